@@ -1,0 +1,68 @@
+# How every target of Railfix is made: one library a folder, one program a service, one test program a folder.
+
+set(RAILFIX_SANITIZE "" CACHE STRING "Sanitizers for all our code, as for -fsanitize= (set by the presets asan and tsan)")
+
+find_program(RAILFIX_CCACHE ccache)
+if(RAILFIX_CCACHE)
+  set(CMAKE_C_COMPILER_LAUNCHER ${RAILFIX_CCACHE})
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${RAILFIX_CCACHE})
+endif()
+
+if(RAILFIX_SANITIZE)
+  add_compile_options(-fsanitize=${RAILFIX_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  add_link_options(-fsanitize=${RAILFIX_SANITIZE})
+endif()
+
+# Picture and filter code is vectorised at O3.
+set(CMAKE_CXX_FLAGS_RELEASE "-O3 -DNDEBUG")
+
+# Strict warnings for our own code; generated code is compiled without them.
+# -Wrestrict is off because g++ 12 warns of every `"text" + string` (GCC bug 105651).
+function(railfix_warnings target)
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
+                                           -Wnon-virtual-dtor -Woverloaded-virtual -Wimplicit-fallthrough -Wno-restrict -Werror)
+endfunction()
+
+# railfix_library(core SOURCES a.cpp DEPENDS x y)  -> target railfix_core, headers as <folder>/<header>.hpp
+function(railfix_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
+  add_library(railfix_${name} STATIC ${ARG_SOURCES})
+  target_include_directories(railfix_${name} PUBLIC ${CMAKE_SOURCE_DIR}/common ${CMAKE_SOURCE_DIR}/services)
+  target_link_libraries(railfix_${name} PUBLIC ${ARG_DEPENDS})
+  railfix_warnings(railfix_${name})
+endfunction()
+
+# railfix_service(odometry ALGORITHM a.cpp SERVICE odometry_service.cpp DEPENDS x)
+#   -> library railfix_odometry (the algorithm, no DDS) and program railfix-odometry (main.cpp and the DDS side).
+function(railfix_service name)
+  cmake_parse_arguments(ARG "" "" "ALGORITHM;SERVICE;DEPENDS" ${ARGN})
+  railfix_library(${name} SOURCES ${ARG_ALGORITHM} DEPENDS ${ARG_DEPENDS})
+  string(REPLACE "_" "-" program ${name})
+  add_executable(railfix-${program} main.cpp ${ARG_SERVICE})
+  target_link_libraries(railfix-${program} PRIVATE railfix_${name} railfix_service)
+  railfix_warnings(railfix-${program})
+endfunction()
+
+# railfix_test(core SOURCES a_test.cpp DEPENDS railfix_core)  -> program railfix-test-core, run by CTest test by test
+function(railfix_test name)
+  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;DEPENDS" ${ARGN})
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 120)
+  endif()
+  add_executable(railfix-test-${name} ${ARG_SOURCES})
+  target_link_libraries(railfix-test-${name} PRIVATE ${ARG_DEPENDS} GTest::gmock GTest::gtest_main)
+  target_include_directories(railfix-test-${name} PRIVATE ${CMAKE_SOURCE_DIR}/tests)
+  target_compile_definitions(railfix-test-${name} PRIVATE RAILFIX_SOURCE_DIR="${CMAKE_SOURCE_DIR}"
+                                                          RAILFIX_BIN_DIR="${CMAKE_RUNTIME_OUTPUT_DIRECTORY}")
+  railfix_warnings(railfix-test-${name})
+  add_test(NAME ${name} COMMAND railfix-test-${name})
+  set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT})
+endfunction()
+
+# railfix_benchmark(odometry SOURCES a.cpp DEPENDS railfix_odometry)  -> program railfix-bench-odometry, run by ./dev bench
+function(railfix_benchmark name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
+  add_executable(railfix-bench-${name} ${ARG_SOURCES})
+  target_link_libraries(railfix-bench-${name} PRIVATE ${ARG_DEPENDS} benchmark::benchmark_main)
+  railfix_warnings(railfix-bench-${name})
+endfunction()
