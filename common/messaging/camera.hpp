@@ -1,0 +1,27 @@
+// camera_calibration as the geometry that it means.
+#pragma once
+
+#include "geometry/camera.hpp"
+#include "idl/camera.h"
+
+namespace railfix::messaging {
+
+inline geometry::Intrinsics intrinsics_of(const msg::CameraCalibration& c) {
+  return {c.fu_px(),
+          c.fv_px(),
+          c.cu_px(),
+          c.cv_px(),
+          c.k1(),
+          c.k2(),
+          c.p1(),
+          c.p2(),
+          static_cast<int>(c.width_px()),
+          static_cast<int>(c.height_px())};
+}
+
+/// A guess where mount_known is false.
+inline geometry::CameraPose mount_of(const msg::CameraCalibration& c) {
+  return {c.roll_rad(), c.pitch_rad(), c.yaw_rad(), c.lateral_m(), c.height_m()};
+}
+
+}  // namespace railfix::messaging

@@ -1,0 +1,163 @@
+#include "messaging/participant.hpp"
+
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
+#include <algorithm>
+#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+
+#include "messaging/fastdds_types.hpp"
+
+namespace railfix::messaging {
+namespace {
+
+namespace dds = eprosima::fastdds::dds;
+namespace rtps = eprosima::fastdds::rtps;
+
+// The built-in segment of 512 KiB loses a third of what a camera sends.
+constexpr uint32_t kSharedMemoryBytes = 16U << 20U;
+constexpr uint32_t kSharedMemoryQueue = 1024;
+constexpr uint32_t kSocketBufferBytes = 4U << 20U;
+// Dead participants vanish after the lease; the default of 20 s would show ghosts.
+constexpr int32_t kParticipantLeaseS = 5;
+constexpr int32_t kAnnouncementS = 1;
+
+dds::DomainParticipantQos participant_qos(const ParticipantOptions& options) {
+  dds::DomainParticipantQos qos;
+  qos.name(options.service + "@" + options.host);
+  qos.transport().use_builtin_transports = false;
+  auto shared_memory = std::make_shared<rtps::SharedMemTransportDescriptor>();
+  shared_memory->segment_size(kSharedMemoryBytes);
+  shared_memory->port_queue_capacity(kSharedMemoryQueue);
+  qos.transport().user_transports.push_back(shared_memory);
+  auto udp = std::make_shared<rtps::UDPv4TransportDescriptor>();
+  udp->sendBufferSize = kSocketBufferBytes;
+  udp->receiveBufferSize = kSocketBufferBytes;
+  udp->non_blocking_send = true;
+  qos.transport().user_transports.push_back(udp);
+  auto& discovery = qos.wire_protocol().builtin.discovery_config;
+  discovery.leaseDuration = {kParticipantLeaseS, 0};
+  discovery.leaseDuration_announcementperiod = {kAnnouncementS, 0};
+  return qos;
+}
+
+}  // namespace
+
+dds::Topic* Participant::Impl::topic(const TopicInfo& info, const std::string& instance) {
+  const std::string name = instance.empty() ? info.name : info.name + "/" + instance;
+  const std::lock_guard lock(mutex);
+  auto& topic = topics[name];
+  if (topic == nullptr) {
+    const auto support = fastdds(*info.type).support();
+    support.register_type(participant);
+    topic = participant->create_topic(name, info.type->name(), dds::TOPIC_QOS_DEFAULT);
+    if (topic == nullptr)
+      throw core::BadInput("topic " + name + " cannot be made on DDS domain " + std::to_string(options.domain));
+  }
+  return topic;
+}
+
+namespace {
+
+// Keeps the topic of one remote endpoint of this train, or forgets it. Fast DDS tells of our own endpoints too.
+template <class Endpoint>
+void note(std::map<eprosima::fastrtps::rtps::GUID_t, std::string>& known, const Endpoint& endpoint, bool removed,
+          const std::string& train_id, const dds::DomainParticipant& own) {
+  if (endpoint.guid().guidPrefix == own.guid().guidPrefix) return;
+  if (removed) {
+    known.erase(endpoint.guid());
+    return;
+  }
+  const auto partitions = endpoint.m_qos.m_partition.getNames();
+  if (std::find(partitions.begin(), partitions.end(), "train/" + train_id) == partitions.end()) return;
+  known[endpoint.guid()] = endpoint.topicName().to_string();
+}
+
+}  // namespace
+
+void Participant::Impl::on_publisher_discovery(dds::DomainParticipant* own,
+                                               eprosima::fastrtps::rtps::WriterDiscoveryInfo&& info) {
+  const std::lock_guard lock(mutex);
+  note(remote_writers, info.info, info.status == eprosima::fastrtps::rtps::WriterDiscoveryInfo::REMOVED_WRITER,
+       options.train_id, *own);
+}
+
+void Participant::Impl::on_subscriber_discovery(dds::DomainParticipant* own,
+                                                eprosima::fastrtps::rtps::ReaderDiscoveryInfo&& info) {
+  const std::lock_guard lock(mutex);
+  note(remote_readers, info.info, info.status == eprosima::fastrtps::rtps::ReaderDiscoveryInfo::REMOVED_READER,
+       options.train_id, *own);
+}
+
+Participant::Participant(const ParticipantOptions& options) : impl_(std::make_unique<Impl>()) {
+  impl_->options = options;
+  auto* factory = dds::DomainParticipantFactory::get_instance();
+  if (!options.qos_profiles.empty()) {
+    if (factory->load_XML_profiles_file(options.qos_profiles) != ReturnCode_t::RETCODE_OK) {
+      throw core::BadInput(options.qos_profiles +
+                           " is not a Fast DDS profile file; start from deploy/qos/railfix_qos.xml");
+    }
+    impl_->own_profiles = true;
+  }
+  if (options.domain < 0 || options.domain > 232) {
+    throw core::BadInput("DDS domain " + std::to_string(options.domain) + " is not in 0..232");
+  }
+  impl_->participant = factory->create_participant(static_cast<uint32_t>(options.domain), participant_qos(options),
+                                                   impl_.get(), dds::StatusMask::none());
+  if (impl_->participant == nullptr) {
+    throw core::BadInput("cannot join DDS domain " + std::to_string(options.domain) +
+                         "; check that /dev/shm has room and that a network interface is up");
+  }
+  dds::PublisherQos publisher_qos;
+  publisher_qos.partition().push_back(("train/" + options.train_id).c_str());
+  impl_->publisher = impl_->participant->create_publisher(publisher_qos);
+  dds::SubscriberQos subscriber_qos;
+  subscriber_qos.partition().push_back(("train/" + options.train_id).c_str());
+  impl_->subscriber = impl_->participant->create_subscriber(subscriber_qos);
+}
+
+Participant::~Participant() {
+  if (impl_->participant == nullptr) return;
+  impl_->participant->set_listener(nullptr);
+  impl_->participant->delete_contained_entities();
+  dds::DomainParticipantFactory::get_instance()->delete_participant(impl_->participant);
+}
+
+void Participant::assert_liveliness() {
+  const std::lock_guard lock(impl_->mutex);
+  for (auto* writer : impl_->manual_liveliness) writer->assert_liveliness();
+}
+
+Connections Participant::connections() const {
+  const std::lock_guard lock(impl_->mutex);
+  Connections connections;
+  connections.endpoints = static_cast<uint32_t>(impl_->writers.size() + impl_->readers.size());
+  connections.remote_endpoints = static_cast<uint32_t>(impl_->remote_writers.size() + impl_->remote_readers.size());
+  std::map<std::string, std::pair<uint32_t, uint32_t>> ends;  // topic -> writers, readers
+  for (auto* writer : impl_->writers) {
+    dds::PublicationMatchedStatus status;
+    writer->get_publication_matched_status(status);
+    connections.matches += static_cast<uint32_t>(status.current_count);
+    ++ends[writer->get_topic()->get_name()].first;
+  }
+  for (auto* reader : impl_->readers) {
+    dds::SubscriptionMatchedStatus status;
+    reader->get_subscription_matched_status(status);
+    connections.matches += static_cast<uint32_t>(status.current_count);
+    ++ends[reader->get_topicdescription()->get_name()].second;
+  }
+  for (const auto& [guid, topic] : impl_->remote_writers) ++ends[topic].first;
+  for (const auto& [guid, topic] : impl_->remote_readers) ++ends[topic].second;
+  for (const auto& [topic, counts] : ends) connections.pairs += counts.first * counts.second;
+  return connections;
+}
+
+std::vector<std::string> Participant::written_topics() const {
+  const std::lock_guard lock(impl_->mutex);
+  std::vector<std::string> names;
+  for (const auto& [guid, name] : impl_->remote_writers) names.push_back(name);
+  std::sort(names.begin(), names.end());
+  names.erase(std::unique(names.begin(), names.end()), names.end());
+  return names;
+}
+
+}  // namespace railfix::messaging

@@ -1,0 +1,40 @@
+// Private to this folder: the inside of a Participant.
+#pragma once
+
+#include <fastdds/dds/domain/DomainParticipant.hpp>
+#include <fastdds/dds/domain/DomainParticipantListener.hpp>
+#include <fastdds/dds/publisher/DataWriter.hpp>
+#include <fastdds/dds/publisher/Publisher.hpp>
+#include <fastdds/dds/subscriber/DataReader.hpp>
+#include <fastdds/dds/subscriber/Subscriber.hpp>
+#include <fastdds/dds/topic/Topic.hpp>
+#include <map>
+#include <set>
+
+#include "messaging/messaging.hpp"
+
+namespace railfix::messaging {
+
+struct Participant::Impl : eprosima::fastdds::dds::DomainParticipantListener {
+  ParticipantOptions options;
+  eprosima::fastdds::dds::DomainParticipant* participant = nullptr;
+  eprosima::fastdds::dds::Publisher* publisher = nullptr;
+  eprosima::fastdds::dds::Subscriber* subscriber = nullptr;
+
+  std::mutex mutex;
+  std::map<std::string, eprosima::fastdds::dds::Topic*> topics;
+  std::set<eprosima::fastdds::dds::DataWriter*> manual_liveliness;  // writers to assert
+  std::set<eprosima::fastdds::dds::DataWriter*> writers;
+  std::set<eprosima::fastdds::dds::DataReader*> readers;
+  std::map<eprosima::fastrtps::rtps::GUID_t, std::string> remote_writers;  // topic name of each
+  std::map<eprosima::fastrtps::rtps::GUID_t, std::string> remote_readers;
+  bool own_profiles = false;
+
+  eprosima::fastdds::dds::Topic* topic(const TopicInfo& info, const std::string& instance);
+  void on_publisher_discovery(eprosima::fastdds::dds::DomainParticipant*,
+                              eprosima::fastrtps::rtps::WriterDiscoveryInfo&& info) override;
+  void on_subscriber_discovery(eprosima::fastdds::dds::DomainParticipant*,
+                               eprosima::fastrtps::rtps::ReaderDiscoveryInfo&& info) override;
+};
+
+}  // namespace railfix::messaging

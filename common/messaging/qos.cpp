@@ -1,0 +1,116 @@
+#include <sstream>
+
+#include "core/time.hpp"
+#include "messaging/fastdds_qos.hpp"
+#include "messaging/topics.hpp"
+
+namespace railfix::messaging {
+namespace {
+
+namespace dds = eprosima::fastdds::dds;
+
+// Liveliness must be announced well within the lease; the run loop asserts every 50 ms.
+constexpr double kAnnounceShareOfLease = 0.5;
+
+eprosima::fastrtps::Duration_t duration(int64_t ns) {
+  return {static_cast<int32_t>(ns / core::kNsPerSecond), static_cast<uint32_t>(ns % core::kNsPerSecond)};
+}
+
+template <class Qos>
+void apply_common(const QosProfile& profile, Qos& qos) {
+  qos.durability().kind = profile.transient_local ? dds::TRANSIENT_LOCAL_DURABILITY_QOS : dds::VOLATILE_DURABILITY_QOS;
+  qos.history().kind = dds::KEEP_LAST_HISTORY_QOS;
+  qos.history().depth = profile.depth;
+  qos.resource_limits().max_instances = profile.max_instances;
+  qos.resource_limits().max_samples_per_instance = profile.depth;
+  qos.resource_limits().max_samples = profile.depth * profile.max_instances;
+  qos.resource_limits().allocated_samples = std::min(profile.depth * profile.max_instances, 16);
+  qos.ownership().kind = profile.exclusive ? dds::EXCLUSIVE_OWNERSHIP_QOS : dds::SHARED_OWNERSHIP_QOS;
+  if (profile.deadline_ns > 0) qos.deadline().period = duration(profile.deadline_ns);
+  if (profile.liveliness_lease_ns > 0) {
+    qos.liveliness().kind = dds::MANUAL_BY_TOPIC_LIVELINESS_QOS;
+    qos.liveliness().lease_duration = duration(profile.liveliness_lease_ns);
+    qos.liveliness().announcement_period =
+        duration(static_cast<int64_t>(static_cast<double>(profile.liveliness_lease_ns) * kAnnounceShareOfLease));
+  }
+  if (profile.data_sharing) {
+    qos.data_sharing().automatic();
+  } else {
+    qos.data_sharing().off();
+  }
+  qos.endpoint().history_memory_policy = profile.data_sharing
+                                             ? eprosima::fastrtps::rtps::PREALLOCATED_MEMORY_MODE
+                                             : eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
+}
+
+std::string xml_duration(int64_t ns) {
+  std::ostringstream xml;
+  xml << "<sec>" << ns / core::kNsPerSecond << "</sec><nanosec>" << ns % core::kNsPerSecond << "</nanosec>";
+  return xml.str();
+}
+
+void write_xml(std::ostream& xml, const TopicInfo& topic, bool writer) {
+  const QosProfile& p = topic.qos;
+  const char* tag = writer ? "data_writer" : "data_reader";
+  const bool reliable = writer ? p.writer_reliable : p.reliable;
+  xml << "    <" << tag << " profile_name=\"" << topic.name << "\">\n      <qos>\n";
+  if (p.data_sharing) {
+    xml << "        <data_sharing><kind>AUTOMATIC</kind></data_sharing>\n";
+  } else {
+    xml << "        <data_sharing><kind>OFF</kind></data_sharing>\n";
+  }
+  xml << "        <reliability><kind>" << (reliable ? "RELIABLE" : "BEST_EFFORT") << "</kind></reliability>\n";
+  xml << "        <durability><kind>" << (p.transient_local ? "TRANSIENT_LOCAL" : "VOLATILE")
+      << "</kind></durability>\n";
+  if (p.deadline_ns > 0) xml << "        <deadline><period>" << xml_duration(p.deadline_ns) << "</period></deadline>\n";
+  if (p.liveliness_lease_ns > 0) {
+    const auto announce = static_cast<int64_t>(static_cast<double>(p.liveliness_lease_ns) * kAnnounceShareOfLease);
+    xml << "        <liveliness><kind>MANUAL_BY_TOPIC</kind><lease_duration>" << xml_duration(p.liveliness_lease_ns)
+        << "</lease_duration><announcement_period>" << xml_duration(announce)
+        << "</announcement_period></liveliness>\n";
+  }
+  if (p.exclusive) xml << "        <ownership><kind>EXCLUSIVE</kind></ownership>\n";
+  if (writer)
+    xml << "        <publishMode><kind>" << (p.asynchronous ? "ASYNCHRONOUS" : "SYNCHRONOUS")
+        << "</kind></publishMode>\n";
+  xml << "      </qos>\n      <topic>\n";
+  xml << "        <historyQos><kind>KEEP_LAST</kind><depth>" << p.depth << "</depth></historyQos>\n";
+  xml << "        <resourceLimitsQos><max_samples>" << p.depth * p.max_instances << "</max_samples><max_instances>"
+      << p.max_instances << "</max_instances><max_samples_per_instance>" << p.depth
+      << "</max_samples_per_instance><allocated_samples>" << std::min(p.depth * p.max_instances, 16)
+      << "</allocated_samples></resourceLimitsQos>\n      </topic>\n";
+  xml << "      <historyMemoryPolicy>" << (p.data_sharing ? "PREALLOCATED" : "PREALLOCATED_WITH_REALLOC")
+      << "</historyMemoryPolicy>\n    </" << tag << ">\n";
+}
+
+}  // namespace
+
+void apply(const QosProfile& profile, dds::DataWriterQos& qos) {
+  apply_common(profile, qos);
+  qos.reliability().kind = profile.writer_reliable ? dds::RELIABLE_RELIABILITY_QOS : dds::BEST_EFFORT_RELIABILITY_QOS;
+  qos.publish_mode().kind = profile.asynchronous ? dds::ASYNCHRONOUS_PUBLISH_MODE : dds::SYNCHRONOUS_PUBLISH_MODE;
+}
+
+void apply(const QosProfile& profile, dds::DataReaderQos& qos) {
+  apply_common(profile, qos);
+  qos.reliability().kind = profile.reliable ? dds::RELIABLE_RELIABILITY_QOS : dds::BEST_EFFORT_RELIABILITY_QOS;
+}
+
+std::string qos_xml() {
+  std::ostringstream xml;
+  xml << "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"
+         "<!-- Quality of service of every Railfix topic, one writer and one reader profile each. Equal to the "
+         "compiled-in\n"
+         "     profiles (common/messaging/topics.hpp; `railfix topics qos` prints this file). Services use an edited "
+         "copy with\n"
+         "     common.qos_profiles. -->\n"
+         "<dds xmlns=\"http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles\">\n  <profiles>\n";
+  for (const auto& topic : all_topics()) {
+    write_xml(xml, topic, true);
+    write_xml(xml, topic, false);
+  }
+  xml << "  </profiles>\n</dds>\n";
+  return xml.str();
+}
+
+}  // namespace railfix::messaging

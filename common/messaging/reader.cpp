@@ -1,0 +1,91 @@
+#include <fastdds/dds/subscriber/DataReaderListener.hpp>
+
+#include "messaging/fastdds_qos.hpp"
+#include "messaging/fastdds_types.hpp"
+#include "messaging/participant.hpp"
+
+namespace railfix::messaging {
+
+namespace dds = eprosima::fastdds::dds;
+
+struct AnyReader::Impl : dds::DataReaderListener {
+  Participant::Impl* participant = nullptr;
+  const FastDdsType* type = nullptr;
+  dds::DataReader* reader = nullptr;
+  Queue* queue = nullptr;
+  std::shared_ptr<const Handler> handler;
+  Queue::Source source;
+
+  std::mutex mutex;
+  std::map<dds::InstanceHandle_t, std::shared_ptr<const void>>
+      last_of_writer;  // keyed topics: to say who has fallen silent
+
+  void push(std::shared_ptr<const void> sample, const SampleInfo& info) {
+    queue->push(&source, [run = handler, sample = std::move(sample), info] { (*run)(sample, info); });
+  }
+
+  void on_data_available(dds::DataReader* from) override {
+    type->take_all(
+        *from, [this](std::shared_ptr<const void> sample, const SampleInfo& info, const dds::InstanceHandle_t& writer) {
+          if (type->keyed()) {
+            const std::lock_guard lock(mutex);
+            last_of_writer[writer] = sample;
+          }
+          push(std::move(sample), info);
+        });
+  }
+
+  void on_liveliness_changed(dds::DataReader*, const dds::LivelinessChangedStatus& status) override {
+    if (status.alive_count_change >= 0) return;
+    const std::lock_guard lock(mutex);
+    const auto last = last_of_writer.find(status.last_publication_handle);
+    if (last != last_of_writer.end()) push(last->second, {.valid = false});
+  }
+};
+
+AnyReader::AnyReader(Participant& participant, const TopicInfo& topic, const std::string& instance, Queue& queue,
+                     Handler handler)
+    : impl_(std::make_unique<Impl>()) {
+  auto& inside = participant.impl();
+  impl_->participant = &inside;
+  impl_->type = &fastdds(*topic.type);
+  impl_->queue = &queue;
+  impl_->handler = std::make_shared<const Handler>(std::move(handler));
+  impl_->source.limit = topic.reader_queue;
+  dds::DataReaderQos qos;
+  if (!inside.own_profiles ||
+      inside.subscriber->get_datareader_qos_from_profile(topic.name, qos) != ReturnCode_t::RETCODE_OK) {
+    apply(topic.qos, qos);
+  }
+  auto* dds_topic = inside.topic(topic, instance);
+  impl_->reader = inside.subscriber->create_datareader(
+      dds_topic, qos, impl_.get(), dds::StatusMask::data_available() << dds::StatusMask::liveliness_changed());
+  if (impl_->reader == nullptr) {
+    throw core::BadInput("topic " + dds_topic->get_name() +
+                         " cannot be read: quality of service or permissions refuse it");
+  }
+  const std::lock_guard lock(inside.mutex);
+  inside.readers.insert(impl_->reader);
+}
+
+AnyReader::~AnyReader() {
+  {
+    const std::lock_guard lock(impl_->participant->mutex);
+    impl_->participant->readers.erase(impl_->reader);
+  }
+  impl_->reader->set_listener(nullptr);
+  impl_->participant->subscriber->delete_datareader(impl_->reader);
+  impl_->queue->forget(&impl_->source);
+}
+
+int AnyReader::matched_writers() const {
+  dds::SubscriptionMatchedStatus status;
+  impl_->reader->get_subscription_matched_status(status);
+  return status.current_count;
+}
+
+uint64_t AnyReader::dropped() const {
+  return impl_->queue->dropped(impl_->source);
+}
+
+}  // namespace railfix::messaging

@@ -1,0 +1,80 @@
+#include <fastdds/dds/publisher/DataWriterListener.hpp>
+
+#include "messaging/fastdds_qos.hpp"
+#include "messaging/fastdds_types.hpp"
+#include "messaging/participant.hpp"
+
+namespace railfix::messaging {
+
+namespace dds = eprosima::fastdds::dds;
+
+namespace {
+const eprosima::fastrtps::Duration_t kLastWordsPatience{0, 300'000'000};
+}
+
+// A writer always has its own listener: in 2.9.1 an offered deadline that is missed crashes otherwise
+// (eProsima/Fast-DDS#3423).
+struct AnyWriter::Impl : dds::DataWriterListener {
+  Participant::Impl* participant = nullptr;
+  dds::DataWriter* writer = nullptr;
+  std::shared_ptr<void> scratch;  // for topics whose samples cannot be loaned
+
+  ~Impl() override {
+    if (writer == nullptr) return;
+    {
+      const std::lock_guard lock(participant->mutex);
+      participant->manual_liveliness.erase(writer);
+      participant->writers.erase(writer);
+    }
+    // A service's last words (its status, its last log line) would go with their writer.
+    writer->wait_for_acknowledgments(kLastWordsPatience);
+    participant->publisher->delete_datawriter(writer);
+  }
+};
+
+AnyWriter::AnyWriter(Participant& participant, const TopicInfo& topic, const std::string& instance)
+    : impl_(std::make_shared<Impl>()) {
+  auto& inside = participant.impl();
+  impl_->participant = &inside;
+  dds::DataWriterQos qos;
+  if (!inside.own_profiles ||
+      inside.publisher->get_datawriter_qos_from_profile(topic.name, qos) != ReturnCode_t::RETCODE_OK) {
+    apply(topic.qos, qos);
+  }
+  if (topic.qos.exclusive) qos.ownership_strength().value = static_cast<uint32_t>(inside.options.ownership_strength);
+  auto* dds_topic = inside.topic(topic, instance);
+  impl_->writer = inside.publisher->create_datawriter(dds_topic, qos, impl_.get(), dds::StatusMask::all());
+  if (impl_->writer == nullptr) {
+    throw core::BadInput("topic " + dds_topic->get_name() +
+                         " cannot be written: quality of service or permissions refuse it");
+  }
+  impl_->scratch = topic.type->make();
+  const std::lock_guard lock(inside.mutex);
+  inside.writers.insert(impl_->writer);
+  if (topic.qos.liveliness_lease_ns > 0) inside.manual_liveliness.insert(impl_->writer);
+}
+
+bool AnyWriter::write(const void* sample) {
+  return impl_->writer->write(const_cast<void*>(sample));  // Fast DDS takes void* and only reads
+}
+
+bool AnyWriter::write_in_place(const std::function<void(void*)>& fill) {
+  void* loan = nullptr;
+  const auto loaned = impl_->writer->loan_sample(loan, dds::DataWriter::LoanInitializationKind::NO_LOAN_INITIALIZATION);
+  if (loaned != ReturnCode_t::RETCODE_OK) {
+    fill(impl_->scratch.get());
+    return impl_->writer->write(impl_->scratch.get());
+  }
+  fill(loan);
+  if (impl_->writer->write(loan)) return true;
+  impl_->writer->discard_loan(loan);
+  return false;
+}
+
+int AnyWriter::matched_readers() const {
+  dds::PublicationMatchedStatus status;
+  impl_->writer->get_publication_matched_status(status);
+  return status.current_count;
+}
+
+}  // namespace railfix::messaging

@@ -1,0 +1,92 @@
+#include "service/health.hpp"
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <fstream>
+
+#include "core/time.hpp"
+
+namespace railfix::service {
+namespace {
+
+constexpr int64_t kMeasurePeriodNs = core::kNsPerSecond;
+constexpr size_t kMostLatencies = 4096;
+constexpr size_t kReasonBytes = 255;
+
+int64_t used_cpu_ns() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto ns = [](const timeval& time) { return time.tv_sec * core::kNsPerSecond + time.tv_usec * 1000; };
+  return ns(usage.ru_utime) + ns(usage.ru_stime);
+}
+
+double resident_mb() {
+  std::ifstream statm("/proc/self/statm");
+  double total_pages = 0;
+  double resident_pages = 0;
+  statm >> total_pages >> resident_pages;
+  return resident_pages * static_cast<double>(sysconf(_SC_PAGESIZE)) / 1e6;
+}
+
+double percentile(std::vector<double>& values, double share) {
+  if (values.empty()) return 0;
+  const auto nth = values.begin() + static_cast<int64_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), nth, values.end());
+  return *nth;
+}
+
+}  // namespace
+
+PublishedHealth::PublishedHealth(messaging::Participant& participant, const std::string& service,
+                                 const std::string& host)
+    : participant_(participant),
+      writer_(participant, messaging::topics::service_status),
+      measured_ns_(core::monotonic_ns()),
+      cpu_ns_(used_cpu_ns()) {
+  status_.service(service);
+  status_.host(host);
+  status_.version(RAILFIX_VERSION);
+  status_.pid(static_cast<uint32_t>(getpid()));
+  status_.state(msg::STATE_STARTING);
+}
+
+void PublishedHealth::output(int64_t grabbed_ns) {
+  status_.frames_out(status_.frames_out() + 1);
+  if (grabbed_ns > 0 && latencies_ms_.size() < kMostLatencies) {
+    latencies_ms_.push_back(core::seconds(core::wall_ns() - grabbed_ns) * 1e3);
+  }
+}
+
+void PublishedHealth::change(uint8_t state, const std::string& reason) {
+  const std::string cut = reason.substr(0, kReasonBytes);
+  if (status_.state() == state && cut == status_.reason().c_str()) return;
+  status_.state(state);
+  status_.reason(cut);
+  publish();
+}
+
+void PublishedHealth::publish() {
+  measure();
+  const auto connections = participant_.connections();
+  status_.endpoints(connections.endpoints);
+  status_.matches(connections.matches);
+  status_.stamp_ns(core::wall_ns());
+  writer_.write(status_);
+}
+
+void PublishedHealth::measure() {
+  const int64_t now_ns = core::monotonic_ns();
+  if (now_ns - measured_ns_ < kMeasurePeriodNs) return;
+  const int64_t cpu_ns = used_cpu_ns();
+  status_.cpu_percent(100.0 * static_cast<double>(cpu_ns - cpu_ns_) / static_cast<double>(now_ns - measured_ns_));
+  status_.rss_mb(resident_mb());
+  status_.latency_p50_ms(percentile(latencies_ms_, 0.50));
+  status_.latency_p99_ms(percentile(latencies_ms_, 0.99));
+  latencies_ms_.clear();
+  measured_ns_ = now_ns;
+  cpu_ns_ = cpu_ns;
+}
+
+}  // namespace railfix::service

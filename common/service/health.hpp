@@ -1,0 +1,38 @@
+// Private to this folder: counts, measures and publishes service_status.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "service/service.hpp"
+
+namespace railfix::service {
+
+class PublishedHealth final : public Health {
+ public:
+  PublishedHealth(messaging::Participant& participant, const std::string& service, const std::string& host);
+
+  void ready() override { change(msg::STATE_READY, ""); }
+  void active() override { change(msg::STATE_ACTIVE, ""); }
+  void degraded(const std::string& reason) override { change(msg::STATE_DEGRADED, reason); }
+  void failed(const std::string& reason) override { change(msg::STATE_FAILED, reason); }
+  void input() override { status_.frames_in(status_.frames_in() + 1); }
+  void output(int64_t grabbed_ns) override;
+  void dropped(uint64_t count) override { status_.dropped(status_.dropped() + count); }
+
+  void stopped() { change(msg::STATE_STOPPED, ""); }
+  /// Publishes; measures processor and latency anew when the measuring period has passed.
+  void publish();
+
+ private:
+  void change(uint8_t state, const std::string& reason);
+  void measure();
+  messaging::Participant& participant_;
+  messaging::Writer<msg::ServiceStatus> writer_;
+  msg::ServiceStatus status_;
+  std::vector<double> latencies_ms_;  // since the last measurement
+  int64_t measured_ns_ = 0;
+  int64_t cpu_ns_ = 0;
+};
+
+}  // namespace railfix::service

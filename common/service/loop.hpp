@@ -1,0 +1,60 @@
+// Private to this folder: the one run loop.
+#pragma once
+
+#include <map>
+
+#include "service/health.hpp"
+#include "service/service.hpp"
+
+namespace railfix::service {
+
+class Loop final : public Context {
+ public:
+  Loop(std::string service, const CommonConfig& common);
+  ~Loop() override;
+
+  void every(std::chrono::nanoseconds period, std::function<void()> handler) override;
+  void post(std::function<void()> handler) override { queue_.push(nullptr, std::move(handler)); }
+  void at_stop(std::function<void()> handler) override { at_stop_.push_back(std::move(handler)); }
+  void on_command(const std::string& command,
+                  std::function<core::Result<std::string>(const std::string&)> handler) override;
+  Health& health() override { return *health_; }
+  spdlog::logger& log() override { return *log_; }
+  [[nodiscard]] const CommonConfig& common() const override { return common_; }
+  [[nodiscard]] const std::string& service_name() const override { return service_; }
+  messaging::Participant& participant() override { return participant_; }
+  void finish(const std::string& why) override;
+  void used_up_to(int64_t data_ns) override;
+
+  /// Until finish().
+  void turn();
+
+ protected:
+  messaging::Queue& queue() override { return queue_; }
+  void keep(std::shared_ptr<void> reader) override { readers_.push_back(std::move(reader)); }
+
+ private:
+  struct Timer {
+    int64_t period_ns;
+    int64_t due_ns;
+    std::function<void()> handler;
+  };
+  void run_due_timers();
+  void answer(const msg::ControlRequest& request);
+
+  std::string service_;
+  CommonConfig common_;
+  messaging::Participant participant_;
+  messaging::Queue queue_;
+  std::shared_ptr<spdlog::logger> log_;
+  std::unique_ptr<PublishedHealth> health_;
+  std::unique_ptr<messaging::Writer<msg::DataProgress>> progress_;
+  std::unique_ptr<messaging::Writer<msg::ControlReply>> reply_;
+  std::map<std::string, std::function<core::Result<std::string>(const std::string&)>> commands_;
+  std::vector<Timer> timers_;
+  std::vector<std::function<void()>> at_stop_;
+  std::vector<std::shared_ptr<void>> readers_;
+  bool finished_ = false;
+};
+
+}  // namespace railfix::service

@@ -1,0 +1,142 @@
+#include <pthread.h>
+#include <signal.h>
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <thread>
+
+#include "service/loop.hpp"
+
+namespace railfix::service {
+namespace {
+
+enum ExitCode { kDone = 0, kFailed = 1, kBadInput = 2 };
+
+struct CommandLine {
+  std::filesystem::path config;
+  std::vector<std::string> sets;
+  bool check = false;
+  bool document = false;
+};
+
+std::vector<Override> overrides_of(const std::vector<std::string>& sets) {
+  std::vector<Override> overrides;
+  for (const auto& text : sets) {
+    const size_t equals = text.find('=');
+    if (equals == std::string::npos || text.find('.') > equals) {
+      throw core::BadInput("--set " + text + " must be section.key=value");
+    }
+    const Override change{text.substr(0, equals), text.substr(equals + 1)};
+    const std::string section = change.key.substr(0, change.key.find('.'));
+    const auto& known = known_sections();
+    if (section != "common" && std::find(known.begin(), known.end(), section) == known.end()) {
+      throw core::BadInput("--set " + text + ": section " + section +
+                           " belongs to no service; `--document` shows this service's sections");
+    }
+    overrides.push_back(change);
+  }
+  return overrides;
+}
+
+// SIGTERM and SIGINT end the loop from a thread of their own, so that everything is taken down in order.
+class SignalWatch {
+ public:
+  SignalWatch() {
+    sigemptyset(&signals_);
+    sigaddset(&signals_, SIGTERM);
+    sigaddset(&signals_, SIGINT);
+    sigaddset(&signals_, SIGUSR2);
+    pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
+  }
+  void watch(Loop& loop) {
+    thread_ = std::thread([this, &loop] {
+      int signal = 0;
+      sigwait(&signals_, &signal);
+      if (signal != SIGUSR2) loop.post([&loop, signal] { loop.finish(signal == SIGTERM ? "SIGTERM" : "SIGINT"); });
+    });
+  }
+  ~SignalWatch() {
+    if (!thread_.joinable()) return;
+    pthread_kill(thread_.native_handle(), SIGUSR2);
+    thread_.join();
+  }
+
+ private:
+  sigset_t signals_{};
+  std::thread thread_;
+};
+
+int serve(const Program& program, const CommonConfig& common) {
+  SignalWatch signals;
+  Loop loop(program.name, common);
+  signals.watch(loop);
+  try {
+    const auto service = program.make(loop);
+    loop.log().info("version {}, train {}, domain {}", RAILFIX_VERSION, common.train_id, common.domain);
+    loop.health().ready();
+    loop.turn();
+  } catch (const core::BadInput& error) {
+    loop.log().error("{}", error.what());
+    loop.health().failed(error.what());
+    return kBadInput;
+  } catch (const std::exception& error) {
+    loop.log().critical("failed: {}", error.what());
+    loop.health().failed(error.what());
+    return kFailed;
+  }
+  return kDone;
+}
+
+}  // namespace
+
+void CommonConfig::describe(Fields& fields) {
+  fields.text("train_id", train_id, "Name of the train; services see only services of the same train.");
+  fields.text("host", host, "Name of the computer that this service runs on, for status and log.");
+  fields.integer("domain", domain, {0, 232}, "", "DDS domain of the train.");
+  fields.choice("log_level", log_level, {"trace", "debug", "info", "warning", "error"},
+                "Least severe message that is logged.");
+  fields.text("qos_profiles", qos_profiles,
+              "Fast DDS XML file that replaces the built-in quality of service; empty = built in.");
+  fields.integer("ownership_strength", ownership_strength, {0, 1000}, "",
+                 "Of two services that write the same exclusive topic the stronger one is heard.");
+  fields.flag("lock_step", lock_step, "Answer on data_progress; set by `railfix run --pace lossless`.");
+}
+
+const std::vector<std::string>& known_sections() {
+  static const std::vector<std::string> sections{"frame_grabber", "sensor_gateway", "track_detector", "odometry",
+                                                 "map_matcher",   "fusion",         "tpr_publisher",  "recorder"};
+  return sections;
+}
+
+int run_program(const Program& program, int argc, char** argv) {
+  CommandLine line;
+  CLI::App app{"Railfix service " + program.name};
+  app.add_option("--config", line.config,
+                 "YAML file with the sections `common` and `" + program.name + "` (others are ignored)");
+  app.add_option("--set", line.sets, "section.key=value, over the file; may be repeated");
+  app.add_flag("--check", line.check, "Read the configuration, say what is wrong with it, and end");
+  app.add_flag("--document", line.document, "Print every key with its default, unit, range and meaning, and end");
+  app.set_version_flag("--version", std::string(RAILFIX_VERSION));
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kDone : kBadInput;
+  }
+  if (line.document) {
+    std::cout << document_config<CommonConfig>("common") << program.document();
+    return kDone;
+  }
+  try {
+    const auto overrides = overrides_of(line.sets);
+    const auto common =
+        core::value_or_throw(read_config<CommonConfig>("common", line.config, overrides, known_sections()));
+    core::ok_or_throw(program.read(line.config, overrides));
+    if (line.check) return kDone;
+    return serve(program, common);
+  } catch (const core::BadInput& error) {
+    std::cerr << program.name << ": " << error.what() << '\n';
+    return kBadInput;
+  }
+}
+
+}  // namespace railfix::service

@@ -1,0 +1,131 @@
+// The shape of every service: one configuration, one run loop, one thread that runs all handlers, status and log over
+// DDS.
+//
+//   int main(int argc, char** argv) { return railfix::service::run<railfix::odometry::OdometryService>("odometry",
+//   argc, argv); }
+//
+//   class OdometryService {
+//    public:
+//     using Config = OdometryConfig;                            // has describe(service::Fields&)
+//     OdometryService(const Config& config, service::Context& context);   // creates writers, registers handlers; may
+//     throw BadInput
+//   };
+//
+// Command line of every service: --config FILE, --set section.key=value, --check, --document, --version (see
+// docs/configuration).
+#pragma once
+
+#include <spdlog/logger.h>
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "messaging/topics.hpp"
+#include "service/config.hpp"
+
+namespace railfix::service {
+
+/// What all services of a train share: section `common` of the configuration file.
+struct CommonConfig {
+  std::string train_id = "demo";
+  std::string host = "local";
+  int64_t domain = 0;
+  std::string log_level = "info";
+  std::string qos_profiles;
+  int64_t ownership_strength = 10;
+  bool lock_step = false;
+  void describe(Fields& fields);
+};
+
+/// State, counters and latency of this service; published as service_status four times a second and at every change of
+/// state. Call from handlers only.
+class Health {
+ public:
+  virtual ~Health() = default;
+  virtual void ready() = 0;  // set up, waits for input
+  virtual void active() = 0;
+  virtual void degraded(const std::string& reason) = 0;  // goes on with less
+  virtual void failed(const std::string& reason) = 0;
+  virtual void input() = 0;                     // one input sample used
+  virtual void output(int64_t grabbed_ns) = 0;  // one output sent; grabbed_ns of the input behind it, 0 = none
+  virtual void dropped(uint64_t count) = 0;
+};
+
+/// What a service gets from the run loop. All handlers run one after the other in the service's own thread, samples in
+/// the order of their arrival.
+class Context {
+ public:
+  virtual ~Context() = default;
+
+  /// A writer of this topic; `instance` is the part behind the slash ("cam0" in camera_frame/cam0).
+  template <class T>
+  messaging::Writer<T> writer(const messaging::Topic<T>& topic, const std::string& instance = "") {
+    return messaging::Writer<T>(participant(), topic, instance);
+  }
+  /// Calls the handler for every sample. When handlers are slower than the data the oldest waiting samples are dropped
+  /// and counted (queue length: topic.reader_queue).
+  template <class T>
+  void on(const messaging::Topic<T>& topic, std::function<void(const T&)> handler, const std::string& instance = "") {
+    keep(std::make_shared<messaging::Reader<T>>(participant(), topic, instance, queue(), std::move(handler)));
+  }
+  /// Calls the handler in this period (host's monotonic clock).
+  virtual void every(std::chrono::nanoseconds period, std::function<void()> handler) = 0;
+  /// Calls the handler once, soon, in the service thread. May be called from any thread.
+  virtual void post(std::function<void()> handler) = 0;
+  /// Calls the handler when the service is told to stop, before writers go away.
+  virtual void at_stop(std::function<void()> handler) = 0;
+  /// Answers a request on service_control that is addressed to this service: gives the reply's text or an error.
+  virtual void on_command(const std::string& command,
+                          std::function<core::Result<std::string>(const std::string& argument)> handler) = 0;
+
+  virtual Health& health() = 0;
+  virtual spdlog::logger& log() = 0;
+  [[nodiscard]] virtual const CommonConfig& common() const = 0;
+  [[nodiscard]] virtual const std::string& service_name() const = 0;
+  virtual messaging::Participant& participant() = 0;
+  /// Ends the run loop; the program exits with 0.
+  virtual void finish(const std::string& why) = 0;
+
+  /// Lock step: tells whoever plays the data that this service has used everything up to data_ns. Does nothing on a
+  /// live train.
+  virtual void used_up_to(int64_t data_ns) = 0;
+
+ protected:
+  virtual messaging::Queue& queue() = 0;
+  virtual void keep(std::shared_ptr<void> reader) = 0;
+};
+
+/// Everything around a service. `make` is called once the participant is up.
+struct Program {
+  std::string name;
+  std::function<core::Status(const std::filesystem::path& file, const std::vector<Override>& overrides)> read;
+  std::function<std::string()> document;
+  std::function<std::shared_ptr<void>(Context&)> make;
+};
+int run_program(const Program& program, int argc, char** argv);
+
+/// Names of all services' configuration sections, so that one file may configure a whole train.
+const std::vector<std::string>& known_sections();
+
+template <class Service>
+int run(const std::string& name, int argc, char** argv) {
+  auto config = std::make_shared<typename Service::Config>();
+  Program program;
+  program.name = name;
+  program.read = [config, name](const std::filesystem::path& file,
+                                const std::vector<Override>& overrides) -> core::Status {
+    auto read = read_config<typename Service::Config>(name, file, overrides, known_sections());
+    if (!read.ok()) return read.error();
+    *config = read.value();
+    return {};
+  };
+  program.document = [name] { return document_config<typename Service::Config>(name); };
+  program.make = [config](Context& context) -> std::shared_ptr<void> {
+    return std::make_shared<Service>(*config, context);
+  };
+  return run_program(program, argc, argv);
+}
+
+}  // namespace railfix::service
