@@ -1,0 +1,188 @@
+#include "track/import/build.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <iomanip>
+#include <sstream>
+
+#include "track/import/finish.hpp"
+#include "track/import/landxml.hpp"
+#include "track/import/network.hpp"
+#include "track/import/osm_network.hpp"
+
+namespace railfix::track {
+namespace {
+
+constexpr double kSurveyFrogSigmaM = 0.5;  // the frog is drawn, not surveyed
+constexpr double kMappingFrogSigmaM = 10.0;
+constexpr double kSurveyLocationM = 1.0;  // Q_LOCACC
+constexpr double kMappingLocationM = 5.0;
+
+enum class Kind { landxml, osm, json, compiled };
+
+/// By the name's ending; .xml by its first element.
+core::Result<Kind> kind_of(const std::filesystem::path& file) {
+  const std::string name = file.filename().string();
+  const auto ends = [&](std::initializer_list<std::string_view> endings) {
+    return std::any_of(endings.begin(), endings.end(), [&](std::string_view ending) { return name.ends_with(ending); });
+  };
+  if (!std::filesystem::is_regular_file(file))
+    return core::Error{"cannot read " + file.string() + "; is the path right?"};
+  if (ends({".osm", ".pbf", ".osm.gz", ".osm.bz2", ".osm.xml"})) return Kind::osm;
+  if (ends({".json", ".geojson"})) return Kind::json;
+  if (ends({".landxml", ".LandXML"})) return Kind::landxml;
+  if (ends({".map"})) return Kind::compiled;
+  if (ends({".xml", ".XML"})) {
+    std::ifstream stream(file, std::ios::binary);
+    std::string head(1000, '\0');
+    stream.read(head.data(), static_cast<std::streamsize>(head.size()));
+    return head.find("<osm") != std::string::npos ? Kind::osm : Kind::landxml;
+  }
+  return core::Error{file.string() +
+                     " is of no kind that can be read; give LandXML (.xml, .landxml), OpenStreetMap (.osm, .pbf), "
+                     "Overpass JSON, GeoJSON or a compiled map (.map)"};
+}
+
+/// True to scale at its middle: a metre on the map is a metre on the ground to 1e-5 within 25 km.
+std::string local_crs(const GeoPoint& middle) {
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(4) << "+proj=tmerc +lat_0=" << middle.lat_deg << " +lon_0=" << middle.lon_deg
+       << " +k=1 +x_0=100000 +y_0=100000 +ellps=WGS84 +units=m +no_defs +type=crs";
+  return text.str();
+}
+
+/// Everything that was read, before it becomes one map. Errors are thrown as BadInput and become a value at the door.
+class Sources {
+ public:
+  explicit Sources(const BuildOptions& options) : options_(options) {}
+
+  void read(const std::filesystem::path& file) {
+    map_.source += (map_.source.empty() ? "" : ", ") + file.filename().string();
+    switch (core::value_or_throw(kind_of(file))) {
+      case Kind::landxml:
+        take(core::value_or_throw(read_landxml(file)), file);
+        break;
+      case Kind::osm:
+        take(core::value_or_throw(read_osm(file, options_.with_trams)));
+        break;
+      case Kind::json:
+        take(core::value_or_throw(read_osm_json(file, options_.with_trams)));
+        break;
+      case Kind::compiled:
+        take(core::value_or_throw(Map::load(file)), file);
+        break;
+    }
+  }
+
+  BuiltMap finish() {
+    choose_crs();
+    if (!tracks_.empty()) {
+      append(cut_tracks(std::move(tracks_), map_.problems), map_);
+      add_frogs(map_, kSurveyFrogSigmaM);
+    }
+    const size_t surveyed_edges = map_.edges.size();
+    if (!osm_.ways.empty() || map_.edges.empty()) add_osm();
+    const bool all_surveyed = surveyed_edges == map_.edges.size();
+    if (options_.virtual_balises_every_m > 0) {
+      core::ok_or_throw(add_virtual_balises(map_, options_.virtual_balises_every_m, options_.nid_c,
+                                            options_.first_nid_bg,
+                                            all_surveyed ? kSurveyLocationM : kMappingLocationM));
+    }
+    for (std::string& problem : check_topology(map_)) map_.problems.push_back(std::move(problem));
+    out_.map = std::move(map_);
+    return std::move(out_);
+  }
+
+ private:
+  void take(LandXml read, const std::filesystem::path& file) {
+    want_crs(read.crs, file);
+    std::move(read.tracks.begin(), read.tracks.end(), std::back_inserter(tracks_));
+    std::move(read.problems.begin(), read.problems.end(), std::back_inserter(map_.problems));
+    out_.landxml.include(read.figures);
+  }
+
+  void take(OsmData read) {
+    osm_.nodes.merge(read.nodes);
+    std::move(read.ways.begin(), read.ways.end(), std::back_inserter(osm_.ways));
+  }
+
+  void take(Map read, const std::filesystem::path& file) {
+    if (!map_.edges.empty())
+      throw core::BadInput("only one compiled map can be built upon; " + file.string() + " is the second");
+    want_crs(read.crs, file);
+    read.source = map_.source;
+    std::move(map_.problems.begin(), map_.problems.end(), std::back_inserter(read.problems));
+    map_ = std::move(read);
+    // What the check finds is found anew.
+    const std::vector<std::string> found = check_topology(map_);
+    std::erase_if(map_.problems,
+                  [&](const std::string& p) { return std::find(found.begin(), found.end(), p) != found.end(); });
+  }
+
+  void want_crs(const std::string& crs, const std::filesystem::path& file) {
+    if (!source_crs_.empty() && crs != source_crs_) {
+      throw core::BadInput(file.string() + " is in " + (crs.empty() ? "an unnamed coordinate system" : crs) +
+                           " but the sources before it are in " + source_crs_ + "; build one map of each");
+    }
+    source_crs_ = crs;
+    has_plane_source_ = true;
+  }
+
+  void choose_crs() {
+    map_.crs = options_.crs;
+    if (has_plane_source_) {
+      if (map_.crs == "local")
+        throw core::BadInput("--crs local is for OpenStreetMap data only; a plan keeps its own system");
+      if (!map_.crs.empty() && !source_crs_.empty() && map_.crs != source_crs_) {
+        throw core::BadInput("the plan is in " + source_crs_ + " and is not reprojected; leave --crs " + map_.crs +
+                             " out");
+      }
+      if (map_.crs.empty()) map_.crs = source_crs_;
+      if (map_.crs.empty())
+        map_.problems.push_back("the coordinate system is not known; give --crs to get latitudes and longitudes");
+    } else if (const std::optional<GeoPoint> middle = middle_of(osm_)) {
+      if (map_.crs.empty()) map_.crs = utm_crs(*middle);
+      if (map_.crs == "local") map_.crs = local_crs(*middle);
+    }
+    if (!map_.crs.empty() && map_.crs != "local") static_cast<void>(core::value_or_throw(Projection::open(map_.crs)));
+  }
+
+  void add_osm() {
+    if (osm_.ways.empty())
+      throw core::BadInput(
+          "the inputs hold no railway tracks (railway=rail, light_rail, narrow_gauge or subway; --trams adds trams)");
+    if (map_.crs.empty() || map_.crs == "local")
+      throw core::BadInput("OpenStreetMap data need a coordinate system; give --crs");
+    const Projection projection = core::value_or_throw(Projection::open(map_.crs));
+    OsmNetwork network = core::value_or_throw(build_osm_network(osm_, projection, options_.smooth_m));
+    const bool alone = map_.edges.empty();
+    append(network.draft, map_);
+    if (alone) add_frogs(map_, kMappingFrogSigmaM);
+    std::move(network.problems.begin(), network.problems.end(), std::back_inserter(map_.problems));
+    out_.osm.include(network.figures);
+  }
+
+  const BuildOptions& options_;
+  Map map_;
+  std::vector<ImportedTrack> tracks_;
+  OsmData osm_;
+  std::string source_crs_;
+  bool has_plane_source_ = false;
+  BuiltMap out_;
+};
+
+}  // namespace
+
+core::Result<BuiltMap> build_map(const std::vector<std::filesystem::path>& inputs, const BuildOptions& options) {
+  try {
+    Sources sources(options);
+    for (const std::filesystem::path& input : inputs) sources.read(input);
+    BuiltMap built = sources.finish();
+    built.map.name = inputs.empty() ? "" : inputs.front().stem().string();
+    return built;
+  } catch (const core::BadInput& bad) {
+    return core::Error{bad.what()};
+  }
+}
+
+}  // namespace railfix::track

@@ -1,0 +1,34 @@
+// What `railfix map build` does: any mix of sources to one checked map.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/result.hpp"
+#include "track/import/tracks.hpp"
+#include "track/map.hpp"
+
+namespace railfix::track {
+
+struct BuildOptions {
+  std::string crs{};  // "" = the LandXML's own, else the UTM zone of the data; "local" = true to scale around the
+                      // middle of the data
+  bool with_trams = false;
+  double smooth_m = 0;                 // how far points of OpenStreetMap may move to even out the curvature
+  double virtual_balises_every_m = 0;  // 0 = none
+  uint32_t nid_c = 1;
+  uint32_t first_nid_bg = 1;
+};
+
+struct BuiltMap {
+  Map map;
+  FitFigures landxml;  // zero elements where there was no such source
+  FitFigures osm;
+};
+
+/// LandXML (.xml, .landxml), OSM (.osm, .pbf, also .gz/.bz2), Overpass JSON (.json), GeoJSON (.geojson) and compiled
+/// maps (.map). The problems found are in the map.
+core::Result<BuiltMap> build_map(const std::vector<std::filesystem::path>& inputs, const BuildOptions& options);
+
+}  // namespace railfix::track

@@ -1,0 +1,142 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <set>
+
+#include "core/units.hpp"
+#include "track/import/finish.hpp"
+
+namespace railfix::track {
+namespace {
+
+constexpr double kGapM = 0.05;
+constexpr double kKinkRad = 0.05;
+constexpr double kNearMissM = 1.5;
+constexpr double kSharpestPerM = 1.0 / 80.0;
+
+std::string metres(double value) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.2f m", value);
+  return text.data();
+}
+
+std::string called(const Edge& edge) {
+  return "edge " + std::to_string(edge.id) + " (" + edge.name + ")";
+}
+
+double distance(const PlanPose& pose, const Node& node) {
+  return std::hypot(pose.easting_m - node.easting_m, pose.northing_m - node.northing_m);
+}
+
+class Check {
+ public:
+  explicit Check(const Map& map) : map_(map) {
+    for (const Node& node : map.nodes) nodes_[node.id] = &node;
+    for (const Edge& edge : map.edges) {
+      ends_[edge.from_node].push_back(&edge);
+      ends_[edge.to_node].push_back(&edge);
+    }
+    for (const Connection& way : map.connections) {
+      connected_.insert({way.node, way.edge_a});
+      connected_.insert({way.node, way.edge_b});
+    }
+  }
+
+  std::vector<std::string> run() {
+    for (const Edge& edge : map_.edges) {
+      check_shape(edge);
+      check_end(edge, edge.from_node, edge.alignment.at(0).pose);
+      check_end(edge, edge.to_node, edge.alignment.at(edge.alignment.length_m()).pose);
+    }
+    for (const Node& node : map_.nodes) check_node(node);
+    check_balises();
+    return std::move(problems_);
+  }
+
+ private:
+  /// Within one edge: elements that do not meet, kinks, radii that no train runs.
+  void check_shape(const Edge& edge) {
+    const Alignment& track = edge.alignment;
+    for (size_t i = 0; i < track.elements().size(); ++i) {
+      const Element& element = track.elements()[i];
+      const std::string where = called(edge) + " at " + metres(track.element_offsets()[i]);
+      const double sharpest = std::max(std::abs(element.curvature_start_per_m), std::abs(element.curvature_end_per_m));
+      if (sharpest > kSharpestPerM && !told_sharp_.contains(edge.id)) {
+        problems_.push_back(where + " has a radius of only " + metres(1.0 / sharpest));
+        told_sharp_.insert(edge.id);
+      }
+      if (i == 0) continue;
+      const PlanPose before = advance(track.starts()[i - 1], track.elements()[i - 1], track.elements()[i - 1].length_m);
+      const PlanPose& start = track.starts()[i];
+      const double gap = std::hypot(before.easting_m - start.easting_m, before.northing_m - start.northing_m);
+      if (gap > kGapM) problems_.push_back(where + " has a gap of " + metres(gap));
+      if (std::abs(core::wrap_pi(before.heading_rad - start.heading_rad)) > kKinkRad)
+        problems_.push_back(where + " has a kink");
+    }
+  }
+
+  void check_end(const Edge& edge, uint32_t node_id, const PlanPose& pose) {
+    const auto node = nodes_.find(node_id);
+    if (node == nodes_.end()) {
+      problems_.push_back(called(edge) + " ends at node " + std::to_string(node_id) + ", which does not exist");
+      return;
+    }
+    if (distance(pose, *node->second) > kGapM) {
+      problems_.push_back(called(edge) + " ends " + metres(distance(pose, *node->second)) + " from its node " +
+                          std::to_string(node_id));
+    }
+    if (ends_[node_id].size() > 1 && !connected_.contains({node_id, edge.id})) {
+      problems_.push_back(called(edge) + " is not connected to any other at node " + std::to_string(node_id));
+    }
+  }
+
+  void check_node(const Node& node) {
+    const size_t meeting = ends_[node.id].size();
+    const std::string where = "node " + std::to_string(node.id) + (node.name.empty() ? "" : " (" + node.name + ")");
+    if (meeting == 0) problems_.push_back(where + " belongs to no edge");
+    if (node.kind == NodeKind::railway_switch && meeting < 3) {
+      problems_.push_back(where + " is a switch but only " + std::to_string(meeting) + " track" +
+                          (meeting == 1 ? " meets" : "s meet") + " there");
+    }
+    if (node.kind == NodeKind::end && meeting == 1) check_near_miss(node, *ends_[node.id].front());
+  }
+
+  /// A loose end beside another track is more likely a mistake than a buffer stop.
+  void check_near_miss(const Node& node, const Edge& own) {
+    for (const Edge& other : map_.edges) {
+      if (other.id == own.id || other.from_node == node.id || other.to_node == node.id) continue;
+      const PlanPose& start = other.alignment.starts().front();
+      if (distance(start, node) > other.alignment.length_m() + kNearMissM) continue;
+      const Alignment::Nearest nearest = other.alignment.nearest(node.easting_m, node.northing_m);
+      if (std::abs(nearest.lateral_m) > kNearMissM) continue;
+      problems_.push_back(called(own) + " ends loose at node " + std::to_string(node.id) + ", only " +
+                          metres(std::abs(nearest.lateral_m)) + " from " + called(other));
+    }
+  }
+
+  void check_balises() {
+    std::set<uint32_t> seen;
+    for (const BaliseGroup& group : map_.balise_groups) {
+      if (seen.insert(group.nid_lrbg()).second) continue;
+      problems_.push_back("balise group " + std::to_string(group.nid_c) + "/" + std::to_string(group.nid_bg) +
+                          " is there twice");
+    }
+  }
+
+  const Map& map_;
+  std::map<uint32_t, const Node*> nodes_;
+  std::map<uint32_t, std::vector<const Edge*>> ends_;
+  std::set<std::pair<uint32_t, uint32_t>> connected_;  // node, edge
+  std::set<uint32_t> told_sharp_;
+  std::vector<std::string> problems_;
+};
+
+}  // namespace
+
+std::vector<std::string> check_topology(const Map& map) {
+  return Check(map).run();
+}
+
+}  // namespace railfix::track

@@ -1,0 +1,117 @@
+#include "track/import/finish.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <unordered_map>
+
+namespace railfix::track {
+namespace {
+
+constexpr double kGaugeM = 1.435;
+constexpr double kLongestSwitchM = 150.0;
+constexpr double kStepM = 0.5;
+constexpr uint32_t kLastBaliseGroup = 16382;  // 16383 means unknown
+
+/// An edge as seen when leaving a node.
+struct Branch {
+  const Edge* edge = nullptr;
+  bool forward = true;
+
+  [[nodiscard]] double offset(double from_node_m) const {
+    return forward ? from_node_m : edge->alignment.length_m() - from_node_m;
+  }
+};
+
+Branch branch_from(const Map& map, uint32_t edge_id, uint32_t node) {
+  const Edge* edge = map.edge(edge_id);
+  return {edge, edge->from_node == node};
+}
+
+/// How far `branch` is left of `straight` (looking away from the node), at a distance along the branch.
+double separation(const Branch& straight, const Branch& branch, double distance_m) {
+  const PlanPose pose = branch.edge->alignment.at(branch.offset(distance_m)).pose;
+  const double lateral = straight.edge->alignment.nearest(pose.easting_m, pose.northing_m).lateral_m;
+  return straight.forward ? lateral : -lateral;
+}
+
+/// Distance from the node at which the branches are one gauge apart.
+std::optional<double> frog_distance(const Branch& straight, const Branch& branch) {
+  const double reach =
+      std::min({kLongestSwitchM, straight.edge->alignment.length_m(), branch.edge->alignment.length_m()});
+  for (double far = kStepM; far <= reach; far += kStepM) {
+    const double after = std::abs(separation(straight, branch, far));
+    if (after < kGaugeM) continue;
+    const double before = std::abs(separation(straight, branch, far - kStepM));
+    return far - kStepM * (after - kGaugeM) / std::max(after - before, 1e-9);
+  }
+  return std::nullopt;
+}
+
+void add_frog(Map& map, const Node& node, const Branch& straight, const Branch& branch, double sigma_m) {
+  const std::optional<double> distance = frog_distance(straight, branch);
+  if (!distance) return;
+  const PlanPose pose = branch.edge->alignment.at(branch.offset(*distance)).pose;
+  const double on_straight = straight.edge->alignment.nearest(pose.easting_m, pose.northing_m).offset_m;
+  // The frog lies where the two inner rails cross, half a gauge from either centre line.
+  const double left = std::copysign(0.5 * kGaugeM, separation(straight, branch, *distance));
+  const std::string name = "frog of " + (node.name.empty() ? "node " + std::to_string(node.id) : node.name);
+  const auto add = [&](const Branch& on, double offset_m, double lateral_m) {
+    const auto id = static_cast<uint32_t>(map.landmarks.size() + 1);
+    map.landmarks.push_back(
+        {id, LandmarkKind::frog, on.edge->id, offset_m, on.forward ? lateral_m : -lateral_m, sigma_m, name});
+  };
+  add(straight, on_straight, left);
+  add(branch, branch.offset(*distance), -left);
+}
+
+/// The stem is the edge that both ways share; without one there is no frog between them.
+void add_frogs_of(Map& map, const Node& node, const Connection& straight, const Connection& way, double sigma_m) {
+  for (const auto& [stem, branch] : {std::pair(way.edge_a, way.edge_b), std::pair(way.edge_b, way.edge_a)}) {
+    if (stem != straight.edge_a && stem != straight.edge_b) continue;
+    const uint32_t on = stem == straight.edge_a ? straight.edge_b : straight.edge_a;
+    if (on == branch || on == stem) continue;
+    add_frog(map, node, branch_from(map, on, node.id), branch_from(map, branch, node.id), sigma_m);
+  }
+}
+
+}  // namespace
+
+void add_frogs(Map& map, double sigma_m) {
+  std::unordered_map<uint32_t, std::vector<Connection>> ways_at;
+  for (const Connection& way : map.connections) ways_at[way.node].push_back(way);
+  for (const Node& node : map.nodes) {
+    const std::vector<Connection>& ways = ways_at[node.id];
+    for (const Connection& way : ways) {
+      for (const Connection& straight : ways) {
+        if (way.diverging && !straight.diverging) add_frogs_of(map, node, straight, way, sigma_m);
+      }
+    }
+  }
+}
+
+core::Status add_virtual_balises(Map& map, double every_m, uint32_t nid_c, uint32_t first_nid_bg, double q_locacc_m) {
+  if (!(every_m >= 1.0)) return core::Error{"virtual balise groups must be at least 1 m apart"};
+  if (nid_c > 1023) return core::Error{"NID_C must be between 0 and 1023"};
+  uint32_t next = first_nid_bg;
+  for (const Edge& edge : map.edges) {
+    const double length = edge.alignment.length_m();
+    const auto count = static_cast<uint32_t>(std::lround(length / every_m));
+    if (next + count > kLastBaliseGroup + 1) {
+      return core::Error{"the map needs more than 16382 virtual balise groups; place them farther apart"};
+    }
+    for (uint32_t i = 0; i < count; ++i) {
+      map.balise_groups.push_back({.nid_c = nid_c,
+                                   .nid_bg = next++,
+                                   .edge = edge.id,
+                                   .offset_m = length * (i + 0.5) / count,
+                                   .nominal_is_forward = true,
+                                   .is_virtual = true,
+                                   .q_locacc_m = q_locacc_m,
+                                   .balises = {}});
+    }
+  }
+  return {};
+}
+
+}  // namespace railfix::track

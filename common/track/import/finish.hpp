@@ -1,0 +1,25 @@
+// What is added to a connected map, and the check of it.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/result.hpp"
+#include "track/map.hpp"
+
+namespace railfix::track {
+
+/// Puts a frog on both branches of every switch, where their centre lines are one gauge (1.435 m) apart; sigma_m says
+/// how well the source knows the place.
+void add_frogs(Map& map, double sigma_m);
+
+/// Virtual balise groups about every `every_m` along every edge (none on edges shorter than half of it), numbered from
+/// `first_nid_bg`. Fails when ETCS runs out of numbers.
+core::Status add_virtual_balises(Map& map, double every_m, uint32_t nid_c, uint32_t first_nid_bg, double q_locacc_m);
+
+/// What is wrong with the map, one sentence each, naming the element: gaps and kinks within edges and between connected
+/// ones, switches that lead nowhere, track ends that just miss another, balise groups given twice.
+std::vector<std::string> check_topology(const Map& map);
+
+}  // namespace railfix::track

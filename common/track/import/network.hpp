@@ -1,0 +1,45 @@
+// From pieces of track to a connected map: nodes, what a train can do at them, numbered landmarks.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "track/import/tracks.hpp"
+#include "track/map.hpp"
+
+namespace railfix::track {
+
+struct DraftNode {
+  std::string name;
+  double easting_m = 0;
+  double northing_m = 0;
+  bool is_switch = false;    // the source says so, whatever meets here
+  bool is_crossing = false;  // tracks cross on the level, nobody can change track
+};
+
+struct DraftEdge {
+  ImportedTrack track;
+  size_t from_node = 0;  // index into Draft::nodes
+  size_t to_node = 0;
+  // Directions in which a train leaves the node on this edge, as surveyed (before a fit smoothed them).
+  double leaving_from_rad = 0;
+  double leaving_to_rad = 0;
+};
+
+struct Draft {
+  std::vector<DraftNode> nodes;
+  std::vector<DraftEdge> edges;
+};
+
+/// Cuts tracks where the end of another touches them (within 5 cm and 20 mrad) and joins ends that meet. Every end that
+/// meets nothing is told in `problems` with its nearest neighbour.
+Draft cut_tracks(std::vector<ImportedTrack> tracks, std::vector<std::string>& problems);
+
+/// The part of an alignment between two offsets, with its profile and cant.
+Alignment slice(const Alignment& alignment, double from_m, double to_m);
+
+/// Adds the draft to the map. Two edges are connected at a node where the turn between them is less than 60 degrees;
+/// pieces of one line (else the smallest turn) are the straight way.
+void append(const Draft& draft, Map& map);
+
+}  // namespace railfix::track

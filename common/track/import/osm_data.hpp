@@ -1,0 +1,44 @@
+// Railways out of OpenStreetMap, as far as a map needs them.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "core/result.hpp"
+#include "track/projection.hpp"
+
+namespace railfix::track {
+
+using OsmTags = std::map<std::string, std::string>;
+
+struct OsmNode {
+  GeoPoint place;
+  OsmTags tags;  // only of nodes that say something about the railway
+};
+
+struct OsmWay {
+  int64_t id = 0;
+  std::vector<int64_t> nodes;
+  OsmTags tags;
+};
+
+struct OsmData {
+  std::unordered_map<int64_t, OsmNode> nodes;
+  std::vector<OsmWay> ways;
+};
+
+/// Is this way track that a train runs on? railway=rail, light_rail, narrow_gauge, subway, and tram where asked for.
+bool is_track(const OsmTags& tags, bool with_trams);
+
+/// OSM XML or PBF, also compressed (.osm, .pbf, .osm.gz, .osm.bz2). Memory grows with the railways in the file only.
+core::Result<OsmData> read_osm(const std::filesystem::path& file, bool with_trams);
+
+/// Overpass JSON ("elements") or GeoJSON ("features"). GeoJSON has no nodes: equal coordinates (1e-7 degree) are one
+/// node.
+core::Result<OsmData> read_osm_json(const std::filesystem::path& file, bool with_trams);
+
+}  // namespace railfix::track

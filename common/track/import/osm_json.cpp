@@ -1,0 +1,121 @@
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "track/import/osm_data.hpp"
+
+namespace railfix::track {
+namespace {
+
+using nlohmann::json;
+
+OsmTags tags_in(const json& object, const char* key) {
+  OsmTags tags;
+  const auto found = object.find(key);
+  if (found == object.end() || !found->is_object()) return tags;
+  for (const auto& [name, value] : found->items()) {
+    if (value.is_string()) tags.emplace(name, value.get<std::string>());
+  }
+  return tags;
+}
+
+bool plausible(const GeoPoint& place) {
+  return std::abs(place.lat_deg) <= 90.0 && std::abs(place.lon_deg) <= 180.0;
+}
+
+void read_overpass(const json& elements, bool with_trams, OsmData& out) {
+  for (const json& element : elements) {
+    const std::string type = element.value("type", "");
+    if (type == "node") {
+      const GeoPoint place{element.at("lat").get<double>(), element.at("lon").get<double>()};
+      if (plausible(place)) out.nodes[element.at("id").get<int64_t>()] = {place, tags_in(element, "tags")};
+    } else if (type == "way") {
+      OsmTags tags = tags_in(element, "tags");
+      if (!is_track(tags, with_trams) || !element.contains("nodes")) continue;
+      out.ways.push_back(
+          {element.at("id").get<int64_t>(), element.at("nodes").get<std::vector<int64_t>>(), std::move(tags)});
+    }
+  }
+}
+
+/// GeoJSON coordinates as a node identity: both to 1e-7 degree, as OpenStreetMap stores them.
+int64_t identity(const GeoPoint& place) {
+  const auto lat = static_cast<int64_t>(std::llround((place.lat_deg + 90.0) * 1e7));
+  const auto lon = static_cast<int64_t>(std::llround((place.lon_deg + 180.0) * 1e7));
+  return lat * 3'600'000'001 + lon;
+}
+
+GeoPoint place_in(const json& coordinates) {
+  return {coordinates.at(1).get<double>(), coordinates.at(0).get<double>()};
+}
+
+/// "way/123" -> 123; a number made up (negative) where there is none.
+int64_t number_in(const OsmTags& tags, size_t position) {
+  const auto id = tags.find("@id");
+  const size_t slash = id == tags.end() ? std::string::npos : id->second.find('/');
+  if (slash != std::string::npos) {
+    const int64_t number = std::strtoll(id->second.c_str() + slash + 1, nullptr, 10);
+    if (number > 0) return number;
+  }
+  return -static_cast<int64_t>(position) - 1;
+}
+
+void add_line(const json& coordinates, const OsmTags& tags, OsmData& out) {
+  OsmWay way{number_in(tags, out.ways.size()), {}, tags};
+  for (const json& pair : coordinates) {
+    const GeoPoint place = place_in(pair);
+    if (!plausible(place)) continue;
+    way.nodes.push_back(identity(place));
+    out.nodes[way.nodes.back()].place = place;
+  }
+  out.ways.push_back(std::move(way));
+}
+
+void read_features(const json& features, bool with_trams, OsmData& out) {
+  for (const json& feature : features) {
+    const OsmTags tags = tags_in(feature, "properties");
+    const auto geometry = feature.find("geometry");
+    if (geometry == feature.end() || !geometry->is_object() || !geometry->contains("coordinates")) continue;
+    const json& coordinates = geometry->at("coordinates");
+    const std::string type = geometry->value("type", "");
+    if (type == "Point") {
+      const GeoPoint place = place_in(coordinates);
+      if (plausible(place)) out.nodes[identity(place)] = {place, tags};
+      continue;
+    }
+    // A line that does not say what it is, or is a train's route, is taken as track.
+    const auto route = tags.find("route");
+    const bool train_route = route != tags.end() && (route->second == "train" || route->second == "railway");
+    const bool silent = !tags.contains("railway") && !tags.contains("@id") && !tags.contains("highway");
+    if (!is_track(tags, with_trams) && !train_route && !silent) continue;
+    if (type == "LineString") add_line(coordinates, tags, out);
+    if (type == "MultiLineString") {
+      for (const json& line : coordinates) add_line(line, tags, out);
+    }
+  }
+}
+
+}  // namespace
+
+core::Result<OsmData> read_osm_json(const std::filesystem::path& file, bool with_trams) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream || std::filesystem::is_directory(file)) {
+    return core::Error{"cannot read " + file.string() + "; is the path right?"};
+  }
+  try {
+    const json document = json::parse(stream);
+    OsmData out;
+    if (document.is_object() && document.contains("elements")) {
+      read_overpass(document.at("elements"), with_trams, out);
+    } else if (document.is_object() && document.contains("features")) {
+      read_features(document.at("features"), with_trams, out);
+    } else {
+      return core::Error{file.string() + " is neither Overpass JSON (\"elements\") nor GeoJSON (\"features\")"};
+    }
+    return out;
+  } catch (const json::exception& reason) {
+    return core::Error{"cannot read " + file.string() + " as JSON map data: " + reason.what()};
+  }
+}
+
+}  // namespace railfix::track

@@ -1,0 +1,23 @@
+// OpenStreetMap ways to edges between switches, with tangents that agree at every node.
+#pragma once
+
+#include "track/import/network.hpp"
+#include "track/import/osm_data.hpp"
+
+namespace railfix::track {
+
+struct OsmNetwork {
+  Draft draft;
+  FitFigures figures;
+  std::vector<std::string> problems;
+};
+
+/// Ways are cut and joined so that edges run from switch to switch (or end, or crossing). Tunnels become portals,
+/// bridges, signals and balises landmarks; offsets are as good as the mapping, taken as 3 m (1 sigma).
+/// `smooth_m` lets the mapped points move by as much to even out the curvature; 0 keeps them where they are.
+core::Result<OsmNetwork> build_osm_network(const OsmData& data, const Projection& projection, double smooth_m);
+
+/// Middle of the tracks' bounding box.
+std::optional<GeoPoint> middle_of(const OsmData& data);
+
+}  // namespace railfix::track

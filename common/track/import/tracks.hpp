@@ -1,0 +1,41 @@
+// What the readers of map sources hand over to the builder.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "track/map.hpp"
+
+namespace railfix::track {
+
+/// A landmark on one track, not yet numbered.
+struct TrackMark {
+  LandmarkKind kind = LandmarkKind::unknown;
+  double offset_m = 0;
+  double lateral_m = 0;
+  double sigma_m = 0;
+  std::string name;
+};
+
+/// One track as a source describes it, before it is cut at switches.
+struct ImportedTrack {
+  std::string name;
+  std::string line;
+  Alignment alignment;
+  std::vector<TrackMark> marks;
+};
+
+/// How well what was read closes: worst cases over all elements, in metres and radians.
+struct FitFigures {
+  size_t elements = 0;
+  double max_end_error_m = 0;        // integrated end of an element against the source's end of it
+  double max_length_change_m = 0;    // of an element, against the source's length
+  double max_heading_step_rad = 0;   // from one element to the next
+  double max_gap_m = 0;              // from the source's end of one element to its start of the next
+  double max_point_distance_m = 0;   // track from a polyline's points (left out where too near, moved by smoothing)
+  double max_chord_deviation_m = 0;  // track against the straight lines between a polyline's points
+
+  void include(const FitFigures& other);
+};
+
+}  // namespace railfix::track

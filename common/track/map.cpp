@@ -1,0 +1,131 @@
+#include "track/map.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <memory>
+#include <string_view>
+
+namespace railfix::track {
+namespace {
+
+constexpr std::array<std::string_view, 8> kLandmarkKinds{"unknown",    "frog", "balise", "portal_in",
+                                                         "portal_out", "mast", "bridge", "platform"};
+constexpr std::array<std::string_view, 4> kNodeKinds{"end", "joint", "switch", "crossing"};
+
+std::optional<double> number_from(std::string_view text) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+/// The projection of this thread; made anew when a map with another system asks.
+const Projection* projection_for(const std::string& crs) {
+  struct Cached {
+    std::string crs;
+    std::unique_ptr<Projection> projection;
+  };
+  thread_local Cached cached;
+  if (crs.empty()) return nullptr;
+  if (cached.crs != crs) {
+    core::Result<Projection> opened = Projection::open(crs);
+    cached.crs = crs;
+    cached.projection.reset();
+    if (opened.ok()) cached.projection = std::make_unique<Projection>(std::move(opened).value());
+  }
+  return cached.projection.get();
+}
+
+/// A line that was cut at switches is called NAME, NAME#2, ...: counts on over its pieces.
+const Edge* piece_at(const Map& map, const Edge& first, double& offset_m) {
+  const Edge* piece = &first;
+  for (int number = 2; offset_m > piece->alignment.length_m(); ++number) {
+    const Edge* next = map.edge(piece->id + 1);
+    if (next == nullptr || next->name != first.name + "#" + std::to_string(number)) break;
+    offset_m -= piece->alignment.length_m();
+    piece = next;
+  }
+  return piece;
+}
+
+}  // namespace
+
+std::string to_string(LandmarkKind kind) {
+  return std::string(kLandmarkKinds.at(static_cast<size_t>(kind)));
+}
+
+std::optional<LandmarkKind> landmark_kind_from(const std::string& text) {
+  const auto* const found = std::find(kLandmarkKinds.begin(), kLandmarkKinds.end(), text);
+  if (found == kLandmarkKinds.end()) return std::nullopt;
+  return static_cast<LandmarkKind>(found - kLandmarkKinds.begin());
+}
+
+std::string to_string(NodeKind kind) {
+  return std::string(kNodeKinds.at(static_cast<size_t>(kind)));
+}
+
+const Edge* Map::edge(uint32_t id) const {
+  return id >= 1 && id <= edges.size() ? &edges[id - 1] : nullptr;
+}
+
+const Landmark* Map::landmark(uint32_t id) const {
+  return id >= 1 && id <= landmarks.size() ? &landmarks[id - 1] : nullptr;
+}
+
+core::Result<EdgePosition> Map::parse_position(const std::string& text) const {
+  const core::Error malformed{"\"" + text +
+                              "\" is not a place on the map; write EDGE:OFFSET, EDGE:OFFSET:+ or EDGE:OFFSET:-"};
+  EdgePosition out;
+  std::string_view rest = text;
+  if (rest.ends_with(":+") || rest.ends_with(":-")) {
+    out.direction = rest.back() == '+' ? Direction::forward : Direction::reverse;
+    rest.remove_suffix(2);
+  }
+  const size_t colon = rest.rfind(':');
+  if (colon == std::string_view::npos || colon == 0) return malformed;
+  const std::optional<double> offset = number_from(rest.substr(colon + 1));
+  if (!offset) return malformed;
+  out.offset_m = *offset;
+
+  const std::string_view wanted = rest.substr(0, colon);
+  const auto named = std::find_if(edges.begin(), edges.end(), [&](const Edge& e) { return e.name == wanted; });
+  const Edge* found = named != edges.end() ? &*named : nullptr;
+  uint32_t id = 0;
+  const auto [end, error] = std::from_chars(wanted.data(), wanted.data() + wanted.size(), id);
+  const bool is_number = error == std::errc() && end == wanted.data() + wanted.size() && edge(id) != nullptr;
+  if (is_number) found = edge(id);
+  if (found == nullptr) {
+    return core::Error{"the map has no edge \"" + std::string(wanted) + "\"; `railfix map info` lists its edges"};
+  }
+  if (!is_number) found = piece_at(*this, *found, out.offset_m);
+  out.edge = found->id;
+  if (out.offset_m < 0 || out.offset_m > found->alignment.length_m() + 1e-6) {
+    return core::Error{"offset " + std::string(rest.substr(colon + 1)) + " is not on edge " + std::string(wanted) +
+                       ", which is " + std::to_string(*offset - out.offset_m + found->alignment.length_m()) +
+                       " m long"};
+  }
+  return out;
+}
+
+std::vector<const Landmark*> Map::landmarks_on(uint32_t edge_id) const {
+  std::vector<const Landmark*> found;
+  for (const Landmark& candidate : landmarks) {
+    if (candidate.edge == edge_id) found.push_back(&candidate);
+  }
+  std::stable_sort(found.begin(), found.end(), [](const auto* a, const auto* b) { return a->offset_m < b->offset_m; });
+  return found;
+}
+
+std::optional<GeoPoint> Map::to_geo(double easting_m, double northing_m) const {
+  const Projection* projection = projection_for(crs);
+  return projection != nullptr ? projection->to_geo(easting_m, northing_m) : std::nullopt;
+}
+
+std::optional<Eigen::Vector2d> Map::from_geo(const GeoPoint& point) const {
+  const Projection* projection = projection_for(crs);
+  return projection != nullptr ? projection->from_geo(point) : std::nullopt;
+}
+
+}  // namespace railfix::track

@@ -1,0 +1,109 @@
+// The compiled map in memory: edges with their geometry, what connects them, what stands beside them.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/result.hpp"
+#include "track/alignment.hpp"
+#include "track/projection.hpp"
+
+namespace railfix::track {
+
+enum class LandmarkKind : uint8_t { unknown, frog, balise, portal_in, portal_out, mast, bridge, platform };
+/// "frog", "balise", "portal_in", ... as in the run tables; and back.
+std::string to_string(LandmarkKind kind);
+std::optional<LandmarkKind> landmark_kind_from(const std::string& text);
+
+enum class NodeKind : uint8_t { end, joint, railway_switch, crossing };
+/// "end", "joint", "switch", "crossing".
+std::string to_string(NodeKind kind);
+
+struct Edge {
+  uint32_t id = 0;
+  std::string name;
+  uint32_t from_node = 0;
+  uint32_t to_node = 0;
+  std::string line;
+  Alignment alignment;
+};
+
+struct Node {
+  uint32_t id = 0;
+  NodeKind kind = NodeKind::end;
+  std::string name;
+  double easting_m = 0;
+  double northing_m = 0;
+};
+
+struct Connection {
+  uint32_t node = 0;
+  uint32_t edge_a = 0;
+  uint32_t edge_b = 0;
+  bool diverging = false;
+};
+
+struct Landmark {
+  uint32_t id = 0;
+  LandmarkKind kind = LandmarkKind::unknown;
+  uint32_t edge = 0;
+  double offset_m = 0;
+  double lateral_m = 0;
+  double sigma_m = 0;
+  std::string name;
+};
+
+struct BaliseGroup {
+  uint32_t nid_c = 0;
+  uint32_t nid_bg = 0;
+  uint32_t edge = 0;
+  double offset_m = 0;
+  bool nominal_is_forward = true;
+  bool is_virtual = false;
+  double q_locacc_m = 0;
+  std::vector<uint32_t> balises;  // landmark ids
+  [[nodiscard]] uint32_t nid_lrbg() const { return nid_c << 14U | nid_bg; }
+};
+
+enum class Direction : uint8_t { unknown, forward, reverse };
+
+/// A place on the map: EDGE:OFFSET[:+|-].
+struct EdgePosition {
+  uint32_t edge = 0;
+  double offset_m = 0;
+  Direction direction = Direction::forward;
+};
+
+class Map {
+ public:
+  /// Reads what `railfix map build` wrote (Protobuf, railfix.map.Map of idl/map.proto).
+  static core::Result<Map> load(const std::filesystem::path& file);
+  [[nodiscard]] core::Status save(const std::filesystem::path& file) const;
+
+  std::string name;
+  std::string source;
+  std::string crs;          // for PROJ, empty = local metres
+  std::vector<Edge> edges;  // edges[i].id == i + 1
+  std::vector<Node> nodes;
+  std::vector<Connection> connections;
+  std::vector<Landmark> landmarks;  // landmarks[i].id == i + 1
+  std::vector<BaliseGroup> balise_groups;
+  std::vector<std::string> problems;
+
+  /// Nullptr when there is no such edge or landmark.
+  [[nodiscard]] const Edge* edge(uint32_t id) const;
+  [[nodiscard]] const Landmark* landmark(uint32_t id) const;
+  /// "EDGE:OFFSET[:+|-]", EDGE a number or a name. Behind a name the offset may run on over the line's next pieces,
+  /// which are called NAME#2, NAME#3, ... where switches cut it.
+  [[nodiscard]] core::Result<EdgePosition> parse_position(const std::string& text) const;
+  /// Landmarks of one edge, by offset.
+  [[nodiscard]] std::vector<const Landmark*> landmarks_on(uint32_t edge) const;
+  /// WGS 84 of a map coordinate; nothing without a crs.
+  [[nodiscard]] std::optional<GeoPoint> to_geo(double easting_m, double northing_m) const;
+  [[nodiscard]] std::optional<Eigen::Vector2d> from_geo(const GeoPoint& point) const;
+};
+
+}  // namespace railfix::track

@@ -1,0 +1,257 @@
+// The map file: Protobuf, checked on reading so that everybody else may rely on what the structs promise.
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <system_error>
+
+#include "idl/map.pb.h"
+#include "track/map.hpp"
+
+namespace railfix::track {
+namespace {
+
+constexpr double kLongestEdgeM = 1e6;
+constexpr double kSharpestPerM = 0.1;  // no track has a radius of less than 10 m
+
+bool finite(std::initializer_list<double> values) {
+  return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
+}
+
+template <class Points>
+bool sorted_by_offset(const Points& points) {
+  return std::is_sorted(points.begin(), points.end(),
+                        [](const auto& a, const auto& b) { return a.offset_m < b.offset_m; });
+}
+
+core::Status check_elements(const map::Edge& edge) {
+  const std::string where = "edge " + std::to_string(edge.id());
+  if (edge.elements().empty()) return core::Error{where + " has no elements"};
+  double sum = 0;
+  for (const map::Element& element : edge.elements()) {
+    if (!finite({element.length_m(), element.curvature_start_per_m(), element.curvature_end_per_m(),
+                 element.easting_m(), element.northing_m(), element.heading_rad()})) {
+      return core::Error{where + " has an element with a value that is not a number"};
+    }
+    if (element.length_m() <= 0) return core::Error{where + " has an element without length"};
+    if (std::abs(element.curvature_start_per_m()) > kSharpestPerM ||
+        std::abs(element.curvature_end_per_m()) > kSharpestPerM) {
+      return core::Error{where + " has a radius of less than 10 m"};
+    }
+    sum += element.length_m();
+  }
+  if (sum > kLongestEdgeM) return core::Error{where + " is longer than 1000 km"};
+  if (std::abs(sum - edge.length_m()) > 1e-3) return core::Error{where + " is not as long as its elements together"};
+  return {};
+}
+
+core::Result<Edge> edge_from(const map::Edge& in) {
+  if (const core::Status status = check_elements(in); !status) return status.error();
+  std::vector<Element> elements;
+  std::vector<PlanPose> starts;
+  for (const map::Element& e : in.elements()) {
+    elements.push_back({e.length_m(), e.curvature_start_per_m(), e.curvature_end_per_m()});
+    starts.push_back({e.easting_m(), e.northing_m(), e.heading_rad()});
+  }
+  std::vector<GradePoint> profile;
+  for (const map::GradePoint& p : in.profile()) profile.push_back({p.offset_m(), p.elevation_m(), p.curve_length_m()});
+  std::vector<CantPoint> cant;
+  for (const map::CantPoint& p : in.cant()) cant.push_back({p.offset_m(), p.cant_m()});
+  const bool numbers = std::all_of(profile.begin(), profile.end(),
+                                   [](const GradePoint& p) {
+                                     return finite({p.offset_m, p.elevation_m, p.curve_length_m});
+                                   }) &&
+                       std::all_of(cant.begin(), cant.end(), [](const CantPoint& p) {
+                         return finite({p.offset_m, p.cant_m});
+                       });
+  if (!numbers || !sorted_by_offset(profile) || !sorted_by_offset(cant)) {
+    return core::Error{"edge " + std::to_string(in.id()) + " has a profile or cant out of order"};
+  }
+  Edge out{.id = in.id(),
+           .name = in.name(),
+           .from_node = in.from_node(),
+           .to_node = in.to_node(),
+           .line = in.line(),
+           .alignment = {}};
+  out.alignment = Alignment(std::move(elements), std::move(starts), std::move(profile), std::move(cant));
+  return out;
+}
+
+/// Fills the map's lists from the message; the error says which element is wrong.
+core::Status read_edges(const map::Map& in, Map& out) {
+  for (const map::Node& n : in.nodes()) {
+    if (!map::Node::Kind_IsValid(n.kind()))
+      return core::Error{"node " + std::to_string(n.id()) + " is of an unknown kind"};
+    out.nodes.push_back({n.id(), static_cast<NodeKind>(n.kind()), n.name(), n.easting_m(), n.northing_m()});
+  }
+  for (const map::Edge& e : in.edges()) {
+    if (e.id() != out.edges.size() + 1) return core::Error{"its edges are not numbered 1, 2, 3, ..."};
+    core::Result<Edge> edge = edge_from(e);
+    if (!edge) return edge.error();
+    out.edges.push_back(std::move(edge).value());
+  }
+  if (out.edges.empty()) return core::Error{"it holds no track"};
+  for (const map::Connection& c : in.connections()) {
+    if (out.edge(c.edge_a()) == nullptr || out.edge(c.edge_b()) == nullptr) {
+      return core::Error{"a connection at node " + std::to_string(c.node()) + " names an edge that does not exist"};
+    }
+    out.connections.push_back({c.node(), c.edge_a(), c.edge_b(), c.diverging()});
+  }
+  return {};
+}
+
+bool on_edge(const Map& map, uint32_t edge_id, double offset_m) {
+  const Edge* edge = map.edge(edge_id);
+  return edge != nullptr && offset_m >= -1e-3 && offset_m <= edge->alignment.length_m() + 1e-3;
+}
+
+core::Status read_marks(const map::Map& in, Map& out) {
+  for (const map::Landmark& l : in.landmarks()) {
+    const std::string where = "landmark " + std::to_string(l.id());
+    if (l.id() != out.landmarks.size() + 1) return core::Error{"its landmarks are not numbered 1, 2, 3, ..."};
+    if (!map::Landmark::Kind_IsValid(l.kind())) return core::Error{where + " is of an unknown kind"};
+    if (!on_edge(out, l.edge(), l.offset_m()) || !finite({l.lateral_m(), l.sigma_m()})) {
+      return core::Error{where + " is not on an edge"};
+    }
+    out.landmarks.push_back(
+        {l.id(), static_cast<LandmarkKind>(l.kind()), l.edge(), l.offset_m(), l.lateral_m(), l.sigma_m(), l.name()});
+  }
+  for (const map::BaliseGroup& g : in.balise_groups()) {
+    const std::string where = "balise group " + std::to_string(g.nid_c()) + "/" + std::to_string(g.nid_bg());
+    if (g.nid_c() > 1023 || g.nid_bg() > 16383) return core::Error{where + " has an identity that ETCS cannot carry"};
+    if (!on_edge(out, g.edge(), g.offset_m())) return core::Error{where + " is not on an edge"};
+    out.balise_groups.push_back({g.nid_c(),
+                                 g.nid_bg(),
+                                 g.edge(),
+                                 g.offset_m(),
+                                 g.nominal_is_forward(),
+                                 g.is_virtual(),
+                                 g.q_locacc_m(),
+                                 {g.balises().begin(), g.balises().end()}});
+  }
+  return {};
+}
+
+void write_edge(const Edge& edge, map::Edge& out) {
+  out.set_id(edge.id);
+  out.set_name(edge.name);
+  out.set_from_node(edge.from_node);
+  out.set_to_node(edge.to_node);
+  out.set_line(edge.line);
+  out.set_length_m(edge.alignment.length_m());
+  for (size_t i = 0; i < edge.alignment.elements().size(); ++i) {
+    const Element& element = edge.alignment.elements()[i];
+    const PlanPose& start = edge.alignment.starts()[i];
+    map::Element& e = *out.add_elements();
+    e.set_length_m(element.length_m);
+    e.set_curvature_start_per_m(element.curvature_start_per_m);
+    e.set_curvature_end_per_m(element.curvature_end_per_m);
+    e.set_easting_m(start.easting_m);
+    e.set_northing_m(start.northing_m);
+    e.set_heading_rad(start.heading_rad);
+  }
+  for (const GradePoint& point : edge.alignment.profile()) {
+    map::GradePoint& p = *out.add_profile();
+    p.set_offset_m(point.offset_m);
+    p.set_elevation_m(point.elevation_m);
+    p.set_curve_length_m(point.curve_length_m);
+  }
+  for (const CantPoint& point : edge.alignment.cant()) {
+    map::CantPoint& p = *out.add_cant();
+    p.set_offset_m(point.offset_m);
+    p.set_cant_m(point.cant_m);
+  }
+}
+
+void write_network(const Map& map, map::Map& out) {
+  for (const Edge& edge : map.edges) write_edge(edge, *out.add_edges());
+  for (const Node& node : map.nodes) {
+    map::Node& n = *out.add_nodes();
+    n.set_id(node.id);
+    n.set_kind(static_cast<map::Node::Kind>(node.kind));
+    n.set_name(node.name);
+    n.set_easting_m(node.easting_m);
+    n.set_northing_m(node.northing_m);
+  }
+  for (const Connection& connection : map.connections) {
+    map::Connection& c = *out.add_connections();
+    c.set_node(connection.node);
+    c.set_edge_a(connection.edge_a);
+    c.set_edge_b(connection.edge_b);
+    c.set_diverging(connection.diverging);
+  }
+}
+
+void write_marks(const Map& map, map::Map& out) {
+  for (const Landmark& landmark : map.landmarks) {
+    map::Landmark& l = *out.add_landmarks();
+    l.set_id(landmark.id);
+    l.set_kind(static_cast<map::Landmark::Kind>(landmark.kind));
+    l.set_edge(landmark.edge);
+    l.set_offset_m(landmark.offset_m);
+    l.set_lateral_m(landmark.lateral_m);
+    l.set_sigma_m(landmark.sigma_m);
+    l.set_name(landmark.name);
+  }
+  for (const BaliseGroup& group : map.balise_groups) {
+    map::BaliseGroup& g = *out.add_balise_groups();
+    g.set_nid_c(group.nid_c);
+    g.set_nid_bg(group.nid_bg);
+    g.set_edge(group.edge);
+    g.set_offset_m(group.offset_m);
+    g.set_nominal_is_forward(group.nominal_is_forward);
+    g.set_is_virtual(group.is_virtual);
+    g.set_q_locacc_m(group.q_locacc_m);
+    for (const uint32_t balise : group.balises) g.add_balises(balise);
+  }
+}
+
+}  // namespace
+
+core::Result<Map> Map::load(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream || std::filesystem::is_directory(file)) {
+    return core::Error{"cannot read the map " + file.string() + "; is the path right?"};
+  }
+  const google::protobuf::LogSilencer silence;  // the one sentence below is enough
+  map::Map in;
+  if (!in.ParseFromIstream(&stream)) {
+    return core::Error{file.string() + " is not a compiled map or is cut short; make it with `railfix map build`"};
+  }
+  Map out;
+  out.name = in.name();
+  out.source = in.source();
+  out.crs = in.crs();
+  out.problems.assign(in.problems().begin(), in.problems().end());
+  core::Status status = read_edges(in, out);
+  if (status.ok()) status = read_marks(in, out);
+  if (!status)
+    return core::Error{file.string() + " is not a sound map: " + status.error().message +
+                       "; build it again with `railfix map build`"};
+  return out;
+}
+
+core::Status Map::save(const std::filesystem::path& file) const {
+  map::Map out;
+  out.set_name(name);
+  out.set_source(source);
+  out.set_crs(crs);
+  for (const std::string& problem : problems) out.add_problems(problem);
+  write_network(*this, out);
+  write_marks(*this, out);
+
+  // First beside its place, then moved there: a service never reads half a map.
+  const std::filesystem::path partial = file.string() + ".partial";
+  std::ofstream stream(partial, std::ios::binary | std::ios::trunc);
+  const bool written = stream && out.SerializeToOstream(&stream) && stream.flush();
+  stream.close();
+  std::error_code moved;
+  if (written) std::filesystem::rename(partial, file, moved);
+  if (!written || moved) {
+    std::error_code ignored;
+    std::filesystem::remove(partial, ignored);
+    return core::Error{"cannot write the map " + file.string() + "; does the folder exist and is there space?"};
+  }
+  return {};
+}
+
+}  // namespace railfix::track

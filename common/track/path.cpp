@@ -1,0 +1,193 @@
+#include "track/path.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/units.hpp"
+
+namespace railfix::track {
+namespace {
+
+constexpr int kMostLegs = 100000;  // ends a path round a ring of tiny edges
+
+/// Running on an edge in one direction.
+struct Run {
+  const Edge* edge = nullptr;
+  bool forward = true;
+};
+
+double end_heading(const Run& run) {
+  return run.edge->alignment.at(run.forward ? run.edge->alignment.length_m() : 0.0).pose.heading_rad +
+         (run.forward ? 0.0 : core::kPi);
+}
+double begin_heading(const Run& run) {
+  return end_heading({run.edge, !run.forward}) + core::kPi;
+}
+
+/// What follows at the end of a run: the straight way, among several the one that turns least.
+std::optional<Run> next_run(const Map& map, const Run& run) {
+  const uint32_t node = run.forward ? run.edge->to_node : run.edge->from_node;
+  const double heading = end_heading(run);
+  std::optional<Run> best;
+  double best_cost = 0;
+  for (const Connection& connection : map.connections) {
+    if (connection.node != node) continue;
+    if (connection.edge_a != run.edge->id && connection.edge_b != run.edge->id) continue;
+    const Edge* other = map.edge(connection.edge_a == run.edge->id ? connection.edge_b : connection.edge_a);
+    for (const bool forward : {true, false}) {
+      const Run candidate{other, forward};
+      if ((forward ? other->from_node : other->to_node) != node) continue;
+      const double turn = std::abs(core::wrap_pi(begin_heading(candidate) - heading));
+      const double cost = turn + (connection.diverging ? 10.0 : 0.0);
+      if (!best || cost < best_cost) {
+        best = candidate;
+        best_cost = cost;
+      }
+    }
+  }
+  return best;
+}
+
+/// Runs after the first until `distance_m` beyond the end of the first is covered or the track ends.
+std::vector<Run> runs_after(const Map& map, const Run& first, double distance_m) {
+  std::vector<Run> runs;
+  Run run = first;
+  while (distance_m > 0 && runs.size() < kMostLegs) {
+    const std::optional<Run> next = next_run(map, run);
+    if (!next) break;
+    run = *next;
+    runs.push_back(run);
+    distance_m -= run.edge->alignment.length_m();
+  }
+  return runs;
+}
+
+LandmarkKind seen_along(LandmarkKind kind, bool forward) {
+  if (forward) return kind;
+  if (kind == LandmarkKind::portal_in) return LandmarkKind::portal_out;
+  return kind == LandmarkKind::portal_out ? LandmarkKind::portal_in : kind;
+}
+
+}  // namespace
+
+core::Result<Path> Path::follow(std::shared_ptr<const Map> map, const EdgePosition& start, double ahead_m,
+                                double behind_m) {
+  const Edge* edge = map->edge(start.edge);
+  if (edge == nullptr) return core::Error{"the map has no edge " + std::to_string(start.edge)};
+  if (!(start.offset_m >= -1e-6 && start.offset_m <= edge->alignment.length_m() + 1e-6)) {
+    return core::Error{"offset " + std::to_string(start.offset_m) + " m is not on edge " + std::to_string(start.edge)};
+  }
+  const bool forward = start.direction != Direction::reverse;
+  const double length = edge->alignment.length_m();
+  const double before =
+      std::clamp(forward ? start.offset_m : length - start.offset_m, 0.0, length);  // of the edge behind the start
+
+  std::vector<Run> runs = runs_after(*map, {edge, !forward}, behind_m - before);
+  std::reverse(runs.begin(), runs.end());
+  double distance = -before;
+  for (Run& run : runs) {
+    run.forward = !run.forward;
+    distance -= run.edge->alignment.length_m();
+  }
+  runs.push_back({edge, forward});
+  const std::vector<Run> ahead = runs_after(*map, {edge, forward}, ahead_m - (length - before));
+  runs.insert(runs.end(), ahead.begin(), ahead.end());
+
+  Path path;
+  path.map_ = std::move(map);
+  const double begin = -std::max(behind_m, 0.0);
+  const double end = std::max(ahead_m, 0.0);
+  for (const Run& run : runs) {
+    const double run_length = run.edge->alignment.length_m();
+    const double from = std::clamp(begin - distance, 0.0, run_length);  // into the run
+    const double to = std::clamp(end - distance, 0.0, run_length);
+    if (to > from || run.edge == edge) {
+      path.legs_.push_back({run.edge, run.forward, distance + from, to - from, run.forward ? from : run_length - from});
+    }
+    distance += run_length;
+  }
+  path.collect_marks();
+  return path;
+}
+
+void Path::collect_marks() {
+  for (const Leg& leg : legs_) {
+    const double sign = leg.forward ? 1.0 : -1.0;
+    const auto distance_on_leg = [&](double offset_m) -> std::optional<double> {
+      const double into = sign * (offset_m - leg.offset_begin_m);
+      if (into < -1e-6 || into > leg.length_m + 1e-6) return std::nullopt;
+      return leg.begin_m + into;
+    };
+    for (const Landmark& landmark : map_->landmarks) {
+      if (landmark.edge != leg.edge->id) continue;
+      if (const auto distance = distance_on_leg(landmark.offset_m)) {
+        landmarks_.push_back({&landmark, *distance, sign * landmark.lateral_m, seen_along(landmark.kind, leg.forward)});
+      }
+    }
+    for (const BaliseGroup& group : map_->balise_groups) {
+      if (group.edge != leg.edge->id) continue;
+      if (const auto distance = distance_on_leg(group.offset_m)) {
+        groups_.push_back({&group, *distance, group.nominal_is_forward == leg.forward});
+      }
+    }
+  }
+  const auto by_distance = [](const auto& a, const auto& b) { return a.distance_m < b.distance_m; };
+  std::stable_sort(landmarks_.begin(), landmarks_.end(), by_distance);
+  std::stable_sort(groups_.begin(), groups_.end(), by_distance);
+}
+
+double Path::begin_m() const {
+  return legs_.front().begin_m;
+}
+double Path::end_m() const {
+  return legs_.back().begin_m + legs_.back().length_m;
+}
+
+const Path::Leg& Path::leg_at(double distance_m) const {
+  const auto after = std::upper_bound(legs_.begin(), legs_.end(), distance_m,
+                                      [](double distance, const Leg& leg) { return distance < leg.begin_m; });
+  return after == legs_.begin() ? legs_.front() : *(after - 1);
+}
+
+double Path::offset_on(const Leg& leg, double distance_m) {
+  return leg.offset_begin_m + (leg.forward ? 1.0 : -1.0) * (distance_m - leg.begin_m);
+}
+
+EdgePosition Path::position_at(double distance_m) const {
+  const double distance = std::clamp(distance_m, begin_m(), end_m());
+  const Leg& leg = leg_at(distance);
+  const double offset = std::clamp(offset_on(leg, distance), 0.0, leg.edge->alignment.length_m());
+  return {leg.edge->id, offset, leg.forward ? Direction::forward : Direction::reverse};
+}
+
+std::optional<double> Path::distance_of(uint32_t edge, double offset_m) const {
+  std::optional<double> best;
+  for (const Leg& leg : legs_) {
+    if (leg.edge->id != edge) continue;
+    const double into = (leg.forward ? 1.0 : -1.0) * (offset_m - leg.offset_begin_m);
+    if (into < -1e-6 || into > leg.length_m + 1e-6) continue;
+    const double distance = leg.begin_m + into;
+    if (!best || std::abs(distance) < std::abs(*best)) best = distance;
+  }
+  return best;
+}
+
+TrackPoint Path::at(double distance_m) const {
+  const Leg& leg = leg_at(distance_m);
+  TrackPoint point = leg.edge->alignment.at(offset_on(leg, distance_m));
+  if (leg.forward) return point;
+  // The rates keep their sign: quantity and direction both turn round.
+  point.pose.heading_rad = core::wrap_pi(point.pose.heading_rad + core::kPi);
+  point.curvature_per_m = -point.curvature_per_m;
+  point.cant_m = -point.cant_m;
+  point.grade = -point.grade;
+  return point;
+}
+
+double Path::curvature_at(double distance_m) const {
+  const Leg& leg = leg_at(distance_m);
+  const double curvature = leg.edge->alignment.curvature_at(offset_on(leg, distance_m));
+  return leg.forward ? curvature : -curvature;
+}
+
+}  // namespace railfix::track

@@ -1,0 +1,65 @@
+// One way through the network: a chain of edges with a distance of its own, as a train runs it.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "core/result.hpp"
+#include "track/map.hpp"
+
+namespace railfix::track {
+
+/// A landmark or balise group at its distance on a path; lateral is seen along the path (left positive).
+struct PathLandmark {
+  const Landmark* landmark = nullptr;
+  double distance_m = 0;
+  double lateral_m = 0;
+  LandmarkKind kind = LandmarkKind::unknown;  // as met along the path: a portal in is a portal out the other way
+};
+struct PathBaliseGroup {
+  const BaliseGroup* group = nullptr;
+  double distance_m = 0;
+  bool nominal_is_along_path = true;
+};
+
+/// Distance 0 is where the path was started; it may be negative behind it. Read-only after it is made; keeps the map
+/// alive.
+class Path {
+ public:
+  /// Follows the track from `start` (its direction, unknown = forward) over the straight way of every switch, `ahead_m`
+  /// in front and `behind_m` behind, or until the track ends. Where the straight way is not told, the smallest turn is
+  /// taken.
+  static core::Result<Path> follow(std::shared_ptr<const Map> map, const EdgePosition& start, double ahead_m,
+                                   double behind_m);
+
+  [[nodiscard]] double begin_m() const;  // smallest distance, <= 0
+  [[nodiscard]] double end_m() const;
+  [[nodiscard]] EdgePosition position_at(double distance_m) const;  // clamped to the ends
+  /// Distance of a place on the map, the one nearest to 0 on a ring; nothing when the path does not run over it.
+  [[nodiscard]] std::optional<double> distance_of(uint32_t edge, double offset_m) const;
+  /// Geometry seen along the path: heading, curvature, grade and cant have the sign of the path's direction.
+  [[nodiscard]] TrackPoint at(double distance_m) const;
+  [[nodiscard]] double curvature_at(double distance_m) const;
+  [[nodiscard]] const std::vector<PathLandmark>& landmarks() const { return landmarks_; }  // by distance
+  [[nodiscard]] const std::vector<PathBaliseGroup>& balise_groups() const { return groups_; }
+  [[nodiscard]] const Map& map() const { return *map_; }
+
+ private:
+  struct Leg {
+    const Edge* edge = nullptr;
+    bool forward = true;
+    double begin_m = 0;  // path distance where the leg begins
+    double length_m = 0;
+    double offset_begin_m = 0;  // edge offset at begin_m
+  };
+  [[nodiscard]] const Leg& leg_at(double distance_m) const;
+  static double offset_on(const Leg& leg, double distance_m);
+  void collect_marks();
+  std::shared_ptr<const Map> map_;
+  std::vector<Leg> legs_;
+  std::vector<PathLandmark> landmarks_;
+  std::vector<PathBaliseGroup> groups_;
+};
+
+}  // namespace railfix::track

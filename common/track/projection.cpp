@@ -1,0 +1,57 @@
+#include "track/projection.hpp"
+
+#include <proj.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace railfix::track {
+
+struct Projection::Handle {
+  PJ_CONTEXT* context = proj_context_create();
+  PJ* map_from_geo = nullptr;
+
+  Handle() { proj_log_level(context, PJ_LOG_NONE); }
+  ~Handle() {
+    proj_destroy(map_from_geo);
+    proj_context_destroy(context);
+  }
+  Handle(const Handle&) = delete;
+  Handle& operator=(const Handle&) = delete;
+};
+
+core::Result<Projection> Projection::open(const std::string& crs) {
+  auto handle = std::make_shared<Handle>();
+  const core::Error unknown{"\"" + crs +
+                            "\" is not a coordinate system in metres that PROJ knows; give one such as EPSG:2056"};
+  PJ* system = proj_create(handle->context, crs.c_str());
+  const PJ_TYPE type = system != nullptr ? proj_get_type(system) : PJ_TYPE_UNKNOWN;
+  proj_destroy(system);
+  if (type != PJ_TYPE_PROJECTED_CRS && type != PJ_TYPE_COMPOUND_CRS && type != PJ_TYPE_BOUND_CRS) return unknown;
+  PJ* raw = proj_create_crs_to_crs(handle->context, "EPSG:4326", crs.c_str(), nullptr);
+  if (raw == nullptr) return unknown;
+  // Easting before northing and longitude before latitude, whatever order the authority of the system wrote down.
+  handle->map_from_geo = proj_normalize_for_visualization(handle->context, raw);
+  proj_destroy(raw);
+  if (handle->map_from_geo == nullptr) return unknown;
+  return Projection(std::move(handle));
+}
+
+std::optional<GeoPoint> Projection::to_geo(double easting_m, double northing_m) const {
+  const PJ_COORD out = proj_trans(handle_->map_from_geo, PJ_INV, proj_coord(easting_m, northing_m, 0, 0));
+  if (!std::isfinite(out.xy.x) || !std::isfinite(out.xy.y)) return std::nullopt;
+  return GeoPoint{.lat_deg = out.xy.y, .lon_deg = out.xy.x};
+}
+
+std::optional<Eigen::Vector2d> Projection::from_geo(const GeoPoint& point) const {
+  const PJ_COORD out = proj_trans(handle_->map_from_geo, PJ_FWD, proj_coord(point.lon_deg, point.lat_deg, 0, 0));
+  if (!std::isfinite(out.xy.x) || !std::isfinite(out.xy.y)) return std::nullopt;
+  return Eigen::Vector2d(out.xy.x, out.xy.y);
+}
+
+std::string utm_crs(const GeoPoint& point) {
+  const int zone = std::clamp(static_cast<int>(std::floor((point.lon_deg + 180.0) / 6.0)) + 1, 1, 60);
+  return "EPSG:" + std::to_string((point.lat_deg < 0 ? 32700 : 32600) + zone);
+}
+
+}  // namespace railfix::track
