@@ -1,0 +1,131 @@
+#include "vision/ground_sheet.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+namespace railfix::vision {
+namespace {
+
+// Point of the sheet's centre line and the direction of growing offset there, in track axes.
+struct SheetRow {
+  Eigen::Vector3d centre_m;
+  Eigen::Vector3d left;
+};
+
+SheetRow sheet_row(const SheetPose& pose, double ahead_m) {
+  const double turn = pose.curvature_per_m * ahead_m;
+  // Series of sin(turn)/curvature and (1 - cos(turn))/curvature: exact to 1e-6 m up to 15 m at a radius of 100 m.
+  const double along = ahead_m * (1.0 - turn * turn / 6.0);
+  const double aside = 0.5 * ahead_m * turn * (1.0 - turn * turn / 12.0);
+  const double up = 0.5 * pose.vertical_curvature_per_m * ahead_m * ahead_m - pose.texture_depth_m;
+  return {{along, aside, up}, {-std::sin(turn), std::cos(turn), 0.0}};
+}
+
+float sample(const cv::Mat& grey, float u, float v) {
+  const int x = static_cast<int>(u);
+  const int y = static_cast<int>(v);
+  const float fx = u - static_cast<float>(x);
+  const float fy = v - static_cast<float>(y);
+  const uchar* top = grey.ptr<uchar>(y) + x;
+  const uchar* bottom = top + grey.step;
+  const float a = static_cast<float>(top[0]) + fx * static_cast<float>(top[1] - top[0]);
+  const float b = static_cast<float>(bottom[0]) + fx * static_cast<float>(bottom[1] - bottom[0]);
+  return a + fy * (b - a);
+}
+
+}  // namespace
+
+Sheet fit_sheet(const geometry::Intrinsics& camera, const SheetPose& pose, double near_m, double far_m,
+                double half_width_m, double cell_m, double margin_rad) {
+  SheetPose raised = pose;  // the camera looks further up by the margin: the near edge of what it then sees
+  raised.camera.pitch_rad -= margin_rad;
+  raised.curvature_per_m = 0;
+  raised.vertical_curvature_per_m = 0;
+  const geometry::View view(camera, raised.camera);
+  Sheet sheet;
+  sheet.half_width_m = half_width_m;
+  sheet.cell_m = cell_m;
+  sheet.cols = static_cast<int>(2.0 * half_width_m / cell_m) + 1;
+  const auto visible = [&](double ahead_m) {
+    for (const double side : {-1.0, 1.0}) {
+      const auto pixel = view.project({ahead_m, side * half_width_m, -pose.texture_depth_m});
+      if (!pixel || pixel->x() < 1 || pixel->y() < 1 || pixel->x() > camera.width_px - 2 ||
+          pixel->y() > camera.height_px - 2) {
+        return false;
+      }
+    }
+    return true;
+  };
+  double begin_m = near_m;
+  while (begin_m < far_m && !visible(begin_m)) begin_m += cell_m;
+  double end_m = begin_m;
+  while (end_m < far_m && visible(end_m)) end_m += cell_m;
+  sheet.near_m = begin_m;
+  sheet.rows = static_cast<int>((end_m - begin_m) / cell_m);
+  return sheet;
+}
+
+void TopViewMaker::map_row(const SheetPose& pose, const Eigen::Matrix3d& camera_from_track, double ahead_m) {
+  const SheetRow row = sheet_row(pose, ahead_m);
+  const Eigen::Vector3d position(0.0, pose.camera.lateral_m, pose.camera.height_m);
+  const Eigen::Vector3f start =
+      (camera_from_track * (row.centre_m + row.left * sheet_.offset_m(0) - position)).cast<float>();
+  const Eigen::Vector3f step = (camera_from_track * row.left * sheet_.cell_m).cast<float>();
+  const auto fu = static_cast<float>(camera_.fu_px);
+  const auto fv = static_cast<float>(camera_.fv_px);
+  const auto cu = static_cast<float>(camera_.cu_px);
+  const auto cv = static_cast<float>(camera_.cv_px);
+  const auto k1 = static_cast<float>(camera_.k1);
+  const auto k2 = static_cast<float>(camera_.k2);
+  const auto p1 = static_cast<float>(camera_.p1);
+  const auto p2 = static_cast<float>(camera_.p2);
+  for (int col = 0; col < sheet_.cols; ++col) {
+    const auto c = static_cast<float>(col);
+    const float inverse_z = 1.0F / (start.z() + c * step.z());
+    const float x = (start.x() + c * step.x()) * inverse_z;
+    const float y = (start.y() + c * step.y()) * inverse_z;
+    const float r2 = x * x + y * y;
+    const float radial = 1.0F + r2 * (k1 + k2 * r2);
+    u_px_[static_cast<size_t>(col)] = fu * (x * radial + 2.0F * p1 * x * y + p2 * (r2 + 2.0F * x * x)) + cu;
+    v_px_[static_cast<size_t>(col)] = fv * (y * radial + p1 * (r2 + 2.0F * y * y) + 2.0F * p2 * x * y) + cv;
+  }
+}
+
+void TopViewMaker::make(const cv::Mat& grey, const SheetPose& pose, TopView& out) {
+  const auto cols = static_cast<size_t>(sheet_.cols);
+  u_px_.resize(cols);
+  v_px_.resize(cols);
+  sharp_.create(sheet_.rows, sheet_.cols, CV_32F);
+  out.row_seen.assign(static_cast<size_t>(sheet_.rows), 0);
+  cv::resize(grey, half_, cv::Size(grey.cols / 2, grey.rows / 2), 0, 0, cv::INTER_AREA);
+
+  const Eigen::Matrix3d camera_from_track = geometry::rotation_camera_from_track(pose.camera);
+  // Along the track a picture row covers (X^2 + H^2) / (f H) of ground: below half a cell the half-size picture is the
+  // right one.
+  const double height_m = pose.height_m();
+  const double fine_m = std::sqrt(std::max(0.0, 0.6 * sheet_.cell_m * camera_.fv_px * height_m - height_m * height_m));
+  for (int row = 0; row < sheet_.rows; ++row) {
+    const double ahead_m = sheet_.ahead_m(row);
+    map_row(pose, camera_from_track, ahead_m);
+    auto* line = sharp_.ptr<float>(row);
+    const auto [u_min, u_max] = std::minmax(u_px_.front(), u_px_.back());
+    const auto [v_min, v_max] = std::minmax(v_px_.front(), v_px_.back());
+    const bool seen = u_min >= 1 && v_min >= 1 && u_max < static_cast<float>(camera_.width_px - 3) &&
+                      v_max < static_cast<float>(camera_.height_px - 3);
+    out.row_seen[static_cast<size_t>(row)] = seen ? 1 : 0;
+    if (!seen) {
+      std::fill(line, line + cols, 0.0F);
+    } else if (ahead_m < fine_m) {
+      for (size_t c = 0; c < cols; ++c) line[c] = sample(half_, 0.5F * u_px_[c] - 0.25F, 0.5F * v_px_[c] - 0.25F);
+    } else {
+      for (size_t c = 0; c < cols; ++c) line[c] = sample(grey, u_px_[c], v_px_[c]);
+    }
+  }
+  // The smoothing carries an unseen row's emptiness into its neighbours.
+  const std::vector<uint8_t> seen = out.row_seen;
+  for (size_t row = 1; row + 1 < seen.size(); ++row) out.row_seen[row] = seen[row - 1] & seen[row] & seen[row + 1];
+  cv::GaussianBlur(sharp_, out.grey, cv::Size(3, 3), 0.85, 0.85, cv::BORDER_REPLICATE);
+}
+
+}  // namespace railfix::vision
