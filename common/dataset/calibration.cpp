@@ -1,0 +1,179 @@
+#include "dataset/calibration.hpp"
+
+#include <cmath>
+#include <fstream>
+#include <sstream>
+
+#include "dataset/yaml_file.hpp"
+
+namespace railfix::dataset {
+namespace {
+
+using core::Error;
+using core::Result;
+using core::Status;
+
+constexpr int kLargestSidePx = 100'000;
+
+Status read_lens(const YamlFile& yaml, geometry::Intrinsics& camera) {
+  if (yaml.has("camera_model")) {
+    const auto model = yaml.text("camera_model");
+    if (!model.ok()) return model.error();
+    if (model.value() != "pinhole")
+      return yaml.error("camera_model", "is '" + model.value() + "', only pinhole can be used");
+  }
+  const auto intrinsics = yaml.numbers("intrinsics", 4);
+  if (!intrinsics.ok()) return intrinsics.error();
+  const auto& i = intrinsics.value();
+  if (i[0] <= 0 || i[1] <= 0) return yaml.error("intrinsics", "fu and fv must be positive");
+  camera.fu_px = i[0];
+  camera.fv_px = i[1];
+  camera.cu_px = i[2];
+  camera.cv_px = i[3];
+  return {};
+}
+
+Status read_distortion(const YamlFile& yaml, geometry::Intrinsics& camera) {
+  std::string model = yaml.has("distortion_coefficients") ? "radial-tangential" : "none";
+  if (yaml.has("distortion_model")) {
+    const auto text = yaml.text("distortion_model");
+    if (!text.ok()) return text.error();
+    model = text.value();
+  }
+  if (model == "none") return {};
+  if (model != "radial-tangential" && model != "radtan" && model != "plumb_bob") {
+    return yaml.error("distortion_model", "is '" + model + "', only radial-tangential and none can be used");
+  }
+  const auto coefficients = yaml.numbers("distortion_coefficients", 4);
+  if (!coefficients.ok()) return coefficients.error();
+  const auto& k = coefficients.value();
+  for (size_t more = 4; more < k.size(); ++more) {
+    if (k[more] != 0) return yaml.error("distortion_coefficients", "only k1, k2, p1, p2 may differ from zero");
+  }
+  camera.k1 = k[0];
+  camera.k2 = k[1];
+  camera.p1 = k[2];
+  camera.p2 = k[3];
+  return {};
+}
+
+Status read_resolution(const YamlFile& yaml, geometry::Intrinsics& camera) {
+  const auto resolution = yaml.numbers("resolution", 2);
+  if (!resolution.ok()) return resolution.error();
+  const auto& r = resolution.value();
+  for (size_t i = 0; i < 2; ++i) {
+    if (r[i] < 1 || r[i] > kLargestSidePx || r[i] != std::floor(r[i])) {
+      return yaml.error("resolution", "must be [width, height] in whole pixels");
+    }
+  }
+  camera.width_px = static_cast<int>(r[0]);
+  camera.height_px = static_cast<int>(r[1]);
+  return {};
+}
+
+Status read_mount(const YamlFile& yaml, std::optional<geometry::CameraPose>& mount) {
+  if (!yaml.has("mount")) return {};
+  geometry::CameraPose pose;
+  const std::pair<const char*, double*> fields[] = {{"mount.height_m", &pose.height_m},
+                                                    {"mount.pitch_rad", &pose.pitch_rad},
+                                                    {"mount.yaw_rad", &pose.yaw_rad},
+                                                    {"mount.roll_rad", &pose.roll_rad},
+                                                    {"mount.lateral_m", &pose.lateral_m}};
+  for (const auto& [key, value] : fields) {
+    const auto number = yaml.number(key);
+    if (!number.ok()) return number.error();
+    *value = number.value();
+  }
+  if (pose.height_m <= 0) return yaml.error("mount.height_m", "must be positive");
+  mount = pose;
+  return {};
+}
+
+// "P0: f 0 cu 0  0 f cv 0  0 0 1 0": rectified pictures, so there is no distortion.
+Result<CameraCalibration> read_kitti_calibration(const std::filesystem::path& file) {
+  std::ifstream stream(file);
+  std::string line;
+  while (std::getline(stream, line)) {
+    std::istringstream cells(line);
+    std::string name;
+    cells >> name;
+    if (name != "P0:" && name != "P_rect_00:") continue;
+    double p[12] = {};
+    for (double& value : p) {
+      if (!(cells >> value)) return Error{file.string() + " line '" + name + "' must hold 12 numbers"};
+    }
+    if (!(p[0] > 0) || !(p[5] > 0))
+      return Error{file.string() + " line '" + name + "' must hold positive focal lengths"};
+    CameraCalibration calibration;
+    calibration.intrinsics.fu_px = p[0];
+    calibration.intrinsics.fv_px = p[5];
+    calibration.intrinsics.cu_px = p[2];
+    calibration.intrinsics.cv_px = p[6];
+    return calibration;
+  }
+  return Error{file.string() + " has no line 'P0: ...'; it must be the calib.txt of a KITTI odometry sequence"};
+}
+
+}  // namespace
+
+Result<CameraCalibration> read_calibration(const std::filesystem::path& file) {
+  const auto loaded = YamlFile::load(file);
+  if (!loaded.ok()) return loaded.error();
+  const YamlFile& yaml = loaded.value();
+  CameraCalibration calibration;
+  for (const Status& status : {read_resolution(yaml, calibration.intrinsics), read_lens(yaml, calibration.intrinsics),
+                               read_distortion(yaml, calibration.intrinsics), read_mount(yaml, calibration.mount)}) {
+    if (!status.ok()) return status.error();
+  }
+  if (yaml.has("rate_hz")) {
+    const auto rate = yaml.number("rate_hz");
+    if (!rate.ok()) return rate.error();
+    if (rate.value() < 0) return yaml.error("rate_hz", "must not be negative");
+    calibration.rate_hz = rate.value();
+  }
+  return calibration;
+}
+
+Status write_calibration(const std::filesystem::path& file, const CameraCalibration& calibration) {
+  std::ofstream stream(file);
+  if (!stream) return Error{file.string() + " cannot be written; check the folder and its permissions"};
+  const auto& c = calibration.intrinsics;
+  stream.precision(17);
+  stream << "sensor_type: camera\n";
+  if (calibration.rate_hz > 0) stream << "rate_hz: " << calibration.rate_hz << '\n';
+  stream << "resolution: [" << c.width_px << ", " << c.height_px << "]\n"
+         << "camera_model: pinhole\n"
+         << "intrinsics: [" << c.fu_px << ", " << c.fv_px << ", " << c.cu_px << ", " << c.cv_px << "]\n"
+         << "distortion_model: radial-tangential\n"
+         << "distortion_coefficients: [" << c.k1 << ", " << c.k2 << ", " << c.p1 << ", " << c.p2 << "]\n";
+  if (calibration.mount) {
+    const auto& m = *calibration.mount;
+    stream << "mount:\n"
+           << "  height_m: " << m.height_m << "      # above the rail heads\n"
+           << "  pitch_rad: " << m.pitch_rad << "    # down positive\n"
+           << "  yaw_rad: " << m.yaw_rad << "      # left positive\n"
+           << "  roll_rad: " << m.roll_rad << "\n"
+           << "  lateral_m: " << m.lateral_m << "    # left of the track centre positive\n";
+  }
+  stream.close();
+  if (!stream) return Error{file.string() + " could not be written completely; is the disk full?"};
+  return {};
+}
+
+Result<std::optional<CameraCalibration>> find_calibration(const std::filesystem::path& pictures) {
+  using Found = std::optional<CameraCalibration>;
+  for (const char* place : {"mav0/cam0/sensor.yaml", "cam0/sensor.yaml", "sensor.yaml", "camera.yaml"}) {
+    if (!std::filesystem::is_regular_file(pictures / place)) continue;
+    const auto read = read_calibration(pictures / place);
+    if (!read.ok()) return read.error();
+    return Found(read.value());
+  }
+  if (std::filesystem::is_regular_file(pictures / "calib.txt")) {
+    const auto read = read_kitti_calibration(pictures / "calib.txt");
+    if (!read.ok()) return read.error();
+    return Found(read.value());
+  }
+  return Found();
+}
+
+}  // namespace railfix::dataset

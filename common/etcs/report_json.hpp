@@ -1,0 +1,20 @@
+// Message 136 as one JSON object: keys are the field names of SUBSET-026, values the raw integers, in the message's
+// order.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "core/result.hpp"
+#include "etcs/train_position_report.hpp"
+
+namespace railfix::etcs {
+
+/// NID_C and NID_BG stand beside NID_LRBG; packets 4, 5 and 44 are listed under "packets" with their bits as text.
+/// REQUIRES: encode() accepts the report.
+nlohmann::ordered_json to_json(const TrainPositionReport& report, Baseline baseline);
+
+/// The other way. NID_MESSAGE, L_MESSAGE and L_PACKET may be left out, but must be right when given; NID_C with NID_BG
+/// may replace NID_LRBG. A missing, unknown or out-of-range key is named. encode() accepts the result.
+core::Result<TrainPositionReport> report_from_json(const nlohmann::ordered_json& json, Baseline baseline);
+
+}  // namespace railfix::etcs

@@ -1,0 +1,122 @@
+// The bytes of a file and the merge of its chunks into one stream of messages in time order.
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <limits>
+
+#include "mcap/reader.hpp"
+
+namespace railfix::mcap {
+
+namespace {
+
+// Sorts behind every message of the same time and chunk number; a chunk is opened before its messages are known.
+constexpr uint64_t kUnopened = std::numeric_limits<uint64_t>::max();
+
+}  // namespace
+
+core::Result<std::shared_ptr<FileBytes>> FileBytes::open(const std::filesystem::path& file) {
+  const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  struct stat info {};
+  if (descriptor < 0 || ::fstat(descriptor, &info) != 0 || !S_ISREG(info.st_mode)) {
+    const std::string why = descriptor < 0 ? std::strerror(errno) : "it is not a file";
+    if (descriptor >= 0) ::close(descriptor);
+    return core::Error{file.string() + " cannot be read (" + why + ")"};
+  }
+  return std::shared_ptr<FileBytes>(new FileBytes(descriptor, static_cast<uint64_t>(info.st_size)));
+}
+
+FileBytes::~FileBytes() {
+  ::close(descriptor_);
+}
+
+std::optional<Bytes> FileBytes::read(uint64_t offset, uint64_t length) const {
+  if (offset > size_ || length > size_ - offset) return std::nullopt;
+  Bytes bytes(length);
+  size_t done = 0;
+  while (done < length) {
+    const ssize_t got = ::pread(descriptor_, bytes.data() + done, length - done, static_cast<off_t>(offset + done));
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) return std::nullopt;
+    done += static_cast<size_t>(got);
+  }
+  return bytes;
+}
+
+bool being_written(const std::filesystem::path& file) {
+  const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) return false;
+  const bool locked = ::flock(descriptor, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+  ::close(descriptor);
+  return locked;
+}
+
+Messages::Messages(Reader& reader, Selection selection) : reader_(reader), selection_(std::move(selection)) {
+  for (const auto& [id, channel] : reader_.channels_) {
+    if (selection_.topics.empty() || selection_.topics.contains(channel.topic)) channels_.insert(id);
+  }
+  for (uint64_t i = 0; i < reader_.places_.size(); ++i) {
+    const ChunkPlace& place = reader_.places_[i];
+    if (selection_.from_ns && place.end_ns < *selection_.from_ns) continue;
+    if (selection_.to_ns && place.start_ns >= *selection_.to_ns) continue;
+    heap_.push_back({place.start_ns, i, kUnopened});
+  }
+  std::ranges::make_heap(heap_, std::greater<>());
+}
+
+bool Messages::wanted(const Message& message) const {
+  return channels_.contains(message.channel_id) &&
+         (!selection_.from_ns || message.log_time_ns >= *selection_.from_ns) &&
+         (!selection_.to_ns || message.log_time_ns < *selection_.to_ns);
+}
+
+void Messages::open(uint64_t place) {
+  auto records = reader_.load(reader_.places_[place]);
+  if (!records) return;
+  Loaded loaded{std::move(*records), 0};
+  Decoder decoder(loaded.records);
+  while (decoder.left() > 0) {
+    const size_t position = decoder.position();
+    const uint8_t opcode = decoder.u8();
+    const ByteView content = decoder.raw(decoder.u64());
+    Message message;
+    if (!decoder.ok()) {
+      reader_.problem("the chunk at byte " + std::to_string(reader_.places_[place].offset) +
+                      " ends in a broken record");
+      break;
+    }
+    if (opcode != static_cast<uint8_t>(Opcode::message) || !parse(content, message) || !wanted(message)) continue;
+    heap_.push_back({message.log_time_ns, place, position});
+    std::ranges::push_heap(heap_, std::greater<>());
+    ++loaded.left;
+  }
+  if (loaded.left > 0) loaded_.emplace(place, std::move(loaded));
+}
+
+std::optional<Message> Messages::next() {
+  if (finished_) loaded_.erase(*finished_);
+  finished_.reset();
+  while (!heap_.empty()) {
+    std::ranges::pop_heap(heap_, std::greater<>());
+    const Entry entry = heap_.back();
+    heap_.pop_back();
+    if (entry.position == kUnopened) {
+      open(entry.place);
+      continue;
+    }
+    Loaded& loaded = loaded_.at(entry.place);
+    Decoder decoder(ByteView(loaded.records).subspan(entry.position + 1));
+    Message message;
+    (void)parse(decoder.raw(decoder.u64()), message);
+    if (--loaded.left == 0) finished_ = entry.place;
+    return message;
+  }
+  return std::nullopt;
+}
+
+}  // namespace railfix::mcap

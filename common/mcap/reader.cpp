@@ -1,0 +1,281 @@
+#include "mcap/reader.hpp"
+
+#include <algorithm>
+
+#include "mcap/writer.hpp"
+
+namespace railfix::mcap {
+
+namespace {
+
+constexpr uint64_t kTailBytes = kRecordHeadBytes + kFooterBytes + kMagic.size();
+constexpr size_t kMostProblems = 100;
+
+bool has_magic(const std::optional<Bytes>& bytes) {
+  return bytes && std::ranges::equal(*bytes, kMagic);
+}
+
+}  // namespace
+
+core::Result<std::unique_ptr<Reader>> Reader::open(const std::filesystem::path& file) {
+  auto bytes = FileBytes::open(file);
+  if (!bytes.ok()) return bytes.error();
+  std::unique_ptr<Reader> reader(new Reader(file, bytes.value()));
+  if (!has_magic(reader->bytes_->read(0, kMagic.size()))) {
+    return core::Error{file.string() + (reader->bytes_->size() == 0 ? " is empty" : " is not an MCAP recording") +
+                       "; give a file that the recorder wrote"};
+  }
+  reader->indexed_ = reader->read_summary();
+  if (!reader->indexed_) {
+    reader->schemas_.clear();
+    reader->channels_.clear();
+    reader->metadata_.clear();
+    reader->places_.clear();
+    reader->statistics_ = {};
+    reader->scan();
+  }
+  return reader;
+}
+
+void Reader::problem(const std::string& what) {
+  const std::string sentence = file_.string() + ": " + what;
+  const bool said = std::ranges::find(problems_, sentence) != problems_.end();
+  if (!said && problems_.size() < kMostProblems) problems_.push_back(sentence);
+}
+
+bool Reader::learn(uint8_t opcode, ByteView content) {
+  if (opcode == static_cast<uint8_t>(Opcode::schema)) {
+    Schema schema;
+    if (!parse(content, schema)) return false;
+    const auto [known, added] = schemas_.emplace(schema.id, schema);
+    if (!added && known->second != schema) {
+      problem("schema " + std::to_string(schema.id) + " is defined twice and differently; the first one is used");
+    }
+  } else if (opcode == static_cast<uint8_t>(Opcode::channel)) {
+    Channel channel;
+    if (!parse(content, channel)) return false;
+    const auto [known, added] = channels_.emplace(channel.id, channel);
+    if (!added && known->second != channel) {
+      problem("channel " + std::to_string(channel.id) + " is defined twice and differently; the first one is used");
+    }
+  }
+  return true;
+}
+
+bool Reader::read_summary_record(uint8_t opcode, ByteView content, std::vector<MetadataIndex>& metadata) {
+  switch (static_cast<Opcode>(opcode)) {
+    case Opcode::statistics:
+      return parse(content, statistics_);
+    case Opcode::chunk_index: {
+      ChunkIndex index;
+      if (!parse(content, index)) return false;
+      places_.push_back({index.start_ns, index.end_ns, index.offset, index.length, false});
+      return true;
+    }
+    case Opcode::metadata_index: {
+      MetadataIndex index;
+      if (!parse(content, index)) return false;
+      metadata.push_back(index);
+      return true;
+    }
+    default:
+      return learn(opcode, content);
+  }
+}
+
+bool Reader::read_summary() {
+  const uint64_t size = bytes_->size();
+  if (size < kMagic.size() + kTailBytes || !has_magic(bytes_->read(size - kMagic.size(), kMagic.size()))) {
+    problem("was not closed properly, so it is read by a scan; what the recorder had not yet written is missing");
+    return false;
+  }
+  const uint64_t footer_offset = size - kTailBytes;
+  const auto tail = bytes_->read(footer_offset, kTailBytes);
+  Footer footer;
+  if (!tail || tail->front() != static_cast<uint8_t>(Opcode::footer) ||
+      !parse(ByteView(*tail).subspan(kRecordHeadBytes, kFooterBytes), footer) || footer.summary_start > footer_offset) {
+    problem("its footer is damaged, so it is read by a scan");
+    return false;
+  }
+  if (footer.summary_start == 0) return false;  // legal: a file without an index
+  const auto summary = bytes_->read(footer.summary_start, size - kMagic.size() - footer.summary_start);
+  if (!summary) return false;
+  const ByteView checked = ByteView(*summary).first(summary->size() - 4);
+  if (footer.summary_crc != 0 && crc32(checked) != footer.summary_crc) {
+    problem("the checksum of its index is wrong, so it is read by a scan");
+    return false;
+  }
+  Decoder decoder(checked.first(footer_offset - footer.summary_start));
+  std::vector<MetadataIndex> metadata_indexes;
+  while (decoder.left() > 0) {
+    const uint8_t opcode = decoder.u8();
+    const ByteView content = decoder.raw(decoder.u64());
+    if (!decoder.ok() || !read_summary_record(opcode, content, metadata_indexes)) {
+      problem("its index is damaged, so it is read by a scan");
+      return false;
+    }
+  }
+  if (places_.empty() && statistics_.messages > 0) return false;  // its messages stand outside chunks
+  std::ranges::sort(places_, {}, &ChunkPlace::offset);
+  for (const MetadataIndex& index : metadata_indexes) {
+    const auto record = bytes_->read(index.offset, index.length);
+    Metadata metadata;
+    if (record && record->size() > kRecordHeadBytes && parse(ByteView(*record).subspan(kRecordHeadBytes), metadata)) {
+      metadata_.push_back(std::move(metadata));
+    } else {
+      problem("metadata '" + index.name + "' is damaged");
+    }
+  }
+  return true;
+}
+
+void Reader::scan() {
+  uint64_t offset = kMagic.size();
+  const uint64_t size = bytes_->size();
+  while (offset < size) {
+    const auto head = bytes_->read(offset, std::min<uint64_t>(kRecordHeadBytes, size - offset));
+    if (offset + kMagic.size() == size && has_magic(bytes_->read(offset, kMagic.size()))) return;
+    Decoder decoder(head ? ByteView(*head) : ByteView());
+    const uint8_t opcode = decoder.u8();
+    const uint64_t length = decoder.u64();
+    const bool whole = decoder.ok() && length <= size - offset - kRecordHeadBytes;
+    const auto content = whole ? bytes_->read(offset + kRecordHeadBytes, length) : std::nullopt;
+    if (!content || opcode == 0) {
+      problem("ends in the middle of a record at byte " + std::to_string(offset) + " of " + std::to_string(size));
+      return;
+    }
+    if (!scan_record(opcode, offset, *content)) {
+      problem("the record at byte " + std::to_string(offset) + " is damaged and left out");
+    }
+    if (opcode == static_cast<uint8_t>(Opcode::data_end)) return;
+    offset += kRecordHeadBytes + length;
+  }
+}
+
+bool Reader::scan_record(uint8_t opcode, uint64_t offset, ByteView content) {
+  const uint64_t length = kRecordHeadBytes + content.size();
+  switch (static_cast<Opcode>(opcode)) {
+    case Opcode::metadata: {
+      Metadata metadata;
+      if (!parse(content, metadata)) return false;
+      metadata_.push_back(std::move(metadata));
+      ++statistics_.metadata;
+      return true;
+    }
+    case Opcode::attachment:
+      ++statistics_.attachments;
+      return true;
+    case Opcode::message: {
+      Message message;
+      if (!parse(content, message)) return false;
+      statistics_.count(message.channel_id, message.log_time_ns);
+      places_.push_back({message.log_time_ns, message.log_time_ns, offset, length, true});
+      return true;
+    }
+    case Opcode::chunk: {
+      ChunkPlace place{0, 0, offset, length, false};
+      const auto records = load(place);
+      if (!records) return true;  // load() has said why
+      Statistics inside;
+      Decoder decoder(*records);
+      while (decoder.left() > 0) {
+        const uint8_t inner = decoder.u8();
+        const ByteView inner_content = decoder.raw(decoder.u64());
+        Message message;
+        if (!decoder.ok()) break;
+        if (inner != static_cast<uint8_t>(Opcode::message)) {
+          (void)learn(inner, inner_content);
+        } else if (parse(inner_content, message)) {
+          inside.count(message.channel_id, message.log_time_ns);
+          statistics_.count(message.channel_id, message.log_time_ns);
+        }
+      }
+      place.start_ns = inside.start_ns;
+      place.end_ns = inside.end_ns;
+      places_.push_back(place);
+      ++statistics_.chunks;
+      return true;
+    }
+    default: {
+      const bool known = learn(opcode, content);
+      statistics_.schemas = static_cast<uint16_t>(schemas_.size());
+      statistics_.channels = static_cast<uint32_t>(channels_.size());
+      return known;
+    }
+  }
+}
+
+std::optional<Bytes> Reader::load(const ChunkPlace& place) {
+  const std::string what = "the chunk at byte " + std::to_string(place.offset);
+  auto record = bytes_->read(place.offset, place.length);
+  if (!record || record->size() < kRecordHeadBytes) {
+    problem(what + " is not in the file; its messages are missing");
+    return std::nullopt;
+  }
+  if (place.loose) return record;
+  ChunkHead head;
+  ByteView stored;
+  if (record->front() != static_cast<uint8_t>(Opcode::chunk) ||
+      !parse(ByteView(*record).subspan(kRecordHeadBytes), head, stored)) {
+    problem(what + " is damaged; its messages are missing");
+    return std::nullopt;
+  }
+  auto records = chunk_records(head, stored);
+  if (!records.ok()) {
+    problem(what + " cannot be used, " + records.error().message + "; its messages are missing");
+    return std::nullopt;
+  }
+  return std::move(records).value();
+}
+
+Messages Reader::messages(Selection selection) {
+  return {*this, std::move(selection)};
+}
+
+void Reader::for_each(const Selection& selection,
+                      const std::function<bool(const Channel& channel, const Message& message)>& use) {
+  Messages all = messages(selection);
+  while (const auto message = all.next()) {
+    if (!use(channels_.at(message->channel_id), *message)) return;
+  }
+}
+
+core::Result<std::vector<std::string>> recover(const std::filesystem::path& damaged, const std::filesystem::path& out) {
+  auto reader = Reader::open(damaged);
+  if (!reader.ok()) return reader.error();
+  WriterOptions options;
+  options.sync_period_s = 0;
+  options.overwrite = true;
+  auto writer = Writer::create(out, options);
+  if (!writer.ok()) return writer.error();
+  Reader& in = *reader.value();
+  Writer& to = *writer.value();
+  std::map<uint16_t, uint16_t> schema_ids{{0, 0}};
+  std::map<uint16_t, uint16_t> channel_ids;
+  for (const auto& [id, schema] : in.schemas()) {
+    auto added = to.add_schema(schema.name, schema.encoding, schema.data);
+    if (!added.ok()) return added.error();
+    schema_ids[id] = added.value();
+  }
+  for (const auto& [id, channel] : in.channels()) {
+    auto added =
+        to.add_channel(schema_ids[channel.schema_id], channel.topic, channel.message_encoding, channel.metadata);
+    if (!added.ok()) return added.error();
+    channel_ids[id] = added.value();
+  }
+  core::Status status;
+  for (const Metadata& metadata : in.metadata()) {
+    status = to.write_metadata(metadata);
+    if (!status.ok()) return status.error();
+  }
+  in.for_each({}, [&](const Channel& channel, Message message) {
+    message.channel_id = channel_ids.at(channel.id);
+    status = to.write(message);
+    return status.ok();
+  });
+  if (status.ok()) status = to.close();
+  if (!status.ok()) return status.error();
+  return in.problems();
+}
+
+}  // namespace railfix::mcap

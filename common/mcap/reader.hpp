@@ -1,0 +1,141 @@
+// Reads MCAP recordings, ours and others': by their index when the file was closed properly, else by a scan that finds
+// every whole record of a truncated or damaged file. No content can crash it; what could not be read is said in
+// problems(). Not thread safe.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "core/result.hpp"
+#include "mcap/records.hpp"
+
+namespace railfix::mcap {
+
+/// Where messages are stored: a Chunk record, or a run of Message records that stand outside chunks.
+struct ChunkPlace {
+  int64_t start_ns = 0;
+  int64_t end_ns = 0;
+  uint64_t offset = 0;
+  uint64_t length = 0;
+  bool loose = false;  // the run of records itself
+};
+
+class FileBytes {
+ public:
+  static core::Result<std::shared_ptr<FileBytes>> open(const std::filesystem::path& file);
+  ~FileBytes();
+  FileBytes(const FileBytes&) = delete;
+  FileBytes& operator=(const FileBytes&) = delete;
+  [[nodiscard]] uint64_t size() const { return size_; }
+  /// Nothing when the range is not in the file or cannot be read.
+  [[nodiscard]] std::optional<Bytes> read(uint64_t offset, uint64_t length) const;
+
+ private:
+  FileBytes(int descriptor, uint64_t size) : descriptor_(descriptor), size_(size) {}
+  int descriptor_;
+  uint64_t size_;
+};
+
+/// Which messages to read; everything by default. Topics that the file does not have give no messages.
+struct Selection {
+  std::set<std::string> topics;    // empty = all
+  std::optional<int64_t> from_ns;  // log time, inclusive
+  std::optional<int64_t> to_ns;    // log time, exclusive
+};
+
+class Messages;
+
+class Reader {
+ public:
+  /// Error: the file cannot be opened or does not begin like an MCAP file. A damaged one opens, with problems().
+  static core::Result<std::unique_ptr<Reader>> open(const std::filesystem::path& file);
+
+  /// False: the file was not closed properly (cut off, or still being written), or its index is damaged.
+  [[nodiscard]] bool indexed() const { return indexed_; }
+  /// A sentence for everything that is missing or damaged, as far as it was met. Messages add to it while they are
+  /// read.
+  [[nodiscard]] const std::vector<std::string>& problems() const { return problems_; }
+  [[nodiscard]] const std::map<uint16_t, Schema>& schemas() const { return schemas_; }
+  [[nodiscard]] const std::map<uint16_t, Channel>& channels() const { return channels_; }
+  [[nodiscard]] const std::vector<Metadata>& metadata() const { return metadata_; }
+  /// As stored in an indexed file, else counted by the scan.
+  [[nodiscard]] const Statistics& statistics() const { return statistics_; }
+  [[nodiscard]] const std::filesystem::path& file() const { return file_; }
+
+  /// Messages in the order of their log time, equal times in file order. REQUIRES: the reader outlives it.
+  Messages messages(Selection selection = {});
+  /// Calls `use` for every selected message, in the same order, until it returns false.
+  void for_each(const Selection& selection,
+                const std::function<bool(const Channel& channel, const Message& message)>& use);
+
+ private:
+  friend class Messages;
+  Reader(std::filesystem::path file, std::shared_ptr<FileBytes> bytes)
+      : file_(std::move(file)), bytes_(std::move(bytes)) {}
+  bool read_summary();
+  bool read_summary_record(uint8_t opcode, ByteView content, std::vector<MetadataIndex>& metadata);
+  void scan();
+  bool scan_record(uint8_t opcode, uint64_t offset, ByteView content);
+  bool learn(uint8_t opcode, ByteView content);
+  std::optional<Bytes> load(const ChunkPlace& place);
+  void problem(const std::string& what);
+
+  std::filesystem::path file_;
+  std::shared_ptr<FileBytes> bytes_;
+  bool indexed_ = false;
+  std::vector<std::string> problems_;
+  std::map<uint16_t, Schema> schemas_;
+  std::map<uint16_t, Channel> channels_;
+  std::vector<Metadata> metadata_;
+  std::vector<ChunkPlace> places_;
+  Statistics statistics_;
+};
+
+/// Goes through a recording; holds only the chunks that overlap the present time in memory.
+class Messages {
+ public:
+  /// The next message, or nothing at the end. Its data lives until the next call.
+  std::optional<Message> next();
+
+ private:
+  friend class Reader;
+  struct Entry {
+    int64_t log_time_ns;
+    uint64_t place;     // number of the chunk, in file order
+    uint64_t position;  // of the record within the chunk; kUnopened for a chunk not yet loaded
+    bool operator>(const Entry& other) const {
+      return std::tie(log_time_ns, place, position) > std::tie(other.log_time_ns, other.place, other.position);
+    }
+  };
+  struct Loaded {
+    Bytes records;
+    size_t left = 0;
+  };
+  Messages(Reader& reader, Selection selection);
+  void open(uint64_t place);
+  [[nodiscard]] bool wanted(const Message& message) const;
+
+  Reader& reader_;
+  Selection selection_;
+  std::set<uint16_t> channels_;
+  std::vector<Entry> heap_;
+  std::map<uint64_t, Loaded> loaded_;
+  std::optional<uint64_t> finished_;  // chunk of the last message, to be dropped at the next call
+};
+
+/// A writer has this file open now (NAME.mcap.active of a running recorder).
+bool being_written(const std::filesystem::path& file);
+
+/// Copies everything readable of a damaged or unfinished recording into a proper one, replacing what has that name.
+/// Gives what could not be kept.
+core::Result<std::vector<std::string>> recover(const std::filesystem::path& damaged, const std::filesystem::path& out);
+
+}  // namespace railfix::mcap

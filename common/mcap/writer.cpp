@@ -1,0 +1,305 @@
+#include "mcap/writer.hpp"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+#include "core/time.hpp"
+
+namespace railfix::mcap {
+
+namespace {
+
+constexpr size_t kMostIds = 65535;
+
+core::Error io_error(const std::string& what, const std::filesystem::path& file) {
+  return core::Error{file.string() + ": " + what + " (" + std::strerror(errno) + ")"};
+}
+
+/// All bytes or an error.
+bool write_all(int descriptor, ByteView bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(descriptor, bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) return false;
+    bytes = bytes.subspan(static_cast<size_t>(written));
+  }
+  return true;
+}
+
+/// The folder's entry of a new or renamed file reaches the disk only with the folder.
+void sync_folder(const std::filesystem::path& file) {
+  const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
+  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return;
+  ::fsync(descriptor);
+  ::close(descriptor);
+}
+
+}  // namespace
+
+core::Result<std::unique_ptr<Writer>> Writer::create(const std::filesystem::path& file, const WriterOptions& options) {
+  std::unique_ptr<Writer> writer(new Writer(file, options));
+  writer->active_ = file.string() + ".active";
+  if (!options.overwrite && std::filesystem::exists(file)) {
+    return core::Error{file.string() + " exists already; choose another name or remove it"};
+  }
+  const int flags = O_WRONLY | O_CREAT | O_CLOEXEC | (options.overwrite ? 0 : O_EXCL);
+  writer->descriptor_ = ::open(writer->active_.c_str(), flags, 0644);
+  if (writer->descriptor_ < 0) {
+    if (errno == EEXIST) {
+      return core::Error{writer->active_.string() +
+                         " exists: another recorder writes it or an earlier one was cut off; recover or remove it"};
+    }
+    return io_error("cannot be created; does the folder exist and may this user write there?", writer->active_);
+  }
+  // The lock goes with the process: recover() can tell a recording that is being written from one that was cut off.
+  if (::flock(writer->descriptor_, LOCK_EX | LOCK_NB) != 0) {
+    ::close(std::exchange(writer->descriptor_, -1));
+    return core::Error{writer->active_.string() + " is being written by another recorder; choose another name"};
+  }
+  if (options.overwrite) (void)!::ftruncate(writer->descriptor_, 0);
+  Bytes head(kMagic.begin(), kMagic.end());
+  Encoder encoder(head);
+  const size_t record = encoder.begin_record(static_cast<uint8_t>(Opcode::header));
+  encoder.text("");
+  encoder.text(options.library);
+  encoder.end_record(record);
+  const auto status = writer->put(head);
+  if (!status.ok()) return status.error();
+  writer->synced_ns_ = core::monotonic_ns();
+  sync_folder(writer->active_);
+  return writer;
+}
+
+Writer::~Writer() {
+  (void)close();
+}
+
+core::Status Writer::put(ByteView bytes) {
+  if (descriptor_ < 0) return core::Error{file_.string() + " is closed already"};
+  if (!write_all(descriptor_, bytes)) {
+    const core::Error error = io_error("cannot be written; is the disk full?", active_);
+    // Half a record would hide everything behind it.
+    if (::ftruncate(descriptor_, static_cast<off_t>(offset_)) != 0 ||
+        ::lseek(descriptor_, static_cast<off_t>(offset_), SEEK_SET) < 0) {
+      ::close(descriptor_);
+      descriptor_ = -1;
+    }
+    return error;
+  }
+  offset_ += bytes.size();
+  if (options_.data_crc) data_crc_ = crc32(bytes, data_crc_);
+  return {};
+}
+
+core::Result<uint16_t> Writer::add_schema(const std::string& name, const std::string& encoding,
+                                          const std::string& data) {
+  for (const Schema& schema : schemas_) {
+    if (schema.name == name && schema.encoding == encoding && schema.data == data) return schema.id;
+  }
+  if (schemas_.size() >= kMostIds) return core::Error{file_.string() + ": more than 65535 schemas"};
+  const Schema schema{static_cast<uint16_t>(schemas_.size() + 1), name, encoding, data};
+  // Outside the chunks, so that a damaged chunk takes no other chunk's schema with it.
+  Bytes record;
+  append(record, schema);
+  const auto status = put(record);
+  if (!status.ok()) return status.error();
+  schemas_.push_back(schema);
+  ++statistics_.schemas;
+  return schema.id;
+}
+
+core::Result<uint16_t> Writer::add_channel(uint16_t schema_id, const std::string& topic,
+                                           const std::string& message_encoding,
+                                           const std::map<std::string, std::string>& metadata) {
+  if (schema_id > schemas_.size()) {
+    return core::Error{file_.string() + ": channel " + topic + " names schema " + std::to_string(schema_id) +
+                       ", which was not added"};
+  }
+  for (const Channel& channel : channels_) {
+    if (channel.topic == topic && channel.schema_id == schema_id && channel.message_encoding == message_encoding &&
+        channel.metadata == metadata) {
+      return channel.id;
+    }
+  }
+  if (channels_.size() >= kMostIds) return core::Error{file_.string() + ": more than 65535 channels"};
+  const Channel channel{static_cast<uint16_t>(channels_.size() + 1), schema_id, topic, message_encoding, metadata};
+  Bytes record;
+  append(record, channel);
+  const auto status = put(record);
+  if (!status.ok()) return status.error();
+  channels_.push_back(channel);
+  ++statistics_.channels;
+  return channel.id;
+}
+
+core::Status Writer::write(const Message& message) {
+  if (message.channel_id == 0 || message.channel_id > channels_.size()) {
+    return core::Error{file_.string() + ": a message names channel " + std::to_string(message.channel_id) +
+                       ", which was not added"};
+  }
+  const size_t record_bytes = kRecordHeadBytes + kMessageHeadBytes + message.data.size();
+  if (!chunk_.empty() && chunk_.size() + record_bytes > options_.chunk_bytes) {
+    const auto status = flush_chunk();
+    if (!status.ok()) return status;
+  }
+  if (chunk_.empty()) {
+    chunk_head_ = {};
+    chunk_head_.start_ns = chunk_head_.end_ns = message.log_time_ns;
+    chunk_begun_ns_ = core::monotonic_ns();
+  }
+  chunk_head_.start_ns = std::min(chunk_head_.start_ns, message.log_time_ns);
+  chunk_head_.end_ns = std::max(chunk_head_.end_ns, message.log_time_ns);
+  chunk_messages_[message.channel_id].push_back({message.log_time_ns, chunk_.size()});
+  append(chunk_, message);
+  statistics_.count(message.channel_id, message.log_time_ns);
+  return tick();
+}
+
+core::Status Writer::write_metadata(const Metadata& metadata) {
+  Bytes record;
+  append(record, metadata);
+  const MetadataIndex index{offset_, record.size(), metadata.name};
+  auto status = put(record);
+  if (!status.ok()) return status;
+  metadata_indexes_.push_back(index);
+  ++statistics_.metadata;
+  return {};
+}
+
+core::Status Writer::tick() {
+  const int64_t now_ns = core::monotonic_ns();
+  const bool old = options_.chunk_age_s > 0 && now_ns - chunk_begun_ns_ >= core::to_ns(options_.chunk_age_s);
+  if (!chunk_.empty() && (old || chunk_.size() >= options_.chunk_bytes)) {
+    auto status = flush_chunk();
+    if (!status.ok()) return status;
+  }
+  if (options_.sync_period_s > 0 && now_ns - synced_ns_ >= core::to_ns(options_.sync_period_s)) return sync();
+  return {};
+}
+
+core::Status Writer::flush_chunk() {
+  if (chunk_.empty()) return {};
+  chunk_head_.uncompressed_bytes = chunk_.size();
+  chunk_head_.crc = options_.chunk_crc ? crc32(chunk_) : 0;
+  const Bytes packed = options_.compress ? compress_zstd(chunk_, options_.zstd_level) : Bytes{};
+  chunk_head_.compression = packed.empty() ? "" : "zstd";
+  const ByteView stored = packed.empty() ? ByteView(chunk_) : ByteView(packed);
+
+  Bytes out;
+  out.reserve(stored.size() + 64 + statistics_.channels * 32);
+  append(out, chunk_head_, stored);
+  ChunkIndex index{chunk_head_.start_ns,    chunk_head_.end_ns, offset_,      out.size(), {}, 0,
+                   chunk_head_.compression, stored.size(),      chunk_.size()};
+  Encoder encoder(out);
+  for (const auto& [channel_id, entries] : chunk_messages_) {
+    index.message_index_offsets[channel_id] = offset_ + out.size();
+    const size_t record = encoder.begin_record(static_cast<uint8_t>(Opcode::message_index));
+    encoder.u16(channel_id);
+    const size_t array = encoder.begin_array();
+    for (const IndexEntry& entry : entries) {
+      encoder.time(entry.log_time_ns);
+      encoder.u64(entry.offset);
+    }
+    encoder.end_array(array);
+    encoder.end_record(record);
+  }
+  index.message_index_length = out.size() - index.length;
+  auto status = put(out);
+  if (!status.ok()) return status;
+  chunk_indexes_.push_back(std::move(index));
+  ++statistics_.chunks;
+  chunk_.clear();
+  chunk_messages_.clear();
+  return {};
+}
+
+core::Status Writer::sync() {
+  synced_ns_ = core::monotonic_ns();
+  if (descriptor_ >= 0 && ::fdatasync(descriptor_) != 0) return io_error("cannot be forced to the disk", active_);
+  return {};
+}
+
+namespace {
+
+/// Groups of summary records and the offsets that point at them.
+class SummaryBuilder {
+ public:
+  explicit SummaryBuilder(uint64_t summary_start) : start_(summary_start) {}
+
+  template <class Records>
+  void group(Opcode opcode, const Records& records) {
+    const size_t begin = bytes_.size();
+    for (const auto& record : records) append(bytes_, record);
+    if (bytes_.size() == begin) return;
+    Encoder encoder(offsets_);
+    const size_t record = encoder.begin_record(static_cast<uint8_t>(Opcode::summary_offset));
+    encoder.u8(static_cast<uint8_t>(opcode));
+    encoder.u64(start_ + begin);
+    encoder.u64(bytes_.size() - begin);
+    encoder.end_record(record);
+  }
+  /// Summary, offsets, footer and magic.
+  Bytes finish() && {
+    const uint64_t offset_start = start_ + bytes_.size();
+    bytes_.insert(bytes_.end(), offsets_.begin(), offsets_.end());
+    Encoder encoder(bytes_);
+    const size_t record = encoder.begin_record(static_cast<uint8_t>(Opcode::footer));
+    encoder.u64(start_);
+    encoder.u64(offset_start);
+    encoder.u32(0);
+    encoder.end_record(record);
+    const uint32_t crc = crc32(ByteView(bytes_).first(bytes_.size() - 4));
+    bytes_.resize(bytes_.size() - 4);
+    encoder.u32(crc);
+    encoder.raw(kMagic);
+    return std::move(bytes_);
+  }
+
+ private:
+  uint64_t start_;
+  Bytes bytes_;
+  Bytes offsets_;
+};
+
+}  // namespace
+
+core::Status Writer::write_tail() {
+  Bytes data_end;
+  Encoder encoder(data_end);
+  const size_t record = encoder.begin_record(static_cast<uint8_t>(Opcode::data_end));
+  encoder.u32(options_.data_crc ? data_crc_ : 0);
+  encoder.end_record(record);
+  SummaryBuilder summary(offset_ + data_end.size());
+  summary.group(Opcode::schema, schemas_);
+  summary.group(Opcode::channel, channels_);
+  summary.group(Opcode::statistics, std::array{statistics_});
+  summary.group(Opcode::chunk_index, chunk_indexes_);
+  summary.group(Opcode::metadata_index, metadata_indexes_);
+  encoder.raw(std::move(summary).finish());
+  return put(data_end);
+}
+
+core::Status Writer::close() {
+  if (descriptor_ < 0) return {};
+  core::Status status = flush_chunk();
+  if (status.ok()) status = write_tail();
+  if (status.ok()) status = sync();
+  if (descriptor_ >= 0 && ::close(descriptor_) != 0 && status.ok()) status = io_error("cannot be closed", active_);
+  descriptor_ = -1;
+  if (!status.ok()) return status;
+  std::error_code failed;
+  std::filesystem::rename(active_, file_, failed);
+  if (failed)
+    return core::Error{active_.string() + ": cannot be renamed to " + file_.string() + " (" + failed.message() + ")"};
+  sync_folder(file_);
+  return {};
+}
+
+}  // namespace railfix::mcap
