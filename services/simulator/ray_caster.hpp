@@ -1,0 +1,49 @@
+// From pixels to places on the track's surface, and what the tracks there show.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "simulator/ground_shader.hpp"
+#include "simulator/local_track.hpp"
+
+namespace railfix::simulator {
+
+class RayCaster {
+ public:
+  struct Eye {
+    const geometry::Intrinsics& camera;
+    const Shot& shot;
+    double heading_rad;  // of the track at the foot, for the hills on the horizon
+  };
+  RayCaster(const Eye& eye, const LocalTrack& main, const std::vector<LocalTrack>& branches,
+            const GroundShader& shader);
+
+  /// One row of the picture, albedo times light. normal_x, normal_y: the pixels' undistorted x/z and y/z.
+  void row(const float* normal_x, const float* normal_y, int count, float* out) const;
+
+ private:
+  struct Hit {
+    float x, y, scale;  // place and ray length, ray = direction * scale
+  };
+  [[nodiscard]] bool meet(const Eigen::Vector3f& ray, Hit& hit) const;
+  [[nodiscard]] bool march(const Eigen::Vector3f& ray, Hit& hit) const;
+  [[nodiscard]] float sky(const Eigen::Vector3f& ray) const;
+  [[nodiscard]] float surface(const Eigen::Vector3f& ray, const Hit& hit) const;
+  [[nodiscard]] float junction(const GroundPixel& own, const Eigen::Vector3f& ray, const Hit& hit) const;
+  [[nodiscard]] GroundPixel pixel_on(const LocalTrack& track, const Eigen::Vector3f& ray, const Hit& hit) const;
+
+  const LocalTrack& main_;
+  const std::vector<LocalTrack>& branches_;
+  const GroundShader& shader_;
+  Eigen::Matrix3f track_from_camera_;
+  Eigen::Vector3f step_u_;  // change of the ray per pixel
+  Eigen::Vector3f step_v_;
+  float height_m_;
+  float lateral_m_;
+  float blur_m_;
+  float heading_rad_;
+  float steepest_;  // rays above it meet the sky
+};
+
+}  // namespace railfix::simulator

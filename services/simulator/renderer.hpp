@@ -1,0 +1,63 @@
+// Cab pictures by casting a ray per pixel on the track's surface; rail edges are exact to a few thousandths of a pixel.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "geometry/camera.hpp"
+#include "simulator/line.hpp"
+#include "simulator/local_track.hpp"
+#include "simulator/texture.hpp"
+
+namespace railfix::simulator {
+
+constexpr float kHalfGaugeM = 0.7175F;  // inner edges of the rail heads from the track centre
+constexpr float kHeadWidthM = 0.072F;   // 60E1
+constexpr float kRailFootDepthM = 0.150F;
+constexpr double kSleeperPitchM = 0.60;
+
+struct RenderOptions {
+  geometry::Intrinsics camera;
+  double texture_depth_m = 0.18;  // sleeper tops below the rail heads
+  double ballast_depth_m = 0.20;
+  double read_noise_grey = 1.2;   // 1 sigma in the dark
+  double shot_noise_grey = 0.18;  // variance per grey level
+  double vignetting = 0.18;       // loss of light in the corners
+  bool scenery = true;            // masts, platforms, tunnels, bridges
+  uint64_t seed = 1;
+};
+
+/// What changes from picture to picture.
+struct Shot {
+  geometry::CameraPose pose;  // absolute, against the track
+  double distance_m = 0;      // of the camera's foot on the path
+  double speed_mps = 0;
+  double exposure_s = 0.002;
+  double gain = 1.0;  // brightness factor (auto-exposure and its wander)
+  uint64_t noise_seed = 0;
+};
+
+/// Read-only after it is made: render() may be called from many threads.
+class Renderer {
+ public:
+  Renderer(std::shared_ptr<const Line> line, const RenderOptions& options);
+  /// CV_8UC1 of the camera's size.
+  [[nodiscard]] cv::Mat render(const Shot& shot) const;
+  [[nodiscard]] const RenderOptions& options() const { return options_; }
+
+ private:
+  [[nodiscard]] cv::Mat expose(const cv::Mat& radiance, const Shot& shot) const;
+  std::shared_ptr<const Line> line_;
+  RenderOptions options_;
+  Tile ballast_;
+  Tile concrete_;
+  Tile verge_;
+  std::vector<float> normal_x_;  // undistorted x/z and y/z of every pixel
+  std::vector<float> normal_y_;
+  std::vector<float> vignette_;
+  std::vector<float> noise_;  // standard normal numbers
+};
+
+}  // namespace railfix::simulator

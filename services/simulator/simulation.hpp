@@ -1,0 +1,52 @@
+// A whole run into a dataset folder: pictures, sensors, truth and map.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "core/result.hpp"
+#include "simulator/renderer.hpp"
+#include "simulator/sensors.hpp"
+#include "simulator/trajectory.hpp"
+
+namespace railfix::simulator {
+
+struct SimulationOptions {
+  std::filesystem::path out;
+  std::shared_ptr<const track::Map> map;  // nothing = the built-in line
+  std::string start = "1:100";
+  RunOptions run;
+  ShakeOptions shake;
+  SensorOptions sensors;
+  RenderOptions render;  // camera set; its seed is `seed`
+  geometry::CameraPose mount{0.0, 0.2094, 0.0, 0.0, 2.5};
+  double rate_hz = 30.0;
+  double exposure_s = 0.002;
+  double gain_wander = 0.05;  // 1 sigma of the slow change of brightness
+  bool pictures = true;
+  std::string format = "png";  // png, jpg or pgm
+  int jpeg_quality = 95;
+  int threads = 1;
+  uint64_t seed = 1;
+};
+
+struct SimulationReport {
+  size_t pictures = 0;
+  double duration_s = 0;
+  double length_m = 0;
+  double render_ms = 0;  // mean time of one picture on one thread, without encoding
+};
+
+/// Called with pictures done and their number.
+using ProgressCall = std::function<void(size_t done, size_t total)>;
+
+/// Writes the folder as docs/dataset.md says, plus truth/rails.csv (exact inner rail edges of every picture).
+/// An existing folder is refused unless it is empty.
+core::Result<SimulationReport> simulate(const SimulationOptions& options, const ProgressCall& progress);
+
+/// Brightness factor of the camera at a time: auto-exposure that follows tunnels with a lag, and a slow wander.
+double camera_gain(const Trajectory& trajectory, double time_s, double wander, uint64_t seed);
+
+}  // namespace railfix::simulator
