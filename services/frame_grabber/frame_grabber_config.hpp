@@ -1,0 +1,57 @@
+// Configuration of the frame_grabber: section `frame_grabber`.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "frame_grabber/picture_health.hpp"
+#include "service/config.hpp"
+
+namespace railfix::frame_grabber {
+
+struct FrameGrabberConfig {
+  std::string camera = "cam0";
+  std::string source;
+  std::string calibration;
+  double fps = 0;
+  std::string pace = "real";
+  std::string start = "command";
+  std::string at_end = "idle";
+  std::vector<std::string> wait_for;
+  double wait_s = 20;
+  int64_t read_ahead = 8;
+  double preview_hz = 5;
+  int64_t preview_width_px = 640;
+  int64_t preview_quality = 75;
+  PictureHealthConfig health;
+
+  void describe(service::Fields& fields) {
+    fields.text("camera", camera,
+                "Name of the camera: the topics are camera_frame/<camera> and camera_preview/<camera>.");
+    fields.text("source", source, "Dataset folder (EuRoC or KITTI), folder of pictures, or video file.");
+    fields.text("calibration", calibration, "Calibration file; empty = the one that lies with the pictures.");
+    fields.number("fps", fps, {0, 1000}, "1/s", "Rate of a folder of pictures or a video; 0 = the video's own, or 30.");
+    fields.choice(
+        "pace", pace, {"real", "lossless"},
+        "real: at the recorded rate, late pictures are skipped; lossless: the next picture when all in wait_for "
+        "have used the last one.");
+    fields.choice("start", start, {"command", "immediately"},
+                  "Begin to play at the control command `start`, or at once.");
+    fields.choice("at_end", at_end, {"idle", "finish"}, "Behind the last picture: stay, or end the program.");
+    fields.list("wait_for", wait_for, "Services that have to answer on data_progress (pace lossless).");
+    fields.number("wait_s", wait_s, {0.1, 3600}, "s", "Longest wait for these answers before the program gives up.");
+    fields.integer("read_ahead", read_ahead, {1, 256}, "pictures", "How many pictures are decoded ahead.");
+    fields.number("preview_hz", preview_hz, {0, 30}, "1/s", "Rate of the JPEG preview; 0 = none.");
+    fields.integer("preview_width_px", preview_width_px, {64, 1920}, "px", "Largest width of the preview.");
+    fields.integer("preview_quality", preview_quality, {1, 100}, "", "JPEG quality of the preview.");
+    fields.group("health", "When a picture is flagged as bad.", [this](service::Fields& f) {
+      f.number("dark_below_grey", health.dark_below_grey, {0, 255}, "grey", "Dark: 95 % of the pixels are below this.");
+      f.number("saturated_share", health.saturated_share, {0.01, 1}, "",
+               "Saturated: this share of the pixels is 250 or brighter.");
+      f.integer("frozen_after_pictures", health.frozen_after_pictures, {1, 10000}, "pictures",
+                "Frozen: so many pictures in a row are equal to the one before in every pixel.");
+    });
+  }
+};
+
+}  // namespace railfix::frame_grabber

@@ -1,0 +1,292 @@
+#include "frame_grabber/frame_grabber_service.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cstring>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "core/time.hpp"
+
+namespace railfix::frame_grabber {
+namespace {
+
+static_assert(kDark == msg::PICTURE_DARK && kSaturated == msg::PICTURE_SATURATED && kFrozen == msg::PICTURE_FROZEN &&
+              kOutOfOrder == msg::PICTURE_OUT_OF_ORDER);
+
+constexpr int64_t kLastWordsNs = 300'000'000;  // for the last samples to arrive before the program ends
+constexpr int kBadBeforeDegraded = 10;
+constexpr int kPicturesTried = 100;
+constexpr double kGuessedHeightM = 2.5;
+constexpr std::chrono::milliseconds kWaitCheck{100};
+constexpr int kConnectedChecks = 4;  // the answers' way back is found a little later
+
+std::string words(uint32_t health) {
+  std::string text;
+  const std::pair<uint32_t, const char*> names[] = {
+      {kDark, "dark"}, {kSaturated, "saturated"}, {kFrozen, "frozen"}, {kOutOfOrder, "out of order"}};
+  for (const auto& [bit, name] : names) {
+    if ((health & bit) != 0) text += (text.empty() ? "" : ", ") + std::string(name);
+  }
+  return text;
+}
+
+std::string size_text(const cv::Size& size) {
+  return std::to_string(size.width) + "x" + std::to_string(size.height);
+}
+
+std::optional<dataset::CameraCalibration> calibration_of(const FrameGrabberConfig& config) {
+  if (!config.calibration.empty()) return core::value_or_throw(dataset::read_calibration(config.calibration));
+  return core::value_or_throw(dataset::find_calibration(config.source));
+}
+
+/// Size of the first picture that can be read.
+cv::Size picture_size(const FrameGrabberConfig& config) {
+  const auto source = core::value_or_throw(dataset::open_pictures(config.source, {config.fps}));
+  std::string why = "it is empty";
+  for (int tries = 0; tries < kPicturesTried; ++tries) {
+    const auto next = source->next();
+    if (!next.ok()) {
+      why = next.error().message;
+      continue;
+    }
+    if (!next.value()) break;
+    return next.value()->grey.size();
+  }
+  throw core::BadInput(config.source + " holds no picture that can be read: " + why);
+}
+
+void check_size(const cv::Size& size) {
+  if (static_cast<size_t>(size.area()) <= msg::CAMERA_MAX_PIXELS) return;
+  throw core::BadInput("the pictures have " + size_text(size) + " pixels, more than the " +
+                       std::to_string(msg::CAMERA_MAX_PIXELS) +
+                       " that camera_frame carries; scale them down to 1920x1200");
+}
+
+/// A guess that at least shows pictures in the right proportion; mount_known says that it is one.
+dataset::CameraCalibration guessed(const cv::Size& size) {
+  dataset::CameraCalibration calibration;
+  auto& camera = calibration.intrinsics;
+  camera.fu_px = camera.fv_px = size.width;
+  camera.cu_px = (size.width - 1) / 2.0;
+  camera.cv_px = (size.height - 1) / 2.0;
+  camera.width_px = size.width;
+  camera.height_px = size.height;
+  return calibration;
+}
+
+}  // namespace
+
+FrameGrabberService::FrameGrabberService(const Config& config, service::Context& context)
+    : config_(config),
+      context_(context),
+      frames_(context.writer(messaging::topics::camera_frame, config.camera)),
+      previews_(context.writer(messaging::topics::camera_preview, config.camera)),
+      calibrations_(context.writer(messaging::topics::camera_calibration)),
+      clock_(context.writer(messaging::topics::data_clock)),
+      picture_health_(config.health),
+      lock_step_(config.wait_for) {
+  if (config_.source.empty()) {
+    throw core::BadInput("frame_grabber.source is empty; give a dataset folder, a folder of pictures or a video");
+  }
+  source_ = core::value_or_throw(dataset::open_pictures(config_.source, {config_.fps}));
+  size_ = picture_size(config_);
+  check_size(size_);
+  publish_calibration();
+  context_.on<msg::DataProgress>(messaging::topics::data_progress, [this](const msg::DataProgress& progress) {
+    lock_step_.answered(progress.service().c_str(), progress.data_ns());
+    if (!waiting_since_ns_ || !lock_step_.done()) return;
+    waiting_since_ns_.reset();
+    player_->complete();
+  });
+  context_.on_command("start", [this](const std::string&) { return start(); });
+  context_.every(kWaitCheck, [this] {
+    start_when_connected();
+    check_wait();
+    finish_after_last_words();
+  });
+  context_.at_stop([this] { player_.reset(); });
+  if (config_.start == "immediately") made_ns_ = core::monotonic_ns();
+}
+
+void FrameGrabberService::start_when_connected() {
+  if (!made_ns_) return;
+  const bool enough = clock_.matched_readers() >= static_cast<int>(config_.wait_for.size());
+  connected_checks_ = enough ? connected_checks_ + 1 : 0;
+  const bool gave_up = core::seconds(core::monotonic_ns() - *made_ns_) > config_.wait_s;
+  if (connected_checks_ < kConnectedChecks && !gave_up) return;
+  made_ns_.reset();
+  (void)start();
+}
+
+core::Result<std::string> FrameGrabberService::start() {
+  if (!source_) return std::string("plays already");
+  PlayerEvents events;
+  events.picture = [this](dataset::Picture picture) {
+    context_.post([this, picture = std::move(picture)] { play(picture); });
+  };
+  events.late = [this](int64_t) { context_.post([this] { context_.health().dropped(1); }); };
+  events.broken = [this](const std::string& why) { context_.post([this, why] { broken(why); }); };
+  events.ended = [this] { context_.post([this] { end(); }); };
+  context_.log().info("plays {} at {} pace", config_.source, config_.pace);
+  context_.health().active();
+  player_ = std::make_unique<Player>(std::move(source_), !lossless(), static_cast<size_t>(config_.read_ahead),
+                                     std::move(events));
+  return std::string("plays ") + config_.source;
+}
+
+void FrameGrabberService::play(const dataset::Picture& picture) {
+  const int64_t grabbed_ns = core::wall_ns();
+  if (picture.grey.size() != size_) {
+    broken("picture " + picture.name + " has " + size_text(picture.grey.size()) + " pixels where the first has " +
+           size_text(size_));
+    return player_->complete();
+  }
+  context_.health().input();
+  const uint32_t health = picture_health_.judge(picture.stamp_ns, picture.grey);
+  say_health(health);
+  newest_ns_ = std::max(newest_ns_, picture.stamp_ns);
+  if (lossless()) {
+    lock_step_.begin(newest_ns_);
+    waiting_since_ns_ = core::monotonic_ns();
+  }
+  if (lossless() || grabbed_ns - clock_sent_ns_ >= core::kNsPerSecond) publish_clock(newest_ns_, grabbed_ns, false);
+  publish_frame(picture, grabbed_ns, health);
+  publish_preview(picture, grabbed_ns, health);
+  if (lossless() && !lock_step_.done()) return;  // data_progress completes it
+  waiting_since_ns_.reset();
+  player_->complete();
+}
+
+void FrameGrabberService::publish_frame(const dataset::Picture& picture, int64_t grabbed_ns, uint32_t health) {
+  ++frame_seq_;
+  const cv::Mat& grey = picture.grey;
+  const bool sent = frames_.write_in_place([&](msg::CameraFrame& frame) {
+    frame.stamp_ns(picture.stamp_ns);
+    frame.grabbed_ns(grabbed_ns);
+    frame.seq(frame_seq_);
+    frame.width_px(static_cast<uint32_t>(grey.cols));
+    frame.height_px(static_cast<uint32_t>(grey.rows));
+    frame.exposure_s(0);
+    frame.health(health);
+    uint8_t* to = frame.data().data();
+    const auto columns = static_cast<size_t>(grey.cols);
+    for (int row = 0; row < grey.rows; ++row, to += columns) std::memcpy(to, grey.ptr(row), columns);
+  });
+  if (sent) {
+    context_.health().output(grabbed_ns);
+  } else {
+    context_.health().dropped(1);
+  }
+}
+
+void FrameGrabberService::publish_preview(const dataset::Picture& picture, int64_t grabbed_ns, uint32_t health) {
+  if (config_.preview_hz <= 0) return;
+  const int64_t period_ns = core::to_ns(1.0 / config_.preview_hz);
+  if (preview_ns_ && picture.stamp_ns >= *preview_ns_ && picture.stamp_ns - *preview_ns_ < period_ns) return;
+  preview_ns_ = picture.stamp_ns;
+  cv::Mat small = picture.grey;
+  if (small.cols > config_.preview_width_px) {
+    const double scale = static_cast<double>(config_.preview_width_px) / small.cols;
+    cv::resize(picture.grey, small, {}, scale, scale, cv::INTER_AREA);
+  }
+  std::vector<uint8_t> jpeg;
+  cv::imencode(".jpg", small, jpeg, {cv::IMWRITE_JPEG_QUALITY, static_cast<int>(config_.preview_quality)});
+  msg::CameraPreview preview;
+  preview.stamp_ns(picture.stamp_ns);
+  preview.grabbed_ns(grabbed_ns);
+  preview.seq(frame_seq_);
+  preview.width_px(static_cast<uint32_t>(small.cols));
+  preview.height_px(static_cast<uint32_t>(small.rows));
+  preview.health(health);
+  preview.jpeg(std::move(jpeg));
+  previews_.write(preview);
+}
+
+void FrameGrabberService::publish_calibration() {
+  const auto found = calibration_of(config_);
+  dataset::CameraCalibration calibration = found ? *found : guessed(size_);
+  if (!found) context_.log().warn("no calibration lies with {}; the focal length is a guess", config_.source);
+  if (!calibration.mount) context_.log().warn("the camera's mount is not known; run `railfix calibrate mount`");
+  auto& camera = calibration.intrinsics;
+  if (camera.width_px == 0) {  // KITTI's calibration does not say
+    camera.width_px = size_.width;
+    camera.height_px = size_.height;
+  }
+  if (cv::Size(camera.width_px, camera.height_px) != size_) {
+    throw core::BadInput("the pictures have " + size_text(size_) + " pixels, but the calibration is for " +
+                         size_text({camera.width_px, camera.height_px}) + "; give the camera's own calibration");
+  }
+  geometry::CameraPose guess;
+  guess.height_m = kGuessedHeightM;
+  const geometry::CameraPose mount = calibration.mount.value_or(guess);
+  msg::CameraCalibration message;
+  message.camera(config_.camera);
+  message.fu_px(camera.fu_px);
+  message.fv_px(camera.fv_px);
+  message.cu_px(camera.cu_px);
+  message.cv_px(camera.cv_px);
+  message.k1(camera.k1);
+  message.k2(camera.k2);
+  message.p1(camera.p1);
+  message.p2(camera.p2);
+  message.height_m(mount.height_m);
+  message.pitch_rad(mount.pitch_rad);
+  message.yaw_rad(mount.yaw_rad);
+  message.roll_rad(mount.roll_rad);
+  message.lateral_m(mount.lateral_m);
+  message.width_px(static_cast<uint32_t>(camera.width_px));
+  message.height_px(static_cast<uint32_t>(camera.height_px));
+  message.mount_known(calibration.mount.has_value());
+  calibrations_.write(message);
+}
+
+void FrameGrabberService::publish_clock(int64_t data_ns, int64_t wall_ns, bool ended) {
+  clock_sent_ns_ = wall_ns;
+  msg::DataClock clock;
+  clock.data_ns(data_ns);
+  clock.wall_ns(wall_ns);
+  clock.seq(++clock_seq_);
+  clock.lock_step(lossless() ? 1 : 0);
+  clock.ended(ended ? 1 : 0);
+  clock_.write(clock);
+}
+
+void FrameGrabberService::say_health(uint32_t health) {
+  bad_in_a_row_ = health == 0 ? 0 : bad_in_a_row_ + 1;
+  if (bad_in_a_row_ == 0) context_.health().active();
+  if (bad_in_a_row_ == kBadBeforeDegraded) {
+    context_.health().degraded("pictures are " + words(health));
+    context_.log().warn("pictures are {}", words(health));
+  }
+}
+
+void FrameGrabberService::broken(const std::string& why) {
+  context_.log().warn("{}", why);
+  context_.health().dropped(1);
+}
+
+void FrameGrabberService::end() {
+  publish_clock(newest_ns_, core::wall_ns(), true);
+  context_.log().info("played {} pictures", frame_seq_);
+  ended_ns_ = core::monotonic_ns();
+}
+
+void FrameGrabberService::finish_after_last_words() {
+  if (!ended_ns_ || config_.at_end != "finish" || core::monotonic_ns() - *ended_ns_ < kLastWordsNs) return;
+  context_.finish("all pictures played");
+}
+
+void FrameGrabberService::check_wait() {
+  if (gave_up_ns_ && core::monotonic_ns() - *gave_up_ns_ > kLastWordsNs) throw std::runtime_error(gave_up_why_);
+  if (gave_up_ns_ || !waiting_since_ns_) return;
+  if (core::seconds(core::monotonic_ns() - *waiting_since_ns_) < config_.wait_s) return;
+  gave_up_why_ = fmt::format(
+      "no answer on data_progress from {} for {} s at picture {}; see that these services run with common.lock_step",
+      lock_step_.missing(), config_.wait_s, frame_seq_);
+  gave_up_ns_ = core::monotonic_ns();
+  context_.health().failed(gave_up_why_);
+}
+
+}  // namespace railfix::frame_grabber

@@ -1,0 +1,130 @@
+#include "frame_grabber/player.hpp"
+
+#include "core/time.hpp"
+#include "frame_grabber/pace.hpp"
+
+namespace railfix::frame_grabber {
+
+ReadAhead::ReadAhead(std::unique_ptr<dataset::PictureSource> source, size_t depth, TooLate too_late)
+    : source_(std::move(source)), depth_(depth), too_late_(std::move(too_late)), thread_([this] { decode(); }) {}
+
+ReadAhead::~ReadAhead() {
+  stop();
+  thread_.join();
+}
+
+void ReadAhead::stop() {
+  const std::lock_guard lock(mutex_);
+  stopped_ = true;
+  changed_.notify_all();
+}
+
+void ReadAhead::skip_late(int64_t decode_ns) {
+  for (auto stamp_ns = source_->next_stamp_ns(); stamp_ns; stamp_ns = source_->next_stamp_ns()) {
+    if (!too_late_(*stamp_ns, decode_ns) || !source_->skip()) return;
+  }
+}
+
+void ReadAhead::decode() {
+  int64_t decode_ns = 0;  // running mean
+  while (true) {
+    skip_late(decode_ns);
+    const int64_t begin_ns = core::monotonic_ns();
+    Item item = source_->next();
+    decode_ns += (core::monotonic_ns() - begin_ns - decode_ns) / 4;
+    const bool last = item.ok() && !item.value();
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return stopped_ || items_.size() < depth_; });
+    if (stopped_) return;
+    ended_ = last;
+    if (!last) items_.push_back(std::move(item));
+    changed_.notify_all();
+    if (last) return;
+  }
+}
+
+ReadAhead::Item ReadAhead::next() {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [this] { return stopped_ || ended_ || !items_.empty(); });
+  if (stopped_ || items_.empty()) return std::optional<dataset::Picture>();
+  Item item = std::move(items_.front());
+  items_.pop_front();
+  changed_.notify_all();
+  return item;
+}
+
+Player::Player(std::unique_ptr<dataset::PictureSource> source, bool real_pace, size_t read_ahead, PlayerEvents events)
+    : real_pace_(real_pace),
+      events_(std::move(events)),
+      pictures_(std::move(source), read_ahead,
+                [this](int64_t stamp_ns, int64_t decode_ns) {
+                  const bool late = too_late(stamp_ns, decode_ns);
+                  if (late) events_.late(stamp_ns);
+                  return late;
+                }),
+      thread_([this] { play(); }) {}
+
+bool Player::too_late(int64_t stamp_ns, int64_t decode_ns) const {
+  const int64_t offset_ns = wall_minus_data_ns_;
+  return real_pace_ && offset_ns != kNotBegun && core::wall_ns() + decode_ns > stamp_ns + offset_ns;
+}
+
+Player::~Player() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopped_ = true;
+    changed_.notify_all();
+  }
+  pictures_.stop();
+  thread_.join();
+}
+
+void Player::complete() {
+  const std::lock_guard lock(mutex_);
+  complete_ = true;
+  changed_.notify_all();
+}
+
+bool Player::wait_until(int64_t wall_ns) {
+  std::unique_lock lock(mutex_);
+  // On the steady clock, so that a step of the wall clock moves at most this one picture.
+  const auto due = std::chrono::steady_clock::now() + std::chrono::nanoseconds(wall_ns - core::wall_ns());
+  return !changed_.wait_until(lock, due, [this] { return stopped_; });
+}
+
+bool Player::wait_complete() {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [this] { return stopped_ || complete_; });
+  complete_ = false;
+  return !stopped_;
+}
+
+void Player::play() {
+  RealPace pace;
+  while (true) {
+    ReadAhead::Item item = pictures_.next();
+    {
+      const std::lock_guard lock(mutex_);
+      if (stopped_) return;
+    }
+    if (!item.ok()) {
+      events_.broken(item.error().message);
+      continue;
+    }
+    if (!item.value()) return events_.ended();
+    dataset::Picture picture = std::move(*std::move(item).value());
+    if (real_pace_) {
+      const auto verdict = pace.ask(picture.stamp_ns, core::wall_ns());
+      wall_minus_data_ns_ = pace.wall_minus_data_ns();
+      if (verdict.skip) {
+        events_.late(picture.stamp_ns);
+        continue;
+      }
+      if (!wait_until(verdict.due_ns)) return;
+    }
+    events_.picture(std::move(picture));
+    if (!wait_complete()) return;
+  }
+}
+
+}  // namespace railfix::frame_grabber

@@ -1,0 +1,197 @@
+#include "odometry/odometry_service.hpp"
+
+#include <cmath>
+#include <cstring>
+
+#include "core/time.hpp"
+#include "core/units.hpp"
+#include "messaging/camera.hpp"
+
+namespace railfix::odometry {
+namespace {
+
+constexpr std::chrono::milliseconds kExpirePeriod{2};
+constexpr int64_t kLockStepWaitNs = 10 * core::kNsPerSecond;
+constexpr int64_t kPoseLifeNs = core::kNsPerSecond / 2;
+constexpr int64_t kBlindNs = core::kNsPerSecond;
+constexpr size_t kLongestQueue = 8;
+// Places in TrackView.covariance: upper triangle of 7x7, row by row.
+constexpr size_t kPitchVariance = 7;
+constexpr size_t kHeightVariance = 22;
+constexpr size_t kCurvatureVariance = 25;
+constexpr size_t kVerticalCurvatureVariance = 27;
+// A curvature known worse than this says less than the last one that was known better.
+constexpr double kWorstCurvatureSigma = 1e-3;
+constexpr double kWorstVerticalCurvatureSigma = 2e-4;
+
+uint8_t mode_of(MouseMode mode) {
+  switch (mode) {
+    case MouseMode::search:
+      return msg::ODOMETRY_SEARCH;
+    case MouseMode::track:
+      return msg::ODOMETRY_TRACK;
+    case MouseMode::keyframe:
+      return msg::ODOMETRY_KEYFRAME;
+    case MouseMode::blind:
+      break;
+  }
+  return msg::ODOMETRY_BLIND;
+}
+
+}  // namespace
+
+OdometryService::OdometryService(const Config& config, service::Context& context)
+    : config_(config), context_(context), writer_(context.writer(messaging::topics::odometry_step)) {
+  context_.on<msg::CameraCalibration>(messaging::topics::camera_calibration,
+                                      [this](const msg::CameraCalibration& c) { calibrated(c); });
+  context_.on<msg::TrackView>(messaging::topics::track_view, [this](const msg::TrackView& view) { viewed(view); });
+  context_.on<msg::CameraFrame>(
+      messaging::topics::camera_frame, [this](const msg::CameraFrame& frame) { pictured(frame); }, config_.camera);
+  context_.every(kExpirePeriod, [this] { expire(); });
+  context_.health().ready();
+}
+
+void OdometryService::calibrated(const msg::CameraCalibration& c) {
+  if (config_.camera != c.camera().c_str()) return;
+  intrinsics_ = messaging::intrinsics_of(c);
+  mount_ = messaging::mount_of(c);
+  mount_known_ = c.mount_known();
+  last_pose_ns_ = 0;
+  mouse_ = std::make_unique<TrainMouse>(intrinsics_, config_.mouse);
+  context_.log().info("camera {} {}x{}, {:.2f} m above the rails, pitch {:.2f} deg", config_.camera,
+                      intrinsics_.width_px, intrinsics_.height_px, mount_.height_m,
+                      core::deg_from_rad(mount_.pitch_rad));
+}
+
+cv::Mat OdometryService::spare() {
+  if (spare_.empty()) return {};
+  cv::Mat buffer = spare_.back();
+  spare_.pop_back();
+  return buffer;
+}
+
+void OdometryService::pictured(const msg::CameraFrame& frame) {
+  context_.health().input();
+  if (last_seq_ != 0 && frame.seq() > last_seq_ + 1) context_.health().dropped(frame.seq() - last_seq_ - 1);
+  last_seq_ = frame.seq();
+  const auto width = static_cast<int>(frame.width_px());
+  const auto height = static_cast<int>(frame.height_px());
+  if (width < 16 || height < 16 || frame.width_px() * uint64_t{frame.height_px()} > msg::CAMERA_MAX_PIXELS) {
+    context_.used_up_to(frame.stamp_ns());
+    return;
+  }
+  Waiting waiting;
+  waiting.stamp_ns = frame.stamp_ns();
+  waiting.grabbed_ns = frame.grabbed_ns();
+  waiting.frame_seq = frame.seq();
+  waiting.health = frame.health();
+  waiting.until_ns =
+      core::monotonic_ns() + (context_.common().lock_step ? kLockStepWaitNs : core::to_ns(config_.max_wait_ms * 1e-3));
+  waiting.grey = spare();
+  waiting.grey.create(height, width, CV_8UC1);
+  std::memcpy(waiting.grey.data, frame.data().data(), static_cast<size_t>(width) * static_cast<size_t>(height));
+  waiting_.push_back(std::move(waiting));
+  while (!early_.empty() && early_.front().frame_seq() <= frame.seq()) {  // the view has overtaken its picture
+    const msg::TrackView view = early_.front();
+    early_.pop_front();
+    viewed(view);
+  }
+  if (waiting_.size() > kLongestQueue) expire();
+}
+
+// Pictures are measured in their order: those before this view's picture will get no view of their own any more.
+void OdometryService::viewed(const msg::TrackView& view) {
+  while (!waiting_.empty() && waiting_.front().frame_seq <= view.frame_seq()) {
+    const Waiting waiting = std::move(waiting_.front());
+    waiting_.pop_front();
+    const bool own = waiting.frame_seq == view.frame_seq();
+    measure(waiting, own ? &view : nullptr);
+    if (own) return;
+  }
+  if (view.frame_seq() <= last_seq_) return;
+  early_.push_back(view);
+  if (early_.size() > kLongestQueue) early_.pop_front();
+}
+
+void OdometryService::expire() {
+  while (!waiting_.empty() && (waiting_.front().until_ns < core::monotonic_ns() || waiting_.size() > kLongestQueue)) {
+    const Waiting waiting = std::move(waiting_.front());
+    waiting_.pop_front();
+    measure(waiting, nullptr);
+  }
+}
+
+void OdometryService::take_pose(const Waiting& waiting, const msg::TrackView* view, MousePicture& picture) {
+  const bool fresh = last_pose_ns_ != 0 && waiting.stamp_ns - last_pose_ns_ < kPoseLifeNs;
+  picture.pose = fresh ? last_pose_ : mount_;
+  picture.curvature_per_m = curvature_per_m_;
+  picture.vertical_curvature_per_m = vertical_curvature_per_m_;
+  if (view == nullptr || (view->seen_left() == 0 && view->seen_right() == 0)) return;
+  const auto sigma = [view](size_t place) { return std::sqrt(std::max(0.0, view->covariance()[place])); };
+  const PoseTrust trust{sigma(kPitchVariance), sigma(kHeightVariance)};
+  if (!(trust.pitch_sigma_rad < config_.mouse.mount_pitch_sigma_rad) || !std::isfinite(view->pitch_rad())) return;
+  if (sigma(kCurvatureVariance) < kWorstCurvatureSigma) curvature_per_m_ = view->curvature_per_m();
+  if (config_.use_vertical_curvature && sigma(kVerticalCurvatureVariance) < kWorstVerticalCurvatureSigma) {
+    vertical_curvature_per_m_ = view->vertical_curvature_per_m();
+  }
+  last_pose_ = {view->roll_rad(), view->pitch_rad(), view->yaw_rad(), view->lateral_m(), view->height_m()};
+  last_pose_ns_ = waiting.stamp_ns;
+  picture.pose = last_pose_;
+  picture.pose_measured = true;
+  picture.trust = {std::max(trust.pitch_sigma_rad, 1e-5), std::max(trust.height_sigma_m, 1e-4)};
+  picture.curvature_per_m = curvature_per_m_;
+  picture.vertical_curvature_per_m = vertical_curvature_per_m_;
+}
+
+void OdometryService::measure(const Waiting& waiting, const msg::TrackView* view) {
+  if (!mouse_) {
+    context_.health().degraded("no camera_calibration for camera " + config_.camera + " yet: nothing can be measured");
+  } else {
+    MousePicture picture;
+    picture.grey = waiting.grey;
+    picture.stamp_ns = waiting.stamp_ns;
+    take_pose(waiting, view, picture);
+    const MouseStep step = mouse_->process(picture);
+    publish(step, waiting);
+    tell(step);
+  }
+  spare_.push_back(waiting.grey);
+  context_.used_up_to(waiting.stamp_ns);
+}
+
+void OdometryService::publish(const MouseStep& step, const Waiting& waiting) {
+  msg::OdometryStep out;
+  out.stamp_ns(step.stamp_ns);
+  out.reference_stamp_ns(step.reference_stamp_ns);
+  out.grabbed_ns(waiting.grabbed_ns);
+  out.frame_seq(waiting.frame_seq);
+  out.step_m(step.step_m);
+  out.lateral_m(step.lateral_m);
+  out.yaw_rad(step.yaw_rad);
+  out.step_sigma_m(step.step_sigma_m);
+  out.yaw_sigma_rad(step.yaw_sigma_rad);
+  out.distance_m(step.distance_m);
+  out.speed_mps(step.speed_mps);
+  out.lateral_speed_mps(step.lateral_speed_mps);
+  out.yaw_rate_rps(step.yaw_rate_rps);
+  out.height_m(step.height_m);
+  out.mode(mode_of(step.mode));
+  out.valid(step.valid ? 1 : 0);
+  writer_.write(out);
+  context_.health().output(waiting.grabbed_ns);
+}
+
+void OdometryService::tell(const MouseStep& step) {
+  if (step.valid || last_valid_ns_ == 0) last_valid_ns_ = step.stamp_ns;
+  if (step.stamp_ns - last_valid_ns_ > kBlindNs) {
+    context_.health().degraded(step.mode == MouseMode::blind
+                                   ? "blind: the ground shows no texture (dark, glare, snow or a covered lens)"
+                                   : "the ground of one picture is not found in the next (wrong mount, or too fast)");
+  } else if (!mount_known_) {
+    context_.health().degraded("the camera's mount is not calibrated: run railfix calibrate mount");
+  } else if (step.valid) {
+    context_.health().active();
+  }
+}
+
+}  // namespace railfix::odometry

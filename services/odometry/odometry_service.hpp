@@ -1,0 +1,55 @@
+// camera_frame, camera_calibration, track_view in; odometry_step out.
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <optional>
+
+#include "odometry/odometry_config.hpp"
+#include "service/service.hpp"
+
+namespace railfix::odometry {
+
+class OdometryService {
+ public:
+  using Config = OdometryConfig;
+  OdometryService(const Config& config, service::Context& context);
+
+ private:
+  struct Waiting {  // a picture whose track_view has not come
+    int64_t stamp_ns = 0;
+    int64_t grabbed_ns = 0;
+    uint64_t frame_seq = 0;
+    uint32_t health = 0;
+    int64_t until_ns = 0;  // monotonic
+    cv::Mat grey;
+  };
+  void calibrated(const msg::CameraCalibration& calibration);
+  void pictured(const msg::CameraFrame& frame);
+  void viewed(const msg::TrackView& view);
+  void expire();
+  void measure(const Waiting& waiting, const msg::TrackView* view);
+  void take_pose(const Waiting& waiting, const msg::TrackView* view, MousePicture& picture);
+  void publish(const MouseStep& step, const Waiting& waiting);
+  void tell(const MouseStep& step);
+  cv::Mat spare();
+
+  Config config_;
+  service::Context& context_;
+  messaging::Writer<msg::OdometryStep> writer_;
+  geometry::Intrinsics intrinsics_;
+  geometry::CameraPose mount_;
+  bool mount_known_ = false;
+  std::unique_ptr<TrainMouse> mouse_;  // nothing before the calibration is known
+  std::deque<Waiting> waiting_;
+  std::deque<msg::TrackView> early_;  // views that came before their picture
+  std::vector<cv::Mat> spare_;        // picture buffers to use again
+  geometry::CameraPose last_pose_;
+  int64_t last_pose_ns_ = 0;
+  double curvature_per_m_ = 0;
+  double vertical_curvature_per_m_ = 0;
+  uint64_t last_seq_ = 0;
+  int64_t last_valid_ns_ = 0;
+};
+
+}  // namespace railfix::odometry

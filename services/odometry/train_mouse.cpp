@@ -1,0 +1,266 @@
+#include "odometry/train_mouse.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/time.hpp"
+
+namespace railfix::odometry {
+namespace {
+
+constexpr double kShakeMarginRad = 0.02;
+constexpr double kCurveSmoothing_s = 0.3;
+constexpr double kVerticalSmoothing_s = 0.5;
+constexpr double kInertia_s = 0.3;  // after it the speed is not enough to choose among alike shifts
+constexpr double kSlowMps = 0.5;
+constexpr double kStandingMps = 0.15;
+constexpr int kAlignments = 4;
+constexpr size_t kFewestPatches = 5;
+constexpr double kLowestAgreement = 0.35;
+constexpr double kStandingStepM = 0.05;         // less is standstill, which ...
+constexpr double kStandingShare = 0.8;          // ... nearly all the ground in sight must show (lettering: up to 0.7)
+constexpr double kLongestReferenceShare = 0.6;  // of the sheet that may have gone out of sight
+constexpr double kSpeedGain = 0.5;
+
+}  // namespace
+
+TrainMouse::TrainMouse(const geometry::Intrinsics& camera, const TrainMouseOptions& options)
+    : camera_(camera), options_(options), filter_(options.filter) {}
+
+void TrainMouse::smooth_curves(const MousePicture& picture) {
+  if (!picture.pose_measured) return;
+  const double dt_s = curves_known_ ? core::seconds(picture.stamp_ns - last_stamp_ns_) : 1e9;
+  const double fast = 1.0 - std::exp(-dt_s / kCurveSmoothing_s);
+  const double slow = 1.0 - std::exp(-dt_s / kVerticalSmoothing_s);
+  curvature_per_m_ += fast * (picture.curvature_per_m - curvature_per_m_);
+  vertical_curvature_per_m_ += slow * (picture.vertical_curvature_per_m - vertical_curvature_per_m_);
+  curves_known_ = true;
+}
+
+// Makes the top view of the picture; false when there is nothing to see in it.
+bool TrainMouse::look(const MousePicture& picture) {
+  now_.stamp_ns = picture.stamp_ns;
+  now_.pose = {picture.pose, options_.texture_depth_m, curvature_per_m_, vertical_curvature_per_m_};
+  now_.prior = {};
+  now_.prior.trust = picture.trust;
+  if (!picture.pose_measured) now_.prior.trust = {options_.mount_pitch_sigma_rad, options_.mount_height_sigma_m};
+  // A slow train's pictures are compared at one pose: the noise of measured poses would only move the ground.
+  if (reference_ && confirmed_ && std::abs(speed_mps_) < kSlowMps) {
+    now_.pose = reference_->seen.pose;
+    now_.prior.pitch_offset_rad = now_.pose.camera.pitch_rad - picture.pose.pitch_rad;
+    now_.prior.height_offset_m = now_.pose.camera.height_m - picture.pose.height_m;
+  }
+  if (!maker_) {
+    const vision::Sheet sheet =
+        vision::fit_sheet(camera_, now_.pose, options_.near_m, options_.far_m,
+                          0.5 * options_.gauge_m - options_.rail_margin_m, options_.cell_m, kShakeMarginRad);
+    maker_ = std::make_unique<vision::TopViewMaker>(camera_, sheet);
+  }
+  if (maker_->sheet().rows < 100) {
+    maker_.reset();  // the pose shows no ground: try again with the next one
+    return false;
+  }
+  maker_->make(picture.grey, now_.pose, now_.view);
+  now_.coarse = make_coarse(now_.view);
+  return now_.coarse.contrast_grey > options_.lowest_contrast_grey;
+}
+
+void TrainMouse::make_reference() {
+  Reference next;
+  TextureReference::Options texture;
+  texture.noise_grey = options_.noise_grey;
+  next.texture = std::make_unique<TextureReference>(now_.view, maker_->sheet(), texture);
+  next.seen = now_;
+  next.seen.view.grey = now_.view.grey.clone();
+  next.seen.coarse.texture = now_.coarse.texture.clone();
+  reference_ = std::move(next);
+}
+
+TrainMouse::Rough TrainMouse::find_roughly(bool full_band, double predicted_m, double band_m) const {
+  const vision::Sheet& sheet = maker_->sheet();
+  const double cell_m = 2.0 * sheet.cell_m;
+  const int rows = now_.coarse.texture.rows;
+  const int apart = static_cast<int>(std::ceil(0.16 / cell_m));
+  RowRange shifts{static_cast<int>(std::floor((predicted_m - band_m) / cell_m)),
+                  static_cast<int>(std::ceil((predicted_m + band_m) / cell_m))};
+  const int limit = rows - 30;
+  shifts = {std::max(shifts.first, -limit), std::min(shifts.last, limit)};
+  Rough rough;
+  if (shifts.first > shifts.last) return rough;
+  const ShiftPeak whole = find_shift(reference_->seen.coarse, now_.coarse, {0, rows - 1}, shifts, 2, apart);
+  rough.score = whole.score;
+  if (whole.score < options_.lowest_score) return rough;
+  if (full_band && whole.runner_up > options_.ambiguity * whole.score) return rough;
+  rough.found = true;
+  rough.left_shift_m = -whole.cols * cell_m;
+
+  // A camera that has pitched between the pictures moves far ground more than near ground.
+  const int first = std::max(0, static_cast<int>(whole.rows));
+  const int last = std::min(rows - 1, rows - 1 + static_cast<int>(whole.rows));
+  const int middle = (first + last) / 2;
+  const auto around = [&](double shift) {
+    return RowRange{static_cast<int>(std::lround(shift)) - 3, static_cast<int>(std::lround(shift)) + 3};
+  };
+  const auto part = [&](RowRange section) {
+    const ShiftPeak peak = find_shift(reference_->seen.coarse, now_.coarse, section, around(whole.rows), 2, apart);
+    return peak.score > 0.5 * whole.score ? peak.rows : whole.rows;
+  };
+  rough.near_m = sheet.ahead_m(first + middle);
+  rough.far_m = sheet.ahead_m(middle + last);
+  rough.near_shift_m = -part({first, middle}) * cell_m;
+  rough.far_shift_m = -part({middle, last}) * cell_m;
+  return rough;
+}
+
+std::optional<Motion> TrainMouse::align(const Rough& rough, MouseStep& step) const {
+  const double height_m = now_.pose.height_m();
+  std::vector<PatchMotion> votes;
+  DisplacementField field = [&rough](const Eigen::Vector2d& place, bool) {
+    const double share = std::clamp((place.x() - rough.near_m) / (rough.far_m - rough.near_m), -0.5, 1.5);
+    return Eigen::Vector2d(rough.near_shift_m + share * (rough.far_shift_m - rough.near_shift_m), rough.left_shift_m);
+  };
+  Motion motion;
+  size_t in_sight = 0;
+  for (int i = 0; i < kAlignments; ++i) {
+    in_sight = reference_->texture->measure(now_.view, field, votes);
+    if (votes.size() < kFewestPatches) return std::nullopt;
+    motion = filter_.solve(reference_->errors, now_.prior, height_m, votes);
+    field = [&motion, height_m](const Eigen::Vector2d& place, bool ballast) {
+      return MotionFilter::displacement(motion, height_m, place, ballast);
+    };
+  }
+  step.patches = static_cast<int>(votes.size());
+  step.matched = static_cast<double>(votes.size()) / static_cast<double>(in_sight);
+  if (motion.agreement < kLowestAgreement) return std::nullopt;
+  // What sticks to the picture (lettering, dirt on the pane) stands still whatever the train does; the ground around it
+  // tells.
+  if (std::abs(motion.along_m) < kStandingStepM && step.matched < kStandingShare) return std::nullopt;
+  return motion;
+}
+
+void TrainMouse::accept(const Motion& motion, MouseStep& step) {
+  const double dt_s = core::seconds(now_.stamp_ns - tentative_stamp_ns_);
+  double distance_m = reference_->distance_m + motion.now.mean(PoseErrors::kDistance);
+  const bool slow = confirmed_ && std::abs(speed_mps_) < kStandingMps;
+  if (slow && std::abs(distance_m - tentative_distance_m_) < options_.standstill_m) distance_m = tentative_distance_m_;
+  const double measured_mps = (distance_m - tentative_distance_m_) / dt_s;
+  speed_mps_ = speed_known_ && !slow ? speed_mps_ + kSpeedGain * (measured_mps - speed_mps_) : measured_mps;
+  if (slow && distance_m == tentative_distance_m_) speed_mps_ = 0;
+
+  if (!confirmed_ && speed_known_) {
+    confirmed_ = true;
+    distance_m += bridge(measured_mps);
+  }
+  speed_known_ = true;
+  // With what this picture says of the reference's own distance, so that steps add up to the distance.
+  step.step_m = distance_m - reference_->distance_m;
+  step.lateral_m = motion.lateral_m + 0.5 * now_.pose.curvature_per_m * motion.along_m * motion.along_m;
+  step.yaw_rad = motion.turn_rad + now_.pose.curvature_per_m * motion.along_m;
+  step.step_sigma_m = motion.along_sigma_m;
+  step.yaw_sigma_rad = motion.turn_sigma_rad;
+  const double since_reference_s = core::seconds(now_.stamp_ns - reference_->seen.stamp_ns);
+  step.lateral_speed_mps = step.lateral_m / since_reference_s;
+  step.yaw_rate_rps = step.yaw_rad / since_reference_s;
+  step.speed_mps = speed_mps_;
+  step.agreement = motion.agreement;
+  step.pitch_bias_rad = motion.now.mean(PoseErrors::kPitchBias);
+  step.ballast_depth_m = motion.now.mean(PoseErrors::kBallastDepth);
+  step.mode = !confirmed_                                   ? MouseMode::search
+              : reference_->seen.stamp_ns == last_stamp_ns_ ? MouseMode::track
+                                                            : MouseMode::keyframe;
+  step.valid = confirmed_;
+  tentative_distance_m_ = distance_m;
+  tentative_stamp_ns_ = now_.stamp_ns;
+  if (confirmed_) {
+    distance_m_ = distance_m;
+    measured_stamp_ns_ = now_.stamp_ns;
+  }
+  // The reference stays while the next picture will still be near it.
+  const double next_m = std::abs(motion.along_m + speed_mps_ * dt_s);
+  if (next_m > options_.reference_length_m) {
+    PoseErrors errors = motion.now;
+    errors.mean(PoseErrors::kDistance) = 0;
+    make_reference();
+    reference_->errors = errors;
+    reference_->distance_m = distance_m;
+  }
+}
+
+// Distance over the gap before the present reference, at the mean of the speeds on either side.
+double TrainMouse::bridge(double speed_after_mps) {
+  if (measured_stamp_ns_ == 0) return 0;
+  const double gap_s = core::seconds(restart_stamp_ns_ - measured_stamp_ns_);
+  if (gap_s > options_.bridge_s) return 0;
+  const double bridge_m = 0.5 * (speed_before_gap_mps_ + speed_after_mps) * gap_s;
+  reference_->distance_m += bridge_m;
+  return bridge_m;
+}
+
+// No motion from this picture. The reference waits for the next one while its ground is still in sight.
+void TrainMouse::give_up(MouseStep& step) {
+  const vision::Sheet& sheet = maker_->sheet();
+  const double gone_m = std::abs(speed_mps_) * core::seconds(now_.stamp_ns - reference_->seen.stamp_ns);
+  const bool out_of_sight = gone_m > kLongestReferenceShare * sheet.rows * sheet.cell_m;
+  const bool too_long = now_.stamp_ns - tentative_stamp_ns_ > core::kNsPerSecond / 2;
+  step.mode = MouseMode::search;
+  if (confirmed_ && !out_of_sight && !too_long) return;
+  // Start anew from this picture.
+  if (confirmed_) speed_before_gap_mps_ = speed_mps_;
+  restart_stamp_ns_ = now_.stamp_ns;
+  speed_known_ = false;
+  confirmed_ = false;
+  make_reference();
+  reference_->errors = filter_.first(now_.prior);
+  reference_->distance_m = tentative_distance_m_ = distance_m_;
+  tentative_stamp_ns_ = now_.stamp_ns;
+}
+
+MouseStep TrainMouse::process(const MousePicture& picture) {
+  MouseStep step;
+  step.stamp_ns = picture.stamp_ns;
+  step.reference_stamp_ns = picture.stamp_ns;
+  step.distance_m = distance_m_;
+  step.height_m = picture.pose.height_m + options_.texture_depth_m;
+  if (picture.stamp_ns <= last_stamp_ns_ || picture.grey.type() != CV_8UC1 || picture.grey.cols != camera_.width_px ||
+      picture.grey.rows != camera_.height_px) {
+    return step;
+  }
+  smooth_curves(picture);
+  const bool seen = look(picture);
+  if (!seen) {
+    last_stamp_ns_ = picture.stamp_ns;
+    return step;
+  }
+  if (!reference_) {
+    make_reference();
+    reference_->errors = filter_.first(now_.prior);
+    tentative_stamp_ns_ = picture.stamp_ns;
+    step.mode = MouseMode::search;
+    last_stamp_ns_ = picture.stamp_ns;
+    return step;
+  }
+
+  const double since_m_s = core::seconds(picture.stamp_ns - tentative_stamp_ns_);
+  const double reference_s = core::seconds(picture.stamp_ns - reference_->seen.stamp_ns);
+  const bool predicted = speed_known_ || picture.speed_mps.has_value();
+  const double speed_mps = speed_known_ ? speed_mps_ : picture.speed_mps.value_or(0.0);
+  const double known_m = speed_known_ ? tentative_distance_m_ - reference_->distance_m : 0.0;
+  const double predicted_m = predicted ? known_m + speed_mps * (speed_known_ ? since_m_s : reference_s) : 0.0;
+  double band_m = options_.search_band_m + options_.max_acceleration_mps2 * since_m_s * (since_m_s + 0.1);
+  if (!speed_known_) band_m = predicted ? band_m + 0.1 * std::abs(predicted_m) : options_.max_speed_mps * reference_s;
+
+  const Rough rough = find_roughly(!predicted || since_m_s > kInertia_s, predicted_m, band_m);
+  step.score = rough.score;
+  step.reference_stamp_ns = reference_->seen.stamp_ns;
+  const auto motion = rough.found ? align(rough, step) : std::nullopt;
+  if (motion) {
+    accept(*motion, step);
+  } else {
+    give_up(step);
+  }
+  step.distance_m = distance_m_;
+  last_stamp_ns_ = picture.stamp_ns;
+  return step;
+}
+
+}  // namespace railfix::odometry

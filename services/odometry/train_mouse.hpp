@@ -1,0 +1,140 @@
+// The train mouse: how far has the train gone, seen from the ground between the rails (paper 002, 2.1).
+//
+// Every picture is turned into a top view of the texture plane with its own camera pose, the ground of a reference
+// picture is found again in it, first roughly, then patch by patch to a fraction of a cell, and the patches'
+// displacements give the motion. While the train is slow the reference stays, so standing still adds up to nothing.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <optional>
+
+#include "geometry/camera.hpp"
+#include "odometry/motion_filter.hpp"
+#include "odometry/shift_search.hpp"
+#include "odometry/texture_alignment.hpp"
+#include "vision/ground_sheet.hpp"
+
+namespace railfix::odometry {
+
+struct TrainMouseOptions {
+  double gauge_m = 1.435;
+  double texture_depth_m = 0.18;  // sleeper tops below the rail heads
+  double rail_margin_m = 0.12;    // ground beside the rail that its foot and shadow spoil
+  double near_m = 4.0;            // ground used, ahead of the camera; the picture may limit it further
+  double far_m = 14.0;
+  double cell_m = 0.02;
+  double noise_grey = 2.0;
+  double max_speed_mps = 70.0;
+  double max_acceleration_mps2 = 3.0;
+  double search_band_m = 0.15;      // around the predicted shift, beside what the acceleration allows
+  double reference_length_m = 0.5;  // the reference stays until the train has moved so far
+  double lowest_score = 0.25;       // of the rough search
+  double ambiguity = 0.75;          // full search: the second-best shift must stay below this share of the best
+  double lowest_contrast_grey = 1.0;
+  double mount_pitch_sigma_rad = 0.004;  // where the pose is only that of the mount
+  double mount_height_sigma_m = 0.02;
+  MotionFilter::Options filter;
+  double standstill_m = 0.003;  // motion below it, at standstill, is not counted until it exceeds it
+  double bridge_s = 3.0;        // cumulative distance goes on with the mean speed over gaps up to this long
+};
+
+struct MousePicture {
+  cv::Mat grey;  // CV_8UC1
+  int64_t stamp_ns = 0;
+  geometry::CameraPose pose;  // of this picture where measured, else the mount's or the last
+  bool pose_measured = false;
+  PoseTrust trust;  // of a measured pose
+  double curvature_per_m = 0;
+  double vertical_curvature_per_m = 0;
+  std::optional<double> speed_mps;  // from elsewhere, only to find the first match
+};
+
+enum class MouseMode : uint8_t { search, track, keyframe, blind };
+
+/// As odometry_step (idl/odometry.idl); step, lateral and yaw count from the reference picture.
+struct MouseStep {
+  int64_t stamp_ns = 0;
+  int64_t reference_stamp_ns = 0;
+  double step_m = 0;
+  double lateral_m = 0;
+  double yaw_rad = 0;
+  double step_sigma_m = 0;
+  double yaw_sigma_rad = 0;
+  double distance_m = 0;
+  double speed_mps = 0;
+  double lateral_speed_mps = 0;
+  double yaw_rate_rps = 0;
+  double height_m = 0;
+  MouseMode mode = MouseMode::blind;
+  bool valid = false;
+  int patches = 0;             // that voted
+  double matched = 0;          // share of the patches in sight that voted
+  double agreement = 0;        // 0..1
+  double score = 0;            // correlation of the rough search
+  double pitch_bias_rad = 0;   // measured less true pitch, as the ground shows it
+  double ballast_depth_m = 0;  // below the sleeper tops, as the ground shows it
+};
+
+class TrainMouse {
+ public:
+  TrainMouse(const geometry::Intrinsics& camera, const TrainMouseOptions& options);
+
+  /// Pictures in the order of their stamps; one that is not newer than the last is answered as invalid and left out.
+  MouseStep process(const MousePicture& picture);
+
+ private:
+  struct Seen {  // one picture, ready to be compared
+    int64_t stamp_ns = 0;
+    vision::SheetPose pose;
+    vision::TopView view;
+    CoarseView coarse;
+    PosePrior prior;
+  };
+  struct Reference {
+    Seen seen;
+    std::unique_ptr<TextureReference> texture;
+    PoseErrors errors;
+    double distance_m = 0;
+  };
+  struct Rough {  // displacement of the ground in two halves of the sheet
+    bool found = false;
+    double score = 0;
+    double near_m = 0, far_m = 0;
+    double near_shift_m = 0, far_shift_m = 0;
+    double left_shift_m = 0;
+  };
+
+  bool look(const MousePicture& picture);
+  void make_reference();
+  [[nodiscard]] Rough find_roughly(bool full_band, double predicted_m, double band_m) const;
+  [[nodiscard]] std::optional<Motion> align(const Rough& rough, MouseStep& step) const;
+  void accept(const Motion& motion, MouseStep& step);
+  double bridge(double speed_after_mps);
+  void give_up(MouseStep& step);
+  void smooth_curves(const MousePicture& picture);
+
+  geometry::Intrinsics camera_;
+  TrainMouseOptions options_;
+  MotionFilter filter_;
+  std::unique_ptr<vision::TopViewMaker> maker_;
+  Seen now_;
+  std::optional<Reference> reference_;
+  double curvature_per_m_ = 0;
+  double vertical_curvature_per_m_ = 0;
+  bool curves_known_ = false;
+
+  int64_t last_stamp_ns_ = 0;        // of any picture
+  int64_t measured_stamp_ns_ = 0;    // of the last picture with a confirmed motion, 0 = none yet
+  int64_t tentative_stamp_ns_ = 0;   // of the last picture with any motion
+  double tentative_distance_m_ = 0;  // there
+  double distance_m_ = 0;            // confirmed
+  double speed_mps_ = 0;
+  bool speed_known_ = false;
+  bool confirmed_ = false;
+  int64_t restart_stamp_ns_ = 0;  // of the first picture after a gap
+  double speed_before_gap_mps_ = 0;
+};
+
+}  // namespace railfix::odometry

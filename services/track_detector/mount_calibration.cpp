@@ -1,0 +1,127 @@
+#include "track_detector/mount_calibration.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace railfix::track_detector {
+namespace {
+
+constexpr size_t kRoughPictures = 6;
+constexpr size_t kMinStraight = 3;
+constexpr double kRollHeldRad = 1e-5;
+constexpr double kStraightPerM = 3e-4;  // and within two sigmas of zero
+// A pose that no picture knows anything about: cabs are 1.6 to 4.2 m high, cameras look up to 20 degrees down.
+constexpr double kRoughHeightsM[] = {2.0, 2.8, 3.7};
+constexpr double kRoughPitchesRad[] = {0.0, 0.12, 0.24};
+constexpr TrackShapeSigma kRoughLimits{kRollHeldRad, 0.025, 0.04, 0.2, 0.18, 0.001, 0.0005, 3e-5};
+constexpr TrackShapeSigma kFineLimits{kRollHeldRad, 0.012, 0.02, 0.10, 0.06, 0.003, 0.0005, 3e-5};
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+constexpr double geometry::CameraPose::*kMembers[] = {&geometry::CameraPose::pitch_rad, &geometry::CameraPose::yaw_rad,
+                                                      &geometry::CameraPose::lateral_m,
+                                                      &geometry::CameraPose::height_m};
+
+/// Median pose; `spread` gets the robust standard deviation (1.4826 * median absolute deviation).
+geometry::CameraPose median_pose(const std::vector<TrackObservation>& observations, geometry::CameraPose* spread) {
+  geometry::CameraPose middle;
+  for (const auto member : kMembers) {
+    std::vector<double> values;
+    for (const auto& o : observations) values.push_back(o.shape.camera.*member);
+    middle.*member = median(values);
+    for (auto& value : values) value = std::abs(value - middle.*member);
+    if (spread != nullptr) spread->*member = 1.4826 * median(values);
+  }
+  return middle;
+}
+
+}  // namespace
+
+MountCalibrator::MountCalibrator(const geometry::Intrinsics& camera, double gauge_m)
+    : camera_(camera), gauge_m_(gauge_m) {}
+
+std::vector<TrackObservation> MountCalibrator::look(const geometry::CameraPose& start, const TrackShapeSigma& limits,
+                                                    size_t max_pictures) const {
+  DetectorOptions options;
+  options.gauge_m = gauge_m_;
+  options.limits = limits;
+  TrackDetector detector(camera_, start, options);
+  const size_t stride = std::max<size_t>(1, pictures_.size() / max_pictures);
+  std::vector<TrackObservation> seen;
+  for (size_t i = 0; i < pictures_.size(); i += stride) {
+    detector.reset();
+    auto observation = detector.detect(pictures_[i]);
+    if (observation.seen()) seen.push_back(std::move(observation));
+  }
+  return seen;
+}
+
+core::Result<geometry::CameraPose> MountCalibrator::rough() const {
+  std::vector<TrackObservation> best;
+  double best_confidence = 0;
+  for (const double height_m : kRoughHeightsM) {
+    for (const double pitch_rad : kRoughPitchesRad) {
+      auto seen = look({0, pitch_rad, 0, 0, height_m}, kRoughLimits, kRoughPictures);
+      double confidence = 0;
+      for (const auto& o : seen) confidence += o.confidence;
+      if (confidence > best_confidence) {
+        best_confidence = confidence;
+        best = std::move(seen);
+      }
+    }
+  }
+  if (best.empty()) {
+    return core::Error{
+        "no picture shows two rails at the gauge: use pictures of straight track in good light, give --focal "
+        "or --camera, and check --gauge"};
+  }
+  return median_pose(best, nullptr);
+}
+
+core::Result<MountCalibration> MountCalibrator::solve() const {
+  if (pictures_.empty()) return core::Error{"there is no picture to calibrate from"};
+  const auto start = rough();
+  if (!start.ok()) return start.error();
+  MountCalibration result;
+  result.pictures = pictures_.size();
+  auto seen = look(start.value(), kFineLimits, pictures_.size());
+  result.seen = seen.size();
+  std::erase_if(seen, [](const TrackObservation& o) {
+    const double sigma = std::sqrt(std::max(0.0, o.covariance(5, 5)));
+    return std::abs(o.shape.curvature_per_m) > std::max(kStraightPerM, 2 * sigma);
+  });
+  result.straight = seen.size();
+  const size_t wanted = std::min(kMinStraight, pictures_.size());
+  if (seen.size() < wanted) {
+    char text[200];
+    std::snprintf(
+        text, sizeof text,
+        "only %zu of %zu pictures show both rails of straight track, at least %zu are needed: take more pictures",
+        seen.size(), pictures_.size(), wanted);
+    return core::Error{text};
+  }
+  geometry::CameraPose spread;
+  result.mount = median_pose(seen, &spread);
+  const double count = static_cast<double>(seen.size());
+  for (const auto member : kMembers) {
+    std::vector<double> own;
+    const int k = member == &geometry::CameraPose::pitch_rad   ? 1
+                  : member == &geometry::CameraPose::yaw_rad   ? 2
+                  : member == &geometry::CameraPose::lateral_m ? 3
+                                                               : 4;
+    for (const auto& o : seen) own.push_back(std::sqrt(std::max(0.0, o.covariance(k, k))));
+    // The scatter over pictures holds the shake; a median is 1.25 times as uncertain as a mean.
+    result.sigma.*member = 1.25 * std::max(spread.*member, median(own)) / std::sqrt(count);
+  }
+  std::vector<double> residuals;
+  for (const auto& o : seen) residuals.push_back(o.residual_px);
+  result.residual_px = median(residuals);
+  return result;
+}
+
+}  // namespace railfix::track_detector

@@ -1,0 +1,42 @@
+// Where the camera sits and looks, from pictures of straight track: the vanishing point gives pitch and yaw, the known
+// gauge gives the height, the two slopes the sideways position.
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "core/result.hpp"
+#include "track_detector/track_detector.hpp"
+
+namespace railfix::track_detector {
+
+struct MountCalibration {
+  geometry::CameraPose mount;  // roll is held at 0: straight rails cannot tell it from a sideways position
+  geometry::CameraPose sigma;  // one sigma of the mean pose, from the scatter over the pictures
+  size_t pictures = 0;
+  size_t seen = 0;      // pictures with both rails found
+  size_t straight = 0;  // of those, used
+  double residual_px = 0;
+};
+
+/// Add pictures, then solve. Works from a rough idea of the mount or none.
+class MountCalibrator {
+ public:
+  MountCalibrator(const geometry::Intrinsics& camera, double gauge_m);
+
+  /// Grey pictures of the camera's size, any distance apart. All are kept until solve().
+  void add(const cv::Mat& grey) { pictures_.push_back(grey); }
+  /// An error when too few pictures show straight track, or when they do not agree.
+  [[nodiscard]] core::Result<MountCalibration> solve() const;
+
+ private:
+  [[nodiscard]] std::vector<TrackObservation> look(const geometry::CameraPose& start, const TrackShapeSigma& limits,
+                                                   size_t max_pictures) const;
+  [[nodiscard]] core::Result<geometry::CameraPose> rough() const;
+
+  geometry::Intrinsics camera_;
+  double gauge_m_;
+  std::vector<cv::Mat> pictures_;
+};
+
+}  // namespace railfix::track_detector

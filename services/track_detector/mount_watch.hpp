@@ -1,0 +1,23 @@
+// Does the pose keep away from the calibrated mount? Shake averages out, a camera that was knocked does not.
+#pragma once
+
+#include "track_detector/rail_fit.hpp"
+
+namespace railfix::track_detector {
+
+class MountWatch {
+ public:
+  MountWatch(const TrackShape& mount, const TrackShapeSigma& limits);
+  /// A pose from a picture with both rails seen, `interval_s` after the previous one.
+  void add(const TrackShape& shape, double interval_s);
+  /// The average of the last minute is off by more than the suspension explains.
+  [[nodiscard]] bool drifted() const;
+
+ private:
+  Eigen::Matrix<double, 5, 1> mount_;
+  Eigen::Matrix<double, 5, 1> sigma_;
+  Eigen::Matrix<double, 5, 1> average_ = Eigen::Matrix<double, 5, 1>::Zero();  // of the deviation
+  double seen_s_ = 0;
+};
+
+}  // namespace railfix::track_detector

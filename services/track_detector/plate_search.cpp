@@ -1,0 +1,175 @@
+#include "track_detector/plate_search.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+
+namespace railfix::track_detector {
+namespace {
+
+constexpr double kInsetM = 0.06;      // the plate's rim, blurred by distance, is left out of its mean
+constexpr double kGapM = 0.05;        // around the plate: its shadow and blur
+constexpr double kStripM = 0.10;      // ground compared on each side
+constexpr double kOffCentreM = 0.06;  // a balise lies in the middle of the track
+constexpr double kSizeToleranceM = 0.09;
+constexpr double kEvenness = 0.75;  // spread inside, as a share of the weakest contrast
+constexpr double kDarkGrey = 12;    // below it shares of brightness mean nothing
+
+struct Box {
+  int row, col, rows, cols;
+};
+
+class Sums {
+ public:
+  explicit Sums(const cv::Mat& grey) { cv::integral(grey, sum_, squared_, CV_64F, CV_64F); }
+  [[nodiscard]] double mean(const Box& box) const { return of(sum_, box) / (box.rows * box.cols); }
+  [[nodiscard]] double spread(const Box& box) const {
+    const double m = mean(box);
+    return std::sqrt(std::max(0.0, of(squared_, box) / (box.rows * box.cols) - m * m));
+  }
+
+ private:
+  static double of(const cv::Mat& sums, const Box& box) {
+    const auto* top = sums.ptr<double>(box.row);
+    const auto* bottom = sums.ptr<double>(box.row + box.rows);
+    return bottom[box.col + box.cols] - bottom[box.col] - top[box.col + box.cols] + top[box.col];
+  }
+  cv::Mat sum_;
+  cv::Mat squared_;
+};
+
+// The plate's box and its surroundings around a centre, in cells.
+struct Layout {
+  int half_rows, half_cols, inset, gap, strip;
+  Layout(const LandmarkOptions& options, double cell_m)
+      : half_rows(static_cast<int>(std::lround(0.5 * options.balise_length_m / cell_m))),
+        half_cols(static_cast<int>(std::lround(0.5 * options.balise_width_m / cell_m))),
+        inset(static_cast<int>(std::lround(kInsetM / cell_m))),
+        gap(static_cast<int>(std::lround(kGapM / cell_m))),
+        strip(static_cast<int>(std::lround(kStripM / cell_m))) {}
+};
+
+// Signed contrast of the weakest side, share of brightness; nothing when the sides disagree or the inside is uneven.
+std::optional<double> plate_contrast(const Sums& sums, const Layout& l, int row, int col, double lowest) {
+  const Box inside{row - l.half_rows + l.inset, col - l.half_cols + l.inset, 2 * (l.half_rows - l.inset) + 1,
+                   2 * (l.half_cols - l.inset) + 1};
+  const double grey = sums.mean(inside);
+  const int rows = inside.rows;
+  const int cols = inside.cols;
+  const double sides[4] = {sums.mean({row - l.half_rows - l.gap - l.strip, inside.col, l.strip, cols}),
+                           sums.mean({row + l.half_rows + l.gap + 1, inside.col, l.strip, cols}),
+                           sums.mean({inside.row, col - l.half_cols - l.gap - l.strip, rows, l.strip}),
+                           sums.mean({inside.row, col + l.half_cols + l.gap + 1, rows, l.strip})};
+  const double sign = grey > sides[0] ? 1.0 : -1.0;
+  double weakest = 1e9;
+  double brightest = grey;
+  for (const double side : sides) {
+    weakest = std::min(weakest, sign * (grey - side));
+    brightest = std::max(brightest, side);
+  }
+  if (brightest < kDarkGrey || weakest < lowest * brightest) return std::nullopt;
+  if (sums.spread(inside) > kEvenness * weakest) return std::nullopt;
+  return sign * weakest / brightest;
+}
+
+// Place of the steepest step of this sign in a profile near `at`, to a fraction of a cell.
+std::optional<double> find_edge(const std::vector<double>& profile, int at, int reach, double sign) {
+  int best = -1;
+  double steepest = 0;
+  const auto slope = [&](int i) {
+    return sign * (profile[static_cast<size_t>(i) + 1] - profile[static_cast<size_t>(i) - 1]);
+  };
+  for (int i = std::max(2, at - reach); i <= std::min(static_cast<int>(profile.size()) - 3, at + reach); ++i) {
+    if (slope(i) > steepest) {
+      steepest = slope(i);
+      best = i;
+    }
+  }
+  if (best < 0) return std::nullopt;
+  const double before = slope(best - 1);
+  const double after = slope(best + 1);
+  const double bend = before - 2 * steepest + after;
+  return bend < 0 ? best + std::clamp(0.5 * (before - after) / bend, -0.5, 0.5) : best;
+}
+
+struct Extent {
+  double middle;
+  double length;
+};
+
+// Both edges of the plate in a profile through it.
+std::optional<Extent> measure_extent(const std::vector<double>& profile, int centre, int half, int reach, double sign) {
+  const auto low = find_edge(profile, centre - half, reach, sign);
+  const auto high = find_edge(profile, centre + half, reach, -sign);
+  if (!low || !high) return std::nullopt;
+  return Extent{0.5 * (*low + *high), *high - *low};
+}
+
+std::optional<PlateCandidate> refine(const cv::Mat& grey, const vision::Sheet& sheet, const Layout& l,
+                                     const LandmarkOptions& options, const cv::Point& centre, double contrast) {
+  const double sign = contrast > 0 ? 1.0 : -1.0;
+  const int reach = static_cast<int>(std::lround(0.10 / sheet.cell_m));
+  std::vector<double> along(static_cast<size_t>(grey.rows), 0.0);
+  std::vector<double> across(static_cast<size_t>(grey.cols), 0.0);
+  const int in_cols = l.half_cols - l.inset;
+  const int in_rows = l.half_rows - l.inset;
+  for (int r = std::max(0, centre.y - 3 * l.half_rows); r < std::min(grey.rows, centre.y + 3 * l.half_rows); ++r) {
+    const auto* line = grey.ptr<float>(r);
+    for (int c = centre.x - in_cols; c <= centre.x + in_cols; ++c) along[static_cast<size_t>(r)] += line[c];
+    along[static_cast<size_t>(r)] /= 2.0 * in_cols + 1.0;
+  }
+  for (int r = centre.y - in_rows; r <= centre.y + in_rows; ++r) {
+    const auto* line = grey.ptr<float>(r);
+    for (int c = 0; c < grey.cols; ++c) across[static_cast<size_t>(c)] += line[c] / (2.0 * in_rows + 1.0);
+  }
+  const auto length = measure_extent(along, centre.y, l.half_rows, reach, sign);
+  const auto width = measure_extent(across, centre.x, l.half_cols, reach, sign);
+  if (!length || !width) return std::nullopt;
+  if (std::abs(length->length * sheet.cell_m - options.balise_length_m) > kSizeToleranceM) return std::nullopt;
+  if (std::abs(width->length * sheet.cell_m - options.balise_width_m) > kSizeToleranceM) return std::nullopt;
+  return PlateCandidate{sheet.ahead_m(length->middle), sheet.offset_m(width->middle), std::abs(contrast)};
+}
+
+}  // namespace
+
+std::vector<PlateCandidate> find_plates(const vision::TopView& view, const vision::Sheet& sheet,
+                                        const LandmarkOptions& options) {
+  const Layout l(options, sheet.cell_m);
+  const Sums sums(view.grey);
+  const int row_margin = l.half_rows + l.gap + l.strip + 1;
+  const int col_margin = l.half_cols + l.gap + l.strip + 1;
+  const int off = static_cast<int>(kOffCentreM / sheet.cell_m);
+  const int middle = (sheet.cols - 1) / 2;
+  struct Hit {
+    cv::Point centre;
+    double contrast;
+  };
+  std::vector<Hit> hits;
+  for (int row = row_margin; row < sheet.rows - row_margin; ++row) {
+    if (view.row_seen[static_cast<size_t>(row - row_margin)] == 0 ||
+        view.row_seen[static_cast<size_t>(row + row_margin)] == 0) {
+      continue;
+    }
+    for (int col = std::max(col_margin, middle - off); col <= std::min(sheet.cols - 1 - col_margin, middle + off);
+         ++col) {
+      if (const auto contrast = plate_contrast(sums, l, row, col, options.lowest_contrast)) {
+        hits.push_back({{col, row}, *contrast});
+      }
+    }
+  }
+  std::sort(hits.begin(), hits.end(),
+            [](const Hit& a, const Hit& b) { return std::abs(a.contrast) > std::abs(b.contrast); });
+  std::vector<PlateCandidate> plates;
+  for (const Hit& hit : hits) {
+    const double ahead_m = sheet.ahead_m(hit.centre.y);
+    const bool known = std::any_of(plates.begin(), plates.end(), [&](const PlateCandidate& plate) {
+      return std::abs(plate.ahead_m - ahead_m) < 2.0 * options.balise_length_m;
+    });
+    if (known) continue;
+    if (const auto plate = refine(view.grey, sheet, l, options, hit.centre, hit.contrast)) plates.push_back(*plate);
+  }
+  return plates;
+}
+
+}  // namespace railfix::track_detector

@@ -1,0 +1,155 @@
+#include "track_detector/rail_edges.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace railfix::track_detector {
+namespace {
+
+constexpr double kStepPx = 0.5;  // between samples of a profile
+constexpr double kSmallestHeadPx = 3.0;
+constexpr double kEdgeSigmaPx = 0.35;  // of a clear edge
+constexpr double kEdgeSigmaM = 0.003;  // wear and rounding of the head, dirt
+constexpr double kSideM = 0.05;        // ground beside the head that it is compared with
+
+/// Bilinear; the caller keeps it inside.
+double sample(const cv::Mat& grey, double u, double v) {
+  const int x = static_cast<int>(u);
+  const int y = static_cast<int>(v);
+  const double fx = u - x;
+  const double fy = v - y;
+  const auto* upper = grey.ptr<uint8_t>(y) + x;
+  const auto* lower = grey.ptr<uint8_t>(y + 1) + x;
+  return (1 - fy) * ((1 - fx) * upper[0] + fx * upper[1]) + fy * ((1 - fx) * lower[0] + fx * lower[1]);
+}
+
+bool inside(const cv::Mat& grey, const Eigen::Vector2d& pixel) {
+  return pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < grey.cols - 1.01 && pixel.y() < grey.rows - 1.01;
+}
+
+/// Grey levels across one rail; index 0 is innermost. Buffers are kept for speed.
+class Profile {
+ public:
+  /// `outward_px`: picture vector of one step outward; averaged over a few places along the rail.
+  bool take(const cv::Mat& grey, const Eigen::Vector2d& first, const Eigen::Vector2d& outward,
+            const Eigen::Vector2d& along, int count) {
+    values_.assign(static_cast<size_t>(count), 0.0);
+    const Eigen::Vector2d last = first + outward * (count - 1);
+    for (int k = -2; k <= 2; ++k) {
+      const Eigen::Vector2d shift = along * k;
+      if (!inside(grey, first + shift) || !inside(grey, last + shift)) return false;
+      Eigen::Vector2d p = first + shift;
+      for (auto& value : values_) {
+        value += 0.2 * sample(grey, p.x(), p.y());
+        p += outward;
+      }
+    }
+    sums_.resize(values_.size() + 1);
+    sums_[0] = 0;
+    for (size_t i = 0; i < values_.size(); ++i) sums_[i + 1] = sums_[i] + values_[i];
+    return true;
+  }
+
+  [[nodiscard]] double mean(int first, int last) const {
+    first = std::clamp(first, 0, size() - 1);
+    last = std::clamp(last, first + 1, size());
+    return (sums_[static_cast<size_t>(last)] - sums_[static_cast<size_t>(first)]) / (last - first);
+  }
+  [[nodiscard]] int size() const { return static_cast<int>(values_.size()); }
+
+ private:
+  std::vector<double> values_;
+  std::vector<double> sums_;
+};
+
+/// Where across one rail the inner edge is, in samples, with its contrast.
+struct Crossing {
+  double at = 0;
+  double contrast = 0;
+};
+
+/// The band that stands out most on both sides, then the steepest step at its inner side.
+std::optional<Crossing> find_crossing(const Profile& profile, double head, double side, double sign,
+                                      double min_contrast) {
+  const int head_n = std::max(2, static_cast<int>(std::lround(head)));
+  const int crown_n = std::max(2, static_cast<int>(std::lround(0.6 * head)));
+  const int side_n = std::max(2, static_cast<int>(std::lround(side)));
+  int best = -1;
+  double best_contrast = min_contrast;
+  for (int i = side_n; i + head_n + side_n <= profile.size(); ++i) {
+    const double crown = profile.mean(i, i + crown_n);
+    const double contrast = std::min(sign * (crown - profile.mean(i - side_n, i)),
+                                     sign * (crown - profile.mean(i + head_n, i + head_n + side_n)));
+    if (contrast > best_contrast) {
+      best_contrast = contrast;
+      best = i;
+    }
+  }
+  if (best < 0) return std::nullopt;
+  // Step between the few samples on either side, sub-sample by a parabola through its peak.
+  const int half = std::clamp(head_n / 6, 2, 8);
+  const auto step = [&](int i) { return sign * (profile.mean(i, i + half) - profile.mean(i - half, i)); };
+  const int slack = std::max(2, head_n / 3);
+  int peak = -1;
+  double peak_value = 0;
+  for (int i = std::max(half + 1, best - slack); i <= std::min(profile.size() - half - 1, best + slack); ++i) {
+    if (step(i) > peak_value) {
+      peak_value = step(i);
+      peak = i;
+    }
+  }
+  if (peak < 0 || peak_value < 0.5 * min_contrast) return std::nullopt;
+  const double before = step(peak - 1);
+  const double after = step(peak + 1);
+  const double bend = before - 2 * peak_value + after;
+  const double shift = bend < 0 ? std::clamp(0.5 * (before - after) / bend, -1.0, 1.0) : 0.0;
+  // Border between samples peak - 1 and peak.
+  return Crossing{peak + shift - 0.5, best_contrast};
+}
+
+}  // namespace
+
+std::vector<RailEdge> find_edges(const cv::Mat& grey, const geometry::Intrinsics& camera, const TrackShape& shape,
+                                 const EdgeOptions& options, int tried[2]) {
+  const geometry::View view(camera, shape.camera);
+  const double ratio = std::pow(options.far_m / options.near_m, 1.0 / std::max(1, options.stations - 1));
+  std::vector<RailEdge> edges;
+  Profile profile;
+  for (const auto side : {Side::left, Side::right}) {
+    int& count = tried[side == Side::left ? 0 : 1];
+    count = 0;
+    for (int i = 0; i < options.stations; ++i) {
+      const double ahead_m = options.near_m * std::pow(ratio, i);
+      const auto inner = view.project(rail_point(shape, side, options.gauge_m, ahead_m));
+      const auto outer = view.project(rail_point(shape, side, options.gauge_m, ahead_m, options.head_m));
+      const auto next = view.project(rail_point(shape, side, options.gauge_m, ahead_m * 1.01));
+      if (!inner || !outer || !next) continue;
+      const double head_px = (*outer - *inner).norm();
+      if (head_px < kSmallestHeadPx || !inside(grey, *inner)) continue;
+      const double px_per_m = head_px / options.head_m;
+      const Eigen::Vector2d outward = (*outer - *inner) / head_px * kStepPx;
+      const Eigen::Vector2d along = (*next - *inner).normalized();
+      const double reach_px = std::max(options.reach_m * px_per_m, 2.0);
+      const double side_px = std::max(kSideM * px_per_m, 1.5);
+      const int before = static_cast<int>(std::ceil((reach_px + side_px) / kStepPx)) + 1;
+      const int behind = static_cast<int>(std::ceil((reach_px + head_px + side_px) / kStepPx)) + 1;
+      if (!profile.take(grey, *inner - outward * before, outward, along, before + behind + 1)) continue;
+      ++count;
+      const auto crossing =
+          find_crossing(profile, head_px / kStepPx, side_px / kStepPx, options.dark ? -1.0 : 1.0, options.min_contrast);
+      if (!crossing) continue;
+      RailEdge edge;
+      edge.point.pixel = *inner + outward * (crossing->at - before);
+      edge.point.side = side;
+      edge.point.sigma_px = std::hypot(kEdgeSigmaPx, kEdgeSigmaM * px_per_m);
+      edge.ahead_m = ahead_m;
+      edge.offset_m = (crossing->at - before) * kStepPx / px_per_m;
+      edge.contrast = crossing->contrast;
+      edges.push_back(edge);
+    }
+  }
+  return edges;
+}
+
+}  // namespace railfix::track_detector

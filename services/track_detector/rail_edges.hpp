@@ -1,0 +1,34 @@
+// Sub-pixel points of the inner edges of the rail heads, in the original picture, near where a first shape puts them.
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "track_detector/rail_fit.hpp"
+
+namespace railfix::track_detector {
+
+struct EdgeOptions {
+  double gauge_m = 1.435;
+  double head_m = 0.07;
+  double near_m = 5;
+  double far_m = 50;
+  int stations = 40;
+  double reach_m = 0.1;     // how far inwards and outwards of the expected place is looked
+  double min_contrast = 6;  // grey levels between the head and the ground inside of it
+  bool dark = false;        // the head is darker than both its sides
+};
+
+struct RailEdge {
+  EdgePoint point;
+  double ahead_m = 0;   // of the station; only as right as the shape it was looked for with
+  double offset_m = 0;  // outwards from the expected place
+  double contrast = 0;  // grey levels
+};
+
+/// Points near to far, left rail first. Stations outside the picture or without a clear edge give none.
+/// `tried`: how many stations of each side were inside the picture.
+std::vector<RailEdge> find_edges(const cv::Mat& grey, const geometry::Intrinsics& camera, const TrackShape& shape,
+                                 const EdgeOptions& options, int tried[2]);
+
+}  // namespace railfix::track_detector

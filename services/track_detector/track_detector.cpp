@@ -1,0 +1,193 @@
+#include "track_detector/track_detector.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace railfix::track_detector {
+namespace {
+
+constexpr double kSigmas = 3.0;       // limits of the search, in sigmas of the suspension
+constexpr double kSearchFarM = 28.0;  // farther, pitch errors move the rails too much for a coarse search
+constexpr double kMinSearchScore = 0.12;
+constexpr size_t kCandidates = 4;
+constexpr int kPatience = 3;        // pictures without rails before the search saves time
+constexpr double kSupportPx = 1.5;  // a point within this of the fit ...
+constexpr double kSupportM = 0.02;  // ... or this supports the rail
+constexpr double kGoodResidualPx = 2.0;
+constexpr double kSure = 0.8;           // confidence that ends the search
+constexpr double kTrackReachM = 0.08;   // how far rails are looked for from the previous picture's ...
+constexpr double kSearchReachM = 0.10;  // ... and from the search's
+
+}  // namespace
+
+TrackDetector::TrackDetector(const geometry::Intrinsics& camera, const geometry::CameraPose& mount,
+                             const DetectorOptions& options)
+    : camera_(camera), options_(options) {
+  mount_.camera = mount;
+  const auto& limits = options.limits;
+  search_limits_.pitch_rad = kSigmas * limits.pitch_rad;
+  search_limits_.yaw_rad = kSigmas * limits.yaw_rad;
+  search_limits_.lateral_m = kSigmas * (limits.lateral_m + limits.roll_rad * mount.height_m);
+  search_limits_.height_fraction = kSigmas * limits.height_m / mount.height_m;
+  search_limits_.curvature_per_m = 2 * limits.curvature_per_m;
+  near_m_ = nearest_visible_m(camera, mount, options.gauge_m / 2 + 0.1, options.far_m / 3);
+  TopViewSize size;
+  size.far_m = std::min(std::max(kSearchFarM, 3 * near_m_), options.far_m);
+  size.half_width_m =
+      std::min(5.0, options.gauge_m / 2 + 0.3 + search_limits_.lateral_m + search_limits_.yaw_rad * size.far_m +
+                        search_limits_.curvature_per_m * size.far_m * size.far_m / 2);
+  top_view_ = std::make_unique<TopView>(camera, mount, size);
+}
+
+TrackObservation TrackDetector::detect(const cv::Mat& grey) {
+  if (previous_) {
+    auto observation = refine(grey, *previous_, dark_, kTrackReachM);
+    if (observation.seen()) {
+      previous_ = observation.shape;
+      return observation;
+    }
+  }
+  previous_.reset();
+  // While nothing is seen for long, bright and dark rails take turns: that keeps up with the camera.
+  const bool both = misses_ < kPatience;
+  TrackObservation observation;
+  forget(observation);
+  for (const bool dark : {false, true}) {
+    if (!both && dark != (misses_ % 2 == 1)) continue;
+    auto found = search(grey, dark);
+    if (found.confidence >= observation.confidence) observation = std::move(found);
+    if (observation.seen()) {
+      previous_ = observation.shape;
+      dark_ = dark;
+      misses_ = 0;
+      return observation;
+    }
+  }
+  ++misses_;
+  return observation;
+}
+
+TrackObservation TrackDetector::search(const cv::Mat& grey, bool dark) const {
+  TrackObservation best;
+  best.reason = "no pair of rails at the gauge";
+  forget(best);
+  const cv::Mat ridges = top_view_->ridges(grey, dark);
+  for (const auto& candidate :
+       search_rails(*top_view_, ridges, search_limits_, options_.gauge_m, options_.head_m, kCandidates)) {
+    if (candidate.score < kMinSearchScore) continue;
+    auto observation = refine(grey, candidate.shape, dark, kSearchReachM);
+    const bool better =
+        observation.seen() != best.seen() ? observation.seen() : observation.confidence > best.confidence;
+    if (better) best = std::move(observation);
+    if (best.seen() && best.confidence > kSure) break;
+  }
+  return best;
+}
+
+RailFit TrackDetector::fit(const std::vector<RailEdge>& edges, const TrackShape& start) const {
+  RailFitOptions fit_options;
+  fit_options.gauge_m = options_.gauge_m;
+  fit_options.prior = mount_;
+  fit_options.prior_sigma = options_.limits;
+  std::vector<EdgePoint> points;
+  points.reserve(edges.size());
+  for (const auto& edge : edges) points.push_back(edge.point);
+  return fit_rails(camera_, points, start, fit_options);
+}
+
+TrackObservation TrackDetector::refine(const cv::Mat& grey, const TrackShape& start, bool dark,
+                                       double first_reach_m) const {
+  EdgeOptions edge_options;
+  edge_options.gauge_m = options_.gauge_m;
+  edge_options.head_m = options_.head_m;
+  edge_options.near_m = near_m_;
+  edge_options.min_contrast = options_.min_contrast;
+  edge_options.dark = dark;
+  TrackObservation observation;
+  TrackShape shape = start;
+  std::array<int, 2> tried{};
+  // Near first, where little can go wrong; then farther and narrower with what the near part has taught.
+  const double far_m[] = {std::min(25.0, options_.far_m), std::min(40.0, options_.far_m), options_.far_m};
+  const double reach_m[] = {first_reach_m, 0.06, 0.045};
+  const int stations[] = {20, 28, 40};
+  std::vector<RailEdge> edges;
+  RailFit result;
+  for (int pass = 0; pass < 3; ++pass) {
+    edge_options.far_m = far_m[pass];
+    edge_options.reach_m = reach_m[pass];
+    edge_options.stations = stations[pass];
+    edges = find_edges(grey, camera_, shape, edge_options, tried.data());
+    if (edges.size() < 8) {
+      observation.reason = "too few edges of rail heads";
+      forget(observation);
+      return observation;
+    }
+    result = fit(edges, shape);
+    shape = result.shape;
+  }
+  observation.near_m = edge_options.near_m;
+  observation.far_m = edge_options.far_m;
+  judge(edges, tried, result, observation);
+  if (observation.seen_left != observation.seen_right) keep_one_rail(edges, observation);
+  if (!observation.seen_left && !observation.seen_right) forget(observation);
+  return observation;
+}
+
+void TrackDetector::judge(const std::vector<RailEdge>& edges, const std::array<int, 2>& tried, const RailFit& fit,
+                          TrackObservation& observation) const {
+  const geometry::View view(camera_, fit.shape.camera);
+  std::array<int, 2> supported{};
+  for (size_t i = 0; i < edges.size(); ++i) {
+    const double px_per_m = camera_.fu_px / std::max(1.0, edges[i].ahead_m);
+    if (std::abs(fit.residuals_px[i]) > std::max(kSupportPx, kSupportM * px_per_m)) continue;
+    ++supported[edges[i].point.side == Side::left ? 0 : 1];
+    observation.points.push_back(edges[i].point);
+  }
+  std::array<double, 2> share{};
+  for (size_t side = 0; side < 2; ++side)
+    share[side] = tried[side] < 6 ? 0.0 : supported[side] / static_cast<double>(tried[side]);
+  observation.shape = fit.shape;
+  observation.covariance = fit.covariance;
+  observation.condition = fit.condition;
+  observation.residual_px = fit.residual_px;
+  observation.confidence = std::sqrt(share[0] * share[1]) / (1.0 + fit.residual_px / kGoodResidualPx);
+  if (!fit.converged) {
+    observation.reason = "the fit does not settle";
+  } else if (!within_limits(fit.shape)) {
+    observation.reason = "the pose is outside the suspension limits";
+  } else {
+    observation.seen_left = share[0] >= options_.min_supported;
+    observation.seen_right = share[1] >= options_.min_supported;
+    if (!observation.seen()) observation.reason = "too few rows show both rails";
+  }
+}
+
+// What was taken for the other rail must not bend the answer.
+void TrackDetector::keep_one_rail(std::vector<RailEdge> edges, TrackObservation& observation) const {
+  const Side side = observation.seen_left ? Side::left : Side::right;
+  std::erase_if(edges, [side](const RailEdge& edge) { return edge.point.side != side; });
+  std::erase_if(observation.points, [side](const EdgePoint& point) { return point.side != side; });
+  const RailFit one = fit(edges, observation.shape);
+  observation.shape = one.shape;
+  observation.covariance = one.covariance;
+  observation.condition = one.condition;
+  observation.residual_px = one.residual_px;
+}
+
+void TrackDetector::forget(TrackObservation& observation) const {
+  observation.shape = mount_;
+  observation.covariance = to_vector(options_.limits).head<7>().cwiseAbs2().asDiagonal();
+  observation.condition = std::numeric_limits<double>::infinity();
+  observation.points.clear();
+}
+
+bool TrackDetector::within_limits(const TrackShape& shape) const {
+  const ShapeVector deviation = to_vector(shape) - to_vector(mount_);
+  const ShapeVector sigma = to_vector(options_.limits);
+  for (int k = 0; k < 5; ++k) {
+    if (std::abs(deviation(k)) > 4 * sigma(k)) return false;
+  }
+  return true;
+}
+
+}  // namespace railfix::track_detector

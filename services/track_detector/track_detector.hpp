@@ -1,0 +1,83 @@
+// Rails in one picture after the other -> camera shake and track curvature, or "not seen".
+#pragma once
+
+#include <array>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "track_detector/rail_edges.hpp"
+#include "track_detector/rail_fit.hpp"
+#include "track_detector/rail_search.hpp"
+
+namespace railfix::track_detector {
+
+struct DetectorOptions {
+  double gauge_m = 1.435;  // between the inner edges of the rail heads
+  double head_m = 0.07;    // width of a rail head
+  double far_m = 60;       // rails are followed as far as this
+  /// What the suspension and the track do to the camera, one sigma about the mount; also limits the search (3 sigma).
+  TrackShapeSigma limits{0.008, 0.008, 0.02, 0.10, 0.04, 0.003, 0.0005, 3e-5};
+  double min_contrast = 6;     // grey levels of a rail head against both its sides
+  double min_supported = 0.5;  // share of the stations that must show a rail for "seen"
+};
+
+/// One picture's answer. Without `seen_left` or `seen_right` the shape is the mount and the covariance that of the
+/// limits.
+struct TrackObservation {
+  bool seen_left = false;
+  bool seen_right = false;
+  [[nodiscard]] bool seen() const { return seen_left && seen_right; }
+  TrackShape shape;
+  Eigen::Matrix<double, 7, 7> covariance = Eigen::Matrix<double, 7, 7>::Zero();  // order of ShapeVector
+  double condition = 0;
+  double residual_px = 0;
+  double confidence = 0;          // 0..1
+  std::vector<EdgePoint> points;  // inner edges that the fit uses, left rail first, near to far
+  double near_m = 0;              // the rails were looked for from here ...
+  double far_m = 0;               // ... to here
+  std::string reason;             // why not seen
+};
+
+class TrackDetector {
+ public:
+  TrackDetector(const geometry::Intrinsics& camera, const geometry::CameraPose& mount, const DetectorOptions& options);
+
+  /// Grey picture (CV_8UC1) of the camera's size. Starts from the previous picture's answer where it still holds, else
+  /// searches the whole range of the limits.
+  TrackObservation detect(const cv::Mat& grey);
+  /// Forgets the previous picture.
+  void reset() {
+    previous_.reset();
+    misses_ = 0;
+  }
+
+  [[nodiscard]] const geometry::Intrinsics& camera() const { return camera_; }
+  [[nodiscard]] const TrackShape& mount() const { return mount_; }
+  [[nodiscard]] const DetectorOptions& options() const { return options_; }
+
+ private:
+  [[nodiscard]] TrackObservation search(const cv::Mat& grey, bool dark) const;
+  [[nodiscard]] TrackObservation refine(const cv::Mat& grey, const TrackShape& start, bool dark,
+                                        double first_reach_m) const;
+  [[nodiscard]] RailFit fit(const std::vector<RailEdge>& edges, const TrackShape& start) const;
+  void judge(const std::vector<RailEdge>& edges, const std::array<int, 2>& tried, const RailFit& fit,
+             TrackObservation& observation) const;
+  void keep_one_rail(std::vector<RailEdge> edges, TrackObservation& observation) const;
+  void forget(TrackObservation& observation) const;
+  [[nodiscard]] bool within_limits(const TrackShape& shape) const;
+
+  geometry::Intrinsics camera_;
+  TrackShape mount_;
+  DetectorOptions options_;
+  SearchLimits search_limits_;
+  double near_m_ = 0;
+  std::unique_ptr<TopView> top_view_;
+  std::optional<TrackShape> previous_;
+  int misses_ = 0;     // pictures without rails in a row
+  bool dark_ = false;  // the previous picture's rails are darker than the ground
+};
+
+}  // namespace railfix::track_detector
