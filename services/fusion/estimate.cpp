@@ -1,0 +1,124 @@
+// From the filter to the state that is published: place on the map, interval, integrity.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/time.hpp"
+#include "fusion/estimator.hpp"
+
+namespace railfix::fusion {
+namespace {
+
+constexpr double kRecentS = 1.0;
+constexpr double kRecentPositionS = 30.0;
+constexpr double kNoMotionUnusableS = 5.0;
+
+// The sentences that people read on the dashboard.
+void add_reason(TrainEstimate& estimate, const std::string& what) {
+  estimate.integrity = std::max(estimate.integrity, Integrity::degraded);
+  if (!estimate.reason.empty()) estimate.reason += "; ";
+  estimate.reason += what;
+}
+
+}  // namespace
+
+Interval Estimator::interval() const {
+  const double centre_m = path_ ? filter_.path_distance_m() : filter_.value(StateIndex::distance);
+  const double sigma_m = path_ ? filter_.path_sigma_m() : filter_.sigma(StateIndex::distance);
+  const double bound_m = parameters_->interval_factor * sigma_m + parameters_->interval_floor_m +
+                         parameters_->interval_drift * since_reference_m() + doubt_m_;
+  return {centre_m - std::max(bound_m, doubt_behind_m_), centre_m + std::max(bound_m, doubt_ahead_m_)};
+}
+
+TrainEstimate Estimator::estimate(const Interval& promised, double since_sure_m) const {
+  TrainEstimate e;
+  e.stamp_ns = filter_.stamp_ns();
+  e.distance_m = filter_.value(StateIndex::distance);
+  e.speed_mps = filter_.speed_mps();
+  e.acceleration_mps2 = filter_.value(StateIndex::acceleration);
+  e.visual_scale = filter_.scale(Odometer::camera);
+  e.wheel_scale = filter_.scale(Odometer::wheel);
+  e.since_reference_m = since_reference_m();
+  e.reference = reference_;
+  e.standstill = standstill_;
+  e.track_known = path_ != nullptr;
+  e.sigma_m = path_ ? filter_.path_sigma_m() : filter_.sigma(StateIndex::distance);
+  const double centre_m = path_ ? filter_.path_distance_m() : e.distance_m;
+  e.over_m = centre_m - promised.behind_m;
+  e.under_m = promised.ahead_m - centre_m;
+  locate(e);
+  judge(e, since_sure_m);
+  return e;
+}
+
+void Estimator::locate(TrainEstimate& e) const {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  e.lat_deg = e.lon_deg = e.easting_m = e.northing_m = e.heading_rad = nan;
+  if (!path_) return;
+  e.path_distance_m = std::clamp(filter_.path_distance_m(), path_->begin_m(), path_->end_m());
+  e.position = path_->position_at(e.path_distance_m);
+  const auto pose = path_->at(e.path_distance_m).pose;
+  e.easting_m = pose.easting_m;
+  e.northing_m = pose.northing_m;
+  e.heading_rad = pose.heading_rad;
+  if (const auto geo = path_->map().to_geo(pose.easting_m, pose.northing_m)) {
+    e.lat_deg = geo->lat_deg;
+    e.lon_deg = geo->lon_deg;
+  }
+}
+
+bool Estimator::silent(Source source) const {
+  const auto& w = watch(source);
+  return w.seen_ns != 0 && core::seconds(filter_.stamp_ns() - w.seen_ns) > parameters_->sensor_timeout_s;
+}
+
+void Estimator::judge(TrainEstimate& e, double since_sure_m) const {
+  e.integrity = Integrity::ok;
+  const auto ago_s = [&](Source source) {
+    const auto used_ns = watch(source).used_ns;
+    return core::seconds(filter_.stamp_ns() - (used_ns == 0 ? start_ns_ : used_ns));
+  };
+  for (int i = 0; i < kSources; ++i) {
+    const auto source = static_cast<Source>(i);
+    const bool motion = source == Source::camera || source == Source::wheel || source == Source::imu;
+    if (watch(source).used_ns != 0 && ago_s(source) < (motion ? kRecentS : kRecentPositionS)) e.sources |= 1U << i;
+  }
+
+  const auto& camera = watch(Source::camera);
+  if (silent(Source::camera)) {
+    add_reason(e, "no camera");
+  } else if (camera.isolated) {
+    add_reason(e, "camera motion contradicts the other sensors");
+  } else if (camera.seen_ns != 0 && ago_s(Source::camera) > parameters_->sensor_timeout_s) {
+    add_reason(e, "camera blind");
+  }
+  if (silent(Source::wheel)) {
+    add_reason(e, "no wheel pulses");
+  } else if (watch(Source::wheel).isolated) {
+    add_reason(e, "wheel slips or slides");
+  }
+  if (silent(Source::imu)) {
+    add_reason(e, "no IMU");
+  } else if (watch(Source::imu).isolated) {
+    add_reason(e, "IMU contradicts the other sensors");
+  }
+  if (watch(Source::gnss).isolated) add_reason(e, "GNSS contradicts the position");
+  if (refused_fix_) add_reason(e, "a position fix was refused");
+  if (corrected_) add_reason(e, "position was corrected by two fixes against the filter");
+  if (off_path_fixes_ > 0) add_reason(e, "a position fix lies on another track");
+  if (!path_) add_reason(e, "place on the map not known");
+  if (path_ && (filter_.path_distance_m() < path_->begin_m() || filter_.path_distance_m() > path_->end_m())) {
+    add_reason(e, "beyond the end of the mapped track");
+  }
+
+  const double budget_m = parameters_->budget_m + parameters_->budget_per_m * since_sure_m;
+  const double bound_m = std::max(e.over_m, e.under_m);
+  if (bound_m > budget_m) add_reason(e, "interval wider than allowed");
+  const double no_motion_s = std::min(ago_s(Source::camera), ago_s(Source::wheel));
+  if (no_motion_s > parameters_->sensor_timeout_s) add_reason(e, "nothing measures the motion");
+  if (no_motion_s > kNoMotionUnusableS || bound_m > parameters_->unusable_budgets * budget_m) {
+    e.integrity = Integrity::unusable;
+  }
+}
+
+}  // namespace railfix::fusion

@@ -1,0 +1,135 @@
+// One moment of fusion: the motion filter, what is known of each sensor's health, and the state that follows from both.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "fusion/fusion_parameters.hpp"
+#include "fusion/fusion_types.hpp"
+#include "fusion/motion_filter.hpp"
+#include "fusion/slip_watch.hpp"
+#include "track/path.hpp"
+
+namespace railfix::fusion {
+
+/// What became of one sensor's measurements lately.
+struct SensorWatch {
+  int64_t seen_ns = 0;  // 0 = never
+  int64_t used_ns = 0;
+  int refused = 0;  // in a row
+  bool isolated = false;
+
+  void accept(int64_t stamp_ns) {
+    used_ns = stamp_ns;
+    refused = 0;
+    isolated = false;
+  }
+};
+
+/// Where the train is for certain: the two ends on the path (on the distance run when the place is not known).
+struct Interval {
+  double behind_m = 0;
+  double ahead_m = 0;
+};
+
+/// A plain value; events are applied in the order of their stamps (Fusion sees to that).
+class Estimator {
+ public:
+  /// path: the way of the train with distance 0 at the start; nullptr when the place is not known.
+  Estimator(const FusionParameters* parameters, std::shared_ptr<const track::Path> path, int64_t stamp_ns);
+
+  void apply(const Event& event);
+  /// Moves on without a measurement.
+  void predict_to(int64_t stamp_ns);
+  void rebase_clock(int64_t stamp_ns);
+  [[nodiscard]] Interval interval() const;
+  /// The state with this promised interval; since_sure_m: way since the last place that is beyond doubt.
+  /// REQUIRES: predict_to(stamp_ns()) was the last call (as for interval()).
+  [[nodiscard]] TrainEstimate estimate(const Interval& promised, double since_sure_m) const;
+  [[nodiscard]] double since_reference_m() const { return std::abs(filter_.since_reference_m()); }
+  /// What became of the last event, when it was a fix.
+  [[nodiscard]] bool fix_used() const { return fix_verdict_ == FixVerdict::used; }
+  [[nodiscard]] bool fix_refused() const { return fix_verdict_ == FixVerdict::refused; }
+
+  /// When the last event showed that the wheel slips: what it said since a little before is best taken back.
+  [[nodiscard]] bool slip_began() const { return slip_began_; }
+  /// Wheel samples up to this stamp are not to be used.
+  void block_wheel_until(int64_t stamp_ns) { wheel_.blocked_until_ns = stamp_ns; }
+
+  /// Of the last event. The filter itself may be a little behind, because samples wait for their mean.
+  [[nodiscard]] int64_t stamp_ns() const { return stamp_ns_; }
+  [[nodiscard]] const MotionFilter& filter() const { return filter_; }
+  [[nodiscard]] const SensorWatch& watch(Source source) const { return watches_[static_cast<size_t>(source)]; }
+  [[nodiscard]] bool knows_picture(int64_t stamp_ns) const { return filter_.has_clone(stamp_ns); }
+  [[nodiscard]] const std::shared_ptr<const track::Path>& path() const { return path_; }
+
+ private:
+  /// Samples until they are used as their mean.
+  struct Mean {
+    int64_t since_ns = 0;
+    int64_t last_ns = 0;
+    double sum = 0;
+    int count = 0;
+    std::optional<double> add(int64_t stamp_ns, double value, double period_s);
+  };
+  /// The wheel's odometer and its recovery from slip.
+  struct Wheel {
+    std::optional<int64_t> first_pulses;
+    double resolution_m = 0;
+    int64_t blocked_until_ns = 0;
+    int64_t window_begin_ns = 0;
+    int good_windows = 0;
+  };
+  enum class FixVerdict : uint8_t { none, used, refused };
+  struct RefusedFix {
+    double residual_m = 0;
+    double sigma_m = 0;
+    double distance_m = 0;
+  };
+
+  void use(const OdometryInput& step);
+  void use(const WheelInput& sample);
+  void use(const ImuInput& sample);
+  void use(const GnssInput& sample);
+  void use(const FixInput& fix);
+  void use(const PictureInput& picture);
+  void compare_with_wheel(const OdometryInput& step, double sigma_m);
+  void isolate_wheel();
+  void recover_wheel(const WheelInput& sample, double wheel_m, double sigma_m);
+  void use_yaw_rate(double rate_rps);
+  void refuse(const FixInput& fix, double path_distance_m, const Offer& offer);
+  void accept(const FixInput& fix);
+  void watch_standstill();
+  SensorWatch& watch(Source source) { return watches_[static_cast<size_t>(source)]; }
+  [[nodiscard]] bool silent(Source source) const;
+  void judge(TrainEstimate& estimate, double since_sure_m) const;
+  void locate(TrainEstimate& estimate) const;
+
+  const FusionParameters* parameters_;
+  std::shared_ptr<const track::Path> path_;
+  MotionFilter filter_;
+  int64_t stamp_ns_;
+  std::array<SensorWatch, kSources> watches_;
+  Mean accel_;
+  Mean yaw_;
+  Wheel wheel_;
+  SlipWatch slip_watch_;
+  bool slip_began_ = false;
+  FixVerdict fix_verdict_ = FixVerdict::none;
+  std::optional<RefusedFix> refused_fix_;
+  bool corrected_ = false;  // the place was moved against the filter's word, not confirmed yet
+  uint32_t reference_ = 0;
+  uint32_t off_path_fixes_ = 0;  // since the last fix that was used
+  double doubt_m_ = 0;           // camera and the rest contradict each other by so much since the reference
+  double doubt_behind_m_ = 0;    // a refused fix says that the train is so far behind
+  double doubt_ahead_m_ = 0;
+  double rest_distance_m_ = 0;
+  int64_t rest_since_ns_ = 0;
+  bool standstill_ = false;
+  int64_t start_ns_ = 0;
+};
+
+}  // namespace railfix::fusion

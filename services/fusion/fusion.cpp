@@ -1,0 +1,205 @@
+#include "fusion/fusion.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <initializer_list>
+#include <tuple>
+
+#include "core/time.hpp"
+
+namespace railfix::fusion {
+namespace {
+
+constexpr double kPathAheadM = 300000;
+constexpr double kPathBehindM = 50000;
+constexpr double kNetworkProbability = 0.95;
+constexpr double kNoCameraS = 0.3;
+constexpr int64_t kSnapshotNs = 50'000'000;
+constexpr int64_t kSlipUnseenNs = 1'200'000'000;  // a slip may have grown for so long before it is found
+constexpr int kJumpsToBelieve = 3;
+constexpr uint64_t kLateToReset = 100;
+
+int64_t stamp_of(const Event& event) {
+  return std::visit([](const auto& input) { return input.stamp_ns; }, event);
+}
+
+bool finite(std::initializer_list<double> numbers) {
+  return std::all_of(numbers.begin(), numbers.end(), [](double number) { return std::isfinite(number); });
+}
+bool has_sense(const ImuInput& e) {
+  return finite({e.accel_x_mps2, e.rate_z_rps});
+}
+bool has_sense(const WheelInput& e) {
+  return finite({e.pulses_per_metre}) && e.pulses_per_metre > 0;
+}
+bool has_sense(const PictureInput&) {
+  return true;
+}
+bool has_sense(const OdometryInput& e) {
+  return finite({e.step_m, e.step_sigma_m}) && (!e.valid || e.reference_stamp_ns < e.stamp_ns);
+}
+bool has_sense(const GnssInput& e) {
+  return finite({e.easting_m, e.northing_m, e.hdop});
+}
+bool has_sense(const FixInput& e) {
+  return finite({e.offset_m, e.sigma_m, e.probability});
+}
+
+// Two fixes may have one stamp; everything else has one measurement for each stamp.
+std::tuple<int64_t, size_t, int, uint32_t> order_of(const Event& event) {
+  const auto* fix = std::get_if<FixInput>(&event);
+  return {stamp_of(event), event.index(), fix ? static_cast<int>(fix->kind) : 0, fix ? fix->landmark : 0};
+}
+
+}  // namespace
+
+core::Result<Fusion> Fusion::create(const FusionParameters& parameters, std::shared_ptr<const track::Map> map,
+                                    const std::optional<track::EdgePosition>& start) {
+  if (!start || !map) return Fusion(parameters, std::move(map), nullptr);
+  auto path = track::Path::follow(map, *start, kPathAheadM, kPathBehindM);
+  if (!path.ok()) return path.error();
+  return Fusion(parameters, std::move(map), std::make_shared<const track::Path>(std::move(path).value()));
+}
+
+Fusion::Fusion(const FusionParameters& parameters, std::shared_ptr<const track::Map> map,
+               std::shared_ptr<const track::Path> path)
+    : parameters_(std::make_shared<const FusionParameters>(parameters)), map_(std::move(map)), path_(std::move(path)) {}
+
+std::optional<TrainEstimate> Fusion::add(Event event) {
+  if (!std::visit([](const auto& input) { return has_sense(input); }, event)) {
+    ++counts_.nonsense;
+    return std::nullopt;
+  }
+  const auto* step = std::get_if<OdometryInput>(&event);
+  if (!now_) {
+    // The first step counts from a picture before it: begin there.
+    const bool from_reference = step && step->reference_stamp_ns < step->stamp_ns &&
+                                core::seconds(step->stamp_ns - step->reference_stamp_ns) < parameters_->max_jump_s;
+    now_.emplace(parameters_.get(), path_, (from_reference ? step->reference_stamp_ns : stamp_of(event)) - 1);
+    snapshots_.push_back(*now_);
+  }
+  if (!believable(event)) return std::nullopt;
+  if (auto* fix = std::get_if<FixInput>(&event)) start_position(*fix);
+  if (step) remember_reference(*step);
+  return insert(event);
+}
+
+std::optional<TrainEstimate> Fusion::tick(int64_t now_ns) {
+  if (!now_ || core::seconds(now_ns - last_output_ns_) < parameters_->output_period_s) return std::nullopt;
+  if (now_ns <= now_->stamp_ns()) return std::nullopt;
+  Hypotheses ahead = *now_;
+  ahead.predict_to(now_ns);
+  return give(ahead.estimate());
+}
+
+std::optional<int64_t> Fusion::latest_stamp_ns() const {
+  if (!now_) return std::nullopt;
+  return now_->stamp_ns();
+}
+
+// A single wild stamp must not carry the train away; a clock that was really set is followed.
+bool Fusion::believable(const Event& event) {
+  const int64_t stamp_ns = stamp_of(event);
+  auto& ahead_in_row = ahead_in_row_[event.index()];
+  if (core::seconds(stamp_ns - now_->stamp_ns()) > parameters_->max_jump_s && ++ahead_in_row < kJumpsToBelieve) {
+    ++counts_.jumped;
+    return false;
+  }
+  ahead_in_row = 0;
+  if (stamp_ns > snapshots_.front().stamp_ns()) {
+    late_in_row_ = 0;
+    return true;
+  }
+  ++counts_.too_late;
+  if (++late_in_row_ < kLateToReset) return false;
+  late_in_row_ = 0;
+  ++counts_.clock_resets;
+  now_->rebase_clock(stamp_ns - 1);
+  events_.clear();
+  snapshots_.assign(1, *now_);
+  last_output_ns_ = 0;
+  return true;
+}
+
+void Fusion::start_position(FixInput& fix) const {
+  if (now_->main().path() || !map_ || fix.kind != FixKind::network || fix.probability < kNetworkProbability) return;
+  auto path = track::Path::follow(map_, {fix.edge, fix.offset_m, fix.direction}, kPathAheadM, kPathBehindM);
+  if (path.ok()) fix.new_path = std::make_shared<const track::Path>(std::move(path).value());
+}
+
+void Fusion::remember_reference(const OdometryInput& step) {
+  if (!step.valid || now_->main().knows_picture(step.reference_stamp_ns)) return;
+  if (step.reference_stamp_ns > snapshots_.front().stamp_ns()) insert(PictureInput{step.reference_stamp_ns});
+}
+
+std::optional<TrainEstimate> Fusion::insert(const Event& event) {
+  const auto place = std::lower_bound(events_.begin(), events_.end(), event,
+                                      [](const Event& a, const Event& b) { return order_of(a) < order_of(b); });
+  if (place != events_.end() && order_of(*place) == order_of(event)) {
+    ++counts_.repeated;
+    return std::nullopt;
+  }
+  if (!std::holds_alternative<PictureInput>(event)) ++counts_.used;
+  if (const auto* step = std::get_if<OdometryInput>(&event))
+    last_odometry_ns_ = std::max(last_odometry_ns_, step->stamp_ns);
+  const bool wanted = due(event);
+  std::optional<TrainEstimate> estimate;
+  // Before the insertion, which may move the deque's begin.
+  const auto mine = place - events_.begin();
+  events_.insert(place, event);
+  auto next = mine;
+  if (mine + 1 < static_cast<std::ptrdiff_t>(events_.size())) next = rewind_before(stamp_of(event));
+  while (next < static_cast<std::ptrdiff_t>(events_.size())) {
+    run(events_[static_cast<size_t>(next)]);
+    if (wanted && next == mine) estimate = now_->estimate();
+    ++next;
+    if (now_->main().slip_began()) {
+      const int64_t found_ns = now_->stamp_ns();
+      next = rewind_before(found_ns - kSlipUnseenNs);
+      now_->block_wheel_until(found_ns);
+      snapshots_.back() = *now_;
+    }
+  }
+  forget_old();
+  return estimate ? give(*std::move(estimate)) : std::nullopt;
+}
+
+void Fusion::run(const Event& event) {
+  now_->apply(event);
+  if (snapshots_.back().stamp_ns() == now_->stamp_ns()) {
+    snapshots_.back() = *now_;
+  } else if (now_->stamp_ns() - snapshots_.back().stamp_ns() >= kSnapshotNs) {
+    snapshots_.push_back(*now_);
+  }
+}
+
+// Gives the index of the first event that is to be used again.
+std::ptrdiff_t Fusion::rewind_before(int64_t stamp_ns) {
+  while (snapshots_.size() > 1 && snapshots_.back().stamp_ns() >= stamp_ns) snapshots_.pop_back();
+  now_ = snapshots_.back();
+  const auto again = std::find_if(events_.begin(), events_.end(),
+                                  [&](const Event& event) { return stamp_of(event) > now_->stamp_ns(); });
+  return again - events_.begin();
+}
+
+void Fusion::forget_old() {
+  const int64_t oldest_ns = now_->stamp_ns() - core::to_ns(parameters_->history_s);
+  while (snapshots_.size() > 1 && snapshots_[1].stamp_ns() <= oldest_ns) snapshots_.pop_front();
+  while (!events_.empty() && stamp_of(events_.front()) <= snapshots_.front().stamp_ns()) events_.pop_front();
+}
+
+bool Fusion::due(const Event& event) const {
+  if (std::holds_alternative<OdometryInput>(event)) return true;
+  if (std::holds_alternative<PictureInput>(event)) return false;
+  const int64_t stamp_ns = stamp_of(event);
+  const bool camera = last_odometry_ns_ != 0 && core::seconds(stamp_ns - last_odometry_ns_) < kNoCameraS;
+  return !camera && core::seconds(stamp_ns - last_output_ns_) >= parameters_->output_period_s;
+}
+
+std::optional<TrainEstimate> Fusion::give(TrainEstimate estimate) {
+  if (estimate.stamp_ns <= last_output_ns_) return std::nullopt;
+  last_output_ns_ = estimate.stamp_ns;
+  return estimate;
+}
+
+}  // namespace railfix::fusion

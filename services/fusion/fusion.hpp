@@ -1,0 +1,73 @@
+// The fusion of all sensors: takes measurements in any order, uses each at its own time, and gives the train's state.
+//
+// The state after a set of measurements does not depend on the order in which they came: late ones are put where they
+// belong and everything behind them is replayed from a snapshot.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+
+#include "fusion/fusion_parameters.hpp"
+#include "fusion/fusion_types.hpp"
+#include "fusion/hypotheses.hpp"
+#include "track/path.hpp"
+
+namespace railfix::fusion {
+
+/// What was not used, since the start.
+struct FusionCounts {
+  uint64_t used = 0;
+  uint64_t too_late = 0;  // older than the history
+  uint64_t repeated = 0;  // the same sensor and stamp again
+  uint64_t jumped = 0;    // stamp too far ahead to be believed
+  uint64_t nonsense = 0;  // not a number, counts from the future, no pulses per metre
+  uint64_t clock_resets = 0;
+};
+
+class Fusion {
+ public:
+  /// map may be nullptr; start: nothing = unknown, then a network fix starts the position. Fails when there is no such
+  /// place.
+  static core::Result<Fusion> create(const FusionParameters& parameters, std::shared_ptr<const track::Map> map,
+                                     const std::optional<track::EdgePosition>& start);
+
+  /// Uses a measurement. Gives a state for every odometry step, and every output_period_s from the other sensors while
+  /// there is no camera. Stamps of the states only grow.
+  std::optional<TrainEstimate> add(Event event);
+  /// Nothing came until now_ns: gives a state with what is left when the last one is older than output_period_s.
+  std::optional<TrainEstimate> tick(int64_t now_ns);
+  /// Stamp of the newest measurement; nothing before the first.
+  [[nodiscard]] std::optional<int64_t> latest_stamp_ns() const;
+  [[nodiscard]] const Estimator* estimator() const { return now_ ? &now_->main() : nullptr; }
+  [[nodiscard]] const FusionCounts& counts() const { return counts_; }
+
+ private:
+  Fusion(const FusionParameters& parameters, std::shared_ptr<const track::Map> map,
+         std::shared_ptr<const track::Path> path);
+  [[nodiscard]] bool believable(const Event& event);
+  void start_position(FixInput& fix) const;
+  void remember_reference(const OdometryInput& step);
+  std::optional<TrainEstimate> insert(const Event& event);
+  void run(const Event& event);
+  std::ptrdiff_t rewind_before(int64_t stamp_ns);
+  void forget_old();
+  [[nodiscard]] bool due(const Event& event) const;
+  std::optional<TrainEstimate> give(TrainEstimate estimate);
+
+  std::shared_ptr<const FusionParameters> parameters_;
+  std::shared_ptr<const track::Map> map_;
+  std::shared_ptr<const track::Path> path_;
+  std::optional<Hypotheses> now_;
+  std::deque<Event> events_;          // by stamp, then kind
+  std::deque<Hypotheses> snapshots_;  // each has used all events up to its stamp
+  FusionCounts counts_;
+  int64_t last_output_ns_ = 0;
+  int64_t last_odometry_ns_ = 0;
+  uint64_t late_in_row_ = 0;
+  std::array<int, std::variant_size_v<Event>> ahead_in_row_{};
+};
+
+}  // namespace railfix::fusion

@@ -1,0 +1,67 @@
+// What fusion assumes of the train and its sensors. Defaults fit an electric passenger train; every one is a
+// configuration key.
+#pragma once
+
+#include <cstdint>
+
+namespace railfix::fusion {
+
+struct FusionParameters {
+  // The train.
+  double start_sigma_m = 1.0;            // of the configured start
+  double acceleration_sigma_mps2 = 0.4;  // usual size of its acceleration ...
+  double acceleration_time_s = 8.0;      // ... and how long one value lasts
+
+  // Camera and wheel: true over measured metres, changing slowly along the way.
+  double visual_scale_sigma = 0.01;
+  double visual_scale_length_m = 60000;
+  double step_sigma_floor_m = 0.001;
+  double wheel_scale_sigma = 0.01;
+  double wheel_scale_length_m = 60000;
+
+  // IMU: noise of the mean over imu_period_s, bias with the mount's pitch in it.
+  double imu_period_s = 0.05;
+  double accel_sigma_mps2 = 0.15;
+  double accel_bias_sigma_mps2 = 0.15;
+  double accel_bias_walk = 0.003;  // m/s^2 per square root of a second
+  double unknown_grade = 0.03;     // grade that must be expected where there is no map
+
+  double gyro_period_s = 1.0;     // of yaw rate against the map's curvature
+  double gyro_sigma_rps = 0.004;  // of its mean, with the car body's own turning
+
+  // GNSS: position noise per unit of HDOP or of the RTK solution; errors last, so that a fix says little new.
+  double gnss_single_sigma_m = 3.0;
+  double gnss_rtk_fixed_sigma_m = 0.05;
+  double gnss_rtk_float_sigma_m = 0.5;
+  double gnss_map_sigma_m = 0.3;  // antenna's lever arm and map
+  double gnss_error_time_s = 60.0;
+  double gnss_antenna_ahead_m = 0.0;  // of the camera's foot
+
+  // Fixes.
+  double fix_min_probability = 0.9;
+  double fix_sigma_floor_m = 0.05;
+
+  // Tests on innovations, in standard deviations.
+  double gate_camera = 5.0;
+  double gate_wheel = 5.0;
+  double gate_imu = 5.0;
+  double gate_gyro = 3.0;
+  double gate_gnss = 4.0;
+  double gate_fix = 4.0;
+
+  // The interval that is promised: factor * sigma + floor + drift * distance since the reference.
+  double interval_factor = 4.0;
+  double interval_floor_m = 0.5;
+  double interval_drift = 0.003;
+  // What is still good: SUBSET-041.
+  double budget_m = 5.0;
+  double budget_per_m = 0.05;
+  double unusable_budgets = 4.0;  // an interval of so many budgets is no position
+
+  double sensor_timeout_s = 0.5;  // a sensor that was there and is silent for longer is reported
+  double output_period_s = 0.1;   // of states without a camera
+  double history_s = 3.0;         // a measurement older than this is too late
+  double max_jump_s = 2.0;        // a stamp further ahead is not believed at once
+};
+
+}  // namespace railfix::fusion

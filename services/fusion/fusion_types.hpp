@@ -1,0 +1,97 @@
+// What goes into fusion and what comes out of it, without DDS. Stamps are Unix nanoseconds of the measurement, not of
+// its arrival.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <variant>
+
+#include "track/path.hpp"
+
+namespace railfix::fusion {
+
+/// Motion of the camera's foot since the reference picture.
+struct OdometryInput {
+  int64_t stamp_ns = 0;
+  int64_t reference_stamp_ns = 0;
+  double step_m = 0;
+  double step_sigma_m = 0;
+  bool valid = false;  // false: blind, the step means nothing
+};
+
+struct WheelInput {
+  int64_t stamp_ns = 0;
+  int64_t pulses = 0;  // cumulative, signed
+  double pulses_per_metre = 0;
+};
+
+struct ImuInput {
+  int64_t stamp_ns = 0;
+  double accel_x_mps2 = 0;  // specific force along the body's forward axis
+  double rate_z_rps = 0;
+};
+
+struct GnssInput {
+  int64_t stamp_ns = 0;
+  double easting_m = 0;  // in the map's coordinates
+  double northing_m = 0;
+  double hdop = 0;
+  int fix = 0;  // 0 none, 1 single, 4 RTK fixed, 5 RTK float
+};
+
+enum class FixKind : uint8_t { curvature = 1, landmark = 2, network = 3 };
+
+/// A place on the map, of the camera's foot at the stamp.
+struct FixInput {
+  int64_t stamp_ns = 0;
+  uint32_t edge = 0;
+  double offset_m = 0;
+  double sigma_m = 0;
+  double probability = 0;
+  uint32_t landmark = 0;
+  FixKind kind = FixKind::landmark;
+  track::Direction direction = track::Direction::unknown;
+  std::shared_ptr<const track::Path> new_path;  // set by Fusion when the fix starts the position on the map
+};
+
+/// The next picture will be measured against the one of this stamp: remember where the train was.
+struct PictureInput {
+  int64_t stamp_ns = 0;
+};
+
+/// In the order in which events of the same stamp are used.
+using Event = std::variant<ImuInput, WheelInput, PictureInput, OdometryInput, GnssInput, FixInput>;
+
+enum class Source : uint8_t { camera, wheel, imu, gnss, landmark, curvature };
+constexpr int kSources = 6;
+enum class Integrity : uint8_t { ok, degraded, unusable };
+
+/// State of the train at one stamp; fields as in msg::TrainState.
+struct TrainEstimate {
+  int64_t stamp_ns = 0;
+  bool track_known = false;
+  track::EdgePosition position;
+  double path_distance_m = 0;  // on fusion's path; 0 without one
+  double distance_m = 0;
+  double speed_mps = 0;
+  double acceleration_mps2 = 0;
+  double over_m = 0;   // the true position may lie this far behind
+  double under_m = 0;  // ... and this far in front
+  double sigma_m = 0;
+  double visual_scale = 1;
+  double wheel_scale = 1;
+  double since_reference_m = 0;
+  double lat_deg = 0;
+  double lon_deg = 0;
+  double easting_m = 0;
+  double northing_m = 0;
+  double heading_rad = 0;
+  uint32_t reference = 0;
+  uint32_t sources = 0;  // bit 1 << Source
+  Integrity integrity = Integrity::unusable;
+  bool standstill = false;
+  std::string reason;  // why it is not ok, one sentence
+};
+
+}  // namespace railfix::fusion

@@ -1,0 +1,256 @@
+#include "fusion/motion_filter.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/time.hpp"
+
+namespace railfix::fusion {
+
+using estimation::StateMatrix;
+using estimation::StateVector;
+
+namespace {
+
+constexpr int kCore = static_cast<int>(StateIndex::count);
+constexpr int kRecentClones = 2;  // pictures before this one that the next step may still refer to
+constexpr double kUnknownPositionM = 1e5;
+constexpr double kUnknownSpeedMps = 60.0;
+constexpr double kLongestStepS = 0.1;
+constexpr double kWheelCreep = 1e-3;  // random part of the wheel's slip, metres per square root of a metre
+
+double squared(double value) {
+  return value * value;
+}
+
+}  // namespace
+
+MotionFilter::MotionFilter(const FusionParameters& parameters, int64_t stamp_ns, bool origin_known)
+    : stamp_ns_(stamp_ns), x_(StateVector::Zero(kCore)) {
+  StateVector sigma(kCore);
+  sigma << 0.0, 0.0, origin_known ? parameters.start_sigma_m : kUnknownPositionM, kUnknownSpeedMps,
+      parameters.acceleration_sigma_mps2,
+      std::hypot(parameters.accel_bias_sigma_mps2, origin_known ? 0.0 : 9.81 * parameters.unknown_grade),
+      parameters.visual_scale_sigma, parameters.wheel_scale_sigma, kUnknownPositionM, 0.01;
+  ud_ = estimation::UdFilter(StateVector(sigma.cwiseAbs2()));
+}
+
+void MotionFilter::choose_unit(Odometer odometer, const FusionParameters& parameters) {
+  unit_ = odometer;
+  const bool camera = odometer == Odometer::camera;
+  const int unit = index(StateIndex::unit_scale);
+  const int other = index(StateIndex::other_scale);
+  ud_.reset(unit, squared(camera ? parameters.visual_scale_sigma : parameters.wheel_scale_sigma));
+  ud_.reset(other, squared(camera ? parameters.wheel_scale_sigma : parameters.visual_scale_sigma));
+  // Both are known on their own: against the unit the other one is its own error less the unit's.
+  const auto n = x_.size();
+  StateMatrix phi = StateMatrix::Identity(n, n);
+  phi(other, unit) = -1;
+  ud_.propagate(phi, StateMatrix::Zero(n, 1), StateVector::Zero(1));
+}
+
+void MotionFilter::predict_to(int64_t stamp_ns, const FusionParameters& parameters) {
+  const double dt_s = core::seconds(stamp_ns - stamp_ns_);
+  if (dt_s > 0) {
+    const int steps = std::clamp(static_cast<int>(std::ceil(dt_s / kLongestStepS)), 1, 100);
+    for (int k = 0; k < steps; ++k) step(dt_s / steps, parameters);
+  }
+  stamp_ns_ = std::max(stamp_ns, stamp_ns_);
+}
+
+void MotionFilter::step(double dt_s, const FusionParameters& p) {
+  const int n = static_cast<int>(x_.size());
+  const int odometer = index(StateIndex::odometer);
+  const int distance = index(StateIndex::distance);
+  const int speed = index(StateIndex::speed);
+  const int acceleration = index(StateIndex::acceleration);
+  const int wheel = index(StateIndex::wheel_odometer);
+  const int unit_scale = index(StateIndex::unit_scale);
+  const int other_scale = index(StateIndex::other_scale);
+  const double tau = p.acceleration_time_s;
+  const double keep = std::exp(-dt_s / tau);
+  const double speed_per_accel = tau * (1 - keep);
+  const double way_per_accel = tau * (dt_s - speed_per_accel);
+  const double way_m = x_(speed) * dt_s + x_(acceleration) * way_per_accel;  // in unit metres
+  const double k = 1 + x_(unit_scale);
+  const double per_wheel = 1 / to_unit(Odometer::wheel);
+  const bool camera_unit = unit_ != Odometer::wheel;
+  const double visual_keep = std::exp(-std::abs(way_m) / p.visual_scale_length_m);
+  const double wheel_keep = std::exp(-std::abs(way_m) / p.wheel_scale_length_m);
+  const double unit_keep = camera_unit ? visual_keep : wheel_keep;
+  const double other_keep = camera_unit ? wheel_keep : visual_keep;
+  const double unit_sigma = camera_unit ? p.visual_scale_sigma : p.wheel_scale_sigma;
+  const double other_sigma = camera_unit ? p.wheel_scale_sigma : p.visual_scale_sigma;
+
+  StateMatrix phi = StateMatrix::Identity(n, n);
+  phi(odometer, speed) = dt_s;
+  phi(odometer, acceleration) = way_per_accel;
+  phi(distance, speed) = k * dt_s;
+  phi(distance, acceleration) = k * way_per_accel;
+  phi(distance, unit_scale) = way_m;
+  phi(speed, acceleration) = speed_per_accel;
+  phi(acceleration, acceleration) = keep;
+  phi(wheel, speed) = per_wheel * dt_s;
+  phi(wheel, acceleration) = per_wheel * way_per_accel;
+  if (camera_unit) phi(wheel, other_scale) = -way_m * squared(per_wheel);
+  phi(unit_scale, unit_scale) = unit_keep;
+  phi(other_scale, other_scale) = other_keep;
+
+  const int noisy[] = {acceleration, index(StateIndex::accel_bias), unit_scale, other_scale,
+                       wheel,        index(StateIndex::gyro_bias)};
+  StateVector q(6);
+  q << squared(p.acceleration_sigma_mps2) * (1 - squared(keep)), squared(p.accel_bias_walk) * dt_s,
+      squared(unit_sigma) * (1 - squared(unit_keep)), squared(other_sigma) * (1 - squared(other_keep)),
+      squared(kWheelCreep) * std::abs(way_m), 1e-10 * dt_s;
+  StateMatrix g = StateMatrix::Zero(n, 6);
+  for (int i = 0; i < 6; ++i) g(noisy[i], i) = 1;
+  ud_.propagate(phi, g, q);
+
+  x_(odometer) += way_m;
+  x_(distance) += k * way_m;
+  x_(wheel) += way_m * per_wheel;
+  x_(speed) += x_(acceleration) * speed_per_accel;
+  x_(acceleration) *= keep;
+  x_(unit_scale) *= unit_keep;
+  x_(other_scale) *= other_keep;
+}
+
+void MotionFilter::rebase_clock(int64_t stamp_ns) {
+  while (!clones_.empty()) remove_clone(0);
+  stamp_ns_ = stamp_ns;
+}
+
+void MotionFilter::clone_now(int64_t keep_ns) {
+  int newer = 0;
+  for (int i = 0; i < static_cast<int>(clones_.size());) {
+    if (clones_[i] == keep_ns || newer++ < kRecentClones) {
+      ++i;
+    } else {
+      remove_clone(i);
+    }
+  }
+  if (has_clone(stamp_ns_)) return;
+  const int odometer = index(StateIndex::odometer);
+  StateVector x(x_.size() + 1);
+  x << x_(odometer), x_;
+  ud_.clone_to_front(odometer);
+  x_ = x;
+  clones_.insert(clones_.begin(), stamp_ns_);
+}
+
+Offer MotionFilter::offer_step(int64_t reference_stamp_ns, double step_m, double sigma_m, double gate) {
+  const auto clone = clone_index(reference_stamp_ns);
+  if (!clone) return {};
+  const double per_camera = 1 / to_unit(Odometer::camera);
+  const double way_m = value(StateIndex::odometer) - x_(*clone);
+  StateVector h = row();
+  h(index(StateIndex::odometer)) = per_camera;
+  h(*clone) = -per_camera;
+  if (unit_ == Odometer::wheel) h(index(StateIndex::other_scale)) = -way_m * squared(per_camera);
+  return offer(h, step_m - way_m * per_camera, sigma_m, gate);
+}
+
+Offer MotionFilter::offer_speed(double speed_mps, double sigma_mps, double gate) {
+  const double per_camera = 1 / to_unit(Odometer::camera);
+  StateVector h = row();
+  h(index(StateIndex::speed)) = per_camera;
+  if (unit_ == Odometer::wheel) {
+    h(index(StateIndex::other_scale)) = -value(StateIndex::speed) * squared(per_camera);
+  }
+  return offer(h, speed_mps - value(StateIndex::speed) * per_camera, sigma_mps, gate);
+}
+
+Offer MotionFilter::offer_wheel(double wheel_m, double sigma_m, double gate) {
+  StateVector h = row();
+  h(index(StateIndex::wheel_odometer)) = 1;
+  return offer(h, wheel_m - value(StateIndex::wheel_odometer), sigma_m, gate);
+}
+
+Offer MotionFilter::offer_acceleration(double accel_mps2, double sigma_mps2, double gate) {
+  StateVector h = row();
+  h(index(StateIndex::acceleration)) = 1;
+  h(index(StateIndex::accel_bias)) = 1;
+  return offer(h, accel_mps2 - value(StateIndex::acceleration) - value(StateIndex::accel_bias), sigma_mps2, gate);
+}
+
+Offer MotionFilter::offer_position(double path_distance_m, double sigma_m, double gate) {
+  StateVector h = row();
+  h(index(StateIndex::distance)) = 1;
+  h(index(StateIndex::origin)) = 1;
+  return offer(h, path_distance_m - this->path_distance_m(), sigma_m, gate);
+}
+
+Offer MotionFilter::offer_yaw_rate(double rate_rps, double curvature_per_m, double curvature_rate_per_m2,
+                                   double sigma_rps, double gate) {
+  const double speed_mps = this->speed_mps();
+  StateVector h = row();
+  h(index(StateIndex::distance)) = speed_mps * curvature_rate_per_m2;
+  h(index(StateIndex::origin)) = speed_mps * curvature_rate_per_m2;
+  h(index(StateIndex::gyro_bias)) = 1;
+  return offer(h, rate_rps - speed_mps * curvature_per_m - value(StateIndex::gyro_bias), sigma_rps, gate);
+}
+
+void MotionFilter::restart_wheel(double wheel_m, double sigma_m) {
+  x_(index(StateIndex::wheel_odometer)) = wheel_m;
+  ud_.reset(index(StateIndex::wheel_odometer), squared(sigma_m));
+}
+
+void MotionFilter::loosen_origin(double sigma_m) {
+  ud_.inflate(index(StateIndex::origin), squared(sigma_m));
+}
+
+void MotionFilter::set_origin(double path_distance_m, double sigma_m) {
+  x_(index(StateIndex::origin)) = path_distance_m - value(StateIndex::distance);
+  ud_.reset(index(StateIndex::origin), squared(sigma_m));
+}
+
+double MotionFilter::sigma(StateIndex state) const {
+  return std::sqrt(ud_.variance(index(state)));
+}
+
+double MotionFilter::path_sigma_m() const {
+  StateVector h = row();
+  h(index(StateIndex::distance)) = 1;
+  h(index(StateIndex::origin)) = 1;
+  return std::sqrt(ud_.variance(h));
+}
+
+double MotionFilter::to_unit(Odometer odometer) const {
+  return unit_ == Odometer::none || odometer == unit_ ? 1.0 : 1 + value(StateIndex::other_scale);
+}
+
+double MotionFilter::scale_sigma(Odometer odometer) const {
+  StateVector h = row();
+  h(index(StateIndex::unit_scale)) = 1;
+  if (odometer != unit_) h(index(StateIndex::other_scale)) = 1;
+  return std::sqrt(ud_.variance(h));
+}
+
+std::optional<int> MotionFilter::clone_index(int64_t stamp_ns) const {
+  const auto it = std::find(clones_.begin(), clones_.end(), stamp_ns);
+  if (it == clones_.end()) return std::nullopt;
+  return static_cast<int>(it - clones_.begin());
+}
+
+StateVector MotionFilter::row() const {
+  return StateVector::Zero(x_.size());
+}
+
+void MotionFilter::remove_clone(int index) {
+  const auto behind = x_.size() - index - 1;
+  StateVector x(x_.size() - 1);
+  x << x_.head(index), x_.tail(behind);
+  x_ = x;
+  ud_.marginalise(index);
+  clones_.erase(clones_.begin() + index);
+}
+
+Offer MotionFilter::offer(const StateVector& h, double residual, double sigma, double gate) {
+  const double r = squared(sigma);
+  const auto innovation = ud_.innovation(h, residual, r);
+  const bool inside = innovation.nis <= squared(gate);  // false for NaN too
+  if (inside) x_ += ud_.update(h, residual, r);
+  return {inside, residual, innovation.nis};
+}
+
+}  // namespace railfix::fusion

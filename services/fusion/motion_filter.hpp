@@ -1,0 +1,112 @@
+// Error-state filter of the train's motion along its path, in U-D factors (002, section 2.2 and eq. 5).
+//
+// The train's motion is kept in the metres of one odometer (the camera's or the wheel's, whichever measured first: the
+// unit), so that this sensor's measurements are linear and can never seem to show their own scale. States, behind the
+// clones: odometer [unit m], distance run [m], path distance of its origin [m], speed [unit m/s], acceleration,
+// accelerometer bias [m/s^2], scale of the unit - 1, the other odometer's scale against the unit - 1, wheel's own
+// odometer [m], gyro bias [rad/s]. Position on the path = distance + origin, so that distance runs on whether or not
+// the place on the map is known. A clone is the odometer at one picture; steps since that picture compare with it.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "estimation/ud_filter.hpp"
+#include "fusion/fusion_parameters.hpp"
+
+namespace railfix::fusion {
+
+enum class StateIndex : int {
+  odometer,
+  distance,
+  origin,
+  speed,
+  acceleration,
+  accel_bias,
+  unit_scale,
+  other_scale,
+  wheel_odometer,
+  gyro_bias,
+  count
+};
+
+enum class Odometer : uint8_t { none, camera, wheel };
+
+/// Result of offering one measurement.
+struct Offer {
+  bool used = false;
+  double residual = 0;
+  double nis = 0;
+};
+
+/// A plain value: copies of it are the snapshots from which late measurements are replayed.
+class MotionFilter {
+ public:
+  /// origin_known: the path's distance 0 is the start; otherwise the place on the map is not known yet.
+  MotionFilter(const FusionParameters& parameters, int64_t stamp_ns, bool origin_known);
+
+  /// Moves on to the stamp. REQUIRES: not before the current one.
+  void predict_to(int64_t stamp_ns, const FusionParameters& parameters);
+  /// Moves the clock alone, when it was set; clones lose their meaning and go.
+  void rebase_clock(int64_t stamp_ns);
+
+  /// The first odometer that measures; the others are compared with it from then on.
+  void choose_unit(Odometer odometer, const FusionParameters& parameters);
+  [[nodiscard]] Odometer unit() const { return unit_; }
+
+  /// Remembers the odometer at the current stamp; forgets clones of older pictures but `keep_ns`.
+  void clone_now(int64_t keep_ns);
+  [[nodiscard]] bool has_clone(int64_t stamp_ns) const { return clone_index(stamp_ns).has_value(); }
+  /// Makes the current place the reference: since_reference counts from here.
+  void mark_reference() { reference_m_ = value(StateIndex::distance); }
+
+  Offer offer_step(int64_t reference_stamp_ns, double step_m, double sigma_m, double gate);
+  /// A speed in camera metres.
+  Offer offer_speed(double speed_mps, double sigma_mps, double gate);
+  Offer offer_wheel(double wheel_m, double sigma_m, double gate);
+  Offer offer_acceleration(double accel_mps2, double sigma_mps2, double gate);
+  Offer offer_position(double path_distance_m, double sigma_m, double gate);
+  /// Turning against the map's curvature: where the curvature changes it says where the train is.
+  Offer offer_yaw_rate(double rate_rps, double curvature_per_m, double curvature_rate_per_m2, double sigma_rps,
+                       double gate);
+
+  /// The wheel's odometer begins anew at this reading (first sample, after slip).
+  void restart_wheel(double wheel_m, double sigma_m);
+  /// The place is not where it was thought: the origin becomes unknown within sigma and the next fix decides.
+  void loosen_origin(double sigma_m);
+  /// Path distance becomes `path_distance_m`, unknown within sigma, whatever it was.
+  void set_origin(double path_distance_m, double sigma_m);
+
+  [[nodiscard]] int64_t stamp_ns() const { return stamp_ns_; }
+  [[nodiscard]] double value(StateIndex state) const { return x_(index(state)); }
+  [[nodiscard]] double sigma(StateIndex state) const;
+  [[nodiscard]] double path_distance_m() const { return value(StateIndex::distance) + value(StateIndex::origin); }
+  [[nodiscard]] double path_sigma_m() const;
+  [[nodiscard]] double speed_mps() const { return unit_scale() * value(StateIndex::speed); }
+  /// True over measured metres of an odometer.
+  [[nodiscard]] double scale(Odometer odometer) const { return unit_scale() * to_unit(odometer); }
+  /// Unit metres over measured metres of an odometer.
+  [[nodiscard]] double to_unit(Odometer odometer) const;
+  [[nodiscard]] double scale_sigma(Odometer odometer) const;
+  /// Way since the reference.
+  [[nodiscard]] double since_reference_m() const { return value(StateIndex::distance) - reference_m_; }
+
+ private:
+  [[nodiscard]] int index(StateIndex state) const { return static_cast<int>(clones_.size()) + static_cast<int>(state); }
+  [[nodiscard]] std::optional<int> clone_index(int64_t stamp_ns) const;
+  [[nodiscard]] double unit_scale() const { return 1 + value(StateIndex::unit_scale); }
+  [[nodiscard]] estimation::StateVector row() const;
+  void step(double dt_s, const FusionParameters& parameters);
+  void remove_clone(int index);
+  Offer offer(const estimation::StateVector& h, double residual, double sigma, double gate);
+
+  int64_t stamp_ns_ = 0;
+  Odometer unit_ = Odometer::none;
+  double reference_m_ = 0;
+  std::vector<int64_t> clones_;  // their stamps in the order of the states: newest first
+  estimation::StateVector x_;
+  estimation::UdFilter ud_;
+};
+
+}  // namespace railfix::fusion

@@ -1,0 +1,62 @@
+// Place from the shape of the track: the measured curvature of the last few hundred metres against the map's (paper
+// 004, 8). Where a curve begins or ends the place is known; on a straight or within an arc it is not, and nothing is
+// said.
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "map_matcher/match_types.hpp"
+#include "track/path.hpp"
+
+namespace railfix::map_matcher {
+
+struct CurvatureParameters {
+  double bin_m = 4.0;           // measurements are averaged over this way
+  double window_m = 400;        // longest way that is matched
+  double noise_per_m = 2e-4;    // least sigma of one bin: car body, sleepers, map
+  double correlated_bins = 3;   // neighbouring bins err together
+  double scale_sigma = 0.01;    // of the odometer
+  double search_margin_m = 10;  // beyond the promised interval of train_state
+  double max_sigma_m = 8.0;     // of a fix that is worth sending
+  double sigma_floor_m = 0.7;   // map and the point that the curvature belongs to
+  double min_probability = 0.9;
+};
+
+class CurvatureMatcher {
+ public:
+  CurvatureMatcher(const CurvatureParameters& parameters, std::shared_ptr<const track::Path> path)
+      : parameters_(parameters), path_(std::move(path)) {}
+
+  /// Curvature (left positive) with its sigma, of the track at this odometer reading.
+  void add(double odometer_m, double curvature_per_m, double sigma_per_m);
+  /// The odometer lost the way (camera blind): what came before cannot be used any more.
+  void forget() { bins_.clear(); }
+  /// Best place now. A fix uses up its measurements, so that none is counted twice. Call it every few metres.
+  std::optional<Fix> match(int64_t stamp_ns, double odometer_m, const Prior& prior);
+
+ private:
+  struct Bin {
+    double odometer_m = 0;  // weighted mean of its samples
+    double curvature_per_m = 0;
+    double weight = 0;
+  };
+  struct Peak {
+    double offset_m = 0;  // of the place from the prior's
+    double sigma_m = 0;
+    double probability = 0;
+    bool at_edge = false;
+  };
+  [[nodiscard]] Peak search(double odometer_m, const Prior& prior) const;
+  class MapCurvature;
+  [[nodiscard]] double misfit(const MapCurvature& map, double place_m, double scale, double odometer_m) const;
+
+  CurvatureParameters parameters_;
+  std::shared_ptr<const track::Path> path_;
+  std::deque<Bin> bins_;
+  double waiting_sigma_m_ = 0;  // best sigma so far of a fix that may still become better, 0 = none
+};
+
+}  // namespace railfix::map_matcher

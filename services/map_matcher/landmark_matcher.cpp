@@ -1,0 +1,112 @@
+#include "map_matcher/landmark_matcher.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace railfix::map_matcher {
+namespace {
+
+constexpr double kDensityReachM = 200;  // of mapped landmarks, for the chance of a random hit
+constexpr int kWindowSteps = 40;
+constexpr double kClearSideM = 1.0;
+constexpr size_t kMostSightings = 12;
+
+double gauss(double error, double sigma) {
+  const double z = error / sigma;
+  return std::exp(-0.5 * z * z) / (sigma * std::sqrt(2 * std::numbers::pi));
+}
+
+bool other_side(const Sighting& sighting, const track::PathLandmark& landmark) {
+  return std::abs(sighting.lateral_m) > kClearSideM && std::abs(landmark.lateral_m) > kClearSideM &&
+         (sighting.lateral_m > 0) != (landmark.lateral_m > 0);
+}
+
+}  // namespace
+
+// Every mapped landmark of the kind in the window is one hypothesis, weighed by how well the earlier sightings fit it;
+// the last hypothesis is that this sighting is false, weighed by their mean fit over the window. The window itself only
+// selects.
+std::optional<Fix> LandmarkMatcher::add(const Sighting& sighting, const Prior& prior) {
+  const double place_m = prior.travelled_m + sighting.distance_ahead_m;
+  const double margin_m = parameters_.window_margin_m + 3 * sighting.sigma_m;
+  const double expected_m = prior.path_distance_m + sighting.distance_ahead_m;
+  const double from_m = expected_m - prior.over_m - margin_m;
+  const double to_m = expected_m + prior.under_m + margin_m;
+  std::erase_if(seen_, [&](const Seen& seen) { return std::abs(place_m - seen.place_m) > parameters_.history_m; });
+
+  const double confidence = std::clamp(sighting.confidence, 0.01, 0.999);
+  double mean_fit = 0;
+  for (int i = 0; i <= kWindowSteps; ++i) {
+    mean_fit += history_fits(from_m + (to_m - from_m) * i / kWindowSteps - place_m, place_m) / (kWindowSteps + 1);
+  }
+  double sum = mean_fit * (1 - confidence + parameters_.false_per_m * (to_m - from_m));
+  const track::PathLandmark* best = nullptr;
+  double best_weight = 0;
+  for (const auto* landmark : near(sighting.kind, from_m, to_m)) {
+    if (other_side(sighting, *landmark)) continue;
+    const double weight = confidence * parameters_.detection * history_fits(landmark->distance_m - place_m, place_m);
+    sum += weight;
+    if (weight > best_weight) {
+      best = landmark;
+      best_weight = weight;
+    }
+  }
+  seen_.push_back({sighting, place_m});
+  if (seen_.size() > kMostSightings) seen_.pop_front();
+  if (best == nullptr || !(best_weight >= parameters_.min_probability * sum)) return std::nullopt;
+  return Fix{sighting.stamp_ns, best->distance_m - sighting.distance_ahead_m,
+             std::hypot(sighting.sigma_m, best->landmark->sigma_m), best_weight / sum, best->landmark->id};
+}
+
+double LandmarkMatcher::history_fits(double shift_m, double now_m) const {
+  if (seen_.empty()) return 1;
+  double fit = 1;
+  for (const auto& seen : seen_) fit *= sighting_fits(seen, seen.place_m + shift_m, relative_sigma_m(seen, now_m));
+  // Landmarks between the sightings that nobody reported.
+  const auto [first, last] = std::minmax(seen_.front().place_m, now_m);
+  for (const auto& landmark : path_->landmarks()) {
+    const double place_m = landmark.distance_m - shift_m;
+    if (place_m < first + 1 || place_m > last - 0.5 || !sighted_before(landmark.kind)) continue;
+    const bool reported = std::any_of(seen_.begin(), seen_.end(), [&](const Seen& seen) {
+      return seen.sighting.kind == landmark.kind &&
+             std::abs(seen.place_m - place_m) < 3 * relative_sigma_m(seen, now_m);
+    });
+    if (!reported) fit *= 1 - parameters_.detection;
+  }
+  return fit;
+}
+
+double LandmarkMatcher::sighting_fits(const Seen& seen, double path_m, double relative_m) const {
+  const auto mapped = near(seen.sighting.kind, path_m - kDensityReachM, path_m + kDensityReachM);
+  const double mapped_per_m = static_cast<double>(mapped.size()) / (2 * kDensityReachM);
+  const double by_chance = parameters_.false_per_m + (1 - seen.sighting.confidence) * mapped_per_m;
+  double density = by_chance;
+  for (const auto* landmark : mapped) {
+    if (other_side(seen.sighting, *landmark)) continue;
+    density += parameters_.detection * seen.sighting.confidence * gauss(landmark->distance_m - path_m, relative_m);
+  }
+  return density / (by_chance + parameters_.detection * mapped_per_m);
+}
+
+std::vector<const track::PathLandmark*> LandmarkMatcher::near(track::LandmarkKind kind, double from_m,
+                                                              double to_m) const {
+  const auto& all = path_->landmarks();
+  auto it = std::lower_bound(all.begin(), all.end(), from_m,
+                             [](const track::PathLandmark& landmark, double m) { return landmark.distance_m < m; });
+  std::vector<const track::PathLandmark*> found;
+  for (; it != all.end() && it->distance_m <= to_m; ++it) {
+    if (it->kind == kind) found.push_back(&*it);
+  }
+  return found;
+}
+
+bool LandmarkMatcher::sighted_before(track::LandmarkKind kind) const {
+  return std::any_of(seen_.begin(), seen_.end(), [&](const Seen& seen) { return seen.sighting.kind == kind; });
+}
+
+double LandmarkMatcher::relative_sigma_m(const Seen& seen, double now_m) const {
+  return std::hypot(1.5 * seen.sighting.sigma_m, 0.1 + parameters_.scale_sigma * std::abs(now_m - seen.place_m));
+}
+
+}  // namespace railfix::map_matcher

@@ -1,0 +1,50 @@
+// Which mapped landmark was sighted? Sightings are judged together: the last ones must fit the map at the same time,
+// some of them may be false, and some landmarks may have been missed.
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "map_matcher/match_types.hpp"
+#include "track/path.hpp"
+
+namespace railfix::map_matcher {
+
+struct LandmarkParameters {
+  double detection = 0.8;        // chance that a mapped landmark is sighted
+  double false_per_m = 0.0005;   // false sightings of one kind per metre
+  double scale_sigma = 0.01;     // of the distance run between sightings
+  double window_margin_m = 2.0;  // beyond the promised interval of train_state
+  double history_m = 600;        // sightings further back are forgotten
+  double min_probability = 0.5;  // of a fix that is worth sending
+};
+
+class LandmarkMatcher {
+ public:
+  LandmarkMatcher(const LandmarkParameters& parameters, std::shared_ptr<const track::Path> path)
+      : parameters_(parameters), path_(std::move(path)) {}
+
+  /// Nothing when no mapped landmark fits or it cannot be told which one.
+  std::optional<Fix> add(const Sighting& sighting, const Prior& prior);
+
+ private:
+  struct Seen {
+    Sighting sighting;
+    double place_m = 0;  // of the object in distance run
+  };
+  /// How well all earlier sightings fit the map when path distance = distance run + shift, against chance.
+  [[nodiscard]] double history_fits(double shift_m, double now_m) const;
+  [[nodiscard]] double sighting_fits(const Seen& seen, double path_m, double relative_m) const;
+  [[nodiscard]] std::vector<const track::PathLandmark*> near(track::LandmarkKind kind, double from_m,
+                                                             double to_m) const;
+  [[nodiscard]] bool sighted_before(track::LandmarkKind kind) const;
+  [[nodiscard]] double relative_sigma_m(const Seen& seen, double now_m) const;
+
+  LandmarkParameters parameters_;
+  std::shared_ptr<const track::Path> path_;
+  std::deque<Seen> seen_;
+};
+
+}  // namespace railfix::map_matcher

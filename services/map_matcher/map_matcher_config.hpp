@@ -1,0 +1,54 @@
+// Configuration of the map matcher: section `map_matcher`.
+#pragma once
+
+#include <string>
+
+#include "map_matcher/curvature_matcher.hpp"
+#include "map_matcher/landmark_matcher.hpp"
+#include "service/config.hpp"
+
+namespace railfix::map_matcher {
+
+struct MapMatcherConfig {
+  std::string map;
+  bool use_landmarks = true;
+  bool use_curvature = true;
+  double view_ahead_m = 7.0;
+  double least_speed_mps = 1.0;
+  double match_every_m = 5.0;
+  LandmarkParameters landmarks;
+  CurvatureParameters curvature;
+
+  void describe(service::Fields& fields) {
+    fields.text("map", map, "Compiled map (railfix map build); empty = nothing is matched.");
+    fields.flag("use_landmarks", use_landmarks, "Match landmark sightings.");
+    fields.flag("use_curvature", use_curvature, "Match the shape of the track.");
+    fields.number("view_ahead_m", view_ahead_m, {0, 50}, "m",
+                  "The curvature of track_view belongs to this point ahead of the camera's foot.");
+    fields.number("least_speed_mps", least_speed_mps, {0, 50}, "m/s", "Slower, the turning says nothing of the track.");
+    fields.number("match_every_m", match_every_m, {0.5, 1000}, "m", "The shape is matched anew after this way.");
+    fields.group("landmarks", "Matching of sightings.", [this](service::Fields& f) {
+      auto& p = landmarks;
+      f.number("detection", p.detection, {0.01, 0.999}, "", "Chance that a mapped landmark is sighted.");
+      f.number("false_per_m", p.false_per_m, {1e-7, 1}, "1/m", "False sightings of one kind per metre.");
+      f.number("scale_sigma", p.scale_sigma, {1e-5, 0.2}, "", "Error of the way run between sightings.");
+      f.number("window_margin_m", p.window_margin_m, {0, 1000}, "m", "Search beyond the interval of train_state.");
+      f.number("history_m", p.history_m, {0, 10000}, "m", "Sightings are judged together over this way.");
+      f.number("min_probability", p.min_probability, {0, 1}, "", "A less probable fix is not sent.");
+    });
+    fields.group("curvature", "Matching of the track's shape.", [this](service::Fields& f) {
+      auto& p = curvature;
+      f.number("bin_m", p.bin_m, {0.5, 50}, "m", "Measurements are averaged over this way.");
+      f.number("window_m", p.window_m, {50, 5000}, "m", "Longest way that is matched.");
+      f.number("noise_per_m", p.noise_per_m, {1e-6, 0.1}, "1/m", "Least sigma of one average.");
+      f.number("correlated_bins", p.correlated_bins, {1, 100}, "", "So many neighbouring averages err together.");
+      f.number("scale_sigma", p.scale_sigma, {1e-5, 0.2}, "", "Error of the odometer's scale.");
+      f.number("search_margin_m", p.search_margin_m, {0, 1000}, "m", "Search beyond the interval of train_state.");
+      f.number("max_sigma_m", p.max_sigma_m, {0.5, 100}, "m", "A vaguer fix is not sent.");
+      f.number("sigma_floor_m", p.sigma_floor_m, {0, 50}, "m", "Least sigma of a fix.");
+      f.number("min_probability", p.min_probability, {0, 1}, "", "A less probable fix is not sent.");
+    });
+  }
+};
+
+}  // namespace railfix::map_matcher

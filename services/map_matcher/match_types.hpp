@@ -1,0 +1,36 @@
+// What goes into the map matcher and what comes out of it, without DDS.
+#pragma once
+
+#include <cstdint>
+
+#include "track/map.hpp"
+
+namespace railfix::map_matcher {
+
+struct Sighting {
+  int64_t stamp_ns = 0;
+  track::LandmarkKind kind = track::LandmarkKind::unknown;
+  double distance_ahead_m = 0;  // of the camera's foot at the stamp
+  double lateral_m = 0;
+  double sigma_m = 0;
+  double confidence = 0;
+};
+
+/// Where fusion thinks the train is: only a window to search in.
+struct Prior {
+  double path_distance_m = 0;
+  double over_m = 0;       // may be so far behind
+  double under_m = 0;      // ... or in front
+  double travelled_m = 0;  // distance run, to relate sightings to each other
+};
+
+/// A place of the camera's foot, from map and measurement alone.
+struct Fix {
+  int64_t stamp_ns = 0;
+  double path_distance_m = 0;
+  double sigma_m = 0;
+  double probability = 0;
+  uint32_t landmark = 0;  // 0 = from curvature
+};
+
+}  // namespace railfix::map_matcher

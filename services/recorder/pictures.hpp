@@ -1,0 +1,18 @@
+// Pictures as JPEG and back.
+#pragma once
+
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "core/result.hpp"
+
+namespace railfix::recorder {
+
+/// 8-bit grey pixels, rows without gaps. Error: the size is not possible.
+core::Result<std::vector<uint8_t>> encode_jpeg(const uint8_t* pixels, uint32_t width_px, uint32_t height_px,
+                                               int quality);
+/// Grey; error: not a picture.
+core::Result<cv::Mat> decode_jpeg(const std::vector<uint8_t>& jpeg);
+
+}  // namespace railfix::recorder

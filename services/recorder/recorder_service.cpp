@@ -1,0 +1,92 @@
+#include "recorder/recorder_service.hpp"
+
+#include <chrono>
+
+#include "core/time.hpp"
+
+namespace railfix::recorder {
+
+namespace {
+
+constexpr std::chrono::milliseconds kStatePeriod{200};
+// A loss is shown for this long after the last one.
+constexpr int64_t kLossShownNs = 10 * core::kNsPerSecond;
+
+}  // namespace
+
+RecorderService::RecorderService(const Config& config, service::Context& context)
+    : config_(config), context_(context), thread_(config, context.participant(), about(), [&context](int64_t stamp_ns) {
+        if (context.common().lock_step) context.post([&context, stamp_ns] { context.used_up_to(stamp_ns); });
+      }) {
+  if (config_.file.empty()) {
+    for (const auto& sentence : recover_folder(config_.folder)) context_.log().warn("{}", sentence);
+  }
+  context_.on_command("start", [this](const std::string& file) { return start(file); });
+  context_.on_command("stop", [this](const std::string&) { return stop(); });
+  context_.every(kStatePeriod, [this] { show_state(); });
+  context_.at_stop([this] {
+    if (thread_.state().recording) (void)stop();
+    show_state();
+  });
+  if (config_.autostart) core::value_or_throw(start(""));
+}
+
+std::map<std::string, std::string> RecorderService::about() const {
+  const auto& common = context_.common();
+  return {{"train_id", common.train_id},
+          {"host", common.host},
+          {"version", RAILFIX_VERSION},
+          {"domain", std::to_string(common.domain)},
+          {"pictures", config_.pictures},
+          {"map", fingerprint(config_.map)},
+          {"configuration", fingerprint(config_.train_file)}};
+}
+
+core::Result<std::string> RecorderService::start(const std::string& file) {
+  if (file.empty() && config_.file.empty() && config_.quota_mb > 0) {
+    for (const auto& sentence : keep_quota(config_.folder, static_cast<uint64_t>(config_.quota_mb * 1e6))) {
+      context_.log().info("{}", sentence);
+    }
+  }
+  auto started = thread_.start(file);
+  if (started.ok()) {
+    lost_ = 0;
+    context_.log().info("recording {}", started.value());
+  }
+  return started;
+}
+
+core::Result<std::string> RecorderService::stop() {
+  auto stopped = thread_.stop();
+  if (stopped.ok()) {
+    context_.log().info("closed {}", stopped.value());
+  } else {
+    context_.log().error("{}", stopped.error().message);
+  }
+  return stopped;
+}
+
+void RecorderService::show_state() {
+  const RecorderState now = thread_.state();
+  for (; received_ < now.received; ++received_) context_.health().input();
+  for (; written_ < now.written; ++written_) context_.health().output(0);
+  if (now.lost > lost_) {
+    context_.health().dropped(now.lost - lost_);
+    lost_last_ns_ = core::monotonic_ns();
+  }
+  lost_ = now.lost;
+  if (now.problem != problem_ && !now.problem.empty()) context_.log().error("{}", now.problem);
+  problem_ = now.problem;
+  const bool loses = lost_last_ns_ != 0 && core::monotonic_ns() - lost_last_ns_ < kLossShownNs;
+  if (!now.problem.empty()) {
+    context_.health().degraded(now.problem);
+  } else if (now.recording && loses) {
+    context_.health().degraded("samples are lost: " + now.losses);
+  } else if (now.recording && now.written > 0) {
+    context_.health().active();
+  } else {
+    context_.health().ready();
+  }
+}
+
+}  // namespace railfix::recorder

@@ -1,0 +1,148 @@
+#include "sensor_gateway/sensor_gateway_service.hpp"
+
+#include "core/time.hpp"
+
+namespace railfix::sensor_gateway {
+namespace {
+
+constexpr std::chrono::milliseconds kTick{5};  // one IMU sample at 200 Hz
+constexpr int64_t kLastWordsNs = 300'000'000;  // for the last samples to arrive before the program ends
+
+dataset::Sensors read(const SensorGatewayConfig& config) {
+  if (config.source.empty()) throw core::BadInput("sensor_gateway.source is empty; give a dataset folder");
+  auto sensors = core::value_or_throw(dataset::read_sensors(config.source));
+  if (!config.imu) sensors.imu.clear();
+  if (!config.wheel) sensors.wheel.clear();
+  if (!config.gnss) sensors.gnss.clear();
+  return sensors;
+}
+
+}  // namespace
+
+SensorGatewayService::SensorGatewayService(const Config& config, service::Context& context)
+    : config_(config),
+      context_(context),
+      playback_(read(config)),
+      sinks_{[this](const dataset::ImuRow& row) { publish(row); },
+             [this](const dataset::WheelRow& row) { publish(row); },
+             [this](const dataset::GnssRow& row) { publish(row); }},
+      imu_(context.writer(messaging::topics::imu_sample)),
+      wheel_(context.writer(messaging::topics::wheel_sample)),
+      gnss_(context.writer(messaging::topics::gnss_fix)) {
+  const auto& sensors = playback_.sensors();
+  context_.log().info("has {} IMU, {} wheel and {} GNSS samples", sensors.imu.size(), sensors.wheel.size(),
+                      sensors.gnss.size());
+  context_.every(kTick, [this] { play_by_wall_clock(); });
+  if (config_.clock == "follow") {
+    context_.on<msg::DataClock>(messaging::topics::data_clock, [this](const msg::DataClock& clock) { follow(clock); });
+    return;
+  }
+  clock_.emplace(context_.writer(messaging::topics::data_clock));
+  context_.on_command("start", [this](const std::string&) { return start(); });
+  if (config_.start == "immediately") {
+    context_.post([this] { (void)start(); });
+  }
+}
+
+void SensorGatewayService::begin(int64_t data_ns) {
+  if (begun_) return;
+  begun_ = true;
+  playback_.skip_to(data_ns - core::to_ns(config_.lead_s));
+  context_.health().active();
+}
+
+void SensorGatewayService::follow(const msg::DataClock& clock) {
+  begin(clock.data_ns());
+  if (clock.lock_step() != 0 || clock.ended() != 0) {
+    anchor_.reset();
+    playback_.play_until(clock.data_ns(), sinks_);
+    context_.used_up_to(clock.data_ns());
+  } else {
+    anchor_ = {clock.data_ns(), clock.wall_ns()};
+  }
+  if (clock.ended() != 0) end();
+}
+
+core::Result<std::string> SensorGatewayService::start() {
+  const auto first = playback_.next_ns();
+  if (!first) return core::Error{config_.source + " has no IMU, wheel or GNSS samples to play"};
+  if (anchor_) return std::string("plays already");
+  begin(*first);
+  anchor_ = {*first, core::wall_ns()};
+  return std::string("plays ") + config_.source;
+}
+
+void SensorGatewayService::play_by_wall_clock() {
+  if (!anchor_) return;
+  const int64_t wall_ns = core::wall_ns();
+  const int64_t data_ns = anchor_->data_ns + (wall_ns - anchor_->wall_ns);
+  playback_.play_until(data_ns, sinks_);
+  if (!clock_) return;
+  if (!playback_.next_ns()) {
+    publish_clock(data_ns, wall_ns, true);
+    anchor_.reset();
+    return end();
+  }
+  if (wall_ns - clock_sent_ns_ >= core::kNsPerSecond) publish_clock(data_ns, wall_ns, false);
+}
+
+void SensorGatewayService::publish_clock(int64_t data_ns, int64_t wall_ns, bool ended) {
+  clock_sent_ns_ = wall_ns;
+  msg::DataClock clock;
+  clock.data_ns(data_ns);
+  clock.wall_ns(wall_ns);
+  clock.seq(++clock_seq_);
+  clock.ended(ended ? 1 : 0);
+  clock_->write(clock);
+}
+
+void SensorGatewayService::end() {
+  context_.log().info("played {} IMU, {} wheel and {} GNSS samples", imu_seq_, wheel_seq_, gnss_seq_);
+  if (config_.at_end != "finish") return;
+  const int64_t ended_ns = core::monotonic_ns();
+  context_.every(kTick, [this, ended_ns] {
+    if (core::monotonic_ns() - ended_ns > kLastWordsNs) context_.finish("all samples played");
+  });
+}
+
+void SensorGatewayService::publish(const dataset::ImuRow& row) {
+  msg::ImuSample sample;
+  sample.stamp_ns(row.stamp_ns);
+  sample.grabbed_ns(core::wall_ns());
+  sample.seq(++imu_seq_);
+  sample.rate_x_rps(row.rate_rps[0]);
+  sample.rate_y_rps(row.rate_rps[1]);
+  sample.rate_z_rps(row.rate_rps[2]);
+  sample.accel_x_mps2(row.accel_mps2[0]);
+  sample.accel_y_mps2(row.accel_mps2[1]);
+  sample.accel_z_mps2(row.accel_mps2[2]);
+  imu_.write(sample);
+  context_.health().output(sample.grabbed_ns());
+}
+
+void SensorGatewayService::publish(const dataset::WheelRow& row) {
+  msg::WheelSample sample;
+  sample.stamp_ns(row.stamp_ns);
+  sample.grabbed_ns(core::wall_ns());
+  sample.seq(++wheel_seq_);
+  sample.pulses(row.pulses);
+  sample.pulses_per_metre(playback_.sensors().pulses_per_metre);
+  wheel_.write(sample);
+  context_.health().output(sample.grabbed_ns());
+}
+
+void SensorGatewayService::publish(const dataset::GnssRow& row) {
+  msg::GnssFix fix;
+  fix.stamp_ns(row.stamp_ns);
+  fix.grabbed_ns(core::wall_ns());
+  fix.seq(++gnss_seq_);
+  fix.lat_deg(row.lat_deg);
+  fix.lon_deg(row.lon_deg);
+  fix.alt_m(row.alt_m);
+  fix.hdop(row.hdop);
+  fix.fix(static_cast<uint8_t>(row.fix));
+  gnss_.write(fix);
+  context_.health().output(fix.grabbed_ns());
+}
+
+}  // namespace railfix::sensor_gateway

@@ -1,0 +1,49 @@
+// The sensor tables of a dataset -> imu_sample, wheel_sample, gnss_fix, in step with data_clock.
+#pragma once
+
+#include <optional>
+
+#include "sensor_gateway/playback.hpp"
+#include "sensor_gateway/sensor_gateway_config.hpp"
+#include "service/service.hpp"
+
+namespace railfix::sensor_gateway {
+
+class SensorGatewayService {
+ public:
+  using Config = SensorGatewayConfig;
+  SensorGatewayService(const Config& config, service::Context& context);
+
+ private:
+  void follow(const msg::DataClock& clock);
+  core::Result<std::string> start();
+  void begin(int64_t data_ns);
+  void play_by_wall_clock();
+  void publish_clock(int64_t data_ns, int64_t wall_ns, bool ended);
+  void end();
+  void publish(const dataset::ImuRow& row);
+  void publish(const dataset::WheelRow& row);
+  void publish(const dataset::GnssRow& row);
+
+  struct Anchor {
+    int64_t data_ns;
+    int64_t wall_ns;
+  };
+  Config config_;
+  service::Context& context_;
+  Playback playback_;
+  Sinks sinks_;
+  messaging::Writer<msg::ImuSample> imu_;
+  messaging::Writer<msg::WheelSample> wheel_;
+  messaging::Writer<msg::GnssFix> gnss_;
+  std::optional<messaging::Writer<msg::DataClock>> clock_;  // with clock own
+  std::optional<Anchor> anchor_;                            // real pace, while it plays
+  bool begun_ = false;
+  uint64_t imu_seq_ = 0;
+  uint64_t wheel_seq_ = 0;
+  uint64_t gnss_seq_ = 0;
+  uint64_t clock_seq_ = 0;
+  int64_t clock_sent_ns_ = 0;
+};
+
+}  // namespace railfix::sensor_gateway

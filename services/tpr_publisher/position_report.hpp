@@ -1,0 +1,55 @@
+// From a place relative to its balise group to the fields of message 136 (SUBSET-026 3.6.1 to 3.6.4, units of chapter
+// 7).
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "etcs/train_position_report.hpp"
+#include "tpr_publisher/balise_tracker.hpp"
+
+namespace railfix::tpr_publisher {
+
+/// What is known of the train at one moment. "Front" and "rear" are along the cab's forward axis.
+struct TrainPosition {
+  int64_t stamp_ns = 0;
+  track::EdgePosition foot;  // of the camera
+  bool track_known = false;
+  bool usable = true;     // false: integrity lost, the place must not be used
+  double distance_m = 0;  // travelled since start, signed
+  double speed_mps = 0;   // along the cab's forward axis, signed
+  double over_m = 0;      // the true foot may lie this far behind the estimate
+  double under_m = 0;     // ... and this far in front of it
+  bool standstill = false;
+
+  [[nodiscard]] bool place_known() const {
+    return track_known && usable && foot.direction != track::Direction::unknown;
+  }
+};
+
+enum class Motion : uint8_t { unknown, forward, backward };  // along the cab's forward axis
+
+/// What the position does not say.
+struct ReportSettings {
+  etcs::Baseline baseline = etcs::Baseline::b3;
+  uint32_t nid_engine = 0;
+  uint32_t m_mode = 0;
+  uint32_t m_level = etcs::kLevel2;
+  uint32_t nid_ntc = 0;         // used with level NTC only
+  uint32_t finest_q_scale = 0;  // coarser ones are taken when a distance does not fit
+  double foot_to_front_m = 0;   // from the camera's foot forward to the train's front end
+};
+
+/// No reference: NID_LRBG and all that is relative to it is "unknown". A real group of a single balise gives packet 1,
+/// whose directions are relative to the way from the group before it, and unknown without one (3.6.2.2, 3.4.2.3.3).
+/// D_LRBG is rounded to its step; L_DOUBTOVER and L_DOUBTUNDER take up what the rounding moves, so that the interval
+/// from min safe to max safe front end never shrinks.
+etcs::TrainPositionReport make_report(const TrainPosition& position, const std::optional<Reference>& reference,
+                                      Motion motion, const ReportSettings& settings, int64_t now_ns);
+
+/// Nearest step of 5 km/h; at standstill 0, or 127 in 4.0.0.
+uint32_t v_train(double speed_mps, bool standstill, etcs::Baseline baseline);
+/// Trainborne clock: steps of 10 ms, never the value "unknown"; starts anew after 497 days.
+uint32_t t_train(int64_t now_ns);
+
+}  // namespace railfix::tpr_publisher

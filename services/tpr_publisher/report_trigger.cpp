@@ -1,0 +1,90 @@
+#include "tpr_publisher/report_trigger.hpp"
+
+#include <cmath>
+
+#include "core/time.hpp"
+
+namespace railfix::tpr_publisher {
+
+ReportTrigger::ReportTrigger(const etcs::ReportParameters& parameters, double train_length_m)
+    : train_length_m_(train_length_m) {
+  core::ok_or_throw(set_parameters(parameters));
+}
+
+core::Status ReportTrigger::set_parameters(const etcs::ReportParameters& parameters) {
+  if (parameters.t_cycloc == 0 || parameters.d_cycloc == 0) {
+    return core::Error{"Packet 58 asks for reports without a pause (T_CYCLOC or D_CYCLOC is 0): use 1 or more."};
+  }
+  for (const auto& location : parameters.locations) {
+    if (location.q_lgtloc == 0 && train_length_m_ <= 0) {
+      return core::Error{
+          "Packet 58 asks for a report where the rear end passes, but train_length_m is not known: set it."};
+    }
+  }
+  parameters_ = parameters;
+  locations_placed_ = false;
+  locations_.clear();
+  location_passed_ = false;
+  asked_ = parameters.m_loc == etcs::kReportNow;
+  return {};
+}
+
+void ReportTrigger::place_locations(const Moment& moment) {
+  if (locations_placed_ || !moment.beyond_lrbg_m) return;
+  locations_placed_ = true;
+  double at_m = moment.front_m - *moment.beyond_lrbg_m;
+  for (const auto& location : parameters_.locations) {
+    at_m += location.d_loc * etcs::scale_m(parameters_.q_scale);
+    const bool rear_end = location.q_lgtloc == 0;
+    locations_.push_back({at_m, rear_end, reached_m(moment, rear_end) >= at_m});
+  }
+}
+
+double ReportTrigger::reached_m(const Moment& moment, bool rear_end) const {
+  return rear_end ? moment.min_safe_front_m - train_length_m_ : moment.max_safe_front_m;
+}
+
+void ReportTrigger::note_events(const Moment& moment) {
+  if (moment.nid_lrbg != etcs::kUnknownBaliseGroup && moment.nid_lrbg != last_group_) {
+    last_group_ = moment.nid_lrbg;
+    group_passed_ = true;
+  }
+  for (auto& location : locations_) {
+    if (location.passed || reached_m(moment, location.rear_end) < location.at_m) continue;
+    location.passed = true;
+    location_passed_ = true;
+  }
+}
+
+bool ReportTrigger::cycle_distance_over(const Moment& moment) const {
+  const double period_m = parameters_.d_cycloc * etcs::scale_m(parameters_.q_scale);
+  return parameters_.d_cycloc != etcs::kNoCycleDistance && std::abs(moment.front_m - reported_->front_m) >= period_m;
+}
+
+bool ReportTrigger::cycle_time_over(const Moment& moment) const {
+  const int64_t period_ns = int64_t{parameters_.t_cycloc} * core::kNsPerSecond;
+  return parameters_.t_cycloc != etcs::kNoCycleTime && moment.now_ns - reported_->now_ns >= period_ns;
+}
+
+std::optional<Reason> ReportTrigger::due(const Moment& moment) {
+  place_locations(moment);
+  note_events(moment);
+  if (!reported_ || asked_) return Reason::start;
+  if (moment.standstill != reported_->standstill) {
+    return moment.standstill ? Reason::standstill : Reason::moving;
+  }
+  if (group_passed_ && parameters_.m_loc == etcs::kReportAtGroups) return Reason::balise_group;
+  if (location_passed_) return Reason::location;
+  if (cycle_distance_over(moment)) return Reason::cycle_distance;
+  if (cycle_time_over(moment)) return Reason::cycle_time;
+  return std::nullopt;
+}
+
+void ReportTrigger::sent(const Moment& moment) {
+  reported_ = moment;
+  asked_ = false;
+  group_passed_ = false;
+  location_passed_ = false;
+}
+
+}  // namespace railfix::tpr_publisher

@@ -1,0 +1,70 @@
+// When to report: first of all, then as packet 58 asks, and at standstill whatever it asks (SUBSET-026 3.6.5.1).
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "core/result.hpp"
+#include "etcs/report_parameters.hpp"
+
+namespace railfix::tpr_publisher {
+
+/// Values as in REPORT_* of idl/position.idl.
+enum class Reason : uint8_t {
+  cycle_time = 1,
+  cycle_distance = 2,
+  standstill = 3,
+  moving = 4,
+  balise_group = 5,
+  location = 6,
+  start = 7,
+};
+
+/// What the rules look at. Distances are on the train's own travelled distance.
+struct Moment {
+  int64_t now_ns = 0;
+  double front_m = 0;           // estimated front end
+  double max_safe_front_m = 0;  // infinite when not known: a location then counts as passed
+  double min_safe_front_m = 0;
+  bool standstill = false;
+  uint32_t nid_lrbg = etcs::kUnknownBaliseGroup;
+  std::optional<double> beyond_lrbg_m;  // front end beyond the LRBG, along the cab's forward axis
+};
+
+class ReportTrigger {
+ public:
+  /// train_length_m: 0 = not known; then no location may ask for the rear end.
+  ReportTrigger(const etcs::ReportParameters& parameters, double train_length_m);
+
+  /// A new packet 58; one that asks for reports without a pause or for what is not known is refused. Its locations
+  /// count from the LRBG, along the cab's forward axis, from the next moment with an LRBG on.
+  core::Status set_parameters(const etcs::ReportParameters& parameters);
+  /// The most urgent reason to report now; the same again until sent() is called.
+  [[nodiscard]] std::optional<Reason> due(const Moment& moment);
+  void sent(const Moment& moment);
+
+ private:
+  struct Location {
+    double at_m = 0;  // travelled distance
+    bool rear_end = false;
+    bool passed = false;
+  };
+  void place_locations(const Moment& moment);
+  void note_events(const Moment& moment);
+  [[nodiscard]] double reached_m(const Moment& moment, bool rear_end) const;
+  [[nodiscard]] bool cycle_distance_over(const Moment& moment) const;
+  [[nodiscard]] bool cycle_time_over(const Moment& moment) const;
+
+  etcs::ReportParameters parameters_;
+  double train_length_m_;
+  bool locations_placed_ = false;
+  std::vector<Location> locations_;
+  std::optional<Moment> reported_;  // last moment that was sent
+  uint32_t last_group_ = etcs::kUnknownBaliseGroup;
+  bool asked_ = false;  // "now"
+  bool group_passed_ = false;
+  bool location_passed_ = false;
+};
+
+}  // namespace railfix::tpr_publisher

@@ -1,0 +1,61 @@
+// Train states in, position reports out: LRBG, fields, and the moments when they are due. No clock: the caller says
+// what time it is.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tpr_publisher/balise_tracker.hpp"
+#include "tpr_publisher/position_report.hpp"
+#include "tpr_publisher/report_trigger.hpp"
+
+namespace railfix::tpr_publisher {
+
+struct Settings {
+  ReportSettings report;
+  etcs::ReportParameters parameters;
+  double train_length_m = 0;  // 0 = not known
+  double search_behind_m = 5000;
+};
+
+struct Report {
+  int64_t stamp_ns = 0;  // of the train's position
+  int64_t sent_ns = 0;
+  Reason reason = Reason::start;
+  etcs::TrainPositionReport fields;
+  std::vector<uint8_t> message;
+};
+
+/// At most one of the two; neither when nothing is due.
+struct Outcome {
+  std::optional<Report> report;
+  std::string refusal;  // a report is due but cannot be sent: why
+};
+
+class TprPublisher {
+ public:
+  /// Without a map (nullptr) every report says "LRBG unknown". Throws BadInput when the settings cannot be encoded.
+  TprPublisher(std::shared_ptr<const track::Map> map, const Settings& settings);
+
+  /// A report must be younger than 1 s when it is sent (SUBSET-041 5.3.1.3): an older position gives a refusal and the
+  /// report stays due.
+  Outcome update(const TrainPosition& position, int64_t now_ns);
+  /// Time goes on without a position: says when a report is due that cannot be sent.
+  Outcome tick(int64_t now_ns);
+  core::Status set_parameters(const etcs::ReportParameters& parameters) { return trigger_.set_parameters(parameters); }
+
+ private:
+  void follow(const TrainPosition& position);
+  [[nodiscard]] Moment moment(int64_t now_ns) const;
+
+  Settings settings_;
+  std::optional<BaliseTracker> tracker_;
+  ReportTrigger trigger_;
+  std::optional<Reference> reference_;
+  std::optional<TrainPosition> position_;
+  Motion motion_ = Motion::unknown;  // the last one; kept at standstill
+};
+
+}  // namespace railfix::tpr_publisher

@@ -1,0 +1,52 @@
+#include "tpr_publisher/tpr_publisher_config.hpp"
+
+namespace railfix::tpr_publisher {
+
+void TprPublisherConfig::describe(service::Fields& fields) {
+  fields.text("map", map, "Compiled map with the balise groups; empty = every report says LRBG unknown.");
+  fields.choice("baseline", baseline, {"3", "4"}, "Layout of the message: SUBSET-026 3.x or 4.0.0.");
+  fields.integer("nid_engine", nid_engine, {0, 16777215}, "", "On-board ETCS identity, NID_ENGINE.");
+  fields.integer("m_mode", m_mode, {0, 31}, "", "On-board operating mode to report, M_MODE (0 = full supervision).");
+  fields.integer("m_level", m_level, {0, 4}, "", "ETCS level to report, M_LEVEL (1 = NTC, 3 = level 2).");
+  fields.integer("nid_ntc", nid_ntc, {0, 255}, "", "National system, NID_NTC; used with level NTC only.");
+  fields.number("foot_to_front_m", foot_to_front_m, {-500, 500}, "m",
+                "From the camera's foot forward to the train's front end.");
+  fields.number("train_length_m", train_length_m, {0, 2000}, "m",
+                "For reports where the rear end passes; 0 = not known.");
+  fields.number("search_behind_m", search_behind_m, {0, 100000}, "m",
+                "How far behind the train a balise group is looked for when none has been passed yet.");
+  fields.choice("finest_step", finest_step, {"10 cm", "1 m", "10 m"},
+                "Finest resolution of distances, Q_SCALE; coarser ones are taken when a distance does not fit.");
+  fields.integer("t_cycloc_s", t_cycloc_s, {1, 255}, "s", "Time between reports, T_CYCLOC; 255 = not cyclic in time.");
+  fields.integer("d_cycloc_m", d_cycloc_m, {1, 32767}, "m",
+                 "Distance between reports, D_CYCLOC; 32767 = not cyclic in space.");
+  fields.choice("m_loc", m_loc, {"groups", "not_at_groups"}, "Report at every new balise group or not, M_LOC.");
+  fields.text("packet_58", packet_58,
+              "Position report parameters as a packet 58 in hexadecimal digits; replaces the three keys above.");
+}
+
+Settings TprPublisherConfig::settings() const {
+  Settings settings;
+  settings.report.baseline = baseline == "4" ? etcs::Baseline::b4 : etcs::Baseline::b3;
+  settings.report.nid_engine = static_cast<uint32_t>(nid_engine);
+  settings.report.m_mode = static_cast<uint32_t>(m_mode);
+  settings.report.m_level = static_cast<uint32_t>(m_level);
+  settings.report.nid_ntc = static_cast<uint32_t>(nid_ntc);
+  settings.report.finest_q_scale = finest_step == "10 cm" ? 0 : finest_step == "1 m" ? 1 : 2;
+  settings.report.foot_to_front_m = foot_to_front_m;
+  settings.train_length_m = train_length_m;
+  settings.search_behind_m = search_behind_m;
+  settings.parameters.t_cycloc = static_cast<uint32_t>(t_cycloc_s);
+  settings.parameters.d_cycloc = static_cast<uint32_t>(d_cycloc_m);
+  settings.parameters.m_loc = m_loc == "groups" ? etcs::kReportAtGroups : etcs::kReportNotAtGroups;
+  if (!packet_58.empty()) {
+    const auto bytes = etcs::parse_hex(packet_58);
+    if (!bytes.ok()) throw core::BadInput("tpr_publisher.packet_58: " + bytes.error().message);
+    auto parameters = etcs::decode_report_parameters(bytes.value());
+    if (!parameters.ok()) throw core::BadInput("tpr_publisher.packet_58: " + parameters.error().message);
+    settings.parameters = std::move(parameters).value();
+  }
+  return settings;
+}
+
+}  // namespace railfix::tpr_publisher

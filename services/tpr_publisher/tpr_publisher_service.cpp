@@ -1,0 +1,152 @@
+#include "tpr_publisher/tpr_publisher_service.hpp"
+
+#include <cmath>
+
+#include "core/time.hpp"
+
+namespace railfix::tpr_publisher {
+
+namespace {
+
+constexpr std::chrono::milliseconds kTickPeriod{500};
+
+static_assert(static_cast<uint8_t>(Reason::cycle_time) == msg::REPORT_CYCLE_TIME);
+static_assert(static_cast<uint8_t>(Reason::cycle_distance) == msg::REPORT_CYCLE_DISTANCE);
+static_assert(static_cast<uint8_t>(Reason::standstill) == msg::REPORT_STANDSTILL);
+static_assert(static_cast<uint8_t>(Reason::moving) == msg::REPORT_MOVING);
+static_assert(static_cast<uint8_t>(Reason::balise_group) == msg::REPORT_BALISE_GROUP);
+static_assert(static_cast<uint8_t>(Reason::location) == msg::REPORT_LOCATION);
+static_assert(static_cast<uint8_t>(Reason::start) == msg::REPORT_START);
+
+std::shared_ptr<const track::Map> load_map(const std::string& file) {
+  if (file.empty()) return nullptr;
+  return std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(file)));
+}
+
+track::Direction direction_of(uint8_t direction) {
+  if (direction == msg::DIRECTION_FORWARD) return track::Direction::forward;
+  return direction == msg::DIRECTION_REVERSE ? track::Direction::reverse : track::Direction::unknown;
+}
+
+TrainPosition position_of(const msg::TrainState& state) {
+  TrainPosition position;
+  position.stamp_ns = state.stamp_ns();
+  position.foot = {state.edge(), state.offset_m(), direction_of(state.direction())};
+  position.track_known = state.track_known() != 0;
+  position.usable = state.integrity() != msg::INTEGRITY_UNUSABLE;
+  position.distance_m = state.distance_m();
+  position.speed_mps = state.speed_mps();
+  position.over_m = state.over_m();
+  position.under_m = state.under_m();
+  position.standstill = state.standstill() != 0;
+  return position;
+}
+
+double metres(uint32_t raw, uint32_t q_scale) {
+  return raw == etcs::kUnknownDistance ? std::nan("") : raw * etcs::scale_m(q_scale);
+}
+
+/// The values of the message, as it says them.
+msg::TrainPositionReport message_of(const Report& report, etcs::Baseline baseline) {
+  const auto& fields = report.fields;
+  msg::TrainPositionReport message;
+  message.stamp_ns(report.stamp_ns);
+  message.sent_ns(report.sent_ns);
+  message.d_lrbg_m(metres(fields.d_lrbg, fields.q_scale));
+  message.l_doubtover_m(metres(fields.l_doubtover, fields.q_scale));
+  message.l_doubtunder_m(metres(fields.l_doubtunder, fields.q_scale));
+  message.v_train_kmh(fields.v_train == etcs::kStandstillSpeed ? 0.0 : fields.v_train * 5.0);
+  message.nid_engine(fields.nid_engine);
+  message.nid_lrbg(fields.nid_lrbg);
+  message.nid_prvlrbg(fields.nid_prvlrbg.value_or(etcs::kUnknownBaliseGroup));
+  message.nid_packet(static_cast<uint8_t>(fields.nid_packet));
+  message.q_dirlrbg(static_cast<uint8_t>(fields.q_dirlrbg));
+  message.q_dlrbg(static_cast<uint8_t>(fields.q_dlrbg));
+  message.q_dirtrain(static_cast<uint8_t>(fields.q_dirtrain));
+  message.baseline(static_cast<uint8_t>(baseline));
+  message.reason(static_cast<uint8_t>(report.reason));
+  message.message_bytes(static_cast<uint32_t>(report.message.size()));
+  std::copy(report.message.begin(), report.message.end(), message.message().begin());
+  return message;
+}
+
+}  // namespace
+
+TprPublisherService::TprPublisherService(const Config& config, service::Context& context)
+    : context_(context),
+      has_map_(!config.map.empty()),
+      baseline_(config.settings().report.baseline),
+      publisher_(load_map(config.map), config.settings()),
+      writer_(context.writer(messaging::topics::train_position_report)) {
+  context.on<msg::DataClock>(messaging::topics::data_clock,
+                             [this](const msg::DataClock& clock) { data_clock_ = clock; });
+  context.on<msg::TrainState>(messaging::topics::train_state,
+                              [this](const msg::TrainState& state) { on_state(state); });
+  context.every(kTickPeriod, [this] { on_tick(); });
+  context.on_command("packet_58", [this](const std::string& hex) -> core::Result<std::string> {
+    const auto bytes = etcs::parse_hex(hex);
+    if (!bytes.ok()) return bytes.error();
+    const auto parameters = etcs::decode_report_parameters(bytes.value());
+    if (!parameters.ok()) return parameters.error();
+    if (const auto status = publisher_.set_parameters(parameters.value()); !status.ok()) return status.error();
+    return std::string("position report parameters taken over");
+  });
+}
+
+int64_t TprPublisherService::now_ns(int64_t stamp_ns) const {
+  if (context_.common().lock_step) return stamp_ns;  // the data waits for us
+  const int64_t wall_ns = core::wall_ns();
+  return data_clock_ ? data_clock_->data_ns() + (wall_ns - data_clock_->wall_ns()) : wall_ns;
+}
+
+void TprPublisherService::on_state(const msg::TrainState& state) {
+  context_.health().input();
+  state_seen_ = true;
+  const auto outcome = publisher_.update(position_of(state), now_ns(state.stamp_ns()));
+  if (outcome.report) send(*outcome.report, state.grabbed_ns());
+  if (!outcome.refusal.empty()) {
+    show(outcome.refusal);
+  } else if (!reference_known_) {
+    show(!has_map_                  ? "Reports say LRBG unknown: tpr_publisher.map is not set."
+         : state.track_known() == 0 ? "Reports say LRBG unknown: the track is not known."
+                                    : "Reports say LRBG unknown: no balise group behind the train yet.");
+  } else {
+    show("");
+  }
+  context_.used_up_to(state.stamp_ns());
+}
+
+void TprPublisherService::on_tick() {
+  // Before the first state the service is ready; the end of played data is no fault.
+  if (!state_seen_ || context_.common().lock_step || (data_clock_ && data_clock_->ended() != 0)) return;
+  const auto outcome = publisher_.tick(now_ns(0));
+  if (!outcome.refusal.empty()) show(outcome.refusal);
+}
+
+void TprPublisherService::send(const Report& report, int64_t grabbed_ns) {
+  auto message = message_of(report, baseline_);
+  message.seq(seq_);
+  if (!writer_.write(message)) {
+    context_.log().error("A position report could not be sent.");
+    return;
+  }
+  ++seq_;
+  reference_known_ = report.fields.nid_lrbg != etcs::kUnknownBaliseGroup;
+  context_.health().output(grabbed_ns);
+  context_.log().debug("reason {}: {}", message.reason(), etcs::to_hex(report.message));
+}
+
+void TprPublisherService::show(const std::string& degraded_by) {
+  if (degraded_by.empty()) {
+    context_.health().active();
+  } else {
+    context_.health().degraded(degraded_by);
+  }
+  // Figures in the sentence change all the time; the kind of it is worth one line in the log.
+  const auto kind = degraded_by.substr(0, degraded_by.find_first_of("0123456789"));
+  if (kind == degraded_by_) return;
+  degraded_by_ = kind;
+  if (!degraded_by.empty()) context_.log().warn("{}", degraded_by);
+}
+
+}  // namespace railfix::tpr_publisher
