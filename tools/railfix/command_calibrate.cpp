@@ -1,0 +1,198 @@
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "commands.hpp"
+#include "core/result.hpp"
+#include "core/units.hpp"
+#include "dataset/dataset.hpp"
+#include "progress.hpp"
+#include "track_detector/draw.hpp"
+#include "track_detector/mount_calibration.hpp"
+
+namespace railfix::tool {
+namespace {
+
+// Seen in most cabs: 70 degrees across the picture.
+constexpr double kAssumedFocalPerWidth = 0.72;
+constexpr size_t kMaxPictures = 120;
+
+struct MountArguments {
+  std::string pictures;
+  std::string video;
+  std::string camera;
+  std::string out;
+  std::string draw;
+  double gauge_m = 1.435;
+  double focal_px = 0;
+  bool json = false;
+};
+
+std::vector<dataset::Picture> load_pictures(const std::string& path, bool quiet) {
+  if (!std::filesystem::exists(path)) throw core::BadInput(path + " does not exist");
+  auto source = core::value_or_throw(dataset::open_pictures(path, {}));
+  const auto count = source->count();
+  const size_t stride = count ? std::max<size_t>(1, (*count + kMaxPictures - 1) / kMaxPictures) : 10;
+  Progress progress("reading pictures", count.value_or(0), quiet);
+  std::vector<dataset::Picture> pictures;
+  for (size_t i = 0; pictures.size() < kMaxPictures; ++i) {
+    auto picture = core::value_or_throw(source->next());
+    if (!picture) break;
+    progress.update(i + 1);
+    if (i % stride == 0) pictures.push_back(std::move(*picture));
+  }
+  progress.finish();
+  if (pictures.empty()) throw core::BadInput(path + " holds no picture");
+  for (const auto& picture : pictures) {
+    if (picture.grey.size() != pictures.front().grey.size()) {
+      throw core::BadInput(path + ": " + picture.name + " has another size than " + pictures.front().name +
+                           "; give pictures of one camera");
+    }
+  }
+  return pictures;
+}
+
+dataset::CameraCalibration starting_calibration(const MountArguments& arguments, const cv::Size& size,
+                                                std::string& remark) {
+  dataset::CameraCalibration calibration;
+  if (!arguments.camera.empty()) {
+    calibration = core::value_or_throw(dataset::read_calibration(arguments.camera));
+    if (calibration.intrinsics.width_px != size.width || calibration.intrinsics.height_px != size.height) {
+      throw core::BadInput(arguments.camera + " is for another picture size than these pictures");
+    }
+    return calibration;
+  }
+  auto& lens = calibration.intrinsics;
+  lens.width_px = size.width;
+  lens.height_px = size.height;
+  lens.fu_px = arguments.focal_px > 0 ? arguments.focal_px : kAssumedFocalPerWidth * size.width;
+  lens.fv_px = lens.fu_px;
+  lens.cu_px = (size.width - 1) / 2.0;
+  lens.cv_px = (size.height - 1) / 2.0;
+  if (arguments.focal_px <= 0) {
+    char text[300];
+    std::snprintf(
+        text, sizeof text,
+        "The focal length is assumed (%.0f px, 70 degrees across): height and sideways position do not depend on it, "
+        "but angles and every distance along the track do, in proportion. Give --focal or --camera to fix it.",
+        lens.fu_px);
+    remark = text;
+  }
+  return calibration;
+}
+
+// Read again, because keeping all pictures in colour would take four times the memory.
+cv::Mat in_colour(const std::string& path, const dataset::Picture& wanted) {
+  dataset::PictureOptions options;
+  options.colour = true;
+  const auto source = core::value_or_throw(dataset::open_pictures(path, options));
+  while (true) {
+    auto picture = core::value_or_throw(source->next());
+    if (!picture) throw core::BadInput(path + " has changed while it was read");
+    if (picture->name == wanted.name) return picture->colour;
+  }
+}
+
+void draw(const std::string& file, cv::Mat colour, const dataset::Picture& picture, const geometry::Intrinsics& lens,
+          const geometry::CameraPose& mount, double gauge_m) {
+  track_detector::DetectorOptions options;
+  options.gauge_m = gauge_m;
+  track_detector::TrackDetector detector(lens, mount, options);
+  track_detector::draw_track(colour, lens, detector.detect(picture.grey), gauge_m);
+  if (!cv::imwrite(file, colour))
+    throw core::BadInput("cannot write " + file + ": give a .png in a folder that exists");
+}
+
+void print(const track_detector::MountCalibration& found, const std::string& remark) {
+  const auto deg = [](double rad) { return core::deg_from_rad(rad); };
+  const auto& m = found.mount;
+  const auto& s = found.sigma;
+  std::printf("both rails seen in %zu of %zu pictures, %zu on straight track, residual %.2f px\n", found.seen,
+              found.pictures, found.straight, found.residual_px);
+  std::printf("height   %7.3f m    +- %.3f   above the rail heads\n", m.height_m, s.height_m);
+  std::printf("lateral  %+7.3f m    +- %.3f   left of the track centre\n", m.lateral_m, s.lateral_m);
+  std::printf("pitch    %7.3f deg  +- %.3f   down\n", deg(m.pitch_rad), deg(s.pitch_rad));
+  std::printf("yaw      %+7.3f deg  +- %.3f   left\n", deg(m.yaw_rad), deg(s.yaw_rad));
+  std::printf("roll       0.000 deg  held: straight rails cannot tell roll from a sideways position\n");
+  if (!remark.empty()) std::printf("%s\n", remark.c_str());
+}
+
+nlohmann::json to_json(const track_detector::MountCalibration& found, const geometry::Intrinsics& lens, bool assumed) {
+  const auto& m = found.mount;
+  const auto& s = found.sigma;
+  return {{"height_m", m.height_m},
+          {"height_sigma_m", s.height_m},
+          {"lateral_m", m.lateral_m},
+          {"lateral_sigma_m", s.lateral_m},
+          {"pitch_rad", m.pitch_rad},
+          {"pitch_sigma_rad", s.pitch_rad},
+          {"yaw_rad", m.yaw_rad},
+          {"yaw_sigma_rad", s.yaw_rad},
+          {"roll_rad", m.roll_rad},
+          {"focal_px", lens.fu_px},
+          {"focal_assumed", assumed},
+          {"pictures", found.pictures},
+          {"seen", found.seen},
+          {"straight", found.straight},
+          {"residual_px", found.residual_px}};
+}
+
+int calibrate_mount(const MountArguments& arguments) {
+  if (arguments.pictures.empty() == arguments.video.empty()) {
+    throw core::BadInput("give either --pictures DIR or --video FILE");
+  }
+  const std::string& path = arguments.pictures.empty() ? arguments.video : arguments.pictures;
+  const auto pictures = load_pictures(path, arguments.json);
+  std::string remark;
+  auto calibration = starting_calibration(arguments, pictures.front().grey.size(), remark);
+  track_detector::MountCalibrator calibrator(calibration.intrinsics, arguments.gauge_m);
+  for (const auto& picture : pictures) calibrator.add(picture.grey);
+  const auto found = calibrator.solve();
+  if (!found.ok()) {
+    std::cerr << "railfix: " << found.error().message << '\n';
+    return 1;
+  }
+  calibration.mount = found.value().mount;
+  core::ok_or_throw(dataset::write_calibration(arguments.out, calibration));
+  if (!arguments.draw.empty()) {
+    const auto& picture = pictures[pictures.size() / 2];
+    draw(arguments.draw, in_colour(path, picture), picture, calibration.intrinsics, *calibration.mount,
+         arguments.gauge_m);
+  }
+  if (arguments.json) {
+    std::cout << to_json(found.value(), calibration.intrinsics, !remark.empty()).dump(2) << '\n';
+  } else {
+    print(found.value(), remark);
+    std::printf("written to %s\n", arguments.out.c_str());
+  }
+  return 0;
+}
+
+}  // namespace
+
+void add_calibrate(CLI::App& app, Action& chosen) {
+  auto* calibrate = app.add_subcommand("calibrate", "How a camera sits and looks");
+  calibrate->require_subcommand(1);
+  auto* mount =
+      calibrate->add_subcommand("mount", "Height, sideways position, pitch and yaw from the rails of straight track");
+  mount->footer("Example: railfix calibrate mount --pictures frames --focal 1390 --out camera.yaml --draw check.png");
+  auto arguments = std::make_shared<MountArguments>();
+  mount->add_option("--pictures", arguments->pictures, "Folder of pictures or dataset, straight track among them");
+  mount->add_option("--video", arguments->video, "Video file instead of pictures");
+  mount->add_option("--gauge", arguments->gauge_m, "Track gauge in metres")
+      ->check(CLI::Range(0.5, 2.0))
+      ->capture_default_str();
+  mount->add_option("--focal", arguments->focal_px, "Focal length in pixels; else it is assumed")
+      ->check(CLI::Range(50.0, 50000.0));
+  mount->add_option("--camera", arguments->camera,
+                    "Calibration with the lens (intrinsics and distortion), instead of --focal");
+  mount->add_option("--out", arguments->out, "Calibration file to write")->required();
+  mount->add_option("--draw", arguments->draw, "Draw the rails on one picture, to check by eye");
+  mount->add_flag("--json", arguments->json, "Print the result as JSON");
+  mount->callback([arguments, &chosen] { chosen = [arguments] { return calibrate_mount(*arguments); }; });
+}
+
+}  // namespace railfix::tool

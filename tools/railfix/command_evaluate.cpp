@@ -1,0 +1,59 @@
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "commands.hpp"
+#include "core/result.hpp"
+#include "evaluation/evaluation.hpp"
+#include "evaluation/html_report.hpp"
+
+namespace railfix::tool {
+namespace {
+
+struct Options {
+  std::string truth;
+  std::string run;
+  std::string json;
+  std::string report;
+};
+
+void write_file(const std::string& name, const std::string& content) {
+  std::ofstream file(name);
+  file << content;
+  file.close();
+  if (!file) throw core::BadInput(name + " cannot be written; check the folder and its permissions");
+}
+
+int evaluate(const Options& options) {
+  const auto truth = core::value_or_throw(evaluation::Truth::read(options.truth));
+  const auto run = core::value_or_throw(evaluation::read_run(options.run));
+  const auto result = evaluation::evaluate(truth, run);
+  if (!options.report.empty()) {
+    const auto name = std::filesystem::absolute(options.run + "/").parent_path().filename().string();
+    write_file(options.report, evaluation::html_report(truth, result, name));
+  }
+  const std::string json = evaluation::to_json(result).dump(2) + "\n";
+  if (options.json == "-") {
+    std::cout << json;
+  } else {
+    evaluation::print(result, std::cout);
+    if (!options.json.empty()) write_file(options.json, json);
+  }
+  return 0;
+}
+
+}  // namespace
+
+void add_evaluate(CLI::App& app, Action& chosen) {
+  auto* command = app.add_subcommand("evaluate", "Judge a run against the truth of its dataset");
+  command->footer("Example: railfix evaluate --truth SEQ/truth --run OUT --json figures.json --report report.html");
+  auto options = std::make_shared<Options>();
+  command->add_option("--truth", options->truth, "Folder with track.csv and landmarks.csv (SEQ/truth)")->required();
+  command->add_option("--run", options->run, "Folder that `railfix run --out` wrote")->required();
+  command->add_option("--json", options->json, "Write all figures as JSON to this file, - = standard output alone");
+  command->add_option("--report", options->report, "Write a report with plots to this file (HTML)");
+  command->callback([options, &chosen] { chosen = [options] { return evaluate(*options); }; });
+}
+
+}  // namespace railfix::tool

@@ -1,0 +1,130 @@
+// `railfix run`: recorded data through the real services.
+#include <csignal>
+#include <iostream>
+
+#include "commands.hpp"
+#include "core/result.hpp"
+#include "progress.hpp"
+#include "run/draw_run.hpp"
+#include "run/live_table.hpp"
+#include "run/run_plan.hpp"
+#include "run/supervisor.hpp"
+#include "run_tables.hpp"
+
+namespace railfix::tool {
+namespace {
+
+constexpr double kConnectS = 30;
+constexpr double kAnswerS = 10;
+constexpr double kStopS = 15;
+constexpr double kTurnS = 0.1;
+
+volatile std::sig_atomic_t interrupted = 0;
+
+std::vector<std::string> names_of(const std::vector<ServiceProgram>& programs) {
+  std::vector<std::string> names;
+  for (const auto& program : programs) names.push_back(program.service);
+  return names;
+}
+
+void start_services(Processes& processes, const std::vector<ServiceProgram>& programs, const RunPlan& plan,
+                    const std::vector<std::string>& sets) {
+  std::vector<std::string> arguments{"--config", plan.config.string()};
+  for (const auto& set : sets) {
+    arguments.push_back("--set");
+    arguments.push_back(set);
+  }
+  for (const auto& program : programs) core::ok_or_throw(processes.start(program, arguments));
+}
+
+// Until the data has ended, was interrupted, or a service has died.
+void watch(Supervisor& supervisor, Processes& processes, const RunOptions& options, const RunPlan& plan) {
+  LiveTable table;
+  Progress progress("run", plan.pictures.value_or(0), options.pace == "real");
+  while (!supervisor.drained() && interrupted == 0) {
+    supervisor.turn(kTurnS);
+    if (const auto ended = processes.unexpected_end()) throw std::runtime_error(*ended);
+    if (options.pace == "real") table.update(supervisor.picture());
+    progress.update(supervisor.picture().views);
+  }
+  progress.finish();
+  table.finish(supervisor.picture());
+}
+
+// The recorder goes last, so that it hears everyone's last words.
+void stop_services(Processes& processes) {
+  auto before = processes.running();
+  std::erase(before, "recorder");
+  for (const auto& group : {before, std::vector<std::string>{"recorder"}}) {
+    const auto stopped = processes.stop(group, kStopS);
+    if (!stopped.ok()) throw std::runtime_error(stopped.error().message);
+  }
+}
+
+int run(const RunOptions& options) {
+  const auto plan = core::value_or_throw(plan_run(options));
+  const auto programs = core::value_or_throw(find_service_programs());
+  std::signal(SIGINT, [](int) { interrupted = 1; });
+  std::signal(SIGTERM, [](int) { interrupted = 1; });
+
+  messaging::ParticipantOptions network;
+  network.train_id = plan.train_id;
+  network.service = "run";
+  network.domain = options.domain;
+  Supervisor supervisor(network, names_of(programs));
+  Processes processes(options.out / "log");
+  start_services(processes, programs, plan, options.sets);
+  const auto connected = supervisor.wait_connected(processes, kConnectS);
+  if (!connected.ok()) throw std::runtime_error(connected.error().message);
+  const auto started = supervisor.command(processes, "frame_grabber", "start", "", kAnswerS);
+  if (!started.ok()) throw std::runtime_error(started.error().message);
+  watch(supervisor, processes, options, plan);
+  stop_services(processes);
+
+  const auto tables = core::value_or_throw(export_tables(options.out / "recording.mcap", options.out));
+  for (const auto& problem : tables.problems) std::cerr << "railfix: " << problem << '\n';
+  std::cout << "tables and recording.mcap are in " << options.out.string() << '\n';
+  if (!options.draw.empty()) std::cout << draw_run(options, options.out / "recording.mcap", options.draw) << '\n';
+  return interrupted == 0 ? 0 : 1;
+}
+
+}  // namespace
+
+void add_run(CLI::App& app, Action& chosen) {
+  auto options = std::make_shared<RunOptions>();
+  auto* command = app.add_subcommand("run", "Put a dataset, a video or a folder of pictures through the real services");
+  command->footer(
+      "Examples:\n"
+      "  railfix run --dataset SEQ --start 1:250:+ --out OUT        a dataset with its map, as fast as the services "
+      "can\n"
+      "  railfix run --dataset SEQ --pace real --out OUT           at the recorded rate, with a live table; counts "
+      "what is dropped\n"
+      "  railfix run --dataset cab.mp4 --camera camera.yaml --out OUT --draw OUT/drawn\n"
+      "OUT gets recording.mcap, the tables of the run (track_view.csv, odometry.csv, train_state.csv, tpr.csv, ...), "
+      "the services'\n"
+      "configuration (run.yaml) and logs (log/). `railfix evaluate` judges them against ground truth.");
+  command
+      ->add_option("--dataset,--pictures,--video", options->source,
+                   "Dataset folder (EuRoC or KITTI), folder of pictures, or video file")
+      ->required();
+  command->add_option("--camera", options->camera,
+                      "Calibration file (from `railfix calibrate`), when the source has none");
+  command->add_option("--fps", options->fps, "Pictures a second, for folders and videos without times")
+      ->check(CLI::Range(0.01, 1000.0));
+  command->add_option("--map", options->map, "Map (compiled, LandXML or OSM); the dataset's own when not given");
+  command->add_option("--start", options->start, "EDGE:OFFSET[:+|-] where the train stands, or unknown");
+  command
+      ->add_option("--pace", options->pace, "lossless: next picture when all have used the last; real: recorded rate")
+      ->check(CLI::IsMember({"real", "lossless"}))
+      ->capture_default_str();
+  command->add_option("--out", options->out, "Folder for the results")->required();
+  command->add_flag("--camera-only", options->camera_only, "Leave out wheel, IMU and GNSS");
+  command->add_option("--draw", options->draw, "Folder for the pictures with the rails drawn on them");
+  command->add_flag("!--no-pictures", options->record_pictures, "Leave the pictures out of the recording");
+  command->add_option("--config", options->config, "Services' settings (YAML) to begin with");
+  command->add_option("--set", options->sets, "section.key=value, over everything else; may be repeated");
+  command->add_option("--domain", options->domain, "DDS domain")->check(CLI::Range(0, 232))->capture_default_str();
+  command->callback([options, &chosen] { chosen = [options] { return run(*options); }; });
+}
+
+}  // namespace railfix::tool

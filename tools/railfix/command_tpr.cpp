@@ -1,0 +1,166 @@
+#include <cstdio>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "commands.hpp"
+#include "core/result.hpp"
+#include "etcs/layout.hpp"
+#include "etcs/report_json.hpp"
+
+namespace railfix::tool {
+
+namespace {
+
+using core::BadInput;
+using etcs::Baseline;
+
+std::string format(const char* pattern, double value) {
+  char text[64];
+  std::snprintf(text, sizeof text, pattern, value);
+  return text;
+}
+
+std::string distance_text(uint32_t raw, uint32_t q_scale) {
+  if (raw == etcs::kUnknownDistance) return "unknown, or more than 327.66 km";
+  return format(q_scale == 0 ? "%.1f m" : "%.0f m", raw * etcs::scale_m(q_scale));
+}
+
+std::string group_text(uint32_t nid_lrbg) {
+  if (nid_lrbg == etcs::kUnknownBaliseGroup) return "unknown";
+  return "country/region " + std::to_string(nid_lrbg >> 14U) + ", balise group " + std::to_string(nid_lrbg & 16383U);
+}
+
+template <size_t N>
+std::string one_of(const char* const (&names)[N], uint32_t value) {
+  return value < N ? names[value] : "spare";
+}
+
+/// What a raw value says, in units.
+std::string meaning(const std::string& name, uint32_t value, const etcs::TrainPositionReport& report) {
+  if (name == "NID_MESSAGE") return "train position report";
+  if (name == "L_MESSAGE") return "bytes";
+  if (name == "L_PACKET") return "bits";
+  if (name == "T_TRAIN") return value == etcs::kUnknownTime ? "unknown" : format("%.2f s", value * 0.01);
+  if (name == "NID_PACKET") return value == 0 ? "position report" : "position report based on two balise groups";
+  if (name == "Q_SCALE") return one_of({"10 cm", "1 m", "10 m"}, value);
+  if (name == "NID_LRBG" || name == "NID_PRVLRBG") return group_text(value);
+  if (name == "D_LRBG") return distance_text(value, report.q_scale) + " from the group to the estimated front end";
+  if (name == "L_DOUBTOVER") return distance_text(value, report.q_scale) + " behind the estimate: min safe front end";
+  if (name == "L_DOUBTUNDER") return distance_text(value, report.q_scale) + " in front of it: max safe front end";
+  if (name == "Q_DIRLRBG") return "train orientation: " + one_of({"reverse", "nominal", "unknown"}, value);
+  if (name == "Q_DLRBG") return "front end on the side: " + one_of({"reverse", "nominal", "unknown"}, value);
+  if (name == "Q_DIRTRAIN") return "running direction: " + one_of({"reverse", "nominal", "unknown"}, value);
+  if (name == "Q_LENGTH" || name == "Q_INTEGRITY") {
+    return one_of(
+        {"no information", "integrity confirmed by a device", "integrity confirmed by the driver", "integrity lost"},
+        value);
+  }
+  if (name == "L_TRAININT") return std::to_string(value) + " m safe train length";
+  if (name == "V_TRAIN") return value == etcs::kStandstillSpeed ? "standstill" : std::to_string(value * 5) + " km/h";
+  if (name == "M_MODE") {
+    return one_of({"full supervision", "on sight", "staff responsible", "shunting", "unfitted", "sleeping", "stand by",
+                   "trip", "post trip", "system failure", "isolation", "non leading", "limited supervision",
+                   "national system", "reversing", "passive shunting", "automatic driving", "supervised manoeuvre"},
+                  value);
+  }
+  if (name == "M_LEVEL") return one_of({"level 0", "level NTC", "level 1", "level 2", "level 3"}, value);
+  return "";
+}
+
+void print_table(const nlohmann::ordered_json& json, const etcs::TrainPositionReport& report) {
+  std::printf("%-12s %10s  %s\n", "field", "value", "meaning");
+  for (const auto& [name, value] : json.items()) {
+    if (!value.is_number_unsigned() || name == "NID_C" || name == "NID_BG") continue;
+    const auto raw = value.get<uint32_t>();
+    std::printf("%-12s %10u  %s\n", name.c_str(), raw, meaning(name, raw, report).c_str());
+  }
+  for (const auto& packet : report.other_packets) {
+    const char* what = packet.nid_packet == 4   ? "error reporting"
+                       : packet.nid_packet == 5 ? "train running number"
+                                                : "external data";
+    std::string bits;
+    for (const bool bit : packet.content) bits += bit ? '1' : '0';
+    std::printf("packet %-5u %10zu  %s: %s\n", packet.nid_packet, packet.content.size(), what, bits.c_str());
+  }
+}
+
+int decode(const std::string& hex, Baseline baseline, bool json_wanted) {
+  const auto bytes = core::value_or_throw(etcs::parse_hex(hex));
+  const auto report = etcs::decode(bytes, baseline);
+  if (!report.ok()) {
+    const auto other = baseline == Baseline::b3 ? Baseline::b4 : Baseline::b3;
+    const bool fits_other = etcs::decode(bytes, other).ok();
+    const std::string hint =
+        fits_other ? " It reads well as --baseline " + std::to_string(static_cast<int>(other)) + "." : "";
+    throw BadInput(report.error().message + hint);
+  }
+  const auto json = etcs::to_json(report.value(), baseline);
+  if (json_wanted) {
+    std::cout << json.dump(2) << '\n';
+  } else {
+    print_table(json, report.value());
+  }
+  return 0;
+}
+
+int encode(const std::string& file, Baseline baseline) {
+  std::string text;
+  if (file == "-") {
+    text.assign(std::istreambuf_iterator<char>(std::cin), {});
+  } else {
+    std::ifstream stream(file);
+    if (!stream) throw BadInput(file + ": cannot be read; does it exist?");
+    text.assign(std::istreambuf_iterator<char>(stream), {});
+  }
+  const std::string where = file == "-" ? "standard input" : file;
+  const auto json = nlohmann::ordered_json::parse(text, nullptr, false);
+  if (json.is_discarded()) throw BadInput(where + ": not JSON.");
+  const auto report = etcs::report_from_json(json, baseline);
+  if (!report.ok()) throw BadInput(where + ": " + report.error().message);
+  std::cout << etcs::to_hex(core::value_or_throw(etcs::encode(report.value(), baseline))) << '\n';
+  return 0;
+}
+
+struct Options {
+  std::string hex;
+  std::string file;
+  int baseline = 3;
+  bool json = false;
+};
+
+}  // namespace
+
+void add_tpr(CLI::App& app, Action& chosen) {
+  auto options = std::make_shared<Options>();
+  auto* tpr = app.add_subcommand("tpr", "ETCS train position reports (message 136): from and to bits");
+  tpr->require_subcommand(1);
+  const auto add_baseline = [&](CLI::App* command) {
+    command->add_option("--baseline", options->baseline, "Layout: 3 = SUBSET-026 3.x, 4 = 4.0.0")
+        ->check(CLI::IsMember({3, 4}));
+  };
+
+  auto* decoder = tpr->add_subcommand(
+      "decode", "Explain a message, e.g. railfix tpr decode 880601D6F345402AF34000E48F68EB84D250014010C38830");
+  decoder->add_option("hex", options->hex, "The message in hexadecimal digits")->required();
+  decoder->add_flag("--json", options->json, "One JSON object with the raw values");
+  add_baseline(decoder);
+  decoder->callback([options, &chosen] {
+    chosen = [options] { return decode(options->hex, static_cast<Baseline>(options->baseline), options->json); };
+  });
+
+  auto* encoder = tpr->add_subcommand("encode", "Make a message, e.g. railfix tpr encode --json report.json");
+  encoder
+      ->add_option("--json", options->file, "File with the fields as `decode --json` prints them, - = standard input")
+      ->required();
+  add_baseline(encoder);
+  encoder->callback([options, &chosen] {
+    chosen = [options] { return encode(options->file, static_cast<Baseline>(options->baseline)); };
+  });
+}
+
+}  // namespace railfix::tool

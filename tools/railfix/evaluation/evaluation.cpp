@@ -1,0 +1,67 @@
+#include "evaluation/evaluation.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/time.hpp"
+
+namespace railfix::evaluation {
+
+std::vector<ServiceResult> judge_services(const std::vector<StatusRow>& rows) {
+  std::map<std::pair<std::string, std::string>, std::vector<const StatusRow*>> by_service;
+  for (const StatusRow& row : rows) by_service[{row.service, row.host}].push_back(&row);
+  std::vector<ServiceResult> results;
+  for (const auto& [name, its] : by_service) {
+    const auto of = [&its = its](double StatusRow::*field) {
+      std::vector<double> values;
+      for (const StatusRow* row : its) values.push_back(row->*field);
+      return summarise(std::move(values));
+    };
+    ServiceResult result;
+    result.service = name.first;
+    result.host = name.second;
+    result.frames_in = of(&StatusRow::frames_in).max;
+    result.frames_out = of(&StatusRow::frames_out).max;
+    result.dropped = of(&StatusRow::dropped).max;
+    result.latency_p50_ms = of(&StatusRow::latency_p50_ms).p50;
+    result.latency_p99_ms = of(&StatusRow::latency_p99_ms).max;
+    result.cpu_percent = of(&StatusRow::cpu_percent).mean;
+    result.rss_mb = of(&StatusRow::rss_mb).max;
+    result.last_state = its.back()->state;
+    results.push_back(result);
+  }
+  return results;
+}
+
+ReportResult judge_reports(const std::vector<ReportRow>& rows) {
+  ReportResult result;
+  std::vector<double> doubt;
+  for (const ReportRow& row : rows) {
+    ++result.reports;
+    result.with_position += row.position_known ? 1 : 0;
+    doubt.push_back(row.doubt_over_m + row.doubt_under_m);
+  }
+  result.doubt_m = summarise(std::move(doubt));
+  return result;
+}
+
+Evaluation evaluate(const Truth& truth, const RunTables& run) {
+  Evaluation result;
+  result.duration_s = core::seconds(truth.rows().back().stamp_ns - truth.rows().front().stamp_ns);
+  result.travelled_m = truth.travelled_m();
+  result.missing = run.missing;
+  if (run.odometry) result.odometry = judge_odometry(truth, *run.odometry);
+  if (run.states) result.position = judge_position(truth, *run.states);
+  if (run.views) result.views = judge_views(truth, *run.views);
+  if (run.rails) result.edges = judge_edges(truth, *run.rails);
+  if (run.sightings) result.sightings = judge_sightings(truth, *run.sightings);
+  if (run.fixes) {
+    result.fixes.emplace();
+    for (const FixRow& fix : *run.fixes) ++(*result.fixes)[fix.kind];
+  }
+  if (run.reports) result.reports = judge_reports(*run.reports);
+  if (run.status) result.services = judge_services(*run.status);
+  return result;
+}
+
+}  // namespace railfix::evaluation

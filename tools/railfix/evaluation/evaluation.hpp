@@ -1,0 +1,55 @@
+// `railfix evaluate`: a run's tables beside the truth, as figures, text and JSON.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include "evaluation/motion.hpp"
+#include "evaluation/seeing.hpp"
+
+namespace railfix::evaluation {
+
+struct ServiceResult {
+  std::string service;
+  std::string host;
+  double frames_in = 0;
+  double frames_out = 0;
+  double dropped = 0;
+  double latency_p50_ms = kUnknown;  // median of what the service said each second
+  double latency_p99_ms = kUnknown;  // the worst second
+  double cpu_percent = kUnknown;     // mean
+  double rss_mb = kUnknown;          // largest
+  std::string last_state;
+};
+std::vector<ServiceResult> judge_services(const std::vector<StatusRow>& rows);
+
+struct ReportResult {
+  size_t reports = 0;
+  size_t with_position = 0;
+  Summary doubt_m;  // over + under
+};
+ReportResult judge_reports(const std::vector<ReportRow>& rows);
+
+/// What is not in the run is nothing.
+struct Evaluation {
+  double duration_s = 0;
+  double travelled_m = 0;
+  std::optional<OdometryResult> odometry;
+  std::optional<PositionResult> position;
+  std::optional<ViewResult> views;
+  std::optional<EdgeResult> edges;
+  std::optional<SightingResult> sightings;
+  std::optional<std::map<std::string, size_t>> fixes;  // how many of each kind
+  std::optional<ReportResult> reports;
+  std::optional<std::vector<ServiceResult>> services;
+  std::vector<std::string> missing;
+};
+Evaluation evaluate(const Truth& truth, const RunTables& run);
+
+void print(const Evaluation& evaluation, std::ostream& out);
+nlohmann::ordered_json to_json(const Evaluation& evaluation);
+
+}  // namespace railfix::evaluation

@@ -1,0 +1,177 @@
+#include "evaluation/run_tables.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/csv_table.hpp"
+
+namespace railfix::evaluation {
+namespace {
+
+namespace fs = std::filesystem;
+using core::CsvTable;
+using core::Error;
+using core::Status;
+
+Status read(const fs::path& file, std::vector<OdometryRow>& rows) {
+  CsvTable table(file);
+  const size_t stamp = table.required({"stamp_ns"});
+  const size_t valid = table.required({"valid"});
+  const size_t distance = table.required({"distance_m"});
+  const size_t speed = table.required({"speed_mps"});
+  const size_t mode = table.required({"mode"});
+  while (table.next()) {
+    rows.push_back({table.integer(stamp), table.integer(valid) != 0, table.number_or_nan(distance),
+                    table.number_or_nan(speed), table.text(mode)});
+  }
+  return table.status();
+}
+
+Status read(const fs::path& file, std::vector<StateRow>& rows) {
+  CsvTable table(file);
+  const size_t stamp = table.required({"stamp_ns"});
+  const size_t known = table.required({"track_known"});
+  const size_t distance = table.required({"distance_m"});
+  const size_t speed = table.required({"speed_mps"});
+  const size_t over = table.required({"over_m"});
+  const size_t under = table.required({"under_m"});
+  const size_t integrity = table.required({"integrity"});
+  const size_t easting = table.required({"easting_m"});
+  const size_t northing = table.required({"northing_m"});
+  while (table.next()) {
+    StateRow row;
+    row.stamp_ns = table.integer(stamp);
+    row.track_known = table.integer(known) != 0;
+    row.distance_m = table.number_or_nan(distance);
+    row.speed_mps = table.number_or_nan(speed);
+    row.over_m = table.number_or_nan(over);
+    row.under_m = table.number_or_nan(under);
+    row.integrity = table.text(integrity);
+    row.easting_m = table.number_or_nan(easting);
+    row.northing_m = table.number_or_nan(northing);
+    rows.push_back(row);
+  }
+  return table.status();
+}
+
+Status read(const fs::path& file, std::vector<ViewRow>& rows) {
+  CsvTable table(file);
+  const size_t stamp = table.required({"stamp_ns"});
+  const size_t seen = table.required({"seen"});
+  std::array<size_t, kViewFields> values{};
+  std::array<size_t, kViewFields> sigmas{};
+  for (size_t i = 0; i < kViewFields; ++i) {
+    values[i] = table.required({kViewFieldNames[i]});
+    sigmas[i] = table.required({std::string(kViewFieldNames[i]) + "_sigma"});
+  }
+  while (table.next()) {
+    ViewRow row;
+    row.stamp_ns = table.integer(stamp);
+    row.seen = table.integer(seen) != 0;
+    for (size_t i = 0; i < kViewFields; ++i) {
+      row.value[i] = table.number_or_nan(values[i]);
+      row.sigma[i] = table.number_or_nan(sigmas[i]);
+    }
+    rows.push_back(row);
+  }
+  return table.status();
+}
+
+Status read(const fs::path& file, std::vector<RailPoint>& rows) {
+  CsvTable table(file);
+  const size_t stamp = table.required({"stamp_ns"});
+  const size_t rail = table.required({"rail"});
+  const size_t u = table.required({"u_px"});
+  const size_t v = table.required({"v_px"});
+  while (table.next()) {
+    const std::string side = table.text(rail);
+    if (side != "L" && side != "R") table.refuse("has the rail '" + side + "', which must be L or R");
+    rows.push_back({table.integer(stamp), side == "L", table.finite(u), table.finite(v)});
+  }
+  return table.status();
+}
+
+Status read(const fs::path& file, std::vector<SightingRow>& rows) {
+  CsvTable table(file);
+  const size_t stamp = table.required({"stamp_ns"});
+  const size_t kind = table.required({"kind"});
+  const size_t ahead = table.required({"distance_ahead_m"});
+  while (table.next()) rows.push_back({table.integer(stamp), table.text(kind), table.finite(ahead)});
+  return table.status();
+}
+
+Status read(const fs::path& file, std::vector<FixRow>& rows) {
+  CsvTable table(file);
+  const size_t kind = table.required({"kind"});
+  while (table.next()) rows.push_back({table.text(kind)});
+  return table.status();
+}
+
+Status read(const fs::path& file, std::vector<ReportRow>& rows) {
+  CsvTable table(file);
+  const size_t stamp = table.required({"stamp_ns"});
+  const size_t distance = table.required({"d_lrbg_m"});
+  const size_t over = table.required({"l_doubtover_m"});
+  const size_t under = table.required({"l_doubtunder_m"});
+  while (table.next()) {
+    rows.push_back({table.integer(stamp), std::isfinite(table.number_or_nan(distance)), table.number_or_nan(over),
+                    table.number_or_nan(under)});
+  }
+  return table.status();
+}
+
+Status read(const fs::path& file, std::vector<StatusRow>& rows) {
+  CsvTable table(file);
+  const size_t service = table.required({"service"});
+  const size_t host = table.required({"host"});
+  const size_t state = table.required({"state"});
+  const size_t numbers[] = {table.required({"frames_in"}),      table.required({"frames_out"}),
+                            table.required({"dropped"}),        table.required({"latency_p50_ms"}),
+                            table.required({"latency_p99_ms"}), table.required({"cpu_percent"}),
+                            table.required({"rss_mb"})};
+  while (table.next()) {
+    double value[std::size(numbers)];
+    for (size_t i = 0; i < std::size(numbers); ++i) value[i] = table.number_or_nan(numbers[i]);
+    rows.push_back({table.text(service), table.text(host), table.text(state), value[0], value[1], value[2], value[3],
+                    value[4], value[5], value[6]});
+  }
+  return table.status();
+}
+
+template <class Row>
+Status read_if_there(const fs::path& folder, const std::string& name, std::optional<std::vector<Row>>& rows,
+                     std::vector<std::string>& missing) {
+  if (!fs::exists(folder / name)) {
+    missing.push_back(name);
+    return {};
+  }
+  rows.emplace();
+  const Status status = read(folder / name, *rows);
+  if constexpr (requires(Row row) { row.stamp_ns; }) {
+    std::stable_sort(rows->begin(), rows->end(), [](const Row& a, const Row& b) { return a.stamp_ns < b.stamp_ns; });
+  }
+  return status;
+}
+
+}  // namespace
+
+core::Result<RunTables> read_run(const fs::path& folder) {
+  if (!fs::is_directory(folder)) return Error{folder.string() + " is not a folder; give the --out folder of a run"};
+  RunTables run;
+  for (const Status& status : {read_if_there(folder, "odometry.csv", run.odometry, run.missing),
+                               read_if_there(folder, "train_state.csv", run.states, run.missing),
+                               read_if_there(folder, "track_view.csv", run.views, run.missing),
+                               read_if_there(folder, "rails.csv", run.rails, run.missing),
+                               read_if_there(folder, "sightings.csv", run.sightings, run.missing),
+                               read_if_there(folder, "position_fix.csv", run.fixes, run.missing),
+                               read_if_there(folder, "tpr.csv", run.reports, run.missing),
+                               read_if_there(folder, "status.csv", run.status, run.missing)}) {
+    if (!status.ok()) return status.error();
+  }
+  constexpr size_t kTables = 8;
+  if (run.missing.size() == kTables)
+    return Error{folder.string() + " holds no table of a run (odometry.csv, train_state.csv, ...)"};
+  return run;
+}
+
+}  // namespace railfix::evaluation

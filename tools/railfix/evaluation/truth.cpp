@@ -1,0 +1,106 @@
+#include "evaluation/truth.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/units.hpp"
+
+namespace railfix::evaluation {
+
+using core::Error;
+using dataset::TruthRow;
+
+core::Result<Truth> Truth::read(const std::filesystem::path& folder) {
+  auto rows = dataset::read_truth(folder / "track.csv");
+  if (!rows.ok()) return rows.error();
+  if (rows.value().size() < 2) return Error{(folder / "track.csv").string() + " needs at least two rows"};
+  std::optional<std::vector<dataset::TruthLandmark>> landmarks;
+  if (std::filesystem::exists(folder / "landmarks.csv")) {
+    auto read = dataset::read_truth_landmarks(folder / "landmarks.csv");
+    if (!read.ok()) return read.error();
+    landmarks = std::move(read).value();
+  }
+  const auto calibration =
+      dataset::find_calibration(std::filesystem::absolute(folder / "").parent_path().parent_path());
+  if (!calibration.ok()) return calibration.error();
+  return Truth(std::move(rows).value(), std::move(landmarks), calibration.value());
+}
+
+Truth::Truth(std::vector<TruthRow> rows, std::optional<std::vector<dataset::TruthLandmark>> landmarks,
+             std::optional<dataset::CameraCalibration> calibration)
+    : rows_(std::move(rows)), landmarks_(std::move(landmarks)), calibration_(std::move(calibration)) {
+  for (const TruthRow& row : rows_) {
+    if (!std::isfinite(row.curvature_per_m)) continue;
+    const double vertical = std::isfinite(row.vertical_curvature_per_m) ? row.vertical_curvature_per_m : 0.0;
+    bends_.push_back({row.distance_m, row.curvature_per_m, vertical});
+  }
+  std::stable_sort(bends_.begin(), bends_.end(),
+                   [](const Bend& a, const Bend& b) { return a.distance_m < b.distance_m; });
+}
+
+std::optional<TruthRow> Truth::at(int64_t stamp_ns) const {
+  if (stamp_ns < rows_.front().stamp_ns || stamp_ns > rows_.back().stamp_ns) return std::nullopt;
+  const auto next = std::lower_bound(rows_.begin(), rows_.end(), stamp_ns,
+                                     [](const TruthRow& row, int64_t stamp) { return row.stamp_ns < stamp; });
+  if (next->stamp_ns == stamp_ns) return *next;
+  const TruthRow& a = *(next - 1);
+  const TruthRow& b = *next;
+  const double share = static_cast<double>(stamp_ns - a.stamp_ns) / static_cast<double>(b.stamp_ns - a.stamp_ns);
+  const auto between = [share](double from, double to) { return from + share * (to - from); };
+  TruthRow row;
+  row.stamp_ns = stamp_ns;
+  row.distance_m = between(a.distance_m, b.distance_m);
+  row.speed_mps = between(a.speed_mps, b.speed_mps);
+  row.acceleration_mps2 = between(a.acceleration_mps2, b.acceleration_mps2);
+  row.camera.roll_rad = between(a.camera.roll_rad, b.camera.roll_rad);
+  row.camera.pitch_rad = between(a.camera.pitch_rad, b.camera.pitch_rad);
+  row.camera.yaw_rad = between(a.camera.yaw_rad, b.camera.yaw_rad);
+  row.camera.lateral_m = between(a.camera.lateral_m, b.camera.lateral_m);
+  row.camera.height_m = between(a.camera.height_m, b.camera.height_m);
+  row.curvature_per_m = between(a.curvature_per_m, b.curvature_per_m);
+  row.vertical_curvature_per_m = between(a.vertical_curvature_per_m, b.vertical_curvature_per_m);
+  row.easting_m = between(a.easting_m, b.easting_m);
+  row.northing_m = between(a.northing_m, b.northing_m);
+  row.heading_rad = core::wrap_pi(a.heading_rad + share * core::wrap_pi(b.heading_rad - a.heading_rad));
+  return row;
+}
+
+Truth::Bend Truth::bend_at(double distance_m) const {
+  if (bends_.empty()) return {distance_m, 0, 0};
+  const auto next = std::lower_bound(bends_.begin(), bends_.end(), distance_m,
+                                     [](const Bend& bend, double d) { return bend.distance_m < d; });
+  if (next == bends_.begin()) return bends_.front();
+  if (next == bends_.end()) return bends_.back();
+  const Bend& a = *(next - 1);
+  const double share = (distance_m - a.distance_m) / (next->distance_m - a.distance_m);
+  return {distance_m, a.curvature_per_m + share * (next->curvature_per_m - a.curvature_per_m),
+          a.vertical_per_m + share * (next->vertical_per_m - a.vertical_per_m)};
+}
+
+std::vector<Truth::Offset> Truth::track_ahead(const TruthRow& train, const std::vector<double>& ahead_m) const {
+  std::vector<Offset> offsets;
+  Offset slope;
+  Offset offset;
+  double x = 0;
+  for (const double ahead : ahead_m) {
+    // Curvature taken constant over each step, at its middle: exact for constant and near enough for changing
+    // curvature.
+    const double step = ahead - x;
+    const Bend bend = bend_at(train.distance_m + x + step / 2);
+    offset.y_m += slope.y_m * step + bend.curvature_per_m * step * step / 2;
+    offset.z_m += slope.z_m * step + bend.vertical_per_m * step * step / 2;
+    slope.y_m += bend.curvature_per_m * step;
+    slope.z_m += bend.vertical_per_m * step;
+    x = ahead;
+    offsets.push_back(offset);
+  }
+  return offsets;
+}
+
+double Truth::travelled_m() const {
+  double sum = 0;
+  for (size_t i = 1; i < rows_.size(); ++i) sum += std::abs(rows_[i].distance_m - rows_[i - 1].distance_m);
+  return sum;
+}
+
+}  // namespace railfix::evaluation

@@ -1,0 +1,52 @@
+// What was really so: the truth tables of a dataset, at any time and any distance.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "core/result.hpp"
+#include "dataset/dataset.hpp"
+
+namespace railfix::evaluation {
+
+class Truth {
+ public:
+  /// `folder` is SEQ/truth: track.csv, and when there are any landmarks.csv and the camera's calibration of SEQ.
+  static core::Result<Truth> read(const std::filesystem::path& folder);
+  /// REQUIRES: at least two rows in the order of their stamps.
+  Truth(std::vector<dataset::TruthRow> rows, std::optional<std::vector<dataset::TruthLandmark>> landmarks,
+        std::optional<dataset::CameraCalibration> calibration);
+
+  /// Linear between the two rows around the stamp; nothing outside the table.
+  [[nodiscard]] std::optional<dataset::TruthRow> at(int64_t stamp_ns) const;
+
+  struct Offset {
+    double y_m = 0;
+    double z_m = 0;
+  };
+  /// Where the track centre runs at each of these distances ahead (growing, > 0), against the track axes at the train:
+  /// curvature and vertical curvature of the table integrated twice.
+  [[nodiscard]] std::vector<Offset> track_ahead(const dataset::TruthRow& train,
+                                                const std::vector<double>& ahead_m) const;
+
+  [[nodiscard]] const std::vector<dataset::TruthRow>& rows() const { return rows_; }
+  [[nodiscard]] const std::optional<std::vector<dataset::TruthLandmark>>& landmarks() const { return landmarks_; }
+  [[nodiscard]] const std::optional<dataset::CameraCalibration>& calibration() const { return calibration_; }
+  /// Metres run, forward and back.
+  [[nodiscard]] double travelled_m() const;
+
+ private:
+  struct Bend {
+    double distance_m;
+    double curvature_per_m;
+    double vertical_per_m;
+  };
+  [[nodiscard]] Bend bend_at(double distance_m) const;
+  std::vector<dataset::TruthRow> rows_;
+  std::optional<std::vector<dataset::TruthLandmark>> landmarks_;
+  std::optional<dataset::CameraCalibration> calibration_;
+  std::vector<Bend> bends_;  // by distance
+};
+
+}  // namespace railfix::evaluation

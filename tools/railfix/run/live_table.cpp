@@ -1,0 +1,101 @@
+#include "run/live_table.hpp"
+
+#include <spdlog/fmt/fmt.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+
+#include "core/time.hpp"
+#include "core/units.hpp"
+
+namespace railfix::tool {
+namespace {
+
+constexpr int64_t kTerminalPeriodNs = core::kNsPerSecond;
+constexpr int64_t kLinePeriodNs = 10 * core::kNsPerSecond;
+
+const char* name_of_state(uint8_t state) {
+  switch (state) {
+    case msg::STATE_STARTING:
+      return "starting";
+    case msg::STATE_READY:
+      return "ready";
+    case msg::STATE_ACTIVE:
+      return "active";
+    case msg::STATE_DEGRADED:
+      return "degraded";
+    case msg::STATE_FAILED:
+      return "failed";
+    default:
+      return "stopped";
+  }
+}
+
+std::string position_line(const TrainPicture& picture) {
+  if (!picture.state) return "position: no train_state yet";
+  const auto& s = *picture.state;
+  const double elapsed_s = core::seconds(picture.data_ns - picture.data_begin_ns);
+  const std::string where =
+      s.track_known() != 0 ? fmt::format("edge {} at {:.2f} m", s.edge(), s.offset_m()) : "track not yet known";
+  const char* integrity = s.integrity() == msg::INTEGRITY_OK         ? "ok"
+                          : s.integrity() == msg::INTEGRITY_DEGRADED ? "degraded"
+                                                                     : "unusable";
+  return fmt::format("{:6.1f} s  {}  -{:.2f}/+{:.2f} m  {:.1f} km/h{}  travelled {:.1f} m  integrity {}", elapsed_s,
+                     where, s.over_m(), s.under_m(), core::kmh_from_mps(s.speed_mps()),
+                     s.standstill() != 0 ? " (standstill)" : "", s.distance_m(), integrity);
+}
+
+std::string counts_line(const TrainPicture& picture) {
+  const double seen =
+      picture.views == 0 ? 0 : 100.0 * static_cast<double>(picture.views_seen) / static_cast<double>(picture.views);
+  std::string line = fmt::format("rails seen {:.1f} % of {} pictures  sightings {}  position reports {}", seen,
+                                 picture.views, picture.sightings, picture.reports);
+  if (picture.report && picture.report->nid_lrbg() != 0xFFFFFF) {
+    line += fmt::format("  last: LRBG {}/{} + {:.1f} m", picture.report->nid_lrbg() >> 14U,
+                        picture.report->nid_lrbg() & 0x3FFFU, picture.report->d_lrbg_m());
+  }
+  return line;
+}
+
+}  // namespace
+
+std::string table_of(const TrainPicture& picture) {
+  std::string text = position_line(picture) + "\n" + counts_line(picture) + "\n";
+  text += fmt::format("{:<15} {:<9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>6} {:>7}  {}\n", "service", "state", "in", "out",
+                      "dropped", "p50 ms", "p99 ms", "cpu %", "MB", "reason");
+  for (const auto& [name, s] : picture.services) {
+    const bool silent = s.state() != msg::STATE_STOPPED && picture.silent.contains(name);
+    text += fmt::format("{:<15} {:<9} {:>8} {:>8} {:>8} {:>8.1f} {:>8.1f} {:>6.1f} {:>7.1f}  {}\n", name,
+                        silent ? "SILENT" : name_of_state(s.state()), s.frames_in(), s.frames_out(), s.dropped(),
+                        s.latency_p50_ms(), s.latency_p99_ms(), s.cpu_percent(), s.rss_mb(), s.reason().c_str());
+  }
+  for (const auto& line : picture.log) text += "! " + line + "\n";
+  return text;
+}
+
+LiveTable::LiveTable() : terminal_(isatty(STDOUT_FILENO) == 1) {}
+
+void LiveTable::update(const TrainPicture& picture) {
+  const int64_t now_ns = core::monotonic_ns();
+  if (now_ns - drawn_ns_ < (terminal_ ? kTerminalPeriodNs : kLinePeriodNs)) return;
+  drawn_ns_ = now_ns;
+  if (terminal_) return draw(picture);
+  std::printf("%s\n", position_line(picture).c_str());
+  std::fflush(stdout);
+}
+
+void LiveTable::finish(const TrainPicture& picture) {
+  draw(picture);
+}
+
+void LiveTable::draw(const TrainPicture& picture) {
+  const std::string text = table_of(picture);
+  // Up to where the last table began, then every line cleared to its end: no flicker, no scrolling.
+  if (terminal_ && drawn_lines_ > 0) std::printf("\x1b[%zuA\x1b[J", drawn_lines_);
+  std::fputs(text.c_str(), stdout);
+  std::fflush(stdout);
+  drawn_lines_ = static_cast<size_t>(std::count(text.begin(), text.end(), '\n'));
+}
+
+}  // namespace railfix::tool

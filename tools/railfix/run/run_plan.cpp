@@ -1,0 +1,114 @@
+#include "run/run_plan.hpp"
+
+#include <unistd.h>
+#include <yaml-cpp/yaml.h>
+
+#include <fstream>
+
+#include "dataset/dataset.hpp"
+#include "track/import/build.hpp"
+#include "track/map.hpp"
+
+namespace railfix::tool {
+namespace {
+
+core::Result<std::filesystem::path> prepare_map(const RunOptions& options) {
+  std::filesystem::path source = options.map;
+  if (source.empty()) {
+    const auto found = dataset::find_map(options.source);
+    if (!found) return std::filesystem::path();
+    source = *found;
+  }
+  if (!std::filesystem::exists(source)) return core::Error{source.string() + " does not exist; --map needs a map file"};
+  if (track::Map::load(source).ok()) return std::filesystem::absolute(source);
+  const auto built = track::build_map({source}, {});
+  if (!built.ok()) return built.error();
+  const auto compiled = std::filesystem::absolute(options.out / "line.map");
+  const auto saved = built.value().map.save(compiled);
+  if (!saved.ok()) return saved.error();
+  return compiled;
+}
+
+core::Result<YAML::Node> load_settings(const std::filesystem::path& file) {
+  if (file.empty()) return YAML::Node(YAML::NodeType::Map);
+  try {
+    YAML::Node settings = YAML::LoadFile(file.string());
+    if (!settings.IsMap()) return core::Error{file.string() + " must consist of sections, one for each service"};
+    return settings;
+  } catch (const YAML::BadFile&) {
+    return core::Error{file.string() + " cannot be opened; --config needs a YAML file"};
+  } catch (const YAML::Exception& error) {
+    return core::Error{file.string() + " line " + std::to_string(error.mark.line + 1) +
+                       ": not valid YAML: " + error.msg};
+  }
+}
+
+// What only the run knows; the rest of each section stays as the user or the default has it.
+void fill_settings(YAML::Node& settings, const RunOptions& options, const RunPlan& plan) {
+  const bool lossless = options.pace == "lossless";
+  settings["common"]["train_id"] = plan.train_id;
+  settings["common"]["domain"] = options.domain;
+  settings["common"]["lock_step"] = lossless;
+
+  YAML::Node grabber = settings["frame_grabber"];
+  grabber["source"] = std::filesystem::absolute(options.source).string();
+  grabber["calibration"] = options.camera.empty() ? "" : std::filesystem::absolute(options.camera).string();
+  grabber["fps"] = options.fps;
+  grabber["pace"] = options.pace;
+  grabber["start"] = "command";
+  if (lossless) {
+    for (const char* service : {"sensor_gateway", "track_detector", "odometry", "map_matcher", "fusion"}) {
+      grabber["wait_for"].push_back(service);
+    }
+    if (options.record_pictures) grabber["wait_for"].push_back("recorder");
+  }
+
+  YAML::Node gateway = settings["sensor_gateway"];
+  gateway["source"] = std::filesystem::absolute(options.source).string();
+  gateway["clock"] = "follow";
+  if (options.camera_only) {
+    for (const char* sensor : {"imu", "wheel", "gnss"}) gateway[sensor] = false;
+  }
+
+  for (const char* service : {"fusion", "map_matcher", "tpr_publisher"}) settings[service]["map"] = plan.map.string();
+  settings["fusion"]["start"] = options.start;
+  settings["recorder"]["map"] = plan.map.string();
+  settings["recorder"]["file"] = std::filesystem::absolute(options.out / "recording.mcap").string();
+  settings["recorder"]["pictures"] = options.record_pictures ? "jpeg" : "none";
+}
+
+}  // namespace
+
+core::Result<RunPlan> plan_run(const RunOptions& options) {
+  dataset::PictureOptions picture_options;
+  picture_options.fps = options.fps;
+  const auto pictures = dataset::open_pictures(options.source, picture_options);
+  if (!pictures.ok()) return pictures.error();
+
+  std::error_code failed;
+  std::filesystem::create_directories(options.out, failed);
+  if (failed) return core::Error{options.out.string() + " cannot be made: " + failed.message()};
+
+  RunPlan plan;
+  plan.pictures = pictures.value()->count();
+  plan.train_id = "run-" + std::to_string(getpid());
+  const auto map = prepare_map(options);
+  if (!map.ok()) return map.error();
+  plan.map = map.value();
+  if (plan.map.empty() && options.start != "unknown") {
+    return core::Error{"--start " + options.start + " needs a map: give --map, or put one into " +
+                       (options.source / "map").string()};
+  }
+
+  auto settings = load_settings(options.config);
+  if (!settings.ok()) return settings.error();
+  fill_settings(settings.value(), options, plan);
+  plan.config = std::filesystem::absolute(options.out / "run.yaml");
+  std::ofstream file(plan.config);
+  file << settings.value() << '\n';
+  file.close();
+  if (!file) return core::Error{plan.config.string() + " cannot be written; is the disk full?"};
+  return plan;
+}
+
+}  // namespace railfix::tool

@@ -1,0 +1,41 @@
+// What there is to know about a topic while listening to it: rate, gaps, losses. And which name was probably meant.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "messaging/messaging.hpp"
+
+namespace railfix::tool {
+
+class TopicStatistics {
+ public:
+  void add(const messaging::SampleInfo& info);
+
+  [[nodiscard]] uint64_t samples() const { return samples_; }
+  /// From the first to the last sample; 0 with less than two.
+  [[nodiscard]] double rate_hz() const;
+  [[nodiscard]] double shortest_gap_ms() const;
+  [[nodiscard]] double longest_gap_ms() const;
+  /// Samples that a writer sent and that never came.
+  [[nodiscard]] uint64_t lost() const { return lost_; }
+  /// From sending to receiving, of the last sample (meaningful when both hosts' clocks agree).
+  [[nodiscard]] double latency_ms() const { return latency_ms_; }
+
+ private:
+  uint64_t samples_ = 0;
+  uint64_t lost_ = 0;
+  int64_t first_ns_ = 0;
+  int64_t last_ns_ = 0;
+  int64_t shortest_ns_ = 0;
+  int64_t longest_ns_ = 0;
+  double latency_ms_ = 0;
+  std::map<uint64_t, uint64_t> last_sequence_;  // of each writer
+};
+
+/// Those of the names that are like the wanted one, the most alike first; at most five.
+std::vector<std::string> similar_names(const std::string& wanted, const std::vector<std::string>& names);
+
+}  // namespace railfix::tool
