@@ -1,0 +1,260 @@
+// frame_grabber and sensor_gateway as programs, over DDS, with this test as the third in lock step.
+#include <gmock/gmock.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <map>
+
+#include "core/time.hpp"
+#include "messaging/topics.hpp"
+#include "unit/dataset/temporary_folder.hpp"
+
+namespace railfix {
+namespace {
+
+using ::testing::HasSubstr;
+namespace topics = messaging::topics;
+
+constexpr int kDomain = 81;
+constexpr int64_t kPatienceNs = 20 * core::kNsPerSecond;
+constexpr int64_t kPeriodNs = 20'000'000;
+constexpr int kPictures = 40;
+constexpr int64_t kPictureNs = 20'000'000;
+constexpr int64_t kImuNs = 5'000'000;
+constexpr size_t kImuSamples = (kPictures - 1) * kPictureNs / kImuNs + 1;  // up to the last picture
+
+class Program {
+ public:
+  Program(const std::string& name, const std::vector<std::string>& sets) {
+    std::vector<std::string> words{std::string(RAILFIX_BIN_DIR) + "/" + name};
+    for (const auto& set : sets) words.insert(words.end(), {"--set", set});
+    std::vector<char*> argv;
+    for (auto& word : words) argv.push_back(word.data());
+    argv.push_back(nullptr);
+    pid_ = fork();  // other threads run here already: from now on nothing may allocate in the child
+    if (pid_ != 0) return;
+    execv(argv[0], argv.data());
+    _exit(127);
+  }
+  ~Program() {
+    if (exit_code_) return;
+    kill(pid_, SIGKILL);
+    waitpid(pid_, nullptr, 0);
+  }
+  Program(const Program&) = delete;
+  Program& operator=(const Program&) = delete;
+  /// Nothing while it runs.
+  std::optional<int> exit_code() {
+    int status = 0;
+    if (!exit_code_ && waitpid(pid_, &status, WNOHANG) == pid_)
+      exit_code_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128;
+    return exit_code_;
+  }
+
+ private:
+  pid_t pid_ = 0;
+  std::optional<int> exit_code_;
+};
+
+class Playback : public railfix::testing::TemporaryFolder {
+ protected:
+  Playback()
+      : train_("playback-" + std::to_string(getpid())),
+        participant_(options(train_)),
+        progress_(participant_, topics::data_progress),
+        control_(participant_, topics::service_control) {
+    listen<msg::DataClock>(topics::data_clock, [this](const msg::DataClock& clock) { clocks_.push_back(clock); });
+    listen<msg::ImuSample>(topics::imu_sample,
+                           [this](const msg::ImuSample& sample) { imu_.push_back(sample.stamp_ns()); });
+    listen<msg::WheelSample>(topics::wheel_sample,
+                             [this](const msg::WheelSample& sample) { wheel_.push_back(sample.pulses()); });
+    listen<msg::CameraFrame>(
+        topics::camera_frame, [this](const msg::CameraFrame& frame) { take(frame); }, "cam0");
+    listen<msg::CameraPreview>(
+        topics::camera_preview, [this](const msg::CameraPreview& preview) { preview_ = preview; }, "cam0");
+    listen<msg::CameraCalibration>(topics::camera_calibration,
+                                   [this](const msg::CameraCalibration& calibration) { calibration_ = calibration; });
+    listen<msg::ServiceStatus>(topics::service_status, [this](const msg::ServiceStatus& status) {
+      status_[status.service().c_str()] = status;
+      if (status.state() == msg::STATE_FAILED) failure_ = status.reason().c_str();
+    });
+  }
+
+  template <class T>
+  void listen(const messaging::Topic<T>& topic, std::function<void(const T&)> handler,
+              const std::string& instance = "") {
+    readers_.push_back(
+        std::make_shared<messaging::Reader<T>>(participant_, topic, instance, queue_, std::move(handler)));
+  }
+  static messaging::ParticipantOptions options(const std::string& train) {
+    messaging::ParticipantOptions options;
+    options.train_id = train;
+    options.domain = kDomain;
+    return options;
+  }
+
+  void SetUp() override {
+    TemporaryFolder::SetUp();
+    std::string pictures = "#timestamp [ns],filename\n";
+    for (int i = 0; i < kPictures; ++i) {
+      const std::string name = std::to_string(i) + ".png";
+      write_picture("mav0/cam0/data/" + name, 50 + i);
+      pictures += std::to_string(kBeginNs + i * kPictureNs) + "," + name + "\n";
+    }
+    write("mav0/cam0/data.csv", pictures);
+    write("mav0/cam0/sensor.yaml",
+          "resolution: [8, 6]\nintrinsics: [9, 9, 4, 3]\n"
+          "mount: {height_m: 2.2, pitch_rad: 0.1, yaw_rad: 0, roll_rad: 0, lateral_m: 0}\n");
+    std::string imu = "#timestamp [ns],w_x,w_y,w_z,a_x,a_y,a_z\n";
+    for (int64_t t = 0; t <= kPictures * kPictureNs; t += kImuNs)
+      imu += std::to_string(kBeginNs + t) + ",0,0,0,0,0,9.81\n";
+    write("mav0/imu0/data.csv", imu);
+    write("mav0/wheel0/data.csv", "#timestamp [ns],pulses\n" + std::to_string(kBeginNs + 1) + ",7\n");
+    write("mav0/wheel0/sensor.yaml", "pulses_per_metre: 10\n");
+  }
+
+  [[nodiscard]] std::vector<std::string> common(const std::string& service) const {
+    return {"common.train_id=" + train_, "common.domain=" + std::to_string(kDomain), "common.log_level=error",
+            service + ".source=" + root_.string(), service + ".at_end=finish"};
+  }
+  std::unique_ptr<Program> gateway(bool lock_step) {
+    auto sets = common("sensor_gateway");
+    if (lock_step) sets.push_back("common.lock_step=true");
+    return std::make_unique<Program>("railfix-sensor-gateway", sets);
+  }
+  std::unique_ptr<Program> grabber(std::vector<std::string> more) {
+    auto sets = common("frame_grabber");
+    sets.insert(sets.end(), more.begin(), more.end());
+    return std::make_unique<Program>("railfix-frame-grabber", sets);
+  }
+
+  template <class Condition>
+  bool run_until(Condition condition) {
+    const int64_t deadline_ns = core::monotonic_ns() + kPatienceNs;
+    while (!condition()) {
+      if (core::monotonic_ns() > deadline_ns) return false;
+      participant_.assert_liveliness();
+      queue_.run_one(core::monotonic_ns() + kPeriodNs);
+    }
+    return true;
+  }
+  /// Both services are ready and everyone has found everyone.
+  bool connected() {
+    const auto own = participant_.connections();
+    uint32_t endpoints = 0;
+    uint32_t matches = own.matches;
+    for (const auto& [name, status] : status_) {
+      endpoints += status.endpoints();
+      matches += status.matches();
+    }
+    return status_.size() == 2 && own.remote_endpoints == endpoints && matches == 2 * own.pairs;
+  }
+  void start() {
+    msg::ControlRequest request;
+    request.service("frame_grabber");
+    request.command("start");
+    control_.write(request);
+  }
+  void take(const msg::CameraFrame& frame) {
+    frames_.push_back({frame.seq(), frame.stamp_ns(), frame.health(), frame.data()[0]});
+    if (!answers_) return;
+    msg::DataProgress progress;
+    progress.service("tester");
+    progress.data_ns(frame.stamp_ns());
+    progress_.write(progress);
+  }
+
+  struct Frame {
+    uint64_t seq;
+    int64_t stamp_ns;
+    uint32_t health;
+    int grey;
+  };
+  static constexpr int64_t kBeginNs = 1'700'000'000'000'000'000;
+  std::string train_;
+  messaging::Queue queue_;
+  messaging::Participant participant_;
+  messaging::Writer<msg::DataProgress> progress_;
+  messaging::Writer<msg::ControlRequest> control_;
+  std::vector<std::shared_ptr<void>> readers_;
+  std::vector<msg::DataClock> clocks_;
+  std::vector<Frame> frames_;
+  std::vector<int64_t> imu_;
+  std::vector<int64_t> wheel_;
+  std::map<std::string, msg::ServiceStatus> status_;
+  std::optional<msg::CameraPreview> preview_;
+  std::optional<msg::CameraCalibration> calibration_;
+  std::string failure_;
+  bool answers_ = true;
+};
+
+TEST_F(Playback, LosslessGivesEveryPictureAndSampleOnceAndEnds) {
+  const auto sensors = gateway(true);
+  const auto pictures = grabber({"frame_grabber.pace=lossless", "frame_grabber.wait_for=[sensor_gateway, tester]"});
+  ASSERT_TRUE(run_until([&] { return connected(); }));
+  start();
+  ASSERT_TRUE(run_until([&] { return pictures->exit_code() && sensors->exit_code(); }));
+  EXPECT_EQ(pictures->exit_code(), 0);
+  EXPECT_EQ(sensors->exit_code(), 0);
+  ASSERT_TRUE(run_until([&] { return imu_.size() >= kImuSamples; })) << imu_.size();
+  ASSERT_EQ(frames_.size(), size_t{kPictures});
+  for (size_t i = 0; i < frames_.size(); ++i) {
+    EXPECT_EQ(frames_[i].seq, i + 1);
+    EXPECT_EQ(frames_[i].stamp_ns, kBeginNs + static_cast<int64_t>(i) * kPictureNs);
+    EXPECT_EQ(frames_[i].grey, 50 + static_cast<int>(i));
+    EXPECT_EQ(frames_[i].health, 0U);
+  }
+  ASSERT_EQ(imu_.size(), kImuSamples);
+  for (size_t i = 0; i < imu_.size(); ++i) EXPECT_EQ(imu_[i], kBeginNs + static_cast<int64_t>(i) * kImuNs);
+  EXPECT_THAT(wheel_, ::testing::ElementsAre(7));
+  ASSERT_EQ(clocks_.size(), size_t{kPictures + 1});
+  EXPECT_EQ(clocks_.back().ended(), 1);
+  EXPECT_EQ(clocks_.back().data_ns(), frames_.back().stamp_ns);
+  ASSERT_TRUE(calibration_);
+  EXPECT_TRUE(calibration_->mount_known());
+  EXPECT_EQ(calibration_->height_m(), 2.2);
+  ASSERT_TRUE(preview_);
+  EXPECT_EQ(preview_->width_px(), 8U);
+}
+
+TEST_F(Playback, LosslessNamesWhoDoesNotAnswer) {
+  answers_ = false;
+  const auto sensors = gateway(true);
+  const auto pictures = grabber(
+      {"frame_grabber.pace=lossless", "frame_grabber.wait_for=[sensor_gateway, tester]", "frame_grabber.wait_s=0.5"});
+  ASSERT_TRUE(run_until([&] { return connected(); }));
+  start();
+  ASSERT_TRUE(run_until([&] { return pictures->exit_code().has_value(); }));
+  EXPECT_EQ(pictures->exit_code(), 1);
+  EXPECT_THAT(failure_, HasSubstr("no answer on data_progress from tester for 0.5 s at picture 1"));
+  EXPECT_EQ(frames_.size(), 1U);
+}
+
+TEST_F(Playback, RealPaceTakesAsLongAsTheRecording) {
+  const auto sensors = gateway(false);
+  const auto pictures = grabber({"frame_grabber.pace=real"});
+  ASSERT_TRUE(run_until([&] { return connected(); }));
+  start();
+  ASSERT_TRUE(run_until([&] { return !frames_.empty(); }));
+  const int64_t first_ns = core::monotonic_ns();
+  ASSERT_TRUE(run_until([&] { return !clocks_.empty() && clocks_.back().ended() != 0; }));
+  EXPECT_NEAR(core::seconds(core::monotonic_ns() - first_ns), core::seconds((kPictures - 1) * kPictureNs), 0.2);
+  ASSERT_TRUE(run_until([&] { return pictures->exit_code() && sensors->exit_code(); }));
+  EXPECT_GT(frames_.size(), 0.8 * kPictures);  // other programs on this machine may cost a picture
+  EXPECT_TRUE(run_until([&] { return imu_.size() >= kImuSamples; })) << imu_.size();
+}
+
+TEST_F(Playback, WhatCannotBePlayedIsExitCodeTwo) {
+  write("mav0/cam0/sensor.yaml", "resolution: [80, 60]\nintrinsics: [9, 9, 4, 3]\n");
+  const auto pictures = grabber({});
+  ASSERT_TRUE(run_until([&] { return pictures->exit_code().has_value(); }));
+  EXPECT_EQ(pictures->exit_code(), 2);
+  write("mav0/imu0/data.csv", "#timestamp [ns],w_x,w_y,w_z,a_x,a_y,a_z\n1,2\n");
+  const auto sensors = gateway(false);
+  ASSERT_TRUE(run_until([&] { return sensors->exit_code().has_value(); }));
+  EXPECT_EQ(sensors->exit_code(), 2);
+}
+
+}  // namespace
+}  // namespace railfix

@@ -1,0 +1,241 @@
+// The recorder, `railfix replay` and `railfix topics` as real processes: what is replayed is recorded again unchanged.
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "core/time.hpp"
+#include "mcap/reader.hpp"
+#include "mcap/writer.hpp"
+#include "messaging/topics.hpp"
+#include "recorder/pictures.hpp"
+#include "support/program.hpp"
+
+namespace railfix {
+
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+constexpr int kSteps = 400;
+constexpr int64_t kStepNs = 5'000'000;
+constexpr int kPictures = 20;
+constexpr int64_t kPictureNs = 100'000'000;
+const std::string kDomain = "82";
+
+/// A program that runs beside the test.
+class Background {
+ public:
+  Background(const std::vector<std::string>& arguments, const fs::path& output) {
+    pid_ = fork();
+    if (pid_ != 0) return;
+    const int out = open(output.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
+    dup2(out, STDOUT_FILENO);
+    dup2(out, STDERR_FILENO);
+    const std::string program = std::string(RAILFIX_BIN_DIR) + "/" + arguments[0];
+    std::vector<char*> argv{const_cast<char*>(program.c_str())};
+    for (size_t i = 1; i < arguments.size(); ++i) argv.push_back(const_cast<char*>(arguments[i].c_str()));
+    argv.push_back(nullptr);
+    execv(program.c_str(), argv.data());
+    _exit(127);
+  }
+  ~Background() {
+    if (pid_ > 0) (void)end(SIGKILL);
+  }
+  Background(const Background&) = delete;
+  Background& operator=(const Background&) = delete;
+
+  /// Its exit code, 128 + signal when it died of one.
+  int end(int signal) {
+    if (signal != 0) kill(pid_, signal);
+    int status = 0;
+    waitpid(pid_, &status, 0);
+    pid_ = -1;
+    return WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status);
+  }
+
+ private:
+  pid_t pid_ = -1;
+};
+
+class RecordingTest : public ::testing::Test {
+ protected:
+  RecordingTest()
+      : train_(std::string("recording-") + std::to_string(getpid())),
+        folder_(fs::temp_directory_path() / ("railfix-" + train_)) {
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  ~RecordingTest() override { fs::remove_all(folder_); }
+
+  [[nodiscard]] fs::path source() const {
+    auto writer = mcap::Writer::create(folder_ / "source.mcap", {}).value();
+    const auto channel = [&](const std::string& topic, const messaging::Type& type) {
+      const uint16_t schema = writer->add_schema(type.name(), "omgidl", "").value();
+      return writer->add_channel(schema, topic, "cdr", {}).value();
+    };
+    const auto write = [&](uint16_t id, int64_t time_ns, const std::vector<uint8_t>& cdr) {
+      EXPECT_TRUE(writer->write({id, 0, kBegin + time_ns, kBegin + time_ns, cdr}).ok());
+    };
+    const uint16_t odometry = channel("odometry_step", messaging::type_of<msg::OdometryStep>());
+    for (int i = 0; i < kSteps; ++i) {
+      msg::OdometryStep step;
+      step.stamp_ns(i);
+      step.distance_m(0.5 * i);
+      write(odometry, i * kStepNs, messaging::serialize(step));
+    }
+    const uint16_t camera = channel("camera_frame/cam0", messaging::type_of<msg::CameraPreview>());
+    for (int i = 0; i < kPictures; ++i) {
+      msg::CameraPreview picture;
+      picture.seq(static_cast<uint64_t>(i));
+      const std::vector<uint8_t> pixels(640 * 480, static_cast<uint8_t>(10 * i));
+      picture.jpeg(recorder::encode_jpeg(pixels.data(), 640, 480, 95).value());
+      write(camera, i * kPictureNs, messaging::serialize(picture));
+    }
+    const uint16_t control = channel("service_control", messaging::type_of<msg::ControlRequest>());
+    msg::ControlRequest stop;
+    stop.service("*");
+    stop.command("stop");
+    write(control, kPictureNs, messaging::serialize(stop));
+    const auto status = writer->close();
+    EXPECT_TRUE(status.ok());
+    return folder_ / "source.mcap";
+  }
+
+  [[nodiscard]] std::vector<std::string> recorder(const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> arguments{"railfix-recorder",         "--set", "common.train_id=" + train_, "--set",
+                                       "common.domain=" + kDomain, "--set", "recorder.keep_free_mb=0"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  }
+  [[nodiscard]] test::Outcome railfix(std::vector<std::string> arguments) const {
+    arguments.insert(arguments.begin(), "railfix");
+    arguments.insert(arguments.end(), {"--train", train_, "--domain", kDomain});
+    return test::run_program(arguments, 60);
+  }
+  void wait_for_recorder() const {
+    const auto status = railfix({"topics", "echo", "service_status", "--count", "1", "--for", "30", "--json"});
+    ASSERT_EQ(status.exit_code, 0) << status.err;
+    EXPECT_EQ(nlohmann::json::parse(status.out)["service"], "recorder");
+  }
+
+  static constexpr int64_t kBegin = 1'700'000'000 * core::kNsPerSecond;
+  std::string train_;
+  fs::path folder_;
+};
+
+TEST_F(RecordingTest, WhatIsReplayedIsRecordedAgain) {
+  const auto recording = folder_ / "again.mcap";
+  Background recorder_program(recorder({"--set", "recorder.file=" + recording.string()}), folder_ / "recorder.log");
+  wait_for_recorder();
+  Background hz({"railfix", "topics", "hz", "odometry_step", "--json", "--count", std::to_string(kSteps / 2), "--for",
+                 "60", "--train", train_, "--domain", kDomain},
+                folder_ / "hz.json");
+  const auto replayed = railfix({"replay", source().string()});
+  EXPECT_EQ(replayed.exit_code, 0) << replayed.err;
+  EXPECT_THAT(replayed.out, HasSubstr(std::to_string(kSteps + kPictures) + " samples of 2 topics"));
+  EXPECT_EQ(hz.end(0), 0);
+  EXPECT_NEAR(nlohmann::json::parse(test::slurp(folder_ / "hz.json"))["rate_hz"].get<double>(), 200, 40);
+  EXPECT_EQ(recorder_program.end(SIGTERM), 0) << test::slurp(folder_ / "recorder.log");
+
+  auto reader = mcap::Reader::open(recording).value();
+  EXPECT_TRUE(reader->indexed()) << "SIGTERM closes the file properly";
+  int steps = 0;
+  int pictures = 0;
+  std::vector<double> gap_errors_ms;
+  int64_t last_ns = 0;
+  reader->for_each({}, [&](const mcap::Channel& channel, const mcap::Message& message) {
+    const std::vector<uint8_t> cdr(message.data.begin(), message.data.end());
+    EXPECT_NE(channel.topic, "service_control") << "commands of the past are not given again";
+    if (channel.topic == "odometry_step") {
+      msg::OdometryStep step;
+      EXPECT_TRUE(messaging::deserialize(cdr, step));
+      EXPECT_EQ(step.distance_m(), 0.5 * steps);
+      const double gap_ms = 1e3 * core::seconds(message.publish_time_ns - last_ns - kStepNs);
+      if (steps++ > 0) gap_errors_ms.push_back(std::abs(gap_ms));
+      last_ns = message.publish_time_ns;
+    } else if (channel.topic == "camera_frame/cam0") {
+      msg::CameraPreview picture;
+      EXPECT_TRUE(messaging::deserialize(cdr, picture));
+      const auto pixels = recorder::decode_jpeg(picture.jpeg());
+      EXPECT_TRUE(pixels.ok());
+      EXPECT_EQ(pixels.value().size(), cv::Size(640, 480));
+      EXPECT_NEAR(pixels.value().at<uint8_t>(240, 320), 10.0 * static_cast<double>(picture.seq()), 2);
+      ++pictures;
+    }
+    return true;
+  });
+  EXPECT_EQ(steps, kSteps);
+  EXPECT_EQ(pictures, kPictures);
+  ASSERT_FALSE(gap_errors_ms.empty());
+  std::ranges::sort(gap_errors_ms);
+  const double p50_ms = gap_errors_ms[gap_errors_ms.size() / 2];
+  const double p99_ms = gap_errors_ms[gap_errors_ms.size() * 99 / 100];
+  std::printf("replayed gaps differ from the recorded ones by p50 %.3f ms, p99 %.3f ms\n", p50_ms, p99_ms);
+  EXPECT_LT(p50_ms, 1.0);
+}
+
+TEST_F(RecordingTest, AKilledRecorderLosesNoWrittenChunk) {
+  const std::vector<std::string> settings{"--set", "recorder.folder=" + folder_.string(), "--set",
+                                          "recorder.chunk_age_s=0.05"};
+  Background killed(recorder(settings), folder_ / "recorder.log");
+  wait_for_recorder();
+  const auto replayed = railfix({"replay", source().string(), "--topics", "odometry_step", "--rate", "4"});
+  ASSERT_EQ(replayed.exit_code, 0) << replayed.err;
+  EXPECT_EQ(killed.end(SIGKILL), 128 + SIGKILL);
+
+  Background next(recorder(settings), folder_ / "recorder.log");
+  wait_for_recorder();
+  EXPECT_EQ(next.end(SIGTERM), 0);
+  fs::path recovered;
+  for (const auto& entry : fs::directory_iterator(folder_)) {
+    if (entry.path().stem().string().ends_with("-recovered")) recovered = entry.path();
+  }
+  ASSERT_FALSE(recovered.empty()) << test::slurp(folder_ / "recorder.log");
+  auto reader = mcap::Reader::open(recovered).value();
+  EXPECT_TRUE(reader->indexed());
+  int steps = 0;
+  reader->for_each({{"odometry_step"}, {}, {}},
+                   [&](const mcap::Channel&, const mcap::Message&) { return ++steps > 0; });
+  EXPECT_EQ(steps, kSteps) << "the replay lingers longer than a chunk's age";
+}
+
+TEST_F(RecordingTest, ReplayRefusesWhatCannotBeMeant) {
+  const auto missing = railfix({"replay", (folder_ / "none.mcap").string()});
+  EXPECT_EQ(missing.exit_code, 2);
+  EXPECT_THAT(missing.err, HasSubstr("cannot be read"));
+  const auto topic = railfix({"replay", source().string(), "--topics", "imu_sample"});
+  EXPECT_EQ(topic.exit_code, 2);
+  EXPECT_THAT(topic.err, HasSubstr("it has odometry_step, camera_frame/cam0, service_control"));
+  messaging::ParticipantOptions options;
+  options.train_id = train_;
+  options.domain = std::stoi(kDomain);
+  messaging::Participant running(options);
+  messaging::Writer<msg::OdometryStep> writer(running, messaging::topics::odometry_step);
+  const auto second = railfix({"replay", (folder_ / "source.mcap").string()});
+  EXPECT_EQ(second.exit_code, 2);
+  EXPECT_THAT(second.err, HasSubstr("is running: odometry_step has a writer already"));
+}
+
+TEST_F(RecordingTest, TopicsHelpWithNames) {
+  const auto wrong = railfix({"topics", "echo", "train_sate"});
+  EXPECT_EQ(wrong.exit_code, 2);
+  EXPECT_THAT(wrong.err, HasSubstr("did you mean train_state"));
+  messaging::ParticipantOptions options;
+  options.train_id = train_;
+  options.domain = std::stoi(kDomain);
+  messaging::Participant running(options);
+  messaging::Writer<msg::GnssFix> writer(running, messaging::topics::gnss_fix);
+  const auto list = railfix({"topics", "list", "--json", "--for", "2"});
+  ASSERT_EQ(list.exit_code, 0) << list.err;
+  const auto json = nlohmann::json::parse(list.out);
+  ASSERT_EQ(json.size(), 1U);
+  EXPECT_EQ(json[0]["topic"], "gnss_fix");
+  EXPECT_EQ(json[0]["type"], "railfix::msg::GnssFix");
+  EXPECT_EQ(json[0]["writers"], 1);
+}
+
+}  // namespace
+
+}  // namespace railfix

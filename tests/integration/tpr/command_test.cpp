@@ -1,0 +1,71 @@
+// `railfix tpr` as scripts use it: output, standard error, exit codes.
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "support/program.hpp"
+
+namespace railfix {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+constexpr const char* kCheckVector = "880601D6F345402AF34000E48F68EB84D250014010C38830";
+constexpr double kPatienceS = 20;
+
+test::Outcome tpr(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), {"railfix", "tpr"});
+  return test::run_program(arguments, kPatienceS);
+}
+
+class TprCommand : public ::testing::Test {
+ protected:
+  ~TprCommand() override { std::filesystem::remove(file_); }
+  std::string file_with(const std::string& text) {
+    std::ofstream(file_) << text;
+    return file_;
+  }
+  std::string file_ = std::filesystem::temp_directory_path() / ("tpr-" + std::to_string(getpid()) + ".json");
+};
+
+TEST_F(TprCommand, DecodesForPeople) {
+  const auto outcome = tpr({"decode", kCheckVector});
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_THAT(outcome.out, HasSubstr("140 km/h"));
+  EXPECT_THAT(outcome.out, HasSubstr("country/region 123, balise group 4567"));
+  EXPECT_EQ(outcome.err, "");
+}
+
+TEST_F(TprCommand, JsonGoesBothWays) {
+  const auto json = tpr({"decode", kCheckVector, "--json"});
+  EXPECT_EQ(json.exit_code, 0);
+  EXPECT_THAT(json.out, StartsWith("{"));
+  const auto hex = tpr({"encode", "--json", file_with(json.out)});
+  EXPECT_EQ(hex.exit_code, 0);
+  EXPECT_EQ(hex.out, std::string(kCheckVector) + "\n");
+}
+
+TEST_F(TprCommand, WrongInputGivesOneSentenceAndTwo) {
+  for (const auto& arguments :
+       std::vector<std::vector<std::string>>{{"decode", "88"},
+                                             {"decode", "8"},
+                                             {"decode", "zz"},
+                                             {"decode", kCheckVector, "--baseline", "4"},
+                                             {"encode", "--json", "/no/such/file"},
+                                             {"encode", "--json", file_with("{\"T_TRAIN\": 1}")}}) {
+    const auto outcome = tpr(arguments);
+    EXPECT_EQ(outcome.exit_code, 2) << arguments[1];
+    EXPECT_EQ(outcome.out, "");
+    EXPECT_THAT(outcome.err, StartsWith("railfix: "));
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+  }
+}
+
+TEST_F(TprCommand, SaysWhichBaselineWouldFit) {
+  EXPECT_THAT(tpr({"decode", kCheckVector, "--baseline", "4"}).err, HasSubstr("--baseline 3"));
+}
+
+}  // namespace
+}  // namespace railfix

@@ -1,0 +1,166 @@
+// A whole train: the real service programs over DDS on a short simulated dataset, judged against its ground truth.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "core/csv.hpp"
+#include "dataset/dataset.hpp"
+#include "mcap/reader.hpp"
+#include "messaging/topics.hpp"
+#include "support/program.hpp"
+
+namespace railfix {
+namespace {
+
+using ::testing::HasSubstr;
+namespace fs = std::filesystem;
+
+constexpr double kSimulateS = 240;
+constexpr double kRunS = 300;
+
+// One row of train_state.csv that matters here.
+struct State {
+  int64_t stamp_ns;
+  double easting_m, northing_m, heading_rad, over_m, under_m;
+  bool track_known;
+};
+
+class Train : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = fs::temp_directory_path() / ("railfix-train-" + std::to_string(getpid()));
+    simulated_ = test::run_program(
+        {"railfix", "simulate", "--out", sequence(), "--length-m", "450", "--speed-kmh", "72", "--size", "640x512",
+         "--rate-hz", "30", "--format", "jpg", "--seed", "11", "--start", "1:250"},
+        kSimulateS);
+    ran_ = test::run_program({"railfix", "run", "--dataset", sequence(), "--start", "1:250:+", "--out", out()}, kRunS);
+  }
+  static void TearDownTestSuite() { fs::remove_all(folder_); }
+  static std::string sequence() { return (folder_ / "seq").string(); }
+  static std::string out() { return (folder_ / "out").string(); }
+  void SetUp() override {
+    ASSERT_EQ(simulated_.exit_code, 0) << simulated_.err;
+    ASSERT_EQ(ran_.exit_code, 0) << ran_.err << ran_.out;
+  }
+
+  static std::vector<State> states() {
+    auto reader = core::CsvReader::open(fs::path(out()) / "train_state.csv");
+    EXPECT_TRUE(reader.ok());
+    auto& csv = reader.value();
+    const auto number = [&](const char* name) { return csv.number(*csv.column({name})).value(); };
+    std::vector<State> states;
+    while (csv.next()) {
+      states.push_back({csv.integer(*csv.column({"stamp_ns"})).value(), number("easting_m"), number("northing_m"),
+                        number("heading_rad"), number("over_m"), number("under_m"),
+                        csv.text(*csv.column({"track_known"})) == "1"});
+    }
+    return states;
+  }
+  static size_t rows(const std::string& table) {
+    auto reader = core::CsvReader::open(fs::path(out()) / table);
+    EXPECT_TRUE(reader.ok()) << table;
+    size_t count = 0;
+    while (reader.value().next()) ++count;
+    return count;
+  }
+
+  static fs::path folder_;
+  static test::Outcome simulated_;
+  static test::Outcome ran_;
+};
+fs::path Train::folder_;
+test::Outcome Train::simulated_;
+test::Outcome Train::ran_;
+
+TEST_F(Train, EveryPictureWentThroughDetectorOdometryAndFusion) {
+  const auto truth = dataset::read_truth(fs::path(sequence()) / "truth" / "track.csv");
+  ASSERT_TRUE(truth.ok());
+  const size_t pictures = dataset::open_pictures(sequence(), {}).value()->count().value();
+  ASSERT_GT(pictures, 300U);
+  EXPECT_EQ(rows("track_view.csv"), pictures);
+  EXPECT_EQ(rows("odometry.csv"), pictures);
+  EXPECT_EQ(rows("train_state.csv"), pictures);
+}
+
+TEST_F(Train, TheTrueTrainIsInsideTheConfidenceInterval) {
+  const auto truth = dataset::read_truth(fs::path(sequence()) / "truth" / "track.csv").value();
+  std::map<int64_t, const dataset::TruthRow*> by_stamp;
+  for (const auto& row : truth) by_stamp[row.stamp_ns] = &row;
+  size_t compared = 0;
+  double worst_m = 0;
+  for (const auto& state : states()) {
+    if (!state.track_known) continue;
+    const auto found = by_stamp.lower_bound(state.stamp_ns);
+    if (found == by_stamp.end() || found->first != state.stamp_ns) continue;
+    const auto& true_row = *found->second;
+    // Heading is clockwise from north: forward is (sin, cos) in (east, north).
+    const double ahead_m = (true_row.easting_m - state.easting_m) * std::sin(state.heading_rad) +
+                           (true_row.northing_m - state.northing_m) * std::cos(state.heading_rad);
+    ASSERT_LE(ahead_m, state.under_m) << "at " << state.stamp_ns;
+    ASSERT_GE(ahead_m, -state.over_m) << "at " << state.stamp_ns;
+    worst_m = std::max(worst_m, std::abs(ahead_m));
+    ++compared;
+  }
+  EXPECT_GT(compared, 300U);
+  EXPECT_LT(worst_m, 2.0);
+}
+
+TEST_F(Train, ReportsAreValidMessages136) {
+  auto reader = core::CsvReader::open(fs::path(out()) / "tpr.csv");
+  ASSERT_TRUE(reader.ok());
+  auto& csv = reader.value();
+  size_t reports = 0;
+  bool with_group = false;
+  while (csv.next()) {
+    const std::string hex(csv.text(*csv.column({"hex"})));
+    const auto decoded = test::run_program({"railfix", "tpr", "decode", hex, "--json"}, 10);
+    ASSERT_EQ(decoded.exit_code, 0) << hex << ": " << decoded.err;
+    const auto fields = nlohmann::json::parse(decoded.out);
+    EXPECT_EQ(fields["NID_MESSAGE"], 136);
+    EXPECT_EQ(fields["L_MESSAGE"], hex.size() / 2);
+    with_group = with_group || csv.integer(*csv.column({"nid_lrbg"})).value() != 16777215;
+    ++reports;
+  }
+  // 25 s of running with a report every 6 s, and events.
+  EXPECT_GE(reports, 4U);
+  EXPECT_TRUE(with_group) << "no report refers to a balise group";
+}
+
+TEST_F(Train, TheRecordingHoldsEveryTopic) {
+  auto recording = mcap::Reader::open(fs::path(out()) / "recording.mcap");
+  ASSERT_TRUE(recording.ok()) << recording.error().message;
+  std::set<std::string> recorded;
+  for (const auto& [id, channel] : recording.value()->channels())
+    recorded.insert(channel.topic.substr(0, channel.topic.find('/')));
+  for (const auto& topic : messaging::all_topics()) {
+    if (topic.name == "position_fix" || topic.name == "log_record") continue;  // events: may not happen in a short run
+    EXPECT_TRUE(recorded.contains(topic.name)) << topic.name;
+  }
+}
+
+TEST_F(Train, NothingWasDropped) {
+  auto reader = core::CsvReader::open(fs::path(out()) / "status.csv");
+  ASSERT_TRUE(reader.ok());
+  auto& csv = reader.value();
+  std::set<std::string> services;
+  while (csv.next()) {
+    services.emplace(csv.text(*csv.column({"service"})));
+    EXPECT_EQ(csv.integer(*csv.column({"dropped"})).value(), 0) << csv.text(*csv.column({"service"}));
+  }
+  EXPECT_THAT(services, ::testing::UnorderedElementsAre("frame_grabber", "sensor_gateway", "track_detector", "odometry",
+                                                        "map_matcher", "fusion", "tpr_publisher", "recorder"));
+}
+
+TEST(TrainRefuses, WhatItCannotRunWithOneSentence) {
+  const auto missing =
+      test::run_program({"railfix", "run", "--dataset", "/no/such/dataset", "--out", "/tmp/railfix-never"}, 20);
+  EXPECT_EQ(missing.exit_code, 2);
+  EXPECT_THAT(missing.err, HasSubstr("/no/such/dataset"));
+  EXPECT_FALSE(fs::exists("/tmp/railfix-never"));
+}
+
+}  // namespace
+}  // namespace railfix

@@ -1,0 +1,123 @@
+// The tables in docs/configuration say what the programs say: every key with its default, unit and range, and no other
+// key.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <regex>
+#include <string>
+#include <vector>
+
+namespace railfix {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Key {
+  std::string value;  // default as in the YAML file
+  std::string range;  // "[...]" at the end of the comment, without the brackets; empty where there is none
+  std::string file;
+};
+
+const fs::path kRoot = RAILFIX_SOURCE_DIR;
+
+std::vector<fs::path> files_below(const fs::path& folder, const std::string& extension) {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    if (entry.path().extension() == extension) files.push_back(entry.path());
+  }
+  return files;
+}
+
+// "section.group.key" of everything in a file that `railfix-<service> --document` wrote.
+void read_keys(const fs::path& file, std::map<std::string, Key>& keys) {
+  static const std::regex kLine(R"(( *)(\w+):(?: (.*))?)");
+  static const std::regex kRange(R"(.* \[([^\[\]]*)\])");
+  std::ifstream stream(file);
+  std::vector<std::string> groups;
+  std::string comment;
+  for (std::string line; std::getline(stream, line);) {
+    if (line.find_first_not_of(' ') != std::string::npos && line[line.find_first_not_of(' ')] == '#') {
+      comment = line;
+      continue;
+    }
+    std::smatch part;
+    if (!std::regex_match(line, part, kLine)) continue;
+    groups.resize(static_cast<size_t>(part.length(1)) / 2);
+    std::string path;
+    for (const auto& group : groups) path += group + ".";
+    std::smatch range;
+    if (part[3].matched) {
+      keys[path + part.str(2)] = {part[3], std::regex_match(comment, range, kRange) ? range.str(1) : "",
+                                  file.filename().string()};
+    } else {
+      groups.push_back(part[2]);
+    }
+  }
+}
+
+std::map<std::string, Key> keys_of_programs() {
+  std::map<std::string, Key> keys;
+  for (const auto& file : files_below(kRoot / "services", ".yaml")) read_keys(file, keys);
+  return keys;
+}
+
+// Rows "| `section.key` | default | unit, range | meaning |" of all pages.
+std::map<std::string, Key> keys_of_pages() {
+  static const std::regex kRow(R"(\| `(\w+(?:\.\w+)+)` \| (?:`(.*)`|empty) \| (.*?) \| .* \|)");
+  std::map<std::string, Key> keys;
+  for (const auto& file : files_below(kRoot / "docs" / "configuration", ".md")) {
+    std::ifstream stream(file);
+    for (std::string line; std::getline(stream, line);) {
+      std::smatch part;
+      if (std::regex_match(line, part, kRow)) keys[part[1]] = {part[2], part[3], file.filename().string()};
+    }
+  }
+  return keys;
+}
+
+TEST(ConfigurationPages, SayEveryKeyWithItsDefaultAndRange) {
+  const auto pages = keys_of_pages();
+  const auto programs = keys_of_programs();
+  ASSERT_GT(programs.size(), 100U);
+  for (const auto& [key, program] : programs) {
+    const auto page = pages.find(key);
+    if (page == pages.end()) {
+      ADD_FAILURE() << key << " of " << program.file << " stands on no page in docs/configuration";
+      continue;
+    }
+    const bool empty = program.value == "\"\"" || program.value == "[]";
+    EXPECT_EQ(page->second.value, empty ? "" : program.value) << "default of " << key << " in " << page->second.file;
+    if (!program.range.empty()) {
+      EXPECT_EQ(page->second.range, program.range) << "unit and range of " << key << " in " << page->second.file;
+    }
+  }
+}
+
+TEST(ConfigurationPages, SayNoKeyThatIsGone) {
+  const auto programs = keys_of_programs();
+  for (const auto& [key, page] : keys_of_pages()) {
+    EXPECT_TRUE(programs.contains(key)) << key << " in " << page.file << " is no key of any service";
+  }
+}
+
+// A relative link that leads nowhere is a page that has gone.
+TEST(Documentation, LinksLeadSomewhere) {
+  static const std::regex kLink(R"(\]\(([^)#:]+)\))");
+  auto pages = files_below(kRoot / "docs", ".md");
+  for (const char* folder : {"services", "common"}) {
+    for (const auto& page : files_below(kRoot / folder, ".md")) pages.push_back(page);
+  }
+  for (const auto& page : pages) {
+    std::ifstream stream(page);
+    const std::string text{std::istreambuf_iterator<char>(stream), {}};
+    for (std::sregex_iterator link(text.begin(), text.end(), kLink), end; link != end; ++link) {
+      EXPECT_TRUE(fs::exists(page.parent_path() / link->str(1))) << page << " links to " << link->str(1);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace railfix

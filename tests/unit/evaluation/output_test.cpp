@@ -1,0 +1,137 @@
+#include <gmock/gmock.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "evaluation/evaluation.hpp"
+#include "evaluation/html_report.hpp"
+#include "made_truth.hpp"
+#include "unit/dataset/temporary_folder.hpp"
+
+namespace railfix::evaluation {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+class RunFolder : public railfix::testing::TemporaryFolder {
+ protected:
+  void write_run() const {
+    write("out/odometry.csv",
+          "stamp_ns,valid,distance_m,speed_mps,lateral_speed_mps,yaw_rate_rps,step_sigma_m,mode\n"
+          "0,1,0,20,0,0,0.001,search\n10000000000,1,202,20,0,0,0.001,track\n20000000000,0,404,,,,,blind\n");
+    write("out/train_state.csv",
+          "stamp_ns,edge,offset_m,direction,track_known,distance_m,speed_mps,over_m,under_m,sigma_m,integrity,lat_deg,"
+          "lon_deg,"
+          "easting_m,northing_m,heading_rad\n"
+          "0,,,,0,0,20,,,,unusable,,,,,\n10000000000,1,5,forward,1,200,20,1,1,0.3,ok,,,5000,7200.5,0\n");
+    write("out/status.csv",
+          "stamp_ns,service,host,state,frames_in,frames_out,dropped,latency_p50_ms,latency_p99_ms,cpu_percent,rss_mb\n"
+          "1,odometry,cab,active,60,59,1,2.0,4.0,30,50\n2,fusion,coach,active,60,60,0,1.0,2.0,10,40\n"
+          "3,odometry,cab,degraded,120,118,2,3.0,9.0,50,60\n");
+  }
+};
+
+TEST_F(RunFolder, FiguresOfTheTablesThatAreThere) {
+  write_run();
+  const auto run = read_run(root_ / "out");
+  ASSERT_TRUE(run.ok()) << run.error().message;
+  EXPECT_THAT(run.value().missing,
+              ElementsAre("track_view.csv", "rails.csv", "sightings.csv", "position_fix.csv", "tpr.csv"));
+  const MadeTruth made;
+  const auto json = to_json(evaluate(made.make(), run.value()));
+  EXPECT_NEAR(json["odometry"]["drift_percent"].get<double>(), 1.0, 1e-9);
+  EXPECT_NEAR(json["odometry"]["blind_percent"].get<double>(), 100.0 / 3, 1e-9);
+  EXPECT_EQ(json["position"]["basis"], "map");
+  EXPECT_NEAR(json["position"]["position_error_m"]["max"].get<double>(), 0.5, 1e-6);
+  EXPECT_EQ(json["position"]["coverage_percent"], 100.0);
+  EXPECT_EQ(json["track_choice"]["known_percent"], 50.0);
+  EXPECT_TRUE(json["edges"].is_null());
+  EXPECT_TRUE(json["sightings"].is_null());
+  EXPECT_EQ(json["dropped"], 2.0);
+  ASSERT_EQ(json["services"].size(), 2U);
+  EXPECT_EQ(json["services"][1]["service"], "odometry");
+  EXPECT_EQ(json["services"][1]["frames_in"], 120.0);
+  EXPECT_EQ(json["services"][1]["latency_p50_ms"], 2.5);
+  EXPECT_EQ(json["services"][1]["latency_p99_ms"], 9.0);
+  EXPECT_EQ(json["services"][1]["cpu_percent"], 40.0);
+  EXPECT_EQ(json["services"][1]["last_state"], "degraded");
+}
+
+TEST_F(RunFolder, TextSaysWhatIsNotInTheRun) {
+  write_run();
+  std::ostringstream out;
+  print(evaluate(MadeTruth().make(), read_run(root_ / "out").value()), out);
+  EXPECT_THAT(out.str(), HasSubstr("drift                   1.0000 % of 400.000 m"));
+  EXPECT_THAT(out.str(), HasSubstr("rails.csv: not in this run"));
+  EXPECT_THAT(out.str(), Not(HasSubstr("nan")));
+}
+
+TEST_F(RunFolder, ReportNeedsNothingElse) {
+  write_run();
+  const Truth truth = MadeTruth().make();
+  const std::string html = html_report(truth, evaluate(truth, read_run(root_ / "out").value()), "a <run>");
+  EXPECT_THAT(html, HasSubstr("a &lt;run&gt;"));
+  for (const char* title : {"Distance error", "Position error along", "Speed", "Path on the map", "Stanford diagram"}) {
+    EXPECT_THAT(html, HasSubstr(std::string("aria-label=\"") + title)) << title;
+  }
+  for (const char* outside : {"http://", "https://", "<script", "<link", "nan"})
+    EXPECT_THAT(html, Not(HasSubstr(outside))) << outside;
+}
+
+TEST_F(RunFolder, EmptyTablesGiveNoFiguresAndNoCrash) {
+  for (const char* table :
+       {"odometry.csv:stamp_ns,valid,distance_m,speed_mps,mode", "rails.csv:stamp_ns,rail,u_px,v_px",
+        "train_state.csv:stamp_ns,track_known,distance_m,speed_mps,over_m,under_m,integrity,easting_m,northing_m",
+        "sightings.csv:stamp_ns,kind,distance_ahead_m", "position_fix.csv:kind",
+        "tpr.csv:stamp_ns,d_lrbg_m,l_doubtover_m,l_doubtunder_m",
+        "track_view.csv:stamp_ns,seen,roll_rad,pitch_rad,yaw_rad,lateral_m,height_m,curvature_per_m,vertical_curvature_"
+        "per_m,"
+        "roll_rad_sigma,pitch_rad_sigma,yaw_rad_sigma,lateral_m_sigma,height_m_sigma,curvature_per_m_sigma,"
+        "vertical_curvature_per_m_sigma",
+        "status.csv:service,host,state,frames_in,frames_out,dropped,latency_p50_ms,latency_p99_ms,cpu_percent,rss_"
+        "mb"}) {
+    const std::string text = table;
+    const size_t colon = text.find(':');
+    write("out/" + text.substr(0, colon), text.substr(colon + 1) + "\n");
+  }
+  MadeTruth made;
+  made.landmarks = {{{"frog", 1500, 0}}};
+  const Truth truth = made.make();
+  const auto run = read_run(root_ / "out");
+  ASSERT_TRUE(run.ok()) << run.error().message;
+  const auto evaluation = evaluate(truth, run.value());
+  EXPECT_TRUE(to_json(evaluation)["odometry"]["drift_percent"].dump() == "null");
+  std::ostringstream out;
+  print(evaluation, out);
+  EXPECT_THAT(html_report(truth, evaluation, "empty"), Not(HasSubstr("nan")));
+}
+
+TEST_F(RunFolder, BrokenInputIsASentence) {
+  EXPECT_THAT(read_run(root_ / "nothing").error().message, HasSubstr("is not a folder"));
+  EXPECT_THAT(read_run(root_).error().message, HasSubstr("holds no table"));
+  write("out/rails.csv", "stamp_ns,rail,u_px,v_px\n1,L,3,4\n2,X,3,4\n");
+  EXPECT_THAT(read_run(root_ / "out").error().message, HasSubstr("rails.csv line 3: has the rail 'X'"));
+  write("out/rails.csv", "stamp_ns,rail,u_px\n");
+  EXPECT_THAT(read_run(root_ / "out").error().message, HasSubstr("rails.csv line 1: has no column 'v_px'"));
+  write("seq/truth/track.csv", "timestamp,distance\n1,1\n");
+  EXPECT_THAT(Truth::read(root_ / "seq/truth").error().message, HasSubstr("at least two rows"));
+}
+
+TEST_F(RunFolder, TruthFolderWithLandmarksAndTheCamerasCalibration) {
+  write("seq/truth/track.csv", "timestamp,distance\n1,1\n2,2\n");
+  EXPECT_FALSE(Truth::read(root_ / "seq/truth").value().calibration().has_value());
+  write("seq/truth/landmarks.csv", "kind,distance,lateral\nfrog,1,0\n");
+  write("seq/mav0/cam0/sensor.yaml", "resolution: [8, 6]\nintrinsics: [5, 5, 4, 3]\n");
+  for (const char* spelling : {"seq/truth", "seq/truth/"}) {
+    const auto truth = Truth::read(root_ / spelling);
+    ASSERT_TRUE(truth.ok()) << truth.error().message;
+    EXPECT_TRUE(truth.value().calibration().has_value()) << spelling;
+    EXPECT_EQ(truth.value().landmarks()->size(), 1U);
+  }
+}
+
+}  // namespace
+}  // namespace railfix::evaluation

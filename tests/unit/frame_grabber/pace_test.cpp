@@ -1,0 +1,59 @@
+#include "frame_grabber/pace.hpp"
+
+#include <gtest/gtest.h>
+
+namespace railfix::frame_grabber {
+namespace {
+
+// Data:  100   110   120   130        Wall when asked:  5000 is the first picture
+TEST(RealPace, PicturesAreAsFarApartAsTheyWereRecorded) {
+  RealPace pace;
+  EXPECT_EQ(pace.ask(100, 5000).due_ns, 5000);
+  EXPECT_EQ(pace.ask(110, 5001).due_ns, 5010);
+  EXPECT_EQ(pace.ask(130, 5001).due_ns, 5030);
+}
+
+TEST(RealPace, OnePeriodLateIsPlayedMoreIsSkippedAndDoesNotShiftTheRest) {
+  RealPace pace;
+  EXPECT_FALSE(pace.ask(100, 5000).skip);
+  EXPECT_FALSE(pace.ask(110, 5020).skip);  // due 5010, exactly one period late
+  EXPECT_TRUE(pace.ask(120, 5031).skip);   // due 5020
+  const auto next = pace.ask(130, 5031);   // due 5030
+  EXPECT_FALSE(next.skip);
+  EXPECT_EQ(next.due_ns, 5030);
+}
+
+TEST(RealPace, PicturesOutOfOrderAreDueAtOnce) {
+  RealPace pace;
+  (void)pace.ask(100, 5000);
+  (void)pace.ask(120, 5010);
+  const auto old = pace.ask(110, 5021);
+  EXPECT_FALSE(old.skip);
+  EXPECT_EQ(old.due_ns, 5021);
+  EXPECT_EQ(pace.ask(140, 5021).due_ns, 5040);
+}
+
+TEST(LockStep, WaitsForEveryoneAndNamesWhoIsMissing) {
+  LockStep step({"odometry", "fusion"});
+  step.begin(100);
+  EXPECT_FALSE(step.done());
+  EXPECT_EQ(step.missing(), "fusion, odometry");
+  step.answered("odometry", 100);
+  step.answered("stranger", 100);
+  EXPECT_EQ(step.missing(), "fusion");
+  step.answered("fusion", 99);
+  EXPECT_FALSE(step.done());
+  step.answered("fusion", 105);
+  EXPECT_TRUE(step.done());
+  step.begin(110);
+  EXPECT_EQ(step.missing(), "fusion, odometry");
+}
+
+TEST(LockStep, NobodyToWaitForIsDone) {
+  LockStep step({});
+  step.begin(1);
+  EXPECT_TRUE(step.done());
+}
+
+}  // namespace
+}  // namespace railfix::frame_grabber

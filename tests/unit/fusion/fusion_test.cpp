@@ -1,0 +1,399 @@
+#include "fusion/fusion.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "unit/fusion/train_simulation.hpp"
+
+namespace railfix::fusion {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr int64_t kBeginNs = 1'600'000'000'000'000'000;
+int64_t at(double t_s) {
+  return kBeginNs + core::to_ns(t_s);
+}
+
+std::shared_ptr<const track::Map> straight_line() {
+  auto map = std::make_shared<track::Map>();
+  map->edges.push_back({1, "line", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{20000, 0, 0}})});
+  map->nodes = {{1, track::NodeKind::end, "", 0, 0}, {2, track::NodeKind::end, "", 0, 20000}};
+  return map;
+}
+
+Fusion fusion_at(double offset_m, const FusionParameters& parameters = {}) {
+  return core::value_or_throw(
+      Fusion::create(parameters, straight_line(), track::EdgePosition{1, offset_m, track::Direction::forward}));
+}
+Fusion fusion_without_start() {
+  return core::value_or_throw(Fusion::create({}, straight_line(), std::nullopt));
+}
+
+OdometryInput step_at(double t_s, double speed_mps, double period_s = 0.02) {
+  return {at(t_s), at(t_s - period_s), speed_mps * period_s, 0.001, true};
+}
+FixInput fix_at(double t_s, double offset_m, uint32_t landmark, double probability = 0.9999) {
+  return {at(t_s), 1, offset_m, 0.1, probability, landmark, FixKind::landmark, track::Direction::forward, nullptr};
+}
+WheelInput wheel_at(double t_s, double metres) {
+  return {at(t_s), static_cast<int64_t>(std::floor(metres * 100)), 100};
+}
+
+// Runs with constant speed from `from_s` to `to_s`; the last state.
+TrainEstimate run(Fusion& fusion, double from_s, double to_s, double speed_mps) {
+  std::optional<TrainEstimate> last;
+  for (int i = 1; from_s + i * 0.02 <= to_s + 1e-9; ++i) {
+    if (auto state = fusion.add(step_at(from_s + i * 0.02, speed_mps))) last = state;
+  }
+  EXPECT_TRUE(last);
+  return last.value_or(TrainEstimate{});
+}
+
+TEST(Fusion, CameraAloneGivesPlaceSpeedAndInterval) {
+  auto fusion = fusion_at(500);
+  const auto state = run(fusion, 0, 20, 10);
+  EXPECT_EQ(state.stamp_ns, at(20));
+  EXPECT_NEAR(state.distance_m, 200, 0.01);
+  EXPECT_NEAR(state.position.offset_m, 700, 0.01);
+  EXPECT_NEAR(state.northing_m, 700, 0.01);
+  EXPECT_NEAR(state.speed_mps, 10, 0.05);
+  EXPECT_TRUE(state.track_known);
+  EXPECT_EQ(state.integrity, Integrity::ok) << state.reason;
+  EXPECT_NEAR(state.since_reference_m, 200, 0.01);
+  EXPECT_TRUE(std::isnan(state.lat_deg));
+  EXPECT_EQ(state.sources, 1U << static_cast<int>(Source::camera));
+  // 1 % of scale must be admitted, and no more than the budget.
+  EXPECT_GT(state.over_m, 0.02 * 200);
+  EXPECT_LT(state.over_m, 5 + 0.05 * 200);
+}
+
+TEST(Fusion, WithoutMapDistanceAndSpeedRun) {
+  auto fusion = core::value_or_throw(Fusion::create({}, nullptr, std::nullopt));
+  const auto state = run(fusion, 0, 10, -5);
+  EXPECT_FALSE(state.track_known);
+  EXPECT_EQ(state.position.edge, 0U);
+  EXPECT_NEAR(state.distance_m, -50, 0.01);
+  EXPECT_NEAR(state.speed_mps, -5, 0.05);
+  EXPECT_THAT(state.reason, HasSubstr("place on the map not known"));
+}
+
+TEST(Fusion, NetworkFixStartsThePosition) {
+  auto fusion = fusion_without_start();
+  run(fusion, 0, 10, 20);
+  FixInput fix = fix_at(10, 4000, 0, 0.99);
+  fix.kind = FixKind::network;
+  fix.sigma_m = 3;
+  fix.direction = track::Direction::reverse;
+  fusion.add(fix);
+  const auto state = run(fusion, 10, 11, 20);
+  EXPECT_TRUE(state.track_known);
+  EXPECT_NEAR(state.position.offset_m, 3980, 0.1);
+  EXPECT_EQ(state.position.direction, track::Direction::reverse);
+  EXPECT_NEAR(state.distance_m, 220, 0.1);
+  EXPECT_GT(state.over_m, 4 * 3);
+  EXPECT_LT(state.over_m, 20);
+}
+
+TEST(Fusion, LandmarkIsIgnoredWhilePlaceIsUnknown) {
+  auto fusion = fusion_without_start();
+  run(fusion, 0, 1, 20);
+  fusion.add(fix_at(1, 4000, 7));
+  EXPECT_FALSE(run(fusion, 1, 2, 20).track_known);
+}
+
+TEST(Fusion, TwoLandmarksCalibrateTheCamerasScale) {
+  auto fusion = fusion_at(0);
+  double place_m = 0;
+  for (int k = 1; k <= 5; ++k) {
+    run(fusion, (k - 1) * 20.0, k * 20.0, 20);  // the camera says 400 m, truly it is 1 % more
+    place_m = k * 404.0;
+    fusion.add(fix_at(k * 20.0, place_m, static_cast<uint32_t>(k)));
+  }
+  const auto state = run(fusion, 100, 120, 20);
+  EXPECT_NEAR(state.visual_scale, 1.01, 0.001);
+  EXPECT_NEAR(state.position.offset_m, place_m + 404, 0.8);
+  EXPECT_EQ(state.reference, 5U);
+  EXPECT_NEAR(state.since_reference_m, 404, 1.0);
+  EXPECT_EQ(state.integrity, Integrity::ok) << state.reason;
+}
+
+// Motion alone says nothing of the scale; a filter that linearises badly believes otherwise.
+TEST(Fusion, ScaleIsNotLearntWithoutReferences) {
+  auto camera = fusion_at(0);
+  auto wheel = fusion_at(0);
+  core::Random random(4);
+  for (int i = 1; i <= 20000; ++i) {
+    auto step = step_at(i * 0.02, 25);
+    step.step_m += 0.001 * random.normal();
+    camera.add(step);
+    wheel.add(wheel_at(i * 0.02, 25 * i * 0.02));
+  }
+  EXPECT_NEAR(camera.estimator()->filter().scale(Odometer::camera), 1, 1e-9);
+  EXPECT_NEAR(wheel.estimator()->filter().scale(Odometer::wheel), 1, 1e-9);
+  EXPECT_NEAR(camera.estimator()->filter().scale_sigma(Odometer::camera), 0.01, 0.0005);
+  EXPECT_NEAR(wheel.estimator()->filter().scale_sigma(Odometer::wheel), 0.01, 0.0005);
+}
+
+TEST(Fusion, KeyFramesPinAStandingTrain) {
+  auto fusion = fusion_at(100);
+  fusion.add(OdometryInput{at(0.02), at(0), 0, 0.001, true});
+  core::Random random(3);
+  std::optional<TrainEstimate> state;
+  for (int i = 2; i < 15000; ++i) {
+    state = fusion.add(OdometryInput{at(i * 0.02), at(0), 0.001 * random.normal(), 0.001, true});
+  }
+  ASSERT_TRUE(state);
+  EXPECT_NEAR(state->distance_m, 0, 0.005);
+  EXPECT_NEAR(state->speed_mps, 0, 0.03);
+  EXPECT_TRUE(state->standstill);
+}
+
+// Nothing may depend on the order in which measurements arrive.
+TEST(Fusion, LateMeasurementsAreUsedAtTheirOwnTime) {
+  SimulationPlan plan;
+  plan.duration_s = 40;
+  const TrainSimulation simulation(plan, 5);
+  auto in_order = core::value_or_throw(Fusion::create({}, simulation.map, simulation.start()));
+  auto mixed = core::value_or_throw(Fusion::create({}, simulation.map, simulation.start()));
+  in_order.add(simulation.events.front());
+  mixed.add(simulation.events.front());
+
+  std::vector<std::pair<int64_t, Event>> arrivals;
+  for (size_t i = 1; i < simulation.events.size(); ++i) {
+    const auto& event = simulation.events[i];
+    in_order.add(event);
+    int64_t delay_ns = 0;
+    if (std::holds_alternative<OdometryInput>(event)) delay_ns = 80'000'000;
+    if (std::holds_alternative<FixInput>(event)) delay_ns = 900'000'000;
+    if (std::holds_alternative<GnssInput>(event)) delay_ns = 300'000'000;
+    arrivals.emplace_back(TrainSimulation::stamp(event) + delay_ns, event);
+  }
+  std::stable_sort(arrivals.begin(), arrivals.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  for (const auto& [when, event] : arrivals) mixed.add(event);
+
+  EXPECT_EQ(mixed.counts().too_late, 0U);
+  EXPECT_EQ(*in_order.latest_stamp_ns(), *mixed.latest_stamp_ns());
+  const auto& a = in_order.estimator()->filter();
+  const auto& b = mixed.estimator()->filter();
+  EXPECT_NEAR(a.path_distance_m(), b.path_distance_m(), 1e-6);
+  EXPECT_NEAR(a.path_sigma_m(), b.path_sigma_m(), 1e-6);
+  EXPECT_NEAR(a.scale(Odometer::camera), b.scale(Odometer::camera), 1e-9);
+}
+
+// Every picture is used and answered at once, however many came before it and whatever else the history holds.
+TEST(Fusion, EveryOdometryStepGivesAState) {
+  for (const bool inertial : {false, true}) {
+    auto fusion = fusion_at(100);
+    double way_m = 0;
+    double reference_m = 0;
+    double reference_s = 0;
+    for (int i = 0; i < 2000; ++i) {
+      const double t_s = i / 30.0;
+      way_m = t_s < 2 ? 0 : 0.5 * 0.4 * (t_s - 2) * (t_s - 2);
+      if (inertial) fusion.add(ImuInput{at(t_s - 0.01), t_s < 2 ? 0 : 0.4, 0});
+      const auto state = fusion.add(OdometryInput{at(t_s), at(reference_s), way_m - reference_m, 0.001, i >= 2});
+      ASSERT_TRUE(state) << "picture " << i;
+      EXPECT_EQ(state->stamp_ns, at(t_s));
+      EXPECT_EQ(fusion.estimator()->watch(Source::camera).seen_ns, at(t_s));
+      EXPECT_NEAR(state->distance_m, way_m, 0.02) << "picture " << i;
+      if (way_m - reference_m > 0.4) {  // key frame: many pictures when slow, one when fast
+        reference_m = way_m;
+        reference_s = t_s;
+      }
+    }
+  }
+}
+
+TEST(Fusion, StampsOfStatesOnlyGrow) {
+  auto fusion = fusion_at(0);
+  fusion.add(step_at(0.02, 10));
+  fusion.add(step_at(0.06, 10, 0.04));
+  EXPECT_FALSE(fusion.add(step_at(0.04, 10)));  // late: used, but the state was given already
+  EXPECT_EQ(fusion.counts().used, 3U);
+  EXPECT_FALSE(fusion.add(step_at(0.04, 10)));
+  EXPECT_EQ(fusion.counts().repeated, 1U);
+}
+
+TEST(Fusion, BlindCameraIsBridgedByTheWheel) {
+  auto fusion = fusion_at(0);
+  std::optional<TrainEstimate> state;
+  for (int i = 1; i <= 1500; ++i) {
+    const double t = i * 0.02;
+    fusion.add(wheel_at(t, 10 * t));
+    auto step = step_at(t, 10);
+    if (t > 10) step = {at(t), at(t - 0.02), 0, 0, false};
+    if (const auto s = fusion.add(step)) state = s;
+  }
+  ASSERT_TRUE(state);
+  EXPECT_NEAR(state->distance_m, 300, 0.3);
+  EXPECT_THAT(state->reason, HasSubstr("camera blind"));
+  EXPECT_EQ(state->integrity, Integrity::degraded);
+  EXPECT_LT(state->over_m, 5 + 0.05 * 300);
+}
+
+TEST(Fusion, WheelAloneGivesStatesTenTimesASecond) {
+  auto fusion = fusion_at(0);
+  int states = 0;
+  std::optional<TrainEstimate> last;
+  for (int i = 0; i <= 500; ++i) {
+    if (const auto s = fusion.add(wheel_at(i * 0.02, 8 * i * 0.02))) {
+      ++states;
+      last = s;
+    }
+  }
+  EXPECT_GE(states, 99);
+  ASSERT_TRUE(last);
+  EXPECT_NEAR(last->distance_m, 8 * core::seconds(last->stamp_ns - kBeginNs), 0.1);
+  EXPECT_NEAR(last->speed_mps, 8, 0.1);
+}
+
+TEST(Fusion, SlippingWheelIsIsolatedAndTakenBackLater) {
+  auto fusion = fusion_at(0);
+  double wheel_m = 0;
+  bool isolated = false;
+  std::optional<TrainEstimate> state;
+  for (int i = 1; i <= 3000; ++i) {
+    const double t = i * 0.02;
+    const bool slip = t > 20 && t < 26;
+    wheel_m += 0.2 * (slip ? 1.06 : 1.0);
+    if (const auto s = fusion.add(step_at(t, 10))) state = s;
+    fusion.add(wheel_at(t, wheel_m));
+    if (state->reason.find("wheel slips") != std::string::npos) {
+      isolated = true;
+      EXPECT_GT(t, 20);
+      EXPECT_LT(t, 30);
+    }
+  }
+  EXPECT_TRUE(isolated);
+  EXPECT_EQ(state->integrity, Integrity::ok) << state->reason;
+  EXPECT_NEAR(state->distance_m, 600, 0.15);
+  EXPECT_NEAR(state->visual_scale, 1, 1e-3);
+  EXPECT_NEAR(state->wheel_scale, 1, 1e-3);
+}
+
+TEST(Fusion, WithoutAnySensorTheIntervalGrowsAndSaysSo) {
+  auto fusion = fusion_at(0);
+  const auto before = run(fusion, 0, 10, 20);
+  double over_m = before.over_m;
+  std::optional<TrainEstimate> state;
+  for (int i = 1; i <= 100; ++i) {
+    state = fusion.tick(at(10 + 0.1 * i));
+    ASSERT_TRUE(state);
+    EXPECT_GT(state->over_m, over_m);
+    over_m = state->over_m;
+  }
+  EXPECT_NEAR(state->distance_m, 400, 5);
+  EXPECT_EQ(state->integrity, Integrity::unusable);
+  EXPECT_THAT(state->reason, HasSubstr("no camera"));
+  EXPECT_FALSE(fusion.tick(at(20)));  // no second state for one time
+}
+
+TEST(Fusion, OneFalseFixNeverMovesTheTrain) {
+  auto fusion = fusion_at(0);
+  run(fusion, 0, 10, 20);
+  fusion.add(fix_at(10, 260, 3));
+  const auto state = run(fusion, 10, 11, 20);
+  EXPECT_NEAR(state.position.offset_m, 220, 0.1);
+  EXPECT_THAT(state.reason, HasSubstr("a position fix was refused"));
+  EXPECT_GT(state.under_m, 60);  // but the interval admits that it may be right
+  EXPECT_LT(state.over_m, 20);
+}
+
+TEST(Fusion, TwoFixesThatAgreeMoveTheTrain) {
+  auto fusion = fusion_at(0);
+  run(fusion, 0, 10, 20);
+  fusion.add(fix_at(10, 260, 3));
+  run(fusion, 10, 15, 20);
+  fusion.add(fix_at(15, 360, 4));
+  const auto state = run(fusion, 15, 16, 20);
+  EXPECT_NEAR(state.position.offset_m, 380, 1);
+  EXPECT_EQ(state.integrity, Integrity::degraded);
+}
+
+// A false fix inside the interval is found out by the next one, and the interval held the truth meanwhile.
+TEST(Fusion, FalseFixInsideTheIntervalIsUndoneByTheNext) {
+  auto fusion = fusion_at(0);
+  run(fusion, 0, 20, 20);
+  fusion.add(fix_at(20, 410, 3, 0.99));
+  const auto misled = run(fusion, 20, 30, 20);
+  EXPECT_GT(misled.position.offset_m, 605);
+  EXPECT_GT(misled.over_m, misled.position.offset_m - 600);
+  fusion.add(fix_at(30, 600, 4, 0.99));
+  const auto state = run(fusion, 30, 31, 20);
+  EXPECT_NEAR(state.position.offset_m, 620, 0.5);
+  EXPECT_EQ(state.reference, 4U);
+}
+
+TEST(Fusion, ImprobableAndForeignFixesAreLeftOut) {
+  auto fusion = fusion_at(0);
+  run(fusion, 0, 10, 20);
+  fusion.add(fix_at(10, 203, 3, 0.5));
+  FixInput foreign = fix_at(10.01, 100, 4);
+  foreign.edge = 77;
+  fusion.add(foreign);
+  const auto state = run(fusion, 10, 11, 20);
+  EXPECT_NEAR(state.position.offset_m, 220, 0.1);
+  EXPECT_EQ(state.reference, 0U);
+  EXPECT_THAT(state.reason, HasSubstr("another track"));
+}
+
+TEST(Fusion, GnssHoldsTheIntervalAndWildFixesAreRefused) {
+  auto fusion = fusion_at(0);
+  std::optional<TrainEstimate> state;
+  for (int i = 1; i <= 30000; ++i) {
+    const double t = i * 0.02;
+    if (const auto s = fusion.add(step_at(t, 9.9))) state = s;  // 1 % short
+    if (i % 50 == 0) fusion.add(GnssInput{at(t + 0.001), 1.5, 10 * t + (i % 1000 == 0 ? 90 : 0.5), 1.0, 1});
+  }
+  EXPECT_NEAR(state->position.offset_m, 6000, 5);  // the camera alone would be 60 m off
+  EXPECT_LT(state->over_m, 50);
+  EXPECT_GT(state->over_m, std::abs(state->position.offset_m - 6000));
+}
+
+TEST(Fusion, WildStampsAreNotFollowedButANewClockIs) {
+  auto fusion = fusion_at(0);
+  run(fusion, 0, 5, 10);
+  EXPECT_FALSE(fusion.add(wheel_at(3600, 1e6)));
+  EXPECT_EQ(fusion.counts().jumped, 1U);
+  EXPECT_EQ(*fusion.latest_stamp_ns(), at(5));
+
+  auto state = run(fusion, -100, -90, 10);  // set back by 105 s
+  EXPECT_EQ(fusion.counts().clock_resets, 1U);
+  EXPECT_EQ(state.stamp_ns, at(-90));
+  EXPECT_NEAR(state.distance_m, 50 + 100 - 20, 3);  // 100 steps were lost until the new clock was believed
+
+  state = run(fusion, 1000, 1010, 10);  // set forward: what happened in between is not known
+  EXPECT_EQ(state.stamp_ns, at(1010));
+  EXPECT_GT(state.over_m, 1000);
+}
+
+TEST(Fusion, NonsenseNumbersAreRefused) {
+  auto fusion = fusion_at(0);
+  run(fusion, 0, 5, 10);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  fusion.add(OdometryInput{at(5.02), at(5), nan, 0.001, true});
+  fusion.add(OdometryInput{at(5.04), at(5.02), 0.2, nan, true});
+  fusion.add(OdometryInput{at(5.06), at(5.07), 0.2, 0.001, true});  // counts from the future
+  fusion.add(WheelInput{at(5.06), 3, 0});
+  fusion.add(ImuInput{at(5.06), nan, nan});
+  fusion.add(ImuInput{at(5.2), nan, nan});
+  fusion.add(GnssInput{at(5.06), nan, nan, nan, 1});
+  fusion.add(FixInput{at(5.06), 1, nan, 0.1, 1, 1, FixKind::landmark, track::Direction::forward, nullptr});
+  fusion.add(FixInput{at(5.06), 1, 50, nan, 1, 2, FixKind::landmark, track::Direction::forward, nullptr});
+  const auto state = run(fusion, 5.2, 6, 10);
+  EXPECT_NEAR(state.distance_m, 60, 0.5);
+  EXPECT_TRUE(std::isfinite(state.over_m));
+}
+
+TEST(Fusion, StartMustBeOnTheMap) {
+  const auto fusion = Fusion::create({}, straight_line(), track::EdgePosition{9, 0, track::Direction::forward});
+  ASSERT_FALSE(fusion.ok());
+  EXPECT_THAT(fusion.error().message, HasSubstr("edge 9"));
+}
+
+}  // namespace
+}  // namespace railfix::fusion

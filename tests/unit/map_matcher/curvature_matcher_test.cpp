@@ -1,0 +1,80 @@
+#include "map_matcher/curvature_matcher.hpp"
+
+#include <gtest/gtest.h>
+
+#include "core/random.hpp"
+#include "core/result.hpp"
+
+namespace railfix::map_matcher {
+namespace {
+
+std::shared_ptr<const track::Path> line_of(const std::vector<track::Element>& elements) {
+  auto map = std::make_shared<track::Map>();
+  map->edges.push_back({1, "line", 1, 2, "", track::Alignment::chained({0, 0, 0}, elements)});
+  map->nodes = {{1, track::NodeKind::end, "", 0, 0}, {2, track::NodeKind::end, "", 0, 0}};
+  return std::make_shared<const track::Path>(
+      core::value_or_throw(track::Path::follow(map, {1, 0, track::Direction::forward}, 50000, 0)));
+}
+
+struct Result {
+  int fixes = 0;
+  double worst_sigmas = 0;
+  double worst_m = 0;
+};
+
+Result run(const std::shared_ptr<const track::Path>& path, uint64_t seed, double interval_m, double noise_per_m) {
+  core::Random random(seed);
+  CurvatureMatcher matcher({}, path);
+  const double scale = 1 + 0.005 * random.normal();
+  const double prior_error_m = random.uniform(-0.9, 0.9) * interval_m;
+  Result result;
+  for (double s = 10; s < path->end_m() - 10; s += 0.5) {
+    const double odometer_m = s * scale;
+    matcher.add(odometer_m, path->curvature_at(s) + noise_per_m * random.normal(), noise_per_m);
+    if (std::fmod(s, 20.0) != 0) continue;
+    const auto fix = matcher.match(1, odometer_m, {s + prior_error_m, interval_m, interval_m, odometer_m});
+    if (!fix) continue;
+    ++result.fixes;
+    result.worst_sigmas = std::max(result.worst_sigmas, std::abs(fix->path_distance_m - s) / fix->sigma_m);
+    result.worst_m = std::max(result.worst_m, std::abs(fix->path_distance_m - s));
+  }
+  return result;
+}
+
+TEST(CurvatureMatcher, SaysNothingOnAStraightOrInAnArc) {
+  EXPECT_EQ(run(line_of({{3000, 0, 0}}), 1, 20, 3e-4).fixes, 0);
+  EXPECT_EQ(run(line_of({{3000, 0.002, 0.002}}), 2, 20, 3e-4).fixes, 0);
+}
+
+TEST(CurvatureMatcher, EntriesAndExitsOfCurvesGiveHonestFixes) {
+  int fixes = 0;
+  for (uint64_t seed = 1; seed <= 8; ++seed) {
+    core::Random random(seed);
+    std::vector<track::Element> elements;
+    for (int k = 0; k < 4; ++k) {
+      const double curvature = (random.uniform() < 0.5 ? -1 : 1) / random.uniform(400, 1200);
+      for (const auto& e :
+           {track::Element{random.uniform(150, 500), 0, 0}, track::Element{80, 0, curvature},
+            track::Element{random.uniform(80, 300), curvature, curvature}, track::Element{80, curvature, 0}}) {
+        elements.push_back(e);
+      }
+    }
+    elements.push_back({300, 0, 0});
+    const auto result = run(line_of(elements), seed, 25, 5e-4);
+    fixes += result.fixes;
+    EXPECT_LT(result.worst_sigmas, 4) << "seed " << seed;
+    EXPECT_LT(result.worst_m, 20) << "seed " << seed;
+  }
+  EXPECT_GE(fixes, 8 * 2);
+}
+
+TEST(CurvatureMatcher, ForgetsWhatCameBeforeTheCameraWasBlind) {
+  const auto path = line_of({{300, 0, 0}, {80, 0, 0.002}, {300, 0.002, 0.002}});
+  CurvatureMatcher matcher({}, path);
+  for (double s = 100; s < 400; s += 0.5) matcher.add(s, path->curvature_at(s), 2e-4);
+  matcher.forget();
+  EXPECT_FALSE(matcher.match(1, 400, {400, 20, 20, 400}));
+}
+
+}  // namespace
+}  // namespace railfix::map_matcher

@@ -1,0 +1,118 @@
+#include "map_matcher/landmark_matcher.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/random.hpp"
+#include "core/result.hpp"
+
+namespace railfix::map_matcher {
+namespace {
+
+using track::LandmarkKind;
+
+std::shared_ptr<const track::Path> line_with(const std::vector<std::pair<LandmarkKind, double>>& landmarks) {
+  auto map = std::make_shared<track::Map>();
+  map->edges.push_back({1, "line", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{20000, 0, 0}})});
+  map->nodes = {{1, track::NodeKind::end, "", 0, 0}, {2, track::NodeKind::end, "", 0, 20000}};
+  uint32_t id = 0;
+  for (const auto& [kind, offset_m] : landmarks) map->landmarks.push_back({++id, kind, 1, offset_m, 0, 0.1, ""});
+  return std::make_shared<const track::Path>(
+      core::value_or_throw(track::Path::follow(map, {1, 0, track::Direction::forward}, 20000, 0)));
+}
+
+Sighting sighting_of(LandmarkKind kind, double confidence = 0.98) {
+  return {1000, kind, 5.0, 0, 0.2, confidence};
+}
+Prior prior_at(double place_m, double interval_m, double travelled_m) {
+  return {place_m, interval_m, interval_m, travelled_m};
+}
+
+TEST(LandmarkMatcher, FixComesFromMapAndSightingNotFromThePrior) {
+  const auto path = line_with({{LandmarkKind::balise, 500}});
+  for (const double prior_error_m : {-6.0, 0.0, 7.0}) {
+    LandmarkMatcher matcher({}, path);
+    const auto fix = matcher.add(sighting_of(LandmarkKind::balise), prior_at(495 + prior_error_m, 10, 0));
+    ASSERT_TRUE(fix);
+    EXPECT_NEAR(fix->path_distance_m, 495, 1e-9);
+    EXPECT_NEAR(fix->sigma_m, std::hypot(0.2, 0.1), 1e-9);
+    EXPECT_EQ(fix->landmark, 1U);
+    EXPECT_GT(fix->probability, 0.9);
+    EXPECT_LT(fix->probability, 0.999);
+  }
+}
+
+TEST(LandmarkMatcher, SaysNothingOutsideTheWindowOrOfAnotherKind) {
+  const auto path = line_with({{LandmarkKind::balise, 500}});
+  LandmarkMatcher matcher({}, path);
+  EXPECT_FALSE(matcher.add(sighting_of(LandmarkKind::balise), prior_at(450, 10, 0)));
+  EXPECT_FALSE(matcher.add(sighting_of(LandmarkKind::frog), prior_at(495, 10, 50)));
+}
+
+TEST(LandmarkMatcher, TwoBalisesNearEachOtherAreAmbiguousUntilBothAreSeen) {
+  const auto path = line_with({{LandmarkKind::balise, 500}, {LandmarkKind::balise, 503}});
+  LandmarkMatcher matcher({}, path);
+  const auto first = matcher.add(sighting_of(LandmarkKind::balise), prior_at(495, 6, 100));
+  EXPECT_TRUE(!first || first->probability < 0.9);
+  const auto second = matcher.add(sighting_of(LandmarkKind::balise), prior_at(498, 6, 103));
+  ASSERT_TRUE(second);
+  EXPECT_EQ(second->landmark, 2U);
+  EXPECT_NEAR(second->path_distance_m, 498, 1e-9);
+  EXPECT_GT(second->probability, 0.95);
+}
+
+TEST(LandmarkMatcher, EqualMastsWithinTheWindowAreNotTold) {
+  std::vector<std::pair<LandmarkKind, double>> masts;
+  for (int i = 0; i < 100; ++i) masts.emplace_back(LandmarkKind::mast, 50.0 * i);
+  LandmarkMatcher matcher({}, line_with(masts));
+  for (int i = 10; i < 20; ++i) {
+    const auto fix = matcher.add(sighting_of(LandmarkKind::mast), prior_at(50.0 * i - 5, 80, 50.0 * i));
+    EXPECT_TRUE(!fix || fix->probability < 0.7);
+  }
+}
+
+TEST(LandmarkMatcher, UnsureSightingGivesUnsureFix) {
+  LandmarkMatcher matcher({}, line_with({{LandmarkKind::frog, 500}}));
+  const auto fix = matcher.add(sighting_of(LandmarkKind::frog, 0.6), prior_at(495, 10, 0));
+  ASSERT_TRUE(fix);
+  EXPECT_LT(fix->probability, 0.8);
+}
+
+// Over many random lines with missed and false sightings: what is called 95 % sure must be right in 95 %.
+TEST(LandmarkMatcher, ProbabilitiesAreHonest) {
+  core::Random random(11);
+  int sure = 0;
+  int wrong = 0;
+  for (int line = 0; line < 60; ++line) {
+    std::vector<std::pair<LandmarkKind, double>> landmarks;
+    for (double m = 100; m < 6000; m += random.uniform(20, 250)) {
+      landmarks.emplace_back(LandmarkKind::balise, m);
+      if (random.uniform() < 0.5) landmarks.emplace_back(LandmarkKind::balise, m += 3);
+    }
+    LandmarkMatcher matcher({}, line_with(landmarks));
+    const double scale = 1 + 0.007 * random.normal();
+    std::vector<std::pair<double, bool>> sightings;
+    for (const auto& [kind, m] : landmarks)
+      if (random.uniform() < 0.85) sightings.emplace_back(m, true);
+    for (int k = 0; k < 3; ++k) sightings.emplace_back(random.uniform(100, 6000), false);
+    std::sort(sightings.begin(), sightings.end());
+    for (const auto& [m, real] : sightings) {
+      const double foot_m = m - 5;
+      const double interval_m = random.uniform(2, 25);
+      const auto prior = prior_at(foot_m + random.uniform(-0.8, 0.8) * interval_m, interval_m, foot_m * scale);
+      Sighting sighting = sighting_of(LandmarkKind::balise, 0.95);
+      sighting.distance_ahead_m += 0.2 * random.normal();
+      const auto fix = matcher.add(sighting, prior);
+      if (!fix || fix->probability < 0.95) continue;
+      ++sure;
+      if (!real || std::abs(fix->path_distance_m - foot_m) > 1.0) ++wrong;
+    }
+  }
+  EXPECT_GT(sure, 500);
+  EXPECT_LT(wrong, sure / 20) << wrong << " of " << sure;
+}
+
+}  // namespace
+}  // namespace railfix::map_matcher

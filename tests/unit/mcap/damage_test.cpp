@@ -1,0 +1,168 @@
+#include <gmock/gmock.h>
+
+#include "core/random.hpp"
+#include "recordings.hpp"
+
+namespace railfix::mcap {
+
+namespace {
+
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+WriterOptions small_chunks() {
+  WriterOptions options;
+  options.chunk_bytes = 300;
+  options.overwrite = true;
+  return options;
+}
+
+/// Ends of the chunks of a proper file and how many messages stand before each.
+std::vector<std::pair<size_t, size_t>> chunk_ends(const Bytes& file) {
+  std::vector<std::pair<size_t, size_t>> ends;
+  size_t messages = 0;
+  Decoder decoder(ByteView(file).subspan(kMagic.size()));
+  while (decoder.left() > kMagic.size()) {
+    const uint8_t opcode = decoder.u8();
+    const ByteView content = decoder.raw(decoder.u64());
+    if (opcode != static_cast<uint8_t>(Opcode::chunk)) continue;
+    ChunkHead head;
+    ByteView stored;
+    EXPECT_TRUE(parse(content, head, stored));
+    const Bytes records = chunk_records(head, stored).value();
+    for (Decoder inside(records); inside.left() > 0; ++messages) {
+      (void)inside.u8();
+      (void)inside.raw(inside.u64());
+    }
+    ends.emplace_back(kMagic.size() + decoder.position(), messages);
+  }
+  return ends;
+}
+
+using DamageTest = RecordingTest;
+
+TEST_F(DamageTest, CutAtEveryByteKeepsEveryWholeChunk) {
+  const auto all = samples(24);
+  const Bytes whole = content(record(all, small_chunks()));
+  const auto ends = chunk_ends(whole);
+  ASSERT_GE(ends.size(), 4U);
+  for (size_t size = 0; size < whole.size(); ++size) {
+    const auto opened = Reader::open(store({whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size)}));
+    if (size < kMagic.size()) {
+      EXPECT_FALSE(opened.ok());
+      continue;
+    }
+    ASSERT_TRUE(opened.ok()) << opened.error().message;
+    size_t expected = 0;
+    for (const auto& [end, messages] : ends) expected = size >= end ? messages : expected;
+    Reader& reader = *opened.value();
+    ASSERT_EQ(read(reader).size(), expected) << "cut at byte " << size;
+    ASSERT_EQ(reader.statistics().messages, expected);
+    ASSERT_FALSE(reader.problems().empty());
+  }
+}
+
+TEST_F(DamageTest, EveryFlippedByteIsNoticedOrHarmless) {
+  const auto all = samples(16);
+  const Bytes whole = content(record(all, small_chunks()));
+  const auto expected = read(*Reader::open(folder_ / "test.mcap").value());
+  for (size_t i = 0; i < whole.size(); ++i) {
+    Bytes changed = whole;
+    changed[i] ^= 0x41;
+    const auto opened = Reader::open(store(changed));
+    if (!opened.ok()) continue;
+    Reader& reader = *opened.value();
+    const auto got = read(reader);
+    ASSERT_TRUE(got == expected || !reader.problems().empty()) << "byte " << i << " changed the messages silently";
+  }
+}
+
+TEST_F(DamageTest, CorruptChunkIsNamedAndTheOthersAreRead) {
+  const auto all = samples(40);
+  Bytes bytes = content(record(all, small_chunks()));
+  const auto ends = chunk_ends(bytes);
+  bytes[ends[2].first - 3] ^= 0xFF;
+  auto reader = Reader::open(store(bytes)).value();
+  ASSERT_TRUE(reader->indexed());
+  EXPECT_EQ(read(*reader).size(), all.size() - (ends[2].second - ends[1].second));
+  EXPECT_THAT(reader->problems(), Contains(HasSubstr("its messages are missing")));
+  const size_t said = reader->problems().size();
+  (void)read(*reader);
+  EXPECT_EQ(reader->problems().size(), said) << "said once";
+}
+
+TEST_F(DamageTest, DamagedIndexFallsBackToTheScan) {
+  const auto all = samples(40);
+  Bytes bytes = content(record(all, small_chunks()));
+  bytes[bytes.size() - 60] ^= 0xFF;
+  auto reader = Reader::open(store(bytes)).value();
+  EXPECT_FALSE(reader->indexed());
+  EXPECT_EQ(read(*reader).size(), all.size());
+  EXPECT_THAT(reader->problems(), Contains(HasSubstr("checksum of its index")));
+}
+
+TEST_F(DamageTest, GarbageNeverCrashes) {
+  core::Random random(7);
+  const Bytes whole = content(record(samples(30), small_chunks()));
+  for (int round = 0; round < 600; ++round) {
+    Bytes bytes = whole;
+    const size_t begin = random.next() % bytes.size();
+    const size_t count = 1 + random.next() % 40;
+    for (size_t i = begin; i < std::min(bytes.size(), begin + count); ++i)
+      bytes[i] = static_cast<uint8_t>(random.next());
+    if (round % 3 == 0) std::copy(kMagic.begin(), kMagic.end(), bytes.begin());
+    const auto opened = Reader::open(store(bytes));
+    EXPECT_LE(opened.ok() ? read(*opened.value()).size() : 0U, 60U);
+  }
+}
+
+TEST_F(DamageTest, OtherFilesAreRefusedWithASentence) {
+  const auto missing = Reader::open(folder_ / "missing.mcap");
+  ASSERT_FALSE(missing.ok());
+  EXPECT_THAT(missing.error().message, HasSubstr("cannot be read"));
+  const auto empty = Reader::open(store({}));
+  ASSERT_FALSE(empty.ok());
+  EXPECT_THAT(empty.error().message, HasSubstr("is empty"));
+  const auto other = Reader::open(store(Bytes(1000, 'x')));
+  ASSERT_FALSE(other.ok());
+  EXPECT_THAT(other.error().message, HasSubstr("not an MCAP recording"));
+  EXPECT_FALSE(Reader::open(folder_).ok());
+}
+
+TEST_F(DamageTest, MessagesOutsideChunksAreFound) {
+  Bytes bytes(kMagic.begin(), kMagic.end());
+  append(bytes, Channel{3, 0, "topic", "json", {}});
+  append(bytes, Message{3, 1, 20, 20, bytes_of("later")});
+  append(bytes, Message{3, 2, 10, 10, bytes_of("earlier")});
+  auto reader = Reader::open(store(bytes)).value();
+  const auto all = read(*reader);
+  ASSERT_EQ(all.size(), 2U);
+  EXPECT_EQ(all[0].data, "earlier");
+}
+
+TEST_F(DamageTest, TwoDifferentChannelsOfOneIdAreToldApart) {
+  Bytes bytes(kMagic.begin(), kMagic.end());
+  append(bytes, Channel{3, 0, "topic", "json", {}});
+  append(bytes, Channel{3, 0, "other", "json", {}});
+  EXPECT_THAT(Reader::open(store(bytes)).value()->problems(), Contains(HasSubstr("defined twice")));
+}
+
+TEST_F(DamageTest, RecoverMakesAProperFile) {
+  const auto all = samples(40);
+  Bytes bytes = content(record(all, small_chunks()));
+  const auto ends = chunk_ends(bytes);
+  bytes.resize(ends[3].first + 5);
+  const auto lost = recover(store(bytes), folder_ / "recovered.mcap");
+  ASSERT_TRUE(lost.ok()) << lost.error().message;
+  EXPECT_FALSE(lost.value().empty());
+  auto reader = Reader::open(folder_ / "recovered.mcap").value();
+  EXPECT_TRUE(reader->indexed());
+  EXPECT_THAT(reader->problems(), IsEmpty());
+  EXPECT_EQ(read(*reader).size(), ends[3].second);
+  EXPECT_EQ(reader->channels().size(), 2U);
+}
+
+}  // namespace
+
+}  // namespace railfix::mcap

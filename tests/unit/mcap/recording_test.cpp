@@ -1,0 +1,154 @@
+#include <gmock/gmock.h>
+
+#include <algorithm>
+
+#include "recordings.hpp"
+
+namespace railfix::mcap {
+
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+std::vector<Sample> in_time_order(std::vector<Sample> all) {
+  std::ranges::stable_sort(all, {}, &Sample::log_time_ns);
+  return all;
+}
+
+TEST_F(RecordingTest, GivesBackWhatWasWrittenInTimeOrder) {
+  for (const bool compress : {false, true}) {
+    WriterOptions options;
+    options.chunk_bytes = 700;
+    options.compress = compress;
+    options.overwrite = true;
+    const auto all = samples(300);
+    auto reader = Reader::open(record(all, options)).value();
+    EXPECT_TRUE(reader->indexed());
+    EXPECT_EQ(read(*reader), in_time_order(all)) << "compress " << compress;
+    EXPECT_THAT(reader->problems(), IsEmpty());
+    EXPECT_GT(reader->statistics().chunks, 20U);
+  }
+}
+
+TEST_F(RecordingTest, StatisticsAndMetadataMatch) {
+  const auto all = samples(101);
+  auto reader = Reader::open(record(all)).value();
+  const Statistics& statistics = reader->statistics();
+  EXPECT_EQ(statistics.messages, 101U);
+  EXPECT_EQ(statistics.schemas, 1U);
+  EXPECT_EQ(statistics.channels, 2U);
+  EXPECT_EQ(statistics.metadata, 1U);
+  EXPECT_EQ(statistics.start_ns, std::ranges::min(all, {}, &Sample::log_time_ns).log_time_ns);
+  EXPECT_EQ(statistics.end_ns, std::ranges::max(all, {}, &Sample::log_time_ns).log_time_ns);
+  EXPECT_EQ(statistics.channel_messages, (std::map<uint16_t, uint64_t>{{1, 51}, {2, 50}}));
+  ASSERT_EQ(reader->metadata().size(), 1U);
+  EXPECT_EQ(reader->metadata()[0], (Metadata{"railfix", {{"train", "demo"}, {"map", "loop"}}}));
+  EXPECT_EQ(reader->channels().at(1).metadata.at("train"), "demo");
+  EXPECT_EQ(reader->schemas().at(1).name, "railfix::msg::Any");
+}
+
+TEST_F(RecordingTest, SelectsByTopicAndTime) {
+  WriterOptions options;
+  options.chunk_bytes = 500;
+  const auto all = samples(200);
+  auto reader = Reader::open(record(all, options)).value();
+  auto expected = in_time_order(all);
+  std::erase_if(expected, [](const Sample& sample) {
+    return sample.topic != "wheel_sample" || sample.log_time_ns < 1'050'000 || sample.log_time_ns >= 1'100'000;
+  });
+  ASSERT_FALSE(expected.empty());
+  EXPECT_EQ(read(*reader, {{"wheel_sample"}, 1'050'000, 1'100'000}), expected);
+  EXPECT_THAT(read(*reader, {{"no_such_topic"}, {}, {}}), IsEmpty());
+}
+
+TEST_F(RecordingTest, KeepsFileOrderOfEqualTimes) {
+  std::vector<Sample> all;
+  for (uint32_t i = 0; i < 50; ++i) all.push_back({"log_record", i, 5000, 5000, "same time"});
+  WriterOptions options;
+  options.chunk_bytes = 200;
+  auto reader = Reader::open(record(all, options)).value();
+  EXPECT_EQ(read(*reader), all);
+}
+
+TEST_F(RecordingTest, EmptyRecordingIsProper) {
+  auto reader = Reader::open(record({})).value();
+  EXPECT_TRUE(reader->indexed());
+  EXPECT_THAT(read(*reader), IsEmpty());
+  EXPECT_THAT(reader->problems(), IsEmpty());
+  EXPECT_EQ(reader->statistics().messages, 0U);
+}
+
+TEST_F(RecordingTest, LargeMessageGetsItsOwnChunk) {
+  WriterOptions options;
+  options.chunk_bytes = 1000;
+  auto all = samples(3);
+  all[1].data = std::string(5000, 'x');
+  auto reader = Reader::open(record(all, options)).value();
+  EXPECT_EQ(read(*reader).size(), 3U);
+  EXPECT_EQ(reader->statistics().chunks, 3U);
+}
+
+TEST_F(RecordingTest, OpenFileIsCalledActiveAndReadable) {
+  const auto file = folder_ / "live.mcap";
+  WriterOptions options;
+  options.chunk_bytes = 100;
+  auto writer = Writer::create(file, options).value();
+  const uint16_t channel = writer->add_channel(0, "log_record", "json", {}).value();
+  for (uint32_t i = 0; i < 4; ++i) {
+    ASSERT_TRUE(writer->write({channel, i, i, i, bytes_of(std::string(60, '{'))}).ok());
+  }
+  EXPECT_FALSE(std::filesystem::exists(file));
+  EXPECT_TRUE(being_written(file.string() + ".active"));
+  WriterOptions greedy;
+  greedy.overwrite = true;
+  EXPECT_FALSE(Writer::create(file, greedy).ok()) << "another recorder must not take it over";
+  auto reader = Reader::open(file.string() + ".active").value();
+  EXPECT_FALSE(reader->indexed());
+  EXPECT_EQ(read(*reader).size(), 3U) << "all but the chunk that is being collected";
+  ASSERT_TRUE(writer->close().ok());
+  EXPECT_FALSE(std::filesystem::exists(file.string() + ".active"));
+  EXPECT_FALSE(being_written(file));
+  EXPECT_EQ(read(*Reader::open(file).value()).size(), 4U);
+}
+
+TEST_F(RecordingTest, OldChunkIsStoredWithoutNewMessages) {
+  WriterOptions options;
+  options.chunk_age_s = 1e-9;
+  auto writer = Writer::create(folder_ / "slow.mcap", options).value();
+  const uint16_t channel = writer->add_channel(0, "log_record", "json", {}).value();
+  const uint64_t before = writer->bytes_written();
+  ASSERT_TRUE(writer->write({channel, 1, 1, 1, bytes_of("{}")}).ok());
+  ASSERT_TRUE(writer->tick().ok());
+  EXPECT_GT(writer->bytes_written(), before);
+}
+
+TEST_F(RecordingTest, RefusesToOverwriteAndSaysWhy) {
+  const auto file = record(samples(2));
+  const auto again = Writer::create(file, {});
+  ASSERT_FALSE(again.ok());
+  EXPECT_THAT(again.error().message, HasSubstr("exists already"));
+  const auto nowhere = Writer::create(folder_ / "no" / "such" / "folder.mcap", {});
+  ASSERT_FALSE(nowhere.ok());
+  EXPECT_THAT(nowhere.error().message, HasSubstr("No such file"));
+}
+
+TEST_F(RecordingTest, RefusesUnknownIds) {
+  auto writer = Writer::create(folder_ / "ids.mcap", {}).value();
+  EXPECT_FALSE(writer->add_channel(7, "track_view", "cdr", {}).ok());
+  EXPECT_FALSE(writer->write({3, 0, 0, 0, bytes_of("x")}).ok());
+}
+
+TEST_F(RecordingTest, FullDiskIsAnErrorNotACrash) {
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "skipped: no /dev/full";
+  std::filesystem::create_symlink("/dev/full", folder_ / "full.mcap.active");
+  WriterOptions options;
+  options.overwrite = true;
+  const auto created = Writer::create(folder_ / "full.mcap", options);
+  ASSERT_FALSE(created.ok());
+  EXPECT_THAT(created.error().message, HasSubstr("disk full"));
+}
+
+}  // namespace
+
+}  // namespace railfix::mcap

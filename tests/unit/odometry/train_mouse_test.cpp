@@ -1,0 +1,285 @@
+#include "odometry/train_mouse.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/time.hpp"
+#include "unit/odometry/synthetic_ground.hpp"
+
+namespace railfix::odometry {
+namespace {
+
+using test::SyntheticGround;
+
+// A train on synthetic ground with the mouse behind it.
+class Ride {
+ public:
+  explicit Ride(const SyntheticGround::Options& ground = {}, uint64_t seed = 1)
+      : ground_(seed, ground), options_(ground), mouse_(test::small_camera(), {}) {}
+
+  MouseStep at(double time_s, double distance_m) {
+    MousePicture picture;
+    picture.grey = ground_.picture(test::small_camera(), shaken, distance_m, light);
+    picture.stamp_ns = 1'700'000'000'000'000'000 + core::to_ns(time_s);
+    picture.pose = pose_used.value_or(shaken);
+    picture.pose_measured = true;
+    picture.trust = trust;
+    picture.curvature_per_m = options_.curvature_per_m;
+    picture.vertical_curvature_per_m = options_.vertical_curvature_per_m;
+    return mouse_.process(picture);
+  }
+
+  geometry::CameraPose shaken = test::cab_mount();
+  std::optional<geometry::CameraPose> pose_used;
+  PoseTrust trust{0.0003, 0.002};
+  SyntheticGround::Light light;
+
+ private:
+  SyntheticGround ground_;
+  SyntheticGround::Options options_;
+  TrainMouse mouse_;
+};
+
+constexpr double kRate = 30.0;
+
+TEST(TrainMouse, MeasuresSteadyMotion) {
+  Ride ride;
+  MouseStep step;
+  for (int i = 0; i <= 40; ++i) step = ride.at(i / kRate, 0.5 * i);
+  EXPECT_TRUE(step.valid);
+  EXPECT_EQ(step.mode, MouseMode::track);
+  EXPECT_NEAR(step.distance_m, 20.0, 0.01);
+  EXPECT_NEAR(step.speed_mps, 15.0, 0.05);
+  EXPECT_NEAR(step.step_m, 0.5, 0.003);
+  EXPECT_NEAR(step.height_m, 2.78, 1e-9);
+}
+
+TEST(TrainMouse, MeasuresReverse) {
+  Ride ride;
+  MouseStep step;
+  for (int i = 0; i <= 20; ++i) step = ride.at(i / kRate, -0.3 * i);
+  EXPECT_TRUE(step.valid);
+  EXPECT_NEAR(step.distance_m, -6.0, 0.006);
+}
+
+// 18 m/s at 30 Hz is one sleeper a picture.
+TEST(TrainMouse, IsNotDeceivedBySleepers) {
+  SyntheticGround::Options ground;
+  ground.stone_contrast = 12;
+  ground.sleeper_contrast = 60;
+  Ride ride(ground);
+  MouseStep step;
+  for (int i = 0; i <= 20; ++i) step = ride.at(i / kRate, 0.6 * i);
+  EXPECT_TRUE(step.valid);
+  EXPECT_NEAR(step.distance_m, 12.0, 0.03);
+}
+
+TEST(TrainMouse, StandsStillExactly) {
+  Ride ride;
+  MouseStep step;
+  int i = 0;
+  double distance_m = 0;
+  for (; i < 8; ++i) step = ride.at(i / kRate, distance_m += 0.02 * (8 - i) / 8.0);
+  for (int k = 0; k < 6; ++k) step = ride.at(i++ / kRate, distance_m);
+  const double stopped_m = step.distance_m;
+  EXPECT_NEAR(stopped_m, distance_m - 0.02, 0.004);
+  const auto mount = ride.shaken;
+  core::Random random(3);
+  for (int k = 0; k < 40; ++k) {
+    ride.pose_used = mount;  // the measured pose is noisy, the camera is not
+    ride.pose_used->pitch_rad += random.normal(0, 3e-4);
+    step = ride.at(i++ / kRate, distance_m);
+    ASSERT_TRUE(step.valid);
+    EXPECT_EQ(step.distance_m, stopped_m);
+    EXPECT_EQ(step.speed_mps, 0.0);
+  }
+  EXPECT_EQ(step.mode, MouseMode::keyframe);
+}
+
+TEST(TrainMouse, CreepingDoesNotDrift) {
+  Ride ride;
+  MouseStep step;
+  for (int i = 0; i <= 60; ++i) step = ride.at(i / kRate, 0.004 * i);
+  EXPECT_TRUE(step.valid);
+  EXPECT_NEAR(step.distance_m, 0.24, 0.004);
+}
+
+TEST(TrainMouse, ExposureStepsDoNotMatter) {
+  Ride ride;
+  MouseStep step;
+  for (int i = 0; i <= 20; ++i) {
+    ride.light.gain = i % 3 == 0 ? 0.5 : 1.2;
+    ride.light.bias = i % 2 == 0 ? 15 : 0;
+    step = ride.at(i / kRate, 0.4 * i);
+  }
+  EXPECT_TRUE(step.valid);
+  EXPECT_NEAR(step.distance_m, 8.0, 0.01);
+}
+
+// The train's own shadow stands still in the picture over the left half of the ground, its edge along and across.
+TEST(TrainMouse, OwnShadowDoesNotHoldItBack) {
+  Ride ride;
+  ride.light.shade = [](double u, double v) { return u < 310 && v > 250 ? 0.45 : 1.0; };
+  MouseStep step;
+  for (int i = 0; i <= 20; ++i) step = ride.at(i / kRate, 0.4 * i);
+  EXPECT_TRUE(step.valid);
+  EXPECT_NEAR(step.distance_m, 8.0, 0.012);
+}
+
+// A picture a second at 10 m/s: the ground is gone each time, only the lettering on the picture is found again.
+TEST(TrainMouse, LetteringOnThePictureIsNotStandstill) {
+  Ride ride;
+  ride.light.shade = [](double u, double v) {
+    return v > 380 && v < 470 && (static_cast<int>(u / 5) * 7919 + static_cast<int>(v / 6) * 104729) % 5 == 0 ? 2.5
+                                                                                                              : 1.0;
+  };
+  for (int i = 0; i < 8; ++i) EXPECT_FALSE(ride.at(i, 10.3 * i).valid) << i;
+}
+
+TEST(TrainMouse, DarkIsBlindAndNotStandstill) {
+  Ride ride;
+  MouseStep step;
+  for (int i = 0; i < 10; ++i) step = ride.at(i / kRate, 0.4 * i);
+  ASSERT_TRUE(step.valid);
+  ride.light.gain = 0.0;
+  ride.light.noise = 0.5;
+  for (int i = 10; i < 20; ++i) {
+    step = ride.at(i / kRate, 0.4 * i);
+    EXPECT_FALSE(step.valid);
+    EXPECT_EQ(step.mode, MouseMode::blind);
+  }
+  ride.light.gain = 1.0;
+  ride.light.noise = 2.0;
+  for (int i = 20; i < 30; ++i) step = ride.at(i / kRate, 0.4 * i);
+  EXPECT_TRUE(step.valid);
+  EXPECT_NEAR(step.speed_mps, 12.0, 0.1);
+  EXPECT_NEAR(step.distance_m, 11.6, 0.05);  // the gap is bridged with the speed
+}
+
+TEST(TrainMouse, DroppedPicturesAreBridgedByTheirStamps) {
+  Ride ride;
+  MouseStep step;
+  for (int i = 0; i <= 40; ++i) {
+    if (i % 5 == 3 || i == 20 || i == 21) continue;
+    step = ride.at(i / kRate, 0.35 * i);
+    EXPECT_TRUE(step.valid || i <= 2) << i;
+  }
+  EXPECT_NEAR(step.distance_m, 14.0, 0.012);
+}
+
+TEST(TrainMouse, LatePictureIsLeftOut) {
+  Ride ride;
+  for (int i = 0; i < 6; ++i) ride.at(i / kRate, 0.4 * i);
+  EXPECT_FALSE(ride.at(3.5 / kRate, 0.4 * 3.5).valid);
+  const MouseStep step = ride.at(6 / kRate, 2.4);
+  EXPECT_TRUE(step.valid);
+  EXPECT_NEAR(step.distance_m, 2.4, 0.012);
+}
+
+TEST(TrainMouse, ShakeOfTheCameraIsNotMotion) {
+  Ride ride;
+  ride.trust = {1e-5, 1e-4};
+  const auto mount = ride.shaken;
+  MouseStep step;
+  for (int i = 0; i <= 30; ++i) {
+    ride.shaken.pitch_rad = mount.pitch_rad + 0.003 * std::sin(0.7 * i);
+    ride.shaken.roll_rad = 0.004 * std::sin(0.4 * i + 1);
+    ride.shaken.yaw_rad = 0.003 * std::sin(0.5 * i);
+    ride.shaken.lateral_m = 0.02 * std::sin(0.3 * i);
+    ride.shaken.height_m = mount.height_m + 0.01 * std::sin(0.6 * i);
+    step = ride.at(i / kRate, 0.3 * i);
+  }
+  EXPECT_TRUE(step.valid);
+  EXPECT_NEAR(step.distance_m, 9.0, 0.012);
+}
+
+// Shake that nobody has measured: the ground itself tells it from motion.
+TEST(TrainMouse, PoseNoiseDoesNotReachTheSteps) {
+  Ride ride;
+  const auto mount = ride.shaken;
+  ride.trust = {0.001, 0.003};
+  core::Random random(5);
+  double worst_m = 0;
+  double before_m = 0;
+  for (int i = 0; i <= 40; ++i) {
+    ride.pose_used = mount;
+    ride.pose_used->pitch_rad += random.normal(0, 0.001);  // 30 mm at 9 m
+    const MouseStep step = ride.at(i / kRate, 0.5 * i);
+    if (i > 5) {
+      worst_m = std::max(worst_m, std::abs(step.step_m - 0.5));
+      EXPECT_NEAR(step.distance_m - before_m, step.step_m, 1e-9) << "steps add up to the distance";
+    }
+    before_m = step.distance_m;
+  }
+  EXPECT_LT(worst_m, 0.012);
+}
+
+TEST(TrainMouse, CurveIsMeasuredAlongTheTrack) {
+  SyntheticGround::Options ground;
+  ground.curvature_per_m = -1.0 / 250.0;
+  Ride ride(ground);
+  MouseStep step;
+  for (int i = 0; i <= 30; ++i) step = ride.at(i / kRate, 0.6 * i);
+  EXPECT_TRUE(step.valid);
+  EXPECT_NEAR(step.distance_m, 18.0, 0.015);
+  EXPECT_NEAR(step.yaw_rad / step.step_m, -1.0 / 250.0, 3e-4);
+}
+
+// The sheet is laid for a straight track, the ground curves: the turn shows all the same.
+TEST(TrainMouse, UnknownCurveShowsAsTurn) {
+  SyntheticGround::Options ground;
+  ground.curvature_per_m = 1.0 / 600.0;
+  SyntheticGround scene(7, ground);
+  TrainMouse mouse(test::small_camera(), {});
+  double turn_rad = 0;
+  MouseStep step;
+  for (int i = 0; i <= 20; ++i) {
+    MousePicture picture;
+    picture.grey = scene.picture(test::small_camera(), test::cab_mount(), 0.6 * i, {});
+    picture.stamp_ns = core::to_ns(1 + i / kRate);
+    picture.pose = test::cab_mount();
+    step = mouse.process(picture);
+    if (step.valid && i > 2) turn_rad += step.yaw_rad;
+  }
+  EXPECT_TRUE(step.valid);
+  EXPECT_NEAR(turn_rad / (18 * 0.6), 1.0 / 600.0, 2e-4);
+}
+
+TEST(TrainMouse, LastingPitchErrorIsFoundFromTheGround) {
+  Ride ride;
+  ride.trust = {0.0003, 0.002};
+  ride.pose_used = ride.shaken;
+  ride.pose_used->pitch_rad += 0.001;
+  MouseStep step;
+  for (int i = 0; i <= 60; ++i) step = ride.at(i / kRate, 0.6 * i);
+  EXPECT_NEAR(step.pitch_bias_rad, 0.001, 3e-4);
+}
+
+TEST(TrainMouse, SigmaIsHonest) {
+  Ride ride;
+  double sum = 0;
+  int count = 0;
+  for (int i = 0; i <= 60; ++i) {
+    const MouseStep step = ride.at(i / kRate, 0.55 * i);
+    if (!step.valid) continue;
+    const double error = (step.step_m - 0.55) / step.step_sigma_m;
+    sum += error * error;
+    ++count;
+  }
+  ASSERT_GT(count, 50);
+  EXPECT_LT(std::sqrt(sum / count), 2.0);
+  EXPECT_GT(std::sqrt(sum / count), 0.15);
+}
+
+TEST(TrainMouse, WrongSizeIsRefused) {
+  TrainMouse mouse(test::small_camera(), {});
+  MousePicture picture;
+  picture.grey = cv::Mat::zeros(10, 10, CV_8UC1);
+  picture.stamp_ns = 5;
+  EXPECT_FALSE(mouse.process(picture).valid);
+}
+
+}  // namespace
+}  // namespace railfix::odometry

@@ -1,0 +1,212 @@
+// Real topics inside one process, recorded into a file.
+#include "recorder/recorder_thread.hpp"
+
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include <set>
+
+#include "cdr/decode.hpp"
+#include "core/time.hpp"
+#include "mcap/reader.hpp"
+#include "recorder/pictures.hpp"
+
+namespace railfix::recorder {
+
+namespace {
+
+namespace fs = std::filesystem;
+namespace topics = messaging::topics;
+using ::testing::HasSubstr;
+
+constexpr int64_t kPatienceNs = 20 * core::kNsPerSecond;
+constexpr uint32_t kWidthPx = 320;
+constexpr uint32_t kHeightPx = 200;
+
+template <class Condition>
+bool wait_until(const Condition& condition) {
+  messaging::Queue idle;
+  const int64_t deadline_ns = core::monotonic_ns() + kPatienceNs;
+  while (!condition()) {
+    if (core::monotonic_ns() > deadline_ns) return false;
+    idle.run_one(core::monotonic_ns() + 5'000'000);
+  }
+  return true;
+}
+
+class RecorderThreadTest : public ::testing::Test {
+ protected:
+  RecorderThreadTest()
+      : folder_(fs::temp_directory_path() / ("railfix-recorder-thread-" + std::to_string(::getpid()))),
+        participant_(options()) {
+    fs::remove_all(folder_);
+    config_.folder = folder_.string();
+    config_.keep_free_mb = 0;
+  }
+  ~RecorderThreadTest() override { fs::remove_all(folder_); }
+
+  static messaging::ParticipantOptions options() {
+    messaging::ParticipantOptions options;
+    options.train_id = "recorder-" + std::to_string(::getpid());
+    options.domain = 78;
+    return options;
+  }
+  std::unique_ptr<RecorderThread> recorder() {
+    return std::make_unique<RecorderThread>(
+        config_, participant_, std::map<std::string, std::string>{{"train_id", "demo"}, {"version", "test"}},
+        [this](int64_t stamp_ns) { last_picture_ns_ = stamp_ns; });
+  }
+  static void fill(msg::CameraFrame& frame, uint64_t seq) {
+    frame.stamp_ns(1000 + static_cast<int64_t>(seq));
+    frame.grabbed_ns(5);
+    frame.seq(seq);
+    frame.width_px(kWidthPx);
+    frame.height_px(kHeightPx);
+    frame.exposure_s(0.001F);
+    frame.health(msg::PICTURE_DARK);
+    for (size_t i = 0; i < kWidthPx * kHeightPx; ++i) frame.data()[i] = static_cast<uint8_t>(i % kWidthPx / 2 + seq);
+  }
+
+  fs::path folder_;
+  messaging::Participant participant_;
+  RecorderConfig config_;
+  std::atomic<int64_t> last_picture_ns_ = 0;
+};
+
+TEST_F(RecorderThreadTest, RecordsSamplesAndPicturesOfEveryTopic) {
+  messaging::Writer<msg::OdometryStep> odometry(participant_, topics::odometry_step);
+  messaging::Writer<msg::CameraFrame> camera(participant_, topics::camera_frame, "cam0");
+  auto recorder = this->recorder();
+  const auto started = recorder->start("");
+  ASSERT_TRUE(started.ok()) << started.error().message;
+  EXPECT_FALSE(recorder->start("").ok()) << "one recording at a time";
+  ASSERT_TRUE(wait_until([&] { return odometry.matched_readers() == 1 && camera.matched_readers() == 1; }));
+
+  constexpr uint64_t kPictures = 6;
+  constexpr int kSteps = 200;
+  for (int i = 0; i < kSteps; ++i) {
+    msg::OdometryStep step;
+    step.stamp_ns(i);
+    step.distance_m(0.25 * i);
+    ASSERT_TRUE(odometry.write(step));
+    // No more history than the topic keeps: the test must not depend on how fast this machine is.
+    ASSERT_TRUE(wait_until([&] { return i % 20 != 19 || recorder->state().written >= static_cast<uint64_t>(i / 2); }));
+  }
+  for (uint64_t seq = 1; seq <= kPictures; ++seq) {
+    ASSERT_TRUE(camera.write_in_place([&](msg::CameraFrame& frame) { fill(frame, seq); }));
+    ASSERT_TRUE(wait_until([&] { return last_picture_ns_ == 1000 + static_cast<int64_t>(seq); }));
+  }
+  const auto stopped = recorder->stop();
+  ASSERT_TRUE(stopped.ok()) << stopped.error().message;
+  EXPECT_FALSE(recorder->stop().ok());
+
+  auto reader = mcap::Reader::open(started.value()).value();
+  EXPECT_TRUE(reader->indexed());
+  uint64_t pictures = 0;
+  int steps = 0;
+  reader->for_each({}, [&](const mcap::Channel& channel, const mcap::Message& message) {
+    EXPECT_GT(message.publish_time_ns, 0);
+    EXPECT_GE(message.log_time_ns, message.publish_time_ns);
+    const mcap::Schema& schema = reader->schemas().at(channel.schema_id);
+    // What the file itself says is enough to decode it.
+    cdr::Types types;
+    EXPECT_TRUE(types.add(schema.data).ok());
+    const auto json = cdr::decode(types, schema.name, message.data);
+    EXPECT_TRUE(json.ok()) << json.error().message;
+    if (channel.topic == "odometry_step") {
+      EXPECT_EQ(json.value()["distance_m"], 0.25 * steps);
+      EXPECT_EQ(message.sequence, static_cast<uint32_t>(++steps));
+    } else if (channel.topic == "camera_frame/cam0") {
+      EXPECT_EQ(schema.name, "railfix::msg::CameraPreview");
+      msg::CameraPreview picture;
+      EXPECT_TRUE(messaging::deserialize({message.data.begin(), message.data.end()}, picture));
+      EXPECT_EQ(picture.seq(), ++pictures);
+      EXPECT_EQ(picture.stamp_ns(), 1000 + static_cast<int64_t>(pictures));
+      EXPECT_EQ(picture.health(), msg::PICTURE_DARK);
+      const auto pixels = decode_jpeg(picture.jpeg());
+      EXPECT_TRUE(pixels.ok());
+      EXPECT_NEAR(pixels.value().at<uint8_t>(100, 100), 50 + static_cast<int>(pictures), 4);
+    }
+    return true;
+  });
+  EXPECT_EQ(steps, kSteps);
+  EXPECT_EQ(pictures, kPictures);
+  EXPECT_EQ(reader->metadata().size(), 1U) << "nothing was lost: " << stopped.value();
+}
+
+TEST_F(RecorderThreadTest, CamerasThatAppearLaterAreFound) {
+  config_.cameras = {};
+  config_.picture_every = 2;
+  auto recorder = this->recorder();
+  const auto started = recorder->start((folder_ / "later.mcap").string());
+  ASSERT_TRUE(started.ok());
+  messaging::Participant elsewhere(options());
+  messaging::Writer<msg::CameraFrame> camera(elsewhere, topics::camera_frame, "rear");
+  ASSERT_TRUE(wait_until([&] { return camera.matched_readers() == 1; }));
+  auto frame = std::make_unique<msg::CameraFrame>();
+  for (uint64_t seq = 1; seq <= 4; ++seq) {
+    fill(*frame, seq);
+    ASSERT_TRUE(camera.write(*frame));
+    ASSERT_TRUE(wait_until([&] { return last_picture_ns_ == 1000 + static_cast<int64_t>(seq); }));
+  }
+  ASSERT_TRUE(recorder->stop().ok());
+  auto reader = mcap::Reader::open(folder_ / "later.mcap").value();
+  EXPECT_EQ(reader->statistics().messages, 2U) << "every second picture";
+  EXPECT_EQ(reader->channels().begin()->second.topic, "camera_frame/rear");
+}
+
+TEST_F(RecorderThreadTest, ANewFileRepeatsStandingValues) {
+  config_.split_mb = 0.03;
+  config_.compress = false;
+  config_.chunk_age_s = 0.05;
+  messaging::Writer<msg::CameraCalibration> calibration(participant_, topics::camera_calibration);
+  messaging::Writer<msg::LogRecord> log(participant_, topics::log_record);
+  for (const char* camera : {"cam0", "cam1"}) {
+    msg::CameraCalibration sample;
+    sample.camera(camera);
+    ASSERT_TRUE(calibration.write(sample));
+  }
+  auto recorder = this->recorder();
+  const auto started = recorder->start("");
+  ASSERT_TRUE(started.ok());
+  ASSERT_TRUE(wait_until([&] { return recorder->state().written >= 2; }));
+  msg::LogRecord record;
+  record.text(std::string(1000, 'x'));
+  std::string second;
+  ASSERT_TRUE(wait_until([&] {
+    second = recorder->state().file;
+    return second != started.value() || !log.write(record);
+  }));
+  ASSERT_NE(second, started.value());
+  ASSERT_TRUE(recorder->stop().ok());
+  for (const auto& file : {started.value(), second}) {
+    auto reader = mcap::Reader::open(file).value();
+    EXPECT_TRUE(reader->indexed());
+    std::set<std::string> cameras;
+    reader->for_each({{"camera_calibration"}, {}, {}}, [&](const mcap::Channel&, const mcap::Message& message) {
+      msg::CameraCalibration sample;
+      EXPECT_TRUE(messaging::deserialize({message.data.begin(), message.data.end()}, sample));
+      return cameras.insert(sample.camera().c_str()).second;
+    });
+    EXPECT_EQ(cameras, (std::set<std::string>{"cam0", "cam1"})) << file;
+  }
+}
+
+TEST_F(RecorderThreadTest, FullDiskEndsTheRecordingProperly) {
+  config_.keep_free_mb = 1e12;
+  auto recorder = this->recorder();
+  const auto started = recorder->start((folder_ / "full.mcap").string());
+  ASSERT_TRUE(started.ok());
+  ASSERT_TRUE(wait_until([&] { return !recorder->state().recording; }));
+  EXPECT_THAT(recorder->state().problem, HasSubstr("MB free"));
+  EXPECT_TRUE(mcap::Reader::open(folder_ / "full.mcap").value()->indexed());
+}
+
+TEST_F(RecorderThreadTest, DestructionClosesTheFile) {
+  (void)recorder()->start((folder_ / "gone.mcap").string());
+  EXPECT_TRUE(mcap::Reader::open(folder_ / "gone.mcap").value()->indexed());
+}
+
+}  // namespace
+
+}  // namespace railfix::recorder

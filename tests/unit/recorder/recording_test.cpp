@@ -1,0 +1,137 @@
+#include "recorder/recording.hpp"
+
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include <fstream>
+
+#include "core/time.hpp"
+#include "mcap/reader.hpp"
+#include "recorder/pictures.hpp"
+
+namespace railfix::recorder {
+
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+class RecordingFolder : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() / ("railfix-recorder-" + std::to_string(::getpid()));
+    fs::remove_all(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  [[nodiscard]] std::unique_ptr<Recording> create(const std::string& name) const {
+    return Recording::create(folder_ / name, {}, {{"train_id", "demo"}}).value();
+  }
+  static core::Status write(Recording& recording, const std::string& topic, uint32_t sequence) {
+    static const std::vector<uint8_t> data{0, 1, 0, 0, 9};
+    return recording.write({topic, "railfix::msg::Any", "struct Any { octet x; };", {{"keyed", "false"}}},
+                           {0, sequence, 1000 + sequence, 900 + sequence, data});
+  }
+  fs::path folder_;
+};
+
+TEST_F(RecordingFolder, HoldsSamplesChannelsAndWhatTheTrainWas) {
+  auto recording = create("a/b/one.mcap");
+  ASSERT_TRUE(write(*recording, "track_view", 1).ok());
+  ASSERT_TRUE(write(*recording, "imu_sample", 1).ok());
+  ASSERT_TRUE(write(*recording, "track_view", 2).ok());
+  ASSERT_TRUE(recording->close().ok());
+  auto reader = mcap::Reader::open(folder_ / "a/b/one.mcap").value();
+  EXPECT_EQ(reader->statistics().messages, 3U);
+  EXPECT_EQ(reader->statistics().channels, 2U);
+  EXPECT_EQ(reader->schemas().at(1).encoding, "omgidl");
+  EXPECT_EQ(reader->channels().at(1).message_encoding, "cdr");
+  ASSERT_EQ(reader->metadata().size(), 1U);
+  EXPECT_EQ(reader->metadata()[0].name, "railfix");
+  EXPECT_EQ(reader->metadata()[0].entries.at("train_id"), "demo");
+}
+
+TEST_F(RecordingFolder, GapsAreTransportUnlessADropExplainsThem) {
+  auto recording = create("gaps.mcap");
+  for (const uint64_t sequence : {5, 6, 9, 10}) recording->note_sequence("track_view", 1, sequence);
+  recording->note_sequence("track_view", 2, 100);  // another writer counts on its own
+  EXPECT_EQ(recording->loss_text(), "track_view: 2 transport");
+  recording->set_dropped("track_view", Loss::queue, 2);
+  EXPECT_EQ(recording->loss_text(), "track_view: 2 queue");
+  recording->set_dropped("camera_frame/cam0", Loss::encoder, 7);
+  for (const uint64_t sequence : {1, 10}) recording->note_sequence("camera_frame/cam0", 3, sequence);
+  EXPECT_EQ(recording->loss_text(), "camera_frame/cam0: 1 transport, 7 encoder; track_view: 2 queue");
+  EXPECT_EQ(recording->lost_samples(), 10U);
+  ASSERT_TRUE(recording->close().ok());
+  auto reader = mcap::Reader::open(folder_ / "gaps.mcap").value();
+  ASSERT_EQ(reader->metadata().size(), 2U);
+  EXPECT_EQ(reader->metadata()[1].name, "railfix_losses");
+  EXPECT_EQ(reader->metadata()[1].entries.at("camera_frame/cam0 encoder"), "7");
+}
+
+TEST_F(RecordingFolder, NamesAreUniqueAndInUtc) {
+  const int64_t now_ns = 1'700'000'000 * core::kNsPerSecond;
+  const fs::path first = new_name(folder_, "4711/a", now_ns);
+  EXPECT_EQ(first.filename(), "4711_a-20231114-221320.mcap");
+  fs::create_directories(folder_);
+  std::ofstream(first).put('x');
+  EXPECT_EQ(new_name(folder_, "4711/a", now_ns).filename(), "4711_a-20231114-221320-2.mcap");
+}
+
+TEST_F(RecordingFolder, CrashedRecordingsAreRecoveredAndRunningOnesLeftAlone) {
+  auto running = create("running.mcap");
+  auto crashed = create("done.mcap");
+  ASSERT_TRUE(write(*crashed, "track_view", 1).ok());
+  ASSERT_TRUE(crashed->close().ok());
+  fs::rename(folder_ / "done.mcap", folder_ / "crashed.mcap.active");
+  fs::resize_file(folder_ / "crashed.mcap.active", fs::file_size(folder_ / "crashed.mcap.active") - 20);
+  EXPECT_THAT(recover_folder(folder_), ElementsAre(HasSubstr("was left by a crash; what it held is now in")));
+  EXPECT_EQ(mcap::Reader::open(folder_ / "crashed-recovered.mcap").value()->statistics().messages, 1U);
+  EXPECT_FALSE(fs::exists(folder_ / "crashed.mcap.active"));
+  EXPECT_TRUE(fs::exists(folder_ / "running.mcap.active"));
+  EXPECT_THAT(recover_folder(folder_ / "nowhere"), IsEmpty());
+}
+
+TEST_F(RecordingFolder, QuotaRemovesTheOldest) {
+  fs::create_directories(folder_);
+  const auto make = [&](const std::string& name, int age_h) {
+    std::ofstream(folder_ / name) << std::string(1000, 'x');
+    fs::last_write_time(folder_ / name, fs::file_time_type::clock::now() - std::chrono::hours(age_h));
+  };
+  make("new.mcap", 1);
+  make("oldest.mcap", 9);
+  make("older.mcap", 5);
+  make("notes.txt", 99);
+  EXPECT_EQ(keep_quota(folder_, 10000).size(), 0U);
+  EXPECT_THAT(keep_quota(folder_, 2500), ElementsAre(HasSubstr("oldest.mcap")));
+  EXPECT_TRUE(fs::exists(folder_ / "older.mcap"));
+  EXPECT_TRUE(fs::exists(folder_ / "notes.txt"));
+}
+
+TEST_F(RecordingFolder, FingerprintsTellFilesApart) {
+  fs::create_directories(folder_);
+  std::ofstream(folder_ / "map.bin") << "123456789";
+  EXPECT_EQ(fingerprint(folder_ / "map.bin"), "map.bin crc32 cbf43926");  // the check value of CRC-32/ISO-HDLC
+  EXPECT_EQ(fingerprint(""), "");
+  EXPECT_THAT(fingerprint(folder_ / "none"), HasSubstr("not readable"));
+}
+
+TEST(Pictures, JpegKeepsThePicture) {
+  std::vector<uint8_t> pixels(64 * 48);
+  for (size_t i = 0; i < pixels.size(); ++i) pixels[i] = static_cast<uint8_t>(i % 64 * 3);
+  const auto jpeg = encode_jpeg(pixels.data(), 64, 48, 90);
+  ASSERT_TRUE(jpeg.ok());
+  const auto back = decode_jpeg(jpeg.value());
+  ASSERT_TRUE(back.ok());
+  ASSERT_EQ(back.value().size(), cv::Size(64, 48));
+  for (size_t i = 0; i < pixels.size(); ++i) EXPECT_NEAR(back.value().data[i], pixels[i], 6);
+  EXPECT_FALSE(encode_jpeg(pixels.data(), 0, 48, 90).ok());
+  EXPECT_FALSE(decode_jpeg({1, 2, 3}).ok());
+  EXPECT_FALSE(decode_jpeg({}).ok());
+}
+
+}  // namespace
+
+}  // namespace railfix::recorder

@@ -1,0 +1,59 @@
+#include "topic_watch.hpp"
+
+#include <gmock/gmock.h>
+
+namespace railfix::tool {
+
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+messaging::SampleInfo at(int64_t received_ms, uint64_t sequence, uint64_t writer = 1) {
+  messaging::SampleInfo info;
+  info.received_ns = received_ms * 1'000'000;
+  info.source_ns = info.received_ns - 2'000'000;
+  info.sequence = sequence;
+  info.writer = writer;
+  return info;
+}
+
+TEST(TopicStatistics, RateAndGaps) {
+  TopicStatistics statistics;
+  EXPECT_EQ(statistics.rate_hz(), 0);
+  statistics.add(at(1000, 1));
+  EXPECT_EQ(statistics.rate_hz(), 0);
+  for (const int64_t ms : {1020, 1030, 1100}) statistics.add(at(ms, 2));
+  EXPECT_EQ(statistics.samples(), 4U);
+  EXPECT_DOUBLE_EQ(statistics.rate_hz(), 30.0);
+  EXPECT_DOUBLE_EQ(statistics.shortest_gap_ms(), 10.0);
+  EXPECT_DOUBLE_EQ(statistics.longest_gap_ms(), 70.0);
+  EXPECT_DOUBLE_EQ(statistics.latency_ms(), 2.0);
+}
+
+TEST(TopicStatistics, LossesAreCountedForEachWriter) {
+  TopicStatistics statistics;
+  statistics.add(at(0, 10, 1));
+  statistics.add(at(1, 500, 2));
+  statistics.add(at(2, 11, 1));
+  EXPECT_EQ(statistics.lost(), 0U);
+  statistics.add(at(3, 15, 1));
+  statistics.add(at(4, 502, 2));
+  EXPECT_EQ(statistics.lost(), 4U);
+  messaging::SampleInfo silent;
+  silent.valid = false;
+  statistics.add(silent);
+  EXPECT_EQ(statistics.samples(), 5U);
+}
+
+TEST(SimilarNames, FindsWhatWasMeant) {
+  const std::vector<std::string> names{"track_view", "train_state", "odometry_step", "camera_frame/cam0", "imu_sample"};
+  EXPECT_THAT(similar_names("track_veiw", names), ElementsAre("track_view"));
+  EXPECT_THAT(similar_names("odometry", names), ElementsAre("odometry_step"));
+  EXPECT_THAT(similar_names("camera_frame/cam1", names), ElementsAre("camera_frame/cam0"));
+  EXPECT_THAT(similar_names("zzzzzzzzz", names), IsEmpty());
+}
+
+}  // namespace
+
+}  // namespace railfix::tool

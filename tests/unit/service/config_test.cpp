@@ -1,0 +1,119 @@
+#include "service/config.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+namespace railfix::service {
+namespace {
+
+using ::testing::HasSubstr;
+
+struct Config {
+  double speed_mps = 10;
+  int64_t count = 3;
+  bool on = true;
+  std::string mode = "a";
+  std::string name = "x";
+  std::vector<std::string> names;
+  double inner_m = 1;
+  void describe(Fields& fields) {
+    fields.number("speed_mps", speed_mps, {0, 100}, "m/s", "How fast.");
+    fields.integer("count", count, {1, 5}, "", "How many.");
+    fields.flag("on", on, "Whether.");
+    fields.choice("mode", mode, {"a", "b"}, "Which.");
+    fields.text("name", name, "Who.");
+    fields.list("names", names, "Whom.");
+    fields.group("inner", "Inside.", [this](Fields& inner) {
+      inner.number("inner_m", inner_m, {0, 2}, "m", "How far.");
+    });
+  }
+};
+
+class ConfigTest : public ::testing::Test {
+ protected:
+  std::filesystem::path write(const std::string& text) {
+    const auto file = std::filesystem::path(::testing::TempDir()) / "railfix_config_test.yaml";
+    std::ofstream(file) << text;
+    return file;
+  }
+  static std::string error_of(const core::Result<Config>& result) {
+    return result.ok() ? "no error" : result.error().message;
+  }
+};
+
+TEST_F(ConfigTest, ReadsEveryKindOfKeyAndLeavesDefaults) {
+  const auto config = read_config<Config>("odometry", write("odometry:\n  speed_mps: 2.5\n  count: 5\n  on: false\n  "
+                                                            "mode: b\n  names: [p, q]\n  inner:\n    inner_m: 0.5\n"));
+  ASSERT_TRUE(config.ok()) << error_of(config);
+  EXPECT_EQ(config.value().speed_mps, 2.5);
+  EXPECT_EQ(config.value().count, 5);
+  EXPECT_FALSE(config.value().on);
+  EXPECT_EQ(config.value().mode, "b");
+  EXPECT_EQ(config.value().name, "x");
+  EXPECT_THAT(config.value().names, ::testing::ElementsAre("p", "q"));
+  EXPECT_EQ(config.value().inner_m, 0.5);
+}
+
+TEST_F(ConfigTest, NamesFileLineKeyAndReason) {
+  const auto file = write("odometry:\n  speed_mps: 200\n  cuont: 3\n  inner: {inner_m: far}\n");
+  const auto config = read_config<Config>("odometry", file);
+  ASSERT_FALSE(config.ok());
+  EXPECT_THAT(error_of(config), HasSubstr(file.string() + " line 2: odometry.speed_mps 200 is outside 0 to 100 m/s"));
+  EXPECT_THAT(error_of(config), HasSubstr("line 3: odometry.cuont is not a key of this section, which has: count"));
+  EXPECT_THAT(error_of(config), HasSubstr("line 4: odometry.inner.inner_m 'far' is not a number; give it in m"));
+}
+
+TEST_F(ConfigTest, RefusesNotANumberAndWrongKinds) {
+  EXPECT_FALSE(read_config<Config>("odometry", write("odometry: {speed_mps: .nan}\n")).ok());
+  EXPECT_FALSE(read_config<Config>("odometry", write("odometry: {count: 2.5}\n")).ok());
+  EXPECT_FALSE(read_config<Config>("odometry", write("odometry: {count: [1]}\n")).ok());
+  EXPECT_FALSE(read_config<Config>("odometry", write("odometry: {mode: c}\n")).ok());
+  EXPECT_FALSE(read_config<Config>("odometry", write("odometry: [1, 2]\n")).ok());
+  EXPECT_FALSE(read_config<Config>("odometry", write("odometry: {inner: 3}\n")).ok());
+}
+
+TEST_F(ConfigTest, CommandLineIsOverTheFile) {
+  const auto file = write("odometry: {speed_mps: 1, inner: {inner_m: 0.5}}\n");
+  const auto config = read_config<Config>(
+      "odometry", file, {{"odometry.speed_mps", "7"}, {"odometry.inner.inner_m", "1.5"}, {"fusion.x", "1"}});
+  ASSERT_TRUE(config.ok()) << error_of(config);
+  EXPECT_EQ(config.value().speed_mps, 7);
+  EXPECT_EQ(config.value().inner_m, 1.5);
+  const auto wrong = read_config<Config>("odometry", file, {{"odometry.speed", "7"}});
+  EXPECT_THAT(error_of(wrong), HasSubstr("odometry.speed is not a key"));
+  const auto outside = read_config<Config>("odometry", file, {{"odometry.speed_mps", "700"}});
+  EXPECT_THAT(error_of(outside), HasSubstr("command line: odometry.speed_mps 700 is outside"));
+}
+
+TEST_F(ConfigTest, CommandLineTakesListsAndEmptyTexts) {
+  const auto config = read_config<Config>("odometry", {}, {{"odometry.names", "[p, q]"}, {"odometry.name", ""}});
+  ASSERT_TRUE(config.ok()) << error_of(config);
+  EXPECT_THAT(config.value().names, ::testing::ElementsAre("p", "q"));
+  EXPECT_EQ(config.value().name, "");
+}
+
+TEST_F(ConfigTest, OneFileConfiguresAWholeTrain) {
+  const auto file = write("common: {domain: 3}\nfusion: {anything: 1}\nodometry: {count: 2}\n");
+  EXPECT_TRUE(read_config<Config>("odometry", file, {}, {"fusion"}).ok());
+  EXPECT_THAT(error_of(read_config<Config>("odometry", file, {}, {})),
+              HasSubstr("section fusion belongs to no service; there are common"));
+}
+
+TEST_F(ConfigTest, MissingAndBrokenFilesAreSentences) {
+  EXPECT_THAT(error_of(read_config<Config>("odometry", "/no/such.yaml")), HasSubstr("/no/such.yaml does not exist"));
+  EXPECT_THAT(error_of(read_config<Config>("odometry", write("odometry: {a: [\n"))), HasSubstr("not valid YAML"));
+  EXPECT_THAT(error_of(read_config<Config>("odometry", write("just text\n"))), HasSubstr("sections"));
+}
+
+TEST_F(ConfigTest, DocumentationIsAValidConfigurationWithTheDefaults) {
+  const std::string text = document_config<Config>("odometry");
+  EXPECT_THAT(text, HasSubstr("# How fast. [m/s, 0 to 100]\n  speed_mps: 10\n"));
+  const auto config = read_config<Config>("odometry", write(text));
+  ASSERT_TRUE(config.ok()) << error_of(config);
+  EXPECT_EQ(config.value().speed_mps, 10);
+}
+
+}  // namespace
+}  // namespace railfix::service

@@ -1,0 +1,153 @@
+#include "tpr_publisher/balise_tracker.hpp"
+
+#include <gtest/gtest.h>
+
+#include "unit/tpr_publisher/balise_map.hpp"
+
+namespace railfix::tpr_publisher {
+namespace {
+
+using namespace testing;
+
+class Tracker : public ::testing::Test {
+ protected:
+  void expect(uint32_t nid_lrbg, double foot_m) {
+    ASSERT_TRUE(tracker.reference().has_value());
+    EXPECT_EQ(tracker.reference()->group->nid_lrbg(), nid_lrbg);
+    EXPECT_NEAR(tracker.reference()->foot_m, foot_m, 1e-9);
+  }
+  [[nodiscard]] uint32_t previous() const {
+    return tracker.reference()->previous == nullptr ? 0 : tracker.reference()->previous->nid_lrbg();
+  }
+  BaliseTracker tracker{balise_map(), 5000};
+};
+
+TEST_F(Tracker, KnowsNoGroupBeforeTheFirst) {
+  tracker.update(forward(1, 50));
+  EXPECT_FALSE(tracker.reference().has_value());
+  tracker.update(forward(1, 99));
+  EXPECT_FALSE(tracker.reference().has_value());
+  tracker.update(forward(1, 100));
+  expect(kA, 0);
+  EXPECT_EQ(previous(), 0U);
+  EXPECT_TRUE(tracker.reference()->nominal_along);
+}
+
+TEST_F(Tracker, TakesTheGroupsBehindAtTheStart) {
+  tracker.update(forward(1, 450));
+  expect(kB, 50);
+  EXPECT_EQ(previous(), kA);
+  EXPECT_FALSE(tracker.reference()->nominal_along);
+}
+
+TEST_F(Tracker, PassesSeveralGroupsInOneStep) {
+  tracker.update(forward(1, 50));
+  tracker.update(forward(1, 705));
+  expect(kC, 5);
+  EXPECT_EQ(previous(), kB);
+  EXPECT_TRUE(tracker.reference()->from_previous_along);
+}
+
+TEST_F(Tracker, RollingBackKeepsTheGroupUntilAnotherIsPassed) {
+  tracker.update(forward(1, 410));
+  tracker.update(forward(1, 390));
+  expect(kB, -10);
+  tracker.update(forward(1, 410));
+  expect(kB, 10);
+  tracker.update(forward(1, 90));
+  expect(kA, -10);
+  EXPECT_EQ(previous(), kB);
+  EXPECT_FALSE(tracker.reference()->from_previous_along);
+}
+
+TEST_F(Tracker, JitterOnAGroupChangesNothing) {
+  tracker.update(forward(1, 399));
+  for (int i = 0; i < 10; ++i) {
+    tracker.update(forward(1, 400.2));
+    expect(kB, 0.2);
+    tracker.update(forward(1, 399.8));
+    expect(kB, -0.2);
+    EXPECT_EQ(previous(), kA);
+  }
+}
+
+TEST_F(Tracker, GoesStraightOverTheSwitch) {
+  tracker.update(forward(1, 990));
+  tracker.update(forward(2, 10));
+  expect(kC, 310);
+  tracker.update(forward(2, 205));
+  expect(kD, 5);
+  EXPECT_EQ(previous(), kC);
+}
+
+TEST_F(Tracker, GoesOverTheDivergingWay) {
+  tracker.update(forward(1, 990));
+  tracker.update(reverse(3, 490));  // the siding is drawn the other way
+  expect(kC, 310);
+  tracker.update(reverse(3, 390));
+  expect(kE, 10);
+  EXPECT_FALSE(tracker.reference()->nominal_along);
+}
+
+TEST_F(Tracker, ComesOutOfTheSidingWithTheRightGroup) {
+  tracker.update(forward(3, 450));
+  expect(kE, 50);
+  tracker.update(reverse(1, 990));
+  expect(kE, 110);  // the straight way back from here would lead to D
+  tracker.update(reverse(1, 690));
+  expect(kC, 10);
+  EXPECT_EQ(previous(), kE);
+  EXPECT_FALSE(tracker.reference()->nominal_along);
+}
+
+TEST_F(Tracker, BacksOverTheSwitch) {
+  tracker.update(forward(2, 250));
+  tracker.update(forward(2, 20));
+  expect(kD, -180);
+  tracker.update(forward(1, 980));
+  expect(kD, -220);
+  tracker.update(forward(1, 650));
+  expect(kC, -50);
+}
+
+TEST_F(Tracker, StandsExactlyWhereEdgesMeet) {
+  tracker.update(forward(1, 990));
+  tracker.update(forward(1, 1000));
+  tracker.update(forward(2, 0));
+  expect(kC, 300);
+  tracker.update(forward(2, 1));
+  expect(kC, 301);
+  EXPECT_EQ(previous(), kB);
+}
+
+TEST_F(Tracker, AJumpToAnotherTrackStartsAnew) {
+  tracker.update(forward(2, 250));
+  tracker.update(forward(3, 450));
+  expect(kE, 50);
+  EXPECT_EQ(previous(), 0U);
+}
+
+TEST_F(Tracker, TurningTheCabStartsAnew) {
+  tracker.update(forward(1, 450));
+  tracker.update(reverse(1, 450));
+  expect(kC, 250);
+}
+
+TEST_F(Tracker, LosesItselfOffTheMap) {
+  tracker.update(forward(1, 450));
+  tracker.update(forward(9, 450));
+  EXPECT_FALSE(tracker.reference().has_value());
+  tracker.update(forward(1, 450));
+  expect(kB, 50);
+}
+
+TEST_F(Tracker, SearchesOnlySoFarBehind) {
+  BaliseTracker near(balise_map(), 40);
+  near.update(forward(1, 450));
+  EXPECT_FALSE(near.reference().has_value());
+  near.update(forward(2, 20));  // steps beyond 500 m are jumps
+  EXPECT_FALSE(near.reference().has_value());
+}
+
+}  // namespace
+}  // namespace railfix::tpr_publisher

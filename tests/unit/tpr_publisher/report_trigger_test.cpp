@@ -1,0 +1,150 @@
+#include "tpr_publisher/report_trigger.hpp"
+
+#include <gmock/gmock.h>
+
+#include "core/time.hpp"
+
+namespace railfix::tpr_publisher {
+namespace {
+
+using core::kNsPerSecond;
+
+class Trigger : public ::testing::Test {
+ protected:
+  /// Reports at the moment when something is due; says what.
+  std::optional<Reason> step() {
+    const auto reason = trigger.due(moment);
+    if (reason) trigger.sent(moment);
+    return reason;
+  }
+  void run(double duration_s, double distance_m) {
+    moment.now_ns += core::to_ns(duration_s);
+    moment.front_m += distance_m;
+    moment.max_safe_front_m = moment.front_m + 10;
+    moment.min_safe_front_m = moment.front_m - 20;
+    if (moment.beyond_lrbg_m) *moment.beyond_lrbg_m += distance_m;
+  }
+  static etcs::ReportParameters parameters() {
+    etcs::ReportParameters parameters;
+    parameters.t_cycloc = 6;
+    return parameters;
+  }
+  void ask(const etcs::ReportParameters& parameters) { core::ok_or_throw(trigger.set_parameters(parameters)); }
+
+  ReportTrigger trigger{parameters(), 100};
+  Moment moment;
+};
+
+TEST_F(Trigger, TheFirstMomentReports) {
+  EXPECT_EQ(step(), Reason::start);
+  EXPECT_EQ(step(), std::nullopt);
+}
+
+TEST_F(Trigger, ReportsEveryTCyclocSeconds) {
+  step();
+  for (int cycle = 0; cycle < 3; ++cycle) {
+    run(5.99, 100);
+    EXPECT_EQ(step(), std::nullopt);
+    run(0.01, 0);
+    EXPECT_EQ(step(), Reason::cycle_time);
+  }
+}
+
+TEST_F(Trigger, ReportsEveryDCyclocMetresEitherWay) {
+  auto wanted = parameters();
+  wanted.t_cycloc = etcs::kNoCycleTime;
+  wanted.q_scale = 2;
+  wanted.d_cycloc = 5;  // 50 m
+  ask(wanted);
+  step();
+  run(100, 49);
+  EXPECT_EQ(step(), std::nullopt);
+  run(1, 1);
+  EXPECT_EQ(step(), Reason::cycle_distance);
+  run(1, -50);
+  EXPECT_EQ(step(), Reason::cycle_distance);
+}
+
+TEST_F(Trigger, InfiniteCyclesNeverReport) {
+  ask(etcs::ReportParameters{});
+  step();
+  run(1e5, 1e6);
+  EXPECT_EQ(step(), std::nullopt);
+}
+
+TEST_F(Trigger, StandstillReachedAndLeft) {
+  step();
+  moment.standstill = true;
+  EXPECT_EQ(step(), Reason::standstill);
+  EXPECT_EQ(step(), std::nullopt);
+  moment.standstill = false;
+  EXPECT_EQ(step(), Reason::moving);
+}
+
+TEST_F(Trigger, EveryNewBaliseGroupUnlessNotWanted) {
+  step();
+  moment.nid_lrbg = 7;
+  EXPECT_EQ(step(), Reason::balise_group);
+  moment.nid_lrbg = etcs::kUnknownBaliseGroup;
+  EXPECT_EQ(step(), std::nullopt);
+  moment.nid_lrbg = 7;  // found again, not new
+  EXPECT_EQ(step(), std::nullopt);
+  auto wanted = parameters();
+  wanted.m_loc = etcs::kReportNotAtGroups;
+  ask(wanted);
+  moment.nid_lrbg = 8;
+  EXPECT_EQ(step(), std::nullopt);
+}
+
+TEST_F(Trigger, NowReportsAtOnce) {
+  step();
+  auto wanted = parameters();
+  wanted.m_loc = etcs::kReportNow;
+  ask(wanted);
+  EXPECT_EQ(step(), Reason::start);
+  EXPECT_EQ(step(), std::nullopt);
+}
+
+TEST_F(Trigger, LocationsCountFromTheBaliseGroup) {
+  auto wanted = parameters();
+  wanted.t_cycloc = etcs::kNoCycleTime;
+  wanted.locations = {{20, 1}, {100, 1}, {50, 0}};  // 20 m and 120 m: front end; 170 m: rear end of the 100 m train
+  ask(wanted);
+  step();
+  moment.nid_lrbg = 7;
+  moment.beyond_lrbg_m = 30;
+  run(0, 0);
+  EXPECT_EQ(step(), Reason::balise_group);  // the first location lies behind already
+  run(1, 79);                               // 109 m, max safe front end 119 m
+  EXPECT_EQ(step(), std::nullopt);
+  run(1, 1.5);
+  EXPECT_EQ(step(), Reason::location);
+  run(1, 170);  // 280.5 m, min safe rear end 160.5 m
+  EXPECT_EQ(step(), std::nullopt);
+  run(1, 10);
+  EXPECT_EQ(step(), Reason::location);
+  run(1, 500);
+  EXPECT_EQ(step(), std::nullopt);
+}
+
+TEST_F(Trigger, StaysDueUntilSent) {
+  step();
+  moment.nid_lrbg = 7;
+  EXPECT_EQ(trigger.due(moment), Reason::balise_group);
+  EXPECT_EQ(trigger.due(moment), Reason::balise_group);
+  trigger.sent(moment);
+  EXPECT_EQ(trigger.due(moment), std::nullopt);
+}
+
+TEST(TriggerParameters, WhatCannotBeDoneIsRefused) {
+  etcs::ReportParameters wanted;
+  wanted.locations = {{100, 0}};
+  ReportTrigger trigger({}, 0);
+  EXPECT_THAT(trigger.set_parameters(wanted).error().message, ::testing::HasSubstr("train_length_m"));
+  wanted = {};
+  wanted.t_cycloc = 0;
+  EXPECT_THAT(trigger.set_parameters(wanted).error().message, ::testing::HasSubstr("without a pause"));
+}
+
+}  // namespace
+}  // namespace railfix::tpr_publisher

@@ -1,0 +1,123 @@
+#include "tpr_publisher/tpr_publisher.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "core/time.hpp"
+#include "unit/tpr_publisher/balise_map.hpp"
+
+namespace railfix::tpr_publisher {
+namespace {
+
+using namespace testing;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+constexpr int64_t kStart = 1'700'000'000'000'000'000;
+
+Settings settings() {
+  Settings settings;
+  settings.parameters.t_cycloc = 6;
+  settings.report.nid_engine = 4711;
+  settings.report.foot_to_front_m = 2;
+  return settings;
+}
+
+TrainPosition at(const track::EdgePosition& foot, double run_s, double speed_mps) {
+  TrainPosition position;
+  position.stamp_ns = kStart + core::to_ns(run_s);
+  position.foot = foot;
+  position.track_known = true;
+  position.speed_mps = speed_mps;
+  position.distance_m = foot.offset_m;
+  position.over_m = position.under_m = 3;
+  position.standstill = speed_mps == 0;
+  return position;
+}
+
+TEST(TprPublisher, ARunGivesTheReportsOfTheRules) {
+  TprPublisher publisher(balise_map(), settings());
+  std::vector<Reason> reasons;
+  std::vector<uint32_t> groups;
+  for (int i = 0; i <= 1700; ++i) {  // 50 Hz, 20 m/s from 50 m to 650 m, then 4 s at rest
+    const double run_s = i * 0.02;
+    const bool moving = run_s < 30;
+    const auto position = at(forward(1, 50 + 20 * std::min(run_s, 30.0)), run_s, moving ? 20 : 0);
+    const auto outcome = publisher.update(position, position.stamp_ns + 40'000'000);
+    ASSERT_EQ(outcome.refusal, "");
+    if (!outcome.report) continue;
+    reasons.push_back(outcome.report->reason);
+    groups.push_back(outcome.report->fields.nid_lrbg);
+    ASSERT_EQ(etcs::decode(outcome.report->message, etcs::Baseline::b3).value(), outcome.report->fields);
+    EXPECT_EQ(outcome.report->fields.nid_engine, 4711U);
+    EXPECT_EQ(outcome.report->sent_ns - outcome.report->stamp_ns, 40'000'000);
+  }
+  EXPECT_THAT(reasons, ElementsAre(Reason::start, Reason::balise_group, Reason::cycle_time, Reason::cycle_time,
+                                   Reason::balise_group, Reason::cycle_time, Reason::cycle_time, Reason::standstill));
+  EXPECT_THAT(groups, ElementsAre(etcs::kUnknownBaliseGroup, kA, kA, kA, kB, kB, kB, kB));
+}
+
+TEST(TprPublisher, OldPositionsAreNotReported) {
+  TprPublisher publisher(balise_map(), settings());
+  const auto position = at(forward(1, 450), 0, 20);
+  auto outcome = publisher.update(position, position.stamp_ns + core::kNsPerSecond);
+  EXPECT_FALSE(outcome.report.has_value());
+  EXPECT_THAT(outcome.refusal, HasSubstr("1.0 s old, the limit is 1 s"));
+  outcome = publisher.update(position, position.stamp_ns - 5 * core::kNsPerSecond);
+  EXPECT_THAT(outcome.refusal, HasSubstr("5.0 s in the future"));
+  outcome = publisher.update(position, position.stamp_ns + core::kNsPerSecond - 1);  // still due
+  ASSERT_TRUE(outcome.report.has_value());
+  EXPECT_EQ(outcome.report->reason, Reason::start);
+}
+
+TEST(TprPublisher, SilenceOfTheStateIsSaidWhenAReportIsDue) {
+  TprPublisher publisher(balise_map(), settings());
+  EXPECT_THAT(publisher.tick(kStart).refusal, HasSubstr("no train_state yet"));
+  ASSERT_TRUE(publisher.update(at(forward(1, 450), 0, 20), kStart).report.has_value());
+  EXPECT_EQ(publisher.tick(kStart + 5 * core::kNsPerSecond).refusal, "");  // nothing due
+  EXPECT_THAT(publisher.tick(kStart + 7 * core::kNsPerSecond).refusal, HasSubstr("7.0 s old"));
+  EXPECT_FALSE(publisher.tick(kStart + 7 * core::kNsPerSecond).report.has_value());
+}
+
+TEST(TprPublisher, ALostTrackLosesTheReference) {
+  TprPublisher publisher(balise_map(), settings());
+  auto position = at(forward(1, 450), 0, 20);
+  EXPECT_EQ(publisher.update(position, position.stamp_ns).report->fields.nid_lrbg, kB);
+  position = at(forward(1, 570), 6, 20);
+  position.track_known = false;
+  EXPECT_EQ(publisher.update(position, position.stamp_ns).report->fields.nid_lrbg, etcs::kUnknownBaliseGroup);
+}
+
+TEST(TprPublisher, DirectionOfMovementIsKeptAtStandstill) {
+  TprPublisher publisher(balise_map(), settings());
+  EXPECT_EQ(publisher.update(at(forward(1, 150), 0, 0), kStart).report->fields.q_dirtrain, etcs::kUnknownSide);
+  auto position = at(forward(1, 149), 1, -2);
+  EXPECT_EQ(publisher.update(position, position.stamp_ns).report->fields.q_dirtrain, etcs::kReverse);
+  position = at(forward(1, 149), 2, 0);
+  EXPECT_EQ(publisher.update(position, position.stamp_ns).report->fields.q_dirtrain, etcs::kReverse);
+}
+
+TEST(TprPublisher, NumbersThatAreNoneAreRefused) {
+  TprPublisher publisher(balise_map(), settings());
+  auto position = at(forward(1, 150), 0, 20);
+  position.speed_mps = NAN;
+  EXPECT_THAT(publisher.update(position, kStart).refusal, HasSubstr("not a number"));
+  position = at(forward(1, NAN), 0, 20);
+  position.distance_m = 0;
+  EXPECT_EQ(publisher.update(position, kStart).report->fields.nid_lrbg, etcs::kUnknownBaliseGroup);
+}
+
+TEST(TprPublisher, WithoutAMapTheReferenceIsUnknown) {
+  TprPublisher publisher(nullptr, settings());
+  EXPECT_EQ(publisher.update(at(forward(1, 450), 0, 20), kStart).report->fields.nid_lrbg, etcs::kUnknownBaliseGroup);
+}
+
+TEST(TprPublisher, SettingsThatCannotBeEncodedAreRefusedAtOnce) {
+  auto wrong = settings();
+  wrong.report.m_mode = 16;  // exists in 4.0.0 only
+  EXPECT_THROW(TprPublisher(nullptr, wrong), core::BadInput);
+}
+
+}  // namespace
+}  // namespace railfix::tpr_publisher

@@ -1,0 +1,144 @@
+#include "track/import/landxml.hpp"
+
+#include <pugixml.hpp>
+#include <sstream>
+
+#include "core/random.hpp"
+#include "core/units.hpp"
+#include "import_fixture.hpp"
+
+namespace railfix::track {
+namespace {
+
+using testing::HasSubstr;
+using LandXmlTest = ImportTest;
+
+// A straight of 100 m northwards, a clothoid of 60 m into a right curve of radius 300 m, 100 m of that.
+constexpr const char* kSample = R"(<?xml version="1.0"?>
+<LandXML version="1.2"><Units><Metric linearUnit="meter"/></Units><Alignments><Alignment name="L1" length="260" staStart="1000">
+<CoordGeom>
+<Line length="100"><Start>5000 2000</Start><End>5100 2000</End></Line>
+<Spiral length="60" radiusStart="INF" radiusEnd="300" rot="cw" spiType="clothoid"><Start>5100 2000</Start><End>5159.940027771 2001.998571883</End></Spiral>
+<Curve rot="cw" radius="300" length="100" crvType="arc"><Start>5159.940027771 2001.998571883</Start><End>5255.959512788 2028.228481536</End></Curve>
+</CoordGeom>
+<Profile><ProfAlign><PVI>1000 400</PVI><CircCurve length="40" radius="4000">1130 401.3</CircCurve><PVI>1260 401.3</PVI></ProfAlign></Profile>
+<Cant gauge="1.435"><CantStation station="1100" appliedCant="0" curvature="cw"/><CantStation station="1160" appliedCant="120" curvature="cw"/></Cant>
+</Alignment></Alignments></LandXML>)";
+
+TEST_F(LandXmlTest, ReadsPlanProfileAndCant) {
+  const LandXml read = core::value_or_throw(read_landxml(write("l.xml", kSample)));
+  ASSERT_EQ(read.tracks.size(), 1U);
+  const Alignment& track = read.tracks[0].alignment;
+  EXPECT_EQ(read.tracks[0].name, "L1");
+  EXPECT_EQ(read.crs, "");
+  EXPECT_NEAR(track.length_m(), 260, 1e-3);
+  EXPECT_NEAR(track.at(0).pose.northing_m, 5000, 1e-9);
+  EXPECT_NEAR(track.at(0).pose.easting_m, 2000, 1e-9);
+  EXPECT_NEAR(track.at(50).pose.heading_rad, 0, 1e-9);
+  EXPECT_NEAR(track.at(200).curvature_per_m, -1.0 / 300, 1e-12);  // clockwise is to the right
+  EXPECT_GT(track.at(200).pose.heading_rad, 0.1);
+  EXPECT_NEAR(track.at(130).cant_m, -0.06, 1e-6);  // the left rail is the outer, higher one
+  EXPECT_NEAR(track.at(130).elevation_m, 401.3 - 0.01 * 40 / 8, 1e-5);
+  EXPECT_NEAR(track.at(20).grade, 0.01, 1e-6);
+  EXPECT_THAT(read.problems, testing::IsEmpty());
+  EXPECT_LT(read.figures.max_heading_step_rad, 1e-6);
+}
+
+TEST_F(LandXmlTest, ClosesElementsOntoTheirEndsAndKeepsTheCurvature) {
+  core::Random random(5);
+  for (int i = 0; i < 200; ++i) {
+    const Element drawn{random.uniform(1, 500), random.uniform(-0.004, 0.004),
+                        i % 3 == 0 ? 0.0 : random.uniform(-0.004, 0.004)};
+    const PlanPose start{random.uniform(0, 1e6), random.uniform(0, 1e6), random.uniform(-3, 3)};
+    const PlanPose end = advance(start, drawn, drawn.length_m);
+    const ClosedElement closed =
+        close_element({start.easting_m, start.northing_m}, {end.easting_m, end.northing_m}, drawn.curvature_start_per_m,
+                      drawn.curvature_end_per_m, drawn.length_m * 1.0001);
+    EXPECT_NEAR(closed.element.length_m, drawn.length_m, 1e-6);
+    EXPECT_NEAR(core::wrap_pi(closed.start.heading_rad - start.heading_rad), 0, 1e-9);
+    const PlanPose reached = advance(closed.start, closed.element, closed.element.length_m);
+    EXPECT_NEAR(std::hypot(reached.easting_m - end.easting_m, reached.northing_m - end.northing_m), 0, 1e-8);
+  }
+}
+
+// The file itself is the reference: every element must end where the file says, at the station the file says.
+TEST_F(LandXmlTest, SwissMainLineIsReproducedWithinATenthOfAMillimetre) {
+  const std::filesystem::path file = shared_data("alignment/sbb_mszw_a2.landxml");
+  if (!std::filesystem::exists(file)) GTEST_SKIP() << "skipped: no " << file;
+  const LandXml read = core::value_or_throw(read_landxml(file));
+  EXPECT_EQ(read.crs, "EPSG:2056");
+  ASSERT_EQ(read.tracks.size(), 10U);
+  pugi::xml_document document;
+  ASSERT_TRUE(document.load_file(file.c_str()));
+  const pugi::xml_node alignment = document.child("LandXML").child("Alignments").child("Alignment");
+  const Alignment& track = read.tracks[0].alignment;
+  ASSERT_EQ(read.tracks[0].name, "A50034A");
+  size_t i = 0;
+  double worst_m = 0;
+  for (const pugi::xml_node& element : alignment.child("CoordGeom").children()) {
+    std::istringstream text(element.child("End").text().get());
+    double northing = 0;
+    double easting = 0;
+    text >> northing >> easting;
+    const double length = element.attribute("length").as_double();
+    const PlanPose end = advance(track.starts()[i], track.elements()[i], length);
+    worst_m = std::max(worst_m, std::hypot(end.easting_m - easting, end.northing_m - northing));
+    // And by dead reckoning with the file's own stations over all the elements before.
+    const double station = element.attribute("staStart").as_double() + length;
+    const PlanPose at = track.at(station - 1e-6).pose;
+    EXPECT_LT(std::hypot(at.easting_m - easting, at.northing_m - northing), 1e-3) << station;
+    ++i;
+  }
+  EXPECT_EQ(i, 103U);
+  EXPECT_EQ(track.elements().size(), 103U);
+  EXPECT_LT(worst_m, 1e-4);
+  EXPECT_LT(read.figures.max_heading_step_rad, 1e-3);
+}
+
+TEST_F(LandXmlTest, NamesTheLineThatIsWrong) {
+  const auto message = [&](const std::string& from, const std::string& to) {
+    std::string text = kSample;
+    text.replace(text.find(from), from.size(), to);
+    const core::Result<LandXml> read = read_landxml(write("bad.xml", text));
+    return read.ok() ? std::string("was read") : read.error().message;
+  };
+  EXPECT_THAT(message("radius=\"300\" ", "radius=\"abc\" "), HasSubstr("line 6"));
+  EXPECT_THAT(message("radius=\"300\" ", "radius=\"3\" "), HasSubstr("less than 10 m"));
+  EXPECT_THAT(message("rot=\"cw\" radius", "rot=\"up\" radius"), HasSubstr("cw or ccw"));
+  EXPECT_THAT(message("5100 2000</End>", "5100</End>"), HasSubstr("line 4"));
+  EXPECT_THAT(message("5255.959512788", "1e300"), HasSubstr("1000 km"));
+  EXPECT_THAT(message("linearUnit=\"meter\"", "linearUnit=\"foot\""), HasSubstr("metres"));
+  EXPECT_THAT(message("<PVI>1260", "<PVI>1100"), HasSubstr("must grow"));
+  EXPECT_THAT(message("appliedCant=\"120\"", "appliedCant=\"nan\""), HasSubstr("appliedCant"));
+  EXPECT_THAT(message("</CoordGeom>", ""), HasSubstr("not sound XML"));
+  EXPECT_THAT(message("<Line ", "<Chain "), HasSubstr("not sound XML"));
+  EXPECT_FALSE(read_landxml(in_folder("none.xml")).ok());
+}
+
+TEST_F(LandXmlTest, TellsOfElementsThatDoNotFit) {
+  std::string text = kSample;
+  text.replace(text.find("5255.959512788"), 14, "5254.959512788");
+  const LandXml read = core::value_or_throw(read_landxml(write("bad.xml", text)));
+  ASSERT_THAT(read.problems, testing::Not(testing::IsEmpty()));
+  EXPECT_THAT(read.problems[0], HasSubstr("line 6"));
+}
+
+TEST_F(LandXmlTest, NoDamageToTheFileCrashesIt) {
+  const std::string whole = kSample;
+  core::Random random(9);
+  for (size_t length = 0; length < whole.size(); length += 11) {
+    EXPECT_FALSE(read_landxml(write("cut.xml", whole.substr(0, length))).ok());
+  }
+  for (int i = 0; i < 150; ++i) {
+    std::string bad = whole;
+    for (int k = 0; k < 3; ++k) bad[random.next() % bad.size()] = static_cast<char>(random.next());
+    const core::Result<LandXml> read = read_landxml(write("bad.xml", bad));
+    if (!read.ok()) continue;
+    for (const ImportedTrack& track : read.value().tracks) {
+      EXPECT_TRUE(std::isfinite(track.alignment.at(10).pose.easting_m));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace railfix::track

@@ -1,0 +1,160 @@
+#include "track/import/network.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/units.hpp"
+#include "small_map.hpp"
+#include "track/import/finish.hpp"
+#include "track/path.hpp"
+
+namespace railfix::track {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+/// A straight main line of 1000 m northwards with a turnout of radius 500 m to the right at 400 m.
+std::vector<ImportedTrack> main_and_branch() {
+  const Alignment main = Alignment::chained({100, 200, 0}, {{1000, 0, 0}}, {{0, 10, 0}, {1000, 20, 0}});
+  const Alignment branch = Alignment::chained(main.at(400).pose, {{120, -1.0 / 500, -1.0 / 500}});
+  return {{"main", "main", main, {{LandmarkKind::mast, 600, 3, 0.1, "S1"}}}, {"branch", "branch", branch, {}}};
+}
+
+Map built(std::vector<ImportedTrack> tracks, std::vector<std::string>& problems) {
+  Map map;
+  append(cut_tracks(std::move(tracks), problems), map);
+  return map;
+}
+
+TEST(Network, CutsTheMainLineAtTheTurnout) {
+  std::vector<std::string> problems;
+  const Map map = built(main_and_branch(), problems);
+  ASSERT_EQ(map.edges.size(), 3U);
+  EXPECT_NEAR(map.edges[0].alignment.length_m(), 400, 1e-6);
+  EXPECT_NEAR(map.edges[1].alignment.length_m(), 600, 1e-6);
+  EXPECT_EQ(map.edges[1].name, "main#2");
+  EXPECT_NEAR(map.edges[1].alignment.at(100).elevation_m, 15, 1e-9);
+  EXPECT_EQ(map.parse_position("main:450").value().edge, 2U);  // counted over the pieces
+  EXPECT_NEAR(map.parse_position("main:450").value().offset_m, 50, 1e-6);
+  EXPECT_FALSE(map.parse_position("main:1001").ok());
+  EXPECT_FALSE(map.parse_position("1:450").ok());
+  ASSERT_EQ(map.connections.size(), 2U);
+  EXPECT_EQ(map.connections[0].edge_a, 1U);
+  EXPECT_EQ(map.connections[0].edge_b, 2U);
+  EXPECT_FALSE(map.connections[0].diverging);
+  EXPECT_TRUE(map.connections[1].diverging);
+  EXPECT_EQ(map.connections[1].edge_a, 1U);  // the branch is reached from the stem alone
+  EXPECT_EQ(map.connections[1].edge_b, 3U);
+  ASSERT_EQ(map.landmarks.size(), 1U);
+  EXPECT_EQ(map.landmarks[0].edge, 2U);
+  EXPECT_NEAR(map.landmarks[0].offset_m, 200, 1e-6);
+  EXPECT_THAT(check_topology(map), IsEmpty());
+  EXPECT_EQ(problems.size(), 3U);  // both ends of the main line and that of the branch
+}
+
+TEST(Network, ConnectsABranchThatIsDrawnTowardsTheTurnout) {
+  std::vector<ImportedTrack> tracks = main_and_branch();
+  const PlanPose end = tracks[1].alignment.at(120).pose;
+  tracks[1].alignment =
+      Alignment::chained({end.easting_m, end.northing_m, end.heading_rad + core::kPi}, {{120, 1.0 / 500, 1.0 / 500}});
+  std::vector<std::string> problems;
+  const auto map = std::make_shared<const Map>(built(tracks, problems));
+  ASSERT_EQ(map->connections.size(), 2U);
+  const Path path = core::value_or_throw(Path::follow(map, {3, 0, Direction::forward}, 400, 0));
+  EXPECT_EQ(path.position_at(400).edge, 1U);
+  EXPECT_EQ(path.position_at(400).direction, Direction::reverse);
+}
+
+TEST(Network, JoinsEndsThatMeet) {
+  const Alignment first = Alignment::chained({0, 0, 1}, {{100, 0, 0.002}});
+  const Alignment second = Alignment::chained(first.at(100).pose, {{80, 0.002, 0}});
+  std::vector<std::string> problems;
+  const Map map = built({{"a", "", first, {}}, {"b", "", second, {}}}, problems);
+  EXPECT_EQ(map.edges.size(), 2U);
+  ASSERT_EQ(map.connections.size(), 1U);
+  EXPECT_EQ(std::count_if(map.nodes.begin(), map.nodes.end(), [](const Node& n) { return n.kind == NodeKind::joint; }),
+            1);
+}
+
+TEST(Network, TellsTheNeighbourOfALooseEnd) {
+  std::vector<ImportedTrack> tracks = main_and_branch();
+  tracks[1].alignment = Alignment::chained({101, 600, 0}, {{120, -1.0 / 500, -1.0 / 500}});
+  std::vector<std::string> problems;
+  const Map map = built(tracks, problems);
+  EXPECT_THAT(problems,
+              testing::Contains(HasSubstr("the start of branch is not connected; the nearest track, main, is 1.0")));
+  EXPECT_THAT(check_topology(map), testing::Contains(HasSubstr("ends loose")));
+}
+
+TEST(Slice, HasTheSameGeometry) {
+  const Alignment line = Alignment::chained({0, 0, 0.5}, {{100, 0, 0}, {60, 0, 0.004}, {200, 0.004, 0.004}},
+                                            {{0, 1, 0}, {150, 4, 60}, {360, 2, 0}}, {{100, 0}, {160, 0.1}});
+  const Alignment part = slice(line, 130, 250);
+  EXPECT_NEAR(part.length_m(), 120, 1e-9);
+  for (double s = 0; s <= 120; s += 3) {
+    const TrackPoint a = line.at(130 + s);
+    const TrackPoint b = part.at(s);
+    EXPECT_NEAR(a.pose.easting_m, b.pose.easting_m, 1e-9);
+    EXPECT_NEAR(a.curvature_per_m, b.curvature_per_m, 1e-15);
+    EXPECT_NEAR(a.elevation_m, b.elevation_m, 1e-9);
+    EXPECT_NEAR(a.cant_m, b.cant_m, 1e-12);
+  }
+}
+
+TEST(Frogs, LieWhereTheBranchesAreOneGaugeApart) {
+  std::vector<std::string> problems;
+  Map map = built(main_and_branch(), problems);
+  add_frogs(map, 0.3);
+  ASSERT_EQ(map.landmarks.size(), 3U);
+  const double angle = std::acos(1.0 - 1.435 / 500);
+  EXPECT_NEAR(map.landmarks[1].offset_m, 500 * std::sin(angle), 0.02);  // on the main line
+  EXPECT_NEAR(map.landmarks[1].lateral_m, -1.435 / 2, 1e-9);            // towards the branch, to the right
+  EXPECT_EQ(map.landmarks[1].edge, 2U);
+  EXPECT_NEAR(map.landmarks[2].offset_m, 500 * angle, 0.02);
+  EXPECT_NEAR(map.landmarks[2].lateral_m, 1.435 / 2, 1e-9);
+  EXPECT_EQ(map.landmarks[2].edge, 3U);
+}
+
+TEST(VirtualBalises, AreSpreadAlongTheEdges) {
+  Map map = small_map();
+  map.balise_groups.clear();
+  ASSERT_TRUE(add_virtual_balises(map, 300, 7, 20, 5).ok());
+  ASSERT_EQ(map.balise_groups.size(), 8U);  // 3 + 3 + 2
+  EXPECT_EQ(map.balise_groups[0].nid_bg, 20U);
+  EXPECT_EQ(map.balise_groups[7].nid_bg, 27U);
+  EXPECT_NEAR(map.balise_groups[1].offset_m, 500, 1e-9);
+  EXPECT_TRUE(map.balise_groups[0].is_virtual);
+  EXPECT_FALSE(add_virtual_balises(map, 1, 7, 16000, 5).ok());
+  EXPECT_FALSE(add_virtual_balises(map, 0, 7, 1, 5).ok());
+  EXPECT_FALSE(add_virtual_balises(map, 300, 1024, 1, 5).ok());
+}
+
+TEST(Check, FindsNothingInASoundMap) {
+  EXPECT_THAT(check_topology(small_map()), IsEmpty());
+}
+
+TEST(Check, NamesWhatIsWrong) {
+  Map map = small_map();
+  map.balise_groups.push_back(map.balise_groups[0]);
+  EXPECT_THAT(check_topology(map), testing::Contains(HasSubstr("balise group 85/100 is there twice")));
+  map = small_map();
+  map.connections.pop_back();
+  EXPECT_THAT(check_topology(map), testing::Contains(HasSubstr("edge 3 (siding) is not connected")));
+  map = small_map();
+  map.edges[1].from_node = 4;
+  EXPECT_THAT(check_topology(map), testing::Contains(HasSubstr("edge 2 (on) ends")));
+  EXPECT_THAT(check_topology(map), testing::Contains(HasSubstr("is a switch but only 2 tracks meet")));
+  map = small_map();
+  map.edges[0].alignment =
+      Alignment({{500, 0, 0}, {500, 0, 0}},
+                {{2680000, 1250000, core::kPi / 2}, {2680500, 1250000.2, core::kPi / 2 + 0.1}}, {}, {});
+  EXPECT_THAT(check_topology(map), testing::Contains(HasSubstr("a gap of 0.20 m")));
+  EXPECT_THAT(check_topology(map), testing::Contains(HasSubstr("has a kink")));
+  map = small_map();
+  map.edges[2].from_node = 77;
+  EXPECT_THAT(check_topology(map), testing::Contains(HasSubstr("node 77, which does not exist")));
+}
+
+}  // namespace
+}  // namespace railfix::track

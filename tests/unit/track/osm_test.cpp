@@ -1,0 +1,163 @@
+#include <osmium/builder/attr.hpp>
+#include <osmium/io/any_output.hpp>
+
+#include "core/random.hpp"
+#include "core/units.hpp"
+#include "import_fixture.hpp"
+#include "track/import/build.hpp"
+#include "track/import/finish.hpp"
+#include "track/import/osm_network.hpp"
+#include "track/path.hpp"
+
+namespace railfix::track {
+namespace {
+
+using testing::HasSubstr;
+
+/// A main line (ways 10 and 11) with a switch (node 3), a siding (way 12), a tunnel (way 11), and a road.
+class OsmTest : public ImportTest {
+ protected:
+  [[nodiscard]] std::filesystem::path write_osm(const std::string& name) const {
+    using namespace osmium::builder::attr;  // NOLINT(google-build-using-namespace)
+    osmium::memory::Buffer buffer(100000, osmium::memory::Buffer::auto_grow::yes);
+    for (int i = 1; i <= 8; ++i) {
+      const osmium::Location place(15.6 + 0.001 * i, 48.2 + 0.00001 * i * i);
+      if (i == 3) {
+        osmium::builder::add_node(buffer, _id(i), _version(1), _location(place), _tag("railway", "switch"),
+                                  _tag("ref", "W1"));
+      } else if (i == 5) {
+        osmium::builder::add_node(buffer, _id(i), _version(1), _location(place), _tag("railway", "signal"));
+      } else {
+        osmium::builder::add_node(buffer, _id(i), _version(1), _location(place));
+      }
+    }
+    osmium::builder::add_node(buffer, _id(20), _version(1), _location(15.6045, 48.20002));
+    osmium::builder::add_node(buffer, _id(21), _version(1), _location(15.6055, 48.19990));
+    osmium::builder::add_way(buffer, _id(10), _version(1), _nodes({1, 2, 3, 4}), _tag("railway", "rail"),
+                             _tag("name", "Westbahn"));
+    osmium::builder::add_way(buffer, _id(11), _version(1), _nodes({4, 5, 6, 7, 8}), _tag("railway", "rail"),
+                             _tag("name", "Westbahn"), _tag("tunnel", "yes"));
+    osmium::builder::add_way(buffer, _id(12), _version(1), _nodes({3, 20, 21}), _tag("railway", "rail"),
+                             _tag("service", "siding"));
+    osmium::builder::add_way(buffer, _id(13), _version(1), _nodes({1, 20}), _tag("highway", "primary"));
+    osmium::builder::add_way(buffer, _id(14), _version(1), _nodes({20, 2}), _tag("railway", "abandoned"));
+    osmium::io::Writer writer(in_folder(name).string(), osmium::io::overwrite::allow);
+    writer(std::move(buffer));
+    writer.close();
+    return in_folder(name);
+  }
+};
+
+TEST_F(OsmTest, XmlAndPbfGiveTheSameNetwork) {
+  for (const char* name : {"a.osm", "a.osm.pbf", "a.osm.bz2", "a.osm.gz"}) {
+    SCOPED_TRACE(name);
+    const Map map = core::value_or_throw(build_map({write_osm(name)}, {})).map;
+    EXPECT_EQ(map.crs, "EPSG:32633");
+    ASSERT_EQ(map.edges.size(), 3U);
+    const auto found = std::find_if(map.nodes.begin(), map.nodes.end(),
+                                    [](const Node& n) { return n.kind == NodeKind::railway_switch; });
+    ASSERT_NE(found, map.nodes.end());
+    EXPECT_EQ(found->name, "W1");
+    ASSERT_EQ(map.connections.size(), 2U);
+    EXPECT_EQ(map.edge(map.connections[0].edge_a)->line, "Westbahn");
+    EXPECT_EQ(map.edge(map.connections[0].edge_b)->line, "Westbahn");
+    EXPECT_FALSE(map.connections[0].diverging);
+    EXPECT_TRUE(map.connections[1].diverging);
+    EXPECT_THAT(map.problems, testing::Not(testing::Contains(HasSubstr("node"))));
+  }
+}
+
+TEST_F(OsmTest, TunnelsAndSignalsBecomeLandmarks) {
+  const Map map = core::value_or_throw(build_map({write_osm("a.osm")}, {})).map;
+  const auto of = [&](LandmarkKind kind) {
+    return std::find_if(map.landmarks.begin(), map.landmarks.end(), [&](const Landmark& l) { return l.kind == kind; });
+  };
+  ASSERT_NE(of(LandmarkKind::portal_in), map.landmarks.end());
+  EXPECT_EQ(of(LandmarkKind::portal_out), map.landmarks.end());  // the data end inside the tunnel
+  const Landmark& portal = *of(LandmarkKind::portal_in);
+  const PlanPose pose = map.edge(portal.edge)->alignment.at(portal.offset_m).pose;
+  const auto node4 = map.from_geo({48.2 + 0.00001 * 16, 15.604});
+  EXPECT_NEAR(pose.easting_m, node4->x(), 1e-3);
+  EXPECT_NEAR(pose.northing_m, node4->y(), 1e-3);
+  EXPECT_GT(portal.sigma_m, 0);
+  EXPECT_NE(of(LandmarkKind::mast), map.landmarks.end());
+}
+
+TEST_F(OsmTest, TheStraightWayAndTheBranchAreSmooth) {
+  const auto map = std::make_shared<const Map>(core::value_or_throw(build_map({write_osm("a.osm")}, {})).map);
+  const Connection& branch = map->connections[1];
+  const auto heading = [&](uint32_t id) {  // leaving the switch
+    const Edge& edge = *map->edge(id);
+    const bool forward = edge.from_node == branch.node;
+    return edge.alignment.at(forward ? 0 : edge.alignment.length_m()).pose.heading_rad + (forward ? 0 : core::kPi);
+  };
+  for (const Connection& way : map->connections) {
+    EXPECT_NEAR(core::wrap_pi(heading(way.edge_a) - heading(way.edge_b) - core::kPi), 0, 1e-9);
+  }
+}
+
+TEST_F(OsmTest, LocalProjectionIsTrueToScale) {
+  const Map utm = core::value_or_throw(build_map({write_osm("a.osm")}, {})).map;
+  const Map local = core::value_or_throw(build_map({write_osm("a.osm")}, {.crs = "local"})).map;
+  const double ratio = utm.edges[0].alignment.length_m() / local.edges[0].alignment.length_m();
+  EXPECT_NEAR(ratio, 0.9996, 1e-4);
+  EXPECT_LT(ratio, 1 - 3e-4);
+  ASSERT_TRUE(local.to_geo(100000, 100000));
+}
+
+TEST_F(OsmTest, NoDamageToAFileCrashesIt) {
+  core::Random random(3);
+  for (const char* name : {"b.osm", "b.osm.pbf"}) {
+    const std::string whole = content(write_osm(name));
+    for (int i = 0; i < 60; ++i) {
+      std::string bad = whole;
+      if (i % 2 == 0) bad.resize(random.next() % bad.size());
+      for (int k = 0; k < 3 && !bad.empty(); ++k) bad[random.next() % bad.size()] = static_cast<char>(random.next());
+      const auto built = build_map({write(name, bad)}, {});
+      if (!built.ok()) {
+        EXPECT_FALSE(built.error().message.empty());
+      }
+    }
+  }
+}
+
+TEST_F(OsmTest, SanktPoeltenRunsThroughItsNodes) {
+  const std::filesystem::path file = shared_data("network/osm/sankt_poelten.json");
+  if (!std::filesystem::exists(file)) GTEST_SKIP() << "skipped: no " << file;
+  const OsmData data = core::value_or_throw(read_osm_json(file, false));
+  const BuiltMap built = core::value_or_throw(build_map({file}, {}));
+  EXPECT_GT(built.map.edges.size(), 500U);
+  size_t off = 0;
+  size_t tried = 0;
+  for (size_t way = 0; way < data.ways.size(); way += 40) {
+    const GeoPoint place = data.nodes.at(data.ways[way].nodes[data.ways[way].nodes.size() / 2]).place;
+    const auto point = built.map.from_geo(place);
+    double nearest = 1e9;
+    for (const Edge& edge : built.map.edges) {
+      const PlanPose& start = edge.alignment.starts().front();
+      if (std::hypot(start.easting_m - point->x(), start.northing_m - point->y()) > edge.alignment.length_m() + 10)
+        continue;
+      nearest = std::min(nearest, std::abs(edge.alignment.nearest(point->x(), point->y()).lateral_m));
+    }
+    ++tried;
+    if (nearest > 1e-3) ++off;
+  }
+  EXPECT_GT(tried, 40U);
+  EXPECT_LE(off, tried / 10);  // nodes nearer than 2 m to another are left out
+  for (const Edge& edge : built.map.edges) EXPECT_TRUE(std::isfinite(edge.alignment.at(1).pose.easting_m));
+}
+
+TEST_F(OsmTest, GeoJsonFindsTheTaggedSwitches) {
+  const std::filesystem::path file = shared_data("network/osm/Ventimiglia_Albenga.geojson");
+  if (!std::filesystem::exists(file)) GTEST_SKIP() << "skipped: no " << file;
+  const Map map = core::value_or_throw(build_map({file}, {})).map;
+  EXPECT_EQ(map.crs, "EPSG:32632");
+  const auto switches = std::count_if(map.nodes.begin(), map.nodes.end(),
+                                      [](const Node& n) { return n.kind == NodeKind::railway_switch; });
+  EXPECT_GE(switches, 39);
+  EXPECT_TRUE(std::any_of(map.landmarks.begin(), map.landmarks.end(),
+                          [](const Landmark& l) { return l.kind == LandmarkKind::portal_in; }));
+}
+
+}  // namespace
+}  // namespace railfix::track

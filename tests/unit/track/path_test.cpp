@@ -1,0 +1,112 @@
+#include "track/path.hpp"
+
+#include <gtest/gtest.h>
+
+#include "small_map.hpp"
+
+namespace railfix::track {
+namespace {
+
+std::shared_ptr<const Map> shared_small_map() {
+  return std::make_shared<const Map>(small_map());
+}
+
+Path path_from(const EdgePosition& start, double ahead_m, double behind_m) {
+  return core::value_or_throw(Path::follow(shared_small_map(), start, ahead_m, behind_m));
+}
+
+TEST(Path, GoesStraightOverTheSwitch) {
+  const Path path = path_from({1, 200, Direction::forward}, 1200, 500);
+  EXPECT_DOUBLE_EQ(path.begin_m(), -200);
+  EXPECT_DOUBLE_EQ(path.end_m(), 1200);
+  EXPECT_EQ(path.position_at(900).edge, 2U);
+  EXPECT_NEAR(path.position_at(900).offset_m, 100, 1e-9);
+  EXPECT_NEAR(path.curvature_at(900), 1.0 / 500, 1e-15);
+  EXPECT_EQ(path.position_at(5000).edge, 2U);
+  EXPECT_EQ(*path.distance_of(2, 100), 900);
+  EXPECT_FALSE(path.distance_of(3, 100));
+  EXPECT_FALSE(path.distance_of(2, 700));  // beyond 1200 m ahead
+}
+
+TEST(Path, MayBeginInsideAnEdgeAheadAndBehind) {
+  const Path path = path_from({1, 500, Direction::forward}, 100, 50);
+  EXPECT_DOUBLE_EQ(path.begin_m(), -50);
+  EXPECT_DOUBLE_EQ(path.end_m(), 100);
+  EXPECT_DOUBLE_EQ(path.position_at(-50).offset_m, 450);
+}
+
+TEST(Path, RunsFromTheSidingOntoTheMainLineBackwards) {
+  const Path path = path_from({3, 400, Direction::forward}, 600, 1000);
+  EXPECT_DOUBLE_EQ(path.begin_m(), -400);
+  EXPECT_DOUBLE_EQ(path.end_m(), 600);
+  const EdgePosition end = path.position_at(600);
+  EXPECT_EQ(end.edge, 1U);
+  EXPECT_NEAR(end.offset_m, 500, 1e-9);
+  EXPECT_EQ(end.direction, Direction::reverse);
+
+  const TrackPoint on_main = path.at(300);  // 800 m along edge 1, westwards
+  EXPECT_NEAR(core::wrap_pi(on_main.pose.heading_rad + core::kPi / 2), 0, 1e-12);
+  EXPECT_NEAR(on_main.cant_m, -0.08, 1e-12);
+  EXPECT_NEAR(on_main.twist, 1e-4, 1e-15);
+  EXPECT_NEAR(on_main.grade, -0.01, 1e-15);
+}
+
+TEST(Path, SignsTurnRoundOnAReversedEdge) {
+  const Path forward = path_from({2, 0, Direction::forward}, 800, 0);
+  const Path reverse = path_from({2, 800, Direction::reverse}, 800, 0);
+  for (double s = 0; s <= 800; s += 40) {
+    const TrackPoint a = forward.at(s);
+    const TrackPoint b = reverse.at(800 - s);
+    EXPECT_NEAR(a.pose.easting_m, b.pose.easting_m, 1e-9);
+    EXPECT_NEAR(a.curvature_per_m, -b.curvature_per_m, 1e-15);
+    EXPECT_NEAR(std::abs(core::wrap_pi(a.pose.heading_rad - b.pose.heading_rad)), core::kPi, 1e-9);
+  }
+}
+
+TEST(Path, PositionIsContinuousOverEveryJoint) {
+  const Path path = path_from({3, 250, Direction::forward}, 2000, 2000);
+  for (double s = path.begin_m(); s + 1 <= path.end_m(); s += 1) {
+    const PlanPose a = path.at(s).pose;
+    const PlanPose b = path.at(s + 1).pose;
+    EXPECT_NEAR(std::hypot(a.easting_m - b.easting_m, a.northing_m - b.northing_m), 1, 1e-4);
+    EXPECT_LT(std::abs(core::wrap_pi(a.heading_rad - b.heading_rad)), 0.01);
+  }
+}
+
+TEST(Path, ListsMarksByDistanceAsSeenAlongThePath) {
+  const Path path = path_from({1, 600, Direction::reverse}, 600, 10000);  // from the straight way behind
+  ASSERT_EQ(path.landmarks().size(), 2U);
+  EXPECT_NEAR(path.landmarks()[0].distance_m, -300, 1e-9);  // the balise behind
+  EXPECT_NEAR(path.landmarks()[1].distance_m, 300, 1e-9);
+  EXPECT_NEAR(path.landmarks()[1].lateral_m, 3, 1e-12);
+  ASSERT_EQ(path.balise_groups().size(), 1U);
+  EXPECT_FALSE(path.balise_groups()[0].nominal_is_along_path);
+
+  const Path siding = path_from({3, 300, Direction::reverse}, 300, 0);
+  ASSERT_EQ(siding.landmarks().size(), 1U);
+  EXPECT_EQ(siding.landmarks()[0].kind, LandmarkKind::portal_out);
+}
+
+TEST(Path, EndsOnARing) {
+  Map map;
+  const double length = 2 * core::kPi * 100;
+  map.edges = {{1, "ring", 1, 1, "", Alignment::chained({}, {{length, 0.01, 0.01}})}};
+  map.nodes = {{1, NodeKind::joint, "", 0, 0}};
+  map.connections = {{1, 1, 1, false}};
+  const Path path =
+      core::value_or_throw(Path::follow(std::make_shared<const Map>(map), {1, 10, Direction::forward}, 2000, 2000));
+  EXPECT_NEAR(path.end_m(), 2000, 1e-9);
+  EXPECT_NEAR(path.begin_m(), -2000, 1e-9);
+  EXPECT_NEAR(path.position_at(length).offset_m, 10, 1e-9);
+  EXPECT_EQ(path.position_at(1500).direction, Direction::forward);
+  EXPECT_NEAR(*path.distance_of(1, 5), -5, 1e-9);
+}
+
+TEST(Path, SaysWhereItCannotStart) {
+  EXPECT_FALSE(Path::follow(shared_small_map(), {9, 0, Direction::forward}, 1, 1).ok());
+  EXPECT_FALSE(Path::follow(shared_small_map(), {1, 1001, Direction::forward}, 1, 1).ok());
+  EXPECT_FALSE(Path::follow(shared_small_map(), {1, std::nan(""), Direction::forward}, 1, 1).ok());
+}
+
+}  // namespace
+}  // namespace railfix::track

@@ -1,0 +1,198 @@
+#include "track_detector/track_detector.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "core/units.hpp"
+#include "synthetic_picture.hpp"
+#include "track_detector/draw.hpp"
+#include "track_detector/mount_calibration.hpp"
+#include "track_detector/mount_watch.hpp"
+
+namespace {
+
+using namespace railfix::track_detector;
+using railfix::core::rad_from_deg;
+using test::kCab;
+using test::kMount;
+using test::render;
+using test::Scene;
+
+Scene shaken_curve(double curvature_per_m) {
+  Scene scene;
+  scene.shape.camera = kMount;
+  scene.shape.camera.pitch_rad += 0.006;
+  scene.shape.camera.yaw_rad -= 0.015;
+  scene.shape.camera.lateral_m += 0.06;
+  scene.shape.camera.height_m -= 0.03;
+  scene.shape.curvature_per_m = curvature_per_m;
+  return scene;
+}
+
+/// Largest distance of the found rails from the true ones, in metres across the track, up to `far_m`.
+double worst_offset_m(const TrackObservation& observation, const Scene& scene, double far_m) {
+  const railfix::geometry::View found(kCab, observation.shape.camera);
+  const railfix::geometry::View truth(kCab, scene.shape.camera);
+  double worst = 0;
+  for (double x = 8; x < far_m; x += 1) {
+    for (const auto side : {Side::left, Side::right}) {
+      const auto pixel = found.project(rail_point(observation.shape, side, 1.435, x));
+      const auto ground = truth.on_plane(*pixel, 0);
+      worst = std::max(worst, std::abs(ground->y() - rail_point(scene.shape, side, 1.435, ground->x()).y()));
+    }
+  }
+  return worst;
+}
+
+class ColdStart : public testing::TestWithParam<double> {};
+
+TEST_P(ColdStart, FindsShakenRailsInOnePicture) {
+  const Scene scene = shaken_curve(GetParam());
+  TrackDetector detector(kCab, kMount, {});
+  const auto observation = detector.detect(render(scene));
+  ASSERT_TRUE(observation.seen()) << observation.reason;
+  EXPECT_LT(worst_offset_m(observation, scene, 30), 0.01);
+  for (const int k : {1, 2, 4, 5}) {
+    const double error = to_vector(observation.shape)(k) - to_vector(scene.shape)(k);
+    EXPECT_LT(std::abs(error), 4 * std::sqrt(observation.covariance(k, k))) << "unknown " << k;
+  }
+  EXPECT_NEAR(observation.shape.curvature_per_m, GetParam(), 3e-4);
+}
+
+INSTANTIATE_TEST_SUITE_P(Curvatures, ColdStart, testing::Values(0.0, 1.0 / 2000, -1.0 / 500, 1.0 / 250));
+
+TEST(TrackDetector, FindsRailsWhenThePoseIsDegreesAndDecimetresWrong) {
+  Scene scene;
+  scene.shape.camera = kMount;
+  auto guess = kMount;
+  guess.pitch_rad += rad_from_deg(2);
+  guess.yaw_rad -= rad_from_deg(2);
+  guess.height_m += 0.25;
+  guess.lateral_m += 0.2;
+  DetectorOptions options;
+  options.limits.pitch_rad = options.limits.yaw_rad = 0.03;
+  options.limits.height_m = 0.15;
+  options.limits.lateral_m = 0.2;
+  TrackDetector detector(kCab, guess, options);
+  const auto observation = detector.detect(render(scene));
+  ASSERT_TRUE(observation.seen()) << observation.reason;
+  EXPECT_LT(worst_offset_m(observation, scene, 30), 0.02);
+}
+
+TEST(TrackDetector, FindsDarkRailsOnLightGround) {
+  Scene scene = shaken_curve(0);
+  scene.rail_grey = 60;
+  scene.ground_grey = 190;
+  TrackDetector detector(kCab, kMount, {});
+  const auto observation = detector.detect(render(scene));
+  ASSERT_TRUE(observation.seen()) << observation.reason;
+  EXPECT_LT(worst_offset_m(observation, scene, 30), 0.01);
+}
+
+TEST(TrackDetector, FollowsAndRecovers) {
+  TrackDetector detector(kCab, kMount, {});
+  Scene scene;
+  scene.shape.camera = kMount;
+  ASSERT_TRUE(detector.detect(render(scene)).seen());
+  scene.shape.camera.pitch_rad += 0.002;
+  EXPECT_TRUE(detector.detect(render(scene)).seen());
+  const cv::Mat nothing(1024, 1280, CV_8UC1, cv::Scalar(90));
+  EXPECT_FALSE(detector.detect(nothing).seen());
+  EXPECT_TRUE(detector.detect(render(shaken_curve(-1.0 / 500))).seen());
+}
+
+TEST(TrackDetector, SaysNotSeenWithoutRails) {
+  TrackDetector detector(kCab, kMount, {});
+  Scene scene = shaken_curve(0);
+  scene.left_rail = scene.right_rail = false;
+  for (const uint64_t seed : {1, 2, 3}) {
+    for (const double noise : {3.0, 25.0}) {
+      scene.noise_grey = noise;
+      const auto observation = detector.detect(render(scene, kCab, seed));
+      EXPECT_FALSE(observation.seen_left || observation.seen_right);
+      EXPECT_FALSE(observation.reason.empty());
+      EXPECT_EQ(observation.shape.camera.height_m, kMount.height_m);
+      EXPECT_GT(observation.covariance(1, 1), 0);
+    }
+  }
+  EXPECT_FALSE(detector.detect(cv::Mat::zeros(1024, 1280, CV_8UC1)).seen());
+  EXPECT_FALSE(detector.detect(cv::Mat(1024, 1280, CV_8UC1, cv::Scalar(255))).seen());
+}
+
+TEST(TrackDetector, DoesNotInventASecondRail) {
+  Scene scene = shaken_curve(0);
+  scene.right_rail = false;
+  TrackDetector detector(kCab, kMount, {});
+  EXPECT_FALSE(detector.detect(render(scene)).seen());
+}
+
+TEST(TrackDetector, RefusesRailsOfAnotherGauge) {
+  Scene scene = shaken_curve(0);
+  scene.gauge_m = 1.0;
+  TrackDetector detector(kCab, kMount, {});
+  EXPECT_FALSE(detector.detect(render(scene)).seen());
+}
+
+TEST(MountCalibration, FindsAnUnknownMount) {
+  MountCalibrator calibrator(kCab, 1.435);
+  railfix::core::Random random(5);
+  for (int i = 0; i < 3; ++i) {
+    Scene scene;
+    scene.shape.camera = {0, 0.16 + 0.001 * random.normal(), 0.03 + 0.001 * random.normal(), -0.2, 3.3};
+    calibrator.add(render(scene, kCab, static_cast<uint64_t>(i)));
+  }
+  const auto found = calibrator.solve();
+  ASSERT_TRUE(found.ok()) << found.error().message;
+  EXPECT_NEAR(found.value().mount.height_m, 3.3, 0.02);
+  EXPECT_NEAR(found.value().mount.lateral_m, -0.2, 0.02);
+  EXPECT_NEAR(found.value().mount.pitch_rad, 0.16, 0.003);
+  EXPECT_NEAR(found.value().mount.yaw_rad, 0.03, 0.003);
+}
+
+TEST(MountCalibration, SaysWhatToDoWithoutRails) {
+  MountCalibrator calibrator(kCab, 1.435);
+  EXPECT_FALSE(calibrator.solve().ok());
+  calibrator.add(cv::Mat(1024, 1280, CV_8UC1, cv::Scalar(90)));
+  const auto found = calibrator.solve();
+  ASSERT_FALSE(found.ok());
+  EXPECT_NE(found.error().message.find("straight track"), std::string::npos);
+}
+
+TEST(MountWatch, ShakeAveragesOutAndAKnockDoesNot) {
+  TrackShape mount;
+  mount.camera = kMount;
+  const DetectorOptions options;
+  MountWatch watch(mount, options.limits);
+  TrackShape shape = mount;
+  for (int i = 0; i < 3600; ++i) {
+    shape.camera.pitch_rad = mount.camera.pitch_rad + (i % 2 == 0 ? 1 : -1) * options.limits.pitch_rad;
+    watch.add(shape, 1.0 / 60);
+  }
+  EXPECT_FALSE(watch.drifted());
+  shape.camera.pitch_rad = mount.camera.pitch_rad + 3 * options.limits.pitch_rad;
+  for (int i = 0; i < 7200; ++i) watch.add(shape, 1.0 / 60);
+  EXPECT_TRUE(watch.drifted());
+}
+
+TEST(Draw, MarksTheRailsAndSaysNotSeen) {
+  Scene scene = shaken_curve(0);
+  const cv::Mat grey = render(scene);
+  TrackDetector detector(kCab, kMount, {});
+  cv::Mat seen;
+  cv::cvtColor(grey, seen, cv::COLOR_GRAY2BGR);
+  draw_track(seen, kCab, detector.detect(grey), 1.435);
+  const railfix::geometry::View view(kCab, scene.shape.camera);
+  const auto pixel = view.project(rail_point(scene.shape, Side::left, 1.435, 10));
+  const auto colour =
+      seen.at<cv::Vec3b>(static_cast<int>(std::lround(pixel->y())), static_cast<int>(std::lround(pixel->x())));
+  EXPECT_GT(colour[1], colour[2] + 30) << "the left rail is green";
+  cv::Mat blind(1024, 1280, CV_8UC3, cv::Scalar::all(90));
+  draw_track(blind, kCab, TrackObservation{}, 1.435);
+  cv::Mat red;
+  cv::inRange(blind, cv::Scalar(0, 0, 200), cv::Scalar(100, 100, 255), red);
+  EXPECT_GT(cv::countNonZero(red), 100);
+}
+
+}  // namespace
