@@ -28,7 +28,7 @@ std::vector<Override> overrides_of(const std::vector<std::string>& sets) {
     }
     const Override change{text.substr(0, equals), text.substr(equals + 1)};
     const std::string section = change.key.substr(0, change.key.find('.'));
-    const auto& known = known_sections();
+    const auto& known = service_names();
     if (section != "common" && std::find(known.begin(), known.end(), section) == known.end()) {
       throw core::BadInput("--set " + text + ": section " + section +
                            " belongs to no service; `--document` shows this service's sections");
@@ -102,10 +102,10 @@ void CommonConfig::describe(Fields& fields) {
   fields.flag("lock_step", lock_step, "Answer on data_progress; set by `railfix run --pace lossless`.");
 }
 
-const std::vector<std::string>& known_sections() {
-  static const std::vector<std::string> sections{"frame_grabber", "sensor_gateway", "track_detector", "odometry",
-                                                 "map_matcher",   "fusion",         "tpr_publisher",  "recorder"};
-  return sections;
+const std::vector<std::string>& service_names() {
+  static const std::vector<std::string> names{"frame_grabber", "sensor_gateway", "track_detector", "odometry",
+                                              "map_matcher",   "fusion",         "tpr_publisher",  "recorder"};
+  return names;
 }
 
 int run_program(const Program& program, int argc, char** argv) {
@@ -129,7 +129,7 @@ int run_program(const Program& program, int argc, char** argv) {
   try {
     const auto overrides = overrides_of(line.sets);
     const auto common =
-        core::value_or_throw(read_config<CommonConfig>("common", line.config, overrides, known_sections()));
+        core::value_or_throw(read_config<CommonConfig>("common", line.config, overrides, service_names()));
     core::ok_or_throw(program.read(line.config, overrides));
     if (line.check) return kDone;
     return serve(program, common);

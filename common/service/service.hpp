@@ -106,8 +106,8 @@ struct Program {
 };
 int run_program(const Program& program, int argc, char** argv);
 
-/// Names of all services' configuration sections, so that one file may configure a whole train.
-const std::vector<std::string>& known_sections();
+/// All services of a train, in the order of the data's way; each has a configuration section of its name.
+const std::vector<std::string>& service_names();
 
 template <class Service>
 int run(const std::string& name, int argc, char** argv) {
@@ -116,7 +116,7 @@ int run(const std::string& name, int argc, char** argv) {
   program.name = name;
   program.read = [config, name](const std::filesystem::path& file,
                                 const std::vector<Override>& overrides) -> core::Status {
-    auto read = read_config<typename Service::Config>(name, file, overrides, known_sections());
+    auto read = read_config<typename Service::Config>(name, file, overrides, service_names());
     if (!read.ok()) return read.error();
     *config = read.value();
     return {};

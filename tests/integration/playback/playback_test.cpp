@@ -1,13 +1,11 @@
 // frame_grabber and sensor_gateway as programs, over DDS, with this test as the third in lock step.
 #include <gmock/gmock.h>
-#include <signal.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <map>
 
 #include "core/time.hpp"
 #include "messaging/topics.hpp"
+#include "support/program.hpp"
 #include "unit/dataset/temporary_folder.hpp"
 
 namespace railfix {
@@ -23,39 +21,6 @@ constexpr int kPictures = 40;
 constexpr int64_t kPictureNs = 20'000'000;
 constexpr int64_t kImuNs = 5'000'000;
 constexpr size_t kImuSamples = (kPictures - 1) * kPictureNs / kImuNs + 1;  // up to the last picture
-
-class Program {
- public:
-  Program(const std::string& name, const std::vector<std::string>& sets) {
-    std::vector<std::string> words{std::string(RAILFIX_BIN_DIR) + "/" + name};
-    for (const auto& set : sets) words.insert(words.end(), {"--set", set});
-    std::vector<char*> argv;
-    for (auto& word : words) argv.push_back(word.data());
-    argv.push_back(nullptr);
-    pid_ = fork();  // other threads run here already: from now on nothing may allocate in the child
-    if (pid_ != 0) return;
-    execv(argv[0], argv.data());
-    _exit(127);
-  }
-  ~Program() {
-    if (exit_code_) return;
-    kill(pid_, SIGKILL);
-    waitpid(pid_, nullptr, 0);
-  }
-  Program(const Program&) = delete;
-  Program& operator=(const Program&) = delete;
-  /// Nothing while it runs.
-  std::optional<int> exit_code() {
-    int status = 0;
-    if (!exit_code_ && waitpid(pid_, &status, WNOHANG) == pid_)
-      exit_code_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128;
-    return exit_code_;
-  }
-
- private:
-  pid_t pid_ = 0;
-  std::optional<int> exit_code_;
-};
 
 class Playback : public railfix::testing::TemporaryFolder {
  protected:
@@ -118,15 +83,15 @@ class Playback : public railfix::testing::TemporaryFolder {
     return {"common.train_id=" + train_, "common.domain=" + std::to_string(kDomain), "common.log_level=error",
             service + ".source=" + root_.string(), service + ".at_end=finish"};
   }
-  std::unique_ptr<Program> gateway(bool lock_step) {
+  std::unique_ptr<test::Program> gateway(bool lock_step) {
     auto sets = common("sensor_gateway");
     if (lock_step) sets.push_back("common.lock_step=true");
-    return std::make_unique<Program>("railfix-sensor-gateway", sets);
+    return std::make_unique<test::Program>(test::with_settings("railfix-sensor-gateway", sets));
   }
-  std::unique_ptr<Program> grabber(std::vector<std::string> more) {
+  std::unique_ptr<test::Program> grabber(std::vector<std::string> more) {
     auto sets = common("frame_grabber");
     sets.insert(sets.end(), more.begin(), more.end());
-    return std::make_unique<Program>("railfix-frame-grabber", sets);
+    return std::make_unique<test::Program>(test::with_settings("railfix-frame-grabber", sets));
   }
 
   template <class Condition>
@@ -235,13 +200,14 @@ TEST_F(Playback, RealPaceTakesAsLongAsTheRecording) {
   const auto sensors = gateway(false);
   const auto pictures = grabber({"frame_grabber.pace=real"});
   ASSERT_TRUE(run_until([&] { return connected(); }));
+  const int64_t begun_ns = core::monotonic_ns();
   start();
-  ASSERT_TRUE(run_until([&] { return !frames_.empty(); }));
-  const int64_t first_ns = core::monotonic_ns();
   ASSERT_TRUE(run_until([&] { return !clocks_.empty() && clocks_.back().ended() != 0; }));
-  EXPECT_NEAR(core::seconds(core::monotonic_ns() - first_ns), core::seconds((kPictures - 1) * kPictureNs), 0.2);
+  EXPECT_GE(core::monotonic_ns() - begun_ns, (kPictures - 1) * kPictureNs);
   ASSERT_TRUE(run_until([&] { return pictures->exit_code() && sensors->exit_code(); }));
-  EXPECT_GT(frames_.size(), 0.8 * kPictures);  // other programs on this machine may cost a picture
+  // A machine that is busy with other things may cost pictures, but none is lost in silence.
+  EXPECT_EQ(frames_.size() + status_["frame_grabber"].dropped(), size_t{kPictures});
+  EXPECT_GT(frames_.size(), size_t{kPictures} / 2);
   EXPECT_TRUE(run_until([&] { return imu_.size() >= kImuSamples; })) << imu_.size();
 }
 

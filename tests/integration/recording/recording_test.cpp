@@ -24,41 +24,6 @@ constexpr int kPictures = 20;
 constexpr int64_t kPictureNs = 100'000'000;
 const std::string kDomain = "82";
 
-/// A program that runs beside the test.
-class Background {
- public:
-  Background(const std::vector<std::string>& arguments, const fs::path& output) {
-    pid_ = fork();
-    if (pid_ != 0) return;
-    const int out = open(output.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
-    dup2(out, STDOUT_FILENO);
-    dup2(out, STDERR_FILENO);
-    const std::string program = std::string(RAILFIX_BIN_DIR) + "/" + arguments[0];
-    std::vector<char*> argv{const_cast<char*>(program.c_str())};
-    for (size_t i = 1; i < arguments.size(); ++i) argv.push_back(const_cast<char*>(arguments[i].c_str()));
-    argv.push_back(nullptr);
-    execv(program.c_str(), argv.data());
-    _exit(127);
-  }
-  ~Background() {
-    if (pid_ > 0) (void)end(SIGKILL);
-  }
-  Background(const Background&) = delete;
-  Background& operator=(const Background&) = delete;
-
-  /// Its exit code, 128 + signal when it died of one.
-  int end(int signal) {
-    if (signal != 0) kill(pid_, signal);
-    int status = 0;
-    waitpid(pid_, &status, 0);
-    pid_ = -1;
-    return WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status);
-  }
-
- private:
-  pid_t pid_ = -1;
-};
-
 class RecordingTest : public ::testing::Test {
  protected:
   RecordingTest()
@@ -109,6 +74,7 @@ class RecordingTest : public ::testing::Test {
     arguments.insert(arguments.end(), more.begin(), more.end());
     return arguments;
   }
+  [[nodiscard]] test::Program::Options log() const { return {folder_ / "recorder.log", {}, {}}; }
   [[nodiscard]] test::Outcome railfix(std::vector<std::string> arguments) const {
     arguments.insert(arguments.begin(), "railfix");
     arguments.insert(arguments.end(), {"--train", train_, "--domain", kDomain});
@@ -127,15 +93,15 @@ class RecordingTest : public ::testing::Test {
 
 TEST_F(RecordingTest, WhatIsReplayedIsRecordedAgain) {
   const auto recording = folder_ / "again.mcap";
-  Background recorder_program(recorder({"--set", "recorder.file=" + recording.string()}), folder_ / "recorder.log");
+  test::Program recorder_program(recorder({"--set", "recorder.file=" + recording.string()}), log());
   wait_for_recorder();
-  Background hz({"railfix", "topics", "hz", "odometry_step", "--json", "--count", std::to_string(kSteps / 2), "--for",
-                 "60", "--train", train_, "--domain", kDomain},
-                folder_ / "hz.json");
+  test::Program hz({"railfix", "topics", "hz", "odometry_step", "--json", "--count", std::to_string(kSteps / 2),
+                    "--for", "60", "--train", train_, "--domain", kDomain},
+                   {folder_ / "hz.json", {}, {}});
   const auto replayed = railfix({"replay", source().string()});
   EXPECT_EQ(replayed.exit_code, 0) << replayed.err;
   EXPECT_THAT(replayed.out, HasSubstr(std::to_string(kSteps + kPictures) + " samples of 2 topics"));
-  EXPECT_EQ(hz.end(0), 0);
+  EXPECT_EQ(hz.wait_for_end(), 0);
   EXPECT_NEAR(nlohmann::json::parse(test::slurp(folder_ / "hz.json"))["rate_hz"].get<double>(), 200, 40);
   EXPECT_EQ(recorder_program.end(SIGTERM), 0) << test::slurp(folder_ / "recorder.log");
 
@@ -179,13 +145,13 @@ TEST_F(RecordingTest, WhatIsReplayedIsRecordedAgain) {
 TEST_F(RecordingTest, AKilledRecorderLosesNoWrittenChunk) {
   const std::vector<std::string> settings{"--set", "recorder.folder=" + folder_.string(), "--set",
                                           "recorder.chunk_age_s=0.05"};
-  Background killed(recorder(settings), folder_ / "recorder.log");
+  test::Program killed(recorder(settings), log());
   wait_for_recorder();
   const auto replayed = railfix({"replay", source().string(), "--topics", "odometry_step", "--rate", "4"});
   ASSERT_EQ(replayed.exit_code, 0) << replayed.err;
   EXPECT_EQ(killed.end(SIGKILL), 128 + SIGKILL);
 
-  Background next(recorder(settings), folder_ / "recorder.log");
+  test::Program next(recorder(settings), log());
   wait_for_recorder();
   EXPECT_EQ(next.end(SIGTERM), 0);
   fs::path recovered;

@@ -6,6 +6,7 @@
 
 #include "core/time.hpp"
 #include "messaging/topics.hpp"
+#include "service/service.hpp"
 #include "support/program.hpp"
 
 namespace railfix {
@@ -57,15 +58,9 @@ TEST_P(EveryService, GetsReadyAndEndsCleanlyOnSigterm) {
   const std::string train = "services-test-" + GetParam() + "-" + std::to_string(getpid());
   const auto folder = fs::temp_directory_path() / train;
   write_dataset(folder);
-  const pid_t pid = fork();
-  if (pid == 0) {
-    if (chdir(folder.c_str()) != 0) _exit(126);
-    const std::string path = std::string(RAILFIX_BIN_DIR) + "/" + program();
-    const std::string set_train = "common.train_id=" + train;
-    execl(path.c_str(), path.c_str(), "--set", set_train.c_str(), "--set", "common.domain=78", "--set",
-          "frame_grabber.source=.", "--set", "sensor_gateway.source=.", nullptr);
-    _exit(127);
-  }
+  test::Program service(test::with_settings(program(), {"common.train_id=" + train, "common.domain=78",
+                                                        "frame_grabber.source=.", "sensor_gateway.source=."}),
+                        {{}, {}, folder});
   messaging::ParticipantOptions options;
   options.train_id = train;
   options.domain = 78;
@@ -79,33 +74,23 @@ TEST_P(EveryService, GetsReadyAndEndsCleanlyOnSigterm) {
                                                  if (status.state() != msg::STATE_STARTING && !up) {
                                                    up = true;
                                                    EXPECT_EQ(std::string(status.service().c_str()), GetParam());
-                                                   kill(pid, SIGTERM);
+                                                   service.send(SIGTERM);
                                                  }
                                                });
   const int64_t deadline_ns = core::monotonic_ns() + 20 * core::kNsPerSecond;
-  int wait_status = 0;
-  bool ended = false;
-  while (!ended && core::monotonic_ns() < deadline_ns) {
+  while (!service.exit_code() && core::monotonic_ns() < deadline_ns) {
     queue.run_one(core::monotonic_ns() + core::kNsPerSecond / 20);
-    ended = waitpid(pid, &wait_status, WNOHANG) == pid;
-  }
-  if (!ended) {
-    kill(pid, SIGKILL);
-    waitpid(pid, &wait_status, 0);
   }
   while (queue.run_one(0)) {
   }
   EXPECT_TRUE(up) << "never got ready";
   EXPECT_TRUE(stopped) << "did not say that it stops";
-  ASSERT_TRUE(ended) << "did not end on SIGTERM";
-  EXPECT_TRUE(WIFEXITED(wait_status) && WEXITSTATUS(wait_status) == 0) << "wait status " << wait_status;
+  EXPECT_EQ(service.exit_code(), 0) << "did not end on SIGTERM, or not cleanly";
   fs::remove_all(folder);
 }
 
-INSTANTIATE_TEST_SUITE_P(Railfix, EveryService,
-                         ::testing::Values("frame_grabber", "sensor_gateway", "track_detector", "odometry",
-                                           "map_matcher", "fusion", "tpr_publisher", "recorder"),
-                         [](const auto& service) { return service.param; });
+INSTANTIATE_TEST_SUITE_P(Railfix, EveryService, ::testing::ValuesIn(service::service_names()),
+                         [](const auto& name) { return name.param; });
 
 }  // namespace
 }  // namespace railfix

@@ -1,14 +1,12 @@
 // The service program itself, over DDS: states in, reports and status out.
 #include <gmock/gmock.h>
-#include <signal.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <filesystem>
 
 #include "core/time.hpp"
 #include "etcs/train_position_report.hpp"
 #include "messaging/topics.hpp"
+#include "support/program.hpp"
 #include "unit/tpr_publisher/balise_map.hpp"
 
 namespace railfix {
@@ -21,37 +19,6 @@ namespace topics = messaging::topics;
 constexpr int kDomain = 79;
 constexpr int64_t kPatienceNs = 15 * core::kNsPerSecond;
 constexpr int64_t kPeriodNs = 20'000'000;
-
-/// railfix-tpr-publisher, told to stop at the end.
-class Service {
- public:
-  explicit Service(const std::vector<std::string>& sets) {
-    std::vector<std::string> words{std::string(RAILFIX_BIN_DIR) + "/railfix-tpr-publisher"};
-    for (const auto& set : sets) words.insert(words.end(), {"--set", set});
-    std::vector<char*> argv;
-    for (auto& word : words) argv.push_back(word.data());
-    argv.push_back(nullptr);
-    pid_ = fork();  // other threads run here already: from now on nothing may allocate in the child
-    if (pid_ != 0) return;
-    execv(argv[0], argv.data());
-    _exit(127);
-  }
-  ~Service() { stop(); }
-  Service(const Service&) = delete;
-  Service& operator=(const Service&) = delete;
-  int stop() {
-    if (pid_ <= 0) return status_;
-    kill(pid_, SIGTERM);
-    int status = 0;
-    waitpid(pid_, &status, 0);
-    pid_ = 0;
-    return status_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-  }
-
- private:
-  pid_t pid_ = 0;
-  int status_ = -1;
-};
 
 class TprService : public ::testing::Test {
  protected:
@@ -77,10 +44,11 @@ class TprService : public ::testing::Test {
     options.domain = kDomain;
     return options;
   }
-  [[nodiscard]] std::vector<std::string> sets() const {
-    return {"common.train_id=" + train_,       "common.domain=" + std::to_string(kDomain),
-            "common.log_level=error",          "tpr_publisher.map=" + map_file_.string(),
-            "tpr_publisher.foot_to_front_m=2", "tpr_publisher.nid_engine=4711"};
+  [[nodiscard]] std::vector<std::string> service() const {
+    return test::with_settings("railfix-tpr-publisher",
+                               {"common.train_id=" + train_, "common.domain=" + std::to_string(kDomain),
+                                "common.log_level=error", "tpr_publisher.map=" + map_file_.string(),
+                                "tpr_publisher.foot_to_front_m=2", "tpr_publisher.nid_engine=4711"});
   }
   /// Handles what comes until the condition holds; `each` runs every 20 ms.
   template <class Condition, class Each>
@@ -134,7 +102,7 @@ class TprService : public ::testing::Test {
 };
 
 TEST_F(TprService, ReportsOverTheNetwork) {
-  Service service(sets());
+  test::Program program(service());
   ASSERT_TRUE(run_until([&] { return connected(); }, [] {}));
   double offset_m = 380;
   ASSERT_TRUE(run_until([&] { return reports_.size() == 2; },
@@ -155,11 +123,11 @@ TEST_F(TprService, ReportsOverTheNetwork) {
   EXPECT_GE(reports_[1].l_doubtover_m(), 8.0 - 0.05);
   EXPECT_TRUE(
       run_until([&] { return status_ && status_->state() == msg::STATE_ACTIVE; }, [&] { write_state(offset_m); }));
-  EXPECT_EQ(service.stop(), 0);
+  EXPECT_EQ(program.end(SIGTERM), 0);
 }
 
 TEST_F(TprService, OldStatesAreNotReportedAndTheStatusSaysWhy) {
-  Service service(sets());
+  test::Program program(service());
   ASSERT_TRUE(run_until([&] { return connected(); }, [] {}));
   ASSERT_TRUE(run_until([&] { return status_ && status_->state() == msg::STATE_DEGRADED; },
                         [&] { write_state(450, 3 * core::kNsPerSecond); }));
@@ -169,7 +137,7 @@ TEST_F(TprService, OldStatesAreNotReportedAndTheStatusSaysWhy) {
 }
 
 TEST_F(TprService, TakesPacket58FromACommand) {
-  Service service(sets());
+  test::Program program(service());
   ASSERT_TRUE(run_until([&] { return connected() && commands_.matched_readers() > 0; }, [] {}));
   ASSERT_TRUE(run_until([&] { return reports_.size() == 1; }, [&] { write_state(450); }));
   msg::ControlRequest request;

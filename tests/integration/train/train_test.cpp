@@ -10,6 +10,7 @@
 #include "dataset/dataset.hpp"
 #include "mcap/reader.hpp"
 #include "messaging/topics.hpp"
+#include "service/service.hpp"
 #include "support/program.hpp"
 
 namespace railfix {
@@ -150,8 +151,7 @@ TEST_F(Train, NothingWasDropped) {
     services.emplace(csv.text(*csv.column({"service"})));
     EXPECT_EQ(csv.integer(*csv.column({"dropped"})).value(), 0) << csv.text(*csv.column({"service"}));
   }
-  EXPECT_THAT(services, ::testing::UnorderedElementsAre("frame_grabber", "sensor_gateway", "track_detector", "odometry",
-                                                        "map_matcher", "fusion", "tpr_publisher", "recorder"));
+  EXPECT_THAT(services, ::testing::UnorderedElementsAreArray(service::service_names()));
 }
 
 TEST(TrainRefuses, WhatItCannotRunWithOneSentence) {

@@ -11,8 +11,10 @@
 #include <cstring>
 #include <deque>
 #include <fstream>
+#include <ranges>
 
 #include "core/time.hpp"
+#include "service/service.hpp"
 
 namespace railfix::tool {
 namespace {
@@ -44,8 +46,8 @@ std::string describe(int wait_status) {
 core::Result<std::vector<ServiceProgram>> find_service_programs() {
   const auto folder = std::filesystem::read_symlink("/proc/self/exe").parent_path();
   std::vector<ServiceProgram> programs;
-  for (const std::string service : {"recorder", "fusion", "map_matcher", "tpr_publisher", "odometry", "track_detector",
-                                    "sensor_gateway", "frame_grabber"}) {
+  // Against the way of the data: who listens is there before who speaks.
+  for (const std::string& service : std::views::reverse(service::service_names())) {
     std::string file = "railfix-" + service;
     std::replace(file.begin(), file.end(), '_', '-');
     if (!std::filesystem::exists(folder / file)) {
