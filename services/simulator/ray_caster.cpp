@@ -18,7 +18,9 @@ constexpr float kHalfSleeperM = 1.3F;
 constexpr float kOwnSleepersM = 2.2F;  // so far apart each track has its own sleepers
 constexpr float kBranchSideM = 3.0F;
 constexpr float kTunnelHalfWidthM = 2.8F;
-constexpr size_t kMostBranches = 4;
+constexpr int kBlockPx = 8;  // so far apart rays are cast; between them the ground is smooth
+constexpr float kSmooth = 0.06F;
+constexpr float kHorizonRise = -1e-4F;
 
 float hazy(float albedo, float distance_m) {
   return albedo + (kHaze - albedo) * std::min(1.0F, distance_m / kHazeDistanceM);
@@ -50,12 +52,67 @@ RayCaster::RayCaster(const Eye& eye, const LocalTrack& main, const std::vector<L
       steepest_(main.steepest(height_m_)) {}
 
 void RayCaster::row(const float* normal_x, const float* normal_y, int count, float* out) const {
-  for (int u = 0; u < count; ++u) {
-    const Eigen::Vector3f ray =
-        track_from_camera_.col(0) * normal_x[u] + track_from_camera_.col(1) * normal_y[u] + track_from_camera_.col(2);
-    Hit hit{};
-    out[u] = meet(ray, hit) ? surface(ray, hit) : sky(ray);
+  Sample first = sample(normal_x[0], normal_y[0]);
+  Sample mixed = first;
+  for (int begin = 0; begin < count; begin += kBlockPx) {
+    const int end = std::min(begin + kBlockPx, count - 1);
+    const Sample last = sample(normal_x[end], normal_y[end]);
+    const int stop = std::min(begin + kBlockPx, count);
+    if (alike(first, last)) {
+      mixed.ground = first.ground;
+      mixed.track = first.track;
+      mixed.other_count = first.other_count;
+      const float step = 1.0F / static_cast<float>(std::max(1, end - begin));
+      for (int u = begin; u < stop; ++u) {
+        between(first, last, static_cast<float>(u - begin) * step, mixed);
+        out[u] = albedo(mixed);
+      }
+    } else {
+      for (int u = begin; u < stop; ++u) out[u] = albedo(sample(normal_x[u], normal_y[u]));
+    }
+    first = last;
   }
+}
+
+RayCaster::Sample RayCaster::sample(float normal_x, float normal_y) const {
+  Sample here;
+  here.ray = track_from_camera_.col(0) * normal_x + track_from_camera_.col(1) * normal_y + track_from_camera_.col(2);
+  here.ground = meet(here.ray, here.hit);
+  here.track = here.ground && main_.covers(here.hit.x) && here.ray.z() <= kHorizonRise;
+  if (!here.track) return here;
+  here.own = pixel_on(main_, here.ray, here.hit);
+  for (size_t i = 0; i < branches_.size() && here.other_count < kMostBranches; ++i) {
+    if (!branches_[i].covers(here.hit.x)) continue;
+    here.branch[here.other_count] = i;
+    here.others[here.other_count++] = pixel_on(branches_[i], here.ray, here.hit);
+  }
+  return here;
+}
+
+bool RayCaster::alike(const Sample& a, const Sample& b) const {
+  if (a.ground != b.ground || a.track != b.track) return false;
+  if (!a.ground) return a.ray.z() > kHighestHill * a.ray.x() && b.ray.z() > kHighestHill * b.ray.x();
+  if (std::abs(a.hit.x - b.hit.x) > kSmooth * a.hit.x) return false;
+  return a.other_count == b.other_count && std::equal(a.branch, a.branch + a.other_count, b.branch);
+}
+
+void RayCaster::between(const Sample& a, const Sample& b, float w, Sample& out) {
+  const auto mix = [w](float from, float to) { return from + w * (to - from); };
+  const auto mix_pixels = [&](const GroundPixel& from, const GroundPixel& to, GroundPixel& at) {
+    at.at = {mix(from.at.s_m, to.at.s_m), mix(from.at.d_m, to.at.d_m), mix(from.at.cos_heading, to.at.cos_heading),
+             mix(from.at.sin_heading, to.at.sin_heading), mix(from.at.stretch, to.at.stretch)};
+    at.slope_s = mix(from.slope_s, to.slope_s);
+    at.slope_d = mix(from.slope_d, to.slope_d);
+    at.size_s_m = mix(from.size_s_m, to.size_s_m);
+    at.size_d_m = mix(from.size_d_m, to.size_d_m);
+    at.edge_d_m = mix(from.edge_d_m, to.edge_d_m);
+  };
+  out.ray = a.ray + w * (b.ray - a.ray);
+  if (!a.ground) return;
+  out.hit.x = mix(a.hit.x, b.hit.x);
+  if (!a.track) return;
+  mix_pixels(a.own, b.own, out.own);
+  for (size_t i = 0; i < a.other_count; ++i) mix_pixels(a.others[i], b.others[i], out.others[i]);
 }
 
 bool RayCaster::meet(const Eigen::Vector3f& ray, Hit& hit) const {
@@ -146,51 +203,51 @@ GroundPixel RayCaster::pixel_on(const LocalTrack& track, const Eigen::Vector3f& 
   return pixel;
 }
 
-float RayCaster::surface(const Eigen::Vector3f& ray, const Hit& hit) const {
-  if (!main_.covers(hit.x) || ray.z() > -1e-4F) return hazy(kFarGround, hit.x);
-  const GroundPixel own = pixel_on(main_, ray, hit);
+float RayCaster::albedo(const Sample& here) const {
+  if (!here.ground) return sky(here.ray);
+  if (!here.track) return hazy(kFarGround, here.hit.x);
   float albedo = 0.0F;
-  if (branches_.empty()) {
-    albedo = GroundShader::foot_and_web(own, shader_.ground(own, kHalfSleeperM));
-    const float share = GroundShader::head_cover(own);
-    if (share > 0.0F) albedo += share * (shader_.head(own) - albedo);
+  if (here.other_count == 0) {
+    albedo = GroundShader::foot_and_web(here.own, shader_.ground(here.own, kHalfSleeperM));
+    const float share = GroundShader::head_cover(here.own);
+    if (share > 0.0F) albedo += share * (shader_.head(here.own) - albedo);
   } else {
-    albedo = junction(own, ray, hit);
+    albedo = junction(here);
   }
-  if (std::abs(own.at.d_m) < kTunnelHalfWidthM) albedo *= shader_.light(own.at.s_m);
-  return hazy(albedo, hit.x);
+  if (std::abs(here.own.at.d_m) < kTunnelHalfWidthM) albedo *= shader_.light(here.own.at.s_m);
+  return hazy(albedo, here.hit.x);
 }
 
 // Several tracks: the ground of the nearest, the rails of all. Wheels need their groove where rails come together:
 // blades stand off from the rail beside them, frogs have gaps.
-float RayCaster::junction(const GroundPixel& own, const Eigen::Vector3f& ray, const Hit& hit) const {
+float RayCaster::junction(const Sample& here) const {
   struct Other {
-    GroundPixel pixel;
+    const GroundPixel* pixel;
     float apart_m;
   };
+  const GroundPixel& own = here.own;
   Other others[kMostBranches];
   size_t count = 0;
-  GroundPixel nearest = own;
+  const GroundPixel* nearest = &own;
   float half_length_m = kHalfSleeperM;
-  for (const auto& branch : branches_) {
-    if (count == kMostBranches || !branch.covers(hit.x)) continue;
-    const GroundPixel pixel = pixel_on(branch, ray, hit);
+  for (size_t i = 0; i < here.other_count; ++i) {
+    const GroundPixel& pixel = here.others[i];
     if (std::abs(pixel.at.d_m) > kBranchSideM) continue;
     const float apart_m = std::abs(own.at.d_m - pixel.at.d_m);
-    others[count++] = {pixel, apart_m};
+    others[count++] = {&pixel, apart_m};
     if (apart_m < kOwnSleepersM) {
       half_length_m = std::max(half_length_m, kHalfSleeperM + apart_m);
-    } else if (std::abs(pixel.at.d_m) < std::abs(nearest.at.d_m)) {
-      nearest = pixel;
+    } else if (std::abs(pixel.at.d_m) < std::abs(nearest->at.d_m)) {
+      nearest = &pixel;
     }
   }
-  float albedo = GroundShader::foot_and_web(own, shader_.ground(nearest, half_length_m));
-  for (size_t i = 0; i < count; ++i) albedo = GroundShader::foot_and_web(others[i].pixel, albedo);
+  float albedo = GroundShader::foot_and_web(own, shader_.ground(*nearest, half_length_m));
+  for (size_t i = 0; i < count; ++i) albedo = GroundShader::foot_and_web(*others[i].pixel, albedo);
   float own_share = GroundShader::head_cover(own);
   for (size_t i = 0; i < count; ++i) {
-    const float share = GroundShader::head_cover(others[i].pixel) * (1.0F - flangeway(own));
-    if (share > 0.0F) albedo += share * (shader_.head(others[i].pixel) - albedo);
-    if (others[i].apart_m > kBladesEndM) own_share *= 1.0F - flangeway(others[i].pixel);
+    const float share = GroundShader::head_cover(*others[i].pixel) * (1.0F - flangeway(own));
+    if (share > 0.0F) albedo += share * (shader_.head(*others[i].pixel) - albedo);
+    if (others[i].apart_m > kBladesEndM) own_share *= 1.0F - flangeway(*others[i].pixel);
   }
   if (own_share > 0.0F) albedo += own_share * (shader_.head(own) - albedo);
   return albedo;

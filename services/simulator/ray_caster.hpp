@@ -26,11 +26,26 @@ class RayCaster {
   struct Hit {
     float x, y, scale;  // place and ray length, ray = direction * scale
   };
+  static constexpr size_t kMostBranches = 4;
+  /// A pixel with everything that its albedo depends on. Where two neighbours in a row are alike, so is all between.
+  struct Sample {
+    Eigen::Vector3f ray;
+    Hit hit{};
+    bool ground = false;  // else sky
+    bool track = false;   // near enough for `own` and `others`
+    GroundPixel own;
+    size_t other_count = 0;
+    GroundPixel others[kMostBranches];
+    size_t branch[kMostBranches];  // whose pixel that is
+  };
+  [[nodiscard]] Sample sample(float normal_x, float normal_y) const;
+  [[nodiscard]] bool alike(const Sample& a, const Sample& b) const;
+  static void between(const Sample& a, const Sample& b, float w, Sample& out);
+  [[nodiscard]] float albedo(const Sample& sample) const;
   [[nodiscard]] bool meet(const Eigen::Vector3f& ray, Hit& hit) const;
   [[nodiscard]] bool march(const Eigen::Vector3f& ray, Hit& hit) const;
   [[nodiscard]] float sky(const Eigen::Vector3f& ray) const;
-  [[nodiscard]] float surface(const Eigen::Vector3f& ray, const Hit& hit) const;
-  [[nodiscard]] float junction(const GroundPixel& own, const Eigen::Vector3f& ray, const Hit& hit) const;
+  [[nodiscard]] float junction(const Sample& sample) const;
   [[nodiscard]] GroundPixel pixel_on(const LocalTrack& track, const Eigen::Vector3f& ray, const Hit& hit) const;
 
   const LocalTrack& main_;

@@ -14,6 +14,20 @@ namespace {
 constexpr size_t kNoiseCount = 1U << 16U;
 constexpr float kWhite = 235.0F;  // grey level of albedo 1 at gain 1
 
+struct Film {
+  float scale;          // grey levels of radiance 1
+  float read_variance;  // grey levels squared, in the dark
+  float shot_variance;  // more of it per grey level
+};
+
+void expose_row(const float* in, const float* vignette, const float* noise, const Film& film, int count, uint8_t* out) {
+  for (int u = 0; u < count; ++u) {
+    const float clean = std::min(in[u] * vignette[u] * film.scale, 255.0F);
+    const float noisy = clean + std::sqrt(film.read_variance + film.shot_variance * clean) * noise[u];
+    out[u] = static_cast<uint8_t>(std::clamp(noisy + 0.5F, 0.0F, 255.0F));
+  }
+}
+
 }  // namespace
 
 Renderer::Renderer(std::shared_ptr<const Line> line, const RenderOptions& options)
@@ -38,8 +52,9 @@ Renderer::Renderer(std::shared_ptr<const Line> line, const RenderOptions& option
     }
   }
   core::Random random(mix_bits(options.seed, 104));
-  noise_.reserve(kNoiseCount);
-  for (size_t i = 0; i < kNoiseCount; ++i) noise_.push_back(static_cast<float>(random.normal()));
+  // A row takes its noise in one piece from anywhere in the first kNoiseCount.
+  noise_.resize(kNoiseCount + static_cast<size_t>(camera.width_px));
+  for (auto& value : noise_) value = static_cast<float>(random.normal());
 }
 
 cv::Mat Renderer::render(const Shot& shot) const {
@@ -63,22 +78,13 @@ cv::Mat Renderer::render(const Shot& shot) const {
 
 cv::Mat Renderer::expose(const cv::Mat& radiance, const Shot& shot) const {
   cv::Mat picture(radiance.size(), CV_8UC1);
-  float sigma[256];
-  for (int grey = 0; grey < 256; ++grey) {
-    sigma[grey] = static_cast<float>(
-        std::sqrt(options_.read_noise_grey * options_.read_noise_grey + options_.shot_noise_grey * grey));
-  }
-  const float scale = kWhite * static_cast<float>(shot.gain);
+  const Film film{kWhite * static_cast<float>(shot.gain),
+                  static_cast<float>(options_.read_noise_grey * options_.read_noise_grey),
+                  static_cast<float>(options_.shot_noise_grey)};
   for (int v = 0; v < radiance.rows; ++v) {
-    const float* in = radiance.ptr<float>(v);
-    const float* vignette = &vignette_[static_cast<size_t>(v) * static_cast<size_t>(radiance.cols)];
-    uint8_t* out = picture.ptr<uint8_t>(v);
-    size_t draw = mix_bits(shot.noise_seed, v, 5);
-    for (int u = 0; u < radiance.cols; ++u) {
-      const float clean = std::min(in[u] * vignette[u] * scale, 255.0F);
-      const float noisy = clean + sigma[static_cast<int>(clean)] * noise_[draw++ & (kNoiseCount - 1)];
-      out[u] = static_cast<uint8_t>(std::clamp(noisy + 0.5F, 0.0F, 255.0F));
-    }
+    const size_t first = static_cast<size_t>(v) * static_cast<size_t>(radiance.cols);
+    const float* noise = &noise_[mix_bits(shot.noise_seed, v, 5) % kNoiseCount];
+    expose_row(radiance.ptr<float>(v), &vignette_[first], noise, film, radiance.cols, picture.ptr<uint8_t>(v));
   }
   return picture;
 }
