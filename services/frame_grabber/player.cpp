@@ -19,25 +19,30 @@ void ReadAhead::stop() {
   changed_.notify_all();
 }
 
-void ReadAhead::skip_late(int64_t decode_ns) {
+std::vector<int64_t> ReadAhead::skip_late(int64_t decode_ns) {
+  std::vector<int64_t> left_out_ns;
   for (auto stamp_ns = source_->next_stamp_ns(); stamp_ns; stamp_ns = source_->next_stamp_ns()) {
-    if (!too_late_(*stamp_ns, decode_ns) || !source_->skip()) return;
+    if (*stamp_ns <= newest_ns_) break;
+    newest_ns_ = *stamp_ns;
+    if (!too_late_(*stamp_ns, decode_ns) || !source_->skip()) break;
+    left_out_ns.push_back(*stamp_ns);
   }
+  return left_out_ns;
 }
 
 void ReadAhead::decode() {
   int64_t decode_ns = 0;  // running mean
   while (true) {
-    skip_late(decode_ns);
+    auto left_out_ns = skip_late(decode_ns);
     const int64_t begin_ns = core::monotonic_ns();
-    Item item = source_->next();
+    Item item{std::move(left_out_ns), source_->next()};
     decode_ns += (core::monotonic_ns() - begin_ns - decode_ns) / 4;
-    const bool last = item.ok() && !item.value();
+    const bool last = item.picture.ok() && !item.picture.value();
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [this] { return stopped_ || items_.size() < depth_; });
     if (stopped_) return;
     ended_ = last;
-    if (!last) items_.push_back(std::move(item));
+    items_.push_back(std::move(item));
     changed_.notify_all();
     if (last) return;
   }
@@ -46,7 +51,7 @@ void ReadAhead::decode() {
 ReadAhead::Item ReadAhead::next() {
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [this] { return stopped_ || ended_ || !items_.empty(); });
-  if (stopped_ || items_.empty()) return std::optional<dataset::Picture>();
+  if (stopped_ || items_.empty()) return {};
   Item item = std::move(items_.front());
   items_.pop_front();
   changed_.notify_all();
@@ -57,11 +62,7 @@ Player::Player(std::unique_ptr<dataset::PictureSource> source, bool real_pace, s
     : real_pace_(real_pace),
       events_(std::move(events)),
       pictures_(std::move(source), read_ahead,
-                [this](int64_t stamp_ns, int64_t decode_ns) {
-                  const bool late = too_late(stamp_ns, decode_ns);
-                  if (late) events_.late(stamp_ns);
-                  return late;
-                }),
+                [this](int64_t stamp_ns, int64_t decode_ns) { return too_late(stamp_ns, decode_ns); }),
       thread_([this] { play(); }) {}
 
 bool Player::too_late(int64_t stamp_ns, int64_t decode_ns) const {
@@ -107,12 +108,13 @@ void Player::play() {
       const std::lock_guard lock(mutex_);
       if (stopped_) return;
     }
-    if (!item.ok()) {
-      events_.broken(item.error().message);
+    for (const int64_t stamp_ns : item.left_out_ns) events_.late(stamp_ns);
+    if (!item.picture.ok()) {
+      events_.broken(item.picture.error().message);
       continue;
     }
-    if (!item.value()) return events_.ended();
-    dataset::Picture picture = std::move(*std::move(item).value());
+    if (!item.picture.value()) return events_.ended();
+    dataset::Picture picture = std::move(*std::move(item.picture).value());
     if (real_pace_) {
       const auto verdict = pace.ask(picture.stamp_ns, core::wall_ns());
       wall_minus_data_ns_ = pace.wall_minus_data_ns();

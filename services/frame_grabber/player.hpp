@@ -10,6 +10,7 @@
 #include <mutex>
 #include <optional>
 #include <thread>
+#include <vector>
 
 #include "dataset/dataset.hpp"
 
@@ -18,24 +19,29 @@ namespace railfix::frame_grabber {
 /// Decodes in a thread of its own, at most `depth` pictures ahead.
 class ReadAhead {
  public:
-  /// Says whether a picture would be too late when it takes decode_ns to decode: it is then left out undecoded.
+  /// Says whether a picture would be too late when it takes decode_ns to decode: it is then left out undecoded. Asked
+  /// in the decoder's thread, and only for pictures newer than all before: an older one is due at once, never late.
   using TooLate = std::function<bool(int64_t stamp_ns, int64_t decode_ns)>;
   ReadAhead(std::unique_ptr<dataset::PictureSource> source, size_t depth, TooLate too_late);
   ~ReadAhead();
   ReadAhead(const ReadAhead&) = delete;
   ReadAhead& operator=(const ReadAhead&) = delete;
 
-  using Item = core::Result<std::optional<dataset::Picture>>;
-  /// As PictureSource::next(); waits for the decoder. At the end, and after stop(), an empty item.
+  struct Item {
+    std::vector<int64_t> left_out_ns;  // stamps of the pictures that were left out before this one
+    core::Result<std::optional<dataset::Picture>> picture = std::optional<dataset::Picture>();
+  };
+  /// As PictureSource::next(); waits for the decoder. At the end, and after stop(), an item without a picture.
   Item next();
   void stop();
 
  private:
   void decode();
-  void skip_late(int64_t decode_ns);
+  [[nodiscard]] std::vector<int64_t> skip_late(int64_t decode_ns);
   std::unique_ptr<dataset::PictureSource> source_;
   size_t depth_;
   TooLate too_late_;
+  int64_t newest_ns_ = INT64_MIN;  // stamp, of the pictures read or left out so far
   std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<Item> items_;
@@ -44,7 +50,7 @@ class ReadAhead {
   std::thread thread_;  // last: it uses all of the above
 };
 
-/// What becomes of the pictures; called in the player's threads.
+/// What becomes of the pictures; all called in one thread of the player, in the order of the source.
 struct PlayerEvents {
   /// The picture is due. Playing goes on after Player::complete().
   std::function<void(dataset::Picture picture)> picture;
