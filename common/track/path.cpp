@@ -24,8 +24,8 @@ double begin_heading(const Run& run) {
   return end_heading({run.edge, !run.forward}) + core::kPi;
 }
 
-/// What follows at the end of a run: the straight way, among several the one that turns least.
-std::optional<Run> next_run(const Map& map, const Run& run) {
+/// What follows at the end of a run: an edge of `via`, else the straight way, among several the one that turns least.
+std::optional<Run> next_run(const Map& map, const Run& run, const std::vector<uint32_t>& via) {
   const uint32_t node = run.forward ? run.edge->to_node : run.edge->from_node;
   const double heading = end_heading(run);
   std::optional<Run> best;
@@ -38,7 +38,8 @@ std::optional<Run> next_run(const Map& map, const Run& run) {
       const Run candidate{other, forward};
       if ((forward ? other->from_node : other->to_node) != node) continue;
       const double turn = std::abs(core::wrap_pi(begin_heading(candidate) - heading));
-      const double cost = turn + (connection.diverging ? 10.0 : 0.0);
+      const bool wanted = std::find(via.begin(), via.end(), other->id) != via.end();
+      const double cost = turn + (connection.diverging ? 10.0 : 0.0) - (wanted ? 100.0 : 0.0);
       if (!best || cost < best_cost) {
         best = candidate;
         best_cost = cost;
@@ -49,11 +50,11 @@ std::optional<Run> next_run(const Map& map, const Run& run) {
 }
 
 /// Runs after the first until `distance_m` beyond the end of the first is covered or the track ends.
-std::vector<Run> runs_after(const Map& map, const Run& first, double distance_m) {
+std::vector<Run> runs_after(const Map& map, const Run& first, double distance_m, const std::vector<uint32_t>& via) {
   std::vector<Run> runs;
   Run run = first;
   while (distance_m > 0 && runs.size() < kMostLegs) {
-    const std::optional<Run> next = next_run(map, run);
+    const std::optional<Run> next = next_run(map, run, via);
     if (!next) break;
     run = *next;
     runs.push_back(run);
@@ -71,7 +72,7 @@ LandmarkKind seen_along(LandmarkKind kind, bool forward) {
 }  // namespace
 
 core::Result<Path> Path::follow(std::shared_ptr<const Map> map, const EdgePosition& start, double ahead_m,
-                                double behind_m) {
+                                double behind_m, const std::vector<uint32_t>& via) {
   const Edge* edge = map->edge(start.edge);
   if (edge == nullptr) return core::Error{"the map has no edge " + std::to_string(start.edge)};
   if (!(start.offset_m >= -1e-6 && start.offset_m <= edge->alignment.length_m() + 1e-6)) {
@@ -82,7 +83,7 @@ core::Result<Path> Path::follow(std::shared_ptr<const Map> map, const EdgePositi
   const double before =
       std::clamp(forward ? start.offset_m : length - start.offset_m, 0.0, length);  // of the edge behind the start
 
-  std::vector<Run> runs = runs_after(*map, {edge, !forward}, behind_m - before);
+  std::vector<Run> runs = runs_after(*map, {edge, !forward}, behind_m - before, via);
   std::reverse(runs.begin(), runs.end());
   double distance = -before;
   for (Run& run : runs) {
@@ -90,7 +91,7 @@ core::Result<Path> Path::follow(std::shared_ptr<const Map> map, const EdgePositi
     distance -= run.edge->alignment.length_m();
   }
   runs.push_back({edge, forward});
-  const std::vector<Run> ahead = runs_after(*map, {edge, forward}, ahead_m - (length - before));
+  const std::vector<Run> ahead = runs_after(*map, {edge, forward}, ahead_m - (length - before), via);
   runs.insert(runs.end(), ahead.begin(), ahead.end());
 
   Path path;

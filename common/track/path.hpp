@@ -29,9 +29,9 @@ class Path {
  public:
   /// Follows the track from `start` (its direction, unknown = forward) over the straight way of every switch, `ahead_m`
   /// in front and `behind_m` behind, or until the track ends. Where the straight way is not told, the smallest turn is
-  /// taken.
+  /// taken. Edges in `via` (ids) are taken wherever a switch leads to one of them.
   static core::Result<Path> follow(std::shared_ptr<const Map> map, const EdgePosition& start, double ahead_m,
-                                   double behind_m);
+                                   double behind_m, const std::vector<uint32_t>& via = {});
 
   [[nodiscard]] double begin_m() const;  // smallest distance, <= 0
   [[nodiscard]] double end_m() const;

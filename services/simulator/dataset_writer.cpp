@@ -116,8 +116,10 @@ core::Status DatasetWriter::write_truth(const Trajectory& trajectory, const std:
   if (const auto status = track.close(); !status.ok()) return status;
   if (const auto status = rails.close(); !status.ok()) return status;
   core::CsvWriter landmarks(root_ / "truth/landmarks.csv", "kind,distance,lateral");
-  for (const auto& mark : trajectory.line().path().landmarks()) {
-    landmarks << track::to_string(mark.landmark->kind) << mark.distance_m << mark.lateral_m;
+  for (const auto& thing : trajectory.line().things()) {
+    // A balise of the neighbouring track is seen, but it is no landmark of this one.
+    if (!thing.own && thing.kind == track::LandmarkKind::balise) continue;
+    landmarks << track::to_string(thing.kind) << thing.distance_m << thing.lateral_m;
     landmarks.end_row();
   }
   return landmarks.close();

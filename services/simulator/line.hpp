@@ -25,15 +25,37 @@ struct CentreSample {
 struct CentreLine {
   double begin_m = 0;
   std::vector<CentreSample> samples;
+  uint32_t edge = 0;  // of a track beside the path
 };
 
-/// From begin to end along the path; lateral_m left positive (platforms: sign = side).
+/// From begin to end along the path; lateral_m left positive. A platform's edge is at lateral_m and its body lies
+/// outward; a tunnel reaches from right_m to left_m.
 struct Span {
   double begin_m = 0;
   double end_m = 0;
   double lateral_m = 0;
+  double outward = 0;
+  double left_m = 0;
+  double right_m = 0;
 };
 struct Spot {
+  double distance_m = 0;
+  double lateral_m = 0;
+};
+
+/// Something of the map beside the path, on the path's own scale.
+struct Thing {
+  track::LandmarkKind kind = track::LandmarkKind::unknown;  // as met along the path
+  double distance_m = 0;
+  double lateral_m = 0;
+  bool own = true;       // on an edge of the path; else on a track beside it
+  double outward = 0.0;  // sign of the side of its track that it stands on
+};
+
+/// What looks like a landmark and is none: signals, boards, posts.
+struct Distractor {
+  enum class Kind : uint8_t { signal, distance_board, speed_board, cabinet };
+  Kind kind = Kind::signal;
   double distance_m = 0;
   double lateral_m = 0;
 };
@@ -41,20 +63,25 @@ struct Spot {
 /// Read-only after it is made; may be used from many threads.
 class Line {
  public:
-  /// The path from `start` over the straight way of every switch, at most `ahead_m` long. Fails when the path is
-  /// shorter than 50 m.
+  /// The path from `start` over the straight way of every switch or the edges of `via`, at most `ahead_m` long. Fails
+  /// when the path is shorter than 50 m.
   static core::Result<Line> make(std::shared_ptr<const track::Map> map, const track::EdgePosition& start,
-                                 double ahead_m);
+                                 double ahead_m, const std::vector<uint32_t>& via = {});
 
   [[nodiscard]] const track::Path& path() const { return path_; }
   [[nodiscard]] const CentreLine& main() const { return main_; }
-  /// Tracks that leave or join the path at its switches.
+  /// Tracks that leave, join or accompany the path.
   [[nodiscard]] const std::vector<CentreLine>& branches() const { return branches_; }
+  /// Landmarks on the path, and of the tracks beside it those that are as good as beside the path.
+  [[nodiscard]] const std::vector<Thing>& things() const { return things_; }
   [[nodiscard]] const std::vector<Spot>& balises() const { return balises_; }
   [[nodiscard]] const std::vector<Spot>& masts() const { return masts_; }
   [[nodiscard]] const std::vector<Spot>& bridges() const { return bridges_; }
   [[nodiscard]] const std::vector<Span>& tunnels() const { return tunnels_; }
   [[nodiscard]] const std::vector<Span>& platforms() const { return platforms_; }
+  [[nodiscard]] const std::vector<Distractor>& distractors() const { return distractors_; }
+  /// Lateral offsets of the tracks beside the path at a place, the path's own (0) first.
+  [[nodiscard]] std::vector<double> tracks_at(double distance_m) const;
   /// How deep inside a tunnel (0 outside, else metres to the nearer portal).
   [[nodiscard]] double depth_in_tunnel_m(double distance_m) const;
 
@@ -62,10 +89,15 @@ class Line {
   explicit Line(track::Path path) : path_(std::move(path)) {}
   void sample_main();
   void sample_branches();
+  void collect_things();
   void collect_objects();
+  void place_distractors();
+  [[nodiscard]] Spot spot_of(double easting_m, double northing_m) const;
   track::Path path_;
   CentreLine main_;
   std::vector<CentreLine> branches_;
+  std::vector<Thing> things_;
+  std::vector<Distractor> distractors_;
   std::vector<Spot> balises_;
   std::vector<Spot> masts_;
   std::vector<Spot> bridges_;

@@ -8,6 +8,22 @@ constexpr double kSightM = 270.0;
 constexpr double kSideM = 60.0;
 constexpr double kFlatM = 1e-5;
 
+// The sample near the foot: from where the line's own scale says, downhill in steps of 10 m (a track beside the path
+// is longer or shorter than it).
+size_t near_foot(const CentreLine& line, double s_origin_m, const track::TrackPoint& foot) {
+  const auto gap = [&](int64_t i) {
+    const auto& pose = line.samples[static_cast<size_t>(i)].pose;
+    return std::hypot(pose.easting_m - foot.pose.easting_m, pose.northing_m - foot.pose.northing_m);
+  };
+  const auto last = static_cast<int64_t>(line.samples.size()) - 1;
+  const double guess = (s_origin_m - line.begin_m) / kCentreStepM;
+  int64_t near = std::clamp(static_cast<int64_t>(guess), int64_t{0}, last);
+  for (const int64_t step : {-40, 40}) {
+    while (near + step >= 0 && near + step <= last && gap(near + step) < gap(near)) near += step;
+  }
+  return static_cast<size_t>(near);
+}
+
 }  // namespace
 
 struct LocalTrack::Seen {
@@ -17,8 +33,9 @@ struct LocalTrack::Seen {
 LocalTrack::LocalTrack(const CentreLine& line, double s_origin_m, const track::TrackPoint& foot) {
   const double sin_h = std::sin(foot.pose.heading_rad);
   const double cos_h = std::cos(foot.pose.heading_rad);
-  const double window_begin = (s_origin_m - line.begin_m - kBehindFootM) / kCentreStepM;
-  const auto first = static_cast<size_t>(std::max(0.0, window_begin));
+  const auto behind = static_cast<size_t>(kBehindFootM / kCentreStepM);
+  const size_t near = near_foot(line, s_origin_m, foot);
+  const size_t first = near > behind ? near - behind : 0;
   std::vector<Seen> seen;
   for (size_t i = first; i < line.samples.size(); ++i) {
     const auto& sample = line.samples[i];

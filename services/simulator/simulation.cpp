@@ -87,12 +87,23 @@ class Studio {
 };
 
 core::Result<std::shared_ptr<const Line>> make_line(const SimulationOptions& options) {
-  const auto map = options.map ? options.map : std::make_shared<const track::Map>(builtin_line());
+  auto map = options.map;
+  if (!map) {
+    auto built_in = builtin_line(options.line);
+    if (!built_in.ok()) return built_in.error();
+    map = std::make_shared<const track::Map>(std::move(built_in).value());
+  }
   const auto start = map->parse_position(options.start);
   if (!start.ok()) return start.error();
+  std::vector<uint32_t> via;
+  for (const auto& name : options.via) {
+    const auto place = map->parse_position(name + ":0");
+    if (!place.ok()) return place.error();
+    via.push_back(place.value().edge);
+  }
   const double ahead_m =
       options.run.length_m > 0.0 ? options.run.length_m : options.run.duration_s * options.run.cruise_mps;
-  auto line = Line::make(map, start.value(), ahead_m);
+  auto line = Line::make(map, start.value(), ahead_m, via);
   if (!line.ok()) return line.error();
   return std::shared_ptr<const Line>(std::make_shared<Line>(std::move(line).value()));
 }

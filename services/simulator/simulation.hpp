@@ -15,8 +15,10 @@ namespace railfix::simulator {
 
 struct SimulationOptions {
   std::filesystem::path out;
-  std::shared_ptr<const track::Map> map;  // nothing = the built-in line
+  std::shared_ptr<const track::Map> map;  // nothing = a built-in line
+  std::string line = "default";           // or "long": the built-in line without a map
   std::string start = "1:100";
+  std::vector<std::string> via;  // edges to turn to at switches, numbers or names
   RunOptions run;
   ShakeOptions shake;
   SensorOptions sensors;

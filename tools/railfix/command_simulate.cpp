@@ -156,8 +156,13 @@ void add_simulate(CLI::App& app, Action& chosen) {
                          "  railfix run --dataset /tmp/demo --start 1:250:+ --out /tmp/demo-run\n"
                          "The same seed gives the same bytes.");
   command->add_option("--out", simulation.out, "dataset folder to write (new or empty)")->required();
-  command->add_option("--map", settings->map, "map made by `railfix map build` (default: a built-in line of 4 km)")
-      ->check(CLI::ExistingFile);
+  auto* map = command->add_option("--map", settings->map, "map made by `railfix map build` (default: a built-in line)")
+                  ->check(CLI::ExistingFile);
+  command->add_option("--line", simulation.line, "built-in line: default (4 km) or long (30 km)")
+      ->check(CLI::IsMember({"default", "long"}))
+      ->excludes(map)
+      ->capture_default_str();
+  command->add_option("--via", simulation.via, "edges to turn to at switches, else the straight way is run");
   command->add_option("--start", simulation.start, "EDGE:OFFSET[:+|-] where the train stands first")
       ->capture_default_str();
   command->add_option("--length-m", simulation.run.length_m, "way to run")

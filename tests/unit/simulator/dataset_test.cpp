@@ -85,7 +85,7 @@ TEST(Dataset, MapRoundTrip) {
   ASSERT_TRUE(map.save(folder.path / "line.map").ok());
   const auto again = track::Map::load(folder.path / "line.map");
   ASSERT_TRUE(again.ok()) << again.error().message;
-  ASSERT_EQ(again.value().edges.size(), 4U);
+  ASSERT_EQ(again.value().edges.size(), 5U);
   EXPECT_EQ(again.value().balise_groups.size(), map.balise_groups.size());
   // The loop ends where the station track ends.
   const auto& station = map.edges[1].alignment;
