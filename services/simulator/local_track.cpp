@@ -73,8 +73,8 @@ void LocalTrack::tabulate(const std::vector<Seen>& seen) {
     const auto mix = [w](double from, double to) { return static_cast<float>(from + w * (to - from)); };
     const float z = mix(a.z, b.z);
     const float twist = mix(a.twist, b.twist);
-    lowest_m_ = std::min(lowest_m_, z);
-    highest_m_ = std::max(highest_m_, z);
+    lowest_m_ = std::min(lowest_m_, z - kCantedM * std::abs(twist));
+    highest_m_ = std::max(highest_m_, z + kCantedM * std::abs(twist));
     flat_ = flat_ && std::abs(z) < kFlatM && std::abs(twist) < kFlatM;
     rows_.push_back({mix(a.y, b.y), mix(a.s, b.s), static_cast<float>(std::cos(turn)),
                      static_cast<float>(std::sin(turn)), mix(a.curvature, b.curvature), z, twist, 0.0F});
@@ -91,7 +91,7 @@ float LocalTrack::steepest(float height_m) const {
   float steepest = -1e-4F;
   for (size_t i = 0; i < rows_.size(); ++i) {
     const float x = begin_m_ + static_cast<float>(i) * kStepM;
-    if (x > 1.0F) steepest = std::max(steepest, (rows_[i].z - height_m) / x);
+    if (x > 1.0F) steepest = std::max(steepest, (rows_[i].z + kCantedM * std::abs(rows_[i].twist) - height_m) / x);
   }
   return steepest;
 }

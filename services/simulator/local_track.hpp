@@ -25,7 +25,8 @@ class LocalTrack {
   static constexpr float kBehindM = -2.0F;
   static constexpr float kAheadM = 250.0F;
   static constexpr float kStepM = 0.25F;
-  static constexpr float kExactM = 8.0F;  // further beside the track only grass grows
+  static constexpr float kExactM = 8.0F;   // further beside the track only grass grows
+  static constexpr float kCantedM = 6.0F;  // as far beside the track the ground leans with its cant
 
   /// s_m counts from `s_origin_m` on the line's own scale.
   LocalTrack(const CentreLine& line, double s_origin_m, const track::TrackPoint& foot);
@@ -57,10 +58,9 @@ class LocalTrack {
     const Row& a = rows_[index];
     const Row& b = rows_[index + 1];
     const float twist = a.twist + w * (b.twist - a.twist);
-    return {a.z + w * (b.z - a.z) + twist * (y_m - a.y), (b.z - a.z) * (1.0F / kStepM)};
+    const float beside = std::clamp(y_m - a.y, -kCantedM, kCantedM);
+    return {a.z + w * (b.z - a.z) + twist * beside, (b.z - a.z) * (1.0F / kStepM)};
   }
-  /// Height of the rail plane at the track's centre, the last known one beyond the sight.
-  [[nodiscard]] float centre_z(float x_m) const { return at(std::min(x_m, end_m_)).z; }
   [[nodiscard]] float lowest_m() const { return lowest_m_; }
   [[nodiscard]] float highest_m() const { return highest_m_; }
   /// Steepest ray from `height_m` over the foot (rise per metre of x) that still meets the surface.

@@ -135,7 +135,8 @@ bool RayCaster::meet(const Eigen::Vector3f& ray, Hit& hit) const {
 // Near the horizon humps and hollows decide where a ray lands: walk between the heights that the surface can have.
 bool RayCaster::march(const Eigen::Vector3f& ray, Hit& hit) const {
   const float fall = -ray.z() / ray.x();
-  const auto over = [&](float x) { return height_m_ - fall * x - main_.centre_z(x); };
+  const float aside = ray.y() / ray.x();
+  const auto over = [&](float x) { return height_m_ - fall * x - main_.height(x, lateral_m_ + x * aside).z_m; };
   const float first = fall > 1e-5F ? std::max(kNearM - 10.0F, (height_m_ - main_.highest_m()) / fall) : kNearM - 10.0F;
   const float last = fall > 1e-5F ? (height_m_ - main_.lowest_m()) / fall : LocalTrack::kAheadM;
   float low = first;
