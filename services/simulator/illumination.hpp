@@ -1,0 +1,38 @@
+// How much light falls on a place of the line: sky, sun, tunnels and the train's headlamp.
+#pragma once
+
+#include <vector>
+
+#include "simulator/line.hpp"
+#include "simulator/look.hpp"
+
+namespace railfix::simulator {
+
+/// For one picture; s, x, y in metres from the camera's foot (s along the track, x forward, y left).
+class Illumination {
+ public:
+  Illumination(const Line& line, const Light& light, double distance_m);
+
+  /// 1 = a bright diffuse day.
+  struct Level {
+    float diffuse;  // of sky, tunnel mouths and headlamp
+    float direct;   // of the sun, where no shadow lies
+  };
+  [[nodiscard]] Level on_ground(float s_m, float x_m, float y_m) const;
+  /// The same for something upright, all together.
+  [[nodiscard]] float on_object(float s_m, float x_m, float y_m) const {
+    const Level level = on_ground(s_m, x_m, y_m);
+    return level.diffuse + level.direct;
+  }
+  /// True where all places of the picture have the same light.
+  [[nodiscard]] bool uniform() const { return tunnels_.empty() && light_.sky >= 1.0; }
+
+ private:
+  Light light_;
+  std::vector<Span> tunnels_;
+};
+
+/// Full width at the level of the rails; outside of it the ground is not in the tunnel.
+constexpr float kTunnelGroundHalfWidthM = 2.8F;
+
+}  // namespace railfix::simulator
