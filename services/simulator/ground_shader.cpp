@@ -72,23 +72,6 @@ GroundShader::GroundShader(const Line& line, const RenderOptions& options, const
     if (std::abs(balise.distance_m - distance_m) < 120.0)
       balises_.push_back({balise.distance_m - distance_m, balise.lateral_m});
   }
-  for (const auto& tunnel : line.tunnels()) {
-    tunnels_.push_back({tunnel.begin_m - distance_m, tunnel.end_m - distance_m, 0.0});
-  }
-}
-
-float GroundShader::light(float s_m) const {
-  constexpr float kAmbient = 0.012F;
-  for (const auto& tunnel : tunnels_) {
-    const float in = s_m - static_cast<float>(tunnel.begin_m);
-    const float out = static_cast<float>(tunnel.end_m) - s_m;
-    if (in <= 0.0F || out <= 0.0F) continue;
-    const float daylight = std::exp(-in / 4.0F) + std::exp(-out / 4.0F);
-    const float ahead = std::max(s_m, 4.0F);
-    const float headlamp = 0.16F * std::min(1.0F, 100.0F / (ahead * ahead)) + 0.05F * std::min(1.0F, 12.0F / ahead);
-    return std::min(1.0F, kAmbient + daylight + headlamp);
-  }
-  return 1.0F;
 }
 
 // Patches of a tile at random offsets, cross-faded at their borders: no repetition along the line.

@@ -38,8 +38,6 @@ class GroundShader {
   [[nodiscard]] static float head_cover(const GroundPixel& pixel);
   /// Albedo of a rail head there.
   [[nodiscard]] float head(const GroundPixel& pixel) const;
-  /// Daylight (1) to tunnel darkness at a place of the path.
-  [[nodiscard]] float light(float s_m) const;
 
  private:
   struct Sleeper {
@@ -67,7 +65,6 @@ class GroundShader {
   std::vector<float> rail_grey_;  // slow changes of the heads' shine, one a metre
   float rail_phase_m_ = 0;
   std::vector<Spot> balises_;  // s relative to the foot
-  std::vector<Span> tunnels_;
 };
 
 }  // namespace railfix::simulator

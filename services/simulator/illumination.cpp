@@ -22,7 +22,8 @@ float headlamp(float x_m, float y_m) {
 
 }  // namespace
 
-Illumination::Illumination(const Line& line, const Light& light, double distance_m) : light_(light) {
+Illumination::Illumination(const Line& line, const Light& light, double distance_m)
+    : light_(light), per_haze_m_(static_cast<float>(1.0 / light.haze_m)) {
   for (const auto& tunnel : line.tunnels()) {
     if (tunnel.begin_m - distance_m < kSightM && tunnel.end_m > distance_m - kSightM)
       tunnels_.push_back({tunnel.begin_m - distance_m, tunnel.end_m - distance_m, 0.0});

@@ -1,6 +1,7 @@
 // How much light falls on a place of the line: sky, sun, tunnels and the train's headlamp.
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "simulator/line.hpp"
@@ -24,11 +25,18 @@ class Illumination {
     const Level level = on_ground(s_m, x_m, y_m);
     return level.diffuse + level.direct;
   }
+  /// What the air between leaves of an albedo.
+  [[nodiscard]] float hazy(float albedo, float x_m) const {
+    return albedo + (kHaze - albedo) * std::min(1.0F, x_m * per_haze_m_);
+  }
   /// True where all places of the picture have the same light.
-  [[nodiscard]] bool uniform() const { return tunnels_.empty() && light_.sky >= 1.0; }
+  [[nodiscard]] bool uniform() const { return tunnels_.empty() && light_.sky + light_.sun >= 1.0; }
+  [[nodiscard]] const Light& open() const { return light_; }
 
  private:
+  static constexpr float kHaze = 0.62F;
   Light light_;
+  float per_haze_m_;
   std::vector<Span> tunnels_;
 };
 

@@ -5,8 +5,9 @@ namespace railfix::simulator {
 
 /// Light of the open line. A diffuse day of sky 1 and no sun is the measure: it lights albedo 1 to full white.
 struct Light {
-  double sky = 1.0;  // from everywhere, no shadows
-  double sun = 0.0;  // from the sun, where nothing is in its way
+  double sky = 1.0;   // from everywhere, no shadows
+  double dome = 1.0;  // brightness of the sky that the camera sees
+  double sun = 0.0;   // from the sun, where nothing is in its way
   double sun_elevation_rad = 0.6;
   double sun_heading_rad = 0.0;  // where it stands, clockwise from grid north
   double headlamp = 1.0;         // of the train; it shows where the rest is dark

@@ -5,8 +5,6 @@
 namespace railfix::simulator {
 namespace {
 
-constexpr float kHaze = 0.62F;
-constexpr float kHazeDistanceM = 500.0F;
 constexpr float kHills = 0.50F;
 constexpr float kHighestHill = 0.068F;  // rise per metre
 constexpr float kFarGround = 0.42F;
@@ -17,14 +15,10 @@ constexpr float kBladesEndM = 0.4F;  // further apart than this the tracks' rail
 constexpr float kHalfSleeperM = 1.3F;
 constexpr float kOwnSleepersM = 2.2F;  // so far apart each track has its own sleepers
 constexpr float kBranchSideM = 3.0F;
-constexpr float kTunnelHalfWidthM = 2.8F;
+constexpr float kNowhereM = -1e6F;
 constexpr int kBlockPx = 8;  // so far apart rays are cast; between them the ground is smooth
 constexpr float kSmooth = 0.06F;
 constexpr float kHorizonRise = -1e-4F;
-
-float hazy(float albedo, float distance_m) {
-  return albedo + (kHaze - albedo) * std::min(1.0F, distance_m / kHazeDistanceM);
-}
 
 // The inside of a rail where wheel flanges of that track run.
 float flangeway(const GroundPixel& pixel) {
@@ -37,11 +31,11 @@ float flangeway(const GroundPixel& pixel) {
 
 }  // namespace
 
-RayCaster::RayCaster(const Eye& eye, const LocalTrack& main, const std::vector<LocalTrack>& branches,
-                     const GroundShader& shader)
-    : main_(main),
-      branches_(branches),
-      shader_(shader),
+RayCaster::RayCaster(const Eye& eye, const Ground& ground)
+    : main_(ground.main),
+      branches_(ground.branches),
+      shader_(ground.shader),
+      light_(ground.light),
       track_from_camera_(geometry::rotation_camera_from_track(eye.shot.pose).transpose().cast<float>()),
       step_u_(track_from_camera_.col(0) / static_cast<float>(eye.camera.fu_px)),
       step_v_(track_from_camera_.col(1) / static_cast<float>(eye.camera.fv_px)),
@@ -49,7 +43,7 @@ RayCaster::RayCaster(const Eye& eye, const LocalTrack& main, const std::vector<L
       lateral_m_(static_cast<float>(eye.shot.pose.lateral_m)),
       blur_m_(static_cast<float>(std::abs(eye.shot.speed_mps) * eye.shot.exposure_s)),
       heading_rad_(static_cast<float>(eye.heading_rad)),
-      steepest_(main.steepest(height_m_)) {}
+      steepest_(ground.main.steepest(height_m_)) {}
 
 void RayCaster::row(const float* normal_x, const float* normal_y, int count, float* out) const {
   Sample first = sample(normal_x[0], normal_y[0]);
@@ -61,6 +55,7 @@ void RayCaster::row(const float* normal_x, const float* normal_y, int count, flo
     if (alike(first, last)) {
       mixed.ground = first.ground;
       mixed.track = first.track;
+      mixed.light = first.light;
       mixed.other_count = first.other_count;
       const float step = 1.0F / static_cast<float>(std::max(1, end - begin));
       for (int u = begin; u < stop; ++u) {
@@ -79,12 +74,20 @@ RayCaster::Sample RayCaster::sample(float normal_x, float normal_y) const {
   here.ray = track_from_camera_.col(0) * normal_x + track_from_camera_.col(1) * normal_y + track_from_camera_.col(2);
   here.ground = meet(here.ray, here.hit);
   here.track = here.ground && main_.covers(here.hit.x) && here.ray.z() <= kHorizonRise;
+  const auto& open = light_.open();
+  here.light = {static_cast<float>(open.sky), static_cast<float>(open.sun)};
   if (!here.track) return here;
   here.own = pixel_on(main_, here.ray, here.hit);
   for (size_t i = 0; i < branches_.size() && here.other_count < kMostBranches; ++i) {
     if (!branches_[i].covers(here.hit.x)) continue;
     here.branch[here.other_count] = i;
     here.others[here.other_count++] = pixel_on(branches_[i], here.ray, here.hit);
+  }
+  if (!light_.uniform()) {
+    const float beside = std::abs(here.own.at.d_m);
+    // Beside a tunnel lies its hill, which nobody sees from inside.
+    const float s = beside < kTunnelGroundHalfWidthM ? here.own.at.s_m : kNowhereM;
+    here.light = light_.on_ground(s, here.hit.x, here.hit.y);
   }
   return here;
 }
@@ -111,6 +114,7 @@ void RayCaster::between(const Sample& a, const Sample& b, float w, Sample& out) 
   if (!a.ground) return;
   out.hit.x = mix(a.hit.x, b.hit.x);
   if (!a.track) return;
+  out.light = {mix(a.light.diffuse, b.light.diffuse), mix(a.light.direct, b.light.direct)};
   mix_pixels(a.own, b.own, out.own);
   for (size_t i = 0; i < a.other_count; ++i) mix_pixels(a.others[i], b.others[i], out.others[i]);
 }
@@ -165,13 +169,15 @@ bool RayCaster::march(const Eigen::Vector3f& ray, Hit& hit) const {
 
 float RayCaster::sky(const Eigen::Vector3f& ray) const {
   const float rise = ray.z() / ray.x();
-  const float dome = 0.98F - 0.35F * std::min(rise, 0.6F);
+  const auto& open = light_.open();
+  const float dome = static_cast<float>(open.dome) * (0.98F - 0.35F * std::min(rise, 0.6F));
   if (rise > kHighestHill) return dome;
   const float azimuth = std::atan2(ray.y(), ray.x()) - heading_rad_;
   const float hills = 0.035F + 0.018F * std::sin(azimuth * 7.0F) + 0.009F * std::sin(azimuth * 17.0F + 1.0F) +
                       0.004F * std::sin(azimuth * 53.0F);
   const float w = std::clamp((rise - hills) * 600.0F, 0.0F, 1.0F);
-  return kHills + w * (dome - kHills);
+  const float hill = kHills * static_cast<float>(open.sky + open.sun);
+  return hill + w * (dome - hill);
 }
 
 GroundPixel RayCaster::pixel_on(const LocalTrack& track, const Eigen::Vector3f& ray, const Hit& hit) const {
@@ -206,7 +212,8 @@ GroundPixel RayCaster::pixel_on(const LocalTrack& track, const Eigen::Vector3f& 
 
 float RayCaster::albedo(const Sample& here) const {
   if (!here.ground) return sky(here.ray);
-  if (!here.track) return hazy(kFarGround, here.hit.x);
+  const float light = here.light.diffuse + here.light.direct;
+  if (!here.track) return light * light_.hazy(kFarGround, here.hit.x);
   float albedo = 0.0F;
   if (here.other_count == 0) {
     albedo = GroundShader::foot_and_web(here.own, shader_.ground(here.own, kHalfSleeperM));
@@ -215,8 +222,7 @@ float RayCaster::albedo(const Sample& here) const {
   } else {
     albedo = junction(here);
   }
-  if (std::abs(here.own.at.d_m) < kTunnelHalfWidthM) albedo *= shader_.light(here.own.at.s_m);
-  return hazy(albedo, here.hit.x);
+  return light * light_.hazy(albedo, here.hit.x);
 }
 
 // Several tracks: the ground of the nearest, the rails of all. Wheels need their groove where rails come together:

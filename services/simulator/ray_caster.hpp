@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "simulator/ground_shader.hpp"
+#include "simulator/illumination.hpp"
 #include "simulator/local_track.hpp"
 
 namespace railfix::simulator {
@@ -16,10 +17,15 @@ class RayCaster {
     const Shot& shot;
     double heading_rad;  // of the track at the foot, for the hills on the horizon
   };
-  RayCaster(const Eye& eye, const LocalTrack& main, const std::vector<LocalTrack>& branches,
-            const GroundShader& shader);
+  struct Ground {
+    const LocalTrack& main;
+    const std::vector<LocalTrack>& branches;
+    const GroundShader& shader;
+    const Illumination& light;
+  };
+  RayCaster(const Eye& eye, const Ground& ground);
 
-  /// One row of the picture, albedo times light. normal_x, normal_y: the pixels' undistorted x/z and y/z.
+  /// A row of the picture or a part of it, albedo times light. normal_x, normal_y: the pixels' undistorted x/z and y/z.
   void row(const float* normal_x, const float* normal_y, int count, float* out) const;
 
  private:
@@ -34,6 +40,7 @@ class RayCaster {
     bool ground = false;  // else sky
     bool track = false;   // near enough for `own` and `others`
     GroundPixel own;
+    Illumination::Level light{};
     size_t other_count = 0;
     GroundPixel others[kMostBranches];
     size_t branch[kMostBranches];  // whose pixel that is
@@ -51,6 +58,7 @@ class RayCaster {
   const LocalTrack& main_;
   const std::vector<LocalTrack>& branches_;
   const GroundShader& shader_;
+  const Illumination& light_;
   Eigen::Matrix3f track_from_camera_;
   Eigen::Vector3f step_u_;  // change of the ray per pixel
   Eigen::Vector3f step_v_;

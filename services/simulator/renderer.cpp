@@ -5,6 +5,7 @@
 
 #include "core/random.hpp"
 #include "simulator/ground_shader.hpp"
+#include "simulator/illumination.hpp"
 #include "simulator/ray_caster.hpp"
 #include "simulator/scenery.hpp"
 
@@ -13,6 +14,10 @@ namespace {
 
 constexpr size_t kNoiseCount = 1U << 16U;
 constexpr float kWhite = 235.0F;  // grey level of albedo 1 at gain 1
+
+constexpr int kUndrawnGrey = 90;
+constexpr double kStripBeginM = 0.5;
+constexpr double kStripStepM = 0.5;
 
 struct Film {
   float scale;          // grey levels of radiance 1
@@ -25,6 +30,20 @@ void expose_row(const float* in, const float* vignette, const float* noise, cons
     const float clean = std::min(in[u] * vignette[u] * film.scale, 255.0F);
     const float noisy = clean + std::sqrt(film.read_variance + film.shot_variance * clean) * noise[u];
     out[u] = static_cast<uint8_t>(std::clamp(noisy + 0.5F, 0.0F, 255.0F));
+  }
+}
+
+// Widens the spans of the rows between two pixels so that both of them and the line between them lie inside.
+void widen(const Eigen::Vector2d& a, const Eigen::Vector2d& b, int width, std::vector<Renderer::Columns>& spans) {
+  const double rows = static_cast<double>(spans.size());
+  const int first = static_cast<int>(std::clamp(std::floor(std::min(a.y(), b.y())), 0.0, rows));
+  const int last = static_cast<int>(std::clamp(std::ceil(std::max(a.y(), b.y())), -1.0, rows - 1.0));
+  for (int v = first; v <= last; ++v) {
+    const double w = std::abs(b.y() - a.y()) < 1e-6 ? 0.0 : std::clamp((v - a.y()) / (b.y() - a.y()), 0.0, 1.0);
+    const double u = std::clamp(a.x() + w * (b.x() - a.x()), -1.0, static_cast<double>(width));
+    auto& span = spans[static_cast<size_t>(v)];
+    span.begin = std::clamp(static_cast<int>(u) - 1, 0, span.begin);
+    span.end = std::clamp(static_cast<int>(u) + 2, span.end, width);
   }
 }
 
@@ -66,25 +85,56 @@ cv::Mat Renderer::render(const Shot& shot) const {
     if (!seen.empty()) branches.push_back(std::move(seen));
   }
   const GroundShader shader(*line_, options_, {ballast_, concrete_, verge_}, shot.distance_m);
-  const RayCaster caster({options_.camera, shot, foot.pose.heading_rad}, main, branches, shader);
-  cv::Mat radiance(options_.camera.height_px, options_.camera.width_px, CV_32FC1);
+  const Illumination light(*line_, shot.look.light, shot.distance_m);
+  const RayCaster caster({options_.camera, shot, foot.pose.heading_rad}, {main, branches, shader, light});
+  const auto spans = drawn_spans(main, shot);
+  // Kept from picture to picture: the system takes longer to give memory than we to fill it.
+  thread_local cv::Mat radiance;
+  radiance.create(options_.camera.height_px, options_.camera.width_px, CV_32FC1);
   for (int v = 0; v < radiance.rows; ++v) {
-    const size_t first = static_cast<size_t>(v) * static_cast<size_t>(radiance.cols);
-    caster.row(&normal_x_[first], &normal_y_[first], radiance.cols, radiance.ptr<float>(v));
+    const auto span = spans[static_cast<size_t>(v)];
+    const size_t first = static_cast<size_t>(v) * static_cast<size_t>(radiance.cols) + static_cast<size_t>(span.begin);
+    if (span.end > span.begin)
+      caster.row(&normal_x_[first], &normal_y_[first], span.end - span.begin, radiance.ptr<float>(v) + span.begin);
   }
-  if (options_.scenery) draw_scenery(*line_, main, shader, options_.camera, shot, radiance);
-  return expose(radiance, shot);
+  if (options_.scenery && options_.strip.ahead_m <= 0.0)
+    draw_scenery(*line_, main, light, options_.camera, shot, radiance);
+  return expose(radiance, spans, shot);
 }
 
-cv::Mat Renderer::expose(const cv::Mat& radiance, const Shot& shot) const {
-  cv::Mat picture(radiance.size(), CV_8UC1);
+std::vector<Renderer::Columns> Renderer::drawn_spans(const LocalTrack& main, const Shot& shot) const {
+  const auto& strip = options_.strip;
+  const int width = options_.camera.width_px;
+  std::vector<Columns> spans(static_cast<size_t>(options_.camera.height_px), {0, width});
+  if (strip.ahead_m <= 0.0 || main.empty()) return spans;
+  for (auto& span : spans) span = {width, 0};
+  const geometry::View view(options_.camera, shot.pose);
+  for (const double side : {-1.0, 1.0}) {
+    std::optional<Eigen::Vector2d> before;
+    for (double x = kStripBeginM; x <= strip.ahead_m; x += kStripStepM) {
+      const auto at = static_cast<float>(x);
+      const auto place = main.locate(at, 0.0F);
+      const double y = side * strip.beside_m / static_cast<double>(place.cos_heading) - static_cast<double>(place.d_m);
+      const auto pixel = view.project({x, y, static_cast<double>(main.centre_z(at))});
+      if (before && pixel) widen(*before, *pixel, width, spans);
+      before = pixel;
+    }
+  }
+  return spans;
+}
+
+cv::Mat Renderer::expose(const cv::Mat& radiance, const std::vector<Columns>& spans, const Shot& shot) const {
+  cv::Mat picture(radiance.size(), CV_8UC1, cv::Scalar(kUndrawnGrey));
   const Film film{kWhite * static_cast<float>(shot.gain),
                   static_cast<float>(options_.read_noise_grey * options_.read_noise_grey),
                   static_cast<float>(options_.shot_noise_grey)};
   for (int v = 0; v < radiance.rows; ++v) {
-    const size_t first = static_cast<size_t>(v) * static_cast<size_t>(radiance.cols);
+    const auto span = spans[static_cast<size_t>(v)];
+    const size_t first = static_cast<size_t>(v) * static_cast<size_t>(radiance.cols) + static_cast<size_t>(span.begin);
     const float* noise = &noise_[mix_bits(shot.noise_seed, v, 5) % kNoiseCount];
-    expose_row(radiance.ptr<float>(v), &vignette_[first], noise, film, radiance.cols, picture.ptr<uint8_t>(v));
+    if (span.end > span.begin)
+      expose_row(radiance.ptr<float>(v) + span.begin, &vignette_[first], noise, film, span.end - span.begin,
+                 picture.ptr<uint8_t>(v) + span.begin);
   }
   return picture;
 }

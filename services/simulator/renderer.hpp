@@ -9,6 +9,7 @@
 #include "geometry/camera.hpp"
 #include "simulator/line.hpp"
 #include "simulator/local_track.hpp"
+#include "simulator/look.hpp"
 #include "simulator/texture.hpp"
 
 namespace railfix::simulator {
@@ -18,6 +19,12 @@ constexpr float kHeadWidthM = 0.072F;   // 60E1
 constexpr float kRailFootDepthM = 0.150F;
 constexpr double kSleeperPitchM = 0.60;
 
+/// The part of the picture that is drawn: own track so far ahead and so far to both sides; the rest is grey.
+struct Strip {
+  double ahead_m = 0;  // 0 = everything
+  double beside_m = 1.2;
+};
+
 struct RenderOptions {
   geometry::Intrinsics camera;
   double texture_depth_m = 0.18;  // sleeper tops below the rail heads
@@ -26,6 +33,7 @@ struct RenderOptions {
   double shot_noise_grey = 0.18;  // variance per grey level
   double vignetting = 0.18;       // loss of light in the corners
   bool scenery = true;            // masts, platforms, tunnels, bridges
+  Strip strip;
   uint64_t seed = 1;
 };
 
@@ -37,6 +45,7 @@ struct Shot {
   double exposure_s = 0.002;
   double gain = 1.0;  // brightness factor (auto-exposure and its wander)
   uint64_t noise_seed = 0;
+  Look look;
 };
 
 /// Read-only after it is made: render() may be called from many threads.
@@ -47,8 +56,13 @@ class Renderer {
   [[nodiscard]] cv::Mat render(const Shot& shot) const;
   [[nodiscard]] const RenderOptions& options() const { return options_; }
 
+  struct Columns {
+    int begin, end;
+  };
+
  private:
-  [[nodiscard]] cv::Mat expose(const cv::Mat& radiance, const Shot& shot) const;
+  [[nodiscard]] std::vector<Columns> drawn_spans(const LocalTrack& main, const Shot& shot) const;  // of each row
+  [[nodiscard]] cv::Mat expose(const cv::Mat& radiance, const std::vector<Columns>& spans, const Shot& shot) const;
   std::shared_ptr<const Line> line_;
   RenderOptions options_;
   Tile ballast_;

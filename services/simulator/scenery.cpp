@@ -74,8 +74,8 @@ void paint(const std::vector<Eigen::Vector2d>& polygon, float grey, cv::Mat& rad
 
 class Stage {
  public:
-  Stage(const Line& line, const GroundShader& shader, double foot_m)
-      : line_(line), shader_(shader), foot_m_(foot_m), foot_(line.path().at(foot_m)) {}
+  Stage(const Line& line, const Illumination& light, double foot_m)
+      : line_(line), light_(light), foot_m_(foot_m), foot_(line.path().at(foot_m)) {}
 
   // Point beside the path, `up_m` over its rails, in the foot's track axes.
   [[nodiscard]] Corner at(double distance_m, double lateral_m, double up_m) const {
@@ -98,9 +98,12 @@ class Stage {
   [[nodiscard]] bool seen(double distance_m) const {
     return distance_m - foot_m_ > 0.0 && distance_m - foot_m_ < kFarX;
   }
-  [[nodiscard]] float light(double distance_m) const { return shader_.light(static_cast<float>(distance_m - foot_m_)); }
-  void add(std::vector<Corner> corners, float grey, double distance_m) {
-    faces_.push_back({std::move(corners), grey, distance_m});
+  void add(std::vector<Corner> corners, float albedo, double distance_m) {
+    Corner middle = Corner::Zero();
+    for (const auto& corner : corners) middle += corner / static_cast<double>(corners.size());
+    const auto x = static_cast<float>(middle.x());
+    const float light = light_.on_object(static_cast<float>(distance_m - foot_m_), x, static_cast<float>(middle.y()));
+    faces_.push_back({std::move(corners), light * light_.hazy(albedo, x), distance_m});
   }
 
   // Steps through a span from far to near, as the picture needs.
@@ -125,7 +128,7 @@ class Stage {
 
  private:
   const Line& line_;
-  const GroundShader& shader_;
+  const Illumination& light_;
   double foot_m_;
   track::TrackPoint foot_;
   std::vector<Face> faces_;
@@ -136,13 +139,11 @@ void add_masts(const Line& line, Stage& stage) {
     if (!stage.seen(mast.distance_m)) continue;
     const double s = mast.distance_m;
     const double d = mast.lateral_m;
-    const float light = stage.light(s);
     stage.add({stage.at(s, d - 0.13, -0.3), stage.at(s, d + 0.13, -0.3), stage.at(s, d + 0.13, 7.5),
                stage.at(s, d - 0.13, 7.5)},
-              0.33F * light, s);
+              0.33F, s);
     const double arm = d > 0.0 ? -0.3 : 0.3;
-    stage.add({stage.at(s, d, 6.3), stage.at(s, d, 6.4), stage.at(s, arm, 5.9), stage.at(s, arm, 5.8)}, 0.25F * light,
-              s);
+    stage.add({stage.at(s, d, 6.3), stage.at(s, d, 6.4), stage.at(s, arm, 5.9), stage.at(s, arm, 5.8)}, 0.25F, s);
   }
 }
 
@@ -188,17 +189,15 @@ void add_tunnels(const Line& line, Stage& stage) {
     const double ahead = tunnel.begin_m - stage.foot_m();
     if (ahead > kFarX || tunnel.end_m < stage.foot_m()) continue;
     stage.along(tunnel, 2.5, [&](double a, double b) {
-      const float light = stage.light(0.5 * (a + b));
       const float shade = 0.85F + 0.3F * unit_float(mix_bits(91, std::llround(a / 2.5)));
       const double w = kTunnelHalfWidthM;
       const double h = kTunnelHeightM;
       for (const double side : {-1.0, 1.0}) {
         stage.add({stage.at(a, side * w, -0.3), stage.at(b, side * w, -0.3), stage.at(b, side * w, h),
                    stage.at(a, side * w, h)},
-                  0.42F * light * shade, a);
+                  0.42F * shade, a);
       }
-      stage.add({stage.at(a, -w, h), stage.at(b, -w, h), stage.at(b, w, h), stage.at(a, w, h)}, 0.30F * light * shade,
-                a);
+      stage.add({stage.at(a, -w, h), stage.at(b, -w, h), stage.at(b, w, h), stage.at(a, w, h)}, 0.30F * shade, a);
     });
     // Behind the far end of the sight nothing of the outside shows.
     if (tunnel.end_m > stage.foot_m() + kFarX) {
@@ -217,10 +216,10 @@ void add_bridges(const Line& line, Stage& stage) {
 
 }  // namespace
 
-void draw_scenery(const Line& line, const LocalTrack& main, const GroundShader& shader,
+void draw_scenery(const Line& line, const LocalTrack& main, const Illumination& light,
                   const geometry::Intrinsics& camera, const Shot& shot, cv::Mat& radiance) {
   if (main.empty()) return;
-  Stage stage(line, shader, shot.distance_m);
+  Stage stage(line, light, shot.distance_m);
   add_masts(line, stage);
   add_platforms(line, stage);
   add_bridges(line, stage);

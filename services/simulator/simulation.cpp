@@ -65,7 +65,8 @@ class Studio {
             truth.speed_mps,
             options_.exposure_s,
             camera_gain(trajectory_, time_s, options_.gain_wander, options_.seed),
-            mix_bits(options_.seed, static_cast<int64_t>(k), 6)};
+            mix_bits(options_.seed, static_cast<int64_t>(k), 6),
+            {}};
   }
   void fail(const std::string& sentence) {
     const std::lock_guard lock(mutex_);

@@ -118,6 +118,15 @@ void add_camera_options(CLI::App& app, Settings& settings) {
       ->check(CLI::Range(1, 100))
       ->capture_default_str()
       ->group(group);
+  app.add_option("--only-ahead-m", simulation.render.strip.ahead_m,
+                 "draw the own track so far ahead and nothing else, for long runs (0 = whole pictures)")
+      ->check(CLI::Range(0.0, 200.0))
+      ->capture_default_str()
+      ->group(group);
+  app.add_option("--only-beside-m", simulation.render.strip.beside_m, "with --only-ahead-m: so far to each side")
+      ->check(CLI::Range(0.8, 20.0))
+      ->capture_default_str()
+      ->group(group);
   app.add_flag("--no-pictures", settings.no_pictures, "sensors and truth only")->group(group);
 }
 

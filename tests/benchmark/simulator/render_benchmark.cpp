@@ -27,11 +27,12 @@ Shot shot_at(double distance_m) {
   return shot;
 }
 
-void draw(benchmark::State& state, const Place& place) {
+void draw(benchmark::State& state, const Place& place, const Strip& strip = {}) {
   const auto map = std::make_shared<const track::Map>(builtin_line());
   const auto line =
       core::value_or_throw(Line::make(map, core::value_or_throw(map->parse_position(place.start)), 400.0));
   RenderOptions options;
+  options.strip = strip;
   const int width = static_cast<int>(state.range(0));
   const int height = width * 4 / 5;
   options.camera = {0.9 * width, 0.9 * width, 0.5 * (width - 1), 0.5 * (height - 1), 0, 0, 0, 0, width, height};
@@ -44,6 +45,7 @@ void draw(benchmark::State& state, const Place& place) {
 
 BENCHMARK_CAPTURE(draw, plain, kPlain)->Arg(1280)->Arg(640)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(draw, switches, kSwitches)->Arg(1280)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(draw, own_track_only, kPlain, Strip{30.0, 1.2})->Arg(1280)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(draw, tunnel, kTunnel)->Arg(1280)->Unit(benchmark::kMillisecond);
 
 }  // namespace

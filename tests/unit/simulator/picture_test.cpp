@@ -169,6 +169,32 @@ TEST(Picture, SameSeedSameBytes) {
   EXPECT_GT(cv::norm(a, c, cv::NORM_L1), 1e6);
 }
 
+TEST(Picture, StripIsTheWholePictureThereAndNothingBeside) {
+  const auto line = line_from("1:430");
+  auto options = small_camera();
+  const auto shot = standing_at(40.0);
+  const cv::Mat whole = Renderer(line, options).render(shot);
+  options.strip = {25.0, 1.2};
+  const cv::Mat strip = Renderer(line, options).render(shot);
+  const geometry::View view(options.camera, shot.pose);
+  int compared = 0;
+  for (double x = 5.0; x < 20.0; x += 0.5) {
+    for (const double y : {-1.0, 0.0, 1.0}) {
+      const auto pixel = view.project({x, y - 0.5 * x * x / 600.0, 0.0});
+      if (!pixel || pixel->y() > 510) continue;
+      const int u = static_cast<int>(pixel->x());
+      const int v = static_cast<int>(pixel->y());
+      // Means of a few pixels, because each picture has its own noise.
+      const cv::Rect patch(u - 4, v, 9, 1);
+      EXPECT_NEAR(cv::mean(whole(patch))[0], cv::mean(strip(patch))[0], 6.0) << x << " " << y;
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 60);
+  EXPECT_EQ(cv::norm(strip(cv::Rect(0, 0, 640, 100)), cv::NORM_INF), cv::norm(strip.row(0), cv::NORM_INF));
+  EXPECT_LT(cv::countNonZero(strip != strip.at<uint8_t>(0, 0)), strip.total() * 2 / 5);
+}
+
 TEST(Picture, BaliseIsWhereTheLandmarkSays) {
   const auto line = line_from("1:180");  // balises at 20 and 23 m
   ASSERT_GE(line->balises().size(), 2U);
