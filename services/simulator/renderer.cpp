@@ -115,7 +115,7 @@ std::vector<Renderer::Columns> Renderer::drawn_spans(const LocalTrack& main, con
       const auto at = static_cast<float>(x);
       const auto place = main.locate(at, 0.0F);
       const double y = side * strip.beside_m / static_cast<double>(place.cos_heading) - static_cast<double>(place.d_m);
-      const auto pixel = view.project({x, y, static_cast<double>(main.centre_z(at))});
+      const auto pixel = view.project({x, y, static_cast<double>(main.height(at, static_cast<float>(y)).z_m)});
       if (before && pixel) widen(*before, *pixel, width, spans);
       before = pixel;
     }

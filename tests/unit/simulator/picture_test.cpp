@@ -170,9 +170,9 @@ TEST(Picture, SameSeedSameBytes) {
 }
 
 TEST(Picture, StripIsTheWholePictureThereAndNothingBeside) {
-  const auto line = line_from("1:430");
+  const auto line = line_from("1:100");
   auto options = small_camera();
-  const auto shot = standing_at(40.0);
+  const auto shot = standing_at(20.0);
   const cv::Mat whole = Renderer(line, options).render(shot);
   options.strip = {25.0, 1.2};
   const cv::Mat strip = Renderer(line, options).render(shot);
@@ -180,7 +180,7 @@ TEST(Picture, StripIsTheWholePictureThereAndNothingBeside) {
   int compared = 0;
   for (double x = 5.0; x < 20.0; x += 0.5) {
     for (const double y : {-1.0, 0.0, 1.0}) {
-      const auto pixel = view.project({x, y - 0.5 * x * x / 600.0, 0.0});
+      const auto pixel = view.project({x, y, 0.0});
       if (!pixel || pixel->y() > 510) continue;
       const int u = static_cast<int>(pixel->x());
       const int v = static_cast<int>(pixel->y());
