@@ -78,7 +78,9 @@ class Parser {
     if (wanted.starts_with("::")) return map.find(wanted.substr(2));
     std::string scope = scope_;
     while (true) {
-      const auto found = map.find(scope.empty() ? wanted : scope + "::" + wanted);
+      std::string qualified = scope;
+      if (!qualified.empty()) qualified.append("::");
+      const auto found = map.find(qualified.append(wanted));
       if (found != map.end() || scope.empty()) return found;
       const size_t cut = scope.rfind("::");
       scope = cut == std::string::npos ? "" : scope.substr(0, cut);
