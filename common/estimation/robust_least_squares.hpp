@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <cmath>
+#include <limits>
 
 namespace railfix::estimation {
 
@@ -48,6 +49,7 @@ struct LeastSquaresResult {
   Eigen::Matrix<double, N, 1> x;
   NormalEquations<N> equations;  // at x; information.inverse() is the covariance
   int iterations = 0;
+  double last_step = std::numeric_limits<double>::infinity();  // in sigmas of the solution
   bool converged = false;
 };
 
@@ -66,6 +68,7 @@ LeastSquaresResult<N> least_squares(Build&& build, const Eigen::Matrix<double, N
     const Eigen::Matrix<double, N, 1> step = -damped.ldlt().solve(result.equations.gradient);
     if (!step.allFinite()) return result;
     const double length = std::sqrt(std::abs(step.dot(result.equations.information * step)));
+    result.last_step = length;
     NormalEquations<N> trial;
     const Eigen::Matrix<double, N, 1> moved = result.x + step;
     const bool exists = build(moved, trial);

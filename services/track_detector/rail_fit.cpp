@@ -254,6 +254,7 @@ RailFit fit_rails(const geometry::Intrinsics& camera, const std::vector<EdgePoin
   RailFit fit;
   fit.shape = to_shape(solution.x);
   fit.converged = solution.converged;
+  fit.last_step = solution.last_step;
   const Eigen::Matrix<double, kShapeSize, kShapeSize> covariance = solution.equations.information.inverse();
   fit.covariance = covariance.topLeftCorner<7, 7>();
   Equations data;

@@ -68,6 +68,7 @@ struct RailFit {
   double inliers = 0;      // fraction of points with weight above one half
   std::vector<double> residuals_px;  // per point, along the normal
   bool converged = false;
+  double last_step = 0;  // in sigmas of the solution; robust weights may let it creep on below any tolerance
 };
 
 /// Fits from `start`. Points on one rail alone are allowed: the priors carry the rest and the covariance says so.

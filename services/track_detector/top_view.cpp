@@ -14,11 +14,6 @@ constexpr double kSideM = 0.06;
 constexpr float kNoiseGrey = 4.0F;
 constexpr double kClearestShare = 0.96;
 
-/// Mean of columns [first, last) from prefix sums.
-float mean(const std::vector<float>& sums, int first, int last) {
-  return (sums[static_cast<size_t>(last)] - sums[static_cast<size_t>(first)]) / static_cast<float>(last - first);
-}
-
 /// How much a band around each column is brighter than both its sides (grey levels, at least 0).
 void band_contrast(const float* grey, int columns, double column_m, float sign, std::vector<float>& sums,
                    float* contrast) {
@@ -30,10 +25,13 @@ void band_contrast(const float* grey, int columns, double column_m, float sign, 
   const int side = std::max(1, static_cast<int>(std::lround(kSideM / column_m)));
   const int reach = half + gap + side;
   std::fill(contrast, contrast + columns, 0.0F);
-  for (int c = reach; c + reach + 1 < columns; ++c) {
-    const float head = mean(sums, c - half, c + half + 1);
-    const float right = mean(sums, c - reach, c - half - gap);
-    const float left = mean(sums, c + half + gap + 1, c + reach + 1);
+  const float per_head = 1.0F / static_cast<float>(2 * half + 1);
+  const float per_side = 1.0F / static_cast<float>(side);
+  const float* sum = sums.data();
+  for (int c = reach; c < columns - reach - 1; ++c) {
+    const float head = (sum[c + half + 1] - sum[c - half]) * per_head;
+    const float right = (sum[c - half - gap] - sum[c - reach]) * per_side;
+    const float left = (sum[c + reach + 1] - sum[c + half + gap + 1]) * per_side;
     contrast[c] = std::max(0.0F, std::min(sign * (head - right), sign * (head - left)));
   }
 }
@@ -62,43 +60,46 @@ TopView::TopView(const geometry::Intrinsics& camera, const geometry::CameraPose&
   const double near_m = nearest_visible_m(camera, pose, 0.5, size.far_m * 0.7);
   const double ratio = std::pow(size.far_m / near_m, 1.0 / (size.rows - 1));
   const geometry::View view(camera, pose);
-  map_.create(size.rows * kSubRows, columns_, CV_32FC2);
-  for (int r = 0; r < map_.rows; ++r) {
+  cv::Mat map(size.rows * kSubRows, columns_, CV_32FC2);
+  for (int r = 0; r < map.rows; ++r) {
     const double ahead_m = near_m * std::pow(ratio, (r - 0.5 * (kSubRows - 1)) / kSubRows);
     if (r % kSubRows == 0) ahead_m_.push_back(near_m * std::pow(ratio, r / kSubRows));
     for (int c = 0; c < columns_; ++c) {
       const auto pixel = view.project({ahead_m, first_y_m_ + c * size.column_m, 0.0});
       // Outside the picture: far away, remap answers with the border value.
-      map_.at<cv::Vec2f>(r, c) =
+      map.at<cv::Vec2f>(r, c) =
           pixel ? cv::Vec2f(static_cast<float>(pixel->x()), static_cast<float>(pixel->y())) : cv::Vec2f(-1e4F, -1e4F);
+    }
+  }
+  cv::convertMaps(map, cv::noArray(), map_, map_fraction_, CV_16SC2);
+}
+
+void TopView::look(const cv::Mat& grey) {
+  cv::remap(grey, samples_, map_, map_fraction_, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
+  means_.create(size_.rows, columns_, CV_32F);
+  for (int r = 0; r < size_.rows; ++r) {
+    auto* mean = means_.ptr<float>(r);
+    std::fill(mean, mean + columns_, 0.0F);
+    for (int s = 0; s < kSubRows; ++s) {
+      const auto* sample = samples_.ptr<uint8_t>(r * kSubRows + s);
+      for (int c = 0; c < columns_; ++c) mean[c] += static_cast<float>(sample[c]) * (1.0F / kSubRows);
     }
   }
 }
 
-cv::Mat TopView::ridges(const cv::Mat& grey, bool dark) const {
-  cv::Mat samples;
-  cv::remap(grey, samples, map_, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
-  cv::Mat scores(size_.rows, columns_, CV_32F);
-  std::vector<float> row(static_cast<size_t>(columns_));
-  std::vector<float> sums;
-  std::vector<float> sorted;
+const cv::Mat& TopView::ridges(bool dark) {
+  scores_.create(size_.rows, columns_, CV_32F);
   for (int r = 0; r < size_.rows; ++r) {
-    std::fill(row.begin(), row.end(), 0.0F);
-    for (int s = 0; s < kSubRows; ++s) {
-      const auto* sample = samples.ptr<uint8_t>(r * kSubRows + s);
-      for (int c = 0; c < columns_; ++c) row[static_cast<size_t>(c)] += sample[c];
-    }
-    for (auto& value : row) value /= kSubRows;
-    auto* score = scores.ptr<float>(r);
-    band_contrast(row.data(), columns_, size_.column_m, dark ? -1.0F : 1.0F, sums, score);
-    sorted.assign(score, score + columns_);
+    auto* score = scores_.ptr<float>(r);
+    band_contrast(means_.ptr<float>(r), columns_, size_.column_m, dark ? -1.0F : 1.0F, sums_, score);
+    sorted_.assign(score, score + columns_);
     const auto clearest =
-        sorted.begin() + static_cast<std::ptrdiff_t>(kClearestShare * static_cast<double>(columns_ - 1));
-    std::nth_element(sorted.begin(), clearest, sorted.end());
+        sorted_.begin() + static_cast<std::ptrdiff_t>(kClearestShare * static_cast<double>(columns_ - 1));
+    std::nth_element(sorted_.begin(), clearest, sorted_.end());
     const float scale = 1.0F / (*clearest + kNoiseGrey);
     for (int c = 0; c < columns_; ++c) score[c] = std::min(1.0F, score[c] * scale);
   }
-  return scores;
+  return scores_;
 }
 
 }  // namespace railfix::track_detector

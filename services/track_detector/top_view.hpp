@@ -21,9 +21,12 @@ class TopView {
  public:
   TopView(const geometry::Intrinsics& camera, const geometry::CameraPose& pose, const TopViewSize& size);
 
+  /// Takes a picture in; ridges() then scores it.
+  void look(const cv::Mat& grey);
   /// Ridge score 0..1 (CV_32F, rows x columns): 1 where a band as wide as a rail head stands out on both sides as
   /// clearly as the clearest ones of its row. `dark`: look for bands darker than both sides (rusty rails in snow).
-  [[nodiscard]] cv::Mat ridges(const cv::Mat& grey, bool dark) const;
+  /// Valid until the next call.
+  const cv::Mat& ridges(bool dark);
 
   [[nodiscard]] int rows() const { return size_.rows; }
   [[nodiscard]] int columns() const { return columns_; }
@@ -39,7 +42,13 @@ class TopView {
   int columns_ = 0;
   double first_y_m_ = 0;
   std::vector<double> ahead_m_;
-  cv::Mat map_;  // CV_32FC2: kSubRows rows of the picture for every row of the view
+  cv::Mat map_;           // kSubRows rows of the picture for every row of the view, as whole pixels ...
+  cv::Mat map_fraction_;  // ... and what is left of them
+  cv::Mat samples_;
+  cv::Mat means_;   // CV_32F, rows x columns
+  cv::Mat scores_;  // CV_32F, rows x columns
+  std::vector<float> sums_;
+  std::vector<float> sorted_;
 };
 
 /// Smallest X at which the track centre +-side_m is in the picture; nothing visible: far_m.

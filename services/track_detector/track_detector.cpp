@@ -10,9 +10,12 @@ constexpr double kSigmas = 3.0;       // limits of the search, in sigmas of the 
 constexpr double kSearchFarM = 28.0;  // farther, pitch errors move the rails too much for a coarse search
 constexpr double kMinSearchScore = 0.12;
 constexpr size_t kCandidates = 4;
-constexpr int kPatience = 3;        // pictures without rails before the search saves time
-constexpr double kSupportPx = 1.5;  // a point within this of the fit ...
-constexpr double kSupportM = 0.02;  // ... or this supports the rail
+constexpr int kPatience = 3;            // pictures without rails before the search saves time
+constexpr double kSupportPx = 1.5;      // a point within this of the fit ...
+constexpr double kSupportM = 0.02;      // ... or this supports the rail
+constexpr double kFitTolerance = 0.05;  // sigmas
+constexpr int kFitIterations = 15;
+constexpr double kSettled = 0.5;  // sigmas; points that leave one by one keep a fit creeping
 constexpr double kGoodResidualPx = 2.0;
 constexpr double kSure = 0.8;           // confidence that ends the search
 constexpr double kTrackReachM = 0.08;   // how far rails are looked for from the previous picture's ...
@@ -37,6 +40,7 @@ TrackDetector::TrackDetector(const geometry::Intrinsics& camera, const geometry:
       std::min(5.0, options.gauge_m / 2 + 0.3 + search_limits_.lateral_m + search_limits_.yaw_rad * size.far_m +
                         search_limits_.curvature_per_m * size.far_m * size.far_m / 2);
   top_view_ = std::make_unique<TopView>(camera, mount, size);
+  search_ = std::make_unique<RailSearch>(*top_view_, search_limits_, options.gauge_m, options.head_m);
 }
 
 TrackObservation TrackDetector::detect(const cv::Mat& grey) {
@@ -52,6 +56,7 @@ TrackObservation TrackDetector::detect(const cv::Mat& grey) {
   const bool both = misses_ < kPatience;
   TrackObservation observation;
   forget(observation);
+  top_view_->look(grey);
   for (const bool dark : {false, true}) {
     if (!both && dark != (misses_ % 2 == 1)) continue;
     auto found = search(grey, dark);
@@ -67,13 +72,11 @@ TrackObservation TrackDetector::detect(const cv::Mat& grey) {
   return observation;
 }
 
-TrackObservation TrackDetector::search(const cv::Mat& grey, bool dark) const {
+TrackObservation TrackDetector::search(const cv::Mat& grey, bool dark) {
   TrackObservation best;
   best.reason = "no pair of rails at the gauge";
   forget(best);
-  const cv::Mat ridges = top_view_->ridges(grey, dark);
-  for (const auto& candidate :
-       search_rails(*top_view_, ridges, search_limits_, options_.gauge_m, options_.head_m, kCandidates)) {
+  for (const auto& candidate : search_->find(top_view_->ridges(dark), kCandidates)) {
     if (candidate.score < kMinSearchScore) continue;
     auto observation = refine(grey, candidate.shape, dark, kSearchReachM);
     const bool better =
@@ -89,6 +92,8 @@ RailFit TrackDetector::fit(const std::vector<RailEdge>& edges, const TrackShape&
   fit_options.gauge_m = options_.gauge_m;
   fit_options.prior = mount_;
   fit_options.prior_sigma = options_.limits;
+  fit_options.step_tolerance = kFitTolerance;
+  fit_options.max_iterations = kFitIterations;
   std::vector<EdgePoint> points;
   points.reserve(edges.size());
   for (const auto& edge : edges) points.push_back(edge.point);
@@ -151,10 +156,10 @@ void TrackDetector::judge(const std::vector<RailEdge>& edges, const std::array<i
   observation.condition = fit.condition;
   observation.residual_px = fit.residual_px;
   observation.confidence = std::sqrt(share[0] * share[1]) / (1.0 + fit.residual_px / kGoodResidualPx);
-  if (!fit.converged) {
+  if (fit.last_step > kSettled) {
     observation.reason = "the fit does not settle";
-  } else if (!within_limits(fit.shape)) {
-    observation.reason = "the pose is outside the suspension limits";
+  } else if (const char* reason = outside_limits(fit.shape)) {
+    observation.reason = reason;
   } else {
     observation.seen_left = share[0] >= options_.min_supported;
     observation.seen_right = share[1] >= options_.min_supported;
@@ -181,13 +186,17 @@ void TrackDetector::forget(TrackObservation& observation) const {
   observation.points.clear();
 }
 
-bool TrackDetector::within_limits(const TrackShape& shape) const {
+const char* TrackDetector::outside_limits(const TrackShape& shape) const {
+  static constexpr const char* kReasons[] = {
+      "the roll is outside the suspension limits", "the pitch is outside the suspension limits",
+      "the yaw is outside the suspension limits", "the sideways position is outside the suspension limits",
+      "the height is outside the suspension limits"};
   const ShapeVector deviation = to_vector(shape) - to_vector(mount_);
   const ShapeVector sigma = to_vector(options_.limits);
   for (int k = 0; k < 5; ++k) {
-    if (std::abs(deviation(k)) > 4 * sigma(k)) return false;
+    if (std::abs(deviation(k)) > 4 * sigma(k)) return kReasons[k];
   }
-  return true;
+  return nullptr;
 }
 
 }  // namespace railfix::track_detector

@@ -59,7 +59,7 @@ class TrackDetector {
   [[nodiscard]] const DetectorOptions& options() const { return options_; }
 
  private:
-  [[nodiscard]] TrackObservation search(const cv::Mat& grey, bool dark) const;
+  [[nodiscard]] TrackObservation search(const cv::Mat& grey, bool dark);
   [[nodiscard]] TrackObservation refine(const cv::Mat& grey, const TrackShape& start, bool dark,
                                         double first_reach_m) const;
   [[nodiscard]] RailFit fit(const std::vector<RailEdge>& edges, const TrackShape& start) const;
@@ -67,7 +67,8 @@ class TrackDetector {
              TrackObservation& observation) const;
   void keep_one_rail(std::vector<RailEdge> edges, TrackObservation& observation) const;
   void forget(TrackObservation& observation) const;
-  [[nodiscard]] bool within_limits(const TrackShape& shape) const;
+  /// Why the pose cannot be; null when it can.
+  [[nodiscard]] const char* outside_limits(const TrackShape& shape) const;
 
   geometry::Intrinsics camera_;
   TrackShape mount_;
@@ -75,6 +76,7 @@ class TrackDetector {
   SearchLimits search_limits_;
   double near_m_ = 0;
   std::unique_ptr<TopView> top_view_;
+  std::unique_ptr<RailSearch> search_;
   std::optional<TrackShape> previous_;
   int misses_ = 0;     // pictures without rails in a row
   bool dark_ = false;  // the previous picture's rails are darker than the ground

@@ -4,7 +4,7 @@
 // The masks are thin lines along the middle of each rail head, of all tracks. Therefore the found inner edge is moved
 // outwards by half a head before it is compared: in every fifth row from the horizon + 60 px to the bottom,
 // horizontally, with the middle of the nearest mask run. Rows without a run within 40 px (overlaid text, end of the
-// mask) do not count. A frame is right when the median over the rows of both rails is within 6 px.
+// mask) do not count. A frame is right when the median over the rows of both rails is within 4 px.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -26,7 +26,7 @@ using railfix::geometry::Intrinsics;
 using railfix::geometry::View;
 
 constexpr double kFocalPerWidth = 0.72;
-constexpr double kRightPx = 6;
+constexpr double kRightPx = 4;
 constexpr double kSearchPx = 40;
 constexpr double kBelowHorizonPx = 60;
 
@@ -165,7 +165,7 @@ int main() {
       }
     }
   }
-  std::printf("%-22s %6s %6s %18s %17s %17s\n", "cabview", "frames", "seen", "within 6 px", "median", "worst frame");
+  std::printf("%-22s %6s %6s %18s %17s %17s\n", "cabview", "frames", "seen", "within 4 px", "median", "worst frame");
   alone.print("each picture alone");
   sequence.print("as a sequence");
   return 0;
