@@ -18,7 +18,8 @@ constexpr double kNearM = 40.0;      // edges so near to the path are drawn
 constexpr double kBesideM = 9.0;     // landmarks of other tracks so near are landmarks of the path
 constexpr double kOneTunnelM = 6.0;  // tracks so near share a tunnel
 constexpr double kTunnelHalfWidthM = 2.7;
-constexpr size_t kCoarse = 40;  // samples, 10 m
+constexpr double kAbutmentM = 4.5;  // from the outermost track
+constexpr size_t kCoarse = 40;      // samples, 10 m
 constexpr size_t kVeryCoarse = 80;
 
 CentreSample sample_of(const track::TrackPoint& point) {
@@ -207,6 +208,13 @@ void Line::collect_things() {
 void Line::collect_objects() {
   std::vector<bool> open_tunnels;
   std::vector<bool> open_platforms;
+  const auto nearest_track = [&](const Spot& spot) {
+    double nearest = 0.0;
+    for (const double lateral_m : tracks_at(spot.distance_m)) {
+      if (std::abs(lateral_m - spot.lateral_m) < std::abs(nearest - spot.lateral_m)) nearest = lateral_m;
+    }
+    return nearest;
+  };
   for (const auto& thing : things_) {
     const Spot spot{thing.distance_m, thing.lateral_m};
     switch (thing.kind) {
@@ -214,15 +222,27 @@ void Line::collect_objects() {
         balises_.push_back(spot);
         break;
       case track::LandmarkKind::mast:
-        masts_.push_back(spot);
+        masts_.push_back({spot.distance_m, spot.lateral_m, nearest_track(spot)});
         break;
       case track::LandmarkKind::bridge:
-        bridges_.push_back(spot);
+        bridges_.push_back({spot.distance_m, kAbutmentM, -kAbutmentM});
+        for (const double lateral_m : tracks_at(spot.distance_m)) {
+          auto& bridge = bridges_.back();
+          bridge.left_m = std::max(bridge.left_m, lateral_m + kAbutmentM);
+          bridge.right_m = std::min(bridge.right_m, lateral_m - kAbutmentM);
+        }
         break;
       case track::LandmarkKind::portal_in:
       case track::LandmarkKind::portal_out: {
         auto centred = thing;
         centred.lateral_m = 0.0;
+        const bool inside_one = std::find(open_tunnels.begin(), open_tunnels.end(), true) != open_tunnels.end();
+        if (thing.kind == track::LandmarkKind::portal_out && !inside_one) {
+          // The way out of a tunnel that the path began in.
+          tunnels_.push_back({path_.begin_m() - kSeenAheadM, thing.distance_m});
+          open_tunnels.push_back(false);
+          break;
+        }
         add_to_spans(tunnels_, open_tunnels, centred, path_.end_m() + kSeenAheadM - thing.distance_m);
         break;
       }
@@ -253,7 +273,7 @@ void Line::place_distractors() {
     for (const auto& platform : platforms_) {
       if (s > platform.begin_m - 5.0 && s < platform.end_m + 5.0 && platform.outward * d > 0.0) return false;
     }
-    return std::none_of(masts_.begin(), masts_.end(), [&](const Spot& mast) {
+    return std::none_of(masts_.begin(), masts_.end(), [&](const Mast& mast) {
       return std::abs(mast.distance_m - s) < 2.0 && mast.lateral_m * d > 0.0;
     });
   };

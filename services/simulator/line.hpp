@@ -43,6 +43,20 @@ struct Spot {
   double lateral_m = 0;
 };
 
+/// A mast holds the wire of the track at track_m.
+struct Mast {
+  double distance_m = 0;
+  double lateral_m = 0;
+  double track_m = 0;
+};
+/// A road over the tracks; its near face, as seen along the path, is at distance_m, its abutments at left_m and
+/// right_m.
+struct Bridge {
+  double distance_m = 0;
+  double left_m = 0;
+  double right_m = 0;
+};
+
 /// Something of the map beside the path, on the path's own scale.
 struct Thing {
   track::LandmarkKind kind = track::LandmarkKind::unknown;  // as met along the path
@@ -75,8 +89,8 @@ class Line {
   /// Landmarks on the path, and of the tracks beside it those that are as good as beside the path.
   [[nodiscard]] const std::vector<Thing>& things() const { return things_; }
   [[nodiscard]] const std::vector<Spot>& balises() const { return balises_; }
-  [[nodiscard]] const std::vector<Spot>& masts() const { return masts_; }
-  [[nodiscard]] const std::vector<Spot>& bridges() const { return bridges_; }
+  [[nodiscard]] const std::vector<Mast>& masts() const { return masts_; }
+  [[nodiscard]] const std::vector<Bridge>& bridges() const { return bridges_; }
   [[nodiscard]] const std::vector<Span>& tunnels() const { return tunnels_; }
   [[nodiscard]] const std::vector<Span>& platforms() const { return platforms_; }
   [[nodiscard]] const std::vector<Distractor>& distractors() const { return distractors_; }
@@ -99,8 +113,8 @@ class Line {
   std::vector<Thing> things_;
   std::vector<Distractor> distractors_;
   std::vector<Spot> balises_;
-  std::vector<Spot> masts_;
-  std::vector<Spot> bridges_;
+  std::vector<Mast> masts_;
+  std::vector<Bridge> bridges_;
   std::vector<Span> tunnels_;
   std::vector<Span> platforms_;
 };

@@ -97,8 +97,7 @@ cv::Mat Renderer::render(const Shot& shot) const {
     if (span.end > span.begin)
       caster.row(&normal_x_[first], &normal_y_[first], span.end - span.begin, radiance.ptr<float>(v) + span.begin);
   }
-  if (options_.scenery && options_.strip.ahead_m <= 0.0)
-    draw_scenery(*line_, main, light, options_.camera, shot, radiance);
+  if (options_.scenery && options_.strip.ahead_m <= 0.0) draw_scenery(*line_, main, light, options_, shot, radiance);
   return expose(radiance, spans, shot);
 }
 

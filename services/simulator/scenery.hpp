@@ -1,17 +1,17 @@
-// Upright things beside and over the track: masts, platforms, bridges, tunnels. Painted over the ground from far to
-// near.
+// Upright things beside and over the track, and their shadows. Painted over the ground from far to near.
 #pragma once
 
-#include <opencv2/core.hpp>
-
-#include "simulator/illumination.hpp"
-#include "simulator/local_track.hpp"
-#include "simulator/renderer.hpp"
+#include "simulator/stage.hpp"
 
 namespace railfix::simulator {
 
+/// Tunnels, bridges and platforms.
+void add_buildings(Stage& stage);
+/// Masts with wires, signals, boards and cabinets.
+void add_furniture(Stage& stage);
+
 /// Paints into `radiance` (CV_32FC1).
-void draw_scenery(const Line& line, const LocalTrack& main, const Illumination& light,
-                  const geometry::Intrinsics& camera, const Shot& shot, cv::Mat& radiance);
+void draw_scenery(const Line& line, const LocalTrack& main, const Illumination& light, const RenderOptions& options,
+                  const Shot& shot, cv::Mat& radiance);
 
 }  // namespace railfix::simulator
