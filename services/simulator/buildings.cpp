@@ -62,8 +62,9 @@ void add_portal(Stage& stage, const Span& tunnel) {
 }
 
 void add_lamps(Stage& stage, const Span& tunnel) {
-  const double first = std::floor(std::max(0.0, stage.foot_m() - tunnel.begin_m) / kLampSpacingM) + 0.5;
-  for (double s = tunnel.begin_m + first * kLampSpacingM; s < tunnel.end_m && stage.seen(s); s += kLampSpacingM) {
+  const double last = std::min(tunnel.end_m, stage.foot_m() + Stage::kFarM);
+  const double first = std::ceil(std::max(0.0, stage.foot_m() - tunnel.begin_m) / kLampSpacingM - 0.5) + 0.5;
+  for (double s = tunnel.begin_m + first * kLampSpacingM; s < last; s += kLampSpacingM) {
     const double d = tunnel.left_m - 0.06;
     stage.face(
         {stage.at(s - 0.6, d, 3.0), stage.at(s + 0.6, d, 3.0), stage.at(s + 0.6, d, 3.2), stage.at(s - 0.6, d, 3.2)},
