@@ -1,48 +1,179 @@
 #include "frame_grabber/picture_health.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cstring>
+#include <cmath>
+
+#include "core/time.hpp"
 
 namespace railfix::frame_grabber {
 namespace {
 
-constexpr int kGrid = 8;  // every eighth pixel of every eighth row
-constexpr int kSaturatedGrey = 250;
+constexpr size_t kSaturatedGrey = 250;
 constexpr double kDarkShare = 0.95;
+constexpr uint32_t kFewestEdges = 30;
+constexpr double kUsualWeight = 1.0 / 1000;  // of one picture
+constexpr double kGoneShare = 0.05;          // of the usual number of edges
+constexpr double kAsBright = 0.7;            // of the usual brightness
+constexpr double kSharpestShare = 0.1;
+// Tiles: noise of 3 grey leaves 0.8 in the mean of a window.
+constexpr float kNoStructureGrey = 1.3F;
+constexpr float kStructureGrey = 4.0F;
+constexpr float kStillShare = 0.3F;  // change over structure
+constexpr float kMovesShare = 0.6F;
+constexpr float kNoiseGrey = 1.5F;
+constexpr float kLitGrey = 24;           // darker tiles hide their structure
+constexpr float kNotBurntOutGrey = 245;  // as do burnt-out ones
+constexpr int64_t kReferenceNs = core::kNsPerSecond;
+constexpr int kStillComparisons = 4;
+constexpr double kMovingShare = 0.3;  // of the track's tiles, for the others to be called still
+// The part of the track that is watched.
+constexpr double kNearM = 3;
+constexpr double kFarM = 25;
+constexpr double kHalfWidthM = 2.5;
+constexpr size_t kFewestTiles = 6;
 
-bool equal(const cv::Mat& a, const cv::Mat& b) {
-  if (a.size() != b.size()) return false;
-  for (int row = 0; row < a.rows; ++row) {
-    if (std::memcmp(a.ptr(row), b.ptr(row), static_cast<size_t>(a.cols)) != 0) return false;
+/// The lower middle of the picture.
+TileMask usual_track() {
+  TileMask mask;
+  for (int row = kTileRows / 2; row < kTileRows; ++row) {
+    for (int column = kTileColumns / 4; column < kTileColumns * 3 / 4; ++column) mask.set(row * kTileColumns + column);
   }
-  return true;
+  return mask;
 }
 
 }  // namespace
 
-uint32_t PictureHealth::judge(int64_t stamp_ns, const cv::Mat& grey) {
-  std::array<size_t, 256> histogram{};
-  size_t pixels = 0;
-  for (int row = kGrid / 2 < grey.rows ? kGrid / 2 : 0; row < grey.rows; row += kGrid) {
-    const uint8_t* values = grey.ptr(row);
-    for (int column = 0; column < grey.cols; column += kGrid, ++pixels) ++histogram[values[column]];
+std::string health_words(uint32_t health) {
+  std::string text;
+  const std::pair<uint32_t, const char*> names[] = {{kDark, "dark"},       {kSaturated, "saturated"},
+                                                    {kFrozen, "frozen"},   {kOutOfOrder, "out of order"},
+                                                    {kCovered, "covered"}, {kBlurred, "blurred"}};
+  for (const auto& [bit, name] : names) {
+    if ((health & bit) != 0) text += (text.empty() ? "" : ", ") + std::string(name);
   }
-  const auto share = [&](size_t from, size_t to) {
-    size_t count = 0;
-    for (size_t value = from; value < to; ++value) count += histogram[value];
-    return static_cast<double>(count) / static_cast<double>(pixels);
-  };
-  uint32_t health = 0;
-  const auto dark = static_cast<size_t>(std::clamp(config_.dark_below_grey, 0.0, 256.0));
-  if (share(0, dark) >= kDarkShare) health |= kDark;
-  if (share(kSaturatedGrey, 256) >= config_.saturated_share) health |= kSaturated;
-  equal_pictures_ = equal(grey, last_) ? equal_pictures_ + 1 : 0;
-  if (equal_pictures_ >= config_.frozen_after_pictures) health |= kFrozen;
+  return text;
+}
+
+bool PictureHealth::Lasting::update(bool now, int64_t stamp_ns, int64_t long_enough_ns) {
+  if (!now) {
+    since_ns_.reset();
+    return false;
+  }
+  if (!since_ns_ || stamp_ns < *since_ns_) since_ns_ = stamp_ns;
+  return stamp_ns - *since_ns_ >= long_enough_ns;
+}
+
+void PictureHealth::watch_track(const geometry::Intrinsics& camera, const geometry::CameraPose& mount) {
+  const geometry::View view(camera, mount);
+  TileMask mask;
+  for (int i = 0; i < kTiles; ++i) {
+    const Eigen::Vector2d centre((i % kTileColumns + 0.5) * camera.width_px / kTileColumns,
+                                 (i / kTileColumns + 0.5) * camera.height_px / kTileRows);
+    const auto ground = view.on_plane(centre, 0);
+    if (ground && ground->x() > kNearM && ground->x() < kFarM && std::abs(ground->y()) < kHalfWidthM) mask.set(i);
+  }
+  if (mask.count() >= kFewestTiles) track_ = mask;
+}
+
+uint32_t PictureHealth::judge(int64_t stamp_ns, const cv::Mat& grey) {
+  if (!track_) track_ = usual_track();
+  now_.measure(grey);
+  uint32_t health = exposure();
+  if (repeated(grey)) health |= kFrozen;
   if (newest_ns_ && stamp_ns <= *newest_ns_) health |= kOutOfOrder;
   newest_ns_ = std::max(stamp_ns, newest_ns_.value_or(stamp_ns));
-  last_ = grey;
+  if (health != 0) return health;  // the rest cannot be told from such a picture, and it lasts
+  find_cover(stamp_ns);
+  measure_sharpness();
+  const int64_t persist_ns = core::to_ns(config_.persist_s);
+  if (covered_.update(covered_share_ >= config_.covered_share, stamp_ns, persist_ns)) health |= kCovered;
+  // Where few edges are left it stays as it was: a covered or blurred lens may leave none.
+  if (sharpness_ && blurred_.update(*sharpness_ < config_.blurred_below, stamp_ns, persist_ns)) health |= kBlurred;
   return health;
+}
+
+uint32_t PictureHealth::exposure() const {
+  const auto share = [this](size_t from, size_t to) {
+    uint32_t count = 0;
+    for (size_t value = from; value < to; ++value) count += now_.histogram[value];
+    return static_cast<double>(count) / now_.pixels;
+  };
+  uint32_t health = 0;
+  if (share(0, static_cast<size_t>(std::clamp(config_.dark_below_grey, 0.0, 256.0))) >= kDarkShare) health |= kDark;
+  if (share(kSaturatedGrey, 256) >= config_.saturated_share) health |= kSaturated;
+  return health;
+}
+
+/// Also a driver that gives its last few buffers again and again.
+bool PictureHealth::repeated(const cv::Mat& grey) {
+  const uint64_t own = fingerprint(grey);
+  const auto known = fingerprints_.begin() + static_cast<std::ptrdiff_t>(std::min(pictures_, fingerprints_.size()));
+  const bool seen_before = std::find(fingerprints_.begin(), known, own) != known;
+  repeats_ = seen_before ? repeats_ + 1 : 0;
+  if (!seen_before) fingerprints_[pictures_++ % fingerprints_.size()] = own;
+  return repeats_ >= config_.frozen_after_pictures;
+}
+
+void PictureHealth::find_cover(int64_t stamp_ns) {
+  if (!reference_ns_ || reference_.window_means.size() != now_.window_means.size() || stamp_ns < *reference_ns_) {
+    reference_ = now_;
+    reference_ns_ = stamp_ns;
+    still_ = {};
+  } else if (stamp_ns - *reference_ns_ >= kReferenceNs) {
+    compare_with_reference();
+    reference_ = now_;
+    reference_ns_ = stamp_ns;
+  }
+  size_t covered = 0;
+  for (size_t i = 0; i < kTiles; ++i) {
+    if (!track_->test(i)) continue;
+    const auto& tile = now_.tiles[i];
+    const bool readable = tile.grey > kLitGrey && tile.grey < kNotBurntOutGrey;
+    if ((readable && tile.structure_grey < kNoStructureGrey) || still_[i] >= kStillComparisons) ++covered;
+  }
+  covered_share_ = static_cast<double>(covered) / static_cast<double>(track_->count());
+}
+
+/// At a standstill nothing moves, so nothing is learned.
+void PictureHealth::compare_with_reference() {
+  const auto changes = difference(now_, reference_);
+  TileMask still;
+  size_t moving = 0;
+  for (size_t i = 0; i < kTiles; ++i) {
+    const float structure = std::max(now_.tiles[i].structure_grey, reference_.tiles[i].structure_grey);
+    if (!track_->test(i) || structure < kStructureGrey) continue;
+    if (changes[i] > kMovesShare * structure) ++moving;
+    if (changes[i] < kNoiseGrey + kStillShare * (structure - kStructureGrey)) still.set(i);
+  }
+  if (static_cast<double>(moving) < kMovingShare * static_cast<double>(track_->count())) return;
+  for (size_t i = 0; i < kTiles; ++i) still_[i] = still.test(i) ? still_[i] + 1 : 0;
+}
+
+void PictureHealth::measure_sharpness() {
+  std::array<uint32_t, PictureTiles::kSlopeBins> slopes{};
+  uint32_t edges = 0;
+  double grey = 0;
+  for (size_t i = 0; i < kTiles; ++i) {
+    if (!track_->test(i)) continue;
+    grey += now_.tiles[i].grey / static_cast<double>(track_->count());
+    for (size_t bin = 0; bin < slopes.size(); ++bin) {
+      slopes[bin] += now_.slopes[i][bin];
+      edges += now_.slopes[i][bin];
+    }
+  }
+  sharpness_.reset();
+  if (edges < std::max<double>(kFewestEdges, kGoneShare * usual_edges_)) {
+    const bool gone = usual_edges_ * kGoneShare > kFewestEdges && grey > kAsBright * usual_grey_;
+    if (gone) sharpness_ = 0;
+    return;
+  }
+  const double weight = usual_edges_ == 0 ? 1 : kUsualWeight;
+  usual_edges_ += weight * (edges - usual_edges_);
+  usual_grey_ += weight * (grey - usual_grey_);
+  double left = kSharpestShare * edges;
+  size_t bin = slopes.size() - 1;
+  while (bin > 0 && left > slopes[bin]) left -= slopes[bin--];
+  sharpness_ = static_cast<double>(bin) / (PictureTiles::kSlopeBins - 1);
 }
 
 }  // namespace railfix::frame_grabber
