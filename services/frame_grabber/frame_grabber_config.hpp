@@ -49,7 +49,13 @@ struct FrameGrabberConfig {
       f.number("saturated_share", health.saturated_share, {0.01, 1}, "",
                "Saturated: this share of the pixels is 250 or brighter.");
       f.integer("frozen_after_pictures", health.frozen_after_pictures, {1, 10000}, "pictures",
-                "Frozen: so many pictures in a row are equal to the one before in every pixel.");
+                "Frozen: so many pictures in a row are equal, in every pixel, to one of the 16 before.");
+      f.number("covered_share", health.covered_share, {0.05, 1}, "",
+               "Covered: this share of the track's part of the picture shows nothing, or stands still while the rest "
+               "of it moves.");
+      f.number("blurred_below", health.blurred_below, {0, 1}, "",
+               "Blurred: less than this share of the height of the sharpest edges lies within two pixels; 0 = never.");
+      f.number("persist_s", health.persist_s, {0, 600}, "s", "Covered and blurred must last so long.");
     });
   }
 };

@@ -13,7 +13,8 @@ namespace railfix::frame_grabber {
 namespace {
 
 static_assert(kDark == msg::PICTURE_DARK && kSaturated == msg::PICTURE_SATURATED && kFrozen == msg::PICTURE_FROZEN &&
-              kOutOfOrder == msg::PICTURE_OUT_OF_ORDER);
+              kOutOfOrder == msg::PICTURE_OUT_OF_ORDER && kCovered == msg::PICTURE_COVERED &&
+              kBlurred == msg::PICTURE_BLURRED);
 
 constexpr int64_t kLastWordsNs = 300'000'000;  // for the last samples to arrive before the program ends
 constexpr int kBadBeforeDegraded = 10;
@@ -22,14 +23,19 @@ constexpr double kGuessedHeightM = 2.5;
 constexpr std::chrono::milliseconds kWaitCheck{100};
 constexpr int kConnectedChecks = 4;  // the answers' way back is found a little later
 
-std::string words(uint32_t health) {
-  std::string text;
-  const std::pair<uint32_t, const char*> names[] = {
-      {kDark, "dark"}, {kSaturated, "saturated"}, {kFrozen, "frozen"}, {kOutOfOrder, "out of order"}};
-  for (const auto& [bit, name] : names) {
-    if ((health & bit) != 0) text += (text.empty() ? "" : ", ") + std::string(name);
+/// "pictures are covered: look for ..."
+std::string complaint(uint32_t health) {
+  const std::pair<uint32_t, const char*> advice[] = {
+      {kFrozen, "the camera or its driver sends the same picture again; switch the camera off and on"},
+      {kCovered, "see what is on the lens or the window; deep snow and fog look the same"},
+      {kBlurred, "clean lens and window, look for condensation, and check the focus"},
+      {kSaturated, "shorten the exposure or turn on its automatic"},
+      {kDark, "lengthen the exposure, or see what covers the lens"},
+      {kOutOfOrder, "their time stamps do not grow; check the camera's clock"}};
+  for (const auto& [bit, what] : advice) {
+    if ((health & bit) != 0) return "pictures are " + health_words(health) + ": " + what;
   }
-  return text;
+  return "";
 }
 
 std::string size_text(const cv::Size& size) {
@@ -221,6 +227,7 @@ void FrameGrabberService::publish_calibration() {
   geometry::CameraPose guess;
   guess.height_m = kGuessedHeightM;
   const geometry::CameraPose mount = calibration.mount.value_or(guess);
+  if (calibration.mount) picture_health_.watch_track(camera, mount);
   msg::CameraCalibration message;
   message.camera(config_.camera);
   message.fu_px(camera.fu_px);
@@ -257,8 +264,8 @@ void FrameGrabberService::say_health(uint32_t health) {
   bad_in_a_row_ = health == 0 ? 0 : bad_in_a_row_ + 1;
   if (bad_in_a_row_ == 0) context_.health().active();
   if (bad_in_a_row_ == kBadBeforeDegraded) {
-    context_.health().degraded("pictures are " + words(health));
-    context_.log().warn("pictures are {}", words(health));
+    context_.health().degraded(complaint(health));
+    context_.log().warn("{}", complaint(health));
   }
 }
 

@@ -11,6 +11,7 @@ namespace {
 constexpr size_t kSaturatedGrey = 250;
 constexpr double kDarkShare = 0.95;
 constexpr uint32_t kFewestEdges = 30;
+constexpr double kManyEdges = 300;
 constexpr double kUsualWeight = 1.0 / 1000;  // of one picture
 constexpr double kGoneShare = 0.05;          // of the usual number of edges
 constexpr double kAsBright = 0.7;            // of the usual brightness
@@ -163,8 +164,7 @@ void PictureHealth::measure_sharpness() {
   }
   sharpness_.reset();
   if (edges < std::max<double>(kFewestEdges, kGoneShare * usual_edges_)) {
-    const bool gone = usual_edges_ * kGoneShare > kFewestEdges && grey > kAsBright * usual_grey_;
-    if (gone) sharpness_ = 0;
+    if (usual_edges_ > kManyEdges && grey > kAsBright * usual_grey_) sharpness_ = 0;
     return;
   }
   const double weight = usual_edges_ == 0 ? 1 : kUsualWeight;

@@ -151,9 +151,16 @@ void OdometryService::measure(const Waiting& waiting, const msg::TrackView* view
     picture.grey = waiting.grey;
     picture.stamp_ns = waiting.stamp_ns;
     take_pose(waiting, view, picture);
-    const MouseStep step = mouse_->process(picture);
-    publish(step, waiting);
-    tell(step);
+    if (messaging::is_repeat(waiting.health)) {
+      last_step_.stamp_ns = waiting.stamp_ns;
+      last_step_.mode = MouseMode::blind;
+      last_step_.valid = false;
+    } else {
+      last_step_ = mouse_->process(picture);
+      last_step_.step_sigma_m *= messaging::sigma_factor(waiting.health);
+    }
+    publish(last_step_, waiting);
+    tell(last_step_, waiting.health);
   }
   spare_.push_back(waiting.grey);
   context_.used_up_to(waiting.stamp_ns);
@@ -181,10 +188,11 @@ void OdometryService::publish(const MouseStep& step, const Waiting& waiting) {
   context_.health().output(waiting.grabbed_ns);
 }
 
-void OdometryService::tell(const MouseStep& step) {
+void OdometryService::tell(const MouseStep& step, uint32_t picture_health) {
   if (step.valid || last_valid_ns_ == 0) last_valid_ns_ = step.stamp_ns;
   if (step.stamp_ns - last_valid_ns_ > kBlindNs) {
-    context_.health().degraded(step.mode == MouseMode::blind
+    context_.health().degraded(messaging::is_repeat(picture_health) ? "blind: the camera sends the same picture again"
+                               : step.mode == MouseMode::blind
                                    ? "blind: the ground shows no texture (dark, glare, snow or a covered lens)"
                                    : "the ground of one picture is not found in the next (wrong mount, or too fast)");
   } else if (!mount_known_) {

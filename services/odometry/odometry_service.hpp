@@ -31,7 +31,7 @@ class OdometryService {
   void measure(const Waiting& waiting, const msg::TrackView* view);
   void take_pose(const Waiting& waiting, const msg::TrackView* view, MousePicture& picture);
   void publish(const MouseStep& step, const Waiting& waiting);
-  void tell(const MouseStep& step);
+  void tell(const MouseStep& step, uint32_t picture_health);
   cv::Mat spare();
 
   Config config_;
@@ -48,6 +48,7 @@ class OdometryService {
   int64_t last_pose_ns_ = 0;
   double curvature_per_m_ = 0;
   double vertical_curvature_per_m_ = 0;
+  MouseStep last_step_;
   uint64_t last_seq_ = 0;
   int64_t last_valid_ns_ = 0;
 };

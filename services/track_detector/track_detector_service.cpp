@@ -106,7 +106,11 @@ void TrackDetectorService::detect(const msg::CameraFrame& frame) {
   // The picture is only read; cv::Mat has no constant view of foreign memory.
   auto* pixels = const_cast<uint8_t*>(frame.data().data());  // NOLINT(cppcoreguidelines-pro-type-const-cast)
   const cv::Mat grey(static_cast<int>(frame.height_px()), static_cast<int>(frame.width_px()), CV_8UC1, pixels);
-  const TrackObservation observation = detector_->detect(grey);
+  TrackObservation observation;
+  observation.reason = "the camera sends the same picture again";
+  if (!messaging::is_repeat(frame.health())) observation = detector_->detect(grey);
+  const double factor = messaging::sigma_factor(frame.health());
+  observation.covariance *= factor * factor;
   if (observation.seen()) watch_->add(observation.shape, core::seconds(frame.stamp_ns() - last_stamp_ns_));
   last_stamp_ns_ = frame.stamp_ns();
   publish(observation, frame);

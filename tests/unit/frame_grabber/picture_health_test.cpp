@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
+#include <opencv2/imgproc.hpp>
+
 #include "core/random.hpp"
 
 namespace railfix::frame_grabber {
@@ -43,6 +46,106 @@ TEST(PictureHealth, FrozenOnlyAfterSoManyEqualPictures) {
   cv::Mat other = still.clone();
   other.at<uint8_t>(60, 81) ^= 1U;  // off the coarse grid
   EXPECT_EQ(health.judge(4, other), 0U);
+}
+
+TEST(PictureHealth, ARepeatIsFrozenAtOnceAlsoWhenBuffersTakeTurns) {
+  PictureHealth health({});
+  EXPECT_EQ(health.judge(1, noise(1, 20, 200)), 0U);
+  EXPECT_EQ(health.judge(2, noise(2, 20, 200)), 0U);
+  EXPECT_EQ(health.judge(3, noise(1, 20, 200)), kFrozen);
+  EXPECT_EQ(health.judge(4, noise(2, 20, 200)), kFrozen);
+  EXPECT_EQ(health.judge(5, noise(3, 20, 200)), 0U);
+}
+
+/// Ballast, twice as high as a picture, and pictures of it with noise of their own.
+class PictureHealthOnTheWay : public ::testing::Test {
+ protected:
+  PictureHealthOnTheWay() {
+    core::Random random(11);
+    for (auto* value = ballast_.data; value != ballast_.dataend; ++value) {
+      *value = static_cast<uint8_t>(random.uniform(0, 256));
+    }
+    cv::GaussianBlur(ballast_, ballast_, {}, 1.0);
+    cv::normalize(ballast_, ballast_, 30, 220, cv::NORM_MINMAX);
+  }
+  cv::Mat picture(int number, bool moves) {
+    const int from = moves ? number * 37 % 500 : 0;
+    cv::Mat shown = ballast_.rowRange(from, from + 512).clone();
+    return shown;
+  }
+  /// So many pictures at 10 Hz; the last one's health.
+  uint32_t run(int pictures, bool moves, const std::function<void(cv::Mat&)>& spoil) {
+    uint32_t flags = 0;
+    for (int i = 0; i < pictures; ++i, ++number_) {
+      cv::Mat shown = picture(number_, moves);
+      spoil(shown);
+      cv::Mat noise(shown.size(), CV_8UC1);
+      cv::theRNG().state = static_cast<uint64_t>(number_);
+      cv::randn(noise, 6, 2);
+      shown += noise;
+      flags = health_.judge(number_ * 100'000'000LL, shown);
+      if (flags != 0) ++flagged_;
+    }
+    return flags;
+  }
+  cv::Mat ballast_ = cv::Mat(1024, 640, CV_8UC1);
+  PictureHealth health_ = PictureHealth(PictureHealthConfig());
+  int number_ = 1;
+  int flagged_ = 0;
+};
+
+TEST_F(PictureHealthOnTheWay, MovingAndStandingAreNotFlagged) {
+  run(100, true, [](cv::Mat&) {});
+  run(200, false, [](cv::Mat&) {});
+  run(50, true, [](cv::Mat& m) { cv::blur(m, m, {1, 25}); });  // fast
+  EXPECT_EQ(flagged_, 0);
+}
+
+TEST_F(PictureHealthOnTheWay, BlurIsFlaggedWhenItLastsAndRecovers) {
+  const auto defocus = [](cv::Mat& m) { cv::GaussianBlur(m, m, {}, 3.5); };
+  run(20, true, [](cv::Mat&) {});
+  run(20, true, defocus);
+  EXPECT_EQ(flagged_, 0) << "two seconds are not long enough";
+  EXPECT_EQ(run(10, true, defocus), kBlurred);
+  EXPECT_EQ(run(1, true, [](cv::Mat&) {}), 0U);
+}
+
+TEST_F(PictureHealthOnTheWay, CondensationTakesAllEdges) {
+  run(20, true, [](cv::Mat&) {});
+  const auto mist = [](cv::Mat& m) {
+    cv::GaussianBlur(m, m, {}, 5);
+    m.convertTo(m, -1, 0.5, 60);
+  };
+  EXPECT_EQ(run(30, true, mist) & kBlurred, kBlurred);
+}
+
+TEST_F(PictureHealthOnTheWay, ACoverWithoutStructureAndAStandingOne) {
+  run(20, true, [](cv::Mat&) {});
+  EXPECT_EQ(run(25, true, [](cv::Mat& m) { m.rowRange(300, 512).setTo(90); }), kCovered);
+  EXPECT_EQ(run(1, true, [](cv::Mat&) {}), 0U);
+  flagged_ = 0;
+  cv::Mat leaf = ballast_(cv::Rect(0, 0, 640, 170)).clone();
+  const auto stuck = [&leaf](cv::Mat& m) { leaf.copyTo(m.rowRange(342, 512)); };
+  EXPECT_EQ(run(80, true, stuck), kCovered);
+  run(1, true, [](cv::Mat&) {});
+  EXPECT_EQ(run(30, true, [](cv::Mat&) {}), 0U);
+  flagged_ = 0;
+  run(200, false, stuck);
+  EXPECT_EQ(flagged_, 0) << "at a standstill it cannot be told";
+}
+
+TEST(PictureHealth, WatchesTheTrackAndNotTheSky) {
+  geometry::Intrinsics camera{500, 500, 320, 256, 0, 0, 0, 0, 640, 512};
+  PictureHealth health({});
+  health.watch_track(camera, {0, 0.2, 0, 0, 2.5});
+  cv::Mat picture = noise(1, 20, 200);
+  cv::resize(picture, picture, cv::Size(640, 512), 0, 0, cv::INTER_NEAREST);
+  picture.rowRange(0, 200).setTo(180);
+  (void)health.judge(1, picture);
+  EXPECT_EQ(health.covered_share(), 0.0);
+  picture.rowRange(200, 512).setTo(100);
+  (void)health.judge(2, picture);
+  EXPECT_EQ(health.covered_share(), 1.0);
 }
 
 TEST(PictureHealth, StampsThatDoNotGrowAreOutOfOrder) {
