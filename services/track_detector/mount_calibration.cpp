@@ -8,14 +8,37 @@ namespace railfix::track_detector {
 namespace {
 
 constexpr size_t kRoughPictures = 6;
+constexpr size_t kVotingPictures = 20;
 constexpr size_t kMinStraight = 3;
 constexpr double kRollHeldRad = 1e-5;
 constexpr double kStraightPerM = 3e-4;  // and within two sigmas of zero
 // A pose that no picture knows anything about: cabs are 1.6 to 4.2 m high, cameras look up to 20 degrees down.
 constexpr double kRoughHeightsM[] = {2.0, 2.8, 3.7};
 constexpr double kRoughPitchesRad[] = {0.0, 0.12, 0.24};
+constexpr double kRoughYawsRad[] = {0.0, -0.2, 0.2};
+constexpr double kRoughLateralsM[] = {0.0, -0.9, 0.9};
+constexpr double kUsualLateralM = 1.0;
 constexpr TrackShapeSigma kRoughLimits{kRollHeldRad, 0.025, 0.04, 0.2, 0.18, 0.001, 0.0005, 3e-5};
+constexpr TrackShapeSigma kAnywhereLimits{kRollHeldRad, 0.025, 0.04, 0.2, 0.18, 0.003, 0.0005, 3e-5};
 constexpr TrackShapeSigma kFineLimits{kRollHeldRad, 0.012, 0.02, 0.10, 0.06, 0.003, 0.0005, 3e-5};
+
+std::vector<geometry::CameraPose> rough_starts() {
+  std::vector<geometry::CameraPose> starts;
+  for (const double height_m : kRoughHeightsM) {
+    for (const double pitch_rad : kRoughPitchesRad) {
+      for (const double yaw_rad : kRoughYawsRad) {
+        for (const double lateral_m : kRoughLateralsM) starts.push_back({0, pitch_rad, yaw_rad, lateral_m, height_m});
+      }
+    }
+  }
+  return starts;
+}
+
+/// How sure it is that these are the own rails: a cab camera sits between them, or little beside.
+double plausible(const TrackObservation& o) {
+  const double lateral = o.shape.camera.lateral_m / kUsualLateralM;
+  return o.confidence / (1 + lateral * lateral);
+}
 
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -61,26 +84,55 @@ std::vector<TrackObservation> MountCalibrator::look(const geometry::CameraPose& 
   return seen;
 }
 
+// Every start is tried on a few pictures; what was found best in each of them, and the median of the best start, are
+// then put to the vote: one picture may show a fence at the gauge, but not all of them at the same place.
 core::Result<geometry::CameraPose> MountCalibrator::rough() const {
-  std::vector<TrackObservation> best;
-  double best_confidence = 0;
-  for (const double height_m : kRoughHeightsM) {
-    for (const double pitch_rad : kRoughPitchesRad) {
-      auto seen = look({0, pitch_rad, 0, 0, height_m}, kRoughLimits, kRoughPictures);
-      double confidence = 0;
-      for (const auto& o : seen) confidence += o.confidence;
-      if (confidence > best_confidence) {
-        best_confidence = confidence;
-        best = std::move(seen);
-      }
+  std::vector<TrackObservation> best_start;
+  double best_score = 0;
+  std::vector<TrackObservation> best_of(pictures_.size());
+  const size_t stride = std::max<size_t>(1, pictures_.size() / kRoughPictures);
+  DetectorOptions options;
+  options.gauge_m = gauge_m_;
+  options.limits = kRoughLimits;
+  for (const auto& start : rough_starts()) {
+    TrackDetector detector(camera_, start, options);
+    std::vector<TrackObservation> seen;
+    double score = 0;
+    for (size_t i = 0; i < pictures_.size(); i += stride) {
+      detector.reset();
+      auto observation = detector.detect(pictures_[i]);
+      if (!observation.seen()) continue;
+      score += plausible(observation);
+      if (!best_of[i].seen() || plausible(observation) > plausible(best_of[i])) best_of[i] = observation;
+      seen.push_back(std::move(observation));
     }
+    if (score <= best_score) continue;
+    best_score = score;
+    best_start = std::move(seen);
   }
-  if (best.empty()) {
+  if (best_start.empty()) {
     return core::Error{
         "no picture shows two rails at the gauge: use pictures of straight track in good light, give --focal "
         "or --camera, and check --gauge"};
   }
-  return median_pose(best, nullptr);
+  std::vector<geometry::CameraPose> candidates{median_pose(best_start, nullptr)};
+  for (const auto& o : best_of) {
+    if (o.seen()) candidates.push_back(o.shape.camera);
+  }
+  return elected(candidates);
+}
+
+geometry::CameraPose MountCalibrator::elected(const std::vector<geometry::CameraPose>& candidates) const {
+  geometry::CameraPose best = candidates.front();
+  double best_score = -1;
+  for (const auto& candidate : candidates) {
+    double score = 0;
+    for (const auto& o : look(candidate, kFineLimits, kVotingPictures)) score += plausible(o);
+    if (score <= best_score) continue;
+    best_score = score;
+    best = candidate;
+  }
+  return best;
 }
 
 core::Result<MountCalibration> MountCalibrator::solve() const {
@@ -122,6 +174,24 @@ core::Result<MountCalibration> MountCalibrator::solve() const {
   for (const auto& o : seen) residuals.push_back(o.residual_px);
   result.residual_px = median(residuals);
   return result;
+}
+
+TrackObservation find_rails_anywhere(const geometry::Intrinsics& camera, const cv::Mat& grey, double gauge_m) {
+  DetectorOptions options;
+  options.gauge_m = gauge_m;
+  options.limits = kAnywhereLimits;
+  TrackObservation best;
+  best.reason = "no pair of rails at the gauge";
+  double best_score = 0;
+  for (const auto& start : rough_starts()) {
+    TrackDetector detector(camera, start, options);
+    auto observation = detector.detect(grey);
+    const double score = observation.seen() ? plausible(observation) : 0;
+    if (score <= best_score) continue;
+    best_score = score;
+    best = std::move(observation);
+  }
+  return best;
 }
 
 }  // namespace railfix::track_detector

@@ -33,10 +33,16 @@ class MountCalibrator {
   [[nodiscard]] std::vector<TrackObservation> look(const geometry::CameraPose& start, const TrackShapeSigma& limits,
                                                    size_t max_pictures) const;
   [[nodiscard]] core::Result<geometry::CameraPose> rough() const;
+  /// The candidate that most pictures agree with.
+  [[nodiscard]] geometry::CameraPose elected(const std::vector<geometry::CameraPose>& candidates) const;
 
   geometry::Intrinsics camera_;
   double gauge_m_;
   std::vector<cv::Mat> pictures_;
 };
+
+/// The own rails in one picture of a camera whose mount nobody knows: every usual height, pitch, yaw and sideways
+/// position is tried (about a second). Roll is held at 0.
+TrackObservation find_rails_anywhere(const geometry::Intrinsics& camera, const cv::Mat& grey, double gauge_m);
 
 }  // namespace railfix::track_detector

@@ -8,7 +8,6 @@ namespace railfix::track_detector {
 namespace {
 
 constexpr double kStepPx = 0.5;  // between samples of a profile
-constexpr double kSmallestHeadPx = 3.0;
 constexpr double kEdgeSigmaPx = 0.35;  // of a clear edge
 constexpr double kEdgeSigmaM = 0.003;  // wear and rounding of the head, dirt
 constexpr double kSideM = 0.05;        // ground beside the head that it is compared with
@@ -126,7 +125,7 @@ std::vector<RailEdge> find_edges(const cv::Mat& grey, const geometry::Intrinsics
       const auto next = view.project(rail_point(shape, side, options.gauge_m, ahead_m * 1.01));
       if (!inner || !outer || !next) continue;
       const double head_px = (*outer - *inner).norm();
-      if (head_px < kSmallestHeadPx || !inside(grey, *inner)) continue;
+      if (head_px < options.smallest_head_px || !inside(grey, *inner)) continue;
       const double px_per_m = head_px / options.head_m;
       const Eigen::Vector2d outward = (*outer - *inner) / head_px * kStepPx;
       const Eigen::Vector2d along = (*next - *inner).normalized();

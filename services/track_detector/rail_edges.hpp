@@ -14,9 +14,10 @@ struct EdgeOptions {
   double near_m = 5;
   double far_m = 50;
   int stations = 40;
-  double reach_m = 0.1;     // how far inwards and outwards of the expected place is looked
-  double min_contrast = 6;  // grey levels between the head and the ground inside of it
-  bool dark = false;        // the head is darker than both its sides
+  double reach_m = 0.1;         // how far inwards and outwards of the expected place is looked
+  double min_contrast = 6;      // grey levels between the head and the ground inside of it
+  double smallest_head_px = 3;  // narrower ones, far away, are biased by blur
+  bool dark = false;            // the head is darker than both its sides
 };
 
 struct RailEdge {

@@ -17,6 +17,9 @@ constexpr double kFitTolerance = 0.05;  // sigmas
 constexpr int kFitIterations = 15;
 constexpr double kSettled = 0.5;  // sigmas; points that leave one by one keep a fit creeping
 constexpr double kGoodResidualPx = 2.0;
+constexpr double kHeadPx = 3.0;  // rails are followed until their heads are as narrow as this ...
+constexpr double kSmallestHeadPx = 1.5;
+constexpr double kShortestLook = 2.5;  // ... but at least to so many times the nearest visible distance
 constexpr double kSure = 0.8;           // confidence that ends the search
 constexpr double kTrackReachM = 0.08;   // how far rails are looked for from the previous picture's ...
 constexpr double kSearchReachM = 0.10;  // ... and from the search's
@@ -108,6 +111,9 @@ TrackObservation TrackDetector::refine(const cv::Mat& grey, const TrackShape& st
   edge_options.near_m = near_m_;
   edge_options.min_contrast = options_.min_contrast;
   edge_options.dark = dark;
+  // A camera of few pixels must make do with narrower heads, or it would see no length of rail at all.
+  edge_options.smallest_head_px =
+      std::clamp(camera_.fu_px * options_.head_m / (kShortestLook * near_m_), kSmallestHeadPx, kHeadPx);
   TrackObservation observation;
   TrackShape shape = start;
   std::array<int, 2> tried{};
