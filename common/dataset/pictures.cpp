@@ -80,8 +80,8 @@ class FileSource : public PictureSource {
 /// Frames of a video; their times are frame number / fps, as players do it.
 class VideoSource : public PictureSource {
  public:
-  VideoSource(cv::VideoCapture capture, double fps, bool colour)
-      : capture_(std::move(capture)), fps_(fps), colour_(colour) {}
+  VideoSource(const cv::VideoCapture& capture, double fps, bool colour)
+      : capture_(capture), fps_(fps), colour_(colour) {}
 
   MaybePicture next() override {
     cv::Mat frame;
