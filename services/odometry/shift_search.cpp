@@ -2,113 +2,132 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 
 namespace railfix::odometry {
 namespace {
 
-constexpr double kClip = 3.0;      // one bright stone must not rule the sum
+constexpr float kClip = 3.0F;      // one bright stone must not rule the sum
+constexpr float kUnit = 64.0F;     // of the 16-bit numbers: 3 sigma squared times 10,000 cells fit into 32 bits
 constexpr int kContrastRows = 15;  // local contrast over 0.6 m
 constexpr int kFewestRows = 30;    // 1.2 m of common ground
-
-void remove_means(cv::Mat& texture, const std::vector<uint8_t>& row_seen) {
-  std::vector<float> column(static_cast<size_t>(texture.cols), 0.0F);
-  int rows = 0;
-  for (int r = 0; r < texture.rows; ++r) {
-    auto* line = texture.ptr<float>(r);
-    if (row_seen[static_cast<size_t>(r)] == 0) {
-      std::fill(line, line + texture.cols, 0.0F);
-      continue;
-    }
-    float mean = 0;
-    for (int c = 0; c < texture.cols; ++c) mean += line[c];
-    mean /= static_cast<float>(texture.cols);
-    for (int c = 0; c < texture.cols; ++c) {
-      line[c] -= mean;
-      column[static_cast<size_t>(c)] += line[c];
-    }
-    ++rows;
-  }
-  if (rows == 0) return;
-  for (float& sum : column) sum /= static_cast<float>(rows);
-  for (int r = 0; r < texture.rows; ++r) {
-    if (row_seen[static_cast<size_t>(r)] == 0) continue;
-    auto* line = texture.ptr<float>(r);
-    for (int c = 0; c < texture.cols; ++c) line[c] -= column[static_cast<size_t>(c)];
-  }
-}
-
-// Scales rows so that dark and bright stretches weigh the same; returns the contrast before.
-double normalise(cv::Mat& texture, const std::vector<uint8_t>& row_seen) {
-  const auto rows = static_cast<size_t>(texture.rows);
-  std::vector<double> energy(rows + 1, 0.0);
-  std::vector<int> seen(rows + 1, 0);
-  for (int r = 0; r < texture.rows; ++r) {
-    const auto* line = texture.ptr<float>(r);
-    double sum = 0;
-    for (int c = 0; c < texture.cols; ++c) sum += line[c] * line[c];
-    energy[static_cast<size_t>(r) + 1] = energy[static_cast<size_t>(r)] + sum / texture.cols;
-    seen[static_cast<size_t>(r) + 1] = seen[static_cast<size_t>(r)] + row_seen[static_cast<size_t>(r)];
-  }
-  for (int r = 0; r < texture.rows; ++r) {
-    const auto low = static_cast<size_t>(std::max(0, r - kContrastRows / 2));
-    const auto high = static_cast<size_t>(std::min(texture.rows, r + kContrastRows / 2 + 1));
-    const int count = seen[high] - seen[low];
-    if (count == 0) continue;
-    const double sigma = std::sqrt((energy[high] - energy[low]) / count) + 0.05;
-    auto* line = texture.ptr<float>(r);
-    for (int c = 0; c < texture.cols; ++c) {
-      line[c] = static_cast<float>(std::clamp(line[c] / sigma, -kClip, kClip));
-    }
-  }
-  return seen[rows] == 0 ? 0.0 : std::sqrt(energy[rows] / seen[rows]);
-}
+constexpr int kLane = 8;
 
 double correlation(const CoarseView& reference, const CoarseView& now, RowRange section, int shift, int side) {
-  const int first_col = std::max(0, side);
-  const int cols = reference.texture.cols - std::abs(side);
-  float ab = 0;
-  float aa = 0;
-  float bb = 0;
+  int64_t ab = 0;
+  int64_t aa = 0;
+  int64_t bb = 0;
   int rows = 0;
+  const int width = (reference.cols + kLane - 1) / kLane * kLane;
   const int first = std::max(section.first, shift);
-  const int last = std::min(section.last, now.texture.rows - 1 + shift);
+  const int last = std::min(section.last, now.rows - 1 + shift);
   for (int r = first; r <= last; ++r) {
-    if (reference.row_seen[static_cast<size_t>(r)] == 0 || now.row_seen[static_cast<size_t>(r - shift)] == 0) continue;
-    const auto* a = reference.texture.ptr<float>(r) + first_col;
-    const auto* b = now.texture.ptr<float>(r - shift) + first_col - side;
-    for (int c = 0; c < cols; ++c) {
-      ab += a[c] * b[c];
-      aa += a[c] * a[c];
-      bb += b[c] * b[c];
-    }
+    const auto at = static_cast<size_t>(r);
+    const auto there = static_cast<size_t>(r - shift);
+    if (reference.row_seen[at] == 0 || now.row_seen[there] == 0) continue;
+    const int16_t* a = reference.row(r);
+    const int16_t* b = now.row(r - shift) - side;
+    int32_t sum = 0;
+    for (int c = 0; c < width; ++c) sum += a[c] * b[c];
+    ab += sum;
+    aa += reference.energy[at];
+    bb += now.energy[there];
     ++rows;
   }
   if (rows < std::min(kFewestRows, (section.last - section.first + 1) / 2) || aa <= 0 || bb <= 0) return -1;
-  return ab / std::sqrt(static_cast<double>(aa) * bb);
+  const double common = static_cast<double>(reference.cols) / static_cast<double>(reference.cols - std::abs(side));
+  return common * static_cast<double>(ab) / std::sqrt(static_cast<double>(aa) * static_cast<double>(bb));
 }
 
 }  // namespace
 
-CoarseView make_coarse(const vision::TopView& view) {
-  CoarseView coarse;
-  cv::resize(view.grey, coarse.texture, cv::Size(view.grey.cols / 2, view.grey.rows / 2), 0, 0, cv::INTER_AREA);
-  coarse.row_seen.resize(static_cast<size_t>(coarse.texture.rows));
-  for (size_t r = 0; r < coarse.row_seen.size(); ++r) {
-    coarse.row_seen[r] = view.row_seen[2 * r] & view.row_seen[2 * r + 1];
-  }
-  remove_means(coarse.texture, coarse.row_seen);
-  coarse.contrast_grey = normalise(coarse.texture, coarse.row_seen);
-  return coarse;
+void CoarseViewMaker::make(const vision::TopView& view, CoarseView& out) {
+  out.rows = view.grey.rows / 2;
+  out.cols = view.grey.cols / 2;
+  out.stride = 2 * CoarseView::kMostSide + (out.cols + kLane - 1) / kLane * kLane;
+  out.texture.assign(static_cast<size_t>(out.rows * out.stride), 0);
+  out.energy.assign(static_cast<size_t>(out.rows), 0);
+  out.row_seen.resize(static_cast<size_t>(out.rows));
+  halve(view, out);
+  remove_means(out);
+  normalise(out);
 }
 
-ShiftPeak find_shift(const CoarseView& reference, const CoarseView& now, RowRange section, RowRange shifts, int side,
-                     int apart) {
-  std::vector<double> best(static_cast<size_t>(shifts.last - shifts.first + 1), -1.0);
+void CoarseViewMaker::halve(const vision::TopView& view, CoarseView& out) {
+  half_.assign(static_cast<size_t>(out.rows * out.cols), 0.0F);
+  for (int r = 0; r < out.rows; ++r) {
+    const auto at = static_cast<size_t>(r);
+    out.row_seen[at] = view.row_seen[2 * at] & view.row_seen[2 * at + 1];
+    if (out.row_seen[at] == 0) continue;
+    const auto* top = view.grey.ptr<float>(2 * r);
+    const auto* bottom = view.grey.ptr<float>(2 * r + 1);
+    float* line = &half_[static_cast<size_t>(r * out.cols)];
+    for (int c = 0; c < out.cols; ++c)
+      line[c] = 0.25F * (top[2 * c] + top[2 * c + 1] + bottom[2 * c] + bottom[2 * c + 1]);
+  }
+}
+
+void CoarseViewMaker::remove_means(const CoarseView& shape) {
+  const int cols = shape.cols;
+  column_.assign(static_cast<size_t>(cols), 0.0F);
+  int rows = 0;
+  for (int r = 0; r < shape.rows; ++r) {
+    if (shape.row_seen[static_cast<size_t>(r)] == 0) continue;
+    float* line = &half_[static_cast<size_t>(r * cols)];
+    float mean = 0;
+    for (int c = 0; c < cols; ++c) mean += line[c];
+    mean /= static_cast<float>(cols);
+    for (int c = 0; c < cols; ++c) {
+      line[c] -= mean;
+      column_[static_cast<size_t>(c)] += line[c];
+    }
+    ++rows;
+  }
+  if (rows == 0) return;
+  for (float& sum : column_) sum /= static_cast<float>(rows);
+  for (int r = 0; r < shape.rows; ++r) {
+    if (shape.row_seen[static_cast<size_t>(r)] == 0) continue;
+    float* line = &half_[static_cast<size_t>(r * cols)];
+    for (int c = 0; c < cols; ++c) line[c] -= column_[static_cast<size_t>(c)];
+  }
+}
+
+// Scales rows so that dark and bright stretches weigh the same.
+void CoarseViewMaker::normalise(CoarseView& out) {
+  const auto rows = static_cast<size_t>(out.rows);
+  energy_.assign(rows + 1, 0.0);
+  seen_.assign(rows + 1, 0);
+  for (size_t r = 0; r < rows; ++r) {
+    const float* line = &half_[r * static_cast<size_t>(out.cols)];
+    float sum = 0;
+    for (int c = 0; c < out.cols; ++c) sum += line[c] * line[c];
+    energy_[r + 1] = energy_[r] + static_cast<double>(sum) / out.cols;
+    seen_[r + 1] = seen_[r] + out.row_seen[r];
+  }
+  for (int r = 0; r < out.rows; ++r) {
+    const auto low = static_cast<size_t>(std::max(0, r - kContrastRows / 2));
+    const auto high = static_cast<size_t>(std::min(out.rows, r + kContrastRows / 2 + 1));
+    const int count = seen_[high] - seen_[low];
+    if (count == 0) continue;
+    const auto scale = static_cast<float>(1.0 / (std::sqrt((energy_[high] - energy_[low]) / count) + 0.05));
+    const float* line = &half_[static_cast<size_t>(r * out.cols)];
+    int16_t* texture = &out.texture[static_cast<size_t>(r * out.stride + CoarseView::kMostSide)];
+    int64_t energy = 0;
+    for (int c = 0; c < out.cols; ++c) {
+      texture[c] = static_cast<int16_t>(kUnit * std::clamp(line[c] * scale, -kClip, kClip));
+      energy += texture[c] * texture[c];
+    }
+    out.energy[static_cast<size_t>(r)] = energy;
+  }
+  out.contrast_grey = seen_[rows] == 0 ? 0.0 : std::sqrt(energy_[rows] / seen_[rows]);
+}
+
+ShiftPeak ShiftSearch::find(const CoarseView& reference, const CoarseView& now, RowRange section, RowRange shifts,
+                            int side, int apart) {
+  best_.assign(static_cast<size_t>(shifts.last - shifts.first + 1), -1.0);
   ShiftPeak peak;
   int peak_shift = shifts.first;
   for (int shift = shifts.first; shift <= shifts.last; ++shift) {
-    double& here = best[static_cast<size_t>(shift - shifts.first)];
+    double& here = best_[static_cast<size_t>(shift - shifts.first)];
     for (int s = -side; s <= side; ++s) {
       const double score = correlation(reference, now, section, shift, s);
       here = std::max(here, score);
@@ -121,7 +140,7 @@ ShiftPeak find_shift(const CoarseView& reference, const CoarseView& now, RowRang
   }
   peak.rows = peak_shift;
   const auto at = [&](int shift) {
-    return shift < shifts.first || shift > shifts.last ? -1.0 : best[static_cast<size_t>(shift - shifts.first)];
+    return shift < shifts.first || shift > shifts.last ? -1.0 : best_[static_cast<size_t>(shift - shifts.first)];
   };
   for (int shift = shifts.first; shift <= shifts.last; ++shift) {
     if (std::abs(shift - peak_shift) > apart) peak.runner_up = std::max(peak.runner_up, at(shift));

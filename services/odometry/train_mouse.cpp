@@ -61,7 +61,7 @@ bool TrainMouse::look(const MousePicture& picture) {
     return false;
   }
   maker_->make(picture.grey, now_.pose, now_.view);
-  now_.coarse = make_coarse(now_.view);
+  coarse_maker_.make(now_.view, now_.coarse);
   return now_.coarse.contrast_grey > options_.lowest_contrast_grey;
 }
 
@@ -72,14 +72,13 @@ void TrainMouse::make_reference() {
   next.texture = std::make_unique<TextureReference>(now_.view, maker_->sheet(), texture);
   next.seen = now_;
   next.seen.view.grey = now_.view.grey.clone();
-  next.seen.coarse.texture = now_.coarse.texture.clone();
   reference_ = std::move(next);
 }
 
-TrainMouse::Rough TrainMouse::find_roughly(bool full_band, double predicted_m, double band_m) const {
+TrainMouse::Rough TrainMouse::find_roughly(bool full_band, double predicted_m, double band_m) {
   const vision::Sheet& sheet = maker_->sheet();
   const double cell_m = 2.0 * sheet.cell_m;
-  const int rows = now_.coarse.texture.rows;
+  const int rows = now_.coarse.rows;
   const int apart = static_cast<int>(std::ceil(0.16 / cell_m));
   RowRange shifts{static_cast<int>(std::floor((predicted_m - band_m) / cell_m)),
                   static_cast<int>(std::ceil((predicted_m + band_m) / cell_m))};
@@ -87,7 +86,7 @@ TrainMouse::Rough TrainMouse::find_roughly(bool full_band, double predicted_m, d
   shifts = {std::max(shifts.first, -limit), std::min(shifts.last, limit)};
   Rough rough;
   if (shifts.first > shifts.last) return rough;
-  const ShiftPeak whole = find_shift(reference_->seen.coarse, now_.coarse, {0, rows - 1}, shifts, 2, apart);
+  const ShiftPeak whole = search_.find(reference_->seen.coarse, now_.coarse, {0, rows - 1}, shifts, 2, apart);
   rough.score = whole.score;
   if (whole.score < options_.lowest_score) return rough;
   if (full_band && whole.runner_up > options_.ambiguity * whole.score) return rough;
@@ -102,7 +101,7 @@ TrainMouse::Rough TrainMouse::find_roughly(bool full_band, double predicted_m, d
     return RowRange{static_cast<int>(std::lround(shift)) - 3, static_cast<int>(std::lround(shift)) + 3};
   };
   const auto part = [&](RowRange section) {
-    const ShiftPeak peak = find_shift(reference_->seen.coarse, now_.coarse, section, around(whole.rows), 2, apart);
+    const ShiftPeak peak = search_.find(reference_->seen.coarse, now_.coarse, section, around(whole.rows), 2, apart);
     return peak.score > 0.5 * whole.score ? peak.rows : whole.rows;
   };
   rough.near_m = sheet.ahead_m(first + middle);

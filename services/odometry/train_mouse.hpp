@@ -108,7 +108,7 @@ class TrainMouse {
 
   bool look(const MousePicture& picture);
   void make_reference();
-  [[nodiscard]] Rough find_roughly(bool full_band, double predicted_m, double band_m) const;
+  [[nodiscard]] Rough find_roughly(bool full_band, double predicted_m, double band_m);
   [[nodiscard]] std::optional<Motion> align(const Rough& rough, MouseStep& step) const;
   void accept(const Motion& motion, MouseStep& step);
   double bridge(double speed_after_mps);
@@ -119,6 +119,8 @@ class TrainMouse {
   TrainMouseOptions options_;
   MotionFilter filter_;
   std::unique_ptr<vision::TopViewMaker> maker_;
+  CoarseViewMaker coarse_maker_;
+  ShiftSearch search_;
   Seen now_;
   std::optional<Reference> reference_;
   double curvature_per_m_ = 0;

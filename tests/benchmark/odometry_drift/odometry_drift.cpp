@@ -1,16 +1,15 @@
-// railfix-measure-odometry --dataset SEQ: drift of the train mouse alone, with the true camera poses or with poses made
-// noisy, one line per 100 m and one for the whole run.
+// railfix-measure-odometry: drift of the train mouse alone, on a dataset or on pictures drawn on the way (--simulate),
+// with the poses of track_detector, with true poses made noisy, or with the mount's.
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <ctime>
-#include <unordered_map>
 
 #include "core/random.hpp"
-#include "core/time.hpp"
-#include "dataset/dataset.hpp"
+#include "core/units.hpp"
+#include "drift.hpp"
 #include "odometry/train_mouse.hpp"
+#include "scene.hpp"
 #include "track_detector/track_detector.hpp"
 
 namespace railfix {
@@ -18,166 +17,184 @@ namespace {
 
 struct Arguments {
   std::string dataset;
-  std::string pose = "true";
-  double pitch_noise_rad = 0;
-  double pitch_bias_rad = 0;
-  double height_noise_m = 0;
-  double curvature_noise_per_m = 0;
-  double vertical_curvature_noise_per_m = 0;
+  simulator::SimulationOptions simulation;
+  Disturbances disturbances;
+  std::string map;
+  double speed_kmh = 72;
+  double pitch_deg = 12;
+  double focal_px = 1509;  // 8 mm and 5.3 um, as in paper 002
+  std::string pose = "detected";
+  double height_error_m = 0;
+  double pitch_noise_rad = 0, pitch_bias_rad = 0, height_noise_m = 0, curvature_noise_per_m = 0;
   size_t limit = 0;
   bool steps = false;
-  bool no_vertical = false;
+  bool windows = false;
+  track_detector::DetectorOptions detector;
   odometry::TrainMouseOptions mouse;
 };
 
+void add_simulation(CLI::App& app, Arguments& a) {
+  auto& simulation = a.simulation;
+  app.add_option("--simulate", simulation.start, "Draw the pictures on the way, from EDGE:OFFSET")->group("Simulation");
+  app.add_option("--map", a.map, "Compiled map")->group("Simulation");
+  app.add_option("--line", simulation.line, "Without a map: default or long")->group("Simulation");
+  app.add_option("--length-m", simulation.run.length_m, "")->group("Simulation");
+  app.add_option("--speed-kmh", a.speed_kmh, "")->group("Simulation");
+  app.add_option("--accelerate", simulation.run.accelerate_mps2, "m/s^2; brakes alike")->group("Simulation");
+  app.add_option("--dwell-s", simulation.run.dwell_s, "Standing at both ends")->group("Simulation");
+  app.add_option("--stop-at-m", simulation.run.stop_at_m, "")->group("Simulation");
+  app.add_option("--stop-s", simulation.run.stop_s, "")->group("Simulation");
+  app.add_option("--rate-hz", simulation.rate_hz, "")->group("Simulation");
+  app.add_option("--pitch-deg", a.pitch_deg, "")->group("Simulation");
+  app.add_option("--focal-px", a.focal_px, "")->group("Simulation");
+  app.add_option("--height-m", simulation.mount.height_m, "")->group("Simulation");
+  app.add_option("--shake", simulation.shake.scale, "")->group("Simulation");
+  app.add_option("--exposure-s", simulation.exposure_s, "")->group("Simulation");
+  app.add_option("--seed", simulation.seed, "")->group("Simulation");
+  app.add_option("--drop", a.disturbances.drop_share, "Share of pictures lost")->group("Simulation");
+  app.add_option("--jitter-s", a.disturbances.stamp_jitter_s, "Of the stamps, 1 sigma")->group("Simulation");
+}
+
+void add_mouse(CLI::App& app, odometry::TrainMouseOptions& mouse) {
+  const std::string group = "Train mouse";
+  app.add_option("--texture-depth", mouse.texture_depth_m, "m")->group(group);
+  app.add_option("--reference-length", mouse.reference_length_m, "m")->group(group);
+  app.add_option("--far", mouse.far_m, "m")->group(group);
+  app.add_option("--near", mouse.near_m, "m")->group(group);
+  app.add_option("--cell", mouse.cell_m, "m")->group(group);
+  app.add_option("--bias-sigma", mouse.filter.pitch_bias_sigma_rad, "rad")->group(group);
+  app.add_option("--bias-walk", mouse.filter.pitch_bias_walk_rad_per_sqrt_m, "rad/sqrt(m)")->group(group);
+  app.add_option("--ballast-sigma", mouse.filter.ballast_depth_sigma_m, "m")->group(group);
+  app.add_option("--ballast-depth", mouse.filter.ballast_depth_m, "m")->group(group);
+  app.add_option("--ballast-walk", mouse.filter.ballast_depth_walk_m_per_sqrt_m, "m/sqrt(m)")->group(group);
+}
+
 Arguments parse(int argc, char** argv) {
   Arguments a;
-  CLI::App app("Drift of the train mouse on a dataset with truth");
-  app.add_option("--dataset", a.dataset, "Dataset folder")->required();
-  app.add_option("--pose", a.pose, "true, detected (track_detector's) or mount")
+  a.simulation.rate_hz = 60;
+  a.simulation.start = "";
+  CLI::App app("Drift of the train mouse where the truth is known");
+  app.add_option("--dataset", a.dataset, "Dataset folder with truth");
+  add_simulation(app, a);
+  app.add_option("--pose", a.pose, "detected (track_detector's), true or mount")
       ->check(CLI::IsMember({"true", "detected", "mount"}));
-  app.add_option("--pitch-noise", a.pitch_noise_rad, "Added to every pose, 1 sigma, rad; yaw and roll get the same");
-  app.add_option("--pitch-bias", a.pitch_bias_rad, "Added to every pose, rad");
-  app.add_option("--height-noise", a.height_noise_m, "Added to every pose, 1 sigma, m; lateral gets the same");
-  app.add_option("--curvature-noise", a.curvature_noise_per_m, "1 sigma, 1/m");
-  app.add_option("--vertical-noise", a.vertical_curvature_noise_per_m, "1 sigma, 1/m");
-  app.add_flag("--no-vertical", a.no_vertical, "Vertical curvature is not known");
+  app.add_option("--height-error", a.height_error_m, "The calibration's height is wrong by so much, m");
+  app.add_option("--pitch-noise", a.pitch_noise_rad, "Added to true poses, 1 sigma, rad; yaw and roll get the same");
+  app.add_option("--pitch-bias", a.pitch_bias_rad, "Added to true and detected poses, rad");
+  app.add_option("--height-noise", a.height_noise_m, "Added to true poses, 1 sigma, m; lateral gets the same");
+  app.add_option("--curvature-noise", a.curvature_noise_per_m, "Added to the true curvature, 1 sigma, 1/m");
+  app.add_option("--rails-far", a.detector.far_m, "Rails are followed as far as this, m");
   app.add_option("--limit", a.limit, "Pictures");
   app.add_flag("--steps", a.steps, "Print every step");
-  app.add_option("--texture-depth", a.mouse.texture_depth_m, "m");
-  app.add_option("--reference-length", a.mouse.reference_length_m, "m");
-  app.add_option("--far", a.mouse.far_m, "m");
-  app.add_option("--near", a.mouse.near_m, "m");
-  app.add_option("--cell", a.mouse.cell_m, "m");
-  app.add_option("--bias-sigma", a.mouse.filter.pitch_bias_sigma_rad, "rad");
-  app.add_option("--bias-walk", a.mouse.filter.pitch_bias_walk_rad_per_sqrt_m, "rad/sqrt(m)");
-  app.add_option("--ballast-sigma", a.mouse.filter.ballast_depth_sigma_m, "m");
-  app.add_option("--ballast-depth", a.mouse.filter.ballast_depth_m, "m");
-  app.add_option("--ballast-walk", a.mouse.filter.ballast_depth_walk_m_per_sqrt_m, "m/sqrt(m)");
+  app.add_flag("--windows", a.windows, "Print every 100 m");
+  add_mouse(app, a.mouse);
   try {
     app.parse(argc, argv);
+    if (a.dataset.empty() == a.simulation.start.empty())
+      throw CLI::ValidationError("say either --dataset FOLDER or --simulate EDGE:OFFSET");
   } catch (const CLI::ParseError& error) {
     std::exit(app.exit(error));
   }
   return a;
 }
 
-class Drift {
+std::unique_ptr<Scene> open_scene(Arguments& a) {
+  if (!a.dataset.empty()) return open_dataset(a.dataset);
+  auto& simulation = a.simulation;
+  if (!a.map.empty())
+    simulation.map = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(a.map)));
+  simulation.render.camera = {a.focal_px, a.focal_px, 639.5, 511.5, 0, 0, 0, 0, 1280, 1024};
+  simulation.mount.pitch_rad = core::rad_from_deg(a.pitch_deg);
+  simulation.run.cruise_mps = core::mps_from_kmh(a.speed_kmh);
+  simulation.run.brake_mps2 = simulation.run.accelerate_mps2;
+  return simulate_track(simulation, a.disturbances);
+}
+
+// Where the mouse gets its poses from.
+class PoseSource {
  public:
-  void add(const dataset::TruthRow& truth, const odometry::MouseStep& step) {
-    ++pictures_;
-    valid_ += step.valid ? 1 : 0;
-    if (!step.valid) return;
-    if (begun_) {
-      const double true_step = truth.distance_m - last_truth_m_;
-      const double error = (step.distance_m - last_m_) - true_step;
-      squared_ += error * error;
-      if (std::abs(true_step) < 1e-4 && step.distance_m != last_m_) ++moved_at_rest_;
-      at_rest_ += std::abs(true_step) < 1e-4 ? 1 : 0;
-      travelled_ += std::abs(true_step);
-      ++steps_;
-    } else {
-      begun_ = true;
-      first_error_m_ = mark_error_m_ = step.distance_m - truth.distance_m;
-      mark_m_ = truth.distance_m;
-    }
-    last_truth_m_ = truth.distance_m;
-    last_m_ = step.distance_m;
-    if (std::abs(truth.distance_m - mark_m_) >= 100.0) {
-      const double error = step.distance_m - truth.distance_m;
-      std::printf(
-          "%8.1f m  %+8.3f m per 100 m   total %+8.3f m   speed %5.2f m/s   pitch bias %+.3f mrad   ballast %.1f mm\n",
-          truth.distance_m, (error - mark_error_m_) * 100.0 / std::abs(truth.distance_m - mark_m_),
-          error - first_error_m_, step.speed_mps, 1e3 * step.pitch_bias_rad, 1e3 * step.ballast_depth_m);
-      worst_percent_ =
-          std::max(worst_percent_, std::abs(error - mark_error_m_) / std::abs(truth.distance_m - mark_m_) * 100);
-      mark_m_ = truth.distance_m;
-      mark_error_m_ = error;
-    }
+  PoseSource(const Arguments& a, const dataset::CameraCalibration& calibration)
+      : a_(a), mount_(calibration.mount.value_or(geometry::CameraPose{})), random_(1) {
+    mount_.height_m += a.height_error_m;
+    detector_ = std::make_unique<track_detector::TrackDetector>(calibration.intrinsics, mount_, a.detector);
   }
-  void print(double seconds) const {
-    const double error = last_m_ - last_truth_m_ - first_error_m_;
-    std::printf("pictures %zu, valid %zu (%.2f %%), travelled %.1f m, drift %+.3f m = %+.4f %%, worst 100 m %.3f %%\n",
-                pictures_, valid_, 100.0 * static_cast<double>(valid_) / static_cast<double>(pictures_), travelled_,
-                error, 100.0 * error / std::max(1.0, travelled_), worst_percent_);
-    std::printf("step error %.2f mm (1 sigma), at rest %zu pictures of which moved %zu, %.2f ms a picture\n",
-                1e3 * std::sqrt(squared_ / static_cast<double>(std::max<size_t>(1, steps_))), at_rest_, moved_at_rest_,
-                1e3 * seconds / static_cast<double>(std::max<size_t>(1, pictures_)));
+  odometry::MousePicture picture(const Moment& moment) {
+    odometry::MousePicture picture;
+    picture.grey = moment.grey;
+    picture.stamp_ns = moment.stamp_ns;
+    picture.pose = mount_;
+    if (a_.pose == "true") noisy_truth(moment.truth, picture);
+    if (a_.pose == "detected") detect(picture);
+    return picture;
   }
 
  private:
-  bool begun_ = false;
-  double first_error_m_ = 0, mark_m_ = 0, mark_error_m_ = 0, last_m_ = 0, last_truth_m_ = 0;
-  double squared_ = 0, travelled_ = 0, worst_percent_ = 0;
-  size_t pictures_ = 0, valid_ = 0, steps_ = 0, at_rest_ = 0, moved_at_rest_ = 0;
+  void noisy_truth(const dataset::TruthRow& truth, odometry::MousePicture& picture) {
+    picture.pose = truth.camera;
+    picture.pose.pitch_rad += a_.pitch_bias_rad + random_.normal(0, a_.pitch_noise_rad);
+    picture.pose.yaw_rad += random_.normal(0, a_.pitch_noise_rad);
+    picture.pose.roll_rad += random_.normal(0, a_.pitch_noise_rad);
+    picture.pose.lateral_m += random_.normal(0, a_.height_noise_m);
+    picture.pose.height_m += random_.normal(0, a_.height_noise_m);
+    picture.pose_measured = true;
+    picture.trust = {std::max(1e-5, a_.pitch_noise_rad), std::max(1e-4, a_.height_noise_m)};
+    picture.curvature_per_m = truth.curvature_per_m + random_.normal(0, a_.curvature_noise_per_m);
+    picture.vertical_curvature_per_m = truth.vertical_curvature_per_m;
+  }
+  // As odometry_service takes it from track_view.
+  void detect(odometry::MousePicture& picture) {
+    const auto seen = detector_->detect(picture.grey);
+    const odometry::PoseTrust trust{std::sqrt(seen.covariance(1, 1)), std::sqrt(seen.covariance(4, 4))};
+    const bool good = (seen.seen_left || seen.seen_right) && trust.pitch_sigma_rad < a_.mouse.mount_pitch_sigma_rad;
+    if (good) {
+      last_ = seen.shape.camera;
+      last_->pitch_rad += a_.pitch_bias_rad;
+      if (std::sqrt(seen.covariance(5, 5)) < 1e-3) curvature_per_m_ = seen.shape.curvature_per_m;
+      picture.trust = trust;
+    }
+    picture.pose_measured = good;
+    picture.pose = last_.value_or(mount_);
+    picture.curvature_per_m = curvature_per_m_;
+    picture.vertical_curvature_per_m = seen.shape.vertical_curvature_per_m;
+  }
+  const Arguments& a_;
+  geometry::CameraPose mount_;
+  core::Random random_;
+  std::unique_ptr<track_detector::TrackDetector> detector_;
+  std::optional<geometry::CameraPose> last_;
+  double curvature_per_m_ = 0;
 };
 
-void disturb(const Arguments& a, core::Random& random, odometry::MousePicture& picture) {
-  picture.pose.pitch_rad += a.pitch_bias_rad + random.normal(0, a.pitch_noise_rad);
-  picture.pose.yaw_rad += random.normal(0, a.pitch_noise_rad);
-  picture.pose.roll_rad += random.normal(0, a.pitch_noise_rad);
-  picture.pose.lateral_m += random.normal(0, a.height_noise_m);
-  picture.pose.height_m += random.normal(0, a.height_noise_m);
-  picture.curvature_per_m += random.normal(0, a.curvature_noise_per_m);
-  picture.vertical_curvature_per_m += random.normal(0, a.vertical_curvature_noise_per_m);
-  if (a.no_vertical) picture.vertical_curvature_per_m = 0;
-  picture.trust = {std::max(1e-5, a.pitch_noise_rad), std::max(1e-4, a.height_noise_m)};
+void print_step(size_t count, const Moment& moment, const odometry::MousePicture& picture,
+                const odometry::MouseStep& step) {
+  std::printf(
+      "%zu true %.4f m %.3f m/s  got %.4f m %.3f m/s step %+.4f +- %.4f mode %d valid %d patches %d agreement %.2f "
+      "score %.2f lateral %+.4f yaw %+.5f pitch error %+.6f +- %.6f height error %+.5f +- %.5f vertical %+.7f error "
+      "%+.7f\n",
+      count, moment.truth.distance_m, moment.truth.speed_mps, step.distance_m, step.speed_mps, step.step_m,
+      step.step_sigma_m, static_cast<int>(step.mode), step.valid ? 1 : 0, step.patches, step.agreement, step.score,
+      step.lateral_m, step.yaw_rad, picture.pose.pitch_rad - moment.truth.camera.pitch_rad,
+      picture.trust.pitch_sigma_rad, picture.pose.height_m - moment.truth.camera.height_m, picture.trust.height_sigma_m,
+      moment.truth.vertical_curvature_per_m, picture.vertical_curvature_per_m - moment.truth.vertical_curvature_per_m);
 }
 
-void detect(track_detector::TrackDetector& detector, odometry::MousePicture& picture) {
-  const auto seen = detector.detect(picture.grey);
-  picture.pose = seen.shape.camera;
-  picture.pose_measured = seen.seen();
-  picture.trust = {std::sqrt(seen.covariance(1, 1)), std::sqrt(seen.covariance(4, 4))};
-  picture.curvature_per_m = seen.shape.curvature_per_m;
-  picture.vertical_curvature_per_m = seen.shape.vertical_curvature_per_m;
-}
-
-int measure(const Arguments& a) {
-  const auto calibration = core::value_or_throw(dataset::read_calibration(a.dataset + "/mav0/cam0/sensor.yaml"));
-  std::unordered_map<int64_t, dataset::TruthRow> truth;
-  for (const auto& row : core::value_or_throw(dataset::read_truth(a.dataset + "/truth/track.csv")))
-    truth[row.stamp_ns] = row;
-  auto source = core::value_or_throw(dataset::open_pictures(a.dataset, {}));
-  odometry::TrainMouse mouse(calibration.intrinsics, a.mouse);
-  track_detector::TrackDetector detector(calibration.intrinsics, calibration.mount.value_or(geometry::CameraPose{}),
-                                         {});
-  core::Random random(1);
-  Drift drift;
-  double seconds = 0;
+int measure(Arguments a) {
+  cv::setNumThreads(1);
+  const auto scene = open_scene(a);
+  odometry::TrainMouse mouse(scene->calibration().intrinsics, a.mouse);
+  PoseSource poses(a, scene->calibration());
+  Drift drift(a.windows);
   for (size_t count = 0; a.limit == 0 || count < a.limit; ++count) {
-    const auto next = core::value_or_throw(source->next());
-    if (!next) break;
-    const auto row = truth.find(next->stamp_ns);
-    if (row == truth.end()) continue;
-    odometry::MousePicture picture;
-    picture.grey = next->grey;
-    picture.stamp_ns = next->stamp_ns;
-    if (a.pose == "true") {
-      picture.pose = row->second.camera;
-      picture.pose_measured = true;
-      picture.curvature_per_m = row->second.curvature_per_m;
-      picture.vertical_curvature_per_m = row->second.vertical_curvature_per_m;
-      disturb(a, random, picture);
-    } else if (a.pose == "detected") {
-      detect(detector, picture);
-      if (a.no_vertical) picture.vertical_curvature_per_m = 0;
-    } else if (calibration.mount) {
-      picture.pose = *calibration.mount;
-    }
+    const auto moment = scene->next();
+    if (!moment) break;
+    const odometry::MousePicture picture = poses.picture(*moment);
     const std::clock_t begin = std::clock();  // processor time: other programs do not count
     const odometry::MouseStep step = mouse.process(picture);
-    seconds += static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
-    if (a.steps) {
-      std::printf(
-          "%zu true %.4f m %.3f m/s  got %.4f m %.3f m/s step %+.4f +- %.4f mode %d valid %d patches %d agreement %.2f "
-          "score %.2f\n",
-          count, row->second.distance_m, row->second.speed_mps, step.distance_m, step.speed_mps, step.step_m,
-          step.step_sigma_m, static_cast<int>(step.mode), step.valid ? 1 : 0, step.patches, step.agreement, step.score);
-    }
-    drift.add(row->second, step);
+    const double seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+    if (a.steps) print_step(count, *moment, picture, step);
+    drift.add(moment->truth, step, seconds);
   }
-  drift.print(seconds);
+  drift.print();
   return 0;
 }
 

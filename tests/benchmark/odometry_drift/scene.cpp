@@ -1,0 +1,103 @@
+#include "scene.hpp"
+
+#include <algorithm>
+#include <unordered_map>
+
+#include "core/random.hpp"
+#include "core/time.hpp"
+#include "simulator/builtin_line.hpp"
+
+namespace railfix {
+namespace {
+
+constexpr simulator::Strip kDrawn{70.0, 1.1};
+
+class Dataset : public Scene {
+ public:
+  explicit Dataset(const std::string& folder)
+      : calibration_(core::value_or_throw(dataset::read_calibration(folder + "/mav0/cam0/sensor.yaml"))),
+        pictures_(core::value_or_throw(dataset::open_pictures(folder, {}))) {
+    for (const auto& row : core::value_or_throw(dataset::read_truth(folder + "/truth/track.csv")))
+      truth_[row.stamp_ns] = row;
+  }
+  std::optional<Moment> next() override {
+    while (true) {
+      const auto picture = core::value_or_throw(pictures_->next());
+      if (!picture) return std::nullopt;
+      const auto row = truth_.find(picture->stamp_ns);
+      if (row != truth_.end()) return Moment{picture->grey, picture->stamp_ns, row->second};
+    }
+  }
+  [[nodiscard]] const dataset::CameraCalibration& calibration() const override { return calibration_; }
+
+ private:
+  dataset::CameraCalibration calibration_;
+  std::unique_ptr<dataset::PictureSource> pictures_;
+  std::unordered_map<int64_t, dataset::TruthRow> truth_;
+};
+
+std::shared_ptr<const simulator::Line> line_of(const simulator::SimulationOptions& options) {
+  const auto map =
+      options.map ? options.map
+                  : std::make_shared<const track::Map>(core::value_or_throw(simulator::builtin_line(options.line)));
+  return std::make_shared<const simulator::Line>(core::value_or_throw(
+      simulator::Line::make(map, core::value_or_throw(map->parse_position(options.start)), options.run.length_m, {})));
+}
+
+class Simulated : public Scene {
+ public:
+  Simulated(const simulator::SimulationOptions& options, const Disturbances& disturbances)
+      : options_(options),
+        disturbances_(disturbances),
+        calibration_{options.render.camera, options.rate_hz, options.mount},
+        line_(line_of(options)),
+        trajectory_(line_, options.run, options.mount, options.shake, options.seed),
+        renderer_(line_, only_track(options)),
+        random_(options.seed + 1000) {}
+
+  std::optional<Moment> next() override {
+    while (random_.uniform() < disturbances_.drop_share) ++count_;
+    const double time_s = static_cast<double>(count_++) / options_.rate_hz;
+    if (time_s > trajectory_.duration_s()) return std::nullopt;
+    Moment moment;
+    moment.truth = trajectory_.truth(time_s);
+    const auto& at = moment.truth;
+    const double jitter_s =
+        std::clamp(random_.normal(0, disturbances_.stamp_jitter_s), -0.4 / options_.rate_hz, 0.4 / options_.rate_hz);
+    moment.stamp_ns = trajectory_.begin_ns() + core::to_ns(time_s + jitter_s);
+    const double gain = simulator::camera_gain(trajectory_, time_s, options_.gain_wander, options_.seed);
+    moment.grey =
+        renderer_.render({at.camera, at.distance_m, at.speed_mps, options_.exposure_s, gain, random_.next(), {}});
+    return moment;
+  }
+  [[nodiscard]] const dataset::CameraCalibration& calibration() const override { return calibration_; }
+
+ private:
+  static simulator::RenderOptions only_track(const simulator::SimulationOptions& options) {
+    simulator::RenderOptions render = options.render;
+    render.seed = options.seed;
+    render.strip = kDrawn;
+    render.scenery = false;
+    return render;
+  }
+  simulator::SimulationOptions options_;
+  Disturbances disturbances_;
+  dataset::CameraCalibration calibration_;
+  std::shared_ptr<const simulator::Line> line_;
+  simulator::Trajectory trajectory_;
+  simulator::Renderer renderer_;
+  core::Random random_;
+  int64_t count_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<Scene> open_dataset(const std::string& folder) {
+  return std::make_unique<Dataset>(folder);
+}
+
+std::unique_ptr<Scene> simulate_track(const simulator::SimulationOptions& options, const Disturbances& disturbances) {
+  return std::make_unique<Simulated>(options, disturbances);
+}
+
+}  // namespace railfix

@@ -1,0 +1,38 @@
+// Pictures with truth, one after the other: from a dataset folder, or drawn on the way so that nothing need be stored.
+#pragma once
+
+#include <memory>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+
+#include "dataset/dataset.hpp"
+#include "simulator/simulation.hpp"
+
+namespace railfix {
+
+struct Moment {
+  cv::Mat grey;
+  int64_t stamp_ns = 0;  // as the camera says
+  dataset::TruthRow truth;
+};
+
+class Scene {
+ public:
+  virtual ~Scene() = default;
+  virtual std::optional<Moment> next() = 0;
+  [[nodiscard]] virtual const dataset::CameraCalibration& calibration() const = 0;
+};
+
+std::unique_ptr<Scene> open_dataset(const std::string& folder);
+
+/// What happens to pictures between the camera and us.
+struct Disturbances {
+  double drop_share = 0;      // pictures lost
+  double stamp_jitter_s = 0;  // 1 sigma of the stamp against the true time
+};
+
+/// Draws only the own track, 70 m ahead and 1.1 m to either side: the rest stays grey.
+std::unique_ptr<Scene> simulate_track(const simulator::SimulationOptions& options, const Disturbances& disturbances);
+
+}  // namespace railfix
