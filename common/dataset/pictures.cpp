@@ -191,7 +191,7 @@ MaybeSource open_video(const fs::path& file, const PictureOptions& options) {
   if (!capture.isOpened()) return Error{file.string() + " is neither a picture nor a video that can be opened"};
   if (fps <= 0) fps = capture.get(cv::CAP_PROP_FPS);
   if (!(fps > 0 && fps < 100'000)) fps = kDefaultFps;
-  return std::unique_ptr<PictureSource>(std::make_unique<VideoSource>(std::move(capture), fps, options.colour));
+  return std::unique_ptr<PictureSource>(std::make_unique<VideoSource>(capture, fps, options.colour));
 }
 
 }  // namespace
