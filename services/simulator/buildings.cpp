@@ -66,7 +66,7 @@ void add_lamps(Stage& stage, const Span& tunnel) {
   const double first = std::ceil(std::max(0.0, stage.foot_m() - tunnel.begin_m) / kLampSpacingM - 0.5) + 0.5;
   for (double s = tunnel.begin_m + first * kLampSpacingM; s < last; s += kLampSpacingM) {
     const double d = tunnel.left_m - 0.06;
-    stage.face(
+    stage.glow(
         {stage.at(s - 0.6, d, 3.0), stage.at(s + 0.6, d, 3.0), stage.at(s + 0.6, d, 3.2), stage.at(s - 0.6, d, 3.2)},
         0.9F, s - 3.0);
   }

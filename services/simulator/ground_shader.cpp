@@ -140,10 +140,10 @@ float GroundShader::balises(const GroundPixel& pixel, float below) const {
   return albedo;
 }
 
-float GroundShader::ground(const GroundPixel& pixel, float sleeper_half_length_m) const {
+float GroundShader::ground(const GroundPixel& pixel, const Reach& reach) const {
   const float ballast_s = pixel.at.s_m + pixel.slope_s * ballast_depth_m_;
   const float ballast_d = pixel.at.d_m + pixel.slope_d * ballast_depth_m_;
-  const float edge = kBallastEdgeM + (sleeper_half_length_m - 1.3F);
+  const float edge = kBallastEdgeM - 1.3F + (ballast_d > 0.0F ? reach.left_m : reach.right_m);
   float beside = std::abs(ballast_d) > edge ? 1.0F : 0.0F;
   if (std::abs(std::abs(ballast_d) - edge) < 0.7F) {
     const float ragged = 0.25F * std::sin((ballast_s + ragged_phase_m_) * kRagged) *
@@ -157,10 +157,10 @@ float GroundShader::ground(const GroundPixel& pixel, float sleeper_half_length_m
   }
   const float s = pixel.at.s_m + pixel.slope_s * sleeper_depth_m_;
   const float d = pixel.at.d_m + pixel.slope_d * sleeper_depth_m_;
-  if (std::abs(d) < sleeper_half_length_m + 0.2F) {
+  if (d < reach.left_m + 0.2F && d > -reach.right_m - 0.2F) {
     const float along =
         (sleepers_before(s + 0.5F * pixel.size_s_m) - sleepers_before(s - 0.5F * pixel.size_s_m)) / pixel.size_s_m;
-    const float share = along * cover(d, -sleeper_half_length_m, sleeper_half_length_m, pixel.edge_d_m);
+    const float share = along * cover(d, -reach.right_m, reach.left_m, pixel.edge_d_m);
     if (share > 0.0F) {
       const Sleeper& one = sleeper(s);
       const float spread = pixel.size_s_m < 0.5F ? one.grey : 1.0F;

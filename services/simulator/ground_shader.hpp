@@ -28,10 +28,15 @@ class GroundShader {
     const Tile& concrete;
     const Tile& verge;
   };
+  /// How far the sleepers reach from the track's middle; longer in switches.
+  struct Reach {
+    float left_m = 1.3F;
+    float right_m = 1.3F;
+  };
   GroundShader(const Line& line, const RenderOptions& options, const Tiles& tiles, double distance_m);
 
   /// Albedo (0..1) of ballast, sleepers, verge and balises.
-  [[nodiscard]] float ground(const GroundPixel& pixel, float sleeper_half_length_m) const;
+  [[nodiscard]] float ground(const GroundPixel& pixel, const Reach& reach) const;
   /// Foot and web of a track's rails over what is below.
   [[nodiscard]] static float foot_and_web(const GroundPixel& pixel, float below);
   /// Share of the pixel that a rail head covers, for one track.

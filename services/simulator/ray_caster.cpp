@@ -1,6 +1,9 @@
 #include "simulator/ray_caster.hpp"
 
 #include <cmath>
+#include <span>
+
+#include "simulator/switches.hpp"
 
 namespace railfix::simulator {
 namespace {
@@ -10,24 +13,14 @@ constexpr float kHighestHill = 0.068F;  // rise per metre
 constexpr float kFarGround = 0.42F;
 constexpr float kNearM = 40.0F;  // up to here Newton's method finds the surface
 constexpr float kMarchM = 4.0F;
-constexpr float kFlangewayM = 0.045F;
-constexpr float kBladesEndM = 0.4F;  // further apart than this the tracks' rails are whole but for the frog
-constexpr float kHalfSleeperM = 1.3F;
+constexpr float kFrogPlate = 0.17F;
+constexpr float kCheckRail = 0.34F;
 constexpr float kOwnSleepersM = 2.2F;  // so far apart each track has its own sleepers
 constexpr float kBranchSideM = 3.0F;
 constexpr float kNowhereM = -1e6F;
 constexpr int kBlockPx = 8;  // so far apart rays are cast; between them the ground is smooth
 constexpr float kSmooth = 0.06F;
 constexpr float kHorizonRise = -1e-4F;
-
-// The inside of a rail where wheel flanges of that track run.
-float flangeway(const GroundPixel& pixel) {
-  const float d = std::abs(pixel.at.d_m);
-  const float size = pixel.edge_d_m;
-  const float a = std::max(kHalfGaugeM - kFlangewayM, d - 0.5F * size);
-  const float b = std::min(kHalfGaugeM, d + 0.5F * size);
-  return b > a ? (b - a) / size : 0.0F;
-}
 
 }  // namespace
 
@@ -216,7 +209,7 @@ float RayCaster::albedo(const Sample& here) const {
   if (!here.track) return light * light_.hazy(kFarGround, here.hit.x);
   float albedo = 0.0F;
   if (here.other_count == 0) {
-    albedo = GroundShader::foot_and_web(here.own, shader_.ground(here.own, kHalfSleeperM));
+    albedo = GroundShader::foot_and_web(here.own, shader_.ground(here.own, {}));
     const float share = GroundShader::head_cover(here.own);
     if (share > 0.0F) albedo += share * (shader_.head(here.own) - albedo);
   } else {
@@ -225,38 +218,35 @@ float RayCaster::albedo(const Sample& here) const {
   return light * light_.hazy(albedo, here.hit.x);
 }
 
-// Several tracks: the ground of the nearest, the rails of all. Wheels need their groove where rails come together:
-// blades stand off from the rail beside them, frogs have gaps.
+// Several tracks: the ground of the nearest, the rails of all.
 float RayCaster::junction(const Sample& here) const {
-  struct Other {
-    const GroundPixel* pixel;
-    float apart_m;
-  };
-  const GroundPixel& own = here.own;
-  Other others[kMostBranches];
-  size_t count = 0;
-  const GroundPixel* nearest = &own;
-  float half_length_m = kHalfSleeperM;
+  const GroundPixel* tracks[kMostBranches + 1] = {&here.own};
+  size_t count = 1;
+  const GroundPixel* nearest = &here.own;
+  GroundShader::Reach reach;
   for (size_t i = 0; i < here.other_count; ++i) {
     const GroundPixel& pixel = here.others[i];
     if (std::abs(pixel.at.d_m) > kBranchSideM) continue;
-    const float apart_m = std::abs(own.at.d_m - pixel.at.d_m);
-    others[count++] = {&pixel, apart_m};
-    if (apart_m < kOwnSleepersM) {
-      half_length_m = std::max(half_length_m, kHalfSleeperM + apart_m);
+    tracks[count++] = &pixel;
+    const float apart_m = here.own.at.d_m - pixel.at.d_m;
+    if (std::abs(apart_m) < kOwnSleepersM) {
+      (apart_m > 0.0F ? reach.left_m : reach.right_m) += std::abs(apart_m);
     } else if (std::abs(pixel.at.d_m) < std::abs(nearest->at.d_m)) {
       nearest = &pixel;
     }
   }
-  float albedo = GroundShader::foot_and_web(own, shader_.ground(*nearest, half_length_m));
-  for (size_t i = 0; i < count; ++i) albedo = GroundShader::foot_and_web(*others[i].pixel, albedo);
-  float own_share = GroundShader::head_cover(own);
+  if (nearest != &here.own) reach = {};
+  const std::span<const GroundPixel* const> near(tracks, count);
+  float albedo = shader_.ground(*nearest, reach);
   for (size_t i = 0; i < count; ++i) {
-    const float share = GroundShader::head_cover(*others[i].pixel) * (1.0F - flangeway(own));
-    if (share > 0.0F) albedo += share * (shader_.head(*others[i].pixel) - albedo);
-    if (others[i].apart_m > kBladesEndM) own_share *= 1.0F - flangeway(*others[i].pixel);
+    if (i == 0 || foot_shows(near, i)) albedo = GroundShader::foot_and_web(*tracks[i], albedo);
   }
-  if (own_share > 0.0F) albedo += own_share * (shader_.head(own) - albedo);
+  if (count > 1 && frog_plate(near, 0)) albedo = kFrogPlate;
+  for (size_t i = count; i-- > 0;) {
+    const HeadShare share = count > 1 ? head_share(near, i) : HeadShare{GroundShader::head_cover(*tracks[i]), 0.0F};
+    if (share.check > 0.0F) albedo += share.check * (kCheckRail - albedo);
+    if (share.running > 0.0F) albedo += share.running * (shader_.head(*tracks[i]) - albedo);
+  }
   return albedo;
 }
 

@@ -11,13 +11,6 @@
 namespace railfix::simulator {
 namespace {
 
-dataset::TruthRow truth_of(const Shot& shot) {
-  dataset::TruthRow truth;
-  truth.distance_m = shot.distance_m;
-  truth.camera = shot.pose;
-  return truth;
-}
-
 // Where the grey level crosses the middle between rail head (outside) and its dark side (inside), along the row.
 double edge_u(const cv::Mat& picture, double u, double v, int side) {
   const int row = static_cast<int>(std::lround(v));
