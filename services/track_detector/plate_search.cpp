@@ -106,8 +106,8 @@ std::optional<Extent> measure_extent(const std::vector<double>& profile, int cen
   return Extent{0.5 * (*low + *high), *high - *low};
 }
 
-std::optional<PlateCandidate> refine(const cv::Mat& grey, const vision::Sheet& sheet, const Layout& l,
-                                     const LandmarkOptions& options, const cv::Point& centre, double contrast) {
+std::optional<GroundCandidate> refine(const cv::Mat& grey, const vision::Sheet& sheet, const Layout& l,
+                                      const LandmarkOptions& options, const cv::Point& centre, double contrast) {
   const double sign = contrast > 0 ? 1.0 : -1.0;
   const int reach = static_cast<int>(std::lround(0.10 / sheet.cell_m));
   std::vector<double> along(static_cast<size_t>(grey.rows), 0.0);
@@ -128,13 +128,13 @@ std::optional<PlateCandidate> refine(const cv::Mat& grey, const vision::Sheet& s
   if (!length || !width) return std::nullopt;
   if (std::abs(length->length * sheet.cell_m - options.balise_length_m) > kSizeToleranceM) return std::nullopt;
   if (std::abs(width->length * sheet.cell_m - options.balise_width_m) > kSizeToleranceM) return std::nullopt;
-  return PlateCandidate{sheet.ahead_m(length->middle), sheet.offset_m(width->middle), std::abs(contrast)};
+  return GroundCandidate{sheet.ahead_m(length->middle), sheet.offset_m(width->middle), std::abs(contrast)};
 }
 
 }  // namespace
 
-std::vector<PlateCandidate> find_plates(const vision::TopView& view, const vision::Sheet& sheet,
-                                        const LandmarkOptions& options) {
+std::vector<GroundCandidate> find_plates(const vision::TopView& view, const vision::Sheet& sheet,
+                                         const LandmarkOptions& options) {
   const Layout l(options, sheet.cell_m);
   const Sums sums(view.grey);
   const int row_margin = l.half_rows + l.gap + l.strip + 1;
@@ -160,10 +160,10 @@ std::vector<PlateCandidate> find_plates(const vision::TopView& view, const visio
   }
   std::sort(hits.begin(), hits.end(),
             [](const Hit& a, const Hit& b) { return std::abs(a.contrast) > std::abs(b.contrast); });
-  std::vector<PlateCandidate> plates;
+  std::vector<GroundCandidate> plates;
   for (const Hit& hit : hits) {
     const double ahead_m = sheet.ahead_m(hit.centre.y);
-    const bool known = std::any_of(plates.begin(), plates.end(), [&](const PlateCandidate& plate) {
+    const bool known = std::any_of(plates.begin(), plates.end(), [&](const GroundCandidate& plate) {
       return std::abs(plate.ahead_m - ahead_m) < 2.0 * options.balise_length_m;
     });
     if (known) continue;

@@ -3,13 +3,13 @@
 
 #include <vector>
 
-#include "track_detector/landmark_finder.hpp"
+#include "track_detector/landmark_types.hpp"
 #include "vision/ground_sheet.hpp"
 
 namespace railfix::track_detector {
 
 /// Best first; no two overlap.
-std::vector<PlateCandidate> find_plates(const vision::TopView& view, const vision::Sheet& sheet,
-                                        const LandmarkOptions& options);
+std::vector<GroundCandidate> find_plates(const vision::TopView& view, const vision::Sheet& sheet,
+                                         const LandmarkOptions& options);
 
 }  // namespace railfix::track_detector

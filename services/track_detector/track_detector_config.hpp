@@ -26,6 +26,8 @@ struct TrackDetectorConfig {
                   "A rail is seen when it shows at this share of the places where it should.");
     fields.group("balises", "Plates between the rails that are reported as landmark_sighting.",
                  [this](service::Fields& group) { describe_balises(group); });
+    fields.group("sightings", "What else is reported as landmark_sighting.",
+                 [this](service::Fields& group) { describe_sightings(group); });
     fields.group("limits", "What suspension and curves do to the camera, one sigma about the mount.",
                  [this](service::Fields& group) { describe_limits(group); });
   }
@@ -40,6 +42,13 @@ struct TrackDetectorConfig {
     fields.number("lowest_contrast", landmarks.lowest_contrast, {0.02, 0.9}, "",
                   "Of the plate against each of its sides, share of the brightness.");
     fields.number("lowest_confidence", landmarks.lowest_confidence, {0, 1}, "", "Below it nothing is reported.");
+  }
+  void describe_sightings(service::Fields& fields) {
+    fields.flag("frogs", landmarks.frogs, "Frogs of switches.");
+    fields.flag("uprights", landmarks.uprights, "Masts, tunnel portals and bridges.");
+    fields.number("texture_depth_m", landmarks.texture_depth_m, {0, 0.5}, "m",
+                  "Sleepers and ballast below the rail heads: scale of the way between pictures.");
+    fields.number("way_sigma", landmarks.way_sigma, {0.001, 0.1}, "", "Error of that way, share of it.");
   }
   void describe_limits(service::Fields& fields) {
     auto& limits = detector.limits;

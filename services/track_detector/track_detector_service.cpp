@@ -173,7 +173,7 @@ void TrackDetectorService::find_landmarks(const cv::Mat& grey, const TrackObserv
     out.lateral_m(sighting.lateral_m);
     out.sigma_m(sighting.sigma_m);
     out.confidence(sighting.confidence);
-    out.kind(msg::SIGHTING_BALISE);
+    out.kind(static_cast<uint8_t>(sighting.type));
     sighting_writer_.write(out);
   }
 }

@@ -1,24 +1,39 @@
-// railfix-measure-landmarks --dataset SEQ: balises found with the true camera poses, against truth/landmarks.csv.
+// railfix-measure-landmarks --dataset SEQ: sightings of every kind against truth/landmarks.csv, with camera poses from
+// the rails (or the true ones) and the time they take.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <ctime>
+#include <map>
 
 #include "core/random.hpp"
 #include "core/time.hpp"
 #include "dataset/dataset.hpp"
 #include "track_detector/landmark_finder.hpp"
+#include "track_detector/track_detector.hpp"
 
 namespace railfix {
 namespace {
-
-constexpr double kMatchM = 1.5;  // half the distance of the balises of a group
 
 struct Found {
   double distance_m;
   track_detector::Sighting sighting;
 };
+
+struct Settings {
+  std::string folder;
+  double pitch_noise_rad = 0;
+  bool true_poses = false;
+  bool verbose = false;
+  double first_m = 40;  // what is nearer at the beginning cannot be followed
+};
+
+const std::map<std::string, track_detector::LandmarkType> kKinds = {
+    {"frog", track_detector::LandmarkType::frog},           {"balise", track_detector::LandmarkType::balise},
+    {"portal_in", track_detector::LandmarkType::portal_in}, {"portal_out", track_detector::LandmarkType::portal_out},
+    {"mast", track_detector::LandmarkType::mast},           {"bridge", track_detector::LandmarkType::bridge},
+    {"platform", track_detector::LandmarkType::platform}};
 
 double distance_at(const std::vector<dataset::TruthRow>& truth, int64_t stamp_ns) {
   const auto after = std::lower_bound(truth.begin() + 1, truth.end() - 1, stamp_ns,
@@ -29,56 +44,87 @@ double distance_at(const std::vector<dataset::TruthRow>& truth, int64_t stamp_ns
   return a.distance_m + share * (b.distance_m - a.distance_m);
 }
 
-void judge(const std::vector<dataset::TruthLandmark>& landmarks, const std::vector<Found>& found, double begin_m,
-           double end_m) {
+// Half the distance of the balises of a group; what stands beside the track is met more coarsely.
+double match_m(const std::string& kind) {
+  return kind == "balise" ? 1.5 : 3.0;
+}
+
+bool same_side(double a_m, double b_m) {
+  return std::abs(a_m) < 0.3 || std::abs(b_m) < 0.3 || a_m * b_m > 0;
+}
+
+void judge(const std::string& kind, const std::vector<dataset::TruthLandmark>& landmarks,
+           const std::vector<Found>& found, double begin_m, double end_m, bool verbose) {
+  std::vector<const dataset::TruthLandmark*> real;
+  for (const auto& landmark : landmarks) {
+    if (landmark.kind == kind) real.push_back(&landmark);
+  }
+  std::vector<bool> used(real.size());
+  std::vector<double> errors;
+  double normalised = 0;
+  int wrong = 0;
+  int said = 0;
+  for (const Found& f : found) {
+    if (f.sighting.type != kKinds.at(kind)) continue;
+    ++said;
+    size_t best = real.size();
+    for (size_t i = 0; i < real.size(); ++i) {
+      const double off_m = std::abs(f.distance_m - real[i]->distance_m);
+      if (used[i] || off_m > match_m(kind) || !same_side(f.sighting.lateral_m, real[i]->lateral_m)) continue;
+      if (best == real.size() || off_m < std::abs(f.distance_m - real[best]->distance_m)) best = i;
+    }
+    const double error_m = best < real.size() ? f.distance_m - real[best]->distance_m : NAN;
+    if (verbose || best == real.size()) {
+      std::printf("  %s %-10s at %9.3f m, error %+.3f m, sigma %.3f, lateral %+.2f, ahead %5.2f, confidence %.2f\n",
+                  best < real.size() ? "right" : "FALSE", kind.c_str(), f.distance_m, error_m, f.sighting.sigma_m,
+                  f.sighting.lateral_m, f.sighting.distance_ahead_m, f.sighting.confidence);
+    }
+    if (best == real.size()) {
+      ++wrong;
+      continue;
+    }
+    used[best] = true;
+    errors.push_back(error_m);
+    normalised += std::pow(error_m / f.sighting.sigma_m, 2);
+  }
   int expected = 0;
   int hit = 0;
-  int right = 0;
+  for (size_t i = 0; i < real.size(); ++i) {
+    if (real[i]->distance_m < begin_m || real[i]->distance_m > end_m + 3) continue;
+    ++expected;
+    hit += used[i] ? 1 : 0;
+    if (!used[i])
+      std::printf("  missed %s at %.2f m, lateral %+.2f m\n", kind.c_str(), real[i]->distance_m, real[i]->lateral_m);
+  }
   double sum = 0;
   double squared = 0;
-  double normalised = 0;
-  for (const auto& landmark : landmarks) {
-    if (landmark.kind != "balise" || landmark.distance_m < begin_m + 9.0 || landmark.distance_m > end_m + 4.0) continue;
-    ++expected;
-    const bool seen = std::any_of(found.begin(), found.end(), [&](const Found& f) {
-      return std::abs(f.distance_m - landmark.distance_m) < kMatchM;
-    });
-    hit += seen ? 1 : 0;
-    if (!seen) std::printf("missed  balise at %.2f m\n", landmark.distance_m);
-  }
-  for (const Found& f : found) {
-    double error = 1e9;
-    for (const auto& landmark : landmarks) {
-      if (landmark.kind == "balise" && std::abs(f.distance_m - landmark.distance_m) < std::abs(error)) {
-        error = f.distance_m - landmark.distance_m;
-      }
-    }
-    const bool matched = std::abs(error) < kMatchM;
-    std::printf("%s at %9.3f m  error %+.3f m  sigma %.3f  lateral %+.3f  ahead %.2f  confidence %.2f\n",
-                matched ? "right " : "FALSE ", f.distance_m, matched ? error : NAN, f.sighting.sigma_m,
-                f.sighting.lateral_m, f.sighting.distance_ahead_m, f.sighting.confidence);
-    if (!matched) continue;
-    ++right;
+  std::vector<double> absolute;
+  for (const double error : errors) {
     sum += error;
     squared += error * error;
-    normalised += error * error / (f.sighting.sigma_m * f.sighting.sigma_m);
+    absolute.push_back(std::abs(error));
   }
-  const double n = std::max(1, right);
+  std::sort(absolute.begin(), absolute.end());
+  const double n = std::max<double>(1, static_cast<double>(errors.size()));
   std::printf(
-      "balises expected %d, recall %.1f %%, sightings %zu, precision %.1f %%, mean error %+.3f m, rms %.3f m, "
+      "%-10s real %3d found %3d false %2d  recall %5.1f %%  precision %5.1f %%  mean %+.3f m  rms %.3f m  p95 %.3f m  "
       "rms/sigma %.2f\n",
-      expected, 100.0 * hit / std::max(1, expected), found.size(),
-      100.0 * right / std::max<double>(1, static_cast<double>(found.size())), sum / n, std::sqrt(squared / n),
+      kind.c_str(), expected, hit, wrong, 100.0 * hit / std::max(1, expected),
+      100.0 * (said - wrong) / std::max(1, said), sum / n, std::sqrt(squared / n),
+      absolute.empty() ? 0.0 : absolute[static_cast<size_t>(0.95 * static_cast<double>(absolute.size() - 1))],
       std::sqrt(normalised / n));
 }
 
-int measure(const std::string& folder, double pitch_noise_rad) {
+int measure(const Settings& settings) {
+  const std::string& folder = settings.folder;
   const auto calibration = core::value_or_throw(dataset::read_calibration(folder + "/mav0/cam0/sensor.yaml"));
   const auto truth = core::value_or_throw(dataset::read_truth(folder + "/truth/track.csv"));
   const auto landmarks = core::value_or_throw(dataset::read_truth_landmarks(folder + "/truth/landmarks.csv"));
   if (truth.size() < 2) throw core::BadInput(folder + "/truth/track.csv has fewer than two rows");
   auto source = core::value_or_throw(dataset::open_pictures(folder, {}));
   track_detector::LandmarkFinder finder(calibration.intrinsics, {});
+  track_detector::TrackDetector detector(calibration.intrinsics, calibration.mount.value_or(geometry::CameraPose{}),
+                                         {});
   core::Random random(1);
   std::vector<Found> found;
   double seconds = 0;
@@ -90,19 +136,30 @@ int measure(const std::string& folder, double pitch_noise_rad) {
     track_detector::LandmarkPicture picture;
     picture.grey = next->grey;
     picture.stamp_ns = next->stamp_ns;
-    picture.pose = row->camera;
-    picture.pose.pitch_rad += random.normal(0, pitch_noise_rad);
-    picture.curvature_per_m = row->curvature_per_m;
-    picture.vertical_curvature_per_m = row->vertical_curvature_per_m;
+    if (settings.true_poses) {
+      picture.pose = row->camera;
+      picture.pose.pitch_rad += random.normal(0, settings.pitch_noise_rad);
+      picture.curvature_per_m = row->curvature_per_m;
+      picture.vertical_curvature_per_m = row->vertical_curvature_per_m;
+    } else {
+      const auto rails = detector.detect(next->grey);
+      if (!rails.seen()) continue;
+      picture.pose = rails.shape.camera;
+      picture.curvature_per_m = rails.shape.curvature_per_m;
+      picture.pitch_sigma_rad = std::sqrt(rails.covariance(1, 1));
+    }
     const std::clock_t begin = std::clock();  // processor time: other programs do not count
-    const auto sightings = finder.process(picture);
+    const auto& sightings = finder.process(picture);
     seconds += static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
     ++pictures;
     for (const auto& sighting : sightings) {
       found.push_back({distance_at(truth, sighting.stamp_ns) + sighting.distance_ahead_m, sighting});
     }
   }
-  judge(landmarks, found, truth.front().distance_m, truth.back().distance_m);
+  for (const auto& [kind, type] : kKinds) {
+    judge(kind, landmarks, found, truth.front().distance_m + settings.first_m, truth.back().distance_m,
+          settings.verbose);
+  }
   std::printf("%zu pictures, %.2f ms each\n", pictures,
               1e3 * seconds / static_cast<double>(std::max<size_t>(1, pictures)));
   return 0;
@@ -112,14 +169,16 @@ int measure(const std::string& folder, double pitch_noise_rad) {
 }  // namespace railfix
 
 int main(int argc, char** argv) {
-  CLI::App app("Balises found on a dataset with truth");
-  std::string folder;
-  double pitch_noise_rad = 0;
-  app.add_option("--dataset", folder, "Dataset folder")->required();
-  app.add_option("--pitch-noise", pitch_noise_rad, "Added to every pose, 1 sigma, rad");
+  CLI::App app("Sightings on a dataset with truth");
+  railfix::Settings settings;
+  app.add_option("--dataset", settings.folder, "Dataset folder")->required();
+  app.add_flag("--true-poses", settings.true_poses, "Poses from truth/track.csv instead of from the rails");
+  app.add_option("--pitch-noise", settings.pitch_noise_rad, "Added to every true pose, 1 sigma, rad");
+  app.add_option("--first-m", settings.first_m, "Landmarks in the first metres do not count");
+  app.add_flag("--verbose", settings.verbose, "Every sighting, not only false and missed ones");
   CLI11_PARSE(app, argc, argv);
   try {
-    return railfix::measure(folder, pitch_noise_rad);
+    return railfix::measure(settings);
   } catch (const railfix::core::BadInput& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 2;

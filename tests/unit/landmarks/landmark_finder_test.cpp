@@ -28,7 +28,7 @@ geometry::CameraPose mount() {
   return pose;
 }
 
-// Noisy ground with sleepers, and one plate in it.
+// Noisy ballast with sleepers, and one plate in it.
 class Scene {
  public:
   double plate_m = 30;
@@ -40,6 +40,13 @@ class Scene {
     for (int v = 0; v < grey.rows; ++v) {
       for (int u = 0; u < grey.cols; ++u) grey.at<uchar>(v, u) = static_cast<uchar>(80 + 12 * random_.uniform());
     }
+    for (auto k = static_cast<int64_t>(distance_m / kStoneM); static_cast<double>(k) * kStoneM < distance_m + 15; ++k) {
+      core::Random stones(static_cast<uint64_t>(k));
+      for (int column = -3; column < 3; ++column) {
+        const double s = static_cast<double>(k) * kStoneM;
+        paint(grey, {s - distance_m, kStoneM, 0.2, 0.2 * column + 0.1, 0.18}, 75 + 25 * stones.uniform());
+      }
+    }
     for (double s = std::floor(distance_m / 0.6) * 0.6; s < distance_m + 30; s += 0.6) {
       paint(grey, {s - distance_m, 0.27, 2.6, 0.0, 0.18}, 115);
     }
@@ -49,6 +56,7 @@ class Scene {
   }
 
  private:
+  static constexpr double kStoneM = 0.15;
   struct Area {
     double ahead_m, length_m, width_m, lateral_m, depth_m;
   };
