@@ -52,12 +52,13 @@ core::Result<DatasetWriter> DatasetWriter::create(const fs::path& root) {
 }
 
 core::Status DatasetWriter::write_camera(const dataset::CameraCalibration& calibration,
-                                         const std::vector<int64_t>& stamps, const std::string& format) const {
+                                         const std::vector<Exposure>& exposures, const std::string& format) const {
   const auto status = dataset::write_calibration(root_ / "mav0/cam0/sensor.yaml", calibration);
   if (!status.ok()) return status;
   core::CsvWriter csv(root_ / "mav0/cam0/data.csv", "#timestamp [ns],filename");
-  for (const int64_t stamp : stamps) {
-    csv << stamp << picture_name(stamp, format);
+  for (const auto& exposure : exposures) {
+    if (exposure.dropped) continue;
+    csv << exposure.stamp_ns << picture_name(exposure.stamp_ns, format);
     csv.end_row();
   }
   return csv.close();
@@ -90,18 +91,20 @@ core::Status DatasetWriter::write_sensors(const SensorModel& sensors, const Sens
   return gnss.close();
 }
 
-core::Status DatasetWriter::write_truth(const Trajectory& trajectory, const std::vector<int64_t>& stamps,
+core::Status DatasetWriter::write_truth(const Trajectory& trajectory, const std::vector<Exposure>& exposures,
                                         const geometry::Intrinsics& camera) const {
   core::CsvWriter track(root_ / "truth/track.csv",
                         "timestamp,distance,speed,acceleration,camera_height,lateral,pitch,yaw,roll,curvature,vertical_"
                         "curvature,easting,northing,heading");
   core::CsvWriter rails(root_ / "truth/rails.csv", "stamp_ns,rail,u_px,v_px");
-  for (const int64_t stamp : stamps) {
-    const auto row = trajectory.truth(core::seconds(stamp - trajectory.begin_ns()));
+  for (const auto& exposure : exposures) {
+    const int64_t stamp = exposure.stamp_ns;
+    const auto row = trajectory.truth(core::seconds(exposure.exposed_ns - trajectory.begin_ns()));
     track << stamp << row.distance_m << row.speed_mps << row.acceleration_mps2 << row.camera.height_m
           << row.camera.lateral_m << row.camera.pitch_rad << row.camera.yaw_rad << row.camera.roll_rad
           << row.curvature_per_m << row.vertical_curvature_per_m << row.easting_m << row.northing_m << row.heading_rad;
     track.end_row();
+    if (exposure.dropped) continue;
     for (const int side : {1, -1}) {
       for (const double ahead : kEdgeAheadM) {
         const auto pixel = rail_edge_px(trajectory.line(), row, camera, ahead, side);
@@ -123,6 +126,28 @@ core::Status DatasetWriter::write_truth(const Trajectory& trajectory, const std:
     landmarks.end_row();
   }
   return landmarks.close();
+}
+
+core::Status DatasetWriter::write_visibility(const std::vector<Exposure>& exposures,
+                                             const std::vector<Visibility>& visibilities) const {
+  core::CsvWriter csv(root_ / "truth/visibility.csv", "stamp_ns,exposed_ns,sequence,rails_visible,gain");
+  for (size_t k = 0; k < exposures.size(); ++k) {
+    if (exposures[k].dropped) continue;
+    csv << exposures[k].stamp_ns << exposures[k].exposed_ns << static_cast<int64_t>(k) << visibilities[k].rails
+        << visibilities[k].gain;
+    csv.end_row();
+  }
+  return csv.close();
+}
+
+core::Status DatasetWriter::write_description(const std::string& text) const {
+  if (text.empty()) return {};
+  const auto file = root_ / "simulation.yaml";
+  std::ofstream stream(file);
+  stream << text;
+  stream.close();
+  if (!stream) return core::Error{file.string() + " could not be written completely; is the disk full?"};
+  return {};
 }
 
 core::Status DatasetWriter::write_map(const track::Map& map) const {

@@ -4,10 +4,17 @@
 #include <filesystem>
 
 #include "core/result.hpp"
+#include "simulator/scenario.hpp"
 #include "simulator/sensors.hpp"
 #include "simulator/trajectory.hpp"
 
 namespace railfix::simulator {
+
+/// How well a picture shows what it should.
+struct Visibility {
+  double rails = 0;  // share of the own rails, see Renderer::rails_visible
+  double gain = 1;
+};
 
 class DatasetWriter {
  public:
@@ -17,13 +24,19 @@ class DatasetWriter {
   [[nodiscard]] std::filesystem::path picture_file(const std::string& name) const {
     return root_ / "mav0/cam0/data" / name;
   }
-  /// sensor.yaml and data.csv of the camera; picture k is at k / rate_hz.
+  /// sensor.yaml and data.csv of the camera.
   [[nodiscard]] core::Status write_camera(const dataset::CameraCalibration& calibration,
-                                          const std::vector<int64_t>& stamps, const std::string& format) const;
+                                          const std::vector<Exposure>& exposures, const std::string& format) const;
   [[nodiscard]] core::Status write_sensors(const SensorModel& sensors, const SensorOptions& options) const;
-  /// truth/track.csv, one row per stamp; truth/rails.csv, exact inner rail edges in the picture; truth/landmarks.csv.
-  [[nodiscard]] core::Status write_truth(const Trajectory& trajectory, const std::vector<int64_t>& stamps,
+  /// truth/track.csv, one row a picture, dropped ones too: what it shows; truth/rails.csv, exact inner rail edges in
+  /// the picture; truth/landmarks.csv.
+  [[nodiscard]] core::Status write_truth(const Trajectory& trajectory, const std::vector<Exposure>& exposures,
                                          const geometry::Intrinsics& camera) const;
+  /// truth/visibility.csv, one row a picture that was not dropped.
+  [[nodiscard]] core::Status write_visibility(const std::vector<Exposure>& exposures,
+                                              const std::vector<Visibility>& visibilities) const;
+  /// simulation.yaml, with nothing to say no file.
+  [[nodiscard]] core::Status write_description(const std::string& text) const;
   [[nodiscard]] core::Status write_map(const track::Map& map) const;
 
  private:

@@ -6,6 +6,7 @@
 
 #include "simulator/line.hpp"
 #include "simulator/look.hpp"
+#include "simulator/shadow_field.hpp"
 
 namespace railfix::simulator {
 
@@ -13,6 +14,16 @@ namespace railfix::simulator {
 class Illumination {
  public:
   Illumination(const Line& line, const Light& light, double distance_m);
+  /// With shadows of trees and clouds that take the share `depth` of the sun's light.
+  void cast(const ShadowField::Slice& shadows, double depth) {
+    shadows_ = shadows;
+    shadow_depth_ = static_cast<float>(depth);
+  }
+  /// Share of the sun's light that shadows leave.
+  [[nodiscard]] float sunlit(float s_m, float d_m, float size_s_m, float size_d_m) const {
+    if (shadow_depth_ <= 0.0F) return 1.0F;
+    return 1.0F - shadow_depth_ * (1.0F - shadows_.lit(s_m, d_m, size_s_m, size_d_m));
+  }
 
   /// 1 = a bright diffuse day.
   struct Level {
@@ -36,6 +47,8 @@ class Illumination {
  private:
   static constexpr float kHaze = 0.62F;
   Light light_;
+  ShadowField::Slice shadows_{};
+  float shadow_depth_ = 0;
   float per_haze_m_;
   std::vector<Span> tunnels_;
 };

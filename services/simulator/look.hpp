@@ -1,4 +1,4 @@
-// How the world and the camera's glass look in one picture: light, weather and what is on the windscreen.
+// How the world and the windscreen look in one picture: light and weather of its moment.
 #pragma once
 
 namespace railfix::simulator {
@@ -14,11 +14,17 @@ struct Light {
   double haze_m = 500.0;         // things so far away are lost in it
 };
 
+/// Strengths from 0 (none) to 1 (as RenderOptions::weather says) where nothing else is said.
 struct Look {
   Light light;
-  double time_s = 0;        // since the beginning, for what moves by itself
-  double shadow_depth = 0;  // share of the sun's light that trees or clouds take
-  double wet = 0;           // ground and rails: 0 dry, 1 wet
+  double time_s = 0;   // since the beginning, for what moves by itself
+  double shadows = 0;  // share of the sun's light that trees or clouds take
+  double wet = 0;      // ground and rails
+  double rain = 0;     // drops in the air
+  double leaves = 0;   // in the air
+  double drops = 0;    // on the windscreen
+  double dirt = 0;
+  bool wiping = false;
 };
 
 }  // namespace railfix::simulator

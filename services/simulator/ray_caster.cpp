@@ -18,6 +18,10 @@ constexpr float kCheckRail = 0.34F;
 constexpr float kOwnSleepersM = 2.2F;  // so far apart each track has its own sleepers
 constexpr float kBranchSideM = 3.0F;
 constexpr float kNowhereM = -1e6F;
+constexpr float kBrushed = 0.12F;
+constexpr float kGlint = 1.6F;
+constexpr float kWetDarker = 0.48F;
+constexpr float kWetFilm = 0.30F;
 constexpr int kBlockPx = 8;  // so far apart rays are cast; between them the ground is smooth
 constexpr float kSmooth = 0.06F;
 constexpr float kHorizonRise = -1e-4F;
@@ -36,6 +40,9 @@ RayCaster::RayCaster(const Eye& eye, const Ground& ground)
       lateral_m_(static_cast<float>(eye.shot.pose.lateral_m)),
       blur_m_(static_cast<float>(std::abs(eye.shot.speed_mps) * eye.shot.exposure_s)),
       heading_rad_(static_cast<float>(eye.heading_rad)),
+      wet_(static_cast<float>(eye.shot.look.wet)),
+      sun_ahead_(static_cast<float>(std::cos(ground.light.open().sun_elevation_rad) *
+                                    std::cos(eye.heading_rad - ground.light.open().sun_heading_rad))),
       steepest_(ground.main.steepest(height_m_)) {}
 
 void RayCaster::row(const float* normal_x, const float* normal_y, int count, float* out) const {
@@ -205,17 +212,39 @@ GroundPixel RayCaster::pixel_on(const LocalTrack& track, const Eigen::Vector3f& 
 
 float RayCaster::albedo(const Sample& here) const {
   if (!here.ground) return sky(here.ray);
-  const float light = here.light.diffuse + here.light.direct;
-  if (!here.track) return light * light_.hazy(kFarGround, here.hit.x);
+  if (!here.track) return (here.light.diffuse + here.light.direct) * light_.hazy(kFarGround, here.hit.x);
+  const auto& at = here.own.at;
+  const float sunlit =
+      here.light.direct > 0.0F ? light_.sunlit(at.s_m, at.d_m, here.own.size_s_m, here.own.size_d_m) : 0.0F;
+  const float light = here.light.diffuse + here.light.direct * sunlit;
   float albedo = 0.0F;
   if (here.other_count == 0) {
-    albedo = GroundShader::foot_and_web(here.own, shader_.ground(here.own, {}));
+    albedo = wetted(GroundShader::foot_and_web(here.own, shader_.ground(here.own, {})), here.ray);
     const float share = GroundShader::head_cover(here.own);
-    if (share > 0.0F) albedo += share * (shader_.head(here.own) - albedo);
+    if (share > 0.0F) albedo += share * (head(here.own, here) - albedo);
   } else {
     albedo = junction(here);
   }
   return light * light_.hazy(albedo, here.hit.x);
+}
+
+// Worn steel is brushed along the track: it mirrors the sun wherever the ray and the sun make the same angle with it.
+float RayCaster::head(const GroundPixel& pixel, const Sample& here) const {
+  const float albedo = shader_.head(pixel);
+  if (here.light.direct <= 0.0F) return albedo;
+  const float along = here.ray.x() / here.ray.norm();
+  const float off = (along - sun_ahead_) * (1.0F / kBrushed);
+  return albedo * (1.0F + kGlint * here.light.direct / (here.light.direct + here.light.diffuse) * std::exp(-off * off));
+}
+
+// Water fills the pores, which makes things darker, and mirrors the sky under flat angles (Schlick's approximation).
+float RayCaster::wetted(float albedo, const Eigen::Vector3f& ray) const {
+  if (wet_ <= 0.0F) return albedo;
+  const float steep = 1.0F - std::abs(ray.z()) / ray.norm();
+  const float mirrored = steep * steep * steep * steep * steep;
+  const auto& open = light_.open();
+  const auto sky = static_cast<float>(open.dome / std::max(open.sky + open.sun, 1e-3));
+  return albedo * (1.0F - kWetDarker * wet_) + wet_ * kWetFilm * mirrored * std::min(sky, 1.5F);
 }
 
 // Several tracks: the ground of the nearest, the rails of all.
@@ -242,10 +271,11 @@ float RayCaster::junction(const Sample& here) const {
     if (i == 0 || foot_shows(near, i)) albedo = GroundShader::foot_and_web(*tracks[i], albedo);
   }
   if (count > 1 && frog_plate(near, 0)) albedo = kFrogPlate;
+  albedo = wetted(albedo, here.ray);
   for (size_t i = count; i-- > 0;) {
     const HeadShare share = count > 1 ? head_share(near, i) : HeadShare{GroundShader::head_cover(*tracks[i]), 0.0F};
     if (share.check > 0.0F) albedo += share.check * (kCheckRail - albedo);
-    if (share.running > 0.0F) albedo += share.running * (shader_.head(*tracks[i]) - albedo);
+    if (share.running > 0.0F) albedo += share.running * (head(*tracks[i], here) - albedo);
   }
   return albedo;
 }

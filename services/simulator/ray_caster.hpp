@@ -15,7 +15,7 @@ class RayCaster {
   struct Eye {
     const geometry::Intrinsics& camera;
     const Shot& shot;
-    double heading_rad;  // of the track at the foot, for the hills on the horizon
+    double heading_rad;  // of the track at the foot, for the hills on the horizon and the sun
   };
   struct Ground {
     const LocalTrack& main;
@@ -52,6 +52,8 @@ class RayCaster {
   [[nodiscard]] bool meet(const Eigen::Vector3f& ray, Hit& hit) const;
   [[nodiscard]] bool march(const Eigen::Vector3f& ray, Hit& hit) const;
   [[nodiscard]] float sky(const Eigen::Vector3f& ray) const;
+  [[nodiscard]] float head(const GroundPixel& pixel, const Sample& sample) const;
+  [[nodiscard]] float wetted(float albedo, const Eigen::Vector3f& ray) const;
   [[nodiscard]] float junction(const Sample& sample) const;
   [[nodiscard]] GroundPixel pixel_on(const LocalTrack& track, const Eigen::Vector3f& ray, const Hit& hit) const;
 
@@ -66,7 +68,9 @@ class RayCaster {
   float lateral_m_;
   float blur_m_;
   float heading_rad_;
-  float steepest_;  // rays above it meet the sky
+  float wet_;
+  float sun_ahead_;  // of the direction to the sun, its part along the track
+  float steepest_;   // rays above it meet the sky
 };
 
 }  // namespace railfix::simulator

@@ -4,6 +4,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/random.hpp"
+#include "simulator/air.hpp"
 #include "simulator/ground_shader.hpp"
 #include "simulator/illumination.hpp"
 #include "simulator/ray_caster.hpp"
@@ -16,6 +17,15 @@ constexpr size_t kNoiseCount = 1U << 16U;
 constexpr float kWhite = 235.0F;  // grey level of albedo 1 at gain 1
 
 constexpr int kUndrawnGrey = 90;
+// Where and when a rail counts as visible.
+constexpr double kSeenFromM = 3.0;
+constexpr double kSeenToM = 25.0;
+constexpr double kSeenStepM = 0.5;
+constexpr double kHeadAlbedo = 0.75;
+constexpr double kBesideAlbedo = 0.35;
+constexpr double kLeastContrastGrey = 6.0;
+constexpr double kNoises = 2.0;
+constexpr float kClearEnough = 0.35F;
 constexpr double kStripBeginM = 0.5;
 constexpr double kStripStepM = 0.5;
 
@@ -52,6 +62,9 @@ void widen(const Eigen::Vector2d& a, const Eigen::Vector2d& b, int width, std::v
 Renderer::Renderer(std::shared_ptr<const Line> line, const RenderOptions& options)
     : line_(std::move(line)),
       options_(options),
+      shadows_(options.weather.shadows, mix_bits(options.seed, 105)),
+      windscreen_(options.weather.glass, {options.camera.width_px, options.camera.height_px},
+                  mix_bits(options.seed, 106)),
       ballast_(ballast_tile(mix_bits(options.seed, 101), 0.045F)),
       concrete_(concrete_tile(mix_bits(options.seed, 102))),
       verge_(verge_tile(mix_bits(options.seed, 103))) {
@@ -85,12 +98,14 @@ cv::Mat Renderer::render(const Shot& shot) const {
     if (!seen.empty()) branches.push_back(std::move(seen));
   }
   const GroundShader shader(*line_, options_, {ballast_, concrete_, verge_}, shot.distance_m);
-  const Illumination light(*line_, shot.look.light, shot.distance_m);
+  Illumination light(*line_, shot.look.light, shot.distance_m);
+  light.cast(shadows_.slice(shot.distance_m, shot.look.time_s), shot.look.shadows);
   const RayCaster caster({options_.camera, shot, foot.pose.heading_rad}, {main, branches, shader, light});
   const auto spans = drawn_spans(main, shot);
   // Kept from picture to picture: the system takes longer to give memory than we to fill it.
   thread_local cv::Mat radiance;
   radiance.create(options_.camera.height_px, options_.camera.width_px, CV_32FC1);
+  if (options_.strip.ahead_m > 0.0) radiance.setTo(kUndrawnGrey / kWhite);
   for (int v = 0; v < radiance.rows; ++v) {
     const auto span = spans[static_cast<size_t>(v)];
     const size_t first = static_cast<size_t>(v) * static_cast<size_t>(radiance.cols) + static_cast<size_t>(span.begin);
@@ -98,7 +113,60 @@ cv::Mat Renderer::render(const Shot& shot) const {
       caster.row(&normal_x_[first], &normal_y_[first], span.end - span.begin, radiance.ptr<float>(v) + span.begin);
   }
   if (options_.scenery && options_.strip.ahead_m <= 0.0) draw_scenery(*line_, main, light, options_, shot, radiance);
+  weather(shot, foot.pose.heading_rad, light, radiance);
   return expose(radiance, spans, shot);
+}
+
+InTheAir Renderer::air(const Shot& shot, double heading_rad) const {
+  return {options_.camera, shot.pose, shot.distance_m, shot.speed_mps, shot.exposure_s, heading_rad, options_.seed};
+}
+
+void Renderer::weather(const Shot& shot, double heading_rad, const Illumination& light, cv::Mat& radiance) const {
+  const auto here = air(shot, heading_rad);
+  if (shot.look.leaves > 0.0) draw_leaves(here, shot.look, light, radiance);
+  if (shot.look.rain > 0.0) draw_rain(here, shot.look, light, radiance);
+  windscreen_.apply(shot.look, radiance);
+  Glare(here, light).apply(radiance);
+}
+
+double Renderer::rails_visible(const Shot& shot) const {
+  const auto foot = line_->path().at(shot.distance_m);
+  const LocalTrack main(line_->main(), shot.distance_m, foot);
+  const Illumination light(*line_, shot.look.light, shot.distance_m);
+  const Glare glare(air(shot, foot.pose.heading_rad), light);
+  const geometry::View view(options_.camera, shot.pose);
+  std::vector<Eigen::Vector2d> pixels;
+  std::vector<float> levels;
+  for (double x = kSeenFromM; x <= kSeenToM; x += kSeenStepM) {
+    const auto at = static_cast<float>(x);
+    if (!main.covers(at)) break;
+    const double middle = -static_cast<double>(main.locate(at, 0.0F).d_m);
+    for (const double side : {1.0, -1.0}) {
+      const double y = middle + side * static_cast<double>(kHalfGaugeM);
+      const auto pixel = view.project({x, y, static_cast<double>(main.height(at, static_cast<float>(y)).z_m)});
+      if (!pixel || pixel->x() < 0 || pixel->y() < 0 || pixel->x() > options_.camera.width_px - 1 ||
+          pixel->y() > options_.camera.height_px - 1)
+        continue;
+      pixels.push_back(*pixel);
+      // Where shadows move the rail is judged in the shadow.
+      const auto level = light.on_ground(at, at, static_cast<float>(y));
+      levels.push_back(level.diffuse + level.direct * (1.0F - static_cast<float>(shot.look.shadows)));
+    }
+  }
+  const auto clear = windscreen_.clear(shot.look, pixels);
+  const double scale = static_cast<double>(kWhite) * shot.gain;
+  const double amplified = std::max(1.0, shot.gain);
+  int seen = 0;
+  for (size_t i = 0; i < pixels.size(); ++i) {
+    const double light_here = static_cast<double>(clear[i] * levels[i]);
+    const double veil = static_cast<double>(glare.at(pixels[i].x(), pixels[i].y()));
+    const double head = std::min(255.0, scale * (kHeadAlbedo * light_here + veil));
+    const double beside = std::min(255.0, scale * (kBesideAlbedo * light_here + veil));
+    const double noise = amplified * std::sqrt(options_.read_noise_grey * options_.read_noise_grey +
+                                               options_.shot_noise_grey * head / amplified);
+    seen += clear[i] > kClearEnough && head - beside > std::max(kLeastContrastGrey, kNoises * noise);
+  }
+  return pixels.empty() ? 0.0 : static_cast<double>(seen) / static_cast<double>(pixels.size());
 }
 
 std::vector<Renderer::Columns> Renderer::drawn_spans(const LocalTrack& main, const Shot& shot) const {
@@ -124,9 +192,11 @@ std::vector<Renderer::Columns> Renderer::drawn_spans(const LocalTrack& main, con
 
 cv::Mat Renderer::expose(const cv::Mat& radiance, const std::vector<Columns>& spans, const Shot& shot) const {
   cv::Mat picture(radiance.size(), CV_8UC1, cv::Scalar(kUndrawnGrey));
-  const Film film{kWhite * static_cast<float>(shot.gain),
-                  static_cast<float>(options_.read_noise_grey * options_.read_noise_grey),
-                  static_cast<float>(options_.shot_noise_grey)};
+  // What amplifies the light amplifies its noise.
+  const double amplified = std::max(1.0, shot.gain);
+  const double read_noise = options_.read_noise_grey * amplified;
+  const Film film{kWhite * static_cast<float>(shot.gain), static_cast<float>(read_noise * read_noise),
+                  static_cast<float>(options_.shot_noise_grey * amplified)};
   for (int v = 0; v < radiance.rows; ++v) {
     const auto span = spans[static_cast<size_t>(v)];
     const size_t first = static_cast<size_t>(v) * static_cast<size_t>(radiance.cols) + static_cast<size_t>(span.begin);

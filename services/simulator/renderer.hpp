@@ -10,7 +10,9 @@
 #include "simulator/line.hpp"
 #include "simulator/local_track.hpp"
 #include "simulator/look.hpp"
+#include "simulator/shadow_field.hpp"
 #include "simulator/texture.hpp"
+#include "simulator/windscreen.hpp"
 
 namespace railfix::simulator {
 
@@ -25,6 +27,12 @@ struct Strip {
   double beside_m = 1.2;
 };
 
+/// Shape of what Look gives the strength of.
+struct WeatherOptions {
+  ShadowShape shadows;
+  GlassOptions glass;
+};
+
 struct RenderOptions {
   geometry::Intrinsics camera;
   double texture_depth_m = 0.18;  // sleeper tops below the rail heads
@@ -34,6 +42,7 @@ struct RenderOptions {
   double vignetting = 0.18;       // loss of light in the corners
   bool scenery = true;            // masts, platforms, tunnels, bridges
   Strip strip;
+  WeatherOptions weather;
   uint64_t seed = 1;
 };
 
@@ -48,12 +57,18 @@ struct Shot {
   Look look;
 };
 
+class Illumination;
+struct InTheAir;
+
 /// Read-only after it is made: render() may be called from many threads.
 class Renderer {
  public:
   Renderer(std::shared_ptr<const Line> line, const RenderOptions& options);
   /// CV_8UC1 of the camera's size.
   [[nodiscard]] cv::Mat render(const Shot& shot) const;
+  /// Share of the own rails within 25 m and in the picture that stand out against what lies beside them: not dark,
+  /// not washed out, nothing on the windscreen before them.
+  [[nodiscard]] double rails_visible(const Shot& shot) const;
   [[nodiscard]] const RenderOptions& options() const { return options_; }
 
   struct Columns {
@@ -62,9 +77,13 @@ class Renderer {
 
  private:
   [[nodiscard]] std::vector<Columns> drawn_spans(const LocalTrack& main, const Shot& shot) const;  // of each row
+  void weather(const Shot& shot, double heading_rad, const Illumination& light, cv::Mat& radiance) const;
+  [[nodiscard]] InTheAir air(const Shot& shot, double heading_rad) const;
   [[nodiscard]] cv::Mat expose(const cv::Mat& radiance, const std::vector<Columns>& spans, const Shot& shot) const;
   std::shared_ptr<const Line> line_;
   RenderOptions options_;
+  ShadowField shadows_;
+  Windscreen windscreen_;
   Tile ballast_;
   Tile concrete_;
   Tile verge_;

@@ -8,6 +8,7 @@
 
 #include "core/result.hpp"
 #include "simulator/renderer.hpp"
+#include "simulator/scenario.hpp"
 #include "simulator/sensors.hpp"
 #include "simulator/trajectory.hpp"
 
@@ -25,8 +26,8 @@ struct SimulationOptions {
   RenderOptions render;  // camera set; its seed is `seed`
   geometry::CameraPose mount{0.0, 0.2094, 0.0, 0.0, 2.5};
   double rate_hz = 30.0;
-  double exposure_s = 0.002;
-  double gain_wander = 0.05;  // 1 sigma of the slow change of brightness
+  ScenarioOptions scenario;
+  std::string description;  // what is simulated, for SEQ/simulation.yaml
   bool pictures = true;
   std::string format = "png";  // png, jpg or pgm
   int jpeg_quality = 95;
@@ -47,8 +48,5 @@ using ProgressCall = std::function<void(size_t done, size_t total)>;
 /// Writes the folder as docs/dataset.md says, plus truth/rails.csv (exact inner rail edges of every picture).
 /// An existing folder is refused unless it is empty.
 core::Result<SimulationReport> simulate(const SimulationOptions& options, const ProgressCall& progress);
-
-/// Brightness factor of the camera at a time: auto-exposure that follows tunnels with a lag, and a slow wander.
-double camera_gain(const Trajectory& trajectory, double time_s, double wander, uint64_t seed);
 
 }  // namespace railfix::simulator

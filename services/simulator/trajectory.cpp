@@ -42,6 +42,9 @@ Trajectory::Trajectory(std::shared_ptr<const Line> line, const RunOptions& run, 
   }
   phase(run_.dwell_s, 0.0);
 
+  const double rattle = shake.scale > 0.0 ? shake.rattle_rad : 0.0;
+  rattle_ = {
+      {{2.0 * core::kPi * shake.rattle_hz, 0.3, rattle}, {2.0 * core::kPi * 1.37 * shake.rattle_hz, 1.9, rattle}}};
   core::Random random(seed ^ 0x5A5A5A5AULL);
   const double sigmas[5] = {shake.roll_rad, shake.pitch_rad, shake.yaw_rad, shake.lateral_m, shake.height_m};
   for (int axis = 0; axis < 5; ++axis) {
@@ -90,6 +93,8 @@ geometry::CameraPose Trajectory::shake(double time_s) const {
     for (const auto& wave : waves_[axis])
       values[axis] += envelope * wave.amplitude * std::sin(wave.rate_rps * time_s + wave.phase_rad);
   }
+  for (const auto& wave : rattle_)
+    values[1] += envelope * wave.amplitude * std::sin(wave.rate_rps * time_s + wave.phase_rad);
   return {values[0], values[1], values[2], values[3], values[4]};
 }
 

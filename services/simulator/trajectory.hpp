@@ -1,6 +1,7 @@
 // How the virtual train runs: speed profile, and the camera's shake; the exact truth at any time.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -29,6 +30,8 @@ struct ShakeOptions {
   double yaw_rad = 0.0015;
   double lateral_m = 0.010;
   double height_m = 0.005;
+  double rattle_rad = 0.0;  // fast pitching besides, 1 sigma
+  double rattle_hz = 14.0;
 };
 
 /// Distance, speed and acceleration of one moment.
@@ -67,6 +70,7 @@ class Trajectory {
   RunOptions run_;
   geometry::CameraPose mount_;
   std::vector<Phase> phases_;
+  std::array<Wave, 2> rattle_{};
   std::vector<Wave> waves_[5];  // roll, pitch, yaw, lateral, height
   double duration_s_ = 0;
 };

@@ -5,10 +5,14 @@
 #include "commands.hpp"
 #include "core/units.hpp"
 #include "progress.hpp"
+#include "scenario_files.hpp"
 #include "simulator/simulation.hpp"
+#include "simulator/simulator_config.hpp"
 
 namespace railfix::tool {
 namespace {
+
+constexpr const char* kSection = "simulator";
 
 struct Settings {
   simulator::SimulationOptions simulation;
@@ -17,7 +21,11 @@ struct Settings {
   double focal_px = 0;
   double speed_kmh = 72;
   double pitch_deg = 12;
-  std::vector<double> distortion;
+  std::vector<std::string> scenarios;
+  std::vector<std::string> sets;
+  std::vector<service::Override> shorthands;  // options that stand for a key
+  bool list_scenarios = false;
+  bool document = false;
   bool no_pictures = false;
   bool quiet = false;
 };
@@ -34,18 +42,66 @@ geometry::Intrinsics intrinsics(const Settings& settings) {
   camera.fu_px = camera.fv_px = settings.focal_px > 0 ? settings.focal_px : 0.9 * camera.width_px;
   camera.cu_px = 0.5 * (camera.width_px - 1);
   camera.cv_px = 0.5 * (camera.height_px - 1);
-  if (!settings.distortion.empty()) {
-    camera.k1 = settings.distortion[0];
-    camera.k2 = settings.distortion[1];
-    camera.p1 = settings.distortion[2];
-    camera.p2 = settings.distortion[3];
-  }
   return camera;
 }
 
-int simulate(Settings& settings) {
+// Scenario files one over the other, then --set, then the options that stand for a key.
+simulator::SimulatorConfig read_scenarios(const Settings& settings) {
+  std::vector<service::Override> changes;
+  for (const auto& set : settings.sets) {
+    const auto equals = set.find('=');
+    if (equals == std::string::npos)
+      throw core::BadInput("--set " + set + " is not key=value, like rain.intensity=0.5");
+    const std::string key = set.substr(0, equals);
+    const bool whole = key.starts_with(kSection + std::string("."));
+    changes.push_back({(whole ? "" : kSection + std::string(".")) + key, set.substr(equals + 1)});
+  }
+  changes.insert(changes.end(), settings.shorthands.begin(), settings.shorthands.end());
+  simulator::SimulatorConfig config;
+  const auto read = [&](const std::filesystem::path& file, const std::vector<service::Override>& over) {
+    const auto status =
+        service::read_section(kSection, file, over, {}, [&](service::Fields& fields) { config.describe(fields); });
+    if (!status.ok()) throw core::BadInput(status.error().message);
+  };
+  for (const auto& name : settings.scenarios) read(core::value_or_throw(find_scenario(name)), {});
+  read({}, changes);
+  return config;
+}
+
+int list_scenarios() {
+  for (const auto& scenario : ready_scenarios())
+    std::printf("%-20s %s\n", scenario.name.c_str(), scenario.what.c_str());
+  return 0;
+}
+
+void apply(Settings& settings, simulator::SimulatorConfig config) {
   auto& simulation = settings.simulation;
-  simulation.render.camera = intrinsics(settings);
+  auto camera = intrinsics(settings);
+  const auto& lens = config.render.camera;
+  camera.k1 = lens.k1;
+  camera.k2 = lens.k2;
+  camera.p1 = lens.p1;
+  camera.p2 = lens.p2;
+  const double texture_depth_m = simulation.render.texture_depth_m;
+  simulation.scenario = config.scenario;
+  simulation.shake = config.shake;
+  simulation.render = config.render;
+  simulation.render.camera = camera;
+  simulation.render.texture_depth_m = texture_depth_m;
+  simulation.description =
+      "# What `railfix simulate` drew here; seed " + std::to_string(simulation.seed) + ".\n" +
+      service::document_section(kSection, [&](service::Fields& fields) { config.describe(fields); });
+}
+
+int simulate(Settings& settings) {
+  if (settings.list_scenarios) return list_scenarios();
+  if (settings.document) {
+    std::fputs(service::document_config<simulator::SimulatorConfig>(kSection).c_str(), stdout);
+    return 0;
+  }
+  auto& simulation = settings.simulation;
+  if (simulation.out.empty()) throw core::BadInput("--out is missing: name the dataset folder to write (new or empty)");
+  apply(settings, read_scenarios(settings));
   simulation.run.cruise_mps = core::mps_from_kmh(settings.speed_kmh);
   simulation.mount.pitch_rad = core::rad_from_deg(settings.pitch_deg);
   simulation.pictures = !settings.no_pictures;
@@ -74,9 +130,6 @@ void add_camera_options(CLI::App& app, Settings& settings) {
   app.add_option("--focal-px", settings.focal_px, "focal length (default 0.9 x width)")
       ->check(CLI::Range(10.0, 50000.0))
       ->group(group);
-  app.add_option("--distortion", settings.distortion, "k1 k2 p1 p2 of the lens (default none)")
-      ->expected(4)
-      ->group(group);
   app.add_option("--height-m", simulation.mount.height_m, "camera over the rail heads")
       ->check(CLI::Range(0.3, 20.0))
       ->capture_default_str()
@@ -87,23 +140,6 @@ void add_camera_options(CLI::App& app, Settings& settings) {
       ->group(group);
   app.add_option("--lateral-m", simulation.mount.lateral_m, "camera left of the track's middle")
       ->check(CLI::Range(-3.0, 3.0))
-      ->capture_default_str()
-      ->group(group);
-  app.add_option("--exposure-s", simulation.exposure_s, "motion blur = speed x exposure")
-      ->check(CLI::Range(0.0, 0.1))
-      ->capture_default_str()
-      ->group(group);
-  app.add_option("--gain-wander", simulation.gain_wander, "slow change of brightness, 1 sigma")
-      ->check(CLI::Range(0.0, 0.5))
-      ->capture_default_str()
-      ->group(group);
-  app.add_option("--noise-grey", simulation.render.read_noise_grey, "noise in the dark, 1 sigma")
-      ->check(CLI::Range(0.0, 50.0))
-      ->capture_default_str()
-      ->group(group);
-  app.add_option("--shake", simulation.shake.scale,
-                 "shake of the camera, 1 = roll 0.09, pitch 0.14, yaw 0.09 deg, 10 mm at 72 km/h")
-      ->check(CLI::Range(0.0, 20.0))
       ->capture_default_str()
       ->group(group);
   app.add_option("--texture-depth-m", simulation.render.texture_depth_m, "sleeper tops below the rail heads")
@@ -118,16 +154,33 @@ void add_camera_options(CLI::App& app, Settings& settings) {
       ->check(CLI::Range(1, 100))
       ->capture_default_str()
       ->group(group);
-  app.add_option("--only-ahead-m", simulation.render.strip.ahead_m,
-                 "draw the own track so far ahead and nothing else, for long runs (0 = whole pictures)")
-      ->check(CLI::Range(0.0, 200.0))
-      ->capture_default_str()
-      ->group(group);
-  app.add_option("--only-beside-m", simulation.render.strip.beside_m, "with --only-ahead-m: so far to each side")
-      ->check(CLI::Range(0.8, 20.0))
-      ->capture_default_str()
-      ->group(group);
   app.add_flag("--no-pictures", settings.no_pictures, "sensors and truth only")->group(group);
+}
+
+void add_scenario_options(CLI::App& app, Settings& settings) {
+  const std::string group = "Weather, light and camera (docs/configuration/simulation.md)";
+  app.add_option("--scenario", settings.scenarios,
+                 "FILE or name of a ready one; several: the later goes over the former")
+      ->group(group);
+  app.add_option("--set", settings.sets, "key=value over it, for example rain.intensity=0.5; may be repeated")
+      ->group(group);
+  app.add_flag("--list-scenarios", settings.list_scenarios, "say which are ready and end")->group(group);
+  app.add_flag("--document", settings.document, "print every key as YAML to begin with and end")->group(group);
+  const auto shorthand = [&](const char* name, const std::string& key) {
+    app.add_option_function<std::string>(
+           name,
+           [&settings, key](const std::string& value) {
+             settings.shorthands.push_back({kSection + std::string(".") + key, value});
+           },
+           "--set " + key)
+        ->group(group);
+  };
+  shorthand("--exposure-s", "exposure.time_s");
+  shorthand("--gain-wander", "exposure.wander");
+  shorthand("--noise-grey", "exposure.read_noise_grey");
+  shorthand("--shake", "vibration.shake");
+  shorthand("--only-ahead-m", "strip.ahead_m");
+  shorthand("--only-beside-m", "strip.beside_m");
 }
 
 void add_sensor_options(CLI::App& app, simulator::SensorOptions& sensors) {
@@ -164,7 +217,7 @@ void add_simulate(CLI::App& app, Action& chosen) {
                          "  railfix simulate --start 1:250 --length-m 300 --speed-kmh 72 --out /tmp/demo\n"
                          "  railfix run --dataset /tmp/demo --start 1:250:+ --out /tmp/demo-run\n"
                          "The same seed gives the same bytes.");
-  command->add_option("--out", simulation.out, "dataset folder to write (new or empty)")->required();
+  command->add_option("--out", simulation.out, "dataset folder to write (new or empty)");
   auto* map = command->add_option("--map", settings->map, "map made by `railfix map build` (default: a built-in line)")
                   ->check(CLI::ExistingFile);
   command->add_option("--line", simulation.line, "built-in line: default (4 km) or long (30 km)")
@@ -203,6 +256,7 @@ void add_simulate(CLI::App& app, Action& chosen) {
       ->capture_default_str();
   command->add_flag("--quiet", settings->quiet, "no progress bar");
   add_camera_options(*command, *settings);
+  add_scenario_options(*command, *settings);
   add_sensor_options(*command, simulation.sensors);
   command->callback([settings, &chosen] { chosen = [settings] { return simulate(*settings); }; });
 }

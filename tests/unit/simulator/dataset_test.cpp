@@ -1,12 +1,14 @@
 #include <gmock/gmock.h>
 #include <unistd.h>
 
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 
 #include "dataset/dataset.hpp"
 #include "simulator/builtin_line.hpp"
+#include "simulator/dataset_writer.hpp"
 #include "simulator/simulation.hpp"
 
 namespace railfix::simulator {
@@ -110,6 +112,47 @@ TEST(Dataset, SameSeedSameBytesWithAnyThreads) {
     ++compared;
   }
   EXPECT_GT(compared, 20U);
+}
+
+// The row of a picture says what it shows, whatever its stamp says; lost pictures are in the truth only.
+TEST(Dataset, LostPicturesAndWrongStampsAreToldByTheTruth) {
+  const Folder folder("railfix-sim-lost");
+  auto options = short_run(folder.path);
+  options.rate_hz = 10.0;
+  options.render.camera.width_px = 64;
+  options.render.camera.height_px = 48;
+  options.scenario.frames.drop_share = 0.2;
+  options.scenario.frames.jitter_s = 0.01;
+  options.scenario.frames.drop_when = "3..8 s";
+  const auto report = simulate_quietly(options);
+  ASSERT_TRUE(report.ok()) << report.error().message;
+  const auto truth = core::value_or_throw(dataset::read_truth(folder.path / "truth/track.csv"));
+  EXPECT_LT(report.value().pictures, truth.size());
+  const auto pictures = core::value_or_throw(dataset::open_pictures(folder.path, {}));
+  EXPECT_EQ(pictures->count(), report.value().pictures);
+  std::ifstream stream(folder.path / "truth/visibility.csv");
+  std::string line;
+  std::getline(stream, line);
+  EXPECT_EQ(line, "stamp_ns,exposed_ns,sequence,rails_visible,gain");
+  size_t rows = 0;
+  size_t off = 0;
+  while (std::getline(stream, line)) {
+    long long stamp_ns = 0;
+    long long exposed_ns = 0;
+    size_t sequence = 0;
+    double visible = -1.0;
+    ASSERT_EQ(std::sscanf(line.c_str(), "%lld,%lld,%zu,%lf", &stamp_ns, &exposed_ns, &sequence, &visible), 4) << line;
+    ASSERT_LT(sequence, truth.size());
+    EXPECT_EQ(truth[sequence].stamp_ns, stamp_ns);
+    EXPECT_NEAR(static_cast<double>(exposed_ns), 1.7e18 + 1e8 * static_cast<double>(sequence), 1e3);
+    EXPECT_TRUE(fs::exists(folder.path / "mav0/cam0/data" / picture_name(stamp_ns, "pgm")));
+    EXPECT_GE(visible, 0.0);
+    EXPECT_LE(visible, 1.0);
+    off += stamp_ns != exposed_ns;
+    ++rows;
+  }
+  EXPECT_EQ(rows, report.value().pictures);
+  EXPECT_GT(off, rows / 2);
 }
 
 TEST(Dataset, RefusesWhatCannotBe) {
