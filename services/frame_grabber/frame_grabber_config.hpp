@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "frame_grabber/live_camera.hpp"
 #include "frame_grabber/picture_health.hpp"
 #include "service/config.hpp"
 
@@ -24,13 +25,24 @@ struct FrameGrabberConfig {
   int64_t preview_width_px = 640;
   int64_t preview_quality = 75;
   PictureHealthConfig health;
+  LiveConfig live;
+
+  /// With the rate that is given for every kind of source.
+  [[nodiscard]] LiveConfig live_config() const {
+    LiveConfig config = live;
+    config.rate_hz = fps;
+    return config;
+  }
 
   void describe(service::Fields& fields) {
     fields.text("camera", camera,
                 "Name of the camera: the topics are camera_frame/<camera> and camera_preview/<camera>.");
-    fields.text("source", source, "Dataset folder (EuRoC or KITTI), folder of pictures, or video file.");
+    fields.text("source", source,
+                "Dataset folder (EuRoC or KITTI), folder of pictures, video file, or a live camera: genicam:ID "
+                "(or address, or any), capture:DEVICE, PIPELINE or URL.");
     fields.text("calibration", calibration, "Calibration file; empty = the one that lies with the pictures.");
-    fields.number("fps", fps, {0, 1000}, "1/s", "Rate of a folder of pictures or a video; 0 = the video's own, or 30.");
+    fields.number("fps", fps, {0, 1000}, "1/s",
+                  "Rate of a folder of pictures, a video or a live camera; 0 = its own, 30 for a folder.");
     fields.choice(
         "pace", pace, {"real", "lossless"},
         "real: at the recorded rate, late pictures are skipped; lossless: the next picture when all in wait_for "
@@ -57,6 +69,26 @@ struct FrameGrabberConfig {
                "Blurred: less than this share of the height of the sharpest edges lies within two pixels; 0 = never.");
       f.number("persist_s", health.persist_s, {0, 600}, "s", "Covered and blurred must last so long.");
     });
+    fields.group("live", "How a live camera is set.", [this](service::Fields& f) { describe_live(f); });
+  }
+
+ private:
+  void describe_live(service::Fields& f) {
+    f.number("exposure_us", live.exposure_us, {0, 1e6}, "us", "Exposure (genicam); 0 = the camera's automatic.");
+    f.number("gain_db", live.gain_db, {-1, 60}, "dB", "Gain (genicam); negative = the camera's automatic.");
+    f.text("pixel_format", live.pixel_format,
+           "Mono8, Mono12p, Mono12Packed, Mono16, BayerRG8, BayerGR8, BayerGB8, BayerBG8 or BGR8 (genicam); becomes "
+           "mono8.");
+    f.text("trigger", live.trigger, "Trigger source of the camera, as Line1 (genicam); empty = it runs by itself.");
+    f.integer("packet_size", live.packet_size, {0, 16000}, "bytes",
+              "Packets of GigE cameras (genicam); 0 = found out when it connects.");
+    f.integer("width_px", live.width_px, {0, 1920}, "px", "Width to ask of the camera; 0 = as it is set.");
+    f.integer("height_px", live.height_px, {0, 1920}, "px", "Height to ask of the camera; 0 = as it is set.");
+    f.flag("ptp", live.ptp, "The camera's clock follows the network's PTP clock, as this computer's does (genicam).");
+    f.number("latency_ms", live.latency_ms, {0, 1000}, "ms",
+             "From the end of exposure to the arrival of the picture's beginning; taken off the stamps.");
+    f.number("silent_s", live.silent_s, {0.2, 600}, "s", "A camera without a picture for so long is connected anew.");
+    f.number("reconnect_s", live.reconnect_s, {0.1, 600}, "s", "Pause between attempts to connect.");
   }
 };
 

@@ -94,12 +94,27 @@ FrameGrabberService::FrameGrabberService(const Config& config, service::Context&
       picture_health_(config.health),
       lock_step_(config.wait_for) {
   if (config_.source.empty()) {
-    throw core::BadInput("frame_grabber.source is empty; give a dataset folder, a folder of pictures or a video");
+    throw core::BadInput(
+        "frame_grabber.source is empty; give a dataset folder, a folder of pictures, a video, genicam:ID or "
+        "capture:DEVICE");
   }
+  live_camera_ = core::value_or_throw(make_live_camera(config_.source, config_.live_config()));
+  if (live_camera_) {
+    prepare_live();
+  } else {
+    prepare_recorded();
+  }
+  context_.at_stop([this] {
+    player_.reset();
+    feed_.reset();
+  });
+}
+
+void FrameGrabberService::prepare_recorded() {
   source_ = core::value_or_throw(dataset::open_pictures(config_.source, {config_.fps}));
   size_ = picture_size(config_);
   check_size(size_);
-  publish_calibration();
+  publish_calibration(calibration_of(config_));
   context_.on<msg::DataProgress>(messaging::topics::data_progress, [this](const msg::DataProgress& progress) {
     lock_step_.answered(progress.service().c_str(), progress.data_ns());
     if (!waiting_since_ns_ || !lock_step_.done()) return;
@@ -112,7 +127,6 @@ FrameGrabberService::FrameGrabberService(const Config& config, service::Context&
     check_wait();
     finish_after_last_words();
   });
-  context_.at_stop([this] { player_.reset(); });
   if (config_.start == "immediately") made_ns_ = core::monotonic_ns();
 }
 
@@ -150,52 +164,54 @@ void FrameGrabberService::play(const dataset::Picture& picture) {
     return player_->complete();
   }
   context_.health().input();
-  const uint32_t health = picture_health_.judge(picture.stamp_ns, picture.grey);
-  say_health(health);
   newest_ns_ = std::max(newest_ns_, picture.stamp_ns);
   if (lossless()) {
     lock_step_.begin(newest_ns_);
     waiting_since_ns_ = core::monotonic_ns();
   }
   if (lossless() || grabbed_ns - clock_sent_ns_ >= core::kNsPerSecond) publish_clock(newest_ns_, grabbed_ns, false);
-  publish_frame(picture, grabbed_ns, health);
-  publish_preview(picture, grabbed_ns, health);
+  publish(raw_of(picture.stamp_ns, picture.grey), grabbed_ns);
   if (lossless() && !lock_step_.done()) return;  // data_progress completes it
   waiting_since_ns_.reset();
   player_->complete();
 }
 
-void FrameGrabberService::publish_frame(const dataset::Picture& picture, int64_t grabbed_ns, uint32_t health) {
+void FrameGrabberService::publish(const RawPicture& picture, int64_t grabbed_ns) {
   ++frame_seq_;
-  const cv::Mat& grey = picture.grey;
+  uint32_t health = 0;
   const bool sent = frames_.write_in_place([&](msg::CameraFrame& frame) {
+    uint8_t* pixels = frame.data().data();
+    to_mono8(picture, pixels);
+    health = picture_health_.judge(picture.stamp_ns, cv::Mat(picture.size, CV_8UC1, pixels));
     frame.stamp_ns(picture.stamp_ns);
     frame.grabbed_ns(grabbed_ns);
     frame.seq(frame_seq_);
-    frame.width_px(static_cast<uint32_t>(grey.cols));
-    frame.height_px(static_cast<uint32_t>(grey.rows));
-    frame.exposure_s(0);
+    frame.width_px(static_cast<uint32_t>(picture.size.width));
+    frame.height_px(static_cast<uint32_t>(picture.size.height));
+    frame.exposure_s(picture.exposure_s);
     frame.health(health);
-    uint8_t* to = frame.data().data();
-    const auto columns = static_cast<size_t>(grey.cols);
-    for (int row = 0; row < grey.rows; ++row, to += columns) std::memcpy(to, grey.ptr(row), columns);
   });
   if (sent) {
     context_.health().output(grabbed_ns);
   } else {
     context_.health().dropped(1);
   }
+  say_health(health);
+  publish_preview(picture, grabbed_ns, health);
 }
 
-void FrameGrabberService::publish_preview(const dataset::Picture& picture, int64_t grabbed_ns, uint32_t health) {
+void FrameGrabberService::publish_preview(const RawPicture& picture, int64_t grabbed_ns, uint32_t health) {
   if (config_.preview_hz <= 0) return;
   const int64_t period_ns = core::to_ns(1.0 / config_.preview_hz);
   if (preview_ns_ && picture.stamp_ns >= *preview_ns_ && picture.stamp_ns - *preview_ns_ < period_ns) return;
   preview_ns_ = picture.stamp_ns;
-  cv::Mat small = picture.grey;
+  preview_grey_.create(picture.size, CV_8UC1);
+  to_mono8(picture, preview_grey_.data);
+  cv::Mat small = preview_grey_;
   if (small.cols > config_.preview_width_px) {
     const double scale = static_cast<double>(config_.preview_width_px) / small.cols;
-    cv::resize(picture.grey, small, {}, scale, scale, cv::INTER_AREA);
+    small = cv::Mat();
+    cv::resize(preview_grey_, small, {}, scale, scale, cv::INTER_AREA);
   }
   std::vector<uint8_t> jpeg;
   cv::imencode(".jpg", small, jpeg, {cv::IMWRITE_JPEG_QUALITY, static_cast<int>(config_.preview_quality)});
@@ -205,13 +221,13 @@ void FrameGrabberService::publish_preview(const dataset::Picture& picture, int64
   preview.seq(frame_seq_);
   preview.width_px(static_cast<uint32_t>(small.cols));
   preview.height_px(static_cast<uint32_t>(small.rows));
+  preview.exposure_s(picture.exposure_s);
   preview.health(health);
   preview.jpeg(std::move(jpeg));
   previews_.write(preview);
 }
 
-void FrameGrabberService::publish_calibration() {
-  const auto found = calibration_of(config_);
+void FrameGrabberService::publish_calibration(const std::optional<dataset::CameraCalibration>& found) {
   dataset::CameraCalibration calibration = found ? *found : guessed(size_);
   if (!found) context_.log().warn("no calibration lies with {}; the focal length is a guess", config_.source);
   if (!calibration.mount) context_.log().warn("the camera's mount is not known; run `railfix calibrate mount`");

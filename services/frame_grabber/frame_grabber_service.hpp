@@ -1,5 +1,5 @@
-// Pictures of a dataset, folder or video -> camera_frame, camera_preview, camera_calibration, and data_clock for
-// everyone.
+// Pictures of a camera, dataset, folder or video -> camera_frame, camera_preview, camera_calibration; recorded pictures
+// also give data_clock to everyone.
 #pragma once
 
 #include <memory>
@@ -7,6 +7,7 @@
 
 #include "dataset/dataset.hpp"
 #include "frame_grabber/frame_grabber_config.hpp"
+#include "frame_grabber/live_feed.hpp"
 #include "frame_grabber/pace.hpp"
 #include "frame_grabber/player.hpp"
 #include "service/service.hpp"
@@ -19,11 +20,15 @@ class FrameGrabberService {
   FrameGrabberService(const Config& config, service::Context& context);
 
  private:
+  void prepare_recorded();
+  void prepare_live();
   core::Result<std::string> start();
+  void shoot(const RawPicture& picture);
+  void say_packets(uint64_t bad_packets);
   void play(const dataset::Picture& picture);
-  void publish_frame(const dataset::Picture& picture, int64_t grabbed_ns, uint32_t health);
-  void publish_preview(const dataset::Picture& picture, int64_t grabbed_ns, uint32_t health);
-  void publish_calibration();
+  void publish(const RawPicture& picture, int64_t grabbed_ns);
+  void publish_preview(const RawPicture& picture, int64_t grabbed_ns, uint32_t health);
+  void publish_calibration(const std::optional<dataset::CameraCalibration>& calibration);
   void publish_clock(int64_t data_ns, int64_t wall_ns, bool ended);
   void say_health(uint32_t health);
   void broken(const std::string& why);
@@ -36,7 +41,8 @@ class FrameGrabberService {
   Config config_;
   service::Context& context_;
   std::unique_ptr<dataset::PictureSource> source_;  // until it plays
-  cv::Size size_;                                   // of every picture
+  std::unique_ptr<LiveCamera> live_camera_;         // until its feed has it
+  cv::Size size_;                                   // of every picture; empty while a live camera's is not known
   messaging::Writer<msg::CameraFrame> frames_;
   messaging::Writer<msg::CameraPreview> previews_;
   messaging::Writer<msg::CameraCalibration> calibrations_;
@@ -55,7 +61,10 @@ class FrameGrabberService {
   std::optional<int64_t> gave_up_ns_;
   std::string gave_up_why_;
   int bad_in_a_row_ = 0;
-  std::unique_ptr<Player> player_;  // last: its thread calls the context
+  cv::Mat preview_grey_;
+  uint64_t bad_packets_ = 0;
+  std::unique_ptr<Player> player_;  // last, as the feed: their threads call the context
+  std::unique_ptr<LiveFeed> feed_;
 };
 
 }  // namespace railfix::frame_grabber

@@ -44,10 +44,10 @@ class Program {
     std::filesystem::path err;     // empty: where `out` goes
     std::filesystem::path folder;  // to run in
   };
-  /// `arguments[0]` is the program's name in the build's bin folder.
+  /// `arguments[0]` is the program's name in the build's bin folder, or an absolute path.
   explicit Program(std::vector<std::string> arguments) : Program(std::move(arguments), Options{}) {}
   Program(std::vector<std::string> arguments, const Options& options) {
-    arguments[0] = std::string(RAILFIX_BIN_DIR) + "/" + arguments[0];
+    arguments[0] = (std::filesystem::path(RAILFIX_BIN_DIR) / arguments[0]).string();
     std::vector<char*> argv;
     for (auto& argument : arguments) argv.push_back(argument.data());
     argv.push_back(nullptr);

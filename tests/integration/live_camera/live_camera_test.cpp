@@ -1,0 +1,192 @@
+// frame_grabber as a program with live cameras: Aravis's fake GigE Vision camera on the loopback, a GStreamer pipeline
+// and a file through OpenCV.
+#include <gmock/gmock.h>
+#include <sys/file.h>
+
+#include <opencv2/videoio.hpp>
+
+#include "core/time.hpp"
+#include "messaging/topics.hpp"
+#include "support/program.hpp"
+#include "unit/dataset/temporary_folder.hpp"
+
+namespace railfix {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+namespace topics = messaging::topics;
+
+constexpr int kDomain = 83;
+constexpr int64_t kPatienceNs = 60 * core::kNsPerSecond;
+constexpr int64_t kPeriodNs = 20'000'000;
+const char* const kFakeCamera = "/usr/bin/arv-fake-gv-camera-0.8";
+
+/// The fake camera has one fixed port: tests of several builds on one computer take turns.
+class OnlyOne {
+ public:
+  OnlyOne() : file_(open("/tmp/railfix-fake-camera.lock", O_RDWR | O_CREAT | O_CLOEXEC, 0666)) {
+    flock(file_, LOCK_EX);
+  }
+  ~OnlyOne() { close(file_); }
+  OnlyOne(const OnlyOne&) = delete;
+  OnlyOne& operator=(const OnlyOne&) = delete;
+
+ private:
+  int file_;
+};
+
+class LiveCamera : public railfix::testing::TemporaryFolder {
+ protected:
+  LiveCamera()
+      : train_("live-" + std::to_string(getpid())),
+        participant_(options(train_)),
+        frames_reader_(participant_, topics::camera_frame, "cam0", queue_,
+                       [this](const msg::CameraFrame& frame) { take(frame); }),
+        status_reader_(participant_, topics::service_status, "", queue_,
+                       [this](const msg::ServiceStatus& status) { status_ = status; }),
+        calibration_reader_(participant_, topics::camera_calibration, "", queue_,
+                            [this](const msg::CameraCalibration& one) { calibration_ = one; }) {}
+
+  static messaging::ParticipantOptions options(const std::string& train) {
+    messaging::ParticipantOptions options;
+    options.train_id = train;
+    options.domain = kDomain;
+    return options;
+  }
+  struct Frame {
+    uint64_t seq;
+    int64_t stamp_ns;
+    int64_t grabbed_ns;
+    uint32_t width_px;
+    uint32_t height_px;
+    uint32_t health;
+    float exposure_s;
+  };
+  void take(const msg::CameraFrame& f) {
+    frames_.push_back({f.seq(), f.stamp_ns(), f.grabbed_ns(), f.width_px(), f.height_px(), f.health(), f.exposure_s()});
+  }
+  std::unique_ptr<test::Program> grabber(const std::string& source, std::vector<std::string> more) {
+    std::vector<std::string> sets{"common.train_id=" + train_, "common.domain=" + std::to_string(kDomain),
+                                  "common.log_level=error", "frame_grabber.source=" + source};
+    sets.insert(sets.end(), more.begin(), more.end());
+    return std::make_unique<test::Program>(test::with_settings("railfix-frame-grabber", sets));
+  }
+  template <class Condition>
+  bool run_until(Condition condition) {
+    const int64_t deadline_ns = core::monotonic_ns() + kPatienceNs;
+    while (!condition()) {
+      if (core::monotonic_ns() > deadline_ns) return false;
+      participant_.assert_liveliness();
+      queue_.run_one(core::monotonic_ns() + kPeriodNs);
+    }
+    return true;
+  }
+  [[nodiscard]] std::string reason() const { return status_.reason().c_str(); }
+  void expect_growing_stamps() const {
+    for (size_t i = 1; i < frames_.size(); ++i) {
+      EXPECT_GT(frames_[i].stamp_ns, frames_[i - 1].stamp_ns) << i;
+      EXPECT_GT(frames_[i].seq, frames_[i - 1].seq) << i;
+    }
+  }
+
+  std::string train_;
+  messaging::Queue queue_;
+  messaging::Participant participant_;
+  messaging::Reader<msg::CameraFrame> frames_reader_;
+  messaging::Reader<msg::ServiceStatus> status_reader_;
+  messaging::Reader<msg::CameraCalibration> calibration_reader_;
+  std::vector<Frame> frames_;
+  msg::ServiceStatus status_;
+  std::optional<msg::CameraCalibration> calibration_;
+};
+
+// The fake camera's picture is a smooth ramp, which is what a cover looks like: that has to last longer than the test.
+TEST_F(LiveCamera, AGigeCameraThatComesGoesAndComesBack) {
+  if (!std::filesystem::exists(kFakeCamera)) GTEST_SKIP() << "aravis-tools are not installed";
+  const OnlyOne only_one;
+  const auto service = grabber(
+      "genicam:127.0.0.1",
+      {"frame_grabber.fps=20", "frame_grabber.live.exposure_us=4000", "frame_grabber.live.width_px=320",
+       "frame_grabber.live.height_px=240", "frame_grabber.live.silent_s=1", "frame_grabber.live.reconnect_s=0.2",
+       "frame_grabber.health.persist_s=600", "frame_grabber.health.frozen_after_pictures=10000"});
+  ASSERT_TRUE(run_until([&] { return status_.state() == msg::STATE_DEGRADED; }));
+  EXPECT_THAT(reason(), AllOf(HasSubstr("genicam:127.0.0.1 is not found"), HasSubstr("check cable, power")));
+
+  auto camera = std::make_unique<test::Program>(std::vector<std::string>{kFakeCamera, "-i", "127.0.0.1"});
+  ASSERT_TRUE(run_until([&] { return frames_.size() >= 30 && status_.state() == msg::STATE_ACTIVE; })) << reason();
+  expect_growing_stamps();
+  EXPECT_EQ(frames_[0].width_px, 320U);
+  EXPECT_EQ(frames_[0].height_px, 240U);
+  EXPECT_NEAR(frames_[0].exposure_s, 0.004, 1e-6);
+  EXPECT_FALSE(calibration_->mount_known());
+  const auto& last = frames_.back();
+  const double period_s =
+      core::seconds(last.stamp_ns - frames_[0].stamp_ns) / static_cast<double>(last.seq - frames_[0].seq);
+  EXPECT_GT(period_s, 0.045) << "a slow computer may lose pictures, but cannot make more";
+  EXPECT_LT(std::abs(core::seconds(last.grabbed_ns - last.stamp_ns)), 5.0);
+
+  camera.reset();
+  ASSERT_TRUE(run_until([&] {
+    return reason().find("sends no picture for 1.0 s") != std::string::npos ||
+           reason().find("is not found") != std::string::npos;
+  })) << reason();
+  EXPECT_EQ(status_.state(), msg::STATE_DEGRADED);
+  const size_t before = frames_.size();
+  camera = std::make_unique<test::Program>(std::vector<std::string>{kFakeCamera, "-i", "127.0.0.1"});
+  ASSERT_TRUE(run_until([&] { return frames_.size() >= before + 10 && status_.state() == msg::STATE_ACTIVE; }))
+      << reason();
+  expect_growing_stamps();
+}
+
+TEST_F(LiveCamera, AGstreamerPipeline) {
+  const auto service = grabber(
+      "capture:videotestsrc is-live=true pattern=snow ! video/x-raw,format=GRAY8,width=320,height=240,framerate=25/1 ! "
+      "appsink",
+      {});
+  ASSERT_TRUE(run_until([&] { return frames_.size() >= 20 || status_.state() == msg::STATE_DEGRADED; }));
+  if (frames_.empty() && reason().find("cannot be opened") != std::string::npos) {
+    GTEST_SKIP() << "GStreamer's base plugins are not installed";
+  }
+  expect_growing_stamps();
+  EXPECT_EQ(frames_[0].width_px, 320U);
+  EXPECT_EQ(frames_[0].height_px, 240U);
+  EXPECT_EQ(frames_.back().health & ~msg::PICTURE_COVERED, 0U);
+}
+
+TEST_F(LiveCamera, AFileIsPlayedAtItsRateAndBegunAnewAtItsEnd) {
+  const std::string file = (root_ / "colour.avi").string();
+  cv::VideoWriter video(file, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 20, {160, 120});
+  ASSERT_TRUE(video.isOpened());
+  cv::Mat picture(120, 160, CV_8UC3);
+  cv::RNG random(1);
+  for (int i = 0; i < 10; ++i) {
+    random.fill(picture, cv::RNG::UNIFORM, 0, 255);
+    video.write(picture);
+  }
+  video.release();
+  const auto service = grabber("capture:" + file, {"frame_grabber.live.reconnect_s=0.1"});
+  ASSERT_TRUE(run_until([&] { return frames_.size() >= 15; })) << reason();
+  expect_growing_stamps();
+  EXPECT_EQ(frames_[0].width_px, 160U);
+}
+
+TEST_F(LiveCamera, ACalibrationOfAnotherSizeIsSaid) {
+  write("camera.yaml", "resolution: [80, 60]\nintrinsics: [90, 90, 40, 30]\n");
+  const auto service =
+      grabber("capture:videotestsrc is-live=true ! video/x-raw,format=GRAY8,width=320,height=240 ! appsink",
+              {"frame_grabber.calibration=" + (root_ / "camera.yaml").string()});
+  ASSERT_TRUE(run_until([&] { return status_.state() == msg::STATE_DEGRADED; }));
+  if (reason().find("cannot be opened") != std::string::npos)
+    GTEST_SKIP() << "GStreamer's base plugins are not installed";
+  EXPECT_THAT(reason(), HasSubstr("sends 320x240 pixels, but its calibration is for 80x60"));
+  EXPECT_TRUE(frames_.empty());
+}
+
+TEST_F(LiveCamera, APixelFormatThatIsNotReadIsExitCodeTwo) {
+  const auto service = grabber("genicam:any", {"frame_grabber.live.pixel_format=YUV9"});
+  EXPECT_EQ(service->wait_for_end(), 2);
+}
+
+}  // namespace
+}  // namespace railfix

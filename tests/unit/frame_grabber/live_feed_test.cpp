@@ -1,0 +1,76 @@
+#include "frame_grabber/live_feed.hpp"
+
+#include <gmock/gmock.h>
+
+#include <deque>
+#include <future>
+
+namespace railfix::frame_grabber {
+namespace {
+
+using ::testing::ElementsAre;
+
+/// Does what its script says: '+' picture, '!' gone, '-' cannot be connected (ends a connection attempt); at its end
+/// the promise is kept and nothing more comes.
+class Scripted : public LiveCamera {
+ public:
+  Scripted(std::string script, std::promise<void>& end) : script_(std::move(script)), end_(end) {}
+  core::Result<std::string> connect() override {
+    if (position_ < script_.size() && script_[position_] == '-') {
+      ++position_;
+      return core::Error{"not there"};
+    }
+    return std::string("there");
+  }
+  core::Result<std::optional<RawPicture>> next(std::chrono::milliseconds) override {
+    if (position_ == script_.size()) {
+      if (!ended_) end_.set_value();
+      ended_ = true;
+      return std::optional<RawPicture>();
+    }
+    if (script_[position_++] == '!') return core::Error{"unplugged"};
+    return std::optional(RawPicture{});
+  }
+  void disconnect() override {}
+  [[nodiscard]] std::string name() const override { return "camera scripted"; }
+
+ private:
+  std::string script_;
+  std::promise<void>& end_;
+  size_t position_ = 0;
+  bool ended_ = false;
+};
+
+std::vector<std::string> run(const std::string& script, bool finish_pictures) {
+  LiveConfig config;
+  config.reconnect_s = 0.001;
+  config.silent_s = 3600;
+  std::vector<std::string> told;
+  std::promise<void> end;
+  std::promise<LiveFeed*> made;
+  auto feed_made = made.get_future().share();
+  LiveEvents events;
+  events.connected = [&told](const std::string& what) { told.push_back(what); };
+  events.gone = [&told](const std::string& why) { told.push_back(why); };
+  events.picture = [&, feed_made](const RawPicture& picture) {
+    told.push_back("picture, lost " + std::to_string(picture.lost));
+    if (finish_pictures) feed_made.get()->finished();
+  };
+  LiveFeed feed(std::make_unique<Scripted>(script, end), config, events);
+  made.set_value(&feed);
+  end.get_future().wait();
+  return told;
+}
+
+TEST(LiveFeed, ConnectsAgainAndTellsEachReasonOnce) {
+  EXPECT_THAT(run("--+!-+", true), ElementsAre("not there", "there", "picture, lost 0", "unplugged", "not there",
+                                               "there", "picture, lost 0"));
+}
+
+TEST(LiveFeed, PicturesThatNobodyTakesAreLostAndNotKept) {
+  EXPECT_THAT(run("++++++", false),
+              ElementsAre("there", "picture, lost 0", "picture, lost 0", "picture, lost 0", "picture, lost 0"));
+}
+
+}  // namespace
+}  // namespace railfix::frame_grabber
