@@ -74,7 +74,7 @@ struct FrameGrabberConfig {
 
  private:
   void describe_live(service::Fields& f) {
-    f.number("exposure_us", live.exposure_us, {0, 1e6}, "us", "Exposure (genicam); 0 = the camera's automatic.");
+    f.number("exposure_us", live.exposure_us, {0, 100000}, "us", "Exposure (genicam); 0 = the camera's automatic.");
     f.number("gain_db", live.gain_db, {-1, 60}, "dB", "Gain (genicam); negative = the camera's automatic.");
     f.text("pixel_format", live.pixel_format,
            "Mono8, Mono12p, Mono12Packed, Mono16, BayerRG8, BayerGR8, BayerGB8, BayerBG8 or BGR8 (genicam); becomes "
