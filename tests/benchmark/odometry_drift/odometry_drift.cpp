@@ -49,7 +49,7 @@ void add_simulation(CLI::App& app, Arguments& a) {
   app.add_option("--focal-px", a.focal_px, "")->group("Simulation");
   app.add_option("--height-m", simulation.mount.height_m, "")->group("Simulation");
   app.add_option("--shake", simulation.shake.scale, "")->group("Simulation");
-  app.add_option("--exposure-s", simulation.exposure_s, "")->group("Simulation");
+  app.add_option("--exposure-s", simulation.scenario.exposure.time_s, "")->group("Simulation");
   app.add_option("--seed", simulation.seed, "")->group("Simulation");
   app.add_option("--drop", a.disturbances.drop_share, "Share of pictures lost")->group("Simulation");
   app.add_option("--jitter-s", a.disturbances.stamp_jitter_s, "Of the stamps, 1 sigma")->group("Simulation");

@@ -49,6 +49,7 @@ class Simulated : public Scene {
   Simulated(const simulator::SimulationOptions& options, const Disturbances& disturbances)
       : options_(options),
         disturbances_(disturbances),
+        scenario_(core::value_or_throw(simulator::Scenario::make(options.scenario, options.seed))),
         calibration_{options.render.camera, options.rate_hz, options.mount},
         line_(line_of(options)),
         trajectory_(line_, options.run, options.mount, options.shake, options.seed),
@@ -65,9 +66,9 @@ class Simulated : public Scene {
     const double jitter_s =
         std::clamp(random_.normal(0, disturbances_.stamp_jitter_s), -0.4 / options_.rate_hz, 0.4 / options_.rate_hz);
     moment.stamp_ns = trajectory_.begin_ns() + core::to_ns(time_s + jitter_s);
-    const double gain = simulator::camera_gain(trajectory_, time_s, options_.gain_wander, options_.seed);
     moment.grey =
-        renderer_.render({at.camera, at.distance_m, at.speed_mps, options_.exposure_s, gain, random_.next(), {}});
+        renderer_.render({at.camera, at.distance_m, at.speed_mps, options_.scenario.exposure.time_s,
+                          scenario_.gain(trajectory_, time_s), random_.next(), scenario_.look(time_s, at.distance_m)});
     return moment;
   }
   [[nodiscard]] const dataset::CameraCalibration& calibration() const override { return calibration_; }
@@ -82,6 +83,7 @@ class Simulated : public Scene {
   }
   simulator::SimulationOptions options_;
   Disturbances disturbances_;
+  simulator::Scenario scenario_;
   dataset::CameraCalibration calibration_;
   std::shared_ptr<const simulator::Line> line_;
   simulator::Trajectory trajectory_;
