@@ -219,13 +219,20 @@ float RayCaster::albedo(const Sample& here) const {
   const float light = here.light.diffuse + here.light.direct * sunlit;
   float albedo = 0.0F;
   if (here.other_count == 0) {
-    albedo = wetted(GroundShader::foot_and_web(here.own, shader_.ground(here.own, {})), here.ray);
     const float share = GroundShader::head_cover(here.own);
+    if (share < 1.0F) albedo = wetted(beside_head(here.own), here.ray);
     if (share > 0.0F) albedo += share * (head(here.own, here) - albedo);
   } else {
     albedo = junction(here);
   }
   return light * light_.hazy(albedo, here.hit.x);
+}
+
+// Web, foot and the ground beside them; the ground costs most and is left out where nothing of it shows.
+float RayCaster::beside_head(const GroundPixel& pixel) const {
+  const float rail = GroundShader::foot_and_web(pixel, 0.0F);
+  const float ground_share = GroundShader::foot_and_web(pixel, 1.0F) - rail;
+  return ground_share > 0.0F ? rail + ground_share * shader_.ground(pixel, {}) : rail;
 }
 
 // Worn steel is brushed along the track: it mirrors the sun wherever the ray and the sun make the same angle with it.

@@ -52,6 +52,7 @@ class RayCaster {
   [[nodiscard]] bool meet(const Eigen::Vector3f& ray, Hit& hit) const;
   [[nodiscard]] bool march(const Eigen::Vector3f& ray, Hit& hit) const;
   [[nodiscard]] float sky(const Eigen::Vector3f& ray) const;
+  [[nodiscard]] float beside_head(const GroundPixel& pixel) const;
   [[nodiscard]] float head(const GroundPixel& pixel, const Sample& sample) const;
   [[nodiscard]] float wetted(float albedo, const Eigen::Vector3f& ray) const;
   [[nodiscard]] float junction(const Sample& sample) const;
