@@ -7,22 +7,24 @@
 namespace railfix::track_detector {
 namespace {
 
-constexpr double kFirstBearing = 0.06;
+constexpr double kFirstBearing = 0.06;    // an edge is taken up from here ...
+constexpr double kLastBearing = 0.75;     // ... to here, share of the widest one
 constexpr double kBearingSigma = 0.0012;  // of one edge, yaw of the pose included
 constexpr double kLeastSigma = 0.0007;    // what does not average out
 constexpr double kUsualLateralM = 3.5;
 constexpr double kInverseSigma = 0.12;  // 1/m
 constexpr double kGateSigmas = 3.0;
 constexpr double kGate = 0.003;
-constexpr double kGrowth = 1.6;      // of the bearing while it is followed
+constexpr double kGrowth = 1.3;      // of the bearing while it is followed
 constexpr double kWorstFit = 0.004;  // bearing
-constexpr int kFewestPictures = 6;
+constexpr int kFewestPictures = 5;
+constexpr double kBesideBearing = 0.03;  // a new edge so near a known one belongs to the same thing
 constexpr double kSeenShare = 0.6;
 constexpr int kMostMissed = 3;
 constexpr size_t kMostTracks = 150;
 constexpr double kNearestLateralM = 1.5;
 constexpr double kFarthestLateralM = 14.0;
-constexpr double kBendShare = 0.15;  // of the curvature, unknown
+constexpr double kBendShare = 0.30;  // of the curvature, unknown
 constexpr double kCorrelated = 4.0;  // so many neighbouring measurements err together
 
 // Bearing of a place (arc length and lateral offset of a track of constant curvature) seen from the track's foot.
@@ -61,10 +63,10 @@ double EdgeTracker::straightened(const Track& track, double bearing, const Landm
          picture.pose.lateral_m / ahead_m;
 }
 
-void EdgeTracker::remember(Track& track, const Measurement& measurement) {
-  if (track.count == kMost) {
-    for (size_t i = 0; 2 * i < kMost; ++i) track.measured[i] = track.measured[2 * i + 1];
-    track.count = kMost / 2;
+void EdgeTracker::remember(Track& track, const EdgeMeasurement& measurement) {
+  if (track.count == kMostMeasurements) {
+    for (size_t i = 0; 2 * i < kMostMeasurements; ++i) track.measured[i] = track.measured[2 * i + 1];
+    track.count = kMostMeasurements / 2;
   }
   track.measured[track.count++] = measurement;
 }
@@ -83,6 +85,7 @@ void EdgeTracker::update(Track& track, const UprightEdge& edge, const LandmarkPi
   track.p00 -= k0 * track.p00;
   track.inner_grey += edge.inner_grey;
   track.outer_grey += edge.outer_grey;
+  track.deep_grey += edge.deep_grey;
   track.hit = true;
   track.missed = 0;
   ++track.seen;
@@ -136,6 +139,13 @@ const std::vector<SettledEdge>& EdgeTracker::follow(const std::vector<UprightEdg
     track.ratio = 1 / std::abs(found[i].bearing);
     track.p00 = std::pow(10 * kBearingSigma / (found[i].bearing * found[i].bearing), 2);
     track.p11 = kInverseSigma * kInverseSigma;
+    for (const Track& known : tracks_) {
+      const double off = std::abs(known.bearing() - found[i].bearing);
+      if (known.seen < kFewestPictures || off > kBesideBearing) continue;
+      track.inverse_m = known.inverse_m;
+      track.p11 = 4 * known.p11;
+      break;
+    }
     update(track, found[i], picture);
     tracks_.push_back(track);
   }
@@ -158,7 +168,7 @@ std::optional<SettledEdge> EdgeTracker::settle(const Track& track) {
     double squared = 0;
     double weights = 0;
     for (size_t i = 0; i < track.count; ++i) {
-      const Measurement& m = track.measured[i];
+      const EdgeMeasurement& m = track.measured[i];
       const double along_m = std::max(1.0, place_m - m.way_m);
       const double model = bearing_of(along_m, lateral_m, m.curvature_per_m, m.eye_lateral_m);
       const double residual = m.bearing - model;
@@ -190,7 +200,10 @@ std::optional<SettledEdge> EdgeTracker::settle(const Track& track) {
                      std::sqrt(covariance(1, 1)),
                      track.inner_grey / track.seen,
                      track.outer_grey / track.seen,
-                     track.seen};
+                     track.deep_grey / track.seen,
+                     track.seen,
+                     track.count,
+                     track.measured};
 }
 
 }  // namespace railfix::track_detector

@@ -10,6 +10,13 @@
 
 namespace railfix::track_detector {
 
+constexpr size_t kMostMeasurements = 48;
+
+/// Where an edge was seen, and what the picture's pose was.
+struct EdgeMeasurement {
+  double way_m, bearing, curvature_per_m, eye_lateral_m;
+};
+
 /// An edge that went out of sight, on the scale of the way.
 struct SettledEdge {
   double place_m = 0;
@@ -18,7 +25,10 @@ struct SettledEdge {
   double lateral_sigma_m = 0;
   double inner_grey = 0;  // beside it towards the track, mean
   double outer_grey = 0;
+  double deep_grey = 0;  // farther away towards the track, mean
   int pictures = 0;
+  size_t count = 0;  // of the measurements that were kept
+  std::array<EdgeMeasurement, kMostMeasurements> measured{};
 };
 
 class EdgeTracker {
@@ -31,28 +41,24 @@ class EdgeTracker {
   void forget();
 
  private:
-  static constexpr size_t kMost = 48;
-  struct Measurement {
-    double way_m, bearing, curvature_per_m, eye_lateral_m;
-  };
   // x/y, which falls by 1/y per metre of the way, in a Kalman filter.
   struct Track {
     double side = 1;  // +1 left
     double ratio = 0, inverse_m = 0;
     double p00 = 0, p01 = 0, p11 = 0;
     double way_m = 0;
-    double inner_grey = 0, outer_grey = 0;  // sums
-    int sign = 1;                           // of the contrast
+    double inner_grey = 0, outer_grey = 0, deep_grey = 0;  // sums
+    int sign = 1;                                          // of the contrast
     int seen = 0, missed = 0, gaps = 0;
     bool hit = false;
     size_t count = 0;
-    std::array<Measurement, kMost> measured;
+    std::array<EdgeMeasurement, kMostMeasurements> measured;
     [[nodiscard]] double bearing() const { return side / std::max(0.3, ratio); }
     [[nodiscard]] double ahead_m() const { return ratio / inverse_m; }
   };
   static void predict(Track& track, double way_m);
   static void update(Track& track, const UprightEdge& edge, const LandmarkPicture& picture);
-  static void remember(Track& track, const Measurement& measurement);
+  static void remember(Track& track, const EdgeMeasurement& measurement);
   [[nodiscard]] static double straightened(const Track& track, double bearing, const LandmarkPicture& picture);
   [[nodiscard]] static std::optional<SettledEdge> settle(const Track& track);
 

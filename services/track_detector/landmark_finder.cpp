@@ -45,12 +45,14 @@ LandmarkFinder::LandmarkFinder(const geometry::Intrinsics& camera, const Landmar
       plates_(plate_tracking(options), options.way_sigma),
       frog_search_(camera, options),
       frogs_(frog_tracking(options), options.way_sigma),
+      platform_search_(camera),
       upright_search_(camera) {}
 
 const std::vector<Sighting>& LandmarkFinder::process(const LandmarkPicture& picture) {
   sightings_.clear();
   if (!move(picture)) return sightings_;
   find_in_track(picture);
+  if (options_.platforms) find_platforms(picture);
   if (options_.uprights) find_uprights(picture);
   return sightings_;
 }
@@ -70,6 +72,7 @@ bool LandmarkFinder::move(const LandmarkPicture& picture) {
   if (!step_m) {
     plates_.forget();
     frogs_.forget();
+    platforms_.forget();
     edges_.forget();
     uprights_.forget();
     return false;
@@ -103,6 +106,17 @@ void LandmarkFinder::find_in_track(const LandmarkPicture& picture) {
   }
 }
 
+void LandmarkFinder::find_platforms(const LandmarkPicture& picture) {
+  for (const SettledPlatform& end : platforms_.follow(platform_search_.find(picture), way_m_)) {
+    if (uprights_.in_tunnel(way_m_)) continue;  // walls, ducts and lamps look like platforms
+    const double ahead_m = end.place_m - way_m_;
+    report(
+        {LandmarkType::platform, picture.stamp_ns, ahead_m, end.lateral_m,
+         std::hypot(end.sigma_m, options_.way_sigma * (std::abs(ahead_m) + 6.0)), 1.0 - std::exp(-0.5 * end.pictures)},
+        picture);
+  }
+}
+
 void LandmarkFinder::find_uprights(const LandmarkPicture& picture) {
   const auto& found = upright_search_.find(picture);
   const auto& settled = edges_.follow(found, picture, way_m_, upright_search_.widest_bearing());
@@ -117,7 +131,6 @@ void LandmarkFinder::find_uprights(const LandmarkPicture& picture) {
 
 void LandmarkFinder::report(Sighting sighting, const LandmarkPicture& picture) {
   if (sighting.confidence < options_.lowest_confidence) return;
-  if (sighting.type == LandmarkType::portal_out || sighting.type == LandmarkType::bridge) return;
   sighting.frame_seq = picture.frame_seq;
   sighting.grabbed_ns = picture.grabbed_ns;
   sightings_.push_back(sighting);

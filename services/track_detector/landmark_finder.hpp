@@ -12,6 +12,7 @@
 #include "track_detector/ground_motion.hpp"
 #include "track_detector/ground_tracker.hpp"
 #include "track_detector/landmark_types.hpp"
+#include "track_detector/platform_tracker.hpp"
 #include "track_detector/upright_objects.hpp"
 #include "track_detector/upright_search.hpp"
 #include "vision/ground_sheet.hpp"
@@ -28,6 +29,7 @@ class LandmarkFinder {
  private:
   [[nodiscard]] bool move(const LandmarkPicture& picture);
   void find_in_track(const LandmarkPicture& picture);
+  void find_platforms(const LandmarkPicture& picture);
   void find_uprights(const LandmarkPicture& picture);
   void report(Sighting sighting, const LandmarkPicture& picture);
   [[nodiscard]] double pitch_error_m(const LandmarkPicture& picture, double ahead_m, double depth_m) const;
@@ -41,6 +43,8 @@ class LandmarkFinder {
   GroundTracker plates_;
   FrogSearch frog_search_;
   GroundTracker frogs_;
+  PlatformSearch platform_search_;
+  PlatformTracker platforms_;
   UprightSearch upright_search_;
   EdgeTracker edges_;
   UprightObjects uprights_;

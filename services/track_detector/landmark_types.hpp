@@ -24,6 +24,7 @@ struct LandmarkOptions {
   double texture_depth_m = 0.19;  // of sleepers and ballast below the rail heads, for the way between pictures
   double way_sigma = 0.01;        // of that way, share of it
   bool frogs = true;
+  bool platforms = true;
   bool uprights = true;  // masts, portals, bridges
 };
 

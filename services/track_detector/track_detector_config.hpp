@@ -45,6 +45,7 @@ struct TrackDetectorConfig {
   }
   void describe_sightings(service::Fields& fields) {
     fields.flag("frogs", landmarks.frogs, "Frogs of switches.");
+    fields.flag("platforms", landmarks.platforms, "Beginnings and ends of platform edges.");
     fields.flag("uprights", landmarks.uprights, "Masts, tunnel portals and bridges.");
     fields.number("texture_depth_m", landmarks.texture_depth_m, {0, 0.5}, "m",
                   "Sleepers and ballast below the rail heads: scale of the way between pictures.");

@@ -14,7 +14,7 @@ constexpr double kCellPx = 1.15;
 constexpr double kWidestBearing = 0.75;
 constexpr double kLeanStep = 0.025;
 constexpr double kFading = 0.85;
-constexpr int kEdge = 3;                // columns on each side that are compared
+constexpr int kEdge = 2;                // columns on each side that are compared
 constexpr float kLeastContrast = 3.0F;  // grey levels
 constexpr float kLeastScore = 5.0F;     // of the mean step against its scatter over the rows
 constexpr float kHintScore = 3.0F;
@@ -22,6 +22,8 @@ constexpr float kScoreNoise = 0.3F;
 
 constexpr size_t kUpright = 4;          // index of no lean
 constexpr double kNothingClear = 20.0;  // grey levels
+
+constexpr double kDeep[] = {0.3, 0.5};  // of an edge's bearing: twice to three times as far, if it is a wall
 
 double lean_of(size_t index) {
   return (static_cast<double>(index) - static_cast<double>(kUpright)) * kLeanStep;
@@ -83,7 +85,7 @@ void UprightSearch::differentiate() {
     float* step = step_.ptr<float>(row);
     std::fill(step, step + columns_, 0.0F);
     for (int c = first + kEdge; c <= last - kEdge; ++c) {
-      step[c] = (grey[c + 1] + grey[c + 2] + grey[c + 3] - grey[c - 1] - grey[c - 2] - grey[c - 3]) * (1.0F / kEdge);
+      step[c] = (grey[c + 1] + grey[c + 2] - grey[c - 1] - grey[c - 2]) * (1.0F / kEdge);
     }
   }
 }
@@ -132,7 +134,9 @@ void UprightSearch::collect() {
     const double part = bend < 0 ? std::clamp(0.5 * (low - high) / bend, -0.5, 0.5) : 0.0;
     const double bearing = (c + part - 0.5 * (columns_ - 1)) * cell_;
     const int outward = bearing > 0 ? 2 : -2;
-    found_.push_back({bearing, column_grey(c - outward), column_grey(c + outward)});
+    found_.push_back({bearing, column_grey(c - outward), column_grey(c + outward),
+                      mean_grey(std::min(kDeep[0] * bearing, kDeep[1] * bearing),
+                                std::max(kDeep[0] * bearing, kDeep[1] * bearing))});
   }
 }
 

@@ -13,6 +13,7 @@ struct UprightEdge {
   double bearing = 0;     // metres left per metre ahead, at the camera's height
   double inner_grey = 0;  // beside it, towards the track
   double outer_grey = 0;
+  double deep_grey = -1;  // mean of what lies between it and the track farther away; negative = not seen
   [[nodiscard]] double contrast() const { return outer_grey - inner_grey; }
 };
 
