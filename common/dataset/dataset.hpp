@@ -94,6 +94,13 @@ struct TruthLandmark {
 core::Result<std::vector<TruthRow>> read_truth(const std::filesystem::path& track_csv);
 core::Result<std::vector<TruthLandmark>> read_truth_landmarks(const std::filesystem::path& landmarks_csv);
 
+/// How much of the own rails each picture shows, 0 to 1.
+struct TruthVisibility {
+  int64_t stamp_ns = 0;
+  double rails_visible = 0;
+};
+core::Result<std::vector<TruthVisibility>> read_truth_visibility(const std::filesystem::path& visibility_csv);
+
 /// Finds SEQ/map/* that `railfix map build` or `Map::load` can read; nothing when there is none.
 std::optional<std::filesystem::path> find_map(const std::filesystem::path& sequence);
 

@@ -141,6 +141,16 @@ Result<std::vector<TruthLandmark>> read_truth_landmarks(const fs::path& landmark
   return landmarks;
 }
 
+Result<std::vector<TruthVisibility>> read_truth_visibility(const fs::path& visibility_csv) {
+  CsvTable table(visibility_csv);
+  const size_t stamp = table.required({"stamp_ns"});
+  const size_t visible = table.required({"rails_visible"});
+  std::vector<TruthVisibility> rows;
+  while (table.next()) rows.push_back({table.integer(stamp), table.finite(visible)});
+  if (!table.status().ok()) return table.status().error();
+  return rows;
+}
+
 std::optional<fs::path> find_map(const fs::path& sequence) {
   // Compiled maps first, then what `railfix map build` reads, from the richest format to the plainest.
   static const std::vector<std::string> kByPreference = {".rfmap",   ".railmap", ".map", ".pb",  ".railml", ".landxml",

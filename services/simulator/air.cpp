@@ -132,7 +132,7 @@ float Glare::at(double u_px, double v_px) const {
   const float r = std::sqrt(du * du + dv * dv);
   // Disc, bloom and the veil that the lens lays over everything.
   const float disc = 6.0F * std::exp(-(r * r) / (0.018F * 0.018F));
-  return strength_ * (disc + 0.55F * std::exp(-r / 0.07F) + 0.11F * std::exp(-r / 0.45F));
+  return strength_ * (disc + 0.70F * std::exp(-r / 0.08F) + 0.17F * std::exp(-r / 0.45F));
 }
 
 void Glare::apply(cv::Mat& radiance) const {

@@ -94,6 +94,28 @@ TEST(Views, BiasSpreadAndHonestSigmas) {
   EXPECT_NEAR(result.fields[5].bias, 1e-4, 1e-15);
 }
 
+// What nobody could see is not asked for.
+TEST(Views, SeenIsCountedWhereTheRailsAreVisible) {
+  const MadeTruth made;
+  auto truth = made.make();
+  std::vector<ViewRow> rows;
+  std::vector<dataset::TruthVisibility> visibility;
+  for (int i = 0; i < 10; ++i) {
+    ViewRow row;
+    row.stamp_ns = made.row(i).stamp_ns;
+    row.seen = i >= 4;
+    rows.push_back(row);
+    visibility.push_back({row.stamp_ns, i < 3 ? 0.2 : 0.9});
+  }
+  EXPECT_EQ(judge_views(truth, rows).visible, 0U);
+  EXPECT_TRUE(std::isnan(judge_views(truth, rows).seen_of_visible_percent));
+  truth.set_visibility(visibility);
+  const auto result = judge_views(truth, rows);
+  EXPECT_EQ(result.seen_percent, 60);
+  EXPECT_EQ(result.visible, 7U);
+  EXPECT_NEAR(result.seen_of_visible_percent, 100.0 * 6 / 7, 1e-9);
+}
+
 TEST(Sightings, PrecisionRecallAndPositionError) {
   MadeTruth made;  // 1000 m to 2000 m, reference point 8 m ahead
   made.landmarks = {{{"balise", 1100, 0},

@@ -74,6 +74,8 @@ void print_position(std::ostream& out, const PositionResult& position) {
 void print_views(std::ostream& out, const ViewResult& views) {
   out << "track view\n";
   line(out, "rails seen", share(views.seen_percent));
+  if (views.visible > 0)
+    line(out, "... where visible", share(views.seen_of_visible_percent) + " of " + std::to_string(views.visible));
   for (size_t i = 0; i < kViewFields; ++i) {
     const FieldError& field = views.fields[i];
     const auto number = [](double value) { return figure(value, "%.3g", ""); };
@@ -161,7 +163,9 @@ ordered_json choice_json(const PositionResult& position) {
 }
 
 ordered_json views_json(const ViewResult& views) {
-  ordered_json json = {{"seen_percent", views.seen_percent}};
+  ordered_json json = {{"seen_percent", views.seen_percent},
+                       {"visible", views.visible},
+                       {"seen_of_visible_percent", views.seen_of_visible_percent}};
   for (size_t i = 0; i < kViewFields; ++i) {
     const FieldError& field = views.fields[i];
     json[kViewFieldNames[i]] = {{"bias", field.bias},

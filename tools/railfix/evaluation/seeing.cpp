@@ -6,6 +6,7 @@
 namespace railfix::evaluation {
 namespace {
 
+constexpr double kVisibleShare = 0.5;  // of the own rails within 25 m
 constexpr double kNearestM = 0.5;
 constexpr double kFarthestM = 200.0;
 constexpr double kGrowth = 1.05;  // each step along the rail is 5 % of its distance: near even steps in the picture
@@ -174,7 +175,11 @@ ViewResult judge_views(const Truth& truth, const std::vector<ViewRow>& rows) {
   std::array<std::vector<double>, kViewFields> errors;
   std::array<std::vector<double>, kViewFields> sigmas;
   size_t seen = 0;
+  size_t seen_of_visible = 0;
   for (const ViewRow& row : rows) {
+    const bool visible = truth.rails_visible(row.stamp_ns).value_or(0.0) >= kVisibleShare;
+    result.visible += visible;
+    seen_of_visible += visible && row.seen;
     if (!row.seen) continue;
     ++seen;
     const auto real = truth.at(row.stamp_ns);
@@ -187,6 +192,7 @@ ViewResult judge_views(const Truth& truth, const std::vector<ViewRow>& rows) {
     result.curvature.push_back({row.stamp_ns, real->distance_m, real->curvature_per_m, row.value[5]});
   }
   result.seen_percent = percent(seen, rows.size());
+  if (result.visible > 0) result.seen_of_visible_percent = percent(seen_of_visible, result.visible);
   for (size_t i = 0; i < kViewFields; ++i) result.fields[i] = judge_field(errors[i], sigmas[i]);
   return result;
 }

@@ -38,6 +38,8 @@ struct CurvatureSample {
 };
 struct ViewResult {
   double seen_percent = kUnknown;
+  size_t visible = 0;  // pictures that show half of the own rails or more, where the truth says so
+  double seen_of_visible_percent = kUnknown;   // of them
   std::array<FieldError, kViewFields> fields;  // where both rails were seen
   std::vector<CurvatureSample> curvature;
 };

@@ -23,7 +23,22 @@ core::Result<Truth> Truth::read(const std::filesystem::path& folder) {
   const auto calibration =
       dataset::find_calibration(std::filesystem::absolute(folder / "").parent_path().parent_path());
   if (!calibration.ok()) return calibration.error();
-  return Truth(std::move(rows).value(), std::move(landmarks), calibration.value());
+  Truth truth(std::move(rows).value(), std::move(landmarks), calibration.value());
+  if (std::filesystem::exists(folder / "visibility.csv")) {
+    const auto visibility = dataset::read_truth_visibility(folder / "visibility.csv");
+    if (!visibility.ok()) return visibility.error();
+    truth.set_visibility(visibility.value());
+  }
+  return truth;
+}
+
+std::optional<double> Truth::rails_visible(int64_t stamp_ns) const {
+  const auto found = visible_.find(stamp_ns);
+  return found == visible_.end() ? std::nullopt : std::optional(found->second);
+}
+
+void Truth::set_visibility(const std::vector<dataset::TruthVisibility>& rows) {
+  for (const auto& row : rows) visible_[row.stamp_ns] = row.rails_visible;
 }
 
 Truth::Truth(std::vector<TruthRow> rows, std::optional<std::vector<dataset::TruthLandmark>> landmarks,

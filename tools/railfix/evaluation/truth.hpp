@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <unordered_map>
 #include <vector>
 
 #include "core/result.hpp"
@@ -12,7 +13,8 @@ namespace railfix::evaluation {
 
 class Truth {
  public:
-  /// `folder` is SEQ/truth: track.csv, and when there are any landmarks.csv and the camera's calibration of SEQ.
+  /// `folder` is SEQ/truth: track.csv, and when there are any landmarks.csv, visibility.csv and the camera's
+  /// calibration of SEQ.
   static core::Result<Truth> read(const std::filesystem::path& folder);
   /// REQUIRES: at least two rows in the order of their stamps.
   Truth(std::vector<dataset::TruthRow> rows, std::optional<std::vector<dataset::TruthLandmark>> landmarks,
@@ -30,6 +32,10 @@ class Truth {
   [[nodiscard]] std::vector<Offset> track_ahead(const dataset::TruthRow& train,
                                                 const std::vector<double>& ahead_m) const;
 
+  /// Share of the own rails that the picture of this stamp shows; nothing when nobody says.
+  [[nodiscard]] std::optional<double> rails_visible(int64_t stamp_ns) const;
+  void set_visibility(const std::vector<dataset::TruthVisibility>& rows);
+
   [[nodiscard]] const std::vector<dataset::TruthRow>& rows() const { return rows_; }
   [[nodiscard]] const std::optional<std::vector<dataset::TruthLandmark>>& landmarks() const { return landmarks_; }
   [[nodiscard]] const std::optional<dataset::CameraCalibration>& calibration() const { return calibration_; }
@@ -46,6 +52,7 @@ class Truth {
   std::vector<dataset::TruthRow> rows_;
   std::optional<std::vector<dataset::TruthLandmark>> landmarks_;
   std::optional<dataset::CameraCalibration> calibration_;
+  std::unordered_map<int64_t, double> visible_;
   std::vector<Bend> bends_;  // by distance
 };
 
