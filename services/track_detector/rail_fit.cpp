@@ -12,11 +12,13 @@ namespace railfix::track_detector {
 namespace {
 
 using Equations = estimation::NormalEquations<kShapeSize>;
+using Matrix8 = Eigen::Matrix<double, kShapeSize, kShapeSize>;
 using Row = Eigen::Matrix<double, 1, kShapeSize>;
 using Jacobian = Eigen::Matrix<double, 2, kShapeSize>;
 
 constexpr double kFarthestM = 1000.0;
 constexpr double kNearestM = 0.3;
+constexpr double kFixedByRails = 6;  // unknowns that two curved rails fix; the priors hold the rest
 
 /// A measured point without distortion, in pixels from the principal point.
 struct FitPoint {
@@ -125,6 +127,7 @@ class Builder {
 
   bool operator()(const ShapeVector& shape, Equations& equations, bool with_priors = true) {
     RailPicture rails(camera_, shape);
+    by_offset.setZero();
     for (size_t i = 0; i < points_.size(); ++i) {
       if (!add_point(rails, i, equations)) return false;
     }
@@ -141,8 +144,24 @@ class Builder {
     return true;
   }
 
+  /// The points' sigmas from their scatter: 1.4826 times the median residual, made good for the unknowns. They only
+  /// become smaller: larger ones would let wild points in. Returns the factor that the scatter asks for.
+  double scale_sigmas(double least) {
+    if (points_.size() <= kShapeSize) return 1;
+    std::vector<double> ratios(points_.size());
+    for (size_t i = 0; i < points_.size(); ++i) ratios[i] = std::abs(residuals_px[i]) / points_[i].sigma_px;
+    const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
+    std::nth_element(ratios.begin(), middle, ratios.end());
+    const auto count = static_cast<double>(points_.size());
+    const double factor = std::max(least, 1.4826 * *middle * std::sqrt(count / (count - kFixedByRails)));
+    for (auto& point : points_) point.sigma_px *= std::min(1.0, factor);
+    return factor;
+  }
+
   std::vector<double> residuals_px;
   std::vector<double> weights;
+  /// Sums of J'W times the derivative by a sideways offset of the left and of the right rail.
+  Eigen::Matrix<double, kShapeSize, 2> by_offset = Eigen::Matrix<double, kShapeSize, 2>::Zero();
 
  private:
   bool add_point(RailPicture& rails, size_t i, Equations& equations) {
@@ -161,6 +180,7 @@ class Builder {
     residuals_px[i] = normal.dot(difference);
     const Row across = normal.transpose() * j / point.sigma_px;
     weights[i] = equations.add(across, residuals_px[i] / point.sigma_px, options_.cauchy_scale);
+    by_offset.col(point.half_gauge_m > 0 ? 0 : 1) -= weights[i] * across(3) * across.transpose();
     if (point.ahead_known) {
       const Eigen::Vector2d tangent = along.normalized();
       const Row lengthwise = tangent.transpose() * j / point.sigma_px;
@@ -250,15 +270,24 @@ RailFit fit_rails(const geometry::Intrinsics& camera, const std::vector<EdgePoin
   estimation::LeastSquaresOptions limits;
   limits.max_iterations = options.max_iterations;
   limits.step_tolerance = options.step_tolerance;
-  const auto solution = estimation::least_squares<kShapeSize>(builder, to_vector(start), limits);
+  auto solution = estimation::least_squares<kShapeSize>(builder, to_vector(start), limits);
   RailFit fit;
+  if (options.least_sigma_factor > 0) {
+    fit.sigma_factor = builder.scale_sigmas(options.least_sigma_factor);
+    solution = estimation::least_squares<kShapeSize>(builder, solution.x, limits);
+  }
   fit.shape = to_shape(solution.x);
   fit.converged = solution.converged;
   fit.last_step = solution.last_step;
-  const Eigen::Matrix<double, kShapeSize, kShapeSize> covariance = solution.equations.information.inverse();
-  fit.covariance = covariance.topLeftCorner<7, 7>();
   Equations data;
   builder(solution.x, data, false);
+  const double spread = std::max(1.0, fit.sigma_factor * fit.sigma_factor);
+  const Matrix8 information = solution.equations.information - (1.0 - 1.0 / spread) * data.information;
+  Matrix8 covariance = information.inverse();
+  const Eigen::Matrix<double, kShapeSize, 2> moved =
+      covariance * builder.by_offset * (options.rail_offset_sigma_m / spread);
+  covariance += moved * moved.transpose();
+  fit.covariance = covariance.topLeftCorner<7, 7>();
   fit.condition = condition_of(data.information.topLeftCorner<7, 7>());
   summarise(builder, fit);
   return fit;

@@ -56,6 +56,12 @@ struct RailFitOptions {
   /// Suspension limits about the calibrated mount: two straight rails fix only four numbers (paper 000, 3.1).
   TrackShape prior;
   TrackShapeSigma prior_sigma;
+  /// Takes the points' sigmas times one factor from the residuals' scatter, but not below this: a covariance that the
+  /// picture itself vouches for. 0 = the sigmas as they are.
+  double least_sigma_factor = 0;
+  /// Of what moves all edges of one rail sideways alike (gauge, wear, light on one side of the heads): no residual
+  /// shows it, so it is added to the covariance.
+  double rail_offset_sigma_m = 0;
   int max_iterations = 30;
   double step_tolerance = 1e-3;  // of the last step, in sigmas of the solution
 };
@@ -63,9 +69,10 @@ struct RailFitOptions {
 struct RailFit {
   TrackShape shape;
   Eigen::Matrix<double, 7, 7> covariance;  // roll ... vertical curvature, the curvature rate marginalised
-  double condition = 0;    // of the 7x7 information without priors, scaled to unit diagonal; infinity = singular
-  double residual_px = 0;  // root mean square of the points with weight above one half
-  double inliers = 0;      // fraction of points with weight above one half
+  double condition = 0;     // of the 7x7 information without priors, scaled to unit diagonal; infinity = singular
+  double sigma_factor = 1;  // of the points' sigmas, as their scatter asks for
+  double residual_px = 0;   // root mean square of the points with weight above one half
+  double inliers = 0;       // fraction of points with weight above one half
   std::vector<double> residuals_px;  // per point, along the normal
   bool converged = false;
   double last_step = 0;  // in sigmas of the solution; robust weights may let it creep on below any tolerance

@@ -14,12 +14,13 @@ constexpr int kPatience = 3;            // pictures without rails before the sea
 constexpr double kSupportPx = 1.5;      // a point within this of the fit ...
 constexpr double kSupportM = 0.02;      // ... or this supports the rail
 constexpr double kFitTolerance = 0.05;  // sigmas
+constexpr double kLeastSigmaFactor = 0.15;
 constexpr int kFitIterations = 15;
 constexpr double kSettled = 0.5;  // sigmas; points that leave one by one keep a fit creeping
 constexpr double kGoodResidualPx = 2.0;
 constexpr double kHeadPx = 3.0;  // rails are followed until their heads are as narrow as this ...
 constexpr double kSmallestHeadPx = 1.5;
-constexpr double kShortestLook = 2.5;  // ... but at least to so many times the nearest visible distance
+constexpr double kShortestLook = 2.5;   // ... but at least to so many times the nearest visible distance
 constexpr double kSure = 0.8;           // confidence that ends the search
 constexpr double kTrackReachM = 0.08;   // how far rails are looked for from the previous picture's ...
 constexpr double kSearchReachM = 0.10;  // ... and from the search's
@@ -95,6 +96,8 @@ RailFit TrackDetector::fit(const std::vector<RailEdge>& edges, const TrackShape&
   fit_options.gauge_m = options_.gauge_m;
   fit_options.prior = mount_;
   fit_options.prior_sigma = options_.limits;
+  fit_options.least_sigma_factor = kLeastSigmaFactor;
+  fit_options.rail_offset_sigma_m = options_.rail_offset_sigma_m;
   fit_options.step_tolerance = kFitTolerance;
   fit_options.max_iterations = kFitIterations;
   std::vector<EdgePoint> points;

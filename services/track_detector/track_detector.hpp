@@ -20,8 +20,9 @@ struct DetectorOptions {
   double far_m = 60;       // rails are followed as far as this
   /// What the suspension and the track do to the camera, one sigma about the mount; also limits the search (3 sigma).
   TrackShapeSigma limits{0.008, 0.008, 0.02, 0.10, 0.04, 0.003, 0.0005, 3e-5};
-  double min_contrast = 6;     // grey levels of a rail head against both its sides
-  double min_supported = 0.5;  // share of the stations that must show a rail for "seen"
+  double rail_offset_sigma_m = 0.0005;  // of a whole rail's edges: gauge, wear
+  double min_contrast = 6;              // grey levels of a rail head against both its sides
+  double min_supported = 0.5;           // share of the stations that must show a rail for "seen"
 };
 
 /// One picture's answer. Without `seen_left` or `seen_right` the shape is the mount and the covariance that of the
