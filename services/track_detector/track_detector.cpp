@@ -11,6 +11,7 @@ constexpr double kSearchFarM = 28.0;  // farther, pitch errors move the rails to
 constexpr double kMinSearchScore = 0.12;
 constexpr size_t kCandidates = 4;
 constexpr int kPatience = 3;            // pictures without rails before the search saves time
+constexpr double kHopeful = 0.4;        // share of the places with an edge, below which a candidate is given up
 constexpr double kSupportPx = 1.5;      // a point within this of the fit ...
 constexpr double kSupportM = 0.02;      // ... or this supports the rail
 constexpr double kFitTolerance = 0.05;  // sigmas
@@ -21,6 +22,12 @@ constexpr double kGoodResidualPx = 2.0;
 constexpr double kHeadPx = 3.0;  // rails are followed until their heads are as narrow as this ...
 constexpr double kSmallestHeadPx = 1.5;
 constexpr double kShortestLook = 2.5;   // ... but at least to so many times the nearest visible distance
+constexpr double kUsualWeight = 0.02;   // of a picture in the slow mean of the pose
+constexpr double kPartsNearM = 4.0;     // legs that part so little beyond the nearest visible place are two shapes
+constexpr double kSureMargin = 2.0;     // sigmas squared by which the train stands better on one leg
+constexpr double kStillOneM = 0.03;     // legs this close are one
+constexpr double kShortestM = 3.0;      // of rail that is reported at least
+constexpr double kUnsureLeg = 0.7;      // of the confidence while the own leg is not known
 constexpr double kSure = 0.8;           // confidence that ends the search
 constexpr double kTrackReachM = 0.08;   // how far rails are looked for from the previous picture's ...
 constexpr double kSearchReachM = 0.10;  // ... and from the search's
@@ -31,6 +38,7 @@ TrackDetector::TrackDetector(const geometry::Intrinsics& camera, const geometry:
                              const DetectorOptions& options)
     : camera_(camera), options_(options) {
   mount_.camera = mount;
+  usual_ = to_vector(mount_);
   const auto& limits = options.limits;
   search_limits_.pitch_rad = kSigmas * limits.pitch_rad;
   search_limits_.yaw_rad = kSigmas * limits.yaw_rad;
@@ -48,9 +56,11 @@ TrackDetector::TrackDetector(const geometry::Intrinsics& camera, const geometry:
 }
 
 TrackObservation TrackDetector::detect(const cv::Mat& grey) {
+  top_view_->look(grey);
   if (previous_) {
     auto observation = refine(grey, *previous_, dark_, kTrackReachM);
     if (observation.seen()) {
+      choose_leg(grey, dark_, observation);
       previous_ = observation.shape;
       return observation;
     }
@@ -60,12 +70,12 @@ TrackObservation TrackDetector::detect(const cv::Mat& grey) {
   const bool both = misses_ < kPatience;
   TrackObservation observation;
   forget(observation);
-  top_view_->look(grey);
   for (const bool dark : {false, true}) {
     if (!both && dark != (misses_ % 2 == 1)) continue;
     auto found = search(grey, dark);
     if (found.confidence >= observation.confidence) observation = std::move(found);
     if (observation.seen()) {
+      choose_leg(grey, dark, observation);
       previous_ = observation.shape;
       dark_ = dark;
       misses_ = 0;
@@ -91,18 +101,22 @@ TrackObservation TrackDetector::search(const cv::Mat& grey, bool dark) {
   return best;
 }
 
-RailFit TrackDetector::fit(const std::vector<RailEdge>& edges, const TrackShape& start) const {
+RailFit TrackDetector::fit(const std::vector<RailEdge>& edges, const TrackShape& start, bool last) const {
+  std::vector<EdgePoint> points;
+  points.reserve(edges.size());
+  for (const auto& edge : edges) points.push_back(edge.point);
+  return fit(points, start, last);
+}
+
+RailFit TrackDetector::fit(const std::vector<EdgePoint>& points, const TrackShape& start, bool last) const {
   RailFitOptions fit_options;
   fit_options.gauge_m = options_.gauge_m;
   fit_options.prior = mount_;
   fit_options.prior_sigma = options_.limits;
-  fit_options.least_sigma_factor = kLeastSigmaFactor;
+  fit_options.least_sigma_factor = last ? kLeastSigmaFactor : 0;
   fit_options.rail_offset_sigma_m = options_.rail_offset_sigma_m;
   fit_options.step_tolerance = kFitTolerance;
   fit_options.max_iterations = kFitIterations;
-  std::vector<EdgePoint> points;
-  points.reserve(edges.size());
-  for (const auto& edge : edges) points.push_back(edge.point);
   return fit_rails(camera_, points, start, fit_options);
 }
 
@@ -131,12 +145,12 @@ TrackObservation TrackDetector::refine(const cv::Mat& grey, const TrackShape& st
     edge_options.reach_m = reach_m[pass];
     edge_options.stations = stations[pass];
     edges = find_edges(grey, camera_, shape, edge_options, tried.data());
-    if (edges.size() < 8) {
+    if (edges.size() < 8 || static_cast<double>(edges.size()) < kHopeful * (tried[0] + tried[1])) {
       observation.reason = "too few edges of rail heads";
       forget(observation);
       return observation;
     }
-    result = fit(edges, shape);
+    result = fit(edges, shape, pass == 2);
     shape = result.shape;
   }
   observation.near_m = edge_options.near_m;
@@ -181,11 +195,54 @@ void TrackDetector::keep_one_rail(std::vector<RailEdge> edges, TrackObservation&
   const Side side = observation.seen_left ? Side::left : Side::right;
   std::erase_if(edges, [side](const RailEdge& edge) { return edge.point.side != side; });
   std::erase_if(observation.points, [side](const EdgePoint& point) { return point.side != side; });
-  const RailFit one = fit(edges, observation.shape);
+  const RailFit one = fit(edges, observation.shape, true);
   observation.shape = one.shape;
   observation.covariance = one.covariance;
   observation.condition = one.condition;
   observation.residual_px = one.residual_px;
+}
+
+double TrackDetector::displacement(const TrackShape& shape) const {
+  const ShapeVector apart = (to_vector(shape) - usual_).cwiseQuotient(to_vector(options_.limits));
+  return apart(0) * apart(0) + apart(2) * apart(2) + apart(3) * apart(3);  // roll, yaw, lateral
+}
+
+void TrackDetector::choose_leg(const cv::Mat& grey, bool dark, TrackObservation& observation) {
+  const auto branch = branch_search_.find(*top_view_, top_view_->ridges(dark), camera_, observation.shape,
+                                          options_.gauge_m, options_.head_m);
+  if (!branch) {
+    usual_.head<5>() += kUsualWeight * (to_vector(observation.shape) - usual_).head<5>();
+    return;
+  }
+  if (branch->from_m < near_m_ + kPartsNearM) {
+    auto other = refine(grey, other_leg(observation.shape, *branch), dark, kSearchReachM);
+    if (other.seen()) {
+      const double margin = displacement(observation.shape) - displacement(other.shape);
+      if (margin > 0) std::swap(observation, other);
+      if (std::abs(margin) > kSureMargin) return;
+    }
+  }
+  // The legs are one until they are a fraction of a head apart.
+  const double common_m = branch->from_m + std::sqrt(2 * kStillOneM / std::abs(branch->bend_per_m));
+  end_at(common_m, observation.shape, observation);
+}
+
+void TrackDetector::end_at(double far_m, const TrackShape& start, TrackObservation& observation) const {
+  observation.branches = true;
+  far_m = std::max(far_m, kShortestM + near_m_);
+  if (far_m >= observation.far_m) return;
+  const geometry::View view(camera_, observation.shape.camera);
+  std::erase_if(observation.points, [&](const EdgePoint& point) {
+    const auto ground = view.on_plane(point.pixel, 0);
+    return !ground || ground->x() > far_m;
+  });
+  const RailFit near = fit(observation.points, start, true);
+  observation.shape = near.shape;
+  observation.covariance = near.covariance;
+  observation.condition = near.condition;
+  observation.residual_px = near.residual_px;
+  observation.far_m = far_m;
+  observation.confidence *= kUnsureLeg;
 }
 
 void TrackDetector::forget(TrackObservation& observation) const {

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "track_detector/branch_search.hpp"
 #include "track_detector/rail_edges.hpp"
 #include "track_detector/rail_fit.hpp"
 #include "track_detector/rail_search.hpp"
@@ -39,6 +40,7 @@ struct TrackObservation {
   std::vector<EdgePoint> points;  // inner edges that the fit uses, left rail first, near to far
   double near_m = 0;              // the rails were looked for from here ...
   double far_m = 0;               // ... to here
+  bool branches = false;          // another leg leaves ahead and which one is the own is not known: far_m ends there
   std::string reason;             // why not seen
 };
 
@@ -53,6 +55,7 @@ class TrackDetector {
   void reset() {
     previous_.reset();
     misses_ = 0;
+    usual_ = to_vector(mount_);
   }
 
   [[nodiscard]] const geometry::Intrinsics& camera() const { return camera_; }
@@ -63,10 +66,17 @@ class TrackDetector {
   [[nodiscard]] TrackObservation search(const cv::Mat& grey, bool dark);
   [[nodiscard]] TrackObservation refine(const cv::Mat& grey, const TrackShape& start, bool dark,
                                         double first_reach_m) const;
-  [[nodiscard]] RailFit fit(const std::vector<RailEdge>& edges, const TrackShape& start) const;
+  /// `last`: of the passes, with an honest covariance.
+  [[nodiscard]] RailFit fit(const std::vector<RailEdge>& edges, const TrackShape& start, bool last) const;
+  [[nodiscard]] RailFit fit(const std::vector<EdgePoint>& points, const TrackShape& start, bool last) const;
   void judge(const std::vector<RailEdge>& edges, const std::array<int, 2>& tried, const RailFit& fit,
              TrackObservation& observation) const;
   void keep_one_rail(std::vector<RailEdge> edges, TrackObservation& observation) const;
+  /// Goes over to the other leg of a switch where the train stands better on it; else ends where the legs part.
+  void choose_leg(const cv::Mat& grey, bool dark, TrackObservation& observation);
+  /// How far the pose is from where the camera usually is, in sigmas squared.
+  [[nodiscard]] double displacement(const TrackShape& shape) const;
+  void end_at(double far_m, const TrackShape& start, TrackObservation& observation) const;
   void forget(TrackObservation& observation) const;
   /// Why the pose cannot be; null when it can.
   [[nodiscard]] const char* outside_limits(const TrackShape& shape) const;
@@ -78,7 +88,9 @@ class TrackDetector {
   double near_m_ = 0;
   std::unique_ptr<TopView> top_view_;
   std::unique_ptr<RailSearch> search_;
+  BranchSearch branch_search_;
   std::optional<TrackShape> previous_;
+  ShapeVector usual_;  // slow mean of the pose
   int misses_ = 0;     // pictures without rails in a row
   bool dark_ = false;  // the previous picture's rails are darker than the ground
 };

@@ -4,9 +4,10 @@
 //
 // A picture counts as visible when both heads stand out from the ground on both sides by 6 grey levels at most of the
 // true places, whatever the detector says. It is wrong when "seen" is said and a rail is drawn more than 0.5 m away
-// from its true place anywhere nearer than 30 m, or its points are more than 5 px off in the median.
-// For --poses the suspension limits are the scatter of the true poses (a floor keeps them from zero), as an operator
-// who knows his train would set them, and the rails' offset is zero, as the simulator's gauge is exact.
+// from its true place anywhere nearer than 30 m and than the end that the detector gives, or its points are more than 5
+// px off in the median. For --poses the suspension limits are the scatter of the true poses (a floor keeps them from
+// zero), as an operator who knows his train would set them, and the rails' offset is zero, as the simulator's gauge is
+// exact.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -70,7 +71,7 @@ double worst_offset_m(const geometry::Intrinsics& camera, const TrackObservation
   for (const auto side : {Side::left, Side::right}) {
     for (const auto& pixel : truth.side(side)) {
       const auto ground = view.on_plane(pixel, 0);
-      if (!ground || ground->x() > 30) continue;
+      if (!ground || ground->x() > std::min(30.0, observation.far_m)) continue;
       worst = std::max(worst, std::abs(ground->y() - rail_point(observation.shape, side, gauge_m, ground->x()).y()));
     }
   }
