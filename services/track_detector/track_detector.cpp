@@ -55,7 +55,8 @@ TrackDetector::TrackDetector(const geometry::Intrinsics& camera, const geometry:
   search_ = std::make_unique<RailSearch>(*top_view_, search_limits_, options.gauge_m, options.head_m);
 }
 
-TrackObservation TrackDetector::detect(const cv::Mat& grey) {
+TrackObservation TrackDetector::detect(const cv::Mat& grey, const std::optional<RollHint>& roll) {
+  roll_ = roll;
   top_view_->look(grey);
   if (previous_) {
     auto observation = refine(grey, *previous_, dark_, kTrackReachM);
@@ -113,6 +114,10 @@ RailFit TrackDetector::fit(const std::vector<EdgePoint>& points, const TrackShap
   fit_options.gauge_m = options_.gauge_m;
   fit_options.prior = mount_;
   fit_options.prior_sigma = options_.limits;
+  if (roll_) {
+    fit_options.prior.camera.roll_rad = roll_->roll_rad;
+    fit_options.prior_sigma.roll_rad = std::min(roll_->sigma_rad, options_.limits.roll_rad);
+  }
   fit_options.least_sigma_factor = last ? kLeastSigmaFactor : 0;
   fit_options.rail_offset_sigma_m = options_.rail_offset_sigma_m;
   fit_options.step_tolerance = kFitTolerance;

@@ -21,9 +21,15 @@ struct DetectorOptions {
   double far_m = 60;       // rails are followed as far as this
   /// What the suspension and the track do to the camera, one sigma about the mount; also limits the search (3 sigma).
   TrackShapeSigma limits{0.008, 0.008, 0.02, 0.10, 0.04, 0.003, 0.0005, 3e-5};
-  double rail_offset_sigma_m = 0.0005;  // of a whole rail's edges: gauge, wear
-  double min_contrast = 6;              // grey levels of a rail head against both its sides
-  double min_supported = 0.5;           // share of the stations that must show a rail for "seen"
+  double rail_offset_sigma_m = 0.001;  // of a whole rail's edges: gauge, wear
+  double min_contrast = 6;             // grey levels of a rail head against both its sides
+  double min_supported = 0.5;          // share of the stations that must show a rail for "seen"
+};
+
+/// What another sensor says about the roll of the camera against the track.
+struct RollHint {
+  double roll_rad = 0;
+  double sigma_rad = 0.01;
 };
 
 /// One picture's answer. Without `seen_left` or `seen_right` the shape is the mount and the covariance that of the
@@ -49,8 +55,8 @@ class TrackDetector {
   TrackDetector(const geometry::Intrinsics& camera, const geometry::CameraPose& mount, const DetectorOptions& options);
 
   /// Grey picture (CV_8UC1) of the camera's size. Starts from the previous picture's answer where it still holds, else
-  /// searches the whole range of the limits.
-  TrackObservation detect(const cv::Mat& grey);
+  /// searches the whole range of the limits. `roll`: straight rails alone cannot tell it from a sideways position.
+  TrackObservation detect(const cv::Mat& grey, const std::optional<RollHint>& roll = std::nullopt);
   /// Forgets the previous picture.
   void reset() {
     previous_.reset();
@@ -91,6 +97,7 @@ class TrackDetector {
   BranchSearch branch_search_;
   std::optional<TrackShape> previous_;
   ShapeVector usual_;  // slow mean of the pose
+  std::optional<RollHint> roll_;
   int misses_ = 0;     // pictures without rails in a row
   bool dark_ = false;  // the previous picture's rails are darker than the ground
 };

@@ -20,6 +20,10 @@ struct TrackDetectorConfig {
                   "Track gauge, between the inner edges of the rail heads.");
     fields.number("head_m", detector.head_m, {0.03, 0.12}, "m", "Width of a rail head.");
     fields.number("far_m", detector.far_m, {15, 200}, "m", "Rails are followed as far as this.");
+    fields.number(
+        "rail_offset_sigma_m", detector.rail_offset_sigma_m, {0, 0.02}, "m",
+        "What gauge and wear move the edges of a whole rail, one sigma: no picture shows it, so it is added to "
+        "the sigmas.");
     fields.number("min_contrast", detector.min_contrast, {1, 100}, "grey levels",
                   "A rail head stands out by at least this against the ground on both its sides.");
     fields.number("min_supported", detector.min_supported, {0.2, 1}, "",

@@ -173,6 +173,34 @@ TEST(RailFit, OneRailAloneKeepsTheRestAtThePrior) {
   EXPECT_NEAR(std::sqrt(fit.covariance(4, 4)), cab.options.prior_sigma.height_m, 0.005);
 }
 
+// The points are said to be five times worse than they are: the residuals tell, and the errors keep to the covariance.
+TEST(RailFit, TakesTheSigmasFromTheResiduals) {
+  CabCase cab;
+  cab.options.cauchy_scale = 2;
+  cab.options.least_sigma_factor = 0.05;
+  Random random(11);
+  double squares = 0;
+  constexpr int kDraws = 200;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    auto points = exact_points(kCab, cab.mount, 1.435, 7, 40, 40, false, 0.5);
+    for (auto& point : points) point.pixel += 0.1 * Eigen::Vector2d(random.normal(), random.normal());
+    const auto fit = fit_rails(kCab, points, cab.mount, cab.options);
+    EXPECT_NEAR(fit.sigma_factor, 0.2, 0.1);
+    squares += std::pow(fit.shape.camera.height_m - 2.5, 2) / fit.covariance(4, 4);
+  }
+  EXPECT_NEAR(std::sqrt(squares / kDraws), 1.0, 0.25);
+}
+
+TEST(RailFit, AnOffsetOfAWholeRailWidensTheHeight) {
+  CabCase cab;
+  const auto points = exact_points(kCab, cab.mount, 1.435, 7, 40, 40, false, 0.05);
+  const auto exact = fit_rails(kCab, points, cab.mount, cab.options);
+  cab.options.rail_offset_sigma_m = 0.002;
+  const auto worn = fit_rails(kCab, points, cab.mount, cab.options);
+  const double expected_m = 2.5 * std::sqrt(2.0) * 0.002 / 1.435;
+  EXPECT_NEAR(std::sqrt(worn.covariance(4, 4) - exact.covariance(4, 4)), expected_m, 0.2 * expected_m);
+}
+
 TEST(RailFit, NoPointsGiveThePriorBack) {
   const CabCase cab;
   const auto fit = fit_rails(kCab, {}, cab.mount, cab.options);

@@ -135,6 +135,61 @@ TEST(TrackDetector, RefusesRailsOfAnotherGauge) {
   EXPECT_FALSE(detector.detect(render(scene)).seen());
 }
 
+/// Both legs of a switch in one picture; `leg` lies on the track of `scene` as the other one.
+cv::Mat two_legs(const Scene& scene, const Branch& branch) {
+  Scene other = scene;
+  other.shape = other_leg(scene.shape, branch);
+  cv::Mat both;
+  cv::max(render(scene), render(other), both);
+  return both;
+}
+
+TEST(TrackDetector, TellsThatAnotherLegLeavesAhead) {
+  Scene scene;
+  scene.shape.camera = kMount;
+  TrackDetector detector(kCab, kMount, {});
+  EXPECT_FALSE(detector.detect(render(scene)).branches);
+  const auto observation = detector.detect(two_legs(scene, {14.0, 1.0 / 190, 1}));
+  ASSERT_TRUE(observation.seen()) << observation.reason;
+  EXPECT_TRUE(observation.branches);
+  EXPECT_LT(observation.far_m, 20);
+  EXPECT_LT(worst_offset_m(observation, scene, observation.far_m), 0.1);
+}
+
+// The train turns off; the detector had followed the straight leg. Once the legs are apart near the train it must know.
+TEST(TrackDetector, GoesOverToTheLegThatTheTrainRunsOn) {
+  const double bend_per_m = -1.0 / 190;  // seen from the train's leg the other one falls back to the right
+  Scene scene;
+  scene.shape.camera = kMount;
+  scene.shape.curvature_per_m = 1.0 / 190;
+  TrackDetector detector(kCab, kMount, {});
+  Scene straight = scene;
+  straight.shape = other_leg(scene.shape, {2.0, bend_per_m, 1});
+  ASSERT_TRUE(detector.detect(render(straight)).seen());
+  for (double from_m = 0.0; from_m >= -12.0; from_m -= 2.0) {
+    const auto observation = detector.detect(two_legs(scene, {from_m, bend_per_m, 1}));
+    ASSERT_TRUE(observation.seen()) << from_m;
+    if (from_m > -6) continue;
+    EXPECT_LT(worst_offset_m(observation, scene, 20), 0.1) << from_m;
+    EXPECT_NEAR(observation.shape.curvature_per_m, 1.0 / 190, 1e-3) << from_m;
+  }
+}
+
+TEST(TrackDetector, TakesTheRollOfAnotherSensor) {
+  Scene scene;
+  scene.shape.camera = kMount;
+  scene.shape.camera.roll_rad = 0.012;
+  const cv::Mat grey = render(scene);
+  TrackDetector detector(kCab, kMount, {});
+  const auto alone = detector.detect(grey);
+  const auto helped = detector.detect(grey, RollHint{0.012, 0.001});
+  ASSERT_TRUE(alone.seen() && helped.seen());
+  EXPECT_NEAR(helped.shape.camera.roll_rad, 0.012, 0.002);
+  EXPECT_NEAR(helped.shape.camera.lateral_m, kMount.lateral_m, 0.01);
+  EXPECT_LT(helped.covariance(0, 0), 0.1 * alone.covariance(0, 0));
+  EXPECT_LT(helped.covariance(3, 3), 0.1 * alone.covariance(3, 3));
+}
+
 TEST(MountCalibration, FindsAnUnknownMount) {
   MountCalibrator calibrator(kCab, 1.435);
   railfix::core::Random random(5);
