@@ -180,7 +180,7 @@ void add_bridge(Stage& stage, const Bridge& bridge) {
                  stage.ground(s, wall + outward * 26.0), stage.at(s, wall + outward * 2.0, kBridgeOverM)},
                 0.31F, s);
   }
-  stage.shade({stage.ground(s, left), stage.ground(s, right), stage.ground(end, right), stage.ground(end, left)}, 0.6);
+  stage.shade({stage.stones(s, left), stage.stones(s, right), stage.stones(end, right), stage.stones(end, left)}, 0.6);
   stage.cast(s, left, s, right, kBridgeUnderM, kBridgeOverM);
   stage.cast(end, left, end, right, kBridgeUnderM, kBridgeOverM);
 }

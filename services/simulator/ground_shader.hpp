@@ -8,6 +8,7 @@
 #include "simulator/local_track.hpp"
 #include "simulator/renderer.hpp"
 #include "simulator/texture.hpp"
+#include "simulator/track_bed.hpp"
 
 namespace railfix::simulator {
 
@@ -19,6 +20,7 @@ struct GroundPixel {
   float size_s_m = 0;  // of the pixel on the ground, motion blur included in size_s_m
   float size_d_m = 0;
   float edge_d_m = 0;  // metres of d per pixel across an edge along the track
+  uint32_t lane = 0;   // 0 = the own track; others have sleepers and stones of their own
 };
 
 class GroundShader {
@@ -45,31 +47,31 @@ class GroundShader {
   [[nodiscard]] float head(const GroundPixel& pixel) const;
 
  private:
-  struct Sleeper {
-    float begin_m;   // of its cell, from the foot
-    float middle_m;  // within its cell
-    float grey;
-    float tile_s, tile_d;
+  // The pixel in the counting of the map, and how far the sleepers reach there.
+  struct Oriented {
+    GroundPixel pixel;
+    Reach reach;
   };
-  struct Patch {
+  struct Balise {
     float s, d;
+    float albedo;
   };
+  [[nodiscard]] Oriented oriented(const GroundPixel& pixel, const Reach& reach) const;
+  [[nodiscard]] float bed_depth(float d_m, float bay_m, const Reach& reach) const;
+  [[nodiscard]] float bed(const GroundPixel& pixel, float bay_m, const Reach& reach) const;
   [[nodiscard]] float patchwork(const Tile& tile, float s_m, float d_m, const GroundPixel& pixel) const;
-  [[nodiscard]] const Sleeper& sleeper(float s_m) const;
-  [[nodiscard]] float sleepers_before(float s_m) const;
+  [[nodiscard]] float sleepers_before(float s_m, float width_m, float shift_m) const;
+  [[nodiscard]] float sleepers(const GroundPixel& pixel, float bay_m, const Reach& reach, float below) const;
+  [[nodiscard]] float sleeper_top(const Sleeper& one, float s_m, float d_m, const GroundPixel& pixel) const;
+  [[nodiscard]] float marked(const GroundPixel& pixel, float s_m, float d_m, bool on_top, float below) const;
   [[nodiscard]] float balises(const GroundPixel& pixel, float below) const;
 
   Tiles tiles_;
+  TrackBed bed_;
+  bool forward_;
+  bool flat_;  // one plane for sleepers and stones
   float sleeper_depth_m_;
-  float ballast_depth_m_;
-  float sleeper_phase_m_ = 0;  // foot within its sleeper cell
-  float patch_phase_m_ = 0;    // foot within its ballast patch
-  float ragged_phase_m_ = 0;
-  std::vector<Sleeper> sleepers_;
-  std::vector<Patch> patches_;
-  std::vector<float> rail_grey_;  // slow changes of the heads' shine, one a metre
-  float rail_phase_m_ = 0;
-  std::vector<Spot> balises_;  // s relative to the foot
+  std::vector<Balise> balises_;
 };
 
 }  // namespace railfix::simulator

@@ -18,8 +18,9 @@ constexpr double kNearM = 40.0;      // edges so near to the path are drawn
 constexpr double kBesideM = 9.0;     // landmarks of other tracks so near are landmarks of the path
 constexpr double kOneTunnelM = 6.0;  // tracks so near share a tunnel
 constexpr double kTunnelHalfWidthM = 2.7;
-constexpr double kAbutmentM = 4.5;  // from the outermost track
-constexpr size_t kCoarse = 40;      // samples, 10 m
+constexpr double kAbutmentM = 4.5;      // from the outermost track
+constexpr size_t kCoarse = 40;          // samples, 10 m
+constexpr double kCountedM = 100000.0;  // places are counted from the track's beginning, at most so far behind
 constexpr size_t kVeryCoarse = 80;
 
 CentreSample sample_of(const track::TrackPoint& point) {
@@ -128,6 +129,9 @@ bool comes_near(const Neighbourhood& neighbourhood, const track::Alignment& alig
 
 core::Result<Line> Line::make(std::shared_ptr<const track::Map> map, const track::EdgePosition& start, double ahead_m,
                               const std::vector<uint32_t>& via) {
+  auto counted = start;
+  counted.direction = track::Direction::forward;
+  const auto before = track::Path::follow(map, counted, 0.0, kCountedM);
   auto path = track::Path::follow(std::move(map), start, ahead_m + kSeenAheadM, kSeenBehindM, via);
   if (!path.ok()) return path.error();
   if (path.value().end_m() < kShortestPathM) {
@@ -135,6 +139,8 @@ core::Result<Line> Line::make(std::shared_ptr<const track::Map> map, const track
                        " m behind the start; start where at least 50 m lie ahead"};
   }
   Line line(std::move(path).value());
+  line.counted_from_m_ = before.ok() ? -before.value().begin_m() : 0.0;
+  line.counted_forward_ = start.direction != track::Direction::reverse;
   line.sample_main();
   line.sample_branches();
   line.collect_things();

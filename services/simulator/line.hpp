@@ -74,6 +74,12 @@ struct Distractor {
   double lateral_m = 0;
 };
 
+/// Where a place of the path is in a counting that does not depend on where the path begins and how it runs.
+struct TexturePlace {
+  double place_m = 0;
+  bool forward = true;  // the path runs as that counting does
+};
+
 /// Read-only after it is made; may be used from many threads.
 class Line {
  public:
@@ -96,6 +102,9 @@ class Line {
   [[nodiscard]] const std::vector<Distractor>& distractors() const { return distractors_; }
   /// Lateral offsets of the tracks beside the path at a place, the path's own (0) first.
   [[nodiscard]] std::vector<double> tracks_at(double distance_m) const;
+  [[nodiscard]] TexturePlace texture_place(double distance_m) const {
+    return {counted_from_m_ + (counted_forward_ ? distance_m : -distance_m), counted_forward_};
+  }
   /// How deep inside a tunnel (0 outside, else metres to the nearer portal).
   [[nodiscard]] double depth_in_tunnel_m(double distance_m) const;
 
@@ -108,6 +117,8 @@ class Line {
   void place_distractors();
   [[nodiscard]] Spot spot_of(double easting_m, double northing_m) const;
   track::Path path_;
+  double counted_from_m_ = 0;
+  bool counted_forward_ = true;
   CentreLine main_;
   std::vector<CentreLine> branches_;
   std::vector<Thing> things_;

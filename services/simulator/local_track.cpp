@@ -30,7 +30,7 @@ struct LocalTrack::Seen {
   double x, y, s, turn, curvature, z, twist;
 };
 
-LocalTrack::LocalTrack(const CentreLine& line, double s_origin_m, const track::TrackPoint& foot) {
+LocalTrack::LocalTrack(const CentreLine& line, double s_origin_m, const track::TrackPoint& foot) : lane_(line.edge) {
   const double sin_h = std::sin(foot.pose.heading_rad);
   const double cos_h = std::cos(foot.pose.heading_rad);
   const auto behind = static_cast<size_t>(kBehindFootM / kCentreStepM);

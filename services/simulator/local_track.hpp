@@ -35,6 +35,8 @@ class LocalTrack {
   [[nodiscard]] bool covers(float x_m) const { return x_m >= begin_m_ && x_m < end_m_; }
   [[nodiscard]] bool empty() const { return rows_.empty(); }
   [[nodiscard]] bool flat() const { return flat_; }
+  /// 0 for the path itself, else the edge beside it.
+  [[nodiscard]] uint32_t lane() const { return lane_; }
   /// REQUIRES covers(x_m).
   [[nodiscard]] OnTrack locate(float x_m, float y_m) const {
     const Row row = at(x_m);
@@ -95,6 +97,7 @@ class LocalTrack {
   float lowest_m_ = 0;
   float highest_m_ = 0;
   bool flat_ = true;
+  uint32_t lane_ = 0;
 };
 
 }  // namespace railfix::simulator

@@ -104,6 +104,7 @@ void RayCaster::between(const Sample& a, const Sample& b, float w, Sample& out) 
   const auto mix_pixels = [&](const GroundPixel& from, const GroundPixel& to, GroundPixel& at) {
     at.at = {mix(from.at.s_m, to.at.s_m), mix(from.at.d_m, to.at.d_m), mix(from.at.cos_heading, to.at.cos_heading),
              mix(from.at.sin_heading, to.at.sin_heading), mix(from.at.stretch, to.at.stretch)};
+    at.lane = from.lane;
     at.slope_s = mix(from.slope_s, to.slope_s);
     at.slope_d = mix(from.slope_d, to.slope_d);
     at.size_s_m = mix(from.size_s_m, to.size_s_m);
@@ -183,6 +184,7 @@ float RayCaster::sky(const Eigen::Vector3f& ray) const {
 GroundPixel RayCaster::pixel_on(const LocalTrack& track, const Eigen::Vector3f& ray, const Hit& hit) const {
   GroundPixel pixel;
   pixel.at = track.locate(hit.x, hit.y);
+  pixel.lane = track.lane();
   const float c = pixel.at.cos_heading;
   const float s = pixel.at.sin_heading;
   const float sink = -1.0F / ray.z();

@@ -20,6 +20,7 @@ constexpr float kHalfGaugeM = 0.7175F;  // inner edges of the rail heads from th
 constexpr float kHeadWidthM = 0.072F;   // 60E1
 constexpr float kRailFootDepthM = 0.150F;
 constexpr double kSleeperPitchM = 0.60;
+constexpr double kVergeDropM = 0.30;  // ground beside the ballast, below the sleeper tops
 
 /// The part of the picture that is drawn: own track so far ahead and so far to both sides; the rest is grey.
 struct Strip {
@@ -36,7 +37,7 @@ struct WeatherOptions {
 struct RenderOptions {
   geometry::Intrinsics camera;
   double texture_depth_m = 0.18;  // sleeper tops below the rail heads
-  double ballast_depth_m = 0.20;
+  double ballast_depth_m = 0.20;  // mean of the stones between sleepers; the same as the sleepers = all flat
   double read_noise_grey = 1.2;   // 1 sigma in the dark
   double shot_noise_grey = 0.18;  // variance per grey level
   double vignetting = 0.18;       // loss of light in the corners

@@ -149,7 +149,9 @@ Stage::Stage(const Line& line, const LocalTrack& main, const Illumination& light
       main_(main),
       light_(light),
       foot_m_(shot.distance_m),
-      ground_depth_m_(options.ballast_depth_m),
+      stone_depth_m_(options.ballast_depth_m),
+      verge_depth_m_(options.ballast_depth_m > options.texture_depth_m ? options.texture_depth_m + kVergeDropM
+                                                                       : options.ballast_depth_m),
       foot_(line.path().at(foot_m_)),
       shadow_(-std::sin(light.open().sun_heading_rad), -std::cos(light.open().sun_heading_rad)),
       sun_(light.open().sun / std::max(1e-6, light.open().sun + light.open().sky)) {
@@ -185,10 +187,10 @@ Corner Stage::beside(const CentreLine& track, double distance_m, double lateral_
   return {x, y, z};
 }
 
-Corner Stage::ground(double distance_m, double lateral_m) const {
+Corner Stage::sunk(double distance_m, double lateral_m, double depth_m) const {
   Corner corner = at(distance_m, lateral_m, 0.0);
-  corner.z() = static_cast<double>(main_.height(static_cast<float>(corner.x()), static_cast<float>(corner.y())).z_m) -
-               ground_depth_m_;
+  corner.z() =
+      static_cast<double>(main_.height(static_cast<float>(corner.x()), static_cast<float>(corner.y())).z_m) - depth_m;
   return corner;
 }
 
@@ -236,7 +238,7 @@ void Stage::cast(double from_m, double from_lateral_m, double to_m, double to_la
     const double heading_rad = main.samples[static_cast<size_t>(position)].pose.heading_rad;
     const double along = shadow_.x() * std::sin(heading_rad) + shadow_.y() * std::cos(heading_rad);
     const double left = -shadow_.x() * std::cos(heading_rad) + shadow_.y() * std::sin(heading_rad);
-    return ground(s + (up + ground_depth_m_) * along, d + (up + ground_depth_m_) * left);
+    return stones(s + (up + stone_depth_m_) * along, d + (up + stone_depth_m_) * left);
   };
   shade({fallen(from_m, from_lateral_m, bottom_m), fallen(to_m, to_lateral_m, bottom_m),
          fallen(to_m, to_lateral_m, top_m), fallen(from_m, from_lateral_m, top_m)},

@@ -27,8 +27,13 @@ class Stage {
     return beside(line_.main(), distance_m, lateral_m, up_m);
   }
   [[nodiscard]] Corner beside(const CentreLine& track, double distance_m, double lateral_m, double up_m) const;
-  /// Point on the drawn ground.
-  [[nodiscard]] Corner ground(double distance_m, double lateral_m) const;
+  /// Point on the drawn ground beside the ballast, where things stand; and on the stones, where shadows fall.
+  [[nodiscard]] Corner ground(double distance_m, double lateral_m) const {
+    return sunk(distance_m, lateral_m, verge_depth_m_);
+  }
+  [[nodiscard]] Corner stones(double distance_m, double lateral_m) const {
+    return sunk(distance_m, lateral_m, stone_depth_m_);
+  }
 
   /// A face of its own, edges exact. Painted before all that have a smaller order_m (metres of the path).
   void face(const Quad& corners, float albedo, double order_m) { add(corners, lit(corners, albedo, order_m), order_m); }
@@ -82,12 +87,14 @@ class Stage {
   void add(const Quad& corners, float radiance, double order_m, float grow_px = 0.5F) {
     faces_.push_back({corners, radiance, grow_px, order_m, 0.0});
   }
+  [[nodiscard]] Corner sunk(double distance_m, double lateral_m, double depth_m) const;
   [[nodiscard]] float lit(const Quad& corners, float albedo, double distance_m) const;
   const Line& line_;
   const LocalTrack& main_;
   const Illumination& light_;
   double foot_m_;
-  double ground_depth_m_;
+  double stone_depth_m_;
+  double verge_depth_m_;
   track::TrackPoint foot_;
   Eigen::Vector2d shadow_;  // metres east and north per metre of height
   double sun_;              // share of the open line's light that comes from it
