@@ -150,6 +150,16 @@ core::Status DatasetWriter::write_description(const std::string& text) const {
   return {};
 }
 
+core::Status DatasetWriter::write_trains(const std::vector<OtherTrain>& trains) const {
+  if (trains.empty()) return {};
+  core::CsvWriter csv(root_ / "truth/trains.csv", "edge,front_m,speed_mps,length_m");
+  for (const auto& train : trains) {
+    csv << static_cast<int64_t>(train.edge) << train.front_m << train.speed_mps << train.length_m;
+    csv.end_row();
+  }
+  return csv.close();
+}
+
 core::Status DatasetWriter::write_map(const track::Map& map) const {
   return map.save(root_ / "map/line.map");
 }

@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "core/result.hpp"
+#include "simulator/renderer.hpp"
 #include "simulator/scenario.hpp"
 #include "simulator/sensors.hpp"
 #include "simulator/trajectory.hpp"
@@ -37,6 +38,8 @@ class DatasetWriter {
                                               const std::vector<Visibility>& visibilities) const;
   /// simulation.yaml, with nothing to say no file.
   [[nodiscard]] core::Status write_description(const std::string& text) const;
+  /// truth/trains.csv, nothing when there are none.
+  [[nodiscard]] core::Status write_trains(const std::vector<OtherTrain>& trains) const;
   [[nodiscard]] core::Status write_map(const track::Map& map) const;
 
  private:

@@ -23,7 +23,8 @@ constexpr float kFastening = 0.17F;
 constexpr float kWeed = 0.30F;
 constexpr float kSkyInWater = 0.85F;
 constexpr float kJointM = 0.004F;
-constexpr float kLaneShiftM = 4.8F;  // other tracks show other places of the textures
+constexpr float kShortFrontM = 0.12F;  // front faces of sleepers that stay within their cell
+constexpr float kLaneShiftM = 4.8F;    // other tracks show other places of the textures
 constexpr uint32_t kLanes = 5;
 constexpr float kRagged = 6.2831853F / TrackBed::kRaggedPeriodM;
 
@@ -143,7 +144,10 @@ float GroundShader::bed_depth(float d_m, float bay_m, const Reach& reach) const 
 
 float GroundShader::bed(const GroundPixel& pixel, float bay_m, const Reach& reach) const {
   float depth = sleeper_depth_m_ + bay_m;
-  for (int i = 0; i < 3; ++i) depth = bed_depth(pixel.at.d_m + pixel.slope_d * depth, bay_m, reach);
+  const float on_bay = pixel.at.d_m + pixel.slope_d * depth;
+  if (on_bay > reach.left_m - 0.1F || on_bay < 0.1F - reach.right_m) {
+    for (int i = 0; i < 3; ++i) depth = bed_depth(pixel.at.d_m + pixel.slope_d * depth, bay_m, reach);
+  }
   const float s = pixel.at.s_m + pixel.slope_s * depth;
   const float d = pixel.at.d_m + pixel.slope_d * depth;
   const float edge = kBallastEdgeM - 1.3F + (d > 0.0F ? reach.left_m : reach.right_m);
@@ -171,26 +175,42 @@ float GroundShader::sleeper_top(const Sleeper& one, float s_m, float d_m, const 
   return grey * (0.25F + 0.5F * (texture(s_m, d_m) - 0.56F));
 }
 
+// Shares of tops and front faces along the track within the pixel.
+GroundShader::SleeperShare GroundShader::sleeper_share(float s_m, float size_m, float hidden_m,
+                                                       bool seen_forward) const {
+  constexpr auto kPitch = static_cast<float>(kSleeperPitchM);
+  const float half = 0.5F * size_m;
+  const float position = bed_.sleeper_position(s_m);
+  const int index = static_cast<int>(position * (1.0F / kPitch));
+  const float within = position - static_cast<float>(index) * kPitch;
+  if (within > half && within + half < kPitch && hidden_m < kShortFrontM) {
+    // All in one cell.
+    const float begin = bed_.sleeper(index).middle_m - 0.5F * kSleeperWidthM;
+    const float face = seen_forward ? begin - hidden_m : begin + kSleeperWidthM;
+    return {cover(within, begin, begin + kSleeperWidthM, size_m), cover(within, face, face + hidden_m, size_m)};
+  }
+  const auto along = [&](float width, float shift) {
+    return (sleepers_before(s_m + half, width, shift) - sleepers_before(s_m - half, width, shift)) / size_m;
+  };
+  const float top = along(kSleeperWidthM, 0.0F);
+  if (hidden_m <= 0.0F) return {top, 0.0F};
+  return {top, std::max(0.0F, along(kSleeperWidthM + hidden_m, (seen_forward ? -0.5F : 0.5F) * hidden_m) - top)};
+}
+
 // Tops, front faces down to the stones, fastenings.
 float GroundShader::sleepers(const GroundPixel& pixel, float bay_m, const Reach& reach, float below) const {
   const float s = pixel.at.s_m + pixel.slope_s * sleeper_depth_m_;
   const float d = pixel.at.d_m + pixel.slope_d * sleeper_depth_m_;
   if (d > reach.left_m + 0.2F || d < -reach.right_m - 0.2F) return below;
-  const float half = 0.5F * pixel.size_s_m;
-  const auto along = [&](float width, float shift) {
-    return (sleepers_before(s + half, width, shift) - sleepers_before(s - half, width, shift)) / pixel.size_s_m;
-  };
-  const float across = cover(d, -reach.right_m, reach.left_m, pixel.edge_d_m);
-  const float share = along(kSleeperWidthM, 0.0F);
   constexpr auto kPitch = static_cast<float>(kSleeperPitchM);
-  float albedo = below;
   const float hidden = std::min(std::abs(pixel.slope_s) * bay_m, kPitch - 0.06F - kSleeperWidthM);
-  if (hidden > 0.002F && share < 1.0F) {
-    const float toward = pixel.slope_s > 0.0F ? -0.5F : 0.5F;
-    const float front = std::max(0.0F, along(kSleeperWidthM + hidden, toward * hidden) - share);
-    albedo += across * front / (1.0F - share) * (kSleeperFront - albedo);
+  const auto share = sleeper_share(s, pixel.size_s_m, hidden, pixel.slope_s > 0.0F);
+  const float across = cover(d, -reach.right_m, reach.left_m, pixel.edge_d_m);
+  float albedo = below;
+  if (share.front > 0.0F && share.top < 1.0F) {
+    albedo += across * std::min(1.0F, share.front / (1.0F - share.top)) * (kSleeperFront - albedo);
   }
-  if (share * across <= 0.0F) return albedo;
+  if (share.top * across <= 0.0F) return albedo;
   const float position = bed_.sleeper_position(s);
   const int index = static_cast<int>(position * (1.0F / kPitch));
   const Sleeper& one = bed_.sleeper(index);
@@ -204,7 +224,7 @@ float GroundShader::sleepers(const GroundPixel& pixel, float bay_m, const Reach&
                        cover(within, one.middle_m - 0.5F * length, one.middle_m + 0.5F * length, pixel.size_s_m);
     top += clip * (kFastening - top);
   }
-  return albedo + share * across * (top - albedo);
+  return albedo + share.top * across * (top - albedo);
 }
 
 // Stains and puddles, weeds and leaves: on the stones, or on all that lies there.
@@ -216,8 +236,11 @@ float GroundShader::marked(const GroundPixel& pixel, float s_m, float d_m, bool 
   for (int i = bed_.patch(index).first_mark; i < bed_.patch(index + 1).first_mark; ++i) {
     const Mark& mark = bed_.marks()[static_cast<size_t>(i)];
     if (on_top != (mark.kind == Mark::Kind::oil || mark.kind == Mark::Kind::leaf)) continue;
-    const float a = (local - mark.s) / (mark.half_s + 0.3F * pixel.size_s_m);
-    const float b = (d_m - mark.d) / (mark.half_d + 0.3F * pixel.size_d_m);
+    const float half_s = mark.half_s + 0.3F * pixel.size_s_m;
+    const float half_d = mark.half_d + 0.3F * pixel.size_d_m;
+    if (std::abs(d_m - mark.d) > half_d || std::abs(local - mark.s) > half_s) continue;
+    const float a = (local - mark.s) / half_s;
+    const float b = (d_m - mark.d) / half_d;
     const float inside = 1.0F - a * a - b * b;
     if (inside <= 0.0F) continue;
     switch (mark.kind) {
@@ -245,7 +268,14 @@ float GroundShader::marked(const GroundPixel& pixel, float s_m, float d_m, bool 
 }
 
 float GroundShader::ground(const GroundPixel& seen, const Reach& reach_along_path) const {
-  const auto [pixel, reach] = oriented(seen, reach_along_path);
+  if (!forward_ || seen.lane != 0) {
+    const auto turned = oriented(seen, reach_along_path);
+    return ground_as_counted(turned.pixel, turned.reach);
+  }
+  return ground_as_counted(seen, reach_along_path);
+}
+
+float GroundShader::ground_as_counted(const GroundPixel& pixel, const Reach& reach) const {
   const float s = pixel.at.s_m + pixel.slope_s * sleeper_depth_m_;
   float bay_m = 0.0F;
   if (!flat_) {
@@ -265,13 +295,13 @@ float GroundShader::head_cover(const GroundPixel& pixel) {
   return cover(d, kHalfGaugeM, kHalfGaugeM + kHeadWidthM, pixel.edge_d_m);
 }
 
-float GroundShader::head(const GroundPixel& seen) const {
-  const GroundPixel pixel = oriented(seen, {}).pixel;
-  const float shine = bed_.shine(pixel.at.s_m);
+float GroundShader::head(const GroundPixel& pixel) const {
+  const float s = (forward_ ? pixel.at.s_m : -pixel.at.s_m) + kLaneShiftM * static_cast<float>(pixel.lane % kLanes);
+  const float shine = bed_.shine(s);
   const float d = std::abs(pixel.at.d_m);
   const float band = cover(d, 0.0F, kHalfGaugeM + 0.056F, std::max(pixel.edge_d_m, 0.01F));
   float albedo = shine * (0.42F + 0.43F * band);
-  const float position = bed_.patch_position(pixel.at.s_m);
+  const float position = bed_.patch_position(s);
   const int index = bed_.patch_index(position);
   if (bed_.patch(index).joint) {
     const float local = position - static_cast<float>(index) * TrackBed::kPatchM - 0.5F;

@@ -56,11 +56,16 @@ class GroundShader {
     float s, d;
     float albedo;
   };
+  struct SleeperShare {
+    float top, front;
+  };
   [[nodiscard]] Oriented oriented(const GroundPixel& pixel, const Reach& reach) const;
   [[nodiscard]] float bed_depth(float d_m, float bay_m, const Reach& reach) const;
   [[nodiscard]] float bed(const GroundPixel& pixel, float bay_m, const Reach& reach) const;
   [[nodiscard]] float patchwork(const Tile& tile, float s_m, float d_m, const GroundPixel& pixel) const;
   [[nodiscard]] float sleepers_before(float s_m, float width_m, float shift_m) const;
+  [[nodiscard]] SleeperShare sleeper_share(float s_m, float size_m, float hidden_m, bool seen_forward) const;
+  [[nodiscard]] float ground_as_counted(const GroundPixel& pixel, const Reach& reach) const;
   [[nodiscard]] float sleepers(const GroundPixel& pixel, float bay_m, const Reach& reach, float below) const;
   [[nodiscard]] float sleeper_top(const Sleeper& one, float s_m, float d_m, const GroundPixel& pixel) const;
   [[nodiscard]] float marked(const GroundPixel& pixel, float s_m, float d_m, bool on_top, float below) const;

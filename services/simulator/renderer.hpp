@@ -34,6 +34,14 @@ struct WeatherOptions {
   GlassOptions glass;
 };
 
+/// A train on a track beside the path.
+struct OtherTrain {
+  uint32_t edge = 0;      // of the track beside
+  double front_m = 0;     // of its leading end at the beginning of the run, on the path's scale
+  double speed_mps = 0;   // against the path = negative
+  double length_m = 100;  // rounded to whole cars
+};
+
 struct RenderOptions {
   geometry::Intrinsics camera;
   double texture_depth_m = 0.18;  // sleeper tops below the rail heads
@@ -42,6 +50,7 @@ struct RenderOptions {
   double shot_noise_grey = 0.18;  // variance per grey level
   double vignetting = 0.18;       // loss of light in the corners
   bool scenery = true;            // masts, platforms, tunnels, bridges
+  std::vector<OtherTrain> trains;
   Strip strip;
   WeatherOptions weather;
   uint64_t seed = 1;

@@ -8,6 +8,7 @@ void draw_scenery(const Line& line, const LocalTrack& main, const Illumination& 
   Stage stage(line, main, light, options, shot);
   add_furniture(stage);
   add_buildings(stage);
+  add_trains(stage, options.trains, shot.look.time_s);
   stage.paint(geometry::View(options.camera, shot.pose), radiance);
 }
 

@@ -10,6 +10,9 @@ void add_buildings(Stage& stage);
 /// Masts with wires, signals, boards and cabinets.
 void add_furniture(Stage& stage);
 
+/// Trains on the tracks beside the path.
+void add_trains(Stage& stage, const std::vector<OtherTrain>& trains, double time_s);
+
 /// Paints into `radiance` (CV_32FC1).
 void draw_scenery(const Line& line, const LocalTrack& main, const Illumination& light, const RenderOptions& options,
                   const Shot& shot, cv::Mat& radiance);

@@ -9,6 +9,7 @@
 #include "core/time.hpp"
 #include "simulator/builtin_line.hpp"
 #include "simulator/dataset_writer.hpp"
+#include "simulator/traffic.hpp"
 
 namespace railfix::simulator {
 namespace {
@@ -129,18 +130,20 @@ core::Result<SimulationReport> simulate(const SimulationOptions& options, const 
   const auto exposures = scenario.value().exposures(trajectory, options.rate_hz);
   const SensorModel sensors(trajectory, options.sensors, options.seed);
   const auto& out = writer.value();
+  const auto trains = plan_traffic(trajectory, options.other_trains, options.seed);
   dataset::CameraCalibration calibration{options.render.camera, options.rate_hz, options.mount};
   const auto pictures = options.pictures ? exposures : std::vector<Exposure>();
   for (const auto& status :
        {out.write_camera(calibration, pictures, options.format), out.write_sensors(sensors, options.sensors),
         out.write_truth(trajectory, exposures, options.render.camera), out.write_map(line.value()->path().map()),
-        out.write_description(options.description)}) {
+        out.write_trains(trains), out.write_description(options.description)}) {
     if (!status.ok()) return status.error();
   }
   SimulationReport report{0, trajectory.duration_s(), trajectory.length_m(), 0.0};
   if (options.pictures) {
     auto render = options.render;
     render.seed = options.seed;
+    render.trains = trains;
     const Renderer renderer(line.value(), render);
     Studio studio({options, scenario.value(), trajectory, renderer, out, pictures});
     if (const auto status = studio.run(progress); !status.ok()) return status.error();

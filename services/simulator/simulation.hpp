@@ -28,6 +28,7 @@ struct SimulationOptions {
   double rate_hz = 30.0;
   ScenarioOptions scenario;
   std::string description;  // what is simulated, for SEQ/simulation.yaml
+  int other_trains = 0;     // met on the tracks beside the path
   bool pictures = true;
   std::string format = "png";  // png, jpg or pgm
   int jpeg_quality = 95;

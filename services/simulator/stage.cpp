@@ -245,13 +245,24 @@ void Stage::cast(double from_m, double from_lateral_m, double to_m, double to_la
         sun_);
 }
 
-void Stage::paint(const geometry::View& view, cv::Mat& radiance) {
+// Where shadows lie on each other it is as dark as in the darkest.
+void Stage::paint_shadows(const geometry::View& view, cv::Mat& radiance) const {
+  if (shadows_.empty()) return;
   const Lens lens(view);
+  thread_local cv::Mat remaining;
+  remaining.create(radiance.size(), CV_32FC1);
+  remaining.setTo(1.0F);
   for (const auto& shadow : shadows_) {
     const float lost = 1.0F - shadow.radiance;
-    fill(lens.outline_of(shadow.corners), shadow.grow_px, radiance,
-         [lost](float& pixel, float share) { pixel *= 1.0F - share * lost; });
+    fill(lens.outline_of(shadow.corners), shadow.grow_px, remaining,
+         [lost](float& pixel, float share) { pixel = std::min(pixel, 1.0F - share * lost); });
   }
+  cv::multiply(radiance, remaining, radiance);
+}
+
+void Stage::paint(const geometry::View& view, cv::Mat& radiance) {
+  paint_shadows(view, radiance);
+  const Lens lens(view);
   std::stable_sort(faces_.begin(), faces_.end(), [](const Face& a, const Face& b) { return a.order_m > b.order_m; });
   for (const auto& face : faces_) {
     Outline outline;

@@ -35,6 +35,11 @@ class Stage {
     return sunk(distance_m, lateral_m, stone_depth_m_);
   }
 
+  /// Offset of a point from the path, left positive.
+  [[nodiscard]] double lateral_m(const Corner& corner) const {
+    return static_cast<double>(main_.locate(static_cast<float>(corner.x()), static_cast<float>(corner.y())).d_m);
+  }
+
   /// A face of its own, edges exact. Painted before all that have a smaller order_m (metres of the path).
   void face(const Quad& corners, float albedo, double order_m) { add(corners, lit(corners, albedo, order_m), order_m); }
   /// A face that joins others: a little larger, which closes the seams. extra: light of lamps near by.
@@ -87,6 +92,7 @@ class Stage {
   void add(const Quad& corners, float radiance, double order_m, float grow_px = 0.5F) {
     faces_.push_back({corners, radiance, grow_px, order_m, 0.0});
   }
+  void paint_shadows(const geometry::View& view, cv::Mat& radiance) const;
   [[nodiscard]] Corner sunk(double distance_m, double lateral_m, double depth_m) const;
   [[nodiscard]] float lit(const Quad& corners, float albedo, double distance_m) const;
   const Line& line_;

@@ -225,6 +225,9 @@ void add_simulate(CLI::App& app, Action& chosen) {
       ->excludes(map)
       ->capture_default_str();
   command->add_option("--via", simulation.via, "edges to turn to at switches, else the straight way is run");
+  command->add_option("--other-trains", simulation.other_trains, "trains met on the tracks beside the line")
+      ->check(CLI::Range(0, 1000))
+      ->capture_default_str();
   command->add_option("--start", simulation.start, "EDGE:OFFSET[:+|-] where the train stands first")
       ->capture_default_str();
   command->add_option("--length-m", simulation.run.length_m, "way to run")

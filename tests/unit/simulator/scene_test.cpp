@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <opencv2/imgproc.hpp>
 
 #include "scene.hpp"
 #include "simulator/dataset_writer.hpp"
@@ -120,6 +120,122 @@ TEST(Neighbours, HaveRailsOfTheirOwn) {
     const auto pixel = rail_edge_px(*line, truth_of(shot), options.camera, 9.0, side);
     EXPECT_NEAR(view.on_plane(*pixel, 0.0)->y(), side * 0.7175, 1e-6);
   }
+}
+
+// Where the grey along a row of places first falls by a share of the way from bright to dark, from y = from on.
+double falls_at(const cv::Mat& picture, const geometry::View& view, double x, double z, double from, double to,
+                double share) {
+  std::vector<double> greys;
+  constexpr int kSteps = 400;
+  for (int i = 0; i <= kSteps; ++i) {
+    const auto pixel = view.project({x, from + (to - from) * i / kSteps, z});
+    cv::Mat one;
+    cv::getRectSubPix(picture, cv::Size(1, 1),
+                      cv::Point2f(static_cast<float>(pixel->x()), static_cast<float>(pixel->y())), one, CV_32F);
+    greys.push_back(static_cast<double>(one.at<float>(0, 0)));
+  }
+  const double bright = *std::max_element(greys.begin(), greys.end());
+  const double limit = bright - share * (bright - *std::min_element(greys.begin(), greys.end()));
+  const auto first = std::find_if(greys.begin(), greys.end(), [&](double grey) { return grey < limit; });
+  return from + (to - from) * static_cast<double>(first - greys.begin()) / kSteps;
+}
+
+TEST(Things, MastAndPortalAreWhereTheMapSays) {
+  const auto options = quiet_camera();
+  const auto line = line_from("1:100");
+  const auto& mast =
+      *std::find_if(line->masts().begin(), line->masts().end(), [](const Mast& one) { return one.distance_m > 40.0; });
+  auto shot = standing_at(mast.distance_m - 20.0);
+  const geometry::View view(options.camera, shot.pose);
+  const double away = mast.lateral_m > 0.0 ? 1.0 : -1.0;
+  const double outer = falls_at(Renderer(line, options).render(shot), view, 19.87, 5.0, mast.lateral_m + away * 0.6,
+                                mast.lateral_m, 0.5);
+  EXPECT_NEAR(outer, mast.lateral_m + away * 0.13, 0.04);
+
+  const auto tunnel = line_from("3:700");
+  const auto& bore = tunnel->tunnels().at(0);
+  shot = standing_at(bore.begin_m - 20.0);
+  const auto here = tunnel->path().at(shot.distance_m);
+  const auto portal = tunnel->path().at(bore.begin_m);
+  const double turn = here.pose.heading_rad - portal.pose.heading_rad;
+  const double de = portal.pose.easting_m - here.pose.easting_m;
+  const double dn = portal.pose.northing_m - here.pose.northing_m;
+  const double x = de * std::sin(here.pose.heading_rad) + dn * std::cos(here.pose.heading_rad);
+  const double y = -de * std::cos(here.pose.heading_rad) + dn * std::sin(here.pose.heading_rad);
+  ASSERT_LT(std::abs(turn), 0.06);
+  // Into the opening from its left: at the wall's edge it gets dark.
+  const double edge = falls_at(Renderer(tunnel, options).render(shot), view, x, 2.2, y + 4.0, y, 0.15);
+  EXPECT_NEAR(edge, y + 2.7, 0.12);
+}
+
+TEST(Things, LandmarksOfTheTrackBesideAreKnownToo) {
+  const auto line = line_from("1:1350", {4});
+  const auto platform = std::find_if(line->things().begin(), line->things().end(),
+                                     [](const Thing& thing) { return thing.kind == track::LandmarkKind::platform; });
+  ASSERT_NE(platform, line->things().end());
+  EXPECT_FALSE(platform->own);
+  EXPECT_NEAR(platform->lateral_m, -1.67 - 4.7, 0.02);
+}
+
+TEST(Ground, LooksTheSameFromEveryStart) {
+  const auto options = quiet_camera();
+  const auto a = line_from("1:100");
+  const auto b = line_from("1:160.3");
+  const cv::Mat first = Renderer(a, options).render(standing_at(90.3));
+  const cv::Mat second = Renderer(b, options).render(standing_at(30.0));
+  cv::Mat difference;
+  cv::absdiff(first.rowRange(200, 512), second.rowRange(200, 512), difference);
+  EXPECT_LT(cv::mean(difference)[0], 0.2);
+}
+
+TEST(Ground, StonesLieAsDeepAsTheyShow) {
+  // From another height the same stones are seen in another direction: the depth at which two pictures agree is
+  // theirs. Nothing lies above the sleepers' tops or deeper than 8 cm below them, and some of it clearly deeper.
+  const auto line = line_from("1:100");
+  auto options = quiet_camera();
+  options.ballast_depth_m = 0.22;
+  const Renderer renderer(line, options);
+  const auto low = standing_at(50.0);
+  auto high = low;
+  high.pose.height_m = 2.9;
+  const cv::Mat pictures[] = {renderer.render(low), renderer.render(high)};
+  const geometry::View views[] = {{options.camera, low.pose}, {options.camera, high.pose}};
+  const auto patch = [&](int k, double x, double depth) {
+    cv::Mat u(12, 60, CV_32FC1);
+    cv::Mat v(12, 60, CV_32FC1);
+    for (int i = 0; i < u.rows; ++i) {
+      for (int j = 0; j < u.cols; ++j) {
+        const auto pixel = views[k].project({x + i * 0.01, -0.3 + j * 0.01, -depth});
+        u.at<float>(i, j) = static_cast<float>(pixel->x());
+        v.at<float>(i, j) = static_cast<float>(pixel->y());
+      }
+    }
+    cv::Mat values;
+    cv::remap(pictures[k], values, u, v, cv::INTER_LINEAR);
+    return values;
+  };
+  int deep = 0;
+  int agreeing = 0;
+  for (double x = 4.6; x < 6.4; x += 0.06) {
+    double best = 0.0;
+    double best_depth = 0.0;
+    for (double depth = 0.10; depth < 0.34; depth += 0.01) {
+      cv::Mat score;
+      cv::matchTemplate(patch(0, x, depth), patch(1, x, depth), score, cv::TM_CCOEFF_NORMED);
+      const auto value = static_cast<double>(score.at<float>(0, 0));
+      if (value > best) {
+        best = value;
+        best_depth = depth;
+      }
+    }
+    if (best < 0.85) continue;
+    ++agreeing;
+    EXPECT_GT(best_depth, 0.15) << x;
+    EXPECT_LT(best_depth, 0.285) << x;
+    deep += best_depth > 0.205 ? 1 : 0;
+  }
+  EXPECT_GT(agreeing, 8);
+  EXPECT_GT(deep, 2);
 }
 
 }  // namespace
