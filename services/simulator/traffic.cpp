@@ -14,6 +14,7 @@ constexpr double kCarM = 25.5;
 struct Beside {
   uint32_t edge;
   double begin_m, end_m;  // where the run goes beside it
+  double middle_m;        // of the whole track
   bool loop;
 };
 
@@ -27,7 +28,8 @@ std::vector<Beside> tracks_beside(const Trajectory& trajectory) {
     if (end_m - begin_m < kShortestM) continue;
     const auto* edge = map.edge(branch.edge);
     const auto is_switch = [&](uint32_t node) { return map.nodes[node - 1].kind == track::NodeKind::railway_switch; };
-    beside.push_back({branch.edge, begin_m, end_m, is_switch(edge->from_node) && is_switch(edge->to_node)});
+    beside.push_back({branch.edge, begin_m, end_m, branch.begin_m + 0.5 * length_m,
+                      is_switch(edge->from_node) && is_switch(edge->to_node)});
   }
   return beside;
 }
@@ -54,7 +56,7 @@ std::vector<OtherTrain> plan_traffic(const Trajectory& trajectory, int count, ui
     const double meet_m = track.begin_m + random.uniform(0.3, 0.7) * (track.end_m - track.begin_m);
     const double length_m = kCarM * std::floor(random.uniform(3.0, 8.0));
     if (track.loop) {
-      trains.push_back({track.edge, 0.5 * (track.begin_m + track.end_m + length_m), 0.0, length_m});
+      trains.push_back({track.edge, track.middle_m + 0.5 * length_m, 0.0, length_m});
       continue;
     }
     const double speed_mps = (k % 3 == 2 ? 1.0 : -1.0) * random.uniform(18.0, 34.0);

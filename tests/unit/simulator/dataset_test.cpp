@@ -10,6 +10,7 @@
 #include "simulator/builtin_line.hpp"
 #include "simulator/dataset_writer.hpp"
 #include "simulator/simulation.hpp"
+#include "simulator/traffic.hpp"
 
 namespace railfix::simulator {
 namespace {
@@ -153,6 +154,27 @@ TEST(Dataset, LostPicturesAndWrongStampsAreToldByTheTruth) {
   }
   EXPECT_EQ(rows, report.value().pictures);
   EXPECT_GT(off, rows / 2);
+}
+
+TEST(Traffic, MeetsTheRunOnTheTracksBesideIt) {
+  const auto map = std::make_shared<const track::Map>(builtin_line());
+  const auto on = [&](const char* start, double length_m) {
+    RunOptions run;
+    run.length_m = length_m;
+    const auto line =
+        std::make_shared<const Line>(Line::make(map, map->parse_position(start).value(), length_m).value());
+    const Trajectory trajectory(line, run, {0.0, 0.2094, 0.0, 0.0, 2.5}, {}, 1);
+    return plan_traffic(trajectory, 3, 1);
+  };
+  EXPECT_TRUE(on("1:100", 300.0).empty());
+  const auto standing = on("2:20", 300.0);
+  ASSERT_EQ(standing.size(), 3U);
+  EXPECT_EQ(standing[0].edge, 4U);
+  EXPECT_DOUBLE_EQ(standing[0].speed_mps, 0.0);
+  const auto moving = on("3:1050", 700.0);
+  ASSERT_EQ(moving.size(), 3U);
+  EXPECT_LT(moving[0].speed_mps, 0.0);
+  EXPECT_GT(moving[2].speed_mps, 0.0);
 }
 
 TEST(Dataset, RefusesWhatCannotBe) {
