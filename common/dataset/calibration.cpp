@@ -71,21 +71,33 @@ Status read_resolution(const YamlFile& yaml, geometry::Intrinsics& camera) {
   return {};
 }
 
-Status read_mount(const YamlFile& yaml, std::optional<geometry::CameraPose>& mount) {
-  if (!yaml.has("mount")) return {};
+Status read_pose(const YamlFile& yaml, const std::string& section, std::optional<geometry::CameraPose>& result) {
+  if (!yaml.has(section)) return {};
   geometry::CameraPose pose;
-  const std::pair<const char*, double*> fields[] = {{"mount.height_m", &pose.height_m},
-                                                    {"mount.pitch_rad", &pose.pitch_rad},
-                                                    {"mount.yaw_rad", &pose.yaw_rad},
-                                                    {"mount.roll_rad", &pose.roll_rad},
-                                                    {"mount.lateral_m", &pose.lateral_m}};
+  const std::pair<const char*, double*> fields[] = {{".height_m", &pose.height_m},
+                                                    {".pitch_rad", &pose.pitch_rad},
+                                                    {".yaw_rad", &pose.yaw_rad},
+                                                    {".roll_rad", &pose.roll_rad},
+                                                    {".lateral_m", &pose.lateral_m}};
   for (const auto& [key, value] : fields) {
-    const auto number = yaml.number(key);
+    const auto number = yaml.number(section + key);
     if (!number.ok()) return number.error();
     *value = number.value();
   }
-  if (pose.height_m <= 0) return yaml.error("mount.height_m", "must be positive");
-  mount = pose;
+  if (pose.height_m <= 0) return yaml.error(section + ".height_m", "must be positive");
+  result = pose;
+  return {};
+}
+
+Status read_lens_sigma(const YamlFile& yaml, std::optional<geometry::Intrinsics>& result) {
+  if (!yaml.has("intrinsics_sigma") || !yaml.has("distortion_sigma")) return {};
+  const auto lens = yaml.numbers("intrinsics_sigma", 4);
+  if (!lens.ok()) return lens.error();
+  const auto distortion = yaml.numbers("distortion_sigma", 4);
+  if (!distortion.ok()) return distortion.error();
+  const auto& f = lens.value();
+  const auto& k = distortion.value();
+  result = geometry::Intrinsics{f[0], f[1], f[2], f[3], k[0], k[1], k[2], k[3], 0, 0};
   return {};
 }
 
@@ -114,6 +126,15 @@ Result<CameraCalibration> read_kitti_calibration(const std::filesystem::path& fi
   return Error{file.string() + " has no line 'P0: ...'; it must be the calib.txt of a KITTI odometry sequence"};
 }
 
+void write_pose(std::ostream& stream, const char* section, const geometry::CameraPose& m) {
+  stream << section << ":\n"
+         << "  height_m: " << m.height_m << "      # above the rail heads\n"
+         << "  pitch_rad: " << m.pitch_rad << "    # down positive\n"
+         << "  yaw_rad: " << m.yaw_rad << "      # left positive\n"
+         << "  roll_rad: " << m.roll_rad << "\n"
+         << "  lateral_m: " << m.lateral_m << "    # left of the track centre positive\n";
+}
+
 }  // namespace
 
 Result<CameraCalibration> read_calibration(const std::filesystem::path& file) {
@@ -121,8 +142,10 @@ Result<CameraCalibration> read_calibration(const std::filesystem::path& file) {
   if (!loaded.ok()) return loaded.error();
   const YamlFile& yaml = loaded.value();
   CameraCalibration calibration;
-  for (const Status& status : {read_resolution(yaml, calibration.intrinsics), read_lens(yaml, calibration.intrinsics),
-                               read_distortion(yaml, calibration.intrinsics), read_mount(yaml, calibration.mount)}) {
+  for (const Status& status :
+       {read_resolution(yaml, calibration.intrinsics), read_lens(yaml, calibration.intrinsics),
+        read_distortion(yaml, calibration.intrinsics), read_pose(yaml, "mount", calibration.mount),
+        read_lens_sigma(yaml, calibration.intrinsics_sigma), read_pose(yaml, "mount_sigma", calibration.mount_sigma)}) {
     if (!status.ok()) return status.error();
   }
   if (yaml.has("rate_hz")) {
@@ -146,15 +169,13 @@ Status write_calibration(const std::filesystem::path& file, const CameraCalibrat
          << "intrinsics: [" << c.fu_px << ", " << c.fv_px << ", " << c.cu_px << ", " << c.cv_px << "]\n"
          << "distortion_model: radial-tangential\n"
          << "distortion_coefficients: [" << c.k1 << ", " << c.k2 << ", " << c.p1 << ", " << c.p2 << "]\n";
-  if (calibration.mount) {
-    const auto& m = *calibration.mount;
-    stream << "mount:\n"
-           << "  height_m: " << m.height_m << "      # above the rail heads\n"
-           << "  pitch_rad: " << m.pitch_rad << "    # down positive\n"
-           << "  yaw_rad: " << m.yaw_rad << "      # left positive\n"
-           << "  roll_rad: " << m.roll_rad << "\n"
-           << "  lateral_m: " << m.lateral_m << "    # left of the track centre positive\n";
+  if (calibration.intrinsics_sigma) {
+    const auto& g = *calibration.intrinsics_sigma;
+    stream << "intrinsics_sigma: [" << g.fu_px << ", " << g.fv_px << ", " << g.cu_px << ", " << g.cv_px << "]\n"
+           << "distortion_sigma: [" << g.k1 << ", " << g.k2 << ", " << g.p1 << ", " << g.p2 << "]\n";
   }
+  if (calibration.mount) write_pose(stream, "mount", *calibration.mount);
+  if (calibration.mount_sigma) write_pose(stream, "mount_sigma", *calibration.mount_sigma);
   stream.close();
   if (!stream) return Error{file.string() + " could not be written completely; is the disk full?"};
   return {};

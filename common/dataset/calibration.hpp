@@ -13,11 +13,15 @@ struct CameraCalibration {
   geometry::Intrinsics intrinsics;
   double rate_hz = 0;                         // 0 = not known
   std::optional<geometry::CameraPose> mount;  // nothing = run `railfix calibrate mount`
+  // One sigma of each number; nothing = not known. A roll that was held at 0 has none (0).
+  std::optional<geometry::Intrinsics> intrinsics_sigma{};
+  std::optional<geometry::CameraPose> mount_sigma{};
 };
 
 /// rate_hz, resolution, camera_model: pinhole, intrinsics, distortion_model: radial-tangential (or none),
-/// distortion_coefficients, optional mount {height_m, pitch_rad, yaw_rad, roll_rad, lateral_m}. Other keys are ignored
-/// (EuRoC files carry more).
+/// distortion_coefficients, optional mount {height_m, pitch_rad, yaw_rad, roll_rad, lateral_m}, and optional
+/// intrinsics_sigma, distortion_sigma and mount_sigma of the same shapes. Other keys are ignored (EuRoC files carry
+/// more).
 core::Result<CameraCalibration> read_calibration(const std::filesystem::path& file);
 core::Status write_calibration(const std::filesystem::path& file, const CameraCalibration& calibration);
 

@@ -65,15 +65,18 @@ geometry::CameraPose median_pose(const std::vector<TrackObservation>& observatio
 
 }  // namespace
 
-MountCalibrator::MountCalibrator(const geometry::Intrinsics& camera, double gauge_m)
-    : camera_(camera), gauge_m_(gauge_m) {}
+MountCalibrator::MountCalibrator(const geometry::Intrinsics& camera, double gauge_m, double roll_rad,
+                                 const geometry::Intrinsics& lens_sigma)
+    : camera_(camera), gauge_m_(gauge_m), roll_rad_(roll_rad), lens_sigma_(lens_sigma) {}
 
 std::vector<TrackObservation> MountCalibrator::look(const geometry::CameraPose& start, const TrackShapeSigma& limits,
                                                     size_t max_pictures) const {
   DetectorOptions options;
   options.gauge_m = gauge_m_;
   options.limits = limits;
-  TrackDetector detector(camera_, start, options);
+  geometry::CameraPose rolled = start;
+  rolled.roll_rad = roll_rad_;
+  TrackDetector detector(camera_, rolled, options);
   const size_t stride = std::max<size_t>(1, pictures_.size() / max_pictures);
   std::vector<TrackObservation> seen;
   for (size_t i = 0; i < pictures_.size(); i += stride) {
@@ -170,6 +173,8 @@ core::Result<MountCalibration> MountCalibrator::solve() const {
     // The scatter over pictures holds the shake; a median is 1.25 times as uncertain as a mean.
     result.sigma.*member = 1.25 * std::max(spread.*member, median(own)) / std::sqrt(count);
   }
+  result.mount.roll_rad = roll_rad_;
+  add_lens(result);
   std::vector<double> residuals;
   for (const auto& o : seen) residuals.push_back(o.residual_px);
   result.residual_px = median(residuals);
@@ -192,6 +197,16 @@ TrackObservation find_rails_anywhere(const geometry::Intrinsics& camera, const c
     best = std::move(observation);
   }
   return best;
+}
+
+/// A wrong principal point is taken for pitch and yaw, a wrong focal length scales their tangents.
+void MountCalibrator::add_lens(MountCalibration& result) const {
+  const auto& m = result.mount;
+  const auto more = [](double sigma, double a, double b) { return std::sqrt(sigma * sigma + a * a + b * b); };
+  result.sigma.pitch_rad = more(result.sigma.pitch_rad, lens_sigma_.cv_px / camera_.fv_px,
+                                std::tan(m.pitch_rad) * lens_sigma_.fv_px / camera_.fv_px);
+  result.sigma.yaw_rad = more(result.sigma.yaw_rad, lens_sigma_.cu_px / camera_.fu_px,
+                              std::tan(m.yaw_rad) * lens_sigma_.fu_px / camera_.fu_px);
 }
 
 }  // namespace railfix::track_detector

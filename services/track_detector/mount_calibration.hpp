@@ -11,8 +11,8 @@
 namespace railfix::track_detector {
 
 struct MountCalibration {
-  geometry::CameraPose mount;  // roll is held at 0: straight rails cannot tell it from a sideways position
-  geometry::CameraPose sigma;  // one sigma of the mean pose, from the scatter over the pictures
+  geometry::CameraPose mount;  // roll as given: straight rails cannot tell it from a sideways position
+  geometry::CameraPose sigma;  // one sigma; roll: 0, as its own is not known here
   size_t pictures = 0;
   size_t seen = 0;      // pictures with both rails found
   size_t straight = 0;  // of those, used
@@ -22,7 +22,10 @@ struct MountCalibration {
 /// Add pictures, then solve. Works from a rough idea of the mount or none.
 class MountCalibrator {
  public:
-  MountCalibrator(const geometry::Intrinsics& camera, double gauge_m);
+  /// `roll_rad` from elsewhere (gravity), 0 where nothing is known. `lens_sigma`: of the camera's numbers, zeros where
+  /// they are not known.
+  MountCalibrator(const geometry::Intrinsics& camera, double gauge_m, double roll_rad = 0,
+                  const geometry::Intrinsics& lens_sigma = {});
 
   /// Grey pictures of the camera's size, any distance apart. All are kept until solve().
   void add(const cv::Mat& grey) { pictures_.push_back(grey); }
@@ -33,11 +36,14 @@ class MountCalibrator {
   [[nodiscard]] std::vector<TrackObservation> look(const geometry::CameraPose& start, const TrackShapeSigma& limits,
                                                    size_t max_pictures) const;
   [[nodiscard]] core::Result<geometry::CameraPose> rough() const;
+  void add_lens(MountCalibration& result) const;
   /// The candidate that most pictures agree with.
   [[nodiscard]] geometry::CameraPose elected(const std::vector<geometry::CameraPose>& candidates) const;
 
   geometry::Intrinsics camera_;
   double gauge_m_;
+  double roll_rad_;
+  geometry::Intrinsics lens_sigma_;
   std::vector<cv::Mat> pictures_;
 };
 

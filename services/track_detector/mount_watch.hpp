@@ -1,6 +1,8 @@
 // Does the pose keep away from the calibrated mount? Shake averages out, a camera that was knocked does not.
 #pragma once
 
+#include <string>
+
 #include "track_detector/rail_fit.hpp"
 
 namespace railfix::track_detector {
@@ -10,8 +12,10 @@ class MountWatch {
   MountWatch(const TrackShape& mount, const TrackShapeSigma& limits);
   /// A pose from a picture with both rails seen, `interval_s` after the previous one.
   void add(const TrackShape& shape, double interval_s);
-  /// The average of the last minute is off by more than the suspension explains.
-  [[nodiscard]] bool drifted() const;
+  /// The average of the last minute is off by more than shake and suspension explain.
+  [[nodiscard]] bool drifted() const { return !what_drifted().empty(); }
+  /// "pitch by +0.52 deg (0.37 may be)"; empty when nothing has.
+  [[nodiscard]] std::string what_drifted() const;
 
  private:
   Eigen::Matrix<double, 5, 1> mount_;

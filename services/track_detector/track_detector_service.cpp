@@ -11,6 +11,7 @@
 namespace railfix::track_detector {
 namespace {
 
+constexpr int64_t kDriftSaidNs = 5 * core::kNsPerSecond;  // its numbers change with every picture
 constexpr int64_t kBlindNs = core::kNsPerSecond;
 constexpr double kUnknownMountFactor = 3.0;  // how much wider the limits are while the mount is a guess
 
@@ -180,12 +181,16 @@ void TrackDetectorService::find_landmarks(const cv::Mat& grey, const TrackObserv
 
 void TrackDetectorService::tell(const TrackObservation& observation, int64_t stamp_ns) {
   if (observation.seen() || last_seen_ns_ == 0) last_seen_ns_ = stamp_ns;
+  if (stamp_ns - drift_ns_ > kDriftSaidNs || stamp_ns < drift_ns_) {
+    drift_ = watch_->what_drifted();
+    drift_ns_ = stamp_ns;
+  }
   if (stamp_ns - last_seen_ns_ > kBlindNs) {
     context_.health().degraded("rails not seen: " + observation.reason);
   } else if (!mount_known_) {
     context_.health().degraded("the camera's mount is not calibrated: run railfix calibrate mount");
-  } else if (watch_->drifted()) {
-    context_.health().degraded("the camera has moved in its mount: run railfix calibrate mount again");
+  } else if (!drift_.empty()) {
+    context_.health().degraded("the camera has moved in its mount: " + drift_ + "; run railfix calibrate mount again");
   } else if (observation.seen()) {
     context_.health().active();
   }

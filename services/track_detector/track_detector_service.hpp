@@ -34,6 +34,8 @@ class TrackDetectorService {
   uint64_t last_seq_ = 0;
   int64_t last_stamp_ns_ = 0;
   int64_t last_seen_ns_ = 0;
+  std::string drift_;  // of the mount, as told last
+  int64_t drift_ns_ = 0;
 };
 
 }  // namespace railfix::track_detector

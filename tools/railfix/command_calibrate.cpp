@@ -1,9 +1,11 @@
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "commands.hpp"
 #include "core/result.hpp"
@@ -19,6 +21,10 @@ namespace {
 // Seen in most cabs: 70 degrees across the picture.
 constexpr double kAssumedFocalPerWidth = 0.72;
 constexpr size_t kMaxPictures = 120;
+constexpr size_t kFewestImuRows = 200;
+constexpr double kGravityRollSigmaRad = 0.009;  // 0.09 m/s2 of bias and of cant that is not known
+constexpr double kTypicalRollRad = 0.0175;      // 1 degree, to say what it would do
+const cv::Scalar kMountColour(0, 230, 255);
 
 struct MountArguments {
   std::string pictures;
@@ -28,6 +34,7 @@ struct MountArguments {
   std::string draw;
   double gauge_m = 1.435;
   double focal_px = 0;
+  bool roll_from_imu = false;
   bool json = false;
 };
 
@@ -96,17 +103,84 @@ cv::Mat in_colour(const std::string& path, const dataset::Picture& wanted) {
   }
 }
 
+struct Roll {
+  double rad = 0;
+  double sigma_rad = 0;  // 0 = held, not measured
+};
+
+/// From gravity, with an IMU that sits in the camera's housing: on straight track the rails are level (but for cant).
+Roll roll_from_gravity(const std::string& path) {
+  const auto sensors = core::value_or_throw(dataset::read_sensors(path));
+  if (sensors.imu.size() < kFewestImuRows) {
+    throw core::BadInput(
+        path + " holds no IMU data of some seconds: leave --roll-from-imu out, or give a dataset with mav0/imu0");
+  }
+  double across = 0;
+  double up = 0;
+  for (const auto& row : sensors.imu) {
+    across += row.accel_mps2[1] / static_cast<double>(sensors.imu.size());
+    up += row.accel_mps2[2] / static_cast<double>(sensors.imu.size());
+  }
+  return {std::atan2(across, up), kGravityRollSigmaRad};
+}
+
+void put_words(cv::Mat& picture, const std::string& words, const cv::Point& at) {
+  const double scale = picture.cols / 1600.0;
+  cv::putText(picture, words, at, cv::FONT_HERSHEY_SIMPLEX, scale, {0, 0, 0}, 4, cv::LINE_AA);
+  cv::putText(picture, words, at, cv::FONT_HERSHEY_SIMPLEX, scale, kMountColour, 1, cv::LINE_AA);
+}
+
+/// What the mount alone says, whatever this picture shows: straight rails at the gauge, distances, the horizon.
+void draw_mount(cv::Mat& picture, const geometry::View& view, double gauge_m) {
+  const auto pixel = [&](double x_m, double y_m) -> std::optional<cv::Point> {
+    const auto p = view.project({x_m, y_m, 0});
+    if (!p || p->cwiseAbs().maxCoeff() > 1e5) return std::nullopt;
+    return cv::Point(cvRound(p->x()), cvRound(p->y()));
+  };
+  const auto line = [&](double x0_m, double y0_m, double x1_m, double y1_m) {
+    const auto from = pixel(x0_m, y0_m);
+    const auto to = pixel(x1_m, y1_m);
+    if (from && to) cv::line(picture, *from, *to, kMountColour, 1, cv::LINE_AA);
+  };
+  for (const double side : {-0.5, 0.5}) {
+    for (double x_m = 2; x_m < 80; x_m *= 1.1) line(x_m, side * gauge_m, 1.1 * x_m, side * gauge_m);
+  }
+  for (const double x_m : {5, 10, 15, 20, 30, 50, 80}) {
+    line(x_m, -1.2, x_m, 1.2);
+    if (const auto at = pixel(x_m, -1.25)) put_words(picture, std::to_string(cvRound(x_m)) + " m", *at);
+  }
+  const int horizon = cvRound(view.horizon_v_px());
+  cv::line(picture, {0, horizon}, {picture.cols - 1, horizon}, kMountColour, 1, cv::LINE_AA);
+  put_words(picture, "horizon", {8, horizon - 6});
+}
+
 void draw(const std::string& file, cv::Mat colour, const dataset::Picture& picture, const geometry::Intrinsics& lens,
           const geometry::CameraPose& mount, double gauge_m) {
   track_detector::DetectorOptions options;
   options.gauge_m = gauge_m;
   track_detector::TrackDetector detector(lens, mount, options);
   track_detector::draw_track(colour, lens, detector.detect(picture.grey), gauge_m);
+  draw_mount(colour, geometry::View(lens, mount), gauge_m);
   if (!cv::imwrite(file, colour))
     throw core::BadInput("cannot write " + file + ": give a .png in a folder that exists");
 }
 
-void print(const track_detector::MountCalibration& found, const std::string& remark) {
+void print_roll(const geometry::CameraPose& mount, const Roll& roll) {
+  const double lateral_m = kTypicalRollRad * mount.height_m;
+  if (roll.sigma_rad > 0) {
+    std::printf(
+        "roll     %+7.3f deg  +- %.3f   right side down, from gravity; an IMU beside the camera only helps when it is "
+        "turned with it\n",
+        core::deg_from_rad(roll.rad), core::deg_from_rad(roll.sigma_rad));
+    return;
+  }
+  std::printf(
+      "roll       0.000 deg  held: straight rails cannot tell roll from a sideways position. Level the camera with a "
+      "spirit level: a roll of 1 degree moves lateral by %.3f m\n",
+      lateral_m);
+}
+
+void print(const track_detector::MountCalibration& found, const Roll& roll, const std::string& remark) {
   const auto deg = [](double rad) { return core::deg_from_rad(rad); };
   const auto& m = found.mount;
   const auto& s = found.sigma;
@@ -116,7 +190,7 @@ void print(const track_detector::MountCalibration& found, const std::string& rem
   std::printf("lateral  %+7.3f m    +- %.3f   left of the track centre\n", m.lateral_m, s.lateral_m);
   std::printf("pitch    %7.3f deg  +- %.3f   down\n", deg(m.pitch_rad), deg(s.pitch_rad));
   std::printf("yaw      %+7.3f deg  +- %.3f   left\n", deg(m.yaw_rad), deg(s.yaw_rad));
-  std::printf("roll       0.000 deg  held: straight rails cannot tell roll from a sideways position\n");
+  print_roll(m, roll);
   if (!remark.empty()) std::printf("%s\n", remark.c_str());
 }
 
@@ -146,9 +220,11 @@ int calibrate_mount(const MountArguments& arguments) {
   }
   const std::string& path = arguments.pictures.empty() ? arguments.video : arguments.pictures;
   const auto pictures = load_pictures(path, arguments.json);
+  const Roll roll = arguments.roll_from_imu ? roll_from_gravity(path) : Roll{};
   std::string remark;
   auto calibration = starting_calibration(arguments, pictures.front().grey.size(), remark);
-  track_detector::MountCalibrator calibrator(calibration.intrinsics, arguments.gauge_m);
+  track_detector::MountCalibrator calibrator(calibration.intrinsics, arguments.gauge_m, roll.rad,
+                                             calibration.intrinsics_sigma.value_or(geometry::Intrinsics{}));
   for (const auto& picture : pictures) calibrator.add(picture.grey);
   const auto found = calibrator.solve();
   if (!found.ok()) {
@@ -156,17 +232,23 @@ int calibrate_mount(const MountArguments& arguments) {
     return 1;
   }
   calibration.mount = found.value().mount;
+  calibration.mount_sigma = found.value().sigma;
+  calibration.mount_sigma->roll_rad = roll.sigma_rad;
+  // Roll and sideways position turn about the same rails.
+  calibration.mount_sigma->lateral_m =
+      std::hypot(found.value().sigma.lateral_m, roll.sigma_rad * calibration.mount->height_m);
   core::ok_or_throw(dataset::write_calibration(arguments.out, calibration));
-  if (!arguments.draw.empty()) {
-    const auto& picture = pictures[pictures.size() / 2];
-    draw(arguments.draw, in_colour(path, picture), picture, calibration.intrinsics, *calibration.mount,
-         arguments.gauge_m);
-  }
+  const std::string drawn = arguments.draw.empty()
+                                ? std::filesystem::path(arguments.out).replace_extension(".mount.png").string()
+                                : arguments.draw;
+  const auto& picture = pictures[pictures.size() / 2];
+  draw(drawn, in_colour(path, picture), picture, calibration.intrinsics, *calibration.mount, arguments.gauge_m);
   if (arguments.json) {
     std::cout << to_json(found.value(), calibration.intrinsics, !remark.empty()).dump(2) << '\n';
   } else {
-    print(found.value(), remark);
-    std::printf("written to %s\n", arguments.out.c_str());
+    print(found.value(), roll, remark);
+    std::printf("written to %s; look at %s: straight rails must lie in the yellow lines\n", arguments.out.c_str(),
+                drawn.c_str());
   }
   return 0;
 }
@@ -176,6 +258,7 @@ int calibrate_mount(const MountArguments& arguments) {
 void add_calibrate(CLI::App& app, Action& chosen) {
   auto* calibrate = app.add_subcommand("calibrate", "How a camera sits and looks");
   calibrate->require_subcommand(1);
+  add_calibrate_lens(*calibrate, chosen);
   auto* mount =
       calibrate->add_subcommand("mount", "Height, sideways position, pitch and yaw from the rails of straight track");
   mount->footer("Example: railfix calibrate mount --pictures frames --focal 1390 --out camera.yaml --draw check.png");
@@ -190,7 +273,10 @@ void add_calibrate(CLI::App& app, Action& chosen) {
   mount->add_option("--camera", arguments->camera,
                     "Calibration with the lens (intrinsics and distortion), instead of --focal");
   mount->add_option("--out", arguments->out, "Calibration file to write")->required();
-  mount->add_option("--draw", arguments->draw, "Draw the rails on one picture, to check by eye");
+  mount->add_option("--draw", arguments->draw, "Picture to check by eye; else beside --out");
+  mount->add_flag(
+      "--roll-from-imu", arguments->roll_from_imu,
+      "Take the roll from gravity: for an IMU that is fixed to the camera, standing or on straight level track");
   mount->add_flag("--json", arguments->json, "Print the result as JSON");
   mount->callback([arguments, &chosen] { chosen = [arguments] { return calibrate_mount(*arguments); }; });
 }

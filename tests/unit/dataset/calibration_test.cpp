@@ -41,6 +41,8 @@ TEST_F(CalibrationTest, WhatIsWrittenReadsBackTheSame) {
   written.intrinsics = {1234.5, 1233.25, 639.5, 511.5, -0.1, 0.01, 1e-4, -2e-5, 1280, 1024};
   written.rate_hz = 60;
   written.mount = geometry::CameraPose{0.01, 0.12345678901234567, -0.02, 0.03, 2.4};
+  written.mount_sigma = geometry::CameraPose{0, 0.0002, 0.0003, 0.004, 0.005};
+  written.intrinsics_sigma = geometry::Intrinsics{0.5, 0.6, 0.7, 0.8, 1e-3, 2e-3, 3e-5, 4e-5, 0, 0};
   ASSERT_TRUE(write_calibration(root_ / "camera.yaml", written).ok());
   const auto read = read_calibration(root_ / "camera.yaml");
   ASSERT_TRUE(read.ok()) << read.error().message;
@@ -52,6 +54,11 @@ TEST_F(CalibrationTest, WhatIsWrittenReadsBackTheSame) {
   EXPECT_EQ(read.value().mount->height_m, 2.4);
   EXPECT_EQ(read.value().intrinsics.k1, -0.1);
   EXPECT_EQ(read.value().intrinsics.height_px, 1024);
+  ASSERT_TRUE(read.value().mount_sigma && read.value().intrinsics_sigma);
+  EXPECT_EQ(read.value().mount_sigma->roll_rad, 0);
+  EXPECT_EQ(read.value().mount_sigma->height_m, 0.005);
+  EXPECT_EQ(read.value().intrinsics_sigma->cv_px, 0.8);
+  EXPECT_EQ(read.value().intrinsics_sigma->p2, 4e-5);
 }
 
 TEST_F(CalibrationTest, ErrorsNameFileAndKey) {

@@ -206,6 +206,65 @@ TEST(MountCalibration, FindsAnUnknownMount) {
   EXPECT_NEAR(found.value().mount.yaw_rad, 0.03, 0.003);
 }
 
+const railfix::geometry::Intrinsics kSmall{575, 575, 319.5, 255.5, 0, 0, 0, 0, 640, 512};
+
+// Errors over sigma, over drives with shake of their own.
+TEST(MountCalibration, ErrorsAreWithinTheSigmas) {
+  double square = 0;
+  constexpr int kDrives = 2;
+  for (uint64_t drive = 0; drive < kDrives; ++drive) {
+    MountCalibrator calibrator(kSmall, 1.435);
+    railfix::core::Random random(100 + drive);
+    const railfix::geometry::CameraPose mount{0, 0.12, 0.01, 0.1, 2.5};
+    for (uint64_t i = 0; i < 4; ++i) {
+      Scene scene;
+      scene.shape.camera = {0, mount.pitch_rad + 0.002 * random.normal(), mount.yaw_rad + 0.002 * random.normal(),
+                            mount.lateral_m + 0.01 * random.normal(), mount.height_m + 0.005 * random.normal()};
+      calibrator.add(render(scene, kSmall, 10 * drive + i));
+    }
+    const auto found = calibrator.solve();
+    ASSERT_TRUE(found.ok()) << found.error().message;
+    const auto& m = found.value().mount;
+    const auto& s = found.value().sigma;
+    for (const double error :
+         {(m.pitch_rad - mount.pitch_rad) / s.pitch_rad, (m.yaw_rad - mount.yaw_rad) / s.yaw_rad,
+          (m.lateral_m - mount.lateral_m) / s.lateral_m, (m.height_m - mount.height_m) / s.height_m}) {
+      EXPECT_LT(std::abs(error), 3.5) << "drive " << drive;
+      square += error * error / (4 * kDrives);
+    }
+    EXPECT_LT(s.height_m, 0.02);
+    EXPECT_EQ(m.roll_rad, 0);
+  }
+  EXPECT_LT(square, 2.0);
+}
+
+TEST(MountCalibration, ARollFromElsewhereIsKept) {
+  MountCalibrator calibrator(kSmall, 1.435, 0.02, {3, 3, 2, 2, 0, 0, 0, 0, 0, 0});
+  for (uint64_t i = 0; i < 2; ++i) {
+    Scene scene;
+    scene.shape.camera = {0.02, 0.12, 0, 0.3, 2.5};
+    calibrator.add(render(scene, kSmall, i));
+  }
+  const auto found = calibrator.solve();
+  ASSERT_TRUE(found.ok()) << found.error().message;
+  EXPECT_EQ(found.value().mount.roll_rad, 0.02);
+  EXPECT_NEAR(found.value().mount.lateral_m, 0.3, 0.02);
+  EXPECT_GE(found.value().sigma.pitch_rad, 2.0 / kSmall.fv_px) << "the centre's sigma is in it";
+}
+
+TEST(MountCalibration, CurvesAreRefused) {
+  MountCalibrator calibrator(kSmall, 1.435);
+  for (uint64_t i = 0; i < 3; ++i) {
+    Scene scene;
+    scene.shape.camera = kMount;
+    scene.shape.curvature_per_m = 1.0 / 400;
+    calibrator.add(render(scene, kSmall, i));
+  }
+  const auto found = calibrator.solve();
+  ASSERT_FALSE(found.ok());
+  EXPECT_NE(found.error().message.find("straight track"), std::string::npos) << found.error().message;
+}
+
 TEST(MountCalibration, SaysWhatToDoWithoutRails) {
   MountCalibrator calibrator(kCab, 1.435);
   EXPECT_FALSE(calibrator.solve().ok());
@@ -229,6 +288,22 @@ TEST(MountWatch, ShakeAveragesOutAndAKnockDoesNot) {
   shape.camera.pitch_rad = mount.camera.pitch_rad + 3 * options.limits.pitch_rad;
   for (int i = 0; i < 7200; ++i) watch.add(shape, 1.0 / 60);
   EXPECT_TRUE(watch.drifted());
+}
+
+TEST(MountWatch, HalfADegreeIsToldInNumbers) {
+  TrackShape mount;
+  mount.camera = kMount;
+  MountWatch watch(mount, DetectorOptions().limits);
+  for (double railfix::geometry::CameraPose::*angle :
+       {&railfix::geometry::CameraPose::pitch_rad, &railfix::geometry::CameraPose::yaw_rad}) {
+    TrackShape shape = mount;
+    shape.camera.*angle -= 0.5 / 57.29578;
+    for (int i = 0; i < 60 * 120; ++i) watch.add(mount, 1.0 / 60);
+    EXPECT_EQ(watch.what_drifted(), "");
+    for (int i = 0; i < 60 * 300; ++i) watch.add(shape, 1.0 / 60);
+    EXPECT_NE(watch.what_drifted().find("by -0.50 deg (0.37 may be)"), std::string::npos) << watch.what_drifted();
+    for (int i = 0; i < 60 * 300; ++i) watch.add(mount, 1.0 / 60);
+  }
 }
 
 TEST(Draw, MarksTheRailsAndSaysNotSeen) {
