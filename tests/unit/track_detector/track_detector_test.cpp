@@ -211,12 +211,12 @@ const railfix::geometry::Intrinsics kSmall{575, 575, 319.5, 255.5, 0, 0, 0, 0, 6
 // Errors over sigma, over drives with shake of their own.
 TEST(MountCalibration, ErrorsAreWithinTheSigmas) {
   double square = 0;
-  constexpr int kDrives = 2;
+  constexpr int kDrives = 1;
   for (uint64_t drive = 0; drive < kDrives; ++drive) {
     MountCalibrator calibrator(kSmall, 1.435);
     railfix::core::Random random(100 + drive);
     const railfix::geometry::CameraPose mount{0, 0.12, 0.01, 0.1, 2.5};
-    for (uint64_t i = 0; i < 4; ++i) {
+    for (uint64_t i = 0; i < 3; ++i) {
       Scene scene;
       scene.shape.camera = {0, mount.pitch_rad + 0.002 * random.normal(), mount.yaw_rad + 0.002 * random.normal(),
                             mount.lateral_m + 0.01 * random.normal(), mount.height_m + 0.005 * random.normal()};
@@ -254,7 +254,7 @@ TEST(MountCalibration, ARollFromElsewhereIsKept) {
 
 TEST(MountCalibration, CurvesAreRefused) {
   MountCalibrator calibrator(kSmall, 1.435);
-  for (uint64_t i = 0; i < 3; ++i) {
+  for (uint64_t i = 0; i < 2; ++i) {
     Scene scene;
     scene.shape.camera = kMount;
     scene.shape.curvature_per_m = 1.0 / 400;
