@@ -44,7 +44,7 @@ struct TopView {
 Sheet fit_sheet(const geometry::Intrinsics& camera, const SheetPose& pose, double near_m, double far_m,
                 double half_width_m, double cell_m, double margin_rad);
 
-/// Resamples 8-bit pictures; keeps its buffers between pictures.
+/// Resamples 8-bit pictures; keeps its buffers between pictures and touches only the pixels that the sheet covers.
 class TopViewMaker {
  public:
   TopViewMaker(const geometry::Intrinsics& camera, const Sheet& sheet) : camera_(camera), sheet_(sheet) {}
@@ -55,10 +55,13 @@ class TopViewMaker {
 
  private:
   void map_row(const SheetPose& pose, const Eigen::Matrix3d& camera_from_track, double ahead_m);
+  void halve(const cv::Mat& grey, const SheetPose& pose, const Eigen::Matrix3d& camera_from_track, double fine_m);
+  void smooth(cv::Mat& out);
   geometry::Intrinsics camera_;
   Sheet sheet_;
   cv::Mat half_;  // picture at half size: near rows see the ground finer than a cell
   cv::Mat sharp_;
+  std::vector<float> line_;  // a row smoothed along the track, with a column to spare on either side
   std::vector<float> u_px_;
   std::vector<float> v_px_;
 };

@@ -13,7 +13,20 @@ namespace railfix::odometry {
 
 enum class Ground : uint8_t { sleeper, ballast, mixed };
 
-/// One per row. Where the two cannot be told apart all is sleeper: the texture plane.
-std::vector<Ground> find_ground(const vision::TopView& view, const vision::Sheet& sheet);
+/// Keeps its buffers between pictures.
+class GroundFinder {
+ public:
+  /// One per row. Where the two cannot be told apart all is sleeper: the texture plane.
+  void find(const vision::TopView& view, const vision::Sheet& sheet, std::vector<Ground>& out);
+
+ private:
+  void measure_roughness(const vision::TopView& view);
+  void mark_ballast(const vision::TopView& view, int half_window);
+  [[nodiscard]] bool any_smooth(int row, int reach) const;
+  std::vector<float> squared_;    // of differences along a row, mean
+  std::vector<float> roughness_;  // its root over three rows
+  std::vector<float> window_;
+  std::vector<uint8_t> ballast_;
+};
 
 }  // namespace railfix::odometry

@@ -8,63 +8,75 @@
 namespace railfix::odometry {
 namespace {
 
-// Unknowns: the reference's distance, pitch and height error, pitch bias, ballast depth, then the new picture's errors.
-// In the order of PoseErrors first.
+// Unknowns: the reference's errors in the order of PoseErrors, then the new picture's.
 enum Unknown {
   kDistanceR,
   kPitchR,
   kHeightR,
+  kVerticalR,
   kBias,
   kBallast,
   kDistanceN,
   kPitchN,
   kHeightN,
+  kVerticalN,
   kLateral,
   kTurn,
-  kUnknowns
+  kAll
 };
-using Vector = Eigen::Matrix<double, kUnknowns, 1>;
-using Matrix = Eigen::Matrix<double, kUnknowns, kUnknowns>;
-using Rows = Eigen::Matrix<double, 2, kUnknowns>;
+constexpr int kOfNow[PoseErrors::kCount] = {kDistanceN, kPitchN, kHeightN, kVerticalN, kBias, kBallast};
+using Vector = Eigen::Matrix<double, kAll, 1>;
+using Rows = Eigen::Matrix<double, 2, kAll>;
 
 constexpr double kLateralSigmaM = 0.05;
 constexpr double kTurnSigmaRad = 0.02;
 constexpr double kDistanceSigmaM = 1e3;
 constexpr double kTinyVariance = 1e-12;
+constexpr double kTinyVerticalVariance = 1e-16;
 constexpr double kCauchySquared = 4.0;
 constexpr double kMedianChiSquared2 = 1.386;  // two degrees of freedom
-constexpr int kReweightings = 5;
+constexpr int kReweightings = 4;
 
 // Displacement (ahead, left) of a place that shows at `place` in the reference and `now` in the new view, per unknown.
 Rows rows_at(const Eigen::Vector2d& place, const Eigen::Vector2d& now, double height_m, bool ballast) {
   const double x = place.x();
   const double xn = now.x();
   const double n = place.y();
+  const double per_m = 1.0 / height_m;
   Rows rows = Rows::Zero();
   rows(0, kDistanceR) = 1.0;
   rows(0, kDistanceN) = -1.0;
-  rows(0, kPitchR) = (x * x + height_m * height_m) / height_m;
-  rows(0, kPitchN) = -(xn * xn + height_m * height_m) / height_m;
-  rows(0, kHeightR) = -x / height_m;
-  rows(0, kHeightN) = xn / height_m;
+  rows(0, kPitchR) = (x * x + height_m * height_m) * per_m;
+  rows(0, kPitchN) = -(xn * xn + height_m * height_m) * per_m;
+  rows(0, kHeightR) = -x * per_m;
+  rows(0, kHeightN) = xn * per_m;
+  rows(0, kVerticalR) = 0.5 * x * x * x * per_m;
+  rows(0, kVerticalN) = -0.5 * xn * xn * xn * per_m;
   rows(0, kTurn) = n;
-  if (ballast) rows(0, kBallast) = (x - xn) / height_m;  // farther away than the sheet, so it seems slower
-  rows(1, kPitchR) = n * x / height_m;
-  rows(1, kPitchN) = -n * xn / height_m;
-  rows(1, kHeightR) = -n / height_m;
-  rows(1, kHeightN) = n / height_m;
+  if (ballast) rows(0, kBallast) = (x - xn) * per_m;  // farther away than the sheet, so it seems slower
+  rows(1, kPitchR) = n * x * per_m;
+  rows(1, kPitchN) = -n * xn * per_m;
+  rows(1, kHeightR) = -n * per_m;
+  rows(1, kHeightN) = n * per_m;
+  rows(1, kVerticalR) = 0.5 * n * x * x * per_m;
+  rows(1, kVerticalN) = -0.5 * n * xn * xn * per_m;
   rows(1, kLateral) = -1.0;
   rows(1, kTurn) = -xn;
   return rows;
 }
 
-void add_prior(Matrix& information, Vector& right, const Vector& row, double value, double sigma) {
-  const double weight = 1.0 / (sigma * sigma);
-  information += weight * row * row.transpose();
-  right += weight * value * row;
+}  // namespace
+
+PoseTrust PoseTrust::independent(double pitch_sigma_rad, double height_sigma_m, double vertical_sigma_per_m) {
+  PoseTrust trust;
+  const Eigen::Vector3d sigma(pitch_sigma_rad, height_sigma_m, vertical_sigma_per_m);
+  trust.covariance = sigma.cwiseProduct(sigma).asDiagonal();
+  return trust;
 }
 
-}  // namespace
+double PoseTrust::pitch_sigma_rad() const {
+  return std::sqrt(covariance(0, 0));
+}
 
 PoseErrors MotionFilter::first(const PosePrior& prior) const {
   PoseErrors errors;
@@ -74,104 +86,155 @@ PoseErrors MotionFilter::first(const PosePrior& prior) const {
       options_.ballast_depth_sigma_m * options_.ballast_depth_sigma_m;
   errors.mean(PoseErrors::kPitch) = prior.pitch_offset_rad;
   errors.mean(PoseErrors::kHeight) = prior.height_offset_m;
-  errors.covariance(PoseErrors::kPitch, PoseErrors::kPitch) =
-      prior.trust.pitch_sigma_rad * prior.trust.pitch_sigma_rad + bias;
-  errors.covariance(PoseErrors::kHeight, PoseErrors::kHeight) = prior.trust.height_sigma_m * prior.trust.height_sigma_m;
+  errors.mean(PoseErrors::kVertical) = prior.vertical_offset_per_m;
+  errors.covariance.block<3, 3>(PoseErrors::kPitch, PoseErrors::kPitch) = prior.trust.covariance;
+  errors.covariance(PoseErrors::kPitch, PoseErrors::kPitch) += bias;
   errors.covariance(PoseErrors::kPitchBias, PoseErrors::kPitchBias) = bias;
   errors.covariance(PoseErrors::kPitch, PoseErrors::kPitchBias) = bias;
   errors.covariance(PoseErrors::kPitchBias, PoseErrors::kPitch) = bias;
   return errors;
 }
 
-Motion MotionFilter::solve(const PoseErrors& reference, const PosePrior& prior, double height_m,
-                           const std::vector<PatchMotion>& patches) const {
-  Matrix prior_information = Matrix::Zero();
-  Vector prior_right = Vector::Zero();
+void MotionFilter::set_prior(const PoseErrors& reference, const PosePrior& prior) {
   constexpr int kCarried = PoseErrors::kCount;
-  const PoseErrors::Covariance covariance = reference.covariance + kTinyVariance * PoseErrors::Covariance::Identity();
-  prior_information.topLeftCorner<kCarried, kCarried>() = covariance.inverse();
-  prior_right.head<kCarried>() = prior_information.topLeftCorner<kCarried, kCarried>() * reference.mean;
-  Vector row = Vector::Zero();
-  row(kPitchN) = 1.0;
-  row(kBias) = -1.0;
-  add_prior(prior_information, prior_right, row, prior.pitch_offset_rad, prior.trust.pitch_sigma_rad);
-  add_prior(prior_information, prior_right, Vector::Unit(kHeightN), prior.height_offset_m, prior.trust.height_sigma_m);
-  add_prior(prior_information, prior_right, Vector::Unit(kLateral), 0.0, kLateralSigmaM);
-  add_prior(prior_information, prior_right, Vector::Unit(kTurn), 0.0, kTurnSigmaRad);
-  add_prior(prior_information, prior_right, Vector::Unit(kDistanceN), 0.0, kDistanceSigmaM);
+  PoseErrors::Mean tiny = PoseErrors::Mean::Constant(kTinyVariance);
+  tiny(PoseErrors::kVertical) = kTinyVerticalVariance;
+  PoseErrors::Covariance covariance = reference.covariance;
+  covariance.diagonal() += tiny;
+  prior_information_.setZero();
+  prior_right_.setZero();
+  prior_information_.topLeftCorner<kCarried, kCarried>() = covariance.inverse();
+  prior_right_.head<kCarried>().noalias() =
+      prior_information_.topLeftCorner<kCarried, kCarried>().lazyProduct(reference.mean);
 
-  std::vector<Rows> rows;
-  rows.reserve(patches.size());
-  for (const PatchMotion& patch : patches)
-    rows.push_back(rows_at(patch.place_m, patch.place_m + patch.displacement_m, height_m, patch.ballast));
+  // The new picture's pitch less the lasting bias, its height and its vertical curvature are as measured.
+  Eigen::Matrix<double, 3, kUnknowns> rows = Eigen::Matrix<double, 3, kUnknowns>::Zero();
+  rows(0, kPitchN) = 1.0;
+  rows(0, kBias) = -1.0;
+  rows(1, kHeightN) = 1.0;
+  rows(2, kVerticalN) = 1.0;
+  const Eigen::Vector3d offset(prior.pitch_offset_rad, prior.height_offset_m, prior.vertical_offset_per_m);
+  Eigen::Matrix3d trust = prior.trust.covariance;
+  trust.diagonal() += Eigen::Vector3d(kTinyVariance, kTinyVariance, kTinyVerticalVariance);
+  const Eigen::Matrix<double, kUnknowns, 3> weighted = rows.transpose().lazyProduct(trust.inverse());
+  prior_information_ += weighted.lazyProduct(rows);
+  prior_right_ += weighted.lazyProduct(offset);
+  prior_information_(kLateral, kLateral) += 1.0 / (kLateralSigmaM * kLateralSigmaM);
+  prior_information_(kTurn, kTurn) += 1.0 / (kTurnSigmaRad * kTurnSigmaRad);
+  prior_information_(kDistanceN, kDistanceN) += 1.0 / (kDistanceSigmaM * kDistanceSigmaM);
+}
 
-  std::vector<double> weights(patches.size(), 1.0);
-  std::vector<double> errors(patches.size(), 0.0);
-  double scale = 1.0;  // of the patches' squared errors against their promise
-  Vector solution = Vector::Zero();
-  Eigen::LDLT<Matrix> solver;
-  for (int iteration = 0; iteration <= kReweightings; ++iteration) {
-    Matrix information = prior_information;
-    Vector right = prior_right;
-    for (size_t i = 0; i < patches.size(); ++i) {
-      const Eigen::Matrix<double, kUnknowns, 2> weighted =
-          rows[i].transpose() * patches[i].information * (weights[i] / scale);
-      information += weighted * rows[i];
-      right += weighted * patches[i].displacement_m;
-    }
-    solver.compute(information);
-    solution = solver.solve(right);
-    if (patches.empty() || iteration == kReweightings) break;
-    for (size_t i = 0; i < patches.size(); ++i) {
-      const Eigen::Vector2d left_over = patches[i].displacement_m - rows[i] * solution;
-      errors[i] = left_over.dot(patches[i].information * left_over);
-    }
-    std::vector<double> sorted = errors;
-    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
-    scale = std::max(1.0, sorted[sorted.size() / 2] / kMedianChiSquared2);
-    for (size_t i = 0; i < patches.size(); ++i) weights[i] = 1.0 / (1.0 + errors[i] / (scale * kCauchySquared));
+void MotionFilter::set_votes(double height_m, const std::vector<PatchMotion>& patches) {
+  votes_.resize(patches.size());
+  for (size_t i = 0; i < patches.size(); ++i) {
+    const PatchMotion& patch = patches[i];
+    const Rows rows = rows_at(patch.place_m, patch.place_m + patch.displacement_m, height_m, patch.ballast);
+    // Root of the information: its Cholesky factor, transposed.
+    const double l00 = std::sqrt(patch.information(0, 0));
+    const double l10 = patch.information(1, 0) / l00;
+    const double l11 = std::sqrt(std::max(0.0, patch.information(1, 1) - l10 * l10));
+    Vote& vote = votes_[i];
+    vote.rows[0] = l00 * rows.row(0).transpose() + l10 * rows.row(1).transpose();
+    vote.rows[1] = l11 * rows.row(1).transpose();
+    vote.values[0] = l00 * patch.displacement_m.x() + l10 * patch.displacement_m.y();
+    vote.values[1] = l11 * patch.displacement_m.y();
+    vote.weight = 1.0;
   }
+}
 
+MotionFilter::Matrix MotionFilter::information(double scale, Vector& right) const {
+  Matrix sum = prior_information_;
+  right = prior_right_;
+  for (const Vote& vote : votes_) {
+    const double weight = vote.weight / scale;
+    for (int k = 0; k < 2; ++k) {
+      const Vector weighted = weight * vote.rows[k];
+      for (int j = 0; j < kUnknowns; ++j) sum.col(j) += vote.rows[k](j) * weighted;
+      right += vote.values[k] * weighted;
+    }
+  }
+  return sum;
+}
+
+// Weights the votes by their errors; returns how much larger the squared errors are than promised.
+double MotionFilter::weigh(const Vector& solution) {
+  errors_.clear();
+  for (Vote& vote : votes_) {
+    const double a = vote.values[0] - vote.rows[0].dot(solution);
+    const double b = vote.values[1] - vote.rows[1].dot(solution);
+    vote.error = a * a + b * b;
+    errors_.push_back(vote.error);
+  }
+  const auto middle = errors_.begin() + static_cast<std::ptrdiff_t>(errors_.size() / 2);
+  std::nth_element(errors_.begin(), middle, errors_.end());
+  const double scale = std::max(1.0, *middle / kMedianChiSquared2);
+  for (Vote& vote : votes_) vote.weight = 1.0 / (1.0 + vote.error / (scale * kCauchySquared));
+  return scale;
+}
+
+void MotionFilter::solve(const PoseErrors& reference, const PosePrior& prior, double height_m,
+                         const std::vector<PatchMotion>& patches, Motion& motion) {
+  static_assert(kUnknowns == kAll);
+  set_prior(reference, prior);
+  set_votes(height_m, patches);
+  double scale = 1.0;
+  Vector right;
+  Eigen::LDLT<Matrix> solver(information(scale, right));
+  Vector solution = solver.solve(right);
+  for (int i = 0; i < kReweightings && !patches.empty(); ++i) {
+    scale = weigh(solution);
+    solver.compute(information(scale, right));
+    solution = solver.solve(right);
+  }
   const Matrix all = solver.solve(Matrix::Identity());
-  Motion motion;
+  const auto sigma = [&all](int i) { return std::sqrt(std::max(0.0, all(i, i))); };
   motion.along_m = solution(kDistanceN) - solution(kDistanceR);
   motion.lateral_m = solution(kLateral);
   motion.turn_rad = solution(kTurn);
   motion.along_sigma_m = std::sqrt(
       std::max(0.0, all(kDistanceN, kDistanceN) + all(kDistanceR, kDistanceR) - 2.0 * all(kDistanceN, kDistanceR)));
-  motion.lateral_sigma_m = std::sqrt(std::max(0.0, all(kLateral, kLateral)));
-  motion.turn_sigma_rad = std::sqrt(std::max(0.0, all(kTurn, kTurn)));
+  motion.lateral_sigma_m = sigma(kLateral);
+  motion.turn_sigma_rad = sigma(kTurn);
   motion.disagreement = std::sqrt(scale);
-  for (const double weight : weights) motion.agreement += weight / static_cast<double>(weights.size());
-  motion.reference_pitch_error_rad = solution(kPitchR);
-  motion.reference_height_error_m = solution(kHeightR);
-  constexpr int kOfNow[kCarried] = {kDistanceN, kPitchN, kHeightN, kBias, kBallast};
-  for (int i = 0; i < kCarried; ++i) {
+  motion.agreement = 0;
+  for (const Vote& vote : votes_) motion.agreement += vote.weight / static_cast<double>(votes_.size());
+  motion.reference = solution.head<PoseErrors::kCount>();
+  for (int i = 0; i < PoseErrors::kCount; ++i) {
     motion.now.mean(i) = solution(kOfNow[i]);
-    for (int j = 0; j < kCarried; ++j) motion.now.covariance(i, j) = all(kOfNow[i], kOfNow[j]);
+    for (int j = 0; j < PoseErrors::kCount; ++j) motion.now.covariance(i, j) = all(kOfNow[i], kOfNow[j]);
   }
-  const auto walk = [&motion](PoseErrors::Index index, double per_sqrt_m) {
-    motion.now.covariance(index, index) += per_sqrt_m * per_sqrt_m * std::abs(motion.along_m);
-  };
-  if (options_.pitch_bias_sigma_rad > 0) walk(PoseErrors::kPitchBias, options_.pitch_bias_walk_rad_per_sqrt_m);
-  if (options_.ballast_depth_sigma_m > 0) walk(PoseErrors::kBallastDepth, options_.ballast_depth_walk_m_per_sqrt_m);
-  return motion;
+  walk(motion);
+}
+
+// The bias forgets itself over its length, the ballast's depth wanders.
+void MotionFilter::walk(Motion& motion) const {
+  auto& now = motion.now;
+  const double way_m = std::abs(motion.along_m);
+  constexpr auto kB = PoseErrors::kPitchBias;
+  const double sigma = options_.pitch_bias_sigma_rad;
+  const double keep = sigma > 0 ? std::exp(-way_m / options_.pitch_bias_length_m) : 1.0;
+  now.mean(kB) *= keep;
+  now.covariance.row(kB) *= keep;
+  now.covariance.col(kB) *= keep;
+  now.covariance(kB, kB) += (1.0 - keep * keep) * sigma * sigma;
+  if (options_.ballast_depth_sigma_m > 0) {
+    now.covariance(PoseErrors::kBallastDepth, PoseErrors::kBallastDepth) +=
+        options_.ballast_depth_walk_m_per_sqrt_m * options_.ballast_depth_walk_m_per_sqrt_m * way_m;
+  }
 }
 
 Eigen::Vector2d MotionFilter::displacement(const Motion& motion, double height_m, const Eigen::Vector2d& place_m,
                                            bool ballast) {
   Vector unknowns = Vector::Zero();
-  unknowns(kPitchR) = motion.reference_pitch_error_rad;
-  unknowns(kHeightR) = motion.reference_height_error_m;
-  unknowns(kBallast) = motion.now.mean(PoseErrors::kBallastDepth);
+  unknowns.head<PoseErrors::kCount>() = motion.reference;
+  for (int i = 0; i < PoseErrors::kCount; ++i) unknowns(kOfNow[i]) = motion.now.mean(i);
+  unknowns(kDistanceR) = 0;
   unknowns(kDistanceN) = motion.along_m;
-  unknowns(kPitchN) = motion.now.mean(PoseErrors::kPitch);
-  unknowns(kHeightN) = motion.now.mean(PoseErrors::kHeight);
   unknowns(kLateral) = motion.lateral_m;
   unknowns(kTurn) = motion.turn_rad;
-  const Eigen::Vector2d first =
-      rows_at(place_m, place_m - Eigen::Vector2d(motion.along_m, 0), height_m, ballast) * unknowns;
-  return rows_at(place_m, place_m + first, height_m, ballast) * unknowns;
+  const Eigen::Vector2d now = place_m - Eigen::Vector2d(motion.along_m, 0);
+  const Eigen::Vector2d first = rows_at(place_m, now, height_m, ballast).lazyProduct(unknowns);
+  return rows_at(place_m, place_m + first, height_m, ballast).lazyProduct(unknowns);
 }
 
 }  // namespace railfix::odometry

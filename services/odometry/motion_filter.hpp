@@ -1,10 +1,10 @@
 // From the patches' displacements to the motion of the camera's foot, with the errors of the camera poses as unknowns.
 //
-// A pitch error e moves the ground in the top view by (X^2 + H^2)/H * e, a height error h by X/H * h, motion by the
-// same amount everywhere. Over 8 m of ground the three differ, so one least-squares problem holds step, turn and the
-// pose errors of both pictures; what is known of the reference picture's errors is carried from step to step. This way
-// the noise of the measured poses does not reach the distance, and their lasting pitch error (which would be a scale
-// error) is found from the ground: a wrong pitch makes far ground seem to move faster than near ground.
+// A pitch error e moves the ground in the top view by (X^2 + H^2)/H * e, a height error h by X/H * h, an error a of the
+// vertical curvature by X^3/(2 H) * a, motion by the same amount everywhere. Over 8 m of ground these differ, so one
+// least-squares problem holds step, turn and the pose errors of both pictures; what is known of the reference picture's
+// errors is carried from step to step. This way the noise of the measured poses does not reach the distance, and their
+// lasting pitch error (which would be a scale error) is found from the ground.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,18 +14,21 @@
 
 namespace railfix::odometry {
 
-/// How well a picture's camera pose is known, 1 sigma.
+/// How well a picture's camera pose is known: covariance of pitch (rad), height (m) and vertical curvature (1/m).
+/// The rails tell the three together much better than each alone, so what is between them counts.
 struct PoseTrust {
-  double pitch_sigma_rad = 0.001;
-  double height_sigma_m = 0.005;
+  Eigen::Matrix3d covariance = Eigen::Vector3d(1e-6, 2.5e-5, 1e-10).asDiagonal();
+
+  static PoseTrust independent(double pitch_sigma_rad, double height_sigma_m, double vertical_sigma_per_m = 1e-6);
+  [[nodiscard]] double pitch_sigma_rad() const;
 };
 
 /// Errors of one picture's pose and the distance there. Errors are pose used less true pose.
 struct PoseErrors {
-  enum Index { kDistance, kPitch, kHeight, kPitchBias, kBallastDepth, kCount };
+  enum Index { kDistance, kPitch, kHeight, kVertical, kPitchBias, kBallastDepth, kCount };
   using Mean = Eigen::Matrix<double, kCount, 1>;
   using Covariance = Eigen::Matrix<double, kCount, kCount>;
-  Mean mean = Mean::Zero();  // distance relative to the reference picture's, m; pitch rad; height m; rad; m
+  Mean mean = Mean::Zero();  // distance relative to the reference picture's, m; rad; m; 1/m; rad; m
   Covariance covariance = Covariance::Zero();
 };
 
@@ -38,23 +41,24 @@ struct Motion {
   double turn_sigma_rad = 0;
   double agreement = 0;     // sum of the patches' weights over their number, 0..1
   double disagreement = 1;  // root of the normalised squared errors: 1 = patches differ as their gradients promise
-  double reference_pitch_error_rad = 0;  // the reference picture's errors, seen from here
-  double reference_height_error_m = 0;
-  PoseErrors now;  // distance relative to the reference picture's
+  PoseErrors::Mean reference = PoseErrors::Mean::Zero();  // the reference picture's errors, seen from here
+  PoseErrors now;                                         // distance relative to the reference picture's
 };
 
-/// What is known of a new picture's pose before its ground is compared.
+/// What is known of a new picture's pose before its ground is compared: pose used less measured pose, and how far the
+/// measured one may be off.
 struct PosePrior {
-  double pitch_offset_rad = 0;  // pose used less measured pose
+  double pitch_offset_rad = 0;
   double height_offset_m = 0;
+  double vertical_offset_per_m = 0;
   PoseTrust trust;
 };
 
 class MotionFilter {
  public:
   struct Options {
-    double pitch_bias_sigma_rad = 0.001;  // how far the measured pitch may lastingly be off; 0 = never
-    double pitch_bias_walk_rad_per_sqrt_m = 2e-6;
+    double pitch_bias_sigma_rad = 0.0003;  // how far the measured pitch may be off for longer; 0 = never
+    double pitch_bias_length_m = 200;      // of way, after which it is another
     double ballast_depth_m =
         0.02;  // of the ballast below the sleeper tops, and how far that may be off; 0 = not at all
     double ballast_depth_sigma_m = 0.03;
@@ -64,15 +68,34 @@ class MotionFilter {
 
   /// The first picture's errors, before anything is seen.
   [[nodiscard]] PoseErrors first(const PosePrior& prior) const;
-  /// Least squares over the patches, each weighted down as it disagrees with the others (Cauchy).
-  [[nodiscard]] Motion solve(const PoseErrors& reference, const PosePrior& prior, double height_m,
-                             const std::vector<PatchMotion>& patches) const;
+  /// Least squares over the patches, each weighted down as it disagrees with the others (Cauchy). Keeps its buffers.
+  void solve(const PoseErrors& reference, const PosePrior& prior, double height_m,
+             const std::vector<PatchMotion>& patches, Motion& motion);
   /// Displacement of a place in the top view under this motion.
   [[nodiscard]] static Eigen::Vector2d displacement(const Motion& motion, double height_m,
                                                     const Eigen::Vector2d& place_m, bool ballast);
 
  private:
+  static constexpr int kUnknowns = PoseErrors::kCount + 6;
+  using Vector = Eigen::Matrix<double, kUnknowns, 1>;
+  using Matrix = Eigen::Matrix<double, kUnknowns, kUnknowns>;
+  struct Vote {  // of one patch: rows and displacement times the root of its information
+    Vector rows[2];
+    double values[2];
+    double weight = 1;
+    double error = 0;  // squared, in the patch's own sigmas
+  };
+  void set_prior(const PoseErrors& reference, const PosePrior& prior);
+  void set_votes(double height_m, const std::vector<PatchMotion>& patches);
+  [[nodiscard]] Matrix information(double scale, Vector& right) const;
+  double weigh(const Vector& solution);
+  void walk(Motion& motion) const;
+
   Options options_;
+  Matrix prior_information_ = Matrix::Zero();
+  Vector prior_right_ = Vector::Zero();
+  std::vector<Vote> votes_;
+  std::vector<double> errors_;
 };
 
 }  // namespace railfix::odometry

@@ -11,15 +11,12 @@ namespace railfix::odometry {
 struct OdometryConfig {
   std::string camera = "cam0";
   double max_wait_ms = 25;
-  bool use_vertical_curvature = false;
   TrainMouseOptions mouse;
 
   void describe(service::Fields& fields) {
     fields.text("camera", camera, "The camera whose pictures are measured: camera_frame/<camera>.");
     fields.number("max_wait_ms", max_wait_ms, {0, 1000}, "ms",
                   "How long a picture waits for its own track_view before the last pose is taken.");
-    fields.flag("use_vertical_curvature", use_vertical_curvature,
-                "Bend the ground as track_view says. Its noise costs more than it gives on cameras of few pixels.");
     fields.number("gauge_m", mouse.gauge_m, {0.5, 2.0}, "m", "Track gauge; the ground between the rails is used.");
     fields.number("texture_depth_m", mouse.texture_depth_m, {0, 0.5}, "m",
                   "Sleeper tops below the rail heads. 1 cm wrong is 0.4 % of distance.");
@@ -47,8 +44,8 @@ struct OdometryConfig {
                   "Shake of the height while the rails are not seen.");
     fields.number("pitch_bias_sigma_rad", mouse.filter.pitch_bias_sigma_rad, {0, 0.02}, "rad",
                   "How far measured pitch may lastingly be off; the ground corrects it. 0: trust it.");
-    fields.number("pitch_bias_walk_rad_per_sqrt_m", mouse.filter.pitch_bias_walk_rad_per_sqrt_m, {0, 1e-3},
-                  "rad/sqrt(m)", "How fast that error may change.");
+    fields.number("pitch_bias_length_m", mouse.filter.pitch_bias_length_m, {1, 1e6}, "m",
+                  "Way after which that error is another one.");
     fields.number("ballast_depth_m", mouse.filter.ballast_depth_m, {-0.1, 0.3}, "m",
                   "Ballast below the sleeper tops, to begin with.");
     fields.number("ballast_depth_sigma_m", mouse.filter.ballast_depth_sigma_m, {0, 0.2}, "m",

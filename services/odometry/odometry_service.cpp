@@ -16,13 +16,11 @@ constexpr int64_t kPoseLifeNs = core::kNsPerSecond / 2;
 constexpr int64_t kBlindNs = core::kNsPerSecond;
 constexpr size_t kLongestQueue = 8;
 // Places in TrackView.covariance: upper triangle of 7x7, row by row.
-constexpr size_t kPitchVariance = 7;
-constexpr size_t kHeightVariance = 22;
 constexpr size_t kCurvatureVariance = 25;
-constexpr size_t kVerticalCurvatureVariance = 27;
+constexpr size_t kPoseCovariance[3][3] = {
+    {7, 10, 12}, {10, 22, 24}, {12, 24, 27}};  // pitch, height, vertical curvature
 // A curvature known worse than this says less than the last one that was known better.
 constexpr double kWorstCurvatureSigma = 1e-3;
-constexpr double kWorstVerticalCurvatureSigma = 2e-4;
 
 uint8_t mode_of(MouseMode mode) {
   switch (mode) {
@@ -128,17 +126,19 @@ void OdometryService::take_pose(const Waiting& waiting, const msg::TrackView* vi
   picture.vertical_curvature_per_m = vertical_curvature_per_m_;
   if (view == nullptr || (view->seen_left() == 0 && view->seen_right() == 0)) return;
   const auto sigma = [view](size_t place) { return std::sqrt(std::max(0.0, view->covariance()[place])); };
-  const PoseTrust trust{sigma(kPitchVariance), sigma(kHeightVariance)};
-  if (!(trust.pitch_sigma_rad < config_.mouse.mount_pitch_sigma_rad) || !std::isfinite(view->pitch_rad())) return;
-  if (sigma(kCurvatureVariance) < kWorstCurvatureSigma) curvature_per_m_ = view->curvature_per_m();
-  if (config_.use_vertical_curvature && sigma(kVerticalCurvatureVariance) < kWorstVerticalCurvatureSigma) {
-    vertical_curvature_per_m_ = view->vertical_curvature_per_m();
+  PoseTrust trust;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) trust.covariance(i, j) = view->covariance()[kPoseCovariance[i][j]];
   }
+  if (!trust.covariance.allFinite() || !std::isfinite(view->pitch_rad())) return;
+  if (!(trust.pitch_sigma_rad() < config_.mouse.mount_pitch_sigma_rad)) return;
+  if (sigma(kCurvatureVariance) < kWorstCurvatureSigma) curvature_per_m_ = view->curvature_per_m();
+  vertical_curvature_per_m_ = view->vertical_curvature_per_m();
   last_pose_ = {view->roll_rad(), view->pitch_rad(), view->yaw_rad(), view->lateral_m(), view->height_m()};
   last_pose_ns_ = waiting.stamp_ns;
   picture.pose = last_pose_;
   picture.pose_measured = true;
-  picture.trust = {std::max(trust.pitch_sigma_rad, 1e-5), std::max(trust.height_sigma_m, 1e-4)};
+  picture.trust = trust;
   picture.curvature_per_m = curvature_per_m_;
   picture.vertical_curvature_per_m = vertical_curvature_per_m_;
 }

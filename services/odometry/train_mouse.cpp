@@ -43,13 +43,17 @@ bool TrainMouse::look(const MousePicture& picture) {
   now_.pose = {picture.pose, options_.texture_depth_m, curvature_per_m_, vertical_curvature_per_m_};
   now_.prior = {};
   now_.prior.trust = picture.trust;
-  if (!picture.pose_measured) now_.prior.trust = {options_.mount_pitch_sigma_rad, options_.mount_height_sigma_m};
+  if (!picture.pose_measured) {
+    now_.prior.trust = PoseTrust::independent(options_.mount_pitch_sigma_rad, options_.mount_height_sigma_m);
+  }
   // A slow train's pictures are compared at one pose: the noise of measured poses would only move the ground.
   if (reference_ && confirmed_ && std::abs(speed_mps_) < kSlowMps) {
     now_.pose = reference_->seen.pose;
     now_.prior.pitch_offset_rad = now_.pose.camera.pitch_rad - picture.pose.pitch_rad;
     now_.prior.height_offset_m = now_.pose.camera.height_m - picture.pose.height_m;
   }
+  if (picture.pose_measured)
+    now_.prior.vertical_offset_per_m = now_.pose.vertical_curvature_per_m - picture.vertical_curvature_per_m;
   if (!maker_) {
     const vision::Sheet sheet =
         vision::fit_sheet(camera_, now_.pose, options_.near_m, options_.far_m,
@@ -65,14 +69,20 @@ bool TrainMouse::look(const MousePicture& picture) {
   return now_.coarse.contrast_grey > options_.lowest_contrast_grey;
 }
 
+// The present picture becomes the reference; the old one's buffers take the next picture.
 void TrainMouse::make_reference() {
-  Reference next;
-  TextureReference::Options texture;
-  texture.noise_grey = options_.noise_grey;
-  next.texture = std::make_unique<TextureReference>(now_.view, maker_->sheet(), texture);
-  next.seen = now_;
-  next.seen.view.grey = now_.view.grey.clone();
-  reference_ = std::move(next);
+  if (!reference_) {
+    TextureReference::Options texture;
+    texture.noise_grey = options_.noise_grey;
+    reference_.emplace(texture);
+  }
+  reference_->texture.set(now_.view, maker_->sheet());
+  std::swap(reference_->seen, now_);
+  now_.stamp_ns = reference_->seen.stamp_ns;
+  now_.pose = reference_->seen.pose;
+  now_.prior = reference_->seen.prior;
+  reference_->errors = {};
+  reference_->distance_m = 0;
 }
 
 TrainMouse::Rough TrainMouse::find_roughly(bool full_band, double predicted_m, double band_m) {
@@ -111,33 +121,31 @@ TrainMouse::Rough TrainMouse::find_roughly(bool full_band, double predicted_m, d
   return rough;
 }
 
-std::optional<Motion> TrainMouse::align(const Rough& rough, MouseStep& step) const {
+bool TrainMouse::align(const Rough& rough, MouseStep& step) {
   const double height_m = now_.pose.height_m();
-  std::vector<PatchMotion> votes;
   DisplacementField field = [&rough](const Eigen::Vector2d& place, bool) {
     const double share = std::clamp((place.x() - rough.near_m) / (rough.far_m - rough.near_m), -0.5, 1.5);
     return Eigen::Vector2d(rough.near_shift_m + share * (rough.far_shift_m - rough.near_shift_m), rough.left_shift_m);
   };
-  Motion motion;
   size_t in_sight = 0;
   for (int i = 0; i < kAlignments; ++i) {
-    in_sight = reference_->texture->measure(now_.view, field, votes);
-    if (votes.size() < kFewestPatches) return std::nullopt;
-    motion = filter_.solve(reference_->errors, now_.prior, height_m, votes);
-    field = [&motion, height_m](const Eigen::Vector2d& place, bool ballast) {
-      return MotionFilter::displacement(motion, height_m, place, ballast);
+    in_sight = reference_->texture.measure(now_.view, field, votes_);
+    if (votes_.size() < kFewestPatches) return false;
+    filter_.solve(reference_->errors, now_.prior, height_m, votes_, motion_);
+    field = [this, height_m](const Eigen::Vector2d& place, bool ballast) {
+      return MotionFilter::displacement(motion_, height_m, place, ballast);
     };
   }
-  step.patches = static_cast<int>(votes.size());
-  step.matched = static_cast<double>(votes.size()) / static_cast<double>(in_sight);
-  if (motion.agreement < kLowestAgreement) return std::nullopt;
+  step.patches = static_cast<int>(votes_.size());
+  step.matched = static_cast<double>(votes_.size()) / static_cast<double>(in_sight);
+  if (motion_.agreement < kLowestAgreement) return false;
   // What sticks to the picture (lettering, dirt on the pane) stands still whatever the train does; the ground around it
   // tells.
-  if (std::abs(motion.along_m) < kStandingStepM && step.matched < kStandingShare) return std::nullopt;
-  return motion;
+  return std::abs(motion_.along_m) >= kStandingStepM || step.matched >= kStandingShare;
 }
 
-void TrainMouse::accept(const Motion& motion, MouseStep& step) {
+void TrainMouse::accept(MouseStep& step) {
+  const Motion& motion = motion_;
   const double dt_s = core::seconds(now_.stamp_ns - tentative_stamp_ns_);
   double distance_m = reference_->distance_m + motion.now.mean(PoseErrors::kDistance);
   const bool slow = confirmed_ && std::abs(speed_mps_) < kStandingMps;
@@ -251,9 +259,8 @@ MouseStep TrainMouse::process(const MousePicture& picture) {
   const Rough rough = find_roughly(!predicted || since_m_s > kInertia_s, predicted_m, band_m);
   step.score = rough.score;
   step.reference_stamp_ns = reference_->seen.stamp_ns;
-  const auto motion = rough.found ? align(rough, step) : std::nullopt;
-  if (motion) {
-    accept(*motion, step);
+  if (rough.found && align(rough, step)) {
+    accept(step);
   } else {
     give_up(step);
   }

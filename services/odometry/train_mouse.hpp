@@ -93,8 +93,9 @@ class TrainMouse {
     PosePrior prior;
   };
   struct Reference {
+    explicit Reference(const TextureReference::Options& options) : texture(options) {}
     Seen seen;
-    std::unique_ptr<TextureReference> texture;
+    TextureReference texture;
     PoseErrors errors;
     double distance_m = 0;
   };
@@ -109,8 +110,8 @@ class TrainMouse {
   bool look(const MousePicture& picture);
   void make_reference();
   [[nodiscard]] Rough find_roughly(bool full_band, double predicted_m, double band_m);
-  [[nodiscard]] std::optional<Motion> align(const Rough& rough, MouseStep& step) const;
-  void accept(const Motion& motion, MouseStep& step);
+  bool align(const Rough& rough, MouseStep& step);
+  void accept(MouseStep& step);
   double bridge(double speed_after_mps);
   void give_up(MouseStep& step);
   void smooth_curves(const MousePicture& picture);
@@ -122,6 +123,8 @@ class TrainMouse {
   CoarseViewMaker coarse_maker_;
   ShiftSearch search_;
   Seen now_;
+  Motion motion_;
+  std::vector<PatchMotion> votes_;
   std::optional<Reference> reference_;
   double curvature_per_m_ = 0;
   double vertical_curvature_per_m_ = 0;

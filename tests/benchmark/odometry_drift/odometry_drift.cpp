@@ -63,7 +63,7 @@ void add_mouse(CLI::App& app, odometry::TrainMouseOptions& mouse) {
   app.add_option("--near", mouse.near_m, "m")->group(group);
   app.add_option("--cell", mouse.cell_m, "m")->group(group);
   app.add_option("--bias-sigma", mouse.filter.pitch_bias_sigma_rad, "rad")->group(group);
-  app.add_option("--bias-walk", mouse.filter.pitch_bias_walk_rad_per_sqrt_m, "rad/sqrt(m)")->group(group);
+  app.add_option("--bias-length", mouse.filter.pitch_bias_length_m, "m")->group(group);
   app.add_option("--ballast-sigma", mouse.filter.ballast_depth_sigma_m, "m")->group(group);
   app.add_option("--ballast-depth", mouse.filter.ballast_depth_m, "m")->group(group);
   app.add_option("--ballast-walk", mouse.filter.ballast_depth_walk_m_per_sqrt_m, "m/sqrt(m)")->group(group);
@@ -137,15 +137,20 @@ class PoseSource {
     picture.pose.lateral_m += random_.normal(0, a_.height_noise_m);
     picture.pose.height_m += random_.normal(0, a_.height_noise_m);
     picture.pose_measured = true;
-    picture.trust = {std::max(1e-5, a_.pitch_noise_rad), std::max(1e-4, a_.height_noise_m)};
+    picture.trust =
+        odometry::PoseTrust::independent(std::max(1e-5, a_.pitch_noise_rad), std::max(1e-4, a_.height_noise_m));
     picture.curvature_per_m = truth.curvature_per_m + random_.normal(0, a_.curvature_noise_per_m);
     picture.vertical_curvature_per_m = truth.vertical_curvature_per_m;
   }
   // As odometry_service takes it from track_view.
   void detect(odometry::MousePicture& picture) {
     const auto seen = detector_->detect(picture.grey);
-    const odometry::PoseTrust trust{std::sqrt(seen.covariance(1, 1)), std::sqrt(seen.covariance(4, 4))};
-    const bool good = (seen.seen_left || seen.seen_right) && trust.pitch_sigma_rad < a_.mouse.mount_pitch_sigma_rad;
+    constexpr int kOf[3] = {1, 4, 6};  // pitch, height, vertical curvature
+    odometry::PoseTrust trust;
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) trust.covariance(i, j) = seen.covariance(kOf[i], kOf[j]);
+    }
+    const bool good = (seen.seen_left || seen.seen_right) && trust.pitch_sigma_rad() < a_.mouse.mount_pitch_sigma_rad;
     if (good) {
       last_ = seen.shape.camera;
       last_->pitch_rad += a_.pitch_bias_rad;
@@ -174,8 +179,9 @@ void print_step(size_t count, const Moment& moment, const odometry::MousePicture
       count, moment.truth.distance_m, moment.truth.speed_mps, step.distance_m, step.speed_mps, step.step_m,
       step.step_sigma_m, static_cast<int>(step.mode), step.valid ? 1 : 0, step.patches, step.agreement, step.score,
       step.lateral_m, step.yaw_rad, picture.pose.pitch_rad - moment.truth.camera.pitch_rad,
-      picture.trust.pitch_sigma_rad, picture.pose.height_m - moment.truth.camera.height_m, picture.trust.height_sigma_m,
-      moment.truth.vertical_curvature_per_m, picture.vertical_curvature_per_m - moment.truth.vertical_curvature_per_m);
+      picture.trust.pitch_sigma_rad(), picture.pose.height_m - moment.truth.camera.height_m,
+      std::sqrt(picture.trust.covariance(1, 1)), moment.truth.vertical_curvature_per_m,
+      picture.vertical_curvature_per_m - moment.truth.vertical_curvature_per_m);
 }
 
 int measure(Arguments a) {

@@ -10,7 +10,7 @@
 namespace railfix {
 namespace {
 
-constexpr simulator::Strip kDrawn{70.0, 1.1};
+constexpr simulator::Strip kDrawn{60.0, 1.0};
 
 class Dataset : public Scene {
  public:

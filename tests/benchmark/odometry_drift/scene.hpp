@@ -32,7 +32,7 @@ struct Disturbances {
   double stamp_jitter_s = 0;  // 1 sigma of the stamp against the true time
 };
 
-/// Draws only the own track, 70 m ahead and 1.1 m to either side: the rest stays grey.
+/// Draws only the own track, 60 m ahead and 1 m to either side: the rest stays grey.
 std::unique_ptr<Scene> simulate_track(const simulator::SimulationOptions& options, const Disturbances& disturbances);
 
 }  // namespace railfix

@@ -33,7 +33,7 @@ class Ride {
 
   geometry::CameraPose shaken = test::cab_mount();
   std::optional<geometry::CameraPose> pose_used;
-  PoseTrust trust{0.0003, 0.002};
+  PoseTrust trust = PoseTrust::independent(0.0003, 0.002);
   SyntheticGround::Light light;
 
  private:
@@ -180,7 +180,7 @@ TEST(TrainMouse, LatePictureIsLeftOut) {
 
 TEST(TrainMouse, ShakeOfTheCameraIsNotMotion) {
   Ride ride;
-  ride.trust = {1e-5, 1e-4};
+  ride.trust = PoseTrust::independent(1e-5, 1e-4);
   const auto mount = ride.shaken;
   MouseStep step;
   for (int i = 0; i <= 30; ++i) {
@@ -199,7 +199,7 @@ TEST(TrainMouse, ShakeOfTheCameraIsNotMotion) {
 TEST(TrainMouse, PoseNoiseDoesNotReachTheSteps) {
   Ride ride;
   const auto mount = ride.shaken;
-  ride.trust = {0.001, 0.003};
+  ride.trust = PoseTrust::independent(0.001, 0.003);
   core::Random random(5);
   double worst_m = 0;
   double before_m = 0;
@@ -249,7 +249,7 @@ TEST(TrainMouse, UnknownCurveShowsAsTurn) {
 
 TEST(TrainMouse, LastingPitchErrorIsFoundFromTheGround) {
   Ride ride;
-  ride.trust = {0.0003, 0.002};
+  ride.trust = PoseTrust::independent(0.0003, 0.002);
   ride.pose_used = ride.shaken;
   ride.pose_used->pitch_rad += 0.001;
   MouseStep step;
