@@ -124,6 +124,17 @@ void MotionFilter::set_prior(const PoseErrors& reference, const PosePrior& prior
   prior_information_(kDistanceN, kDistanceN) += 1.0 / (kDistanceSigmaM * kDistanceSigmaM);
 }
 
+// The errors (used less true) of two pictures differ by what was used, give or take sigma.
+void MotionFilter::tie(int now, int reference, double used, double sigma) {
+  const double weight = 1.0 / (sigma * sigma);
+  prior_information_(now, now) += weight;
+  prior_information_(reference, reference) += weight;
+  prior_information_(now, reference) -= weight;
+  prior_information_(reference, now) -= weight;
+  prior_right_(now) += weight * used;
+  prior_right_(reference) -= weight * used;
+}
+
 void MotionFilter::set_votes(double height_m, const std::vector<PatchMotion>& patches) {
   votes_.resize(patches.size());
   for (size_t i = 0; i < patches.size(); ++i) {
@@ -172,10 +183,12 @@ double MotionFilter::weigh(const Vector& solution) {
   return scale;
 }
 
-void MotionFilter::solve(const PoseErrors& reference, const PosePrior& prior, double height_m,
+void MotionFilter::solve(const PoseErrors& reference, const PosePrior& prior, const PoseTie& pose_tie, double height_m,
                          const std::vector<PatchMotion>& patches, Motion& motion) {
   static_assert(kUnknowns == kAll);
   set_prior(reference, prior);
+  tie(kHeightN, kHeightR, pose_tie.height_used_m, pose_tie.height_sigma_m);
+  tie(kVerticalN, kVerticalR, pose_tie.vertical_used_per_m, pose_tie.vertical_sigma_per_m);
   set_votes(height_m, patches);
   double scale = 1.0;
   Vector right;

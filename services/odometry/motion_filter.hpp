@@ -54,6 +54,15 @@ struct PosePrior {
   PoseTrust trust;
 };
 
+/// What two pictures share: the suspension moves the camera only so fast, and the track bends only so fast. Poses used,
+/// new less reference, and how far their errors may differ.
+struct PoseTie {
+  double height_used_m = 0;
+  double vertical_used_per_m = 0;
+  double height_sigma_m = 0.05;
+  double vertical_sigma_per_m = 1e-3;
+};
+
 class MotionFilter {
  public:
   struct Options {
@@ -69,7 +78,7 @@ class MotionFilter {
   /// The first picture's errors, before anything is seen.
   [[nodiscard]] PoseErrors first(const PosePrior& prior) const;
   /// Least squares over the patches, each weighted down as it disagrees with the others (Cauchy). Keeps its buffers.
-  void solve(const PoseErrors& reference, const PosePrior& prior, double height_m,
+  void solve(const PoseErrors& reference, const PosePrior& prior, const PoseTie& tie, double height_m,
              const std::vector<PatchMotion>& patches, Motion& motion);
   /// Displacement of a place in the top view under this motion.
   [[nodiscard]] static Eigen::Vector2d displacement(const Motion& motion, double height_m,
@@ -86,6 +95,7 @@ class MotionFilter {
     double error = 0;  // squared, in the patch's own sigmas
   };
   void set_prior(const PoseErrors& reference, const PosePrior& prior);
+  void tie(int now, int reference, double used, double sigma);
   void set_votes(double height_m, const std::vector<PatchMotion>& patches);
   [[nodiscard]] Matrix information(double scale, Vector& right) const;
   double weigh(const Vector& solution);

@@ -13,7 +13,6 @@ constexpr double kCurveSmoothing_s = 0.3;
 constexpr double kVerticalSmoothing_s = 0.5;
 constexpr double kInertia_s = 0.3;  // after it the speed is not enough to choose among alike shifts
 constexpr double kSlowMps = 0.5;
-constexpr double kStandingMps = 0.15;
 constexpr int kAlignments = 4;
 constexpr size_t kFewestPatches = 5;
 constexpr double kLowestAgreement = 0.35;
@@ -21,11 +20,18 @@ constexpr double kStandingStepM = 0.05;         // less is standstill, which ...
 constexpr double kStandingShare = 0.8;          // ... nearly all the ground in sight must show (lettering: up to 0.7)
 constexpr double kLongestReferenceShare = 0.6;  // of the sheet that may have gone out of sight
 constexpr double kSpeedGain = 0.5;
+constexpr double kHeightShakeM = 0.0015;  // of the camera between two pictures: motors, ...
+constexpr double kBouncePerM = 0.02;      // ... the springs on the way, ...
+constexpr double kSettlingMps = 1e-4;     // ... people getting in
+constexpr double kVerticalChangePerM2 = 1e-5;
+constexpr double kVerticalChangeM = 0.2;
+constexpr double kFadedScore = 0.6;  // at rest: the light has changed since the reference
+constexpr int64_t kShortestRestNs = 2 * core::kNsPerSecond;
 
 }  // namespace
 
 TrainMouse::TrainMouse(const geometry::Intrinsics& camera, const TrainMouseOptions& options)
-    : camera_(camera), options_(options), filter_(options.filter) {}
+    : camera_(camera), options_(options), filter_(options.filter), standstill_(options.standstill_m) {}
 
 void TrainMouse::smooth_curves(const MousePicture& picture) {
   if (!picture.pose_measured) return;
@@ -82,7 +88,7 @@ void TrainMouse::make_reference() {
   now_.pose = reference_->seen.pose;
   now_.prior = reference_->seen.prior;
   reference_->errors = {};
-  reference_->distance_m = 0;
+  reference_->measured_m = reference_->distance_m = 0;
 }
 
 TrainMouse::Rough TrainMouse::find_roughly(bool full_band, double predicted_m, double band_m) {
@@ -121,6 +127,18 @@ TrainMouse::Rough TrainMouse::find_roughly(bool full_band, double predicted_m, d
   return rough;
 }
 
+// How the body bounces grows with speed; at rest people get in and out.
+PoseTie TrainMouse::tie(double along_m) const {
+  const auto& then = reference_->seen;
+  const double dt_s = core::seconds(now_.stamp_ns - then.stamp_ns);
+  PoseTie tie;
+  tie.height_used_m = now_.pose.camera.height_m - then.pose.camera.height_m;
+  tie.vertical_used_per_m = now_.pose.vertical_curvature_per_m - then.pose.vertical_curvature_per_m;
+  tie.height_sigma_m = kHeightShakeM + (kBouncePerM * std::abs(along_m) + kSettlingMps * dt_s);
+  tie.vertical_sigma_per_m = kVerticalChangePerM2 * (kVerticalChangeM + std::abs(along_m));
+  return tie;
+}
+
 bool TrainMouse::align(const Rough& rough, MouseStep& step) {
   const double height_m = now_.pose.height_m();
   DisplacementField field = [&rough](const Eigen::Vector2d& place, bool) {
@@ -131,7 +149,8 @@ bool TrainMouse::align(const Rough& rough, MouseStep& step) {
   for (int i = 0; i < kAlignments; ++i) {
     in_sight = reference_->texture.measure(now_.view, field, votes_);
     if (votes_.size() < kFewestPatches) return false;
-    filter_.solve(reference_->errors, now_.prior, height_m, votes_, motion_);
+    const double along_m = i == 0 ? rough.near_shift_m : motion_.along_m;
+    filter_.solve(reference_->errors, now_.prior, tie(along_m), height_m, votes_, motion_);
     field = [this, height_m](const Eigen::Vector2d& place, bool ballast) {
       return MotionFilter::displacement(motion_, height_m, place, ballast);
     };
@@ -145,52 +164,58 @@ bool TrainMouse::align(const Rough& rough, MouseStep& step) {
 }
 
 void TrainMouse::accept(MouseStep& step) {
-  const Motion& motion = motion_;
   const double dt_s = core::seconds(now_.stamp_ns - tentative_stamp_ns_);
-  double distance_m = reference_->distance_m + motion.now.mean(PoseErrors::kDistance);
-  const bool slow = confirmed_ && std::abs(speed_mps_) < kStandingMps;
-  if (slow && std::abs(distance_m - tentative_distance_m_) < options_.standstill_m) distance_m = tentative_distance_m_;
-  const double measured_mps = (distance_m - tentative_distance_m_) / dt_s;
-  speed_mps_ = speed_known_ && !slow ? speed_mps_ + kSpeedGain * (measured_mps - speed_mps_) : measured_mps;
-  if (slow && distance_m == tentative_distance_m_) speed_mps_ = 0;
-
+  double measured_m = reference_->measured_m + motion_.now.mean(PoseErrors::kDistance);
+  const double measured_mps = (measured_m - tentative_distance_m_) / dt_s;
+  speed_mps_ = speed_known_ ? speed_mps_ + kSpeedGain * (measured_mps - speed_mps_) : measured_mps;
   if (!confirmed_ && speed_known_) {
     confirmed_ = true;
-    distance_m += bridge(measured_mps);
+    measured_m += bridge(measured_mps);
   }
   speed_known_ = true;
+  tentative_distance_m_ = measured_m;
+  tentative_stamp_ns_ = now_.stamp_ns;
+  if (confirmed_) {
+    distance_m_ = standstill_.report(now_.stamp_ns, measured_m);
+    measured_stamp_ns_ = now_.stamp_ns;
+    if (standstill_.resting() || std::abs(speed_mps_) < kSlowMps) speed_mps_ = standstill_.recent_speed_mps();
+  }
+  fill(step, confirmed_ ? distance_m_ : measured_m);
+  renew_reference(step, dt_s);
+}
+
+void TrainMouse::fill(MouseStep& step, double distance_m) const {
   // With what this picture says of the reference's own distance, so that steps add up to the distance.
   step.step_m = distance_m - reference_->distance_m;
-  step.lateral_m = motion.lateral_m + 0.5 * now_.pose.curvature_per_m * motion.along_m * motion.along_m;
-  step.yaw_rad = motion.turn_rad + now_.pose.curvature_per_m * motion.along_m;
-  step.step_sigma_m = motion.along_sigma_m;
-  step.yaw_sigma_rad = motion.turn_sigma_rad;
+  step.lateral_m = motion_.lateral_m + 0.5 * now_.pose.curvature_per_m * motion_.along_m * motion_.along_m;
+  step.yaw_rad = motion_.turn_rad + now_.pose.curvature_per_m * motion_.along_m;
+  step.step_sigma_m = motion_.along_sigma_m;
+  step.yaw_sigma_rad = motion_.turn_sigma_rad;
   const double since_reference_s = core::seconds(now_.stamp_ns - reference_->seen.stamp_ns);
   step.lateral_speed_mps = step.lateral_m / since_reference_s;
   step.yaw_rate_rps = step.yaw_rad / since_reference_s;
   step.speed_mps = speed_mps_;
-  step.agreement = motion.agreement;
-  step.pitch_bias_rad = motion.now.mean(PoseErrors::kPitchBias);
-  step.ballast_depth_m = motion.now.mean(PoseErrors::kBallastDepth);
+  step.agreement = motion_.agreement;
+  step.pitch_bias_rad = motion_.now.mean(PoseErrors::kPitchBias);
+  step.ballast_depth_m = motion_.now.mean(PoseErrors::kBallastDepth);
   step.mode = !confirmed_                                   ? MouseMode::search
               : reference_->seen.stamp_ns == last_stamp_ns_ ? MouseMode::track
                                                             : MouseMode::keyframe;
   step.valid = confirmed_;
-  tentative_distance_m_ = distance_m;
-  tentative_stamp_ns_ = now_.stamp_ns;
-  if (confirmed_) {
-    distance_m_ = distance_m;
-    measured_stamp_ns_ = now_.stamp_ns;
-  }
-  // The reference stays while the next picture will still be near it.
-  const double next_m = std::abs(motion.along_m + speed_mps_ * dt_s);
-  if (next_m > options_.reference_length_m) {
-    PoseErrors errors = motion.now;
-    errors.mean(PoseErrors::kDistance) = 0;
-    make_reference();
-    reference_->errors = errors;
-    reference_->distance_m = distance_m;
-  }
+}
+
+// The reference stays while the next picture will still be near it; at rest until the light has changed.
+void TrainMouse::renew_reference(const MouseStep& step, double dt_s) {
+  const double next_m = std::abs(motion_.along_m + speed_mps_ * dt_s);
+  const bool faded =
+      standstill_.resting() && step.score < kFadedScore && now_.stamp_ns - reference_->seen.stamp_ns > kShortestRestNs;
+  if (next_m <= options_.reference_length_m && !faded) return;
+  const PoseErrors errors = motion_.now;
+  make_reference();
+  reference_->errors = errors;
+  reference_->errors.mean(PoseErrors::kDistance) = 0;
+  reference_->measured_m = tentative_distance_m_;
+  reference_->distance_m = confirmed_ ? distance_m_ : tentative_distance_m_;
 }
 
 // Distance over the gap before the present reference, at the mean of the speeds on either side.
@@ -199,6 +224,7 @@ double TrainMouse::bridge(double speed_after_mps) {
   const double gap_s = core::seconds(restart_stamp_ns_ - measured_stamp_ns_);
   if (gap_s > options_.bridge_s) return 0;
   const double bridge_m = 0.5 * (speed_before_gap_mps_ + speed_after_mps) * gap_s;
+  reference_->measured_m += bridge_m;
   reference_->distance_m += bridge_m;
   return bridge_m;
 }
@@ -218,7 +244,7 @@ void TrainMouse::give_up(MouseStep& step) {
   confirmed_ = false;
   make_reference();
   reference_->errors = filter_.first(now_.prior);
-  reference_->distance_m = tentative_distance_m_ = distance_m_;
+  reference_->measured_m = reference_->distance_m = tentative_distance_m_ = distance_m_;
   tentative_stamp_ns_ = now_.stamp_ns;
 }
 
@@ -251,7 +277,7 @@ MouseStep TrainMouse::process(const MousePicture& picture) {
   const double reference_s = core::seconds(picture.stamp_ns - reference_->seen.stamp_ns);
   const bool predicted = speed_known_ || picture.speed_mps.has_value();
   const double speed_mps = speed_known_ ? speed_mps_ : picture.speed_mps.value_or(0.0);
-  const double known_m = speed_known_ ? tentative_distance_m_ - reference_->distance_m : 0.0;
+  const double known_m = speed_known_ ? tentative_distance_m_ - reference_->measured_m : 0.0;
   const double predicted_m = predicted ? known_m + speed_mps * (speed_known_ ? since_m_s : reference_s) : 0.0;
   double band_m = options_.search_band_m + options_.max_acceleration_mps2 * since_m_s * (since_m_s + 0.1);
   if (!speed_known_) band_m = predicted ? band_m + 0.1 * std::abs(predicted_m) : options_.max_speed_mps * reference_s;

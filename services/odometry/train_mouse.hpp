@@ -13,6 +13,7 @@
 #include "geometry/camera.hpp"
 #include "odometry/motion_filter.hpp"
 #include "odometry/shift_search.hpp"
+#include "odometry/standstill.hpp"
 #include "odometry/texture_alignment.hpp"
 #include "vision/ground_sheet.hpp"
 
@@ -97,7 +98,8 @@ class TrainMouse {
     Seen seen;
     TextureReference texture;
     PoseErrors errors;
-    double distance_m = 0;
+    double measured_m = 0;  // distance there, ...
+    double distance_m = 0;  // ... and as reported: less what was held back at rest
   };
   struct Rough {  // displacement of the ground in two halves of the sheet
     bool found = false;
@@ -111,7 +113,10 @@ class TrainMouse {
   void make_reference();
   [[nodiscard]] Rough find_roughly(bool full_band, double predicted_m, double band_m);
   bool align(const Rough& rough, MouseStep& step);
+  [[nodiscard]] PoseTie tie(double along_m) const;
   void accept(MouseStep& step);
+  void fill(MouseStep& step, double distance_m) const;
+  void renew_reference(const MouseStep& step, double dt_s);
   double bridge(double speed_after_mps);
   void give_up(MouseStep& step);
   void smooth_curves(const MousePicture& picture);
@@ -124,6 +129,7 @@ class TrainMouse {
   ShiftSearch search_;
   Seen now_;
   Motion motion_;
+  Standstill standstill_;
   std::vector<PatchMotion> votes_;
   std::optional<Reference> reference_;
   double curvature_per_m_ = 0;
@@ -133,8 +139,8 @@ class TrainMouse {
   int64_t last_stamp_ns_ = 0;        // of any picture
   int64_t measured_stamp_ns_ = 0;    // of the last picture with a confirmed motion, 0 = none yet
   int64_t tentative_stamp_ns_ = 0;   // of the last picture with any motion
-  double tentative_distance_m_ = 0;  // there
-  double distance_m_ = 0;            // confirmed
+  double tentative_distance_m_ = 0;  // there, as measured
+  double distance_m_ = 0;            // confirmed and reported
   double speed_mps_ = 0;
   bool speed_known_ = false;
   bool confirmed_ = false;

@@ -4,12 +4,15 @@
 #include <cmath>
 #include <cstdio>
 
+#include "core/time.hpp"
+
 namespace railfix {
 namespace {
 
 constexpr double kWindowM = 100.0;
-constexpr double kRestM = 1e-4;        // less motion from picture to picture is rest
-constexpr double kFalseRestM = 0.004;  // longer true motion without a measured one is a false standstill
+constexpr double kRestM = 1e-4;                      // less motion from picture to picture is rest
+constexpr double kFalseRestM = 0.004;                // longer true motion without a measured one is a false standstill
+constexpr int64_t kSettlingNs = core::kNsPerSecond;  // after a halt
 constexpr size_t kRemembered = 400;
 
 double quantile(std::vector<double> values, double share) {
@@ -56,8 +59,13 @@ void Drift::compare(double true_step_m, const odometry::MouseStep& step) {
   squared_m2_ += (moved_m - true_step_m) * (moved_m - true_step_m);
   travelled_m_ += std::abs(true_step_m);
   ++steps_;
-  if (std::abs(true_step_m) < kRestM) {
+  if (std::abs(true_step_m) >= kRestM) {
+    rest_begin_ns_ = 0;
+  } else if (rest_begin_ns_ == 0) {
+    rest_begin_ns_ = step.stamp_ns;
+  } else if (step.stamp_ns - rest_begin_ns_ > kSettlingNs) {
     ++at_rest_;
+    rest_moved_m_ += std::abs(moved_m);
     if (moved_m != 0) ++moved_at_rest_;
   }
   const double truth_m = last_truth_m_ + true_step_m;
@@ -96,8 +104,10 @@ void Drift::print() const {
   std::printf("step error %.2f mm (1 sigma); normalised by its sigma: rms %.2f, p99 %.2f\n",
               1e3 * std::sqrt(squared_m2_ / static_cast<double>(std::max<size_t>(1, steps_))),
               root_mean_square(normalised_), std::max(quantile(normalised_, 0.995), -quantile(normalised_, 0.005)));
-  std::printf("at rest %zu pictures, moved in %zu; false standstill in %zu pictures, longest %.1f mm\n", at_rest_,
-              moved_at_rest_, false_rest_, 1e3 * longest_false_rest_m_);
+  std::printf(
+      "at rest for more than a second %zu pictures, moved in %zu by %.3f m; standstill said too long in %zu, "
+      "longest over %.1f mm\n",
+      at_rest_, moved_at_rest_, rest_moved_m_, false_rest_, 1e3 * longest_false_rest_m_);
   std::printf("processor time a picture: mean %.2f ms, p50 %.2f, p99 %.2f\n", 1e3 * mean(seconds_),
               1e3 * quantile(seconds_, 0.5), 1e3 * quantile(seconds_, 0.99));
 }

@@ -27,6 +27,8 @@ class Drift {
   double still_since_truth_m_ = 0;  // true distance when the measured one last moved
   size_t pictures_ = 0, valid_ = 0, steps_ = 0;
   size_t at_rest_ = 0, moved_at_rest_ = 0, false_rest_ = 0;
+  int64_t rest_begin_ns_ = 0;  // 0 = the train moves
+  double rest_moved_m_ = 0;
   double longest_false_rest_m_ = 0;
   std::vector<double> window_percent_, seconds_, normalised_;
   std::vector<std::pair<int64_t, double>> true_distance_;  // of the last second, to find references in

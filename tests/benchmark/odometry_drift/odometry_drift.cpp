@@ -52,6 +52,12 @@ void add_simulation(CLI::App& app, Arguments& a) {
   app.add_option("--exposure-s", simulation.scenario.exposure.time_s, "")->group("Simulation");
   app.add_option("--seed", simulation.seed, "")->group("Simulation");
   app.add_option("--drop", a.disturbances.drop_share, "Share of pictures lost")->group("Simulation");
+  app.add_option("--gain-wander", simulation.scenario.exposure.wander, "Slow change of brightness, 1 sigma")
+      ->group("Simulation");
+  app.add_option("--idle-shake", a.disturbances.idle_shake, "Vibration also at rest: 1 = 0.3 mrad, 1 mm")
+      ->group("Simulation");
+  app.add_option("--rest-s", a.disturbances.rest_s, "The stop (--stop-at-m, --stop-s) is looped to last so long")
+      ->group("Simulation");
   app.add_option("--jitter-s", a.disturbances.stamp_jitter_s, "Of the stamps, 1 sigma")->group("Simulation");
 }
 

@@ -1,6 +1,8 @@
 #include "scene.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <unordered_map>
 
 #include "core/random.hpp"
@@ -57,23 +59,55 @@ class Simulated : public Scene {
         random_(options.seed + 1000) {}
 
   std::optional<Moment> next() override {
+    if (std::optional<Moment> again = repeat()) return again;
     while (random_.uniform() < disturbances_.drop_share) ++count_;
     const double time_s = static_cast<double>(count_++) / options_.rate_hz;
     if (time_s > trajectory_.duration_s()) return std::nullopt;
     Moment moment;
     moment.truth = trajectory_.truth(time_s);
+    shake(time_s, moment.truth.camera);
     const auto& at = moment.truth;
     const double jitter_s =
         std::clamp(random_.normal(0, disturbances_.stamp_jitter_s), -0.4 / options_.rate_hz, 0.4 / options_.rate_hz);
-    moment.stamp_ns = trajectory_.begin_ns() + core::to_ns(time_s + jitter_s);
+    moment.stamp_ns = trajectory_.begin_ns() + core::to_ns(time_s + jitter_s) + pause_ns_;
     moment.grey =
         renderer_.render({at.camera, at.distance_m, at.speed_mps, options_.scenario.exposure.time_s,
                           scenario_.gain(trajectory_, time_s), random_.next(), scenario_.look(time_s, at.distance_m)});
+    remember(moment);
     return moment;
   }
   [[nodiscard]] const dataset::CameraCalibration& calibration() const override { return calibration_; }
 
  private:
+  // Whole numbers of waves in a second, so that a loop of whole seconds has no jump.
+  void shake(double time_s, geometry::CameraPose& pose) const {
+    const auto wave = [&](double hz, double phase) { return std::sin(2 * std::numbers::pi * hz * time_s + phase); };
+    const double by = disturbances_.idle_shake;
+    pose.pitch_rad += by * 0.0003 * (wave(7, 0.3) + wave(19, 1.0));
+    pose.yaw_rad += by * 0.0002 * wave(11, 2.0);
+    pose.roll_rad += by * 0.0003 * wave(13, 0.7);
+    pose.lateral_m += by * 0.001 * wave(5, 1.5);
+    pose.height_m += by * 0.001 * (wave(3, 0.1) + wave(17, 2.2));
+  }
+  // At rest, with the stop's last picture behind: the stop again, until it has lasted long enough.
+  std::optional<Moment> repeat() {
+    const double loop_s = static_cast<double>(rest_.size()) / options_.rate_hz;
+    if (rest_.empty() || loop_s < std::floor(options_.run.stop_s) - 1.0) return std::nullopt;
+    if (repeated_s_ >= disturbances_.rest_s) return std::nullopt;
+    Moment moment = rest_[at_];
+    moment.stamp_ns += pause_ns_ + core::to_ns(loop_s);
+    if (++at_ == rest_.size()) {
+      at_ = 0;
+      pause_ns_ += core::to_ns(loop_s);
+      repeated_s_ += loop_s;
+    }
+    return moment;
+  }
+  void remember(const Moment& moment) {
+    const bool stop = disturbances_.rest_s > 0 && moment.truth.speed_mps == 0 && moment.truth.distance_m > 1;
+    const double most_s = std::floor(options_.run.stop_s) - 1.0;
+    if (stop && static_cast<double>(rest_.size()) / options_.rate_hz < most_s) rest_.push_back(moment);
+  }
   static simulator::RenderOptions only_track(const simulator::SimulationOptions& options) {
     simulator::RenderOptions render = options.render;
     render.seed = options.seed;
@@ -90,6 +124,10 @@ class Simulated : public Scene {
   simulator::Renderer renderer_;
   core::Random random_;
   int64_t count_ = 0;
+  std::vector<Moment> rest_;  // of the stop, whole seconds
+  size_t at_ = 0;
+  double repeated_s_ = 0;
+  int64_t pause_ns_ = 0;
 };
 
 }  // namespace

@@ -30,6 +30,8 @@ std::unique_ptr<Scene> open_dataset(const std::string& folder);
 struct Disturbances {
   double drop_share = 0;      // pictures lost
   double stamp_jitter_s = 0;  // 1 sigma of the stamp against the true time
+  double idle_shake = 0;      // of the camera, motors running: 1 = 0.3 mrad and 1 mm, up to 19 Hz; also at rest
+  double rest_s = 0;          // the pictures of a stop are shown again and again until it has lasted so long
 };
 
 /// Draws only the own track, 60 m ahead and 1 m to either side: the rest stays grey.
