@@ -21,9 +21,12 @@ constexpr double kSettled = 0.5;  // sigmas; points that leave one by one keep a
 constexpr double kGoodResidualPx = 2.0;
 constexpr double kHeadPx = 3.0;  // rails are followed until their heads are as narrow as this ...
 constexpr double kSmallestHeadPx = 1.5;
-constexpr double kShortestLook = 2.5;   // ... but at least to so many times the nearest visible distance
-constexpr double kUsualWeight = 0.02;   // of a picture in the slow mean of the pose
-constexpr double kPartsNearM = 4.0;     // legs that part so little beyond the nearest visible place are two shapes
+constexpr double kShortestLook = 2.5;  // ... but at least to so many times the nearest visible distance
+constexpr double kUsualWeight = 0.02;  // of a picture in the slow mean of the pose
+constexpr double kPartsNearM = 4.0;    // legs that part so little beyond the nearest visible place are two shapes
+constexpr double kLegRollRad = 0.008;  // how well a pose on one leg of a switch is known
+constexpr double kLegYawRad = 0.02;
+constexpr double kLegLateralM = 0.1;
 constexpr double kSureMargin = 2.0;     // sigmas squared by which the train stands better on one leg
 constexpr double kStillOneM = 0.03;     // legs this close are one
 constexpr double kShortestM = 3.0;      // of rail that is reported at least
@@ -66,12 +69,15 @@ TrackObservation TrackDetector::detect(const cv::Mat& grey, const std::optional<
       return observation;
     }
   }
+  // One search a picture when following has already cost its time; the other kind of rails waits for the next.
+  const bool lost = previous_.has_value();
   previous_.reset();
   // While nothing is seen for long, bright and dark rails take turns: that keeps up with the camera.
   const bool both = misses_ < kPatience;
   TrackObservation observation;
   forget(observation);
   for (const bool dark : {false, true}) {
+    if (lost && dark != dark_) continue;
     if (!both && dark != (misses_ % 2 == 1)) continue;
     auto found = search(grey, dark);
     if (found.confidence >= observation.confidence) observation = std::move(found);
@@ -208,8 +214,13 @@ void TrackDetector::keep_one_rail(std::vector<RailEdge> edges, TrackObservation&
 }
 
 double TrackDetector::displacement(const TrackShape& shape) const {
-  const ShapeVector apart = (to_vector(shape) - usual_).cwiseQuotient(to_vector(options_.limits));
-  return apart(0) * apart(0) + apart(2) * apart(2) + apart(3) * apart(3);  // roll, yaw, lateral
+  const ShapeVector apart = to_vector(shape) - usual_;
+  const auto& limits = options_.limits;
+  // However stiff the suspension is, over a switch the fit itself is no better than this.
+  const double roll = apart(0) / std::max(limits.roll_rad, kLegRollRad);
+  const double yaw = apart(2) / std::max(limits.yaw_rad, kLegYawRad);
+  const double lateral = apart(3) / std::max(limits.lateral_m, kLegLateralM);
+  return roll * roll + yaw * yaw + lateral * lateral;
 }
 
 void TrackDetector::choose_leg(const cv::Mat& grey, bool dark, TrackObservation& observation) {
