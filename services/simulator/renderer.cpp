@@ -105,7 +105,8 @@ cv::Mat Renderer::render(const Shot& shot) const {
   // Kept from picture to picture: the system takes longer to give memory than we to fill it.
   thread_local cv::Mat radiance;
   radiance.create(options_.camera.height_px, options_.camera.width_px, CV_32FC1);
-  if (options_.strip.ahead_m > 0.0) radiance.setTo(kUndrawnGrey / kWhite);
+  // Drops and dirt spread what is behind them.
+  if (options_.strip.ahead_m > 0.0 && shot.look.drops + shot.look.dirt > 0.0) radiance.setTo(kUndrawnGrey / kWhite);
   for (int v = 0; v < radiance.rows; ++v) {
     const auto span = spans[static_cast<size_t>(v)];
     const size_t first = static_cast<size_t>(v) * static_cast<size_t>(radiance.cols) + static_cast<size_t>(span.begin);

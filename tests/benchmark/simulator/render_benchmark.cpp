@@ -45,7 +45,7 @@ void draw(benchmark::State& state, const Place& place, const Strip& strip = {}) 
 
 BENCHMARK_CAPTURE(draw, plain, kPlain)->Arg(1280)->Arg(640)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(draw, switches, kSwitches)->Arg(1280)->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(draw, own_track_only, kPlain, Strip{30.0, 1.2})->Arg(1280)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(draw, own_track_only, kPlain, Strip{30.0, 0.9})->Arg(1280)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(draw, tunnel, kTunnel)->Arg(1280)->Unit(benchmark::kMillisecond);
 
 }  // namespace
