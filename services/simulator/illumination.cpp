@@ -25,8 +25,9 @@ float headlamp(float x_m, float y_m) {
 Illumination::Illumination(const Line& line, const Light& light, double distance_m)
     : light_(light), per_haze_m_(static_cast<float>(1.0 / light.haze_m)) {
   for (const auto& tunnel : line.tunnels()) {
-    if (tunnel.begin_m - distance_m < kSightM && tunnel.end_m > distance_m - kSightM)
-      tunnels_.push_back({tunnel.begin_m - distance_m, tunnel.end_m - distance_m, 0.0});
+    if (tunnel.begin_m - distance_m > kSightM || tunnel.end_m < distance_m - kSightM) continue;
+    tunnels_.push_back({tunnel.begin_m - distance_m, tunnel.end_m - distance_m, 0.0});
+    tunnel_reach_m_ = std::max(tunnel_reach_m_, static_cast<float>(std::max(tunnel.left_m, -tunnel.right_m)) + 0.1F);
   }
 }
 

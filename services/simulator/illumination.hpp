@@ -40,6 +40,8 @@ class Illumination {
   [[nodiscard]] float hazy(float albedo, float x_m) const {
     return albedo + (kHaze - albedo) * std::min(1.0F, x_m * per_haze_m_);
   }
+  /// Ground further beside the path is not in a tunnel.
+  [[nodiscard]] float tunnel_reach_m() const { return tunnel_reach_m_; }
   /// True where all places of the picture have the same light.
   [[nodiscard]] bool uniform() const { return tunnels_.empty() && light_.sky + light_.sun >= 1.0; }
   [[nodiscard]] const Light& open() const { return light_; }
@@ -51,9 +53,7 @@ class Illumination {
   float shadow_depth_ = 0;
   float per_haze_m_;
   std::vector<Span> tunnels_;
+  float tunnel_reach_m_ = 0;
 };
-
-/// Full width at the level of the rails; outside of it the ground is not in the tunnel.
-constexpr float kTunnelGroundHalfWidthM = 2.8F;
 
 }  // namespace railfix::simulator

@@ -86,7 +86,7 @@ RayCaster::Sample RayCaster::sample(float normal_x, float normal_y) const {
   if (!light_.uniform()) {
     const float beside = std::abs(here.own.at.d_m);
     // Beside a tunnel lies its hill, which nobody sees from inside.
-    const float s = beside < kTunnelGroundHalfWidthM ? here.own.at.s_m : kNowhereM;
+    const float s = beside < light_.tunnel_reach_m() ? here.own.at.s_m : kNowhereM;
     here.light = light_.on_ground(s, here.hit.x, here.hit.y);
   }
   return here;
