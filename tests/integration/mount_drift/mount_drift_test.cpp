@@ -1,0 +1,127 @@
+// A camera that is knocked by half a degree on the way: frame_grabber and track_detector as programs, over DDS.
+#include <gmock/gmock.h>
+
+#include <map>
+
+#include "core/time.hpp"
+#include "core/units.hpp"
+#include "messaging/topics.hpp"
+#include "support/program.hpp"
+#include "unit/dataset/temporary_folder.hpp"
+#include "unit/track_detector/synthetic_picture.hpp"
+
+namespace railfix {
+namespace {
+
+using ::testing::HasSubstr;
+namespace topics = messaging::topics;
+
+const std::string kDomain = "84";
+constexpr int64_t kPatienceNs = 120 * core::kNsPerSecond;
+constexpr int kGood = 60;      // pictures, one a second
+constexpr int kKnocked = 110;  // behind them
+constexpr double kKnockRad = 0.5 / 57.29578;
+const geometry::Intrinsics kCamera{575, 575, 319.5, 255.5, 0, 0, 0, 0, 640, 512};
+
+class MountDrift : public testing::TemporaryFolder {
+ protected:
+  MountDrift() : train_("drift-" + std::to_string(getpid())), participant_(options(train_)) {}
+
+  static messaging::ParticipantOptions options(const std::string& train) {
+    messaging::ParticipantOptions options;
+    options.train_id = train;
+    options.domain = std::stoi(kDomain);
+    return options;
+  }
+  void SetUp() override {
+    TemporaryFolder::SetUp();
+    std::string list = "#timestamp [ns],filename\n";
+    const cv::Mat good = picture(0);
+    const cv::Mat knocked = picture(kKnockRad);
+    std::filesystem::create_directories(root_ / "mav0/cam0/data");
+    for (int i = 0; i < kGood + kKnocked; ++i) {
+      cv::Mat one = (i < kGood ? good : knocked).clone();
+      one.at<uint8_t>(0, i) ^= 1U;  // no two pictures of a camera are the same
+      const std::string name = std::to_string(i) + ".pgm";
+      cv::imwrite((root_ / "mav0/cam0/data" / name).string(), one);
+      list += std::to_string((i + 1) * core::kNsPerSecond) + "," + name + "\n";
+    }
+    write("mav0/cam0/data.csv", list);
+    write("mav0/cam0/sensor.yaml",
+          "resolution: [640, 512]\nintrinsics: [575, 575, 319.5, 255.5]\n"
+          "mount: {height_m: 2.6, pitch_rad: 0.1, yaw_rad: 0, roll_rad: 0, lateral_m: 0}\n");
+  }
+  static cv::Mat picture(double knock_rad) {
+    track_detector::test::Scene scene;
+    scene.shape.camera = {0, 0.1 + knock_rad, 0, 0, 2.6};
+    return track_detector::test::render(scene, kCamera);
+  }
+  [[nodiscard]] test::Program service(const std::string& program, std::vector<std::string> settings) const {
+    settings.insert(settings.end(),
+                    {"common.train_id=" + train_, "common.domain=" + kDomain, "common.log_level=error"});
+    return test::Program(test::with_settings(program, settings));
+  }
+  template <class Condition>
+  bool run_until(Condition condition) {
+    const int64_t deadline_ns = core::monotonic_ns() + kPatienceNs;
+    while (!condition()) {
+      if (core::monotonic_ns() > deadline_ns) return false;
+      participant_.assert_liveliness();
+      queue_.run_one(core::monotonic_ns() + 20'000'000);
+    }
+    return true;
+  }
+  /// Both services are ready and everyone has found everyone.
+  bool connected(const std::map<std::string, msg::ServiceStatus>& all) {
+    const auto own = participant_.connections();
+    uint32_t endpoints = 0;
+    uint32_t matches = own.matches;
+    for (const auto& [name, one] : all) {
+      endpoints += one.endpoints();
+      matches += one.matches();
+    }
+    return all.size() == 2 && own.remote_endpoints == endpoints && matches == 2 * own.pairs;
+  }
+
+  std::string train_;
+  messaging::Queue queue_;
+  messaging::Participant participant_;
+};
+
+TEST_F(MountDrift, IsToldWithNumbersAndWhatToDo) {
+  std::map<int64_t, bool> drifted;  // by picture
+  int64_t last_seen = 0;
+  double pitch_rad = 0;
+  messaging::Reader<msg::TrackView> views(
+      participant_, topics::track_view, "", queue_,
+      [&](const msg::TrackView& view) { drifted[view.stamp_ns() / core::kNsPerSecond] = view.mount_drifted() != 0; });
+  std::map<std::string, msg::ServiceStatus> all;
+  messaging::Reader<msg::ServiceStatus> status(
+      participant_, topics::service_status, "", queue_,
+      [&](const msg::ServiceStatus& one) { all[one.service().c_str()] = one; });
+  messaging::Writer<msg::ControlRequest> control(participant_, topics::service_control);
+  const auto detector = service("railfix-track-detector", {"common.lock_step=true"});
+  const auto grabber =
+      service("railfix-frame-grabber", {"frame_grabber.source=" + root_.string(), "frame_grabber.pace=lossless",
+                                        "frame_grabber.wait_for=[track_detector]"});
+  const auto reason = [&all] { return std::string(all["track_detector"].reason().c_str()); };
+  ASSERT_TRUE(run_until([&] { return connected(all); }));
+  msg::ControlRequest request;
+  request.service("frame_grabber");
+  request.command("start");
+  control.write(request);
+  (void)run_until([&] { return drifted.contains(kGood + kKnocked); });
+  ASSERT_TRUE(drifted.contains(kGood + kKnocked)) << "the last picture did not come; " << reason();
+  (void)run_until([&] { return reason().find("pitch by +0.4") != std::string::npos || !drifted.at(kGood + kKnocked); });
+  for (const auto& [picture, drift] : drifted) {
+    if (picture <= kGood) {
+      EXPECT_FALSE(drift) << "false alarm at picture " << picture;
+    }
+  }
+  EXPECT_TRUE(drifted.at(kGood + kKnocked)) << "last seen " << last_seen << " with pitch " << pitch_rad;
+  EXPECT_THAT(reason(), HasSubstr("the camera has moved in its mount: pitch by +0.4"));
+  EXPECT_THAT(reason(), HasSubstr("run railfix calibrate mount again"));
+}
+
+}  // namespace
+}  // namespace railfix
