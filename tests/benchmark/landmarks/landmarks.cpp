@@ -1,16 +1,21 @@
 // railfix-measure-landmarks --dataset SEQ: sightings of every kind against truth/landmarks.csv, with camera poses from
 // the rails (or the true ones) and the time they take.
+// railfix-measure-landmarks --pictures DIR --fps N: what would be sighted on real pictures.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <ctime>
 #include <map>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "core/random.hpp"
 #include "core/time.hpp"
 #include "dataset/dataset.hpp"
+#include "track_detector/draw.hpp"
 #include "track_detector/landmark_finder.hpp"
+#include "track_detector/mount_calibration.hpp"
 #include "track_detector/track_detector.hpp"
 
 namespace railfix {
@@ -21,11 +26,16 @@ struct Found {
   track_detector::Sighting sighting;
 };
 
+constexpr double kFocalPerWidth = 0.72;  // of cameras that nobody knows
+
 struct Settings {
   std::string folder;
   double pitch_noise_rad = 0;
   bool true_poses = false;
   bool verbose = false;
+  std::string pictures;  // instead of folder
+  double fps = 1;
+  std::string draw;     // folder for pictures of sightings
   double first_m = 40;  // what is nearer at the beginning cannot be followed
 };
 
@@ -42,6 +52,28 @@ double distance_at(const std::vector<dataset::TruthRow>& truth, int64_t stamp_ns
   const auto& b = *after;
   const double share = static_cast<double>(stamp_ns - a.stamp_ns) / static_cast<double>(b.stamp_ns - a.stamp_ns);
   return a.distance_m + share * (b.distance_m - a.distance_m);
+}
+
+track_detector::LandmarkPicture picture_of(const dataset::Picture& source,
+                                           const track_detector::TrackObservation& rails) {
+  track_detector::LandmarkPicture picture;
+  picture.grey = source.grey;
+  picture.stamp_ns = source.stamp_ns;
+  picture.pose = rails.shape.camera;
+  picture.curvature_per_m = rails.shape.curvature_per_m;
+  picture.pitch_sigma_rad = std::sqrt(rails.covariance(1, 1));
+  return picture;
+}
+
+void draw(const Settings& settings, const cv::Mat& grey, const geometry::View& view,
+          const track_detector::Sighting& sighting, size_t number) {
+  if (settings.draw.empty()) return;
+  cv::Mat colour;
+  cv::cvtColor(grey, colour, cv::COLOR_GRAY2BGR);
+  track_detector::draw_sighting(colour, view, sighting);
+  cv::imwrite(
+      settings.draw + "/" + std::to_string(number) + "_" + std::to_string(static_cast<int>(sighting.type)) + ".png",
+      colour);
 }
 
 // Half the distance of the balises of a group; what stands beside the track is met more coarsely.
@@ -115,6 +147,44 @@ void judge(const std::string& kind, const std::vector<dataset::TruthLandmark>& l
       std::sqrt(normalised / n));
 }
 
+// Real pictures have no truth: says what would be reported, for looking at.
+int tell(const Settings& settings) {
+  dataset::PictureOptions options;
+  options.fps = settings.fps;
+  geometry::Intrinsics camera;
+  std::vector<dataset::Picture> pictures;
+  auto source = core::value_or_throw(dataset::open_pictures(settings.pictures, options));
+  while (auto next = core::value_or_throw(source->next())) pictures.push_back(*next);
+  if (pictures.empty()) throw core::BadInput(settings.pictures + " has no pictures");
+  camera.width_px = pictures[0].grey.cols;
+  camera.height_px = pictures[0].grey.rows;
+  camera.fu_px = camera.fv_px = kFocalPerWidth * camera.width_px;
+  camera.cu_px = 0.5 * (camera.width_px - 1);
+  camera.cv_px = 0.5 * (camera.height_px - 1);
+  track_detector::MountCalibrator calibrator(camera, 1.435);
+  for (const auto& one : pictures) calibrator.add(one.grey);
+  const auto mount = core::value_or_throw(calibrator.solve()).mount;
+  track_detector::TrackDetector detector(camera, mount, {});
+  track_detector::LandmarkFinder finder(camera, {});
+  size_t seen = 0;
+  size_t said = 0;
+  for (size_t i = 0; i < pictures.size(); ++i) {
+    const auto rails = detector.detect(pictures[i].grey);
+    if (!rails.seen()) continue;
+    ++seen;
+    const auto picture = picture_of(pictures[i], rails);
+    for (const auto& sighting : finder.process(picture)) {
+      ++said;
+      std::printf("picture %zu: kind %d, %.2f m ahead, lateral %+.2f m, sigma %.2f m, confidence %.2f\n", i,
+                  static_cast<int>(sighting.type), sighting.distance_ahead_m, sighting.lateral_m, sighting.sigma_m,
+                  sighting.confidence);
+      draw(settings, pictures[i].grey, geometry::View(camera, picture.pose), sighting, i);
+    }
+  }
+  std::printf("%zu pictures, rails seen on %zu, %zu sightings\n", pictures.size(), seen, said);
+  return 0;
+}
+
 int measure(const Settings& settings) {
   const std::string& folder = settings.folder;
   const auto calibration = core::value_or_throw(dataset::read_calibration(folder + "/mav0/cam0/sensor.yaml"));
@@ -144,9 +214,7 @@ int measure(const Settings& settings) {
     } else {
       const auto rails = detector.detect(next->grey);
       if (!rails.seen()) continue;
-      picture.pose = rails.shape.camera;
-      picture.curvature_per_m = rails.shape.curvature_per_m;
-      picture.pitch_sigma_rad = std::sqrt(rails.covariance(1, 1));
+      picture = picture_of(*next, rails);
     }
     const std::clock_t begin = std::clock();  // processor time: other programs do not count
     const auto& sightings = finder.process(picture);
@@ -154,6 +222,7 @@ int measure(const Settings& settings) {
     ++pictures;
     for (const auto& sighting : sightings) {
       found.push_back({distance_at(truth, sighting.stamp_ns) + sighting.distance_ahead_m, sighting});
+      draw(settings, next->grey, geometry::View(calibration.intrinsics, picture.pose), sighting, pictures);
     }
   }
   for (const auto& [kind, type] : kKinds) {
@@ -171,14 +240,18 @@ int measure(const Settings& settings) {
 int main(int argc, char** argv) {
   CLI::App app("Sightings on a dataset with truth");
   railfix::Settings settings;
-  app.add_option("--dataset", settings.folder, "Dataset folder")->required();
+  auto* dataset = app.add_option("--dataset", settings.folder, "Dataset folder with truth");
+  app.add_option("--pictures", settings.pictures, "Real pictures without truth: only says what is sighted")
+      ->excludes(dataset);
+  app.add_option("--fps", settings.fps, "... so many a second");
+  app.add_option("--draw", settings.draw, "Existing folder for a picture of each sighting");
   app.add_flag("--true-poses", settings.true_poses, "Poses from truth/track.csv instead of from the rails");
   app.add_option("--pitch-noise", settings.pitch_noise_rad, "Added to every true pose, 1 sigma, rad");
   app.add_option("--first-m", settings.first_m, "Landmarks in the first metres do not count");
   app.add_flag("--verbose", settings.verbose, "Every sighting, not only false and missed ones");
   CLI11_PARSE(app, argc, argv);
   try {
-    return railfix::measure(settings);
+    return settings.folder.empty() ? railfix::tell(settings) : railfix::measure(settings);
   } catch (const railfix::core::BadInput& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 2;
