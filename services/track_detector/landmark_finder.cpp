@@ -12,8 +12,9 @@ constexpr double kNearM = 3.5;
 constexpr double kCellM = 0.02;
 constexpr double kShakeMarginRad = 0.02;
 constexpr double kFrogReferenceM = 9.5;
+constexpr double kLookM = 0.55;  // frogs and platforms need no denser looks: that keeps up with 60 pictures a second
 constexpr double kFrogScore = 0.3;
-constexpr double kFrogSigmaM = 0.05;  // what does not average out: wear, the blades' gap
+constexpr double kFrogSigmaM = 0.09;  // what does not average out: wear, the blades' gap
 
 GroundTracking frog_tracking(const LandmarkOptions& options) {
   GroundTracking tracking;
@@ -97,7 +98,8 @@ void LandmarkFinder::find_in_track(const LandmarkPicture& picture) {
             std::hypot(plate.sigma_m, depth_m, pitch_m), plate.confidence},
            picture);
   }
-  if (!options_.frogs) return;
+  if (!options_.frogs || way_m_ - frog_look_m_ < kLookM) return;
+  frog_look_m_ = way_m_;
   for (const SettledThing& frog : frogs_.follow(frog_search_.find(picture), way_m_)) {
     const double pitch_m = pitch_error_m(picture, kFrogReferenceM, 0);
     report({LandmarkType::frog, picture.stamp_ns, frog.place_m - way_m_, frog.lateral_m,
@@ -107,6 +109,9 @@ void LandmarkFinder::find_in_track(const LandmarkPicture& picture) {
 }
 
 void LandmarkFinder::find_platforms(const LandmarkPicture& picture) {
+  const bool frogs_took_this_picture = frog_look_m_ == way_m_;
+  if (way_m_ - platform_look_m_ < (frogs_took_this_picture ? 1.5 : 1.0) * kLookM) return;
+  platform_look_m_ = way_m_;
   for (const SettledPlatform& end : platforms_.follow(platform_search_.find(picture), way_m_)) {
     if (uprights_.in_tunnel(way_m_)) continue;  // walls, ducts and lamps look like platforms
     const double ahead_m = end.place_m - way_m_;

@@ -40,6 +40,8 @@ class LandmarkFinder {
   vision::TopView view_;
   GroundMotion motion_;
   double way_m_ = 0;  // run since the beginning, good to a percent
+  double frog_look_m_ = -1e9;
+  double platform_look_m_ = -1e9;
   GroundTracker plates_;
   FrogSearch frog_search_;
   GroundTracker frogs_;

@@ -17,6 +17,7 @@ constexpr double kDarkShare = 0.93;  // of the outer brightness
 constexpr double kDeepShare = 0.5;
 constexpr double kSameWallM = 0.3;
 constexpr double kMouthM = 8;
+constexpr double kExitSigmaM = 0.4;
 constexpr double kOneSideSigmaM = 0.2;
 constexpr double kDaylightShare = 0.8;  // of the brightness in front of the tunnel
 constexpr double kObjectSigmaM = 0.05;  // of where the surveyor's point of an object is
@@ -145,6 +146,8 @@ void UprightObjects::pair_sides() {
                            std::min(left.edge.pictures, right.edge.pictures)};
       if (between(width_m, kTunnelWidthM) && ((dark && deep) || bright)) {
         object.type = dark ? LandmarkType::portal_in : LandmarkType::portal_out;
+        // The last joint of the lining may have been taken for the exit.
+        if (!dark) object.sigma_m = std::hypot(object.sigma_m, kExitSigmaM);
         object.outer_grey = std::min(left.edge.outer_grey, right.edge.outer_grey);
       } else if (!between(width_m, kBridgeWidthM)) {
         continue;
