@@ -8,7 +8,7 @@ namespace {
 
 constexpr double kWindowM = 1.4;     // holds two sleepers and what is between them
 constexpr int kStride = 8;           // rows between limits
-constexpr double kApartM = 0.06;     // ballast so near to a sleeper is not used
+constexpr double kApartM = 0.06;     // ballast so near to a sleeper is not used, nor a sleeper so near to its front
 constexpr float kFewestGrey = 0.5F;  // roughness of a noiseless row that is as good as smooth
 constexpr float kClearlyRougher = 1.7F;
 
@@ -52,12 +52,10 @@ void GroundFinder::mark_ballast(const vision::TopView& view, int half_window) {
   }
 }
 
-bool GroundFinder::any_smooth(int row, int reach) const {
-  const int last = std::min(static_cast<int>(ballast_.size()) - 1, row + reach);
-  for (int k = std::max(0, row - reach); k <= last; ++k) {
-    if (ballast_[static_cast<size_t>(k)] == 0) return true;
-  }
-  return false;
+bool GroundFinder::any(uint8_t ballast, int first, int last) const {
+  const auto begin = ballast_.begin() + std::max(0, first);
+  const auto end = ballast_.begin() + std::min(static_cast<int>(ballast_.size()), last + 1);
+  return std::find(begin, end, ballast) != end;
 }
 
 void GroundFinder::find(const vision::TopView& view, const vision::Sheet& sheet, std::vector<Ground>& out) {
@@ -66,8 +64,11 @@ void GroundFinder::find(const vision::TopView& view, const vision::Sheet& sheet,
   out.assign(static_cast<size_t>(sheet.rows), Ground::sleeper);
   const int apart = std::max(1, static_cast<int>(std::lround(kApartM / sheet.cell_m)));
   for (int r = 0; r < sheet.rows; ++r) {
-    if (ballast_[static_cast<size_t>(r)] == 0) continue;
-    out[static_cast<size_t>(r)] = any_smooth(r, apart) ? Ground::mixed : Ground::ballast;
+    if (ballast_[static_cast<size_t>(r)] != 0) {
+      out[static_cast<size_t>(r)] = any(0, r - apart, r + apart) ? Ground::mixed : Ground::ballast;
+    } else if (any(1, r - apart, r - 1)) {
+      out[static_cast<size_t>(r)] = Ground::mixed;  // the front face, smooth as the top, goes down to the stones
+    }
   }
 }
 

@@ -1,7 +1,8 @@
 // Which rows of the top view show ballast, and which sleepers?
 //
 // Ballast lies some centimetres below the sleeper tops; 1 cm is 0.4 % of motion. Seen from above it is rough along a
-// row, a sleeper is smooth. The ballast right beside a sleeper is hidden or laid bare by it and belongs to neither.
+// row, a sleeper is smooth. The ballast right beside a sleeper is hidden or laid bare by it and belongs to neither; nor
+// does the sleeper's front edge, where its front face is seen.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +23,7 @@ class GroundFinder {
  private:
   void measure_roughness(const vision::TopView& view);
   void mark_ballast(const vision::TopView& view, int half_window);
-  [[nodiscard]] bool any_smooth(int row, int reach) const;
+  [[nodiscard]] bool any(uint8_t ballast, int first, int last) const;
   std::vector<float> squared_;    // of differences along a row, mean
   std::vector<float> roughness_;  // its root over three rows
   std::vector<float> window_;

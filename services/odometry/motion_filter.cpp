@@ -135,15 +135,25 @@ void MotionFilter::tie(int now, int reference, double used, double sigma) {
   prior_right_(reference) -= weight * used;
 }
 
+// The stones of one bay lie deeper than those of the next: a patch of ballast knows its motion only so well.
+Eigen::Matrix2d MotionFilter::information_of(const PatchMotion& patch, double height_m) const {
+  if (!patch.ballast) return patch.information;
+  const double sigma_m = patch.displacement_m.x() / height_m * options_.ballast_scatter_m;
+  const Eigen::Vector2d along = patch.information.col(0);
+  const double variance = sigma_m * sigma_m;
+  return patch.information - along * along.transpose() * (variance / (1.0 + variance * along.x()));
+}
+
 void MotionFilter::set_votes(double height_m, const std::vector<PatchMotion>& patches) {
   votes_.resize(patches.size());
   for (size_t i = 0; i < patches.size(); ++i) {
     const PatchMotion& patch = patches[i];
     const Rows rows = rows_at(patch.place_m, patch.place_m + patch.displacement_m, height_m, patch.ballast);
+    const Eigen::Matrix2d known = information_of(patch, height_m);
     // Root of the information: its Cholesky factor, transposed.
-    const double l00 = std::sqrt(patch.information(0, 0));
-    const double l10 = patch.information(1, 0) / l00;
-    const double l11 = std::sqrt(std::max(0.0, patch.information(1, 1) - l10 * l10));
+    const double l00 = std::sqrt(known(0, 0));
+    const double l10 = known(1, 0) / l00;
+    const double l11 = std::sqrt(std::max(0.0, known(1, 1) - l10 * l10));
     Vote& vote = votes_[i];
     vote.rows[0] = l00 * rows.row(0).transpose() + l10 * rows.row(1).transpose();
     vote.rows[1] = l11 * rows.row(1).transpose();

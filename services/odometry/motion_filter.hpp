@@ -72,6 +72,7 @@ class MotionFilter {
         0.02;  // of the ballast below the sleeper tops, and how far that may be off; 0 = not at all
     double ballast_depth_sigma_m = 0.03;
     double ballast_depth_walk_m_per_sqrt_m = 3e-4;
+    double ballast_scatter_m = 0.03;  // of the depth from one bay between sleepers to the next
   };
   explicit MotionFilter(const Options& options) : options_(options) {}
 
@@ -96,6 +97,7 @@ class MotionFilter {
   };
   void set_prior(const PoseErrors& reference, const PosePrior& prior);
   void tie(int now, int reference, double used, double sigma);
+  [[nodiscard]] Eigen::Matrix2d information_of(const PatchMotion& patch, double height_m) const;
   void set_votes(double height_m, const std::vector<PatchMotion>& patches);
   [[nodiscard]] Matrix information(double scale, Vector& right) const;
   double weigh(const Vector& solution);

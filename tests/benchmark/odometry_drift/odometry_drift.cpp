@@ -73,6 +73,7 @@ void add_mouse(CLI::App& app, odometry::TrainMouseOptions& mouse) {
   app.add_option("--ballast-sigma", mouse.filter.ballast_depth_sigma_m, "m")->group(group);
   app.add_option("--ballast-depth", mouse.filter.ballast_depth_m, "m")->group(group);
   app.add_option("--ballast-walk", mouse.filter.ballast_depth_walk_m_per_sqrt_m, "m/sqrt(m)")->group(group);
+  app.add_option("--ballast-scatter", mouse.filter.ballast_scatter_m, "m")->group(group);
 }
 
 Arguments parse(int argc, char** argv) {
