@@ -52,6 +52,8 @@ struct OdometryConfig {
                   "How far that may be off; the ground corrects it. 0: trust it.");
     fields.number("ballast_depth_walk_m_per_sqrt_m", mouse.filter.ballast_depth_walk_m_per_sqrt_m, {0, 0.01},
                   "m/sqrt(m)", "How fast it may change along the line.");
+    fields.number("ballast_scatter_m", mouse.filter.ballast_scatter_m, {0, 0.2}, "m",
+                  "How much it differs from one bay between sleepers to the next, 1 sigma.");
     fields.number("standstill_m", mouse.standstill_m, {0, 0.05}, "m",
                   "At standstill, motion is counted when it exceeds this length.");
     fields.number("bridge_s", mouse.bridge_s, {0, 30}, "s",

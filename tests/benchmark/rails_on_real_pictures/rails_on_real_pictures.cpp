@@ -296,6 +296,7 @@ void masks(const fs::path& folder) {
 int main(int argc, char** argv) {
   cv::setNumThreads(1);
   if (argc == 3 && std::string(argv[1]) == "--draw") draw_folder = argv[2];
+  if (!draw_folder.empty()) std::filesystem::create_directories(draw_folder);
   const auto folder = data_folder();
   if (!fs::exists(folder / "cabview")) {
     std::printf("skipped: no pictures in %s (set RAILFIX_DATA)\n", folder.c_str());
