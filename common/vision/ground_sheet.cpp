@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+
 #include <initializer_list>
+#include "vision/picture_line.hpp"
 
 namespace railfix::vision {
 namespace {
@@ -20,18 +22,6 @@ SheetRow sheet_row(const SheetPose& pose, double ahead_m) {
   const double aside = 0.5 * ahead_m * turn * (1.0 - turn * turn / 12.0);
   const double up = 0.5 * pose.vertical_curvature_per_m * ahead_m * ahead_m - pose.texture_depth_m;
   return {{along, aside, up}, {-std::sin(turn), std::cos(turn), 0.0}};
-}
-
-float sample(const cv::Mat& grey, float u, float v) {
-  const int x = static_cast<int>(u);
-  const int y = static_cast<int>(v);
-  const float fx = u - static_cast<float>(x);
-  const float fy = v - static_cast<float>(y);
-  const uchar* top = grey.ptr<uchar>(y) + x;
-  const uchar* bottom = top + grey.step;
-  const float a = static_cast<float>(top[0]) + fx * static_cast<float>(top[1] - top[0]);
-  const float b = static_cast<float>(bottom[0]) + fx * static_cast<float>(bottom[1] - bottom[0]);
-  return a + fy * (b - a);
 }
 
 }  // namespace
@@ -72,24 +62,7 @@ void TopViewMaker::map_row(const SheetPose& pose, const Eigen::Matrix3d& camera_
   const Eigen::Vector3f start =
       (camera_from_track * (row.centre_m + row.left * sheet_.offset_m(0) - position)).cast<float>();
   const Eigen::Vector3f step = (camera_from_track * row.left * sheet_.cell_m).cast<float>();
-  const auto fu = static_cast<float>(camera_.fu_px);
-  const auto fv = static_cast<float>(camera_.fv_px);
-  const auto cu = static_cast<float>(camera_.cu_px);
-  const auto cv = static_cast<float>(camera_.cv_px);
-  const auto k1 = static_cast<float>(camera_.k1);
-  const auto k2 = static_cast<float>(camera_.k2);
-  const auto p1 = static_cast<float>(camera_.p1);
-  const auto p2 = static_cast<float>(camera_.p2);
-  for (int col = 0; col < sheet_.cols; ++col) {
-    const auto c = static_cast<float>(col);
-    const float inverse_z = 1.0F / (start.z() + c * step.z());
-    const float x = (start.x() + c * step.x()) * inverse_z;
-    const float y = (start.y() + c * step.y()) * inverse_z;
-    const float r2 = x * x + y * y;
-    const float radial = 1.0F + r2 * (k1 + k2 * r2);
-    u_px_[static_cast<size_t>(col)] = fu * (x * radial + 2.0F * p1 * x * y + p2 * (r2 + 2.0F * x * x)) + cu;
-    v_px_[static_cast<size_t>(col)] = fv * (y * radial + p1 * (r2 + 2.0F * y * y) + 2.0F * p2 * x * y) + cv;
-  }
+  project_line(camera_, start, step, sheet_.cols, u_px_.data(), v_px_.data());
 }
 
 // Mean of two by two pixels, where the sheet is nearer than fine_m.
@@ -165,9 +138,9 @@ void TopViewMaker::make(const cv::Mat& grey, const SheetPose& pose, TopView& out
     if (!seen) {
       std::fill(line, line + cols, 0.0F);
     } else if (ahead_m < fine_m) {
-      for (size_t c = 0; c < cols; ++c) line[c] = sample(half_, 0.5F * u_px_[c] - 0.25F, 0.5F * v_px_[c] - 0.25F);
+      for (size_t c = 0; c < cols; ++c) line[c] = bilinear(half_, 0.5F * u_px_[c] - 0.25F, 0.5F * v_px_[c] - 0.25F);
     } else {
-      for (size_t c = 0; c < cols; ++c) line[c] = sample(grey, u_px_[c], v_px_[c]);
+      for (size_t c = 0; c < cols; ++c) line[c] = bilinear(grey, u_px_[c], v_px_[c]);
     }
   }
   // The smoothing carries an unseen row's emptiness into its neighbours.
