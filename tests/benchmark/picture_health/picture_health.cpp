@@ -93,7 +93,7 @@ void judge(const std::string& path, const Spoiling& spoiling, double fps, int mo
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   double fps = 0;
   int most = 1 << 30;
   for (int i = 1; i < argc; ++i) {
@@ -107,4 +107,8 @@ int main(int argc, char** argv) {
       for (const Spoiling& spoiling : kSpoilings) judge(word, spoiling, fps, most);
     }
   }
+  return 0;
+} catch (const core::BadInput& error) {
+  std::fprintf(stderr, "railfix-bench-picture-health: %s\n", error.what());
+  return 2;
 }
