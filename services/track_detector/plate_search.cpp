@@ -13,8 +13,14 @@ constexpr double kGapM = 0.05;        // around the plate: its shadow and blur
 constexpr double kStripM = 0.10;      // ground compared on each side
 constexpr double kOffCentreM = 0.06;  // a balise lies in the middle of the track
 constexpr double kSizeToleranceM = 0.09;
-constexpr double kEvenness = 0.75;  // spread inside, as a share of the weakest contrast
-constexpr double kDarkGrey = 12;    // below it shares of brightness mean nothing
+constexpr double kEvenness = 0.75;     // spread inside, as a share of the weakest contrast
+constexpr double kEdgeM = 0.03;        // a plate's edge is made within so much to either side ...
+constexpr double kBesideEdgeM = 0.10;  // ... of what the brightness changes within this
+constexpr double kSharpEdge = 0.7;
+constexpr double kRimM = 0.03;
+constexpr double kCornerM = 0.07;
+constexpr double kFullCorners = 0.85;
+constexpr double kDarkGrey = 12;  // below it shares of brightness mean nothing
 
 struct Box {
   int row, col, rows, cols;
@@ -96,18 +102,57 @@ std::optional<double> find_edge(const std::vector<double>& profile, int at, int 
 struct Extent {
   double middle;
   double length;
+  double sharpness;  // of the softer edge: share of the step from outside to inside that it makes within kEdgeM
 };
 
+double at(const std::vector<double>& profile, double place) {
+  const double inside = std::clamp(place, 0.0, static_cast<double>(profile.size()) - 1.001);
+  const auto i = static_cast<size_t>(inside);
+  const double f = inside - static_cast<double>(i);
+  return (1 - f) * profile[i] + f * profile[i + 1];
+}
+
+double edge_sharpness(const std::vector<double>& profile, double edge, double inwards, double reach, double far) {
+  const double step = at(profile, edge + inwards * far) - at(profile, edge - inwards * far);
+  return step == 0 ? 0 : (at(profile, edge + inwards * reach) - at(profile, edge - inwards * reach)) / step;
+}
+
 // Both edges of the plate in a profile through it.
-std::optional<Extent> measure_extent(const std::vector<double>& profile, int centre, int half, int reach, double sign) {
+std::optional<Extent> measure_extent(const std::vector<double>& profile, int centre, int half, int reach, double sign,
+                                     double cell_m) {
   const auto low = find_edge(profile, centre - half, reach, sign);
   const auto high = find_edge(profile, centre + half, reach, -sign);
   if (!low || !high) return std::nullopt;
-  return Extent{0.5 * (*low + *high), *high - *low};
+  const double near = kEdgeM / cell_m;
+  const double far = kBesideEdgeM / cell_m;
+  return Extent{0.5 * (*low + *high), *high - *low,
+                std::min(edge_sharpness(profile, *low, 1, near, far), edge_sharpness(profile, *high, -1, near, far))};
 }
 
-std::optional<GroundCandidate> refine(const cv::Mat& grey, const vision::Sheet& sheet, const Layout& l,
-                                      const LandmarkOptions& options, const cv::Point& centre, double contrast) {
+// How much the emptiest corner has of the contrast of the middle against both sides: a plate fills its corners, a stain
+// does not.
+double corner_fill(const Sums& sums, const Layout& l, double cell_m, const Extent& length, const Extent& width) {
+  const int row = static_cast<int>(std::lround(length.middle));
+  const int col = static_cast<int>(std::lround(width.middle));
+  const int half_rows = static_cast<int>(0.5 * length.length);
+  const int half_cols = static_cast<int>(0.5 * width.length);
+  const int rim = static_cast<int>(std::lround(kRimM / cell_m));
+  const int corner = std::max(1, static_cast<int>(std::lround(kCornerM / cell_m)));
+  const double middle = sums.mean({row - half_rows / 2, col - half_cols / 2, half_rows, half_cols});
+  const double side = 0.5 * (sums.mean({row - half_rows / 2, col - half_cols - l.gap - l.strip, half_rows, l.strip}) +
+                             sums.mean({row - half_rows / 2, col + half_cols + l.gap + 1, half_rows, l.strip}));
+  double emptiest = 1.0;
+  for (const int top : {row - half_rows + rim, row + half_rows - rim - corner}) {
+    for (const int left : {col - half_cols + rim, col + half_cols - rim - corner}) {
+      emptiest = std::min(emptiest, (sums.mean({top, left, corner, corner}) - side) / (middle - side));
+    }
+  }
+  return emptiest;
+}
+
+std::optional<GroundCandidate> refine(const cv::Mat& grey, const Sums& sums, const vision::Sheet& sheet,
+                                      const Layout& l, const LandmarkOptions& options, const cv::Point& centre,
+                                      double contrast) {
   const double sign = contrast > 0 ? 1.0 : -1.0;
   const int reach = static_cast<int>(std::lround(0.10 / sheet.cell_m));
   std::vector<double> along(static_cast<size_t>(grey.rows), 0.0);
@@ -123,11 +168,14 @@ std::optional<GroundCandidate> refine(const cv::Mat& grey, const vision::Sheet& 
     const auto* line = grey.ptr<float>(r);
     for (int c = 0; c < grey.cols; ++c) across[static_cast<size_t>(c)] += line[c] / (2.0 * in_rows + 1.0);
   }
-  const auto length = measure_extent(along, centre.y, l.half_rows, reach, sign);
-  const auto width = measure_extent(across, centre.x, l.half_cols, reach, sign);
+  const auto length = measure_extent(along, centre.y, l.half_rows, reach, sign, sheet.cell_m);
+  const auto width = measure_extent(across, centre.x, l.half_cols, reach, sign, sheet.cell_m);
   if (!length || !width) return std::nullopt;
   if (std::abs(length->length * sheet.cell_m - options.balise_length_m) > kSizeToleranceM) return std::nullopt;
   if (std::abs(width->length * sheet.cell_m - options.balise_width_m) > kSizeToleranceM) return std::nullopt;
+  if (std::abs(sheet.offset_m(width->middle)) > kOffCentreM) return std::nullopt;
+  if (width->sharpness < kSharpEdge || corner_fill(sums, l, sheet.cell_m, *length, *width) < kFullCorners)
+    return std::nullopt;
   return GroundCandidate{sheet.ahead_m(length->middle), sheet.offset_m(width->middle), std::abs(contrast)};
 }
 
@@ -167,7 +215,8 @@ std::vector<GroundCandidate> find_plates(const vision::TopView& view, const visi
       return std::abs(plate.ahead_m - ahead_m) < 2.0 * options.balise_length_m;
     });
     if (known) continue;
-    if (const auto plate = refine(view.grey, sheet, l, options, hit.centre, hit.contrast)) plates.push_back(*plate);
+    if (const auto plate = refine(view.grey, sums, sheet, l, options, hit.centre, hit.contrast))
+      plates.push_back(*plate);
   }
   return plates;
 }
