@@ -131,13 +131,18 @@ std::optional<Extent> measure_extent(const std::vector<double>& profile, int cen
 
 // How much the emptiest corner has of the contrast of the middle against both sides: a plate fills its corners, a stain
 // does not.
-double corner_fill(const Sums& sums, const Layout& l, double cell_m, const Extent& length, const Extent& width) {
+double corner_fill(const Sums& sums, const Layout& l, const vision::Sheet& sheet, const Extent& length,
+                   const Extent& width) {
+  const double cell_m = sheet.cell_m;
   const int row = static_cast<int>(std::lround(length.middle));
   const int col = static_cast<int>(std::lround(width.middle));
   const int half_rows = static_cast<int>(0.5 * length.length);
   const int half_cols = static_cast<int>(0.5 * width.length);
   const int rim = static_cast<int>(std::lround(kRimM / cell_m));
   const int corner = std::max(1, static_cast<int>(std::lround(kCornerM / cell_m)));
+  const int beside = half_cols + l.gap + l.strip;
+  // A wide plate off the middle may reach so far that its sides are not in the sheet: then nothing is known of it.
+  if (col < beside || col + beside >= sheet.cols) return 0.0;
   const double middle = sums.mean({row - half_rows / 2, col - half_cols / 2, half_rows, half_cols});
   const double side = 0.5 * (sums.mean({row - half_rows / 2, col - half_cols - l.gap - l.strip, half_rows, l.strip}) +
                              sums.mean({row - half_rows / 2, col + half_cols + l.gap + 1, half_rows, l.strip}));
@@ -174,8 +179,7 @@ std::optional<GroundCandidate> refine(const cv::Mat& grey, const Sums& sums, con
   if (std::abs(length->length * sheet.cell_m - options.balise_length_m) > kSizeToleranceM) return std::nullopt;
   if (std::abs(width->length * sheet.cell_m - options.balise_width_m) > kSizeToleranceM) return std::nullopt;
   if (std::abs(sheet.offset_m(width->middle)) > kOffCentreM) return std::nullopt;
-  if (width->sharpness < kSharpEdge || corner_fill(sums, l, sheet.cell_m, *length, *width) < kFullCorners)
-    return std::nullopt;
+  if (width->sharpness < kSharpEdge || corner_fill(sums, l, sheet, *length, *width) < kFullCorners) return std::nullopt;
   return GroundCandidate{sheet.ahead_m(length->middle), sheet.offset_m(width->middle), std::abs(contrast)};
 }
 
