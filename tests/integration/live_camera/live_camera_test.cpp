@@ -8,6 +8,7 @@
 #include "core/time.hpp"
 #include "messaging/topics.hpp"
 #include "support/program.hpp"
+#include "support/run_until.hpp"
 #include "unit/dataset/temporary_folder.hpp"
 
 namespace railfix {
@@ -18,8 +19,6 @@ using ::testing::HasSubstr;
 namespace topics = messaging::topics;
 
 constexpr int kDomain = 83;
-constexpr int64_t kPatienceNs = 60 * core::kNsPerSecond;
-constexpr int64_t kPeriodNs = 20'000'000;
 const char* const kFakeCamera = "/usr/bin/arv-fake-gv-camera-0.8";
 
 /// The fake camera has one fixed port: tests of several builds on one computer take turns.
@@ -74,13 +73,7 @@ class LiveCamera : public railfix::testing::TemporaryFolder {
   }
   template <class Condition>
   bool run_until(Condition condition) {
-    const int64_t deadline_ns = core::monotonic_ns() + kPatienceNs;
-    while (!condition()) {
-      if (core::monotonic_ns() > deadline_ns) return false;
-      participant_.assert_liveliness();
-      queue_.run_one(core::monotonic_ns() + kPeriodNs);
-    }
-    return true;
+    return test::run_until(participant_, queue_, condition);
   }
   [[nodiscard]] std::string reason() const { return status_.reason().c_str(); }
   void expect_growing_stamps() const {

@@ -6,6 +6,7 @@
 #include "core/time.hpp"
 #include "messaging/topics.hpp"
 #include "support/program.hpp"
+#include "support/run_until.hpp"
 #include "unit/dataset/temporary_folder.hpp"
 
 namespace railfix {
@@ -15,8 +16,6 @@ using ::testing::HasSubstr;
 namespace topics = messaging::topics;
 
 constexpr int kDomain = 81;
-constexpr int64_t kPatienceNs = 60 * core::kNsPerSecond;
-constexpr int64_t kPeriodNs = 20'000'000;
 constexpr int kPictures = 40;
 constexpr int64_t kPictureNs = 20'000'000;
 constexpr int64_t kImuNs = 5'000'000;
@@ -96,13 +95,7 @@ class Playback : public railfix::testing::TemporaryFolder {
 
   template <class Condition>
   bool run_until(Condition condition) {
-    const int64_t deadline_ns = core::monotonic_ns() + kPatienceNs;
-    while (!condition()) {
-      if (core::monotonic_ns() > deadline_ns) return false;
-      participant_.assert_liveliness();
-      queue_.run_one(core::monotonic_ns() + kPeriodNs);
-    }
-    return true;
+    return test::run_until(participant_, queue_, condition);
   }
   /// Both services are ready and everyone has found everyone.
   bool connected() {
