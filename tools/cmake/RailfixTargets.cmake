@@ -1,6 +1,7 @@
 # How every target of Railfix is made: one library a folder, one program a service, one test program a folder.
 
-set(RAILFIX_SANITIZE "" CACHE STRING "Sanitizers for all our code, as for -fsanitize= (set by the presets asan and tsan)")
+set(RAILFIX_SANITIZE "" CACHE STRING "Sanitizers for all our code, as for -fsanitize= (set by the presets asan, tsan and fuzz)")
+option(RAILFIX_FUZZ "Programs of tests/fuzz with libFuzzer, which needs clang (set by the preset fuzz)" OFF)
 
 find_program(RAILFIX_CCACHE ccache)
 if(RAILFIX_CCACHE)
@@ -12,6 +13,9 @@ if(RAILFIX_SANITIZE)
   add_compile_options(-fsanitize=${RAILFIX_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
   add_link_options(-fsanitize=${RAILFIX_SANITIZE})
 endif()
+if(RAILFIX_FUZZ)
+  add_compile_options(-fsanitize=fuzzer-no-link)
+endif()
 
 # Picture and filter code is vectorised at O3.
 set(CMAKE_CXX_FLAGS_RELEASE "-O3 -DNDEBUG")
@@ -20,7 +24,8 @@ set(CMAKE_CXX_FLAGS_RELEASE "-O3 -DNDEBUG")
 # -Wrestrict is off because g++ 12 warns of every `"text" + string` (GCC bug 105651).
 function(railfix_warnings target)
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
-                                           -Wnon-virtual-dtor -Woverloaded-virtual -Wimplicit-fallthrough -Wno-restrict -Werror)
+                                           -Wnon-virtual-dtor -Woverloaded-virtual -Wimplicit-fallthrough
+                                           $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict> $<$<NOT:$<BOOL:${RAILFIX_FUZZ}>>:-Werror>)
 endfunction()
 
 # railfix_library(core SOURCES a.cpp DEPENDS x y)  -> target railfix_core, headers as <folder>/<header>.hpp

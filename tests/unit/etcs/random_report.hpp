@@ -1,16 +1,19 @@
-// Valid messages of every shape, and a way to change single fields of encoded ones.
+// Valid messages of every shape, and a way to change single fields of encoded ones. `Source` is what chooses, with
+// next(): random numbers, or the input of a fuzzer.
 #pragma once
 
 #include "core/random.hpp"
-#include "etcs/train_position_report.hpp"
+#include "etcs/report_parameters.hpp"
 
 namespace railfix::etcs::testing {
 
-inline uint32_t below(core::Random& random, uint32_t limit) {
+template <class Source>
+uint32_t below(Source& random, uint32_t limit) {
   return static_cast<uint32_t>(random.next() % limit);
 }
 
-inline TrainPositionReport random_report(core::Random& random, Baseline baseline) {
+template <class Source>
+TrainPositionReport random_report(Source& random, Baseline baseline) {
   const bool b4 = baseline == Baseline::b4;
   TrainPositionReport report;
   report.t_train = static_cast<uint32_t>(random.next());
@@ -40,6 +43,22 @@ inline TrainPositionReport random_report(core::Random& random, Baseline baseline
     report.other_packets.push_back(packet);
   }
   return report;
+}
+
+template <class Source>
+ReportParameters random_parameters(Source& random) {
+  ReportParameters parameters;
+  parameters.q_dir = below(random, 3);
+  parameters.q_scale = below(random, 3);
+  parameters.t_cycloc = below(random, 256);
+  parameters.d_cycloc = below(random, 32768);
+  parameters.m_loc = below(random, 3);
+  parameters.locations.resize(below(random, 32));
+  for (auto& location : parameters.locations) {
+    location.d_loc = below(random, 32768);
+    location.q_lgtloc = below(random, 2);
+  }
+  return parameters;
 }
 
 /// Overwrites `count` bits from bit `begin`.

@@ -7,21 +7,9 @@
 namespace railfix::etcs {
 namespace {
 
-using testing::below;
+using testing::random_parameters;
 using ::testing::HasSubstr;
 using testing::set_bits;
-
-ReportParameters random_parameters(core::Random& random) {
-  ReportParameters parameters;
-  parameters.q_dir = below(random, 3);
-  parameters.q_scale = below(random, 3);
-  parameters.t_cycloc = below(random, 256);
-  parameters.d_cycloc = below(random, 32768);
-  parameters.m_loc = below(random, 3);
-  parameters.locations.resize(below(random, 32));
-  for (auto& location : parameters.locations) location = {below(random, 32768), below(random, 2)};
-  return parameters;
-}
 
 TEST(ReportParameters, HandMadePacket) {
   // 58 | both | 72 bits | 1 m | 6 s | 1000 m | at groups | 1 element: 500 m, max safe front end
