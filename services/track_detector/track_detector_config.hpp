@@ -4,6 +4,7 @@
 #include <string>
 
 #include "service/config.hpp"
+#include "track_detector/imu_roll.hpp"
 #include "track_detector/landmark_finder.hpp"
 #include "track_detector/track_detector.hpp"
 
@@ -13,6 +14,7 @@ struct TrackDetectorConfig {
   std::string camera = "cam0";
   DetectorOptions detector;
   LandmarkOptions landmarks;
+  ImuRollOptions imu_roll;
 
   void describe(service::Fields& fields) {
     fields.text("camera", camera, "The camera whose pictures are searched: camera_frame/<camera>.");
@@ -34,6 +36,9 @@ struct TrackDetectorConfig {
                  [this](service::Fields& group) { describe_sightings(group); });
     fields.group("limits", "What suspension and curves do to the camera, one sigma about the mount.",
                  [this](service::Fields& group) { describe_limits(group); });
+    fields.group("imu_roll",
+                 "The gyro of an IMU in the body (imu_sample) narrows the roll. Without an IMU nothing changes.",
+                 [this](service::Fields& group) { describe_imu_roll(group); });
   }
 
  private:
@@ -54,6 +59,15 @@ struct TrackDetectorConfig {
     fields.number("texture_depth_m", landmarks.texture_depth_m, {0, 0.5}, "m",
                   "Sleepers and ballast below the rail heads: scale of the way between pictures.");
     fields.number("way_sigma", landmarks.way_sigma, {0.001, 0.1}, "", "Error of that way, share of it.");
+  }
+  void describe_imu_roll(service::Fields& fields) {
+    fields.flag("use", imu_roll.use, "Use imu_sample where there is one.");
+    fields.number("sway_hz", imu_roll.sway_hz, {0.2, 5}, "Hz", "Rolling of the body on its springs.");
+    fields.number("slow_rad", imu_roll.slow_rad, {0, 0.1}, "rad",
+                  "Roll that no gyro tells (load, wind, unbalanced cant), one sigma; a part of limits.roll_rad.");
+    fields.number("twist_rps", imu_roll.twist_rps, {1e-4, 0.2}, "rad/s",
+                  "Turning of the track under the train in cant ramps, and bias of the gyro, one sigma.");
+    fields.number("noise_rps", imu_roll.noise_rps, {1e-5, 0.1}, "rad/s", "Noise of a gyro sample, one sigma.");
   }
   void describe_limits(service::Fields& fields) {
     auto& limits = detector.limits;

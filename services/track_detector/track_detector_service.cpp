@@ -57,6 +57,11 @@ TrackDetectorService::TrackDetectorService(const Config& config, service::Contex
                                       [this](const msg::CameraCalibration& c) { calibrated(c); });
   context_.on<msg::CameraFrame>(
       messaging::topics::camera_frame, [this](const msg::CameraFrame& frame) { pictured(frame); }, config_.camera);
+  if (config_.imu_roll.use) {
+    context_.on<msg::ImuSample>(messaging::topics::imu_sample, [this](const msg::ImuSample& sample) {
+      if (imu_roll_) imu_roll_->add(sample.stamp_ns(), sample.rate_x_rps());
+    });
+  }
   context_.health().ready();
 }
 
@@ -81,6 +86,7 @@ void TrackDetectorService::calibrated(const msg::CameraCalibration& c) {
   }
   detector_ = std::make_unique<TrackDetector>(camera, mount, options);
   finder_ = std::make_unique<LandmarkFinder>(camera, config_.landmarks);
+  imu_roll_ = std::make_unique<ImuRoll>(config_.imu_roll, mount, options.limits.roll_rad);
   watch_ = std::make_unique<MountWatch>(detector_->mount(), options.limits);
   context_.log().info("camera {} {}x{}, {:.2f} m above the rails, pitch {:.2f} deg", config_.camera, camera.width_px,
                       camera.height_px, mount.height_m, core::deg_from_rad(mount.pitch_rad));
@@ -109,7 +115,7 @@ void TrackDetectorService::detect(const msg::CameraFrame& frame) {
   const cv::Mat grey(static_cast<int>(frame.height_px()), static_cast<int>(frame.width_px()), CV_8UC1, pixels);
   TrackObservation observation;
   observation.reason = "the camera sends the same picture again";
-  if (!messaging::is_repeat(frame.health())) observation = detector_->detect(grey);
+  if (!messaging::is_repeat(frame.health())) observation = detector_->detect(grey, imu_roll_->at(frame.stamp_ns()));
   const double factor = messaging::sigma_factor(frame.health());
   observation.covariance *= factor * factor;
   if (observation.seen()) watch_->add(observation.shape, core::seconds(frame.stamp_ns() - last_stamp_ns_));

@@ -1,9 +1,10 @@
-// camera_frame, camera_calibration in; track_view out, one for every picture, and landmark_sighting.
+// camera_frame, camera_calibration, imu_sample in; track_view out, one for every picture, and landmark_sighting.
 #pragma once
 
 #include <memory>
 
 #include "service/service.hpp"
+#include "track_detector/imu_roll.hpp"
 #include "track_detector/landmark_finder.hpp"
 #include "track_detector/mount_watch.hpp"
 #include "track_detector/track_detector_config.hpp"
@@ -28,6 +29,7 @@ class TrackDetectorService {
   messaging::Writer<msg::TrackView> writer_;
   messaging::Writer<msg::LandmarkSighting> sighting_writer_;
   std::unique_ptr<TrackDetector> detector_;  // nothing before the calibration is known
+  std::unique_ptr<ImuRoll> imu_roll_;
   std::unique_ptr<MountWatch> watch_;
   std::unique_ptr<LandmarkFinder> finder_;
   bool mount_known_ = false;

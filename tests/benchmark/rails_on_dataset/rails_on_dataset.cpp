@@ -1,13 +1,13 @@
 // The track detector alone on simulated datasets with truth: one line a dataset with what was seen, what was wrong, how
 // far edges are off and the time; with --poses also pose and curvature errors and the honesty of the sigmas.
-//   railfix-bench-rails-on-dataset SEQ... [--poses] [--draw DIR EVERY]
+//   railfix-bench-rails-on-dataset SEQ... [--poses] [--imu] [--draw DIR EVERY]
 //
 // A picture counts as visible when both heads stand out from the ground on both sides by 6 grey levels at most of the
 // true places, whatever the detector says. It is wrong when "seen" is said and a rail is drawn more than 0.5 m away
 // from its true place anywhere nearer than 30 m and than the end that the detector gives, or its points are more than 5
 // px off in the median. For --poses the suspension limits are the scatter of the true poses (a floor keeps them from
 // zero), as an operator who knows his train would set them, and the rails' offset is zero, as the simulator's gauge is
-// exact.
+// exact. --imu: the roll's prior comes from the dataset's gyro.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -23,6 +23,7 @@
 #include "dataset/dataset.hpp"
 #include "rails_on_dataset/true_rails.hpp"
 #include "track_detector/draw.hpp"
+#include "track_detector/imu_roll.hpp"
 #include "track_detector/track_detector.hpp"
 
 namespace {
@@ -49,16 +50,17 @@ struct Statistics {
   int wrong = 0;
   std::array<std::vector<double>, 7> errors;
   std::array<std::vector<double>, 7> normalised;
-  std::vector<double> edges;
+  std::vector<double> edges;    // distances from the true edge, px
+  std::vector<double> outward;  // the same with sign
   std::vector<double> milliseconds;
 };
 
-/// Distances of the found points from the true edges, in pixels along the row.
-std::vector<double> edge_errors(const TrackObservation& observation, const bench::TrueRails& truth) {
+/// How far outward of the true edges the found points are, in pixels along the row.
+std::vector<double> outward_errors(const TrackObservation& observation, const bench::TrueRails& truth) {
   std::vector<double> errors;
   for (const auto& point : observation.points) {
     const auto column = bench::true_column(truth.side(point.side), point.pixel.y());
-    if (column) errors.push_back(std::abs(*column - point.pixel.x()));
+    if (column) errors.push_back((point.side == Side::left ? 1 : -1) * (*column - point.pixel.x()));
   }
   return errors;
 }
@@ -92,10 +94,10 @@ void compare(const TrackObservation& observation, const dataset::TruthRow& truth
 }
 
 void print_line(const std::string& name, const Statistics& s) {
-  std::printf("%-28s %6d %8d %8.2f %6d %8.3f %8.2f %8.2f %8.2f %8.2f\n", name.c_str(), s.frames, s.visible,
+  std::printf("%-28s %6d %8d %8.2f %6d %8.3f %8.2f %8.3f %8.2f %8.2f %8.2f\n", name.c_str(), s.frames, s.visible,
               100.0 * s.seen_of_visible / std::max(1, s.visible), s.wrong, quantile(s.edges, 0.5),
-              quantile(s.edges, 0.95), quantile(s.milliseconds, 0.5), quantile(s.milliseconds, 0.99),
-              quantile(s.milliseconds, 1.0));
+              quantile(s.edges, 0.95), quantile(s.outward, 0.5), quantile(s.milliseconds, 0.5),
+              quantile(s.milliseconds, 0.99), quantile(s.milliseconds, 1.0));
 }
 
 void print_poses(const Statistics& s) {
@@ -145,6 +147,7 @@ struct Options {
   std::string draw_folder;
   int draw_every = 100;
   bool poses = false;
+  bool imu = false;
 };
 
 void count(const geometry::Intrinsics& camera, const cv::Mat& grey, const TrackObservation& observation,
@@ -155,7 +158,9 @@ void count(const geometry::Intrinsics& camera, const cv::Mat& grey, const TrackO
   if (!observation.seen()) return;
   ++statistics.seen;
   statistics.seen_of_visible += visible ? 1 : 0;
-  const auto errors = edge_errors(observation, truth);
+  auto errors = outward_errors(observation, truth);
+  statistics.outward.insert(statistics.outward.end(), errors.begin(), errors.end());
+  for (auto& error : errors) error = std::abs(error);
   statistics.edges.insert(statistics.edges.end(), errors.begin(), errors.end());
   if (quantile(errors, 0.5) > kWrongPx || worst_offset_m(camera, observation, truth, gauge_m) > kWrongM) {
     ++statistics.wrong;
@@ -178,12 +183,20 @@ void measure(const std::string& sequence, const Options& wanted) {
     options.rail_offset_sigma_m = 0;
   }
   TrackDetector detector(calibration.intrinsics, *calibration.mount, options);
+  ImuRollOptions imu_options;
+  if (wanted.poses) imu_options.slow_rad = 0;  // the simulator's train has none
+  ImuRoll imu_roll(imu_options, *calibration.mount, options.limits.roll_rad);
+  const auto imu =
+      wanted.imu ? core::value_or_throw(dataset::read_sensors(sequence)).imu : std::vector<dataset::ImuRow>{};
+  auto sample = imu.begin();
   Statistics statistics;
   for (;;) {
     const auto picture = core::value_or_throw(pictures->next());
     if (!picture) break;
+    for (; sample != imu.end() && sample->stamp_ns <= picture->stamp_ns; ++sample)
+      imu_roll.add(sample->stamp_ns, sample->rate_rps[0]);
     const auto begun = std::clock();
-    const auto observation = detector.detect(picture->grey);
+    const auto observation = detector.detect(picture->grey, imu_roll.at(picture->stamp_ns));
     statistics.milliseconds.push_back(1e3 * static_cast<double>(std::clock() - begun) / CLOCKS_PER_SEC);
     ++statistics.frames;
     if (!wanted.draw_folder.empty() && (statistics.frames % wanted.draw_every == 1 || !observation.seen())) {
@@ -216,12 +229,14 @@ int main(int argc, char** argv) {
       options.draw_every = std::max(2, std::atoi(argv[++i]));
     } else if (std::string(argv[i]) == "--poses") {
       options.poses = true;
+    } else if (std::string(argv[i]) == "--imu") {
+      options.imu = true;
     } else {
       sequences.emplace_back(argv[i]);
     }
   }
-  std::printf("%-28s %6s %8s %8s %6s %8s %8s %8s %8s %8s\n", "dataset", "frames", "visible", "seen %", "wrong",
-              "edge px", "p95 px", "ms", "p99 ms", "max ms");
+  std::printf("%-28s %6s %8s %8s %6s %8s %8s %8s %8s %8s %8s\n", "dataset", "frames", "visible", "seen %", "wrong",
+              "edge px", "p95 px", "outward", "ms", "p99 ms", "max ms");
   try {
     for (const auto& sequence : sequences) measure(sequence, options);
   } catch (const core::BadInput& error) {
