@@ -12,6 +12,7 @@
 #include "core/result.hpp"
 #include "core/units.hpp"
 #include "track/import/build.hpp"
+#include "track/import/made_network.hpp"
 
 namespace railfix::tool {
 namespace {
@@ -303,6 +304,33 @@ void add_info(CLI::App& map, Action& chosen) {
   command->callback([request, &chosen] { chosen = [request] { return info(*request); }; });
 }
 
+void add_make(CLI::App& map, Action& chosen) {
+  struct MakeRequest {
+    std::string out;
+    track::MadeNetworkOptions options;
+  };
+  const auto request = std::make_shared<MakeRequest>();
+  CLI::App* command = map.add_subcommand("make", "Make up a railway network of any size, for tests");
+  command->add_option("--out", request->out, "The map file to write")->required();
+  command->add_option("--track-km", request->options.track_km, "Length of all tracks together")
+      ->check(CLI::Range(20.0, 100000.0))
+      ->capture_default_str();
+  command->add_option("--seed", request->options.seed, "Another network of the same kind")->capture_default_str();
+  command->add_option("--masts", request->options.mast_spacing_m, "Masts about every so many metres; 0 = none")
+      ->check(CLI::Range(0.0, 1000.0))
+      ->capture_default_str();
+  command->footer("Example:\n  railfix map make --track-km 20000 --seed 1 --out national.map");
+  command->callback([request, &chosen] {
+    chosen = [request] {
+      const track::Map made = track::made_network(request->options);
+      core::ok_or_throw(made.save(request->out));
+      print_summary(made);
+      std::printf("written          %s\n", request->out.c_str());
+      return 0;
+    };
+  });
+}
+
 }  // namespace
 
 void add_map(CLI::App& app, Action& chosen) {
@@ -310,6 +338,7 @@ void add_map(CLI::App& app, Action& chosen) {
   map->require_subcommand(1);
   add_build(*map, chosen);
   add_info(*map, chosen);
+  add_make(*map, chosen);
 }
 
 }  // namespace railfix::tool

@@ -13,6 +13,7 @@ constexpr double kTouchM = 0.05;
 constexpr double kTouchRad = 0.02;
 constexpr double kSharpestTurnRad = core::kPi / 3.0;
 constexpr double kNeighbourM = 50.0;
+constexpr double kLeavingM = 5.0;
 
 struct End {
   size_t track = 0;
@@ -65,23 +66,41 @@ size_t node_at(const PlanPose& pose, Draft& draft) {
   return draft.nodes.size() - 1;
 }
 
-void add_piece(const ImportedTrack& track, double from_m, double to_m, size_t number, Draft& draft) {
-  DraftEdge edge;
-  edge.track.name = number == 1 ? track.name : track.name + "#" + std::to_string(number);
-  edge.track.line = track.line;
-  edge.track.alignment = slice(track.alignment, from_m, to_m);
+/// Where a train heads that has left the node by a few metres: tells a branch from the track it is tangent to.
+double leaving_rad(const Alignment& piece, bool at_end) {
+  const double into = std::min(kLeavingM, 0.5 * piece.length_m());
+  const double heading = piece.at(at_end ? piece.length_m() - into : into).pose.heading_rad;
+  return at_end ? heading + core::kPi : heading;
+}
+
+/// Marks and groups of the track that lie on the piece; a group goes with its reference, its balises stay within.
+void take_marks(const ImportedTrack& track, double from_m, double to_m, bool is_last, ImportedTrack& piece) {
+  const auto is_on_piece = [&](double offset_m) {
+    return offset_m >= from_m && (offset_m < to_m || (is_last && offset_m <= to_m));
+  };
   for (TrackMark mark : track.marks) {
-    if (mark.offset_m < from_m || mark.offset_m >= to_m) continue;
+    if (!is_on_piece(mark.offset_m)) continue;
     mark.offset_m -= from_m;
-    edge.track.marks.push_back(mark);
+    piece.marks.push_back(std::move(mark));
   }
-  const PlanPose begin = track.alignment.at(from_m).pose;
-  const PlanPose end = edge.track.alignment.at(edge.track.alignment.length_m()).pose;
-  edge.leaving_from_rad = begin.heading_rad;
-  edge.leaving_to_rad = end.heading_rad + core::kPi;
-  edge.from_node = node_at(begin, draft);
-  edge.to_node = node_at(end, draft);
-  draft.edges.push_back(std::move(edge));
+  for (TrackGroup group : track.groups) {
+    if (!is_on_piece(group.offset_m)) continue;
+    group.offset_m -= from_m;
+    for (TrackMark& balise : group.balises) balise.offset_m = std::clamp(balise.offset_m - from_m, 0.0, to_m - from_m);
+    piece.groups.push_back(std::move(group));
+  }
+}
+
+/// Points of a list by offset that matter between two offsets: those within and two on either side.
+template <class Point>
+std::vector<Point> points_between(const std::vector<Point>& points, double from_m, double to_m) {
+  const auto before = [](const Point& point, double offset_m) { return point.offset_m < offset_m; };
+  const auto first = std::lower_bound(points.begin(), points.end(), from_m, before);
+  const auto last = std::lower_bound(points.begin(), points.end(), to_m, before);
+  std::vector<Point> out(first - std::min<ptrdiff_t>(2, first - points.begin()),
+                         last + std::min<ptrdiff_t>(2, points.end() - last));
+  for (Point& point : out) point.offset_m -= from_m;
+  return out;
 }
 
 /// One edge's end at a node.
@@ -155,11 +174,25 @@ Alignment slice(const Alignment& alignment, double from_m, double to_m) {
         {to - from, element.curvature_start_per_m + rate * from, element.curvature_start_per_m + rate * to});
     starts.push_back(advance(alignment.starts()[i], element, from));
   }
-  std::vector<GradePoint> profile = alignment.profile();
-  for (GradePoint& point : profile) point.offset_m -= from_m;
-  std::vector<CantPoint> cant = alignment.cant();
-  for (CantPoint& point : cant) point.offset_m -= from_m;
-  return {std::move(elements), std::move(starts), std::move(profile), std::move(cant)};
+  return {std::move(elements), std::move(starts), points_between(alignment.profile(), from_m, to_m),
+          points_between(alignment.cant(), from_m, to_m)};
+}
+
+void add_pieces(const ImportedTrack& track, const std::vector<TrackCut>& cuts, Draft& draft) {
+  for (size_t i = 0; i + 1 < cuts.size(); ++i) {
+    const double from = cuts[i].offset_m;
+    const double to = cuts[i + 1].offset_m;
+    DraftEdge edge;
+    edge.track.name = i == 0 ? track.name : track.name + "#" + std::to_string(i + 1);
+    edge.track.line = track.line;
+    edge.track.alignment = slice(track.alignment, from, to);
+    take_marks(track, from, to, i + 2 == cuts.size(), edge.track);
+    edge.leaving_from_rad = leaving_rad(edge.track.alignment, false);
+    edge.leaving_to_rad = leaving_rad(edge.track.alignment, true);
+    edge.from_node = cuts[i].node;
+    edge.to_node = cuts[i + 1].node;
+    draft.edges.push_back(std::move(edge));
+  }
 }
 
 Draft cut_tracks(std::vector<ImportedTrack> tracks, std::vector<std::string>& problems) {
@@ -177,20 +210,26 @@ Draft cut_tracks(std::vector<ImportedTrack> tracks, std::vector<std::string>& pr
   }
   Draft draft;
   for (size_t i = 0; i < tracks.size(); ++i) {
-    std::sort(cuts[i].begin(), cuts[i].end());
+    cuts[i].push_back(0.0);
     cuts[i].push_back(tracks[i].alignment.length_m());
-    double from = 0;
-    size_t number = 0;
-    for (const double to : cuts[i]) {
-      if (to - from < 2.0 * kTouchM) continue;
-      add_piece(tracks[i], from, to, ++number, draft);
-      from = to;
+    std::sort(cuts[i].begin(), cuts[i].end());
+    std::vector<TrackCut> nodes;
+    for (const double offset : cuts[i]) {
+      if (!nodes.empty() && offset - nodes.back().offset_m < 2.0 * kTouchM) continue;
+      nodes.push_back({offset, node_at(tracks[i].alignment.at(offset).pose, draft)});
     }
+    nodes.back().offset_m = tracks[i].alignment.length_m();
+    if (nodes.size() > 1) add_pieces(tracks[i], nodes, draft);
   }
   return draft;
 }
 
 void append(const Draft& draft, Map& map) {
+  const auto add_landmark = [&](uint32_t edge, const TrackMark& mark) {
+    const auto number = static_cast<uint32_t>(map.landmarks.size() + 1);
+    map.landmarks.push_back({number, mark.kind, edge, mark.offset_m, mark.lateral_m, mark.sigma_m, mark.name});
+    return number;
+  };
   const auto first_node = static_cast<uint32_t>(map.nodes.size() + 1);
   const auto first_edge = static_cast<uint32_t>(map.edges.size() + 1);
   std::vector<std::vector<Meeting>> meetings(draft.nodes.size());
@@ -205,9 +244,18 @@ void append(const Draft& draft, Map& map) {
                          .to_node = first_node + static_cast<uint32_t>(in.to_node),
                          .line = in.track.line,
                          .alignment = in.track.alignment});
-    for (const TrackMark& mark : in.track.marks) {
-      const auto number = static_cast<uint32_t>(map.landmarks.size() + 1);
-      map.landmarks.push_back({number, mark.kind, id, mark.offset_m, mark.lateral_m, mark.sigma_m, mark.name});
+    for (const TrackMark& mark : in.track.marks) add_landmark(id, mark);
+    for (const TrackGroup& in_group : in.track.groups) {
+      BaliseGroup group{.nid_c = in_group.nid_c,
+                        .nid_bg = in_group.nid_bg,
+                        .edge = id,
+                        .offset_m = in_group.offset_m,
+                        .nominal_is_forward = in_group.nominal_is_forward,
+                        .is_virtual = false,
+                        .q_locacc_m = in_group.q_locacc_m,
+                        .balises = {}};
+      for (const TrackMark& balise : in_group.balises) group.balises.push_back(add_landmark(id, balise));
+      map.balise_groups.push_back(std::move(group));
     }
   }
   for (size_t i = 0; i < draft.nodes.size(); ++i) {

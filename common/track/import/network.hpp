@@ -31,11 +31,20 @@ struct Draft {
   std::vector<DraftEdge> edges;
 };
 
+/// A node that lies on a track.
+struct TrackCut {
+  double offset_m = 0;
+  size_t node = 0;  // index into Draft::nodes
+};
+
+/// Adds the pieces of a track between the nodes on it. REQUIRES: two cuts or more, by offset, at least 10 cm apart.
+void add_pieces(const ImportedTrack& track, const std::vector<TrackCut>& cuts, Draft& draft);
+
 /// Cuts tracks where the end of another touches them (within 5 cm and 20 mrad) and joins ends that meet. Every end that
 /// meets nothing is told in `problems` with its nearest neighbour.
 Draft cut_tracks(std::vector<ImportedTrack> tracks, std::vector<std::string>& problems);
 
-/// The part of an alignment between two offsets, with its profile and cant.
+/// The part of an alignment between two offsets, with its profile and cant and what of them lies next to it.
 Alignment slice(const Alignment& alignment, double from_m, double to_m);
 
 /// Adds the draft to the map. Two edges are connected at a node where the turn between them is less than 60 degrees;

@@ -17,12 +17,23 @@ struct TrackMark {
   std::string name;
 };
 
+/// A balise group on one track, its balises at offsets of the same track.
+struct TrackGroup {
+  uint32_t nid_c = 0;
+  uint32_t nid_bg = 0;
+  double offset_m = 0;
+  bool nominal_is_forward = true;
+  double q_locacc_m = 0;
+  std::vector<TrackMark> balises;
+};
+
 /// One track as a source describes it, before it is cut at switches.
 struct ImportedTrack {
   std::string name;
   std::string line;
   Alignment alignment;
-  std::vector<TrackMark> marks;
+  std::vector<TrackMark> marks{};
+  std::vector<TrackGroup> groups{};
 };
 
 /// How well what was read closes: worst cases over all elements, in metres and radians.
