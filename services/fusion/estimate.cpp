@@ -39,6 +39,7 @@ TrainEstimate Estimator::estimate(const Interval& promised, double since_sure_m)
   e.visual_scale = filter_.scale(Odometer::camera);
   e.wheel_scale = filter_.scale(Odometer::wheel);
   e.since_reference_m = since_reference_m();
+  e.since_sure_m = since_sure_m;
   e.reference = reference_;
   e.standstill = standstill_;
   e.track_known = path_ != nullptr;

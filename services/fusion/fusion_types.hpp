@@ -82,6 +82,7 @@ struct TrainEstimate {
   double visual_scale = 1;
   double wheel_scale = 1;
   double since_reference_m = 0;
+  double since_sure_m = 0;  // way since the last place that is beyond doubt: the interval's budget counts from there
   double lat_deg = 0;
   double lon_deg = 0;
   double easting_m = 0;

@@ -2,25 +2,25 @@
 // little).
 #include <benchmark/benchmark.h>
 
-#include "unit/fusion/train_simulation.hpp"
+#include "support/train/simulation.hpp"
 
 namespace railfix::fusion {
 namespace {
 
 void one_minute(benchmark::State& state) {
-  SimulationPlan plan;
+  train::SimulationPlan plan;
   plan.duration_s = 60;
-  const TrainSimulation simulation(plan, 1);
-  const int64_t delay_ns = state.range(0) * 1'000'000;
-  std::vector<std::pair<int64_t, Event>> arrivals;
-  for (const auto& event : simulation.events) {
-    arrivals.emplace_back(TrainSimulation::stamp(event) + (std::holds_alternative<OdometryInput>(event) ? delay_ns : 0),
-                          event);
+  train::TrainSimulation simulation(plan, 1);
+  auto& arrivals = simulation.arrivals;
+  for (auto& arrival : arrivals) {
+    if (std::holds_alternative<OdometryInput>(arrival.event))
+      arrival.arrival_s += 1e-3 * static_cast<double>(state.range(0));
   }
-  std::stable_sort(arrivals.begin(), arrivals.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::stable_sort(arrivals.begin(), arrivals.end(),
+                   [](const auto& a, const auto& b) { return a.arrival_s < b.arrival_s; });
   for (auto _ : state) {
     auto fusion = core::value_or_throw(Fusion::create({}, simulation.map, simulation.start()));
-    for (const auto& [when, event] : arrivals) benchmark::DoNotOptimize(fusion.add(event));
+    for (const auto& arrival : arrivals) benchmark::DoNotOptimize(fusion.add(arrival.event));
   }
   state.SetItemsProcessed(state.iterations() * static_cast<int64_t>(arrivals.size()));
 }

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "unit/fusion/train_simulation.hpp"
+#include "support/train/simulation.hpp"
 
 namespace railfix::fusion {
 namespace {
@@ -154,23 +154,23 @@ TEST(Fusion, KeyFramesPinAStandingTrain) {
 
 // Nothing may depend on the order in which measurements arrive.
 TEST(Fusion, LateMeasurementsAreUsedAtTheirOwnTime) {
-  SimulationPlan plan;
+  train::SimulationPlan plan;
   plan.duration_s = 40;
-  const TrainSimulation simulation(plan, 5);
+  const train::TrainSimulation simulation(plan, 5);
   auto in_order = core::value_or_throw(Fusion::create({}, simulation.map, simulation.start()));
   auto mixed = core::value_or_throw(Fusion::create({}, simulation.map, simulation.start()));
-  in_order.add(simulation.events.front());
-  mixed.add(simulation.events.front());
+  in_order.add(simulation.arrivals.front().event);
+  mixed.add(simulation.arrivals.front().event);
 
   std::vector<std::pair<int64_t, Event>> arrivals;
-  for (size_t i = 1; i < simulation.events.size(); ++i) {
-    const auto& event = simulation.events[i];
+  for (size_t i = 1; i < simulation.arrivals.size(); ++i) {
+    const auto& event = simulation.arrivals[i].event;
     in_order.add(event);
     int64_t delay_ns = 0;
     if (std::holds_alternative<OdometryInput>(event)) delay_ns = 80'000'000;
     if (std::holds_alternative<FixInput>(event)) delay_ns = 900'000'000;
     if (std::holds_alternative<GnssInput>(event)) delay_ns = 300'000'000;
-    arrivals.emplace_back(TrainSimulation::stamp(event) + delay_ns, event);
+    arrivals.emplace_back(train::TrainSimulation::stamp(event) + delay_ns, event);
   }
   std::stable_sort(arrivals.begin(), arrivals.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   for (const auto& [when, event] : arrivals) mixed.add(event);

@@ -1,0 +1,77 @@
+#include "campaign.hpp"
+
+#include <atomic>
+#include <cmath>
+#include <thread>
+
+namespace railfix::train {
+namespace {
+
+constexpr size_t kBlock = 64;
+
+struct Run {
+  Fault fault;
+  Verdict verdict;
+  StanfordCounts stanford;
+};
+
+Run run_one(const CampaignPlan& plan, uint64_t number) {
+  const auto simulation = simulation_of(plan, number);
+  auto fusion = core::value_or_throw(fusion::Fusion::create(plan.parameters, simulation.map, simulation.start()));
+  Run run{simulation.plan().fault, {}, {}};
+  run.verdict = judge(simulation, fusion, 0, [&run](const fusion::TrainEstimate& state, double error_m) {
+    run.stanford.add(std::abs(error_m), error_m > 0 ? state.over_m : state.under_m);
+  });
+  return run;
+}
+
+std::vector<Run> run_block(const CampaignPlan& plan, uint64_t first) {
+  std::vector<Run> runs(kBlock);
+  std::atomic<size_t> next{0};
+  std::vector<std::thread> threads;
+  for (int t = 0; t < plan.threads; ++t) {
+    threads.emplace_back([&] {
+      for (size_t i = next++; i < kBlock; i = next++) runs[i] = run_one(plan, first + i);
+    });
+  }
+  for (auto& thread : threads) thread.join();
+  return runs;
+}
+
+}  // namespace
+
+TrainSimulation simulation_of(const CampaignPlan& plan, uint64_t number) {
+  const uint64_t seed = plan.seed * 1'000'000 + number;
+  core::Random random(seed * 77 + 5);
+  SimulationPlan one = plan.simulation;
+  one.duration_s = plan.duration_s;
+  const bool none = plan.faults.empty() || random.uniform() < plan.no_fault_share;
+  if (!none) {
+    const auto& [sensor, kind] = plan.faults[number % plan.faults.size()];
+    one.fault = random_fault(random, sensor, kind, plan.duration_s);
+  }
+  if (!plan.map) return TrainSimulation(one, seed);
+  return TrainSimulation(one, seed, plan.map, plan.starts[number % plan.starts.size()]);
+}
+
+CampaignResult run_campaign(const CampaignPlan& plan) {
+  CampaignResult result;
+  for (uint64_t first = 0; result.sum.way_m < 1000 * plan.km; first += kBlock) {
+    const auto runs = run_block(plan, first);
+    for (size_t i = 0; i < runs.size() && result.sum.way_m < 1000 * plan.km; ++i) {
+      const auto& run = runs[i];
+      const FaultName name{run.fault.sensor, run.fault.kind};
+      result.by_fault[name].add(run.verdict);
+      ++result.runs[name];
+      result.sum.add(run.verdict);
+      ++result.run_count;
+      result.stanford.add(run.stanford);
+      if (run.verdict.outside + run.verdict.wider_unsaid > 0)
+        result.bad.push_back(
+            {first + i, run.fault, run.verdict.outside, run.verdict.wider_unsaid, run.verdict.worst_excess_m});
+    }
+  }
+  return result;
+}
+
+}  // namespace railfix::train

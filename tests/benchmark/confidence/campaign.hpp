@@ -1,0 +1,50 @@
+// Many simulated runs with faults, on several threads; the same result for any number of threads.
+#pragma once
+
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "stanford.hpp"
+#include "support/train/verdict.hpp"
+
+namespace railfix::train {
+
+using FaultName = std::pair<Sensor, FaultKind>;
+
+struct CampaignPlan {
+  double km = 100;
+  uint64_t seed = 1;
+  int threads = 2;
+  double duration_s = 240;        // of one run
+  std::vector<FaultName> faults;  // in turn, one a run
+  double no_fault_share = 0.25;   // of runs beside those
+  SimulationPlan simulation;
+  fusion::FusionParameters parameters;
+  std::shared_ptr<const track::Map> map;    // nullptr: every run on a random line
+  std::vector<track::EdgePosition> starts;  // on map, in turn
+};
+
+struct BadRun {
+  uint64_t number = 0;
+  Fault fault;
+  size_t outside = 0;
+  size_t unsaid = 0;
+  double excess_m = 0;
+};
+
+struct CampaignResult {
+  std::map<FaultName, Verdict> by_fault;
+  std::map<FaultName, size_t> runs;
+  Verdict sum;
+  size_t run_count = 0;
+  std::vector<BadRun> bad;
+  StanfordCounts stanford;
+};
+
+/// Run `number` of the campaign alone.
+TrainSimulation simulation_of(const CampaignPlan& plan, uint64_t number);
+CampaignResult run_campaign(const CampaignPlan& plan);
+
+}  // namespace railfix::train

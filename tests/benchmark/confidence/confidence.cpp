@@ -1,0 +1,157 @@
+// railfix-measure-confidence: does the promised interval hold the train, over thousands of kilometres with one faulty
+// sensor at a time? Sensor-level simulation (tests/support/train), the real fusion.
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <iostream>
+
+#include "campaign.hpp"
+#include "core/units.hpp"
+
+namespace railfix::train {
+namespace {
+
+struct Arguments {
+  CampaignPlan plan;
+  std::string fault = "all";
+  std::string without;
+  std::string stanford;
+  std::string map;
+  std::string start;
+  double max_kmh = 150;
+  int64_t run = -1;
+  bool list = false;
+};
+
+std::vector<FaultName> faults_named(const std::string& text) {
+  std::vector<FaultName> chosen;
+  if (text == "none") return chosen;
+  for (const auto& [sensor, kind] : all_faults()) {
+    const auto name = to_string(sensor) + ":" + to_string(kind);
+    if (sensor != Sensor::none && (text == "all" || name == text || to_string(sensor) == text))
+      chosen.emplace_back(sensor, kind);
+  }
+  if (chosen.empty()) throw core::BadInput("--fault " + text + ": give all, none, SENSOR or SENSOR:KIND (see --list)");
+  return chosen;
+}
+
+void leave_out(SimulationPlan& plan, const std::string& names) {
+  const auto has = [&](const char* name) { return names.find(name) != std::string::npos; };
+  plan.camera = !has("camera");
+  plan.wheel = !has("wheel");
+  plan.imu = !has("imu");
+  plan.gnss = !has("gnss");
+  if (has("landmarks")) plan.landmark_spacing_m = 0;
+}
+
+void load_map(Arguments& a) {
+  if (a.map.empty()) return;
+  auto map = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(a.map)));
+  a.plan.starts.push_back(core::value_or_throw(map->parse_position(a.start)));
+  a.plan.map = std::move(map);
+}
+
+void print_row(const std::string& name, size_t runs, Verdict verdict) {
+  const auto states = static_cast<double>(std::max<size_t>(verdict.states, 1));
+  std::printf("%-28s %5zu %8.1f %9zu %8zu %8.2f %7.2f %6zu %7.2f %8.2f %8.2f %8.2f\n", name.c_str(), runs,
+              verdict.way_m / 1000, verdict.states, verdict.outside, verdict.worst_excess_m,
+              100 * static_cast<double>(verdict.wider) / states, verdict.wider_unsaid,
+              100 * static_cast<double>(verdict.not_ok) / states, verdict.width_sum_m / states,
+              quantile(verdict.errors_m, 0.95), quantile(verdict.errors_m, 1));
+}
+
+void print(const CampaignResult& result) {
+  std::printf("%-28s %5s %8s %9s %8s %8s %7s %6s %7s %8s %8s %8s\n", "fault", "runs", "km", "states", "outside",
+              "by (m)", "wider%", "unsaid", "not ok%", "mean(m)", "p95(m)", "max(m)");
+  for (const auto& [name, verdict] : result.by_fault)
+    print_row(to_string(name.first) + " " + to_string(name.second), result.runs.at(name), verdict);
+  print_row("all", result.run_count, result.sum);
+  for (const auto& bad : result.bad)
+    std::printf("run %llu: %s %s from %.1f s to %.1f s, size %g: %zu outside by up to %.2f m, %zu wider unsaid\n",
+                static_cast<unsigned long long>(bad.number), to_string(bad.fault.sensor).c_str(),
+                to_string(bad.fault.kind).c_str(), bad.fault.begin_s, bad.fault.end_s, bad.fault.size, bad.outside,
+                bad.excess_m, bad.unsaid);
+}
+
+// One run, a line a second.
+void trace(const CampaignPlan& plan, uint64_t number) {
+  const auto simulation = simulation_of(plan, number);
+  auto fusion = core::value_or_throw(fusion::Fusion::create(plan.parameters, simulation.map, simulation.start()));
+  const auto& fault = simulation.plan().fault;
+  std::printf("%s %s from %.1f s to %.1f s, size %g\n", to_string(fault.sensor).c_str(), to_string(fault.kind).c_str(),
+              fault.begin_s, fault.end_s, fault.size);
+  double next_s = 0;
+  bool was_outside = false;
+  const double begin_s = core::seconds(simulation.stamp_ns(0));
+  judge(simulation, fusion, 0, [&](const fusion::TrainEstimate& e, double error_m) {
+    const double t_s = core::seconds(e.stamp_ns) - begin_s;
+    const bool outside = error_m > e.over_m || -error_m > e.under_m;
+    if (t_s < next_s && t_s > next_s - 2 && outside == was_outside) return;
+    next_s = t_s + 1;
+    was_outside = outside;
+    std::printf("%8.2f s %8.1f m %5.1f m/s error %8.3f in [-%.2f, +%.2f] sigma %.3f since %.0f scales %.4f %.4f %s%s\n",
+                t_s, e.distance_m, e.speed_mps, error_m, e.under_m, e.over_m, e.sigma_m, e.since_reference_m,
+                e.visual_scale, e.wheel_scale, outside ? "OUTSIDE " : "", e.reason.c_str());
+  });
+}
+
+int run(int argc, char** argv) {
+  Arguments a;
+  auto& s = a.plan.simulation;
+  s.visual_scale_error = 0.004;
+  s.landmark_spacing_m = 600;
+  s.landmark_spread = 0.7;
+  s.false_fix_share = 0.005;
+  s.fix_probability = 0.995;
+  CLI::App app("Confidence campaign: simulated sensors with faults through fusion, the interval against the truth");
+  app.add_option("--km", a.plan.km, "Way to run in total")->capture_default_str();
+  app.add_option("--seed", a.plan.seed, "Other seeds, other runs")->capture_default_str();
+  app.add_option("--threads", a.plan.threads, "Threads")->capture_default_str();
+  app.add_option("--duration-s", a.plan.duration_s, "Length of one run")->capture_default_str();
+  app.add_option("--max-kmh", a.max_kmh, "Highest speed")->capture_default_str();
+  app.add_option("--landmarks-m", s.landmark_spacing_m, "Mean distance of landmarks, 0 = none")->capture_default_str();
+  app.add_option("--fault", a.fault, "all, none, SENSOR or SENSOR:KIND")->capture_default_str();
+  app.add_option("--without", a.without, "Leave out any of camera, wheel, imu, gnss, landmarks (comma between)");
+  app.add_option("--map", a.map, "Compiled map instead of random lines");
+  app.add_option("--start", a.start, "EDGE:OFFSET[:+|-] on the map");
+  app.add_option("--stanford", a.stanford, "Write the Stanford diagram (SVG)");
+  app.add_option("--run", a.run, "Print one run of the campaign second by second");
+  app.add_flag("--list", a.list, "Print the faults");
+  CLI11_PARSE(app, argc, argv);
+  if (a.list) {
+    for (const auto& [sensor, kind] : all_faults()) std::cout << to_string(sensor) << ":" << to_string(kind) << "\n";
+    return 0;
+  }
+  a.plan.faults = faults_named(a.fault);
+  s.max_speed_mps = a.max_kmh / 3.6;
+  leave_out(s, a.without);
+  load_map(a);
+  if (a.run >= 0) {
+    trace(a.plan, static_cast<uint64_t>(a.run));
+    return 0;
+  }
+  const auto result = run_campaign(a.plan);
+  print(result);
+  if (!a.stanford.empty()) {
+    std::ofstream out(a.stanford);
+    char title[100];
+    std::snprintf(title, sizeof title, "%.0f km, %zu runs, seed %llu, faults: ", result.sum.way_m / 1000,
+                  result.run_count, static_cast<unsigned long long>(a.plan.seed));
+    out << result.stanford.svg(title + a.fault);
+    if (!out) throw core::BadInput("--stanford " + a.stanford + ": cannot be written");
+  }
+  return result.bad.empty() ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace railfix::train
+
+int main(int argc, char** argv) {
+  try {
+    return railfix::train::run(argc, argv);
+  } catch (const railfix::core::BadInput& e) {
+    std::cerr << "railfix-measure-confidence: " << e.what() << "\n";
+    return 2;
+  }
+}

@@ -1,0 +1,61 @@
+#include "support/train/drive.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace railfix::train {
+namespace {
+
+constexpr double kTickS = 0.05;
+constexpr double kTractionMps2 = 0.7;
+constexpr double kBrakeMps2 = 0.9;
+constexpr double kJerkMps3 = 0.6;
+
+}  // namespace
+
+Drive::Drive(core::Random& random, double duration_s, double max_speed_mps, double max_way_m) {
+  double speed = random.uniform() < 0.5 ? 0 : random.uniform(5, std::min(30.0, max_speed_mps));
+  double distance = 0;
+  double accel = 0;
+  double target = random.uniform(5, max_speed_mps);
+  double change_s = random.uniform(10, 40);
+  for (int i = 0; i * kTickS <= duration_s + 1; ++i) {
+    samples_.push_back({distance, speed, accel});
+    if (i * kTickS > change_s) {
+      target = random.uniform() < 0.25 ? 0 : random.uniform(3, max_speed_mps);
+      change_s += random.uniform(10, 40);
+    }
+    const double left_m = max_way_m - distance - 5;
+    if (speed * speed / (2 * 0.6 * kBrakeMps2) + 3 * speed > left_m) target = 0;
+    const double wanted = std::clamp(0.5 * (target - speed), -kBrakeMps2, kTractionMps2);
+    accel += std::clamp(wanted - accel, -kJerkMps3 * kTickS, kJerkMps3 * kTickS);
+    const double before = speed;
+    speed = std::max(0.0, speed + accel * kTickS);
+    if (speed == 0) accel = 0;
+    distance += 0.5 * (before + speed) * kTickS;
+  }
+}
+
+Motion Drive::at(double t_s) const {
+  const double t = std::clamp(t_s / kTickS, 0.0, static_cast<double>(samples_.size() - 2));
+  const auto i = static_cast<size_t>(t);
+  const double part = t - static_cast<double>(i);
+  const auto& a = samples_[i];
+  const auto& b = samples_[i + 1];
+  const double accel = (b.speed_mps - a.speed_mps) / kTickS;
+  const double dt_s = part * kTickS;
+  return {a.distance_m + a.speed_mps * dt_s + 0.5 * accel * dt_s * dt_s, a.speed_mps + accel * dt_s, accel};
+}
+
+double Drive::duration_s() const {
+  return static_cast<double>(samples_.size() - 2) * kTickS;
+}
+
+double Drive::time_at(double distance_m) const {
+  const auto passed =
+      std::find_if(samples_.begin(), samples_.end(), [&](const Motion& m) { return m.distance_m >= distance_m; });
+  if (passed == samples_.end()) return duration_s();
+  return std::min(static_cast<double>(passed - samples_.begin()) * kTickS, duration_s());
+}
+
+}  // namespace railfix::train

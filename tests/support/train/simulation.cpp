@@ -1,0 +1,286 @@
+#include "support/train/simulation.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/units.hpp"
+
+namespace railfix::train {
+namespace {
+
+using fusion::FixInput;
+using fusion::FixKind;
+using fusion::GnssInput;
+using fusion::ImuInput;
+using fusion::OdometryInput;
+using fusion::WheelInput;
+
+constexpr double kPictureS = 0.05;
+constexpr double kPulseS = 0.05;
+constexpr double kInertialS = 0.02;
+constexpr double kPulsesPerMetre = 90;
+constexpr double kKeyFrameM = 0.15;
+
+core::Random stream(uint64_t seed, uint64_t number) {
+  core::Random mixed(seed * 1'000'003 + number);
+  return core::Random(mixed.next());
+}
+
+Drive drive_on(uint64_t seed, const SimulationPlan& plan, double most_m) {
+  auto random = stream(seed, 2);
+  return Drive(random, plan.duration_s, plan.max_speed_mps, most_m);
+}
+
+std::shared_ptr<const track::Map> line_of(uint64_t seed, const SimulationPlan& plan) {
+  auto random = stream(seed, 1);
+  return random_line(random, TrainSimulation::kStartOffsetM + (plan.max_speed_mps + 3) * plan.duration_s + 1000);
+}
+
+}  // namespace
+
+TrainSimulation::TrainSimulation(const SimulationPlan& plan, uint64_t seed)
+    : TrainSimulation(plan, seed, line_of(seed, plan), {1, kStartOffsetM, track::Direction::forward}) {}
+
+TrainSimulation::TrainSimulation(const SimulationPlan& plan, uint64_t seed, std::shared_ptr<const track::Map> on,
+                                 const track::EdgePosition& start)
+    : map(std::move(on)),
+      plan_(plan),
+      seed_(seed),
+      start_(start),
+      path_(std::make_shared<const track::Path>(core::value_or_throw(track::Path::follow(map, start, 300000, 1000)))),
+      drive_(drive_on(seed, plan, path_->end_m() - 10)) {
+  measure();
+}
+
+void TrainSimulation::measure() {
+  auto random = stream(seed_, 3);
+  start_error_m = plan_.start_sigma_m * random.normal();
+  if (plan_.camera) make_steps();
+  if (plan_.wheel) make_pulses();
+  if (plan_.imu) make_inertial();
+  if (plan_.gnss) make_gnss();
+  if (plan_.landmark_spacing_m > 0) make_fixes();
+  std::stable_sort(arrivals.begin(), arrivals.end(),
+                   [](const Arrival& a, const Arrival& b) { return a.arrival_s < b.arrival_s; });
+}
+
+track::EdgePosition TrainSimulation::start() const {
+  auto place = start_;
+  place.offset_m += place.direction == track::Direction::reverse ? -start_error_m : start_error_m;
+  return place;
+}
+
+int64_t TrainSimulation::stamp_ns(double t_s) const {
+  double shift_s = 0;
+  const auto& fault = plan_.fault;
+  if (fault.is(Sensor::clock, FaultKind::clock_step) && t_s >= fault.begin_s) shift_s = fault.size;
+  if (fault.is(Sensor::clock, FaultKind::drift)) {
+    shift_s = fault.size * std::clamp(t_s - fault.begin_s, 0.0, fault.end_s - fault.begin_s);
+  }
+  return kBeginNs + core::to_ns(t_s + shift_s);
+}
+
+Motion TrainSimulation::truth_at(int64_t stamp_ns, double arrival_s) const {
+  double t_s = core::seconds(stamp_ns - kBeginNs);
+  const auto& fault = plan_.fault;
+  if (fault.is(Sensor::clock, FaultKind::clock_step) && arrival_s >= fault.begin_s) {
+    const double set_s = t_s - fault.size;
+    if (fault.size > 0 ? set_s >= fault.begin_s : set_s <= arrival_s + 1e-3) {
+      t_s = set_s;
+    } else if (fault.size > 0) {
+      t_s = std::min(t_s, fault.begin_s);
+    }
+  }
+  if (fault.is(Sensor::clock, FaultKind::drift) && t_s > fault.begin_s) {
+    const double run_s = (t_s - fault.begin_s) / (1 + fault.size);
+    const double full_s = fault.end_s - fault.begin_s;
+    t_s = run_s < full_s ? fault.begin_s + run_s : t_s - fault.size * full_s;
+  }
+  return drive_.at(t_s);
+}
+
+std::optional<double> TrainSimulation::error_m(const track::EdgePosition& place, const Motion& truth) const {
+  const auto distance_m = path_->distance_of(place.edge, place.offset_m);
+  if (!distance_m) return std::nullopt;
+  return *distance_m - truth.distance_m;
+}
+
+bool TrainSimulation::faulty(Sensor sensor, FaultKind kind, double t_s) const {
+  return plan_.fault.is(sensor, kind) && plan_.fault.active(t_s);
+}
+
+// Bias or drift of one sensor at this time, in its own unit. What a drift has come to stays until the end.
+double TrainSimulation::offset_of(Sensor sensor, double t_s) const {
+  if (faulty(sensor, FaultKind::bias, t_s)) return plan_.fault.size;
+  if (plan_.fault.is(sensor, FaultKind::drift)) return plan_.fault.size * plan_.fault.progress(t_s);
+  return 0;
+}
+
+void TrainSimulation::add(Sensor sensor, double t_s, fusion::Event event) {
+  if (faulty(sensor, FaultKind::dropout, t_s)) return;
+  const bool late = faulty(sensor, FaultKind::delay, t_s);
+  arrivals.push_back({t_s + (late ? plan_.fault.size : 0.0), std::move(event)});
+}
+
+std::vector<TrainSimulation::Spell> TrainSimulation::spells(core::Random& random, double every_s, double shortest_s,
+                                                            double longest_s, double size) const {
+  std::vector<Spell> result;
+  for (double t = random.uniform(0, every_s); t < duration_s(); t += every_s * random.uniform(0.5, 1.5)) {
+    result.push_back({t, t + random.uniform(shortest_s, longest_s), random.uniform(-size, size)});
+  }
+  return result;
+}
+
+const TrainSimulation::Spell* TrainSimulation::within(const std::vector<Spell>& all, double t_s) {
+  const auto it =
+      std::find_if(all.begin(), all.end(), [&](const Spell& s) { return t_s >= s.begin_s && t_s < s.end_s; });
+  return it == all.end() ? nullptr : &*it;
+}
+
+// A key frame is kept until 0.15 m are run; steps refer to it. Scale wanders a little around its error.
+void TrainSimulation::make_steps() {
+  auto random = stream(seed_, 10);
+  const auto blind = plan_.blind_spells ? spells(random, 60, 5, 15, 0) : std::vector<Spell>{};
+  const double scale = 1 + plan_.visual_scale_error * random.normal();
+  const double phase = random.uniform(0, 6);
+  double reference_s = 0;
+  double seen_m = 0;  // way as the camera measures it
+  double reference_m = 0;
+  for (int i = 1; i * kPictureS <= duration_s(); ++i) {
+    const double t = i * kPictureS;
+    const double true_m = drive_.at(t).distance_m;
+    const double wander = 1 + plan_.visual_wander * std::sin(phase + true_m / 3000);
+    seen_m += (true_m - drive_.at(t - kPictureS).distance_m) / (scale * wander) * (1 + offset_of(Sensor::camera, t));
+    const bool lost = random.uniform() < 0.01;
+    const double times = faulty(Sensor::camera, FaultKind::noise, t) ? plan_.fault.size : 1;
+    const double share = faulty(Sensor::camera, FaultKind::outliers, t) ? 0.3 : plan_.outlier_share;
+    OdometryInput step{stamp_ns(t), stamp_ns(reference_s), seen_m - reference_m, plan_.step_noise_m, true};
+    step.step_m += times * plan_.step_noise_m * random.normal();
+    const double sleeper = random.uniform() < 0.5 ? 0.6 : -0.6;
+    if (random.uniform() < share) step.step_m += sleeper;
+    if (faulty(Sensor::camera, FaultKind::stuck, t)) step.step_m = 0;
+    const bool dark = within(blind, t) != nullptr || faulty(Sensor::camera, FaultKind::blind, t);
+    if (dark) step = {step.stamp_ns, step.reference_stamp_ns, 0, 0, false};
+    if (lost) continue;
+    add(Sensor::camera, t, step);
+    if (dark || std::abs(seen_m - reference_m) > kKeyFrameM) {
+      reference_s = t;
+      reference_m = seen_m;
+    }
+  }
+}
+
+void TrainSimulation::make_pulses() {
+  auto random = stream(seed_, 11);
+  const auto slips = plan_.slip ? spells(random, 60, 2, 8, 0.3) : std::vector<Spell>{};
+  const double scale = 1 + plan_.wheel_scale_error * random.normal();
+  double wheel_m = random.uniform();
+  for (int i = 0; i * kPulseS <= duration_s(); ++i) {
+    const double t = i * kPulseS;
+    const double way_m = i == 0 ? 0 : drive_.at(t).distance_m - drive_.at(t - kPulseS).distance_m;
+    const auto* slip = within(slips, t);
+    const bool stuck = faulty(Sensor::wheel, FaultKind::stuck, t);
+    if (!stuck) wheel_m += way_m / scale * (slip ? 1 + slip->size : 1) * (1 + offset_of(Sensor::wheel, t));
+    const bool jump = random.uniform() < 0.05;
+    const double jump_m = random.uniform(-5, 5);
+    if (jump && faulty(Sensor::wheel, FaultKind::outliers, t)) wheel_m += jump_m;
+    const double jitter = random.normal();
+    const double noise_m = faulty(Sensor::wheel, FaultKind::noise, t) ? plan_.fault.size * 0.01 * jitter : 0;
+    add(Sensor::wheel, t,
+        WheelInput{stamp_ns(t), static_cast<int64_t>(std::floor((wheel_m + noise_m) * kPulsesPerMetre)),
+                   kPulsesPerMetre});
+  }
+}
+
+// Both are in one sensor: they come late or not at all together.
+void TrainSimulation::make_inertial() {
+  auto random = stream(seed_, 12);
+  const double bias = 0.08 * random.normal();
+  const double gyro_bias = 0.002 * random.normal();
+  const auto& fault = plan_.fault;
+  std::optional<double> stuck_accel;
+  std::optional<double> stuck_rate;
+  for (int i = 1; i * kInertialS <= duration_s(); ++i) {
+    const double t = i * kInertialS;
+    const auto now = drive_.at(t);
+    const double accel = (drive_.at(t + 0.01).speed_mps - drive_.at(t - 0.01).speed_mps) / 0.02;
+    const auto point = path_->at(now.distance_m);
+    const double accel_times = faulty(Sensor::accelerometer, FaultKind::noise, t) ? fault.size : 1;
+    const double rate_times = faulty(Sensor::gyro, FaultKind::noise, t) ? fault.size : 1;
+    ImuInput sample{stamp_ns(t), accel + core::kGravityMps2 * point.grade + bias + accel_times * 0.2 * random.normal(),
+                    now.speed_mps * point.curvature_per_m + gyro_bias + rate_times * 0.01 * random.normal()};
+    sample.accel_x_mps2 += offset_of(Sensor::accelerometer, t);
+    sample.rate_z_rps += offset_of(Sensor::gyro, t);
+    const bool wild = random.uniform() < 0.1;
+    if (wild && faulty(Sensor::accelerometer, FaultKind::outliers, t)) sample.accel_x_mps2 += 20;
+    if (wild && faulty(Sensor::gyro, FaultKind::outliers, t)) sample.rate_z_rps += 2;
+    if (faulty(Sensor::accelerometer, FaultKind::stuck, t)) {
+      sample.accel_x_mps2 = *(stuck_accel = stuck_accel.value_or(sample.accel_x_mps2));
+    }
+    if (faulty(Sensor::gyro, FaultKind::stuck, t)) {
+      sample.rate_z_rps = *(stuck_rate = stuck_rate.value_or(sample.rate_z_rps));
+    }
+    add(fault.sensor == Sensor::gyro ? Sensor::gyro : Sensor::accelerometer, t, sample);
+  }
+}
+
+void TrainSimulation::make_gnss() {
+  auto random = stream(seed_, 13);
+  const auto outages = spells(random, 60, 10, 40, 0);
+  const auto& fault = plan_.fault;
+  const double towards = random.uniform(0, 6.28);
+  double east = 2 * random.normal();
+  double north = 2 * random.normal();
+  std::optional<GnssInput> stuck;
+  for (int i = 0; i <= duration_s(); ++i) {
+    east = 0.98 * east + 0.4 * random.normal();
+    north = 0.98 * north + 0.4 * random.normal();
+    const auto pose = path_->at(drive_.at(i).distance_m).pose;
+    const double noisy_east = random.normal();
+    const double noisy_north = random.normal();
+    const double times = faulty(Sensor::gnss, FaultKind::noise, i) ? 3 * fault.size : 0;
+    const double share = faulty(Sensor::gnss, FaultKind::outliers, i) ? 0.3 : 0.02;
+    const double wild = random.uniform() < share ? 80 : 0;
+    const double wrong_m = offset_of(Sensor::gnss, i);
+    GnssInput sample{stamp_ns(i), pose.easting_m + east + wild + times * noisy_east + wrong_m * std::cos(towards),
+                     pose.northing_m + north + times * noisy_north + wrong_m * std::sin(towards), 1.0,
+                     within(outages, i) != nullptr ? 0 : 1};
+    if (faulty(Sensor::gnss, FaultKind::stuck, i)) {
+      if (!stuck) stuck = sample;
+      sample.easting_m = stuck->easting_m;
+      sample.northing_m = stuck->northing_m;
+    }
+    add(Sensor::gnss, i, sample);
+  }
+}
+
+void TrainSimulation::make_fixes() {
+  auto random = stream(seed_, 14);
+  const auto& fault = plan_.fault;
+  uint32_t id = 0;
+  bool wrong_once = false;
+  std::optional<track::EdgePosition> stuck;
+  double place_m = plan_.landmark_spacing_m;
+  while (place_m < way_m()) {
+    const double t = drive_.time_at(place_m) + 0.003;
+    const double sign = random.uniform() < 0.5 ? -1 : 1;
+    const double false_m = sign * random.uniform(3, 60);
+    const double noise_m = plan_.fix_sigma_m * random.normal();
+    const double share = faulty(Sensor::fix, FaultKind::outliers, t) ? 0.3 : plan_.false_fix_share;
+    double wrong_m = random.uniform() < share ? false_m : 0;
+    wrong_m += (faulty(Sensor::fix, FaultKind::noise, t) ? fault.size : 1) * noise_m + offset_of(Sensor::fix, t);
+    if (fault.is(Sensor::fix, FaultKind::wrong_landmark) && t > fault.begin_s && !wrong_once) {
+      wrong_m += fault.size;
+      wrong_once = true;
+    }
+    auto place = path_->position_at(drive_.at(t).distance_m + wrong_m);
+    if (faulty(Sensor::fix, FaultKind::wrong_branch, t)) place.edge = place.edge == 1 ? 2 : 1;
+    if (faulty(Sensor::fix, FaultKind::stuck, t)) place = *(stuck = stuck.value_or(place));
+    add(Sensor::fix, t,
+        FixInput{stamp_ns(t), place.edge, place.offset_m, plan_.fix_sigma_m, plan_.fix_probability, ++id,
+                 FixKind::landmark, place.direction, nullptr});
+    place_m += plan_.landmark_spacing_m * (1 + plan_.landmark_spread * random.uniform(-1, 1));
+  }
+}
+
+}  // namespace railfix::train

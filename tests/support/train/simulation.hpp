@@ -1,0 +1,110 @@
+// A train on a line with imperfect sensors, at the level of measurements (no pictures), fast enough for thousands of
+// kilometres. Everything follows from the seed; each sensor has random numbers of its own, so that a fault in one
+// leaves the others as they were.
+//
+// Odometry comes at 20 Hz where the camera has 60: steps count from picture to picture at speed, so three errors of
+// 1.7 mm become one of 3 mm; a key frame is kept below 3 m/s as in the train mouse. Nothing else in fusion knows rates.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "core/random.hpp"
+#include "core/time.hpp"
+#include "fusion/fusion.hpp"
+#include "support/train/drive.hpp"
+#include "support/train/faults.hpp"
+#include "support/train/line.hpp"
+#include "track/path.hpp"
+
+namespace railfix::train {
+
+/// Which sensors there are and how wrong they may be; sizes are those of one standard deviation unless they say
+/// otherwise.
+struct SimulationPlan {
+  double duration_s = 120;
+  double max_speed_mps = 42;
+  bool camera = true;
+  bool wheel = true;
+  bool imu = true;
+  bool gnss = true;
+  double landmark_spacing_m = 400;  // 0 = none
+  double landmark_spread = 0;       // spacing varies by this share to either side
+  double visual_scale_error = 0.007;
+  double visual_wander = 0.001;  // of the camera's scale, lasting about 3 km
+  double wheel_scale_error = 0.007;
+  double step_noise_m = 0.002;
+  double outlier_share = 0.003;   // of odometry steps: one sleeper more or less
+  double false_fix_share = 0.02;  // of fixes: somewhere else, with full confidence
+  double fix_sigma_m = 0.15;
+  double fix_probability = 0.99;
+  bool blind_spells = true;  // 5 to 15 s without camera, now and then
+  bool slip = true;          // wheel turns up to 30 % too fast or slow for some seconds
+  double start_sigma_m = 0.3;
+  Fault fault;
+};
+
+/// A measurement with the time at which it comes to fusion.
+struct Arrival {
+  double arrival_s = 0;
+  fusion::Event event;
+};
+
+class TrainSimulation {
+ public:
+  static constexpr double kStartOffsetM = 200;
+
+  /// On a random line.
+  TrainSimulation(const SimulationPlan& plan, uint64_t seed);
+  /// From a place on a given map, until the track ends.
+  TrainSimulation(const SimulationPlan& plan, uint64_t seed, std::shared_ptr<const track::Map> map,
+                  const track::EdgePosition& start);
+
+  static int64_t stamp(const fusion::Event& event) {
+    return std::visit([](const auto& input) { return input.stamp_ns; }, event);
+  }
+  /// What fusion is told of the start.
+  [[nodiscard]] track::EdgePosition start() const;
+  /// Truth at a stamp; arrival_s: when fusion said it (a clock that was set back gives every stamp twice).
+  [[nodiscard]] Motion truth_at(int64_t stamp_ns, double arrival_s = 1e9) const;
+  /// Place minus truth, along the way; nothing when the place lies on another track.
+  [[nodiscard]] std::optional<double> error_m(const track::EdgePosition& place, const Motion& truth) const;
+  [[nodiscard]] int64_t stamp_ns(double t_s) const;
+  [[nodiscard]] double duration_s() const { return drive_.duration_s(); }
+  [[nodiscard]] double way_m() const { return drive_.way_m(); }
+  [[nodiscard]] const Drive& drive() const { return drive_; }
+  [[nodiscard]] const track::Path& path() const { return *path_; }
+  [[nodiscard]] const SimulationPlan& plan() const { return plan_; }
+
+  std::shared_ptr<const track::Map> map;
+  std::vector<Arrival> arrivals;  // in the order in which they come
+  double start_error_m = 0;
+
+ private:
+  static constexpr int64_t kBeginNs = 1'700'000'000'000'000'000;
+  struct Spell {
+    double begin_s;
+    double end_s;
+    double size;
+  };
+  void measure();
+  void make_steps();
+  void make_pulses();
+  void make_inertial();
+  void make_gnss();
+  void make_fixes();
+  void add(Sensor sensor, double t_s, fusion::Event event);
+  [[nodiscard]] bool faulty(Sensor sensor, FaultKind kind, double t_s) const;
+  [[nodiscard]] double offset_of(Sensor sensor, double t_s) const;
+  std::vector<Spell> spells(core::Random& random, double every_s, double shortest_s, double longest_s,
+                            double size) const;
+  static const Spell* within(const std::vector<Spell>& all, double t_s);
+
+  SimulationPlan plan_;
+  uint64_t seed_;
+  track::EdgePosition start_;
+  std::shared_ptr<const track::Path> path_;
+  Drive drive_;
+};
+
+}  // namespace railfix::train

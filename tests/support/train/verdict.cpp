@@ -1,0 +1,104 @@
+#include "support/train/verdict.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace railfix::train {
+namespace {
+
+constexpr double kTickS = 0.1;
+
+// Words by which the state's reason names a sensor.
+const char* name_in_reason(Sensor sensor) {
+  switch (sensor) {
+    case Sensor::camera:
+      return "camera";
+    case Sensor::wheel:
+      return "wheel";
+    case Sensor::accelerometer:
+    case Sensor::gyro:
+      return "IMU";
+    case Sensor::gnss:
+      return "GNSS";
+    case Sensor::fix:
+      return "fix";
+    case Sensor::clock:
+      return "clock";
+    default:
+      return "";
+  }
+}
+
+class Judge {
+ public:
+  Judge(const TrainSimulation& simulation, double after_m, const Watcher& watcher)
+      : simulation_(simulation), after_m_(after_m), watcher_(watcher) {
+    verdict_.way_m = simulation.way_m();
+  }
+
+  void see(const fusion::TrainEstimate& state, double arrival_s) {
+    const auto truth = simulation_.truth_at(state.stamp_ns, arrival_s);
+    const double error_m = state.track_known ? simulation_.error_m(state.position, truth).value_or(1e6)
+                                             : state.distance_m - truth.distance_m;
+    const double excess_m = std::max(error_m - state.over_m, -error_m - state.under_m);
+    ++verdict_.states;
+    if (!(excess_m <= 0)) ++verdict_.outside;
+    verdict_.worst_excess_m = std::max(verdict_.worst_excess_m, excess_m);
+    const bool ok = state.integrity == fusion::Integrity::ok;
+    const bool wider = std::max(state.over_m, state.under_m) > 5 + 0.05 * state.since_sure_m;
+    verdict_.wider += wider ? 1 : 0;
+    verdict_.wider_unsaid += wider && ok ? 1 : 0;
+    verdict_.not_ok += ok ? 0 : 1;
+    verdict_.width_sum_m += state.over_m + state.under_m;
+    const auto& fault = simulation_.plan().fault;
+    const bool named = state.reason.find(name_in_reason(fault.sensor)) != std::string::npos;
+    if (fault.sensor != Sensor::none && fault.active(arrival_s) && named) ++verdict_.told;
+    if (truth.distance_m >= after_m_) verdict_.errors_m.push_back(static_cast<float>(std::abs(error_m)));
+    if (watcher_) watcher_(state, error_m);
+  }
+
+  Verdict take() { return std::move(verdict_); }
+
+ private:
+  const TrainSimulation& simulation_;
+  double after_m_;
+  const Watcher& watcher_;
+  Verdict verdict_;
+};
+
+}  // namespace
+
+void Verdict::add(const Verdict& other) {
+  way_m += other.way_m;
+  states += other.states;
+  outside += other.outside;
+  worst_excess_m = std::max(worst_excess_m, other.worst_excess_m);
+  wider += other.wider;
+  wider_unsaid += other.wider_unsaid;
+  not_ok += other.not_ok;
+  told += other.told;
+  width_sum_m += other.width_sum_m;
+  errors_m.insert(errors_m.end(), other.errors_m.begin(), other.errors_m.end());
+}
+
+Verdict judge(const TrainSimulation& simulation, fusion::Fusion& fusion, double after_m, const Watcher& watcher) {
+  Judge judge(simulation, after_m, watcher);
+  double tick_s = 0;
+  for (const auto& arrival : simulation.arrivals) {
+    if (arrival.arrival_s > simulation.duration_s()) break;
+    for (; tick_s < arrival.arrival_s; tick_s += kTickS) {
+      if (const auto state = fusion.tick(simulation.stamp_ns(tick_s))) judge.see(*state, tick_s);
+    }
+    if (const auto state = fusion.add(arrival.event)) judge.see(*state, arrival.arrival_s);
+  }
+  return judge.take();
+}
+
+double quantile(std::vector<float>& values, double share) {
+  if (values.empty()) return 0;
+  const auto place = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + place, values.end());
+  return values[static_cast<size_t>(place)];
+}
+
+}  // namespace railfix::train
