@@ -9,6 +9,7 @@ namespace {
 constexpr float kClip = 3.0F;      // one bright stone must not rule the sum
 constexpr float kUnit = 64.0F;     // of the 16-bit numbers: 3 sigma squared times 10,000 cells fit into 32 bits
 constexpr int kContrastRows = 15;  // local contrast over 0.6 m
+constexpr int kLocalCols = 3;      // to either side: a sleeper's shape changes across the track over longer ways
 constexpr int kFewestRows = 30;    // 1.2 m of common ground
 constexpr int kLane = 8;
 
@@ -66,6 +67,18 @@ void CoarseViewMaker::halve(const vision::TopView& view, CoarseView& out) {
   }
 }
 
+// Sleepers that sag in their middle are not the same across the track; over a few columns they are.
+void CoarseViewMaker::remove_local_mean(float* line, int cols) {
+  sums_.resize(static_cast<size_t>(cols) + 1);
+  sums_[0] = 0;
+  for (int c = 0; c < cols; ++c) sums_[static_cast<size_t>(c) + 1] = sums_[static_cast<size_t>(c)] + line[c];
+  for (int c = 0; c < cols; ++c) {
+    const int low = std::max(0, c - kLocalCols);
+    const int high = std::min(cols, c + kLocalCols + 1);
+    line[c] -= (sums_[static_cast<size_t>(high)] - sums_[static_cast<size_t>(low)]) / static_cast<float>(high - low);
+  }
+}
+
 void CoarseViewMaker::remove_means(const CoarseView& shape) {
   const int cols = shape.cols;
   column_.assign(static_cast<size_t>(cols), 0.0F);
@@ -73,13 +86,8 @@ void CoarseViewMaker::remove_means(const CoarseView& shape) {
   for (int r = 0; r < shape.rows; ++r) {
     if (shape.row_seen[static_cast<size_t>(r)] == 0) continue;
     float* line = &half_[static_cast<size_t>(r * cols)];
-    float mean = 0;
-    for (int c = 0; c < cols; ++c) mean += line[c];
-    mean /= static_cast<float>(cols);
-    for (int c = 0; c < cols; ++c) {
-      line[c] -= mean;
-      column_[static_cast<size_t>(c)] += line[c];
-    }
+    remove_local_mean(line, cols);
+    for (int c = 0; c < cols; ++c) column_[static_cast<size_t>(c)] += line[c];
     ++rows;
   }
   if (rows == 0) return;

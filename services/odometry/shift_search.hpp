@@ -1,7 +1,8 @@
 // Coarse search: by how many rows has the ground moved in the top view? (paper 002, eq. 1, with gain and bias removed)
 //
-// Every row and column loses its mean first. What is the same across the track (sleepers, cross shadows) or along it
-// (rail shadows, wheel marks) is gone then, so sleepers cannot vote for a shift by their own distance.
+// Every row loses its mean over a few columns first, every column its mean. What changes slowly across the track
+// (sleepers, cross shadows) or not at all along it (rail shadows, wheel marks) is gone then, so sleepers cannot vote
+// for a shift by their own distance.
 #pragma once
 
 #include <cstdint>
@@ -32,10 +33,12 @@ class CoarseViewMaker {
 
  private:
   void halve(const vision::TopView& view, CoarseView& out);
+  void remove_local_mean(float* line, int cols);
   void remove_means(const CoarseView& shape);
   void normalise(CoarseView& out);
   std::vector<float> half_;
   std::vector<float> column_;
+  std::vector<float> sums_;     // of a row, prefix sums
   std::vector<double> energy_;  // of the rows before, prefix sums
   std::vector<int> seen_;       // rows before, prefix sums
 };

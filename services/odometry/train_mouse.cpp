@@ -25,7 +25,9 @@ constexpr double kBouncePerM = 0.02;      // ... the springs on the way, ...
 constexpr double kSettlingMps = 1e-4;     // ... people getting in
 constexpr double kVerticalChangePerM2 = 1e-5;
 constexpr double kVerticalChangeM = 0.2;
-constexpr double kFadedScore = 0.6;  // at rest: the light has changed since the reference
+constexpr double kReliefSigmaM = 0.008;    // mean of the ground in sight against the sheet; tuned on simulated relief
+constexpr double kUnseenPitchShare = 0.4;  // of the mount's pitch sigma that the ground does not take out; tuned alike
+constexpr double kFadedScore = 0.6;        // at rest: the light has changed since the reference
 constexpr int64_t kShortestRestNs = 2 * core::kNsPerSecond;
 
 }  // namespace
@@ -49,6 +51,7 @@ bool TrainMouse::look(const MousePicture& picture) {
   now_.pose = {picture.pose, options_.texture_depth_m, curvature_per_m_, vertical_curvature_per_m_};
   now_.prior = {};
   now_.prior.trust = picture.trust;
+  now_.pose_measured = picture.pose_measured;
   if (!picture.pose_measured) {
     now_.prior.trust = PoseTrust::independent(options_.mount_pitch_sigma_rad, options_.mount_height_sigma_m);
   }
@@ -87,6 +90,7 @@ void TrainMouse::make_reference() {
   now_.stamp_ns = reference_->seen.stamp_ns;
   now_.pose = reference_->seen.pose;
   now_.prior = reference_->seen.prior;
+  now_.pose_measured = reference_->seen.pose_measured;
   reference_->errors = {};
   reference_->measured_m = reference_->distance_m = 0;
 }
@@ -184,12 +188,24 @@ void TrainMouse::accept(MouseStep& step) {
   renew_reference(step, dt_s);
 }
 
+// Errors that all patches and many steps have in common, which the least squares takes for independent: the mean relief
+// of the ground in sight and, where rails are not seen, the slow pitching of the body about the mount's pose.
+double TrainMouse::scale_sigma() const {
+  const double height_m = now_.pose.height_m();
+  double ahead_m = 0;
+  for (const PatchMotion& patch : votes_) ahead_m += patch.place_m.x() / static_cast<double>(votes_.size());
+  const double relief = kReliefSigmaM / height_m;
+  if (now_.pose_measured && reference_->seen.pose_measured) return relief;
+  return std::hypot(relief, 2.0 * ahead_m / height_m * kUnseenPitchShare * options_.mount_pitch_sigma_rad);
+}
+
 void TrainMouse::fill(MouseStep& step, double distance_m) const {
   // With what this picture says of the reference's own distance, so that steps add up to the distance.
   step.step_m = distance_m - reference_->distance_m;
   step.lateral_m = motion_.lateral_m + 0.5 * now_.pose.curvature_per_m * motion_.along_m * motion_.along_m;
   step.yaw_rad = motion_.turn_rad + now_.pose.curvature_per_m * motion_.along_m;
-  step.step_sigma_m = motion_.along_sigma_m;
+  // What standstill holds back is an error of the step that is known to be there.
+  step.step_sigma_m = std::hypot(motion_.along_sigma_m, scale_sigma() * motion_.along_m, step.step_m - motion_.along_m);
   step.yaw_sigma_rad = motion_.turn_sigma_rad;
   const double since_reference_s = core::seconds(now_.stamp_ns - reference_->seen.stamp_ns);
   step.lateral_speed_mps = step.lateral_m / since_reference_s;

@@ -92,6 +92,7 @@ class TrainMouse {
     vision::TopView view;
     CoarseView coarse;
     PosePrior prior;
+    bool pose_measured = false;
   };
   struct Reference {
     explicit Reference(const TextureReference::Options& options) : texture(options) {}
@@ -115,6 +116,7 @@ class TrainMouse {
   bool align(const Rough& rough, MouseStep& step);
   [[nodiscard]] PoseTie tie(double along_m) const;
   void accept(MouseStep& step);
+  [[nodiscard]] double scale_sigma() const;
   void fill(MouseStep& step, double distance_m) const;
   void renew_reference(const MouseStep& step, double dt_s);
   double bridge(double speed_after_mps);
