@@ -33,6 +33,7 @@ void BranchSearch::place_rows(const TopView& view, const cv::Mat& ridges, const 
   const geometry::View now(camera, shape.camera);
   const geometry::View mounted(camera, view.pose());
   rows_.clear();
+  rows_.reserve(static_cast<size_t>(view.rows()));
   for (int r = 0; r < view.rows(); ++r) {
     Row row;
     row.ahead_m = view.ahead_m(r);

@@ -40,6 +40,7 @@ double bearing_of(double along_m, double lateral_m, double curvature_per_m, doub
 EdgeTracker::EdgeTracker() {
   tracks_.reserve(kMostTracks);
   settled_.reserve(kMostTracks);
+  used_.reserve(kMostTracks);
 }
 
 void EdgeTracker::forget() {

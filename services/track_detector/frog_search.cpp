@@ -39,6 +39,7 @@ FrogSearch::FrogSearch(const geometry::Intrinsics& camera, const LandmarkOptions
   ridges_.create(rows_, kColumns, CV_32F);
   sums_.resize(kColumns + 1);
   points_.reserve(static_cast<size_t>(rows_));
+  found_.reserve(1);
 }
 
 const std::vector<GroundCandidate>& FrogSearch::find(const LandmarkPicture& picture) {

@@ -12,7 +12,15 @@ constexpr int kMostMissed = 3;
 constexpr int kFewestUsed = 2;
 constexpr double kSpotPerM = 0.0015;  // spots are less sharp farther away
 
+constexpr size_t kUsuallyFollowed = 64;
+
 }  // namespace
+
+GroundTracker::GroundTracker(const GroundTracking& tracking, double way_sigma)
+    : tracking_(tracking), way_sigma_(way_sigma) {
+  things_.reserve(kUsuallyFollowed);
+  settled_.reserve(kUsuallyFollowed);
+}
 
 const std::vector<SettledThing>& GroundTracker::follow(const std::vector<GroundCandidate>& found, double way_m) {
   settled_.clear();

@@ -30,7 +30,7 @@ struct SettledThing {
 
 class GroundTracker {
  public:
-  GroundTracker(const GroundTracking& tracking, double way_sigma) : tracking_(tracking), way_sigma_(way_sigma) {}
+  GroundTracker(const GroundTracking& tracking, double way_sigma);
 
   /// What was found in the picture at way_m. Gives what is settled now; valid until the next call.
   const std::vector<SettledThing>& follow(const std::vector<GroundCandidate>& found, double way_m);

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "track_detector/plate_search.hpp"
-
 namespace railfix::track_detector {
 namespace {
 
@@ -47,7 +45,9 @@ LandmarkFinder::LandmarkFinder(const geometry::Intrinsics& camera, const Landmar
       frog_search_(camera, options),
       frogs_(frog_tracking(options), options.way_sigma),
       platform_search_(camera),
-      upright_search_(camera) {}
+      upright_search_(camera) {
+  sightings_.reserve(32);
+}
 
 const std::vector<Sighting>& LandmarkFinder::process(const LandmarkPicture& picture) {
   sightings_.clear();
@@ -67,6 +67,7 @@ bool LandmarkFinder::move(const LandmarkPicture& picture) {
         vision::fit_sheet(camera_, pose, kNearM, options_.far_m, options_.half_width_m, kCellM, kShakeMarginRad);
     if (sheet.rows < 100) return false;  // this pose shows no ground; the next may
     maker_ = std::make_unique<vision::TopViewMaker>(camera_, sheet);
+    plate_search_ = std::make_unique<PlateSearch>(sheet, options_);
   }
   maker_->make(picture.grey, pose, view_);
   const auto step_m = motion_.step(view_, maker_->sheet(), picture.stamp_ns);
@@ -90,7 +91,7 @@ double LandmarkFinder::pitch_error_m(const LandmarkPicture& picture, double ahea
 }
 
 void LandmarkFinder::find_in_track(const LandmarkPicture& picture) {
-  for (const SettledThing& plate : plates_.follow(find_plates(view_, maker_->sheet(), options_), way_m_)) {
+  for (const SettledThing& plate : plates_.follow(plate_search_->find(view_), way_m_)) {
     const double height_m = picture.pose.height_m + options_.balise_depth_m;
     const double depth_m = options_.balise_depth_sigma_m * options_.reference_m / height_m;
     const double pitch_m = pitch_error_m(picture, options_.reference_m, options_.balise_depth_m);

@@ -12,6 +12,7 @@
 #include "track_detector/ground_motion.hpp"
 #include "track_detector/ground_tracker.hpp"
 #include "track_detector/landmark_types.hpp"
+#include "track_detector/plate_search.hpp"
 #include "track_detector/platform_tracker.hpp"
 #include "track_detector/upright_objects.hpp"
 #include "track_detector/upright_search.hpp"
@@ -42,6 +43,7 @@ class LandmarkFinder {
   double way_m_ = 0;  // run since the beginning, good to a percent
   double frog_look_m_ = -1e9;
   double platform_look_m_ = -1e9;
+  std::unique_ptr<PlateSearch> plate_search_;
   GroundTracker plates_;
   FrogSearch frog_search_;
   GroundTracker frogs_;

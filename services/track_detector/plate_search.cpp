@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
-#include <optional>
 
 namespace railfix::track_detector {
 namespace {
@@ -22,29 +20,6 @@ constexpr double kCornerM = 0.07;
 constexpr double kFullCorners = 0.85;
 constexpr double kDarkGrey = 12;  // below it shares of brightness mean nothing
 
-struct Box {
-  int row, col, rows, cols;
-};
-
-class Sums {
- public:
-  explicit Sums(const cv::Mat& grey) { cv::integral(grey, sum_, squared_, CV_64F, CV_64F); }
-  [[nodiscard]] double mean(const Box& box) const { return of(sum_, box) / (box.rows * box.cols); }
-  [[nodiscard]] double spread(const Box& box) const {
-    const double m = mean(box);
-    return std::sqrt(std::max(0.0, of(squared_, box) / (box.rows * box.cols) - m * m));
-  }
-
- private:
-  static double of(const cv::Mat& sums, const Box& box) {
-    const auto* top = sums.ptr<double>(box.row);
-    const auto* bottom = sums.ptr<double>(box.row + box.rows);
-    return bottom[box.col + box.cols] - bottom[box.col] - top[box.col + box.cols] + top[box.col];
-  }
-  cv::Mat sum_;
-  cv::Mat squared_;
-};
-
 // The plate's box and its surroundings around a centre, in cells.
 struct Layout {
   int half_rows, half_cols, inset, gap, strip;
@@ -57,9 +32,9 @@ struct Layout {
 };
 
 // Signed contrast of the weakest side, share of brightness; nothing when the sides disagree or the inside is uneven.
-std::optional<double> plate_contrast(const Sums& sums, const Layout& l, int row, int col, double lowest) {
-  const Box inside{row - l.half_rows + l.inset, col - l.half_cols + l.inset, 2 * (l.half_rows - l.inset) + 1,
-                   2 * (l.half_cols - l.inset) + 1};
+std::optional<double> plate_contrast(const AreaSums& sums, const Layout& l, int row, int col, double lowest) {
+  const CellBox inside{row - l.half_rows + l.inset, col - l.half_cols + l.inset, 2 * (l.half_rows - l.inset) + 1,
+                       2 * (l.half_cols - l.inset) + 1};
   const double grey = sums.mean(inside);
   const int rows = inside.rows;
   const int cols = inside.cols;
@@ -131,7 +106,7 @@ std::optional<Extent> measure_extent(const std::vector<double>& profile, int cen
 
 // How much the emptiest corner has of the contrast of the middle against both sides: a plate fills its corners, a stain
 // does not.
-double corner_fill(const Sums& sums, const Layout& l, const vision::Sheet& sheet, const Extent& length,
+double corner_fill(const AreaSums& sums, const Layout& l, const vision::Sheet& sheet, const Extent& length,
                    const Extent& width) {
   const double cell_m = sheet.cell_m;
   const int row = static_cast<int>(std::lround(length.middle));
@@ -155,74 +130,112 @@ double corner_fill(const Sums& sums, const Layout& l, const vision::Sheet& sheet
   return emptiest;
 }
 
-std::optional<GroundCandidate> refine(const cv::Mat& grey, const Sums& sums, const vision::Sheet& sheet,
-                                      const Layout& l, const LandmarkOptions& options, const cv::Point& centre,
-                                      double contrast) {
-  const double sign = contrast > 0 ? 1.0 : -1.0;
-  const int reach = static_cast<int>(std::lround(0.10 / sheet.cell_m));
-  std::vector<double> along(static_cast<size_t>(grey.rows), 0.0);
-  std::vector<double> across(static_cast<size_t>(grey.cols), 0.0);
-  const int in_cols = l.half_cols - l.inset;
-  const int in_rows = l.half_rows - l.inset;
-  for (int r = std::max(0, centre.y - 3 * l.half_rows); r < std::min(grey.rows, centre.y + 3 * l.half_rows); ++r) {
-    const auto* line = grey.ptr<float>(r);
-    for (int c = centre.x - in_cols; c <= centre.x + in_cols; ++c) along[static_cast<size_t>(r)] += line[c];
-    along[static_cast<size_t>(r)] /= 2.0 * in_cols + 1.0;
-  }
-  for (int r = centre.y - in_rows; r <= centre.y + in_rows; ++r) {
-    const auto* line = grey.ptr<float>(r);
-    for (int c = 0; c < grey.cols; ++c) across[static_cast<size_t>(c)] += line[c] / (2.0 * in_rows + 1.0);
-  }
-  const auto length = measure_extent(along, centre.y, l.half_rows, reach, sign, sheet.cell_m);
-  const auto width = measure_extent(across, centre.x, l.half_cols, reach, sign, sheet.cell_m);
-  if (!length || !width) return std::nullopt;
-  if (std::abs(length->length * sheet.cell_m - options.balise_length_m) > kSizeToleranceM) return std::nullopt;
-  if (std::abs(width->length * sheet.cell_m - options.balise_width_m) > kSizeToleranceM) return std::nullopt;
-  if (std::abs(sheet.offset_m(width->middle)) > kOffCentreM) return std::nullopt;
-  if (width->sharpness < kSharpEdge || corner_fill(sums, l, sheet, *length, *width) < kFullCorners) return std::nullopt;
-  return GroundCandidate{sheet.ahead_m(length->middle), sheet.offset_m(width->middle), std::abs(contrast)};
-}
-
 }  // namespace
 
-std::vector<GroundCandidate> find_plates(const vision::TopView& view, const vision::Sheet& sheet,
-                                         const LandmarkOptions& options) {
-  const Layout l(options, sheet.cell_m);
-  const Sums sums(view.grey);
+void AreaSums::set(const cv::Mat& grey) {
+  step_ = static_cast<size_t>(grey.cols) + 1;
+  const size_t size = step_ * (static_cast<size_t>(grey.rows) + 1);
+  sums_.resize(size);
+  squared_.resize(size);
+  std::fill(sums_.begin(), sums_.begin() + static_cast<ptrdiff_t>(step_), 0.0);
+  std::fill(squared_.begin(), squared_.begin() + static_cast<ptrdiff_t>(step_), 0.0);
+  for (int r = 0; r < grey.rows; ++r) {
+    const auto* line = grey.ptr<float>(r);
+    double* sum = sums_.data() + static_cast<size_t>(r + 1) * step_;
+    double* squared = squared_.data() + static_cast<size_t>(r + 1) * step_;
+    double row_sum = 0;
+    double row_squared = 0;
+    sum[0] = squared[0] = 0;
+    for (size_t c = 1; c < step_; ++c) {
+      const auto value = static_cast<double>(line[c - 1]);
+      row_sum += value;
+      row_squared += value * value;
+      sum[c] = *(sum + c - step_) + row_sum;
+      squared[c] = *(squared + c - step_) + row_squared;
+    }
+  }
+}
+
+double AreaSums::of(const std::vector<double>& sums, const CellBox& box) const {
+  const double* top = sums.data() + static_cast<size_t>(box.row) * step_ + box.col;
+  const double* bottom = top + static_cast<size_t>(box.rows) * step_;
+  return bottom[box.cols] - bottom[0] - top[box.cols] + top[0];
+}
+
+double AreaSums::spread(const CellBox& box) const {
+  const double m = mean(box);
+  return std::sqrt(std::max(0.0, of(squared_, box) / (box.rows * box.cols) - m * m));
+}
+
+PlateSearch::PlateSearch(const vision::Sheet& sheet, const LandmarkOptions& options)
+    : sheet_(sheet),
+      options_(options),
+      along_(static_cast<size_t>(sheet.rows)),
+      across_(static_cast<size_t>(sheet.cols)) {
+  hits_.reserve(static_cast<size_t>(sheet.rows * (2 * static_cast<int>(kOffCentreM / sheet.cell_m) + 1)));
+  found_.reserve(64);
+}
+
+std::optional<GroundCandidate> PlateSearch::refine(const cv::Mat& grey, const Hit& hit) {
+  const Layout l(options_, sheet_.cell_m);
+  const double sign = hit.contrast > 0 ? 1.0 : -1.0;
+  const int reach = static_cast<int>(std::lround(0.10 / sheet_.cell_m));
+  std::fill(along_.begin(), along_.end(), 0.0);
+  std::fill(across_.begin(), across_.end(), 0.0);
+  const int in_cols = l.half_cols - l.inset;
+  const int in_rows = l.half_rows - l.inset;
+  for (int r = std::max(0, hit.row - 3 * l.half_rows); r < std::min(grey.rows, hit.row + 3 * l.half_rows); ++r) {
+    const auto* line = grey.ptr<float>(r);
+    for (int c = hit.col - in_cols; c <= hit.col + in_cols; ++c) along_[static_cast<size_t>(r)] += line[c];
+    along_[static_cast<size_t>(r)] /= 2.0 * in_cols + 1.0;
+  }
+  for (int r = hit.row - in_rows; r <= hit.row + in_rows; ++r) {
+    const auto* line = grey.ptr<float>(r);
+    for (int c = 0; c < grey.cols; ++c) across_[static_cast<size_t>(c)] += line[c] / (2.0 * in_rows + 1.0);
+  }
+  const auto length = measure_extent(along_, hit.row, l.half_rows, reach, sign, sheet_.cell_m);
+  const auto width = measure_extent(across_, hit.col, l.half_cols, reach, sign, sheet_.cell_m);
+  if (!length || !width) return std::nullopt;
+  if (std::abs(length->length * sheet_.cell_m - options_.balise_length_m) > kSizeToleranceM) return std::nullopt;
+  if (std::abs(width->length * sheet_.cell_m - options_.balise_width_m) > kSizeToleranceM) return std::nullopt;
+  if (std::abs(sheet_.offset_m(width->middle)) > kOffCentreM) return std::nullopt;
+  if (width->sharpness < kSharpEdge || corner_fill(sums_, l, sheet_, *length, *width) < kFullCorners)
+    return std::nullopt;
+  return GroundCandidate{sheet_.ahead_m(length->middle), sheet_.offset_m(width->middle), std::abs(hit.contrast)};
+}
+
+const std::vector<GroundCandidate>& PlateSearch::find(const vision::TopView& view) {
+  found_.clear();
+  hits_.clear();
+  const Layout l(options_, sheet_.cell_m);
+  sums_.set(view.grey);
   const int row_margin = l.half_rows + l.gap + l.strip + 1;
   const int col_margin = l.half_cols + l.gap + l.strip + 1;
-  const int off = static_cast<int>(kOffCentreM / sheet.cell_m);
-  const int middle = (sheet.cols - 1) / 2;
-  struct Hit {
-    cv::Point centre;
-    double contrast;
-  };
-  std::vector<Hit> hits;
-  for (int row = row_margin; row < sheet.rows - row_margin; ++row) {
+  const int off = static_cast<int>(kOffCentreM / sheet_.cell_m);
+  const int middle = (sheet_.cols - 1) / 2;
+  for (int row = row_margin; row < sheet_.rows - row_margin; ++row) {
     if (view.row_seen[static_cast<size_t>(row - row_margin)] == 0 ||
         view.row_seen[static_cast<size_t>(row + row_margin)] == 0) {
       continue;
     }
-    for (int col = std::max(col_margin, middle - off); col <= std::min(sheet.cols - 1 - col_margin, middle + off);
+    for (int col = std::max(col_margin, middle - off); col <= std::min(sheet_.cols - 1 - col_margin, middle + off);
          ++col) {
-      if (const auto contrast = plate_contrast(sums, l, row, col, options.lowest_contrast)) {
-        hits.push_back({{col, row}, *contrast});
+      if (const auto contrast = plate_contrast(sums_, l, row, col, options_.lowest_contrast)) {
+        hits_.push_back({row, col, *contrast});
       }
     }
   }
-  std::sort(hits.begin(), hits.end(),
+  std::sort(hits_.begin(), hits_.end(),
             [](const Hit& a, const Hit& b) { return std::abs(a.contrast) > std::abs(b.contrast); });
-  std::vector<GroundCandidate> plates;
-  for (const Hit& hit : hits) {
-    const double ahead_m = sheet.ahead_m(hit.centre.y);
-    const bool known = std::any_of(plates.begin(), plates.end(), [&](const GroundCandidate& plate) {
-      return std::abs(plate.ahead_m - ahead_m) < 2.0 * options.balise_length_m;
+  for (const Hit& hit : hits_) {
+    const double ahead_m = sheet_.ahead_m(hit.row);
+    const bool known = std::any_of(found_.begin(), found_.end(), [&](const GroundCandidate& plate) {
+      return std::abs(plate.ahead_m - ahead_m) < 2.0 * options_.balise_length_m;
     });
     if (known) continue;
-    if (const auto plate = refine(view.grey, sums, sheet, l, options, hit.centre, hit.contrast))
-      plates.push_back(*plate);
+    if (const auto plate = refine(view.grey, hit)) found_.push_back(*plate);
   }
-  return plates;
+  return found_;
 }
 
 }  // namespace railfix::track_detector

@@ -27,7 +27,14 @@ double spot_sigma(double ahead_m) {
   return kSpotSigmaM + kSpotPerM * ahead_m * ahead_m;
 }
 
+constexpr size_t kUsuallyFollowed = 64;
+
 }  // namespace
+
+PlatformTracker::PlatformTracker() {
+  marks_.reserve(kUsuallyFollowed);
+  settled_.reserve(kUsuallyFollowed);
+}
 
 const std::vector<SettledPlatform>& PlatformTracker::follow(const std::vector<PlatformMark>& found, double way_m) {
   settled_.clear();

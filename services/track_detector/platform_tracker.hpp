@@ -20,6 +20,7 @@ struct SettledPlatform {
 /// times its real distance beside: so its height is known, and what lies on the ground or stands higher is no platform.
 class PlatformTracker {
  public:
+  PlatformTracker();
   /// Marks of the picture at way_m. Gives what is settled now; valid until the next call.
   const std::vector<SettledPlatform>& follow(const std::vector<PlatformMark>& found, double way_m);
   void forget() { marks_.clear(); }

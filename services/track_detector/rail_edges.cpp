@@ -7,10 +7,11 @@
 namespace railfix::track_detector {
 namespace {
 
-constexpr double kStepPx = 0.5;  // between samples of a profile
+constexpr double kStepPx = 0.5;        // between samples of a profile
 constexpr double kEdgeSigmaPx = 0.35;  // of a clear edge
 constexpr double kEdgeSigmaM = 0.003;  // wear and rounding of the head, dirt
-constexpr double kSideM = 0.05;        // ground beside the head that it is compared with
+constexpr size_t kUsualSamples = 1024;
+constexpr double kSideM = 0.05;  // ground beside the head that it is compared with
 
 /// Bilinear; the caller keeps it inside.
 double sample(const cv::Mat& grey, double u, double v) {
@@ -27,41 +28,6 @@ bool inside(const cv::Mat& grey, const Eigen::Vector2d& pixel) {
   return pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < grey.cols - 1.01 && pixel.y() < grey.rows - 1.01;
 }
 
-/// Grey levels across one rail; index 0 is innermost. Buffers are kept for speed.
-class Profile {
- public:
-  /// `outward_px`: picture vector of one step outward; averaged over a few places along the rail.
-  bool take(const cv::Mat& grey, const Eigen::Vector2d& first, const Eigen::Vector2d& outward,
-            const Eigen::Vector2d& along, int count) {
-    values_.assign(static_cast<size_t>(count), 0.0);
-    const Eigen::Vector2d last = first + outward * (count - 1);
-    for (int k = -2; k <= 2; ++k) {
-      const Eigen::Vector2d shift = along * k;
-      if (!inside(grey, first + shift) || !inside(grey, last + shift)) return false;
-      Eigen::Vector2d p = first + shift;
-      for (auto& value : values_) {
-        value += 0.2 * sample(grey, p.x(), p.y());
-        p += outward;
-      }
-    }
-    sums_.resize(values_.size() + 1);
-    sums_[0] = 0;
-    for (size_t i = 0; i < values_.size(); ++i) sums_[i + 1] = sums_[i] + values_[i];
-    return true;
-  }
-
-  [[nodiscard]] double mean(int first, int last) const {
-    first = std::clamp(first, 0, size() - 1);
-    last = std::clamp(last, first + 1, size());
-    return (sums_[static_cast<size_t>(last)] - sums_[static_cast<size_t>(first)]) / (last - first);
-  }
-  [[nodiscard]] int size() const { return static_cast<int>(values_.size()); }
-
- private:
-  std::vector<double> values_;
-  std::vector<double> sums_;
-};
-
 /// Where across one rail the inner edge is, in samples, with its contrast.
 struct Crossing {
   double at = 0;
@@ -69,7 +35,7 @@ struct Crossing {
 };
 
 /// The band that stands out most on both sides, then the steepest step at its inner side.
-std::optional<Crossing> find_crossing(const Profile& profile, double head, double side, double sign,
+std::optional<Crossing> find_crossing(const EdgeProfile& profile, double head, double side, double sign,
                                       double min_contrast) {
   const int head_n = std::max(2, static_cast<int>(std::lround(head)));
   const int crown_n = std::max(2, static_cast<int>(std::lround(0.6 * head)));
@@ -109,12 +75,42 @@ std::optional<Crossing> find_crossing(const Profile& profile, double head, doubl
 
 }  // namespace
 
-std::vector<RailEdge> find_edges(const cv::Mat& grey, const geometry::Intrinsics& camera, const TrackShape& shape,
-                                 const EdgeOptions& options, int tried[2]) {
+EdgeProfile::EdgeProfile() {
+  values_.reserve(kUsualSamples);
+  sums_.reserve(kUsualSamples + 1);
+}
+
+bool EdgeProfile::take(const cv::Mat& grey, const Eigen::Vector2d& first, const Eigen::Vector2d& outward_px,
+                       const Eigen::Vector2d& along, int count) {
+  values_.assign(static_cast<size_t>(count), 0.0);
+  const Eigen::Vector2d last = first + outward_px * (count - 1);
+  for (int k = -2; k <= 2; ++k) {
+    const Eigen::Vector2d shift = along * k;
+    if (!inside(grey, first + shift) || !inside(grey, last + shift)) return false;
+    Eigen::Vector2d p = first + shift;
+    for (auto& value : values_) {
+      value += 0.2 * sample(grey, p.x(), p.y());
+      p += outward_px;
+    }
+  }
+  sums_.resize(values_.size() + 1);
+  sums_[0] = 0;
+  for (size_t i = 0; i < values_.size(); ++i) sums_[i + 1] = sums_[i] + values_[i];
+  return true;
+}
+
+double EdgeProfile::mean(int first, int last) const {
+  first = std::clamp(first, 0, size() - 1);
+  last = std::clamp(last, first + 1, size());
+  return (sums_[static_cast<size_t>(last)] - sums_[static_cast<size_t>(first)]) / (last - first);
+}
+
+const std::vector<RailEdge>& EdgeFinder::find(const cv::Mat& grey, const geometry::Intrinsics& camera,
+                                              const TrackShape& shape, const EdgeOptions& options, int tried[2]) {
   const geometry::View view(camera, shape.camera);
   const double ratio = std::pow(options.far_m / options.near_m, 1.0 / std::max(1, options.stations - 1));
-  std::vector<RailEdge> edges;
-  Profile profile;
+  edges_.clear();
+  edges_.reserve(2 * static_cast<size_t>(std::max(1, options.stations)));
   for (const auto side : {Side::left, Side::right}) {
     int& count = tried[side == Side::left ? 0 : 1];
     count = 0;
@@ -133,10 +129,10 @@ std::vector<RailEdge> find_edges(const cv::Mat& grey, const geometry::Intrinsics
       const double side_px = std::max(kSideM * px_per_m, 1.5);
       const int before = static_cast<int>(std::ceil((reach_px + side_px) / kStepPx)) + 1;
       const int behind = static_cast<int>(std::ceil((reach_px + head_px + side_px) / kStepPx)) + 1;
-      if (!profile.take(grey, *inner - outward * before, outward, along, before + behind + 1)) continue;
+      if (!profile_.take(grey, *inner - outward * before, outward, along, before + behind + 1)) continue;
       ++count;
-      const auto crossing =
-          find_crossing(profile, head_px / kStepPx, side_px / kStepPx, options.dark ? -1.0 : 1.0, options.min_contrast);
+      const auto crossing = find_crossing(profile_, head_px / kStepPx, side_px / kStepPx, options.dark ? -1.0 : 1.0,
+                                          options.min_contrast);
       if (!crossing) continue;
       RailEdge edge;
       edge.point.pixel = *inner + outward * (crossing->at - before);
@@ -145,10 +141,10 @@ std::vector<RailEdge> find_edges(const cv::Mat& grey, const geometry::Intrinsics
       edge.ahead_m = ahead_m;
       edge.offset_m = (crossing->at - before) * kStepPx / px_per_m;
       edge.contrast = crossing->contrast;
-      edges.push_back(edge);
+      edges_.push_back(edge);
     }
   }
-  return edges;
+  return edges_;
 }
 
 }  // namespace railfix::track_detector

@@ -27,9 +27,32 @@ struct RailEdge {
   double contrast = 0;  // grey levels
 };
 
-/// Points near to far, left rail first. Stations outside the picture or without a clear edge give none.
-/// `tried`: how many stations of each side were inside the picture.
-std::vector<RailEdge> find_edges(const cv::Mat& grey, const geometry::Intrinsics& camera, const TrackShape& shape,
-                                 const EdgeOptions& options, int tried[2]);
+/// Grey levels across one rail; index 0 is innermost.
+class EdgeProfile {
+ public:
+  EdgeProfile();
+  /// `outward_px`: picture vector of one step outward; averaged over a few places along the rail.
+  bool take(const cv::Mat& grey, const Eigen::Vector2d& first, const Eigen::Vector2d& outward_px,
+            const Eigen::Vector2d& along, int count);
+  [[nodiscard]] double mean(int first, int last) const;
+  [[nodiscard]] int size() const { return static_cast<int>(values_.size()); }
+
+ private:
+  std::vector<double> values_;
+  std::vector<double> sums_;
+};
+
+/// Keeps its buffers between pictures.
+class EdgeFinder {
+ public:
+  /// Points near to far, left rail first; valid until the next call. Stations outside the picture or without a clear
+  /// edge give none. `tried`: how many stations of each side were inside the picture.
+  const std::vector<RailEdge>& find(const cv::Mat& grey, const geometry::Intrinsics& camera, const TrackShape& shape,
+                                    const EdgeOptions& options, int tried[2]);
+
+ private:
+  EdgeProfile profile_;
+  std::vector<RailEdge> edges_;
+};
 
 }  // namespace railfix::track_detector

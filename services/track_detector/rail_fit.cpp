@@ -20,15 +20,6 @@ constexpr double kFarthestM = 1000.0;
 constexpr double kNearestM = 0.3;
 constexpr double kFixedByRails = 6;  // unknowns that two curved rails fix; the priors hold the rest
 
-/// A measured point without distortion, in pixels from the principal point.
-struct FitPoint {
-  Eigen::Vector2d pixel;
-  double half_gauge_m = 0;  // signed
-  double sigma_px = 1;
-  double inverse_m = 0;  // where it is known
-  bool ahead_known = false;
-};
-
 /// The rails seen by the camera, with derivatives. Uses 1/X along the rail: in it a straight rail's picture is linear.
 class RailPicture {
  public:
@@ -113,17 +104,29 @@ bool slide_to_nearest(RailPicture& rails, const FitPoint& point, double& w, Eige
   return rails.at(point.half_gauge_m, w, pixel, along);
 }
 
+/// Where a Builder keeps what it works on.
+struct FitBuffers {
+  std::vector<FitPoint>& points;
+  std::vector<double>& residuals_px;
+  std::vector<double>& weights;
+  std::vector<double>& ratios;
+};
+
 /// Adds all points; keeps their residuals (px) and weights.
 class Builder {
  public:
-  Builder(const geometry::Intrinsics& camera, std::vector<FitPoint> points, const RailFitOptions& options)
-      : residuals_px(points.size()),
-        weights(points.size()),
-        camera_(camera),
-        points_(std::move(points)),
+  Builder(const geometry::Intrinsics& camera, const FitBuffers& buffers, const RailFitOptions& options)
+      : camera_(camera),
+        points_(buffers.points),
+        residuals_px_(buffers.residuals_px),
+        weights_(buffers.weights),
+        ratios_(buffers.ratios),
         options_(options),
         prior_(to_vector(options.prior)),
-        prior_sigma_(to_vector(options.prior_sigma)) {}
+        prior_sigma_(to_vector(options.prior_sigma)) {
+    residuals_px_.assign(points_.size(), 0.0);
+    weights_.assign(points_.size(), 0.0);
+  }
 
   bool operator()(const ShapeVector& shape, Equations& equations, bool with_priors = true) {
     RailPicture rails(camera_, shape);
@@ -148,18 +151,16 @@ class Builder {
   /// become smaller: larger ones would let wild points in. Returns the factor that the scatter asks for.
   double scale_sigmas(double least) {
     if (points_.size() <= kShapeSize) return 1;
-    std::vector<double> ratios(points_.size());
-    for (size_t i = 0; i < points_.size(); ++i) ratios[i] = std::abs(residuals_px[i]) / points_[i].sigma_px;
-    const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
-    std::nth_element(ratios.begin(), middle, ratios.end());
+    ratios_.resize(points_.size());
+    for (size_t i = 0; i < points_.size(); ++i) ratios_[i] = std::abs(residuals_px_[i]) / points_[i].sigma_px;
+    const auto middle = ratios_.begin() + static_cast<std::ptrdiff_t>(ratios_.size() / 2);
+    std::nth_element(ratios_.begin(), middle, ratios_.end());
     const auto count = static_cast<double>(points_.size());
     const double factor = std::max(least, 1.4826 * *middle * std::sqrt(count / (count - kFixedByRails)));
     for (auto& point : points_) point.sigma_px *= std::min(1.0, factor);
     return factor;
   }
 
-  std::vector<double> residuals_px;
-  std::vector<double> weights;
   /// Sums of J'W times the derivative by a sideways offset of the left and of the right rail.
   Eigen::Matrix<double, kShapeSize, 2> by_offset = Eigen::Matrix<double, kShapeSize, 2>::Zero();
 
@@ -177,10 +178,10 @@ class Builder {
     const Jacobian j = rails.by_shape(w);
     const Eigen::Vector2d normal = Eigen::Vector2d(-along.y(), along.x()).normalized();
     const Eigen::Vector2d difference = pixel - point.pixel;
-    residuals_px[i] = normal.dot(difference);
+    residuals_px_[i] = normal.dot(difference);
     const Row across = normal.transpose() * j / point.sigma_px;
-    weights[i] = equations.add(across, residuals_px[i] / point.sigma_px, options_.cauchy_scale);
-    by_offset.col(point.half_gauge_m > 0 ? 0 : 1) -= weights[i] * across(3) * across.transpose();
+    weights_[i] = equations.add(across, residuals_px_[i] / point.sigma_px, options_.cauchy_scale);
+    by_offset.col(point.half_gauge_m > 0 ? 0 : 1) -= weights_[i] * across(3) * across.transpose();
     if (point.ahead_known) {
       const Eigen::Vector2d tangent = along.normalized();
       const Row lengthwise = tangent.transpose() * j / point.sigma_px;
@@ -189,29 +190,15 @@ class Builder {
     return true;
   }
 
-  geometry::Intrinsics camera_;
-  std::vector<FitPoint> points_;
-  RailFitOptions options_;
+  const geometry::Intrinsics& camera_;
+  std::vector<FitPoint>& points_;
+  std::vector<double>& residuals_px_;
+  std::vector<double>& weights_;
+  std::vector<double>& ratios_;
+  const RailFitOptions& options_;
   ShapeVector prior_;
   ShapeVector prior_sigma_;
 };
-
-std::vector<FitPoint> prepare(const geometry::Intrinsics& camera, const std::vector<EdgePoint>& points,
-                              double gauge_m) {
-  std::vector<FitPoint> prepared;
-  prepared.reserve(points.size());
-  for (const auto& point : points) {
-    FitPoint p;
-    const Eigen::Vector2d n = geometry::undistort(camera, point.pixel);
-    p.pixel = {camera.fu_px * n.x(), camera.fv_px * n.y()};
-    p.half_gauge_m = point.side == Side::left ? gauge_m / 2 : -gauge_m / 2;
-    p.sigma_px = point.sigma_px;
-    p.ahead_known = std::isfinite(point.ahead_m);
-    if (p.ahead_known) p.inverse_m = 1.0 / point.ahead_m;
-    prepared.push_back(p);
-  }
-  return prepared;
-}
 
 double condition_of(const Eigen::Matrix<double, 7, 7>& information) {
   const Eigen::Matrix<double, 7, 1> scale = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
@@ -222,17 +209,16 @@ double condition_of(const Eigen::Matrix<double, 7, 7>& information) {
   return values(6) / values(0);
 }
 
-void summarise(const Builder& builder, RailFit& fit) {
+void summarise(const std::vector<double>& weights, RailFit& fit) {
   double squares = 0;
   size_t used = 0;
-  for (size_t i = 0; i < builder.weights.size(); ++i) {
-    if (builder.weights[i] <= 0.5) continue;
-    squares += builder.residuals_px[i] * builder.residuals_px[i];
+  for (size_t i = 0; i < weights.size(); ++i) {
+    if (weights[i] <= 0.5) continue;
+    squares += fit.residuals_px[i] * fit.residuals_px[i];
     ++used;
   }
-  fit.residuals_px = builder.residuals_px;
   fit.residual_px = used > 0 ? std::sqrt(squares / static_cast<double>(used)) : 0.0;
-  fit.inliers = builder.weights.empty() ? 0.0 : static_cast<double>(used) / static_cast<double>(builder.weights.size());
+  fit.inliers = weights.empty() ? 0.0 : static_cast<double>(used) / static_cast<double>(weights.size());
 }
 
 }  // namespace
@@ -264,33 +250,49 @@ Eigen::Vector3d rail_point(const TrackShape& shape, Side side, double gauge_m, d
           0.5 * shape.vertical_curvature_per_m * x2};
 }
 
-RailFit fit_rails(const geometry::Intrinsics& camera, const std::vector<EdgePoint>& points, const TrackShape& start,
-                  const RailFitOptions& options) {
-  Builder builder(camera, prepare(camera, points, options.gauge_m), options);
+void RailFitter::prepare(const geometry::Intrinsics& camera, const std::vector<EdgePoint>& points, double gauge_m) {
+  points_.clear();
+  points_.reserve(points.size());
+  for (const auto& point : points) {
+    FitPoint p;
+    const Eigen::Vector2d n = geometry::undistort(camera, point.pixel);
+    p.pixel = {camera.fu_px * n.x(), camera.fv_px * n.y()};
+    p.half_gauge_m = point.side == Side::left ? gauge_m / 2 : -gauge_m / 2;
+    p.sigma_px = point.sigma_px;
+    p.ahead_known = std::isfinite(point.ahead_m);
+    if (p.ahead_known) p.inverse_m = 1.0 / point.ahead_m;
+    points_.push_back(p);
+  }
+}
+
+const RailFit& RailFitter::fit(const geometry::Intrinsics& camera, const std::vector<EdgePoint>& points,
+                               const TrackShape& start, const RailFitOptions& options) {
+  prepare(camera, points, options.gauge_m);
+  Builder builder(camera, {points_, fit_.residuals_px, weights_, ratios_}, options);
   estimation::LeastSquaresOptions limits;
   limits.max_iterations = options.max_iterations;
   limits.step_tolerance = options.step_tolerance;
   auto solution = estimation::least_squares<kShapeSize>(builder, to_vector(start), limits);
-  RailFit fit;
+  fit_.sigma_factor = 1;
   if (options.least_sigma_factor > 0) {
-    fit.sigma_factor = builder.scale_sigmas(options.least_sigma_factor);
+    fit_.sigma_factor = builder.scale_sigmas(options.least_sigma_factor);
     solution = estimation::least_squares<kShapeSize>(builder, solution.x, limits);
   }
-  fit.shape = to_shape(solution.x);
-  fit.converged = solution.converged;
-  fit.last_step = solution.last_step;
+  fit_.shape = to_shape(solution.x);
+  fit_.converged = solution.converged;
+  fit_.last_step = solution.last_step;
   Equations data;
   builder(solution.x, data, false);
-  const double spread = std::max(1.0, fit.sigma_factor * fit.sigma_factor);
+  const double spread = std::max(1.0, fit_.sigma_factor * fit_.sigma_factor);
   const Matrix8 information = solution.equations.information - (1.0 - 1.0 / spread) * data.information;
   Matrix8 covariance = information.inverse();
   const Eigen::Matrix<double, kShapeSize, 2> moved =
       covariance * builder.by_offset * (options.rail_offset_sigma_m / spread);
   covariance += moved * moved.transpose();
-  fit.covariance = covariance.topLeftCorner<7, 7>();
-  fit.condition = condition_of(data.information.topLeftCorner<7, 7>());
-  summarise(builder, fit);
-  return fit;
+  fit_.covariance = covariance.topLeftCorner<7, 7>();
+  fit_.condition = condition_of(data.information.topLeftCorner<7, 7>());
+  summarise(weights_, fit_);
+  return fit_;
 }
 
 }  // namespace railfix::track_detector

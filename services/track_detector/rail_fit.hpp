@@ -78,8 +78,35 @@ struct RailFit {
   double last_step = 0;  // in sigmas of the solution; robust weights may let it creep on below any tolerance
 };
 
-/// Fits from `start`. Points on one rail alone are allowed: the priors carry the rest and the covariance says so.
-RailFit fit_rails(const geometry::Intrinsics& camera, const std::vector<EdgePoint>& points, const TrackShape& start,
-                  const RailFitOptions& options);
+/// A measured point without distortion, in pixels from the principal point.
+struct FitPoint {
+  Eigen::Vector2d pixel;
+  double half_gauge_m = 0;  // signed
+  double sigma_px = 1;
+  double inverse_m = 0;  // where it is known
+  bool ahead_known = false;
+};
+
+/// Keeps its buffers between fits.
+class RailFitter {
+ public:
+  /// Fits from `start`. Points on one rail alone are allowed: the priors carry the rest and the covariance says so.
+  /// Valid until the next call.
+  const RailFit& fit(const geometry::Intrinsics& camera, const std::vector<EdgePoint>& points, const TrackShape& start,
+                     const RailFitOptions& options);
+
+ private:
+  void prepare(const geometry::Intrinsics& camera, const std::vector<EdgePoint>& points, double gauge_m);
+
+  std::vector<FitPoint> points_;
+  std::vector<double> weights_, ratios_;
+  RailFit fit_;
+};
+
+/// A single fit.
+inline RailFit fit_rails(const geometry::Intrinsics& camera, const std::vector<EdgePoint>& points,
+                         const TrackShape& start, const RailFitOptions& options) {
+  return RailFitter().fit(camera, points, start, options);
+}
 
 }  // namespace railfix::track_detector

@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 
 namespace railfix::track_detector {
 namespace {
 
 // The coarse search looks at every second row and column of the ridges, which are spread first.
 constexpr int kCoarse = 2;
+constexpr int kSpread = 2;
 constexpr double kSpreadColumns = 3.0;
 constexpr double kHandicap = 0.03;     // of the score at each limit
 constexpr double kWorthKeeping = 0.5;  // of the best score
@@ -56,6 +56,7 @@ RailSearch::RailSearch(const TopView& view, const SearchLimits& limits, double g
   const double flattest = depression(view, view.rows() - 1, -limits.pitch_rad);
   const double farthest = (limits.curvature_per_m * height_m / (2 * flattest) + limits.yaw_rad) / flattest;
   farthest_shift_ = std::min(view.columns() / kCoarse, static_cast<int>(std::ceil(farthest / left_grid_.step)) + 1);
+  found_.reserve(pitches_.size() * yaws_.size() * curvatures_.size());
 }
 
 RailSearch::SlopeGrid RailSearch::slope_grid(double half_gauge_m) const {
@@ -250,23 +251,37 @@ bool RailSearch::alike(const RailHypothesis& a, const RailHypothesis& b) const {
   return std::abs(left) < 0.12 && std::abs(right) < 0.12;
 }
 
+/// Every cell the largest of its row within kSpread columns.
+void RailSearch::spread(const cv::Mat& ridges) {
+  spread_.create(ridges.rows, ridges.cols, CV_32F);
+  for (int r = 0; r < ridges.rows; r += kCoarse) {
+    const auto* from = ridges.ptr<float>(r);
+    auto* to = spread_.ptr<float>(r);
+    for (int c = 0; c < ridges.cols; ++c) {
+      const int first = std::max(0, c - kSpread);
+      const int end = std::min(ridges.cols, c + kSpread + 1);
+      to[c] = *std::max_element(from + first, from + end);
+    }
+  }
+}
+
 const std::vector<RailCandidate>& RailSearch::find(const cv::Mat& ridges, size_t max_candidates) {
   // Coarse steps are allowed because every ridge is spread by as much as a step moves a line.
-  cv::dilate(ridges, spread_, cv::Mat::ones(1, 5, CV_8U));
+  spread(ridges);
   coarse();
   candidates_.clear();
-  std::vector<RailHypothesis> kept;
+  kept_.clear();
   const double worth = kWorthKeeping * best_;
-  while (kept.size() < max_candidates) {
+  while (kept_.size() < max_candidates) {
     const RailHypothesis* next = nullptr;
     for (const auto& h : found_) {
       if (h.score < worth || (next != nullptr && h.score <= next->score)) continue;
-      if (std::none_of(kept.begin(), kept.end(), [&](const auto& other) { return alike(h, other); })) next = &h;
+      if (std::none_of(kept_.begin(), kept_.end(), [&](const auto& other) { return alike(h, other); })) next = &h;
     }
     if (next == nullptr) break;
-    kept.push_back(*next);
+    kept_.push_back(*next);
   }
-  for (const auto& h : kept) candidates_.push_back(to_candidate(refined(h, ridges)));
+  for (const auto& h : kept_) candidates_.push_back(to_candidate(refined(h, ridges)));
   std::sort(candidates_.begin(), candidates_.end(), [](const auto& a, const auto& b) { return a.score > b.score; });
   return candidates_;
 }

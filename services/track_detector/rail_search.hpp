@@ -66,6 +66,7 @@ class RailSearch {
   [[nodiscard]] SlopeGrid slope_grid(double half_gauge_m) const;
   void resample(const SlopeGrid& grid, double pitch_rad, ShiftableRows& rows) const;
   void sum(const SlopeGrid& grid, ShiftableRows& rows) const;
+  void spread(const cv::Mat& ridges);
   void coarse();
   void try_coarse(const RailHypothesis& h);
   [[nodiscard]] RailHypothesis refined(RailHypothesis h, const cv::Mat& ridges) const;
@@ -95,6 +96,7 @@ class RailSearch {
   std::vector<double> shift_per_curvature_;
   std::vector<int> shifts_;  // of every coarse row, from -farthest_shift_
   std::vector<RailHypothesis> found_;
+  std::vector<RailHypothesis> kept_;
   double best_ = 0;
   std::vector<RailCandidate> candidates_;
 };

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 
 namespace railfix::track_detector {
 namespace {
@@ -11,6 +10,7 @@ constexpr int kSubRows = 4;      // averaged along the track: ballast is rough, 
 constexpr double kHeadM = 0.06;  // a little less than the head, for heads that are bright on their crown only
 constexpr double kGapM = 0.02;
 constexpr double kSideM = 0.06;
+constexpr int kOne = 256;  // a pixel, in units of the samples' weights
 constexpr float kNoiseGrey = 4.0F;
 constexpr double kClearestShare = 0.96;
 
@@ -60,29 +60,42 @@ TopView::TopView(const geometry::Intrinsics& camera, const geometry::CameraPose&
   const double near_m = nearest_visible_m(camera, pose, 0.5, size.far_m * 0.7);
   const double ratio = std::pow(size.far_m / near_m, 1.0 / (size.rows - 1));
   const geometry::View view(camera, pose);
-  cv::Mat map(size.rows * kSubRows, columns_, CV_32FC2);
-  for (int r = 0; r < map.rows; ++r) {
-    const double ahead_m = near_m * std::pow(ratio, (r - 0.5 * (kSubRows - 1)) / kSubRows);
-    if (r % kSubRows == 0) ahead_m_.push_back(near_m * std::pow(ratio, r / kSubRows));
+  for (int r = 0; r < size.rows; ++r) {
+    ahead_m_.push_back(near_m * std::pow(ratio, r));
     for (int c = 0; c < columns_; ++c) {
-      const auto pixel = view.project({ahead_m, first_y_m_ + c * size.column_m, 0.0});
-      // Outside the picture: far away, remap answers with the border value.
-      map.at<cv::Vec2f>(r, c) =
-          pixel ? cv::Vec2f(static_cast<float>(pixel->x()), static_cast<float>(pixel->y())) : cv::Vec2f(-1e4F, -1e4F);
+      for (int k = 0; k < kSubRows; ++k) {
+        const double ahead_m = near_m * std::pow(ratio, r + (k - 0.5 * (kSubRows - 1)) / kSubRows);
+        const auto pixel = view.project({ahead_m, first_y_m_ + c * size.column_m, 0.0});
+        // Outside the picture its border counts.
+        const auto place = [](double px, int size_px) {
+          return static_cast<int>(kOne * std::clamp(px, 0.0, size_px - 1.01) + 0.5);
+        };
+        const int u = pixel ? place(pixel->x(), camera.width_px) : 0;
+        const int v = pixel ? place(pixel->y(), camera.height_px) : 0;
+        samples_.push_back({static_cast<int16_t>(u / kOne), static_cast<int16_t>(v / kOne),
+                            static_cast<uint16_t>(u % kOne), static_cast<uint16_t>(v % kOne)});
+      }
     }
   }
-  cv::convertMaps(map, cv::noArray(), map_, map_fraction_, CV_16SC2);
 }
 
 void TopView::look(const cv::Mat& grey) {
-  cv::remap(grey, samples_, map_, map_fraction_, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
   means_.create(size_.rows, columns_, CV_32F);
+  const auto* sample = samples_.data();
+  const auto row_step = static_cast<ptrdiff_t>(grey.step);
   for (int r = 0; r < size_.rows; ++r) {
     auto* mean = means_.ptr<float>(r);
-    std::fill(mean, mean + columns_, 0.0F);
-    for (int s = 0; s < kSubRows; ++s) {
-      const auto* sample = samples_.ptr<uint8_t>(r * kSubRows + s);
-      for (int c = 0; c < columns_; ++c) mean[c] += static_cast<float>(sample[c]) * (1.0F / kSubRows);
+    for (int c = 0; c < columns_; ++c) {
+      int sum = 0;
+      for (int k = 0; k < kSubRows; ++k, ++sample) {
+        const uint8_t* upper = grey.data + sample->v * row_step + sample->u;
+        const uint8_t* lower = upper + row_step;
+        const int right = sample->right;
+        const int below = sample->below;
+        sum += (upper[0] * (kOne - right) + upper[1] * right) * (kOne - below) +
+               (lower[0] * (kOne - right) + lower[1] * right) * below;
+      }
+      mean[c] = static_cast<float>(sum) * (1.0F / (kOne * kOne * kSubRows));
     }
   }
 }

@@ -2,6 +2,7 @@
 // ridge score, row by row from near to far.
 #pragma once
 
+#include <cstdint>
 #include <opencv2/core.hpp>
 #include <vector>
 
@@ -42,11 +43,14 @@ class TopView {
   int columns_ = 0;
   double first_y_m_ = 0;
   std::vector<double> ahead_m_;
-  cv::Mat map_;           // kSubRows rows of the picture for every row of the view, as whole pixels ...
-  cv::Mat map_fraction_;  // ... and what is left of them
-  cv::Mat samples_;
-  cv::Mat means_;   // CV_32F, rows x columns
-  cv::Mat scores_;  // CV_32F, rows x columns
+  /// A pixel of the picture and the weights of its right and lower neighbours, in 256ths.
+  struct Sample {
+    int16_t u, v;
+    uint16_t right, below;
+  };
+  std::vector<Sample> samples_;  // kSubRows in turn for every cell of the view
+  cv::Mat means_;                // CV_32F, rows x columns
+  cv::Mat scores_;               // CV_32F, rows x columns
   std::vector<float> sums_;
   std::vector<float> sorted_;
 };

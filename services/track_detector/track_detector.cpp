@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace railfix::track_detector {
 namespace {
 
+constexpr size_t kMostPoints = 80;  // two rails at the last pass's stations
+constexpr size_t kLongestReason = 80;
 constexpr double kSigmas = 3.0;       // limits of the search, in sigmas of the suspension
 constexpr double kSearchFarM = 28.0;  // farther, pitch errors move the rails too much for a coarse search
 constexpr double kMinSearchScore = 0.12;
@@ -56,66 +59,72 @@ TrackDetector::TrackDetector(const geometry::Intrinsics& camera, const geometry:
                         search_limits_.curvature_per_m * size.far_m * size.far_m / 2);
   top_view_ = std::make_unique<TopView>(camera, mount, size);
   search_ = std::make_unique<RailSearch>(*top_view_, search_limits_, options.gauge_m, options.head_m);
+  points_.reserve(kMostPoints);
+  for (TrackObservation* one : {&observation_, &found_, &trial_}) {
+    one->points.reserve(kMostPoints);
+    one->reason.reserve(kLongestReason);
+  }
 }
 
-TrackObservation TrackDetector::detect(const cv::Mat& grey, const std::optional<RollHint>& roll) {
+void TrackObservation::clear() {
+  TrackObservation fresh;
+  points.clear();
+  reason.clear();
+  fresh.points.swap(points);
+  fresh.reason.swap(reason);
+  *this = std::move(fresh);
+}
+
+const TrackObservation& TrackDetector::detect(const cv::Mat& grey, const std::optional<RollHint>& roll) {
   roll_ = roll;
   top_view_->look(grey);
-  if (previous_) {
-    auto observation = refine(grey, *previous_, dark_, kTrackReachM);
-    if (observation.seen()) {
-      choose_leg(grey, dark_, observation);
-      previous_ = observation.shape;
-      return observation;
-    }
-  }
   // One search a picture when following has already cost its time; the other kind of rails waits for the next.
   const bool lost = previous_.has_value();
+  if (lost && follow(grey)) return observation_;
   previous_.reset();
   // While nothing is seen for long, bright and dark rails take turns: that keeps up with the camera.
   const bool both = misses_ < kPatience;
-  TrackObservation observation;
-  forget(observation);
+  observation_.clear();
+  forget(observation_);
   for (const bool dark : {false, true}) {
     if (lost && dark != dark_) continue;
     if (!both && dark != (misses_ % 2 == 1)) continue;
-    auto found = search(grey, dark);
-    if (found.confidence >= observation.confidence) observation = std::move(found);
-    if (observation.seen()) {
-      choose_leg(grey, dark, observation);
-      previous_ = observation.shape;
+    search(grey, dark, found_);
+    if (found_.confidence >= observation_.confidence) std::swap(observation_, found_);
+    if (observation_.seen()) {
+      choose_leg(grey, dark, observation_);
+      previous_ = observation_.shape;
       dark_ = dark;
       misses_ = 0;
-      return observation;
+      return observation_;
     }
   }
   ++misses_;
-  return observation;
+  return observation_;
 }
 
-TrackObservation TrackDetector::search(const cv::Mat& grey, bool dark) {
-  TrackObservation best;
+bool TrackDetector::follow(const cv::Mat& grey) {
+  refine(grey, *previous_, dark_, kTrackReachM, observation_);
+  if (!observation_.seen()) return false;
+  choose_leg(grey, dark_, observation_);
+  previous_ = observation_.shape;
+  return true;
+}
+
+void TrackDetector::search(const cv::Mat& grey, bool dark, TrackObservation& best) {
+  best.clear();
   best.reason = "no pair of rails at the gauge";
   forget(best);
   for (const auto& candidate : search_->find(top_view_->ridges(dark), kCandidates)) {
     if (candidate.score < kMinSearchScore) continue;
-    auto observation = refine(grey, candidate.shape, dark, kSearchReachM);
-    const bool better =
-        observation.seen() != best.seen() ? observation.seen() : observation.confidence > best.confidence;
-    if (better) best = std::move(observation);
+    refine(grey, candidate.shape, dark, kSearchReachM, trial_);
+    const bool better = trial_.seen() != best.seen() ? trial_.seen() : trial_.confidence > best.confidence;
+    if (better) std::swap(best, trial_);
     if (best.seen() && best.confidence > kSure) break;
   }
-  return best;
 }
 
-RailFit TrackDetector::fit(const std::vector<RailEdge>& edges, const TrackShape& start, bool last) const {
-  std::vector<EdgePoint> points;
-  points.reserve(edges.size());
-  for (const auto& edge : edges) points.push_back(edge.point);
-  return fit(points, start, last);
-}
-
-RailFit TrackDetector::fit(const std::vector<EdgePoint>& points, const TrackShape& start, bool last) const {
+const RailFit& TrackDetector::fit(const std::vector<EdgePoint>& points, const TrackShape& start, bool last) {
   RailFitOptions fit_options;
   fit_options.gauge_m = options_.gauge_m;
   fit_options.prior = mount_;
@@ -128,11 +137,13 @@ RailFit TrackDetector::fit(const std::vector<EdgePoint>& points, const TrackShap
   fit_options.rail_offset_sigma_m = options_.rail_offset_sigma_m;
   fit_options.step_tolerance = kFitTolerance;
   fit_options.max_iterations = kFitIterations;
-  return fit_rails(camera_, points, start, fit_options);
+  return fitter_.fit(camera_, points, start, fit_options);
 }
 
-TrackObservation TrackDetector::refine(const cv::Mat& grey, const TrackShape& start, bool dark,
-                                       double first_reach_m) const {
+void TrackDetector::refine(const cv::Mat& grey, const TrackShape& start, bool dark, double first_reach_m,
+                           TrackObservation& observation) {
+  TrackShape shape = start;  // may be the observation's own
+  observation.clear();
   EdgeOptions edge_options;
   edge_options.gauge_m = options_.gauge_m;
   edge_options.head_m = options_.head_m;
@@ -142,34 +153,33 @@ TrackObservation TrackDetector::refine(const cv::Mat& grey, const TrackShape& st
   // A camera of few pixels must make do with narrower heads, or it would see no length of rail at all.
   edge_options.smallest_head_px =
       std::clamp(camera_.fu_px * options_.head_m / (kShortestLook * near_m_), kSmallestHeadPx, kHeadPx);
-  TrackObservation observation;
-  TrackShape shape = start;
   std::array<int, 2> tried{};
   // Near first, where little can go wrong; then farther and narrower with what the near part has taught.
   const double far_m[] = {std::min(25.0, options_.far_m), std::min(40.0, options_.far_m), options_.far_m};
   const double reach_m[] = {first_reach_m, 0.06, 0.045};
   const int stations[] = {20, 28, 40};
-  std::vector<RailEdge> edges;
-  RailFit result;
+  const std::vector<RailEdge>* edges = nullptr;
+  const RailFit* result = nullptr;
   for (int pass = 0; pass < 3; ++pass) {
     edge_options.far_m = far_m[pass];
     edge_options.reach_m = reach_m[pass];
     edge_options.stations = stations[pass];
-    edges = find_edges(grey, camera_, shape, edge_options, tried.data());
-    if (edges.size() < 8 || static_cast<double>(edges.size()) < kHopeful * (tried[0] + tried[1])) {
+    edges = &edge_finder_.find(grey, camera_, shape, edge_options, tried.data());
+    if (edges->size() < 8 || static_cast<double>(edges->size()) < kHopeful * (tried[0] + tried[1])) {
       observation.reason = "too few edges of rail heads";
       forget(observation);
-      return observation;
+      return;
     }
-    result = fit(edges, shape, pass == 2);
-    shape = result.shape;
+    points_.clear();
+    for (const auto& edge : *edges) points_.push_back(edge.point);
+    result = &fit(points_, shape, pass == 2);
+    shape = result->shape;
   }
   observation.near_m = edge_options.near_m;
   observation.far_m = edge_options.far_m;
-  judge(edges, tried, result, observation);
-  if (observation.seen_left != observation.seen_right) keep_one_rail(edges, observation);
+  judge(*edges, tried, *result, observation);
+  if (observation.seen_left != observation.seen_right) keep_one_rail(*edges, observation);
   if (!observation.seen_left && !observation.seen_right) forget(observation);
-  return observation;
 }
 
 void TrackDetector::judge(const std::vector<RailEdge>& edges, const std::array<int, 2>& tried, const RailFit& fit,
@@ -202,11 +212,14 @@ void TrackDetector::judge(const std::vector<RailEdge>& edges, const std::array<i
 }
 
 // What was taken for the other rail must not bend the answer.
-void TrackDetector::keep_one_rail(std::vector<RailEdge> edges, TrackObservation& observation) const {
+void TrackDetector::keep_one_rail(const std::vector<RailEdge>& edges, TrackObservation& observation) {
   const Side side = observation.seen_left ? Side::left : Side::right;
-  std::erase_if(edges, [side](const RailEdge& edge) { return edge.point.side != side; });
+  points_.clear();
+  for (const auto& edge : edges) {
+    if (edge.point.side == side) points_.push_back(edge.point);
+  }
   std::erase_if(observation.points, [side](const EdgePoint& point) { return point.side != side; });
-  const RailFit one = fit(edges, observation.shape, true);
+  const RailFit& one = fit(points_, observation.shape, true);
   observation.shape = one.shape;
   observation.covariance = one.covariance;
   observation.condition = one.condition;
@@ -231,19 +244,19 @@ void TrackDetector::choose_leg(const cv::Mat& grey, bool dark, TrackObservation&
     return;
   }
   if (branch->from_m < near_m_ + kPartsNearM) {
-    auto other = refine(grey, other_leg(observation.shape, *branch), dark, kSearchReachM);
-    if (other.seen()) {
-      const double margin = displacement(observation.shape) - displacement(other.shape);
-      if (margin > 0) std::swap(observation, other);
+    refine(grey, other_leg(observation.shape, *branch), dark, kSearchReachM, trial_);
+    if (trial_.seen()) {
+      const double margin = displacement(observation.shape) - displacement(trial_.shape);
+      if (margin > 0) std::swap(observation, trial_);
       if (std::abs(margin) > kSureMargin) return;
     }
   }
   // The legs are one until they are a fraction of a head apart.
   const double common_m = branch->from_m + std::sqrt(2 * kStillOneM / std::abs(branch->bend_per_m));
-  end_at(common_m, observation.shape, observation);
+  end_at(common_m, observation);
 }
 
-void TrackDetector::end_at(double far_m, const TrackShape& start, TrackObservation& observation) const {
+void TrackDetector::end_at(double far_m, TrackObservation& observation) {
   observation.branches = true;
   far_m = std::max(far_m, kShortestM + near_m_);
   if (far_m >= observation.far_m) return;
@@ -252,7 +265,7 @@ void TrackDetector::end_at(double far_m, const TrackShape& start, TrackObservati
     const auto ground = view.on_plane(point.pixel, 0);
     return !ground || ground->x() > far_m;
   });
-  const RailFit near = fit(observation.points, start, true);
+  const RailFit& near = fit(observation.points, observation.shape, true);
   observation.shape = near.shape;
   observation.covariance = near.covariance;
   observation.condition = near.condition;

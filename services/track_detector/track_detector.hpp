@@ -48,6 +48,9 @@ struct TrackObservation {
   double far_m = 0;               // ... to here
   bool branches = false;          // another leg leaves ahead and which one is the own is not known: far_m ends there
   std::string reason;             // why not seen
+
+  /// Nothing seen; keeps its memory.
+  void clear();
 };
 
 class TrackDetector {
@@ -56,7 +59,8 @@ class TrackDetector {
 
   /// Grey picture (CV_8UC1) of the camera's size. Starts from the previous picture's answer where it still holds, else
   /// searches the whole range of the limits. `roll`: straight rails alone cannot tell it from a sideways position.
-  TrackObservation detect(const cv::Mat& grey, const std::optional<RollHint>& roll = std::nullopt);
+  /// The answer is valid until the next call.
+  const TrackObservation& detect(const cv::Mat& grey, const std::optional<RollHint>& roll = std::nullopt);
   /// Forgets the previous picture.
   void reset() {
     previous_.reset();
@@ -69,20 +73,20 @@ class TrackDetector {
   [[nodiscard]] const DetectorOptions& options() const { return options_; }
 
  private:
-  [[nodiscard]] TrackObservation search(const cv::Mat& grey, bool dark);
-  [[nodiscard]] TrackObservation refine(const cv::Mat& grey, const TrackShape& start, bool dark,
-                                        double first_reach_m) const;
+  bool follow(const cv::Mat& grey);
+  void search(const cv::Mat& grey, bool dark, TrackObservation& best);
+  void refine(const cv::Mat& grey, const TrackShape& start, bool dark, double first_reach_m,
+              TrackObservation& observation);
   /// `last`: of the passes, with an honest covariance.
-  [[nodiscard]] RailFit fit(const std::vector<RailEdge>& edges, const TrackShape& start, bool last) const;
-  [[nodiscard]] RailFit fit(const std::vector<EdgePoint>& points, const TrackShape& start, bool last) const;
+  const RailFit& fit(const std::vector<EdgePoint>& points, const TrackShape& start, bool last);
   void judge(const std::vector<RailEdge>& edges, const std::array<int, 2>& tried, const RailFit& fit,
              TrackObservation& observation) const;
-  void keep_one_rail(std::vector<RailEdge> edges, TrackObservation& observation) const;
+  void keep_one_rail(const std::vector<RailEdge>& edges, TrackObservation& observation);
   /// Goes over to the other leg of a switch where the train stands better on it; else ends where the legs part.
   void choose_leg(const cv::Mat& grey, bool dark, TrackObservation& observation);
   /// How far the pose is from where the camera usually is, in sigmas squared.
   [[nodiscard]] double displacement(const TrackShape& shape) const;
-  void end_at(double far_m, const TrackShape& start, TrackObservation& observation) const;
+  void end_at(double far_m, TrackObservation& observation);
   void forget(TrackObservation& observation) const;
   /// Why the pose cannot be; null when it can.
   [[nodiscard]] const char* outside_limits(const TrackShape& shape) const;
@@ -95,6 +99,12 @@ class TrackDetector {
   std::unique_ptr<TopView> top_view_;
   std::unique_ptr<RailSearch> search_;
   BranchSearch branch_search_;
+  EdgeFinder edge_finder_;
+  RailFitter fitter_;
+  std::vector<EdgePoint> points_;
+  TrackObservation observation_;  // the answer
+  TrackObservation found_;        // of one kind of rails
+  TrackObservation trial_;        // of one candidate, of one leg
   std::optional<TrackShape> previous_;
   ShapeVector usual_;  // slow mean of the pose
   std::optional<RollHint> roll_;

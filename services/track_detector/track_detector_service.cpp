@@ -23,14 +23,14 @@ struct RailArrays {
 
 /// Up to 16 points of one rail, evenly over all of them.
 RailArrays points_of(const TrackObservation& observation, Side side) {
-  std::vector<Eigen::Vector2d> points;
-  for (const auto& point : observation.points) {
-    if (point.side == side) points.push_back(point.pixel);
-  }
+  // The left rail's come first.
+  const auto on_side = [side](const EdgePoint& point) { return point.side == side; };
+  const auto first = std::find_if(observation.points.begin(), observation.points.end(), on_side);
+  const auto size = static_cast<size_t>(std::count_if(first, observation.points.end(), on_side));
   RailArrays arrays;
-  arrays.count = static_cast<uint32_t>(std::min(points.size(), arrays.u_px.size()));
+  arrays.count = static_cast<uint32_t>(std::min(size, arrays.u_px.size()));
   for (uint32_t i = 0; i < arrays.count; ++i) {
-    const auto& point = points[arrays.count < 2 ? 0 : i * (points.size() - 1) / (arrays.count - 1)];
+    const auto& point = first[static_cast<ptrdiff_t>(arrays.count < 2 ? 0 : i * (size - 1) / (arrays.count - 1))].pixel;
     arrays.u_px[i] = static_cast<float>(point.x());
     arrays.v_px[i] = static_cast<float>(point.y());
   }
@@ -113,9 +113,13 @@ void TrackDetectorService::detect(const msg::CameraFrame& frame) {
   // The picture is only read; cv::Mat has no constant view of foreign memory.
   auto* pixels = const_cast<uint8_t*>(frame.data().data());  // NOLINT(cppcoreguidelines-pro-type-const-cast)
   const cv::Mat grey(static_cast<int>(frame.height_px()), static_cast<int>(frame.width_px()), CV_8UC1, pixels);
-  TrackObservation observation;
-  observation.reason = "the camera sends the same picture again";
-  if (!messaging::is_repeat(frame.health())) observation = detector_->detect(grey, imu_roll_->at(frame.stamp_ns()));
+  TrackObservation& observation = observation_;
+  if (messaging::is_repeat(frame.health())) {
+    observation.clear();
+    observation.reason = "the camera sends the same picture again";
+  } else {
+    observation = detector_->detect(grey, imu_roll_->at(frame.stamp_ns()));
+  }
   const double factor = messaging::sigma_factor(frame.health());
   observation.covariance *= factor * factor;
   if (observation.seen()) watch_->add(observation.shape, core::seconds(frame.stamp_ns() - last_stamp_ns_));

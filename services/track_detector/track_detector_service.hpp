@@ -32,6 +32,7 @@ class TrackDetectorService {
   std::unique_ptr<ImuRoll> imu_roll_;
   std::unique_ptr<MountWatch> watch_;
   std::unique_ptr<LandmarkFinder> finder_;
+  TrackObservation observation_;
   bool mount_known_ = false;
   uint64_t last_seq_ = 0;
   int64_t last_stamp_ns_ = 0;

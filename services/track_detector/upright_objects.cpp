@@ -27,6 +27,7 @@ constexpr double kWorstSigmaM = 0.35;
 constexpr double kWorstEdgeM = 0.8;
 constexpr double kLongestTunnelM = 500;  // a portal out may be missed
 constexpr double kHoldM = 1.0;
+constexpr size_t kUsuallyHeld = 200;
 
 // Size of a thing from the bearings of its two edges in the same pictures: its front looks smaller with the distance,
 // its side with the distance squared. Errors of the pose move both edges alike.
@@ -60,6 +61,12 @@ bool between(double value, const double (&range)[2]) {
 }
 
 }  // namespace
+
+UprightObjects::UprightObjects() {
+  edges_.reserve(kUsuallyHeld);
+  held_.reserve(kUsuallyHeld);
+  objects_.reserve(kUsuallyHeld);
+}
 
 void UprightObjects::forget() {
   edges_.clear();

@@ -18,6 +18,7 @@ struct UprightObject {
 
 class UprightObjects {
  public:
+  UprightObjects();
   /// Edges that were settled in the picture at way_m. Gives what is certain now; valid until the next call.
   const std::vector<UprightObject>& add(const std::vector<SettledEdge>& edges, double way_m);
   void forget();

@@ -1,8 +1,10 @@
 // railfix-make-landmark-line --seed N --out line.map: a short line with as many frogs, masts, bridges, portals and
 // platforms as fit, for `railfix simulate --map`. Places, sides and radii are drawn from the seed.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <vector>
 
 #include "core/random.hpp"
 #include "core/units.hpp"
@@ -29,7 +31,8 @@ class LandmarkLine {
   explicit LandmarkLine(uint64_t seed) : random_(seed) { map.name = "landmarks " + std::to_string(seed); }
   track::Map map;
 
-  void build(int stations) {
+  /// Balises all along instead of a pair on each stretch of plain track: `every_m` apart, give or take a half.
+  void build(int stations, double every_m) {
     track::PlanPose pose{0, 0, 0.4};
     uint32_t from = node(track::NodeKind::end, pose);
     for (int i = 0; i < stations; ++i) {
@@ -37,9 +40,26 @@ class LandmarkLine {
       from = station(from, pose);
     }
     plain(from, pose, stations);
+    if (every_m > 0) lay_balises(every_m);
   }
 
  private:
+  void lay_balises(double every_m) {
+    std::erase_if(map.landmarks, [](const track::Landmark& l) { return l.kind == LandmarkKind::balise; });
+    std::vector<track::Landmark> frogs = map.landmarks;
+    std::erase_if(frogs, [](const track::Landmark& l) { return l.kind != LandmarkKind::frog; });
+    for (const uint32_t id : main_edges_) {
+      const double length_m = map.edges[id - 1].alignment.length_m();
+      for (double s = between(0.3, 1.0) * every_m; s < length_m; s += between(0.5, 1.5) * every_m) {
+        const bool on_frog = std::any_of(frogs.begin(), frogs.end(), [&](const track::Landmark& frog) {
+          return frog.edge == id && std::abs(frog.offset_m - s) < 2;
+        });
+        if (!on_frog) landmark(LandmarkKind::balise, id, s, 0);
+      }
+    }
+    for (size_t i = 0; i < map.landmarks.size(); ++i) map.landmarks[i].id = static_cast<uint32_t>(i + 1);
+  }
+
   double between(double low, double high) { return low + (high - low) * random_.uniform(); }
   double side() { return random_.uniform() < 0.5 ? -1.0 : 1.0; }
   uint32_t node(track::NodeKind kind, const track::PlanPose& pose) {
@@ -67,6 +87,7 @@ class LandmarkLine {
     pose = alignment.at(kPlainM).pose;
     const uint32_t to = node(track::NodeKind::joint, pose);
     const uint32_t id = edge(from, to, alignment);
+    main_edges_.push_back(id);
     const bool tunnel = index % 2 == 1;
     if (tunnel) {
       landmark(LandmarkKind::portal_in, id, 50, 0);
@@ -92,6 +113,7 @@ class LandmarkLine {
     const uint32_t to = node(track::NodeKind::railway_switch, pose);
     const uint32_t before = static_cast<uint32_t>(map.edges.size());
     const uint32_t id = edge(from, to, main);
+    main_edges_.push_back(id);
     const uint32_t leaves = branch(from, begin, branch_side, main, id, false);
     map.connections.push_back({from, before, id, false});
     map.connections.push_back({from, before, leaves, true});
@@ -136,6 +158,7 @@ class LandmarkLine {
   }
 
   core::Random random_;
+  std::vector<uint32_t> main_edges_;
 };
 
 }  // namespace
@@ -145,13 +168,16 @@ int main(int argc, char** argv) {
   CLI::App app("A line full of landmarks, as a compiled map");
   uint64_t seed = 1;
   int stations = 3;
+  double balises_every_m = 0;
   std::string out;
   app.add_option("--seed", seed, "Draws places, sides and radii");
   app.add_option("--stations", stations, "Stations of 240 m each")->check(CLI::Range(1, 100));
+  app.add_option("--balises-every-m", balises_every_m, "Balises all along, so far apart (0 = a pair between stations)")
+      ->check(CLI::Range(0.0, 1000.0));
   app.add_option("--out", out, "Compiled map")->required();
   CLI11_PARSE(app, argc, argv);
   railfix::LandmarkLine line(seed);
-  line.build(stations);
+  line.build(stations, balises_every_m);
   const auto status = line.map.save(out);
   if (!status.ok()) {
     std::fprintf(stderr, "%s\n", status.error().message.c_str());

@@ -1,5 +1,9 @@
 #include <benchmark/benchmark.h>
 
+#include "core/time.hpp"
+#include "simulator/builtin_line.hpp"
+#include "simulator/renderer.hpp"
+#include "track_detector/landmark_finder.hpp"
 #include "track_detector/track_detector.hpp"
 #include "unit/track_detector/synthetic_picture.hpp"
 
@@ -93,25 +97,130 @@ BENCHMARK(BM_StageBranch)->Unit(benchmark::kMicrosecond);
 
 void BM_StageEdges(benchmark::State& state) {
   const Stage stage;
+  EdgeFinder finder;
   int tried[2];
   for (auto _ : state)
-    benchmark::DoNotOptimize(find_edges(stage.grey, test::kCab, stage.scene.shape, stage.edges, tried).size());
+    benchmark::DoNotOptimize(finder.find(stage.grey, test::kCab, stage.scene.shape, stage.edges, tried).size());
 }
 BENCHMARK(BM_StageEdges)->Unit(benchmark::kMicrosecond);
 
 void BM_StageFit(benchmark::State& state) {
   const Stage stage;
+  EdgeFinder finder;
   int tried[2];
   std::vector<EdgePoint> points;
-  for (const auto& edge : find_edges(stage.grey, test::kCab, stage.scene.shape, stage.edges, tried))
+  for (const auto& edge : finder.find(stage.grey, test::kCab, stage.scene.shape, stage.edges, tried))
     points.push_back(edge.point);
   RailFitOptions options;
   options.prior.camera = test::kMount;
   options.prior_sigma = DetectorOptions{}.limits;
   options.least_sigma_factor = 0.15;
   options.step_tolerance = 0.05;
-  for (auto _ : state) benchmark::DoNotOptimize(fit_rails(test::kCab, points, options.prior, options).residual_px);
+  RailFitter fitter;
+  for (auto _ : state) benchmark::DoNotOptimize(fitter.fit(test::kCab, points, options.prior, options).residual_px);
 }
 BENCHMARK(BM_StageFit)->Unit(benchmark::kMicrosecond);
+
+// The sightings: pictures of the simulator over balises, a switch and masts, at 90 km/h and 30 pictures a second.
+
+struct Ride {
+  static constexpr double kStepM = 25.0 / 30;
+  Ride() {
+    cv::setNumThreads(1);
+    auto map = std::make_shared<railfix::track::Map>(railfix::simulator::builtin_line());
+    auto line = railfix::simulator::Line::make(map, {1, 1305, railfix::track::Direction::forward}, 140);
+    railfix::simulator::RenderOptions options;
+    options.camera = camera = test::kCab;
+    const railfix::simulator::Renderer renderer(std::make_shared<railfix::simulator::Line>(std::move(line).value()),
+                                                options);
+    for (int i = 0; i < 50; ++i) {
+      railfix::simulator::Shot shot;
+      shot.pose = test::kMount;
+      shot.distance_m = kStepM * i;
+      shot.speed_mps = kStepM * 30;
+      LandmarkPicture picture;
+      picture.grey = renderer.render(shot);
+      picture.pose = test::kMount;
+      pictures.push_back(picture);
+    }
+    const railfix::vision::SheetPose pose{test::kMount, 0.12, 0, 0};
+    sheet = railfix::vision::fit_sheet(camera, pose, 3.5, 14.0, 0.58, 0.02, 0.02);
+    railfix::vision::TopViewMaker maker(camera, sheet);
+    views.resize(pictures.size());
+    for (size_t i = 0; i < pictures.size(); ++i) maker.make(pictures[i].grey, pose, views[i]);
+  }
+  railfix::geometry::Intrinsics camera;
+  railfix::vision::Sheet sheet;
+  std::vector<LandmarkPicture> pictures;
+  std::vector<railfix::vision::TopView> views;
+};
+
+Ride& ride() {
+  static Ride ride;
+  return ride;
+}
+
+/// Every picture in turn; `Work` takes its index and a stamp that grows.
+template <class Work>
+void each_picture(benchmark::State& state, Work&& work) {
+  size_t i = 0;
+  int64_t stamp_ns = 0;
+  for (auto _ : state) {
+    work(i, stamp_ns);
+    i = (i + 1) % ride().pictures.size();
+    stamp_ns += railfix::core::to_ns(1.0 / 30);
+  }
+}
+
+void BM_Sightings(benchmark::State& state) {
+  LandmarkFinder finder(ride().camera, {});
+  each_picture(state, [&](size_t i, int64_t stamp_ns) {
+    LandmarkPicture picture = ride().pictures[i];
+    picture.stamp_ns = stamp_ns;
+    benchmark::DoNotOptimize(finder.process(picture).size());
+  });
+}
+BENCHMARK(BM_Sightings)->Unit(benchmark::kMicrosecond);
+
+void BM_SightingsGroundView(benchmark::State& state) {
+  railfix::vision::TopViewMaker maker(ride().camera, ride().sheet);
+  railfix::vision::TopView view;
+  each_picture(state, [&](size_t i, int64_t) {
+    maker.make(ride().pictures[i].grey, {test::kMount, 0.12, 0, 0}, view);
+    benchmark::DoNotOptimize(view.grey.data);
+  });
+}
+BENCHMARK(BM_SightingsGroundView)->Unit(benchmark::kMicrosecond);
+
+void BM_SightingsGroundMotion(benchmark::State& state) {
+  GroundMotion motion(70);
+  each_picture(state, [&](size_t i, int64_t stamp_ns) {
+    benchmark::DoNotOptimize(motion.step(ride().views[i], ride().sheet, stamp_ns));
+  });
+}
+BENCHMARK(BM_SightingsGroundMotion)->Unit(benchmark::kMicrosecond);
+
+void BM_SightingsPlates(benchmark::State& state) {
+  PlateSearch search(ride().sheet, {});
+  each_picture(state, [&](size_t i, int64_t) { benchmark::DoNotOptimize(search.find(ride().views[i]).size()); });
+}
+BENCHMARK(BM_SightingsPlates)->Unit(benchmark::kMicrosecond);
+
+template <class Search>
+void one_search(benchmark::State& state, Search&& search) {
+  each_picture(state, [&](size_t i, int64_t) { benchmark::DoNotOptimize(search.find(ride().pictures[i]).size()); });
+}
+void BM_SightingsFrogs(benchmark::State& state) {
+  one_search(state, FrogSearch(ride().camera, {}));
+}
+BENCHMARK(BM_SightingsFrogs)->Unit(benchmark::kMicrosecond);
+void BM_SightingsPlatforms(benchmark::State& state) {
+  one_search(state, PlatformSearch(ride().camera));
+}
+BENCHMARK(BM_SightingsPlatforms)->Unit(benchmark::kMicrosecond);
+void BM_SightingsUprights(benchmark::State& state) {
+  one_search(state, UprightSearch(ride().camera));
+}
+BENCHMARK(BM_SightingsUprights)->Unit(benchmark::kMicrosecond);
 
 }  // namespace
