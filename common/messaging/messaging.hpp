@@ -80,6 +80,12 @@ struct Connections {
   uint32_t pairs = 0;             // reader-writer pairs of equal topics on this train, own and remote
 };
 
+/// Samples that this participant has sent to a topic. SampleInfo::sequence of the last one is the same number.
+struct Sent {
+  std::string topic;  // with its instance: "camera_frame/cam0"
+  uint64_t samples = 0;
+};
+
 /// This process on the train's DDS network. Must outlive its writers and readers.
 class Participant {
  public:
@@ -94,6 +100,8 @@ class Participant {
   [[nodiscard]] Connections connections() const;
   /// Names of all topics of this train that have a writer now, sorted ("camera_frame/cam0", ...).
   [[nodiscard]] std::vector<std::string> written_topics() const;
+  /// By own writers, in the order in which they were made.
+  [[nodiscard]] std::vector<Sent> sent() const;
 
   struct Impl;
   [[nodiscard]] Impl& impl() { return *impl_; }

@@ -151,6 +151,13 @@ Connections Participant::connections() const {
   return connections;
 }
 
+std::vector<Sent> Participant::sent() const {
+  const std::lock_guard lock(impl_->mutex);
+  std::vector<Sent> sent;
+  for (const auto& count : impl_->sent) sent.push_back({count->topic, count->samples});
+  return sent;
+}
+
 std::vector<std::string> Participant::written_topics() const {
   const std::lock_guard lock(impl_->mutex);
   std::vector<std::string> names;

@@ -1,6 +1,7 @@
 // Private to this folder: the inside of a Participant.
 #pragma once
 
+#include <atomic>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantListener.hpp>
 #include <fastdds/dds/publisher/DataWriter.hpp>
@@ -15,6 +16,13 @@
 
 namespace railfix::messaging {
 
+/// One writer's samples, counted; outlives the writer.
+struct SentCount {
+  explicit SentCount(std::string name) : topic(std::move(name)) {}
+  std::string topic;
+  std::atomic<uint64_t> samples = 0;
+};
+
 struct Participant::Impl : eprosima::fastdds::dds::DomainParticipantListener {
   ParticipantOptions options;
   eprosima::fastdds::dds::DomainParticipant* participant = nullptr;
@@ -26,6 +34,7 @@ struct Participant::Impl : eprosima::fastdds::dds::DomainParticipantListener {
   std::set<eprosima::fastdds::dds::DataWriter*> manual_liveliness;  // writers to assert
   std::set<eprosima::fastdds::dds::DataWriter*> writers;
   std::set<eprosima::fastdds::dds::DataReader*> readers;
+  std::vector<std::shared_ptr<const SentCount>> sent;
   std::map<eprosima::fastrtps::rtps::GUID_t, std::string> remote_writers;  // topic name of each
   std::map<eprosima::fastrtps::rtps::GUID_t, std::string> remote_readers;
   bool own_profiles = false;

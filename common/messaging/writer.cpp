@@ -18,6 +18,9 @@ struct AnyWriter::Impl : dds::DataWriterListener {
   Participant::Impl* participant = nullptr;
   dds::DataWriter* writer = nullptr;
   std::shared_ptr<void> scratch;  // for topics whose samples cannot be loaned
+  std::shared_ptr<SentCount> sent;
+
+  bool send(void* sample);
 
   ~Impl() override {
     if (writer == nullptr) return;
@@ -49,13 +52,21 @@ AnyWriter::AnyWriter(Participant& participant, const TopicInfo& topic, const std
                          " cannot be written: quality of service or permissions refuse it");
   }
   impl_->scratch = topic.type->make();
+  impl_->sent = std::make_shared<SentCount>(dds_topic->get_name());
   const std::lock_guard lock(inside.mutex);
+  inside.sent.push_back(impl_->sent);
   inside.writers.insert(impl_->writer);
   if (topic.qos.liveliness_lease_ns > 0) inside.manual_liveliness.insert(impl_->writer);
 }
 
+bool AnyWriter::Impl::send(void* sample) {
+  if (!writer->write(sample)) return false;
+  ++sent->samples;
+  return true;
+}
+
 bool AnyWriter::write(const void* sample) {
-  return impl_->writer->write(const_cast<void*>(sample));  // Fast DDS takes void* and only reads
+  return impl_->send(const_cast<void*>(sample));  // Fast DDS takes void* and only reads
 }
 
 bool AnyWriter::write_in_place(const std::function<void(void*)>& fill) {
@@ -63,10 +74,10 @@ bool AnyWriter::write_in_place(const std::function<void(void*)>& fill) {
   const auto loaned = impl_->writer->loan_sample(loan, dds::DataWriter::LoanInitializationKind::NO_LOAN_INITIALIZATION);
   if (loaned != ReturnCode_t::RETCODE_OK) {
     fill(impl_->scratch.get());
-    return impl_->writer->write(impl_->scratch.get());
+    return impl_->send(impl_->scratch.get());
   }
   fill(loan);
-  if (impl_->writer->write(loan)) return true;
+  if (impl_->send(loan)) return true;
   impl_->writer->discard_loan(loan);
   return false;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/time.hpp"
+#include "messaging/lock_step.hpp"
 #include "service/log.hpp"
 
 namespace railfix::service {
@@ -12,6 +13,11 @@ constexpr std::chrono::milliseconds kAssertPeriod{50};
 // Four times a second, so that a dead or frozen service shows within half a second.
 constexpr std::chrono::milliseconds kStatusPeriod{250};
 constexpr int64_t kIdleNs = core::kNsPerSecond;
+
+// Standing values and the words of operation are never held back.
+bool waits_for_turn(const messaging::TopicInfo& topic) {
+  return topic.idl != "operation" && !topic.qos.transient_local;
+}
 
 }  // namespace
 
@@ -25,6 +31,13 @@ Loop::Loop(std::string service, const CommonConfig& common)
       reply_(std::make_unique<messaging::Writer<msg::ControlReply>>(participant_, messaging::topics::service_reply)) {
   if (common_.lock_step) {
     progress_ = std::make_unique<messaging::Writer<msg::DataProgress>>(participant_, messaging::topics::data_progress);
+  }
+  if (common_.lock_step) {
+    messaging::Topic<msg::DataClock> clocks = messaging::topics::data_clock;
+    readers_.push_back(std::make_unique<messaging::AnyReader>(
+        participant_, messaging::info_of(clocks), "", queue_, [this](const auto& sample, const auto& info) {
+          if (info.valid) clock(*static_cast<const msg::DataClock*>(sample.get()));
+        }));
   }
   on<msg::ControlRequest>(messaging::topics::service_control,
                           [this](const msg::ControlRequest& request) { answer(request); });
@@ -71,11 +84,58 @@ void Loop::answer(const msg::ControlRequest& request) {
   reply_->write(reply);
 }
 
-void Loop::used_up_to(int64_t data_ns) {
-  if (!progress_) return;
+void Loop::listen(const messaging::TopicInfo& topic, const std::string& instance, Handler handler, StampOf stamp_of) {
+  if (common_.lock_step && topic.name == messaging::topics::data_clock.name) {
+    on_clock_.push_back(std::move(handler));
+  } else if (common_.lock_step && waits_for_turn(topic)) {
+    keep_in_turn(topic, instance, std::move(handler), stamp_of);
+  } else {
+    readers_.push_back(std::make_unique<messaging::AnyReader>(
+        participant_, topic, instance, queue_, [handler = std::move(handler)](const auto& sample, const auto& info) {
+          if (info.valid) handler(sample.get());
+        }));
+  }
+}
+
+void Loop::keep_in_turn(const messaging::TopicInfo& topic, const std::string& instance, Handler handler,
+                        StampOf stamp_of) {
+  const std::string name = instance.empty() ? topic.name : topic.name + "/" + instance;
+  turns_.reads(name);
+  readers_.push_back(std::make_unique<messaging::AnyReader>(
+      participant_, topic, instance, queue_,
+      [this, name, handler = std::move(handler), stamp_of](const auto& sample, const auto& info) {
+        if (!info.valid) return;
+        turns_.keep(name, info.sequence, stamp_of(sample.get()), [handler, sample] { handler(sample.get()); });
+      }));
+}
+
+// What belongs to no turn: the end of the data, and real pace.
+void Loop::clock(const msg::DataClock& clock) {
+  if (clock.lock_step() == 0 || clock.ended() != 0) {
+    for (const auto& handler : on_clock_) handler(&clock);
+    return;
+  }
+  if (service_ != clock.turn().c_str()) return;
+  std::map<std::string, uint64_t> sent;
+  for (const auto& topic : clock.sent()) sent[topic.topic().c_str()] = topic.samples();
+  turns_.begin(std::move(sent));
+  turn_ = clock;
+  turn_taken_ = false;
+}
+
+void Loop::take_turn() {
+  for (const auto& work : turns_.take()) work();
+  for (const auto& handler : on_clock_) handler(&*turn_);
+  turn_taken_ = true;
+}
+
+void Loop::end_turn() {
   msg::DataProgress progress;
-  progress.data_ns(data_ns);
+  progress.data_ns(turn_->data_ns());
+  progress.seq(turn_->seq());
   progress.service(service_);
+  progress.sent(messaging::sent_samples(participant_));
+  turn_.reset();
   progress_->write(progress);
 }
 
@@ -102,6 +162,8 @@ void Loop::turn() {
     int64_t due_ns = core::monotonic_ns() + kIdleNs;
     for (const auto& timer : timers_) due_ns = std::min(due_ns, timer.due_ns);
     queue_.run_one(due_ns);
+    if (turn_ && !turn_taken_ && turns_.ready()) take_turn();
+    if (turn_ && turn_taken_ && (!turn_ended_ || turn_ended_(turn_->data_ns()))) end_turn();
   }
   for (const auto& handler : at_stop_) handler();
 }

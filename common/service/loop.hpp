@@ -5,6 +5,7 @@
 
 #include "service/health.hpp"
 #include "service/service.hpp"
+#include "service/turns.hpp"
 
 namespace railfix::service {
 
@@ -24,14 +25,14 @@ class Loop final : public Context {
   [[nodiscard]] const std::string& service_name() const override { return service_; }
   messaging::Participant& participant() override { return participant_; }
   void finish(const std::string& why) override;
-  void used_up_to(int64_t data_ns) override;
+  void turn_ends_when(std::function<bool(int64_t)> done) override { turn_ended_ = std::move(done); }
 
   /// Until finish().
   void turn();
 
  protected:
-  messaging::Queue& queue() override { return queue_; }
-  void keep(std::shared_ptr<void> reader) override { readers_.push_back(std::move(reader)); }
+  void listen(const messaging::TopicInfo& topic, const std::string& instance, Handler handler,
+              StampOf stamp_of) override;
 
  private:
   struct Timer {
@@ -41,6 +42,10 @@ class Loop final : public Context {
   };
   void run_due_timers();
   void answer(const msg::ControlRequest& request);
+  void keep_in_turn(const messaging::TopicInfo& topic, const std::string& instance, Handler handler, StampOf stamp_of);
+  void clock(const msg::DataClock& clock);
+  void take_turn();
+  void end_turn();
 
   std::string service_;
   CommonConfig common_;
@@ -53,7 +58,12 @@ class Loop final : public Context {
   std::map<std::string, std::function<core::Result<std::string>(const std::string&)>> commands_;
   std::vector<Timer> timers_;
   std::vector<std::function<void()>> at_stop_;
-  std::vector<std::shared_ptr<void>> readers_;
+  Turns turns_;
+  std::optional<msg::DataClock> turn_;  // given to us, until we have answered
+  bool turn_taken_ = false;             // all its samples are used
+  std::function<bool(int64_t)> turn_ended_;
+  std::vector<Handler> on_clock_;
+  std::vector<std::unique_ptr<messaging::AnyReader>> readers_;
   bool finished_ = false;
 };
 

@@ -99,7 +99,8 @@ void CommonConfig::describe(Fields& fields) {
               "Fast DDS XML file that replaces the built-in quality of service; empty = built in.");
   fields.integer("ownership_strength", ownership_strength, {0, 1000}, "",
                  "Of two services that write the same exclusive topic the stronger one is heard.");
-  fields.flag("lock_step", lock_step, "Answer on data_progress; set by `railfix run --pace lossless`.");
+  fields.flag("lock_step", lock_step,
+              "Use data in turns and answer on data_progress; set by `railfix run --pace lossless`.");
 }
 
 const std::vector<std::string>& service_names() {

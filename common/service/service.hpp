@@ -65,10 +65,17 @@ class Context {
     return messaging::Writer<T>(participant(), topic, instance);
   }
   /// Calls the handler for every sample. When handlers are slower than the data the oldest waiting samples are dropped
-  /// and counted (queue length: topic.reader_queue).
+  /// and counted (queue length: topic.reader_queue). In lock step the samples of a step are handled when this service's
+  /// turn has come, by stamp, equal stamps in the order of these calls.
   template <class T>
   void on(const messaging::Topic<T>& topic, std::function<void(const T&)> handler, const std::string& instance = "") {
-    keep(std::make_shared<messaging::Reader<T>>(participant(), topic, instance, queue(), std::move(handler)));
+    listen(
+        messaging::info_of(topic), instance,
+        [handler = std::move(handler)](const void* sample) { handler(*static_cast<const T*>(sample)); },
+        [](const void* sample) -> int64_t {
+          if constexpr (requires(const T& t) { t.stamp_ns(); }) return static_cast<const T*>(sample)->stamp_ns();
+          return 0;
+        });
   }
   /// Calls the handler in this period (host's monotonic clock).
   virtual void every(std::chrono::nanoseconds period, std::function<void()> handler) = 0;
@@ -88,13 +95,15 @@ class Context {
   /// Ends the run loop; the program exits with 0.
   virtual void finish(const std::string& why) = 0;
 
-  /// Lock step: tells whoever plays the data that this service has used everything up to data_ns. Does nothing on a
-  /// live train.
-  virtual void used_up_to(int64_t data_ns) = 0;
+  /// Lock step: a turn that this service finishes in a thread of its own ends when `done` says so, which is asked after
+  /// every handler.
+  virtual void turn_ends_when(std::function<bool(int64_t data_ns)> done) = 0;
 
  protected:
-  virtual messaging::Queue& queue() = 0;
-  virtual void keep(std::shared_ptr<void> reader) = 0;
+  using Handler = std::function<void(const void* sample)>;
+  using StampOf = int64_t (*)(const void* sample);
+  virtual void listen(const messaging::TopicInfo& topic, const std::string& instance, Handler handler,
+                      StampOf stamp_of) = 0;
 };
 
 /// Everything around a service. `make` is called once the participant is up.

@@ -50,7 +50,7 @@ struct FrameGrabberConfig {
     fields.choice("start", start, {"command", "immediately"},
                   "Begin to play at the control command `start`, or at once.");
     fields.choice("at_end", at_end, {"idle", "finish"}, "Behind the last picture: stay, or end the program.");
-    fields.list("wait_for", wait_for, "Services that have to answer on data_progress (pace lossless).");
+    fields.list("wait_for", wait_for, "Services that take turns on every picture, in this order (pace lossless).");
     fields.number("wait_s", wait_s, {0.1, 3600}, "s", "Longest wait for these answers before the program gives up.");
     fields.integer("read_ahead", read_ahead, {1, 256}, "pictures", "How many pictures are decoded ahead.");
     fields.number("preview_hz", preview_hz, {0, 30}, "1/s", "Rate of the JPEG preview; 0 = none.");

@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/time.hpp"
+#include "messaging/lock_step.hpp"
 
 namespace railfix::frame_grabber {
 namespace {
@@ -115,12 +116,8 @@ void FrameGrabberService::prepare_recorded() {
   size_ = picture_size(config_);
   check_size(size_);
   publish_calibration(calibration_of(config_));
-  context_.on<msg::DataProgress>(messaging::topics::data_progress, [this](const msg::DataProgress& progress) {
-    lock_step_.answered(progress.service().c_str(), progress.data_ns());
-    if (!waiting_since_ns_ || !lock_step_.done()) return;
-    waiting_since_ns_.reset();
-    player_->complete();
-  });
+  context_.on<msg::DataProgress>(messaging::topics::data_progress,
+                                 [this](const msg::DataProgress& progress) { answered(progress); });
   context_.on_command("start", [this](const std::string&) { return start(); });
   context_.every(kWaitCheck, [this] {
     start_when_connected();
@@ -165,15 +162,31 @@ void FrameGrabberService::play(const dataset::Picture& picture) {
   }
   context_.health().input();
   newest_ns_ = std::max(newest_ns_, picture.stamp_ns);
-  if (lossless()) {
-    lock_step_.begin(newest_ns_);
-    waiting_since_ns_ = core::monotonic_ns();
-  }
-  if (lossless() || grabbed_ns - clock_sent_ns_ >= core::kNsPerSecond) publish_clock(newest_ns_, grabbed_ns, false);
+  if (!lossless() && grabbed_ns - clock_sent_ns_ >= core::kNsPerSecond) publish_clock(newest_ns_, grabbed_ns, false);
   publish(raw_of(picture.stamp_ns, picture.grey), grabbed_ns);
-  if (lossless() && !lock_step_.done()) return;  // data_progress completes it
-  waiting_since_ns_.reset();
-  player_->complete();
+  if (!lossless()) return player_->complete();
+  note_sent(messaging::sent_samples(context_.participant()));
+  lock_step_.begin();
+  give_turn();
+}
+
+void FrameGrabberService::give_turn() {
+  if (lock_step_.done()) {
+    waiting_since_ns_.reset();
+    return player_->complete();
+  }
+  waiting_since_ns_ = core::monotonic_ns();
+  publish_clock(newest_ns_, core::wall_ns(), false);
+}
+
+void FrameGrabberService::answered(const msg::DataProgress& progress) {
+  if (!lock_step_.answered(progress.service().c_str(), progress.seq())) return;
+  note_sent(progress.sent());
+  give_turn();
+}
+
+void FrameGrabberService::note_sent(const std::vector<msg::SentSamples>& sent) {
+  for (const auto& topic : sent) sent_[topic.topic().c_str()] = topic.samples();
 }
 
 void FrameGrabberService::publish(const RawPicture& picture, int64_t grabbed_ns) {
@@ -270,9 +283,17 @@ void FrameGrabberService::publish_clock(int64_t data_ns, int64_t wall_ns, bool e
   msg::DataClock clock;
   clock.data_ns(data_ns);
   clock.wall_ns(wall_ns);
-  clock.seq(++clock_seq_);
+  clock.seq(lossless() ? lock_step_.step() : ++clock_seq_);
   clock.lock_step(lossless() ? 1 : 0);
   clock.ended(ended ? 1 : 0);
+  if (lossless() && !ended) {
+    clock.turn(lock_step_.turn());
+    for (const auto& [topic, samples] : sent_) {
+      clock.sent().emplace_back();
+      clock.sent().back().topic(topic);
+      clock.sent().back().samples(samples);
+    }
+  }
   clock_.write(clock);
 }
 
@@ -307,7 +328,7 @@ void FrameGrabberService::check_wait() {
   if (core::seconds(core::monotonic_ns() - *waiting_since_ns_) < config_.wait_s) return;
   gave_up_why_ = fmt::format(
       "no answer on data_progress from {} for {} s at picture {}; see that these services run with common.lock_step",
-      lock_step_.missing(), config_.wait_s, frame_seq_);
+      lock_step_.turn(), config_.wait_s, frame_seq_);
   gave_up_ns_ = core::monotonic_ns();
   context_.health().failed(gave_up_why_);
 }

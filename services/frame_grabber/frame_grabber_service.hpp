@@ -2,6 +2,7 @@
 // also give data_clock to everyone.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <optional>
 
@@ -26,6 +27,9 @@ class FrameGrabberService {
   void shoot(const RawPicture& picture);
   void say_packets(uint64_t bad_packets);
   void play(const dataset::Picture& picture);
+  void give_turn();
+  void answered(const msg::DataProgress& progress);
+  void note_sent(const std::vector<msg::SentSamples>& sent);
   void publish(const RawPicture& picture, int64_t grabbed_ns);
   void publish_preview(const RawPicture& picture, int64_t grabbed_ns, uint32_t health);
   void publish_calibration(const std::optional<dataset::CameraCalibration>& calibration);
@@ -49,6 +53,7 @@ class FrameGrabberService {
   messaging::Writer<msg::DataClock> clock_;
   PictureHealth picture_health_;
   LockStep lock_step_;
+  std::map<std::string, uint64_t> sent_;  // by everybody, to each topic
   uint64_t frame_seq_ = 0;
   uint64_t clock_seq_ = 0;
   int64_t clock_sent_ns_ = 0;

@@ -1,7 +1,5 @@
 #include "frame_grabber/pace.hpp"
 
-#include <algorithm>
-
 namespace railfix::frame_grabber {
 
 RealPace::Verdict RealPace::ask(int64_t stamp_ns, int64_t wall_ns) {
@@ -17,25 +15,15 @@ RealPace::Verdict RealPace::ask(int64_t stamp_ns, int64_t wall_ns) {
   return {due_ns, wall_ns - due_ns > period_ns};
 }
 
-LockStep::LockStep(std::vector<std::string> services) {
-  for (const std::string& service : services) used_[service] = INT64_MIN;
+void LockStep::begin() {
+  ++step_;
+  next_ = 0;
 }
 
-void LockStep::answered(const std::string& service, int64_t data_ns) {
-  const auto found = used_.find(service);
-  if (found != used_.end()) found->second = std::max(found->second, data_ns);
-}
-
-bool LockStep::done() const {
-  return std::all_of(used_.begin(), used_.end(), [this](const auto& one) { return one.second >= data_ns_; });
-}
-
-std::string LockStep::missing() const {
-  std::string names;
-  for (const auto& [service, used_ns] : used_) {
-    if (used_ns < data_ns_) names += (names.empty() ? "" : ", ") + service;
-  }
-  return names;
+bool LockStep::answered(const std::string& service, uint64_t step) {
+  if (done() || step != step_ || service != turn()) return false;
+  ++next_;
+  return true;
 }
 
 }  // namespace railfix::frame_grabber

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -27,21 +26,25 @@ class RealPace {
   std::optional<int64_t> newest_ns_;
 };
 
-/// Lock step: which services have not used the present step yet.
+/// Lock step: in every step each service has its turn, one after the other.
 class LockStep {
  public:
-  explicit LockStep(std::vector<std::string> services);
-  /// A new step: everything up to data_ns has to be used.
-  void begin(int64_t data_ns) { data_ns_ = data_ns; }
-  /// A service has used everything up to data_ns. Services that nobody waits for are left out.
-  void answered(const std::string& service, int64_t data_ns);
-  [[nodiscard]] bool done() const;
-  /// "odometry, fusion"
-  [[nodiscard]] std::string missing() const;
+  explicit LockStep(std::vector<std::string> services) : services_(std::move(services)), next_(services_.size()) {}
+  /// A new step; the first service has the turn.
+  void begin();
+  /// No turn is left in this step.
+  [[nodiscard]] bool done() const { return next_ == services_.size(); }
+  /// Whose turn it is. REQUIRES: not done().
+  [[nodiscard]] const std::string& turn() const { return services_[next_]; }
+  /// Number of the present step, from 1.
+  [[nodiscard]] uint64_t step() const { return step_; }
+  /// A service has taken its turn. False when it is not the one that has it: an answer to an older step, or a stranger.
+  bool answered(const std::string& service, uint64_t step);
 
  private:
-  int64_t data_ns_ = INT64_MIN;
-  std::map<std::string, int64_t> used_;
+  std::vector<std::string> services_;
+  size_t next_;
+  uint64_t step_ = 0;
 };
 
 }  // namespace railfix::frame_grabber

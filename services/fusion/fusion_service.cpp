@@ -92,11 +92,6 @@ FusionService::FusionService(const FusionConfig& config, service::Context& conte
 }
 
 void FusionService::listen(const FusionConfig& config) {
-  // Also when the camera is left out: lock step waits for the answer to every picture.
-  context_.on<msg::OdometryStep>(odometry_step, [this, used = config.use_camera](const msg::OdometryStep& m) {
-    if (used) use(input_of(m), m.grabbed_ns());
-    context_.used_up_to(m.stamp_ns());
-  });
   if (config.use_wheel) {
     context_.on<msg::WheelSample>(wheel_sample, [this](const msg::WheelSample& m) {
       use(WheelInput{m.stamp_ns(), m.pulses(), m.pulses_per_metre()}, m.grabbed_ns());
@@ -108,6 +103,10 @@ void FusionService::listen(const FusionConfig& config) {
     });
   }
   if (config.use_gnss) context_.on<msg::GnssFix>(gnss_fix, [this](const msg::GnssFix& m) { use_gnss(m); });
+  if (config.use_camera) {
+    context_.on<msg::OdometryStep>(odometry_step,
+                                   [this](const msg::OdometryStep& m) { use(input_of(m), m.grabbed_ns()); });
+  }
   if (config.use_fixes) {
     context_.on<msg::PositionFix>(position_fix, [this](const msg::PositionFix& m) { use(input_of(m), 0); });
   }

@@ -26,10 +26,7 @@ MapMatcherService::MapMatcherService(const MapMatcherConfig& config, service::Co
   context_.on<msg::TrainState>(topics::train_state, [this](const msg::TrainState& m) { use(m); });
   context_.on<msg::TrackView>(topics::track_view, [this](const msg::TrackView& m) { use(m); });
   context_.on<msg::LandmarkSighting>(topics::landmark_sighting, [this](const msg::LandmarkSighting& m) { use(m); });
-  context_.on<msg::OdometryStep>(topics::odometry_step, [this](const msg::OdometryStep& m) {
-    use(m);
-    context_.used_up_to(m.stamp_ns());
-  });
+  context_.on<msg::OdometryStep>(topics::odometry_step, [this](const msg::OdometryStep& m) { use(m); });
   context_.health().ready();
 }
 

@@ -74,10 +74,7 @@ void OdometryService::pictured(const msg::CameraFrame& frame) {
   last_seq_ = frame.seq();
   const auto width = static_cast<int>(frame.width_px());
   const auto height = static_cast<int>(frame.height_px());
-  if (width < 16 || height < 16 || frame.width_px() * uint64_t{frame.height_px()} > msg::CAMERA_MAX_PIXELS) {
-    context_.used_up_to(frame.stamp_ns());
-    return;
-  }
+  if (width < 16 || height < 16 || frame.width_px() * uint64_t{frame.height_px()} > msg::CAMERA_MAX_PIXELS) return;
   Waiting waiting;
   waiting.stamp_ns = frame.stamp_ns();
   waiting.grabbed_ns = frame.grabbed_ns();
@@ -163,7 +160,6 @@ void OdometryService::measure(const Waiting& waiting, const msg::TrackView* view
     tell(last_step_, waiting.health);
   }
   spare_.push_back(waiting.grey);
-  context_.used_up_to(waiting.stamp_ns);
 }
 
 void OdometryService::publish(const MouseStep& step, const Waiting& waiting) {

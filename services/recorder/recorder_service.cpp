@@ -1,5 +1,6 @@
 #include "recorder/recorder_service.hpp"
 
+#include <algorithm>
 #include <chrono>
 
 #include "core/time.hpp"
@@ -15,9 +16,14 @@ constexpr int64_t kLossShownNs = 10 * core::kNsPerSecond;
 }  // namespace
 
 RecorderService::RecorderService(const Config& config, service::Context& context)
-    : config_(config), context_(context), thread_(config, context.participant(), about(), [&context](int64_t stamp_ns) {
-        if (context.common().lock_step) context.post([&context, stamp_ns] { context.used_up_to(stamp_ns); });
+    : config_(config),
+      context_(context),
+      thread_(config, context.participant(), about(), [this, &context](int64_t stamp_ns) {
+        if (context.common().lock_step) {
+          context.post([this, stamp_ns] { recorded_ns_ = std::max(recorded_ns_, stamp_ns); });
+        }
       }) {
+  context_.turn_ends_when([this](int64_t data_ns) { return recorded_ns_ >= data_ns || !thread_.state().recording; });
   if (config_.file.empty()) {
     for (const auto& sentence : recover_folder(config_.folder)) context_.log().warn("{}", sentence);
   }

@@ -20,6 +20,7 @@ class RecorderService {
 
   Config config_;
   service::Context& context_;
+  int64_t recorded_ns_ = INT64_MIN;  // pictures up to here are in the file (lock step)
   RecorderThread thread_;
   uint64_t received_ = 0;
   uint64_t written_ = 0;

@@ -56,7 +56,6 @@ void SensorGatewayService::follow(const msg::DataClock& clock) {
   if (clock.lock_step() != 0 || clock.ended() != 0) {
     anchor_.reset();
     playback_.play_until(clock.data_ns(), sinks_);
-    context_.used_up_to(clock.data_ns());
   } else {
     anchor_ = {clock.data_ns(), clock.wall_ns()};
   }

@@ -113,7 +113,6 @@ void TprPublisherService::on_state(const msg::TrainState& state) {
   } else {
     show("");
   }
-  context_.used_up_to(state.stamp_ns());
 }
 
 void TprPublisherService::on_tick() {

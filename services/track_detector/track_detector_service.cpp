@@ -106,7 +106,6 @@ void TrackDetectorService::pictured(const msg::CameraFrame& frame) {
   } else {
     detect(frame);
   }
-  context_.used_up_to(frame.stamp_ns());
 }
 
 void TrackDetectorService::detect(const msg::CameraFrame& frame) {

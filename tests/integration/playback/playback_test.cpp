@@ -28,7 +28,7 @@ class Playback : public railfix::testing::TemporaryFolder {
         participant_(options(train_)),
         progress_(participant_, topics::data_progress),
         control_(participant_, topics::service_control) {
-    listen<msg::DataClock>(topics::data_clock, [this](const msg::DataClock& clock) { clocks_.push_back(clock); });
+    listen<msg::DataClock>(topics::data_clock, [this](const msg::DataClock& clock) { take(clock); });
     listen<msg::ImuSample>(topics::imu_sample,
                            [this](const msg::ImuSample& sample) { imu_.push_back(sample.stamp_ns()); });
     listen<msg::WheelSample>(topics::wheel_sample,
@@ -116,11 +116,21 @@ class Playback : public railfix::testing::TemporaryFolder {
   }
   void take(const msg::CameraFrame& frame) {
     frames_.push_back({frame.seq(), frame.stamp_ns(), frame.health(), frame.data()[0]});
-    if (!answers_) return;
+  }
+  void take(const msg::DataClock& clock) {
+    clocks_.push_back(clock);
+    if (!answers_ || std::string(clock.turn().c_str()) != "tester") return;
     msg::DataProgress progress;
     progress.service("tester");
-    progress.data_ns(frame.stamp_ns());
+    progress.seq(clock.seq());
     progress_.write(progress);
+  }
+
+  static uint64_t sent(const msg::DataClock& clock, const std::string& topic) {
+    for (const auto& one : clock.sent()) {
+      if (topic == one.topic().c_str()) return one.samples();
+    }
+    return 0;
   }
 
   struct Frame {
@@ -166,7 +176,14 @@ TEST_F(Playback, LosslessGivesEveryPictureAndSampleOnceAndEnds) {
   ASSERT_EQ(imu_.size(), kImuSamples);
   for (size_t i = 0; i < imu_.size(); ++i) EXPECT_EQ(imu_[i], kBeginNs + static_cast<int64_t>(i) * kImuNs);
   EXPECT_THAT(wheel_, ::testing::ElementsAre(7));
-  ASSERT_EQ(clocks_.size(), size_t{kPictures + 1});
+  ASSERT_EQ(clocks_.size(), size_t{2 * kPictures + 1});  // two turns a picture, and the end
+  for (size_t i = 0; i < 2 * kPictures; ++i) {
+    EXPECT_EQ(clocks_[i].seq(), i / 2 + 1);
+    EXPECT_EQ(std::string(clocks_[i].turn().c_str()), i % 2 == 0 ? "sensor_gateway" : "tester");
+  }
+  EXPECT_EQ(sent(clocks_[0], "camera_frame/cam0"), 1U);
+  EXPECT_EQ(sent(clocks_[1], "imu_sample"), 1U);
+  EXPECT_EQ(sent(clocks_[2 * kPictures - 1], "imu_sample"), kImuSamples);
   EXPECT_EQ(clocks_.back().ended(), 1);
   EXPECT_EQ(clocks_.back().data_ns(), frames_.back().stamp_ns);
   ASSERT_TRUE(calibration_);

@@ -109,6 +109,21 @@ TEST_F(Train, TheTrueTrainIsInsideTheConfidenceInterval) {
   EXPECT_LT(worst_m, 2.0);
 }
 
+TEST_F(Train, ASecondRunGivesTheSameTablesByteForByte) {
+  const std::string again = (folder_ / "again").string();
+  const auto ran = test::run_program(
+      {"railfix", "run", "--dataset", sequence(), "--start", "1:250:+", "--no-pictures", "--out", again}, kRunS);
+  ASSERT_EQ(ran.exit_code, 0) << ran.err << ran.out;
+  size_t compared = 0;
+  for (const auto& file : fs::directory_iterator(out())) {
+    const std::string name = file.path().filename().string();
+    if (file.path().extension() != ".csv" || name == "status.csv") continue;  // the services' health: host times
+    EXPECT_TRUE(test::slurp(file.path()) == test::slurp(fs::path(again) / name)) << name << " differs";
+    ++compared;
+  }
+  EXPECT_GE(compared, 5U);
+}
+
 TEST_F(Train, ReportsAreValidMessages136) {
   auto reader = core::CsvReader::open(fs::path(out()) / "tpr.csv");
   ASSERT_TRUE(reader.ok());

@@ -33,25 +33,28 @@ TEST(RealPace, PicturesOutOfOrderAreDueAtOnce) {
   EXPECT_EQ(pace.ask(140, 5021).due_ns, 5040);
 }
 
-TEST(LockStep, WaitsForEveryoneAndNamesWhoIsMissing) {
+TEST(LockStep, GivesEveryoneATurnInOrderAndNamesWhoHasIt) {
   LockStep step({"odometry", "fusion"});
-  step.begin(100);
-  EXPECT_FALSE(step.done());
-  EXPECT_EQ(step.missing(), "fusion, odometry");
-  step.answered("odometry", 100);
-  step.answered("stranger", 100);
-  EXPECT_EQ(step.missing(), "fusion");
-  step.answered("fusion", 99);
-  EXPECT_FALSE(step.done());
-  step.answered("fusion", 105);
   EXPECT_TRUE(step.done());
-  step.begin(110);
-  EXPECT_EQ(step.missing(), "fusion, odometry");
+  step.begin();
+  EXPECT_EQ(step.step(), 1U);
+  EXPECT_EQ(step.turn(), "odometry");
+  EXPECT_FALSE(step.answered("fusion", 1)) << "not yet its turn";
+  EXPECT_FALSE(step.answered("stranger", 1));
+  EXPECT_TRUE(step.answered("odometry", 1));
+  EXPECT_EQ(step.turn(), "fusion");
+  EXPECT_FALSE(step.answered("odometry", 1)) << "twice";
+  EXPECT_TRUE(step.answered("fusion", 1));
+  EXPECT_TRUE(step.done());
+  EXPECT_FALSE(step.answered("fusion", 1)) << "no turn is left";
+  step.begin();
+  EXPECT_FALSE(step.answered("odometry", 1)) << "of the step before";
+  EXPECT_EQ(step.turn(), "odometry");
 }
 
 TEST(LockStep, NobodyToWaitForIsDone) {
   LockStep step({});
-  step.begin(1);
+  step.begin();
   EXPECT_TRUE(step.done());
 }
 

@@ -57,7 +57,8 @@ void fill_settings(YAML::Node& settings, const RunOptions& options, const RunPla
   grabber["pace"] = options.pace;
   grabber["start"] = "command";
   if (lossless) {
-    for (const char* service : {"sensor_gateway", "track_detector", "odometry", "map_matcher", "fusion"}) {
+    for (const char* service :
+         {"sensor_gateway", "track_detector", "odometry", "map_matcher", "fusion", "tpr_publisher"}) {
       grabber["wait_for"].push_back(service);
     }
     if (options.record_pictures) grabber["wait_for"].push_back("recorder");
