@@ -11,7 +11,8 @@ namespace {
 constexpr double kShakeMarginRad = 0.02;
 constexpr double kCurveSmoothing_s = 0.3;
 constexpr double kVerticalSmoothing_s = 0.5;
-constexpr double kInertia_s = 0.3;  // after it the speed is not enough to choose among alike shifts
+constexpr double kInertia_s = 0.3;      // after it the speed is not enough to choose among alike shifts
+constexpr double kWrongStamp_s = 0.03;  // searched again over so much way before the ground is given up
 constexpr double kSlowMps = 0.5;
 constexpr int kAlignments = 4;
 constexpr size_t kFewestPatches = 5;
@@ -29,6 +30,7 @@ constexpr double kReliefSigmaM = 0.008;    // mean of the ground in sight agains
 constexpr double kUnseenPitchShare = 0.4;  // of the mount's pitch sigma that the ground does not take out; tuned alike
 constexpr double kFadedScore = 0.6;        // at rest: the light has changed since the reference
 constexpr int64_t kShortestRestNs = 2 * core::kNsPerSecond;
+constexpr int64_t kClockSetBackNs = core::kNsPerSecond;  // no picture is as late as that
 
 }  // namespace
 
@@ -264,7 +266,18 @@ void TrainMouse::give_up(MouseStep& step) {
   tentative_stamp_ns_ = now_.stamp_ns;
 }
 
+// The clock was set back, or a stamp was far ahead of the others: what is known of the motion is of no use.
+void TrainMouse::begin_anew() {
+  reference_.reset();
+  standstill_ = Standstill(options_.standstill_m);
+  speed_mps_ = 0;
+  speed_known_ = confirmed_ = curves_known_ = false;
+  measured_stamp_ns_ = last_stamp_ns_ = 0;
+  tentative_distance_m_ = distance_m_;
+}
+
 MouseStep TrainMouse::process(const MousePicture& picture) {
+  if (picture.stamp_ns < last_stamp_ns_ - kClockSetBackNs) begin_anew();
   MouseStep step;
   step.stamp_ns = picture.stamp_ns;
   step.reference_stamp_ns = picture.stamp_ns;
@@ -283,6 +296,7 @@ MouseStep TrainMouse::process(const MousePicture& picture) {
   if (!reference_) {
     make_reference();
     reference_->errors = filter_.first(now_.prior);
+    reference_->measured_m = reference_->distance_m = distance_m_;
     tentative_stamp_ns_ = picture.stamp_ns;
     step.mode = MouseMode::search;
     last_stamp_ns_ = picture.stamp_ns;
@@ -298,7 +312,9 @@ MouseStep TrainMouse::process(const MousePicture& picture) {
   double band_m = options_.search_band_m + options_.max_acceleration_mps2 * since_m_s * (since_m_s + 0.1);
   if (!speed_known_) band_m = predicted ? band_m + 0.1 * std::abs(predicted_m) : options_.max_speed_mps * reference_s;
 
-  const Rough rough = find_roughly(!predicted || since_m_s > kInertia_s, predicted_m, band_m);
+  Rough rough = find_roughly(!predicted || since_m_s > kInertia_s, predicted_m, band_m);
+  if (!rough.found && speed_known_)
+    rough = find_roughly(true, predicted_m, 2.0 * band_m + kWrongStamp_s * std::abs(speed_mps));
   step.score = rough.score;
   step.reference_stamp_ns = reference_->seen.stamp_ns;
   if (rough.found && align(rough, step)) {

@@ -83,6 +83,7 @@ class TrainMouse {
   TrainMouse(const geometry::Intrinsics& camera, const TrainMouseOptions& options);
 
   /// Pictures in the order of their stamps; one that is not newer than the last is answered as invalid and left out.
+  /// When it is older by more than a second the clock was set back: measuring begins anew, the distance goes on.
   MouseStep process(const MousePicture& picture);
 
  private:
@@ -122,6 +123,7 @@ class TrainMouse {
   double bridge(double speed_after_mps);
   void give_up(MouseStep& step);
   void smooth_curves(const MousePicture& picture);
+  void begin_anew();
 
   geometry::Intrinsics camera_;
   TrainMouseOptions options_;

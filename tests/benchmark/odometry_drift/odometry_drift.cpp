@@ -4,12 +4,15 @@
 #include <cmath>
 #include <cstdio>
 #include <ctime>
+#include <map>
+#include <vector>
 
 #include "core/random.hpp"
 #include "core/units.hpp"
 #include "drift.hpp"
 #include "odometry/train_mouse.hpp"
 #include "scene.hpp"
+#include "simulator/simulator_config.hpp"
 #include "track_detector/track_detector.hpp"
 
 namespace railfix {
@@ -20,6 +23,7 @@ struct Arguments {
   simulator::SimulationOptions simulation;
   Disturbances disturbances;
   std::string map;
+  std::vector<std::string> scenarios;
   double speed_kmh = 72;
   double pitch_deg = 12;
   double focal_px = 1509;  // 8 mm and 5.3 um, as in paper 002
@@ -57,6 +61,17 @@ void add_simulation(CLI::App& app, Arguments& a) {
   app.add_option("--idle-shake", a.disturbances.idle_shake, "Vibration also at rest: 1 = 0.3 mrad, 1 mm")
       ->group("Simulation");
   app.add_option("--rest-s", a.disturbances.rest_s, "The stop (--stop-at-m, --stop-s) is looped to last so long")
+      ->group("Simulation");
+  app.add_option("--scenario", a.scenarios, "Scenario file, as deploy/scenarios/rain_wiper.yaml; more than one add up")
+      ->group("Simulation");
+  app.add_flag("--whole-picture", a.disturbances.whole_picture, "Draw it all, with scenery and other trains (slow)")
+      ->group("Simulation");
+  app.add_option("--other-trains", simulation.other_trains, "Met on the way, in the whole picture")
+      ->group("Simulation");
+  const std::map<std::string, Way> ways{
+      {"forward", Way::forward}, {"reverse", Way::reverse}, {"there-and-back", Way::there_and_back}};
+  app.add_option("--way", a.disturbances.way, "forward, reverse or there-and-back")
+      ->transform(CLI::CheckedTransformer(ways))
       ->group("Simulation");
   app.add_option("--jitter-s", a.disturbances.stamp_jitter_s, "Of the stamps, 1 sigma")->group("Simulation");
 }
@@ -105,12 +120,27 @@ Arguments parse(int argc, char** argv) {
   return a;
 }
 
+// What the files do not say stays as the other options have it.
+void read_scenarios(const std::vector<std::string>& files, simulator::SimulationOptions& simulation) {
+  simulator::SimulatorConfig config{simulation.scenario, simulation.render, simulation.shake};
+  for (const auto& file : files) {
+    const auto status =
+        service::read_section("simulator", file, {}, {}, [&](service::Fields& fields) { config.describe(fields); });
+    if (!status.ok()) throw core::BadInput(status.error().message);
+  }
+  simulation.scenario = config.scenario;
+  simulation.render = config.render;
+  simulation.shake = config.shake;
+}
+
 std::unique_ptr<Scene> open_scene(Arguments& a) {
   if (!a.dataset.empty()) return open_dataset(a.dataset);
   auto& simulation = a.simulation;
   if (!a.map.empty())
     simulation.map = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(a.map)));
-  simulation.render.camera = {a.focal_px, a.focal_px, 639.5, 511.5, 0, 0, 0, 0, 1280, 1024};
+  read_scenarios(a.scenarios, simulation);
+  const auto lens = simulation.render.camera;
+  simulation.render.camera = {a.focal_px, a.focal_px, 639.5, 511.5, lens.k1, lens.k2, lens.p1, lens.p2, 1280, 1024};
   simulation.mount.pitch_rad = core::rad_from_deg(a.pitch_deg);
   simulation.run.cruise_mps = core::mps_from_kmh(a.speed_kmh);
   simulation.run.brake_mps2 = simulation.run.accelerate_mps2;

@@ -8,6 +8,7 @@
 #include "core/random.hpp"
 #include "core/time.hpp"
 #include "simulator/builtin_line.hpp"
+#include "simulator/traffic.hpp"
 
 namespace railfix {
 namespace {
@@ -55,16 +56,20 @@ class Simulated : public Scene {
         calibration_{options.render.camera, options.rate_hz, options.mount},
         line_(line_of(options)),
         trajectory_(line_, options.run, options.mount, options.shake, options.seed),
-        renderer_(line_, only_track(options)),
+        renderer_(line_, what_to_draw(options, disturbances, trajectory_)),
         random_(options.seed + 1000) {}
 
   std::optional<Moment> next() override {
     if (std::optional<Moment> again = repeat()) return again;
     while (random_.uniform() < disturbances_.drop_share) ++count_;
     const double time_s = static_cast<double>(count_++) / options_.rate_hz;
-    if (time_s > trajectory_.duration_s()) return std::nullopt;
+    const bool there_and_back = disturbances_.way == Way::there_and_back;
+    if (time_s > (there_and_back ? 2.0 : 1.0) * trajectory_.duration_s()) return std::nullopt;
+    const bool back = disturbances_.way == Way::reverse || time_s > trajectory_.duration_s();
+    const double run_s = back ? (there_and_back ? 2.0 : 1.0) * trajectory_.duration_s() - time_s : time_s;
     Moment moment;
-    moment.truth = trajectory_.truth(time_s);
+    moment.truth = trajectory_.truth(run_s);
+    if (back) moment.truth.speed_mps = -moment.truth.speed_mps;
     shake(time_s, moment.truth.camera);
     const auto& at = moment.truth;
     const double jitter_s =
@@ -72,7 +77,7 @@ class Simulated : public Scene {
     moment.stamp_ns = trajectory_.begin_ns() + core::to_ns(time_s + jitter_s) + pause_ns_;
     moment.grey =
         renderer_.render({at.camera, at.distance_m, at.speed_mps, options_.scenario.exposure.time_s,
-                          scenario_.gain(trajectory_, time_s), random_.next(), scenario_.look(time_s, at.distance_m)});
+                          scenario_.gain(trajectory_, run_s), random_.next(), scenario_.look(time_s, at.distance_m)});
     remember(moment);
     return moment;
   }
@@ -108,11 +113,17 @@ class Simulated : public Scene {
     const double most_s = std::floor(options_.run.stop_s) - 1.0;
     if (stop && static_cast<double>(rest_.size()) / options_.rate_hz < most_s) rest_.push_back(moment);
   }
-  static simulator::RenderOptions only_track(const simulator::SimulationOptions& options) {
+  static simulator::RenderOptions what_to_draw(const simulator::SimulationOptions& options,
+                                               const Disturbances& disturbances,
+                                               const simulator::Trajectory& trajectory) {
     simulator::RenderOptions render = options.render;
     render.seed = options.seed;
-    render.strip = kDrawn;
-    render.scenery = false;
+    render.scenery = disturbances.whole_picture;
+    if (disturbances.whole_picture) {
+      render.trains = simulator::plan_traffic(trajectory, options.other_trains, options.seed);
+    } else {
+      render.strip = kDrawn;
+    }
     return render;
   }
   simulator::SimulationOptions options_;

@@ -26,15 +26,21 @@ class Scene {
 
 std::unique_ptr<Scene> open_dataset(const std::string& folder);
 
-/// What happens to pictures between the camera and us.
+/// How the run is gone through.
+enum class Way { forward, reverse, there_and_back };
+
+/// What happens to the run, and to pictures between the camera and us.
 struct Disturbances {
-  double drop_share = 0;      // pictures lost
-  double stamp_jitter_s = 0;  // 1 sigma of the stamp against the true time
-  double idle_shake = 0;      // of the camera, motors running: 1 = 0.3 mrad and 1 mm, up to 19 Hz; also at rest
-  double rest_s = 0;          // the pictures of a stop are shown again and again until it has lasted so long
+  Way way = Way::forward;
+  double drop_share = 0;       // pictures lost
+  double stamp_jitter_s = 0;   // 1 sigma of the stamp against the true time
+  double idle_shake = 0;       // of the camera, motors running: 1 = 0.3 mrad and 1 mm, up to 19 Hz; also at rest
+  double rest_s = 0;           // the pictures of a stop are shown again and again until it has lasted so long
+  bool whole_picture = false;  // with scenery and other trains
 };
 
-/// Draws only the own track, 60 m ahead and 1 m to either side: the rest stays grey.
+/// Draws only the own track, 60 m ahead and 1 m to either side, if the whole picture is not asked for: the rest stays
+/// grey.
 std::unique_ptr<Scene> simulate_track(const simulator::SimulationOptions& options, const Disturbances& disturbances);
 
 }  // namespace railfix

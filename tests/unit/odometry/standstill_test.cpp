@@ -17,7 +17,8 @@ class Feed {
  public:
   explicit Feed(double noise_m) : noise_m_(noise_m) {}
   double at(double true_m) {
-    return standstill.report(core::to_ns(1 + static_cast<double>(count_++) / kRate), true_m + random_.normal(0, noise_m_));
+    return standstill.report(core::to_ns(1 + static_cast<double>(count_++) / kRate),
+                             true_m + random_.normal(0, noise_m_));
   }
   Standstill standstill{0.003};
 

@@ -59,7 +59,8 @@ float SyntheticGround::ground(double along_m, double left_m) const {
   const float top = a[0] + fc * (a[1] - a[0]);
   const float bottom = b[0] + fc * (b[1] - b[0]);
   auto grey = static_cast<float>(100.0 + options_.stone_contrast * (top + fr * (bottom - top)));
-  const double in_period = along_m / 0.6 - std::floor(along_m / 0.6);
+  const double straight_m = along_m - options_.sleeper_bow_m * std::cos(2.2 * left_m);
+  const double in_period = straight_m / 0.6 - std::floor(straight_m / 0.6);
   if (in_period < 0.42) grey += static_cast<float>(options_.sleeper_contrast);
   return grey;
 }

@@ -19,6 +19,7 @@ class SyntheticGround {
   struct Options {
     double stone_contrast = 30;   // grey levels, 1 sigma
     double sleeper_contrast = 0;  // sleepers every 0.60 m, brighter by so much
+    double sleeper_bow_m = 0;     // their middle shows farther on than their ends, as sagging ones do
     double texture_depth_m = 0.18;
     double curvature_per_m = 0;
     double vertical_curvature_per_m = 0;

@@ -76,6 +76,53 @@ TEST(TrainMouse, IsNotDeceivedBySleepers) {
   EXPECT_NEAR(step.distance_m, 12.0, 0.03);
 }
 
+// 36 m/s at 60 Hz is exactly one sleeper a picture, from a cold start and again after a gap.
+TEST(TrainMouse, OneSleeperAPictureIsNotStandstill) {
+  SyntheticGround::Options ground;
+  ground.stone_contrast = 12;
+  ground.sleeper_contrast = 60;
+  Ride ride(ground, 4);
+  MouseStep step;
+  for (int i = 0; i <= 30; ++i) {
+    if (i >= 10 && i < 20) continue;
+    step = ride.at(i / 60.0, 0.6 * i);
+    EXPECT_TRUE(step.valid || i < 2 || (i >= 20 && i < 22)) << i;
+    if (step.valid) {
+      EXPECT_NEAR(step.speed_mps, 36.0, 0.4) << i;
+    }
+  }
+  EXPECT_NEAR(step.distance_m, 18.0, 0.05);
+}
+
+// All shifts by a sleeper look alike then, over the whole width.
+TEST(TrainMouse, SaggingSleepersHaveNoVote) {
+  SyntheticGround::Options ground;
+  ground.stone_contrast = 12;
+  ground.sleeper_contrast = 60;
+  ground.sleeper_bow_m = 0.15;
+  Ride ride(ground);
+  for (int i = 0; i < 5; ++i) {  // a picture a second: no motion is known beforehand
+    const MouseStep step = ride.at(i, 2.1 * i);
+    EXPECT_EQ(step.valid, i >= 2) << i;
+    if (step.valid) {
+      EXPECT_NEAR(step.step_m, 2.1, 0.01) << i;
+    }
+  }
+}
+
+TEST(TrainMouse, TurnsBackWithoutAStop) {
+  Ride ride;
+  for (int i = 0; i <= 40; ++i) {
+    const double time_s = i / 20.0;
+    const double distance_m = 3.0 * time_s - 1.5 * time_s * time_s;
+    const MouseStep step = ride.at(time_s, distance_m);
+    EXPECT_TRUE(step.valid || i < 2) << i;
+    if (step.valid) {
+      EXPECT_NEAR(step.distance_m, distance_m, 0.008) << i;
+    }
+  }
+}
+
 TEST(TrainMouse, StandsStillExactly) {
   Ride ride;
   MouseStep step;
@@ -176,6 +223,30 @@ TEST(TrainMouse, LatePictureIsLeftOut) {
   const MouseStep step = ride.at(6 / kRate, 2.4);
   EXPECT_TRUE(step.valid);
   EXPECT_NEAR(step.distance_m, 2.4, 0.012);
+}
+
+TEST(TrainMouse, NoisyStampsDoNotChangeTheDistance) {
+  Ride ride;
+  core::Random random(5);
+  MouseStep step;
+  for (int i = 0; i <= 30; ++i) {
+    step = ride.at(i / kRate + std::clamp(random.normal(0, 0.005), -0.012, 0.012), 0.5 * i);
+    EXPECT_TRUE(step.valid || i < 2) << i;
+  }
+  EXPECT_NEAR(step.distance_m, 15.0, 0.012);
+}
+
+// One stamp an hour ahead of the others must not end the measuring for an hour.
+TEST(TrainMouse, BeginsAnewWhenTheClockIsSetBack) {
+  Ride ride;
+  MouseStep step;
+  for (int i = 0; i < 6; ++i) step = ride.at(i / kRate, 0.4 * i);
+  const double before_m = ride.at(3600, 2.4).distance_m;
+  for (int i = 7; i < 12; ++i) step = ride.at(i / kRate, 0.4 * i);
+  EXPECT_TRUE(step.valid);
+  EXPECT_NEAR(step.speed_mps, 12.0, 0.1);
+  EXPECT_GT(step.distance_m, before_m + 0.8);
+  EXPECT_LT(step.distance_m, 0.4 * 11 + 0.05);
 }
 
 TEST(TrainMouse, ShakeOfTheCameraIsNotMotion) {
