@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <opencv2/core/hal/intrin.hpp>
 
 namespace railfix::frame_grabber {
 namespace {
@@ -23,23 +24,10 @@ struct Window {
 
 /// REQUIRES: 18 pixels.
 Window look_at(const uint8_t* p) {
-  uint8_t low[kWindow];
-  uint8_t high[kWindow];
-  uint8_t steps[kWindow];
-  int sum = 0;
-  for (int i = 0; i < kWindow; ++i) sum += p[i];
-  for (int i = 0; i < kWindow; ++i) {
-    low[i] = high[i] = p[i];
-    steps[i] = static_cast<uint8_t>(std::max(p[i], p[i + 2]) - std::min(p[i], p[i + 2]));
-  }
-  for (int half = kWindow / 2; half > 0; half /= 2) {
-    for (int i = 0; i < half; ++i) {
-      low[i] = std::min(low[i], low[i + half]);
-      high[i] = std::max(high[i], high[i + half]);
-      steps[i] = std::max(steps[i], steps[i + half]);
-    }
-  }
-  return {sum / kWindow, high[0] - low[0], std::min<int>(steps[0], high[0] - low[0])};
+  const cv::v_uint8x16 here = cv::v_load(p);
+  const int height = cv::v_reduce_max(here) - cv::v_reduce_min(here);
+  const int steepest = cv::v_reduce_max(cv::v_absdiff(here, cv::v_load(p + 2)));
+  return {static_cast<int>(cv::v_reduce_sum(here)) / kWindow, height, std::min(steepest, height)};
 }
 
 int tile_of(int position, int length, int tiles) {
@@ -100,17 +88,18 @@ std::array<float, kTiles> difference(const PictureTiles& a, const PictureTiles& 
 
 uint64_t fingerprint(const cv::Mat& grey) {
   constexpr uint64_t kOdd = 0x9E3779B97F4A7C15ULL;
-  uint64_t lanes[4] = {1, 2, 3, 4};
+  constexpr size_t kLanes = 8;  // so many multiplications are under way at a time
+  uint64_t lanes[kLanes] = {1, 2, 3, 4, 5, 6, 7, 8};
   const auto columns = static_cast<size_t>(grey.cols);
   for (int row = 0; row < grey.rows; ++row) {
     const uint8_t* p = grey.ptr(row);
     size_t i = 0;
-    for (; i + 32 <= columns; i += 32) {
-      uint64_t words[4];
+    for (; i + 8 * kLanes <= columns; i += 8 * kLanes) {
+      uint64_t words[kLanes];
       std::memcpy(words, p + i, sizeof words);
-      for (int k = 0; k < 4; ++k) lanes[k] = (std::rotl(lanes[k], 23) ^ words[k]) * kOdd;
+      for (size_t k = 0; k < kLanes; ++k) lanes[k] = (std::rotl(lanes[k], 23) ^ words[k]) * kOdd;
     }
-    for (; i < columns; ++i) lanes[i % 4] = (std::rotl(lanes[i % 4], 23) ^ p[i]) * kOdd;
+    for (; i < columns; ++i) lanes[i % kLanes] = (std::rotl(lanes[i % kLanes], 23) ^ p[i]) * kOdd;
   }
   uint64_t all = static_cast<uint64_t>(grey.rows) * kOdd + columns;
   for (const uint64_t lane : lanes) all = (std::rotl(all, 29) ^ lane) * kOdd;

@@ -12,6 +12,12 @@ constexpr double kEdgeSigmaPx = 0.35;  // of a clear edge
 constexpr double kEdgeSigmaM = 0.003;  // wear and rounding of the head, dirt
 constexpr size_t kUsualSamples = 1024;
 constexpr double kSideM = 0.05;  // ground beside the head that it is compared with
+// The dark web beside a head draws the steepest place towards the head, by up to this.
+constexpr double kBiasPx = 0.05;
+// What is k times too bright for the camera swallows 1/2 - 1/(2k) of the pixel at its edge; k is 1 to 3 and unknown.
+constexpr double kSwallowedPx = 0.2;
+constexpr double kSwallowedSigmaPx = 0.2;
+constexpr double kBurntOutGrey = 245;
 
 /// Bilinear; the caller keeps it inside.
 double sample(const cv::Mat& grey, double u, double v) {
@@ -32,6 +38,7 @@ bool inside(const cv::Mat& grey, const Eigen::Vector2d& pixel) {
 struct Crossing {
   double at = 0;
   double contrast = 0;
+  bool burnt_out = false;  // the brighter side of the edge
 };
 
 /// The band that stands out most on both sides, then the steepest step at its inner side.
@@ -70,7 +77,9 @@ std::optional<Crossing> find_crossing(const EdgeProfile& profile, double head, d
   const double bend = before - 2 * peak_value + after;
   const double shift = bend < 0 ? std::clamp(0.5 * (before - after) / bend, -1.0, 1.0) : 0.0;
   // Border between samples peak - 1 and peak.
-  return Crossing{peak + shift - 0.5, best_contrast};
+  const double brighter =
+      sign > 0 ? profile.mean(peak + 1, peak + 1 + crown_n) : profile.mean(peak - 1 - side_n, peak - 1);
+  return Crossing{peak + shift - 0.5, best_contrast, brighter > kBurntOutGrey};
 }
 
 }  // namespace
@@ -135,11 +144,14 @@ const std::vector<RailEdge>& EdgeFinder::find(const cv::Mat& grey, const geometr
                                           options.min_contrast);
       if (!crossing) continue;
       RailEdge edge;
-      edge.point.pixel = *inner + outward * (crossing->at - before);
+      double at = crossing->at - before;
+      if (crossing->burnt_out) at += (options.dark ? -kSwallowedPx : kSwallowedPx) / kStepPx;
+      edge.point.pixel = *inner + outward * at;
       edge.point.side = side;
+      edge.point.bias_sigma_px = crossing->burnt_out ? kSwallowedSigmaPx : kBiasPx;
       edge.point.sigma_px = std::hypot(kEdgeSigmaPx, kEdgeSigmaM * px_per_m);
       edge.ahead_m = ahead_m;
-      edge.offset_m = (crossing->at - before) * kStepPx / px_per_m;
+      edge.offset_m = at * kStepPx / px_per_m;
       edge.contrast = crossing->contrast;
       edges_.push_back(edge);
     }

@@ -131,6 +131,7 @@ class Builder {
   bool operator()(const ShapeVector& shape, Equations& equations, bool with_priors = true) {
     RailPicture rails(camera_, shape);
     by_offset.setZero();
+    by_bias.setZero();
     for (size_t i = 0; i < points_.size(); ++i) {
       if (!add_point(rails, i, equations)) return false;
     }
@@ -163,6 +164,8 @@ class Builder {
 
   /// Sums of J'W times the derivative by a sideways offset of the left and of the right rail.
   Eigen::Matrix<double, kShapeSize, 2> by_offset = Eigen::Matrix<double, kShapeSize, 2>::Zero();
+  /// The same by one sigma of the edges' common bias in pixels.
+  Eigen::Matrix<double, kShapeSize, 2> by_bias = Eigen::Matrix<double, kShapeSize, 2>::Zero();
 
  private:
   bool add_point(RailPicture& rails, size_t i, Equations& equations) {
@@ -181,7 +184,9 @@ class Builder {
     residuals_px_[i] = normal.dot(difference);
     const Row across = normal.transpose() * j / point.sigma_px;
     weights_[i] = equations.add(across, residuals_px_[i] / point.sigma_px, options_.cauchy_scale);
-    by_offset.col(point.half_gauge_m > 0 ? 0 : 1) -= weights_[i] * across(3) * across.transpose();
+    const int rail = point.half_gauge_m > 0 ? 0 : 1;
+    by_offset.col(rail) -= weights_[i] * across(3) * across.transpose();
+    by_bias.col(rail) -= weights_[i] * point.bias_sigma_px * across(3) / j.col(3).norm() * across.transpose();
     if (point.ahead_known) {
       const Eigen::Vector2d tangent = along.normalized();
       const Row lengthwise = tangent.transpose() * j / point.sigma_px;
@@ -259,6 +264,7 @@ void RailFitter::prepare(const geometry::Intrinsics& camera, const std::vector<E
     p.pixel = {camera.fu_px * n.x(), camera.fv_px * n.y()};
     p.half_gauge_m = point.side == Side::left ? gauge_m / 2 : -gauge_m / 2;
     p.sigma_px = point.sigma_px;
+    p.bias_sigma_px = point.bias_sigma_px;
     p.ahead_known = std::isfinite(point.ahead_m);
     if (p.ahead_known) p.inverse_m = 1.0 / point.ahead_m;
     points_.push_back(p);
@@ -288,7 +294,8 @@ const RailFit& RailFitter::fit(const geometry::Intrinsics& camera, const std::ve
   Matrix8 covariance = information.inverse();
   const Eigen::Matrix<double, kShapeSize, 2> moved =
       covariance * builder.by_offset * (options.rail_offset_sigma_m / spread);
-  covariance += moved * moved.transpose();
+  const Eigen::Matrix<double, kShapeSize, 2> shifted = covariance * builder.by_bias / spread;
+  covariance += moved * moved.transpose() + shifted * shifted.transpose();
   fit_.covariance = covariance.topLeftCorner<7, 7>();
   fit_.condition = condition_of(data.information.topLeftCorner<7, 7>());
   summarise(weights_, fit_);

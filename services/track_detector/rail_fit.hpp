@@ -48,6 +48,8 @@ struct EdgePoint {
   /// Known X: then both pixel coordinates count (the paper's point-to-point distance, 3.5). NaN: the point may lie
   /// anywhere along the rail and only its distance along the picture normal of the rail counts.
   double ahead_m = std::numeric_limits<double>::quiet_NaN();
+  /// One sigma of what moves all edges of this rail across by so many pixels alike; no residual shows it.
+  double bias_sigma_px = 0;
 };
 
 struct RailFitOptions {
@@ -83,6 +85,7 @@ struct FitPoint {
   Eigen::Vector2d pixel;
   double half_gauge_m = 0;  // signed
   double sigma_px = 1;
+  double bias_sigma_px = 0;
   double inverse_m = 0;  // where it is known
   bool ahead_known = false;
 };

@@ -91,6 +91,32 @@ TEST(TrackDetector, FindsDarkRailsOnLightGround) {
   EXPECT_LT(worst_offset_m(observation, scene, 30), 0.01);
 }
 
+// Heads too bright for the camera look wider than they are: that must neither move the pose nor make it look sure.
+TEST(TrackDetector, KnowsThatBurntOutHeadsLookTooWide) {
+  Scene scene;
+  scene.shape.camera = kMount;
+  TrackDetector detector(kCab, kMount, {});
+  const auto usual = detector.detect(render(scene));
+  for (const double rail_grey : {300.0, 400.0, 600.0}) {
+    scene.rail_grey = rail_grey;
+    const auto observation = detector.detect(render(scene));
+    ASSERT_TRUE(observation.seen()) << observation.reason;
+    for (const int k : {1, 4}) {
+      const double error = to_vector(observation.shape)(k) - to_vector(scene.shape)(k);
+      EXPECT_LT(std::abs(error), 2 * std::sqrt(observation.covariance(k, k))) << "unknown " << k;
+    }
+    EXPECT_GT(observation.covariance(1, 1), 1.5 * usual.covariance(1, 1));
+    const railfix::geometry::View view(kCab, scene.shape.camera);
+    double outward_px = 0;
+    for (const auto& point : observation.points) {
+      const auto ground = view.on_plane(point.pixel, 0);
+      const double outward_m = (point.side == Side::left ? 1 : -1) * ground->y() - 1.435 / 2;
+      outward_px += outward_m * kCab.fu_px / ground->x() / static_cast<double>(observation.points.size());
+    }
+    EXPECT_LT(std::abs(outward_px), 0.18) << rail_grey;
+  }
+}
+
 TEST(TrackDetector, FollowsAndRecovers) {
   TrackDetector detector(kCab, kMount, {});
   Scene scene;
