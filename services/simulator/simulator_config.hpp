@@ -96,6 +96,10 @@ struct SimulatorConfig {
                   "Slow shake; 1 is roll 0.09, pitch 0.14, yaw 0.09 deg and 10 mm at 72 km/h, 1 sigma.");
     fields.number("rattle_rad", shake.rattle_rad, {0, 0.02}, "rad", "Fast pitching at 72 km/h, 1 sigma.");
     fields.number("rattle_hz", shake.rattle_hz, {3, 60}, "Hz", "How fast.");
+    fields.number("knock_at_s", shake.knock_at_s, {0, 1e6}, "s",
+                  "The camera is knocked in its mount then and stays so; 0: never.");
+    fields.number("knock_pitch_rad", shake.knock_pitch_rad, {-0.2, 0.2}, "rad", "By how much, down.");
+    fields.number("knock_yaw_rad", shake.knock_yaw_rad, {-0.2, 0.2}, "rad", "By how much, to the left.");
   }
   void describe_frames(service::Fields& fields) {
     auto& frames = scenario.frames;

@@ -28,7 +28,7 @@ double length_for(const RunOptions& run) {
 
 Trajectory::Trajectory(std::shared_ptr<const Line> line, const RunOptions& run, const geometry::CameraPose& mount,
                        const ShakeOptions& shake, uint64_t seed)
-    : line_(std::move(line)), run_(run), mount_(mount) {
+    : line_(std::move(line)), run_(run), mount_(mount), shake_(shake) {
   const double wanted_m = run_.length_m > 0.0 ? run_.length_m : length_for(run_);
   const double length_m = std::min(wanted_m, line_->path().end_m());
   phases_.push_back({0.0, 0.0, 0.0, 0.0});
@@ -109,6 +109,10 @@ dataset::TruthRow Trajectory::truth(double time_s) const {
   row.acceleration_mps2 = now.acceleration_mps2;
   row.camera = {mount_.roll_rad + moved.roll_rad, mount_.pitch_rad + moved.pitch_rad, mount_.yaw_rad + moved.yaw_rad,
                 mount_.lateral_m + moved.lateral_m, mount_.height_m + moved.height_m};
+  if (shake_.knock_at_s > 0.0 && time_s >= shake_.knock_at_s) {
+    row.camera.pitch_rad += shake_.knock_pitch_rad;
+    row.camera.yaw_rad += shake_.knock_yaw_rad;
+  }
   row.curvature_per_m = track.curvature_per_m;
   row.vertical_curvature_per_m = track.vertical_curvature_per_m;
   row.easting_m = track.pose.easting_m;

@@ -32,6 +32,10 @@ struct ShakeOptions {
   double height_m = 0.005;
   double rattle_rad = 0.0;  // fast pitching besides, 1 sigma
   double rattle_hz = 14.0;
+  // The camera is knocked in its mount and stays so; the calibration does not know it.
+  double knock_at_s = 0.0;  // 0 = never
+  double knock_pitch_rad = 0.0;
+  double knock_yaw_rad = 0.0;
 };
 
 /// Distance, speed and acceleration of one moment.
@@ -69,6 +73,7 @@ class Trajectory {
   std::shared_ptr<const Line> line_;
   RunOptions run_;
   geometry::CameraPose mount_;
+  ShakeOptions shake_;
   std::vector<Phase> phases_;
   std::array<Wave, 2> rattle_{};
   std::vector<Wave> waves_[5];  // roll, pitch, yaw, lateral, height

@@ -7,7 +7,8 @@
 // from its true place anywhere nearer than 30 m and than the end that the detector gives, or its points are more than 5
 // px off in the median. For --poses the suspension limits are the scatter of the true poses (a floor keeps them from
 // zero), as an operator who knows his train would set them, and the rails' offset is zero, as the simulator's gauge is
-// exact. --imu: the roll's prior comes from the dataset's gyro.
+// exact. --imu: the roll's prior comes from the dataset's gyro. When the mount is found to be off it is said, as
+// track_detector says it.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -20,10 +21,12 @@
 #include <string>
 #include <vector>
 
+#include "core/time.hpp"
 #include "dataset/dataset.hpp"
 #include "rails_on_dataset/true_rails.hpp"
 #include "track_detector/draw.hpp"
 #include "track_detector/imu_roll.hpp"
+#include "track_detector/mount_watch.hpp"
 #include "track_detector/track_detector.hpp"
 
 namespace {
@@ -189,6 +192,10 @@ void measure(const std::string& sequence, const Options& wanted) {
   const auto imu =
       wanted.imu ? core::value_or_throw(dataset::read_sensors(sequence)).imu : std::vector<dataset::ImuRow>{};
   auto sample = imu.begin();
+  MountWatch watch(detector.mount(), options.limits);
+  std::string drift;
+  int64_t first_ns = 0;
+  int64_t last_ns = 0;
   Statistics statistics;
   for (;;) {
     const auto picture = core::value_or_throw(pictures->next());
@@ -199,6 +206,13 @@ void measure(const std::string& sequence, const Options& wanted) {
     const auto observation = detector.detect(picture->grey, imu_roll.at(picture->stamp_ns));
     statistics.milliseconds.push_back(1e3 * static_cast<double>(std::clock() - begun) / CLOCKS_PER_SEC);
     ++statistics.frames;
+    if (first_ns == 0) first_ns = last_ns = picture->stamp_ns;
+    if (observation.seen()) watch.add(observation.shape, core::seconds(picture->stamp_ns - last_ns));
+    last_ns = picture->stamp_ns;
+    if (drift.empty() && watch.drifted()) {
+      drift = watch.what_drifted();
+      std::printf("  the mount is off after %.1f s: %s\n", core::seconds(last_ns - first_ns), drift.c_str());
+    }
     if (!wanted.draw_folder.empty() && (statistics.frames % wanted.draw_every == 1 || !observation.seen())) {
       cv::Mat colour;
       cv::cvtColor(picture->grey, colour, cv::COLOR_GRAY2BGR);
