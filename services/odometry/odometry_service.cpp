@@ -148,7 +148,7 @@ void OdometryService::measure(const Waiting& waiting, const msg::TrackView* view
     picture.grey = waiting.grey;
     picture.stamp_ns = waiting.stamp_ns;
     take_pose(waiting, view, picture);
-    if (messaging::is_repeat(waiting.health)) {
+    if (messaging::why_useless(waiting.health) != nullptr) {
       last_step_.stamp_ns = waiting.stamp_ns;
       last_step_.mode = MouseMode::blind;
       last_step_.valid = false;
@@ -187,7 +187,8 @@ void OdometryService::publish(const MouseStep& step, const Waiting& waiting) {
 void OdometryService::tell(const MouseStep& step, uint32_t picture_health) {
   if (step.valid || last_valid_ns_ == 0) last_valid_ns_ = step.stamp_ns;
   if (step.stamp_ns - last_valid_ns_ > kBlindNs) {
-    context_.health().degraded(messaging::is_repeat(picture_health) ? "blind: the camera sends the same picture again"
+    const char* useless = messaging::why_useless(picture_health);
+    context_.health().degraded(useless != nullptr ? std::string("blind: ") + useless
                                : step.mode == MouseMode::blind
                                    ? "blind: the ground shows no texture (dark, glare, snow or a covered lens)"
                                    : "the ground of one picture is not found in the next (wrong mount, or too fast)");

@@ -103,6 +103,13 @@ const TrackObservation& TrackDetector::detect(const cv::Mat& grey, const std::op
   return observation_;
 }
 
+const TrackObservation& TrackDetector::not_seen(const char* why) {
+  observation_.clear();
+  forget(observation_);
+  observation_.reason = why;
+  return observation_;
+}
+
 bool TrackDetector::follow(const cv::Mat& grey) {
   refine(grey, *previous_, dark_, kTrackReachM, observation_);
   if (!observation_.seen()) return false;

@@ -61,6 +61,8 @@ class TrackDetector {
   /// searches the whole range of the limits. `roll`: straight rails alone cannot tell it from a sideways position.
   /// The answer is valid until the next call.
   const TrackObservation& detect(const cv::Mat& grey, const std::optional<RollHint>& roll = std::nullopt);
+  /// The answer for a picture that is not worth looking at.
+  const TrackObservation& not_seen(const char* why);
   /// Forgets the previous picture.
   void reset() {
     previous_.reset();

@@ -113,9 +113,8 @@ void TrackDetectorService::detect(const msg::CameraFrame& frame) {
   auto* pixels = const_cast<uint8_t*>(frame.data().data());  // NOLINT(cppcoreguidelines-pro-type-const-cast)
   const cv::Mat grey(static_cast<int>(frame.height_px()), static_cast<int>(frame.width_px()), CV_8UC1, pixels);
   TrackObservation& observation = observation_;
-  if (messaging::is_repeat(frame.health())) {
-    observation.clear();
-    observation.reason = "the camera sends the same picture again";
+  if (const char* why = messaging::why_useless(frame.health())) {
+    observation = detector_->not_seen(why);
   } else {
     observation = detector_->detect(grey, imu_roll_->at(frame.stamp_ns()));
   }
