@@ -7,204 +7,375 @@
 namespace railfix::track_detector {
 namespace {
 
-constexpr double kFirstBearing = 0.06;    // an edge is taken up from here ...
-constexpr double kLastBearing = 0.75;     // ... to here, share of the widest one
+constexpr size_t kMostLooks = 56;
+constexpr double kLookM = 0.4;           // way between two looks
+constexpr double kReachM = 26.0;         // way back
+constexpr double kFirstBearing = 0.055;  // narrower ones tell nothing
+constexpr double kWideShare = 0.62;      // of the widest bearing: from here an edge is looked for in the looks before
+constexpr double kPatienceM = 1.3;       // an edge that was not seen on so much of the way has left
+constexpr double kTolerance = 0.002;     // bearing, of the pose
+constexpr float kFullScore = 5.0F;
+constexpr double kLateralsM[] = {1.5, 14.0};
+constexpr double kDepthStep = 0.003;  // bearing at kDepthBackM, between two depths that are tried
+constexpr double kDepthBackM = 16.0;
+constexpr size_t kFewestLooks = 5;
+constexpr int kPasses = 6;               // the second half with the looks before it was sure, too
+constexpr float kUsualEvidence = 0.35F;  // by chance
+constexpr double kLeastSupport = 0.2;    // a look, over the usual
+constexpr double kSureSupport = 0.65;
+constexpr double kGate = 0.008;           // bearing, of a known edge in another look
 constexpr double kBearingSigma = 0.0012;  // of one edge, yaw of the pose included
-constexpr double kLeastSigma = 0.0007;    // what does not average out
-constexpr double kUsualLateralM = 3.5;
-constexpr double kInverseSigma = 0.12;  // 1/m
-constexpr double kGateSigmas = 3.0;
-constexpr double kGate = 0.003;
-constexpr double kGrowth = 1.3;      // of the bearing while it is followed
-constexpr double kWorstFit = 0.004;  // bearing
-constexpr int kFewestPictures = 5;
-constexpr double kBesideBearing = 0.03;  // a new edge so near a known one belongs to the same thing
-constexpr double kSeenShare = 0.6;
-constexpr int kMostMissed = 3;
-constexpr size_t kMostTracks = 150;
-constexpr double kNearestLateralM = 1.5;
-constexpr double kFarthestLateralM = 14.0;
-constexpr double kBendShare = 0.30;  // of the curvature, unknown
-constexpr double kCorrelated = 4.0;  // so many neighbouring measurements err together
+constexpr double kLeastSigma = 0.0008;    // what does not average out
+constexpr double kBendSigma = 3e-4;       // 1/m, of the curvature that the way was followed with
+constexpr double kCorrelated = 4.0;       // so many neighbouring measurements err together
+constexpr double kWorstFit = 0.004;       // bearing
+constexpr double kGrowth = 1.4;           // of the bearing while it was seen
+constexpr float kLeastStep = 1.5F;        // grey levels
+constexpr double kSameM = 0.35;
 
-// Bearing of a place (arc length and lateral offset of a track of constant curvature) seen from the track's foot.
-double bearing_of(double along_m, double lateral_m, double curvature_per_m, double eye_lateral_m) {
-  const double turn = curvature_per_m * along_m;
-  const double x = along_m * (1 - turn * turn / 6) - lateral_m * turn;
-  const double y = 0.5 * along_m * turn + lateral_m * (1 - 0.5 * turn * turn) - eye_lateral_m;
-  return y / std::max(0.5, x);
-}
+constexpr double kStepReachM = 9;  // looks from farther away show the end of a wall too narrow
+constexpr int kFewestStepLooks = 6;
+constexpr double kStepM = 0.03;
+constexpr double kStepTopM = 0.06;
+constexpr double kBesideStep = 0.8;  // of a step's evidence is beside it
+constexpr double kClearStep = 0.36;  // mean evidence
 
 }  // namespace
 
-EdgeTracker::EdgeTracker() {
-  tracks_.reserve(kMostTracks);
-  settled_.reserve(kMostTracks);
-  used_.reserve(kMostTracks);
+EdgeTracker::EdgeTracker() : looks_(kMostLooks) {
+  relatives_.reserve(kMostLooks);
+  candidates_.reserve(200);
+  settled_.reserve(200);
 }
 
 void EdgeTracker::forget() {
-  tracks_.clear();
-}
-
-void EdgeTracker::predict(Track& track, double way_m) {
-  const double step_m = way_m - track.way_m;
-  track.way_m = way_m;
-  track.ratio -= step_m * track.inverse_m;
-  track.p00 += step_m * step_m * track.p11 - 2 * step_m * track.p01;
-  track.p01 -= step_m * track.p11;
-  track.hit = false;
-}
-
-// The bearing that the edge would have on straight track, seen from the track centre.
-double EdgeTracker::straightened(const Track& track, double bearing, const LandmarkPicture& picture) {
-  const double ahead_m = std::clamp(track.ahead_m(), 2.0, 40.0);
-  const double lateral_m = track.side / track.inverse_m;
-  return bearing * (1 - picture.curvature_per_m * lateral_m) - 0.5 * picture.curvature_per_m * ahead_m +
-         picture.pose.lateral_m / ahead_m;
-}
-
-void EdgeTracker::remember(Track& track, const EdgeMeasurement& measurement) {
-  if (track.count == kMostMeasurements) {
-    for (size_t i = 0; 2 * i < kMostMeasurements; ++i) track.measured[i] = track.measured[2 * i + 1];
-    track.count = kMostMeasurements / 2;
-  }
-  track.measured[track.count++] = measurement;
-}
-
-void EdgeTracker::update(Track& track, const UprightEdge& edge, const LandmarkPicture& picture) {
-  const double bearing = std::max(0.02, track.side * straightened(track, edge.bearing, picture));
-  const double innovation = 1 / bearing - track.ratio;
-  const double sigma = kBearingSigma / (bearing * bearing);
-  const double variance = track.p00 + sigma * sigma;
-  const double k0 = track.p00 / variance;
-  const double k1 = track.p01 / variance;
-  track.ratio += k0 * innovation;
-  track.inverse_m = std::clamp(track.inverse_m + k1 * innovation, 1 / kFarthestLateralM, 1 / kNearestLateralM);
-  track.p11 -= k1 * track.p01;
-  track.p01 -= k0 * track.p01;
-  track.p00 -= k0 * track.p00;
-  track.inner_grey += edge.inner_grey;
-  track.outer_grey += edge.outer_grey;
-  track.deep_grey += edge.deep_grey;
-  track.hit = true;
-  track.missed = 0;
-  ++track.seen;
-  remember(track, {track.way_m, edge.bearing, picture.curvature_per_m, picture.pose.lateral_m});
+  count_ = 0;
+  candidates_.clear();
 }
 
 const std::vector<SettledEdge>& EdgeTracker::follow(const std::vector<UprightEdge>& found,
-                                                    const LandmarkPicture& picture, double way_m, double widest) {
+                                                    const UprightProfile& profile, const LandmarkPicture& picture,
+                                                    double way_m) {
   settled_.clear();
-  used_.assign(found.size(), 0);
-  for (Track& track : tracks_) predict(track, way_m);
-  // The longest followed choose first.
-  std::sort(tracks_.begin(), tracks_.end(), [](const Track& a, const Track& b) { return a.seen > b.seen; });
-  for (Track& track : tracks_) {
-    const double expected = track.bearing();
-    const double gate = kGate + kGateSigmas * std::sqrt(std::max(0.0, track.p00)) * expected * expected +
-                        0.15 * std::abs(picture.curvature_per_m) * std::min(track.ahead_m(), 30.0);
-    size_t best = found.size();
-    double nearest = gate;
-    for (size_t i = 0; i < found.size(); ++i) {
-      if (used_[i] != 0 || found[i].contrast() * track.sign < 0) continue;
-      const double off = std::abs(straightened(track, found[i].bearing, picture) - expected);
-      if (off < nearest) {
-        nearest = off;
-        best = i;
-      }
-    }
-    if (best < found.size()) {
-      used_[best] = 1;
-      update(track, found[best], picture);
-    } else {
-      ++track.missed;
-      ++track.gaps;
-    }
+  advance(picture, way_m);
+  if (count_ > 0 && std::abs(way_m - looks_[newest_].way_m) < kLookM) return settled_;
+  remember(profile, picture);
+  relate();
+  for (const UprightEdge& edge : found) {
+    if (std::abs(edge.bearing) > kWideShare * widest_) take(edge);
   }
-  for (const Track& track : tracks_) {
-    if (track.missed <= kMostMissed && std::abs(track.bearing()) < widest) continue;
-    if (const auto settled = settle(track)) settled_.push_back(*settled);
-  }
-  std::erase_if(tracks_, [widest](const Track& track) {
-    return track.missed > kMostMissed || std::abs(track.bearing()) >= widest;
-  });
-  for (size_t i = 0; i < found.size() && tracks_.size() < kMostTracks; ++i) {
-    if (used_[i] != 0 || std::abs(found[i].bearing) < kFirstBearing || std::abs(found[i].bearing) > 0.5 * widest)
-      continue;
-    Track track;
-    track.side = found[i].bearing > 0 ? 1 : -1;
-    track.sign = found[i].contrast() > 0 ? 1 : -1;
-    track.way_m = way_m;
-    track.inverse_m = 1 / kUsualLateralM;
-    track.ratio = 1 / std::abs(found[i].bearing);
-    track.p00 = std::pow(10 * kBearingSigma / (found[i].bearing * found[i].bearing), 2);
-    track.p11 = kInverseSigma * kInverseSigma;
-    for (const Track& known : tracks_) {
-      const double off = std::abs(known.bearing() - found[i].bearing);
-      if (known.seen < kFewestPictures || off > kBesideBearing) continue;
-      track.inverse_m = known.inverse_m;
-      track.p11 = 4 * known.p11;
-      break;
-    }
-    update(track, found[i], picture);
-    tracks_.push_back(track);
-  }
+  settle();
   return settled_;
 }
 
-// Place and lateral offset from all bearings (Gauss-Newton, Cauchy weights).
-std::optional<SettledEdge> EdgeTracker::settle(const Track& track) {
-  if (track.seen < kFewestPictures || track.count < kFewestPictures) return std::nullopt;
-  if (track.seen < kSeenShare * (track.seen + track.gaps)) return std::nullopt;
-  const double growth = track.measured[track.count - 1].bearing / track.measured[0].bearing;
-  if (growth < kGrowth) return std::nullopt;
-  double place_m = track.way_m + track.ahead_m();
-  double lateral_m = track.side / track.inverse_m;
-  Eigen::Matrix2d normal;
+// The track's own plan: heading from the curvature that the rails show at the train.
+void EdgeTracker::advance(const LandmarkPicture& picture, double way_m) {
+  const double step_m = way_m - way_m_;
+  const double turn = 0.5 * (curvature_per_m_ + picture.curvature_per_m) * step_m;
+  if (count_ > 0) {
+    x_m_ += step_m * std::cos(heading_rad_ + 0.5 * turn);
+    y_m_ += step_m * std::sin(heading_rad_ + 0.5 * turn);
+    heading_rad_ += turn;
+  }
+  way_m_ = way_m;
+  curvature_per_m_ = picture.curvature_per_m;
+}
+
+void EdgeTracker::remember(const UprightProfile& profile, const LandmarkPicture& picture) {
+  newest_ = (newest_ + 1) % kMostLooks;
+  count_ = std::min(count_ + 1, kMostLooks);
+  cell_ = profile.cell;
+  middle_ = profile.column(0);
+  widest_ = profile.widest;
+  Look& look = looks_[newest_];
+  if (look.step.size() != profile.step.size()) {
+    for (Look& any : looks_) {
+      any.step.resize(profile.step.size());
+      for (auto& evidence : any.evidence) evidence.resize(profile.step.size());
+    }
+  }
+  look.way_m = way_m_;
+  look.x_m = x_m_ - picture.pose.lateral_m * std::sin(heading_rad_);
+  look.y_m = y_m_ + picture.pose.lateral_m * std::cos(heading_rad_);
+  look.heading_rad = heading_rad_;
+  look.curvature_per_m = curvature_per_m_;
+  look.eye_lateral_m = picture.pose.lateral_m;
+  look.step = profile.step;
+  const int width = static_cast<int>(profile.score.size());
+  const int reach = std::max(1, static_cast<int>(std::lround(0.6 * kTolerance / cell_)));
+  for (const int sign : {-1, 1}) {
+    auto& evidence = look.evidence[sign > 0 ? 1 : 0];
+    evidence.assign(static_cast<size_t>(width), 0.0F);
+    for (int c = reach; c < width - reach; ++c) {
+      const float value = std::min(1.0F, static_cast<float>(sign) * profile.score[static_cast<size_t>(c)] / kFullScore);
+      if (value <= 0) continue;
+      for (int k = -reach; k <= reach; ++k) {
+        float& at = evidence[static_cast<size_t>(c + k)];
+        at = std::max(at, value);
+      }
+    }
+  }
+}
+
+void EdgeTracker::relate() {
+  relatives_.clear();
+  const Look& now = looks_[newest_];
+  const double cosine = std::cos(now.heading_rad);
+  const double sine = std::sin(now.heading_rad);
+  for (size_t i = 1; i < count_; ++i) {
+    const Look& look = looks_[(newest_ + kMostLooks - i) % kMostLooks];
+    const double dx = look.x_m - now.x_m;
+    const double dy = look.y_m - now.y_m;
+    const double turn = look.heading_rad - now.heading_rad;
+    if (std::abs(now.way_m - look.way_m) > kReachM) break;
+    relatives_.push_back({&look, now.way_m - look.way_m, cosine * dx + sine * dy, -sine * dx + cosine * dy,
+                          std::cos(turn), std::sin(turn)});
+  }
+}
+
+// Of a place (metres ahead and left of the newest look's eye) in another look; `bend`: error of the curvature.
+double EdgeTracker::bearing_of(const Relative& relative, double x_m, double y_m, double bend) const {
+  const double dx = x_m - relative.x_m;
+  const double dy = y_m - relative.y_m;
+  const double ahead = relative.cosine * dx + relative.sine * dy;
+  const double left = -relative.sine * dx + relative.cosine * dy;
+  return left / std::max(0.5, ahead) + bend * relative.back_m;
+}
+
+// The place on the line of sight that was to be seen longest, and the one that was to be seen best over all.
+std::array<EdgeTracker::Spot, 2> EdgeTracker::locate(double bearing, int sign) const {
+  const double width = std::abs(bearing);
+  const auto columns = static_cast<int>(looks_[newest_].step.size());
+  Spot longest;
+  Spot best;
+  double inverse_m = width / kLateralsM[1];
+  while (inverse_m < width / kLateralsM[0]) {
+    const double x_m = 1 / inverse_m;
+    const double y_m = bearing * x_m;
+    float sum = 0;
+    size_t n = 0;
+    for (const Relative& relative : relatives_) {
+      const double at = bearing_of(relative, x_m, y_m, 0);
+      if (std::abs(at) < kFirstBearing) break;
+      const int column = static_cast<int>(at / cell_ + middle_ + 0.5);
+      if (column < 0 || column >= columns) continue;
+      sum += relative.look->evidence[sign > 0 ? 1 : 0][static_cast<size_t>(column)] - kUsualEvidence;
+      if (++n < kFewestLooks || kGrowth * std::abs(at) > width || static_cast<double>(sum) < longest.support) continue;
+      longest = {x_m, y_m, relative.back_m, static_cast<double>(sum), n};
+    }
+    const double mean = static_cast<double>(sum) / static_cast<double>(n + 1);
+    if (n >= kFewestLooks && mean > best.support) best = {x_m, y_m, kReachM, mean, 1};
+    const double spread = 1 + kDepthBackM * inverse_m;
+    inverse_m += kDepthStep * spread * spread / (width * kDepthBackM);
+  }
+  return {best, longest};
+}
+
+// Sub-pixel place of the clearest step of that sign near a bearing.
+std::optional<double> EdgeTracker::measure(const Relative& relative, double bearing, int sign) const {
+  const auto& step = relative.look->step;
+  const int gate = static_cast<int>(std::lround(kGate / cell_));
+  const int centre = static_cast<int>(std::lround(bearing / cell_ + middle_));
+  if (centre - gate < 1 || centre + gate + 1 >= static_cast<int>(step.size())) return std::nullopt;
+  const auto at = [&](int c) { return static_cast<float>(sign) * step[static_cast<size_t>(c)]; };
+  int best = -1;
+  float most = 0;
+  for (int c = centre - gate; c <= centre + gate; ++c) {
+    if (at(c) < kLeastStep || at(c) < at(c - 1) || at(c) < at(c + 1)) continue;
+    const float off = static_cast<float>(c - centre) / static_cast<float>(gate + 1);
+    const float value = at(c) * (1 - off * off);
+    if (value <= most) continue;
+    most = value;
+    best = c;
+  }
+  if (best < 0) return std::nullopt;
+  const float bend = at(best - 1) - 2 * at(best) + at(best + 1);
+  const double part =
+      bend < 0 ? std::clamp(0.5 * static_cast<double>((at(best - 1) - at(best + 1)) / bend), -0.5, 0.5) : 0.0;
+  return (best + part - middle_) * cell_;
+}
+
+// Gauss-Newton with Cauchy weights over all looks: place, lateral offset and what the curvature was wrong by.
+std::optional<SettledEdge> EdgeTracker::refine(Spot& spot, int sign) const {
+  const Look& now = looks_[newest_];
+  Eigen::Vector3d state(spot.x_m, spot.y_m, 0);
+  Eigen::Matrix3d normal;
+  SettledEdge edge;
   double rms = 0;
-  for (int pass = 0; pass < 8; ++pass) {
+  double narrowest = 1;
+  double widest = 0;
+  for (int pass = 0; pass < kPasses; ++pass) {
     normal.setZero();
-    Eigen::Vector2d right = Eigen::Vector2d::Zero();
+    normal(2, 2) = std::pow(kBearingSigma / kBendSigma, 2);
+    Eigen::Vector3d right(0, 0, -normal(2, 2) * state(2));
     double squared = 0;
     double weights = 0;
-    for (size_t i = 0; i < track.count; ++i) {
-      const EdgeMeasurement& m = track.measured[i];
-      const double along_m = std::max(1.0, place_m - m.way_m);
-      const double model = bearing_of(along_m, lateral_m, m.curvature_per_m, m.eye_lateral_m);
-      const double residual = m.bearing - model;
-      const Eigen::Vector2d slope(
-          (bearing_of(along_m + 0.01, lateral_m, m.curvature_per_m, m.eye_lateral_m) - model) / 0.01, 1 / along_m);
-      // How the track bends on the way there is not well known.
-      const double bend = 0.5 * kBendShare * std::abs(m.curvature_per_m) * along_m;
-      const double variance = 1 + std::pow(bend / kBearingSigma, 2);
-      const double weight = 1 / (variance + std::pow(residual / (2 * kBearingSigma), 2));
+    size_t tried = 0;
+    size_t kept = 0;
+    edge.count = 0;
+    narrowest = 1;
+    widest = 0;
+    const auto add = [&](const Relative& relative) {
+      const double model = bearing_of(relative, state(0), state(1), state(2));
+      if (std::abs(model) < kFirstBearing || std::abs(model) > widest_) return;
+      const bool sure = relative.back_m <= spot.back_m;
+      if (!sure && 2 * pass < kPasses) return;
+      const auto measured = measure(relative, model, sign);
+      tried += sure ? 1 : 0;
+      if (!measured) return;
+      const double residual = *measured - model;
+      const Eigen::Vector3d slope((bearing_of(relative, state(0) + 0.01, state(1), state(2)) - model) / 0.01,
+                                  (bearing_of(relative, state(0), state(1) + 0.01, state(2)) - model) / 0.01,
+                                  relative.back_m);
+      const double weight = 1 / (1 + std::pow(residual / (2 * kBearingSigma), 2));
       normal += weight * slope * slope.transpose();
       right += weight * slope * residual;
       squared += weight * residual * residual;
       weights += weight;
-    }
-    if (!(std::abs(normal.determinant()) > 1e-20)) return std::nullopt;
-    const Eigen::Vector2d step = normal.ldlt().solve(right);
-    place_m += std::clamp(step(0), -2.0, 2.0);
-    lateral_m += std::clamp(step(1), -1.0, 1.0);
+      if (weight < 0.3 || edge.count == kMostMeasurements) return;
+      kept += sure ? 1 : 0;
+      narrowest = std::min(narrowest, std::abs(*measured));
+      widest = std::max(widest, std::abs(*measured));
+      edge.measured[edge.count++] = {relative.look->way_m, *measured, relative.look->eye_lateral_m};
+    };
+    for (size_t i = relatives_.size(); i-- > 0;) add(relatives_[i]);
+    add(itself(now));
+    if (kept < kFewestLooks || 2 * kept < tried) return std::nullopt;
+    const Eigen::Vector3d step = normal.ldlt().solve(right);
+    state(0) += std::clamp(step(0), -2.0, 2.0);
+    state(1) += std::clamp(step(1), -1.0, 1.0);
+    state(2) += step(2);
     rms = std::sqrt(squared / weights);
+    spot.support = static_cast<double>(kept) / static_cast<double>(tried);
   }
-  if (rms > kWorstFit || lateral_m * track.side < kNearestLateralM || lateral_m * track.side > kFarthestLateralM) {
-    return std::nullopt;
-  }
+  if (rms > kWorstFit || widest < kGrowth * narrowest || !(state(0) > 1.0)) return std::nullopt;
+  spot.x_m = state(0);
+  spot.y_m = state(1);
   const double sigma = std::max(rms, kLeastSigma);
-  const Eigen::Matrix2d covariance = normal.inverse() * (sigma * sigma * kCorrelated);
-  return SettledEdge{place_m,
-                     lateral_m,
-                     std::sqrt(covariance(0, 0)),
-                     std::sqrt(covariance(1, 1)),
-                     track.inner_grey / track.seen,
-                     track.outer_grey / track.seen,
-                     track.deep_grey / track.seen,
-                     track.seen,
-                     track.count,
-                     track.measured};
+  const Eigen::Matrix3d covariance = normal.inverse() * (sigma * sigma * kCorrelated);
+  const double left_m = state(1) + now.eye_lateral_m;
+  const double k = std::abs(now.curvature_per_m) < 1e-7 ? 1e-7 : now.curvature_per_m;
+  edge.place_m = now.way_m + std::atan2(k * state(0), 1 - k * left_m) / k;
+  edge.lateral_m = left_m - 0.5 * k * state(0) * state(0);
+  edge.sigma_m = std::sqrt(covariance(0, 0));
+  edge.lateral_sigma_m = std::sqrt(covariance(1, 1));
+  edge.pictures = static_cast<int>(edge.count);
+  edge.cell = cell_;
+  return edge;
+}
+
+void EdgeTracker::take(const UprightEdge& found) {
+  const Look& now = looks_[newest_];
+  const int sign = (found.contrast() > 0) == (found.bearing > 0) ? 1 : -1;
+  const double cosine = std::cos(now.heading_rad);
+  const double sine = std::sin(now.heading_rad);
+  const auto see = [&](Candidate& candidate) {
+    candidate.hit_m = now.way_m;
+    candidate.inner_grey += found.inner_grey;
+    candidate.outer_grey += found.outer_grey;
+    candidate.wall_grey += found.wall_grey;
+    candidate.deep_grey += found.deep_grey;
+    ++candidate.hits;
+    if (candidate.stripe_count < kMostStripes)
+      candidate.stripe[candidate.stripe_count++] = {now.way_m, found.bearing, found.outward, found.inward};
+  };
+  Candidate* known = nullptr;
+  double nearest = kGate;
+  for (Candidate& candidate : candidates_) {
+    const double dx = candidate.x_m - now.x_m;
+    const double dy = candidate.y_m - now.y_m;
+    const double ahead = cosine * dx + sine * dy;
+    const double off = std::abs((-sine * dx + cosine * dy) / std::max(0.5, ahead) - found.bearing);
+    if (candidate.sign != sign || off > nearest) continue;
+    nearest = off;
+    known = &candidate;
+  }
+  if (known != nullptr && known->support > kSureSupport && known->hits % 2 == 1) return see(*known);
+  // Of both places the one that fits more looks.
+  Spot spot;
+  std::optional<SettledEdge> edge;
+  for (Spot& tried : locate(found.bearing, sign)) {
+    if (tried.looks == 0 || tried.support < kLeastSupport * static_cast<double>(tried.looks)) continue;
+    const auto refined = refine(tried, sign);
+    if (!refined || (edge && refined->count <= edge->count)) continue;
+    edge = refined;
+    spot = tried;
+  }
+  if (!edge) return;
+  Candidate* same = nullptr;
+  for (Candidate& candidate : candidates_) {
+    if (candidate.sign == sign && std::abs(candidate.edge.place_m - edge->place_m) < kSameM + edge->sigma_m &&
+        std::abs(candidate.edge.lateral_m - edge->lateral_m) < kSameM)
+      same = &candidate;
+  }
+  if (same == nullptr) {
+    candidates_.emplace_back();
+    same = &candidates_.back();
+    same->sign = sign;
+  }
+  same->x_m = now.x_m + cosine * spot.x_m - sine * spot.y_m;
+  same->y_m = now.y_m + sine * spot.x_m + cosine * spot.y_m;
+  same->support = spot.support;
+  same->edge = *edge;
+  see(*same);
+}
+
+void EdgeTracker::settle() {
+  for (Candidate& candidate : candidates_) {
+    if (way_m_ - candidate.hit_m < kPatienceM) continue;
+    SettledEdge edge = candidate.edge;
+    edge.inner_grey = candidate.inner_grey / candidate.hits;
+    edge.outer_grey = candidate.outer_grey / candidate.hits;
+    edge.wall_grey = candidate.wall_grey / candidate.hits;
+    edge.deep_grey = candidate.deep_grey / candidate.hits;
+    edge.stripe = candidate.stripe;
+    edge.stripe_count = candidate.stripe_count;
+    settled_.push_back(edge);
+  }
+  std::erase_if(candidates_, [this](const Candidate& candidate) { return way_m_ - candidate.hit_m >= kPatienceM; });
+}
+
+// Mean over the looks and both walls, of the clearer sign on each.
+double EdgeTracker::step_evidence(double place_m, const std::array<double, 2>& walls_m) const {
+  const Look& now = looks_[newest_];
+  const double k = now.curvature_per_m;
+  const double ahead_m = place_m - now.way_m;
+  double sum = 0;
+  int n = 0;
+  for (const double lateral_m : walls_m) {
+    const double y_m = lateral_m + 0.5 * k * ahead_m * ahead_m - now.eye_lateral_m;
+    const double x_m = ahead_m - lateral_m * k * ahead_m;
+    std::array<double, 2> sums{0, 0};
+    for (const Relative& relative : relatives_) {
+      if (ahead_m + relative.back_m < 1 || ahead_m + relative.back_m > kStepReachM) continue;
+      const double at = bearing_of(relative, x_m, y_m, 0);
+      const int column = static_cast<int>(at / cell_ + middle_ + 0.5);
+      if (std::abs(at) > widest_ || column < 0 || column >= static_cast<int>(relative.look->step.size())) continue;
+      for (size_t i = 0; i < sums.size(); ++i)
+        sums[i] += static_cast<double>(relative.look->evidence[i][static_cast<size_t>(column)]);
+      ++n;
+    }
+    sum += std::max(sums[0], sums[1]);
+  }
+  return n < kFewestStepLooks ? 0.0 : sum / n;
+}
+
+std::optional<double> EdgeTracker::last_step(const std::array<double, 2>& walls_m, double from_m, double to_m) const {
+  if (count_ == 0) return std::nullopt;
+  // From the far end: the first clear one, at its top.
+  double best = 0;
+  double best_m = 0;
+  for (double place_m = to_m; place_m > from_m; place_m -= kStepM) {
+    const double evidence = step_evidence(place_m, walls_m);
+    if (evidence > std::max(best, kClearStep)) {
+      best = evidence;
+      best_m = place_m;
+    } else if (evidence < kBesideStep * best) {
+      break;
+    }
+  }
+  if (best_m < from_m + kStepTopM) return std::nullopt;
+  return best_m;
 }
 
 }  // namespace railfix::track_detector

@@ -1,5 +1,6 @@
-// Follows upright edges over the way that was run: the bearing of a thing beside the track grows as it comes nearer,
-// and how it grows says where it stands and how far from the track.
+// Where upright edges stand: an edge that is about to leave the picture is looked for in the pictures before, from
+// every place on its line of sight; it stands where it was to be seen all the time. What lies farther behind moves
+// otherwise (parallax), so that even a faint edge before a background like itself is found.
 #pragma once
 
 #include <array>
@@ -10,14 +11,20 @@
 
 namespace railfix::track_detector {
 
-constexpr size_t kMostMeasurements = 48;
+constexpr size_t kMostMeasurements = 56;
+constexpr size_t kMostStripes = 12;
 
-/// Where an edge was seen, and what the picture's pose was.
 struct EdgeMeasurement {
-  double way_m, bearing, curvature_per_m, eye_lateral_m;
+  double way_m, bearing, eye_lateral_m;
 };
 
-/// An edge that went out of sight, on the scale of the way.
+/// How far from an edge the brightness stepped back, in one look.
+struct StripeMeasurement {
+  double way_m, bearing;
+  double outward, inward;  // bearing to the next edge; 0 = the brightness does not step back there
+};
+
+/// An edge that is measured as well as it will be, on the scale of the way.
 struct SettledEdge {
   double place_m = 0;
   double lateral_m = 0;  // of the track centre, left positive
@@ -25,46 +32,77 @@ struct SettledEdge {
   double lateral_sigma_m = 0;
   double inner_grey = 0;  // beside it towards the track, mean
   double outer_grey = 0;
-  double deep_grey = 0;  // farther away towards the track, mean
+  double wall_grey = 0;  // behind it towards the track, mean
+  double deep_grey = 0;  // the same, farther away
+  double cell = 0;       // bearing between two columns
   int pictures = 0;
-  size_t count = 0;  // of the measurements that were kept
-  std::array<EdgeMeasurement, kMostMeasurements> measured{};
+  size_t count = 0;                                           // of the measurements
+  std::array<EdgeMeasurement, kMostMeasurements> measured{};  // far to near
+  size_t stripe_count = 0;
+  std::array<StripeMeasurement, kMostStripes> stripe{};
 };
 
 class EdgeTracker {
  public:
   EdgeTracker();
-  /// Edges of the picture at way_m; `widest` is the bearing at which edges leave the picture. Gives the edges that are
-  /// settled now; valid until the next call.
-  const std::vector<SettledEdge>& follow(const std::vector<UprightEdge>& found, const LandmarkPicture& picture,
-                                         double way_m, double widest);
+  /// Edges and profile of the picture at way_m. Gives the edges that are settled now; valid until the next call.
+  const std::vector<SettledEdge>& follow(const std::vector<UprightEdge>& found, const UprightProfile& profile,
+                                         const LandmarkPicture& picture, double way_m);
   void forget();
+  /// Along the two walls at those lateral offsets: the last place in the range where the brightness steps, seen over
+  /// the near looks together.
+  [[nodiscard]] std::optional<double> last_step(const std::array<double, 2>& walls_m, double from_m, double to_m) const;
 
  private:
-  // x/y, which falls by 1/y per metre of the way, in a Kalman filter.
-  struct Track {
-    double side = 1;  // +1 left
-    double ratio = 0, inverse_m = 0;
-    double p00 = 0, p01 = 0, p11 = 0;
-    double way_m = 0;
-    double inner_grey = 0, outer_grey = 0, deep_grey = 0;  // sums
-    int sign = 1;                                          // of the contrast
-    int seen = 0, missed = 0, gaps = 0;
-    bool hit = false;
-    size_t count = 0;
-    std::array<EdgeMeasurement, kMostMeasurements> measured;
-    [[nodiscard]] double bearing() const { return side / std::max(0.3, ratio); }
-    [[nodiscard]] double ahead_m() const { return ratio / inverse_m; }
+  // Where the eye was in the plan, and what it saw.
+  struct Look {
+    double way_m = 0, x_m = 0, y_m = 0, heading_rad = 0;
+    double curvature_per_m = 0, eye_lateral_m = 0;
+    std::vector<float> step;
+    std::array<std::vector<float>, 2> evidence;  // 0..1 of an edge that darkens, brightens to the left
   };
-  static void predict(Track& track, double way_m);
-  static void update(Track& track, const UprightEdge& edge, const LandmarkPicture& picture);
-  static void remember(Track& track, const EdgeMeasurement& measurement);
-  [[nodiscard]] static double straightened(const Track& track, double bearing, const LandmarkPicture& picture);
-  [[nodiscard]] static std::optional<SettledEdge> settle(const Track& track);
+  // A look as seen from the newest one.
+  struct Relative {
+    const Look* look = nullptr;
+    double back_m = 0, x_m = 0, y_m = 0, cosine = 1, sine = 0;
+  };
+  struct Candidate {
+    double x_m = 0, y_m = 0;  // plan
+    int sign = 1;
+    double support = 0;
+    double hit_m = 0;                                                     // way where it was seen last
+    double inner_grey = 0, outer_grey = 0, wall_grey = 0, deep_grey = 0;  // sums
+    int hits = 0;
+    size_t stripe_count = 0;
+    std::array<StripeMeasurement, kMostStripes> stripe{};
+    SettledEdge edge;
+  };
+  struct Spot {
+    double x_m = 0, y_m = 0;  // from the newest look
+    double back_m = 0;        // it is seen since so long
+    double support = 0;
+    size_t looks = 0;
+  };
+  void advance(const LandmarkPicture& picture, double way_m);
+  void remember(const UprightProfile& profile, const LandmarkPicture& picture);
+  void relate();
+  void take(const UprightEdge& edge);
+  [[nodiscard]] double bearing_of(const Relative& relative, double x_m, double y_m, double bend) const;
+  [[nodiscard]] std::array<Spot, 2> locate(double bearing, int sign) const;
+  [[nodiscard]] std::optional<double> measure(const Relative& relative, double bearing, int sign) const;
+  [[nodiscard]] std::optional<SettledEdge> refine(Spot& spot, int sign) const;
+  [[nodiscard]] double step_evidence(double place_m, const std::array<double, 2>& walls_m) const;
+  [[nodiscard]] static Relative itself(const Look& look) { return {&look, 0, 0, 0, 1, 0}; }
+  void settle();
 
-  std::vector<Track> tracks_;
-  std::vector<uint8_t> used_;
+  std::vector<Look> looks_;  // ring
+  size_t newest_ = 0;
+  size_t count_ = 0;
+  std::vector<Relative> relatives_;  // near to far, without the newest look
+  std::vector<Candidate> candidates_;
   std::vector<SettledEdge> settled_;
+  double way_m_ = 0, x_m_ = 0, y_m_ = 0, heading_rad_ = 0, curvature_per_m_ = 0;  // plan of the track
+  double cell_ = 0, middle_ = 0, widest_ = 0;
 };
 
 }  // namespace railfix::track_detector

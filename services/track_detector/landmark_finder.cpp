@@ -125,8 +125,8 @@ void LandmarkFinder::find_platforms(const LandmarkPicture& picture) {
 
 void LandmarkFinder::find_uprights(const LandmarkPicture& picture) {
   const auto& found = upright_search_.find(picture);
-  const auto& settled = edges_.follow(found, picture, way_m_, upright_search_.widest_bearing());
-  for (const UprightObject& object : uprights_.add(settled, way_m_)) {
+  const auto& settled = edges_.follow(found, upright_search_.profile(), picture, way_m_);
+  for (const UprightObject& object : uprights_.add(settled, edges_, way_m_)) {
     const double ahead_m = object.place_m - way_m_;
     report({object.type, picture.stamp_ns, ahead_m, object.lateral_m,
             std::hypot(object.sigma_m, options_.way_sigma * (std::abs(ahead_m) + 6.0)),

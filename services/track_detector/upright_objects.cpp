@@ -10,14 +10,25 @@ namespace {
 constexpr double kForgetM = 12;                 // edges this far behind the camera
 constexpr double kMastSizeM[] = {0.155, 0.60};  // of its side or front; posts of lamps and boards are thinner
 constexpr double kMastLateralM[] = {2.0, 9.0};
+constexpr double kNearShare = 0.5;  // of the widest bearing: near enough to see both edges
+constexpr double kUsualAheadM = 8;  // when both edges are seen
+constexpr int kFewestTogether = 3;  // looks that show both
 constexpr double kTunnelWidthM[] = {3.6, 12.0};
 constexpr double kBridgeWidthM[] = {6.0, 28.0};
-constexpr double kSidesM = 1.0;      // both sides stand at one place
+constexpr double kApartCells = 3.3;  // between edges, so that they do not disturb each other
+constexpr double kSidesM = 1.3;      // both sides stand at one place
 constexpr double kDarkShare = 0.93;  // of the outer brightness
+constexpr double kWallShare = 0.85;  // of the outer brightness
 constexpr double kDeepShare = 0.5;
+constexpr double kPairShare = 0.5;  // of one side's sigma
 constexpr double kSameWallM = 0.3;
 constexpr double kMouthM = 8;
-constexpr double kExitSigmaM = 0.4;
+constexpr double kExitSigmaM = 0.12;
+constexpr double kStripeRmsM = 0.03;
+constexpr double kGlareM = 0.1;         // an end in glare looks so much nearer
+constexpr double kPanelM = 2.3;         // of the lining, at most
+constexpr double kExitLateralM = 0.6;   // an exit's edge from the wall
+constexpr double kExitWideShare = 0.7;  // of the widest bearing: near enough for the exit's place
 constexpr double kOneSideSigmaM = 0.2;
 constexpr double kDaylightShare = 0.8;  // of the brightness in front of the tunnel
 constexpr double kObjectSigmaM = 0.05;  // of where the surveyor's point of an object is
@@ -25,35 +36,78 @@ constexpr double kSameMastM = 1.5;
 constexpr double kSameBridgeM = 15;
 constexpr double kWorstSigmaM = 0.35;
 constexpr double kWorstEdgeM = 0.8;
-constexpr double kLongestTunnelM = 500;  // a portal out may be missed
+constexpr double kLongestTunnelM = 1500;  // a portal out may be missed
 constexpr double kHoldM = 1.0;
 constexpr size_t kUsuallyHeld = 200;
+constexpr double kWaitM = 1.5;  // the other edge of a mast leaves the picture so much later, at most
 
-// Size of a thing from the bearings of its two edges in the same pictures: its front looks smaller with the distance,
-// its side with the distance squared. Errors of the pose move both edges alike.
-std::optional<double> size_of(const SettledEdge& a, const SettledEdge& b) {
-  const double place_m = 0.5 * (a.place_m + b.place_m);
-  const double lateral_m = 0.5 * std::abs(a.lateral_m + b.lateral_m);
-  double n = 0, x = 0, y = 0, xx = 0, xy = 0;
+struct Size {
+  double front_m = 0;
+  double side_m = 0;
+  double rms_m = 0;
+  int looks = 0;
+};
+
+// Size of a thing from how far apart its two edges are in the same pictures: its front looks smaller with the distance,
+// its side with the distance squared. Errors of the pose move both edges alike. Far away the edges run together.
+class SizeFit {
+ public:
+  SizeFit(const SettledEdge& edge, double place_m, double lateral_m)
+      : place_m_(place_m), lateral_m_(std::abs(lateral_m)), apart_(kApartCells * edge.cell) {
+    widest_ = std::abs(edge.measured[edge.count - 1].bearing);
+  }
+  void add(double way_m, double bearing, double apart) {
+    if (std::abs(bearing) < kNearShare * widest_ || apart < apart_) return;
+    const double ahead_m = std::max(1.0, place_m_ - way_m);
+    const double side = lateral_m_ / ahead_m;
+    const double weight = 1 / (ahead_m * ahead_m);
+    n_ += weight;
+    x_ += weight * side;
+    y_ += weight * apart * ahead_m;
+    xx_ += weight * side * side;
+    xy_ += weight * side * apart * ahead_m;
+    yy_ += weight * apart * ahead_m * apart * ahead_m;
+    ++looks_;
+  }
+  [[nodiscard]] std::optional<Size> solve() const {
+    const double spread = n_ * xx_ - x_ * x_;
+    if (looks_ < kFewestTogether || spread < 1e-4 * n_ * n_) return std::nullopt;
+    double side_m = (n_ * xy_ - x_ * y_) / spread;
+    double front_m = (y_ - side_m * x_) / n_;
+    if (side_m < 0) {
+      side_m = 0;
+      front_m = y_ / n_;
+    } else if (front_m < 0) {
+      front_m = 0;
+      side_m = xy_ / xx_;
+    }
+    const double squared = yy_ - 2 * front_m * y_ - 2 * side_m * xy_ + front_m * front_m * n_ +
+                           2 * front_m * side_m * x_ + side_m * side_m * xx_;
+    return Size{front_m, side_m, std::sqrt(std::max(0.0, squared / n_)), looks_};
+  }
+
+ private:
+  double place_m_, lateral_m_, apart_, widest_ = 0;
+  double n_ = 0, x_ = 0, y_ = 0, xx_ = 0, xy_ = 0, yy_ = 0;
+  int looks_ = 0;
+};
+
+std::optional<Size> size_of(const SettledEdge& a, const SettledEdge& b) {
+  SizeFit fit(a, 0.5 * (a.place_m + b.place_m), 0.5 * (a.lateral_m + b.lateral_m));
   size_t k = 0;
   for (size_t i = 0; i < a.count; ++i) {
     while (k < b.count && b.measured[k].way_m < a.measured[i].way_m) ++k;
     if (k == b.count || b.measured[k].way_m > a.measured[i].way_m) continue;
-    const double ahead_m = place_m - a.measured[i].way_m;
-    const double seen_m = std::abs(b.measured[k].bearing - a.measured[i].bearing) * ahead_m;
-    const double side = lateral_m / ahead_m;
-    const double weight = 1 / (ahead_m * ahead_m);
-    n += weight;
-    x += weight * side;
-    y += weight * seen_m;
-    xx += weight * side * side;
-    xy += weight * side * seen_m;
+    fit.add(a.measured[i].way_m, a.measured[i].bearing, std::abs(b.measured[k].bearing - a.measured[i].bearing));
   }
-  const double spread = n * xx - x * x;
-  if (!(n > 0) || spread < 1e-4 * n * n) return std::nullopt;
-  const double side_m = std::max(0.0, (n * xy - x * y) / spread);
-  const double front_m = std::max(0.0, (y - side_m * x) / n);
-  return std::hypot(front_m, side_m);
+  return fit.solve();
+}
+
+// Of two edges on one side, as they are seen in the same picture.
+bool is_inner(const SettledEdge& a, const SettledEdge& b) {
+  const double way_m = std::min(a.place_m, b.place_m) - kUsualAheadM;
+  return a.lateral_m * b.lateral_m > 0 &&
+         std::abs(a.lateral_m) / (a.place_m - way_m) < std::abs(b.lateral_m) / (b.place_m - way_m);
 }
 
 bool between(double value, const double (&range)[2]) {
@@ -65,102 +119,136 @@ bool between(double value, const double (&range)[2]) {
 UprightObjects::UprightObjects() {
   edges_.reserve(kUsuallyHeld);
   held_.reserve(kUsuallyHeld);
+  masts_.reserve(kUsuallyHeld);
   objects_.reserve(kUsuallyHeld);
 }
 
 void UprightObjects::forget() {
   edges_.clear();
   held_.clear();
-  inside_since_m_ = last_bridge_m_ = last_mast_m_ = -1e9;
+  masts_.clear();
+  tunnel_ = {};
+  exits_ = {};
+  last_bridge_m_ = -1e9;
 }
 
-const std::vector<UprightObject>& UprightObjects::add(const std::vector<SettledEdge>& edges, double way_m) {
+const std::vector<UprightObject>& UprightObjects::add(const std::vector<SettledEdge>& edges, const EdgeTracker& tracker,
+                                                      double way_m) {
   objects_.clear();
   for (const SettledEdge& edge : edges) {
-    if (edge.sigma_m < kWorstEdgeM) edges_.push_back({edge, false});
+    if (edge.sigma_m < kWorstEdgeM) edges_.push_back({edge, way_m});
+    if (in_tunnel(edge.place_m)) look_for_exit(edge);
   }
   if (!edges.empty()) {
+    std::sort(edges_.begin(), edges_.end(),
+              [](const Edge& a, const Edge& b) { return a.edge.sigma_m < b.edge.sigma_m; });
     pair_masts();
-    pair_sides();
   }
+  find_stripes(way_m);
+  pair_sides(way_m);
   release(way_m);
+  release_exit(tracker, way_m);
   std::erase_if(edges_, [way_m](const Edge& e) { return e.edge.place_m < way_m - kForgetM; });
+  std::erase_if(masts_, [way_m](const UprightObject& mast) { return mast.place_m < way_m - kForgetM; });
   return objects_;
 }
 
 // A mast is darker or brighter than what is on both its sides; so is a post, which is thinner.
 void UprightObjects::pair_masts() {
   while (true) {
-    Edge* best_a = nullptr;
-    Edge* best_b = nullptr;
+    Edge* best_inner = nullptr;
+    Edge* best_outer = nullptr;
+    Size best;
     double smallest_m = kMastSizeM[1];
     for (Edge& a : edges_) {
       for (Edge& b : edges_) {
-        if (a.used || b.used || &a == &b || a.edge.lateral_m > b.edge.lateral_m ||
-            a.edge.lateral_m * b.edge.lateral_m < 0)
+        if (a.used || b.used || &a == &b || !is_inner(a.edge, b.edge)) continue;
+        if ((a.edge.outer_grey > a.edge.inner_grey) == (b.edge.outer_grey > b.edge.inner_grey)) continue;
+        if (std::abs(a.edge.place_m - b.edge.place_m) > kMastSizeM[1] ||
+            std::abs(a.edge.lateral_m - b.edge.lateral_m) > kMastSizeM[1])
           continue;
-        const double sign = a.edge.lateral_m > 0 ? 1 : -1;
-        const double step_a = sign * (a.edge.outer_grey - a.edge.inner_grey);
-        const double step_b = sign * (b.edge.outer_grey - b.edge.inner_grey);
-        if (step_a * step_b > 0 || std::abs(a.edge.place_m - b.edge.place_m) > kMastSizeM[1] ||
-            b.edge.lateral_m - a.edge.lateral_m > kMastSizeM[1]) {
-          continue;
-        }
-        const auto size_m = size_of(a.edge, b.edge);
-        if (!size_m || *size_m >= smallest_m) continue;
-        smallest_m = *size_m;
-        best_a = &a;
-        best_b = &b;
+        const auto size = size_of(a.edge, b.edge);
+        if (!size || std::max(size->front_m, size->side_m) >= smallest_m) continue;
+        smallest_m = std::max(size->front_m, size->side_m);
+        best = *size;
+        best_inner = &a;
+        best_outer = &b;
       }
     }
-    if (best_a == nullptr) return;
-    best_a->used = best_b->used = true;
-    if (smallest_m >= kMastSizeM[0]) tell_mast(best_a->edge, best_b->edge);
+    if (best_inner == nullptr) return;
+    best_inner->used = best_outer->used = true;
+    if (smallest_m >= kMastSizeM[0]) tell_mast(best_inner->edge, best.front_m, best.side_m);
   }
 }
 
-void UprightObjects::tell_mast(const SettledEdge& a, const SettledEdge& b) {
-  const double lateral_m = 0.5 * (a.lateral_m + b.lateral_m);
-  const double best_sigma_m = std::min(a.sigma_m, b.sigma_m);
-  if (!between(std::abs(lateral_m), kMastLateralM) || best_sigma_m > kWorstSigmaM) return;
-  const double wa = 1 / (a.sigma_m * a.sigma_m);
-  const double wb = 1 / (b.sigma_m * b.sigma_m);
-  const double place_m = (wa * a.place_m + wb * b.place_m) / (wa + wb);
-  if (std::abs(place_m - last_mast_m_) < kSameMastM && lateral_m * last_mast_lateral_m_ > 0) return;
-  last_mast_m_ = place_m;
-  last_mast_lateral_m_ = lateral_m;
-  // The edges err together: no gain from the second one.
-  objects_.push_back({LandmarkType::mast, place_m, lateral_m, std::hypot(best_sigma_m, kObjectSigmaM),
-                      std::min(a.pictures, b.pictures)});
+// A mast of which only one edge could be followed: the other one shows beside it in the near looks.
+void UprightObjects::find_stripes(double way_m) {
+  for (Edge& e : edges_) {
+    if (e.used || e.way_m > way_m - kWaitM || e.edge.stripe_count == 0 || belongs_to_mast(e.edge)) continue;
+    SizeFit outward(e.edge, e.edge.place_m, e.edge.lateral_m);
+    SizeFit inward = outward;
+    for (size_t i = 0; i < e.edge.stripe_count; ++i) {
+      const StripeMeasurement& m = e.edge.stripe[i];
+      outward.add(m.way_m, m.bearing, m.outward);
+      inward.add(m.way_m, m.bearing, m.inward);
+    }
+    const auto size = outward.solve();
+    if (!size || size->rms_m > kStripeRmsM || !between(std::max(size->front_m, size->side_m), kMastSizeM)) continue;
+    // The far side of a post, and what stands behind it.
+    const auto before = inward.solve();
+    if (before && std::max(before->front_m, before->side_m) < kMastSizeM[0]) continue;
+    e.used = true;
+    tell_mast(e.edge, size->front_m, size->side_m);
+  }
 }
 
-void UprightObjects::pair_sides() {
+// From the edge towards the track, which stands before the clearest background; its far corner when the side shows.
+void UprightObjects::tell_mast(const SettledEdge& inner, double front_m, double side_m) {
+  const double half_m = 0.5 * std::max(front_m, side_m);
+  const double lateral_m = inner.lateral_m + std::copysign(half_m, inner.lateral_m);
+  if (!between(std::abs(lateral_m), kMastLateralM) || inner.sigma_m > kWorstSigmaM) return;
+  const double place_m = inner.place_m + (side_m > front_m ? -half_m : half_m);
+  if (in_tunnel(place_m)) return;  // lamps, niches, panels
+  for (const UprightObject& mast : masts_) {
+    if (std::abs(mast.place_m - place_m) < kSameMastM && mast.lateral_m * lateral_m > 0) return;
+  }
+  masts_.push_back({LandmarkType::mast, place_m, lateral_m, std::hypot(inner.sigma_m, kObjectSigmaM), inner.pictures});
+  objects_.push_back(masts_.back());
+}
+
+bool UprightObjects::belongs_to_mast(const SettledEdge& edge) const {
+  return std::any_of(masts_.begin(), masts_.end(), [&edge](const UprightObject& mast) {
+    return std::abs(mast.place_m - edge.place_m) < kSameMastM && std::abs(mast.lateral_m - edge.lateral_m) < kSameMastM;
+  });
+}
+
+void UprightObjects::pair_sides(double way_m) {
+  const auto dark = [](const SettledEdge& edge) {
+    return edge.inner_grey < kDarkShare * edge.outer_grey && edge.wall_grey < kWallShare * edge.outer_grey;
+  };
+  const auto deep = [](const SettledEdge& edge) { return edge.deep_grey < kDeepShare * edge.outer_grey; };
   for (Edge& left : edges_) {
     for (Edge& right : edges_) {
       if (left.used || right.used || left.edge.lateral_m < 1 || right.edge.lateral_m > -1) continue;
+      if (std::max(left.way_m, right.way_m) > way_m - kWaitM) continue;
       if (std::abs(left.edge.place_m - right.edge.place_m) > kSidesM) continue;
+      if (!dark(left.edge) || !dark(right.edge)) continue;
+      if (belongs_to_mast(left.edge) || belongs_to_mast(right.edge)) continue;
       const double width_m = left.edge.lateral_m - right.edge.lateral_m;
-      const bool dark = left.edge.inner_grey < kDarkShare * left.edge.outer_grey &&
-                        right.edge.inner_grey < kDarkShare * right.edge.outer_grey;
-      // Behind a bridge there is daylight again.
-      const bool deep = left.edge.deep_grey < kDeepShare * left.edge.outer_grey &&
-                        right.edge.deep_grey < kDeepShare * right.edge.outer_grey;
-      const bool bright = left.edge.outer_grey < kDarkShare * left.edge.inner_grey &&
-                          right.edge.outer_grey < kDarkShare * right.edge.inner_grey &&
-                          std::min(left.edge.inner_grey, right.edge.inner_grey) > kDaylightShare * daylight_grey_;
+      // In a curve that was followed wrongly both sides are off by the same, one forwards and one backwards.
       UprightObject object{LandmarkType::bridge, 0.5 * (left.edge.place_m + right.edge.place_m), 0,
-                           std::hypot(std::max(left.edge.sigma_m, right.edge.sigma_m), kObjectSigmaM),
+                           std::hypot(kPairShare * std::max(left.edge.sigma_m, right.edge.sigma_m), kObjectSigmaM),
                            std::min(left.edge.pictures, right.edge.pictures)};
-      if (between(width_m, kTunnelWidthM) && ((dark && deep) || bright)) {
-        object.type = dark ? LandmarkType::portal_in : LandmarkType::portal_out;
-        // The last joint of the lining may have been taken for the exit.
-        if (!dark) object.sigma_m = std::hypot(object.sigma_m, kExitSigmaM);
+      // Behind a bridge there is daylight again.
+      if (between(width_m, kTunnelWidthM) && deep(left.edge) && deep(right.edge)) {
+        object.type = LandmarkType::portal_in;
         object.outer_grey = std::min(left.edge.outer_grey, right.edge.outer_grey);
+        object.wall_m = {right.edge.lateral_m, left.edge.lateral_m};
+        move_to_mouth(object, left.edge, right.edge);
       } else if (!between(width_m, kBridgeWidthM)) {
         continue;
       }
       left.used = right.used = true;
-      if (object.type == LandmarkType::portal_in) move_to_mouth(object, left.edge, right.edge);
       hold(object);
     }
   }
@@ -182,37 +270,48 @@ void UprightObjects::move_to_mouth(UprightObject& portal, const SettledEdge& lef
   }
 }
 
-// A portal's outer corners look like a bridge and come first; in a tunnel each panel looks like the exit.
+// Where the walls end there is daylight. Before the camera has got used to it, the end is hidden in glare and only the
+// panels before it show; so it is taken from the near looks alone, with the wall's lateral offset, which is known.
+void UprightObjects::look_for_exit(const SettledEdge& edge) {
+  const size_t side = edge.lateral_m > 0 ? 1 : 0;
+  const double wall_m = tunnel_.wall_m[side];
+  Exit& exit = exits_[side];
+  if (std::abs(edge.lateral_m - wall_m) > kExitLateralM || edge.outer_grey > kDarkShare * edge.inner_grey) return;
+  if (std::min(edge.inner_grey, edge.wall_grey) < kDaylightShare * tunnel_.daylight_grey) return;
+  const double widest = std::abs(edge.measured[edge.count - 1].bearing);
+  double sum = 0, weights = 0;
+  for (size_t i = 0; i < edge.count; ++i) {
+    const EdgeMeasurement& m = edge.measured[i];
+    if (std::abs(m.bearing) < kExitWideShare * widest) continue;
+    const double weight = std::pow(m.bearing, 4);
+    sum += weight * (m.way_m + (wall_m - m.eye_lateral_m) / m.bearing);
+    weights += weight;
+  }
+  if (sum < exit.place_m * weights) return;
+  exit = {sum / weights, edge.sigma_m, edge.pictures};
+}
+
+// A portal's outer corners look like a bridge and come first.
 void UprightObjects::hold(const UprightObject& object) {
   for (UprightObject& held : held_) {
     if (std::abs(held.place_m - object.place_m) > kForgetM) continue;
-    const bool held_is_bridge = held.type == LandmarkType::bridge;
-    const bool is_bridge = object.type == LandmarkType::bridge;
-    if (held_is_bridge && !is_bridge) held = object;
-    if (held_is_bridge || is_bridge) return;
-    if (held.type == LandmarkType::portal_out && object.type == LandmarkType::portal_out &&
-        object.place_m > held.place_m) {
-      held = object;
-    }
+    if (held.type == LandmarkType::bridge && object.type != LandmarkType::bridge) held = object;
     return;
   }
   held_.push_back(object);
 }
 
 bool UprightObjects::in_tunnel(double way_m) const {
-  return way_m - inside_since_m_ < kLongestTunnelM;
+  return way_m > tunnel_.since_m && way_m - tunnel_.since_m < kLongestTunnelM;
 }
 
 void UprightObjects::release(double way_m) {
   for (const UprightObject& held : held_) {
-    if (held.place_m > way_m + kHoldM) continue;
-    const bool inside = in_tunnel(held.place_m);
-    if (inside != (held.type == LandmarkType::portal_out)) continue;
+    if (held.place_m > way_m + kHoldM || in_tunnel(held.place_m + kForgetM)) continue;
     if (held.type == LandmarkType::portal_in) {
-      inside_since_m_ = held.place_m;
-      daylight_grey_ = held.outer_grey;
+      tunnel_ = {held.place_m, held.outer_grey, held.wall_m};
+      exits_ = {};
     }
-    if (held.type == LandmarkType::portal_out) inside_since_m_ = -1e9;
     if (held.type == LandmarkType::bridge) {
       if (held.place_m - last_bridge_m_ < kSameBridgeM) continue;  // its far side
       last_bridge_m_ = held.place_m;
@@ -220,6 +319,21 @@ void UprightObjects::release(double way_m) {
     objects_.push_back(held);
   }
   std::erase_if(held_, [way_m](const UprightObject& held) { return held.place_m <= way_m + kHoldM; });
+}
+
+// When the last end of a wall is behind the train, no panel can follow.
+void UprightObjects::release_exit(const EdgeTracker& tracker, double way_m) {
+  const Exit& first = exits_[0].place_m > exits_[1].place_m ? exits_[0] : exits_[1];
+  const Exit& other = &first == exits_.data() ? exits_[1] : exits_[0];
+  if (first.pictures == 0 || first.place_m > way_m + kHoldM) return;
+  const bool both = first.place_m - other.place_m < kSidesM;
+  double place_m = both ? 0.5 * (first.place_m + other.place_m) : first.place_m;
+  // The last piece of wall may be as bright as the land behind it: its end is faint.
+  if (const auto end_m = tracker.last_step(tunnel_.wall_m, place_m + kGlareM, place_m + kPanelM)) place_m = *end_m;
+  objects_.push_back(
+      {LandmarkType::portal_out, place_m, 0, std::hypot(kExitSigmaM, both ? 0.0 : kOneSideSigmaM), first.pictures});
+  tunnel_ = {};
+  exits_ = {};
 }
 
 }  // namespace railfix::track_detector

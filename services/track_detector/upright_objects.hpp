@@ -1,6 +1,7 @@
 // What upright edges belong to: two close ones are a mast, one on each side of the track a portal or a bridge.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "track_detector/edge_tracker.hpp"
@@ -14,13 +15,16 @@ struct UprightObject {
   double sigma_m = 0;
   int pictures = 0;
   double outer_grey = 0;  // of a portal
+  std::array<double, 2> wall_m{0, 0};
 };
 
 class UprightObjects {
  public:
   UprightObjects();
-  /// Edges that were settled in the picture at way_m. Gives what is certain now; valid until the next call.
-  const std::vector<UprightObject>& add(const std::vector<SettledEdge>& edges, double way_m);
+  /// Edges that were settled in the picture at way_m, and who followed them. Gives what is certain now; valid until the
+  /// next call.
+  const std::vector<UprightObject>& add(const std::vector<SettledEdge>& edges, const EdgeTracker& tracker,
+                                        double way_m);
   void forget();
   /// Behind a portal in, and no portal out since.
   [[nodiscard]] bool in_tunnel(double way_m) const;
@@ -28,23 +32,36 @@ class UprightObjects {
  private:
   struct Edge {
     SettledEdge edge;
+    double way_m = 0;  // when it was settled
     bool used = false;
   };
   void pair_masts();
-  void tell_mast(const SettledEdge& a, const SettledEdge& b);
-  void pair_sides();
+  void find_stripes(double way_m);
+  void tell_mast(const SettledEdge& inner, double front_m, double side_m);
+  void pair_sides(double way_m);
+  [[nodiscard]] bool belongs_to_mast(const SettledEdge& edge) const;
   void move_to_mouth(UprightObject& portal, const SettledEdge& left, const SettledEdge& right) const;
+  void look_for_exit(const SettledEdge& edge);
   void release(double way_m);
+  void release_exit(const EdgeTracker& tracker, double way_m);
   void hold(const UprightObject& object);
 
+  struct Tunnel {
+    double since_m = -1e9;               // the portal in that no portal out has followed yet
+    double daylight_grey = 0;            // beside it
+    std::array<double, 2> wall_m{0, 0};  // right and left
+  };
+  struct Exit {
+    double place_m = -1e9, sigma_m = 0;
+    int pictures = 0;
+  };
   std::vector<Edge> edges_;             // not yet forgotten
   std::vector<UprightObject> held_;     // told when nothing better can follow
   std::vector<UprightObject> objects_;  // told now
-  double last_mast_m_ = -1e9;
-  double last_mast_lateral_m_ = 0;
+  std::vector<UprightObject> masts_;    // told, not yet forgotten
   double last_bridge_m_ = -1e9;
-  double inside_since_m_ = -1e9;  // the portal in that no portal out has followed yet
-  double daylight_grey_ = 0;      // beside that portal
+  Tunnel tunnel_;
+  std::array<Exit, 2> exits_;  // seen so far, right and left
 };
 
 }  // namespace railfix::track_detector

@@ -23,7 +23,8 @@ constexpr float kScoreNoise = 0.3F;
 constexpr size_t kUpright = 4;          // index of no lean
 constexpr double kNothingClear = 20.0;  // grey levels
 
-constexpr double kDeep[] = {0.3, 0.5};  // of an edge's bearing: twice to three times as far, if it is a wall
+constexpr double kWall[] = {0.75, 0.94};  // of an edge's bearing: so much farther away, if it is a wall along the track
+constexpr double kDeep[] = {0.3, 0.5};
 
 double lean_of(size_t index) {
   return (static_cast<double>(index) - static_cast<double>(kUpright)) * kLeanStep;
@@ -35,7 +36,8 @@ UprightSearch::UprightSearch(const geometry::Intrinsics& camera)
     : lines_(camera), cell_(kCellPx / camera.fu_px), columns_(2 * static_cast<int>(kWidestBearing / cell_) + 1) {
   grey_.create(kRows, columns_, CV_32F);
   step_.create(kRows, columns_, CV_32F);
-  for (auto* row : {&sum_, &squared_, &score_}) row->resize(static_cast<size_t>(columns_));
+  for (auto* row : {&profile_.step, &squared_, &profile_.score}) row->resize(static_cast<size_t>(columns_));
+  profile_.cell = cell_;
   found_.reserve(200);
   lean_ = kUpright;
 }
@@ -54,6 +56,7 @@ const std::vector<UprightEdge>& UprightSearch::find(const LandmarkPicture& pictu
   lean_ = best;
   sum_up(lean_of(lean_));
   collect();
+  pair();
   return found_;
 }
 
@@ -79,7 +82,7 @@ void UprightSearch::differentiate() {
     while (first < last && grey[first] < 0) ++first;
     while (last > first && grey[last] < 0) --last;
   }
-  widest_ = (0.5 * (columns_ - 1) - std::max(first, columns_ - 1 - last) - 2 * kEdge) * cell_;
+  profile_.widest = (0.5 * (columns_ - 1) - std::max(first, columns_ - 1 - last) - 2 * kEdge) * cell_;
   for (int row = 0; row < kRows; ++row) {
     const float* grey = grey_.ptr<float>(row);
     float* step = step_.ptr<float>(row);
@@ -91,7 +94,8 @@ void UprightSearch::differentiate() {
 }
 
 void UprightSearch::sum_up(double lean) {
-  std::fill(sum_.begin(), sum_.end(), 0.0F);
+  auto& sum = profile_.step;
+  std::fill(sum.begin(), sum.end(), 0.0F);
   std::fill(squared_.begin(), squared_.end(), 0.0F);
   for (int row = 0; row < kRows; ++row) {
     const double slope = top_slope_ - (kRows - 1 - row) * kRowSlope;
@@ -101,30 +105,30 @@ void UprightSearch::sum_up(double lean) {
     const int last = std::min(columns_, columns_ - shift);
     for (int c = first; c < last; ++c) {
       const float value = step[c + shift];
-      sum_[static_cast<size_t>(c)] += value;
+      sum[static_cast<size_t>(c)] += value;
       squared_[static_cast<size_t>(c)] += value * value;
     }
   }
-  for (size_t c = 0; c < sum_.size(); ++c) {
-    const float mean = sum_[c] * (1.0F / kRows);
+  for (size_t c = 0; c < sum.size(); ++c) {
+    const float mean = sum[c] = sum[c] * (1.0F / kRows);
     const float variance = std::max(0.0F, squared_[c] * (1.0F / kRows) - mean * mean);
-    score_[c] = mean / (std::sqrt(variance * (1.0F / kRows)) + kScoreNoise);
+    profile_.score[c] = mean / (std::sqrt(variance * (1.0F / kRows)) + kScoreNoise);
   }
 }
 
 double UprightSearch::clearness() const {
   double sum = 0;
-  for (size_t c = 0; c < score_.size(); ++c) {
-    const float over = std::abs(score_[c]) - kHintScore;
-    if (over > 0) sum += static_cast<double>(over * std::abs(sum_[c])) * (1.0 / kRows);
+  for (size_t c = 0; c < profile_.score.size(); ++c) {
+    const float over = std::abs(profile_.score[c]) - kHintScore;
+    if (over > 0) sum += static_cast<double>(over * std::abs(profile_.step[c]));
   }
   return sum;
 }
 
 void UprightSearch::collect() {
   for (int c = kEdge; c < columns_ - kEdge; ++c) {
-    const auto at = [&](int k) { return std::abs(sum_[static_cast<size_t>(k)]); };
-    if (at(c) < kLeastContrast * kRows || std::abs(score_[static_cast<size_t>(c)]) < kLeastScore) continue;
+    const auto at = [&](int k) { return std::abs(profile_.step[static_cast<size_t>(k)]); };
+    if (at(c) < kLeastContrast || std::abs(profile_.score[static_cast<size_t>(c)]) < kLeastScore) continue;
     bool top = true;
     for (int k = 1; k <= kEdge && top; ++k) top = at(c) > at(c - k) && at(c) >= at(c + k);
     if (!top) continue;
@@ -132,11 +136,21 @@ void UprightSearch::collect() {
     const double high = static_cast<double>(at(c + 1));
     const double bend = low - 2.0 * static_cast<double>(at(c)) + high;
     const double part = bend < 0 ? std::clamp(0.5 * (low - high) / bend, -0.5, 0.5) : 0.0;
-    const double bearing = (c + part - 0.5 * (columns_ - 1)) * cell_;
+    const double bearing = profile_.bearing(c + part);
     const int outward = bearing > 0 ? 2 : -2;
-    found_.push_back({bearing, column_grey(c - outward), column_grey(c + outward),
-                      mean_grey(std::min(kDeep[0] * bearing, kDeep[1] * bearing),
-                                std::max(kDeep[0] * bearing, kDeep[1] * bearing))});
+    found_.push_back({bearing, column_grey(c - outward), column_grey(c + outward), mean_grey(bearing, kWall),
+                      mean_grey(bearing, kDeep)});
+  }
+}
+
+void UprightSearch::pair() {
+  for (size_t i = 1; i < found_.size(); ++i) {
+    UprightEdge& a = found_[i - 1];
+    UprightEdge& b = found_[i];
+    const bool left = b.bearing > 0;
+    if ((a.bearing > 0) != left || (a.contrast() > 0) == (b.contrast() > 0)) continue;
+    (left ? a.outward : a.inward) = b.bearing - a.bearing;
+    (left ? b.inward : b.outward) = b.bearing - a.bearing;
   }
 }
 
@@ -150,9 +164,11 @@ double UprightSearch::column_grey(int column) const {
   return sum / kRows;
 }
 
-double UprightSearch::mean_grey(double from_bearing, double to_bearing) const {
-  const int first = static_cast<int>(std::lround(from_bearing / cell_ + 0.5 * (columns_ - 1)));
-  const int last = static_cast<int>(std::lround(to_bearing / cell_ + 0.5 * (columns_ - 1)));
+double UprightSearch::mean_grey(double bearing, const double (&share)[2]) const {
+  const double from = profile_.column(share[bearing > 0 ? 0 : 1] * bearing);
+  const double to = profile_.column(share[bearing > 0 ? 1 : 0] * bearing);
+  const int first = static_cast<int>(std::lround(from));
+  const int last = static_cast<int>(std::lround(to));
   if (first < 0 || last >= columns_ || last < first) return -1;
   double sum = 0;
   int count = 0;

@@ -13,8 +13,23 @@ struct UprightEdge {
   double bearing = 0;     // metres left per metre ahead, at the camera's height
   double inner_grey = 0;  // beside it, towards the track
   double outer_grey = 0;
-  double deep_grey = -1;  // mean of what lies between it and the track farther away; negative = not seen
+  double wall_grey = -1;  // mean of what lies behind it on the track's side; negative = not seen
+  double deep_grey = -1;  // the same, farther away
+  // Bearing to the next edge, if that is where the brightness steps back; else 0.
+  double outward = 0, inward = 0;
   [[nodiscard]] double contrast() const { return outer_grey - inner_grey; }
+};
+
+/// How the brightness steps from bearing to bearing, over the whole band of one picture.
+struct UprightProfile {
+  double cell = 0;           // bearing between two columns
+  double widest = 0;         // largest bearing that the picture shows on both sides
+  std::vector<float> step;   // grey levels, brighter on the left positive; from right to left
+  std::vector<float> score;  // the same against its scatter over the rows
+  [[nodiscard]] double bearing(double column) const {
+    return (column - 0.5 * (static_cast<double>(step.size()) - 1)) * cell;
+  }
+  [[nodiscard]] double column(double at) const { return at / cell + 0.5 * (static_cast<double>(step.size()) - 1); }
 };
 
 /// Looks at a band below the horizon as a level camera that looks along the track would see it: what is upright stands
@@ -27,10 +42,8 @@ class UprightSearch {
   /// From right to left; valid until the next call.
   const std::vector<UprightEdge>& find(const LandmarkPicture& picture);
 
-  /// Mean brightness between two bearings in the last picture; negative where that is not in the picture.
-  [[nodiscard]] double mean_grey(double from_bearing, double to_bearing) const;
-  /// Largest bearing that the last picture shows on both sides.
-  [[nodiscard]] double widest_bearing() const { return widest_; }
+  /// Of the last picture.
+  [[nodiscard]] const UprightProfile& profile() const { return profile_; }
 
  private:
   void look(const LandmarkPicture& picture);
@@ -38,17 +51,19 @@ class UprightSearch {
   void sum_up(double lean);
   [[nodiscard]] double clearness() const;
   void collect();
+  void pair();
   [[nodiscard]] double column_grey(int column) const;
+  [[nodiscard]] double mean_grey(double bearing, const double (&share)[2]) const;
 
   PictureLines lines_;
-  double cell_ = 0;  // bearing between two columns
+  double cell_ = 0;
   int columns_ = 0;
   double top_slope_ = 0;
-  double widest_ = 0;
   size_t lean_ = 0;
   std::array<double, 9> clear_{};  // how clear edges were with each lean, fading
   cv::Mat grey_, step_;            // CV_32F, rows from low to high, columns from right to left
-  std::vector<float> sum_, squared_, score_;
+  std::vector<float> squared_;
+  UprightProfile profile_;
   std::vector<UprightEdge> found_;
 };
 

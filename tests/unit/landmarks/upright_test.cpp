@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "track_detector/platform_tracker.hpp"
@@ -11,31 +12,52 @@ namespace {
 constexpr double kStepM = 0.7;
 constexpr double kWidest = 0.55;
 
-/// An upright line beside straight track.
+/// An upright line beside straight track; `wall` and `deep` is what lies behind it towards the track.
 struct Corner {
-  double place_m, lateral_m, inner_grey, outer_grey;
+  double place_m, lateral_m, inner_grey, outer_grey, wall_grey = 100, deep_grey = 100;
 };
+
+// The corners as seen from way_m: edges as a picture of 640 columns would show them.
+UprightProfile see(const std::vector<Corner>& corners, double way_m, std::vector<UprightEdge>& edges) {
+  UprightProfile profile;
+  profile.cell = 0.002;
+  profile.widest = kWidest;
+  profile.step.assign(641, 0.0F);
+  edges.clear();
+  for (const Corner& corner : corners) {
+    const double ahead_m = corner.place_m - way_m;
+    const double bearing = corner.lateral_m / ahead_m;
+    if (ahead_m < 2 || ahead_m > 40 || std::abs(bearing) > kWidest) continue;
+    const double side = corner.lateral_m > 0 ? 1 : -1;
+    edges.push_back({bearing, corner.inner_grey, corner.outer_grey, corner.wall_grey, corner.deep_grey});
+    for (int c = 0; c < 641; ++c) {
+      const double share = 1 - std::abs(c - profile.column(bearing)) / 2.5;
+      if (share <= 0) continue;
+      profile.step[static_cast<size_t>(c)] +=
+          static_cast<float>(side * share * (corner.outer_grey - corner.inner_grey));
+    }
+  }
+  std::sort(edges.begin(), edges.end(), [](const auto& a, const auto& b) { return a.bearing < b.bearing; });
+  profile.score = profile.step;
+  return profile;
+}
 
 std::vector<UprightObject> pass(const std::vector<Corner>& corners, double to_m) {
   EdgeTracker tracker;
   UprightObjects objects;
   std::vector<UprightObject> told;
-  LandmarkPicture picture;
+  std::vector<UprightEdge> edges;
+  const LandmarkPicture picture;
   for (double way_m = 0; way_m < to_m; way_m += kStepM) {
-    std::vector<UprightEdge> seen;
-    for (const Corner& corner : corners) {
-      const double ahead_m = corner.place_m - way_m;
-      const double bearing = corner.lateral_m / ahead_m;
-      if (ahead_m < 2 || ahead_m > 25 || std::abs(bearing) > kWidest + 0.05) continue;
-      seen.push_back({bearing, corner.inner_grey, corner.outer_grey, 100});
-    }
-    for (const auto& object : objects.add(tracker.follow(seen, picture, way_m, kWidest), way_m)) told.push_back(object);
+    const auto profile = see(corners, way_m, edges);
+    const auto& settled = tracker.follow(edges, profile, picture, way_m);
+    for (const auto& object : objects.add(settled, tracker, way_m)) told.push_back(object);
   }
   return told;
 }
 
 TEST(Uprights, AMastStandsWhereItsEdgesComeFrom) {
-  const auto told = pass({{40, 3.2, 100, 60}, {40, 3.46, 60, 100}}, 45);
+  const auto told = pass({{39.87, 3.2, 100, 60}, {39.87, 3.46, 60, 100}}, 45);
   ASSERT_EQ(told.size(), 1U);
   EXPECT_EQ(told[0].type, LandmarkType::mast);
   EXPECT_NEAR(told[0].place_m, 40, 0.02);
@@ -48,40 +70,74 @@ TEST(Uprights, AMastOfWhichOnlyTheSideShowsIsOne) {
   EXPECT_NEAR(told[0].place_m, 40, 0.15);
 }
 
+TEST(Uprights, AMastThatIsNoDarkerThanWhatIsBehindItShowsByItsSide) {
+  const auto told = pass({{40.13, -3.2, 100, 60}, {39.87, -3.2, 60, 102}, {39.87, -3.46, 102, 100}}, 45);
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_NEAR(told[0].place_m, 40, 0.15);
+}
+
 TEST(Uprights, APostIsNoMast) {
   EXPECT_TRUE(pass({{40, 3.2, 100, 60}, {40, 3.32, 60, 100}}, 45).empty());
 }
 
-TEST(Uprights, ATunnelHasOnePortalInAndOneOut) {
-  std::vector<Corner> corners = {{40, 2.7, 70, 120},    {40, -2.7, 70, 120},   {42.5, 2.7, 40, 70},
-                                 {42.5, -2.7, 40, 70},  {70, 2.7, 150, 90},    {70, -2.7, 150, 90},
-                                 {72.5, 2.7, 210, 170}, {72.5, -2.7, 210, 170}};
+TEST(Uprights, ThePlaceHoldsInACurveThatIsSeenWrongly) {
   EdgeTracker tracker;
-  UprightObjects objects;
-  std::vector<UprightObject> told;
+  std::vector<UprightEdge> edges;
   LandmarkPicture picture;
-  for (double way_m = 0; way_m < 80; way_m += kStepM) {
-    std::vector<UprightEdge> seen;
-    for (const Corner& corner : corners) {
-      const double ahead_m = corner.place_m - way_m;
-      const double bearing = corner.lateral_m / ahead_m;
-      if (ahead_m < 2 || ahead_m > 25 || std::abs(bearing) > kWidest + 0.05) continue;
-      seen.push_back({bearing, corner.inner_grey, corner.outer_grey, corner.place_m < 60 ? 15.0 : 200.0});
-    }
-    for (const auto& object : objects.add(tracker.follow(seen, picture, way_m, kWidest), way_m)) told.push_back(object);
+  picture.curvature_per_m = 2e-4;  // it is straight
+  std::vector<SettledEdge> settled;
+  for (double way_m = 0; way_m < 45; way_m += kStepM) {
+    const auto profile = see({{40, 3.2, 100, 60}}, way_m, edges);
+    for (const auto& edge : tracker.follow(edges, profile, picture, way_m)) settled.push_back(edge);
   }
+  ASSERT_EQ(settled.size(), 1U);
+  EXPECT_NEAR(settled[0].place_m, 40, 0.15);
+  EXPECT_LT(std::abs(settled[0].place_m - 40), 2 * settled[0].sigma_m);
+}
+
+TEST(Uprights, ATunnelHasOnePortalInAndOneOut) {
+  std::vector<Corner> corners;
+  for (const double side : {1.0, -1.0}) {
+    corners.push_back({40, side * 2.7, 70, 120, 60, 15});
+    corners.push_back({42.5, side * 2.7, 40, 70, 40, 15});
+    corners.push_back({70, side * 2.7, 150, 90, 160, 200});
+    corners.push_back({72.5, side * 2.7, 210, 170, 210, 200});
+  }
+  const auto told = pass(corners, 80);
   ASSERT_EQ(told.size(), 2U);
   EXPECT_EQ(told[0].type, LandmarkType::portal_in);
   EXPECT_NEAR(told[0].place_m, 40, 0.05);
   EXPECT_EQ(told[1].type, LandmarkType::portal_out);
-  EXPECT_NEAR(told[1].place_m, 72.5, 0.05);
+  EXPECT_NEAR(told[1].place_m, 72.5, 0.08);
+}
+
+TEST(Uprights, TheFaintEndOfABrightWallIsThePortalOut) {
+  std::vector<Corner> corners;
+  for (const double side : {1.0, -1.0}) {
+    corners.push_back({40, side * 2.7, 70, 120, 60, 15});
+    corners.push_back({70, side * 2.7, 210, 120, 205, 200});
+    corners.push_back({70.5, side * 2.7, 206, 210, 206, 200});
+  }
+  const auto told = pass(corners, 80);
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_EQ(told[1].type, LandmarkType::portal_out);
+  EXPECT_NEAR(told[1].place_m, 70.5, 0.08);
 }
 
 TEST(Uprights, WallsWithDaylightBehindAreABridge) {
-  const auto told = pass({{40, 4.0, 80, 120}, {40, -4.0, 80, 120}, {49, 4.0, 100, 80}, {49, -4.0, 100, 80}}, 60);
+  const auto told =
+      pass({{40, 4.0, 60, 120, 65}, {40, -4.0, 60, 120, 65}, {49, 4.0, 100, 60, 100}, {49, -4.0, 100, 60, 100}}, 60);
   ASSERT_EQ(told.size(), 1U);
   EXPECT_EQ(told[0].type, LandmarkType::bridge);
   EXPECT_NEAR(told[0].place_m, 40, 0.05);
+}
+
+TEST(Uprights, MastsOnBothSidesAreNoBridge) {
+  const auto told = pass(
+      {{40.13, 3.2, 100, 50, 95}, {39.87, 3.2, 50, 110, 70}, {40.13, -3.2, 100, 50, 95}, {39.87, -3.2, 50, 110, 70}},
+      60);
+  ASSERT_EQ(told.size(), 2U);
+  for (const auto& object : told) EXPECT_EQ(object.type, LandmarkType::mast);
 }
 
 std::vector<SettledPlatform> approach(double height_m, double lateral_m) {
