@@ -22,7 +22,6 @@ constexpr int kBadBeforeDegraded = 10;
 constexpr int kPicturesTried = 100;
 constexpr double kGuessedHeightM = 2.5;
 constexpr std::chrono::milliseconds kWaitCheck{100};
-constexpr int kConnectedChecks = 4;  // the answers' way back is found a little later
 
 /// "pictures are covered: look for ..."
 std::string complaint(uint32_t health) {
@@ -93,7 +92,8 @@ FrameGrabberService::FrameGrabberService(const Config& config, service::Context&
       calibrations_(context.writer(messaging::topics::camera_calibration)),
       clock_(context.writer(messaging::topics::data_clock)),
       picture_health_(config.health),
-      lock_step_(config.wait_for) {
+      lock_step_(config.wait_for),
+      gathering_(config.wait_for) {
   if (config_.source.empty()) {
     throw core::BadInput(
         "frame_grabber.source is empty; give a dataset folder, a folder of pictures, a video, genicam:ID or "
@@ -124,15 +124,23 @@ void FrameGrabberService::prepare_recorded() {
     check_wait();
     finish_after_last_words();
   });
-  if (config_.start == "immediately") made_ns_ = core::monotonic_ns();
+  if (config_.start != "immediately") return;
+  made_ns_ = core::monotonic_ns();
+  if (config_.wait_for.empty()) return;
+  context_.on<msg::ServiceStatus>(messaging::topics::service_status, [this](const msg::ServiceStatus& status) {
+    const std::string service = status.service().c_str();
+    if (service == "frame_grabber" || status.state() == msg::STATE_STARTING) return;
+    gathering_.heard(service, {status.endpoints(), status.matches()});
+  });
 }
 
 void FrameGrabberService::start_when_connected() {
   if (!made_ns_) return;
-  const bool enough = clock_.matched_readers() >= static_cast<int>(config_.wait_for.size());
-  connected_checks_ = enough ? connected_checks_ + 1 : 0;
+  const auto found = context_.participant().connections();
+  const bool complete =
+      config_.wait_for.empty() || gathering_.complete({found.matches, found.remote_endpoints, found.pairs});
   const bool gave_up = core::seconds(core::monotonic_ns() - *made_ns_) > config_.wait_s;
-  if (connected_checks_ < kConnectedChecks && !gave_up) return;
+  if (!complete && !gave_up) return;
   made_ns_.reset();
   (void)start();
 }

@@ -53,6 +53,7 @@ class FrameGrabberService {
   messaging::Writer<msg::DataClock> clock_;
   PictureHealth picture_health_;
   LockStep lock_step_;
+  Gathering gathering_;
   std::map<std::string, uint64_t> sent_;  // by everybody, to each topic
   uint64_t frame_seq_ = 0;
   uint64_t clock_seq_ = 0;
@@ -61,7 +62,6 @@ class FrameGrabberService {
   std::optional<int64_t> preview_ns_;
   std::optional<int64_t> waiting_since_ns_;
   std::optional<int64_t> made_ns_;  // start immediately: until it has begun
-  int connected_checks_ = 0;
   std::optional<int64_t> ended_ns_;
   std::optional<int64_t> gave_up_ns_;
   std::string gave_up_why_;

@@ -35,6 +35,8 @@ class LiveCamera {
   /// Nothing when no picture came in time; an error when the camera is gone.
   virtual core::Result<std::optional<RawPicture>> next(std::chrono::milliseconds patience) = 0;
   virtual void disconnect() = 0;
+  /// Makes connect() and next() return soon, now and from now on. The only one that another thread may call.
+  virtual void cancel() {}
   /// "camera genicam:GV01", for messages.
   [[nodiscard]] virtual std::string name() const = 0;
 };

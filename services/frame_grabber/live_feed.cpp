@@ -21,6 +21,7 @@ LiveFeed::~LiveFeed() {
     stopped_ = true;
     changed_.notify_all();
   }
+  camera_->cancel();
   thread_.join();
 }
 

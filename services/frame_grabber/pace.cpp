@@ -26,4 +26,22 @@ bool LockStep::answered(const std::string& service, uint64_t step) {
   return true;
 }
 
+bool Gathering::complete(const Discovered& discovered) {
+  const bool steady = discovered == before_ && heard_ == heard_before_;
+  steady_looks_ = steady ? steady_looks_ + 1 : 0;
+  before_ = discovered;
+  heard_before_ = heard_;
+  for (const auto& service : services_) {
+    if (!heard_.contains(service)) return false;
+  }
+  uint32_t endpoints = 0;
+  uint32_t matches = discovered.matches;
+  for (const auto& [service, one] : heard_) {
+    endpoints += one.endpoints;
+    matches += one.matches;
+  }
+  const bool all_found = discovered.remote_endpoints == endpoints && matches == 2 * discovered.pairs;
+  return all_found || steady_looks_ >= kSteadyLooks;
+}
+
 }  // namespace railfix::frame_grabber

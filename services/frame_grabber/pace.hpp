@@ -1,7 +1,8 @@
-// When recorded pictures are due. Knows no clock: the caller says what time it is.
+// When recorded pictures are due, and when to begin. Knows no clock: the caller says what time it is.
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -45,6 +46,38 @@ class LockStep {
   std::vector<std::string> services_;
   size_t next_;
   uint64_t step_ = 0;
+};
+
+/// Have all found each other, so that no sample of the first picture is lost? Counted as `railfix run` does it.
+class Gathering {
+ public:
+  /// Readers and writers of one participant, and how many partners they have found.
+  struct Connections {
+    uint32_t endpoints = 0;
+    uint32_t matches = 0;
+    bool operator==(const Connections&) const = default;
+  };
+  /// What discovery says here: own partners, endpoints of all others, and pairs there should be in all.
+  struct Discovered {
+    uint32_t matches = 0;
+    uint32_t remote_endpoints = 0;
+    uint32_t pairs = 0;
+    bool operator==(const Discovered&) const = default;
+  };
+  explicit Gathering(std::vector<std::string> services) : services_(std::move(services)) {}
+  /// Status of another service that is set up.
+  void heard(const std::string& service, const Connections& connections) { heard_[service] = connections; }
+  /// REQUIRES: asked ten times a second. Programs without a status (tools) cannot be counted: then it is enough that
+  /// nothing has changed for two seconds.
+  bool complete(const Discovered& discovered);
+
+ private:
+  static constexpr int kSteadyLooks = 20;
+  std::vector<std::string> services_;
+  std::map<std::string, Connections> heard_;
+  std::map<std::string, Connections> heard_before_;
+  Discovered before_;
+  int steady_looks_ = 0;
 };
 
 }  // namespace railfix::frame_grabber

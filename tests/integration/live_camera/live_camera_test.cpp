@@ -2,6 +2,7 @@
 // and a file through OpenCV.
 #include <gmock/gmock.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 
 #include <opencv2/videoio.hpp>
 
@@ -145,6 +146,27 @@ TEST_F(LiveCamera, AGstreamerPipeline) {
   EXPECT_EQ(frames_[0].width_px, 320U);
   EXPECT_EQ(frames_[0].height_px, 240U);
   EXPECT_EQ(frames_.back().health & ~msg::PICTURE_COVERED, 0U);
+}
+
+// Opening a pipe that nobody writes to blocks for ever; so does a camera that hangs.
+TEST_F(LiveCamera, ADeviceThatBlocksDoesNotHoldUpTheEnd) {
+  const std::string pipe = (root_ / "silent").string();
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  const auto service = grabber("capture:" + pipe, {});
+  ASSERT_TRUE(run_until([&] { return status_.state() == msg::STATE_READY; }));
+  EXPECT_EQ(service->end(SIGTERM), 0);
+}
+
+// One picture an hour: reading blocks behind the first.
+TEST_F(LiveCamera, APipelineThatStopsIsToldAndDoesNotHoldUpTheEnd) {
+  const auto service = grabber(
+      "capture:videotestsrc is-live=true ! video/x-raw,format=GRAY8,width=320,height=240,framerate=1/3600 ! appsink",
+      {"frame_grabber.live.silent_s=0.5"});
+  ASSERT_TRUE(run_until([&] { return status_.state() == msg::STATE_DEGRADED; }));
+  if (reason().find("cannot be opened") != std::string::npos)
+    GTEST_SKIP() << "GStreamer's base plugins are not installed";
+  EXPECT_THAT(reason(), HasSubstr("sends no picture for 0.5 s"));
+  EXPECT_EQ(service->end(SIGTERM), 0);
 }
 
 TEST_F(LiveCamera, AFileIsPlayedAtItsRateAndBegunAnewAtItsEnd) {

@@ -206,6 +206,17 @@ TEST_F(Playback, LosslessNamesWhoDoesNotAnswer) {
   EXPECT_EQ(frames_.size(), 1U);
 }
 
+// If it waited for wait_s the test would fail.
+TEST_F(Playback, BegunImmediatelyItWaitsOnlyUntilEveryoneIsThere) {
+  const auto pictures = grabber({"frame_grabber.pace=lossless", "frame_grabber.start=immediately",
+                                 "frame_grabber.wait_for=[sensor_gateway]", "frame_grabber.wait_s=3600"});
+  ASSERT_TRUE(run_until([&] { return status_.contains("frame_grabber"); }));
+  const auto sensors = gateway(true);
+  ASSERT_TRUE(run_until([&] { return pictures->exit_code() && sensors->exit_code(); }));
+  EXPECT_EQ(pictures->exit_code(), 0) << "a service without an answer to every picture would be 1";
+  EXPECT_EQ(sensors->exit_code(), 0);
+}
+
 // How many pictures are late is up to the machine; that none comes early and none is forgotten is not.
 TEST_F(Playback, RealPaceTakesAtLeastAsLongAsTheRecordingAndCountsEveryPicture) {
   const auto sensors = gateway(false);

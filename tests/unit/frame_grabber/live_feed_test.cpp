@@ -67,6 +67,38 @@ TEST(LiveFeed, ConnectsAgainAndTellsEachReasonOnce) {
                                                "there", "picture, lost 0"));
 }
 
+/// Waits for its device for ever, until it is cancelled.
+class Blocked : public LiveCamera {
+ public:
+  explicit Blocked(bool connects) : connects_(connects) {}
+  core::Result<std::string> connect() override {
+    if (!connects_) wait();
+    return std::string("there");
+  }
+  core::Result<std::optional<RawPicture>> next(std::chrono::milliseconds) override {
+    wait();
+    return std::optional<RawPicture>();
+  }
+  void disconnect() override {}
+  void cancel() override { cancelled_.set_value(); }
+  [[nodiscard]] std::string name() const override { return "camera blocked"; }
+
+ private:
+  void wait() { future_.wait(); }
+  bool connects_;
+  std::promise<void> cancelled_;
+  std::shared_future<void> future_ = cancelled_.get_future().share();
+};
+
+TEST(LiveFeed, EndsWhileItsCameraBlocks) {
+  for (const bool connects : {false, true}) {
+    LiveEvents events;
+    events.connected = [](const std::string&) {};
+    events.gone = [](const std::string&) {};
+    const LiveFeed feed(std::make_unique<Blocked>(connects), {}, events);
+  }
+}
+
 TEST(LiveFeed, PicturesThatNobodyTakesAreLostAndNotKept) {
   EXPECT_THAT(run("++++++", false),
               ElementsAre("there", "picture, lost 0", "picture, lost 0", "picture, lost 0", "picture, lost 0"));
