@@ -149,6 +149,34 @@ TEST(Sightings, PrecisionRecallAndPositionError) {
   EXPECT_TRUE(std::isnan(result->kinds.at("bridge").recall_percent()));
 }
 
+// Balises are reported 8 m ahead, masts 25 m: at the ends of the run that makes a difference.
+TEST(Sightings, EveryKindHasItsOwnReferencePoint) {
+  MadeTruth made;  // 1000 m to 2000 m
+  made.landmarks = {{{"balise", 1010, 0},
+                     {"balise", 1500, 0},
+                     {"balise", 2003, 0},
+                     {"mast", 1015, 3},
+                     {"mast", 1500, 3},
+                     {"mast", 1600, 3},
+                     {"mast", 2020, 3},
+                     {"mast", 1024, 3}}};
+  std::vector<SightingRow> rows;
+  const auto say = [&](const char* kind, double at_m, double ahead_m) {
+    rows.push_back({made.row((at_m - ahead_m - 1000) / 20).stamp_ns, kind, ahead_m});
+  };
+  for (const double at_m : {1010.0, 1500.0, 2003.0}) say("balise", at_m, 8);
+  for (const double at_m : {1500.0, 1600.0, 2020.0}) say("mast", at_m, 25);
+  say("mast", 1024, 20);  // nearer than masts usually are
+  const auto result = judge_sightings(made.make(), rows);
+  ASSERT_TRUE(result);
+  EXPECT_EQ(result->kinds.at("balise").real, 3U);
+  EXPECT_EQ(result->kinds.at("balise").right, 3U);
+  EXPECT_EQ(result->kinds.at("mast").real, 4U) << "that at 1015 m could not be reported, that at 1024 m was";
+  EXPECT_EQ(result->kinds.at("mast").right, 4U);
+  EXPECT_EQ(result->all.recall_percent(), 100);
+  EXPECT_EQ(result->all.precision_percent(), 100);
+}
+
 TEST(Sightings, KindsThatWereNeverReportedHaveARecall) {
   MadeTruth made;
   made.landmarks = {{{"frog", 1500, 0}}};

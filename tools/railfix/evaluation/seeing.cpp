@@ -93,8 +93,13 @@ FieldError judge_field(const std::vector<double>& errors, const std::vector<doub
 
 constexpr double kMatchM = 2.0;
 
-/// Nearest pairs first; each landmark and each sighting is used once. Gives the signed errors of the pairs.
-std::vector<double> match(std::vector<double> real_m, const std::vector<double>& said_m) {
+struct Match {
+  double real_m;
+  double error_m;
+};
+
+/// Nearest pairs first; each landmark and each sighting is used once.
+std::vector<Match> match(std::vector<double> real_m, const std::vector<double>& said_m) {
   struct Pair {
     size_t real;
     size_t said;
@@ -112,14 +117,21 @@ std::vector<double> match(std::vector<double> real_m, const std::vector<double>&
             [](const Pair& a, const Pair& b) { return std::abs(a.error_m) < std::abs(b.error_m); });
   std::vector<bool> real_used(real_m.size());
   std::vector<bool> said_used(said_m.size());
-  std::vector<double> errors;
+  std::vector<Match> matches;
   for (const Pair& pair : pairs) {
     if (real_used[pair.real] || said_used[pair.said]) continue;
     real_used[pair.real] = said_used[pair.said] = true;
-    errors.push_back(pair.error_m);
+    matches.push_back({real_m[pair.real], pair.error_m});
   }
-  return errors;
+  return matches;
 }
+
+/// Of one kind, along the run.
+struct Kind {
+  std::vector<double> real_m;
+  std::vector<double> said_m;
+  std::vector<double> ahead_m;  // of the train, where it was said
+};
 
 void sum_up(KindResult& kind, const std::vector<double>& errors) {
   std::vector<double> absolute;
@@ -199,38 +211,46 @@ ViewResult judge_views(const Truth& truth, const std::vector<ViewRow>& rows) {
 
 std::optional<SightingResult> judge_sightings(const Truth& truth, const std::vector<SightingRow>& rows) {
   if (!truth.landmarks()) return std::nullopt;
-  std::map<std::string, std::vector<double>> said;
+  std::map<std::string, Kind> kinds;
   std::vector<double> ahead;
   for (const SightingRow& row : rows) {
     const auto real = truth.at(row.stamp_ns);
     if (!real) continue;
-    said[row.kind].push_back(real->distance_m + row.distance_ahead_m);
+    kinds[row.kind].said_m.push_back(real->distance_m + row.distance_ahead_m);
+    kinds[row.kind].ahead_m.push_back(row.distance_ahead_m);
     ahead.push_back(row.distance_ahead_m);
   }
-  // Only what passed the reference point could be reported; the run itself says how far ahead that point is.
-  const Summary reference = summarise(ahead);
-  const double reference_m = reference.count > 0 ? reference.p50 : 0.0;
+  // A kind that was never reported has a recall, too.
+  for (const dataset::TruthLandmark& landmark : *truth.landmarks())
+    kinds[landmark.kind].real_m.push_back(landmark.distance_m);
+  const Summary usual = summarise(ahead);
   const auto [nearest, farthest] =
       std::minmax_element(truth.rows().begin(), truth.rows().end(),
                           [](const auto& a, const auto& b) { return a.distance_m < b.distance_m; });
-  std::map<std::string, std::vector<double>> real;
-  for (const dataset::TruthLandmark& landmark : *truth.landmarks()) {
-    if (landmark.distance_m < nearest->distance_m + reference_m) continue;
-    if (landmark.distance_m > farthest->distance_m + reference_m) continue;
-    real[landmark.kind].push_back(landmark.distance_m);
-    (void)said[landmark.kind];  // a kind that was never reported has a recall, too
-  }
   SightingResult result;
   std::vector<double> all_errors;
-  for (const auto& [name, sightings] : said) {
-    KindResult& kind = result.kinds[name];
-    kind.real = real[name].size();
-    kind.said = sightings.size();
-    const auto errors = match(real[name], sightings);
-    sum_up(kind, errors);
+  for (const auto& [name, kind] : kinds) {
+    // Only what passed the reference point could be reported; the run itself says how far ahead it is for this kind.
+    const Summary own = summarise(kind.ahead_m);
+    const double reference_m = own.count > 0 ? own.p50 : (usual.count > 0 ? usual.p50 : 0.0);
+    const auto passed = [&, nearest = nearest, farthest = farthest](double place_m) {
+      return place_m >= nearest->distance_m + reference_m && place_m <= farthest->distance_m + reference_m;
+    };
+    const auto matches = match(kind.real_m, kind.said_m);
+    std::vector<double> errors;
+    KindResult judged;
+    judged.real = static_cast<size_t>(std::count_if(kind.real_m.begin(), kind.real_m.end(), passed));
+    judged.said = kind.said_m.size();
+    for (const Match& one : matches) {
+      judged.real += passed(one.real_m) ? 0 : 1;  // at an end of the run, and seen all the same
+      errors.push_back(one.error_m);
+    }
+    if (judged.real + judged.said == 0) continue;
+    sum_up(judged, errors);
     all_errors.insert(all_errors.end(), errors.begin(), errors.end());
-    result.all.real += kind.real;
-    result.all.said += kind.said;
+    result.all.real += judged.real;
+    result.all.said += judged.said;
+    result.kinds[name] = std::move(judged);
   }
   sum_up(result.all, all_errors);
   return result;

@@ -46,7 +46,8 @@ struct ViewResult {
 ViewResult judge_views(const Truth& truth, const std::vector<ViewRow>& rows);
 
 struct KindResult {
-  size_t real = 0;   // landmarks that passed the reference point
+  size_t real =
+      0;  // landmarks that passed the point where this kind is reported (median), or were reported all the same
   size_t said = 0;   // sightings
   size_t right = 0;  // of them with a landmark of the same kind within 2 m
   Summary error_m;   // |distance| of the right ones
