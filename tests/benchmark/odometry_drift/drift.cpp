@@ -13,6 +13,7 @@ constexpr double kWindowM = 100.0;
 constexpr double kRestM = 1e-4;                      // less motion from picture to picture is rest
 constexpr double kFalseRestM = 0.004;                // longer true motion without a measured one is a false standstill
 constexpr int64_t kSettlingNs = core::kNsPerSecond;  // after a halt
+constexpr double kShortStepM = 0.25;                 // from the reference; behind a stop
 constexpr size_t kRemembered = 400;
 
 double quantile(std::vector<double> values, double share) {
@@ -31,6 +32,10 @@ double mean(const std::vector<double>& values) {
 double root_mean_square(std::vector<double> values) {
   for (double& value : values) value *= value;
   return std::sqrt(mean(values));
+}
+
+double both_sides_99(const std::vector<double>& values) {
+  return std::max(quantile(values, 0.995), -quantile(values, 0.005));
 }
 
 }  // namespace
@@ -75,7 +80,9 @@ void Drift::compare(double true_step_m, const odometry::MouseStep& step) {
   longest_false_rest_m_ = std::max(longest_false_rest_m_, still_m);
   for (const auto& [stamp_ns, distance_m] : true_distance_) {
     if (stamp_ns != step.reference_stamp_ns || step.step_sigma_m <= 0) continue;
-    normalised_.push_back((step.step_m - (truth_m - distance_m)) / step.step_sigma_m);
+    const double normalised = (step.step_m - (truth_m - distance_m)) / step.step_sigma_m;
+    normalised_.push_back(normalised);
+    if (std::abs(step.step_m) < kShortStepM && true_step_m != 0) normalised_short_.push_back(normalised);
   }
 }
 
@@ -101,9 +108,12 @@ void Drift::print() const {
               error_m, 100.0 * error_m / std::max(1.0, travelled_m_));
   std::printf("windows of 100 m: mean %.3f %%, p95 %.3f %%, worst %.3f %% of %zu\n", mean(window_percent_),
               quantile(window_percent_, 0.95), quantile(window_percent_, 1.0), window_percent_.size());
-  std::printf("step error %.2f mm (1 sigma); normalised by its sigma: rms %.2f, p99 %.2f\n",
-              1e3 * std::sqrt(squared_m2_ / static_cast<double>(std::max<size_t>(1, steps_))),
-              root_mean_square(normalised_), std::max(quantile(normalised_, 0.995), -quantile(normalised_, 0.005)));
+  std::printf(
+      "step error %.2f mm (1 sigma); normalised by its sigma: rms %.2f, p99 %.2f; "
+      "moving, below 0.25 m: rms %.2f, p99 %.2f of %zu\n",
+      1e3 * std::sqrt(squared_m2_ / static_cast<double>(std::max<size_t>(1, steps_))), root_mean_square(normalised_),
+      both_sides_99(normalised_), root_mean_square(normalised_short_), both_sides_99(normalised_short_),
+      normalised_short_.size());
   std::printf(
       "at rest for more than a second %zu pictures, moved in %zu by %.3f m; standstill said too long in %zu, "
       "longest over %.1f mm\n",

@@ -30,7 +30,8 @@ class Drift {
   int64_t rest_begin_ns_ = 0;  // 0 = the train moves
   double rest_moved_m_ = 0;
   double longest_false_rest_m_ = 0;
-  std::vector<double> window_percent_, seconds_, normalised_;
+  std::vector<double> window_percent_, seconds_;
+  std::vector<double> normalised_, normalised_short_;      // error of a step over its sigma, of all and of short steps
   std::vector<std::pair<int64_t, double>> true_distance_;  // of the last second, to find references in
 };
 
