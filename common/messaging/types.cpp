@@ -5,6 +5,7 @@
 
 #include "idl/cameraPubSubTypes.h"
 #include "idl/odometryPubSubTypes.h"
+#include "idl/onboardPubSubTypes.h"
 #include "idl/operationPubSubTypes.h"
 #include "idl/positionPubSubTypes.h"
 #include "idl/sensorsPubSubTypes.h"
@@ -143,6 +144,7 @@ RAILFIX_TYPE(OdometryStep)
 RAILFIX_TYPE(PositionFix)
 RAILFIX_TYPE(TrainState)
 RAILFIX_TYPE(TrainPositionReport)
+RAILFIX_TYPE(OnboardStatus)
 RAILFIX_TYPE(ServiceStatus)
 RAILFIX_TYPE(LogRecord)
 RAILFIX_TYPE(ControlRequest)

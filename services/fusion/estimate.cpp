@@ -117,6 +117,9 @@ void Estimator::judge(TrainEstimate& e, double since_sure_m) const {
   if (bound_m > budget_m) add_reason(e, "interval wider than allowed");
   const double no_motion_s = std::min(ago_s(Source::camera), ago_s(Source::wheel));
   if (no_motion_s > parameters_->sensor_timeout_s) add_reason(e, "nothing measures the motion");
+  const bool moved = watch(Source::camera).used_ns != 0 || watch(Source::wheel).used_ns != 0;
+  if (!e.standstill && (!moved || no_motion_s > kNoMotionUnusableS))
+    e.speed_mps = std::numeric_limits<double>::quiet_NaN();
   if (no_motion_s > kNoMotionUnusableS || bound_m > parameters_->unusable_budgets * budget_m) {
     e.integrity = Integrity::unusable;
   }

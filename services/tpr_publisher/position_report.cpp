@@ -71,19 +71,23 @@ void refer(const TrainPosition& position, const Reference& reference, Motion mot
   report.l_doubtover = distances.l_doubtover;
   report.l_doubtunder = distances.l_doubtunder;
 
-  bool nominal_along = reference.nominal_along;
   if (!has_co_ordinate_system(*reference.group)) {
     report.nid_packet = 1;
     report.nid_prvlrbg = reference.previous != nullptr ? reference.previous->nid_lrbg() : etcs::kUnknownBaliseGroup;
-    if (reference.previous == nullptr) return;
-    nominal_along = reference.from_previous_along;
   }
-  report.q_dirlrbg = side(nominal_along);
+  report.q_dirlrbg = orientation(reference);
+  if (report.q_dirlrbg == etcs::kUnknownSide) return;
+  const bool nominal_along = report.q_dirlrbg == etcs::kNominal;
   report.q_dlrbg = side(nominal_along == (front_m >= 0));
   if (motion != Motion::unknown) report.q_dirtrain = side(nominal_along == (motion == Motion::forward));
 }
 
 }  // namespace
+
+uint32_t orientation(const Reference& reference) {
+  if (has_co_ordinate_system(*reference.group)) return side(reference.nominal_along);
+  return reference.previous != nullptr ? side(reference.from_previous_along) : uint32_t{etcs::kUnknownSide};
+}
 
 uint32_t v_train(double speed_mps, bool standstill, etcs::Baseline baseline) {
   if (standstill) return baseline == etcs::Baseline::b4 ? etcs::kStandstillSpeed : 0;

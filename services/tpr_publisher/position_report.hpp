@@ -17,7 +17,7 @@ struct TrainPosition {
   bool track_known = false;
   bool usable = true;     // false: integrity lost, the place must not be used
   double distance_m = 0;  // travelled since start, signed
-  double speed_mps = 0;   // along the cab's forward axis, signed
+  double speed_mps = 0;   // along the cab's forward axis, signed; NaN = not known
   double over_m = 0;      // the true foot may lie this far behind the estimate
   double under_m = 0;     // ... and this far in front of it
   bool standstill = false;
@@ -40,10 +40,14 @@ struct ReportSettings {
   double foot_to_front_m = 0;   // from the camera's foot forward to the train's front end
 };
 
-/// No reference: NID_LRBG and all that is relative to it is "unknown". A real group of a single balise gives packet 1,
-/// whose directions are relative to the way from the group before it, and unknown without one (3.6.2.2, 3.4.2.3.3).
-/// D_LRBG is rounded to its step; L_DOUBTOVER and L_DOUBTUNDER take up what the rounding moves, so that the interval
-/// from min safe to max safe front end never shrinks.
+/// Q_DIRLRBG of a train that refers to this group: kUnknownSide for a single balise without a group before it.
+uint32_t orientation(const Reference& reference);
+
+/// REQUIRES: the speed is known, because V_TRAIN has no value for "unknown". No reference: NID_LRBG and all that is
+/// relative to it is "unknown". A real group of a single balise gives packet 1, whose directions are relative to the
+/// way from the group before it, and unknown without one (3.6.2.2, 3.4.2.3.3). Train integrity is left at "no
+/// information". D_LRBG is rounded to its step; L_DOUBTOVER and L_DOUBTUNDER take up what the rounding moves, so that
+/// the interval from min safe to max safe front end never shrinks.
 etcs::TrainPositionReport make_report(const TrainPosition& position, const std::optional<Reference>& reference,
                                       Motion motion, const ReportSettings& settings, int64_t now_ns);
 

@@ -66,6 +66,20 @@ bool ReportTrigger::cycle_time_over(const Moment& moment) const {
   return parameters_.t_cycloc != etcs::kNoCycleTime && moment.now_ns - reported_->now_ns >= period_ns;
 }
 
+std::optional<Reason> ReportTrigger::onboard_reason(const Moment& moment) const {
+  const auto& now = moment.onboard;
+  const auto& then = reported_->onboard;
+  constexpr uint32_t kByDriver = 2;
+  constexpr uint32_t kLost = 3;
+  if (now.m_mode != then.m_mode) return Reason::mode;
+  if (now.m_level != then.m_level || now.nid_ntc != then.nid_ntc) return Reason::level;
+  if (now.q_integrity == kLost && then.q_integrity != kLost) return Reason::integrity_lost;
+  const bool confirmed = now.q_integrity != then.q_integrity || now.integrity_ns != then.integrity_ns;
+  if (now.q_integrity == kByDriver && confirmed) return Reason::integrity_confirmed;
+  if (now.reports_wanted != then.reports_wanted) return now.wanted_because;
+  return std::nullopt;
+}
+
 std::optional<Reason> ReportTrigger::due(const Moment& moment) {
   place_locations(moment);
   note_events(moment);
@@ -73,6 +87,7 @@ std::optional<Reason> ReportTrigger::due(const Moment& moment) {
   if (moment.standstill != reported_->standstill) {
     return moment.standstill ? Reason::standstill : Reason::moving;
   }
+  if (const auto reason = onboard_reason(moment)) return reason;
   if (group_passed_ && parameters_.m_loc == etcs::kReportAtGroups) return Reason::balise_group;
   if (location_passed_) return Reason::location;
   if (cycle_distance_over(moment)) return Reason::cycle_distance;

@@ -1,4 +1,5 @@
-// When to report: first of all, then as packet 58 asks, and at standstill whatever it asks (SUBSET-026 3.6.5.1).
+// When to report: first of all, then as packet 58 asks, and whatever it asks at standstill and where mode, level, train
+// integrity or the on-board unit itself call for it (SUBSET-026 3.6.5.1.4).
 #pragma once
 
 #include <cstdint>
@@ -19,6 +20,26 @@ enum class Reason : uint8_t {
   balise_group = 5,
   location = 6,
   start = 7,
+  mode = 8,
+  level = 9,
+  integrity_confirmed = 10,
+  integrity_lost = 11,
+  border = 12,
+  session = 13,
+  error = 14,
+};
+
+/// What the ETCS on-board unit says, as OnboardStatus of idl/position.idl.
+struct Onboard {
+  int64_t stamp_ns = 0;
+  int64_t integrity_ns = 0;
+  double train_length_m = 0;
+  uint32_t m_mode = 0;
+  uint32_t m_level = etcs::kLevel2;
+  uint32_t nid_ntc = 0;
+  uint32_t q_integrity = 0;
+  uint32_t reports_wanted = 0;
+  Reason wanted_because = Reason::session;
 };
 
 /// What the rules look at. Distances are on the train's own travelled distance.
@@ -30,6 +51,7 @@ struct Moment {
   bool standstill = false;
   uint32_t nid_lrbg = etcs::kUnknownBaliseGroup;
   std::optional<double> beyond_lrbg_m;  // front end beyond the LRBG, along the cab's forward axis
+  Onboard onboard;
 };
 
 class ReportTrigger {
@@ -53,6 +75,7 @@ class ReportTrigger {
   void place_locations(const Moment& moment);
   void note_events(const Moment& moment);
   [[nodiscard]] double reached_m(const Moment& moment, bool rear_end) const;
+  [[nodiscard]] std::optional<Reason> onboard_reason(const Moment& moment) const;
   [[nodiscard]] bool cycle_distance_over(const Moment& moment) const;
   [[nodiscard]] bool cycle_time_over(const Moment& moment) const;
 

@@ -10,6 +10,7 @@ namespace railfix::tpr_publisher {
 namespace {
 
 constexpr int64_t kOldestNs = core::kNsPerSecond;
+constexpr int64_t kOnboardSilentNs = 3 * core::kNsPerSecond;
 
 /// Empty when the position is young enough.
 std::string age_refusal(int64_t stamp_ns, int64_t now_ns) {
@@ -39,15 +40,58 @@ TprPublisher::TprPublisher(std::shared_ptr<const track::Map> map, const Settings
 
 void TprPublisher::follow(const TrainPosition& position) {
   position_ = position;
-  if (!position.standstill && position.speed_mps != 0)
+  if (std::isnan(position.speed_mps)) {
+    motion_ = Motion::unknown;
+  } else if (!position.standstill && position.speed_mps != 0) {
     motion_ = position.speed_mps > 0 ? Motion::forward : Motion::backward;
-  if (!tracker_) return;
-  if (position.place_known()) {
-    tracker_->update(position.foot);
-  } else {
-    tracker_->lose();
   }
-  reference_ = tracker_->reference();
+  if (tracker_) {
+    if (position.place_known()) {
+      tracker_->update(position.foot);
+    } else {
+      tracker_->lose();
+    }
+    reference_ = tracker_->reference();
+  }
+  const double over_m = position.over_m + (reference_ ? reference_->group->q_locacc_m : 0.0);
+  integrity_.follow({position.stamp_ns, position.distance_m, over_m});
+}
+
+core::Status TprPublisher::set_parameters(const etcs::ReportParameters& parameters) {
+  if (parameters.q_dir != etcs::kUnknownSide) {  // here the value 2 says "both"
+    const uint32_t side = reference_ ? orientation(*reference_) : uint32_t{etcs::kUnknownSide};
+    if (side == etcs::kUnknownSide)
+      return core::Error{"Packet 58 is for one direction only (Q_DIR), but the train's is not known yet."};
+    if (side != parameters.q_dir)
+      return core::Error{"Packet 58 is for trains of the other direction (Q_DIR) than this one's."};
+  }
+  return trigger_.set_parameters(parameters);
+}
+
+core::Status TprPublisher::set_onboard(const Onboard& onboard) {
+  ReportSettings report = settings_.report;
+  report.m_mode = onboard.m_mode;
+  report.m_level = onboard.m_level;
+  report.nid_ntc = onboard.nid_ntc;
+  const auto trial = etcs::encode(make_report({}, std::nullopt, Motion::unknown, report, 0), report.baseline);
+  if (!trial.ok()) return trial.error();
+  settings_.report = report;
+  onboard_ = onboard;
+  integrity_.hear(onboard.q_integrity, onboard.integrity_ns, onboard.train_length_m);
+  return {};
+}
+
+bool TprPublisher::onboard_silent(int64_t now_ns) const {
+  return onboard_ && now_ns - onboard_->stamp_ns > kOnboardSilentNs;
+}
+
+etcs::TrainPositionReport TprPublisher::fields(int64_t now_ns) const {
+  auto fields = make_report(*position_, reference_, motion_, settings_.report, now_ns);
+  if (onboard_silent(now_ns)) return fields;
+  const auto said = integrity_.said(position_->distance_m);
+  fields.q_length = said.q_length;
+  fields.l_trainint = said.l_trainint;
+  return fields;
 }
 
 Moment TprPublisher::moment(int64_t now_ns) const {
@@ -61,11 +105,18 @@ Moment TprPublisher::moment(int64_t now_ns) const {
     moment.nid_lrbg = reference_->group->nid_lrbg();
     moment.beyond_lrbg_m = reference_->foot_m + settings_.report.foot_to_front_m;
   }
+  if (onboard_) {
+    moment.onboard = *onboard_;
+  } else {  // no change when it is heard for the first time and says the same
+    moment.onboard.m_mode = settings_.report.m_mode;
+    moment.onboard.m_level = settings_.report.m_level;
+    moment.onboard.nid_ntc = settings_.report.nid_ntc;
+  }
   return moment;
 }
 
 Outcome TprPublisher::update(const TrainPosition& position, int64_t now_ns) {
-  if (!std::isfinite(position.speed_mps) || !std::isfinite(position.distance_m)) {
+  if (std::isinf(position.speed_mps) || !std::isfinite(position.distance_m)) {
     return {std::nullopt, "Position report not sent: speed or distance of the train_state is not a number."};
   }
   follow(position);
@@ -74,8 +125,9 @@ Outcome TprPublisher::update(const TrainPosition& position, int64_t now_ns) {
   if (!reason) return {};
   if (auto refusal = age_refusal(position.stamp_ns, now_ns); !refusal.empty())
     return {std::nullopt, std::move(refusal)};
-  Report report{
-      position.stamp_ns, now_ns, *reason, make_report(position, reference_, motion_, settings_.report, now_ns), {}};
+  if (std::isnan(position.speed_mps) && !position.standstill)
+    return {std::nullopt, "Position report not sent: the speed is not known, and V_TRAIN has no value that says so."};
+  Report report{position.stamp_ns, now_ns, *reason, fields(now_ns), {}};
   auto message = etcs::encode(report.fields, settings_.report.baseline);
   if (!message.ok()) return {std::nullopt, "Position report not sent: " + message.error().message};
   report.message = std::move(message).value();

@@ -10,6 +10,7 @@
 #include "tpr_publisher/balise_tracker.hpp"
 #include "tpr_publisher/position_report.hpp"
 #include "tpr_publisher/report_trigger.hpp"
+#include "tpr_publisher/train_integrity.hpp"
 
 namespace railfix::tpr_publisher {
 
@@ -44,15 +45,23 @@ class TprPublisher {
   Outcome update(const TrainPosition& position, int64_t now_ns);
   /// Time goes on without a position: says when a report is due that cannot be sent.
   Outcome tick(int64_t now_ns);
-  core::Status set_parameters(const etcs::ReportParameters& parameters) { return trigger_.set_parameters(parameters); }
+  /// A packet 58 from trackside. One for the other running direction than the train's (Q_DIR) is refused.
+  core::Status set_parameters(const etcs::ReportParameters& parameters);
+  /// What the on-board unit says replaces mode and level of the settings. Refused when it cannot be encoded.
+  core::Status set_onboard(const Onboard& onboard);
+  /// The on-board unit was heard once, but not lately: its mode and level stand, train integrity is not known.
+  [[nodiscard]] bool onboard_silent(int64_t now_ns) const;
 
  private:
   void follow(const TrainPosition& position);
   [[nodiscard]] Moment moment(int64_t now_ns) const;
+  [[nodiscard]] etcs::TrainPositionReport fields(int64_t now_ns) const;
 
   Settings settings_;
   std::optional<BaliseTracker> tracker_;
   ReportTrigger trigger_;
+  TrainIntegrity integrity_;
+  std::optional<Onboard> onboard_;
   std::optional<Reference> reference_;
   std::optional<TrainPosition> position_;
   Motion motion_ = Motion::unknown;  // the last one; kept at standstill

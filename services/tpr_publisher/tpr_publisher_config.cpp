@@ -2,6 +2,49 @@
 
 namespace railfix::tpr_publisher {
 
+void GroundLinkConfig::describe(service::Fields& fields) {
+  fields.text("broker", broker, "MQTT broker, HOST or HOST:PORT; empty = reports are not sent to the ground.");
+  fields.text("topic", topic, "MQTT topic; {train} becomes common.train_id.");
+  fields.text("client_id", client_id, "MQTT client id; empty = railfix-{train}.");
+  fields.text("store", store, "File for reports that the broker does not have yet; needed with a broker.");
+  fields.integer("store_limit", store_limit, {1, 10000000}, "reports",
+                 "Most that wait in the store; beyond it the oldest are lost.");
+  fields.number("longest_retry_s", longest_retry_s, {0.1, 600}, "s",
+                "Longest pause between two attempts to connect; the first is 0.1 s, each next one twice as long.");
+  fields.integer("keep_alive_s", keep_alive_s, {5, 3600}, "s",
+                 "A broker that is silent for one and a half of it is taken for gone.");
+  fields.text("ca_file", ca_file, "Certificate authority of the broker, PEM; empty = no TLS.");
+  fields.text("certificate_file", certificate_file, "This train's certificate, PEM; empty = none.");
+  fields.text("key_file", key_file, "Key of this train's certificate, PEM.");
+  fields.text("user", user, "User name at the broker; empty = none.");
+  fields.text("password_file", password_file, "File whose first line is the password.");
+}
+
+std::optional<GroundLinkSettings> GroundLinkConfig::settings(const std::string& train_id) const {
+  if (broker.empty()) return std::nullopt;
+  const auto with_train = [&](std::string text) {
+    const auto place = text.find("{train}");
+    return place == std::string::npos ? text : text.replace(place, 7, train_id);
+  };
+  if (store.empty()) throw core::BadInput("tpr_publisher.ground_link.store is not set: name a file on a lasting disk.");
+  if (certificate_file.empty() != key_file.empty())
+    throw core::BadInput("tpr_publisher.ground_link: certificate_file and key_file go together.");
+  GroundLinkSettings settings;
+  core::ok_or_throw(ground_link::parse_broker(broker, settings.mqtt));
+  settings.mqtt.client_id = client_id.empty() ? "railfix-" + train_id : client_id;
+  settings.mqtt.ca_file = ca_file;
+  settings.mqtt.certificate_file = certificate_file;
+  settings.mqtt.key_file = key_file;
+  settings.mqtt.user = user;
+  if (!password_file.empty()) settings.mqtt.password = core::value_or_throw(ground_link::read_password(password_file));
+  settings.mqtt.keep_alive_s = static_cast<int>(keep_alive_s);
+  settings.mqtt.longest_retry_s = longest_retry_s;
+  settings.topic = with_train(topic);
+  settings.store = store;
+  settings.store_limit = static_cast<size_t>(store_limit);
+  return settings;
+}
+
 void TprPublisherConfig::describe(service::Fields& fields) {
   fields.text("map", map, "Compiled map with the balise groups; empty = every report says LRBG unknown.");
   fields.choice("baseline", baseline, {"3", "4"}, "Layout of the message: SUBSET-026 3.x or 4.0.0.");
@@ -23,6 +66,8 @@ void TprPublisherConfig::describe(service::Fields& fields) {
   fields.choice("m_loc", m_loc, {"groups", "not_at_groups"}, "Report at every new balise group or not, M_LOC.");
   fields.text("packet_58", packet_58,
               "Position report parameters as a packet 58 in hexadecimal digits; replaces the three keys above.");
+  fields.group("ground_link", "Reports to the ground over MQTT, QoS 1.",
+               [this](service::Fields& inner) { ground_link.describe(inner); });
 }
 
 Settings TprPublisherConfig::settings() const {

@@ -2,12 +2,33 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "service/config.hpp"
+#include "tpr_publisher/ground_link/ground_link.hpp"
 #include "tpr_publisher/tpr_publisher.hpp"
 
 namespace railfix::tpr_publisher {
+
+struct GroundLinkConfig {
+  std::string broker;
+  std::string topic = "railfix/{train}/position_report";
+  std::string client_id;
+  std::string store;
+  int64_t store_limit = 100000;
+  double longest_retry_s = 10;
+  int64_t keep_alive_s = 10;
+  std::string ca_file;
+  std::string certificate_file;
+  std::string key_file;
+  std::string user;
+  std::string password_file;
+
+  void describe(service::Fields& fields);
+  /// Nothing without a broker. Throws BadInput when the keys do not go together.
+  [[nodiscard]] std::optional<GroundLinkSettings> settings(const std::string& train_id) const;
+};
 
 struct TprPublisherConfig {
   std::string map;
@@ -24,6 +45,7 @@ struct TprPublisherConfig {
   int64_t d_cycloc_m = 32767;
   std::string m_loc = "groups";
   std::string packet_58;
+  GroundLinkConfig ground_link;
 
   void describe(service::Fields& fields);
   /// Throws BadInput when packet_58 cannot be read.

@@ -17,6 +17,8 @@ static_assert(static_cast<uint8_t>(Reason::moving) == msg::REPORT_MOVING);
 static_assert(static_cast<uint8_t>(Reason::balise_group) == msg::REPORT_BALISE_GROUP);
 static_assert(static_cast<uint8_t>(Reason::location) == msg::REPORT_LOCATION);
 static_assert(static_cast<uint8_t>(Reason::start) == msg::REPORT_START);
+static_assert(static_cast<uint8_t>(Reason::mode) == msg::REPORT_MODE);
+static_assert(static_cast<uint8_t>(Reason::error) == msg::REPORT_ERROR);
 
 std::shared_ptr<const track::Map> load_map(const std::string& file) {
   if (file.empty()) return nullptr;
@@ -40,6 +42,26 @@ TrainPosition position_of(const msg::TrainState& state) {
   position.under_m = state.under_m();
   position.standstill = state.standstill() != 0;
   return position;
+}
+
+core::Result<Onboard> onboard_of(const msg::OnboardStatus& status) {
+  if (status.q_integrity() > 3)
+    return core::Error{"q_integrity is " + std::to_string(status.q_integrity()) + ", not 0 to 3."};
+  if (status.reports_wanted() != 0 &&
+      (status.wanted_because() < msg::REPORT_BORDER || status.wanted_because() > msg::REPORT_ERROR))
+    return core::Error{"wanted_because is " + std::to_string(status.wanted_because()) +
+                       ", not border, session or error."};
+  Onboard onboard;
+  onboard.stamp_ns = status.stamp_ns();
+  onboard.integrity_ns = status.integrity_ns();
+  onboard.train_length_m = status.train_length_m();
+  onboard.m_mode = status.m_mode();
+  onboard.m_level = status.m_level();
+  onboard.nid_ntc = status.nid_ntc();
+  onboard.q_integrity = status.q_integrity();
+  onboard.reports_wanted = status.reports_wanted();
+  onboard.wanted_because = static_cast<Reason>(status.wanted_because());
+  return onboard;
 }
 
 double metres(uint32_t raw, uint32_t q_scale) {
@@ -78,10 +100,14 @@ TprPublisherService::TprPublisherService(const Config& config, service::Context&
       baseline_(config.settings().report.baseline),
       publisher_(load_map(config.map), config.settings()),
       writer_(context.writer(messaging::topics::train_position_report)) {
+  if (const auto link = config.ground_link.settings(context.common().train_id))
+    ground_link_ = std::make_unique<GroundLink>(*link);
   context.on<msg::DataClock>(messaging::topics::data_clock,
                              [this](const msg::DataClock& clock) { data_clock_ = clock; });
   context.on<msg::TrainState>(messaging::topics::train_state,
                               [this](const msg::TrainState& state) { on_state(state); });
+  context.on<msg::OnboardStatus>(messaging::topics::onboard_status,
+                                 [this](const msg::OnboardStatus& status) { on_onboard(status); });
   context.every(kTickPeriod, [this] { on_tick(); });
   context.on_command("packet_58", [this](const std::string& hex) -> core::Result<std::string> {
     const auto bytes = etcs::parse_hex(hex);
@@ -102,24 +128,39 @@ int64_t TprPublisherService::now_ns(int64_t stamp_ns) const {
 void TprPublisherService::on_state(const msg::TrainState& state) {
   context_.health().input();
   state_seen_ = true;
-  const auto outcome = publisher_.update(position_of(state), now_ns(state.stamp_ns()));
+  const int64_t now = now_ns(state.stamp_ns());
+  const auto outcome = publisher_.update(position_of(state), now);
   if (outcome.report) send(*outcome.report, state.grabbed_ns());
   if (!outcome.refusal.empty()) {
-    show(outcome.refusal);
+    report_trouble_ = outcome.refusal;
+  } else if (!onboard_refusal_.empty()) {
+    report_trouble_ = onboard_refusal_;
+  } else if (publisher_.onboard_silent(now)) {
+    report_trouble_ = "onboard_status is silent: mode and level as last heard, train integrity not known.";
   } else if (!reference_known_) {
-    show(!has_map_                  ? "Reports say LRBG unknown: tpr_publisher.map is not set."
-         : state.track_known() == 0 ? "Reports say LRBG unknown: the track is not known."
-                                    : "Reports say LRBG unknown: no balise group behind the train yet.");
+    report_trouble_ = !has_map_                  ? "Reports say LRBG unknown: tpr_publisher.map is not set."
+                      : state.track_known() == 0 ? "Reports say LRBG unknown: the track is not known."
+                                                 : "Reports say LRBG unknown: no balise group behind the train yet.";
   } else {
-    show("");
+    report_trouble_.clear();
   }
+  show();
+}
+
+void TprPublisherService::on_onboard(const msg::OnboardStatus& status) {
+  const auto onboard = onboard_of(status);
+  const auto taken = onboard.ok() ? publisher_.set_onboard(onboard.value()) : core::Status(onboard.error());
+  onboard_refusal_ = taken.ok() ? "" : "onboard_status is not used: " + taken.error().message;
 }
 
 void TprPublisherService::on_tick() {
-  // Before the first state the service is ready; the end of played data is no fault.
-  if (!state_seen_ || context_.common().lock_step || (data_clock_ && data_clock_->ended() != 0)) return;
-  const auto outcome = publisher_.tick(now_ns(0));
-  if (!outcome.refusal.empty()) show(outcome.refusal);
+  if (!state_seen_) return;  // ready, whatever the ground link says
+  // The end of played data is no fault.
+  if (!context_.common().lock_step && (!data_clock_ || data_clock_->ended() == 0)) {
+    auto outcome = publisher_.tick(now_ns(0));
+    if (!outcome.refusal.empty()) report_trouble_ = std::move(outcome.refusal);
+  }
+  show();
 }
 
 void TprPublisherService::send(const Report& report, int64_t grabbed_ns) {
@@ -130,12 +171,28 @@ void TprPublisherService::send(const Report& report, int64_t grabbed_ns) {
     return;
   }
   ++seq_;
+  to_ground(report);
   reference_known_ = report.fields.nid_lrbg != etcs::kUnknownBaliseGroup;
   context_.health().output(grabbed_ns);
   context_.log().debug("reason {}: {}", message.reason(), etcs::to_hex(report.message));
 }
 
-void TprPublisherService::show(const std::string& degraded_by) {
+void TprPublisherService::to_ground(const Report& report) {
+  if (!ground_link_) return;
+  ground_link::GroundReport ground;
+  ground.train = context_.common().train_id;
+  ground.stamp_ns = report.stamp_ns;
+  ground.sent_ns = report.sent_ns;
+  ground.baseline = static_cast<uint32_t>(baseline_);
+  ground.reason = static_cast<uint32_t>(report.reason);
+  ground.message = report.message;
+  ground_link_->send(std::move(ground));
+}
+
+void TprPublisherService::show() {
+  std::string degraded_by = report_trouble_;
+  if (const auto link = ground_link_ ? ground_link_->trouble() : ""; !link.empty())
+    degraded_by += (degraded_by.empty() ? "" : " ") + link;
   if (degraded_by.empty()) {
     context_.health().active();
   } else {

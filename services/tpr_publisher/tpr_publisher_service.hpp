@@ -1,9 +1,11 @@
-// train_state in, train_position_report out.
+// train_state and onboard_status in, train_position_report out.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 
+#include "messaging/onboard_topic.hpp"
 #include "service/service.hpp"
 #include "tpr_publisher/tpr_publisher_config.hpp"
 
@@ -16,11 +18,14 @@ class TprPublisherService {
 
  private:
   void on_state(const msg::TrainState& state);
+  void on_onboard(const msg::OnboardStatus& status);
   void on_tick();
   /// Now, in the time of the data: the host's clock on a train, what data_clock says where data is played.
   [[nodiscard]] int64_t now_ns(int64_t stamp_ns) const;
   void send(const Report& report, int64_t grabbed_ns);
-  void show(const std::string& degraded_by);
+  void to_ground(const Report& report);
+  /// What is wrong with the reports, and with the way to the ground, as status and log.
+  void show();
 
   service::Context& context_;
   bool has_map_;
@@ -31,7 +36,10 @@ class TprPublisherService {
   bool state_seen_ = false;
   bool reference_known_ = false;  // in the last report
   uint64_t seq_ = 0;
+  std::unique_ptr<GroundLink> ground_link_;  // nullptr = no broker
+  std::string report_trouble_;
   std::string degraded_by_;
+  std::string onboard_refusal_;  // empty = used
 };
 
 }  // namespace railfix::tpr_publisher

@@ -8,6 +8,7 @@
 
 #include "idl/cameraPubSubTypes.h"
 #include "idl/odometryPubSubTypes.h"
+#include "idl/onboardPubSubTypes.h"
 #include "idl/positionPubSubTypes.h"
 #include "idl/sensorsPubSubTypes.h"
 #include "idl/trackPubSubTypes.h"
@@ -31,7 +32,8 @@ using Types =
                      Plain<TrackViewPubSubType, TrackView>, Plain<LandmarkSightingPubSubType, LandmarkSighting>,
                      Plain<OdometryStepPubSubType, OdometryStep>, Plain<PositionFixPubSubType, PositionFix>,
                      Plain<TrainStatePubSubType, TrainState>,
-                     Plain<TrainPositionReportPubSubType, TrainPositionReport>>;
+                     Plain<TrainPositionReportPubSubType, TrainPositionReport>,
+                     Plain<OnboardStatusPubSubType, OnboardStatus>>;
 TYPED_TEST_SUITE(PlainTypes, Types);
 
 TYPED_TEST(PlainTypes, MemoryIsCdr) {

@@ -127,6 +127,32 @@ TEST_F(Trigger, LocationsCountFromTheBaliseGroup) {
   EXPECT_EQ(step(), std::nullopt);
 }
 
+TEST_F(Trigger, TheOnboardUnitCallsForReports) {
+  step();
+  const auto expect_once = [&](Reason reason) {
+    EXPECT_EQ(step(), reason);
+    EXPECT_EQ(step(), std::nullopt);
+  };
+  moment.onboard.m_mode = 1;
+  expect_once(Reason::mode);
+  moment.onboard.m_level = etcs::kLevel1;
+  expect_once(Reason::level);
+  moment.onboard.q_integrity = 1;  // a device may confirm every second: no report for that
+  EXPECT_EQ(step(), std::nullopt);
+  moment.onboard.q_integrity = 3;
+  expect_once(Reason::integrity_lost);
+  moment.onboard.q_integrity = 2;
+  moment.onboard.integrity_ns = 5;
+  expect_once(Reason::integrity_confirmed);
+  moment.onboard.integrity_ns = 6;  // confirmed again
+  expect_once(Reason::integrity_confirmed);
+  for (const auto reason : {Reason::border, Reason::session, Reason::error}) {
+    ++moment.onboard.reports_wanted;
+    moment.onboard.wanted_because = reason;
+    expect_once(reason);
+  }
+}
+
 TEST_F(Trigger, StaysDueUntilSent) {
   step();
   moment.nid_lrbg = 7;

@@ -101,11 +101,80 @@ TEST(TprPublisher, DirectionOfMovementIsKeptAtStandstill) {
 TEST(TprPublisher, NumbersThatAreNoneAreRefused) {
   TprPublisher publisher(balise_map(), settings());
   auto position = at(forward(1, 150), 0, 20);
-  position.speed_mps = NAN;
+  position.speed_mps = HUGE_VAL;
+  EXPECT_THAT(publisher.update(position, kStart).refusal, HasSubstr("not a number"));
+  position.speed_mps = 20;
+  position.distance_m = NAN;
   EXPECT_THAT(publisher.update(position, kStart).refusal, HasSubstr("not a number"));
   position = at(forward(1, NAN), 0, 20);
   position.distance_m = 0;
   EXPECT_EQ(publisher.update(position, kStart).report->fields.nid_lrbg, etcs::kUnknownBaliseGroup);
+}
+
+TEST(TprPublisher, AnUnknownSpeedIsNoStandstill) {
+  TprPublisher publisher(balise_map(), settings());
+  ASSERT_TRUE(publisher.update(at(forward(1, 350), 0, 20), kStart).report.has_value());
+  auto position = at(forward(1, 390), 2, 20);
+  position.speed_mps = NAN;
+  EXPECT_EQ(publisher.update(position, position.stamp_ns).refusal, "");  // nothing is due
+  position = at(forward(1, 410), 3, 20);
+  position.speed_mps = NAN;
+  const auto outcome = publisher.update(position, position.stamp_ns);  // over a group
+  EXPECT_FALSE(outcome.report.has_value());
+  EXPECT_THAT(outcome.refusal, HasSubstr("the speed is not known"));
+  position = at(forward(1, 430), 4, 20);  // still due when it is known again
+  const auto late = publisher.update(position, position.stamp_ns);
+  ASSERT_TRUE(late.report.has_value());
+  EXPECT_EQ(late.report->reason, Reason::balise_group);
+  EXPECT_EQ(late.report->fields.nid_lrbg, kB);
+  EXPECT_EQ(late.report->fields.v_train, 14U);
+}
+
+TEST(TprPublisher, TheOnboardUnitSetsModeLevelAndIntegrity) {
+  TprPublisher publisher(balise_map(), settings());
+  ASSERT_TRUE(publisher.update(at(forward(1, 450), 0, 20), kStart).report.has_value());
+  Onboard onboard;
+  onboard.stamp_ns = kStart + core::to_ns(0.5);
+  ASSERT_TRUE(publisher.set_onboard(onboard).ok());
+  EXPECT_FALSE(publisher.update(at(forward(1, 460), 0.5, 20), onboard.stamp_ns).report.has_value());  // nothing new
+  onboard.m_mode = 1;
+  onboard.m_level = etcs::kLevelNtc;
+  onboard.nid_ntc = 9;
+  onboard.q_integrity = 1;
+  onboard.integrity_ns = kStart + core::to_ns(0.5);
+  onboard.train_length_m = 120;
+  ASSERT_TRUE(publisher.set_onboard(onboard).ok());
+  auto position = at(forward(1, 470), 1, 20);
+  const auto report = publisher.update(position, position.stamp_ns).report;
+  ASSERT_TRUE(report.has_value());
+  EXPECT_EQ(report->reason, Reason::mode);
+  EXPECT_EQ(report->fields.m_mode, 1U);
+  EXPECT_EQ(report->fields.nid_ntc, 9U);
+  EXPECT_EQ(report->fields.q_length, 1U);
+  EXPECT_EQ(report->fields.l_trainint, 138U);  // 10 m since, 3 m of doubt, 5 m of Q_LOCACC, 120 m
+  EXPECT_EQ(etcs::decode(report->message, etcs::Baseline::b3).value(), report->fields);
+
+  EXPECT_FALSE(publisher.onboard_silent(onboard.stamp_ns + core::to_ns(3)));
+  position = at(forward(1, 600), 7, 20);
+  EXPECT_TRUE(publisher.onboard_silent(position.stamp_ns));
+  const auto silent = publisher.update(position, position.stamp_ns).report;
+  ASSERT_TRUE(silent.has_value());
+  EXPECT_EQ(silent->fields.m_mode, 1U);
+  EXPECT_EQ(silent->fields.q_length, 0U);
+
+  onboard.m_mode = 17;  // 4.0.0 only
+  EXPECT_THAT(publisher.set_onboard(onboard).error().message, HasSubstr("M_MODE"));
+}
+
+TEST(TprPublisher, Packet58ForTheOtherDirectionIsRefused) {
+  TprPublisher publisher(balise_map(), settings());
+  etcs::ReportParameters parameters;
+  parameters.q_dir = etcs::kNominal;
+  EXPECT_THAT(publisher.set_parameters(parameters).error().message, HasSubstr("not known yet"));
+  ASSERT_TRUE(publisher.update(at(forward(1, 150), 0, 20), kStart).report.has_value());  // along A's nominal direction
+  EXPECT_TRUE(publisher.set_parameters(parameters).ok());
+  parameters.q_dir = etcs::kReverse;
+  EXPECT_THAT(publisher.set_parameters(parameters).error().message, HasSubstr("other direction"));
 }
 
 TEST(TprPublisher, WithoutAMapTheReferenceIsUnknown) {

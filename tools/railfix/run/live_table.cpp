@@ -41,9 +41,11 @@ std::string position_line(const TrainPicture& picture) {
   const char* integrity = s.integrity() == msg::INTEGRITY_OK         ? "ok"
                           : s.integrity() == msg::INTEGRITY_DEGRADED ? "degraded"
                                                                      : "unusable";
-  return fmt::format("{:6.1f} s  {}  -{:.2f}/+{:.2f} m  {:.1f} km/h{}  travelled {:.1f} m  integrity {}", elapsed_s,
-                     where, s.over_m(), s.under_m(), core::kmh_from_mps(s.speed_mps()),
-                     s.standstill() != 0 ? " (standstill)" : "", s.distance_m(), integrity);
+  const std::string speed =
+      std::isnan(s.speed_mps()) ? "speed not known" : fmt::format("{:.1f} km/h", core::kmh_from_mps(s.speed_mps()));
+  return fmt::format("{:6.1f} s  {}  -{:.2f}/+{:.2f} m  {}{}  travelled {:.1f} m  integrity {}", elapsed_s, where,
+                     s.over_m(), s.under_m(), speed, s.standstill() != 0 ? " (standstill)" : "", s.distance_m(),
+                     integrity);
 }
 
 std::string counts_line(const TrainPicture& picture) {

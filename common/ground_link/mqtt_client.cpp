@@ -1,0 +1,163 @@
+#include "ground_link/mqtt_client.hpp"
+
+#include <mosquitto.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <chrono>
+#include <condition_variable>
+#include <cstring>
+#include <fstream>
+#include <mutex>
+#include <thread>
+
+namespace railfix::ground_link {
+
+namespace {
+
+constexpr int kQos1 = 1;
+constexpr int kLoopMs = 200;
+constexpr double kFirstRetryS = 0.1;
+
+std::string text_of(int code) {
+  return code == MOSQ_ERR_ERRNO ? std::strerror(errno) : mosquitto_strerror(code);
+}
+
+struct Free {
+  void operator()(mosquitto* client) const { mosquitto_destroy(client); }
+};
+
+}  // namespace
+
+class MqttClient::Connection {
+ public:
+  Connection(const MqttOptions& options, MqttEvents events) : options_(options), events_(std::move(events)) {
+    static const int initialised = mosquitto_lib_init();
+    (void)initialised;
+    const bool clean = !options_.keep_session;
+    client_.reset(mosquitto_new(options_.client_id.empty() ? nullptr : options_.client_id.c_str(), clean, this));
+    if (!client_) throw core::BadInput("MQTT client id \"" + options_.client_id + "\": " + text_of(MOSQ_ERR_ERRNO));
+    mosquitto_threaded_set(client_.get(), true);
+    if (!options_.user.empty())
+      mosquitto_username_pw_set(client_.get(), options_.user.c_str(), options_.password.c_str());
+    set_tls();
+    set_callbacks();
+    thread_ = std::thread([this] { run(); });
+  }
+  ~Connection() {
+    {
+      const std::lock_guard lock(mutex_);
+      stop_ = true;
+    }
+    wake_.notify_all();
+    mosquitto_disconnect(client_.get());
+    thread_.join();
+  }
+  core::Result<int> publish(const std::string& topic, std::span<const uint8_t> payload) {
+    int id = 0;
+    const int code = mosquitto_publish(client_.get(), &id, topic.c_str(), static_cast<int>(payload.size()),
+                                       payload.data(), kQos1, false);
+    // Without a connection the message is kept and sent with the next one.
+    if (code == MOSQ_ERR_SUCCESS || code == MOSQ_ERR_NO_CONN || code == MOSQ_ERR_CONN_LOST) return id;
+    return core::Error{text_of(code)};
+  }
+
+ private:
+  void set_tls() {
+    if (options_.ca_file.empty()) return;
+    const auto or_null = [](const std::string& file) { return file.empty() ? nullptr : file.c_str(); };
+    const int code = mosquitto_tls_set(client_.get(), options_.ca_file.c_str(), nullptr,
+                                       or_null(options_.certificate_file), or_null(options_.key_file), nullptr);
+    if (code != MOSQ_ERR_SUCCESS) {
+      throw core::BadInput("TLS of the ground link: " + options_.ca_file + ", " + options_.certificate_file + ", " +
+                           options_.key_file + ": " + text_of(code) + "; do the files exist, as PEM?");
+    }
+  }
+
+  void set_callbacks() {
+    mosquitto_connect_callback_set(client_.get(), [](mosquitto* client, void* self, int code) {
+      auto& connection = *static_cast<Connection*>(self);
+      if (code != 0) {
+        connection.refusal_ = mosquitto_connack_string(code);
+        return;
+      }
+      connection.retry_s_ = kFirstRetryS;
+      const auto& filter = connection.options_.subscribe_to;
+      if (!filter.empty()) mosquitto_subscribe(client, nullptr, filter.c_str(), kQos1);
+      if (connection.events_.connected) connection.events_.connected();
+    });
+    mosquitto_publish_callback_set(client_.get(), [](mosquitto*, void* self, int id) {
+      const auto& events = static_cast<Connection*>(self)->events_;
+      if (events.delivered) events.delivered(id);
+    });
+    mosquitto_message_callback_set(client_.get(), [](mosquitto*, void* self, const mosquitto_message* message) {
+      const auto& events = static_cast<Connection*>(self)->events_;
+      if (events.received)
+        events.received({static_cast<const uint8_t*>(message->payload), static_cast<size_t>(message->payloadlen)});
+    });
+  }
+
+  [[nodiscard]] bool stopped() {
+    const std::lock_guard lock(mutex_);
+    return stop_;
+  }
+
+  void run() {
+    while (!stopped()) {
+      refusal_.clear();
+      int code = mosquitto_connect_async(client_.get(), options_.host.c_str(), options_.port, options_.keep_alive_s);
+      while (code == MOSQ_ERR_SUCCESS && !stopped()) code = mosquitto_loop(client_.get(), kLoopMs, 1);
+      if (stopped()) break;
+      if (events_.disconnected) events_.disconnected(refusal_.empty() ? text_of(code) : refusal_);
+      pause();
+    }
+  }
+
+  void pause() {
+    std::unique_lock lock(mutex_);
+    wake_.wait_for(lock, std::chrono::duration<double>(retry_s_), [this] { return stop_; });
+    retry_s_ = std::min(retry_s_ * 2, options_.longest_retry_s);
+  }
+
+  MqttOptions options_;
+  MqttEvents events_;
+  std::unique_ptr<mosquitto, Free> client_;
+  double retry_s_ = kFirstRetryS;  // these two: the thread's own
+  std::string refusal_;
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  bool stop_ = false;
+  std::thread thread_;
+};
+
+MqttClient::MqttClient(const MqttOptions& options, MqttEvents events)
+    : connection_(std::make_unique<Connection>(options, std::move(events))) {}
+MqttClient::~MqttClient() = default;
+
+core::Result<int> MqttClient::publish(const std::string& topic, std::span<const uint8_t> payload) {
+  return connection_->publish(topic, payload);
+}
+
+core::Status parse_broker(const std::string& text, MqttOptions& options) {
+  const auto colon = text.rfind(':');
+  options.host = text.substr(0, colon);
+  if (colon != std::string::npos) {
+    const char* end = text.data() + text.size();
+    const auto parsed = std::from_chars(text.data() + colon + 1, end, options.port);
+    if (parsed.ec != std::errc() || parsed.ptr != end || options.port < 1 || options.port > 65535)
+      return core::Error{"Broker \"" + text + "\": give HOST or HOST:PORT, e.g. localhost:1883."};
+  }
+  if (options.host.empty()) return core::Error{"Broker \"" + text + "\": the host is missing, e.g. localhost:1883."};
+  return {};
+}
+
+core::Result<std::string> read_password(const std::string& file) {
+  std::ifstream stream(file);
+  std::string password;
+  if (!stream || !std::getline(stream, password))
+    return core::Error{file + ": no password can be read; put it into the first line."};
+  return password;
+}
+
+}  // namespace railfix::ground_link

@@ -1,0 +1,61 @@
+// A connection to an MQTT broker that is made again by itself. Mosquitto's headers appear only in mqtt_client.cpp.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "core/result.hpp"
+
+namespace railfix::ground_link {
+
+struct MqttOptions {
+  std::string host;
+  int port = 1883;
+  std::string client_id;      // of two clients with the same one the broker throws out the first
+  bool keep_session = false;  // the broker keeps messages for this client while it is away
+  std::string ca_file;        // PEM; empty = no TLS
+  std::string certificate_file;
+  std::string key_file;
+  std::string user;  // empty = none
+  std::string password;
+  int keep_alive_s = 10;        // a silent broker is given up after one and a half of it
+  double longest_retry_s = 10;  // attempts begin 0.1 s apart, each pause is twice the one before
+  std::string subscribe_to;     // topic filter, QoS 1; empty = none
+};
+
+/// Called in the client's own thread.
+struct MqttEvents {
+  std::function<void()> connected;
+  std::function<void(const std::string& why)> disconnected;  // also after every attempt that failed
+  std::function<void(int id)> delivered;                     // the broker has it
+  std::function<void(std::span<const uint8_t> payload)> received;
+};
+
+class MqttClient {
+ public:
+  /// Begins to connect. Throws BadInput when the certificate files cannot be used.
+  MqttClient(const MqttOptions& options, MqttEvents events);
+  /// Says good-bye to the broker; what it has not confirmed is not delivered.
+  ~MqttClient();
+  MqttClient(const MqttClient&) = delete;
+  MqttClient& operator=(const MqttClient&) = delete;
+
+  /// QoS 1; gives the id that `delivered` will have. The client repeats the message over lost connections until then.
+  /// An error: it was not taken. From any thread.
+  core::Result<int> publish(const std::string& topic, std::span<const uint8_t> payload);
+
+ private:
+  class Connection;
+  std::unique_ptr<Connection> connection_;
+};
+
+/// "HOST" or "HOST:PORT" into the options.
+core::Status parse_broker(const std::string& text, MqttOptions& options);
+/// First line of a file that holds a password.
+core::Result<std::string> read_password(const std::string& file);
+
+}  // namespace railfix::ground_link

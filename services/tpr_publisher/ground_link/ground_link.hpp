@@ -1,0 +1,73 @@
+// Position reports to the ground: stored first, then sent over MQTT (QoS 1) in the order in which they were made,
+// removed from the store when the broker has them. Two threads of its own: a slow disk or network never holds the
+// service up.
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <variant>
+
+#include "ground_link/ground_report.hpp"
+#include "ground_link/mqtt_client.hpp"
+#include "tpr_publisher/ground_link/outbox.hpp"
+#include "tpr_publisher/ground_link/report_store.hpp"
+
+namespace railfix::tpr_publisher {
+
+struct GroundLinkSettings {
+  ground_link::MqttOptions mqtt;
+  std::string topic;
+  std::filesystem::path store;
+  size_t store_limit = 100'000;
+};
+
+class GroundLink {
+ public:
+  /// Throws BadInput when the store or the certificates cannot be opened.
+  explicit GroundLink(const GroundLinkSettings& settings);
+  ~GroundLink();
+  GroundLink(const GroundLink&) = delete;
+  GroundLink& operator=(const GroundLink&) = delete;
+
+  /// Any thread; returns at once. Stream and sequence are filled in here.
+  void send(ground_link::GroundReport report);
+  /// Empty when all is well, otherwise one sentence for service_status.
+  [[nodiscard]] std::string trouble() const;
+
+ private:
+  struct Connected {};
+  struct Disconnected {
+    std::string why;
+  };
+  struct Delivered {
+    int id;
+  };
+  using Event = std::variant<ground_link::GroundReport, Connected, Disconnected, Delivered>;
+  void push(Event event);
+  [[nodiscard]] std::deque<Event> wait();
+  void run();
+  void take(Event& event, std::vector<uint64_t>& done);
+  void store_new();
+  void publish();
+  void say();
+
+  GroundLinkSettings settings_;
+  ReportStore store_;  // from here on the worker's own, until mutex_
+  Outbox outbox_;
+  std::deque<ground_link::GroundReport> unstored_;  // a full disk may get room again
+  std::string link_trouble_;
+  std::string store_trouble_;
+  size_t dropped_ = 0;
+  mutable std::mutex mutex_;
+  std::condition_variable wake_;
+  std::deque<Event> events_;
+  std::string trouble_;
+  bool stop_ = false;
+  std::unique_ptr<ground_link::MqttClient> client_;
+  std::thread thread_;
+};
+
+}  // namespace railfix::tpr_publisher

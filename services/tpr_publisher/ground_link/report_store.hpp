@@ -1,0 +1,42 @@
+// Position reports that the ground does not have yet, in one SQLite file (write-ahead log, synchronous FULL): what
+// append() gave a number survives a power cut.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/result.hpp"
+
+namespace railfix::tpr_publisher {
+
+class ReportStore {
+ public:
+  /// Makes the file when it is missing. One that is damaged is moved aside (FILE.damaged) and a new one begun.
+  static core::Result<ReportStore> open(const std::filesystem::path& file);
+
+  /// Empty, or that a damaged file was moved aside.
+  [[nodiscard]] const std::string& problem() const { return problem_; }
+  /// Random, for the life of the file: sequence numbers begin anew in another one.
+  [[nodiscard]] uint64_t stream() const { return stream_; }
+
+  /// Numbers 1, 2, 3, ... never come twice, also when reports were removed. On the disk when it returns.
+  core::Result<uint64_t> append(std::span<const uint8_t> report);
+  core::Status remove(std::span<const uint64_t> sequences);
+  /// In order. An error also when the checksum of the report is wrong.
+  [[nodiscard]] core::Result<std::vector<uint64_t>> sequences() const;
+  [[nodiscard]] core::Result<std::vector<uint8_t>> read(uint64_t sequence) const;
+
+ private:
+  struct Database;
+  ReportStore() = default;
+  core::Status begin(const std::filesystem::path& file);
+  std::shared_ptr<Database> database_;
+  std::string problem_;
+  uint64_t stream_ = 0;
+};
+
+}  // namespace railfix::tpr_publisher

@@ -1,0 +1,56 @@
+#include "tpr_publisher/train_integrity.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/time.hpp"
+
+namespace railfix::tpr_publisher {
+
+namespace {
+
+constexpr int64_t kHistoryNs = 10 * core::kNsPerSecond;
+constexpr uint32_t kLongest = 32767;  // m, L_TRAININT
+constexpr uint32_t kByDevice = 1;
+constexpr uint32_t kByDriver = 2;
+
+}  // namespace
+
+void TrainIntegrity::follow(const Place& place) {
+  places_.push_back(place);
+  while (place.stamp_ns - places_.front().stamp_ns > kHistoryNs) places_.pop_front();
+  settle();
+}
+
+void TrainIntegrity::hear(uint32_t q_integrity, int64_t integrity_ns, double train_length_m) {
+  q_integrity_ = q_integrity;
+  if (integrity_ns == integrity_ns_ && train_length_m == train_length_m_) return;
+  integrity_ns_ = integrity_ns;
+  train_length_m_ = train_length_m;
+  rear_m_.reset();
+  settled_ = false;
+  settle();
+}
+
+void TrainIntegrity::settle() {
+  if (settled_ || places_.empty() || places_.back().stamp_ns < integrity_ns_)
+    return;  // the place then is still to come
+  settled_ = true;
+  // The last place before is taken: farther behind when the train runs forward, which is the safe side.
+  const auto after = std::upper_bound(places_.begin(), places_.end(), integrity_ns_,
+                                      [](int64_t stamp_ns, const Place& place) { return stamp_ns < place.stamp_ns; });
+  if (after == places_.begin() || !(train_length_m_ > 0)) return;
+  const Place& then = *std::prev(after);
+  rear_m_ = then.distance_m - then.over_m - train_length_m_;
+  at_distance_m_ = then.distance_m;
+}
+
+TrainIntegrity::Said TrainIntegrity::said(double distance_m) const {
+  if (q_integrity_ != kByDevice && q_integrity_ != kByDriver) return {q_integrity_, std::nullopt};
+  if (!rear_m_) return {};
+  const double length_m = std::ceil(std::max(distance_m, *at_distance_m_) - *rear_m_);
+  if (!(length_m <= kLongest)) return {};
+  return {q_integrity_, static_cast<uint32_t>(length_m)};
+}
+
+}  // namespace railfix::tpr_publisher

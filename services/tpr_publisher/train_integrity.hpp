@@ -1,0 +1,43 @@
+// Q_LENGTH (Q_INTEGRITY) and L_TRAININT: the way from the estimated front end now to the min safe rear end at the time
+// when the train was last known to be complete (SUBSET-026 7.5.1, L_TRAININT).
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+
+namespace railfix::tpr_publisher {
+
+class TrainIntegrity {
+ public:
+  struct Place {
+    int64_t stamp_ns = 0;
+    double distance_m = 0;  // travelled, signed
+    double over_m = 0;      // L_DOUBTOVER's amount at that time
+  };
+  struct Said {
+    uint32_t q_length = 0;               // 0 = no information
+    std::optional<uint32_t> l_trainint;  // m, with q_length 1 or 2
+  };
+
+  /// REQUIRES: stamps do not go back.
+  void follow(const Place& place);
+  /// q_integrity as in the message; the train was complete at integrity_ns. Confirmed without a length, at a time that
+  /// is longer ago than ten seconds, or before any place is known, it says nothing.
+  void hear(uint32_t q_integrity, int64_t integrity_ns, double train_length_m);
+  /// A train that has backed since then is not taken for shorter.
+  [[nodiscard]] Said said(double distance_m) const;
+
+ private:
+  void settle();
+
+  std::deque<Place> places_;  // of the last ten seconds
+  uint32_t q_integrity_ = 0;
+  int64_t integrity_ns_ = 0;
+  double train_length_m_ = 0;
+  bool settled_ = true;                  // rear_m_ belongs to integrity_ns_
+  std::optional<double> rear_m_;         // min safe rear end, on the travelled distance
+  std::optional<double> at_distance_m_;  // travelled then
+};
+
+}  // namespace railfix::tpr_publisher

@@ -1,0 +1,87 @@
+#include "tpr_publisher/train_integrity.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/time.hpp"
+
+namespace railfix::tpr_publisher {
+namespace {
+
+constexpr uint32_t kByDevice = 1;
+constexpr uint32_t kByDriver = 2;
+
+int64_t at(double run_s) {
+  return core::to_ns(1000 + run_s);
+}
+
+/// 10 m/s from 0 m, ten places a second, until run_s; the min safe front end lies 5 m behind.
+TrainIntegrity running_until(double run_s) {
+  TrainIntegrity integrity;
+  for (int i = 0; i <= static_cast<int>(run_s * 10); ++i) integrity.follow({at(i * 0.1), i * 1.0, 5.0});
+  return integrity;
+}
+
+void expect_nothing(const TrainIntegrity::Said& said) {
+  EXPECT_EQ(said.q_length, 0U);
+  EXPECT_FALSE(said.l_trainint.has_value());
+}
+
+TEST(TrainIntegrity, SaysNothingBeforeItIsTold) {
+  expect_nothing(running_until(5).said(50));
+}
+
+TEST(TrainIntegrity, CountsFromTheRearEndAtTheTimeOfTheConfirmation) {
+  auto integrity = running_until(5);
+  integrity.hear(kByDevice, at(2), 200);  // at 20 m
+  const auto said = integrity.said(50);
+  EXPECT_EQ(said.q_length, kByDevice);
+  EXPECT_EQ(said.l_trainint, 235U);  // 50 - (20 - 5 - 200)
+  integrity.follow({at(6), 60.2, 5});
+  EXPECT_EQ(integrity.said(60.2).l_trainint, 246U);  // rounded up
+}
+
+TEST(TrainIntegrity, TakesThePlaceBeforeATimeBetweenTwo) {
+  auto integrity = running_until(5);
+  integrity.hear(kByDriver, at(2.07), 200);
+  EXPECT_EQ(integrity.said(50).l_trainint, 235U);
+}
+
+TEST(TrainIntegrity, WaitsForThePlaceOfATimeThatIsStillToCome) {
+  auto integrity = running_until(5);
+  integrity.hear(kByDriver, at(5.05), 200);
+  expect_nothing(integrity.said(50));
+  integrity.follow({at(5.1), 51, 5});
+  EXPECT_EQ(integrity.said(51).l_trainint, 206U);
+}
+
+TEST(TrainIntegrity, SaysNothingWhereItCannotKnow) {
+  auto integrity = running_until(20);
+  integrity.hear(kByDevice, at(5), 200);  // longer ago than what is kept
+  expect_nothing(integrity.said(200));
+  integrity.hear(kByDevice, at(19), 0);  // no length
+  expect_nothing(integrity.said(200));
+  integrity.hear(kByDevice, at(19), 40000);  // longer than the field can say
+  expect_nothing(integrity.said(200));
+  integrity.follow({at(21), 210, INFINITY});
+  integrity.hear(kByDevice, at(21), 200);  // no bound behind
+  expect_nothing(integrity.said(210));
+}
+
+TEST(TrainIntegrity, LossIsSaidWithoutALength) {
+  auto integrity = running_until(5);
+  integrity.hear(kByDevice, at(2), 200);
+  integrity.hear(3, at(2), 200);
+  EXPECT_EQ(integrity.said(50).q_length, 3U);
+  EXPECT_FALSE(integrity.said(50).l_trainint.has_value());
+}
+
+TEST(TrainIntegrity, BackingMakesNoShorterTrain) {
+  auto integrity = running_until(5);
+  integrity.hear(kByDevice, at(5), 200);
+  EXPECT_EQ(integrity.said(30).l_trainint, 205U);
+}
+
+}  // namespace
+}  // namespace railfix::tpr_publisher
