@@ -9,7 +9,10 @@ namespace {
 constexpr double kSeenM = 0.25;     // to be seen before and behind the reference distance
 constexpr double kSeenShare = 0.6;  // of the pictures meanwhile
 constexpr int kMostMissed = 3;
-constexpr int kFewestUsed = 2;
+constexpr size_t kFewestUsed = 2;
+constexpr int kPasses = 6;
+constexpr double kWildSigmas = 2.0;
+constexpr double kAgreeShare = 0.5;
 constexpr double kSpotPerM = 0.0015;  // spots are less sharp farther away
 
 constexpr size_t kUsuallyFollowed = 64;
@@ -64,18 +67,19 @@ void GroundTracker::add(Thing& thing, const GroundCandidate& candidate, double w
   thing.hit = true;
   thing.missed = 0;
   ++thing.seen;
+  const double clearness = 1 / (candidate.ahead_m * candidate.ahead_m);
+  thing.clearness += clearness;
+  thing.score += clearness * candidate.score;
   if (std::abs(candidate.ahead_m - tracking_.reference_m) > tracking_.reach_m) return;
   // Near the reference a place counts most: the way to there is short.
   const double way_sigma_m = 2 * way_sigma_ * std::abs(candidate.ahead_m - tracking_.reference_m);
   const double spot_sigma_m = tracking_.spot_sigma_m + kSpotPerM * candidate.ahead_m;
   const double weight = 1 / (way_sigma_m * way_sigma_m + spot_sigma_m * spot_sigma_m);
-  const double place_m = way_m + candidate.ahead_m - thing.first_m;
-  thing.weight += weight;
-  thing.place += weight * place_m;
-  thing.squared += weight * place_m * place_m;
-  thing.lateral += weight * candidate.lateral_m;
-  thing.score += weight * candidate.score;
-  ++thing.used;
+  if (thing.used == kMostLooks) {  // a slow train: every second one is enough
+    for (size_t i = 0; 2 * i < kMostLooks; ++i) thing.looks[i] = thing.looks[2 * i + 1];
+    thing.used = kMostLooks / 2;
+  }
+  thing.looks[thing.used++] = {way_m + candidate.ahead_m - thing.first_m, candidate.lateral_m, weight};
 }
 
 // Seen on both sides of the reference distance: on half a metre of its way at least, so that a stain on the lens or a
@@ -85,14 +89,41 @@ std::optional<SettledThing> GroundTracker::settle(const Thing& thing) const {
   if (thing.last_ahead_m > tracking_.reference_m - kSeenM) return std::nullopt;
   if (thing.first_ahead_m < tracking_.reference_m + kSeenM) return std::nullopt;
   if (thing.seen < kSeenShare * (thing.seen + thing.gaps)) return std::nullopt;
-  const double mean = thing.place / thing.weight;
-  const double rms_m = std::sqrt(std::max(0.0, thing.squared / thing.weight - mean * mean));
-  if (rms_m > tracking_.worst_fit_m) return std::nullopt;
-  const double noise_m = std::hypot(tracking_.spot_sigma_m, rms_m) / std::sqrt(static_cast<double>(thing.used));
-  const double by_score = 1 - std::exp(-thing.score / thing.weight / tracking_.usual_score);
-  const double confidence = (1 - std::exp(-0.5 * thing.seen)) * (0.5 + 0.5 * by_score);
-  if (confidence < tracking_.lowest_confidence) return std::nullopt;
-  return SettledThing{thing.first_m + mean, thing.lateral / thing.weight, noise_m, confidence};
+  const Mean mean = mean_of(thing);
+  if (mean.rms_m > tracking_.worst_fit_m || mean.agreeing < kAgreeShare * static_cast<double>(thing.used))
+    return std::nullopt;
+  const double noise_m = std::hypot(tracking_.spot_sigma_m, mean.rms_m) / std::sqrt(mean.agreeing);
+  const double sure = confidence(thing);
+  if (sure < tracking_.lowest_confidence) return std::nullopt;
+  return SettledThing{thing.first_m + mean.place_m, mean.lateral_m, noise_m, sure};
+}
+
+// Cauchy weights: a look that took a shadow for an edge does not count.
+GroundTracker::Mean GroundTracker::mean_of(const Thing& thing) const {
+  Mean mean;
+  for (int pass = 0; pass < kPasses; ++pass) {
+    double weight = 0, place = 0, lateral = 0, squared = 0, agreeing = 0;
+    for (size_t i = 0; i < thing.used; ++i) {
+      const Look& look = thing.looks[i];
+      const double off_m = look.place_m - mean.place_m;
+      const double trust = pass == 0 ? 1.0 : 1 / (1 + std::pow(off_m / (kWildSigmas * tracking_.spot_sigma_m), 2));
+      weight += trust * look.weight;
+      place += trust * look.weight * look.place_m;
+      lateral += trust * look.weight * look.lateral_m;
+      squared += trust * look.weight * off_m * off_m;
+      agreeing += trust;
+    }
+    mean = {place / weight, lateral / weight, pass == 0 ? 0.0 : std::sqrt(squared / weight), agreeing};
+  }
+  return mean;
+}
+
+// Looks at one thing see the same: their log odds are averaged, not added.
+double GroundTracker::confidence(const Thing& thing) const {
+  const double score = thing.score / thing.clearness;
+  const double by_score = tracking_.log_odds ? 1 / (1 + std::exp(tracking_.usual_score - score))
+                                             : 1 - 0.5 * std::exp(-score / tracking_.usual_score);
+  return by_score * (1 - std::exp(-tracking_.trust_a_look * thing.seen));
 }
 
 }  // namespace railfix::track_detector

@@ -1,6 +1,7 @@
 // Follows things in the ground plane over the way that was run, and settles each once, at a reference distance.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <vector>
 
@@ -15,7 +16,9 @@ struct GroundTracking {
   double worst_fit_m = 0.06;  // what does not stay in its place is none
   double follow_m = 0.20;     // a known thing may be off its place by so much
   double sideways_m = 0.10;
-  double usual_score = 0.1;  // of a candidate, for the confidence
+  bool log_odds = false;     // the score is the log of a likelihood ratio; else a share
+  double usual_score = 0.1;  // of a candidate; of log odds: where right and wrong ones are equally many
+  double trust_a_look = 0.5;
   int fewest_pictures = 4;
   double lowest_confidence = 0.88;
 };
@@ -37,15 +40,21 @@ class GroundTracker {
   void forget() { things_.clear(); }
 
  private:
+  struct Look {
+    double place_m, lateral_m;  // place less first_m
+    double weight;
+  };
+  static constexpr size_t kMostLooks = 32;
   struct Thing {
-    double weight = 0, place = 0, lateral = 0, squared = 0, score = 0;  // weighted sums; place less first_m
-    double first_m = 0;                                                 // place as first seen
+    std::array<Look, kMostLooks> looks{};  // near the reference
+    double clearness = 0, score = 0;       // weighted sums: near looks show most
+    double first_m = 0;                    // place as first seen
     double first_ahead_m = 0;
     double last_m = 0;
     double last_ahead_m = 0;
     double last_lateral_m = 0;
     int seen = 0;
-    int used = 0;
+    size_t used = 0;
     int missed = 0;
     int gaps = 0;
     bool hit = false;
@@ -53,6 +62,13 @@ class GroundTracker {
   };
   void add(Thing& thing, const GroundCandidate& candidate, double way_m) const;
   [[nodiscard]] std::optional<SettledThing> settle(const Thing& thing) const;
+  struct Mean {
+    double place_m = 0, lateral_m = 0;
+    double rms_m = 0;
+    double agreeing = 0;  // looks
+  };
+  [[nodiscard]] Mean mean_of(const Thing& thing) const;
+  [[nodiscard]] double confidence(const Thing& thing) const;
 
   GroundTracking tracking_;
   double way_sigma_;

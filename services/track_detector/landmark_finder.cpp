@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/time.hpp"
+
 namespace railfix::track_detector {
 namespace {
 
@@ -12,6 +14,10 @@ constexpr double kShakeMarginRad = 0.02;
 constexpr double kFrogReferenceM = 9.5;
 constexpr double kLookM = 0.55;  // frogs and platforms need no denser looks: that keeps up with 60 pictures a second
 constexpr double kFrogScore = 0.3;
+constexpr double kPlateEvenOdds = -3.5;
+constexpr double kPlateTrustALook = 0.8;
+constexpr int kFewestPlatePictures = 3;
+constexpr double kShutterS = 0.002;   // open about so long
 constexpr double kFrogSigmaM = 0.09;  // what does not average out: wear, the blades' gap
 
 GroundTracking frog_tracking(const LandmarkOptions& options) {
@@ -29,8 +35,10 @@ GroundTracking frog_tracking(const LandmarkOptions& options) {
 GroundTracking plate_tracking(const LandmarkOptions& options) {
   GroundTracking tracking;
   tracking.reference_m = options.reference_m;
-  tracking.usual_score = options.lowest_contrast;
-  tracking.fewest_pictures = options.fewest_pictures;
+  tracking.log_odds = true;
+  tracking.usual_score = kPlateEvenOdds;
+  tracking.trust_a_look = kPlateTrustALook;
+  tracking.fewest_pictures = kFewestPlatePictures;
   tracking.lowest_confidence = options.lowest_confidence;
   return tracking;
 }
@@ -72,6 +80,7 @@ bool LandmarkFinder::move(const LandmarkPicture& picture) {
   maker_->make(picture.grey, pose, view_);
   const auto step_m = motion_.step(view_, maker_->sheet(), picture.stamp_ns);
   if (!step_m) {
+    stamp_ns_ = picture.stamp_ns;
     plates_.forget();
     frogs_.forget();
     platforms_.forget();
@@ -79,6 +88,8 @@ bool LandmarkFinder::move(const LandmarkPicture& picture) {
     uprights_.forget();
     return false;
   }
+  speed_mps_ = *step_m / core::seconds(picture.stamp_ns - stamp_ns_);
+  stamp_ns_ = picture.stamp_ns;
   // The sheet lies at the height of balises, the texture that was followed lower.
   way_m_ +=
       *step_m * (picture.pose.height_m + options_.texture_depth_m) / (picture.pose.height_m + options_.balise_depth_m);
@@ -91,7 +102,8 @@ double LandmarkFinder::pitch_error_m(const LandmarkPicture& picture, double ahea
 }
 
 void LandmarkFinder::find_in_track(const LandmarkPicture& picture) {
-  for (const SettledThing& plate : plates_.follow(plate_search_->find(view_), way_m_)) {
+  const PlateBlur blur{camera_.fv_px, picture.pose.height_m + options_.balise_depth_m, kShutterS * speed_mps_};
+  for (const SettledThing& plate : plates_.follow(plate_search_->find(view_, blur), way_m_)) {
     const double height_m = picture.pose.height_m + options_.balise_depth_m;
     const double depth_m = options_.balise_depth_sigma_m * options_.reference_m / height_m;
     const double pitch_m = pitch_error_m(picture, options_.reference_m, options_.balise_depth_m);

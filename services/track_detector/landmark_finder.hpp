@@ -41,6 +41,8 @@ class LandmarkFinder {
   vision::TopView view_;
   GroundMotion motion_;
   double way_m_ = 0;  // run since the beginning, good to a percent
+  int64_t stamp_ns_ = 0;
+  double speed_mps_ = 0;
   double frog_look_m_ = -1e9;
   double platform_look_m_ = -1e9;
   std::unique_ptr<PlateSearch> plate_search_;

@@ -58,7 +58,7 @@ struct Sighting {
 struct GroundCandidate {
   double ahead_m = 0;
   double lateral_m = 0;
-  double score = 0;  // plate: contrast of its weakest side, share of the brightness; frog: share of its rails seen
+  double score = 0;  // plate: log of a likelihood ratio (PlateEvidence); frog: share of its rails seen
 };
 
 }  // namespace railfix::track_detector

@@ -11,14 +11,8 @@ constexpr double kGapM = 0.05;        // around the plate: its shadow and blur
 constexpr double kStripM = 0.10;      // ground compared on each side
 constexpr double kOffCentreM = 0.06;  // a balise lies in the middle of the track
 constexpr double kSizeToleranceM = 0.09;
-constexpr double kEvenness = 0.75;     // spread inside, as a share of the weakest contrast
-constexpr double kEdgeM = 0.03;        // a plate's edge is made within so much to either side ...
-constexpr double kBesideEdgeM = 0.10;  // ... of what the brightness changes within this
-constexpr double kSharpEdge = 0.7;
-constexpr double kRimM = 0.03;
-constexpr double kCornerM = 0.07;
-constexpr double kFullCorners = 0.85;
-constexpr double kDarkGrey = 12;  // below it shares of brightness mean nothing
+constexpr double kEvenness = 0.75;  // spread inside, as a share of the weakest contrast
+constexpr double kDarkGrey = 12;    // below it shares of brightness mean nothing
 
 // The plate's box and its surroundings around a centre, in cells.
 struct Layout {
@@ -61,13 +55,15 @@ std::optional<double> find_edge(const std::vector<double>& profile, int at, int 
   const auto slope = [&](int i) {
     return sign * (profile[static_cast<size_t>(i) + 1] - profile[static_cast<size_t>(i) - 1]);
   };
-  for (int i = std::max(2, at - reach); i <= std::min(static_cast<int>(profile.size()) - 3, at + reach); ++i) {
+  const int first = std::max(2, at - reach);
+  const int last = std::min(static_cast<int>(profile.size()) - 3, at + reach);
+  for (int i = first; i <= last; ++i) {
     if (slope(i) > steepest) {
       steepest = slope(i);
       best = i;
     }
   }
-  if (best < 0) return std::nullopt;
+  if (best <= first || best >= last) return std::nullopt;  // it goes on beyond
   const double before = slope(best - 1);
   const double after = slope(best + 1);
   const double bend = before - 2 * steepest + after;
@@ -104,79 +100,19 @@ std::optional<Extent> measure_extent(const std::vector<double>& profile, int cen
                 std::min(edge_sharpness(profile, *low, 1, near, far), edge_sharpness(profile, *high, -1, near, far))};
 }
 
-// How much the emptiest corner has of the contrast of the middle against both sides: a plate fills its corners, a stain
-// does not.
-double corner_fill(const AreaSums& sums, const Layout& l, const vision::Sheet& sheet, const Extent& length,
-                   const Extent& width) {
-  const double cell_m = sheet.cell_m;
-  const int row = static_cast<int>(std::lround(length.middle));
-  const int col = static_cast<int>(std::lround(width.middle));
-  const int half_rows = static_cast<int>(0.5 * length.length);
-  const int half_cols = static_cast<int>(0.5 * width.length);
-  const int rim = static_cast<int>(std::lround(kRimM / cell_m));
-  const int corner = std::max(1, static_cast<int>(std::lround(kCornerM / cell_m)));
-  const int beside = half_cols + l.gap + l.strip;
-  // A wide plate off the middle may reach so far that its sides are not in the sheet: then nothing is known of it.
-  if (col < beside || col + beside >= sheet.cols) return 0.0;
-  const double middle = sums.mean({row - half_rows / 2, col - half_cols / 2, half_rows, half_cols});
-  const double side = 0.5 * (sums.mean({row - half_rows / 2, col - half_cols - l.gap - l.strip, half_rows, l.strip}) +
-                             sums.mean({row - half_rows / 2, col + half_cols + l.gap + 1, half_rows, l.strip}));
-  double emptiest = 1.0;
-  for (const int top : {row - half_rows + rim, row + half_rows - rim - corner}) {
-    for (const int left : {col - half_cols + rim, col + half_cols - rim - corner}) {
-      emptiest = std::min(emptiest, (sums.mean({top, left, corner, corner}) - side) / (middle - side));
-    }
-  }
-  return emptiest;
-}
-
 }  // namespace
-
-void AreaSums::set(const cv::Mat& grey) {
-  step_ = static_cast<size_t>(grey.cols) + 1;
-  const size_t size = step_ * (static_cast<size_t>(grey.rows) + 1);
-  sums_.resize(size);
-  squared_.resize(size);
-  std::fill(sums_.begin(), sums_.begin() + static_cast<ptrdiff_t>(step_), 0.0);
-  std::fill(squared_.begin(), squared_.begin() + static_cast<ptrdiff_t>(step_), 0.0);
-  for (int r = 0; r < grey.rows; ++r) {
-    const auto* line = grey.ptr<float>(r);
-    double* sum = sums_.data() + static_cast<size_t>(r + 1) * step_;
-    double* squared = squared_.data() + static_cast<size_t>(r + 1) * step_;
-    double row_sum = 0;
-    double row_squared = 0;
-    sum[0] = squared[0] = 0;
-    for (size_t c = 1; c < step_; ++c) {
-      const auto value = static_cast<double>(line[c - 1]);
-      row_sum += value;
-      row_squared += value * value;
-      sum[c] = *(sum + c - step_) + row_sum;
-      squared[c] = *(squared + c - step_) + row_squared;
-    }
-  }
-}
-
-double AreaSums::of(const std::vector<double>& sums, const CellBox& box) const {
-  const double* top = sums.data() + static_cast<size_t>(box.row) * step_ + box.col;
-  const double* bottom = top + static_cast<size_t>(box.rows) * step_;
-  return bottom[box.cols] - bottom[0] - top[box.cols] + top[0];
-}
-
-double AreaSums::spread(const CellBox& box) const {
-  const double m = mean(box);
-  return std::sqrt(std::max(0.0, of(squared_, box) / (box.rows * box.cols) - m * m));
-}
 
 PlateSearch::PlateSearch(const vision::Sheet& sheet, const LandmarkOptions& options)
     : sheet_(sheet),
       options_(options),
+      evidence_(sheet, options),
       along_(static_cast<size_t>(sheet.rows)),
       across_(static_cast<size_t>(sheet.cols)) {
   hits_.reserve(static_cast<size_t>(sheet.rows * (2 * static_cast<int>(kOffCentreM / sheet.cell_m) + 1)));
   found_.reserve(64);
 }
 
-std::optional<GroundCandidate> PlateSearch::refine(const cv::Mat& grey, const Hit& hit) {
+std::optional<GroundCandidate> PlateSearch::refine(const cv::Mat& grey, const Hit& hit, const PlateBlur& blur) {
   const Layout l(options_, sheet_.cell_m);
   const double sign = hit.contrast > 0 ? 1.0 : -1.0;
   const int reach = static_cast<int>(std::lround(0.10 / sheet_.cell_m));
@@ -199,12 +135,13 @@ std::optional<GroundCandidate> PlateSearch::refine(const cv::Mat& grey, const Hi
   if (std::abs(length->length * sheet_.cell_m - options_.balise_length_m) > kSizeToleranceM) return std::nullopt;
   if (std::abs(width->length * sheet_.cell_m - options_.balise_width_m) > kSizeToleranceM) return std::nullopt;
   if (std::abs(sheet_.offset_m(width->middle)) > kOffCentreM) return std::nullopt;
-  if (width->sharpness < kSharpEdge || corner_fill(sums_, l, sheet_, *length, *width) < kFullCorners)
-    return std::nullopt;
-  return GroundCandidate{sheet_.ahead_m(length->middle), sheet_.offset_m(width->middle), std::abs(hit.contrast)};
+  const double ahead_m = sheet_.ahead_m(length->middle);
+  const auto evidence = evidence_.of(sums_, {length->middle, width->middle, ahead_m, width->sharpness, sign}, blur);
+  if (!evidence) return std::nullopt;
+  return GroundCandidate{ahead_m, sheet_.offset_m(width->middle), *evidence};
 }
 
-const std::vector<GroundCandidate>& PlateSearch::find(const vision::TopView& view) {
+const std::vector<GroundCandidate>& PlateSearch::find(const vision::TopView& view, const PlateBlur& blur) {
   found_.clear();
   hits_.clear();
   const Layout l(options_, sheet_.cell_m);
@@ -233,7 +170,7 @@ const std::vector<GroundCandidate>& PlateSearch::find(const vision::TopView& vie
       return std::abs(plate.ahead_m - ahead_m) < 2.0 * options_.balise_length_m;
     });
     if (known) continue;
-    if (const auto plate = refine(view.grey, hit)) found_.push_back(*plate);
+    if (const auto plate = refine(view.grey, hit, blur)) found_.push_back(*plate);
   }
   return found_;
 }

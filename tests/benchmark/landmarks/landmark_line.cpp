@@ -51,10 +51,12 @@ class LandmarkLine {
     for (const uint32_t id : main_edges_) {
       const double length_m = map.edges[id - 1].alignment.length_m();
       for (double s = between(0.3, 1.0) * every_m; s < length_m; s += between(0.5, 1.5) * every_m) {
-        const bool on_frog = std::any_of(frogs.begin(), frogs.end(), [&](const track::Landmark& frog) {
-          return frog.edge == id && std::abs(frog.offset_m - s) < 2;
+        // No balise lies where the other track's rail runs between ours: from a switch to its frog.
+        const bool under_rail = std::any_of(frogs.begin(), frogs.end(), [&](const track::Landmark& frog) {
+          if (frog.edge != id) return false;
+          return frog.offset_m < 0.5 * length_m ? s < frog.offset_m + 2 : s > frog.offset_m - 2;
         });
-        if (!on_frog) landmark(LandmarkKind::balise, id, s, 0);
+        if (!under_rail) landmark(LandmarkKind::balise, id, s, 0);
       }
     }
     for (size_t i = 0; i < map.landmarks.size(); ++i) map.landmarks[i].id = static_cast<uint32_t>(i + 1);

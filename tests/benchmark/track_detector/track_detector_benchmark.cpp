@@ -202,7 +202,9 @@ BENCHMARK(BM_SightingsGroundMotion)->Unit(benchmark::kMicrosecond);
 
 void BM_SightingsPlates(benchmark::State& state) {
   PlateSearch search(ride().sheet, {});
-  each_picture(state, [&](size_t i, int64_t) { benchmark::DoNotOptimize(search.find(ride().views[i]).size()); });
+  each_picture(state, [&](size_t i, int64_t) {
+    benchmark::DoNotOptimize(search.find(ride().views[i], {test::kCab.fv_px, 2.6, 0.05}).size());
+  });
 }
 BENCHMARK(BM_SightingsPlates)->Unit(benchmark::kMicrosecond);
 
