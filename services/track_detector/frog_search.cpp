@@ -37,6 +37,7 @@ FrogSearch::FrogSearch(const geometry::Intrinsics& camera, const LandmarkOptions
     : options_(options), lines_(camera), rows_(static_cast<int>((kFarM - kNearM) / kRowM) + 1) {
   grey_.create(rows_, kColumns, CV_32F);
   ridges_.create(rows_, kColumns, CV_32F);
+  spread_ = cv::Mat::zeros(rows_, kColumns, CV_32F);
   sums_.resize(kColumns + 1);
   points_.reserve(static_cast<size_t>(rows_));
   found_.reserve(1);
@@ -96,13 +97,8 @@ void FrogSearch::rate_ridges(int row) {
   }
   const float scale = own < kLowestContrast ? 0.0F : 1.0F / own;
   for (int c = 0; c < kColumns; ++c) ridge[c] = std::min(1.0F, ridge[c] * scale);
-}
-
-float FrogSearch::ridge(int row, double lateral_m) const {
-  const int c = static_cast<int>(std::lround((lateral_m + kHalfWidthM) / kColumnM));
-  if (c < 1 || c + 1 >= kColumns) return 0;
-  const float* line = ridges_.ptr<float>(row);
-  return std::max(line[c], std::max(line[c - 1], line[c + 1]));
+  float* spread = spread_.ptr<float>(row);
+  for (int c = 1; c + 1 < kColumns; ++c) spread[c] = std::max(ridge[c], std::max(ridge[c - 1], ridge[c + 1]));
 }
 
 // Mean ridge along the other rail, inside and outside of ours.
@@ -116,12 +112,18 @@ void FrogSearch::rate(Crossing& crossing) const {
     const int first = std::max(begin, first_row_);
     const int last = std::min(end, rows_ - 1);
     if (last - first < kPartSeen * (end - begin)) return 0.0;
-    double sum = 0;
-    int count = 0;
-    for (int row = first; row <= last; row += 2, ++count) {
+    // The column where the other rail is in a row, for rounding down; the parts never reach the view's sides.
+    const auto column = [&](int row) {
       const double out = (kNearM + row * kRowM - crossing.at_m) * crossing.slope;
-      sum += static_cast<double>(ridge(row, crossing.side * (zero_m + out)));
-    }
+      return static_cast<float>((crossing.side * (zero_m + out) + kHalfWidthM) / kColumnM + 0.5);
+    };
+    const auto turn = static_cast<float>(crossing.side * 2 * kRowM * crossing.slope / kColumnM);
+    float at = column(first);
+    float total = 0;
+    int count = 0;
+    for (int row = first; row <= last; row += 2, ++count, at += turn)
+      total += spread_.ptr<float>(row)[static_cast<int>(at)];
+    const auto sum = static_cast<double>(total);
     return count > 3 ? sum / count : 0.0;
   };
   crossing.inside = part(kInsideM);

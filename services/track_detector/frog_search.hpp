@@ -32,7 +32,6 @@ class FrogSearch {
   };
   void look(const LandmarkPicture& picture);
   void rate_ridges(int row);
-  [[nodiscard]] float ridge(int row, double lateral_m) const;
   [[nodiscard]] Crossing best_crossing() const;
   void rate(Crossing& crossing) const;
   bool refine(Crossing& crossing, GroundCandidate& candidate);
@@ -44,6 +43,7 @@ class FrogSearch {
   int first_row_ = 0;  // the nearest that the picture shows
   cv::Mat grey_;       // CV_32F, rows x columns, near to far and right to left
   cv::Mat ridges_;     // 0..1: 1 stands out as our own rails do in this row
+  cv::Mat spread_;     // the largest of each column and its neighbours
   std::vector<float> sums_;
   std::vector<Point> points_;
   std::vector<GroundCandidate> found_;
