@@ -26,7 +26,8 @@ constexpr float kLitGrey = 24;           // darker tiles hide their structure
 constexpr float kNotBurntOutGrey = 245;  // as do burnt-out ones
 constexpr int64_t kReferenceNs = core::kNsPerSecond;
 constexpr int kStillComparisons = 4;
-constexpr double kMovingShare = 0.3;  // of the track's tiles, for the others to be called still
+constexpr double kMovingShare = 0.3;                         // of the track's tiles, for the others to be called still
+constexpr int64_t kClockSetBackNs = 2 * core::kNsPerSecond;  // no picture is held up so long on its way
 // The part of the track that is watched.
 constexpr double kNearM = 3;
 constexpr double kFarM = 25;
@@ -82,7 +83,8 @@ uint32_t PictureHealth::judge(int64_t stamp_ns, const cv::Mat& grey) {
   uint32_t health = exposure();
   if (repeated(grey)) health |= kFrozen;
   if (newest_ns_ && stamp_ns <= *newest_ns_) health |= kOutOfOrder;
-  newest_ns_ = std::max(stamp_ns, newest_ns_.value_or(stamp_ns));
+  const bool clock_set_back = newest_ns_ && *newest_ns_ - stamp_ns > kClockSetBackNs;
+  newest_ns_ = clock_set_back ? stamp_ns : std::max(stamp_ns, newest_ns_.value_or(stamp_ns));
   if (health != 0) return health;  // the rest cannot be told from such a picture, and it lasts
   find_cover(stamp_ns);
   measure_sharpness();

@@ -46,7 +46,8 @@ TEST_P(EveryService, DefaultConfigurationFileIsItsDocumentation) {
 }
 
 TEST_P(EveryService, RefusesAnUnknownKeyByNameAndFile) {
-  const auto file = fs::path(::testing::TempDir()) / ("railfix-" + GetParam() + "-wrong.yaml");
+  const auto file =
+      fs::path(::testing::TempDir()) / ("railfix-" + GetParam() + "-" + std::to_string(getpid()) + ".yaml");
   std::ofstream(file) << GetParam() << ":\n  no_such_key: 1\n";
   const auto refused = test::run_program({program(), "--check", "--config", file.string()}, 10);
   EXPECT_EQ(refused.exit_code, 2);
@@ -77,7 +78,7 @@ TEST_P(EveryService, GetsReadyAndEndsCleanlyOnSigterm) {
                                                    service.send(SIGTERM);
                                                  }
                                                });
-  const int64_t deadline_ns = core::monotonic_ns() + 20 * core::kNsPerSecond;
+  const int64_t deadline_ns = core::monotonic_ns() + 60 * core::kNsPerSecond;
   while (!service.exit_code() && core::monotonic_ns() < deadline_ns) {
     queue.run_one(core::monotonic_ns() + core::kNsPerSecond / 20);
   }

@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/random.hpp"
+#include "core/time.hpp"
 
 namespace railfix::frame_grabber {
 namespace {
@@ -154,6 +155,14 @@ TEST(PictureHealth, StampsThatDoNotGrowAreOutOfOrder) {
   EXPECT_EQ(health.judge(10, noise(2, 20, 200)), kOutOfOrder);
   EXPECT_EQ(health.judge(9, noise(3, 20, 200)), kOutOfOrder);
   EXPECT_EQ(health.judge(11, noise(4, 20, 200)), 0U);
+}
+
+TEST(PictureHealth, AfterAClockWasSetBackOnlyOnePictureIsOutOfOrder) {
+  PictureHealth health({});
+  constexpr int64_t kHourNs = 3600 * core::kNsPerSecond;
+  EXPECT_EQ(health.judge(2 * kHourNs, noise(1, 20, 200)), 0U);
+  EXPECT_EQ(health.judge(kHourNs, noise(2, 20, 200)), kOutOfOrder);
+  EXPECT_EQ(health.judge(kHourNs + 1, noise(3, 20, 200)), 0U);
 }
 
 TEST(PictureHealth, PicturesSmallerThanTheGridAndPartsOfLargerOnes) {
