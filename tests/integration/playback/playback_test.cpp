@@ -116,14 +116,22 @@ class Playback : public railfix::testing::TemporaryFolder {
   }
   void take(const msg::CameraFrame& frame) {
     frames_.push_back({frame.seq(), frame.stamp_ns(), frame.health(), frame.data()[0]});
+    answer();
   }
   void take(const msg::DataClock& clock) {
     clocks_.push_back(clock);
     if (!answers_ || std::string(clock.turn().c_str()) != "tester") return;
+    turn_ = clock;
+    answer();
+  }
+  /// As services do: when every picture that was sent is here.
+  void answer() {
+    if (!turn_ || frames_.size() < sent(*turn_, "camera_frame/cam0")) return;
     msg::DataProgress progress;
     progress.service("tester");
-    progress.seq(clock.seq());
+    progress.seq(turn_->seq());
     progress_.write(progress);
+    turn_.reset();
   }
 
   static uint64_t sent(const msg::DataClock& clock, const std::string& topic) {
@@ -154,6 +162,7 @@ class Playback : public railfix::testing::TemporaryFolder {
   std::optional<msg::CameraPreview> preview_;
   std::optional<msg::CameraCalibration> calibration_;
   std::string failure_;
+  std::optional<msg::DataClock> turn_;  // of the tester, not yet answered
   bool answers_ = true;
 };
 
