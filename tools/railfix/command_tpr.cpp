@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "commands.hpp"
+#include "command_tpr.hpp"
 #include "core/result.hpp"
 #include "etcs/layout.hpp"
 #include "etcs/report_json.hpp"
@@ -137,7 +137,7 @@ struct Options {
 
 void add_tpr(CLI::App& app, Action& chosen) {
   auto options = std::make_shared<Options>();
-  auto* tpr = app.add_subcommand("tpr", "ETCS train position reports (message 136): from and to bits");
+  auto* tpr = app.add_subcommand("tpr", "ETCS train position reports (message 136): bits, ground link, comparison");
   tpr->require_subcommand(1);
   const auto add_baseline = [&](CLI::App* command) {
     command->add_option("--baseline", options->baseline, "Layout: 3 = SUBSET-026 3.x, 4 = 4.0.0")
@@ -161,6 +161,8 @@ void add_tpr(CLI::App& app, Action& chosen) {
   encoder->callback([options, &chosen] {
     chosen = [options] { return encode(options->file, static_cast<Baseline>(options->baseline)); };
   });
+  add_tpr_compare(*tpr, chosen);
+  add_tpr_listen(*tpr, chosen);
 }
 
 }  // namespace railfix::tool

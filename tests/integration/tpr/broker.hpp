@@ -1,0 +1,81 @@
+// A real Mosquitto for tests: on a free port of this machine, its sessions kept over a restart.
+#pragma once
+
+#include <netinet/in.h>
+#include <sys/socket.h>
+
+#include <optional>
+
+#include "support/program.hpp"
+
+namespace railfix::test {
+
+inline constexpr const char* kMosquitto = "/usr/sbin/mosquitto";
+
+class Broker {
+ public:
+  explicit Broker(std::filesystem::path folder, std::string listener_settings = "")
+      : folder_(std::move(folder)), listener_settings_(std::move(listener_settings)) {
+    std::filesystem::create_directories(folder_);
+  }
+
+  /// Runs and accepts connections when it returns. The port stays the same over restarts.
+  bool start() {
+    for (int attempt = 0; attempt < 10; ++attempt) {
+      if (port_ == 0) port_ = free_port();
+      std::ofstream(folder_ / "broker.conf")
+          << "listener " << port_ << " 127.0.0.1\n"
+          << listener_settings_ << "allow_anonymous true\nuser root\npersistence true\n"
+          << "persistence_location " << folder_.string() << "/\n"
+          << "max_queued_messages 0\nmax_inflight_messages 0\n";
+      program_.emplace(std::vector<std::string>{kMosquitto, "-c", (folder_ / "broker.conf").string()},
+                       Program::Options{folder_ / "broker.log", {}, {}});
+      while (!program_->exit_code()) {
+        if (accepts()) return true;
+        poll(nullptr, 0, 10);
+      }
+      if (was_up_) continue;  // the port must stay: it will be free soon
+      port_ = 0;              // somebody else was faster
+    }
+    return false;
+  }
+  /// Ends it in order: sessions and messages it has taken are kept.
+  void stop() {
+    was_up_ = true;
+    program_->end(SIGTERM);
+  }
+  [[nodiscard]] std::string address() const { return "localhost:" + std::to_string(port_); }
+
+ private:
+  static sockaddr_in local(int port) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    address.sin_port = htons(static_cast<uint16_t>(port));
+    return address;
+  }
+  static int free_port() {
+    const int socket_number = socket(AF_INET, SOCK_STREAM, 0);
+    auto address = local(0);
+    socklen_t length = sizeof address;
+    bind(socket_number, reinterpret_cast<sockaddr*>(&address), length);
+    getsockname(socket_number, reinterpret_cast<sockaddr*>(&address), &length);
+    close(socket_number);
+    return ntohs(address.sin_port);
+  }
+  [[nodiscard]] bool accepts() const {
+    const int socket_number = socket(AF_INET, SOCK_STREAM, 0);
+    auto address = local(port_);
+    const bool connected = connect(socket_number, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0;
+    close(socket_number);
+    return connected;
+  }
+
+  std::filesystem::path folder_;
+  std::string listener_settings_;
+  int port_ = 0;
+  bool was_up_ = false;
+  std::optional<Program> program_;
+};
+
+}  // namespace railfix::test

@@ -1,0 +1,282 @@
+// Reports to the ground over a real Mosquitto: in order, none lost, over restarts of everything.
+#include <atomic>
+#include <iostream>
+#include <mutex>
+#include <nlohmann/json.hpp>
+
+#include "ground_link/ground_report.hpp"
+#include "ground_link/mqtt_client.hpp"
+#include "ground_link/sequence_watch.hpp"
+#include "integration/tpr/broker.hpp"
+#include "integration/tpr/tpr_service.hpp"
+#include "tpr_publisher/ground_link/ground_link.hpp"
+
+namespace railfix {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+/// The ground's end: a session at the broker that outlives connections, and what came over it.
+class Ground {
+ public:
+  Ground(const std::string& broker, const std::string& name) : probe_topic_("railfix/" + name + "/position_report") {
+    ground_link::MqttOptions options;
+    core::ok_or_throw(ground_link::parse_broker(broker, options));
+    options.client_id = "ground-" + name;
+    options.keep_session = true;
+    options.subscribe_to = probe_topic_;
+    options.longest_retry_s = 0.2;
+    client_ = std::make_unique<ground_link::MqttClient>(
+        options, ground_link::MqttEvents{{}, {}, {}, [this](std::span<const uint8_t> payload) { receive(payload); }});
+  }
+  /// Waits until the broker has the subscription: a message to ourselves comes back.
+  bool subscribed() {
+    const std::vector<uint8_t> probe{0};
+    for (int i = 0; i < 600; ++i) {
+      if (i % 20 == 0) (void)client_->publish(probe_topic_, probe);
+      if (probed_) return true;
+      poll(nullptr, 0, 50);
+    }
+    return false;
+  }
+  /// Without those that came twice.
+  [[nodiscard]] std::vector<ground_link::GroundReport> reports() const {
+    const std::lock_guard lock(mutex_);
+    return reports_;
+  }
+  [[nodiscard]] size_t count() const {
+    const std::lock_guard lock(mutex_);
+    return reports_.size();
+  }
+  [[nodiscard]] size_t twice() const {
+    const std::lock_guard lock(mutex_);
+    return twice_;
+  }
+
+ private:
+  void receive(std::span<const uint8_t> payload) {
+    if (payload.size() == 1) {
+      probed_ = true;
+      return;
+    }
+    auto report = ground_link::ground_report_from(payload).value();
+    const std::lock_guard lock(mutex_);
+    if (watch_.arrived(report.train, report.stream, report.sequence) == ground_link::Arrival::twice) {
+      ++twice_;
+    } else {
+      reports_.push_back(std::move(report));
+    }
+  }
+  std::string probe_topic_;
+  std::atomic<bool> probed_ = false;
+  mutable std::mutex mutex_;
+  ground_link::SequenceWatch watch_;
+  std::vector<ground_link::GroundReport> reports_;
+  size_t twice_ = 0;
+  std::unique_ptr<ground_link::MqttClient> client_;
+};
+
+class GroundLinkTest : public TprService {
+ protected:
+  GroundLinkTest() { std::filesystem::create_directories(folder_); }
+  ~GroundLinkTest() override { std::filesystem::remove_all(folder_); }
+  void SetUp() override {
+    if (!std::filesystem::exists(test::kMosquitto)) GTEST_SKIP() << "mosquitto is not installed (./dev setup)";
+  }
+
+  [[nodiscard]] std::vector<std::string> linked_service(const std::string& broker,
+                                                        std::vector<std::string> more = {}) const {
+    const std::string link = "tpr_publisher.ground_link.";
+    more.insert(more.end(), {"tpr_publisher.d_cycloc_m=1", link + "broker=" + broker, link + "longest_retry_s=0.2",
+                             link + "store=" + (folder_ / "reports.db").string()});
+    return service(more);
+  }
+  /// Runs on, a report a metre, until so many have come over DDS.
+  bool run_for(size_t reports) {
+    return run_until([&] { return reports_.size() >= reports; },
+                     [&] {
+                       if (reports_.size() >= last_.reports) {
+                         last_.offset_m += 1.5;
+                         last_.reports = reports_.size() + 1;
+                       }
+                       write_state(last_.offset_m);
+                     });
+  }
+  bool status_says(const std::string& text) {
+    return run_until([&] { return reason().find(text) != std::string::npos; }, [&] { write_state(last_.offset_m); });
+  }
+  [[nodiscard]] std::filesystem::path file(const std::string& name) const { return folder_ / name; }
+
+  struct {
+    double offset_m = 110;
+    size_t reports = 0;
+  } last_;
+  std::filesystem::path folder_ = std::filesystem::temp_directory_path() / ("ground-" + std::to_string(getpid()));
+};
+
+TEST_F(GroundLinkTest, NothingIsLostOverAPowerCutAndADeadZone) {
+  test::Broker broker(file("broker"));
+  ASSERT_TRUE(broker.start());
+  Ground ground(broker.address(), train_);
+  ASSERT_TRUE(ground.subscribed());
+  broker.stop();
+  {
+    test::Program program(linked_service(broker.address()));
+    ASSERT_TRUE(run_until([&] { return connected(); }, [] {}));
+    ASSERT_TRUE(run_for(5));
+    ASSERT_TRUE(status_says("5 reports wait"));
+    EXPECT_EQ(status_->state(), msg::STATE_DEGRADED);
+    EXPECT_THAT(reason(), HasSubstr("Ground link: not connected to localhost:"));
+    program.end(SIGKILL);
+  }
+  ASSERT_TRUE(run_until([&] { return states_.matched_readers() == 0; }, [] {}));
+  test::Program program(linked_service(broker.address()));
+  ASSERT_TRUE(run_until([&] { return connected() && states_.matched_readers() > 0; }, [] {}));
+  ASSERT_TRUE(run_for(9));
+  ASSERT_TRUE(status_says("9 reports wait"));
+  EXPECT_EQ(ground.count(), 0U);
+  ASSERT_TRUE(broker.start());
+  ASSERT_TRUE(run_until([&] { return ground.count() >= 9; }, [&] { write_state(last_.offset_m); }));
+  ASSERT_TRUE(run_until([&] { return reason().find("Ground link") == std::string::npos; },
+                        [&] { write_state(last_.offset_m); }));
+  const auto arrived = ground.reports();
+  for (size_t i = 0; i < 9; ++i) {
+    EXPECT_EQ(arrived[i].sequence, i + 1);
+    EXPECT_EQ(arrived[i].stream, arrived[0].stream);
+    EXPECT_EQ(arrived[i].train, train_);
+    const auto& sent = reports_[i];
+    EXPECT_EQ(arrived[i].message,
+              std::vector<uint8_t>(sent.message().begin(), sent.message().begin() + sent.message_bytes()));
+    EXPECT_EQ(arrived[i].stamp_ns, sent.stamp_ns());
+  }
+}
+
+TEST_F(GroundLinkTest, ListenPrintsEachReportOnce) {
+  test::Broker broker(file("broker"));
+  ASSERT_TRUE(broker.start());
+  test::Program listen({"railfix", "tpr", "listen", "--broker", broker.address(), "--topic",
+                        "railfix/" + train_ + "/position_report", "--count", "3", "--json"},
+                       {file("out"), file("err"), {}});
+  test::Program program(linked_service(broker.address()));
+  ASSERT_TRUE(run_until([&] { return connected(); }, [] {}));
+  // Whoever subscribes late has missed the first ones: reports are made until three have been printed.
+  ASSERT_TRUE(run_until([&] { return listen.exit_code().has_value(); }, [&] { write_state(last_.offset_m += 1.1); }));
+  ASSERT_EQ(listen.exit_code(), 0);
+  std::istringstream lines(test::slurp(file("out")));
+  std::vector<nlohmann::json> printed;
+  for (std::string line; std::getline(lines, line);) printed.push_back(nlohmann::json::parse(line));
+  ASSERT_EQ(printed.size(), 3U);
+  ASSERT_TRUE(run_until([&] { return reports_.size() >= printed[2]["sequence"].get<size_t>(); }, [] {}));
+  for (size_t i = 0; i < 3; ++i) {
+    const size_t sequence = printed[0]["sequence"].get<size_t>() + i;
+    EXPECT_EQ(printed[i]["sequence"], sequence);
+    EXPECT_EQ(printed[i]["arrival"], "new");
+    const auto& sent = reports_.at(sequence - 1);
+    EXPECT_EQ(printed[i]["hex"], etcs::to_hex({sent.message().data(), sent.message_bytes()}));
+  }
+}
+
+// Own authority, a certificate for the broker and one for the train, as docs/configuration/reports.md asks for.
+class Certificates {
+ public:
+  explicit Certificates(const std::filesystem::path& folder) : folder_(folder) {
+    std::filesystem::create_directories(folder);
+    ok_ = openssl({"req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=railfix test",
+                   "-keyout", of("ca.key"), "-out", of("ca.pem")});
+    for (const std::string name : {"broker", "train"}) {
+      std::ofstream(folder_ / (name + ".ext")) << "subjectAltName=DNS:localhost\n";
+      ok_ = ok_ && openssl({"req", "-newkey", "rsa:2048", "-nodes", "-subj", "/CN=" + name, "-keyout",
+                            of(name + ".key"), "-out", of(name + ".csr")});
+      ok_ = ok_ && openssl({"x509", "-req", "-in", of(name + ".csr"), "-CA", of("ca.pem"), "-CAkey", of("ca.key"),
+                            "-CAcreateserial", "-days", "2", "-extfile", of(name + ".ext"), "-out", of(name + ".pem")});
+    }
+  }
+  [[nodiscard]] bool ok() const { return ok_; }
+  [[nodiscard]] std::string of(const std::string& name) const { return (folder_ / name).string(); }
+
+ private:
+  static bool openssl(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), "/usr/bin/openssl");
+    return test::run_program(arguments, 60).exit_code == 0;
+  }
+  std::filesystem::path folder_;
+  bool ok_ = false;
+};
+
+TEST_F(GroundLinkTest, TlsLetsOnlyTheRightCertificatesIn) {
+  const Certificates ours(file("ours"));
+  const Certificates others(file("others"));
+  ASSERT_TRUE(ours.ok() && others.ok());
+  test::Broker broker(file("broker"), "cafile " + ours.of("ca.pem") + "\ncertfile " + ours.of("broker.pem") +
+                                          "\nkeyfile " + ours.of("broker.key") + "\nrequire_certificate true\n");
+  ASSERT_TRUE(broker.start());
+  const auto secured = [&](const std::string& ca, const Certificates& train) {
+    const std::string link = "tpr_publisher.ground_link.";
+    return linked_service(broker.address(), {link + "ca_file=" + ca, link + "certificate_file=" + train.of("train.pem"),
+                                             link + "key_file=" + train.of("train.key")});
+  };
+  {
+    test::Program program(secured(others.of("ca.pem"), ours));  // the broker is not the one it says
+    ASSERT_TRUE(run_until([&] { return connected(); }, [] {}));
+    ASSERT_TRUE(run_for(2));
+    ASSERT_TRUE(status_says("2 reports wait"));
+    EXPECT_THAT(reason(), HasSubstr("Ground link: not connected"));
+  }
+  ASSERT_TRUE(run_until([&] { return states_.matched_readers() == 0; }, [] {}));
+  {
+    test::Program program(secured(ours.of("ca.pem"), others));  // the broker does not know this train
+    ASSERT_TRUE(run_until([&] { return connected() && states_.matched_readers() > 0; }, [] {}));
+    ASSERT_TRUE(run_for(4));
+    ASSERT_TRUE(status_says("4 reports wait"));
+  }
+  ASSERT_TRUE(run_until([&] { return states_.matched_readers() == 0; }, [] {}));
+  test::Program program(secured(ours.of("ca.pem"), ours));
+  ASSERT_TRUE(run_until([&] { return connected() && states_.matched_readers() > 0; }, [] {}));
+  ASSERT_TRUE(run_for(5));
+  ASSERT_TRUE(run_until([&] { return status_ && status_->state() == msg::STATE_ACTIVE; },
+                        [&] { write_state(last_.offset_m); }));
+}
+
+TEST_F(GroundLinkTest, ManyLateReportsArriveInOrderWhileTheBrokerComesAndGoes) {
+  constexpr uint64_t kReports = 2000;
+  test::Broker broker(file("broker"));
+  ASSERT_TRUE(broker.start());
+  Ground ground(broker.address(), train_);
+  ASSERT_TRUE(ground.subscribed());
+  broker.stop();
+  tpr_publisher::GroundLinkSettings settings;
+  core::ok_or_throw(ground_link::parse_broker(broker.address(), settings.mqtt));
+  settings.mqtt.client_id = "railfix-" + train_;
+  settings.mqtt.longest_retry_s = 0.2;
+  settings.topic = "railfix/" + train_ + "/position_report";
+  settings.store = file("many.db");
+  const auto wait_for = [&](size_t count) {
+    for (int i = 0; i < 6000 && ground.count() < count; ++i) poll(nullptr, 0, 10);
+    return ground.count() >= count;
+  };
+  {
+    tpr_publisher::GroundLink link(settings);
+    for (uint64_t i = 1; i <= kReports; ++i) link.send({train_, 0, 0, static_cast<int64_t>(i), 0, 3, 1, {0x88}});
+  }  // stored, though nobody was there
+  tpr_publisher::GroundLink link(settings);
+  const int64_t begun_ns = core::monotonic_ns();
+  for (const size_t until : {size_t{200}, size_t{900}, size_t{1500}}) {
+    ASSERT_TRUE(broker.start());
+    ASSERT_TRUE(wait_for(until));
+    broker.stop();
+  }
+  ASSERT_TRUE(broker.start());
+  ASSERT_TRUE(wait_for(kReports)) << link.trouble();
+  const double took_s = core::seconds(core::monotonic_ns() - begun_ns);
+  const auto arrived = ground.reports();
+  for (uint64_t i = 0; i < kReports; ++i) {
+    ASSERT_EQ(arrived[i].sequence, i + 1);
+    ASSERT_EQ(arrived[i].stamp_ns, static_cast<int64_t>(i + 1));
+  }
+  std::cout << kReports << " late reports over 3 restarts of the broker: " << took_s << " s, 0 lost, " << ground.twice()
+            << " came twice\n";
+}
+
+}  // namespace
+}  // namespace railfix

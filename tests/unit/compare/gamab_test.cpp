@@ -1,0 +1,87 @@
+#include "compare/gamab.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/random.hpp"
+
+namespace railfix::compare {
+namespace {
+
+/// Errors that stay nearly the same inside a leg of ten pairs, as those of two odometers do.
+std::vector<Sample> runs(size_t legs, double ours_sigma, double certified_sigma, uint64_t seed) {
+  core::Random random(seed);
+  std::vector<Sample> samples;
+  for (size_t leg = 0; leg < legs; ++leg) {
+    const double ours = random.normal(0, ours_sigma);
+    const double certified = random.normal(0, certified_sigma);
+    for (int i = 0; i < 10; ++i)
+      samples.push_back(
+          {leg, ours + random.normal(0, 0.1 * ours_sigma), certified + random.normal(0, 0.1 * certified_sigma)});
+  }
+  return samples;
+}
+
+RatioResult judged(const std::vector<Sample>& samples) {
+  return compare_ratio(samples, Figure::root_mean_square, Demand{});
+}
+
+TEST(Gamab, TellsTheBetterTheWorseAndTheUndecided) {
+  const auto better = judged(runs(60, 1, 3, 1));
+  EXPECT_EQ(better.verdict, Verdict::at_least_as_good);
+  EXPECT_EQ(better.legs, 60U);
+  EXPECT_EQ(better.samples, 600U);
+  EXPECT_LT(better.low, better.ratio);
+  EXPECT_LT(better.ratio, better.high);
+  EXPECT_EQ(judged(runs(60, 3, 1, 2)).verdict, Verdict::worse);
+  const auto open = judged(runs(20, 0.9, 1, 3));
+  EXPECT_EQ(open.verdict, Verdict::open);
+  EXPECT_GT(open.legs_needed, 20);
+}
+
+TEST(Gamab, TenLegsAreTheLeast) {
+  const auto few = judged(runs(9, 1, 10, 4));
+  EXPECT_EQ(few.verdict, Verdict::open);
+  EXPECT_EQ(few.legs_needed, 10);
+  EXPECT_EQ(judged({}).samples, 0U);
+}
+
+TEST(Gamab, ValuesThatAreNotKnownAreLeftOut) {
+  auto samples = runs(20, 1, 3, 5);
+  samples[0].ours = NAN;
+  samples[1].certified = HUGE_VAL;
+  EXPECT_EQ(judged(samples).samples, 198U);
+}
+
+// A system just at the limit must be declared good in no more than about 5 of 100 cases.
+TEST(Gamab, TheConfidenceHolds) {
+  int wrong = 0;
+  for (uint64_t seed = 0; seed < 200; ++seed)
+    wrong += judged(runs(40, 1.05, 1, 100 + seed)).verdict == Verdict::at_least_as_good;
+  EXPECT_LE(wrong, 20);  // 5 % are 10; the bootstrap of 40 legs is a little too sure
+}
+
+std::vector<Sample> broken(size_t legs, size_t ours, size_t certified) {
+  std::vector<Sample> samples;
+  for (size_t leg = 0; leg < legs; ++leg) {
+    samples.push_back({leg, 0, 0});
+    samples.push_back({leg, leg < ours ? 1.0 : 0.0, leg + certified >= legs ? 1.0 : 0.0});
+  }
+  return samples;
+}
+
+TEST(Gamab, BrokenPromisesCountByLeg) {
+  const auto none = compare_broken(broken(59, 0, 0), Demand{});
+  EXPECT_EQ(none.verdict, Verdict::at_least_as_good);
+  EXPECT_NEAR(none.ours_at_most, 0.0495, 1e-4);  // 1 - 0.05^(1/59)
+  const auto many = compare_broken(broken(40, 8, 0), Demand{});
+  EXPECT_EQ(many.verdict, Verdict::worse);
+  EXPECT_EQ(many.ours, 8U);
+  EXPECT_EQ(compare_broken(broken(40, 1, 0), Demand{}).verdict, Verdict::open);
+  EXPECT_EQ(compare_broken(broken(40, 1, 3), Demand{}).verdict, Verdict::at_least_as_good);
+  EXPECT_EQ(compare_broken(broken(9, 0, 0), Demand{}).verdict, Verdict::open);
+}
+
+}  // namespace
+}  // namespace railfix::compare

@@ -1,0 +1,125 @@
+#include "compare/pairing.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/time.hpp"
+#include "unit/tpr_publisher/balise_map.hpp"
+
+namespace railfix::compare {
+namespace {
+
+using namespace tpr_publisher::testing;
+
+/// `front_m` beyond the group, along its nominal direction; the train looks and runs `along` it or against it.
+TimedReport report(double run_s, uint32_t group, double front_m, double speed_kmh = 72, bool along = true) {
+  TimedReport timed;
+  timed.stamp_ns = core::to_ns(run_s);
+  auto& f = timed.fields;
+  f.nid_lrbg = group;
+  f.q_scale = 0;
+  f.d_lrbg = static_cast<uint32_t>(std::lround(std::abs(front_m) * 10));
+  f.q_dlrbg = front_m >= 0 ? etcs::kNominal : etcs::kReverse;
+  f.q_dirlrbg = f.q_dirtrain = along ? etcs::kNominal : etcs::kReverse;
+  f.l_doubtover = 30;
+  f.l_doubtunder = 70;
+  f.v_train = static_cast<uint32_t>(std::lround(speed_kmh / 5));
+  return timed;
+}
+
+constexpr int64_t kGapNs = 15 * core::kNsPerSecond;
+
+TEST(Axes, PlaceAReportOnItsGroup) {
+  const auto placed = Axes().place(report(1, kA, 50)).value();
+  EXPECT_EQ(placed.axis, kA);
+  EXPECT_NEAR(placed.front_m, 50, 1e-9);
+  EXPECT_NEAR(placed.low_m, 47, 1e-9);
+  EXPECT_NEAR(placed.high_m, 57, 1e-9);
+  EXPECT_NEAR(placed.speed_mps, 70 / 3.6, 1e-9);
+  const auto against = Axes().place(report(1, kA, -50, 72, false)).value();
+  EXPECT_NEAR(against.front_m, -50, 1e-9);
+  EXPECT_NEAR(against.low_m, -57, 1e-9);  // its front end looks the other way
+  EXPECT_NEAR(against.high_m, -47, 1e-9);
+  EXPECT_LT(against.speed_mps, 0);
+}
+
+TEST(Axes, WhatIsUnknownHasNoPlaceOrNoBound) {
+  auto unknown = report(1, etcs::kUnknownBaliseGroup, 50);
+  EXPECT_FALSE(Axes().place(unknown).has_value());
+  unknown = report(1, kA, 50);
+  unknown.fields.q_dlrbg = etcs::kUnknownSide;
+  EXPECT_FALSE(Axes().place(unknown).has_value());
+  unknown = report(1, kA, 50);
+  unknown.fields.l_doubtover = etcs::kUnknownDistance;
+  EXPECT_EQ(Axes().place(unknown)->low_m, -HUGE_VAL);
+  unknown = report(1, kA, 50);
+  unknown.fields.q_dirlrbg = etcs::kUnknownSide;
+  EXPECT_NEAR(Axes().place(unknown)->low_m, 43, 1e-9);
+}
+
+TEST(Axes, PlaceAReportOnTheLine) {
+  const auto path = track::Path::follow(balise_map(), forward(1, 0), 900, 0);
+  const Axes line(path.value());
+  EXPECT_NEAR(line.place(report(1, kA, 50))->front_m, 150, 1e-9);
+  const auto reverse_group = line.place(report(1, kB, -50, 72, false)).value();  // B's nominal direction runs back
+  EXPECT_NEAR(reverse_group.front_m, 450, 1e-9);
+  EXPECT_NEAR(reverse_group.low_m, 447, 1e-9);
+  EXPECT_NEAR(reverse_group.high_m, 457, 1e-9);
+  EXPECT_GT(reverse_group.speed_mps, 0);
+  EXPECT_FALSE(line.place(report(1, kE, 50)).has_value());  // on the siding
+}
+
+TEST(Pairing, CarriesBySpeedNotByAStraightLine) {
+  // From 20 to 35 km/h in 10 s: 76.4 m; a straight line would say 30.6 m after 4 s.
+  const std::vector<TimedReport> ours{report(0, kA, 0, 20), report(10, kA, 76.4, 35)};
+  const double true_m = 20 / 3.6 * 4 + 0.5 * 15 / 36.0 * 16;
+  const auto pairing = pair_up(ours, {report(4, kA, true_m, 25)}, Axes(), kGapNs);
+  ASSERT_EQ(pairing.pairs.size(), 1U);
+  EXPECT_NEAR(pairing.pairs[0].difference_m(), 0, 0.1);
+  EXPECT_NEAR(pairing.pairs[0].carried_m, 2.5 / 3.6 * 10 * 0.24, 1e-9);
+  EXPECT_TRUE(pairing.pairs[0].overlap());
+}
+
+TEST(Pairing, NeedsOursBeforeAndBehindOnTheSameAxis) {
+  const std::vector<TimedReport> ours{report(0, kA, 0), report(10, kA, 200), report(12, kB, 0), report(40, kB, 500)};
+  const auto pairing = pair_up(ours,
+                               {report(-1, kA, 0), report(10, kA, 203), report(11, kA, 220), report(12, kB, 1),
+                                report(30, kB, 400), report(41, kB, 520)},
+                               Axes(), kGapNs);
+  ASSERT_EQ(pairing.pairs.size(), 2U);
+  EXPECT_EQ(pairing.alone, 4U);
+  EXPECT_EQ(pairing.legs, 2U);
+  EXPECT_NEAR(pairing.pairs[0].difference_m(), -3, 1e-9);
+  EXPECT_EQ(pairing.pairs[0].carried_m, 0);
+  EXPECT_EQ(pairing.pairs[1].leg, 1U);
+}
+
+TEST(Pairing, DifferencesAreInRunningDirection) {
+  const auto pairing = pair_up({report(0, kA, -100, 72, false)}, {report(0, kA, -103, 72, false)}, Axes(), kGapNs);
+  EXPECT_NEAR(pairing.pairs.at(0).difference_m(), -3, 1e-9);  // the certified one is farther on
+}
+
+TEST(Pairing, IntervalsThatDoNotMeetAreSeen) {
+  const auto pairing = pair_up({report(0, kA, 100)}, {report(0, kA, 111)}, Axes(), kGapNs);
+  EXPECT_FALSE(pairing.pairs.at(0).overlap());  // 97 to 107 and 108 to 118
+}
+
+TEST(Pairing, LateStampsShowInTheSpeed) {
+  std::vector<TimedReport> ours;
+  std::vector<TimedReport> certified;
+  double way_m = 0;
+  for (int i = 0; i < 60; ++i) {
+    const double speed_kmh = 5 * (10 + i % 20);
+    way_m += speed_kmh / 3.6;
+    ours.push_back(report(i, kA, way_m, speed_kmh));
+    certified.push_back(report(i, kA, way_m - 0.5 * speed_kmh / 3.6, speed_kmh));  // where it was half a second ago
+  }
+  const auto shift = time_shift(pair_up(ours, certified, Axes(), kGapNs).pairs);
+  EXPECT_NEAR(shift.shift_s, 0.5, 0.01);
+  EXPECT_LT(shift.sigma_s, 0.01);
+  EXPECT_TRUE(std::isnan(time_shift({}).shift_s));
+}
+
+}  // namespace
+}  // namespace railfix::compare

@@ -1,0 +1,49 @@
+#include "compare/report_file.hpp"
+
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include <fstream>
+
+namespace railfix::compare {
+namespace {
+
+using ::testing::HasSubstr;
+
+const std::string kHex = "880601D6F345402AF34000E48F68EB84D250014010C38830";
+
+class ReportFile : public ::testing::Test {
+ protected:
+  ReportFile() { std::filesystem::create_directories(folder_); }
+  ~ReportFile() override { std::filesystem::remove_all(folder_); }
+  core::Result<std::vector<TimedReport>> read(const std::string& name, const std::string& text) {
+    std::ofstream(folder_ / name) << text;
+    return read_reports(folder_ / name, etcs::Baseline::b3);
+  }
+  std::filesystem::path folder_ = std::filesystem::temp_directory_path() / ("report-file-" + std::to_string(getpid()));
+};
+
+TEST_F(ReportFile, TableOrLinesSayTheSame) {
+  const auto table = read("a.csv", "time_ns,message\n2000," + kHex + "\n1000," + kHex + "\n").value();
+  ASSERT_EQ(table.size(), 2U);
+  EXPECT_EQ(table[0].stamp_ns, 1000);  // sorted
+  EXPECT_EQ(table[0].fields.d_lrbg, 1234U);
+  const auto lines = read("a.jsonl", "{\"stamp_ns\": 1000, \"hex\": \"" + kHex + "\", \"baseline\": 3}\n\n").value();
+  ASSERT_EQ(lines.size(), 1U);
+  EXPECT_EQ(lines[0].fields, table[0].fields);
+  ASSERT_TRUE(read("tpr.csv", "stamp_ns,hex\n5," + kHex + "\n").ok());
+  EXPECT_EQ(read_reports(folder_, etcs::Baseline::b3).value().at(0).stamp_ns, 5);
+}
+
+TEST_F(ReportFile, ErrorsNameTheLine) {
+  EXPECT_THAT(read("a.csv", "stamp_ns,hex\n1," + kHex + "\n2,88\n").error().message, HasSubstr("line 3"));
+  EXPECT_THAT(read("a.csv", "stamp_ns\n1\n").error().message, HasSubstr("hex"));
+  EXPECT_THAT(read("a.jsonl", "[1]\n").error().message, HasSubstr("line 1: not a JSON object"));
+  EXPECT_THAT(read("a.jsonl", "{\"stamp_ns\": 1}\n").error().message, HasSubstr("\"hex\""));
+  EXPECT_THAT(read("a.jsonl", "{\"stamp_ns\": 1, \"hex\": \"" + kHex + "\", \"baseline\": 4}").error().message,
+              HasSubstr("line 1"));
+  EXPECT_THAT(read_reports("/no/such.jsonl", etcs::Baseline::b3).error().message, HasSubstr("/no/such.jsonl"));
+}
+
+}  // namespace
+}  // namespace railfix::compare

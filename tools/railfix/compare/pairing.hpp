@@ -1,0 +1,44 @@
+// Two systems' reports at the same times: ours are carried to the time of each certified one by the reported speeds.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "compare/placed_report.hpp"
+
+namespace railfix::compare {
+
+struct Pair {
+  int64_t stamp_ns = 0;  // of the certified report
+  size_t leg = 0;        // certified reports in a row with the same LRBG: errors inside a leg belong together
+  PlacedReport certified;
+  PlacedReport ours;       // at stamp_ns
+  double carried_m = 0;    // bound of what carrying may add: V_TRAIN is rounded to 5 km/h
+  PlacedReport ours_sent;  // the last one before, as it was sent
+  /// Positive: ours lies in front, in running direction (along the axis at standstill).
+  [[nodiscard]] double difference_m() const;
+  /// The two intervals, ours wider by carried_m, have a place in common.
+  [[nodiscard]] bool overlap() const;
+};
+
+struct Pairing {
+  std::vector<Pair> pairs;
+  size_t legs = 0;
+  size_t ours_placed = 0;
+  size_t certified_placed = 0;
+  size_t alone = 0;  // placed certified reports without one of ours before and behind
+};
+
+/// Ours are carried between two reports on the same axis that are at most `longest_gap_ns` apart. REQUIRES: both
+/// sorted.
+Pairing pair_up(const std::vector<TimedReport>& ours, const std::vector<TimedReport>& certified, const Axes& axes,
+                int64_t longest_gap_ns);
+
+/// Least squares of the differences over the speed: a system whose stamps are late lies behind by speed times delay.
+struct TimeShift {
+  double shift_s = 0;  // NaN with fewer than 3 pairs or one speed only
+  double sigma_s = 0;
+};
+TimeShift time_shift(const std::vector<Pair>& pairs);
+
+}  // namespace railfix::compare

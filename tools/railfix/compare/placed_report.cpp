@@ -1,0 +1,59 @@
+#include "compare/placed_report.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/units.hpp"
+
+namespace railfix::compare {
+
+namespace {
+
+constexpr double kSpeedStepKmh = 5.0;
+
+double metres(uint32_t raw, uint32_t q_scale) {
+  return raw == etcs::kUnknownDistance ? HUGE_VAL : raw * etcs::scale_m(q_scale);
+}
+
+/// Along the group's nominal direction.
+double speed_mps(const etcs::TrainPositionReport& fields) {
+  if (fields.v_train == etcs::kStandstillSpeed || fields.v_train == 0) return 0;
+  if (fields.q_dirtrain == etcs::kUnknownSide) return std::numeric_limits<double>::quiet_NaN();
+  const double speed = core::mps_from_kmh(fields.v_train * kSpeedStepKmh);
+  return fields.q_dirtrain == etcs::kNominal ? speed : -speed;
+}
+
+}  // namespace
+
+Axes::Axes(const track::Path& path) : line_(std::in_place) {
+  for (const auto& mark : path.balise_groups())
+    line_->insert({mark.group->nid_lrbg(), {mark.distance_m, mark.nominal_is_along_path}});
+}
+
+std::optional<PlacedReport> Axes::place(const TimedReport& report) const {
+  const auto& fields = report.fields;
+  const bool known = fields.nid_lrbg != etcs::kUnknownBaliseGroup && fields.d_lrbg != etcs::kUnknownDistance &&
+                     fields.q_dlrbg != etcs::kUnknownSide;
+  if (!known) return std::nullopt;
+  const double front_m = metres(fields.d_lrbg, fields.q_scale) * (fields.q_dlrbg == etcs::kNominal ? 1 : -1);
+  double behind_m = metres(fields.l_doubtover, fields.q_scale);  // in rear of the train's front end
+  double ahead_m = metres(fields.l_doubtunder, fields.q_scale);
+  if (fields.q_dirlrbg == etcs::kUnknownSide) behind_m = ahead_m = std::max(behind_m, ahead_m);
+  if (fields.q_dirlrbg == etcs::kReverse) std::swap(behind_m, ahead_m);
+  PlacedReport placed{report.stamp_ns,    fields.nid_lrbg,   fields.nid_lrbg,  front_m,
+                      front_m - behind_m, front_m + ahead_m, speed_mps(fields)};
+  if (!line_) return placed;
+  const auto group = line_->find(fields.nid_lrbg);
+  if (group == line_->end()) return std::nullopt;
+  const double sign = group->second.along ? 1 : -1;
+  placed.axis = 0;
+  placed.front_m = group->second.at_m + sign * placed.front_m;
+  placed.speed_mps *= sign;
+  if (sign < 0) std::swap(behind_m, ahead_m);
+  placed.low_m = placed.front_m - behind_m;
+  placed.high_m = placed.front_m + ahead_m;
+  return placed;
+}
+
+}  // namespace railfix::compare

@@ -1,0 +1,40 @@
+// Position reports as places on an axis that two systems share: the line of a map, or each balise group alone.
+#pragma once
+
+#include <map>
+#include <optional>
+
+#include "compare/report_file.hpp"
+#include "track/path.hpp"
+
+namespace railfix::compare {
+
+struct PlacedReport {
+  int64_t stamp_ns = 0;
+  uint32_t axis = 0;  // reports of different axes cannot be compared: the LRBG, or 0 = the line
+  uint32_t nid_lrbg = 0;
+  double front_m = 0;  // estimated front end
+  double low_m = 0;    // the front end lies between these two; infinite where a doubt is unknown
+  double high_m = 0;
+  double speed_mps = 0;  // along the axis, signed; NaN = its sign is not known
+};
+
+class Axes {
+ public:
+  /// Each balise group alone, along its nominal direction.
+  Axes() = default;
+  /// The groups of this path, along it.
+  explicit Axes(const track::Path& path);
+
+  /// Nothing when the report says "unknown", or its group is not on the path.
+  [[nodiscard]] std::optional<PlacedReport> place(const TimedReport& report) const;
+
+ private:
+  struct Group {
+    double at_m;
+    bool along;
+  };
+  std::optional<std::map<uint32_t, Group>> line_;
+};
+
+}  // namespace railfix::compare

@@ -1,0 +1,23 @@
+// Train position reports of one system, from a file.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "core/result.hpp"
+#include "etcs/train_position_report.hpp"
+
+namespace railfix::compare {
+
+struct TimedReport {
+  int64_t stamp_ns = 0;  // of the position, in the time that both systems share
+  etcs::TrainPositionReport fields;
+};
+
+/// A table with `stamp_ns` and `hex` (tpr.csv of a run; `time_ns` and `message` are understood too), a run's folder, or
+/// .jsonl: one object a line with the same keys, as `railfix tpr listen --json` prints them. A `baseline` given in the
+/// file goes before the argument. Sorted by time.
+core::Result<std::vector<TimedReport>> read_reports(const std::filesystem::path& file, etcs::Baseline baseline);
+
+}  // namespace railfix::compare
