@@ -35,9 +35,14 @@ TEST(Gamab, TellsTheBetterTheWorseAndTheUndecided) {
   EXPECT_LT(better.low, better.ratio);
   EXPECT_LT(better.ratio, better.high);
   EXPECT_EQ(judged(runs(60, 3, 1, 2)).verdict, Verdict::worse);
-  const auto open = judged(runs(20, 0.9, 1, 3));
-  EXPECT_EQ(open.verdict, Verdict::open);
-  EXPECT_GT(open.legs_needed, 20);
+  int undecided = 0;
+  for (uint64_t seed = 0; seed < 20; ++seed) {
+    const auto equal = judged(runs(20, 1, 1, 3 + seed));
+    if (equal.verdict != Verdict::open) continue;
+    ++undecided;
+    EXPECT_GT(equal.legs_needed, 20);
+  }
+  EXPECT_GE(undecided, 14);
 }
 
 TEST(Gamab, TenLegsAreTheLeast) {
@@ -56,10 +61,12 @@ TEST(Gamab, ValuesThatAreNotKnownAreLeftOut) {
 
 // A system just at the limit must be declared good in no more than about 5 of 100 cases.
 TEST(Gamab, TheConfidenceHolds) {
-  int wrong = 0;
-  for (uint64_t seed = 0; seed < 200; ++seed)
-    wrong += judged(runs(40, 1.05, 1, 100 + seed)).verdict == Verdict::at_least_as_good;
-  EXPECT_LE(wrong, 20);  // 5 % are 10; the bootstrap of 40 legs is a little too sure
+  for (const size_t legs : {20U, 40U}) {
+    int wrong = 0;
+    for (uint64_t seed = 0; seed < 200; ++seed)
+      wrong += judged(runs(legs, 1.05, 1, 100 + seed)).verdict == Verdict::at_least_as_good;
+    EXPECT_LE(wrong, 14) << legs;  // 5 % are 10, with 3 of scatter
+  }
 }
 
 std::vector<Sample> broken(size_t legs, size_t ours, size_t certified) {
