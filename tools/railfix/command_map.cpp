@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstdio>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <numeric>
@@ -11,6 +12,7 @@
 #include "commands.hpp"
 #include "core/result.hpp"
 #include "core/units.hpp"
+#include "map/map_commands.hpp"
 #include "track/import/build.hpp"
 #include "track/import/made_network.hpp"
 
@@ -63,6 +65,50 @@ void print_figures(const char* source, const track::FitFigures& figures) {
     std::printf("  length against file           %.6f mm at most\n", figures.max_length_change_m * 1e3);
     std::printf("  gaps between the file's own   %.6f mm at most\n", figures.max_gap_m * 1e3);
   }
+}
+
+const char* kind_of(const track::Element& element) {
+  if (element.curvature_start_per_m != element.curvature_end_per_m) return "clothoid";
+  return element.curvature_start_per_m == 0 ? "straight" : "arc";
+}
+
+/// Straights, clothoids and arcs, and the elements that fit worst.
+void print_fit(const track::FitReport& fit) {
+  if (fit.tracks + fit.left_as_arcs == 0) return;
+  std::map<std::string, size_t> count;
+  for (const track::FittedElement& element : fit.elements) ++count[kind_of(element.element)];
+  std::printf("polylines as straights, clothoids and arcs\n");
+  std::printf("  tracks                        %zu, %zu more left as arcs through their points\n", fit.tracks,
+              fit.left_as_arcs);
+  std::printf("  elements                      %zu straights, %zu clothoids, %zu arcs\n", count["straight"],
+              count["clothoid"], count["arc"]);
+  std::printf("  points from the track         %.3f m rms, %.3f m at most\n", fit.rms_m(), fit.max_m);
+  std::vector<track::FittedElement> worst = fit.elements;
+  const auto shown = static_cast<ptrdiff_t>(std::min<size_t>(5, worst.size()));
+  std::partial_sort(worst.begin(), worst.begin() + shown, worst.end(),
+                    [](const auto& a, const auto& b) { return a.max_m > b.max_m; });
+  for (ptrdiff_t i = 0; i < shown; ++i) {
+    std::printf("  worst                         %.3f m beside the %s of %s at %.1f m\n", worst[i].max_m,
+                kind_of(worst[i].element), worst[i].track.c_str(), worst[i].offset_m);
+  }
+}
+
+ordered_json to_json(const track::FitReport& fit) {
+  ordered_json elements = ordered_json::array();
+  for (const track::FittedElement& element : fit.elements) {
+    elements.push_back({{"track", element.track},
+                        {"offset_m", element.offset_m},
+                        {"kind", kind_of(element.element)},
+                        {"length_m", element.element.length_m},
+                        {"curvature_start_per_m", element.element.curvature_start_per_m},
+                        {"curvature_end_per_m", element.element.curvature_end_per_m},
+                        {"max_point_distance_m", element.max_m}});
+  }
+  return {{"tracks", fit.tracks},
+          {"left_as_arcs", fit.left_as_arcs},
+          {"rms_m", fit.rms_m()},
+          {"max_m", fit.max_m},
+          {"elements", elements}};
 }
 
 ordered_json to_json(const track::FitFigures& figures) {
@@ -223,6 +269,8 @@ int build(const BuildRequest& request) {
                       {"length_m", total_length_m(built.map)},
                       {"crs", built.map.crs}};
     if (built.landxml.elements > 0) json["landxml"] = to_json(built.landxml);
+    if (built.fit.tracks > 0) json["fit"] = to_json(built.fit);
+    if (built.plans.elements > 0) json["plans"] = to_json(built.plans);
     if (built.osm.elements > 0) json["osm"] = to_json(built.osm);
     json["problems"] = built.map.problems;
     print_json(json);
@@ -230,7 +278,9 @@ int build(const BuildRequest& request) {
   }
   print_summary(built.map);
   print_figures("LandXML, element by element", built.landxml);
+  print_figures("Coordinates of a plan, arcs through the points", built.plans);
   print_figures("OpenStreetMap, arcs through the points", built.osm);
+  print_fit(built.fit);
   print_problems(built.map.problems, 20);
   std::printf("written          %s\n", request.out.c_str());
   return 0;
@@ -258,15 +308,21 @@ void add_build(CLI::App& map, Action& chosen) {
   const auto request = std::make_shared<BuildRequest>();
   CLI::App* command = map.add_subcommand("build", "Make a map out of surveys and OpenStreetMap data, and check it");
   command
-      ->add_option("INPUT", request->inputs,
-                   "LandXML (.xml, .landxml), OpenStreetMap (.osm, .pbf), Overpass JSON (.json), GeoJSON (.geojson), "
-                   "compiled map (.map)")
+      ->add_option(
+          "INPUT", request->inputs,
+          "LandXML (.xml, .landxml), railML 2 and 3 (.xml, .railml), ERJU infrastructure and map (.xml, both), "
+          "OpenStreetMap (.osm, .pbf), Overpass JSON (.json), GeoJSON (.geojson), compiled map (.map)")
       ->required();
   command->add_option("--out", request->out, "The map file to write")->required();
   command->add_option(
       "--crs", request->options.crs,
       "Coordinate system for PROJ, such as EPSG:2056; without it the plan's own, else the UTM zone of the data; "
       "local = true to scale around the middle of OpenStreetMap data (UTM shortens up to 0.4 m per km)");
+  command->add_flag(
+      "!--arcs", request->options.with_clothoids,
+      "Two arcs between every pair of points of OpenStreetMap, through every point, instead of straights, "
+      "clothoids and arcs that pass them within their scatter");
+  request->options.with_clothoids = true;
   command->add_flag("--trams", request->options.with_trams, "Take railway=tram too");
   command
       ->add_option("--smooth", request->options.smooth_m,
@@ -339,6 +395,9 @@ void add_map(CLI::App& app, Action& chosen) {
   add_build(*map, chosen);
   add_info(*map, chosen);
   add_make(*map, chosen);
+  add_map_draw(*map, chosen);
+  add_map_coverage(*map, chosen);
+  add_map_learn(*map, chosen);
 }
 
 }  // namespace railfix::tool

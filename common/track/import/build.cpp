@@ -5,20 +5,23 @@
 #include <iomanip>
 #include <sstream>
 
+#include "track/import/erju.hpp"
 #include "track/import/finish.hpp"
 #include "track/import/landxml.hpp"
 #include "track/import/network.hpp"
 #include "track/import/osm_network.hpp"
+#include "track/import/railml.hpp"
 
 namespace railfix::track {
 namespace {
 
 constexpr double kSurveyFrogSigmaM = 0.5;  // the frog is drawn, not surveyed
+constexpr double kPlanFrogSigmaM = 3.0;    // from coordinates every 10 m
 constexpr double kMappingFrogSigmaM = 10.0;
 constexpr double kSurveyLocationM = 1.0;  // Q_LOCACC
 constexpr double kMappingLocationM = 5.0;
 
-enum class Kind { landxml, osm, json, compiled };
+enum class Kind { landxml, osm, json, compiled, railml, erju_infra, erju_map };
 
 /// By the name's ending; .xml by its first element.
 core::Result<Kind> kind_of(const std::filesystem::path& file) {
@@ -32,15 +35,21 @@ core::Result<Kind> kind_of(const std::filesystem::path& file) {
   if (ends({".json", ".geojson"})) return Kind::json;
   if (ends({".landxml", ".LandXML"})) return Kind::landxml;
   if (ends({".map"})) return Kind::compiled;
+  if (ends({".railml", ".railML"})) return Kind::railml;
   if (ends({".xml", ".XML"})) {
     std::ifstream stream(file, std::ios::binary);
     std::string head(1000, '\0');
     stream.read(head.data(), static_cast<std::streamsize>(head.size()));
-    return head.find("<osm") != std::string::npos ? Kind::osm : Kind::landxml;
+    const auto holds = [&](const char* text) { return head.find(text) != std::string::npos; };
+    if (holds("<osm")) return Kind::osm;
+    if (holds("<railml") || holds("<railML")) return Kind::railml;
+    if (holds("erju.org/infra")) return Kind::erju_infra;
+    if (holds("erju.org/map")) return Kind::erju_map;
+    return Kind::landxml;
   }
   return core::Error{file.string() +
-                     " is of no kind that can be read; give LandXML (.xml, .landxml), OpenStreetMap (.osm, .pbf), "
-                     "Overpass JSON, GeoJSON or a compiled map (.map)"};
+                     " is of no kind that can be read; give LandXML, railML or ERJU maps (.xml, .landxml, .railml), "
+                     "OpenStreetMap (.osm, .pbf), Overpass JSON, GeoJSON or a compiled map (.map)"};
 }
 
 /// True to scale at its middle: a metre on the map is a metre on the ground to 1e-5 within 25 km.
@@ -68,6 +77,18 @@ class Sources {
       case Kind::json:
         take(core::value_or_throw(read_osm_json(file, options_.with_trams)));
         break;
+      case Kind::railml:
+        take(core::value_or_throw(read_railml(file)), file);
+        break;
+      case Kind::erju_infra:
+        if (erju_infra_)
+          throw core::BadInput("only one ERJU infrastructure can be read; " + file.string() + " is the second");
+        erju_infra_ = file;
+        break;
+      case Kind::erju_map:
+        if (erju_map_) throw core::BadInput("only one ERJU map can be read; " + file.string() + " is the second");
+        erju_map_ = file;
+        break;
       case Kind::compiled:
         take(core::value_or_throw(Map::load(file)), file);
         break;
@@ -75,7 +96,21 @@ class Sources {
   }
 
   BuiltMap finish() {
+    if (erju_map_ && !erju_infra_)
+      throw core::BadInput(erju_map_->string() +
+                           " holds coordinates only; give the ERJU infrastructure file (infra) too");
+    if (erju_infra_) {
+      take(core::value_or_throw(read_erju(*erju_infra_, erju_map_ ? &*erju_map_ : nullptr)), *erju_infra_);
+    }
     choose_crs();
+    for (RailNet& net : nets_) {
+      const bool is_surveyed = !net.crs.empty();
+      append(draft_of(net), map_);
+      if (is_surveyed) add_frogs(map_, kPlanFrogSigmaM);
+      std::move(net.problems.begin(), net.problems.end(), std::back_inserter(map_.problems));
+      out_.plans.include(net.figures);
+      take(std::move(net.fit));
+    }
     if (!tracks_.empty()) {
       append(cut_tracks(std::move(tracks_), map_.problems), map_);
       add_frogs(map_, kSurveyFrogSigmaM);
@@ -99,6 +134,21 @@ class Sources {
     std::move(read.tracks.begin(), read.tracks.end(), std::back_inserter(tracks_));
     std::move(read.problems.begin(), read.problems.end(), std::back_inserter(map_.problems));
     out_.landxml.include(read.figures);
+  }
+
+  void take(RailNet read, const std::filesystem::path& file) {
+    want_crs(read.crs, file);
+    nets_.push_back(std::move(read));
+  }
+
+  void take(FitReport read) {
+    FitReport& all = out_.fit;
+    std::move(read.elements.begin(), read.elements.end(), std::back_inserter(all.elements));
+    all.tracks += read.tracks;
+    all.left_as_arcs += read.left_as_arcs;
+    all.points += read.points;
+    all.squared_sum_m2 += read.squared_sum_m2;
+    all.max_m = std::max(all.max_m, read.max_m);
   }
 
   void take(OsmData read) {
@@ -154,17 +204,22 @@ class Sources {
     if (map_.crs.empty() || map_.crs == "local")
       throw core::BadInput("OpenStreetMap data need a coordinate system; give --crs");
     const Projection projection = core::value_or_throw(Projection::open(map_.crs));
-    OsmNetwork network = core::value_or_throw(build_osm_network(osm_, projection, options_.smooth_m));
+    OsmNetwork network =
+        core::value_or_throw(build_osm_network(osm_, projection, options_.smooth_m, options_.with_clothoids));
     const bool alone = map_.edges.empty();
     append(network.draft, map_);
     if (alone) add_frogs(map_, kMappingFrogSigmaM);
     std::move(network.problems.begin(), network.problems.end(), std::back_inserter(map_.problems));
     out_.osm.include(network.figures);
+    take(std::move(network.fit));
   }
 
   const BuildOptions& options_;
   Map map_;
   std::vector<ImportedTrack> tracks_;
+  std::vector<RailNet> nets_;
+  std::optional<std::filesystem::path> erju_infra_;
+  std::optional<std::filesystem::path> erju_map_;
   OsmData osm_;
   std::string source_crs_;
   bool has_plane_source_ = false;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/result.hpp"
+#include "track/import/clothoid_fit.hpp"
 #include "track/import/tracks.hpp"
 #include "track/map.hpp"
 
@@ -15,6 +16,7 @@ struct BuildOptions {
   std::string crs{};  // "" = the LandXML's own, else the UTM zone of the data; "local" = true to scale around the
                       // middle of the data
   bool with_trams = false;
+  bool with_clothoids = false;         // polylines of OpenStreetMap become straights, clothoids and arcs
   double smooth_m = 0;                 // how far points of OpenStreetMap may move to even out the curvature
   double virtual_balises_every_m = 0;  // 0 = none
   uint32_t nid_c = 1;
@@ -25,10 +27,13 @@ struct BuiltMap {
   Map map;
   FitFigures landxml;  // zero elements where there was no such source
   FitFigures osm;
+  FitFigures plans;  // railML and ERJU with coordinates
+  FitReport fit;     // of all polylines
 };
 
-/// LandXML (.xml, .landxml), OSM (.osm, .pbf, also .gz/.bz2), Overpass JSON (.json), GeoJSON (.geojson) and compiled
-/// maps (.map). The problems found are in the map.
+/// LandXML (.xml, .landxml), railML 2 and 3 (.xml, .railml), ERJU infrastructure and map (.xml, both together), OSM
+/// (.osm, .pbf, also .gz/.bz2), Overpass JSON (.json), GeoJSON (.geojson) and compiled maps (.map). The problems found
+/// are in the map.
 core::Result<BuiltMap> build_map(const std::vector<std::filesystem::path>& inputs, const BuildOptions& options);
 
 }  // namespace railfix::track

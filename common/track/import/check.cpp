@@ -15,6 +15,9 @@ constexpr double kGapM = 0.05;
 constexpr double kKinkRad = 0.05;
 constexpr double kNearMissM = 1.5;
 constexpr double kSharpestPerM = 1.0 / 80.0;
+constexpr double kSteepest = 0.075;
+constexpr double kStepM = 0.05;  // in height, from one profile point to the next
+constexpr double kSamePlaceM = 0.5;
 
 std::string metres(double value) {
   std::array<char, 32> text{};
@@ -24,6 +27,10 @@ std::string metres(double value) {
 
 std::string called(const Edge& edge) {
   return "edge " + std::to_string(edge.id) + " (" + edge.name + ")";
+}
+
+std::string identity(const BaliseGroup& group) {
+  return std::to_string(group.nid_c) + "/" + std::to_string(group.nid_bg);
 }
 
 double distance(const PlanPose& pose, const Node& node) {
@@ -47,11 +54,13 @@ class Check {
   std::vector<std::string> run() {
     for (const Edge& edge : map_.edges) {
       check_shape(edge);
+      check_grades(edge);
       check_end(edge, edge.from_node, edge.alignment.at(0).pose);
       check_end(edge, edge.to_node, edge.alignment.at(edge.alignment.length_m()).pose);
     }
     for (const Node& node : map_.nodes) check_node(node);
     check_balises();
+    check_parts();
     return std::move(problems_);
   }
 
@@ -116,12 +125,71 @@ class Check {
     }
   }
 
+  /// Grades that no adhesion railway has.
+  void check_grades(const Edge& edge) {
+    const std::vector<GradePoint>& profile = edge.alignment.profile();
+    for (size_t i = 1; i < profile.size(); ++i) {
+      const double run = profile[i].offset_m - profile[i - 1].offset_m;
+      const double rise = profile[i].elevation_m - profile[i - 1].elevation_m;
+      if (std::abs(rise) <= kSteepest * run || std::abs(rise) < kStepM) continue;
+      problems_.push_back(called(edge) + " at " + metres(std::max(0.0, profile[i - 1].offset_m)) + " climbs " +
+                          metres(rise) + " over " + metres(run));
+      return;
+    }
+  }
+
+  /// Tracks that no train can reach from the largest part of the network, told once for each part.
+  void check_parts() {
+    std::vector<size_t> part(map_.edges.size());
+    for (size_t i = 0; i < part.size(); ++i) part[i] = i;
+    const auto root = [&](size_t i) {
+      while (part[i] != i) i = part[i] = part[part[i]];
+      return i;
+    };
+    for (const Connection& way : map_.connections) {
+      if (map_.edge(way.edge_a) != nullptr && map_.edge(way.edge_b) != nullptr)
+        part[root(way.edge_a - 1)] = root(way.edge_b - 1);
+    }
+    struct Part {
+      size_t edges = 0;
+      double length_m = 0;
+      const Edge* first = nullptr;
+    };
+    std::map<size_t, Part> parts;
+    for (size_t i = 0; i < part.size(); ++i) {
+      Part& own = parts[root(i)];
+      ++own.edges;
+      own.length_m += map_.edges[i].alignment.length_m();
+      if (own.first == nullptr) own.first = &map_.edges[i];
+    }
+    if (parts.size() < 2) return;
+    const auto largest = std::max_element(
+        parts.begin(), parts.end(), [](const auto& a, const auto& b) { return a.second.length_m < b.second.length_m; });
+    for (auto own = parts.begin(); own != parts.end(); ++own) {
+      if (own == largest) continue;
+      problems_.push_back(called(*own->second.first) +
+                          (own->second.edges > 1 ? " and " + std::to_string(own->second.edges - 1) + " more" : "") +
+                          ", " + metres(own->second.length_m) + ", cannot be reached from the rest of the network");
+    }
+  }
+
   void check_balises() {
+    std::map<uint32_t, std::vector<const BaliseGroup*>> on_edge;
+    for (const BaliseGroup& group : map_.balise_groups) on_edge[group.edge].push_back(&group);
+    for (auto& [edge, groups] : on_edge) {
+      std::sort(groups.begin(), groups.end(),
+                [](const BaliseGroup* a, const BaliseGroup* b) { return a->offset_m < b->offset_m; });
+      for (size_t i = 1; i < groups.size(); ++i) {
+        if (groups[i]->offset_m - groups[i - 1]->offset_m > kSamePlaceM) continue;
+        problems_.push_back("balise groups " + identity(*groups[i - 1]) + " and " + identity(*groups[i]) +
+                            " are at the same place, edge " + std::to_string(edge) + " at " +
+                            metres(groups[i]->offset_m));
+      }
+    }
     std::set<uint32_t> seen;
     for (const BaliseGroup& group : map_.balise_groups) {
       if (seen.insert(group.nid_lrbg()).second) continue;
-      problems_.push_back("balise group " + std::to_string(group.nid_c) + "/" + std::to_string(group.nid_bg) +
-                          " is there twice");
+      problems_.push_back("balise group " + identity(group) + " is there twice");
     }
   }
 

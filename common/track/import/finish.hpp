@@ -19,7 +19,8 @@ void add_frogs(Map& map, double sigma_m);
 core::Status add_virtual_balises(Map& map, double every_m, uint32_t nid_c, uint32_t first_nid_bg, double q_locacc_m);
 
 /// What is wrong with the map, one sentence each, naming the element: gaps and kinks within edges and between connected
-/// ones, switches that lead nowhere, track ends that just miss another, balise groups given twice.
+/// ones, impossible radii and grades, switches that lead nowhere, track ends that just miss another, parts that are not
+/// connected, balise groups with one identity or at one place.
 std::vector<std::string> check_topology(const Map& map);
 
 }  // namespace railfix::track

@@ -55,8 +55,8 @@ struct ChainEnd {
 
 class Builder {
  public:
-  Builder(const OsmData& data, const Projection& projection, double smooth_m)
-      : data_(data), projection_(projection), smooth_m_(smooth_m) {}
+  Builder(const OsmData& data, const Projection& projection, double smooth_m, bool with_clothoids)
+      : data_(data), projection_(projection), smooth_m_(smooth_m), with_clothoids_(with_clothoids) {}
 
   OsmNetwork build() {
     collect_segments();
@@ -161,9 +161,21 @@ class Builder {
       const std::vector<Eigen::Vector2d>& kept = chains_[i].shape;
       const Eigen::Vector2d first = kept[1] - kept[0];
       const Eigen::Vector2d last = kept[kept.size() - 2] - kept.back();
-      ends_[chains_[i].nodes.front()].push_back({i, false, heading_of(first), first.norm()});
-      ends_[chains_[i].nodes.back()].push_back({i, true, heading_of(last), last.norm()});
+      double leaving_first = heading_of(first);
+      double leaving_last = heading_of(last);
+      if (const std::optional<ClothoidFit> fit = clothoids(chains_[i])) {
+        // The whole track tells its direction better than its last two points do.
+        leaving_first = fit->alignment.at(0).pose.heading_rad;
+        leaving_last = fit->alignment.at(fit->alignment.length_m()).pose.heading_rad + core::kPi;
+      }
+      ends_[chains_[i].nodes.front()].push_back({i, false, leaving_first, first.norm()});
+      ends_[chains_[i].nodes.back()].push_back({i, true, leaving_last, last.norm()});
     }
+  }
+
+  [[nodiscard]] std::optional<ClothoidFit> clothoids(const Chain& chain) const {
+    if (!with_clothoids_) return std::nullopt;
+    return fit_clothoids(thinned(chain.points), {chain.heading_at_start, chain.heading_at_end, 0});
   }
 
   void set_leaving(const ChainEnd& end, double leaving_rad) {
@@ -216,12 +228,20 @@ class Builder {
   }
 
   void add_edge(Chain& chain) {
-    PolylineFit fit = fit_polyline(chain.shape, chain.heading_at_start, chain.heading_at_end);
+    const std::optional<ClothoidFit> smooth = clothoids(chain);
+    PolylineFit fit;
+    if (smooth) {
+      fit.alignment = smooth->alignment;
+    } else {
+      fit = fit_polyline(chain.shape, chain.heading_at_start, chain.heading_at_end);
+      if (with_clothoids_) ++out_.fit.left_as_arcs;
+    }
     const OsmWay& way = data_.ways[chain.ways.front()];
     const size_t number = ++pieces_[way.id];
     DraftEdge edge;
     edge.track.name = "way/" + std::to_string(way.id) + (number > 1 ? "#" + std::to_string(number) : "");
     edge.track.line = line_of(chain);
+    if (smooth) out_.fit.add(edge.track.name, *smooth, chain.points.size());
     edge.track.alignment = std::move(fit.alignment);
     add_marks(chain, edge.track);
     if (fit.straightened > 0) {
@@ -298,6 +318,7 @@ class Builder {
   const OsmData& data_;
   const Projection& projection_;
   double smooth_m_;
+  bool with_clothoids_;
   std::vector<Segment> segments_;
   std::unordered_map<int64_t, std::vector<size_t>> at_node_;
   std::unordered_map<int64_t, Eigen::Vector2d> places_;
@@ -310,8 +331,9 @@ class Builder {
 
 }  // namespace
 
-core::Result<OsmNetwork> build_osm_network(const OsmData& data, const Projection& projection, double smooth_m) {
-  OsmNetwork network = Builder(data, projection, smooth_m).build();
+core::Result<OsmNetwork> build_osm_network(const OsmData& data, const Projection& projection, double smooth_m,
+                                           bool with_clothoids) {
+  OsmNetwork network = Builder(data, projection, smooth_m, with_clothoids).build();
   if (network.draft.edges.empty()) {
     return core::Error{
         "the data hold no railway tracks (railway=rail, light_rail, narrow_gauge or subway; --trams adds trams)"};

@@ -32,6 +32,8 @@ class ImportTest : public testing::Test {
     std::ifstream in(file, std::ios::binary);
     return {std::istreambuf_iterator<char>(in), {}};
   }
+
+ public:
   static std::filesystem::path shared_data(const std::string& name) {
     const char* told = std::getenv("RAILFIX_DATA");
     const std::filesystem::path root = told != nullptr

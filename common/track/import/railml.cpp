@@ -1,0 +1,51 @@
+#include "track/import/railml.hpp"
+
+#include <cmath>
+
+#include "track/import/railml_readers.hpp"
+
+namespace railfix::track {
+
+std::string railml_name(const pugi::xml_node& node) {
+  for (const char* attribute : {"name", "code"}) {
+    const std::string text = node.attribute(attribute).value();
+    if (!text.empty()) return text;
+  }
+  const std::string named = node.child("name").attribute("name").value();
+  return named.empty() ? std::string(node.attribute("id").value()) : named;
+}
+
+std::optional<EtcsIdentity> etcs_identity(const XmlSource& source, const pugi::xml_node& group) {
+  std::vector<pugi::xml_node> places{group};
+  for (const pugi::xml_node& child : group.children()) places.push_back(child);
+  for (const pugi::xml_node& place : places) {
+    for (const auto& [country, number] :
+         {std::pair("countryID", "groupID"), std::pair("nid_c", "nid_bg"), std::pair("nidC", "nidBG")}) {
+      const auto c = XmlSource::number(place, country);
+      const auto bg = XmlSource::number(place, number);
+      if (!c || !bg) continue;
+      if (!(*c >= 0 && *c <= 1023 && *bg >= 0 && *bg <= 16382)) {
+        throw source.wrong(place, "balise group \"" + railml_name(group) +
+                                      "\" has an identity that ETCS cannot carry (NID_C 0-1023, NID_BG 0-16382)");
+      }
+      return EtcsIdentity{static_cast<uint32_t>(*c), static_cast<uint32_t>(*bg)};
+    }
+  }
+  return std::nullopt;
+}
+
+core::Result<RailNet> read_railml(const std::filesystem::path& file) {
+  try {
+    const XmlSource source(file);
+    const std::string name = source.root().name();
+    const std::string version = source.root().attribute("version").value();
+    if (name == "railml" && version.starts_with("2.")) return read_railml2(source);
+    if (name == "railML" && version.starts_with("3.")) return read_railml3(source);
+    return core::Error{source.file_name() + " is <" + name + "> version \"" + version +
+                       "\"; railML 2.x and 3.x can be read"};
+  } catch (const core::BadInput& bad) {
+    return core::Error{bad.what()};
+  }
+}
+
+}  // namespace railfix::track

@@ -1,0 +1,287 @@
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "track/import/railml_readers.hpp"
+
+namespace railfix::track {
+namespace {
+
+/// A place or stretch on a net element, along it.
+struct Place {
+  size_t track = 0;
+  double from_m = 0;
+  double to_m = 0;
+  bool same_direction = true;
+};
+
+class Reader {
+ public:
+  explicit Reader(const XmlSource& source) : source_(source) {}
+
+  RailNet read() {
+    read_systems();
+    read_elements();
+    read_relations();
+    read_switches();
+    read_plan();
+    read_marks();
+    read_balises();
+    return std::move(net_);
+  }
+
+ private:
+  /// Which coordinate system every positioning system means.
+  void read_systems() {
+    for (const pugi::xml_node& system : descendants(source_.root(), "geometricPositioningSystem"))
+      crs_of_[system.attribute("id").value()] = system.attribute("crsDefinition").value();
+  }
+
+  void read_elements() {
+    for (const pugi::xml_node& element : descendants(source_.root(), "netElement")) {
+      const auto length = XmlSource::number(element, "length");
+      // Elements made of others are the same tracks once more, coarser.
+      if (element.child("elementCollectionUnordered") || element.child("elementCollectionOrdered") || !length) {
+        coarse_.insert(element.attribute("id").value());
+        continue;
+      }
+      const std::string id = source_.required_text(element, "id");
+      if (!(*length > 0 && *length < 1e6))
+        throw source_.wrong(element, "net element \"" + id + "\" must be between 0 and 1000 km long");
+      if (!index_.emplace(id, net_.tracks.size()).second)
+        throw source_.wrong(element, "net element \"" + id + "\" is there twice");
+      NetTrack& track = net_.tracks.emplace_back();
+      track.track.name = id;
+      track.length_m = *length;
+      read_shape(element, track);
+    }
+    if (net_.tracks.empty()) throw core::BadInput(source_.file_name() + " holds no <netElement> with a length");
+    for (const pugi::xml_node& node : descendants(source_.root(), "track")) {
+      for (const Place& place : places_of(node)) {
+        ImportedTrack& track = net_.tracks[place.track].track;
+        if (!track.line.empty()) continue;
+        track.line = node.attribute("id").value();
+        track.name += " " + railml_name(node);
+      }
+    }
+  }
+
+  void read_shape(const pugi::xml_node& element, NetTrack& track) {
+    std::vector<std::pair<double, Eigen::Vector2d>> points;
+    for (const pugi::xml_node& place : descendants(element, "intrinsicCoordinate")) {
+      for (const pugi::xml_node& at : place.children("geometricCoordinate")) {
+        const std::string crs = crs_of_[at.attribute("positioningSystemRef").value()];
+        if (crs.empty()) continue;
+        if (!net_.crs.empty() && crs != net_.crs) {
+          throw source_.wrong(at, "coordinates in both " + net_.crs + " and " + crs + "; only one system can be read");
+        }
+        net_.crs = crs;
+        points.emplace_back(source_.required(place, "intrinsicCoord"),
+                            Eigen::Vector2d(source_.required(at, "x"), source_.required(at, "y")));
+      }
+    }
+    std::stable_sort(points.begin(), points.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    for (const auto& [along, at] : points) {
+      if (track.shape.empty() || (track.shape.back() - at).norm() > 0.05) track.shape.push_back(at);
+    }
+  }
+
+  [[nodiscard]] size_t track_of(const pugi::xml_node& node, const std::string& id) const {
+    const auto found = index_.find(id);
+    if (found == index_.end())
+      throw source_.wrong(
+          node, "<" + std::string(node.name()) + "> names the net element \"" + id + "\", which does not exist");
+    return found->second;
+  }
+
+  /// Where an element lies; what lies on coarser net elements only is left out.
+  [[nodiscard]] std::vector<Place> places_of(const pugi::xml_node& node) const {
+    std::vector<Place> out;
+    for (const pugi::xml_node& part : descendants(node, "associatedNetElement")) {
+      const auto found = index_.find(part.attribute("netElementRef").value());
+      if (found == index_.end()) continue;
+      const double length = net_.tracks[found->second].length_m;
+      const double from = XmlSource::number(part, "posBegin").value_or(0);
+      const double to = XmlSource::number(part, "posEnd").value_or(length);
+      const auto within = [&](double value) { return std::clamp(value, 0.0, length); };
+      out.push_back({found->second, within(std::min(from, to)), within(std::max(from, to)), from <= to});
+    }
+    if (!out.empty()) return out;
+    for (const pugi::xml_node& spot : descendants(node, "spotLocation")) {
+      const auto found = index_.find(spot.attribute("netElementRef").value());
+      if (found == index_.end()) continue;
+      const double length = net_.tracks[found->second].length_m;
+      const auto along = XmlSource::number(spot, "intrinsicCoord");
+      const double at = std::clamp(XmlSource::number(spot, "pos").value_or(along.value_or(0) * length), 0.0, length);
+      out.push_back({found->second, at, at, std::string(spot.attribute("applicationDirection").value()) != "reverse"});
+    }
+    return out;
+  }
+
+  void read_relations() {
+    for (const pugi::xml_node& relation : descendants(source_.root(), "netRelation")) {
+      const std::string a = relation.child("elementA").attribute("ref").value();
+      const std::string b = relation.child("elementB").attribute("ref").value();
+      for (const std::string& end : {a, b}) {
+        if (!index_.contains(end) && !coarse_.contains(end)) {
+          throw source_.wrong(relation, "net relation \"" + std::string(relation.attribute("id").value()) +
+                                            "\" names the net element \"" + end + "\", which does not exist");
+        }
+      }
+      if (!index_.contains(a) || !index_.contains(b)) continue;  // between coarser elements
+      NetLink link;
+      link.a = {track_of(relation, a), source_.required(relation, "positionOnA") > 0.5};
+      link.b = {track_of(relation, b), source_.required(relation, "positionOnB") > 0.5};
+      link.passable = std::string(relation.attribute("navigability").value()) != "None";
+      link_of_[relation.attribute("id").value()] = net_.links.size();
+      net_.links.push_back(link);
+    }
+  }
+
+  void read_switches() {
+    for (const pugi::xml_node& points : descendants(source_.root(), "switchIS")) {
+      const std::string branch_course = points.attribute("branchCourse").value();
+      const bool has_turning = points.child("turningBranch");
+      for (const pugi::xml_node& branch : points.children()) {
+        const auto link = link_of_.find(branch.attribute("netRelationRef").value());
+        if (link == link_of_.end()) continue;
+        NetLink& way = net_.links[link->second];
+        way.switch_name = railml_name(points);
+        const std::string kind = branch.name();
+        if (has_turning) {
+          way.diverging = way.diverging || kind == "turningBranch";
+          if (way.side == 0) way.side = 1;
+        } else if (!branch_course.empty()) {
+          way.diverging = kind == branch_course + "Branch";
+          way.side = kind == "leftBranch" ? 1 : -1;
+        }
+      }
+    }
+  }
+
+  void read_plan() {
+    for (const pugi::xml_node& curve : descendants(source_.root(), "horizontalCurve")) {
+      const std::string type = curve.attribute("curveType").value();
+      const auto radius = XmlSource::number(curve, "radius");
+      if (!radius || *radius == 0 || type == "straight") continue;
+      if (std::abs(*radius) < 10) throw source_.wrong(curve, "a radius of less than 10 m is no railway's");
+      if (type != "arc") {
+        net_.problems.push_back("horizontal curve \"" + std::string(curve.attribute("id").value()) + "\" of type " +
+                                type + " is taken as an arc");
+      }
+      for (const Place& place : places_of(curve)) {
+        const double curvature = (place.same_direction ? -1.0 : 1.0) / *radius;
+        if (place.to_m > place.from_m)
+          net_.tracks[place.track].bends.push_back({place.from_m, place.to_m, curvature, curvature});
+      }
+    }
+    for (const pugi::xml_node& curve : descendants(source_.root(), "gradientCurve")) {
+      const auto gradient = XmlSource::number(curve, "gradient");
+      if (!gradient) continue;
+      for (const Place& place : places_of(curve)) {
+        const double grade = (place.same_direction ? 1e-3 : -1e-3) * *gradient;
+        net_.tracks[place.track].slopes.push_back({place.from_m, grade});
+      }
+    }
+    for (NetTrack& track : net_.tracks) {
+      std::stable_sort(track.slopes.begin(), track.slopes.end(),
+                       [](const NetSlope& a, const NetSlope& b) { return a.offset_m < b.offset_m; });
+      std::sort(track.bends.begin(), track.bends.end(),
+                [](const NetBend& a, const NetBend& b) { return a.from_m < b.from_m; });
+    }
+  }
+
+  void add(LandmarkKind kind, const Place& place, double offset_m, double lateral_m, const pugi::xml_node& of) {
+    const std::string name = (kind == LandmarkKind::unknown ? "level crossing " : "") + railml_name(of);
+    net_.tracks[place.track].track.marks.push_back(
+        {kind, offset_m, place.same_direction ? lateral_m : -lateral_m, kRailmlSigmaM, name});
+  }
+
+  void read_marks() {
+    for (const pugi::xml_node& of : descendants(source_.root(), "overCrossing")) {
+      const bool is_tunnel = std::string(of.attribute("constructionType").value()) == "tunnel";
+      for (const Place& place : places_of(of)) {
+        if (is_tunnel) {
+          add(LandmarkKind::portal_in, place, place.from_m, 0, of);
+          add(LandmarkKind::portal_out, place, place.to_m, 0, of);
+        } else {
+          add(LandmarkKind::bridge, place, 0.5 * (place.from_m + place.to_m), 0, of);
+        }
+      }
+    }
+    for (const pugi::xml_node& of : descendants(source_.root(), "underCrossing")) {
+      for (const Place& place : places_of(of))
+        add(LandmarkKind::bridge, place, 0.5 * (place.from_m + place.to_m), 0, of);
+    }
+    for (const pugi::xml_node& of : descendants(source_.root(), "levelCrossingIS")) {
+      for (const Place& place : places_of(of))
+        add(LandmarkKind::unknown, place, 0.5 * (place.from_m + place.to_m), 0, of);
+    }
+    for (const pugi::xml_node& of : descendants(source_.root(), "platformEdge")) {
+      const bool is_left = !of.find_node([](const pugi::xml_node& node) {
+                                return std::string(node.attribute("lateralSide").value()) == "left";
+                              }).empty();
+      for (const Place& place : places_of(of)) {
+        add(LandmarkKind::platform, place, place.from_m, is_left ? 1.7 : -1.7, of);
+        add(LandmarkKind::platform, place, place.to_m, is_left ? 1.7 : -1.7, of);
+      }
+    }
+    for (const pugi::xml_node& of : descendants(source_.root(), "signalIS")) {
+      for (const Place& place : places_of(of)) add(LandmarkKind::mast, place, place.from_m, 0, of);
+    }
+  }
+
+  void read_balises() {
+    std::map<std::string, std::vector<std::pair<Place, pugi::xml_node>>> of_group;
+    for (const pugi::xml_node& balise : descendants(source_.root(), "balise")) {
+      const std::vector<Place> places = places_of(balise);
+      if (places.empty()) continue;
+      std::string group = balise.attribute("baliseGroupRef").value();
+      if (group.empty()) group = balise.attribute("belongsToBaliseGroup").value();
+      if (group.empty()) group = balise.child("belongsToBaliseGroup").attribute("ref").value();
+      if (group.empty()) {
+        add(LandmarkKind::balise, places.front(), places.front().from_m, 0, balise);
+      } else {
+        of_group[group].emplace_back(places.front(), balise);
+      }
+    }
+    for (const pugi::xml_node& node : descendants(source_.root(), "baliseGroup")) {
+      const auto identity = etcs_identity(source_, node);
+      std::vector<std::pair<Place, pugi::xml_node>>& balises = of_group[node.attribute("id").value()];
+      const std::vector<Place> own = places_of(node);
+      if (balises.empty() && !own.empty()) balises.emplace_back(own.front(), node);
+      if (balises.empty()) continue;
+      if (!identity) {
+        net_.problems.push_back("balise group \"" + railml_name(node) +
+                                "\" has no ETCS identity (countryID and groupID); its balises are kept as landmarks");
+        for (const auto& [place, balise] : balises) add(LandmarkKind::balise, place, place.from_m, 0, balise);
+        continue;
+      }
+      TrackGroup group;
+      group.nid_c = identity->nid_c;
+      group.nid_bg = identity->nid_bg;
+      group.offset_m = balises.front().first.from_m;
+      group.nominal_is_forward = balises.front().first.same_direction;
+      group.q_locacc_m = kRailmlSigmaM;
+      for (const auto& [place, balise] : balises)
+        group.balises.push_back({LandmarkKind::balise, place.from_m, 0, kRailmlSigmaM, railml_name(balise)});
+      net_.tracks[balises.front().first.track].track.groups.push_back(std::move(group));
+    }
+  }
+
+  const XmlSource& source_;
+  RailNet net_;
+  std::map<std::string, size_t> index_;
+  std::set<std::string> coarse_;
+  std::map<std::string, size_t> link_of_;
+  std::map<std::string, std::string> crs_of_;
+};
+
+}  // namespace
+
+RailNet read_railml3(const XmlSource& source) {
+  return Reader(source).read();
+}
+
+}  // namespace railfix::track

@@ -1,0 +1,81 @@
+#include "track/import/xml_source.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+
+namespace railfix::track {
+
+XmlSource::XmlSource(const std::filesystem::path& file) : file_name_(file.string()) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream || std::filesystem::is_directory(file))
+    throw core::BadInput("cannot read " + file_name_ + "; is the path right?");
+  text_.assign(std::istreambuf_iterator<char>(stream), {});
+  const pugi::xml_parse_result parsed = document_.load_buffer(text_.data(), text_.size());
+  if (!parsed) {
+    throw core::BadInput(file_name_ + " line " + line_of(parsed.offset) + ": this is not sound XML (" +
+                         parsed.description() + ")");
+  }
+}
+
+std::string XmlSource::line_of(ptrdiff_t offset) const {
+  const size_t length = std::min(static_cast<size_t>(std::max<ptrdiff_t>(offset, 0)), text_.size());
+  return std::to_string(1 + std::count(text_.begin(), text_.begin() + static_cast<ptrdiff_t>(length), '\n'));
+}
+
+core::BadInput XmlSource::wrong(const pugi::xml_node& node, const std::string& what) const {
+  return core::BadInput(file_name_ + " line " + line_of(node.offset_debug()) + ": " + what);
+}
+
+std::optional<double> XmlSource::number(const pugi::xml_node& node, const char* attribute) {
+  const std::vector<double> numbers = numbers_of(node.attribute(attribute).value());
+  return numbers.size() == 1 ? std::optional(numbers.front()) : std::nullopt;
+}
+
+double XmlSource::required(const pugi::xml_node& node, const char* attribute) const {
+  const std::optional<double> value = number(node, attribute);
+  if (!value)
+    throw wrong(node, "<" + std::string(node.name()) + "> needs a number in the attribute \"" + attribute + "\"");
+  return *value;
+}
+
+std::string XmlSource::required_text(const pugi::xml_node& node, const char* attribute) const {
+  std::string text = node.attribute(attribute).value();
+  if (text.empty()) throw wrong(node, "<" + std::string(node.name()) + "> needs the attribute \"" + attribute + "\"");
+  return text;
+}
+
+std::vector<double> numbers_of(std::string_view text) {
+  std::vector<double> numbers;
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  while (true) {
+    while (at != end && std::string_view(" ,\t\r\n").find(*at) != std::string_view::npos) ++at;
+    if (at == end) return numbers;
+    double value = 0;
+    const auto [next, error] = std::from_chars(at, end, value);
+    if (error != std::errc() || !std::isfinite(value)) return {};
+    numbers.push_back(value);
+    at = next;
+  }
+}
+
+std::vector<pugi::xml_node> descendants(const pugi::xml_node& node, const char* name) {
+  struct Collector : pugi::xml_tree_walker {
+    const char* wanted = nullptr;
+    std::vector<pugi::xml_node> found;
+    bool for_each(pugi::xml_node& at) override {
+      if (std::strcmp(at.name(), wanted) == 0) found.push_back(at);
+      return true;
+    }
+  } collector;
+  collector.wanted = name;
+  pugi::xml_node root = node;
+  root.traverse(collector);
+  return std::move(collector.found);
+}
+
+}  // namespace railfix::track

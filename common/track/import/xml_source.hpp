@@ -1,0 +1,42 @@
+// An XML file with a human way to say what is wrong in it.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <pugixml.hpp>
+#include <string>
+#include <vector>
+
+#include "core/result.hpp"
+
+namespace railfix::track {
+
+class XmlSource {
+ public:
+  /// Throws core::BadInput with file and line where the file cannot be read or is not sound XML.
+  explicit XmlSource(const std::filesystem::path& file);
+
+  /// First element, without its namespace.
+  [[nodiscard]] pugi::xml_node root() const { return document_.document_element(); }
+  [[nodiscard]] const std::string& file_name() const { return file_name_; }
+  [[nodiscard]] core::BadInput wrong(const pugi::xml_node& node, const std::string& what) const;
+  /// A finite number in an attribute; `required` throws without one.
+  [[nodiscard]] static std::optional<double> number(const pugi::xml_node& node, const char* attribute);
+  [[nodiscard]] double required(const pugi::xml_node& node, const char* attribute) const;
+  /// Text of an attribute that must be there.
+  [[nodiscard]] std::string required_text(const pugi::xml_node& node, const char* attribute) const;
+
+ private:
+  [[nodiscard]] std::string line_of(ptrdiff_t offset) const;
+  std::string file_name_;
+  std::string text_;
+  pugi::xml_document document_;
+};
+
+/// Finite numbers separated by white space or commas; empty when there is anything else.
+std::vector<double> numbers_of(std::string_view text);
+
+/// Every descendant of that name, in document order.
+std::vector<pugi::xml_node> descendants(const pugi::xml_node& node, const char* name);
+
+}  // namespace railfix::track

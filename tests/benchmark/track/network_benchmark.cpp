@@ -1,0 +1,50 @@
+// A national network of 20,000 km: reading it, finding the tracks near a place.
+#include <benchmark/benchmark.h>
+#include <unistd.h>
+
+#include <filesystem>
+
+#include "core/random.hpp"
+#include "track/import/made_network.hpp"
+#include "track/track_finder.hpp"
+
+namespace {
+
+using namespace railfix;  // NOLINT(google-build-using-namespace)
+
+const std::shared_ptr<const track::Map>& network() {
+  static const auto made = std::make_shared<const track::Map>(track::made_network({.track_km = 20000, .seed = 1}));
+  return made;
+}
+
+void load_20000_km(benchmark::State& state) {
+  const auto file = std::filesystem::temp_directory_path() / ("railfix_bench_" + std::to_string(::getpid()) + ".map");
+  core::ok_or_throw(network()->save(file));
+  for (auto _ : state) benchmark::DoNotOptimize(track::Map::load(file).ok());
+  state.counters["file_MB"] = static_cast<double>(std::filesystem::file_size(file)) / 1e6;
+  std::filesystem::remove(file);
+}
+BENCHMARK(load_20000_km)->Unit(benchmark::kMillisecond);
+
+void make_track_finder(benchmark::State& state) {
+  for (auto _ : state) benchmark::DoNotOptimize(track::TrackFinder(network()));
+}
+BENCHMARK(make_track_finder)->Unit(benchmark::kMillisecond);
+
+void tracks_near(benchmark::State& state) {
+  const track::TrackFinder finder(network());
+  core::Random random(1);
+  const auto radius_m = static_cast<double>(state.range(0));
+  size_t found = 0;
+  for (auto _ : state) {
+    const track::Edge& edge = network()->edges[random.next() % network()->edges.size()];
+    const track::PlanPose& place = edge.alignment.starts().front();
+    const auto near = finder.near(place.easting_m + random.uniform(-20, 20), place.northing_m + 5, radius_m);
+    found += near.size();
+    benchmark::DoNotOptimize(near.data());
+  }
+  state.counters["found"] = benchmark::Counter(static_cast<double>(found), benchmark::Counter::kAvgIterations);
+}
+BENCHMARK(tracks_near)->Arg(30)->Arg(500);
+
+}  // namespace

@@ -1,0 +1,62 @@
+#include "map/coverage.hpp"
+
+#include <gtest/gtest.h>
+
+#include "unit/track/small_map.hpp"
+
+namespace railfix::tool {
+namespace {
+
+using track::Direction;
+
+/// The small map's main line: 1800 m, one group at 900 m with Q_LOCACC 5 m.
+track::Path main_line(Direction direction = Direction::forward) {
+  const auto map = std::make_shared<const track::Map>(track::small_map());
+  const bool forward = direction == Direction::forward;
+  return core::value_or_throw(track::Path::follow(map, {forward ? 1U : 2U, forward ? 0.0 : 800.0, direction}, 5000, 0));
+}
+
+TEST(Coverage, SaysWhereTheIntervalOutgrowsTheLimit) {
+  // 1 % of the way on top of 5 m: 10 m after 500 m.
+  const CoverageOptions options{.scale_sigma = 0.0025, .sigmas = 4, .limit_m = 10, .virtual_locacc_m = 5};
+  const Coverage found = coverage_of(main_line(), options);
+  EXPECT_EQ(found.references, 1U);
+  ASSERT_EQ(found.gaps.size(), 2U);
+  EXPECT_NEAR(found.gaps[0].from_m, 500, 1e-9);
+  EXPECT_NEAR(found.gaps[0].to_m, 900, 1e-9);
+  EXPECT_NEAR(found.gaps[0].largest_m, 14, 1e-9);
+  EXPECT_FALSE(found.gaps[0].outside_budget);
+  ASSERT_EQ(found.gaps[0].references_m.size(), 1U);
+  EXPECT_NEAR(found.gaps[0].references_m[0], 500, 1e-9);
+  EXPECT_NEAR(found.gaps[1].from_m, 1400, 1e-6);
+  EXPECT_NEAR(found.covered_m, 1000, 1e-6);
+}
+
+TEST(Coverage, IsOtherTheOtherWay) {
+  const CoverageOptions options{.scale_sigma = 0.0025, .sigmas = 4, .limit_m = 10, .virtual_locacc_m = 5};
+  const Coverage found = coverage_of(main_line(Direction::reverse), options);
+  ASSERT_EQ(found.gaps.size(), 2U);
+  EXPECT_NEAR(found.gaps[0].to_m, 900, 1e-6);  // 800 + 100 back to the group
+}
+
+TEST(Coverage, GoodOdometryNeedsNoMore) {
+  EXPECT_TRUE(coverage_of(main_line(), {.scale_sigma = 0.0005, .sigmas = 4.5, .limit_m = 10}).gaps.empty());
+}
+
+TEST(Coverage, TellsWhatIsBeyondTheBudgetAndWhatNothingHelps) {
+  const Coverage found =
+      coverage_of(main_line(), {.scale_sigma = 0.02, .sigmas = 4, .limit_m = 4, .virtual_locacc_m = 5});
+  ASSERT_FALSE(found.gaps.empty());
+  EXPECT_TRUE(found.gaps[0].outside_budget);
+  EXPECT_TRUE(found.gaps[0].references_m.empty());
+}
+
+TEST(Coverage, NaturalReferencesCountWhereAskedFor) {
+  CoverageOptions options{.scale_sigma = 0.0025, .sigmas = 4, .limit_m = 10, .virtual_locacc_m = 5, .natural = true};
+  const Coverage found = coverage_of(main_line(), options);
+  EXPECT_EQ(found.references, 2U);  // the mast at 300 m
+  EXPECT_NEAR(found.gaps[0].from_m, 900 + (10 - 5) / 0.01, 1e-6);
+}
+
+}  // namespace
+}  // namespace railfix::tool

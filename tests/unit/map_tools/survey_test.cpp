@@ -1,0 +1,125 @@
+#include "map/survey.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <fstream>
+
+#include "core/random.hpp"
+#include "unit/track/small_map.hpp"
+
+namespace railfix::tool {
+namespace {
+
+using testing::HasSubstr;
+using track::LandmarkKind;
+
+/// Runs over edge 1 that see the known balise at 900 m and masts which the map does not have.
+struct Passes {
+  track::Map map = track::small_map();
+  std::vector<double> masts{150, 420, 505, 760};
+  std::vector<SurveySighting> sightings;
+
+  Passes(size_t runs, double run_sigma_m, uint64_t seed) {
+    map.landmarks.pop_back();  // the mast of the small map
+    map.landmarks[0].sigma_m = 0.05;
+    core::Random random(seed);
+    for (size_t run = 0; run < runs; ++run) {
+      const double shared = random.normal(0, run_sigma_m);
+      const auto see = [&](LandmarkKind kind, double at, double lateral) {
+        sightings.push_back({run, at, kind, 1, at + shared + random.normal(0, 0.1), lateral, 0.1, run_sigma_m});
+      };
+      for (const double at : masts) see(LandmarkKind::mast, at, -3);
+      see(LandmarkKind::balise, 900, 0);
+    }
+  }
+};
+
+TEST(Survey, FindsWhatSeveralRunsSawWithHonestSigmas) {
+  double squares = 0;
+  double count = 0;
+  for (uint64_t seed = 1; seed <= 30; ++seed) {
+    const Passes passes(5, 0.5, seed);
+    const Survey survey = survey_landmarks(passes.map, passes.sightings, {.stretch_m = 2000});
+    ASSERT_EQ(survey.landmarks.size(), 5U);
+    for (const SurveyedLandmark& found : survey.landmarks) {
+      if (found.known_id != 0) continue;
+      double error = 1e9;
+      for (const double at : passes.masts) {
+        if (std::abs(found.landmark.offset_m - at) < std::abs(error)) error = found.landmark.offset_m - at;
+      }
+      EXPECT_EQ(found.runs, 5U);
+      EXPECT_NEAR(found.landmark.lateral_m, -3, 1e-9);
+      // The shared error of each run goes to the balise that is known to 5 cm, not into the masts.
+      EXPECT_LT(found.landmark.sigma_m, 0.15);
+      squares += std::pow(error / found.landmark.sigma_m, 2);
+      ++count;
+    }
+  }
+  EXPECT_NEAR(std::sqrt(squares / count), 1.0, 0.25);
+}
+
+TEST(Survey, AnOutlierAndAThingSeenOnceDoNotCount) {
+  Passes passes(6, 0.2, 4);
+  passes.sightings[1].offset_m += 2.5;  // the mast at 420 in the first run
+  passes.sightings.push_back({3, 600, LandmarkKind::bridge, 1, 600, 0, 0.1, 0.2});
+  const Survey survey = survey_landmarks(passes.map, passes.sightings, {.stretch_m = 2000});
+  EXPECT_EQ(survey.left_alone, 1U);
+  EXPECT_GE(survey.outliers, 1U);
+  double nearest = 1e9;
+  for (const SurveyedLandmark& found : survey.landmarks)
+    nearest = std::min(nearest, std::abs(found.landmark.offset_m - 420));
+  EXPECT_LT(nearest, 0.3);
+}
+
+TEST(Survey, TheMapGetsTheNewLandmarks) {
+  Passes passes(4, 0.3, 2);
+  const Survey survey = survey_landmarks(passes.map, passes.sightings, {});
+  track::Map map = passes.map;
+  apply_survey(survey, map);
+  ASSERT_EQ(map.landmarks.size(), passes.map.landmarks.size() + 4);
+  for (size_t i = 0; i < map.landmarks.size(); ++i) EXPECT_EQ(map.landmarks[i].id, i + 1);
+  EXPECT_EQ(map.landmarks.back().kind, LandmarkKind::mast);
+  EXPECT_THAT(survey_landmarks(passes.map, {}, {}).landmarks, testing::IsEmpty());
+}
+
+class RunTables : public testing::Test {
+ protected:
+  RunTables() { std::filesystem::create_directories(folder_); }
+  ~RunTables() override { std::filesystem::remove_all(folder_); }
+  void write(const std::string& name, const std::string& text) const { std::ofstream(folder_ / name) << text; }
+  const std::filesystem::path folder_ =
+      std::filesystem::temp_directory_path() / ("railfix_survey_" + std::to_string(::getpid()));
+  const std::shared_ptr<const track::Map> map_ = std::make_shared<const track::Map>(track::small_map());
+};
+
+TEST_F(RunTables, SightingsArePutOnTheMap) {
+  write("train_state.csv",
+        "stamp_ns,edge,offset_m,direction,track_known,distance_m,sigma_m\n"
+        "1000000000,1,980,+,1,980,0.4\n2000000000,2,0,+,1,1000,0.5\n");
+  write("sightings.csv",
+        "stamp_ns,kind,distance_ahead_m,lateral_m,sigma_m,confidence\n"
+        "1500000000,mast,5,-3,0.1,0.9\n1500000000,mast,30,3,0.2,0.9\n9000000000,mast,5,3,0.2,0.9\n");
+  const auto read = core::value_or_throw(read_sightings(map_, folder_, 7));
+  ASSERT_EQ(read.size(), 2U);  // the third is after the last state
+  EXPECT_EQ(read[0].edge, 1U);
+  EXPECT_NEAR(read[0].offset_m, 995, 1e-6);
+  EXPECT_EQ(read[0].run, 7U);
+  EXPECT_EQ(read[1].edge, 2U);  // beyond the switch
+  EXPECT_NEAR(read[1].offset_m, 20, 1e-6);
+  EXPECT_NEAR(read[1].run_sigma_m, 0.4, 1e-9);
+}
+
+TEST_F(RunTables, BadTablesAreOneSentence) {
+  EXPECT_FALSE(read_sightings(map_, folder_, 0).ok());
+  write("train_state.csv", "stamp_ns,edge,offset_m,direction,track_known,distance_m,sigma_m\n1,77,0,+,1,0,1\n");
+  write("sightings.csv", "stamp_ns,kind,distance_ahead_m,lateral_m,sigma_m,confidence\n");
+  EXPECT_THAT(read_sightings(map_, folder_, 0).error().message, HasSubstr("edge 77 is not on the map"));
+  write("train_state.csv", "stamp_ns,edge\n");
+  EXPECT_THAT(read_sightings(map_, folder_, 0).error().message, HasSubstr("no column"));
+}
+
+}  // namespace
+}  // namespace railfix::tool

@@ -1,0 +1,248 @@
+// railML 2.4, railML 3.2 and the ERJU digital map.
+#include <algorithm>
+#include <cmath>
+
+#include "core/random.hpp"
+#include "import_fixture.hpp"
+#include "track/import/build.hpp"
+#include "track/import/erju.hpp"
+#include "track/import/railml.hpp"
+#include "track/path.hpp"
+
+namespace railfix::track {
+namespace {
+
+using testing::Contains;
+using testing::HasSubstr;
+
+double length_of(const Map& map) {
+  double sum = 0;
+  for (const Edge& edge : map.edges) sum += edge.alignment.length_m();
+  return sum;
+}
+
+const Node* node_named(const Map& map, const std::string& name) {
+  const auto found = std::find_if(map.nodes.begin(), map.nodes.end(), [&](const Node& n) { return n.name == name; });
+  return found == map.nodes.end() ? nullptr : &*found;
+}
+
+size_t ways_at(const Map& map, uint32_t node) {
+  return static_cast<size_t>(std::count_if(map.connections.begin(), map.connections.end(),
+                                           [&](const Connection& way) { return way.node == node; }));
+}
+
+// A line of 1000 m with a right curve; a siding leaves it to the left at 300 m and comes back at 700 m.
+constexpr const char* kRailml2 = R"(<?xml version="1.0"?>
+<railml xmlns="https://www.railml.org/schemas/2018" version="2.4"><infrastructure id="i"><tracks>
+<track id="t1" name="main"><trackTopology><trackBegin id="b1" pos="0"><openEnd id="o1"/></trackBegin>
+<trackEnd id="e1" pos="1000"><bufferStop id="o2"/></trackEnd><connections>
+<switch id="w1" name="W1" pos="300" trackContinueCourse="straight"><connection id="c1" ref="c3" orientation="outgoing" course="left"/></switch>
+<switch id="w2" name="W2" pos="700" trackContinueCourse="straight"><connection id="c2" ref="c4" orientation="incoming" course="right"/></switch>
+</connections></trackTopology><trackElements><radiusChanges><radiusChange id="r1" pos="800" radius="500" superelevation="60"/>
+<radiusChange id="r2" pos="950" radius="0"/></radiusChanges><gradientChanges><gradientChange id="g1" pos="0" slope="5"/>
+<gradientChange id="g2" pos="400" slope="-10"/></gradientChanges>
+<bridges><bridge id="br1" name="B" pos="40" length="20"/></bridges>
+<levelCrossings><levelCrossing id="lc1" name="Mill Lane" pos="100"/></levelCrossings></trackElements>
+<ocsElements><balises><balise id="x1" pos="200"/><balise id="x2" pos="203"/>
+<baliseGroup id="bg1" name="BG" countryID="97" groupID="1234"><baliseRef ref="x1" sequence="1"/><baliseRef ref="x2" sequence="2"/></baliseGroup>
+</balises></ocsElements></track>
+<track id="t2" name="siding"><trackTopology><trackBegin id="b2" pos="0"><connection id="c3" ref="c1"/></trackBegin>
+<trackEnd id="e2" pos="400"><connection id="c4" ref="c2"/></trackEnd></trackTopology></track>
+</tracks></infrastructure></railml>)";
+
+constexpr const char* kRailml3 = R"(<?xml version="1.0"?>
+<railML xmlns="https://www.railml.org/schemas/3.2" version="3.2"><common><positioning><geometricPositioningSystems>
+<geometricPositioningSystem id="gps" crsDefinition="EPSG:25832"/></geometricPositioningSystems></positioning></common>
+<infrastructure><topology><netElements>
+<netElement id="n1" length="300"><associatedPositioningSystem><intrinsicCoordinate intrinsicCoord="0"><geometricCoordinate positioningSystemRef="gps" x="500000" y="5500000"/></intrinsicCoordinate>
+<intrinsicCoordinate intrinsicCoord="1"><geometricCoordinate positioningSystemRef="gps" x="500300" y="5500000"/></intrinsicCoordinate></associatedPositioningSystem></netElement>
+<netElement id="n2" length="200"/><netElement id="n3" length="200"/></netElements><netRelations>
+<netRelation id="r12" navigability="Both" positionOnA="1" positionOnB="0"><elementA ref="n1"/><elementB ref="n2"/></netRelation>
+<netRelation id="r13" navigability="Both" positionOnA="1" positionOnB="0"><elementA ref="n1"/><elementB ref="n3"/></netRelation>
+<netRelation id="r23" navigability="None" positionOnA="0" positionOnB="0"><elementA ref="n2"/><elementB ref="n3"/></netRelation>
+</netRelations></topology><functionalInfrastructure>
+<switchesIS><switchIS id="s1" branchCourse="right" continueCourse="left" type="ordinarySwitch"><name name="W7"/>
+<leftBranch netRelationRef="r12"/><rightBranch netRelationRef="r13"/></switchIS></switchesIS>
+<overCrossings><overCrossing id="o1" constructionType="tunnel"><linearLocation><associatedNetElement netElementRef="n2" posBegin="50" posEnd="150"/></linearLocation></overCrossing></overCrossings>
+<platformEdges><platformEdge id="p1"><linearLocation><associatedNetElement netElementRef="n3" posBegin="100" posEnd="180"/></linearLocation></platformEdge></platformEdges>
+</functionalInfrastructure></infrastructure></railML>)";
+
+constexpr const char* kInfra = R"(<?xml version="1.0"?>
+<infrastructure xmlns="https://erju.org/infra"><trackEdges><trackEdge id="T1" trackEdgeLength="500000"/><trackEdge id="T2" trackEdgeLength="300000"/></trackEdges>
+<trackEdgeLinks><trackEdgeLink id="l" trackEdgeA="T1" trackEdgeB="T2" startOfA="false" startOfB="true"/></trackEdgeLinks>
+<trackEdgeGeometries><trackEdgeGeometry id="T1"><cantPoints><cantPoint trackGeometryPos="0" appliedCant="0"/><cantPoint trackGeometryPos="100000" appliedCant="50"/></cantPoints></trackEdgeGeometry></trackEdgeGeometries>
+<sampledTrackEdgeGeometry id="T1"><slopes><slope pos="0" samplePointSlope="100"/></slopes></sampledTrackEdgeGeometry>
+<baliseGroups><baliseGroup id="G" nid_c="97" nid_bg="5050" linkOrientationDirection="dirReverse"><balises>
+<balise id="G0"><spotLocation trackEdge="T2" pos="13000"/></balise><balise id="G1"><spotLocation trackEdge="T2" pos="10000"/></balise></balises></baliseGroup></baliseGroups>
+</infrastructure>)";
+
+class PlanImport : public ImportTest {
+ protected:
+  /// Unzips the example of that name; empty where data or unzip are missing.
+  [[nodiscard]] std::vector<std::filesystem::path> unzipped(const std::string& name) const {
+    const std::filesystem::path zip = shared_data("network/railml/" + name);
+    const std::string command =
+        "unzip -q -o \"" + zip.string() + "\" -d \"" + in_folder("").string() + "\" > /dev/null 2>&1";
+    if (!std::filesystem::exists(zip) || std::system(command.c_str()) != 0) return {};  // NOLINT(cert-env33-c)
+    std::vector<std::filesystem::path> files;
+    for (const auto& entry : std::filesystem::directory_iterator(in_folder(""))) {
+      if (entry.path().extension() == ".xml") files.push_back(entry.path());
+    }
+    std::sort(files.begin(), files.end());
+    return files;
+  }
+};
+
+TEST_F(PlanImport, Railml2KeepsWhatThePlanSays) {
+  const Map map = core::value_or_throw(build_map({write("a.railml", kRailml2)}, {})).map;
+  EXPECT_NEAR(length_of(map), 1400, 1e-6);
+  ASSERT_EQ(map.edges.size(), 4U);  // main in three pieces, siding
+  const Node* w1 = node_named(map, "W1");
+  const Node* w2 = node_named(map, "W2");
+  ASSERT_TRUE(w1 != nullptr && w2 != nullptr);
+  EXPECT_EQ(w1->kind, NodeKind::railway_switch);
+  EXPECT_EQ(ways_at(map, w1->id), 2U);
+  EXPECT_EQ(ways_at(map, w2->id), 2U);
+  ASSERT_EQ(map.balise_groups.size(), 1U);
+  EXPECT_EQ(map.balise_groups[0].nid_lrbg(), 97U << 14U | 1234U);
+  EXPECT_NEAR(map.balise_groups[0].offset_m, 200, 1e-6);
+  EXPECT_EQ(map.balise_groups[0].balises.size(), 2U);
+  EXPECT_TRUE(std::any_of(map.landmarks.begin(), map.landmarks.end(),
+                          [](const Landmark& mark) { return mark.name == "level crossing Mill Lane"; }));
+  // The whole main track: its curve, cant and height.
+  const auto shared = std::make_shared<const Map>(map);
+  const Path path = core::value_or_throw(Path::follow(shared, {1, 0, Direction::forward}, 2000, 0));
+  EXPECT_NEAR(path.end_m(), 1000, 1e-6);
+  EXPECT_NEAR(path.curvature_at(900), -1.0 / 500, 1e-12);
+  EXPECT_NEAR(path.at(900).cant_m, -0.06, 1e-9);
+  EXPECT_NEAR(path.at(1000 - 1e-6).elevation_m, 2.0 - 6.0, 1e-3);
+  // And over the siding: straight way first, as long as the file says.
+  const Path over = core::value_or_throw(Path::follow(shared, {1, 0, Direction::forward}, 2000, 0, {4, 2}));
+  EXPECT_NEAR(over.end_m(), 1000, 1e-6);
+  EXPECT_THAT(map.problems, Contains(HasSubstr("laid out as a drawing")));
+}
+
+TEST_F(PlanImport, Railml3KeepsWhatThePlanSays) {
+  const Map map = core::value_or_throw(build_map({write("a.xml", kRailml3)}, {})).map;
+  EXPECT_EQ(map.crs, "EPSG:25832");
+  ASSERT_EQ(map.edges.size(), 3U);
+  EXPECT_NEAR(length_of(map), 700, 1e-6);
+  const Node* points = node_named(map, "W7");
+  ASSERT_NE(points, nullptr);
+  EXPECT_NEAR(points->easting_m, 500300, 0.01);
+  ASSERT_EQ(map.connections.size(), 2U);
+  EXPECT_FALSE(map.connections[0].diverging);
+  EXPECT_EQ(std::max(map.connections[0].edge_a, map.connections[0].edge_b), 2U);
+  EXPECT_TRUE(map.connections[1].diverging);
+  const auto count = [&](LandmarkKind kind) {
+    return std::count_if(map.landmarks.begin(), map.landmarks.end(), [&](const Landmark& m) { return m.kind == kind; });
+  };
+  EXPECT_EQ(count(LandmarkKind::portal_in), 1);
+  EXPECT_EQ(count(LandmarkKind::portal_out), 1);
+  EXPECT_EQ(count(LandmarkKind::platform), 2);
+}
+
+// The same infrastructure in both generations.
+TEST_F(PlanImport, TheExamplesOfBothGenerationsAgree) {
+  for (const auto& [zip, length_m, switches] :
+       {std::tuple("Simplest Example-2.4.zip", 1630.0, 2), {"Simple Example+RTC.zip", 6900.0, 3}}) {
+    SCOPED_TRACE(zip);
+    const std::vector<std::filesystem::path> files = unzipped(zip);
+    if (files.empty()) GTEST_SKIP() << "skipped: no " << zip << ", or no unzip";
+    for (const std::filesystem::path& file : files) {
+      SCOPED_TRACE(file.filename().string());
+      const Map map = core::value_or_throw(build_map({file}, {})).map;
+      EXPECT_NEAR(length_of(map), length_m, 1e-3);
+      EXPECT_EQ(std::count_if(map.nodes.begin(), map.nodes.end(),
+                              [](const Node& node) { return node.kind == NodeKind::railway_switch; }),
+                switches);
+      EXPECT_TRUE(std::none_of(map.problems.begin(), map.problems.end(), [](const std::string& problem) {
+        return problem.find("cannot be reached") != std::string::npos;
+      }));
+    }
+    std::filesystem::remove(files[0]);
+    std::filesystem::remove(files[1]);
+  }
+}
+
+TEST_F(PlanImport, ErjuWithoutCoordinatesIsADrawing) {
+  const Map map = core::value_or_throw(build_map({write("infra.xml", kInfra)}, {})).map;
+  ASSERT_EQ(map.edges.size(), 2U);
+  EXPECT_NEAR(length_of(map), 800, 1e-6);
+  EXPECT_EQ(map.connections.size(), 1U);
+  ASSERT_EQ(map.balise_groups.size(), 1U);
+  EXPECT_FALSE(map.balise_groups[0].nominal_is_forward);
+  EXPECT_NEAR(map.balise_groups[0].offset_m, 13, 1e-9);
+  EXPECT_NEAR(map.edges[0].alignment.at(100).cant_m, 0.05, 1e-12);
+  EXPECT_NEAR(map.edges[1].alignment.at(0).elevation_m, 5, 1e-9);
+}
+
+TEST_F(PlanImport, ScheibenbergIsReadWhole) {
+  const std::filesystem::path infra = shared_data("network/scheibenberg/infra_v1.0.xml");
+  const std::filesystem::path places = shared_data("network/scheibenberg/map_v1.0.xml");
+  if (!std::filesystem::exists(infra)) GTEST_SKIP() << "skipped: no " << infra;
+  const BuiltMap built = core::value_or_throw(build_map({infra, places}, {}));
+  const Map& map = built.map;
+  EXPECT_EQ(map.crs, "EPSG:31468");  // the file names the zone by a number that PROJ has not
+  EXPECT_EQ(map.edges.size(), 11U);
+  EXPECT_EQ(map.balise_groups.size(), 115U);
+  EXPECT_EQ(std::count_if(map.landmarks.begin(), map.landmarks.end(),
+                          [](const Landmark& mark) { return mark.kind == LandmarkKind::balise; }),
+            163);
+  EXPECT_EQ(std::count_if(map.nodes.begin(), map.nodes.end(),
+                          [](const Node& node) { return node.kind == NodeKind::railway_switch; }),
+            6);
+  // As the files count, but for one edge whose coordinates are 20.5 m shorter than its length.
+  EXPECT_NEAR(length_of(map), 26258.83 - 20.5, 1);
+  EXPECT_THAT(map.problems, Contains(HasSubstr("T11")));
+  EXPECT_LT(built.fit.max_m, 0.5);
+  const auto geo = map.to_geo(map.nodes[0].easting_m, map.nodes[0].northing_m);
+  ASSERT_TRUE(geo);
+  EXPECT_NEAR(geo->lat_deg, 50.54, 0.1);  // Scheibenberg in Saxony
+  EXPECT_NEAR(geo->lon_deg, 12.91, 0.15);
+}
+
+TEST_F(PlanImport, SaysWhatIsWrongInOneSentence) {
+  const auto message = [&](std::string text, const std::string& from, const std::string& to) {
+    const size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    text.replace(at, from.size(), to);
+    const auto built = build_map({write("bad.xml", text)}, {});
+    return built.ok() ? std::string("was built") : built.error().message;
+  };
+  EXPECT_THAT(message(kRailml2, "version=\"2.4\"", "version=\"4.0\""), HasSubstr("railML 2.x and 3.x can be read"));
+  EXPECT_THAT(message(kRailml2, "pos=\"1000\"", "pos=\"-5\""), HasSubstr("between 0 and 1000 km"));
+  EXPECT_THAT(message(kRailml2, "radius=\"500\"", "radius=\"5\""), HasSubstr("less than 10 m"));
+  EXPECT_THAT(message(kRailml2, "slope=\"5\"", "slope=\"x\""), HasSubstr("needs a number in the attribute \"slope\""));
+  EXPECT_THAT(message(kRailml2, "groupID=\"1234\"", "groupID=\"99999\""), HasSubstr("ETCS cannot carry"));
+  EXPECT_THAT(message(kRailml2, "</tracks>", ""), HasSubstr("not sound XML"));
+  EXPECT_THAT(message(kRailml3, "elementB ref=\"n2\"", "elementB ref=\"n9\""), HasSubstr("does not exist"));
+  EXPECT_THAT(message(kRailml3, "length=\"300\"", "length=\"-3\""), HasSubstr("between 0 and 1000 km"));
+  EXPECT_THAT(message(kInfra, "nid_c=\"97\"", "nid_c=\"9700\""), HasSubstr("ETCS cannot carry"));
+  EXPECT_THAT(message(kInfra, "trackEdge=\"T2\" pos=\"13000\"", "trackEdge=\"T9\" pos=\"13000\""), HasSubstr("\"T9\""));
+  EXPECT_THAT(message(kInfra, "trackEdgeLength=\"500000\"", ""), HasSubstr("trackEdgeLength"));
+  const auto alone = build_map({write("m.xml", "<mapMgmt xmlns=\"https://erju.org/map\"/>")}, {});
+  ASSERT_FALSE(alone.ok());
+  EXPECT_THAT(alone.error().message, HasSubstr("infra"));
+}
+
+TEST_F(PlanImport, NoDamageToAFileCrashesIt) {
+  core::Random random(12);
+  for (const char* whole : {kRailml2, kRailml3, kInfra}) {
+    for (int i = 0; i < 120; ++i) {
+      std::string bad = whole;
+      if (i % 3 == 0) bad.resize(random.next() % bad.size());
+      for (int k = 0; k < 3 && !bad.empty(); ++k) bad[random.next() % bad.size()] = static_cast<char>(random.next());
+      const auto built = build_map({write("bad.xml", bad)}, {});
+      if (!built.ok()) {
+        EXPECT_FALSE(built.error().message.empty());
+      } else {
+        for (const Edge& edge : built.value().map.edges)
+          EXPECT_TRUE(std::isfinite(edge.alignment.at(1).pose.easting_m));
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace railfix::track

@@ -1,0 +1,62 @@
+#include "map/coverage.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace railfix::tool {
+namespace {
+
+struct Reference {
+  double at_m = 0;
+  double accuracy_m = 0;
+};
+
+std::vector<Reference> references_on(const track::Path& path, const CoverageOptions& options) {
+  std::vector<Reference> out;
+  for (const track::PathBaliseGroup& group : path.balise_groups())
+    out.push_back({group.distance_m, group.group->q_locacc_m});
+  for (const track::PathLandmark& mark : path.landmarks()) {
+    const bool is_natural = mark.kind != track::LandmarkKind::balise && mark.kind != track::LandmarkKind::unknown;
+    if (options.natural && is_natural) out.push_back({mark.distance_m, options.sigmas * mark.landmark->sigma_m});
+  }
+  std::sort(out.begin(), out.end(), [](const Reference& a, const Reference& b) { return a.at_m < b.at_m; });
+  return out;
+}
+
+/// How far a train gets behind a reference before the limit.
+double reach_m(const CoverageOptions& options, double accuracy_m) {
+  return std::max(0.0, (options.limit_m - accuracy_m) / (options.sigmas * options.scale_sigma));
+}
+
+}  // namespace
+
+double half_interval_m(const CoverageOptions& options, double locacc_m, double way_m) {
+  return locacc_m + options.sigmas * options.scale_sigma * way_m;
+}
+
+Coverage coverage_of(const track::Path& path, const CoverageOptions& options) {
+  Coverage out;
+  std::vector<Reference> references = references_on(path, options);
+  out.references = references.size();
+  references.push_back({path.end_m(), 0});  // nothing is reset there, it only ends the last stretch
+  Reference last{path.begin_m(), options.virtual_locacc_m};
+  for (const Reference& next : references) {
+    const double way = next.at_m - last.at_m;
+    const double half = half_interval_m(options, last.accuracy_m, way);
+    out.largest_m = std::max(out.largest_m, half);
+    const double reach = reach_m(options, last.accuracy_m);
+    out.covered_m += std::min(way, reach);
+    if (way > reach) {
+      CoverageGap gap{last.at_m + reach, next.at_m, half, {}, half > 5.0 + 0.05 * way};
+      const double step = reach_m(options, options.virtual_locacc_m);
+      // With no reach at all no virtual reference helps.
+      for (double at = gap.from_m; step > 1.0 && at < next.at_m; at += step) gap.references_m.push_back(at);
+      out.gaps.push_back(std::move(gap));
+    }
+    // A reference that knows less than the train does not help it.
+    if (next.accuracy_m < half) last = next;
+  }
+  return out;
+}
+
+}  // namespace railfix::tool

@@ -1,0 +1,58 @@
+// Natural reference points surveyed from recorded runs: what several passes saw at the same place becomes a landmark.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "core/result.hpp"
+#include "track/map.hpp"
+
+namespace railfix::tool {
+
+/// One sighting, put on the map by where the run thought it was.
+struct SurveySighting {
+  size_t run = 0;
+  double way_m = 0;  // of the run at the sighting
+  track::LandmarkKind kind = track::LandmarkKind::unknown;
+  uint32_t edge = 0;
+  double offset_m = 0;
+  double lateral_m = 0;
+  double sigma_m = 0;      // of the sighting
+  double run_sigma_m = 0;  // of the run's place, shared by sightings near each other
+};
+
+struct SurveyOptions {
+  double stretch_m = 500;  // of a run, with one error of its place
+  double gate_m = 4;       // sightings of one kind nearer than this along the track are of one thing
+  size_t least_runs = 2;   // a new landmark must have been seen in as many
+};
+
+struct SurveyedLandmark {
+  uint32_t known_id = 0;  // of the map, 0 = new
+  track::Landmark landmark;
+  size_t sightings = 0;
+  size_t runs = 0;
+  double moved_m = 0;  // against the map
+};
+
+struct Survey {
+  std::vector<SurveyedLandmark> landmarks;
+  size_t sightings = 0;
+  size_t outliers = 0;    // sightings that hardly counted
+  size_t left_alone = 0;  // sightings of things that too few runs saw
+  double spread = 0;      // rms of errors over their sigmas; sigmas are widened where it is above 1
+};
+
+/// Robust least squares (Huber) over landmarks and the runs' stretches; landmarks of the map enter with their sigma.
+Survey survey_landmarks(const track::Map& map, const std::vector<SurveySighting>& sightings,
+                        const SurveyOptions& options);
+
+/// Moves the known landmarks and adds the new ones.
+void apply_survey(const Survey& survey, track::Map& map);
+
+/// Sightings of a run's tables (sightings.csv, train_state.csv); those without a known track are left out.
+core::Result<std::vector<SurveySighting>> read_sightings(const std::shared_ptr<const track::Map>& map,
+                                                         const std::filesystem::path& run_folder, size_t run);
+
+}  // namespace railfix::tool
