@@ -10,6 +10,7 @@ namespace railfix::fusion {
 namespace {
 
 constexpr double kRecentS = 1.0;
+constexpr double kFreshS = 0.12;
 constexpr double kRecentPositionS = 30.0;
 constexpr double kNoMotionUnusableS = 5.0;
 
@@ -27,7 +28,11 @@ Interval Estimator::interval() const {
   const double sigma_m = path_ ? filter_.path_sigma_m() : filter_.sigma(StateIndex::distance);
   const double bound_m = parameters_->interval_factor * sigma_m + parameters_->interval_floor_m +
                          parameters_->interval_drift * since_reference_m() + doubt_m_;
-  return {centre_m - std::max(bound_m, doubt_behind_m_), centre_m + std::max(bound_m, doubt_ahead_m_)};
+  // Since the last sample the train may have stopped counting, or the clock may have run ahead.
+  const double silent_s = core::seconds(filter_.stamp_ns() - stamp_ns_) - kFreshS;
+  const double silent_m = std::abs(filter_.speed_mps()) * std::max(0.0, silent_s);
+  const double behind_m = std::max(bound_m, doubt_behind_m_) + time_doubt_m_ + silent_m;
+  return {centre_m - behind_m, centre_m + std::max(bound_m, doubt_ahead_m_)};
 }
 
 TrainEstimate Estimator::estimate(const Interval& promised, double since_sure_m) const {
@@ -104,6 +109,7 @@ void Estimator::judge(TrainEstimate& e, double since_sure_m) const {
     add_reason(e, "IMU contradicts the other sensors");
   }
   if (watch(Source::gnss).isolated) add_reason(e, "GNSS contradicts the position");
+  if (time_doubt_m_ > 0) add_reason(e, "a gap in time: the clock was set, or nothing measured");
   if (refused_fix_) add_reason(e, "a position fix was refused");
   if (corrected_) add_reason(e, "position was corrected by two fixes against the filter");
   if (off_path_fixes_ > 0) add_reason(e, "a position fix lies on another track");

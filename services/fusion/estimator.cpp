@@ -19,7 +19,15 @@ constexpr double kRestM = 0.05;  // a train that moved less than this ...
 constexpr double kRestS = 1.0;   // ... for so long stands still
 constexpr double kRestSpeedSigmaMps = 0.3;
 constexpr double kGyroPositionSigmaM = 30.0;  // within which the curvature may be taken as linear
-constexpr double kOffTrackM = 15.0;           // a GNSS fix further beside the track is none
+constexpr double kLatelyS = 1.0;
+constexpr double kBridgeS = 10.0;  // as long as the IMU alone is good for a place
+constexpr double kRebaseS = 0.1;   // lost when the clock is set
+constexpr double kRhythmS = 0.003;
+constexpr double kGapS = 0.05;
+constexpr int kRhythmSamples = 10;
+constexpr double kBanS = 30.0;
+constexpr double kReturnScaleSigma = 0.05;
+constexpr double kOffTrackM = 15.0;  // a GNSS fix further beside the track is none
 
 double gnss_sigma_m(const GnssInput& sample, const FusionParameters& p) {
   const double hdop = std::max(sample.hdop, 0.5);
@@ -71,10 +79,13 @@ void Estimator::rebase_clock(int64_t stamp_ns) {
   for (auto& watch : watches_) {
     watch.seen_ns = std::min(watch.seen_ns, stamp_ns);
     watch.used_ns = std::min(watch.used_ns, stamp_ns);
+    watch.changed_ns = std::min(watch.changed_ns, stamp_ns);
+    watch.banned_until_ns = std::min(watch.banned_until_ns, stamp_ns + core::to_ns(kBanS));
   }
   accel_ = {};
   yaw_ = {};
-  wheel_ = {};
+  wheel_.blocked_until_ns = wheel_.window_begin_ns = 0;
+  filter_.doubt_way(filter_.value(StateIndex::speed) * kRebaseS);
   slip_watch_ = {};
   rest_since_ns_ = stamp_ns;
   start_ns_ = std::min(start_ns_, stamp_ns);
@@ -83,6 +94,7 @@ void Estimator::rebase_clock(int64_t stamp_ns) {
 void Estimator::apply(const Event& event) {
   slip_began_ = false;
   fix_verdict_ = FixVerdict::none;
+  notice_gap(std::visit([](const auto& input) { return input.stamp_ns; }, event));
   std::visit(
       [this](const auto& input) {
         // Inertial samples are many and only their mean is used: they move the filter when it is complete.
@@ -94,13 +106,95 @@ void Estimator::apply(const Event& event) {
   watch_standstill();
 }
 
+bool Estimator::used_within(Source source, double time_s) const {
+  const auto& w = watch(source);
+  return w.used_ns != 0 && !w.isolated && core::seconds(filter_.stamp_ns() - w.used_ns) < time_s;
+}
+
+bool Estimator::knows_motion() const {
+  const bool lately = used_within(Source::camera, kBridgeS) || used_within(Source::wheel, kBridgeS);
+  return used_within(Source::camera, kLatelyS) || used_within(Source::wheel, kLatelyS) ||
+         (lately && used_within(Source::imu, kLatelyS));
+}
+
+int Estimator::motion_sensors() const {
+  return static_cast<int>(used_within(Source::camera, kLatelyS)) +
+         static_cast<int>(used_within(Source::wheel, kLatelyS)) + static_cast<int>(used_within(Source::imu, kLatelyS));
+}
+
+// A sample that comes out of rhythm may have another clock behind it: then the way run by time alone is in doubt by as
+// much, and the sample itself says how far the train ran.
+void Estimator::doubt_time(const SensorWatch& watch, Rhythm& rhythm, int64_t stamp_ns) {
+  if (watch.seen_ns == 0 || stamp_ns <= watch.seen_ns) return;
+  const double dt_s = core::seconds(stamp_ns - watch.seen_ns);
+  const double off_s = std::abs(dt_s - rhythm.period_s);
+  if (rhythm.samples >= kRhythmSamples && off_s > std::max(kRhythmS, 0.1 * rhythm.period_s)) {
+    filter_.doubt_way(filter_.value(StateIndex::speed) * off_s);
+  } else {
+    rhythm.period_s += (dt_s - rhythm.period_s) / std::min(++rhythm.samples, 20);
+  }
+}
+
+bool Estimator::is_consistent() const {
+  return !watch(Source::camera).isolated && !watch(Source::wheel).isolated && !watch(Source::imu).isolated;
+}
+
+void Estimator::place_like(const Estimator& other) {
+  path_ = other.path_;
+  filter_.place_like(other.filter_);
+  doubt_m_ = std::max(doubt_m_, other.doubt_m_);
+  time_doubt_m_ = std::max(time_doubt_m_, other.time_doubt_m_);
+  reference_ = other.reference_;
+}
+
+void Estimator::ban(Source source, const SensorWatch& known) {
+  auto& w = watched(source);
+  w = known;
+  w.refused = 0;
+  w.isolate(stamp_ns_);
+  w.banned_until_ns = stamp_ns_ + core::to_ns(kBanS);
+}
+
+// While a source is banned its samples only show that it is there.
+bool Estimator::banned(Source source, int64_t stamp_ns) {
+  auto& w = watched(source);
+  w.seen_ns = std::max(w.seen_ns, stamp_ns);
+  if (w.banned_until_ns == 0) return false;
+  if (stamp_ns < w.banned_until_ns) return true;
+  w.banned_until_ns = 0;
+  readmit(source);
+  return false;
+}
+
+// It may be right again, with another scale than before.
+void Estimator::readmit(Source source) {
+  if (source == Source::camera) filter_.forget_scale(Odometer::camera, kReturnScaleSigma);
+  if (source == Source::wheel) filter_.forget_scale(Odometer::wheel, kReturnScaleSigma);
+}
+
+// Nothing from any sensor for a while: the clock may have been set forward. What counts way over the gap tells.
+void Estimator::notice_gap(int64_t stamp_ns) {
+  const double gap_s = core::seconds(stamp_ns - stamp_ns_);
+  if (gap_s <= 0) return;
+  if (events_.samples >= kRhythmSamples && gap_s > std::max(kGapS, 5 * events_.period_s)) {
+    time_doubt_m_ += std::abs(filter_.speed_mps()) * gap_s;
+    gap_begin_ns_ = stamp_ns_;
+  } else {
+    events_.period_s += (gap_s - events_.period_s) / std::min(++events_.samples, 50);
+  }
+}
+
 void Estimator::use(const PictureInput& picture) {
   filter_.clone_now(picture.stamp_ns);
 }
 
 void Estimator::use(const OdometryInput& step) {
-  auto& camera = watch(Source::camera);
-  camera.seen_ns = step.stamp_ns;
+  auto& camera = watched(Source::camera);
+  if (step.valid) doubt_time(camera, pictures_, step.stamp_ns);
+  if (banned(Source::camera, step.stamp_ns)) {
+    slip_watch_.no_picture();
+    return;
+  }
   if (step.valid) {
     if (filter_.unit() == Odometer::none) filter_.choose_unit(Odometer::camera, *parameters_);
     const double sigma_m = std::hypot(step.step_sigma_m, parameters_->step_sigma_floor_m);
@@ -112,11 +206,14 @@ void Estimator::use(const OdometryInput& step) {
             : filter_.offer_speed(step.step_m / dt_s, sigma_m / dt_s + 0.5 * dt_s, parameters_->gate_camera);
     if (offer.used) {
       camera.accept(step.stamp_ns);
+      if (step.reference_stamp_ns <= gap_begin_ns_ && filter_.has_clone(step.reference_stamp_ns)) time_doubt_m_ = 0;
       compare_with_wheel(step, sigma_m);
     } else {
       slip_watch_.no_picture();
-      camera.isolated = ++camera.refused >= kRefusalsToIsolate;
-      if (camera.refused >= kRefusalsToDoubt) doubt_m_ += std::abs(offer.residual);
+      if (++camera.refused >= kRefusalsToIsolate) camera.isolate(step.stamp_ns);
+      // With the wheel the rivals' ends are wide enough; without it nobody knows who is right.
+      const bool alone = !used_within(Source::wheel, kLatelyS);
+      if (camera.refused >= kRefusalsToDoubt && alone) doubt_m_ += std::abs(offer.residual);
     }
   }
   if (!step.valid) slip_watch_.no_picture();
@@ -137,15 +234,19 @@ void Estimator::compare_with_wheel(const OdometryInput& step, double sigma_m) {
 }
 
 void Estimator::isolate_wheel() {
-  watch(Source::wheel).isolated = true;
+  watched(Source::wheel).isolate(stamp_ns_);
   wheel_.good_windows = 0;
   wheel_.window_begin_ns = filter_.stamp_ns();
   slip_began_ = true;
 }
 
 void Estimator::use(const WheelInput& sample) {
-  auto& watch = this->watch(Source::wheel);
-  watch.seen_ns = sample.stamp_ns;
+  auto& watch = watched(Source::wheel);
+  if (!watch.isolated) doubt_time(watch, pulses_, sample.stamp_ns);
+  if (banned(Source::wheel, sample.stamp_ns)) {
+    wheel_.window_begin_ns = sample.stamp_ns;
+    return;
+  }
   const double sigma_m = std::hypot(1 / sample.pulses_per_metre / std::sqrt(12.0), 0.001);
   const bool first = !wheel_.first_pulses;
   if (first) wheel_.first_pulses = sample.pulses;
@@ -163,6 +264,7 @@ void Estimator::use(const WheelInput& sample) {
     recover_wheel(sample, wheel_m, sigma_m);
   } else if (filter_.offer_wheel(wheel_m, sigma_m, parameters_->gate_wheel).used) {
     watch.accept(sample.stamp_ns);
+    time_doubt_m_ = 0;
   } else if (++watch.refused >= kRefusalsToIsolate) {
     isolate_wheel();
   }
@@ -177,7 +279,7 @@ void Estimator::recover_wheel(const WheelInput& sample, double wheel_m, double s
   wheel_.good_windows = good ? wheel_.good_windows + 1 : 0;
   wheel_.window_begin_ns = sample.stamp_ns;
   filter_.restart_wheel(wheel_m, sigma_m);
-  if (wheel_.good_windows >= kGoodWindows) watch(Source::wheel).accept(sample.stamp_ns);
+  if (wheel_.good_windows >= kGoodWindows) watched(Source::wheel).accept(sample.stamp_ns);
 }
 
 std::optional<double> Estimator::Mean::add(int64_t stamp_ns, double value, double period_s) {
@@ -192,8 +294,8 @@ std::optional<double> Estimator::Mean::add(int64_t stamp_ns, double value, doubl
 }
 
 void Estimator::use(const ImuInput& sample) {
-  auto& imu = watch(Source::imu);
-  imu.seen_ns = sample.stamp_ns;
+  auto& imu = watched(Source::imu);
+  if (banned(Source::imu, sample.stamp_ns)) return;
   const auto accel_mps2 = accel_.add(sample.stamp_ns, sample.accel_x_mps2, parameters_->imu_period_s);
   const auto rate_rps = yaw_.add(sample.stamp_ns, sample.rate_z_rps, parameters_->gyro_period_s);
   if (accel_mps2 || rate_rps) predict_to(sample.stamp_ns);
@@ -205,7 +307,7 @@ void Estimator::use(const ImuInput& sample) {
     if (offer.used) {
       imu.accept(sample.stamp_ns);
     } else {
-      imu.isolated = ++imu.refused >= kRefusalsToIsolate;
+      if (++imu.refused >= kRefusalsToIsolate) imu.isolate(sample.stamp_ns);
     }
   }
   if (rate_rps) use_yaw_rate(*rate_rps);
@@ -228,25 +330,32 @@ void Estimator::use_yaw_rate(double rate_rps) {
                          parameters_->gate_gyro);
 }
 
+// Errors of GNSS last: a fix is tested as it is, but says little new beside the one before.
 void Estimator::use(const GnssInput& sample) {
-  auto& gnss = watch(Source::gnss);
+  auto& gnss = watched(Source::gnss);
   const double since_s = gnss.seen_ns == 0 ? 1.0 : std::max(core::seconds(sample.stamp_ns - gnss.seen_ns), 0.05);
   gnss.seen_ns = sample.stamp_ns;
-  if (sample.fix == 0 || !path_) return;
+  if (sample.fix == 0 || !path_) {
+    gnss_agreed_ = 0;
+    return;
+  }
   const auto place = project(*path_, filter_.path_distance_m(), sample.easting_m, sample.northing_m);
   const double once_m = std::hypot(gnss_sigma_m(sample, *parameters_), parameters_->gnss_map_sigma_m);
   const double sigma_m = once_m * std::sqrt(1 + 2 * parameters_->gnss_error_time_s / since_s);
   const double foot_m = place.distance_m - parameters_->gnss_antenna_ahead_m;
   const bool beside = std::abs(place.lateral_m) > kOffTrackM + 3 * once_m;
-  if (!beside && filter_.offer_position(foot_m, sigma_m, parameters_->gate_gnss).used) {
+  const bool agrees = !beside && filter_.test_position(foot_m, once_m, parameters_->gate_gnss).used;
+  if (agrees && filter_.offer_position(foot_m, sigma_m, parameters_->gate_gnss).used) {
     gnss.accept(sample.stamp_ns);
-  } else {
-    gnss.isolated = ++gnss.refused >= kRefusalsToIsolate;
+    ++gnss_agreed_;
+  } else if (++gnss.refused >= kRefusalsToIsolate) {
+    gnss.isolate(sample.stamp_ns);
+    gnss_agreed_ = 0;
   }
 }
 
 void Estimator::use(const FixInput& fix) {
-  auto& watch = this->watch(fix.kind == FixKind::curvature ? Source::curvature : Source::landmark);
+  auto& watch = watched(fix.kind == FixKind::curvature ? Source::curvature : Source::landmark);
   watch.seen_ns = fix.stamp_ns;
   if (fix.new_path) {
     path_ = fix.new_path;
@@ -274,11 +383,11 @@ void Estimator::use(const FixInput& fix) {
 }
 
 void Estimator::accept(const FixInput& fix) {
-  watch(fix.kind == FixKind::curvature ? Source::curvature : Source::landmark).accept(fix.stamp_ns);
+  watched(fix.kind == FixKind::curvature ? Source::curvature : Source::landmark).accept(fix.stamp_ns);
   fix_verdict_ = FixVerdict::used;
   refused_fix_.reset();
   off_path_fixes_ = 0;
-  doubt_m_ = doubt_behind_m_ = doubt_ahead_m_ = 0;
+  doubt_m_ = doubt_behind_m_ = doubt_ahead_m_ = time_doubt_m_ = 0;
   // A vague fix helps, but is nothing to measure a distance from.
   if (fix.kind == FixKind::curvature && fix.sigma_m > 2 * filter_.path_sigma_m()) return;
   reference_ = fix.landmark;

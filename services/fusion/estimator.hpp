@@ -21,11 +21,18 @@ struct SensorWatch {
   int64_t used_ns = 0;
   int refused = 0;  // in a row
   bool isolated = false;
+  int64_t changed_ns = 0;  // when it was isolated, or taken back
+  int64_t banned_until_ns = 0;
 
   void accept(int64_t stamp_ns) {
     used_ns = stamp_ns;
     refused = 0;
+    if (isolated) changed_ns = stamp_ns;
     isolated = false;
+  }
+  void isolate(int64_t stamp_ns) {
+    if (!isolated) changed_ns = stamp_ns;
+    isolated = true;
   }
 };
 
@@ -46,6 +53,22 @@ class Estimator {
   void predict_to(int64_t stamp_ns);
   void rebase_clock(int64_t stamp_ns);
   [[nodiscard]] Interval interval() const;
+  [[nodiscard]] double centre_m() const { return path_ ? filter_.path_distance_m() : distance_m(); }
+  [[nodiscard]] double sigma_m() const { return path_ ? filter_.path_sigma_m() : filter_.sigma(StateIndex::distance); }
+  [[nodiscard]] double distance_m() const { return filter_.value(StateIndex::distance); }
+  /// Camera or wheel measured lately and was believed, or the IMU bridges a short while without them.
+  [[nodiscard]] bool knows_motion() const;
+  /// Camera, wheel and IMU, as far as they measured lately and were believed.
+  [[nodiscard]] int motion_sensors() const;
+  /// No motion sensor is isolated.
+  [[nodiscard]] bool is_consistent() const;
+  /// GNSS has agreed with the motion for a while.
+  [[nodiscard]] bool gnss_proven() const { return gnss_agreed_ >= kGnssProof; }
+  /// Takes over place and speed, as independent knowledge.
+  void place_like(const Estimator& other);
+  /// Leaves a source out for a while: the other estimators showed that it is wrong. watch: what was known of it.
+  void ban(Source source, const SensorWatch& watch);
+  [[nodiscard]] bool is_banned(Source source) const { return watch(source).banned_until_ns > stamp_ns_; }
   /// The state with this promised interval; since_sure_m: way since the last place that is beyond doubt.
   /// REQUIRES: predict_to(stamp_ns()) was the last call (as for interval()).
   [[nodiscard]] TrainEstimate estimate(const Interval& promised, double since_sure_m) const;
@@ -83,6 +106,12 @@ class Estimator {
     int64_t window_begin_ns = 0;
     int good_windows = 0;
   };
+  /// Usual time between the samples of one odometer.
+  struct Rhythm {
+    double period_s = 0;
+    int samples = 0;
+  };
+  static constexpr int kGnssProof = 30;
   enum class FixVerdict : uint8_t { none, used, refused };
   struct RefusedFix {
     double residual_m = 0;
@@ -90,6 +119,9 @@ class Estimator {
     double distance_m = 0;
   };
 
+  [[nodiscard]] bool used_within(Source source, double time_s) const;
+  void doubt_time(const SensorWatch& watch, Rhythm& rhythm, int64_t stamp_ns);
+  void notice_gap(int64_t stamp_ns);
   void use(const OdometryInput& step);
   void use(const WheelInput& sample);
   void use(const ImuInput& sample);
@@ -98,12 +130,14 @@ class Estimator {
   void use(const PictureInput& picture);
   void compare_with_wheel(const OdometryInput& step, double sigma_m);
   void isolate_wheel();
+  void readmit(Source source);
+  bool banned(Source source, int64_t stamp_ns);
   void recover_wheel(const WheelInput& sample, double wheel_m, double sigma_m);
   void use_yaw_rate(double rate_rps);
   void refuse(const FixInput& fix, double path_distance_m, const Offer& offer);
   void accept(const FixInput& fix);
   void watch_standstill();
-  SensorWatch& watch(Source source) { return watches_[static_cast<size_t>(source)]; }
+  SensorWatch& watched(Source source) { return watches_[static_cast<size_t>(source)]; }
   [[nodiscard]] bool silent(Source source) const;
   void judge(TrainEstimate& estimate, double since_sure_m) const;
   void locate(TrainEstimate& estimate) const;
@@ -113,6 +147,9 @@ class Estimator {
   MotionFilter filter_;
   int64_t stamp_ns_;
   std::array<SensorWatch, kSources> watches_;
+  Rhythm events_;
+  Rhythm pictures_;
+  Rhythm pulses_;
   Mean accel_;
   Mean yaw_;
   Wheel wheel_;
@@ -120,11 +157,14 @@ class Estimator {
   bool slip_began_ = false;
   FixVerdict fix_verdict_ = FixVerdict::none;
   std::optional<RefusedFix> refused_fix_;
+  int gnss_agreed_ = 0;     // in a row
   bool corrected_ = false;  // the place was moved against the filter's word, not confirmed yet
   uint32_t reference_ = 0;
   uint32_t off_path_fixes_ = 0;  // since the last fix that was used
   double doubt_m_ = 0;           // camera and the rest contradict each other by so much since the reference
-  double doubt_behind_m_ = 0;    // a refused fix says that the train is so far behind
+  double time_doubt_m_ = 0;      // so far behind, because time without data may be no time but a clock that was set
+  int64_t gap_begin_ns_ = 0;
+  double doubt_behind_m_ = 0;  // a refused fix says that the train is so far behind
   double doubt_ahead_m_ = 0;
   double rest_distance_m_ = 0;
   int64_t rest_since_ns_ = 0;

@@ -17,7 +17,8 @@ constexpr double kNoCameraS = 0.3;
 constexpr int64_t kSnapshotNs = 50'000'000;
 constexpr int64_t kSlipUnseenNs = 1'200'000'000;  // a slip may have grown for so long before it is found
 constexpr int kJumpsToBelieve = 3;
-constexpr uint64_t kLateToReset = 100;
+constexpr size_t kBackwardToBelieve = 5;
+constexpr int64_t kSpacingNs = 10'000'000;  // of samples, about
 
 int64_t stamp_of(const Event& event) {
   return std::visit([](const auto& input) { return input.stamp_ns; }, event);
@@ -78,7 +79,9 @@ std::optional<TrainEstimate> Fusion::add(Event event) {
     now_.emplace(parameters_.get(), path_, (from_reference ? step->reference_stamp_ns : stamp_of(event)) - 1);
     snapshots_.push_back(*now_);
   }
+  if (is_clock_set_back(event)) return set_clock_back();
   if (!believable(event)) return std::nullopt;
+  newest_ns_[event.index()] = std::max(newest_ns_[event.index()], stamp_of(event));
   if (auto* fix = std::get_if<FixInput>(&event)) start_position(*fix);
   if (step) remember_reference(*step);
   return insert(event);
@@ -106,19 +109,45 @@ bool Fusion::believable(const Event& event) {
     return false;
   }
   ahead_in_row = 0;
-  if (stamp_ns > snapshots_.front().stamp_ns()) {
-    late_in_row_ = 0;
-    return true;
-  }
+  if (stamp_ns > snapshots_.front().stamp_ns()) return true;
   ++counts_.too_late;
-  if (++late_in_row_ < kLateToReset) return false;
-  late_in_row_ = 0;
+  return false;
+}
+
+// Samples of one sensor come in order, so several in a row that are older than their own kind's newest mean that the
+// clock was set back.
+bool Fusion::is_clock_set_back(const Event& event) {
+  if (std::holds_alternative<FixInput>(event) || std::holds_alternative<GnssInput>(event)) return false;
+  const int64_t newest_ns = newest_ns_[event.index()];
+  if (newest_ns == 0 || stamp_of(event) > newest_ns) {
+    backward_.clear();
+    return false;
+  }
+  if (backward_.empty()) before_backward_ = *now_;
+  backward_.push_back(event);
+  return backward_.size() >= kBackwardToBelieve;
+}
+
+// What the samples did to the state before the new clock was believed is undone; then they are used in it.
+std::optional<TrainEstimate> Fusion::set_clock_back() {
   ++counts_.clock_resets;
-  now_->rebase_clock(stamp_ns - 1);
+  const std::vector<Event> again = std::move(backward_);
+  backward_.clear();
+  int64_t first_ns = stamp_of(again.front());
+  for (const auto& event : again) first_ns = std::min(first_ns, stamp_of(event));
+  now_ = std::move(before_backward_);
+  before_backward_.reset();
+  now_->rebase_clock(first_ns - kSpacingNs);
   events_.clear();
   snapshots_.assign(1, *now_);
-  last_output_ns_ = 0;
-  return true;
+  newest_ns_.fill(0);
+  ahead_in_row_.fill(0);
+  last_output_ns_ = last_odometry_ns_ = 0;
+  std::optional<TrainEstimate> last;
+  for (const auto& event : again) {
+    if (auto state = add(event)) last = std::move(state);
+  }
+  return last;
 }
 
 void Fusion::start_position(FixInput& fix) const {

@@ -9,6 +9,7 @@
 #include <deque>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "fusion/fusion_parameters.hpp"
 #include "fusion/fusion_types.hpp"
@@ -48,6 +49,8 @@ class Fusion {
   Fusion(const FusionParameters& parameters, std::shared_ptr<const track::Map> map,
          std::shared_ptr<const track::Path> path);
   [[nodiscard]] bool believable(const Event& event);
+  [[nodiscard]] bool is_clock_set_back(const Event& event);
+  std::optional<TrainEstimate> set_clock_back();
   void start_position(FixInput& fix) const;
   void remember_reference(const OdometryInput& step);
   std::optional<TrainEstimate> insert(const Event& event);
@@ -66,7 +69,9 @@ class Fusion {
   FusionCounts counts_;
   int64_t last_output_ns_ = 0;
   int64_t last_odometry_ns_ = 0;
-  uint64_t late_in_row_ = 0;
+  std::array<int64_t, std::variant_size_v<Event>> newest_ns_{};  // of each kind
+  std::vector<Event> backward_;                                  // the last ones, each not newer than its kind's newest
+  std::optional<Hypotheses> before_backward_;                    // the state before them
   std::array<int, std::variant_size_v<Event>> ahead_in_row_{};
 };
 

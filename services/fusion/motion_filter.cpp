@@ -180,6 +180,13 @@ Offer MotionFilter::offer_position(double path_distance_m, double sigma_m, doubl
   return offer(h, path_distance_m - this->path_distance_m(), sigma_m, gate);
 }
 
+Offer MotionFilter::test_position(double path_distance_m, double sigma_m, double gate) const {
+  const double residual = path_distance_m - this->path_distance_m();
+  const double variance = squared(path_sigma_m()) + squared(sigma_m);
+  const double nis = squared(residual) / variance;
+  return {nis <= squared(gate), residual, nis};
+}
+
 Offer MotionFilter::offer_yaw_rate(double rate_rps, double curvature_per_m, double curvature_rate_per_m2,
                                    double sigma_rps, double gate) {
   const double speed_mps = this->speed_mps();
@@ -202,6 +209,30 @@ void MotionFilter::loosen_origin(double sigma_m) {
 void MotionFilter::set_origin(double path_distance_m, double sigma_m) {
   x_(index(StateIndex::origin)) = path_distance_m - value(StateIndex::distance);
   ud_.reset(index(StateIndex::origin), squared(sigma_m));
+}
+
+void MotionFilter::doubt_way(double sigma_m) {
+  const auto n = x_.size();
+  StateMatrix g = StateMatrix::Zero(n, 1);
+  g(index(StateIndex::odometer), 0) = 1;
+  g(index(StateIndex::distance), 0) = unit_scale();
+  g(index(StateIndex::wheel_odometer), 0) = 1 / to_unit(Odometer::wheel);
+  ud_.propagate(StateMatrix::Identity(n, n), g, StateVector::Constant(1, squared(sigma_m)));
+}
+
+void MotionFilter::place_like(const MotionFilter& other) {
+  const double distance_sigma_m = other.sigma(StateIndex::distance);
+  const double path_sigma_m = other.path_sigma_m();
+  x_(index(StateIndex::distance)) = other.value(StateIndex::distance);
+  x_(index(StateIndex::origin)) = other.value(StateIndex::origin);
+  ud_.reset(index(StateIndex::distance), squared(std::min(distance_sigma_m, path_sigma_m)));
+  ud_.reset(index(StateIndex::origin), squared(path_sigma_m));
+  reference_m_ = other.reference_m_;
+}
+
+void MotionFilter::forget_scale(Odometer odometer, double sigma) {
+  const auto state = odometer == unit_ ? StateIndex::unit_scale : StateIndex::other_scale;
+  ud_.inflate(index(state), squared(sigma));
 }
 
 double MotionFilter::sigma(StateIndex state) const {

@@ -67,6 +67,8 @@ class MotionFilter {
   Offer offer_wheel(double wheel_m, double sigma_m, double gate);
   Offer offer_acceleration(double accel_mps2, double sigma_mps2, double gate);
   Offer offer_position(double path_distance_m, double sigma_m, double gate);
+  /// Would it be used? Changes nothing.
+  [[nodiscard]] Offer test_position(double path_distance_m, double sigma_m, double gate) const;
   /// Turning against the map's curvature: where the curvature changes it says where the train is.
   Offer offer_yaw_rate(double rate_rps, double curvature_per_m, double curvature_rate_per_m2, double sigma_rps,
                        double gate);
@@ -77,6 +79,13 @@ class MotionFilter {
   void loosen_origin(double sigma_m);
   /// Path distance becomes `path_distance_m`, unknown within sigma, whatever it was.
   void set_origin(double path_distance_m, double sigma_m);
+
+  /// The train may have run so much more or less than was thought (unit metres).
+  void doubt_way(double sigma_m);
+  /// Takes over another filter's place (distance, path distance and their sigmas) as independent knowledge.
+  void place_like(const MotionFilter& other);
+  /// An odometer's scale may have become another one.
+  void forget_scale(Odometer odometer, double sigma);
 
   [[nodiscard]] int64_t stamp_ns() const { return stamp_ns_; }
   [[nodiscard]] double value(StateIndex state) const { return x_(index(state)); }

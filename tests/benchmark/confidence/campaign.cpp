@@ -7,7 +7,7 @@
 namespace railfix::train {
 namespace {
 
-constexpr size_t kBlock = 64;
+constexpr size_t kBlock = 8;
 
 struct Run {
   Fault fault;

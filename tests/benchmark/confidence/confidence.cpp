@@ -22,6 +22,7 @@ struct Arguments {
   double max_kmh = 150;
   int64_t run = -1;
   bool list = false;
+  bool sources = false;
 };
 
 std::vector<FaultName> faults_named(const std::string& text) {
@@ -38,10 +39,10 @@ std::vector<FaultName> faults_named(const std::string& text) {
 
 void leave_out(SimulationPlan& plan, const std::string& names) {
   const auto has = [&](const char* name) { return names.find(name) != std::string::npos; };
-  plan.camera = !has("camera");
-  plan.wheel = !has("wheel");
-  plan.imu = !has("imu");
-  plan.gnss = !has("gnss");
+  plan.camera = plan.camera && !has("camera");
+  plan.wheel = plan.wheel && !has("wheel");
+  plan.imu = plan.imu && !has("imu");
+  plan.gnss = plan.gnss && !has("gnss");
   if (has("landmarks")) plan.landmark_spacing_m = 0;
 }
 
@@ -72,6 +73,31 @@ void print(const CampaignResult& result) {
                 static_cast<unsigned long long>(bad.number), to_string(bad.fault.sensor).c_str(),
                 to_string(bad.fault.kind).c_str(), bad.fault.begin_s, bad.fault.end_s, bad.fault.size, bad.outside,
                 bad.excess_m, bad.unsaid);
+}
+
+// What each source is worth: the same runs without faults, with less and less.
+void compare_sources(const CampaignPlan& plan) {
+  std::printf("%-32s %9s %9s %9s %14s %9s\n", "sources", "p50 (m)", "p95 (m)", "max (m)", "interval (m)", "outside");
+  for (const auto& [name, without] :
+       std::vector<std::pair<std::string, std::string>>{{"all", ""},
+                                                        {"no GNSS", "gnss"},
+                                                        {"no landmarks", "landmarks"},
+                                                        {"camera, landmarks", "wheel,imu,gnss"},
+                                                        {"wheel, IMU, landmarks", "camera,gnss"},
+                                                        {"camera, wheel, IMU", "gnss,landmarks"},
+                                                        {"wheel, IMU", "camera,gnss,landmarks"},
+                                                        {"camera", "wheel,imu,gnss,landmarks"},
+                                                        {"wheel", "camera,imu,gnss,landmarks"},
+                                                        {"GNSS, IMU", "camera,wheel,landmarks"},
+                                                        {"landmarks, IMU", "camera,wheel,gnss"}}) {
+    CampaignPlan one = plan;
+    one.faults.clear();
+    leave_out(one.simulation, without);
+    auto sum = run_campaign(one).sum;
+    std::printf("%-32s %9.2f %9.2f %9.2f %14.1f %9zu\n", name.c_str(), quantile(sum.errors_m, 0.5),
+                quantile(sum.errors_m, 0.95), quantile(sum.errors_m, 1),
+                sum.width_sum_m / static_cast<double>(sum.states), sum.outside);
+  }
 }
 
 // One run, a line a second.
@@ -117,6 +143,7 @@ int run(int argc, char** argv) {
   app.add_option("--start", a.start, "EDGE:OFFSET[:+|-] on the map");
   app.add_option("--stanford", a.stanford, "Write the Stanford diagram (SVG)");
   app.add_option("--run", a.run, "Print one run of the campaign second by second");
+  app.add_flag("--sources", a.sources, "Without faults: a table of what each source is worth");
   app.add_flag("--list", a.list, "Print the faults");
   CLI11_PARSE(app, argc, argv);
   if (a.list) {
@@ -129,6 +156,10 @@ int run(int argc, char** argv) {
   load_map(a);
   if (a.run >= 0) {
     trace(a.plan, static_cast<uint64_t>(a.run));
+    return 0;
+  }
+  if (a.sources) {
+    compare_sources(a.plan);
     return 0;
   }
   const auto result = run_campaign(a.plan);
