@@ -184,8 +184,9 @@ std::optional<TrainEstimate> Fusion::insert(const Event& event) {
     ++next;
     if (now_->main().slip_began()) {
       const int64_t found_ns = now_->stamp_ns();
+      const uint32_t slipping = now_->slipping();
       next = rewind_before(found_ns - kSlipUnseenNs);
-      now_->block_wheel_until(found_ns);
+      now_->block_wheel_until(found_ns, slipping);
       snapshots_.back() = *now_;
     }
   }

@@ -108,11 +108,23 @@ void Hypotheses::rebase_clock(int64_t stamp_ns) {
   suspect_.reset();
 }
 
-void Hypotheses::block_wheel_until(int64_t stamp_ns) {
-  main_.block_wheel_until(stamp_ns);
-  if (without_last_fix_) without_last_fix_->block_wheel_until(stamp_ns);
-  for (auto& rival : rivals_) {
-    if (rival.estimator) rival.estimator->block_wheel_until(stamp_ns);
+uint32_t Hypotheses::slipping() const {
+  uint32_t bits = main_.watch(Source::wheel).isolated ? 1U : 0U;
+  for (size_t i = 0; i < rivals_.size(); ++i) {
+    const auto& estimator = rivals_[i].estimator;
+    if (estimator && estimator->watch(Source::wheel).isolated) bits |= 2U << i;
+  }
+  return bits;
+}
+
+void Hypotheses::block_wheel_until(int64_t stamp_ns, uint32_t slipping) {
+  if ((slipping & 1U) != 0) {
+    main_.block_wheel_until(stamp_ns);
+    if (without_last_fix_) without_last_fix_->block_wheel_until(stamp_ns);
+  }
+  for (size_t i = 0; i < rivals_.size(); ++i) {
+    auto& estimator = rivals_[i].estimator;
+    if (estimator && (slipping & (2U << i)) != 0) estimator->block_wheel_until(stamp_ns);
   }
 }
 

@@ -22,7 +22,10 @@ class Hypotheses {
   void apply(const Event& event);
   void predict_to(int64_t stamp_ns);
   void rebase_clock(int64_t stamp_ns);
-  void block_wheel_until(int64_t stamp_ns);
+  /// Which of the estimators have found that the wheel slips: a bit each.
+  [[nodiscard]] uint32_t slipping() const;
+  /// Those do without wheel samples up to this stamp; what one has found says nothing of the others.
+  void block_wheel_until(int64_t stamp_ns, uint32_t slipping);
   [[nodiscard]] TrainEstimate estimate() const;
 
   [[nodiscard]] int64_t stamp_ns() const { return main_.stamp_ns(); }
