@@ -25,8 +25,6 @@ constexpr double kRebaseS = 0.1;   // lost when the clock is set
 constexpr double kRhythmS = 0.003;
 constexpr double kGapS = 0.05;
 constexpr int kRhythmSamples = 10;
-constexpr double kBanS = 30.0;
-constexpr double kReturnScaleSigma = 0.05;
 constexpr double kOffTrackM = 15.0;  // a GNSS fix further beside the track is none
 
 double gnss_sigma_m(const GnssInput& sample, const FusionParameters& p) {
@@ -80,7 +78,6 @@ void Estimator::rebase_clock(int64_t stamp_ns) {
     watch.seen_ns = std::min(watch.seen_ns, stamp_ns);
     watch.used_ns = std::min(watch.used_ns, stamp_ns);
     watch.changed_ns = std::min(watch.changed_ns, stamp_ns);
-    watch.banned_until_ns = std::min(watch.banned_until_ns, stamp_ns + core::to_ns(kBanS));
   }
   accel_ = {};
   yaw_ = {};
@@ -117,11 +114,6 @@ bool Estimator::knows_motion() const {
          (lately && used_within(Source::imu, kLatelyS));
 }
 
-int Estimator::motion_sensors() const {
-  return static_cast<int>(used_within(Source::camera, kLatelyS)) +
-         static_cast<int>(used_within(Source::wheel, kLatelyS)) + static_cast<int>(used_within(Source::imu, kLatelyS));
-}
-
 // A sample that comes out of rhythm may have another clock behind it: then the way run by time alone is in doubt by as
 // much, and the sample itself says how far the train ran.
 void Estimator::doubt_time(const SensorWatch& watch, Rhythm& rhythm, int64_t stamp_ns) {
@@ -147,31 +139,6 @@ void Estimator::place_like(const Estimator& other) {
   reference_ = other.reference_;
 }
 
-void Estimator::ban(Source source, const SensorWatch& known) {
-  auto& w = watched(source);
-  w = known;
-  w.refused = 0;
-  w.isolate(stamp_ns_);
-  w.banned_until_ns = stamp_ns_ + core::to_ns(kBanS);
-}
-
-// While a source is banned its samples only show that it is there.
-bool Estimator::banned(Source source, int64_t stamp_ns) {
-  auto& w = watched(source);
-  w.seen_ns = std::max(w.seen_ns, stamp_ns);
-  if (w.banned_until_ns == 0) return false;
-  if (stamp_ns < w.banned_until_ns) return true;
-  w.banned_until_ns = 0;
-  readmit(source);
-  return false;
-}
-
-// It may be right again, with another scale than before.
-void Estimator::readmit(Source source) {
-  if (source == Source::camera) filter_.forget_scale(Odometer::camera, kReturnScaleSigma);
-  if (source == Source::wheel) filter_.forget_scale(Odometer::wheel, kReturnScaleSigma);
-}
-
 // Nothing from any sensor for a while: the clock may have been set forward. What counts way over the gap tells.
 void Estimator::notice_gap(int64_t stamp_ns) {
   const double gap_s = core::seconds(stamp_ns - stamp_ns_);
@@ -191,10 +158,7 @@ void Estimator::use(const PictureInput& picture) {
 void Estimator::use(const OdometryInput& step) {
   auto& camera = watched(Source::camera);
   if (step.valid) doubt_time(camera, pictures_, step.stamp_ns);
-  if (banned(Source::camera, step.stamp_ns)) {
-    slip_watch_.no_picture();
-    return;
-  }
+  camera.seen_ns = step.stamp_ns;
   if (step.valid) {
     if (filter_.unit() == Odometer::none) filter_.choose_unit(Odometer::camera, *parameters_);
     const double sigma_m = std::hypot(step.step_sigma_m, parameters_->step_sigma_floor_m);
@@ -243,10 +207,7 @@ void Estimator::isolate_wheel() {
 void Estimator::use(const WheelInput& sample) {
   auto& watch = watched(Source::wheel);
   if (!watch.isolated) doubt_time(watch, pulses_, sample.stamp_ns);
-  if (banned(Source::wheel, sample.stamp_ns)) {
-    wheel_.window_begin_ns = sample.stamp_ns;
-    return;
-  }
+  watch.seen_ns = sample.stamp_ns;
   const double sigma_m = std::hypot(1 / sample.pulses_per_metre / std::sqrt(12.0), 0.001);
   const bool first = !wheel_.first_pulses;
   if (first) wheel_.first_pulses = sample.pulses;
@@ -295,7 +256,7 @@ std::optional<double> Estimator::Mean::add(int64_t stamp_ns, double value, doubl
 
 void Estimator::use(const ImuInput& sample) {
   auto& imu = watched(Source::imu);
-  if (banned(Source::imu, sample.stamp_ns)) return;
+  imu.seen_ns = sample.stamp_ns;
   const auto accel_mps2 = accel_.add(sample.stamp_ns, sample.accel_x_mps2, parameters_->imu_period_s);
   const auto rate_rps = yaw_.add(sample.stamp_ns, sample.rate_z_rps, parameters_->gyro_period_s);
   if (accel_mps2 || rate_rps) predict_to(sample.stamp_ns);

@@ -22,7 +22,6 @@ struct SensorWatch {
   int refused = 0;  // in a row
   bool isolated = false;
   int64_t changed_ns = 0;  // when it was isolated, or taken back
-  int64_t banned_until_ns = 0;
 
   void accept(int64_t stamp_ns) {
     used_ns = stamp_ns;
@@ -58,17 +57,12 @@ class Estimator {
   [[nodiscard]] double distance_m() const { return filter_.value(StateIndex::distance); }
   /// Camera or wheel measured lately and was believed, or the IMU bridges a short while without them.
   [[nodiscard]] bool knows_motion() const;
-  /// Camera, wheel and IMU, as far as they measured lately and were believed.
-  [[nodiscard]] int motion_sensors() const;
   /// No motion sensor is isolated.
   [[nodiscard]] bool is_consistent() const;
   /// GNSS has agreed with the motion for a while.
   [[nodiscard]] bool gnss_proven() const { return gnss_agreed_ >= kGnssProof; }
   /// Takes over place and speed, as independent knowledge.
   void place_like(const Estimator& other);
-  /// Leaves a source out for a while: the other estimators showed that it is wrong. watch: what was known of it.
-  void ban(Source source, const SensorWatch& watch);
-  [[nodiscard]] bool is_banned(Source source) const { return watch(source).banned_until_ns > stamp_ns_; }
   /// The state with this promised interval; since_sure_m: way since the last place that is beyond doubt.
   /// REQUIRES: predict_to(stamp_ns()) was the last call (as for interval()).
   [[nodiscard]] TrainEstimate estimate(const Interval& promised, double since_sure_m) const;
@@ -130,8 +124,6 @@ class Estimator {
   void use(const PictureInput& picture);
   void compare_with_wheel(const OdometryInput& step, double sigma_m);
   void isolate_wheel();
-  void readmit(Source source);
-  bool banned(Source source, int64_t stamp_ns);
   void recover_wheel(const WheelInput& sample, double wheel_m, double sigma_m);
   void use_yaw_rate(double rate_rps);
   void refuse(const FixInput& fix, double path_distance_m, const Offer& offer);

@@ -10,8 +10,6 @@ namespace railfix::fusion {
 namespace {
 
 constexpr double kSureProbability = 0.999;  // from here on a fix needs no second one
-constexpr double kVoteS = 1.0;              // the others must agree for so long before one source is left out
-constexpr double kSeparateSigmas = 3.0;
 constexpr double kRivalGoneS = 1.0;
 
 Source source_of(const Event& event) {
@@ -44,7 +42,6 @@ void Hypotheses::apply(const Event& event) {
   }
   if (source == Source::camera || source == Source::wheel) {
     ask_rivals();
-    vote();
   }
 }
 
@@ -56,38 +53,17 @@ void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
     if (rival.estimator) rival.estimator->apply(event);
   }
   if (!main_.fix_used()) {
-    if (main_.fix_refused()) fix_refused(event, std::move(before));
+    if (!without_last_fix_ || !main_.fix_refused()) return;
+    // The new fix contradicts the last one: if it agrees with what was known before, the last one was false.
+    Estimator other = *without_last_fix_;
+    other.apply(event);
+    if (other.fix_used()) main_ = std::move(other);
     return;
   }
   without_last_fix_.reset();
   if (!fix.new_path && fix.probability < kSureProbability) without_last_fix_ = std::move(before);
-  held_ = {};
   for (auto& rival : rivals_) rival.excess = rival.carried = {};
   ask_rivals();
-}
-
-// Either a source has led the main estimator astray and the one without it knows better, or the last fix was false.
-void Hypotheses::fix_refused(const Event& event, Estimator&& before) {
-  if (const Rival* rival = rival_for(before)) {
-    take(*rival);
-    without_last_fix_ = std::move(before);
-    return;
-  }
-  if (!without_last_fix_) return;
-  Estimator other = *without_last_fix_;
-  other.apply(event);
-  if (other.fix_used()) main_ = std::move(other);
-}
-
-const Hypotheses::Rival* Hypotheses::rival_for(const Estimator& before) const {
-  for (const auto& rival : rivals_) {
-    if (!rival.asked || main_.is_banned(rival.without)) continue;
-    const auto& other = *rival.estimator;
-    if (!other.fix_used()) continue;
-    const double apart_m = std::abs(other.centre_m() - before.centre_m());
-    if (apart_m > kSeparateSigmas * std::hypot(before.sigma_m(), other.sigma_m())) return &rival;
-  }
-  return nullptr;
 }
 
 void Hypotheses::predict_to(int64_t stamp_ns) {
@@ -105,7 +81,6 @@ void Hypotheses::rebase_clock(int64_t stamp_ns) {
     if (rival.estimator) rival.estimator->rebase_clock(stamp_ns);
     rival.asked_ns = std::min(rival.asked_ns, stamp_ns);
   }
-  suspect_.reset();
 }
 
 uint32_t Hypotheses::slipping() const {
@@ -165,43 +140,8 @@ void Hypotheses::ask(Rival& rival) {
   rival.excess.ahead_m = std::max(rival.carried.ahead_m, its.ahead_m - mine.ahead_m);
 }
 
-// When the main estimator contradicts itself and only one source, left out, makes two others agree, that one is wrong.
-void Hypotheses::vote() {
-  std::optional<Source> suspect;
-  if (!main_.is_consistent()) {
-    int explanations = 0;
-    for (const auto& rival : rivals_) {
-      if (!rival.asked || rival.without == Source::gnss || rival.estimator->motion_sensors() < 2) continue;
-      ++explanations;
-      suspect = rival.without;
-    }
-    if (explanations != 1 || main_.watch(*suspect).isolated) suspect.reset();
-  }
-  const int64_t now_ns = main_.filter().stamp_ns();
-  if (suspect != suspect_) suspect_since_ns_ = now_ns;
-  suspect_ = suspect;
-  if (!suspect || core::seconds(now_ns - suspect_since_ns_) < kVoteS) return;
-  for (const auto& rival : rivals_) {
-    if (rival.without == *suspect) take(rival);
-  }
-  suspect_.reset();
-}
-
-// The interval goes on to hold what it held.
-void Hypotheses::take(const Rival& rival) {
-  const Interval before = promised(main_.interval());
-  const auto watch = main_.watch(rival.without);
-  main_ = *rival.estimator;
-  main_.ban(rival.without, watch);
-  const Interval after = main_.interval();
-  held_.behind_m = std::max(0.0, after.behind_m - before.behind_m);
-  held_.ahead_m = std::max(0.0, before.ahead_m - after.ahead_m);
-  for (auto& each : rivals_) each.excess = each.carried = {};
-  ask_rivals();
-}
-
 Interval Hypotheses::promised(const Interval& main) const {
-  Excess most = held_;
+  Excess most;
   for (const auto& rival : rivals_) {
     most.behind_m = std::max(most.behind_m, rival.excess.behind_m);
     most.ahead_m = std::max(most.ahead_m, rival.excess.ahead_m);

@@ -47,22 +47,15 @@ class Hypotheses {
   };
 
   void apply_fix(const FixInput& fix, const Event& event);
-  void fix_refused(const Event& event, Estimator&& before);
   void begin_rival(Source source);
   void ask_rivals();
   void ask(Rival& rival);
-  void vote();
-  void take(const Rival& rival);
-  [[nodiscard]] const Rival* rival_for(const Estimator& before) const;
   [[nodiscard]] Interval promised(const Interval& main) const;
 
   const FusionParameters* parameters_;
   Estimator main_;
   std::optional<Estimator> without_last_fix_;
   std::array<Rival, 4> rivals_;
-  Excess held_;  // of the estimators that were main before
-  std::optional<Source> suspect_;
-  int64_t suspect_since_ns_ = 0;
 };
 
 }  // namespace railfix::fusion

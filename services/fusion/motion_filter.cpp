@@ -230,11 +230,6 @@ void MotionFilter::place_like(const MotionFilter& other) {
   reference_m_ = other.reference_m_;
 }
 
-void MotionFilter::forget_scale(Odometer odometer, double sigma) {
-  const auto state = odometer == unit_ ? StateIndex::unit_scale : StateIndex::other_scale;
-  ud_.inflate(index(state), squared(sigma));
-}
-
 double MotionFilter::sigma(StateIndex state) const {
   return std::sqrt(ud_.variance(index(state)));
 }

@@ -84,8 +84,6 @@ class MotionFilter {
   void doubt_way(double sigma_m);
   /// Takes over another filter's place (distance, path distance and their sigmas) as independent knowledge.
   void place_like(const MotionFilter& other);
-  /// An odometer's scale may have become another one.
-  void forget_scale(Odometer odometer, double sigma);
 
   [[nodiscard]] int64_t stamp_ns() const { return stamp_ns_; }
   [[nodiscard]] double value(StateIndex state) const { return x_(index(state)); }

@@ -49,6 +49,9 @@ TrainSimulation simulation_of(const CampaignPlan& plan, uint64_t number) {
   if (!none) {
     const auto& [sensor, kind] = plan.faults[number % plan.faults.size()];
     one.fault = random_fault(random, sensor, kind, plan.duration_s);
+    // Slip is a fault of its own: not while another motion sensor is wrong (tunnels, outages and false fixes stay).
+    one.slip = one.slip &&
+               (sensor == Sensor::wheel || sensor == Sensor::gnss || sensor == Sensor::fix || sensor == Sensor::clock);
   }
   if (!plan.map) return TrainSimulation(one, seed);
   return TrainSimulation(one, seed, plan.map, plan.starts[number % plan.starts.size()]);
