@@ -18,8 +18,9 @@ constexpr float kSteepest = 6.0F;   // whole steps
 constexpr float kDarkGrey = 8.0F;
 constexpr int kEdgeRows = 24;  // of edge behind its beginning
 constexpr int kFreeRows = 10;  // without edge in front of it
+constexpr double kNearestEndM = 8.0;
 constexpr float kEdgeLevel = 0.75F;
-constexpr float kFreeLevel = 0.3F;
+constexpr float kFreeLevel = 0.35F;  // of the edge
 
 }  // namespace
 
@@ -29,6 +30,7 @@ PlatformSearch::PlatformSearch(const geometry::Intrinsics& camera)
   steps_.create(rows_, kColumns, CV_32F);
   sums_.resize(static_cast<size_t>(rows_) + 1);
   steep_sums_.resize(sums_.size());
+  first_row_.resize(kColumns);
   found_.reserve(8);
 }
 
@@ -56,16 +58,16 @@ void PlatformSearch::look(const LandmarkPicture& picture, int side) {
 }
 
 void PlatformSearch::rate_steps() {
-  first_row_ = 0;
+  std::fill(first_row_.begin(), first_row_.end(), 0);
   for (int row = 0; row < rows_; ++row) {
     const float* grey = grey_.ptr<float>(row);
     float* step = steps_.ptr<float>(row);
     std::fill(step, step + kColumns, 0.0F);
-    if (*std::min_element(grey, grey + kColumns) < 0) {
-      first_row_ = row + 1;
-      continue;
-    }
     for (int c = kEdge; c + kEdge < kColumns; ++c) {
+      if (*std::min_element(grey + c - kEdge, grey + c + kEdge + 1) < 0) {
+        first_row_[static_cast<size_t>(c)] = row + 1;
+        continue;
+      }
       const float inner = grey[c - 1] + grey[c - 2] + grey[c - 3];
       const float outer = grey[c + 1] + grey[c + 2] + grey[c + 3];
       step[c] = std::clamp((outer - inner) / (kFullStep * std::max(inner + outer, 6 * kDarkGrey)) * 2.0F, -kSteepest,
@@ -79,23 +81,26 @@ void PlatformSearch::collect(int side, double polarity) {
   Best end;
   for (int c = kEdge + 1; c + kEdge + 1 < kColumns; ++c) {
     add_up(c, static_cast<float>(polarity));
-    for (int row = first_row_ + kFreeRows; row + kEdgeRows < rows_; ++row) {
+    const int first_row = std::max(first_row_[static_cast<size_t>(c - 1)], first_row_[static_cast<size_t>(c + 1)]);
+    for (int row = first_row + kFreeRows; row + kEdgeRows < rows_; ++row) {
       rate(begin, c, row, row, row + kEdgeRows, row - kFreeRows, row);
     }
-    for (int row = first_row_ + kEdgeRows; row + kFreeRows < rows_; ++row) {
+    for (int row = first_row + kEdgeRows; row + kFreeRows < rows_; ++row) {
       rate(end, c, row, row - kEdgeRows, row, row, row + kFreeRows);
     }
   }
   for (const Best* best : {&begin, &end}) {
-    if (best->steepness <= 0) continue;
+    if (best->edge <= 0) continue;
     const bool begins = best == &begin;
+    // Nearer there are too few rows of the edge left, and the place would be a guess.
+    if (!begins && kNearM + best->row * kRowM < kNearestEndM) continue;
     // Where the step would have to be cut off to be as long as it is in the rows around.
     add_up(best->column, static_cast<float>(polarity));
-    const double edge_rows =
-        (mean(best->row - kFreeRows, best->row + kFreeRows) - best->free) * 2 * kFreeRows / (best->edge - best->free);
+    const float around = steep_mean(best->row - kFreeRows, best->row + kFreeRows);
+    const double edge_rows = static_cast<double>((around - best->free) / (best->edge - best->free)) * 2 * kFreeRows;
     const double at = begins ? best->row + kFreeRows - edge_rows : best->row - kFreeRows + edge_rows;
     found_.push_back({side, begins, kNearM + (at - 0.5) * kRowM, kInnerM + best->column * kColumnM,
-                      static_cast<double>(best->edge - best->free)});
+                      1 - static_cast<double>(best->free / best->edge)});
   }
 }
 
@@ -110,19 +115,21 @@ void PlatformSearch::add_up(int column, float sign) {
   }
 }
 
-float PlatformSearch::mean(int first, int last) const {
-  return (sums_[static_cast<size_t>(last)] - sums_[static_cast<size_t>(first)]) / static_cast<float>(last - first);
+float PlatformSearch::steep_mean(int first, int last) const {
+  return (steep_sums_[static_cast<size_t>(last)] - steep_sums_[static_cast<size_t>(first)]) /
+         static_cast<float>(last - first);
 }
 
+// The stones behind an end have steps, too; how steep they are against the edge's own tells them apart.
 void PlatformSearch::rate(Best& best, int column, int row, int first_edge, int last_edge, int first_free,
                           int last_free) const {
-  const float edge = mean(first_edge, last_edge);
-  if (edge < kEdgeLevel) return;
-  const float free = mean(first_free, last_free);
-  if (free > kFreeLevel) return;
-  const float steepness =
-      (steep_sums_[static_cast<size_t>(last_edge)] - steep_sums_[static_cast<size_t>(first_edge)]) * (edge - free);
-  if (steepness > best.steepness) best = {column, row, edge, free, steepness};
+  const auto last = static_cast<size_t>(last_edge);
+  const auto first = static_cast<size_t>(first_edge);
+  if (sums_[last] - sums_[first] < kEdgeLevel * static_cast<float>(last_edge - first_edge)) return;
+  const float edge = steep_mean(first_edge, last_edge);
+  const float free = steep_mean(first_free, last_free);
+  if (free > kFreeLevel * edge || edge - free < best.edge - best.free) return;
+  best = {column, row, edge, free};
 }
 
 }  // namespace railfix::track_detector

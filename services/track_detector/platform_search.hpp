@@ -34,19 +34,18 @@ class PlatformSearch {
   struct Best {
     int column = 0;
     int row = 0;
-    float edge = 0, free = 0;
-    float steepness = 0;
+    float edge = 0, free = 0;  // mean steps there
   };
   void collect(int side, double polarity);
   void add_up(int column, float sign);
-  [[nodiscard]] float mean(int first, int last) const;
+  [[nodiscard]] float steep_mean(int first, int last) const;
   void rate(Best& best, int column, int row, int first_edge, int last_edge, int first_free, int last_free) const;
 
   PictureLines lines_;
   int rows_ = 0;
-  int first_row_ = 0;
-  cv::Mat grey_;   // CV_32F, rows near to far, columns outward
-  cv::Mat steps_;  // whole steps, brighter outward positive
+  std::vector<int> first_row_;  // of each column that is in the picture
+  cv::Mat grey_;                // CV_32F, rows near to far, columns outward
+  cv::Mat steps_;               // whole steps, brighter outward positive
   std::vector<float> sums_, steep_sums_;
   std::vector<PlatformMark> found_;
 };

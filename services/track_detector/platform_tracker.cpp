@@ -7,21 +7,30 @@ namespace railfix::track_detector {
 namespace {
 
 constexpr double kFollowM = 0.6;
-constexpr double kSidewaysM = 0.15;
+constexpr double kSidewaysM = 0.07;
 constexpr int kMostMissed = 4;
-constexpr int kFewestPictures = 5;
+constexpr size_t kFewestPictures = 8;
+constexpr double kPairM = 3;       // way between two looks that tell the factor
+constexpr double kCorrelated = 1;  // so many neighbouring looks err together
+constexpr double kKeptShare = 0.5;
 constexpr double kSeenShare = 0.6;
-constexpr double kShortestWayM = 9;      // on which it is followed
-constexpr double kLongestGapM = 8.3;     // it is followed to here at least
-constexpr double kUsualLateralM = 1.68;  // of platform edges
-constexpr double kLateralSigmaM = 0.05;
+constexpr double kShortestWayM = 9;          // on which it is followed
+constexpr double kLongestGapM = 11;          // it is followed to here at least
+constexpr double kUsualLateralM = 1.68;      // of platform edges
+constexpr double kLateralSigmaM = 0.15;      // lines are painted behind them
 constexpr double kFactors[] = {0.90, 1.20};  // heights 0.3 to 0.9 m
-constexpr double kFactorsAgree = 0.08;
+constexpr double kFactorsAgree = 0.12;
+constexpr double kWorstSigmaM = 0.30;
 constexpr double kSamePlatformM = 3;
+constexpr double kHoldM = 3;
+constexpr double kWorseSigma = 1.6;
 constexpr double kSpotSigmaM = 0.06;
 constexpr double kSpotPerM = 0.0012;  // times the distance squared
-constexpr double kWorstFit = 3.0;     // of the spot sigma
-constexpr double kEndSigmaM = 0.12;   // how an end looks differs
+constexpr double kEndSigmaM = 0.08;   // how an end looks differs
+
+bool between(double value, const double (&range)[2]) {
+  return value >= range[0] && value <= range[1];
+}
 
 double spot_sigma(double ahead_m) {
   return kSpotSigmaM + kSpotPerM * ahead_m * ahead_m;
@@ -34,6 +43,8 @@ constexpr size_t kUsuallyFollowed = 64;
 PlatformTracker::PlatformTracker() {
   marks_.reserve(kUsuallyFollowed);
   settled_.reserve(kUsuallyFollowed);
+  held_.reserve(kUsuallyFollowed);
+  slopes_.reserve(kMostMarks * kMostMarks / 2);
 }
 
 const std::vector<SettledPlatform>& PlatformTracker::follow(const std::vector<PlatformMark>& found, double way_m) {
@@ -64,27 +75,42 @@ const std::vector<SettledPlatform>& PlatformTracker::follow(const std::vector<Pl
     if (mark.hit) continue;
     ++mark.missed;
     if (mark.missed <= kMostMissed) continue;
-    const auto settled = settle(mark);
-    double& last_m = last_m_[mark.side > 0 ? 1 : 0];
-    if (!settled || std::abs(settled->place_m - last_m) < kSamePlatformM) continue;
-    last_m = settled->place_m;
-    settled_.push_back(*settled);
+    if (const auto settled = settle(mark)) hold(*settled, mark, way_m);
   }
+  release(way_m);
   std::erase_if(marks_, [](const Mark& mark) { return mark.missed > kMostMissed; });
   return settled_;
 }
 
+// The edge and the lines along it end at the same place: the one that is measured best counts.
+void PlatformTracker::hold(const SettledPlatform& settled, const Mark& mark, double way_m) {
+  if (std::abs(settled.place_m - last_m_[mark.side > 0 ? 1 : 0]) < kSamePlatformM) return;
+  for (Held& held : held_) {
+    if (held.side != mark.side || std::abs(held.settled.place_m - settled.place_m) > kSamePlatformM) continue;
+    // The land behind an end looks like more edge.
+    const bool tighter =
+        mark.begins ? settled.pictures > held.settled.pictures : settled.place_m < held.settled.place_m;
+    if (tighter && settled.sigma_m < kWorseSigma * held.settled.sigma_m) held.settled = settled;
+    return;
+  }
+  held_.push_back({settled, mark.side, way_m});
+}
+
+void PlatformTracker::release(double way_m) {
+  for (const Held& held : held_) {
+    if (way_m - held.way_m < kHoldM) continue;
+    last_m_[held.side > 0 ? 1 : 0] = held.settled.place_m;
+    settled_.push_back(held.settled);
+  }
+  std::erase_if(held_, [way_m](const Held& held) { return way_m - held.way_m >= kHoldM; });
+}
+
 void PlatformTracker::add(Mark& mark, const PlatformMark& found, double way_m) {
-  const double sigma_m = spot_sigma(found.ahead_m);
-  const double weight = 1 / (sigma_m * sigma_m);
-  const double x = way_m - mark.first_way_m;
-  mark.w += weight;
-  mark.wx += weight * x;
-  mark.wy += weight * found.ahead_m;
-  mark.wxx += weight * x * x;
-  mark.wxy += weight * x * found.ahead_m;
-  mark.wyy += weight * found.ahead_m * found.ahead_m;
-  mark.beside += weight * found.beside_m;
+  if (mark.count == kMostMarks) {
+    for (size_t i = 0; 2 * i < kMostMarks; ++i) mark.measured[i] = mark.measured[2 * i + 1];
+    mark.count = kMostMarks / 2;
+  }
+  mark.measured[mark.count++] = {way_m - mark.first_way_m, found.ahead_m, found.beside_m};
   mark.last_way_m = way_m;
   mark.last_ahead_m = found.ahead_m;
   mark.beside_m = found.beside_m;
@@ -94,33 +120,73 @@ void PlatformTracker::add(Mark& mark, const PlatformMark& found, double way_m) {
   ++mark.seen;
 }
 
-// ahead = factor * (place - way), with the factor known from where it lies beside the track, too.
+// Median over pairs of looks, which a few wrong ones do not move; 0 = too few.
+double PlatformTracker::usual_factor(const Mark& mark) {
+  slopes_.clear();
+  for (size_t i = 0; i < mark.count; ++i) {
+    for (size_t k = i + 1; k < mark.count; ++k) {
+      const double way_m = mark.measured[k].way_m - mark.measured[i].way_m;
+      if (way_m > kPairM) slopes_.push_back((mark.measured[i].ahead_m - mark.measured[k].ahead_m) / way_m);
+    }
+  }
+  if (slopes_.size() < kFewestPictures) return 0;
+  std::nth_element(slopes_.begin(), slopes_.begin() + slopes_.size() / 2, slopes_.end());
+  return slopes_[slopes_.size() / 2];
+}
+
+// ahead = factor * (place - way), with the factor known from where it lies beside the track, too. Cauchy weights.
 std::optional<SettledPlatform> PlatformTracker::settle(const Mark& mark) {
-  if (mark.seen < kFewestPictures || mark.seen < kSeenShare * (mark.seen + mark.gaps)) return std::nullopt;
+  if (mark.seen < static_cast<int>(kFewestPictures) || mark.seen < kSeenShare * (mark.seen + mark.gaps))
+    return std::nullopt;
   if (mark.last_ahead_m > kLongestGapM || mark.last_way_m - mark.first_way_m < kShortestWayM) return std::nullopt;
-  const double mx = mark.wx / mark.w;
-  const double my = mark.wy / mark.w;
-  const double sxx = mark.wxx - mark.w * mx * mx;
-  const double sxy = mark.wxy - mark.w * mx * my;
-  const double syy = mark.wyy - mark.w * my * my;
-  const double beside_m = mark.beside / mark.w;
-  const double by_motion = sxx > 0 ? -sxy / sxx : 0;
-  const double motion_sigma = 2.0 / std::sqrt(std::max(sxx, 1e-6));
-  const double by_side = beside_m / kUsualLateralM;
-  const double side_sigma = kLateralSigmaM / kUsualLateralM * by_side;
-  if (by_motion < kFactors[0] || by_motion > kFactors[1]) return std::nullopt;
-  if (by_side < kFactors[0] || by_side > kFactors[1]) return std::nullopt;
-  if (std::abs(by_motion - by_side) > kFactorsAgree) return std::nullopt;
-  const double wm = 1 / (motion_sigma * motion_sigma);
-  const double ws = 1 / (side_sigma * side_sigma);
-  const double factor = (wm * by_motion + ws * by_side) / (wm + ws);
-  const double squared = (syy + 2 * factor * sxy + factor * factor * sxx) / mark.seen;
-  if (squared > kWorstFit * kWorstFit) return std::nullopt;
-  const double ahead_m = my / factor;
-  const double factor_sigma = 1 / std::sqrt(wm + ws);
-  const double sigma_m =
-      std::hypot(ahead_m * factor_sigma / factor, std::sqrt(std::max(1.0, squared) / mark.w), kEndSigmaM);
-  return SettledPlatform{mark.first_way_m + mx + ahead_m, mark.side * beside_m / factor, sigma_m, mark.seen};
+  double factor = usual_factor(mark);
+  if (!between(factor, kFactors)) return std::nullopt;
+  slopes_.clear();
+  for (size_t i = 0; i < mark.count; ++i) slopes_.push_back(mark.measured[i].way_m + mark.measured[i].ahead_m / factor);
+  std::nth_element(slopes_.begin(), slopes_.begin() + slopes_.size() / 2, slopes_.end());
+  double place_m = slopes_[slopes_.size() / 2];
+  double factor_variance = 0;
+  double place_variance = 0;
+  double beside_m = 0;
+  double kept = 0;
+  double scatter = 1;  // of the marks, in their sigmas
+  for (int pass = 0; pass < 6; ++pass) {
+    double w = 0, wx = 0, wy = 0, wxx = 0, wxy = 0, wb = 0;
+    double squared = 0;
+    kept = 0;
+    for (size_t i = 0; i < mark.count; ++i) {
+      const Measurement& m = mark.measured[i];
+      const double sigma_m = spot_sigma(m.ahead_m);
+      const double off = (m.ahead_m - factor * (place_m - m.way_m)) / (2 * sigma_m);
+      const double trust = 1 / (1 + off * off);
+      const double weight = trust / (sigma_m * sigma_m);
+      kept += trust;
+      squared += trust * 4 * off * off;
+      w += weight;
+      wx += weight * m.way_m;
+      wy += weight * m.ahead_m;
+      wxx += weight * m.way_m * m.way_m;
+      wxy += weight * m.way_m * m.ahead_m;
+      wb += weight * m.beside_m;
+    }
+    scatter = std::max(0.5, squared / kept);
+    const double mx = wx / w;
+    const double my = wy / w;
+    beside_m = wb / w;
+    const double by_side = beside_m / kUsualLateralM;
+    const double side_weight = std::pow(kUsualLateralM / (kLateralSigmaM * by_side), 2);
+    const double motion_weight = (wxx - w * mx * mx) / kCorrelated;
+    factor = (side_weight * by_side - (wxy - w * mx * my) / kCorrelated) / (side_weight + motion_weight);
+    place_m = mx + my / factor;
+    factor_variance = 1 / (side_weight + motion_weight);
+    place_variance = (kCorrelated / w + std::pow(my / factor, 2) * factor_variance) / (factor * factor);
+    if (!between(factor, kFactors) || !between(by_side, kFactors) || std::abs(factor - by_side) > kFactorsAgree)
+      return std::nullopt;
+  }
+  if (kept < kKeptShare * static_cast<double>(mark.count)) return std::nullopt;
+  const double sigma_m = std::hypot(std::sqrt(scatter * place_variance), kEndSigmaM);
+  if (sigma_m > kWorstSigmaM) return std::nullopt;
+  return SettledPlatform{mark.first_way_m + place_m, mark.side * beside_m / factor, sigma_m, mark.seen};
 }
 
 }  // namespace railfix::track_detector

@@ -9,6 +9,8 @@
 
 namespace railfix::track_detector {
 
+constexpr size_t kMostMarks = 40;
+
 struct SettledPlatform {
   double place_m = 0;  // on the scale of the way
   double lateral_m = 0;
@@ -23,26 +25,41 @@ class PlatformTracker {
   PlatformTracker();
   /// Marks of the picture at way_m. Gives what is settled now; valid until the next call.
   const std::vector<SettledPlatform>& follow(const std::vector<PlatformMark>& found, double way_m);
-  void forget() { marks_.clear(); }
+  void forget() {
+    marks_.clear();
+    held_.clear();
+  }
 
  private:
+  struct Measurement {
+    double way_m, ahead_m, beside_m;  // way since the first one
+  };
   struct Mark {
     int side = 1;
     bool begins = true;
     double first_way_m = 0;
     double last_way_m = 0, last_ahead_m = 0, beside_m = 0;
-    // Weighted sums over way and ahead.
-    double w = 0, wx = 0, wy = 0, wxx = 0, wxy = 0, wyy = 0;
-    double beside = 0;
+    size_t count = 0;
+    std::array<Measurement, kMostMarks> measured{};
     int seen = 0, missed = 0, gaps = 0;
     bool hit = false;
   };
+  struct Held {
+    SettledPlatform settled;
+    int side = 1;
+    double way_m = 0;
+  };
+  void hold(const SettledPlatform& settled, const Mark& mark, double way_m);
+  void release(double way_m);
   static void add(Mark& mark, const PlatformMark& found, double way_m);
-  [[nodiscard]] static std::optional<SettledPlatform> settle(const Mark& mark);
+  [[nodiscard]] double usual_factor(const Mark& mark);
+  [[nodiscard]] std::optional<SettledPlatform> settle(const Mark& mark);
 
   std::array<double, 2> last_m_{-1e9, -1e9};  // settled last, right and left
   std::vector<Mark> marks_;
+  std::vector<Held> held_;  // until no better one can follow
   std::vector<SettledPlatform> settled_;
+  std::vector<double> slopes_;
 };
 
 }  // namespace railfix::track_detector

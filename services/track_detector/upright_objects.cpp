@@ -103,6 +103,15 @@ std::optional<Size> size_of(const SettledEdge& a, const SettledEdge& b) {
   return fit.solve();
 }
 
+// What stands behind a post must not be taken for a mast together with the post's far side.
+bool is_far_side_of_post(const SettledEdge& edge) {
+  SizeFit fit(edge, edge.place_m, edge.lateral_m);
+  for (size_t i = 0; i < edge.stripe_count; ++i)
+    fit.add(edge.stripe[i].way_m, edge.stripe[i].bearing, edge.stripe[i].inward);
+  const auto size = fit.solve();
+  return size && std::max(size->front_m, size->side_m) < kMastSizeM[0];
+}
+
 // Of two edges on one side, as they are seen in the same picture.
 bool is_inner(const SettledEdge& a, const SettledEdge& b) {
   const double way_m = std::min(a.place_m, b.place_m) - kUsualAheadM;
@@ -169,6 +178,7 @@ void UprightObjects::pair_masts() {
           continue;
         const auto size = size_of(a.edge, b.edge);
         if (!size || std::max(size->front_m, size->side_m) >= smallest_m) continue;
+        if (std::max(size->front_m, size->side_m) >= kMastSizeM[0] && is_far_side_of_post(a.edge)) continue;
         smallest_m = std::max(size->front_m, size->side_m);
         best = *size;
         best_inner = &a;
@@ -185,18 +195,12 @@ void UprightObjects::pair_masts() {
 void UprightObjects::find_stripes(double way_m) {
   for (Edge& e : edges_) {
     if (e.used || e.way_m > way_m - kWaitM || e.edge.stripe_count == 0 || belongs_to_mast(e.edge)) continue;
-    SizeFit outward(e.edge, e.edge.place_m, e.edge.lateral_m);
-    SizeFit inward = outward;
-    for (size_t i = 0; i < e.edge.stripe_count; ++i) {
-      const StripeMeasurement& m = e.edge.stripe[i];
-      outward.add(m.way_m, m.bearing, m.outward);
-      inward.add(m.way_m, m.bearing, m.inward);
-    }
-    const auto size = outward.solve();
+    SizeFit fit(e.edge, e.edge.place_m, e.edge.lateral_m);
+    for (size_t i = 0; i < e.edge.stripe_count; ++i)
+      fit.add(e.edge.stripe[i].way_m, e.edge.stripe[i].bearing, e.edge.stripe[i].outward);
+    const auto size = fit.solve();
     if (!size || size->rms_m > kStripeRmsM || !between(std::max(size->front_m, size->side_m), kMastSizeM)) continue;
-    // The far side of a post, and what stands behind it.
-    const auto before = inward.solve();
-    if (before && std::max(before->front_m, before->side_m) < kMastSizeM[0]) continue;
+    if (is_far_side_of_post(e.edge)) continue;
     e.used = true;
     tell_mast(e.edge, size->front_m, size->side_m);
   }
