@@ -9,12 +9,12 @@ namespace {
 constexpr double kFollowM = 0.6;
 constexpr double kSidewaysM = 0.07;
 constexpr int kMostMissed = 4;
-constexpr size_t kFewestPictures = 8;
+constexpr size_t kFewestPictures = 10;
 constexpr double kPairM = 3;       // way between two looks that tell the factor
 constexpr double kCorrelated = 1;  // so many neighbouring looks err together
 constexpr double kKeptShare = 0.5;
 constexpr double kSeenShare = 0.6;
-constexpr double kShortestWayM = 9;          // on which it is followed
+constexpr double kShortestWayM = 6;          // on which it is followed
 constexpr double kLongestGapM = 11;          // it is followed to here at least
 constexpr double kUsualLateralM = 1.68;      // of platform edges
 constexpr double kLateralSigmaM = 0.15;      // lines are painted behind them
@@ -88,8 +88,7 @@ void PlatformTracker::hold(const SettledPlatform& settled, const Mark& mark, dou
   for (Held& held : held_) {
     if (held.side != mark.side || std::abs(held.settled.place_m - settled.place_m) > kSamePlatformM) continue;
     // The land behind an end looks like more edge.
-    const bool tighter =
-        mark.begins ? settled.pictures > held.settled.pictures : settled.place_m < held.settled.place_m;
+    const bool tighter = mark.begins ? settled.sigma_m < held.settled.sigma_m : settled.place_m < held.settled.place_m;
     if (tighter && settled.sigma_m < kWorseSigma * held.settled.sigma_m) held.settled = settled;
     return;
   }
