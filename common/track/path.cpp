@@ -9,12 +9,8 @@ namespace railfix::track {
 namespace {
 
 constexpr int kMostLegs = 100000;  // ends a path round a ring of tiny edges
-
-/// Running on an edge in one direction.
-struct Run {
-  const Edge* edge = nullptr;
-  bool forward = true;
-};
+constexpr size_t kMostJoinSteps = 200;
+constexpr double kLongestJoinM = 3000;
 
 double end_heading(const Run& run) {
   return run.edge->alignment.at(run.forward ? run.edge->alignment.length_m() : 0.0).pose.heading_rad +
@@ -63,6 +59,43 @@ std::vector<Run> runs_after(const Map& map, const Run& first, double distance_m,
   return runs;
 }
 
+/// The old route up to where it leads to `run` (behind it, or in front), and the chain between: breadth first, so that
+/// the shortest chain of edges is taken.
+std::optional<Route> join(const Route& old, const Ways& ways, const Run& run, bool behind, double near_m) {
+  struct Step {
+    Run run;
+    int next;  // towards `run`, -1 = it is `run`
+  };
+  std::vector<Step> steps{{run, -1}};
+  for (size_t i = 0; i < steps.size() && steps.size() < kMostJoinSteps; ++i) {
+    const std::vector<Run> further = behind ? ways.before(steps[i].run) : ways.after(steps[i].run);
+    for (const Run& next : further) {
+      const auto& legs = old.legs();
+      std::optional<size_t> met;
+      for (size_t k = 0; k < legs.size(); ++k) {
+        const double off_m = std::abs((behind ? legs[k].end_m() : legs[k].begin_m) - near_m);
+        if (legs[k].run == next && off_m < kLongestJoinM) met = k;
+      }
+      if (!met) {
+        steps.push_back({next, static_cast<int>(i)});
+        continue;
+      }
+      Route route = old;
+      if (behind) {
+        while (route.legs().size() > *met + 1) route.drop_ahead();
+      } else {
+        for (size_t k = 0; k < *met; ++k) route.drop_behind();
+      }
+      for (int k = static_cast<int>(i); k >= 0; k = steps[static_cast<size_t>(k)].next) {
+        const Run& on_the_way = steps[static_cast<size_t>(k)].run;
+        behind ? route.push_ahead(on_the_way) : route.push_behind(on_the_way);
+      }
+      return route;
+    }
+  }
+  return std::nullopt;
+}
+
 LandmarkKind seen_along(LandmarkKind kind, bool forward) {
   if (forward) return kind;
   if (kind == LandmarkKind::portal_in) return LandmarkKind::portal_out;
@@ -109,6 +142,52 @@ core::Result<Path> Path::follow(std::shared_ptr<const Map> map, const EdgePositi
   }
   path.collect_marks();
   return path;
+}
+
+Path Path::along(std::shared_ptr<const Map> map, const Route& route) {
+  Path path;
+  path.map_ = std::move(map);
+  for (const auto& leg : route.legs()) {
+    const double length_m = leg.run.length_m();
+    path.legs_.push_back({leg.run.edge, leg.run.forward, leg.begin_m, length_m, leg.run.forward ? 0.0 : length_m});
+  }
+  path.collect_marks();
+  return path;
+}
+
+Route Path::route() const {
+  const Leg& first = legs_.front();
+  Route route({first.edge, first.forward}, first.offset_begin_m, first.begin_m);
+  for (size_t i = 1; i < legs_.size(); ++i) route.push_ahead({legs_[i].edge, legs_[i].forward});
+  return route;
+}
+
+Path rerouted(const Path& old, const Ways& ways, const EdgePosition& place, double near_m, double ahead_m,
+              double behind_m) {
+  const Route old_route = old.route();
+  const Run run{old.map().edge(place.edge), place.direction != Direction::reverse};
+  const auto distance_on = [&](const Route& route) { return route.distance_of(place, near_m); };
+  std::optional<Route> best;
+  double best_off_m = INFINITY;
+  for (const bool behind : {true, false}) {
+    const auto joined = join(old_route, ways, run, behind, near_m);
+    const auto distance = joined ? distance_on(*joined) : std::nullopt;
+    if (!distance || std::abs(*distance - near_m) >= best_off_m) continue;
+    best = joined;
+    best_off_m = std::abs(*distance - near_m);
+  }
+  Route route = best && best_off_m < kLongestJoinM ? *best : Route(run, place.offset_m, near_m);
+  while (route.end_m() < near_m + ahead_m && route.legs().size() < kMostLegs) {
+    const auto& next = ways.after(route.legs().back().run);
+    if (next.empty()) break;
+    route.push_ahead(next.front());
+  }
+  while (route.begin_m() > near_m - behind_m && route.legs().size() < kMostLegs) {
+    const auto before = ways.before(route.legs().front().run);
+    if (before.empty()) break;
+    route.push_behind(before.front());
+  }
+  return Path::along(old.shared_map(), route);
 }
 
 void Path::collect_marks() {

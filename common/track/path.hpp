@@ -7,6 +7,7 @@
 
 #include "core/result.hpp"
 #include "track/map.hpp"
+#include "track/ways.hpp"
 
 namespace railfix::track {
 
@@ -33,6 +34,11 @@ class Path {
   static core::Result<Path> follow(std::shared_ptr<const Map> map, const EdgePosition& start, double ahead_m,
                                    double behind_m, const std::vector<uint32_t>& via = {});
 
+  /// The way of a route with the route's distances.
+  static Path along(std::shared_ptr<const Map> map, const Route& route);
+  /// This way as whole edges, with the same distances.
+  [[nodiscard]] Route route() const;
+
   [[nodiscard]] double begin_m() const;  // smallest distance, <= 0
   [[nodiscard]] double end_m() const;
   [[nodiscard]] EdgePosition position_at(double distance_m) const;  // clamped to the ends
@@ -55,11 +61,20 @@ class Path {
   };
   [[nodiscard]] const Leg& leg_at(double distance_m) const;
   static double offset_on(const Leg& leg, double distance_m);
+  [[nodiscard]] const std::shared_ptr<const Map>& shared_map() const { return map_; }
+  friend Path rerouted(const Path& old, const Ways& ways, const EdgePosition& place, double near_m, double ahead_m,
+                       double behind_m);
   void collect_marks();
   std::shared_ptr<const Map> map_;
   std::vector<Leg> legs_;
   std::vector<PathLandmark> landmarks_;
   std::vector<PathBaliseGroup> groups_;
 };
+
+/// The way of a train that is on another track than `old` says: through `place`, joined to the old way where that leads
+/// there (behind or in front), with distances that go on from it, and the straight way up to `ahead_m` and `behind_m`
+/// from there. Where nothing joins them the place gets the distance `near_m`. REQUIRES: the edge is on the map.
+Path rerouted(const Path& old, const Ways& ways, const EdgePosition& place, double near_m, double ahead_m,
+              double behind_m);
 
 }  // namespace railfix::track

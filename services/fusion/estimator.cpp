@@ -316,6 +316,12 @@ void Estimator::use(const GnssInput& sample) {
 }
 
 void Estimator::use(const FixInput& fix) {
+  if (fix.kind == FixKind::track) {
+    if (!path_) return;
+    track_probability_ = fix.probability;
+    if (fix.new_path) path_ = fix.new_path;
+    return;
+  }
   auto& watch = watched(fix.kind == FixKind::curvature ? Source::curvature : Source::landmark);
   watch.seen_ns = fix.stamp_ns;
   if (fix.new_path) {

@@ -161,6 +161,7 @@ class Estimator {
   double rest_distance_m_ = 0;
   int64_t rest_since_ns_ = 0;
   bool standstill_ = false;
+  double track_probability_ = 1;  // as the matcher says; without one the configured start and the straight way count
   int64_t start_ns_ = 0;
 };
 

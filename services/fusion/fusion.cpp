@@ -13,6 +13,8 @@ namespace {
 constexpr double kPathAheadM = 300000;
 constexpr double kPathBehindM = 50000;
 constexpr double kNetworkProbability = 0.95;
+constexpr double kTrackProbability = 0.999;  // from here on a track is declared
+constexpr double kSameTrackM = 500.0;        // the edge is on the path, but not elsewhere on a ring
 constexpr double kNoCameraS = 0.3;
 constexpr int64_t kSnapshotNs = 50'000'000;
 constexpr int64_t kSlipUnseenNs = 1'200'000'000;  // a slip may have grown for so long before it is found
@@ -43,7 +45,7 @@ bool has_sense(const GnssInput& e) {
   return finite({e.easting_m, e.northing_m, e.hdop});
 }
 bool has_sense(const FixInput& e) {
-  return finite({e.offset_m, e.sigma_m, e.probability});
+  return finite({e.offset_m, e.probability}) && (std::isfinite(e.sigma_m) || e.kind == FixKind::track);
 }
 
 // Two fixes may have one stamp; everything else has one measurement for each stamp.
@@ -82,7 +84,10 @@ std::optional<TrainEstimate> Fusion::add(Event event) {
   if (is_clock_set_back(event)) return set_clock_back();
   if (!believable(event)) return std::nullopt;
   newest_ns_[event.index()] = std::max(newest_ns_[event.index()], stamp_of(event));
-  if (auto* fix = std::get_if<FixInput>(&event)) start_position(*fix);
+  if (auto* fix = std::get_if<FixInput>(&event)) {
+    start_position(*fix);
+    change_track(*fix);
+  }
   if (step) remember_reference(*step);
   return insert(event);
 }
@@ -154,6 +159,19 @@ void Fusion::start_position(FixInput& fix) const {
   if (now_->main().path() || !map_ || fix.kind != FixKind::network || fix.probability < kNetworkProbability) return;
   auto path = track::Path::follow(map_, {fix.edge, fix.offset_m, fix.direction}, kPathAheadM, kPathBehindM);
   if (path.ok()) fix.new_path = std::make_shared<const track::Path>(std::move(path).value());
+}
+
+// The place along the track stays; only the edges below it become others.
+void Fusion::change_track(FixInput& fix) {
+  const auto& path = now_->main().path();
+  if (fix.kind != FixKind::track || !path || fix.probability < kTrackProbability) return;
+  if (map_->edge(fix.edge) == nullptr) return;
+  const double here_m = now_->main().filter().path_distance_m();
+  const auto on_path_m = path->distance_of(fix.edge, fix.offset_m);
+  if (on_path_m && std::abs(*on_path_m - here_m) < kSameTrackM) return;
+  if (!ways_) ways_.emplace(*map_);
+  fix.new_path = std::make_shared<const track::Path>(
+      track::rerouted(*path, *ways_, {fix.edge, fix.offset_m, fix.direction}, here_m, kPathAheadM, kPathBehindM));
 }
 
 void Fusion::remember_reference(const OdometryInput& step) {

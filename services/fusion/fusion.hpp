@@ -52,6 +52,7 @@ class Fusion {
   [[nodiscard]] bool is_clock_set_back(const Event& event);
   std::optional<TrainEstimate> set_clock_back();
   void start_position(FixInput& fix) const;
+  void change_track(FixInput& fix);
   void remember_reference(const OdometryInput& step);
   std::optional<TrainEstimate> insert(const Event& event);
   void run(const Event& event);
@@ -63,6 +64,7 @@ class Fusion {
   std::shared_ptr<const FusionParameters> parameters_;
   std::shared_ptr<const track::Map> map_;
   std::shared_ptr<const track::Path> path_;
+  std::optional<track::Ways> ways_;  // made when the first other track is declared
   std::optional<Hypotheses> now_;
   std::deque<Event> events_;          // by stamp, then kind
   std::deque<Hypotheses> snapshots_;  // each has used all events up to its stamp

@@ -42,7 +42,9 @@ FixInput input_of(const msg::PositionFix& m) {
   fix.probability = m.probability();
   fix.landmark = m.landmark();
   fix.kind = m.kind() == msg::FIX_CURVATURE ? FixKind::curvature
-                                            : (m.kind() == msg::FIX_NETWORK ? FixKind::network : FixKind::landmark);
+             : m.kind() == msg::FIX_NETWORK ? FixKind::network
+             : m.kind() == msg::FIX_TRACK   ? FixKind::track
+                                            : FixKind::landmark;
   fix.direction = m.direction() == msg::DIRECTION_REVERSE ? track::Direction::reverse : track::Direction::forward;
   return fix;
 }
@@ -65,6 +67,7 @@ msg::TrainState message_of(const TrainEstimate& e) {
   m.easting_m(e.easting_m);
   m.northing_m(e.northing_m);
   m.heading_rad(e.heading_rad);
+  m.track_probability(e.track_probability);
   m.edge(e.track_known ? e.position.edge : 0);
   m.reference(e.reference);
   m.sources(e.sources);

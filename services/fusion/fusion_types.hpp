@@ -40,7 +40,7 @@ struct GnssInput {
   int fix = 0;  // 0 none, 1 single, 4 RTK fixed, 5 RTK float
 };
 
-enum class FixKind : uint8_t { curvature = 1, landmark = 2, network = 3 };
+enum class FixKind : uint8_t { curvature = 1, landmark = 2, network = 3, track = 4 };
 
 /// A place on the map, of the camera's foot at the stamp.
 struct FixInput {
@@ -52,7 +52,8 @@ struct FixInput {
   uint32_t landmark = 0;
   FixKind kind = FixKind::landmark;
   track::Direction direction = track::Direction::unknown;
-  std::shared_ptr<const track::Path> new_path;  // set by Fusion when the fix starts the position on the map
+  std::shared_ptr<const track::Path> new_path;  // set by Fusion when the fix starts the position on the map, or
+                                                // says that the train is on another track
 };
 
 /// The next picture will be measured against the one of this stamp: remember where the train was.
@@ -88,6 +89,7 @@ struct TrainEstimate {
   double easting_m = 0;
   double northing_m = 0;
   double heading_rad = 0;
+  double track_probability = 0;  // that it is this track and no other behind a switch
   uint32_t reference = 0;
   uint32_t sources = 0;  // bit 1 << Source
   Integrity integrity = Integrity::unusable;

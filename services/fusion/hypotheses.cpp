@@ -29,7 +29,8 @@ Hypotheses::Hypotheses(const FusionParameters* parameters, std::shared_ptr<const
               Rival{Source::gnss, {}, {}, {}}} {}
 
 void Hypotheses::apply(const Event& event) {
-  if (const auto* fix = std::get_if<FixInput>(&event)) {
+  const auto* fix = std::get_if<FixInput>(&event);
+  if (fix != nullptr && fix->kind != FixKind::track) {
     apply_fix(*fix, event);
     return;
   }

@@ -32,6 +32,8 @@ class CurvatureMatcher {
 
   /// Curvature (left positive) with its sigma, of the track at this odometer reading.
   void add(double odometer_m, double curvature_per_m, double sigma_per_m);
+  /// Another way with distances that go on from the old one's; the measurements so far stay.
+  void change_path(std::shared_ptr<const track::Path> path) { path_ = std::move(path); }
   /// The odometer lost the way (camera blind): what came before cannot be used any more.
   void forget() { bins_.clear(); }
   /// Best place now. A fix uses up its measurements, so that none is counted twice. Call it every few metres.

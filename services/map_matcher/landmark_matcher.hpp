@@ -26,6 +26,9 @@ class LandmarkMatcher {
   LandmarkMatcher(const LandmarkParameters& parameters, std::shared_ptr<const track::Path> path)
       : parameters_(parameters), path_(std::move(path)) {}
 
+  /// Another way with distances that go on from the old one's; the sightings so far stay.
+  void change_path(std::shared_ptr<const track::Path> path) { path_ = std::move(path); }
+
   /// Nothing when no mapped landmark fits or it cannot be told which one.
   std::optional<Fix> add(const Sighting& sighting, const Prior& prior);
 

@@ -5,6 +5,7 @@
 
 #include "map_matcher/curvature_matcher.hpp"
 #include "map_matcher/landmark_matcher.hpp"
+#include "map_matcher/track_chooser.hpp"
 #include "service/config.hpp"
 
 namespace railfix::map_matcher {
@@ -13,16 +14,19 @@ struct MapMatcherConfig {
   std::string map;
   bool use_landmarks = true;
   bool use_curvature = true;
+  bool choose_track = true;
   double view_ahead_m = 7.0;
   double least_speed_mps = 1.0;
   double match_every_m = 5.0;
   LandmarkParameters landmarks;
   CurvatureParameters curvature;
+  TrackParameters track;
 
   void describe(service::Fields& fields) {
     fields.text("map", map, "Compiled map (railfix map build); empty = nothing is matched.");
     fields.flag("use_landmarks", use_landmarks, "Match landmark sightings.");
     fields.flag("use_curvature", use_curvature, "Match the shape of the track.");
+    fields.flag("choose_track", choose_track, "Say which track the train is on behind switches.");
     fields.number("view_ahead_m", view_ahead_m, {0, 50}, "m",
                   "The curvature of track_view belongs to this point ahead of the camera's foot.");
     fields.number("least_speed_mps", least_speed_mps, {0, 50}, "m/s", "Slower, the turning says nothing of the track.");
@@ -47,6 +51,21 @@ struct MapMatcherConfig {
       f.number("max_sigma_m", p.max_sigma_m, {0.5, 100}, "m", "A vaguer fix is not sent.");
       f.number("sigma_floor_m", p.sigma_floor_m, {0, 50}, "m", "Least sigma of a fix.");
       f.number("min_probability", p.min_probability, {0, 1}, "", "A less probable fix is not sent.");
+    });
+    fields.group("track", "Choice of the track behind switches.", [this](service::Fields& f) {
+      auto& p = track;
+      f.number("bin_m", p.bin_m, {0.5, 20}, "m", "Turning is compared over this way.");
+      f.number("noise_per_m", p.noise_per_m, {1e-6, 0.1}, "1/m", "Least sigma of the curvature of one bin.");
+      f.number("curvature_share", p.curvature_share, {0, 1}, "", "The map's curvature may be off by this share.");
+      f.number("bias_rps", p.bias_rps, {0, 0.1}, "rad/s", "Unknown constant turning of the sensor, one sigma.");
+      f.number("correlated_bins", p.correlated_bins, {1, 100}, "", "So many neighbouring bins err together.");
+      f.number("lag_m", p.lag_m, {0, 60}, "m", "The car body may turn so far behind the camera's foot.");
+      f.number("least_sigma_m", p.least_sigma_m, {0.1, 50}, "m", "Least sigma of the place along the track.");
+      f.number("reach_m", p.reach_m, {5, 500}, "m", "Ways are told apart from this far ahead of the train.");
+      f.number("declare", p.declare, {0.5, 0.999999}, "", "From this probability on a track is known.");
+      f.number("detection", p.detection, {0.01, 0.999}, "", "Chance that a mapped landmark is sighted.");
+      f.number("false_per_m", p.false_per_m, {1e-7, 1}, "1/m", "False sightings of one kind per metre.");
+      f.number("wrong_side", p.wrong_side, {0.001, 0.5}, "", "Chance that a sighting is on the wrong side.");
     });
   }
 };

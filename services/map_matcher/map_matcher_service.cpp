@@ -1,6 +1,8 @@
 #include "map_matcher/map_matcher_service.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/time.hpp"
 
@@ -13,7 +15,22 @@ constexpr double kPathLeftM = 3000;  // the path is followed anew when less of i
 constexpr double kOldStateS = 2.0;
 constexpr double kYawNoise = 3e-4;  // turning of the car body within one step, rad
 constexpr double kShortestStepM = 0.05;
-constexpr int kCurvatureVariance = 25;  // place of the curvature's variance in TrackView.covariance
+constexpr double kLeastWayM = 1e-5;       // standing still turns nothing
+constexpr double kTrackEveryS = 1.0;      // the track is said again after this time ...
+constexpr double kOpenTrackEveryM = 2.0;  // ... or, while it is not known, this way
+constexpr int kCurvatureVariance = 25;    // place of the curvature's variance in TrackView.covariance
+
+track::EdgePosition place_of(const msg::TrainState& state) {
+  return {state.edge(), state.offset_m(),
+          state.direction() == msg::DIRECTION_REVERSE ? track::Direction::reverse : track::Direction::forward};
+}
+uint8_t direction_of(track::Direction direction) {
+  return direction == track::Direction::reverse ? msg::DIRECTION_REVERSE : msg::DIRECTION_FORWARD;
+}
+Sighting input_of(const msg::LandmarkSighting& m) {
+  return {m.stamp_ns(),  static_cast<track::LandmarkKind>(m.kind()), m.distance_ahead_m(), m.lateral_m(), m.sigma_m(),
+          m.confidence()};
+}
 
 }  // namespace
 
@@ -21,6 +38,8 @@ MapMatcherService::MapMatcherService(const MapMatcherConfig& config, service::Co
     : config_(config), context_(context), writer_(context.writer(messaging::topics::position_fix)) {
   if (!config.map.empty()) {
     map_ = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(config.map)));
+    ways_ = std::make_shared<const track::Ways>(*map_);
+    if (config.choose_track) chooser_.emplace(config.track, map_, ways_);
   }
   namespace topics = messaging::topics;
   context_.on<msg::TrainState>(topics::train_state, [this](const msg::TrainState& m) { use(m); });
@@ -45,11 +64,19 @@ void MapMatcherService::follow(const msg::TrainState& state) {
   if (path_) {
     const auto place_m = path_->distance_of(state.edge(), state.offset_m());
     const bool ends = place_m && path_->end_m() > 0.5 * kPathAheadM && path_->end_m() - *place_m < kPathLeftM;
-    if (place_m && !ends) return;
+    if (place_m && !ends) {
+      place_m_ = *place_m;
+      return;
+    }
+    if (!place_m && map_->edge(state.edge()) != nullptr) {
+      path_ = std::make_shared<const track::Path>(
+          track::rerouted(*path_, *ways_, place_of(state), place_m_, kPathAheadM, kPathBehindM));
+      landmarks_->change_path(path_);
+      curvature_->change_path(path_);
+      return;
+    }
   }
-  const auto direction =
-      state.direction() == msg::DIRECTION_REVERSE ? track::Direction::reverse : track::Direction::forward;
-  auto path = track::Path::follow(map_, {state.edge(), state.offset_m(), direction}, kPathAheadM, kPathBehindM);
+  auto path = track::Path::follow(map_, place_of(state), kPathAheadM, kPathBehindM);
   if (!path.ok()) {
     context_.health().degraded(path.error().message);
     return;
@@ -57,6 +84,7 @@ void MapMatcherService::follow(const msg::TrainState& state) {
   path_ = std::make_shared<const track::Path>(std::move(path).value());
   landmarks_.emplace(config_.landmarks, path_);
   curvature_.emplace(config_.curvature, path_);
+  place_m_ = 0;
 }
 
 std::optional<Prior> MapMatcherService::prior_at(int64_t stamp_ns) const {
@@ -69,6 +97,7 @@ std::optional<Prior> MapMatcherService::prior_at(int64_t stamp_ns) const {
 }
 
 void MapMatcherService::use(const msg::OdometryStep& step) {
+  if (chooser_) follow_turning(step);
   step_ = step;
   if (!curvature_ || !config_.use_curvature) return;
   if (step.valid() == 0 || step.mode() == msg::ODOMETRY_BLIND) {
@@ -91,6 +120,59 @@ void MapMatcherService::use(const msg::OdometryStep& step) {
   }
 }
 
+// Key frames overlap: what counts is how the turn since the same picture grew.
+void MapMatcherService::follow_turning(const msg::OdometryStep& step) {
+  const auto prior = prior_at(step.stamp_ns());
+  if (!prior || !step_) return;
+  const auto place = path_->position_at(prior->path_distance_m);
+  chooser_->follow({place, prior->over_m, prior->under_m, state_->sigma_m()});
+  const double dt_s = core::seconds(step.stamp_ns() - step_->stamp_ns());
+  const bool measured = step.valid() != 0 && step.mode() != msg::ODOMETRY_BLIND && step_->valid() != 0;
+  if (!measured || dt_s <= 0) {
+    if (dt_s > 0) chooser_->move_blind(state_->speed_mps() * dt_s);
+  } else {
+    const double way_m = (step.distance_m() - step_->distance_m()) * state_->visual_scale();
+    const bool same = step.reference_stamp_ns() == step_->reference_stamp_ns();
+    const double part = same || step.step_m() == 0 ? 1.0 : std::clamp(way_m / step.step_m(), -1.0, 1.0);
+    const double turn_rad = same ? step.yaw_rad() - step_->yaw_rad() : part * step.yaw_rad();
+    const double noise_part =
+        same && step.step_m() != 0 ? std::sqrt(std::min(1.0, std::abs(way_m / step.step_m()))) : 1.0;
+    const double sigma_rad = noise_part * std::hypot(step.yaw_sigma_rad(), kYawNoise);
+    if (std::abs(way_m) > kLeastWayM) chooser_->move(way_m, turn_rad, sigma_rad, dt_s);
+  }
+  publish_track(step);
+}
+
+void MapMatcherService::publish_track(const msg::OdometryStep& step) {
+  const auto choice = chooser_->choice();
+  if (!choice) return;
+  const auto& best = choice->options.front();
+  const double since_m = std::abs(step.distance_m() - said_track_.odometer_m);
+  const bool changed = best.place.edge != said_track_.edge || choice->known != said_track_.known;
+  const bool due = core::seconds(step.stamp_ns() - said_track_.stamp_ns) > kTrackEveryS;
+  if (!changed && !due && (choice->known || since_m < kOpenTrackEveryM)) return;
+  said_track_ = {best.place.edge, choice->known, step.stamp_ns(), step.distance_m()};
+  msg::PositionFix message;
+  message.stamp_ns(step.stamp_ns());
+  message.kind(msg::FIX_TRACK);
+  message.offset_m(best.place.offset_m);
+  message.sigma_m(std::numeric_limits<double>::infinity());
+  message.probability(best.probability);
+  message.edge(best.place.edge);
+  message.direction(direction_of(best.place.direction));
+  const size_t others = std::min<size_t>(choice->options.size() - 1, msg::FIX_ALTERNATIVES);
+  for (size_t i = 0; i < others; ++i) {
+    const auto& other = choice->options[i + 1];
+    message.alternative_edge()[i] = other.place.edge;
+    message.alternative_offset_m()[i] = other.place.offset_m;
+    message.alternative_probability()[i] = other.probability;
+    message.alternative_direction()[i] = direction_of(other.place.direction);
+  }
+  message.alternatives(static_cast<uint8_t>(others));
+  if (!writer_.write(message)) context_.health().dropped(1);
+  context_.health().output(step.grabbed_ns());
+}
+
 void MapMatcherService::use(const msg::TrackView& view) {
   if (!curvature_ || !config_.use_curvature || !step_ || step_->valid() == 0) return;
   if (view.seen_left() == 0 || view.seen_right() == 0) return;
@@ -105,10 +187,8 @@ void MapMatcherService::use(const msg::LandmarkSighting& sighting) {
   context_.health().input();
   const auto prior = prior_at(sighting.stamp_ns());
   if (!landmarks_ || !config_.use_landmarks || !prior) return;
-  const auto fix =
-      landmarks_->add({sighting.stamp_ns(), static_cast<track::LandmarkKind>(sighting.kind()),
-                       sighting.distance_ahead_m(), sighting.lateral_m(), sighting.sigma_m(), sighting.confidence()},
-                      *prior);
+  if (chooser_) chooser_->sight(input_of(sighting));
+  const auto fix = landmarks_->add(input_of(sighting), *prior);
   if (fix) publish(*fix, msg::FIX_LANDMARK, sighting.grabbed_ns());
 }
 
@@ -122,7 +202,7 @@ void MapMatcherService::publish(const Fix& fix, uint8_t kind, int64_t grabbed_ns
   message.edge(place.edge);
   message.landmark(fix.landmark);
   message.kind(kind);
-  message.direction(place.direction == track::Direction::reverse ? msg::DIRECTION_REVERSE : msg::DIRECTION_FORWARD);
+  message.direction(direction_of(place.direction));
   if (!writer_.write(message)) context_.health().dropped(1);
   context_.health().output(grabbed_ns);
 }

@@ -8,6 +8,7 @@
 #include "map_matcher/curvature_matcher.hpp"
 #include "map_matcher/landmark_matcher.hpp"
 #include "map_matcher/map_matcher_config.hpp"
+#include "map_matcher/track_chooser.hpp"
 #include "service/service.hpp"
 #include "track/path.hpp"
 
@@ -27,18 +28,31 @@ class MapMatcherService {
   /// The window at a stamp, extrapolated from the last state; nothing when the place is not known or the state is too
   /// old.
   [[nodiscard]] std::optional<Prior> prior_at(int64_t stamp_ns) const;
+  void follow_turning(const msg::OdometryStep& step);
+  void publish_track(const msg::OdometryStep& step);
   void publish(const Fix& fix, uint8_t kind, int64_t grabbed_ns);
 
   MapMatcherConfig config_;
   service::Context& context_;
   messaging::Writer<msg::PositionFix> writer_;
   std::shared_ptr<const track::Map> map_;
+  std::shared_ptr<const track::Ways> ways_;
   std::shared_ptr<const track::Path> path_;
   std::optional<LandmarkMatcher> landmarks_;
   std::optional<CurvatureMatcher> curvature_;
   std::optional<msg::TrainState> state_;
   std::optional<msg::OdometryStep> step_;
+  std::optional<TrackChooser> chooser_;
+  double place_m_ = 0;    // on the path, of the last state
   double matched_m_ = 0;  // odometer at the last match
+  /// What was said of the track last.
+  struct SaidTrack {
+    uint32_t edge = 0;
+    bool known = false;
+    int64_t stamp_ns = 0;
+    double odometer_m = 0;
+  };
+  SaidTrack said_track_;
 };
 
 }  // namespace railfix::map_matcher

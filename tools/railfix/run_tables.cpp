@@ -31,7 +31,7 @@ const char* word(const std::array<const char*, N>& words, uint8_t value) {
 }
 constexpr std::array kModes{"search", "track", "keyframe", "blind"};
 constexpr std::array kSightings{"unknown", "frog", "balise", "portal_in", "portal_out", "mast", "bridge", "platform"};
-constexpr std::array kFixes{"unknown", "curvature", "landmark", "network"};
+constexpr std::array kFixes{"unknown", "curvature", "landmark", "network", "track"};
 constexpr std::array kDirections{"?", "+", "-"};
 constexpr std::array kIntegrities{"ok", "degraded", "unusable"};
 constexpr std::array kStates{"starting", "ready", "active", "degraded", "failed", "stopped"};
@@ -69,7 +69,7 @@ class Tables {
         train_state_(
             folder / "train_state.csv",
             "stamp_ns,edge,offset_m,direction,track_known,distance_m,speed_mps,over_m,under_m,sigma_m,integrity,"
-            "lat_deg,lon_deg,easting_m,northing_m,heading_rad"),
+            "lat_deg,lon_deg,easting_m,northing_m,heading_rad,track_probability"),
         tpr_(folder / "tpr.csv",
              "stamp_ns,nid_lrbg,d_lrbg_m,q_dirlrbg,q_dlrbg,l_doubtover_m,l_doubtunder_m,v_train_kmh,q_dirtrain,hex"),
         status_(folder / "status.csv",
@@ -133,6 +133,7 @@ class Tables {
          {state.lat_deg(), state.lon_deg(), state.easting_m(), state.northing_m(), state.heading_rad()}) {
       train_state_ << (placed ? value : kUnknown);
     }
+    train_state_ << state.track_probability();
     end(train_state_);
   }
 

@@ -341,6 +341,32 @@ TEST(Fusion, ImprobableAndForeignFixesAreLeftOut) {
   EXPECT_THAT(state.reason, HasSubstr("another track"));
 }
 
+TEST(Fusion, FollowsTheDeclaredTrackAndSaysWhileItIsOpen) {
+  auto map = std::make_shared<track::Map>();
+  map->edges.push_back({1, "stem", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{1000, 0, 0}})});
+  map->edges.push_back({2, "straight", 2, 3, "", track::Alignment::chained({0, 1000, 0}, {{1000, 0, 0}})});
+  map->edges.push_back({3, "left", 2, 4, "", track::Alignment::chained({0, 1000, 0}, {{1000, 0.001, 0.001}})});
+  map->connections = {{2, 1, 2, false}, {2, 1, 3, true}};
+  auto fusion = core::value_or_throw(Fusion::create({}, map, track::EdgePosition{1, 900, track::Direction::forward}));
+  EXPECT_EQ(run(fusion, 0, 9, 10).track_probability, 1);
+  const auto said = [&](double t_s, uint32_t edge, double offset_m, double probability) {
+    FixInput fix{at(t_s), edge, offset_m, INFINITY, probability, 0, FixKind::track, track::Direction::forward, nullptr};
+    fusion.add(fix);
+  };
+  EXPECT_EQ(run(fusion, 9, 12, 10).position.edge, 2U);
+  said(12, 3, 20, 0.8);
+  auto state = run(fusion, 12, 13, 10);
+  EXPECT_EQ(state.position.edge, 2U);
+  EXPECT_EQ(state.track_probability, 0.8);
+  said(13, 3, 30, 0.9995);
+  state = run(fusion, 13, 14, 10);
+  EXPECT_EQ(state.position.edge, 3U);
+  EXPECT_NEAR(state.position.offset_m, 40, 0.1);
+  EXPECT_EQ(state.track_probability, 0.9995);
+  EXPECT_NEAR(state.distance_m, 140, 0.1);
+  EXPECT_LT(state.over_m, 10);
+}
+
 TEST(Fusion, GnssHoldsTheIntervalAndWildFixesAreRefused) {
   auto fusion = fusion_at(0);
   std::optional<TrainEstimate> state;

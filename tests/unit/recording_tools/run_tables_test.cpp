@@ -165,6 +165,7 @@ TEST_F(RunTables, StateIsEmptyWhereTheTrackIsNotKnown) {
   state.easting_m(1000);
   state.northing_m(2000);
   state.heading_rad(0.25);
+  state.track_probability(0.75);
   record(topics::train_state, state);
   state.track_known(0);
   record(topics::train_state, state);
@@ -172,8 +173,9 @@ TEST_F(RunTables, StateIsEmptyWhereTheTrackIsNotKnown) {
   EXPECT_THAT(
       lines("train_state.csv"),
       ElementsAre("stamp_ns,edge,offset_m,direction,track_known,distance_m,speed_mps,over_m,under_m,sigma_m,integrity,"
-                  "lat_deg,lon_deg,easting_m,northing_m,heading_rad",
-                  "9,3,50.5,+,1,7,2,1.5,1.25,0.5,degraded,,,1000,2000,0.25", "9,,,,0,7,2,1.5,1.25,0.5,degraded,,,,,"));
+                  "lat_deg,lon_deg,easting_m,northing_m,heading_rad,track_probability",
+                  "9,3,50.5,+,1,7,2,1.5,1.25,0.5,degraded,,,1000,2000,0.25,0.75",
+                  "9,,,,0,7,2,1.5,1.25,0.5,degraded,,,,,,0.75"));
 }
 
 TEST_F(RunTables, ReportsAndStatusInTheTimeOfTheData) {

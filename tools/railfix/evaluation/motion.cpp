@@ -10,7 +10,8 @@ namespace {
 
 constexpr double kWindowM = 100.0;
 constexpr double kWindowStepM = 10.0;
-constexpr double kOwnTrackM = 2.0;  // neighbouring tracks are at least 3.5 m apart
+constexpr double kDeclared = 0.999;  // as TrainState.track_probability says
+constexpr double kOwnTrackM = 2.0;   // neighbouring tracks are at least 3.5 m apart
 
 double speed_rms(const std::vector<MotionSample>& samples) {
   std::vector<double> errors;
@@ -60,6 +61,10 @@ void sum_up_interval(PositionResult& result) {
   result.interval_width_m = summarise(std::move(widths));
 }
 
+bool declared(const StateRow& row) {
+  return row.track_known && !(row.track_probability < kDeclared);
+}
+
 void sum_up_errors(PositionResult& result) {
   std::vector<double> along;
   std::vector<double> signed_along;
@@ -73,14 +78,20 @@ void sum_up_errors(PositionResult& result) {
   result.bias_m = summarise(signed_along).mean;
   result.cross_m = summarise(cross);
   if (result.cross_m.count == 0) return;
-  const auto own = std::count_if(cross.begin(), cross.end(), [](double c) { return c < kOwnTrackM; });
-  result.right_percent = percent(static_cast<size_t>(own), result.cross_m.count);
+  size_t known = 0;
+  size_t own = 0;
+  for (const PositionSample& sample : result.samples) {
+    if (!sample.track_declared || !std::isfinite(sample.cross_m)) continue;
+    ++known;
+    own += std::abs(sample.cross_m) < kOwnTrackM ? 1 : 0;
+  }
+  result.right_percent = percent(own, known);
 }
 
 void sum_up_track_choice(const std::vector<StateRow>& rows, PositionResult& result) {
   size_t known = 0;
   for (const StateRow& row : rows) {
-    if (!row.track_known) continue;
+    if (!declared(row)) continue;
     if (known++ == 0) result.known_after_s = core::seconds(row.stamp_ns - rows.front().stamp_ns);
   }
   result.known_percent = percent(known, rows.size());
@@ -94,6 +105,7 @@ PositionSample interval_of(const StateRow& row, double true_distance_m) {
   sample.under_m = row.under_m;
   sample.easting_m = row.easting_m;
   sample.northing_m = row.northing_m;
+  sample.track_declared = declared(row);
   sample.usable = row.integrity != "unusable";
   return sample;
 }

@@ -45,7 +45,8 @@ struct PositionSample {
   double under_m = kUnknown;
   double easting_m = kUnknown;
   double northing_m = kUnknown;
-  bool usable = true;  // integrity other than unusable
+  bool usable = true;          // integrity other than unusable
+  bool track_declared = true;  // which of several tracks is known
   [[nodiscard]] bool has_interval() const;
   [[nodiscard]] bool covered() const;  // the true place lies in [estimate - over, estimate + under]
 };
@@ -68,7 +69,7 @@ struct PositionResult {
   double speed_rms_mps = kUnknown;
   double known_percent = kUnknown;  // share of the states with a known track
   double known_after_s = kUnknown;  // since the first state
-  double right_percent = kUnknown;  // of the known ones, how many lie less than 2 m aside
+  double right_percent = kUnknown;  // of those, how many lie less than 2 m aside
 };
 PositionResult judge_position(const Truth& truth, const std::vector<StateRow>& rows);
 

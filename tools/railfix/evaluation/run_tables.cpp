@@ -38,8 +38,10 @@ Status read(const fs::path& file, std::vector<StateRow>& rows) {
   const size_t integrity = table.required({"integrity"});
   const size_t easting = table.required({"easting_m"});
   const size_t northing = table.required({"northing_m"});
+  const std::optional<size_t> track = table.optional({"track_probability"});
   while (table.next()) {
     StateRow row;
+    if (track) row.track_probability = table.number_or_nan(*track);
     row.stamp_ns = table.integer(stamp);
     row.track_known = table.integer(known) != 0;
     row.distance_m = table.number_or_nan(distance);

@@ -30,6 +30,7 @@ struct StateRow {
   std::string integrity;
   double easting_m = 0;
   double northing_m = 0;
+  double track_probability = 1;
 };
 
 /// In the order of the table: roll, pitch, yaw, lateral, height, curvature, vertical curvature.

@@ -1,0 +1,98 @@
+#include "track/ways.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/units.hpp"
+
+namespace railfix::track {
+namespace {
+
+double leaving_heading(const Run& run) {
+  return run.edge->alignment.at(run.forward ? 0.0 : run.length_m()).pose.heading_rad + (run.forward ? 0.0 : core::kPi);
+}
+double arriving_heading(const Run& run) {
+  return leaving_heading(run.reversed()) + core::kPi;
+}
+
+}  // namespace
+
+Ways::Ways(const Map& map) : after_(2 * map.edges.size()) {
+  std::vector<std::vector<double>> costs(after_.size());
+  const auto connect = [&](const Connection& connection, uint32_t from, uint32_t to) {
+    const Edge* edge = map.edge(from);
+    const Edge* next = map.edge(to);
+    if (edge == nullptr || next == nullptr) return;
+    for (const bool forward : {true, false}) {
+      if ((forward ? edge->to_node : edge->from_node) != connection.node) continue;
+      for (const bool next_forward : {true, false}) {
+        if ((next_forward ? next->from_node : next->to_node) != connection.node) continue;
+        const Run run{edge, forward};
+        const Run way{next, next_forward};
+        if (way == run.reversed()) continue;
+        const double turn = std::abs(core::wrap_pi(leaving_heading(way) - arriving_heading(run)));
+        if (turn > core::kPi / 2) continue;
+        const double cost = turn + (connection.diverging ? 10.0 : 0.0);
+        auto& found = after_[index(run)];
+        auto& cost_of = costs[index(run)];
+        const auto place = std::upper_bound(cost_of.begin(), cost_of.end(), cost) - cost_of.begin();
+        found.insert(found.begin() + place, way);
+        cost_of.insert(cost_of.begin() + place, cost);
+      }
+    }
+  };
+  for (const Connection& connection : map.connections) {
+    connect(connection, connection.edge_a, connection.edge_b);
+    if (connection.edge_a != connection.edge_b) connect(connection, connection.edge_b, connection.edge_a);
+  }
+}
+
+std::vector<Run> Ways::before(const Run& run) const {
+  std::vector<Run> found = after(run.reversed());
+  for (Run& before : found) before = before.reversed();
+  return found;
+}
+
+Route::Route(const Run& run, double offset_m, double place_m) {
+  legs_.push_back({run, place_m - (run.forward ? offset_m : run.length_m() - offset_m)});
+}
+
+void Route::drop_ahead() {
+  if (legs_.size() > 1) legs_.pop_back();
+}
+
+void Route::drop_behind() {
+  if (legs_.size() > 1) legs_.pop_front();
+}
+
+const Route::Leg& Route::leg_at(double distance_m) const {
+  const auto after = std::upper_bound(legs_.begin(), legs_.end(), distance_m,
+                                      [](double distance, const Leg& leg) { return distance < leg.begin_m; });
+  return after == legs_.begin() ? legs_.front() : *(after - 1);
+}
+
+EdgePosition Route::position_at(double distance_m) const {
+  const Leg& leg = leg_at(distance_m);
+  const double into = std::clamp(distance_m - leg.begin_m, 0.0, leg.run.length_m());
+  return {leg.run.edge->id, leg.run.forward ? into : leg.run.length_m() - into,
+          leg.run.forward ? Direction::forward : Direction::reverse};
+}
+
+std::optional<double> Route::distance_of(const EdgePosition& place, double near_m) const {
+  std::optional<double> best;
+  for (const Leg& leg : legs_) {
+    if (leg.run.edge->id != place.edge || leg.run.forward != (place.direction != Direction::reverse)) continue;
+    const double distance = leg.begin_m + (leg.run.forward ? place.offset_m : leg.run.length_m() - place.offset_m);
+    if (!best || std::abs(distance - near_m) < std::abs(*best - near_m)) best = distance;
+  }
+  return best;
+}
+
+double Route::curvature_at(double distance_m) const {
+  const Leg& leg = leg_at(distance_m);
+  const double into = distance_m - leg.begin_m;
+  const double curvature = leg.run.edge->alignment.curvature_at(leg.run.forward ? into : leg.run.length_m() - into);
+  return leg.run.forward ? curvature : -curvature;
+}
+
+}  // namespace railfix::track

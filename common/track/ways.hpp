@@ -1,0 +1,68 @@
+// What a train can do at the end of every edge, and routes that take any of these ways. Path is the one way of a train
+// that is known; a Route is one of several that are possible.
+#pragma once
+
+#include <deque>
+#include <optional>
+#include <vector>
+
+#include "track/map.hpp"
+
+namespace railfix::track {
+
+/// An edge as it is run, forward = towards growing offsets.
+struct Run {
+  const Edge* edge = nullptr;
+  bool forward = true;
+  [[nodiscard]] Run reversed() const { return {edge, !forward}; }
+  [[nodiscard]] double length_m() const { return edge->alignment.length_m(); }
+  friend bool operator==(const Run&, const Run&) = default;
+};
+
+/// Made once for a map, which must outlive it.
+class Ways {
+ public:
+  explicit Ways(const Map& map);
+  /// Runs that may follow, the straight way first (the one that the map calls straight, else the smallest turn).
+  [[nodiscard]] const std::vector<Run>& after(const Run& run) const { return after_[index(run)]; }
+  /// Runs that may come before, the straight way first.
+  [[nodiscard]] std::vector<Run> before(const Run& run) const;
+
+ private:
+  static size_t index(const Run& run) { return 2 * (run.edge->id - 1) + (run.forward ? 0 : 1); }
+  std::vector<std::vector<Run>> after_;
+};
+
+/// A chain of runs with a distance along it; what is read beyond its ends continues the last run.
+class Route {
+ public:
+  struct Leg {
+    Run run;
+    double begin_m = 0;
+    [[nodiscard]] double end_m() const { return begin_m + run.length_m(); }
+    friend bool operator==(const Leg&, const Leg&) = default;
+  };
+
+  /// The run of a place, which gets the distance `place_m`.
+  Route(const Run& run, double offset_m, double place_m);
+
+  void push_ahead(const Run& run) { legs_.push_back({run, end_m()}); }
+  void push_behind(const Run& run) { legs_.push_front({run, begin_m() - run.length_m()}); }
+  /// One leg always stays.
+  void drop_ahead();
+  void drop_behind();
+
+  [[nodiscard]] const std::deque<Leg>& legs() const { return legs_; }
+  [[nodiscard]] double begin_m() const { return legs_.front().begin_m; }
+  [[nodiscard]] double end_m() const { return legs_.back().end_m(); }
+  [[nodiscard]] const Leg& leg_at(double distance_m) const;
+  [[nodiscard]] EdgePosition position_at(double distance_m) const;
+  /// The place nearest to `near_m`, run in this direction; nothing when the route does not go there.
+  [[nodiscard]] std::optional<double> distance_of(const EdgePosition& place, double near_m) const;
+  [[nodiscard]] double curvature_at(double distance_m) const;
+
+ private:
+  std::deque<Leg> legs_;
+};
+
+}  // namespace railfix::track

@@ -1,0 +1,358 @@
+#include "map_matcher/track_chooser.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+
+namespace railfix::map_matcher {
+namespace {
+
+constexpr double kCellM = 1.0;
+constexpr double kDriftPerM = 0.07;    // a bin's way may be so wrong, for the spreading of the cells
+constexpr double kMostSquared = 12.0;  // a bin that fits worse than this is not believed more
+constexpr double kLostM = 60.0;        // afterwards the window is right and the routes are not
+constexpr double kLeastProbability = 1e-7;
+constexpr double kTurnRoundM = 0.3;
+constexpr double kSameM = 5.0;  // two routes whose distances differ by less are one
+constexpr double kFarFromWindowM = 200;
+constexpr double kMostWindowM = 300;
+constexpr size_t kMostHypotheses = 24;
+constexpr double kSideM = 0.3;
+
+double log_sum(double a, double b) {
+  const double most = std::max(a, b);
+  if (!std::isfinite(most)) return most;
+  return most + std::log1p(std::exp(std::min(a, b) - most));
+}
+
+}  // namespace
+
+void TrackChooser::start(const TrackWindow& window) {
+  hypotheses_.clear();
+  pending_ = {};
+  lost_m_ = moved_back_m_ = 0;
+  place_m_ = 0;
+  window_ = window;
+  const track::Run run{map_->edge(window.place.edge), window.place.direction != track::Direction::reverse};
+  hypotheses_.push_back({track::Route(run, window.place.offset_m, 0), 0, {}});
+  cells_m_ = first_m();
+  extend_behind(hypotheses_.front().route);
+  fit_cells();
+  extend();
+}
+
+void TrackChooser::follow(const TrackWindow& window) {
+  TrackWindow wanted = window;
+  wanted.over_m = std::clamp(window.over_m, 0.0, kMostWindowM);
+  wanted.under_m = std::clamp(window.under_m, 0.0, kMostWindowM);
+  std::optional<double> found;
+  double best = -INFINITY;
+  for (const auto& hypothesis : hypotheses_) {
+    const auto place_m = hypothesis.route.distance_of(window.place, place_m_);
+    if (!place_m || std::abs(*place_m - place_m_) > kFarFromWindowM || hypothesis.log_prior <= best) continue;
+    found = place_m;
+    best = hypothesis.log_prior;
+  }
+  if (hypotheses_.empty() || (!found && lost_m_ > kLostM)) {
+    start(wanted);
+    return;
+  }
+  // A window on a track that was given up is followed on the one that is left.
+  if (found) {
+    place_m_ = *found;
+    lost_m_ = 0;
+  }
+  window_ = wanted;
+}
+
+void TrackChooser::move(double way_m, double turn_rad, double turn_sigma_rad, double duration_s) {
+  if (hypotheses_.empty()) return;
+  place_m_ += way_m;
+  lost_m_ += std::abs(way_m);
+  moved_back_m_ = std::max(0.0, moved_back_m_ - (forwards_ ? way_m : -way_m));
+  if (moved_back_m_ > kTurnRoundM) turn_round();
+  pending_.way_m += way_m;
+  pending_.turn_rad += turn_rad;
+  pending_.variance += turn_sigma_rad * turn_sigma_rad;
+  pending_.duration_s += duration_s;
+  if (std::abs(pending_.way_m) >= parameters_.bin_m) use_pending();
+}
+
+void TrackChooser::move_blind(double way_m) {
+  if (hypotheses_.empty()) return;
+  cells_m_ += pending_.way_m + way_m;
+  pending_ = {};
+  place_m_ += way_m;
+  lost_m_ += std::abs(way_m);
+  for (auto& hypothesis : hypotheses_) spread(hypothesis, way_m);
+  trim();
+  extend();
+  fit_cells();
+}
+
+void TrackChooser::use_pending() {
+  const Pending bin = pending_;
+  pending_ = {};
+  cells_m_ += bin.way_m;
+  trim();
+  extend();
+  fit_cells();
+  for (auto& hypothesis : hypotheses_) {
+    spread(hypothesis, bin.way_m);
+    weigh_turn(hypothesis, bin);
+  }
+  merge();
+  prune();
+}
+
+// Every cell is one place of the train and carries the bias that fits best there (a Kalman filter of one state).
+void TrackChooser::weigh_turn(Hypothesis& hypothesis, const Pending& bin) const {
+  const double measured = bin.turn_rad / bin.way_m;
+  const double noise = bin.variance / (bin.way_m * bin.way_m) + parameters_.noise_per_m * parameters_.noise_per_m;
+  const double bias_to_curvature = bin.duration_s / bin.way_m;
+  for (size_t i = 0; i < hypothesis.cells.size(); ++i) {
+    Cell& cell = hypothesis.cells[i];
+    const double place_m = cells_m_ + kCellM * static_cast<double>(i);
+    const double mapped = 0.5 * (hypothesis.route.curvature_at(place_m - 0.25 * bin.way_m) +
+                                 hypothesis.route.curvature_at(place_m - 0.75 * bin.way_m));
+    const double rough = parameters_.curvature_share * mapped;
+    const double error = measured - mapped - bias_to_curvature * cell.bias_rps;
+    const double own = noise + rough * rough;
+    const double variance = own + bias_to_curvature * bias_to_curvature * cell.bias_variance;
+    const double squared = error * error / variance;
+    cell.log_weight -=
+        0.5 * (std::min(squared, kMostSquared) + std::log(variance / noise)) / parameters_.correlated_bins;
+    if (squared > kMostSquared) continue;
+    const double gain = cell.bias_variance * bias_to_curvature / variance;
+    cell.bias_rps += gain * error;
+    cell.bias_variance *= 1 - gain * bias_to_curvature;
+  }
+}
+
+void TrackChooser::spread(Hypothesis& hypothesis, double way_m) const {
+  const double share = std::min(0.25, 0.5 * std::pow(kDriftPerM * way_m / kCellM, 2));
+  if (hypothesis.cells.size() < 3 || share <= 0) return;
+  const double most =
+      std::max_element(hypothesis.cells.begin(), hypothesis.cells.end(), [](const Cell& a, const Cell& b) {
+        return a.log_weight < b.log_weight;
+      })->log_weight;
+  std::vector<double> weights;
+  weights.reserve(hypothesis.cells.size());
+  for (const Cell& cell : hypothesis.cells) weights.push_back(std::exp(cell.log_weight - most));
+  for (size_t i = 0; i < weights.size(); ++i) {
+    const double before = weights[i == 0 ? 0 : i - 1];
+    const double after = weights[std::min(i + 1, weights.size() - 1)];
+    const double mixed = (1 - 2 * share) * weights[i] + share * (before + after);
+    hypothesis.cells[i].log_weight = most + std::log(std::max(mixed, 1e-300));
+  }
+}
+
+// The cells cover where the train can be; new ones at the ends know no more than their neighbours.
+void TrackChooser::fit_cells() {
+  const auto ahead = static_cast<int>(std::floor((first_m() - cells_m_) / kCellM));
+  cells_m_ += kCellM * ahead;
+  const auto count = static_cast<size_t>(std::ceil((last_m() - cells_m_) / kCellM)) + 1;
+  for (auto& hypothesis : hypotheses_) {
+    auto& cells = hypothesis.cells;
+    if (cells.empty()) cells.push_back({0, 0, parameters_.bias_rps * parameters_.bias_rps});
+    if (ahead > 0) {
+      cells.erase(cells.begin(), cells.begin() + std::min<std::ptrdiff_t>(ahead, std::ssize(cells) - 1));
+    } else if (ahead < 0) {
+      cells.insert(cells.begin(), static_cast<size_t>(-ahead), cells.front());
+    }
+    cells.resize(count, cells.back());
+  }
+}
+
+// What lies ahead may be set otherwise once the train has left it: only what it certainly stands on is kept.
+void TrackChooser::turn_round() {
+  forwards_ = !forwards_;
+  moved_back_m_ = 0;
+  cells_m_ += pending_.way_m;
+  pending_ = {};
+  for (auto& hypothesis : hypotheses_) {
+    auto& route = hypothesis.route;
+    if (forwards_) {
+      while (route.legs().size() > 1 && route.legs().back().begin_m > place_m_ - window_.over_m) route.drop_ahead();
+    } else {
+      while (route.legs().size() > 1 && route.legs().front().end_m() < place_m_ + window_.under_m) route.drop_behind();
+    }
+  }
+  merge();
+  extend();
+  fit_cells();
+}
+
+// In the direction of travel every way is a hypothesis of its own.
+void TrackChooser::extend() {
+  for (size_t i = 0; i < hypotheses_.size();) {
+    auto& route = hypotheses_[i].route;
+    const bool enough =
+        forwards_ ? route.end_m() > last_m() + parameters_.reach_m : route.begin_m() < first_m() - parameters_.reach_m;
+    const auto ways = enough      ? std::vector<track::Run>()
+                      : forwards_ ? ways_->after(route.legs().back().run)
+                                  : ways_->before(route.legs().front().run);
+    if (ways.empty()) {
+      ++i;
+      continue;
+    }
+    hypotheses_[i].log_prior -= std::log(static_cast<double>(ways.size()));
+    const Hypothesis stem = hypotheses_[i];
+    for (size_t k = 0; k < ways.size(); ++k) {
+      if (k > 0) hypotheses_.push_back(stem);
+      auto& longer = k == 0 ? hypotheses_[i].route : hypotheses_.back().route;
+      forwards_ ? longer.push_ahead(ways[k]) : longer.push_behind(ways[k]);
+    }
+    if (hypotheses_.size() > kMostHypotheses) prune();
+  }
+  for (auto& hypothesis : hypotheses_) extend_behind(hypothesis.route);
+}
+
+// Where the train came from matters only for the cells that lie there: the straight way will do.
+void TrackChooser::extend_behind(track::Route& route) const {
+  while (forwards_ && route.begin_m() > first_m()) {
+    const auto ways = ways_->before(route.legs().front().run);
+    if (ways.empty()) return;
+    route.push_behind(ways.front());
+  }
+  while (!forwards_ && route.end_m() < last_m()) {
+    const auto& ways = ways_->after(route.legs().back().run);
+    if (ways.empty()) return;
+    route.push_ahead(ways.front());
+  }
+}
+
+void TrackChooser::trim() {
+  for (auto& hypothesis : hypotheses_) {
+    auto& route = hypothesis.route;
+    if (forwards_) {
+      while (route.legs().size() > 1 && route.legs().front().end_m() < first_m() - kCellM) route.drop_behind();
+    } else {
+      while (route.legs().size() > 1 && route.legs().back().begin_m > last_m() + kCellM) route.drop_ahead();
+    }
+  }
+}
+
+void TrackChooser::merge() {
+  const auto same = [](const track::Route& a, const track::Route& b) {
+    return std::equal(
+        a.legs().begin(), a.legs().end(), b.legs().begin(), b.legs().end(),
+        [](const auto& x, const auto& y) { return x.run == y.run && std::abs(x.begin_m - y.begin_m) < kSameM; });
+  };
+  for (size_t i = 0; i < hypotheses_.size(); ++i) {
+    for (size_t k = i + 1; k < hypotheses_.size();) {
+      auto& a = hypotheses_[i];
+      auto& b = hypotheses_[k];
+      if (!same(a.route, b.route)) {
+        ++k;
+        continue;
+      }
+      const double of_a = a.log_prior + evidence(a);
+      const double of_b = b.log_prior + evidence(b);
+      if (of_b > of_a) std::swap(a, b);
+      a.log_prior += log_sum(of_a, of_b) - std::max(of_a, of_b);
+      hypotheses_.erase(hypotheses_.begin() + static_cast<std::ptrdiff_t>(k));
+    }
+  }
+}
+
+void TrackChooser::prune() {
+  std::vector<double> logs;
+  for (const auto& hypothesis : hypotheses_) logs.push_back(hypothesis.log_prior + evidence(hypothesis));
+  const double best = *std::max_element(logs.begin(), logs.end());
+  std::vector<double> sorted = logs;
+  std::sort(sorted.rbegin(), sorted.rend());
+  double least = best + std::log(kLeastProbability);
+  if (sorted.size() > kMostHypotheses) least = std::max(least, sorted[kMostHypotheses]);
+  std::vector<Hypothesis> kept;
+  for (size_t i = 0; i < logs.size(); ++i) {
+    if (logs[i] <= least && logs[i] < best) continue;
+    kept.push_back(std::move(hypotheses_[i]));
+    kept.back().log_prior -= best;
+  }
+  hypotheses_ = std::move(kept);
+}
+
+// Of the train at a place: as fusion says, and up to the lag further back for the turning.
+double TrackChooser::log_of_place(double place_m) const {
+  const double off_m = place_m - place_m_;
+  const double beyond_m = off_m > 0 ? off_m : std::min(0.0, off_m + parameters_.lag_m);
+  const double sigma_m = std::max(window_.sigma_m, parameters_.least_sigma_m);
+  return -0.5 * beyond_m * beyond_m / (sigma_m * sigma_m);
+}
+
+double TrackChooser::evidence(const Hypothesis& hypothesis) const {
+  double sum = -INFINITY;
+  double prior = -INFINITY;
+  for (size_t i = 0; i < hypothesis.cells.size(); ++i) {
+    const double of_place = log_of_place(cells_m_ + kCellM * static_cast<double>(i));
+    sum = log_sum(sum, hypothesis.cells[i].log_weight + of_place);
+    prior = log_sum(prior, of_place);
+  }
+  return sum - prior;
+}
+
+double TrackChooser::sighting_fits(const track::Route& route, const Sighting& sighting) const {
+  const double seen_m = place_m_ + sighting.distance_ahead_m;
+  const double sigma_m = std::hypot(sighting.sigma_m, std::max(window_.sigma_m, parameters_.least_sigma_m));
+  const bool sided = std::abs(sighting.lateral_m) > kSideM;
+  double density = parameters_.false_per_m + (1 - std::clamp(sighting.confidence, 0.0, 1.0)) / (6 * sigma_m);
+  for (const auto& leg : route.legs()) {
+    if (leg.begin_m > seen_m + 5 * sigma_m || leg.end_m() < seen_m - 5 * sigma_m) continue;
+    for (const auto* landmark : map_->landmarks_on(leg.run.edge->id)) {
+      const bool turned = !leg.run.forward;
+      auto kind = landmark->kind;
+      if (turned && kind == track::LandmarkKind::portal_in) {
+        kind = track::LandmarkKind::portal_out;
+      } else if (turned && kind == track::LandmarkKind::portal_out) {
+        kind = track::LandmarkKind::portal_in;
+      }
+      if (kind != sighting.kind) continue;
+      const double at_m = leg.begin_m + (turned ? leg.run.length_m() - landmark->offset_m : landmark->offset_m);
+      const double z = (at_m - seen_m) / sigma_m;
+      const double lateral_m = turned ? -landmark->lateral_m : landmark->lateral_m;
+      double side = 1;
+      if (sided && std::abs(lateral_m) > kSideM) {
+        side = (lateral_m > 0) == (sighting.lateral_m > 0) ? 1 - parameters_.wrong_side : parameters_.wrong_side;
+      }
+      density += parameters_.detection * sighting.confidence * side * std::exp(-0.5 * z * z) /
+                 (sigma_m * std::sqrt(2 * std::numbers::pi));
+    }
+  }
+  return density;
+}
+
+void TrackChooser::sight(const Sighting& sighting) {
+  if (hypotheses_.size() < 2) return;
+  for (auto& hypothesis : hypotheses_) {
+    hypothesis.log_prior += std::log(sighting_fits(hypothesis.route, sighting));
+  }
+  prune();
+}
+
+std::optional<TrackChoice> TrackChooser::choice() const {
+  if (hypotheses_.empty()) return std::nullopt;
+  struct Sum {
+    track::EdgePosition place;
+    double log = -INFINITY;
+  };
+  std::map<std::pair<uint32_t, track::Direction>, Sum> by_edge;
+  double all = -INFINITY;
+  for (const auto& hypothesis : hypotheses_) {
+    const double log = hypothesis.log_prior + evidence(hypothesis);
+    const auto place = hypothesis.route.position_at(place_m_);
+    auto& sum = by_edge[{place.edge, place.direction}];
+    sum.place = place;
+    sum.log = log_sum(sum.log, log);
+    all = log_sum(all, log);
+  }
+  TrackChoice choice;
+  for (const auto& [edge, sum] : by_edge) choice.options.push_back({sum.place, std::exp(sum.log - all)});
+  std::sort(choice.options.begin(), choice.options.end(),
+            [](const TrackOption& a, const TrackOption& b) { return a.probability > b.probability; });
+  choice.known = choice.options.front().probability >= parameters_.declare;
+  return choice;
+}
+
+}  // namespace railfix::map_matcher

@@ -1,0 +1,115 @@
+// Which track? Every way through the switches around the train is a hypothesis with a probability. How the train turns
+// against the curvature of each way, the side of the frogs and what was sighted tell them apart; until one is clearly
+// ahead the track is not yet known.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "map_matcher/match_types.hpp"
+#include "track/ways.hpp"
+
+namespace railfix::map_matcher {
+
+struct TrackParameters {
+  double bin_m = 2.0;             // turning is compared over this way
+  double noise_per_m = 3e-4;      // least sigma of the curvature of one bin: car body, sleepers
+  double curvature_share = 0.15;  // of the map's curvature: switches are drawn roughly
+  double bias_rps = 0.002;        // unknown constant turning of the sensor, one sigma
+  double correlated_bins = 2.0;   // neighbouring bins err together
+  double lag_m = 20.0;            // the car body turns up to so far behind the camera's foot (distance of the bogies)
+  double least_sigma_m = 1.0;     // of the place along the track
+  double reach_m = 30.0;          // ways are told apart from this far ahead
+  double declare = 0.999;         // probability from which on the track is known
+  double detection = 0.8;         // chance that a mapped landmark is sighted
+  double false_per_m = 0.0005;    // false sightings of one kind per metre
+  double wrong_side = 0.03;       // chance that a frog or mast is reported on the wrong side
+};
+
+/// Where fusion thinks the train is: an edge, and how far it may be off along the track.
+struct TrackWindow {
+  track::EdgePosition place;
+  double over_m = 0;  // may be so far behind
+  double under_m = 0;
+  double sigma_m = 0;
+};
+
+struct TrackOption {
+  track::EdgePosition place;
+  double probability = 0;
+};
+
+/// Best first; the probabilities add up to 1.
+struct TrackChoice {
+  std::vector<TrackOption> options;
+  bool known = false;
+};
+
+class TrackChooser {
+ public:
+  TrackChooser(const TrackParameters& parameters, std::shared_ptr<const track::Map> map,
+               std::shared_ptr<const track::Ways> ways)
+      : parameters_(parameters), map_(std::move(map)), ways_(std::move(ways)) {}
+
+  /// REQUIRES: the edge is on the map. The first window starts the hypotheses, later ones move them along.
+  void follow(const TrackWindow& window);
+  /// Moved by way_m (in metres of the map as well as known, signed) and turned by turn_rad (left positive) meanwhile.
+  void move(double way_m, double turn_rad, double turn_sigma_rad, double duration_s);
+  /// Moved, but nobody knows how it turned.
+  void move_blind(double way_m);
+  void sight(const Sighting& sighting);
+  /// Nothing before the first window.
+  [[nodiscard]] std::optional<TrackChoice> choice() const;
+  [[nodiscard]] size_t hypotheses() const { return hypotheses_.size(); }
+
+ private:
+  /// One place of the train on a route: how well the turning fits, and the sensor's bias that fits best.
+  struct Cell {
+    double log_weight = 0;
+    double bias_rps = 0;
+    double bias_variance = 0;
+  };
+  struct Hypothesis {
+    track::Route route;
+    double log_prior = 0;  // ways taken, sightings
+    std::vector<Cell> cells;
+  };
+  struct Pending {
+    double way_m = 0;
+    double turn_rad = 0;
+    double variance = 0;
+    double duration_s = 0;
+  };
+
+  void start(const TrackWindow& window);
+  void use_pending();
+  void weigh_turn(Hypothesis& hypothesis, const Pending& bin) const;
+  void spread(Hypothesis& hypothesis, double way_m) const;
+  void fit_cells();
+  void turn_round();
+  void extend();
+  void extend_behind(track::Route& route) const;
+  void trim();
+  void merge();
+  void prune();
+  [[nodiscard]] double evidence(const Hypothesis& hypothesis) const;
+  [[nodiscard]] double log_of_place(double place_m) const;
+  [[nodiscard]] double sighting_fits(const track::Route& route, const Sighting& sighting) const;
+  [[nodiscard]] double first_m() const { return place_m_ - window_.over_m - parameters_.lag_m - 2; }
+  [[nodiscard]] double last_m() const { return place_m_ + window_.under_m + 2; }
+
+  TrackParameters parameters_;
+  std::shared_ptr<const track::Map> map_;
+  std::shared_ptr<const track::Ways> ways_;
+  std::vector<Hypothesis> hypotheses_;
+  TrackWindow window_;
+  double place_m_ = 0;  // of the window's middle on the routes
+  double cells_m_ = 0;  // of the first cell
+  double lost_m_ = 0;   // run since the window was on one of the routes
+  double moved_back_m_ = 0;
+  bool forwards_ = true;  // the way that the train moves, seen from the cab
+  Pending pending_;
+};
+
+}  // namespace railfix::map_matcher

@@ -1,0 +1,18 @@
+// The parts of railfix-measure-matching; each prints its figures.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace railfix::measure {
+
+struct MatchingOptions {
+  int count = 0;  // 0 = what the figure asks for
+  uint64_t seed = 1;
+  std::string map;
+  bool each = false;  // a line for each ride that went wrong
+};
+
+int measure_switches(const MatchingOptions& options);
+
+}  // namespace railfix::measure

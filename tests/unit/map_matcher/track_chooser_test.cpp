@@ -1,0 +1,90 @@
+#include "map_matcher/track_chooser.hpp"
+
+#include <gtest/gtest.h>
+
+#include "support/switch_passage.hpp"
+
+namespace railfix::map_matcher {
+namespace {
+
+using testing::Manoeuvre;
+using testing::PassagePlan;
+using testing::SwitchPassage;
+
+TEST(TrackChooser, OverRandomSwitchesNothingDeclaredIsWrong) {
+  core::Random random(77);
+  int open = 0;
+  int facing = 0;
+  int late = 0;
+  constexpr uint64_t kPassages = 60;
+  for (uint64_t i = 0; i < kPassages; ++i) {
+    const PassagePlan plan = testing::random_passage(random);
+    const auto result = SwitchPassage(plan, 1000 + i).run();
+    EXPECT_FALSE(result.wrong) << plan.text();
+    open += result.known_at_end ? 0 : 1;
+    if (!plan.facing) continue;
+    ++facing;
+    EXPECT_GT(result.open_steps, 0) << "declared before anything could be known: " << plan.text();
+    late += result.behind_frog_m > 30 ? 1 : 0;
+  }
+  EXPECT_LE(open, 1);
+  EXPECT_LE(late, facing / 10);
+}
+
+TEST(TrackChooser, AThrownSwitchIsFollowedAfterGoingBack) {
+  for (uint64_t seed = 1; seed <= 12; ++seed) {
+    PassagePlan plan;
+    plan.diverging = seed % 2 == 0;
+    plan.manoeuvre = Manoeuvre::back_and_forth;
+    plan.speed_mps = 8;
+    const auto result = SwitchPassage(plan, seed).run();
+    EXPECT_FALSE(result.wrong) << seed;
+    EXPECT_TRUE(result.known_at_end) << seed;
+  }
+}
+
+std::shared_ptr<const track::Map> fork() {
+  auto map = std::make_shared<track::Map>();
+  map->edges.push_back({1, "stem", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{500, 0, 0}})});
+  map->edges.push_back({2, "straight", 2, 3, "", track::Alignment::chained({0, 500, 0}, {{500, 0, 0}})});
+  map->edges.push_back(
+      {3, "left", 2, 4, "", track::Alignment::chained({0, 500, 0}, {{40, 0.003, 0.003}, {460, 0, 0}})});
+  map->connections = {{2, 1, 2, false}, {2, 1, 3, true}};
+  return map;
+}
+
+TEST(TrackChooser, WithoutAnyTurningMeasuredItSaysNotYetKnown) {
+  const auto map = fork();
+  TrackChooser chooser({}, map, std::make_shared<const track::Ways>(*map));
+  for (double place_m = 400; place_m < 700; place_m += 1) {
+    const bool behind = place_m > 500;
+    chooser.follow({{behind ? 2U : 1U, behind ? place_m - 500 : place_m, track::Direction::forward}, 3, 3, 0.5});
+    chooser.move_blind(1);
+    const auto choice = chooser.choice();
+    ASSERT_TRUE(choice);
+    EXPECT_EQ(choice->known, place_m < 499) << place_m;
+    if (!choice->known) {
+      ASSERT_EQ(choice->options.size(), 2U);
+      EXPECT_NEAR(choice->options[0].probability, 0.5, 1e-6);
+    }
+  }
+}
+
+TEST(TrackChooser, TheSideOfTheFrogCounts) {
+  auto made = std::make_shared<track::Map>(*fork());
+  made->landmarks = {{1, track::LandmarkKind::frog, 2, 30, 0.72, 0.1, ""},
+                     {2, track::LandmarkKind::frog, 3, 30, -0.72, 0.1, ""}};
+  const std::shared_ptr<const track::Map> map = made;
+  TrackChooser chooser({}, map, std::make_shared<const track::Ways>(*map));
+  chooser.follow({{1, 490, track::Direction::forward}, 3, 3, 0.5});
+  for (int i = 0; i < 32; ++i) chooser.move_blind(1);
+  chooser.sight({0, track::LandmarkKind::frog, 8, -0.72, 0.2, 0.95});
+  const auto choice = chooser.choice();
+  ASSERT_TRUE(choice);
+  EXPECT_EQ(choice->options.front().place.edge, 3U);
+  EXPECT_GT(choice->options.front().probability, 0.8);
+  EXPECT_FALSE(choice->known);
+}
+
+}  // namespace
+}  // namespace railfix::map_matcher
