@@ -52,11 +52,17 @@ void CurvatureMatcher::add(double odometer_m, double curvature_per_m, double sig
 double CurvatureMatcher::misfit(const MapCurvature& map, double place_m, double scale, double odometer_m) const {
   const double least = parameters_.noise_per_m * parameters_.noise_per_m;
   double sum = 0;
+  double weighted = 0;
+  double weights = 1 / (parameters_.bias_per_m * parameters_.bias_per_m);
   for (const auto& bin : bins_) {
     const double error = bin.curvature_per_m - map.at(place_m + (1 + scale) * (bin.odometer_m - odometer_m));
-    sum += error * error / (1 / bin.weight + least);
+    const double weight = 1 / (1 / bin.weight + least);
+    sum += weight * error * error;
+    weighted += weight * error;
+    weights += weight;
   }
-  return sum;
+  // What is left when the bias takes the value that fits best.
+  return sum - weighted * weighted / weights;
 }
 
 // Posterior over the place with a flat prior in the window; the odometer's scale is summed over.

@@ -18,6 +18,7 @@ struct CurvatureParameters {
   double window_m = 400;        // longest way that is matched
   double noise_per_m = 2e-4;    // least sigma of one bin: car body, sleepers, map
   double correlated_bins = 3;   // neighbouring bins err together
+  double bias_per_m = 3e-5;     // constant error of the curvature, one sigma
   double scale_sigma = 0.01;    // of the odometer
   double search_margin_m = 10;  // beyond the promised interval of train_state
   double max_sigma_m = 8.0;     // of a fix that is worth sending

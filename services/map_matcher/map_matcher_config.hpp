@@ -4,7 +4,9 @@
 #include <string>
 
 #include "map_matcher/curvature_matcher.hpp"
+#include "map_matcher/curve_exit_matcher.hpp"
 #include "map_matcher/landmark_matcher.hpp"
+#include "map_matcher/network_locator.hpp"
 #include "map_matcher/track_chooser.hpp"
 #include "service/config.hpp"
 
@@ -14,19 +16,27 @@ struct MapMatcherConfig {
   std::string map;
   bool use_landmarks = true;
   bool use_curvature = true;
+  std::string curve_method = "likelihood";
   bool choose_track = true;
+  bool locate = true;
   double view_ahead_m = 7.0;
   double least_speed_mps = 1.0;
   double match_every_m = 5.0;
+  double locate_every_m = 250.0;
   LandmarkParameters landmarks;
   CurvatureParameters curvature;
   TrackParameters track;
+  LocatorParameters locator;
 
   void describe(service::Fields& fields) {
     fields.text("map", map, "Compiled map (railfix map build); empty = nothing is matched.");
     fields.flag("use_landmarks", use_landmarks, "Match landmark sightings.");
     fields.flag("use_curvature", use_curvature, "Match the shape of the track.");
+    fields.choice("curve_method", curve_method, {"likelihood", "exits"},
+                  "How: likelihood over the place, or the exits of curves (paper 004, section 8).");
     fields.flag("choose_track", choose_track, "Say which track the train is on behind switches.");
+    fields.flag("locate", locate, "Look for the place on the whole map while nobody knows it.");
+    fields.number("locate_every_m", locate_every_m, {20, 10000}, "m", "... once in this way.");
     fields.number("view_ahead_m", view_ahead_m, {0, 50}, "m",
                   "The curvature of track_view belongs to this point ahead of the camera's foot.");
     fields.number("least_speed_mps", least_speed_mps, {0, 50}, "m/s", "Slower, the turning says nothing of the track.");
@@ -46,6 +56,7 @@ struct MapMatcherConfig {
       f.number("window_m", p.window_m, {50, 5000}, "m", "Longest way that is matched.");
       f.number("noise_per_m", p.noise_per_m, {1e-6, 0.1}, "1/m", "Least sigma of one average.");
       f.number("correlated_bins", p.correlated_bins, {1, 100}, "", "So many neighbouring averages err together.");
+      f.number("bias_per_m", p.bias_per_m, {1e-9, 0.01}, "1/m", "Constant error of the curvature, one sigma.");
       f.number("scale_sigma", p.scale_sigma, {1e-5, 0.2}, "", "Error of the odometer's scale.");
       f.number("search_margin_m", p.search_margin_m, {0, 1000}, "m", "Search beyond the interval of train_state.");
       f.number("max_sigma_m", p.max_sigma_m, {0.5, 100}, "m", "A vaguer fix is not sent.");
@@ -66,6 +77,21 @@ struct MapMatcherConfig {
       f.number("detection", p.detection, {0.01, 0.999}, "", "Chance that a mapped landmark is sighted.");
       f.number("false_per_m", p.false_per_m, {1e-7, 1}, "1/m", "False sightings of one kind per metre.");
       f.number("wrong_side", p.wrong_side, {0.001, 0.5}, "", "Chance that a sighting is on the wrong side.");
+    });
+    fields.group("locator", "The place on the whole map, without a prior.", [this](service::Fields& f) {
+      auto& p = locator;
+      f.number("window_m", p.window_m, {1000, 50000}, "m", "Longest way that is looked for.");
+      f.number("least_way_m", p.least_way_m, {800, 50000}, "m", "A shorter way is not looked for.");
+      f.number("least_turn_rad", p.least_turn_rad, {0, 100}, "rad", "A way that bends less is not looked for.");
+      f.number("scale_range", p.scale_range, {0.001, 0.05}, "", "The odometer's scale may be off by so much.");
+      f.number("noise_per_m", p.noise_per_m, {1e-5, 0.01}, "1/m", "Least sigma of the curvature over 20 m.");
+      f.number("curvature_share", p.curvature_share, {0, 0.5}, "", "The map's curvature may be off by this share.");
+      f.number("correlated_bins", p.correlated_bins, {1, 100}, "", "So many neighbouring 20 m err together.");
+      f.number("lag_m", p.lag_m, {0, 60}, "m", "The car body may turn so far behind the camera's foot.");
+      f.number("detection", p.detection, {0.01, 0.999}, "", "Chance that a mapped balise is sighted.");
+      f.number("false_per_m", p.false_per_m, {1e-7, 1}, "1/m", "False sightings of balises per metre.");
+      f.number("certain", p.certain, {0.5, 0.999999}, "", "From this probability on a place is certain ...");
+      f.number("certain_misfit", p.certain_misfit, {0.5, 100}, "", "... where the way fits to so many sigmas squared.");
     });
   }
 };

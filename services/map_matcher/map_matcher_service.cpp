@@ -73,6 +73,7 @@ void MapMatcherService::follow(const msg::TrainState& state) {
           track::rerouted(*path_, *ways_, place_of(state), place_m_, kPathAheadM, kPathBehindM));
       landmarks_->change_path(path_);
       curvature_->change_path(path_);
+      if (exits_) exits_.emplace(CurveExitParameters{}, path_);
       return;
     }
   }
@@ -84,6 +85,7 @@ void MapMatcherService::follow(const msg::TrainState& state) {
   path_ = std::make_shared<const track::Path>(std::move(path).value());
   landmarks_.emplace(config_.landmarks, path_);
   curvature_.emplace(config_.curvature, path_);
+  if (config_.curve_method == "exits") exits_.emplace(CurveExitParameters{}, path_);
   place_m_ = 0;
 }
 
@@ -97,11 +99,16 @@ std::optional<Prior> MapMatcherService::prior_at(int64_t stamp_ns) const {
 }
 
 void MapMatcherService::use(const msg::OdometryStep& step) {
+  if (map_ && config_.locate) look_for_place(step);
   if (chooser_) follow_turning(step);
   step_ = step;
   if (!curvature_ || !config_.use_curvature) return;
   if (step.valid() == 0 || step.mode() == msg::ODOMETRY_BLIND) {
     curvature_->forget();
+    return;
+  }
+  if (exits_) {
+    match_exits(step);
     return;
   }
   // Only steps from picture to picture: those against one key frame overlap.
@@ -120,25 +127,77 @@ void MapMatcherService::use(const msg::OdometryStep& step) {
   }
 }
 
+void MapMatcherService::match_exits(const msg::OdometryStep& step) {
+  const double step_m = step.step_m();
+  const auto prior = prior_at(step.stamp_ns());
+  if (!prior || step.mode() != msg::ODOMETRY_TRACK || step_m < kShortestStepM) return;
+  exits_->add(step.distance_m() - 0.5 * step_m, step.yaw_rad() / step_m);
+  if (const auto fix = exits_->match(step.stamp_ns(), step.distance_m(), *prior)) {
+    publish(*fix, msg::FIX_CURVATURE, step.grabbed_ns());
+  }
+}
+
 // Key frames overlap: what counts is how the turn since the same picture grew.
+std::optional<MapMatcherService::Turn> MapMatcherService::turn_of(const msg::OdometryStep& step) const {
+  if (!step_) return std::nullopt;
+  const double dt_s = core::seconds(step.stamp_ns() - step_->stamp_ns());
+  if (dt_s <= 0 || step.valid() == 0 || step.mode() == msg::ODOMETRY_BLIND || step_->valid() == 0) return std::nullopt;
+  const double way_m = step.distance_m() - step_->distance_m();
+  const double part = step.step_m() == 0 ? 1.0 : std::clamp(way_m / step.step_m(), -1.0, 1.0);
+  const double sigma_rad = std::hypot(step.yaw_sigma_rad(), kYawNoise);
+  if (step.reference_stamp_ns() != step_->reference_stamp_ns()) {
+    return Turn{way_m, part * step.yaw_rad(), sigma_rad, dt_s};
+  }
+  return Turn{way_m, step.yaw_rad() - step_->yaw_rad(), std::sqrt(std::abs(part)) * sigma_rad, dt_s};
+}
+
+void MapMatcherService::look_for_place(const msg::OdometryStep& step) {
+  if (!state_ || state_->track_known() != 0) {
+    locator_.reset();
+    return;
+  }
+  if (!locator_) {
+    locator_.emplace(config_.locator, std::make_shared<const NetworkIndex>(map_));
+    located_m_ = step.distance_m();
+  }
+  const auto turn = turn_of(step);
+  if (!turn) {
+    if (step_) locator_->forget();
+    return;
+  }
+  if (std::abs(turn->way_m) > kLeastWayM) locator_->move(turn->way_m, turn->turn_rad, turn->sigma_rad);
+  if (std::abs(step.distance_m() - located_m_) < config_.locate_every_m) return;
+  located_m_ = step.distance_m();
+  const Location location = locator_->locate();
+  if (location.certain) publish_place(step, location);
+}
+
+void MapMatcherService::publish_place(const msg::OdometryStep& step, const Location& location) {
+  const auto& best = location.places.front();
+  msg::PositionFix message;
+  message.stamp_ns(step.stamp_ns());
+  message.kind(msg::FIX_NETWORK);
+  message.edge(best.place.edge);
+  message.offset_m(best.place.offset_m);
+  message.direction(direction_of(best.place.direction));
+  message.sigma_m(best.sigma_m);
+  message.probability(best.probability);
+  if (!writer_.write(message)) context_.health().dropped(1);
+  context_.health().output(step.grabbed_ns());
+}
+
 void MapMatcherService::follow_turning(const msg::OdometryStep& step) {
   const auto prior = prior_at(step.stamp_ns());
   if (!prior || !step_) return;
   const auto place = path_->position_at(prior->path_distance_m);
   chooser_->follow({place, prior->over_m, prior->under_m, state_->sigma_m()});
-  const double dt_s = core::seconds(step.stamp_ns() - step_->stamp_ns());
-  const bool measured = step.valid() != 0 && step.mode() != msg::ODOMETRY_BLIND && step_->valid() != 0;
-  if (!measured || dt_s <= 0) {
-    if (dt_s > 0) chooser_->move_blind(state_->speed_mps() * dt_s);
+  if (const auto turn = turn_of(step)) {
+    const double way_m = turn->way_m * state_->visual_scale();
+    if (std::abs(way_m) > kLeastWayM) chooser_->move(way_m, turn->turn_rad, turn->sigma_rad, turn->duration_s);
   } else {
-    const double way_m = (step.distance_m() - step_->distance_m()) * state_->visual_scale();
-    const bool same = step.reference_stamp_ns() == step_->reference_stamp_ns();
-    const double part = same || step.step_m() == 0 ? 1.0 : std::clamp(way_m / step.step_m(), -1.0, 1.0);
-    const double turn_rad = same ? step.yaw_rad() - step_->yaw_rad() : part * step.yaw_rad();
-    const double noise_part =
-        same && step.step_m() != 0 ? std::sqrt(std::min(1.0, std::abs(way_m / step.step_m()))) : 1.0;
-    const double sigma_rad = noise_part * std::hypot(step.yaw_sigma_rad(), kYawNoise);
-    if (std::abs(way_m) > kLeastWayM) chooser_->move(way_m, turn_rad, sigma_rad, dt_s);
+    const double dt_s = core::seconds(step.stamp_ns() - step_->stamp_ns());
+    const double way_m = state_->speed_mps() * std::max(dt_s, 0.0);
+    if (std::isfinite(way_m)) chooser_->move_blind(way_m);
   }
   publish_track(step);
 }
@@ -185,6 +244,7 @@ void MapMatcherService::use(const msg::TrackView& view) {
 
 void MapMatcherService::use(const msg::LandmarkSighting& sighting) {
   context_.health().input();
+  if (locator_) locator_->sight(input_of(sighting));
   const auto prior = prior_at(sighting.stamp_ns());
   if (!landmarks_ || !config_.use_landmarks || !prior) return;
   if (chooser_) chooser_->sight(input_of(sighting));

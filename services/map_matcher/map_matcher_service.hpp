@@ -6,8 +6,10 @@
 #include <optional>
 
 #include "map_matcher/curvature_matcher.hpp"
+#include "map_matcher/curve_exit_matcher.hpp"
 #include "map_matcher/landmark_matcher.hpp"
 #include "map_matcher/map_matcher_config.hpp"
+#include "map_matcher/network_locator.hpp"
 #include "map_matcher/track_chooser.hpp"
 #include "service/service.hpp"
 #include "track/path.hpp"
@@ -28,6 +30,17 @@ class MapMatcherService {
   /// The window at a stamp, extrapolated from the last state; nothing when the place is not known or the state is too
   /// old.
   [[nodiscard]] std::optional<Prior> prior_at(int64_t stamp_ns) const;
+  /// What this step adds to the one before it.
+  struct Turn {
+    double way_m = 0;
+    double turn_rad = 0;
+    double sigma_rad = 0;
+    double duration_s = 0;
+  };
+  [[nodiscard]] std::optional<Turn> turn_of(const msg::OdometryStep& step) const;
+  void match_exits(const msg::OdometryStep& step);
+  void look_for_place(const msg::OdometryStep& step);
+  void publish_place(const msg::OdometryStep& step, const Location& location);
   void follow_turning(const msg::OdometryStep& step);
   void publish_track(const msg::OdometryStep& step);
   void publish(const Fix& fix, uint8_t kind, int64_t grabbed_ns);
@@ -40,11 +53,14 @@ class MapMatcherService {
   std::shared_ptr<const track::Path> path_;
   std::optional<LandmarkMatcher> landmarks_;
   std::optional<CurvatureMatcher> curvature_;
+  std::optional<CurveExitMatcher> exits_;  // instead of it, where the configuration says so
   std::optional<msg::TrainState> state_;
   std::optional<msg::OdometryStep> step_;
   std::optional<TrackChooser> chooser_;
-  double place_m_ = 0;    // on the path, of the last state
-  double matched_m_ = 0;  // odometer at the last match
+  std::optional<NetworkLocator> locator_;  // only while the place is not known
+  double located_m_ = 0;                   // odometer at the last search
+  double place_m_ = 0;                     // on the path, of the last state
+  double matched_m_ = 0;                   // odometer at the last match
   /// What was said of the track last.
   struct SaidTrack {
     uint32_t edge = 0;

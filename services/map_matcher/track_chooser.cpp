@@ -283,14 +283,18 @@ double TrackChooser::log_of_place(double place_m) const {
 }
 
 double TrackChooser::evidence(const Hypothesis& hypothesis) const {
-  double sum = -INFINITY;
-  double prior = -INFINITY;
+  std::vector<double> logs;
+  logs.reserve(hypothesis.cells.size());
+  double prior = 0;
   for (size_t i = 0; i < hypothesis.cells.size(); ++i) {
     const double of_place = log_of_place(cells_m_ + kCellM * static_cast<double>(i));
-    sum = log_sum(sum, hypothesis.cells[i].log_weight + of_place);
-    prior = log_sum(prior, of_place);
+    logs.push_back(hypothesis.cells[i].log_weight + of_place);
+    prior += std::exp(of_place);
   }
-  return sum - prior;
+  const double most = *std::max_element(logs.begin(), logs.end());
+  double sum = 0;
+  for (const double log : logs) sum += std::exp(log - most);
+  return most + std::log(sum / std::max(prior, 1e-300));
 }
 
 double TrackChooser::sighting_fits(const track::Route& route, const Sighting& sighting) const {
@@ -333,6 +337,9 @@ void TrackChooser::sight(const Sighting& sighting) {
 
 std::optional<TrackChoice> TrackChooser::choice() const {
   if (hypotheses_.empty()) return std::nullopt;
+  if (hypotheses_.size() == 1) {
+    return TrackChoice{{{hypotheses_.front().route.position_at(place_m_), 1.0}}, true};
+  }
   struct Sum {
     track::EdgePosition place;
     double log = -INFINITY;

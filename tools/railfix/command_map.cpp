@@ -398,6 +398,7 @@ void add_map(CLI::App& app, Action& chosen) {
   add_map_draw(*map, chosen);
   add_map_coverage(*map, chosen);
   add_map_learn(*map, chosen);
+  add_map_locate(*map, chosen);
 }
 
 }  // namespace railfix::tool

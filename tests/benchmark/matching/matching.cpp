@@ -9,7 +9,11 @@ namespace {
 
 constexpr const char* kUsage =
     "railfix-measure-matching switches [--count N] [--seed N] [--each]\n"
-    "  switches   track choice over simulated passages of switches\n";
+    "  switches   track choice over simulated passages of switches\n"
+    "railfix-measure-matching curvature [--map FILE] [--count N] [--seed N]\n"
+    "  curvature  wheel and gyro alone against a map, by default ../shared/data/alignment/sbb_mszw_a2.landxml\n"
+    "railfix-measure-matching locate [--map FILE | --track-km KM] [--count N] [--seed N] [--each]\n"
+    "  locate     the place without a prior, over trips of 5 km on a map or a made-up network\n";
 
 }  // namespace
 
@@ -24,6 +28,8 @@ int main(int argc, char** argv) {
       options.seed = std::strtoull(argv[++i], nullptr, 10);
     } else if (std::strcmp(argv[i], "--map") == 0 && more) {
       options.map = argv[++i];
+    } else if (std::strcmp(argv[i], "--track-km") == 0 && more) {
+      options.track_km = std::atof(argv[++i]);
     } else if (std::strcmp(argv[i], "--each") == 0) {
       options.each = true;
     } else if (what.empty() && argv[i][0] != '-') {
@@ -35,6 +41,8 @@ int main(int argc, char** argv) {
   }
   try {
     if (what == "switches") return railfix::measure::measure_switches(options);
+    if (what == "curvature") return railfix::measure::measure_curvature(options);
+    if (what == "locate") return railfix::measure::measure_locate(options);
   } catch (const railfix::core::BadInput& error) {
     std::cerr << "railfix-measure-matching: " << error.what() << "\n";
     return 2;

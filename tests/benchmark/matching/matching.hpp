@@ -10,9 +10,12 @@ struct MatchingOptions {
   int count = 0;  // 0 = what the figure asks for
   uint64_t seed = 1;
   std::string map;
-  bool each = false;  // a line for each ride that went wrong
+  double track_km = 20000;  // of a made-up network
+  bool each = false;        // a line for each ride that went wrong
 };
 
 int measure_switches(const MatchingOptions& options);
+int measure_curvature(const MatchingOptions& options);
+int measure_locate(const MatchingOptions& options);
 
 }  // namespace railfix::measure

@@ -73,6 +73,31 @@ TEST(LandmarkMatcher, EqualMastsWithinTheWindowAreNotTold) {
   }
 }
 
+TEST(LandmarkMatcher, AMovedMastAndABaliseThatTheMapLacksDoNotMislead) {
+  std::vector<std::pair<LandmarkKind, double>> landmarks;
+  for (int i = 0; i < 20; ++i) landmarks.emplace_back(LandmarkKind::mast, 100 + 60.0 * i);
+  landmarks.emplace_back(LandmarkKind::balise, 829);
+  std::sort(landmarks.begin(), landmarks.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+  LandmarkMatcher matcher({}, line_with(landmarks));
+  const auto seen = [&](LandmarkKind kind, double really_m) {
+    return matcher.add(sighting_of(kind), prior_at(really_m - 5 + 2, 15, 1.004 * really_m));
+  };
+  for (int i = 2; i < 20; ++i) {
+    const bool moved = i == 9;
+    const auto fix = seen(LandmarkKind::mast, 100 + 60.0 * i + (moved ? 5 : 0));
+    if (moved) {
+      EXPECT_TRUE(!fix || fix->probability < 0.5);
+    } else if (i > 3) {
+      ASSERT_TRUE(fix) << i;
+      EXPECT_GT(fix->probability, 0.9) << i;
+      EXPECT_NEAR(fix->path_distance_m, 95 + 60.0 * i, 1e-6) << i;
+    }
+    // A balise 9 m in front of the only one on the map.
+    const auto lacking = i == 12 ? seen(LandmarkKind::balise, 820 + 0.1) : std::nullopt;
+    EXPECT_TRUE(!lacking || lacking->probability < 0.5);
+  }
+}
+
 TEST(LandmarkMatcher, UnsureSightingGivesUnsureFix) {
   LandmarkMatcher matcher({}, line_with({{LandmarkKind::frog, 500}}));
   const auto fix = matcher.add(sighting_of(LandmarkKind::frog, 0.6), prior_at(495, 10, 0));

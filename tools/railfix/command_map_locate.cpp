@@ -1,0 +1,86 @@
+// railfix map locate: where on a map a run took place, from how it turned alone.
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+
+#include "commands.hpp"
+#include "core/csv_table.hpp"
+#include "core/result.hpp"
+#include "map_matcher/network_locator.hpp"
+
+namespace railfix::tool {
+namespace {
+
+constexpr double kTurnNoiseRad = 3e-4;  // of one step, as map_matcher takes it
+constexpr double kLongestGapS = 1.0;
+
+struct LocateRequest {
+  std::string map;
+  std::string run;
+  double until_m = 1e9;
+};
+
+/// Feeds odometry.csv of a run; what lies before a gap or a blind spell is forgotten.
+core::Status feed(const std::filesystem::path& file, double until_m, map_matcher::NetworkLocator& locator) {
+  core::CsvTable table(file);
+  const size_t stamp = table.required({"stamp_ns"});
+  const size_t valid = table.required({"valid"});
+  const size_t distance = table.required({"distance_m"});
+  const size_t rate = table.required({"yaw_rate_rps"});
+  bool started = false;
+  double last_m = 0;
+  int64_t last_ns = 0;
+  while (table.next(stamp)) {
+    const double at_m = table.number_or_nan(distance);
+    const double rate_rps = table.number_or_nan(rate);
+    const double dt_s = 1e-9 * static_cast<double>(table.stamp_ns() - last_ns);
+    if (started && std::abs(at_m) > until_m) break;
+    if (table.integer(valid) == 0 || !std::isfinite(at_m) || !std::isfinite(rate_rps)) {
+      locator.forget();
+      started = false;
+      continue;
+    }
+    if (started && dt_s < kLongestGapS && at_m != last_m) locator.move(at_m - last_m, rate_rps * dt_s, kTurnNoiseRad);
+    started = true;
+    last_m = at_m;
+    last_ns = table.stamp_ns();
+  }
+  return table.status();
+}
+
+int locate(const LocateRequest& request) {
+  const auto map = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(request.map)));
+  map_matcher::NetworkLocator locator({}, std::make_shared<const map_matcher::NetworkIndex>(map));
+  core::ok_or_throw(feed(std::filesystem::path(request.run) / "odometry.csv", request.until_m, locator));
+  const auto location = locator.locate();
+  std::printf("way              %.0f m, compared with %zu places\n", locator.way_m(), location.candidates);
+  if (location.places.empty()) {
+    std::printf("place            not yet known: the way is too short or bends too little\n");
+    return 0;
+  }
+  std::printf("place            %s\n", location.certain ? "certain"
+                                       : location.place_certain
+                                           ? "certain, but not which of the tracks beside each other"
+                                           : "not yet certain");
+  for (size_t i = 0; i < std::min<size_t>(location.places.size(), 8); ++i) {
+    const auto& p = location.places[i];
+    std::printf("  %6.2f %%  %u:%.0f:%c  %s, +-%.0f m, scale %.4f, misfit %.2f\n", 100 * p.probability, p.place.edge,
+                p.place.offset_m, p.place.direction == track::Direction::reverse ? '-' : '+',
+                map->edge(p.place.edge)->name.c_str(), p.sigma_m, p.scale, p.misfit);
+  }
+  return 0;
+}
+
+}  // namespace
+
+void add_map_locate(CLI::App& map, Action& chosen) {
+  const auto request = std::make_shared<LocateRequest>();
+  CLI::App* command = map.add_subcommand("locate", "Where on a map a run took place, from how it turned alone");
+  command->add_option("MAP", request->map, "A map made by `railfix map build` or `railfix map make`")->required();
+  command->add_option("--run", request->run, "Folder of a run, with odometry.csv")->required();
+  command->add_option("--until", request->until_m, "Use the run up to this distance")->check(CLI::Range(0.0, 1e9));
+  command->footer("Example:\n  railfix map locate national.map --run OUT");
+  command->callback([request, &chosen] { chosen = [request] { return locate(*request); }; });
+}
+
+}  // namespace railfix::tool
