@@ -126,7 +126,7 @@ void LandmarkFinder::find_platforms(const LandmarkPicture& picture) {
   if (way_m_ - platform_look_m_ < (frogs_took_this_picture ? 1.5 : 1.0) * kLookM) return;
   platform_look_m_ = way_m_;
   for (const SettledPlatform& end : platforms_.follow(platform_search_.find(picture), way_m_)) {
-    if (uprights_.in_tunnel(way_m_)) continue;  // walls, ducts and lamps look like platforms
+    if (uprights_.in_tunnel(way_m_) || uprights_.lit_walls()) continue;  // walls, ducts and lamps look like platforms
     const double ahead_m = end.place_m - way_m_;
     report(
         {LandmarkType::platform, picture.stamp_ns, ahead_m, end.lateral_m,
@@ -138,7 +138,7 @@ void LandmarkFinder::find_platforms(const LandmarkPicture& picture) {
 void LandmarkFinder::find_uprights(const LandmarkPicture& picture) {
   const auto& found = upright_search_.find(picture);
   const auto& settled = edges_.follow(found, upright_search_.profile(), picture, way_m_);
-  for (const UprightObject& object : uprights_.add(settled, edges_, way_m_)) {
+  for (const UprightObject& object : uprights_.add(settled, edges_, way_m_, upright_search_.profile().beside_grey)) {
     const double ahead_m = object.place_m - way_m_;
     report({object.type, picture.stamp_ns, ahead_m, object.lateral_m,
             std::hypot(object.sigma_m, options_.way_sigma * (std::abs(ahead_m) + 6.0)),

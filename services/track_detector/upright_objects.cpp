@@ -37,8 +37,16 @@ constexpr double kSameBridgeM = 15;
 constexpr double kWorstSigmaM = 0.35;
 constexpr double kWorstEdgeM = 0.8;
 constexpr double kLongestTunnelM = 1500;  // a portal out may be missed
+constexpr double kOutShare = 0.7;         // of the daylight before the tunnel
+constexpr double kOutM = 60;              // so long in daylight is no tunnel any more
 constexpr double kHoldM = 1.0;
 constexpr size_t kUsuallyHeld = 200;
+// Grey levels beside the track. An exposure that adapts shows open land by day at 50 to 120, a tunnel's lining in the
+// headlamp's light at 25 to 60, open land at night below 22.
+constexpr double kDaylightGrey = 40;
+constexpr double kLitWallGrey = 20;
+constexpr double kUsualGreyM = 40;  // of way that both are averaged over; longer than the face of a portal shows
+constexpr double kNearGreyM = 6;
 constexpr double kWaitM = 1.5;  // the other edge of a mast leaves the picture so much later, at most
 
 struct Size {
@@ -139,12 +147,37 @@ void UprightObjects::forget() {
   tunnel_ = {};
   exits_ = {};
   last_bridge_m_ = -1e9;
+  light_ = {};
+}
+
+void UprightObjects::look_at_light(double beside_grey, double way_m) {
+  if (!light_.known) light_ = {true, way_m, beside_grey, beside_grey, way_m};
+  const double step_m = way_m - light_.way_m;
+  light_.way_m = way_m;
+  light_.near_grey += (beside_grey - light_.near_grey) * (1 - std::exp(-step_m / kNearGreyM));
+  if (!in_tunnel(way_m)) {
+    light_.usual_grey += (beside_grey - light_.usual_grey) * (1 - std::exp(-step_m / kUsualGreyM));
+  } else if (way_m - light_.tunnel_like_m > kOutM) {  // no tunnel, or its portal out was missed
+    tunnel_ = {};
+    exits_ = {};
+  }
+  if (!in_tunnel(way_m) || beside_grey < kOutShare * light_.usual_grey) light_.tunnel_like_m = way_m;
+}
+
+bool UprightObjects::daylight() const {
+  return light_.usual_grey > kDaylightGrey;
+}
+
+bool UprightObjects::lit_walls() const {
+  return !daylight() && light_.near_grey > kLitWallGrey;
 }
 
 const std::vector<UprightObject>& UprightObjects::add(const std::vector<SettledEdge>& edges, const EdgeTracker& tracker,
-                                                      double way_m) {
+                                                      double way_m, double beside_grey) {
   objects_.clear();
+  look_at_light(beside_grey, way_m);
   for (const SettledEdge& edge : edges) {
+    if (lit_walls()) continue;  // of a tunnel at night, perhaps: lamps, niches, panels
     if (edge.sigma_m < kWorstEdgeM) edges_.push_back({edge, way_m});
     if (in_tunnel(edge.place_m)) look_for_exit(edge);
   }
@@ -158,7 +191,7 @@ const std::vector<UprightObject>& UprightObjects::add(const std::vector<SettledE
   release(way_m);
   release_exit(tracker, way_m);
   std::erase_if(edges_, [way_m](const Edge& e) { return e.edge.place_m < way_m - kForgetM; });
-  std::erase_if(masts_, [way_m](const UprightObject& mast) { return mast.place_m < way_m - kForgetM; });
+  std::erase_if(masts_, [way_m](const UprightObject& mast) { return mast.place_m < way_m - 2 * kForgetM; });
   return objects_;
 }
 
@@ -243,7 +276,9 @@ void UprightObjects::pair_sides(double way_m) {
       UprightObject object{LandmarkType::bridge, 0.5 * (left.edge.place_m + right.edge.place_m), 0,
                            std::hypot(kPairShare * std::max(left.edge.sigma_m, right.edge.sigma_m), kObjectSigmaM),
                            std::min(left.edge.pictures, right.edge.pictures)};
-      // Behind a bridge there is daylight again.
+      // Behind a bridge there is daylight again; in the dark it looks like a portal.
+      const bool into_the_dark = deep(left.edge) || deep(right.edge);
+      if (!daylight() && into_the_dark) continue;
       if (between(width_m, kTunnelWidthM) && deep(left.edge) && deep(right.edge)) {
         object.type = LandmarkType::portal_in;
         object.outer_grey = std::min(left.edge.outer_grey, right.edge.outer_grey);

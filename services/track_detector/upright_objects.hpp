@@ -21,13 +21,15 @@ struct UprightObject {
 class UprightObjects {
  public:
   UprightObjects();
-  /// Edges that were settled in the picture at way_m, and who followed them. Gives what is certain now; valid until the
-  /// next call.
-  const std::vector<UprightObject>& add(const std::vector<SettledEdge>& edges, const EdgeTracker& tracker,
-                                        double way_m);
+  /// Edges that were settled in the picture at way_m, who followed them, and how bright it is beside the track there.
+  /// Gives what is certain now; valid until the next call.
+  const std::vector<UprightObject>& add(const std::vector<SettledEdge>& edges, const EdgeTracker& tracker, double way_m,
+                                        double beside_grey);
   void forget();
-  /// Behind a portal in, and no portal out since.
+  /// Behind a portal in that daylight led to, and since then neither a portal out nor daylight for long.
   [[nodiscard]] bool in_tunnel(double way_m) const;
+  /// Without daylight, between walls in the headlamp's light: perhaps a tunnel.
+  [[nodiscard]] bool lit_walls() const;
 
  private:
   struct Edge {
@@ -35,6 +37,8 @@ class UprightObjects {
     double way_m = 0;  // when it was settled
     bool used = false;
   };
+  void look_at_light(double beside_grey, double way_m);
+  [[nodiscard]] bool daylight() const;
   void pair_masts();
   void find_stripes(double way_m);
   void tell_mast(const SettledEdge& inner, double front_m, double side_m);
@@ -51,6 +55,12 @@ class UprightObjects {
     double daylight_grey = 0;            // beside it
     std::array<double, 2> wall_m{0, 0};  // right and left
   };
+  struct Light {
+    bool known = false;
+    double way_m = 0;
+    double usual_grey = 0, near_grey = 0;  // beside the track, over a long and a short way; usual: outside tunnels
+    double tunnel_like_m = 0;              // way where it was last darker than before the tunnel
+  };
   struct Exit {
     double place_m = -1e9, sigma_m = 0;
     int pictures = 0;
@@ -61,6 +71,7 @@ class UprightObjects {
   std::vector<UprightObject> masts_;    // told, not yet forgotten
   double last_bridge_m_ = -1e9;
   Tunnel tunnel_;
+  Light light_;
   std::array<Exit, 2> exits_;  // seen so far, right and left
 };
 

@@ -25,6 +25,7 @@ constexpr double kNothingClear = 20.0;  // grey levels
 
 constexpr double kWall[] = {0.75, 0.94};  // of an edge's bearing: so much farther away, if it is a wall along the track
 constexpr double kDeep[] = {0.3, 0.5};
+constexpr double kBeside[] = {0.6, 0.95};  // of the widest bearing
 
 double lean_of(size_t index) {
   return (static_cast<double>(index) - static_cast<double>(kUpright)) * kLeanStep;
@@ -46,6 +47,7 @@ const std::vector<UprightEdge>& UprightSearch::find(const LandmarkPicture& pictu
   found_.clear();
   look(picture);
   differentiate();
+  look_beside();
   size_t best = lean_;
   for (size_t index = lean_ > 0 ? lean_ - 1 : 0; index <= std::min(lean_ + 1, clear_.size() - 1); ++index) {
     sum_up(lean_of(index));
@@ -91,6 +93,12 @@ void UprightSearch::differentiate() {
       step[c] = (grey[c + 1] + grey[c + 2] - grey[c - 1] - grey[c - 2]) * (1.0F / kEdge);
     }
   }
+}
+
+void UprightSearch::look_beside() {
+  const double left = mean_grey(profile_.widest, kBeside);
+  const double right = mean_grey(-profile_.widest, kBeside);
+  profile_.beside_grey = std::max(0.0, std::min(left, right));
 }
 
 void UprightSearch::sum_up(double lean) {

@@ -24,6 +24,7 @@ struct UprightEdge {
 struct UprightProfile {
   double cell = 0;           // bearing between two columns
   double widest = 0;         // largest bearing that the picture shows on both sides
+  double beside_grey = 0;    // mean of what lies far beside the track, of the darker side
   std::vector<float> step;   // grey levels, brighter on the left positive; from right to left
   std::vector<float> score;  // the same against its scatter over the rows
   [[nodiscard]] double bearing(double column) const {
@@ -50,6 +51,7 @@ class UprightSearch {
   void differentiate();
   void sum_up(double lean);
   [[nodiscard]] double clearness() const;
+  void look_beside();
   void collect();
   void pair();
   [[nodiscard]] double column_grey(int column) const;

@@ -42,7 +42,11 @@ UprightProfile see(const std::vector<Corner>& corners, double way_m, std::vector
   return profile;
 }
 
-std::vector<UprightObject> pass(const std::vector<Corner>& corners, double to_m) {
+constexpr double kDay = 80;  // grey levels beside the track
+constexpr double kNight = 6;
+constexpr double kLining = 32;
+
+std::vector<UprightObject> pass(const std::vector<Corner>& corners, double to_m, double beside_grey = kDay) {
   EdgeTracker tracker;
   UprightObjects objects;
   std::vector<UprightObject> told;
@@ -51,7 +55,7 @@ std::vector<UprightObject> pass(const std::vector<Corner>& corners, double to_m)
   for (double way_m = 0; way_m < to_m; way_m += kStepM) {
     const auto profile = see(corners, way_m, edges);
     const auto& settled = tracker.follow(edges, profile, picture, way_m);
-    for (const auto& object : objects.add(settled, tracker, way_m)) told.push_back(object);
+    for (const auto& object : objects.add(settled, tracker, way_m, beside_grey)) told.push_back(object);
   }
   return told;
 }
@@ -138,6 +142,37 @@ TEST(Uprights, MastsOnBothSidesAreNoBridge) {
       60);
   ASSERT_EQ(told.size(), 2U);
   for (const auto& object : told) EXPECT_EQ(object.type, LandmarkType::mast);
+}
+
+// Lit corners before the dark: of a bridge or of a portal; and a mast behind them.
+const std::vector<Corner> kGateAndMast{
+    {40, 2.7, 14, 24, 14, 8}, {40, -2.7, 14, 24, 14, 8}, {80.13, 3.8, 100, 60}, {79.87, 3.8, 60, 100}};
+
+TEST(Uprights, InTheDarkNothingIsAPortalAndMastsBehindItCount) {
+  const auto told = pass(kGateAndMast, 90, kNight);
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0].type, LandmarkType::mast);
+  EXPECT_NEAR(told[0].place_m, 80, 0.15);
+}
+
+TEST(Uprights, ByDayTheSameIsAPortalWithoutMastsBehindIt) {
+  const auto told = pass(kGateAndMast, 90, kDay);
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0].type, LandmarkType::portal_in);
+}
+
+TEST(Uprights, LongDaylightEndsATunnelWithoutPortalOut) {
+  auto corners = kGateAndMast;
+  corners.push_back({120.13, 3.8, 100, 60});
+  corners.push_back({119.87, 3.8, 60, 100});
+  const auto told = pass(corners, 130, kDay);
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_EQ(told[1].type, LandmarkType::mast);
+  EXPECT_NEAR(told[1].place_m, 120, 0.15);
+}
+
+TEST(Uprights, BetweenLitWallsInTheDarkNothingIsTold) {
+  EXPECT_TRUE(pass(kGateAndMast, 90, kLining).empty());
 }
 
 std::vector<SettledPlatform> approach(double height_m, double lateral_m) {
