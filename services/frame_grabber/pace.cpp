@@ -2,6 +2,11 @@
 
 namespace railfix::frame_grabber {
 
+namespace {
+// A camera keeps so many in its buffers while the host is held up; so many find room in front of a handler, too.
+constexpr int kPicturesHeld = 3;
+}  // namespace
+
 RealPace::Verdict RealPace::ask(int64_t stamp_ns, int64_t wall_ns) {
   if (!newest_ns_) {
     wall_minus_data_ns_ = wall_ns - stamp_ns;
@@ -12,7 +17,7 @@ RealPace::Verdict RealPace::ask(int64_t stamp_ns, int64_t wall_ns) {
   const int64_t period_ns = stamp_ns - *newest_ns_;
   newest_ns_ = stamp_ns;
   const int64_t due_ns = stamp_ns + wall_minus_data_ns_;
-  return {due_ns, wall_ns - due_ns > period_ns};
+  return {due_ns, wall_ns - due_ns > kPicturesHeld * period_ns};
 }
 
 void LockStep::begin() {

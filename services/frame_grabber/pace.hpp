@@ -15,7 +15,7 @@ class RealPace {
  public:
   struct Verdict {
     int64_t due_ns = 0;  // wall clock; in the past = now
-    bool skip = false;   // more than one period late
+    bool skip = false;   // more than three periods late
   };
   /// REQUIRES: in the order of playing. A picture that is stamped before one already played is due at once.
   Verdict ask(int64_t stamp_ns, int64_t wall_ns);

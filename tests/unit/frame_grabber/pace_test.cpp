@@ -13,12 +13,12 @@ TEST(RealPace, PicturesAreAsFarApartAsTheyWereRecorded) {
   EXPECT_EQ(pace.ask(130, 5001).due_ns, 5030);
 }
 
-TEST(RealPace, OnePeriodLateIsPlayedMoreIsSkippedAndDoesNotShiftTheRest) {
+TEST(RealPace, ThreePeriodsLateIsPlayedMoreIsSkippedAndDoesNotShiftTheRest) {
   RealPace pace;
   EXPECT_FALSE(pace.ask(100, 5000).skip);
-  EXPECT_FALSE(pace.ask(110, 5020).skip);  // due 5010, exactly one period late
-  EXPECT_TRUE(pace.ask(120, 5031).skip);   // due 5020
-  const auto next = pace.ask(130, 5031);   // due 5030
+  EXPECT_FALSE(pace.ask(110, 5040).skip);  // due 5010, exactly three periods late
+  EXPECT_TRUE(pace.ask(120, 5051).skip);   // due 5020
+  const auto next = pace.ask(130, 5051);   // due 5030
   EXPECT_FALSE(next.skip);
   EXPECT_EQ(next.due_ns, 5030);
 }
