@@ -1,15 +1,12 @@
 #include "track/import/landxml.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <optional>
-#include <pugixml.hpp>
 #include <string_view>
 
 #include "core/units.hpp"
+#include "track/import/xml_source.hpp"
 
 namespace railfix::track {
 namespace {
@@ -19,72 +16,36 @@ constexpr double kToleratedStepRad = 1e-3;
 constexpr double kToleratedGapM = 1e-4;
 constexpr size_t kMostProblems = 200;
 
-/// Finite numbers separated by white space; empty when there is anything else.
-std::vector<double> numbers_in(std::string_view text) {
-  std::vector<double> numbers;
-  const char* at = text.data();
-  const char* const end = at + text.size();
-  while (true) {
-    while (at != end && std::string_view(" \t\r\n").find(*at) != std::string_view::npos) ++at;
-    if (at == end) return numbers;
-    double value = 0;
-    const auto [next, error] = std::from_chars(at, end, value);
-    if (error != std::errc() || !std::isfinite(value)) return {};
-    numbers.push_back(value);
-    at = next;
-  }
-}
-
-std::optional<double> attribute(const pugi::xml_node& node, const char* name) {
-  const std::vector<double> numbers = numbers_in(node.attribute(name).value());
-  return numbers.size() == 1 ? std::optional(numbers.front()) : std::nullopt;
-}
-
 /// Reads one document; errors are thrown as BadInput inside and become values at the door.
 class Reader {
  public:
-  Reader(std::string file_name, std::string text) : file_name_(std::move(file_name)), text_(std::move(text)) {}
+  explicit Reader(const std::filesystem::path& file) : source_(file) {}
 
   LandXml read() {
-    const pugi::xml_parse_result parsed = document_.load_buffer(text_.data(), text_.size());
-    if (!parsed) {
-      throw core::BadInput(file_name_ + " line " + line_of(parsed.offset) + ": this is not sound XML (" +
-                           parsed.description() + ")");
+    const pugi::xml_node root = source_.root();
+    if (std::string_view(root.name()) != "LandXML") {
+      throw core::BadInput(source_.file_name() + " is XML but not LandXML: its first element must be <LandXML>");
     }
-    const pugi::xml_node root = document_.child("LandXML");
-    if (!root) throw core::BadInput(file_name_ + " is XML but not LandXML: its first element must be <LandXML>");
     check_units(root);
     for (const pugi::xml_node& group : root.children("Alignments")) {
       for (const pugi::xml_node& alignment : group.children("Alignment")) read_alignment(alignment);
     }
-    if (out_.tracks.empty()) throw core::BadInput(file_name_ + " holds no <Alignment> with <CoordGeom>");
+    if (out_.tracks.empty()) throw core::BadInput(source_.file_name() + " holds no <Alignment> with <CoordGeom>");
     out_.crs = find_crs(root);
     return std::move(out_);
   }
 
  private:
-  [[nodiscard]] std::string line_of(ptrdiff_t offset) const {
-    const size_t length = std::min(static_cast<size_t>(std::max<ptrdiff_t>(offset, 0)), text_.size());
-    return std::to_string(1 + std::count(text_.begin(), text_.begin() + static_cast<ptrdiff_t>(length), '\n'));
-  }
-  [[nodiscard]] core::BadInput wrong(const pugi::xml_node& node, const std::string& what) const {
-    return core::BadInput(file_name_ + " line " + line_of(node.offset_debug()) + ": " + what);
-  }
   void problem(const std::string& sentence) {
     if (out_.problems.size() < kMostProblems) out_.problems.push_back(sentence);
   }
 
-  [[nodiscard]] double required(const pugi::xml_node& node, const char* name) const {
-    const std::optional<double> value = attribute(node, name);
-    if (!value)
-      throw wrong(node, "<" + std::string(node.name()) + "> needs a number in the attribute \"" + name + "\"");
-    return *value;
-  }
   /// "northing easting [height]"
   [[nodiscard]] Eigen::Vector2d point(const pugi::xml_node& element, const char* name) const {
-    const std::vector<double> numbers = numbers_in(element.child(name).text().get());
+    const std::vector<double> numbers = numbers_of(element.child(name).text().get());
     if (numbers.size() < 2) {
-      throw wrong(element, "<" + std::string(element.name()) + "> needs <" + name + "> with northing and easting");
+      throw source_.wrong(element,
+                          "<" + std::string(element.name()) + "> needs <" + name + "> with northing and easting");
     }
     return {numbers[1], numbers[0]};
   }
@@ -93,7 +54,7 @@ class Reader {
     const pugi::xml_node units = root.child("Units");
     const std::string_view unit = units.child("Metric").attribute("linearUnit").value();
     if (units.child("Imperial") || (!unit.empty() && unit != "meter" && unit != "metre")) {
-      throw wrong(units, "only LandXML in metres is read; export it with <Metric linearUnit=\"meter\">");
+      throw source_.wrong(units, "only LandXML in metres is read; export it with <Metric linearUnit=\"meter\">");
     }
   }
 
@@ -101,10 +62,10 @@ class Reader {
   [[nodiscard]] double curvature(const pugi::xml_node& element, const char* name) const {
     const std::string_view text = element.attribute(name).value();
     if (text == "INF" || text == "inf" || text == "Infinity") return 0.0;
-    const double radius = required(element, name);
+    const double radius = source_.required(element, name);
     const std::string_view rotation = element.attribute("rot").value();
-    if (radius < 10.0) throw wrong(element, "a radius of less than 10 m is not a railway's");
-    if (rotation != "cw" && rotation != "ccw") throw wrong(element, "rot must be cw or ccw");
+    if (radius < 10.0) throw source_.wrong(element, "a radius of less than 10 m is not a railway's");
+    if (rotation != "cw" && rotation != "ccw") throw source_.wrong(element, "rot must be cw or ccw");
     return (rotation == "ccw" ? 1.0 : -1.0) / radius;
   }
 
@@ -121,32 +82,32 @@ class Reader {
     double end = 0;
     if (kind == "Curve") {
       if (const std::string_view type = node.attribute("crvType").value(); !type.empty() && type != "arc") {
-        throw wrong(node, "only curves of crvType arc are read");
+        throw source_.wrong(node, "only curves of crvType arc are read");
       }
       start = end = curvature(node, "radius");
     } else if (kind == "Spiral") {
       start = curvature(node, "radiusStart");
       end = curvature(node, "radiusEnd");
       if (const std::string_view type = node.attribute("spiType").value(); type != "clothoid") {
-        problem(track + ": the spiral in line " + line_of(node.offset_debug()) + " is a " + std::string(type) +
+        problem(track + ": the spiral in line " + source_.line_of(node) + " is a " + std::string(type) +
                 ", taken as a clothoid");
       }
     } else if (kind != "Line") {
-      throw wrong(node, "<" + std::string(kind) + "> cannot be read; only Line, Curve and Spiral can");
+      throw source_.wrong(node, "<" + std::string(kind) + "> cannot be read; only Line, Curve and Spiral can");
     }
     const Eigen::Vector2d from = point(node, "Start");
     const Eigen::Vector2d to = point(node, "End");
     const double chord = (to - from).norm();
-    const double length = kind == "Line" ? chord : required(node, "length");
+    const double length = kind == "Line" ? chord : source_.required(node, "length");
     if (!(chord > 1e-4) || !(length > 1e-4)) {
-      problem(track + ": the element in line " + line_of(node.offset_debug()) + " has no length and is left out");
+      problem(track + ": the element in line " + source_.line_of(node) + " has no length and is left out");
       return;
     }
     if (length > 1e6 || !(chord < 1e6) || std::max(std::abs(start), std::abs(end)) * length > core::kPi) {
-      throw wrong(node, "the element turns by more than half a circle or is longer than 1000 km");
+      throw source_.wrong(node, "the element turns by more than half a circle or is longer than 1000 km");
     }
-    take(close_element(from, to, start, end, length), to, attribute(node, "length").value_or(chord),
-         track + ": the element in line " + line_of(node.offset_debug()), plan);
+    take(close_element(from, to, start, end, length), to, XmlSource::number(node, "length").value_or(chord),
+         track + ": the element in line " + source_.line_of(node), plan);
   }
 
   void take(const ClosedElement& closed, const Eigen::Vector2d& to, double file_length, const std::string& where,
@@ -197,13 +158,14 @@ class Reader {
           problem(track + ": <" + std::string(kind) + "> of the profile is left out");
         continue;
       }
-      const std::vector<double> numbers = numbers_in(node.text().get());
-      if (numbers.size() != 2) throw wrong(node, "<" + std::string(kind) + "> needs a station and an elevation");
-      const double length = kind == "PVI" ? 0.0 : required(node, "length");
-      if (length < 0) throw wrong(node, "a vertical curve cannot have a negative length");
+      const std::vector<double> numbers = numbers_of(node.text().get());
+      if (numbers.size() != 2)
+        throw source_.wrong(node, "<" + std::string(kind) + "> needs a station and an elevation");
+      const double length = kind == "PVI" ? 0.0 : source_.required(node, "length");
+      if (length < 0) throw source_.wrong(node, "a vertical curve cannot have a negative length");
       points.push_back({offset_at(plan, numbers[0]), numbers[1], length});
       if (points.size() > 1 && points.back().offset_m <= points[points.size() - 2].offset_m) {
-        throw wrong(node, "the profile's stations must grow");
+        throw source_.wrong(node, "the profile's stations must grow");
       }
     }
     for (size_t i = 1; i < points.size(); ++i) {
@@ -221,11 +183,11 @@ class Reader {
     std::vector<CantPoint> points;
     for (const pugi::xml_node& node : alignment.child("Cant").children("CantStation")) {
       const std::string_view direction = node.attribute("curvature").value();
-      if (direction != "cw" && direction != "ccw") throw wrong(node, "curvature must be cw or ccw");
-      const double cant_m = required(node, "appliedCant") * 1e-3 * (direction == "ccw" ? 1.0 : -1.0);
-      points.push_back({offset_at(plan, required(node, "station")), cant_m});
+      if (direction != "cw" && direction != "ccw") throw source_.wrong(node, "curvature must be cw or ccw");
+      const double cant_m = source_.required(node, "appliedCant") * 1e-3 * (direction == "ccw" ? 1.0 : -1.0);
+      points.push_back({offset_at(plan, source_.required(node, "station")), cant_m});
       if (points.size() > 1 && points.back().offset_m < points[points.size() - 2].offset_m) {
-        throw wrong(node, "the cant stations must grow");
+        throw source_.wrong(node, "the cant stations must grow");
       }
     }
     return points;
@@ -236,14 +198,15 @@ class Reader {
     if (!geometry) return;
     const std::string name = node.attribute("name").as_string("alignment");
     Plan plan;
-    plan.stations.push_back({attribute(node, "staStart").value_or(0.0), 0.0});
+    plan.stations.push_back({XmlSource::number(node, "staStart").value_or(0.0), 0.0});
     for (const pugi::xml_node& element : geometry.children()) {
       if (element.type() == pugi::node_element && std::string_view(element.name()) != "Feature")
         add_element(element, name, plan);
     }
-    if (plan.elements.empty()) throw wrong(geometry, "the alignment " + name + " has no elements");
+    if (plan.elements.empty()) throw source_.wrong(geometry, "the alignment " + name + " has no elements");
     const double plan_length = plan.stations.back().first - plan.stations.front().first;
-    if (const double told = attribute(node, "length").value_or(plan_length); std::abs(told - plan_length) > 0.01) {
+    if (const double told = XmlSource::number(node, "length").value_or(plan_length);
+        std::abs(told - plan_length) > 0.01) {
       problem(name + ": its elements cover " + std::to_string(plan_length) + " m of the " + std::to_string(told) +
               " m that it claims");
     }
@@ -266,9 +229,7 @@ class Reader {
     return swiss ? "EPSG:2056" : "";
   }
 
-  std::string file_name_;
-  std::string text_;
-  pugi::xml_document document_;
+  XmlSource source_;
   LandXml out_;
 };
 
@@ -292,12 +253,8 @@ ClosedElement close_element(const Eigen::Vector2d& from, const Eigen::Vector2d& 
 }
 
 core::Result<LandXml> read_landxml(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream || std::filesystem::is_directory(file)) {
-    return core::Error{"cannot read " + file.string() + "; is the path right?"};
-  }
   try {
-    return Reader(file.string(), std::string(std::istreambuf_iterator<char>(stream), {})).read();
+    return Reader(file).read();
   } catch (const core::BadInput& bad) {
     return core::Error{bad.what()};
   }

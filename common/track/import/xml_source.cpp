@@ -16,18 +16,18 @@ XmlSource::XmlSource(const std::filesystem::path& file) : file_name_(file.string
   text_.assign(std::istreambuf_iterator<char>(stream), {});
   const pugi::xml_parse_result parsed = document_.load_buffer(text_.data(), text_.size());
   if (!parsed) {
-    throw core::BadInput(file_name_ + " line " + line_of(parsed.offset) + ": this is not sound XML (" +
+    throw core::BadInput(file_name_ + " line " + line_at(parsed.offset) + ": this is not sound XML (" +
                          parsed.description() + ")");
   }
 }
 
-std::string XmlSource::line_of(ptrdiff_t offset) const {
+std::string XmlSource::line_at(ptrdiff_t offset) const {
   const size_t length = std::min(static_cast<size_t>(std::max<ptrdiff_t>(offset, 0)), text_.size());
   return std::to_string(1 + std::count(text_.begin(), text_.begin() + static_cast<ptrdiff_t>(length), '\n'));
 }
 
 core::BadInput XmlSource::wrong(const pugi::xml_node& node, const std::string& what) const {
-  return core::BadInput(file_name_ + " line " + line_of(node.offset_debug()) + ": " + what);
+  return core::BadInput(file_name_ + " line " + line_of(node) + ": " + what);
 }
 
 std::optional<double> XmlSource::number(const pugi::xml_node& node, const char* attribute) {
@@ -53,7 +53,7 @@ std::vector<double> numbers_of(std::string_view text) {
   const char* at = text.data();
   const char* const end = at + text.size();
   while (true) {
-    while (at != end && std::string_view(" ,\t\r\n").find(*at) != std::string_view::npos) ++at;
+    while (at != end && std::string_view(" \t\r\n").find(*at) != std::string_view::npos) ++at;
     if (at == end) return numbers;
     double value = 0;
     const auto [next, error] = std::from_chars(at, end, value);

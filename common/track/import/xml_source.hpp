@@ -19,6 +19,8 @@ class XmlSource {
   /// First element, without its namespace.
   [[nodiscard]] pugi::xml_node root() const { return document_.document_element(); }
   [[nodiscard]] const std::string& file_name() const { return file_name_; }
+  /// Where it stands in the file, from 1.
+  [[nodiscard]] std::string line_of(const pugi::xml_node& node) const { return line_at(node.offset_debug()); }
   [[nodiscard]] core::BadInput wrong(const pugi::xml_node& node, const std::string& what) const;
   /// A finite number in an attribute; `required` throws without one.
   [[nodiscard]] static std::optional<double> number(const pugi::xml_node& node, const char* attribute);
@@ -27,13 +29,13 @@ class XmlSource {
   [[nodiscard]] std::string required_text(const pugi::xml_node& node, const char* attribute) const;
 
  private:
-  [[nodiscard]] std::string line_of(ptrdiff_t offset) const;
+  [[nodiscard]] std::string line_at(ptrdiff_t offset) const;
   std::string file_name_;
   std::string text_;
   pugi::xml_document document_;
 };
 
-/// Finite numbers separated by white space or commas; empty when there is anything else.
+/// Finite numbers separated by white space; empty when there is anything else.
 std::vector<double> numbers_of(std::string_view text);
 
 /// Every descendant of that name, in document order.

@@ -1,48 +1,14 @@
 // In steady state neither the rails nor the sightings take memory: neither by operator new nor for matrices of OpenCV.
 #include <gtest/gtest.h>
 
-#include <atomic>
 #include <cmath>
-#include <cstdlib>
-#include <new>
 
 #include "core/time.hpp"
 #include "simulator/builtin_line.hpp"
 #include "simulator/renderer.hpp"
+#include "support/count_allocations.hpp"
 #include "track_detector/landmark_finder.hpp"
 #include "track_detector/track_detector.hpp"
-
-namespace {
-
-std::atomic<bool> counting = false;
-std::atomic<int> allocations = 0;
-
-class CountingMatAllocator : public cv::MatAllocator {
- public:
-  cv::UMatData* allocate(int dims, const int* sizes, int type, void* data, size_t* step, cv::AccessFlag flags,
-                         cv::UMatUsageFlags usage) const override {
-    if (counting) ++allocations;
-    return cv::Mat::getStdAllocator()->allocate(dims, sizes, type, data, step, flags, usage);
-  }
-  bool allocate(cv::UMatData* data, cv::AccessFlag flags, cv::UMatUsageFlags usage) const override {
-    return cv::Mat::getStdAllocator()->allocate(data, flags, usage);
-  }
-  void deallocate(cv::UMatData* data) const override { cv::Mat::getStdAllocator()->deallocate(data); }
-};
-
-}  // namespace
-
-void* operator new(size_t size) {
-  if (counting) ++allocations;
-  if (void* memory = std::malloc(size == 0 ? 1 : size)) return memory;
-  throw std::bad_alloc();
-}
-void operator delete(void* memory) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, size_t) noexcept {
-  std::free(memory);
-}
 
 namespace railfix::track_detector {
 namespace {
@@ -52,12 +18,6 @@ constexpr int kWarmUp = 12;
 /// A ride over two balises and a frog of the built-in line.
 class SteadyState : public testing::Test {
  protected:
-  static void SetUpTestSuite() {
-    static CountingMatAllocator allocator;
-    cv::Mat::setDefaultAllocator(&allocator);
-  }
-  static void TearDownTestSuite() { cv::Mat::setDefaultAllocator(nullptr); }
-
   SteadyState() {
     auto& camera = options_.camera;
     camera.width_px = 640;
@@ -71,7 +31,7 @@ class SteadyState : public testing::Test {
     auto line = simulator::Line::make(map, {1, kBeginM, track::Direction::forward}, 140);
     renderer_ =
         std::make_unique<simulator::Renderer>(std::make_shared<simulator::Line>(std::move(line).value()), options_);
-    allocations = 0;
+    test::allocations = 0;
   }
 
   cv::Mat picture(int index) {
@@ -84,6 +44,7 @@ class SteadyState : public testing::Test {
 
   static constexpr double kBeginM = 1296;
   static constexpr double kStepM = 0.9;
+  test::CountMatrices matrices_;
   simulator::RenderOptions options_;
   geometry::CameraPose mount_;
   std::unique_ptr<simulator::Renderer> renderer_;
@@ -97,18 +58,18 @@ TEST_F(SteadyState, RailsAndSightingsTakeNoMemory) {
     LandmarkPicture one;
     one.grey = picture(i);
     one.stamp_ns = core::to_ns(1 + i / 30.0);
-    counting = i >= kWarmUp;
+    test::counting = i >= kWarmUp;
     const TrackObservation& rails = detector.detect(one.grey);
     one.pose = rails.shape.camera;
     one.pitch_sigma_rad = std::sqrt(rails.covariance(1, 1));
     one.curvature_per_m = rails.shape.curvature_per_m;
     const auto& sightings = finder.process(one);
-    counting = false;
+    test::counting = false;
     EXPECT_TRUE(rails.seen()) << i << " " << rails.reason;
     sighted += sightings.size();
   }
   EXPECT_GE(sighted, 3U);
-  EXPECT_EQ(allocations, 0);
+  EXPECT_EQ(test::allocations, 0);
 }
 
 TEST_F(SteadyState, SearchingWithoutRailsTakesNoMemory) {
@@ -116,12 +77,12 @@ TEST_F(SteadyState, SearchingWithoutRailsTakesNoMemory) {
   cv::Mat upside_down;
   cv::flip(picture(0), upside_down, 0);
   for (int i = 0; i < 12; ++i) {
-    counting = i >= 4;
+    test::counting = i >= 4;
     const bool seen = detector.detect(upside_down).seen();
-    counting = false;
+    test::counting = false;
     EXPECT_FALSE(seen);
   }
-  EXPECT_EQ(allocations, 0);
+  EXPECT_EQ(test::allocations, 0);
 }
 
 }  // namespace
