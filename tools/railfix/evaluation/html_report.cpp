@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "core/time.hpp"
+#include "escape_html.hpp"
 #include "evaluation/plot.hpp"
 
 namespace railfix::evaluation {
@@ -44,7 +45,7 @@ class Html {
  public:
   explicit Html(const Truth& truth) : begin_ns_(truth.rows().front().stamp_ns) {}
   void figure(const std::string& what, const std::string& value) {
-    out_ << "<div><b>" << escape_html(value) << "</b><span>" << escape_html(what) << "</span></div>\n";
+    out_ << "<div><b>" << tool::escape_html(value) << "</b><span>" << tool::escape_html(what) << "</span></div>\n";
   }
   void raw(const std::string& text) { out_ << text; }
   void plot(const std::string& title, const std::string& x, const std::string& y, std::vector<Series> series) {
@@ -165,7 +166,7 @@ void kinds_table(Html& html, const SightingResult& sightings) {
       "th><th>recall</th>"
       "<th>error p95</th></tr>\n");
   for (const auto& [name, kind] : sightings.kinds) {
-    html.raw("<tr><td>" + escape_html(name) + "</td><td>" + std::to_string(kind.real) + "</td><td>" +
+    html.raw("<tr><td>" + tool::escape_html(name) + "</td><td>" + std::to_string(kind.real) + "</td><td>" +
              std::to_string(kind.said) + "</td><td>" + std::to_string(kind.right) + "</td><td>" +
              number(kind.precision_percent(), "%.1f %%") + "</td><td>" + number(kind.recall_percent(), "%.1f %%") +
              "</td><td>" + number(kind.error_m.p95, "%.3f m") + "</td></tr>\n");
@@ -178,11 +179,11 @@ void services_table(Html& html, const std::vector<ServiceResult>& services) {
       "<h2>Services</h2>\n<table><tr><th>service</th><th>in</th><th>out</th><th>dropped</th><th>latency p50</th>"
       "<th>latency p99</th><th>processor</th><th>memory</th><th>state</th></tr>\n");
   for (const ServiceResult& s : services) {
-    html.raw("<tr><td>" + escape_html(s.service) + "</td><td>" + number(s.frames_in, "%.0f") + "</td><td>" +
+    html.raw("<tr><td>" + tool::escape_html(s.service) + "</td><td>" + number(s.frames_in, "%.0f") + "</td><td>" +
              number(s.frames_out, "%.0f") + "</td><td>" + number(s.dropped, "%.0f") + "</td><td>" +
              number(s.latency_p50_ms, "%.2f ms") + "</td><td>" + number(s.latency_p99_ms, "%.2f ms") + "</td><td>" +
              number(s.cpu_percent, "%.0f %%") + "</td><td>" + number(s.rss_mb, "%.0f MB") + "</td><td>" +
-             escape_html(s.last_state) + "</td></tr>\n");
+             tool::escape_html(s.last_state) + "</td></tr>\n");
   }
   html.raw("</table>\n");
 }
@@ -191,11 +192,11 @@ void services_table(Html& html, const std::vector<ServiceResult>& services) {
 
 std::string html_report(const Truth& truth, const Evaluation& evaluation, const std::string& run_name) {
   Html html(truth);
-  html.raw(std::string(kHead) + "<title>Railfix: " + escape_html(run_name) + "</title></head><body>\n<h1>" +
-           escape_html(run_name) + "</h1>\n<p>railfix evaluate: this run beside the truth of its dataset.");
+  html.raw(std::string(kHead) + "<title>Railfix: " + tool::escape_html(run_name) + "</title></head><body>\n<h1>" +
+           tool::escape_html(run_name) + "</h1>\n<p>railfix evaluate: this run beside the truth of its dataset.");
   if (!evaluation.missing.empty()) {
     html.raw(" Not in this run:");
-    for (const std::string& name : evaluation.missing) html.raw(" " + escape_html(name));
+    for (const std::string& name : evaluation.missing) html.raw(" " + tool::escape_html(name));
     html.raw(".");
   }
   html.raw("</p>\n");

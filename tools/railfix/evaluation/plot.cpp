@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "escape_html.hpp"
+
 namespace railfix::evaluation {
 namespace {
 
@@ -69,7 +71,7 @@ void make_axes_equal(Frame& frame) {
 
 std::string text_at(double x, double y, const char* anchor, const std::string& text, const std::string& more = "") {
   return "<text x=\"" + px(x) + "\" y=\"" + px(y) + "\" text-anchor=\"" + anchor + "\"" + more + ">" +
-         escape_html(text) + "</text>\n";
+         tool::escape_html(text) + "</text>\n";
 }
 
 std::string line_between(double x1, double y1, double x2, double y2, const char* style) {
@@ -88,7 +90,7 @@ std::string tick_text(double value, double step) {
 std::string axes(const Frame& frame, const std::string& title, const std::string& x_label, const std::string& y_label) {
   const char* const grid = "stroke=\"#e4e7eb\"";
   std::string out = "<svg viewBox=\"0 0 " + px(kWidth) + " " + px(frame.height) + "\" role=\"img\" aria-label=\"" +
-                    escape_html(title) + "\">\n";
+                    tool::escape_html(title) + "\">\n";
   out += text_at(kLeft, 18, "start", title, " class=\"title\"");
   const auto x_ticks = ticks(frame.x.low, frame.x.high, 8);
   for (const double tick : x_ticks) {
@@ -181,32 +183,6 @@ std::string legend(const std::vector<Series>& series) {
 }
 
 }  // namespace
-
-std::string escape_html(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      case '\'':
-        out += "&#39;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
-}
 
 std::vector<double> ticks(double low, double high, int count) {
   const double rough = (high - low) / count;

@@ -30,9 +30,6 @@ std::string line_svg(const Plot& plot);
 /// wrong.
 std::string stanford_svg(const Points& error_and_bound);
 
-/// "&", "<", ">", and quotes as entities.
-std::string escape_html(const std::string& text);
-
 /// Round numbers, at most about `count`, that span the range.
 std::vector<double> ticks(double low, double high, int count);
 

@@ -1,8 +1,10 @@
+#include <algorithm>
 #include <cstdio>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "escape_html.hpp"
 #include "map/drawing.hpp"
 
 namespace railfix::tool {
@@ -14,24 +16,11 @@ std::string hex(const Drawing::Colour& colour) {
   return text;
 }
 
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      default:
-        out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
-    }
-  }
-  return out;
+// XML knows no control characters.
+std::string escaped(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20; }, ' ');
+  return escape_html(text);
 }
 
 void write_svg(const Drawing& drawing, std::ostream& out) {
