@@ -31,13 +31,12 @@ Loop::Loop(std::string service, const CommonConfig& common)
       reply_(std::make_unique<messaging::Writer<msg::ControlReply>>(participant_, messaging::topics::service_reply)) {
   if (common_.lock_step) {
     progress_ = std::make_unique<messaging::Writer<msg::DataProgress>>(participant_, messaging::topics::data_progress);
-  }
-  if (common_.lock_step) {
-    messaging::Topic<msg::DataClock> clocks = messaging::topics::data_clock;
-    readers_.push_back(std::make_unique<messaging::AnyReader>(
-        participant_, messaging::info_of(clocks), "", queue_, [this](const auto& sample, const auto& info) {
-          if (info.valid) clock(*static_cast<const msg::DataClock*>(sample.get()));
-        }));
+    readers_.push_back(
+        std::make_unique<messaging::AnyReader>(participant_, messaging::info_of(messaging::topics::data_clock), "",
+                                               queue_, [this](const auto& sample, const auto& info) {
+                                                 if (info.valid)
+                                                   clock(*static_cast<const msg::DataClock*>(sample.get()));
+                                               }));
   }
   on<msg::ControlRequest>(messaging::topics::service_control,
                           [this](const msg::ControlRequest& request) { answer(request); });

@@ -136,9 +136,7 @@ void FrameGrabberService::prepare_recorded() {
 
 void FrameGrabberService::start_when_connected() {
   if (!made_ns_) return;
-  const auto found = context_.participant().connections();
-  const bool complete =
-      config_.wait_for.empty() || gathering_.complete({found.matches, found.remote_endpoints, found.pairs});
+  const bool complete = config_.wait_for.empty() || gathering_.complete(context_.participant().connections());
   const bool gave_up = core::seconds(core::monotonic_ns() - *made_ns_) > config_.wait_s;
   if (!complete && !gave_up) return;
   made_ns_.reset();

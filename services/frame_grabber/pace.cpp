@@ -1,5 +1,9 @@
 #include "frame_grabber/pace.hpp"
 
+#include <tuple>
+
+#include "messaging/connected.hpp"
+
 namespace railfix::frame_grabber {
 
 namespace {
@@ -31,22 +35,22 @@ bool LockStep::answered(const std::string& service, uint64_t step) {
   return true;
 }
 
-bool Gathering::complete(const Discovered& discovered) {
-  const bool steady = discovered == before_ && heard_ == heard_before_;
+bool Gathering::complete(const messaging::Connections& here) {
+  const auto seen = [](const messaging::Connections& c) { return std::tie(c.matches, c.remote_endpoints, c.pairs); };
+  const bool steady = seen(here) == seen(before_) && heard_ == heard_before_;
   steady_looks_ = steady ? steady_looks_ + 1 : 0;
-  before_ = discovered;
+  before_ = here;
   heard_before_ = heard_;
   for (const auto& service : services_) {
     if (!heard_.contains(service)) return false;
   }
   uint32_t endpoints = 0;
-  uint32_t matches = discovered.matches;
+  uint32_t matches = 0;
   for (const auto& [service, one] : heard_) {
     endpoints += one.endpoints;
     matches += one.matches;
   }
-  const bool all_found = discovered.remote_endpoints == endpoints && matches == 2 * discovered.pairs;
-  return all_found || steady_looks_ >= kSteadyLooks;
+  return messaging::all_connected(here, endpoints, matches) || steady_looks_ >= kSteadyLooks;
 }
 
 }  // namespace railfix::frame_grabber

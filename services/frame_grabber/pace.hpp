@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "messaging/messaging.hpp"
+
 namespace railfix::frame_grabber {
 
 /// Recorded rate on the wall clock: the first picture is due when it comes, each other as much later as it was recorded
@@ -51,32 +53,25 @@ class LockStep {
 /// Have all found each other, so that no sample of the first picture is lost? Counted as `railfix run` does it.
 class Gathering {
  public:
-  /// Readers and writers of one participant, and how many partners they have found.
-  struct Connections {
+  /// What a service says of itself in service_status.
+  struct Told {
     uint32_t endpoints = 0;
     uint32_t matches = 0;
-    bool operator==(const Connections&) const = default;
-  };
-  /// What discovery says here: own partners, endpoints of all others, and pairs there should be in all.
-  struct Discovered {
-    uint32_t matches = 0;
-    uint32_t remote_endpoints = 0;
-    uint32_t pairs = 0;
-    bool operator==(const Discovered&) const = default;
+    bool operator==(const Told&) const = default;
   };
   explicit Gathering(std::vector<std::string> services) : services_(std::move(services)) {}
   /// Status of another service that is set up.
-  void heard(const std::string& service, const Connections& connections) { heard_[service] = connections; }
+  void heard(const std::string& service, const Told& told) { heard_[service] = told; }
   /// REQUIRES: asked ten times a second. Programs without a status (tools) cannot be counted: then it is enough that
   /// nothing has changed for two seconds.
-  bool complete(const Discovered& discovered);
+  bool complete(const messaging::Connections& here);
 
  private:
   static constexpr int kSteadyLooks = 20;
   std::vector<std::string> services_;
-  std::map<std::string, Connections> heard_;
-  std::map<std::string, Connections> heard_before_;
-  Discovered before_;
+  std::map<std::string, Told> heard_;
+  std::map<std::string, Told> heard_before_;
+  messaging::Connections before_;
   int steady_looks_ = 0;
 };
 

@@ -4,6 +4,7 @@
 #include <map>
 
 #include "core/time.hpp"
+#include "messaging/connected.hpp"
 #include "messaging/topics.hpp"
 #include "support/program.hpp"
 #include "support/run_until.hpp"
@@ -99,14 +100,13 @@ class Playback : public railfix::testing::TemporaryFolder {
   }
   /// Both services are ready and everyone has found everyone.
   bool connected() {
-    const auto own = participant_.connections();
     uint32_t endpoints = 0;
-    uint32_t matches = own.matches;
+    uint32_t matches = 0;
     for (const auto& [name, status] : status_) {
       endpoints += status.endpoints();
       matches += status.matches();
     }
-    return status_.size() == 2 && own.remote_endpoints == endpoints && matches == 2 * own.pairs;
+    return status_.size() == 2 && messaging::all_connected(participant_.connections(), endpoints, matches);
   }
   void start() {
     msg::ControlRequest request;

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/time.hpp"
+#include "messaging/connected.hpp"
 
 namespace railfix::tool {
 namespace {
@@ -82,14 +83,14 @@ std::string Supervisor::missing() const {
   if (!names.empty()) return "not ready: " + names;
   const auto own = participant_.connections();
   uint32_t endpoints = 0;
-  uint32_t matches = own.matches;
+  uint32_t matches = 0;
   for (const auto& [service, status] : picture_.services) {
     endpoints += status.endpoints();
     matches += status.matches();
   }
-  if (own.remote_endpoints == endpoints && matches == 2 * own.pairs) return "";
-  return "services have not found each other (" + std::to_string(matches / 2) + " of " + std::to_string(own.pairs) +
-         " connections)";
+  if (messaging::all_connected(own, endpoints, matches)) return "";
+  return "services have not found each other (" + std::to_string((own.matches + matches) / 2) + " of " +
+         std::to_string(own.pairs) + " connections)";
 }
 
 core::Status Supervisor::wait_connected(Processes& processes, double patience_s) {
