@@ -7,7 +7,9 @@
 #include "idl/camera.h"
 #include "idl/odometry.h"
 #include "idl/operation.h"
+#include "idl/pose.h"
 #include "idl/position.h"
+#include "idl/recorder.h"
 #include "idl/sensors.h"
 #include "idl/track.h"
 #include "messaging/messaging.hpp"
@@ -44,6 +46,8 @@ inline constexpr Topic<msg::TrainState> train_state{
     "position",
     {.depth = 16, .exclusive = true, .deadline_ns = 200 * kMs, .liveliness_lease_ns = 300 * kMs},
     64};
+inline constexpr Topic<msg::TrainPose> train_pose{
+    "train_pose", "position", {.depth = 16, .exclusive = true, .liveliness_lease_ns = 300 * kMs}, 64};
 inline constexpr Topic<msg::TrainPositionReport> train_position_report{
     "train_position_report",
     "position",
@@ -56,6 +60,10 @@ inline constexpr Topic<msg::ServiceStatus> service_status{
     {.transient_local = true, .depth = 1, .max_instances = 64, .liveliness_lease_ns = 400 * kMs},
     256};
 inline constexpr Topic<msg::LogRecord> log_record{"log_record", "operation", {.depth = 256, .asynchronous = true}, 256};
+inline constexpr Topic<msg::RecorderStatus> recorder_status{
+    "recorder_status", "operation", {.transient_local = true, .depth = 1}, 16};
+inline constexpr Topic<msg::PlayerStatus> player_status{
+    "player_status", "operation", {.transient_local = true, .depth = 1}, 16};
 inline constexpr Topic<msg::ControlRequest> service_control{"service_control", "operation", {.depth = 16}, 16};
 inline constexpr Topic<msg::ControlReply> service_reply{"service_reply", "operation", {.depth = 16}, 16};
 inline constexpr Topic<msg::DataClock> data_clock{"data_clock", "operation", {.depth = 32}, 64};

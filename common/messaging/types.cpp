@@ -7,7 +7,9 @@
 #include "idl/odometryPubSubTypes.h"
 #include "idl/onboardPubSubTypes.h"
 #include "idl/operationPubSubTypes.h"
+#include "idl/posePubSubTypes.h"
 #include "idl/positionPubSubTypes.h"
+#include "idl/recorderPubSubTypes.h"
 #include "idl/sensorsPubSubTypes.h"
 #include "idl/trackPubSubTypes.h"
 #include "messaging/fastdds_types.hpp"
@@ -143,10 +145,13 @@ RAILFIX_TYPE(LandmarkSighting)
 RAILFIX_TYPE(OdometryStep)
 RAILFIX_TYPE(PositionFix)
 RAILFIX_TYPE(TrainState)
+RAILFIX_TYPE(TrainPose)
 RAILFIX_TYPE(TrainPositionReport)
 RAILFIX_TYPE(OnboardStatus)
 RAILFIX_TYPE(ServiceStatus)
 RAILFIX_TYPE(LogRecord)
+RAILFIX_TYPE(RecorderStatus)
+RAILFIX_TYPE(PlayerStatus)
 RAILFIX_TYPE(ControlRequest)
 RAILFIX_TYPE(ControlReply)
 RAILFIX_TYPE(DataClock)

@@ -9,6 +9,7 @@
 #include "idl/cameraPubSubTypes.h"
 #include "idl/odometryPubSubTypes.h"
 #include "idl/onboardPubSubTypes.h"
+#include "idl/posePubSubTypes.h"
 #include "idl/positionPubSubTypes.h"
 #include "idl/sensorsPubSubTypes.h"
 #include "idl/trackPubSubTypes.h"
@@ -31,7 +32,7 @@ using Types =
                      Plain<WheelSamplePubSubType, WheelSample>, Plain<GnssFixPubSubType, GnssFix>,
                      Plain<TrackViewPubSubType, TrackView>, Plain<LandmarkSightingPubSubType, LandmarkSighting>,
                      Plain<OdometryStepPubSubType, OdometryStep>, Plain<PositionFixPubSubType, PositionFix>,
-                     Plain<TrainStatePubSubType, TrainState>,
+                     Plain<TrainStatePubSubType, TrainState>, Plain<TrainPosePubSubType, TrainPose>,
                      Plain<TrainPositionReportPubSubType, TrainPositionReport>,
                      Plain<OnboardStatusPubSubType, OnboardStatus>>;
 TYPED_TEST_SUITE(PlainTypes, Types);
