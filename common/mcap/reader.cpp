@@ -240,6 +240,14 @@ void Reader::for_each(const Selection& selection,
   }
 }
 
+std::filesystem::path recovered_name(const std::filesystem::path& damaged) {
+  std::filesystem::path name = damaged;
+  for (const char* ending : {".active", ".mcap"}) {
+    if (name.extension() == ending) name.replace_extension();
+  }
+  return name.string() + "-recovered.mcap";
+}
+
 core::Result<std::vector<std::string>> recover(const std::filesystem::path& damaged, const std::filesystem::path& out) {
   auto reader = Reader::open(damaged);
   if (!reader.ok()) return reader.error();

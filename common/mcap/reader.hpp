@@ -134,6 +134,9 @@ class Messages {
 /// A writer has this file open now (NAME.mcap.active of a running recorder).
 bool being_written(const std::filesystem::path& file);
 
+/// NAME-recovered.mcap beside NAME.mcap or NAME.mcap.active.
+std::filesystem::path recovered_name(const std::filesystem::path& damaged);
+
 /// Copies everything readable of a damaged or unfinished recording into a proper one, replacing what has that name.
 /// Gives what could not be kept.
 core::Result<std::vector<std::string>> recover(const std::filesystem::path& damaged, const std::filesystem::path& out);

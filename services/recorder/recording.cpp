@@ -174,7 +174,7 @@ std::vector<std::string> recover_folder(const fs::path& folder) {
     const std::string base = active.stem().stem().string();
     // A recovery that was itself cut off: its source is still there and is recovered again.
     if (base.ends_with(kRecovered)) continue;
-    const fs::path name = folder / (base + kRecovered + ".mcap");
+    const fs::path name = mcap::recovered_name(active);
     const auto lost = mcap::recover(active, name);
     if (!lost.ok()) {
       sentences.push_back(active.string() + " was left by a crash and cannot be recovered: " + lost.error().message);

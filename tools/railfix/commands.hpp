@@ -18,6 +18,7 @@ void add_map(CLI::App& app, Action& chosen);
 void add_map_locate(CLI::App& map, Action& chosen);
 void add_topics(CLI::App& app, Action& chosen);
 void add_replay(CLI::App& app, Action& chosen);
+void add_recording(CLI::App& app, Action& chosen);
 void add_tpr(CLI::App& app, Action& chosen);
 
 }  // namespace railfix::tool

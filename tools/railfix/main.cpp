@@ -19,7 +19,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   Action chosen;
   for (const auto add :
-       {add_run, add_simulate, add_evaluate, add_calibrate, add_map, add_topics, add_replay, add_tpr}) {
+       {add_run, add_simulate, add_evaluate, add_calibrate, add_map, add_topics, add_replay, add_recording, add_tpr}) {
     add(app, chosen);
   }
   try {

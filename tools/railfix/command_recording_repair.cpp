@@ -1,0 +1,59 @@
+#include <filesystem>
+#include <iostream>
+#include <memory>
+
+#include "command_recording.hpp"
+#include "core/result.hpp"
+#include "mcap/reader.hpp"
+
+namespace railfix::tool {
+
+namespace {
+
+namespace fs = std::filesystem;
+using core::BadInput;
+
+struct Options {
+  fs::path file;
+  fs::path out;
+};
+
+/// Closed properly, and every chunk can be read.
+bool sound(mcap::Reader& reader) {
+  if (!reader.indexed()) return false;
+  reader.for_each({}, [&](const mcap::Channel&, const mcap::Message&) { return reader.problems().empty(); });
+  return reader.problems().empty();
+}
+
+int repair(const Options& options) {
+  const auto reader = core::value_or_throw(mcap::Reader::open(options.file));
+  if (mcap::being_written(options.file)) {
+    throw BadInput(options.file.string() + " is being written by a recorder now; stop that first");
+  }
+  if (sound(*reader)) {
+    std::cout << options.file.string() << " is a whole recording; nothing to repair\n";
+    return 0;
+  }
+  const fs::path out = options.out.empty() ? mcap::recovered_name(options.file) : options.out;
+  if (fs::exists(out)) throw BadInput(out.string() + " exists already; give another name with --out, or remove it");
+  for (const auto& problem : core::value_or_throw(mcap::recover(options.file, out))) std::cerr << problem << '\n';
+  const auto repaired = core::value_or_throw(mcap::Reader::open(out));
+  std::cout << out.string() << ": " << repaired->statistics().messages << " samples of " << repaired->channels().size()
+            << " topics\n";
+  return 0;
+}
+
+}  // namespace
+
+void add_recording_repair(CLI::App& recording, Action& chosen) {
+  auto options = std::make_shared<Options>();
+  auto* command = recording.add_subcommand(
+      "repair",
+      "Make a proper file of one that a crash, a power cut or a bad disk damaged: everything in whole chunks is kept, "
+      "e.g. railfix recording repair demo-20261121-101500.mcap.active");
+  command->add_option("file", options->file, "The damaged recording; it is left as it is")->required();
+  command->add_option("--out", options->out, "The repaired one; NAME-recovered.mcap beside it when not given");
+  command->callback([options, &chosen] { chosen = [options] { return repair(*options); }; });
+}
+
+}  // namespace railfix::tool
