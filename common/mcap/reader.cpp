@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "mcap/compression.hpp"
 #include "mcap/writer.hpp"
 
 namespace railfix::mcap {

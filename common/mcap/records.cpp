@@ -1,16 +1,12 @@
 #include "mcap/records.hpp"
 
-#include <zlib.h>
-#include <zstd.h>
+#include <libdeflate.h>
 
 #include <algorithm>
 
 namespace railfix::mcap {
 
 namespace {
-
-// A length field can be garbage: no chunk of ours comes near this, and a reader must not ask for terabytes.
-constexpr uint64_t kLargestChunkBytes = uint64_t{512} << 20U;
 
 size_t begin(Encoder& encoder, Opcode opcode) {
   return encoder.begin_record(static_cast<uint8_t>(opcode));
@@ -228,35 +224,7 @@ bool parse(ByteView content, Footer& footer) {
 }
 
 uint32_t crc32(ByteView bytes, uint32_t crc) {
-  return static_cast<uint32_t>(::crc32_z(crc, bytes.data(), bytes.size()));
-}
-
-Bytes compress_zstd(ByteView bytes, int level) {
-  Bytes packed(ZSTD_compressBound(bytes.size()));
-  const size_t size = ZSTD_compress(packed.data(), packed.size(), bytes.data(), bytes.size(), level);
-  if (ZSTD_isError(size) != 0 || size >= bytes.size()) return {};
-  packed.resize(size);
-  return packed;
-}
-
-core::Result<Bytes> chunk_records(const ChunkHead& head, ByteView stored_records) {
-  if (head.uncompressed_bytes > kLargestChunkBytes) {
-    return core::Error{"it claims to unpack to " + std::to_string(head.uncompressed_bytes) + " bytes"};
-  }
-  Bytes records;
-  if (head.compression.empty()) {
-    records.assign(stored_records.begin(), stored_records.end());
-  } else if (head.compression == "zstd") {
-    records.resize(head.uncompressed_bytes);
-    const size_t size = ZSTD_decompress(records.data(), records.size(), stored_records.data(), stored_records.size());
-    if (ZSTD_isError(size) != 0) return core::Error{"it does not unpack: " + std::string(ZSTD_getErrorName(size))};
-    records.resize(size);
-  } else {
-    return core::Error{"its compression '" + head.compression + "' is not one that Railfix reads (zstd or none)"};
-  }
-  if (records.size() != head.uncompressed_bytes) return core::Error{"it unpacks to another size than it says"};
-  if (head.crc != 0 && crc32(records) != head.crc) return core::Error{"its checksum is wrong"};
-  return records;
+  return libdeflate_crc32(crc, bytes.data(), bytes.size());
 }
 
 }  // namespace railfix::mcap

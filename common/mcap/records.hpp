@@ -71,7 +71,7 @@ struct ChunkHead {
   int64_t end_ns = 0;
   uint64_t uncompressed_bytes = 0;
   uint32_t crc = 0;         // of the uncompressed records, 0 = not computed
-  std::string compression;  // "" or "zstd" ("lz4" in files of others)
+  std::string compression;  // "", "zstd" or "lz4"
 };
 
 struct ChunkIndex {
@@ -136,9 +136,5 @@ void append(Bytes& out, const Statistics& statistics);
 
 /// CRC-32/ISO-HDLC, continued from `crc` (0 at the beginning).
 uint32_t crc32(ByteView bytes, uint32_t crc = 0);
-/// One zstd frame, or empty when that would not be smaller.
-Bytes compress_zstd(ByteView bytes, int level);
-/// The records of a chunk, decompressed and checked against its CRC; the error is a clause ("its checksum is wrong").
-core::Result<Bytes> chunk_records(const ChunkHead& head, ByteView stored_records);
 
 }  // namespace railfix::mcap

@@ -85,6 +85,7 @@ core::Status Writer::put(ByteView bytes) {
   if (descriptor_ < 0) return core::Error{file_.string() + " is closed already"};
   if (!write_all(descriptor_, bytes)) {
     const core::Error error = io_error("cannot be written; is the disk full?", active_);
+    (void)wait_for_sync();
     // Half a record would hide everything behind it.
     if (::ftruncate(descriptor_, static_cast<off_t>(offset_)) != 0 ||
         ::lseek(descriptor_, static_cast<off_t>(offset_), SEEK_SET) < 0) {
@@ -180,7 +181,7 @@ core::Status Writer::tick() {
     auto status = flush_chunk();
     if (!status.ok()) return status;
   }
-  if (options_.sync_period_s > 0 && now_ns - synced_ns_ >= core::to_ns(options_.sync_period_s)) return sync();
+  if (options_.sync_period_s > 0 && now_ns - synced_ns_ >= core::to_ns(options_.sync_period_s)) return sync_beside();
   return {};
 }
 
@@ -188,8 +189,8 @@ core::Status Writer::flush_chunk() {
   if (chunk_.empty()) return {};
   chunk_head_.uncompressed_bytes = chunk_.size();
   chunk_head_.crc = options_.chunk_crc ? crc32(chunk_) : 0;
-  const Bytes packed = options_.compress ? compress_zstd(chunk_, options_.zstd_level) : Bytes{};
-  chunk_head_.compression = packed.empty() ? "" : "zstd";
+  const Bytes packed = compress(chunk_, options_.compression);
+  chunk_head_.compression = packed.empty() ? "" : name_of(options_.compression);
   const ByteView stored = packed.empty() ? ByteView(chunk_) : ByteView(packed);
 
   Bytes out;
@@ -221,9 +222,21 @@ core::Status Writer::flush_chunk() {
 }
 
 core::Status Writer::sync() {
-  synced_ns_ = core::monotonic_ns();
   if (descriptor_ >= 0 && ::fdatasync(descriptor_) != 0) return io_error("cannot be forced to the disk", active_);
   return {};
+}
+
+// A busy disk takes seconds for this, and messages must not wait for it.
+core::Status Writer::sync_beside() {
+  if (syncing_.valid() && syncing_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return {};
+  auto status = wait_for_sync();
+  synced_ns_ = core::monotonic_ns();
+  syncing_ = std::async(std::launch::async, [this] { return sync(); });
+  return status;
+}
+
+core::Status Writer::wait_for_sync() {
+  return syncing_.valid() ? syncing_.get() : core::Status();
 }
 
 namespace {
@@ -288,6 +301,7 @@ core::Status Writer::write_tail() {
 
 core::Status Writer::close() {
   if (descriptor_ < 0) return {};
+  const core::Status synced = wait_for_sync();
   core::Status status = flush_chunk();
   if (status.ok()) status = write_tail();
   if (status.ok()) status = sync();
@@ -299,7 +313,7 @@ core::Status Writer::close() {
   if (failed)
     return core::Error{active_.string() + ": cannot be renamed to " + file_.string() + " (" + failed.message() + ")"};
   sync_folder(file_);
-  return {};
+  return synced;
 }
 
 }  // namespace railfix::mcap

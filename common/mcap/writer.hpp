@@ -5,12 +5,14 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <future>
 #include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "core/result.hpp"
+#include "mcap/compression.hpp"
 #include "mcap/records.hpp"
 
 namespace railfix::mcap {
@@ -21,15 +23,13 @@ struct WriterOptions {
   /// A chunk is closed when its first message has waited this long, so that a cut loses at most this (0 = by size
   /// only).
   double chunk_age_s = 1.0;
-  /// Chunks that zstd makes smaller are stored so, others as they are; false stores all as they are.
-  bool compress = true;
-  /// zstd level: 1 costs least time, above 3 gains little on CDR samples.
-  int zstd_level = 1;
+  /// Chunks that this makes smaller are stored so, others as they are.
+  Compression compression = Compression::zstd;
   /// Every chunk carries a CRC of its records.
   bool chunk_crc = true;
-  /// The data section carries a CRC too (one more pass over the stored bytes, about 1 ms per 2 MB).
+  /// The data section carries a CRC too (one more pass over the stored bytes).
   bool data_crc = true;
-  /// The file is forced to the disk (fsync) in this period (0 = only at the end).
+  /// The file is forced to the disk (fsync) in this period, in a thread of its own (0 = only at the end).
   double sync_period_s = 5.0;
   /// An existing file of the same name, open or closed, is replaced; false refuses it.
   bool overwrite = false;
@@ -74,6 +74,8 @@ class Writer {
   core::Status put(ByteView bytes);
   core::Status flush_chunk();
   core::Status sync();
+  core::Status sync_beside();
+  core::Status wait_for_sync();
   core::Status write_tail();
 
   std::filesystem::path file_;
@@ -83,6 +85,7 @@ class Writer {
   uint64_t offset_ = 0;
   uint32_t data_crc_ = 0;
   int64_t synced_ns_ = 0;
+  std::future<core::Status> syncing_;
   Bytes chunk_;
   ChunkHead chunk_head_;
   int64_t chunk_begun_ns_ = 0;

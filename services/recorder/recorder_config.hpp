@@ -16,7 +16,7 @@ struct RecorderConfig {
   int64_t picture_every = 1;
   int64_t picture_queue = 12;
   int64_t sample_queue = 20000;
-  bool compress = true;
+  std::string compression = "zstd";
   double chunk_mb = 1.0;
   double chunk_age_s = 1.0;
   double sync_period_s = 5.0;
@@ -44,7 +44,8 @@ struct RecorderConfig {
     fields.integer(
         "sample_queue", sample_queue, {100, 1000000}, "samples",
         "Samples of one topic that may wait for a slow disk; beyond that the oldest is dropped and counted.");
-    fields.flag("compress", compress, "Compress with zstd what gets smaller by it.");
+    fields.choice("compression", compression, {"zstd", "lz4", "none"},
+                  "What gets smaller by it is stored so; lz4 is for full pictures: less work, larger files.");
     fields.number("chunk_mb", chunk_mb, {0.01, 64}, "MB", "Samples are written to the disk in chunks of this size.");
     fields.number("chunk_age_s", chunk_age_s, {0.05, 60}, "s",
                   "A chunk is written at the latest after this time; a crash loses no more.");

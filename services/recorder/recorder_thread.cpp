@@ -16,6 +16,11 @@ constexpr int64_t kTickNs = core::kNsPerSecond / 4;
 constexpr size_t kEncodedWaiting = 256;
 constexpr double kBytesPerMb = 1e6;
 
+mcap::Compression compression_of(const std::string& name) {
+  if (name == "none") return mcap::Compression::none;
+  return name == "lz4" ? mcap::Compression::lz4 : mcap::Compression::zstd;
+}
+
 /// These have one topic for each camera.
 bool per_camera(const std::string& topic) {
   return topic == "camera_frame" || topic == "camera_preview";
@@ -89,7 +94,7 @@ core::Status RecorderThread::create(const fs::path& file) {
   options.chunk_bytes = static_cast<uint64_t>(config_.chunk_mb * kBytesPerMb);
   options.chunk_age_s = config_.chunk_age_s;
   options.sync_period_s = config_.sync_period_s;
-  options.compress = config_.compress;
+  options.compression = compression_of(config_.compression);
   options.overwrite = !config_.file.empty() && file == config_.file;
   options.library = "railfix recorder " + about_.at("version");
   about_["started_ns"] = std::to_string(core::wall_ns());

@@ -31,10 +31,10 @@ std::vector<uint8_t> view(core::Random& random) {
   return messaging::serialize(view);
 }
 
-std::unique_ptr<mcap::Writer> create(bool compress) {
+std::unique_ptr<mcap::Writer> create(mcap::Compression compression) {
   mcap::WriterOptions options;
   options.overwrite = true;
-  options.compress = compress;
+  options.compression = compression;
   options.sync_period_s = 0;
   return mcap::Writer::create(file(), options).value();
 }
@@ -43,7 +43,7 @@ void write_views(benchmark::State& state) {
   core::Random random(1);
   std::vector<std::vector<uint8_t>> samples;
   for (int i = 0; i < 1000; ++i) samples.push_back(view(random));
-  auto writer = create(state.range(0) != 0);
+  auto writer = create(static_cast<mcap::Compression>(state.range(0)));
   const uint16_t channel = writer->add_channel(0, "track_view", "cdr", {}).value();
   int64_t i = 0;
   for (auto _ : state) {
@@ -58,11 +58,11 @@ void write_views(benchmark::State& state) {
       static_cast<double>(fs::file_size(file())) / (static_cast<double>(i) * static_cast<double>(samples[0].size()));
   fs::remove(file());
 }
-BENCHMARK(write_views)->ArgName("zstd")->Arg(0)->Arg(1);
+BENCHMARK(write_views)->ArgName("none_zstd_lz4")->Arg(0)->Arg(1)->Arg(2);
 
 void read_views(benchmark::State& state) {
   core::Random random(1);
-  auto writer = create(true);
+  auto writer = create(mcap::Compression::zstd);
   const uint16_t channel = writer->add_channel(0, "track_view", "cdr", {}).value();
   for (int64_t i = 0; i < 50000; ++i) {
     if (!writer->write({channel, 0, i, i, view(random)}).ok()) state.SkipWithError("disk");

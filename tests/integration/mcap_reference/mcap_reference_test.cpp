@@ -51,10 +51,10 @@ class McapReferenceTest : public ::testing::Test {
             {"data", std::string(30 + i % 90, static_cast<char>('A' + i % 26))}};
   }
 
-  static fs::path record(bool compress) {
+  static fs::path record(Compression compression) {
     WriterOptions options;
     options.chunk_bytes = 1500;
-    options.compress = compress;
+    options.compression = compression;
     options.overwrite = true;
     auto writer = Writer::create(kWork / "ours.mcap", options).value();
     const uint16_t schema = writer->add_schema("railfix::msg::Any", "omgidl", "module railfix {};").value();
@@ -78,10 +78,10 @@ class McapReferenceTest : public ::testing::Test {
 };
 
 TEST_F(McapReferenceTest, ReadsOurRecordings) {
-  for (const bool compress : {false, true}) {
-    const fs::path file = record(compress);
+  for (const auto compression : {Compression::none, Compression::zstd, Compression::lz4}) {
+    const fs::path file = record(compression);
     for (const std::string action : {"indexed", "stream"}) {
-      ASSERT_TRUE(reference(action, file, kWork / "found.json")) << action << " compress " << compress;
+      ASSERT_TRUE(reference(action, file, kWork / "found.json")) << action << " " << name_of(compression);
       const json found = json::parse(std::ifstream(kWork / "found.json"));
       ASSERT_EQ(found["messages"].size(), kSamples) << action;
       for (uint32_t i = 0; i < kSamples; ++i) EXPECT_EQ(found["messages"][i], sample(i)) << action;
@@ -95,7 +95,7 @@ TEST_F(McapReferenceTest, ReadsOurRecordings) {
 }
 
 TEST_F(McapReferenceTest, NoticesWhatWeWouldNotWrite) {
-  const fs::path file = record(true);
+  const fs::path file = record(Compression::zstd);
   std::fstream stream(file, std::ios::binary | std::ios::in | std::ios::out);
   stream.seekp(400);
   stream.write("XXXX", 4);

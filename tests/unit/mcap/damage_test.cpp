@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 
 #include "core/random.hpp"
+#include "mcap/compression.hpp"
 #include "recordings.hpp"
 
 namespace railfix::mcap {

@@ -17,15 +17,15 @@ std::vector<Sample> in_time_order(std::vector<Sample> all) {
 }
 
 TEST_F(RecordingTest, GivesBackWhatWasWrittenInTimeOrder) {
-  for (const bool compress : {false, true}) {
+  for (const auto compression : {Compression::none, Compression::zstd, Compression::lz4}) {
     WriterOptions options;
     options.chunk_bytes = 700;
-    options.compress = compress;
+    options.compression = compression;
     options.overwrite = true;
     const auto all = samples(300);
     auto reader = Reader::open(record(all, options)).value();
     EXPECT_TRUE(reader->indexed());
-    EXPECT_EQ(read(*reader), in_time_order(all)) << "compress " << compress;
+    EXPECT_EQ(read(*reader), in_time_order(all)) << name_of(compression);
     EXPECT_THAT(reader->problems(), IsEmpty());
     EXPECT_GT(reader->statistics().chunks, 20U);
   }

@@ -157,7 +157,7 @@ TEST_F(RecorderThreadTest, CamerasThatAppearLaterAreFound) {
 
 TEST_F(RecorderThreadTest, ANewFileRepeatsStandingValues) {
   config_.split_mb = 0.03;
-  config_.compress = false;
+  config_.compression = "none";
   config_.chunk_age_s = 0.05;
   messaging::Writer<msg::CameraCalibration> calibration(participant_, topics::camera_calibration);
   messaging::Writer<msg::LogRecord> log(participant_, topics::log_record);
