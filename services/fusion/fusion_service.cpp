@@ -13,6 +13,7 @@ using messaging::topics::gnss_fix;
 using messaging::topics::imu_sample;
 using messaging::topics::odometry_step;
 using messaging::topics::position_fix;
+using messaging::topics::train_pose;
 using messaging::topics::train_state;
 using messaging::topics::wheel_sample;
 
@@ -80,10 +81,38 @@ msg::TrainState message_of(const TrainEstimate& e) {
   return m;
 }
 
+BodySample body_sample_of(const msg::ImuSample& m) {
+  return {m.stamp_ns(),
+          {m.rate_x_rps(), m.rate_y_rps(), m.rate_z_rps()},
+          {m.accel_x_mps2(), m.accel_y_mps2(), m.accel_z_mps2()}};
+}
+
+msg::TrainPose message_of(const PoseEstimate& p) {
+  msg::TrainPose m;
+  m.stamp_ns(p.stamp_ns);
+  m.easting_m(p.easting_m);
+  m.northing_m(p.northing_m);
+  m.height_m(p.height_m);
+  m.along_sigma_m(p.along_sigma_m);
+  m.across_sigma_m(p.across_sigma_m);
+  m.height_sigma_m(p.height_sigma_m);
+  m.heading_rad(p.heading_rad);
+  m.pitch_rad(p.pitch_rad);
+  m.roll_rad(p.roll_rad);
+  m.heading_sigma_rad(p.heading_sigma_rad);
+  m.pitch_sigma_rad(p.pitch_sigma_rad);
+  m.roll_sigma_rad(p.roll_sigma_rad);
+  m.orientation(p.from_imu ? msg::ORIENTATION_IMU : msg::ORIENTATION_TRACK);
+  return m;
+}
+
 }  // namespace
 
 FusionService::FusionService(const FusionConfig& config, service::Context& context)
-    : context_(context), writer_(context.writer(train_state)) {
+    : context_(context),
+      writer_(context.writer(train_state)),
+      pose_writer_(context.writer(train_pose)),
+      pose_(config.parameters.gnss_map_sigma_m) {
   if (!config.map.empty()) {
     map_ = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(config.map)));
   }
@@ -102,6 +131,7 @@ void FusionService::listen(const FusionConfig& config) {
   }
   if (config.use_imu) {
     context_.on<msg::ImuSample>(imu_sample, [this](const msg::ImuSample& m) {
+      pose_.add(body_sample_of(m));
       use(ImuInput{m.stamp_ns(), m.accel_x_mps2(), m.rate_z_rps()}, m.grabbed_ns());
     });
   }
@@ -154,12 +184,20 @@ void FusionService::publish(const TrainEstimate& estimate, int64_t grabbed_ns) {
   message.seq(++seq_);
   message.grabbed_ns(grabbed_ns);
   if (!writer_.write(message)) context_.health().dropped(1);
+  if (estimate.track_known) publish_pose(estimate);
   context_.health().output(grabbed_ns);
   if (estimate.integrity == Integrity::ok) {
     context_.health().active();
   } else {
     context_.health().degraded(estimate.reason);
   }
+}
+
+void FusionService::publish_pose(const TrainEstimate& estimate) {
+  const auto* estimator = fusion_->estimator();
+  const bool imu_healthy = !estimator->watch(Source::imu).isolated;
+  if (!pose_writer_.write(message_of(pose_.at(estimate, *estimator->path(), imu_healthy))))
+    context_.health().dropped(1);
 }
 
 }  // namespace railfix::fusion

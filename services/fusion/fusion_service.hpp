@@ -1,4 +1,4 @@
-// DDS side of the fusion: sensors, odometry steps and position fixes in, train_state out.
+// DDS side of the fusion: sensors, odometry steps and position fixes in, train_state and train_pose out.
 #pragma once
 
 #include <memory>
@@ -6,6 +6,7 @@
 
 #include "fusion/fusion.hpp"
 #include "fusion/fusion_config.hpp"
+#include "fusion/train_pose.hpp"
 #include "service/service.hpp"
 
 namespace railfix::fusion {
@@ -22,11 +23,14 @@ class FusionService {
   void keep_time(const msg::DataClock& clock);
   void tick();
   void publish(const TrainEstimate& estimate, int64_t grabbed_ns);
+  void publish_pose(const TrainEstimate& estimate);
 
   service::Context& context_;
   messaging::Writer<msg::TrainState> writer_;
+  messaging::Writer<msg::TrainPose> pose_writer_;
   std::shared_ptr<const track::Map> map_;
   std::optional<Fusion> fusion_;
+  TrainPose pose_;
   std::optional<msg::DataClock> clock_;
   bool live_ = false;
   bool no_projection_told_ = false;

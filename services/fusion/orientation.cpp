@@ -6,12 +6,15 @@ namespace railfix::fusion {
 
 void Orientation::add(const Eigen::Vector3d& rate_rps, const Eigen::Vector3d& force_mps2,
                       const ExpectedMotion& expected, double dt_s) {
-  const double squared = expected.speed_mps * expected.speed_mps;
-  const Eigen::Vector3d of_motion(expected.acceleration_mps2, expected.curvature_per_m * squared,
-                                  expected.vertical_curvature_per_m * squared);
-  const Eigen::Vector3d up = (force_mps2 - of_motion).normalized();
   const auto& q = world_from_body_;
   const Eigen::Vector3d thought_up = q.conjugate() * Eigen::Vector3d::UnitZ();
+  const double squared = expected.speed_mps * expected.speed_mps;
+  // The curve pulls horizontally, which is not the leaning body's left.
+  const Eigen::Vector3d left = (Eigen::Vector3d::UnitY() - thought_up.y() * thought_up).normalized();
+  const Eigen::Vector3d of_motion = Eigen::Vector3d(expected.acceleration_mps2, 0, 0) +
+                                    expected.curvature_per_m * squared * left +
+                                    expected.vertical_curvature_per_m * squared * thought_up;
+  const Eigen::Vector3d up = (force_mps2 - of_motion).normalized();
   // Madgwick's f and its Jacobian (25, 26), for a Z axis that is up.
   const Eigen::Vector3d f = thought_up - up;
   Eigen::Matrix<double, 3, 4> j;                      // by w, x, y, z

@@ -23,6 +23,10 @@ class Orientation {
   /// rate_rps and force_mps2 (specific force: +9.81 on Z at rest) of one sample, dt_s after the one before.
   void add(const Eigen::Vector3d& rate_rps, const Eigen::Vector3d& force_mps2, const ExpectedMotion& expected,
            double dt_s);
+  /// The body's axes become others: body_from_before turns vectors of the old ones.
+  void turn_body(const Eigen::Quaterniond& body_from_before) {
+    world_from_body_ = (world_from_body_ * body_from_before.conjugate()).normalized();
+  }
   /// Left side up positive.
   [[nodiscard]] double roll_rad() const;
   /// Nose down positive.

@@ -43,8 +43,10 @@ dataset::ImuRow SensorModel::ideal_imu(double time_s) const {
 
   const double lean_rad = -track.cant_m / kRailSpacingM;  // about X, left side up
   const Eigen::Vector3d up_in_track(track.grade, std::sin(lean_rad), std::cos(lean_rad));
-  const Eigen::Vector3d turning(-v * track.twist / kRailSpacingM, -v * track.vertical_curvature_per_m,
-                                v * track.curvature_per_m);
+  // The curve turns about the plumb line, which leans in the track's axes.
+  const Eigen::Vector3d turning =
+      Eigen::Vector3d(-v * track.twist / kRailSpacingM, -v * track.vertical_curvature_per_m, 0) +
+      v * track.curvature_per_m * up_in_track;
   const Eigen::Vector3d shaking(rate(before.roll_rad, after.roll_rad), rate(before.pitch_rad, after.pitch_rad),
                                 rate(before.yaw_rad, after.yaw_rad));
   // Centripetal acceleration is horizontal; the track axes lean.

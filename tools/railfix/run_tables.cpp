@@ -34,6 +34,7 @@ constexpr std::array kSightings{"unknown", "frog", "balise", "portal_in", "porta
 constexpr std::array kFixes{"unknown", "curvature", "landmark", "network", "track"};
 constexpr std::array kDirections{"?", "+", "-"};
 constexpr std::array kIntegrities{"ok", "degraded", "unusable"};
+constexpr std::array kOrientations{"track", "imu"};
 constexpr std::array kStates{"starting", "ready", "active", "degraded", "failed", "stopped"};
 
 /// A name that may stand in a cell.
@@ -70,6 +71,9 @@ class Tables {
             folder / "train_state.csv",
             "stamp_ns,edge,offset_m,direction,track_known,distance_m,speed_mps,over_m,under_m,sigma_m,integrity,"
             "lat_deg,lon_deg,easting_m,northing_m,heading_rad,track_probability"),
+        train_pose_(folder / "train_pose.csv",
+                    "stamp_ns,easting_m,northing_m,height_m,along_sigma_m,across_sigma_m,height_sigma_m,heading_rad,"
+                    "pitch_rad,roll_rad,heading_sigma_rad,pitch_sigma_rad,roll_sigma_rad,orientation"),
         tpr_(folder / "tpr.csv",
              "stamp_ns,nid_lrbg,d_lrbg_m,q_dirlrbg,q_dlrbg,l_doubtover_m,l_doubtunder_m,v_train_kmh,q_dirtrain,hex"),
         status_(folder / "status.csv",
@@ -137,6 +141,19 @@ class Tables {
     end(train_state_);
   }
 
+  void add(const msg::TrainPose& pose) {
+    seen_data(pose.stamp_ns());
+    train_pose_ << pose.stamp_ns();
+    for (const double value :
+         {pose.easting_m(), pose.northing_m(), pose.height_m(), pose.along_sigma_m(), pose.across_sigma_m(),
+          pose.height_sigma_m(), pose.heading_rad(), pose.pitch_rad(), pose.roll_rad(), pose.heading_sigma_rad(),
+          pose.pitch_sigma_rad(), pose.roll_sigma_rad()}) {
+      train_pose_ << value;
+    }
+    train_pose_ << word(kOrientations, pose.orientation());
+    end(train_pose_);
+  }
+
   void add(const msg::TrainPositionReport& report) {
     seen_data(report.stamp_ns());
     tpr_ << report.stamp_ns();
@@ -163,8 +180,8 @@ class Tables {
   [[nodiscard]] uint64_t rows() const { return rows_; }
 
   core::Status close() {
-    for (CsvWriter* table :
-         {&track_view_, &rails_, &odometry_, &sightings_, &position_fix_, &train_state_, &tpr_, &status_}) {
+    for (CsvWriter* table : {&track_view_, &rails_, &odometry_, &sightings_, &position_fix_, &train_state_,
+                             &train_pose_, &tpr_, &status_}) {
       auto status = table->close();
       if (!status.ok()) return status;
     }
@@ -193,6 +210,7 @@ class Tables {
   CsvWriter sightings_;
   CsvWriter position_fix_;
   CsvWriter train_state_;
+  CsvWriter train_pose_;
   CsvWriter tpr_;
   CsvWriter status_;
   std::optional<int64_t> data_ns_;
@@ -212,10 +230,14 @@ std::pair<const std::string, AddSample> handler(const messaging::Topic<T>& topic
 }
 
 const std::map<std::string, AddSample>& handlers() {
-  static const std::map<std::string, AddSample> all{
-      handler(topics::track_view),    handler(topics::odometry_step), handler(topics::landmark_sighting),
-      handler(topics::position_fix),  handler(topics::train_state),   handler(topics::train_position_report),
-      handler(topics::service_status)};
+  static const std::map<std::string, AddSample> all{handler(topics::track_view),
+                                                    handler(topics::odometry_step),
+                                                    handler(topics::landmark_sighting),
+                                                    handler(topics::position_fix),
+                                                    handler(topics::train_state),
+                                                    handler(topics::train_pose),
+                                                    handler(topics::train_position_report),
+                                                    handler(topics::service_status)};
   return all;
 }
 

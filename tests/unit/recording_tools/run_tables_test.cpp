@@ -178,6 +178,30 @@ TEST_F(RunTables, StateIsEmptyWhereTheTrackIsNotKnown) {
                   "9,,,,0,7,2,1.5,1.25,0.5,degraded,,,,,,0.75"));
 }
 
+TEST_F(RunTables, PoseIsEmptyWhereTheMapSaysNothing) {
+  msg::TrainPose pose;
+  pose.stamp_ns(9);
+  pose.easting_m(1000);
+  pose.northing_m(2000);
+  pose.height_m(kNan);
+  pose.along_sigma_m(0.5);
+  pose.across_sigma_m(0.25);
+  pose.height_sigma_m(kNan);
+  pose.heading_rad(1.5);
+  pose.pitch_rad(0.125);
+  pose.roll_rad(-0.25);
+  pose.heading_sigma_rad(0.0625);
+  pose.pitch_sigma_rad(0.375);
+  pose.roll_sigma_rad(0.75);
+  pose.orientation(msg::ORIENTATION_IMU);
+  record(topics::train_pose, pose);
+  exported();
+  EXPECT_THAT(lines("train_pose.csv"),
+              ElementsAre("stamp_ns,easting_m,northing_m,height_m,along_sigma_m,across_sigma_m,height_sigma_m,"
+                          "heading_rad,pitch_rad,roll_rad,heading_sigma_rad,pitch_sigma_rad,roll_sigma_rad,orientation",
+                          "9,1000,2000,,0.5,0.25,,1.5,0.125,-0.25,0.0625,0.375,0.75,imu"));
+}
+
 TEST_F(RunTables, ReportsAndStatusInTheTimeOfTheData) {
   msg::ServiceStatus status;
   status.stamp_ns(1'700'000'000'000'000'000);

@@ -52,12 +52,17 @@ TEST(Imu, FeelsTheTrack) {
   const auto standing = sensors.ideal_imu(1.0);
   EXPECT_NEAR(standing.accel_mps2[2], core::kGravityMps2, 1e-6);
   EXPECT_NEAR(sensors.ideal_imu(5.0).accel_mps2[0], 0.8, 1e-6);
-  // Integrals over the run: heading from the gyro.
+  // Integrals over the run: heading from the gyro, about the plumb line that the canted body leans against.
+  const auto& path = trajectory.line().path();
   double turned = 0.0;
   const double step_s = 0.005;
-  for (double t = 0.0; t < trajectory.duration_s(); t += step_s)
-    turned += step_s * sensors.ideal_imu(t + 0.5 * step_s).rate_rps[2];
-  const auto& path = trajectory.line().path();
+  for (double t = 0.0; t < trajectory.duration_s(); t += step_s) {
+    const auto row = sensors.ideal_imu(t + 0.5 * step_s);
+    const auto track = path.at(trajectory.motion(t + 0.5 * step_s).distance_m);
+    const double lean_rad = -track.cant_m / kRailSpacingM;
+    turned += step_s * (track.grade * row.rate_rps[0] + std::sin(lean_rad) * row.rate_rps[1] +
+                        std::cos(lean_rad) * row.rate_rps[2]);
+  }
   EXPECT_NEAR(turned, core::wrap_pi(path.at(0.0).pose.heading_rad - path.at(400.0).pose.heading_rad), 1e-4);
 }
 
