@@ -43,10 +43,11 @@ dataset::ImuRow SensorModel::ideal_imu(double time_s) const {
 
   const double lean_rad = -track.cant_m / kRailSpacingM;  // about X, left side up
   const Eigen::Vector3d up_in_track(track.grade, std::sin(lean_rad), std::cos(lean_rad));
-  // The curve turns about the plumb line, which leans in the track's axes.
-  const Eigen::Vector3d turning =
-      Eigen::Vector3d(-v * track.twist / kRailSpacingM, -v * track.vertical_curvature_per_m, 0) +
-      v * track.curvature_per_m * up_in_track;
+  // The curve turns about the plumb line and the grade about the horizontal; both lean in the track's axes.
+  const Eigen::Vector3d left_in_track(0, std::cos(lean_rad), -std::sin(lean_rad));
+  const Eigen::Vector3d turning = Eigen::Vector3d(-v * track.twist / kRailSpacingM, 0, 0) -
+                                  v * track.vertical_curvature_per_m * left_in_track +
+                                  v * track.curvature_per_m * up_in_track;
   const Eigen::Vector3d shaking(rate(before.roll_rad, after.roll_rad), rate(before.pitch_rad, after.pitch_rad),
                                 rate(before.yaw_rad, after.yaw_rad));
   // Centripetal acceleration is horizontal; the track axes lean.

@@ -60,8 +60,7 @@ TEST(Imu, FeelsTheTrack) {
     const auto row = sensors.ideal_imu(t + 0.5 * step_s);
     const auto track = path.at(trajectory.motion(t + 0.5 * step_s).distance_m);
     const double lean_rad = -track.cant_m / kRailSpacingM;
-    turned += step_s * (track.grade * row.rate_rps[0] + std::sin(lean_rad) * row.rate_rps[1] +
-                        std::cos(lean_rad) * row.rate_rps[2]);
+    turned += step_s * (std::sin(lean_rad) * row.rate_rps[1] + std::cos(lean_rad) * row.rate_rps[2]);
   }
   EXPECT_NEAR(turned, core::wrap_pi(path.at(0.0).pose.heading_rad - path.at(400.0).pose.heading_rad), 1e-4);
 }
