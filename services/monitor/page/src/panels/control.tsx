@@ -1,0 +1,46 @@
+// Asking a service to do something, and what it answered.
+import { type Signal, signal } from "@preact/signals";
+import { token } from "../live";
+import { about, connection } from "../store";
+import type { Reply } from "../wire";
+
+export type Ask = (service: string, command: string, argument?: string) => Promise<Reply>;
+
+/// Set once by main: the socket's control().
+export const ask = signal<Ask>(() => Promise.resolve({ id: 0, done: false, text: "There is no connection to the train." }));
+
+export const may_control = () => connection.value.up && (about.value?.control === "open" || (about.value?.control === "token" && token.value !== ""));
+
+export interface Answer {
+  busy: boolean;
+  done: boolean;
+  text: string;
+}
+export const no_answer: Answer = { busy: false, done: true, text: "" };
+
+export async function send(answer: Signal<Answer>, service: string, command: string, argument = ""): Promise<boolean> {
+  answer.value = { busy: true, done: true, text: "" };
+  const reply = await ask.value(service, command, argument);
+  const text = reply.text || (reply.done ? `${command}: done` : `${command}: refused without a reason`);
+  answer.value = { busy: false, done: reply.done, text };
+  return reply.done;
+}
+
+export function AnswerLine({ answer }: { answer: Signal<Answer> }) {
+  return (
+    <p class={`answer ${answer.value.done ? "" : "bad"}`} role="status">
+      {answer.value.text}
+    </p>
+  );
+}
+
+export function TokenField() {
+  if (about.value?.control === "off") return <p class="nothing">Control is switched off (monitor.control).</p>;
+  if (about.value?.control !== "token") return null;
+  return (
+    <label class="token">
+      Token for control
+      <input type="password" autocomplete="off" value={token.value} onInput={(event) => (token.value = event.currentTarget.value)} />
+    </label>
+  );
+}

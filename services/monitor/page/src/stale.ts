@@ -1,0 +1,31 @@
+// How old a value may be before it is shown as old.
+
+export interface Held<T> {
+  value: T | null;
+  at_ms: number; // when it came, by this browser's clock
+}
+
+export const nothing = <T>(): Held<T> => ({ value: null, at_ms: 0 });
+
+/// Seconds after which a value of this kind is no longer live; the server's own rate leaves two or three in that time.
+export const FRESH_S = { state: 1.5, curvature: 1.5, view: 1.5, services: 2, topics: 3.5, recorder: 3.5, player: 1.5 } as const;
+
+/// Seconds since the train made the value: what the server said plus what passed here. Infinite when there is none.
+export function age_s<T>(held: Held<T>, now_ms: number, age_at_arrival_s = 0): number {
+  if (held.value === null) return Infinity;
+  return Math.max(0, (now_ms - held.at_ms) / 1000) + Math.max(0, age_at_arrival_s);
+}
+
+export type Freshness = "live" | "stale" | "none";
+
+export function freshness(age: number, limit_s: number, connected: boolean): Freshness {
+  if (!Number.isFinite(age)) return "none";
+  return connected && age <= limit_s ? "live" : "stale";
+}
+
+/// Newest `limit` of both, the newer ones last, nothing twice: a new subscription repeats what is known.
+export function appended<T>(old: readonly T[], more: readonly T[], limit: number, key: (item: T) => string): T[] {
+  const known = new Set(old.map(key));
+  const all = old.concat(more.filter((item) => !known.has(key(item)) && known.add(key(item))));
+  return all.length > limit ? all.slice(all.length - limit) : all;
+}

@@ -1,0 +1,121 @@
+// All that the page knows. Everything is bounded: an hour open holds no more than a minute does.
+import { computed, signal } from "@preact/signals";
+import { age_s, appended, FRESH_S, freshness, type Freshness, type Held, nothing } from "./stale";
+import type { About, Curvature, LogRecord, MapData, Message, PlayerStatus, Problem, RecorderStatus, Report, Service, Topic, TrainState, View } from "./wire";
+
+export const LOG_LIMIT = 500;
+export const REPORT_LIMIT = 50;
+const HISTORY_LIMIT = 600; // one a second
+
+export interface Picture {
+  camera: string;
+  stamp_ns: number;
+  image: ImageBitmap;
+}
+
+/// One second of the past: null where nothing was known.
+export interface Moment {
+  at_ms: number;
+  speed_mps: number | null;
+  over_m: number | null;
+  under_m: number | null;
+}
+
+export const about = signal<About | null>(null);
+export const map = signal<MapData | null>(null);
+export const state = signal<Held<TrainState>>(nothing());
+export const curvature = signal<Held<Curvature>>(nothing());
+export const view = signal<Held<View>>(nothing());
+export const picture = signal<Picture | null>(null);
+export const services = signal<Held<Service[]>>(nothing());
+export const topics = signal<Held<Topic[]>>(nothing());
+export const reports = signal<Report[]>([]);
+export const log = signal<LogRecord[]>([]);
+export const recorder = signal<Held<RecorderStatus>>(nothing());
+export const player = signal<Held<PlayerStatus>>(nothing());
+export const problems = signal<Problem[] | null>(null);
+export const history = signal<Moment[]>([]);
+
+/// The socket: `since_ms` is when it came up or was lost, by this browser's clock.
+export const connection = signal<{ up: boolean; since_ms: number; ever: boolean }>({ up: false, since_ms: Date.now(), ever: false });
+/// This browser's clock minus the monitor's, so that "since" means the same on both.
+export const clock_offset_ms = signal(0);
+/// Moves twice a second while the page can be seen; every age hangs on it.
+export const now_ms = signal(Date.now());
+
+export const host_now_ms = computed(() => now_ms.value - clock_offset_ms.value);
+export const host_ms = (ns: number) => ns / 1e6 + clock_offset_ms.value;
+
+type Kind = keyof typeof FRESH_S;
+const held: Record<Kind, { value: Held<unknown> }> = { state, curvature, view, services, topics, recorder, player };
+
+export function age_of(kind: Kind): number {
+  const one = held[kind].value;
+  return age_s(one, now_ms.value, kind === "state" ? ((one.value as TrainState | null)?.age_s ?? 0) : 0);
+}
+export const fresh = (kind: Kind): Freshness => freshness(age_of(kind), FRESH_S[kind], connection.value.up);
+
+function take_state(message: Partial<TrainState>): void {
+  if (message.edge !== undefined) {
+    state.value = { value: message as TrainState, at_ms: Date.now() };
+  } else if (state.value.value !== null) {
+    state.value = { value: { ...state.value.value, age_s: message.age_s ?? Infinity }, at_ms: Date.now() };
+  }
+}
+
+/// Called once a second.
+export function remember_moment(at_ms: number): void {
+  const live = fresh("state") === "live" ? state.value.value : null;
+  const moment = { at_ms, speed_mps: live?.speed_mps ?? null, over_m: live?.over_m ?? null, under_m: live?.under_m ?? null };
+  history.value = history.value.concat(moment).slice(-HISTORY_LIMIT);
+}
+
+export function show_picture(next: Picture): void {
+  picture.value?.image.close();
+  picture.value = next;
+}
+
+const report_key = (report: Report) => `${report.stamp_ns} ${report.seq}`;
+const log_key = (record: LogRecord) => `${record.stamp_ns} ${record.host} ${record.service} ${record.text}`;
+
+/// Everything but replies, which belong to whoever asked.
+export function take(message: Message): void {
+  const at_ms = Date.now();
+  switch (message.kind) {
+    case "hello":
+      clock_offset_ms.value = at_ms - message.now_ns / 1e6;
+      break;
+    case "state":
+      take_state(message);
+      break;
+    case "curvature":
+      curvature.value = { value: message, at_ms };
+      break;
+    case "view":
+      view.value = { value: message, at_ms };
+      break;
+    case "services":
+      services.value = { value: message.services, at_ms };
+      break;
+    case "topics":
+      topics.value = { value: message.topics, at_ms };
+      break;
+    case "report":
+      reports.value = appended(reports.value, [message], REPORT_LIMIT, report_key);
+      break;
+    case "log":
+      log.value = appended(log.value, message.records, LOG_LIMIT, log_key);
+      break;
+    case "recorder":
+      recorder.value = { value: message, at_ms };
+      break;
+    case "player":
+      player.value = { value: message, at_ms };
+      break;
+    case "problems":
+      problems.value = message.problems;
+      break;
+    case "reply":
+      break;
+  }
+}
