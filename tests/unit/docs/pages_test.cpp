@@ -25,8 +25,10 @@ const fs::path kRoot = RAILFIX_SOURCE_DIR;
 
 std::vector<fs::path> files_below(const fs::path& folder, const std::string& extension) {
   std::vector<fs::path> files;
-  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-    if (entry.path().extension() == extension) files.push_back(entry.path());
+  fs::recursive_directory_iterator entry(folder);
+  for (const fs::recursive_directory_iterator end; entry != end; ++entry) {
+    if (entry->path().filename() == "node_modules") entry.disable_recursion_pending();  // other people's pages
+    if (entry->path().extension() == extension) files.push_back(entry->path());
   }
   return files;
 }
