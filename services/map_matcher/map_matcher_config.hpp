@@ -5,6 +5,7 @@
 
 #include "map_matcher/curvature_matcher.hpp"
 #include "map_matcher/curve_exit_matcher.hpp"
+#include "map_matcher/gyro_turn.hpp"
 #include "map_matcher/landmark_matcher.hpp"
 #include "map_matcher/network_locator.hpp"
 #include "map_matcher/track_chooser.hpp"
@@ -18,6 +19,9 @@ struct MapMatcherConfig {
   bool use_curvature = true;
   std::string curve_method = "likelihood";
   bool choose_track = true;
+  bool use_imu = true;
+  double camera_bias_per_m = 1e-4;
+  GyroParameters gyro;
   bool locate = true;
   double view_ahead_m = 7.0;
   double least_speed_mps = 1.0;
@@ -35,6 +39,9 @@ struct MapMatcherConfig {
     fields.choice("curve_method", curve_method, {"likelihood", "exits"},
                   "How: likelihood over the place, or the exits of curves (paper 004, section 8).");
     fields.flag("choose_track", choose_track, "Say which track the train is on behind switches.");
+    fields.flag("use_imu", use_imu, "Take the turning from the gyro while the camera is blind.");
+    fields.number("camera_bias_per_m", camera_bias_per_m, {0, 0.01}, "1/m",
+                  "Constant error of the camera's turning for the choice of the track, one sigma.");
     fields.flag("locate", locate, "Look for the place on the whole map while nobody knows it.");
     fields.number("locate_every_m", locate_every_m, {20, 10000}, "m", "... once in this way.");
     fields.number("view_ahead_m", view_ahead_m, {0, 50}, "m",
@@ -63,20 +70,30 @@ struct MapMatcherConfig {
       f.number("sigma_floor_m", p.sigma_floor_m, {0, 50}, "m", "Least sigma of a fix.");
       f.number("min_probability", p.min_probability, {0, 1}, "", "A less probable fix is not sent.");
     });
+    fields.group("gyro", "Turning from the IMU.", [this](service::Fields& f) {
+      auto& p = gyro;
+      f.number("noise_rad", p.noise_rad, {1e-6, 0.1}, "rad", "Random walk of the heading in a second, one sigma.");
+      f.number("bias_rps", p.bias_rps, {0, 0.1}, "rad/s", "Constant error before the train has stood, one sigma.");
+      f.number("bias_walk_rps", p.bias_walk_rps, {0, 0.01}, "rad/s", "It wanders by so much in a second.");
+      f.number("longest_gap_s", p.longest_gap_s, {0.01, 2}, "s", "Samples further apart do not belong together.");
+    });
     fields.group("track", "Choice of the track behind switches.", [this](service::Fields& f) {
       auto& p = track;
       f.number("bin_m", p.bin_m, {0.5, 20}, "m", "Turning is compared over this way.");
       f.number("noise_per_m", p.noise_per_m, {1e-6, 0.1}, "1/m", "Least sigma of the curvature of one bin.");
       f.number("curvature_share", p.curvature_share, {0, 1}, "", "The map's curvature may be off by this share.");
-      f.number("bias_rps", p.bias_rps, {0, 0.1}, "rad/s", "Unknown constant turning of the sensor, one sigma.");
       f.number("correlated_bins", p.correlated_bins, {1, 100}, "", "So many neighbouring bins err together.");
       f.number("lag_m", p.lag_m, {0, 60}, "m", "The car body may turn so far behind the camera's foot.");
-      f.number("least_sigma_m", p.least_sigma_m, {0.1, 50}, "m", "Least sigma of the place along the track.");
+      f.number("map_sigma_m", p.map_sigma_m, {0.1, 50}, "m", "Switches are elsewhere than on the map, one sigma.");
       f.number("reach_m", p.reach_m, {5, 500}, "m", "Ways are told apart from this far ahead of the train.");
       f.number("declare", p.declare, {0.5, 0.999999}, "", "From this probability on a track is known.");
       f.number("detection", p.detection, {0.01, 0.999}, "", "Chance that a mapped landmark is sighted.");
       f.number("false_per_m", p.false_per_m, {1e-7, 1}, "1/m", "False sightings of one kind per metre.");
       f.number("wrong_side", p.wrong_side, {0.001, 0.5}, "", "Chance that a sighting is on the wrong side.");
+      f.number("view_from_m", p.view_from_m, {0, 50}, "m", "track_view's curvature is that of the rails from here ...");
+      f.number("view_to_m", p.view_to_m, {1, 100}, "m", "... to here ahead of the camera's foot.");
+      f.number("astray", p.astray, {0.001, 0.5}, "", "Chance that pictures show another leg than the own.");
+      f.number("astray_m", p.astray_m, {5, 1000}, "m", "... which then lasts so far.");
     });
     fields.group("locator", "The place on the whole map, without a prior.", [this](service::Fields& f) {
       auto& p = locator;

@@ -18,6 +18,7 @@ constexpr double kShortestStepM = 0.05;
 constexpr double kLeastWayM = 1e-5;       // standing still turns nothing
 constexpr double kTrackEveryS = 1.0;      // the track is said again after this time ...
 constexpr double kOpenTrackEveryM = 2.0;  // ... or, while it is not known, this way
+constexpr double kNoCameraS = 0.5;        // without an odometry step
 constexpr int kCurvatureVariance = 25;    // place of the curvature's variance in TrackView.covariance
 
 track::EdgePosition place_of(const msg::TrainState& state) {
@@ -35,13 +36,17 @@ Sighting input_of(const msg::LandmarkSighting& m) {
 }  // namespace
 
 MapMatcherService::MapMatcherService(const MapMatcherConfig& config, service::Context& context)
-    : config_(config), context_(context), writer_(context.writer(messaging::topics::position_fix)) {
+    : config_(config), context_(context), writer_(context.writer(messaging::topics::position_fix)), gyro_(config.gyro) {
   if (!config.map.empty()) {
     map_ = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(config.map)));
     ways_ = std::make_shared<const track::Ways>(*map_);
     if (config.choose_track) chooser_.emplace(config.track, map_, ways_);
   }
   namespace topics = messaging::topics;
+  if (config.use_imu) {
+    context_.on<msg::ImuSample>(topics::imu_sample,
+                                [this](const msg::ImuSample& m) { gyro_.add(m.stamp_ns(), m.rate_z_rps()); });
+  }
   context_.on<msg::TrainState>(topics::train_state, [this](const msg::TrainState& m) { use(m); });
   context_.on<msg::TrackView>(topics::track_view, [this](const msg::TrackView& m) { use(m); });
   context_.on<msg::LandmarkSighting>(topics::landmark_sighting, [this](const msg::LandmarkSighting& m) { use(m); });
@@ -51,13 +56,25 @@ MapMatcherService::MapMatcherService(const MapMatcherConfig& config, service::Co
 
 void MapMatcherService::use(const msg::TrainState& state) {
   context_.health().input();
+  before_ = state_;
   state_ = state;
+  if (before_ && before_->standstill() != 0 && state.standstill() != 0) stand(before_->stamp_ns(), state.stamp_ns());
   if (!map_ || state.track_known() == 0) {
     context_.health().degraded(map_ ? "the place on the map is not known yet" : "no map is configured");
     return;
   }
   context_.health().active();
   follow(state);
+  if (chooser_) follow_without_camera();
+}
+
+// Whoever follows the gyro now must not have its constant error changed below it.
+void MapMatcherService::stand(int64_t from_ns, int64_t to_ns) {
+  if (!chooser_ || chooser_->sensor() != TurnSensor::gyro) {
+    gyro_.stood(from_ns, to_ns);
+  } else if (const auto turn = gyro_.between(from_ns, to_ns)) {
+    chooser_->stand(*turn);
+  }
 }
 
 void MapMatcherService::follow(const msg::TrainState& state) {
@@ -138,17 +155,29 @@ void MapMatcherService::match_exits(const msg::OdometryStep& step) {
 }
 
 // Key frames overlap: what counts is how the turn since the same picture grew.
-std::optional<MapMatcherService::Turn> MapMatcherService::turn_of(const msg::OdometryStep& step) const {
+std::optional<Turn> MapMatcherService::turn_of(const msg::OdometryStep& step) const {
   if (!step_) return std::nullopt;
   const double dt_s = core::seconds(step.stamp_ns() - step_->stamp_ns());
   if (dt_s <= 0 || step.valid() == 0 || step.mode() == msg::ODOMETRY_BLIND || step_->valid() == 0) return std::nullopt;
-  const double way_m = step.distance_m() - step_->distance_m();
-  const double part = step.step_m() == 0 ? 1.0 : std::clamp(way_m / step.step_m(), -1.0, 1.0);
-  const double sigma_rad = std::hypot(step.yaw_sigma_rad(), kYawNoise);
+  Turn turn;
+  turn.way_m = step.distance_m() - step_->distance_m();
+  turn.bias_rad = config_.camera_bias_per_m * std::abs(turn.way_m);
+  const double part = step.step_m() == 0 ? 1.0 : std::clamp(turn.way_m / step.step_m(), -1.0, 1.0);
+  turn.sigma_rad = std::hypot(step.yaw_sigma_rad(), kYawNoise);
   if (step.reference_stamp_ns() != step_->reference_stamp_ns()) {
-    return Turn{way_m, part * step.yaw_rad(), sigma_rad, dt_s};
+    turn.turn_rad = part * step.yaw_rad();
+  } else {
+    turn.turn_rad = step.yaw_rad() - step_->yaw_rad();
+    turn.sigma_rad *= std::sqrt(std::abs(part));
   }
-  return Turn{way_m, step.yaw_rad() - step_->yaw_rad(), std::sqrt(std::abs(part)) * sigma_rad, dt_s};
+  return turn;
+}
+
+std::optional<Turn> MapMatcherService::turn_of_gyro(int64_t from_ns, int64_t to_ns) const {
+  if (!state_ || !std::isfinite(state_->speed_mps())) return std::nullopt;
+  auto turn = gyro_.between(from_ns, to_ns);
+  if (turn) turn->way_m = state_->speed_mps() * core::seconds(to_ns - from_ns);
+  return turn;
 }
 
 void MapMatcherService::look_for_place(const msg::OdometryStep& step) {
@@ -160,7 +189,8 @@ void MapMatcherService::look_for_place(const msg::OdometryStep& step) {
     locator_.emplace(config_.locator, std::make_shared<const NetworkIndex>(map_));
     located_m_ = step.distance_m();
   }
-  const auto turn = turn_of(step);
+  auto turn = turn_of(step);
+  if (!turn && step_) turn = turn_of_gyro(step_->stamp_ns(), step.stamp_ns());
   if (!turn) {
     if (step_) locator_->forget();
     return;
@@ -191,28 +221,51 @@ void MapMatcherService::follow_turning(const msg::OdometryStep& step) {
   if (!prior || !step_) return;
   const auto place = path_->position_at(prior->path_distance_m);
   chooser_->follow({place, prior->over_m, prior->under_m, state_->sigma_m()});
-  if (const auto turn = turn_of(step)) {
-    const double way_m = turn->way_m * state_->visual_scale();
-    if (std::abs(way_m) > kLeastWayM) chooser_->move(way_m, turn->turn_rad, turn->sigma_rad, turn->duration_s);
+  auto turn = turn_of(step);
+  if (turn) {
+    turn->way_m *= state_->visual_scale();
+  } else {
+    turn = turn_of_gyro(step_->stamp_ns(), step.stamp_ns());
+  }
+  if (turn) {
+    if (std::abs(turn->way_m) > kLeastWayM) chooser_->move(*turn);
   } else {
     const double dt_s = core::seconds(step.stamp_ns() - step_->stamp_ns());
     const double way_m = state_->speed_mps() * std::max(dt_s, 0.0);
     if (std::isfinite(way_m)) chooser_->move_blind(way_m);
   }
-  publish_track(step);
+  publish_track(step.stamp_ns(), step.distance_m(), step.grabbed_ns());
 }
 
-void MapMatcherService::publish_track(const msg::OdometryStep& step) {
+// Without a camera fusion's states lead: they come ten times a second.
+void MapMatcherService::follow_without_camera() {
+  if (!before_ || before_->track_known() == 0 || before_->stamp_ns() >= state_->stamp_ns()) return;
+  if (step_ && core::seconds(state_->stamp_ns() - step_->stamp_ns()) < kNoCameraS) return;
+  const auto prior = prior_at(state_->stamp_ns());
+  if (!prior) return;
+  chooser_->follow({place_of(*state_), prior->over_m, prior->under_m, state_->sigma_m()});
+  const double way_m = state_->distance_m() - before_->distance_m();
+  auto turn = gyro_.between(before_->stamp_ns(), state_->stamp_ns());
+  if (turn && std::abs(way_m) > kLeastWayM) {
+    turn->way_m = way_m;
+    chooser_->move(*turn);
+  } else if (!turn) {
+    chooser_->move_blind(way_m);
+  }
+  publish_track(state_->stamp_ns(), state_->distance_m(), 0);
+}
+
+void MapMatcherService::publish_track(int64_t stamp_ns, double odometer_m, int64_t grabbed_ns) {
   const auto choice = chooser_->choice();
   if (!choice) return;
   const auto& best = choice->options.front();
-  const double since_m = std::abs(step.distance_m() - said_track_.odometer_m);
+  const double since_m = std::abs(odometer_m - said_track_.odometer_m);
   const bool changed = best.place.edge != said_track_.edge || choice->known != said_track_.known;
-  const bool due = core::seconds(step.stamp_ns() - said_track_.stamp_ns) > kTrackEveryS;
+  const bool due = core::seconds(stamp_ns - said_track_.stamp_ns) > kTrackEveryS;
   if (!changed && !due && (choice->known || since_m < kOpenTrackEveryM)) return;
-  said_track_ = {best.place.edge, choice->known, step.stamp_ns(), step.distance_m()};
+  said_track_ = {best.place.edge, choice->known, stamp_ns, odometer_m};
   msg::PositionFix message;
-  message.stamp_ns(step.stamp_ns());
+  message.stamp_ns(stamp_ns);
   message.kind(msg::FIX_TRACK);
   message.offset_m(best.place.offset_m);
   message.sigma_m(std::numeric_limits<double>::infinity());
@@ -229,15 +282,17 @@ void MapMatcherService::publish_track(const msg::OdometryStep& step) {
   }
   message.alternatives(static_cast<uint8_t>(others));
   if (!writer_.write(message)) context_.health().dropped(1);
-  context_.health().output(step.grabbed_ns());
+  context_.health().output(grabbed_ns);
 }
 
 void MapMatcherService::use(const msg::TrackView& view) {
-  if (!curvature_ || !config_.use_curvature || !step_ || step_->valid() == 0) return;
   if (view.seen_left() == 0 || view.seen_right() == 0) return;
-  const double dt_s = core::seconds(view.stamp_ns() - step_->stamp_ns());
   const double variance = view.covariance()[kCurvatureVariance];
-  if (!(variance > 0) || std::abs(dt_s) > kOldStateS || std::abs(step_->speed_mps()) < config_.least_speed_mps) return;
+  if (!(variance > 0)) return;
+  if (chooser_ && prior_at(view.stamp_ns())) chooser_->see(view.curvature_per_m(), std::sqrt(variance));
+  if (!curvature_ || !config_.use_curvature || !step_ || step_->valid() == 0) return;
+  const double dt_s = core::seconds(view.stamp_ns() - step_->stamp_ns());
+  if (std::abs(dt_s) > kOldStateS || std::abs(step_->speed_mps()) < config_.least_speed_mps) return;
   const double odometer_m = step_->distance_m() + step_->speed_mps() * dt_s + config_.view_ahead_m;
   curvature_->add(odometer_m, view.curvature_per_m(), std::sqrt(variance));
 }

@@ -7,6 +7,7 @@
 
 #include "map_matcher/curvature_matcher.hpp"
 #include "map_matcher/curve_exit_matcher.hpp"
+#include "map_matcher/gyro_turn.hpp"
 #include "map_matcher/landmark_matcher.hpp"
 #include "map_matcher/map_matcher_config.hpp"
 #include "map_matcher/network_locator.hpp"
@@ -27,22 +28,20 @@ class MapMatcherService {
   void use(const msg::TrackView& view);
   void use(const msg::LandmarkSighting& sighting);
   void follow(const msg::TrainState& state);
+  void stand(int64_t from_ns, int64_t to_ns);
   /// The window at a stamp, extrapolated from the last state; nothing when the place is not known or the state is too
   /// old.
   [[nodiscard]] std::optional<Prior> prior_at(int64_t stamp_ns) const;
-  /// What this step adds to the one before it.
-  struct Turn {
-    double way_m = 0;
-    double turn_rad = 0;
-    double sigma_rad = 0;
-    double duration_s = 0;
-  };
+  /// What this step adds to the one before it, as the camera saw it.
   [[nodiscard]] std::optional<Turn> turn_of(const msg::OdometryStep& step) const;
+  /// The same from the gyro, for as long as the camera cannot say.
+  [[nodiscard]] std::optional<Turn> turn_of_gyro(int64_t from_ns, int64_t to_ns) const;
   void match_exits(const msg::OdometryStep& step);
   void look_for_place(const msg::OdometryStep& step);
   void publish_place(const msg::OdometryStep& step, const Location& location);
   void follow_turning(const msg::OdometryStep& step);
-  void publish_track(const msg::OdometryStep& step);
+  void follow_without_camera();
+  void publish_track(int64_t stamp_ns, double odometer_m, int64_t grabbed_ns);
   void publish(const Fix& fix, uint8_t kind, int64_t grabbed_ns);
 
   MapMatcherConfig config_;
@@ -54,7 +53,9 @@ class MapMatcherService {
   std::optional<LandmarkMatcher> landmarks_;
   std::optional<CurvatureMatcher> curvature_;
   std::optional<CurveExitMatcher> exits_;  // instead of it, where the configuration says so
+  GyroTurn gyro_;
   std::optional<msg::TrainState> state_;
+  std::optional<msg::TrainState> before_;  // the state before it
   std::optional<msg::OdometryStep> step_;
   std::optional<TrackChooser> chooser_;
   std::optional<NetworkLocator> locator_;  // only while the place is not known

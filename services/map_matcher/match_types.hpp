@@ -16,6 +16,17 @@ struct Sighting {
   double confidence = 0;
 };
 
+enum class TurnSensor : uint8_t { camera, gyro };
+
+/// How far the train ran and how it turned meanwhile (left positive).
+struct Turn {
+  double way_m = 0;
+  double turn_rad = 0;
+  double sigma_rad = 0;  // noise of this piece alone
+  double bias_rad = 0;   // what one sigma of the sensor's constant error has turned meanwhile
+  TurnSensor sensor = TurnSensor::camera;
+};
+
 /// Where fusion thinks the train is: only a window to search in.
 struct Prior {
   double path_distance_m = 0;

@@ -1,8 +1,9 @@
 // Which track? Every way through the switches around the train is a hypothesis with a probability. How the train turns
-// against the curvature of each way, the side of the frogs and what was sighted tell them apart; until one is clearly
-// ahead the track is not yet known.
+// against the curvature of each way, how the rails in the picture bend, the side of the frogs and what was sighted tell
+// them apart; until one is clearly ahead the track is not yet known.
 #pragma once
 
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -16,15 +17,18 @@ struct TrackParameters {
   double bin_m = 2.0;             // turning is compared over this way
   double noise_per_m = 3e-4;      // least sigma of the curvature of one bin: car body, sleepers
   double curvature_share = 0.15;  // of the map's curvature: switches are drawn roughly
-  double bias_rps = 0.002;        // unknown constant turning of the sensor, one sigma
-  double correlated_bins = 2.0;   // neighbouring bins err together
+  double correlated_bins = 2.0;   // neighbouring bins err together, but for the sensor's noise
   double lag_m = 20.0;            // the car body turns up to so far behind the camera's foot (distance of the bogies)
-  double least_sigma_m = 1.0;     // of the place along the track
+  double map_sigma_m = 1.5;       // the map's switches are somewhere else by so much
   double reach_m = 30.0;          // ways are told apart from this far ahead
   double declare = 0.999;         // probability from which on the track is known
   double detection = 0.8;         // chance that a mapped landmark is sighted
   double false_per_m = 0.0005;    // false sightings of one kind per metre
   double wrong_side = 0.03;       // chance that a frog or mast is reported on the wrong side
+  double view_from_m = 3.0;       // the curvature in a picture is that of the rails from here ...
+  double view_to_m = 20.0;        // ... to here ahead of the camera's foot
+  double astray = 0.05;           // chance that the picture's rails are those of another leg than the own
+  double astray_m = 60.0;         // ... which then lasts about so far
 };
 
 /// Where fusion thinks the train is: an edge, and how far it may be off along the track.
@@ -54,37 +58,51 @@ class TrackChooser {
 
   /// REQUIRES: the edge is on the map. The first window starts the hypotheses, later ones move them along.
   void follow(const TrackWindow& window);
-  /// Moved by way_m (in metres of the map as well as known, signed) and turned by turn_rad (left positive) meanwhile.
-  void move(double way_m, double turn_rad, double turn_sigma_rad, double duration_s);
+  /// Moved and turned; the way in metres of the map as well as known, signed.
+  void move(const Turn& turn);
+  /// Stood, and the sensor says that it turned: its own error.
+  void stand(const Turn& turn);
   /// Moved, but nobody knows how it turned.
   void move_blind(double way_m);
   void sight(const Sighting& sighting);
+  /// The curvature of the rails in a picture taken here (left positive).
+  void see(double curvature_per_m, double sigma_per_m);
   /// Nothing before the first window.
   [[nodiscard]] std::optional<TrackChoice> choice() const;
+  /// Whose turning was used last.
+  [[nodiscard]] TurnSensor sensor() const { return sensor_; }
   [[nodiscard]] size_t hypotheses() const { return hypotheses_.size(); }
 
  private:
-  /// One place of the train on a route: how well the turning fits, and the sensor's bias that fits best.
+  /// One place of the train on a route: how well the turning fits, and the sensor's bias that fits best, in sigmas.
   struct Cell {
     double log_weight = 0;
-    double bias_rps = 0;
-    double bias_variance = 0;
+    double bias = 0;
+    double bias_variance = 1;
+  };
+  /// What the pictures showed: their errors are not independent, since a detector that follows the other leg goes on to
+  /// do so and sees that leg's frog. So a hidden state (own leg or astray) is carried along, as logarithms.
+  struct Pictures {
+    double own = 0;
+    double astray = 0;
   };
   struct Hypothesis {
     track::Route route;
-    double log_prior = 0;  // ways taken, sightings
+    double log_prior = 0;  // ways taken
+    Pictures pictures;
     std::vector<Cell> cells;
   };
   struct Pending {
     double way_m = 0;
     double turn_rad = 0;
     double variance = 0;
-    double duration_s = 0;
+    double bias_rad = 0;
   };
 
   void start(const TrackWindow& window);
   void use_pending();
   void weigh_turn(Hypothesis& hypothesis, const Pending& bin) const;
+  static void learn_bias(Cell& cell, double error, double own_variance, double bias_gain);
   void spread(Hypothesis& hypothesis, double way_m) const;
   void fit_cells();
   void turn_round();
@@ -93,7 +111,12 @@ class TrackChooser {
   void trim();
   void merge();
   void prune();
+  void use_picture(const std::vector<double>& log_fits);
+  void run_pictures(double way_m);
+  [[nodiscard]] double view_fits(const track::Route& route, double curvature_per_m, double sigma_per_m) const;
+  /// Logarithm of prior and all evidence.
   [[nodiscard]] double evidence(const Hypothesis& hypothesis) const;
+  [[nodiscard]] double of_turning(const Hypothesis& hypothesis) const;
   [[nodiscard]] double log_of_place(double place_m) const;
   [[nodiscard]] double sighting_fits(const track::Route& route, const Sighting& sighting) const;
   [[nodiscard]] double first_m() const { return place_m_ - window_.over_m - parameters_.lag_m - 2; }
@@ -108,7 +131,9 @@ class TrackChooser {
   double cells_m_ = 0;  // of the first cell
   double lost_m_ = 0;   // run since the window was on one of the routes
   double moved_back_m_ = 0;
-  bool forwards_ = true;  // the way that the train moves, seen from the cab
+  bool forwards_ = true;      // the way that the train moves, seen from the cab
+  double seen_m_ = INFINITY;  // run since a picture was used
+  TurnSensor sensor_ = TurnSensor::camera;
   Pending pending_;
 };
 

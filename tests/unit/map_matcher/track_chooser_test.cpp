@@ -24,7 +24,10 @@ TEST(TrackChooser, OverRandomSwitchesNothingDeclaredIsWrong) {
     open += result.known_at_end ? 0 : 1;
     if (!plan.facing) continue;
     ++facing;
-    EXPECT_GT(result.open_steps, 0) << "declared before anything could be known: " << plan.text();
+    // A camera sees the rails ahead of the foot, and the place on the map is vague.
+    if (!plan.camera || !plan.views) {
+      EXPECT_GT(result.open_steps, 0) << "declared before anything could be known: " << plan.text();
+    }
     late += result.behind_frog_m > 30 ? 1 : 0;
   }
   EXPECT_LE(open, 1);
