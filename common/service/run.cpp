@@ -104,8 +104,9 @@ void CommonConfig::describe(Fields& fields) {
 }
 
 const std::vector<std::string>& service_names() {
-  static const std::vector<std::string> names{"frame_grabber", "sensor_gateway", "track_detector", "odometry",
-                                              "map_matcher",   "fusion",         "tpr_publisher",  "recorder"};
+  static const std::vector<std::string> names{"frame_grabber", "sensor_gateway", "track_detector",
+                                              "odometry",      "map_matcher",    "fusion",
+                                              "tpr_publisher", "recorder",       "monitor"};
   return names;
 }
 

@@ -21,6 +21,8 @@ pkg_check_modules(proj REQUIRED IMPORTED_TARGET proj)
 pkg_check_modules(mosquitto REQUIRED IMPORTED_TARGET libmosquitto)
 pkg_check_modules(sqlite REQUIRED IMPORTED_TARGET sqlite3)
 pkg_check_modules(pugixml REQUIRED IMPORTED_TARGET pugixml)
+find_package(Boost 1.74 REQUIRED)
+find_package(prometheus-cpp REQUIRED)
 find_package(GTest REQUIRED)
 find_package(benchmark REQUIRED)
 

@@ -21,9 +21,11 @@ constexpr double kTurnS = 0.1;
 
 volatile std::sig_atomic_t interrupted = 0;
 
-std::vector<std::string> names_of(const std::vector<ServiceProgram>& programs) {
+std::vector<std::string> needed_of(const std::vector<ServiceProgram>& programs) {
   std::vector<std::string> names;
-  for (const auto& program : programs) names.push_back(program.service);
+  for (const auto& program : programs) {
+    if (program.needed) names.push_back(program.service);
+  }
   return names;
 }
 
@@ -35,6 +37,18 @@ void start_services(Processes& processes, const std::vector<ServiceProgram>& pro
     arguments.push_back(set);
   }
   for (const auto& program : programs) core::ok_or_throw(processes.start(program, arguments));
+}
+
+void say_where_to_watch(Supervisor& supervisor, Processes& processes, const RunOptions& options) {
+  const bool there = supervisor.picture().services.contains("monitor");
+  const auto page = there ? supervisor.command(processes, "monitor", "address", "", kAnswerS)
+                          : core::Result<std::string>(core::Error{"it has not started"});
+  if (page.ok()) {
+    std::cout << "watch it on " << page.value() << std::endl;
+  } else {
+    std::cerr << "railfix: the run goes on without the monitor (" << page.error().message << "); its log is "
+              << (options.out / "log" / "monitor.log").string() << '\n';
+  }
 }
 
 // Until the data has ended, was interrupted, or a service has died.
@@ -71,11 +85,12 @@ int run(const RunOptions& options) {
   network.train_id = plan.train_id;
   network.service = "run";
   network.domain = options.domain;
-  Supervisor supervisor(network, names_of(programs));
+  Supervisor supervisor(network, needed_of(programs));
   Processes processes(options.out / "log");
   start_services(processes, programs, plan, options.sets);
   const auto connected = supervisor.wait_connected(processes, kConnectS);
   if (!connected.ok()) throw std::runtime_error(connected.error().message);
+  say_where_to_watch(supervisor, processes, options);
   const auto started = supervisor.command(processes, "frame_grabber", "start", "", kAnswerS);
   if (!started.ok()) throw std::runtime_error(started.error().message);
   watch(supervisor, processes, options, plan);

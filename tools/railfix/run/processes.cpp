@@ -53,7 +53,7 @@ core::Result<std::vector<ServiceProgram>> find_service_programs() {
     if (!std::filesystem::exists(folder / file)) {
       return core::Error{(folder / file).string() + " is missing; build it with ./dev build"};
     }
-    programs.push_back({service, folder / file});
+    programs.push_back({service, folder / file, service != "monitor"});
   }
   return programs;
 }
@@ -75,7 +75,7 @@ core::Status Processes::start(const ServiceProgram& program, const std::vector<s
   if (pid == 0) become(program.program, arguments, log);
   close(log);
   if (pid < 0) return core::Error{program.program.string() + " cannot be started: " + std::strerror(errno)};
-  children_.push_back({program.service, pid, false, 0});
+  children_.push_back({program.service, program.needed, pid, false, 0});
   return {};
 }
 
@@ -88,7 +88,7 @@ void Processes::reap() {
 std::optional<std::string> Processes::unexpected_end() {
   reap();
   for (const auto& child : children_) {
-    if (!child.ended) continue;
+    if (!child.ended || !child.needed) continue;
     return child.service + " " + describe(child.wait_status) + "; its log (" +
            (log_dir_ / (child.service + ".log")).string() + ") ends with:\n" + log_tail(child.service);
   }

@@ -15,6 +15,7 @@ namespace railfix::tool {
 struct ServiceProgram {
   std::string service;            // "track_detector"
   std::filesystem::path program;  // ".../railfix-track-detector"
+  bool needed = true;             // false: a run goes on without it
 };
 
 /// The programs of all services that `railfix run` starts, beside the running program, in the order of the data.
@@ -30,7 +31,7 @@ class Processes {
   Processes& operator=(const Processes&) = delete;
 
   core::Status start(const ServiceProgram& program, const std::vector<std::string>& arguments);
-  /// A sentence on the first service that has ended by itself, with the last lines of its log.
+  /// A sentence on the first needed service that has ended by itself, with the last lines of its log.
   [[nodiscard]] std::optional<std::string> unexpected_end();
   /// SIGTERM, then waits; SIGKILL for those that have not ended after the patience. Names those.
   core::Status stop(const std::vector<std::string>& services, double patience_s);
@@ -39,6 +40,7 @@ class Processes {
  private:
   struct Child {
     std::string service;
+    bool needed = true;
     pid_t pid = -1;
     bool ended = false;
     int wait_status = 0;

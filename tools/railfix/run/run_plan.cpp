@@ -73,7 +73,7 @@ void fill_settings(YAML::Node& settings, const RunOptions& options, const RunPla
 
   for (const char* service : {"fusion", "map_matcher", "tpr_publisher"}) settings[service]["map"] = plan.map.string();
   settings["fusion"]["start"] = options.start;
-  settings["recorder"]["map"] = plan.map.string();
+  for (const char* service : {"recorder", "monitor"}) settings[service]["map"] = plan.map.string();
   settings["recorder"]["file"] = std::filesystem::absolute(options.out / "recording.mcap").string();
   settings["recorder"]["pictures"] = options.record_pictures ? "jpeg" : "none";
 }

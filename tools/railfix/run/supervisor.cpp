@@ -61,7 +61,7 @@ void Supervisor::note_status(const msg::ServiceStatus& status, bool alive) {
   }
   picture_.silent.erase(service);
   picture_.services[service] = status;
-  if (service == "recorder") return;  // always has work: it hears the statuses too
+  if (service == "recorder" || service == "monitor") return;  // always have work: they hear the statuses too
   const uint64_t work = status.frames_in() + status.frames_out();
   unchanged_[service] = work_done_[service] == work ? unchanged_[service] + 1 : 0;
   work_done_[service] = work;

@@ -1,0 +1,277 @@
+#include "monitor/http_server.hpp"
+
+#include <boost/asio/ip/tcp.hpp>
+#include <future>
+#include <optional>
+#include <thread>
+
+#include "core/result.hpp"
+#include "monitor/web_socket.hpp"
+
+namespace railfix::monitor {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+using asio::ip::tcp;
+
+constexpr std::chrono::seconds kRequestTime{30};
+constexpr std::chrono::seconds kAnswerTime{10};
+constexpr uint32_t kLongestHeader = 16 * 1024;
+constexpr uint64_t kLongestBody = 64 * 1024;
+constexpr std::chrono::seconds kStopTime{3};
+
+int hex_digit(char c) {
+  if (c >= '0' && c <= '9') return c - '0';
+  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
+  if (c >= 'A' && c <= 'F') return c - 'A' + 10;
+  return -1;
+}
+
+std::string text_of(beast::string_view text) {
+  return {text.data(), text.size()};
+}
+
+// Words between commas, over all headers of this name.
+std::vector<std::string> words_of(const WebSocket::HttpRequest& from, http::field name) {
+  std::vector<std::string> words;
+  const auto [begin, end] = from.equal_range(name);
+  for (auto header = begin; header != end; ++header) {
+    std::string word;
+    for (const char c : text_of(header->value()) + ",") {
+      if (c == ' ' || c == '\t') continue;
+      if (c != ',') {
+        word += c;
+      } else if (!word.empty()) {
+        words.push_back(std::exchange(word, ""));
+      }
+    }
+  }
+  return words;
+}
+
+// A name that only this computer's own programs use for it: a page on the internet whose name points here has another.
+bool names_this_computer(const std::string& host) {
+  const std::string name = host.substr(0, host.starts_with('[') ? host.find(']') + 1 : host.find(':'));
+  return name == "localhost" || name == "[::1]" || name.starts_with("127.");
+}
+
+Request request_of(const WebSocket::HttpRequest& from, const tcp::endpoint& peer) {
+  Request request;
+  request.method = text_of(from.method_string());
+  const std::string target = text_of(from.target());
+  const size_t question = target.find('?');
+  request.path = url_decoded(target.substr(0, question));
+  if (question != std::string::npos) {
+    std::string rest = target.substr(question + 1);
+    while (!rest.empty()) {
+      const size_t end = std::min(rest.find('&'), rest.size());
+      const std::string pair = rest.substr(0, end);
+      const size_t equals = std::min(pair.find('='), pair.size());
+      request.query[url_decoded(pair.substr(0, equals))] =
+          equals < pair.size() ? url_decoded(pair.substr(equals + 1)) : "";
+      rest.erase(0, end + 1);
+    }
+  }
+  request.host = text_of(from[http::field::host]);
+  request.origin = text_of(from[http::field::origin]);
+  request.if_none_match = text_of(from[http::field::if_none_match]);
+  request.subprotocols = words_of(from, http::field::sec_websocket_protocol);
+  const bool proxied = from.count("X-Forwarded-For") + from.count("Forwarded") + from.count("Via") > 0;
+  request.local = peer.address().is_loopback() && !proxied && names_this_computer(request.host);
+  return request;
+}
+
+http::response<http::string_body> message_of(const Response& response, bool head, bool keep_alive) {
+  http::response<http::string_body> message{static_cast<http::status>(response.status), 11};
+  message.set(http::field::content_type, response.type);
+  message.set(http::field::cache_control, response.cache_control);
+  message.set("X-Content-Type-Options", "nosniff");
+  if (!response.etag.empty()) message.set(http::field::etag, response.etag);
+  message.keep_alive(keep_alive);
+  if (response.status == 304) return message;
+  message.content_length(response.body.size());
+  if (!head) message.body() = response.body;
+  return message;
+}
+
+/// One TCP connection until it ends or becomes a WebSocket.
+class HttpSession final : public Session, public std::enable_shared_from_this<HttpSession> {
+ public:
+  HttpSession(std::shared_ptr<Shared> shared, tcp::socket&& socket)
+      : shared_(std::move(shared)), stream_(std::move(socket)) {}
+
+  void read() {
+    parser_.emplace();
+    parser_->header_limit(kLongestHeader);
+    parser_->body_limit(kLongestBody);
+    stream_.expires_after(kRequestTime);
+    http::async_read(stream_, buffer_, *parser_, [self = shared_from_this()](beast::error_code error, size_t) {
+      if (error) return self->stop();
+      self->handle();
+    });
+  }
+  void stop() override {
+    beast::error_code ignored;
+    stream_.socket().close(ignored);
+  }
+
+ private:
+  void handle() {
+    beast::error_code failed;
+    const auto peer = stream_.socket().remote_endpoint(failed);
+    if (failed) return stop();
+    const auto& message = parser_->get();
+    request_ = request_of(message, peer);
+    if (beast::websocket::is_upgrade(message)) return upgrade();
+    const bool keep_alive = message.keep_alive();
+    const uint64_t number = ++requests_;
+    // An answer that never comes is one too.
+    stream_.expires_never();
+    patience_.expires_after(kAnswerTime);
+    patience_.async_wait([self = shared_from_this(), number, keep_alive](beast::error_code error) {
+      if (!error)
+        self->answer(number, keep_alive,
+                     {503, "text/plain; charset=utf-8", "the monitor is too busy\n", "", "no-store"});
+    });
+    shared_->handlers.request(request_, [self = shared_from_this(), number, keep_alive](Response response) {
+      asio::post(self->shared_->io, [self, number, keep_alive, response = std::move(response)] {
+        self->answer(number, keep_alive, response);
+      });
+    });
+  }
+
+  void answer(uint64_t number, bool keep_alive, const Response& response) {
+    if (number != requests_ || answered_ == number) return;
+    answered_ = number;
+    patience_.cancel();
+    response_ = message_of(response, request_.method == "HEAD", keep_alive);
+    stream_.expires_after(kRequestTime);
+    http::async_write(stream_, response_, [self = shared_from_this()](beast::error_code error, size_t) {
+      if (error || self->response_.need_eof()) return self->stop();
+      self->read();
+    });
+  }
+
+  void upgrade() {
+    auto decision = shared_->handlers.upgrade(request_);
+    if (decision.accepted && shared_->clients >= shared_->options.most_clients) {
+      decision = {
+          false, "", {503, "text/plain; charset=utf-8", "there are too many viewers already\n", "", "no-store"}};
+    }
+    if (!decision.accepted) {
+      ++requests_;
+      return answer(requests_, false, decision.refusal);
+    }
+    const auto socket = std::make_shared<WebSocket>(shared_, std::move(stream_), request_, decision.subprotocol);
+    shared_->sessions.emplace_back(socket);
+    socket->accept(parser_->get());
+  }
+
+  std::shared_ptr<Shared> shared_;  // goes last
+  beast::tcp_stream stream_;
+  asio::steady_timer patience_{shared_->io};
+  beast::flat_buffer buffer_;
+  std::optional<http::request_parser<http::string_body>> parser_;
+  Request request_;
+  http::response<http::string_body> response_;
+  uint64_t requests_ = 0;
+  uint64_t answered_ = 0;
+};
+
+}  // namespace
+
+struct HttpServer::Impl {
+  std::shared_ptr<Shared> shared = std::make_shared<Shared>();
+  std::vector<std::shared_ptr<tcp::acceptor>> acceptors;
+  std::thread thread;
+  std::promise<void> ended;
+
+  void accept(const std::shared_ptr<tcp::acceptor>& acceptor) {
+    acceptor->async_accept([this, acceptor](beast::error_code error, tcp::socket socket) {
+      if (error == asio::error::operation_aborted || !acceptor->is_open()) return;
+      if (!error) {
+        std::erase_if(shared->sessions, [](const auto& session) { return session.expired(); });
+        const auto session = std::make_shared<HttpSession>(shared, std::move(socket));
+        shared->sessions.emplace_back(session);
+        session->read();
+      }
+      accept(acceptor);
+    });
+  }
+
+  void stop() {
+    for (const auto& acceptor : acceptors) acceptor->close();
+    for (const auto& weak : shared->sessions) {
+      if (const auto session = weak.lock()) session->stop();
+    }
+  }
+};
+
+HttpServer::HttpServer(const HttpOptions& options, Handlers handlers) : impl_(std::make_unique<Impl>()) {
+  impl_->shared->options = options;
+  impl_->shared->handlers = std::move(handlers);
+}
+
+HttpServer::~HttpServer() {
+  if (!impl_->thread.joinable()) return;
+  asio::post(impl_->shared->io, [this] { impl_->stop(); });
+  // Whoever does not take our goodbye is left behind.
+  if (impl_->ended.get_future().wait_for(kStopTime) != std::future_status::ready) impl_->shared->io.stop();
+  impl_->thread.join();
+}
+
+uint16_t HttpServer::listen(uint16_t port, int search) {
+  const std::string& text = impl_->shared->options.address;
+  beast::error_code error;
+  const auto address = asio::ip::make_address(text, error);
+  if (error) throw core::BadInput("monitor.address " + text + " is no IP address; give one such as 127.0.0.1");
+  const int last = port == 0 ? 0 : std::min(port + search, 65535);
+  for (int tried = port; tried <= last; ++tried) {
+    auto acceptor = std::make_shared<tcp::acceptor>(impl_->shared->io);
+    const tcp::endpoint endpoint(address, static_cast<uint16_t>(tried));
+    acceptor->open(endpoint.protocol(), error);
+    if (!error) acceptor->set_option(asio::socket_base::reuse_address(true), error);
+    if (!error) acceptor->bind(endpoint, error);
+    if (!error) acceptor->listen(asio::socket_base::max_listen_connections, error);
+    if (!error) {
+      impl_->acceptors.push_back(acceptor);
+      return acceptor->local_endpoint().port();
+    }
+    if (error != asio::error::address_in_use) {
+      throw core::BadInput(text + ":" + std::to_string(tried) + " cannot be listened on: " + error.message() +
+                           "; set monitor.address to an address of this computer and monitor.port above 1023");
+    }
+  }
+  throw core::BadInput("port " + std::to_string(port) + " of " + text + " is taken" +
+                       (last > port ? ", and so are those up to " + std::to_string(last) : std::string()) +
+                       "; set monitor.port to a free one");
+}
+
+void HttpServer::start() {
+  for (const auto& acceptor : impl_->acceptors) impl_->accept(acceptor);
+  impl_->thread = std::thread([this] {
+    impl_->shared->io.run();
+    impl_->ended.set_value();
+  });
+}
+
+size_t HttpServer::clients() const {
+  return impl_->shared->clients;
+}
+
+std::string url_decoded(const std::string& text) {
+  std::string decoded;
+  for (size_t i = 0; i < text.size(); ++i) {
+    if (text[i] == '%' && i + 2 < text.size() && hex_digit(text[i + 1]) >= 0 && hex_digit(text[i + 2]) >= 0) {
+      decoded += static_cast<char>(16 * hex_digit(text[i + 1]) + hex_digit(text[i + 2]));
+      i += 2;
+    } else {
+      decoded += text[i] == '+' ? ' ' : text[i];
+    }
+  }
+  return decoded;
+}
+
+}  // namespace railfix::monitor

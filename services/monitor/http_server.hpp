@@ -1,0 +1,39 @@
+// HTTP/1.1 and WebSocket (RFC 9112, RFC 6455) on one or more ports, in a thread of its own. Knows no topic and no page.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "monitor/http_types.hpp"
+
+namespace railfix::monitor {
+
+struct HttpOptions {
+  std::string address = "127.0.0.1";
+  size_t client_queue_bytes = 4'000'000;
+  double slow_client_s = 10;
+  size_t most_clients = 64;
+};
+
+class HttpServer {
+ public:
+  HttpServer(const HttpOptions& options, Handlers handlers);
+  ~HttpServer();
+  HttpServer(const HttpServer&) = delete;
+  HttpServer& operator=(const HttpServer&) = delete;
+
+  /// Takes the port, or the first free one of the `search` after it; gives the one taken. Before start(). Throws
+  /// BadInput when all are taken or the address is none of this computer's.
+  uint16_t listen(uint16_t port, int search);
+  void start();
+  [[nodiscard]] size_t clients() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// "%41" and "+" of a URL.
+std::string url_decoded(const std::string& text);
+
+}  // namespace railfix::monitor

@@ -1,0 +1,69 @@
+// What is wrong with the train, in plain sentences, and since when. Knows no DDS and no clock.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "idl/position.h"
+#include "idl/recorder.h"
+#include "idl/sensors.h"
+#include "monitor/service_board.hpp"
+#include "monitor/topic_statistics.hpp"
+
+namespace railfix::monitor {
+
+enum class Level : uint8_t { warning, error };
+
+struct Problem {
+  std::string id;  // stays the same while the problem lasts
+  Level level = Level::warning;
+  std::string what;
+  std::string what_to_do;
+  int64_t since_ns = 0;
+  friend bool operator==(const Problem&, const Problem&) = default;
+};
+
+/// The train as it is seen at one moment.
+struct TrainSeen {
+  int64_t now_ns = 0;
+  int64_t watched_since_ns = 0;
+  const ServiceBoard* services = nullptr;
+  std::vector<std::string> expected;
+  struct Topic {
+    std::string name;
+    TopicNumbers numbers;
+    double usual_gap_s = 0;
+    bool written = false;  // has a writer now
+  };
+  std::vector<Topic> topics;  // those that are listened to
+  std::optional<msg::TrainState> state;
+  double state_age_s = 0;
+  std::optional<msg::RecorderStatus> recorder;
+  std::optional<msg::GnssFix> gnss;
+  bool data_stands = false;           // played data has ended or is paused: silence is right
+  bool played = false;                // a player stands in for the services
+  double shared_memory_free_mb = -1;  // < 0 = not known
+  double interval_wide_m = 100;
+  double disk_low_mb = 1000;
+};
+
+/// Without since_ns.
+std::vector<Problem> find_problems(const TrainSeen& train);
+
+/// Remembers since when.
+class ProblemList {
+ public:
+  /// True when the list has changed.
+  bool update(std::vector<Problem> found, int64_t now_ns);
+  /// The worst first, then the oldest.
+  [[nodiscard]] const std::vector<Problem>& problems() const { return problems_; }
+
+ private:
+  std::map<std::string, int64_t> since_ns_;
+  std::vector<Problem> problems_;
+};
+
+}  // namespace railfix::monitor

@@ -1,0 +1,49 @@
+#include "monitor/service_board.hpp"
+
+namespace railfix::monitor {
+
+const char* name_of_state(uint8_t state) {
+  switch (state) {
+    case msg::STATE_STARTING:
+      return "starting";
+    case msg::STATE_READY:
+      return "ready";
+    case msg::STATE_ACTIVE:
+      return "active";
+    case msg::STATE_DEGRADED:
+      return "degraded";
+    case msg::STATE_FAILED:
+      return "failed";
+    default:
+      return "stopped";
+  }
+}
+
+void ServiceBoard::note(const msg::ServiceStatus& status, int64_t now_ns) {
+  ServiceSeen& seen = services_[key_of(status)];
+  const bool same = seen.received_ns != 0 && seen.alive && seen.status.state() == status.state() &&
+                    std::string(seen.status.reason().c_str()) == status.reason().c_str();
+  if (!same) seen.since_ns = now_ns;
+  seen.status = status;
+  seen.received_ns = now_ns;
+  seen.alive = true;
+}
+
+void ServiceBoard::note_silent(const msg::ServiceStatus& last, int64_t now_ns) {
+  const auto seen = services_.find(key_of(last));
+  if (seen == services_.end() || !seen->second.alive) return;
+  // A new program of this name may write already while the old one's lease runs out.
+  if (seen->second.status.pid() != last.pid()) return;
+  seen->second.alive = false;
+  if (!seen->second.stopped()) seen->second.since_ns = now_ns;
+}
+
+const ServiceSeen* ServiceBoard::find(const std::string& service) const {
+  const ServiceSeen* best = nullptr;
+  for (const auto& [key, seen] : services_) {
+    if (key.second == service && (best == nullptr || (seen.alive && !best->alive))) best = &seen;
+  }
+  return best;
+}
+
+}  // namespace railfix::monitor

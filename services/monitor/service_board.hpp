@@ -1,0 +1,42 @@
+// Every service of the train as it says of itself and as it is seen: state, since when, alive or not.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <utility>
+
+#include "idl/operation.h"
+
+namespace railfix::monitor {
+
+struct ServiceSeen {
+  msg::ServiceStatus status;
+  int64_t received_ns = 0;
+  int64_t since_ns = 0;  // in this state, for this reason, alive or not
+  bool alive = true;     // its liveliness lease has not run out
+  [[nodiscard]] bool stopped() const { return status.state() == msg::STATE_STOPPED; }
+  [[nodiscard]] std::string name() const { return status.service().c_str(); }
+};
+
+/// "starting", "ready", "active", "degraded", "failed", "stopped".
+const char* name_of_state(uint8_t state);
+
+class ServiceBoard {
+ public:
+  /// Its host and name tell one service from another.
+  using Key = std::pair<std::string, std::string>;
+
+  void note(const msg::ServiceStatus& status, int64_t now_ns);
+  /// Its liveliness lease ran out: dead, frozen or stopped.
+  void note_silent(const msg::ServiceStatus& last, int64_t now_ns);
+  [[nodiscard]] const std::map<Key, ServiceSeen>& services() const { return services_; }
+  /// On whichever host; nullptr = never seen.
+  [[nodiscard]] const ServiceSeen* find(const std::string& service) const;
+
+ private:
+  static Key key_of(const msg::ServiceStatus& status) { return {status.host().c_str(), status.service().c_str()}; }
+  std::map<Key, ServiceSeen> services_;
+};
+
+}  // namespace railfix::monitor

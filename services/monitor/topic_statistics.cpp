@@ -1,0 +1,112 @@
+#include "monitor/topic_statistics.hpp"
+
+#include <algorithm>
+
+#include "core/time.hpp"
+
+namespace railfix::monitor {
+namespace {
+
+constexpr int64_t kSliceNs = core::kNsPerSecond / 4;
+constexpr int64_t kRateSlices = 20;  // five seconds
+constexpr int64_t kLatencyNs = 10 * core::kNsPerSecond;
+constexpr size_t kLatencies = 512;
+constexpr double kUsualShare = 0.1;  // of a new gap in the usual one
+constexpr double kGapFactor = 3;
+constexpr double kShortestGap_s = 0.02;
+
+double percentile(std::vector<float>& values, double share) {
+  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+  const auto nth = values.begin() + static_cast<int64_t>(share * static_cast<double>(values.size() - 1) + 0.5);
+  std::nth_element(values.begin(), nth, values.end());
+  return *nth;
+}
+
+}  // namespace
+
+TopicStatistics::Slice& TopicStatistics::slice(int64_t at_ns) {
+  const int64_t number = at_ns / kSliceNs;
+  Slice& found = slices_[static_cast<size_t>(number) % slices_.size()];
+  if (found.number != number) found = {number, 0, 0, 0};
+  return found;
+}
+
+void TopicStatistics::add(const SeenSample& sample) {
+  const auto [last, first_of_writer] = last_sequence_.try_emplace(sample.writer, sample.sequence);
+  if (!first_of_writer) {
+    if (sample.sequence > last->second + 1) lost_ += sample.sequence - last->second - 1;
+    last->second = std::max(last->second, sample.sequence);
+  }
+  if (samples_ == 0) {
+    first_ns_ = sample.received_ns;
+  } else {
+    note_gap(std::max<int64_t>(sample.received_ns - last_ns_, 0));
+  }
+  last_ns_ = std::max(last_ns_, sample.received_ns);
+  ++samples_;
+  bytes_ += sample.bytes;
+  Slice& now = slice(sample.received_ns);
+  ++now.samples;
+  now.bytes += sample.bytes;
+  if (sample.source_ns > 0) note_latency(sample);
+}
+
+void TopicStatistics::note_gap(int64_t gap_ns) {
+  const double gap_s = core::seconds(gap_ns);
+  if (samples_ >= kSamplesToKnow && gap_s > std::max(kGapFactor * usual_gap_s_, kShortestGap_s)) {
+    ++gaps_;
+  } else {
+    usual_gap_s_ = samples_ == 1 ? gap_s : usual_gap_s_ + kUsualShare * (gap_s - usual_gap_s_);
+  }
+  Slice& now = slice(last_ns_ + gap_ns);
+  now.longest_gap_ns = std::max(now.longest_gap_ns, gap_ns);
+}
+
+void TopicStatistics::note_latency(const SeenSample& sample) {
+  const double latency_s = core::seconds(sample.received_ns - sample.source_ns);
+  const auto bound = std::lower_bound(kLatencyBounds_s.begin(), kLatencyBounds_s.end(), latency_s);
+  ++latency_counts_[static_cast<size_t>(bound - kLatencyBounds_s.begin())];
+  latency_sum_s_ += latency_s;
+  if (latencies_.size() < kLatencies) latencies_.emplace_back();
+  latencies_[next_latency_ % kLatencies] = {sample.received_ns, static_cast<float>(latency_s * 1e3)};
+  ++next_latency_;
+}
+
+TopicNumbers TopicStatistics::numbers(int64_t now_ns) const {
+  TopicNumbers numbers;
+  numbers.samples = samples_;
+  numbers.bytes = bytes_;
+  numbers.lost = lost_;
+  numbers.gaps = gaps_;
+  if (samples_ == 0) return numbers;
+  const int64_t present_gap_ns = std::max<int64_t>(now_ns - last_ns_, 0);
+  numbers.age_s = core::seconds(present_gap_ns);
+  const int64_t now_slice = now_ns / kSliceNs;
+  int64_t longest_ns = samples_ > 1 ? present_gap_ns : 0;
+  uint64_t samples = 0;
+  uint64_t bytes = 0;
+  for (const Slice& one : slices_) {
+    const int64_t slices_ago = now_slice - one.number;
+    if (one.number < 0 || slices_ago < 0 || slices_ago >= static_cast<int64_t>(slices_.size())) continue;
+    longest_ns = std::max(longest_ns, one.longest_gap_ns);
+    if (slices_ago == 0 || slices_ago > kRateSlices) continue;  // the present one is not over yet
+    samples += one.samples;
+    bytes += one.bytes;
+  }
+  const int64_t since_first_ns = std::max<int64_t>(now_slice * kSliceNs - first_ns_, kSliceNs);
+  const double window_s = core::seconds(std::min(kRateSlices * kSliceNs, since_first_ns));
+  numbers.hz = static_cast<double>(samples) / window_s;
+  numbers.bytes_per_s = static_cast<double>(bytes) / window_s;
+  numbers.longest_gap_s = core::seconds(longest_ns);
+
+  std::vector<float> latencies_ms;
+  for (const Latency& latency : latencies_) {
+    if (now_ns - latency.received_ns <= kLatencyNs) latencies_ms.push_back(latency.ms);
+  }
+  numbers.latency_p50_ms = percentile(latencies_ms, 0.50);
+  numbers.latency_p95_ms = percentile(latencies_ms, 0.95);
+  numbers.latency_p99_ms = percentile(latencies_ms, 0.99);
+  return numbers;
+}
+
+}  // namespace railfix::monitor
