@@ -64,6 +64,8 @@ Messages::Messages(Reader& reader, Selection selection) : reader_(reader), selec
     const ChunkPlace& place = reader_.places_[i];
     if (selection_.from_ns && place.end_ns < *selection_.from_ns) continue;
     if (selection_.to_ns && place.start_ns >= *selection_.to_ns) continue;
+    const auto wanted_channel = [this](uint16_t id) { return channels_.contains(id); };
+    if (!place.channels.empty() && std::ranges::none_of(place.channels, wanted_channel)) continue;
     heap_.push_back({place.start_ns, i, kUnopened});
   }
   std::ranges::make_heap(heap_, std::greater<>());

@@ -70,7 +70,8 @@ bool Reader::read_summary_record(uint8_t opcode, ByteView content, std::vector<M
     case Opcode::chunk_index: {
       ChunkIndex index;
       if (!parse(content, index)) return false;
-      places_.push_back({index.start_ns, index.end_ns, index.offset, index.length, false});
+      places_.push_back({index.start_ns, index.end_ns, index.offset, index.length, false, {}});
+      for (const auto& [channel, offset] : index.message_index_offsets) places_.back().channels.push_back(channel);
       return true;
     }
     case Opcode::metadata_index: {
@@ -170,11 +171,11 @@ bool Reader::scan_record(uint8_t opcode, uint64_t offset, ByteView content) {
       Message message;
       if (!parse(content, message)) return false;
       statistics_.count(message.channel_id, message.log_time_ns);
-      places_.push_back({message.log_time_ns, message.log_time_ns, offset, length, true});
+      places_.push_back({message.log_time_ns, message.log_time_ns, offset, length, true, {message.channel_id}});
       return true;
     }
     case Opcode::chunk: {
-      ChunkPlace place{0, 0, offset, length, false};
+      ChunkPlace place{0, 0, offset, length, false, {}};
       const auto records = load(place);
       if (!records) return true;  // load() has said why
       Statistics inside;

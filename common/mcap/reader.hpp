@@ -26,6 +26,7 @@ struct ChunkPlace {
   uint64_t offset = 0;
   uint64_t length = 0;
   bool loose = false;  // the run of records itself
+  std::vector<uint16_t> channels;  // that have messages in it; empty = not known
 };
 
 class FileBytes {

@@ -1,222 +1,163 @@
+// `railfix replay`: a recording back onto the topics.
 #include <algorithm>
 #include <cmath>
 #include <csignal>
 #include <iostream>
-#include <map>
 #include <memory>
-#include <opencv2/imgcodecs.hpp>
-#include <thread>
+#include <nlohmann/json.hpp>
 
 #include "commands.hpp"
 #include "core/time.hpp"
-#include "mcap/reader.hpp"
-#include "messaging/topics.hpp"
+#include "key_reader.hpp"
 #include "progress.hpp"
+#include "replay/player.hpp"
 
 namespace railfix::tool {
 namespace {
 
-// Long enough to find readers before the first sample, and to get the last ones out.
-constexpr std::chrono::milliseconds kDiscovery{1500};
-constexpr std::chrono::milliseconds kLinger{300};
-constexpr int64_t kAssertNs = 50'000'000;
+constexpr double kKeySeekS = 5;
 
-// A recorded command must not start or stop a service of today, nor an old clock lead one.
-const std::set<std::string> kOnlyWhenNamed{"service_control", "service_reply", "data_clock", "data_progress"};
-
-struct Options {
-  std::filesystem::path file;
-  double rate = 1;
-  std::vector<std::string> topics;
-  std::string train = "demo";
-  int64_t domain = 0;
-  double from_s = 0;
-  double to_s = std::numeric_limits<double>::infinity();
+struct CommandLine {
+  ReplayOptions replay;
+  std::vector<std::string> remaps;
+  bool json = false;
 };
 
-volatile std::sig_atomic_t interrupted = 0;
+std::atomic<Player*> running = nullptr;
 
-/// Publishes the samples of one recorded channel.
-class Channel {
- public:
-  Channel(messaging::Participant& participant, const messaging::TopicInfo& topic, const std::string& name, bool as_jpeg)
-      : type_(*topic.type),
-        as_jpeg_(as_jpeg),
-        sample_(topic.type->make()),
-        writer_(participant, topic, instance(name)) {}
+void take_key(Player& player, const msg::PlayerStatus& now, const std::string& key) {
+  const double into_s = core::seconds(now.at_ns() - now.from_ns());
+  const double length_s = core::seconds(now.to_ns() - now.from_ns());
+  const auto seek = [&](double by_s) { player.post("seek", std::to_string(std::clamp(into_s + by_s, 0.0, length_s))); };
+  if (key == "q") player.stop();
+  if (key == " ") player.post(now.state() == msg::PLAYER_PLAYING ? "pause" : "play", "");
+  if (key == "." || key == "n") player.post("step", "");
+  if (key == "left") seek(-kKeySeekS);
+  if (key == "right") seek(kKeySeekS);
+  if (key == "up") player.post("rate", std::to_string(now.rate() * 2));
+  if (key == "down") player.post("rate", std::to_string(now.rate() / 2));
+  if (key == "l") player.post("loop", now.looped() != 0 ? "off" : "on");
+}
 
-  /// False: the bytes are not such a sample.
-  bool publish(const std::vector<uint8_t>& cdr) {
-    if (as_jpeg_) return publish_picture(cdr);
-    return type_.deserialize(cdr, sample_.get()) && writer_.write(sample_.get());
+std::string status_line(const msg::PlayerStatus& status) {
+  static constexpr std::array kStates{"playing", "paused", "ended"};
+  char text[160];
+  std::snprintf(text, sizeof text, "\r%-7s %8.1f of %.1f s  x%.2g%s  [space . left right up down l q]\x1b[K",
+                kStates.at(std::min<size_t>(status.state(), 2)), core::seconds(status.at_ns() - status.from_ns()),
+                core::seconds(status.to_ns() - status.from_ns()), status.rate(), status.looped() != 0 ? "  loop" : "");
+  return text;
+}
+
+/// Plays, with keys and a line of status on a terminal, with a progress bar elsewhere.
+ReplayReport play(Player& player) {
+  std::mutex mutex;
+  msg::PlayerStatus now;
+  KeyReader keys([&](const std::string& key) {
+    const std::lock_guard lock(mutex);
+    take_key(player, now, key);
+  });
+  std::optional<Progress> progress;
+  player.on_status([&](const msg::PlayerStatus& status) {
+    const std::lock_guard lock(mutex);
+    now = status;
+    if (keys.reads()) {
+      std::cerr << status_line(status) << std::flush;
+      return;
+    }
+    const double length_s = core::seconds(status.to_ns() - status.from_ns());
+    if (!progress) progress.emplace("replay (seconds)", static_cast<uint64_t>(std::max(1.0, std::ceil(length_s))));
+    progress->update(static_cast<uint64_t>(std::ceil(core::seconds(status.at_ns() - status.from_ns()))));
+  });
+  const auto report = player.run();
+  if (keys.reads()) std::cerr << '\n';
+  return report;
+}
+
+void print(const ReplayReport& report, const CommandLine& line) {
+  if (line.json) {
+    std::cout << nlohmann::ordered_json{{"samples", report.samples},         {"topics", report.topics},
+                                        {"late_p50_ms", report.late_p50_ms}, {"late_p99_ms", report.late_p99_ms},
+                                        {"late_max_ms", report.late_max_ms}, {"problems", report.problems}}
+                     .dump(2)
+              << '\n';
+    return;
   }
+  std::cout << report.samples << " samples of " << report.topics << " topics published for train " << line.replay.train
+            << ", domain " << line.replay.domain << '\n';
+  if (!line.replay.lock_step.empty()) return;
+  std::printf("later than due: p50 %.3f ms, p99 %.3f ms, at most %.1f ms\n", report.late_p50_ms, report.late_p99_ms,
+              report.late_max_ms);
+}
 
- private:
-  static std::string instance(const std::string& name) {
-    const size_t slash = name.find('/');
-    return slash == std::string::npos ? "" : name.substr(slash + 1);
+int replay(CommandLine line) {
+  for (const auto& remap : line.remaps) {
+    const size_t equals = remap.find('=');
+    if (equals == std::string::npos || equals == 0 || equals + 1 == remap.size()) {
+      throw core::BadInput("--remap " + remap + " must be RECORDED=NOW, such as camera_frame/cam0=camera_frame/cam1");
+    }
+    line.replay.remaps[remap.substr(0, equals)] = remap.substr(equals + 1);
   }
-
-  bool publish_picture(const std::vector<uint8_t>& cdr) {
-    msg::CameraPreview picture;
-    if (!messaging::deserialize(cdr, picture)) return false;
-    const cv::Mat pixels = picture.jpeg().empty() ? cv::Mat() : cv::imdecode(picture.jpeg(), cv::IMREAD_GRAYSCALE);
-    if (pixels.empty() || pixels.total() > msg::CAMERA_MAX_PIXELS) return false;
-    return writer_.write_in_place([&](void* sample) {
-      auto& frame = *static_cast<msg::CameraFrame*>(sample);
-      frame.stamp_ns(picture.stamp_ns());
-      frame.grabbed_ns(picture.grabbed_ns());
-      frame.seq(picture.seq());
-      frame.width_px(static_cast<uint32_t>(pixels.cols));
-      frame.height_px(static_cast<uint32_t>(pixels.rows));
-      frame.exposure_s(picture.exposure_s());
-      frame.health(picture.health());
-      std::copy(pixels.datastart, pixels.dataend, frame.data().begin());
+  if (!line.replay.lock_step.empty() && line.replay.rate != 1) {
+    throw core::BadInput("--rate and --lock-step exclude each other: in lock step the services set the rate");
+  }
+  Player player(line.replay);
+  running = &player;
+  for (const int signal : {SIGINT, SIGTERM}) {
+    std::signal(signal, [](int) {
+      if (Player* now = running) now->stop();
     });
   }
+  const auto report = play(player);
+  running = nullptr;
+  for (const auto& problem : report.problems) std::cerr << problem << '\n';
+  print(report, line);
+  return report.samples > 0 ? 0 : 1;
+}
 
-  const messaging::Type& type_;
-  bool as_jpeg_;
-  std::shared_ptr<void> sample_;
-  messaging::AnyWriter writer_;
-};
-
-class Replay {
- public:
-  explicit Replay(const Options& options)
-      : options_(options),
-        reader_(core::value_or_throw(mcap::Reader::open(options.file))),
-        participant_(participant_options(options)) {}
-
-  int run() {
-    make_channels();
-    refuse_running_train();
-    const auto& statistics = reader_->statistics();
-    mcap::Selection selection;
-    for (const auto& [name, channel] : channels_) selection.topics.insert(name);
-    selection.from_ns = statistics.start_ns + core::to_ns(options_.from_s);
-    const double length_s = core::seconds(statistics.end_ns - statistics.start_ns);
-    if (options_.from_s > length_s) {
-      throw core::BadInput("--from " + std::to_string(options_.from_s) + " is behind the end of " +
-                           options_.file.string() + ", which is " + std::to_string(length_s) + " s long");
-    }
-    if (options_.to_s < length_s) selection.to_ns = statistics.start_ns + core::to_ns(options_.to_s);
-    const double played_s = std::min(options_.to_s, length_s) - options_.from_s;
-    Progress progress("replay (seconds)", static_cast<uint64_t>(std::max(1.0, std::ceil(played_s))));
-    play(selection, progress);
-    progress.finish();
-    std::this_thread::sleep_for(kLinger);
-    for (const auto& problem : reader_->problems()) std::cerr << problem << '\n';
-    for (const auto& [name, count] : broken_) {
-      std::cerr << name << ": " << count << " samples are not of this version's type and were left out\n";
-    }
-    std::cout << published_ << " samples of " << channels_.size() << " topics published for train " << options_.train
-              << ", domain " << options_.domain << '\n';
-    return published_ > 0 ? 0 : 1;
-  }
-
- private:
-  static messaging::ParticipantOptions participant_options(const Options& options) {
-    messaging::ParticipantOptions made;
-    made.train_id = options.train;
-    made.domain = options.domain;
-    made.service = "railfix-replay";
-    return made;
-  }
-
-  [[nodiscard]] bool wanted(const std::string& topic) const {
-    if (options_.topics.empty()) return !kOnlyWhenNamed.contains(topic);
-    const std::string base = topic.substr(0, topic.find('/'));
-    return std::ranges::any_of(options_.topics, [&](const std::string& name) { return name == topic || name == base; });
-  }
-
-  void make_channels() {
-    std::string recorded;
-    for (const auto& [id, channel] : reader_->channels()) {
-      recorded += (recorded.empty() ? "" : ", ") + channel.topic;
-      const auto* topic = messaging::find_topic(channel.topic);
-      if (!wanted(channel.topic) || channels_.contains(channel.topic)) continue;
-      const auto schema = reader_->schemas().find(channel.schema_id);
-      const std::string type = schema == reader_->schemas().end() ? "" : schema->second.name;
-      const bool as_jpeg = topic != nullptr && topic->name == std::string("camera_frame") &&
-                           type == messaging::type_of<msg::CameraPreview>().name();
-      if (topic == nullptr || channel.message_encoding != "cdr" || (!as_jpeg && type != topic->type->name())) {
-        std::cerr << channel.topic << " is not a topic of this version (" << type << ") and is left out\n";
-        continue;
-      }
-      channels_.emplace(channel.topic, std::make_unique<Channel>(participant_, *topic, channel.topic, as_jpeg));
-    }
-    if (!channels_.empty()) return;
-    throw core::BadInput(options_.file.string() + " has none of the wanted topics; it has " +
-                         (recorded.empty() ? "none" : recorded));
-  }
-
-  /// Two writers of one topic would give the train two positions.
-  void refuse_running_train() {
-    std::this_thread::sleep_for(kDiscovery);
-    for (const auto& name : participant_.written_topics()) {
-      if (!channels_.contains(name)) continue;
-      throw core::BadInput("train " + options_.train + " on domain " + std::to_string(options_.domain) +
-                           " is running: " + name +
-                           " has a writer already; replay as another train (--train) or other topics (--topics)");
-    }
-  }
-
-  void wait_until(int64_t due_ns) {
-    while (interrupted == 0) {
-      participant_.assert_liveliness();
-      const int64_t left_ns = due_ns - core::monotonic_ns();
-      if (left_ns <= 0) return;
-      std::this_thread::sleep_for(std::chrono::nanoseconds(std::min(left_ns, kAssertNs)));
-    }
-  }
-
-  void play(const mcap::Selection& selection, Progress& progress) {
-    std::signal(SIGINT, [](int) { interrupted = 1; });
-    const int64_t begun_ns = core::monotonic_ns();
-    reader_->for_each(selection, [&](const mcap::Channel& channel, const mcap::Message& message) {
-      const int64_t into_ns = message.log_time_ns - *selection.from_ns;
-      wait_until(begun_ns + static_cast<int64_t>(static_cast<double>(into_ns) / options_.rate));
-      if (interrupted != 0) return false;
-      if (channels_.at(channel.topic)->publish({message.data.begin(), message.data.end()})) {
-        ++published_;
-      } else {
-        ++broken_[channel.topic];
-      }
-      progress.update(static_cast<uint64_t>(std::max(0.0, core::seconds(into_ns))));
-      return true;
-    });
-  }
-
-  Options options_;
-  std::unique_ptr<mcap::Reader> reader_;
-  messaging::Participant participant_;
-  std::map<std::string, std::unique_ptr<Channel>> channels_;
-  std::map<std::string, uint64_t> broken_;
-  uint64_t published_ = 0;
-};
+void add_options(CLI::App& command, CommandLine& line) {
+  ReplayOptions& options = line.replay;
+  command.add_option("FILE", options.file, "Recording (.mcap, also one that was cut off)")->required();
+  command.add_option("--rate", options.rate, "Times faster than recorded")
+      ->capture_default_str()
+      ->check(CLI::Range(0.01, 1000.0));
+  command
+      .add_option("--topics", options.topics,
+                  "Only these, separated by commas; without it all but commands and the data clock")
+      ->delimiter(',');
+  command.add_option("--without", options.without, "Not these, separated by commas")->delimiter(',');
+  command.add_option("--remap", line.remaps, "RECORDED=NOW: publish a topic under another name; may be repeated");
+  command.add_option("--train", options.train, "Train to publish as")->capture_default_str();
+  command.add_option("--domain", options.domain, "DDS domain")->capture_default_str()->check(CLI::Range(0, 232));
+  command.add_option("--from", options.from_s, "Begin this many seconds into the recording")
+      ->check(CLI::NonNegativeNumber);
+  command.add_option("--to", options.to_s, "End this many seconds into the recording")->check(CLI::NonNegativeNumber);
+  command.add_flag("--loop", options.loop, "Begin again at the end");
+  command.add_flag("--paused", options.paused, "Wait for `play` or `step`");
+  command.add_flag("--controlled", options.controlled, "Wait for commands at the end too; Ctrl-C ends");
+  command
+      .add_option("--lock-step", options.lock_step,
+                  "Services that run with common.lock_step, separated by commas: each picture waits for them, and what "
+                  "they write is not replayed")
+      ->delimiter(',');
+  command.add_flag("--json", line.json, "What was done, as JSON on standard output");
+}
 
 }  // namespace
 
 void add_replay(CLI::App& app, Action& chosen) {
-  auto options = std::make_shared<Options>();
-  auto* command = app.add_subcommand("replay",
-                                     "Publish a recording again with its own timing.  Example: railfix replay run.mcap "
-                                     "--topics track_view --train test");
-  command->add_option("FILE", options->file, "Recording (.mcap, also one that was cut off)")->required();
-  command->add_option("--rate", options->rate, "Times faster than recorded")
-      ->capture_default_str()
-      ->check(CLI::Range(0.01, 1000.0));
-  command
-      ->add_option("--topics", options->topics,
-                   "Only these, separated by commas; without it all but commands and the data clock")
-      ->delimiter(',');
-  command->add_option("--train", options->train, "Train to publish as")->capture_default_str();
-  command->add_option("--domain", options->domain, "DDS domain")->capture_default_str()->check(CLI::Range(0, 232));
-  command->add_option("--from", options->from_s, "Begin this many seconds into the recording")
-      ->check(CLI::NonNegativeNumber);
-  command->add_option("--to", options->to_s, "End this many seconds into the recording")->check(CLI::NonNegativeNumber);
-  command->callback([&chosen, options] { chosen = [options] { return Replay(*options).run(); }; });
+  auto line = std::make_shared<CommandLine>();
+  auto* command = app.add_subcommand("replay", "Publish a recording again with its own timing");
+  command->footer(
+      "Examples:\n"
+      "  railfix replay run.mcap --topics track_view --train test\n"
+      "  railfix replay run.mcap --lock-step map_matcher,fusion --train test   through services of now, the same every "
+      "time\n"
+      "Keys on a terminal: space pauses, `.` plays one picture, left and right seek, up and down change the rate, l "
+      "loops, q ends.\n"
+      "Over DDS: service_control for `player`: play, pause, step, seek SECONDS, rate X, loop on|off, stop; "
+      "player_status tells.");
+  add_options(*command, *line);
+  command->callback([&chosen, line] { chosen = [line] { return replay(*line); }; });
 }
 
 }  // namespace railfix::tool

@@ -97,7 +97,7 @@ TEST_F(RecordingTest, WhatIsReplayedIsRecordedAgain) {
   wait_for_recorder();
   test::Program hz({"railfix", "topics", "hz", "odometry_step", "--json", "--count", std::to_string(kSteps / 2),
                     "--for", "60", "--train", train_, "--domain", kDomain},
-                   {folder_ / "hz.json", {}, {}});
+                   {folder_ / "hz.json", folder_ / "hz.err", {}});
   const auto replayed = railfix({"replay", source().string()});
   EXPECT_EQ(replayed.exit_code, 0) << replayed.err;
   EXPECT_THAT(replayed.out, HasSubstr(std::to_string(kSteps + kPictures) + " samples of 2 topics"));

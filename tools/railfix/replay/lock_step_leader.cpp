@@ -1,0 +1,81 @@
+#include "replay/lock_step_leader.hpp"
+
+#include <algorithm>
+
+#include "core/time.hpp"
+#include "messaging/lock_step.hpp"
+#include "service/service.hpp"
+
+namespace railfix::tool {
+
+namespace {
+
+std::vector<std::string> in_order(const std::vector<std::string>& services) {
+  std::vector<std::string> ordered;
+  std::string names;
+  for (const auto& name : service::service_names()) {
+    names += (names.empty() ? "" : ", ") + name;
+    if (std::ranges::find(services, name) != services.end()) ordered.push_back(name);
+  }
+  for (const auto& name : services) {
+    if (std::ranges::find(ordered, name) == ordered.end()) {
+      throw core::BadInput("--lock-step " + name + " is no service; there are: " + names);
+    }
+  }
+  return ordered;
+}
+
+}  // namespace
+
+LockStepLeader::LockStepLeader(messaging::Participant& participant, messaging::Queue& queue,
+                               const std::vector<std::string>& services)
+    : participant_(participant),
+      lock_step_(in_order(services)),
+      clock_(participant, messaging::topics::data_clock),
+      progress_(participant, messaging::topics::data_progress, "", queue,
+                [this](const msg::DataProgress& progress) { answered(progress); }) {}
+
+void LockStepLeader::begin(int64_t data_ns) {
+  data_ns_ = data_ns;
+  note_sent(messaging::sent_samples(participant_));
+  lock_step_.begin();
+  give_turn();
+}
+
+void LockStepLeader::give_turn() {
+  if (!lock_step_.done()) publish(false);
+}
+
+void LockStepLeader::answered(const msg::DataProgress& progress) {
+  if (!lock_step_.answered(progress.service().c_str(), progress.seq())) return;
+  note_sent(progress.sent());
+  give_turn();
+}
+
+void LockStepLeader::note_sent(const std::vector<msg::SentSamples>& sent) {
+  for (const auto& topic : sent) sent_[topic.topic().c_str()] = topic.samples();
+}
+
+void LockStepLeader::publish(bool ended) {
+  msg::DataClock clock;
+  clock.data_ns(data_ns_);
+  clock.wall_ns(core::wall_ns());
+  clock.seq(lock_step_.step());
+  clock.lock_step(1);
+  clock.ended(ended ? 1 : 0);
+  if (!ended) {
+    clock.turn(lock_step_.turn());
+    for (const auto& [topic, samples] : sent_) {
+      clock.sent().emplace_back();
+      clock.sent().back().topic(topic);
+      clock.sent().back().samples(samples);
+    }
+  }
+  clock_.write(clock);
+}
+
+void LockStepLeader::end() {
+  publish(true);
+}
+
+}  // namespace railfix::tool
