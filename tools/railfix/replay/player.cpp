@@ -17,7 +17,7 @@ namespace topics = messaging::topics;
 
 constexpr int64_t kDiscoveryNs = 1'500'000'000;
 constexpr int64_t kLookNs = 100'000'000;
-constexpr int kSteadyLooks = 5;
+constexpr int kSteadyLooks = 10;  // a recorder looks for new cameras four times a second
 constexpr int64_t kConnectNs = 15 * core::kNsPerSecond;
 constexpr int64_t kServicesNs = 60 * core::kNsPerSecond;  // for services to start, and for a turn
 constexpr std::chrono::milliseconds kLinger{300};         // for the last samples to get out
