@@ -295,9 +295,17 @@ const Types& own_types() {
   return types;
 }
 
-std::string_view own_idl(const std::string& name) {
-  for (const auto& file : idl::kEmbeddedIdl) {
-    if (file.name == name) return file.text;
+std::string_view own_idl_of(const std::string& type_name) {
+  static const auto files = [] {
+    std::vector<std::pair<Types, std::string_view>> made;
+    for (const auto& file : idl::kEmbeddedIdl) {
+      made.emplace_back(Types(), file.text);
+      core::ok_or_throw(made.back().first.add(file.text));
+    }
+    return made;
+  }();
+  for (const auto& [types, text] : files) {
+    if (types.find(type_name) != nullptr) return text;
   }
   return {};
 }

@@ -82,7 +82,8 @@ class Types {
 
 /// The types of all our own topics.
 const Types& own_types();
-/// The IDL text of a file in idl/ ("track"); empty when there is none. Self-contained, as MCAP's "omgidl" wants it.
-std::string_view own_idl(const std::string& name);
+/// The text of the file in idl/ that defines this type ("railfix::msg::TrackView"); empty when none does.
+/// Self-contained, as MCAP's "omgidl" wants it.
+std::string_view own_idl_of(const std::string& type_name);
 
 }  // namespace railfix::cdr

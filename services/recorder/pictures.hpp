@@ -1,4 +1,4 @@
-// Pictures as JPEG and back.
+// Pictures as JPEG or PGM and back.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,9 @@ namespace railfix::recorder {
 /// 8-bit grey pixels, rows without gaps. Error: the size is not possible.
 core::Result<std::vector<uint8_t>> encode_jpeg(const uint8_t* pixels, uint32_t width_px, uint32_t height_px,
                                                int quality);
-/// Grey; error: not a picture.
-core::Result<cv::Mat> decode_jpeg(const std::vector<uint8_t>& jpeg);
+/// Every pixel as it is, behind a header of at most 20 bytes.
+core::Result<std::vector<uint8_t>> encode_pgm(const uint8_t* pixels, uint32_t width_px, uint32_t height_px);
+/// JPEG or PGM, grey; error: not a picture.
+core::Result<cv::Mat> decode_picture(const std::vector<uint8_t>& bytes);
 
 }  // namespace railfix::recorder

@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "core/time.hpp"
+#include "recorder/recorder_status.hpp"
 
 namespace railfix::recorder {
 
@@ -18,6 +19,7 @@ constexpr int64_t kLossShownNs = 10 * core::kNsPerSecond;
 RecorderService::RecorderService(const Config& config, service::Context& context)
     : config_(config),
       context_(context),
+      status_(context.writer(messaging::topics::recorder_status)),
       thread_(config, context.participant(), about(), [this, &context](int64_t stamp_ns) {
         if (context.common().lock_step) {
           context.post([this, stamp_ns] { recorded_ns_ = std::max(recorded_ns_, stamp_ns); });
@@ -27,14 +29,35 @@ RecorderService::RecorderService(const Config& config, service::Context& context
   if (config_.file.empty()) {
     for (const auto& sentence : recover_folder(config_.folder)) context_.log().warn("{}", sentence);
   }
-  context_.on_command("start", [this](const std::string& file) { return start(file); });
-  context_.on_command("stop", [this](const std::string&) { return stop(); });
+  add_commands();
   context_.every(kStatePeriod, [this] { show_state(); });
   context_.at_stop([this] {
     if (thread_.state().recording) (void)stop();
     show_state();
   });
   if (config_.autostart) core::value_or_throw(start(""));
+}
+
+void RecorderService::add_commands() {
+  context_.on_command("start", [this](const std::string& file) { return start(file); });
+  context_.on_command("stop", [this](const std::string&) { return stop(); });
+  context_.on_command("pause", [this](const std::string&) { return logged(thread_.pause()); });
+  context_.on_command("resume", [this](const std::string&) { return logged(thread_.resume()); });
+  context_.on_command("event", [this](const std::string& text) {
+    context_.log().info("event by hand: {}", text);
+    return logged(thread_.event(text));
+  });
+  context_.on_command("protect", [this](const std::string& file) {
+    return logged(thread_.housekeeper().protect(file, "protected by hand"));
+  });
+  context_.on_command("unprotect",
+                      [this](const std::string& file) { return logged(thread_.housekeeper().unprotect(file)); });
+}
+
+core::Result<std::string> RecorderService::logged(core::Result<std::string> done) {
+  if (done.ok()) context_.log().info("{}", done.value());
+  show_state();
+  return done;
 }
 
 std::map<std::string, std::string> RecorderService::about() const {
@@ -49,11 +72,6 @@ std::map<std::string, std::string> RecorderService::about() const {
 }
 
 core::Result<std::string> RecorderService::start(const std::string& file) {
-  if (file.empty() && config_.file.empty() && config_.quota_mb > 0) {
-    for (const auto& sentence : keep_quota(config_.folder, static_cast<uint64_t>(config_.quota_mb * 1e6))) {
-      context_.log().info("{}", sentence);
-    }
-  }
   auto started = thread_.start(file);
   if (started.ok()) {
     lost_ = 0;
@@ -73,7 +91,7 @@ core::Result<std::string> RecorderService::stop() {
 }
 
 void RecorderService::show_state() {
-  const RecorderState now = thread_.state();
+  const RecorderState now = thread_.take_state();
   for (; received_ < now.received; ++received_) context_.health().input();
   for (; written_ < now.written; ++written_) context_.health().output(0);
   if (now.lost > lost_) {
@@ -81,8 +99,17 @@ void RecorderService::show_state() {
     lost_last_ns_ = core::monotonic_ns();
   }
   lost_ = now.lost;
+  for (const auto& news : now.news) {
+    context_.log().log(news.bad ? spdlog::level::err : spdlog::level::info, "{}", news.sentence);
+  }
+  for (const auto& sentence : thread_.housekeeper().take_sentences()) context_.log().info("{}", sentence);
   if (now.problem != problem_ && !now.problem.empty()) context_.log().error("{}", now.problem);
   problem_ = now.problem;
+  show_health(now);
+  publish(now);
+}
+
+void RecorderService::show_health(const RecorderState& now) {
   const bool loses = lost_last_ns_ != 0 && core::monotonic_ns() - lost_last_ns_ < kLossShownNs;
   if (!now.problem.empty()) {
     context_.health().degraded(now.problem);
@@ -93,6 +120,15 @@ void RecorderService::show_state() {
   } else {
     context_.health().ready();
   }
+}
+
+void RecorderService::publish(const RecorderState& state) {
+  const auto now = status_of(state, thread_.housekeeper().survey(), config_.file.empty() ? config_.quota_mb : 0);
+  const int64_t now_ns = core::monotonic_ns();
+  if (!changed(published_, now) && now_ns - published_ns_ < core::kNsPerSecond) return;
+  published_ = now;
+  published_ns_ = now_ns;
+  status_.write(now);
 }
 
 }  // namespace railfix::recorder

@@ -1,4 +1,4 @@
-// The recorder as a service: commands start and stop, status and log around the recorder's threads.
+// The recorder as a service: commands, status and log around the recorder's threads.
 #pragma once
 
 #include "recorder/recorder_config.hpp"
@@ -14,12 +14,17 @@ class RecorderService {
 
  private:
   [[nodiscard]] std::map<std::string, std::string> about() const;
+  void add_commands();
+  core::Result<std::string> logged(core::Result<std::string> done);
   core::Result<std::string> start(const std::string& file);
   core::Result<std::string> stop();
   void show_state();
+  void show_health(const RecorderState& now);
+  void publish(const RecorderState& now);
 
   Config config_;
   service::Context& context_;
+  messaging::Writer<msg::RecorderStatus> status_;
   int64_t recorded_ns_ = INT64_MIN;  // pictures up to here are in the file (lock step)
   RecorderThread thread_;
   uint64_t received_ = 0;
@@ -27,6 +32,8 @@ class RecorderService {
   uint64_t lost_ = 0;
   int64_t lost_last_ns_ = 0;
   std::string problem_;
+  msg::RecorderStatus published_;
+  int64_t published_ns_ = 0;
 };
 
 }  // namespace railfix::recorder

@@ -1,10 +1,9 @@
 #include "recorder/recorder_thread.hpp"
 
-#include <algorithm>
+#include <fstream>
+#include <iterator>
 
-#include "cdr/decode.hpp"
 #include "core/time.hpp"
-#include "recorder/pictures.hpp"
 
 namespace railfix::recorder {
 
@@ -13,7 +12,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int64_t kTickNs = core::kNsPerSecond / 4;
-constexpr size_t kEncodedWaiting = 256;
 constexpr double kBytesPerMb = 1e6;
 
 mcap::Compression compression_of(const std::string& name) {
@@ -21,29 +19,42 @@ mcap::Compression compression_of(const std::string& name) {
   return name == "lz4" ? mcap::Compression::lz4 : mcap::Compression::zstd;
 }
 
-/// These have one topic for each camera.
-bool per_camera(const std::string& topic) {
-  return topic == "camera_frame" || topic == "camera_preview";
+std::string type_of_topic(const std::string& name) {
+  const auto* topic = messaging::find_topic(name);
+  return topic == nullptr ? "" : topic->type->name();
 }
 
 }  // namespace
 
 RecorderThread::RecorderThread(const RecorderConfig& config, messaging::Participant& participant,
                                std::map<std::string, std::string> about, std::function<void(int64_t)> on_picture)
-    : config_(config), participant_(participant), about_(std::move(about)), on_picture_(std::move(on_picture)) {
+    : config_(config), about_(std::move(about)), on_picture_(std::move(on_picture)) {
+  for (const auto& rule : config_.events) {
+    rules_.push_back(core::value_or_throw(EventRule::parse(rule, type_of_topic)));
+  }
+  // With `file` the folder belongs to somebody else.
+  const double quota_mb = config_.file.empty() ? config_.quota_mb : 0;
+  housekeeper_ = std::make_unique<Housekeeper>(folder(), static_cast<uint64_t>(quota_mb * kBytesPerMb));
+  inlet_ = std::make_unique<TopicInlet>(config_, participant, about_.at("train_id"), queue_,
+                                        [this](const Arrival& arrival) { use(arrival); });
+  if (config_.ring_s > 0) ring_.emplace(config_.ring_s, static_cast<uint64_t>(config_.ring_mb * kBytesPerMb));
   writer_thread_ = std::thread([this] { turn(); });
-  encoder_thread_ = std::thread([this] {
-    while (!ending_) encode_queue_.run_one(core::monotonic_ns() + kTickNs);
+  if (!ring_) return;
+  (void)in_thread([this]() -> core::Result<std::string> {
+    inlet_->open();
+    return std::string();
   });
 }
 
 RecorderThread::~RecorderThread() {
-  (void)stop();
-  ending_ = true;
-  queue_.push(nullptr, [] {});
-  encode_queue_.push(nullptr, [] {});
+  (void)in_thread([this]() -> core::Result<std::string> {
+    if (recording_) (void)end();
+    inlet_->close();
+    tend_event_files(true);
+    ending_ = true;
+    return std::string();
+  });
   writer_thread_.join();
-  encoder_thread_.join();
 }
 
 core::Result<std::string> RecorderThread::in_thread(const std::function<core::Result<std::string>()>& work) {
@@ -65,9 +76,30 @@ core::Result<std::string> RecorderThread::stop() {
   return in_thread([this] { return end(); });
 }
 
+core::Result<std::string> RecorderThread::pause() {
+  return in_thread([this] { return set_paused(true); });
+}
+
+core::Result<std::string> RecorderThread::resume() {
+  return in_thread([this] { return set_paused(false); });
+}
+
 RecorderState RecorderThread::state() const {
   const std::lock_guard lock(state_mutex_);
   return state_;
+}
+
+RecorderState RecorderThread::take_state() {
+  const std::lock_guard lock(state_mutex_);
+  RecorderState taken = state_;
+  state_.news.clear();
+  return taken;
+}
+
+fs::path RecorderThread::folder() const {
+  if (config_.file.empty()) return config_.folder;
+  const fs::path file(config_.file);
+  return file.has_parent_path() ? file.parent_path() : fs::path(".");
 }
 
 core::Result<std::string> RecorderThread::begin(const fs::path& file) {
@@ -75,29 +107,35 @@ core::Result<std::string> RecorderThread::begin(const fs::path& file) {
   const fs::path name = !file.empty()           ? file
                         : !config_.file.empty() ? fs::path(config_.file)
                                                 : new_name(config_.folder, about_.at("train_id"), core::wall_ns());
-  standing_.clear();
+  count_dropped();  // not of this file
   const auto created = create(name);
   if (!created.ok()) return created.error();
-  for (const auto& topic : messaging::all_topics()) {
-    if (!per_camera(topic.name)) {
-      listen(topic, "");
-      continue;
-    }
-    for (const auto& camera : config_.cameras) listen(topic, camera);
+  inlet_->want_recorded(true);
+  if (inlet_->is_open()) {
+    write_standing();
+  } else {
+    standing_.clear();
+    dropped_.clear();
+    inlet_->open();
   }
-  find_cameras();
   return name.string();
 }
 
-core::Status RecorderThread::create(const fs::path& file) {
+mcap::WriterOptions RecorderThread::writer_options() const {
   mcap::WriterOptions options;
   options.chunk_bytes = static_cast<uint64_t>(config_.chunk_mb * kBytesPerMb);
   options.chunk_age_s = config_.chunk_age_s;
   options.sync_period_s = config_.sync_period_s;
   options.compression = compression_of(config_.compression);
-  options.overwrite = !config_.file.empty() && file == config_.file;
   options.library = "railfix recorder " + about_.at("version");
-  about_["started_ns"] = std::to_string(core::wall_ns());
+  return options;
+}
+
+core::Status RecorderThread::create(const fs::path& file) {
+  mcap::WriterOptions options = writer_options();
+  options.overwrite = !config_.file.empty() && file == config_.file;
+  recording_started_ns_ = core::wall_ns();
+  about_["started_ns"] = std::to_string(recording_started_ns_);
   auto recording = Recording::create(file, options, about_);
   if (!recording.ok()) {
     problem_ = recording.error().message;
@@ -105,8 +143,15 @@ core::Status RecorderThread::create(const fs::path& file) {
   }
   recording_ = std::move(recording).value();
   recording_begun_ns_ = core::monotonic_ns();
+  rated_ns_ = recording_begun_ns_;
+  rated_bytes_ = 0;
+  paused_ = false;
   problem_.clear();
-  return {};
+  std::ifstream configuration(config_.train_file);
+  if (config_.train_file.empty() || !configuration) return {};
+  return recording_->write_metadata(
+      {"railfix_configuration",
+       {{"file", config_.train_file}, {"text", {std::istreambuf_iterator<char>(configuration), {}}}}});
 }
 
 void RecorderThread::split_if_due() {
@@ -115,75 +160,73 @@ void RecorderThread::split_if_due() {
   const double age_s = core::seconds(core::monotonic_ns() - recording_begun_ns_);
   if (!large && (config_.split_min <= 0 || age_s < config_.split_min * 60)) return;
   count_dropped();
-  const auto closed = recording_->close();
-  recording_.reset();
+  (void)wait_for_closing();
+  const bool paused = paused_;
+  // Forcing the rest of a file to the disk takes long enough for samples to pile up.
+  closing_ = std::async(std::launch::async,
+                        [old = std::shared_ptr<Recording>(std::move(recording_))] { return old->close(); });
   if (!create(new_name(config_.folder, about_.at("train_id"), core::wall_ns())).ok()) return;
-  if (!closed.ok()) problem_ = closed.error().message;
-  for (auto& [name, listening] : listening_) {
-    listening.dropped_before = listening.reader->dropped();
-    listening.encoded_dropped_before = queue_.dropped(listening.encoded);
-  }
-  for (const auto& [key, standing] : standing_) {
-    const auto sequence = static_cast<uint32_t>(standing.info.sequence);
-    const auto status =
-        recording_->write(standing.channel, {0, sequence, core::wall_ns(), standing.info.source_ns, standing.cdr});
+  paused_ = paused;
+  write_standing();
+}
+
+core::Status RecorderThread::wait_for_closing() {
+  if (!closing_.valid()) return {};
+  auto status = closing_.get();
+  if (!status.ok()) say(status.error().message, true);
+  return status;
+}
+
+void RecorderThread::write_standing() {
+  for (const auto& [key, sample] : standing_) {
+    const auto status = recording_->write(*sample, core::wall_ns());
     if (!status.ok()) problem_ = status.error().message;
   }
 }
 
-void RecorderThread::keep_standing(const ChannelOf& channel, const messaging::SampleInfo& info,
-                                   const std::vector<uint8_t>& cdr) {
-  if (channel.metadata.at("transient_local") != "true") return;
-  std::string key = channel.topic;
-  if (const auto* type = cdr::own_types().find(channel.type)) {
-    const auto sample = cdr::decode(cdr::own_types(), channel.type, cdr);
-    for (const auto& member : type->members) {
-      if (member.key && sample.ok()) key += "\n" + sample.value()[member.name].dump();
-    }
-  }
-  standing_[key] = {channel, info, cdr};
-}
-
 core::Result<std::string> RecorderThread::end() {
   if (!recording_) return core::Error{"nothing is being recorded"};
-  stop_listening();
+  // What waits for the encoder and then for the disk still belongs to the recording.
+  if (ring_) {
+    inlet_->drain();
+  } else {
+    inlet_->close();
+  }
+  count_dropped();
+  inlet_->want_recorded(false);
   const std::string summary = recording_->file().string() + ": " + std::to_string(recording_->samples()) + " samples";
   const std::string losses = recording_->loss_text();
+  const auto before = wait_for_closing();
   const auto status = recording_->close();
   recording_.reset();
-  if (!status.ok()) {
-    problem_ = status.error().message;
-    return status.error();
+  paused_ = false;
+  for (const auto& one : {before, status}) {
+    if (one.ok()) continue;
+    problem_ = one.error().message;
+    return one.error();
   }
   return summary + (losses.empty() ? "" : ", lost " + losses);
 }
 
-// What waits for the encoder and then for the disk still belongs to the recording.
-void RecorderThread::stop_listening() {
-  // Pictures' readers go away in the encoder's thread, where none of their handlers can be running.
-  std::promise<void> encoded;
-  encode_queue_.push(nullptr, [&] {
-    count_dropped();
-    for (auto& [name, listening] : listening_) {
-      if (listening.cause == Loss::encoder) listening.reader.reset();
-    }
-    encoded.set_value();
-  });
-  encoded.get_future().wait();
-  while (queue_.run_one(0)) {
-  }
+core::Result<std::string> RecorderThread::set_paused(bool paused) {
+  if (!recording_) return core::Error{"nothing is being recorded"};
+  const std::string file = recording_->file().string();
+  if (paused == paused_) return core::Error{file + (paused ? " is paused already" : " is not paused")};
+  inlet_->drain();
   count_dropped();
-  listening_.clear();
+  paused_ = paused;
+  inlet_->want_recorded(!paused);
+  if (paused) return file + " is paused";
+  recording_->forget_sequences();
+  write_standing();
+  return file + " goes on";
 }
 
 void RecorderThread::count_dropped() {
-  if (!recording_) return;
-  for (auto& [name, listening] : listening_) {
-    if (listening.reader) {
-      recording_->set_dropped(name, listening.cause, listening.reader->dropped() - listening.dropped_before);
-    }
-    const uint64_t encoded = queue_.dropped(listening.encoded) - listening.encoded_dropped_before;
-    if (encoded > 0) recording_->set_dropped(name, Loss::queue, encoded);
+  for (const auto& [topic, cause, total] : inlet_->dropped()) {
+    uint64_t& seen = dropped_[{topic, cause}];
+    if (recording_ && !paused_) recording_->add_dropped(topic, cause, total - seen);
+    seen = total;
   }
 }
 
@@ -196,142 +239,96 @@ void RecorderThread::turn() {
 
 void RecorderThread::tick() {
   ticked_ns_ = core::monotonic_ns();
+  if (inlet_->is_open()) inlet_->find_cameras();
+  count_dropped();
   if (recording_) {
-    find_cameras();
-    count_dropped();
     const auto status = recording_->tick(ticked_ns_);
     if (!status.ok()) problem_ = status.error().message;
     split_if_due();
-    if (recording_) guard_disk();
   }
+  if (disk_is_full()) guard_disk();
+  tend_event_files(false);
   publish_state();
 }
 
-void RecorderThread::guard_disk() {
+bool RecorderThread::disk_is_full() const {
   std::error_code failed;
-  const auto file = recording_->file();
+  const fs::path file = recording_ ? recording_->file() : folder() / "";
   const auto space = fs::space(file.has_parent_path() ? file.parent_path() : fs::path("."), failed);
-  if (failed || static_cast<double>(space.available) >= config_.keep_free_mb * kBytesPerMb) return;
-  stop_listening();
-  (void)recording_->close();
-  recording_.reset();
-  problem_ = "recording stopped: the disk of " + file.string() + " has less than " +
+  return !failed && static_cast<double>(space.available) < config_.keep_free_mb * kBytesPerMb;
+}
+
+void RecorderThread::guard_disk() {
+  event_ends_ns_ = 0;
+  if (!recording_) return;
+  const std::string file = recording_->file().string();
+  (void)end();
+  problem_ = "recording stopped: the disk of " + file + " has less than " +
              std::to_string(static_cast<int64_t>(config_.keep_free_mb)) + " MB free";
 }
 
-void RecorderThread::publish_state() {
-  RecorderState now;
-  now.recording = recording_ != nullptr;
-  now.received = received_;
-  now.written = written_;
-  now.problem = problem_;
-  if (recording_) {
-    now.file = recording_->file().string();
-    now.lost = recording_->lost_samples();
-    now.losses = recording_->loss_text();
+void RecorderThread::use(const Arrival& arrival) {
+  if (recording_ && !paused_) record(arrival);
+  const SamplePtr& sample = arrival.recorded ? arrival.recorded : arrival.ringed;
+  if (sample && !sample->standing.empty()) standing_[sample->standing] = sample;
+  if (ring_ && arrival.ringed) {
+    ring_->add(arrival.ringed, core::monotonic_ns());
+    if (event_file_) event_file_->add(arrival.ringed);
   }
-  const std::lock_guard lock(state_mutex_);
-  state_ = std::move(now);
+  if (sample) look_for_events(*sample);
+  if (arrival.picture_stamp_ns) on_picture_(*arrival.picture_stamp_ns);
 }
 
-bool RecorderThread::left_out(const std::string& topic) const {
-  const std::string base = topic.substr(0, topic.find('/'));
-  const auto is = [&](const std::string& name) { return name == topic || name == base; };
-  return std::ranges::any_of(config_.leave_out, is) || (base == "camera_frame" && config_.pictures == "none");
-}
-
-void RecorderThread::find_cameras() {
-  for (const auto& name : participant_.written_topics()) {
-    const size_t slash = name.find('/');
-    const auto* topic = messaging::find_topic(name);
-    if (topic != nullptr && slash != std::string::npos) listen(*topic, name.substr(slash + 1));
-  }
-}
-
-ChannelOf RecorderThread::channel_of(const messaging::TopicInfo& topic, const std::string& name) const {
-  const auto yes_no = [](bool value) { return value ? "true" : "false"; };
-  ChannelOf channel{name, topic.type->name(), std::string(cdr::own_idl(topic.idl)), {}};
-  channel.metadata = {{"train_id", about_.at("train_id")},
-                      {"reliable", yes_no(topic.qos.reliable)},
-                      {"transient_local", yes_no(topic.qos.transient_local)},
-                      {"exclusive", yes_no(topic.qos.exclusive)},
-                      {"keyed", yes_no(topic.type->keyed())},
-                      {"depth", std::to_string(topic.qos.depth)}};
-  return channel;
-}
-
-void RecorderThread::listen(const messaging::TopicInfo& topic, const std::string& instance) {
-  const std::string name = instance.empty() ? topic.name : topic.name + "/" + instance;
-  if (listening_.contains(name) || left_out(name)) return;
-  if (topic.name == "camera_frame" && config_.pictures == "jpeg") return listen_camera(topic, instance);
-  messaging::TopicInfo info = topic;
-  info.reader_queue = static_cast<size_t>(topic.name == "camera_frame" ? config_.picture_queue : config_.sample_queue);
-  const auto handler = [this, channel = channel_of(topic, name), type = topic.type](
-                           const Sample& sample, const messaging::SampleInfo& sample_info) {
-    if (sample_info.valid) write(channel, sample_info, type->serialize(sample.get()));
-  };
-  listening_[name].reader = std::make_unique<messaging::AnyReader>(participant_, info, instance, queue_, handler);
-}
-
-void RecorderThread::listen_camera(const messaging::TopicInfo& topic, const std::string& instance) {
-  const std::string name = topic.name + "/" + instance;
-  Listening& listening = listening_[name];
-  listening.cause = Loss::encoder;
-  listening.encoded.limit = kEncodedWaiting;
-  messaging::TopicInfo info = topic;
-  info.reader_queue = static_cast<size_t>(config_.picture_queue);
-  const auto handler = [this, name, &listening](const Sample& sample, const messaging::SampleInfo& sample_info) {
-    if (sample_info.valid) encode(name, listening, *static_cast<const msg::CameraFrame*>(sample.get()), sample_info);
-  };
-  listening.reader = std::make_unique<messaging::AnyReader>(participant_, info, instance, encode_queue_, handler);
-}
-
-void RecorderThread::encode(const std::string& name, Listening& listening, const msg::CameraFrame& frame,
-                            const messaging::SampleInfo& info) {
-  std::vector<uint8_t> cdr;
-  const bool fits = static_cast<uint64_t>(frame.width_px()) * frame.height_px() <= frame.data().size();
-  if (fits && frame.seq() % static_cast<uint64_t>(config_.picture_every) == 0) {
-    auto jpeg = encode_jpeg(frame.data().data(), frame.width_px(), frame.height_px(),
-                            static_cast<int>(config_.picture_quality));
-    if (jpeg.ok()) {
-      msg::CameraPreview picture;
-      picture.stamp_ns(frame.stamp_ns());
-      picture.grabbed_ns(frame.grabbed_ns());
-      picture.seq(frame.seq());
-      picture.width_px(frame.width_px());
-      picture.height_px(frame.height_px());
-      picture.exposure_s(frame.exposure_s());
-      picture.health(frame.health());
-      picture.jpeg(std::move(jpeg).value());
-      cdr = messaging::serialize(picture);
-    }
-  }
-  queue_.push(&listening.encoded, [this, name, info, stamp_ns = frame.stamp_ns(), cdr = std::move(cdr)] {
-    static const messaging::TopicInfo stored = [] {
-      messaging::TopicInfo as_jpeg = *messaging::find_topic("camera_frame");
-      as_jpeg.type = &messaging::type_of<msg::CameraPreview>();
-      return as_jpeg;
-    }();
-    if (cdr.empty() && recording_) recording_->note_sequence(name, info.writer, info.sequence);
-    if (!cdr.empty()) write(channel_of(stored, name), info, cdr);
-    on_picture_(stamp_ns);
-  });
-}
-
-void RecorderThread::write(const ChannelOf& channel, const messaging::SampleInfo& info,
-                           const std::vector<uint8_t>& cdr) {
-  if (!recording_) return;
+void RecorderThread::record(const Arrival& arrival) {
+  recording_->note_sequence(std::string(arrival.topic), arrival.writer, arrival.sequence);
+  if (!arrival.recorded) return;
   ++received_;
-  recording_->note_sequence(channel.topic, info.writer, info.sequence);
-  const auto status =
-      recording_->write(channel, {0, static_cast<uint32_t>(info.sequence), info.received_ns, info.source_ns, cdr});
-  keep_standing(channel, info, cdr);
+  const auto status = recording_->write(*arrival.recorded);
   if (status.ok()) {
     ++written_;
     problem_.clear();
   } else {
     problem_ = status.error().message;
   }
+}
+
+void RecorderThread::publish_state() {
+  RecorderState now;
+  now.recording = recording_ != nullptr;
+  now.paused = paused_;
+  now.ring = ring_.has_value();
+  now.ring_s = ring_ ? ring_->seconds() : 0;
+  now.received = received_;
+  now.written = written_;
+  now.problem = problem_;
+  now.event = event_;
+  now.waiting_bytes = inlet_->waiting_bytes();
+  if (event_file_) now.waiting_bytes += event_file_->waiting_bytes();
+  for (const auto& closing : closing_events_) now.waiting_bytes += closing->waiting_bytes();
+  if (recording_) {
+    now.file = recording_->file().string();
+    now.started_ns = recording_started_ns_;
+    now.messages = recording_->samples();
+    now.bytes = recording_->bytes();
+    now.lost = recording_->lost_samples();
+    now.losses = recording_->loss_text();
+    now.losses_by_topic = recording_->losses_by_topic();
+    const int64_t since_ns = core::monotonic_ns() - rated_ns_;
+    if (since_ns >= core::kNsPerSecond) {
+      bytes_per_s_ = static_cast<double>(now.bytes - rated_bytes_) / core::seconds(since_ns);
+      rated_ns_ += since_ns;
+      rated_bytes_ = now.bytes;
+    }
+    now.bytes_per_s = bytes_per_s_;
+  }
+  const std::lock_guard lock(state_mutex_);
+  now.news = std::move(state_.news);
+  state_ = std::move(now);
+}
+
+void RecorderThread::say(const std::string& sentence, bool bad) {
+  const std::lock_guard lock(state_mutex_);
+  state_.news.push_back({sentence, bad});
 }
 
 }  // namespace railfix::recorder

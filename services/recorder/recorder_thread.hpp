@@ -1,105 +1,128 @@
-// The recorder's own threads: one that takes samples from the topics and writes them, one that encodes pictures. The
-// disk may stall there without the service looking frozen.
+// The recorder's own threads: one that takes samples from the topics and writes them, one that encodes pictures
+// (TopicInlet), one for each event's file (EventFile), one that looks after the folder (Housekeeper). The disk may
+// stall there without the service looking frozen.
 #pragma once
 
-#include <atomic>
-#include <functional>
 #include <future>
-#include <map>
 #include <mutex>
+#include <optional>
 #include <thread>
 
-#include "messaging/topics.hpp"
-#include "recorder/recorder_config.hpp"
-#include "recorder/recording.hpp"
+#include "recorder/event_file.hpp"
+#include "recorder/event_rule.hpp"
+#include "recorder/housekeeper.hpp"
+#include "recorder/ring.hpp"
+#include "recorder/topic_inlet.hpp"
 
 namespace railfix::recorder {
 
 /// What the service says about the recording.
 struct RecorderState {
-  bool recording = false;
+  bool recording = false;  // a file is open
+  bool paused = false;     // ... and nothing goes into it
+  bool ring = false;       // the last seconds are kept in memory
   std::string file;
-  uint64_t received = 0;  // since the program began
+  int64_t started_ns = 0;  // of the file
+  uint64_t messages = 0;   // in the file
+  uint64_t bytes = 0;      // of the file on the disk
+  double bytes_per_s = 0;
+  uint64_t waiting_bytes = 0;  // for the disk
+  double ring_s = 0;           // how far back an event would reach
+  uint64_t received = 0;       // since the program began
   uint64_t written = 0;
   uint64_t lost = 0;
-  std::string losses;   // of the present recording, by topic and cause
-  std::string problem;  // why nothing can be written, empty = all well
+  std::string losses;  // of the present recording, by topic and cause
+  std::vector<TopicLosses> losses_by_topic;
+  std::string problem;             // why nothing can be written, empty = all well
+  std::optional<EventNote> event;  // the last one
+  struct News {
+    std::string sentence;
+    bool bad;
+  };
+  std::vector<News> news;  // since the last call of take_state()
 };
 
 class RecorderThread {
  public:
-  /// `on_picture` is called from the recorder's thread with the stamp of each picture that was dealt with.
+  /// `on_picture` is called from the recorder's thread with the stamp of each picture that was dealt with. Throws
+  /// BadInput for an event rule that cannot be meant.
   RecorderThread(const RecorderConfig& config, messaging::Participant& participant,
                  std::map<std::string, std::string> about, std::function<void(int64_t stamp_ns)> on_picture);
-  /// Closes the recording.
+  /// Closes all files.
   ~RecorderThread();
   RecorderThread(const RecorderThread&) = delete;
   RecorderThread& operator=(const RecorderThread&) = delete;
 
-  /// Any thread, one after the other. Give the file's name.
+  // Any thread, one after the other. They give the file's name or a sentence.
   core::Result<std::string> start(const std::filesystem::path& file);
   core::Result<std::string> stop();
+  core::Result<std::string> pause();
+  core::Result<std::string> resume();
+  core::Result<std::string> event(const std::string& text);
   [[nodiscard]] RecorderState state() const;
+  /// The same, and forgets the news.
+  RecorderState take_state();
+  Housekeeper& housekeeper() { return *housekeeper_; }
 
  private:
-  /// One topic that is listened to; the source counts encoded pictures waiting for the disk.
-  struct Listening {
-    std::unique_ptr<messaging::AnyReader> reader;
-    messaging::Queue::Source encoded;
-    Loss cause = Loss::queue;
-    uint64_t dropped_before = 0;  // the present file was begun
-    uint64_t encoded_dropped_before = 0;
-  };
-  /// The last sample of a standing value, which every file must hold.
-  struct Standing {
-    ChannelOf channel;
-    messaging::SampleInfo info;
-    std::vector<uint8_t> cdr;
-  };
-  using Sample = std::shared_ptr<const void>;
-
   core::Result<std::string> in_thread(const std::function<core::Result<std::string>()>& work);
   core::Result<std::string> begin(const std::filesystem::path& file);
   core::Status create(const std::filesystem::path& file);
   core::Result<std::string> end();
+  core::Result<std::string> set_paused(bool paused);
   void split_if_due();
-  void keep_standing(const ChannelOf& channel, const messaging::SampleInfo& info, const std::vector<uint8_t>& cdr);
+  core::Status wait_for_closing();
+  void write_standing();
   void turn();
   void tick();
-  void stop_listening();
   void count_dropped();
-  void find_cameras();
   void guard_disk();
+  [[nodiscard]] bool disk_is_full() const;
   void publish_state();
-  void listen(const messaging::TopicInfo& topic, const std::string& instance);
-  void listen_camera(const messaging::TopicInfo& topic, const std::string& instance);
-  void encode(const std::string& name, Listening& listening, const msg::CameraFrame& frame,
-              const messaging::SampleInfo& info);
-  void write(const ChannelOf& channel, const messaging::SampleInfo& info, const std::vector<uint8_t>& cdr);
-  [[nodiscard]] bool left_out(const std::string& topic) const;
-  [[nodiscard]] ChannelOf channel_of(const messaging::TopicInfo& topic, const std::string& name) const;
+  void use(const Arrival& arrival);
+  void record(const Arrival& arrival);
+  void look_for_events(const StoredSample& sample);
+  core::Result<std::string> happened(const EventNote& note, bool by_hand);
+  core::Result<std::string> keep_event(const EventNote& note, bool by_hand);
+  void tend_event_files(bool all);
+  void say(const std::string& sentence, bool bad);
+  [[nodiscard]] mcap::WriterOptions writer_options() const;
+  [[nodiscard]] std::filesystem::path folder() const;
 
   RecorderConfig config_;
-  messaging::Participant& participant_;
   std::map<std::string, std::string> about_;
   std::function<void(int64_t)> on_picture_;
+  std::vector<EventRule> rules_;
+  std::map<const EventRule*, int64_t> rule_happened_ns_;
+  std::unique_ptr<Housekeeper> housekeeper_;
 
   messaging::Queue queue_;
-  messaging::Queue encode_queue_;
-  std::map<std::string, Listening> listening_;
+  std::unique_ptr<TopicInlet> inlet_;
   std::unique_ptr<Recording> recording_;
+  bool paused_ = false;
+  std::future<core::Status> closing_;  // the file before
   int64_t recording_begun_ns_ = 0;
-  std::map<std::string, Standing> standing_;
+  int64_t recording_started_ns_ = 0;  // host clock
+  std::map<std::string, SamplePtr> standing_;
+  std::map<std::pair<std::string, Loss>, uint64_t> dropped_;  // seen so far
+  std::optional<Ring> ring_;
+  std::unique_ptr<EventFile> event_file_;
+  int64_t event_begun_ns_ = 0;
+  int64_t event_ends_ns_ = 0;
+  std::vector<std::unique_ptr<EventFile>> closing_events_;
+  std::optional<EventNote> event_;
   std::string problem_;
   uint64_t received_ = 0;
   uint64_t written_ = 0;
   int64_t ticked_ns_ = 0;
+  int64_t rated_ns_ = 0;
+  uint64_t rated_bytes_ = 0;
+  double bytes_per_s_ = 0;
 
   mutable std::mutex state_mutex_;
   RecorderState state_;
   std::atomic<bool> ending_ = false;
   std::thread writer_thread_;
-  std::thread encoder_thread_;
 };
 
 }  // namespace railfix::recorder

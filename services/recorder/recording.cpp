@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
-#include <ctime>
 #include <fstream>
 
 #include "core/time.hpp"
-#include "mcap/reader.hpp"
 
 namespace railfix::recorder {
 
@@ -16,8 +14,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int64_t kLossPeriodNs = 10 * core::kNsPerSecond;
-constexpr const char* kActive = ".active";
-constexpr const char* kRecovered = "-recovered";
 
 std::string hex8(uint32_t value) {
   std::array<char, 9> text{};
@@ -54,20 +50,24 @@ core::Result<std::unique_ptr<Recording>> Recording::create(const fs::path& file,
   return recording;
 }
 
-core::Status Recording::write(const ChannelOf& channel, const mcap::Message& sample) {
-  auto known = channels_.find(channel.topic);
+core::Status Recording::write(const StoredSample& sample, int64_t log_time_ns) {
+  const ChannelOf& channel = *sample.channel;
+  auto known = channels_.find(sample.channel);
   if (known == channels_.end()) {
     const auto schema = writer_->add_schema(channel.type, "omgidl", channel.idl);
     if (!schema.ok()) return schema.error();
     const auto id = writer_->add_channel(schema.value(), channel.topic, "cdr", channel.metadata);
     if (!id.ok()) return id.error();
-    known = channels_.emplace(channel.topic, id.value()).first;
+    known = channels_.emplace(sample.channel, id.value()).first;
   }
-  mcap::Message message = sample;
-  message.channel_id = known->second;
-  auto status = writer_->write(message);
+  auto status = writer_->write({known->second, sample.sequence, log_time_ns, sample.sent_ns, sample.cdr});
   if (!status.ok()) ++dropped_[{channel.topic, Loss::disk}];
   return status;
+}
+
+core::Status Recording::write_event(const EventNote& note) {
+  return write_metadata(
+      {"railfix_event", {{"time_ns", std::to_string(note.time_ns)}, {"text", note.text}, {"trigger", note.trigger}}});
 }
 
 void Recording::note_sequence(const std::string& topic, uint64_t writer, uint64_t sequence) {
@@ -77,8 +77,8 @@ void Recording::note_sequence(const std::string& topic, uint64_t writer, uint64_
   last->second = std::max(last->second, sequence);
 }
 
-void Recording::set_dropped(const std::string& topic, Loss cause, uint64_t total) {
-  if (total > 0) dropped_[{topic, cause}] = total;
+void Recording::add_dropped(const std::string& topic, Loss cause, uint64_t count) {
+  if (count > 0) dropped_[{topic, cause}] += count;
 }
 
 Recording::Losses Recording::losses() const {
@@ -98,6 +98,15 @@ uint64_t Recording::lost_samples() const {
   uint64_t sum = 0;
   for (const auto& [what, count] : losses()) sum += count;
   return sum;
+}
+
+std::vector<TopicLosses> Recording::losses_by_topic() const {
+  std::vector<TopicLosses> all;
+  for (const auto& [what, count] : losses()) {
+    if (all.empty() || all.back().topic != what.first) all.push_back({what.first, {}});
+    all.back().by_cause[what.second] = count;
+  }
+  return all;
 }
 
 std::string Recording::loss_text() const {
@@ -147,68 +156,6 @@ std::string fingerprint(const fs::path& file) {
     crc = mcap::crc32({reinterpret_cast<const uint8_t*>(block.data()), static_cast<size_t>(stream.gcount())}, crc);
   }
   return file.filename().string() + " crc32 " + hex8(crc);
-}
-
-fs::path new_name(const fs::path& folder, const std::string& train_id, int64_t now_ns) {
-  const auto now_s = static_cast<time_t>(now_ns / core::kNsPerSecond);
-  tm utc{};
-  gmtime_r(&now_s, &utc);
-  std::array<char, 32> stamp{};
-  (void)std::strftime(stamp.data(), stamp.size(), "%Y%m%d-%H%M%S", &utc);
-  std::string train = train_id;
-  std::ranges::replace(train, '/', '_');
-  const std::string base = train + "-" + stamp.data();
-  fs::path file = folder / (base + ".mcap");
-  for (int i = 2; fs::exists(file) || fs::exists(file.string() + kActive); ++i) {
-    file = folder / (base + "-" + std::to_string(i) + ".mcap");
-  }
-  return file;
-}
-
-std::vector<std::string> recover_folder(const fs::path& folder) {
-  std::vector<std::string> sentences;
-  std::error_code failed;
-  for (const auto& entry : fs::directory_iterator(folder, failed)) {
-    const fs::path active = entry.path();
-    if (active.extension() != kActive || active.stem().extension() != ".mcap" || mcap::being_written(active)) continue;
-    const std::string base = active.stem().stem().string();
-    // A recovery that was itself cut off: its source is still there and is recovered again.
-    if (base.ends_with(kRecovered)) continue;
-    const fs::path name = mcap::recovered_name(active);
-    const auto lost = mcap::recover(active, name);
-    if (!lost.ok()) {
-      sentences.push_back(active.string() + " was left by a crash and cannot be recovered: " + lost.error().message);
-      continue;
-    }
-    fs::remove(active, failed);
-    sentences.push_back(active.string() + " was left by a crash; what it held is now in " + name.string());
-  }
-  return sentences;
-}
-
-std::vector<std::string> keep_quota(const fs::path& folder, uint64_t most_bytes) {
-  struct Old {
-    fs::file_time_type time;
-    fs::path file;
-    uint64_t bytes;
-  };
-  std::vector<Old> all;
-  uint64_t sum = 0;
-  std::error_code failed;
-  for (const auto& entry : fs::directory_iterator(folder, failed)) {
-    if (entry.path().extension() != ".mcap" || !entry.is_regular_file(failed)) continue;
-    all.push_back({entry.last_write_time(failed), entry.path(), entry.file_size(failed)});
-    sum += all.back().bytes;
-  }
-  std::ranges::sort(all, {}, &Old::time);
-  std::vector<std::string> removed;
-  for (const Old& old : all) {
-    if (sum < most_bytes) break;
-    if (!fs::remove(old.file, failed)) continue;
-    sum -= old.bytes;
-    removed.push_back(old.file.string() + " was removed to keep the quota");
-  }
-  return removed;
 }
 
 }  // namespace railfix::recorder

@@ -11,16 +11,9 @@
 
 #include "core/result.hpp"
 #include "mcap/writer.hpp"
+#include "recorder/stored_sample.hpp"
 
 namespace railfix::recorder {
-
-/// How a topic appears in the file.
-struct ChannelOf {
-  std::string topic;  // "camera_frame/cam0"
-  std::string type;   // "railfix::msg::CameraPreview"
-  std::string idl;    // self-contained IDL text that defines the type
-  std::map<std::string, std::string> metadata;
-};
 
 /// Where samples were lost on their way into the file.
 enum class Loss {
@@ -31,6 +24,18 @@ enum class Loss {
 };
 const char* name_of(Loss cause);
 
+struct TopicLosses {
+  std::string topic;
+  std::map<Loss, uint64_t> by_cause;
+};
+
+/// Something that people will want to look at.
+struct EventNote {
+  int64_t time_ns = 0;
+  std::string text;
+  std::string trigger;  // "by hand", or the rule
+};
+
 class Recording {
  public:
   static core::Result<std::unique_ptr<Recording>> create(const std::filesystem::path& file,
@@ -38,12 +43,19 @@ class Recording {
                                                          const std::map<std::string, std::string>& about);
 
   /// Error: the disk refuses; the sample is counted as lost.
-  core::Status write(const ChannelOf& channel, const mcap::Message& sample);
+  core::Status write(const StoredSample& sample) { return write(sample, sample.received_ns); }
+  /// The same with another log time.
+  core::Status write(const StoredSample& sample, int64_t log_time_ns);
+  core::Status write_metadata(const mcap::Metadata& metadata) { return writer_->write_metadata(metadata); }
+  /// The metadata record `railfix_event`.
+  core::Status write_event(const EventNote& note);
   /// `writer` and `sequence` as the middleware gives them, of every sample that reached the recorder's thread. Gaps
-  /// that set_dropped() does not explain were lost in transport.
+  /// that add_dropped() does not explain were lost in transport.
   void note_sequence(const std::string& topic, uint64_t writer, uint64_t sequence);
-  /// How many samples of the topic were dropped in front of the recorder's thread since it began.
-  void set_dropped(const std::string& topic, Loss cause, uint64_t total);
+  /// What comes next does not follow what came last: no gap.
+  void forget_sequences() { last_sequence_.clear(); }
+  /// So many more samples of the topic were dropped in front of the recorder's thread.
+  void add_dropped(const std::string& topic, Loss cause, uint64_t count);
   /// Writes what is old enough; losses go into the file at most every ten seconds.
   core::Status tick(int64_t now_monotonic_ns);
   core::Status close();
@@ -51,6 +63,7 @@ class Recording {
   [[nodiscard]] uint64_t samples() const { return writer_->statistics().messages; }
   [[nodiscard]] uint64_t bytes() const { return writer_->bytes_written(); }
   [[nodiscard]] uint64_t lost_samples() const;
+  [[nodiscard]] std::vector<TopicLosses> losses_by_topic() const;
   /// "camera_frame/cam0: 12 encoder, 1 transport; ..."; empty without losses.
   [[nodiscard]] std::string loss_text() const;
   [[nodiscard]] const std::filesystem::path& file() const { return writer_->file(); }
@@ -62,7 +75,7 @@ class Recording {
   core::Status write_losses();
 
   std::unique_ptr<mcap::Writer> writer_;
-  std::map<std::string, uint16_t> channels_;
+  std::map<std::shared_ptr<const ChannelOf>, uint16_t> channels_;
   std::map<std::pair<std::string, uint64_t>, uint64_t> last_sequence_;
   std::map<std::string, uint64_t> gaps_;
   Losses dropped_;
@@ -72,15 +85,5 @@ class Recording {
 
 /// Name and CRC-32 of a file for the metadata; empty for an empty name, "not readable" when it is so.
 std::string fingerprint(const std::filesystem::path& file);
-
-/// FOLDER/TRAIN-YYYYMMDD-HHMMSS.mcap for this time (UTC), with a number behind it when that exists.
-std::filesystem::path new_name(const std::filesystem::path& folder, const std::string& train_id, int64_t now_ns);
-
-/// Makes proper recordings of those in the folder that a crash left behind (NAME.mcap.active that nobody writes), and
-/// says a sentence for each.
-std::vector<std::string> recover_folder(const std::filesystem::path& folder);
-
-/// Removes the oldest recordings until the folder's recordings take less than this; says which.
-std::vector<std::string> keep_quota(const std::filesystem::path& folder, uint64_t most_bytes);
 
 }  // namespace railfix::recorder

@@ -124,7 +124,7 @@ TEST_F(RecordingTest, WhatIsReplayedIsRecordedAgain) {
     } else if (channel.topic == "camera_frame/cam0") {
       msg::CameraPreview picture;
       EXPECT_TRUE(messaging::deserialize(cdr, picture));
-      const auto pixels = recorder::decode_jpeg(picture.jpeg());
+      const auto pixels = recorder::decode_picture(picture.jpeg());
       EXPECT_TRUE(pixels.ok());
       EXPECT_EQ(pixels.value().size(), cv::Size(640, 480));
       EXPECT_NEAR(pixels.value().at<uint8_t>(240, 320), 10.0 * static_cast<double>(picture.seq()), 2);

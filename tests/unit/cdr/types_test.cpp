@@ -70,7 +70,7 @@ TEST(IdlTypes, MistakesNameTheLine) {
 }
 
 TEST(IdlTypes, EveryPrefixOfOurIdlIsReadOrRefused) {
-  const std::string text(own_idl("operation"));
+  const std::string text(own_idl_of("railfix::msg::ServiceStatus"));
   ASSERT_FALSE(text.empty());
   for (size_t size = 0; size < text.size(); ++size) {
     Types types;
@@ -83,7 +83,7 @@ TEST(IdlTypes, KnowsOurOwnTypes) {
   ASSERT_NE(view, nullptr);
   EXPECT_EQ(view->members.front().name, "stamp_ns");
   EXPECT_EQ(own_types().constants().at("railfix::msg::ODOMETRY_BLIND"), 3);
-  EXPECT_TRUE(own_idl("no_such_file").empty());
+  EXPECT_TRUE(own_idl_of("railfix::msg::NoSuchType").empty());
 }
 
 }  // namespace

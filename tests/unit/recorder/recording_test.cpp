@@ -5,7 +5,6 @@
 
 #include <fstream>
 
-#include "core/time.hpp"
 #include "mcap/reader.hpp"
 #include "recorder/pictures.hpp"
 
@@ -14,9 +13,7 @@ namespace railfix::recorder {
 namespace {
 
 namespace fs = std::filesystem;
-using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-using ::testing::IsEmpty;
 
 class RecordingFolder : public ::testing::Test {
  protected:
@@ -31,8 +28,9 @@ class RecordingFolder : public ::testing::Test {
   }
   static core::Status write(Recording& recording, const std::string& topic, uint32_t sequence) {
     static const std::vector<uint8_t> data{0, 1, 0, 0, 9};
-    return recording.write({topic, "railfix::msg::Any", "struct Any { octet x; };", {{"keyed", "false"}}},
-                           {0, sequence, 1000 + sequence, 900 + sequence, data});
+    const auto channel = std::make_shared<const ChannelOf>(
+        ChannelOf{topic, "railfix::msg::Any", "struct Any { octet x; };", {{"keyed", "false"}}});
+    return recording.write(StoredSample{channel, sequence, 1000 + sequence, 900 + sequence, data, ""});
   }
   fs::path folder_;
 };
@@ -58,9 +56,9 @@ TEST_F(RecordingFolder, GapsAreTransportUnlessADropExplainsThem) {
   for (const uint64_t sequence : {5, 6, 9, 10}) recording->note_sequence("track_view", 1, sequence);
   recording->note_sequence("track_view", 2, 100);  // another writer counts on its own
   EXPECT_EQ(recording->loss_text(), "track_view: 2 transport");
-  recording->set_dropped("track_view", Loss::queue, 2);
+  recording->add_dropped("track_view", Loss::queue, 2);
   EXPECT_EQ(recording->loss_text(), "track_view: 2 queue");
-  recording->set_dropped("camera_frame/cam0", Loss::encoder, 7);
+  recording->add_dropped("camera_frame/cam0", Loss::encoder, 7);
   for (const uint64_t sequence : {1, 10}) recording->note_sequence("camera_frame/cam0", 3, sequence);
   EXPECT_EQ(recording->loss_text(), "camera_frame/cam0: 1 transport, 7 encoder; track_view: 2 queue");
   EXPECT_EQ(recording->lost_samples(), 10U);
@@ -71,45 +69,6 @@ TEST_F(RecordingFolder, GapsAreTransportUnlessADropExplainsThem) {
   EXPECT_EQ(reader->metadata()[1].entries.at("camera_frame/cam0 encoder"), "7");
 }
 
-TEST_F(RecordingFolder, NamesAreUniqueAndInUtc) {
-  const int64_t now_ns = 1'700'000'000 * core::kNsPerSecond;
-  const fs::path first = new_name(folder_, "4711/a", now_ns);
-  EXPECT_EQ(first.filename(), "4711_a-20231114-221320.mcap");
-  fs::create_directories(folder_);
-  std::ofstream(first).put('x');
-  EXPECT_EQ(new_name(folder_, "4711/a", now_ns).filename(), "4711_a-20231114-221320-2.mcap");
-}
-
-TEST_F(RecordingFolder, CrashedRecordingsAreRecoveredAndRunningOnesLeftAlone) {
-  auto running = create("running.mcap");
-  auto crashed = create("done.mcap");
-  ASSERT_TRUE(write(*crashed, "track_view", 1).ok());
-  ASSERT_TRUE(crashed->close().ok());
-  fs::rename(folder_ / "done.mcap", folder_ / "crashed.mcap.active");
-  fs::resize_file(folder_ / "crashed.mcap.active", fs::file_size(folder_ / "crashed.mcap.active") - 20);
-  EXPECT_THAT(recover_folder(folder_), ElementsAre(HasSubstr("was left by a crash; what it held is now in")));
-  EXPECT_EQ(mcap::Reader::open(folder_ / "crashed-recovered.mcap").value()->statistics().messages, 1U);
-  EXPECT_FALSE(fs::exists(folder_ / "crashed.mcap.active"));
-  EXPECT_TRUE(fs::exists(folder_ / "running.mcap.active"));
-  EXPECT_THAT(recover_folder(folder_ / "nowhere"), IsEmpty());
-}
-
-TEST_F(RecordingFolder, QuotaRemovesTheOldest) {
-  fs::create_directories(folder_);
-  const auto make = [&](const std::string& name, int age_h) {
-    std::ofstream(folder_ / name) << std::string(1000, 'x');
-    fs::last_write_time(folder_ / name, fs::file_time_type::clock::now() - std::chrono::hours(age_h));
-  };
-  make("new.mcap", 1);
-  make("oldest.mcap", 9);
-  make("older.mcap", 5);
-  make("notes.txt", 99);
-  EXPECT_EQ(keep_quota(folder_, 10000).size(), 0U);
-  EXPECT_THAT(keep_quota(folder_, 2500), ElementsAre(HasSubstr("oldest.mcap")));
-  EXPECT_TRUE(fs::exists(folder_ / "older.mcap"));
-  EXPECT_TRUE(fs::exists(folder_ / "notes.txt"));
-}
-
 TEST_F(RecordingFolder, FingerprintsTellFilesApart) {
   fs::create_directories(folder_);
   std::ofstream(folder_ / "map.bin") << "123456789";
@@ -118,18 +77,51 @@ TEST_F(RecordingFolder, FingerprintsTellFilesApart) {
   EXPECT_THAT(fingerprint(folder_ / "none"), HasSubstr("not readable"));
 }
 
+TEST_F(RecordingFolder, EventsAreMarked) {
+  auto recording = create("marked.mcap");
+  ASSERT_TRUE(recording->write_event({77, "a jolt", "by hand"}).ok());
+  ASSERT_TRUE(recording->close().ok());
+  auto reader = mcap::Reader::open(folder_ / "marked.mcap").value();
+  ASSERT_EQ(reader->metadata().size(), 2U);
+  EXPECT_EQ(reader->metadata()[1].name, "railfix_event");
+  EXPECT_EQ(reader->metadata()[1].entries.at("time_ns"), "77");
+  EXPECT_EQ(reader->metadata()[1].entries.at("text"), "a jolt");
+}
+
+TEST_F(RecordingFolder, APauseIsNoLoss) {
+  auto recording = create("pause.mcap");
+  recording->note_sequence("track_view", 1, 5);
+  recording->forget_sequences();
+  recording->note_sequence("track_view", 1, 500);
+  EXPECT_EQ(recording->loss_text(), "");
+  recording->note_sequence("track_view", 1, 502);
+  EXPECT_EQ(recording->loss_text(), "track_view: 1 transport");
+}
+
+TEST(Pictures, PgmKeepsEveryPixel) {
+  std::vector<uint8_t> pixels(63 * 48);
+  for (size_t i = 0; i < pixels.size(); ++i) pixels[i] = static_cast<uint8_t>(i * i);
+  const auto pgm = encode_pgm(pixels.data(), 63, 48);
+  ASSERT_TRUE(pgm.ok());
+  const auto back = decode_picture(pgm.value());
+  ASSERT_TRUE(back.ok());
+  ASSERT_EQ(back.value().size(), cv::Size(63, 48));
+  EXPECT_TRUE(std::equal(pixels.begin(), pixels.end(), back.value().data));
+  EXPECT_FALSE(encode_pgm(pixels.data(), 0, 48).ok());
+}
+
 TEST(Pictures, JpegKeepsThePicture) {
   std::vector<uint8_t> pixels(64 * 48);
   for (size_t i = 0; i < pixels.size(); ++i) pixels[i] = static_cast<uint8_t>(i % 64 * 3);
   const auto jpeg = encode_jpeg(pixels.data(), 64, 48, 90);
   ASSERT_TRUE(jpeg.ok());
-  const auto back = decode_jpeg(jpeg.value());
+  const auto back = decode_picture(jpeg.value());
   ASSERT_TRUE(back.ok());
   ASSERT_EQ(back.value().size(), cv::Size(64, 48));
   for (size_t i = 0; i < pixels.size(); ++i) EXPECT_NEAR(back.value().data[i], pixels[i], 6);
   EXPECT_FALSE(encode_jpeg(pixels.data(), 0, 48, 90).ok());
-  EXPECT_FALSE(decode_jpeg({1, 2, 3}).ok());
-  EXPECT_FALSE(decode_jpeg({}).ok());
+  EXPECT_FALSE(decode_picture({1, 2, 3}).ok());
+  EXPECT_FALSE(decode_picture({}).ok());
 }
 
 }  // namespace

@@ -74,6 +74,7 @@ void fill_settings(YAML::Node& settings, const RunOptions& options, const RunPla
   for (const char* service : {"fusion", "map_matcher", "tpr_publisher"}) settings[service]["map"] = plan.map.string();
   settings["fusion"]["start"] = options.start;
   for (const char* service : {"recorder", "monitor"}) settings[service]["map"] = plan.map.string();
+  settings["recorder"]["train_file"] = plan.config.string();
   settings["recorder"]["file"] = std::filesystem::absolute(options.out / "recording.mcap").string();
   settings["recorder"]["pictures"] = options.record_pictures ? "jpeg" : "none";
 }
@@ -103,8 +104,8 @@ core::Result<RunPlan> plan_run(const RunOptions& options) {
 
   auto settings = load_settings(options.config);
   if (!settings.ok()) return settings.error();
-  fill_settings(settings.value(), options, plan);
   plan.config = std::filesystem::absolute(options.out / "run.yaml");
+  fill_settings(settings.value(), options, plan);
   std::ofstream file(plan.config);
   file << settings.value() << '\n';
   file.close();

@@ -1,0 +1,51 @@
+// The folder of the recordings: names, protection, quota, what a crash left behind.
+//
+// A recording NAME.mcap is protected while a file NAME.mcap.protected stands beside it; its text says why. So
+// protection survives a restart, and a person sees it, makes it (touch) and ends it (rm) without Railfix.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/result.hpp"
+
+namespace railfix::recorder {
+
+/// FOLDER/TRAIN-YYYYMMDD-HHMMSS.mcap for this time (UTC), with a number behind it when that exists. `kind` stands
+/// before the ending ("-event").
+std::filesystem::path new_name(const std::filesystem::path& folder, const std::string& train_id, int64_t now_ns,
+                               const std::string& kind = "");
+
+/// Before the ending of a recording that was made around an event.
+inline constexpr const char* kEventKind = "-event";
+
+/// What the folder holds.
+struct Survey {
+  uint32_t files = 0;  // recordings, with those being written
+  uint32_t protected_files = 0;
+  uint64_t bytes = 0;
+  uint64_t protected_bytes = 0;
+  uint64_t event_bytes = 0;      // of recordings around events
+  uint64_t disk_free_bytes = 0;  // for this user
+};
+Survey survey(const std::filesystem::path& folder);
+
+/// The recording that is meant by its name in the folder (with or without its ending) or its path; it may still be
+/// being written. Error: there is none, or it is in another folder.
+core::Result<std::filesystem::path> find_recording(const std::filesystem::path& folder, const std::string& name);
+
+core::Status protect(const std::filesystem::path& recording, const std::string& why);
+core::Status unprotect(const std::filesystem::path& recording);
+[[nodiscard]] bool is_protected(const std::filesystem::path& recording);
+
+/// Makes proper recordings of those in the folder that a crash left behind (NAME.mcap.active that nobody writes), and
+/// says a sentence for each. They stay protected if they were.
+std::vector<std::string> recover_folder(const std::filesystem::path& folder);
+
+/// Removes the oldest closed recordings that are not protected until the folder's recordings take no more than this;
+/// says which.
+std::vector<std::string> keep_quota(const std::filesystem::path& folder, uint64_t most_bytes);
+
+}  // namespace railfix::recorder

@@ -1,0 +1,16 @@
+// Standing values: topics whose last sample of each DDS key every file must hold (calibrations, states).
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "recorder/stored_sample.hpp"
+
+namespace railfix::recorder {
+
+/// The topic and the members that the type's IDL marks with @key.
+std::string key_of(const ChannelOf& channel, const nlohmann::ordered_json& sample);
+
+/// StoredSample::standing of a sample of this channel.
+std::string standing_of(const ChannelOf& channel, const std::vector<uint8_t>& cdr);
+
+}  // namespace railfix::recorder

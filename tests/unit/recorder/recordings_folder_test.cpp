@@ -1,0 +1,140 @@
+#include "recorder/recordings_folder.hpp"
+
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include <fstream>
+
+#include "core/time.hpp"
+#include "mcap/reader.hpp"
+#include "recorder/housekeeper.hpp"
+#include "recorder/recording.hpp"
+
+namespace railfix::recorder {
+
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+class RecordingsFolder : public ::testing::Test {
+ protected:
+  RecordingsFolder() : folder_(fs::temp_directory_path() / ("railfix-folder-" + std::to_string(::getpid()))) {
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  ~RecordingsFolder() override { fs::remove_all(folder_); }
+
+  void make(const std::string& name, int age_h) const {
+    std::ofstream(folder_ / name) << std::string(1000, 'x');
+    fs::last_write_time(folder_ / name, fs::file_time_type::clock::now() - std::chrono::hours(age_h));
+  }
+  /// A recording with one sample that a crash left open.
+  void make_crashed(const std::string& name) const {
+    auto recording = Recording::create(folder_ / "whole.mcap", {}, {{"train_id", "demo"}}).value();
+    const auto channel = std::make_shared<const ChannelOf>(ChannelOf{"topic", "m::T", "struct T { octet x; };", {}});
+    ASSERT_TRUE(recording->write(StoredSample{channel, 1, 1000, 900, {0, 1, 0, 0, 9}, ""}).ok());
+    ASSERT_TRUE(recording->close().ok());
+    const fs::path crashed = folder_ / (name + ".active");
+    fs::rename(folder_ / "whole.mcap", crashed);
+    fs::resize_file(crashed, fs::file_size(crashed) - 20);
+  }
+  fs::path folder_;
+};
+
+TEST_F(RecordingsFolder, NamesAreUniqueAndInUtc) {
+  const int64_t now_ns = 1'700'000'000 * core::kNsPerSecond;
+  const fs::path first = new_name(folder_, "4711/a", now_ns);
+  EXPECT_EQ(first.filename(), "4711_a-20231114-221320.mcap");
+  std::ofstream(first).put('x');
+  EXPECT_EQ(new_name(folder_, "4711/a", now_ns).filename(), "4711_a-20231114-221320-2.mcap");
+  EXPECT_EQ(new_name(folder_, "t", now_ns, kEventKind).filename(), "t-20231114-221320-event.mcap");
+}
+
+TEST_F(RecordingsFolder, CrashedRecordingsAreRecoveredAndRunningOnesLeftAlone) {
+  auto running = Recording::create(folder_ / "running.mcap", {}, {}).value();
+  make_crashed("crashed.mcap");
+  EXPECT_THAT(recover_folder(folder_), ElementsAre(HasSubstr("was left by a crash; what it held is now in")));
+  EXPECT_EQ(mcap::Reader::open(folder_ / "crashed-recovered.mcap").value()->statistics().messages, 1U);
+  EXPECT_FALSE(fs::exists(folder_ / "crashed.mcap.active"));
+  EXPECT_TRUE(fs::exists(folder_ / "running.mcap.active"));
+  EXPECT_THAT(recover_folder(folder_ / "nowhere"), IsEmpty());
+}
+
+TEST_F(RecordingsFolder, ProtectionOutlivesACrash) {
+  make_crashed("event.mcap");
+  ASSERT_TRUE(protect(folder_ / "event.mcap", "why").ok());
+  (void)recover_folder(folder_);
+  EXPECT_TRUE(is_protected(folder_ / "event-recovered.mcap"));
+  EXPECT_FALSE(is_protected(folder_ / "event.mcap")) << "its file is gone";
+  EXPECT_THAT(keep_quota(folder_, 1), IsEmpty());
+}
+
+TEST_F(RecordingsFolder, QuotaRemovesTheOldestButNothingProtectedOrOpen) {
+  make("new.mcap", 1);
+  make("oldest.mcap", 9);
+  make("older.mcap", 5);
+  make("open.mcap.active", 20);
+  make("notes.txt", 99);
+  ASSERT_TRUE(protect(folder_ / "oldest.mcap", "a reason").ok());
+  EXPECT_THAT(keep_quota(folder_, 4000), IsEmpty());
+  EXPECT_THAT(keep_quota(folder_, 3500), ElementsAre(HasSubstr("older.mcap")));
+  EXPECT_THAT(keep_quota(folder_, 1), ElementsAre(HasSubstr("new.mcap")));
+  for (const char* kept : {"oldest.mcap", "oldest.mcap.protected", "open.mcap.active", "notes.txt"}) {
+    EXPECT_TRUE(fs::exists(folder_ / kept)) << kept;
+  }
+  ASSERT_TRUE(unprotect(folder_ / "oldest.mcap").ok());
+  EXPECT_THAT(keep_quota(folder_, 1), ElementsAre(HasSubstr("oldest.mcap")));
+  EXPECT_FALSE(unprotect(folder_ / "oldest.mcap").ok()) << "is not protected any more";
+}
+
+TEST_F(RecordingsFolder, SurveyCountsWhatIsThere) {
+  make("a.mcap", 1);
+  make("b-event.mcap", 1);
+  make("c.mcap.active", 1);
+  make("notes.txt", 1);
+  ASSERT_TRUE(protect(folder_ / "b-event.mcap", "event").ok());
+  const Survey seen = survey(folder_);
+  EXPECT_EQ(seen.files, 3U);
+  EXPECT_EQ(seen.bytes, 3000U);
+  EXPECT_EQ(seen.protected_files, 1U);
+  EXPECT_EQ(seen.protected_bytes, 1000U);
+  EXPECT_EQ(seen.event_bytes, 1000U);
+  EXPECT_GT(seen.disk_free_bytes, 0U);
+  EXPECT_EQ(survey(folder_ / "nowhere").files, 0U);
+}
+
+TEST_F(RecordingsFolder, RecordingsAreFoundByWhatPeopleCallThem) {
+  make("a.mcap", 1);
+  make("b.mcap.active", 1);
+  for (const auto& name : {std::string("a"), std::string("a.mcap"), (folder_ / "a.mcap").string()}) {
+    const auto found = find_recording(folder_, name);
+    ASSERT_TRUE(found.ok()) << found.error().message;
+    EXPECT_EQ(found.value(), folder_ / "a.mcap");
+  }
+  EXPECT_EQ(find_recording(folder_, "b.mcap.active").value(), folder_ / "b.mcap");
+  for (const char* wrong : {"", "c", "../a.mcap", "/etc/passwd"}) EXPECT_FALSE(find_recording(folder_, wrong).ok());
+}
+
+TEST_F(RecordingsFolder, TheHousekeeperKeepsTheQuotaByItself) {
+  make("old.mcap", 5);
+  make("kept.mcap", 9);
+  ASSERT_TRUE(protect(folder_ / "kept.mcap", "why").ok());
+  Housekeeper housekeeper(folder_, 1500);
+  const int64_t deadline_ns = core::monotonic_ns() + 30 * core::kNsPerSecond;
+  while (fs::exists(folder_ / "old.mcap") || housekeeper.survey().files != 1) {
+    ASSERT_LT(core::monotonic_ns(), deadline_ns);
+    ::usleep(10'000);
+  }
+  EXPECT_THAT(housekeeper.take_sentences(), ElementsAre(HasSubstr("old.mcap was removed")));
+  EXPECT_TRUE(housekeeper.unprotect("kept").ok());
+  EXPECT_FALSE(housekeeper.protect("gone", "why").ok());
+  EXPECT_TRUE(housekeeper.protect("kept", "why").ok());
+  EXPECT_TRUE(is_protected(folder_ / "kept.mcap"));
+}
+
+}  // namespace
+
+}  // namespace railfix::recorder
