@@ -10,8 +10,8 @@
 namespace railfix::track {
 namespace {
 
-constexpr std::array<std::string_view, 8> kLandmarkKinds{"unknown",    "frog", "balise", "portal_in",
-                                                         "portal_out", "mast", "bridge", "platform"};
+constexpr std::array<std::string_view, 9> kLandmarkKinds{"unknown", "frog",   "balise",   "portal_in",     "portal_out",
+                                                         "mast",    "bridge", "platform", "level_crossing"};
 constexpr std::array<std::string_view, 4> kNodeKinds{"end", "joint", "switch", "crossing"};
 
 std::optional<double> number_from(std::string_view text) {
@@ -64,6 +64,16 @@ std::optional<LandmarkKind> landmark_kind_from(const std::string& text) {
 
 std::string to_string(NodeKind kind) {
   return std::string(kNodeKinds.at(static_cast<size_t>(kind)));
+}
+
+std::optional<double> Edge::speed_limit_mps(double offset_m, Direction running) const {
+  std::optional<double> lowest;
+  for (const SpeedLimit& limit : speed_limits) {
+    if (offset_m < limit.from_m || offset_m > limit.to_m) continue;
+    if (limit.direction != Direction::unknown && limit.direction != running) continue;
+    lowest = std::min(limit.speed_mps, lowest.value_or(limit.speed_mps));
+  }
+  return lowest;
 }
 
 const Edge* Map::edge(uint32_t id) const {

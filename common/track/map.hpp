@@ -13,7 +13,17 @@
 
 namespace railfix::track {
 
-enum class LandmarkKind : uint8_t { unknown, frog, balise, portal_in, portal_out, mast, bridge, platform };
+enum class LandmarkKind : uint8_t {
+  unknown,
+  frog,
+  balise,
+  portal_in,
+  portal_out,
+  mast,
+  bridge,
+  platform,
+  level_crossing  // known from maps only: the camera does not tell it
+};
 /// "frog", "balise", "portal_in", ... as in the run tables; and back.
 std::string to_string(LandmarkKind kind);
 std::optional<LandmarkKind> landmark_kind_from(const std::string& text);
@@ -22,6 +32,17 @@ enum class NodeKind : uint8_t { end, joint, railway_switch, crossing };
 /// "end", "joint", "switch", "crossing".
 std::string to_string(NodeKind kind);
 
+enum class Direction : uint8_t { unknown, forward, reverse };
+
+/// What trains may run on a stretch of an edge; direction unknown = both ways.
+struct SpeedLimit {
+  static constexpr double kFastestMps = 200;  // no train is faster
+  double from_m = 0;
+  double to_m = 0;
+  double speed_mps = 0;
+  Direction direction = Direction::unknown;
+};
+
 struct Edge {
   uint32_t id = 0;
   std::string name;
@@ -29,6 +50,9 @@ struct Edge {
   uint32_t to_node = 0;
   std::string line;
   Alignment alignment;
+  std::vector<SpeedLimit> speed_limits{};
+  /// The lowest limit there for a train running this way (REQUIRES: not unknown); nothing when the source says none.
+  [[nodiscard]] std::optional<double> speed_limit_mps(double offset_m, Direction running) const;
 };
 
 struct Node {
@@ -67,8 +91,6 @@ struct BaliseGroup {
   std::vector<uint32_t> balises;  // landmark ids
   [[nodiscard]] uint32_t nid_lrbg() const { return nid_c << 14U | nid_bg; }
 };
-
-enum class Direction : uint8_t { unknown, forward, reverse };
 
 /// A place on the map: EDGE:OFFSET[:+|-].
 struct EdgePosition {

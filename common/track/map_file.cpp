@@ -66,12 +66,21 @@ core::Result<Edge> edge_from(const map::Edge& in) {
   if (!numbers || !sorted_by_offset(profile) || !sorted_by_offset(cant)) {
     return core::Error{"edge " + std::to_string(in.id()) + " has a profile or cant out of order"};
   }
+  std::vector<SpeedLimit> limits;
+  for (const map::SpeedLimit& l : in.speed_limits()) {
+    if (!finite({l.from_m(), l.to_m()}) || !(l.speed_mps() > 0 && l.speed_mps() < SpeedLimit::kFastestMps) ||
+        !map::SpeedLimit::Direction_IsValid(l.direction())) {
+      return core::Error{"edge " + std::to_string(in.id()) + " has a speed limit that is none"};
+    }
+    limits.push_back({l.from_m(), l.to_m(), l.speed_mps(), static_cast<Direction>(l.direction())});
+  }
   Edge out{.id = in.id(),
            .name = in.name(),
            .from_node = in.from_node(),
            .to_node = in.to_node(),
            .line = in.line(),
-           .alignment = {}};
+           .alignment = {},
+           .speed_limits = std::move(limits)};
   out.alignment = Alignment(std::move(elements), std::move(starts), std::move(profile), std::move(cant));
   return out;
 }
@@ -159,6 +168,13 @@ void write_edge(const Edge& edge, map::Edge& out) {
     map::CantPoint& p = *out.add_cant();
     p.set_offset_m(point.offset_m);
     p.set_cant_m(point.cant_m);
+  }
+  for (const SpeedLimit& limit : edge.speed_limits) {
+    map::SpeedLimit& l = *out.add_speed_limits();
+    l.set_from_m(limit.from_m);
+    l.set_to_m(limit.to_m);
+    l.set_speed_mps(limit.speed_mps);
+    l.set_direction(static_cast<map::SpeedLimit::Direction>(limit.direction));
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <unordered_map>
 
 #include "core/units.hpp"
 
@@ -20,14 +21,26 @@ double begin_heading(const Run& run) {
   return end_heading({run.edge, !run.forward}) + core::kPi;
 }
 
+/// The map's connections by their node.
+using Meetings = std::unordered_map<uint32_t, std::vector<const Connection*>>;
+
+Meetings meetings_of(const Map& map) {
+  Meetings out;
+  for (const Connection& connection : map.connections) out[connection.node].push_back(&connection);
+  return out;
+}
+
 /// What follows at the end of a run: an edge of `via`, else the straight way, among several the one that turns least.
-std::optional<Run> next_run(const Map& map, const Run& run, const std::vector<uint32_t>& via) {
+std::optional<Run> next_run(const Map& map, const Meetings& meetings, const Run& run,
+                            const std::vector<uint32_t>& via) {
   const uint32_t node = run.forward ? run.edge->to_node : run.edge->from_node;
   const double heading = end_heading(run);
   std::optional<Run> best;
   double best_cost = 0;
-  for (const Connection& connection : map.connections) {
-    if (connection.node != node) continue;
+  const auto here = meetings.find(node);
+  if (here == meetings.end()) return best;
+  for (const Connection* met : here->second) {
+    const Connection& connection = *met;
     if (connection.edge_a != run.edge->id && connection.edge_b != run.edge->id) continue;
     const Edge* other = map.edge(connection.edge_a == run.edge->id ? connection.edge_b : connection.edge_a);
     for (const bool forward : {true, false}) {
@@ -46,11 +59,12 @@ std::optional<Run> next_run(const Map& map, const Run& run, const std::vector<ui
 }
 
 /// Runs after the first until `distance_m` beyond the end of the first is covered or the track ends.
-std::vector<Run> runs_after(const Map& map, const Run& first, double distance_m, const std::vector<uint32_t>& via) {
+std::vector<Run> runs_after(const Map& map, const Meetings& meetings, const Run& first, double distance_m,
+                            const std::vector<uint32_t>& via) {
   std::vector<Run> runs;
   Run run = first;
   while (distance_m > 0 && runs.size() < kMostLegs) {
-    const std::optional<Run> next = next_run(map, run, via);
+    const std::optional<Run> next = next_run(map, meetings, run, via);
     if (!next) break;
     run = *next;
     runs.push_back(run);
@@ -116,7 +130,8 @@ core::Result<Path> Path::follow(std::shared_ptr<const Map> map, const EdgePositi
   const double before =
       std::clamp(forward ? start.offset_m : length - start.offset_m, 0.0, length);  // of the edge behind the start
 
-  std::vector<Run> runs = runs_after(*map, {edge, !forward}, behind_m - before, via);
+  const Meetings meetings = meetings_of(*map);
+  std::vector<Run> runs = runs_after(*map, meetings, {edge, !forward}, behind_m - before, via);
   std::reverse(runs.begin(), runs.end());
   double distance = -before;
   for (Run& run : runs) {
@@ -124,7 +139,7 @@ core::Result<Path> Path::follow(std::shared_ptr<const Map> map, const EdgePositi
     distance -= run.edge->alignment.length_m();
   }
   runs.push_back({edge, forward});
-  const std::vector<Run> ahead = runs_after(*map, {edge, forward}, ahead_m - (length - before), via);
+  const std::vector<Run> ahead = runs_after(*map, meetings, {edge, forward}, ahead_m - (length - before), via);
   runs.insert(runs.end(), ahead.begin(), ahead.end());
 
   Path path;
@@ -191,25 +206,27 @@ Path rerouted(const Path& old, const Ways& ways, const EdgePosition& place, doub
 }
 
 void Path::collect_marks() {
-  for (const Leg& leg : legs_) {
-    const double sign = leg.forward ? 1.0 : -1.0;
-    const auto distance_on_leg = [&](double offset_m) -> std::optional<double> {
-      const double into = sign * (offset_m - leg.offset_begin_m);
-      if (into < -1e-6 || into > leg.length_m + 1e-6) return std::nullopt;
-      return leg.begin_m + into;
-    };
-    for (const Landmark& landmark : map_->landmarks) {
-      if (landmark.edge != leg.edge->id) continue;
-      if (const auto distance = distance_on_leg(landmark.offset_m)) {
-        landmarks_.push_back({&landmark, *distance, sign * landmark.lateral_m, seen_along(landmark.kind, leg.forward)});
-      }
+  std::unordered_map<uint32_t, std::vector<const Leg*>> legs_on;
+  for (const Leg& leg : legs_) legs_on[leg.edge->id].push_back(&leg);
+  // Calls `take` with every leg that runs over the place, and its distance there.
+  const auto each_pass = [&](uint32_t edge, double offset_m, const auto& take) {
+    const auto found = legs_on.find(edge);
+    if (found == legs_on.end()) return;
+    for (const Leg* leg : found->second) {
+      const double into = (leg->forward ? 1.0 : -1.0) * (offset_m - leg->offset_begin_m);
+      if (into >= -1e-6 && into <= leg->length_m + 1e-6) take(*leg, leg->begin_m + into);
     }
-    for (const BaliseGroup& group : map_->balise_groups) {
-      if (group.edge != leg.edge->id) continue;
-      if (const auto distance = distance_on_leg(group.offset_m)) {
-        groups_.push_back({&group, *distance, group.nominal_is_forward == leg.forward});
-      }
-    }
+  };
+  for (const Landmark& landmark : map_->landmarks) {
+    each_pass(landmark.edge, landmark.offset_m, [&](const Leg& leg, double distance_m) {
+      const double lateral_m = leg.forward ? landmark.lateral_m : -landmark.lateral_m;
+      landmarks_.push_back({&landmark, distance_m, lateral_m, seen_along(landmark.kind, leg.forward)});
+    });
+  }
+  for (const BaliseGroup& group : map_->balise_groups) {
+    each_pass(group.edge, group.offset_m, [&](const Leg& leg, double distance_m) {
+      groups_.push_back({&group, distance_m, group.nominal_is_forward == leg.forward});
+    });
   }
   const auto by_distance = [](const auto& a, const auto& b) { return a.distance_m < b.distance_m; };
   std::stable_sort(landmarks_.begin(), landmarks_.end(), by_distance);
@@ -262,6 +279,11 @@ TrackPoint Path::at(double distance_m) const {
   point.cant_m = -point.cant_m;
   point.grade = -point.grade;
   return point;
+}
+
+std::optional<double> Path::speed_limit_at(double distance_m) const {
+  const Leg& leg = leg_at(distance_m);
+  return leg.edge->speed_limit_mps(offset_on(leg, distance_m), leg.forward ? Direction::forward : Direction::reverse);
 }
 
 double Path::curvature_at(double distance_m) const {

@@ -256,6 +256,7 @@ void Line::collect_objects() {
         add_to_spans(platforms_, open_platforms, thing, kLonePlatformM);
         break;
       case track::LandmarkKind::frog:
+      case track::LandmarkKind::level_crossing:
       case track::LandmarkKind::unknown:
         break;
     }

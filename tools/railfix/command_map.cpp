@@ -26,6 +26,22 @@ double total_length_m(const track::Map& map) {
                          [](double sum, const track::Edge& edge) { return sum + edge.alignment.length_m(); });
 }
 
+/// Track with a speed limit in one direction or both.
+double limited_m(const track::Map& map) {
+  double sum = 0;
+  for (const track::Edge& edge : map.edges) {
+    std::vector<std::pair<double, double>> parts;
+    for (const track::SpeedLimit& limit : edge.speed_limits) parts.emplace_back(limit.from_m, limit.to_m);
+    std::sort(parts.begin(), parts.end());
+    double reached = 0;
+    for (const auto& [from, to] : parts) {
+      sum += std::max(0.0, to - std::max(from, reached));
+      reached = std::max(reached, to);
+    }
+  }
+  return sum;
+}
+
 size_t count_of(const track::Map& map, track::NodeKind kind) {
   return static_cast<size_t>(
       std::count_if(map.nodes.begin(), map.nodes.end(), [&](const track::Node& node) { return node.kind == kind; }));
@@ -50,6 +66,8 @@ void print_summary(const track::Map& map) {
               count_of(map, track::NodeKind::railway_switch), count_of(map, track::NodeKind::crossing),
               count_of(map, track::NodeKind::joint), count_of(map, track::NodeKind::end));
   std::printf("landmarks        %zu, balise groups %zu\n", map.landmarks.size(), map.balise_groups.size());
+  const double limited = limited_m(map);
+  if (limited > 0) std::printf("speed limits     on %.3f km\n", limited / 1000.0);
 }
 
 void print_figures(const char* source, const track::FitFigures& figures) {
@@ -121,6 +139,18 @@ ordered_json to_json(const track::FitFigures& figures) {
           {"max_chord_deviation_m", figures.max_chord_deviation_m}};
 }
 
+ordered_json limits_json(const track::Edge& edge) {
+  ordered_json limits = ordered_json::array();
+  for (const track::SpeedLimit& limit : edge.speed_limits) {
+    const char* ways[] = {"both", "forward", "reverse"};
+    limits.push_back({{"from_m", limit.from_m},
+                      {"to_m", limit.to_m},
+                      {"speed_mps", limit.speed_mps},
+                      {"direction", ways[static_cast<size_t>(limit.direction)]}});
+  }
+  return limits;
+}
+
 ordered_json edges_json(const track::Map& map) {
   ordered_json edges = ordered_json::array();
   for (const track::Edge& edge : map.edges) {
@@ -130,7 +160,8 @@ ordered_json edges_json(const track::Map& map) {
                      {"length_m", edge.alignment.length_m()},
                      {"from_node", edge.from_node},
                      {"to_node", edge.to_node},
-                     {"elements", edge.alignment.elements().size()}});
+                     {"elements", edge.alignment.elements().size()},
+                     {"speed_limits", limits_json(edge)}});
   }
   return edges;
 }
@@ -220,6 +251,9 @@ void print_place(const track::Map& map, const track::EdgePosition& place, bool a
   const track::TrackPoint point = map.edge(place.edge)->alignment.at(place.offset_m);
   const double heading = core::wrap_pi(point.pose.heading_rad + (reverse ? core::kPi : 0.0));
   const auto geo = map.to_geo(point.pose.easting_m, point.pose.northing_m);
+  const auto limit =
+      map.edge(place.edge)
+          ->speed_limit_mps(place.offset_m, reverse ? track::Direction::reverse : track::Direction::forward);
   if (as_json) {
     print_json({{"edge", place.edge},
                 {"offset_m", place.offset_m},
@@ -232,6 +266,7 @@ void print_place(const track::Map& map, const track::EdgePosition& place, bool a
                 {"twist", point.twist},
                 {"elevation_m", point.elevation_m},
                 {"grade", sign * point.grade + 0.0},
+                {"speed_limit_mps", limit ? ordered_json(*limit) : ordered_json()},
                 {"lat_deg", geo ? ordered_json(geo->lat_deg) : ordered_json()},
                 {"lon_deg", geo ? ordered_json(geo->lon_deg) : ordered_json()}});
     return;
@@ -249,6 +284,7 @@ void print_place(const track::Map& map, const track::EdgePosition& place, bool a
   }
   std::printf("cant             %.1f mm\n", sign * point.cant_m * 1e3);
   std::printf("elevation, grade %.3f m, %.2f per mille\n", point.elevation_m, sign * point.grade * 1e3);
+  if (limit) std::printf("speed limit      %.0f km/h\n", core::kmh_from_mps(*limit));
   if (geo) std::printf("latitude         %.8f\nlongitude        %.8f\n", geo->lat_deg, geo->lon_deg);
 }
 

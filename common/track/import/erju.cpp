@@ -33,7 +33,8 @@ class Reader {
     read_balises();
     read_marks("tunnel", LandmarkKind::portal_in);
     read_marks("bridge", LandmarkKind::bridge);
-    read_marks("levelCrossing", LandmarkKind::unknown);
+    read_marks("levelCrossing", LandmarkKind::level_crossing);
+    read_speeds();
     return std::move(net_);
   }
 
@@ -192,8 +193,7 @@ class Reader {
   /// Things with a section (tunnel, bridge) or a spot (level crossing) of a track edge.
   void read_marks(const char* name, LandmarkKind kind) {
     for (const pugi::xml_node& node : descendants(infra_.root(), name)) {
-      const std::string id =
-          std::string(kind == LandmarkKind::unknown ? "level crossing " : "") + node.attribute("id").value();
+      const std::string id = node.attribute("id").value();
       for (const pugi::xml_node& section : descendants(node, "trackEdgeSection")) {
         NetTrack& track = net_.tracks[track_of(infra_, section, "trackEdge")];
         const double from = metres(XmlSource::number(section, "skipFromStart").value_or(0));
@@ -208,6 +208,22 @@ class Reader {
       for (const pugi::xml_node& spot : descendants(node, "spotLocation")) {
         NetTrack& track = net_.tracks[track_of(infra_, spot, "trackEdge")];
         track.track.marks.push_back({kind, metres(infra_.required(spot, "pos")), 0, kSurveyedM, id});
+      }
+    }
+  }
+
+  /// A static limit holds from its place on, as the train runs, up to the next one.
+  void read_speeds() {
+    for (const pugi::xml_node& profile : descendants(infra_.root(), "teSpeedProfile")) {
+      NetTrack& track = net_.tracks[track_of(infra_, profile, "id")];
+      for (const Direction running : {Direction::forward, Direction::reverse}) {
+        const char* way = running == Direction::forward ? "sameDirProfile" : "oppositeDirProfile";
+        std::vector<std::pair<double, double>> changes;  // metres, m/s
+        for (const pugi::xml_node& item : descendants(profile.child(way), "staticSpeedProfileItem")) {
+          changes.emplace_back(metres(infra_.required(item, "pos")),
+                               core::mps_from_kmh(infra_.required(item, "speed")));
+        }
+        add_speeds(changes, running, track.length_m, track.track);
       }
     }
   }

@@ -89,6 +89,11 @@ void take_marks(const ImportedTrack& track, double from_m, double to_m, bool is_
     for (TrackMark& balise : group.balises) balise.offset_m = std::clamp(balise.offset_m - from_m, 0.0, to_m - from_m);
     piece.groups.push_back(std::move(group));
   }
+  for (SpeedLimit limit : track.speed_limits) {
+    limit.from_m = std::max(limit.from_m - from_m, 0.0);
+    limit.to_m = std::min(limit.to_m, to_m) - from_m;
+    if (limit.to_m > limit.from_m) piece.speed_limits.push_back(limit);
+  }
 }
 
 /// Points of a list by offset that matter between two offsets: those within and two on either side.
@@ -243,7 +248,8 @@ void append(const Draft& draft, Map& map) {
                          .from_node = first_node + static_cast<uint32_t>(in.from_node),
                          .to_node = first_node + static_cast<uint32_t>(in.to_node),
                          .line = in.track.line,
-                         .alignment = in.track.alignment});
+                         .alignment = in.track.alignment,
+                         .speed_limits = in.track.speed_limits});
     for (const TrackMark& mark : in.track.marks) add_landmark(id, mark);
     for (const TrackGroup& in_group : in.track.groups) {
       BaliseGroup group{.nid_c = in_group.nid_c,

@@ -1,6 +1,7 @@
 #include "track/import/osm_network.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <set>
 
@@ -28,6 +29,21 @@ bool is_set(const OsmTags& tags, const char* key) {
   return !value.empty() && value != "no";
 }
 
+/// "80" (km/h) or "50 mph"; nothing where it says anything else.
+std::optional<double> speed_mps_of(const std::string& text) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc()) return std::nullopt;
+  const std::string_view unit(end, static_cast<size_t>(text.data() + text.size() - end));
+  if (unit == " mph" || unit == "mph") {
+    value *= 1.609344;
+  } else if (!unit.empty() && unit != " km/h") {
+    return std::nullopt;
+  }
+  const double speed = core::mps_from_kmh(value);
+  return speed > 0 && speed < SpeedLimit::kFastestMps ? std::optional(speed) : std::nullopt;
+}
+
 struct Segment {
   int64_t a = 0;
   int64_t b = 0;
@@ -38,7 +54,8 @@ struct Segment {
 /// Segments from one break to the next.
 struct Chain {
   std::vector<int64_t> nodes;
-  std::vector<size_t> ways;  // of each segment
+  std::vector<size_t> ways;     // of each segment
+  std::vector<bool> along_way;  // the segment runs as its way is drawn
   std::vector<Eigen::Vector2d> points;
   std::vector<Eigen::Vector2d> shape;  // the points as the track is to run through them
   std::optional<double> heading_at_start;
@@ -140,6 +157,7 @@ class Builder {
     while (true) {
       segments_[segment].used = true;
       chain.ways.push_back(segments_[segment].way);
+      chain.along_way.push_back(segments_[segment].a == chain.nodes.back());
       chain.nodes.push_back(other_end(segment, chain.nodes.back()));
       const int64_t here = chain.nodes.back();
       if (here == begin || is_break(here)) break;
@@ -244,6 +262,7 @@ class Builder {
     if (smooth) out_.fit.add(edge.track.name, *smooth, chain.points.size());
     edge.track.alignment = std::move(fit.alignment);
     add_marks(chain, edge.track);
+    add_speeds(chain, edge.track);
     if (fit.straightened > 0) {
       out_.problems.push_back("edge " + edge.track.name + " has " + std::to_string(fit.straightened) +
                               " stretches with points too crooked for a track; they are straight lines now");
@@ -275,9 +294,7 @@ class Builder {
   }
 
   void add_marks(const Chain& chain, ImportedTrack& track) const {
-    const auto offset_of = [&](size_t i) {
-      return track.alignment.nearest(chain.points[i].x(), chain.points[i].y()).offset_m;
-    };
+    const auto offset_of = [&](size_t i) { return Builder::offset_of(chain, i, track); };
     const auto has = [&](size_t segment, const char* key) { return is_set(data_.ways[chain.ways[segment]].tags, key); };
     const size_t count = chain.ways.size();
     size_t bridge_begin = 0;
@@ -297,6 +314,34 @@ class Builder {
     for (size_t i = 1; i < count; ++i) add_point_mark(chain.nodes[i], offset_of(i), track);
   }
 
+  /// maxspeed, and maxspeed:forward and :backward as the way is drawn; equal neighbours are one limit.
+  void add_speeds(const Chain& chain, ImportedTrack& track) const {
+    const auto speed_at = [&](size_t segment, bool forward) {
+      const OsmTags& tags = data_.ways[chain.ways[segment]].tags;
+      const bool as_drawn = forward == chain.along_way[segment];
+      const auto own = speed_mps_of(value_of(tags, as_drawn ? "maxspeed:forward" : "maxspeed:backward"));
+      return own ? own : speed_mps_of(value_of(tags, "maxspeed"));
+    };
+    for (const bool forward : {true, false}) {
+      std::optional<double> speed;
+      double begin_m = 0;
+      for (size_t i = 0; i <= chain.ways.size(); ++i) {
+        const bool is_end = i == chain.ways.size();
+        const auto next = is_end ? std::nullopt : speed_at(i, forward);
+        if (i > 0 && !is_end && next == speed) continue;
+        const double at_m = i == 0 ? 0.0 : is_end ? track.alignment.length_m() : offset_of(chain, i, track);
+        if (speed && at_m > begin_m)
+          track.speed_limits.push_back({begin_m, at_m, *speed, forward ? Direction::forward : Direction::reverse});
+        speed = next;
+        begin_m = at_m;
+      }
+    }
+  }
+
+  [[nodiscard]] static double offset_of(const Chain& chain, size_t point, const ImportedTrack& track) {
+    return track.alignment.nearest(chain.points[point].x(), chain.points[point].y()).offset_m;
+  }
+
   /// One landmark in the middle; the uncertainty covers the bridge.
   void add_bridge(double from_m, double to_m, size_t way, ImportedTrack& track) const {
     const double length = to_m - from_m;
@@ -312,6 +357,8 @@ class Builder {
       track.marks.push_back({LandmarkKind::balise, offset_m, 0, kMappingSigmaM, value_of(tags, "ref")});
     } else if (kind == "signal") {
       track.marks.push_back({LandmarkKind::mast, offset_m, 0, kMappingSigmaM, value_of(tags, "ref")});
+    } else if (kind == "level_crossing" || kind == "crossing") {  // of a road, of a footpath
+      track.marks.push_back({LandmarkKind::level_crossing, offset_m, 0, kMappingSigmaM, value_of(tags, "name")});
     }
   }
 

@@ -251,6 +251,10 @@ class Planner {
     for (CantPoint& point : track.cant) point.offset_m *= scale;
     track.track.alignment = Alignment(plan.elements(), plan.starts(), std::move(profile), std::move(track.cant));
     for (TrackMark& mark : track.track.marks) place(mark, scale, track.track.alignment.length_m());
+    for (SpeedLimit& limit : track.track.speed_limits) {
+      limit.from_m = std::clamp(limit.from_m * scale, 0.0, track.track.alignment.length_m());
+      limit.to_m = std::clamp(limit.to_m * scale, 0.0, track.track.alignment.length_m());
+    }
     for (TrackGroup& group : track.track.groups) {
       group.offset_m = std::clamp(group.offset_m * scale, 0.0, track.track.alignment.length_m());
       for (TrackMark& balise : group.balises) place(balise, scale, track.track.alignment.length_m());
@@ -320,6 +324,13 @@ size_t split(RailNet& net, size_t track, double offset_m) {
   for (TrackGroup& group : rest.track.groups) {
     for (TrackMark& balise : group.balises) balise.offset_m -= offset_m;
   }
+  for (SpeedLimit& limit : first.track.speed_limits) {
+    if (limit.to_m <= offset_m) continue;
+    rest.track.speed_limits.push_back(
+        {std::max(limit.from_m - offset_m, 0.0), limit.to_m - offset_m, limit.speed_mps, limit.direction});
+    limit.to_m = offset_m;
+  }
+  std::erase_if(first.track.speed_limits, [](const SpeedLimit& limit) { return limit.from_m >= limit.to_m; });
   rest.slopes = taken_from(first.slopes, offset_m);
   if (!first.slopes.empty()) rest.slopes.insert(rest.slopes.begin(), {0, first.slopes.back().grade});
   rest.cant = taken_from(first.cant, offset_m);

@@ -15,6 +15,17 @@ std::string railml_name(const pugi::xml_node& node) {
   return named.empty() ? std::string(node.attribute("id").value()) : named;
 }
 
+std::set<std::string> special_speed_profiles(const XmlSource& source) {
+  std::set<std::string> out;
+  for (const pugi::xml_node& profile : descendants(source.root(), "speedProfile")) {
+    const std::string is_basic = profile.attribute("isBasicSpeedProfile").value();
+    const std::string influence = profile.attribute("influence").value();
+    if (is_basic == "false" || (is_basic.empty() && influence == "decreasing"))
+      out.insert(profile.attribute("id").value());
+  }
+  return out;
+}
+
 std::optional<EtcsIdentity> etcs_identity(const XmlSource& source, const pugi::xml_node& group) {
   std::vector<pugi::xml_node> places{group};
   for (const pugi::xml_node& child : group.children()) places.push_back(child);

@@ -3,6 +3,7 @@
 #include <map>
 #include <set>
 
+#include "core/units.hpp"
 #include "track/import/railml_readers.hpp"
 
 namespace railfix::track {
@@ -30,6 +31,7 @@ class Reader {
   explicit Reader(const XmlSource& source) : source_(source) {}
 
   RailNet read() {
+    special_profiles_ = special_speed_profiles(source_);
     for (const pugi::xml_node& track : descendants(source_.root(), "track")) {
       if (std::string(track.parent().name()) == "tracks") read_track(track);
     }
@@ -61,6 +63,7 @@ class Reader {
     read_connection(end, {.track = index, .at_end = true});
     for (const pugi::xml_node& points : topology.child("connections").children()) read_switch(points, index);
     read_plan(node.child("trackElements"), track);
+    read_speeds(node.child("trackElements"), track);
     read_marks(node, track);
     read_balises(node.child("ocsElements").child("balises"), track);
   }
@@ -118,6 +121,22 @@ class Reader {
     std::stable_sort(track.cant.begin(), track.cant.end(), by_offset);
   }
 
+  /// Every profile for itself: the lowest holds. "end" as speed ends a limit. On its own track only.
+  void read_speeds(const pugi::xml_node& elements, NetTrack& track) const {
+    std::map<std::pair<std::string, std::string>, std::vector<std::pair<double, double>>>
+        changes;  // profile, direction
+    for (const pugi::xml_node& change : elements.child("speedChanges").children("speedChange")) {
+      const std::string profile = change.attribute("profileRef").value();
+      if (special_profiles_.contains(profile)) continue;
+      const double speed = core::mps_from_kmh(XmlSource::number(change, "vMax").value_or(0));
+      changes[{profile, change.attribute("dir").value()}].emplace_back(pos(change) - origin_m_, speed);
+    }
+    for (const auto& [of, list] : changes) {
+      if (of.second != "down") add_speeds(list, Direction::forward, track.length_m, track.track);
+      if (of.second != "up") add_speeds(list, Direction::reverse, track.length_m, track.track);
+    }
+  }
+
   void read_marks(const pugi::xml_node& node, NetTrack& track) {
     const pugi::xml_node elements = node.child("trackElements");
     const auto add = [&](LandmarkKind kind, double offset_m, double lateral_m, const pugi::xml_node& of) {
@@ -126,8 +145,8 @@ class Reader {
                                 "\" is not on its track; it is left out");
         return;
       }
-      const std::string name = (kind == LandmarkKind::unknown ? "level crossing " : "") + railml_name(of);
-      track.track.marks.push_back({kind, std::clamp(offset_m, 0.0, track.length_m), lateral_m, kRailmlSigmaM, name});
+      track.track.marks.push_back(
+          {kind, std::clamp(offset_m, 0.0, track.length_m), lateral_m, kRailmlSigmaM, railml_name(of)});
     };
     const auto length = [](const pugi::xml_node& of) { return XmlSource::number(of, "length").value_or(0); };
     for (const pugi::xml_node& of : elements.child("tunnels").children("tunnel")) {
@@ -137,7 +156,7 @@ class Reader {
     for (const pugi::xml_node& of : elements.child("bridges").children("bridge"))
       add(LandmarkKind::bridge, pos(of) - origin_m_ + 0.5 * length(of), 0, of);
     for (const pugi::xml_node& of : elements.child("levelCrossings").children("levelCrossing"))
-      add(LandmarkKind::unknown, pos(of) - origin_m_, 0, of);
+      add(LandmarkKind::level_crossing, pos(of) - origin_m_, 0, of);
     for (const pugi::xml_node& of : elements.child("platformEdges").children("platformEdge")) {
       const double lateral = std::string(of.attribute("side").value()) == "left" ? 1.7 : -1.7;
       add(LandmarkKind::platform, pos(of) - origin_m_, lateral, of);
@@ -290,6 +309,7 @@ class Reader {
   const XmlSource& source_;
   RailNet net_;
   double origin_m_ = 0;
+  std::set<std::string> special_profiles_;
   std::map<std::string, Connector> connectors_;
   std::map<size_t, std::map<double, size_t>> pieces_;
 };

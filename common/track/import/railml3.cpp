@@ -3,6 +3,7 @@
 #include <map>
 #include <set>
 
+#include "core/units.hpp"
 #include "track/import/railml_readers.hpp"
 
 namespace railfix::track {
@@ -27,6 +28,7 @@ class Reader {
     read_switches();
     read_plan();
     read_marks();
+    read_speeds();
     read_balises();
     return std::move(net_);
   }
@@ -105,7 +107,8 @@ class Reader {
       const double from = XmlSource::number(part, "posBegin").value_or(0);
       const double to = XmlSource::number(part, "posEnd").value_or(length);
       const auto within = [&](double value) { return std::clamp(value, 0.0, length); };
-      out.push_back({found->second, within(std::min(from, to)), within(std::max(from, to)), from <= to});
+      const bool turned = std::string(part.attribute("keepsOrientation").value()) == "false";
+      out.push_back({found->second, within(std::min(from, to)), within(std::max(from, to)), from <= to && !turned});
     }
     if (!out.empty()) return out;
     for (const pugi::xml_node& spot : descendants(node, "spotLocation")) {
@@ -193,9 +196,8 @@ class Reader {
   }
 
   void add(LandmarkKind kind, const Place& place, double offset_m, double lateral_m, const pugi::xml_node& of) {
-    const std::string name = (kind == LandmarkKind::unknown ? "level crossing " : "") + railml_name(of);
     net_.tracks[place.track].track.marks.push_back(
-        {kind, offset_m, place.same_direction ? lateral_m : -lateral_m, kRailmlSigmaM, name});
+        {kind, offset_m, place.same_direction ? lateral_m : -lateral_m, kRailmlSigmaM, railml_name(of)});
   }
 
   void read_marks() {
@@ -216,7 +218,7 @@ class Reader {
     }
     for (const pugi::xml_node& of : descendants(source_.root(), "levelCrossingIS")) {
       for (const Place& place : places_of(of))
-        add(LandmarkKind::unknown, place, 0.5 * (place.from_m + place.to_m), 0, of);
+        add(LandmarkKind::level_crossing, place, 0.5 * (place.from_m + place.to_m), 0, of);
     }
     for (const pugi::xml_node& of : descendants(source_.root(), "platformEdge")) {
       const bool is_left = !of.find_node([](const pugi::xml_node& node) {
@@ -229,6 +231,30 @@ class Reader {
     }
     for (const pugi::xml_node& of : descendants(source_.root(), "signalIS")) {
       for (const Place& place : places_of(of)) add(LandmarkKind::mast, place, place.from_m, 0, of);
+    }
+  }
+
+  void read_speeds() {
+    const std::set<std::string> special = special_speed_profiles(source_);
+    for (const pugi::xml_node& section : descendants(source_.root(), "speedSection")) {
+      const auto speed = XmlSource::number(section, "maxSpeed");
+      if (!speed || *speed <= 0 || core::mps_from_kmh(*speed) >= SpeedLimit::kFastestMps) continue;
+      const auto profiles = section.children("validForSpeedProfile");
+      const bool is_special = !profiles.empty() && std::all_of(profiles.begin(), profiles.end(), [&](const auto& of) {
+        return special.contains(of.attribute("ref").value());
+      });
+      if (is_special || section.attribute("isTemporary").as_bool()) continue;
+      const pugi::xml_node location = section.child("linearLocation");
+      const std::string applies = location.attribute("applicationDirection").value();
+      for (const Place& place : places_of(section)) {
+        Direction running = Direction::unknown;
+        if (applies == "normal" || applies == "reverse")
+          running = (applies == "normal") == place.same_direction ? Direction::forward : Direction::reverse;
+        if (place.to_m > place.from_m) {
+          net_.tracks[place.track].track.speed_limits.push_back(
+              {place.from_m, place.to_m, core::mps_from_kmh(*speed), running});
+        }
+      }
     }
   }
 

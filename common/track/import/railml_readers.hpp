@@ -1,6 +1,8 @@
 // The two generations of railML, one reader each.
 #pragma once
 
+#include <set>
+
 #include "track/import/rail_net.hpp"
 #include "track/import/xml_source.hpp"
 
@@ -14,6 +16,10 @@ constexpr double kRailmlSigmaM = 1.0;
 
 /// Name of an element for a human: its name, else its code, else its id.
 std::string railml_name(const pugi::xml_node& node);
+
+/// Speed profiles for some trains only (tilting, temporary, ...), by id: what is not the basic profile, or, where the
+/// file marks none as that, what lowers it.
+std::set<std::string> special_speed_profiles(const XmlSource& source);
 
 /// The ETCS identity of a balise group, wherever the file has it; nothing when it has none.
 struct EtcsIdentity {

@@ -14,4 +14,19 @@ void FitFigures::include(const FitFigures& other) {
   max_chord_deviation_m = std::max(max_chord_deviation_m, other.max_chord_deviation_m);
 }
 
+void add_speeds(std::vector<std::pair<double, double>> changes, Direction running, double length_m,
+                ImportedTrack& track) {
+  std::stable_sort(changes.begin(), changes.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  const bool forward = running != Direction::reverse;
+  for (size_t i = 0; i < changes.size(); ++i) {
+    const auto& [at, speed_mps] = changes[i];
+    const double before = i == 0 ? 0.0 : changes[i - 1].first;
+    const double after = i + 1 < changes.size() ? changes[i + 1].first : length_m;
+    const double from = std::clamp(forward ? at : before, 0.0, length_m);
+    const double to = std::clamp(forward ? after : at, 0.0, length_m);
+    if (speed_mps > 0 && speed_mps < SpeedLimit::kFastestMps && to > from)
+      track.speed_limits.push_back({from, to, speed_mps, running});
+  }
+}
+
 }  // namespace railfix::track

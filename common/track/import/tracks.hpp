@@ -34,7 +34,13 @@ struct ImportedTrack {
   Alignment alignment;
   std::vector<TrackMark> marks{};
   std::vector<TrackGroup> groups{};
+  std::vector<SpeedLimit> speed_limits{};
 };
+
+/// Adds limits that hold from a place on, as the train runs, up to the next one or the end of the track. What is no
+/// speed (0, or more than a train runs) ends a limit. `changes`: offset in metres, speed in m/s.
+void add_speeds(std::vector<std::pair<double, double>> changes, Direction running, double length_m,
+                ImportedTrack& track);
 
 /// How well what was read closes: worst cases over all elements, in metres and radians.
 struct FitFigures {

@@ -44,6 +44,10 @@ TEST_F(MapFile, ReadsBackWhatWasSaved) {
   ASSERT_EQ(map.landmarks.size(), 3U);
   EXPECT_EQ(map.landmarks[1].kind, LandmarkKind::portal_in);
   EXPECT_EQ(map.balise_groups[1].nid_lrbg(), 85U << 14U | 101U);
+  EXPECT_EQ(map.edges[0].speed_limit_mps(500, Direction::forward), 20);
+  EXPECT_EQ(map.edges[0].speed_limit_mps(500, Direction::reverse), 20);  // the lower of two
+  EXPECT_EQ(map.edges[0].speed_limit_mps(700, Direction::reverse), 30);
+  EXPECT_FALSE(map.edges[0].speed_limit_mps(700, Direction::forward));
   for (double s = 0; s < 1000; s += 100) {
     EXPECT_EQ(map.edges[0].alignment.at(s).pose.easting_m, saved.edges[0].alignment.at(s).pose.easting_m);
     EXPECT_EQ(map.edges[0].alignment.at(s).cant_m, saved.edges[0].alignment.at(s).cant_m);
@@ -90,6 +94,10 @@ TEST_F(MapFile, NamesWhatIsWrong) {
   map.edges[1].alignment = Alignment::chained({}, {{100, 2, 2}});
   ASSERT_TRUE(map.save(file()).ok());
   EXPECT_THAT(Map::load(file()).error().message, HasSubstr("edge 2 has a radius"));
+  map = small_map();
+  map.edges[0].speed_limits[0].speed_mps = -1;
+  ASSERT_TRUE(map.save(file()).ok());
+  EXPECT_THAT(Map::load(file()).error().message, HasSubstr("edge 1 has a speed limit that is none"));
   EXPECT_FALSE(small_map().save(folder_ / "no" / "folder.map").ok());
 }
 
@@ -115,7 +123,7 @@ TEST(Map, KnowsLandmarksOfAnEdgeInOrder) {
 }
 
 TEST(Map, NamesOfLandmarkKindsGoBothWays) {
-  for (int kind = 0; kind <= static_cast<int>(LandmarkKind::platform); ++kind) {
+  for (int kind = 0; kind <= static_cast<int>(LandmarkKind::level_crossing); ++kind) {
     EXPECT_EQ(landmark_kind_from(to_string(static_cast<LandmarkKind>(kind))), static_cast<LandmarkKind>(kind));
   }
   EXPECT_FALSE(landmark_kind_from("tree"));

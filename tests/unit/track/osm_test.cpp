@@ -14,6 +14,25 @@ namespace {
 
 using testing::HasSubstr;
 
+// The line of OsmTest in the two JSON formats.
+constexpr const char* kOverpass = R"({"elements":[
+{"type":"node","id":1,"lat":48.20001,"lon":15.601},
+{"type":"node","id":2,"lat":48.20004,"lon":15.602,"tags":{"railway":"level_crossing","name":"Mill Lane"}},
+{"type":"node","id":3,"lat":48.20009,"lon":15.603,"tags":{"railway":"switch","ref":"W1"}},
+{"type":"node","id":4,"lat":48.20016,"lon":15.604},{"type":"node","id":5,"lat":48.20025,"lon":15.605},
+{"type":"node","id":6,"lat":48.20036,"lon":15.606,"tags":{"railway":"crossing","name":"Mill Lane"}},
+{"type":"node","id":7,"lat":48.20049,"lon":15.607},{"type":"node","id":8,"lat":48.20064,"lon":15.608},
+{"type":"way","id":10,"nodes":[1,2,3,4],"tags":{"railway":"rail","name":"Westbahn","maxspeed":"160","maxspeed:backward":"50 mph"}},
+{"type":"way","id":11,"nodes":[4,5,6,7,8],"tags":{"railway":"rail","name":"Westbahn","maxspeed":"100"}}]})";
+
+constexpr const char* kGeoJson = R"({"type":"FeatureCollection","features":[
+{"type":"Feature","properties":{"railway":"level_crossing","name":"Mill Lane"},"geometry":{"type":"Point","coordinates":[15.602,48.20004]}},
+{"type":"Feature","properties":{"railway":"crossing","name":"Mill Lane"},"geometry":{"type":"Point","coordinates":[15.606,48.20036]}},
+{"type":"Feature","properties":{"railway":"rail","name":"Westbahn","maxspeed":"160","maxspeed:backward":"50 mph"},
+"geometry":{"type":"LineString","coordinates":[[15.601,48.20001],[15.602,48.20004],[15.603,48.20009],[15.604,48.20016]]}},
+{"type":"Feature","properties":{"railway":"rail","name":"Westbahn","maxspeed":"100"},"geometry":{"type":"LineString",
+"coordinates":[[15.604,48.20016],[15.605,48.20025],[15.606,48.20036],[15.607,48.20049],[15.608,48.20064]]}}]})";
+
 /// A main line (ways 10 and 11) with a switch (node 3), a siding (way 12), a tunnel (way 11), and a road.
 class OsmTest : public ImportTest {
  protected:
@@ -27,6 +46,9 @@ class OsmTest : public ImportTest {
                                   _tag("ref", "W1"));
       } else if (i == 5) {
         osmium::builder::add_node(buffer, _id(i), _version(1), _location(place), _tag("railway", "signal"));
+      } else if (i == 2 || i == 6) {
+        osmium::builder::add_node(buffer, _id(i), _version(1), _location(place),
+                                  _tag("railway", i == 2 ? "level_crossing" : "crossing"), _tag("name", "Mill Lane"));
       } else {
         osmium::builder::add_node(buffer, _id(i), _version(1), _location(place));
       }
@@ -34,11 +56,11 @@ class OsmTest : public ImportTest {
     osmium::builder::add_node(buffer, _id(20), _version(1), _location(15.6045, 48.20002));
     osmium::builder::add_node(buffer, _id(21), _version(1), _location(15.6055, 48.19990));
     osmium::builder::add_way(buffer, _id(10), _version(1), _nodes({1, 2, 3, 4}), _tag("railway", "rail"),
-                             _tag("name", "Westbahn"));
+                             _tag("name", "Westbahn"), _tag("maxspeed", "160"), _tag("maxspeed:backward", "50 mph"));
     osmium::builder::add_way(buffer, _id(11), _version(1), _nodes({4, 5, 6, 7, 8}), _tag("railway", "rail"),
-                             _tag("name", "Westbahn"), _tag("tunnel", "yes"));
+                             _tag("name", "Westbahn"), _tag("tunnel", "yes"), _tag("maxspeed", "100"));
     osmium::builder::add_way(buffer, _id(12), _version(1), _nodes({3, 20, 21}), _tag("railway", "rail"),
-                             _tag("service", "siding"));
+                             _tag("service", "siding"), _tag("maxspeed", "signals"));
     osmium::builder::add_way(buffer, _id(13), _version(1), _nodes({1, 20}), _tag("highway", "primary"));
     osmium::builder::add_way(buffer, _id(14), _version(1), _nodes({20, 2}), _tag("railway", "abandoned"));
     osmium::io::Writer writer(in_folder(name).string(), osmium::io::overwrite::allow);
@@ -81,6 +103,42 @@ TEST_F(OsmTest, TunnelsAndSignalsBecomeLandmarks) {
   EXPECT_NEAR(pose.northing_m, node4->y(), 1e-3);
   EXPECT_GT(portal.sigma_m, 0);
   EXPECT_NE(of(LandmarkKind::mast), map.landmarks.end());
+}
+
+TEST_F(OsmTest, LevelCrossingsAndSpeedsAreKeptInEveryFormat) {
+  for (const auto& file :
+       {write_osm("a.osm"), write_osm("a.osm.pbf"), write("a.json", kOverpass), write("a.geojson", kGeoJson)}) {
+    SCOPED_TRACE(file.filename().string());
+    const Map map = core::value_or_throw(build_map({file}, {})).map;
+    EXPECT_EQ(std::count_if(map.landmarks.begin(), map.landmarks.end(),
+                            [](const Landmark& mark) {
+                              return mark.kind == LandmarkKind::level_crossing && mark.name == "Mill Lane";
+                            }),
+              2);
+    // Along the way as drawn, west to east, whichever way the edge runs.
+    const auto limit_kmh = [&](double lon_deg, bool eastwards) {
+      const auto at = map.from_geo({48.2 + 10 * std::pow(lon_deg - 15.6, 2), lon_deg});
+      for (const Edge& edge : map.edges) {
+        const auto near = edge.alignment.nearest(at->x(), at->y());
+        if (std::abs(near.lateral_m) > 2 || edge.line != "Westbahn") continue;
+        const bool runs_east = std::sin(edge.alignment.at(near.offset_m).pose.heading_rad) > 0;
+        const auto limit =
+            edge.speed_limit_mps(near.offset_m, runs_east == eastwards ? Direction::forward : Direction::reverse);
+        return core::kmh_from_mps(limit.value_or(0));
+      }
+      return -1.0;
+    };
+    EXPECT_NEAR(limit_kmh(15.6015, true), 160, 1e-9);
+    EXPECT_NEAR(limit_kmh(15.6015, false), 80.4672, 1e-9);
+    EXPECT_NEAR(limit_kmh(15.6035, true), 160, 1e-9);
+    EXPECT_NEAR(limit_kmh(15.6065, true), 100, 1e-9);
+    EXPECT_NEAR(limit_kmh(15.6065, false), 100, 1e-9);
+    for (const Edge& edge : map.edges) {
+      if (edge.line.empty()) {
+        EXPECT_TRUE(edge.speed_limits.empty());  // "signals" is no number
+      }
+    }
+  }
 }
 
 TEST_F(OsmTest, TheStraightWayAndTheBranchAreSmooth) {

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "core/random.hpp"
+#include "core/units.hpp"
 #include "import_fixture.hpp"
 #include "track/import/build.hpp"
 #include "track/import/erju.hpp"
@@ -26,6 +27,21 @@ const Node* node_named(const Map& map, const std::string& name) {
   return found == map.nodes.end() ? nullptr : &*found;
 }
 
+/// Name and offset of the only level crossing.
+std::pair<std::string, double> level_crossing_of(const Map& map) {
+  std::vector<const Landmark*> found;
+  for (const Landmark& mark : map.landmarks) {
+    if (mark.kind == LandmarkKind::level_crossing) found.push_back(&mark);
+  }
+  return found.size() == 1 ? std::pair(found[0]->name, found[0]->offset_m)
+                           : std::pair(std::string("none or many"), 0.0);
+}
+
+/// km/h, 0 = none said.
+double limit_kmh(const Map& map, uint32_t edge, double offset_m, Direction running) {
+  return core::kmh_from_mps(map.edge(edge)->speed_limit_mps(offset_m, running).value_or(0));
+}
+
 size_t ways_at(const Map& map, uint32_t node) {
   return static_cast<size_t>(std::count_if(map.connections.begin(), map.connections.end(),
                                            [&](const Connection& way) { return way.node == node; }));
@@ -42,13 +58,16 @@ constexpr const char* kRailml2 = R"(<?xml version="1.0"?>
 <radiusChange id="r2" pos="950" radius="0"/></radiusChanges><gradientChanges><gradientChange id="g1" pos="0" slope="5"/>
 <gradientChange id="g2" pos="400" slope="-10"/></gradientChanges>
 <bridges><bridge id="br1" name="B" pos="40" length="20"/></bridges>
-<levelCrossings><levelCrossing id="lc1" name="Mill Lane" pos="100"/></levelCrossings></trackElements>
+<levelCrossings><levelCrossing id="lc1" name="Mill Lane" pos="100"/></levelCrossings>
+<speedChanges><speedChange id="v1" pos="0" dir="up" vMax="80"/><speedChange id="v2" pos="500" dir="up" vMax="120"/>
+<speedChange id="v3" pos="900" dir="down" vMax="60"/><speedChange id="v4" pos="200" dir="down" vMax="end"/>
+<speedChange id="v5" pos="0" dir="up" vMax="20" profileRef="slow"/></speedChanges></trackElements>
 <ocsElements><balises><balise id="x1" pos="200"/><balise id="x2" pos="203"/>
 <baliseGroup id="bg1" name="BG" countryID="97" groupID="1234"><baliseRef ref="x1" sequence="1"/><baliseRef ref="x2" sequence="2"/></baliseGroup>
 </balises></ocsElements></track>
 <track id="t2" name="siding"><trackTopology><trackBegin id="b2" pos="0"><connection id="c3" ref="c1"/></trackBegin>
 <trackEnd id="e2" pos="400"><connection id="c4" ref="c2"/></trackEnd></trackTopology></track>
-</tracks></infrastructure></railml>)";
+</tracks><infraAttrGroups/><speedProfiles><speedProfile id="slow" influence="decreasing"/></speedProfiles></infrastructure></railml>)";
 
 constexpr const char* kRailml3 = R"(<?xml version="1.0"?>
 <railML xmlns="https://www.railml.org/schemas/3.2" version="3.2"><common><positioning><geometricPositioningSystems>
@@ -65,6 +84,11 @@ constexpr const char* kRailml3 = R"(<?xml version="1.0"?>
 <leftBranch netRelationRef="r12"/><rightBranch netRelationRef="r13"/></switchIS></switchesIS>
 <overCrossings><overCrossing id="o1" constructionType="tunnel"><linearLocation><associatedNetElement netElementRef="n2" posBegin="50" posEnd="150"/></linearLocation></overCrossing></overCrossings>
 <platformEdges><platformEdge id="p1"><linearLocation><associatedNetElement netElementRef="n3" posBegin="100" posEnd="180"/></linearLocation></platformEdge></platformEdges>
+<levelCrossingsIS><levelCrossingIS id="x1"><name name="Mill Lane"/><spotLocation netElementRef="n1" pos="120"/></levelCrossingIS></levelCrossingsIS>
+<speeds><speedProfile id="basic" isBasicSpeedProfile="true"/><speedProfile id="tilting" isBasicSpeedProfile="false"/>
+<speedSection id="v1" maxSpeed="100"><linearLocation><associatedNetElement netElementRef="n1" posBegin="50" posEnd="300"/></linearLocation><validForSpeedProfile ref="basic"/></speedSection>
+<speedSection id="v2" maxSpeed="130"><linearLocation><associatedNetElement netElementRef="n2" posBegin="0" posEnd="200"/></linearLocation><validForSpeedProfile ref="tilting"/></speedSection>
+<speedSection id="v3" maxSpeed="40"><linearLocation applicationDirection="reverse"><associatedNetElement netElementRef="n3" posBegin="0" posEnd="200"/></linearLocation></speedSection></speeds>
 </functionalInfrastructure></infrastructure></railML>)";
 
 constexpr const char* kInfra = R"(<?xml version="1.0"?>
@@ -72,6 +96,10 @@ constexpr const char* kInfra = R"(<?xml version="1.0"?>
 <trackEdgeLinks><trackEdgeLink id="l" trackEdgeA="T1" trackEdgeB="T2" startOfA="false" startOfB="true"/></trackEdgeLinks>
 <trackEdgeGeometries><trackEdgeGeometry id="T1"><cantPoints><cantPoint trackGeometryPos="0" appliedCant="0"/><cantPoint trackGeometryPos="100000" appliedCant="50"/></cantPoints></trackEdgeGeometry></trackEdgeGeometries>
 <sampledTrackEdgeGeometry id="T1"><slopes><slope pos="0" samplePointSlope="100"/></slopes></sampledTrackEdgeGeometry>
+<teSpeedProfiles><teSpeedProfile id="T1"><sameDirProfile><staticSpeedProfile><staticSpeedProfileItem pos="0" speed="60"/>
+<staticSpeedProfileItem pos="200000" speed="40"/></staticSpeedProfile></sameDirProfile><oppositeDirProfile><staticSpeedProfile>
+<staticSpeedProfileItem pos="300000" speed="50"/><staticSpeedProfileItem pos="500000" speed="70"/></staticSpeedProfile></oppositeDirProfile></teSpeedProfile></teSpeedProfiles>
+<levelCrossings><levelCrossing id="LX"><trackArea><trackEdgeSection trackEdge="T2" skipFromStart="100000" skipFromEnd="190000"/></trackArea></levelCrossing></levelCrossings>
 <baliseGroups><baliseGroup id="G" nid_c="97" nid_bg="5050" linkOrientationDirection="dirReverse"><balises>
 <balise id="G0"><spotLocation trackEdge="T2" pos="13000"/></balise><balise id="G1"><spotLocation trackEdge="T2" pos="10000"/></balise></balises></baliseGroup></baliseGroups>
 </infrastructure>)";
@@ -107,8 +135,7 @@ TEST_F(PlanImport, Railml2KeepsWhatThePlanSays) {
   EXPECT_EQ(map.balise_groups[0].nid_lrbg(), 97U << 14U | 1234U);
   EXPECT_NEAR(map.balise_groups[0].offset_m, 200, 1e-6);
   EXPECT_EQ(map.balise_groups[0].balises.size(), 2U);
-  EXPECT_TRUE(std::any_of(map.landmarks.begin(), map.landmarks.end(),
-                          [](const Landmark& mark) { return mark.name == "level crossing Mill Lane"; }));
+  EXPECT_EQ(level_crossing_of(map), std::pair(std::string("Mill Lane"), 100.0));
   // The whole main track: its curve, cant and height.
   const auto shared = std::make_shared<const Map>(map);
   const Path path = core::value_or_throw(Path::follow(shared, {1, 0, Direction::forward}, 2000, 0));
@@ -116,6 +143,16 @@ TEST_F(PlanImport, Railml2KeepsWhatThePlanSays) {
   EXPECT_NEAR(path.curvature_at(900), -1.0 / 500, 1e-12);
   EXPECT_NEAR(path.at(900).cant_m, -0.06, 1e-9);
   EXPECT_NEAR(path.at(1000 - 1e-6).elevation_m, 2.0 - 6.0, 1e-3);
+  // Speeds: of the changes that all trains heed, up to the next one on the track, over the pieces that switches cut.
+  const auto speed = [&](double distance_m) { return core::kmh_from_mps(path.speed_limit_at(distance_m).value_or(0)); };
+  for (const auto& [at, kmh] : {std::pair(10.0, 80.0), {499.0, 80.0}, {501.0, 120.0}, {999.0, 120.0}})
+    EXPECT_NEAR(speed(at), kmh, 1e-9) << at;
+  const auto speed_back = [&](double from_begin_m) {
+    const EdgePosition place = path.position_at(from_begin_m);
+    return limit_kmh(map, place.edge, place.offset_m, Direction::reverse);
+  };
+  for (const auto& [at, kmh] : {std::pair(950.0, 0.0), {899.0, 60.0}, {500.0, 60.0}, {201.0, 60.0}, {150.0, 0.0}})
+    EXPECT_NEAR(speed_back(at), kmh, 1e-9) << at;
   // And over the siding: straight way first, as long as the file says.
   const Path over = core::value_or_throw(Path::follow(shared, {1, 0, Direction::forward}, 2000, 0, {4, 2}));
   EXPECT_NEAR(over.end_m(), 1000, 1e-6);
@@ -140,6 +177,14 @@ TEST_F(PlanImport, Railml3KeepsWhatThePlanSays) {
   EXPECT_EQ(count(LandmarkKind::portal_in), 1);
   EXPECT_EQ(count(LandmarkKind::portal_out), 1);
   EXPECT_EQ(count(LandmarkKind::platform), 2);
+  EXPECT_EQ(level_crossing_of(map).first, "Mill Lane");
+  EXPECT_NEAR(level_crossing_of(map).second, 120, 0.01);
+  EXPECT_NEAR(limit_kmh(map, 1, 100, Direction::forward), 100, 1e-9);
+  EXPECT_NEAR(limit_kmh(map, 1, 100, Direction::reverse), 100, 1e-9);
+  EXPECT_EQ(limit_kmh(map, 1, 20, Direction::forward), 0);
+  EXPECT_EQ(limit_kmh(map, 2, 100, Direction::forward), 0);  // for tilting trains only
+  EXPECT_EQ(limit_kmh(map, 3, 100, Direction::forward), 0);
+  EXPECT_NEAR(limit_kmh(map, 3, 100, Direction::reverse), 40, 1e-9);
 }
 
 // The same infrastructure in both generations.
@@ -175,6 +220,13 @@ TEST_F(PlanImport, ErjuWithoutCoordinatesIsADrawing) {
   EXPECT_NEAR(map.balise_groups[0].offset_m, 13, 1e-9);
   EXPECT_NEAR(map.edges[0].alignment.at(100).cant_m, 0.05, 1e-12);
   EXPECT_NEAR(map.edges[1].alignment.at(0).elevation_m, 5, 1e-9);
+  EXPECT_EQ(level_crossing_of(map).first, "LX");
+  EXPECT_NEAR(level_crossing_of(map).second, 105, 1e-9);
+  EXPECT_NEAR(limit_kmh(map, 1, 100, Direction::forward), 60, 1e-9);
+  EXPECT_NEAR(limit_kmh(map, 1, 250, Direction::forward), 40, 1e-9);
+  EXPECT_NEAR(limit_kmh(map, 1, 100, Direction::reverse), 50, 1e-9);
+  EXPECT_NEAR(limit_kmh(map, 1, 400, Direction::reverse), 70, 1e-9);
+  EXPECT_EQ(limit_kmh(map, 2, 100, Direction::forward), 0);
 }
 
 TEST_F(PlanImport, ScheibenbergIsReadWhole) {
@@ -195,6 +247,8 @@ TEST_F(PlanImport, ScheibenbergIsReadWhole) {
   // As the files count, but for one edge whose coordinates are 20.5 m shorter than its length.
   EXPECT_NEAR(length_of(map), 26258.83 - 20.5, 1);
   EXPECT_THAT(map.problems, Contains(HasSubstr("T11")));
+  EXPECT_TRUE(
+      std::none_of(map.edges.begin(), map.edges.end(), [](const Edge& edge) { return edge.speed_limits.empty(); }));
   EXPECT_LT(built.fit.max_m, 0.5);
   const auto geo = map.to_geo(map.nodes[0].easting_m, map.nodes[0].northing_m);
   ASSERT_TRUE(geo);

@@ -24,6 +24,7 @@ inline Map small_map() {
   const Alignment siding =
       Alignment::chained({far.easting_m, far.northing_m, far.heading_rad + core::kPi}, {{500, 1.0 / 300, 1.0 / 300}});
   map.edges = {{1, "main", 1, 2, "line 1", main}, {2, "on", 2, 3, "line 1", on}, {3, "siding", 4, 2, "", siding}};
+  map.edges[0].speed_limits = {{0, 600, 20, Direction::unknown}, {400, 1000, 30, Direction::reverse}};
   map.nodes = {{1, NodeKind::end, "", 2680000, 1250000},
                {2, NodeKind::railway_switch, "W1", at_switch.easting_m, at_switch.northing_m},
                {3, NodeKind::end, "", on.at(800).pose.easting_m, on.at(800).pose.northing_m},

@@ -34,6 +34,8 @@ Colour colour_of(track::LandmarkKind kind) {
       return {150, 150, 150};
     case track::LandmarkKind::balise:
       return kBalise;
+    case track::LandmarkKind::level_crossing:
+      return {240, 100, 100};
     default:
       return {110, 110, 0};
   }
@@ -211,6 +213,7 @@ class Painter {
     entry(colour_of(track::LandmarkKind::bridge), "bridge", false);
     entry(colour_of(track::LandmarkKind::platform), "platform", false);
     entry(colour_of(track::LandmarkKind::mast), "mast", false);
+    entry(colour_of(track::LandmarkKind::level_crossing), "level crossing", false);
   }
 
   const track::Map& map_;
