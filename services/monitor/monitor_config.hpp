@@ -9,6 +9,7 @@ struct MonitorConfig {
   std::string address = "127.0.0.1";
   int64_t port = 8080;
   int64_t port_search = 20;
+  int64_t foxglove_port = 8765;
   std::string page_folder;
   std::string map;
   bool control = true;
@@ -28,6 +29,9 @@ struct MonitorConfig {
     fields.integer("port", port, {0, 65535}, "", "Port of page, /api, /metrics and /healthz; 0 = any that is free.");
     fields.integer("port_search", port_search, {0, 1000}, "ports",
                    "When the port is taken the ones after it are tried, this many; 0 = refuse to start.");
+    fields.integer(
+        "foxglove_port", foxglove_port, {-1, 65535}, "",
+        "Port for Foxglove and Lichtblick besides the one above; 0 = none besides, -1 = no Foxglove at all.");
     fields.text("page_folder", page_folder, "Folder of the built page; empty = the one of this build.");
     fields.text("map", map, "Map file in use (from `railfix map build`); empty = no line is drawn.");
     fields.flag("control", control, "Whether recorder and player can be controlled from the page.");

@@ -3,9 +3,13 @@
 
 #include <deque>
 
+#include "core/time.hpp"
+#include "monitor/cab_watch.hpp"
+#include "monitor/foxglove_api.hpp"
 #include "monitor/http_server.hpp"
 #include "monitor/live_api.hpp"
 #include "monitor/live_messages.hpp"
+#include "monitor/map_view.hpp"
 #include "monitor/monitor_config.hpp"
 #include "monitor/problems.hpp"
 #include "monitor/static_files.hpp"
@@ -38,28 +42,52 @@ class MonitorService {
     }
   };
 
-  [[nodiscard]] Handlers handlers();
-  [[nodiscard]] LiveApi::Actions live_actions();
-  [[nodiscard]] Handlers::Upgrade upgrade(const Request& request) const;
+  /// Whose samples come at least once a second is gone when none came for this long.
+  static constexpr int64_t kAbsentNs = 5 * core::kNsPerSecond;
+  template <class T>
+  static bool recent(const Newest<T>& newest) {
+    return newest.sample && core::wall_ns() - newest.received_ns < kAbsentNs;
+  }
+
+  // monitor_service.cpp: samples, and what is wrong
   void start_timers();
   void set_up_topics();
-
   void arrived(const Arrived& arrived);
+  void hand_to_foxglove(const Arrived& arrived);
+  void on_track(const msg::TrackView& view);
   void on_log(const Arrived& arrived);
   void on_report(const Arrived& arrived);
+  [[nodiscard]] std::set<std::string> cameras() const;
+  [[nodiscard]] std::set<std::string> wanted_topics() const;
   void choose_topics();
+  void show_channels();
+  [[nodiscard]] TrainSeen train_seen();
+  void look_for_problems();
+
+  // monitor_shows.cpp: what is said to those who look
+  [[nodiscard]] std::optional<track::EdgePosition> place() const;
+  void publish_log();
+  void publish_curvature();
+  void publish_pictures();
   void publish_state();
   void publish_topics();
-  void publish_log();
-  void look_for_problems();
-  [[nodiscard]] TrainSeen train_seen();
+  [[nodiscard]] nlohmann::json curvature_message() const;
+  [[nodiscard]] nlohmann::json status_message(const std::string& kind, const messaging::TopicInfo& info,
+                                              const void* sample) const;
+  [[nodiscard]] std::vector<TopicShown> topics_shown() const;
+  [[nodiscard]] std::vector<nlohmann::json> first(const std::string& kind);
 
+  // monitor_clients.cpp: HTTP, WebSockets, control
+  [[nodiscard]] Handlers handlers();
+  [[nodiscard]] LiveApi::Actions live_actions();
+  [[nodiscard]] FoxgloveApi::Actions foxglove_actions();
+  [[nodiscard]] Handlers::Upgrade upgrade(const Request& request) const;
   [[nodiscard]] Response answer(const Request& request);
+  [[nodiscard]] Response map_answer(const Request& request) const;
+  [[nodiscard]] Response metrics_answer();
+  [[nodiscard]] Response health_answer() const;
   [[nodiscard]] nlohmann::json about(const Request& request) const;
   [[nodiscard]] std::string control_of(const Request& request) const;
-  [[nodiscard]] std::vector<nlohmann::json> first(const std::string& kind);
-  [[nodiscard]] nlohmann::json status_message(const std::string& kind, const std::string& topic,
-                                              const messaging::TopicInfo& info, const void* sample) const;
   void control(const ClientPtr& client, const ControlAsk& ask);
   void reply(const msg::ControlReply& reply);
   void give_up_waiting();
@@ -67,6 +95,7 @@ class MonitorService {
   Config config_;
   service::Context& context_;
   std::optional<track::Map> map_;
+  std::unique_ptr<MapView> map_view_;  // null without a map
   StaticFiles files_;
   messaging::Writer<msg::ControlRequest> control_;
   std::map<std::string, std::function<void(const Arrived&)>> on_topic_;
@@ -83,18 +112,27 @@ class MonitorService {
   std::deque<nlohmann::json> log_;
   nlohmann::json log_fresh_ = nlohmann::json::array();
   std::deque<nlohmann::json> reports_;
+  uint64_t reports_sent_ = 0;
+  CurvatureTrail trail_;
+  std::map<std::string, FoxgloveMessage> standing_;  // by topic
   std::vector<std::string> written_;
+  std::map<std::string, int64_t> wanted_ns_;  // topics, and when they were last wanted
+  std::optional<std::set<std::string>> shown_cameras_;
   ProblemList problems_;
   int64_t begun_ns_ = 0;
   int64_t scraped_ns_ = 0;
+  uint64_t slow_viewers_ = 0;
 
   uint64_t next_request_ = 0;
   std::map<uint64_t, ControlWaiting> waiting_;
   TrainWatch watch_;
   std::string address_;
   uint16_t port_ = 0;
+  uint16_t foxglove_port_ = 0;
   HttpServer server_;
-  LiveApi live_;  // before the server: it holds clients
+  CabWatch cab_;
+  LiveApi live_;  // these two hold clients, and go before the server
+  FoxgloveApi foxglove_;
 };
 
 }  // namespace railfix::monitor

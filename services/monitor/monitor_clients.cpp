@@ -1,0 +1,214 @@
+// How the monitor service answers HTTP, lets WebSockets in, and passes on what they ask for.
+#include <cmath>
+
+#include "core/time.hpp"
+#include "monitor/metrics.hpp"
+#include "monitor/monitor_service.hpp"
+
+namespace railfix::monitor {
+namespace {
+
+using nlohmann::json;
+
+constexpr int64_t kAnswerNs = 10 * core::kNsPerSecond;
+constexpr double kMapRadiusM = 20'000;
+constexpr const char* kText = "text/plain; charset=utf-8";
+
+Response json_response(const json& body) {
+  return {200, "application/json", text_of(body) + "\n", "", "no-store"};
+}
+
+std::optional<double> number_of(const Request& request, const char* key) {
+  const auto found = request.query.find(key);
+  if (found == request.query.end()) return std::nullopt;
+  char* end = nullptr;
+  const double value = std::strtod(found->second.c_str(), &end);
+  return end != found->second.c_str() && *end == '\0' && std::isfinite(value) ? std::optional(value) : std::nullopt;
+}
+
+bool speaks_foxglove(const Request& request) {
+  return request.path != "/api/live";
+}
+
+}  // namespace
+
+Handlers MonitorService::handlers() {
+  Handlers handlers;
+  handlers.request = [this](const Request& request, std::function<void(Response)> answer) {
+    const bool ours = request.path.starts_with("/api/") || request.path == "/healthz" || request.path == "/metrics";
+    if (!ours) return answer(files_.get(request));
+    context_.post([this, request, answer = std::move(answer)] { answer(this->answer(request)); });
+  };
+  handlers.upgrade = [this](const Request& request) { return upgrade(request); };
+  handlers.opened = [this](const ClientPtr& client) {
+    context_.post([this, client] {
+      if (speaks_foxglove(client->request())) return foxglove_.opened(client);
+      live_.opened(client);
+    });
+  };
+  handlers.message = [this](const ClientPtr& client, const std::string& text, bool binary) {
+    context_.post([this, client, text, binary] {
+      if (speaks_foxglove(client->request())) return foxglove_.message(client, text, binary);
+      live_.message(client, text);
+    });
+  };
+  handlers.closed = [this](const ClientPtr& client, const std::string& why) {
+    context_.post([this, client, why] {
+      if (!why.empty()) {
+        ++slow_viewers_;
+        context_.log().warn("a viewer was disconnected: {}", why);
+      }
+      if (speaks_foxglove(client->request())) return foxglove_.closed(client);
+      live_.closed(client);
+    });
+  };
+  handlers.slow = [this](const ClientPtr& client, uint64_t dropped) {
+    context_.post([this, client, dropped] { foxglove_.slow(client, dropped); });
+  };
+  return handlers;
+}
+
+Handlers::Upgrade MonitorService::upgrade(const Request& request) const {
+  const auto refuse = [](unsigned status, const char* why) {
+    return Handlers::Upgrade{false, "", {status, kText, why, "", "no-store"}};
+  };
+  if (speaks_foxglove(request)) {
+    const std::string subprotocol = foxglove_subprotocol(request.subprotocols);
+    if (config_.foxglove_port >= 0 && !subprotocol.empty()) return {true, subprotocol, {}};
+    return refuse(400, "this WebSocket speaks foxglove.sdk.v1 and foxglove.websocket.v1; the page's is /api/live\n");
+  }
+  // Any page of the internet may try to open a WebSocket to this address from the viewer's browser.
+  const size_t scheme = request.origin.find("://");
+  const std::string origin = scheme == std::string::npos ? request.origin : request.origin.substr(scheme + 3);
+  if (!origin.empty() && origin != request.host) return refuse(403, "only the monitor's own page may connect\n");
+  return {true, "", {}};
+}
+
+LiveApi::Actions MonitorService::live_actions() {
+  LiveApi::Actions actions;
+  actions.hello = [this](const Client&) {
+    return json{{"kind", "hello"},
+                {"train", context_.common().train_id},
+                {"version", RAILFIX_VERSION},
+                {"host", context_.common().host},
+                {"now_ns", core::wall_ns()}};
+  };
+  actions.first = [this](const std::string& kind) { return first(kind); };
+  actions.watch_changed = [this] { choose_topics(); };
+  actions.control = [this](const ClientPtr& client, const ControlAsk& ask) { control(client, ask); };
+  return actions;
+}
+
+FoxgloveApi::Actions MonitorService::foxglove_actions() {
+  FoxgloveApi::Actions actions;
+  actions.name = "Railfix, train " + context_.common().train_id;
+  actions.metadata = {{"train", context_.common().train_id},
+                      {"version", RAILFIX_VERSION},
+                      {"host", context_.common().host},
+                      {"session", context_.common().train_id + "-" + std::to_string(begun_ns_)}};
+  actions.watch_changed = [this] { choose_topics(); };
+  actions.first = [this](const std::string& topic) {
+    const auto standing = standing_.find(topic);
+    return standing == standing_.end() ? std::vector<FoxgloveMessage>{} : std::vector{standing->second};
+  };
+  return actions;
+}
+
+std::string MonitorService::control_of(const Request& request) const {
+  if (!config_.control) return "off";
+  if (!config_.token.empty()) return "token";
+  return request.local ? "open" : "off";
+}
+
+json MonitorService::about(const Request& request) const {
+  json map = nullptr;
+  if (map_) map = {{"name", map_->name}, {"edges", map_->edges.size()}, {"length_m", map_view_->length_m()}};
+  return {{"train", context_.common().train_id},
+          {"version", RAILFIX_VERSION},
+          {"host", context_.common().host},
+          {"now_ns", core::wall_ns()},
+          {"cameras", cameras()},
+          {"control", control_of(request)},
+          {"map", map}};
+}
+
+// All of a short map; of a long one what lies around a place, the train's when none is named.
+Response MonitorService::map_answer(const Request& request) const {
+  if (!map_view_) return {404, kText, "no map is in use; set monitor.map\n", "", "no-store"};
+  std::optional<track::EdgePosition> around;
+  const auto edge = number_of(request, "edge");
+  if (edge && *edge >= 1 && *edge <= static_cast<double>(map_->edges.size())) {
+    around = track::EdgePosition{static_cast<uint32_t>(*edge), number_of(request, "offset").value_or(0)};
+  } else if (map_view_->length_m() > MapView::kWholeMap_m) {
+    around = place().value_or(track::EdgePosition{1, 0});
+  }
+  return json_response(map_view_->message(around, number_of(request, "radius").value_or(kMapRadiusM)));
+}
+
+Response MonitorService::metrics_answer() {
+  scraped_ns_ = core::wall_ns();
+  const TrainSeen seen = train_seen();
+  MetricsInput input{context_.common().train_id, RAILFIX_VERSION, context_.common().host, &seen,        {},
+                     &problems_.problems(),      reports_sent_,   server_.clients(),      slow_viewers_};
+  for (const auto& [name, topic] : watch_.topics()) {
+    if (!topic.reader) continue;
+    input.topics.push_back({name, topic.reader->matched_writers(), topic.statistics.numbers(seen.now_ns),
+                            topic.statistics.latency_counts(), topic.statistics.latency_sum_s()});
+  }
+  return {200, "text/plain; version=0.0.4; charset=utf-8", metrics_text(input), "", "no-store"};
+}
+
+Response MonitorService::health_answer() const {
+  const auto& problems = problems_.problems();
+  const bool bad = !problems.empty() && problems.front().level == Level::error;
+  return {bad ? 503U : 200U, kText, bad ? problems.front().what + "\n" : "ok\n", "", "no-store"};
+}
+
+Response MonitorService::answer(const Request& request) {
+  if (request.method != "GET" && request.method != "HEAD") {
+    return {405, kText, "only GET and HEAD\n", "", "no-store"};
+  }
+  if (request.path == "/api/about") return json_response(about(request));
+  if (request.path == "/api/map") return map_answer(request);
+  if (request.path == "/metrics") return metrics_answer();
+  if (request.path == "/healthz") return health_answer();
+  return {404, kText, "there is nothing here\n", "", "no-store"};
+}
+
+void MonitorService::control(const ClientPtr& client, const ControlAsk& ask) {
+  const std::string allowed = control_of(client->request());
+  const auto refuse = [&](const std::string& why) { live_.reply(ask.client, ask.id, false, why); };
+  if (allowed == "off") {
+    return refuse(config_.control ? "control is only allowed from this computer itself; set monitor.token for others"
+                                  : "control is switched off (monitor.control)");
+  }
+  if (allowed == "token" && ask.token != config_.token) return refuse("the token is wrong");
+  if (ask.service != "recorder" && ask.service != "player") {
+    return refuse("only recorder and player can be controlled from here, not '" + ask.service + "'");
+  }
+  msg::ControlRequest request;
+  request.request_id(++next_request_);
+  request.service(ask.service);
+  request.command(ask.command.substr(0, 32));
+  request.argument(ask.argument.substr(0, 256));
+  waiting_[next_request_] = {ask.client, ask.id, ask.service, core::monotonic_ns()};
+  context_.log().info("from the page: {} {} {}", ask.service, ask.command, ask.argument);
+  control_.write(request);
+}
+
+void MonitorService::reply(const msg::ControlReply& reply) {
+  const auto waiting = waiting_.find(reply.request_id());
+  if (waiting == waiting_.end()) return;
+  live_.reply(waiting->second.client, waiting->second.id, reply.done(), reply.text().c_str());
+  waiting_.erase(waiting);
+}
+
+void MonitorService::give_up_waiting() {
+  std::erase_if(waiting_, [this](const auto& entry) {
+    if (core::monotonic_ns() - entry.second.asked_ns < kAnswerNs) return false;
+    live_.reply(entry.second.client, entry.second.id, false, entry.second.service + " does not answer; is it running?");
+    return true;
+  });
+}
+
+}  // namespace railfix::monitor

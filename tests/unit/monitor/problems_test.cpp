@@ -1,0 +1,133 @@
+#include "monitor/problems.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/time.hpp"
+
+namespace railfix::monitor {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+constexpr int64_t kNow_ns = 1'700'000'000 * core::kNsPerSecond;
+
+class ProblemsTest : public ::testing::Test {
+ protected:
+  ProblemsTest() {
+    train_.now_ns = kNow_ns;
+    train_.watched_since_ns = kNow_ns - 60 * core::kNsPerSecond;
+    train_.services = &board_;
+    train_.expected = {"odometry", "fusion"};
+    for (const char* name : {"odometry", "fusion"}) board_.note(status(name, msg::STATE_ACTIVE), kNow_ns);
+    train_.state.emplace();
+    train_.state->track_known(1);
+    train_.state->over_m(3);
+    train_.state->under_m(3);
+    TopicNumbers numbers;
+    numbers.age_s = 0.02;
+    train_.topics.push_back({"odometry_step", numbers, 0.02, true});
+  }
+  static msg::ServiceStatus status(const std::string& name, uint8_t state, const std::string& reason = "") {
+    msg::ServiceStatus made;
+    made.service(name);
+    made.host("cab");
+    made.state(state);
+    made.reason(reason);
+    return made;
+  }
+  [[nodiscard]] Problem only() const {
+    const auto problems = find_problems(train_);
+    EXPECT_EQ(problems.size(), 1U);
+    return problems.empty() ? Problem{} : problems.front();
+  }
+
+  ServiceBoard board_;
+  TrainSeen train_;
+};
+
+TEST_F(ProblemsTest, AWellTrainHasNone) {
+  EXPECT_THAT(find_problems(train_), IsEmpty());
+}
+
+TEST_F(ProblemsTest, NamesServicesThatAreMissingDeadOrDegraded) {
+  train_.expected.push_back("recorder");
+  EXPECT_EQ(only().what, "recorder is not there");
+  train_.watched_since_ns = kNow_ns;
+  EXPECT_THAT(find_problems(train_), IsEmpty()) << "it may still be starting";
+
+  board_.note(status("odometry", msg::STATE_DEGRADED, "the picture is dark"), kNow_ns);
+  EXPECT_THAT(only().what, HasSubstr("the picture is dark"));
+  EXPECT_EQ(only().level, Level::warning);
+  board_.note_silent(status("odometry", msg::STATE_DEGRADED), kNow_ns);
+  EXPECT_THAT(only().what, HasSubstr("dead or frozen"));
+  EXPECT_EQ(only().level, Level::error);
+  board_.note(status("odometry", msg::STATE_STOPPED), kNow_ns);
+  EXPECT_EQ(only().what, "odometry was stopped");
+}
+
+TEST_F(ProblemsTest, ASilentTopicIsOneOnlyWhileDataFlows) {
+  train_.topics[0].numbers.age_s = 3;
+  EXPECT_EQ(only().what, "odometry_step has stopped coming");
+  train_.data_stands = true;
+  EXPECT_THAT(find_problems(train_), IsEmpty());
+  train_.data_stands = false;
+  train_.topics[0].written = false;
+  EXPECT_THAT(find_problems(train_), IsEmpty()) << "its writer has gone, which is the service's problem";
+}
+
+TEST_F(ProblemsTest, TellsWhatIsWrongWithThePosition) {
+  train_.state->over_m(90);
+  train_.state->under_m(40);
+  EXPECT_THAT(only().what, HasSubstr("130 m wide"));
+  train_.state->track_known(0);
+  EXPECT_THAT(only().what, HasSubstr("not known which track"));
+  train_.state->track_known(1);
+  train_.state->over_m(1);
+  train_.state->integrity(msg::INTEGRITY_UNUSABLE);
+  EXPECT_EQ(only().level, Level::error);
+}
+
+TEST_F(ProblemsTest, TellsOfRecorderSatellitesAndSharedMemory) {
+  train_.recorder.emplace();
+  train_.recorder->state(msg::RECORDER_RECORDING);
+  train_.recorder->disk_free_mb(50'000);
+  EXPECT_THAT(find_problems(train_), IsEmpty());
+  msg::LostSamples lost;
+  lost.topic("track_view");
+  lost.queue(12);
+  train_.recorder->lost({lost});
+  EXPECT_THAT(only().what, HasSubstr("12 samples of track_view"));
+  train_.recorder->lost({});
+  train_.recorder->disk_free_mb(300);
+  EXPECT_THAT(only().what, HasSubstr("300 MB"));
+  train_.recorder->disk_free_mb(50'000);
+  train_.recorder->state(msg::RECORDER_STOPPED);
+  EXPECT_EQ(only().what, "Nothing is being recorded");
+  train_.recorder.reset();
+  train_.gnss.emplace();
+  train_.gnss->fix(msg::GNSS_NONE);
+  EXPECT_THAT(only().what, HasSubstr("no fix"));
+  train_.gnss.reset();
+  train_.shared_memory_free_mb = 10;
+  EXPECT_THAT(only().what, HasSubstr("/dev/shm has 10 MB left"));
+}
+
+TEST(ProblemList, RemembersSinceWhenAndPutsTheWorstFirst) {
+  ProblemList list;
+  const Problem warning{"a", Level::warning, "a", "", 0};
+  const Problem error{"b", Level::error, "b", "", 0};
+  EXPECT_TRUE(list.update({warning}, 100));
+  EXPECT_FALSE(list.update({warning}, 200));
+  EXPECT_TRUE(list.update({warning, error}, 300));
+  ASSERT_EQ(list.problems().size(), 2U);
+  EXPECT_EQ(list.problems()[0].id, "b");
+  EXPECT_EQ(list.problems()[1].since_ns, 100);
+  EXPECT_TRUE(list.update({}, 400));
+  EXPECT_TRUE(list.update({warning}, 500));
+  EXPECT_EQ(list.problems()[0].since_ns, 500) << "it had gone meanwhile";
+}
+
+}  // namespace
+}  // namespace railfix::monitor
