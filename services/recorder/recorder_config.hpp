@@ -14,7 +14,7 @@ struct RecorderConfig {
   std::string pictures = "jpeg";
   int64_t picture_quality = 85;
   int64_t picture_every = 1;
-  int64_t picture_queue = 60;
+  int64_t picture_queue = 120;
   int64_t sample_queue = 20000;
   std::string compression = "zstd";
   double chunk_mb = 1.0;

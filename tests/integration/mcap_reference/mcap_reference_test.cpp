@@ -1,14 +1,15 @@
 // The reference implementation reads our recordings and we read its own.
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "core/random.hpp"
 #include "mcap/reader.hpp"
 #include "mcap/writer.hpp"
+#include "support/mcap_records.hpp"
+#include "support/mcap_reference.hpp"
 
 namespace railfix::mcap {
 
@@ -21,26 +22,14 @@ constexpr uint32_t kSamples = 200;
 
 class McapReferenceTest : public ::testing::Test {
  protected:
-  static void SetUpTestSuite() {
-    if (std::system("npm --version > /dev/null 2>&1") != 0) return;
-    npm_ = true;
-    fs::create_directories(kWork);
-    for (const char* name : {"package.json", "reference.mjs"}) {
-      fs::copy_file(kSource / name, kWork / name, fs::copy_options::overwrite_existing);
-    }
-    if (!fs::exists(kWork / "node_modules" / "@mcap" / "support")) {
-      const std::string install = "cd '" + kWork.string() + "' && npm install --no-audit --no-fund > npm.log 2>&1";
-      ASSERT_EQ(std::system(install.c_str()), 0) << "npm install failed, see " << kWork / "npm.log";
-    }
+  static const test::McapReference& reference() {
+    static const test::McapReference installed(
+        fs::path(RAILFIX_SOURCE_DIR) / "tests" / "integration" / "mcap_reference", kWork);
+    return installed;
   }
   void SetUp() override {
-    if (!npm_) GTEST_SKIP() << "skipped: npm is not there";
-  }
-
-  static bool reference(const std::string& action, const fs::path& file, const fs::path& out) {
-    const std::string command = "cd '" + kWork.string() + "' && node reference.mjs " + action + " '" + file.string() +
-                                "' > '" + out.string() + "' 2> errors.log";
-    return std::system(command.c_str()) == 0;
+    if (reference().problem() == "npm is not there") GTEST_SKIP() << "skipped: npm is not there";
+    ASSERT_EQ(reference().problem(), "");
   }
 
   static json sample(uint32_t i) {
@@ -72,16 +61,14 @@ class McapReferenceTest : public ::testing::Test {
     return kWork / "ours.mcap";
   }
 
-  inline static const fs::path kSource = fs::path(RAILFIX_SOURCE_DIR) / "tests" / "integration" / "mcap_reference";
   inline static const fs::path kWork = MCAP_REFERENCE_WORK;
-  inline static bool npm_ = false;
 };
 
 TEST_F(McapReferenceTest, ReadsOurRecordings) {
   for (const auto compression : {Compression::none, Compression::zstd, Compression::lz4}) {
     const fs::path file = record(compression);
     for (const std::string action : {"indexed", "stream"}) {
-      ASSERT_TRUE(reference(action, file, kWork / "found.json")) << action << " " << name_of(compression);
+      ASSERT_TRUE(reference().run(action, file, kWork / "found.json")) << action << " " << name_of(compression);
       const json found = json::parse(std::ifstream(kWork / "found.json"));
       ASSERT_EQ(found["messages"].size(), kSamples) << action;
       for (uint32_t i = 0; i < kSamples; ++i) EXPECT_EQ(found["messages"][i], sample(i)) << action;
@@ -94,18 +81,44 @@ TEST_F(McapReferenceTest, ReadsOurRecordings) {
   }
 }
 
+// tests/benchmark/recording_cuts does the same a thousand times.
+TEST_F(McapReferenceTest, AcceptsEveryRepairedFile) {
+  const fs::path folder = kWork / "cuts";
+  fs::remove_all(folder);
+  fs::create_directories(folder);
+  core::Random random(5);
+  std::map<std::string, size_t> expected;
+  for (const auto compression : {Compression::none, Compression::zstd, Compression::lz4}) {
+    const Bytes whole = test::bytes_of_file(record(compression));
+    const auto ends = test::record_ends(whole);
+    for (int i = 0; i < 20; ++i) {
+      const size_t size = kMagic.size() + random.next() % (whole.size() - kMagic.size());
+      std::ofstream(folder / "cut", std::ios::binary)
+          .write(reinterpret_cast<const char*>(whole.data()), static_cast<std::streamsize>(size));
+      const std::string name = name_of(compression) + std::to_string(size) + ".mcap";
+      const auto lost = recover(folder / "cut", folder / name);
+      ASSERT_TRUE(lost.ok()) << lost.error().message;
+      expected[name] = test::messages_before(ends, size);
+    }
+  }
+  ASSERT_TRUE(reference().run("count", folder, kWork / "counts.json"));
+  const json counts = json::parse(std::ifstream(kWork / "counts.json"));
+  ASSERT_EQ(counts.size(), expected.size());
+  for (const auto& [name, messages] : expected) EXPECT_EQ(counts[name], messages) << name;
+}
+
 TEST_F(McapReferenceTest, NoticesWhatWeWouldNotWrite) {
   const fs::path file = record(Compression::zstd);
   std::fstream stream(file, std::ios::binary | std::ios::in | std::ios::out);
   stream.seekp(400);
   stream.write("XXXX", 4);
   stream.close();
-  EXPECT_FALSE(reference("stream", file, kWork / "found.json")) << "the comparison above could not fail";
+  EXPECT_FALSE(reference().run("stream", file, kWork / "found.json")) << "the comparison above could not fail";
 }
 
 TEST_F(McapReferenceTest, OurReaderReadsTheirs) {
   const fs::path file = kWork / "theirs.mcap";
-  ASSERT_TRUE(reference("write", file, kWork / "written.log"));
+  ASSERT_TRUE(reference().run("write", file, kWork / "written.log"));
   auto reader = Reader::open(file).value();
   EXPECT_TRUE(reader->indexed());
   uint32_t i = 0;

@@ -1,10 +1,13 @@
 // The reference MCAP implementation as a program for the test:
 //   node reference.mjs indexed FILE   prints what the indexed reader finds, as one JSON object
 //   node reference.mjs stream FILE    the same with the linear reader
+//   node reference.mjs count FOLDER   how many messages the indexed reader finds in each recording of a folder, after the
+//                                     linear one has checked every CRC and found as many; an error is a text instead
 //   node reference.mjs write FILE     writes a recording for our reader
 import { McapIndexedReader, McapStreamReader, McapWriter } from "@mcap/core";
 import { loadDecompressHandlers } from "@mcap/support";
-import { readFileSync, writeFileSync } from "node:fs";
+import { readdirSync, readFileSync, writeFileSync } from "node:fs";
+import { join } from "node:path";
 
 const [, , action, file] = process.argv;
 
@@ -53,6 +56,21 @@ function readStream(bytes, decompressHandlers) {
   return collector.found;
 }
 
+async function countMessages(folder, decompressHandlers) {
+  const counts = {};
+  for (const name of readdirSync(folder).filter((entry) => entry.endsWith(".mcap"))) {
+    const bytes = readFileSync(join(folder, name));
+    try {
+      const indexed = (await readIndexed(bytes, decompressHandlers)).messages.length;
+      const linear = readStream(bytes, decompressHandlers).messages.length;
+      counts[name] = indexed === linear ? indexed : `${indexed} by the index, but ${linear} in the file`;
+    } catch (error) {
+      counts[name] = String(error);
+    }
+  }
+  return counts;
+}
+
 async function write(path) {
   const parts = [];
   let size = 0n;
@@ -81,6 +99,8 @@ async function write(path) {
 
 if (action === "write") {
   await write(file);
+} else if (action === "count") {
+  console.log(JSON.stringify(await countMessages(file, await loadDecompressHandlers())));
 } else {
   const handlers = await loadDecompressHandlers();
   const bytes = readFileSync(file);

@@ -9,7 +9,9 @@
 #include "mcap/writer.hpp"
 #include "messaging/topics.hpp"
 #include "recorder/pictures.hpp"
+#include "support/mcap_records.hpp"
 #include "support/program.hpp"
+#include "support/run_until.hpp"
 
 namespace railfix {
 
@@ -165,6 +167,114 @@ TEST_F(RecordingTest, AKilledRecorderLosesNoWrittenChunk) {
   reader->for_each({{"odometry_step"}, {}, {}},
                    [&](const mcap::Channel&, const mcap::Message&) { return ++steps > 0; });
   EXPECT_EQ(steps, kSteps) << "the replay lingers longer than a chunk's age";
+}
+
+TEST_F(RecordingTest, KilledWhileItWritesItKeepsEveryWholeChunk) {
+  const std::vector<std::string> settings{"--set", "recorder.folder=" + folder_.string() + "/killed", "--set",
+                                          "recorder.chunk_age_s=0.05"};
+  test::Program killed(recorder(settings), log());
+  wait_for_recorder();
+  test::Program replay(
+      {"railfix", "replay", source().string(), "--topics", "odometry_step", "--train", train_, "--domain", kDomain},
+      {folder_ / "replay.log", {}, {}});
+  const fs::path active = fs::directory_iterator(folder_ / "killed")->path();
+  ASSERT_EQ(active.extension(), ".active");
+  const int64_t deadline_ns = core::monotonic_ns() + 60 * core::kNsPerSecond;
+  size_t written = 0;
+  while (written < kSteps / 4) {
+    ASSERT_LT(core::monotonic_ns(), deadline_ns) << test::slurp(folder_ / "recorder.log");
+    usleep(10'000);
+    const auto ends = test::record_ends(test::bytes_of_file(active));
+    written = ends.empty() ? 0 : ends.back().messages;
+  }
+  const auto refused = test::run_program({"railfix", "recording", "repair", active.string()}, 60);
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("is being written by a recorder now"));
+  EXPECT_EQ(killed.end(SIGKILL), 128 + SIGKILL);
+  const size_t whole = test::record_ends(test::bytes_of_file(active)).back().messages;
+  EXPECT_GE(whole, written);
+
+  const auto out = folder_ / "repaired.mcap";
+  const auto repaired =
+      test::run_program({"railfix", "recording", "repair", active.string(), "--out", out.string()}, 60);
+  EXPECT_EQ(repaired.exit_code, 0) << repaired.err;
+  EXPECT_THAT(repaired.out, HasSubstr(": " + std::to_string(whole) + " samples of "));
+  EXPECT_TRUE(mcap::Reader::open(out).value()->indexed());
+  const auto again = test::run_program({"railfix", "recording", "repair", out.string()}, 60);
+  EXPECT_EQ(again.exit_code, 0);
+  EXPECT_THAT(again.out, HasSubstr("nothing to repair"));
+
+  test::Program next(recorder(settings), log());
+  wait_for_recorder();
+  const fs::path recovered = mcap::recovered_name(active);
+  ASSERT_TRUE(fs::exists(recovered)) << test::slurp(folder_ / "recorder.log");
+  EXPECT_EQ(mcap::Reader::open(recovered).value()->statistics().messages, whole);
+  EXPECT_EQ(next.end(SIGTERM), 0);
+}
+
+TEST_F(RecordingTest, IsLedOverDdsAndSaysHowItIs) {
+  messaging::ParticipantOptions options;
+  options.train_id = train_;
+  options.domain = std::stoi(kDomain);
+  messaging::Participant participant(options);
+  messaging::Queue queue;
+  msg::RecorderStatus status;
+  status.state(255);
+  messaging::Reader<msg::RecorderStatus> statuses(participant, messaging::topics::recorder_status, "", queue,
+                                                  [&](const msg::RecorderStatus& now) { status = now; });
+  msg::ControlReply reply;
+  messaging::Reader<msg::ControlReply> replies(participant, messaging::topics::service_reply, "", queue,
+                                               [&](const msg::ControlReply& now) { reply = now; });
+  messaging::Writer<msg::ControlRequest> control(participant, messaging::topics::service_control);
+  test::Program recorder_program(
+      recorder({"--set", "recorder.folder=" + folder_.string(), "--set", "recorder.autostart=false", "--set",
+                "recorder.ring_s=5", "--set", "recorder.after_s=0"}),
+      log());
+  const auto until = [&](const auto& condition) { return test::run_until(participant, queue, condition); };
+  const auto state = [&](uint8_t wanted) { return until([&] { return status.state() == wanted; }); };
+  uint64_t id = 0;
+  const auto command = [&](const char* name, const std::string& argument = "") {
+    msg::ControlRequest request;
+    request.request_id(++id);
+    request.service("recorder");
+    request.command(name);
+    request.argument(argument);
+    EXPECT_TRUE(control.write(request));
+    EXPECT_TRUE(until([&] { return reply.request_id() == id; })) << name;
+    return reply.done();
+  };
+  // Its loop and its recording listen to commands.
+  ASSERT_TRUE(until([&] { return control.matched_readers() == 2 && replies.matched_writers() == 1; }));
+  ASSERT_TRUE(state(msg::RECORDER_WAITING)) << "it keeps a ring";
+  EXPECT_FALSE(command("stop"));
+  EXPECT_TRUE(command("start"));
+  ASSERT_TRUE(state(msg::RECORDER_RECORDING));
+  const fs::path file = status.file().c_str();
+  EXPECT_TRUE(fs::exists(file.string() + ".active"));
+  EXPECT_GT(status.disk_free_mb(), 0);
+  EXPECT_TRUE(command("pause"));
+  ASSERT_TRUE(state(msg::RECORDER_PAUSED));
+  EXPECT_FALSE(command("pause"));
+  EXPECT_THAT(reply.text().c_str(), HasSubstr("is paused already"));
+  EXPECT_TRUE(command("resume"));
+  ASSERT_TRUE(state(msg::RECORDER_RECORDING));
+  EXPECT_TRUE(command("event", "a jolt"));
+  EXPECT_THAT(reply.text().c_str(), HasSubstr("-event.mcap is being made"));
+  EXPECT_TRUE(until([&] { return status.protected_files() == 1 && std::string(status.event().c_str()) == "a jolt"; }));
+  EXPECT_TRUE(command("protect", file.filename().string()));
+  EXPECT_TRUE(until([&] { return status.protected_files() == 2; }));
+  EXPECT_TRUE(command("stop"));
+  ASSERT_TRUE(state(msg::RECORDER_WAITING));
+  EXPECT_TRUE(command("unprotect", file.filename().string()));
+  EXPECT_TRUE(until([&] { return status.protected_files() == 1; }));
+  EXPECT_FALSE(command("unprotect", "no-such-recording"));
+  EXPECT_THAT(reply.text().c_str(), HasSubstr("there is no recording"));
+  EXPECT_EQ(recorder_program.end(SIGTERM), 0) << test::slurp(folder_ / "recorder.log");
+  auto reader = mcap::Reader::open(file).value();
+  EXPECT_TRUE(reader->indexed());
+  EXPECT_TRUE(std::ranges::any_of(reader->metadata(), [](const mcap::Metadata& metadata) {
+    return metadata.name == "railfix_event" && metadata.entries.at("text") == "a jolt";
+  }));
 }
 
 TEST_F(RecordingTest, ReplayRefusesWhatCannotBeMeant) {

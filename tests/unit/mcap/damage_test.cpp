@@ -1,8 +1,8 @@
 #include <gmock/gmock.h>
 
 #include "core/random.hpp"
-#include "mcap/compression.hpp"
 #include "recordings.hpp"
+#include "support/mcap_records.hpp"
 
 namespace railfix::mcap {
 
@@ -22,21 +22,8 @@ WriterOptions small_chunks() {
 /// Ends of the chunks of a proper file and how many messages stand before each.
 std::vector<std::pair<size_t, size_t>> chunk_ends(const Bytes& file) {
   std::vector<std::pair<size_t, size_t>> ends;
-  size_t messages = 0;
-  Decoder decoder(ByteView(file).subspan(kMagic.size()));
-  while (decoder.left() > kMagic.size()) {
-    const uint8_t opcode = decoder.u8();
-    const ByteView content = decoder.raw(decoder.u64());
-    if (opcode != static_cast<uint8_t>(Opcode::chunk)) continue;
-    ChunkHead head;
-    ByteView stored;
-    EXPECT_TRUE(parse(content, head, stored));
-    const Bytes records = chunk_records(head, stored).value();
-    for (Decoder inside(records); inside.left() > 0; ++messages) {
-      (void)inside.u8();
-      (void)inside.raw(inside.u64());
-    }
-    ends.emplace_back(kMagic.size() + decoder.position(), messages);
+  for (const auto& end : test::record_ends(file)) {
+    if (end.opcode == static_cast<uint8_t>(Opcode::chunk)) ends.emplace_back(end.offset, end.messages);
   }
   return ends;
 }
