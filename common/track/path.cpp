@@ -231,6 +231,39 @@ void Path::collect_marks() {
   const auto by_distance = [](const auto& a, const auto& b) { return a.distance_m < b.distance_m; };
   std::stable_sort(landmarks_.begin(), landmarks_.end(), by_distance);
   std::stable_sort(groups_.begin(), groups_.end(), by_distance);
+  collect_switches();
+}
+
+void Path::collect_switches() {
+  std::unordered_map<uint32_t, std::vector<const Connection*>> at_node;
+  const auto node_before = [](const Leg& leg) { return leg.forward ? leg.edge->from_node : leg.edge->to_node; };
+  for (size_t i = 1; i < legs_.size(); ++i) at_node[node_before(legs_[i])];
+  for (const Connection& connection : map_->connections) {
+    const auto found = at_node.find(connection.node);
+    if (found != at_node.end()) found->second.push_back(&connection);
+  }
+  const auto ways_after = [&](const Run& run, uint32_t node) {
+    int ways = 0;
+    for (const Connection* connection : at_node[node]) {
+      if (connection->edge_a != run.edge->id && connection->edge_b != run.edge->id) continue;
+      const Edge* other = map_->edge(connection->edge_a == run.edge->id ? connection->edge_b : connection->edge_a);
+      if (other == nullptr) continue;
+      for (const bool forward : {true, false}) {
+        const Run next{other, forward};
+        if ((forward ? other->from_node : other->to_node) != node || next == run.reversed()) continue;
+        const double turn = std::abs(core::wrap_pi(begin_heading(next) - end_heading(run)));
+        ways += turn < core::kPi / 2 ? 1 : 0;
+      }
+    }
+    return ways;
+  };
+  for (size_t i = 1; i < legs_.size(); ++i) {
+    const uint32_t node = node_before(legs_[i]);
+    const int ahead = ways_after({legs_[i - 1].edge, legs_[i - 1].forward}, node);
+    const int behind = ways_after({legs_[i].edge, !legs_[i].forward}, node);
+    if (ahead > 1) switches_.push_back({legs_[i].begin_m, true, ahead});
+    if (behind > 1) switches_.push_back({legs_[i].begin_m, false, behind});
+  }
 }
 
 double Path::begin_m() const {

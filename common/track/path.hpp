@@ -24,6 +24,14 @@ struct PathBaliseGroup {
   bool nominal_is_along_path = true;
 };
 
+/// Where the track divides: more than one way for a train that comes from smaller distances (ahead) or from larger
+/// ones.
+struct PathSwitch {
+  double distance_m = 0;
+  bool ahead = true;
+  int ways = 2;
+};
+
 /// Distance 0 is where the path was started; it may be negative behind it. Read-only after it is made; keeps the map
 /// alive.
 class Path {
@@ -51,6 +59,7 @@ class Path {
   [[nodiscard]] std::optional<double> speed_limit_at(double distance_m) const;
   [[nodiscard]] const std::vector<PathLandmark>& landmarks() const { return landmarks_; }  // by distance
   [[nodiscard]] const std::vector<PathBaliseGroup>& balise_groups() const { return groups_; }
+  [[nodiscard]] const std::vector<PathSwitch>& switches() const { return switches_; }  // by distance
   [[nodiscard]] const Map& map() const { return *map_; }
 
  private:
@@ -67,10 +76,12 @@ class Path {
   friend Path rerouted(const Path& old, const Ways& ways, const EdgePosition& place, double near_m, double ahead_m,
                        double behind_m);
   void collect_marks();
+  void collect_switches();
   std::shared_ptr<const Map> map_;
   std::vector<Leg> legs_;
   std::vector<PathLandmark> landmarks_;
   std::vector<PathBaliseGroup> groups_;
+  std::vector<PathSwitch> switches_;
 };
 
 /// The way of a train that is on another track than `old` says: through `place`, joined to the old way where that leads

@@ -48,7 +48,7 @@ TrainEstimate Estimator::estimate(const Interval& promised, double since_sure_m)
   e.reference = reference_;
   e.standstill = standstill_;
   e.track_known = path_ != nullptr;
-  e.track_probability = path_ ? track_probability_ : 0;
+  e.track_probability = path_ ? track_doubt_.probability_at(*path_, filter_.path_distance_m()) : 0;
   e.sigma_m = path_ ? filter_.path_sigma_m() : filter_.sigma(StateIndex::distance);
   const double centre_m = path_ ? filter_.path_distance_m() : e.distance_m;
   e.over_m = centre_m - promised.behind_m;

@@ -100,6 +100,7 @@ void Estimator::apply(const Event& event) {
         use(input);
       },
       event);
+  if (path_) track_doubt_.move(*path_, filter_.path_distance_m());
   watch_standstill();
 }
 
@@ -133,6 +134,7 @@ bool Estimator::is_consistent() const {
 
 void Estimator::place_like(const Estimator& other) {
   path_ = other.path_;
+  track_doubt_ = other.track_doubt_;
   filter_.place_like(other.filter_);
   doubt_m_ = std::max(doubt_m_, other.doubt_m_);
   time_doubt_m_ = std::max(time_doubt_m_, other.time_doubt_m_);
@@ -318,8 +320,11 @@ void Estimator::use(const GnssInput& sample) {
 void Estimator::use(const FixInput& fix) {
   if (fix.kind == FixKind::track) {
     if (!path_) return;
-    track_probability_ = fix.probability;
     if (fix.new_path) path_ = fix.new_path;
+    // What is said of another track is no more than its rest for this one.
+    const auto of_m = path_->distance_of(fix.edge, fix.offset_m);
+    const double here_m = filter_.path_distance_m();
+    track_doubt_.said(of_m ? fix.probability : std::min(fix.probability, 1 - fix.probability), of_m, here_m);
     return;
   }
   auto& watch = watched(fix.kind == FixKind::curvature ? Source::curvature : Source::landmark);
@@ -327,6 +332,7 @@ void Estimator::use(const FixInput& fix) {
   if (fix.new_path) {
     path_ = fix.new_path;
     filter_.set_origin(0, std::hypot(fix.sigma_m, parameters_->fix_sigma_floor_m));
+    track_doubt_.said(fix.probability, std::nullopt, filter_.path_distance_m());
     accept(fix);
     return;
   }

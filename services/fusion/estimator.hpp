@@ -11,6 +11,7 @@
 #include "fusion/fusion_types.hpp"
 #include "fusion/motion_filter.hpp"
 #include "fusion/slip_watch.hpp"
+#include "fusion/track_doubt.hpp"
 #include "track/path.hpp"
 
 namespace railfix::fusion {
@@ -161,7 +162,7 @@ class Estimator {
   double rest_distance_m_ = 0;
   int64_t rest_since_ns_ = 0;
   bool standstill_ = false;
-  double track_probability_ = 1;  // as the matcher says; without one the configured start and the straight way count
+  TrackDoubt track_doubt_;
   int64_t start_ns_ = 0;
 };
 

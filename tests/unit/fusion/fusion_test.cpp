@@ -353,11 +353,13 @@ TEST(Fusion, FollowsTheDeclaredTrackAndSaysWhileItIsOpen) {
     FixInput fix{at(t_s), edge, offset_m, INFINITY, probability, 0, FixKind::track, track::Direction::forward, nullptr};
     fusion.add(fix);
   };
-  EXPECT_EQ(run(fusion, 9, 12, 10).position.edge, 2U);
-  said(12, 3, 20, 0.8);
-  auto state = run(fusion, 12, 13, 10);
+  auto state = run(fusion, 9, 12, 10);
   EXPECT_EQ(state.position.edge, 2U);
-  EXPECT_EQ(state.track_probability, 0.8);
+  EXPECT_EQ(state.track_probability, 0.5);  // nobody has looked yet
+  said(12, 3, 20, 0.8);
+  state = run(fusion, 12, 13, 10);
+  EXPECT_EQ(state.position.edge, 2U);
+  EXPECT_NEAR(state.track_probability, 0.2, 1e-9);  // the other track is the likelier
   said(13, 3, 30, 0.9995);
   state = run(fusion, 13, 14, 10);
   EXPECT_EQ(state.position.edge, 3U);
@@ -365,6 +367,28 @@ TEST(Fusion, FollowsTheDeclaredTrackAndSaysWhileItIsOpen) {
   EXPECT_EQ(state.track_probability, 0.9995);
   EXPECT_NEAR(state.distance_m, 140, 0.1);
   EXPECT_LT(state.over_m, 10);
+}
+
+TEST(Fusion, WithoutAMatcherTheTrackBehindASwitchIsAGuessAndOnTheStemItIsNot) {
+  auto map = std::make_shared<track::Map>();
+  map->edges.push_back({1, "stem", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{1000, 0, 0}})});
+  map->edges.push_back({2, "straight", 2, 3, "", track::Alignment::chained({0, 1000, 0}, {{1000, 0, 0}})});
+  map->edges.push_back({3, "left", 2, 4, "", track::Alignment::chained({0, 1000, 0}, {{1000, 0.001, 0.001}})});
+  map->connections = {{2, 1, 2, false}, {2, 1, 3, true}};
+  const auto start = track::EdgePosition{1, 950, track::Direction::forward};
+  auto there = core::value_or_throw(Fusion::create({}, map, start));
+  EXPECT_EQ(run(there, 0, 4, 10).track_probability, 1);
+  EXPECT_EQ(run(there, 4, 20, 10).track_probability, 0.5);  // 150 m behind it
+  for (int t = 20; t < 40; ++t) run(there, t, t + 1, 30 - t);
+  EXPECT_EQ(run(there, 40, 60, -10).track_probability, 1);  // back before it
+  for (int t = 60; t < 80; ++t) run(there, t, t + 1, t - 70);
+  EXPECT_EQ(run(there, 80, 95, 10).track_probability, 0.5);  // it may have been thrown
+  // A leg that is run towards the switch is no question.
+  const auto from_leg = track::EdgePosition{3, 100, track::Direction::reverse};
+  auto trailing = core::value_or_throw(Fusion::create({}, map, from_leg));
+  const auto state = run(trailing, 0, 20, 10);
+  EXPECT_EQ(state.position.edge, 1U);
+  EXPECT_EQ(state.track_probability, 1);
 }
 
 TEST(Fusion, GnssHoldsTheIntervalAndWildFixesAreRefused) {
