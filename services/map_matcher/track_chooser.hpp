@@ -27,7 +27,7 @@ struct TrackParameters {
   double wrong_side = 0.03;       // chance that a frog or mast is reported on the wrong side
   double view_from_m = 3.0;       // the curvature in a picture is that of the rails from here ...
   double view_to_m = 20.0;        // ... to here ahead of the camera's foot
-  double astray = 0.05;           // chance that the picture's rails are those of another leg than the own
+  double astray = 0.15;           // chance that the picture's rails are those of another leg than the own
   double astray_m = 60.0;         // ... which then lasts about so far
 };
 

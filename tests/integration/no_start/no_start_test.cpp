@@ -1,0 +1,205 @@
+// Nobody knows where the train stands: map_matcher finds the place from the way it bends, fusion starts from there.
+// Both as programs over DDS; this test is the odometer and gives the turns of lock step.
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "core/random.hpp"
+#include "core/time.hpp"
+#include "messaging/connected.hpp"
+#include "messaging/lock_step.hpp"
+#include "support/program.hpp"
+#include "support/run_until.hpp"
+#include "support/sensed_ride.hpp"
+#include "track/path.hpp"
+
+namespace railfix {
+namespace {
+
+namespace fs = std::filesystem;
+namespace topics = messaging::topics;
+
+constexpr int kDomain = 84;
+constexpr uint32_t kEdge = 5;
+constexpr double kFromM = 300;
+constexpr double kToM = 2300;
+constexpr double kStepM = 1.6;
+constexpr double kScale = 1.012;  // measured metres are too many
+constexpr int64_t kStepNs = 100'000'000;
+constexpr int64_t kBeginNs = 1'700'000'000'000'000'000;
+
+// Twelve lines that bend differently, far from each other.
+track::Map made_map() {
+  core::Random random(8);
+  track::Map map;
+  for (uint32_t id = 1; id <= 12; ++id) {
+    std::vector<track::Element> elements;
+    for (double sum_m = 0; sum_m < 3000;) {
+      const double curvature = (random.uniform() < 0.5 ? -1 : 1) / random.uniform(300, 1000);
+      for (const auto& e :
+           {track::Element{random.uniform(80, 300), 0, 0}, track::Element{60, 0, curvature},
+            track::Element{random.uniform(80, 250), curvature, curvature}, track::Element{60, curvature, 0}}) {
+        elements.push_back(e);
+        sum_m += e.length_m;
+      }
+    }
+    map.nodes.push_back({2 * id - 1, track::NodeKind::end, "", 0, 0});
+    map.nodes.push_back({2 * id, track::NodeKind::end, "", 0, 0});
+    map.edges.push_back({id, "line", 2 * id - 1, 2 * id, "", track::Alignment::chained({5000.0 * id, 0, 0}, elements)});
+  }
+  return map;
+}
+
+class NoStart : public ::testing::Test {
+ protected:
+  NoStart()
+      : train_("no-start-" + std::to_string(getpid())),
+        folder_(fs::temp_directory_path() / ("railfix-" + train_)),
+        participant_(options(train_)),
+        steps_(participant_, topics::odometry_step),
+        clock_(participant_, topics::data_clock) {
+    listen<msg::DataProgress>(topics::data_progress, [this](const msg::DataProgress& p) { progress_ = p; });
+    listen<msg::TrainState>(topics::train_state, [this](const msg::TrainState& s) { states_.push_back(s); });
+    listen<msg::PositionFix>(topics::position_fix, [this](const msg::PositionFix& f) { fixes_.push_back(f); });
+    listen<msg::ServiceStatus>(topics::service_status,
+                               [this](const msg::ServiceStatus& s) { status_[s.service().c_str()] = s; });
+    fs::create_directories(folder_);
+  }
+  ~NoStart() override { fs::remove_all(folder_); }
+  NoStart(const NoStart&) = delete;
+  NoStart& operator=(const NoStart&) = delete;
+
+  static messaging::ParticipantOptions options(const std::string& train) {
+    messaging::ParticipantOptions options;
+    options.train_id = train;
+    options.domain = kDomain;
+    return options;
+  }
+  template <class T>
+  void listen(const messaging::Topic<T>& topic, std::function<void(const T&)> handler) {
+    readers_.push_back(std::make_shared<messaging::Reader<T>>(participant_, topic, "", queue_, std::move(handler)));
+  }
+  [[nodiscard]] std::unique_ptr<test::Program> service(const std::string& name, const std::string& program,
+                                                       std::vector<std::string> more) const {
+    std::vector<std::string> sets{"common.train_id=" + train_, "common.domain=" + std::to_string(kDomain),
+                                  "common.log_level=error", "common.lock_step=true",
+                                  name + ".map=" + (folder_ / "map.railfix").string()};
+    sets.insert(sets.end(), more.begin(), more.end());
+    return std::make_unique<test::Program>(test::with_settings(program, sets));
+  }
+  template <class Condition>
+  bool run_until(Condition condition) {
+    return test::run_until(participant_, queue_, condition);
+  }
+  bool connected() {
+    uint32_t endpoints = 0;
+    uint32_t matches = 0;
+    for (const auto& [name, status] : status_) {
+      endpoints += status.endpoints();
+      matches += status.matches();
+    }
+    return status_.size() == 2 && messaging::all_connected(participant_.connections(), endpoints, matches);
+  }
+
+  /// Gives a service its turn and waits until it has taken it.
+  bool turn_of(const std::string& service, uint64_t seq, int64_t data_ns) {
+    msg::DataClock clock;
+    clock.data_ns(data_ns);
+    clock.seq(seq);
+    clock.lock_step(1);
+    clock.turn(service);
+    auto sent = messaging::sent_samples(participant_);
+    for (const auto& [name, samples] : sent_) sent.insert(sent.end(), samples.begin(), samples.end());
+    clock.sent(sent);
+    clock_.write(clock);
+    const bool taken = run_until([&] { return progress_.seq() == seq && service == progress_.service().c_str(); });
+    if (taken) sent_[service] = progress_.sent();
+    return taken;
+  }
+  [[nodiscard]] uint64_t states_sent() const {
+    const auto fusion = sent_.find("fusion");
+    if (fusion == sent_.end()) return 0;
+    for (const auto& one : fusion->second) {
+      if (std::string(one.topic().c_str()) == "train_state") return one.samples();
+    }
+    return 0;
+  }
+
+  std::string train_;
+  fs::path folder_;
+  messaging::Queue queue_;
+  messaging::Participant participant_;
+  messaging::Writer<msg::OdometryStep> steps_;
+  messaging::Writer<msg::DataClock> clock_;
+  std::vector<std::shared_ptr<void>> readers_;
+  msg::DataProgress progress_;
+  std::vector<msg::TrainState> states_;
+  std::vector<msg::PositionFix> fixes_;
+  std::map<std::string, msg::ServiceStatus> status_;
+  std::map<std::string, std::vector<msg::SentSamples>> sent_;
+};
+
+TEST_F(NoStart, ThePlaceIsFoundOnTheMapAndFusionStartsThere) {
+  const track::Map map = made_map();
+  ASSERT_TRUE(map.save(folder_ / "map.railfix").ok());
+  const auto matcher = service("map_matcher", "railfix-map-matcher", {"map_matcher.locate_every_m=100"});
+  const auto fusion = service("fusion", "railfix-fusion", {"fusion.start=unknown"});
+  ASSERT_TRUE(run_until([&] { return connected(); }));
+
+  testing::RideErrors errors;
+  errors.odometer_scale = kScale - 1;
+  errors.turn_bias_rps = errors.turn_noise_rps = 0;
+  errors.step_turn_noise_rad = 3e-4;
+  errors.bogies_behind_m = errors.bogie_distance_m = 0;  // curvature fixes know nothing of a body that turns late
+  const auto& alignment = map.edge(kEdge)->alignment;
+  const testing::VehicleHeading heading([&](double m) { return alignment.curvature_at(m); }, 0, 3000, errors);
+  testing::RideSensors sensors(errors, 4);
+  double distance_m = 0;
+  std::map<int64_t, double> truth_m;
+  uint64_t seq = 0;
+  for (double at_m = kFromM; at_m < kToM; at_m += kStepM) {
+    const int64_t stamp_ns = kBeginNs + static_cast<int64_t>(++seq) * kStepNs;
+    const auto sensed = sensors.step(heading, 0, at_m, at_m + kStepM, core::seconds(kStepNs));
+    distance_m += sensed.way_m;
+    truth_m[stamp_ns] = at_m + kStepM;
+    msg::OdometryStep step;
+    step.stamp_ns(stamp_ns);
+    step.reference_stamp_ns(stamp_ns - kStepNs);
+    step.step_m(sensed.way_m);
+    step.step_sigma_m(0.005);
+    step.yaw_rad(sensed.turn_rad);
+    step.yaw_sigma_rad(sensed.turn_sigma_rad);
+    step.distance_m(distance_m);
+    step.speed_mps(sensed.way_m / core::seconds(kStepNs));
+    step.mode(msg::ODOMETRY_TRACK);
+    step.valid(1);
+    ASSERT_TRUE(steps_.write(step));
+    ASSERT_TRUE(turn_of("map_matcher", seq, stamp_ns)) << "at step " << seq;
+    ASSERT_TRUE(turn_of("fusion", seq, stamp_ns)) << "at step " << seq;
+  }
+  ASSERT_TRUE(run_until([&] { return states_.size() >= states_sent(); }));
+
+  size_t unknown = 0;
+  size_t known = 0;
+  for (const auto& state : states_) {
+    if (state.track_known() == 0) {
+      ++unknown;
+      EXPECT_EQ(known, 0U) << "the place was known and forgotten";
+      continue;
+    }
+    ++known;
+    ASSERT_EQ(state.edge(), kEdge);
+    EXPECT_EQ(state.direction(), msg::DIRECTION_FORWARD);
+    const double error_m = truth_m.at(state.stamp_ns()) - state.offset_m();
+    EXPECT_LE(error_m, state.under_m());
+    EXPECT_GE(error_m, -state.over_m());
+  }
+  EXPECT_GT(unknown, 400U) << "found sooner than anybody can know";
+  EXPECT_GT(known, 100U) << "not found within " << kToM - kFromM << " m";
+  ASSERT_FALSE(fixes_.empty());
+  EXPECT_EQ(fixes_.front().kind(), msg::FIX_NETWORK);
+  EXPECT_GT(fixes_.front().probability(), 0.999);
+}
+
+}  // namespace
+}  // namespace railfix
