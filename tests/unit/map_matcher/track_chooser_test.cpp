@@ -89,5 +89,21 @@ TEST(TrackChooser, TheSideOfTheFrogCounts) {
   EXPECT_FALSE(choice->known);
 }
 
+// A detector that follows the other leg shows it in every picture: many of them say little more than one.
+TEST(TrackChooser, PicturesAloneNeverDeclareATrack) {
+  const auto map = fork();
+  TrackChooser chooser({}, map, std::make_shared<const track::Ways>(*map));
+  chooser.follow({{1, 480, track::Direction::forward}, 2, 2, 0.3});
+  for (double place_m = 480; place_m < 530; place_m += 1) {
+    chooser.move_blind(1);
+    if (place_m > 505) chooser.see(0.003, 2e-4);
+  }
+  const auto choice = chooser.choice();
+  ASSERT_TRUE(choice);
+  EXPECT_EQ(choice->options.front().place.edge, 3U);
+  EXPECT_GT(choice->options.front().probability, 0.7);
+  EXPECT_FALSE(choice->known);
+}
+
 }  // namespace
 }  // namespace railfix::map_matcher
