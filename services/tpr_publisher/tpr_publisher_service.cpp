@@ -164,6 +164,7 @@ void TprPublisherService::on_tick() {
 }
 
 void TprPublisherService::send(const Report& report, int64_t grabbed_ns) {
+  to_ground(report);  // the store's thread begins with it at once, whatever becomes of the sample on the train
   auto message = message_of(report, baseline_);
   message.seq(seq_);
   if (!writer_.write(message)) {
@@ -171,7 +172,6 @@ void TprPublisherService::send(const Report& report, int64_t grabbed_ns) {
     return;
   }
   ++seq_;
-  to_ground(report);
   reference_known_ = report.fields.nid_lrbg != etcs::kUnknownBaliseGroup;
   context_.health().output(grabbed_ns);
   context_.log().debug("reason {}: {}", message.reason(), etcs::to_hex(report.message));

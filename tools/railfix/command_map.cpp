@@ -92,12 +92,14 @@ const char* kind_of(const track::Element& element) {
 
 /// Straights, clothoids and arcs, and the elements that fit worst.
 void print_fit(const track::FitReport& fit) {
-  if (fit.tracks + fit.left_as_arcs == 0) return;
+  if (fit.tracks + fit.left_as_arcs + fit.two_points == 0) return;
   std::map<std::string, size_t> count;
   for (const track::FittedElement& element : fit.elements) ++count[kind_of(element.element)];
   std::printf("polylines as straights, clothoids and arcs\n");
-  std::printf("  tracks                        %zu, %zu more left as arcs through their points\n", fit.tracks,
-              fit.left_as_arcs);
+  std::printf("  tracks                        %zu, %zu more left as arcs through their points, %zu of two points\n",
+              fit.tracks, fit.left_as_arcs, fit.two_points);
+  std::printf("  left out, still arcs          %zu points apart from their track, %.0f m of these tracks\n",
+              fit.left_out, fit.arcs_m);
   std::printf("  elements                      %zu straights, %zu clothoids, %zu arcs\n", count["straight"],
               count["clothoid"], count["arc"]);
   std::printf("  points from the track         %.3f m rms, %.3f m at most\n", fit.rms_m(), fit.max_m);
@@ -122,11 +124,10 @@ ordered_json to_json(const track::FitReport& fit) {
                         {"curvature_end_per_m", element.element.curvature_end_per_m},
                         {"max_point_distance_m", element.max_m}});
   }
-  return {{"tracks", fit.tracks},
-          {"left_as_arcs", fit.left_as_arcs},
-          {"rms_m", fit.rms_m()},
-          {"max_m", fit.max_m},
-          {"elements", elements}};
+  return {{"tracks", fit.tracks},         {"left_as_arcs", fit.left_as_arcs},
+          {"two_points", fit.two_points}, {"left_out_points", fit.left_out},
+          {"arcs_m", fit.arcs_m},         {"rms_m", fit.rms_m()},
+          {"max_m", fit.max_m},           {"elements", elements}};
 }
 
 ordered_json to_json(const track::FitFigures& figures) {

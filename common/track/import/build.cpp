@@ -146,6 +146,9 @@ class Sources {
     std::move(read.elements.begin(), read.elements.end(), std::back_inserter(all.elements));
     all.tracks += read.tracks;
     all.left_as_arcs += read.left_as_arcs;
+    all.two_points += read.two_points;
+    all.left_out += read.left_out;
+    all.arcs_m += read.arcs_m;
     all.points += read.points;
     all.squared_sum_m2 += read.squared_sum_m2;
     all.max_m = std::max(all.max_m, read.max_m);

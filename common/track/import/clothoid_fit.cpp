@@ -12,6 +12,8 @@ namespace railfix::track {
 namespace {
 
 constexpr size_t kFewestPoints = 6;
+constexpr size_t kFewestWithSigma = 3;
+constexpr double kUsualWeighs = 4;    // points
 constexpr size_t kMostPoints = 1500;  // the cost grows with their third power
 constexpr double kLeastSigmaM = 0.02;
 constexpr double kShortestM = 3.0;
@@ -57,8 +59,12 @@ class Refiner {
     return static_cast<Eigen::Index>(1 + best_.values.size() - 1 + inner_knots());
   }
 
+  /// Infinite where the profile is no track.
   [[nodiscard]] Eigen::VectorXd residuals(const SparseProfile& profile) const {
-    const Alignment track = profile.dense().alignment();
+    const CurvatureProfile dense = profile.dense();
+    if (!dense.is_plausible())
+      return Eigen::VectorXd::Constant(static_cast<Eigen::Index>(target_.points.size() + 2), HUGE_VAL);
+    const Alignment track = dense.alignment();
     const std::vector<double> stations = stations_of(track, target_.points);
     Eigen::VectorXd out(static_cast<Eigen::Index>(target_.points.size() + 2));
     const auto count = static_cast<Eigen::Index>(target_.points.size());
@@ -122,7 +128,21 @@ Alignment merged(const SparseProfile& profile, const std::vector<Eigen::Vector2d
   return Alignment::chained(profile.start, std::move(elements));
 }
 
-void judge(const std::vector<Eigen::Vector2d>& points, ClothoidFit& fit) {
+/// The scatter of few points says little: the usual one has its say.
+double sigma_for(const std::vector<Eigen::Vector2d>& points, const ClothoidFitOptions& options) {
+  double sigma = options.sigma_m > 0 ? options.sigma_m : scatter_of(points);
+  if (!(options.sigma_m > 0) && options.usual_sigma_m > 0) {
+    const double own = points.size() > 4 ? static_cast<double>(points.size() - 4) : 0.0;
+    sigma = std::sqrt((own * sigma * sigma + kUsualWeighs * std::pow(options.usual_sigma_m, 2)) / (own + kUsualWeighs));
+  }
+  return std::max(sigma, kLeastSigmaM);
+}
+
+bool is_sound(const CurvatureProfile& profile, const Eigen::MatrixXd& covariance) {
+  return profile.at_m.size() >= 2 && covariance.allFinite() && profile.is_plausible();
+}
+
+void judge(const std::vector<Eigen::Vector2d>& points, ClothoidFit& fit, std::vector<double>& off_m) {
   const std::vector<double> stations = stations_of(fit.alignment, points);
   const Eigen::VectorXd off = distances_of(fit.alignment, points, stations);
   fit.element_max_m.assign(fit.alignment.elements().size(), 0.0);
@@ -132,6 +152,7 @@ void judge(const std::vector<Eigen::Vector2d>& points, ClothoidFit& fit) {
     double& worst = fit.element_max_m[static_cast<size_t>(std::max<ptrdiff_t>(after - 1, 0))];
     worst = std::max(worst, std::abs(off[static_cast<Eigen::Index>(i)]));
   }
+  off_m.assign(off.begin(), off.end());
   fit.rms_m = std::sqrt(off.squaredNorm() / static_cast<double>(points.size()));
   fit.max_m = off.cwiseAbs().maxCoeff();
 }
@@ -150,6 +171,8 @@ void FitReport::add(const std::string& track, const ClothoidFit& fit, size_t poi
   points += points_of_track;
   squared_sum_m2 += fit.rms_m * fit.rms_m * static_cast<double>(points_of_track);
   max_m = std::max(max_m, fit.max_m);
+  left_out += fit.left_out;
+  arcs_m += fit.arcs_m;
   for (size_t i = 0; i < fit.element_max_m.size(); ++i) {
     elements.push_back({track, fit.alignment.element_offsets()[i], fit.alignment.elements()[i], fit.element_max_m[i]});
   }
@@ -159,8 +182,8 @@ double FitReport::rms_m() const {
   return points > 0 ? std::sqrt(squared_sum_m2 / static_cast<double>(points)) : 0.0;
 }
 
-double scatter_of(const std::vector<Eigen::Vector2d>& points) {
-  std::vector<double> off;
+std::vector<double> apart_from_neighbours(const std::vector<Eigen::Vector2d>& points) {
+  std::vector<double> off(points.size(), 0.0);
   for (size_t i = 2; i + 2 < points.size(); ++i) {
     std::array<double, 4> at{};
     const std::array<size_t, 4> near{i - 2, i - 1, i + 1, i + 2};
@@ -178,30 +201,46 @@ double scatter_of(const std::vector<Eigen::Vector2d>& points) {
     }
     const Eigen::Vector2d along = (points[i + 1] - points[i - 1]).normalized();
     const Eigen::Vector2d away = points[i] - expected;
-    off.push_back(std::abs(along.x() * away.y() - along.y() * away.x()) / std::sqrt(variance));
+    off[i] = std::abs(along.x() * away.y() - along.y() * away.x()) / std::sqrt(variance);
   }
-  if (off.empty()) return 0;
+  return off;
+}
+
+double scatter_of(const std::vector<Eigen::Vector2d>& points) {
+  if (points.size() < 5) return 0;
+  std::vector<double> off = apart_from_neighbours(points);
+  off = {off.begin() + 2, off.end() - 2};
   const auto middle = off.begin() + static_cast<ptrdiff_t>(off.size() / 2);
   std::nth_element(off.begin(), middle, off.end());
   return *middle / 0.6745;
 }
 
-std::optional<ClothoidFit> fit_clothoids(const std::vector<Eigen::Vector2d>& points,
-                                         const ClothoidFitOptions& options) {
-  if (points.size() < kFewestPoints || points.size() > kMostPoints) return std::nullopt;
+double fit_limit_m(double sigma_m) {
+  return std::max(6.0 * sigma_m, 0.5);
+}
+
+std::optional<ClothoidFit> fit_somehow(const std::vector<Eigen::Vector2d>& points, const ClothoidFitOptions& options,
+                                       std::vector<double>& off_m) {
+  const size_t fewest = options.usual_sigma_m > 0 ? kFewestWithSigma : kFewestPoints;
+  if (points.size() < fewest || points.size() > kMostPoints) return std::nullopt;
   ClothoidFit fit;
-  fit.sigma_m = std::max(options.sigma_m > 0 ? options.sigma_m : scatter_of(points), kLeastSigmaM);
+  fit.sigma_m = sigma_for(points, options);
   const CurvatureTarget target{points, fit.sigma_m, options.heading_at_start, options.heading_at_end};
   Eigen::MatrixXd covariance;
   const CurvatureProfile dense = dense_profile(target, covariance);
-  if (dense.at_m.size() < 3 || !covariance.allFinite()) return std::nullopt;
-  if (!std::all_of(dense.curvature.begin(), dense.curvature.end(), [](double c) { return std::abs(c) < 0.1; }))
-    return std::nullopt;
+  if (!is_sound(dense, covariance)) return std::nullopt;
   const SparseProfile sparse = Refiner(target, simplified(dense, std::move(covariance))).run();
   fit.alignment = merged(sparse, points);
   if (!is_track(fit.alignment)) return std::nullopt;
-  judge(points, fit);
-  if (!(fit.max_m < std::max(6.0 * fit.sigma_m, 0.5))) return std::nullopt;
+  judge(points, fit, off_m);
+  return fit;
+}
+
+std::optional<ClothoidFit> fit_clothoids(const std::vector<Eigen::Vector2d>& points,
+                                         const ClothoidFitOptions& options) {
+  std::vector<double> off_m;
+  std::optional<ClothoidFit> fit = fit_somehow(points, options, off_m);
+  if (fit && !(fit->max_m < fit_limit_m(fit->sigma_m))) fit.reset();
   return fit;
 }
 

@@ -1,6 +1,6 @@
 #include "track/import/curvature_profile.hpp"
 
-#include <Eigen/Cholesky>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,10 +11,12 @@ namespace railfix::track {
 namespace {
 
 constexpr double kKnotM = 15.0;       // knots are no nearer
-constexpr double kSparseM = 50.0;     // between points farther apart there are knots too
+constexpr double kSparseM = 50.0;     // between points farther apart there are knots too, ...
+constexpr size_t kMostExtra = 3;      // ... so many
+constexpr double kDoneSigmas = 1e-3;  // of the largest change
 constexpr double kSlopeSigma = 1e-4;  // change of the curvature's rate at a knot, per metre squared
 constexpr int kSteps = 6;
-constexpr double kWald = 16.0;  // four sigma
+constexpr double kWald = 25.0;  // five sigma: chosen on made-up lines
 
 double heading_of(const Eigen::Vector2d& step) {
   return std::atan2(step.x(), step.y());
@@ -37,7 +39,7 @@ CurvatureProfile first_guess(const CurvatureTarget& target) {
   out.at_m.push_back(0);
   for (size_t i = 1; i < along.size(); ++i) {
     const double gap = along[i] - out.at_m.back();
-    const auto extra = static_cast<size_t>(gap / kSparseM);
+    const auto extra = std::min(static_cast<size_t>(gap / kSparseM), kMostExtra);
     const double from = out.at_m.back();
     for (size_t k = 1; k <= extra; ++k)
       out.at_m.push_back(from + gap * static_cast<double>(k) / static_cast<double>(extra + 1));
@@ -66,20 +68,31 @@ class Problem {
  public:
   Problem(const CurvatureTarget& target, const CurvatureProfile& profile) : target_(target), profile_(profile) {
     const auto count = static_cast<Eigen::Index>(profile.at_m.size() + 1);
-    normal_ = Eigen::MatrixXd::Zero(count, count);
-    gradient_ = Eigen::VectorXd::Zero(count);
+    rows_ = Eigen::MatrixXd::Zero(count + static_cast<Eigen::Index>(target.points.size()) + 2, count);
+    residual_ = Eigen::VectorXd::Zero(rows_.rows());
     add_points();
     add_headings();
     add_prior();
   }
-  [[nodiscard]] const Eigen::MatrixXd& normal() const { return normal_; }
-  [[nodiscard]] const Eigen::VectorXd& gradient() const { return gradient_; }
+
+  /// Least squares change, and its covariance. By QR with columns of one size: end points known to a millimetre and
+  /// curvatures that act over kilometres are too much for normal equations.
+  [[nodiscard]] Eigen::VectorXd solve(Eigen::MatrixXd& covariance) {
+    const Eigen::VectorXd scale = rows_.colwise().norm().cwiseMax(1e-300).cwiseInverse();
+    const Eigen::HouseholderQR<Eigen::MatrixXd> solver(rows_ * scale.asDiagonal());
+    const auto upper = solver.matrixQR().topRows(rows_.cols()).triangularView<Eigen::Upper>();
+    const Eigen::VectorXd right = (solver.householderQ().adjoint() * residual_).head(rows_.cols());
+    Eigen::MatrixXd inverse = Eigen::MatrixXd::Identity(rows_.cols(), rows_.cols());
+    upper.solveInPlace(inverse);
+    inverse = scale.asDiagonal() * inverse;
+    covariance.noalias() = inverse * inverse.transpose();
+    return inverse * right;
+  }
 
  private:
   void add_row(const Eigen::VectorXd& row, double residual, double sigma) {
-    const double weight = 1.0 / (sigma * sigma);
-    normal_.selfadjointView<Eigen::Lower>().rankUpdate(row, weight);
-    gradient_ += weight * residual * row;
+    rows_.row(next_) = row / sigma;
+    residual_[next_++] = residual / sigma;
   }
 
   /// How much the heading turns for one unit of curvature at a knot.
@@ -98,7 +111,7 @@ class Problem {
       const PlanPose pose = track.at(s).pose;
       knots.emplace_back(pose.easting_m, pose.northing_m);
     }
-    Eigen::VectorXd row(gradient_.size());
+    Eigen::VectorXd row(rows_.cols());
     for (size_t k = 1; k < target_.points.size(); ++k) {
       const PlanPose pose = track.at(stations[k]).pose;
       const Eigen::Vector2d here(pose.easting_m, pose.northing_m);
@@ -113,7 +126,7 @@ class Problem {
   }
 
   void add_headings() {
-    Eigen::VectorXd row = Eigen::VectorXd::Zero(gradient_.size());
+    Eigen::VectorXd row = Eigen::VectorXd::Zero(rows_.cols());
     row[0] = 1;
     if (target_.heading_at_start)
       add_row(row, core::wrap_pi(profile_.start.heading_rad - *target_.heading_at_start), kExactRad);
@@ -128,7 +141,7 @@ class Problem {
   }
 
   void add_prior() {
-    Eigen::VectorXd row(gradient_.size());
+    Eigen::VectorXd row(rows_.cols());
     for (size_t i = 0; i < profile_.at_m.size(); ++i) {
       row.setZero();
       const auto at = static_cast<Eigen::Index>(i + 1);
@@ -153,8 +166,9 @@ class Problem {
 
   const CurvatureTarget& target_;
   const CurvatureProfile& profile_;
-  Eigen::MatrixXd normal_;
-  Eigen::VectorXd gradient_;
+  Eigen::MatrixXd rows_;
+  Eigen::VectorXd residual_;
+  Eigen::Index next_ = 0;
 };
 
 /// Takes away what the points do not call for, the least first.
@@ -280,6 +294,10 @@ class Simplifier {
 
 }  // namespace
 
+bool CurvatureProfile::is_plausible() const {
+  return std::all_of(curvature.begin(), curvature.end(), [](double c) { return std::abs(c) < 0.1; });
+}
+
 Alignment CurvatureProfile::alignment() const {
   std::vector<Element> elements;
   for (size_t i = 0; i + 1 < at_m.size(); ++i)
@@ -326,16 +344,15 @@ Eigen::VectorXd distances_of(const Alignment& track, const std::vector<Eigen::Ve
 
 CurvatureProfile dense_profile(const CurvatureTarget& target, Eigen::MatrixXd& covariance) {
   CurvatureProfile profile = first_guess(target);
-  const auto size = static_cast<Eigen::Index>(profile.at_m.size() + 1);
   for (int step = 0; step < kSteps; ++step) {
-    const Problem problem(target, profile);
-    const Eigen::LDLT<Eigen::MatrixXd> solver(problem.normal());
-    const Eigen::VectorXd change = solver.solve(problem.gradient());
-    if (step + 1 == kSteps) covariance = solver.solve(Eigen::MatrixXd::Identity(size, size));
+    const Eigen::VectorXd change = Problem(target, profile).solve(covariance);
     if (!change.allFinite()) break;
     profile.start.heading_rad -= change[0];
     for (size_t i = 0; i < profile.curvature.size(); ++i)
       profile.curvature[i] += change[static_cast<Eigen::Index>(i + 1)];
+    // No track; and curves that wind up take ages to follow.
+    if (!profile.is_plausible()) break;
+    if ((change.array().square() < kDoneSigmas * kDoneSigmas * covariance.diagonal().array()).all()) break;
   }
   return profile;
 }

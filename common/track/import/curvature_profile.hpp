@@ -16,6 +16,8 @@ struct CurvatureProfile {
   std::vector<double> curvature;
 
   [[nodiscard]] Alignment alignment() const;
+  /// No radius below 10 m.
+  [[nodiscard]] bool is_plausible() const;
 };
 
 /// What the track is to meet: points (the first and last exactly) and headings at the ends where they are known.

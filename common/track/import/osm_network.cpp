@@ -13,6 +13,8 @@ namespace railfix::track {
 namespace {
 
 constexpr double kMappingSigmaM = 3.0;
+constexpr size_t kPointsForSigma = 12;
+constexpr double kLeastUsualSigmaM = 0.05;
 constexpr double kSharpestTurnRad = core::kPi / 3.0;
 constexpr double kTangentBranchRad = core::kPi / 6.0;
 
@@ -78,6 +80,7 @@ class Builder {
   OsmNetwork build() {
     collect_segments();
     trace_chains();
+    find_usual_sigma();
     gather_ends();
     for (const auto& [node, ends] : ends_) agree_on_tangents(ends);
     for (Chain& chain : chains_) add_edge(chain);
@@ -174,6 +177,19 @@ class Builder {
     chains_.push_back(std::move(chain));
   }
 
+  /// Tracks of many points tell how well this region is drawn.
+  void find_usual_sigma() {
+    std::vector<double> scatters;
+    for (const Chain& chain : chains_) {
+      const std::vector<Eigen::Vector2d> points = thinned(chain.points);
+      if (points.size() >= kPointsForSigma) scatters.push_back(scatter_of(points));
+    }
+    if (scatters.empty()) return;
+    const auto middle = scatters.begin() + static_cast<ptrdiff_t>(scatters.size() / 2);
+    std::nth_element(scatters.begin(), middle, scatters.end());
+    usual_sigma_m_ = std::max(*middle, kLeastUsualSigmaM);
+  }
+
   void gather_ends() {
     for (size_t i = 0; i < chains_.size(); ++i) {
       const std::vector<Eigen::Vector2d>& kept = chains_[i].shape;
@@ -193,7 +209,7 @@ class Builder {
 
   [[nodiscard]] std::optional<ClothoidFit> clothoids(const Chain& chain) const {
     if (!with_clothoids_) return std::nullopt;
-    return fit_clothoids(thinned(chain.points), {chain.heading_at_start, chain.heading_at_end, 0});
+    return fit_drawing(thinned(chain.points), {chain.heading_at_start, chain.heading_at_end, 0, usual_sigma_m_});
   }
 
   void set_leaving(const ChainEnd& end, double leaving_rad) {
@@ -252,14 +268,17 @@ class Builder {
       fit.alignment = smooth->alignment;
     } else {
       fit = fit_polyline(chain.shape, chain.heading_at_start, chain.heading_at_end);
-      if (with_clothoids_) ++out_.fit.left_as_arcs;
+      if (with_clothoids_) ++(chain.shape.size() == 2 ? out_.fit.two_points : out_.fit.left_as_arcs);
     }
     const OsmWay& way = data_.ways[chain.ways.front()];
     const size_t number = ++pieces_[way.id];
     DraftEdge edge;
     edge.track.name = "way/" + std::to_string(way.id) + (number > 1 ? "#" + std::to_string(number) : "");
     edge.track.line = line_of(chain);
-    if (smooth) out_.fit.add(edge.track.name, *smooth, chain.points.size());
+    if (smooth) {
+      out_.fit.add(edge.track.name, *smooth, chain.points.size());
+      tell_left_out(edge.track.name, *smooth);
+    }
     edge.track.alignment = std::move(fit.alignment);
     add_marks(chain, edge.track);
     add_speeds(chain, edge.track);
@@ -278,6 +297,13 @@ class Builder {
       out_.figures.max_point_distance_m = std::max(out_.figures.max_point_distance_m, distance);
     }
     out_.draft.edges.push_back(std::move(edge));
+  }
+
+  void tell_left_out(const std::string& track, const ClothoidFit& fit) {
+    if (fit.left_out == 0) return;
+    out_.problems.push_back("edge " + track + " has " + std::to_string(fit.left_out) + " point" +
+                            (fit.left_out > 1 ? "s" : "") + " up to " + std::to_string(fit.left_out_max_m) +
+                            " m beside the track that the others make; left out");
   }
 
   /// The name (else the number) of the way with most segments of the chain.
@@ -366,6 +392,7 @@ class Builder {
   const Projection& projection_;
   double smooth_m_;
   bool with_clothoids_;
+  double usual_sigma_m_ = 0.3;
   std::vector<Segment> segments_;
   std::unordered_map<int64_t, std::vector<size_t>> at_node_;
   std::unordered_map<int64_t, Eigen::Vector2d> places_;

@@ -96,8 +96,13 @@ class Planner {
   [[nodiscard]] bool is_laid(size_t track) const { return !net_.tracks[track].track.alignment.elements().empty(); }
 
   void fit_shape(NetTrack& track) {
-    if (std::optional<ClothoidFit> smooth = fit_clothoids(track.shape, {})) {
+    if (std::optional<ClothoidFit> smooth = fit_drawing(track.shape, {})) {
       net_.fit.add(track.track.name, *smooth, track.shape.size());
+      if (smooth->left_out > 0) {
+        net_.problems.push_back("track " + track.track.name + " has " + std::to_string(smooth->left_out) +
+                                " points up to " + std::to_string(smooth->left_out_max_m) +
+                                " m beside the track that the others make; left out");
+      }
       track.track.alignment = std::move(smooth->alignment);
       return;
     }

@@ -9,6 +9,8 @@
 namespace railfix::track {
 namespace {
 
+constexpr double kTouchM = 0.5;
+
 /// A place or stretch on a net element, along it.
 struct Place {
   size_t track = 0;
@@ -167,18 +169,15 @@ class Reader {
     for (const pugi::xml_node& curve : descendants(source_.root(), "horizontalCurve")) {
       const std::string type = curve.attribute("curveType").value();
       const auto radius = XmlSource::number(curve, "radius");
-      if (!radius || *radius == 0 || type == "straight") continue;
+      if (!radius || *radius == 0 || (!type.empty() && type != "arc")) continue;
       if (std::abs(*radius) < 10) throw source_.wrong(curve, "a radius of less than 10 m is no railway's");
-      if (type != "arc") {
-        net_.problems.push_back("horizontal curve \"" + std::string(curve.attribute("id").value()) + "\" of type " +
-                                type + " is taken as an arc");
-      }
       for (const Place& place : places_of(curve)) {
         const double curvature = (place.same_direction ? -1.0 : 1.0) / *radius;
         if (place.to_m > place.from_m)
           net_.tracks[place.track].bends.push_back({place.from_m, place.to_m, curvature, curvature});
       }
     }
+    read_transitions();
     for (const pugi::xml_node& curve : descendants(source_.root(), "gradientCurve")) {
       const auto gradient = XmlSource::number(curve, "gradient");
       if (!gradient) continue;
@@ -193,6 +192,30 @@ class Reader {
       std::sort(track.bends.begin(), track.bends.end(),
                 [](const NetBend& a, const NetBend& b) { return a.from_m < b.from_m; });
     }
+  }
+
+  /// Clothoids and other transition curves lead from the curvature before them to the one behind; straight where the
+  /// file has nothing there. All are taken as clothoids.
+  void read_transitions() {
+    std::vector<std::pair<size_t, NetBend>> found;
+    for (const pugi::xml_node& curve : descendants(source_.root(), "horizontalCurve")) {
+      const std::string type = curve.attribute("curveType").value();
+      if (type.empty() || type == "arc" || type == "straight") continue;
+      for (const Place& place : places_of(curve)) {
+        if (place.to_m - place.from_m < kTouchM) continue;
+        NetBend bend{place.from_m, place.to_m, 0, 0};
+        for (const NetBend& arc : net_.tracks[place.track].bends) {
+          if (std::abs(arc.to_m - bend.from_m) < kTouchM) bend.curvature_start_per_m = arc.curvature_end_per_m;
+          if (std::abs(arc.from_m - bend.to_m) < kTouchM) bend.curvature_end_per_m = arc.curvature_start_per_m;
+        }
+        if (bend.curvature_start_per_m == 0 && bend.curvature_end_per_m == 0) {
+          net_.problems.push_back("horizontal curve \"" + std::string(curve.attribute("id").value()) + "\" of type " +
+                                  type + " touches no arc; it is taken as a straight");
+        }
+        found.emplace_back(place.track, bend);
+      }
+    }
+    for (const auto& [track, bend] : found) net_.tracks[track].bends.push_back(bend);
   }
 
   void add(LandmarkKind kind, const Place& place, double offset_m, double lateral_m, const pugi::xml_node& of) {

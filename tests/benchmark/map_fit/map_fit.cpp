@@ -2,6 +2,7 @@
 // has it, fitted, and compared with the truth.
 //
 //   railfix-measure-map-fit LINE.landxml
+//   railfix-measure-map-fit made:SEED      # a line of a made-up network instead
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -11,6 +12,7 @@
 #include "track/import/biarc.hpp"
 #include "track/import/clothoid_fit.hpp"
 #include "track/import/landxml.hpp"
+#include "track/import/made_lines.hpp"
 #include "track/import/smooth.hpp"
 
 namespace {
@@ -52,22 +54,36 @@ void judge(const char* name, const Alignment& fit, const Alignment& truth, doubl
       curvature[curvature.size() * 95 / 100], fit.length_m() - truth.length_m(), seconds);
 }
 
+/// Nothing where there is no such file; the reason is printed.
+std::optional<Alignment> truth_of(const std::string& name) {
+  if (name.starts_with("made:")) {
+    for (const MadeLine& line : make_lines(3, 25e3, std::stoull(name.substr(5))).lines) {
+      if (line.main.alignment.length_m() > 10e3) return line.main.alignment;
+    }
+    std::fputs("no line of 10 km in this network\n", stderr);
+    return std::nullopt;
+  }
+  const core::Result<LandXml> read = read_landxml(name);
+  if (!read.ok()) {
+    std::fprintf(stderr, "%s\n", read.error().message.c_str());
+    return std::nullopt;
+  }
+  const auto& tracks = read.value().tracks;
+  return std::max_element(tracks.begin(), tracks.end(),
+                          [](const auto& a, const auto& b) { return a.alignment.length_m() < b.alignment.length_m(); })
+      ->alignment;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   if (argc != 2) {
-    std::fputs("usage: railfix-measure-map-fit LINE.landxml\n", stderr);
+    std::fputs("usage: railfix-measure-map-fit LINE.landxml | made:SEED\n", stderr);
     return 2;
   }
-  const core::Result<LandXml> read = read_landxml(argv[1]);
-  if (!read.ok()) {
-    std::fprintf(stderr, "%s\n", read.error().message.c_str());
-    return 2;
-  }
-  const auto& tracks = read.value().tracks;
-  const Alignment& truth = std::max_element(tracks.begin(), tracks.end(), [](const auto& a, const auto& b) {
-                             return a.alignment.length_m() < b.alignment.length_m();
-                           })->alignment;
+  const std::optional<Alignment> found = truth_of(argv[1]);
+  if (!found) return 2;
+  const Alignment& truth = *found;
   std::printf("truth: %.3f km, %zu elements\n", truth.length_m() / 1e3, truth.elements().size());
   for (const auto& [spacing_m, sigma_m] : {std::pair(20.0, 0.0), {20.0, 0.2}, {20.0, 0.5}, {20.0, 1.0}, {30.0, 0.5}}) {
     const std::vector<Eigen::Vector2d> points = drawn(truth, spacing_m, sigma_m, 21);

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 
 #include "integration/tpr/tpr_service.hpp"
+#include "messaging/onboard_topic.hpp"
 
 namespace railfix {
 namespace {
@@ -42,6 +43,64 @@ TEST_F(TprService, OldStatesAreNotReportedAndTheStatusSaysWhy) {
   EXPECT_THAT(reason(), ContainsRegex("is [0-9.]+ s old, the limit is 1 s"));
   EXPECT_TRUE(reports_.empty());
   ASSERT_TRUE(run_until([&] { return reports_.size() == 1; }, [&] { write_state(450); }));
+}
+
+// What the on-board unit says goes over DDS into the very next report, and back out when it falls silent.
+TEST_F(TprService, TakesModeLevelAndIntegrityFromTheOnboardUnit) {
+  messaging::Writer<msg::OnboardStatus> onboard(participant_, topics::onboard_status);
+  test::Program program(service());
+  ASSERT_TRUE(run_until([&] { return connected() && onboard.matched_readers() > 0; }, [] {}));
+  ASSERT_TRUE(run_until([&] { return reports_.size() == 1; }, [&] { write_state(450); }));
+  const auto last = [&] {
+    const auto& report = reports_.back();
+    return etcs::decode({report.message().data(), report.message_bytes()}, etcs::Baseline::b3).value();
+  };
+  EXPECT_EQ(last().q_length, 0U);
+  msg::OnboardStatus status;
+  const auto say = [&] {
+    status.stamp_ns(core::wall_ns());
+    onboard.write(status);
+  };
+  status.m_mode(1);  // on sight
+  status.m_level(etcs::kLevel2);
+  say();
+  const auto reported = [&](uint8_t reason) {
+    return run_until([&] { return reports_.back().reason() == reason; }, [&] { write_state(450); });
+  };
+  ASSERT_TRUE(reported(msg::REPORT_MODE));
+  EXPECT_EQ(last().m_mode, 1U);
+  status.m_level(0);
+  say();
+  ASSERT_TRUE(reported(msg::REPORT_LEVEL));
+  EXPECT_EQ(last().m_level, 0U);
+  status.q_integrity(2);  // the driver, just now
+  status.integrity_ns(core::wall_ns());
+  status.train_length_m(200);
+  say();
+  ASSERT_TRUE(reported(msg::REPORT_INTEGRITY_CONFIRMED));
+  ASSERT_TRUE(run_until([&] { return last().q_length == 2; },
+                        [&] {
+                          status.integrity_ns(core::wall_ns());
+                          say();
+                          write_state(450);
+                        }));
+  // From the front (2 m before the foot) back over length, over-reading amount and Q_LOCACC.
+  ASSERT_TRUE(last().l_trainint.has_value());
+  EXPECT_GE(*last().l_trainint, 200U + 3U);
+  EXPECT_LE(*last().l_trainint, 200U + 3U + 5U + 1U);
+  status.q_integrity(3);
+  say();
+  ASSERT_TRUE(reported(msg::REPORT_INTEGRITY_LOST));
+  EXPECT_EQ(last().q_length, 3U);
+  status.reports_wanted(1);
+  status.wanted_because(msg::REPORT_SESSION);
+  say();
+  ASSERT_TRUE(reported(msg::REPORT_SESSION));
+  status.q_integrity(9);  // no such value: told, and the old one stays
+  say();
+  ASSERT_TRUE(
+      run_until([&] { return reason().find("q_integrity is 9") != std::string::npos; }, [&] { write_state(450); }));
+  EXPECT_EQ(program.end(SIGTERM), 0);
 }
 
 TEST_F(TprService, TakesPacket58FromACommand) {

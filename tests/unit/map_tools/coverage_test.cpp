@@ -37,6 +37,17 @@ TEST(Coverage, IsOtherTheOtherWay) {
   const Coverage found = coverage_of(main_line(Direction::reverse), options);
   ASSERT_EQ(found.gaps.size(), 2U);
   EXPECT_NEAR(found.gaps[0].to_m, 900, 1e-6);  // 800 + 100 back to the group
+
+  // The same way run backwards, in its own distances.
+  const track::Path there = main_line();
+  const Coverage back = coverage_of(there, options, true);
+  ASSERT_EQ(back.gaps.size(), 2U);
+  EXPECT_NEAR(back.covered_m, found.covered_m, 1e-6);
+  for (size_t i = 0; i < 2; ++i) {
+    EXPECT_NEAR(back.gaps[i].from_m, there.end_m() - found.gaps[i].from_m, 1e-6);
+    EXPECT_NEAR(back.gaps[i].to_m, there.end_m() - found.gaps[i].to_m, 1e-6);
+    EXPECT_NEAR(back.gaps[i].references_m[0], there.end_m() - found.gaps[i].references_m[0], 1e-6);
+  }
 }
 
 TEST(Coverage, GoodOdometryNeedsNoMore) {

@@ -91,6 +91,52 @@ TEST(ClothoidFit, IsBetterThanArcsThroughThePoints) {
   }
 }
 
+TEST(DrawingFit, LeavesOutThePointsThatLieApart) {
+  const Alignment truth = curve_between_straights();
+  std::vector<Eigen::Vector2d> points = drawn(truth, truth.length_m(), 20, 0.1, 5);
+  points[20] += Eigen::Vector2d(3.0, -2.0);
+  points[50] += Eigen::Vector2d(1.5, 1.5);
+  EXPECT_FALSE(fit_clothoids(points, {}));
+  const auto fit = fit_drawing(points, {});
+  ASSERT_TRUE(fit);
+  EXPECT_EQ(fit->left_out, 2U);
+  EXPECT_NEAR(fit->left_out_max_m, 3.6, 0.5);
+  EXPECT_EQ(fit->arcs_m, 0);
+  EXPECT_LT(errors_of(fit->alignment, truth).position_rms_m, 0.1);
+}
+
+TEST(DrawingFit, AZigzagSpoilsItsOwnStretchOnly) {
+  const Alignment truth =
+      Alignment::chained({400000, 5300000, 0.4}, {{1500, 0, 0}, {100, 0, 1.0 / 800}, {900, 1.0 / 800, 1.0 / 800}});
+  std::vector<Eigen::Vector2d> points = drawn(truth, truth.length_m(), 20, 0.1, 6);
+  for (size_t i = 30; i < 42; ++i) points[i] += Eigen::Vector2d(i % 2 == 0 ? 4.0 : -4.0, 0);  // drawn as a zigzag
+  const auto fit = fit_drawing(points, {});
+  ASSERT_TRUE(fit);
+  EXPECT_LT(fit->arcs_m, 0.5 * truth.length_m());
+  // It hangs together, and what was drawn well is where it was drawn.
+  const Alignment& track = fit->alignment;
+  for (size_t i = 1; i < track.elements().size(); ++i) {
+    const PlanPose before = advance(track.starts()[i - 1], track.elements()[i - 1], track.elements()[i - 1].length_m);
+    EXPECT_NEAR(
+        std::hypot(before.easting_m - track.starts()[i].easting_m, before.northing_m - track.starts()[i].northing_m), 0,
+        0.05);
+    EXPECT_NEAR(core::wrap_pi(before.heading_rad - track.starts()[i].heading_rad), 0, 0.01);
+  }
+  for (const double s : {100.0, 300.0, 1300.0, 1900.0, 2300.0}) {
+    const PlanPose pose = truth.at(s).pose;
+    EXPECT_LT(std::abs(track.nearest(pose.easting_m, pose.northing_m).lateral_m), 0.5) << s;
+  }
+}
+
+TEST(DrawingFit, FewPointsLeanOnTheUsualScatter) {
+  const std::vector<Eigen::Vector2d> points{{0, 0}, {0.1, 40}, {-0.1, 80}, {0, 120}};
+  EXPECT_FALSE(fit_clothoids(points, {}));
+  const auto fit = fit_clothoids(points, {.heading_at_start = {}, .heading_at_end = {}, .usual_sigma_m = 0.2});
+  ASSERT_TRUE(fit);
+  EXPECT_EQ(fit->alignment.elements().size(), 1U);
+  EXPECT_EQ(fit->alignment.elements()[0].curvature_start_per_m, 0);
+}
+
 TEST(ClothoidFit, RefusesWhatIsNoTrack) {
   EXPECT_FALSE(fit_clothoids({{0, 0}, {0, 50}, {0, 100}}, {}));
   EXPECT_FALSE(fit_clothoids({{0, 0}, {0, 50}, {50, 50}, {50, 0}, {0, 0.5}, {0, 60}, {70, 60}, {70, 0}}, {}));

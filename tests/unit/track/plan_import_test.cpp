@@ -188,6 +188,29 @@ TEST_F(PlanImport, Railml3KeepsWhatThePlanSays) {
 }
 
 // The same infrastructure in both generations.
+TEST_F(PlanImport, Railml3ClothoidsLeadFromOneArcToTheNext) {
+  const char* text =
+      R"(<railML xmlns="https://www.railml.org/schemas/3.2" version="3.2"><infrastructure><topology><netElements>
+<netElement id="n" length="1000"/></netElements></topology><geometry><horizontalCurves>
+<horizontalCurve id="c1" curveType="clothoid"><linearLocation><associatedNetElement netElementRef="n" posBegin="100" posEnd="200"/></linearLocation></horizontalCurve>
+<horizontalCurve id="c2" curveType="arc" radius="500"><linearLocation><associatedNetElement netElementRef="n" posBegin="200" posEnd="400"/></linearLocation></horizontalCurve>
+<horizontalCurve id="c3" curveType="blossCurve" radius="500"><linearLocation><associatedNetElement netElementRef="n" posBegin="400" posEnd="500"/></linearLocation></horizontalCurve>
+<horizontalCurve id="c4" curveType="arc" radius="-250"><linearLocation><associatedNetElement netElementRef="n" posBegin="500" posEnd="600"/></linearLocation></horizontalCurve>
+<horizontalCurve id="c5" curveType="clothoid"><linearLocation><associatedNetElement netElementRef="n" posBegin="800" posEnd="900"/></linearLocation></horizontalCurve>
+</horizontalCurves></geometry></infrastructure></railML>)";
+  const Map map = core::value_or_throw(build_map({write("a.xml", text)}, {})).map;
+  const Alignment& track = map.edges[0].alignment;
+  for (const auto& [at, curvature] : {std::pair(50.0, 0.0),
+                                      {150.0, -1.0 / 1000},
+                                      {300.0, -1.0 / 500},
+                                      {450.0, 1.0 / 1000},
+                                      {550.0, 1.0 / 250},
+                                      {700.0, 0.0},
+                                      {850.0, 0.0}})
+    EXPECT_NEAR(track.curvature_at(at), curvature, 1e-12) << at;
+  EXPECT_THAT(map.problems, Contains(HasSubstr("c5")));
+}
+
 TEST_F(PlanImport, TheExamplesOfBothGenerationsAgree) {
   for (const auto& [zip, length_m, switches] :
        {std::tuple("Simplest Example-2.4.zip", 1630.0, 2), {"Simple Example+RTC.zip", 6900.0, 3}}) {

@@ -36,12 +36,17 @@ double half_interval_m(const CoverageOptions& options, double locacc_m, double w
   return locacc_m + options.sigmas * options.scale_sigma * way_m;
 }
 
-Coverage coverage_of(const track::Path& path, const CoverageOptions& options) {
+Coverage coverage_of(const track::Path& path, const CoverageOptions& options, bool backwards) {
   Coverage out;
   std::vector<Reference> references = references_on(path, options);
   out.references = references.size();
-  references.push_back({path.end_m(), 0});  // nothing is reset there, it only ends the last stretch
-  Reference last{path.begin_m(), options.virtual_locacc_m};
+  if (backwards) {  // along an axis that runs the other way
+    std::reverse(references.begin(), references.end());
+    for (Reference& reference : references) reference.at_m = -reference.at_m;
+  }
+  // Nothing is reset at the end, it only ends the last stretch.
+  references.push_back({backwards ? -path.begin_m() : path.end_m(), 0});
+  Reference last{backwards ? -path.end_m() : path.begin_m(), options.virtual_locacc_m};
   for (const Reference& next : references) {
     const double way = next.at_m - last.at_m;
     const double half = half_interval_m(options, last.accuracy_m, way);
@@ -57,6 +62,13 @@ Coverage coverage_of(const track::Path& path, const CoverageOptions& options) {
     }
     // A reference that knows less than the train does not help it.
     if (next.accuracy_m < half) last = next;
+  }
+  if (backwards) {
+    for (CoverageGap& gap : out.gaps) {
+      gap.from_m = -gap.from_m;
+      gap.to_m = -gap.to_m;
+      for (double& at : gap.references_m) at = -at;
+    }
   }
   return out;
 }

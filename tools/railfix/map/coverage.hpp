@@ -33,7 +33,8 @@ struct Coverage {
 /// Half the interval behind a reference of this location accuracy.
 double half_interval_m(const CoverageOptions& options, double locacc_m, double way_m);
 
-/// The path is run from its begin, where the place is known as at a virtual reference.
-Coverage coverage_of(const track::Path& path, const CoverageOptions& options);
+/// The path is run from its begin (backwards: from its end), where the place is known as at a virtual reference. Gaps
+/// come as the train meets them, in distances on the path.
+Coverage coverage_of(const track::Path& path, const CoverageOptions& options, bool backwards = false);
 
 }  // namespace railfix::tool

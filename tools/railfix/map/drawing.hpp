@@ -14,7 +14,7 @@ namespace railfix::tool {
 
 struct DrawOptions {
   double width_px = 1600;
-  std::optional<track::EdgePosition> around{}; // this place in the middle; the whole map without
+  std::optional<track::EdgePosition> around{};  // this place in the middle; the whole map without
   double radius_m = 1000;
 };
 

@@ -54,7 +54,7 @@ ordered_json coverage_json(const track::Path& path, const Coverage& found) {
     for (const double at : gap.references_m) places.push_back(place_text(path, at));
     gaps.push_back({{"from", place_text(path, gap.from_m)},
                     {"to", place_text(path, gap.to_m)},
-                    {"length_m", gap.to_m - gap.from_m},
+                    {"length_m", std::abs(gap.to_m - gap.from_m)},
                     {"largest_half_interval_m", gap.largest_m},
                     {"outside_subset_041", gap.outside_budget},
                     {"virtual_references", places}});
@@ -66,13 +66,31 @@ ordered_json coverage_json(const track::Path& path, const Coverage& found) {
           {"gaps", gaps}};
 }
 
+void print_coverage(const char* way_name, const track::Path& path, const Coverage& found) {
+  const double way = path.end_m() - path.begin_m();
+  std::printf("within, %-8s %.1f km (%.1f %%), largest %.1f m\n", way_name, found.covered_m / 1e3,
+              100 * found.covered_m / std::max(way, 1.0), found.largest_m);
+  for (const CoverageGap& gap : found.gaps) {
+    std::printf("  too wide       %s to %s (%.0f m), up to %.1f m%s\n", place_text(path, gap.from_m).c_str(),
+                place_text(path, gap.to_m).c_str(), std::abs(gap.to_m - gap.from_m), gap.largest_m,
+                gap.outside_budget ? ", beyond 5 m + 5 %" : "");
+    std::printf("    reference at");
+    if (gap.references_m.empty()) std::printf(" no place helps: a virtual one is not better than the limit");
+    for (const double at : gap.references_m) std::printf(" %s", place_text(path, at).c_str());
+    std::printf("\n");
+  }
+}
+
 int coverage(const CoverageRequest& request) {
   const auto map = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(request.map)));
   const track::EdgePosition start = core::value_or_throw(map->parse_position(request.start));
   const track::Path path = core::value_or_throw(track::Path::follow(map, start, request.length_m, 0));
   const Coverage found = coverage_of(path, request.options);
+  const Coverage back = coverage_of(path, request.options, true);
   if (request.as_json) {
-    std::cout << coverage_json(path, found).dump(2) << '\n';
+    ordered_json json = coverage_json(path, found);
+    json["back"] = coverage_json(path, back);
+    std::cout << json.dump(2) << '\n';
     return 0;
   }
   const double way = path.end_m() - path.begin_m();
@@ -81,17 +99,8 @@ int coverage(const CoverageRequest& request) {
   std::printf("references       %zu\n", found.references);
   std::printf("limit            %.1f m on either side, %.2f %% drift (1 sigma), %.1f sigma\n", request.options.limit_m,
               100 * request.options.scale_sigma, request.options.sigmas);
-  std::printf("within           %.1f km (%.1f %%), largest %.1f m\n", found.covered_m / 1e3,
-              100 * found.covered_m / std::max(way, 1.0), found.largest_m);
-  for (const CoverageGap& gap : found.gaps) {
-    std::printf("  too wide       %s to %s (%.0f m), up to %.1f m%s\n", place_text(path, gap.from_m).c_str(),
-                place_text(path, gap.to_m).c_str(), gap.to_m - gap.from_m, gap.largest_m,
-                gap.outside_budget ? ", beyond 5 m + 5 %" : "");
-    std::printf("    reference at");
-    if (gap.references_m.empty()) std::printf(" no place helps: a virtual one is not better than the limit");
-    for (const double at : gap.references_m) std::printf(" %s", place_text(path, at).c_str());
-    std::printf("\n");
-  }
+  print_coverage("there", path, found);
+  print_coverage("back", path, back);
   return 0;
 }
 

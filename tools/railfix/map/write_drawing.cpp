@@ -51,6 +51,32 @@ void write_svg(const Drawing& drawing, std::ostream& out) {
   out << "</svg>\n";
 }
 
+/// OpenCV's font has no more than ASCII: letters with marks lose them, what has no such letter becomes '?'.
+std::string ascii(const std::string& text) {
+  // U+00C0 to U+00FF, two characters each.
+  static constexpr std::string_view kLatin1 =
+      "A A A A AeA AEC E E E E I I I I D N O O O O Oex OeU U U UeY Thss"
+      "a a a a aea aec e e e e i i i i d n o o o o oe/ oeu u u uey thy ";
+  std::string out;
+  for (size_t i = 0; i < text.size(); ++i) {
+    const auto byte = static_cast<unsigned char>(text[i]);
+    if (byte < 0x7f) {
+      out += text[i];
+      continue;
+    }
+    if (byte == 0xc3 && i + 1 < text.size()) {
+      const size_t letter = 2 * (static_cast<unsigned char>(text[i + 1]) & 0x3fU);
+      for (const char c : kLatin1.substr(letter, 2)) {
+        if (c != ' ') out += c;
+      }
+    } else {
+      out += '?';
+    }
+    while (i + 1 < text.size() && (static_cast<unsigned char>(text[i + 1]) & 0xc0U) == 0x80U) ++i;
+  }
+  return out;
+}
+
 cv::Mat picture_of(const Drawing& drawing) {
   constexpr int kShift = 4;  // sixteenths of a pixel
   cv::Mat out(static_cast<int>(drawing.height), static_cast<int>(drawing.width), CV_8UC3, cv::Scalar::all(255));
@@ -71,10 +97,8 @@ cv::Mat picture_of(const Drawing& drawing) {
                cv::LINE_AA, kShift);
   }
   for (const Drawing::Label& label : drawing.labels) {
-    std::string plain = label.text;  // OpenCV's font has no more than ASCII
-    for (char& c : plain) c = static_cast<unsigned char>(c) < 127 ? c : '?';
-    cv::putText(out, plain, cv::Point(cvRound(label.at.x()), cvRound(label.at.y())), cv::FONT_HERSHEY_SIMPLEX,
-                label.size / 28.0, cv::Scalar(0, 0, 0), 1, cv::LINE_AA);
+    cv::putText(out, ascii(label.text), cv::Point(cvRound(label.at.x()), cvRound(label.at.y())),
+                cv::FONT_HERSHEY_SIMPLEX, label.size / 28.0, cv::Scalar(0, 0, 0), 1, cv::LINE_AA);
   }
   return out;
 }
