@@ -157,6 +157,28 @@ void judge(const std::vector<Eigen::Vector2d>& points, ClothoidFit& fit, std::ve
   fit.max_m = off.cwiseAbs().maxCoeff();
 }
 
+/// Between points far apart a fit may bow to anywhere. An arc's sagitta is at most a quarter of its chord times the
+/// turn at either end of the chord; more than twice that, and more than a point may lie off, is not told by the points.
+bool bows_out(const Alignment& track, const std::vector<Eigen::Vector2d>& points, double limit_m) {
+  const auto turn_at = [&](size_t i) {
+    if (i == 0 || i + 1 >= points.size()) return 0.0;
+    const Eigen::Vector2d before = points[i] - points[i - 1];
+    const Eigen::Vector2d after = points[i + 1] - points[i];
+    return std::abs(core::wrap_pi(std::atan2(after.x(), after.y()) - std::atan2(before.x(), before.y())));
+  };
+  const std::vector<double> stations = stations_of(track, points);
+  for (size_t i = 0; i + 1 < points.size(); ++i) {
+    const Eigen::Vector2d chord = points[i + 1] - points[i];
+    const double most = limit_m + 0.5 * chord.norm() * std::max(turn_at(i), turn_at(i + 1));
+    for (const double part : {0.25, 0.5, 0.75}) {
+      const PlanPose pose = track.at(stations[i] + part * (stations[i + 1] - stations[i])).pose;
+      const Eigen::Vector2d away = Eigen::Vector2d(pose.easting_m, pose.northing_m) - points[i];
+      if (std::abs(chord.x() * away.y() - chord.y() * away.x()) / chord.norm() > most) return true;
+    }
+  }
+  return false;
+}
+
 bool is_track(const Alignment& track) {
   return std::all_of(track.elements().begin(), track.elements().end(), [](const Element& element) {
     return std::isfinite(element.length_m) && std::abs(element.curvature_start_per_m) < kSharpestPerM &&
@@ -231,7 +253,7 @@ std::optional<ClothoidFit> fit_somehow(const std::vector<Eigen::Vector2d>& point
   if (!is_sound(dense, covariance)) return std::nullopt;
   const SparseProfile sparse = Refiner(target, simplified(dense, std::move(covariance))).run();
   fit.alignment = merged(sparse, points);
-  if (!is_track(fit.alignment)) return std::nullopt;
+  if (!is_track(fit.alignment) || bows_out(fit.alignment, points, fit_limit_m(fit.sigma_m))) return std::nullopt;
   judge(points, fit, off_m);
   return fit;
 }
