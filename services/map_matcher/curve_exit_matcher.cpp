@@ -44,15 +44,12 @@ void CurveExitMatcher::find_curves() {
 
 void CurveExitMatcher::add(double odometer_m, double curvature_per_m) {
   if (!std::isfinite(curvature_per_m)) return;
-  if (bins_.empty() || odometer_m - bins_.back().odometer_m >= parameters_.bin_m) {
-    const double at_m =
-        bins_.empty() ? odometer_m
-                      : bins_.back().odometer_m +
-                            parameters_.bin_m * std::floor((odometer_m - bins_.back().odometer_m) / parameters_.bin_m);
-    bins_.push_back({at_m, curvature_per_m, 1});
-    while (odometer_m - bins_.front().odometer_m > kLongestCurveM) bins_.pop_front();
-    return;
+  if (bins_.empty()) bins_.push_back({odometer_m, curvature_per_m, 1});
+  // Bins without a measurement of their own are there too: the shape is compared bin by bin.
+  while (odometer_m - bins_.back().odometer_m >= parameters_.bin_m) {
+    bins_.push_back({bins_.back().odometer_m + parameters_.bin_m, curvature_per_m, 0});
   }
+  while (odometer_m - bins_.front().odometer_m > kLongestCurveM) bins_.pop_front();
   Bin& bin = bins_.back();
   bin.curvature_per_m += (curvature_per_m - bin.curvature_per_m) / ++bin.count;
 }
@@ -71,23 +68,28 @@ std::optional<double> CurveExitMatcher::error(const Curve& curve) const {
 std::optional<Fix> CurveExitMatcher::match(int64_t stamp_ns, double odometer_m, const Prior& prior) {
   const double first_m = prior.path_distance_m - prior.over_m - parameters_.search_margin_m;
   const double last_m = prior.path_distance_m + prior.under_m + parameters_.search_margin_m;
-  while (next_ < curves_.size() && curves_[next_].exit_m < first_m) {
-    ++next_;
-    least_error_ = 1;
-  }
+  while (next_ < curves_.size() && curves_[next_].exit_m < first_m) wait_for(next_ + 1);
   if (next_ >= curves_.size() || bins_.empty() || curves_[next_].exit_m > last_m) return std::nullopt;
   const auto now = error(curves_[next_]);
   if (!now) return std::nullopt;
+  most_before_ = std::max(most_before_, *now);
   if (*now < least_error_) {
     least_error_ = *now;
-    least_at_m_ = odometer_m;
+    least_at_m_ = bins_.back().odometer_m + 0.5 * parameters_.bin_m;
+    fallen_ = most_before_ > parameters_.rise * *now;
   }
   const bool past = *now > parameters_.rise * least_error_ || odometer_m - least_at_m_ > parameters_.rise_m;
-  if (least_error_ > parameters_.most_error || !past) return std::nullopt;
+  if (least_error_ > parameters_.most_error || !fallen_ || !past) return std::nullopt;
   anchors_.push_back({least_at_m_, curves_[next_].exit_m});
-  ++next_;
-  least_error_ = 1;
+  wait_for(next_ + 1);
   return Fix{stamp_ns, anchors_.back().place_m + odometer_m - anchors_.back().odometer_m, parameters_.sigma_m, 0.95, 0};
+}
+
+void CurveExitMatcher::wait_for(size_t curve) {
+  next_ = curve;
+  least_error_ = 1;
+  most_before_ = 0;
+  fallen_ = false;
 }
 
 double CurveExitMatcher::corrected_m(double odometer_m) const {

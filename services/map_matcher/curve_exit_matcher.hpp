@@ -56,6 +56,7 @@ class CurveExitMatcher {
     int count = 0;
   };
   void find_curves();
+  void wait_for(size_t curve);
   [[nodiscard]] std::optional<double> error(const Curve& curve) const;
 
   CurveExitParameters parameters_;
@@ -66,6 +67,8 @@ class CurveExitMatcher {
   size_t next_ = 0;  // curve that is waited for
   double least_error_ = 1;
   double least_at_m_ = 0;
+  double most_before_ = 0;  // a minimum has larger errors on both sides
+  bool fallen_ = false;
 };
 
 }  // namespace railfix::map_matcher

@@ -55,6 +55,7 @@ class PlaceFilter {
 struct Errors {
   std::vector<double> in_curves_m;
   std::vector<double> all_m;
+  double squared_sigmas = 0;
   int fixes = 0;
   int fixes_outside = 0;  // worse than 4 sigma
 
@@ -72,9 +73,11 @@ double quantile(std::vector<double> values, double share) {
 
 void print(const char* what, const Errors& errors) {
   std::printf(
-      "%-34s in curves p50 %5.1f  p95 %5.1f  max %5.1f m; everywhere p95 %5.1f m; fixes %d, beyond 4 sigma %d\n", what,
-      quantile(errors.in_curves_m, 0.5), quantile(errors.in_curves_m, 0.95), quantile(errors.in_curves_m, 1),
-      quantile(errors.all_m, 0.95), errors.fixes, errors.fixes_outside);
+      "%-34s in curves p50 %5.1f  p95 %5.1f  max %5.1f m; everywhere p95 %5.1f m; fixes %d, rms %.2f sigma, beyond 4 "
+      "sigma %d\n",
+      what, quantile(errors.in_curves_m, 0.5), quantile(errors.in_curves_m, 0.95), quantile(errors.in_curves_m, 1),
+      quantile(errors.all_m, 0.95), errors.fixes, std::sqrt(errors.squared_sigmas / std::max(errors.fixes, 1)),
+      errors.fixes_outside);
 }
 
 struct Comparison {
@@ -106,6 +109,7 @@ void run(const std::shared_ptr<const track::Path>& path, uint64_t seed, Comparis
   double looked_m = begin_m;
   double at_m = begin_m;
   double speed_mps = core::mps_from_kmh(random.uniform(60, 120));
+  std::vector<map_matcher::Anchor> stations;
   const auto step = [&](double time_s) {
     // The bogies turn behind the foot: what was measured belongs there.
     const double next_m = at_m + speed_mps / kRateHz;
@@ -134,6 +138,7 @@ void run(const std::shared_ptr<const track::Path>& path, uint64_t seed, Comparis
     const auto use = [&](const std::optional<map_matcher::Fix>& fix, PlaceFilter& filter, Errors& sum) {
       if (!fix) return;
       ++sum.fixes;
+      sum.squared_sigmas += std::pow((fix->path_distance_m - at_m) / fix->sigma_m, 2);
       sum.fixes_outside += std::abs(fix->path_distance_m - at_m) > 4 * fix->sigma_m ? 1 : 0;
       filter.fix(fix->path_distance_m, fix->sigma_m);
     };
@@ -147,10 +152,15 @@ void run(const std::shared_ptr<const track::Path>& path, uint64_t seed, Comparis
     const bool curve = std::abs(path->curvature_at(at_m)) > kCurve;
     sums.wheel.add(odometer_m - at_m, curve);
     sums.exits.add(by_exits.place_m() - at_m, curve);
-    sums.exits_linear.add(exits.corrected_m(odometer_m - lag_m) + lag_m - at_m, curve);
+    stations.push_back({odometer_m - lag_m, at_m - lag_m});
     sums.likelihood.add(by_likelihood.place_m() - at_m, curve);
   }
-  sums.exits_linear.fixes = sums.exits.fixes;
+  // The paper corrects afterwards, when the exits on both sides are known.
+  for (const auto& station : stations) {
+    const bool curve = std::abs(path->curvature_at(station.place_m)) > kCurve;
+    sums.exits_linear.add(exits.corrected_m(station.odometer_m) - station.place_m, curve);
+  }
+  sums.exits_linear.fixes += static_cast<int>(exits.anchors().size());
 }
 
 }  // namespace

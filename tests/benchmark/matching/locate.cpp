@@ -1,6 +1,7 @@
 // Where on the network, without a prior: trains that start anywhere on a map, in either direction, with an odometer
 // that is wrong by up to 2 %.
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <ctime>
 #include <iostream>
@@ -16,7 +17,7 @@ namespace railfix::measure {
 namespace {
 
 constexpr double kTripM = 5000;
-constexpr double kEveryM = 250;
+constexpr double kEveryM = 500;
 constexpr double kRightM = 50;
 
 double processor_s() {
@@ -56,7 +57,9 @@ struct Trip {
   double place_after_m = 0;
   bool best_right = false;  // at the end, certain or not
   double slowest_s = 0;
-  double turn_rad = 0;
+  double turn_rad = 0;        // of the true track, over stretches of 20 m
+  double most_sigmas = 0;     // error of a place that was certain
+  double bound_m = INFINITY;  // least error that could be had on the way
 };
 
 double apart_m(const track::Map& map, const track::EdgePosition& a, const track::EdgePosition& b) {
@@ -65,24 +68,77 @@ double apart_m(const track::Map& map, const track::EdgePosition& a, const track:
   return std::hypot(p.easting_m - q.easting_m, p.northing_m - q.northing_m);
 }
 
+/// The real track wanders about the mapped one: its curvature, less the map's.
+class MapError {
+ public:
+  MapError(double sigma_m, core::Random& random) {
+    for (auto& wave : waves_) {
+      wave = {random.normal() / kLengthM, random.uniform(0, 6.283)};
+      wave.amplitude_m = sigma_m * std::sqrt(2.0 / static_cast<double>(waves_.size()));
+    }
+  }
+  [[nodiscard]] double curvature_at(double m) const {
+    double sum = 0;
+    for (const auto& w : waves_) sum -= w.amplitude_m * w.per_m * w.per_m * std::sin(w.per_m * m + w.phase);
+    return sum;
+  }
+
+ private:
+  static constexpr double kLengthM = 60;
+  struct Wave {
+    double per_m = 0;
+    double phase = 0;
+    double amplitude_m = 0;
+  };
+  std::array<Wave, 24> waves_;
+};
+
+/// How well the place can be known at all: the Cramer-Rao bound of place and scale with the locator's own noise.
+double bound_m(const testing::VehicleHeading& heading, double begin_m, double end_m, double step_noise_rad) {
+  const map_matcher::LocatorParameters p;
+  const double bin_m = map_matcher::kBinM;
+  const auto curvature = [&](double m) { return (heading.at(m + 5) - heading.at(m - 5)) / 10; };
+  double place = 0;
+  double both = 0;
+  double scale = 3 / (p.scale_range * p.scale_range);
+  for (double m = begin_m; m + bin_m <= end_m; m += bin_m) {
+    const double turn = heading.at(m + bin_m) - heading.at(m);
+    const double variance = std::pow(p.noise_per_m * bin_m, 2) + std::pow(p.curvature_share * turn, 2) +
+                            bin_m * step_noise_rad * step_noise_rad;
+    const double by_place = curvature(m + bin_m) - curvature(m);
+    const double by_scale = curvature(m) * (end_m - m) - curvature(m + bin_m) * (end_m - m - bin_m);
+    const double weight = 1 / (variance * p.correlated_bins);
+    place += weight * by_place * by_place;
+    both += weight * by_place * by_scale;
+    scale += weight * by_scale * by_scale;
+  }
+  const double det = place * scale - both * both;
+  return det > 0 ? std::sqrt(scale / det) : INFINITY;
+}
+
 Trip run_trip(const std::shared_ptr<const map_matcher::NetworkIndex>& index, const track::Route& route,
-              core::Random& random) {
+              const MatchingOptions& options, core::Random& random) {
   testing::RideErrors errors;
   errors.odometer_scale = random.uniform(-0.02, 0.02);
   errors.turn_bias_rps = 0;
   errors.turn_noise_rps = 0;
   errors.step_turn_noise_rad = 3e-4;
   const double first_m = route.begin_m() + 1;
-  const testing::VehicleHeading heading([&](double m) { return route.curvature_at(m); }, first_m, first_m + kTripM + 50,
-                                        errors);
+  const MapError wander(options.map_error_m, random);
+  const testing::VehicleHeading mapped([&](double m) { return route.curvature_at(m); }, first_m, first_m + kTripM + 50,
+                                       errors);
+  const testing::VehicleHeading heading([&](double m) { return route.curvature_at(m) + wander.curvature_at(m); },
+                                        first_m, first_m + kTripM + 50, errors);
   testing::RideSensors sensors(errors, random.next());
   map_matcher::NetworkLocator locator({}, index);
   Trip trip;
   double looked_m = 0;
   constexpr double kStepM = 1.0;
+  for (double m = first_m; m < first_m + kTripM; m += 20) {
+    trip.turn_rad += std::abs(mapped.at(m + 20) - mapped.at(m));
+  }
   for (double at_m = 0; at_m < kTripM; at_m += kStepM) {
     const auto s = sensors.step(heading, 0, first_m + at_m, first_m + at_m + kStepM, kStepM / 20);
-    trip.turn_rad += std::abs(s.turn_rad);
     locator.move(s.way_m, s.turn_rad, s.turn_sigma_rad);
     const double here_m = first_m + at_m + kStepM;
     const auto& leg = route.leg_at(here_m + 8);
@@ -96,6 +152,7 @@ Trip run_trip(const std::shared_ptr<const map_matcher::NetworkIndex>& index, con
     const bool last = at_m + 1.5 * kStepM > kTripM;
     if (!last && at_m - looked_m < kEveryM) continue;
     looked_m = at_m;
+    trip.bound_m = std::min(trip.bound_m, bound_m(mapped, first_m, here_m, errors.step_turn_noise_rad));
     const double begin_s = processor_s();
     const auto location = locator.locate();
     trip.slowest_s = std::max(trip.slowest_s, processor_s() - begin_s);
@@ -114,10 +171,55 @@ Trip run_trip(const std::shared_ptr<const map_matcher::NetworkIndex>& index, con
       trip.place_found = true;
       trip.place_after_m = at_m;
     }
-    if ((location.certain && !right) || (location.place_certain && !near)) trip.wrong = true;
+    const double sigmas = apart_m(index->map(), truth, best) / location.places.front().sigma_m;
+    if (location.certain) trip.most_sigmas = std::max(trip.most_sigmas, sigmas);
+    if ((location.certain && (!right || sigmas > 4)) || (location.place_certain && !near)) trip.wrong = true;
     trip.best_right = near;
+    if (options.each && ((location.certain && !right) || (location.place_certain && !near))) {
+      std::printf("  wrong at %.0f m: %u:%.0f for %u:%.0f, %.0f m apart, sigma %.0f m, misfit %.2f\n", at_m, best.edge,
+                  best.offset_m, truth.edge, truth.offset_m, apart_m(index->map(), truth, best),
+                  location.places.front().sigma_m, location.places.front().misfit);
+    }
   }
   return trip;
+}
+
+void print_found(const char* what, const std::vector<Trip>& trips) {
+  const auto share = [&](auto property) {
+    return 100.0 * static_cast<double>(std::count_if(trips.begin(), trips.end(), property)) /
+           static_cast<double>(std::max<size_t>(trips.size(), 1));
+  };
+  std::printf("%-28s %4zu: best place right at the end %5.1f %%, place certain %5.1f %%, track certain %5.1f %%\n",
+              what, trips.size(), share([](const Trip& t) { return t.best_right; }),
+              share([](const Trip& t) { return t.place_found; }), share([](const Trip& t) { return t.found; }));
+}
+
+void print(const std::vector<Trip>& trips) {
+  print_found("trips of 5 km", trips);
+  std::vector<Trip> informed;
+  std::copy_if(trips.begin(), trips.end(), std::back_inserter(informed),
+               [](const Trip& t) { return t.bound_m < map_matcher::LocatorParameters{}.certain_sigma_m; });
+  print_found("... where the track can tell", informed);
+  std::vector<double> seconds;
+  std::vector<double> after_m;
+  double most_sigmas = 0;
+  for (const Trip& t : trips) {
+    seconds.push_back(t.slowest_s);
+    if (t.found) after_m.push_back(t.found_after_m);
+    most_sigmas = std::max(most_sigmas, t.most_sigmas);
+  }
+  std::sort(seconds.begin(), seconds.end());
+  std::sort(after_m.begin(), after_m.end());
+  const auto middle = [](const std::vector<double>& sorted) {
+    return sorted.empty() ? 0.0 : sorted[sorted.size() / 2];
+  };
+  std::printf(
+      "wrong although certain: %d; largest error of a certain place %.1f sigma; track certain after %.0f m in the "
+      "median\n",
+      static_cast<int>(std::count_if(trips.begin(), trips.end(), [](const Trip& t) { return t.wrong; })), most_sigmas,
+      middle(after_m));
+  std::printf("slowest search of a trip (processor time): median %.2f s, max %.2f s\n", middle(seconds),
+              seconds.empty() ? 0.0 : seconds.back());
 }
 
 }  // namespace
@@ -137,26 +239,15 @@ int measure_locate(const MatchingOptions& options) {
   while (static_cast<int>(trips.size()) < count && ++tries < 100 * count) {
     const auto route = random_route(*map, index->ways(), random);
     if (!route) continue;
-    trips.push_back(run_trip(index, *route, random));
+    trips.push_back(run_trip(index, *route, options, random));
     if (options.each) {
       const Trip& t = trips.back();
-      std::printf("%s%s place after %.0f m, track after %.0f m, turned %.2f rad, %.2f s\n", t.wrong ? "WRONG " : "",
-                  t.best_right ? "" : "not found", t.place_after_m, t.found_after_m, t.turn_rad, t.slowest_s);
+      std::printf("%s%splace after %.0f m, track after %.0f m, turned %.2f rad, bound %.0f m, %.2f s\n",
+                  t.wrong ? "WRONG " : "", t.best_right ? "" : "not found ", t.place_after_m, t.found_after_m,
+                  t.turn_rad, t.bound_m, t.slowest_s);
     }
   }
-  const auto share = [&](auto what) {
-    return 100.0 * static_cast<double>(std::count_if(trips.begin(), trips.end(), what)) /
-           static_cast<double>(std::max<size_t>(trips.size(), 1));
-  };
-  std::vector<double> seconds;
-  for (const Trip& t : trips) seconds.push_back(t.slowest_s);
-  std::sort(seconds.begin(), seconds.end());
-  std::printf("trips of 5 km: %zu; best place right at the end %.1f %%, place certain %.1f %%, track certain %.1f %%\n",
-              trips.size(), share([](const Trip& t) { return t.best_right; }),
-              share([](const Trip& t) { return t.place_found; }), share([](const Trip& t) { return t.found; }));
-  std::printf("wrong although certain: %d; slowest search of a trip (processor time): median %.2f s, max %.2f s\n",
-              static_cast<int>(std::count_if(trips.begin(), trips.end(), [](const Trip& t) { return t.wrong; })),
-              seconds.empty() ? 0.0 : seconds[seconds.size() / 2], seconds.empty() ? 0.0 : seconds.back());
+  print(trips);
   return 0;
 }
 

@@ -12,8 +12,9 @@ constexpr const char* kUsage =
     "  switches   track choice over simulated passages of switches\n"
     "railfix-measure-matching curvature [--map FILE] [--count N] [--seed N]\n"
     "  curvature  wheel and gyro alone against a map, by default ../shared/data/alignment/sbb_mszw_a2.landxml\n"
-    "railfix-measure-matching locate [--map FILE | --track-km KM] [--count N] [--seed N] [--each]\n"
-    "  locate     the place without a prior, over trips of 5 km on a map or a made-up network\n";
+    "railfix-measure-matching locate [--map FILE | --track-km KM] [--count N] [--seed N] [--map-error-m M] [--each]\n"
+    "  locate     the place without a prior, over trips of 5 km on a map or a made-up network; the real track wanders\n"
+    "             about the mapped one by 0.5 m (1 sigma)\n";
 
 }  // namespace
 
@@ -30,6 +31,8 @@ int main(int argc, char** argv) {
       options.map = argv[++i];
     } else if (std::strcmp(argv[i], "--track-km") == 0 && more) {
       options.track_km = std::atof(argv[++i]);
+    } else if (std::strcmp(argv[i], "--map-error-m") == 0 && more) {
+      options.map_error_m = std::atof(argv[++i]);
     } else if (std::strcmp(argv[i], "--each") == 0) {
       options.each = true;
     } else if (what.empty() && argv[i][0] != '-') {

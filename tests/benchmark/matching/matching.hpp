@@ -10,8 +10,9 @@ struct MatchingOptions {
   int count = 0;  // 0 = what the figure asks for
   uint64_t seed = 1;
   std::string map;
-  double track_km = 20000;  // of a made-up network
-  bool each = false;        // a line for each ride that went wrong
+  double track_km = 20000;   // of a made-up network
+  double map_error_m = 0.5;  // of a track about the mapped one
+  bool each = false;         // a line for each ride that went wrong
 };
 
 int measure_switches(const MatchingOptions& options);

@@ -1,0 +1,58 @@
+// The last step of the search on the whole network: on one way through the switches, where along it and with which
+// scale of the odometer the measured turns fit, as a probability over both.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "map_matcher/locator_types.hpp"
+#include "map_matcher/network_index.hpp"
+#include "map_matcher/way_walker.hpp"
+
+namespace railfix::map_matcher {
+
+/// Where the measured way ends on one way through the switches.
+struct WayFit {
+  std::vector<track::Run> runs;  // walked, and some way beyond
+  double end_m = 0;              // mean, from the beginning of the first run, of the camera's foot
+  double sigma_m = 0;
+  double anchor_m = 0;  // of the best fit: where bin `bin` begins, of the foot
+  size_t bin = 0;
+  double scale = 1;         // of the best fit
+  double best_log = 0;      // log likelihood
+  double log_evidence = 0;  // ... summed over places and scales
+  double misfit = 0;        // mean of the squared errors in sigmas, of the best fit
+};
+
+/// A place `along_m` on runs that follow each other.
+Candidate place_on(const std::vector<track::Run>& runs, double along_m);
+
+class WayFitter {
+ public:
+  WayFitter(const TurnModel& model, const NetworkIndex& index) : model_(model), index_(index) {}
+
+  /// With up to so many halvings of the grid: fewer for a first impression. Nothing below least_log.
+  [[nodiscard]] std::optional<WayFit> fit(const WalkedWay& walked, int halvings, double least_log) const;
+
+ private:
+  class Shape;
+  struct Trial {
+    double shift_m = 0;
+    double scale = 1;
+    double log = 0;
+    double squared = 0;
+  };
+  struct Grid {
+    std::vector<Trial> trials;
+    double shift_step_m = 0;
+    double scale_step = 0;
+  };
+  [[nodiscard]] WalkedWay lengthened(WalkedWay walked) const;
+  void weigh(const Shape& shape, const WalkedWay& walked, Trial& trial, double rough_m, double rough_scale,
+             double least_log) const;
+  [[nodiscard]] Grid search(const Shape& shape, const WalkedWay& walked, int halvings, double least_log) const;
+  const TurnModel& model_;
+  const NetworkIndex& index_;
+};
+
+}  // namespace railfix::map_matcher
