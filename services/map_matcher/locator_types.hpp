@@ -14,14 +14,14 @@ struct LocatorParameters {
   double least_way_m = 800;       // shorter ways are not searched for
   double least_turn_rad = 0.4;    // nor ways that bend less (sum of the turns, left and right)
   double scale_range = 0.02;      // of the odometer
-  double noise_per_m = 2e-4;      // least sigma of the curvature over 20 m: body, map
+  double noise_per_m = 3e-4;      // least sigma of the curvature over 20 m: body, map
   double curvature_share = 0.05;  // of the mapped curvature
   double correlated_bins = 3.0;   // neighbouring bins err together
   double lag_m = 20.0;            // the body's heading is the mean of the track's over so much behind the foot
   double detection = 0.8;         // chance that a mapped balise is sighted
   double false_per_m = 0.0005;
   double certain = 0.9999;        // probability from which on the place is certain ...
-  double certain_misfit = 2.0;    // ... when the bins fit to so many sigmas squared in the mean ...
+  double certain_misfit = 1.3;    // ... when the bins fit to so many sigmas squared in the mean ...
   double certain_sigma_m = 20.0;  // ... and the place along the track to this sigma
 };
 

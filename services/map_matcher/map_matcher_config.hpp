@@ -25,12 +25,17 @@ struct MapMatcherConfig {
   bool locate = true;
   double view_ahead_m = 7.0;
   double least_speed_mps = 1.0;
+  double lag_m = 20.0;
   double match_every_m = 5.0;
   double locate_every_m = 250.0;
   LandmarkParameters landmarks;
   CurvatureParameters curvature;
   TrackParameters track;
   LocatorParameters locator;
+
+  /// What several parts take is set once: the lag of the body, and the chances of sightings under `landmarks`.
+  [[nodiscard]] TrackParameters track_parameters() const { return shared(track); }
+  [[nodiscard]] LocatorParameters locator_parameters() const { return shared(locator); }
 
   void describe(service::Fields& fields) {
     fields.text("map", map, "Compiled map (railfix map build); empty = nothing is matched.");
@@ -47,6 +52,7 @@ struct MapMatcherConfig {
     fields.number("view_ahead_m", view_ahead_m, {0, 50}, "m",
                   "The curvature of track_view belongs to this point ahead of the camera's foot.");
     fields.number("least_speed_mps", least_speed_mps, {0, 50}, "m/s", "Slower, the turning says nothing of the track.");
+    fields.number("lag_m", lag_m, {0, 60}, "m", "The car body may turn so far behind the camera's foot.");
     fields.number("match_every_m", match_every_m, {0.5, 1000}, "m", "The shape is matched anew after this way.");
     fields.group("landmarks", "Matching of sightings.", [this](service::Fields& f) {
       auto& p = landmarks;
@@ -83,12 +89,9 @@ struct MapMatcherConfig {
       f.number("noise_per_m", p.noise_per_m, {1e-6, 0.1}, "1/m", "Least sigma of the curvature of one bin.");
       f.number("curvature_share", p.curvature_share, {0, 1}, "", "The map's curvature may be off by this share.");
       f.number("correlated_bins", p.correlated_bins, {1, 100}, "", "So many neighbouring bins err together.");
-      f.number("lag_m", p.lag_m, {0, 60}, "m", "The car body may turn so far behind the camera's foot.");
       f.number("map_sigma_m", p.map_sigma_m, {0.1, 50}, "m", "Switches are elsewhere than on the map, one sigma.");
       f.number("reach_m", p.reach_m, {5, 500}, "m", "Ways are told apart from this far ahead of the train.");
       f.number("declare", p.declare, {0.5, 0.999999}, "", "From this probability on a track is known.");
-      f.number("detection", p.detection, {0.01, 0.999}, "", "Chance that a mapped landmark is sighted.");
-      f.number("false_per_m", p.false_per_m, {1e-7, 1}, "1/m", "False sightings of one kind per metre.");
       f.number("wrong_side", p.wrong_side, {0.001, 0.5}, "", "Chance that a sighting is on the wrong side.");
       f.number("view_from_m", p.view_from_m, {0, 50}, "m", "track_view's curvature is that of the rails from here ...");
       f.number("view_to_m", p.view_to_m, {1, 100}, "m", "... to here ahead of the camera's foot.");
@@ -104,12 +107,19 @@ struct MapMatcherConfig {
       f.number("noise_per_m", p.noise_per_m, {1e-5, 0.01}, "1/m", "Least sigma of the curvature over 20 m.");
       f.number("curvature_share", p.curvature_share, {0, 0.5}, "", "The map's curvature may be off by this share.");
       f.number("correlated_bins", p.correlated_bins, {1, 100}, "", "So many neighbouring 20 m err together.");
-      f.number("lag_m", p.lag_m, {0, 60}, "m", "The car body may turn so far behind the camera's foot.");
-      f.number("detection", p.detection, {0.01, 0.999}, "", "Chance that a mapped balise is sighted.");
-      f.number("false_per_m", p.false_per_m, {1e-7, 1}, "1/m", "False sightings of balises per metre.");
       f.number("certain", p.certain, {0.5, 0.999999}, "", "From this probability on a place is certain ...");
-      f.number("certain_misfit", p.certain_misfit, {0.5, 100}, "", "... where the way fits to so many sigmas squared.");
+      f.number("certain_misfit", p.certain_misfit, {0.5, 100}, "", "... where the way fits to so many sigmas squared,");
+      f.number("certain_sigma_m", p.certain_sigma_m, {7, 1000}, "m", "... and its sigma along the track is less.");
     });
+  }
+
+ private:
+  template <typename Parameters>
+  [[nodiscard]] Parameters shared(Parameters p) const {
+    p.lag_m = lag_m;
+    p.detection = landmarks.detection;
+    p.false_per_m = landmarks.false_per_m;
+    return p;
   }
 };
 

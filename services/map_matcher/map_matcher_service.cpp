@@ -33,6 +33,26 @@ Sighting input_of(const msg::LandmarkSighting& m) {
           m.confidence()};
 }
 
+/// The first place, with the others as alternatives.
+template <typename Places>
+msg::PositionFix message_of(const Places& places) {
+  msg::PositionFix message;
+  message.edge(places.front().place.edge);
+  message.offset_m(places.front().place.offset_m);
+  message.direction(direction_of(places.front().place.direction));
+  message.probability(places.front().probability);
+  const size_t others = std::min<size_t>(places.size() - 1, msg::FIX_ALTERNATIVES);
+  for (size_t i = 0; i < others; ++i) {
+    const auto& other = places[i + 1];
+    message.alternative_edge()[i] = other.place.edge;
+    message.alternative_offset_m()[i] = other.place.offset_m;
+    message.alternative_probability()[i] = other.probability;
+    message.alternative_direction()[i] = direction_of(other.place.direction);
+  }
+  message.alternatives(static_cast<uint8_t>(others));
+  return message;
+}
+
 }  // namespace
 
 MapMatcherService::MapMatcherService(const MapMatcherConfig& config, service::Context& context)
@@ -40,7 +60,7 @@ MapMatcherService::MapMatcherService(const MapMatcherConfig& config, service::Co
   if (!config.map.empty()) {
     map_ = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(config.map)));
     ways_ = std::make_shared<const track::Ways>(*map_);
-    if (config.choose_track) chooser_.emplace(config.track, map_, ways_);
+    if (config.choose_track) chooser_.emplace(config.track_parameters(), map_, ways_);
   }
   namespace topics = messaging::topics;
   if (config.use_imu) {
@@ -186,7 +206,7 @@ void MapMatcherService::look_for_place(const msg::OdometryStep& step) {
     return;
   }
   if (!locator_) {
-    locator_.emplace(config_.locator, std::make_shared<const NetworkIndex>(map_));
+    locator_.emplace(config_.locator_parameters(), std::make_shared<const NetworkIndex>(map_));
     located_m_ = step.distance_m();
   }
   auto turn = turn_of(step);
@@ -203,15 +223,10 @@ void MapMatcherService::look_for_place(const msg::OdometryStep& step) {
 }
 
 void MapMatcherService::publish_place(const msg::OdometryStep& step, const Location& location) {
-  const auto& best = location.places.front();
-  msg::PositionFix message;
+  auto message = message_of(location.places);
   message.stamp_ns(step.stamp_ns());
   message.kind(msg::FIX_NETWORK);
-  message.edge(best.place.edge);
-  message.offset_m(best.place.offset_m);
-  message.direction(direction_of(best.place.direction));
-  message.sigma_m(best.sigma_m);
-  message.probability(best.probability);
+  message.sigma_m(location.places.front().sigma_m);
   if (!writer_.write(message)) context_.health().dropped(1);
   context_.health().output(step.grabbed_ns());
 }
@@ -264,23 +279,10 @@ void MapMatcherService::publish_track(int64_t stamp_ns, double odometer_m, int64
   const bool due = core::seconds(stamp_ns - said_track_.stamp_ns) > kTrackEveryS;
   if (!changed && !due && (choice->known || since_m < kOpenTrackEveryM)) return;
   said_track_ = {best.place.edge, choice->known, stamp_ns, odometer_m};
-  msg::PositionFix message;
+  auto message = message_of(choice->options);
   message.stamp_ns(stamp_ns);
   message.kind(msg::FIX_TRACK);
-  message.offset_m(best.place.offset_m);
   message.sigma_m(std::numeric_limits<double>::infinity());
-  message.probability(best.probability);
-  message.edge(best.place.edge);
-  message.direction(direction_of(best.place.direction));
-  const size_t others = std::min<size_t>(choice->options.size() - 1, msg::FIX_ALTERNATIVES);
-  for (size_t i = 0; i < others; ++i) {
-    const auto& other = choice->options[i + 1];
-    message.alternative_edge()[i] = other.place.edge;
-    message.alternative_offset_m()[i] = other.place.offset_m;
-    message.alternative_probability()[i] = other.probability;
-    message.alternative_direction()[i] = direction_of(other.place.direction);
-  }
-  message.alternatives(static_cast<uint8_t>(others));
   if (!writer_.write(message)) context_.health().dropped(1);
   context_.health().output(grabbed_ns);
 }

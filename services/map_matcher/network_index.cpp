@@ -1,17 +1,21 @@
 #include "map_matcher/network_index.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <deque>
+
+#include "core/units.hpp"
 
 namespace railfix::map_matcher {
 namespace {
 
+constexpr double kParallelRad = 0.3;
 constexpr int kParts = 8;  // of a cell, to integrate the curvature
 
 }  // namespace
 
 NetworkIndex::NetworkIndex(std::shared_ptr<const track::Map> map)
-    : map_(std::move(map)), ways_(*map_), headings_(map_->edges.size()), balises_(map_->edges.size()) {
+    : map_(std::move(map)), ways_(*map_), finder_(map_), headings_(map_->edges.size()), balises_(map_->edges.size()) {
   for (const auto& edge : map_->edges) {
     auto& headings = headings_[edge.id - 1];
     double heading = 0;
@@ -69,6 +73,24 @@ void NetworkIndex::add_chain(const track::Run& first, std::vector<bool>& used) {
     chain.length_m = end_m;
   }
   chains_.push_back(std::move(chain));
+}
+
+std::vector<NetworkIndex::Beside> NetworkIndex::beside(const track::Run& run, double into_m, double within_m) const {
+  const auto heading = [](const track::Run& r, double into) {
+    const auto pose = r.edge->alignment.at(r.forward ? into : r.length_m() - into).pose;
+    return pose.heading_rad + (r.forward ? 0.0 : core::kPi);
+  };
+  const auto pose = run.edge->alignment.at(run.forward ? into_m : run.length_m() - into_m).pose;
+  std::vector<Beside> found;
+  for (const auto& near : finder_.near(pose.easting_m, pose.northing_m, within_m)) {
+    for (const bool forward : {true, false}) {
+      const track::Run other{map_->edge(near.edge), forward};
+      const double into = forward ? near.offset_m : other.length_m() - near.offset_m;
+      const double turn = core::wrap_pi(heading(other, into) - heading(run, into_m));
+      if (std::abs(turn) < kParallelRad) found.push_back({other, into});
+    }
+  }
+  return found;
 }
 
 double NetworkIndex::turned(const track::Run& run, double into_m) const {

@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "track/track_finder.hpp"
 #include "track/ways.hpp"
 
 namespace railfix::map_matcher {
@@ -27,6 +28,12 @@ class NetworkIndex {
   [[nodiscard]] const std::vector<Chain>& chains() const { return chains_; }
   [[nodiscard]] const track::Ways& ways() const { return ways_; }
   [[nodiscard]] const track::Map& map() const { return *map_; }
+  /// Runs beside a place in about the same direction, with the place beside it on each; its own run is among them.
+  struct Beside {
+    track::Run run;
+    double into_m = 0;
+  };
+  [[nodiscard]] std::vector<Beside> beside(const track::Run& run, double into_m, double within_m) const;
   /// Turn since the beginning of a run, in the direction of travel, left positive.
   [[nodiscard]] double turned(const track::Run& run, double into_m) const;
   [[nodiscard]] const std::vector<const track::Landmark*>& balises_on(const track::Edge& edge) const {
@@ -39,6 +46,7 @@ class NetworkIndex {
   [[nodiscard]] double heading_on(const track::Edge& edge, double offset_m) const;
   std::shared_ptr<const track::Map> map_;
   track::Ways ways_;
+  track::TrackFinder finder_;
   std::vector<std::vector<float>> headings_;  // of each edge, every cell
   std::vector<std::vector<const track::Landmark*>> balises_;
   std::vector<Chain> chains_;

@@ -32,6 +32,16 @@ bool same_way(const WayFit& a, const WayFit& b) {
   return at.run == other.run && std::abs(at.into_m - other.into_m) < kSamePlaceM;
 }
 
+// The better one where the place is the same.
+void add(const WayFit& fit, std::vector<WayFit>& fits) {
+  const auto same = std::find_if(fits.begin(), fits.end(), [&](const WayFit& f) { return same_way(f, fit); });
+  if (same == fits.end()) {
+    fits.push_back(fit);
+  } else if (fit.log_evidence > same->log_evidence) {
+    *same = fit;
+  }
+}
+
 // Candidates of several windows lead to the same way: the best of them is kept. REQUIRES: best first.
 void drop_repeated(std::vector<WalkedWay>& ways, size_t bins) {
   struct End {
@@ -159,15 +169,26 @@ std::vector<WayFit> NetworkLocator::compare(const TurnModel& model, const std::v
       const auto full = fitter.fit(way, kHalvings, best_fit - kFarBelow);
       if (!full) continue;
       best_fit = std::max(best_fit, full->best_log);
-      const auto same = std::find_if(fits.begin(), fits.end(), [&](const WayFit& f) { return same_way(f, *full); });
-      if (same == fits.end()) {
-        fits.push_back(*full);
-      } else if (full->log_evidence > same->log_evidence) {
-        *same = *full;
-      }
+      add(*full, fits);
     }
   }
+  add_beside(walker, fitter, fits);
   return fits;
+}
+
+// The tracks beside the best place are compared too: no window needs to have found them.
+void NetworkLocator::add_beside(const WayWalker& walker, const WayFitter& fitter, std::vector<WayFit>& fits) const {
+  if (fits.empty()) return;
+  const WayFit best = *std::max_element(
+      fits.begin(), fits.end(), [](const WayFit& a, const WayFit& b) { return a.log_evidence < b.log_evidence; });
+  if (best.misfit > parameters_.certain_misfit) return;
+  const auto end = place_on(best.runs, best.end_m);
+  for (const auto& beside : index_->beside(end.run, end.into_m, kBesideM)) {
+    const double into_m = std::max(0.0, beside.into_m - 0.5 * parameters_.lag_m);
+    for (const WalkedWay& way : walker.follow({beside.run, into_m, bins_.size(), best.scale, 0}, kExactly, -INFINITY)) {
+      if (const auto fit = fitter.fit(way, kHalvings, best.best_log - kFarBelow)) add(*fit, fits);
+    }
+  }
 }
 
 Location NetworkLocator::locate() const {

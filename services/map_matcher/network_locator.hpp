@@ -48,6 +48,7 @@ class NetworkLocator {
                                             bool& complete) const;
   [[nodiscard]] std::vector<WayFit> first_fits(const WayFitter& fitter, const std::vector<WalkedWay>& ways,
                                                bool& complete) const;
+  void add_beside(const WayWalker& walker, const WayFitter& fitter, std::vector<WayFit>& fits) const;
   [[nodiscard]] Location sum_up(const std::vector<WayFit>& fits) const;
   [[nodiscard]] LocatedPlace place_of(const WayFit& fit) const;
   [[nodiscard]] bool just_behind_switch(const LocatedPlace& place) const;

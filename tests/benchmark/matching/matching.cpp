@@ -12,6 +12,8 @@ constexpr const char* kUsage =
     "  switches   track choice over simulated passages of switches\n"
     "railfix-measure-matching curvature [--map FILE] [--count N] [--seed N]\n"
     "  curvature  wheel and gyro alone against a map, by default ../shared/data/alignment/sbb_mszw_a2.landxml\n"
+    "railfix-measure-matching landmarks [--count N] [--seed N]\n"
+    "  landmarks  which mapped landmark was sighted, with missed and false sightings and a map that is partly wrong\n"
     "railfix-measure-matching locate [--map FILE | --track-km KM] [--count N] [--seed N] [--map-error-m M] [--each]\n"
     "  locate     the place without a prior, over trips of 5 km on a map or a made-up network; the real track wanders\n"
     "             about the mapped one by 0.5 m (1 sigma)\n";
@@ -45,6 +47,7 @@ int main(int argc, char** argv) {
   try {
     if (what == "switches") return railfix::measure::measure_switches(options);
     if (what == "curvature") return railfix::measure::measure_curvature(options);
+    if (what == "landmarks") return railfix::measure::measure_landmarks(options);
     if (what == "locate") return railfix::measure::measure_locate(options);
   } catch (const railfix::core::BadInput& error) {
     std::cerr << "railfix-measure-matching: " << error.what() << "\n";

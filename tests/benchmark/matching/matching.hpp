@@ -17,6 +17,7 @@ struct MatchingOptions {
 
 int measure_switches(const MatchingOptions& options);
 int measure_curvature(const MatchingOptions& options);
+int measure_landmarks(const MatchingOptions& options);
 int measure_locate(const MatchingOptions& options);
 
 }  // namespace railfix::measure

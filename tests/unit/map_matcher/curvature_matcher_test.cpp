@@ -4,6 +4,7 @@
 
 #include "core/random.hpp"
 #include "core/result.hpp"
+#include "map_matcher/curve_exit_matcher.hpp"
 
 namespace railfix::map_matcher {
 namespace {
@@ -66,6 +67,23 @@ TEST(CurvatureMatcher, EntriesAndExitsOfCurvesGiveHonestFixes) {
     EXPECT_LT(result.worst_m, 20) << "seed " << seed;
   }
   EXPECT_GE(fixes, 8 * 2);
+}
+
+// Readings further apart than the bins, at an odd distance: each bin counts all the same.
+TEST(CurveExitMatcher, TheExitOfACurveIsFoundWhereItIs) {
+  for (const double step_m : {1.3, 2.4, 3.7}) {
+    const auto path = line_of({{400, 0, 0}, {80, 0, 0.002}, {250, 0.002, 0.002}, {80, 0.002, 0}, {400, 0, 0}});
+    CurveExitMatcher matcher({}, path);
+    int exits = 0;
+    for (double s = 5; s < 1000; s += step_m) {
+      matcher.add(s - 0.5 * step_m, path->curvature_at(s - 0.5 * step_m));
+      const auto fix = matcher.match(1, s, {s, 30, 30, s});
+      if (!fix) continue;
+      ++exits;
+      EXPECT_NEAR(fix->path_distance_m, s, 5) << "step " << step_m;
+    }
+    EXPECT_EQ(exits, 1) << "step " << step_m;
+  }
 }
 
 TEST(CurvatureMatcher, ForgetsWhatCameBeforeTheCameraWasBlind) {
