@@ -14,15 +14,15 @@
 namespace railfix::map_matcher {
 
 struct CurvatureParameters {
-  double bin_m = 4.0;           // measurements are averaged over this way
-  double window_m = 400;        // longest way that is matched
-  double noise_per_m = 2e-4;    // least sigma of one bin: car body, sleepers, map
-  double correlated_bins = 3;   // neighbouring bins err together
-  double bias_per_m = 3e-5;     // constant error of the curvature, one sigma
-  double scale_sigma = 0.01;    // of the odometer
-  double search_margin_m = 10;  // beyond the promised interval of train_state
-  double max_sigma_m = 8.0;     // of a fix that is worth sending
-  double sigma_floor_m = 0.7;   // map and the point that the curvature belongs to
+  double bin_m = 4.0;            // measurements are averaged over this way
+  double window_m = 400;         // longest way that is matched
+  double noise_per_m = 2e-4;     // least sigma of one bin: car body, sleepers, map
+  double correlated_bins = 1.5;  // neighbouring bins err together
+  double bias_per_m = 3e-5;      // constant error of the curvature, one sigma
+  double scale_sigma = 0.01;     // of the odometer
+  double search_margin_m = 10;   // beyond the promised interval of train_state
+  double max_sigma_m = 8.0;      // of a fix that is worth sending
+  double sigma_floor_m = 0.7;    // map and the point that the curvature belongs to
   double min_probability = 0.9;
 };
 
