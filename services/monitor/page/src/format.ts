@@ -73,20 +73,25 @@ export function duration(seconds: number | null | undefined): string {
   return parts(Math.floor(minutes / 1440), "d", Math.floor(minutes / 60) % 24, "h");
 }
 
-/// "12:31:04", with the date when it is not today's.
-export function clock(ms: number, now_ms: number): string {
+const two = (n: number) => String(n).padStart(2, "0");
+
+/// "12:31:04" and "2026-11-21", by this browser's time zone.
+export function time_of_day(ms: number): string {
   const when = new Date(ms);
-  const two = (n: number) => String(n).padStart(2, "0");
-  const time = `${two(when.getHours())}:${two(when.getMinutes())}:${two(when.getSeconds())}`;
-  if (new Date(now_ms).toDateString() === when.toDateString()) return time;
-  return `${when.getFullYear()}-${two(when.getMonth() + 1)}-${two(when.getDate())} ${time}`;
+  return `${two(when.getHours())}:${two(when.getMinutes())}:${two(when.getSeconds())}`;
 }
+export function day(ms: number): string {
+  const when = new Date(ms);
+  return `${when.getFullYear()}-${two(when.getMonth() + 1)}-${two(when.getDate())}`;
+}
+
+/// "12:31:04", with the date when it is not today's.
+export const clock = (ms: number, now_ms: number) => (day(ms) === day(now_ms) ? "" : `${day(ms)} `) + time_of_day(ms);
 
 /// Place in a recording: "1:02:03.4".
 export function played(seconds: number): string {
   const tenths = Math.max(0, Math.round(seconds * 10));
   const s = Math.floor(tenths / 10);
-  const two = (n: number) => String(n).padStart(2, "0");
   const minutes = Math.floor(s / 60);
   const head = minutes >= 60 ? `${Math.floor(minutes / 60)}:${two(minutes % 60)}` : `${minutes}`;
   return `${head}:${two(s % 60)}.${tenths % 10}`;

@@ -16,12 +16,13 @@ import { Recorder } from "./panels/recorder";
 import { Reports } from "./panels/reports";
 import { Services } from "./panels/services";
 import { Topics } from "./panels/topics";
-import { about, connection, map, now_ms, remember_moment, state } from "./store";
+import { about, connection, map, map_failed, now_ms, remember_moment, state } from "./store";
 import { page_visible, wanted } from "./visible";
 import type { About, MapData } from "./wire";
 
 const RADIUS_M = 20000; // of the part of a long map around the train
 const LONG_MAP_M = 300000;
+const CAMERAS_MS = 2000;
 
 async function fetched<T>(path: string): Promise<T | null> {
   try {
@@ -44,7 +45,9 @@ async function fetch_map(): Promise<void> {
   const one = state.value.value;
   const around = line.length_m > LONG_MAP_M && one?.track_known ? `?edge=${one.edge}&offset=${Math.round(one.offset_m)}&radius=${RADIUS_M}` : "";
   map_of = { edge: one?.track_known ? one.edge : 0, travelled_m: one?.distance_m ?? 0 };
-  map.value = (await fetched<MapData>(`api/map${around}`)) ?? map.value;
+  const got = await fetched<MapData>(`api/map${around}`);
+  map_failed.value = got === null;
+  map.value = got ?? map.value;
 }
 
 function left_the_map(): boolean {
@@ -54,8 +57,13 @@ function left_the_map(): boolean {
   return map_of.edge === 0 || Math.abs((one.distance_m ?? 0) - map_of.travelled_m) > RADIUS_M / 2;
 }
 
+async function fetch_about(): Promise<void> {
+  const got = await fetched<About>("api/about");
+  if (got !== null) about.value = got;
+}
+
 async function greeted(): Promise<void> {
-  about.value = (await fetched<About>("api/about")) ?? about.value;
+  await fetch_about();
   await fetch_map();
 }
 
@@ -101,5 +109,9 @@ setInterval(() => {
   remember_moment(Date.now());
   if (left_the_map()) void fetch_map();
 }, 1000);
+// A monitor that was just started does not know the cameras yet.
+setInterval(() => {
+  if (page_visible.value && connection.value.up && about.value?.cameras.length === 0) void fetch_about();
+}, CAMERAS_MS);
 
 render(<Page />, document.getElementById("page") as HTMLElement);

@@ -11,7 +11,11 @@ export interface Picture {
   camera: string;
   stamp_ns: number;
   image: ImageBitmap;
+  view: View | null; // what was seen in this very picture
 }
+
+const VIEWS_KEPT = 8; // a view comes before its picture, which must be decoded first
+let views: View[] = [];
 
 /// One second of the past: null where nothing was known.
 export interface Moment {
@@ -23,6 +27,7 @@ export interface Moment {
 
 export const about = signal<About | null>(null);
 export const map = signal<MapData | null>(null);
+export const map_failed = signal(false);
 export const state = signal<Held<TrainState>>(nothing());
 export const curvature = signal<Held<Curvature>>(nothing());
 export const view = signal<Held<View>>(nothing());
@@ -70,9 +75,11 @@ export function remember_moment(at_ms: number): void {
   history.value = history.value.concat(moment).slice(-HISTORY_LIMIT);
 }
 
-export function show_picture(next: Picture): void {
-  picture.value?.image.close();
-  picture.value = next;
+export function show_picture(next: Omit<Picture, "view">): void {
+  const seen = views.find((one) => one.camera === next.camera && one.stamp_ns === next.stamp_ns) ?? null;
+  const last = picture.value;
+  picture.value = { ...next, view: seen };
+  last?.image.close();
 }
 
 const report_key = (report: Report) => `${report.stamp_ns} ${report.seq}`;
@@ -93,6 +100,7 @@ export function take(message: Message): void {
       break;
     case "view":
       view.value = { value: message, at_ms };
+      views = views.concat(message).slice(-VIEWS_KEPT);
       break;
     case "services":
       services.value = { value: message.services, at_ms };

@@ -59,8 +59,9 @@ export interface View {
   width: number;
   height: number;
   rails: { left: PicturePoint[]; right: PicturePoint[] } | null;
-  seen: boolean;
-  why: string;
+  seen: boolean; // both rails
+  why: string | null; // why not: "not seen", "left rail not seen", ...
+  // Where the map and the position put them.
   landmarks: { kind: string; name: string; ahead_m: number; across_m: number; x: number; y: number; side: string }[];
   health: string[];
 }

@@ -123,10 +123,9 @@ class Scene {
     for (const edge of this.map.data.edges) {
       const box = this.map.boxes.get(edge.id);
       if (!edge.name || box === undefined || !overlap(box, this.seen)) continue;
-      const seen = edge.line.filter((point) => this.inside(point[1], point[2]));
-      const at = seen[Math.floor(seen.length * 0.75)];
-      if (at === undefined || seen.length < 3) continue;
-      const [x, y] = this.project([at[1], at[2]]);
+      const middle = longest_inside(edge.line.map((point) => this.project([point[1], point[2]])), this.paper);
+      if (middle === null) continue;
+      const [x, y] = middle;
       if (this.room(edge.name, x + 6, y + 14)) label(this.paper.context, edge.name, x + 6, y + 14, this.c.text);
     }
   }
@@ -202,10 +201,39 @@ class Scene {
   private room(text: string, x: number, y: number): boolean {
     const width = this.paper.context.measureText(text).width;
     const box = { west: x - 2, east: x + width + 2, south: y - 11, north: y + 3 };
-    if (box.east > this.paper.width || box.south < 0 || this.taken.some((other) => overlap(box, other))) return false;
+    if (box.west < 0 || box.east > this.paper.width || box.south < 0 || this.taken.some((other) => overlap(box, other))) return false;
     this.taken.push(box);
     return true;
   }
+}
+
+const NAMED_FROM_PX = 8;
+
+/// Middle of the longest straight piece of a line that lies on the paper; null when none is long enough for a name.
+function longest_inside(line: [number, number][], paper: { width: number; height: number }): [number, number] | null {
+  let best: { length: number; middle: [number, number] } | null = null;
+  for (let i = 1; i < line.length; ++i) {
+    const [a, b] = [line[i - 1], line[i]] as [[number, number], [number, number]];
+    const [from, to] = clipped(a, b, paper);
+    if (from >= to) continue;
+    const [dx, dy] = [b[0] - a[0], b[1] - a[1]];
+    const length = (to - from) * Math.hypot(dx, dy);
+    const share = from + 0.6 * (to - from);
+    if (best === null || length > best.length) best = { length, middle: [a[0] + share * dx, a[1] + share * dy] };
+  }
+  return best === null || best.length < NAMED_FROM_PX ? null : best.middle;
+}
+
+/// The part of a segment on the paper, as shares from a to b (Liang and Barsky, 1984).
+function clipped(a: [number, number], b: [number, number], paper: { width: number; height: number }): [number, number] {
+  let [from, to] = [0, 1];
+  const sides = [[a[0] - b[0], a[0]], [b[0] - a[0], paper.width - a[0]], [a[1] - b[1], a[1]], [b[1] - a[1], paper.height - a[1]]] as const;
+  for (const [change, room] of sides) {
+    if (change === 0 && room < 0) return [1, 0];
+    if (change < 0) from = Math.max(from, room / change);
+    if (change > 0) to = Math.min(to, room / change);
+  }
+  return [from, to];
 }
 
 /// Metres a pixel up to which a kind is drawn; its name up to a third of that.

@@ -53,7 +53,7 @@ export function draw_plot(canvas: HTMLCanvasElement, axes: Axes, bands: Band[], 
   const x_of = (x: number) => LEFT + ((x - axes.x.from) / (axes.x.to - axes.x.from || 1)) * (width - LEFT - RIGHT);
   const y_of = (y: number) => TOP + ((axes.y.to - y) / (axes.y.to - axes.y.from || 1)) * (height - TOP - BOTTOM);
 
-  const y_step = round_step((axes.y.to - axes.y.from) / Math.max(1, (height - TOP - BOTTOM) / 36));
+  const y_step = round_step((axes.y.to - axes.y.from) / Math.max(2.2, (height - TOP - BOTTOM) / 36));
   const digits = Math.max(0, -Math.floor(Math.log10(y_step) + 1e-9));
   for (let y = Math.ceil(axes.y.from / y_step) * y_step; y <= axes.y.to + 1e-12; y += y_step) {
     const zero = Math.abs(y) < y_step / 1000;

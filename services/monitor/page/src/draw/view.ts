@@ -1,5 +1,6 @@
 // The camera's picture with what was seen in this very picture drawn over it.
-import { metres, words } from "../format";
+import { capital, number, words } from "../format";
+import { type Box, overlap } from "../track_map";
 import type { Picture } from "../store";
 import type { PicturePoint, View } from "../wire";
 import { polyline } from "./canvas";
@@ -8,13 +9,10 @@ import { polyline } from "./canvas";
 const RAIL = "#18e0ff";
 const RAIL_RIM = "rgba(0, 20, 40, 0.75)";
 const MARK = "#ffd24a";
+const NAMED_UP_TO_M = 120;
 
-/// What is drawn must belong to the picture shown.
-export const belongs = (view: View | null, picture: Picture): view is View =>
-  view !== null && view.camera === picture.camera && view.stamp_ns === picture.stamp_ns;
-
-export function draw_view(canvas: HTMLCanvasElement, picture: Picture, view: View | null): void {
-  const { image } = picture;
+export function draw_view(canvas: HTMLCanvasElement, picture: Picture): void {
+  const { image, view } = picture;
   if (canvas.width !== image.width || canvas.height !== image.height) {
     canvas.width = image.width;
     canvas.height = image.height;
@@ -23,7 +21,7 @@ export function draw_view(canvas: HTMLCanvasElement, picture: Picture, view: Vie
   if (context === null) return;
   context.setTransform(1, 0, 0, 1, 0, 0);
   context.drawImage(image, 0, 0);
-  if (!belongs(view, picture)) return;
+  if (view === null) return;
   const size = image.width / 640; // line widths and text as on a picture of 640 pixels
   const scale = image.width / view.width;
   const place = ([x, y]: PicturePoint): [number, number] => [x * scale, y * scale];
@@ -36,30 +34,44 @@ export function draw_view(canvas: HTMLCanvasElement, picture: Picture, view: Vie
     context.lineWidth = 2.5 * size;
     context.stroke();
   }
-  context.font = `600 ${13 * size}px system-ui, sans-serif`;
-  for (const one of view.landmarks) {
-    const [x, y] = place([one.x, one.y]);
+  draw_marks(context, view.landmarks.map((one) => ({ at: place([one.x, one.y]), one })), size);
+}
+
+const name_of = (one: View["landmarks"][number]) => (one.name.startsWith(words(one.kind)) ? one.name : `${words(one.kind)} ${one.name}`.trim());
+
+/// The nearest first; names only where they cover no other.
+function draw_marks(context: CanvasRenderingContext2D, marks: { at: [number, number]; one: View["landmarks"][number] }[], size: number): void {
+  const taken: Box[] = [];
+  context.font = `600 ${12 * size}px system-ui, sans-serif`;
+  context.lineWidth = 2 * size;
+  for (const { at, one } of [...marks].sort((a, b) => a.one.ahead_m - b.one.ahead_m)) {
+    const half = Math.max(3, Math.min(9, 220 / one.ahead_m)) * size;
     context.strokeStyle = MARK;
-    context.lineWidth = 2.5 * size;
-    context.strokeRect(x - 8 * size, y - 8 * size, 16 * size, 16 * size);
-    name_mark(context, `${one.name || words(one.kind)} ${metres(one.ahead_m)}`, x + 12 * size, y, size);
+    context.strokeRect(at[0] - half, at[1] - half, 2 * half, 2 * half);
+    const text = `${name_of(one)}, ${number(one.ahead_m, 0)} m`;
+    const width = context.measureText(text).width;
+    const left = Math.min(at[0] + half + 4 * size, context.canvas.width - width - 6 * size);
+    const box = { west: left - 4 * size, east: left + width + 4 * size, south: at[1] - 9 * size, north: at[1] + 7 * size };
+    if (one.ahead_m > NAMED_UP_TO_M || taken.some((other) => overlap(box, other))) continue;
+    taken.push(box);
+    context.fillStyle = "rgba(10, 16, 24, 0.72)";
+    context.fillRect(box.west, box.south, box.east - box.west, box.north - box.south);
+    context.fillStyle = MARK;
+    context.fillText(text, left, at[1] + 3.5 * size);
   }
 }
 
-function name_mark(context: CanvasRenderingContext2D, text: string, x: number, y: number, size: number): void {
-  const width = context.measureText(text).width;
-  const left = Math.min(x, context.canvas.width - width - 6 * size);
-  context.fillStyle = "rgba(10, 16, 24, 0.72)";
-  context.fillRect(left - 4 * size, y - 11 * size, width + 8 * size, 17 * size);
-  context.fillStyle = MARK;
-  context.fillText(text, left, y + 2 * size);
+/// "Rails not seen", "Left rail not seen", "Rails not seen: no answer of ...".
+export function not_seen(view: View): string {
+  if (view.why === null || view.why === "" || view.why === "not seen") return "Rails not seen";
+  return view.why.endsWith("rail not seen") ? capital(view.why) : `Rails not seen: ${view.why}`;
 }
 
 export function view_in_words(view: View | null): string {
   if (view === null) return "Camera picture. Nothing is known about what it shows.";
-  const rails = view.seen ? "Both rails are seen." : `Rails not seen: ${view.why || "no reason given"}.`;
-  const marks = view.landmarks.map((one) => `${one.name || words(one.kind)} in ${metres(one.ahead_m)}`);
+  const rails = view.seen ? "Both rails are seen." : `${not_seen(view)}.`;
+  const marks = view.landmarks.slice(0, 5).map((one) => `${name_of(one)} in ${number(one.ahead_m, 0)} m`);
   const health = view.health.length === 0 ? "" : ` The picture is ${view.health.map(words).join(", ")}.`;
-  return `Camera picture. ${rails}${marks.length === 0 ? "" : ` In sight: ${marks.join(", ")}.`}${health}`;
+  return `Camera picture. ${rails}${marks.length === 0 ? "" : ` By the map there come ${marks.join(", ")}.`}${health}`;
 }
 

@@ -1,15 +1,15 @@
 // The live picture with rails and landmarks drawn over it.
 import { signal } from "@preact/signals";
-import { belongs, draw_view, view_in_words } from "../draw/view";
+import { draw_view, not_seen, view_in_words } from "../draw/view";
 import { capital, words } from "../format";
-import { about, fresh, picture, view } from "../store";
+import { about, fresh, picture } from "../store";
 import { Drawing } from "./canvas";
 import { Nothing, Panel } from "./panel";
 
 const chosen = signal("");
 
 function draw(canvas: HTMLCanvasElement): void {
-  if (picture.value !== null) draw_view(canvas, picture.value, view.value.value);
+  if (picture.value !== null) draw_view(canvas, picture.value);
 }
 
 function Choice({ cameras }: { cameras: string[] }) {
@@ -27,19 +27,18 @@ function Choice({ cameras }: { cameras: string[] }) {
 
 /// What must not be overlooked stands on the picture itself.
 function Banner() {
-  const one = view.value.value;
-  if (picture.value === null || one === null) return null;
   if (fresh("view") === "stale") return <p class="banner">Old picture</p>;
-  if (!belongs(one, picture.value)) return null;
+  const one = picture.value?.view;
+  if (!one) return null;
   const health = one.health.length === 0 ? "" : ` · picture ${one.health.map(words).join(", ")}`;
   if (one.seen && health === "") return null;
-  return <p class="banner">{one.seen ? capital(health.slice(3)) : `Rails not seen${one.why === "" || one.why === "not seen" ? "" : `: ${one.why}`}${health}`}</p>;
+  return <p class="banner">{one.seen ? capital(health.slice(3)) : `${not_seen(one)}${health}`}</p>;
 }
 
 export function CameraPanel() {
   const cameras = about.value?.cameras ?? [];
   const camera = chosen.value || cameras[0];
-  const one = view.value.value;
+  const one = picture.value?.view ?? null;
   return (
     <Panel id="camera" title="Camera" topics={camera === undefined ? [] : [`view:${camera}`]} kind="view"
       aside={cameras.length > 1 ? <Choice cameras={cameras} /> : <span class="muted">{camera}</span>}>
@@ -52,9 +51,9 @@ export function CameraPanel() {
         </figure>
       )}
       <p class="legend">
-        <span class="key rail">rails seen</span>
-        <span class="key mark">landmarks</span>
-        <span class="muted">{one === null ? "" : one.seen ? "both rails seen" : "rails not seen"}</span>
+        <span class="key rail">rails as seen</span>
+        <span class="key mark">landmarks where the map puts them</span>
+        <span class="muted">{one === null ? "" : one.seen ? "both rails seen" : not_seen(one).toLowerCase()}</span>
       </p>
     </Panel>
   );

@@ -34,13 +34,14 @@ export function AnswerLine({ answer }: { answer: Signal<Answer> }) {
   );
 }
 
+/// Stands in one panel at a time: a train that replays has no recorder to control.
 export function TokenField() {
   if (about.value?.control === "off") return <p class="nothing">Control is switched off (monitor.control).</p>;
   if (about.value?.control !== "token") return null;
   return (
-    <label class="token">
-      Token for control
-      <input type="password" autocomplete="off" value={token.value} onInput={(event) => (token.value = event.currentTarget.value)} />
-    </label>
+    <span class="field">
+      <label for="token">Token for control</label>
+      <input id="token" type="password" autocomplete="off" value={token.value} onInput={(event) => (token.value = event.currentTarget.value)} />
+    </span>
   );
 }

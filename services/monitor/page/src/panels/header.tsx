@@ -16,7 +16,7 @@ export function Header() {
     <header class="top">
       <h1>
         <span class="mark" aria-hidden="true" />
-        Railfix <span class="train">{one === null ? "" : `train ${one.train}`}</span>
+        <span class="brand">Railfix</span> <span class="train">{one === null ? "" : `train ${one.train}`}</span>
       </h1>
       <Connection />
       <p class="muted host">{one === null ? "" : `${one.host} · version ${one.version}`}</p>

@@ -3,7 +3,7 @@ import { computed, signal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { type Camera, draw_map, map_in_words } from "../draw/map";
 import { draw_strip, strip_in_words } from "../draw/strip";
-import { about, fresh, map, state } from "../store";
+import { about, fresh, map, map_failed, state } from "../store";
 import { TrackMap } from "../track_map";
 import type { TrainState } from "../wire";
 import { Drawing } from "./canvas";
@@ -16,6 +16,18 @@ const centre = signal<[number, number] | null>(null);
 
 const NEAREST = 0.02;
 const FARTHEST = 2000;
+
+const FOLLOWED_UP_TO = 5;
+
+function follow(): void {
+  following.value = true;
+  metres_per_px.value = Math.min(metres_per_px.value, FOLLOWED_UP_TO);
+}
+
+function stay(): void {
+  centre.value = middle();
+  following.value = false;
+}
 
 function zoom(factor: number): void {
   metres_per_px.value = Math.min(FARTHEST, Math.max(NEAREST, metres_per_px.value * factor));
@@ -56,7 +68,7 @@ function key(event: KeyboardEvent): void {
     ArrowRight: () => move(-step, 0),
     ArrowUp: () => move(0, step),
     ArrowDown: () => move(0, -step),
-    Home: () => (following.value = true),
+    Home: follow,
   };
   const action = actions[event.key];
   if (action === undefined) return;
@@ -139,7 +151,7 @@ function Picture() {
           <button aria-label="Zoom in" onClick={() => zoom(0.6)}>+</button>
           <button aria-label="Zoom out" onClick={() => zoom(1.6)}>−</button>
           <button onClick={fit}>Whole line</button>
-          <button aria-pressed={following.value} onClick={() => (following.value = !following.value)}>Follow</button>
+          <button aria-pressed={following.value} onClick={() => (following.value ? stay() : follow())}>Follow</button>
         </div>
       </div>
       {one !== null && one.track_known && lines.has(one.edge) ? (
@@ -156,7 +168,7 @@ export function Line() {
   return (
     <Panel id="line" title="Line" topics={["state"]} kind="state" aside={name ? <span class="muted">{name}</span> : undefined}>
       {track.value === null ? (
-        <Nothing>{about.value === null ? "Waiting for the map." : about.value.map === null ? "The monitor has no map (monitor.map). Edge and metres above are right all the same." : "Loading the map."}</Nothing>
+        <Nothing>{about.value === null ? "Waiting for the map." : about.value.map === null ? "The monitor has no map (monitor.map). Edge and metres above are right all the same." : map_failed.value ? "The monitor does not give its map; it is asked for again at the next connection." : "Loading the map."}</Nothing>
       ) : (
         <Picture />
       )}

@@ -15,27 +15,27 @@ const change = (some: Partial<Filter>) => (filter.value = { ...filter.value, ...
 function Filters() {
   return (
     <form class="filters" role="search" aria-label="Log filter" onSubmit={(event) => event.preventDefault()}>
-      <label>
-        Service
-        <select value={filter.value.service} onChange={(event) => change({ service: event.currentTarget.value })}>
+      <span class="field">
+        <label for="log-service">Service</label>
+        <select id="log-service" value={filter.value.service} onChange={(event) => change({ service: event.currentTarget.value })}>
           <option value="">all</option>
           {names.value.map((one) => (
             <option key={one}>{one}</option>
           ))}
         </select>
-      </label>
-      <label>
-        From level
-        <select value={filter.value.least} onChange={(event) => change({ least: event.currentTarget.value as LogLevel })}>
+      </span>
+      <span class="field">
+        <label for="log-level">From level</label>
+        <select id="log-level" value={filter.value.least} onChange={(event) => change({ least: event.currentTarget.value as LogLevel })}>
           {LEVELS.map((one) => (
             <option key={one}>{one}</option>
           ))}
         </select>
-      </label>
-      <label>
-        Text
-        <input type="search" value={filter.value.text} onInput={(event) => change({ text: event.currentTarget.value })} />
-      </label>
+      </span>
+      <span class="field">
+        <label for="log-text">Text</label>
+        <input id="log-text" type="search" value={filter.value.text} onInput={(event) => change({ text: event.currentTarget.value })} />
+      </span>
       <span class="muted">
         {shown.value.length} of {log.value.length}
         {log.value.length === LOG_LIMIT ? ", older ones are gone" : ""}
@@ -57,7 +57,7 @@ function Lines() {
     at_end.current = box.scrollHeight - box.scrollTop - box.clientHeight < 30;
   };
   return (
-    <div class="scroll tall log" ref={frame} tabIndex={0} role="region" aria-label="Log lines" onScroll={scrolled}>
+    <div class="scroll tall log" ref={frame} tabIndex={0} role="group" aria-label="Log lines" onScroll={scrolled}>
       <ol>
         {records.map((one) => (
           <li key={`${one.stamp_ns} ${one.host} ${one.service} ${one.text}`} class={one.level}>

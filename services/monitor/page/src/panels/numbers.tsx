@@ -70,7 +70,7 @@ function Where({ one }: { one: TrainState }) {
   const known = one.track_known;
   const bounded = known && one.over_m !== null && one.under_m !== null;
   const widest = Math.max(one.over_m ?? 0, one.under_m ?? 0);
-  const digits = widest < 0.995 ? 2 : widest < 99.5 ? 1 : 0;
+  const digits = widest < 0.995 ? 2 : widest < 9.95 ? 1 : 0;
   const geo = one.lat === null || one.lon === null ? "" : `${one.lat.toFixed(5)}°, ${one.lon.toFixed(5)}°`;
   return (
     <>
@@ -104,7 +104,7 @@ export function Numbers() {
   const one = state.value.value;
   const now = fresh("state");
   return (
-    <section id="numbers" class={now === "live" ? "" : "stale"} aria-labelledby="numbers-title">
+    <section id="numbers" tabIndex={-1} class={now === "live" ? "" : "stale"} aria-labelledby="numbers-title">
       <h2 id="numbers-title" class="unseen">
         The train now
       </h2>

@@ -11,7 +11,7 @@ interface Props {
   id: string;
   title: string;
   topics: readonly string[];
-  kind?: Parameters<typeof age_of>[0]; // whose age is shown and greys the content
+  kind?: Parameters<typeof age_of>[0] | undefined; // whose age is shown and greys the content
   aside?: ComponentChildren;
   children: ComponentChildren;
 }

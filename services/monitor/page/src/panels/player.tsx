@@ -43,15 +43,15 @@ function Buttons({ one, able }: { one: PlayerStatus; able: boolean }) {
         <button disabled={!able} onClick={() => void command("play")}>Play</button>
       )}
       <button disabled={!able || one.state === "playing"} onClick={() => void command("step")}>Step</button>
-      <label>
-        Rate
-        <select value={String(one.rate)} disabled={!able || one.lock_step} onChange={(event) => void command("rate", event.currentTarget.value)}>
+      <span class="field">
+        <label for="player-rate">Rate</label>
+        <select id="player-rate" value={String(one.rate)} disabled={!able || one.lock_step} onChange={(event) => void command("rate", event.currentTarget.value)}>
           {rates.map((rate) => (
             <option key={rate} value={String(rate)}>{number(rate, rate < 1 ? 2 : 0)} ×</option>
           ))}
         </select>
-      </label>
-      <label class="tick">
+      </span>
+      <label>
         <input type="checkbox" checked={one.looped} disabled={!able} onChange={(event) => void command("loop", event.currentTarget.checked ? "on" : "off")} />
         Again at the end
       </label>

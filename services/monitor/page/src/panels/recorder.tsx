@@ -96,7 +96,7 @@ function Lost({ one }: { one: RecorderStatus }) {
   if (one.lost.length === 0) return <p class="fine">Nothing lost</p>;
   const causes = Object.keys(CAUSES) as (keyof typeof CAUSES)[];
   return (
-    <div class="scroll" tabIndex={0} role="region" aria-label="Lost samples by cause">
+    <div class="scroll" tabIndex={0} role="group" aria-label="Lost samples by cause">
       <table>
         <caption>Lost samples</caption>
         <thead>
@@ -125,7 +125,7 @@ function Lost({ one }: { one: RecorderStatus }) {
 export function Recorder() {
   const one = recorder.value.value;
   return (
-    <Panel id="recorder" title="Recorder" topics={["recorder"]} kind="recorder">
+    <Panel id="recorder" title="Recorder" topics={["recorder"]} kind={one?.absent ? undefined : "recorder"}>
       {one === null || one.absent ? (
         <Nothing>{one === null ? "Nothing heard of a recorder yet." : "No recorder runs on this train."}</Nothing>
       ) : (

@@ -1,7 +1,7 @@
 // Position reports as they leave, newest first, with the message unfolded.
 import { signal } from "@preact/signals";
 import { unfold } from "../etcs";
-import { capital, clock, metres, number, words } from "../format";
+import { capital, day, metres, number, time_of_day, words } from "../format";
 import { host_ms, now_ms, reports } from "../store";
 import type { Report } from "../wire";
 import { Nothing, Panel } from "./panel";
@@ -15,7 +15,7 @@ function Row({ one }: { one: Report }) {
     <tr class={open ? "chosen" : ""}>
       <th scope="row">
         <button class="link" aria-expanded={open} onClick={() => (chosen.value = open ? null : one.sent_ns)}>
-          {clock(host_ms(one.sent_ns), now_ms.value)}
+          {time_of_day(host_ms(one.sent_ns))}
         </button>
       </th>
       <td>{capital(words(one.reason))}</td>
@@ -38,7 +38,7 @@ function Message({ one }: { one: Report }) {
       </h3>
       <p class="hex">{one.hex.replace(/(..)/g, "$1 ").trim()}</p>
       {problem !== "" && <p class="nothing">It cannot be read further: {problem}.</p>}
-      <div class="scroll" tabIndex={0} role="region" aria-label="Fields of the message">
+      <div class="scroll" tabIndex={0} role="group" aria-label="Fields of the message">
         <table>
           <thead>
             <tr>
@@ -68,17 +68,19 @@ export function Reports() {
   const list = [...reports.value].reverse();
   const open = list.find((one) => one.sent_ns === chosen.value);
   const last = list[0];
+  // Recorded data keeps its own date.
+  const other_day = last === undefined || day(host_ms(last.sent_ns)) === day(now_ms.value) ? "" : day(host_ms(last.sent_ns));
   return (
     <Panel id="reports" title="Position reports" topics={["reports"]}
       aside={last === undefined ? undefined : <span class="muted">newest of the last {list.length} first; press a time for the message</span>}>
       {last === undefined ? (
         <Nothing>None has left since the monitor listens.</Nothing>
       ) : (
-        <div class="scroll tall" tabIndex={0} role="region" aria-label="Position reports">
+        <div class="scroll tall" tabIndex={0} role="group" aria-label="Position reports">
           <table>
             <thead>
               <tr>
-                <th scope="col">Sent</th>
+                <th scope="col">Sent{other_day === "" ? "" : ` on ${other_day}`}</th>
                 <th scope="col">Because</th>
                 <th scope="col">Balise group</th>
                 <th scope="col" class="n">Distance</th>

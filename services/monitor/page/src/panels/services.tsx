@@ -18,8 +18,8 @@ function Row({ one, hosts }: { one: Service; hosts: number }) {
         <span class={`state ${level_of(state)}`}>{state}</span> <span class="muted">{duration(since_s)}</span>
       </td>
       <td class="reason">{state !== "dead" ? one.reason : `silent for ${duration(one.age_s)}${one.reason === "" ? "" : `; last said: ${one.reason}`}`}</td>
-      <td class="n">{milliseconds(one.latency_p50_ms)}</td>
-      <td class="n">{milliseconds(one.latency_p99_ms)}</td>
+      <td class="n">{one.latency_p50_ms ? milliseconds(one.latency_p50_ms) : "–"}</td>
+      <td class="n">{one.latency_p99_ms ? milliseconds(one.latency_p99_ms) : "–"}</td>
       <td class="n">{percent(one.cpu_percent, 0)}</td>
       <td class="n">{number(one.rss_mb, 0)} MB</td>
       <td class={`n ${one.dropped > 0 ? "warn" : ""}`}>{number(one.dropped, 0)}</td>
@@ -41,7 +41,7 @@ export function Services() {
       {list.length === 0 ? (
         <Nothing>No service has said anything yet.</Nothing>
       ) : (
-        <div class="scroll" tabIndex={0} role="region" aria-label="Services">
+        <div class="scroll" tabIndex={0} role="group" aria-label="Services">
           <table>
             <thead>
               <tr>

@@ -11,12 +11,12 @@ function Row({ one }: { one: Topic }) {
     <tr>
       <th scope="row">
         {one.topic}
-        {one.writers !== 1 && <span class={one.writers === 0 ? "warn" : "muted"}> {one.writers === 0 ? "no writer" : `${one.writers} writers`}</span>}
+        {one.writers !== 1 && <span class="muted"> {one.writers === 0 ? "no writer" : `${one.writers} writers`}</span>}
       </th>
       {measured ? (
         <>
-          <td class="n">{hertz(one.hz)}</td>
-          <td class="n">{bytes_per_s(one.bytes_per_s)}</td>
+          <td class="n">{one.age_s === null ? "–" : hertz(one.hz)}</td>
+          <td class="n">{one.age_s === null ? "–" : bytes_per_s(one.bytes_per_s)}</td>
           <td class="n">{one.age_s === null ? "never" : duration(one.age_s)}</td>
           {latency.map((ms, i) => (
             <td class="n" key={i}>{ms === null ? "–" : milliseconds(ms)}</td>
@@ -43,7 +43,7 @@ export function Topics() {
       {list.length === 0 ? (
         <Nothing>No topic is known yet.</Nothing>
       ) : (
-        <div class="scroll" tabIndex={0} role="region" aria-label="Topics">
+        <div class="scroll" tabIndex={0} role="group" aria-label="Topics">
           <table>
             <thead>
               <tr>
