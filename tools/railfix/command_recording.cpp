@@ -3,8 +3,12 @@
 namespace railfix::tool {
 
 void add_recording(CLI::App& app, Action& chosen) {
-  auto* recording = app.add_subcommand("recording", "Recordings (MCAP files): repair what a crash left behind");
+  auto* recording = app.add_subcommand("recording", "Recordings (MCAP files): look into them, cut, join, export, repair");
   recording->require_subcommand(1);
+  add_recording_info(*recording, chosen);
+  add_recording_cut(*recording, chosen);
+  add_recording_merge(*recording, chosen);
+  add_recording_export(*recording, chosen);
   add_recording_repair(*recording, chosen);
 }
 

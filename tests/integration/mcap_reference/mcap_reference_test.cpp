@@ -10,6 +10,7 @@
 #include "mcap/writer.hpp"
 #include "support/mcap_records.hpp"
 #include "support/mcap_reference.hpp"
+#include "support/program.hpp"
 
 namespace railfix::mcap {
 
@@ -105,6 +106,28 @@ TEST_F(McapReferenceTest, AcceptsEveryRepairedFile) {
   const json counts = json::parse(std::ifstream(kWork / "counts.json"));
   ASSERT_EQ(counts.size(), expected.size());
   for (const auto& [name, messages] : expected) EXPECT_EQ(counts[name], messages) << name;
+}
+
+TEST_F(McapReferenceTest, ReadsWhatWeCutAndMerge) {
+  const fs::path file = record(Compression::zstd);
+  const auto railfix = [](std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {"railfix", "recording"});
+    const auto done = test::run_program(arguments, 60);
+    EXPECT_EQ(done.exit_code, 0) << done.err;
+  };
+  const auto part = [&](const std::string& name) { return (kWork / name).string(); };
+  for (const char* name : {"first.mcap", "second.mcap", "merged.mcap"}) fs::remove(kWork / name);
+  // Sample i was recorded 10 ns times i after the first.
+  railfix({"cut", file.string(), "--to", "0.0000012", "--out", part("first.mcap")});
+  railfix({"cut", file.string(), "--from", "0.000001", "--out", part("second.mcap")});
+  railfix({"merge", part("first.mcap"), part("second.mcap"), "--out", part("merged.mcap")});
+  for (const std::string action : {"indexed", "stream"}) {
+    ASSERT_TRUE(reference().run(action, kWork / "merged.mcap", kWork / "found.json")) << action;
+    const json found = json::parse(std::ifstream(kWork / "found.json"));
+    ASSERT_EQ(found["messages"].size(), kSamples) << action;
+    for (uint32_t i = 0; i < kSamples; ++i) EXPECT_EQ(found["messages"][i], sample(i)) << action;
+    EXPECT_EQ(found["statistics"]["messages"], kSamples);
+  }
 }
 
 TEST_F(McapReferenceTest, NoticesWhatWeWouldNotWrite) {

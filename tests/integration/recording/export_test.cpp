@@ -1,0 +1,173 @@
+// `railfix recording info` and `export` as a user calls them, on a made-up ride with pictures.
+#include <gmock/gmock.h>
+
+#include <nlohmann/json.hpp>
+#include <opencv2/videoio.hpp>
+
+#include "cdr/types.hpp"
+#include "core/time.hpp"
+#include "mcap/writer.hpp"
+#include "messaging/topics.hpp"
+#include "recorder/pictures.hpp"
+#include "support/program.hpp"
+
+namespace railfix {
+namespace {
+
+namespace fs = std::filesystem;
+namespace topics = messaging::topics;
+using ::testing::HasSubstr;
+
+constexpr int64_t kBegin = 1'700'000'000 * core::kNsPerSecond;
+constexpr int kPictures = 50;
+constexpr int64_t kPictureNs = 40'000'000;
+
+class Export : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+    writer_ = mcap::Writer::create(file(), {}).value();
+    EXPECT_TRUE(writer_->write_metadata({"railfix", {{"train_id", "t7"}}}).ok());
+    EXPECT_TRUE(writer_->write_metadata({"railfix_losses", {{"imu_sample queue", "12"}}}).ok());
+    msg::CameraCalibration calibration;
+    calibration.camera("cam0");
+    calibration.fu_px(300);
+    calibration.fv_px(300);
+    calibration.cu_px(159.5);
+    calibration.cv_px(119.5);
+    calibration.width_px(320);
+    calibration.height_px(240);
+    write(topics::camera_calibration, calibration, "camera_calibration", 0);
+    for (int i = 0; i < kPictures; ++i) ride(i);
+    msg::LogRecord log;
+    log.service("fusion");
+    log.text("wheel, \"left\", slides");
+    write(topics::log_record, log, "log_record", 1);
+    const auto closed = writer_->close();
+    ASSERT_TRUE(closed.ok());
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  // 20 m/s to the north; the picture of 0.4 s is missing; no place before 0.2 s.
+  void ride(int i) {
+    const int64_t time_ns = i * kPictureNs;
+    const std::vector<uint8_t> pixels(320 * 240, static_cast<uint8_t>(4 * i));
+    msg::CameraPreview picture;
+    picture.stamp_ns(kBegin + time_ns);
+    picture.jpeg(recorder::encode_jpeg(pixels.data(), 320, 240, 90).value());
+    if (i != 10) write(topics::camera_preview, picture, "camera_frame/cam0", time_ns);
+    msg::TrackView view;
+    view.stamp_ns(kBegin + time_ns);
+    view.pitch_rad(0.2);
+    view.height_m(2.5);
+    view.seen_left(1);
+    view.seen_right(1);
+    write(topics::track_view, view, "track_view", time_ns);
+    msg::TrainState state;
+    state.stamp_ns(kBegin + time_ns);
+    state.track_known(i >= 5 ? 1 : 0);
+    state.edge(3);
+    state.offset_m(100 + 0.8 * i);
+    state.speed_mps(20);
+    state.over_m(6);
+    state.under_m(4);
+    state.lat_deg(47 + 0.8 * i / 111195);
+    state.lon_deg(8);
+    write(topics::train_state, state, "train_state", time_ns);
+  }
+  template <class T>
+  void write(const messaging::Topic<T>& topic, const T& sample, const std::string& name, int64_t time_ns) {
+    const auto schema =
+        writer_->add_schema(messaging::type_of<T>().name(), "omgidl", std::string(cdr::own_idl(topic.idl))).value();
+    const auto channel = writer_->add_channel(schema, name, "cdr", {}).value();
+    const auto bytes = messaging::serialize(sample);
+    EXPECT_TRUE(writer_->write({channel, 1, kBegin + time_ns, kBegin + time_ns, bytes}).ok());
+  }
+  [[nodiscard]] fs::path file() const { return folder_ / "ride.mcap"; }
+  [[nodiscard]] test::Outcome recording(std::vector<std::string> arguments) const {
+    arguments.insert(arguments.begin(), {"railfix", "recording"});
+    return test::run_program(arguments, 120);
+  }
+
+  fs::path folder_ = fs::temp_directory_path() / ("railfix-export-" + std::to_string(::getpid()));
+  std::unique_ptr<mcap::Writer> writer_;
+};
+
+TEST_F(Export, InfoTellsWhatIsThereAndWhetherItIsWhole) {
+  const auto info = recording({"info", file().string(), "--json"});
+  ASSERT_EQ(info.exit_code, 0) << info.out << info.err;
+  const auto json = nlohmann::json::parse(info.out);
+  EXPECT_EQ(json["from"], "2023-11-14T22:13:20.000Z");
+  EXPECT_NEAR(json["duration_s"].get<double>(), (kPictures - 1) * 0.04, 1e-6);
+  EXPECT_EQ(json["lost"]["imu_sample queue"], "12");
+  EXPECT_TRUE(json["check"]["sound"]);
+  const auto& topics = json["topics"];
+  const auto pictures =
+      std::ranges::find_if(topics, [](const nlohmann::json& topic) { return topic["topic"] == "camera_frame/cam0"; });
+  ASSERT_NE(pictures, topics.end());
+  EXPECT_EQ((*pictures)["samples"], kPictures - 1);
+  EXPECT_NEAR((*pictures)["longest_gap_s"].get<double>(), 0.08, 1e-6);
+
+  std::fstream(file(), std::ios::binary | std::ios::in | std::ios::out).seekp(3000).write("XXXX", 4);
+  const auto damaged = recording({"info", file().string()});
+  EXPECT_EQ(damaged.exit_code, 1);
+  EXPECT_THAT(damaged.out, HasSubstr("check: PROBLEMS"));
+}
+
+TEST_F(Export, TablesHaveAColumnForEachMember) {
+  const auto exported = recording({"export", file().string(), "--csv", (folder_ / "csv").string()});
+  ASSERT_EQ(exported.exit_code, 0) << exported.err;
+  const std::string states = test::slurp(folder_ / "csv" / "train_state.csv");
+  EXPECT_THAT(states, ::testing::StartsWith("log_time_ns,publish_time_ns,sequence,stamp_ns,"));
+  EXPECT_EQ(std::ranges::count(states, '\n'), kPictures + 1);
+  EXPECT_THAT(test::slurp(folder_ / "csv" / "log_record.csv"), HasSubstr(R"("wheel, ""left"", slides")"));
+  EXPECT_THAT(test::slurp(folder_ / "csv" / "track_view.csv"), HasSubstr(",0;0;0;0;0;0;0;0;0;0;0;0;0;0;0;0,"));
+  EXPECT_TRUE(fs::exists(folder_ / "csv" / "camera_frame_cam0.csv"));
+}
+
+TEST_F(Export, MapsGetTheTrackWithItsConfidence) {
+  const auto gpx = folder_ / "ride.gpx";
+  const auto geojson = folder_ / "ride.geojson";
+  const auto exported = recording({"export", file().string(), "--gpx", gpx.string(), "--geojson", geojson.string()});
+  ASSERT_EQ(exported.exit_code, 0) << exported.err;
+  EXPECT_THAT(test::slurp(gpx), HasSubstr("lat=\"47.00003597\" lon=\"8.00000000\"><time>2023-11-14T22:13:20.200Z"))
+      << "the first place that was known";
+  const auto json = nlohmann::json::parse(test::slurp(geojson));
+  ASSERT_EQ(json["features"].size(), 3U) << "the track, and two seconds with their intervals";
+  EXPECT_EQ(json["features"][0]["geometry"]["type"], "MultiLineString");
+  EXPECT_EQ(json["features"][0]["geometry"]["coordinates"][0].size(), kPictures - 5U);
+  const auto& interval = json["features"][1];
+  EXPECT_EQ(interval["properties"]["over_m"], 6);
+  const auto& ends = interval["geometry"]["coordinates"];
+  EXPECT_NEAR((ends[1][1].get<double>() - ends[0][1].get<double>()) * 111195, 10, 0.01);
+
+  const auto nowhere = recording({"export", file().string(), "--gpx", gpx.string(), "--to", "0.1"});
+  EXPECT_EQ(nowhere.exit_code, 2);
+  EXPECT_THAT(nowhere.err, HasSubstr("says nowhere where on the Earth the train was"));
+}
+
+TEST_F(Export, AFilmRunsAsFastAsTheTrain) {
+  const auto mp4 = folder_ / "ride.mp4";
+  const auto exported = recording({"export", file().string(), "--mp4", mp4.string()});
+  ASSERT_EQ(exported.exit_code, 0) << exported.err;
+  EXPECT_THAT(exported.out, HasSubstr("50 frames at 25 Hz of 49 pictures, both rails drawn in 49"));
+  cv::VideoCapture film(mp4.string());
+  EXPECT_EQ(film.get(cv::CAP_PROP_FPS), 25);
+  cv::Mat frame;
+  int frames = 0;
+  cv::Mat middle;
+  while (film.read(frame)) {
+    if (frames++ == 30) middle = frame.clone();
+  }
+  EXPECT_EQ(frames, kPictures) << "the missing picture's predecessor stands twice";
+  ASSERT_EQ(middle.size(), cv::Size(320, 240));
+  // Away from what is drawn the picture is as grey as it was.
+  EXPECT_NEAR(middle.at<cv::Vec3b>(100, 10)[1], 4 * 30, 8);
+  const auto none = recording({"export", file().string(), "--mp4", mp4.string(), "--camera", "cam7"});
+  EXPECT_EQ(none.exit_code, 2);
+  EXPECT_THAT(none.err, HasSubstr("has no pictures of camera cam7"));
+}
+
+}  // namespace
+}  // namespace railfix

@@ -1,0 +1,158 @@
+#include "recording/copy.hpp"
+
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include <limits>
+
+#include "mcap/check.hpp"
+#include "mcap/writer.hpp"
+#include "messaging/topics.hpp"
+#include "recording/standing_values.hpp"
+
+namespace railfix::tool {
+namespace {
+
+namespace fs = std::filesystem;
+namespace topics = messaging::topics;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+constexpr int64_t kSecond = 1'000'000'000;
+
+/// What stands in a recording: "topic@seconds", in the order of reading.
+std::vector<std::string> content(const fs::path& file) {
+  auto reader = mcap::Reader::open(file).value();
+  EXPECT_TRUE(mcap::check(file).value().problems.empty()) << file;
+  std::vector<std::string> all;
+  reader->for_each({}, [&](const mcap::Channel& channel, const mcap::Message& message) {
+    all.push_back(channel.topic + "@" + std::to_string(message.log_time_ns / kSecond));
+    return true;
+  });
+  return all;
+}
+
+class Copy : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  /// A recording of these samples, of which each has the second as its time.
+  class Recorded {
+   public:
+    Recorded(const fs::path& file, const std::string& train) : writer_(mcap::Writer::create(file, {}).value()) {
+      EXPECT_TRUE(writer_->write_metadata({"railfix", {{"train_id", train}}}).ok());
+    }
+    ~Recorded() { EXPECT_TRUE(writer_->close().ok()); }
+    Recorded& calibration(const char* camera, double focal_px, int64_t at_s) {
+      msg::CameraCalibration sample;
+      sample.camera(camera);
+      sample.fu_px(focal_px);
+      return add(topics::camera_calibration, sample, at_s);
+    }
+    Recorded& step(int64_t at_s) {
+      msg::OdometryStep sample;
+      sample.stamp_ns(at_s);
+      return add(topics::odometry_step, sample, at_s);
+    }
+    Recorded& losses(const std::string& count) {
+      EXPECT_TRUE(writer_->write_metadata({"railfix_losses", {{"imu_sample queue", count}}}).ok());
+      return *this;
+    }
+
+   private:
+    template <class T>
+    Recorded& add(const messaging::Topic<T>& topic, const T& sample, int64_t at_s) {
+      const auto schema = writer_->add_schema(messaging::type_of<T>().name(), "omgidl", "").value();
+      const auto id = writer_->add_channel(schema, topic.name, "cdr", {}).value();
+      const auto cdr = messaging::serialize(sample);
+      EXPECT_TRUE(writer_->write({id, 1, at_s * kSecond, at_s * kSecond - 5, cdr}).ok());
+      return *this;
+    }
+    std::unique_ptr<mcap::Writer> writer_;
+  };
+
+  fs::path folder_ = fs::temp_directory_path() / ("railfix-copy-" + std::to_string(::getpid()));
+  fs::path a_ = folder_ / "a.mcap";
+  fs::path b_ = folder_ / "b.mcap";
+  fs::path out_ = folder_ / "out.mcap";
+};
+
+TEST_F(Copy, StandingValuesAreTheLastOfEachInstance) {
+  Recorded(a_, "t")
+      .calibration("cam0", 1, 1)
+      .calibration("cam1", 2, 2)
+      .calibration("cam0", 3, 3)
+      .calibration("cam0", 4, 9);
+  auto reader = mcap::Reader::open(a_).value();
+  std::vector<double> focal_px;
+  for (const auto& value : standing_values(*reader, {}, 9 * kSecond)) {
+    msg::CameraCalibration calibration;
+    ASSERT_TRUE(messaging::deserialize(value.cdr, calibration));
+    focal_px.push_back(calibration.fu_px());
+  }
+  EXPECT_THAT(focal_px, ElementsAre(2, 3));
+  EXPECT_TRUE(standing_values(*reader, {"odometry_step"}, 9 * kSecond).empty());
+}
+
+TEST_F(Copy, ACutKeepsWhatHeldAtItsBeginning) {
+  Recorded(a_, "t").calibration("cam0", 1, 10).step(10).step(11).step(12).step(13).step(14);
+  const auto report = cut_recording(a_, out_, {1.5, 3.5, {}, {}});
+  ASSERT_TRUE(report.ok()) << report.error().message;
+  EXPECT_EQ(report.value().samples, 2U);
+  EXPECT_EQ(report.value().standing, 1U);
+  EXPECT_THAT(content(out_), ElementsAre("camera_calibration@11", "odometry_step@12", "odometry_step@13"));
+  EXPECT_THAT(mcap::Reader::open(out_).value()->metadata(),
+              ::testing::Contains(::testing::Field(&mcap::Metadata::name, "railfix_cut")));
+}
+
+TEST_F(Copy, ACutHasOnlyTheTopicsOneWants) {
+  Recorded(a_, "t").calibration("cam0", 1, 10).step(10).step(11);
+  constexpr double kAll = std::numeric_limits<double>::infinity();
+  ASSERT_TRUE(cut_recording(a_, out_, {0, kAll, {"odometry_step"}, {}}).ok());
+  EXPECT_THAT(content(out_), ElementsAre("odometry_step@10", "odometry_step@11"));
+  const auto none = cut_recording(a_, folder_ / "none.mcap", {0, kAll, {"imu_sample"}, {}});
+  ASSERT_FALSE(none.ok());
+  EXPECT_THAT(none.error().message, HasSubstr("it has camera_calibration, odometry_step"));
+  const auto behind = cut_recording(a_, folder_ / "none.mcap", {5, 9, {}, {}});
+  ASSERT_FALSE(behind.ok());
+  EXPECT_THAT(behind.error().message, HasSubstr("is 1.000000 s long"));
+  EXPECT_FALSE(fs::exists(folder_ / "none.mcap"));
+}
+
+TEST_F(Copy, PartsAreMergedToTheWhole) {
+  Recorded(a_, "t").calibration("cam0", 1, 10).step(10).step(11).step(12).step(13);
+  ASSERT_TRUE(cut_recording(a_, folder_ / "1.mcap", {0, 2, {}, {}}).ok());
+  ASSERT_TRUE(cut_recording(a_, folder_ / "2.mcap", {1, 9, {}, {}}).ok());
+  const auto report = merge_recordings({folder_ / "2.mcap", folder_ / "1.mcap"}, out_);
+  ASSERT_TRUE(report.ok()) << report.error().message;
+  EXPECT_EQ(report.value().samples, 5U);
+  EXPECT_EQ(report.value().duplicates, 2U)
+      << "the step of 11 s, and the calibration that is repeated in the second part";
+  EXPECT_EQ(content(out_), content(a_));
+}
+
+TEST_F(Copy, LossesAddUp) {
+  Recorded(a_, "t").step(1).losses("1").losses("3");
+  Recorded(b_, "t").step(2).losses("4");
+  ASSERT_TRUE(merge_recordings({a_, b_}, out_).ok());
+  const auto reader = mcap::Reader::open(out_).value();
+  EXPECT_THAT(reader->metadata(), ::testing::Contains(mcap::Metadata{"railfix_losses", {{"imu_sample queue", "7"}}}));
+}
+
+TEST_F(Copy, OneRecordingIsOneTrains) {
+  Recorded(a_, "one").step(1);
+  Recorded(b_, "other").step(2);
+  const auto merged = merge_recordings({a_, b_}, out_);
+  ASSERT_FALSE(merged.ok());
+  EXPECT_THAT(merged.error().message, HasSubstr("is of train other"));
+  const auto itself = merge_recordings({a_, a_}, a_);
+  ASSERT_FALSE(itself.ok());
+  EXPECT_THAT(itself.error().message, HasSubstr("is one of the recordings"));
+}
+
+}  // namespace
+}  // namespace railfix::tool

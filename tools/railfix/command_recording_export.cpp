@@ -1,0 +1,111 @@
+// `railfix recording export`.
+#include <cmath>
+#include <iostream>
+#include <limits>
+#include <memory>
+
+#include "command_recording.hpp"
+#include "core/time.hpp"
+#include "recording/export_csv.hpp"
+#include "recording/export_track.hpp"
+#include "recording/export_video.hpp"
+
+namespace railfix::tool {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+  fs::path file;
+  fs::path csv;
+  fs::path gpx;
+  fs::path geojson;
+  fs::path mp4;
+  std::vector<std::string> topics;
+  VideoOptions video;
+  double from_s = 0;
+  double to_s = std::numeric_limits<double>::infinity();
+};
+
+mcap::Selection part_of(const mcap::Reader& reader, const Options& options) {
+  mcap::Selection part;
+  const int64_t start_ns = reader.statistics().start_ns;
+  part.from_ns = start_ns + core::to_ns(options.from_s);
+  if (std::isfinite(options.to_s)) part.to_ns = start_ns + core::to_ns(options.to_s);
+  for (const auto& [id, channel] : reader.channels()) {
+    for (const auto& name : options.topics) {
+      if (channel.topic == name || channel.topic.starts_with(name + "/")) part.topics.insert(channel.topic);
+    }
+  }
+  if (part.topics.empty() && !options.topics.empty()) {
+    throw core::BadInput(reader.file().string() + " has none of the wanted topics; see `railfix recording info`");
+  }
+  return part;
+}
+
+void write_tables(mcap::Reader& reader, const mcap::Selection& part, const fs::path& folder) {
+  const auto report = core::value_or_throw(export_csv(reader, part, folder));
+  for (const auto& problem : report.problems) std::cerr << problem << '\n';
+  std::cout << folder.string() << ": " << report.tables << " tables, " << report.rows << " rows\n";
+}
+
+void write_tracks(mcap::Reader& reader, const mcap::Selection& part, const Options& options) {
+  const auto track = core::value_or_throw(read_track(reader, part));
+  const auto points = [](const std::vector<std::vector<TrackPoint>>& lines) {
+    size_t count = 0;
+    for (const auto& line : lines) count += line.size();
+    return std::to_string(count);
+  };
+  if (!options.gpx.empty()) core::ok_or_throw(write_gpx(track, options.gpx));
+  if (!options.geojson.empty()) core::ok_or_throw(write_geojson(track, options.geojson));
+  for (const auto& file : {options.gpx, options.geojson}) {
+    if (!file.empty())
+      std::cout << file.string() << ": " << points(track.train) << " places of the train, " << points(track.gnss)
+                << " GNSS fixes\n";
+  }
+}
+
+void write_film(mcap::Reader& reader, const mcap::Selection& part, const Options& options) {
+  const auto report = core::value_or_throw(export_video(reader, part, options.video, options.mp4));
+  for (const auto& problem : report.problems) std::cerr << problem << '\n';
+  std::cout << options.mp4.string() << ": " << report.codec << ", " << report.frames << " frames at " << report.fps
+            << " Hz of " << report.pictures << " pictures, both rails drawn in " << report.with_rails << '\n';
+}
+
+int run(const Options& options) {
+  if (options.csv.empty() && options.gpx.empty() && options.geojson.empty() && options.mp4.empty()) {
+    throw core::BadInput("say what to make of it: --csv FOLDER, --gpx FILE, --geojson FILE or --mp4 FILE");
+  }
+  const auto reader = core::value_or_throw(mcap::Reader::open(options.file));
+  const auto part = part_of(*reader, options);
+  if (!options.csv.empty()) write_tables(*reader, part, options.csv);
+  if (!options.gpx.empty() || !options.geojson.empty()) write_tracks(*reader, part, options);
+  if (!options.mp4.empty()) write_film(*reader, part, options);
+  for (const auto& problem : reader->problems()) std::cerr << problem << '\n';
+  return 0;
+}
+
+}  // namespace
+
+void add_recording_export(CLI::App& recording, Action& chosen) {
+  auto options = std::make_shared<Options>();
+  auto* command = recording.add_subcommand(
+      "export",
+      "A recording as tables, as a track for maps, or as a film with the rails drawn, e.g. railfix recording export "
+      "run.mcap --gpx run.gpx --mp4 run.mp4");
+  command->add_option("file", options->file, "The recording")->required();
+  command->add_option("--csv", options->csv, "Folder for a table of each topic");
+  command->add_option("--gpx", options->gpx, "File for the track as GPX");
+  command->add_option("--geojson", options->geojson, "File for the track with its confidence intervals as GeoJSON");
+  command->add_option("--mp4", options->mp4, "File for the film");
+  command->add_option("--topics", options->topics, "Only tables of these, separated by commas")->delimiter(',');
+  command->add_option("--camera", options->video.camera, "Camera of the film; the first one that has pictures");
+  command->add_option("--fps", options->video.fps, "Frames a second of the film; as the pictures come")
+      ->check(CLI::Range(1.0, 120.0));
+  command->add_option("--from", options->from_s, "Seconds into the recording")->check(CLI::NonNegativeNumber);
+  command->add_option("--to", options->to_s, "Seconds into the recording")->check(CLI::NonNegativeNumber);
+  command->callback([options, &chosen] { chosen = [options] { return run(*options); }; });
+}
+
+}  // namespace railfix::tool

@@ -1,0 +1,165 @@
+// `railfix recording info`.
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "command_recording.hpp"
+#include "core/time.hpp"
+#include "mcap/check.hpp"
+#include "recording/sample_types.hpp"
+#include "recording/utc_text.hpp"
+
+namespace railfix::tool {
+
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+constexpr double kBytesPerMb = 1e6;
+
+struct Options {
+  fs::path file;
+  bool quick = false;
+  bool json = false;
+};
+
+struct Info {
+  std::unique_ptr<mcap::Reader> reader;
+  std::optional<mcap::Check> check;  // nothing when it was not asked for
+  std::vector<std::string> problems;
+};
+
+Info read(const Options& options) {
+  Info info{core::value_or_throw(mcap::Reader::open(options.file)), {}, {}};
+  if (!options.quick) {
+    info.check = core::value_or_throw(mcap::check(options.file));
+    for (const auto& problem : info.check->problems) info.problems.push_back(options.file.string() + ": " + problem);
+  }
+  if (info.problems.empty()) info.problems = info.reader->problems();
+  return info;
+}
+
+/// Losses are counted on: the last word is the sum.
+std::map<std::string, std::string> losses_of(const mcap::Reader& reader) {
+  std::map<std::string, std::string> losses;
+  for (const auto& metadata : reader.metadata()) {
+    if (metadata.name == "railfix_losses") losses = metadata.entries;
+  }
+  return losses;
+}
+
+double rate_hz(uint64_t messages, int64_t duration_ns) {
+  return messages < 2 || duration_ns <= 0 ? 0 : static_cast<double>(messages - 1) / core::seconds(duration_ns);
+}
+
+ordered_json topic_json(const Info& info, const mcap::Channel& channel) {
+  const auto& statistics = info.reader->statistics();
+  const auto counted = statistics.channel_messages.find(channel.id);
+  const uint64_t messages = counted == statistics.channel_messages.end() ? 0 : counted->second;
+  const auto schema = info.reader->schemas().find(channel.schema_id);
+  ordered_json topic{{"topic", channel.topic},
+                     {"type", schema == info.reader->schemas().end() ? "" : schema->second.name},
+                     {"latched", latched(channel)},
+                     {"samples", messages},
+                     {"rate_hz", rate_hz(messages, statistics.end_ns - statistics.start_ns)}};
+  if (!info.check) return topic;
+  const auto content = info.check->channels.find(channel.id);
+  const mcap::ChannelContent none;
+  const auto& checked = content == info.check->channels.end() ? none : content->second;
+  topic["samples"] = checked.messages;
+  topic["rate_hz"] = rate_hz(checked.messages, checked.last_ns - checked.first_ns);
+  topic["bytes"] = checked.bytes;
+  topic["longest_gap_s"] = core::seconds(checked.longest_gap_ns);
+  return topic;
+}
+
+ordered_json to_json(const Options& options, const Info& info) {
+  const auto& statistics = info.reader->statistics();
+  ordered_json json{
+      {"file", options.file.string()},     {"bytes", fs::file_size(options.file)},
+      {"closed", info.reader->indexed()},  {"from", utc_text(statistics.start_ns)},
+      {"to", utc_text(statistics.end_ns)}, {"from_ns", statistics.start_ns},
+      {"to_ns", statistics.end_ns},        {"duration_s", core::seconds(statistics.end_ns - statistics.start_ns)},
+      {"samples", statistics.messages},    {"chunks", statistics.chunks},
+      {"topics", ordered_json::array()},   {"lost", losses_of(*info.reader)},
+      {"metadata", ordered_json::array()}};
+  std::multimap<std::string, ordered_json> by_name;
+  for (const auto& [id, channel] : info.reader->channels()) by_name.emplace(channel.topic, topic_json(info, channel));
+  for (const auto& [name, topic] : by_name) json["topics"].push_back(topic);
+  for (const auto& metadata : info.reader->metadata()) {
+    json["metadata"].push_back({{"name", metadata.name}, {"entries", metadata.entries}});
+  }
+  if (info.check) {
+    json["check"] = {{"sound", info.check->problems.empty()},
+                     {"chunks_with_checksum", info.check->chunks_with_crc},
+                     {"data_checksum", info.check->data_crc},
+                     {"index_checksum", info.check->summary_crc}};
+  }
+  json["problems"] = info.problems;
+  return json;
+}
+
+void print_topics(const ordered_json& topics, bool checked) {
+  std::printf("%-28s %9s %9s %s  %s\n", "topic", "samples", "rate Hz", checked ? "     MB    gap s" : "", "type");
+  for (const auto& topic : topics) {
+    std::printf("%-28s %9llu %9.2f ", topic["topic"].get<std::string>().c_str(),
+                static_cast<unsigned long long>(topic["samples"].get<uint64_t>()), topic["rate_hz"].get<double>());
+    if (checked) {
+      std::printf("%8.2f %8.2f", topic["bytes"].get<double>() / kBytesPerMb, topic["longest_gap_s"].get<double>());
+    }
+    std::printf("  %s%s\n", topic["type"].get<std::string>().c_str(), topic["latched"].get<bool>() ? ", latched" : "");
+  }
+}
+
+void print(const ordered_json& json) {
+  std::printf("%s: %.1f MB, %s\n", json["file"].get<std::string>().c_str(), json["bytes"].get<double>() / kBytesPerMb,
+              json["closed"].get<bool>() ? "closed properly" : "NOT closed properly");
+  std::printf("from %s, %.1f s, %llu samples in %llu chunks\n\n", json["from"].get<std::string>().c_str(),
+              json["duration_s"].get<double>(), static_cast<unsigned long long>(json["samples"].get<uint64_t>()),
+              static_cast<unsigned long long>(json["chunks"].get<uint64_t>()));
+  print_topics(json["topics"], json.contains("check"));
+  std::printf("\n");
+  for (const auto& metadata : json["metadata"]) {
+    if (metadata["name"] == "railfix_losses") continue;
+    std::printf("%s:", metadata["name"].get<std::string>().c_str());
+    for (const auto& [key, value] : metadata["entries"].items()) {
+      std::printf(" %s=%s", key.c_str(), value.get<std::string>().c_str());
+    }
+    std::printf("\n");
+  }
+  std::printf("lost while recording:%s\n", json["lost"].empty() ? " nothing" : "");
+  for (const auto& [what, count] : json["lost"].items()) {
+    std::printf("  %s: %s\n", what.c_str(), count.get<std::string>().c_str());
+  }
+  if (!json.contains("check")) return;
+  std::printf("check: %s\n", json["problems"].empty() ? "every checksum, index entry and count is right" : "PROBLEMS");
+  for (const auto& problem : json["problems"]) std::printf("  %s\n", problem.get<std::string>().c_str());
+}
+
+int info(const Options& options) {
+  const Info all = read(options);
+  const auto json = to_json(options, all);
+  if (options.json) {
+    std::cout << json.dump(2) << '\n';
+  } else {
+    print(json);
+  }
+  return all.problems.empty() ? 0 : 1;
+}
+
+}  // namespace
+
+void add_recording_info(CLI::App& recording, Action& chosen) {
+  auto options = std::make_shared<Options>();
+  auto* command = recording.add_subcommand(
+      "info",
+      "What is in a recording, what was lost, and whether every checksum is right (1 when not), e.g. railfix recording "
+      "info run.mcap");
+  command->add_option("file", options->file, "The recording")->required();
+  command->add_flag("--quick", options->quick, "By its index only, without reading all of it");
+  command->add_flag("--json", options->json, "JSON on standard output");
+  command->callback([options, &chosen] { chosen = [options] { return info(*options); }; });
+}
+
+}  // namespace railfix::tool

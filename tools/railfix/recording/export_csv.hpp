@@ -1,0 +1,26 @@
+// A recording as tables: one CSV file for each topic, one column for each member of its type.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/result.hpp"
+#include "mcap/reader.hpp"
+
+namespace railfix::tool {
+
+struct CsvReport {
+  uint64_t rows = 0;
+  size_t tables = 0;
+  std::vector<std::string> problems;  // a sentence each
+};
+
+/// Writes TOPIC.csv (a slash becomes an underscore) into the folder: log_time_ns, publish_time_ns, sequence, then the
+/// members as the recording's own IDL has them. Arrays are one cell, their elements with semicolons between them; long
+/// octet arrays (pictures) are cut short; unknown is an empty cell; text with a comma stands in double quotes (RFC
+/// 4180).
+core::Result<CsvReport> export_csv(mcap::Reader& reader, const mcap::Selection& part,
+                                   const std::filesystem::path& folder);
+
+}  // namespace railfix::tool
