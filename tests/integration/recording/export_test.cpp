@@ -122,7 +122,9 @@ TEST_F(Export, TablesHaveAColumnForEachMember) {
   EXPECT_THAT(states, ::testing::StartsWith("log_time_ns,publish_time_ns,sequence,stamp_ns,"));
   EXPECT_EQ(std::ranges::count(states, '\n'), kPictures + 1);
   EXPECT_THAT(test::slurp(folder_ / "csv" / "log_record.csv"), HasSubstr(R"("wheel, ""left"", slides")"));
-  EXPECT_THAT(test::slurp(folder_ / "csv" / "track_view.csv"), HasSubstr(",0;0;0;0;0;0;0;0;0;0;0;0;0;0;0;0,"));
+  std::string array = ",0.0";
+  for (int i = 1; i < 16; ++i) array += ";0.0";
+  EXPECT_NE(test::slurp(folder_ / "csv" / "track_view.csv").find(array + ","), std::string::npos);
   EXPECT_TRUE(fs::exists(folder_ / "csv" / "camera_frame_cam0.csv"));
 }
 
