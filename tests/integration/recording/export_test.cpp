@@ -77,9 +77,11 @@ class Export : public ::testing::Test {
     write(topics::train_state, state, "train_state", time_ns);
   }
   template <class T>
-  void write(const messaging::Topic<T>& topic, const T& sample, const std::string& name, int64_t time_ns) {
-    const auto schema =
-        writer_->add_schema(messaging::type_of<T>().name(), "omgidl", std::string(cdr::own_idl(topic.idl))).value();
+  void write(const messaging::Topic<T>& /*topic*/, const T& sample, const std::string& name, int64_t time_ns) {
+    const auto schema = writer_
+                            ->add_schema(messaging::type_of<T>().name(), "omgidl",
+                                         std::string(cdr::own_idl_of(messaging::type_of<T>().name())))
+                            .value();
     const auto channel = writer_->add_channel(schema, name, "cdr", {}).value();
     const auto bytes = messaging::serialize(sample);
     EXPECT_TRUE(writer_->write({channel, 1, kBegin + time_ns, kBegin + time_ns, bytes}).ok());

@@ -18,7 +18,7 @@ class CheckTest : public ::testing::Test {
   void SetUp() override {
     file_ = fs::temp_directory_path() / ("railfix-check-" + std::to_string(::getpid()) + ".mcap");
     WriterOptions options;
-    options.chunk_bytes = 300;
+    options.chunk_bytes = 150;
     options.overwrite = true;
     auto writer = Writer::create(file_, options).value();
     const uint16_t schema = writer->add_schema("a::B", "omgidl", "module a {};").value();
