@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <csignal>
 #include <cstdio>
 #include <iostream>
 #include <map>
@@ -11,6 +10,7 @@
 #include "commands.hpp"
 #include "core/time.hpp"
 #include "messaging/topics.hpp"
+#include "topic_listener.hpp"
 #include "topic_watch.hpp"
 
 namespace railfix::tool {
@@ -19,79 +19,18 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr double kListS = 3;
-constexpr int64_t kTurnNs = 50'000'000;
 constexpr int64_t kHintNs = 2 * core::kNsPerSecond;
-constexpr size_t kWaiting = 1000;
 
 struct Options {
   std::string topic;
-  std::string train = "demo";
-  int64_t domain = 0;
+  TrainNetwork network;
   bool json = false;
   uint64_t count = 0;
   double for_s = 0;
 };
 
-volatile std::sig_atomic_t interrupted = 0;
-
-/// Listens to topics of one train until time or count is up, or Ctrl-C.
-class Listener {
- public:
-  using OnSample =
-      std::function<void(const std::string& topic, const messaging::TopicInfo& info,
-                         const std::shared_ptr<const void>& sample, const messaging::SampleInfo& sample_info)>;
-  explicit Listener(const Options& options) : participant_(participant_options(options)) {
-    std::signal(SIGINT, [](int) { interrupted = 1; });
-  }
-
-  void listen(const std::string& name, OnSample on_sample) {
-    if (readers_.contains(name)) return;
-    const auto* topic = messaging::find_topic(name);
-    if (topic == nullptr) return;
-    const size_t slash = name.find('/');
-    messaging::TopicInfo info = *topic;
-    info.reader_queue = std::max(info.reader_queue, topic->qos.data_sharing ? size_t{8} : kWaiting);
-    readers_[name] = std::make_unique<messaging::AnyReader>(
-        participant_, info, slash == std::string::npos ? "" : name.substr(slash + 1), queue_,
-        [name, topic, on_sample = std::move(on_sample)](const auto& sample, const auto& sample_info) {
-          if (sample_info.valid) on_sample(name, *topic, sample, sample_info);
-        });
-  }
-
-  /// `done` is asked about twenty times a second.
-  void run(double for_s, const std::function<bool()>& done) {
-    const int64_t end_ns = for_s > 0 ? core::monotonic_ns() + core::to_ns(for_s) : std::numeric_limits<int64_t>::max();
-    while (interrupted == 0 && core::monotonic_ns() < end_ns && !done()) {
-      const int64_t turn_ns = std::min(core::monotonic_ns() + kTurnNs, end_ns);
-      while (queue_.run_one(turn_ns) && core::monotonic_ns() < turn_ns) {
-      }
-    }
-  }
-  messaging::Participant& participant() { return participant_; }
-  [[nodiscard]] int writers(const std::string& name) const {
-    const auto reader = readers_.find(name);
-    return reader == readers_.end() ? 0 : reader->second->matched_writers();
-  }
-
- private:
-  static messaging::ParticipantOptions participant_options(const Options& options) {
-    messaging::ParticipantOptions made;
-    made.train_id = options.train;
-    made.domain = options.domain;
-    made.service = "railfix-topics";
-    return made;
-  }
-  messaging::Participant participant_;
-  messaging::Queue queue_;
-  std::map<std::string, std::unique_ptr<messaging::AnyReader>> readers_;
-};
-
-std::string where(const Options& options) {
-  return "train " + options.train + ", domain " + std::to_string(options.domain);
-}
-
 /// The topic, with its camera when there is only one; BadInput with the names that may have been meant.
-std::string resolve(Listener& listener, const Options& options) {
+std::string resolve(TopicListener& listener, const Options& options) {
   std::vector<std::string> written;
   listener.run(kListS, [&] {
     written = listener.participant().written_topics();
@@ -103,10 +42,10 @@ std::string resolve(Listener& listener, const Options& options) {
     if (written.size() == 1) return written.front();
     std::string names;
     for (const auto& name : written) names += (names.empty() ? "" : ", ") + name;
-    throw core::BadInput("topic " + options.topic + " is one for each camera; " +
-                         (names.empty()
-                              ? "none is written on " + where(options) + ", name one as " + options.topic + "/cam0"
-                              : "there are: " + names));
+    throw core::BadInput(
+        "topic " + options.topic + " is one for each camera; " +
+        (names.empty() ? "none is written on " + where(options.network) + ", name one as " + options.topic + "/cam0"
+                       : "there are: " + names));
   }
   if (messaging::find_topic(options.topic) != nullptr) return options.topic;
   for (const auto& topic : messaging::all_topics()) written.push_back(topic.name);
@@ -119,7 +58,7 @@ std::string resolve(Listener& listener, const Options& options) {
 }
 
 int list(const Options& options) {
-  Listener listener(options);
+  TopicListener listener(options.network, "railfix-topics");
   std::map<std::string, TopicStatistics> all;
   const auto watch = [&](const std::string& name) {
     listener.listen(name, [&all](const std::string& topic, const auto&, const auto&,
@@ -152,19 +91,20 @@ int list(const Options& options) {
     }
   }
   if (options.json) std::cout << json.dump(2) << '\n';
-  if (names.empty()) std::cerr << "nobody writes a topic on " << where(options) << "; is a train running there?\n";
+  if (names.empty())
+    std::cerr << "nobody writes a topic on " << where(options.network) << "; is a train running there?\n";
   return names.empty() ? 1 : 0;
 }
 
 /// Says once that nothing has come yet, and why that may be.
 class Hint {
  public:
-  void update(const Listener& listener, const std::string& topic, uint64_t samples, const Options& options) {
+  void update(const TopicListener& listener, const std::string& topic, uint64_t samples, const Options& options) {
     if (said_ || samples > 0 || core::monotonic_ns() - begun_ns_ < kHintNs) return;
     said_ = true;
     std::cerr << topic << ": "
               << (listener.writers(topic) > 0 ? "has a writer, but nothing was sent yet" : "has no writer") << " ("
-              << where(options) << "); waiting, Ctrl-C ends\n";
+              << where(options.network) << "); waiting, Ctrl-C ends\n";
   }
 
  private:
@@ -172,49 +112,35 @@ class Hint {
   bool said_ = false;
 };
 
-ordered_json to_json(const std::string& topic, const TopicStatistics& statistics) {
-  return {{"topic", topic},
-          {"samples", statistics.samples()},
-          {"rate_hz", statistics.rate_hz()},
-          {"shortest_gap_ms", statistics.shortest_gap_ms()},
-          {"longest_gap_ms", statistics.longest_gap_ms()},
-          {"lost", statistics.lost()},
-          {"latency_ms", statistics.latency_ms()}};
-}
-
-void print_rate(const std::string& topic, const TopicStatistics& statistics) {
-  std::printf("%s: %.2f Hz, gaps %.1f to %.1f ms, %llu samples, %llu lost, latency %.2f ms\n", topic.c_str(),
-              statistics.rate_hz(), statistics.shortest_gap_ms(), statistics.longest_gap_ms(),
-              static_cast<unsigned long long>(statistics.samples()), static_cast<unsigned long long>(statistics.lost()),
-              statistics.latency_ms());
-  std::fflush(stdout);
-}
-
-int hz(const Options& options) {
-  Listener listener(options);
+/// Watches one topic: `report` is asked for a line every second about that second, and at the end about all of it.
+template <class Statistics>
+int watch(const Options& options) {
+  TopicListener listener(options.network, "railfix-topics");
   const std::string topic = resolve(listener, options);
-  TopicStatistics whole;
-  TopicStatistics second;
-  listener.listen(topic, [&](const auto&, const auto&, const auto&, const messaging::SampleInfo& info) {
-    whole.add(info);
-    second.add(info);
+  Statistics whole;
+  Statistics second;
+  listener.listen(topic, [&](const auto&, const messaging::TopicInfo& info, const std::shared_ptr<const void>& sample,
+                             const messaging::SampleInfo& sample_info) {
+    whole.add(info, sample.get(), sample_info);
+    second.add(info, sample.get(), sample_info);
   });
   int64_t shown_ns = core::monotonic_ns();
   Hint hint;
   listener.run(options.for_s, [&] {
     hint.update(listener, topic, whole.samples(), options);
     if (!options.json && whole.samples() > 0 && core::monotonic_ns() - shown_ns >= core::kNsPerSecond) {
-      print_rate(topic, second);
+      std::cout << topic << ": " << second.line() << std::endl;
       second = {};
       shown_ns = core::monotonic_ns();
     }
     return options.count > 0 && whole.samples() >= options.count;
   });
   if (options.json) {
-    std::cout << to_json(topic, whole).dump() << '\n';
+    auto json = whole.json();
+    json["topic"] = topic;
+    std::cout << json.dump() << '\n';
   } else {
-    std::printf("all: ");
-    print_rate(topic, whole);
+    std::cout << "all: " << topic << ": " << whole.line() << '\n';
   }
   return whole.samples() > 0 ? 0 : 1;
 }
@@ -227,7 +153,7 @@ void print_sample(const ordered_json& sample) {
 }
 
 int echo(const Options& options) {
-  Listener listener(options);
+  TopicListener listener(options.network, "railfix-topics");
   const std::string topic = resolve(listener, options);
   uint64_t shown = 0;
   cdr::DecodeOptions decode_options;
@@ -254,8 +180,7 @@ int echo(const Options& options) {
 }
 
 void add_common(CLI::App& command, Options& options) {
-  command.add_option("--train", options.train, "Train whose topics to look at")->capture_default_str();
-  command.add_option("--domain", options.domain, "DDS domain")->capture_default_str()->check(CLI::Range(0, 232));
+  add_network(command, options.network);
   command.add_flag("--json", options.json, "JSON on standard output");
   command.add_option("--for", options.for_s, "End after this many seconds")->check(CLI::NonNegativeNumber);
 }
@@ -279,8 +204,15 @@ void add_topics(CLI::App& app, Action& chosen) {
     command->callback([&chosen, options, run] { chosen = [options, run] { return run(*options); }; });
   };
   add("list", "Topics that have a writer, with rate and type (listens three seconds)", list, false);
-  add("hz", "Rate, gaps and losses of one topic, every second.  Example: railfix topics hz odometry_step --for 10", hz,
-      true);
+  add("hz", "Rate, gaps and losses of one topic, every second.  Example: railfix topics hz odometry_step --for 10",
+      watch<RateStatistics>, true);
+  add("bw", "How many bytes of one topic come, every second.  Example: railfix topics bw camera_preview/cam0 --for 10",
+      watch<BandwidthStatistics>, true);
+  add("delay",
+      "How long samples of one topic are on their way, and how old the data in them is, every second.  Example: "
+      "railfix "
+      "topics delay train_state --for 10",
+      watch<DelayStatistics>, true);
   add("echo", "Samples of one topic as they come.  Example: railfix topics echo train_state --count 1 --json", echo,
       true);
   topics->add_subcommand("qos", "Quality of service of every topic as Fast DDS XML, to edit for common.qos_profiles")

@@ -16,6 +16,8 @@ void add_calibrate(CLI::App& app, Action& chosen);
 void add_calibrate_lens(CLI::App& calibrate, Action& chosen);
 void add_map(CLI::App& app, Action& chosen);
 void add_map_locate(CLI::App& map, Action& chosen);
+void add_log(CLI::App& app, Action& chosen);
+void add_top(CLI::App& app, Action& chosen);
 void add_topics(CLI::App& app, Action& chosen);
 void add_replay(CLI::App& app, Action& chosen);
 void add_recording(CLI::App& app, Action& chosen);

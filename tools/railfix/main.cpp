@@ -18,8 +18,8 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", std::string("railfix ") + RAILFIX_VERSION);
   app.require_subcommand(1);
   Action chosen;
-  for (const auto add :
-       {add_run, add_simulate, add_evaluate, add_calibrate, add_map, add_topics, add_replay, add_recording, add_tpr}) {
+  for (const auto add : {add_run, add_simulate, add_evaluate, add_calibrate, add_map, add_top, add_topics, add_log,
+                         add_replay, add_recording, add_tpr}) {
     add(app, chosen);
   }
   try {

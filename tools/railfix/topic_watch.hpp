@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -34,6 +35,50 @@ class TopicStatistics {
   double latency_ms_ = 0;
   std::map<uint64_t, uint64_t> last_sequence_;  // of each writer
 };
+
+/// What `railfix topics hz`, `bw` and `delay` say of one topic.
+class RateStatistics {
+ public:
+  void add(const messaging::TopicInfo&, const void*, const messaging::SampleInfo& info) { all_.add(info); }
+  [[nodiscard]] uint64_t samples() const { return all_.samples(); }
+  [[nodiscard]] std::string line() const;
+  [[nodiscard]] nlohmann::ordered_json json() const;
+
+ private:
+  TopicStatistics all_;
+};
+
+class BandwidthStatistics {
+ public:
+  void add(const messaging::TopicInfo& topic, const void* sample, const messaging::SampleInfo& info);
+  [[nodiscard]] uint64_t samples() const { return all_.samples(); }
+  [[nodiscard]] uint64_t bytes() const { return bytes_; }
+  /// Between the first and the last sample; 0 with less than two.
+  [[nodiscard]] double bytes_per_s() const;
+  [[nodiscard]] std::string line() const;
+  [[nodiscard]] nlohmann::ordered_json json() const;
+
+ private:
+  TopicStatistics all_;
+  uint64_t bytes_ = 0;
+  uint64_t smallest_ = 0;
+  uint64_t largest_ = 0;
+};
+
+class DelayStatistics {
+ public:
+  void add(const messaging::TopicInfo& topic, const void* sample, const messaging::SampleInfo& info);
+  [[nodiscard]] uint64_t samples() const { return on_the_way_ms_.size(); }
+  [[nodiscard]] std::string line() const;
+  [[nodiscard]] nlohmann::ordered_json json() const;
+
+ private:
+  std::vector<double> on_the_way_ms_;     // from sending to receiving
+  std::vector<double> since_grabbed_ms_;  // from the grab of the input behind it to receiving, where the type tells it
+};
+
+/// As CDR; of a picture only the pixels in use.
+uint64_t bytes_of(const messaging::TopicInfo& topic, const void* sample);
 
 /// Those of the names that are like the wanted one, the most alike first; at most five.
 std::vector<std::string> similar_names(const std::string& wanted, const std::vector<std::string>& names);

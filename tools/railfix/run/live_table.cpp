@@ -8,29 +8,13 @@
 
 #include "core/time.hpp"
 #include "core/units.hpp"
+#include "service_table.hpp"
 
 namespace railfix::tool {
 namespace {
 
 constexpr int64_t kTerminalPeriodNs = core::kNsPerSecond;
 constexpr int64_t kLinePeriodNs = 10 * core::kNsPerSecond;
-
-const char* name_of_state(uint8_t state) {
-  switch (state) {
-    case msg::STATE_STARTING:
-      return "starting";
-    case msg::STATE_READY:
-      return "ready";
-    case msg::STATE_ACTIVE:
-      return "active";
-    case msg::STATE_DEGRADED:
-      return "degraded";
-    case msg::STATE_FAILED:
-      return "failed";
-    default:
-      return "stopped";
-  }
-}
 
 std::string position_line(const TrainPicture& picture) {
   if (!picture.state) return "position: no train_state yet";
@@ -64,14 +48,7 @@ std::string counts_line(const TrainPicture& picture) {
 
 std::string table_of(const TrainPicture& picture) {
   std::string text = position_line(picture) + "\n" + counts_line(picture) + "\n";
-  text += fmt::format("{:<15} {:<9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>6} {:>7}  {}\n", "service", "state", "in", "out",
-                      "dropped", "p50 ms", "p99 ms", "cpu %", "MB", "reason");
-  for (const auto& [name, s] : picture.services) {
-    const bool silent = s.state() != msg::STATE_STOPPED && picture.silent.contains(name);
-    text += fmt::format("{:<15} {:<9} {:>8} {:>8} {:>8} {:>8.1f} {:>8.1f} {:>6.1f} {:>7.1f}  {}\n", name,
-                        silent ? "SILENT" : name_of_state(s.state()), s.frames_in(), s.frames_out(), s.dropped(),
-                        s.latency_p50_ms(), s.latency_p99_ms(), s.cpu_percent(), s.rss_mb(), s.reason().c_str());
-  }
+  text += service_table(picture.services, picture.silent, false);
   for (const auto& line : picture.log) text += "! " + line + "\n";
   return text;
 }

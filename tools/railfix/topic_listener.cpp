@@ -1,0 +1,74 @@
+#include "topic_listener.hpp"
+
+#include <algorithm>
+#include <csignal>
+#include <limits>
+
+#include "core/time.hpp"
+
+namespace railfix::tool {
+
+namespace {
+
+constexpr int64_t kTurnNs = 50'000'000;
+constexpr size_t kWaiting = 1000;
+
+volatile std::sig_atomic_t interrupted = 0;
+
+messaging::ParticipantOptions participant_options(const TrainNetwork& network, const std::string& command) {
+  messaging::ParticipantOptions options;
+  options.train_id = network.train;
+  options.domain = network.domain;
+  options.service = command;
+  return options;
+}
+
+}  // namespace
+
+void add_network(CLI::App& command, TrainNetwork& network) {
+  command.add_option("--train", network.train, "Train to listen to")->capture_default_str();
+  command.add_option("--domain", network.domain, "DDS domain")->capture_default_str()->check(CLI::Range(0, 232));
+}
+
+std::string where(const TrainNetwork& network) {
+  return "train " + network.train + ", domain " + std::to_string(network.domain);
+}
+
+TopicListener::TopicListener(const TrainNetwork& network, const std::string& command)
+    : participant_(participant_options(network, command)) {
+  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { interrupted = 1; });
+}
+
+void TopicListener::stop() {
+  interrupted = 1;
+}
+
+void TopicListener::listen(const std::string& name, OnSample on_sample, bool with_silence) {
+  if (readers_.contains(name)) return;
+  const auto* topic = messaging::find_topic(name);
+  if (topic == nullptr) return;
+  const size_t slash = name.find('/');
+  messaging::TopicInfo info = *topic;
+  info.reader_queue = std::max(info.reader_queue, topic->qos.data_sharing ? size_t{8} : kWaiting);
+  readers_[name] = std::make_unique<messaging::AnyReader>(
+      participant_, info, slash == std::string::npos ? "" : name.substr(slash + 1), queue_,
+      [name, topic, with_silence, on_sample = std::move(on_sample)](const auto& sample, const auto& sample_info) {
+        if (sample_info.valid || with_silence) on_sample(name, *topic, sample, sample_info);
+      });
+}
+
+void TopicListener::run(double for_s, const std::function<bool()>& done) {
+  const int64_t end_ns = for_s > 0 ? core::monotonic_ns() + core::to_ns(for_s) : std::numeric_limits<int64_t>::max();
+  while (interrupted == 0 && core::monotonic_ns() < end_ns && !done()) {
+    const int64_t turn_ns = std::min(core::monotonic_ns() + kTurnNs, end_ns);
+    while (queue_.run_one(turn_ns) && core::monotonic_ns() < turn_ns) {
+    }
+  }
+}
+
+int TopicListener::writers(const std::string& name) const {
+  const auto reader = readers_.find(name);
+  return reader == readers_.end() ? 0 : reader->second->matched_writers();
+}
+
+}  // namespace railfix::tool

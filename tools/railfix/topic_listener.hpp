@@ -1,0 +1,48 @@
+// Listens to topics of one train for a command on the terminal.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "messaging/topics.hpp"
+
+namespace railfix::tool {
+
+/// Which train, on which network.
+struct TrainNetwork {
+  std::string train = "demo";
+  int64_t domain = 0;
+};
+/// --train and --domain.
+void add_network(CLI::App& command, TrainNetwork& network);
+/// "train demo, domain 0"
+std::string where(const TrainNetwork& network);
+
+class TopicListener {
+ public:
+  using OnSample =
+      std::function<void(const std::string& topic, const messaging::TopicInfo& info,
+                         const std::shared_ptr<const void>& sample, const messaging::SampleInfo& sample_info)>;
+  /// Ctrl-C and SIGTERM end run() from now on.
+  TopicListener(const TrainNetwork& network, const std::string& command);
+
+  /// A topic that is listened to already, or that is none of ours, is left alone. Without a sample
+  /// (SampleInfo::valid false) a writer has fallen silent: only `with_silence` hears of that.
+  void listen(const std::string& name, OnSample on_sample, bool with_silence = false);
+  /// Until time is up, `done` says so (asked about twenty times a second), or Ctrl-C. for_s 0 = no limit.
+  void run(double for_s, const std::function<bool()>& done);
+  /// Ends run(). Any thread.
+  static void stop();
+  messaging::Participant& participant() { return participant_; }
+  [[nodiscard]] int writers(const std::string& name) const;
+
+ private:
+  messaging::Participant participant_;
+  messaging::Queue queue_;
+  std::map<std::string, std::unique_ptr<messaging::AnyReader>> readers_;
+};
+
+}  // namespace railfix::tool
