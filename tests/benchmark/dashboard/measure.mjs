@@ -13,7 +13,7 @@ const SERVICES = ["frame_grabber", "sensor_gateway", "track_detector", "odometry
 const EVERYTHING = ["state", "services", "topics", "reports", "log", "recorder", "player", "curvature", "problems", "view:cam0"];
 const TICKS_PER_S = 100; // of /proc/PID/stat
 const sleep = (seconds) => new Promise((done) => setTimeout(done, seconds * 1000));
-const median = (values) => values.toSorted((a, b) => a - b)[values.length >> 1];
+const median = (values) => [...values].sort((a, b) => a - b)[values.length >> 1];
 
 /// Percent of one core, by service, over the next seconds.
 async function load(train, seconds) {

