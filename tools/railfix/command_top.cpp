@@ -99,7 +99,7 @@ class Watch {
     }
     return json;
   }
-  [[nodiscard]] bool nobody() const { return written_.empty(); }
+  [[nodiscard]] bool nobody() const { return written_.empty() && services_.empty(); }
 
  private:
   void note(const msg::ServiceStatus& status, bool alive) {

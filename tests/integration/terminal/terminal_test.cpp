@@ -8,6 +8,7 @@
 #include "core/time.hpp"
 #include "messaging/topics.hpp"
 #include "support/program.hpp"
+#include "support/run_until.hpp"
 
 namespace railfix {
 namespace {
@@ -119,12 +120,26 @@ TEST_F(Terminal, TopTellsWhoHasFallenSilent) {
       test::with_settings("railfix-recorder", {"common.train_id=" + train_, "common.domain=" + kDomain,
                                                "recorder.folder=" + folder_.string(), "recorder.keep_free_mb=0"}),
       {folder_ / "recorder.log", {}, {}});
-  const auto status = railfix({"topics", "echo", "service_status", "--count", "1", "--for", "30"});
-  ASSERT_EQ(status.exit_code, 0) << status.err;
-  test::Program top({"railfix", "top", "--json", "--for", "8", "--train", train_, "--domain", kDomain},
+  messaging::ParticipantOptions options;
+  options.train_id = train_;
+  options.domain = std::stoi(kDomain);
+  messaging::Participant participant(options);
+  messaging::Queue queue;
+  uint32_t partners = 0;
+  int heard = 0;
+  messaging::Reader<msg::ServiceStatus> statuses(participant, topics::service_status, "", queue,
+                                                 [&](const msg::ServiceStatus& status) {
+                                                   partners = status.matches();
+                                                   ++heard;
+                                                 });
+  const auto until = [&](const auto& condition) { return test::run_until(participant, queue, condition); };
+  ASSERT_TRUE(until([&] { return heard >= 8; }));
+  const uint32_t partners_before = partners;
+  test::Program top({"railfix", "top", "--json", "--for", "12", "--train", train_, "--domain", kDomain},
                     {folder_ / "top.json", folder_ / "top.err", {}});
-  // It must have heard the recorder before that stops: then two seconds are many times its lease of 0.4 s.
-  std::this_thread::sleep_for(std::chrono::seconds(4));
+  ASSERT_TRUE(until([&] { return partners > partners_before; })) << "top has found the recorder";
+  heard = 0;
+  ASSERT_TRUE(until([&] { return heard >= 4; }));
   recorder.send(SIGSTOP);
   EXPECT_EQ(top.wait_for_end(), 0) << test::slurp(folder_ / "top.err");
   recorder.send(SIGCONT);
