@@ -21,6 +21,7 @@ void add_top(CLI::App& app, Action& chosen);
 void add_topics(CLI::App& app, Action& chosen);
 void add_replay(CLI::App& app, Action& chosen);
 void add_recording(CLI::App& app, Action& chosen);
+void add_tell(CLI::App& app, Action& chosen);
 void add_tpr(CLI::App& app, Action& chosen);
 
 }  // namespace railfix::tool

@@ -263,8 +263,11 @@ TEST_F(RecordingTest, IsLedOverDdsAndSaysHowItIs) {
   EXPECT_TRUE(until([&] { return status.protected_files() == 1 && std::string(status.event().c_str()) == "a jolt"; }));
   EXPECT_TRUE(command("protect", file.filename().string()));
   EXPECT_TRUE(until([&] { return status.protected_files() == 2; }));
-  EXPECT_TRUE(command("stop"));
+  const auto told = railfix({"tell", "recorder", "stop"});
+  EXPECT_EQ(told.exit_code, 0) << told.err;
+  EXPECT_THAT(told.out, HasSubstr(file.string()));
   ASSERT_TRUE(state(msg::RECORDER_WAITING));
+  EXPECT_EQ(railfix({"tell", "recorder", "stop"}).exit_code, 1) << "the service says no";
   EXPECT_TRUE(command("unprotect", file.filename().string()));
   EXPECT_TRUE(until([&] { return status.protected_files() == 1; }));
   EXPECT_FALSE(command("unprotect", "no-such-recording"));

@@ -1,0 +1,130 @@
+#include <unistd.h>
+
+#include <iostream>
+#include <map>
+#include <memory>
+#include <optional>
+
+#include "commands.hpp"
+#include "core/result.hpp"
+#include "core/time.hpp"
+#include "messaging/connected.hpp"
+#include "messaging/topics.hpp"
+
+namespace railfix::tool {
+
+namespace {
+
+namespace topics = messaging::topics;
+
+constexpr int64_t kPatienceNs = 10 * core::kNsPerSecond;
+// Tools that listen say nothing of their connections; then this is long enough for a network at rest.
+constexpr int64_t kDiscoveryNs = 3 * core::kNsPerSecond;
+constexpr int64_t kTurnNs = core::kNsPerSecond / 20;
+
+struct Options {
+  std::string service;
+  std::string command;
+  std::string argument;
+  std::string train = "demo";
+  int64_t domain = 0;
+};
+
+/// One request to one service, and its answer.
+class Teller {
+ public:
+  explicit Teller(const Options& options)
+      : options_(options),
+        participant_(network(options)),
+        control_(participant_, topics::service_control),
+        replies_(participant_, topics::service_reply, "", queue_,
+                 [this](const msg::ControlReply& reply) {
+                   if (reply.request_id() == id_) reply_ = reply;
+                 }),
+        statuses_(participant_, topics::service_status, "", queue_, [this](const msg::ServiceStatus& status) {
+          if (status.state() != msg::STATE_STOPPED) {
+            known_[std::string(status.service().c_str()) + "@" + status.host().c_str()] = status;
+          }
+        }) {}
+
+  int tell() {
+    const std::string where = "train " + options_.train + ", domain " + std::to_string(options_.domain);
+    if (!wait_until([this] { return heard_of_it(); })) {
+      throw core::BadInput("there is no service " + options_.service + " on " + where +
+                           "; is it running, and are --train and --domain right?");
+    }
+    const int64_t found_ns = core::monotonic_ns();
+    (void)wait_until([&] { return connected() || core::monotonic_ns() - found_ns > kDiscoveryNs; });
+    msg::ControlRequest request;
+    request.request_id(id_);
+    request.service(options_.service);
+    request.command(options_.command);
+    request.argument(options_.argument);
+    control_.write(request);
+    if (!wait_until([this] { return reply_.has_value(); })) {
+      std::cerr << options_.service << " on " << where << " does not answer\n";
+      return 1;
+    }
+    (reply_->done() ? std::cout : std::cerr) << reply_->text().c_str() << '\n';
+    return reply_->done() ? 0 : 1;
+  }
+
+ private:
+  static messaging::ParticipantOptions network(const Options& options) {
+    messaging::ParticipantOptions made;
+    made.train_id = options.train;
+    made.domain = options.domain;
+    made.service = "railfix-tell";
+    return made;
+  }
+  template <class Condition>
+  bool wait_until(const Condition& condition) {
+    const int64_t deadline_ns = core::monotonic_ns() + kPatienceNs;
+    while (!condition()) {
+      if (core::monotonic_ns() > deadline_ns) return false;
+      queue_.run_one(core::monotonic_ns() + kTurnNs);
+    }
+    return true;
+  }
+  [[nodiscard]] bool heard_of_it() const {
+    const auto first = known_.lower_bound(options_.service + "@");
+    return first != known_.end() && first->first.starts_with(options_.service + "@");
+  }
+  [[nodiscard]] bool connected() const {
+    uint32_t endpoints = 0;
+    uint32_t matches = 0;
+    for (const auto& [name, status] : known_) {
+      endpoints += status.endpoints();
+      matches += status.matches();
+    }
+    return messaging::all_connected(participant_.connections(), endpoints, matches);
+  }
+
+  Options options_;
+  uint64_t id_ = static_cast<uint64_t>(core::wall_ns()) ^ static_cast<uint64_t>(getpid());
+  std::optional<msg::ControlReply> reply_;
+  std::map<std::string, msg::ServiceStatus> known_;
+  messaging::Queue queue_;
+  messaging::Participant participant_;
+  messaging::Writer<msg::ControlRequest> control_;
+  messaging::Reader<msg::ControlReply> replies_;
+  messaging::Reader<msg::ServiceStatus> statuses_;
+};
+
+}  // namespace
+
+void add_tell(CLI::App& app, Action& chosen) {
+  auto options = std::make_shared<Options>();
+  auto* tell = app.add_subcommand(
+      "tell",
+      "Give a running service a command and print its answer, e.g. railfix tell recorder event \"a jolt at km 12\"; "
+      "the commands stand in the README of the service");
+  tell->add_option("service", options->service, "recorder, fusion, ...")->required();
+  tell->add_option("command", options->command)->required();
+  tell->add_option("argument", options->argument);
+  tell->add_option("--train", options->train, "Train of the service")->capture_default_str();
+  tell->add_option("--domain", options->domain, "DDS domain of the train")->capture_default_str();
+  tell->callback([options, &chosen] { chosen = [options] { return Teller(*options).tell(); }; });
+}
+
+}  // namespace railfix::tool
