@@ -51,7 +51,7 @@ void judge_services(const TrainSeen& train, Problems& problems) {
     } else if (seen.status.state() == msg::STATE_DEGRADED) {
       problems.push_back(
           {"degraded " + id, Level::warning, on_host + " works with less: " + reason, "See to what it says."});
-    } else if (silent_s > kSilentS) {
+    } else if (silent_s > kSilentS && !train.data_stands) {
       problems.push_back({"late " + id, Level::warning, on_host + " has said nothing lately",
                           "The computer or the network is overloaded: look at its processor load."});
     }

@@ -291,12 +291,6 @@ TEST_F(MonitorLiveTest, MetricsAlertsAndSettingsPassPromtool) {
   ASSERT_THAT(said, ::testing::StartsWith("200\n"));
   std::ofstream(kWork / "metrics.txt") << said.substr(4);
   check("check metrics < '" + (kWork / "metrics.txt").string() + "'");
-  // Every series that alerts and dashboard name is one of ours.
-  for (const char* name :
-       {"railfix_service_up", "railfix_service_state", "railfix_position_age_seconds", "railfix_shm_free_bytes",
-        "railfix_topic_latency_seconds_bucket", "railfix_problems", "railfix_service_dropped_total"}) {
-    EXPECT_THAT(said, HasSubstr(name));
-  }
 }
 
 TEST_F(MonitorLiveTest, TakesTheNextPortWhenItsOwnIsTaken) {

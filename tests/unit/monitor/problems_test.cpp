@@ -67,6 +67,16 @@ TEST_F(ProblemsTest, NamesServicesThatAreMissingDeadOrDegraded) {
   EXPECT_EQ(only().what, "odometry was stopped");
 }
 
+TEST_F(ProblemsTest, APausedRecordingIsNone) {
+  train_.now_ns += 10 * core::kNsPerSecond;
+  EXPECT_EQ(find_problems(train_).size(), 2U) << "two services have said nothing for ten seconds";
+  train_.data_stands = true;
+  EXPECT_THAT(find_problems(train_), IsEmpty());
+  train_.played = true;
+  train_.expected.push_back("recorder");
+  EXPECT_THAT(find_problems(train_), IsEmpty()) << "a player stands in for all services";
+}
+
 TEST_F(ProblemsTest, ASilentTopicIsOneOnlyWhileDataFlows) {
   train_.topics[0].numbers.age_s = 3;
   EXPECT_EQ(only().what, "odometry_step has stopped coming");
