@@ -40,15 +40,15 @@ void start_services(Processes& processes, const std::vector<ServiceProgram>& pro
 }
 
 void say_where_to_watch(Supervisor& supervisor, Processes& processes, const RunOptions& options) {
-  const bool there = supervisor.picture().services.contains("monitor");
-  const auto page = there ? supervisor.command(processes, "monitor", "address", "", kAnswerS)
-                          : core::Result<std::string>(core::Error{"it has not started"});
-  if (page.ok()) {
-    std::cout << "watch it on " << page.value() << std::endl;
-  } else {
-    std::cerr << "railfix: the run goes on without the monitor (" << page.error().message << "); its log is "
-              << (options.out / "log" / "monitor.log").string() << '\n';
+  if (!supervisor.picture().gone("monitor")) {
+    const auto page = supervisor.command(processes, "monitor", "address", "", kAnswerS);
+    if (page.ok()) {
+      std::cout << "watch it on " << page.value() << std::endl;
+      return;
+    }
   }
+  std::cerr << "railfix: the run goes on without the monitor; why stands in "
+            << (options.out / "log" / "monitor.log").string() << '\n';
 }
 
 // Until the data has ended, was interrupted, or a service has died.

@@ -53,6 +53,12 @@ Supervisor::Supervisor(const messaging::ParticipantOptions& options, std::vector
          }));
 }
 
+bool TrainPicture::gone(const std::string& service) const {
+  const auto found = services.find(service);
+  if (found == services.end() || silent.contains(service)) return true;
+  return found->second.state() == msg::STATE_FAILED || found->second.state() == msg::STATE_STOPPED;
+}
+
 void Supervisor::note_status(const msg::ServiceStatus& status, bool alive) {
   const std::string service = status.service().c_str();
   if (!alive) {
@@ -85,6 +91,7 @@ std::string Supervisor::missing() const {
   uint32_t endpoints = 0;
   uint32_t matches = 0;
   for (const auto& [service, status] : picture_.services) {
+    if (picture_.gone(service)) continue;
     endpoints += status.endpoints();
     matches += status.matches();
   }

@@ -25,6 +25,9 @@ struct TrainPicture {
   int64_t data_begin_ns = 0;
   int64_t data_ns = 0;           // of the newest odometry step
   std::vector<std::string> log;  // the last warnings and errors
+
+  /// Never seen, failed, stopped, or dead.
+  [[nodiscard]] bool gone(const std::string& service) const;
 };
 
 class Supervisor {
