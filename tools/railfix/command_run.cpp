@@ -14,7 +14,7 @@
 namespace railfix::tool {
 namespace {
 
-constexpr double kConnectS = 30;
+constexpr double kConnectS = 90;
 constexpr double kAnswerS = 10;
 constexpr double kStopS = 15;
 constexpr double kTurnS = 0.1;
