@@ -84,6 +84,7 @@ void Estimator::rebase_clock(int64_t stamp_ns) {
   wheel_.blocked_until_ns = wheel_.window_begin_ns = 0;
   filter_.doubt_way(filter_.value(StateIndex::speed) * kRebaseS);
   slip_watch_ = {};
+  sudden_change_ = {};
   rest_since_ns_ = stamp_ns;
   start_ns_ = std::min(start_ns_, stamp_ns);
 }
@@ -153,6 +154,21 @@ void Estimator::notice_gap(int64_t stamp_ns) {
   }
 }
 
+template <typename Offering>
+Offer Estimator::offer_motion(Source source, int64_t stamp_ns, const Offering& offering) {
+  const Offer offer = offering(filter_);
+  if (offer.used) {
+    sudden_change_.agreed(source, stamp_ns);
+    return offer;
+  }
+  MotionFilter changed = filter_;
+  changed.doubt_acceleration(sudden_change_.since_s(stamp_ns), SuddenChange::kSigmaMps2);
+  const Offer again = offering(changed);
+  if (!again.used || !sudden_change_.called(source, stamp_ns, offer.residual > 0)) return offer;
+  filter_ = std::move(changed);
+  return again;
+}
+
 void Estimator::use(const PictureInput& picture) {
   filter_.clone_now(picture.stamp_ns);
 }
@@ -166,10 +182,11 @@ void Estimator::use(const OdometryInput& step) {
     const double sigma_m = std::hypot(step.step_sigma_m, parameters_->step_sigma_floor_m);
     const double dt_s = core::seconds(step.stamp_ns - step.reference_stamp_ns);
     // Without the reference picture's clone the step is a mean speed, less sure by what the train may have changed it.
-    const auto offer =
-        filter_.has_clone(step.reference_stamp_ns)
-            ? filter_.offer_step(step.reference_stamp_ns, step.step_m, sigma_m, parameters_->gate_camera)
-            : filter_.offer_speed(step.step_m / dt_s, sigma_m / dt_s + 0.5 * dt_s, parameters_->gate_camera);
+    const auto offer = offer_motion(Source::camera, step.stamp_ns, [&](MotionFilter& filter) {
+      return filter.has_clone(step.reference_stamp_ns)
+                 ? filter.offer_step(step.reference_stamp_ns, step.step_m, sigma_m, parameters_->gate_camera)
+                 : filter.offer_speed(step.step_m / dt_s, sigma_m / dt_s + 0.5 * dt_s, parameters_->gate_camera);
+    });
     if (offer.used) {
       camera.accept(step.stamp_ns);
       if (step.reference_stamp_ns <= gap_begin_ns_ && filter_.has_clone(step.reference_stamp_ns)) time_doubt_m_ = 0;
@@ -225,7 +242,9 @@ void Estimator::use(const WheelInput& sample) {
     filter_.restart_wheel(wheel_m, sigma_m);
   } else if (watch.isolated) {
     recover_wheel(sample, wheel_m, sigma_m);
-  } else if (filter_.offer_wheel(wheel_m, sigma_m, parameters_->gate_wheel).used) {
+  } else if (offer_motion(Source::wheel, sample.stamp_ns, [&](MotionFilter& filter) {
+               return filter.offer_wheel(wheel_m, sigma_m, parameters_->gate_wheel);
+             }).used) {
     watch.accept(sample.stamp_ns);
     time_doubt_m_ = 0;
   } else if (++watch.refused >= kRefusalsToIsolate) {
@@ -265,8 +284,10 @@ void Estimator::use(const ImuInput& sample) {
   if (accel_mps2) {
     const double grade = path_ ? path_->at(filter_.path_distance_m()).grade : 0.0;
     const double gravity_mps2 = core::kGravityMps2 * grade / std::hypot(1.0, grade);
-    const auto offer =
-        filter_.offer_acceleration(*accel_mps2 - gravity_mps2, parameters_->accel_sigma_mps2, parameters_->gate_imu);
+    const auto offer = offer_motion(Source::imu, sample.stamp_ns, [&](MotionFilter& filter) {
+      return filter.offer_acceleration(*accel_mps2 - gravity_mps2, parameters_->accel_sigma_mps2,
+                                       parameters_->gate_imu);
+    });
     if (offer.used) {
       imu.accept(sample.stamp_ns);
     } else {

@@ -11,6 +11,7 @@
 #include "fusion/fusion_types.hpp"
 #include "fusion/motion_filter.hpp"
 #include "fusion/slip_watch.hpp"
+#include "fusion/sudden_change.hpp"
 #include "fusion/track_doubt.hpp"
 #include "track/path.hpp"
 
@@ -117,6 +118,9 @@ class Estimator {
   [[nodiscard]] bool used_within(Source source, double time_s) const;
   void doubt_time(const SensorWatch& watch, Rhythm& rhythm, int64_t stamp_ns);
   void notice_gap(int64_t stamp_ns);
+  /// offering: MotionFilter& -> Offer. Offered again as a sudden change of acceleration when it is refused.
+  template <typename Offering>
+  Offer offer_motion(Source source, int64_t stamp_ns, const Offering& offering);
   void use(const OdometryInput& step);
   void use(const WheelInput& sample);
   void use(const ImuInput& sample);
@@ -147,6 +151,7 @@ class Estimator {
   Mean yaw_;
   Wheel wheel_;
   SlipWatch slip_watch_;
+  SuddenChange sudden_change_;
   bool slip_began_ = false;
   FixVerdict fix_verdict_ = FixVerdict::none;
   std::optional<RefusedFix> refused_fix_;

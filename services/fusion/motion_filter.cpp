@@ -220,6 +220,20 @@ void MotionFilter::doubt_way(double sigma_m) {
   ud_.propagate(StateMatrix::Identity(n, n), g, StateVector::Constant(1, squared(sigma_m)));
 }
 
+// One change at the begin of that time, and one now for all the changes between.
+void MotionFilter::doubt_acceleration(double since_s, double sigma_mps2) {
+  const auto n = x_.size();
+  const double way_m = 0.5 * squared(since_s);
+  StateMatrix g = StateMatrix::Zero(n, 2);
+  g(index(StateIndex::odometer), 0) = way_m;
+  g(index(StateIndex::distance), 0) = unit_scale() * way_m;
+  g(index(StateIndex::wheel_odometer), 0) = way_m / to_unit(Odometer::wheel);
+  g(index(StateIndex::speed), 0) = since_s;
+  g(index(StateIndex::acceleration), 0) = 1;
+  g(index(StateIndex::acceleration), 1) = 1;
+  ud_.propagate(StateMatrix::Identity(n, n), g, StateVector::Constant(2, squared(sigma_mps2)));
+}
+
 void MotionFilter::place_like(const MotionFilter& other) {
   const double distance_sigma_m = other.sigma(StateIndex::distance);
   const double path_sigma_m = other.path_sigma_m();

@@ -82,6 +82,8 @@ class MotionFilter {
 
   /// The train may have run so much more or less than was thought (unit metres).
   void doubt_way(double sigma_m);
+  /// The acceleration may have become another one by sigma, up to `since_s` ago.
+  void doubt_acceleration(double since_s, double sigma_mps2);
   /// Takes over another filter's place (distance, path distance and their sigmas) as independent knowledge.
   void place_like(const MotionFilter& other);
 

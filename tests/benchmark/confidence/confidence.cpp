@@ -20,6 +20,7 @@ struct Arguments {
   std::string map;
   std::string start;
   double max_kmh = 150;
+  double sudden_mps2 = 0;
   int64_t run = -1;
   bool list = false;
   bool sources = false;
@@ -136,6 +137,8 @@ int run(int argc, char** argv) {
   app.add_option("--threads", a.plan.threads, "Threads")->capture_default_str();
   app.add_option("--duration-s", a.plan.duration_s, "Length of one run")->capture_default_str();
   app.add_option("--max-kmh", a.max_kmh, "Highest speed")->capture_default_str();
+  app.add_option("--sudden", a.sudden_mps2,
+                 "Accelerate and brake so hard (m/s2), from one moment to the next; 0: gently");
   app.add_option("--landmarks-m", s.landmark_spacing_m, "Mean distance of landmarks, 0 = none")->capture_default_str();
   app.add_option("--fault", a.fault, "all, none, SENSOR or SENSOR:KIND")->capture_default_str();
   app.add_option("--without", a.without, "Leave out any of camera, wheel, imu, gnss, landmarks (comma between)");
@@ -152,6 +155,7 @@ int run(int argc, char** argv) {
   }
   a.plan.faults = faults_named(a.fault);
   s.max_speed_mps = a.max_kmh / 3.6;
+  if (a.sudden_mps2 > 0) s.style = DriveStyle::sudden(a.sudden_mps2);
   leave_out(s, a.without);
   load_map(a);
   if (a.run >= 0) {

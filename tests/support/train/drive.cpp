@@ -7,13 +7,10 @@ namespace railfix::train {
 namespace {
 
 constexpr double kTickS = 0.05;
-constexpr double kTractionMps2 = 0.7;
-constexpr double kBrakeMps2 = 0.9;
-constexpr double kJerkMps3 = 0.6;
 
 }  // namespace
 
-Drive::Drive(core::Random& random, double duration_s, double max_speed_mps, double max_way_m) {
+Drive::Drive(core::Random& random, double duration_s, double max_speed_mps, double max_way_m, const DriveStyle& style) {
   double speed = random.uniform() < 0.5 ? 0 : random.uniform(5, std::min(30.0, max_speed_mps));
   double distance = 0;
   double accel = 0;
@@ -26,9 +23,9 @@ Drive::Drive(core::Random& random, double duration_s, double max_speed_mps, doub
       change_s += random.uniform(10, 40);
     }
     const double left_m = max_way_m - distance - 5;
-    if (speed * speed / (2 * 0.6 * kBrakeMps2) + 3 * speed > left_m) target = 0;
-    const double wanted = std::clamp(0.5 * (target - speed), -kBrakeMps2, kTractionMps2);
-    accel += std::clamp(wanted - accel, -kJerkMps3 * kTickS, kJerkMps3 * kTickS);
+    if (speed * speed / (2 * 0.6 * style.brake_mps2) + 3 * speed > left_m) target = 0;
+    const double wanted = std::clamp(style.gain_per_s * (target - speed), -style.brake_mps2, style.traction_mps2);
+    accel += std::clamp(wanted - accel, -style.jerk_mps3 * kTickS, style.jerk_mps3 * kTickS);
     const double before = speed;
     speed = std::max(0.0, speed + accel * kTickS);
     if (speed == 0) accel = 0;

@@ -14,11 +14,23 @@ struct Motion {
   double acceleration_mps2 = 0;
 };
 
+/// How the driver takes a new speed.
+struct DriveStyle {
+  double traction_mps2 = 0.7;
+  double brake_mps2 = 0.9;
+  double jerk_mps3 = 0.6;
+  double gain_per_s = 0.5;  // acceleration per missing speed
+
+  /// Full traction or brake from one moment to the next and until the speed is there, as an emergency brake to the
+  /// stop.
+  static DriveStyle sudden(double mps2) { return {mps2, mps2, 1000, 10}; }
+};
+
 class Drive {
  public:
   /// Up to max_speed_mps, changing its target every 10 to 40 s, a quarter of them stops. Ends standing before
   /// max_way_m.
-  Drive(core::Random& random, double duration_s, double max_speed_mps = 42, double max_way_m = 1e9);
+  Drive(core::Random& random, double duration_s, double max_speed_mps, double max_way_m, const DriveStyle& style);
 
   [[nodiscard]] Motion at(double t_s) const;
   [[nodiscard]] double way_m() const { return samples_.back().distance_m; }

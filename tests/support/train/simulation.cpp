@@ -28,7 +28,7 @@ core::Random stream(uint64_t seed, uint64_t number) {
 
 Drive drive_on(uint64_t seed, const SimulationPlan& plan, double most_m) {
   auto random = stream(seed, 2);
-  return Drive(random, plan.duration_s, plan.max_speed_mps, most_m);
+  return Drive(random, plan.duration_s, plan.max_speed_mps, most_m, plan.style);
 }
 
 std::shared_ptr<const track::Map> line_of(uint64_t seed, const SimulationPlan& plan) {

@@ -24,6 +24,7 @@ namespace railfix::train {
 struct SimulationPlan {
   double duration_s = 120;
   double max_speed_mps = 42;
+  DriveStyle style;
   bool camera = true;
   bool wheel = true;
   bool imu = true;

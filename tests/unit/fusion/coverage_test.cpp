@@ -78,6 +78,21 @@ TEST(Coverage, BlindCameraWithImuOnly) {
   EXPECT_EQ(campaign.sum.outside, 0U);
 }
 
+// Emergency brakes and starts that bite at once: the motion is another one, no sensor is faulty.
+TEST(Coverage, SuddenAccelerationIsFollowed) {
+  for (const double mps2 : {2.0, 3.0}) {
+    SimulationPlan plan;
+    plan.style = train::DriveStyle::sudden(mps2);
+    plan.max_speed_mps = 22;
+    plan.gnss = plan.slip = plan.blind_spells = false;
+    plan.landmark_spacing_m = 0;
+    plan.outlier_share = 0;
+    const auto campaign = run_campaign(plan, 10);
+    EXPECT_EQ(campaign.sum.outside, 0U) << mps2;
+    EXPECT_GE(campaign.budget_share, 0.99) << mps2;
+  }
+}
+
 // Each sensor with each of its faults, on ordinary troubles beside: the short form of railfix-measure-confidence.
 TEST(Coverage, OneFaultySensorStaysInsideTheInterval) {
   train::Verdict sum;
