@@ -9,6 +9,8 @@ namespace {
 
 constexpr double kStepM = 1.0;
 constexpr double kGridM = 1.0;
+constexpr double kLagStepM = 2.5;
+constexpr double kLagKnownShare = 0.7;  // of the sigma of a lag that nothing tells
 constexpr size_t kFewestBins = 10;
 constexpr double kBetterBy = 0.97;  // a sigma that shrinks less than this is as good as it gets
 constexpr std::array<double, 5> kScales = {-1.5, -0.75, 0.0, 0.75, 1.5};  // in sigmas
@@ -32,14 +34,14 @@ class CurvatureMatcher::MapCurvature {
   std::vector<double> values_;
 };
 
-void CurvatureMatcher::add(double odometer_m, double curvature_per_m, double sigma_per_m) {
+void CurvatureMatcher::add(double odometer_m, double curvature_per_m, double sigma_per_m, CurvatureOf of) {
   if (!std::isfinite(curvature_per_m) || !(sigma_per_m > 0)) return;
   const double weight = 1 / (sigma_per_m * sigma_per_m);
   const auto cell = [this](double m) { return std::floor(m / parameters_.bin_m); };
-  auto bin =
-      std::find_if(bins_.rbegin(), bins_.rend(), [&](const Bin& b) { return cell(b.odometer_m) == cell(odometer_m); });
+  auto bin = std::find_if(bins_.rbegin(), bins_.rend(),
+                          [&](const Bin& b) { return b.of == of && cell(b.odometer_m) == cell(odometer_m); });
   if (bin == bins_.rend()) {
-    bins_.push_back({odometer_m, curvature_per_m, weight});
+    bins_.push_back({odometer_m, curvature_per_m, weight, of});
     while (std::abs(bins_.back().odometer_m - bins_.front().odometer_m) > parameters_.window_m) bins_.pop_front();
     return;
   }
@@ -49,13 +51,15 @@ void CurvatureMatcher::add(double odometer_m, double curvature_per_m, double sig
   bin->weight += weight;
 }
 
-double CurvatureMatcher::misfit(const MapCurvature& map, double place_m, double scale, double odometer_m) const {
+double CurvatureMatcher::misfit(const MapCurvature& map, double place_m, double scale, double lag_m,
+                                double odometer_m) const {
   const double least = parameters_.noise_per_m * parameters_.noise_per_m;
   double sum = 0;
   double weighted = 0;
   double weights = 1 / (parameters_.bias_per_m * parameters_.bias_per_m);
   for (const auto& bin : bins_) {
-    const double error = bin.curvature_per_m - map.at(place_m + (1 + scale) * (bin.odometer_m - odometer_m));
+    const double of_m = place_m - (bin.of == CurvatureOf::body ? lag_m : 0.0);
+    const double error = bin.curvature_per_m - map.at(of_m + (1 + scale) * (bin.odometer_m - odometer_m));
     const double weight = 1 / (1 / bin.weight + least);
     sum += weight * error * error;
     weighted += weight * error;
@@ -65,7 +69,11 @@ double CurvatureMatcher::misfit(const MapCurvature& map, double place_m, double 
   return sum - weighted * weighted / weights;
 }
 
-// Posterior over the place with a flat prior in the window; the odometer's scale is summed over.
+bool CurvatureMatcher::any_of_body() const {
+  return std::any_of(bins_.begin(), bins_.end(), [](const Bin& bin) { return bin.of == CurvatureOf::body; });
+}
+
+// Posterior over the place with a flat prior in the window; the odometer's scale and the body's lag are summed over.
 CurvatureMatcher::Peak CurvatureMatcher::search(double odometer_m, const Prior& prior) const {
   const double from_m = -prior.over_m - parameters_.search_margin_m;
   const double to_m = prior.under_m + parameters_.search_margin_m;
@@ -73,16 +81,20 @@ CurvatureMatcher::Peak CurvatureMatcher::search(double odometer_m, const Prior& 
   const auto [nearest, farthest] = std::minmax_element(
       bins_.begin(), bins_.end(), [](const Bin& a, const Bin& b) { return a.odometer_m < b.odometer_m; });
   const double stretch = 1 + 2 * parameters_.scale_sigma;
-  const MapCurvature map(*path_,
-                         prior.path_distance_m + from_m + stretch * std::min(0.0, nearest->odometer_m - odometer_m),
-                         prior.path_distance_m + to_m + stretch * std::max(0.0, farthest->odometer_m - odometer_m));
+  const MapCurvature map(
+      *path_,
+      prior.path_distance_m + from_m - parameters_.lag_m + stretch * std::min(0.0, nearest->odometer_m - odometer_m),
+      prior.path_distance_m + to_m + stretch * std::max(0.0, farthest->odometer_m - odometer_m));
   std::vector<double> likelihood(count);
   double best = INFINITY;
-  std::vector<std::array<double, kScales.size()>> all(count);
-  for (size_t i = 0; i < count; ++i) {
+  const size_t lags = any_of_body() ? static_cast<size_t>(std::ceil(parameters_.lag_m / kLagStepM)) + 1 : 1;
+  const double lag_step_m = lags > 1 ? parameters_.lag_m / static_cast<double>(lags - 1) : 0.0;
+  std::vector<std::array<double, kScales.size()>> all(count * lags);
+  for (size_t i = 0; i < all.size(); ++i) {
+    const double place_m = prior.path_distance_m + from_m + kStepM * static_cast<double>(i / lags);
+    const double lag_m = lag_step_m * static_cast<double>(i % lags);
     for (size_t k = 0; k < kScales.size(); ++k) {
-      const double place_m = prior.path_distance_m + from_m + kStepM * static_cast<double>(i);
-      all[i][k] = misfit(map, place_m, parameters_.scale_sigma * kScales[k], odometer_m);
+      all[i][k] = misfit(map, place_m, parameters_.scale_sigma * kScales[k], lag_m, odometer_m);
       best = std::min(best, all[i][k]);
     }
   }
@@ -91,9 +103,11 @@ CurvatureMatcher::Peak CurvatureMatcher::search(double odometer_m, const Prior& 
   double sum = 0;
   size_t top = 0;
   for (size_t i = 0; i < count; ++i) {
-    for (size_t k = 0; k < kScales.size(); ++k) {
+    for (size_t j = 0; j < lags * kScales.size(); ++j) {
+      const size_t k = j % kScales.size();
+      const double here = all[i * lags + j / kScales.size()][k];
       likelihood[i] +=
-          std::exp(-0.5 * (all[i][k] - best) / (worse * parameters_.correlated_bins) - 0.5 * kScales[k] * kScales[k]);
+          std::exp(-0.5 * (here - best) / (worse * parameters_.correlated_bins) - 0.5 * kScales[k] * kScales[k]);
     }
     sum += likelihood[i];
     if (likelihood[i] > likelihood[top]) top = i;
@@ -124,6 +138,9 @@ std::optional<Fix> CurvatureMatcher::match(int64_t stamp_ns, double odometer_m, 
     waiting_sigma_m_ = 0;
     return std::nullopt;
   }
+  // An unknown lag is the same error in every fix: more of them must not make the place surer than it.
+  const bool lag_unknown = any_of_body() && peak.sigma_m > kLagKnownShare * parameters_.lag_m / std::sqrt(12.0);
+  if (lag_unknown && std::min(prior.over_m, prior.under_m) < parameters_.lag_m) return std::nullopt;
   if (waiting_sigma_m_ == 0 || sigma_m < kBetterBy * waiting_sigma_m_) {
     waiting_sigma_m_ = sigma_m;
     return std::nullopt;

@@ -22,9 +22,13 @@ struct CurvatureParameters {
   double scale_sigma = 0.01;     // of the odometer
   double search_margin_m = 10;   // beyond the promised interval of train_state
   double max_sigma_m = 8.0;      // of a fix that is worth sending
+  double lag_m = 0;              // the body may turn so far behind the camera's foot
   double sigma_floor_m = 0.7;    // map and the point that the curvature belongs to
   double min_probability = 0.9;
 };
+
+/// What shows a curvature: the rails as they are seen, or the turning of the body, which follows the bogies.
+enum class CurvatureOf : uint8_t { rails, body };
 
 class CurvatureMatcher {
  public:
@@ -32,7 +36,7 @@ class CurvatureMatcher {
       : parameters_(parameters), path_(std::move(path)) {}
 
   /// Curvature (left positive) with its sigma, of the track at this odometer reading.
-  void add(double odometer_m, double curvature_per_m, double sigma_per_m);
+  void add(double odometer_m, double curvature_per_m, double sigma_per_m, CurvatureOf of);
   /// Another way with distances that go on from the old one's; the measurements so far stay.
   void change_path(std::shared_ptr<const track::Path> path) { path_ = std::move(path); }
   /// The odometer lost the way (camera blind): what came before cannot be used any more.
@@ -45,6 +49,7 @@ class CurvatureMatcher {
     double odometer_m = 0;  // weighted mean of its samples
     double curvature_per_m = 0;
     double weight = 0;
+    CurvatureOf of = CurvatureOf::rails;
   };
   struct Peak {
     double offset_m = 0;  // of the place from the prior's
@@ -52,9 +57,11 @@ class CurvatureMatcher {
     double probability = 0;
     bool at_edge = false;
   };
+  [[nodiscard]] bool any_of_body() const;
   [[nodiscard]] Peak search(double odometer_m, const Prior& prior) const;
   class MapCurvature;
-  [[nodiscard]] double misfit(const MapCurvature& map, double place_m, double scale, double odometer_m) const;
+  [[nodiscard]] double misfit(const MapCurvature& map, double place_m, double scale, double lag_m,
+                              double odometer_m) const;
 
   CurvatureParameters parameters_;
   std::shared_ptr<const track::Path> path_;

@@ -36,6 +36,11 @@ struct MapMatcherConfig {
   /// What several parts take is set once: the lag of the body, and the chances of sightings under `landmarks`.
   [[nodiscard]] TrackParameters track_parameters() const { return shared(track); }
   [[nodiscard]] LocatorParameters locator_parameters() const { return shared(locator); }
+  [[nodiscard]] CurvatureParameters curvature_parameters() const {
+    CurvatureParameters p = curvature;
+    p.lag_m = lag_m;
+    return p;
+  }
 
   void describe(service::Fields& fields) {
     fields.text("map", map, "Compiled map (railfix map build); empty = nothing is matched.");

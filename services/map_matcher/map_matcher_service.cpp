@@ -121,7 +121,7 @@ void MapMatcherService::follow(const msg::TrainState& state) {
   }
   path_ = std::make_shared<const track::Path>(std::move(path).value());
   landmarks_.emplace(config_.landmarks, path_);
-  curvature_.emplace(config_.curvature, path_);
+  curvature_.emplace(config_.curvature_parameters(), path_);
   if (config_.curve_method == "exits") exits_.emplace(CurveExitParameters{}, path_);
   place_m_ = 0;
 }
@@ -153,7 +153,7 @@ void MapMatcherService::use(const msg::OdometryStep& step) {
   if (step.mode() == msg::ODOMETRY_TRACK && std::abs(step_m) > kShortestStepM &&
       std::abs(step.speed_mps()) > config_.least_speed_mps) {
     curvature_->add(step.distance_m() - 0.5 * step_m, step.yaw_rad() / step_m,
-                    std::hypot(step.yaw_sigma_rad(), kYawNoise) / std::abs(step_m));
+                    std::hypot(step.yaw_sigma_rad(), kYawNoise) / std::abs(step_m), CurvatureOf::body);
   }
   if (std::abs(step.distance_m() - matched_m_) < config_.match_every_m) return;
   matched_m_ = step.distance_m();
@@ -296,7 +296,7 @@ void MapMatcherService::use(const msg::TrackView& view) {
   const double dt_s = core::seconds(view.stamp_ns() - step_->stamp_ns());
   if (std::abs(dt_s) > kOldStateS || std::abs(step_->speed_mps()) < config_.least_speed_mps) return;
   const double odometer_m = step_->distance_m() + step_->speed_mps() * dt_s + config_.view_ahead_m;
-  curvature_->add(odometer_m, view.curvature_per_m(), std::sqrt(variance));
+  curvature_->add(odometer_m, view.curvature_per_m(), std::sqrt(variance), CurvatureOf::rails);
 }
 
 void MapMatcherService::use(const msg::LandmarkSighting& sighting) {

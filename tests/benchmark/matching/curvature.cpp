@@ -128,7 +128,7 @@ void run(const std::shared_ptr<const track::Path>& path, uint64_t seed, Comparis
     if (pending_m < kBinM) continue;
     const double middle_m = odometer_m - 0.5 * pending_m - lag_m;
     const double noise_per_m = errors.turn_noise_rps * std::sqrt(pending_m / speed_mps / kRateHz) / pending_m;
-    likelihood.add(middle_m, pending_rad / pending_m, noise_per_m);
+    likelihood.add(middle_m, pending_rad / pending_m, noise_per_m, map_matcher::CurvatureOf::body);
     exits.add(middle_m, pending_rad / pending_m);
     pending_m = pending_rad = 0;
     const auto window = [&](const PlaceFilter& filter) {

@@ -31,7 +31,7 @@ Result run(const std::shared_ptr<const track::Path>& path, uint64_t seed, double
   Result result;
   for (double s = 10; s < path->end_m() - 10; s += 0.5) {
     const double odometer_m = s * scale;
-    matcher.add(odometer_m, path->curvature_at(s) + noise_per_m * random.normal(), noise_per_m);
+    matcher.add(odometer_m, path->curvature_at(s) + noise_per_m * random.normal(), noise_per_m, CurvatureOf::rails);
     if (std::fmod(s, 20.0) != 0) continue;
     const auto fix = matcher.match(1, odometer_m, {s + prior_error_m, interval_m, interval_m, odometer_m});
     if (!fix) continue;
@@ -86,10 +86,39 @@ TEST(CurveExitMatcher, TheExitOfACurveIsFoundWhereItIs) {
   }
 }
 
+// The body of a car whose bogies' middle lies 11.5 m behind the foot. Rails that are seen, too, tell the lag.
+TEST(CurvatureMatcher, ABodyThatTurnsBehindTheFootIsInTheSigma) {
+  const auto path = line_of({{400, 0, 0}, {80, 0, 0.002}, {250, 0.002, 0.002}, {80, 0.002, 0}, {400, 0, 0}});
+  CurvatureParameters parameters;
+  parameters.lag_m = 20;
+  for (const double lag_m : {0.0, 3.0, 11.5, 20.0}) {
+    for (const bool rails : {false, true}) {
+      CurvatureMatcher matcher(parameters, path);
+      int fixes = 0;
+      for (double s = 30; s < 1150; s += 0.5) {
+        matcher.add(s, path->curvature_at(s - lag_m), 3e-4, CurvatureOf::body);
+        if (rails) matcher.add(s, path->curvature_at(s), 3e-4, CurvatureOf::rails);
+        if (std::fmod(s, 10.0) != 0) continue;
+        if (!rails) {
+          EXPECT_FALSE(CurvatureMatcher(matcher).match(1, s, {s, 15, 15, s})) << "lag " << lag_m;
+        }
+        const auto fix = matcher.match(1, s, {s + 3, 25, 25, s});
+        if (!fix) continue;
+        ++fixes;
+        EXPECT_LT(std::abs(fix->path_distance_m - s), 2.5 * fix->sigma_m) << "lag " << lag_m << " at " << s;
+        if (rails) {
+          EXPECT_NEAR(fix->path_distance_m, s, 3) << "lag " << lag_m;
+        }
+      }
+      EXPECT_GE(fixes, 1) << "lag " << lag_m << (rails ? " with rails" : "");
+    }
+  }
+}
+
 TEST(CurvatureMatcher, ForgetsWhatCameBeforeTheCameraWasBlind) {
   const auto path = line_of({{300, 0, 0}, {80, 0, 0.002}, {300, 0.002, 0.002}});
   CurvatureMatcher matcher({}, path);
-  for (double s = 100; s < 400; s += 0.5) matcher.add(s, path->curvature_at(s), 2e-4);
+  for (double s = 100; s < 400; s += 0.5) matcher.add(s, path->curvature_at(s), 2e-4, CurvatureOf::rails);
   matcher.forget();
   EXPECT_FALSE(matcher.match(1, 400, {400, 20, 20, 400}));
 }
