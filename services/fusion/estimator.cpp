@@ -11,6 +11,12 @@ namespace {
 
 constexpr int kRefusalsToIsolate = 3;
 constexpr int kRefusalsToDoubt = 10;
+constexpr int kAgreementsOfCamera = 10;
+constexpr int kAgreementsOfImu = 60;
+constexpr int kRepeatedSamples = 10;  // and for ...
+constexpr double kRepeatedS = 0.15;   // ... so long
+constexpr double kAtWorkS = 0.3;
+constexpr double kRecoveryWayM = 1.0;  // a wheel shows by turning that it is well again
 constexpr double kSlipWindowS = 0.5;
 constexpr int kGoodWindows = 2;
 constexpr double kSlipTestSigmas = 3.0;
@@ -129,8 +135,31 @@ void Estimator::doubt_time(const SensorWatch& watch, Rhythm& rhythm, int64_t sta
   }
 }
 
-bool Estimator::is_consistent() const {
-  return !watch(Source::camera).isolated && !watch(Source::wheel).isolated && !watch(Source::imu).isolated;
+bool Estimator::is_consistent(uint32_t excepted) const {
+  return std::ranges::none_of(kMotionSources, [&](Source source) {
+    return watch(source).isolated && (excepted & 1U << static_cast<unsigned>(source)) == 0;
+  });
+}
+
+int Estimator::sensors_at_work() const {
+  return static_cast<int>(
+      std::ranges::count_if(kMotionSources, [&](Source source) { return used_within(source, kAtWorkS); }));
+}
+
+void Estimator::exclude(Source source, const Estimator& other) {
+  watched(source) = other.watch(source);
+  watched(source).isolated = false;
+  watched(source).isolate(stamp_ns_);
+  watched(source).convicted = true;
+  slip_began_ = false;
+  if (source == Source::camera) pictures_ = other.pictures_;
+  if (source == Source::imu) accel_repeated_ = other.accel_repeated_;
+  if (source != Source::wheel) return;
+  pulses_ = other.pulses_;
+  wheel_ = other.wheel_;
+  wheel_.good_windows = 0;
+  wheel_.window_begin_ns = filter_.stamp_ns();
+  wheel_.window_m.reset();
 }
 
 void Estimator::place_like(const Estimator& other) {
@@ -182,12 +211,19 @@ void Estimator::use(const OdometryInput& step) {
     const double sigma_m = std::hypot(step.step_sigma_m, parameters_->step_sigma_floor_m);
     const double dt_s = core::seconds(step.stamp_ns - step.reference_stamp_ns);
     // Without the reference picture's clone the step is a mean speed, less sure by what the train may have changed it.
-    const auto offer = offer_motion(Source::camera, step.stamp_ns, [&](MotionFilter& filter) {
+    const auto offered_to = [&](MotionFilter& filter) {
       return filter.has_clone(step.reference_stamp_ns)
                  ? filter.offer_step(step.reference_stamp_ns, step.step_m, sigma_m, parameters_->gate_camera)
                  : filter.offer_speed(step.step_m / dt_s, sigma_m / dt_s + 0.5 * dt_s, parameters_->gate_camera);
-    });
-    if (offer.used) {
+    };
+    const bool alone = !used_within(Source::wheel, kLatelyS);
+    if (camera.isolated && !(alone && !used_within(Source::imu, kLatelyS))) {
+      slip_watch_.no_picture();
+      MotionFilter trial = filter_;
+      const auto offer = offered_to(trial);
+      camera.hear(offer.used, kAgreementsOfCamera, step.stamp_ns);
+      if (alone) doubt_m_ += std::abs(offer.residual);
+    } else if (const auto offer = offer_motion(Source::camera, step.stamp_ns, offered_to); offer.used) {
       camera.accept(step.stamp_ns);
       if (step.reference_stamp_ns <= gap_begin_ns_ && filter_.has_clone(step.reference_stamp_ns)) time_doubt_m_ = 0;
       compare_with_wheel(step, sigma_m);
@@ -195,7 +231,6 @@ void Estimator::use(const OdometryInput& step) {
       slip_watch_.no_picture();
       if (++camera.refused >= kRefusalsToIsolate) camera.isolate(step.stamp_ns);
       // With the wheel the rivals' ends are wide enough; without it nobody knows who is right.
-      const bool alone = !used_within(Source::wheel, kLatelyS);
       if (camera.refused >= kRefusalsToDoubt && alone) doubt_m_ += std::abs(offer.residual);
     }
   }
@@ -220,6 +255,7 @@ void Estimator::isolate_wheel() {
   watched(Source::wheel).isolate(stamp_ns_);
   wheel_.good_windows = 0;
   wheel_.window_begin_ns = filter_.stamp_ns();
+  wheel_.window_m.reset();
   slip_began_ = true;
 }
 
@@ -252,15 +288,22 @@ void Estimator::use(const WheelInput& sample) {
   }
 }
 
-// While the wheel slips its odometer is only compared, window by window; two good windows end the slip.
+// While the wheel slips its odometer is only compared, window by window; two good windows in which it turned end the
+// slip: a wheel that is stuck agrees with every train that stands. Where there is no camera it must be taken as it is.
 void Estimator::recover_wheel(const WheelInput& sample, double wheel_m, double sigma_m) {
-  if (wheel_.window_begin_ns >= sample.stamp_ns) filter_.restart_wheel(wheel_m, sigma_m);
+  const auto begin_window = [&] {
+    wheel_.window_begin_ns = sample.stamp_ns;
+    wheel_.window_m = wheel_m;
+    filter_.restart_wheel(wheel_m, sigma_m);
+  };
+  if (wheel_.window_begin_ns >= sample.stamp_ns || !wheel_.window_m) begin_window();
   if (core::seconds(sample.stamp_ns - wheel_.window_begin_ns) < kSlipWindowS) return;
   MotionFilter trial = filter_;
   const bool good = trial.offer_wheel(wheel_m, sigma_m, kSlipTestSigmas).used;
+  const bool with_camera = watch(Source::camera).seen_ns != 0 && !silent(Source::camera);
+  if (with_camera && good && std::abs(wheel_m - *wheel_.window_m) < kRecoveryWayM) return;
   wheel_.good_windows = good ? wheel_.good_windows + 1 : 0;
-  wheel_.window_begin_ns = sample.stamp_ns;
-  filter_.restart_wheel(wheel_m, sigma_m);
+  begin_window();
   if (wheel_.good_windows >= kGoodWindows) watched(Source::wheel).accept(sample.stamp_ns);
 }
 
@@ -278,23 +321,40 @@ std::optional<double> Estimator::Mean::add(int64_t stamp_ns, double value, doubl
 void Estimator::use(const ImuInput& sample) {
   auto& imu = watched(Source::imu);
   imu.seen_ns = sample.stamp_ns;
+  accel_repeated_.add(sample.accel_x_mps2, sample.stamp_ns);
   const auto accel_mps2 = accel_.add(sample.stamp_ns, sample.accel_x_mps2, parameters_->imu_period_s);
   const auto rate_rps = yaw_.add(sample.stamp_ns, sample.rate_z_rps, parameters_->gyro_period_s);
   if (accel_mps2 || rate_rps) predict_to(sample.stamp_ns);
-  if (accel_mps2) {
-    const double grade = path_ ? path_->at(filter_.path_distance_m()).grade : 0.0;
-    const double gravity_mps2 = core::kGravityMps2 * grade / std::hypot(1.0, grade);
-    const auto offer = offer_motion(Source::imu, sample.stamp_ns, [&](MotionFilter& filter) {
-      return filter.offer_acceleration(*accel_mps2 - gravity_mps2, parameters_->accel_sigma_mps2,
-                                       parameters_->gate_imu);
-    });
-    if (offer.used) {
-      imu.accept(sample.stamp_ns);
-    } else {
-      if (++imu.refused >= kRefusalsToIsolate) imu.isolate(sample.stamp_ns);
-    }
-  }
+  if (accel_mps2) use_acceleration(*accel_mps2, sample.stamp_ns);
   if (rate_rps) use_yaw_rate(*rate_rps);
+}
+
+void Estimator::use_acceleration(double accel_mps2, int64_t stamp_ns) {
+  auto& imu = watched(Source::imu);
+  const bool stuck =
+      accel_repeated_.count >= kRepeatedSamples && core::seconds(stamp_ns - accel_repeated_.since_ns) >= kRepeatedS;
+  if (stuck) {
+    imu.isolate(stamp_ns);
+    imu.convicted = true;
+    imu.agreed = 0;
+    return;
+  }
+  const double grade = path_ ? path_->at(filter_.path_distance_m()).grade : 0.0;
+  const double force_mps2 = accel_mps2 - core::kGravityMps2 * grade / std::hypot(1.0, grade);
+  const double sigma_mps2 = parameters_->accel_sigma_mps2;
+  if (imu.convicted) {
+    MotionFilter trial = filter_;
+    imu.hear(trial.offer_acceleration(force_mps2, sigma_mps2, parameters_->gate_imu).used, kAgreementsOfImu, stamp_ns);
+    return;
+  }
+  const auto offer = offer_motion(Source::imu, stamp_ns, [&](MotionFilter& filter) {
+    return filter.offer_acceleration(force_mps2, sigma_mps2, parameters_->gate_imu);
+  });
+  if (offer.used) {
+    imu.accept(stamp_ns);
+  } else if (++imu.refused >= kRefusalsToIsolate) {
+    imu.isolate(stamp_ns);
+  }
 }
 
 // The mean belongs to the middle of its period, which lies v * period / 2 behind.

@@ -22,18 +22,26 @@ struct SensorWatch {
   int64_t seen_ns = 0;  // 0 = never
   int64_t used_ns = 0;
   int refused = 0;  // in a row
+  int agreed = 0;   // in a row, while it is isolated and only watched
   bool isolated = false;
+  bool convicted = false;  // isolated because it is known to be the wrong one
   int64_t changed_ns = 0;  // when it was isolated, or taken back
 
   void accept(int64_t stamp_ns) {
     used_ns = stamp_ns;
     refused = 0;
     if (isolated) changed_ns = stamp_ns;
-    isolated = false;
+    isolated = convicted = false;
   }
   void isolate(int64_t stamp_ns) {
     if (!isolated) changed_ns = stamp_ns;
     isolated = true;
+    agreed = 0;
+  }
+  /// What an isolated sensor says next; one agreement may be chance, so many in a row bring it back.
+  void hear(bool agrees, int enough, int64_t stamp_ns) {
+    agreed = agrees ? agreed + 1 : 0;
+    if (agreed >= enough) accept(stamp_ns);
   }
 };
 
@@ -59,8 +67,12 @@ class Estimator {
   [[nodiscard]] double distance_m() const { return filter_.value(StateIndex::distance); }
   /// Camera or wheel measured lately and was believed, or the IMU bridges a short while without them.
   [[nodiscard]] bool knows_motion() const;
-  /// No motion sensor is isolated.
-  [[nodiscard]] bool is_consistent() const;
+  /// No motion sensor is isolated but those of `excepted` (bits 1 << Source).
+  [[nodiscard]] bool is_consistent(uint32_t excepted = 0) const;
+  /// So many motion sensors measured in the last moments and were believed.
+  [[nodiscard]] int sensors_at_work() const;
+  /// That sensor is found to be wrong: it is isolated, with what `other` knows of it.
+  void exclude(Source source, const Estimator& other);
   /// GNSS has agreed with the motion for a while.
   [[nodiscard]] bool gnss_proven() const { return gnss_agreed_ >= kGnssProof; }
   /// Takes over place and speed, as independent knowledge.
@@ -100,7 +112,19 @@ class Estimator {
     double resolution_m = 0;
     int64_t blocked_until_ns = 0;
     int64_t window_begin_ns = 0;
+    std::optional<double> window_m;  // its reading then
     int good_windows = 0;
+  };
+  /// A sensor that is stuck repeats itself to the last digit.
+  struct Repeated {
+    double value = 0;
+    int64_t since_ns = 0;
+    int count = 0;
+    void add(double next, int64_t stamp_ns) {
+      count = next == value ? count + 1 : 0;
+      if (count == 0) since_ns = stamp_ns;
+      value = next;
+    }
   };
   /// Usual time between the samples of one odometer.
   struct Rhythm {
@@ -127,6 +151,7 @@ class Estimator {
   void use(const GnssInput& sample);
   void use(const FixInput& fix);
   void use(const PictureInput& picture);
+  void use_acceleration(double accel_mps2, int64_t stamp_ns);
   void compare_with_wheel(const OdometryInput& step, double sigma_m);
   void isolate_wheel();
   void recover_wheel(const WheelInput& sample, double wheel_m, double sigma_m);
@@ -148,6 +173,7 @@ class Estimator {
   Rhythm pictures_;
   Rhythm pulses_;
   Mean accel_;
+  Repeated accel_repeated_;
   Mean yaw_;
   Wheel wheel_;
   SlipWatch slip_watch_;

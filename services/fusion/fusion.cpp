@@ -18,6 +18,7 @@ constexpr double kSameTrackM = 500.0;        // the edge is on the path, but not
 constexpr double kNoCameraS = 0.3;
 constexpr int64_t kSnapshotNs = 50'000'000;
 constexpr int64_t kSlipUnseenNs = 1'200'000'000;  // a slip may have grown for so long before it is found
+constexpr int kMostRewinds = 3;                   // for slips found again while the time is replayed
 constexpr int kJumpsToBelieve = 3;
 constexpr size_t kBackwardToBelieve = 5;
 constexpr int64_t kSpacingNs = 10'000'000;  // of samples, about
@@ -196,11 +197,12 @@ std::optional<TrainEstimate> Fusion::insert(const Event& event) {
   events_.insert(place, event);
   auto next = mine;
   if (mine + 1 < static_cast<std::ptrdiff_t>(events_.size())) next = rewind_before(stamp_of(event));
+  int rewinds = 0;
   while (next < static_cast<std::ptrdiff_t>(events_.size())) {
     run(events_[static_cast<size_t>(next)]);
     if (wanted && next == mine) estimate = now_->estimate();
     ++next;
-    if (now_->main().slip_began()) {
+    if (now_->main().slip_began() && ++rewinds <= kMostRewinds) {
       const int64_t found_ns = now_->stamp_ns();
       const uint32_t slipping = now_->slipping();
       next = rewind_before(found_ns - kSlipUnseenNs);

@@ -2,6 +2,7 @@
 // its arrival.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -66,6 +67,7 @@ using Event = std::variant<ImuInput, WheelInput, PictureInput, OdometryInput, Gn
 
 enum class Source : uint8_t { camera, wheel, imu, gnss, landmark, curvature };
 constexpr int kSources = 6;
+inline constexpr std::array kMotionSources{Source::camera, Source::wheel, Source::imu};
 enum class Integrity : uint8_t { ok, degraded, unusable };
 
 /// State of the train at one stamp; fields as in msg::TrainState.

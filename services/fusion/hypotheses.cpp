@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kSureProbability = 0.999;  // from here on a fix needs no second one
 constexpr double kRivalGoneS = 1.0;
+constexpr double kProofS = 2.0;
 
 Source source_of(const Event& event) {
   if (std::holds_alternative<ImuInput>(event)) return Source::imu;
@@ -42,8 +43,37 @@ void Hypotheses::apply(const Event& event) {
     if (rival.estimator && rival.without != source) rival.estimator->apply(event);
   }
   if (source == Source::camera || source == Source::wheel) {
+    exclude_faulty();
     ask_rivals();
   }
+}
+
+// Main contradicts itself, without one certain sensor two others have agreed for a while, and without any other sensor
+// the contradiction stays: that sensor is wrong. A rival that has only little left to say does not contradict itself
+// and leaves the matter open.
+void Hypotheses::exclude_faulty() {
+  const int64_t now_ns = main_.filter().stamp_ns();
+  Rival* proven = nullptr;
+  int consistent = 0;
+  for (auto& rival : rivals_) {
+    if (!rival.estimator || rival.without == Source::gnss) continue;
+    const bool agrees = rival.estimator->is_consistent();
+    consistent += agrees ? 1 : 0;
+    const bool proves = agrees && rival.estimator->sensors_at_work() >= 2;
+    if (!proves || rival.proven_since_ns == 0) rival.proven_since_ns = proves ? now_ns : 0;
+    if (proves && core::seconds(now_ns - rival.proven_since_ns) >= kProofS) proven = &rival;
+  }
+  if (proven == nullptr || consistent > 1 || main_.is_consistent()) return;
+  // Nothing is left to prove when that sensor alone is isolated.
+  if (main_.is_consistent(1U << static_cast<unsigned>(proven->without))) return;
+  adopt(*proven);
+}
+
+void Hypotheses::adopt(Rival& rival) {
+  Estimator next = *rival.estimator;
+  next.exclude(rival.without, main_);
+  main_ = std::move(next);
+  for (auto& other : rivals_) other.excess = other.carried = {};
 }
 
 void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
@@ -53,6 +83,7 @@ void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
   for (auto& rival : rivals_) {
     if (rival.estimator) rival.estimator->apply(event);
   }
+  if (main_.fix_refused() && adopt_by_fix(before)) return;
   if (!main_.fix_used()) {
     if (!without_last_fix_ || !main_.fix_refused()) return;
     // The new fix contradicts the last one: if it agrees with what was known before, the last one was false.
@@ -63,8 +94,29 @@ void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
   }
   without_last_fix_.reset();
   if (!fix.new_path && fix.probability < kSureProbability) without_last_fix_ = std::move(before);
-  for (auto& rival : rivals_) rival.excess = rival.carried = {};
+  for (auto& rival : rivals_) {
+    rival.excess = rival.carried = {};
+    // Confirmed is the main one: a rival that is elsewhere was wrong.
+    if (rival.estimator && rival.estimator->fix_refused()) rival.estimator = main_;
+  }
   ask_rivals();
+}
+
+// The main one refuses the fix, but without one certain sensor it fits: that sensor is wrong, or the fix is; until the
+// next one the interval holds both.
+bool Hypotheses::adopt_by_fix(const Estimator& before) {
+  Rival* only = nullptr;
+  for (auto& rival : rivals_) {
+    if (!rival.asked || !rival.estimator->fix_used()) continue;
+    if (only != nullptr) return false;
+    only = &rival;
+  }
+  const bool two_odometers = main_.watch(Source::camera).seen_ns != 0 && main_.watch(Source::wheel).seen_ns != 0;
+  if (only == nullptr || !two_odometers) return false;
+  adopt(*only);
+  without_last_fix_ = before;
+  ask_rivals();
+  return true;
 }
 
 void Hypotheses::predict_to(int64_t stamp_ns) {
@@ -81,6 +133,7 @@ void Hypotheses::rebase_clock(int64_t stamp_ns) {
   for (auto& rival : rivals_) {
     if (rival.estimator) rival.estimator->rebase_clock(stamp_ns);
     rival.asked_ns = std::min(rival.asked_ns, stamp_ns);
+    rival.proven_since_ns = 0;
   }
 }
 
@@ -120,14 +173,21 @@ void Hypotheses::ask(Rival& rival) {
                        rival.estimator->is_consistent();
   if (!can_say) {
     rival.asked = false;
+    rival.contradicted = rival.contradicted || (rival.estimator && !rival.estimator->is_consistent());
     return;
   }
   auto& other = *rival.estimator;
   if (!rival.asked && core::seconds(now_ns - rival.asked_ns) > kRivalGoneS) {
     // It was away: it begins again where the main one is, and what it had said before stays.
-    other.place_like(main_);
+    // A train without camera may have nothing but the rival's wheel.
+    if (rival.contradicted && (main_.knows_motion() || main_.watch(Source::camera).seen_ns != 0)) {
+      other = main_;
+    } else {
+      other.place_like(main_);
+    }
     rival.carried = rival.excess;
   }
+  rival.contradicted = false;
   rival.asked = true;
   rival.asked_ns = now_ns;
   other.predict_to(now_ns);

@@ -4,7 +4,8 @@
 // the next fix decides. Four rivals do without camera, wheel, IMU or GNSS: the interval holds their ends too (solution
 // separation, as in receiver autonomous integrity monitoring: Brown and McBurney 1988), because a fault may be too slow
 // for any test on innovations. A rival that contradicts itself, or has no odometer left, is not asked; what it said
-// last is carried along until a fix confirms the main one.
+// last is carried along until a fix confirms the main one. When the main one contradicts itself and one rival alone has
+// two sensors that agree, or fits a fix that the main one refuses, that rival becomes the main one.
 #pragma once
 
 #include <array>
@@ -41,12 +42,17 @@ class Hypotheses {
     Source without;
     std::optional<Estimator> estimator;  // from the source's first sample on; until then it is the main one
     Excess excess;
-    Excess carried;        // when it came back
-    bool asked = false;    // its word counts at present
-    int64_t asked_ns = 0;  // ... and counted last
+    Excess carried;               // when it came back
+    bool asked = false;           // its word counts at present
+    int64_t asked_ns = 0;         // ... and counted last
+    bool contradicted = false;    // itself, while it was not asked
+    int64_t proven_since_ns = 0;  // two sensors have agreed in it since then; 0 = they do not
   };
 
   void apply_fix(const FixInput& fix, const Event& event);
+  bool adopt_by_fix(const Estimator& before);
+  void exclude_faulty();
+  void adopt(Rival& rival);
   void begin_rival(Source source);
   void ask_rivals();
   void ask(Rival& rival);

@@ -1,5 +1,6 @@
 #include "campaign.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <thread>
@@ -8,6 +9,7 @@ namespace railfix::train {
 namespace {
 
 constexpr size_t kBlock = 8;
+constexpr double kManyWider = 0.05;
 
 struct Run {
   Fault fault;
@@ -50,17 +52,18 @@ TrainSimulation simulation_of(const CampaignPlan& plan, uint64_t number) {
     const auto& [sensor, kind] = plan.faults[number % plan.faults.size()];
     one.fault = random_fault(random, sensor, kind, plan.duration_s);
     // Slip is a fault of its own: not while another motion sensor is wrong (tunnels, outages and false fixes stay).
-    one.slip = one.slip &&
-               (sensor == Sensor::wheel || sensor == Sensor::gnss || sensor == Sensor::fix || sensor == Sensor::clock);
+    one.slip = one.slip && (plan.slip_always || sensor == Sensor::wheel || sensor == Sensor::gnss ||
+                            sensor == Sensor::fix || sensor == Sensor::clock);
   }
   if (!plan.map) return TrainSimulation(one, seed);
   return TrainSimulation(one, seed, plan.map, plan.starts[number % plan.starts.size()]);
 }
 
-CampaignResult run_campaign(const CampaignPlan& plan) {
+CampaignResult run_campaign(const CampaignPlan& plan, const std::function<void(const Verdict&)>& progress) {
   CampaignResult result;
   for (uint64_t first = 0; result.sum.way_m < 1000 * plan.km; first += kBlock) {
     const auto runs = run_block(plan, first);
+    if (progress) progress(result.sum);
     for (size_t i = 0; i < runs.size() && result.sum.way_m < 1000 * plan.km; ++i) {
       const auto& run = runs[i];
       const FaultName name{run.fault.sensor, run.fault.kind};
@@ -69,9 +72,14 @@ CampaignResult run_campaign(const CampaignPlan& plan) {
       result.sum.add(run.verdict);
       ++result.run_count;
       result.stanford.add(run.stanford);
-      if (run.verdict.outside + run.verdict.wider_unsaid > 0)
-        result.bad.push_back(
-            {first + i, run.fault, run.verdict.outside, run.verdict.wider_unsaid, run.verdict.worst_excess_m});
+      const auto& v = run.verdict;
+      const double wider = static_cast<double>(v.wider) / static_cast<double>(std::max<size_t>(v.states, 1));
+      const BadRun noted{first + i, run.fault, v.outside, v.wider_unsaid, v.worst_excess_m, wider};
+      if (v.outside + v.wider_unsaid > 0) {
+        result.bad.push_back(noted);
+      } else if (wider > kManyWider) {
+        result.wide.push_back(noted);
+      }
     }
   }
   return result;

@@ -1,6 +1,7 @@
 // Many simulated runs with faults, on several threads; the same result for any number of threads.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <string>
 #include <utility>
@@ -20,18 +21,21 @@ struct CampaignPlan {
   double duration_s = 240;        // of one run
   std::vector<FaultName> faults;  // in turn, one a run
   double no_fault_share = 0.25;   // of runs beside those
+  bool slip_always = false;       // beside faults of other motion sensors too
   SimulationPlan simulation;
   fusion::FusionParameters parameters;
   std::shared_ptr<const track::Map> map;    // nullptr: every run on a random line
   std::vector<track::EdgePosition> starts;  // on map, in turn
 };
 
+/// A run with states outside, wider than allowed without saying so, or with many states that are wider.
 struct BadRun {
   uint64_t number = 0;
   Fault fault;
   size_t outside = 0;
   size_t unsaid = 0;
   double excess_m = 0;
+  double wider_share = 0;
 };
 
 struct CampaignResult {
@@ -40,11 +44,13 @@ struct CampaignResult {
   Verdict sum;
   size_t run_count = 0;
   std::vector<BadRun> bad;
+  std::vector<BadRun> wide;  // none of the bad ones
   StanfordCounts stanford;
 };
 
 /// Run `number` of the campaign alone.
 TrainSimulation simulation_of(const CampaignPlan& plan, uint64_t number);
-CampaignResult run_campaign(const CampaignPlan& plan);
+/// progress hears of the sum so far now and then.
+CampaignResult run_campaign(const CampaignPlan& plan, const std::function<void(const Verdict&)>& progress = {});
 
 }  // namespace railfix::train

@@ -1,6 +1,7 @@
 // railfix-measure-confidence: does the promised interval hold the train, over thousands of kilometres with one faulty
 // sensor at a time? Sensor-level simulation (tests/support/train), the real fusion.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -8,9 +9,12 @@
 
 #include "campaign.hpp"
 #include "core/units.hpp"
+#include "position.hpp"
 
 namespace railfix::train {
 namespace {
+
+constexpr size_t kWideShown = 20;
 
 struct Arguments {
   CampaignPlan plan;
@@ -22,6 +26,7 @@ struct Arguments {
   double max_kmh = 150;
   double sudden_mps2 = 0;
   int64_t run = -1;
+  int position = 0;
   bool list = false;
   bool sources = false;
 };
@@ -63,6 +68,14 @@ void print_row(const std::string& name, size_t runs, Verdict verdict) {
               quantile(verdict.errors_m, 0.95), quantile(verdict.errors_m, 1));
 }
 
+std::string to_string(const BadRun& run) {
+  char text[120];
+  std::snprintf(text, sizeof text, "run %llu: %s %s from %.1f s to %.1f s, size %g",
+                static_cast<unsigned long long>(run.number), to_string(run.fault.sensor).c_str(),
+                to_string(run.fault.kind).c_str(), run.fault.begin_s, run.fault.end_s, run.fault.size);
+  return text;
+}
+
 void print(const CampaignResult& result) {
   std::printf("%-28s %5s %8s %9s %8s %8s %7s %6s %7s %8s %8s %8s\n", "fault", "runs", "km", "states", "outside",
               "by (m)", "wider%", "unsaid", "not ok%", "mean(m)", "p95(m)", "max(m)");
@@ -70,10 +83,13 @@ void print(const CampaignResult& result) {
     print_row(to_string(name.first) + " " + to_string(name.second), result.runs.at(name), verdict);
   print_row("all", result.run_count, result.sum);
   for (const auto& bad : result.bad)
-    std::printf("run %llu: %s %s from %.1f s to %.1f s, size %g: %zu outside by up to %.2f m, %zu wider unsaid\n",
-                static_cast<unsigned long long>(bad.number), to_string(bad.fault.sensor).c_str(),
-                to_string(bad.fault.kind).c_str(), bad.fault.begin_s, bad.fault.end_s, bad.fault.size, bad.outside,
+    std::printf("%s: %zu outside by up to %.2f m, %zu wider unsaid\n", to_string(bad).c_str(), bad.outside,
                 bad.excess_m, bad.unsaid);
+  auto wide = result.wide;
+  std::ranges::sort(wide, std::ranges::greater{}, &BadRun::wider_share);
+  for (size_t i = 0; i < std::min(wide.size(), kWideShown); ++i)
+    std::printf("%s: %.0f %% of the states wider than allowed\n", to_string(wide[i]).c_str(),
+                100 * wide[i].wider_share);
 }
 
 // What each source is worth: the same runs without faults, with less and less.
@@ -147,6 +163,8 @@ int run(int argc, char** argv) {
   app.add_option("--stanford", a.stanford, "Write the Stanford diagram (SVG)");
   app.add_option("--run", a.run, "Print one run of the campaign second by second");
   app.add_flag("--sources", a.sources, "Without faults: a table of what each source is worth");
+  app.add_option("--position", a.position, "Position with frogs and portals as references: so many runs of 26 km");
+  app.add_flag("--slip-always", a.plan.slip_always, "The wheel slips beside every fault: two faults at once");
   app.add_flag("--list", a.list, "Print the faults");
   CLI11_PARSE(app, argc, argv);
   if (a.list) {
@@ -162,11 +180,21 @@ int run(int argc, char** argv) {
     trace(a.plan, static_cast<uint64_t>(a.run));
     return 0;
   }
+  if (a.position > 0) {
+    print_positions(a.plan.seed, a.position);
+    return 0;
+  }
   if (a.sources) {
     compare_sources(a.plan);
     return 0;
   }
-  const auto result = run_campaign(a.plan);
+  double next_km = 0;
+  const auto result = run_campaign(a.plan, [&](const Verdict& sum) {
+    if (sum.way_m < 1000 * next_km) return;
+    next_km += a.plan.km / 50;
+    std::fprintf(stderr, "%.0f of %.0f km, %zu of %zu states outside\n", sum.way_m / 1000, a.plan.km, sum.outside,
+                 sum.states);
+  });
   print(result);
   if (!a.stanford.empty()) {
     std::ofstream out(a.stanford);
@@ -176,6 +204,8 @@ int run(int argc, char** argv) {
     out << result.stanford.svg(title + a.fault);
     if (!out) throw core::BadInput("--stanford " + a.stanford + ": cannot be written");
   }
+  std::printf("%s: %zu of %zu states outside their interval, %zu wider than allowed without saying so\n",
+              result.bad.empty() ? "PASSED" : "FAILED", result.sum.outside, result.sum.states, result.sum.wider_unsaid);
   return result.bad.empty() ? 0 : 1;
 }
 

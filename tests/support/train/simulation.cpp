@@ -59,7 +59,11 @@ void TrainSimulation::measure() {
   if (plan_.wheel) make_pulses();
   if (plan_.imu) make_inertial();
   if (plan_.gnss) make_gnss();
-  if (plan_.landmark_spacing_m > 0) make_fixes();
+  if (!plan_.map_landmarks.empty()) {
+    make_fixes_of_map();
+  } else if (plan_.landmark_spacing_m > 0) {
+    make_fixes();
+  }
   std::stable_sort(arrivals.begin(), arrivals.end(),
                    [](const Arrival& a, const Arrival& b) { return a.arrival_s < b.arrival_s; });
 }
@@ -280,6 +284,21 @@ void TrainSimulation::make_fixes() {
         FixInput{stamp_ns(t), place.edge, place.offset_m, plan_.fix_sigma_m, plan_.fix_probability, ++id,
                  FixKind::landmark, place.direction, nullptr});
     place_m += plan_.landmark_spacing_m * (1 + plan_.landmark_spread * random.uniform(-1, 1));
+  }
+}
+
+void TrainSimulation::make_fixes_of_map() {
+  auto random = stream(seed_, 14);
+  for (const auto& mark : path_->landmarks()) {
+    const auto wanted =
+        std::ranges::find(plan_.map_landmarks, mark.kind, &std::pair<track::LandmarkKind, double>::first);
+    const double noise = random.normal();
+    if (wanted == plan_.map_landmarks.end() || mark.distance_m < 1 || mark.distance_m > way_m()) continue;
+    const double t = drive_.time_at(mark.distance_m) + 0.003;
+    const auto place = path_->position_at(drive_.at(t).distance_m + wanted->second * noise);
+    add(Sensor::fix, t,
+        FixInput{stamp_ns(t), place.edge, place.offset_m, wanted->second, plan_.fix_probability, mark.landmark->id,
+                 FixKind::landmark, place.direction, nullptr});
   }
 }
 

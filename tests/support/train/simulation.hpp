@@ -7,6 +7,7 @@
 #pragma once
 
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "core/random.hpp"
@@ -29,8 +30,9 @@ struct SimulationPlan {
   bool wheel = true;
   bool imu = true;
   bool gnss = true;
-  double landmark_spacing_m = 400;  // 0 = none
-  double landmark_spread = 0;       // spacing varies by this share to either side
+  double landmark_spacing_m = 400;                                    // 0 = none
+  double landmark_spread = 0;                                         // spacing varies by this share to either side
+  std::vector<std::pair<track::LandmarkKind, double>> map_landmarks;  // instead: those of the map, with their sigma (m)
   double visual_scale_error = 0.007;
   double visual_wander = 0.001;  // of the camera's scale, lasting about 3 km
   double wheel_scale_error = 0.007;
@@ -94,6 +96,7 @@ class TrainSimulation {
   void make_inertial();
   void make_gnss();
   void make_fixes();
+  void make_fixes_of_map();
   void add(Sensor sensor, double t_s, fusion::Event event);
   [[nodiscard]] bool faulty(Sensor sensor, FaultKind kind, double t_s) const;
   [[nodiscard]] double offset_of(Sensor sensor, double t_s) const;

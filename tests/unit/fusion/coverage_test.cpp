@@ -116,5 +116,36 @@ TEST(Coverage, OneFaultySensorStaysInsideTheInterval) {
             << static_cast<double>(sum.wider) / static_cast<double>(sum.states) << " wider than 5 m + 5 %\n";
 }
 
+// Runs in which the interval once grew to kilometres, or the train was outside it, because fusion believed the wrong
+// one.
+TEST(Coverage, TheSensorThatIsWrongIsFoundOut) {
+  using train::FaultKind;
+  using train::Sensor;
+  SimulationPlan plan;
+  plan.duration_s = 240;
+  plan.max_speed_mps = 150 / 3.6;
+  plan.visual_scale_error = 0.004;
+  plan.landmark_spacing_m = 600;
+  plan.landmark_spread = 0.7;
+  plan.false_fix_share = 0.005;
+  plan.fix_probability = 0.995;
+  for (const auto& [seed, fault] :
+       {std::pair<uint64_t, train::Fault>{11'000'009, {Sensor::wheel, FaultKind::stuck, 109.5, 169.5, 1}},
+        {12'000'016, {Sensor::accelerometer, FaultKind::stuck, 111.1, 140.8, 1}},
+        {12'000'002, {Sensor::camera, FaultKind::stuck, 78.7, 85.6, 1}},
+        {12'000'062, {Sensor::accelerometer, FaultKind::drift, 157.6, 216.1, 2.25}}}) {
+    plan.fault = fault;
+    plan.slip = fault.sensor == Sensor::wheel;
+    const train::TrainSimulation simulation(plan, seed);
+    auto fusion = core::value_or_throw(Fusion::create({}, simulation.map, simulation.start()));
+    const auto verdict = train::judge(simulation, fusion);
+    std::cout << train::to_string(fault.sensor) << " " << train::to_string(fault.kind) << ": " << verdict.wider
+              << " of " << verdict.states << " wider than allowed\n";
+    EXPECT_EQ(verdict.outside, 0U);
+    EXPECT_EQ(verdict.wider_unsaid, 0U);
+    EXPECT_LT(static_cast<double>(verdict.wider), 0.25 * static_cast<double>(verdict.states));
+  }
+}
+
 }  // namespace
 }  // namespace railfix::fusion
