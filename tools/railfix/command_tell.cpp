@@ -90,15 +90,7 @@ class Teller {
     const auto first = known_.lower_bound(options_.service + "@");
     return first != known_.end() && first->first.starts_with(options_.service + "@");
   }
-  [[nodiscard]] bool connected() const {
-    uint32_t endpoints = 0;
-    uint32_t matches = 0;
-    for (const auto& [name, status] : known_) {
-      endpoints += status.endpoints();
-      matches += status.matches();
-    }
-    return messaging::all_connected(participant_.connections(), endpoints, matches);
-  }
+  [[nodiscard]] bool connected() const { return messaging::all_connected(participant_.connections(), known_); }
 
   Options options_;
   uint64_t id_ = static_cast<uint64_t>(core::wall_ns()) ^ static_cast<uint64_t>(getpid());

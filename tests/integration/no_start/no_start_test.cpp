@@ -91,15 +91,7 @@ class NoStart : public ::testing::Test {
   bool run_until(Condition condition) {
     return test::run_until(participant_, queue_, condition);
   }
-  bool connected() {
-    uint32_t endpoints = 0;
-    uint32_t matches = 0;
-    for (const auto& [name, status] : status_) {
-      endpoints += status.endpoints();
-      matches += status.matches();
-    }
-    return status_.size() == 2 && messaging::all_connected(participant_.connections(), endpoints, matches);
-  }
+  bool connected() { return status_.size() == 2 && messaging::all_connected(participant_.connections(), status_); }
 
   /// Gives a service its turn and waits until it has taken it.
   bool turn_of(const std::string& service, uint64_t seq, int64_t data_ns) {

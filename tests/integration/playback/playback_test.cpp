@@ -99,15 +99,7 @@ class Playback : public railfix::testing::TemporaryFolder {
     return test::run_until(participant_, queue_, condition);
   }
   /// Both services are ready and everyone has found everyone.
-  bool connected() {
-    uint32_t endpoints = 0;
-    uint32_t matches = 0;
-    for (const auto& [name, status] : status_) {
-      endpoints += status.endpoints();
-      matches += status.matches();
-    }
-    return status_.size() == 2 && messaging::all_connected(participant_.connections(), endpoints, matches);
-  }
+  bool connected() { return status_.size() == 2 && messaging::all_connected(participant_.connections(), status_); }
   void start() {
     msg::ControlRequest request;
     request.service("frame_grabber");
