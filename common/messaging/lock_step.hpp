@@ -1,6 +1,8 @@
-// What a service says of its own topics in lock step.
+// What services say of their topics in lock step, and who leads it of all.
 #pragma once
 
+#include <map>
+#include <string>
 #include <vector>
 
 #include "messaging/topics.hpp"
@@ -19,5 +21,23 @@ inline std::vector<msg::SentSamples> sent_samples(const Participant& participant
   }
   return samples;
 }
+
+/// What everybody on the train has sent by now: who leads the lock step collects it and says it with every turn.
+class SentTotals {
+ public:
+  void note(const std::vector<msg::SentSamples>& sent) {
+    for (const auto& topic : sent) samples_[topic.topic().c_str()] = topic.samples();
+  }
+  void say(msg::DataClock& clock) const {
+    for (const auto& [topic, samples] : samples_) {
+      clock.sent().emplace_back();
+      clock.sent().back().topic(topic);
+      clock.sent().back().samples(samples);
+    }
+  }
+
+ private:
+  std::map<std::string, uint64_t> samples_;
+};
 
 }  // namespace railfix::messaging

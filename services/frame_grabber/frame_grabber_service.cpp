@@ -8,7 +8,6 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/time.hpp"
-#include "messaging/lock_step.hpp"
 
 namespace railfix::frame_grabber {
 namespace {
@@ -171,7 +170,7 @@ void FrameGrabberService::play(const dataset::Picture& picture) {
   if (!lossless() && grabbed_ns - clock_sent_ns_ >= core::kNsPerSecond) publish_clock(newest_ns_, grabbed_ns, false);
   publish(raw_of(picture.stamp_ns, picture.grey), grabbed_ns);
   if (!lossless()) return player_->complete();
-  note_sent(messaging::sent_samples(context_.participant()));
+  sent_.note(messaging::sent_samples(context_.participant()));
   lock_step_.begin();
   give_turn();
 }
@@ -187,12 +186,8 @@ void FrameGrabberService::give_turn() {
 
 void FrameGrabberService::answered(const msg::DataProgress& progress) {
   if (!lock_step_.answered(progress.service().c_str(), progress.seq())) return;
-  note_sent(progress.sent());
+  sent_.note(progress.sent());
   give_turn();
-}
-
-void FrameGrabberService::note_sent(const std::vector<msg::SentSamples>& sent) {
-  for (const auto& topic : sent) sent_[topic.topic().c_str()] = topic.samples();
 }
 
 void FrameGrabberService::publish(const RawPicture& picture, int64_t grabbed_ns) {
@@ -294,11 +289,7 @@ void FrameGrabberService::publish_clock(int64_t data_ns, int64_t wall_ns, bool e
   clock.ended(ended ? 1 : 0);
   if (lossless() && !ended) {
     clock.turn(lock_step_.turn());
-    for (const auto& [topic, samples] : sent_) {
-      clock.sent().emplace_back();
-      clock.sent().back().topic(topic);
-      clock.sent().back().samples(samples);
-    }
+    sent_.say(clock);
   }
   clock_.write(clock);
 }

@@ -2,7 +2,6 @@
 // also give data_clock to everyone.
 #pragma once
 
-#include <map>
 #include <memory>
 #include <optional>
 
@@ -11,6 +10,7 @@
 #include "frame_grabber/live_feed.hpp"
 #include "frame_grabber/pace.hpp"
 #include "frame_grabber/player.hpp"
+#include "messaging/lock_step.hpp"
 #include "service/service.hpp"
 
 namespace railfix::frame_grabber {
@@ -29,7 +29,6 @@ class FrameGrabberService {
   void play(const dataset::Picture& picture);
   void give_turn();
   void answered(const msg::DataProgress& progress);
-  void note_sent(const std::vector<msg::SentSamples>& sent);
   void publish(const RawPicture& picture, int64_t grabbed_ns);
   void publish_preview(const RawPicture& picture, int64_t grabbed_ns, uint32_t health);
   void publish_calibration(const std::optional<dataset::CameraCalibration>& calibration);
@@ -54,7 +53,7 @@ class FrameGrabberService {
   PictureHealth picture_health_;
   LockStep lock_step_;
   Gathering gathering_;
-  std::map<std::string, uint64_t> sent_;  // by everybody, to each topic
+  messaging::SentTotals sent_;
   uint64_t frame_seq_ = 0;
   uint64_t clock_seq_ = 0;
   int64_t clock_sent_ns_ = 0;

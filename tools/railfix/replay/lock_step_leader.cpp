@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "core/time.hpp"
-#include "messaging/lock_step.hpp"
 #include "service/service.hpp"
 
 namespace railfix::tool {
@@ -37,7 +36,7 @@ LockStepLeader::LockStepLeader(messaging::Participant& participant, messaging::Q
 
 void LockStepLeader::begin(int64_t data_ns) {
   data_ns_ = data_ns;
-  note_sent(messaging::sent_samples(participant_));
+  sent_.note(messaging::sent_samples(participant_));
   lock_step_.begin();
   give_turn();
 }
@@ -48,12 +47,8 @@ void LockStepLeader::give_turn() {
 
 void LockStepLeader::answered(const msg::DataProgress& progress) {
   if (!lock_step_.answered(progress.service().c_str(), progress.seq())) return;
-  note_sent(progress.sent());
+  sent_.note(progress.sent());
   give_turn();
-}
-
-void LockStepLeader::note_sent(const std::vector<msg::SentSamples>& sent) {
-  for (const auto& topic : sent) sent_[topic.topic().c_str()] = topic.samples();
 }
 
 void LockStepLeader::publish(bool ended) {
@@ -65,11 +60,7 @@ void LockStepLeader::publish(bool ended) {
   clock.ended(ended ? 1 : 0);
   if (!ended) {
     clock.turn(lock_step_.turn());
-    for (const auto& [topic, samples] : sent_) {
-      clock.sent().emplace_back();
-      clock.sent().back().topic(topic);
-      clock.sent().back().samples(samples);
-    }
+    sent_.say(clock);
   }
   clock_.write(clock);
 }

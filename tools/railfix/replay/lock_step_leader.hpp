@@ -2,12 +2,12 @@
 // is sent, then each service has its turn, then the next.
 #pragma once
 
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "frame_grabber/pace.hpp"
+#include "messaging/lock_step.hpp"
 #include "messaging/topics.hpp"
 
 namespace railfix::tool {
@@ -30,13 +30,12 @@ class LockStepLeader {
  private:
   void give_turn();
   void answered(const msg::DataProgress& progress);
-  void note_sent(const std::vector<msg::SentSamples>& sent);
   void publish(bool ended);
   messaging::Participant& participant_;
   frame_grabber::LockStep lock_step_;
   messaging::Writer<msg::DataClock> clock_;
   messaging::Reader<msg::DataProgress> progress_;
-  std::map<std::string, uint64_t> sent_;
+  messaging::SentTotals sent_;
   int64_t data_ns_ = 0;
 };
 
