@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/time.hpp"
+#include "messaging/camera.hpp"
 
 namespace railfix::monitor {
 namespace {
@@ -17,16 +18,7 @@ constexpr double kPointEveryM = 2;
 CabWatch::CabWatch(double picture_hz) : period_ns_(core::to_ns(0.9 / picture_hz)) {}
 
 void CabWatch::calibration(const msg::CameraCalibration& c) {
-  intrinsics_[c.camera().c_str()] = {c.fu_px(),
-                                     c.fv_px(),
-                                     c.cu_px(),
-                                     c.cv_px(),
-                                     c.k1(),
-                                     c.k2(),
-                                     c.p1(),
-                                     c.p2(),
-                                     static_cast<int>(c.width_px()),
-                                     static_cast<int>(c.height_px())};
+  intrinsics_[c.camera().c_str()] = messaging::intrinsics_of(c);
 }
 
 void CabWatch::track(const msg::TrackView& view) {
