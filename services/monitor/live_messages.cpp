@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/time.hpp"
+#include "messaging/operation_words.hpp"
 
 namespace railfix::monitor {
 namespace {
@@ -16,11 +17,6 @@ constexpr uint32_t kLrbgUnknown = 0xFFFFFF;
 
 json known(double value) {
   return std::isfinite(value) ? json(value) : json(nullptr);
-}
-
-const char* level_name(uint8_t level) {
-  constexpr std::array<const char*, 6> kNames{"trace", "debug", "info", "warning", "error", "critical"};
-  return kNames[std::min<size_t>(level, kNames.size() - 1)];
 }
 
 const char* direction_name(uint8_t direction) {
@@ -92,7 +88,7 @@ json services_message(const ServiceBoard& board, int64_t now_ns) {
     const auto& status = seen.status;
     services.push_back({{"service", seen.name()},
                         {"host", key.first},
-                        {"state", name_of_state(status.state())},
+                        {"state", messaging::name_of_state(status.state())},
                         {"reason", status.reason().c_str()},
                         {"since_ns", seen.since_ns},
                         {"age_s", core::seconds(now_ns - seen.received_ns)},
@@ -137,7 +133,7 @@ json log_record(const msg::LogRecord& record) {
   return {{"stamp_ns", record.stamp_ns()},
           {"service", record.service().c_str()},
           {"host", record.host().c_str()},
-          {"level", level_name(record.level())},
+          {"level", messaging::name_of_level(record.level())},
           {"text", record.text().c_str()}};
 }
 

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "core/time.hpp"
+#include "messaging/operation_words.hpp"
 
 namespace railfix::monitor {
 namespace {
@@ -89,7 +90,7 @@ void add_services(Families& families, const TrainSeen& seen) {
                    service.alive && !service.stopped() && status.state() != msg::STATE_FAILED ? 1 : 0, labels);
     for (uint8_t state = msg::STATE_STARTING; state <= msg::STATE_STOPPED; ++state) {
       Labels with_state = labels;
-      with_state.push_back({"state", name_of_state(state)});
+      with_state.push_back({"state", messaging::name_of_state(state)});
       families.gauge("railfix_service_state", "1 for the state that the service is in, 0 for all others.",
                      status.state() == state ? 1 : 0, with_state);
     }

@@ -2,23 +2,6 @@
 
 namespace railfix::monitor {
 
-const char* name_of_state(uint8_t state) {
-  switch (state) {
-    case msg::STATE_STARTING:
-      return "starting";
-    case msg::STATE_READY:
-      return "ready";
-    case msg::STATE_ACTIVE:
-      return "active";
-    case msg::STATE_DEGRADED:
-      return "degraded";
-    case msg::STATE_FAILED:
-      return "failed";
-    default:
-      return "stopped";
-  }
-}
-
 void ServiceBoard::note(const msg::ServiceStatus& status, int64_t now_ns) {
   ServiceSeen& seen = services_[key_of(status)];
   const bool same = seen.received_ns != 0 && seen.alive && seen.status.state() == status.state() &&

@@ -19,9 +19,6 @@ struct ServiceSeen {
   [[nodiscard]] std::string name() const { return status.service().c_str(); }
 };
 
-/// "starting", "ready", "active", "degraded", "failed", "stopped".
-const char* name_of_state(uint8_t state);
-
 class ServiceBoard {
  public:
   /// Its host and name tell one service from another.

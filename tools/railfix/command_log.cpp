@@ -7,6 +7,7 @@
 #include "commands.hpp"
 #include "core/result.hpp"
 #include "mcap/reader.hpp"
+#include "messaging/operation_words.hpp"
 #include "recording/utc_text.hpp"
 #include "topic_listener.hpp"
 
@@ -14,7 +15,7 @@ namespace railfix::tool {
 namespace {
 
 // As in LogRecord.level and common.log_level.
-const std::vector<std::string> kLevels{"trace", "debug", "info", "warning", "error", "critical"};
+const std::vector<std::string> kLevels(messaging::kLevelNames.begin(), messaging::kLevelNames.end());
 
 struct Options {
   std::filesystem::path file;
@@ -35,7 +36,7 @@ bool wanted(const Options& options, const msg::LogRecord& record) {
 
 void print(const Options& options, const msg::LogRecord& record) {
   if (!wanted(options, record)) return;
-  const std::string level = kLevels[std::min<size_t>(record.level(), kLevels.size() - 1)];
+  const std::string level = messaging::name_of_level(record.level());
   if (options.json) {
     std::cout << nlohmann::ordered_json{{"time", utc_text(record.stamp_ns())},
                                         {"service", record.service().c_str()},

@@ -11,6 +11,7 @@
 #include "commands.hpp"
 #include "core/time.hpp"
 #include "key_reader.hpp"
+#include "messaging/operation_words.hpp"
 #include "recording/utc_text.hpp"
 #include "service_table.hpp"
 #include "topic_listener.hpp"
@@ -82,7 +83,7 @@ class Watch {
     for (const auto& [name, s] : services_) {
       json["services"].push_back({{"service", name},
                                   {"host", s.host().c_str()},
-                                  {"state", silent_.contains(name) ? "silent" : name_of_state(s.state())},
+                                  {"state", silent_.contains(name) ? "silent" : messaging::name_of_state(s.state())},
                                   {"dropped", s.dropped()},
                                   {"cpu_percent", s.cpu_percent()},
                                   {"rss_mb", s.rss_mb()},

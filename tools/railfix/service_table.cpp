@@ -2,6 +2,8 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "messaging/operation_words.hpp"
+
 namespace railfix::tool {
 
 namespace {
@@ -14,30 +16,13 @@ const char* colour_of(uint8_t state, bool silent) {
 
 }  // namespace
 
-const char* name_of_state(uint8_t state) {
-  switch (state) {
-    case msg::STATE_STARTING:
-      return "starting";
-    case msg::STATE_READY:
-      return "ready";
-    case msg::STATE_ACTIVE:
-      return "active";
-    case msg::STATE_DEGRADED:
-      return "degraded";
-    case msg::STATE_FAILED:
-      return "failed";
-    default:
-      return "stopped";
-  }
-}
-
 std::string service_table(const std::map<std::string, msg::ServiceStatus>& services,
                           const std::set<std::string>& silent, bool colours) {
   std::string text = fmt::format("{:<15} {:<9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>6} {:>7}  {}\n", "service", "state",
                                  "in", "out", "dropped", "p50 ms", "p99 ms", "cpu %", "MB", "reason");
   for (const auto& [name, s] : services) {
     const bool quiet = s.state() != msg::STATE_STOPPED && silent.contains(name);
-    const std::string state = fmt::format("{:<9}", quiet ? "SILENT" : name_of_state(s.state()));
+    const std::string state = fmt::format("{:<9}", quiet ? "SILENT" : messaging::name_of_state(s.state()));
     text += fmt::format("{:<15} {} {:>8} {:>8} {:>8} {:>8.1f} {:>8.1f} {:>6.1f} {:>7.1f}  {}\n", name,
                         colours ? colour_of(s.state(), quiet) + state + "\x1b[0m" : state, s.frames_in(),
                         s.frames_out(), s.dropped(), s.latency_p50_ms(), s.latency_p99_ms(), s.cpu_percent(),

@@ -9,9 +9,6 @@
 
 namespace railfix::tool {
 
-/// "active", "degraded", ...
-const char* name_of_state(uint8_t state);
-
 /// One line for each, with a header. `silent` ones have not been heard lately; they are so called unless they stopped
 /// in order. With colours: ANSI codes around what is wrong.
 std::string service_table(const std::map<std::string, msg::ServiceStatus>& services,

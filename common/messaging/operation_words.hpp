@@ -1,0 +1,24 @@
+// Words for the numbers of operation.idl, the same on every page, table and metric.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+namespace railfix::messaging {
+
+/// By ServiceStatus.state.
+inline constexpr std::array kStateNames{"starting", "ready", "active", "degraded", "failed", "stopped"};
+/// By LogRecord.level.
+inline constexpr std::array kLevelNames{"trace", "debug", "info", "warning", "error", "critical"};
+
+/// A state that a later release may have is "stopped".
+constexpr const char* name_of_state(uint8_t state) {
+  return kStateNames[std::min<size_t>(state, kStateNames.size() - 1)];
+}
+constexpr const char* name_of_level(uint8_t level) {
+  return kLevelNames[std::min<size_t>(level, kLevelNames.size() - 1)];
+}
+
+}  // namespace railfix::messaging
