@@ -14,6 +14,8 @@ using etcs::kUnknownDistance;
 constexpr double kSpeedStepKmh = 5.0;
 constexpr uint32_t kCoarsestScale = 2;
 constexpr uint32_t kFastest = 120;  // 600 km/h
+constexpr uint32_t kStandBy = 6;    // M_MODE
+constexpr uint32_t kSupervisedManoeuvre = 17;
 
 struct Distances {
   uint32_t d_lrbg = kUnknownDistance;
@@ -57,8 +59,9 @@ bool has_co_ordinate_system(const track::BaliseGroup& group) {
 void refer(const TrainPosition& position, const Reference& reference, Motion motion, const ReportSettings& settings,
            etcs::TrainPositionReport& report) {
   const double front_m = reference.foot_m + settings.foot_to_front_m;
-  const double over_m = amount_m(position.over_m) + amount_m(reference.group->q_locacc_m);
-  const double under_m = amount_m(position.under_m) + amount_m(reference.group->q_locacc_m);
+  const auto allowance = train_allowance(settings);
+  const double over_m = amount_m(position.over_m) + amount_m(reference.group->q_locacc_m) + allowance.over_m;
+  const double under_m = amount_m(position.under_m) + amount_m(reference.group->q_locacc_m) + allowance.under_m;
   const int best = distances_in(etcs::scale_m(kCoarsestScale), front_m, over_m, under_m).known();
   Distances distances;
   for (uint32_t q_scale = settings.finest_q_scale; q_scale <= kCoarsestScale; ++q_scale) {
@@ -83,6 +86,14 @@ void refer(const TrainPosition& position, const Reference& reference, Motion mot
 }
 
 }  // namespace
+
+Allowance train_allowance(const ReportSettings& settings) {
+  const bool applies =
+      settings.baseline == etcs::Baseline::b4 &&
+      (settings.m_mode == kSupervisedManoeuvre || (settings.m_mode == kStandBy && !settings.train_data));
+  if (!applies) return {};
+  return {amount_m(settings.train_over_m), amount_m(settings.train_under_m)};
+}
 
 uint32_t orientation(const Reference& reference) {
   if (has_co_ordinate_system(*reference.group)) return side(reference.nominal_along);

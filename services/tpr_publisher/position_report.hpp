@@ -38,7 +38,19 @@ struct ReportSettings {
   uint32_t nid_ntc = 0;         // used with level NTC only
   uint32_t finest_q_scale = 0;  // coarser ones are taken when a distance does not fit
   double foot_to_front_m = 0;   // from the camera's foot forward to the train's front end
+  bool train_data = false;      // the on-board unit has valid train data
+  double train_over_m = -1;     // 4.0.0 only, see train_allowance(); below 0 = not known
+  double train_under_m = -1;
 };
+
+/// What 4.0.0 adds to the over- and under-reading amounts in supervised manoeuvre, and in stand-by without train data,
+/// where vehicles may stand in front of and behind the engine (L_TRAINOVER and L_TRAINUNDER, SUBSET-026 4.0.0
+/// 3.6.4.1). Zero otherwise, infinite where it is not known.
+struct Allowance {
+  double over_m = 0;
+  double under_m = 0;
+};
+Allowance train_allowance(const ReportSettings& settings);
 
 /// Q_DIRLRBG of a train that refers to this group: kUnknownSide for a single balise without a group before it.
 uint32_t orientation(const Reference& reference);

@@ -73,6 +73,7 @@ core::Status TprPublisher::set_onboard(const Onboard& onboard) {
   report.m_mode = onboard.m_mode;
   report.m_level = onboard.m_level;
   report.nid_ntc = onboard.nid_ntc;
+  report.train_data = onboard.train_length_m > 0;
   const auto trial = etcs::encode(make_report({}, std::nullopt, Motion::unknown, report, 0), report.baseline);
   if (!trial.ok()) return trial.error();
   settings_.report = report;
@@ -99,8 +100,11 @@ Moment TprPublisher::moment(int64_t now_ns) const {
   moment.now_ns = now_ns;
   moment.standstill = position_->standstill;
   moment.front_m = position_->distance_m + settings_.report.foot_to_front_m;
-  moment.max_safe_front_m = position_->under_m >= 0 ? moment.front_m + position_->under_m : HUGE_VAL;
-  moment.min_safe_front_m = position_->over_m >= 0 ? moment.front_m - position_->over_m : -HUGE_VAL;
+  const auto allowance = train_allowance(settings_.report);
+  const double over_m = position_->over_m + allowance.over_m;
+  const double under_m = position_->under_m + allowance.under_m;
+  moment.max_safe_front_m = position_->under_m >= 0 ? moment.front_m + under_m : HUGE_VAL;
+  moment.min_safe_front_m = position_->over_m >= 0 ? moment.front_m - over_m : -HUGE_VAL;
   if (reference_) {
     moment.nid_lrbg = reference_->group->nid_lrbg();
     moment.beyond_lrbg_m = reference_->foot_m + settings_.report.foot_to_front_m;

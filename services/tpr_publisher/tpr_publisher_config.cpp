@@ -55,7 +55,11 @@ void TprPublisherConfig::describe(service::Fields& fields) {
   fields.number("foot_to_front_m", foot_to_front_m, {-500, 500}, "m",
                 "From the camera's foot forward to the train's front end.");
   fields.number("train_length_m", train_length_m, {0, 2000}, "m",
-                "For reports where the rear end passes; 0 = not known.");
+                "For reports where the rear end passes, and valid train data; 0 = not known.");
+  fields.number("train_over_m", train_over_m, {-1, 2000}, "m",
+                "4.0.0, supervised manoeuvre or stand-by without train data: added to L_DOUBTOVER; -1 = not known.");
+  fields.number("train_under_m", train_under_m, {-1, 2000}, "m",
+                "4.0.0, supervised manoeuvre or stand-by without train data: added to L_DOUBTUNDER; -1 = not known.");
   fields.number("search_behind_m", search_behind_m, {0, 100000}, "m",
                 "How far behind the train a balise group is looked for when none has been passed yet.");
   fields.choice("finest_step", finest_step, {"10 cm", "1 m", "10 m"},
@@ -79,6 +83,9 @@ Settings TprPublisherConfig::settings() const {
   settings.report.nid_ntc = static_cast<uint32_t>(nid_ntc);
   settings.report.finest_q_scale = finest_step == "10 cm" ? 0 : finest_step == "1 m" ? 1 : 2;
   settings.report.foot_to_front_m = foot_to_front_m;
+  settings.report.train_data = train_length_m > 0;
+  settings.report.train_over_m = train_over_m;
+  settings.report.train_under_m = train_under_m;
   settings.train_length_m = train_length_m;
   settings.search_behind_m = search_behind_m;
   settings.parameters.t_cycloc = static_cast<uint32_t>(t_cycloc_s);

@@ -39,6 +39,8 @@ struct TprPublisherConfig {
   int64_t nid_ntc = 0;
   double foot_to_front_m = 0;
   double train_length_m = 0;
+  double train_over_m = -1;
+  double train_under_m = -1;
   double search_behind_m = 5000;
   std::string finest_step = "10 cm";
   int64_t t_cycloc_s = 6;

@@ -163,6 +163,7 @@ void add_tpr(CLI::App& app, Action& chosen) {
   });
   add_tpr_compare(*tpr, chosen);
   add_tpr_listen(*tpr, chosen);
+  add_tpr_onboard(*tpr, chosen);
 }
 
 }  // namespace railfix::tool

@@ -7,5 +7,6 @@ namespace railfix::tool {
 
 void add_tpr_compare(CLI::App& tpr, Action& chosen);
 void add_tpr_listen(CLI::App& tpr, Action& chosen);
+void add_tpr_onboard(CLI::App& tpr, Action& chosen);
 
 }  // namespace railfix::tool

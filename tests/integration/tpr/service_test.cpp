@@ -103,6 +103,65 @@ TEST_F(TprService, TakesModeLevelAndIntegrityFromTheOnboardUnit) {
   EXPECT_EQ(program.end(SIGTERM), 0);
 }
 
+/// Standard input of a program that is started while this lives.
+class StandardInput {
+ public:
+  StandardInput() {
+    if (pipe(ends_) != 0) throw std::runtime_error("pipe");
+    kept_ = dup(STDIN_FILENO);
+    dup2(ends_[0], STDIN_FILENO);
+    fcntl(ends_[1], F_SETFD, FD_CLOEXEC);
+  }
+  ~StandardInput() {
+    dup2(kept_, STDIN_FILENO);
+    for (const int end : {kept_, ends_[0], ends_[1]}) close(end);
+  }
+  StandardInput(const StandardInput&) = delete;
+  StandardInput& operator=(const StandardInput&) = delete;
+  void say(const std::string& line) const {
+    ASSERT_EQ(write(ends_[1], (line + "\n").data(), line.size() + 1), static_cast<ssize_t>(line.size() + 1));
+  }
+
+ private:
+  int ends_[2] = {-1, -1};
+  int kept_ = -1;
+};
+
+// `railfix tpr onboard` in place of the on-board unit: the command line, then lines on its standard input.
+TEST_F(TprService, HearsTheOnboardCommand) {
+  test::Program program(service({"tpr_publisher.t_cycloc_s=1"}));
+  ASSERT_TRUE(run_until([&] { return connected(); }, [] {}));
+  ASSERT_TRUE(run_until([&] { return reports_.size() == 1; }, [&] { write_state(450); }));
+  const StandardInput input;
+  test::Program onboard(
+      {"railfix", "tpr", "onboard", "mode=OS", "level=1", "--train", train_, "--domain", std::to_string(kDomain)});
+  const auto reported = [&](uint8_t reason) {
+    return run_until([&] { return reports_.back().reason() == reason; }, [&] { write_state(450); });
+  };
+  const auto last = [&] {
+    const auto& report = reports_.back();
+    return etcs::decode({report.message().data(), report.message_bytes()}, etcs::Baseline::b3).value();
+  };
+  ASSERT_TRUE(reported(msg::REPORT_MODE));
+  EXPECT_EQ(last().m_mode, 1U);
+  EXPECT_EQ(last().m_level, etcs::kLevel1);
+  input.say("no such word");
+  input.say("level=NTC ntc=20");
+  ASSERT_TRUE(reported(msg::REPORT_LEVEL));
+  EXPECT_EQ(last().nid_ntc, 20U);
+  input.say("integrity=driver length=200");
+  ASSERT_TRUE(reported(msg::REPORT_INTEGRITY_CONFIRMED));
+  input.say("report=session");
+  ASSERT_TRUE(reported(msg::REPORT_SESSION));
+  ASSERT_TRUE(run_until([&] { return last().q_length == 2; }, [&] { write_state(450); }));
+  EXPECT_GE(last().l_trainint.value_or(0), 200U);
+  input.say("integrity=lost");
+  ASSERT_TRUE(reported(msg::REPORT_INTEGRITY_LOST));
+  EXPECT_EQ(onboard.end(SIGTERM), 0);
+  EXPECT_TRUE(run_until([&] { return reason().find("onboard_status is silent") != std::string::npos; },
+                        [&] { write_state(450); }));
+}
+
 TEST_F(TprService, TakesPacket58FromACommand) {
   test::Program program(service());
   ASSERT_TRUE(run_until([&] { return connected() && commands_.matched_readers() > 0; }, [] {}));

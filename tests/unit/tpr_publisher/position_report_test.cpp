@@ -56,6 +56,29 @@ TEST_F(PositionReport, TellsDistanceSidesAndDoubt) {
   EXPECT_EQ(fields.t_train, 100U);
 }
 
+// SUBSET-026 4.0.0 3.6.4.1: SM, and SB without train data.
+TEST_F(PositionReport, ManoeuvresAndStandByWithoutTrainDataWidenTheInterval) {
+  constexpr uint32_t kStandBy = 6;
+  constexpr uint32_t kSupervisedManoeuvre = 17;
+  settings.train_over_m = 30;
+  settings.train_under_m = 40;
+  const auto doubts = [&] { return std::pair(report().l_doubtover, report().l_doubtunder); };
+  const std::pair<uint32_t, uint32_t> plain{10, 12};
+  const std::pair<uint32_t, uint32_t> wider{40, 52};
+  settings.m_mode = kStandBy;
+  EXPECT_EQ(doubts(), plain) << "Baseline 3 knows no allowance";
+  settings.baseline = etcs::Baseline::b4;
+  EXPECT_EQ(doubts(), wider);
+  settings.train_data = true;
+  EXPECT_EQ(doubts(), plain);
+  settings.m_mode = kSupervisedManoeuvre;
+  EXPECT_EQ(doubts(), wider);
+  settings.train_under_m = -1;
+  EXPECT_EQ(doubts(), std::pair(40U, uint32_t{kUnknownDistance}));
+  settings.m_mode = 0;
+  EXPECT_EQ(doubts(), plain);
+}
+
 TEST_F(PositionReport, SidesFollowTheGroupsNominalDirection) {
   struct Case {
     bool nominal_along;

@@ -1,0 +1,235 @@
+// `railfix tpr onboard`: in place of the ETCS on-board unit, as long as none is connected.
+#include <poll.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iostream>
+#include <iterator>
+#include <memory>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "command_tpr.hpp"
+#include "core/time.hpp"
+#include "etcs/train_position_report.hpp"
+#include "messaging/onboard_topic.hpp"
+#include "topic_listener.hpp"
+
+namespace railfix::tool {
+
+namespace {
+
+constexpr int64_t kPeriodNs = core::kNsPerSecond;
+constexpr int64_t kClockStepNs = core::kNsPerSecond / 2;
+constexpr uint8_t kByDevice = 1;
+constexpr uint8_t kByDriver = 2;
+
+using Names = std::vector<std::string>;
+// By their values in message 136 and in REPORT_* from REPORT_BORDER on.
+const Names kModes{"FS", "OS", "SR", "SH", "UN", "SL", "SB", "TR", "PT",
+                   "SF", "IS", "NL", "LS", "SN", "RV", "PS", "AD", "SM"};
+const Names kLevels{"0", "NTC", "1", "2", "3"};
+const Names kIntegrities{"none", "device", "driver", "lost"};
+const Names kReports{"border", "session", "error"};
+
+struct Options {
+  std::vector<std::string> words;
+  TrainNetwork network;
+  double for_s = 0;
+};
+
+uint8_t index_of(const std::string& word, const Names& names, const std::string& value) {
+  const auto found = std::ranges::find(names, value);
+  if (found != names.end()) return static_cast<uint8_t>(found - names.begin());
+  std::string all;
+  for (const auto& name : names) all += (all.empty() ? "" : ", ") + name;
+  throw core::BadInput(word + ": must be one of " + all);
+}
+
+double number_of(const std::string& word, const std::string& value, double most) {
+  char* end = nullptr;
+  const double number = std::strtod(value.c_str(), &end);
+  if (value.empty() || *end != '\0' || !(number >= 0 && number <= most))
+    throw core::BadInput(word + ": must be a number from 0 to " + std::to_string(std::lround(most)));
+  return number;
+}
+
+/// What the words have said so far.
+class OnboardUnit {
+ public:
+  OnboardUnit() { status_.m_level(etcs::kLevel2); }
+
+  /// "mode=OS level=2 ...": all of the line or, with BadInput, nothing of it.
+  void hear(const std::string& line) {
+    const OnboardUnit before = *this;
+    std::istringstream stream(line);
+    try {
+      for (std::string word; stream >> word;) take(word);
+    } catch (const core::BadInput&) {
+      *this = before;
+      throw;
+    }
+  }
+  /// `ahead_ns`: the time of the data minus the host's.
+  [[nodiscard]] msg::OnboardStatus status(int64_t ahead_ns) const {
+    auto status = status_;
+    status.stamp_ns(core::wall_ns() + ahead_ns);
+    if (status.q_integrity() == kByDevice) status.integrity_ns(status.stamp_ns());  // a device confirms all the time
+    if (status.q_integrity() == kByDriver) status.integrity_ns(status_.integrity_ns() + ahead_ns);
+    return status;
+  }
+  [[nodiscard]] std::string text() const {
+    std::ostringstream text;
+    text << "mode " << kModes[status_.m_mode()] << ", level " << kLevels[status_.m_level()];
+    if (status_.m_level() == etcs::kLevelNtc) text << " (" << int{status_.nid_ntc()} << ")";
+    text << ", integrity " << kIntegrities[status_.q_integrity()] << ", length ";
+    status_.train_length_m() > 0 ? text << status_.train_length_m() << " m" : text << "not known";
+    return text.str();
+  }
+
+ private:
+  void take(const std::string& word) {
+    const auto equals = std::min(word.find('='), word.size());
+    const std::string name = word.substr(0, equals);
+    const std::string value = equals < word.size() ? word.substr(equals + 1) : "";
+    if (name == "mode") {
+      status_.m_mode(index_of(word, kModes, value));
+    } else if (name == "level") {
+      status_.m_level(index_of(word, kLevels, value));
+    } else if (name == "ntc") {
+      status_.nid_ntc(static_cast<uint8_t>(number_of(word, value, 255)));
+    } else if (name == "integrity") {
+      status_.q_integrity(index_of(word, kIntegrities, value));
+      if (status_.q_integrity() == kByDriver) status_.integrity_ns(core::wall_ns());
+    } else if (name == "length") {
+      status_.train_length_m(number_of(word, value, 2000));
+    } else if (name == "report") {
+      status_.wanted_because(static_cast<uint8_t>(msg::REPORT_BORDER + index_of(word, kReports, value)));
+      // Another number than whoever spoke before: seconds do not come twice.
+      const auto seconds = static_cast<uint32_t>(core::wall_ns() / core::kNsPerSecond);
+      status_.reports_wanted(std::max(status_.reports_wanted() + 1, seconds));
+    } else {
+      throw core::BadInput(word + ": must be mode=, level=, ntc=, integrity=, length= or report=");
+    }
+  }
+  msg::OnboardStatus status_;
+};
+
+/// Whole lines of standard input, without waiting for them.
+class Lines {
+ public:
+  std::vector<std::string> take() {
+    std::vector<std::string> lines;
+    // In the background a program that reads its terminal would be stopped.
+    if (isatty(STDIN_FILENO) == 1 && tcgetpgrp(STDIN_FILENO) != getpgrp()) return lines;
+    pollfd input{STDIN_FILENO, POLLIN, 0};
+    while (!ended_ && poll(&input, 1, 0) > 0) {
+      std::array<char, 4096> bytes{};
+      const ssize_t count = read(STDIN_FILENO, bytes.data(), bytes.size());
+      ended_ = count <= 0;
+      if (!ended_) text_.append(bytes.data(), static_cast<size_t>(count));
+    }
+    for (size_t end = text_.find('\n'); end != std::string::npos; end = text_.find('\n')) {
+      lines.push_back(text_.substr(0, end));
+      text_.erase(0, end + 1);
+    }
+    return lines;
+  }
+
+ private:
+  std::string text_;
+  bool ended_ = false;
+};
+
+class Station {
+ public:
+  explicit Station(const Options& options)
+      : options_(options),
+        listener_(options.network, "railfix-tpr-onboard"),
+        writer_(listener_.participant(), messaging::topics::onboard_status) {
+    // Played data has its own time.
+    listener_.listen(messaging::topics::data_clock.name,
+                     [this](const auto&, const auto&, const auto& sample, const auto&) {
+                       const auto& clock = *static_cast<const msg::DataClock*>(sample.get());
+                       const int64_t ahead_ns = clock.data_ns() - clock.wall_ns();
+                       // One offset, lest the same confirmation looks like a new one every time.
+                       if (std::abs(ahead_ns - data_ahead_ns_) > kClockStepNs) data_ahead_ns_ = ahead_ns;
+                     });
+  }
+
+  int speak(OnboardUnit unit) {
+    say(unit);
+    listener_.run(options_.for_s, [&] {
+      bool changed = false;
+      for (const auto& line : lines_.take()) changed |= heard(unit, line);
+      heard_once_ |= writer_.matched_readers() > 0;
+      if (changed) say(unit);
+      if (core::monotonic_ns() >= next_ns_) write(unit);
+      return false;
+    });
+    if (heard_once_) return 0;
+    std::cerr << "nobody read it: there is no tpr_publisher on " << where(options_.network)
+              << "; is it running, and are --train and --domain right?\n";
+    return 1;
+  }
+
+ private:
+  bool heard(OnboardUnit& unit, const std::string& line) {
+    try {
+      unit.hear(line);
+      return true;
+    } catch (const core::BadInput& error) {
+      std::cerr << error.what() << '\n';
+      return false;
+    }
+  }
+  void say(const OnboardUnit& unit) {
+    std::cout << unit.text() << std::endl;
+    write(unit);
+  }
+  void write(const OnboardUnit& unit) {
+    writer_.write(unit.status(data_ahead_ns_));
+    next_ns_ = core::monotonic_ns() + kPeriodNs;
+  }
+
+  Options options_;
+  TopicListener listener_;
+  messaging::Writer<msg::OnboardStatus> writer_;
+  Lines lines_;
+  int64_t data_ahead_ns_ = 0;
+  int64_t next_ns_ = 0;
+  bool heard_once_ = false;
+};
+
+}  // namespace
+
+void add_tpr_onboard(CLI::App& tpr, Action& chosen) {
+  auto options = std::make_shared<Options>();
+  auto* command = tpr.add_subcommand(
+      "onboard", "Say what the ETCS on-board unit would: mode, level, train integrity, and when it wants a report");
+  command->footer(
+      "Example: railfix tpr onboard mode=FS level=2 integrity=driver length=200\n"
+      "  mode=FS, OS, SR, SH, UN, SL, SB, TR, PT, SF, IS, NL, LS, SN, RV, PS, and in 4.0.0 AD, SM   level=0, NTC, 1, "
+      "2, 3\n"
+      "  ntc=NID_NTC   integrity=none, device, driver, lost   length=safe length in m, 0 = not known\n"
+      "  report=border, session, error: a report is wanted now\n"
+      "onboard_status is sent at every change and once a second until Ctrl-C. Lines of the same words on standard "
+      "input\n"
+      "change it. Silent for 3 s, tpr_publisher keeps mode and level and says nothing of train integrity.");
+  command->add_option("WORD=VALUE", options->words, "As below; without any: mode=FS level=2 integrity=none");
+  command->add_option("--for-s", options->for_s, "End after so many seconds, 0 = run until interrupted")
+      ->check(CLI::NonNegativeNumber);
+  add_network(*command, options->network);
+  command->callback([options, &chosen] {
+    chosen = [options] {
+      OnboardUnit unit;
+      for (const auto& word : options->words) unit.hear(word);
+      return Station(*options).speak(unit);
+    };
+  });
+}
+
+}  // namespace railfix::tool
