@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <memory>
 #include <string>
 
@@ -10,6 +11,7 @@
 #include "core/time.hpp"
 #include "evaluation/statistics.hpp"
 #include "evaluation/truth.hpp"
+#include "report_source.hpp"
 
 namespace railfix::tool {
 
@@ -30,29 +32,46 @@ struct Options {
   double longest_gap_s = 15;
   double offset_s = 0;
   compare::Demand demand;
+  int64_t domain = 0;
+  double for_s = 0;
 };
 
 constexpr double kPathM = 1e6;
+constexpr double kTurnS = 0.1;
 
-/// The line through `start`, or through the first group that the certified system reports.
-track::Path path_of(const Options& options, const std::vector<compare::TimedReport>& certified) {
-  auto map = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(options.map)));
-  track::EdgePosition start;
-  if (!options.start.empty()) {
-    start = core::value_or_throw(map->parse_position(options.start));
-  } else {
-    const track::BaliseGroup* first = nullptr;
-    for (const auto& report : certified) {
-      for (const auto& group : map->balise_groups) {
-        if (first == nullptr && group.nid_lrbg() == report.fields.nid_lrbg) first = &group;
-      }
-      if (first != nullptr) break;
+/// Where reports are compared: on the line through `start`, or through the first group of the map that the certified
+/// system reports. The map is read once.
+class Line {
+ public:
+  explicit Line(const Options& options) : options_(options) {
+    if (options.map.empty()) {
+      axes_.emplace();
+      return;
     }
-    if (first == nullptr) throw core::BadInput(options.map + ": has none of the reported balise groups.");
-    start = {first->edge, first->offset_m, track::Direction::forward};
+    map_ = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(options.map)));
+    if (!options.start.empty()) follow(core::value_or_throw(map_->parse_position(options.start)));
   }
-  return core::value_or_throw(track::Path::follow(map, start, kPathM, kPathM, options.via));
-}
+  /// Nothing before a group is known.
+  const compare::Axes* axes(const std::vector<compare::TimedReport>& certified) {
+    for (const auto& report : certified) {
+      if (axes_) break;
+      for (const auto& group : map_->balise_groups) {
+        if (group.nid_lrbg() != report.fields.nid_lrbg) continue;
+        follow({group.edge, group.offset_m, track::Direction::forward});
+        break;
+      }
+    }
+    return axes_ ? &*axes_ : nullptr;
+  }
+
+ private:
+  void follow(const track::EdgePosition& start) {
+    axes_.emplace(core::value_or_throw(track::Path::follow(map_, start, kPathM, kPathM, options_.via)));
+  }
+  const Options& options_;
+  std::shared_ptr<const track::Map> map_;
+  std::optional<compare::Axes> axes_;
+};
 
 /// Error of a report against the truth; both on the path that begins where the truth does.
 struct Judge {
@@ -148,7 +167,7 @@ void print_pairs(const compare::Pairing& pairing) {
 }
 
 int verdict(const Columns& columns, const Options& options) {
-  std::printf("\nGAMAB, %.0f %% confidence, margin %.0f %%, bootstrap over legs (ours / certified)\n",
+  std::printf("\nGAMAB, %.0f %% confidence, margin %.0f %%, over legs (ours / certified)\n",
               100 * options.demand.confidence, 100 * options.demand.margin);
   std::vector<Verdict> verdicts;
   verdicts.push_back(
@@ -172,35 +191,69 @@ int verdict(const Columns& columns, const Options& options) {
   return 0;
 }
 
-int compare_reports(const Options& options) {
-  if (!options.truth.empty() && (options.map.empty() || options.start.empty()))
-    throw core::BadInput("--truth needs --map and --start, the place on the map where the truth begins.");
-  const auto ours =
-      core::value_or_throw(compare::read_reports(options.ours, static_cast<etcs::Baseline>(options.baseline)));
-  auto certified = core::value_or_throw(
-      compare::read_reports(options.certified, static_cast<etcs::Baseline>(options.certified_baseline)));
-  for (auto& report : certified) report.stamp_ns += core::to_ns(options.offset_s);
-  const auto axes = options.map.empty() ? compare::Axes() : compare::Axes(path_of(options, certified));
-  const auto pairing = compare::pair_up(ours, certified, axes, core::to_ns(options.longest_gap_s));
-  std::optional<evaluation::Truth> truth;
-  std::optional<Judge> judge;
-  if (!options.truth.empty()) {
-    truth = core::value_or_throw(evaluation::Truth::read(options.truth));
-    judge = Judge{&*truth, options.foot_to_front_m};
+/// Reports that come now, until the other side's file is over, time is up, or Ctrl-C; each pair is told as it comes.
+void listen(ReportSource& ours, ReportSource& certified, Line& line, const Options& options) {
+  const int64_t end_ns =
+      options.for_s > 0 ? core::monotonic_ns() + core::to_ns(options.for_s) : std::numeric_limits<int64_t>::max();
+  const auto over = [](const ReportSource& live, const ReportSource& other) {
+    return !other.live() && !live.reports().empty() && !other.reports().empty() &&
+           live.reports().back().stamp_ns > other.reports().back().stamp_ns;
+  };
+  size_t told = 0;
+  for (bool goes_on = true; goes_on && core::monotonic_ns() < end_ns;) {
+    for (auto* source : {&ours, &certified}) {
+      if (source->live()) goes_on &= source->listen(kTurnS);
+    }
+    const auto* axes = line.axes(certified.reports());
+    if (axes == nullptr) continue;
+    const auto pairs =
+        compare::pair_up(ours.reports(), certified.reports(), *axes, core::to_ns(options.longest_gap_s)).pairs;
+    for (; told < pairs.size(); ++told) {
+      std::printf("at %.3f s ours - certified %+.2f m, intervals %s\n", core::seconds(pairs[told].stamp_ns),
+                  pairs[told].difference_m(), pairs[told].overlap() ? "overlap" : "have nothing in common");
+      std::fflush(stdout);
+    }
+    goes_on &= !over(ours, certified) && !over(certified, ours);
   }
-  std::printf("reports                  ours %zu, %zu with a place; certified %zu, %zu with a place\n", ours.size(),
-              pairing.ours_placed, certified.size(), pairing.certified_placed);
-  std::printf("paired in time           %zu in %zu legs; %zu certified reports have none of ours beside them\n",
-              pairing.pairs.size(), pairing.legs, pairing.alone);
-  if (pairing.pairs.empty())
-    throw core::BadInput("No reports can be compared: do the times and balise groups of both files belong together?");
+}
+
+int print_comparison(const Options& options, const compare::Pairing& pairing, const std::optional<Judge>& judge) {
   print_pairs(pairing);
   const auto columns = columns_of(pairing, judge);
   std::printf("\n%-24s %9s %9s %9s   %9s %9s %9s\n%-24s %9s %9s %9s   %9s %9s %9s\n", "", "ours", "", "", "certified",
               "", "", "m", "mean", "p95", "max", "mean", "p95", "max");
   print_row("interval length", columns.lengths);
   if (judge) print_row("error, size", columns.errors);
+  const auto unknown = [&](double compare::Sample::*side) {
+    return std::ranges::count_if(columns.lengths, [&](const auto& sample) { return !std::isfinite(sample.*side); });
+  };
+  std::printf("interval not known       ours %td, certified %td of %zu: left out\n", unknown(&compare::Sample::ours),
+              unknown(&compare::Sample::certified), columns.lengths.size());
   return verdict(columns, options);
+}
+
+int compare_reports(const Options& options) {
+  if (!options.truth.empty() && (options.map.empty() || options.start.empty()))
+    throw core::BadInput("--truth needs --map and --start, the place on the map where the truth begins.");
+  std::optional<evaluation::Truth> truth;
+  if (!options.truth.empty()) truth = core::value_or_throw(evaluation::Truth::read(options.truth));
+  ReportSource ours(options.ours, static_cast<etcs::Baseline>(options.baseline), options.domain);
+  ReportSource certified(options.certified, static_cast<etcs::Baseline>(options.certified_baseline), options.domain);
+  certified.shift(core::to_ns(options.offset_s));
+  Line line(options);
+  if (ours.live() || certified.live()) listen(ours, certified, line, options);
+  const auto* axes = line.axes(certified.reports());
+  if (axes == nullptr) throw core::BadInput(options.map + ": has none of the reported balise groups.");
+  const auto pairing = compare::pair_up(ours.reports(), certified.reports(), *axes, core::to_ns(options.longest_gap_s));
+  std::optional<Judge> judge;
+  if (truth) judge = Judge{&*truth, options.foot_to_front_m};
+  std::printf("reports                  ours %zu, %zu with a place; certified %zu, %zu with a place\n",
+              ours.reports().size(), pairing.ours_placed, certified.reports().size(), pairing.certified_placed);
+  std::printf("paired in time           %zu in %zu legs; %zu certified reports have none of ours beside them\n",
+              pairing.pairs.size(), pairing.legs, pairing.alone);
+  if (pairing.pairs.empty())
+    throw core::BadInput("No reports can be compared: do the times and balise groups of both sides belong together?");
+  return print_comparison(options, pairing, judge);
 }
 
 }  // namespace
@@ -208,11 +261,23 @@ int compare_reports(const Options& options) {
 void add_tpr_compare(CLI::App& tpr, Action& chosen) {
   auto options = std::make_shared<Options>();
   auto* command = tpr.add_subcommand("compare", "Our reports beside those of the certified system, paired in time");
-  command->footer("Example: railfix tpr compare --ours OUT --certified rbc.csv --map line.map");
-  command->add_option("--ours", options->ours, "Folder of a run, or a .csv or .jsonl file with stamp_ns and hex")
+  command->footer(
+      "Examples:\n"
+      "  railfix tpr compare --ours OUT --certified rbc.csv --map line.map\n"
+      "  railfix tpr compare --ours topic:demo --certified rbc.csv   what train demo sends now, until the file is "
+      "over\n"
+      "  railfix tpr compare --ours topic:demo --certified topic:demo-evc --for-s 3600");
+  command
+      ->add_option("--ours", options->ours,
+                   "Folder of a run, a .csv or .jsonl file with stamp_ns and hex, a recording (.mcap), or topic:TRAIN: "
+                   "what is sent now")
       ->required();
-  command->add_option("--certified", options->certified, "The certified system's: .csv or .jsonl, stamp_ns and hex")
-      ->required();
+  command->add_option("--certified", options->certified, "The certified system's, as --ours")->required();
+  command->add_option("--domain", options->domain, "DDS domain of topic:TRAIN")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 232));
+  command->add_option("--for-s", options->for_s, "Listen for so many seconds, 0 = until a file is over, or Ctrl-C")
+      ->check(CLI::NonNegativeNumber);
   command->add_option("--map", options->map, "Compiled map: also reports with different LRBGs can be compared");
   command->add_option("--start", options->start, "Place on the map where the line begins, EDGE:OFFSET[:+|-]");
   command->add_option("--via", options->via, "Edges taken at switches");

@@ -43,6 +43,10 @@ void TopicListener::stop() {
   interrupted = 1;
 }
 
+bool TopicListener::stopped() {
+  return interrupted != 0;
+}
+
 void TopicListener::listen(const std::string& name, OnSample on_sample, bool with_silence) {
   if (readers_.contains(name)) return;
   const auto* topic = messaging::find_topic(name);

@@ -36,6 +36,8 @@ class TopicListener {
   void run(double for_s, const std::function<bool()>& done);
   /// Ends run(). Any thread.
   static void stop();
+  /// Ctrl-C, SIGTERM or stop().
+  [[nodiscard]] static bool stopped();
   messaging::Participant& participant() { return participant_; }
   [[nodiscard]] int writers(const std::string& name) const;
 

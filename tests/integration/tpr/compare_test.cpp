@@ -1,9 +1,10 @@
-// `railfix tpr compare` on two small files.
+// `railfix tpr compare` as a program: on files, with map and truth, and on what the service sends now over DDS.
 #include <gmock/gmock.h>
 
 #include <filesystem>
 
 #include "etcs/train_position_report.hpp"
+#include "integration/tpr/tpr_service.hpp"
 #include "support/program.hpp"
 
 namespace railfix {
@@ -12,6 +13,10 @@ namespace {
 using ::testing::HasSubstr;
 
 constexpr double kPatienceS = 60;
+
+std::string hex_of(const etcs::TrainPositionReport& report) {
+  return etcs::to_hex(core::value_or_throw(etcs::encode(report, etcs::Baseline::b3)));
+}
 
 /// 20 m/s away from one group after the other, a report every 5 s; `error_m` in front of the true place.
 std::string table(double error_m, uint32_t doubt_m) {
@@ -26,12 +31,44 @@ std::string table(double error_m, uint32_t doubt_m) {
       report.q_dirlrbg = report.q_dlrbg = report.q_dirtrain = etcs::kNominal;
       report.l_doubtover = report.l_doubtunder = doubt_m * 10;
       report.v_train = 14;
-      text << (leg * 5 + i) * 5'000'000'000LL << ','
-           << etcs::to_hex(core::value_or_throw(etcs::encode(report, etcs::Baseline::b3))) << '\n';
+      text << (leg * 5 + i) * 5'000'000'000LL << ',' << hex_of(report) << '\n';
     }
   }
   return text.str();
 }
+
+/// Relative to the group A of balise_map() at 100 m of edge 1, or to C at 700 m; the front end is at `front_m`.
+etcs::TrainPositionReport beyond(uint32_t group, double front_m, uint32_t doubt_m) {
+  etcs::TrainPositionReport report;
+  report.nid_lrbg = group;
+  report.q_scale = 0;
+  report.d_lrbg =
+      static_cast<uint32_t>(std::lround(10 * (front_m - (group == tpr_publisher::testing::kA ? 100 : 700))));
+  report.q_dirlrbg = report.q_dlrbg = report.q_dirtrain = etcs::kNominal;
+  report.l_doubtover = report.l_doubtunder = doubt_m * 10;
+  report.v_train = 14;
+  return report;
+}
+
+class TprCompareFiles : public ::testing::Test {
+ protected:
+  TprCompareFiles() {
+    std::filesystem::create_directories(folder_ / "truth");
+    core::ok_or_throw(tpr_publisher::testing::balise_map()->save(folder_ / "line.map"));
+  }
+  ~TprCompareFiles() override { std::filesystem::remove_all(folder_); }
+  [[nodiscard]] std::string file(const std::string& name) const { return (folder_ / name).string(); }
+  [[nodiscard]] test::Outcome compare(const std::vector<std::string>& more) const {
+    std::vector<std::string> arguments{
+        "railfix", "tpr", "compare", "--ours", file("ours.csv"), "--certified", file("certified.csv")};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return test::run_program(arguments, kPatienceS);
+  }
+
+ private:
+  std::filesystem::path folder_ =
+      std::filesystem::temp_directory_path() / ("tpr-compare-map-" + std::to_string(getpid()));
+};
 
 TEST(TprCompare, SaysWhatIsShownAndWhatIsNot) {
   const auto folder = std::filesystem::temp_directory_path() / ("tpr-compare-" + std::to_string(getpid()));
@@ -45,7 +82,7 @@ TEST(TprCompare, SaysWhatIsShownAndWhatIsNot) {
   EXPECT_THAT(outcome.out, HasSubstr("60 in 12 legs"));
   EXPECT_THAT(outcome.out, HasSubstr("mean +2.00 m"));
   EXPECT_THAT(outcome.out, HasSubstr("overlap        60 of 60"));
-  EXPECT_THAT(outcome.out, HasSubstr("ratio 0.250 (0.250 to 0.250)"));
+  EXPECT_THAT(outcome.out, HasSubstr("ratio 0.250 (0.158 to 0.396)"));
   EXPECT_THAT(outcome.out, HasSubstr("intervals at least as good; errors not known"));
   outcome = test::run_program({"railfix", "tpr", "compare", "--ours", certified, "--certified", ours}, kPatienceS);
   EXPECT_THAT(outcome.out, HasSubstr("verdict                  WORSE"));
@@ -53,6 +90,92 @@ TEST(TprCompare, SaysWhatIsShownAndWhatIsNot) {
   EXPECT_EQ(outcome.exit_code, 2);
   EXPECT_THAT(outcome.err, HasSubstr("/no/such.csv"));
   std::filesystem::remove_all(folder);
+}
+
+// From 150 to 950 m of edge 1 at 20 m/s, front end 2 m before the foot: ours changes to group C at 700 m, the certified
+// system misses it. Ours is 0.5 m in front of the truth, the certified 1.5 m behind it, with an interval that misses it
+// in the end.
+TEST_F(TprCompareFiles, OneLineAndItsTruth) {
+  std::ofstream ours(file("ours.csv"));
+  std::ofstream certified(file("certified.csv"));
+  std::ofstream truth(file("truth/track.csv"));
+  ours << "stamp_ns,hex\n";
+  certified << "stamp_ns,hex\n";
+  truth << "timestamp,distance\n";
+  for (int i = 0; i <= 40; ++i) {
+    const double foot_m = 150 + 20 * i;
+    const int64_t stamp_ns = i * core::kNsPerSecond;
+    truth << stamp_ns << ',' << foot_m - 150 << '\n';
+    const double front_m = foot_m + 2;
+    const bool beyond_c = front_m > 700;
+    ours << stamp_ns << ','
+         << hex_of(beyond(beyond_c ? tpr_publisher::testing::kC : tpr_publisher::testing::kA, front_m + 0.5, 5))
+         << '\n';
+    certified << stamp_ns << ',' << hex_of(beyond(tpr_publisher::testing::kA, front_m - 1.5, i < 35 ? 10 : 1)) << '\n';
+  }
+  ours.close();
+  certified.close();
+  truth.close();
+  auto outcome = compare({});
+  EXPECT_THAT(outcome.out, HasSubstr("paired in time           28 in")) << "behind C the groups differ";
+  outcome = compare({"--map", file("line.map")});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("paired in time           41 in"));
+  EXPECT_THAT(outcome.out, HasSubstr("mean +2.00 m"));
+  EXPECT_THAT(outcome.out, HasSubstr("error                    not known without --truth"));
+  outcome =
+      compare({"--map", file("line.map"), "--start", "1:150:+", "--truth", file("truth"), "--foot-to-front-m", "2"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("error, size                   0.50      0.50      0.50        1.50      1.50"));
+  EXPECT_THAT(outcome.out, HasSubstr("outside the interval     ours on 0, certified on 1 of 1 legs"));
+  outcome = compare({"--truth", file("truth")});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("--truth needs --map and --start"));
+}
+
+// What the service sends now, beside a certified system whose reports come as another train's.
+TEST_F(TprService, IsComparedWhileItRuns) {
+  const auto evc_options = options(train_ + "-evc");
+  messaging::Participant evc(evc_options);
+  messaging::Writer<msg::TrainPositionReport> certified(evc, topics::train_position_report);
+  test::Program program(service({"tpr_publisher.t_cycloc_s=1"}));
+  const auto said = map_file_.string() + ".said";
+  test::Program compare(
+      {"railfix", "tpr", "compare", "--ours", "topic:" + train_, "--certified", "topic:" + train_ + "-evc", "--domain",
+       std::to_string(kDomain), "--map", map_file_.string(), "--start", "1:0:+"},
+      {said, said + "-err", {}});
+  ASSERT_TRUE(run_until([&] { return connected() && certified.matched_readers() > 0; }, [] {}));
+  // 2 m behind ours, whose front is 2 m before the foot: at the foot itself.
+  const auto write_certified = [&](double front_m) {
+    const auto bytes =
+        core::value_or_throw(etcs::encode(beyond(tpr_publisher::testing::kA, front_m, 10), etcs::Baseline::b3));
+    msg::TrainPositionReport message;
+    message.stamp_ns(core::wall_ns());
+    message.baseline(3);
+    message.message_bytes(static_cast<uint32_t>(bytes.size()));
+    std::copy(bytes.begin(), bytes.end(), message.message().begin());
+    certified.write(message);
+    evc.assert_liveliness();
+  };
+  int turn = 0;
+  const auto pairs = [&] {
+    const auto text = test::slurp(said);
+    size_t count = 0;
+    for (size_t at = text.find("ours - certified"); at != std::string::npos; at = text.find("ours - certified", at + 1))
+      ++count;
+    return count;
+  };
+  ASSERT_TRUE(run_until([&] { return pairs() >= 5; },
+                        [&] {
+                          write_state(450, 0, 0);
+                          if (++turn % 10 == 0) write_certified(450);
+                        }));
+  EXPECT_EQ(compare.end(SIGINT), 0) << test::slurp(said + "-err");
+  const auto text = test::slurp(said);
+  EXPECT_THAT(text, HasSubstr("ours - certified +2.00 m, intervals overlap"));
+  EXPECT_THAT(text, HasSubstr("mean +2.00 m"));
+  EXPECT_THAT(text, HasSubstr("verdict                  not shown")) << "one leg shows nothing";
+  for (const auto& file : {said, said + "-err"}) std::filesystem::remove(file);
 }
 
 }  // namespace

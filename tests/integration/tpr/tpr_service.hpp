@@ -67,7 +67,7 @@ class TprService : public ::testing::Test {
     }
     return true;
   }
-  void write_state(double offset_m, int64_t age_ns = 0) {
+  void write_state(double offset_m, int64_t age_ns = 0, double speed_mps = 20) {
     msg::TrainState state;
     state.stamp_ns(core::wall_ns() - age_ns);
     state.seq(seq_++);
@@ -76,7 +76,8 @@ class TprService : public ::testing::Test {
     state.distance_m(offset_m);
     state.direction(msg::DIRECTION_FORWARD);
     state.track_known(1);
-    state.speed_mps(20);
+    state.speed_mps(speed_mps);
+    state.standstill(speed_mps == 0 ? 1 : 0);
     state.over_m(3);
     state.under_m(4);
     states_.write(state);

@@ -145,6 +145,26 @@ TEST_F(Train, ReportsAreValidMessages136) {
   EXPECT_TRUE(with_group) << "no report refers to a balise group";
 }
 
+// The recording's reports beside those of the tables, which are the same, and both beside the truth.
+TEST_F(Train, ReportsAreComparedWithTheTruth) {
+  const auto map = dataset::find_map(sequence());
+  ASSERT_TRUE(map.has_value());
+  const auto compared =
+      test::run_program({"railfix", "tpr", "compare", "--ours", out() + "/recording.mcap", "--certified", out(),
+                         "--map", map->string(), "--start", "1:250:+", "--truth", sequence() + "/truth"},
+                        60);
+  ASSERT_EQ(compared.exit_code, 0) << compared.err;
+  EXPECT_THAT(compared.out, HasSubstr("mean +0.00 m, |.| p50 0.00, p95 0.00, max 0.00 m"));
+  double mean_m = 0;
+  double p95_m = 0;
+  double max_m = 0;
+  const auto row = compared.out.find("error, size");
+  ASSERT_NE(row, std::string::npos) << compared.out;
+  ASSERT_EQ(std::sscanf(compared.out.c_str() + row, "error, size %lf %lf %lf", &mean_m, &p95_m, &max_m), 3);
+  EXPECT_LT(max_m, 2.0);
+  EXPECT_THAT(compared.out, HasSubstr("outside the interval     ours on 0, certified on 0 of"));
+}
+
 TEST_F(Train, TheRecordingHoldsEveryTopic) {
   auto recording = mcap::Reader::open(fs::path(out()) / "recording.mcap");
   ASSERT_TRUE(recording.ok()) << recording.error().message;

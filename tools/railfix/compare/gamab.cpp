@@ -6,19 +6,22 @@
 #include <map>
 
 #include "core/random.hpp"
-#include "evaluation/statistics.hpp"
 
 namespace railfix::compare {
 
 namespace {
 
 constexpr size_t kFewestLegs = 10;
-constexpr int kDraws = 4000;
+constexpr double kFewestDraws = 1999;
+constexpr double kDrawsBeyondBound = 20;
+constexpr double kUnseenOverWorst = 2;
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 struct Leg {
   double ours = 0;  // sums
   double certified = 0;
+  Leg operator+(const Leg& other) const { return {ours + other.ours, certified + other.certified}; }
+  Leg operator*(double weight) const { return {ours * weight, certified * weight}; }
 };
 
 std::vector<Leg> sums_of_legs(const std::vector<Sample>& samples, Figure figure, size_t& used) {
@@ -38,6 +41,50 @@ std::vector<Leg> sums_of_legs(const std::vector<Sample>& samples, Figure figure,
 double ratio_of(const Leg& sum, Figure figure) {
   const double ratio = sum.ours / sum.certified;
   return figure == Figure::root_mean_square ? std::sqrt(ratio) : ratio;
+}
+
+struct Bounds {
+  double low = 0;
+  double high = 0;
+};
+
+/// Ratios of random subsets, every leg in or out by a throw of a coin.
+Leg random_subset(const std::vector<Leg>& legs, core::Random& random) {
+  Leg sum;
+  while (sum.ours == 0 && sum.certified == 0) {
+    uint64_t coins = 0;
+    for (size_t i = 0; i < legs.size(); ++i) {
+      if (i % 64 == 0) coins = random.next();
+      if ((coins >> (i % 64) & 1U) != 0) sum = sum + legs[i];
+    }
+  }
+  return sum;
+}
+
+double random_weight(core::Random& random) {
+  return -std::log1p(-random.uniform());
+}
+
+Bounds bounds_of(const std::vector<Leg>& legs, Figure figure, double confidence) {
+  const auto draws = static_cast<size_t>(std::max(kFewestDraws, std::ceil(kDrawsBeyondBound / (1 - confidence))));
+  Leg worst;
+  for (const auto& leg : legs) worst = {std::max(worst.ours, leg.ours), std::max(worst.certified, leg.certified)};
+  core::Random random(1);
+  std::vector<double> subsets;
+  std::vector<double> pessimist;
+  std::vector<double> optimist;
+  for (size_t draw = 0; draw < draws; ++draw) {
+    subsets.push_back(ratio_of(random_subset(legs, random), figure));
+    Leg sum;
+    for (const auto& leg : legs) sum = sum + leg * random_weight(random);
+    const double unseen = kUnseenOverWorst * random_weight(random);
+    pessimist.push_back(ratio_of({sum.ours + unseen * worst.ours, sum.certified}, figure));
+    optimist.push_back(ratio_of({sum.ours, sum.certified + unseen * worst.certified}, figure));
+  }
+  for (auto* ratios : {&subsets, &pessimist, &optimist}) std::sort(ratios->begin(), ratios->end());
+  const auto beyond = static_cast<size_t>((1 - confidence) * static_cast<double>(draws + 1) + 1e-9);
+  return {std::min(subsets[beyond - 1], optimist[beyond - 1]),
+          std::max(subsets[draws - beyond], pessimist[draws - beyond])};
 }
 
 /// Probability of at most k heads in n throws.
@@ -69,37 +116,17 @@ RatioResult compare_ratio(const std::vector<Sample>& samples, Figure figure, con
   RatioResult result{Verdict::open, kUnknown, kUnknown, kUnknown, 0, 0, kUnknown};
   const auto legs = sums_of_legs(samples, figure, result.samples);
   result.legs = legs.size();
-  Leg all;
-  for (const auto& leg : legs) {
-    all.ours += leg.ours;
-    all.certified += leg.certified;
-  }
   if (legs.empty()) return result;
+  Leg all;
+  for (const auto& leg : legs) all = all + leg;
   result.ratio = ratio_of(all, figure);
   if (legs.size() < kFewestLegs) {
     result.legs_needed = static_cast<double>(kFewestLegs);
     return result;
   }
-  core::Random random(1);
-  std::vector<double> ratios;
-  for (int draw = 0; draw < kDraws; ++draw) {
-    Leg sum;
-    for (size_t i = 0; i < legs.size(); ++i) {
-      const Leg& leg = legs[random.next() % legs.size()];
-      sum.ours += leg.ours;
-      sum.certified += leg.certified;
-    }
-    ratios.push_back(ratio_of(sum, figure));
-  }
-  std::sort(ratios.begin(), ratios.end());
-  // With few legs a percentile bootstrap is too sure; widened so that the test of the confidence holds at 20 and 40
-  // legs.
-  const double widened = 1 + 10.0 / static_cast<double>(legs.size());
-  const auto bound = [&](double share) {
-    return result.ratio * std::pow(evaluation::quantile(ratios, share) / result.ratio, widened);
-  };
-  result.low = bound(1 - demand.confidence);
-  result.high = bound(demand.confidence);
+  const auto bounds = bounds_of(legs, figure, demand.confidence);
+  result.low = bounds.low;
+  result.high = bounds.high;
   const double limit = 1 + demand.margin;
   if (result.high <= limit) {
     result.verdict = Verdict::at_least_as_good;

@@ -1,6 +1,16 @@
 // "Globally at least as good" (GAMAB, EN 50126-2): is one system's figure shown to be no worse than another's?
-// One-sided, with a stated confidence and a margin, by a bootstrap over legs, because the errors of one leg belong
-// together.
+// One-sided, with a stated confidence and a margin, over legs, because the errors of one leg belong together.
+//
+// A bound is the farther one of two:
+// - Ratios of random subsets of the legs are typical values (Hartigan, "Using subsample values as typical values", JASA
+//   64, 1969): the true ratio R is as likely in one gap between the sorted ones as in any other. Exact for
+//   any number of legs and tails however heavy, where ours - R certified of a leg is as likely as its negative, as it
+//   is when both systems' errors are distributed alike but for their size.
+// - Random weights on the legs and on one more that was not seen, twice as bad as the worst one seen (Gaffke, "Three
+// test
+//   statistics for a nonparametric one-sided hypothesis on the mean of a nonnegative variable", Math. Methods Statist.
+//   14, 2005, whose bound puts the unseen one at the end of the range). For systems whose errors are not alike.
+// No bound can hold against a failure so rare that the legs at hand likely do not show it: see compare_broken.
 #pragma once
 
 #include <cstddef>

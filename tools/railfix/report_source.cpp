@@ -1,0 +1,65 @@
+#include "report_source.hpp"
+
+#include <algorithm>
+#include <iostream>
+
+#include "mcap/reader.hpp"
+
+namespace railfix::tool {
+
+namespace {
+
+constexpr const char* kTopic = "topic:";
+
+}  // namespace
+
+ReportSource::ReportSource(const std::string& where, etcs::Baseline baseline, int64_t domain) {
+  if (where.starts_with(kTopic)) {
+    const TrainNetwork network{where.substr(std::string(kTopic).size()), domain};
+    listener_ = std::make_unique<TopicListener>(network, "railfix-tpr-compare");
+    listener_->listen(messaging::topics::train_position_report.name,
+                      [this](const auto&, const auto&, const auto& sample, const auto&) {
+                        take(*static_cast<const msg::TrainPositionReport*>(sample.get()));
+                      });
+  } else if (where.ends_with(".mcap")) {
+    read_recording(where);
+  } else {
+    reports_ = core::value_or_throw(compare::read_reports(where, baseline));
+  }
+}
+
+void ReportSource::read_recording(const std::string& file) {
+  const auto reader = core::value_or_throw(mcap::Reader::open(file));
+  reader->for_each({{messaging::topics::train_position_report.name}, {}, {}},
+                   [this](const mcap::Channel&, const mcap::Message& message) {
+                     msg::TrainPositionReport report;
+                     if (messaging::deserialize({message.data.begin(), message.data.end()}, report)) take(report);
+                     return true;
+                   });
+  for (const auto& problem : reader->problems()) std::cerr << problem << '\n';
+}
+
+void ReportSource::take(const msg::TrainPositionReport& report) {
+  const size_t bytes = std::min<size_t>(report.message_bytes(), report.message().size());
+  auto fields = etcs::decode({report.message().data(), bytes}, static_cast<etcs::Baseline>(report.baseline()));
+  if (!fields.ok()) {
+    if (refusal_.empty()) std::cerr << "a report was left out: " << (refusal_ = fields.error().message) << '\n';
+    return;
+  }
+  const int64_t stamp_ns = report.stamp_ns() + offset_ns_;
+  const auto later = std::upper_bound(reports_.begin(), reports_.end(), stamp_ns,
+                                      [](int64_t stamp, const auto& other) { return stamp < other.stamp_ns; });
+  reports_.insert(later, {stamp_ns, std::move(fields).value()});
+}
+
+bool ReportSource::listen(double for_s) {
+  listener_->run(for_s, [] { return false; });
+  return !TopicListener::stopped();
+}
+
+void ReportSource::shift(int64_t offset_ns) {
+  offset_ns_ = offset_ns;
+  for (auto& report : reports_) report.stamp_ns += offset_ns;
+}
+
+}  // namespace railfix::tool

@@ -1,0 +1,38 @@
+// Where position reports to compare come from: a file, a recording, or what a train sends now.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "compare/report_file.hpp"
+#include "topic_listener.hpp"
+
+namespace railfix::tool {
+
+class ReportSource {
+ public:
+  /// `where`: a run's folder, .csv or .jsonl (compare::read_reports), a recording (.mcap), or topic:TRAIN for the
+  /// train_position_report of a train on this DDS domain. The baseline is for files that do not say theirs. Throws
+  /// BadInput when it cannot be read.
+  ReportSource(const std::string& where, etcs::Baseline baseline, int64_t domain);
+
+  [[nodiscard]] bool live() const { return listener_ != nullptr; }
+  /// REQUIRES: live(). Takes what comes for so long; false after Ctrl-C.
+  bool listen(double for_s);
+  /// Sorted by time.
+  [[nodiscard]] const std::vector<compare::TimedReport>& reports() const { return reports_; }
+  /// The other end's clock is put forward by this.
+  void shift(int64_t offset_ns);
+
+ private:
+  void read_recording(const std::string& file);
+  void take(const msg::TrainPositionReport& report);
+
+  std::vector<compare::TimedReport> reports_;
+  int64_t offset_ns_ = 0;
+  std::string refusal_;  // why reports were left out, told once
+  std::unique_ptr<TopicListener> listener_;
+};
+
+}  // namespace railfix::tool
