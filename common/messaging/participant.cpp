@@ -1,7 +1,6 @@
 #include "messaging/participant.hpp"
 
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
-#include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
 #include <algorithm>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 
@@ -13,22 +12,18 @@ namespace {
 namespace dds = eprosima::fastdds::dds;
 namespace rtps = eprosima::fastdds::rtps;
 
-// The built-in segment of 512 KiB loses a third of what a camera sends.
-constexpr uint32_t kSharedMemoryBytes = 16U << 20U;
-constexpr uint32_t kSharedMemoryQueue = 1024;
 constexpr uint32_t kSocketBufferBytes = 4U << 20U;
 // Dead participants vanish after the lease; the default of 20 s would show ghosts.
 constexpr int32_t kParticipantLeaseS = 5;
 constexpr int32_t kAnnouncementS = 1;
 
+// No shared-memory transport: in 2.9.1 a process that is killed and started again makes its queue anew, while those that
+// ran on write to the old one for ever (eProsima/Fast-DDS#4728), and a stopped one spins. Pictures are shared in memory
+// by data sharing, which does not need it.
 dds::DomainParticipantQos participant_qos(const ParticipantOptions& options) {
   dds::DomainParticipantQos qos;
   qos.name(options.service + "@" + options.host);
   qos.transport().use_builtin_transports = false;
-  auto shared_memory = std::make_shared<rtps::SharedMemTransportDescriptor>();
-  shared_memory->segment_size(kSharedMemoryBytes);
-  shared_memory->port_queue_capacity(kSharedMemoryQueue);
-  qos.transport().user_transports.push_back(shared_memory);
   auto udp = std::make_shared<rtps::UDPv4TransportDescriptor>();
   udp->sendBufferSize = kSocketBufferBytes;
   udp->receiveBufferSize = kSocketBufferBytes;
@@ -105,7 +100,7 @@ Participant::Participant(const ParticipantOptions& options) : impl_(std::make_un
                                                    impl_.get(), dds::StatusMask::none());
   if (impl_->participant == nullptr) {
     throw core::BadInput("cannot join DDS domain " + std::to_string(options.domain) +
-                         "; check that /dev/shm has room and that a network interface is up");
+                         "; check that the network of this host is up (`ip link set lo up` at least)");
   }
   dds::PublisherQos publisher_qos;
   publisher_qos.partition().push_back(("train/" + options.train_id).c_str());
