@@ -1,12 +1,12 @@
 // Two lock-step replays of one recording through the real fusion and map_matcher give the same positions, byte for
-// byte. This test takes a turn itself, so that it has every sample.
+// byte.
 #include <gmock/gmock.h>
 
 #include "core/random.hpp"
+#include "integration/replay/lock_step_ear.hpp"
 #include "mcap/writer.hpp"
 #include "messaging/topics.hpp"
 #include "support/program.hpp"
-#include "support/run_until.hpp"
 #include "track/map.hpp"
 
 namespace railfix {
@@ -24,7 +24,6 @@ constexpr int kImuPerFrame = 3;
 constexpr double kStepM = 0.7;
 constexpr double kAheadM = 3;
 constexpr double kMastsEveryM = 60;
-const std::string kOwnName = "tpr_publisher";  // whose turn this test takes
 
 void write_map(const fs::path& file) {
   track::Map map;
@@ -101,88 +100,6 @@ void record_ride(const fs::path& file) {
   recorded.close();
 }
 
-/// Hears every position of the train in lock step.
-class Ear {
- public:
-  explicit Ear(const std::string& train) : participant_(network(train)) {
-    hear(topics::train_state);
-    hear(topics::position_fix);
-    clock_.emplace(participant_, topics::data_clock, "", queue_, [this](const msg::DataClock& clock) {
-      if (clock.lock_step() != 0 && clock.ended() == 0 && kOwnName == clock.turn().c_str()) turn_ = clock;
-      ended_ = ended_ || clock.ended() != 0;
-    });
-    progress_.emplace(participant_, topics::data_progress);
-    status_.emplace(participant_, topics::service_status);
-  }
-
-  /// False when the replay takes too long.
-  bool listen_until_the_end() {
-    return test::run_until(participant_, queue_, [this] {
-      say_status();
-      answer();
-      return ended_;
-    });
-  }
-  [[nodiscard]] const std::map<std::string, std::string>& bytes() const { return bytes_; }
-  [[nodiscard]] const std::map<std::string, uint64_t>& samples() const { return received_; }
-
- private:
-  static messaging::ParticipantOptions network(const std::string& train) {
-    messaging::ParticipantOptions options;
-    options.train_id = train;
-    options.domain = kDomain;
-    return options;
-  }
-  template <class T>
-  void hear(const messaging::Topic<T>& topic) {
-    readers_.push_back(std::make_shared<messaging::Reader<T>>(
-        participant_, topic, "", queue_,
-        std::function([this, name = std::string(topic.name)](const T& sample, const messaging::SampleInfo& info) {
-          if (!info.valid) return;
-          const auto cdr = messaging::serialize(sample);
-          bytes_[name].append(cdr.begin(), cdr.end());
-          received_[name] = info.sequence;
-        })));
-  }
-  void say_status() {
-    if (core::monotonic_ns() < status_due_ns_) return;
-    status_due_ns_ = core::monotonic_ns() + 250'000'000;
-    const auto here = participant_.connections();
-    msg::ServiceStatus status;
-    status.service(kOwnName);
-    status.host("test");
-    status.state(msg::STATE_ACTIVE);
-    status.endpoints(here.endpoints);
-    status.matches(here.matches);
-    status_->write(status);
-  }
-  void answer() {
-    if (!turn_) return;
-    for (const auto& sent : turn_->sent()) {
-      const std::string topic = sent.topic().c_str();
-      if ((topic == "train_state" || topic == "position_fix") && received_[topic] < sent.samples()) return;
-    }
-    msg::DataProgress progress;
-    progress.data_ns(turn_->data_ns());
-    progress.seq(turn_->seq());
-    progress.service(kOwnName);
-    turn_.reset();
-    progress_->write(progress);
-  }
-
-  messaging::Queue queue_;
-  messaging::Participant participant_;
-  std::optional<messaging::Writer<msg::DataProgress>> progress_;
-  std::optional<messaging::Writer<msg::ServiceStatus>> status_;
-  std::vector<std::shared_ptr<void>> readers_;
-  std::optional<messaging::Reader<msg::DataClock>> clock_;
-  std::optional<msg::DataClock> turn_;
-  std::map<std::string, uint64_t> received_;
-  std::map<std::string, std::string> bytes_;
-  int64_t status_due_ns_ = 0;
-  bool ended_ = false;
-};
-
 class LockStepReplay : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -203,10 +120,11 @@ class LockStepReplay : public ::testing::Test {
     const std::string map = (folder_ / "line.map").string();
     const auto fusion = service("fusion", {"fusion.map=" + map, "fusion.start=1:100:+"});
     const auto matcher = service("map-matcher", {"map_matcher.map=" + map});
-    Ear ear(train);
-    test::Program replay({"railfix", "replay", (folder_ / "ride.mcap").string(), "--lock-step",
-                          "fusion,map_matcher," + kOwnName, "--train", train, "--domain", std::to_string(kDomain)},
-                         {folder_ / "out", folder_ / "err", {}});
+    test::LockStepEar ear(train, kDomain);
+    test::Program replay(
+        {"railfix", "replay", (folder_ / "ride.mcap").string(), "--lock-step",
+         "fusion,map_matcher," + test::LockStepEar::kName, "--train", train, "--domain", std::to_string(kDomain)},
+        {folder_ / "out", folder_ / "err", {}});
     EXPECT_TRUE(ear.listen_until_the_end()) << test::slurp(folder_ / "err");
     EXPECT_EQ(replay.wait_for_end(), 0) << test::slurp(folder_ / "err");
     EXPECT_THAT(test::slurp(folder_ / "err"), HasSubstr("train_state is written by a service of now and is left out"));
