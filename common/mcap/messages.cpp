@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <cstring>
 #include <limits>
+#include <utility>
 
 #include "mcap/reader.hpp"
 
@@ -15,7 +16,8 @@ namespace railfix::mcap {
 
 namespace {
 
-// Sorts behind every message of the same time and chunk number; a chunk is opened before its messages are known.
+// Of a chunk that was not opened yet. Forwards it stands at the chunk's first time, backwards at its last, where it
+// comes before every message of that time.
 constexpr uint64_t kUnopened = std::numeric_limits<uint64_t>::max();
 
 }  // namespace
@@ -64,11 +66,14 @@ Messages::Messages(Reader& reader, Selection selection) : reader_(reader), selec
     const ChunkPlace& place = reader_.places_[i];
     if (selection_.from_ns && place.end_ns < *selection_.from_ns) continue;
     if (selection_.to_ns && place.start_ns >= *selection_.to_ns) continue;
-    const auto wanted_channel = [this](uint16_t id) { return channels_.contains(id); };
-    if (!place.channels.empty() && std::ranges::none_of(place.channels, wanted_channel)) continue;
-    heap_.push_back({place.start_ns, i, kUnopened});
+    if (wanted(place)) heap_.push_back({selection_.backwards ? place.end_ns : place.start_ns, i, kUnopened});
   }
-  std::ranges::make_heap(heap_, std::greater<>());
+  std::ranges::make_heap(heap_, Behind{selection_.backwards});
+}
+
+bool Messages::wanted(const ChunkPlace& place) const {
+  const auto wanted_channel = [this](uint16_t id) { return channels_.contains(id); };
+  return place.channels.empty() || std::ranges::any_of(place.channels, wanted_channel);
 }
 
 bool Messages::wanted(const Message& message) const {
@@ -94,7 +99,7 @@ void Messages::open(uint64_t place) {
     }
     if (opcode != static_cast<uint8_t>(Opcode::message) || !parse(content, message) || !wanted(message)) continue;
     heap_.push_back({message.log_time_ns, place, position});
-    std::ranges::push_heap(heap_, std::greater<>());
+    std::ranges::push_heap(heap_, Behind{selection_.backwards});
     ++loaded.left;
   }
   if (loaded.left > 0) loaded_.emplace(place, std::move(loaded));
@@ -104,11 +109,11 @@ std::optional<Message> Messages::next() {
   if (finished_) loaded_.erase(*finished_);
   finished_.reset();
   while (!heap_.empty()) {
-    std::ranges::pop_heap(heap_, std::greater<>());
+    std::ranges::pop_heap(heap_, Behind{selection_.backwards});
     const Entry entry = heap_.back();
     heap_.pop_back();
     if (entry.position == kUnopened) {
-      open(entry.place);
+      if (wanted(reader_.places_[entry.place])) open(entry.place);
       continue;
     }
     Loaded& loaded = loaded_.at(entry.place);
@@ -116,7 +121,8 @@ std::optional<Message> Messages::next() {
     Message message;
     (void)parse(decoder.raw(decoder.u64()), message);
     if (--loaded.left == 0) finished_ = entry.place;
-    return message;
+    if (channels_.contains(message.channel_id)) return message;
+    if (finished_) loaded_.erase(*std::exchange(finished_, std::nullopt));
   }
   return std::nullopt;
 }

@@ -194,6 +194,7 @@ bool Reader::scan_record(uint8_t opcode, uint64_t offset, ByteView content) {
       }
       place.start_ns = inside.start_ns;
       place.end_ns = inside.end_ns;
+      for (const auto& [id, count] : inside.channel_messages) place.channels.push_back(id);
       places_.push_back(place);
       ++statistics_.chunks;
       return true;

@@ -25,7 +25,7 @@ struct ChunkPlace {
   int64_t end_ns = 0;
   uint64_t offset = 0;
   uint64_t length = 0;
-  bool loose = false;  // the run of records itself
+  bool loose = false;              // the run of records itself
   std::vector<uint16_t> channels;  // that have messages in it; empty = not known
 };
 
@@ -50,6 +50,7 @@ struct Selection {
   std::set<std::string> topics;    // empty = all
   std::optional<int64_t> from_ns;  // log time, inclusive
   std::optional<int64_t> to_ns;    // log time, exclusive
+  bool backwards = false;          // the newest first
 };
 
 class Messages;
@@ -105,6 +106,8 @@ class Messages {
  public:
   /// The next message, or nothing at the end. Its data lives until the next call.
   std::optional<Message> next();
+  /// No more messages of this channel; chunks that have no others of the selected are not read any more.
+  void leave_out(uint16_t channel_id) { channels_.erase(channel_id); }
 
  private:
   friend class Reader;
@@ -112,9 +115,14 @@ class Messages {
     int64_t log_time_ns;
     uint64_t place;     // number of the chunk, in file order
     uint64_t position;  // of the record within the chunk; kUnopened for a chunk not yet loaded
-    bool operator>(const Entry& other) const {
-      return std::tie(log_time_ns, place, position) > std::tie(other.log_time_ns, other.place, other.position);
+    bool operator<(const Entry& other) const {
+      return std::tie(log_time_ns, place, position) < std::tie(other.log_time_ns, other.place, other.position);
     }
+  };
+  /// The heap's order: true when a comes behind b.
+  struct Behind {
+    bool backwards;
+    bool operator()(const Entry& a, const Entry& b) const { return backwards ? a < b : b < a; }
   };
   struct Loaded {
     Bytes records;
@@ -122,6 +130,7 @@ class Messages {
   };
   Messages(Reader& reader, Selection selection);
   void open(uint64_t place);
+  [[nodiscard]] bool wanted(const ChunkPlace& place) const;
   [[nodiscard]] bool wanted(const Message& message) const;
 
   Reader& reader_;

@@ -58,6 +58,12 @@ class Copy : public ::testing::Test {
       sample.stamp_ns(at_s);
       return add(topics::odometry_step, sample, at_s);
     }
+    Recorded& status(const std::string& service, uint8_t state, int64_t at_s) {
+      msg::ServiceStatus status;
+      status.service(service);
+      status.state(state);
+      return add(messaging::topics::service_status, status, at_s);
+    }
     Recorded& losses(const std::string& count) {
       EXPECT_TRUE(writer_->write_metadata({"railfix_losses", {{"imu_sample queue", count}}}).ok());
       return *this;
@@ -96,6 +102,16 @@ TEST_F(Copy, StandingValuesAreTheLastOfEachInstance) {
   }
   EXPECT_THAT(focal_px, ElementsAre(2, 3));
   EXPECT_TRUE(standing_values(*reader, {"odometry_step"}, 9 * kSecond).empty());
+}
+
+TEST_F(Copy, OfAServiceThatSaysNothingAnyMoreNothingStands) {
+  Recorded(a_, "t").status("fusion", 1, 1).status("odometry", 2, 30).status("odometry", 3, 31).status("fusion", 1, 50);
+  auto reader = mcap::Reader::open(a_).value();
+  const auto values = standing_values(*reader, {}, 40 * kSecond);
+  ASSERT_EQ(values.size(), 1U);
+  msg::ServiceStatus status;
+  ASSERT_TRUE(messaging::deserialize(values[0].cdr, status));
+  EXPECT_EQ(status.state(), 3) << "its last word";
 }
 
 TEST_F(Copy, ACutKeepsWhatHeldAtItsBeginning) {

@@ -32,9 +32,14 @@ const cdr::Structure* SampleTypes::structure(const mcap::Channel& channel) {
   return known == nullptr ? nullptr : known->find(type_name(channel));
 }
 
-std::string SampleTypes::key(const mcap::Channel& channel, mcap::ByteView cdr) {
+bool SampleTypes::keyed(const mcap::Channel& channel) {
   const auto* type = structure(channel);
-  if (type == nullptr || std::ranges::none_of(type->members, &cdr::Member::key)) return "";
+  return type != nullptr && std::ranges::any_of(type->members, &cdr::Member::key);
+}
+
+std::string SampleTypes::key(const mcap::Channel& channel, mcap::ByteView cdr) {
+  if (!keyed(channel)) return "";
+  const auto* type = structure(channel);
   const auto sample = cdr::decode(*types(channel), type->name, cdr);
   if (!sample.ok()) return "";
   std::string key;

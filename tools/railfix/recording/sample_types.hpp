@@ -23,6 +23,7 @@ class SampleTypes {
   /// Nullptr when the type is not known.
   const cdr::Structure* structure(const mcap::Channel& channel);
   [[nodiscard]] std::string type_name(const mcap::Channel& channel) const;
+  [[nodiscard]] bool keyed(const mcap::Channel& channel);
   /// Tells instances of a keyed topic from each other; empty for others, and for bytes that are no such sample.
   std::string key(const mcap::Channel& channel, mcap::ByteView cdr);
 
