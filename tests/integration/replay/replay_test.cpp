@@ -35,6 +35,7 @@ class Replay : public ::testing::Test {
     listen<msg::CameraCalibration>(topics::camera_calibration, [this](const msg::CameraCalibration& calibration) {
       focal_px_[calibration.camera().c_str()] = calibration.fu_px();
     });
+    listen<msg::DataClock>(topics::data_clock, [this](const msg::DataClock& clock) { clock_ = clock; });
     source();
   }
   ~Replay() override { fs::remove_all(folder_); }
@@ -119,6 +120,7 @@ class Replay : public ::testing::Test {
   std::optional<messaging::Reader<msg::TrackView>> view_reader_;
   std::optional<msg::PlayerStatus> status_;
   std::optional<msg::ControlReply> reply_;
+  std::optional<msg::DataClock> clock_;
   std::vector<int64_t> views_;
   std::map<std::string, double> focal_px_;
   uint64_t request_ = 0;
@@ -138,6 +140,11 @@ TEST_F(Replay, IsLedOverDds) {
   }
   EXPECT_EQ(views_, (std::vector<int64_t>{0, 1}));
 
+  ASSERT_TRUE(run_until([this] { return clock_ && clock_->data_ns() >= 1; })) << "the data's time";
+  const msg::DataClock stands = *clock_;
+  ASSERT_TRUE(run_until([&] { return clock_->wall_ns() > stands.wall_ns() + 200'000'000; }));
+  EXPECT_EQ(clock_->data_ns(), stands.data_ns()) << "stands while the recording stands";
+
   tell("seek", "6");
   ASSERT_TRUE(run_until([this] { return focal_px_["cam0"] == 200; })) << "the calibration of 5 s still holds at 6 s";
   EXPECT_EQ(focal_px_["cam1"], 300);
@@ -156,6 +163,8 @@ TEST_F(Replay, IsLedOverDds) {
   EXPECT_NEAR(at_s(), kLengthS, 1e-6);
   ASSERT_TRUE(run_until([this] { return views_.size() == 3 + 40; }));
   EXPECT_EQ(views_.back(), kViews - 1);
+  ASSERT_TRUE(run_until([this] { return clock_->ended() == 1; }));
+  EXPECT_EQ(clock_->data_ns(), kViews - 1);
 
   EXPECT_EQ(player->exit_code(), std::nullopt) << "waits for commands at the end";
   EXPECT_EQ(player->end(SIGTERM), 0);

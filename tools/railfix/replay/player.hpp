@@ -49,17 +49,22 @@ class Player {
 
  private:
   using Command = std::function<core::Result<std::string>(const std::string& argument)>;
+  // player_setup.cpp
   void find_part();
   void discover();
   void open_channels();
+  void open_clock();
   void connect();
+  // player_commands.cpp
   std::map<std::string, Command> make_commands();
   core::Result<std::string> carry_out(const std::string& name, const std::string& argument);
   void answer(const msg::ControlRequest& request);
   core::Result<std::string> play();
   core::Result<std::string> seek(const std::string& argument);
   core::Result<std::string> set_rate(const std::string& argument);
+  void wake_promptly() const;
 
+  // player.cpp
   void go_to(int64_t at_ns);
   void play_on();
   bool hold_back(int64_t now_ns);
@@ -70,6 +75,7 @@ class Player {
   void serve(int64_t until_ns);
   void keep_alive(int64_t now_ns);
   void publish_status();
+  void publish_clock(bool ended);
   [[nodiscard]] int64_t at_ns() const;
   [[nodiscard]] ReplayReport report();
 
@@ -84,6 +90,7 @@ class Player {
   messaging::Writer<msg::PlayerStatus> status_;
   messaging::Writer<msg::ControlReply> replies_;
   messaging::Reader<msg::ControlRequest> requests_;
+  std::optional<messaging::Writer<msg::DataClock>> clock_;  // not in lock step, nor beside a clock of now
   std::unique_ptr<messaging::Reader<msg::ServiceStatus>> services_;
   std::set<std::string> live_services_;
   std::function<void(const msg::PlayerStatus&)> on_status_;
@@ -100,9 +107,11 @@ class Player {
   uint64_t moves_ = 0;  // counts go_to()
   std::unique_ptr<SampleFeed> feed_;
   std::optional<PreparedSample> next_;
-  int64_t sent_to_ns_ = 0;  // log time of the last sample
-  size_t unused_ = 0;       // lock step: samples sent that nobody had a turn for
-  int64_t data_ns_ = 0;     // lock step: stamp of the newest picture, or what stands for it
+  int64_t sent_to_ns_ = 0;    // log time of the last sample
+  size_t unused_ = 0;         // lock step: samples sent that nobody had a turn for
+  int64_t data_ns_ = 0;       // stamp of the newest picture, or what stands for it, 0 = none yet
+  int64_t data_time_ns_ = 0;  // its log time
+  uint64_t clocks_ = 0;       // sent
   std::optional<int64_t> waiting_since_ns_;
   int64_t alive_due_ns_ = 0;
   int64_t status_due_ns_ = 0;
