@@ -12,6 +12,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int64_t kTickNs = core::kNsPerSecond / 4;
+constexpr int64_t kSplitAgainNs = core::kNsPerSecond;
 constexpr double kBytesPerMb = 1e6;
 
 mcap::Compression compression_of(const std::string& name) {
@@ -108,8 +109,13 @@ core::Result<std::string> RecorderThread::begin(const fs::path& file) {
                         : !config_.file.empty() ? fs::path(config_.file)
                                                 : new_name(config_.folder, about_.at("train_id"), core::wall_ns());
   count_dropped();  // not of this file
-  const auto created = create(name);
-  if (!created.ok()) return created.error();
+  auto created = create(name);
+  if (!created.ok()) {
+    problem_ = created.error().message;
+    return created.error();
+  }
+  record_into(std::move(created).value());
+  paused_ = false;
   inlet_->want_recorded(true);
   if (inlet_->is_open()) {
     write_standing();
@@ -131,42 +137,53 @@ mcap::WriterOptions RecorderThread::writer_options() const {
   return options;
 }
 
-core::Status RecorderThread::create(const fs::path& file) {
+core::Result<std::unique_ptr<Recording>> RecorderThread::create(const fs::path& file) {
   mcap::WriterOptions options = writer_options();
   options.overwrite = !config_.file.empty() && file == config_.file;
-  recording_started_ns_ = core::wall_ns();
-  about_["started_ns"] = std::to_string(recording_started_ns_);
+  about_["started_ns"] = std::to_string(core::wall_ns());
   auto recording = Recording::create(file, options, about_);
-  if (!recording.ok()) {
-    problem_ = recording.error().message;
-    return recording.error();
-  }
-  recording_ = std::move(recording).value();
+  std::ifstream configuration(config_.train_file);
+  if (!recording.ok() || config_.train_file.empty() || !configuration) return recording;
+  const auto status = recording.value()->write_metadata(
+      {"railfix_configuration",
+       {{"file", config_.train_file}, {"text", {std::istreambuf_iterator<char>(configuration), {}}}}});
+  if (!status.ok()) return status.error();
+  return recording;
+}
+
+void RecorderThread::record_into(std::unique_ptr<Recording> recording) {
+  recording_ = std::move(recording);
+  recording_started_ns_ = core::wall_ns();
   recording_begun_ns_ = core::monotonic_ns();
   rated_ns_ = recording_begun_ns_;
   rated_bytes_ = 0;
-  paused_ = false;
   problem_.clear();
-  std::ifstream configuration(config_.train_file);
-  if (config_.train_file.empty() || !configuration) return {};
-  return recording_->write_metadata(
-      {"railfix_configuration",
-       {{"file", config_.train_file}, {"text", {std::istreambuf_iterator<char>(configuration), {}}}}});
+  split_problem_.clear();
 }
 
+// The next file is there before the old one is closed: if it cannot be made, the old one goes on, and it is tried
+// again.
 void RecorderThread::split_if_due() {
   if (!config_.file.empty() && recording_->file() == config_.file) return;
   const bool large = config_.split_mb > 0 && static_cast<double>(recording_->bytes()) >= config_.split_mb * kBytesPerMb;
   const double age_s = core::seconds(core::monotonic_ns() - recording_begun_ns_);
   if (!large && (config_.split_min <= 0 || age_s < config_.split_min * 60)) return;
+  if (!split_problem_.empty() && core::monotonic_ns() < split_again_ns_) return;
+  const fs::path name = new_name(config_.folder, about_.at("train_id"), core::wall_ns());
+  auto next = create(name);
+  if (!next.ok()) {
+    std::error_code failed;
+    for (const auto& begun : {name, fs::path(name.string() + ".active")}) fs::remove(begun, failed);
+    split_problem_ = "no new file can be begun, " + recording_->file().string() + " goes on: " + next.error().message;
+    split_again_ns_ = core::monotonic_ns() + kSplitAgainNs;
+    return;
+  }
   count_dropped();
   (void)wait_for_closing();
-  const bool paused = paused_;
   // Forcing the rest of a file to the disk takes long enough for samples to pile up.
   closing_ = std::async(std::launch::async,
                         [old = std::shared_ptr<Recording>(std::move(recording_))] { return old->close(); });
-  if (!create(new_name(config_.folder, about_.at("train_id"), core::wall_ns())).ok()) return;
-  paused_ = paused;
+  record_into(std::move(next).value());
   write_standing();
 }
 
@@ -199,6 +216,7 @@ core::Result<std::string> RecorderThread::end() {
   const auto before = wait_for_closing();
   const auto status = recording_->close();
   recording_.reset();
+  split_problem_.clear();
   paused_ = false;
   for (const auto& one : {before, status}) {
     if (one.ok()) continue;
@@ -300,7 +318,7 @@ void RecorderThread::publish_state() {
   now.ring_s = ring_ ? ring_->seconds() : 0;
   now.received = received_;
   now.written = written_;
-  now.problem = problem_;
+  now.problem = problem_.empty() ? split_problem_ : problem_;
   now.event = event_;
   now.waiting_bytes = inlet_->waiting_bytes();
   if (event_file_) now.waiting_bytes += event_file_->waiting_bytes();

@@ -67,7 +67,8 @@ class RecorderThread {
  private:
   core::Result<std::string> in_thread(const std::function<core::Result<std::string>()>& work);
   core::Result<std::string> begin(const std::filesystem::path& file);
-  core::Status create(const std::filesystem::path& file);
+  core::Result<std::unique_ptr<Recording>> create(const std::filesystem::path& file);
+  void record_into(std::unique_ptr<Recording> recording);
   core::Result<std::string> end();
   core::Result<std::string> set_paused(bool paused);
   void split_if_due();
@@ -112,6 +113,8 @@ class RecorderThread {
   std::vector<std::unique_ptr<EventFile>> closing_events_;
   std::optional<EventNote> event_;
   std::string problem_;
+  std::string split_problem_;  // why the next file could not be begun
+  int64_t split_again_ns_ = 0;
   uint64_t received_ = 0;
   uint64_t written_ = 0;
   int64_t ticked_ns_ = 0;

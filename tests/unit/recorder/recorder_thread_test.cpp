@@ -1,6 +1,7 @@
 // Real topics inside one process, recorded into a file.
 #include <gmock/gmock.h>
 
+#include <fstream>
 #include <set>
 
 #include "cdr/decode.hpp"
@@ -131,6 +132,44 @@ TEST_F(RecorderThreadTest, ANewFileRepeatsStandingValues) {
     });
     EXPECT_EQ(cameras, (std::set<std::string>{"cam0", "cam1"})) << file;
   }
+}
+
+TEST_F(RecorderThreadTest, GoesOnInTheOldFileWhenANewOneCannotBeBegunAndTriesAgain) {
+  config_.split_mb = 0.03;
+  config_.compression = "none";
+  config_.chunk_age_s = 0.05;
+  messaging::Writer<msg::LogRecord> log(participant_, topics::log_record);
+  auto recorder = this->recorder();
+  const auto started = recorder->start("");
+  ASSERT_TRUE(started.ok());
+  const fs::path away = folder_.string() + "-away";
+  fs::rename(folder_, away);
+  std::ofstream(folder_) << "no folder can be here";
+  uint64_t sent = 0;
+  const auto send = [&] {
+    msg::LogRecord record;
+    record.text(std::string(1000, 'x'));
+    sent += log.write(record) ? 1 : 0;
+  };
+  ASSERT_TRUE(wait_until([&] { return send(), !recorder->state().problem.empty(); }));
+  EXPECT_THAT(recorder->state().problem, HasSubstr("no new file can be begun, " + started.value() + " goes on"));
+  EXPECT_TRUE(recorder->state().recording);
+  for (int i = 0; i < 20; ++i) send();
+  ASSERT_TRUE(wait_until([&] { return recorder->state().written == sent; }));
+  EXPECT_FALSE(recorder->state().problem.empty()) << "until a file can be begun";
+
+  fs::remove(folder_);
+  fs::rename(away, folder_);
+  ASSERT_TRUE(wait_until([&] { return recorder->state().file != started.value(); }));
+  EXPECT_TRUE(recorder->state().problem.empty());
+  send();
+  ASSERT_TRUE(wait_until([&] { return recorder->state().written == sent; }));
+  const std::string second = recorder->state().file;
+  ASSERT_TRUE(recorder->stop().ok());
+  uint64_t messages = 0;
+  for (const auto& file : {started.value(), second})
+    messages += mcap::Reader::open(file).value()->statistics().messages;
+  EXPECT_EQ(messages, sent);
 }
 
 TEST_F(RecorderThreadTest, FullDiskEndsTheRecordingProperly) {
