@@ -79,6 +79,26 @@ void fill_settings(YAML::Node& settings, const RunOptions& options, const RunPla
   settings["recorder"]["pictures"] = options.record_pictures ? "jpeg" : "none";
 }
 
+// What is set on the command line is part of the run's configuration. What cannot be meant the services refuse.
+void add_overrides(YAML::Node& settings, const std::vector<std::string>& sets) {
+  for (const std::string& set : sets) {
+    const size_t equals = set.find('=');
+    if (equals == std::string::npos || set.find('.') >= equals) continue;
+    try {
+      const YAML::Node value = YAML::Load(set.substr(equals + 1));
+      YAML::Node section = settings;
+      std::string key = set.substr(0, equals);
+      for (size_t dot = key.find('.'); dot != std::string::npos; dot = key.find('.')) {
+        section.reset(section[key.substr(0, dot)]);
+        key.erase(0, dot + 1);
+      }
+      section[key] = value.IsScalar() ? YAML::Node(value.Scalar()) : value;
+    } catch (const YAML::Exception&) {
+      continue;
+    }
+  }
+}
+
 }  // namespace
 
 core::Result<RunPlan> plan_run(const RunOptions& options) {
@@ -106,6 +126,7 @@ core::Result<RunPlan> plan_run(const RunOptions& options) {
   if (!settings.ok()) return settings.error();
   plan.config = std::filesystem::absolute(options.out / "run.yaml");
   fill_settings(settings.value(), options, plan);
+  add_overrides(settings.value(), options.sets);
   std::ofstream file(plan.config);
   file << settings.value() << '\n';
   file.close();
