@@ -22,7 +22,7 @@ export function line_map() {
     id, kind, name, edge: 1, offset_m, across_m, easting_m: main[Math.round(offset_m / 10)][1], northing_m: main[Math.round(offset_m / 10)][2],
   });
   return {
-    edges: [{ id: 1, name: "track 1", length_m: 6000, line: main }, { id: 2, name: "loop", length_m: 700, line: side }],
+    edges: [{ id: 1, name: "track 1", length_m: 6000, line: main }, { id: 2, length_m: 700, line: side }],
     switches: [{ id: 1, edge: 1, offset_m: 1650, easting_m: at_switch[1], northing_m: at_switch[2] }],
     landmarks: [
       beside(1, "platform", "Oberwil", 900, 3), beside(2, "platform", "Talheim", 2300, -3), beside(3, "balise", "123-4567", 1600, 0),

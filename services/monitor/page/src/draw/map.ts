@@ -118,15 +118,18 @@ class Scene {
     if (!live && this.room("old", x + 12, y + 16)) label(context, "old", x + 12, y + 16, this.c.muted);
   }
 
-  /// On the track itself, in the middle of what is seen of it.
+  /// On the track itself, in the middle of what is seen of it. Edges without a name are told by their number, after all
+  /// others and where there is much of them to see.
   edge_names(): void {
-    for (const edge of this.map.data.edges) {
+    const named = (edge: MapData["edges"][number]) => Boolean(edge.name);
+    for (const edge of [...this.map.data.edges].sort((a, b) => Number(named(b)) - Number(named(a)))) {
       const box = this.map.boxes.get(edge.id);
-      if (!edge.name || box === undefined || !overlap(box, this.seen)) continue;
-      const middle = longest_inside(edge.line.map((point) => this.project([point[1], point[2]])), this.paper);
+      if (box === undefined || !overlap(box, this.seen)) continue;
+      const text = this.map.name(edge.id);
+      const middle = middle_inside(edge.line.map((point) => this.project([point[1], point[2]])), this.paper, named(edge) ? NAMED_FROM_PX : NUMBERED_FROM_PX);
       if (middle === null) continue;
       const [x, y] = middle;
-      if (this.room(edge.name, x + 6, y + 14)) label(this.paper.context, edge.name, x + 6, y + 14, this.c.text);
+      if (this.room(text, x + 6, y + 14)) label(this.paper.context, text, x + 6, y + 14, named(edge) ? this.c.text : this.c.muted);
     }
   }
 
@@ -207,21 +210,29 @@ class Scene {
   }
 }
 
-const NAMED_FROM_PX = 8;
+const NAMED_FROM_PX = 24; // so much of an edge must be seen
+const NUMBERED_FROM_PX = 80;
 
-/// Middle of the longest straight piece of a line that lies on the paper; null when none is long enough for a name.
-function longest_inside(line: [number, number][], paper: { width: number; height: number }): [number, number] | null {
-  let best: { length: number; middle: [number, number] } | null = null;
+/// The middle of what lies of a line on the paper; null when that is shorter than `least_px`.
+function middle_inside(line: [number, number][], paper: { width: number; height: number }, least_px: number): [number, number] | null {
+  const pieces: { at: [number, number]; along: [number, number]; length_px: number }[] = [];
+  let seen_px = 0;
   for (let i = 1; i < line.length; ++i) {
     const [a, b] = [line[i - 1], line[i]] as [[number, number], [number, number]];
     const [from, to] = clipped(a, b, paper);
     if (from >= to) continue;
     const [dx, dy] = [b[0] - a[0], b[1] - a[1]];
-    const length = (to - from) * Math.hypot(dx, dy);
-    const share = from + 0.6 * (to - from);
-    if (best === null || length > best.length) best = { length, middle: [a[0] + share * dx, a[1] + share * dy] };
+    const along: [number, number] = [(to - from) * dx, (to - from) * dy];
+    pieces.push({ at: [a[0] + from * dx, a[1] + from * dy], along, length_px: Math.hypot(...along) });
+    seen_px += Math.hypot(...along);
   }
-  return best === null || best.length < NAMED_FROM_PX ? null : best.middle;
+  if (seen_px < least_px) return null;
+  let left_px = seen_px / 2;
+  for (const { at, along, length_px } of pieces) {
+    if (left_px <= length_px) return [at[0] + (left_px / length_px) * along[0], at[1] + (left_px / length_px) * along[1]];
+    left_px -= length_px;
+  }
+  return null;
 }
 
 /// The part of a segment on the paper, as shares from a to b (Liang and Barsky, 1984).

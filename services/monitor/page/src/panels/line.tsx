@@ -18,6 +18,7 @@ const NEAREST = 0.02;
 const FARTHEST = 2000;
 
 const FOLLOWED_UP_TO = 5;
+const BUTTONS_PX = 44; // they lie over the upper edge of the map
 
 function follow(): void {
   following.value = true;
@@ -55,8 +56,9 @@ function whole_line(width: number, height: number): void {
   const box = track.value?.box();
   if (box === undefined) return;
   following.value = false;
-  centre.value = [(box.west + box.east) / 2, (box.south + box.north) / 2];
-  metres_per_px.value = Math.max((box.east - box.west) / (width - 40), (box.north - box.south) / (height - 40), NEAREST);
+  const m = Math.max((box.east - box.west) / (width - 40), (box.north - box.south) / (height - 40 - BUTTONS_PX), NEAREST);
+  metres_per_px.value = m;
+  centre.value = [(box.west + box.east) / 2, (box.south + box.north + BUTTONS_PX * m) / 2];
 }
 
 function key(event: KeyboardEvent): void {
