@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 
@@ -142,9 +143,8 @@ class Estimator {
   [[nodiscard]] bool used_within(Source source, double time_s) const;
   void doubt_time(const SensorWatch& watch, Rhythm& rhythm, int64_t stamp_ns);
   void notice_gap(int64_t stamp_ns);
-  /// offering: MotionFilter& -> Offer. Offered again as a sudden change of acceleration when it is refused.
-  template <typename Offering>
-  Offer offer_motion(Source source, int64_t stamp_ns, const Offering& offering);
+  /// Offered again as a sudden change of acceleration when it is refused.
+  Offer offer_motion(Source source, int64_t stamp_ns, const std::function<Offer(MotionFilter&)>& offering);
   void use(const OdometryInput& step);
   void use(const WheelInput& sample);
   void use(const ImuInput& sample);

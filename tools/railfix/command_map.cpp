@@ -375,6 +375,10 @@ void add_build(CLI::App& map, Action& chosen) {
   command->add_option("--first-nid-bg", request->options.first_nid_bg, "NID_BG of the first virtual balise group")
       ->check(CLI::Range(0, 16382))
       ->capture_default_str();
+  command
+      ->add_option("--landmarks", request->options.landmarks,
+                   "Keep landmarks of these kinds alone, for example frog,portal_in,portal_out (default: all)")
+      ->delimiter(',');
   command->add_flag("--json", request->as_json, "The figures and problems as JSON on standard output");
   command->footer(
       "Examples:\n"

@@ -123,6 +123,7 @@ class Sources {
                                             options_.first_nid_bg,
                                             all_surveyed ? kSurveyLocationM : kMappingLocationM));
     }
+    if (!options_.landmarks.empty()) core::ok_or_throw(keep_landmarks(map_, options_.landmarks));
     for (std::string& problem : check_topology(map_)) map_.problems.push_back(std::move(problem));
     out_.map = std::move(map_);
     return std::move(out_);

@@ -21,6 +21,7 @@ struct BuildOptions {
   double virtual_balises_every_m = 0;  // 0 = none
   uint32_t nid_c = 1;
   uint32_t first_nid_bg = 1;
+  std::vector<std::string> landmarks{};  // kinds that are kept; empty = all
 };
 
 struct BuiltMap {

@@ -114,4 +114,23 @@ core::Status add_virtual_balises(Map& map, double every_m, uint32_t nid_c, uint3
   return {};
 }
 
+core::Status keep_landmarks(Map& map, const std::vector<std::string>& kinds) {
+  for (const auto& kind : kinds) {
+    if (!landmark_kind_from(kind)) return core::Error{"there are no landmarks of kind \"" + kind + "\""};
+  }
+  std::unordered_map<uint32_t, uint32_t> new_ids;
+  std::vector<Landmark> kept;
+  for (const Landmark& mark : map.landmarks) {
+    if (std::ranges::find(kinds, to_string(mark.kind)) == kinds.end()) continue;
+    kept.push_back(mark);
+    kept.back().id = new_ids[mark.id] = static_cast<uint32_t>(kept.size());
+  }
+  map.landmarks = std::move(kept);
+  for (BaliseGroup& group : map.balise_groups) {
+    std::erase_if(group.balises, [&](uint32_t id) { return !new_ids.contains(id); });
+    for (uint32_t& id : group.balises) id = new_ids.at(id);
+  }
+  return {};
+}
+
 }  // namespace railfix::track

@@ -130,6 +130,24 @@ TEST(VirtualBalises, AreSpreadAlongTheEdges) {
   EXPECT_FALSE(add_virtual_balises(map, 300, 1024, 1, 5).ok());
 }
 
+TEST(Landmarks, AreKeptByTheirKind) {
+  Map map = small_map();
+  map.landmarks = {{1, LandmarkKind::mast, 1, 10, 3, 0, "mast"},
+                   {2, LandmarkKind::balise, 1, 20, 0, 0, "balise 1"},
+                   {3, LandmarkKind::frog, 1, 30, 0, 0, "frog"},
+                   {4, LandmarkKind::balise, 1, 23, 0, 0, "balise 2"}};
+  map.balise_groups.assign(1, {.edge = 1, .balises = {2, 4}});
+  EXPECT_FALSE(keep_landmarks(map, {"balice"}).ok());
+  ASSERT_TRUE(keep_landmarks(map, {"balise"}).ok());
+  ASSERT_EQ(map.landmarks.size(), 2U);
+  EXPECT_EQ(map.landmarks[1].id, 2U);
+  EXPECT_EQ(map.landmarks[1].name, "balise 2");
+  EXPECT_THAT(map.balise_groups[0].balises, testing::ElementsAre(1, 2));
+  ASSERT_TRUE(keep_landmarks(map, {"frog"}).ok());
+  EXPECT_TRUE(map.landmarks.empty());
+  EXPECT_TRUE(map.balise_groups[0].balises.empty());
+}
+
 TEST(Check, FindsNothingInASoundMap) {
   EXPECT_THAT(check_topology(small_map()), IsEmpty());
 }

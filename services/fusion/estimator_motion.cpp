@@ -1,0 +1,219 @@
+// Camera, wheel and IMU: what measures the motion.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/time.hpp"
+#include "core/units.hpp"
+#include "fusion/estimator.hpp"
+
+namespace railfix::fusion {
+namespace {
+
+constexpr int kRefusalsToIsolate = 3;
+constexpr int kRefusalsToDoubt = 10;
+constexpr int kAgreementsOfCamera = 10;
+constexpr int kAgreementsOfImu = 60;
+constexpr int kRepeatedSamples = 10;   // and for ...
+constexpr double kRepeatedS = 0.15;    // ... so long
+constexpr double kRecoveryWayM = 1.0;  // a wheel shows by turning that it is well again
+constexpr double kSlipWindowS = 0.5;
+constexpr int kGoodWindows = 2;
+constexpr double kSlipTestSigmas = 3.0;
+constexpr double kSlipSigmas = 4.5;
+constexpr double kGyroPositionSigmaM = 30.0;  // within which the curvature may be taken as linear
+constexpr double kLatelyS = 1.0;
+
+}  // namespace
+
+Offer Estimator::offer_motion(Source source, int64_t stamp_ns, const std::function<Offer(MotionFilter&)>& offering) {
+  const Offer offer = offering(filter_);
+  if (offer.used) {
+    sudden_change_.agreed(source, stamp_ns);
+    return offer;
+  }
+  MotionFilter changed = filter_;
+  changed.doubt_acceleration(sudden_change_.since_s(stamp_ns), SuddenChange::kSigmaMps2);
+  const Offer again = offering(changed);
+  if (!again.used || !sudden_change_.called(source, stamp_ns, offer.residual > 0)) return offer;
+  filter_ = std::move(changed);
+  return again;
+}
+
+void Estimator::use(const PictureInput& picture) {
+  filter_.clone_now(picture.stamp_ns);
+}
+
+void Estimator::use(const OdometryInput& step) {
+  auto& camera = watched(Source::camera);
+  if (step.valid) doubt_time(camera, pictures_, step.stamp_ns);
+  camera.seen_ns = step.stamp_ns;
+  if (step.valid) {
+    if (filter_.unit() == Odometer::none) filter_.choose_unit(Odometer::camera, *parameters_);
+    const double sigma_m = std::hypot(step.step_sigma_m, parameters_->step_sigma_floor_m);
+    const double dt_s = core::seconds(step.stamp_ns - step.reference_stamp_ns);
+    // Without the reference picture's clone the step is a mean speed, less sure by what the train may have changed it.
+    const auto offered_to = [&](MotionFilter& filter) {
+      return filter.has_clone(step.reference_stamp_ns)
+                 ? filter.offer_step(step.reference_stamp_ns, step.step_m, sigma_m, parameters_->gate_camera)
+                 : filter.offer_speed(step.step_m / dt_s, sigma_m / dt_s + 0.5 * dt_s, parameters_->gate_camera);
+    };
+    const bool alone = !used_within(Source::wheel, kLatelyS);
+    if (camera.isolated && !(alone && !used_within(Source::imu, kLatelyS))) {
+      slip_watch_.no_picture();
+      MotionFilter trial = filter_;
+      const auto offer = offered_to(trial);
+      camera.hear(offer.used, kAgreementsOfCamera, step.stamp_ns);
+      if (alone) doubt_m_ += std::abs(offer.residual);
+    } else if (const auto offer = offer_motion(Source::camera, step.stamp_ns, offered_to); offer.used) {
+      camera.accept(step.stamp_ns);
+      if (step.reference_stamp_ns <= gap_begin_ns_ && filter_.has_clone(step.reference_stamp_ns)) time_doubt_m_ = 0;
+      compare_with_wheel(step, sigma_m);
+    } else {
+      slip_watch_.no_picture();
+      if (++camera.refused >= kRefusalsToIsolate) camera.isolate(step.stamp_ns);
+      // With the wheel the rivals' ends are wide enough; without it nobody knows who is right.
+      if (camera.refused >= kRefusalsToDoubt && alone) doubt_m_ += std::abs(offer.residual);
+    }
+  }
+  if (!step.valid) slip_watch_.no_picture();
+  filter_.clone_now(step.reference_stamp_ns);
+}
+
+void Estimator::compare_with_wheel(const OdometryInput& step, double sigma_m) {
+  const auto ways = slip_watch_.picture(step);
+  if (!ways || watch(Source::wheel).isolated) return;
+  const double visual_m = ways->visual_m * filter_.to_unit(Odometer::camera);
+  const double wheel_m = ways->wheel_m * filter_.to_unit(Odometer::wheel);
+  const double noise_m = std::hypot(sigma_m * std::sqrt(ways->steps), wheel_.resolution_m);
+  const double known_m = filter_.sigma(StateIndex::other_scale) * std::abs(visual_m);
+  const double raw_m = std::hypot(parameters_->visual_scale_sigma, parameters_->wheel_scale_sigma) * std::abs(visual_m);
+  const bool ratio_moved = std::abs(wheel_m - visual_m) > kSlipSigmas * std::hypot(noise_m, known_m);
+  const bool ratio_impossible = std::abs(ways->wheel_m - ways->visual_m) > kSlipSigmas * std::hypot(noise_m, raw_m);
+  if (ratio_moved || ratio_impossible) isolate_wheel();
+}
+
+void Estimator::isolate_wheel() {
+  watched(Source::wheel).isolate(stamp_ns_);
+  wheel_.good_windows = 0;
+  wheel_.window_begin_ns = filter_.stamp_ns();
+  wheel_.window_m.reset();
+  slip_began_ = true;
+}
+
+void Estimator::use(const WheelInput& sample) {
+  auto& watch = watched(Source::wheel);
+  if (!watch.isolated) doubt_time(watch, pulses_, sample.stamp_ns);
+  watch.seen_ns = sample.stamp_ns;
+  const double sigma_m = std::hypot(1 / sample.pulses_per_metre / std::sqrt(12.0), 0.001);
+  const bool first = !wheel_.first_pulses;
+  if (first) wheel_.first_pulses = sample.pulses;
+  wheel_.resolution_m = 1 / sample.pulses_per_metre;
+  const double wheel_m = static_cast<double>(sample.pulses - *wheel_.first_pulses) / sample.pulses_per_metre;
+  slip_watch_.wheel(sample.stamp_ns, wheel_m);
+  if (sample.stamp_ns <= wheel_.blocked_until_ns) {
+    isolate_wheel();
+    slip_began_ = false;
+  }
+  if (first) {
+    if (filter_.unit() == Odometer::none) filter_.choose_unit(Odometer::wheel, *parameters_);
+    filter_.restart_wheel(wheel_m, sigma_m);
+  } else if (watch.isolated) {
+    recover_wheel(sample, wheel_m, sigma_m);
+  } else if (offer_motion(Source::wheel, sample.stamp_ns, [&](MotionFilter& filter) {
+               return filter.offer_wheel(wheel_m, sigma_m, parameters_->gate_wheel);
+             }).used) {
+    watch.accept(sample.stamp_ns);
+    time_doubt_m_ = 0;
+  } else if (++watch.refused >= kRefusalsToIsolate) {
+    isolate_wheel();
+  }
+}
+
+// While the wheel slips its odometer is only compared, window by window; two good windows in which it turned end the
+// slip: a wheel that is stuck agrees with every train that stands. Where there is no camera it must be taken as it is.
+void Estimator::recover_wheel(const WheelInput& sample, double wheel_m, double sigma_m) {
+  const auto begin_window = [&] {
+    wheel_.window_begin_ns = sample.stamp_ns;
+    wheel_.window_m = wheel_m;
+    filter_.restart_wheel(wheel_m, sigma_m);
+  };
+  if (wheel_.window_begin_ns >= sample.stamp_ns || !wheel_.window_m) begin_window();
+  if (core::seconds(sample.stamp_ns - wheel_.window_begin_ns) < kSlipWindowS) return;
+  MotionFilter trial = filter_;
+  const bool good = trial.offer_wheel(wheel_m, sigma_m, kSlipTestSigmas).used;
+  const bool with_camera = watch(Source::camera).seen_ns != 0 && !silent(Source::camera);
+  if (with_camera && good && std::abs(wheel_m - *wheel_.window_m) < kRecoveryWayM) return;
+  wheel_.good_windows = good ? wheel_.good_windows + 1 : 0;
+  begin_window();
+  if (wheel_.good_windows >= kGoodWindows) watched(Source::wheel).accept(sample.stamp_ns);
+}
+
+std::optional<double> Estimator::Mean::add(int64_t stamp_ns, double value, double period_s) {
+  if (count == 0 || core::seconds(stamp_ns - last_ns) > 0.5) *this = {stamp_ns, stamp_ns, 0, 0};
+  last_ns = stamp_ns;
+  sum += value;
+  ++count;
+  if (core::seconds(stamp_ns - since_ns) < period_s) return std::nullopt;
+  const double mean = sum / count;
+  *this = {};
+  return mean;
+}
+
+void Estimator::use(const ImuInput& sample) {
+  auto& imu = watched(Source::imu);
+  imu.seen_ns = sample.stamp_ns;
+  accel_repeated_.add(sample.accel_x_mps2, sample.stamp_ns);
+  const auto accel_mps2 = accel_.add(sample.stamp_ns, sample.accel_x_mps2, parameters_->imu_period_s);
+  const auto rate_rps = yaw_.add(sample.stamp_ns, sample.rate_z_rps, parameters_->gyro_period_s);
+  if (accel_mps2 || rate_rps) predict_to(sample.stamp_ns);
+  if (accel_mps2) use_acceleration(*accel_mps2, sample.stamp_ns);
+  if (rate_rps) use_yaw_rate(*rate_rps);
+}
+
+void Estimator::use_acceleration(double accel_mps2, int64_t stamp_ns) {
+  auto& imu = watched(Source::imu);
+  const bool stuck =
+      accel_repeated_.count >= kRepeatedSamples && core::seconds(stamp_ns - accel_repeated_.since_ns) >= kRepeatedS;
+  if (stuck) {
+    imu.isolate(stamp_ns);
+    imu.convicted = true;
+    imu.agreed = 0;
+    return;
+  }
+  const double grade = path_ ? path_->at(filter_.path_distance_m()).grade : 0.0;
+  const double force_mps2 = accel_mps2 - core::kGravityMps2 * grade / std::hypot(1.0, grade);
+  const double sigma_mps2 = parameters_->accel_sigma_mps2;
+  if (imu.convicted) {
+    MotionFilter trial = filter_;
+    imu.hear(trial.offer_acceleration(force_mps2, sigma_mps2, parameters_->gate_imu).used, kAgreementsOfImu, stamp_ns);
+    return;
+  }
+  const auto offer = offer_motion(Source::imu, stamp_ns, [&](MotionFilter& filter) {
+    return filter.offer_acceleration(force_mps2, sigma_mps2, parameters_->gate_imu);
+  });
+  if (offer.used) {
+    imu.accept(stamp_ns);
+  } else if (++imu.refused >= kRefusalsToIsolate) {
+    imu.isolate(stamp_ns);
+  }
+}
+
+// The mean belongs to the middle of its period, which lies v * period / 2 behind.
+void Estimator::use_yaw_rate(double rate_rps) {
+  const double speed_mps = filter_.speed_mps();
+  const double speed_sigma_mps = filter_.sigma(StateIndex::speed);
+  if (standstill_) {
+    filter_.offer_yaw_rate(rate_rps, 0, 0, parameters_->gyro_sigma_rps, parameters_->gate_gyro);
+    return;
+  }
+  if (!path_ || filter_.path_sigma_m() > kGyroPositionSigmaM || speed_sigma_mps > 1) return;
+  const auto point = path_->at(filter_.path_distance_m() - 0.5 * speed_mps * parameters_->gyro_period_s);
+  // A tenth of the curvature covers the map's error, which is the same for a whole curve.
+  const double sigma_rps =
+      parameters_->gyro_sigma_rps + std::abs(point.curvature_per_m) * (0.1 * std::abs(speed_mps) + speed_sigma_mps);
+  filter_.offer_yaw_rate(rate_rps, point.curvature_per_m, point.curvature_rate_per_m2, sigma_rps,
+                         parameters_->gate_gyro);
+}
+
+}  // namespace railfix::fusion

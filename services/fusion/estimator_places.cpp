@@ -1,0 +1,142 @@
+// GNSS and fixes: what says where the train is.
+#include <algorithm>
+#include <cmath>
+
+#include "core/time.hpp"
+#include "fusion/estimator.hpp"
+
+namespace railfix::fusion {
+namespace {
+
+constexpr int kRefusalsToIsolate = 3;
+constexpr double kOffTrackM = 15.0;  // a GNSS fix further beside the track is none
+
+double gnss_sigma_m(const GnssInput& sample, const FusionParameters& p) {
+  const double hdop = std::max(sample.hdop, 0.5);
+  if (sample.fix == 4) return p.gnss_rtk_fixed_sigma_m * hdop;
+  if (sample.fix == 5) return p.gnss_rtk_float_sigma_m * hdop;
+  return p.gnss_single_sigma_m * hdop;
+}
+
+struct Projection {
+  double distance_m;
+  double lateral_m;
+};
+
+// Newton steps along the path; converges in two or three because the start is near.
+Projection project(const track::Path& path, double start_m, double easting_m, double northing_m) {
+  double s = start_m;
+  double lateral_m = 0;
+  for (int k = 0; k < 6; ++k) {
+    const auto pose = path.at(s).pose;
+    const double east = easting_m - pose.easting_m;
+    const double north = northing_m - pose.northing_m;
+    const double sine = std::sin(pose.heading_rad);
+    const double cosine = std::cos(pose.heading_rad);
+    const double ahead = east * sine + north * cosine;
+    lateral_m = north * sine - east * cosine;
+    s = std::clamp(s + ahead, path.begin_m(), path.end_m());
+    if (std::abs(ahead) < 1e-3) break;
+  }
+  return {s, lateral_m};
+}
+
+}  // namespace
+
+// Errors of GNSS last: a fix is tested as it is, but says little new beside the one before.
+void Estimator::use(const GnssInput& sample) {
+  auto& gnss = watched(Source::gnss);
+  const double since_s = gnss.seen_ns == 0 ? 1.0 : std::max(core::seconds(sample.stamp_ns - gnss.seen_ns), 0.05);
+  gnss.seen_ns = sample.stamp_ns;
+  if (sample.fix == 0 || !path_) {
+    gnss_agreed_ = 0;
+    return;
+  }
+  const auto place = project(*path_, filter_.path_distance_m(), sample.easting_m, sample.northing_m);
+  const double once_m = std::hypot(gnss_sigma_m(sample, *parameters_), parameters_->gnss_map_sigma_m);
+  const double sigma_m = once_m * std::sqrt(1 + 2 * parameters_->gnss_error_time_s / since_s);
+  const double foot_m = place.distance_m - parameters_->gnss_antenna_ahead_m;
+  const bool beside = std::abs(place.lateral_m) > kOffTrackM + 3 * once_m;
+  const bool agrees = !beside && filter_.test_position(foot_m, once_m, parameters_->gate_gnss).used;
+  if (agrees && filter_.offer_position(foot_m, sigma_m, parameters_->gate_gnss).used) {
+    gnss.accept(sample.stamp_ns);
+    ++gnss_agreed_;
+  } else if (++gnss.refused >= kRefusalsToIsolate) {
+    gnss.isolate(sample.stamp_ns);
+    gnss_agreed_ = 0;
+  }
+}
+
+void Estimator::use(const FixInput& fix) {
+  if (fix.kind == FixKind::track) {
+    if (!path_) return;
+    if (fix.new_path) path_ = fix.new_path;
+    // What is said of another track is no more than its rest for this one.
+    const auto of_m = path_->distance_of(fix.edge, fix.offset_m);
+    const double here_m = filter_.path_distance_m();
+    track_doubt_.said(of_m ? fix.probability : std::min(fix.probability, 1 - fix.probability), of_m, here_m);
+    return;
+  }
+  auto& watch = watched(fix.kind == FixKind::curvature ? Source::curvature : Source::landmark);
+  watch.seen_ns = fix.stamp_ns;
+  if (fix.new_path) {
+    path_ = fix.new_path;
+    filter_.set_origin(0, std::hypot(fix.sigma_m, parameters_->fix_sigma_floor_m));
+    track_doubt_.said(fix.probability, std::nullopt, filter_.path_distance_m());
+    accept(fix);
+    return;
+  }
+  if (!path_ || fix.probability < parameters_->fix_min_probability) return;
+  const auto path_distance_m = path_->distance_of(fix.edge, fix.offset_m);
+  if (!path_distance_m) {
+    ++off_path_fixes_;
+    return;
+  }
+  // A second fix on the landmark of the first has the same error of the map in it.
+  const bool again = fix.landmark != 0 && fix.landmark == reference_ && std::abs(filter_.since_reference_m()) < 50;
+  const double sigma_m = std::hypot(fix.sigma_m, parameters_->fix_sigma_floor_m) * (again ? 3.0 : 1.0);
+  const auto offer = filter_.offer_position(*path_distance_m, sigma_m, parameters_->gate_fix);
+  if (offer.used) {
+    corrected_ = false;
+    accept(fix);
+  } else {
+    ++watch.refused;
+    refuse(fix, *path_distance_m, offer);
+  }
+}
+
+void Estimator::accept(const FixInput& fix) {
+  watched(fix.kind == FixKind::curvature ? Source::curvature : Source::landmark).accept(fix.stamp_ns);
+  fix_verdict_ = FixVerdict::used;
+  refused_fix_.reset();
+  off_path_fixes_ = 0;
+  doubt_m_ = doubt_behind_m_ = doubt_ahead_m_ = time_doubt_m_ = 0;
+  // A vague fix helps, but is nothing to measure a distance from.
+  if (fix.kind == FixKind::curvature && fix.sigma_m > 2 * filter_.path_sigma_m()) return;
+  reference_ = fix.landmark;
+  filter_.mark_reference();
+}
+
+// One fix alone never moves the train against the filter; a second one elsewhere that says the same does.
+void Estimator::refuse(const FixInput& fix, double path_distance_m, const Offer& offer) {
+  const double distance_m = filter_.value(StateIndex::distance);
+  if (refused_fix_ && std::abs(distance_m - refused_fix_->distance_m) > 10) {
+    const double drift_m = 0.04 * std::abs(distance_m - refused_fix_->distance_m);
+    const double apart_m = std::abs(offer.residual - refused_fix_->residual_m);
+    if (apart_m < 4 * std::hypot(fix.sigma_m, refused_fix_->sigma_m) + drift_m) {
+      filter_.loosen_origin(std::abs(offer.residual) + fix.sigma_m);
+      filter_.offer_position(path_distance_m, std::hypot(fix.sigma_m, parameters_->fix_sigma_floor_m),
+                             parameters_->gate_fix);
+      corrected_ = true;
+      accept(fix);
+      return;
+    }
+  }
+  fix_verdict_ = FixVerdict::refused;
+  refused_fix_ = RefusedFix{offer.residual, fix.sigma_m, distance_m};
+  const double reach_m = std::abs(offer.residual) + parameters_->interval_factor * fix.sigma_m;
+  auto& doubt_m = offer.residual < 0 ? doubt_behind_m_ : doubt_ahead_m_;
+  doubt_m = std::max(doubt_m, reach_m);
+}
+
+}  // namespace railfix::fusion
