@@ -1,10 +1,13 @@
 #include "messaging/participant.hpp"
 
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <fastrtps/utils/IPLocator.h>
 #include <algorithm>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 
 #include "messaging/fastdds_types.hpp"
+#include "messaging/network.hpp"
+#include "messaging/security.hpp"
 
 namespace railfix::messaging {
 namespace {
@@ -16,10 +19,30 @@ constexpr uint32_t kSocketBufferBytes = 4U << 20U;
 // Dead participants vanish after the lease; the default of 20 s would show ghosts.
 constexpr int32_t kParticipantLeaseS = 5;
 constexpr int32_t kAnnouncementS = 1;
+// Participants of one host that a peer is asked for: every service twice (standby, swap) and a few tools.
+constexpr uint32_t kParticipantsOfHost = 32;
+constexpr const char* kDiscoveryGroup = "239.255.0.1";  // RTPS 2.2, 9.6.1.4.1
 
-// No shared-memory transport: in 2.9.1 a process that is killed and started again makes its queue anew, while those that
-// ran on write to the old one for ever (eProsima/Fast-DDS#4728), and a stopped one spins. Pictures are shared in memory
-// by data sharing, which does not need it.
+// Peers replace Fast DDS's own list, so the multicast group and this host are named, too. Port 0: those of the domain.
+rtps::LocatorList initial_peers(const std::vector<std::string>& peers) {
+  rtps::LocatorList list;
+  std::vector<std::string> addresses{kDiscoveryGroup, "127.0.0.1"};
+  addresses.insert(addresses.end(), peers.begin(), peers.end());
+  for (const auto& address : addresses) {
+    eprosima::fastrtps::rtps::Locator_t locator;
+    locator.kind = LOCATOR_KIND_UDPv4;
+    if (!eprosima::fastrtps::rtps::IPLocator::setIPv4(locator, address)) {
+      throw core::BadInput("peer '" + address +
+                           "' is not an IPv4 address; give the other host's address on the train network");
+    }
+    list.push_back(locator);
+  }
+  return list;
+}
+
+// No shared-memory transport: in 2.9.1 a process that is killed and started again makes its queue anew, while those
+// that ran on write to the old one for ever (eProsima/Fast-DDS#4728), and a stopped one spins. Pictures are shared in
+// memory by data sharing, which does not need it.
 dds::DomainParticipantQos participant_qos(const ParticipantOptions& options) {
   dds::DomainParticipantQos qos;
   qos.name(options.service + "@" + options.host);
@@ -28,10 +51,17 @@ dds::DomainParticipantQos participant_qos(const ParticipantOptions& options) {
   udp->sendBufferSize = kSocketBufferBytes;
   udp->receiveBufferSize = kSocketBufferBytes;
   udp->non_blocking_send = true;
+  udp->maxInitialPeersRange = kParticipantsOfHost;
+  udp->interfaceWhiteList = core::value_or_throw(addresses_of(options.interfaces));
   qos.transport().user_transports.push_back(udp);
   auto& discovery = qos.wire_protocol().builtin.discovery_config;
   discovery.leaseDuration = {kParticipantLeaseS, 0};
   discovery.leaseDuration_announcementperiod = {kAnnouncementS, 0};
+  if (!options.peers.empty()) qos.wire_protocol().builtin.initialPeersList = initial_peers(options.peers);
+  for (const auto& [name, value] :
+       core::value_or_throw(security_properties(options.security_folder, options.service))) {
+    qos.properties().properties().emplace_back(name, value);
+  }
   return qos;
 }
 
@@ -56,14 +86,16 @@ namespace {
 // Keeps the topic of one remote endpoint of this train, or forgets it. Fast DDS tells of our own endpoints too.
 template <class Endpoint>
 void note(std::map<eprosima::fastrtps::rtps::GUID_t, std::string>& known, const Endpoint& endpoint, bool removed,
-          const std::string& train_id, const dds::DomainParticipant& own) {
+          const std::vector<std::string>& own_partitions, const dds::DomainParticipant& own) {
   if (endpoint.guid().guidPrefix == own.guid().guidPrefix) return;
   if (removed) {
     known.erase(endpoint.guid());
     return;
   }
   const auto partitions = endpoint.m_qos.m_partition.getNames();
-  if (std::find(partitions.begin(), partitions.end(), "train/" + train_id) == partitions.end()) return;
+  if (std::find_first_of(partitions.begin(), partitions.end(), own_partitions.begin(), own_partitions.end()) ==
+      partitions.end())
+    return;
   known[endpoint.guid()] = endpoint.topicName().to_string();
 }
 
@@ -73,14 +105,23 @@ void Participant::Impl::on_publisher_discovery(dds::DomainParticipant* own,
                                                eprosima::fastrtps::rtps::WriterDiscoveryInfo&& info) {
   const std::lock_guard lock(mutex);
   note(remote_writers, info.info, info.status == eprosima::fastrtps::rtps::WriterDiscoveryInfo::REMOVED_WRITER,
-       options.train_id, *own);
+       {train.partition, host.partition}, *own);
 }
 
 void Participant::Impl::on_subscriber_discovery(dds::DomainParticipant* own,
                                                 eprosima::fastrtps::rtps::ReaderDiscoveryInfo&& info) {
   const std::lock_guard lock(mutex);
   note(remote_readers, info.info, info.status == eprosima::fastrtps::rtps::ReaderDiscoveryInfo::REMOVED_READER,
-       options.train_id, *own);
+       {train.partition, host.partition}, *own);
+}
+
+void Participant::Impl::join(Ends& ends) {
+  dds::PublisherQos publisher_qos;
+  publisher_qos.partition().push_back(ends.partition.c_str());
+  ends.publisher = participant->create_publisher(publisher_qos);
+  dds::SubscriberQos subscriber_qos;
+  subscriber_qos.partition().push_back(ends.partition.c_str());
+  ends.subscriber = participant->create_subscriber(subscriber_qos);
 }
 
 Participant::Participant(const ParticipantOptions& options) : impl_(std::make_unique<Impl>()) {
@@ -96,18 +137,16 @@ Participant::Participant(const ParticipantOptions& options) : impl_(std::make_un
   if (options.domain < 0 || options.domain > 232) {
     throw core::BadInput("DDS domain " + std::to_string(options.domain) + " is not in 0..232");
   }
+  impl_->running_interfaces = running_interfaces(options.interfaces);
+  impl_->train.partition = "train/" + options.train_id;
+  impl_->host.partition = impl_->train.partition + "/memory/" + memory_id();
   impl_->participant = factory->create_participant(static_cast<uint32_t>(options.domain), participant_qos(options),
                                                    impl_.get(), dds::StatusMask::none());
   if (impl_->participant == nullptr) {
     throw core::BadInput("cannot join DDS domain " + std::to_string(options.domain) +
                          "; check that the network of this host is up (`ip link set lo up` at least)");
   }
-  dds::PublisherQos publisher_qos;
-  publisher_qos.partition().push_back(("train/" + options.train_id).c_str());
-  impl_->publisher = impl_->participant->create_publisher(publisher_qos);
-  dds::SubscriberQos subscriber_qos;
-  subscriber_qos.partition().push_back(("train/" + options.train_id).c_str());
-  impl_->subscriber = impl_->participant->create_subscriber(subscriber_qos);
+  for (auto* ends : {&impl_->train, &impl_->host}) impl_->join(*ends);
 }
 
 Participant::~Participant() {
@@ -120,6 +159,10 @@ Participant::~Participant() {
 void Participant::assert_liveliness() {
   const std::lock_guard lock(impl_->mutex);
   for (auto* writer : impl_->manual_liveliness) writer->assert_liveliness();
+}
+
+bool Participant::interface_appeared() const {
+  return running_interfaces(impl_->options.interfaces) > impl_->running_interfaces;
 }
 
 Connections Participant::connections() const {

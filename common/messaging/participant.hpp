@@ -25,9 +25,18 @@ struct SentCount {
 
 struct Participant::Impl : eprosima::fastdds::dds::DomainParticipantListener {
   ParticipantOptions options;
+  size_t running_interfaces = 0;  // when this participant joined
   eprosima::fastdds::dds::DomainParticipant* participant = nullptr;
-  eprosima::fastdds::dds::Publisher* publisher = nullptr;
-  eprosima::fastdds::dds::Subscriber* subscriber = nullptr;
+  /// Where writers and readers live: those of the whole train, and those of topics that stay in this host's memory.
+  struct Ends {
+    std::string partition;
+    eprosima::fastdds::dds::Publisher* publisher = nullptr;
+    eprosima::fastdds::dds::Subscriber* subscriber = nullptr;
+  };
+  Ends train;
+  Ends host;
+  Ends& ends_of(const TopicInfo& info) { return info.qos.data_sharing ? host : train; }
+  void join(Ends& ends);
 
   std::mutex mutex;
   std::map<std::string, eprosima::fastdds::dds::Topic*> topics;

@@ -11,6 +11,7 @@ namespace dds = eprosima::fastdds::dds;
 struct AnyReader::Impl : dds::DataReaderListener {
   Participant::Impl* participant = nullptr;
   const FastDdsType* type = nullptr;
+  dds::Subscriber* subscriber = nullptr;
   dds::DataReader* reader = nullptr;
   Queue* queue = nullptr;
   std::shared_ptr<const Handler> handler;
@@ -52,13 +53,14 @@ AnyReader::AnyReader(Participant& participant, const TopicInfo& topic, const std
   impl_->queue = &queue;
   impl_->handler = std::make_shared<const Handler>(std::move(handler));
   impl_->source.limit = topic.reader_queue;
+  impl_->subscriber = inside.ends_of(topic).subscriber;
   dds::DataReaderQos qos;
   if (!inside.own_profiles ||
-      inside.subscriber->get_datareader_qos_from_profile(topic.name, qos) != ReturnCode_t::RETCODE_OK) {
+      impl_->subscriber->get_datareader_qos_from_profile(topic.name, qos) != ReturnCode_t::RETCODE_OK) {
     apply(topic.qos, qos);
   }
   auto* dds_topic = inside.topic(topic, instance);
-  impl_->reader = inside.subscriber->create_datareader(
+  impl_->reader = impl_->subscriber->create_datareader(
       dds_topic, qos, impl_.get(), dds::StatusMask::data_available() << dds::StatusMask::liveliness_changed());
   if (impl_->reader == nullptr) {
     throw core::BadInput("topic " + dds_topic->get_name() +
@@ -74,7 +76,7 @@ AnyReader::~AnyReader() {
     impl_->participant->readers.erase(impl_->reader);
   }
   impl_->reader->set_listener(nullptr);
-  impl_->participant->subscriber->delete_datareader(impl_->reader);
+  impl_->subscriber->delete_datareader(impl_->reader);
   impl_->queue->forget(&impl_->source);
 }
 

@@ -40,13 +40,14 @@ double percentile(std::vector<double>& values, double share) {
 }  // namespace
 
 PublishedHealth::PublishedHealth(messaging::Participant& participant, const std::string& service,
-                                 const std::string& host)
+                                 const CommonConfig& common)
     : participant_(participant),
       writer_(participant, messaging::topics::service_status),
+      file_(health_path(common, service)),
       measured_ns_(core::monotonic_ns()),
       cpu_ns_(used_cpu_ns()) {
   status_.service(service);
-  status_.host(host);
+  status_.host(common.host);
   status_.version(RAILFIX_VERSION);
   status_.pid(static_cast<uint32_t>(getpid()));
   status_.state(msg::STATE_STARTING);
@@ -74,6 +75,7 @@ void PublishedHealth::publish() {
   status_.matches(connections.matches);
   status_.stamp_ns(core::wall_ns());
   writer_.write(status_);
+  file_.write(status_);
 }
 
 void PublishedHealth::measure() {

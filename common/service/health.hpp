@@ -4,13 +4,14 @@
 #include <array>
 #include <vector>
 
+#include "service/health_file.hpp"
 #include "service/service.hpp"
 
 namespace railfix::service {
 
 class PublishedHealth final : public Health {
  public:
-  PublishedHealth(messaging::Participant& participant, const std::string& service, const std::string& host);
+  PublishedHealth(messaging::Participant& participant, const std::string& service, const CommonConfig& common);
 
   void ready() override { change(msg::STATE_READY, ""); }
   void active() override { change(msg::STATE_ACTIVE, ""); }
@@ -29,6 +30,7 @@ class PublishedHealth final : public Health {
   void measure();
   messaging::Participant& participant_;
   messaging::Writer<msg::ServiceStatus> writer_;
+  HealthFile file_;
   msg::ServiceStatus status_;
   std::vector<double> latencies_ms_;  // since the last measurement
   int64_t measured_ns_ = 0;

@@ -12,6 +12,7 @@ namespace {
 constexpr std::chrono::milliseconds kAssertPeriod{50};
 // Four times a second, so that a dead or frozen service shows within half a second.
 constexpr std::chrono::milliseconds kStatusPeriod{250};
+constexpr std::chrono::seconds kCablePeriod{1};
 constexpr int64_t kIdleNs = core::kNsPerSecond;
 
 // Standing values and the words of operation are never held back.
@@ -24,10 +25,10 @@ bool waits_for_turn(const messaging::TopicInfo& topic) {
 Loop::Loop(std::string service, const CommonConfig& common)
     : service_(std::move(service)),
       common_(common),
-      participant_(
-          {common.train_id, common.host, service_, common.domain, common.ownership_strength, common.qos_profiles}),
+      participant_({common.train_id, common.host, service_, common.domain, common.ownership_strength,
+                    common.qos_profiles, common.interfaces, common.peers, common.security}),
       log_(make_logger(participant_, service_, common)),
-      health_(std::make_unique<PublishedHealth>(participant_, service_, common.host)),
+      health_(std::make_unique<PublishedHealth>(participant_, service_, common)),
       reply_(std::make_unique<messaging::Writer<msg::ControlReply>>(participant_, messaging::topics::service_reply)) {
   if (common_.lock_step) {
     progress_ = std::make_unique<messaging::Writer<msg::DataProgress>>(participant_, messaging::topics::data_progress);
@@ -44,6 +45,15 @@ Loop::Loop(std::string service, const CommonConfig& common)
   every(kStatusPeriod, [this] {
     health_->dropped(queue_.take_dropped());
     health_->publish();
+  });
+  if (!common_.interfaces.empty()) watch_cable();
+}
+
+// Started without the cable, this process would never use it.
+void Loop::watch_cable() {
+  every(kCablePeriod, [this] {
+    if (participant_.interface_appeared())
+      finish("a network interface of common.interfaces has come up; whoever started this service starts it again");
   });
 }
 

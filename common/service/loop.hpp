@@ -41,6 +41,7 @@ class Loop final : public Context {
     std::function<void()> handler;
   };
   void run_due_timers();
+  void watch_cable();
   void answer(const msg::ControlRequest& request);
   void keep_in_turn(const messaging::TopicInfo& topic, const std::string& instance, Handler handler, StampOf stamp_of);
   void clock(const msg::DataClock& clock);

@@ -5,6 +5,7 @@
 #include <iostream>
 #include <thread>
 
+#include "service/health_file.hpp"
 #include "service/loop.hpp"
 
 namespace railfix::service {
@@ -17,6 +18,7 @@ struct CommandLine {
   std::vector<std::string> sets;
   bool check = false;
   bool document = false;
+  bool health = false;
 };
 
 std::vector<Override> overrides_of(const std::vector<std::string>& sets) {
@@ -66,6 +68,12 @@ class SignalWatch {
   std::thread thread_;
 };
 
+int say_health(const CommonConfig& common, const std::string& service) {
+  const auto answer = ask_health(health_path(common, service));
+  std::cout << service << ": " << answer.text << '\n';
+  return answer.healthy ? kDone : kFailed;
+}
+
 int serve(const Program& program, const CommonConfig& common) {
   SignalWatch signals;
   Loop loop(program.name, common);
@@ -99,6 +107,12 @@ void CommonConfig::describe(Fields& fields) {
               "Fast DDS XML file that replaces the built-in quality of service; empty = built in.");
   fields.integer("ownership_strength", ownership_strength, {0, 1000}, "",
                  "Of two services that write the same exclusive topic the stronger one is heard.");
+  fields.list("interfaces", interfaces,
+              "Network interfaces, by name or IPv4 address, that DDS uses beside the loopback; empty = all.");
+  fields.list("peers", peers,
+              "IPv4 addresses of the train's other hosts, asked directly where multicast does not pass.");
+  fields.text("security", security,
+              "Folder with this service's certificate, key and permissions; empty = DDS without security.");
   fields.flag("lock_step", lock_step,
               "Use data in turns and answer on data_progress; set by `railfix run --pace lossless`.");
 }
@@ -118,6 +132,8 @@ int run_program(const Program& program, int argc, char** argv) {
   app.add_option("--set", line.sets, "section.key=value, over the file; may be repeated");
   app.add_flag("--check", line.check, "Read the configuration, say what is wrong with it, and end");
   app.add_flag("--document", line.document, "Print every key with its default, unit, range and meaning, and end");
+  app.add_flag("--health", line.health,
+               "Ask the service that runs here with this configuration how it is, and end: exit code 0 or 1");
   app.set_version_flag("--version", std::string(RAILFIX_VERSION));
   try {
     app.parse(argc, argv);
@@ -132,6 +148,7 @@ int run_program(const Program& program, int argc, char** argv) {
     const auto overrides = overrides_of(line.sets);
     const auto common =
         core::value_or_throw(read_config<CommonConfig>("common", line.config, overrides, service_names()));
+    if (line.health) return say_health(common, program.name);
     core::ok_or_throw(program.read(line.config, overrides));
     if (line.check) return kDone;
     return serve(program, common);

@@ -35,6 +35,9 @@ struct CommonConfig {
   std::string log_level = "info";
   std::string qos_profiles;
   int64_t ownership_strength = 10;
+  std::vector<std::string> interfaces;
+  std::vector<std::string> peers;
+  std::string security;
   bool lock_step = false;
   void describe(Fields& fields);
 };

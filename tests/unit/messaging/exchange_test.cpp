@@ -150,6 +150,49 @@ TEST_F(Exchange, TheStrongerWriterOfAnExclusiveTopicIsHeard) {
   }));
 }
 
+TEST_F(Exchange, AWriterKnowsWhoIsHeardAndItsStrengthCanChange) {
+  auto other_options = options("train-" + std::to_string(getpid()));
+  other_options.ownership_strength = 20;
+  Participant other(other_options);
+  uint64_t heard = 0;
+  Reader<msg::TrainState> reader(participant_, topics::train_state, "", queue_,
+                                 [&](const msg::TrainState& state) { heard = state.seq(); });
+  Writer<msg::TrainState> writer(participant_, topics::train_state);
+  Writer<msg::TrainState> other_writer(other, topics::train_state);
+  EXPECT_EQ(writer.owner(), Owner::unknown);
+  EXPECT_EQ(other_writer.owner(), Owner::unknown);
+  const auto both_write_until = [&](uint64_t expected) {
+    msg::TrainState state;
+    return run_until([&] {
+      state.seq(1);
+      writer.write(state);
+      state.seq(2);
+      other_writer.write(state);
+      const auto own = writer.owner();
+      const auto others = other_writer.owner();
+      return heard == expected && own == (expected == 1 ? Owner::self : Owner::other) &&
+             others == (expected == 2 ? Owner::self : Owner::other);
+    });
+  };
+  EXPECT_TRUE(both_write_until(2)) << "20 against 10";
+  writer.set_ownership_strength(30);
+  EXPECT_TRUE(both_write_until(1)) << "20 against 30";
+  writer.set_ownership_strength(5);
+  EXPECT_TRUE(both_write_until(2)) << "20 against 5";
+}
+
+TEST_F(Exchange, AnInterfaceThatIsNotHereIsNamedWithThoseThatAre) {
+  auto wrong = options("train");
+  wrong.interfaces = {"lo", "no-such-interface"};
+  try {
+    Participant participant(wrong);
+    FAIL() << "joined over an interface that is not here";
+  } catch (const core::BadInput& error) {
+    EXPECT_NE(std::string(error.what()).find("no-such-interface is not here"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("lo (127.0.0.1)"), std::string::npos) << error.what();
+  }
+}
+
 TEST_F(Exchange, AServiceThatFallsSilentIsNamed) {
   std::string gone;
   int heard = 0;

@@ -1,0 +1,19 @@
+// DDS Security (OMG DDS-SEC 1.1) of a train: who may join and which topics each service may write.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/result.hpp"
+
+namespace railfix::messaging {
+
+/// Fast DDS properties for the identity of `service` in this folder, which `railfix train keys` fills:
+///   ca.pem, governance.p7s, <service>.cert.pem, <service>.key.pem, <service>.permissions.p7s
+/// Empty folder name: none. Error: a file that is missing or cannot be read.
+core::Result<std::vector<std::pair<std::string, std::string>>> security_properties(const std::filesystem::path& folder,
+                                                                                   const std::string& service);
+
+}  // namespace railfix::messaging

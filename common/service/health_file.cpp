@@ -1,0 +1,58 @@
+#include "service/health_file.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <array>
+#include <fstream>
+
+#include "core/time.hpp"
+#include "messaging/operation_words.hpp"
+
+namespace railfix::service {
+namespace {
+
+constexpr int64_t kSilentNs = 2 * core::kNsPerSecond;
+constexpr size_t kBytes = 512;
+
+}  // namespace
+
+std::filesystem::path health_path(const CommonConfig& common, const std::string& service) {
+  return "/dev/shm/railfix-health-" + common.train_id + "-" + common.host + "-" + service;
+}
+
+HealthFile::HealthFile(std::filesystem::path path)
+    : path_(std::move(path)), file_(open(path_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0644)) {}
+
+// Another build of this service may have taken over the file; then its words stand there again in a quarter of a
+// second.
+HealthFile::~HealthFile() {
+  if (file_ < 0) return;
+  close(file_);
+  unlink(path_.c_str());
+}
+
+void HealthFile::write(const msg::ServiceStatus& status) {
+  const std::string reason = status.reason().c_str();
+  std::string text = std::to_string(core::monotonic_ns()) + ' ' + std::to_string(status.state()) + '\n' + reason;
+  text.resize(kBytes, '\n');
+  if (file_ >= 0 && pwrite(file_, text.data(), text.size(), 0) < 0) unlink(path_.c_str());
+}
+
+HealthAnswer ask_health(const std::filesystem::path& path) {
+  std::ifstream in(path);
+  int64_t said_ns = 0;
+  int state = -1;
+  std::string reason;
+  if (!(in >> said_ns >> state)) return {false, "does not run here: " + path.string() + " is missing"};
+  std::getline(in >> std::ws, reason);
+  const int64_t age_ns = core::monotonic_ns() - said_ns;
+  if (age_ns > kSilentNs || age_ns < 0) {  // negative: from before the computer was started
+    return {false, "dead or frozen: silent for " + std::to_string(std::abs(age_ns) / core::kNsPerSecond) + " s"};
+  }
+  const std::string text =
+      std::string(messaging::name_of_state(static_cast<uint8_t>(state))) + (reason.empty() ? "" : ": " + reason);
+  return {state != msg::STATE_FAILED && state != msg::STATE_STOPPED, text};
+}
+
+}  // namespace railfix::service

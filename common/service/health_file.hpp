@@ -1,0 +1,40 @@
+// What a service says of itself to its own host, beside service_status: health checks of containers and service
+// managers ask this file, because joining the train's network every few seconds would cost more than the service.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "idl/operation.h"
+#include "service/service.hpp"
+
+namespace railfix::service {
+
+/// In the host's shared memory, one a service, host and train.
+std::filesystem::path health_path(const CommonConfig& common, const std::string& service);
+
+class HealthFile {
+ public:
+  explicit HealthFile(std::filesystem::path path);
+  ~HealthFile();
+  HealthFile(const HealthFile&) = delete;
+  HealthFile& operator=(const HealthFile&) = delete;
+
+  /// Over what stood there; takes memory at the first call only, so that a full /dev/shm later does not silence it.
+  /// What cannot be written is left out: the check says so.
+  void write(const msg::ServiceStatus& status);
+
+ private:
+  std::filesystem::path path_;
+  int file_ = -1;
+};
+
+struct HealthAnswer {
+  bool healthy = false;
+  std::string text;  // one sentence
+};
+/// Healthy: its run loop turned within the last two seconds and it has not failed. Degraded is healthy: a restart would
+/// not help.
+HealthAnswer ask_health(const std::filesystem::path& path);
+
+}  // namespace railfix::service
