@@ -6,14 +6,18 @@
 namespace railfix::map_matcher {
 namespace {
 
-constexpr double kBaliseSigmaM = 4.0;
+constexpr double kMarkSigmaM = 4.0;
+constexpr double kDetailM = 2.0;
 
 }  // namespace
 
 TurnModel::TurnModel(const LocatorParameters& parameters, const MeasuredWay& way) : parameters_(parameters), way_(way) {
-  const double least = std::pow(parameters_.noise_per_m * kBinM, 2);
-  per_least_variance_ = 1 / least;
-  for (const auto& bin : way) variance_.push_back(bin.variance + least);
+  heading_squared_ = std::pow(parameters.heading_sigma_rad, 2);
+  stays_ = std::exp(-kBinM / parameters.heading_m);
+  strayed_ = 1 - stays_;
+  fresh_ = heading_squared_ * (1 - stays_ * stays_);
+  per_least_variance_ = 1 / fresh_;
+  per_bias_variance_ = parameters.correlated_bins / std::pow(parameters.bias_per_m * kBinM, 2);
   for (size_t k = 0; k < kMostBins; ++k) {
     for (size_t i = 0; i < way.size(); ++i) {
       const double before = way[i - std::min(i, k + 1)].turn_rad;
@@ -22,19 +26,18 @@ TurnModel::TurnModel(const LocatorParameters& parameters, const MeasuredWay& way
       changes_rad_[k].push_back(std::max(change, k > 0 ? changes_rad_[k - 1][i] : 0.0));
     }
   }
-}
-
-double TurnModel::log_of(double squared, double variance) const {
-  return -0.5 * (squared + std::log(variance)) / parameters_.correlated_bins;
+  const double least = std::pow(parameters.noise_per_m * kBinM, 2);
+  for (size_t i = 0; i < way.size(); ++i) {
+    // Map and body do not tell where within a few metres a kink lies.
+    const double detail = kDetailM / kBinM * changes_rad_[0][i];
+    variance_.push_back(way[i].variance + least + detail * detail);
+    least_log_variance_ += std::log((fresh_ + variance_.back()) * per_least_variance_);
+  }
 }
 
 double TurnModel::of_distance(double off_m) const {
-  const double z = off_m / kBaliseSigmaM;
-  return std::abs(z) > 6 ? 0.0 : parameters_.detection * std::exp(-0.5 * z * z) / (kBaliseSigmaM * 2.5066);
-}
-
-double TurnModel::of_density(double density) {
-  return std::log(std::min(density, 1.0));
+  const double z = off_m / kMarkSigmaM;
+  return std::abs(z) > 6 ? 0.0 : parameters_.detection * std::exp(-0.5 * z * z) / (kMarkSigmaM * 2.5066);
 }
 
 }  // namespace railfix::map_matcher

@@ -109,7 +109,11 @@ struct MapMatcherConfig {
       f.number("least_way_m", p.least_way_m, {800, 50000}, "m", "A shorter way is not looked for.");
       f.number("least_turn_rad", p.least_turn_rad, {0, 100}, "rad", "A way that bends less is not looked for.");
       f.number("scale_range", p.scale_range, {0.001, 0.05}, "", "The odometer's scale may be off by so much.");
-      f.number("noise_per_m", p.noise_per_m, {1e-5, 0.01}, "1/m", "Least sigma of the curvature over 20 m.");
+      f.number("noise_per_m", p.noise_per_m, {1e-6, 0.01}, "1/m", "Least sigma of the measured curvature over 20 m.");
+      f.number("bias_per_m", p.bias_per_m, {1e-7, 0.01}, "1/m", "Constant error of the measured curvature, one sigma.");
+      f.number("heading_sigma_rad", p.heading_sigma_rad, {1e-4, 0.1}, "rad",
+               "The heading strays so far about the track's ...");
+      f.number("heading_m", p.heading_m, {5, 1000}, "m", "... and changes over such a way.");
       f.number("curvature_share", p.curvature_share, {0, 0.5}, "", "The map's curvature may be off by this share.");
       f.number("correlated_bins", p.correlated_bins, {1, 100}, "", "So many neighbouring 20 m err together.");
       f.number("certain", p.certain, {0.5, 0.999999}, "", "From this probability on a place is certain ...");

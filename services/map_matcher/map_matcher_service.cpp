@@ -219,7 +219,7 @@ void MapMatcherService::look_for_place(const msg::OdometryStep& step) {
   if (std::abs(step.distance_m() - located_m_) < config_.locate_every_m) return;
   located_m_ = step.distance_m();
   const Location location = locator_->locate();
-  if (location.certain) publish_place(step, location);
+  if (location.certain()) publish_place(step, location);
 }
 
 void MapMatcherService::publish_place(const msg::OdometryStep& step, const Location& location) {

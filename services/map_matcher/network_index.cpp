@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
 
 #include "core/units.hpp"
 
@@ -15,7 +14,7 @@ constexpr int kParts = 8;  // of a cell, to integrate the curvature
 }  // namespace
 
 NetworkIndex::NetworkIndex(std::shared_ptr<const track::Map> map)
-    : map_(std::move(map)), ways_(*map_), finder_(map_), headings_(map_->edges.size()), balises_(map_->edges.size()) {
+    : map_(std::move(map)), ways_(*map_), finder_(map_), headings_(map_->edges.size()), marks_(2 * map_->edges.size()) {
   for (const auto& edge : map_->edges) {
     auto& headings = headings_[edge.id - 1];
     double heading = 0;
@@ -28,14 +27,24 @@ NetworkIndex::NetworkIndex(std::shared_ptr<const track::Map> map)
       headings.push_back(static_cast<float>(heading));
     }
   }
-  for (const auto& landmark : map_->landmarks) {
-    if (landmark.kind == track::LandmarkKind::balise && map_->edge(landmark.edge) != nullptr) {
-      balises_[landmark.edge - 1].push_back(&landmark);
-    }
+  for (const auto& l : map_->landmarks) {
+    const auto* edge = map_->edge(l.edge);
+    if (edge == nullptr || !is_mark(l.kind)) continue;
+    const double length_m = edge->alignment.length_m();
+    marks_[2 * (l.edge - 1)].push_back({l.offset_m, mark_kind(l.kind), l.lateral_m});
+    marks_[2 * (l.edge - 1) + 1].push_back({length_m - l.offset_m, mark_kind(l.kind), -l.lateral_m});
+  }
+  for (auto& marks : marks_) {
+    std::sort(marks.begin(), marks.end(), [](const Mark& a, const Mark& b) { return a.along_m < b.along_m; });
   }
   std::vector<bool> used(map_->edges.size(), false);
   for (const auto& edge : map_->edges) {
-    if (!used[edge.id - 1]) add_chain({&edge, true}, used);
+    if (!used[edge.id - 1]) add_straight_on({&edge, true}, used);
+    for (const bool forward : {true, false}) {
+      const track::Run run{&edge, forward};
+      const auto& legs = ways_.after(run);
+      for (size_t i = 1; i < legs.size(); ++i) add_through(run, legs[i]);
+    }
   }
 }
 
@@ -47,7 +56,7 @@ double NetworkIndex::heading_on(const track::Edge& edge, double offset_m) const 
   return headings[i] + (cell - static_cast<double>(i)) * (headings[i + 1] - headings[i]);
 }
 
-void NetworkIndex::add_chain(const track::Run& first, std::vector<bool>& used) {
+void NetworkIndex::add_straight_on(const track::Run& first, std::vector<bool>& used) {
   std::deque<track::Run> runs{first};
   used[first.edge->id - 1] = true;
   for (const bool ahead : {true, false}) {
@@ -61,6 +70,38 @@ void NetworkIndex::add_chain(const track::Run& first, std::vector<bool>& used) {
       ahead ? runs.push_back(next.front()) : runs.push_front(next.front().reversed());
     }
   }
+  chains_.push_back(chain_of(runs));
+}
+
+void NetworkIndex::add_through(const track::Run& from, const track::Run& leg) {
+  std::deque<track::Run> runs{from, leg};
+  double ahead_m = leg.length_m();
+  while (ahead_m < kReachM) {
+    const auto& next = ways_.after(runs.back());
+    if (next.empty()) break;
+    ahead_m += next.front().length_m();
+    runs.push_back(next.front());
+  }
+  double behind_m = from.length_m();
+  while (behind_m < kReachM) {
+    const auto& before = ways_.after(runs.front().reversed());
+    if (before.empty()) break;
+    behind_m += before.front().length_m();
+    runs.push_front(before.front().reversed());
+  }
+  // Of the runs at the ends only what is near.
+  Chain chain = chain_of(runs);
+  const auto first = static_cast<std::ptrdiff_t>(std::max(0.0, behind_m - kReachM) / kCellM);
+  const auto last = std::min(std::ssize(chain.heading_rad), static_cast<std::ptrdiff_t>((behind_m + kReachM) / kCellM));
+  chain.heading_rad = {chain.heading_rad.begin() + first, chain.heading_rad.begin() + last};
+  const double cut_m = kCellM * static_cast<double>(first);
+  for (auto& l : chain.legs) l.begin_m -= cut_m;
+  chain.through_m = behind_m - cut_m;
+  chain.length_m = kCellM * static_cast<double>(last - first);
+  chains_.push_back(std::move(chain));
+}
+
+NetworkIndex::Chain NetworkIndex::chain_of(const std::deque<track::Run>& runs) const {
   Chain chain;
   double heading = 0;
   for (const auto& run : runs) {
@@ -72,7 +113,7 @@ void NetworkIndex::add_chain(const track::Run& first, std::vector<bool>& used) {
     heading += turned(run, run.length_m());
     chain.length_m = end_m;
   }
-  chains_.push_back(std::move(chain));
+  return chain;
 }
 
 std::vector<NetworkIndex::Beside> NetworkIndex::beside(const track::Run& run, double into_m, double within_m) const {

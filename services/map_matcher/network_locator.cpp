@@ -1,70 +1,32 @@
 #include "map_matcher/network_locator.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "core/units.hpp"
-#include "map_matcher/place_search.hpp"
+#include "map_matcher/way_comparison.hpp"
 
 namespace railfix::map_matcher {
 namespace {
 
-constexpr double kFarBelow = 25.0;  // a way whose log likelihood is so far below the best one is given up
-constexpr size_t kMostFitted = 400;
-constexpr size_t kLookEvery = 50;
-constexpr double kAlikeBelow = 8.0;
-constexpr std::ptrdiff_t kMostAlike = 25;
-constexpr double kRivalBelow = 15.0;
-constexpr WayWalker::Trial kRoughly{20.0, 0.02, 4};
-constexpr WayWalker::Trial kExactly{8.0, 0.001, 8};
-constexpr size_t kMostTried = 12;
-constexpr int kFirstHalvings = 1;
-constexpr int kHalvings = 3;
-constexpr double kSamePlaceM = 60.0;
-constexpr double kRepeatedM = 45.0;
 constexpr double kBesideM = 40.0;
 constexpr double kSettledM = 100.0;  // behind a switch
 constexpr double kLeastSigmaM = 3.0;
 
-bool same_way(const WayFit& a, const WayFit& b) {
-  const auto at = place_on(a.runs, a.end_m);
-  const auto other = place_on(b.runs, b.end_m);
-  return at.run == other.run && std::abs(at.into_m - other.into_m) < kSamePlaceM;
-}
-
-// The better one where the place is the same.
-void add(const WayFit& fit, std::vector<WayFit>& fits) {
-  const auto same = std::find_if(fits.begin(), fits.end(), [&](const WayFit& f) { return same_way(f, fit); });
-  if (same == fits.end()) {
-    fits.push_back(fit);
-  } else if (fit.log_evidence > same->log_evidence) {
-    *same = fit;
-  }
-}
-
-// Candidates of several windows lead to the same way: the best of them is kept. REQUIRES: best first.
-void drop_repeated(std::vector<WalkedWay>& ways, size_t bins) {
-  struct End {
-    const WalkedWay* way;
-    Candidate place;
-  };
-  std::vector<End> ends;
-  std::vector<WalkedWay> kept;
-  kept.reserve(ways.size());
-  for (auto& way : ways) {
-    const double ahead_m = way.scale * kBinM * static_cast<double>(bins - way.bin);
-    const auto end = place_on(way.runs, way.anchor_m + ahead_m);
-    const bool repeated = std::any_of(ends.begin(), ends.end(), [&](const End& e) {
-      return e.place.run == end.run && std::abs(e.place.into_m - end.into_m) < kRepeatedM && e.way->runs == way.runs;
-    });
-    if (repeated) continue;
-    kept.push_back(std::move(way));
-    ends.push_back({&kept.back(), end});
-  }
-  ways = std::move(kept);
-}
-
 }  // namespace
+
+std::string to_string(Doubt doubt) {
+  constexpr std::array<const char*, 8> kTexts = {"certain",
+                                                 "the way is too short or bends too little",
+                                                 "more places may fit than were compared",
+                                                 "no place fits to the noise",
+                                                 "several places fit",
+                                                 "the place along the track is vague",
+                                                 "not which of the tracks beside each other",
+                                                 "not which leg of the switch behind"};
+  return kTexts.at(static_cast<size_t>(doubt));
+}
 
 void NetworkLocator::move(double way_m, double turn_rad, double turn_sigma_rad) {
   if (way_m <= 0) {
@@ -83,126 +45,57 @@ void NetworkLocator::move(double way_m, double turn_rad, double turn_sigma_rad) 
   next.variance = share * turn_sigma_rad * turn_sigma_rad;
   open_.turn_rad -= next.turn_rad;
   open_.variance = std::max(0.0, open_.variance - next.variance);
-  for (const double balise_m : open_.balises_m) {
-    if (balise_m >= kBinM) next.balises_m.push_back(balise_m - kBinM);
+  for (Mark mark : open_.marks) {
+    if (mark.along_m < kBinM) continue;
+    mark.along_m -= kBinM;
+    next.marks.push_back(mark);
   }
-  std::erase_if(open_.balises_m, [](double m) { return m >= kBinM; });
+  std::erase_if(open_.marks, [](const Mark& mark) { return mark.along_m >= kBinM; });
   bins_.push_back(std::move(open_));
   open_ = std::move(next);
   open_m_ = over_m;
   if (way_m > 2 * kBinM) forget();  // a gap
-  while (static_cast<double>(bins_.size()) * kBinM > parameters_.window_m) bins_.pop_front();
+  while (static_cast<double>(bins_.size()) * kBinM > parameters_.window_m) {
+    bins_.pop_front();
+    ++gone_bins_;
+  }
 }
 
 void NetworkLocator::sight(const Sighting& sighting) {
-  if (sighting.kind != track::LandmarkKind::balise) return;
-  open_.balises_m.push_back(open_m_ + sighting.distance_ahead_m);
+  if (!is_mark(sighting.kind)) return;
+  open_.marks.push_back({open_m_ + sighting.distance_ahead_m, mark_kind(sighting.kind), sighting.lateral_m});
 }
 
 void NetworkLocator::forget() {
   bins_.clear();
+  gone_bins_ = 0;
+  memory_.clear();
   open_ = {};
   open_m_ = 0;
 }
 
-// Best first. Where more places fit alike than could be told apart, the rest is not looked at.
-std::vector<WayFit> NetworkLocator::first_fits(const WayFitter& fitter, const std::vector<WalkedWay>& ways,
-                                               bool& complete) const {
-  double best = -INFINITY;
-  std::vector<WayFit> fits;
-  for (size_t i = 0; i < ways.size(); ++i) {
-    const auto fit = fitter.fit(ways[i], kFirstHalvings, best - kFarBelow);
-    if (fit) {
-      best = std::max(best, fit->best_log);
-      fits.push_back(*fit);
-    }
-    if (i % kLookEvery != kLookEvery - 1) continue;
-    const auto alike =
-        std::count_if(fits.begin(), fits.end(), [&](const WayFit& f) { return f.best_log > best - kAlikeBelow; });
-    const auto top = std::max_element(fits.begin(), fits.end(),
-                                      [](const WayFit& a, const WayFit& b) { return a.best_log < b.best_log; });
-    if (alike <= kMostAlike || top->misfit > parameters_.certain_misfit) continue;
-    complete = false;
-    break;
-  }
-  std::sort(fits.begin(), fits.end(), [](const WayFit& a, const WayFit& b) { return a.best_log > b.best_log; });
-  return fits;
-}
-
-// First one rough walk each; what may be the place is fitted, walked again as exactly as the fit knows it, and what
-// that finds is fitted in full.
-std::vector<WayFit> NetworkLocator::compare(const TurnModel& model, const std::vector<Candidate>& candidates,
-                                            bool& complete) const {
-  const WayWalker walker(model, *index_);
-  const WayFitter fitter(model, *index_);
-  double best = -INFINITY;
-  std::vector<WalkedWay> rough;
-  for (const Candidate& candidate : candidates) {
-    for (auto& way : walker.follow(candidate, kRoughly, best - kFarBelow)) {
-      best = std::max(best, way.log);
-      rough.push_back(std::move(way));
-    }
-  }
-  std::erase_if(rough, [&](const WalkedWay& w) { return w.log < best - kFarBelow; });
-  std::sort(rough.begin(), rough.end(), [](const WalkedWay& a, const WalkedWay& b) { return a.log > b.log; });
-  drop_repeated(rough, model.way().size());
-  complete = rough.size() <= kMostFitted;
-  if (!complete) rough.resize(kMostFitted);
-  const auto first = first_fits(fitter, rough, complete);
-  if (first.empty()) return {};
-  best = first.front().best_log;
-  std::vector<WayFit> fits;
-  std::vector<WayFit> tried;
-  double best_fit = -INFINITY;
-  for (const WayFit& fit : first) {
-    if (fit.best_log < best - kFarBelow) break;
-    if (std::any_of(tried.begin(), tried.end(), [&](const WayFit& t) { return same_way(t, fit); })) continue;
-    if (tried.size() == kMostTried) {
-      complete = complete && fit.best_log < best - kRivalBelow;
-      break;
-    }
-    tried.push_back(fit);
-    Candidate anchor = place_on(fit.runs, fit.anchor_m - 0.5 * parameters_.lag_m);
-    anchor.bin = fit.bin;
-    anchor.scale = fit.scale;
-    for (const WalkedWay& way : walker.follow(anchor, kExactly, -INFINITY)) {
-      const auto full = fitter.fit(way, kHalvings, best_fit - kFarBelow);
-      if (!full) continue;
-      best_fit = std::max(best_fit, full->best_log);
-      add(*full, fits);
-    }
-  }
-  add_beside(walker, fitter, fits);
-  return fits;
-}
-
-// The tracks beside the best place are compared too: no window needs to have found them.
-void NetworkLocator::add_beside(const WayWalker& walker, const WayFitter& fitter, std::vector<WayFit>& fits) const {
-  if (fits.empty()) return;
-  const WayFit best = *std::max_element(
-      fits.begin(), fits.end(), [](const WayFit& a, const WayFit& b) { return a.log_evidence < b.log_evidence; });
-  if (best.misfit > parameters_.certain_misfit) return;
-  const auto end = place_on(best.runs, best.end_m);
-  for (const auto& beside : index_->beside(end.run, end.into_m, kBesideM)) {
-    const double into_m = std::max(0.0, beside.into_m - 0.5 * parameters_.lag_m);
-    for (const WalkedWay& way : walker.follow({beside.run, into_m, bins_.size(), best.scale, 0}, kExactly, -INFINITY)) {
-      if (const auto fit = fitter.fit(way, kHalvings, best.best_log - kFarBelow)) add(*fit, fits);
-    }
-  }
-}
-
-Location NetworkLocator::locate() const {
+Location NetworkLocator::locate() {
   double turn = 0;
   for (const MeasuredBin& bin : bins_) turn += std::abs(bin.turn_rad);
   if (way_m() < parameters_.least_way_m || turn < parameters_.least_turn_rad) return {};
   const MeasuredWay way(bins_.begin(), bins_.end());
   const TurnModel model(parameters_, way);
-  const auto found = PlaceSearch(parameters_, *index_, way).search();
-  bool complete = true;
-  Location location = sum_up(compare(model, found.candidates, complete));
+  const auto found = PlaceSearch(parameters_, *index_, way, gone_bins_, memory_).search();
+  const auto compared = WayComparison(model, *index_).compare(found.candidates);
+  Location location = sum_up(compared.fits);
   location.candidates = found.candidates.size();
-  if (!complete || !found.complete) location.certain = location.place_certain = false;
+  location.doubt = doubt_of(location, found.complete && compared.complete);
   return location;
+}
+
+Doubt NetworkLocator::doubt_of(const Location& location, bool complete) const {
+  if (!complete || location.places.empty()) return Doubt::not_all_seen;
+  const LocatedPlace& best = location.places.front();
+  if (best.misfit >= parameters_.certain_misfit) return Doubt::misfit;
+  if (location.place_probability < parameters_.certain) return Doubt::alike;
+  if (best.sigma_m >= parameters_.certain_sigma_m) return Doubt::wide;
+  if (best.probability < parameters_.certain) return Doubt::beside;
+  return just_behind_switch(best) ? Doubt::near_switch : Doubt::none;
 }
 
 // On from the last whole bin.
@@ -247,23 +140,26 @@ Location NetworkLocator::sum_up(const std::vector<WayFit>& fits) const {
   std::sort(location.places.begin(), location.places.end(),
             [](const LocatedPlace& a, const LocatedPlace& b) { return a.probability > b.probability; });
   if (location.places.empty()) return location;
+  location.place_probability = beside_probability(location.places);
+  return location;
+}
+
+// Of the best place and those on tracks beside it.
+double NetworkLocator::beside_probability(const std::vector<LocatedPlace>& places) const {
   const auto pose_of = [&](const LocatedPlace& p) {
     auto pose = index_->map().edge(p.place.edge)->alignment.at(p.place.offset_m).pose;
     if (p.place.direction == track::Direction::reverse) pose.heading_rad += core::kPi;
     return pose;
   };
-  const auto& first = location.places.front();
-  const auto at = pose_of(first);
-  for (const auto& place : location.places) {
+  const auto at = pose_of(places.front());
+  double sum = 0;
+  for (const auto& place : places) {
     const auto pose = pose_of(place);
     const bool beside = std::hypot(pose.easting_m - at.easting_m, pose.northing_m - at.northing_m) < kBesideM &&
                         std::abs(core::wrap_pi(pose.heading_rad - at.heading_rad)) < 0.3;
-    if (beside) location.place_probability += place.probability;
+    if (beside) sum += place.probability;
   }
-  const bool good = first.misfit < parameters_.certain_misfit && first.sigma_m < parameters_.certain_sigma_m;
-  location.place_certain = good && location.place_probability >= parameters_.certain;
-  location.certain = good && first.probability >= parameters_.certain && !just_behind_switch(first);
-  return location;
+  return sum;
 }
 
 }  // namespace railfix::map_matcher

@@ -5,11 +5,13 @@
 
 #include <deque>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "map_matcher/locator_types.hpp"
 #include "map_matcher/match_types.hpp"
 #include "map_matcher/network_index.hpp"
+#include "map_matcher/place_search.hpp"
 #include "map_matcher/way_fit.hpp"
 
 namespace railfix::map_matcher {
@@ -22,12 +24,27 @@ struct LocatedPlace {
   double misfit = 0;  // mean of the squared errors in sigmas
 };
 
+/// Why a place is not certain: the first that applies.
+enum class Doubt : uint8_t {
+  none,
+  too_plain,     // the way is too short or bends too little
+  not_all_seen,  // the place may be one that was not compared
+  misfit,        // nothing fits to the noise
+  alike,         // several places fit
+  wide,          // along the track
+  beside,        // which of the tracks beside each other
+  near_switch    // which leg of a switch that was just passed
+};
+std::string to_string(Doubt doubt);
+
 struct Location {
   std::vector<LocatedPlace> places;  // best first
   double place_probability = 0;      // of the best place, on whichever of the tracks beside each other
-  bool place_certain = false;        // tracks beside each other may still be open
-  bool certain = false;              // the track too
-  size_t candidates = 0;             // places that were compared in full
+  Doubt doubt = Doubt::too_plain;
+  size_t candidates = 0;  // places that were compared
+  [[nodiscard]] bool certain() const { return doubt == Doubt::none; }
+  /// Certain but for the track: those beside each other are still open.
+  [[nodiscard]] bool place_certain() const { return doubt == Doubt::none || doubt >= Doubt::beside; }
 };
 
 class NetworkLocator {
@@ -41,21 +58,20 @@ class NetworkLocator {
   void forget();
   [[nodiscard]] double way_m() const { return static_cast<double>(bins_.size()) * kBinM; }
   /// Where the train is now. No places where the way is too short or too plain.
-  [[nodiscard]] Location locate() const;
+  [[nodiscard]] Location locate();
 
  private:
-  [[nodiscard]] std::vector<WayFit> compare(const TurnModel& model, const std::vector<Candidate>& candidates,
-                                            bool& complete) const;
-  [[nodiscard]] std::vector<WayFit> first_fits(const WayFitter& fitter, const std::vector<WalkedWay>& ways,
-                                               bool& complete) const;
-  void add_beside(const WayWalker& walker, const WayFitter& fitter, std::vector<WayFit>& fits) const;
   [[nodiscard]] Location sum_up(const std::vector<WayFit>& fits) const;
+  [[nodiscard]] Doubt doubt_of(const Location& location, bool complete) const;
+  [[nodiscard]] double beside_probability(const std::vector<LocatedPlace>& places) const;
   [[nodiscard]] LocatedPlace place_of(const WayFit& fit) const;
   [[nodiscard]] bool just_behind_switch(const LocatedPlace& place) const;
 
   LocatorParameters parameters_;
   std::shared_ptr<const NetworkIndex> index_;
   std::deque<MeasuredBin> bins_;  // oldest first
+  size_t gone_bins_ = 0;          // in front of them
+  PlaceSearch::Memory memory_;
   MeasuredBin open_;
   double open_m_ = 0;
 };

@@ -12,15 +12,15 @@ struct WindowShape {
   size_t segment_bins;
   size_t segments;
 };
-// 800 m between the switches, 2.4 km where the way is plain.
-constexpr std::array kWindowShapes{WindowShape{5, 8}, WindowShape{10, 12}};
-constexpr size_t kWholeSegmentBins = 10;
-constexpr std::array<double, 4> kWholeScales = {-0.75, -0.25, 0.25, 0.75};  // of the range
-constexpr double kTurnRad = 0.02;
-constexpr double kShiftM = 20.0;     // grid, scale over half a window
-constexpr size_t kPlainHits = 1500;  // a window that fits at so many places is too plain
-constexpr size_t kMostWhole = 400;   // ... but of those of the whole way the best are kept
-constexpr size_t kMostStretches = 12;
+// 800 m between the switches, 2.4 km where the way is plain, 500 m where it bends much.
+constexpr std::array kWindowShapes{WindowShape{5, 8}, WindowShape{10, 12}, WindowShape{5, 5}};
+constexpr double kTurnRad = 0.035;
+constexpr double kShiftM = 20.0;      // grid, scale over half a window
+constexpr size_t kPlainHits = 25000;  // a stretch that fits at so many places is too plain
+constexpr size_t kMostStretches = 8;
+constexpr size_t kFewHits = 1000;
+constexpr int kApartEnough = 3;  // stretches that do not overlap, ...
+constexpr int kApartLeast = 2;   // ... of which so many do not all miss the place
 constexpr double kSameM = 40.0;
 constexpr std::ptrdiff_t kSameCells = 4;
 
@@ -69,18 +69,42 @@ PlaceSearch::Window PlaceSearch::window_at(size_t first_bin, size_t segment_bins
   return window;
 }
 
-void PlaceSearch::look_on(size_t chain, bool forward, const Window& window, size_t number,
+// What tells most is compared everywhere, without a branch, the rest where that fits.
+void PlaceSearch::look_on(size_t chain, bool forward, const Window& window, Scratch& scratch,
                           std::vector<Hit>& hits) const {
   const auto& headings = index_.chains()[chain].heading_rad;
   const double cells = window.scale * static_cast<double>(window.segment_bins) * kBinM / NetworkIndex::kCellM;
-  std::vector<std::ptrdiff_t> ends;
+  auto& ends = scratch.ends;
+  auto& fitting = scratch.fitting;
+  ends.clear();
   for (size_t k = 0; k <= window.turns.size(); ++k) {
     ends.push_back((forward ? 1 : -1) * static_cast<std::ptrdiff_t>(std::lround(cells * static_cast<double>(k))));
   }
   const std::ptrdiff_t reach = std::abs(ends.back());
-  const auto size = std::ssize(headings);
+  std::ptrdiff_t from = forward ? 0 : reach;
+  std::ptrdiff_t to = std::ssize(headings) - (forward ? reach : 0);
+  if (const double through_m = index_.chains()[chain].through_m; !std::isnan(through_m)) {
+    const auto through = static_cast<std::ptrdiff_t>(through_m / NetworkIndex::kCellM);
+    from = std::max(from, through - (forward ? reach : 0));
+    to = std::min(to, through + (forward ? 1 : reach + 1));
+  }
+  if (to <= from) return;
+  if (std::ssize(fitting) < to - from) fitting.resize(static_cast<size_t>(to - from));
+  size_t count = 0;
+  {
+    const size_t k = window.order.front();
+    const auto turn = static_cast<float>(window.turns[k]);
+    const auto tolerance = static_cast<float>(window.tolerances[k]);
+    const float* begin = headings.data() + ends[k];
+    const float* end = headings.data() + ends[k + 1];
+    for (std::ptrdiff_t i = from; i < to; ++i) {
+      fitting[count] = i;
+      count += std::abs(end[i] - begin[i] - turn) < tolerance ? 1 : 0;
+    }
+  }
   std::ptrdiff_t first = -kSameCells;
-  for (std::ptrdiff_t i = forward ? 0 : reach; i < (forward ? size - reach : size); ++i) {
+  for (size_t n = 0; n < count; ++n) {
+    const std::ptrdiff_t i = fitting[n];
     const float* heading = headings.data() + i;
     double squared = 0;
     bool fits = true;
@@ -96,14 +120,19 @@ void PlaceSearch::look_on(size_t chain, bool forward, const Window& window, size
     if (!same) first = i;
     if (same && squared >= hits.back().squared) continue;
     if (same) hits.pop_back();
-    hits.push_back({chain, forward, i, squared, number});
+    hits.push_back({chain, forward, i, squared, 0});
   }
 }
 
-void PlaceSearch::look_everywhere(const Window& window, size_t number, std::vector<Hit>& hits) const {
-  for (size_t chain = 0; chain < index_.chains().size(); ++chain) {
-    for (const bool forward : {true, false}) look_on(chain, forward, window, number, hits);
+PlaceSearch::Look PlaceSearch::look_everywhere(const Window& window) const {
+  Look look{window, {}, false};
+  Scratch scratch;
+  for (size_t chain = 0; chain < index_.chains().size() && !look.plain; ++chain) {
+    for (const bool forward : {true, false}) look_on(chain, forward, window, scratch, look.hits);
+    look.plain = look.hits.size() > kPlainHits;
   }
+  if (look.plain) look.hits.clear();
+  return look;
 }
 
 Candidate PlaceSearch::candidate_of(const Hit& hit, const Window& window) const {
@@ -114,57 +143,100 @@ Candidate PlaceSearch::candidate_of(const Hit& hit, const Window& window) const 
   const auto& leg = *(after - 1);
   const double into_m = place_m - leg.begin_m;
   const double squared = hit.squared / static_cast<double>(window.turns.size());
-  return {hit.forward ? leg.run : leg.run.reversed(), hit.forward ? into_m : leg.run.length_m() - into_m,
-          window.first_bin, window.scale, squared};
+  return {hit.forward ? leg.run : leg.run.reversed(),
+          hit.forward ? into_m : leg.run.length_m() - into_m,
+          window.first_bin,
+          window.scale,
+          1,
+          squared};
 }
 
-PlacesFound PlaceSearch::search() const {
-  PlacesFound found;
-  std::vector<Window> windows;
-  std::vector<Hit> hits;
-  const auto look = [&](const Window& window, size_t most) {
-    std::vector<Hit> now;
-    windows.push_back(window);
-    look_everywhere(window, windows.size() - 1, now);
-    const auto worse = [](const Hit& a, const Hit& b) { return a.squared < b.squared; };
-    if (now.size() > kPlainHits && most == 0) return;
-    if (most > 0 && now.size() > most) {
-      std::nth_element(now.begin(), now.begin() + static_cast<std::ptrdiff_t>(most), now.end(), worse);
-      now.resize(most);
-    }
-    hits.insert(hits.end(), now.begin(), now.end());
-  };
+// Until enough of them fit at a few places only. What was looked for before is remembered.
+std::vector<PlaceSearch::Look> PlaceSearch::looks() {
+  Memory kept;
+  std::vector<Look> looks;
+  std::vector<Window> telling;
   for (const auto& shape : kWindowShapes) {
     for (const size_t first : stretches(shape.segment_bins * shape.segments)) {
-      look(window_at(first, shape.segment_bins, shape.segments, 1), 0);
+      if (apart(telling) >= kApartEnough) break;
+      const std::tuple key(gone_bins_ + first, shape.segment_bins, shape.segments);
+      auto known = memory_.extract(key);
+      const auto& look =
+          kept.emplace(key, known ? std::move(known.mapped())
+                                  : look_everywhere(window_at(first, shape.segment_bins, shape.segments, 1)))
+              .first->second;
+      if (look.plain) continue;
+      looks.push_back(look);
+      looks.back().window.first_bin = first;
+      if (look.hits.size() <= kFewHits) telling.push_back(looks.back().window);
     }
   }
-  if (hits.empty()) {
-    const size_t segments = way_.size() / kWholeSegmentBins;
-    for (const double share : kWholeScales) {
-      look(window_at(0, kWholeSegmentBins, segments, 1 + share * parameters_.scale_range), kMostWhole);
-    }
+  memory_ = std::move(kept);
+  return looks;
+}
+
+// So many of the stretches do not overlap.
+int PlaceSearch::apart(std::vector<Window> windows) {
+  std::sort(windows.begin(), windows.end(), [](const Window& a, const Window& b) { return a.end_bin() < b.end_bin(); });
+  size_t free_bin = 0;
+  int count = 0;
+  for (const Window& window : windows) {
+    if (window.first_bin < free_bin) continue;
+    free_bin = window.end_bin();
+    ++count;
   }
-  // One place of the train may be found by several windows: where the way would begin tells.
+  return count;
+}
+
+// Those that fit at the fewest places, until enough of them do not overlap.
+std::vector<PlaceSearch::Look> PlaceSearch::chosen(std::vector<Look> looks, bool& complete) {
+  std::sort(looks.begin(), looks.end(), [](const Look& a, const Look& b) { return a.hits.size() < b.hits.size(); });
+  std::vector<Window> windows;
+  for (size_t i = 0; i < looks.size() && apart(windows) < kApartEnough; ++i) {
+    windows.push_back(looks[i].window);
+    for (Hit& hit : looks[i].hits) hit.window = i;
+  }
+  looks.resize(windows.size());
+  complete = apart(windows) >= kApartLeast;
+  return looks;
+}
+
+// One place of the train may be found by several stretches: where the way would begin tells.
+std::vector<Candidate> PlaceSearch::merged(const std::vector<Look>& looks) const {
   const auto begin_m = [&](const Hit& hit) {
-    const double back_m = kBinM * static_cast<double>(windows[hit.window].first_bin);
+    const double back_m = kBinM * static_cast<double>(looks[hit.window].window.first_bin);
     return NetworkIndex::kCellM * static_cast<double>(hit.cell) - (hit.forward ? back_m : -back_m);
   };
+  std::vector<Hit> hits;
+  for (const Look& look : looks) hits.insert(hits.end(), look.hits.begin(), look.hits.end());
   std::sort(hits.begin(), hits.end(), [&](const Hit& a, const Hit& b) {
     return std::tuple(a.chain, a.forward, begin_m(a)) < std::tuple(b.chain, b.forward, begin_m(b));
   });
+  std::vector<Candidate> candidates;
   const Hit* last = nullptr;
   for (const Hit& hit : hits) {
-    const auto candidate = candidate_of(hit, windows[hit.window]);
+    const auto candidate = candidate_of(hit, looks[hit.window].window);
     const bool same = last != nullptr && last->chain == hit.chain && last->forward == hit.forward &&
                       begin_m(hit) - begin_m(*last) < kSameM;
     if (!same) {
-      last = &hit;
-      found.candidates.push_back(candidate);
-    } else if (candidate.squared < found.candidates.back().squared) {
-      found.candidates.back() = candidate;
+      candidates.push_back(candidate);
+    } else {
+      Candidate& before = candidates.back();
+      const int found = before.found + (hit.window != last->window ? 1 : 0);
+      if (candidate.squared < before.squared) before = candidate;
+      before.found = found;
     }
+    last = &hit;
   }
+  std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
+    return a.found != b.found ? a.found > b.found : a.squared < b.squared;
+  });
+  return candidates;
+}
+
+PlacesFound PlaceSearch::search() {
+  PlacesFound found;
+  found.candidates = merged(chosen(looks(), found.complete));
   return found;
 }
 

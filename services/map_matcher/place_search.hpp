@@ -1,7 +1,10 @@
 // The first step of the search on the whole network: stretches of the measured way, as turns of a few hundred metres
-// each, compared with every 10 m of every chain of edges in both directions.
+// each, compared with every 10 m of every chain of edges in both directions. A stretch may miss the place (a switch too
+// many, an error of the map beyond what is allowed), several that do not overlap will not.
 #pragma once
 
+#include <map>
+#include <tuple>
 #include <vector>
 
 #include "map_matcher/locator_types.hpp"
@@ -10,18 +13,12 @@
 namespace railfix::map_matcher {
 
 struct PlacesFound {
-  std::vector<Candidate> candidates;
-  bool complete = true;  // false: there were more that fit
+  std::vector<Candidate> candidates;  // the likely ones first
+  bool complete = true;               // false: the place may not be among them
 };
 
 class PlaceSearch {
  public:
-  PlaceSearch(const LocatorParameters& parameters, const NetworkIndex& index, const MeasuredWay& way)
-      : parameters_(parameters), index_(index), way_(way) {}
-
-  [[nodiscard]] PlacesFound search() const;
-
- private:
   /// A stretch as turns of its segments.
   struct Window {
     size_t first_bin = 0;
@@ -30,6 +27,7 @@ class PlaceSearch {
     std::vector<double> turns;
     std::vector<double> tolerances;
     std::vector<size_t> order;  // what tells most, first
+    [[nodiscard]] size_t end_bin() const { return first_bin + segment_bins * turns.size(); }
   };
   /// A candidate before it is known on which edge it lies.
   struct Hit {
@@ -39,15 +37,41 @@ class PlaceSearch {
     double squared = 0;
     size_t window = 0;
   };
+  struct Look {
+    Window window;
+    std::vector<Hit> hits;
+    bool plain = false;  // it fits at too many places; not all of them are here
+  };
+  /// What was looked for before, by where the stretch begins since the first bin ever, and by its shape.
+  using Memory = std::map<std::tuple<size_t, size_t, size_t>, Look>;
+
+  /// `gone_bins` were measured before the way, and forgotten.
+  PlaceSearch(const LocatorParameters& parameters, const NetworkIndex& index, const MeasuredWay& way, size_t gone_bins,
+              Memory& memory)
+      : parameters_(parameters), index_(index), way_(way), gone_bins_(gone_bins), memory_(memory) {}
+
+  [[nodiscard]] PlacesFound search();
+
+ private:
   [[nodiscard]] Window window_at(size_t first_bin, size_t segment_bins, size_t segments, double scale) const;
   [[nodiscard]] std::vector<size_t> stretches(size_t bins) const;
-  void look_on(size_t chain, bool forward, const Window& window, size_t number, std::vector<Hit>& hits) const;
-  void look_everywhere(const Window& window, size_t number, std::vector<Hit>& hits) const;
+  [[nodiscard]] std::vector<Look> looks();
+  [[nodiscard]] static int apart(std::vector<Window> windows);
+  [[nodiscard]] static std::vector<Look> chosen(std::vector<Look> looks, bool& complete);
+  struct Scratch {
+    std::vector<std::ptrdiff_t> ends;
+    std::vector<std::ptrdiff_t> fitting;
+  };
+  void look_on(size_t chain, bool forward, const Window& window, Scratch& scratch, std::vector<Hit>& hits) const;
+  [[nodiscard]] Look look_everywhere(const Window& window) const;
   [[nodiscard]] Candidate candidate_of(const Hit& hit, const Window& window) const;
+  [[nodiscard]] std::vector<Candidate> merged(const std::vector<Look>& looks) const;
 
   const LocatorParameters& parameters_;
   const NetworkIndex& index_;
   const MeasuredWay& way_;
+  size_t gone_bins_;
+  Memory& memory_;
 };
 
 }  // namespace railfix::map_matcher

@@ -6,15 +6,13 @@
 namespace railfix::map_matcher {
 namespace {
 
-constexpr double kShiftStepM = 10.0;
-constexpr int kShiftSteps = 6;
-constexpr double kScaleStep = 0.002;
+constexpr double kShiftStepM = 40.0;
+constexpr int kShiftSteps = 1;
+constexpr double kScaleStep = 0.01;
 constexpr double kBeyondM = 150.0;
 constexpr double kGridM = 5.0;
-constexpr double kKeptBelow = 12.0;  // on the coarser grids
-constexpr size_t kMostKept = 150;
 constexpr size_t kFineEnough = 60;  // trials nearly as good as the best
-constexpr double kLargeProduct = 1e200;
+constexpr size_t kLookEvery = 8;    // bins, whether it is worth going on
 constexpr double kNearlyAsGood = 3.0;
 
 }  // namespace
@@ -31,15 +29,16 @@ class WayFitter::Shape {
       for (double m = kGridM * static_cast<double>(track.size()); m < end_m; m += kGridM) {
         track.push_back(heading + index.turned(run, m - begin_m));
       }
-      for (const auto* balise : index.balises_on(*run.edge)) {
-        balises_m_.push_back(begin_m + (run.forward ? balise->offset_m : run.length_m() - balise->offset_m));
+      for (Mark mark : index.marks_on(run)) {
+        mark.along_m += begin_m;
+        marks_.push_back(mark);
       }
       heading += index.turned(run, run.length_m());
       begin_m = end_m;
     }
-    length_m_ = begin_m;
     if (track.empty()) track.push_back(0);
     const auto lag = static_cast<size_t>(std::lround(lag_m / kGridM));
+    headings_.reserve(track.size());
     for (size_t i = 0; i < track.size(); ++i) {
       double sum = 0;
       for (size_t k = 0; k <= lag; ++k) {
@@ -47,7 +46,6 @@ class WayFitter::Shape {
       }
       headings_.push_back(lag > 0 ? sum / static_cast<double>(lag) : track[i]);
     }
-    std::sort(balises_m_.begin(), balises_m_.end());
   }
   [[nodiscard]] double heading(double m) const {
     const double cell = std::clamp(m / kGridM, 0.0, static_cast<double>(headings_.size() - 1));
@@ -55,65 +53,60 @@ class WayFitter::Shape {
     if (headings_.size() < 2) return headings_[0];
     return headings_[i] + (cell - static_cast<double>(i)) * (headings_[i + 1] - headings_[i]);
   }
-  /// To the mapped balises around.
-  [[nodiscard]] std::vector<double> balises_from(double m) const {
-    std::vector<double> distances_m;
-    for (auto b = std::lower_bound(balises_m_.begin(), balises_m_.end(), m - kBinM);
-         b != balises_m_.end() && *b < m + kBinM; ++b) {
-      distances_m.push_back(*b - m);
+  /// Log likelihood of a landmark that was sighted here, give or take rough_m.
+  [[nodiscard]] double of_mark(const TurnModel& model, const Mark& seen, double m, double rough_m) const {
+    double likelihood = model.of_false_mark();
+    auto mapped = std::lower_bound(marks_.begin(), marks_.end(), m - kBinM - rough_m,
+                                   [](const Mark& mark, double at_m) { return mark.along_m < at_m; });
+    for (; mapped != marks_.end() && mapped->along_m < m + kBinM + rough_m; ++mapped) {
+      if (alike(seen, *mapped)) likelihood += model.of_mark(mapped->along_m - m, rough_m);
     }
-    return distances_m;
+    return std::log(std::min(likelihood, 1.0));
   }
   [[nodiscard]] const std::vector<track::Run>& runs() const { return runs_; }
-  [[nodiscard]] double length_m() const { return length_m_; }
+  [[nodiscard]] size_t cells() const { return headings_.size(); }
 
  private:
   std::vector<track::Run> runs_;
   std::vector<double> headings_;
-  std::vector<double> balises_m_;
-  double length_m_ = 0;
+  std::vector<Mark> marks_;  // in order
 };
 
 // Given up as soon as it falls below least_log: what is still to come cannot make it better.
 void WayFitter::weigh(const Shape& shape, const WalkedWay& walked, Trial& trial, double rough_m, double rough_scale,
-                      double least_log) const {
+                      double least_log) {
   const auto& way = model_.way();
   const auto bins_from_anchor = [&](double i) { return i - static_cast<double>(walked.bin); };
   const auto place_m = [&](size_t i) {
     return walked.anchor_m + trial.shift_m + trial.scale * kBinM * bins_from_anchor(static_cast<double>(i));
   };
-  // The likelihood is summed up in the end; squares alone tell earlier that it is too small.
-  const double most_squared = -2 * model_.parameters().correlated_bins * least_log;
-  trial.squared = 0;
-  double capped = 0;
-  double variance = 1;
-  double variances = 0;
-  double balises = 0;
+  const double most_squared = model_.most_squared(least_log);
+  TurnSum sum = model_.begin();
+  double marks = 0;
   double from_m = place_m(0);
   double before = shape.heading(from_m);
-  for (size_t i = 0; i < way.size() && capped < most_squared; ++i) {
+  bool worth = true;
+  size_t i = 0;
+  for (; i < way.size() && worth; ++i) {
     const double to_m = place_m(i + 1);
     const double after = shape.heading(to_m);
     const double away_m = kBinM * std::abs(bins_from_anchor(static_cast<double>(i) + 0.5));
-    const auto error = model_.of_turn(i, after - before, rough_m + rough_scale * away_m);
-    trial.squared += error.squared;
-    capped += std::min(error.squared, TurnModel::kMostSquared);
-    variance *= error.variance;
-    if (variance > kLargeProduct) {
-      variances += std::log(variance);
-      variance = 1;
-    }
-    for (const double balise_m : way[i].balises_m) {
-      balises += model_.of_balise(shape.balises_from(from_m + trial.scale * balise_m));
+    const double here_rough_m = rough_m + rough_scale * away_m;
+    model_.add(sum, i, after - before, here_rough_m);
+    for (const Mark& seen : way[i].marks) {
+      marks += shape.of_mark(model_, seen, from_m + trial.scale * seen.along_m, here_rough_m);
     }
     before = after;
     from_m = to_m;
+    if (i % kLookEvery == 0) worth = model_.squared_of(sum) < most_squared;
   }
-  trial.log = model_.log_of(capped + variances, variance) + balises;
+  compared_bins_ += i;
+  trial.log = worth ? model_.log_of(sum) + marks : -INFINITY;
+  trial.misfit = model_.misfit_of(sum);
 }
 
 // From a wide grid to finer ones around what fits; on the wider ones the errors may be as large as the steps make them.
-WayFitter::Grid WayFitter::search(const Shape& shape, const WalkedWay& walked, int halvings, double least_log) const {
+WayFitter::Grid WayFitter::search(const Shape& shape, const WalkedWay& walked, const Effort& effort, double least_log) {
   const double range = model_.parameters().scale_range;
   const int scales = static_cast<int>(std::ceil(range / kScaleStep));
   Grid grid{{}, kShiftStepM, range / scales};
@@ -122,16 +115,17 @@ WayFitter::Grid WayFitter::search(const Shape& shape, const WalkedWay& walked, i
       grid.trials.push_back({0.5 * model_.parameters().lag_m + a * grid.shift_step_m, 1 + b * grid.scale_step, 0, 0});
     }
   }
+  int halvings = effort.halvings;
   for (int level = 0;; ++level) {
     const bool last = level == halvings;
     double best = -INFINITY;
     for (Trial& t : grid.trials) {
       weigh(shape, walked, t, last ? 0 : 0.5 * grid.shift_step_m, last ? 0 : 0.5 * grid.scale_step,
-            std::max(least_log, best - kKeptBelow));
+            std::max(least_log, best - effort.kept_below));
       best = std::max(best, t.log);
     }
     if (best < least_log) return {};
-    std::erase_if(grid.trials, [&](const Trial& t) { return t.log < best - kKeptBelow; });
+    std::erase_if(grid.trials, [&](const Trial& t) { return t.log < best - effort.kept_below; });
     if (last) return grid;
     const auto good = std::count_if(grid.trials.begin(), grid.trials.end(),
                                     [&](const Trial& t) { return t.log > best - kNearlyAsGood; });
@@ -140,7 +134,7 @@ WayFitter::Grid WayFitter::search(const Shape& shape, const WalkedWay& walked, i
       continue;
     }
     std::sort(grid.trials.begin(), grid.trials.end(), [](const Trial& a, const Trial& b) { return a.log > b.log; });
-    if (grid.trials.size() > kMostKept) grid.trials.resize(kMostKept);
+    if (grid.trials.size() > effort.most_kept) grid.trials.resize(effort.most_kept);
     grid.shift_step_m *= 0.5;
     grid.scale_step *= 0.5;
     std::vector<Trial> finer;
@@ -178,10 +172,11 @@ WalkedWay WayFitter::lengthened(WalkedWay walked) const {
   return walked;
 }
 
-std::optional<WayFit> WayFitter::fit(const WalkedWay& walked, int halvings, double least_log) const {
+std::optional<WayFit> WayFitter::fit(const WalkedWay& walked, const Effort& effort, double least_log) {
   const WalkedWay way = lengthened(walked);
   const Shape shape(index_, way.runs, model_.parameters().lag_m);
-  const Grid grid = search(shape, way, halvings, least_log);
+  compared_bins_ += shape.cells();
+  const Grid grid = search(shape, way, effort, least_log);
   if (grid.trials.empty()) return std::nullopt;
   const Trial& best = *std::max_element(grid.trials.begin(), grid.trials.end(),
                                         [](const Trial& a, const Trial& b) { return a.log < b.log; });
@@ -207,14 +202,14 @@ std::optional<WayFit> WayFitter::fit(const WalkedWay& walked, int halvings, doub
   result.scale = best.scale;
   result.best_log = best.log;
   result.log_evidence = best.log + std::log(sum * grid.shift_step_m * grid.scale_step);
-  result.misfit = best.squared / static_cast<double>(model_.way().size());
+  result.misfit = best.misfit;
   return result;
 }
 
 Candidate place_on(const std::vector<track::Run>& runs, double along_m) {
   size_t i = 0;
   for (; i + 1 < runs.size() && along_m > runs[i].length_m(); ++i) along_m -= runs[i].length_m();
-  return {runs[i], std::clamp(along_m, 0.0, runs[i].length_m()), 0, 1, 0};
+  return {runs[i], std::clamp(along_m, 0.0, runs[i].length_m())};
 }
 
 }  // namespace railfix::map_matcher

@@ -31,8 +31,16 @@ class WayFitter {
  public:
   WayFitter(const TurnModel& model, const NetworkIndex& index) : model_(model), index_(index) {}
 
-  /// With up to so many halvings of the grid: fewer for a first impression. Nothing below least_log.
-  [[nodiscard]] std::optional<WayFit> fit(const WalkedWay& walked, int halvings, double least_log) const;
+  /// How finely is looked: the grid is halved up to so many times, with the best trials of each.
+  struct Effort {
+    int halvings = 0;
+    size_t most_kept = 0;
+    double kept_below = 0;  // the best one, in log likelihood
+  };
+  /// Nothing below least_log.
+  [[nodiscard]] std::optional<WayFit> fit(const WalkedWay& walked, const Effort& effort, double least_log);
+  /// So many bins were compared by now: the time that it took.
+  [[nodiscard]] size_t compared_bins() const { return compared_bins_; }
 
  private:
   class Shape;
@@ -40,7 +48,7 @@ class WayFitter {
     double shift_m = 0;
     double scale = 1;
     double log = 0;
-    double squared = 0;
+    double misfit = 0;
   };
   struct Grid {
     std::vector<Trial> trials;
@@ -49,10 +57,11 @@ class WayFitter {
   };
   [[nodiscard]] WalkedWay lengthened(WalkedWay walked) const;
   void weigh(const Shape& shape, const WalkedWay& walked, Trial& trial, double rough_m, double rough_scale,
-             double least_log) const;
-  [[nodiscard]] Grid search(const Shape& shape, const WalkedWay& walked, int halvings, double least_log) const;
+             double least_log);
+  [[nodiscard]] Grid search(const Shape& shape, const WalkedWay& walked, const Effort& effort, double least_log);
   const TurnModel& model_;
   const NetworkIndex& index_;
+  size_t compared_bins_ = 0;
 };
 
 }  // namespace railfix::map_matcher

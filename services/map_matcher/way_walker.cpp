@@ -22,7 +22,9 @@ struct WayWalker::Step {
 struct WayWalker::Walk {
   double into_m = 0;    // of the newest run
   double turn_rad = 0;  // of the present step
-  double log = 0;
+  TurnSum turns;
+  double marks = 0;     // log likelihood
+  double log = 0;       // of both
   double beyond_m = 0;  // of the end of the track
   std::shared_ptr<const Step> steps;
   [[nodiscard]] const track::Run& run() const { return steps->run; }
@@ -44,8 +46,11 @@ void WayWalker::step(const Walk& from, double way_m, std::vector<Walk>& to, int 
   }
   if (depth == 0) return;
   const auto go_on = [&](const track::Run& next_run) {
-    Walk next{way_m > 0 ? 0.0 : next_run.length_m(), turn_rad, from.log, 0,
-              std::make_shared<const Step>(Step{next_run, from.steps})};
+    Walk next = from;
+    next.into_m = way_m > 0 ? 0.0 : next_run.length_m();
+    next.turn_rad = turn_rad;
+    next.beyond_m = 0;
+    next.steps = std::make_shared<const Step>(Step{next_run, from.steps});
     step(next, way_m - (border_m - from.into_m), to, depth - 1);
   };
   const auto next_runs = way_m > 0 ? index_.ways().after(run) : index_.ways().before(run);
@@ -60,39 +65,59 @@ void WayWalker::step(const Walk& from, double way_m, std::vector<Walk>& to, int 
 }
 
 // On the run of the step's beginning, or where it ended.
-double WayWalker::of_balises(const Walk& before, const Walk& after, size_t bin, double scale, bool ahead) const {
+double WayWalker::of_marks(const Walk& before, const Walk& after, size_t bin, double scale, bool ahead,
+                           double rough_m) const {
   const Walk& early = ahead ? before : after;
   const Walk& late = ahead ? after : before;
   double log = 0;
-  for (const double balise_m : model_.way()[bin].balises_m) {
-    std::vector<double> distances_m;
-    const auto look = [&](const track::Run& run, double into_m) {
-      const double offset_m = run.forward ? into_m : run.length_m() - into_m;
-      for (const auto* mapped : index_.balises_on(*run.edge)) distances_m.push_back(mapped->offset_m - offset_m);
+  for (const Mark& seen : model_.way()[bin].marks) {
+    double likelihood = model_.of_false_mark();
+    const auto look = [&](const track::Run& run, double at_m) {
+      for (const Mark& mapped : index_.marks_on(run)) {
+        if (alike(seen, mapped)) likelihood += model_.of_mark(mapped.along_m - at_m, rough_m);
+      }
     };
-    look(early.run(), early.into_m + scale * balise_m);
-    if (!(late.run() == early.run())) look(late.run(), late.into_m - scale * (kBinM - balise_m));
-    log += model_.of_balise(distances_m);
+    look(early.run(), early.into_m + scale * seen.along_m);
+    if (!(late.run() == early.run())) look(late.run(), late.into_m - scale * (kBinM - seen.along_m));
+    log += std::log(std::min(likelihood, 1.0));
   }
   return log;
 }
 
-std::vector<WayWalker::Walk> WayWalker::go(const std::vector<Walk>& walks, size_t bin, bool ahead,
-                                           const Candidate& candidate, const Trial& trial, double least_log) const {
+std::vector<WayWalker::Walk> WayWalker::go(std::vector<Walk> walks, size_t bin, bool ahead, const Candidate& candidate,
+                                           const Trial& trial, double least_log) {
   const double from_anchor_m = kBinM * std::abs(static_cast<double>(bin) - static_cast<double>(candidate.bin));
   const double rough_m = trial.rough_m + trial.rough_scale * from_anchor_m;
+  const auto weigh = [&](const Walk& before, Walk& after) {
+    // Behind the anchor the step was taken backwards: its turn counts the other way round.
+    model_.add(after.turns, bin, (ahead ? 1 : -1) * after.turn_rad, rough_m);
+    if (!model_.way()[bin].marks.empty()) {
+      after.marks += of_marks(before, after, bin, candidate.scale, ahead, rough_m);
+    }
+    after.log = model_.log_of(after.turns) + after.marks;
+  };
+  compared_bins_ += walks.size();
+  const double way_m = (ahead ? 1 : -1) * candidate.scale * kBinM;
+  if (walks.size() == 1) {
+    // Mostly: one walk, and no end of its run is near.
+    Walk& walk = walks.front();
+    const double into_m = walk.into_m + way_m;
+    if (into_m >= 0 && into_m <= walk.run().length_m()) {
+      Walk before = walk;
+      walk.turn_rad = index_.turned(walk.run(), into_m) - index_.turned(walk.run(), walk.into_m);
+      walk.into_m = into_m;
+      weigh(before, walk);
+      if (walk.log < least_log) walks.clear();
+      return walks;
+    }
+  }
   std::vector<Walk> next;
   for (const Walk& walk : walks) {
     Walk from = walk;
     from.turn_rad = 0;
     const size_t first = next.size();
-    step(from, (ahead ? 1 : -1) * candidate.scale * kBinM, next, kMostRunsAStep);
-    for (size_t i = first; i < next.size(); ++i) {
-      // Behind the anchor the step was taken backwards: its turn counts the other way round.
-      const auto error = model_.of_turn(bin, (ahead ? 1 : -1) * next[i].turn_rad, rough_m);
-      next[i].log += model_.log_of(std::min(error.squared, TurnModel::kMostSquared), error.variance);
-      if (!model_.way()[bin].balises_m.empty()) next[i].log += of_balises(from, next[i], bin, candidate.scale, ahead);
-    }
+    step(from, way_m, next, kMostRunsAStep);
+    for (size_t i = first; i < next.size(); ++i) weigh(from, next[i]);
   }
   std::erase_if(next, [&](const Walk& w) { return w.log < least_log; });
   if (next.size() < 2) return next;
@@ -109,16 +134,19 @@ std::vector<WayWalker::Walk> WayWalker::go(const std::vector<Walk>& walks, size_
   return kept;
 }
 
-std::vector<WalkedWay> WayWalker::follow(const Candidate& candidate, const Trial& trial, double least_log) const {
-  const Walk anchor{candidate.into_m, 0, 0, 0, std::make_shared<const Step>(Step{candidate.run, nullptr})};
+std::vector<WalkedWay> WayWalker::follow(const Candidate& candidate, const Trial& trial, double least_log) {
+  Walk anchor;
+  anchor.into_m = candidate.into_m;
+  anchor.turns = model_.begin();
+  anchor.steps = std::make_shared<const Step>(Step{candidate.run, nullptr});
   std::vector<Walk> behind{anchor};
   for (size_t i = candidate.bin; i > 0 && !behind.empty(); --i) {
-    behind = go(behind, i - 1, false, candidate, trial, least_log);
+    behind = go(std::move(behind), i - 1, false, candidate, trial, least_log);
   }
   if (behind.empty()) return {};
   std::vector<Walk> ahead{anchor};
   for (size_t i = candidate.bin; i < model_.way().size() && !ahead.empty(); ++i) {
-    ahead = go(ahead, i, true, candidate, trial, least_log - behind.front().log);
+    ahead = go(std::move(ahead), i, true, candidate, trial, least_log - behind.front().log);
   }
   std::vector<WalkedWay> ways;
   for (const Walk& before : behind) {

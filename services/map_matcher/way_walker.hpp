@@ -28,20 +28,24 @@ class WayWalker {
     double rough_scale = 0;
     size_t most_ways = 4;
   };
-  [[nodiscard]] std::vector<WalkedWay> follow(const Candidate& candidate, const Trial& trial, double least_log) const;
+  [[nodiscard]] std::vector<WalkedWay> follow(const Candidate& candidate, const Trial& trial, double least_log);
+  /// So many bins were compared by now: the time that it took.
+  [[nodiscard]] size_t compared_bins() const { return compared_bins_; }
 
  private:
   struct Step;
   struct Walk;
   void step(const Walk& from, double way_m, std::vector<Walk>& to, int depth) const;
-  [[nodiscard]] double of_balises(const Walk& before, const Walk& after, size_t bin, double scale, bool ahead) const;
-  [[nodiscard]] std::vector<Walk> go(const std::vector<Walk>& walks, size_t bin, bool ahead, const Candidate& candidate,
-                                     const Trial& trial, double least_log) const;
+  [[nodiscard]] double of_marks(const Walk& before, const Walk& after, size_t bin, double scale, bool ahead,
+                                double rough_m) const;
+  [[nodiscard]] std::vector<Walk> go(std::vector<Walk> walks, size_t bin, bool ahead, const Candidate& candidate,
+                                     const Trial& trial, double least_log);
 
   [[nodiscard]] static WalkedWay joined(const Walk& behind, const Walk& ahead, const Candidate& candidate);
 
   const TurnModel& model_;
   const NetworkIndex& index_;
+  size_t compared_bins_ = 0;
 };
 
 }  // namespace railfix::map_matcher

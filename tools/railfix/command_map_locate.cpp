@@ -58,10 +58,8 @@ int locate(const LocateRequest& request) {
     std::printf("place            not yet known: the way is too short or bends too little\n");
     return 0;
   }
-  std::printf("place            %s\n", location.certain ? "certain"
-                                       : location.place_certain
-                                           ? "certain, but not which of the tracks beside each other"
-                                           : "not yet certain");
+  const char* certainty = location.certain() ? "" : location.place_certain() ? "certain, but " : "not yet certain: ";
+  std::printf("place            %s%s\n", certainty, to_string(location.doubt).c_str());
   for (size_t i = 0; i < std::min<size_t>(location.places.size(), 8); ++i) {
     const auto& p = location.places[i];
     std::printf("  %6.2f %%  %u:%.0f:%c  %s, +-%.0f m, scale %.4f, misfit %.2f\n", 100 * p.probability, p.place.edge,

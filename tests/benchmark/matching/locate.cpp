@@ -19,6 +19,11 @@ namespace {
 constexpr double kTripM = 5000;
 constexpr double kEveryM = 500;
 constexpr double kRightM = 50;
+constexpr double kMissed = 0.15;    // landmarks that are not sighted
+constexpr double kMapSigmaM = 1.0;  // ... and are so far from where the map has them
+constexpr double kFalsePerM = 0.0003;
+constexpr std::array kFalseKinds{track::LandmarkKind::balise, track::LandmarkKind::frog, track::LandmarkKind::bridge,
+                                 track::LandmarkKind::platform, track::LandmarkKind::portal_in};
 
 double processor_s() {
   return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
@@ -56,7 +61,8 @@ struct Trip {
   double found_after_m = 0;
   double place_after_m = 0;
   bool best_right = false;  // at the end, certain or not
-  double slowest_s = 0;
+  std::vector<double> searches_s;
+  std::vector<map_matcher::Doubt> doubts;
   double turn_rad = 0;        // of the true track, over stretches of 20 m
   double most_sigmas = 0;     // error of a place that was certain
   double bound_m = INFINITY;  // least error that could be had on the way
@@ -103,7 +109,7 @@ double bound_m(const testing::VehicleHeading& heading, double begin_m, double en
   double scale = 3 / (p.scale_range * p.scale_range);
   for (double m = begin_m; m + bin_m <= end_m; m += bin_m) {
     const double turn = heading.at(m + bin_m) - heading.at(m);
-    const double variance = std::pow(p.noise_per_m * bin_m, 2) + std::pow(p.curvature_share * turn, 2) +
+    const double variance = 2 * std::pow(p.heading_sigma_rad, 2) * 0.4 + std::pow(p.curvature_share * turn, 2) +
                             bin_m * step_noise_rad * step_noise_rad;
     const double by_place = curvature(m + bin_m) - curvature(m);
     const double by_scale = curvature(m) * (end_m - m) - curvature(m + bin_m) * (end_m - m - bin_m);
@@ -120,7 +126,7 @@ Trip run_trip(const std::shared_ptr<const map_matcher::NetworkIndex>& index, con
               const MatchingOptions& options, core::Random& random) {
   testing::RideErrors errors;
   errors.odometer_scale = random.uniform(-0.02, 0.02);
-  errors.turn_bias_rps = 0;
+  errors.turn_bias_rps = 0.001 * random.normal();
   errors.turn_noise_rps = 0;
   errors.step_turn_noise_rad = 3e-4;
   const double first_m = route.begin_m() + 1;
@@ -142,20 +148,23 @@ Trip run_trip(const std::shared_ptr<const map_matcher::NetworkIndex>& index, con
     locator.move(s.way_m, s.turn_rad, s.turn_sigma_rad);
     const double here_m = first_m + at_m + kStepM;
     const auto& leg = route.leg_at(here_m + 8);
-    for (const auto* balise : index->balises_on(*leg.run.edge)) {
-      const double balise_m =
-          leg.begin_m + (leg.run.forward ? balise->offset_m : leg.run.length_m() - balise->offset_m);
-      if (balise_m <= here_m + 8 - kStepM || balise_m > here_m + 8 || random.uniform() < 0.15) continue;
-      locator.sight({0, track::LandmarkKind::balise, balise_m - here_m, 0, 0.2, 0.95});
+    for (const auto& mark : index->marks_on(leg.run)) {
+      const double mark_m = leg.begin_m + mark.along_m;
+      if (mark_m <= here_m + 8 - kStepM || mark_m > here_m + 8 || random.uniform() < kMissed) continue;
+      locator.sight({0, mark.kind, mark_m - here_m + kMapSigmaM * random.normal(), mark.lateral_m, 0.2, 0.95});
     }
-    if (random.uniform() < 0.0003 * kStepM) locator.sight({0, track::LandmarkKind::balise, 8, 0, 0.2, 0.95});
+    if (random.uniform() < kFalsePerM * kStepM) {
+      const auto kind = kFalseKinds[static_cast<size_t>(random.uniform(0, static_cast<double>(kFalseKinds.size())))];
+      const double side = random.uniform() < 0.5 ? -1 : 1;
+      locator.sight({0, kind, 8, kind == track::LandmarkKind::frog ? 0.72 * side : 0, 0.2, 0.95});
+    }
     const bool last = at_m + 1.5 * kStepM > kTripM;
     if (!last && at_m - looked_m < kEveryM) continue;
     looked_m = at_m;
     trip.bound_m = std::min(trip.bound_m, bound_m(mapped, first_m, here_m, errors.step_turn_noise_rad));
     const double begin_s = processor_s();
     const auto location = locator.locate();
-    trip.slowest_s = std::max(trip.slowest_s, processor_s() - begin_s);
+    trip.searches_s.push_back(processor_s() - begin_s);
     if (location.places.empty()) continue;
     const auto truth = route.position_at(here_m);
     const auto& best = location.places.front().place;
@@ -163,19 +172,20 @@ Trip run_trip(const std::shared_ptr<const map_matcher::NetworkIndex>& index, con
     // Near a joint of edges the place may lie on the next one: on the route it must be.
     const auto on_route = route.distance_of(best, here_m);
     const bool right = near && on_route && std::abs(*on_route - here_m) < kRightM;
-    if (location.certain && !trip.found) {
+    if (location.certain() && !trip.found) {
       trip.found = true;
       trip.found_after_m = at_m;
     }
-    if (location.place_certain && !trip.place_found) {
+    if (location.place_certain() && !trip.place_found) {
       trip.place_found = true;
       trip.place_after_m = at_m;
     }
+    trip.doubts.push_back(location.doubt);
     const double sigmas = apart_m(index->map(), truth, best) / location.places.front().sigma_m;
-    if (location.certain) trip.most_sigmas = std::max(trip.most_sigmas, sigmas);
-    if ((location.certain && (!right || sigmas > 4)) || (location.place_certain && !near)) trip.wrong = true;
+    if (location.certain()) trip.most_sigmas = std::max(trip.most_sigmas, sigmas);
+    if ((location.certain() && (!right || sigmas > 4)) || (location.place_certain() && !near)) trip.wrong = true;
     trip.best_right = near;
-    if (options.each && ((location.certain && !right) || (location.place_certain && !near))) {
+    if (options.each && ((location.certain() && !right) || (location.place_certain() && !near))) {
       std::printf("  wrong at %.0f m: %u:%.0f for %u:%.0f, %.0f m apart, sigma %.0f m, misfit %.2f\n", at_m, best.edge,
                   best.offset_m, truth.edge, truth.offset_m, apart_m(index->map(), truth, best),
                   location.places.front().sigma_m, location.places.front().misfit);
@@ -194,6 +204,10 @@ void print_found(const char* what, const std::vector<Trip>& trips) {
               share([](const Trip& t) { return t.place_found; }), share([](const Trip& t) { return t.found; }));
 }
 
+double quantile(const std::vector<double>& sorted, double share) {
+  return sorted.empty() ? 0.0 : sorted[static_cast<size_t>(share * static_cast<double>(sorted.size() - 1))];
+}
+
 void print(const std::vector<Trip>& trips) {
   print_found("trips of 5 km", trips);
   std::vector<Trip> informed;
@@ -203,23 +217,47 @@ void print(const std::vector<Trip>& trips) {
   std::vector<double> seconds;
   std::vector<double> after_m;
   double most_sigmas = 0;
+  int wrong = 0;
   for (const Trip& t : trips) {
-    seconds.push_back(t.slowest_s);
+    seconds.insert(seconds.end(), t.searches_s.begin(), t.searches_s.end());
     if (t.found) after_m.push_back(t.found_after_m);
     most_sigmas = std::max(most_sigmas, t.most_sigmas);
+    wrong += t.wrong ? 1 : 0;
   }
   std::sort(seconds.begin(), seconds.end());
   std::sort(after_m.begin(), after_m.end());
-  const auto middle = [](const std::vector<double>& sorted) {
-    return sorted.empty() ? 0.0 : sorted[sorted.size() / 2];
-  };
   std::printf(
-      "wrong although certain: %d; largest error of a certain place %.1f sigma; track certain after %.0f m in the "
+      "wrong although certain %d; largest error of a certain place %.1f sigma; track certain after %.0f m in the "
       "median\n",
-      static_cast<int>(std::count_if(trips.begin(), trips.end(), [](const Trip& t) { return t.wrong; })), most_sigmas,
-      middle(after_m));
-  std::printf("slowest search of a trip (processor time): median %.2f s, max %.2f s\n", middle(seconds),
-              seconds.empty() ? 0.0 : seconds.back());
+      wrong, most_sigmas, quantile(after_m, 0.5));
+  std::printf("search (processor time, %zu): p50 %.2f, p99 %.2f, max %.2f s\n", seconds.size(), quantile(seconds, 0.5),
+              quantile(seconds, 0.99), quantile(seconds, 1));
+}
+
+void tell(int number, const Trip& t) {
+  const double slowest_s = t.searches_s.empty() ? 0.0 : *std::max_element(t.searches_s.begin(), t.searches_s.end());
+  std::printf("%4d: %s%s", number, t.wrong ? "WRONG, " : "", t.best_right ? "" : "not found, ");
+  if (t.found) {
+    std::printf("track certain after %.0f m", t.found_after_m);
+  } else if (t.place_found) {
+    std::printf("place certain after %.0f m", t.place_after_m);
+  } else {
+    std::printf("not certain: %s", t.doubts.empty() ? "bends too little" : to_string(t.doubts.back()).c_str());
+  }
+  std::printf("; turned %.2f rad, bound %.0f m, slowest search %.2f s\n", t.turn_rad, t.bound_m, slowest_s);
+  std::fflush(stdout);
+}
+
+/// Trips are drawn each for itself, so that a run may begin anywhere among them.
+std::optional<Trip> trip_of(int number, const std::shared_ptr<const map_matcher::NetworkIndex>& index,
+                            const MatchingOptions& options) {
+  core::Random random(options.seed * 7919 + 5 + 1000003 * static_cast<uint64_t>(number));
+  for (int tries = 0; tries < 100; ++tries) {
+    if (const auto route = random_route(index->map(), index->ways(), random)) {
+      return run_trip(index, *route, options, random);
+    }
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -232,20 +270,13 @@ int measure_locate(const MatchingOptions& options) {
   const auto index = std::make_shared<const map_matcher::NetworkIndex>(map);
   std::printf("%.0f km of track, %zu edges, index made in %.2f s\n", track_m / 1000, map->edges.size(),
               processor_s() - begin_s);
-  core::Random random(options.seed * 7919 + 5);
   const int count = options.count > 0 ? options.count : 100;
   std::vector<Trip> trips;
-  int tries = 0;
-  while (static_cast<int>(trips.size()) < count && ++tries < 100 * count) {
-    const auto route = random_route(*map, index->ways(), random);
-    if (!route) continue;
-    trips.push_back(run_trip(index, *route, options, random));
-    if (options.each) {
-      const Trip& t = trips.back();
-      std::printf("%s%splace after %.0f m, track after %.0f m, turned %.2f rad, bound %.0f m, %.2f s\n",
-                  t.wrong ? "WRONG " : "", t.best_right ? "" : "not found ", t.place_after_m, t.found_after_m,
-                  t.turn_rad, t.bound_m, t.slowest_s);
-    }
+  for (int i = options.from; i < options.from + count; ++i) {
+    const auto trip = trip_of(i, index, options);
+    if (!trip) continue;
+    trips.push_back(*trip);
+    if (options.each) tell(i, trips.back());
   }
   print(trips);
   return 0;

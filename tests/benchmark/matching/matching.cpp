@@ -14,9 +14,11 @@ constexpr const char* kUsage =
     "  curvature  wheel and gyro alone against a map, by default ../shared/data/alignment/sbb_mszw_a2.landxml\n"
     "railfix-measure-matching landmarks [--count N] [--seed N]\n"
     "  landmarks  which mapped landmark was sighted, with missed and false sightings and a map that is partly wrong\n"
-    "railfix-measure-matching locate [--map FILE | --track-km KM] [--count N] [--seed N] [--map-error-m M] [--each]\n"
+    "railfix-measure-matching locate [--map FILE | --track-km KM] [--trips N] [--from N] [--seed N] [--map-error-m M]\n"
+    "                         [--each]\n"
     "  locate     the place without a prior, over trips of 5 km on a map or a made-up network; the real track wanders\n"
-    "             about the mapped one by 0.5 m (1 sigma)\n";
+    "             about the mapped one by 0.5 m (1 sigma). --each prints every trip as it ends, --from goes on with\n"
+    "             those of the same seed\n";
 
 }  // namespace
 
@@ -25,8 +27,10 @@ int main(int argc, char** argv) {
   std::string what;
   for (int i = 1; i < argc; ++i) {
     const bool more = i + 1 < argc;
-    if (std::strcmp(argv[i], "--count") == 0 && more) {
+    if ((std::strcmp(argv[i], "--count") == 0 || std::strcmp(argv[i], "--trips") == 0) && more) {
       options.count = std::atoi(argv[++i]);
+    } else if (std::strcmp(argv[i], "--from") == 0 && more) {
+      options.from = std::atoi(argv[++i]);
     } else if (std::strcmp(argv[i], "--seed") == 0 && more) {
       options.seed = std::strtoull(argv[++i], nullptr, 10);
     } else if (std::strcmp(argv[i], "--map") == 0 && more) {

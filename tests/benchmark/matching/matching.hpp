@@ -8,6 +8,7 @@ namespace railfix::measure {
 
 struct MatchingOptions {
   int count = 0;  // 0 = what the figure asks for
+  int from = 0;   // the first of them (locate)
   uint64_t seed = 1;
   std::string map;
   double track_km = 20000;   // of a made-up network
