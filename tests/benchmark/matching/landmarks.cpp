@@ -69,17 +69,19 @@ struct Seen {
   double place_m = 0;
   LandmarkKind kind = LandmarkKind::unknown;
   bool on_map = false;  // at about its place
+  bool moved = false;   // the map has it elsewhere
 };
 
 std::vector<Seen> sightings_of(const std::vector<Thing>& things, core::Random& random) {
   std::vector<Seen> seen;
   for (const Thing& thing : things) {
     if (std::isnan(thing.real_m) || random.uniform() < kMissed) continue;
-    seen.push_back({thing.real_m, thing.kind, std::abs(thing.real_m - thing.mapped_m) < kRightM});
+    seen.push_back({thing.real_m, thing.kind, std::abs(thing.real_m - thing.mapped_m) < kRightM,
+                    std::abs(thing.real_m - thing.mapped_m) >= kRightM});
   }
   for (const auto kind : {LandmarkKind::balise, LandmarkKind::mast}) {
     for (double m = 0; m < kLineM; m += 10) {
-      if (random.uniform() < 10 * kFalsePerM) seen.push_back({m + random.uniform(0, 10), kind, false});
+      if (random.uniform() < 10 * kFalsePerM) seen.push_back({m + random.uniform(0, 10), kind, false, false});
     }
   }
   std::sort(seen.begin(), seen.end(), [](const Seen& a, const Seen& b) { return a.place_m < b.place_m; });
@@ -92,14 +94,18 @@ struct Count {
   int others = 0;  // false ones, moved or unmapped landmarks
   int sure = 0;    // fixes
   int right = 0;
-  int wrong = 0;
+  int wrong = 0;        // ... of which
+  int wrong_false = 0;  // not on the map at all, or seen where nothing is
+  int wrong_other = 0;  // another one was named
+  int wrong_moved = 0;  // standing elsewhere than the map says
   double promised = 0;  // sum of 1 - probability
 
   void print(const char* what) const {
     std::printf(
         "%-8s %5d sightings of mapped, %4d of others: sure %.1f %% of the mapped, %d wrong (promised %.1f), "
-        "%.1f %% of the sure\n",
-        what, mapped, others, 100.0 * right / std::max(mapped, 1), wrong, promised, 100.0 * wrong / std::max(sure, 1));
+        "%.1f %% of the sure: false or unmapped %d, moved %d, another one named %d\n",
+        what, mapped, others, 100.0 * right / std::max(mapped, 1), wrong, promised, 100.0 * wrong / std::max(sure, 1),
+        wrong_false, wrong_moved, wrong_other);
   }
 };
 
@@ -121,6 +127,7 @@ void run_line(core::Random& random, double interval_m, Count& balises, Count& ma
     ++count.sure;
     count.right += right ? 1 : 0;
     count.wrong += right ? 0 : 1;
+    if (!right) ++(seen.moved ? count.wrong_moved : seen.on_map ? count.wrong_other : count.wrong_false);
     count.promised += 1 - fix->probability;
   }
 }
