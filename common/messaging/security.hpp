@@ -12,6 +12,7 @@ namespace railfix::messaging {
 
 /// Fast DDS properties for the identity of `service` in this folder, which `railfix train keys` fills:
 ///   ca.pem, governance.p7s, <service>.cert.pem, <service>.key.pem, <service>.permissions.p7s
+/// Tools, whose names begin with "railfix-", have the operator's identity `tool`.
 /// Empty folder name: none. Error: a file that is missing or cannot be read.
 core::Result<std::vector<std::pair<std::string, std::string>>> security_properties(const std::filesystem::path& folder,
                                                                                    const std::string& service);

@@ -23,5 +23,6 @@ void add_replay(CLI::App& app, Action& chosen);
 void add_recording(CLI::App& app, Action& chosen);
 void add_tell(CLI::App& app, Action& chosen);
 void add_tpr(CLI::App& app, Action& chosen);
+void add_train(CLI::App& app, Action& chosen);
 
 }  // namespace railfix::tool

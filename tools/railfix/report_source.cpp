@@ -15,7 +15,7 @@ constexpr const char* kTopic = "topic:";
 
 ReportSource::ReportSource(const std::string& where, etcs::Baseline baseline, int64_t domain) {
   if (where.starts_with(kTopic)) {
-    const TrainNetwork network{where.substr(std::string(kTopic).size()), domain};
+    const TrainNetwork network{where.substr(std::string(kTopic).size()), domain, {}};
     listener_ = std::make_unique<TopicListener>(network, "railfix-tpr-compare");
     listener_->listen(messaging::topics::train_position_report.name,
                       [this](const auto&, const auto&, const auto& sample, const auto&) {

@@ -20,6 +20,9 @@ messaging::ParticipantOptions participant_options(const TrainNetwork& network, c
   options.train_id = network.train;
   options.domain = network.domain;
   options.service = command;
+  options.interfaces = network.host.interfaces;
+  options.peers = network.host.peers;
+  options.security_folder = network.host.security;
   return options;
 }
 
@@ -28,6 +31,16 @@ messaging::ParticipantOptions participant_options(const TrainNetwork& network, c
 void add_network(CLI::App& command, TrainNetwork& network) {
   command.add_option("--train", network.train, "Train to listen to")->capture_default_str();
   command.add_option("--domain", network.domain, "DDS domain")->capture_default_str()->check(CLI::Range(0, 232));
+  command.add_option_function<std::string>(
+      "--config",
+      [&network](const std::string& file) {
+        const auto common = service::read_config<service::CommonConfig>("common", file, {}, service::service_names());
+        if (!common.ok()) throw CLI::ValidationError(common.error().message);
+        network.host = common.value();
+        network.train = network.host.train_id;
+        network.domain = network.host.domain;
+      },
+      "Configuration of the services on this computer: their train, domain, interfaces and keys");
 }
 
 std::string where(const TrainNetwork& network) {

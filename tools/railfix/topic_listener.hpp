@@ -8,6 +8,7 @@
 #include <string>
 
 #include "messaging/topics.hpp"
+#include "service/service.hpp"
 
 namespace railfix::tool {
 
@@ -15,8 +16,9 @@ namespace railfix::tool {
 struct TrainNetwork {
   std::string train = "demo";
   int64_t domain = 0;
+  service::CommonConfig host;  // interfaces, peers and keys
 };
-/// --train and --domain.
+/// --train and --domain, or --config for everything at once.
 void add_network(CLI::App& command, TrainNetwork& network);
 /// "train demo, domain 0"
 std::string where(const TrainNetwork& network);

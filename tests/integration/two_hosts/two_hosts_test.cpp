@@ -148,6 +148,57 @@ TEST_F(TwoHostsTest, StatesAndReportsCrossTheCableAndPicturesDoNot) {
   EXPECT_LT(bytes, kPictures * kWidthPx * kHeightPx / 20);
 }
 
+/// What the cab hears of train_state: from whom, and the longest pause.
+struct Heard {
+  explicit Heard(messaging::Participant& participant, messaging::Queue& queue)
+      : reader(participant, topics::train_state, "", queue,
+               [this](const msg::TrainState&, const messaging::SampleInfo& info) {
+                 if (!info.valid) return;
+                 const int64_t now_ns = core::monotonic_ns();
+                 if (last_ns != 0) longest_s = std::max(longest_s, core::seconds(now_ns - last_ns));
+                 last_ns = now_ns;
+                 writer = info.writer;
+                 ++states;
+               }) {}
+  uint64_t states = 0;
+  uint64_t writer = 0;
+  double longest_s = 0;
+  int64_t last_ns = 0;
+  messaging::Reader<msg::TrainState> reader;
+};
+
+TEST_F(TwoHostsTest, AStandbyOnTheOtherHostTakesOver) {
+  const std::vector<std::string> first{"common.ownership_strength=20"};
+  const std::vector<std::string> second{"common.ownership_strength=10"};
+  auto primary = start(TwoHosts::coach, "railfix-fusion", first);
+  auto standby = start(TwoHosts::cab, "railfix-fusion", second);
+  Camera camera(*cab_);
+  Heard heard(*cab_, queue_);
+  const auto drive = [&](auto condition) {
+    int64_t next_ns = 0;
+    return run_until([&] {
+      if (core::monotonic_ns() >= next_ns) {
+        camera.step();
+        next_ns = core::monotonic_ns() + 33'000'000;
+      }
+      return condition();
+    });
+  };
+  const auto drive_states = [&](uint64_t count) {
+    const uint64_t until = heard.states + count;
+    return drive([&] { return heard.states >= until; });
+  };
+  ASSERT_TRUE(drive([&] { return heard.reader.matched_writers() == 2; }));
+  ASSERT_TRUE(drive_states(60));
+  const uint64_t before = heard.writer;
+  heard.longest_s = 0;
+  primary->end(SIGKILL);
+  ASSERT_TRUE(drive([&] { return heard.writer != before; })) << "nobody takes over";
+  const double gap_s = heard.longest_s;
+  std::cout << "gap in train_state when its fusion is killed: " << static_cast<int>(1000 * gap_s) << " ms\n";
+  EXPECT_LT(gap_s, 2.0);  // the figure of a quiet machine is in docs/figures.md
+}
+
 TEST_F(TwoHostsTest, AServiceStartedWithoutTheCableEndsToBeStartedAgainWhenThereIsOne) {
   hosts_.plug(false);
   auto fusion = start(TwoHosts::cab, "railfix-fusion");

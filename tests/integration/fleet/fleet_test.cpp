@@ -1,0 +1,151 @@
+// `railfix train` as an operator uses it: real services under a real supervisor, in a folder of their own.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <nlohmann/json.hpp>
+
+#include "core/time.hpp"
+#include "support/program.hpp"
+
+namespace railfix {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+class Fleet : public ::testing::Test {
+ protected:
+  Fleet() {
+    fs::create_directories(folder_ / "train");
+    write_manifest(RAILFIX_TEST_RELEASE);
+  }
+  ~Fleet() override {
+    train({"down", "--root", root()});
+    fs::remove_all(folder_);
+  }
+  void write_manifest(const std::string& release, const std::string& more = "") {
+    std::ofstream(folder_ / "train" / "train.yaml")
+        << "train:\n  id: " << id_ << "\n  domain: 95\n  release: " << release
+        << "\n  run_as: programs\n  hosts: { cab: { address: 127.0.0.1 } }\n"
+           "  services: { fusion: cab, tpr_publisher: cab }\n"
+           "settings: { common: { log_level: warning }"
+        << more << " }\n";
+  }
+  [[nodiscard]] std::string root() const { return (folder_ / "root").string(); }
+  [[nodiscard]] std::string manifest() const { return (folder_ / "train").string(); }
+  static test::Outcome train(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {"railfix", "train"});
+    return test::run_program(arguments, 180);
+  }
+  test::Outcome up() { return train({"up", manifest(), "--root", root(), "--healthy-for", "1", "--patience", "60"}); }
+  test::Outcome upgrade(const std::string& patience_s = "60") {
+    return train({"upgrade", manifest(), "--root", root(), "--healthy-for", "1", "--patience", patience_s});
+  }
+  nlohmann::json status(const std::string& service) {
+    const auto said = train({"status", "--root", root(), "--json"});
+    const auto all = nlohmann::json::parse(said.out);
+    for (const auto& one : all["services"]) {
+      if (one["service"] == service) return one;
+    }
+    return {};
+  }
+  template <class Condition>
+  static bool wait_until(Condition condition) {
+    const int64_t deadline_ns = core::monotonic_ns() + 60 * core::kNsPerSecond;
+    while (!condition()) {
+      if (core::monotonic_ns() > deadline_ns) return false;
+      poll(nullptr, 0, 100);
+    }
+    return true;
+  }
+  const std::string id_ = "fleet-" + std::to_string(getpid());
+  const fs::path folder_ = fs::temp_directory_path() / id_;
+};
+
+TEST_F(Fleet, ServicesComeUpComeBackAfterAKillAndGoDown) {
+  const auto started = up();
+  EXPECT_EQ(started.exit_code, 0) << started.out << started.err;
+  const auto before = status("fusion");
+  EXPECT_TRUE(before["healthy"]);
+  ASSERT_EQ(kill(before["pid"].get<pid_t>(), SIGKILL), 0);
+  EXPECT_TRUE(wait_until([&] {
+    const auto now = status("fusion");
+    return now["healthy"] && now["pid"] != before["pid"] && now["restarts"] == 1;
+  }));
+  EXPECT_EQ(train({"down", "--root", root()}).exit_code, 0);
+  const auto after = train({"status", "--root", root()});
+  EXPECT_EQ(after.exit_code, 1);
+  EXPECT_THAT(after.out, HasSubstr("not running: railfix train up"));
+}
+
+TEST_F(Fleet, AnUpgradeRestartsWhatChangedAndRollsBackByItselfWhenItIsBad) {
+  ASSERT_EQ(up().exit_code, 0);
+  const auto fusion = status("fusion");
+  const auto reports = status("tpr_publisher");
+  write_manifest(RAILFIX_TEST_RELEASE, ", tpr_publisher: { nid_engine: 4711 }");
+  const auto difference = train({"diff", manifest(), "--root", root()});
+  EXPECT_THAT(difference.out, HasSubstr("+tpr_publisher.nid_engine: 4711"));
+  EXPECT_THAT(difference.out, Not(HasSubstr("fusion:")));
+  const auto upgraded = upgrade();
+  EXPECT_EQ(upgraded.exit_code, 0) << upgraded.out << upgraded.err;
+  EXPECT_EQ(status("fusion")["pid"], fusion["pid"]) << "it was not concerned";
+  const auto changed = status("tpr_publisher");
+  EXPECT_NE(changed["pid"], reports["pid"]);
+
+  // A release whose fusion does not live.
+  const auto bin = folder_ / "root/opt/railfix/9.9.9/bin";
+  fs::create_directories(bin);
+  std::ofstream(bin / "railfix-fusion") << "#!/bin/sh\nexit 3\n";
+  fs::permissions(bin / "railfix-fusion", fs::perms::owner_all);
+  fs::create_symlink(fs::path(RAILFIX_BIN_DIR) / "railfix-tpr-publisher", bin / "railfix-tpr-publisher");
+  write_manifest("9.9.9", ", tpr_publisher: { nid_engine: 4711 }");
+  const auto failed = upgrade("6");
+  EXPECT_EQ(failed.exit_code, 1);
+  EXPECT_THAT(failed.err, HasSubstr("did not pass: fusion does not run: ended with exit code 3"));
+  EXPECT_THAT(failed.err, HasSubstr("runs again"));
+  EXPECT_EQ(status("fusion")["release"], RAILFIX_TEST_RELEASE);
+  EXPECT_TRUE(status("fusion")["healthy"]);
+  EXPECT_EQ(status("tpr_publisher")["pid"], changed["pid"]) << "its turn had not come";
+
+  const auto back = train({"rollback", "--root", root(), "--healthy-for", "1", "--patience", "60"});
+  EXPECT_EQ(back.exit_code, 0) << back.out << back.err;
+  EXPECT_EQ(status("tpr_publisher")["generation"], reports["generation"]);
+}
+
+TEST_F(Fleet, AMistakeInTheManifestStartsNothing) {
+  write_manifest("0.0.7");
+  const auto missing = up();
+  EXPECT_EQ(missing.exit_code, 2);
+  EXPECT_THAT(missing.err, HasSubstr("release 0.0.7 of fusion is not installed on this computer"));
+  write_manifest(RAILFIX_TEST_RELEASE, ", fusion: { no_such_key: 1 }");
+  const auto wrong = up();
+  EXPECT_EQ(wrong.exit_code, 1);
+  EXPECT_THAT(wrong.out, HasSubstr("fusion.no_such_key is not a key of this section"));
+  EXPECT_EQ(train({"status", "--root", root()}).exit_code, 2) << "something was started";
+}
+
+// The lines of the page work as they stand there.
+TEST(FleetPage, AThirdTrainIsMadeStepByStep) {
+  const auto page = test::slurp(fs::path(RAILFIX_SOURCE_DIR) / "docs" / "fleet.md");
+  const auto section = page.substr(page.find("## A train of your own"));
+  std::string script = "set -e\nexport PATH=" RAILFIX_BIN_DIR ":$PATH\n";
+  for (size_t begin = section.find("```sh\n"); begin != std::string::npos; begin = section.find("```sh\n", begin)) {
+    begin += 6;
+    script += section.substr(begin, section.find("```", begin) - begin);
+  }
+  const auto folder = fs::temp_directory_path() / ("railfix-fleet-page-" + std::to_string(getpid()));
+  fs::create_directories(folder);
+  std::ofstream(folder / "page.sh") << "cd " << folder.string() << "\ntrap 'railfix train down --root host' EXIT\n"
+                                    << script;
+  const auto ran = test::run_program({"/bin/bash", (folder / "page.sh").string()}, 300);
+  EXPECT_EQ(ran.exit_code, 0) << ran.out << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("train vt612-003, host cab"));
+  EXPECT_THAT(ran.out, HasSubstr("+tpr_publisher.nid_engine: 612303"));
+  EXPECT_THAT(ran.out, HasSubstr("generation 1 runs again"));
+  fs::remove_all(folder);
+}
+
+}  // namespace
+}  // namespace railfix

@@ -1,0 +1,179 @@
+// DDS Security with the keys that `railfix train keys` makes, over real DDS: who has no certificate of this train, or
+// not for this topic, hears and says nothing.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+
+#include "messaging/topics.hpp"
+#include "support/run_until.hpp"
+#include "train/keys.hpp"
+
+namespace railfix {
+namespace {
+
+namespace fs = std::filesystem;
+namespace topics = messaging::topics;
+
+constexpr int kDomain = 93;
+constexpr uint64_t kStates = 40;
+
+class Security : public ::testing::Test {
+ protected:
+  Security() { fs::create_directories(folder_); }
+  ~Security() override { fs::remove_all(folder_); }
+
+  // The train's folder with keys, under an authority of its own.
+  fs::path keys_of(const std::string& name) {
+    const auto train = folder_ / name;
+    fs::create_directories(train);
+    std::ofstream(train / "train.yaml")
+        << "train:\n  id: " << train_ << "\n  domain: " << kDomain
+        << "\n  release: 1.0\n  security: true\n  hosts: { cab: { address: 127.0.0.1 } }\n"
+           "  services: { frame_grabber: cab, odometry: cab, fusion: cab, monitor: cab }\n";
+    const auto made = tool::make_keys(core::value_or_throw(tool::read_manifest(train)), {});
+    if (!made.ok()) throw std::runtime_error(made.error().message);
+    return train / "security" / "cab";
+  }
+  messaging::ParticipantOptions options(const std::string& service, const fs::path& keys) const {
+    messaging::ParticipantOptions options;
+    options.train_id = train_;
+    options.domain = kDomain;
+    options.service = service;
+    options.host = "cab";
+    options.security_folder = keys.string();
+    return options;
+  }
+  const std::string train_ = "secure-" + std::to_string(getpid());
+  const fs::path folder_ = fs::temp_directory_path() / train_;
+};
+
+/// A fusion and a monitor with right certificates, and what the monitor has heard.
+struct Train {
+  explicit Train(const messaging::ParticipantOptions& fusion_options,
+                 const messaging::ParticipantOptions& monitor_options)
+      : fusion(fusion_options), monitor(monitor_options) {}
+  void write(uint64_t seq) {
+    msg::TrainState state;
+    state.seq(seq);
+    writer.write(state);
+  }
+  messaging::Queue queue;
+  messaging::Participant fusion;
+  messaging::Participant monitor;
+  std::vector<uint64_t> heard;
+  messaging::Writer<msg::TrainState> writer{fusion, topics::train_state};
+  messaging::Reader<msg::TrainState> reader{monitor, topics::train_state, "", queue,
+                                            [this](const msg::TrainState& state) { heard.push_back(state.seq()); }};
+};
+
+// Somebody who reads and writes train_state, with the strength to be heard before all others.
+struct Rogue {
+  explicit Rogue(messaging::ParticipantOptions options) : participant(strong(std::move(options))) {}
+  static messaging::ParticipantOptions strong(messaging::ParticipantOptions options) {
+    options.ownership_strength = 1000;
+    return options;
+  }
+  messaging::Queue queue;
+  messaging::Participant participant;
+  uint64_t heard = 0;
+  messaging::Writer<msg::TrainState> writer{participant, topics::train_state};
+  messaging::Reader<msg::TrainState> reader{participant, topics::train_state, "", queue,
+                                            [this](const msg::TrainState&) { ++heard; }};
+};
+
+// Both live side by side until the train has exchanged enough; then nothing of it may have crossed.
+void expect_nothing_crosses(Train& train, Rogue& rogue) {
+  msg::TrainState lie;
+  lie.seq(666);
+  uint64_t seq = 0;
+  ASSERT_TRUE(test::run_until(train.fusion, train.queue,
+                              [&] {
+                                train.write(++seq);
+                                rogue.writer.write(lie);
+                                while (rogue.queue.run_one(0)) {
+                                }
+                                return train.heard.size() >= kStates && seq >= 150;
+                              }))
+      << "the train itself hears only " << train.heard.size();
+  // Its own reader hears its own writer, nobody else's.
+  EXPECT_EQ(rogue.reader.matched_writers(), 1);
+  EXPECT_EQ(rogue.writer.matched_readers(), 1);
+  EXPECT_EQ(train.reader.matched_writers(), 1);
+  EXPECT_THAT(train.heard, ::testing::Not(::testing::Contains(666U)));
+}
+
+TEST_F(Security, WithoutACertificateNothingIsHeardAndNothingSaid) {
+  const auto keys = keys_of("train");
+  Train train(options("fusion", keys), options("monitor", keys));
+  Rogue rogue(options("fusion", ""));
+  expect_nothing_crosses(train, rogue);
+}
+
+TEST_F(Security, WithACertificateOfAnotherAuthorityNothingIsHeardAndNothingSaid) {
+  const auto keys = keys_of("train");
+  Train train(options("fusion", keys), options("monitor", keys));
+  Rogue rogue(options("fusion", keys_of("foreign")));
+  expect_nothing_crosses(train, rogue);
+}
+
+// The test can fail: with a right certificate the same rogue is heard.
+TEST_F(Security, WithTheRightCertificateASecondFusionIsHeard) {
+  const auto keys = keys_of("train");
+  Train train(options("fusion", keys), options("monitor", keys));
+  Rogue second(options("fusion", keys));
+  msg::TrainState state;
+  state.seq(666);
+  EXPECT_TRUE(test::run_until(train.fusion, train.queue, [&] {
+    second.writer.write(state);
+    return !train.heard.empty() && train.heard.back() == 666;
+  }));
+}
+
+TEST_F(Security, ARightCertificateDoesNotOpenAnotherServicesTopic) {
+  const auto keys = keys_of("train");
+  messaging::Participant odometry(options("odometry", keys));
+  EXPECT_THROW(messaging::Writer<msg::TrainState>(odometry, topics::train_state), core::BadInput);
+  EXPECT_NO_THROW(messaging::Writer<msg::OdometryStep>(odometry, topics::odometry_step));
+}
+
+TEST_F(Security, ToolsHaveTheOperatorsCertificate) {
+  const auto keys = keys_of("train");
+  messaging::Participant tool(options("railfix-tell", keys));
+  EXPECT_NO_THROW(messaging::Writer<msg::ControlRequest>(tool, topics::service_control));
+  EXPECT_THROW(messaging::Writer<msg::TrainState>(tool, topics::train_state), core::BadInput);
+}
+
+TEST_F(Security, FullPicturesReachTheirOwnHost) {
+  const auto keys = keys_of("train");
+  messaging::Participant grabber(options("frame_grabber", keys));
+  messaging::Participant odometry(options("odometry", keys));
+  messaging::Queue queue;
+  uint64_t pictures = 0;
+  messaging::Writer<msg::CameraFrame> writer(grabber, topics::camera_frame, "cam0");
+  messaging::Reader<msg::CameraFrame> reader(odometry, topics::camera_frame, "cam0", queue,
+                                             [&](const msg::CameraFrame&) { ++pictures; });
+  EXPECT_TRUE(test::run_until(grabber, queue, [&] {
+    writer.write_in_place([](msg::CameraFrame& frame) {
+      frame.width_px(64);
+      frame.height_px(48);
+    });
+    return pictures >= 5;
+  }));
+}
+
+TEST_F(Security, AKeyThatIsMissingIsNamed) {
+  const auto keys = keys_of("train");
+  fs::remove(keys / "fusion.key.pem");
+  try {
+    messaging::Participant participant(options("fusion", keys));
+    FAIL() << "joined without its key";
+  } catch (const core::BadInput& error) {
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("fusion.key.pem is missing or cannot be read"));
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("railfix train keys"));
+  }
+}
+
+}  // namespace
+}  // namespace railfix

@@ -1,0 +1,296 @@
+// `railfix train` and `railfix doctor`: a train from its manifest (docs/fleet.md).
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "commands.hpp"
+#include "core/result.hpp"
+#include "train/check.hpp"
+#include "train/keys.hpp"
+#include "train/render.hpp"
+#include "train/roll_out.hpp"
+#include "train/supervise.hpp"
+
+namespace railfix::tool {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+  fs::path train;
+  fs::path out;
+  fs::path root = "/";
+  std::string host;
+  KeysOptions keys;
+  HealthGate gate;
+  bool json = false;
+};
+
+/// Prints what was found; false when one of it is an error.
+bool say(const std::vector<Finding>& findings) {
+  bool good = true;
+  for (const auto& finding : findings) {
+    std::cout << (finding.error ? "error: " : "warning: ") << finding.text << '\n';
+    good = good && !finding.error;
+  }
+  return good;
+}
+
+fs::path programs_folder() {
+  return fs::read_symlink("/proc/self/exe").parent_path();
+}
+
+std::string names_of(const Manifest& manifest) {
+  std::string names;
+  for (const auto& host : manifest.hosts) names += (names.empty() ? "" : ", ") + host.name;
+  return names;
+}
+
+const TrainHost& chosen_host(const Manifest& manifest, const Options& options) {
+  const auto* host = options.host.empty() ? manifest.host_here() : manifest.host(options.host);
+  if (host != nullptr) return *host;
+  if (!options.host.empty())
+    throw core::BadInput("--host '" + options.host + "' is no host of train " + manifest.train_id +
+                         "; there are: " + names_of(manifest));
+  throw core::BadInput("this computer has the address of no host of train " + manifest.train_id +
+                       "; say which one it is with --host: " + names_of(manifest));
+}
+
+HostPlan plan_here(const Options& options) {
+  auto plan = HostFolder(options.root).plan();
+  if (!plan) throw core::BadInput("no train was brought up on this computer; begin with railfix train up");
+  return *plan;
+}
+
+int check(const Options& options) {
+  const auto manifest = core::value_or_throw(read_manifest(options.train));
+  auto findings = check_train(manifest, programs_folder());
+  const auto* here = options.host.empty() ? manifest.host_here() : &chosen_host(manifest, options);
+  if (here != nullptr) {
+    for (auto& finding : check_computer(&manifest, here)) findings.push_back(std::move(finding));
+  }
+  const bool good = say(findings);
+  if (here == nullptr)
+    std::cout << "this computer is none of " << names_of(manifest) << ": on each of them, run railfix doctor --train\n";
+  std::cout << "train " << manifest.train_id << ": " << manifest.services.size() << " services on "
+            << manifest.hosts.size() << " hosts, release " << manifest.release
+            << (good ? ", can start" : ", must not start like this") << '\n';
+  return good ? 0 : 1;
+}
+
+int render(const Options& options) {
+  const auto manifest = core::value_or_throw(read_manifest(options.train));
+  if (!say(check_train(manifest, programs_folder()))) return 1;
+  for (const auto& host : manifest.hosts) {
+    core::ok_or_throw(render_host(manifest, host, options.out / host.name));
+    std::cout << host.name << " (" << host.address << "): " << (options.out / host.name).string() << '\n';
+  }
+  return 0;
+}
+
+int keys(const Options& options) {
+  const auto manifest = core::value_or_throw(read_manifest(options.train));
+  for (const auto& folder : core::value_or_throw(make_keys(manifest, options.keys)))
+    std::cout << "keys of one host: " << folder.string() << '\n';
+  std::cout << "the authority's key stays with you: " << (manifest.folder / "security" / "authority").string()
+            << "; never copy it to the train\n";
+  return 0;
+}
+
+int status(const Options& options) {
+  const HostFolder folder(options.root);
+  const auto plan = plan_here(options);
+  const auto state = folder.state();
+  const auto supervisor = supervisor_of(folder);
+  bool healthy = supervisor.has_value();
+  nlohmann::ordered_json json{{"train", plan.train_id},
+                              {"host", plan.host},
+                              {"generation", plan.generation},
+                              {"supervised", supervisor.has_value()},
+                              {"services", nlohmann::ordered_json::array()}};
+  std::string table;
+  for (const auto& service : plan.services) {
+    const auto found = state.find(service.name);
+    const RunningService process = found == state.end() || !supervisor ? RunningService{} : found->second;
+    const auto health = supervisor ? health_of(plan, state, service.name) : ServiceHealth{false, "is not started"};
+    healthy = healthy && health.healthy;
+    json["services"].push_back({{"service", service.name},
+                                {"release", service.release},
+                                {"generation", service.generation},
+                                {"standby", service.standby},
+                                {"pid", process.pid},
+                                {"restarts", process.restarts},
+                                {"healthy", health.healthy},
+                                {"text", health.text}});
+    char line[256];
+    std::snprintf(line, sizeof(line), "%-15s %-10s %10d %8lld %8d  ", service.name.c_str(), service.release.c_str(),
+                  service.generation, static_cast<long long>(process.pid), process.restarts);
+    table += line + health.text + (service.standby ? " (configured as standby)" : "") + "\n";
+  }
+  if (options.json) {
+    std::cout << json.dump(2) << '\n';
+  } else {
+    std::cout << "train " << plan.train_id << ", host " << plan.host << ", generation " << plan.generation
+              << (supervisor ? "" : ", not running: railfix train up") << "\n"
+              << "service         release    generation      pid restarts  health\n"
+              << table;
+  }
+  return healthy ? 0 : 1;
+}
+
+int up(const Options& options) {
+  const auto manifest = core::value_or_throw(read_manifest(options.train));
+  const auto& host = chosen_host(manifest, options);
+  auto findings = check_train(manifest, programs_folder());
+  for (auto& finding : check_computer(&manifest, &host)) findings.push_back(std::move(finding));
+  if (!say(findings)) return 1;
+  if (supervisor_of(HostFolder(options.root))) {
+    std::cout << "services run here already; railfix train diff says what the manifest would change, upgrade does it\n";
+    return status(options);
+  }
+  const auto plan = core::value_or_throw(install(manifest, host, options.root));
+  const auto healthy = bring_up(options.root, plan, options.gate);
+  if (!healthy.ok()) std::cerr << "railfix: not healthy: " << healthy.error().message << '\n';
+  const int shown = status(options);
+  return healthy.ok() ? shown : 1;
+}
+
+int down(const Options& options) {
+  const auto plan = plan_here(options);
+  core::ok_or_throw(bring_down(options.root));
+  std::cout << "train " << plan.train_id << ", host " << plan.host << ": stopped\n";
+  return 0;
+}
+
+int diff(const Options& options) {
+  const auto manifest = core::value_or_throw(read_manifest(options.train));
+  const auto& host = chosen_host(manifest, options);
+  const auto now = plan_here(options);
+  size_t changes = 0;
+  for (const auto& service : services_on(manifest, host.name)) {
+    const auto* runs = now.service(service.name);
+    std::string text;
+    if (runs == nullptr) {
+      text = "comes to this host";
+    } else if (runs->release != service.release) {
+      text = "release " + runs->release + " -> " + service.release;
+    } else if (runs->standby != service.standby) {
+      text = service.standby ? "becomes standby" : "is standby no more";
+    } else {
+      text = difference(runs->settings, settings_of(manifest, host, service.name));
+    }
+    if (text.empty()) continue;
+    ++changes;
+    std::cout << service.name << ": " << text << '\n';
+  }
+  for (const auto& service : now.services) {
+    const auto* stays = manifest.service(service.name);
+    if (stays != nullptr && (stays->host == host.name || stays->standby == host.name)) continue;
+    ++changes;
+    std::cout << service.name << ": leaves this host\n";
+  }
+  std::cout << (changes == 0 ? "nothing to be done\n" : "railfix train upgrade does it, service by service\n");
+  return 0;
+}
+
+int upgrade(const Options& options) {
+  const auto manifest = core::value_or_throw(read_manifest(options.train));
+  const auto& host = chosen_host(manifest, options);
+  plan_here(options);
+  auto findings = check_train(manifest, programs_folder());
+  for (auto& finding : check_computer(&manifest, &host)) findings.push_back(std::move(finding));
+  if (!say(findings)) return 1;
+  const auto plan = core::value_or_throw(install(manifest, host, options.root));
+  const auto done =
+      roll_out(options.root, plan, options.gate, [](const std::string& text) { std::cout << text << std::endl; });
+  if (!done.ok()) throw std::runtime_error(done.error().message);
+  std::cout << "generation " << plan.generation << " runs\n";
+  return 0;
+}
+
+int rollback(const Options& options) {
+  const HostFolder folder(options.root);
+  const auto now = plan_here(options);
+  const auto before = folder.plan(now.previous);
+  if (now.previous == 0 || !before)
+    throw core::BadInput("there is no generation before " + std::to_string(now.generation));
+  const auto done =
+      roll_out(options.root, *before, options.gate, [](const std::string& text) { std::cout << text << std::endl; });
+  if (!done.ok()) throw std::runtime_error(done.error().message);
+  std::cout << "generation " << before->generation << " runs again\n";
+  return 0;
+}
+
+int supervise_here(const Options& options) {
+  supervise(HostFolder(options.root));
+  return 0;
+}
+
+int doctor(const Options& options) {
+  const TrainHost* host = nullptr;
+  Manifest manifest;
+  if (!options.train.empty()) {
+    manifest = core::value_or_throw(read_manifest(options.train));
+    host = &chosen_host(manifest, options);
+  }
+  const bool good = say(check_computer(host == nullptr ? nullptr : &manifest, host));
+  std::cout << (good ? "this computer can run Railfix\n" : "this computer must not run Railfix like this\n");
+  return good ? 0 : 1;
+}
+
+}  // namespace
+
+void add_train(CLI::App& app, Action& chosen) {
+  auto options = std::make_shared<Options>();
+  auto* train = app.add_subcommand(
+      "train", "A train as a whole, from its manifest.  Example: railfix train check deploy/trains/re460-042");
+  train->require_subcommand(1);
+  enum { kManifest = 1, kHost = 2, kRoot = 4, kGate = 8 };
+  const auto add = [&](const char* name, const char* what, int (*work)(const Options&), int takes) {
+    auto* command = train->add_subcommand(name, what);
+    if ((takes & kManifest) != 0) command->add_option("train", options->train, "Folder of train.yaml")->required();
+    if ((takes & kHost) != 0)
+      command->add_option("--host", options->host,
+                          "Which host of the train this computer is; found by its address otherwise");
+    if ((takes & kRoot) != 0)
+      command->add_option("--root", options->root, "Where var/lib/railfix and opt/railfix are")->capture_default_str();
+    if ((takes & kGate) != 0) {
+      command->add_option("--healthy-for", options->gate.healthy_s, "Seconds that a service must be healthy")
+          ->check(CLI::Range(0.5, 600.0))
+          ->capture_default_str();
+      command->add_option("--patience", options->gate.patience_s, "Seconds that it may take to become so")
+          ->check(CLI::Range(1.0, 3600.0))
+          ->capture_default_str();
+    }
+    command->callback([&chosen, options, work] { chosen = [options, work] { return work(*options); }; });
+    return command;
+  };
+  add("check", "Say everything that would go wrong, before anything starts", check, kManifest | kHost);
+  add("render", "Write configuration, compose file and systemd unit for each host", render, kManifest)
+      ->add_option("--out", options->out, "Folder to write into")
+      ->required();
+  auto* make = add("keys", "Make the train's certificates and permissions for DDS Security", keys, kManifest);
+  make->add_option("--days", options->keys.valid_days, "How long certificates are valid")
+      ->check(CLI::Range(1, 3650))
+      ->capture_default_str();
+  make->add_flag("--renew", options->keys.renew, "Make new ones although there are some; the old ones stay valid");
+  add("up", "Check, then start this computer's services and a supervisor that keeps them running", up,
+      kManifest | kHost | kRoot | kGate);
+  add("down", "Stop this computer's services and their supervisor", down, kRoot);
+  add("status", "How this computer's services are: exit code 0 when all are healthy", status, kRoot)
+      ->add_flag("--json", options->json, "JSON on standard output");
+  add("diff", "What upgrade would change on this computer", diff, kManifest | kHost | kRoot);
+  add("upgrade",
+      "Bring this computer to the manifest, service by service; back by itself when one does not get healthy", upgrade,
+      kManifest | kHost | kRoot | kGate);
+  add("rollback", "Back to the generation before the last upgrade", rollback, kRoot | kGate);
+  add("supervise", "Keep this computer's services running; what systemd starts", supervise_here, kRoot);
+
+  auto* computer = app.add_subcommand("doctor", "Say what is wrong with this computer as a host of a train");
+  computer->add_option("--train", options->train, "Folder of train.yaml");
+  computer->add_option("--host", options->host, "Which host of the train this computer is");
+  computer->callback([&chosen, options] { chosen = [options] { return doctor(*options); }; });
+}
+
+}  // namespace railfix::tool

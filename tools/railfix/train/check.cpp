@@ -1,0 +1,262 @@
+#include "train/check.hpp"
+
+#include <sys/statvfs.h>
+#include <sys/timex.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <fstream>
+#include <memory>
+#include <set>
+
+#include "messaging/network.hpp"
+#include "messaging/qos_match.hpp"
+#include "train/keys.hpp"
+#include "train/render.hpp"
+#include "train/topic_rights.hpp"
+
+namespace railfix::tool {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int64_t kSoonDays = 30;
+constexpr double kPicturesMb = 512;  // histories of two cameras
+constexpr double kSharedMemoryMb = 16;
+constexpr double kRecordingsMb = 2000;
+constexpr double kDiskMb = 200;
+constexpr int64_t kSocketBytes = 4 << 20;
+
+using Findings = std::vector<Finding>;
+
+void error(Findings& findings, const std::string& text) {
+  findings.push_back({true, text});
+}
+void warning(Findings& findings, const std::string& text) {
+  findings.push_back({false, text});
+}
+
+// Full pictures stay in the memory of one host.
+void check_placement(const Manifest& manifest, Findings& findings) {
+  const auto* camera = manifest.service("frame_grabber");
+  for (const char* reader : {"track_detector", "odometry"}) {
+    const auto* service = manifest.service(reader);
+    if (service == nullptr) continue;
+    if (camera == nullptr)
+      error(findings, std::string(reader) + " has no pictures: train.services has no frame_grabber");
+    else if (service->host != camera->host)
+      error(findings, std::string(reader) + " is on " + service->host +
+                          ", but full pictures do not leave the camera's host " + camera->host + "; put it there");
+  }
+  const auto needs = [&](const char* service, const char* other) {
+    if (manifest.service(service) != nullptr && manifest.service(other) == nullptr)
+      warning(findings, std::string(service) + " runs without " + other + ", which it listens to");
+  };
+  needs("tpr_publisher", "fusion");
+  needs("fusion", "odometry");
+  needs("map_matcher", "odometry");
+}
+
+void check_files(const Manifest& manifest, Findings& findings) {
+  for (const auto& [key, name] : {std::pair<std::string, std::string>{"train.map", manifest.map},
+                                  std::pair<std::string, std::string>{"train.calibration", manifest.calibration},
+                                  std::pair<std::string, std::string>{"train.qos_profiles", manifest.qos_profiles}}) {
+    if (!name.empty() && access((manifest.folder / name).c_str(), R_OK) != 0)
+      error(findings,
+            key + ": " + (manifest.folder / name).string() + " is missing or cannot be read; put it beside train.yaml");
+  }
+  if (manifest.map.empty()) warning(findings, "train.map is empty: there will be distance and speed, but no position");
+}
+
+void check_quality_of_service(const Manifest& manifest, Findings& findings) {
+  const auto file = manifest.folder / manifest.qos_profiles;
+  if (manifest.qos_profiles.empty() || access(file.c_str(), R_OK) != 0) return;
+  const auto mismatches = messaging::qos_mismatches(file);
+  if (!mismatches.ok()) return error(findings, mismatches.error().message);
+  for (const auto& mismatch : mismatches.value()) error(findings, mismatch);
+}
+
+// Empty when it is not given.
+std::string setting_of(const Manifest& manifest, const char* service, const char* key) {
+  const YAML::Node section = manifest.settings[service];
+  if (!section || !section.IsMap()) return "";
+  const YAML::Node value = section[key];
+  return value && value.IsScalar() ? value.Scalar() : "";
+}
+
+// Settings that are right for a run of recorded data and wrong for a train.
+void check_settings(const Manifest& manifest, Findings& findings) {
+  if (const auto start = setting_of(manifest, "fusion", "start"); !start.empty() && start != "unknown")
+    warning(findings, "settings.fusion.start is " + start +
+                          ": a fusion that is started again would believe to stand there; leave it out, and "
+                          "map_matcher finds the place");
+  const auto* camera = manifest.service("frame_grabber");
+  const auto* recorder = manifest.service("recorder");
+  if (camera != nullptr && recorder != nullptr && camera->host != recorder->host &&
+      setting_of(manifest, "recorder", "pictures") != "none")
+    warning(findings, "recorder is on " + recorder->host + " and records no pictures: they do not leave " +
+                          camera->host + "; put it there, or set settings.recorder.pictures to none");
+}
+
+void check_ports(const Manifest& manifest, Findings& findings) {
+  for (const auto& host : manifest.hosts) {
+    std::map<int64_t, std::string> taken;
+    for (const auto& service : services_on(manifest, host.name)) {
+      const auto section = manifest.settings[service.name];
+      if (!section || !section.IsMap()) continue;
+      for (const auto& entry : section) {
+        const std::string key = entry.first.Scalar();
+        int64_t port = 0;
+        if (!key.ends_with("port") || !YAML::convert<int64_t>::decode(entry.second, port) || port == 0) continue;
+        const std::string who = service.name + "." + key;
+        const auto [other, is_new] = taken.emplace(port, who);
+        if (!is_new)
+          error(findings,
+                who + " and " + other->second + " want the same port " + std::to_string(port) + " on " + host.name);
+      }
+    }
+  }
+}
+
+void check_keys(const Manifest& manifest, Findings& findings) {
+  if (!manifest.security) return;
+  for (const auto& host : manifest.hosts) {
+    const auto folder = manifest.folder / "security" / host.name;
+    std::vector<std::string> services{kOperator};
+    for (const auto& service : services_on(manifest, host.name)) services.push_back(service.name);
+    for (const auto& service : services) {
+      const auto left = days_left(folder / (service + ".cert.pem"));
+      if (!left.ok()) {
+        error(findings, left.error().message);
+      } else if (left.value() < 0) {
+        error(findings, (folder / (service + ".cert.pem")).string() + " ran out " + std::to_string(-left.value()) +
+                            " days ago; renew with railfix train keys --renew");
+      } else if (left.value() < kSoonDays) {
+        warning(findings, (folder / (service + ".cert.pem")).string() + " runs out in " + std::to_string(left.value()) +
+                              " days; renew with railfix train keys --renew");
+      }
+    }
+  }
+}
+
+// Runs a program; what it says on its standard error when it does not end well.
+std::string complaint_of(const std::string& command) {
+  FILE* pipe = popen((command + " 2>&1 >/dev/null").c_str(), "r");
+  if (pipe == nullptr) return "cannot be run: " + command;
+  std::string text;
+  std::array<char, 512> part{};
+  while (std::fgets(part.data(), part.size(), pipe) != nullptr) text += part.data();
+  return pclose(pipe) == 0 ? "" : text;
+}
+
+void check_configurations(const Manifest& manifest, const fs::path& programs, Findings& findings) {
+  for (const auto& host : manifest.hosts) {
+    const auto config =
+        fs::temp_directory_path() / ("railfix-check-" + std::to_string(getpid()) + "-" + host.name + ".yaml");
+    std::ofstream(config) << render_config(manifest, host, manifest.folder.string());
+    for (const auto& service : services_on(manifest, host.name)) {
+      std::string program = "railfix-" + service.name;
+      std::replace(program.begin(), program.end(), '_', '-');
+      if (!fs::exists(programs / program)) {
+        warning(findings,
+                "settings of " + service.name + " are not checked: " + (programs / program).string() + " is missing");
+        continue;
+      }
+      const auto text =
+          complaint_of("'" + (programs / program).string() + "' --check --config '" + config.string() + "'");
+      if (!text.empty()) {
+        // The rendered file is ours; the operator knows train.yaml.
+        std::string for_operator = text;
+        for (size_t at = 0; (at = for_operator.find(config.string())) != std::string::npos;)
+          for_operator.replace(at, config.string().size(), "settings for " + host.name);
+        while (!for_operator.empty() && for_operator.back() == '\n') for_operator.pop_back();
+        error(findings, for_operator);
+      }
+    }
+    fs::remove(config);
+  }
+}
+
+double megabytes_free(const char* folder) {
+  struct statvfs disk {};
+  if (statvfs(folder, &disk) != 0) return -1;
+  return static_cast<double>(disk.f_bavail) * static_cast<double>(disk.f_frsize) / 1e6;
+}
+
+void check_shared_memory(bool pictures, Findings& findings) {
+  const double needed_mb = pictures ? kPicturesMb : kSharedMemoryMb;
+  const double free_mb = megabytes_free("/dev/shm");
+  if (free_mb < 0) return error(findings, "/dev/shm is not there; mount a tmpfs on it");
+  if (free_mb < needed_mb)
+    error(findings, "/dev/shm has " + std::to_string(static_cast<int>(free_mb)) + " MB free, this host needs " +
+                        std::to_string(static_cast<int>(needed_mb)) +
+                        "; mount -o remount,size=2G /dev/shm, and remove " +
+                        "fast_datasharing_* there when no service runs");
+}
+
+void check_clock(Findings& findings) {
+  timex clock{};
+  const int state = adjtimex(&clock);
+  if (state == TIME_ERROR || (clock.status & STA_UNSYNC) != 0)
+    warning(findings,
+            "this computer's clock is not disciplined (chrony or PTP): stamps of two hosts cannot be compared");
+}
+
+void check_sockets(Findings& findings) {
+  for (const char* limit : {"rmem_max", "wmem_max"}) {
+    int64_t bytes = 0;
+    std::ifstream(std::string("/proc/sys/net/core/") + limit) >> bytes;
+    if (bytes < kSocketBytes)
+      warning(findings, std::string("net.core.") + limit + " is " + std::to_string(bytes) +
+                            " bytes, too small for bursts between hosts; sysctl -w net.core." + limit + "=16777216 " +
+                            "(60-railfix.conf of railfix train render does it)");
+  }
+}
+
+void check_interface(const TrainHost& host, Findings& findings) {
+  const std::string interface = host.interface.empty() ? host.address : host.interface;
+  if (const auto found = messaging::addresses_of({interface}); !found.ok()) {
+    error(findings, "host " + host.name + ": " + found.error().message);
+  } else if (messaging::running_interfaces({interface}) == 0) {
+    warning(findings, "host " + host.name + ": interface " + interface + " has no carrier; is the cable in?");
+  }
+}
+
+}  // namespace
+
+std::vector<Finding> check_train(const Manifest& manifest, const fs::path& programs) {
+  Findings findings;
+  check_placement(manifest, findings);
+  check_files(manifest, findings);
+  check_quality_of_service(manifest, findings);
+  check_settings(manifest, findings);
+  check_ports(manifest, findings);
+  check_keys(manifest, findings);
+  check_configurations(manifest, programs, findings);
+  return findings;
+}
+
+std::vector<Finding> check_computer(const Manifest* manifest, const TrainHost* host) {
+  Findings findings;
+  const auto runs = [&](const char* service) {
+    if (manifest == nullptr || host == nullptr) return true;
+    const auto* one = manifest->service(service);
+    return one != nullptr && one->host == host->name;
+  };
+  check_shared_memory(runs("frame_grabber"), findings);
+  if (manifest == nullptr || manifest->hosts.size() > 1) {
+    check_sockets(findings);
+    check_clock(findings);
+  }
+  const char* state = fs::exists("/var/lib/railfix") ? "/var/lib/railfix" : "/var/lib";
+  const double needed_mb = runs("recorder") ? kRecordingsMb : kDiskMb;
+  if (const double disk_mb = megabytes_free(state); disk_mb < needed_mb)
+    error(findings, std::string(state) + " has " + std::to_string(static_cast<int>(disk_mb)) +
+                        " MB free; recordings and unsent reports need " + std::to_string(static_cast<int>(needed_mb)));
+  if (host != nullptr) check_interface(*host, findings);
+  return findings;
+}
+
+}  // namespace railfix::tool

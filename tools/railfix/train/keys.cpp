@@ -1,0 +1,232 @@
+#include "train/keys.hpp"
+
+#include <openssl/asn1.h>
+#include <openssl/pem.h>
+#include <openssl/x509.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <ctime>
+#include <fstream>
+#include <memory>
+
+#include "train/render.hpp"
+#include "train/topic_rights.hpp"
+
+extern char** environ;
+
+namespace railfix::tool {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int64_t kAuthorityDays = 7300;
+
+core::Status openssl(const std::vector<std::string>& arguments) {
+  std::vector<char*> argv{const_cast<char*>("openssl")};
+  for (const auto& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
+  argv.push_back(nullptr);
+  posix_spawn_file_actions_t quiet;
+  posix_spawn_file_actions_init(&quiet);
+  posix_spawn_file_actions_addopen(&quiet, STDERR_FILENO, "/dev/null", 1, 0);
+  pid_t pid = -1;
+  const int failed = posix_spawnp(&pid, "openssl", &quiet, nullptr, argv.data(), environ);
+  posix_spawn_file_actions_destroy(&quiet);
+  if (failed != 0) return core::Error{"openssl is missing; install the Debian package openssl"};
+  int status = 0;
+  waitpid(pid, &status, 0);
+  if (status == 0) return {};
+  return core::Error{"openssl " + arguments.front() + " failed; run it by hand to see why: openssl " + [&] {
+    std::string line;
+    for (const auto& argument : arguments) line += argument + " ";
+    return line;
+  }()};
+}
+
+std::string xml_time(std::time_t time) {
+  char text[32];
+  std::tm utc{};
+  gmtime_r(&time, &utc);
+  std::strftime(text, sizeof(text), "%Y-%m-%dT%H:%M:%S", &utc);
+  return text;
+}
+
+core::Status write_text(const fs::path& file, const std::string& text) {
+  std::ofstream out(file);
+  out << text;
+  out.close();
+  if (!out) return core::Error{file.string() + " cannot be written"};
+  return {};
+}
+
+/// Where the authority lives, and what is done with it.
+class Authority {
+ public:
+  explicit Authority(fs::path folder) : folder_(std::move(folder)) {}
+  [[nodiscard]] fs::path certificate() const { return folder_ / "ca.pem"; }
+
+  core::Status make(const std::string& train_id) {
+    if (fs::exists(certificate())) return {};
+    fs::create_directories(folder_);
+    fs::permissions(folder_, fs::perms::owner_all);
+    return openssl({"req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-sha256",
+                    "-days", std::to_string(kAuthorityDays), "-subj", "/O=Railfix/CN=train " + train_id, "-keyout",
+                    key().string(), "-out", certificate().string()});
+  }
+
+  core::Status issue(const std::string& name, const fs::path& certificate_file, const fs::path& key_file,
+                     int64_t valid_days) const {
+    const auto request = folder_ / "request.pem";
+    auto status = openssl({"req", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-sha256",
+                           "-subj", "/O=Railfix/CN=" + name, "-keyout", key_file.string(), "-out", request.string()});
+    if (!status.ok()) return status;
+    status = openssl({"x509", "-req", "-in", request.string(), "-CA", certificate().string(), "-CAkey", key().string(),
+                      "-set_serial", "0x" + serial(), "-days", std::to_string(valid_days), "-sha256", "-out",
+                      certificate_file.string()});
+    fs::remove(request);
+    return status;
+  }
+
+  core::Status sign(const std::string& text, const fs::path& signed_file) const {
+    const auto draft = folder_ / "draft.xml";
+    auto status = write_text(draft, text);
+    if (!status.ok()) return status;
+    status = openssl({"smime", "-sign", "-in", draft.string(), "-text", "-out", signed_file.string(), "-signer",
+                      certificate().string(), "-inkey", key().string()});
+    fs::remove(draft);
+    return status;
+  }
+
+ private:
+  [[nodiscard]] fs::path key() const { return folder_ / "ca.key.pem"; }
+  static std::string serial() {
+    std::ifstream random("/dev/urandom", std::ios::binary);
+    std::string hex = "1";
+    for (int i = 0; i < 15; ++i) {
+      const int byte = random.get() & 0xff;
+      constexpr char kDigits[] = "0123456789abcdef";
+      hex += kDigits[byte >> 4];
+      hex += kDigits[byte & 15];
+    }
+    return hex;
+  }
+  fs::path folder_;
+};
+
+// A service's certificate, key and permissions in the folder of its host.
+core::Status make_identity(const Manifest& manifest, const Authority& authority, const fs::path& folder,
+                           const std::string& service, const std::string& host, const KeysOptions& options) {
+  const auto certificate = folder / (service + ".cert.pem");
+  if (fs::exists(certificate) && !options.renew) return {};
+  const auto key = folder / (service + ".key.pem");
+  auto status = authority.issue(service + "@" + host, certificate, key, options.valid_days);
+  if (!status.ok()) return status;
+  fs::permissions(key, fs::perms::owner_read | fs::perms::owner_write | fs::perms::group_read);
+  const std::time_t now = std::time(nullptr);
+  return authority.sign(
+      permissions_xml(manifest, service, host, xml_time(now - 86400), xml_time(now + options.valid_days * 86400)),
+      folder / (service + ".permissions.p7s"));
+}
+
+std::string topic_rule(const std::string& expression, bool protect) {
+  const std::string kind = protect ? "ENCRYPT" : "NONE";
+  return "        <topic_rule><topic_expression>" + expression + "</topic_expression>\n" +
+         "          <enable_discovery_protection>" + (protect ? "true" : "false") + "</enable_discovery_protection>\n" +
+         "          <enable_liveliness_protection>" + (protect ? "true" : "false") +
+         "</enable_liveliness_protection>\n" +
+         "          <enable_read_access_control>true</enable_read_access_control>\n" +
+         "          <enable_write_access_control>true</enable_write_access_control>\n" +
+         "          <metadata_protection_kind>" + kind + "</metadata_protection_kind>\n" +
+         "          <data_protection_kind>NONE</data_protection_kind></topic_rule>\n";
+}
+
+std::string rights(const char* what, const std::vector<std::string>& topics, const std::string& partition) {
+  std::string text = std::string("        <") + what + "><topics>\n";
+  for (const auto& topic : topics) text += "          <topic>" + topic + "</topic>\n";
+  return text + "        </topics><partitions><partition>" + partition + "</partition><partition>" + partition +
+         "/memory/*</partition></partitions></" + what + ">\n";
+}
+
+}  // namespace
+
+std::string governance_xml(const Manifest& manifest) {
+  const std::string domain = std::to_string(manifest.domain);
+  return "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n"
+         "<dds xmlns:xsi=\"http://www.w3.org/2001/XMLSchema-instance\" "
+         "xsi:noNamespaceSchemaLocation=\"governance.xsd\">\n"
+         "  <domain_access_rules><domain_rule>\n    <domains><id>" +
+         domain +
+         "</id></domains>\n"
+         "    <allow_unauthenticated_participants>false</allow_unauthenticated_participants>\n"
+         "    <enable_join_access_control>true</enable_join_access_control>\n"
+         "    <discovery_protection_kind>ENCRYPT</discovery_protection_kind>\n"
+         "    <liveliness_protection_kind>ENCRYPT</liveliness_protection_kind>\n"
+         "    <rtps_protection_kind>NONE</rtps_protection_kind>\n    <topic_access_rules>\n" +
+         // Full pictures never leave the host; encrypted they could not be shared in memory.
+         topic_rule("camera_frame/*", false) + topic_rule("*", true) +
+         "    </topic_access_rules>\n  </domain_rule></domain_access_rules>\n</dds>\n";
+}
+
+std::string permissions_xml(const Manifest& manifest, const std::string& service, const std::string& host,
+                            const std::string& not_before, const std::string& not_after) {
+  const std::string partition = "train/" + manifest.train_id;
+  std::vector<std::string> writes = topics_written_by_all();
+  const auto& own = topics_written_by(service);
+  writes.insert(writes.end(), own.begin(), own.end());
+  return "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n"
+         "<dds xmlns:xsi=\"http://www.w3.org/2001/XMLSchema-instance\" "
+         "xsi:noNamespaceSchemaLocation=\"permissions.xsd\">\n"
+         "  <permissions><grant name=\"" +
+         service + "@" + host +
+         "\">\n"
+         "    <subject_name>CN=" +
+         service + "@" + host +
+         ",O=Railfix</subject_name>\n"
+         "    <validity><not_before>" +
+         not_before + "</not_before><not_after>" + not_after +
+         "</not_after></validity>\n"
+         "    <allow_rule><domains><id>" +
+         std::to_string(manifest.domain) + "</id></domains>\n" + rights("publish", writes, partition) +
+         rights("subscribe", {"*"}, partition) +
+         "    </allow_rule>\n    <default>DENY</default>\n  </grant></permissions>\n</dds>\n";
+}
+
+core::Result<std::vector<fs::path>> make_keys(const Manifest& manifest, const KeysOptions& options) {
+  const fs::path folder = manifest.folder / "security";
+  Authority authority(folder / "authority");
+  auto status = authority.make(manifest.train_id);
+  if (!status.ok()) return status.error();
+  std::vector<fs::path> made;
+  for (const auto& host : manifest.hosts) {
+    const auto here = folder / host.name;
+    fs::create_directories(here);
+    fs::copy_file(authority.certificate(), here / "ca.pem", fs::copy_options::overwrite_existing);
+    status = authority.sign(governance_xml(manifest), here / "governance.p7s");
+    if (!status.ok()) return status.error();
+    std::vector<std::string> services{kOperator, "onboard"};
+    for (const auto& service : services_on(manifest, host.name)) services.push_back(service.name);
+    for (const auto& service : services) {
+      status = make_identity(manifest, authority, here, service, host.name, options);
+      if (!status.ok()) return status.error();
+    }
+    made.push_back(here);
+  }
+  return made;
+}
+
+core::Result<int64_t> days_left(const fs::path& certificate) {
+  const std::unique_ptr<FILE, int (*)(FILE*)> file(std::fopen(certificate.c_str(), "r"),
+                                                   [](FILE* f) { return f != nullptr ? std::fclose(f) : 0; });
+  if (!file) return core::Error{certificate.string() + " is missing; make it with railfix train keys"};
+  const std::unique_ptr<X509, void (*)(X509*)> read(PEM_read_X509(file.get(), nullptr, nullptr, nullptr), X509_free);
+  if (!read)
+    return core::Error{certificate.string() + " is not a certificate; make it again with railfix train keys --renew"};
+  int days = 0;
+  int seconds = 0;
+  if (ASN1_TIME_diff(&days, &seconds, nullptr, X509_get0_notAfter(read.get())) != 1)
+    return core::Error{certificate.string() + " has no readable end of validity"};
+  return seconds < 0 ? days - 1 : days;
+}
+
+}  // namespace railfix::tool

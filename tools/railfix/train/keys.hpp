@@ -1,0 +1,31 @@
+// Keys of a train: its own certificate authority, one certificate and one permission file for each service on each host
+// (OMG DDS-SEC 1.1, 8.3 and 8.4). Made with the openssl program.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "train/manifest.hpp"
+
+namespace railfix::tool {
+
+struct KeysOptions {
+  int64_t valid_days = 365;
+  bool renew = false;  // new certificates under the same authority; the old ones stay valid until they run out
+};
+
+/// Governance and permissions as XML, before they are signed.
+std::string governance_xml(const Manifest& manifest);
+std::string permissions_xml(const Manifest& manifest, const std::string& service, const std::string& host,
+                            const std::string& not_before, const std::string& not_after);
+
+/// Fills FOLDER/security/<host>/ for every host and FOLDER/security/authority/ with the authority, whose key stays with
+/// the operator. What is there stays unless it is renewed. Gives the folders of the hosts. Error: openssl is missing or
+/// refuses.
+core::Result<std::vector<std::filesystem::path>> make_keys(const Manifest& manifest, const KeysOptions& options);
+
+/// Days until the certificate runs out, negative when it has. Error: no certificate.
+core::Result<int64_t> days_left(const std::filesystem::path& certificate);
+
+}  // namespace railfix::tool

@@ -1,0 +1,123 @@
+#include "train/plan.hpp"
+
+#include <unistd.h>
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <fstream>
+
+namespace railfix::tool {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::optional<YAML::Node> load(const fs::path& file) {
+  try {
+    return YAML::LoadFile(file.string());
+  } catch (const YAML::Exception&) {
+    return std::nullopt;
+  }
+}
+
+core::Status replace(const fs::path& file, const std::string& text) {
+  std::error_code failed;
+  fs::create_directories(file.parent_path(), failed);
+  const auto draft = file.string() + "." + std::to_string(getpid());
+  std::ofstream out(draft);
+  out << text;
+  out.close();
+  if (out) fs::rename(draft, file, failed);
+  if (!out || failed) return core::Error{file.string() + " cannot be written; is the disk full, or are you not root?"};
+  return {};
+}
+
+PlannedService service_of(const YAML::Node& node) {
+  return {node["name"].as<std::string>(),
+          node["release"].as<std::string>(),
+          node["generation"].as<int>(),
+          node["standby"].as<bool>(),
+          node["command"].as<std::vector<std::string>>(),
+          node["settings"].as<std::string>()};
+}
+
+}  // namespace
+
+const PlannedService* HostPlan::service(const std::string& name) const {
+  const auto found = std::find_if(services.begin(), services.end(), [&](const auto& one) { return one.name == name; });
+  return found == services.end() ? nullptr : &*found;
+}
+
+fs::path HostFolder::generation(int number) const {
+  return folder_ / "generations" / std::to_string(number);
+}
+
+int HostFolder::newest_generation() const {
+  int newest = 0;
+  std::error_code none;
+  for (const auto& entry : fs::directory_iterator(folder_ / "generations", none)) {
+    newest = std::max(newest, std::atoi(entry.path().filename().c_str()));
+  }
+  return newest;
+}
+
+fs::file_time_type HostFolder::plan_written() const {
+  std::error_code none;
+  return fs::last_write_time(folder_ / "plan.yaml", none);
+}
+
+std::optional<HostPlan> HostFolder::plan_in(const fs::path& folder) {
+  const auto root = load(folder / "plan.yaml");
+  if (!root) return std::nullopt;
+  HostPlan plan;
+  plan.train_id = (*root)["train_id"].as<std::string>();
+  plan.host = (*root)["host"].as<std::string>();
+  plan.generation = (*root)["generation"].as<int>();
+  plan.previous = (*root)["previous"].as<int>();
+  for (const auto& node : (*root)["services"]) plan.services.push_back(service_of(node));
+  return plan;
+}
+
+core::Status HostFolder::write_to(const fs::path& folder, const HostPlan& plan) {
+  YAML::Node root;
+  root["train_id"] = plan.train_id;
+  root["host"] = plan.host;
+  root["generation"] = plan.generation;
+  root["previous"] = plan.previous;
+  root["services"] = YAML::Node(YAML::NodeType::Sequence);
+  for (const auto& service : plan.services) {
+    YAML::Node node;
+    node["name"] = service.name;
+    node["release"] = service.release;
+    node["generation"] = service.generation;
+    node["standby"] = service.standby;
+    node["command"] = service.command;
+    node["settings"] = service.settings;
+    root["services"].push_back(node);
+  }
+  return replace(folder / "plan.yaml", YAML::Dump(root) + "\n");
+}
+
+HostState HostFolder::state() const {
+  HostState state;
+  const auto root = load(folder_ / "state.yaml");
+  if (!root || !root->IsMap()) return state;
+  for (const auto& entry : *root) {
+    state[entry.first.as<std::string>()] = {entry.second["pid"].as<int64_t>(), entry.second["generation"].as<int>(),
+                                            entry.second["restarts"].as<int>(),
+                                            entry.second["last_end"].as<std::string>()};
+  }
+  return state;
+}
+
+core::Status HostFolder::write(const HostState& state) const {
+  YAML::Node root(YAML::NodeType::Map);
+  for (const auto& [name, service] : state) {
+    root[name]["pid"] = service.pid;
+    root[name]["generation"] = service.generation;
+    root[name]["restarts"] = service.restarts;
+    root[name]["last_end"] = service.last_end;
+  }
+  return replace(folder_ / "state.yaml", YAML::Dump(root) + "\n");
+}
+
+}  // namespace railfix::tool

@@ -1,0 +1,78 @@
+// What one host runs: the commands of its services, as files that the supervisor reads and `railfix train` writes.
+//
+//   ROOT/var/lib/railfix/train/generations/N/  configuration, map, keys and compose file of generation N, never changed
+//   again ROOT/var/lib/railfix/train/plan.yaml       which service runs with which generation; replaced in one step
+//   ROOT/var/lib/railfix/train/state.yaml      what the supervisor says: processes and how often they were restarted
+//   ROOT/var/lib/railfix/train/log/            what the services say
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/result.hpp"
+
+namespace railfix::tool {
+
+struct PlannedService {
+  std::string name;
+  std::string release;
+  int generation = 0;
+  bool standby = false;
+  std::vector<std::string> command;
+  std::string settings;  // everything that the service reads; another text means that it must be restarted
+
+  bool operator==(const PlannedService&) const = default;
+};
+
+struct HostPlan {
+  std::string train_id;
+  std::string host;
+  int generation = 0;  // the newest one whose roll-out succeeded or is under way
+  int previous = 0;    // the one before, 0 = none
+  std::vector<PlannedService> services;
+
+  [[nodiscard]] const PlannedService* service(const std::string& name) const;
+};
+
+struct RunningService {
+  int64_t pid = 0;  // 0 = waits to be started again
+  int generation = 0;
+  int restarts = 0;  // since it was started with this generation
+  std::string last_end;
+};
+using HostState = std::map<std::string, RunningService>;
+
+/// The folder of all this.
+class HostFolder {
+ public:
+  explicit HostFolder(const std::filesystem::path& root) : home_(root / "var/lib/railfix"), folder_(home_ / "train") {}
+  /// Where services run: recordings, reports that wait for the ground.
+  [[nodiscard]] const std::filesystem::path& home() const { return home_; }
+  [[nodiscard]] std::filesystem::path generation(int number) const;
+  [[nodiscard]] std::filesystem::path log(const std::string& service) const {
+    return folder_ / "log" / (service + ".log");
+  }
+  [[nodiscard]] std::filesystem::path lock() const { return folder_ / "supervisor.lock"; }
+  [[nodiscard]] int newest_generation() const;
+
+  /// Nothing when no train was brought up here.
+  [[nodiscard]] std::optional<HostPlan> plan() const { return plan_in(folder_); }
+  /// As it was installed, with all services of this generation.
+  [[nodiscard]] std::optional<HostPlan> plan(int number) const { return plan_in(generation(number)); }
+  core::Status write(const HostPlan& plan) const { return write_to(folder_, plan); }
+  core::Status write_generation(const HostPlan& plan) const { return write_to(generation(plan.generation), plan); }
+  [[nodiscard]] std::filesystem::file_time_type plan_written() const;
+  [[nodiscard]] HostState state() const;
+  core::Status write(const HostState& state) const;
+
+ private:
+  [[nodiscard]] static std::optional<HostPlan> plan_in(const std::filesystem::path& folder);
+  static core::Status write_to(const std::filesystem::path& folder, const HostPlan& plan);
+  std::filesystem::path home_;
+  std::filesystem::path folder_;
+};
+
+}  // namespace railfix::tool

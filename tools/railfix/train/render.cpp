@@ -1,0 +1,301 @@
+#include "train/render.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <sstream>
+
+namespace railfix::tool {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kPrimaryStrength = 20;
+constexpr int kStandbyStrength = 10;
+constexpr int kStopS = 10;
+constexpr const char* kStateFolder = "/var/lib/railfix";
+constexpr const char* kMade = "Made by railfix train from train.yaml; edit that.";
+
+std::string dashed(std::string name) {
+  std::replace(name.begin(), name.end(), '_', '-');
+  return name;
+}
+
+std::string image_of(const HostedService& service) {
+  return "railfix/" + dashed(service.name) + ":" + service.release;
+}
+
+// Cameras and sensors are the only things beside the network that a service touches.
+bool needs_devices(const std::string& service) {
+  return service == "frame_grabber" || service == "sensor_gateway";
+}
+
+void fill(YAML::Node section, const char* key, const std::string& value) {
+  if (!value.empty() && !section[key]) section[key] = value;
+}
+
+std::string in_folder(const std::string& folder, const std::string& file) {
+  return file.empty() ? "" : folder + "/" + fs::path(file).filename().string();
+}
+
+// What only the manifest knows.
+void fill_common(YAML::Node settings, const Manifest& manifest, const TrainHost& host, const std::string& folder) {
+  YAML::Node common = settings["common"];
+  common["train_id"] = manifest.train_id;
+  common["host"] = host.name;
+  common["domain"] = manifest.domain;
+  common["interfaces"].push_back(host.interface.empty() ? host.address : host.interface);
+  for (const auto& other : manifest.hosts) {
+    if (other.name != host.name) common["peers"].push_back(other.address);
+  }
+  if (!manifest.qos_profiles.empty()) common["qos_profiles"] = in_folder(folder, manifest.qos_profiles);
+  if (manifest.security) common["security"] = folder + "/security";
+}
+
+YAML::Node settings_on(const Manifest& manifest, const TrainHost& host, const std::string& folder) {
+  YAML::Node settings = YAML::Clone(manifest.settings);
+  fill_common(settings, manifest, host, folder);
+  for (const char* service : {"map_matcher", "fusion", "tpr_publisher", "recorder", "monitor"}) {
+    if (manifest.service(service) != nullptr) fill(settings[service], "map", in_folder(folder, manifest.map));
+  }
+  if (manifest.service("frame_grabber") != nullptr)
+    fill(settings["frame_grabber"], "calibration", in_folder(folder, manifest.calibration));
+  if (manifest.service("recorder") != nullptr) {
+    fill(settings["recorder"], "train_file", folder + "/config.yaml");
+    fill(settings["recorder"], "folder", std::string(kStateFolder) + "/recordings");
+  }
+  if (manifest.service("monitor") != nullptr && !settings["monitor"]["expected"]) {
+    for (const auto& service : manifest.services) {
+      if (service.name != "monitor") settings["monitor"]["expected"].push_back(service.name);
+    }
+  }
+  return settings;
+}
+
+std::string strength_of(const HostedService& service) {
+  return "common.ownership_strength=" + std::to_string(service.standby ? kStandbyStrength : kPrimaryStrength);
+}
+
+std::vector<std::string> arguments_of(const HostedService& service, const std::string& folder) {
+  return {"--config", folder + "/config.yaml", "--set", strength_of(service)};
+}
+
+std::vector<std::string> podman_command(const HostedService& service, const std::string& folder) {
+  const std::string name = "railfix-" + dashed(service.name);
+  const std::string user = std::to_string(kUserId) + ":" + std::to_string(kUserId);
+  // Fast DDS tells hosts by their addresses, and shares memory between equal users: the host's network and IPC, one
+  // user.
+  std::vector<std::string> command{"/usr/bin/podman",
+                                   "run",
+                                   "--rm",
+                                   "--replace",
+                                   "--name",
+                                   name,
+                                   "--network",
+                                   "host",
+                                   "--ipc",
+                                   "host",
+                                   "--user",
+                                   user,
+                                   "--read-only",
+                                   "--cap-drop",
+                                   "ALL",
+                                   "--security-opt",
+                                   "no-new-privileges",
+                                   "--init",
+                                   "--stop-timeout",
+                                   std::to_string(kStopS),
+                                   "--tmpfs",
+                                   "/tmp",
+                                   "--volume",
+                                   folder + ":" + folder + ":ro",
+                                   "--volume",
+                                   std::string(kStateFolder) + ":" + kStateFolder,
+                                   "--workdir",
+                                   kStateFolder};
+  if (needs_devices(service.name)) command.insert(command.end(), {"--volume", "/dev:/dev"});
+  command.push_back(image_of(service));
+  const auto arguments = arguments_of(service, folder);
+  command.insert(command.end(), arguments.begin(), arguments.end());
+  return command;
+}
+
+core::Status write(const fs::path& file, const std::string& text) {
+  std::error_code failed;
+  fs::create_directories(file.parent_path(), failed);
+  std::ofstream out(file);
+  out << text;
+  out.close();
+  if (!out) return core::Error{file.string() + " cannot be written; is the disk full, or are you not root?"};
+  return {};
+}
+
+std::string unit_of(const Manifest& manifest, const TrainHost& host) {
+  std::ostringstream unit;
+  unit << "# " << kMade << "\n[Unit]\nDescription=Railfix on host " << host.name << " of train " << manifest.train_id
+       << "\nAfter=network-online.target\nWants=network-online.target\nStartLimitIntervalSec=0\n\n"
+       << "[Service]\nExecStart=/usr/bin/railfix train supervise\nRestart=always\nRestartSec=1\nKillMode=mixed\n"
+       << "TimeoutStopSec=" << 4 * kStopS << "\n\n[Install]\nWantedBy=multi-user.target\n";
+  return unit.str();
+}
+
+std::string sysctl_text() {
+  return std::string("# ") + kMade +
+         "\n# Socket buffers for DDS between the hosts, and fragments that do not block the link for 30 s.\n"
+         "net.core.rmem_max = 16777216\nnet.core.wmem_max = 16777216\nnet.ipv4.ipfrag_time = 3\n"
+         "net.ipv4.ipfrag_high_thresh = 134217728\n";
+}
+
+// The keys of this host: the owner and the services' group may read them.
+core::Status copy_files(const Manifest& manifest, const TrainHost& host, const fs::path& folder) {
+  const auto options = fs::copy_options::overwrite_existing | fs::copy_options::recursive;
+  std::vector<std::pair<fs::path, fs::path>> files;
+  for (const auto& name : {manifest.map, manifest.calibration, manifest.qos_profiles}) {
+    if (!name.empty()) files.emplace_back(manifest.folder / name, folder / fs::path(name).filename());
+  }
+  if (manifest.security) files.emplace_back(manifest.folder / "security" / host.name, folder / "security");
+  for (const auto& [from, to] : files) {
+    std::error_code failed;
+    fs::copy(from, to, options, failed);
+    if (failed) return core::Error{from.string() + " cannot be copied to " + to.string() + ": " + failed.message()};
+  }
+  return {};
+}
+
+// A line for each key: "tpr_publisher.nid_engine: 460042".
+std::string lines_of(const YAML::Node& node, const std::string& key) {
+  if (!node.IsMap()) {
+    YAML::Emitter value;
+    value << YAML::Flow << node;
+    return key + ": " + value.c_str() + "\n";
+  }
+  std::string text;
+  for (const auto& entry : node) text += lines_of(entry.second, key + "." + entry.first.Scalar());
+  return text;
+}
+
+// Changes with every byte of the file, or of the files in the folder.
+std::string fingerprint(const fs::path& path) {
+  uint64_t hash = 0xcbf29ce484222325U;  // FNV-1a
+  std::vector<fs::path> files;
+  if (fs::is_directory(path)) {
+    for (const auto& entry : fs::directory_iterator(path)) files.push_back(entry.path());
+    std::sort(files.begin(), files.end());
+  } else {
+    files.push_back(path);
+  }
+  for (const auto& file : files) {
+    std::ifstream in(file, std::ios::binary);
+    for (std::istreambuf_iterator<char> byte(in), end; byte != end; ++byte)
+      hash = (hash ^ static_cast<unsigned char>(*byte)) * 0x100000001b3U;
+  }
+  return std::to_string(hash);
+}
+
+}  // namespace
+
+std::vector<HostedService> services_on(const Manifest& manifest, const std::string& host) {
+  std::vector<HostedService> here;
+  for (const auto& service : manifest.services) {
+    if (service.host == host) here.push_back({service.name, manifest.release_of(service), false});
+    if (service.standby == host) here.push_back({service.name, manifest.release_of(service), true});
+  }
+  return here;
+}
+
+std::string render_config(const Manifest& manifest, const TrainHost& host, const std::string& folder) {
+  YAML::Emitter out;
+  out << settings_on(manifest, host, folder);
+  return std::string("# ") + kMade + "\n" + out.c_str() + "\n";
+}
+
+std::string settings_of(const Manifest& manifest, const TrainHost& host, const std::string& service) {
+  const auto settings = settings_on(manifest, host, "FOLDER");
+  std::string text = lines_of(settings["common"], "common");
+  if (settings[service]) text += lines_of(settings[service], service);
+  const auto mentions = [&](const std::string& file) {
+    return !file.empty() && text.find(in_folder("FOLDER", file)) != std::string::npos;
+  };
+  for (const auto& file : {manifest.map, manifest.calibration, manifest.qos_profiles}) {
+    if (mentions(file)) text += file + ": fingerprint " + fingerprint(manifest.folder / file) + "\n";
+  }
+  if (manifest.security) {
+    for (const char* part : {".cert.pem", ".permissions.p7s"})
+      text += service + part + ": fingerprint " +
+              fingerprint(manifest.folder / "security" / host.name / (service + part)) + "\n";
+  }
+  return text;
+}
+
+core::Result<std::vector<std::string>> command_of(const Manifest& manifest, const HostedService& service,
+                                                  const fs::path& folder, const fs::path& root) {
+  const auto at = fs::absolute(folder).lexically_normal().string();
+  if (manifest.containers) return podman_command(service, at);
+  const std::string name = "railfix-" + dashed(service.name);
+  auto program = fs::absolute(root) / "opt/railfix" / service.release / "bin" / name;
+  if (!fs::exists(program) && service.release == RAILFIX_VERSION)
+    program = fs::read_symlink("/proc/self/exe").parent_path() / name;
+  if (!fs::exists(program)) {
+    return core::Error{"release " + service.release + " of " + service.name + " is not installed on this computer: " +
+                       (root / "opt/railfix" / service.release / "bin" / name).string() + " is missing"};
+  }
+  std::vector<std::string> command{program.lexically_normal().string()};
+  const auto arguments = arguments_of(service, at);
+  command.insert(command.end(), arguments.begin(), arguments.end());
+  return command;
+}
+
+std::string render_compose(const Manifest& manifest, const TrainHost& host, const std::string& folder) {
+  YAML::Emitter out;
+  out << YAML::Comment(kMade) << YAML::BeginMap;
+  out << YAML::Key << "version" << YAML::Value << YAML::DoubleQuoted << "3.7";
+  out << YAML::Key << "services" << YAML::Value << YAML::BeginMap;
+  for (const auto& service : services_on(manifest, host.name)) {
+    const std::string program = "railfix-" + dashed(service.name);
+    YAML::Node one;
+    one["image"] = image_of(service);
+    one["container_name"] = program;
+    one["command"] = arguments_of(service, folder);
+    // Fast DDS tells hosts by their addresses, and shares memory between equal users.
+    one["network_mode"] = "host";
+    one["ipc"] = "host";
+    one["user"] = std::to_string(kUserId) + ":" + std::to_string(kUserId);
+    one["read_only"] = true;
+    one["init"] = true;
+    one["cap_drop"].push_back("ALL");
+    one["security_opt"].push_back("no-new-privileges");
+    one["restart"] = "unless-stopped";
+    one["stop_grace_period"] = std::to_string(kStopS) + "s";
+    one["working_dir"] = kStateFolder;
+    one["volumes"].push_back(folder + ":" + folder + ":ro");
+    one["volumes"].push_back(std::string(kStateFolder) + ":" + kStateFolder);
+    if (needs_devices(service.name)) one["volumes"].push_back("/dev:/dev");
+    one["tmpfs"].push_back("/tmp");
+    one["healthcheck"]["test"] =
+        std::vector<std::string>{"CMD", program, "--health", "--config", folder + "/config.yaml"};
+    one["healthcheck"]["interval"] = "5s";
+    one["healthcheck"]["timeout"] = "3s";
+    one["healthcheck"]["retries"] = 2;
+    one["healthcheck"]["start_period"] = "10s";
+    out << YAML::Key << dashed(service.name) << YAML::Value << one;
+  }
+  out << YAML::EndMap << YAML::EndMap;
+  return std::string(out.c_str()) + "\n";
+}
+
+core::Status render_host(const Manifest& manifest, const TrainHost& host, const fs::path& folder) {
+  const auto at = fs::absolute(folder).lexically_normal().string();
+  std::error_code failed;
+  fs::create_directories(folder, failed);
+  if (failed) return core::Error{folder.string() + " cannot be made: " + failed.message()};
+  if (const auto copied = copy_files(manifest, host, folder); !copied.ok()) return copied;
+  for (const auto& [name, text] :
+       std::map<std::string, std::string>{{"config.yaml", render_config(manifest, host, at)},
+                                          {"compose.yaml", render_compose(manifest, host, at)},
+                                          {"systemd/railfix.service", unit_of(manifest, host)},
+                                          {"systemd/60-railfix.conf", sysctl_text()}}) {
+    if (const auto written = write(folder / name, text); !written.ok()) return written;
+  }
+  return {};
+}
+
+}  // namespace railfix::tool

@@ -1,0 +1,40 @@
+// The manifest as files for each host: the services' configuration, maps and keys, a compose file, the supervisor's
+// unit.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "train/manifest.hpp"
+
+namespace railfix::tool {
+
+/// User and group of all services: shared memory works between equal users only.
+inline constexpr int kUserId = 990;
+
+/// One process of a host.
+struct HostedService {
+  std::string name;
+  std::string release;
+  bool standby = false;
+};
+std::vector<HostedService> services_on(const Manifest& manifest, const std::string& host);
+
+/// Fills `folder` with everything that this host needs: config.yaml, map, calibration, qos profiles, security/,
+/// compose.yaml, systemd/railfix.service, systemd/60-railfix.conf. Error: a file that cannot be copied or written.
+core::Status render_host(const Manifest& manifest, const TrainHost& host, const std::filesystem::path& folder);
+
+/// The configuration of all services on this host, for files that lie in `folder` there.
+std::string render_config(const Manifest& manifest, const TrainHost& host, const std::string& folder);
+std::string render_compose(const Manifest& manifest, const TrainHost& host, const std::string& folder);
+
+/// What starts one service whose files lie in `folder`; programs are looked for in ROOT/opt/railfix/RELEASE/bin, and
+/// beside this program when it is of that release. Error: there is no such program.
+core::Result<std::vector<std::string>> command_of(const Manifest& manifest, const HostedService& service,
+                                                  const std::filesystem::path& folder,
+                                                  const std::filesystem::path& root);
+/// Everything that the service reads, as text: another text means that it must be restarted.
+std::string settings_of(const Manifest& manifest, const TrainHost& host, const std::string& service);
+
+}  // namespace railfix::tool

@@ -1,0 +1,248 @@
+#include "train/roll_out.hpp"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstring>
+#include <sstream>
+
+#include "core/time.hpp"
+#include "service/health_file.hpp"
+#include "train/render.hpp"
+#include "train/supervise.hpp"
+
+namespace railfix::tool {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kTurnMs = 50;
+constexpr double kStopS = 40;
+constexpr double kBackS = 60;
+
+template <class Condition>
+bool wait_until(double patience_s, Condition condition) {
+  const int64_t deadline_ns = core::monotonic_ns() + core::to_ns(patience_s);
+  while (!condition()) {
+    if (core::monotonic_ns() > deadline_ns) return false;
+    poll(nullptr, 0, kTurnMs);
+  }
+  return true;
+}
+
+/// Watches one service until it has been healthy for long enough.
+class Gate {
+ public:
+  Gate(const HostFolder& folder, const HostPlan& plan, std::string service, double healthy_s)
+      : folder_(folder), plan_(plan), service_(std::move(service)), healthy_ns_(core::to_ns(healthy_s)) {}
+  bool passed() {
+    const auto state = folder_.state();
+    const auto found = state.find(service_);
+    const int generation = plan_.service(service_)->generation;
+    const bool ours = found != state.end() && found->second.generation == generation && found->second.pid > 0;
+    health_ = health_of(plan_, state, service_);
+    const int64_t now_ns = core::monotonic_ns();
+    if (!ours || !health_.healthy || found->second.pid != pid_) {
+      healthy_since_ns_ = now_ns;
+      pid_ = ours ? found->second.pid : 0;
+      return false;
+    }
+    return now_ns - healthy_since_ns_ >= healthy_ns_;
+  }
+  [[nodiscard]] std::string why_not() const { return service_ + " " + health_.text; }
+
+ private:
+  const HostFolder& folder_;
+  const HostPlan& plan_;
+  std::string service_;
+  int64_t healthy_ns_;
+  int64_t healthy_since_ns_ = 0;
+  int64_t pid_ = 0;
+  ServiceHealth health_;
+};
+
+core::Status wait_healthy(const HostFolder& folder, const HostPlan& plan, const std::vector<std::string>& services,
+                          const HealthGate& gate) {
+  std::vector<Gate> gates;
+  for (const auto& service : services) gates.emplace_back(folder, plan, service, gate.healthy_s);
+  const bool healthy = wait_until(gate.patience_s, [&] {
+    bool all = true;
+    for (auto& one : gates) all = one.passed() && all;
+    return all;
+  });
+  if (healthy) return {};
+  std::string problems;
+  for (auto& one : gates) {
+    if (!one.passed()) problems += (problems.empty() ? "" : "; ") + one.why_not();
+  }
+  return core::Error{problems};
+}
+
+// A process of its own session, so that it stays when the terminal goes.
+core::Status start_supervisor(const fs::path& root) {
+  const HostFolder folder(root);
+  const auto program = fs::read_symlink("/proc/self/exe").string();
+  const auto log_file = folder.log("supervisor");
+  fs::create_directories(log_file.parent_path());
+  const int log = open(log_file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+  const std::string at = fs::absolute(root).string();
+  const pid_t pid = fork();
+  if (pid == 0) {
+    setsid();
+    const int nothing = open("/dev/null", O_RDONLY);
+    dup2(nothing, STDIN_FILENO);
+    dup2(log, STDOUT_FILENO);
+    dup2(log, STDERR_FILENO);
+    execl(program.c_str(), program.c_str(), "train", "supervise", "--root", at.c_str(), nullptr);
+    _exit(127);
+  }
+  if (log >= 0) close(log);
+  if (pid < 0 || !wait_until(10, [&] { return supervisor_of(folder).has_value(); }))
+    return core::Error{"the supervisor does not start; why stands in " + log_file.string()};
+  return {};
+}
+
+std::vector<std::string> names_of(const HostPlan& plan) {
+  std::vector<std::string> names;
+  for (const auto& service : plan.services) names.push_back(service.name);
+  return names;
+}
+
+// One step: this service as in `to`, everything else as it is.
+HostPlan with_service(HostPlan plan, const HostPlan& to, const std::string& name) {
+  std::erase_if(plan.services, [&](const auto& one) { return one.name == name; });
+  if (const auto* service = to.service(name)) plan.services.push_back(*service);
+  // The order of the data's way is that of the target.
+  std::stable_sort(plan.services.begin(), plan.services.end(), [&](const auto& a, const auto& b) {
+    const auto place = [&](const std::string& one) {
+      return std::find_if(to.services.begin(), to.services.end(), [&](const auto& s) { return s.name == one; }) -
+             to.services.begin();
+    };
+    return place(a.name) < place(b.name);
+  });
+  return plan;
+}
+
+std::vector<std::string> changed_services(const HostPlan& from, const HostPlan& to) {
+  std::vector<std::string> changed;
+  for (const auto& service : to.services) {
+    const auto* now = from.service(service.name);
+    if (now == nullptr || *now != service) changed.push_back(service.name);
+  }
+  for (const auto& service : from.services) {
+    if (to.service(service.name) == nullptr) changed.push_back(service.name);
+  }
+  return changed;
+}
+
+}  // namespace
+
+ServiceHealth health_of(const HostPlan& plan, const HostState& state, const std::string& service) {
+  const auto process = state.find(service);
+  if (process == state.end()) return {false, "is not started"};
+  if (process->second.pid == 0) {
+    return {false,
+            "does not run: " + (process->second.last_end.empty() ? "not started yet" : process->second.last_end)};
+  }
+  service::CommonConfig common;
+  common.train_id = plan.train_id;
+  common.host = plan.host;
+  const auto answer = service::ask_health(service::health_path(common, service));
+  return {answer.healthy, answer.text};
+}
+
+std::string difference(const std::string& before, const std::string& after) {
+  const auto lines = [](const std::string& text) {
+    std::vector<std::string> list;
+    std::istringstream in(text);
+    for (std::string line; std::getline(in, line);) list.push_back(line);
+    return list;
+  };
+  const auto old_lines = lines(before);
+  const auto new_lines = lines(after);
+  std::string text;
+  for (const auto& line : old_lines) {
+    if (std::find(new_lines.begin(), new_lines.end(), line) == new_lines.end()) text += "\n  -" + line;
+  }
+  for (const auto& line : new_lines) {
+    if (std::find(old_lines.begin(), old_lines.end(), line) == old_lines.end()) text += "\n  +" + line;
+  }
+  return text;
+}
+
+core::Result<HostPlan> install(const Manifest& manifest, const TrainHost& host, const fs::path& root) {
+  const HostFolder folder(root);
+  const auto now = folder.plan();
+  HostPlan plan;
+  plan.train_id = manifest.train_id;
+  plan.host = host.name;
+  plan.generation = folder.newest_generation() + 1;
+  plan.previous = now ? now->generation : 0;
+  const auto files = folder.generation(plan.generation);
+  if (const auto rendered = render_host(manifest, host, files); !rendered.ok()) return rendered.error();
+  for (const auto& service : services_on(manifest, host.name)) {
+    const auto command = command_of(manifest, service, files, root);
+    if (!command.ok()) return command.error();
+    PlannedService planned{service.name,    service.release, plan.generation,
+                           service.standby, command.value(), settings_of(manifest, host, service.name)};
+    const auto* runs = now ? now->service(service.name) : nullptr;
+    const bool same = runs != nullptr && runs->release == planned.release && runs->standby == planned.standby &&
+                      runs->settings == planned.settings;
+    plan.services.push_back(same ? *runs : planned);
+  }
+  if (const auto written = folder.write_generation(plan); !written.ok()) return written.error();
+  return plan;
+}
+
+core::Status bring_up(const fs::path& root, const HostPlan& plan, const HealthGate& gate) {
+  const HostFolder folder(root);
+  if (const auto written = folder.write(plan); !written.ok()) return written;
+  if (!supervisor_of(folder)) {
+    if (const auto started = start_supervisor(root); !started.ok()) return started;
+  }
+  return wait_healthy(folder, plan, names_of(plan), gate);
+}
+
+core::Status bring_down(const fs::path& root) {
+  const HostFolder folder(root);
+  const auto pid = supervisor_of(folder);
+  if (!pid) return {};
+  if (kill(static_cast<pid_t>(*pid), SIGTERM) != 0)
+    return core::Error{"the supervisor " + std::to_string(*pid) + " cannot be told to end: " + std::strerror(errno)};
+  if (!wait_until(kStopS, [&] { return !supervisor_of(folder).has_value(); }))
+    return core::Error{"the supervisor " + std::to_string(*pid) + " has not ended within " +
+                       std::to_string(static_cast<int>(kStopS)) + " s"};
+  return {};
+}
+
+core::Status roll_out(const fs::path& root, const HostPlan& plan, const HealthGate& gate, const Say& say) {
+  const HostFolder folder(root);
+  const auto before = folder.plan();
+  if (!before) return core::Error{"no train was brought up here; begin with railfix train up"};
+  auto now = *before;
+  now.generation = plan.generation;
+  now.previous = before->generation;
+  for (const auto& name : changed_services(*before, plan)) {
+    now = with_service(now, plan, name);
+    if (const auto written = folder.write(now); !written.ok()) return written;
+    const auto* target = plan.service(name);
+    say(target != nullptr ? name + ": release " + target->release + ", generation " + std::to_string(target->generation)
+                          : name + ": leaves this host");
+    if (target == nullptr) continue;
+    const auto healthy = wait_healthy(folder, now, {name}, gate);
+    if (healthy.ok()) continue;
+    say(healthy.error().message + "; back to generation " + std::to_string(before->generation));
+    if (const auto written = folder.write(*before); !written.ok()) return written;
+    const HealthGate patient{gate.healthy_s, std::max(gate.patience_s, kBackS)};
+    const auto again = wait_healthy(folder, *before, names_of(*before), patient);
+    return core::Error{"generation " + std::to_string(plan.generation) + " did not pass: " + healthy.error().message +
+                       (again.ok() ? "; generation " + std::to_string(before->generation) + " runs again"
+                                   : "; AND the old generation is not healthy: " + again.error().message)};
+  }
+  return folder.write(now);
+}
+
+}  // namespace railfix::tool

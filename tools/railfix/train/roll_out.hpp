@@ -1,0 +1,41 @@
+// From the manifest to running services on one host, and back.
+#pragma once
+
+#include <functional>
+
+#include "train/manifest.hpp"
+#include "train/plan.hpp"
+
+namespace railfix::tool {
+
+/// Renders the manifest for this host as its next generation. Nothing is started. Services that would run exactly as
+/// they do now keep their old entry. Error: a file or program that is missing.
+core::Result<HostPlan> install(const Manifest& manifest, const TrainHost& host, const std::filesystem::path& root);
+
+struct HealthGate {
+  double healthy_s = 3;     // without a break, and without being started again
+  double patience_s = 120;  // for that
+};
+using Say = std::function<void(const std::string&)>;
+
+/// Starts a supervisor that outlives this process, if there is none, and waits until every service is healthy.
+core::Status bring_up(const std::filesystem::path& root, const HostPlan& plan, const HealthGate& gate);
+/// Ends the supervisor and its services.
+core::Status bring_down(const std::filesystem::path& root);
+
+/// Service by service in the order of the data's way: restarts those whose entry differs from what runs now. When one
+/// does not pass the gate all of them go back to what ran before; then the error says which, why, and whether that
+/// worked.
+core::Status roll_out(const std::filesystem::path& root, const HostPlan& plan, const HealthGate& gate, const Say& say);
+
+/// A sentence on a service: "active", "degraded: ...", "does not run: ended by Killed".
+struct ServiceHealth {
+  bool healthy = false;
+  std::string text;
+};
+ServiceHealth health_of(const HostPlan& plan, const HostState& state, const std::string& service);
+
+/// The lines of one settings text that the other has not, as "-line" and "+line"; empty when they are equal.
+std::string difference(const std::string& before, const std::string& after);
+
+}  // namespace railfix::tool

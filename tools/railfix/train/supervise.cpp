@@ -1,0 +1,218 @@
+#include "train/supervise.hpp"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/file.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstring>
+#include <ranges>
+
+#include "core/time.hpp"
+
+namespace railfix::tool {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kTurnMs = 20;
+constexpr int64_t kFirstPauseNs = 200'000'000;
+constexpr int64_t kLongestPauseNs = 5 * core::kNsPerSecond;
+constexpr int64_t kLivesNs = 10 * core::kNsPerSecond;
+constexpr int64_t kStopNs = 10 * core::kNsPerSecond;
+
+volatile std::sig_atomic_t asked_to_stop = 0;
+
+std::string said_of(int wait_status) {
+  if (WIFSIGNALED(wait_status)) return std::string("ended by ") + strsignal(WTERMSIG(wait_status));
+  return "ended with exit code " + std::to_string(WEXITSTATUS(wait_status));
+}
+
+[[noreturn]] void become(const std::vector<std::string>& command, const fs::path& home, int log) {
+  prctl(PR_SET_PDEATHSIG, SIGTERM);  // a service without its supervisor would never be replaced
+  setpgid(0, 0);
+  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, SIG_DFL);
+  dup2(log, STDOUT_FILENO);
+  dup2(log, STDERR_FILENO);
+  std::vector<char*> argv;
+  for (const auto& argument : command) argv.push_back(const_cast<char*>(argument.c_str()));
+  argv.push_back(nullptr);
+  if (chdir(home.c_str()) == 0) execv(argv[0], argv.data());
+  _exit(127);
+}
+
+/// One service of the plan and its process.
+class Child {
+ public:
+  Child(PlannedService service, const HostFolder& folder)
+      : service_(std::move(service)), home_(folder.home()), log_(folder.log(service_.name)) {}
+  [[nodiscard]] const PlannedService& service() const { return service_; }
+  [[nodiscard]] RunningService state() const { return {pid_, service_.generation, restarts_, last_end_}; }
+  [[nodiscard]] bool runs() const { return pid_ > 0; }
+
+  /// Starts it when it is time, notes its end. True when something has changed.
+  bool turn() {
+    const int64_t now_ns = core::monotonic_ns();
+    if (pid_ > 0) return note_end(now_ns);
+    if (now_ns < next_start_ns_) return false;
+    start(now_ns);
+    return true;
+  }
+  void ask_to_stop() const {
+    if (pid_ > 0) kill(pid_, SIGTERM);
+  }
+  void kill_it() {
+    if (pid_ <= 0) return;
+    kill(pid_, SIGKILL);
+    waitpid(pid_, nullptr, 0);
+    pid_ = 0;
+  }
+  bool ended() {
+    if (pid_ > 0 && waitpid(pid_, nullptr, WNOHANG) == pid_) pid_ = 0;
+    return pid_ == 0;
+  }
+
+ private:
+  void start(int64_t now_ns) {
+    fs::create_directories(log_.parent_path());
+    const int log = open(log_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+    pid_ = fork();
+    if (pid_ == 0) become(service_.command, home_, log);
+    if (log >= 0) close(log);
+    started_ns_ = now_ns;
+    if (pid_ > 0) return;
+    pid_ = 0;
+    next_start_ns_ = now_ns + kLongestPauseNs;
+    last_end_ = std::string("cannot be started: ") + std::strerror(errno);
+  }
+  bool note_end(int64_t now_ns) {
+    int wait_status = 0;
+    if (waitpid(pid_, &wait_status, WNOHANG) != pid_) return false;
+    pid_ = 0;
+    ++restarts_;
+    last_end_ = said_of(wait_status);
+    pause_ns_ = now_ns - started_ns_ > kLivesNs ? kFirstPauseNs : std::min(2 * pause_ns_, kLongestPauseNs);
+    next_start_ns_ = now_ns + pause_ns_;
+    return true;
+  }
+
+  PlannedService service_;
+  fs::path home_;
+  fs::path log_;
+  pid_t pid_ = 0;
+  int restarts_ = 0;
+  std::string last_end_;
+  int64_t started_ns_ = 0;
+  int64_t next_start_ns_ = 0;
+  int64_t pause_ns_ = kFirstPauseNs / 2;
+};
+
+// Those who listen go last, so that the recorder and the monitor hear everyone's last words.
+void stop(std::vector<Child*> children) {
+  for (auto* child : children) child->ask_to_stop();
+  const int64_t deadline_ns = core::monotonic_ns() + kStopNs;
+  const auto all_ended = [&] {
+    bool ended = true;
+    for (auto* child : children) ended = child->ended() && ended;
+    return ended;
+  };
+  while (!all_ended() && core::monotonic_ns() < deadline_ns) poll(nullptr, 0, kTurnMs);
+  for (auto* child : children) child->kill_it();
+}
+
+class Supervision {
+ public:
+  explicit Supervision(const HostFolder& folder) : folder_(folder) {}
+  void turn() {
+    follow_plan();
+    bool changed = false;
+    for (auto& child : children_) changed = child.turn() || changed;
+    if (changed) say();
+  }
+  void end() {
+    std::vector<Child*> speakers;
+    std::vector<Child*> listeners;
+    for (auto& child : children_) {
+      const bool listens = child.service().name == "recorder" || child.service().name == "monitor";
+      (listens ? listeners : speakers).push_back(&child);
+    }
+    stop(speakers);
+    stop(listeners);
+    children_.clear();
+    say();
+  }
+
+ private:
+  void follow_plan() {
+    const auto written = folder_.plan_written();
+    if (written == plan_written_) return;
+    plan_written_ = written;
+    const auto plan = folder_.plan();
+    if (!plan || plan->services == planned_) return;
+    planned_ = plan->services;
+    std::vector<Child*> leaving;
+    for (auto& child : children_) {
+      if (std::find(planned_.begin(), planned_.end(), child.service()) == planned_.end()) leaving.push_back(&child);
+    }
+    stop(leaving);
+    std::erase_if(children_, [&](const Child& child) {
+      return std::find(planned_.begin(), planned_.end(), child.service()) == planned_.end();
+    });
+    // Against the way of the data: who listens is there before who speaks.
+    for (const auto& service : std::views::reverse(planned_)) {
+      const bool there = std::any_of(children_.begin(), children_.end(),
+                                     [&](const Child& child) { return child.service() == service; });
+      if (!there) children_.emplace_back(service, folder_);
+    }
+    say();
+  }
+  void say() const {
+    HostState state;
+    for (const auto& child : children_) state[child.service().name] = child.state();
+    static_cast<void>(folder_.write(state));  // a full disk must not end the train
+  }
+  const HostFolder& folder_;
+  fs::file_time_type plan_written_{};
+  std::vector<PlannedService> planned_;
+  std::vector<Child> children_;
+};
+
+}  // namespace
+
+void supervise(const HostFolder& folder) {
+  fs::create_directories(folder.lock().parent_path());
+  const int lock = open(folder.lock().c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  if (lock < 0 || flock(lock, LOCK_EX | LOCK_NB) != 0) {
+    throw core::BadInput(folder.lock().string() +
+                         " is held: a supervisor runs here already, or this user may not write there");
+  }
+  const std::string pid = std::to_string(getpid()) + "\n";
+  if (ftruncate(lock, 0) != 0 || pwrite(lock, pid.data(), pid.size(), 0) < 0)
+    throw core::BadInput(folder.lock().string() + " cannot be written; is the disk full?");
+  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { asked_to_stop = 1; });
+  Supervision supervision(folder);
+  while (asked_to_stop == 0) {
+    supervision.turn();
+    poll(nullptr, 0, kTurnMs);
+  }
+  supervision.end();
+  close(lock);
+}
+
+std::optional<int64_t> supervisor_of(const HostFolder& folder) {
+  const int lock = open(folder.lock().c_str(), O_RDWR | O_CLOEXEC);
+  if (lock < 0) return std::nullopt;
+  const bool free = flock(lock, LOCK_EX | LOCK_NB) == 0;
+  char text[32] = {};
+  const auto bytes = pread(lock, text, sizeof(text) - 1, 0);
+  close(lock);
+  if (free || bytes <= 0) return std::nullopt;
+  return std::atoll(text);
+}
+
+}  // namespace railfix::tool

@@ -1,0 +1,16 @@
+// Keeps the services of one host running as its plan says: the only thing that systemd, or a person, starts on a host.
+#pragma once
+
+#include "train/plan.hpp"
+
+namespace railfix::tool {
+
+/// Until SIGTERM or SIGINT. Follows the plan when it changes: services whose entry has changed are stopped and started
+/// anew, those that are gone are stopped. One that ends by itself is started again after 0.2 s, later and later (up to
+/// 5 s) when it does not live. Throws BadInput when another supervisor has this folder.
+void supervise(const HostFolder& folder);
+
+/// Whether a supervisor has this folder; its process.
+std::optional<int64_t> supervisor_of(const HostFolder& folder);
+
+}  // namespace railfix::tool
