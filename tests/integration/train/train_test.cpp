@@ -12,6 +12,7 @@
 #include "messaging/topics.hpp"
 #include "service/service.hpp"
 #include "support/program.hpp"
+#include "track/map.hpp"
 
 namespace railfix {
 namespace {
@@ -163,6 +164,36 @@ TEST_F(Train, ReportsAreComparedWithTheTruth) {
   ASSERT_EQ(std::sscanf(compared.out.c_str() + row, "error, size %lf %lf %lf", &mean_m, &p95_m, &max_m), 3);
   EXPECT_LT(max_m, 2.0);
   EXPECT_THAT(compared.out, HasSubstr("outside the interval     ours on 0, certified on 0 of"));
+}
+
+// `railfix map learn` on the tables of a real run, for a map that has forgotten all but its frogs. (The same run twice,
+// because a new landmark must be seen by two.)
+TEST_F(Train, MapLearnFindsTheLandmarksAgain) {
+  const auto file = dataset::find_map(sequence());
+  ASSERT_TRUE(file.has_value());
+  const auto truth = core::value_or_throw(track::Map::load(*file));
+  auto poor = truth;
+  std::erase_if(poor.landmarks, [](const auto& mark) { return mark.kind != track::LandmarkKind::frog; });
+  for (size_t i = 0; i < poor.landmarks.size(); ++i) poor.landmarks[i].id = static_cast<uint32_t>(i + 1);
+  poor.balise_groups.clear();
+  const auto poor_file = (folder_ / "poor.map").string();
+  const auto learned_file = (folder_ / "learned.map").string();
+  core::ok_or_throw(poor.save(poor_file));
+  const auto learned =
+      test::run_program({"railfix", "map", "learn", poor_file, out(), out(), "--out", learned_file}, 60);
+  ASSERT_EQ(learned.exit_code, 0) << learned.err;
+  const auto map = core::value_or_throw(track::Map::load(learned_file));
+  EXPECT_GE(map.landmarks.size(), poor.landmarks.size() + 3) << learned.out;
+  for (size_t i = poor.landmarks.size(); i < map.landmarks.size(); ++i) {
+    const auto& mark = map.landmarks[i];
+    double error_m = HUGE_VAL;
+    for (const auto& real : truth.landmarks) {
+      if (real.kind == mark.kind && real.edge == mark.edge)
+        error_m = std::min(error_m, std::abs(real.offset_m - mark.offset_m));
+    }
+    EXPECT_LT(error_m, 4 * mark.sigma_m) << track::to_string(mark.kind) << " at " << mark.offset_m;
+    EXPECT_LT(mark.sigma_m, 1) << track::to_string(mark.kind) << " at " << mark.offset_m;
+  }
 }
 
 TEST_F(Train, TheRecordingHoldsEveryTopic) {

@@ -13,19 +13,27 @@ namespace railfix::tool {
 /// One sighting, put on the map by where the run thought it was.
 struct SurveySighting {
   size_t run = 0;
-  double way_m = 0;  // of the run at the sighting
+  double way_m = 0;  // of the run at the sighting, by its speed: no fix moves it
   track::LandmarkKind kind = track::LandmarkKind::unknown;
   uint32_t edge = 0;
   double offset_m = 0;
   double lateral_m = 0;
-  double sigma_m = 0;      // of the sighting
-  double run_sigma_m = 0;  // of the run's place, shared by sightings near each other
+  double sigma_m = 0;        // of the sighting
+  double run_sigma_m = 0;    // of the run's place, shared by sightings near each other
+  double place_ahead_m = 0;  // the run's place along the track minus way_m: what its fixes have moved it
+  bool is_reverse = false;   // the run goes against the edge
+
+  /// Along the edge, as if no fix had moved the run's place.
+  [[nodiscard]] double unmoved_m() const { return offset_m + (is_reverse ? place_ahead_m : -place_ahead_m); }
 };
 
 struct SurveyOptions {
-  double stretch_m = 500;  // of a run, with one error of its place
-  double gate_m = 4;       // sightings of one kind nearer than this along the track are of one thing
-  size_t least_runs = 2;   // a new landmark must have been seen in as many
+  double stretch_m = 500;     // of a run: its place counts once in it, because fixes near each other share their errors
+  double knot_m = 100;        // the error of way_m is linear between knots so far apart ...
+  double drift = 0.002;       // ... and changes by this share of the way (1 sigma)
+  double common_share = 0.5;  // of a sighting's variance that all sightings of a thing have in common
+  double gate_m = 4;          // sightings of one kind nearer than this along the track are of one thing
+  size_t least_runs = 2;      // a new landmark must have been seen in as many
 };
 
 struct SurveyedLandmark {
@@ -44,7 +52,8 @@ struct Survey {
   double spread = 0;      // rms of errors over their sigmas; sigmas are widened where it is above 1
 };
 
-/// Robust least squares (Huber) over landmarks and the runs' stretches; landmarks of the map enter with their sigma.
+/// Robust least squares (Huber) over landmarks and the error of every run's way; landmarks of the map enter with their
+/// sigma. What the camera sees wrongly in the same way every time does not average out: see common_share.
 Survey survey_landmarks(const track::Map& map, const std::vector<SurveySighting>& sightings,
                         const SurveyOptions& options);
 

@@ -1,0 +1,136 @@
+#include "map/survey_solver.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace railfix::tool {
+
+namespace {
+
+constexpr int kRounds = 15;
+constexpr double kLeastSigmaM = 0.01;
+
+double weight_of(double sigma_m) {
+  return 1.0 / std::pow(std::max(sigma_m, kLeastSigmaM), 2);
+}
+
+double median_offset(const std::vector<SurveySighting>& all, const Thing& thing) {
+  std::vector<double> offsets;
+  for (const size_t i : thing.sightings) offsets.push_back(all[i].offset_m);
+  const auto middle = offsets.begin() + static_cast<ptrdiff_t>(offsets.size() / 2);
+  std::nth_element(offsets.begin(), middle, offsets.end());
+  return *middle;
+}
+
+}  // namespace
+
+SurveySolver::SurveySolver(const std::vector<SurveySighting>& all, const std::vector<Thing>& things,
+                           const SurveyOptions& options)
+    : all_(all), things_(things), options_(options) {
+  for (const auto& seen : all) {
+    for (const int64_t k : {knot_of(seen), knot_of(seen) + 1}) knots_.try_emplace({seen.run, k}, 0);
+  }
+  auto index = static_cast<Eigen::Index>(2 * things_.size());
+  for (auto& [key, at] : knots_) at = index++;
+  state_ = Eigen::VectorXd::Zero(index);
+  for (size_t t = 0; t < things.size(); ++t)
+    state_[place_index(t)] = things[t].known != nullptr ? things[t].known->offset_m : median_offset(all, things[t]);
+  for (const auto& seen : all) {  // a start for the error of the way: the run's place is right
+    for (const int64_t k : {knot_of(seen), knot_of(seen) + 1}) state_[knots_.at({seen.run, k})] = seen.place_ahead_m;
+  }
+  for (int round = 0; round < kRounds; ++round) solve();
+}
+
+int64_t SurveySolver::knot_of(const SurveySighting& seen) const {
+  return static_cast<int64_t>(std::floor(seen.way_m / options_.knot_m));
+}
+
+double SurveySolver::sigma(size_t thing) const {
+  Eigen::VectorXd unit = Eigen::VectorXd::Zero(state_.size());
+  unit[place_index(thing)] = 1;
+  return std::sqrt(factors_.solve(unit)[place_index(thing)]);
+}
+
+double SurveySolver::own_sigma(size_t sighting) const {
+  return std::max(all_[sighting].sigma_m * std::sqrt(1 - options_.common_share), kLeastSigmaM);
+}
+
+SurveySolver::Terms SurveySolver::way_terms(size_t sighting, double sign) const {
+  const SurveySighting& seen = all_[sighting];
+  const int64_t knot = knot_of(seen);
+  const double share = seen.way_m / options_.knot_m - static_cast<double>(knot);
+  return {{knots_.at({seen.run, knot}), sign * (1 - share)}, {knots_.at({seen.run, knot + 1}), sign * share}};
+}
+
+SurveySolver::Terms SurveySolver::terms_of(size_t thing, size_t sighting) const {
+  Terms terms = way_terms(sighting, all_[sighting].is_reverse ? 1.0 : -1.0);
+  terms.insert(terms.begin(), {{place_index(thing), 1.0}, {common_index(thing), 1.0}});
+  return terms;
+}
+
+double SurveySolver::seen_at(size_t sighting) const {
+  double at_m = all_[sighting].unmoved_m();
+  for (const auto& [index, factor] : way_terms(sighting, all_[sighting].is_reverse ? -1.0 : 1.0))
+    at_m += factor * state_[index];
+  return at_m;
+}
+
+double SurveySolver::error(size_t thing, size_t sighting) const {
+  double off_m = all_[sighting].unmoved_m();
+  for (const auto& [index, factor] : terms_of(thing, sighting)) off_m -= factor * state_[index];
+  return off_m / own_sigma(sighting);
+}
+
+void SurveySolver::add(const Terms& terms, double value, double weight) {
+  for (const auto& [i, a] : terms) {
+    right_[i] += weight * a * value;
+    for (const auto& [j, b] : terms) normal_.emplace_back(i, j, weight * a * b);
+  }
+}
+
+void SurveySolver::add_sightings() {
+  for (size_t t = 0; t < things_.size(); ++t) {
+    if (const track::Landmark* known = things_[t].known)
+      add({{place_index(t), 1.0}}, known->offset_m, weight_of(known->sigma_m));
+    double variance = 0;
+    for (const size_t i : things_[t].sightings) {
+      variance += std::pow(all_[i].sigma_m, 2) / static_cast<double>(things_[t].sightings.size());
+      const double off = std::abs(error(t, i));
+      add(terms_of(t, i), all_[i].unmoved_m(), (off > kHuber ? kHuber / off : 1.0) * weight_of(own_sigma(i)));
+    }
+    add({{common_index(t), 1.0}}, 0, weight_of(std::sqrt(options_.common_share * variance)));
+  }
+}
+
+void SurveySolver::add_knots() {
+  for (auto knot = knots_.begin(), next = std::next(knot); next != knots_.end(); knot = next++) {
+    if (knot->first.first != next->first.first) continue;
+    const double apart_m = options_.knot_m * static_cast<double>(next->first.second - knot->first.second);
+    add({{next->second, 1.0}, {knot->second, -1.0}}, 0, weight_of(options_.drift * apart_m));
+  }
+}
+
+void SurveySolver::add_places_of_runs() {
+  std::map<std::pair<size_t, int64_t>, size_t> vaguest;  // of every stretch: the least of what landmarks told the run
+  for (size_t i = 0; i < all_.size(); ++i) {
+    const auto stretch = static_cast<int64_t>(std::floor(all_[i].way_m / options_.stretch_m));
+    const auto [entry, is_new] = vaguest.try_emplace({all_[i].run, stretch}, i);
+    if (all_[i].run_sigma_m > all_[entry->second].run_sigma_m) entry->second = i;
+  }
+  for (const auto& [stretch, i] : vaguest)
+    add(way_terms(i, 1.0), all_[i].place_ahead_m, weight_of(all_[i].run_sigma_m));
+}
+
+void SurveySolver::solve() {
+  normal_.clear();
+  right_ = Eigen::VectorXd::Zero(state_.size());
+  add_sightings();
+  add_knots();
+  add_places_of_runs();
+  Eigen::SparseMatrix<double> normal(state_.size(), state_.size());
+  normal.setFromTriplets(normal_.begin(), normal_.end());
+  factors_.compute(normal);
+  state_ = factors_.solve(right_);
+}
+
+}  // namespace railfix::tool

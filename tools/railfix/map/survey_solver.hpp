@@ -1,0 +1,65 @@
+// The least squares of a survey: things along edges, and the errors of the runs that saw them.
+//
+// A run that goes along its edge sees thing x at offset_m = x + c_x - b(way_m) + place_ahead_m + noise (all but x with
+// the other sign against the edge): c_x is what all sightings of x have wrong in common, b the true place along the
+// track minus way_m, a random walk with knots. Landmarks of the map hold x, the run's own place holds b.
+#pragma once
+
+#include <Eigen/SparseCholesky>
+#include <map>
+#include <vector>
+
+#include "map/survey.hpp"
+
+namespace railfix::tool {
+
+/// Sightings (by index) that are of one thing.
+struct Thing {
+  const track::Landmark* known = nullptr;  // on the map as
+  std::vector<size_t> sightings;
+};
+
+class SurveySolver {
+ public:
+  static constexpr double kHuber = 2.0;  // sigmas beyond which a sighting loses weight
+
+  /// Solves. REQUIRES: every sighting of a thing is in `all`, which outlives the solver as do the things.
+  SurveySolver(const std::vector<SurveySighting>& all, const std::vector<Thing>& things, const SurveyOptions& options);
+
+  [[nodiscard]] double place(size_t thing) const { return state_[place_index(thing)]; }
+  [[nodiscard]] double sigma(size_t thing) const;
+  /// Along its edge, with the error of its run's way taken out.
+  [[nodiscard]] double seen_at(size_t sighting) const;
+  /// Error of a sighting over the part of its sigma that it has alone.
+  [[nodiscard]] double error(size_t thing, size_t sighting) const;
+
+ private:
+  using Terms = std::vector<std::pair<Eigen::Index, double>>;
+
+  [[nodiscard]] static Eigen::Index place_index(size_t thing) { return static_cast<Eigen::Index>(thing); }
+  [[nodiscard]] Eigen::Index common_index(size_t thing) const {
+    return static_cast<Eigen::Index>(things_.size() + thing);
+  }
+  [[nodiscard]] Terms terms_of(size_t thing, size_t sighting) const;
+  /// b(way_m) along the edge.
+  [[nodiscard]] Terms way_terms(size_t sighting, double sign) const;
+  [[nodiscard]] double own_sigma(size_t sighting) const;
+  [[nodiscard]] int64_t knot_of(const SurveySighting& seen) const;
+  void solve();
+  /// terms * state = value with this weight.
+  void add(const Terms& terms, double value, double weight);
+  void add_sightings();
+  void add_knots();
+  void add_places_of_runs();
+
+  const std::vector<SurveySighting>& all_;
+  const std::vector<Thing>& things_;
+  SurveyOptions options_;
+  std::map<std::pair<size_t, int64_t>, Eigen::Index> knots_;  // of run and number along its way
+  Eigen::VectorXd state_;
+  std::vector<Eigen::Triplet<double>> normal_;
+  Eigen::VectorXd right_;
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factors_;
+};
+
+}  // namespace railfix::tool

@@ -1,0 +1,151 @@
+// The tables of a run as sightings on the map.
+#include <algorithm>
+#include <cmath>
+
+#include "core/csv.hpp"
+#include "core/time.hpp"
+#include "map/survey.hpp"
+#include "track/path.hpp"
+
+namespace railfix::tool {
+
+namespace {
+
+constexpr double kNearM = 50;  // a state's place lies so near to where the speed would have brought the train
+
+struct State {
+  int64_t stamp_ns = 0;
+  track::EdgePosition place;
+  double way_m = 0;          // by the speed alone: fixes do not move it
+  double place_ahead_m = 0;  // the place along the track minus way_m; changes where a fix moved the place
+  double sigma_m = 0;
+};
+
+/// The way between two places, along the train; nothing where no short way leads from one to the other.
+std::optional<double> way_between(const std::shared_ptr<const track::Map>& map, const State& a, const State& b) {
+  if (a.place.edge == b.place.edge) {
+    const double grown_m = b.place.offset_m - a.place.offset_m;
+    return a.place.direction == track::Direction::reverse ? -grown_m : grown_m;
+  }
+  const double reach_m = std::abs(b.way_m - a.way_m) + kNearM;
+  const auto path = track::Path::follow(map, a.place, reach_m, reach_m, {b.place.edge});
+  return path.ok() ? path.value().distance_of(b.place.edge, b.place.offset_m) : std::nullopt;
+}
+
+template <class T>
+T read_or_throw(core::Result<T> cell) {
+  return core::value_or_throw(std::move(cell));
+}
+
+size_t column_of(const core::CsvReader& table, const std::filesystem::path& file, std::string_view name) {
+  const auto column = table.column({name});
+  if (!column) throw core::BadInput(file.string() + " has no column " + std::string(name));
+  return *column;
+}
+
+/// The way that the speeds give, trapezoids; an empty cell is a train that stands or is not known to move.
+class WayBySpeed {
+ public:
+  double at(int64_t stamp_ns, double speed_mps) {
+    const double now_mps = std::isfinite(speed_mps) ? speed_mps : 0;
+    if (begun_) way_m_ += 0.5 * (now_mps + speed_mps_) * core::seconds(stamp_ns - stamp_ns_);
+    begun_ = true;
+    stamp_ns_ = stamp_ns;
+    speed_mps_ = now_mps;
+    return way_m_;
+  }
+
+ private:
+  bool begun_ = false;
+  int64_t stamp_ns_ = 0;
+  double speed_mps_ = 0;
+  double way_m_ = 0;
+};
+
+std::vector<State> read_states(const std::shared_ptr<const track::Map>& map, const std::filesystem::path& file) {
+  core::CsvReader table = core::value_or_throw(core::CsvReader::open(file));
+  const auto at = [&](std::string_view name) { return column_of(table, file, name); };
+  const size_t stamp = at("stamp_ns"), edge = at("edge"), offset = at("offset_m"), direction = at("direction");
+  const size_t speed = at("speed_mps"), sigma = at("sigma_m"), known = at("track_known");
+  WayBySpeed way;
+  std::vector<State> out;
+  while (table.next()) {
+    State state;
+    state.stamp_ns = read_or_throw(table.integer(stamp));
+    state.way_m = way.at(state.stamp_ns, read_or_throw(table.number(speed)));
+    const std::string_view is_known = table.text(known);
+    if (table.text(edge).empty() || is_known == "0" || is_known == "false") continue;
+    state.place.edge = static_cast<uint32_t>(read_or_throw(table.integer(edge)));
+    state.place.offset_m = read_or_throw(table.number(offset));
+    state.place.direction = table.text(direction) == "-" ? track::Direction::reverse : track::Direction::forward;
+    state.sigma_m = read_or_throw(table.number(sigma));
+    if (map->edge(state.place.edge) == nullptr) {
+      throw core::BadInput(
+          table.error("edge " + std::to_string(state.place.edge) + " is not on the map; was the run made on it?"));
+    }
+    if (!std::isfinite(state.place.offset_m) || !std::isfinite(state.sigma_m)) continue;
+    if (!out.empty()) {
+      const double run_m = state.way_m - out.back().way_m;
+      state.place_ahead_m = out.back().place_ahead_m + way_between(map, out.back(), state).value_or(run_m) - run_m;
+    }
+    out.push_back(state);
+  }
+  core::ok_or_throw(table.status());
+  return out;
+}
+
+/// The place at a time between two states, on the map along the way that the train takes.
+std::optional<track::EdgePosition> place_at(const std::shared_ptr<const track::Map>& map, const State& before,
+                                            const State& after, int64_t stamp_ns, double ahead_m) {
+  const double span = static_cast<double>(after.stamp_ns - before.stamp_ns);
+  const double part = span > 0 ? static_cast<double>(stamp_ns - before.stamp_ns) / span : 0.0;
+  const double ahead = part * std::abs(after.way_m - before.way_m) + ahead_m;
+  track::EdgePosition from = before.place;
+  from.offset_m = std::clamp(from.offset_m, 0.0, map->edge(from.edge)->alignment.length_m());
+  const auto path = track::Path::follow(map, from, std::max(ahead, 0.0) + 1, std::max(-ahead, 0.0) + 1);
+  if (!path.ok() || ahead > path.value().end_m() || ahead < path.value().begin_m()) return std::nullopt;
+  return path.value().position_at(ahead);
+}
+
+track::LandmarkKind as_on_map(track::LandmarkKind kind, track::Direction direction) {
+  if (direction != track::Direction::reverse) return kind;
+  if (kind == track::LandmarkKind::portal_in) return track::LandmarkKind::portal_out;
+  return kind == track::LandmarkKind::portal_out ? track::LandmarkKind::portal_in : kind;
+}
+
+}  // namespace
+
+core::Result<std::vector<SurveySighting>> read_sightings(const std::shared_ptr<const track::Map>& map,
+                                                         const std::filesystem::path& run_folder, size_t run) {
+  try {
+    const std::vector<State> states = read_states(map, run_folder / "train_state.csv");
+    const std::filesystem::path file = run_folder / "sightings.csv";
+    core::CsvReader table = core::value_or_throw(core::CsvReader::open(file));
+    const auto at = [&](std::string_view name) { return column_of(table, file, name); };
+    const size_t stamp = at("stamp_ns"), kind = at("kind"), ahead = at("distance_ahead_m"), lateral = at("lateral_m");
+    const size_t sigma = at("sigma_m");
+    std::vector<SurveySighting> out;
+    while (table.next()) {
+      const int64_t when = read_or_throw(table.integer(stamp));
+      const auto what = track::landmark_kind_from(std::string(table.text(kind)));
+      if (!what) return table.error("\"" + std::string(table.text(kind)) + "\" is no kind of landmark");
+      const auto after = std::lower_bound(states.begin(), states.end(), when,
+                                          [](const State& state, int64_t ns) { return state.stamp_ns < ns; });
+      if (after == states.begin() || after == states.end()) continue;
+      const State& before = *(after - 1);
+      const auto place = place_at(map, before, *after, when, read_or_throw(table.number(ahead)));
+      if (!place) continue;
+      const bool is_reverse = place->direction == track::Direction::reverse;
+      const double side = read_or_throw(table.number(lateral));
+      out.push_back({run, before.way_m, as_on_map(*what, place->direction), place->edge, place->offset_m,
+                     std::isfinite(side) ? (is_reverse ? -side : side) : 0.0, read_or_throw(table.number(sigma)),
+                     before.sigma_m, before.place_ahead_m, is_reverse});
+    }
+    core::ok_or_throw(table.status());
+    return out;
+  } catch (const core::BadInput& bad) {
+    return core::Error{bad.what()};
+  }
+}
+
+}  // namespace railfix::tool
