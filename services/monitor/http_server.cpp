@@ -51,12 +51,6 @@ std::vector<std::string> words_of(const WebSocket::HttpRequest& from, http::fiel
   return words;
 }
 
-// A name that only this computer's own programs use for it: a page on the internet whose name points here has another.
-bool names_this_computer(const std::string& host) {
-  const std::string name = host.substr(0, host.starts_with('[') ? host.find(']') + 1 : host.find(':'));
-  return name == "localhost" || name == "[::1]" || name.starts_with("127.");
-}
-
 Request request_of(const WebSocket::HttpRequest& from, const tcp::endpoint& peer) {
   Request request;
   request.method = text_of(from.method_string());
@@ -259,6 +253,11 @@ void HttpServer::start() {
 
 size_t HttpServer::clients() const {
   return impl_->shared->clients;
+}
+
+bool names_this_computer(const std::string& host) {
+  const std::string name = host.substr(0, host.starts_with('[') ? host.find(']') + 1 : host.find(':'));
+  return name == "localhost" || name == "[::1]" || host == "::1" || name.starts_with("127.");
 }
 
 std::string url_decoded(const std::string& text) {

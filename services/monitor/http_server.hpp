@@ -33,6 +33,10 @@ class HttpServer {
   std::unique_ptr<Impl> impl_;
 };
 
+/// A name or address, with or without a port, that only this computer's own programs use for it: a page on the internet
+/// whose name points here has another.
+bool names_this_computer(const std::string& host);
+
 /// "%41" and "+" of a URL.
 std::string url_decoded(const std::string& text);
 

@@ -74,6 +74,13 @@ void add_topics(Families& families, const MetricsInput& input) {
     families.counter("railfix_topic_bytes_total", "Bytes of these samples, as CDR.", numbers.bytes, labels);
     families.counter("railfix_topic_lost_total", "Samples that were sent and never came to the monitor.", numbers.lost,
                      labels);
+    families.counter("railfix_topic_dropped_total", "Samples that came and waited too long for the monitor.",
+                     topic.dropped, labels);
+    families.counter("railfix_topic_rejected_total", "Samples that the monitor's middleware had no room for.",
+                     topic.rejected, labels);
+    families.counter("railfix_topic_deadlines_missed_total",
+                     "Times that the topic's deadline passed without a sample; 0 for topics without one.",
+                     topic.deadlines_missed, labels);
     families.counter("railfix_topic_gaps_total", "Pauses of more than three usual ones.", numbers.gaps, labels);
     families.gauge("railfix_topic_rate_hertz", "Samples a second over the last five seconds.", numbers.hz, labels);
     families.gauge("railfix_topic_age_seconds", "Since the last sample; NaN = none came yet.",

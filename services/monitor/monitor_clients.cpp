@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "core/time.hpp"
+#include "messaging/reader_troubles.hpp"
 #include "monitor/metrics.hpp"
 #include "monitor/monitor_service.hpp"
 
@@ -114,6 +115,16 @@ FoxgloveApi::Actions MonitorService::foxglove_actions() {
   return actions;
 }
 
+// What the operator should know who opens the page to others; empty = nobody but this computer.
+std::string MonitorService::exposure() const {
+  if (names_this_computer(config_.address)) return "";
+  const std::string sees =
+      "everybody who reaches " + config_.address + " sees the page, its pictures and /metrics, without encryption; ";
+  if (!config_.control) return sees + "nobody can control anything";
+  if (config_.token.empty()) return sees + "control only from this computer, because monitor.token is empty";
+  return sees + "control asks for the token, which travels as it is: use a network that only the train is on, or TLS";
+}
+
 std::string MonitorService::control_of(const Request& request) const {
   if (!config_.control) return "off";
   if (!config_.token.empty()) return "token";
@@ -150,9 +161,13 @@ Response MonitorService::metrics_answer() {
   const TrainSeen seen = train_seen();
   MetricsInput input{context_.common().train_id, RAILFIX_VERSION, context_.common().host, &seen,        {},
                      &problems_.problems(),      reports_sent_,   server_.clients(),      slow_viewers_};
+  const auto troubles = messaging::reader_troubles(context_.participant());
   for (const auto& [name, topic] : watch_.topics()) {
     if (!topic.reader) continue;
+    const auto found = troubles.find(name);
+    const auto trouble = found == troubles.end() ? messaging::ReaderTroubles() : found->second;
     input.topics.push_back({name, topic.reader->matched_writers(), topic.statistics.numbers(seen.now_ns),
+                            topic.reader->dropped(), trouble.rejected, trouble.deadlines_missed,
                             topic.statistics.latency_counts(), topic.statistics.latency_sum_s()});
   }
   return {200, "text/plain; version=0.0.4; charset=utf-8", metrics_text(input), "", "no-store"};

@@ -21,6 +21,8 @@ constexpr size_t kReportsKept = 20;
 constexpr int64_t kScrapeNs = 60 * core::kNsPerSecond;
 // Readers go away this long after the last one looked, so that opening a page anew makes none.
 constexpr int64_t kLingerNs = 10 * core::kNsPerSecond;
+// What has come waits for so many turns of 50 ms when nobody looks.
+constexpr uint64_t kIdleTurns = 5;
 
 std::filesystem::path page_folder(const std::string& configured) {
   if (!configured.empty()) return configured;
@@ -66,6 +68,7 @@ MonitorService::MonitorService(const Config& config, service::Context& context)
   } else {
     context_.log().info("the page is at {}", address_);
   }
+  if (const std::string said = exposure(); !said.empty()) context_.log().warn("{}", said);
   context_.on_command("address", [this](const std::string&) { return core::Result<std::string>(address_); });
   start_timers();
   server_.start();
@@ -75,6 +78,7 @@ MonitorService::~MonitorService() = default;
 
 void MonitorService::start_timers() {
   context_.every(50ms, [this] {
+    if (nobody_looks() && ++idle_turns_ % kIdleTurns != 0) return;
     watch_.drain();
     publish_pictures();
   });
@@ -83,7 +87,9 @@ void MonitorService::start_timers() {
   });
   context_.every(200ms, [this] { publish_curvature(); });
   context_.every(250ms, [this] { publish_log(); });
-  context_.every(500ms, [this] { live_.publish("services", services_message(services_, core::wall_ns())); });
+  context_.every(500ms, [this] {
+    if (live_.watched("services")) live_.publish("services", services_message(services_, core::wall_ns()));
+  });
   context_.every(1s, [this] {
     written_ = context_.participant().written_topics();
     show_channels();
@@ -91,6 +97,7 @@ void MonitorService::start_timers() {
     look_for_problems();
     publish_topics();
     give_up_waiting();
+    context_.health().dropped(watch_.take_dropped());
     if (core::wall_ns() - state_.received_ns > core::kNsPerSecond) publish_state();
   });
 }
@@ -224,6 +231,12 @@ std::set<std::string> MonitorService::wanted_topics() const {
   }
   if (foxglove_.watched(kFoxglovePlace)) names.insert("train_pose");
   return names;
+}
+
+// A page in the background asks for the problems alone, and those are looked for once a second.
+bool MonitorService::nobody_looks() const {
+  const auto is_problems = [](const std::string& kind) { return kind == "problems"; };
+  return std::ranges::all_of(live_.watched(), is_problems) && foxglove_.watched().empty() && waiting_.empty();
 }
 
 void MonitorService::choose_topics() {

@@ -59,6 +59,7 @@ class MonitorService {
   void on_report(const Arrived& arrived);
   [[nodiscard]] std::set<std::string> cameras() const;
   [[nodiscard]] std::set<std::string> wanted_topics() const;
+  [[nodiscard]] bool nobody_looks() const;
   void choose_topics();
   void show_channels();
   [[nodiscard]] TrainSeen train_seen();
@@ -87,6 +88,7 @@ class MonitorService {
   [[nodiscard]] Response metrics_answer();
   [[nodiscard]] Response health_answer() const;
   [[nodiscard]] nlohmann::json about(const Request& request) const;
+  [[nodiscard]] std::string exposure() const;
   [[nodiscard]] std::string control_of(const Request& request) const;
   void control(const ClientPtr& client, const ControlAsk& ask);
   void reply(const msg::ControlReply& reply);
@@ -122,6 +124,7 @@ class MonitorService {
   int64_t begun_ns_ = 0;
   int64_t scraped_ns_ = 0;
   uint64_t slow_viewers_ = 0;
+  uint64_t idle_turns_ = 0;
 
   uint64_t next_request_ = 0;
   std::map<uint64_t, ControlWaiting> waiting_;

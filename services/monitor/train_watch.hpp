@@ -35,6 +35,8 @@ class TrainWatch {
   void read(const std::set<std::string>& names);
   /// Handles what has come since the last call.
   void drain();
+  /// Samples that waited too long for drain(), since the last call.
+  uint64_t take_dropped() { return queue_.take_dropped(); }
 
   struct Topic {
     const messaging::TopicInfo* info = nullptr;

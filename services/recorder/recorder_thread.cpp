@@ -2,6 +2,7 @@
 
 #include <fstream>
 #include <iterator>
+#include <utility>
 
 #include "core/time.hpp"
 
@@ -103,11 +104,21 @@ fs::path RecorderThread::folder() const {
   return file.has_parent_path() ? file.parent_path() : fs::path(".");
 }
 
+// With `file` that one first, then others beside it: a second start must not take away what the first one recorded.
+fs::path RecorderThread::next_name() {
+  if (config_.file.empty()) return new_name(config_.folder, about_.at("train_id"), core::wall_ns());
+  const fs::path first(config_.file);
+  if (!std::exchange(file_begun_, true)) return first;
+  fs::path next;
+  for (int i = 2; next.empty() || fs::exists(next) || fs::exists(next.string() + ".active"); ++i) {
+    next = first.parent_path() / (first.stem().string() + "-" + std::to_string(i) + first.extension().string());
+  }
+  return next;
+}
+
 core::Result<std::string> RecorderThread::begin(const fs::path& file) {
   if (recording_) return core::Error{recording_->file().string() + " is being recorded already; stop it first"};
-  const fs::path name = !file.empty()           ? file
-                        : !config_.file.empty() ? fs::path(config_.file)
-                                                : new_name(config_.folder, about_.at("train_id"), core::wall_ns());
+  const fs::path name = file.empty() ? next_name() : file;
   count_dropped();  // not of this file
   auto created = create(name);
   if (!created.ok()) {
@@ -164,7 +175,7 @@ void RecorderThread::record_into(std::unique_ptr<Recording> recording) {
 // The next file is there before the old one is closed: if it cannot be made, the old one goes on, and it is tried
 // again.
 void RecorderThread::split_if_due() {
-  if (!config_.file.empty() && recording_->file() == config_.file) return;
+  if (!config_.file.empty()) return;
   const bool large = config_.split_mb > 0 && static_cast<double>(recording_->bytes()) >= config_.split_mb * kBytesPerMb;
   const double age_s = core::seconds(core::monotonic_ns() - recording_begun_ns_);
   if (!large && (config_.split_min <= 0 || age_s < config_.split_min * 60)) return;

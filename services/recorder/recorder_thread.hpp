@@ -66,6 +66,7 @@ class RecorderThread {
 
  private:
   core::Result<std::string> in_thread(const std::function<core::Result<std::string>()>& work);
+  [[nodiscard]] std::filesystem::path next_name();
   core::Result<std::string> begin(const std::filesystem::path& file);
   core::Result<std::unique_ptr<Recording>> create(const std::filesystem::path& file);
   void record_into(std::unique_ptr<Recording> recording);
@@ -101,6 +102,7 @@ class RecorderThread {
   std::unique_ptr<TopicInlet> inlet_;
   std::unique_ptr<Recording> recording_;
   bool paused_ = false;
+  bool file_begun_ = false;            // the one that is configured
   std::future<core::Status> closing_;  // the file before
   int64_t recording_begun_ns_ = 0;
   int64_t recording_started_ns_ = 0;  // host clock

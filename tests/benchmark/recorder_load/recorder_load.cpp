@@ -1,14 +1,17 @@
 // The recorder program under the full load of a train: 60 pictures a second of 1280x1024 and every topic, over DDS.
 // Prints its processor time, what reached the disk, and what was lost where; compares what was sent with what stands
-// in the files.
+// in the files. With --replay the recording is played again, and how late its samples went out is judged, too.
 //
 //   railfix-measure-recorder [--seconds 30] [--pictures full] [--compression lz4] [--ring-s 10] [--quota-mb 20000]
+//                            [--replay]
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <iostream>
+#include <nlohmann/json.hpp>
 
 #include "core/time.hpp"
 #include "mcap/reader.hpp"
@@ -24,6 +27,8 @@ namespace fs = std::filesystem;
 namespace topics = messaging::topics;
 
 constexpr int64_t kDomain = 89;
+constexpr double kProgressS = 10;
+constexpr double kWantedLateMs = 1;  // 99 % of the replayed samples
 
 struct Options {
   double seconds = 30;
@@ -35,6 +40,7 @@ struct Options {
   double split_mb = 4000;
   fs::path folder;
   bool keep = false;
+  bool replay = false;
 };
 
 struct Usage {
@@ -76,10 +82,14 @@ class Measurement {
         status_reader_(participant_, topics::recorder_status, "", queue_, [this](const msg::RecorderStatus& status) {
           status_ = status;
           most_waiting_mb_ = std::max(most_waiting_mb_, status.queue_mb());
+          if (status.file().size() == 0) return;
+          auto& lost = lost_[status.file().c_str()];
+          lost.assign(status.lost().begin(), status.lost().end());
         }) {}
 
   int run() {
-    if (!test::run_until(participant_, queue_, [&] { return pid_ != 0 && load_.heard() && status_.file().size() > 0; })) {
+    if (!test::run_until(participant_, queue_,
+                         [&] { return pid_ != 0 && load_.heard() && status_.file().size() > 0; })) {
       std::cerr << "the recorder did not start: " << test::slurp(options_.folder / "recorder.log") << '\n';
       return 2;
     }
@@ -90,10 +100,13 @@ class Measurement {
     const Usage after = usage_of(pid_);
     settle();
     print(before, after, took_s);
-    const msg::RecorderStatus last = status_;
     if (recorder_.end(SIGTERM) != 0) std::cerr << "the recorder ended with an error\n";
     const uint64_t missing = options_.quota_mb > 0 ? 0 : compare();
-    return last.lost().empty() && missing == 0 ? 0 : 1;
+    const bool whole = lost_samples() == 0 && missing == 0;
+    std::printf("recorder: %s, %llu samples lost in %.0f s (wanted: 0)\n", whole ? "PASS" : "FAIL",
+                static_cast<unsigned long long>(std::max(lost_samples(), missing)), took_s);
+    const bool prompt = !options_.replay || replay();
+    return whole && prompt ? 0 : 1;
   }
 
  private:
@@ -123,6 +136,12 @@ class Measurement {
     for (double left_s = options_.seconds; left_s > 0; left_s -= 1) {
       load_.send(std::min(left_s, 1.0));
       handle();
+      const double done_s = options_.seconds - left_s + 1;
+      if (std::fmod(done_s, kProgressS) < 1 && left_s > 1) {
+        std::printf("%.0f of %.0f s: %llu lost, %.1f MB wait for the disk\n", done_s, options_.seconds,
+                    static_cast<unsigned long long>(lost_samples()), status_.queue_mb());
+        std::fflush(stdout);
+      }
       const bool half = left_s > options_.seconds / 2 && left_s - 1 <= options_.seconds / 2;
       if (half && options_.ring_s > 0) {
         msg::ControlRequest request;
@@ -154,12 +173,59 @@ class Measurement {
                 100 * (after.cpu_s - before.cpu_s) / took_s, (after.written_mb - before.written_mb) / took_s);
     std::printf("waiting for the disk at most %.1f MB; %u recordings, %.0f MB in the folder\n", most_waiting_mb_,
                 status_.files(), status_.kept_mb());
-    for (const auto& lost : status_.lost()) {
-      std::printf("lost of %s: transport %llu, encoder %llu, queue %llu, disk %llu\n", lost.topic().c_str(),
-                  static_cast<unsigned long long>(lost.transport()), static_cast<unsigned long long>(lost.encoder()),
-                  static_cast<unsigned long long>(lost.queue()), static_cast<unsigned long long>(lost.disk()));
+    for (const auto& [file, topics] : lost_) {
+      for (const auto& lost : topics) {
+        std::printf("lost of %s in %s: transport %llu, encoder %llu, queue %llu, disk %llu\n", lost.topic().c_str(),
+                    fs::path(file).filename().c_str(), static_cast<unsigned long long>(lost.transport()),
+                    static_cast<unsigned long long>(lost.encoder()), static_cast<unsigned long long>(lost.queue()),
+                    static_cast<unsigned long long>(lost.disk()));
+      }
     }
-    if (status_.lost().empty()) std::printf("lost: 0\n");
+  }
+
+  /// In all files: each counts its own.
+  [[nodiscard]] uint64_t lost_samples() const {
+    uint64_t sum = 0;
+    for (const auto& [file, topics] : lost_) {
+      for (const auto& lost : topics) sum += lost.transport() + lost.encoder() + lost.queue() + lost.disk();
+    }
+    return sum;
+  }
+
+  /// Plays the largest file to a reader of its pictures. True when the samples went out in time and all pictures came.
+  bool replay() {
+    fs::path largest;
+    for (const auto& entry : fs::directory_iterator(options_.folder)) {
+      const bool whole = entry.path().extension() == ".mcap";
+      if (whole && (largest.empty() || fs::file_size(entry.path()) > fs::file_size(largest))) largest = entry.path();
+    }
+    messaging::ParticipantOptions other = network();
+    other.train_id += "-replay";
+    messaging::Queue queue;
+    messaging::Participant participant(other);
+    uint64_t pictures = 0;
+    const messaging::Reader<msg::CameraFrame> reader(participant, topics::camera_frame, "cam0", queue,
+                                                     [&](const msg::CameraFrame&) { ++pictures; });
+    const fs::path said = options_.folder / "replay.json";
+    test::Program player({"railfix", "replay", largest.string(), "--train", other.train_id, "--domain",
+                          std::to_string(kDomain), "--without", "service_status", "--json"},
+                         {said, options_.folder / "replay.log", {}});
+    while (!player.exit_code()) queue.run_one(core::monotonic_ns() + core::kNsPerSecond / 100);
+    while (queue.run_one(0)) {
+    }
+    const auto report = nlohmann::json::parse(test::slurp(said), nullptr, false);
+    if (report.is_discarded()) {
+      std::printf("replay: FAIL, %s", test::slurp(options_.folder / "replay.log").c_str());
+      return false;
+    }
+    const double p99_ms = report["late_p99_ms"];
+    std::printf("replay of %s: %llu samples, %llu pictures came; later than due: p50 %.3f, p99 %.3f, at most %.1f ms\n",
+                largest.filename().c_str(), static_cast<unsigned long long>(report["samples"].get<uint64_t>()),
+                static_cast<unsigned long long>(pictures), report["late_p50_ms"].get<double>(), p99_ms,
+                report["late_max_ms"].get<double>());
+    std::printf("replay: %s, p99 %.3f ms (wanted: < %.0f ms)\n", p99_ms < kWantedLateMs ? "PASS" : "FAIL", p99_ms,
+                kWantedLateMs);
+    return p99_ms < kWantedLateMs;
   }
 
   /// Samples that were sent and stand in no file.
@@ -195,6 +261,7 @@ class Measurement {
   uint32_t pid_ = 0;
   msg::RecorderStatus status_;
   double most_waiting_mb_ = 0;
+  std::map<std::string, std::vector<msg::LostSamples>> lost_;  // by file
   messaging::Reader<msg::ServiceStatus> health_;
   messaging::Reader<msg::RecorderStatus> status_reader_;
 };
@@ -214,6 +281,7 @@ int main(int argc, char** argv) {
   app.add_option("--split-mb", options.split_mb);
   app.add_option("--folder", options.folder, "Where to record; removed at the end unless --keep");
   app.add_flag("--keep", options.keep);
+  app.add_flag("--replay", options.replay, "Play the largest file again and judge how late its samples go out");
   CLI11_PARSE(app, argc, argv);
   if (options.folder.empty()) {
     options.folder = std::filesystem::temp_directory_path() / ("railfix-load-" + std::to_string(getpid()));

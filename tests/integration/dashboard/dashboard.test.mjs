@@ -9,6 +9,7 @@ import { browser, build, packages, railfix, Train, until } from "./train.mjs";
 const SERVICES = ["frame_grabber", "fusion", "map_matcher", "monitor", "odometry", "recorder", "sensor_gateway", "tpr_publisher", "track_detector"];
 const DESK = { width: 1440, height: 900 };
 const PHONE = { width: 390, height: 844 };
+const TOKEN = "a word for the test";
 const DRIVE_S = 420; // far longer than the test on a slow machine; it is cut short at the end
 
 let train, chromium, page;
@@ -51,7 +52,7 @@ async function picture(name, which = page) {
 }
 
 before(async () => {
-  train = await Train.start(DRIVE_S);
+  train = await Train.start(DRIVE_S, [`monitor.token=${TOKEN}`]);
   chromium = await browser();
   page = undefined;
   page = await open(DESK, "light");
@@ -139,6 +140,11 @@ describe("the page", { timeout: 600000 }, () => {
     const row = page.locator("#topics tbody tr", { hasText: "train_state" });
     await until("train_state flows", async () => parseFloat(await row.locator("td").first().innerText()) > 1);
     assert.match(await row.innerText(), /\d\sms/);
+    const heads = await page.locator("#topics thead th").allInnerTexts();
+    const cell = async (name) => row.locator("th, td").nth(heads.findIndex((head) => head.startsWith(name))).innerText();
+    assert.match(await cell("Bandwidth"), /^[\d.]+\s[kM]?B\/s$/);
+    assert.match(await cell("Age"), /^[\d.]+\s(ms|s)$/);
+    assert.match(await cell("Gaps"), /^\d+/);
     assert.match(await page.locator("#topics tbody tr", { hasText: "camera_frame" }).innerText(), /not listened to/);
   });
 
@@ -151,10 +157,17 @@ describe("the page", { timeout: 600000 }, () => {
     await page.getByLabel("Service", { exact: true }).selectOption(service);
     assert.ok((await lines.count()) <= all);
     for (const said of await lines.locator("i").allInnerTexts()) assert.equal(said, service);
+    const words = (await lines.locator("span").last().innerText()).slice(0, 12);
+    await page.getByLabel("Text", { exact: true }).fill(words);
+    for (const said of await lines.locator("span").allInnerTexts()) assert.ok(said.toLowerCase().includes(words.toLowerCase()), said);
     await page.getByLabel("Text", { exact: true }).fill("no such words");
     await page.getByText("Nothing matches the filter.").waitFor();
     await page.getByLabel("Text", { exact: true }).fill("");
     await page.getByLabel("Service", { exact: true }).selectOption("");
+    await page.getByLabel("From level", { exact: true }).selectOption("warning");
+    for (const level of await lines.locator("b").allInnerTexts()) assert.match(level, /^(warning|error|critical)$/);
+    await page.getByLabel("From level", { exact: true }).selectOption("info");
+    assert.equal(await lines.count() >= all, true, "everything is there again");
   });
 
   it("controls the recorder and shows what it does", async () => {
@@ -163,6 +176,13 @@ describe("the page", { timeout: 600000 }, () => {
     const press = (name) => page.locator("#recorder").getByRole("button", { name, exact: true }).click();
     const becomes = (word) => page.locator("#recorder .facts .state", { hasText: word }).waitFor();
     await becomes("Recording");
+    const stop = page.locator("#recorder").getByRole("button", { name: "Stop", exact: true });
+    assert.ok(await stop.isDisabled(), "nobody controls anything without the token");
+    await page.getByLabel("Token for control").fill("a guess");
+    await press("Pause");
+    await until("a wrong token is refused", async () => (await text("#recorder .answer")) === "the token is wrong");
+    assert.match(await state.innerText(), /Recording/);
+    await page.getByLabel("Token for control").fill(TOKEN);
     assert.match(await text("#recorder .facts"), /recording\.mcap[\s\S]*\d+ messages[\s\S]*Disk free\s+[\d.]+\s[MGT]B/);
     await press("Pause");
     await becomes("Paused");
@@ -175,6 +195,13 @@ describe("the page", { timeout: 600000 }, () => {
     await press("Protect this file");
     await until("the recorder answers", async () => /recording\.mcap/.test(await text("#recorder .answer")));
     assert.match(await state.innerText(), /Recording/);
+    await press("Stop");
+    await becomes("Stopped");
+    await page.locator(".problem", { hasText: "Nothing is being recorded" }).waitFor();
+    await press("Start");
+    await becomes("Recording");
+    await until("another file is written beside the first", async () => /recording-2\.mcap/.test(await text("#recorder .facts")));
+    await page.locator(".problem", { hasText: "Nothing is being recorded" }).waitFor({ state: "detached" });
     await picture("recorder");
   });
 
@@ -276,6 +303,10 @@ describe("the page", { timeout: 600000 }, () => {
       await panel.getByRole("button", { name: "Step" }).click();
       return Number(await bar.inputValue()) > at;
     });
+    await panel.getByLabel("Again at the end").click();
+    await until("it will not begin again", async () => /loop off/.test(await text("#player .answer")));
+    await panel.getByLabel("Again at the end").click();
+    await until("it will", async () => /loop on/.test(await text("#player .answer")));
     await panel.getByLabel("Rate").selectOption("2");
     await panel.getByRole("button", { name: "Play", exact: true }).click();
     await until("it plays twice as fast", async () => /Playing/.test(await text("#player .aside")) && (await panel.getByLabel("Rate").inputValue()) === "2");

@@ -44,8 +44,9 @@ export function simulate(folder, seconds) {
 }
 
 export class Train {
-  static async start(seconds) {
+  static async start(seconds, settings = []) {
     const train = new Train();
+    train.settings = settings;
     train.folder = mkdtempSync(join(tmpdir(), "railfix-dashboard-"));
     try {
       simulate(train.path("line"), seconds);
@@ -62,7 +63,7 @@ export class Train {
 
   async run() {
     this.process = spawn(program("railfix"), ["run", "--dataset", this.path("line"), "--start", "1:250:+", "--pace", "real", "--out", this.path("out"),
-      "--set", `monitor.port=${this.port}`]);
+      ...[`monitor.port=${this.port}`, ...this.settings].flatMap((one) => ["--set", one])]);
     let said = "";
     for (const stream of [this.process.stdout, this.process.stderr]) stream.on("data", (data) => (said += data));
     this.ended = new Promise((done) => this.process.on("exit", done));
@@ -85,7 +86,7 @@ export class Train {
   signal = (service, signal) => process.kill(this.pid(service), signal);
 
   start_monitor(...settings) {
-    const set = [`monitor.port=${this.port}`, ...settings].flatMap((one) => ["--set", one]);
+    const set = settings.flatMap((one) => ["--set", one]);
     this.monitor = spawn(program("railfix-monitor"), ["--config", this.path("out/run.yaml"), ...set], { stdio: "ignore" });
   }
 

@@ -29,6 +29,12 @@ const actions = {
     process.exit(0);
   },
 
+  // Whether the monitor is there under another address.
+  async reach() {
+    console.log(await fetch(`http://${argument}:${port}/healthz`).then(() => "reached", () => "not reached"));
+    process.exit(0);
+  },
+
   // Everything that the page watches, and a command to the recorder.
   live() {
     const wanted = ["hello", "state", "services", "topics", "log", "view", "picture", "report", "reply"];

@@ -190,7 +190,7 @@ class MonitorLiveTest : public ::testing::Test {
     name_ = "monitor-test-" + std::to_string(getpid()) + "-" + std::to_string(number++);
     train_ = std::make_unique<Train>(name_);
   }
-  void start(std::vector<std::string> settings = {}) {
+  void start(std::vector<std::string> settings = {}, const std::string& host = "127.0.0.1") {
     for (const char* setting : {"monitor.port=0", "monitor.foxglove_port=0", "monitor.expected=[]", "common.domain=79",
                                 "monitor.picture_hz=30"}) {
       settings.emplace_back(setting);
@@ -199,8 +199,9 @@ class MonitorLiveTest : public ::testing::Test {
     monitor_.emplace(test::with_settings("railfix-monitor", settings),
                      test::Program::Options{kWork / "monitor.log", {}, {}});
     const std::string address = train_->address();
-    ASSERT_TRUE(address.starts_with("http://127.0.0.1:")) << address << test::slurp(kWork / "monitor.log");
-    port_ = address.substr(17, address.size() - 18);
+    const std::string before = "http://" + host + ":";
+    ASSERT_TRUE(address.starts_with(before)) << address << test::slurp(kWork / "monitor.log");
+    port_ = address.substr(before.size(), address.size() - before.size() - 1);
   }
   /// Runs the client while the train lives on; gives what it said.
   std::string client(const std::string& action, const std::string& argument = "") {
@@ -246,6 +247,20 @@ TEST_F(MonitorLiveTest, LetsInWhoMayAndSaysNoToOthers) {
   EXPECT_THAT(client("get", "/api/map"), ::testing::StartsWith("404\nno map is in use"));
 }
 
+TEST_F(MonitorLiveTest, ListensOnlyWhereItIsTold) {
+  start({"monitor.address=127.0.0.2"}, "127.0.0.2");
+  EXPECT_EQ(client("reach", "127.0.0.2"), "reached");
+  EXPECT_EQ(client("reach", "127.0.0.1"), "not reached");
+  EXPECT_THAT(test::slurp(kWork / "monitor.log"), ::testing::Not(HasSubstr("everybody")));
+}
+
+TEST_F(MonitorLiveTest, SaysWhatItMeansToListenForOthers) {
+  start({"monitor.address=0.0.0.0", "monitor.token=secret"}, "localhost");
+  EXPECT_THAT(test::slurp(kWork / "monitor.log"),
+              ::testing::AllOf(HasSubstr("everybody who reaches 0.0.0.0 sees the page"),
+                               HasSubstr("control asks for the token, which travels as it is")));
+}
+
 TEST_F(MonitorLiveTest, SpeaksBothSubprotocolsOfFoxglove) {
   start();
   EXPECT_EQ(client("foxglove", "foxglove.websocket.v1"), "ok");
@@ -289,6 +304,9 @@ TEST_F(MonitorLiveTest, MetricsAlertsAndSettingsPassPromtool) {
     return said.find("railfix_topic_samples_total{topic=\"track_view\"}") != std::string::npos;
   })) << "who reads /metrics looks";
   ASSERT_THAT(said, ::testing::StartsWith("200\n"));
+  EXPECT_THAT(said, HasSubstr("railfix_topic_dropped_total{topic=\"train_state\"} 0\n"));
+  EXPECT_THAT(said, HasSubstr("railfix_topic_rejected_total{topic=\"train_state\"} 0\n"));
+  EXPECT_THAT(said, HasSubstr("railfix_topic_deadlines_missed_total{topic=\"train_state\"}"));
   std::ofstream(kWork / "metrics.txt") << said.substr(4);
   check("check metrics < '" + (kWork / "metrics.txt").string() + "'");
 }

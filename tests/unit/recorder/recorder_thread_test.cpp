@@ -182,6 +182,18 @@ TEST_F(RecorderThreadTest, FullDiskEndsTheRecordingProperly) {
   EXPECT_TRUE(mcap::Reader::open(folder_ / "full.mcap").value()->indexed());
 }
 
+TEST_F(RecorderThreadTest, ASecondStartKeepsWhatTheFirstRecorded) {
+  config_.file = (folder_ / "run.mcap").string();
+  auto recorder = this->recorder();
+  for (const char* name : {"run.mcap", "run-2.mcap", "run-3.mcap"}) {
+    const auto started = recorder->start("");
+    ASSERT_TRUE(started.ok()) << started.error().message;
+    EXPECT_EQ(started.value(), folder_ / name);
+    ASSERT_TRUE(recorder->stop().ok());
+  }
+  EXPECT_TRUE(fs::exists(folder_ / "run.mcap"));
+}
+
 TEST_F(RecorderThreadTest, DestructionClosesTheFile) {
   (void)recorder()->start((folder_ / "gone.mcap").string());
   EXPECT_TRUE(mcap::Reader::open(folder_ / "gone.mcap").value()->indexed());
