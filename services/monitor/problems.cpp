@@ -16,6 +16,8 @@ constexpr double kStartS = 10;
 constexpr double kSilentS = 2;
 constexpr double kSilentGaps = 8;
 constexpr double kSharedMemoryLowMb = 64;
+// So the recorder begins its reason while it loses samples.
+constexpr std::string_view kRecorderLoses = "samples are lost";
 
 /// Topics that come all the time while data flows, and whose writer says nothing when they do not.
 const std::set<std::string>& flowing_topics() {
@@ -48,6 +50,8 @@ void judge_services(const TrainSeen& train, Problems& problems) {
     } else if (seen.status.state() == msg::STATE_FAILED) {
       problems.push_back({"failed " + id, Level::error, on_host + " has failed: " + reason,
                           "Mend what it says, then start it again."});
+    } else if (name == "recorder" && reason.starts_with(kRecorderLoses) && train.recorder) {
+      continue;  // judge_recorder() says it
     } else if (seen.status.state() == msg::STATE_DEGRADED) {
       problems.push_back(
           {"degraded " + id, Level::warning, on_host + " works with less: " + reason, "See to what it says."});

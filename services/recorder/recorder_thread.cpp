@@ -309,7 +309,7 @@ void RecorderThread::use(const Arrival& arrival) {
 }
 
 void RecorderThread::record(const Arrival& arrival) {
-  recording_->note_sequence(std::string(arrival.topic), arrival.writer, arrival.sequence);
+  if (arrival.live) recording_->note_sequence(std::string(arrival.topic), arrival.writer, arrival.sequence);
   if (!arrival.recorded) return;
   ++received_;
   const auto status = recording_->write(*arrival.recorded);

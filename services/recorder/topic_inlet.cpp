@@ -147,11 +147,12 @@ void TopicInlet::listen(const messaging::TopicInfo& topic, const std::string& in
   if (topic.name == "camera_frame") return listen_camera(listening, topic, name, instance);
   messaging::TopicInfo info = topic;
   info.reader_queue = static_cast<size_t>(config_.sample_queue);
-  const auto handler = [this, channel = channel_of(topic, *topic.type, name), type = topic.type](
+  const auto handler = [this, channel = channel_of(topic, *topic.type, name), type = topic.type, since_ns = core::wall_ns()](
                            const Sample& sample, const messaging::SampleInfo& sample_info) {
     if (!sample_info.valid) return;
     const auto one = stored(channel, sample_info, type->serialize(sample.get()));
-    use_({channel->topic, sample_info.writer, sample_info.sequence, one, one, std::nullopt});
+    const bool live = sample_info.source_ns >= since_ns;
+    use_({channel->topic, sample_info.writer, sample_info.sequence, one, one, std::nullopt, live});
   };
   listening.reader = std::make_unique<messaging::AnyReader>(participant_, info, instance, queue_, handler);
 }
@@ -209,7 +210,7 @@ void TopicInlet::encode(const std::string& name, Listening& listening, const msg
   waiting_bytes_ += bytes;
   const std::shared_ptr<void> waits(nullptr, [this, bytes](void*) { waiting_bytes_ -= bytes; });
   queue_.push(&listening.encoded, [this, name, info, stamp_ns = frame.stamp_ns(), recorded, ringed, waits] {
-    use_({name, info.writer, info.sequence, recorded, ringed, stamp_ns});
+    use_({name, info.writer, info.sequence, recorded, ringed, stamp_ns, true});
   });
 }
 

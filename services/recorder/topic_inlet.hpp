@@ -22,6 +22,7 @@ struct Arrival {
   SamplePtr recorded;                       // null: not wanted in the recording
   SamplePtr ringed;                         // null: not wanted in the ring
   std::optional<int64_t> picture_stamp_ns;  // of pictures
+  bool live = true;  // false: a standing value from before we listened; what comes next need not follow it
 };
 
 class TopicInlet {

@@ -109,6 +109,9 @@ TEST_F(ProblemsTest, TellsOfRecorderSatellitesAndSharedMemory) {
   lost.queue(12);
   train_.recorder->lost({lost});
   EXPECT_THAT(only().what, HasSubstr("12 samples of track_view"));
+  board_.note(status("recorder", msg::STATE_DEGRADED, "samples are lost: track_view: 12 queue"), kNow_ns);
+  EXPECT_THAT(only().what, HasSubstr("12 samples of track_view")) << "one cause, one sentence";
+  board_.note(status("recorder", msg::STATE_ACTIVE), kNow_ns);
   train_.recorder->lost({});
   train_.recorder->disk_free_mb(300);
   EXPECT_THAT(only().what, HasSubstr("300 MB"));

@@ -172,6 +172,23 @@ TEST_F(RecorderThreadTest, GoesOnInTheOldFileWhenANewOneCannotBeBegunAndTriesAga
   EXPECT_EQ(messages, sent);
 }
 
+TEST_F(RecorderThreadTest, WhatWasSaidBeforeItListenedIsNotLost) {
+  messaging::Writer<msg::ServiceStatus> status(participant_, topics::service_status);
+  const auto say = [&](const std::string& service) {
+    msg::ServiceStatus sample;
+    sample.service(service);
+    ASSERT_TRUE(status.write(sample));
+  };
+  say("fusion");
+  for (int i = 0; i < 20; ++i) say("odometry");
+  auto recorder = this->recorder();
+  ASSERT_TRUE(recorder->start((folder_ / "late.mcap").string()).ok());
+  ASSERT_TRUE(wait_until([&] { return recorder->state().written == 2; })) << "the last word of each";
+  for (int i = 0; i < 3; ++i) say("odometry");
+  ASSERT_TRUE(wait_until([&] { return recorder->state().written == 5; }));
+  EXPECT_EQ(recorder->state().losses, "");
+}
+
 TEST_F(RecorderThreadTest, FullDiskEndsTheRecordingProperly) {
   config_.keep_free_mb = 1e12;
   auto recorder = this->recorder();
