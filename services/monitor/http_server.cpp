@@ -4,6 +4,7 @@
 #include <future>
 #include <optional>
 #include <thread>
+#include <type_traits>
 
 #include "core/result.hpp"
 #include "monitor/web_socket.hpp"
@@ -15,6 +16,7 @@ namespace asio = boost::asio;
 namespace beast = boost::beast;
 namespace http = beast::http;
 using asio::ip::tcp;
+using HttpRequest = http::request<http::string_body>;
 
 constexpr std::chrono::seconds kRequestTime{30};
 constexpr std::chrono::seconds kAnswerTime{10};
@@ -34,7 +36,7 @@ std::string text_of(beast::string_view text) {
 }
 
 // Words between commas, over all headers of this name.
-std::vector<std::string> words_of(const WebSocket::HttpRequest& from, http::field name) {
+std::vector<std::string> words_of(const HttpRequest& from, http::field name) {
   std::vector<std::string> words;
   const auto [begin, end] = from.equal_range(name);
   for (auto header = begin; header != end; ++header) {
@@ -51,7 +53,7 @@ std::vector<std::string> words_of(const WebSocket::HttpRequest& from, http::fiel
   return words;
 }
 
-Request request_of(const WebSocket::HttpRequest& from, const tcp::endpoint& peer) {
+Request request_of(const HttpRequest& from, const tcp::endpoint& peer) {
   Request request;
   request.method = text_of(from.method_string());
   const std::string target = text_of(from.target());
@@ -90,17 +92,30 @@ http::response<http::string_body> message_of(const Response& response, bool head
   return message;
 }
 
-/// One TCP connection until it ends or becomes a WebSocket.
-class HttpSession final : public Session, public std::enable_shared_from_this<HttpSession> {
+/// One connection until it ends or becomes a WebSocket. `Stream` is PlainStream or TlsStream.
+template <class Stream>
+class HttpSession final : public Session, public std::enable_shared_from_this<HttpSession<Stream>> {
  public:
-  HttpSession(std::shared_ptr<Shared> shared, tcp::socket&& socket)
-      : shared_(std::move(shared)), stream_(std::move(socket)) {}
+  HttpSession(std::shared_ptr<Shared> shared, Stream&& stream)
+      : shared_(std::move(shared)), stream_(std::move(stream)) {}
+
+  void begin() {
+    if constexpr (std::is_same_v<Stream, PlainStream>) {
+      read();
+    } else {
+      tcp().expires_after(kRequestTime);
+      stream_.async_handshake(asio::ssl::stream_base::server, [self = shared_from_this()](beast::error_code error) {
+        if (error) return self->stop();
+        self->read();
+      });
+    }
+  }
 
   void read() {
     parser_.emplace();
     parser_->header_limit(kLongestHeader);
     parser_->body_limit(kLongestBody);
-    stream_.expires_after(kRequestTime);
+    tcp().expires_after(kRequestTime);
     http::async_read(stream_, buffer_, *parser_, [self = shared_from_this()](beast::error_code error, size_t) {
       if (error) return self->stop();
       self->handle();
@@ -108,13 +123,16 @@ class HttpSession final : public Session, public std::enable_shared_from_this<Ht
   }
   void stop() override {
     beast::error_code ignored;
-    stream_.socket().close(ignored);
+    tcp().socket().close(ignored);
   }
 
  private:
+  using std::enable_shared_from_this<HttpSession>::shared_from_this;
+  PlainStream& tcp() { return beast::get_lowest_layer(stream_); }
+
   void handle() {
     beast::error_code failed;
-    const auto peer = stream_.socket().remote_endpoint(failed);
+    const auto peer = tcp().socket().remote_endpoint(failed);
     if (failed) return stop();
     const auto& message = parser_->get();
     request_ = request_of(message, peer);
@@ -122,7 +140,7 @@ class HttpSession final : public Session, public std::enable_shared_from_this<Ht
     const bool keep_alive = message.keep_alive();
     const uint64_t number = ++requests_;
     // An answer that never comes is one too.
-    stream_.expires_never();
+    tcp().expires_never();
     patience_.expires_after(kAnswerTime);
     patience_.async_wait([self = shared_from_this(), number, keep_alive](beast::error_code error) {
       if (!error)
@@ -141,7 +159,7 @@ class HttpSession final : public Session, public std::enable_shared_from_this<Ht
     answered_ = number;
     patience_.cancel();
     response_ = message_of(response, request_.method == "HEAD", keep_alive);
-    stream_.expires_after(kRequestTime);
+    tcp().expires_after(kRequestTime);
     http::async_write(stream_, response_, [self = shared_from_this()](beast::error_code error, size_t) {
       if (error || self->response_.need_eof()) return self->stop();
       self->read();
@@ -158,13 +176,14 @@ class HttpSession final : public Session, public std::enable_shared_from_this<Ht
       ++requests_;
       return answer(requests_, false, decision.refusal);
     }
-    const auto socket = std::make_shared<WebSocket>(shared_, std::move(stream_), request_, decision.subprotocol);
+    const auto socket =
+        std::make_shared<WebSocket<Stream>>(shared_, std::move(stream_), request_, decision.subprotocol);
     shared_->sessions.emplace_back(socket);
     socket->accept(parser_->get());
   }
 
   std::shared_ptr<Shared> shared_;  // goes last
-  beast::tcp_stream stream_;
+  Stream stream_;
   asio::steady_timer patience_{shared_->io};
   beast::flat_buffer buffer_;
   std::optional<http::request_parser<http::string_body>> parser_;
@@ -187,12 +206,21 @@ struct HttpServer::Impl {
       if (error == asio::error::operation_aborted || !acceptor->is_open()) return;
       if (!error) {
         std::erase_if(shared->sessions, [](const auto& session) { return session.expired(); });
-        const auto session = std::make_shared<HttpSession>(shared, std::move(socket));
-        shared->sessions.emplace_back(session);
-        session->read();
+        if (shared->tls) {
+          open<TlsStream>(TlsStream(PlainStream(std::move(socket)), *shared->tls));
+        } else {
+          open<PlainStream>(PlainStream(std::move(socket)));
+        }
       }
       accept(acceptor);
     });
+  }
+
+  template <class Stream>
+  void open(Stream&& stream) {
+    const auto session = std::make_shared<HttpSession<Stream>>(shared, std::move(stream));
+    shared->sessions.emplace_back(session);
+    session->begin();
   }
 
   void stop() {
@@ -206,6 +234,24 @@ struct HttpServer::Impl {
 HttpServer::HttpServer(const HttpOptions& options, Handlers handlers) : impl_(std::make_unique<Impl>()) {
   impl_->shared->options = options;
   impl_->shared->handlers = std::move(handlers);
+  if (options.certificate.empty() && options.key.empty()) return;
+  if (options.certificate.empty() || options.key.empty()) {
+    throw core::BadInput("monitor.tls_certificate and monitor.tls_key belong together; give both or none");
+  }
+  auto& tls = impl_->shared->tls.emplace(asio::ssl::context::tls_server);
+  tls.set_options(asio::ssl::context::default_workarounds | asio::ssl::context::no_tlsv1 |
+                  asio::ssl::context::no_tlsv1_1);
+  beast::error_code error;
+  tls.use_certificate_chain_file(options.certificate, error);
+  if (error) {
+    throw core::BadInput("monitor.tls_certificate " + options.certificate +
+                         " is no certificate in PEM: " + error.message());
+  }
+  tls.use_private_key_file(options.key, asio::ssl::context::pem, error);
+  if (error) {
+    throw core::BadInput("monitor.tls_key " + options.key +
+                         " is no key in PEM that fits the certificate: " + error.message());
+  }
 }
 
 HttpServer::~HttpServer() {

@@ -1,4 +1,5 @@
-// HTTP/1.1 and WebSocket (RFC 9112, RFC 6455) on one or more ports, in a thread of its own. Knows no topic and no page.
+// HTTP/1.1 and WebSocket (RFC 9112, RFC 6455) on one or more ports, in a thread of its own, plain or with TLS. Knows no
+// topic and no page.
 #pragma once
 
 #include <memory>
@@ -13,10 +14,13 @@ struct HttpOptions {
   size_t client_queue_bytes = 4'000'000;
   double slow_client_s = 10;
   size_t most_clients = 64;
+  std::string certificate;  // PEM files for TLS 1.2 and above; both or none
+  std::string key;
 };
 
 class HttpServer {
  public:
+  /// Throws BadInput when certificate and key cannot be used.
   HttpServer(const HttpOptions& options, Handlers handlers);
   ~HttpServer();
   HttpServer(const HttpServer&) = delete;

@@ -118,11 +118,15 @@ FoxgloveApi::Actions MonitorService::foxglove_actions() {
 // What the operator should know who opens the page to others; empty = nobody but this computer.
 std::string MonitorService::exposure() const {
   if (names_this_computer(config_.address)) return "";
-  const std::string sees =
-      "everybody who reaches " + config_.address + " sees the page, its pictures and /metrics, without encryption; ";
+  const bool tls = !config_.tls_key.empty();
+  const std::string sees = "everybody who reaches " + config_.address + " sees the page, its pictures and /metrics" +
+                           (tls ? "; " : ", without encryption; ");
   if (!config_.control) return sees + "nobody can control anything";
   if (config_.token.empty()) return sees + "control only from this computer, because monitor.token is empty";
-  return sees + "control asks for the token, which travels as it is: use a network that only the train is on, or TLS";
+  if (tls) return sees + "control asks for the token";
+  return sees +
+         "control asks for the token, which travels as it is: use a network that only the train is on, or "
+         "monitor.tls_certificate";
 }
 
 std::string MonitorService::control_of(const Request& request) const {

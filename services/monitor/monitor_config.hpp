@@ -14,6 +14,8 @@ struct MonitorConfig {
   std::string map;
   bool control = true;
   std::string token;
+  std::string tls_certificate;
+  std::string tls_key;
   double picture_hz = 5;
   double client_queue_mb = 4;
   double slow_client_s = 10;
@@ -36,6 +38,10 @@ struct MonitorConfig {
     fields.text("map", map, "Map file in use (from `railfix map build`); empty = no line is drawn.");
     fields.flag("control", control, "Whether recorder and player can be controlled from the page.");
     fields.text("token", token, "Word that control asks for; empty = control only from this computer itself.");
+    fields.text("tls_certificate", tls_certificate,
+                "PEM file with this computer's certificate and those above it: everything is served with TLS; empty = "
+                "without.");
+    fields.text("tls_key", tls_key, "PEM file with the certificate's key.");
     fields.number("picture_hz", picture_hz, {0.1, 30}, "1/s", "Most pictures that a viewer gets in a second.");
     fields.number("client_queue_mb", client_queue_mb, {0.1, 1000}, "MB",
                   "What may wait for one viewer's network; one with more is disconnected.");

@@ -48,7 +48,7 @@ MonitorService::MonitorService(const Config& config, service::Context& context)
       next_request_((std::random_device()() & 0xFFFFFFFULL) << 24U),
       watch_(context.participant(), [this](const Arrived& arrived) { this->arrived(arrived); }),
       server_({config.address, static_cast<size_t>(config.client_queue_mb * 1e6), config.slow_client_s,
-               static_cast<size_t>(config.most_clients)},
+               static_cast<size_t>(config.most_clients), config.tls_certificate, config.tls_key},
               handlers()),
       cab_(config.picture_hz),
       live_(live_actions()),
@@ -61,8 +61,8 @@ MonitorService::MonitorService(const Config& config, service::Context& context)
     context_.log().info("Foxglove and Lichtblick connect to port {} or {}", foxglove_port_, port_);
   }
   const std::string host = config.address == "0.0.0.0" || config.address == "::" ? "localhost" : config.address;
-  address_ =
-      "http://" + (host.find(':') == std::string::npos ? host : "[" + host + "]") + ":" + std::to_string(port_) + "/";
+  address_ = (config.tls_key.empty() ? "http://" : "https://") +
+             (host.find(':') == std::string::npos ? host : "[" + host + "]") + ":" + std::to_string(port_) + "/";
   if (config.port != 0 && port_ != config.port) {
     context_.log().warn("port {} is taken by another program; the page is at {}", config.port, address_);
   } else {

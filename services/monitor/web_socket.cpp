@@ -21,8 +21,8 @@ constexpr size_t kLongestReason = 120;  // of a close frame: 123 bytes
 
 }  // namespace
 
-WebSocket::WebSocket(std::shared_ptr<Shared> shared, beast::tcp_stream&& stream, Request request,
-                     std::string subprotocol)
+template <class Stream>
+WebSocket<Stream>::WebSocket(std::shared_ptr<Shared> shared, Stream&& stream, Request request, std::string subprotocol)
     : shared_(std::move(shared)),
       stream_(std::move(stream)),
       watch_(shared_->io),
@@ -32,11 +32,13 @@ WebSocket::WebSocket(std::shared_ptr<Shared> shared, beast::tcp_stream&& stream,
   ++shared_->clients;
 }
 
-WebSocket::~WebSocket() {
+template <class Stream>
+WebSocket<Stream>::~WebSocket() {
   --shared_->clients;
 }
 
-void WebSocket::accept(const HttpRequest& upgrade) {
+template <class Stream>
+void WebSocket<Stream>::accept(const HttpRequest& upgrade) {
   beast::get_lowest_layer(stream_).expires_never();
   beast::error_code ignored;
   beast::get_lowest_layer(stream_).socket().set_option(asio::socket_base::send_buffer_size(kSendBufferBytes), ignored);
@@ -55,7 +57,8 @@ void WebSocket::accept(const HttpRequest& upgrade) {
   });
 }
 
-void WebSocket::read() {
+template <class Stream>
+void WebSocket<Stream>::read() {
   if (ended_) return;
   stream_.async_read(buffer_, [self = shared_from_this()](beast::error_code error, size_t) {
     if (error) return self->end("");
@@ -65,16 +68,19 @@ void WebSocket::read() {
   });
 }
 
-void WebSocket::resume() {
+template <class Stream>
+void WebSocket<Stream>::resume() {
   asio::post(shared_->io, [self = shared_from_this()] { self->read(); });
 }
 
-void WebSocket::send(Frame frame) {
+template <class Stream>
+void WebSocket<Stream>::send(Frame frame) {
   asio::post(shared_->io,
              [self = shared_from_this(), frame = std::move(frame)]() mutable { self->queue(std::move(frame)); });
 }
 
-void WebSocket::queue(Frame frame) {
+template <class Stream>
+void WebSocket<Stream>::queue(Frame frame) {
   if (!open_ || ended_) return;
   const auto same = frame.slot.empty() ? waiting_.end()
                                        : std::find_if(waiting_.begin(), waiting_.end(),
@@ -90,7 +96,8 @@ void WebSocket::queue(Frame frame) {
 }
 
 // Leaves out the oldest of what may be left out.
-bool WebSocket::make_room() {
+template <class Stream>
+bool WebSocket<Stream>::make_room() {
   for (auto frame = waiting_.begin();
        frame != waiting_.end() && waiting_bytes_ > shared_->options.client_queue_bytes;) {
     if (!frame->droppable) {
@@ -104,7 +111,8 @@ bool WebSocket::make_room() {
   return waiting_bytes_ <= shared_->options.client_queue_bytes;
 }
 
-void WebSocket::write() {
+template <class Stream>
+void WebSocket<Stream>::write() {
   if (waiting_.empty() || ended_) return;
   sending_ = std::move(waiting_.front());
   waiting_.pop_front();
@@ -120,7 +128,8 @@ void WebSocket::write() {
 }
 
 // Once a second: who takes nothing is let go; who got less than all is told.
-void WebSocket::watch() {
+template <class Stream>
+void WebSocket<Stream>::watch() {
   watch_.expires_after(kWatchPeriod);
   watch_.async_wait([self = shared_from_this()](beast::error_code error) {
     if (error || self->ended_) return;
@@ -137,11 +146,13 @@ void WebSocket::watch() {
   });
 }
 
-void WebSocket::close(const std::string& why) {
+template <class Stream>
+void WebSocket<Stream>::close(const std::string& why) {
   asio::post(shared_->io, [self = shared_from_this(), why] { self->say_goodbye(why); });
 }
 
-void WebSocket::say_goodbye(const std::string& why) {
+template <class Stream>
+void WebSocket<Stream>::say_goodbye(const std::string& why) {
   if (ended_) return;
   waiting_.clear();
   waiting_bytes_ = 0;
@@ -152,7 +163,8 @@ void WebSocket::say_goodbye(const std::string& why) {
   stream_.async_close(reason, [self = shared_from_this(), why](beast::error_code) { self->end(why); });
 }
 
-void WebSocket::end(const std::string& why) {
+template <class Stream>
+void WebSocket<Stream>::end(const std::string& why) {
   if (ended_) return;
   ended_ = true;
   waiting_.clear();
@@ -161,5 +173,8 @@ void WebSocket::end(const std::string& why) {
   beast::get_lowest_layer(stream_).socket().close(ignored);
   if (told_) shared_->handlers.closed(shared_from_this(), why.empty() ? why_ : why);
 }
+
+template class WebSocket<PlainStream>;
+template class WebSocket<TlsStream>;
 
 }  // namespace railfix::monitor

@@ -3,15 +3,22 @@
 
 #include <atomic>
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/ssl/context.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
+#include <boost/beast/ssl.hpp>
 #include <boost/beast/websocket.hpp>
+#include <boost/beast/websocket/ssl.hpp>
 #include <deque>
+#include <optional>
 
 #include "monitor/http_server.hpp"
 
 namespace railfix::monitor {
+
+using PlainStream = boost::beast::tcp_stream;
+using TlsStream = boost::beast::ssl_stream<PlainStream>;
 
 /// One connection of the server, HTTP or WebSocket.
 class Session {
@@ -24,17 +31,19 @@ class Session {
 struct Shared {
   HttpOptions options;
   Handlers handlers;
+  std::optional<boost::asio::ssl::context> tls;  // none = plain
   boost::asio::io_context io{1};
   std::atomic<size_t> clients = 0;
   uint64_t next_id = 1;
   std::vector<std::weak_ptr<Session>> sessions;
 };
 
-class WebSocket final : public Client, public Session, public std::enable_shared_from_this<WebSocket> {
+/// `Stream` is PlainStream or TlsStream.
+template <class Stream>
+class WebSocket final : public Client, public Session, public std::enable_shared_from_this<WebSocket<Stream>> {
  public:
   using HttpRequest = boost::beast::http::request<boost::beast::http::string_body>;
-  WebSocket(std::shared_ptr<Shared> shared, boost::beast::tcp_stream&& stream, Request request,
-            std::string subprotocol);
+  WebSocket(std::shared_ptr<Shared> shared, Stream&& stream, Request request, std::string subprotocol);
   ~WebSocket() override;
 
   void accept(const HttpRequest& upgrade);
@@ -46,6 +55,7 @@ class WebSocket final : public Client, public Session, public std::enable_shared
   void stop() override { say_goodbye("the monitor stops"); }
 
  private:
+  using std::enable_shared_from_this<WebSocket>::shared_from_this;
   void read();
   void queue(Frame frame);
   bool make_room();
@@ -55,7 +65,7 @@ class WebSocket final : public Client, public Session, public std::enable_shared
   void say_goodbye(const std::string& why);
 
   std::shared_ptr<Shared> shared_;  // goes last
-  boost::beast::websocket::stream<boost::beast::tcp_stream> stream_;
+  boost::beast::websocket::stream<Stream> stream_;
   boost::beast::flat_buffer buffer_;
   boost::asio::steady_timer watch_;
   uint64_t id_;

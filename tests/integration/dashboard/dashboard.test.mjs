@@ -266,7 +266,9 @@ describe("the page", { timeout: 600000 }, () => {
     await show("services");
     await page.locator("#services tr", { hasText: "tpr_publisher" }).locator(".state.bad").first().waitFor();
     await page.evaluate(() => scrollTo(0, 0));
-    await picture("service-frozen");
+    await page.emulateMedia({ colorScheme: "dark" });
+    await picture("service-frozen-dark");
+    await page.emulateMedia({ colorScheme: "light" });
     train.signal("tpr_publisher", "SIGCONT");
     await problem.waitFor({ state: "detached" });
   });

@@ -1,5 +1,7 @@
 // Looks at a monitor as a browser or Foxglove does. Says "ok" and ends with 0 once everything has come, else with 1.
 //   node client.mjs ACTION PORT [ARGUMENT]
+import { readFileSync } from "node:fs";
+import https from "node:https";
 import WebSocket from "ws";
 import foxglove from "@foxglove/ws-protocol";
 
@@ -33,6 +35,18 @@ const actions = {
   async reach() {
     console.log(await fetch(`http://${argument}:${port}/healthz`).then(() => "reached", () => "not reached"));
     process.exit(0);
+  },
+
+  // The page, its WebSocket and Foxglove's with TLS; the argument is the certificate to trust.
+  async tls() {
+    const wanted = ["page", "live", "foxglove"];
+    const ca = readFileSync(argument);
+    https.get(`https://127.0.0.1:${port}/healthz`, { ca }, (answer) => answer.statusCode > 0 && note("page", wanted)).on("error", (error) => fail(error.message));
+    for (const [name, path, protocols] of [["live", "/api/live", []], ["foxglove", "/", ["foxglove.sdk.v1"]]]) {
+      const socket = new WebSocket(`wss://127.0.0.1:${port}${path}`, protocols, { ca });
+      socket.on("message", () => note(name, wanted));
+      socket.on("error", (error) => fail(error.message));
+    }
   },
 
   // Everything that the page watches, and a command to the recorder.

@@ -190,7 +190,8 @@ class MonitorLiveTest : public ::testing::Test {
     name_ = "monitor-test-" + std::to_string(getpid()) + "-" + std::to_string(number++);
     train_ = std::make_unique<Train>(name_);
   }
-  void start(std::vector<std::string> settings = {}, const std::string& host = "127.0.0.1") {
+  void start(std::vector<std::string> settings = {}, const std::string& host = "127.0.0.1",
+             const std::string& scheme = "http") {
     for (const char* setting : {"monitor.port=0", "monitor.foxglove_port=0", "monitor.expected=[]", "common.domain=79",
                                 "monitor.picture_hz=30"}) {
       settings.emplace_back(setting);
@@ -199,7 +200,7 @@ class MonitorLiveTest : public ::testing::Test {
     monitor_.emplace(test::with_settings("railfix-monitor", settings),
                      test::Program::Options{kWork / "monitor.log", {}, {}});
     const std::string address = train_->address();
-    const std::string before = "http://" + host + ":";
+    const std::string before = scheme + "://" + host + ":";
     ASSERT_TRUE(address.starts_with(before)) << address << test::slurp(kWork / "monitor.log");
     port_ = address.substr(before.size(), address.size() - before.size() - 1);
   }
@@ -259,6 +260,26 @@ TEST_F(MonitorLiveTest, SaysWhatItMeansToListenForOthers) {
   EXPECT_THAT(test::slurp(kWork / "monitor.log"),
               ::testing::AllOf(HasSubstr("everybody who reaches 0.0.0.0 sees the page"),
                                HasSubstr("control asks for the token, which travels as it is")));
+}
+
+TEST_F(MonitorLiveTest, SpeaksTlsWithTheCertificateThatItIsGiven) {
+  const std::string certificate = (kWork / "certificate.pem").string();
+  const std::string key = (kWork / "key.pem").string();
+  ASSERT_EQ(std::system(("openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -days 1 -subj "
+                         "/CN=monitor -addext subjectAltName=IP:127.0.0.1 -keyout '" +
+                         key + "' -out '" + certificate + "' 2> '" + (kWork / "openssl.log").string() + "'")
+                            .c_str()),
+            0);
+  start({"monitor.tls_certificate=" + certificate, "monitor.tls_key=" + key}, "127.0.0.1", "https");
+  EXPECT_EQ(client("tls", certificate), "ok");
+  EXPECT_EQ(client("reach", "127.0.0.1"), "not reached") << "nothing without TLS";
+  const auto refused = test::run_program(
+      test::with_settings("railfix-monitor", {"monitor.port=0", "monitor.foxglove_port=0", "common.domain=79",
+                                              "common.train_id=" + name_ + "-other",
+                                              "monitor.tls_certificate=" + certificate, "monitor.tls_key=/etc/hosts"}),
+      30);
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("monitor.tls_key /etc/hosts is no key in PEM that fits the certificate"));
 }
 
 TEST_F(MonitorLiveTest, SpeaksBothSubprotocolsOfFoxglove) {
