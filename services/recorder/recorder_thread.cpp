@@ -155,9 +155,9 @@ core::Result<std::unique_ptr<Recording>> RecorderThread::create(const fs::path& 
   auto recording = Recording::create(file, options, about_);
   std::ifstream configuration(config_.train_file);
   if (!recording.ok() || config_.train_file.empty() || !configuration) return recording;
+  const std::string text{std::istreambuf_iterator<char>(configuration), {}};
   const auto status = recording.value()->write_metadata(
-      {"railfix_configuration",
-       {{"file", config_.train_file}, {"text", {std::istreambuf_iterator<char>(configuration), {}}}}});
+      {"railfix_configuration", {{"file", config_.train_file}, {"text", without_secrets(text)}}});
   if (!status.ok()) return status.error();
   return recording;
 }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdio>
 #include <fstream>
+#include <regex>
 
 #include "core/time.hpp"
 
@@ -144,6 +145,11 @@ core::Status Recording::close() {
   const auto status = write_losses();
   const auto closed = writer_->close();
   return status.ok() ? closed : status;
+}
+
+std::string without_secrets(const std::string& yaml) {
+  static const std::regex secret(R"(((?:token|password)["']?\s*:)[^\n}]*)");
+  return std::regex_replace(yaml, secret, "$1 not recorded");
 }
 
 std::string fingerprint(const fs::path& file) {

@@ -83,6 +83,9 @@ class Recording {
   int64_t losses_written_ns_ = 0;
 };
 
+/// A configuration's YAML without the values of tokens and passwords: recordings are given away.
+std::string without_secrets(const std::string& yaml);
+
 /// Name and CRC-32 of a file for the metadata; empty for an empty name, "not readable" when it is so.
 std::string fingerprint(const std::filesystem::path& file);
 

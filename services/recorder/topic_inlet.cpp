@@ -147,8 +147,8 @@ void TopicInlet::listen(const messaging::TopicInfo& topic, const std::string& in
   if (topic.name == "camera_frame") return listen_camera(listening, topic, name, instance);
   messaging::TopicInfo info = topic;
   info.reader_queue = static_cast<size_t>(config_.sample_queue);
-  const auto handler = [this, channel = channel_of(topic, *topic.type, name), type = topic.type, since_ns = core::wall_ns()](
-                           const Sample& sample, const messaging::SampleInfo& sample_info) {
+  const auto handler = [this, channel = channel_of(topic, *topic.type, name), type = topic.type,
+                        since_ns = core::wall_ns()](const Sample& sample, const messaging::SampleInfo& sample_info) {
     if (!sample_info.valid) return;
     const auto one = stored(channel, sample_info, type->serialize(sample.get()));
     const bool live = sample_info.source_ns >= since_ns;

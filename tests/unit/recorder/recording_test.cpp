@@ -110,6 +110,12 @@ TEST(Pictures, PgmKeepsEveryPixel) {
   EXPECT_FALSE(encode_pgm(pixels.data(), 0, 48).ok());
 }
 
+TEST(Configuration, IsRecordedWithoutItsSecrets) {
+  EXPECT_EQ(without_secrets("monitor:\n  token: abc def\n  port: 8080\ntpr_publisher:\n  mqtt_password: \"x: y\"\n"),
+            "monitor:\n  token: not recorded\n  port: 8080\ntpr_publisher:\n  mqtt_password: not recorded\n");
+  EXPECT_EQ(without_secrets("monitor: {token: abc, port: 1}"), "monitor: {token: not recorded}");
+}
+
 TEST(Pictures, JpegKeepsThePicture) {
   std::vector<uint8_t> pixels(64 * 48);
   for (size_t i = 0; i < pixels.size(); ++i) pixels[i] = static_cast<uint8_t>(i % 64 * 3);
