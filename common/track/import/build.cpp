@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <fstream>
-#include <iomanip>
-#include <sstream>
 
 #include "track/import/erju.hpp"
 #include "track/import/finish.hpp"
 #include "track/import/landxml.hpp"
+#include "track/import/local_crs.hpp"
 #include "track/import/network.hpp"
 #include "track/import/osm_network.hpp"
 #include "track/import/railml.hpp"
@@ -50,14 +49,6 @@ core::Result<Kind> kind_of(const std::filesystem::path& file) {
   return core::Error{file.string() +
                      " is of no kind that can be read; give LandXML, railML or ERJU maps (.xml, .landxml, .railml), "
                      "OpenStreetMap (.osm, .pbf), Overpass JSON, GeoJSON or a compiled map (.map)"};
-}
-
-/// True to scale at its middle: a metre on the map is a metre on the ground to 1e-5 within 25 km.
-std::string local_crs(const GeoPoint& middle) {
-  std::ostringstream text;
-  text << std::fixed << std::setprecision(4) << "+proj=tmerc +lat_0=" << middle.lat_deg << " +lon_0=" << middle.lon_deg
-       << " +k=1 +x_0=100000 +y_0=100000 +ellps=WGS84 +units=m +no_defs +type=crs";
-  return text.str();
 }
 
 /// Everything that was read, before it becomes one map. Errors are thrown as BadInput and become a value at the door.

@@ -4,6 +4,7 @@
 #include <set>
 
 #include "core/units.hpp"
+#include "track/import/railml2_coordinates.hpp"
 #include "track/import/railml_readers.hpp"
 
 namespace railfix::track {
@@ -28,7 +29,7 @@ struct Connector {
 
 class Reader {
  public:
-  explicit Reader(const XmlSource& source) : source_(source) {}
+  explicit Reader(const XmlSource& source) : source_(source), coordinates_(source) {}
 
   RailNet read() {
     special_profiles_ = special_speed_profiles(source_);
@@ -37,6 +38,7 @@ class Reader {
     }
     if (net_.tracks.empty()) throw core::BadInput(source_.file_name() + " holds no <track> with <trackTopology>");
     cut_at_switches();
+    shape_pieces();
     link();
     return std::move(net_);
   }
@@ -66,6 +68,7 @@ class Reader {
     read_speeds(node.child("trackElements"), track);
     read_marks(node, track);
     read_balises(node.child("ocsElements").child("balises"), track);
+    points_.push_back(coordinates_.points_of(node, origin_m_));
   }
 
   void read_connection(const pugi::xml_node& at, Connector connector) {
@@ -225,6 +228,22 @@ class Reader {
     }
   }
 
+  /// A track whose coordinates do not fit its length, or end on the way, is laid out without them.
+  void shape_pieces() {
+    for (const auto& [track, pieces] : pieces_) {
+      const auto last = pieces.rbegin();
+      const double length_m = last->first + net_.tracks[last->second].length_m;
+      std::string why;
+      if (shape_between(points_[track], 0, length_m, why).empty()) {
+        if (!why.empty()) net_.problems.push_back("track " + net_.tracks[track].track.name + " " + why + "; not used");
+        continue;
+      }
+      net_.crs = coordinates_.crs();
+      for (const auto& [begin_m, piece] : pieces)
+        net_.tracks[piece].shape = shape_between(points_[track], begin_m, begin_m + net_.tracks[piece].length_m, why);
+    }
+  }
+
   [[nodiscard]] std::optional<size_t> piece_after(const Connector& at) const {
     for (const auto& [begin, piece] : pieces_.at(at.track)) {
       if (std::abs(begin - at.offset_m) < kAtEndM) return piece;
@@ -308,6 +327,8 @@ class Reader {
 
   const XmlSource& source_;
   RailNet net_;
+  Railml2Coordinates coordinates_;
+  std::vector<std::vector<Railml2Coordinates::Point>> points_;  // of every track
   double origin_m_ = 0;
   std::set<std::string> special_profiles_;
   std::map<std::string, Connector> connectors_;

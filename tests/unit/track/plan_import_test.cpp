@@ -1,6 +1,7 @@
 // railML 2.4, railML 3.2 and the ERJU digital map.
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "core/random.hpp"
 #include "core/units.hpp"
@@ -157,6 +158,67 @@ TEST_F(PlanImport, Railml2KeepsWhatThePlanSays) {
   const Path over = core::value_or_throw(Path::follow(shared, {1, 0, Direction::forward}, 2000, 0, {4, 2}));
   EXPECT_NEAR(over.end_m(), 1000, 1e-6);
   EXPECT_THAT(map.problems, Contains(HasSubstr("laid out as a drawing")));
+}
+
+/// 400 m straight to the north-east and a left arc of 500 m radius over 400 m; a siding of 200 m leaves at 300 m.
+/// Points every 20 m as `coord` writes them.
+std::string railml2_with_coordinates(const std::string& attributes,
+                                     const std::function<std::string(const Eigen::Vector2d&)>& coord) {
+  const Alignment line =
+      Alignment::chained({500000, 5300000, core::kPi / 4}, {{400, 0, 0}, {400, 1.0 / 500, 1.0 / 500}});
+  const auto place = [&](double at_m, double beside_m) {
+    const PlanPose pose = line.at(at_m).pose;
+    const Eigen::Vector2d right(std::cos(pose.heading_rad), -std::sin(pose.heading_rad));
+    return "<geoCoord coord=\"" + coord(Eigen::Vector2d(pose.easting_m, pose.northing_m) + beside_m * right) + "\"" +
+           attributes + "/>";
+  };
+  std::string mappings;
+  for (int at = 20; at < 800; at += 20)
+    mappings += "<geoMapping id=\"m" + std::to_string(at) + "\" pos=\"" + std::to_string(1000 + at) + "\">" +
+                place(at, 0) + "</geoMapping>";
+  return R"(<railml xmlns="https://www.railml.org/schemas/2018" version="2.4"><infrastructure id="i"><tracks>
+<track id="t1" name="main"><trackTopology><trackBegin id="b1" pos="1000"><openEnd id="o1"/>)" +
+         place(0, 0) + R"(</trackBegin><trackEnd id="e1" pos="1800"><bufferStop id="o2"/>)" + place(800, 0) +
+         R"(</trackEnd><connections><switch id="w1" name="W1" pos="1310"><connection id="c1" ref="c3" orientation="outgoing" course="right"/>
+</switch></connections></trackTopology><trackElements><geoMappings>)" +
+         mappings + R"(</geoMappings></trackElements><ocsElements><signals><signal id="s1" name="S1" pos="1500">)" +
+         place(500, 3) + R"(</signal></signals></ocsElements></track>
+<track id="t2" name="siding"><trackTopology><trackBegin id="b2" pos="0"><connection id="c3" ref="c1"/></trackBegin>
+<trackEnd id="e2" pos="200"><bufferStop id="o3"/></trackEnd></trackTopology></track></tracks></infrastructure></railml>)";
+}
+
+TEST_F(PlanImport, Railml2CoordinatesMakeTheTrack) {
+  const auto projection = core::value_or_throw(Projection::open("EPSG:25833"));
+  const auto metres = [](const Eigen::Vector2d& at) {
+    char text[80];
+    std::snprintf(text, sizeof text, "%.4f %.4f", at.x(), at.y());
+    return std::string(text);
+  };
+  const auto degrees = [&](const Eigen::Vector2d& at) {
+    const auto geo = projection.to_geo(at.x(), at.y()).value();
+    char text[80];
+    std::snprintf(text, sizeof text, "%.9f %.9f 250.0", geo.lat_deg, geo.lon_deg);
+    return std::string(text);
+  };
+  const std::string plain = railml2_with_coordinates(" epsgCode=\"urn:ogc:def:crs:EPSG::25833\"", metres);
+  const Map map = core::value_or_throw(build_map({write("a.railml", plain)}, {})).map;
+  EXPECT_EQ(map.crs, "EPSG:25833");
+  const auto path =
+      core::value_or_throw(Path::follow(std::make_shared<const Map>(map), {1, 0, Direction::forward}, 2000, 0));
+  EXPECT_NEAR(path.end_m(), 800, 0.05);
+  EXPECT_NEAR(path.at(0).pose.easting_m, 500000, 0.01);
+  EXPECT_NEAR(path.at(300).pose.northing_m, 5300000 + 300 * std::cos(core::kPi / 4), 0.02);
+  EXPECT_NEAR(path.curvature_at(200), 0, 1e-5);
+  EXPECT_NEAR(path.curvature_at(600), 1.0 / 500, 1e-5);
+  EXPECT_EQ(ways_at(map, node_named(map, "W1")->id), 2U);
+  EXPECT_NEAR(node_named(map, "W1")->easting_m, 500000 + 310 * std::sin(core::kPi / 4), 0.02);
+  // WGS 84 without a word: the same line, now true to scale (UTM's middle meridian shortens by 0.4 m per km).
+  const Map geo = core::value_or_throw(build_map({write("b.railml", railml2_with_coordinates("", degrees))}, {})).map;
+  const auto there = geo.to_geo(geo.nodes[0].easting_m, geo.nodes[0].northing_m).value();
+  EXPECT_NEAR(there.lat_deg, projection.to_geo(500000, 5300000)->lat_deg, 1e-7);
+  EXPECT_NEAR(length_of(geo), 1000 + 800 * 0.0004, 0.1);
+  const std::string mixed = std::string(plain).replace(plain.find("25833"), 5, "25832");
+  EXPECT_THAT(build_map({write("c.railml", mixed)}, {}).error().message, HasSubstr("EPSG:25832"));
 }
 
 TEST_F(PlanImport, Railml3KeepsWhatThePlanSays) {
