@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <string_view>
 #include <system_error>
 
 #include "idl/map.pb.h"
@@ -140,12 +141,45 @@ core::Status read_marks(const map::Map& in, Map& out) {
   return {};
 }
 
+core::Status read_map(const map::Map& in, Map& out) {
+  out.name = in.name();
+  out.source = in.source();
+  out.crs = in.crs();
+  out.problems.assign(in.problems().begin(), in.problems().end());
+  core::Status status = read_edges(in, out);
+  return status.ok() ? read_marks(in, out) : status;
+}
+
+/// Length of the UTF-8 character (RFC 3629) that begins there; 0 where none does.
+size_t character_at(std::string_view text) {
+  const auto byte = [&](size_t i) { return i < text.size() ? static_cast<uint8_t>(text[i]) : uint8_t{0}; };
+  const auto follows = [&](size_t i) { return (byte(i) & 0xC0U) == 0x80U; };
+  const uint8_t first = byte(0);
+  if (first < 0x80) return 1;
+  if (first >= 0xC2 && first <= 0xDF && follows(1)) return 2;
+  const bool too_long = (first == 0xE0 && byte(1) < 0xA0) || (first == 0xF0 && byte(1) < 0x90);
+  const bool beyond = (first == 0xED && byte(1) > 0x9F) || (first == 0xF4 && byte(1) > 0x8F);
+  if (too_long || beyond || first < 0xE0 || first > 0xF4) return 0;
+  const size_t length = first < 0xF0 ? 3 : 4;
+  return follows(1) && follows(2) && (length == 3 || follows(3)) ? length : 0;
+}
+
+/// Names come from foreign files in any encoding; what is no UTF-8 would make the whole map unreadable.
+std::string as_utf8(std::string text) {
+  for (size_t i = 0; i < text.size();) {
+    const size_t length = character_at(std::string_view(text).substr(i));
+    if (length == 0) text[i] = '?';
+    i += std::max<size_t>(1, length);
+  }
+  return text;
+}
+
 void write_edge(const Edge& edge, map::Edge& out) {
   out.set_id(edge.id);
-  out.set_name(edge.name);
+  out.set_name(as_utf8(edge.name));
   out.set_from_node(edge.from_node);
   out.set_to_node(edge.to_node);
-  out.set_line(edge.line);
+  out.set_line(as_utf8(edge.line));
   out.set_length_m(edge.alignment.length_m());
   for (size_t i = 0; i < edge.alignment.elements().size(); ++i) {
     const Element& element = edge.alignment.elements()[i];
@@ -184,7 +218,7 @@ void write_network(const Map& map, map::Map& out) {
     map::Node& n = *out.add_nodes();
     n.set_id(node.id);
     n.set_kind(static_cast<map::Node::Kind>(node.kind));
-    n.set_name(node.name);
+    n.set_name(as_utf8(node.name));
     n.set_easting_m(node.easting_m);
     n.set_northing_m(node.northing_m);
   }
@@ -206,7 +240,7 @@ void write_marks(const Map& map, map::Map& out) {
     l.set_offset_m(landmark.offset_m);
     l.set_lateral_m(landmark.lateral_m);
     l.set_sigma_m(landmark.sigma_m);
-    l.set_name(landmark.name);
+    l.set_name(as_utf8(landmark.name));
   }
   for (const BaliseGroup& group : map.balise_groups) {
     map::BaliseGroup& g = *out.add_balise_groups();
@@ -234,13 +268,7 @@ core::Result<Map> Map::load(const std::filesystem::path& file) {
     return core::Error{file.string() + " is not a compiled map or is cut short; make it with `railfix map build`"};
   }
   Map out;
-  out.name = in.name();
-  out.source = in.source();
-  out.crs = in.crs();
-  out.problems.assign(in.problems().begin(), in.problems().end());
-  core::Status status = read_edges(in, out);
-  if (status.ok()) status = read_marks(in, out);
-  if (!status)
+  if (const core::Status status = read_map(in, out); !status)
     return core::Error{file.string() + " is not a sound map: " + status.error().message +
                        "; build it again with `railfix map build`"};
   return out;
@@ -248,12 +276,16 @@ core::Result<Map> Map::load(const std::filesystem::path& file) {
 
 core::Status Map::save(const std::filesystem::path& file) const {
   map::Map out;
-  out.set_name(name);
-  out.set_source(source);
-  out.set_crs(crs);
-  for (const std::string& problem : problems) out.add_problems(problem);
+  out.set_name(as_utf8(name));
+  out.set_source(as_utf8(source));
+  out.set_crs(as_utf8(crs));
+  for (const std::string& problem : problems) out.add_problems(as_utf8(problem));
   write_network(*this, out);
   write_marks(*this, out);
+  Map read_back;
+  if (const core::Status status = read_map(out, read_back); !status)
+    return core::Error{"the map " + file.string() + " cannot be stored: " + status.error().message +
+                       "; is a coordinate of its source wrong?"};
 
   // First beside its place, then moved there: a service never reads half a map.
   const std::filesystem::path partial = file.string() + ".partial";

@@ -1,0 +1,106 @@
+// What people and other programs write into files beside the pictures: configuration, calibration, tables of sensors
+// and of the truth, reports to compare. The first byte of the input chooses.
+#include <array>
+#include <cmath>
+
+#include "compare/report_file.hpp"
+#include "dataset/calibration.hpp"
+#include "dataset/dataset.hpp"
+#include "fuzz/fuzz_target.hpp"
+#include "fuzz/input_file.hpp"
+#include "service/config.hpp"
+
+namespace railfix {
+
+namespace {
+
+struct Config {
+  double speed_mps = 10;
+  int64_t count = 3;
+  bool on = true;
+  std::string mode = "a";
+  std::string name = "x";
+  std::vector<std::string> names;
+  double inner_m = 1;
+  void describe(service::Fields& fields) {
+    fields.number("speed_mps", speed_mps, {0, 100}, "m/s", "How fast.");
+    fields.integer("count", count, {1, 5}, "", "How many.");
+    fields.flag("on", on, "Whether.");
+    fields.choice("mode", mode, {"a", "b"}, "Which.");
+    fields.text("name", name, "Who.");
+    fields.list("names", names, "Whom.");
+    fields.group("inner", "Inside.", [this](service::Fields& inner) {
+      inner.number("inner_m", inner_m, {0, 2}, "m", "How far.");
+    });
+  }
+};
+
+template <class T>
+bool taken(const core::Result<T>& result) {
+  if (!result.ok()) fuzz::require(!result.error().message.empty(), "a refusal says why");
+  return result.ok();
+}
+
+void configuration(const std::filesystem::path& file) {
+  const auto read = service::read_config<Config>("odometry", file, {}, {"common"});
+  if (!taken(read)) return;
+  const auto& config = read.value();
+  fuzz::require(config.speed_mps >= 0 && config.speed_mps <= 100 && config.count >= 1 && config.count <= 5 &&
+                    config.inner_m >= 0 && config.inner_m <= 2 && (config.mode == "a" || config.mode == "b"),
+                "what is taken is in its range");
+}
+
+void calibration(const std::filesystem::path& file, const std::filesystem::path& out) {
+  const auto read = dataset::read_calibration(file);
+  if (!taken(read)) return;
+  fuzz::require(dataset::write_calibration(out, read.value()).ok(), "a calibration that was taken can be written");
+  const auto again = dataset::read_calibration(out);
+  fuzz::require(again.ok(), "a written calibration is read again");
+  fuzz::require(std::abs(again.value().intrinsics.fu_px / read.value().intrinsics.fu_px - 1) < 1e-6,
+                "a written calibration is the same");
+}
+
+}  // namespace
+
+}  // namespace railfix
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  using namespace railfix;
+  if (size == 0) return 0;
+  static const fuzz::InputFolder folder;
+  const std::span<const uint8_t> rest{data + 1, size - 1};
+  static constexpr std::array kTables{"imu0", "wheel0", "gnss0"};
+  const int choice = (data[0] + 2) % 10;  // the digits in their order
+  switch (choice) {
+    case 0:
+      configuration(folder.write("a.yaml", rest));
+      break;
+    case 1:
+      calibration(folder.write("camera.yaml", rest), folder.at("out.yaml"));
+      break;
+    case 2:
+      (void)taken(dataset::find_calibration(folder.write("kitti/calib.txt", rest).parent_path()));
+      break;
+    case 3:
+    case 4:
+    case 5: {
+      const std::string table = kTables[choice - 3];
+      const auto sequence = folder.at("seq-" + table);
+      (void)folder.write("seq-" + table + "/mav0/" + table + "/data.csv", rest);
+      (void)taken(dataset::read_sensors(sequence));
+      break;
+    }
+    case 6:
+      (void)taken(dataset::read_truth(folder.write("track.csv", rest)));
+      break;
+    case 7:
+      (void)taken(dataset::read_truth_landmarks(folder.write("landmarks.csv", rest)));
+      break;
+    case 8:
+      (void)taken(compare::read_reports(folder.write("reports.csv", rest), etcs::Baseline::b3));
+      break;
+    default:
+      (void)taken(compare::read_reports(folder.write("reports.jsonl", rest), etcs::Baseline::b4));
+  }
+  return 0;
+}
