@@ -1,18 +1,17 @@
 #include "track/import/osm_network.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <set>
 
 #include "core/units.hpp"
 #include "track/import/biarc.hpp"
+#include "track/import/osm_marks.hpp"
 #include "track/import/smooth.hpp"
 
 namespace railfix::track {
 namespace {
 
-constexpr double kMappingSigmaM = 3.0;
 constexpr size_t kPointsForSigma = 12;
 constexpr double kLeastUsualSigmaM = 0.05;
 constexpr double kSharpestTurnRad = core::kPi / 3.0;
@@ -22,46 +21,11 @@ double heading_of(const Eigen::Vector2d& step) {
   return std::atan2(step.x(), step.y());
 }
 
-std::string value_of(const OsmTags& tags, const char* key) {
-  const auto found = tags.find(key);
-  return found == tags.end() ? std::string() : found->second;
-}
-bool is_set(const OsmTags& tags, const char* key) {
-  const std::string value = value_of(tags, key);
-  return !value.empty() && value != "no";
-}
-
-/// "80" (km/h) or "50 mph"; nothing where it says anything else.
-std::optional<double> speed_mps_of(const std::string& text) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc()) return std::nullopt;
-  const std::string_view unit(end, static_cast<size_t>(text.data() + text.size() - end));
-  if (unit == " mph" || unit == "mph") {
-    value *= 1.609344;
-  } else if (!unit.empty() && unit != " km/h") {
-    return std::nullopt;
-  }
-  const double speed = core::mps_from_kmh(value);
-  return speed > 0 && speed < SpeedLimit::kFastestMps ? std::optional(speed) : std::nullopt;
-}
-
 struct Segment {
   int64_t a = 0;
   int64_t b = 0;
   size_t way = 0;
   bool used = false;
-};
-
-/// Segments from one break to the next.
-struct Chain {
-  std::vector<int64_t> nodes;
-  std::vector<size_t> ways;     // of each segment
-  std::vector<bool> along_way;  // the segment runs as its way is drawn
-  std::vector<Eigen::Vector2d> points;
-  std::vector<Eigen::Vector2d> shape;  // the points as the track is to run through them
-  std::optional<double> heading_at_start;
-  std::optional<double> heading_at_end;
 };
 
 /// One end of a chain at its node, seen leaving the node.
@@ -83,7 +47,7 @@ class Builder {
     find_usual_sigma();
     gather_ends();
     for (const auto& [node, ends] : ends_) agree_on_tangents(ends);
-    for (Chain& chain : chains_) add_edge(chain);
+    for (OsmChain& chain : chains_) add_edge(chain);
     return std::move(out_);
   }
 
@@ -155,7 +119,7 @@ class Builder {
   }
 
   void trace(int64_t begin, size_t segment) {
-    Chain chain;
+    OsmChain chain;
     chain.nodes.push_back(begin);
     while (true) {
       segments_[segment].used = true;
@@ -180,7 +144,7 @@ class Builder {
   /// Tracks of many points tell how well this region is drawn.
   void find_usual_sigma() {
     std::vector<double> scatters;
-    for (const Chain& chain : chains_) {
+    for (const OsmChain& chain : chains_) {
       const std::vector<Eigen::Vector2d> points = thinned(chain.points);
       if (points.size() >= kPointsForSigma) scatters.push_back(scatter_of(points));
     }
@@ -207,13 +171,13 @@ class Builder {
     }
   }
 
-  [[nodiscard]] std::optional<ClothoidFit> clothoids(const Chain& chain) const {
+  [[nodiscard]] std::optional<ClothoidFit> clothoids(const OsmChain& chain) const {
     if (!with_clothoids_) return std::nullopt;
     return fit_drawing(thinned(chain.points), {chain.heading_at_start, chain.heading_at_end, 0, usual_sigma_m_});
   }
 
   void set_leaving(const ChainEnd& end, double leaving_rad) {
-    Chain& chain = chains_[end.chain];
+    OsmChain& chain = chains_[end.chain];
     (end.at_end ? chain.heading_at_end : chain.heading_at_start) = leaving_rad + (end.at_end ? core::kPi : 0.0);
   }
 
@@ -261,7 +225,7 @@ class Builder {
     return entry->second;
   }
 
-  void add_edge(Chain& chain) {
+  void add_edge(OsmChain& chain) {
     const std::optional<ClothoidFit> smooth = clothoids(chain);
     PolylineFit fit;
     if (smooth) {
@@ -280,8 +244,7 @@ class Builder {
       tell_left_out(edge.track.name, *smooth);
     }
     edge.track.alignment = std::move(fit.alignment);
-    add_marks(chain, edge.track);
-    add_speeds(chain, edge.track);
+    OsmMarks(data_, chain).add(edge.track);
     if (fit.straightened > 0) {
       out_.problems.push_back("edge " + edge.track.name + " has " + std::to_string(fit.straightened) +
                               " stretches with points too crooked for a track; they are straight lines now");
@@ -307,7 +270,7 @@ class Builder {
   }
 
   /// The name (else the number) of the way with most segments of the chain.
-  [[nodiscard]] std::string line_of(const Chain& chain) const {
+  [[nodiscard]] std::string line_of(const OsmChain& chain) const {
     std::map<std::string, size_t> votes;
     for (const size_t way : chain.ways) {
       const OsmTags& tags = data_.ways[way].tags;
@@ -319,75 +282,6 @@ class Builder {
         ->first;
   }
 
-  void add_marks(const Chain& chain, ImportedTrack& track) const {
-    const auto offset_of = [&](size_t i) { return Builder::offset_of(chain, i, track); };
-    const auto has = [&](size_t segment, const char* key) { return is_set(data_.ways[chain.ways[segment]].tags, key); };
-    const size_t count = chain.ways.size();
-    size_t bridge_begin = 0;
-    for (size_t i = 0; i < count; ++i) {
-      const std::string name = value_of(data_.ways[chain.ways[i]].tags, "tunnel:name");
-      if (i > 0 && has(i, "tunnel") && !has(i - 1, "tunnel")) {
-        track.marks.push_back({LandmarkKind::portal_in, offset_of(i), 0, kMappingSigmaM, name});
-      }
-      if (i + 1 < count && has(i, "tunnel") && !has(i + 1, "tunnel")) {
-        track.marks.push_back({LandmarkKind::portal_out, offset_of(i + 1), 0, kMappingSigmaM, name});
-      }
-      if (!has(i, "bridge")) continue;
-      if (i == 0 || !has(i - 1, "bridge")) bridge_begin = i;
-      if (i + 1 == count || !has(i + 1, "bridge"))
-        add_bridge(offset_of(bridge_begin), offset_of(i + 1), chain.ways[i], track);
-    }
-    for (size_t i = 1; i < count; ++i) add_point_mark(chain.nodes[i], offset_of(i), track);
-  }
-
-  /// maxspeed, and maxspeed:forward and :backward as the way is drawn; equal neighbours are one limit.
-  void add_speeds(const Chain& chain, ImportedTrack& track) const {
-    const auto speed_at = [&](size_t segment, bool forward) {
-      const OsmTags& tags = data_.ways[chain.ways[segment]].tags;
-      const bool as_drawn = forward == chain.along_way[segment];
-      const auto own = speed_mps_of(value_of(tags, as_drawn ? "maxspeed:forward" : "maxspeed:backward"));
-      return own ? own : speed_mps_of(value_of(tags, "maxspeed"));
-    };
-    for (const bool forward : {true, false}) {
-      std::optional<double> speed;
-      double begin_m = 0;
-      for (size_t i = 0; i <= chain.ways.size(); ++i) {
-        const bool is_end = i == chain.ways.size();
-        const auto next = is_end ? std::nullopt : speed_at(i, forward);
-        if (i > 0 && !is_end && next == speed) continue;
-        const double at_m = i == 0 ? 0.0 : is_end ? track.alignment.length_m() : offset_of(chain, i, track);
-        if (speed && at_m > begin_m)
-          track.speed_limits.push_back({begin_m, at_m, *speed, forward ? Direction::forward : Direction::reverse});
-        speed = next;
-        begin_m = at_m;
-      }
-    }
-  }
-
-  [[nodiscard]] static double offset_of(const Chain& chain, size_t point, const ImportedTrack& track) {
-    return track.alignment.nearest(chain.points[point].x(), chain.points[point].y()).offset_m;
-  }
-
-  /// One landmark in the middle; the uncertainty covers the bridge.
-  void add_bridge(double from_m, double to_m, size_t way, ImportedTrack& track) const {
-    const double length = to_m - from_m;
-    track.marks.push_back({LandmarkKind::bridge, from_m + 0.5 * length, 0,
-                           std::hypot(kMappingSigmaM, length / std::sqrt(12.0)),
-                           value_of(data_.ways[way].tags, "bridge:name")});
-  }
-
-  void add_point_mark(int64_t node, double offset_m, ImportedTrack& track) const {
-    const OsmTags& tags = tags_at(node);
-    const std::string kind = value_of(tags, "railway");
-    if (kind == "balise" || is_set(tags, "railway:balise")) {
-      track.marks.push_back({LandmarkKind::balise, offset_m, 0, kMappingSigmaM, value_of(tags, "ref")});
-    } else if (kind == "signal") {
-      track.marks.push_back({LandmarkKind::mast, offset_m, 0, kMappingSigmaM, value_of(tags, "ref")});
-    } else if (kind == "level_crossing" || kind == "crossing") {  // of a road, of a footpath
-      track.marks.push_back({LandmarkKind::level_crossing, offset_m, 0, kMappingSigmaM, value_of(tags, "name")});
-    }
-  }
-
   const OsmData& data_;
   const Projection& projection_;
   double smooth_m_;
@@ -396,7 +290,7 @@ class Builder {
   std::vector<Segment> segments_;
   std::unordered_map<int64_t, std::vector<size_t>> at_node_;
   std::unordered_map<int64_t, Eigen::Vector2d> places_;
-  std::vector<Chain> chains_;
+  std::vector<OsmChain> chains_;
   std::map<int64_t, std::vector<ChainEnd>> ends_;
   std::unordered_map<int64_t, size_t> node_index_;
   std::unordered_map<int64_t, size_t> pieces_;

@@ -1,10 +1,10 @@
 // How well does `railfix map learn` find again what a map was made without? Chainage of the learned landmarks against
 // the true ones, and whether their sigmas hold.
 //
-//   railfix-measure-survey strip TRUE.map --keep frog --out POOR.map
+//   railfix map build TRUE.map --landmarks frog --out POOR.map
 //   railfix simulate --map TRUE.map ... --out S1     railfix run --dataset S1 --map POOR.map --out R1     (and so on)
 //   railfix map learn POOR.map R1 R2 R3 --out LEARNED.map
-//   railfix-measure-survey judge TRUE.map POOR.map LEARNED.map
+//   railfix-measure-survey TRUE.map POOR.map LEARNED.map
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -32,18 +32,6 @@ struct Errors {
   double largest_m = 0;
   size_t beyond = 0;  // 3 sigmas
 };
-
-int strip(const std::string& file, const std::vector<std::string>& kept, const std::string& out) {
-  Map map = core::value_or_throw(Map::load(file));
-  std::erase_if(map.landmarks, [&](const Landmark& mark) {
-    return std::ranges::find(kept, track::to_string(mark.kind)) == kept.end();
-  });
-  for (size_t i = 0; i < map.landmarks.size(); ++i) map.landmarks[i].id = static_cast<uint32_t>(i + 1);
-  map.balise_groups.clear();
-  core::ok_or_throw(map.save(out));
-  std::printf("%zu landmarks left in %s\n", map.landmarks.size(), out.c_str());
-  return 0;
-}
 
 bool one_side(const Landmark& a, const Landmark& b) {
   const bool has_side = a.kind == track::LandmarkKind::mast || a.kind == track::LandmarkKind::platform;
@@ -108,20 +96,13 @@ int judge(const std::string& truth_file, const std::string& poor_file, const std
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"Accuracy of `railfix map learn`"};
-  app.require_subcommand(1);
+  CLI::App app{"Accuracy of `railfix map learn`: learned landmarks against the true ones"};
   std::string truth;
   std::string poor;
   std::string learned;
-  std::vector<std::string> kept;
-  auto* stripping = app.add_subcommand("strip", "A map without landmarks but for some kinds");
-  stripping->add_option("MAP", truth)->required();
-  stripping->add_option("--keep", kept, "Kinds that stay, separated by commas")->delimiter(',');
-  stripping->add_option("--out", poor)->required();
-  auto* judging = app.add_subcommand("judge", "Learned landmarks against the true ones");
-  judging->add_option("TRUE", truth)->required();
-  judging->add_option("POOR", poor)->required();
-  judging->add_option("LEARNED", learned)->required();
+  app.add_option("TRUE", truth, "The map that the pictures were drawn from")->required();
+  app.add_option("POOR", poor, "The map that the runs were made on")->required();
+  app.add_option("LEARNED", learned, "What `railfix map learn` made of it")->required();
   CLI11_PARSE(app, argc, argv);
-  return stripping->parsed() ? strip(truth, kept, poor) : judge(truth, poor, learned);
+  return judge(truth, poor, learned);
 }

@@ -1,0 +1,41 @@
+// What stands beside a chain of OpenStreetMap segments, and how fast trains may run on it.
+#pragma once
+
+#include "track/import/network.hpp"
+#include "track/import/osm_data.hpp"
+
+namespace railfix::track {
+
+/// Segments from one break to the next.
+struct OsmChain {
+  std::vector<int64_t> nodes;
+  std::vector<size_t> ways;     // of each segment
+  std::vector<bool> along_way;  // the segment runs as its way is drawn
+  std::vector<Eigen::Vector2d> points;
+  std::vector<Eigen::Vector2d> shape;  // the points as the track is to run through them
+  std::optional<double> heading_at_start;
+  std::optional<double> heading_at_end;
+};
+
+class OsmMarks {
+ public:
+  OsmMarks(const OsmData& data, const OsmChain& chain) : data_(data), chain_(chain) {}
+  /// REQUIRES: the track's alignment was made from the chain.
+  void add(ImportedTrack& track) const;
+
+ private:
+  void add_structures(ImportedTrack& track) const;
+  void add_speeds(ImportedTrack& track) const;
+  void add_bridge(double from_m, double to_m, size_t way, ImportedTrack& track) const;
+  void add_point_mark(int64_t node, double offset_m, ImportedTrack& track) const;
+  [[nodiscard]] double offset_of(size_t point, const ImportedTrack& track) const;
+  [[nodiscard]] const OsmTags& tags_of(size_t segment) const { return data_.ways[chain_.ways[segment]].tags; }
+
+  const OsmData& data_;
+  const OsmChain& chain_;
+};
+
+/// Empty where there is no such key.
+std::string value_of(const OsmTags& tags, const char* key);
+
+}  // namespace railfix::track
