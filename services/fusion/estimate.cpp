@@ -1,6 +1,7 @@
 // From the filter to the state that is published: place on the map, interval, integrity.
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 
 #include "core/time.hpp"
@@ -13,12 +14,22 @@ constexpr double kRecentS = 1.0;
 constexpr double kFreshS = 0.12;
 constexpr double kRecentPositionS = 30.0;
 constexpr double kNoMotionUnusableS = 5.0;
+constexpr double kHeldByGnssS = 5.0;
 
 // The sentences that people read on the dashboard.
 void add_reason(TrainEstimate& estimate, const std::string& what) {
   estimate.integrity = std::max(estimate.integrity, Integrity::degraded);
   if (!estimate.reason.empty()) estimate.reason += "; ";
   estimate.reason += what;
+}
+
+// Operators ask since when a sensor is distrusted.
+std::string since(const SensorWatch& watch) {
+  const int64_t second = watch.changed_ns / 1'000'000'000 % 86'400;
+  char text[32];
+  std::snprintf(text, sizeof text, " since %02d:%02d:%02d UTC", static_cast<int>(second / 3600),
+                static_cast<int>(second / 60 % 60), static_cast<int>(second % 60));
+  return text;
 }
 
 }  // namespace
@@ -33,6 +44,19 @@ Interval Estimator::interval() const {
   const double silent_m = std::abs(filter_.speed_mps()) * std::max(0.0, silent_s);
   const double behind_m = std::max(bound_m, doubt_behind_m_) + time_doubt_m_ + silent_m;
   return {centre_m - behind_m, centre_m + std::max(bound_m, doubt_ahead_m_)};
+}
+
+// As an odometer's accuracy is stated: a share of the way, and one slip at the highest speed.
+Interval Estimator::widened(const Interval& interval) const {
+  const auto& p = *parameters_;
+  const double once_m = p.wheel_slip_share * std::min(unwatched_.way_m, unwatched_.fastest_mps * p.wheel_slip_s);
+  const double slip_m = std::min(once_m + p.wheel_slip_per_m * unwatched_.way_m, p.wheel_slip_share * unwatched_.way_m);
+  const bool held = gnss_proven() && used_within(Source::gnss, kHeldByGnssS);
+  const double most_m = held ? p.gnss_bound_m : std::numeric_limits<double>::infinity();
+  // A wheel that slides counts less than it is judged by.
+  const double slide_m = slip_m / (1 - std::min(p.wheel_slip_share, 0.9));
+  return {interval.behind_m - std::min(slip_m + unwatched_.behind_m, most_m),
+          interval.ahead_m + std::min(slide_m + unwatched_.ahead_m, most_m)};
 }
 
 TrainEstimate Estimator::estimate(const Interval& promised, double since_sure_m) const {
@@ -95,21 +119,24 @@ void Estimator::judge(TrainEstimate& e, double since_sure_m) const {
   if (silent(Source::camera)) {
     add_reason(e, "no camera");
   } else if (camera.isolated) {
-    add_reason(e, "camera motion contradicts the other sensors");
+    add_reason(e, "camera motion contradicts the other sensors" + since(camera));
   } else if (camera.seen_ns != 0 && ago_s(Source::camera) > parameters_->sensor_timeout_s) {
     add_reason(e, "camera blind");
   }
   if (silent(Source::wheel)) {
     add_reason(e, "no wheel pulses");
   } else if (watch(Source::wheel).isolated) {
-    add_reason(e, "wheel slips or slides");
+    add_reason(e, "wheel slips or slides" + since(watch(Source::wheel)));
+  } else if (wheel_.scatters) {
+    add_reason(e, "wheel readings scatter");
   }
   if (silent(Source::imu)) {
     add_reason(e, "no IMU");
   } else if (watch(Source::imu).isolated) {
-    add_reason(e, "IMU contradicts the other sensors");
+    add_reason(e, "IMU contradicts the other sensors" + since(watch(Source::imu)));
   }
-  if (watch(Source::gnss).isolated) add_reason(e, "GNSS contradicts the position");
+  const auto& gnss = watch(Source::gnss);
+  if (gnss.isolated) add_reason(e, "GNSS contradicts the position" + since(gnss));
   if (time_doubt_m_ > 0) add_reason(e, "a gap in time: the clock was set, or nothing measured");
   if (refused_fix_) add_reason(e, "a position fix was refused");
   if (corrected_) add_reason(e, "position was corrected by two fixes against the filter");
@@ -122,6 +149,10 @@ void Estimator::judge(TrainEstimate& e, double since_sure_m) const {
   const double budget_m = parameters_->budget_m + parameters_->budget_per_m * since_sure_m;
   const double bound_m = std::max(e.over_m, e.under_m);
   if (bound_m > budget_m) add_reason(e, "interval wider than allowed");
+  const bool wheel = ago_s(Source::wheel) < kRecentS;
+  if (wheel && ago_s(Source::camera) > kRecentS && ago_s(Source::imu) > kRecentS) {
+    add_reason(e, "the wheel alone measures: nothing would see it slip");
+  }
   const double no_motion_s = std::min(ago_s(Source::camera), ago_s(Source::wheel));
   if (no_motion_s > parameters_->sensor_timeout_s) add_reason(e, "nothing measures the motion");
   const bool moved = watch(Source::camera).used_ns != 0 || watch(Source::wheel).used_ns != 0;

@@ -83,7 +83,10 @@ bool Estimator::knows_motion() const {
 void Estimator::doubt_time(const SensorWatch& watch, Rhythm& rhythm, int64_t stamp_ns) {
   if (watch.seen_ns == 0 || stamp_ns <= watch.seen_ns) return;
   const double dt_s = core::seconds(stamp_ns - watch.seen_ns);
-  const double off_s = std::abs(dt_s - rhythm.period_s);
+  // While other sensors went on the clock did, too.
+  const double late_s = std::min(dt_s - rhythm.period_s, rhythm.pause_s);
+  const double off_s = std::max(late_s, rhythm.period_s - dt_s);
+  rhythm.pause_s = 0;
   if (rhythm.samples >= kRhythmSamples && off_s > std::max(kRhythmS, 0.1 * rhythm.period_s)) {
     filter_.doubt_way(filter_.value(StateIndex::speed) * off_s);
   } else {
@@ -124,6 +127,7 @@ void Estimator::place_like(const Estimator& other) {
   filter_.place_like(other.filter_);
   doubt_m_ = std::max(doubt_m_, other.doubt_m_);
   time_doubt_m_ = std::max(time_doubt_m_, other.time_doubt_m_);
+  unwatched_ = other.unwatched_;
   reference_ = other.reference_;
 }
 
@@ -131,6 +135,7 @@ void Estimator::place_like(const Estimator& other) {
 void Estimator::notice_gap(int64_t stamp_ns) {
   const double gap_s = core::seconds(stamp_ns - stamp_ns_);
   if (gap_s <= 0) return;
+  for (auto* rhythm : {&pictures_, &pulses_}) rhythm->pause_s = std::max(rhythm->pause_s, gap_s);
   if (events_.samples >= kRhythmSamples && gap_s > std::max(kGapS, 5 * events_.period_s)) {
     time_doubt_m_ += std::abs(filter_.speed_mps()) * gap_s;
     gap_begin_ns_ = stamp_ns_;

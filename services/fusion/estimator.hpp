@@ -14,6 +14,7 @@
 #include "fusion/slip_watch.hpp"
 #include "fusion/sudden_change.hpp"
 #include "fusion/track_doubt.hpp"
+#include "fusion/wheel_noise.hpp"
 #include "track/path.hpp"
 
 namespace railfix::fusion {
@@ -62,7 +63,10 @@ class Estimator {
   /// Moves on without a measurement.
   void predict_to(int64_t stamp_ns);
   void rebase_clock(int64_t stamp_ns);
+  /// Of the sensors that work, without widened().
   [[nodiscard]] Interval interval() const;
+  /// With what slips may have added since the reference that no camera watched.
+  [[nodiscard]] Interval widened(const Interval& interval) const;
   [[nodiscard]] double centre_m() const { return path_ ? filter_.path_distance_m() : distance_m(); }
   [[nodiscard]] double sigma_m() const { return path_ ? filter_.path_sigma_m() : filter_.sigma(StateIndex::distance); }
   [[nodiscard]] double distance_m() const { return filter_.value(StateIndex::distance); }
@@ -110,7 +114,9 @@ class Estimator {
   /// The wheel's odometer and its recovery from slip.
   struct Wheel {
     std::optional<int64_t> first_pulses;
+    double last_m = 0;  // its reading
     double resolution_m = 0;
+    bool scatters = false;
     int64_t blocked_until_ns = 0;
     int64_t window_begin_ns = 0;
     std::optional<double> window_m;  // its reading then
@@ -131,6 +137,16 @@ class Estimator {
   struct Rhythm {
     double period_s = 0;
     int samples = 0;
+    double pause_s = 0;  // the longest without a sample of any sensor since its last one
+  };
+  /// What the wheel has counted since the reference without a camera beside it.
+  struct Unwatched {
+    double distance_m = 0;  // of the train at its last sample
+    double way_m = 0;       // as far as nobody would have seen it slip
+    double fastest_mps = 0;
+    double apart_m = 0;   // its way less the train's while it was isolated: who is wrong is not known for certain
+    double behind_m = 0;  // the furthest that came to
+    double ahead_m = 0;
   };
   static constexpr int kGnssProof = 30;
   enum class FixVerdict : uint8_t { none, used, refused };
@@ -154,6 +170,10 @@ class Estimator {
   void use_acceleration(double accel_mps2, int64_t stamp_ns);
   void compare_with_wheel(const OdometryInput& step, double sigma_m);
   void isolate_wheel();
+  void doubt_silent_wheel(int64_t silent_since_ns, double way_m);
+  void watch_alone(double way_m);
+  [[nodiscard]] bool is_watched() const;
+  [[nodiscard]] double unwatched_share() const;
   void recover_wheel(const WheelInput& sample, double wheel_m, double sigma_m);
   void use_yaw_rate(double rate_rps);
   void refuse(const FixInput& fix, double path_distance_m, const Offer& offer);
@@ -176,6 +196,8 @@ class Estimator {
   Repeated accel_repeated_;
   Mean yaw_;
   Wheel wheel_;
+  WheelNoise wheel_noise_;
+  Unwatched unwatched_;
   SlipWatch slip_watch_;
   SuddenChange sudden_change_;
   bool slip_began_ = false;

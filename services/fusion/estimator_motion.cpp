@@ -21,8 +21,15 @@ constexpr double kSlipWindowS = 0.5;
 constexpr int kGoodWindows = 2;
 constexpr double kSlipTestSigmas = 3.0;
 constexpr double kSlipSigmas = 4.5;
+constexpr double kScatterResolutions = 3.0;
+constexpr double kSilentS = 1.0;
+constexpr double kSilentSlip = 0.1;           // share of the way
 constexpr double kGyroPositionSigmaM = 30.0;  // within which the curvature may be taken as linear
 constexpr double kLatelyS = 1.0;
+constexpr double kBridgeS = 10.0;  // as long as the IMU alone is good for a speed
+constexpr double kTaughtS = 30.0;
+constexpr double kUnseenBiasSigmas = 4.0;
+constexpr double kUnknownSpeedMps = 10.0;
 
 }  // namespace
 
@@ -104,13 +111,18 @@ void Estimator::isolate_wheel() {
 void Estimator::use(const WheelInput& sample) {
   auto& watch = watched(Source::wheel);
   if (!watch.isolated) doubt_time(watch, pulses_, sample.stamp_ns);
-  watch.seen_ns = sample.stamp_ns;
-  const double sigma_m = std::hypot(1 / sample.pulses_per_metre / std::sqrt(12.0), 0.001);
+  const int64_t before_ns = std::exchange(watch.seen_ns, sample.stamp_ns);
   const bool first = !wheel_.first_pulses;
   if (first) wheel_.first_pulses = sample.pulses;
-  wheel_.resolution_m = 1 / sample.pulses_per_metre;
   const double wheel_m = static_cast<double>(sample.pulses - *wheel_.first_pulses) / sample.pulses_per_metre;
+  const double way_m = first ? 0.0 : wheel_m - std::exchange(wheel_.last_m, wheel_m);
+  wheel_noise_.add(sample.stamp_ns, wheel_m);
+  const double resolution_sigma_m = std::hypot(1 / sample.pulses_per_metre / std::sqrt(12.0), 0.001);
+  wheel_.scatters = wheel_noise_.sigma_m() > kScatterResolutions * resolution_sigma_m;
+  const double sigma_m = wheel_.scatters ? wheel_noise_.sigma_m() : resolution_sigma_m;
+  wheel_.resolution_m = wheel_.scatters ? sigma_m * std::sqrt(2.0) : 1 / sample.pulses_per_metre;
   slip_watch_.wheel(sample.stamp_ns, wheel_m);
+  doubt_silent_wheel(before_ns, way_m);
   if (sample.stamp_ns <= wheel_.blocked_until_ns) {
     isolate_wheel();
     slip_began_ = false;
@@ -128,6 +140,46 @@ void Estimator::use(const WheelInput& sample) {
   } else if (++watch.refused >= kRefusalsToIsolate) {
     isolate_wheel();
   }
+  watch_alone(way_m);
+}
+
+// What it counted while it was silent may have a slip in it. When every sensor was silent it is the clock that is
+// asked.
+void Estimator::doubt_silent_wheel(int64_t silent_since_ns, double way_m) {
+  if (silent_since_ns == 0 || core::seconds(stamp_ns_ - silent_since_ns) < std::max(kSilentS, 5 * pulses_.period_s))
+    return;
+  if (gap_begin_ns_ >= silent_since_ns) return;
+  filter_.doubt_wheel(kSilentSlip * std::abs(way_m));
+}
+
+// A slip that begins slowly takes the filter along, and when it ends it is the wheel that seems to slip.
+void Estimator::watch_alone(double way_m) {
+  const double run_m = filter_.value(StateIndex::distance) - unwatched_.distance_m;
+  unwatched_.distance_m += run_m;
+  if (watch(Source::wheel).isolated && !is_watched()) {
+    unwatched_.apart_m += filter_.scale(Odometer::wheel) * way_m - run_m;
+    unwatched_.behind_m = std::max(unwatched_.behind_m, -unwatched_.apart_m);
+    unwatched_.ahead_m = std::max(unwatched_.ahead_m, unwatched_.apart_m);
+  }
+  const double share = unwatched_share();
+  unwatched_.way_m += share * std::max(std::abs(way_m), std::abs(run_m));
+  unwatched_.fastest_mps = std::max(unwatched_.fastest_mps, share * std::abs(filter_.speed_mps()));
+}
+
+// A camera sees every slip; what it has taught of scales and biases is good for some time.
+bool Estimator::is_watched() const {
+  return used_within(Source::camera, kTaughtS);
+}
+
+// An IMU sees none that has been there from the beginning, and later as little as it knows
+// its own bias.
+double Estimator::unwatched_share() const {
+  if (is_watched()) return 0;
+  if (!used_within(Source::imu, kLatelyS)) return 1;
+  const double slip_s = parameters_->wheel_slip_s;
+  if (core::seconds(stamp_ns_ - std::max(watch(Source::wheel).changed_ns, start_ns_)) < slip_s) return 1;
+  const double unseen_mps = kUnseenBiasSigmas * filter_.sigma(StateIndex::accel_bias) * slip_s;
+  return std::min(1.0, unseen_mps / (parameters_->wheel_slip_share * std::abs(filter_.speed_mps()) + 0.01));
 }
 
 // While the wheel slips its odometer is only compared, window by window; two good windows in which it turned end the
@@ -143,10 +195,14 @@ void Estimator::recover_wheel(const WheelInput& sample, double wheel_m, double s
   MotionFilter trial = filter_;
   const bool good = trial.offer_wheel(wheel_m, sigma_m, kSlipTestSigmas).used;
   const bool with_camera = watch(Source::camera).seen_ns != 0 && !silent(Source::camera);
-  if (with_camera && good && std::abs(wheel_m - *wheel_.window_m) < kRecoveryWayM) return;
+  const bool turns = std::abs(wheel_m - *wheel_.window_m) >= kRecoveryWayM;
+  if (with_camera && good && !turns) return;
   wheel_.good_windows = good ? wheel_.good_windows + 1 : 0;
+  // Without a camera for so long nothing knows the speed better than a wheel that turns.
+  const bool alone = !is_watched() && core::seconds(sample.stamp_ns - watch(Source::wheel).changed_ns) > kBridgeS;
+  if (alone && turns && !good) filter_.loosen_speed(kUnknownSpeedMps);
   begin_window();
-  if (wheel_.good_windows >= kGoodWindows) watched(Source::wheel).accept(sample.stamp_ns);
+  if (wheel_.good_windows >= kGoodWindows || (alone && turns)) watched(Source::wheel).accept(sample.stamp_ns);
 }
 
 std::optional<double> Estimator::Mean::add(int64_t stamp_ns, double value, double period_s) {

@@ -111,6 +111,7 @@ void Estimator::accept(const FixInput& fix) {
   refused_fix_.reset();
   off_path_fixes_ = 0;
   doubt_m_ = doubt_behind_m_ = doubt_ahead_m_ = time_doubt_m_ = 0;
+  unwatched_ = {.distance_m = unwatched_.distance_m};
   // A vague fix helps, but is nothing to measure a distance from.
   if (fix.kind == FixKind::curvature && fix.sigma_m > 2 * filter_.path_sigma_m()) return;
   reference_ = fix.landmark;

@@ -52,6 +52,10 @@ struct FusionConfig {
     f.number("step_sigma_floor_m", p.step_sigma_floor_m, {1e-5, 1}, "m", "Least noise of one odometry step.");
     f.number("wheel_scale_sigma", p.wheel_scale_sigma, {1e-5, 0.2}, "", "The same for the wheel (wear, creep).");
     f.number("wheel_scale_length_m", p.wheel_scale_length_m, {100, 1e7}, "m", "The same for the wheel.");
+    f.number("wheel_slip_share", p.wheel_slip_share, {0, 1}, "",
+             "Where the wheel measures alone, a slip or slide may be this share of the speed ...");
+    f.number("wheel_slip_s", p.wheel_slip_s, {0, 60}, "s", "... for so long ...");
+    f.number("wheel_slip_per_m", p.wheel_slip_per_m, {0, 0.5}, "m/m", "... and all of them this share of a long way.");
     f.number("imu_period_s", p.imu_period_s, {0.001, 1}, "s", "Inertial samples are used as means over this time.");
     f.number("accel_sigma_mps2", p.accel_sigma_mps2, {0.001, 5}, "m/s^2", "Noise of such a mean.");
     f.number("accel_bias_sigma_mps2", p.accel_bias_sigma_mps2, {0.001, 5}, "m/s^2",

@@ -19,6 +19,11 @@ struct FusionParameters {
   double wheel_scale_sigma = 0.01;
   double wheel_scale_length_m = 60000;
 
+  // What a slip or slide can add that no other sensor would see: once, and over a long way.
+  double wheel_slip_share = 0.3;  // of the speed ...
+  double wheel_slip_s = 8.0;      // ... for so long
+  double wheel_slip_per_m = 0.05;
+
   // IMU: noise of the mean over imu_period_s, bias with the mount's pitch in it.
   double imu_period_s = 0.05;
   double accel_sigma_mps2 = 0.15;

@@ -213,12 +213,12 @@ Interval Hypotheses::promised(const Interval& main) const {
 TrainEstimate Hypotheses::estimate() const {
   Estimator main = main_;
   main.predict_to(stamp_ns());
-  Interval all = promised(main.interval());
+  Interval all = main.widened(promised(main.interval()));
   double since_sure_m = main.since_reference_m();
   if (without_last_fix_) {
     Estimator other = *without_last_fix_;
     other.predict_to(stamp_ns());
-    const Interval its = other.interval();
+    const Interval its = other.widened(other.interval());
     all.behind_m = std::min(all.behind_m, its.behind_m);
     all.ahead_m = std::max(all.ahead_m, its.ahead_m);
     since_sure_m = other.since_reference_m();

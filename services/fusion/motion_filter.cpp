@@ -202,6 +202,10 @@ void MotionFilter::restart_wheel(double wheel_m, double sigma_m) {
   ud_.reset(index(StateIndex::wheel_odometer), squared(sigma_m));
 }
 
+void MotionFilter::doubt_wheel(double sigma_m) {
+  ud_.inflate(index(StateIndex::wheel_odometer), squared(sigma_m));
+}
+
 void MotionFilter::loosen_origin(double sigma_m) {
   ud_.inflate(index(StateIndex::origin), squared(sigma_m));
 }
@@ -218,6 +222,10 @@ void MotionFilter::doubt_way(double sigma_m) {
   g(index(StateIndex::distance), 0) = unit_scale();
   g(index(StateIndex::wheel_odometer), 0) = 1 / to_unit(Odometer::wheel);
   ud_.propagate(StateMatrix::Identity(n, n), g, StateVector::Constant(1, squared(sigma_m)));
+}
+
+void MotionFilter::loosen_speed(double sigma_mps) {
+  ud_.reset(index(StateIndex::speed), squared(sigma_mps));
 }
 
 // One change at the begin of that time, and one now for all the changes between.

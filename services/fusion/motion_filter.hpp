@@ -75,6 +75,8 @@ class MotionFilter {
 
   /// The wheel's odometer begins anew at this reading (first sample, after slip).
   void restart_wheel(double wheel_m, double sigma_m);
+  /// The wheel may have counted so much too much or too little.
+  void doubt_wheel(double sigma_m);
   /// The place is not where it was thought: the origin becomes unknown within sigma and the next fix decides.
   void loosen_origin(double sigma_m);
   /// Path distance becomes `path_distance_m`, unknown within sigma, whatever it was.
@@ -84,6 +86,8 @@ class MotionFilter {
   void doubt_way(double sigma_m);
   /// The acceleration may have become another one by sigma, up to `since_s` ago.
   void doubt_acceleration(double since_s, double sigma_mps2);
+  /// The speed is another one within sigma (unit metres).
+  void loosen_speed(double sigma_mps);
   /// Takes over another filter's place (distance, path distance and their sigmas) as independent knowledge.
   void place_like(const MotionFilter& other);
 

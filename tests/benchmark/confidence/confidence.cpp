@@ -27,6 +27,7 @@ struct Arguments {
   double sudden_mps2 = 0;
   int64_t run = -1;
   int position = 0;
+  std::string row;
   bool list = false;
   bool sources = false;
 };
@@ -164,6 +165,7 @@ int run(int argc, char** argv) {
   app.add_option("--run", a.run, "Print one run of the campaign second by second");
   app.add_flag("--sources", a.sources, "Without faults: a table of what each source is worth");
   app.add_option("--position", a.position, "Position with frogs and portals as references: so many runs of 26 km");
+  app.add_option("--row", a.row, "... with this set of sensors alone, as the table names it");
   app.add_flag("--slip-always", a.plan.slip_always, "The wheel slips beside every fault: two faults at once");
   app.add_flag("--list", a.list, "Print the faults");
   CLI11_PARSE(app, argc, argv);
@@ -181,7 +183,7 @@ int run(int argc, char** argv) {
     return 0;
   }
   if (a.position > 0) {
-    print_positions(a.plan.seed, a.position);
+    print_positions(a.plan.seed, a.position, a.row);
     return 0;
   }
   if (a.sources) {

@@ -80,12 +80,13 @@ bool near_one(const std::vector<double>& places, double distance_m) {
 
 }  // namespace
 
-void print_positions(uint64_t seed, int runs) {
+void print_positions(uint64_t seed, int runs, const std::string& only) {
   const auto map = std::make_shared<const track::Map>(simulator::builtin_line("long").value());
   const auto start = map->parse_position("1:100").value();
   std::printf("%-30s %8s %8s %8s %8s %8s %8s %8s %10s %8s\n", "sensors", "km", "p50 (m)", "p95 (m)", "max (m)",
               "near p95", "near max", "mean (m)", "width (m)", "outside");
   for (const auto& row : kRows) {
+    if (!only.empty() && only != row.name) continue;
     Verdict sum;
     std::vector<float> near_m;
     std::vector<float> all_m;
@@ -94,13 +95,20 @@ void print_positions(uint64_t seed, int runs) {
       auto fusion = core::value_or_throw(fusion::Fusion::create(parameters_of(row), map, simulation.start()));
       const auto places = references_on(simulation.path());
       double next_m = places.front();
+      int outside = 0;
       sum.add(judge(simulation, fusion, 0, [&](const fusion::TrainEstimate& state, double error_m) {
+        if (error_m > state.over_m || -error_m > state.under_m) {
+          if (outside++ == 0)
+            std::printf("(run %d outside at %.1f s, %.1f m: %.2f m in [-%.2f, +%.2f], %s)\n", run,
+                        core::seconds(state.stamp_ns - simulation.stamp_ns(0)), state.distance_m, error_m,
+                        state.under_m, state.over_m, state.reason.c_str());
+        }
         if (state.path_distance_m < next_m) return;
         next_m = state.path_distance_m + kEveryM;
         all_m.push_back(static_cast<float>(std::abs(error_m)));
         if (near_one(places, state.path_distance_m)) near_m.push_back(static_cast<float>(std::abs(error_m)));
       }));
-      if (run == 0 && &row == kRows)
+      if (run == 0 && (&row == kRows || !only.empty()))
         std::printf("(%zu references on %.1f km)\n", places.size(), simulation.path().end_m() / 1000);
     }
     double mean_m = 0;

@@ -1,0 +1,168 @@
+// What a wheel can do to a train that no camera watches: readings that scatter, pulses that were lost, slips nobody
+// sees.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/random.hpp"
+#include "core/time.hpp"
+#include "fusion/fusion.hpp"
+#include "fusion/wheel_noise.hpp"
+
+namespace railfix::fusion {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr double kPeriodS = 0.05;
+
+// A train on a straight line. Truth is kept in metres since the start.
+class Train {
+ public:
+  Train() {
+    auto map = std::make_shared<track::Map>();
+    map->edges.push_back({1, "line", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{20000, 0, 0}})});
+    map->nodes = {{1, track::NodeKind::end, "", 0, 0}, {2, track::NodeKind::end, "", 0, 20000}};
+    fusion_.emplace(
+        core::value_or_throw(Fusion::create({}, map, track::EdgePosition{1, 1000, track::Direction::forward})));
+  }
+
+  bool camera = true;  // false: there is none, or it is silent
+  bool blind = false;  // it says that it sees nothing
+  bool wheel = true;   // its samples arrive
+  bool imu = true;
+  double slip = 0;     // share that the wheel counts too much
+  double noise_m = 0;  // of the wheel's readings
+  double speed_mps = 0;
+  double way_m = 0;
+  double worst_error_m = 0;  // since it was set to 0 last
+  std::optional<TrainEstimate> state;
+
+  /// Runs so long with this acceleration; every state must hold the train.
+  void run(double time_s, double acceleration_mps2 = 0) {
+    for (int i = 0; i < std::lround(time_s / kPeriodS); ++i) {
+      const double step_m = speed_mps * kPeriodS + 0.5 * acceleration_mps2 * kPeriodS * kPeriodS;
+      speed_mps += acceleration_mps2 * kPeriodS;
+      way_m += step_m;
+      wheel_m_ += step_m * (1 + slip);
+      ++ticks_;
+      if (imu) see(fusion_->add(ImuInput{now(), acceleration_mps2 + 0.05 * random_.normal(), 0}));
+      const double reading_m = wheel_m_ + noise_m * random_.normal();
+      if (wheel) see(fusion_->add(WheelInput{now(), static_cast<int64_t>(std::floor(reading_m * 90)), 90}));
+      if (camera)
+        see(fusion_->add(OdometryInput{now(), now() - core::to_ns(kPeriodS), blind ? 0 : step_m, 0.002, !blind}));
+    }
+  }
+
+ private:
+  [[nodiscard]] int64_t now() const { return 1'600'000'000'000'000'000 + ticks_ * core::to_ns(kPeriodS); }
+  void see(const std::optional<TrainEstimate>& next) {
+    if (!next) return;
+    state = next;
+    if (next->stamp_ns != now()) return;
+    const double error_m = next->distance_m - way_m;
+    worst_error_m = std::max(worst_error_m, std::abs(error_m));
+    EXPECT_LE(error_m, next->over_m) << state->reason << " at tick " << ticks_;
+    EXPECT_LE(-error_m, next->under_m) << state->reason << " at tick " << ticks_;
+  }
+
+  core::Random random_{7};
+  std::optional<Fusion> fusion_;
+  int64_t ticks_ = 0;
+  double wheel_m_ = 0;
+};
+
+TEST(WheelNoise, IsLearntAndASlipIsNone) {
+  core::Random random(3);
+  WheelNoise quiet;
+  WheelNoise slipping;
+  WheelNoise noisy;
+  for (int64_t i = 0; i < 100; ++i) {
+    const double way_m = 1.5 * static_cast<double>(i);
+    quiet.add(i * 50'000'000, std::floor(way_m * 90) / 90);
+    slipping.add(i * 50'000'000, i < 90 ? way_m : 1.3 * way_m);
+    noisy.add(i * 50'000'000, way_m + 0.1 * random.normal());
+  }
+  EXPECT_LT(quiet.sigma_m(), 0.008);
+  EXPECT_LT(slipping.sigma_m(), 0.001);
+  EXPECT_NEAR(noisy.sigma_m(), 0.1, 0.05);
+}
+
+TEST(Wheel, ReadingsThatScatterMoveNothingWhileTheCameraIsBlind) {
+  Train train;
+  train.run(60, 0.5);
+  train.blind = true;
+  train.run(9);
+  train.noise_m = 0.1;
+  train.worst_error_m = 0;
+  train.run(15);
+  EXPECT_LT(train.worst_error_m, 1.5);
+  EXPECT_EQ(train.state->integrity, Integrity::degraded);
+  EXPECT_THAT(train.state->reason, HasSubstr("wheel"));
+}
+
+TEST(Wheel, WhatItCountedWhileItWasSilentIsNotBelieved) {
+  Train train;
+  train.run(30, 0.5);
+  train.wheel = false;
+  train.slip = -0.3;
+  train.run(30, -0.5);
+  train.run(10);
+  train.blind = true;
+  train.run(12);
+  train.wheel = true;
+  train.worst_error_m = 0;
+  train.run(2);
+  EXPECT_LT(train.worst_error_m, 3);
+}
+
+// Its rival without wheel once promised 19 km, because the clock was doubted for as long as the camera was away.
+TEST(Wheel, TheReturnOfASilentCameraDoesNotDoubtTheClock) {
+  Train train;
+  train.run(60, 0.5);
+  train.camera = false;
+  train.run(150);
+  const double width_m = train.state->over_m + train.state->under_m;
+  train.camera = true;
+  train.run(1);
+  EXPECT_LT(train.state->over_m + train.state->under_m, width_m + 20);
+}
+
+TEST(Wheel, AloneItAdmitsWhatASlipMayAdd) {
+  Train train;
+  train.camera = train.imu = false;
+  train.run(40, 0.5);
+  for (double slip = 0; slip < 0.25; slip += 0.001) {  // so slowly that no test on innovations sees it
+    train.slip = slip;
+    train.run(kPeriodS);
+  }
+  EXPECT_GT(train.worst_error_m, 20);
+  train.slip = 0;
+  train.run(10);
+  EXPECT_NE(train.state->integrity, Integrity::ok);
+  EXPECT_THAT(train.state->reason, HasSubstr("nothing would see it slip"));
+}
+
+TEST(Wheel, ASlipFromTheStandHoldsWithAnImuAndTheWheelComesBack) {
+  Train train;
+  train.camera = false;
+  train.run(20);
+  train.slip = 0.15;
+  train.run(6, 0.6);
+  train.slip = 0;
+  train.run(6, 0.6);
+  train.run(30);
+  EXPECT_NEAR(train.state->speed_mps, train.speed_mps, 0.3);
+}
+
+TEST(Wheel, TheReasonSaysSinceWhenItIsDistrusted) {
+  Train train;
+  train.run(40, 0.5);  // the clock began at 12:26:40
+  train.slip = 0.3;
+  train.run(3);
+  EXPECT_THAT(train.state->reason, HasSubstr("wheel slips or slides since 12:27:"));
+}
+
+}  // namespace
+}  // namespace railfix::fusion
