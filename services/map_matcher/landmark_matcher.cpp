@@ -8,7 +8,7 @@ namespace railfix::map_matcher {
 namespace {
 
 constexpr double kDensityReachM = 200;  // of mapped landmarks, for the chance of a random hit
-constexpr int kWindowSteps = 40;
+constexpr double kFitStepM = 0.7;       // earlier sightings fit within about so much
 constexpr double kClearSideM = 1.0;
 constexpr size_t kMostSightings = 12;
 
@@ -25,8 +25,9 @@ bool other_side(const Sighting& sighting, const track::PathLandmark& landmark) {
 }  // namespace
 
 // Every mapped landmark of the kind in the window is one hypothesis, weighed by how well the earlier sightings fit it;
-// the last hypothesis is that this sighting is false, weighed by their mean fit over the window. The window itself only
-// selects.
+// that it stands elsewhere than the map says is another; the last one is that this sighting is false, weighed by the
+// mean fit over the window. The confidence is a chance for the sighting, not for each landmark in the window. The
+// window itself only selects.
 std::optional<Fix> LandmarkMatcher::add(const Sighting& sighting, const Prior& prior) {
   const double place_m = prior.travelled_m + sighting.distance_ahead_m;
   const double margin_m = parameters_.window_margin_m + 3 * sighting.sigma_m;
@@ -36,17 +37,19 @@ std::optional<Fix> LandmarkMatcher::add(const Sighting& sighting, const Prior& p
   std::erase_if(seen_, [&](const Seen& seen) { return std::abs(place_m - seen.place_m) > parameters_.history_m; });
 
   const double confidence = std::clamp(sighting.confidence, 0.01, 0.999);
-  double mean_fit = 0;
-  for (int i = 0; i <= kWindowSteps; ++i) {
-    mean_fit += history_fits(from_m + (to_m - from_m) * i / kWindowSteps - place_m, place_m) / (kWindowSteps + 1);
-  }
-  double sum = mean_fit * (1 - confidence + parameters_.false_per_m * (to_m - from_m));
+  std::vector<const track::PathLandmark*> candidates = near(sighting.kind, from_m, to_m);
+  std::erase_if(candidates, [&](const auto* landmark) { return other_side(sighting, *landmark); });
+  const double expected = std::max(1.0, parameters_.detection * static_cast<double>(candidates.size()));
+  double sum = mean_fit(from_m - place_m, to_m - place_m, place_m) *
+               ((1 - confidence) * expected + parameters_.false_per_m * (to_m - from_m));
   const track::PathLandmark* best = nullptr;
   double best_weight = 0;
-  for (const auto* landmark : near(sighting.kind, from_m, to_m)) {
-    if (other_side(sighting, *landmark)) continue;
-    const double weight = confidence * parameters_.detection * history_fits(landmark->distance_m - place_m, place_m);
-    sum += weight;
+  for (const auto* landmark : candidates) {
+    const double shift_m = landmark->distance_m - place_m;
+    const double chance = confidence * parameters_.detection;
+    const double weight = chance * (1 - parameters_.moved) * history_fits(shift_m, place_m);
+    const double elsewhere = mean_fit(shift_m - parameters_.moved_m, shift_m + parameters_.moved_m, place_m);
+    sum += weight + chance * parameters_.moved * elsewhere;
     if (weight > best_weight) {
       best = landmark;
       best_weight = weight;
@@ -57,6 +60,13 @@ std::optional<Fix> LandmarkMatcher::add(const Sighting& sighting, const Prior& p
   if (best == nullptr || !(best_weight >= parameters_.min_probability * sum)) return std::nullopt;
   return Fix{sighting.stamp_ns, best->distance_m - sighting.distance_ahead_m,
              std::hypot(sighting.sigma_m, best->landmark->sigma_m), best_weight / sum, best->landmark->id};
+}
+
+double LandmarkMatcher::mean_fit(double from_m, double to_m, double now_m) const {
+  const int steps = std::max(1, static_cast<int>(std::ceil((to_m - from_m) / kFitStepM)));
+  double sum = 0;
+  for (int i = 0; i < steps; ++i) sum += history_fits(from_m + (to_m - from_m) * (i + 0.5) / steps, now_m);
+  return sum / steps;
 }
 
 double LandmarkMatcher::history_fits(double shift_m, double now_m) const {

@@ -15,6 +15,8 @@ namespace railfix::map_matcher {
 struct LandmarkParameters {
   double detection = 0.8;        // chance that a mapped landmark is sighted
   double false_per_m = 0.0005;   // false sightings of one kind per metre
+  double moved = 0.03;           // chance that a landmark stands elsewhere than the map says, ...
+  double moved_m = 6.0;          // ... by so much at most
   double scale_sigma = 0.01;     // of the distance run between sightings
   double window_margin_m = 2.0;  // beyond the promised interval of train_state
   double history_m = 600;        // sightings further back are forgotten
@@ -39,6 +41,8 @@ class LandmarkMatcher {
   };
   /// How well all earlier sightings fit the map when path distance = distance run + shift, against chance.
   [[nodiscard]] double history_fits(double shift_m, double now_m) const;
+  /// Mean of history_fits between two shifts.
+  [[nodiscard]] double mean_fit(double from_m, double to_m, double now_m) const;
   [[nodiscard]] double sighting_fits(const Seen& seen, double path_m, double relative_m) const;
   [[nodiscard]] std::vector<const track::PathLandmark*> near(track::LandmarkKind kind, double from_m,
                                                              double to_m) const;

@@ -3,53 +3,26 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numbers>
+
+#include "map_matcher/picture_fits.hpp"
 
 namespace railfix::map_matcher {
 namespace {
 
-constexpr double kCellM = 1.0;
-constexpr double kDriftPerM = 0.07;    // a bin's way may be so wrong, for the spreading of the cells
-constexpr double kMostSquared = 12.0;  // a bin that fits worse than this is not believed more
-constexpr double kLostM = 60.0;        // afterwards the window is right and the routes are not
+constexpr double kLostM = 60.0;  // afterwards the window is right and the routes are not
 constexpr double kLeastProbability = 1e-7;
 constexpr double kTurnRoundM = 0.3;
 constexpr double kSameM = 5.0;  // two routes whose distances differ by less are one
 constexpr double kFarFromWindowM = 200;
 constexpr double kMostWindowM = 300;
 constexpr size_t kMostHypotheses = 24;
-constexpr double kSideM = 0.3;
-constexpr double kNoiseShare = 1.5;       // no sensor knows its own noise better
-constexpr double kNoLagShare = 0.3;       // of the cars
-constexpr double kHalfBodyM = 8.0;        // a long car turns with the mean of the track below it
-constexpr double kViewStepM = 3.0;        // places where the curvature in a picture is read from the map
-constexpr double kBiasForgetPerM = 5e-4;  // the sensor's bias may be another one after some kilometres
+constexpr double kNoLagShare = 0.3;  // of the cars
 
 double log_sum(double a, double b) {
   const double most = std::max(a, b);
   if (!std::isfinite(most)) return most;
   return most + std::log1p(std::exp(std::min(a, b) - most));
 }
-
-/// Sums of a route's curvature every metre, so that means over any stretch are cheap.
-class CurvatureSums {
- public:
-  CurvatureSums(const track::Route& route, double first_m, double last_m) : first_m_(first_m) {
-    sums_.push_back(0);
-    for (double m = first_m + 0.5; m < last_m + 1; m += 1) sums_.push_back(sums_.back() + route.curvature_at(m));
-  }
-  /// REQUIRES: from_m < to_m, both within the stretch.
-  [[nodiscard]] double mean(double from_m, double to_m) const { return (sum(to_m) - sum(from_m)) / (to_m - from_m); }
-
- private:
-  [[nodiscard]] double sum(double m) const {
-    const double cell = std::clamp(m - first_m_, 0.0, static_cast<double>(sums_.size()) - 1.001);
-    const auto i = static_cast<size_t>(cell);
-    return sums_[i] + (cell - static_cast<double>(i)) * (sums_[i + 1] - sums_[i]);
-  }
-  double first_m_;
-  std::vector<double> sums_;
-};
 
 }  // namespace
 
@@ -127,79 +100,25 @@ void TrackChooser::move_blind(double way_m) {
   place_m_ += way_m;
   lost_m_ += std::abs(way_m);
   run_pictures(way_m);
-  for (auto& hypothesis : hypotheses_) spread(hypothesis, way_m);
+  for (auto& hypothesis : hypotheses_) spread(hypothesis.cells, way_m);
   trim();
   extend();
   fit_cells();
 }
 
 void TrackChooser::use_pending() {
-  const Pending bin = pending_;
+  const BinTurn bin = pending_;
   pending_ = {};
   cells_m_ += bin.way_m;
   trim();
   extend();
   fit_cells();
   for (auto& hypothesis : hypotheses_) {
-    spread(hypothesis, bin.way_m);
-    weigh_turn(hypothesis, bin);
+    spread(hypothesis.cells, bin.way_m);
+    weigh_turn(hypothesis.cells, cells_m_, hypothesis.route, bin, parameters_);
   }
   merge();
   prune();
-}
-
-// Every cell is one place of the train and carries the bias that fits best there.
-void TrackChooser::weigh_turn(Hypothesis& hypothesis, const Pending& bin) const {
-  const double measured = bin.turn_rad / bin.way_m;
-  const double sensor = kNoiseShare * bin.variance / (bin.way_m * bin.way_m);
-  const double body = parameters_.noise_per_m * parameters_.noise_per_m;
-  const double bias_to_curvature = bin.bias_rad / bin.way_m;
-  const double end_m = cells_m_ + kCellM * static_cast<double>(hypothesis.cells.size());
-  const CurvatureSums track(hypothesis.route, cells_m_ - kHalfBodyM - 3 - std::abs(bin.way_m),
-                            end_m + kHalfBodyM + 3 + std::abs(bin.way_m));
-  for (size_t i = 0; i < hypothesis.cells.size(); ++i) {
-    Cell& cell = hypothesis.cells[i];
-    const double middle_m = cells_m_ + kCellM * static_cast<double>(i) - 0.5 * bin.way_m;
-    // A short car turns with the track below it, a long one with the mean below its body.
-    const double below = track.mean(middle_m - 1, middle_m + 1);
-    const double of_body = track.mean(middle_m - kHalfBodyM, middle_m + kHalfBodyM);
-    const double mapped = 0.5 * (below + of_body);
-    const double rough = std::hypot(parameters_.curvature_share * mapped, 0.5 * (below - of_body));
-    // Body and map err over several bins alike: as much less is to be learnt from one.
-    const double own = sensor + parameters_.correlated_bins * (body + rough * rough);
-    learn_bias(cell, measured - mapped - bias_to_curvature * cell.bias, own, bias_to_curvature);
-    cell.log_weight += 0.5 * std::log(sensor + body);
-    cell.bias_variance = std::min(1.0, cell.bias_variance + kBiasForgetPerM * std::abs(bin.way_m));
-  }
-}
-
-// A Kalman filter of one state; how well the measurement fits weighs the cell.
-void TrackChooser::learn_bias(Cell& cell, double error, double own_variance, double bias_gain) {
-  const double variance = own_variance + bias_gain * bias_gain * cell.bias_variance;
-  const double squared = error * error / variance;
-  cell.log_weight -= 0.5 * (std::min(squared, kMostSquared) + std::log(variance));
-  if (squared > kMostSquared) return;
-  const double gain = cell.bias_variance * bias_gain / variance;
-  cell.bias += gain * error;
-  cell.bias_variance *= std::max(0.0, 1 - gain * bias_gain);
-}
-
-void TrackChooser::spread(Hypothesis& hypothesis, double way_m) const {
-  const double share = std::min(0.25, 0.5 * std::pow(kDriftPerM * way_m / kCellM, 2));
-  if (hypothesis.cells.size() < 3 || share <= 0) return;
-  const double most =
-      std::max_element(hypothesis.cells.begin(), hypothesis.cells.end(), [](const Cell& a, const Cell& b) {
-        return a.log_weight < b.log_weight;
-      })->log_weight;
-  std::vector<double> weights;
-  weights.reserve(hypothesis.cells.size());
-  for (const Cell& cell : hypothesis.cells) weights.push_back(std::exp(cell.log_weight - most));
-  for (size_t i = 0; i < weights.size(); ++i) {
-    const double before = weights[i == 0 ? 0 : i - 1];
-    const double after = weights[std::min(i + 1, weights.size() - 1)];
-    const double mixed = (1 - 2 * share) * weights[i] + share * (before + after);
-    hypothesis.cells[i].log_weight = most + std::log(std::max(mixed, 1e-300));
-  }
 }
 
 // The cells cover where the train can be; new ones at the ends know no more than their neighbours.
@@ -357,36 +276,6 @@ double TrackChooser::of_turning(const Hypothesis& hypothesis) const {
   return most + std::log(sum / std::max(prior, 1e-300));
 }
 
-double TrackChooser::sighting_fits(const track::Route& route, const Sighting& sighting) const {
-  const double seen_m = place_m_ + sighting.distance_ahead_m;
-  const double sigma_m = std::hypot(sighting.sigma_m, window_.sigma_m, parameters_.map_sigma_m);
-  const bool sided = std::abs(sighting.lateral_m) > kSideM;
-  double density = parameters_.false_per_m + (1 - std::clamp(sighting.confidence, 0.0, 1.0)) / (6 * sigma_m);
-  for (const auto& leg : route.legs()) {
-    if (leg.begin_m > seen_m + 5 * sigma_m || leg.end_m() < seen_m - 5 * sigma_m) continue;
-    for (const auto* landmark : map_->landmarks_on(leg.run.edge->id)) {
-      const bool turned = !leg.run.forward;
-      auto kind = landmark->kind;
-      if (turned && kind == track::LandmarkKind::portal_in) {
-        kind = track::LandmarkKind::portal_out;
-      } else if (turned && kind == track::LandmarkKind::portal_out) {
-        kind = track::LandmarkKind::portal_in;
-      }
-      if (kind != sighting.kind) continue;
-      const double at_m = leg.begin_m + (turned ? leg.run.length_m() - landmark->offset_m : landmark->offset_m);
-      const double z = (at_m - seen_m) / sigma_m;
-      const double lateral_m = turned ? -landmark->lateral_m : landmark->lateral_m;
-      double side = 1;
-      if (sided && std::abs(lateral_m) > kSideM) {
-        side = (lateral_m > 0) == (sighting.lateral_m > 0) ? 1 - parameters_.wrong_side : parameters_.wrong_side;
-      }
-      density += parameters_.detection * sighting.confidence * side * std::exp(-0.5 * z * z) /
-                 (sigma_m * std::sqrt(2 * std::numbers::pi));
-    }
-  }
-  return density;
-}
-
 // Astray, the pictures show one of the other ways.
 void TrackChooser::use_picture(const std::vector<double>& log_fits) {
   for (size_t i = 0; i < hypotheses_.size(); ++i) {
@@ -412,25 +301,13 @@ void TrackChooser::run_pictures(double way_m) {
 
 void TrackChooser::sight(const Sighting& sighting) {
   if (hypotheses_.size() < 2) return;
+  const SightedOnRoute seen{sighting, place_m_ + sighting.distance_ahead_m,
+                            std::hypot(sighting.sigma_m, window_.sigma_m, parameters_.map_sigma_m)};
   std::vector<double> fits;
-  for (const auto& hypothesis : hypotheses_) fits.push_back(std::log(sighting_fits(hypothesis.route, sighting)));
+  for (const auto& hypothesis : hypotheses_)
+    fits.push_back(std::log(sighting_fits(*map_, hypothesis.route, seen, parameters_)));
   use_picture(fits);
   prune();
-}
-
-// The picture is taken where the train really is, anywhere in the window: what fits one of these places fits.
-double TrackChooser::view_fits(const track::Route& route, double curvature_per_m, double sigma_per_m) const {
-  double least = INFINITY;
-  double most = -INFINITY;
-  const double end_m = last_m() + parameters_.view_to_m;
-  for (double m = place_m_ - window_.over_m - 2 + parameters_.view_from_m; m < end_m + kViewStepM; m += kViewStepM) {
-    const double mapped = route.curvature_at(std::min(m, end_m));
-    const double rough = parameters_.curvature_share * std::abs(mapped);
-    least = std::min(least, mapped - rough);
-    most = std::max(most, mapped + rough);
-  }
-  const double beyond = std::max({0.0, least - curvature_per_m, curvature_per_m - most});
-  return -0.5 * std::min(kMostSquared, beyond * beyond / (sigma_per_m * sigma_per_m)) / parameters_.correlated_bins;
 }
 
 void TrackChooser::see(double curvature_per_m, double sigma_per_m) {
@@ -438,7 +315,8 @@ void TrackChooser::see(double curvature_per_m, double sigma_per_m) {
   seen_m_ = 0;
   const double sigma = std::hypot(sigma_per_m, parameters_.noise_per_m);
   std::vector<double> fits;
-  for (const auto& hypothesis : hypotheses_) fits.push_back(view_fits(hypothesis.route, curvature_per_m, sigma));
+  const ViewedCurvature view{curvature_per_m, sigma, place_m_ - window_.over_m - 2, last_m()};
+  for (const auto& hypothesis : hypotheses_) fits.push_back(view_fits(hypothesis.route, view, parameters_));
   use_picture(fits);
 }
 

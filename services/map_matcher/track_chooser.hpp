@@ -9,27 +9,11 @@
 #include <vector>
 
 #include "map_matcher/match_types.hpp"
+#include "map_matcher/track_parameters.hpp"
+#include "map_matcher/turn_cells.hpp"
 #include "track/ways.hpp"
 
 namespace railfix::map_matcher {
-
-struct TrackParameters {
-  double bin_m = 2.0;             // turning is compared over this way
-  double noise_per_m = 3e-4;      // least sigma of the curvature of one bin: car body, sleepers
-  double curvature_share = 0.15;  // of the map's curvature: switches are drawn roughly
-  double correlated_bins = 2.0;   // neighbouring bins err together, but for the sensor's noise
-  double lag_m = 20.0;            // the car body turns up to so far behind the camera's foot (distance of the bogies)
-  double map_sigma_m = 1.5;       // the map's switches are somewhere else by so much
-  double reach_m = 30.0;          // ways are told apart from this far ahead
-  double declare = 0.999;         // probability from which on the track is known
-  double detection = 0.8;         // chance that a mapped landmark is sighted
-  double false_per_m = 0.0005;    // false sightings of one kind per metre
-  double wrong_side = 0.03;       // chance that a frog or mast is reported on the wrong side
-  double view_from_m = 3.0;       // the curvature in a picture is that of the rails from here ...
-  double view_to_m = 20.0;        // ... to here ahead of the camera's foot
-  double astray = 0.15;           // chance that the picture's rails are those of another leg than the own
-  double astray_m = 60.0;         // ... which then lasts about so far
-};
 
 /// Where fusion thinks the train is: an edge, and how far it may be off along the track.
 struct TrackWindow {
@@ -74,12 +58,6 @@ class TrackChooser {
   [[nodiscard]] size_t hypotheses() const { return hypotheses_.size(); }
 
  private:
-  /// One place of the train on a route: how well the turning fits, and the sensor's bias that fits best, in sigmas.
-  struct Cell {
-    double log_weight = 0;
-    double bias = 0;
-    double bias_variance = 1;
-  };
   /// What the pictures showed: their errors are not independent, since a detector that follows the other leg goes on to
   /// do so and sees that leg's frog. So a hidden state (own leg or astray) is carried along, as logarithms.
   struct Pictures {
@@ -90,20 +68,10 @@ class TrackChooser {
     track::Route route;
     double log_prior = 0;  // ways taken
     Pictures pictures;
-    std::vector<Cell> cells;
+    std::vector<TurnCell> cells;
   };
-  struct Pending {
-    double way_m = 0;
-    double turn_rad = 0;
-    double variance = 0;
-    double bias_rad = 0;
-  };
-
   void start(const TrackWindow& window);
   void use_pending();
-  void weigh_turn(Hypothesis& hypothesis, const Pending& bin) const;
-  static void learn_bias(Cell& cell, double error, double own_variance, double bias_gain);
-  void spread(Hypothesis& hypothesis, double way_m) const;
   void fit_cells();
   void turn_round();
   void extend();
@@ -113,12 +81,10 @@ class TrackChooser {
   void prune();
   void use_picture(const std::vector<double>& log_fits);
   void run_pictures(double way_m);
-  [[nodiscard]] double view_fits(const track::Route& route, double curvature_per_m, double sigma_per_m) const;
   /// Logarithm of prior and all evidence.
   [[nodiscard]] double evidence(const Hypothesis& hypothesis) const;
   [[nodiscard]] double of_turning(const Hypothesis& hypothesis) const;
   [[nodiscard]] double log_of_place(double place_m) const;
-  [[nodiscard]] double sighting_fits(const track::Route& route, const Sighting& sighting) const;
   [[nodiscard]] double first_m() const { return place_m_ - window_.over_m - parameters_.lag_m - 2; }
   [[nodiscard]] double last_m() const { return place_m_ + window_.under_m + 2; }
 
@@ -134,7 +100,7 @@ class TrackChooser {
   bool forwards_ = true;      // the way that the train moves, seen from the cab
   double seen_m_ = INFINITY;  // run since a picture was used
   TurnSensor sensor_ = TurnSensor::camera;
-  Pending pending_;
+  BinTurn pending_;
 };
 
 }  // namespace railfix::map_matcher

@@ -1,11 +1,13 @@
-// Nobody knows where the train stands: map_matcher finds the place from the way it bends, fusion starts from there.
-// Both as programs over DDS; this test is the odometer and gives the turns of lock step.
+// map_matcher without its usual inputs, as a program over DDS; this test is the rest of the train and gives the turns
+// of lock step. Nobody knows where the train stands: the place is found from the way it bends, and fusion starts from
+// there. Nobody sees anything: without a single odometry step the gyro tells which leg of a switch was taken.
 #include <gtest/gtest.h>
 
 #include <map>
 
 #include "core/random.hpp"
 #include "core/time.hpp"
+#include "core/units.hpp"
 #include "messaging/connected.hpp"
 #include "messaging/lock_step.hpp"
 #include "support/program.hpp"
@@ -50,9 +52,9 @@ track::Map made_map() {
   return map;
 }
 
-class NoStart : public ::testing::Test {
+class MatcherInLockStep : public ::testing::Test {
  protected:
-  NoStart()
+  MatcherInLockStep()
       : train_("no-start-" + std::to_string(getpid())),
         folder_(fs::temp_directory_path() / ("railfix-" + train_)),
         participant_(options(train_)),
@@ -65,9 +67,9 @@ class NoStart : public ::testing::Test {
                                [this](const msg::ServiceStatus& s) { status_[s.service().c_str()] = s; });
     fs::create_directories(folder_);
   }
-  ~NoStart() override { fs::remove_all(folder_); }
-  NoStart(const NoStart&) = delete;
-  NoStart& operator=(const NoStart&) = delete;
+  ~MatcherInLockStep() override { fs::remove_all(folder_); }
+  MatcherInLockStep(const MatcherInLockStep&) = delete;
+  MatcherInLockStep& operator=(const MatcherInLockStep&) = delete;
 
   static messaging::ParticipantOptions options(const std::string& train) {
     messaging::ParticipantOptions options;
@@ -91,7 +93,9 @@ class NoStart : public ::testing::Test {
   bool run_until(Condition condition) {
     return test::run_until(participant_, queue_, condition);
   }
-  bool connected() { return status_.size() == 2 && messaging::all_connected(participant_.connections(), status_); }
+  bool connected(size_t services) {
+    return status_.size() == services && messaging::all_connected(participant_.connections(), status_);
+  }
 
   /// Gives a service its turn and waits until it has taken it.
   bool turn_of(const std::string& service, uint64_t seq, int64_t data_ns) {
@@ -108,11 +112,11 @@ class NoStart : public ::testing::Test {
     if (taken) sent_[service] = progress_.sent();
     return taken;
   }
-  [[nodiscard]] uint64_t states_sent() const {
-    const auto fusion = sent_.find("fusion");
-    if (fusion == sent_.end()) return 0;
-    for (const auto& one : fusion->second) {
-      if (std::string(one.topic().c_str()) == "train_state") return one.samples();
+  [[nodiscard]] uint64_t sent_by(const std::string& service, const std::string& topic) const {
+    const auto samples = sent_.find(service);
+    if (samples == sent_.end()) return 0;
+    for (const auto& one : samples->second) {
+      if (topic == one.topic().c_str()) return one.samples();
     }
     return 0;
   }
@@ -131,12 +135,13 @@ class NoStart : public ::testing::Test {
   std::map<std::string, std::vector<msg::SentSamples>> sent_;
 };
 
+using NoStart = MatcherInLockStep;
 TEST_F(NoStart, ThePlaceIsFoundOnTheMapAndFusionStartsThere) {
   const track::Map map = made_map();
   ASSERT_TRUE(map.save(folder_ / "map.railfix").ok());
   const auto matcher = service("map_matcher", "railfix-map-matcher", {"map_matcher.locate_every_m=100"});
   const auto fusion = service("fusion", "railfix-fusion", {"fusion.start=unknown"});
-  ASSERT_TRUE(run_until([&] { return connected(); }));
+  ASSERT_TRUE(run_until([&] { return connected(2); }));
 
   testing::RideErrors errors;
   errors.odometer_scale = kScale - 1;
@@ -169,7 +174,7 @@ TEST_F(NoStart, ThePlaceIsFoundOnTheMapAndFusionStartsThere) {
     ASSERT_TRUE(turn_of("map_matcher", seq, stamp_ns)) << "at step " << seq;
     ASSERT_TRUE(turn_of("fusion", seq, stamp_ns)) << "at step " << seq;
   }
-  ASSERT_TRUE(run_until([&] { return states_.size() >= states_sent(); }));
+  ASSERT_TRUE(run_until([&] { return states_.size() >= sent_by("fusion", "train_state"); }));
 
   size_t unknown = 0;
   size_t known = 0;
@@ -191,6 +196,81 @@ TEST_F(NoStart, ThePlaceIsFoundOnTheMapAndFusionStartsThere) {
   ASSERT_FALSE(fixes_.empty());
   EXPECT_EQ(fixes_.front().kind(), msg::FIX_NETWORK);
   EXPECT_GT(fixes_.front().probability(), 0.999);
+}
+
+// 300 m straight, then a switch: edge 2 goes straight on, edge 3 bends to the left.
+track::Map switch_map() {
+  constexpr double kSwitchM = 300;
+  track::Map map;
+  const auto edge = [&](uint32_t id, uint32_t from, uint32_t to, double begin_m, std::vector<track::Element> elements) {
+    map.edges.push_back({id, "", from, to, "", track::Alignment::chained({begin_m, 0, core::kPi / 2}, elements)});
+  };
+  edge(1, 1, 2, 0, {{kSwitchM, 0, 0}});
+  edge(2, 2, 3, kSwitchM, {{400, 0, 0}});
+  edge(3, 2, 4, kSwitchM, {{400, 1.0 / 300, 1.0 / 300}});
+  for (const auto& [id, kind] : {std::pair{1U, track::NodeKind::end},
+                                 {2U, track::NodeKind::railway_switch},
+                                 {3U, track::NodeKind::end},
+                                 {4U, track::NodeKind::end}}) {
+    map.nodes.push_back({id, kind, "", 0, 0});
+  }
+  map.connections = {{2, 1, 2, false}, {2, 1, 3, true}};
+  return map;
+}
+
+using NoCamera = MatcherInLockStep;
+TEST_F(NoCamera, TheGyroTellsTheLegWithoutAnOdometryStep) {
+  constexpr double kSpeedMps = 15;
+  constexpr double kGyroBiasRps = 0.002;
+  constexpr double kEndM = 400;
+  constexpr int kStandingSteps = 50;
+  const track::Map map = switch_map();
+  ASSERT_TRUE(map.save(folder_ / "map.railfix").ok());
+  messaging::Writer<msg::TrainState> state_writer(participant_, topics::train_state);
+  messaging::Writer<msg::ImuSample> imu_writer(participant_, topics::imu_sample);
+  const auto matcher = service("map_matcher", "railfix-map-matcher", {});
+  ASSERT_TRUE(run_until([&] { return connected(1); }));
+
+  core::Random random(3);
+  double at_m = 200;
+  uint64_t seq = 0;
+  while (at_m < kEndM) {
+    const int64_t stamp_ns = kBeginNs + static_cast<int64_t>(++seq) * kStepNs;
+    const bool stands = seq <= kStandingSteps;
+    const double begin_m = at_m;
+    if (!stands) at_m += kSpeedMps * core::seconds(kStepNs);
+    for (int i = 1; i <= 5; ++i) {
+      const bool bends = begin_m + (at_m - begin_m) * i / 5 > 300;
+      msg::ImuSample sample;
+      sample.stamp_ns(stamp_ns - kStepNs + i * kStepNs / 5);
+      sample.rate_z_rps((stands || !bends ? 0 : kSpeedMps / 300) + kGyroBiasRps + 0.002 * random.normal());
+      ASSERT_TRUE(imu_writer.write(sample));
+    }
+    // Fusion follows the straight leg until it is told otherwise.
+    const bool told = !fixes_.empty() && fixes_.back().edge() == 3 && fixes_.back().probability() > 0.999;
+    msg::TrainState state;
+    state.stamp_ns(stamp_ns);
+    state.edge(at_m < 300 ? 1 : told ? 3 : 2);
+    state.offset_m(at_m < 300 ? at_m : at_m - 300);
+    state.direction(msg::DIRECTION_FORWARD);
+    state.track_known(1);
+    state.standstill(stands ? 1 : 0);
+    state.speed_mps(stands ? 0 : kSpeedMps);
+    state.distance_m(at_m);
+    state.over_m(4);
+    state.under_m(4);
+    state.sigma_m(1);
+    ASSERT_TRUE(state_writer.write(state));
+    ASSERT_TRUE(turn_of("map_matcher", seq, stamp_ns)) << "at step " << seq;
+    ASSERT_TRUE(run_until([&] { return fixes_.size() >= sent_by("map_matcher", "position_fix"); }));
+  }
+  ASSERT_FALSE(fixes_.empty());
+  EXPECT_EQ(fixes_.back().edge(), 3U);
+  EXPECT_GT(fixes_.back().probability(), 0.999);
+  for (const auto& fix : fixes_) {
+    EXPECT_EQ(fix.kind(), msg::FIX_TRACK);
+    EXPECT_FALSE(fix.edge() == 2 && fix.probability() >= 0.999) << "the other leg was declared";
+  }
 }
 
 }  // namespace
