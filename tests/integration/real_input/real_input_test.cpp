@@ -18,7 +18,7 @@ namespace {
 using ::testing::HasSubstr;
 namespace fs = std::filesystem;
 
-constexpr double kSimulateS = 120;
+constexpr double kSimulateS = 600;
 constexpr double kRunS = 120;
 
 size_t files_in(const fs::path& folder) {

@@ -20,7 +20,7 @@ namespace {
 using ::testing::HasSubstr;
 namespace fs = std::filesystem;
 
-constexpr double kSimulateS = 240;
+constexpr double kSimulateS = 1200;
 constexpr double kRunS = 600;
 
 // One row of train_state.csv that matters here.
