@@ -23,7 +23,7 @@ struct CurvatureParameters {
   double search_margin_m = 10;   // beyond the promised interval of train_state
   double max_sigma_m = 8.0;      // of a fix that is worth sending
   double lag_m = 0;              // the body may turn so far behind the camera's foot
-  double sigma_floor_m = 0.7;    // map and the point that the curvature belongs to
+  double sigma_floor_m = 1.2;    // map and the point that the curvature belongs to
   double min_probability = 0.9;
 };
 

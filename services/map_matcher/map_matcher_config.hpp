@@ -23,7 +23,7 @@ struct MapMatcherConfig {
   double camera_bias_per_m = 1e-4;
   GyroParameters gyro;
   bool locate = true;
-  double view_ahead_m = 7.0;
+  double view_ahead_m = 5.0;
   double least_speed_mps = 1.0;
   double lag_m = 20.0;
   double match_every_m = 5.0;

@@ -14,6 +14,7 @@ constexpr double kPathBehindM = 5000;
 constexpr double kPathLeftM = 3000;  // the path is followed anew when less of it is left
 constexpr double kOldStateS = 2.0;
 constexpr double kYawNoise = 3e-4;  // turning of the car body within one step, rad
+constexpr double kRailsFreshS = 0.5;
 constexpr double kShortestStepM = 0.05;
 constexpr double kLeastWayM = 1e-5;       // standing still turns nothing
 constexpr double kTrackEveryS = 1.0;      // the track is said again after this time ...
@@ -148,9 +149,11 @@ void MapMatcherService::use(const msg::OdometryStep& step) {
     match_exits(step);
     return;
   }
-  // Only steps from picture to picture: those against one key frame overlap.
+  // Where the rails are seen they tell the shape: pictures turn as the track ahead does (by 10 to 13 m, measured), not as
+  // the body behind. Only steps from picture to picture: those against one key frame overlap.
   const double step_m = step.step_m();
-  if (step.mode() == msg::ODOMETRY_TRACK && std::abs(step_m) > kShortestStepM &&
+  const bool rails_seen = std::abs(core::seconds(step.stamp_ns() - rails_seen_ns_)) < kRailsFreshS;
+  if (!rails_seen && step.mode() == msg::ODOMETRY_TRACK && std::abs(step_m) > kShortestStepM &&
       std::abs(step.speed_mps()) > config_.least_speed_mps) {
     curvature_->add(step.distance_m() - 0.5 * step_m, step.yaw_rad() / step_m,
                     std::hypot(step.yaw_sigma_rad(), kYawNoise) / std::abs(step_m), CurvatureOf::body);
@@ -291,6 +294,7 @@ void MapMatcherService::use(const msg::TrackView& view) {
   if (view.seen_left() == 0 || view.seen_right() == 0) return;
   const double variance = view.covariance()[kCurvatureVariance];
   if (!(variance > 0)) return;
+  rails_seen_ns_ = view.stamp_ns();
   if (chooser_ && prior_at(view.stamp_ns())) chooser_->see(view.curvature_per_m(), std::sqrt(variance));
   if (!curvature_ || !config_.use_curvature || !step_ || step_->valid() == 0) return;
   const double dt_s = core::seconds(view.stamp_ns() - step_->stamp_ns());

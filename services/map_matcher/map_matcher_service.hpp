@@ -57,6 +57,7 @@ class MapMatcherService {
   std::optional<msg::TrainState> state_;
   std::optional<msg::TrainState> before_;  // the state before it
   std::optional<msg::OdometryStep> step_;
+  int64_t rails_seen_ns_ = 0;
   std::optional<TrackChooser> chooser_;
   std::optional<NetworkLocator> locator_;  // only while the place is not known
   double located_m_ = 0;                   // odometer at the last search

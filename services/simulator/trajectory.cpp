@@ -69,6 +69,7 @@ void Trajectory::phase(double duration_s, double acceleration_mps2) {
 }
 
 void Trajectory::leg(double length_m, double cruise_mps) {
+  if (length_m <= 0.0) return;  // no time is left between the dwells: the train stands
   const double per_speed2 = 0.5 / run_.accelerate_mps2 + 0.5 / run_.brake_mps2;
   const double top_mps = std::min(cruise_mps, std::sqrt(length_m / per_speed2));
   phase(top_mps / run_.accelerate_mps2, run_.accelerate_mps2);

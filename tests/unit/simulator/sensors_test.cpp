@@ -38,6 +38,15 @@ TEST(Run, StandsRunsAndStandsAgain) {
   EXPECT_NEAR(standing_s, 24.0, 0.1);  // 2 + 20 + 2
 }
 
+TEST(Run, StandsWhenThereIsNoTimeToMove) {
+  RunOptions options;
+  options.length_m = 0.0;
+  options.duration_s = 4.0;
+  const Trajectory trajectory(line_from("1:100"), options, kMount, {}, 7);
+  EXPECT_NEAR(trajectory.duration_s(), 4.0, 1e-9);
+  EXPECT_EQ(trajectory.length_m(), 0.0);
+}
+
 TEST(Run, CameraStandsStillWithTheTrain) {
   const auto trajectory = run("1:100", 200.0, 1.0);
   const auto a = trajectory.truth(0.5).camera;

@@ -7,9 +7,9 @@
 //   any number of legs and tails however heavy, where ours - R certified of a leg is as likely as its negative, as it
 //   is when both systems' errors are distributed alike but for their size.
 // - Random weights on the legs and on one more that was not seen, twice as bad as the worst one seen (Gaffke, "Three
-// test
-//   statistics for a nonparametric one-sided hypothesis on the mean of a nonnegative variable", Math. Methods Statist.
-//   14, 2005, whose bound puts the unseen one at the end of the range). For systems whose errors are not alike.
+//   test statistics for a nonparametric one-sided hypothesis on the mean of a nonnegative variable", Math. Methods
+//   Statist. 14, 2005, whose bound puts the unseen one at the end of the range). For systems whose errors are not
+//   alike.
 // No bound can hold against a failure so rare that the legs at hand likely do not show it: see compare_broken.
 #pragma once
 
