@@ -107,7 +107,7 @@ void judge_recorder(const TrainSeen& train, Problems& problems) {
   }
   if (lost > 0) {
     problems.push_back({"recorder lost", Level::warning,
-                        fmt::format("The recording lacks {} samples of {}", lost, topics),
+                        fmt::format("The recording lacks {} {} of {}", lost, lost == 1 ? "sample" : "samples", topics),
                         "See the causes in the recorder panel; record fewer pictures or use a faster disk."});
   }
   if (recorder.disk_free_mb() > 0 && recorder.disk_free_mb() < train.disk_low_mb) {
