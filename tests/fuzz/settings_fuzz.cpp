@@ -9,31 +9,11 @@
 #include "fuzz/fuzz_target.hpp"
 #include "fuzz/input_file.hpp"
 #include "service/config.hpp"
+#include "support/every_setting.hpp"
 
 namespace railfix {
 
 namespace {
-
-struct Config {
-  double speed_mps = 10;
-  int64_t count = 3;
-  bool on = true;
-  std::string mode = "a";
-  std::string name = "x";
-  std::vector<std::string> names;
-  double inner_m = 1;
-  void describe(service::Fields& fields) {
-    fields.number("speed_mps", speed_mps, {0, 100}, "m/s", "How fast.");
-    fields.integer("count", count, {1, 5}, "", "How many.");
-    fields.flag("on", on, "Whether.");
-    fields.choice("mode", mode, {"a", "b"}, "Which.");
-    fields.text("name", name, "Who.");
-    fields.list("names", names, "Whom.");
-    fields.group("inner", "Inside.", [this](service::Fields& inner) {
-      inner.number("inner_m", inner_m, {0, 2}, "m", "How far.");
-    });
-  }
-};
 
 template <class T>
 bool taken(const core::Result<T>& result) {
@@ -42,7 +22,7 @@ bool taken(const core::Result<T>& result) {
 }
 
 void configuration(const std::filesystem::path& file) {
-  const auto read = service::read_config<Config>("odometry", file, {}, {"common"});
+  const auto read = service::read_config<test::EverySetting>("odometry", file, {}, {"common"});
   if (!taken(read)) return;
   const auto& config = read.value();
   fuzz::require(config.speed_mps >= 0 && config.speed_mps <= 100 && config.count >= 1 && config.count <= 5 &&

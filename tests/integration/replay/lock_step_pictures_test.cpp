@@ -2,14 +2,12 @@
 // recording go through the real track_detector, odometry, map_matcher and fusion.
 #include <gmock/gmock.h>
 
-#include "integration/replay/lock_step_ear.hpp"
-#include "support/program.hpp"
+#include "integration/replay/lock_step_train.hpp"
 
 namespace railfix {
 namespace {
 
 namespace fs = std::filesystem;
-using ::testing::HasSubstr;
 
 constexpr int kDomain = 89;
 constexpr size_t kLeastPictures = 60;
@@ -37,25 +35,15 @@ class LockStepReplayOfPictures : public ::testing::Test {
 
   /// The bytes of all samples, by topic.
   std::map<std::string, std::string> positions(const std::string& train) {
-    std::vector<std::unique_ptr<test::Program>> services;
-    const auto start = [&](const std::string& name, std::vector<std::string> settings) {
-      settings.insert(settings.end(), {"common.train_id=" + train, "common.domain=" + std::to_string(kDomain),
-                                       "common.log_level=error", "common.lock_step=true"});
-      services.push_back(std::make_unique<test::Program>(test::with_settings("railfix-" + name, settings)));
-    };
     const std::string map = fs::path(sequence()) / "map" / "line.map";
-    start("track-detector", {});
-    start("odometry", {});
-    start("map-matcher", {"map_matcher.map=" + map});
-    start("fusion", {"fusion.map=" + map, "fusion.start=1:250:+"});
-    test::LockStepEar ear(train, kDomain);
-    test::Program replay({"railfix", "replay", (folder_ / "run" / "recording.mcap").string(), "--lock-step",
-                          "track_detector,odometry,map_matcher,fusion," + test::LockStepEar::kName, "--train", train,
-                          "--domain", std::to_string(kDomain)},
-                         {folder_ / "out", folder_ / "err", {}});
-    EXPECT_TRUE(ear.listen_until_the_end()) << test::slurp(folder_ / "err");
-    EXPECT_EQ(replay.wait_for_end(), 0) << test::slurp(folder_ / "err");
-    EXPECT_THAT(test::slurp(folder_ / "err"), HasSubstr("odometry_step is written by a service of now"));
+    test::LockStepTrain services(train, kDomain);
+    services.start("track-detector", {});
+    services.start("odometry", {});
+    services.start("map-matcher", {"map_matcher.map=" + map});
+    services.start("fusion", {"fusion.map=" + map, "fusion.start=1:250:+"});
+    services.replay(folder_ / "run" / "recording.mcap", "track_detector,odometry,map_matcher,fusion",
+                    "odometry_step is written by a service of now");
+    const auto& ear = services.ear();
     EXPECT_GE(ear.samples().at("train_state"), kLeastPictures);
     return ear.bytes();
   }

@@ -3,10 +3,9 @@
 #include <gmock/gmock.h>
 
 #include "core/random.hpp"
-#include "integration/replay/lock_step_ear.hpp"
+#include "integration/replay/lock_step_train.hpp"
 #include "mcap/writer.hpp"
 #include "messaging/topics.hpp"
-#include "support/program.hpp"
 #include "track/map.hpp"
 
 namespace railfix {
@@ -14,7 +13,6 @@ namespace {
 
 namespace fs = std::filesystem;
 namespace topics = messaging::topics;
-using ::testing::HasSubstr;
 
 constexpr int kDomain = 88;
 constexpr int64_t kBegin = 1'700'000'000 * core::kNsPerSecond;
@@ -112,22 +110,13 @@ class LockStepReplay : public ::testing::Test {
 
   /// The bytes of all samples, by topic.
   std::map<std::string, std::string> positions(const std::string& train) {
-    const auto service = [&](const std::string& name, std::vector<std::string> settings) {
-      settings.insert(settings.end(), {"common.train_id=" + train, "common.domain=" + std::to_string(kDomain),
-                                       "common.log_level=error", "common.lock_step=true"});
-      return std::make_unique<test::Program>(test::with_settings("railfix-" + name, settings));
-    };
     const std::string map = (folder_ / "line.map").string();
-    const auto fusion = service("fusion", {"fusion.map=" + map, "fusion.start=1:100:+"});
-    const auto matcher = service("map-matcher", {"map_matcher.map=" + map});
-    test::LockStepEar ear(train, kDomain);
-    test::Program replay(
-        {"railfix", "replay", (folder_ / "ride.mcap").string(), "--lock-step",
-         "fusion,map_matcher," + test::LockStepEar::kName, "--train", train, "--domain", std::to_string(kDomain)},
-        {folder_ / "out", folder_ / "err", {}});
-    EXPECT_TRUE(ear.listen_until_the_end()) << test::slurp(folder_ / "err");
-    EXPECT_EQ(replay.wait_for_end(), 0) << test::slurp(folder_ / "err");
-    EXPECT_THAT(test::slurp(folder_ / "err"), HasSubstr("train_state is written by a service of now and is left out"));
+    test::LockStepTrain services(train, kDomain);
+    services.start("fusion", {"fusion.map=" + map, "fusion.start=1:100:+"});
+    services.start("map-matcher", {"map_matcher.map=" + map});
+    services.replay(folder_ / "ride.mcap", "fusion,map_matcher",
+                    "train_state is written by a service of now and is left out");
+    const auto& ear = services.ear();
     EXPECT_GE(ear.samples().at("train_state"), kFrames);
     EXPECT_GE(ear.samples().at("position_fix"), 4U);
     return ear.bytes();
