@@ -1,6 +1,7 @@
 #include "service/health_file.hpp"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <array>
@@ -15,17 +16,24 @@ namespace {
 constexpr int64_t kSilentNs = 2 * core::kNsPerSecond;
 constexpr size_t kBytes = 512;
 
+int opened(const std::filesystem::path& path) {
+  return open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
+}
+
+bool removed(int file) {
+  struct stat now {};
+  return fstat(file, &now) == 0 && now.st_nlink == 0;
+}
+
 }  // namespace
 
 std::filesystem::path health_path(const CommonConfig& common, const std::string& service) {
   return "/dev/shm/railfix-health-" + common.train_id + "-" + common.host + "-" + service;
 }
 
-HealthFile::HealthFile(std::filesystem::path path)
-    : path_(std::move(path)), file_(open(path_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0644)) {}
+HealthFile::HealthFile(std::filesystem::path path) : path_(std::move(path)), file_(opened(path_)) {}
 
-// Another build of this service may have taken over the file; then its words stand there again in a quarter of a
-// second.
+// Another build of this service may have taken over the file; it makes a new one with its next words.
 HealthFile::~HealthFile() {
   if (file_ < 0) return;
   close(file_);
@@ -33,6 +41,10 @@ HealthFile::~HealthFile() {
 }
 
 void HealthFile::write(const msg::ServiceStatus& status) {
+  if (file_ >= 0 && removed(file_)) {
+    close(file_);
+    file_ = opened(path_);
+  }
   const std::string reason = status.reason().c_str();
   std::string text = std::to_string(core::monotonic_ns()) + ' ' + std::to_string(status.state()) + '\n' + reason;
   text.resize(kBytes, '\n');
