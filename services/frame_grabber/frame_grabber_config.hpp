@@ -17,6 +17,7 @@ struct FrameGrabberConfig {
   double fps = 0;
   std::string pace = "real";
   std::string start = "command";
+  double began_s = 0;
   std::string at_end = "idle";
   std::vector<std::string> wait_for;
   double wait_s = 20;
@@ -49,6 +50,9 @@ struct FrameGrabberConfig {
         "have used the last one.");
     fields.choice("start", start, {"command", "immediately"},
                   "Begin to play at the control command `start`, or at once.");
+    fields.number("began_s", began_s, {0, 1e10}, "s",
+                  "Unix time at which the first picture was taken, pace real: a program that is started again goes on "
+                  "where the camera would be by now; 0 = when play begins.");
     fields.choice("at_end", at_end, {"idle", "finish"}, "Behind the last picture: stay, or end the program.");
     fields.list("wait_for", wait_for, "Services that take turns on every picture, in this order (pace lossless).");
     fields.number("wait_s", wait_s, {0.1, 3600}, "s", "Longest wait for these answers before the program gives up.");

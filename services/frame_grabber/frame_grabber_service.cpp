@@ -154,8 +154,13 @@ core::Result<std::string> FrameGrabberService::start() {
   context_.log().info("plays {} at {} pace", config_.source, config_.pace);
   context_.health().active();
   player_ = std::make_unique<Player>(std::move(source_), !lossless(), static_cast<size_t>(config_.read_ahead),
-                                     std::move(events));
+                                     std::move(events), began_ns());
   return std::string("plays ") + config_.source;
+}
+
+std::optional<int64_t> FrameGrabberService::began_ns() const {
+  if (config_.began_s == 0) return std::nullopt;
+  return core::to_ns(config_.began_s);
 }
 
 void FrameGrabberService::play(const dataset::Picture& picture) {

@@ -26,6 +26,7 @@ class FrameGrabberService {
   core::Result<std::string> start();
   void shoot(const RawPicture& picture);
   void say_packets(uint64_t bad_packets);
+  [[nodiscard]] std::optional<int64_t> began_ns() const;
   void play(const dataset::Picture& picture);
   void give_turn();
   void answered(const msg::DataProgress& progress);

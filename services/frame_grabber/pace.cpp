@@ -13,9 +13,10 @@ constexpr int kPicturesHeld = 3;
 
 RealPace::Verdict RealPace::ask(int64_t stamp_ns, int64_t wall_ns) {
   if (!newest_ns_) {
-    wall_minus_data_ns_ = wall_ns - stamp_ns;
+    if (!begun_) wall_minus_data_ns_ = wall_ns - stamp_ns;
+    begun_ = true;
     newest_ns_ = stamp_ns;
-    return {wall_ns, false};
+    return {stamp_ns + wall_minus_data_ns_, false};
   }
   if (stamp_ns <= *newest_ns_) return {wall_ns, false};
   const int64_t period_ns = stamp_ns - *newest_ns_;

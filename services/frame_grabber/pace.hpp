@@ -11,14 +11,18 @@
 
 namespace railfix::frame_grabber {
 
-/// Recorded rate on the wall clock: the first picture is due when it comes, each other as much later as it was recorded
-/// later.
+/// Recorded rate on the wall clock: the first picture is due when it comes (unless it is said when), each other as much
+/// later as it was recorded later.
 class RealPace {
  public:
   struct Verdict {
     int64_t due_ns = 0;  // wall clock; in the past = now
     bool skip = false;   // more than three periods late
   };
+  RealPace() = default;
+  /// Due time minus stamp is known before the first picture comes.
+  explicit RealPace(std::optional<int64_t> wall_minus_data_ns)
+      : wall_minus_data_ns_(wall_minus_data_ns.value_or(0)), begun_(wall_minus_data_ns.has_value()) {}
   /// REQUIRES: in the order of playing. A picture that is stamped before one already played is due at once.
   Verdict ask(int64_t stamp_ns, int64_t wall_ns);
   /// Due time minus stamp of every picture. REQUIRES: asked once.
@@ -26,6 +30,7 @@ class RealPace {
 
  private:
   int64_t wall_minus_data_ns_ = 0;
+  bool begun_ = false;
   std::optional<int64_t> newest_ns_;
 };
 

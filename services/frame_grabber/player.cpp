@@ -58,8 +58,25 @@ ReadAhead::Item ReadAhead::next() {
   return item;
 }
 
-Player::Player(std::unique_ptr<dataset::PictureSource> source, bool real_pace, size_t read_ahead, PlayerEvents events)
+namespace {
+
+// Passes over the pictures whose time has gone by; gives wall clock minus stamp.
+std::optional<int64_t> pass_over(dataset::PictureSource& source, std::optional<int64_t> began_ns) {
+  const auto first_ns = source.next_stamp_ns();
+  if (!began_ns || !first_ns) return std::nullopt;
+  const int64_t anchor_ns = *began_ns - *first_ns;
+  for (auto next_ns = first_ns; next_ns && *next_ns + anchor_ns < core::wall_ns(); next_ns = source.next_stamp_ns()) {
+    if (!source.skip()) break;
+  }
+  return anchor_ns;
+}
+
+}  // namespace
+
+Player::Player(std::unique_ptr<dataset::PictureSource> source, bool real_pace, size_t read_ahead, PlayerEvents events,
+               std::optional<int64_t> began_ns)
     : real_pace_(real_pace),
+      anchor_ns_(real_pace ? pass_over(*source, began_ns) : std::nullopt),
       events_(std::move(events)),
       pictures_(std::move(source), read_ahead,
                 [this](int64_t stamp_ns, int64_t decode_ns) { return too_late(stamp_ns, decode_ns); }),
@@ -101,7 +118,7 @@ bool Player::wait_complete() {
 }
 
 void Player::play() {
-  RealPace pace;
+  RealPace pace(anchor_ns_);
   while (true) {
     ReadAhead::Item item = pictures_.next();
     {

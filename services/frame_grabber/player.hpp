@@ -61,8 +61,10 @@ struct PlayerEvents {
 
 class Player {
  public:
-  /// Starts at once. real_pace false: the next picture comes as soon as the last one is complete.
-  Player(std::unique_ptr<dataset::PictureSource> source, bool real_pace, size_t read_ahead, PlayerEvents events);
+  /// Starts at once. real_pace false: the next picture comes as soon as the last one is complete. began_ns, with real
+  /// pace: wall clock at which the first picture was due; those that would have been played by now are passed over.
+  Player(std::unique_ptr<dataset::PictureSource> source, bool real_pace, size_t read_ahead, PlayerEvents events,
+         std::optional<int64_t> began_ns = {});
   ~Player();
   Player(const Player&) = delete;
   Player& operator=(const Player&) = delete;
@@ -76,6 +78,7 @@ class Player {
   bool wait_complete();
   bool too_late(int64_t stamp_ns, int64_t decode_ns) const;
   bool real_pace_;
+  std::optional<int64_t> anchor_ns_;  // wall clock minus stamp, where it is known beforehand
   PlayerEvents events_;
   std::mutex mutex_;
   std::condition_variable changed_;

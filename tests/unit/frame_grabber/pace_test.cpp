@@ -23,6 +23,12 @@ TEST(RealPace, ThreePeriodsLateIsPlayedMoreIsSkippedAndDoesNotShiftTheRest) {
   EXPECT_EQ(next.due_ns, 5030);
 }
 
+TEST(RealPace, WhereTheBeginningIsSaidTheFirstPictureIsDueThen) {
+  RealPace pace(4900);
+  EXPECT_EQ(pace.ask(100, 4000).due_ns, 5000);
+  EXPECT_EQ(pace.ask(110, 5001).due_ns, 5010);
+}
+
 TEST(RealPace, PicturesOutOfOrderAreDueAtOnce) {
   RealPace pace;
   (void)pace.ask(100, 5000);

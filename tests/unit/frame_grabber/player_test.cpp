@@ -4,6 +4,8 @@
 
 #include <future>
 
+#include "core/time.hpp"
+
 namespace railfix::frame_grabber {
 namespace {
 
@@ -74,7 +76,7 @@ struct Played {
   std::promise<void> ended;
 };
 
-std::vector<std::string> play(std::vector<int64_t> stamps, bool real_pace) {
+std::vector<std::string> play(std::vector<int64_t> stamps, bool real_pace, std::optional<int64_t> began_ns = {}) {
   Played played;
   std::promise<Player*> made;
   auto player = made.get_future().share();
@@ -86,7 +88,7 @@ std::vector<std::string> play(std::vector<int64_t> stamps, bool real_pace) {
   events.late = [&played](int64_t stamp) { played.events.push_back("late " + std::to_string(stamp)); };
   events.broken = [&played](const std::string& why) { played.events.push_back(why); };
   events.ended = [&played] { played.ended.set_value(); };
-  Player one(std::make_unique<Numbers>(std::move(stamps)), real_pace, 4, std::move(events));
+  Player one(std::make_unique<Numbers>(std::move(stamps)), real_pace, 4, std::move(events), began_ns);
   made.set_value(&one);
   played.ended.get_future().wait();
   return played.events;
@@ -98,6 +100,12 @@ TEST(Player, LosslessGivesEveryPictureInOrder) {
 
 TEST(Player, RealPaceGivesPicturesOfOneInstant) {
   EXPECT_THAT(play({5, 5, 5}, true), ElementsAre("5", "5", "5"));
+}
+
+TEST(Player, PassesOverWhatWouldHaveBeenPlayedBeforeItWasStarted) {
+  const int64_t now_ns = core::wall_ns();
+  EXPECT_THAT(play({5, 6, 7}, true, now_ns - 3600 * core::kNsPerSecond), ::testing::IsEmpty());
+  EXPECT_THAT(play({5, 6, 7}, false, now_ns - 3600 * core::kNsPerSecond), ElementsAre("5", "6", "7"));
 }
 
 // Nanoseconds apart: how many are late is up to the machine, that each comes once and in its turn is not.

@@ -1,0 +1,129 @@
+#include "system/soak.hpp"
+
+#include <cmath>
+#include <cstdio>
+
+#include "core/time.hpp"
+
+namespace railfix::system_test {
+namespace {
+
+constexpr double kPeriodS = 10;
+constexpr double kSettleShare = 0.2;  // of the time: caches and histories fill
+constexpr double kGrowthMbPerHour = 5;
+constexpr double kLatencyMsPerHour = 5;
+
+/// Least squares.
+struct Line {
+  double slope_per_hour = 0;
+  double sigma = 0;
+  double first = 0;
+  double last = 0;
+};
+
+struct Series {
+  std::vector<double> at_s;
+  std::vector<double> value;
+  void add(double time_s, double one) {
+    at_s.push_back(time_s);
+    value.push_back(one);
+  }
+  // By ten blocks' medians, so that one noisy moment of the machine is one of ten points.
+  [[nodiscard]] Line line() const {
+    const size_t begin = static_cast<size_t>(kSettleShare * static_cast<double>(value.size()));
+    constexpr size_t kBlocks = 10;
+    std::vector<double> x;
+    std::vector<double> y;
+    for (size_t block = 0; block < kBlocks; ++block) {
+      const size_t from = begin + block * (value.size() - begin) / kBlocks;
+      const size_t to = begin + (block + 1) * (value.size() - begin) / kBlocks;
+      if (from == to) continue;
+      std::vector<double> part(value.begin() + static_cast<std::ptrdiff_t>(from),
+                               value.begin() + static_cast<std::ptrdiff_t>(to));
+      std::nth_element(part.begin(), part.begin() + static_cast<std::ptrdiff_t>(part.size() / 2), part.end());
+      x.push_back((at_s[from] + at_s[to - 1]) / 2 / 3600);
+      y.push_back(part[part.size() / 2]);
+    }
+    const auto n = static_cast<double>(x.size());
+    if (n < 3) return {};
+    double mean_x = 0;
+    double mean_y = 0;
+    for (size_t i = 0; i < x.size(); ++i) {
+      mean_x += x[i] / n;
+      mean_y += y[i] / n;
+    }
+    double xx = 0;
+    double xy = 0;
+    for (size_t i = 0; i < x.size(); ++i) {
+      xx += (x[i] - mean_x) * (x[i] - mean_x);
+      xy += (x[i] - mean_x) * (y[i] - mean_y);
+    }
+    Line line{xy / xx, 0, y.front(), y.back()};
+    double rest = 0;
+    for (size_t i = 0; i < x.size(); ++i) {
+      const double residual = y[i] - mean_y - line.slope_per_hour * (x[i] - mean_x);
+      rest += residual * residual;
+    }
+    line.sigma = std::sqrt(rest / (n - 2) / xx);
+    return line;
+  }
+};
+
+struct Watched {
+  Series memory_mb;
+  Series latency_ms;
+  uint32_t pid = 0;
+  int restarts = 0;
+  uint64_t dropped = 0;
+};
+
+bool print(const std::map<std::string, Watched>& all, const Heard& heard, double ridden_s) {
+  std::printf(
+      "\nsoak after %.1f minutes: %llu states, %llu outside, longest pause of train_state %.2f s, of reports "
+      "%.2f s\n%-24s %26s %30s %8s %8s\n",
+      ridden_s / 60, static_cast<unsigned long long>(heard.states), static_cast<unsigned long long>(heard.outside),
+      heard.state_gap_s, heard.report_gap_s, "service", "resident MB, slope an hour", "latency p99 ms, slope an hour",
+      "dropped", "restarts");
+  bool good = true;
+  for (const auto& [name, one] : all) {
+    const auto memory = one.memory_mb.line();
+    const auto latency = one.latency_ms.line();
+    const bool grows = memory.slope_per_hour - 2 * memory.sigma > kGrowthMbPerHour ||
+                       latency.slope_per_hour - 2 * latency.sigma > kLatencyMsPerHour;
+    good = good && !grows && one.restarts == 0;
+    std::printf("%-24s %6.1f to %6.1f, %+5.2f +- %4.2f  %6.1f to %6.1f, %+6.2f +- %4.2f  %8llu %8d%s\n", name.c_str(),
+                memory.first, memory.last, memory.slope_per_hour, memory.sigma, latency.first, latency.last,
+                latency.slope_per_hour, latency.sigma, static_cast<unsigned long long>(one.dropped), one.restarts,
+                grows ? "  GROWS" : "");
+  }
+  std::fflush(stdout);
+  return good && heard.outside == 0;
+}
+
+}  // namespace
+
+int soak(Rig& rig, Observer& observer, double minutes) {
+  std::map<std::string, Watched> all;
+  observer.begin();
+  double said_s = 0;
+  for (double at_s = 0; at_s < 60 * minutes; at_s += kPeriodS) {
+    observer.run(kPeriodS);
+    for (const auto& name : rig.services()) {
+      const auto found = observer.services().find(name);
+      if (found == observer.services().end()) continue;
+      const auto& status = found->second.status;
+      auto& one = all[name];
+      if (one.pid != 0 && one.pid != status.pid()) ++one.restarts;
+      one.pid = status.pid();
+      one.dropped = status.dropped();
+      one.memory_mb.add(at_s, status.rss_mb());
+      one.latency_ms.add(at_s, status.latency_p99_ms());
+    }
+    if (at_s - said_s < 600) continue;
+    said_s = at_s;
+    print(all, observer.heard(), at_s);
+  }
+  return print(all, observer.end(), 60 * minutes) ? 0 : 1;
+}
+
+}  // namespace railfix::system_test
