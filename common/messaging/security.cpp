@@ -1,13 +1,28 @@
 #include "messaging/security.hpp"
 
+#include <openssl/asn1.h>
+#include <openssl/pem.h>
+#include <openssl/x509.h>
 #include <unistd.h>
 
+#include <cstdio>
+#include <memory>
+
 namespace railfix::messaging {
+
+namespace {
+
+std::string identity_of(const std::string& service) {
+  return service.starts_with("railfix-") ? "tool" : service;
+}
+
+}  // namespace
+
 core::Result<std::vector<std::pair<std::string, std::string>>> security_properties(const std::filesystem::path& folder,
                                                                                    const std::string& service) {
   std::vector<std::pair<std::string, std::string>> properties;
   if (folder.empty()) return properties;
-  const std::string name = service.starts_with("railfix-") ? "tool" : service;
+  const std::string name = identity_of(service);
   const std::string identity = "dds.sec.auth.builtin.PKI-DH.";
   const std::string permissions = "dds.sec.access.builtin.Access-Permissions.";
   properties = {{"dds.sec.auth.plugin", "builtin.PKI-DH"},
@@ -26,6 +41,20 @@ core::Result<std::vector<std::pair<std::string, std::string>>> security_properti
     properties.emplace_back(property, "file://" + file.string());
   }
   return properties;
+}
+
+core::Result<int64_t> days_left(const std::filesystem::path& certificate) {
+  const std::unique_ptr<FILE, int (*)(FILE*)> file(std::fopen(certificate.c_str(), "r"),
+                                                   [](FILE* f) { return f != nullptr ? std::fclose(f) : 0; });
+  if (!file) return core::Error{certificate.string() + " is missing; make it with railfix train keys"};
+  const std::unique_ptr<X509, void (*)(X509*)> read(PEM_read_X509(file.get(), nullptr, nullptr, nullptr), X509_free);
+  if (!read)
+    return core::Error{certificate.string() + " is not a certificate; make it again with railfix train keys --renew"};
+  int days = 0;
+  int seconds = 0;
+  if (ASN1_TIME_diff(&days, &seconds, nullptr, X509_get0_notAfter(read.get())) != 1)
+    return core::Error{certificate.string() + " has no readable end of validity"};
+  return seconds < 0 ? days - 1 : days;
 }
 
 }  // namespace railfix::messaging

@@ -17,4 +17,7 @@ namespace railfix::messaging {
 core::Result<std::vector<std::pair<std::string, std::string>>> security_properties(const std::filesystem::path& folder,
                                                                                    const std::string& service);
 
+/// Days until the certificate runs out, negative when it has. Error: no certificate.
+core::Result<int64_t> days_left(const std::filesystem::path& certificate);
+
 }  // namespace railfix::messaging

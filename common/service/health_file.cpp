@@ -51,6 +51,13 @@ void HealthFile::write(const msg::ServiceStatus& status) {
   if (file_ >= 0 && pwrite(file_, text.data(), text.size(), 0) < 0) unlink(path_.c_str());
 }
 
+std::optional<int64_t> silent_ns(const std::filesystem::path& path) {
+  std::ifstream in(path);
+  int64_t said_ns = 0;
+  if (!(in >> said_ns)) return std::nullopt;
+  return core::monotonic_ns() - said_ns;
+}
+
 HealthAnswer ask_health(const std::filesystem::path& path) {
   std::ifstream in(path);
   int64_t said_ns = 0;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "idl/operation.h"
@@ -28,6 +29,9 @@ class HealthFile {
   std::filesystem::path path_;
   int file_ = -1;
 };
+
+/// How long ago the service said something there; nothing when it never did.
+std::optional<int64_t> silent_ns(const std::filesystem::path& path);
 
 struct HealthAnswer {
   bool healthy = false;

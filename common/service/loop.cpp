@@ -4,6 +4,7 @@
 
 #include "core/time.hpp"
 #include "messaging/lock_step.hpp"
+#include "messaging/security.hpp"
 #include "service/log.hpp"
 
 namespace railfix::service {
@@ -13,6 +14,8 @@ constexpr std::chrono::milliseconds kAssertPeriod{50};
 // Four times a second, so that a dead or frozen service shows within half a second.
 constexpr std::chrono::milliseconds kStatusPeriod{250};
 constexpr std::chrono::seconds kCablePeriod{1};
+constexpr std::chrono::hours kCertificatePeriod{6};
+constexpr int64_t kCertificateDays = 30;
 constexpr int64_t kIdleNs = core::kNsPerSecond;
 
 // Standing values and the words of operation are never held back.
@@ -47,6 +50,7 @@ Loop::Loop(std::string service, const CommonConfig& common)
     health_->publish();
   });
   if (!common_.interfaces.empty()) watch_cable();
+  if (!common_.security.empty()) watch_certificate();
 }
 
 // Started without the cable, this process would never use it.
@@ -55,6 +59,20 @@ void Loop::watch_cable() {
     if (participant_.interface_appeared())
       finish("a network interface of common.interfaces has come up; whoever started this service starts it again");
   });
+}
+
+// What runs goes on when it has run out, but would not be let in again after a restart.
+void Loop::watch_certificate() {
+  const auto look = [this] {
+    const auto left = messaging::days_left(std::filesystem::path(common_.security) / (service_ + ".cert.pem"));
+    if (left.ok() && left.value() < kCertificateDays)
+      log_->warn(
+          "this service's certificate {} days; railfix train keys --renew, then railfix train upgrade on each host",
+          left.value() < 0 ? "ran out before " + std::to_string(-left.value())
+                           : "runs out in " + std::to_string(left.value()));
+  };
+  look();
+  every(kCertificatePeriod, look);
 }
 
 Loop::~Loop() {

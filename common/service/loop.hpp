@@ -42,6 +42,7 @@ class Loop final : public Context {
   };
   void run_due_timers();
   void watch_cable();
+  void watch_certificate();
   void answer(const msg::ControlRequest& request);
   void keep_in_turn(const messaging::TopicInfo& topic, const std::string& instance, Handler handler, StampOf stamp_of);
   void clock(const msg::DataClock& clock);

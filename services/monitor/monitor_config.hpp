@@ -24,6 +24,7 @@ struct MonitorConfig {
                                        "map_matcher",   "fusion",         "tpr_publisher",  "recorder"};
   double interval_wide_m = 100;
   double disk_low_mb = 1000;
+  int64_t certificate_days = 30;
 
   void describe(service::Fields& fields) {
     fields.text("address", address,
@@ -53,6 +54,8 @@ struct MonitorConfig {
                   "A confidence interval wider than this is a problem.");
     fields.number("disk_low_mb", disk_low_mb, {0, 1e7}, "MB",
                   "Less free space than this on the recorder's disk is a problem.");
+    fields.integer("certificate_days", certificate_days, {0, 3650}, "days",
+                   "A certificate that runs out sooner than this is a problem, here and in railfix train check.");
   }
 };
 

@@ -6,6 +6,7 @@
 
 #include "cdr/types.hpp"
 #include "core/time.hpp"
+#include "messaging/security.hpp"
 #include "monitor/foxglove_messages.hpp"
 
 namespace railfix::monitor {
@@ -90,6 +91,8 @@ void MonitorService::start_timers() {
   context_.every(500ms, [this] {
     if (live_.watched("services")) live_.publish("services", services_message(services_, core::wall_ns()));
   });
+  read_certificates();
+  context_.every(1h, [this] { read_certificates(); });
   context_.every(1s, [this] {
     written_ = context_.participant().written_topics();
     show_channels();
@@ -286,9 +289,25 @@ TrainSeen MonitorService::train_seen() {
   std::error_code failed;
   const auto shared_memory = std::filesystem::space("/dev/shm", failed);
   if (!failed) train.shared_memory_free_mb = static_cast<double>(shared_memory.available) / 1e6;
+  train.certificates = certificates_;
+  train.certificate_days = config_.certificate_days;
   train.interval_wide_m = config_.interval_wide_m;
   train.disk_low_mb = config_.disk_low_mb;
   return train;
+}
+
+// The keys of all services of this host lie in one folder.
+void MonitorService::read_certificates() {
+  certificates_.clear();
+  constexpr std::string_view kEnd = ".cert.pem";
+  std::error_code none;
+  for (const auto& entry : std::filesystem::directory_iterator(context_.common().security, none)) {
+    const std::string file = entry.path().filename().string();
+    if (!file.ends_with(kEnd)) continue;
+    if (const auto left = messaging::days_left(entry.path()); left.ok())
+      certificates_.push_back({file.substr(0, file.size() - kEnd.size()), left.value()});
+  }
+  std::ranges::sort(certificates_, {}, &TrainSeen::Certificate::name);
 }
 
 void MonitorService::look_for_problems() {

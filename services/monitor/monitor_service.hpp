@@ -63,6 +63,7 @@ class MonitorService {
   void choose_topics();
   void show_channels();
   [[nodiscard]] TrainSeen train_seen();
+  void read_certificates();
   void look_for_problems();
 
   // monitor_shows.cpp: what is said to those who look
@@ -121,6 +122,7 @@ class MonitorService {
   std::map<std::string, int64_t> wanted_ns_;  // topics, and when they were last wanted
   std::optional<std::set<std::string>> shown_cameras_;
   ProblemList problems_;
+  std::vector<TrainSeen::Certificate> certificates_;
   int64_t begun_ns_ = 0;
   int64_t scraped_ns_ = 0;
   uint64_t slow_viewers_ = 0;

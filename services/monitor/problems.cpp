@@ -121,6 +121,17 @@ void judge_recorder(const TrainSeen& train, Problems& problems) {
   }
 }
 
+void judge_certificates(const TrainSeen& train, Problems& problems) {
+  for (const auto& one : train.certificates) {
+    if (one.days_left >= train.certificate_days) continue;
+    const bool over = one.days_left < 0;
+    problems.push_back({"certificate " + one.name, over ? Level::error : Level::warning,
+                        over ? fmt::format("The certificate of {} has run out", one.name)
+                             : fmt::format("The certificate of {} runs out in {} days", one.name, one.days_left),
+                        "railfix train keys --renew, then railfix train upgrade on each host."});
+  }
+}
+
 void judge_rest(const TrainSeen& train, Problems& problems) {
   if (train.gnss && !train.data_stands && train.gnss->fix() == msg::GNSS_NONE) {
     problems.push_back({"gnss", Level::warning, "The satellite receiver has no fix",
@@ -141,6 +152,7 @@ std::vector<Problem> find_problems(const TrainSeen& train) {
   judge_topics(train, problems);
   judge_position(train, problems);
   judge_recorder(train, problems);
+  judge_certificates(train, problems);
   judge_rest(train, problems);
   return problems;
 }

@@ -46,6 +46,12 @@ struct TrainSeen {
   bool data_stands = false;           // played data has ended or is paused: silence is right
   bool played = false;                // a player stands in for the services
   double shared_memory_free_mb = -1;  // < 0 = not known
+  struct Certificate {
+    std::string name;  // the service's
+    int64_t days_left = 0;
+  };
+  std::vector<Certificate> certificates;  // of this host's services
+  int64_t certificate_days = 30;
   double interval_wide_m = 100;
   double disk_low_mb = 1000;
 };

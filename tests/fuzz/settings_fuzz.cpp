@@ -1,5 +1,5 @@
 // What people and other programs write into files beside the pictures: configuration, calibration, tables of sensors
-// and of the truth, reports to compare. The first byte of the input chooses.
+// and of the truth, reports to compare, scenarios. The first byte of the input chooses.
 #include <array>
 #include <cmath>
 
@@ -9,6 +9,7 @@
 #include "fuzz/fuzz_target.hpp"
 #include "fuzz/input_file.hpp"
 #include "service/config.hpp"
+#include "simulator/simulator_config.hpp"
 #include "support/every_setting.hpp"
 
 namespace railfix {
@@ -28,6 +29,11 @@ void configuration(const std::filesystem::path& file) {
   fuzz::require(config.speed_mps >= 0 && config.speed_mps <= 100 && config.count >= 1 && config.count <= 5 &&
                     config.inner_m >= 0 && config.inner_m <= 2 && (config.mode == "a" || config.mode == "b"),
                 "what is taken is in its range");
+}
+
+void scenario(const std::filesystem::path& file) {
+  const auto read = service::read_config<simulator::SimulatorConfig>("simulator", file, {}, {});
+  if (taken(read)) (void)taken(simulator::Scenario::make(read.value().scenario, 1));
 }
 
 void calibration(const std::filesystem::path& file, const std::filesystem::path& out) {
@@ -50,7 +56,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   static const fuzz::InputFolder folder;
   const std::span<const uint8_t> rest{data + 1, size - 1};
   static constexpr std::array kTables{"imu0", "wheel0", "gnss0"};
-  const int choice = (data[0] + 2) % 10;  // the digits in their order
+  const int choice = data[0] == 's' ? 10 : (data[0] + 2) % 10;  // the digits in their order
   switch (choice) {
     case 0:
       configuration(folder.write("a.yaml", rest));
@@ -75,6 +81,9 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       break;
     case 7:
       (void)taken(dataset::read_truth_landmarks(folder.write("landmarks.csv", rest)));
+      break;
+    case 10:
+      scenario(folder.write("scenario.yaml", rest));
       break;
     case 8:
       (void)taken(compare::read_reports(folder.write("reports.csv", rest), etcs::Baseline::b3));

@@ -12,11 +12,12 @@ namespace railfix::system_test {
 struct Fault {
   std::string name;
   std::function<void(Rig&)> begin;
-  std::function<void(Rig&)> end;  // takes it away after lasts_s; what heals itself: at the end of the watch
-  double lasts_s = 0;             // 0 = an instant, after which the train must help itself
-  double watch_s = 8;             // behind it
-  std::string named;              // somebody's complaint contains this
-  bool in_short = false;          // part of the short campaign
+  std::function<void(Rig&)> end;        // takes it away after lasts_s; what heals itself: at the end of the watch
+  std::function<bool(Rig&)> over = {};  // asked meanwhile: it is over before lasts_s
+  double lasts_s = 0;                   // 0 = an instant, after which the train must help itself
+  double watch_s = 8;                   // behind it
+  std::string named;                    // somebody's complaint contains this
+  bool in_short = false;                // part of the short campaign
 };
 
 /// For the train as the rig has it. REQUIRES: the rig lives longer.

@@ -27,6 +27,7 @@ constexpr Targets kShort{20, 20, 20};
 constexpr double kShortPatienceS = 60;
 
 constexpr double kUsualS = 120;  // from the departure until the place is known
+constexpr double kTakenAwayS = 1;
 constexpr double kUsualAgainS = 15;
 constexpr int64_t kSharedMemoryMb = 1024;
 
@@ -95,7 +96,8 @@ Row measure(const Fault& fault, Rig& rig, Observer& observer, bool short_one) {
   fault.begin(rig);
   double over_s = now_s();  // when the train can begin to recover
   if (fault.lasts_s > 0) {
-    observer.run(fault.lasts_s);
+    for (const double until_s = now_s() + fault.lasts_s; now_s() < until_s && !(fault.over && fault.over(rig));)
+      observer.run(std::min(0.2, until_s - now_s()));
     if (fault.end) fault.end(rig);
     over_s = now_s();
   }
@@ -108,6 +110,7 @@ Row measure(const Fault& fault, Rig& rig, Observer& observer, bool short_one) {
                return text.find(fault.named) != std::string::npos;
              });
   if (fault.lasts_s == 0 && fault.end) fault.end(rig);
+  observer.run(kTakenAwayS);  // so that the next fault does not begin before this one's end is heard
   return row;
 }
 
@@ -193,6 +196,7 @@ int run(Options& options) {
     return options.short_one ? 77 : 2;
   }
   options.rig.ride = drawn_ride(options);
+  options.rig.break_pictures = options.soak_minutes <= 0;
   Rig rig(options.rig);
   if (options.list) {
     rig.prepare();

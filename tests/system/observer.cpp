@@ -56,7 +56,7 @@ std::string ask(int port, const std::string& path) {
   setsockopt(socket_number, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
   sockaddr_in address{};
   address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  address.sin_addr.s_addr = inet_addr(TwoHosts::kAddress[TwoHosts::coach]);
   address.sin_port = htons(static_cast<uint16_t>(port));
   std::string answer;
   const std::string request = "GET " + path + " HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n";

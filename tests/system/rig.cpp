@@ -46,7 +46,7 @@ Rig::Rig(const RigOptions& options)
       hosts_(std::make_unique<TwoHosts>()) {
   if (!hosts_->ready()) throw core::BadInput("two network namespaces need root and the program ip (iproute2)");
   for (const char* host : kHosts) mount_memory(root(host), kRootMb);
-  copy_ride();
+  if (options_.break_pictures) copy_ride();
 }
 
 Rig::~Rig() {
@@ -77,7 +77,7 @@ void Rig::write_manifest() {
   const auto both = [&](const char* first, const char* second) {
     return options_.standby ? std::string("{ host: ") + first + ", standby: " + second + " }" : std::string(first);
   };
-  const std::string ride = (folder_ / "ride").string();
+  const std::string ride = played().string();
   std::ofstream(train / "train.yaml")
       << "train:\n  id: " << train_id_ << "\n  domain: " << kDomain << "\n  release: " << RAILFIX_VERSION
       << "\n  run_as: programs\n  security: " << (options_.security ? "true" : "false") << "\n  map: line.map\n"

@@ -19,6 +19,7 @@ using test::TwoHosts;
 
 struct RigOptions {
   std::filesystem::path ride;  // dataset with truth
+  bool break_pictures = true;  // a copy is played, whose pictures may be replaced
   bool security = true;
   bool standby = true;
   int64_t picture_every = 1;  // of the recording
@@ -74,6 +75,9 @@ class Rig {
 
  private:
   [[nodiscard]] std::filesystem::path clock_file(const std::string& host) const { return folder_ / (host + ".clock"); }
+  [[nodiscard]] std::filesystem::path played() const {
+    return options_.break_pictures ? folder_ / "ride" : options_.ride;
+  }
   void copy_ride();
   void write_manifest();
   void start_broker();

@@ -121,7 +121,7 @@ int soak(Rig& rig, Observer& observer, double minutes) {
     }
     if (at_s - said_s < 600) continue;
     said_s = at_s;
-    print(all, observer.heard(), at_s);
+    print(all, observer.end(), at_s);
   }
   return print(all, observer.end(), 60 * minutes) ? 0 : 1;
 }

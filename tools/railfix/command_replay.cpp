@@ -82,8 +82,8 @@ void print(const ReplayReport& report, const CommandLine& line) {
               << '\n';
     return;
   }
-  std::cout << report.samples << " samples of " << report.topics << " topics published for train " << line.replay.train
-            << ", domain " << line.replay.domain << '\n';
+  std::cout << report.samples << " samples of " << report.topics << " topics published for "
+            << where(line.replay.network) << '\n';
   if (!line.replay.lock_step.empty()) return;
   std::printf("later than due: p50 %.3f ms, p99 %.3f ms, at most %.1f ms\n", report.late_p50_ms, report.late_p99_ms,
               report.late_max_ms);
@@ -126,8 +126,7 @@ void add_options(CLI::App& command, CommandLine& line) {
       ->delimiter(',');
   command.add_option("--without", options.without, "Not these, separated by commas")->delimiter(',');
   command.add_option("--remap", line.remaps, "RECORDED=NOW: publish a topic under another name; may be repeated");
-  command.add_option("--train", options.train, "Train to publish as")->capture_default_str();
-  command.add_option("--domain", options.domain, "DDS domain")->capture_default_str()->check(CLI::Range(0, 232));
+  add_network(command, options.network);
   command.add_option("--from", options.from_s, "Begin this many seconds into the recording")
       ->check(CLI::NonNegativeNumber);
   command.add_option("--to", options.to_s, "End this many seconds into the recording")->check(CLI::NonNegativeNumber);

@@ -10,6 +10,7 @@
 #include "core/time.hpp"
 #include "messaging/connected.hpp"
 #include "messaging/topics.hpp"
+#include "topic_listener.hpp"
 
 namespace railfix::tool {
 
@@ -26,8 +27,7 @@ struct Options {
   std::string service;
   std::string command;
   std::string argument;
-  std::string train = "demo";
-  int64_t domain = 0;
+  TrainNetwork network;
 };
 
 /// One request to one service, and its answer.
@@ -35,7 +35,7 @@ class Teller {
  public:
   explicit Teller(const Options& options)
       : options_(options),
-        participant_(network(options)),
+        participant_(participant_options(options.network, "railfix-tell")),
         control_(participant_, topics::service_control),
         replies_(participant_, topics::service_reply, "", queue_,
                  [this](const msg::ControlReply& reply) {
@@ -48,10 +48,11 @@ class Teller {
         }) {}
 
   int tell() {
-    const std::string where = "train " + options_.train + ", domain " + std::to_string(options_.domain);
+    const std::string here = where(options_.network);
     if (!wait_until([this] { return heard_of_it(); })) {
-      throw core::BadInput("there is no service " + options_.service + " on " + where +
-                           "; is it running, and are --train and --domain right?");
+      throw core::BadInput(
+          "there is no service " + options_.service + " on " + here +
+          "; is it running, and are --train and --domain right? On a secured train --config is needed");
     }
     const int64_t found_ns = core::monotonic_ns();
     (void)wait_until([&] { return connected() || core::monotonic_ns() - found_ns > kDiscoveryNs; });
@@ -62,7 +63,7 @@ class Teller {
     request.argument(options_.argument);
     control_.write(request);
     if (!wait_until([this] { return reply_.has_value(); })) {
-      std::cerr << options_.service << " on " << where << " does not answer\n";
+      std::cerr << options_.service << " on " << here << " does not answer\n";
       return 1;
     }
     (reply_->done() ? std::cout : std::cerr) << reply_->text().c_str() << '\n';
@@ -70,13 +71,6 @@ class Teller {
   }
 
  private:
-  static messaging::ParticipantOptions network(const Options& options) {
-    messaging::ParticipantOptions made;
-    made.train_id = options.train;
-    made.domain = options.domain;
-    made.service = "railfix-tell";
-    return made;
-  }
   template <class Condition>
   bool wait_until(const Condition& condition) {
     const int64_t deadline_ns = core::monotonic_ns() + kPatienceNs;
@@ -114,8 +108,7 @@ void add_tell(CLI::App& app, Action& chosen) {
   tell->add_option("service", options->service, "recorder, fusion, ...")->required();
   tell->add_option("command", options->command)->required();
   tell->add_option("argument", options->argument);
-  tell->add_option("--train", options->train, "Train of the service")->capture_default_str();
-  tell->add_option("--domain", options->domain, "DDS domain of the train")->capture_default_str();
+  add_network(*tell, options->network);
   tell->callback([options, &chosen] { chosen = [options] { return Teller(*options).tell(); }; });
 }
 

@@ -32,7 +32,7 @@ struct Options {
   double longest_gap_s = 15;
   double offset_s = 0;
   compare::Demand demand;
-  int64_t domain = 0;
+  TrainNetwork network;
   double for_s = 0;
 };
 
@@ -237,8 +237,8 @@ int compare_reports(const Options& options) {
     throw core::BadInput("--truth needs --map and --start, the place on the map where the truth begins.");
   std::optional<evaluation::Truth> truth;
   if (!options.truth.empty()) truth = core::value_or_throw(evaluation::Truth::read(options.truth));
-  ReportSource ours(options.ours, static_cast<etcs::Baseline>(options.baseline), options.domain);
-  ReportSource certified(options.certified, static_cast<etcs::Baseline>(options.certified_baseline), options.domain);
+  ReportSource ours(options.ours, static_cast<etcs::Baseline>(options.baseline), options.network);
+  ReportSource certified(options.certified, static_cast<etcs::Baseline>(options.certified_baseline), options.network);
   certified.shift(core::to_ns(options.offset_s));
   Line line(options);
   if (ours.live() || certified.live()) listen(ours, certified, line, options);
@@ -273,9 +273,7 @@ void add_tpr_compare(CLI::App& tpr, Action& chosen) {
                    "what is sent now")
       ->required();
   command->add_option("--certified", options->certified, "The certified system's, as --ours")->required();
-  command->add_option("--domain", options->domain, "DDS domain of topic:TRAIN")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 232));
+  add_domain(*command, options->network);
   command->add_option("--for-s", options->for_s, "Listen for so many seconds, 0 = until a file is over, or Ctrl-C")
       ->check(CLI::NonNegativeNumber);
   command->add_option("--map", options->map, "Compiled map: also reports with different LRBGs can be compared");

@@ -234,7 +234,12 @@ int doctor(const Options& options) {
     manifest = core::value_or_throw(read_manifest(options.train));
     host = &chosen_host(manifest, options);
   }
-  const bool good = say(check_computer(host == nullptr ? nullptr : &manifest, host));
+  auto findings = check_computer(host == nullptr ? nullptr : &manifest, host);
+  if (host != nullptr) {
+    for (auto& finding : check_certificates(manifest, *host)) findings.push_back(std::move(finding));
+  }
+  for (auto& finding : check_installed_certificates(HostFolder(options.root))) findings.push_back(std::move(finding));
+  const bool good = say(findings);
   std::cout << (good ? "this computer can run Railfix\n" : "this computer must not run Railfix like this\n");
   return good ? 0 : 1;
 }
@@ -290,6 +295,7 @@ void add_train(CLI::App& app, Action& chosen) {
   auto* computer = app.add_subcommand("doctor", "Say what is wrong with this computer as a host of a train");
   computer->add_option("--train", options->train, "Folder of train.yaml");
   computer->add_option("--host", options->host, "Which host of the train this computer is");
+  computer->add_option("--root", options->root, "Where var/lib/railfix is")->capture_default_str();
   computer->callback([&chosen, options] { chosen = [options] { return doctor(*options); }; });
 }
 

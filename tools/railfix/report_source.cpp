@@ -13,9 +13,9 @@ constexpr const char* kTopic = "topic:";
 
 }  // namespace
 
-ReportSource::ReportSource(const std::string& where, etcs::Baseline baseline, int64_t domain) {
+ReportSource::ReportSource(const std::string& where, etcs::Baseline baseline, TrainNetwork network) {
   if (where.starts_with(kTopic)) {
-    const TrainNetwork network{where.substr(std::string(kTopic).size()), domain, {}};
+    network.train = where.substr(std::string(kTopic).size());
     listener_ = std::make_unique<TopicListener>(network, "railfix-tpr-compare");
     listener_->listen(messaging::topics::train_position_report.name,
                       [this](const auto&, const auto&, const auto& sample, const auto&) {

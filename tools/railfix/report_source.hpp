@@ -13,9 +13,9 @@ namespace railfix::tool {
 class ReportSource {
  public:
   /// `where`: a run's folder, .csv or .jsonl (compare::read_reports), a recording (.mcap), or topic:TRAIN for the
-  /// train_position_report of a train on this DDS domain. The baseline is for files that do not say theirs. Throws
+  /// train_position_report of a train on this network. The baseline is for files that do not say theirs. Throws
   /// BadInput when it cannot be read.
-  ReportSource(const std::string& where, etcs::Baseline baseline, int64_t domain);
+  ReportSource(const std::string& where, etcs::Baseline baseline, TrainNetwork network);
 
   [[nodiscard]] bool live() const { return listener_ != nullptr; }
   /// REQUIRES: live(). Takes what comes for so long; false after Ctrl-C.

@@ -15,6 +15,8 @@ constexpr size_t kWaiting = 1000;
 
 volatile std::sig_atomic_t interrupted = 0;
 
+}  // namespace
+
 messaging::ParticipantOptions participant_options(const TrainNetwork& network, const std::string& command) {
   messaging::ParticipantOptions options;
   options.train_id = network.train;
@@ -26,10 +28,12 @@ messaging::ParticipantOptions participant_options(const TrainNetwork& network, c
   return options;
 }
 
-}  // namespace
-
 void add_network(CLI::App& command, TrainNetwork& network) {
-  command.add_option("--train", network.train, "Train to listen to")->capture_default_str();
+  command.add_option("--train", network.train, "Name of the train")->capture_default_str();
+  add_domain(command, network);
+}
+
+void add_domain(CLI::App& command, TrainNetwork& network) {
   command.add_option("--domain", network.domain, "DDS domain")->capture_default_str()->check(CLI::Range(0, 232));
   command.add_option_function<std::string>(
       "--config",

@@ -20,6 +20,10 @@ struct TrainNetwork {
 };
 /// --train and --domain, or --config for everything at once.
 void add_network(CLI::App& command, TrainNetwork& network);
+/// The same without --train.
+void add_domain(CLI::App& command, TrainNetwork& network);
+/// As a tool of this name (it begins with "railfix-").
+messaging::ParticipantOptions participant_options(const TrainNetwork& network, const std::string& command);
 /// "train demo, domain 0"
 std::string where(const TrainNetwork& network);
 

@@ -74,7 +74,16 @@ TEST_F(Fleet, ServicesComeUpComeBackAfterAKillAndGoDown) {
     const auto now = status("fusion");
     return now["healthy"] && now["pid"] != before["pid"] && now["restarts"] == 1;
   }));
+  const auto again = status("fusion");
+  ASSERT_EQ(kill(again["pid"].get<pid_t>(), SIGSTOP), 0);
+  EXPECT_TRUE(wait_until([&] {
+    const auto now = status("fusion");
+    return now["healthy"] && now["pid"] != again["pid"] && now["restarts"] == 2;
+  })) << "one that hangs is not started anew";
+  ASSERT_EQ(kill(status("fusion")["pid"].get<pid_t>(), SIGKILL), 0);
   EXPECT_EQ(train({"down", "--root", root()}).exit_code, 0);
+  for (const auto& entry : fs::directory_iterator("/dev/shm"))
+    EXPECT_THAT(entry.path().string(), Not(HasSubstr("railfix-health-" + id_))) << "left behind";
   const auto after = train({"status", "--root", root()});
   EXPECT_EQ(after.exit_code, 1);
   EXPECT_THAT(after.out, HasSubstr("not running: railfix train up"));

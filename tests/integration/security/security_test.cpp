@@ -25,11 +25,15 @@ class Security : public ::testing::Test {
   ~Security() override { fs::remove_all(folder_); }
 
   // The train's folder with keys, under an authority of its own.
-  fs::path keys_of(const std::string& name) {
+  fs::path keys_of(const std::string& name, const std::string& train_id = "", const fs::path& authority = {}) {
     const auto train = folder_ / name;
     fs::create_directories(train);
+    if (!authority.empty()) {
+      fs::create_directories(train / "security");
+      fs::copy(authority, train / "security/authority", fs::copy_options::recursive);
+    }
     std::ofstream(train / "train.yaml")
-        << "train:\n  id: " << train_ << "\n  domain: " << kDomain
+        << "train:\n  id: " << (train_id.empty() ? train_ : train_id) << "\n  domain: " << kDomain
         << "\n  release: 1.0\n  security: true\n  hosts: { cab: { address: 127.0.0.1 } }\n"
            "  services: { frame_grabber: cab, odometry: cab, fusion: cab, monitor: cab }\n";
     const auto made = tool::make_keys(core::value_or_throw(tool::read_manifest(train)), {});
@@ -116,6 +120,32 @@ TEST_F(Security, WithACertificateOfAnotherAuthorityNothingIsHeardAndNothingSaid)
   Train train(options("fusion", keys), options("monitor", keys));
   Rogue rogue(options("fusion", keys_of("foreign")));
   expect_nothing_crosses(train, rogue);
+}
+
+// A right certificate of this train, for a service that has nothing to do with positions.
+TEST_F(Security, ARightCertificateOfAnotherServiceSeesNothing) {
+  const auto keys = keys_of("train");
+  messaging::Participant odometry(options("odometry", keys));
+  messaging::Queue queue;
+  const auto read = [&] {
+    messaging::Reader<msg::TrainState> reader(odometry, topics::train_state, "", queue, [](const msg::TrainState&) {});
+  };
+  EXPECT_THROW(read(), core::BadInput);
+  EXPECT_NO_THROW(
+      messaging::Reader<msg::TrackView>(odometry, topics::track_view, "", queue, [](const msg::TrackView&) {}));
+}
+
+// Two trains under one authority: the certificates of one do not open the other.
+TEST_F(Security, TheCertificateOfAnotherTrainOfTheSameOperatorOpensNothing) {
+  const auto keys = keys_of("train");
+  const auto other = keys_of("other", "another-train", keys.parent_path() / "authority");
+  Train train(options("fusion", keys), options("monitor", keys));
+  messaging::Participant stranger(options("fusion", other));
+  EXPECT_THROW(messaging::Writer<msg::TrainState>(stranger, topics::train_state), core::BadInput);
+  messaging::Queue queue;
+  EXPECT_THROW(
+      messaging::Reader<msg::TrainState>(stranger, topics::train_state, "", queue, [](const msg::TrainState&) {}),
+      core::BadInput);
 }
 
 // The test can fail: with a right certificate the same rogue is heard.

@@ -60,6 +60,7 @@ TEST(Metrics, HaveEverySeriesThatAlertsAndDashboardName) {
   seen.state.emplace();
   seen.recorder.emplace();
   seen.shared_memory_free_mb = 1;
+  seen.certificates = {{"fusion", 300}};
   const std::vector<Problem> problems;
   MetricTopic topic;
   topic.name = "train_state";

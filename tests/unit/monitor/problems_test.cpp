@@ -99,6 +99,18 @@ TEST_F(ProblemsTest, TellsWhatIsWrongWithThePosition) {
   EXPECT_EQ(only().level, Level::error);
 }
 
+TEST_F(ProblemsTest, TellsOfCertificatesBeforeTheyRunOut) {
+  train_.certificate_days = 20;
+  train_.certificates = {{"fusion", 20}};
+  EXPECT_THAT(find_problems(train_), IsEmpty());
+  train_.certificates = {{"fusion", 19}};
+  EXPECT_EQ(only().what, "The certificate of fusion runs out in 19 days");
+  EXPECT_EQ(only().level, Level::warning);
+  train_.certificates = {{"fusion", -1}};
+  EXPECT_EQ(only().what, "The certificate of fusion has run out");
+  EXPECT_EQ(only().level, Level::error);
+}
+
 TEST_F(ProblemsTest, TellsOfRecorderSatellitesAndSharedMemory) {
   train_.recorder.emplace();
   train_.recorder->state(msg::RECORDER_RECORDING);

@@ -5,6 +5,7 @@
 
 #include <fstream>
 
+#include "support/program.hpp"
 #include "train/check.hpp"
 #include "train/keys.hpp"
 #include "train/render.hpp"
@@ -137,6 +138,10 @@ TEST_F(TrainFolder, CertificatesThatAreMissingOrRunOutAreTold) {
   soon.valid_days = 20;
   ASSERT_TRUE(make_keys(secured, soon).ok());
   EXPECT_THAT(findings("run_as: programs", "security: true"), Contains(HasSubstr("fusion.cert.pem runs out in ")));
+  const auto patient =
+      manifest(std::string(kTrain) + "  monitor: { certificate_days: 5 }\n", "run_as: programs", "security: true")
+          .value();
+  EXPECT_THAT(check_certificates(patient, *patient.host("cab")), IsEmpty()) << "the limit is a setting";
   KeysOptions renewed;
   renewed.renew = true;
   ASSERT_TRUE(make_keys(secured, renewed).ok());
@@ -164,6 +169,42 @@ TEST_F(TrainFolder, EachHostGetsItsConfigurationComposeFileAndUnit) {
   EXPECT_THAT(fusion["command"].as<std::vector<std::string>>(), Contains("common.ownership_strength=20"));
   EXPECT_FALSE(compose["services"]["odometry"]);
   EXPECT_TRUE(fs::exists(out / "systemd" / "railfix.service"));
+}
+
+TEST_F(TrainFolder, CertificatesAndPasswordsOfTheGroundLinkComeAlong) {
+  std::ofstream(folder_ / "line.map") << "map";
+  fs::create_directories(folder_ / "ground");
+  std::ofstream(folder_ / "ground/ca.pem") << "authority";
+  std::ofstream(folder_ / "ground/password") << "secret";
+  const std::string with_link =
+      std::string(kTrain) +
+      "    ground_link: { broker: \"ground.example:8883\", store: reports.db, user: re460-042,\n"
+      "      ca_file: ground/ca.pem, password_file: ground/password, key_file: /etc/key.pem }\n";
+  const auto train = manifest(with_link).value();
+  const auto out = folder_ / "out";
+  ASSERT_TRUE(render_host(train, *train.host("coach"), out).ok());
+  EXPECT_EQ(test::slurp(out / "files/tpr_publisher.ground_link.password_file"), "secret");
+  const auto config = test::slurp(out / "config.yaml");
+  EXPECT_THAT(config, HasSubstr("ca_file: " + (out / "files/tpr_publisher.ground_link.ca_file.pem").string()));
+  EXPECT_THAT(config, HasSubstr("key_file: /etc/key.pem")) << "the host has it";
+  const auto before = settings_of(train, *train.host("coach"), "tpr_publisher");
+  const auto of_fusion = settings_of(train, *train.host("coach"), "fusion");
+  std::ofstream(folder_ / "ground/password") << "another";
+  EXPECT_NE(settings_of(train, *train.host("coach"), "tpr_publisher"), before);
+  EXPECT_EQ(settings_of(train, *train.host("coach"), "fusion"), of_fusion);
+  fs::remove(folder_ / "ground/password");
+  EXPECT_THAT(findings("settings:\n  tpr_publisher:", "settings:\n  monitor: { address: 0.0.0.0 }\n  tpr_publisher:"),
+              Contains(HasSubstr("open to every network")));
+  const auto missing = check_train(manifest(with_link).value(), "/no/programs");
+  EXPECT_TRUE(std::any_of(missing.begin(), missing.end(), [](const Finding& finding) {
+    return finding.error && finding.text.find("settings.tpr_publisher.ground_link.password_file") == 0;
+  }));
+}
+
+TEST_F(TrainFolder, ThePageIsOnTheTrainNetworkOnly) {
+  std::ofstream(folder_ / "line.map") << "map";
+  const auto train = manifest(kTrain).value();
+  EXPECT_THAT(render_config(train, *train.host("coach"), "FOLDER"), HasSubstr("address: 10.42.1.12"));
 }
 
 TEST_F(TrainFolder, SettingsOfAServiceChangeWithWhatItReadsAndNothingElse) {

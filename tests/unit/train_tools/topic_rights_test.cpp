@@ -32,6 +32,15 @@ TEST(TopicRights, NoRightIsForATopicThatIsNotThere) {
   for (const auto& right : rights()) EXPECT_NE(messaging::find_topic(right), nullptr) << right;
 }
 
+TEST(TopicRights, EveryRightToReadIsForATopicThatIsThere) {
+  for (const auto& name : service::service_names()) {
+    for (const auto& topic : topics_read_by(name)) {
+      const std::string base = topic.substr(0, topic.find('/'));
+      EXPECT_TRUE(topic == "*" || messaging::find_topic(base) != nullptr) << name << ": " << topic;
+    }
+  }
+}
+
 TEST(TopicRights, PositionsAndReportsHaveOneServiceEach) {
   const auto writers = [](const std::string& topic) {
     std::vector<std::string> names;

@@ -82,8 +82,7 @@ ChannelChoice choose_channels(const mcap::Reader& reader, const ReplayOptions& o
         continue;
       }
       if (!kWrittenByMany.contains(now)) {
-        throw core::BadInput("train " + options.train + " on domain " + std::to_string(options.domain) +
-                             " is running: " + now +
+        throw core::BadInput(where(options.network) + " is running: " + now +
                              " has a writer already; replay as another train (--train), other "
                              "topics (--topics, --without) or under another name (--remap)");
       }

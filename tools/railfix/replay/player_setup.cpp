@@ -17,21 +17,13 @@ constexpr int kSteadyLooks = 10;  // a recorder looks for new cameras four times
 constexpr int64_t kConnectNs = 15 * core::kNsPerSecond;
 constexpr int64_t kServicesNs = 60 * core::kNsPerSecond;
 
-messaging::ParticipantOptions network(const ReplayOptions& options) {
-  messaging::ParticipantOptions network;
-  network.train_id = options.train;
-  network.domain = options.domain;
-  network.service = "railfix-replay";
-  return network;
-}
-
 }  // namespace
 
 Player::Player(const ReplayOptions& options)
     : options_(options),
       reader_(core::value_or_throw(mcap::Reader::open(options.file))),
       types_(*reader_),
-      participant_(network(options)),
+      participant_(participant_options(options.network, "railfix-replay")),
       gathering_(options.lock_step),
       commands_(make_commands()),
       status_(participant_, topics::player_status),
@@ -85,8 +77,8 @@ void Player::discover() {
     if (waited_ns < kDiscoveryNs) continue;
     if (missing().empty()) return;
     if (waited_ns > kServicesNs) {
-      throw core::BadInput("--lock-step: no sign of " + missing() + " on train " + options_.train + ", domain " +
-                           std::to_string(options_.domain) + "; start with --set common.lock_step=true");
+      throw core::BadInput("--lock-step: no sign of " + missing() + " on " + where(options_.network) +
+                           "; start with --set common.lock_step=true");
     }
   }
 }

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "topic_listener.hpp"
+
 namespace railfix::tool {
 
 struct ReplayOptions {
@@ -15,8 +17,7 @@ struct ReplayOptions {
   std::vector<std::string> topics;            // empty = all but those of kOnlyWhenNamed
   std::vector<std::string> without;           // left out
   std::map<std::string, std::string> remaps;  // recorded name -> name now
-  std::string train = "demo";
-  int64_t domain = 0;
+  TrainNetwork network;
   double from_s = 0;  // into the recording
   double to_s = std::numeric_limits<double>::infinity();
   bool loop = false;

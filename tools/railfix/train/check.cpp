@@ -13,8 +13,10 @@
 
 #include "messaging/network.hpp"
 #include "messaging/qos_match.hpp"
+#include "messaging/security.hpp"
 #include "train/keys.hpp"
 #include "train/render.hpp"
+#include "train/setting_files.hpp"
 #include "train/topic_rights.hpp"
 
 namespace railfix::tool {
@@ -22,7 +24,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int64_t kSoonDays = 30;
+constexpr int64_t kSoonDays = 30;    // where settings.monitor.certificate_days does not say otherwise
 constexpr double kPicturesMb = 512;  // histories of two cameras
 constexpr double kSharedMemoryMb = 16;
 constexpr double kRecordingsMb = 2000;
@@ -67,6 +69,11 @@ void check_files(const Manifest& manifest, Findings& findings) {
       error(findings,
             key + ": " + (manifest.folder / name).string() + " is missing or cannot be read; put it beside train.yaml");
   }
+  for (const auto& file : setting_files(manifest)) {
+    if (access((manifest.folder / file.file).c_str(), R_OK) != 0)
+      error(findings, "settings." + file.service + "." + file.key + ": " + (manifest.folder / file.file).string() +
+                          " is missing or cannot be read; put it beside train.yaml");
+  }
   if (manifest.map.empty()) warning(findings, "train.map is empty: there will be distance and speed, but no position");
 }
 
@@ -92,6 +99,10 @@ void check_settings(const Manifest& manifest, Findings& findings) {
     warning(findings, "settings.fusion.start is " + start +
                           ": a fusion that is started again would believe to stand there; leave it out, and "
                           "map_matcher finds the place");
+  if (setting_of(manifest, "monitor", "address") == "0.0.0.0")
+    warning(findings,
+            "settings.monitor.address is 0.0.0.0: page and metrics are open to every network that the computer is in; "
+            "leave it out, and they are on the train network only");
   const auto* camera = manifest.service("frame_grabber");
   const auto* recorder = manifest.service("recorder");
   if (camera != nullptr && recorder != nullptr && camera->host != recorder->host &&
@@ -120,24 +131,23 @@ void check_ports(const Manifest& manifest, Findings& findings) {
   }
 }
 
-void check_keys(const Manifest& manifest, Findings& findings) {
-  if (!manifest.security) return;
-  for (const auto& host : manifest.hosts) {
-    const auto folder = manifest.folder / "security" / host.name;
-    std::vector<std::string> services{kOperator};
-    for (const auto& service : services_on(manifest, host.name)) services.push_back(service.name);
-    for (const auto& service : services) {
-      const auto left = days_left(folder / (service + ".cert.pem"));
-      if (!left.ok()) {
-        error(findings, left.error().message);
-      } else if (left.value() < 0) {
-        error(findings, (folder / (service + ".cert.pem")).string() + " ran out " + std::to_string(-left.value()) +
-                            " days ago; renew with railfix train keys --renew");
-      } else if (left.value() < kSoonDays) {
-        warning(findings, (folder / (service + ".cert.pem")).string() + " runs out in " + std::to_string(left.value()) +
-                              " days; renew with railfix train keys --renew");
-      }
-    }
+int64_t warning_days(const Manifest& manifest) {
+  int64_t days = kSoonDays;
+  const auto section = manifest.settings["monitor"];
+  if (section && section.IsMap() && section["certificate_days"])
+    (void)YAML::convert<int64_t>::decode(section["certificate_days"], days);
+  return days;
+}
+
+void check_certificate(const fs::path& certificate, int64_t soon_days, Findings& findings) {
+  const auto left = messaging::days_left(certificate);
+  constexpr const char* kRenew = "; railfix train keys --renew, then railfix train upgrade on each host";
+  if (!left.ok()) {
+    error(findings, left.error().message);
+  } else if (left.value() < 0) {
+    error(findings, certificate.string() + " ran out " + std::to_string(-left.value()) + " days ago" + kRenew);
+  } else if (left.value() < soon_days) {
+    warning(findings, certificate.string() + " runs out in " + std::to_string(left.value()) + " days" + kRenew);
   }
 }
 
@@ -233,8 +243,32 @@ std::vector<Finding> check_train(const Manifest& manifest, const fs::path& progr
   check_quality_of_service(manifest, findings);
   check_settings(manifest, findings);
   check_ports(manifest, findings);
-  check_keys(manifest, findings);
+  for (const auto& host : manifest.hosts) {
+    for (auto& finding : check_certificates(manifest, host)) findings.push_back(std::move(finding));
+  }
   check_configurations(manifest, programs, findings);
+  return findings;
+}
+
+std::vector<Finding> check_certificates(const Manifest& manifest, const TrainHost& host) {
+  Findings findings;
+  if (!manifest.security) return findings;
+  std::vector<std::string> services{kOperator};
+  for (const auto& service : services_on(manifest, host.name)) services.push_back(service.name);
+  for (const auto& service : services)
+    check_certificate(manifest.folder / "security" / host.name / (service + ".cert.pem"), warning_days(manifest),
+                      findings);
+  return findings;
+}
+
+std::vector<Finding> check_installed_certificates(const HostFolder& folder) {
+  Findings findings;
+  const auto plan = folder.plan();
+  if (!plan) return findings;
+  for (const auto& service : plan->services) {
+    const auto keys = folder.generation(service.generation) / "security";
+    if (fs::exists(keys)) check_certificate(keys / (service.name + ".cert.pem"), kSoonDays, findings);
+  }
   return findings;
 }
 

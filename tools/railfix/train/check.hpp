@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "train/manifest.hpp"
+#include "train/plan.hpp"
 
 namespace railfix::tool {
 
@@ -17,6 +18,11 @@ struct Finding {
 /// service's own check of its configuration (with the programs in `programs`, skipped and said when they are not
 /// there).
 std::vector<Finding> check_train(const Manifest& manifest, const std::filesystem::path& programs);
+
+/// Certificates of one host beside the manifest: missing, run out, or about to (settings.monitor.certificate_days).
+std::vector<Finding> check_certificates(const Manifest& manifest, const TrainHost& host);
+/// Those that the services of this computer run with.
+std::vector<Finding> check_installed_certificates(const HostFolder& folder);
 
 /// This computer as a host: shared memory, socket buffers, clock, disk, interface. With a manifest, for what `host`
 /// runs.

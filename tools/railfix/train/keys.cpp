@@ -1,15 +1,11 @@
 #include "train/keys.hpp"
 
-#include <openssl/asn1.h>
-#include <openssl/pem.h>
-#include <openssl/x509.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <ctime>
 #include <fstream>
-#include <memory>
 
 #include "train/render.hpp"
 #include "train/topic_rights.hpp"
@@ -188,7 +184,7 @@ std::string permissions_xml(const Manifest& manifest, const std::string& service
          "</not_after></validity>\n"
          "    <allow_rule><domains><id>" +
          std::to_string(manifest.domain) + "</id></domains>\n" + rights("publish", writes, partition) +
-         rights("subscribe", {"*"}, partition) +
+         rights("subscribe", topics_read_by(service), partition) +
          "    </allow_rule>\n    <default>DENY</default>\n  </grant></permissions>\n</dds>\n";
 }
 
@@ -213,20 +209,6 @@ core::Result<std::vector<fs::path>> make_keys(const Manifest& manifest, const Ke
     made.push_back(here);
   }
   return made;
-}
-
-core::Result<int64_t> days_left(const fs::path& certificate) {
-  const std::unique_ptr<FILE, int (*)(FILE*)> file(std::fopen(certificate.c_str(), "r"),
-                                                   [](FILE* f) { return f != nullptr ? std::fclose(f) : 0; });
-  if (!file) return core::Error{certificate.string() + " is missing; make it with railfix train keys"};
-  const std::unique_ptr<X509, void (*)(X509*)> read(PEM_read_X509(file.get(), nullptr, nullptr, nullptr), X509_free);
-  if (!read)
-    return core::Error{certificate.string() + " is not a certificate; make it again with railfix train keys --renew"};
-  int days = 0;
-  int seconds = 0;
-  if (ASN1_TIME_diff(&days, &seconds, nullptr, X509_get0_notAfter(read.get())) != 1)
-    return core::Error{certificate.string() + " has no readable end of validity"};
-  return seconds < 0 ? days - 1 : days;
 }
 
 }  // namespace railfix::tool

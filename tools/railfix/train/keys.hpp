@@ -25,7 +25,4 @@ std::string permissions_xml(const Manifest& manifest, const std::string& service
 /// refuses.
 core::Result<std::vector<std::filesystem::path>> make_keys(const Manifest& manifest, const KeysOptions& options);
 
-/// Days until the certificate runs out, negative when it has. Error: no certificate.
-core::Result<int64_t> days_left(const std::filesystem::path& certificate);
-
 }  // namespace railfix::tool

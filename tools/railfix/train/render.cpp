@@ -4,6 +4,8 @@
 #include <fstream>
 #include <sstream>
 
+#include "train/setting_files.hpp"
+
 namespace railfix::tool {
 namespace {
 
@@ -54,6 +56,7 @@ void fill_common(YAML::Node settings, const Manifest& manifest, const TrainHost&
 YAML::Node settings_on(const Manifest& manifest, const TrainHost& host, const std::string& folder) {
   YAML::Node settings = YAML::Clone(manifest.settings);
   fill_common(settings, manifest, host, folder);
+  point_to_host(settings, setting_files(manifest), folder);
   for (const char* service : {"map_matcher", "fusion", "tpr_publisher", "recorder", "monitor"}) {
     if (manifest.service(service) != nullptr) fill(settings[service], "map", in_folder(folder, manifest.map));
   }
@@ -63,6 +66,8 @@ YAML::Node settings_on(const Manifest& manifest, const TrainHost& host, const st
     fill(settings["recorder"], "train_file", folder + "/config.yaml");
     fill(settings["recorder"], "folder", std::string(kStateFolder) + "/recordings");
   }
+  // The page is for the train network, not for every other one that this computer is in.
+  if (manifest.service("monitor") != nullptr) fill(settings["monitor"], "address", host.address);
   if (manifest.service("monitor") != nullptr && !settings["monitor"]["expected"]) {
     for (const auto& service : manifest.services) {
       if (service.name != "monitor") settings["monitor"]["expected"].push_back(service.name);
@@ -153,8 +158,11 @@ core::Status copy_files(const Manifest& manifest, const TrainHost& host, const f
     if (!name.empty()) files.emplace_back(manifest.folder / name, folder / fs::path(name).filename());
   }
   if (manifest.security) files.emplace_back(manifest.folder / "security" / host.name, folder / "security");
+  for (const auto& file : setting_files(manifest))
+    files.emplace_back(manifest.folder / file.file, file.on_host(folder.string()));
   for (const auto& [from, to] : files) {
     std::error_code failed;
+    fs::create_directories(to.parent_path(), failed);
     fs::copy(from, to, options, failed);
     if (failed) return core::Error{from.string() + " cannot be copied to " + to.string() + ": " + failed.message()};
   }
@@ -217,6 +225,10 @@ std::string settings_of(const Manifest& manifest, const TrainHost& host, const s
   };
   for (const auto& file : {manifest.map, manifest.calibration, manifest.qos_profiles}) {
     if (mentions(file)) text += file + ": fingerprint " + fingerprint(manifest.folder / file) + "\n";
+  }
+  for (const auto& file : setting_files(manifest)) {
+    if (file.service == service)
+      text += service + "." + file.key + ": fingerprint " + fingerprint(manifest.folder / file.file) + "\n";
   }
   if (manifest.security) {
     for (const char* part : {".cert.pem", ".permissions.p7s"})

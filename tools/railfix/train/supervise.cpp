@@ -14,6 +14,8 @@
 #include <ranges>
 
 #include "core/time.hpp"
+#include "service/health_file.hpp"
+#include "train/left_behind.hpp"
 
 namespace railfix::tool {
 namespace {
@@ -24,6 +26,12 @@ constexpr int kTurnMs = 20;
 constexpr int64_t kFirstPauseNs = 200'000'000;
 constexpr int64_t kLongestPauseNs = 5 * core::kNsPerSecond;
 constexpr int64_t kLivesNs = 10 * core::kNsPerSecond;
+// A run loop that does not turn for so long hangs; the longest work of any service in one go is about a second.
+constexpr int64_t kFrozenNs = 3 * core::kNsPerSecond;
+constexpr int64_t kLookNs = core::kNsPerSecond / 4;
+constexpr int kFrozenLooks = 3;  // after a computer that stood still everybody may speak first
+// A participant that died is forgotten after 5 s, and then nobody has its pictures mapped.
+constexpr int64_t kForgottenNs = 10 * core::kNsPerSecond;
 constexpr int64_t kStopNs = 10 * core::kNsPerSecond;
 
 volatile std::sig_atomic_t asked_to_stop = 0;
@@ -49,8 +57,11 @@ std::string said_of(int wait_status) {
 /// One service of the plan and its process.
 class Child {
  public:
-  Child(PlannedService service, const HostFolder& folder)
-      : service_(std::move(service)), home_(folder.home()), log_(folder.log(service_.name)) {}
+  Child(PlannedService service, const HostFolder& folder, const service::CommonConfig& common)
+      : service_(std::move(service)),
+        home_(folder.home()),
+        log_(folder.log(service_.name)),
+        health_(service::health_path(common, service_.name)) {}
   [[nodiscard]] const PlannedService& service() const { return service_; }
   [[nodiscard]] RunningService state() const { return {pid_, service_.generation, restarts_, last_end_}; }
   [[nodiscard]] bool runs() const { return pid_ > 0; }
@@ -58,7 +69,10 @@ class Child {
   /// Starts it when it is time, notes its end. True when something has changed.
   bool turn() {
     const int64_t now_ns = core::monotonic_ns();
-    if (pid_ > 0) return note_end(now_ns);
+    if (pid_ > 0) {
+      kill_when_frozen(now_ns);
+      return note_end(now_ns);
+    }
     if (now_ns < next_start_ns_) return false;
     start(now_ns);
     return true;
@@ -71,6 +85,7 @@ class Child {
     kill(pid_, SIGKILL);
     waitpid(pid_, nullptr, 0);
     pid_ = 0;
+    forget_health();
   }
   bool ended() {
     if (pid_ > 0 && waitpid(pid_, nullptr, WNOHANG) == pid_) pid_ = 0;
@@ -78,7 +93,22 @@ class Child {
   }
 
  private:
+  // A killed one leaves its last words, which would speak for the next one.
+  void forget_health() const {
+    std::error_code none;
+    fs::remove(health_, none);
+  }
+  // One that has spoken since it was started, and is silent now: nobody else would ever end it.
+  void kill_when_frozen(int64_t now_ns) {
+    if (now_ns - looked_ns_ < kLookNs) return;
+    looked_ns_ = now_ns;
+    const auto silent_ns = service::silent_ns(health_);
+    const bool silent = silent_ns && *silent_ns > kFrozenNs && *silent_ns < now_ns - started_ns_;
+    frozen_looks_ = silent ? frozen_looks_ + 1 : 0;
+    if (frozen_looks_ >= kFrozenLooks) kill(pid_, SIGKILL);
+  }
   void start(int64_t now_ns) {
+    forget_health();
     fs::create_directories(log_.parent_path());
     const int log = open(log_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
     pid_ = fork();
@@ -95,7 +125,9 @@ class Child {
     if (waitpid(pid_, &wait_status, WNOHANG) != pid_) return false;
     pid_ = 0;
     ++restarts_;
-    last_end_ = said_of(wait_status);
+    last_end_ = (frozen_looks_ >= kFrozenLooks ? "was frozen, " : "") + said_of(wait_status);
+    frozen_looks_ = 0;
+    forget_health();
     pause_ns_ = now_ns - started_ns_ > kLivesNs ? kFirstPauseNs : std::min(2 * pause_ns_, kLongestPauseNs);
     next_start_ns_ = now_ns + pause_ns_;
     return true;
@@ -104,6 +136,9 @@ class Child {
   PlannedService service_;
   fs::path home_;
   fs::path log_;
+  fs::path health_;
+  int frozen_looks_ = 0;
+  int64_t looked_ns_ = 0;
   pid_t pid_ = 0;
   int restarts_ = 0;
   std::string last_end_;
@@ -132,7 +167,11 @@ class Supervision {
     follow_plan();
     bool changed = false;
     for (auto& child : children_) changed = child.turn() || changed;
-    if (changed) say();
+    if (changed) {
+      say();
+      clean_ns_ = core::monotonic_ns() + kForgottenNs;
+    }
+    clean();
   }
   void end() {
     std::vector<Child*> speakers;
@@ -148,6 +187,19 @@ class Supervision {
   }
 
  private:
+  // What killed services have left, in two looks.
+  void clean() {
+    const int64_t now_ns = core::monotonic_ns();
+    if (clean_ns_ == 0 || now_ns < clean_ns_) return;
+    if (!left_) {
+      left_ = left_behind();
+      clean_ns_ = now_ns + core::kNsPerSecond;
+      return;
+    }
+    remove_left_behind(*left_);
+    left_.reset();
+    clean_ns_ = 0;
+  }
   void follow_plan() {
     const auto written = folder_.plan_written();
     if (written == plan_written_) return;
@@ -163,11 +215,14 @@ class Supervision {
     std::erase_if(children_, [&](const Child& child) {
       return std::find(planned_.begin(), planned_.end(), child.service()) == planned_.end();
     });
+    service::CommonConfig common;
+    common.train_id = plan->train_id;
+    common.host = plan->host;
     // Against the way of the data: who listens is there before who speaks.
     for (const auto& service : std::views::reverse(planned_)) {
       const bool there = std::any_of(children_.begin(), children_.end(),
                                      [&](const Child& child) { return child.service() == service; });
-      if (!there) children_.emplace_back(service, folder_);
+      if (!there) children_.emplace_back(service, folder_, common);
     }
     say();
   }
@@ -178,6 +233,8 @@ class Supervision {
   }
   const HostFolder& folder_;
   fs::file_time_type plan_written_{};
+  int64_t clean_ns_ = 0;  // 0 = there is nothing to be cleaned
+  std::optional<std::vector<fs::path>> left_;
   std::vector<PlannedService> planned_;
   std::vector<Child> children_;
 };

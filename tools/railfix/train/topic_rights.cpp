@@ -27,4 +27,23 @@ const std::vector<std::string>& topics_written_by(const std::string& service) {
   return found == topics.end() ? none : found->second;
 }
 
+std::vector<std::string> topics_read_by(const std::string& service) {
+  static const std::map<std::string, std::vector<std::string>> topics{
+      {"frame_grabber", {}},
+      {"sensor_gateway", {}},
+      {"track_detector", {"camera_frame/*", "camera_calibration", "imu_sample"}},
+      {"odometry", {"camera_frame/*", "camera_calibration", "track_view"}},
+      {"map_matcher", {"landmark_sighting", "track_view", "odometry_step", "imu_sample", "train_state"}},
+      {"fusion", {"odometry_step", "imu_sample", "wheel_sample", "gnss_fix", "position_fix"}},
+      {"tpr_publisher", {"train_state", "onboard_status"}},
+      {"onboard", {}}};
+  const auto found = topics.find(service);
+  if (found == topics.end()) return {"*"};  // recorder, monitor, the operator's tools
+  std::vector<std::string> read = found->second;
+  for (const auto& more : {topics_written_by(service), topics_written_by_all()})
+    read.insert(read.end(), more.begin(), more.end());
+  read.insert(read.end(), {"service_control", "data_clock"});
+  return read;
+}
+
 }  // namespace railfix::tool

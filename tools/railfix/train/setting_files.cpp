@@ -1,0 +1,50 @@
+#include "train/setting_files.hpp"
+
+namespace railfix::tool {
+namespace {
+
+struct Place {
+  const char* service;
+  const char* group;  // empty = the section itself
+  const char* key;
+};
+constexpr Place kPlaces[] = {
+    {"tpr_publisher", "ground_link", "ca_file"},  {"tpr_publisher", "ground_link", "certificate_file"},
+    {"tpr_publisher", "ground_link", "key_file"}, {"tpr_publisher", "ground_link", "password_file"},
+    {"monitor", "", "tls_certificate"},           {"monitor", "", "tls_key"}};
+
+std::string key_of(const Place& place) {
+  return (*place.group == '\0' ? "" : std::string(place.group) + ".") + place.key;
+}
+
+// The section that holds the key, undefined when there is none.
+YAML::Node section_of(const YAML::Node& settings, const Place& place) {
+  if (!settings || !settings.IsMap()) return YAML::Node(YAML::NodeType::Undefined);
+  const YAML::Node section = settings[place.service];
+  if (*place.group == '\0' || !section || !section.IsMap()) return section;
+  return section[place.group];
+}
+
+}  // namespace
+
+std::vector<SettingFile> setting_files(const Manifest& manifest) {
+  std::vector<SettingFile> files;
+  for (const auto& place : kPlaces) {
+    const auto section = section_of(manifest.settings, place);
+    if (!section || !section.IsMap() || !section[place.key] || !section[place.key].IsScalar()) continue;
+    const std::filesystem::path file = section[place.key].Scalar();
+    if (!file.empty() && file.is_relative()) files.push_back({place.service, key_of(place), file});
+  }
+  return files;
+}
+
+void point_to_host(YAML::Node settings, const std::vector<SettingFile>& files, const std::string& folder) {
+  for (const auto& file : files) {
+    for (const auto& place : kPlaces) {
+      if (file.service == place.service && file.key == key_of(place))
+        section_of(settings, place)[place.key] = file.on_host(folder);
+    }
+  }
+}
+
+}  // namespace railfix::tool

@@ -1,0 +1,26 @@
+// Settings that name files which lie beside train.yaml: certificates and passwords of the ground link and of the page.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "train/manifest.hpp"
+
+namespace railfix::tool {
+
+struct SettingFile {
+  std::string service;
+  std::string key;             // "ground_link.ca_file"
+  std::filesystem::path file;  // as train.yaml has it, beside train.yaml
+  /// Where it lies in the folder of a host.
+  [[nodiscard]] std::string on_host(const std::string& folder) const {
+    return folder + "/files/" + service + "." + key + file.extension().string();
+  }
+};
+
+/// Those that the manifest gives. An absolute path is a file that the host has already, and not among them.
+std::vector<SettingFile> setting_files(const Manifest& manifest);
+/// Makes the settings name the files in the folder of a host.
+void point_to_host(YAML::Node settings, const std::vector<SettingFile>& files, const std::string& folder);
+
+}  // namespace railfix::tool
