@@ -309,7 +309,10 @@ void RecorderThread::use(const Arrival& arrival) {
 }
 
 void RecorderThread::record(const Arrival& arrival) {
-  if (arrival.live) recording_->note_sequence(std::string(arrival.topic), arrival.writer, arrival.sequence);
+  const std::string topic(arrival.topic);
+  const auto* known = messaging::find_topic(topic);
+  if (arrival.live)
+    recording_->note_sequence(topic, arrival.writer, arrival.sequence, known != nullptr && known->qos.exclusive);
   if (!arrival.recorded) return;
   ++received_;
   const auto status = recording_->write(*arrival.recorded);

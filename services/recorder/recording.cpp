@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <fstream>
 #include <regex>
+#include <utility>
 
 #include "core/time.hpp"
 
@@ -71,10 +72,11 @@ core::Status Recording::write_event(const EventNote& note) {
       {"railfix_event", {{"time_ns", std::to_string(note.time_ns)}, {"text", note.text}, {"trigger", note.trigger}}});
 }
 
-void Recording::note_sequence(const std::string& topic, uint64_t writer, uint64_t sequence) {
+void Recording::note_sequence(const std::string& topic, uint64_t writer, uint64_t sequence, bool exclusive) {
+  const bool taken_over = std::exchange(heard_[topic], writer) != writer;
   const auto [last, first] = last_sequence_.try_emplace({topic, writer}, sequence);
   if (first) return;
-  if (sequence > last->second + 1) gaps_[topic] += sequence - last->second - 1;
+  if (sequence > last->second + 1 && !(exclusive && taken_over)) gaps_[topic] += sequence - last->second - 1;
   last->second = std::max(last->second, sequence);
 }
 

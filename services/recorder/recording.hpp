@@ -50,8 +50,9 @@ class Recording {
   /// The metadata record `railfix_event`.
   core::Status write_event(const EventNote& note);
   /// `writer` and `sequence` as the middleware gives them, of every sample that reached the recorder's thread. Gaps
-  /// that add_dropped() does not explain were lost in transport.
-  void note_sequence(const std::string& topic, uint64_t writer, uint64_t sequence);
+  /// that add_dropped() does not explain were lost in transport. `exclusive`: one writer is heard at a time, and the
+  /// numbers of the others go on meanwhile.
+  void note_sequence(const std::string& topic, uint64_t writer, uint64_t sequence, bool exclusive = false);
   /// What comes next does not follow what came last: no gap.
   void forget_sequences() { last_sequence_.clear(); }
   /// So many more samples of the topic were dropped in front of the recorder's thread.
@@ -77,6 +78,7 @@ class Recording {
   std::unique_ptr<mcap::Writer> writer_;
   std::map<std::shared_ptr<const ChannelOf>, uint16_t> channels_;
   std::map<std::pair<std::string, uint64_t>, uint64_t> last_sequence_;
+  std::map<std::string, uint64_t> heard_;  // the last writer of each topic
   std::map<std::string, uint64_t> gaps_;
   Losses dropped_;
   uint64_t lost_written_ = 0;

@@ -51,6 +51,17 @@ TEST_F(RecordingFolder, HoldsSamplesChannelsAndWhatTheTrainWas) {
   EXPECT_EQ(reader->metadata()[0].entries.at("train_id"), "demo");
 }
 
+TEST_F(RecordingFolder, WhatAStandbyWritesUnheardIsNotLost) {
+  auto recording = create("standby.mcap");
+  for (const uint64_t sequence : {5, 6}) recording->note_sequence("train_state", 1, sequence, true);
+  for (const uint64_t sequence : {5, 6}) recording->note_sequence("train_state", 2, sequence, true);
+  recording->note_sequence("train_state", 1, 50, true);
+  recording->note_sequence("train_state", 2, 99, true);
+  EXPECT_EQ(recording->loss_text(), "");
+  recording->note_sequence("train_state", 2, 102, true);
+  EXPECT_EQ(recording->loss_text(), "train_state: 2 transport");
+}
+
 TEST_F(RecordingFolder, GapsAreTransportUnlessADropExplainsThem) {
   auto recording = create("gaps.mcap");
   for (const uint64_t sequence : {5, 6, 9, 10}) recording->note_sequence("track_view", 1, sequence);
