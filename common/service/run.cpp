@@ -128,7 +128,8 @@ int run_program(const Program& program, int argc, char** argv) {
   CommandLine line;
   CLI::App app{"Railfix service " + program.name};
   app.add_option("--config", line.config,
-                 "YAML file with the sections `common` and `" + program.name + "` (others are ignored)");
+                 "YAML file with the sections `common` and `" + program.name + "` (others are ignored)")
+      ->envname("RAILFIX_CONFIG");
   app.add_option("--set", line.sets, "section.key=value, over the file; may be repeated");
   app.add_flag("--check", line.check, "Read the configuration, say what is wrong with it, and end");
   app.add_flag("--document", line.document, "Print every key with its default, unit, range and meaning, and end");

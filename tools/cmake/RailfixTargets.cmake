@@ -37,6 +37,9 @@ function(railfix_library name)
   railfix_warnings(railfix_${name})
 endfunction()
 
+# All services, and nothing else: what images are made of.
+add_custom_target(railfix-services)
+
 # railfix_service(odometry ALGORITHM a.cpp SERVICE odometry_service.cpp DEPENDS x)
 #   -> library railfix_odometry (the algorithm, no DDS) and program railfix-odometry (main.cpp and the DDS side).
 function(railfix_service name)
@@ -46,6 +49,7 @@ function(railfix_service name)
   add_executable(railfix-${program} main.cpp ${ARG_SERVICE})
   target_link_libraries(railfix-${program} PRIVATE railfix_${name} railfix_service)
   railfix_warnings(railfix-${program})
+  add_dependencies(railfix-services railfix-${program})
 endfunction()
 
 # railfix_test(core SOURCES a_test.cpp DEPENDS railfix_core)  -> program railfix-test-core, run by CTest test by test

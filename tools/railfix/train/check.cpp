@@ -290,6 +290,9 @@ std::vector<Finding> check_computer(const Manifest* manifest, const TrainHost* h
     error(findings, std::string(state) + " has " + std::to_string(static_cast<int>(disk_mb)) +
                         " MB free; recordings and unsent reports need " + std::to_string(static_cast<int>(needed_mb)));
   if (host != nullptr) check_interface(*host, findings);
+  if (manifest != nullptr && host != nullptr && manifest->containers) {
+    for (const auto& problem : container_problems(*manifest, *host)) error(findings, problem);
+  }
   return findings;
 }
 

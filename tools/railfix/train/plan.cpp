@@ -5,11 +5,14 @@
 
 #include <algorithm>
 #include <fstream>
+#include <set>
 
 namespace railfix::tool {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr int kGenerationsKept = 5;
 
 std::optional<YAML::Node> load(const fs::path& file) {
   try {
@@ -37,6 +40,7 @@ PlannedService service_of(const YAML::Node& node) {
           node["generation"].as<int>(),
           node["standby"].as<bool>(),
           node["command"].as<std::vector<std::string>>(),
+          node["clean_up"].as<std::vector<std::string>>(std::vector<std::string>{}),
           node["settings"].as<std::string>()};
 }
 
@@ -58,6 +62,24 @@ int HostFolder::newest_generation() const {
     newest = std::max(newest, std::atoi(entry.path().filename().c_str()));
   }
   return newest;
+}
+
+void HostFolder::prune() const {
+  const auto now = plan();
+  if (!now) return;
+  std::set<int> used{now->generation, now->previous};
+  for (const auto& running : {now, plan(now->previous)}) {
+    if (!running) continue;
+    for (const auto& service : running->services) used.insert(service.generation);
+  }
+  const int newest = newest_generation();
+  std::error_code none;
+  std::vector<fs::path> old;
+  for (const auto& entry : fs::directory_iterator(folder_ / "generations", none)) {
+    const int number = std::atoi(entry.path().filename().c_str());
+    if (number <= newest - kGenerationsKept && !used.contains(number)) old.push_back(entry.path());
+  }
+  for (const auto& folder : old) fs::remove_all(folder, none);
 }
 
 fs::file_time_type HostFolder::plan_written() const {
@@ -91,6 +113,7 @@ core::Status HostFolder::write_to(const fs::path& folder, const HostPlan& plan) 
     node["generation"] = service.generation;
     node["standby"] = service.standby;
     node["command"] = service.command;
+    node["clean_up"] = service.clean_up;
     node["settings"] = service.settings;
     root["services"].push_back(node);
   }

@@ -1,9 +1,9 @@
 // What one host runs: the commands of its services, as files that the supervisor reads and `railfix train` writes.
 //
-//   ROOT/var/lib/railfix/train/generations/N/  configuration, map, keys and compose file of generation N, never changed
-//   again ROOT/var/lib/railfix/train/plan.yaml       which service runs with which generation; replaced in one step
-//   ROOT/var/lib/railfix/train/state.yaml      what the supervisor says: processes and how often they were restarted
-//   ROOT/var/lib/railfix/train/log/            what the services say
+//   ROOT/var/lib/railfix-train/generations/N/  configuration, map, keys and compose file of generation N, never changed
+//   again ROOT/var/lib/railfix-train/plan.yaml       which service runs with which generation; replaced in one step
+//   ROOT/var/lib/railfix-train/state.yaml      what the supervisor says: processes and how often they were restarted
+//   ROOT/var/lib/railfix-train/log/            what the services say
 #pragma once
 
 #include <filesystem>
@@ -22,7 +22,8 @@ struct PlannedService {
   int generation = 0;
   bool standby = false;
   std::vector<std::string> command;
-  std::string settings;  // everything that the service reads; another text means that it must be restarted
+  std::vector<std::string> clean_up;  // run before each start and after a kill; empty = nothing to do
+  std::string settings;               // everything that the service reads; another text means that it must be restarted
 
   bool operator==(const PlannedService&) const = default;
 };
@@ -45,10 +46,11 @@ struct RunningService {
 };
 using HostState = std::map<std::string, RunningService>;
 
-/// The folder of all this.
+/// The folder of all this. Services that run in containers do not see it, but for their own files of their generation.
 class HostFolder {
  public:
-  explicit HostFolder(const std::filesystem::path& root) : home_(root / "var/lib/railfix"), folder_(home_ / "train") {}
+  explicit HostFolder(const std::filesystem::path& root)
+      : home_(root / "var/lib/railfix"), folder_(root / "var/lib/railfix-train") {}
   /// Where services run: recordings, reports that wait for the ground.
   [[nodiscard]] const std::filesystem::path& home() const { return home_; }
   [[nodiscard]] std::filesystem::path generation(int number) const;
@@ -67,6 +69,8 @@ class HostFolder {
   [[nodiscard]] std::filesystem::file_time_type plan_written() const;
   [[nodiscard]] HostState state() const;
   core::Status write(const HostState& state) const;
+  /// Removes old generations: all but the newest five and those that the plan runs or can go back to.
+  void prune() const;
 
  private:
   [[nodiscard]] static std::optional<HostPlan> plan_in(const std::filesystem::path& folder);

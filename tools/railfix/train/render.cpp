@@ -14,21 +14,11 @@ namespace fs = std::filesystem;
 constexpr int kPrimaryStrength = 20;
 constexpr int kStandbyStrength = 10;
 constexpr int kStopS = 10;
-constexpr const char* kStateFolder = "/var/lib/railfix";
 constexpr const char* kMade = "Made by railfix train from train.yaml; edit that.";
 
 std::string dashed(std::string name) {
   std::replace(name.begin(), name.end(), '_', '-');
   return name;
-}
-
-std::string image_of(const HostedService& service) {
-  return "railfix/" + dashed(service.name) + ":" + service.release;
-}
-
-// Cameras and sensors are the only things beside the network that a service touches.
-bool needs_devices(const std::string& service) {
-  return service == "frame_grabber" || service == "sensor_gateway";
 }
 
 void fill(YAML::Node section, const char* key, const std::string& value) {
@@ -64,7 +54,7 @@ YAML::Node settings_on(const Manifest& manifest, const TrainHost& host, const st
     fill(settings["frame_grabber"], "calibration", in_folder(folder, manifest.calibration));
   if (manifest.service("recorder") != nullptr) {
     fill(settings["recorder"], "train_file", folder + "/config.yaml");
-    fill(settings["recorder"], "folder", std::string(kStateFolder) + "/recordings");
+    fill(settings["recorder"], "folder", std::string(kContainerHome) + "/recordings");
   }
   // The page is for the train network, not for every other one that this computer is in.
   if (manifest.service("monitor") != nullptr) fill(settings["monitor"], "address", host.address);
@@ -78,50 +68,6 @@ YAML::Node settings_on(const Manifest& manifest, const TrainHost& host, const st
 
 std::string strength_of(const HostedService& service) {
   return "common.ownership_strength=" + std::to_string(service.standby ? kStandbyStrength : kPrimaryStrength);
-}
-
-std::vector<std::string> arguments_of(const HostedService& service, const std::string& folder) {
-  return {"--config", folder + "/config.yaml", "--set", strength_of(service)};
-}
-
-std::vector<std::string> podman_command(const HostedService& service, const std::string& folder) {
-  const std::string name = "railfix-" + dashed(service.name);
-  const std::string user = std::to_string(kUserId) + ":" + std::to_string(kUserId);
-  // Fast DDS tells hosts by their addresses, and shares memory between equal users: the host's network and IPC, one
-  // user.
-  std::vector<std::string> command{"/usr/bin/podman",
-                                   "run",
-                                   "--rm",
-                                   "--replace",
-                                   "--name",
-                                   name,
-                                   "--network",
-                                   "host",
-                                   "--ipc",
-                                   "host",
-                                   "--user",
-                                   user,
-                                   "--read-only",
-                                   "--cap-drop",
-                                   "ALL",
-                                   "--security-opt",
-                                   "no-new-privileges",
-                                   "--init",
-                                   "--stop-timeout",
-                                   std::to_string(kStopS),
-                                   "--tmpfs",
-                                   "/tmp",
-                                   "--volume",
-                                   folder + ":" + folder + ":ro",
-                                   "--volume",
-                                   std::string(kStateFolder) + ":" + kStateFolder,
-                                   "--workdir",
-                                   kStateFolder};
-  if (needs_devices(service.name)) command.insert(command.end(), {"--volume", "/dev:/dev"});
-  command.push_back(image_of(service));
-  const auto arguments = arguments_of(service, folder);
-  command.insert(command.end(), arguments.begin(), arguments.end());
-  return command;
 }
 
 core::Status write(const fs::path& file, const std::string& text) {
@@ -201,6 +147,10 @@ std::string fingerprint(const fs::path& path) {
 
 }  // namespace
 
+std::vector<std::string> service_arguments(const HostedService& service) {
+  return {"--set", strength_of(service)};
+}
+
 std::vector<HostedService> services_on(const Manifest& manifest, const std::string& host) {
   std::vector<HostedService> here;
   for (const auto& service : manifest.services) {
@@ -230,6 +180,13 @@ std::string settings_of(const Manifest& manifest, const TrainHost& host, const s
     if (file.service == service)
       text += service + "." + file.key + ": fingerprint " + fingerprint(manifest.folder / file.file) + "\n";
   }
+  if (manifest.containers) {
+    // Another build of the same release is another image.
+    const auto engine = container_engine();
+    const HostedService one{service, manifest.release_of(*manifest.service(service))};
+    text +=
+        "image: " + (engine.ok() ? image_id(engine.value(), image_of(one)) : std::nullopt).value_or("missing") + "\n";
+  }
   if (manifest.security) {
     for (const char* part : {".cert.pem", ".permissions.p7s"})
       text += service + part + ": fingerprint " +
@@ -238,10 +195,9 @@ std::string settings_of(const Manifest& manifest, const TrainHost& host, const s
   return text;
 }
 
-core::Result<std::vector<std::string>> command_of(const Manifest& manifest, const HostedService& service,
-                                                  const fs::path& folder, const fs::path& root) {
+core::Result<std::vector<std::string>> program_command(const HostedService& service, const fs::path& folder,
+                                                       const fs::path& root) {
   const auto at = fs::absolute(folder).lexically_normal().string();
-  if (manifest.containers) return podman_command(service, at);
   const std::string name = "railfix-" + dashed(service.name);
   auto program = fs::absolute(root) / "opt/railfix" / service.release / "bin" / name;
   if (!fs::exists(program) && service.release == RAILFIX_VERSION)
@@ -250,8 +206,8 @@ core::Result<std::vector<std::string>> command_of(const Manifest& manifest, cons
     return core::Error{"release " + service.release + " of " + service.name + " is not installed on this computer: " +
                        (root / "opt/railfix" / service.release / "bin" / name).string() + " is missing"};
   }
-  std::vector<std::string> command{program.lexically_normal().string()};
-  const auto arguments = arguments_of(service, at);
+  std::vector<std::string> command{program.lexically_normal().string(), "--config", at + "/config.yaml"};
+  const auto arguments = service_arguments(service);
   command.insert(command.end(), arguments.begin(), arguments.end());
   return command;
 }
@@ -262,33 +218,8 @@ std::string render_compose(const Manifest& manifest, const TrainHost& host, cons
   out << YAML::Key << "version" << YAML::Value << YAML::DoubleQuoted << "3.7";
   out << YAML::Key << "services" << YAML::Value << YAML::BeginMap;
   for (const auto& service : services_on(manifest, host.name)) {
-    const std::string program = "railfix-" + dashed(service.name);
-    YAML::Node one;
-    one["image"] = image_of(service);
-    one["container_name"] = program;
-    one["command"] = arguments_of(service, folder);
-    // Fast DDS tells hosts by their addresses, and shares memory between equal users.
-    one["network_mode"] = "host";
-    one["ipc"] = "host";
-    one["user"] = std::to_string(kUserId) + ":" + std::to_string(kUserId);
-    one["read_only"] = true;
-    one["init"] = true;
-    one["cap_drop"].push_back("ALL");
-    one["security_opt"].push_back("no-new-privileges");
-    one["restart"] = "unless-stopped";
-    one["stop_grace_period"] = std::to_string(kStopS) + "s";
-    one["working_dir"] = kStateFolder;
-    one["volumes"].push_back(folder + ":" + folder + ":ro");
-    one["volumes"].push_back(std::string(kStateFolder) + ":" + kStateFolder);
-    if (needs_devices(service.name)) one["volumes"].push_back("/dev:/dev");
-    one["tmpfs"].push_back("/tmp");
-    one["healthcheck"]["test"] =
-        std::vector<std::string>{"CMD", program, "--health", "--config", folder + "/config.yaml"};
-    one["healthcheck"]["interval"] = "5s";
-    one["healthcheck"]["timeout"] = "3s";
-    one["healthcheck"]["retries"] = 2;
-    one["healthcheck"]["start_period"] = "10s";
-    out << YAML::Key << dashed(service.name) << YAML::Value << one;
+    const auto container = container_of(manifest, host, service, folder, kContainerHome);
+    out << YAML::Key << dashed(service.name) << YAML::Value << compose_service(container);
   }
   out << YAML::EndMap << YAML::EndMap;
   return std::string(out.c_str()) + "\n";

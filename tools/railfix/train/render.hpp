@@ -6,20 +6,14 @@
 #include <string>
 #include <vector>
 
-#include "train/manifest.hpp"
+#include "train/containers.hpp"
 
 namespace railfix::tool {
 
-/// User and group of all services: shared memory works between equal users only.
-inline constexpr int kUserId = 990;
-
-/// One process of a host.
-struct HostedService {
-  std::string name;
-  std::string release;
-  bool standby = false;
-};
 std::vector<HostedService> services_on(const Manifest& manifest, const std::string& host);
+
+/// Of a service, beside its configuration.
+std::vector<std::string> service_arguments(const HostedService& service);
 
 /// Fills `folder` with everything that this host needs: config.yaml, map, calibration, qos profiles, security/,
 /// compose.yaml, systemd/railfix.service, systemd/60-railfix.conf. Error: a file that cannot be copied or written.
@@ -31,9 +25,9 @@ std::string render_compose(const Manifest& manifest, const TrainHost& host, cons
 
 /// What starts one service whose files lie in `folder`; programs are looked for in ROOT/opt/railfix/RELEASE/bin, and
 /// beside this program when it is of that release. Error: there is no such program.
-core::Result<std::vector<std::string>> command_of(const Manifest& manifest, const HostedService& service,
-                                                  const std::filesystem::path& folder,
-                                                  const std::filesystem::path& root);
+core::Result<std::vector<std::string>> program_command(const HostedService& service,
+                                                       const std::filesystem::path& folder,
+                                                       const std::filesystem::path& root);
 /// Everything that the service reads, as text: another text means that it must be restarted.
 std::string settings_of(const Manifest& manifest, const TrainHost& host, const std::string& service);
 

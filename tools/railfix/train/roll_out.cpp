@@ -105,6 +105,27 @@ core::Status start_supervisor(const fs::path& root) {
   return {};
 }
 
+// A container of exactly the image that the release's name stands for now, or a program.
+core::Status set_commands(const Manifest& manifest, const TrainHost& host, const HostedService& service,
+                          const fs::path& files, const fs::path& root, PlannedService& planned) {
+  if (!manifest.containers) {
+    const auto command = program_command(service, files, root);
+    if (!command.ok()) return command.error();
+    planned.command = command.value();
+    return {};
+  }
+  const auto engine = container_engine();
+  if (!engine.ok()) return engine.error();
+  const auto absolute = [](const fs::path& path) { return fs::absolute(path).lexically_normal().string(); };
+  auto container = container_of(manifest, host, service, absolute(files), absolute(HostFolder(root).home()));
+  const auto id = image_id(engine.value(), container.image);
+  if (!id) return core::Error{"image " + container.image + " is not on this computer"};
+  container.image = *id;
+  planned.command = run_command(container, engine.value());
+  planned.clean_up = remove_command(container, engine.value());
+  return {};
+}
+
 std::vector<std::string> names_of(const HostPlan& plan) {
   std::vector<std::string> names;
   for (const auto& service : plan.services) names.push_back(service.name);
@@ -184,14 +205,17 @@ core::Result<HostPlan> install(const Manifest& manifest, const TrainHost& host, 
   const auto files = folder.generation(plan.generation);
   if (const auto rendered = render_host(manifest, host, files); !rendered.ok()) return rendered.error();
   for (const auto& service : services_on(manifest, host.name)) {
-    const auto command = command_of(manifest, service, files, root);
-    if (!command.ok()) return command.error();
-    PlannedService planned{service.name,    service.release, plan.generation,
-                           service.standby, command.value(), settings_of(manifest, host, service.name)};
+    PlannedService planned{service.name, service.release, plan.generation, service.standby, {}, {}, {}};
+    planned.settings = settings_of(manifest, host, service.name);
+    if (const auto commanded = set_commands(manifest, host, service, files, root, planned); !commanded.ok())
+      return commanded.error();
     const auto* runs = now ? now->service(service.name) : nullptr;
     const bool same = runs != nullptr && runs->release == planned.release && runs->standby == planned.standby &&
                       runs->settings == planned.settings;
     plan.services.push_back(same ? *runs : planned);
+  }
+  if (manifest.containers) {
+    if (const auto handed = hand_over(files, folder.home()); !handed.ok()) return handed.error();
   }
   if (const auto written = folder.write_generation(plan); !written.ok()) return written.error();
   return plan;
@@ -242,7 +266,9 @@ core::Status roll_out(const fs::path& root, const HostPlan& plan, const HealthGa
                        (again.ok() ? "; generation " + std::to_string(before->generation) + " runs again"
                                    : "; AND the old generation is not healthy: " + again.error().message)};
   }
-  return folder.write(now);
+  const auto written = folder.write(now);
+  folder.prune();
+  return written;
 }
 
 }  // namespace railfix::tool

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <csignal>
 #include <cstring>
+#include <fstream>
 #include <ranges>
 
 #include "core/time.hpp"
@@ -32,6 +33,7 @@ constexpr int64_t kLookNs = core::kNsPerSecond / 4;
 constexpr int kFrozenLooks = 3;  // after a computer that stood still everybody may speak first
 // A participant that died is forgotten after 5 s, and then nobody has its pictures mapped.
 constexpr int64_t kForgottenNs = 10 * core::kNsPerSecond;
+constexpr size_t kLastWords = 300;
 constexpr int64_t kStopNs = 10 * core::kNsPerSecond;
 
 volatile std::sig_atomic_t asked_to_stop = 0;
@@ -41,17 +43,46 @@ std::string said_of(int wait_status) {
   return "ended with exit code " + std::to_string(WEXITSTATUS(wait_status));
 }
 
-[[noreturn]] void become(const std::vector<std::string>& command, const fs::path& home, int log) {
-  prctl(PR_SET_PDEATHSIG, SIGTERM);  // a service without its supervisor would never be replaced
-  setpgid(0, 0);
-  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, SIG_DFL);
-  dup2(log, STDOUT_FILENO);
-  dup2(log, STDERR_FILENO);
+[[noreturn]] void execute(const std::vector<std::string>& command) {
   std::vector<char*> argv;
   for (const auto& argument : command) argv.push_back(const_cast<char*>(argument.c_str()));
   argv.push_back(nullptr);
-  if (chdir(home.c_str()) == 0) execv(argv[0], argv.data());
+  execv(argv[0], argv.data());
   _exit(127);
+}
+
+// To its end, without a word.
+void run_quietly(const std::vector<std::string>& command) {
+  if (command.empty()) return;
+  const pid_t pid = fork();
+  if (pid == 0) {
+    const int nothing = open("/dev/null", O_RDWR);
+    for (const int file : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) dup2(nothing, file);
+    execute(command);
+  }
+  if (pid > 0) waitpid(pid, nullptr, 0);
+}
+
+[[noreturn]] void become(const PlannedService& service, const fs::path& home, int log) {
+  prctl(PR_SET_PDEATHSIG, SIGTERM);  // a service without its supervisor would never be replaced
+  setpgid(0, 0);
+  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, SIG_DFL);
+  run_quietly(service.clean_up);
+  dup2(log, STDOUT_FILENO);
+  dup2(log, STDERR_FILENO);
+  if (chdir(home.c_str()) == 0) execute(service.command);
+  _exit(127);
+}
+
+// What it said last, after `from`: an engine's complaint, or the service's own.
+std::string last_words(const fs::path& log, std::streamoff from) {
+  std::ifstream in(log);
+  in.seekg(from);
+  std::string last;
+  for (std::string line; std::getline(in, line);) {
+    if (!line.empty()) last = line;
+  }
+  return last.substr(0, kLastWords);
 }
 
 /// One service of the plan and its process.
@@ -82,6 +113,7 @@ class Child {
   }
   void kill_it() {
     if (pid_ <= 0) return;
+    run_quietly(service_.clean_up);
     kill(pid_, SIGKILL);
     waitpid(pid_, nullptr, 0);
     pid_ = 0;
@@ -111,8 +143,9 @@ class Child {
     forget_health();
     fs::create_directories(log_.parent_path());
     const int log = open(log_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+    log_began_ = log < 0 ? 0 : lseek(log, 0, SEEK_END);
     pid_ = fork();
-    if (pid_ == 0) become(service_.command, home_, log);
+    if (pid_ == 0) become(service_, home_, log);
     if (log >= 0) close(log);
     started_ns_ = now_ns;
     if (pid_ > 0) return;
@@ -128,6 +161,7 @@ class Child {
     last_end_ = (frozen_looks_ >= kFrozenLooks ? "was frozen, " : "") + said_of(wait_status);
     frozen_looks_ = 0;
     forget_health();
+    if (const auto said = wait_status == 0 ? "" : last_words(log_, log_began_); !said.empty()) last_end_ += ": " + said;
     pause_ns_ = now_ns - started_ns_ > kLivesNs ? kFirstPauseNs : std::min(2 * pause_ns_, kLongestPauseNs);
     next_start_ns_ = now_ns + pause_ns_;
     return true;
@@ -142,6 +176,7 @@ class Child {
   pid_t pid_ = 0;
   int restarts_ = 0;
   std::string last_end_;
+  std::streamoff log_began_ = 0;
   int64_t started_ns_ = 0;
   int64_t next_start_ns_ = 0;
   int64_t pause_ns_ = kFirstPauseNs / 2;
