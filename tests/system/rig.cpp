@@ -113,7 +113,7 @@ void Rig::prepare() {
   if (options_.security) core::value_or_throw(tool::make_keys(manifest, {}));
   for (const char* host : kHosts) {
     const tool::HostFolder place(root(host));
-    fs::remove(place.home() / "train/plan.yaml");  // what runs unchanged would keep its old files
+    fs::remove(place.plan_file());  // what runs unchanged would keep its old files
     core::ok_or_throw(place.write(core::value_or_throw(tool::install(manifest, *manifest.host(host), root(host)))));
     // Two clients of a broker with the same name throw each other out.
     if (options_.standby)

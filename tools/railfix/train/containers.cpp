@@ -216,18 +216,14 @@ std::vector<std::string> container_problems(const Manifest& manifest, const Trai
   return problems;
 }
 
-core::Status hand_over(const fs::path& generation, const fs::path& home) {
-  std::error_code none;
-  fs::create_directories(home, none);
-  bool done = chown(home.c_str(), kUserId, kUserId) == 0;
-  for (const auto& entry : fs::recursive_directory_iterator(generation / "security", none)) {
-    done = lchown(entry.path().c_str(), static_cast<uid_t>(-1), kUserId) == 0 && done;
-  }
-  if (fs::exists(generation / "security"))
-    done = lchown((generation / "security").c_str(), static_cast<uid_t>(-1), kUserId) == 0 && done;
-  if (!done)
-    return core::Error{home.string() + " cannot be given to user " + std::to_string(kUserId) + "; are you root?"};
-  return {};
+core::Status hand_over(const fs::path& folder) {
+  std::error_code failed;
+  fs::create_directories(folder, failed);
+  bool done = chown(folder.c_str(), kUserId, kUserId) == 0;
+  for (const auto& entry : fs::directory_iterator(folder, failed))
+    done = lchown(entry.path().c_str(), kUserId, kUserId) == 0 && done;
+  if (done && !failed) return {};
+  return core::Error{folder.string() + " cannot be given to user " + std::to_string(kUserId) + "; are you root?"};
 }
 
 }  // namespace railfix::tool

@@ -56,7 +56,7 @@ std::optional<std::string> image_id(const std::string& engine, const std::string
 /// Everything that keeps this computer from running the host's containers, a sentence each.
 std::vector<std::string> container_problems(const Manifest& manifest, const TrainHost& host);
 
-/// Gives the services' group what it must read and write there. Error: not root.
-core::Status hand_over(const std::filesystem::path& generation, const std::filesystem::path& home);
+/// Gives a folder and the files in it to the services' user; makes the folder when it is not there. Error: not root.
+core::Status hand_over(const std::filesystem::path& folder);
 
 }  // namespace railfix::tool

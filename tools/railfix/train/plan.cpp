@@ -84,7 +84,7 @@ void HostFolder::prune() const {
 
 fs::file_time_type HostFolder::plan_written() const {
   std::error_code none;
-  return fs::last_write_time(folder_ / "plan.yaml", none);
+  return fs::last_write_time(plan_file(), none);
 }
 
 std::optional<HostPlan> HostFolder::plan_in(const fs::path& folder) {

@@ -57,6 +57,7 @@ class HostFolder {
   [[nodiscard]] std::filesystem::path log(const std::string& service) const {
     return folder_ / "log" / (service + ".log");
   }
+  [[nodiscard]] std::filesystem::path plan_file() const { return folder_ / "plan.yaml"; }
   [[nodiscard]] std::filesystem::path lock() const { return folder_ / "supervisor.lock"; }
   [[nodiscard]] int newest_generation() const;
 

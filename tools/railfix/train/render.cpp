@@ -1,5 +1,7 @@
 #include "train/render.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <fstream>
 #include <sstream>
@@ -238,6 +240,7 @@ core::Status render_host(const Manifest& manifest, const TrainHost& host, const 
                                           {"systemd/60-railfix.conf", sysctl_text()}}) {
     if (const auto written = write(folder / name, text); !written.ok()) return written;
   }
+  if (manifest.containers && manifest.security && geteuid() == 0) return hand_over(folder / "security");
   return {};
 }
 

@@ -215,7 +215,7 @@ core::Result<HostPlan> install(const Manifest& manifest, const TrainHost& host, 
     plan.services.push_back(same ? *runs : planned);
   }
   if (manifest.containers) {
-    if (const auto handed = hand_over(files, folder.home()); !handed.ok()) return handed.error();
+    if (const auto handed = hand_over(folder.home()); !handed.ok()) return handed.error();
   }
   if (const auto written = folder.write_generation(plan); !written.ok()) return written.error();
   return plan;
