@@ -7,6 +7,7 @@
 
 #include "support/program.hpp"
 #include "train/check.hpp"
+#include "train/containers.hpp"
 #include "train/keys.hpp"
 #include "train/render.hpp"
 
@@ -205,6 +206,25 @@ TEST_F(TrainFolder, ThePageIsOnTheTrainNetworkOnly) {
   std::ofstream(folder_ / "line.map") << "map";
   const auto train = manifest(kTrain).value();
   EXPECT_THAT(render_config(train, *train.host("coach"), "FOLDER"), HasSubstr("address: 10.42.1.12"));
+}
+
+TEST_F(TrainFolder, AContainerIsLockedDownAndSeesNoKeysButItsOwn) {
+  std::ofstream(folder_ / "line.map") << "map";
+  const auto train = manifest(kTrain, "run_as: programs", "security: true").value();
+  const auto container = container_of(train, *train.host("coach"), {"fusion", "1.3.0", false}, "/g/7", "/home");
+  EXPECT_EQ(container.image, "railfix/fusion:1.3.0");
+  EXPECT_THAT(container.volumes, Contains("/home:/var/lib/railfix"));
+  EXPECT_THAT(container.volumes, Contains("/g/7/security/fusion.key.pem:/g/7/security/fusion.key.pem:ro"));
+  for (const auto& volume : container.volumes) {
+    EXPECT_THAT(volume, Not(HasSubstr("tpr_publisher")));
+    EXPECT_THAT(volume, Not(HasSubstr("/g/7:")));
+    EXPECT_THAT(volume, Not(HasSubstr("security:")));
+    EXPECT_THAT(volume, Not(HasSubstr("/dev")));
+  }
+  const auto command = run_command(container, "/usr/bin/podman");
+  for (const char* option : {"--read-only", "--cap-drop=ALL", "--user=990:990", "--security-opt=no-new-privileges",
+                             "--network=host", "--ipc=host", "--env=RAILFIX_CONFIG=/g/7/config.yaml"})
+    EXPECT_THAT(command, Contains(std::string(option)));
 }
 
 TEST_F(TrainFolder, SettingsOfAServiceChangeWithWhatItReadsAndNothingElse) {

@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "train/render.hpp"
+#include "train/setting_files.hpp"
 
 namespace railfix::tool {
 namespace {
@@ -101,6 +102,9 @@ Container container_of(const Manifest& manifest, const TrainHost& host, const Ho
     for (const auto& file : {std::string("ca.pem"), std::string("governance.p7s"), service.name + ".cert.pem",
                              service.name + ".key.pem", service.name + ".permissions.p7s"})
       add("security/" + file);
+  }
+  for (const auto& file : setting_files(manifest)) {
+    if (file.service == service.name) add(file.on_host("").substr(1));
   }
   add_devices(service.name, container);
   return container;

@@ -45,7 +45,7 @@ Container container_of(const Manifest& manifest, const TrainHost& host, const Ho
 std::vector<std::string> run_command(const Container& container, const std::string& engine);
 /// Removes what may be left of it, whether it runs or not.
 std::vector<std::string> remove_command(const Container& container, const std::string& engine);
-/// For a compose file; a subset that docker-compose 1.29 and podman-compose 1.0 understand.
+/// For a compose file; a subset that docker-compose 1.29 understands.
 YAML::Node compose_service(const Container& container);
 
 /// Absolute path of podman, or else of docker. Error: neither is installed.

@@ -240,7 +240,11 @@ core::Status render_host(const Manifest& manifest, const TrainHost& host, const 
                                           {"systemd/60-railfix.conf", sysctl_text()}}) {
     if (const auto written = write(folder / name, text); !written.ok()) return written;
   }
-  if (manifest.containers && manifest.security && geteuid() == 0) return hand_over(folder / "security");
+  if (!manifest.containers || geteuid() != 0) return {};
+  for (const char* secrets : {"security", "files"}) {
+    if (!fs::exists(folder / secrets)) continue;
+    if (const auto handed = hand_over(folder / secrets); !handed.ok()) return handed;
+  }
   return {};
 }
 
