@@ -141,7 +141,7 @@ class Child {
   }
   void start(int64_t now_ns) {
     forget_health();
-    fs::create_directories(log_.parent_path());
+    for (const auto& folder : {home_, log_.parent_path()}) fs::create_directories(folder);
     const int log = open(log_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
     log_began_ = log < 0 ? 0 : lseek(log, 0, SEEK_END);
     pid_ = fork();
