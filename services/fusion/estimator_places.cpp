@@ -10,6 +10,9 @@ namespace {
 
 constexpr int kRefusalsToIsolate = 3;
 constexpr double kOffTrackM = 15.0;  // a GNSS fix further beside the track is none
+// Of the sigma of a GNSS fix; squares add up to the whole.
+constexpr double kGnssLastingShare = 0.866;
+constexpr double kGnssNewShare = 0.5;
 
 double gnss_sigma_m(const GnssInput& sample, const FusionParameters& p) {
   const double hdop = std::max(sample.hdop, 0.5);
@@ -43,10 +46,9 @@ Projection project(const track::Path& path, double start_m, double easting_m, do
 
 }  // namespace
 
-// Errors of GNSS last: a fix is tested as it is, but says little new beside the one before.
+// Tested as it is; what is new in it beside the fix before is little, because its error lasts.
 void Estimator::use(const GnssInput& sample) {
   auto& gnss = watched(Source::gnss);
-  const double since_s = gnss.seen_ns == 0 ? 1.0 : std::max(core::seconds(sample.stamp_ns - gnss.seen_ns), 0.05);
   gnss.seen_ns = sample.stamp_ns;
   if (sample.fix == 0 || !path_) {
     gnss_agreed_ = 0;
@@ -54,11 +56,11 @@ void Estimator::use(const GnssInput& sample) {
   }
   const auto place = project(*path_, filter_.path_distance_m(), sample.easting_m, sample.northing_m);
   const double once_m = std::hypot(gnss_sigma_m(sample, *parameters_), parameters_->gnss_map_sigma_m);
-  const double sigma_m = once_m * std::sqrt(1 + 2 * parameters_->gnss_error_time_s / since_s);
   const double foot_m = place.distance_m - parameters_->gnss_antenna_ahead_m;
   const bool beside = std::abs(place.lateral_m) > kOffTrackM + 3 * once_m;
   const bool agrees = !beside && filter_.test_position(foot_m, once_m, parameters_->gate_gnss).used;
-  if (agrees && filter_.offer_position(foot_m, sigma_m, parameters_->gate_gnss).used) {
+  const MeasuredPlace measured{foot_m, kGnssNewShare * once_m, StateIndex::gnss_error, kGnssLastingShare * once_m};
+  if (agrees && filter_.offer_position(measured, parameters_->gate_gnss).used) {
     gnss.accept(sample.stamp_ns);
     ++gnss_agreed_;
   } else if (++gnss.refused >= kRefusalsToIsolate) {
@@ -95,7 +97,8 @@ void Estimator::use(const FixInput& fix) {
   // A second fix on the landmark of the first has the same error of the map in it.
   const bool again = fix.landmark != 0 && fix.landmark == reference_ && std::abs(filter_.since_reference_m()) < 50;
   const double sigma_m = std::hypot(fix.sigma_m, parameters_->fix_sigma_floor_m) * (again ? 3.0 : 1.0);
-  const auto offer = filter_.offer_position(*path_distance_m, sigma_m, parameters_->gate_fix);
+  const auto lasting = fix.kind == FixKind::curvature ? std::optional(StateIndex::shape_error) : std::nullopt;
+  const auto offer = filter_.offer_position({*path_distance_m, sigma_m, lasting}, parameters_->gate_fix);
   if (offer.used) {
     corrected_ = false;
     accept(fix);
@@ -126,7 +129,7 @@ void Estimator::refuse(const FixInput& fix, double path_distance_m, const Offer&
     const double apart_m = std::abs(offer.residual - refused_fix_->residual_m);
     if (apart_m < 4 * std::hypot(fix.sigma_m, refused_fix_->sigma_m) + drift_m) {
       filter_.loosen_origin(std::abs(offer.residual) + fix.sigma_m);
-      filter_.offer_position(path_distance_m, std::hypot(fix.sigma_m, parameters_->fix_sigma_floor_m),
+      filter_.offer_position({path_distance_m, std::hypot(fix.sigma_m, parameters_->fix_sigma_floor_m)},
                              parameters_->gate_fix);
       corrected_ = true;
       accept(fix);

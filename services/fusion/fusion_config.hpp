@@ -47,11 +47,14 @@ struct FusionConfig {
     auto& p = parameters;
     f.number("visual_scale_sigma", p.visual_scale_sigma, {1e-5, 0.2}, "",
              "How far the camera's metres may be off before references confirm them.");
-    f.number("visual_scale_length_m", p.visual_scale_length_m, {100, 1e7}, "m",
-             "Way on which the camera's scale may become another one.");
+    f.number("visual_scale_walk", p.visual_scale_walk, {0, 0.01}, "1/sqrt(m)",
+             "How fast this changes: after 1 km by 32 times as much.");
+    f.number("visual_creep", p.visual_creep, {0, 1}, "m/sqrt(m)",
+             "What the camera's way strays beside its scale: after 100 m 10 times as much.");
     f.number("step_sigma_floor_m", p.step_sigma_floor_m, {1e-5, 1}, "m", "Least noise of one odometry step.");
     f.number("wheel_scale_sigma", p.wheel_scale_sigma, {1e-5, 0.2}, "", "The same for the wheel (wear, creep).");
-    f.number("wheel_scale_length_m", p.wheel_scale_length_m, {100, 1e7}, "m", "The same for the wheel.");
+    f.number("wheel_scale_walk", p.wheel_scale_walk, {0, 0.01}, "1/sqrt(m)", "The same for the wheel.");
+    f.number("wheel_creep", p.wheel_creep, {0, 1}, "m/sqrt(m)", "The same for the wheel.");
     f.number("wheel_slip_share", p.wheel_slip_share, {0, 1}, "",
              "Where the wheel measures alone, a slip or slide may be this share of the speed ...");
     f.number("wheel_slip_s", p.wheel_slip_s, {0, 60}, "s", "... for so long ...");
@@ -72,11 +75,13 @@ struct FusionConfig {
     f.number("gnss_rtk_fixed_sigma_m", p.gnss_rtk_fixed_sigma_m, {0.005, 10}, "m", "RTK fixed, at HDOP 1.");
     f.number("gnss_rtk_float_sigma_m", p.gnss_rtk_float_sigma_m, {0.01, 50}, "m", "RTK float, at HDOP 1.");
     f.number("gnss_map_sigma_m", p.gnss_map_sigma_m, {0, 50}, "m", "Antenna's place on the train and map.");
-    f.number("gnss_error_time_s", p.gnss_error_time_s, {0, 3600}, "s",
-             "How long one error of GNSS lasts: fixes within this time say little new.");
+    f.number("gnss_error_time_s", p.gnss_error_time_s, {0, 3600}, "s", "How long one error of GNSS lasts.");
     f.number("gnss_bound_m", p.gnss_bound_m, {0, 1000}, "m",
              "A lasting error of GNSS that agrees with the motion is no larger; the interval allows for it.");
     f.number("gnss_antenna_ahead_m", p.gnss_antenna_ahead_m, {-500, 500}, "m", "Antenna ahead of the camera's foot.");
+    f.number("shape_error_sigma_m", p.shape_error_sigma_m, {0, 100}, "m",
+             "Fixes from the track's shape, and the turning, err alike by so much ...");
+    f.number("shape_error_length_m", p.shape_error_length_m, {1, 1e6}, "m", "... over such a way.");
     f.number("fix_min_probability", p.fix_min_probability, {0, 1}, "", "Fixes that are less probable are left out.");
     f.number("fix_sigma_floor_m", p.fix_sigma_floor_m, {0.001, 10}, "m", "Least sigma of a fix.");
   }

@@ -12,12 +12,15 @@ struct FusionParameters {
   double acceleration_sigma_mps2 = 0.4;  // usual size of its acceleration ...
   double acceleration_time_s = 8.0;      // ... and how long one value lasts
 
-  // Camera and wheel: true over measured metres, changing slowly along the way.
+  // Camera and wheel: true over measured metres, which walks at random along the way (per square root of a metre), and
+  // what each strays beside it (metres per square root of a metre).
   double visual_scale_sigma = 0.01;
-  double visual_scale_length_m = 60000;
+  double visual_scale_walk = 1e-5;
+  double visual_creep = 0.006;
   double step_sigma_floor_m = 0.001;
   double wheel_scale_sigma = 0.01;
-  double wheel_scale_length_m = 60000;
+  double wheel_scale_walk = 3e-6;
+  double wheel_creep = 0.001;
 
   // What a slip or slide can add that no other sensor would see: once, and over a long way.
   double wheel_slip_share = 0.3;  // of the speed ...
@@ -34,7 +37,7 @@ struct FusionParameters {
   double gyro_period_s = 1.0;     // of yaw rate against the map's curvature
   double gyro_sigma_rps = 0.004;  // of its mean, with the car body's own turning
 
-  // GNSS: position noise per unit of HDOP or of the RTK solution; errors last, so that a fix says little new.
+  // GNSS: position noise per unit of HDOP or of the RTK solution; most of it lasts.
   double gnss_single_sigma_m = 3.0;
   double gnss_rtk_fixed_sigma_m = 0.05;
   double gnss_rtk_float_sigma_m = 0.5;
@@ -42,6 +45,10 @@ struct FusionParameters {
   double gnss_error_time_s = 60.0;
   double gnss_bound_m = 15.0;         // an error that the tests do not see is no larger
   double gnss_antenna_ahead_m = 0.0;  // of the camera's foot
+
+  // The shape of the track (fixes of kind curvature, turning): it lies elsewhere than on the map, and seems to.
+  double shape_error_sigma_m = 1.0;
+  double shape_error_length_m = 2000.0;
 
   // Fixes.
   double fix_min_probability = 0.9;

@@ -133,6 +133,7 @@ void Hypotheses::rebase_clock(int64_t stamp_ns) {
   for (auto& rival : rivals_) {
     if (rival.estimator) rival.estimator->rebase_clock(stamp_ns);
     rival.asked_ns = std::min(rival.asked_ns, stamp_ns);
+    rival.strayed_ns = std::min(rival.strayed_ns, stamp_ns);
     rival.proven_since_ns = 0;
   }
 }
@@ -173,6 +174,7 @@ void Hypotheses::ask(Rival& rival) {
                        rival.estimator->is_consistent();
   if (!can_say) {
     rival.asked = false;
+    if (rival.estimator && rival.estimator->is_consistent()) stray(rival, now_ns);
     rival.contradicted = rival.contradicted || (rival.estimator && !rival.estimator->is_consistent());
     return;
   }
@@ -197,8 +199,17 @@ void Hypotheses::ask(Rival& rival) {
     its.behind_m = std::max(its.behind_m, mine.behind_m - parameters_->gnss_bound_m);
     its.ahead_m = std::min(its.ahead_m, mine.ahead_m + parameters_->gnss_bound_m);
   }
-  rival.excess.behind_m = std::max(rival.carried.behind_m, mine.behind_m - its.behind_m);
-  rival.excess.ahead_m = std::max(rival.carried.ahead_m, its.ahead_m - mine.ahead_m);
+  rival.excess.behind_m = rival.carried.behind_m + std::max(0.0, mine.behind_m - its.behind_m);
+  rival.excess.ahead_m = rival.carried.ahead_m + std::max(0.0, its.ahead_m - mine.ahead_m);
+  rival.faster_mps = other.filter().speed_mps() - main_.filter().speed_mps();
+  rival.strayed_ns = now_ns;
+}
+
+// Nothing tells any more how far they come apart: as fast as they did last.
+void Hypotheses::stray(Rival& rival, int64_t now_ns) {
+  const double apart_m = rival.faster_mps * core::seconds(now_ns - std::exchange(rival.strayed_ns, now_ns));
+  rival.excess.behind_m += std::max(0.0, -apart_m);
+  rival.excess.ahead_m += std::max(0.0, apart_m);
 }
 
 Interval Hypotheses::promised(const Interval& main) const {

@@ -47,6 +47,8 @@ class Hypotheses {
     int64_t asked_ns = 0;         // ... and counted last
     bool contradicted = false;    // itself, while it was not asked
     int64_t proven_since_ns = 0;  // two sensors have agreed in it since then; 0 = they do not
+    double faster_mps = 0;        // than the main one, when it was asked last
+    int64_t strayed_ns = 0;
   };
 
   void apply_fix(const FixInput& fix, const Event& event);
@@ -56,6 +58,7 @@ class Hypotheses {
   void begin_rival(Source source);
   void ask_rivals();
   void ask(Rival& rival);
+  static void stray(Rival& rival, int64_t now_ns);
   [[nodiscard]] Interval promised(const Interval& main) const;
 
   const FusionParameters* parameters_;

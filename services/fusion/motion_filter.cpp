@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "core/time.hpp"
 
@@ -17,7 +18,6 @@ constexpr int kRecentClones = 2;  // pictures before this one that the next step
 constexpr double kUnknownPositionM = 1e5;
 constexpr double kUnknownSpeedMps = 60.0;
 constexpr double kLongestStepS = 0.1;
-constexpr double kWheelCreep = 1e-3;  // random part of the wheel's slip, metres per square root of a metre
 
 double squared(double value) {
   return value * value;
@@ -31,7 +31,8 @@ MotionFilter::MotionFilter(const FusionParameters& parameters, int64_t stamp_ns,
   sigma << 0.0, 0.0, origin_known ? parameters.start_sigma_m : kUnknownPositionM, kUnknownSpeedMps,
       parameters.acceleration_sigma_mps2,
       std::hypot(parameters.accel_bias_sigma_mps2, origin_known ? 0.0 : 9.81 * parameters.unknown_grade),
-      parameters.visual_scale_sigma, parameters.wheel_scale_sigma, kUnknownPositionM, 0.01;
+      parameters.visual_scale_sigma, parameters.wheel_scale_sigma, kUnknownPositionM, 0.01,
+      parameters.shape_error_sigma_m, 1.0;
   ud_ = estimation::UdFilter(StateVector(sigma.cwiseAbs2()));
 }
 
@@ -60,7 +61,7 @@ void MotionFilter::predict_to(int64_t stamp_ns, const FusionParameters& paramete
 
 void MotionFilter::step(double dt_s, const FusionParameters& p) {
   const int n = static_cast<int>(x_.size());
-  const int odometer = index(StateIndex::odometer);
+  const int camera = index(StateIndex::camera_odometer);
   const int distance = index(StateIndex::distance);
   const int speed = index(StateIndex::speed);
   const int acceleration = index(StateIndex::acceleration);
@@ -73,18 +74,13 @@ void MotionFilter::step(double dt_s, const FusionParameters& p) {
   const double way_per_accel = tau * (dt_s - speed_per_accel);
   const double way_m = x_(speed) * dt_s + x_(acceleration) * way_per_accel;  // in unit metres
   const double k = 1 + x_(unit_scale);
+  const double per_camera = 1 / to_unit(Odometer::camera);
   const double per_wheel = 1 / to_unit(Odometer::wheel);
   const bool camera_unit = unit_ != Odometer::wheel;
-  const double visual_keep = std::exp(-std::abs(way_m) / p.visual_scale_length_m);
-  const double wheel_keep = std::exp(-std::abs(way_m) / p.wheel_scale_length_m);
-  const double unit_keep = camera_unit ? visual_keep : wheel_keep;
-  const double other_keep = camera_unit ? wheel_keep : visual_keep;
-  const double unit_sigma = camera_unit ? p.visual_scale_sigma : p.wheel_scale_sigma;
-  const double other_sigma = camera_unit ? p.wheel_scale_sigma : p.visual_scale_sigma;
 
   StateMatrix phi = StateMatrix::Identity(n, n);
-  phi(odometer, speed) = dt_s;
-  phi(odometer, acceleration) = way_per_accel;
+  phi(camera, speed) = per_camera * dt_s;
+  phi(camera, acceleration) = per_camera * way_per_accel;
   phi(distance, speed) = k * dt_s;
   phi(distance, acceleration) = k * way_per_accel;
   phi(distance, unit_scale) = way_m;
@@ -92,27 +88,39 @@ void MotionFilter::step(double dt_s, const FusionParameters& p) {
   phi(acceleration, acceleration) = keep;
   phi(wheel, speed) = per_wheel * dt_s;
   phi(wheel, acceleration) = per_wheel * way_per_accel;
-  if (camera_unit) phi(wheel, other_scale) = -way_m * squared(per_wheel);
-  phi(unit_scale, unit_scale) = unit_keep;
-  phi(other_scale, other_scale) = other_keep;
+  phi(camera_unit ? wheel : camera, other_scale) = -way_m * squared(camera_unit ? per_wheel : per_camera);
+  const double shape_keep = std::exp(-std::abs(way_m) / p.shape_error_length_m);
+  const double gnss_keep = p.gnss_error_time_s > 0 ? std::exp(-dt_s / p.gnss_error_time_s) : 0.0;
+  phi(index(StateIndex::shape_error), index(StateIndex::shape_error)) = shape_keep;
+  phi(index(StateIndex::gnss_error), index(StateIndex::gnss_error)) = gnss_keep;
 
-  const int noisy[] = {acceleration, index(StateIndex::accel_bias), unit_scale, other_scale,
-                       wheel,        index(StateIndex::gyro_bias)};
-  StateVector q(6);
+  const int noisy[] = {acceleration,
+                       index(StateIndex::accel_bias),
+                       unit_scale,
+                       other_scale,
+                       camera,
+                       wheel,
+                       index(StateIndex::gyro_bias),
+                       index(StateIndex::shape_error),
+                       index(StateIndex::gnss_error)};
+  constexpr int kNoisy = static_cast<int>(std::size(noisy));
+  StateVector q(kNoisy);
   q << squared(p.acceleration_sigma_mps2) * (1 - squared(keep)), squared(p.accel_bias_walk) * dt_s,
-      squared(unit_sigma) * (1 - squared(unit_keep)), squared(other_sigma) * (1 - squared(other_keep)),
-      squared(kWheelCreep) * std::abs(way_m), 1e-10 * dt_s;
-  StateMatrix g = StateMatrix::Zero(n, 6);
-  for (int i = 0; i < 6; ++i) g(noisy[i], i) = 1;
+      squared(camera_unit ? p.visual_scale_walk : p.wheel_scale_walk) * std::abs(way_m),
+      squared(camera_unit ? p.wheel_scale_walk : p.visual_scale_walk) * std::abs(way_m),
+      squared(p.visual_creep) * std::abs(way_m), squared(p.wheel_creep) * std::abs(way_m), 1e-10 * dt_s,
+      squared(p.shape_error_sigma_m) * (1 - squared(shape_keep)), 1 - squared(gnss_keep);
+  StateMatrix g = StateMatrix::Zero(n, kNoisy);
+  for (int i = 0; i < kNoisy; ++i) g(noisy[i], i) = 1;
   ud_.propagate(phi, g, q);
 
-  x_(odometer) += way_m;
+  x_(camera) += way_m * per_camera;
   x_(distance) += k * way_m;
   x_(wheel) += way_m * per_wheel;
   x_(speed) += x_(acceleration) * speed_per_accel;
   x_(acceleration) *= keep;
-  x_(unit_scale) *= unit_keep;
-  x_(other_scale) *= other_keep;
+  x_(index(StateIndex::shape_error)) *= shape_keep;
+  x_(index(StateIndex::gnss_error)) *= gnss_keep;
 }
 
 void MotionFilter::rebase_clock(int64_t stamp_ns) {
@@ -130,7 +138,7 @@ void MotionFilter::clone_now(int64_t keep_ns) {
     }
   }
   if (has_clone(stamp_ns_)) return;
-  const int odometer = index(StateIndex::odometer);
+  const int odometer = index(StateIndex::camera_odometer);
   StateVector x(x_.size() + 1);
   x << x_(odometer), x_;
   ud_.clone_to_front(odometer);
@@ -141,13 +149,10 @@ void MotionFilter::clone_now(int64_t keep_ns) {
 Offer MotionFilter::offer_step(int64_t reference_stamp_ns, double step_m, double sigma_m, double gate) {
   const auto clone = clone_index(reference_stamp_ns);
   if (!clone) return {};
-  const double per_camera = 1 / to_unit(Odometer::camera);
-  const double way_m = value(StateIndex::odometer) - x_(*clone);
   StateVector h = row();
-  h(index(StateIndex::odometer)) = per_camera;
-  h(*clone) = -per_camera;
-  if (unit_ == Odometer::wheel) h(index(StateIndex::other_scale)) = -way_m * squared(per_camera);
-  return offer(h, step_m - way_m * per_camera, sigma_m, gate);
+  h(index(StateIndex::camera_odometer)) = 1;
+  h(*clone) = -1;
+  return offer(h, step_m - (value(StateIndex::camera_odometer) - x_(*clone)), sigma_m, gate);
 }
 
 Offer MotionFilter::offer_speed(double speed_mps, double sigma_mps, double gate) {
@@ -173,11 +178,16 @@ Offer MotionFilter::offer_acceleration(double accel_mps2, double sigma_mps2, dou
   return offer(h, accel_mps2 - value(StateIndex::acceleration) - value(StateIndex::accel_bias), sigma_mps2, gate);
 }
 
-Offer MotionFilter::offer_position(double path_distance_m, double sigma_m, double gate) {
+Offer MotionFilter::offer_position(const MeasuredPlace& place, double gate) {
   StateVector h = row();
   h(index(StateIndex::distance)) = 1;
   h(index(StateIndex::origin)) = 1;
-  return offer(h, path_distance_m - this->path_distance_m(), sigma_m, gate);
+  double expected_m = path_distance_m();
+  if (place.lasting) {
+    h(index(*place.lasting)) = place.per_lasting;
+    expected_m += place.per_lasting * value(*place.lasting);
+  }
+  return offer(h, place.path_distance_m - expected_m, place.sigma_m, gate);
 }
 
 Offer MotionFilter::test_position(double path_distance_m, double sigma_m, double gate) const {
@@ -193,8 +203,10 @@ Offer MotionFilter::offer_yaw_rate(double rate_rps, double curvature_per_m, doub
   StateVector h = row();
   h(index(StateIndex::distance)) = speed_mps * curvature_rate_per_m2;
   h(index(StateIndex::origin)) = speed_mps * curvature_rate_per_m2;
+  h(index(StateIndex::shape_error)) = speed_mps * curvature_rate_per_m2;
   h(index(StateIndex::gyro_bias)) = 1;
-  return offer(h, rate_rps - speed_mps * curvature_per_m - value(StateIndex::gyro_bias), sigma_rps, gate);
+  const double curvature_there_per_m = curvature_per_m + curvature_rate_per_m2 * value(StateIndex::shape_error);
+  return offer(h, rate_rps - speed_mps * curvature_there_per_m - value(StateIndex::gyro_bias), sigma_rps, gate);
 }
 
 void MotionFilter::restart_wheel(double wheel_m, double sigma_m) {
@@ -218,7 +230,7 @@ void MotionFilter::set_origin(double path_distance_m, double sigma_m) {
 void MotionFilter::doubt_way(double sigma_m) {
   const auto n = x_.size();
   StateMatrix g = StateMatrix::Zero(n, 1);
-  g(index(StateIndex::odometer), 0) = 1;
+  g(index(StateIndex::camera_odometer), 0) = 1 / to_unit(Odometer::camera);
   g(index(StateIndex::distance), 0) = unit_scale();
   g(index(StateIndex::wheel_odometer), 0) = 1 / to_unit(Odometer::wheel);
   ud_.propagate(StateMatrix::Identity(n, n), g, StateVector::Constant(1, squared(sigma_m)));
@@ -233,7 +245,7 @@ void MotionFilter::doubt_acceleration(double since_s, double sigma_mps2) {
   const auto n = x_.size();
   const double way_m = 0.5 * squared(since_s);
   StateMatrix g = StateMatrix::Zero(n, 2);
-  g(index(StateIndex::odometer), 0) = way_m;
+  g(index(StateIndex::camera_odometer), 0) = way_m / to_unit(Odometer::camera);
   g(index(StateIndex::distance), 0) = unit_scale() * way_m;
   g(index(StateIndex::wheel_odometer), 0) = way_m / to_unit(Odometer::wheel);
   g(index(StateIndex::speed), 0) = since_s;

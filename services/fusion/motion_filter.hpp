@@ -2,10 +2,13 @@
 //
 // The train's motion is kept in the metres of one odometer (the camera's or the wheel's, whichever measured first: the
 // unit), so that this sensor's measurements are linear and can never seem to show their own scale. States, behind the
-// clones: odometer [unit m], distance run [m], path distance of its origin [m], speed [unit m/s], acceleration,
+// clones: camera's own odometer [m], distance run [m], path distance of its origin [m], speed [unit m/s], acceleration,
 // accelerometer bias [m/s^2], scale of the unit - 1, the other odometer's scale against the unit - 1, wheel's own
-// odometer [m], gyro bias [rad/s]. Position on the path = distance + origin, so that distance runs on whether or not
-// the place on the map is known. A clone is the odometer at one picture; steps since that picture compare with it.
+// odometer [m], gyro bias [rad/s], lasting error of the track's shape [m] and of GNSS [its sigma]. Both odometers
+// stray from the train's way at random. Position on the path = distance + origin, so that distance runs on whether or
+// not the place on the map is known. A clone is the camera's odometer at one picture; steps since that picture compare
+// with it. What lasts is a state of its own, because fixes that err alike must not be taken for independent ones
+// (coloured measurement noise: Bryson and Henrikson 1968).
 #pragma once
 
 #include <cstdint>
@@ -18,7 +21,7 @@
 namespace railfix::fusion {
 
 enum class StateIndex : int {
-  odometer,
+  camera_odometer,
   distance,
   origin,
   speed,
@@ -28,10 +31,20 @@ enum class StateIndex : int {
   other_scale,
   wheel_odometer,
   gyro_bias,
+  shape_error,
+  gnss_error,
   count
 };
 
 enum class Odometer : uint8_t { none, camera, wheel };
+
+/// A measured path distance: noise of its own, and so many metres of a lasting error where that is a state.
+struct MeasuredPlace {
+  double path_distance_m = 0;
+  double sigma_m = 0;
+  std::optional<StateIndex> lasting = std::nullopt;
+  double per_lasting = 1;
+};
 
 /// Result of offering one measurement.
 struct Offer {
@@ -66,8 +79,8 @@ class MotionFilter {
   Offer offer_speed(double speed_mps, double sigma_mps, double gate);
   Offer offer_wheel(double wheel_m, double sigma_m, double gate);
   Offer offer_acceleration(double accel_mps2, double sigma_mps2, double gate);
-  Offer offer_position(double path_distance_m, double sigma_m, double gate);
-  /// Would it be used? Changes nothing.
+  Offer offer_position(const MeasuredPlace& place, double gate);
+  /// Would a place with independent errors be used? Changes nothing.
   [[nodiscard]] Offer test_position(double path_distance_m, double sigma_m, double gate) const;
   /// Turning against the map's curvature: where the curvature changes it says where the train is.
   Offer offer_yaw_rate(double rate_rps, double curvature_per_m, double curvature_rate_per_m2, double sigma_rps,

@@ -1,5 +1,6 @@
 #include "simulator/renderer.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
@@ -106,14 +107,15 @@ cv::Mat Renderer::render(const Shot& shot) const {
   thread_local cv::Mat radiance;
   radiance.create(options_.camera.height_px, options_.camera.width_px, CV_32FC1);
   // Drops and dirt spread what is behind them.
-  if (options_.strip.ahead_m > 0.0 && shot.look.drops + shot.look.dirt > 0.0) radiance.setTo(kUndrawnGrey / kWhite);
+  const bool all = draws_all(shot.distance_m);
+  if (!all && shot.look.drops + shot.look.dirt > 0.0) radiance.setTo(kUndrawnGrey / kWhite);
   for (int v = 0; v < radiance.rows; ++v) {
     const auto span = spans[static_cast<size_t>(v)];
     const size_t first = static_cast<size_t>(v) * static_cast<size_t>(radiance.cols) + static_cast<size_t>(span.begin);
     if (span.end > span.begin)
       caster.row(&normal_x_[first], &normal_y_[first], span.end - span.begin, radiance.ptr<float>(v) + span.begin);
   }
-  if (options_.scenery && options_.strip.ahead_m <= 0.0) draw_scenery(*line_, main, light, options_, shot, radiance);
+  if (options_.scenery && all) draw_scenery(*line_, main, light, options_, shot, radiance);
   weather(shot, foot.pose.heading_rad, light, radiance);
   return expose(radiance, spans, shot);
 }
@@ -170,11 +172,26 @@ double Renderer::rails_visible(const Shot& shot) const {
   return pixels.empty() ? 0.0 : static_cast<double>(seen) / static_cast<double>(pixels.size());
 }
 
+bool Renderer::draws_all(double distance_m) const {
+  const double before_m = options_.strip.whole_before_m;
+  if (options_.strip.ahead_m <= 0.0) return true;
+  if (before_m <= 0.0) return false;
+  const auto in_front = [&](double begin_m, double end_m) {
+    return distance_m > begin_m - before_m && distance_m < end_m;
+  };
+  const auto& things = line_->things();
+  const auto& tunnels = line_->tunnels();
+  return std::any_of(tunnels.begin(), tunnels.end(), [&](const Span& t) { return in_front(t.begin_m, t.end_m); }) ||
+         std::any_of(things.begin(), things.end(), [&](const Thing& t) {
+           return t.own && t.kind == track::LandmarkKind::frog && in_front(t.distance_m, t.distance_m);
+         });
+}
+
 std::vector<Renderer::Columns> Renderer::drawn_spans(const LocalTrack& main, const Shot& shot) const {
   const auto& strip = options_.strip;
   const int width = options_.camera.width_px;
   std::vector<Columns> spans(static_cast<size_t>(options_.camera.height_px), {0, width});
-  if (strip.ahead_m <= 0.0 || main.empty()) return spans;
+  if (draws_all(shot.distance_m) || main.empty()) return spans;
   for (auto& span : spans) span = {width, 0};
   const geometry::View view(options_.camera, shot.pose);
   for (const double side : {-1.0, 1.0}) {

@@ -26,6 +26,7 @@ constexpr double kVergeDropM = 0.30;  // ground beside the ballast, below the sl
 struct Strip {
   double ahead_m = 0;  // 0 = everything
   double beside_m = 1.2;
+  double whole_before_m = 0;  // everything so far before a frog and before a tunnel, and in the tunnel
 };
 
 /// Shape of what Look gives the strength of.
@@ -86,6 +87,7 @@ class Renderer {
   };
 
  private:
+  [[nodiscard]] bool draws_all(double distance_m) const;
   [[nodiscard]] std::vector<Columns> drawn_spans(const LocalTrack& main, const Shot& shot) const;  // of each row
   void weather(const Shot& shot, double heading_rad, const Illumination& light, cv::Mat& radiance) const;
   [[nodiscard]] InTheAir air(const Shot& shot, double heading_rad) const;

@@ -29,6 +29,8 @@ struct SimulatorConfig {
     fields.group("strip", "Draws a part of the picture only, for long runs.", [&](auto& f) {
       f.number("ahead_m", render.strip.ahead_m, {0, 200}, "m", "The own track so far ahead, the rest is grey; 0: all.");
       f.number("beside_m", render.strip.beside_m, {0.8, 20}, "m", "So far to each side of its middle.");
+      f.number("whole_before_m", render.strip.whole_before_m, {0, 500}, "m",
+               "The whole picture so far before a frog and a tunnel, and in it; 0: nowhere.");
     });
   }
 
