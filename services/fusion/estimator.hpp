@@ -143,6 +143,7 @@ class Estimator {
   struct Unwatched {
     double distance_m = 0;  // of the train at its last sample
     double way_m = 0;       // as far as nobody would have seen it slip
+    double hidden_m = 0;    // what slips may have added that pass for a change of speed
     double fastest_mps = 0;
     double apart_m = 0;   // its way less the train's while it was isolated: who is wrong is not known for certain
     double behind_m = 0;  // the furthest that came to
@@ -171,7 +172,7 @@ class Estimator {
   void compare_with_wheel(const OdometryInput& step, double sigma_m);
   void isolate_wheel();
   void doubt_silent_wheel(int64_t silent_since_ns, double way_m);
-  void watch_alone(double way_m);
+  void watch_alone(double way_m, double dt_s);
   [[nodiscard]] bool is_watched() const;
   [[nodiscard]] double unwatched_share() const;
   void recover_wheel(const WheelInput& sample, double wheel_m, double sigma_m);

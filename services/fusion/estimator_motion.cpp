@@ -28,6 +28,8 @@ constexpr double kGyroPositionSigmaM = 30.0;  // within which the curvature may 
 constexpr double kLatelyS = 1.0;
 constexpr double kBridgeS = 10.0;  // as long as the IMU alone is good for a speed
 constexpr double kTaughtS = 30.0;
+constexpr double kBlindS = 0.3;
+constexpr double kHiddenSlipMps = 0.7;
 constexpr double kUnseenBiasSigmas = 4.0;
 constexpr double kUnknownSpeedMps = 10.0;
 
@@ -140,7 +142,7 @@ void Estimator::use(const WheelInput& sample) {
   } else if (++watch.refused >= kRefusalsToIsolate) {
     isolate_wheel();
   }
-  watch_alone(way_m);
+  watch_alone(way_m, before_ns == 0 ? 0.0 : core::seconds(sample.stamp_ns - before_ns));
 }
 
 // What it counted while it was silent may have a slip in it. When every sensor was silent it is the clock that is
@@ -153,7 +155,7 @@ void Estimator::doubt_silent_wheel(int64_t silent_since_ns, double way_m) {
 }
 
 // A slip that begins slowly takes the filter along, and when it ends it is the wheel that seems to slip.
-void Estimator::watch_alone(double way_m) {
+void Estimator::watch_alone(double way_m, double dt_s) {
   const double run_m = filter_.value(StateIndex::distance) - unwatched_.distance_m;
   unwatched_.distance_m += run_m;
   if (watch(Source::wheel).isolated && !is_watched()) {
@@ -161,12 +163,18 @@ void Estimator::watch_alone(double way_m) {
     unwatched_.behind_m = std::max(unwatched_.behind_m, -unwatched_.apart_m);
     unwatched_.ahead_m = std::max(unwatched_.ahead_m, unwatched_.apart_m);
   }
+  // Nobody else measures for a while: a slip may be no larger than what passes for a change of speed.
+  if (is_watched() && !used_within(Source::camera, kBlindS) && !used_within(Source::imu, kLatelyS)) {
+    const double most_m = kHiddenSlipMps * parameters_->wheel_slip_s;
+    const double more_m = std::min(kHiddenSlipMps * dt_s, parameters_->wheel_slip_share * std::abs(way_m));
+    unwatched_.hidden_m = std::min(unwatched_.hidden_m + more_m, most_m);
+  }
   const double share = unwatched_share();
   unwatched_.way_m += share * std::max(std::abs(way_m), std::abs(run_m));
   unwatched_.fastest_mps = std::max(unwatched_.fastest_mps, share * std::abs(filter_.speed_mps()));
 }
 
-// A camera sees every slip; what it has taught of scales and biases is good for some time.
+// A camera sees every slip; what it has taught an IMU is good for some time.
 bool Estimator::is_watched() const {
   return used_within(Source::camera, kTaughtS);
 }

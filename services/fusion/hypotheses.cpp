@@ -12,6 +12,7 @@ namespace {
 constexpr double kSureProbability = 0.999;  // from here on a fix needs no second one
 constexpr double kRivalGoneS = 1.0;
 constexpr double kProofS = 2.0;
+constexpr double kSameSpeedsS = 3.0;
 
 Source source_of(const Event& event) {
   if (std::holds_alternative<ImuInput>(event)) return Source::imu;
@@ -174,7 +175,8 @@ void Hypotheses::ask(Rival& rival) {
                        rival.estimator->is_consistent();
   if (!can_say) {
     rival.asked = false;
-    if (rival.estimator && rival.estimator->is_consistent()) stray(rival, now_ns);
+    if (rival.estimator && rival.estimator->is_consistent() && core::seconds(now_ns - rival.asked_ns) < kSameSpeedsS)
+      stray(rival, now_ns);
     rival.contradicted = rival.contradicted || (rival.estimator && !rival.estimator->is_consistent());
     return;
   }
@@ -195,17 +197,20 @@ void Hypotheses::ask(Rival& rival) {
   other.predict_to(now_ns);
   const Interval mine = main_.interval();
   Interval its = other.interval();
+  double apart_m = other.centre_m() - main_.centre_m();
   if (rival.without == Source::gnss && main_.gnss_proven()) {
+    apart_m = std::clamp(apart_m, -parameters_->gnss_bound_m, parameters_->gnss_bound_m);
     its.behind_m = std::max(its.behind_m, mine.behind_m - parameters_->gnss_bound_m);
     its.ahead_m = std::min(its.ahead_m, mine.ahead_m + parameters_->gnss_bound_m);
   }
-  rival.excess.behind_m = rival.carried.behind_m + std::max(0.0, mine.behind_m - its.behind_m);
-  rival.excess.ahead_m = rival.carried.ahead_m + std::max(0.0, its.ahead_m - mine.ahead_m);
+  // Since it came back both have gone on from one place: how far they come apart since adds to what it had said before.
+  rival.excess.behind_m = std::max(rival.carried.behind_m + std::max(0.0, -apart_m), mine.behind_m - its.behind_m);
+  rival.excess.ahead_m = std::max(rival.carried.ahead_m + std::max(0.0, apart_m), its.ahead_m - mine.ahead_m);
   rival.faster_mps = other.filter().speed_mps() - main_.filter().speed_mps();
   rival.strayed_ns = now_ns;
 }
 
-// Nothing tells any more how far they come apart: as fast as they did last.
+// Nothing tells any more how far they come apart: for a while as fast as they did last.
 void Hypotheses::stray(Rival& rival, int64_t now_ns) {
   const double apart_m = rival.faster_mps * core::seconds(now_ns - std::exchange(rival.strayed_ns, now_ns));
   rival.excess.behind_m += std::max(0.0, -apart_m);

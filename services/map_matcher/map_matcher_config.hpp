@@ -23,7 +23,8 @@ struct MapMatcherConfig {
   double camera_bias_per_m = 1e-4;
   GyroParameters gyro;
   bool locate = true;
-  double view_ahead_m = 5.0;
+  double view_ahead_m = 8.0;
+  double view_rate_sigma_per_m2 = 3e-5;
   double least_speed_mps = 1.0;
   double lag_m = 20.0;
   double match_every_m = 5.0;
@@ -55,7 +56,10 @@ struct MapMatcherConfig {
     fields.flag("locate", locate, "Look for the place on the whole map while nobody knows it.");
     fields.number("locate_every_m", locate_every_m, {20, 10000}, "m", "... once in this way.");
     fields.number("view_ahead_m", view_ahead_m, {0, 50}, "m",
-                  "The curvature of track_view belongs to this point ahead of the camera's foot.");
+                  "The curvature of track_view belongs to a point at most so far ahead of the camera's foot.");
+    fields.number("view_rate_sigma_per_m2", view_rate_sigma_per_m2, {1e-7, 1e-2}, "1/m^2",
+                  "Where in front of that it lies follows from its sigma and this: the same as "
+                  "track_detector.limits.curvature_rate_per_m2.");
     fields.number("least_speed_mps", least_speed_mps, {0, 50}, "m/s", "Slower, the turning says nothing of the track.");
     fields.number("lag_m", lag_m, {0, 60}, "m", "The car body may turn so far behind the camera's foot.");
     fields.number("match_every_m", match_every_m, {0.5, 1000}, "m", "The shape is matched anew after this way.");

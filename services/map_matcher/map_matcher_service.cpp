@@ -21,6 +21,7 @@ constexpr double kTrackEveryS = 1.0;      // the track is said again after this 
 constexpr double kOpenTrackEveryM = 2.0;  // ... or, while it is not known, this way
 constexpr double kNoCameraS = 0.5;        // without an odometry step
 constexpr int kCurvatureVariance = 25;    // place of the curvature's variance in TrackView.covariance
+constexpr double kRateShare = 0.75;       // of the curvature's sigma comes from its unknown rate
 
 track::EdgePosition place_of(const msg::TrainState& state) {
   return {state.edge(), state.offset_m(),
@@ -149,8 +150,8 @@ void MapMatcherService::use(const msg::OdometryStep& step) {
     match_exits(step);
     return;
   }
-  // Where the rails are seen they tell the shape: pictures turn as the track ahead does (by 10 to 13 m, measured), not as
-  // the body behind. Only steps from picture to picture: those against one key frame overlap.
+  // Where the rails are seen they tell the shape: pictures turn as the track ahead does (by 10 to 13 m, measured), not
+  // as the body behind. Only steps from picture to picture: those against one key frame overlap.
   const double step_m = step.step_m();
   const bool rails_seen = std::abs(core::seconds(step.stamp_ns() - rails_seen_ns_)) < kRailsFreshS;
   if (!rails_seen && step.mode() == msg::ODOMETRY_TRACK && std::abs(step_m) > kShortestStepM &&
@@ -299,8 +300,13 @@ void MapMatcherService::use(const msg::TrackView& view) {
   if (!curvature_ || !config_.use_curvature || !step_ || step_->valid() == 0) return;
   const double dt_s = core::seconds(view.stamp_ns() - step_->stamp_ns());
   if (std::abs(dt_s) > kOldStateS || std::abs(step_->speed_mps()) < config_.least_speed_mps) return;
-  const double odometer_m = step_->distance_m() + step_->speed_mps() * dt_s + config_.view_ahead_m;
-  curvature_->add(odometer_m, view.curvature_per_m(), std::sqrt(variance), CurvatureOf::rails);
+  // A short view does not tell how the curvature changes: it is that of the middle of what is seen, and at the foot it
+  // is unsure by as much as the rate may make of that way. A long view tells both, and the curvature is that at the
+  // foot.
+  const double sigma_per_m = std::sqrt(variance);
+  const double ahead_m = std::min(config_.view_ahead_m, kRateShare * sigma_per_m / config_.view_rate_sigma_per_m2);
+  const double odometer_m = step_->distance_m() + step_->speed_mps() * dt_s + ahead_m;
+  curvature_->add(odometer_m, view.curvature_per_m(), sigma_per_m, CurvatureOf::rails);
 }
 
 void MapMatcherService::use(const msg::LandmarkSighting& sighting) {
