@@ -128,7 +128,9 @@ void Estimator::refuse(const FixInput& fix, double path_distance_m, const Offer&
     const double drift_m = 0.04 * std::abs(distance_m - refused_fix_->distance_m);
     const double apart_m = std::abs(offer.residual - refused_fix_->residual_m);
     if (apart_m < 4 * std::hypot(fix.sigma_m, refused_fix_->sigma_m) + drift_m) {
+      // What was wrong may have taught a wrong scale, too.
       filter_.loosen_origin(std::abs(offer.residual) + fix.sigma_m);
+      filter_.loosen_scale(*parameters_);
       filter_.offer_position({path_distance_m, std::hypot(fix.sigma_m, parameters_->fix_sigma_floor_m)},
                              parameters_->gate_fix);
       corrected_ = true;

@@ -222,6 +222,12 @@ void MotionFilter::loosen_origin(double sigma_m) {
   ud_.inflate(index(StateIndex::origin), squared(sigma_m));
 }
 
+void MotionFilter::loosen_scale(const FusionParameters& parameters) {
+  const bool camera = unit_ != Odometer::wheel;
+  ud_.inflate(index(StateIndex::unit_scale),
+              squared(camera ? parameters.visual_scale_sigma : parameters.wheel_scale_sigma));
+}
+
 void MotionFilter::set_origin(double path_distance_m, double sigma_m) {
   x_(index(StateIndex::origin)) = path_distance_m - value(StateIndex::distance);
   ud_.reset(index(StateIndex::origin), squared(sigma_m));

@@ -92,6 +92,8 @@ class MotionFilter {
   void doubt_wheel(double sigma_m);
   /// The place is not where it was thought: the origin becomes unknown within sigma and the next fix decides.
   void loosen_origin(double sigma_m);
+  /// What a false fix taught of the scale of both odometers is forgotten.
+  void loosen_scale(const FusionParameters& parameters);
   /// Path distance becomes `path_distance_m`, unknown within sigma, whatever it was.
   void set_origin(double path_distance_m, double sigma_m);
 
