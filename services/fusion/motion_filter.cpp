@@ -77,8 +77,18 @@ void MotionFilter::step(double dt_s, const FusionParameters& p) {
   const double per_camera = 1 / to_unit(Odometer::camera);
   const double per_wheel = 1 / to_unit(Odometer::wheel);
   const bool camera_unit = unit_ != Odometer::wheel;
+  // A scale walks, but stays within its sigma.
+  const auto scale_keep = [&](double walk, double sigma) {
+    return std::exp(-0.5 * squared(walk / sigma) * std::abs(way_m));
+  };
+  const double visual_keep = scale_keep(p.visual_scale_walk, p.visual_scale_sigma);
+  const double wheel_keep = scale_keep(p.wheel_scale_walk, p.wheel_scale_sigma);
+  const double visual_noise = squared(p.visual_scale_sigma) * (1 - squared(visual_keep));
+  const double wheel_noise = squared(p.wheel_scale_sigma) * (1 - squared(wheel_keep));
 
   StateMatrix phi = StateMatrix::Identity(n, n);
+  phi(unit_scale, unit_scale) = camera_unit ? visual_keep : wheel_keep;
+  phi(other_scale, other_scale) = camera_unit ? wheel_keep : visual_keep;
   phi(camera, speed) = per_camera * dt_s;
   phi(camera, acceleration) = per_camera * way_per_accel;
   phi(distance, speed) = k * dt_s;
@@ -106,8 +116,7 @@ void MotionFilter::step(double dt_s, const FusionParameters& p) {
   constexpr int kNoisy = static_cast<int>(std::size(noisy));
   StateVector q(kNoisy);
   q << squared(p.acceleration_sigma_mps2) * (1 - squared(keep)), squared(p.accel_bias_walk) * dt_s,
-      squared(camera_unit ? p.visual_scale_walk : p.wheel_scale_walk) * std::abs(way_m),
-      squared(camera_unit ? p.wheel_scale_walk : p.visual_scale_walk) * std::abs(way_m),
+      camera_unit ? visual_noise : wheel_noise, camera_unit ? wheel_noise : visual_noise,
       squared(p.visual_creep) * std::abs(way_m), squared(p.wheel_creep) * std::abs(way_m), 1e-10 * dt_s,
       squared(p.shape_error_sigma_m) * (1 - squared(shape_keep)), 1 - squared(gnss_keep);
   StateMatrix g = StateMatrix::Zero(n, kNoisy);
@@ -119,6 +128,8 @@ void MotionFilter::step(double dt_s, const FusionParameters& p) {
   x_(wheel) += way_m * per_wheel;
   x_(speed) += x_(acceleration) * speed_per_accel;
   x_(acceleration) *= keep;
+  x_(unit_scale) *= camera_unit ? visual_keep : wheel_keep;
+  x_(other_scale) *= camera_unit ? wheel_keep : visual_keep;
   x_(index(StateIndex::shape_error)) *= shape_keep;
   x_(index(StateIndex::gnss_error)) *= gnss_keep;
 }
