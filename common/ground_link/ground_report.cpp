@@ -13,6 +13,7 @@ std::vector<uint8_t> to_bytes(const GroundReport& report) {
   proto.set_sent_ns(report.sent_ns);
   proto.set_baseline(report.baseline);
   proto.set_reason(report.reason);
+  proto.set_host(report.host);
   proto.set_message(report.message.data(), report.message.size());
   std::vector<uint8_t> bytes(proto.ByteSizeLong());
   proto.SerializeToArray(bytes.data(), static_cast<int>(bytes.size()));
@@ -34,6 +35,7 @@ core::Result<GroundReport> ground_report_from(std::span<const uint8_t> bytes) {
   report.sent_ns = proto.sent_ns();
   report.baseline = proto.baseline();
   report.reason = proto.reason();
+  report.host = proto.host();
   report.message.assign(proto.message().begin(), proto.message().end());
   return report;
 }

@@ -19,6 +19,7 @@ struct GroundReport {
   uint32_t baseline = 3;
   uint32_t reason = 0;
   std::vector<uint8_t> message;
+  std::string host;
   bool operator==(const GroundReport&) const = default;
 };
 

@@ -25,7 +25,6 @@ void apply_common(const QosProfile& profile, Qos& qos) {
   qos.resource_limits().max_samples_per_instance = profile.depth;
   qos.resource_limits().max_samples = profile.depth * profile.max_instances;
   qos.resource_limits().allocated_samples = std::min(profile.depth * profile.max_instances, 16);
-  qos.ownership().kind = profile.exclusive ? dds::EXCLUSIVE_OWNERSHIP_QOS : dds::SHARED_OWNERSHIP_QOS;
   if (profile.deadline_ns > 0) qos.deadline().period = duration(profile.deadline_ns);
   if (profile.liveliness_lease_ns > 0) {
     qos.liveliness().kind = dds::MANUAL_BY_TOPIC_LIVELINESS_QOS;
@@ -69,7 +68,6 @@ void write_xml(std::ostream& xml, const TopicInfo& topic, bool writer) {
         << "</lease_duration><announcement_period>" << xml_duration(announce)
         << "</announcement_period></liveliness>\n";
   }
-  if (p.exclusive) xml << "        <ownership><kind>EXCLUSIVE</kind></ownership>\n";
   if (writer)
     xml << "        <publishMode><kind>" << (p.asynchronous ? "ASYNCHRONOUS" : "SYNCHRONOUS")
         << "</kind></publishMode>\n";

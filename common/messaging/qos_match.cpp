@@ -35,7 +35,7 @@ Terms built_in(const TopicInfo& topic, bool writer) {
   apply(topic.qos, qos);
   return {writer ? topic.qos.writer_reliable : topic.qos.reliable,
           topic.qos.transient_local,
-          topic.qos.exclusive,
+          false,
           qos.deadline().period.to_ns(),
           qos.liveliness().lease_duration.to_ns(),
           static_cast<int>(qos.liveliness().kind)};

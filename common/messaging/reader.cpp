@@ -1,5 +1,6 @@
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 
+#include "core/time.hpp"
 #include "messaging/fastdds_qos.hpp"
 #include "messaging/fastdds_types.hpp"
 #include "messaging/participant.hpp"
@@ -7,6 +8,30 @@
 namespace railfix::messaging {
 
 namespace dds = eprosima::fastdds::dds;
+
+namespace {
+
+// Of two writers of an exclusive topic the one that was heard goes on being heard until it has been silent for so long:
+// more than a period of train_state without a camera, less than a standby needs to take over. DDS's own exclusive
+// ownership would hear the strongest, which is the one that comes back and knows nothing yet.
+constexpr int64_t kHoldNs = 150'000'000;
+
+class OneWriter {
+ public:
+  bool hears(uint64_t writer) {
+    const int64_t now_ns = core::monotonic_ns();
+    if (writer != writer_ && now_ns - heard_ns_ < kHoldNs) return false;
+    writer_ = writer;
+    heard_ns_ = now_ns;
+    return true;
+  }
+
+ private:
+  uint64_t writer_ = 0;
+  int64_t heard_ns_ = -kHoldNs;
+};
+
+}  // namespace
 
 struct AnyReader::Impl : dds::DataReaderListener {
   Participant::Impl* participant = nullptr;
@@ -16,6 +41,8 @@ struct AnyReader::Impl : dds::DataReaderListener {
   Queue* queue = nullptr;
   std::shared_ptr<const Handler> handler;
   Queue::Source source;
+  bool exclusive = false;
+  OneWriter one_writer;  // the middleware's thread only
 
   std::mutex mutex;
   std::map<dds::InstanceHandle_t, std::shared_ptr<const void>>
@@ -28,6 +55,7 @@ struct AnyReader::Impl : dds::DataReaderListener {
   void on_data_available(dds::DataReader* from) override {
     type->take_all(
         *from, [this](std::shared_ptr<const void> sample, const SampleInfo& info, const dds::InstanceHandle_t& writer) {
+          if (exclusive && !one_writer.hears(info.writer)) return;
           if (type->keyed()) {
             const std::lock_guard lock(mutex);
             last_of_writer[writer] = sample;
@@ -52,6 +80,7 @@ AnyReader::AnyReader(Participant& participant, const TopicInfo& topic, const std
   impl_->type = &fastdds(*topic.type);
   impl_->queue = &queue;
   impl_->handler = std::make_shared<const Handler>(std::move(handler));
+  impl_->exclusive = topic.qos.exclusive && !topic.qos.transient_local;  // every report counts
   impl_->source.limit = topic.reader_queue;
   impl_->subscriber = inside.ends_of(topic).subscriber;
   dds::DataReaderQos qos;

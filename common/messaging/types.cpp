@@ -4,6 +4,7 @@
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 
 #include "idl/cameraPubSubTypes.h"
+#include "idl/chargePubSubTypes.h"
 #include "idl/odometryPubSubTypes.h"
 #include "idl/onboardPubSubTypes.h"
 #include "idl/operationPubSubTypes.h"
@@ -12,6 +13,7 @@
 #include "idl/recorderPubSubTypes.h"
 #include "idl/sensorsPubSubTypes.h"
 #include "idl/trackPubSubTypes.h"
+#include "messaging/charge_topic.hpp"
 #include "messaging/fastdds_types.hpp"
 #include "messaging/topics.hpp"
 
@@ -156,6 +158,7 @@ RAILFIX_TYPE(ControlRequest)
 RAILFIX_TYPE(ControlReply)
 RAILFIX_TYPE(DataClock)
 RAILFIX_TYPE(DataProgress)
+RAILFIX_TYPE(InCharge)
 #undef RAILFIX_TYPE
 
 }  // namespace railfix::messaging

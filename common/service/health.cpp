@@ -74,8 +74,17 @@ void PublishedHealth::publish() {
   status_.endpoints(connections.endpoints);
   status_.matches(connections.matches);
   status_.stamp_ns(core::wall_ns());
-  writer_.write(status_);
-  file_.write(status_);
+  const auto said = clock_trouble_.empty() ? status_ : with_clock_trouble();
+  writer_.write(said);
+  file_.write(said);
+}
+
+msg::ServiceStatus PublishedHealth::with_clock_trouble() const {
+  msg::ServiceStatus said = status_;
+  if (said.state() == msg::STATE_ACTIVE) said.state(msg::STATE_DEGRADED);
+  const std::string reason = said.reason().c_str();
+  said.reason((clock_trouble_ + (reason.empty() ? "" : " ") + reason).substr(0, kReasonBytes));
+  return said;
 }
 
 void PublishedHealth::measure() {

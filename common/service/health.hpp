@@ -14,6 +14,7 @@ class PublishedHealth final : public Health {
   PublishedHealth(messaging::Participant& participant, const std::string& service, const CommonConfig& common);
 
   void ready() override { change(msg::STATE_READY, ""); }
+  void standing_by(const std::string& reason) override { change(msg::STATE_READY, reason); }
   void active() override { change(msg::STATE_ACTIVE, ""); }
   void degraded(const std::string& reason) override { change(msg::STATE_DEGRADED, reason); }
   void failed(const std::string& reason) override { change(msg::STATE_FAILED, reason); }
@@ -21,6 +22,8 @@ class PublishedHealth final : public Health {
   void output(int64_t grabbed_ns) override;
   void dropped(uint64_t count) override { status_.dropped(status_.dropped() + count); }
 
+  /// Empty = none; a service that is active is degraded by it.
+  void clock_trouble(const std::string& sentence) { clock_trouble_ = sentence; }
   void stopped() { change(msg::STATE_STOPPED, ""); }
   /// Publishes; measures processor and latency anew when the measuring period has passed.
   void publish();
@@ -28,10 +31,12 @@ class PublishedHealth final : public Health {
  private:
   void change(uint8_t state, const std::string& reason);
   void measure();
+  [[nodiscard]] msg::ServiceStatus with_clock_trouble() const;
   messaging::Participant& participant_;
   messaging::Writer<msg::ServiceStatus> writer_;
   HealthFile file_;
   msg::ServiceStatus status_;
+  std::string clock_trouble_;
   std::vector<double> latencies_ms_;  // since the last measurement
   int64_t measured_ns_ = 0;
   int64_t cpu_ns_ = 0;

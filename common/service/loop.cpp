@@ -32,7 +32,9 @@ Loop::Loop(std::string service, const CommonConfig& common)
                     common.qos_profiles, common.interfaces, common.peers, common.security}),
       log_(make_logger(participant_, service_, common)),
       health_(std::make_unique<PublishedHealth>(participant_, service_, common)),
-      reply_(std::make_unique<messaging::Writer<msg::ControlReply>>(participant_, messaging::topics::service_reply)) {
+      reply_(std::make_unique<messaging::Writer<msg::ControlReply>>(participant_, messaging::topics::service_reply)),
+      notes_(notes_path(common, service_)),
+      clocks_(common.host) {
   if (common_.lock_step) {
     progress_ = std::make_unique<messaging::Writer<msg::DataProgress>>(participant_, messaging::topics::data_progress);
     readers_.push_back(
@@ -51,6 +53,7 @@ Loop::Loop(std::string service, const CommonConfig& common)
   });
   if (!common_.interfaces.empty()) watch_cable();
   if (!common_.security.empty()) watch_certificate();
+  if (!common_.peers.empty() && !common_.lock_step) watch_clocks();
 }
 
 // Started without the cable, this process would never use it.
@@ -73,6 +76,18 @@ void Loop::watch_certificate() {
   };
   look();
   every(kCertificatePeriod, look);
+}
+
+// Every service stamps its status with its host's clock.
+void Loop::watch_clocks() {
+  readers_.push_back(std::make_unique<messaging::AnyReader>(
+      participant_, messaging::info_of(messaging::topics::service_status), "", queue_,
+      [this](const auto& sample, const auto& info) {
+        if (!info.valid) return;
+        const auto& status = *static_cast<const msg::ServiceStatus*>(sample.get());
+        clocks_.hear(status.host().c_str(), status.stamp_ns(), info.received_ns);
+        health_->clock_trouble(clocks_.trouble());
+      }));
 }
 
 Loop::~Loop() {
@@ -166,6 +181,12 @@ void Loop::end_turn() {
   progress_->write(progress);
 }
 
+void Loop::share_charge(ChargeHandlers handlers) {
+  if (common_.lock_step || common_.ownership_strength == 0) return;
+  standby_ = std::make_unique<Standby>(participant_, queue_, service_, common_, std::move(handlers));
+  every(Standby::kPeriod, [this] { standby_->update(); });
+}
+
 void Loop::finish(const std::string& why) {
   if (finished_) return;
   log_->info("stopping: {}", why);
@@ -192,6 +213,7 @@ void Loop::turn() {
     if (turn_ && !turn_taken_ && turns_.ready()) take_turn();
     if (turn_ && turn_taken_ && (!turn_ended_ || turn_ended_(turn_->data_ns()))) end_turn();
   }
+  if (standby_) standby_->leave();
   for (const auto& handler : at_stop_) handler();
 }
 

@@ -3,8 +3,11 @@
 
 #include <map>
 
+#include "service/clock_watch.hpp"
 #include "service/health.hpp"
+#include "service/notes.hpp"
 #include "service/service.hpp"
+#include "service/standby.hpp"
 #include "service/turns.hpp"
 
 namespace railfix::service {
@@ -24,6 +27,11 @@ class Loop final : public Context {
   [[nodiscard]] const CommonConfig& common() const override { return common_; }
   [[nodiscard]] const std::string& service_name() const override { return service_; }
   messaging::Participant& participant() override { return participant_; }
+  void share_charge(ChargeHandlers handlers) override;
+  [[nodiscard]] bool in_charge() const override { return !standby_ || standby_->in_charge(); }
+  [[nodiscard]] std::string holder() const override { return standby_ ? standby_->holder() : ""; }
+  void keep(const std::string& notes) override { notes_.keep(notes); }
+  [[nodiscard]] const std::string& kept() const override { return notes_.kept(); }
   void finish(const std::string& why) override;
   void turn_ends_when(std::function<bool(int64_t)> done) override { turn_ended_ = std::move(done); }
 
@@ -43,6 +51,7 @@ class Loop final : public Context {
   void run_due_timers();
   void watch_cable();
   void watch_certificate();
+  void watch_clocks();
   void answer(const msg::ControlRequest& request);
   void keep_in_turn(const messaging::TopicInfo& topic, const std::string& instance, Handler handler, StampOf stamp_of);
   void clock(const msg::DataClock& clock);
@@ -57,6 +66,9 @@ class Loop final : public Context {
   std::unique_ptr<PublishedHealth> health_;
   std::unique_ptr<messaging::Writer<msg::DataProgress>> progress_;
   std::unique_ptr<messaging::Writer<msg::ControlReply>> reply_;
+  Notes notes_;
+  ClockWatch clocks_;
+  std::unique_ptr<Standby> standby_;  // nullptr = the only one of its kind
   std::map<std::string, std::function<core::Result<std::string>(const std::string&)>> commands_;
   std::vector<Timer> timers_;
   std::vector<std::function<void()>> at_stop_;

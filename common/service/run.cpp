@@ -106,7 +106,10 @@ void CommonConfig::describe(Fields& fields) {
   fields.text("qos_profiles", qos_profiles,
               "Fast DDS XML file that replaces the built-in quality of service; empty = built in.");
   fields.integer("ownership_strength", ownership_strength, {0, 1000}, "",
-                 "Of two services that write the same exclusive topic the stronger one is heard.");
+                 "0: the only fusion or tpr_publisher of this train; otherwise one of several, of which one is in "
+                 "charge, of equally good ones the stronger.");
+  fields.number("take_over_s", take_over_s, {0.1, 10}, "s",
+                "A standby takes charge when it has not heard of the one in charge for so long.");
   fields.list("interfaces", interfaces,
               "Network interfaces, by name or IPv4 address, that DDS uses beside the loopback; empty = all.");
   fields.list("peers", peers,

@@ -34,7 +34,8 @@ struct CommonConfig {
   int64_t domain = 0;
   std::string log_level = "info";
   std::string qos_profiles;
-  int64_t ownership_strength = 10;
+  int64_t ownership_strength = 0;
+  double take_over_s = 0.25;
   std::vector<std::string> interfaces;
   std::vector<std::string> peers;
   std::string security;
@@ -47,13 +48,20 @@ struct CommonConfig {
 class Health {
  public:
   virtual ~Health() = default;
-  virtual void ready() = 0;  // set up, waits for input
+  virtual void ready() = 0;                                 // set up, waits for input
+  virtual void standing_by(const std::string& reason) = 0;  // ready, but another one of its kind is in charge
   virtual void active() = 0;
   virtual void degraded(const std::string& reason) = 0;  // goes on with less
   virtual void failed(const std::string& reason) = 0;
   virtual void input() = 0;                     // one input sample used
   virtual void output(int64_t grabbed_ns) = 0;  // one output sent; grabbed_ns of the input behind it, 0 = none
   virtual void dropped(uint64_t count) = 0;
+};
+
+/// What a service that may have a standby says and hears of it.
+struct ChargeHandlers {
+  std::function<int()> fitness;             // how good its output is, 0 to 255, more is better
+  std::function<void(bool taken)> changed;  // it has taken charge, or has given it away
 };
 
 /// What a service gets from the run loop. All handlers run one after the other in the service's own thread, samples in
@@ -95,6 +103,17 @@ class Context {
   [[nodiscard]] virtual const CommonConfig& common() const = 0;
   [[nodiscard]] virtual const std::string& service_name() const = 0;
   virtual messaging::Participant& participant() = 0;
+  /// For a service of which there may be several (common.ownership_strength): one is in charge, the others work along
+  /// and send nothing. See charge.hpp for the rule.
+  virtual void share_charge(ChargeHandlers handlers) = 0;
+  /// To be asked right before sending. The only one of its kind is always in charge, and so is everybody in lock step.
+  [[nodiscard]] virtual bool in_charge() const = 0;
+  /// Host of the one in charge, as far as it is known; empty when it is this one.
+  [[nodiscard]] virtual std::string holder() const = 0;
+  /// What this service wants to know when it is started anew on this host: in memory, gone when the computer restarts.
+  /// kept() gives the notes of the process before, empty = none.
+  virtual void keep(const std::string& notes) = 0;
+  [[nodiscard]] virtual const std::string& kept() const = 0;
   /// Ends the run loop; the program exits with 0.
   virtual void finish(const std::string& why) = 0;
 

@@ -18,6 +18,9 @@ using messaging::topics::train_state;
 using messaging::topics::wheel_sample;
 
 constexpr std::chrono::milliseconds kTickPeriod{50};
+constexpr int64_t kKeepPeriodNs = 250'000'000;
+constexpr uint64_t kNumbersSinceKept = 100;  // at least as many as may have been used meanwhile
+constexpr double kOldestNotesS = 30.0;
 constexpr double kLiveDataS = 5.0;  // data stamps further from the host's clock are not live
 
 Fusion make_fusion(const FusionConfig& config, const std::shared_ptr<const track::Map>& map) {
@@ -106,13 +109,28 @@ msg::TrainPose message_of(const PoseEstimate& p) {
   return m;
 }
 
+KnownPlace known_place_of(const msg::TrainState& m) {
+  const auto direction =
+      m.direction() == msg::DIRECTION_REVERSE ? track::Direction::reverse : track::Direction::forward;
+  return {m.stamp_ns(),         {m.edge(), m.offset_m(), direction}, m.speed_mps(), m.over_m(), m.under_m(),
+          m.track_probability()};
+}
+
+// Which of two fusions is to be heard: the one that knows its place, or that has more to measure with.
+int fitness_of(const TrainEstimate& estimate, bool has_map) {
+  if (estimate.integrity == Integrity::unusable) return 0;
+  return 1 + (estimate.track_known || !has_map ? 2 : 0) + (estimate.integrity == Integrity::ok ? 1 : 0);
+}
+
 }  // namespace
 
 FusionService::FusionService(const FusionConfig& config, service::Context& context)
     : context_(context),
       writer_(context.writer(train_state)),
       pose_writer_(context.writer(train_pose)),
-      pose_(config.parameters.gnss_map_sigma_m) {
+      pose_(config.parameters.gnss_map_sigma_m),
+      parameters_(config.parameters),
+      kept_for_(config.map + ' ' + config.start + '\n') {
   if (!config.map.empty()) {
     map_ = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(config.map)));
   }
@@ -120,7 +138,92 @@ FusionService::FusionService(const FusionConfig& config, service::Context& conte
   listen(config);
   context_.on<msg::DataClock>(data_clock, [this](const msg::DataClock& m) { keep_time(m); });
   context_.every(kTickPeriod, [this] { tick(); });
+  if (!context_.common().lock_step) {
+    remember();
+    share_charge();
+  }
   context_.health().ready();
+}
+
+void FusionService::share_charge() {
+  if (context_.common().ownership_strength == 0) return;
+  context_.share_charge({[this] { return fitness_; }, [this](bool taken) { charge_changed(taken); }});
+  context_.on<msg::TrainState>(train_state, [this](const msg::TrainState& state) { hear(state); });
+}
+
+void FusionService::charge_changed(bool taken) {
+  context_.log().info(taken ? "in charge from now on" : "stands by from now on");
+  learnt_ = taken;  // whoever is in charge now knows more than one that had to give it away
+  // Readers have waited long enough for a state.
+  if (taken && latest_ && latest_->stamp_ns() > heard_ns_) send(*latest_);
+}
+
+void FusionService::hear(const msg::TrainState& state) {
+  if (context_.in_charge() || state.stamp_ns() <= heard_ns_) return;
+  heard_ns_ = state.stamp_ns();
+  seq_ = std::max(seq_, state.seq());
+  if (!latest_ || known_) return;
+  // The travelled distance must not jump at a take-over.
+  const double speed_mps = std::isfinite(latest_->speed_mps()) ? latest_->speed_mps() : 0;
+  const double since_s = core::seconds(state.stamp_ns() - latest_->stamp_ns());
+  distance_offset_m_ += state.distance_m() - (latest_->distance_m() + speed_mps * since_s);
+  if (learnt_ || !map_ || state.track_known() == 0 || state.integrity() == msg::INTEGRITY_UNUSABLE) return;
+  if (!place_at(map_, known_place_of(state), state.stamp_ns(), parameters_.interval_factor)) return;  // soon
+  learnt_ = true;
+  known_ = state;
+  begin_anew();
+}
+
+// Notes of the process before, if they are of this train's present ride.
+void FusionService::remember() {
+  const auto& notes = context_.kept();
+  if (!notes.starts_with(kept_for_)) return;
+  msg::TrainState state;
+  const std::vector<uint8_t> cdr(notes.begin() + static_cast<std::ptrdiff_t>(kept_for_.size()), notes.end());
+  from_notes_ = messaging::deserialize(cdr, state);
+  if (from_notes_) known_ = state;
+}
+
+void FusionService::keep(const msg::TrainState& state) {
+  if (context_.common().lock_step || clock_ || std::abs(state.stamp_ns() - kept_ns_) < kKeepPeriodNs) return;
+  kept_ns_ = state.stamp_ns();
+  const auto cdr = messaging::serialize(state);
+  context_.keep(kept_for_ + std::string(cdr.begin(), cdr.end()));
+}
+
+// A known place is wanted at the time of the first state of the fusion that is to go on from it.
+void FusionService::take_over_known(const TrainEstimate& first) {
+  const double age_s = core::seconds(first.stamp_ns - known_->stamp_ns());
+  if (from_notes_) {
+    from_notes_ = false;
+    const bool live = !clock_ && std::abs(core::seconds(core::wall_ns() - first.stamp_ns)) < kLiveDataS;
+    if (!live || age_s < 0 || age_s > kOldestNotesS) {
+      known_.reset();
+      return;
+    }
+    seq_ = std::max(seq_, known_->seq() + kNumbersSinceKept);
+    if (map_ && known_->track_known() != 0) {
+      begin_anew();
+      return;
+    }
+  }
+  const double speed_mps = std::isfinite(known_->speed_mps()) ? known_->speed_mps() : 0;
+  distance_offset_m_ = known_->distance_m() + speed_mps * age_s - first.distance_m;
+  if (begun_anew_) {
+    if (const auto place = place_at(map_, known_place_of(*known_), first.stamp_ns, parameters_.interval_factor)) {
+      fusion_->add(*place);
+    } else {
+      learnt_ = false;
+    }
+  }
+  begun_anew_ = false;
+  known_.reset();
+}
+
+// What is known of the place comes from another fusion: what this one believes of it is forgotten.
+void FusionService::begin_anew() {
+  fusion_.emplace(core::value_or_throw(Fusion::create(parameters_, map_, std::nullopt)));
+  begun_anew_ = true;
 }
 
 void FusionService::listen(const FusionConfig& config) {
@@ -173,24 +276,47 @@ void FusionService::tick() {
   const auto latest_ns = fusion_->latest_stamp_ns();
   if (!latest_ns) return;
   const int64_t wall_ns = core::wall_ns();
-  const int64_t now_ns = clock_ ? clock_->data_ns() + wall_ns - clock_->wall_ns() : wall_ns;
-  live_ = live_ || clock_ || std::abs(core::seconds(now_ns - *latest_ns)) < kLiveDataS;
+  const int64_t monotonic_ns = core::monotonic_ns();
+  if (*latest_ns != newest_stamp_ns_) {
+    newest_stamp_ns_ = *latest_ns;
+    newest_came_ns_ = monotonic_ns;
+  }
+  live_ = live_ || clock_ || std::abs(core::seconds(wall_ns - *latest_ns)) < kLiveDataS;
   if (!live_) return;
+  // In the clock of the sensors' host, whatever this one's says.
+  const int64_t now_ns =
+      clock_ ? clock_->data_ns() + wall_ns - clock_->wall_ns() : newest_stamp_ns_ + monotonic_ns - newest_came_ns_;
   if (const auto estimate = fusion_->tick(now_ns)) publish(*estimate, 0);
 }
 
 void FusionService::publish(const TrainEstimate& estimate, int64_t grabbed_ns) {
+  if (known_) take_over_known(estimate);
   msg::TrainState message = message_of(estimate);
-  message.seq(++seq_);
   message.grabbed_ns(grabbed_ns);
-  if (!writer_.write(message)) context_.health().dropped(1);
+  message.distance_m(message.distance_m() + distance_offset_m_);
+  fitness_ = fitness_of(estimate, map_ != nullptr);
+  latest_ = message;
+  if (!context_.in_charge()) {
+    const auto holder = context_.holder();
+    context_.health().standing_by(holder.empty() ? "nobody is in charge yet"
+                                                 : "stands by, " + holder + " is in charge");
+    return;
+  }
+  send(message);
   if (estimate.track_known) publish_pose(estimate);
-  context_.health().output(grabbed_ns);
   if (estimate.integrity == Integrity::ok) {
     context_.health().active();
   } else {
     context_.health().degraded(estimate.reason);
   }
+}
+
+void FusionService::send(const msg::TrainState& state) {
+  msg::TrainState message = state;
+  message.seq(++seq_);
+  if (!writer_.write(message)) context_.health().dropped(1);
+  context_.health().output(message.grabbed_ns());
+  keep(message);
 }
 
 void FusionService::publish_pose(const TrainEstimate& estimate) {

@@ -6,6 +6,7 @@
 
 #include "fusion/fusion.hpp"
 #include "fusion/fusion_config.hpp"
+#include "fusion/handover.hpp"
 #include "fusion/train_pose.hpp"
 #include "service/service.hpp"
 
@@ -23,7 +24,16 @@ class FusionService {
   void keep_time(const msg::DataClock& clock);
   void tick();
   void publish(const TrainEstimate& estimate, int64_t grabbed_ns);
+  void send(const msg::TrainState& state);
   void publish_pose(const TrainEstimate& estimate);
+  void share_charge();
+  void charge_changed(bool taken);
+  /// From the one in charge, while this one stands by.
+  void hear(const msg::TrainState& state);
+  void keep(const msg::TrainState& state);
+  void remember();
+  void begin_anew();
+  void take_over_known(const TrainEstimate& first);
 
   service::Context& context_;
   messaging::Writer<msg::TrainState> writer_;
@@ -31,10 +41,23 @@ class FusionService {
   std::shared_ptr<const track::Map> map_;
   std::optional<Fusion> fusion_;
   TrainPose pose_;
+  FusionParameters parameters_;
+  std::string kept_for_;  // map and start that the notes are for
   std::optional<msg::DataClock> clock_;
   bool live_ = false;
+  int64_t newest_stamp_ns_ = 0;  // of the data ...
+  int64_t newest_came_ns_ = 0;   // ... and when it was seen, monotonic
   bool no_projection_told_ = false;
   uint64_t seq_ = 0;
+  std::optional<msg::TrainState> latest_;  // of this fusion, sent or not
+  std::optional<msg::TrainState> known_;   // of another one, to begin anew from
+  bool from_notes_ = false;                // known_ is of the process before
+  bool begun_anew_ = false;                // known_ is to be used in the new one
+  bool learnt_ = false;                    // nothing more to take over
+  int64_t heard_ns_ = 0;                   // stamp of the newest state of the one in charge
+  int64_t kept_ns_ = 0;
+  double distance_offset_m_ = 0;  // of what is sent to what has been measured here
+  int fitness_ = 0;
 };
 
 }  // namespace railfix::fusion

@@ -102,4 +102,11 @@ void ReportTrigger::sent(const Moment& moment) {
   location_passed_ = false;
 }
 
+void ReportTrigger::watch(const Moment& moment) {
+  place_locations(moment);
+  note_events(moment);
+  reported_.reset();
+  asked_ = group_passed_ = location_passed_ = false;
+}
+
 }  // namespace railfix::tpr_publisher

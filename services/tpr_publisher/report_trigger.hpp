@@ -65,6 +65,8 @@ class ReportTrigger {
   /// The most urgent reason to report now; the same again until sent() is called.
   [[nodiscard]] std::optional<Reason> due(const Moment& moment);
   void sent(const Moment& moment);
+  /// Somebody else reports: follows what passes, and the next report of this one is a first one.
+  void watch(const Moment& moment);
 
  private:
   struct Location {

@@ -29,6 +29,10 @@ std::string age_refusal(int64_t stamp_ns, int64_t now_ns) {
   return text;
 }
 
+bool is_number(const TrainPosition& position) {
+  return !std::isinf(position.speed_mps) && std::isfinite(position.distance_m);
+}
+
 }  // namespace
 
 TprPublisher::TprPublisher(std::shared_ptr<const track::Map> map, const Settings& settings)
@@ -119,8 +123,14 @@ Moment TprPublisher::moment(int64_t now_ns) const {
   return moment;
 }
 
+void TprPublisher::watch(const TrainPosition& position, int64_t now_ns) {
+  if (!is_number(position)) return;
+  follow(position);
+  trigger_.watch(moment(now_ns));
+}
+
 Outcome TprPublisher::update(const TrainPosition& position, int64_t now_ns) {
-  if (std::isinf(position.speed_mps) || !std::isfinite(position.distance_m)) {
+  if (!is_number(position)) {
     return {std::nullopt, "Position report not sent: speed or distance of the train_state is not a number."};
   }
   follow(position);

@@ -43,6 +43,9 @@ class TprPublisher {
   /// A report must be younger than 1 s when it is sent (SUBSET-041 5.3.1.3): an older position gives a refusal and the
   /// report stays due.
   Outcome update(const TrainPosition& position, int64_t now_ns);
+  /// Another tpr_publisher reports: follows the train, and begins with a report of its own when update() is called
+  /// next.
+  void watch(const TrainPosition& position, int64_t now_ns);
   /// Time goes on without a position: says when a report is due that cannot be sent.
   Outcome tick(int64_t now_ns);
   /// A packet 58 from trackside. One for the other running direction than the train's (Q_DIR) is refused.

@@ -4,8 +4,9 @@ namespace railfix::tpr_publisher {
 
 void GroundLinkConfig::describe(service::Fields& fields) {
   fields.text("broker", broker, "MQTT broker, HOST or HOST:PORT; empty = reports are not sent to the ground.");
-  fields.text("topic", topic, "MQTT topic; {train} becomes common.train_id.");
-  fields.text("client_id", client_id, "MQTT client id; empty = railfix-{train}.");
+  fields.text("topic", topic, "MQTT topic; {train} becomes common.train_id, {host} common.host.");
+  fields.text("client_id", client_id,
+              "MQTT client id, another one for every client of the broker; empty = railfix-{train}-{host}.");
   fields.text("store", store, "File for reports that the broker does not have yet; needed with a broker.");
   fields.integer("store_limit", store_limit, {1, 10000000}, "reports",
                  "Most that wait in the store; beyond it the oldest are lost.");
@@ -20,18 +21,21 @@ void GroundLinkConfig::describe(service::Fields& fields) {
   fields.text("password_file", password_file, "File whose first line is the password.");
 }
 
-std::optional<GroundLinkSettings> GroundLinkConfig::settings(const std::string& train_id) const {
+std::optional<GroundLinkSettings> GroundLinkConfig::settings(const std::string& train_id,
+                                                             const std::string& host) const {
   if (broker.empty()) return std::nullopt;
-  const auto with_train = [&](std::string text) {
-    const auto place = text.find("{train}");
-    return place == std::string::npos ? text : text.replace(place, 7, train_id);
+  const auto filled_in = [&](std::string text) {
+    for (const auto& [word, value] : {std::pair<std::string, std::string>("{train}", train_id), {"{host}", host}}) {
+      if (const auto place = text.find(word); place != std::string::npos) text.replace(place, word.size(), value);
+    }
+    return text;
   };
   if (store.empty()) throw core::BadInput("tpr_publisher.ground_link.store is not set: name a file on a lasting disk.");
   if (certificate_file.empty() != key_file.empty())
     throw core::BadInput("tpr_publisher.ground_link: certificate_file and key_file go together.");
   GroundLinkSettings settings;
   core::ok_or_throw(ground_link::parse_broker(broker, settings.mqtt));
-  settings.mqtt.client_id = client_id.empty() ? "railfix-" + train_id : client_id;
+  settings.mqtt.client_id = filled_in(client_id.empty() ? "railfix-{train}-{host}" : client_id);
   settings.mqtt.ca_file = ca_file;
   settings.mqtt.certificate_file = certificate_file;
   settings.mqtt.key_file = key_file;
@@ -39,7 +43,7 @@ std::optional<GroundLinkSettings> GroundLinkConfig::settings(const std::string& 
   if (!password_file.empty()) settings.mqtt.password = core::value_or_throw(ground_link::read_password(password_file));
   settings.mqtt.keep_alive_s = static_cast<int>(keep_alive_s);
   settings.mqtt.longest_retry_s = longest_retry_s;
-  settings.topic = with_train(topic);
+  settings.topic = filled_in(topic);
   settings.store = store;
   settings.store_limit = static_cast<size_t>(store_limit);
   return settings;

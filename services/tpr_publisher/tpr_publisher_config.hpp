@@ -27,7 +27,7 @@ struct GroundLinkConfig {
 
   void describe(service::Fields& fields);
   /// Nothing without a broker. Throws BadInput when the keys do not go together.
-  [[nodiscard]] std::optional<GroundLinkSettings> settings(const std::string& train_id) const;
+  [[nodiscard]] std::optional<GroundLinkSettings> settings(const std::string& train_id, const std::string& host) const;
 };
 
 struct TprPublisherConfig {

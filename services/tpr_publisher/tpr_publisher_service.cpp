@@ -100,7 +100,7 @@ TprPublisherService::TprPublisherService(const Config& config, service::Context&
       baseline_(config.settings().report.baseline),
       publisher_(load_map(config.map), config.settings()),
       writer_(context.writer(messaging::topics::train_position_report)) {
-  if (const auto link = config.ground_link.settings(context.common().train_id))
+  if (const auto link = config.ground_link.settings(context.common().train_id, context.common().host))
     ground_link_ = std::make_unique<GroundLink>(*link);
   context.on<msg::DataClock>(messaging::topics::data_clock,
                              [this](const msg::DataClock& clock) { data_clock_ = clock; });
@@ -109,6 +109,7 @@ TprPublisherService::TprPublisherService(const Config& config, service::Context&
   context.on<msg::OnboardStatus>(messaging::topics::onboard_status,
                                  [this](const msg::OnboardStatus& status) { on_onboard(status); });
   context.every(kTickPeriod, [this] { on_tick(); });
+  share_charge();
   context.on_command("packet_58", [this](const std::string& hex) -> core::Result<std::string> {
     const auto bytes = etcs::parse_hex(hex);
     if (!bytes.ok()) return bytes.error();
@@ -117,6 +118,31 @@ TprPublisherService::TprPublisherService(const Config& config, service::Context&
     if (const auto status = publisher_.set_parameters(parameters.value()); !status.ok()) return status.error();
     return std::string("position report parameters taken over");
   });
+}
+
+void TprPublisherService::share_charge() {
+  if (context_.common().ownership_strength == 0) return;
+  context_.share_charge(
+      {[this] { return fitness(); },
+       [this](bool taken) { context_.log().info(taken ? "in charge from now on" : "stands by from now on"); }});
+  // Numbers go on where the other one stopped.
+  context_.on<msg::TrainPositionReport>(
+      messaging::topics::train_position_report,
+      [this](const msg::TrainPositionReport& report) { seq_ = std::max(seq_, report.seq() + 1); });
+}
+
+// Without a way to the ground reports only wait.
+int TprPublisherService::fitness() const {
+  const bool has_state = state_seen_ && core::monotonic_ns() - state_monotonic_ns_ < core::kNsPerSecond;
+  const bool has_ground = !ground_link_ || ground_link_->connected();
+  return (has_ground ? 2 : 0) + (has_state ? 1 : 0);
+}
+
+void TprPublisherService::stand_by(const msg::TrainState& state, int64_t now_ns) {
+  publisher_.watch(position_of(state), now_ns);
+  report_trouble_.clear();
+  const auto holder = context_.holder();
+  context_.health().standing_by(holder.empty() ? "nobody is in charge yet" : "stands by, " + holder + " is in charge");
 }
 
 int64_t TprPublisherService::now_ns(int64_t stamp_ns) const {
@@ -128,7 +154,12 @@ int64_t TprPublisherService::now_ns(int64_t stamp_ns) const {
 void TprPublisherService::on_state(const msg::TrainState& state) {
   context_.health().input();
   state_seen_ = true;
+  state_monotonic_ns_ = core::monotonic_ns();
   const int64_t now = now_ns(state.stamp_ns());
+  if (!context_.in_charge()) {
+    stand_by(state, now);
+    return;
+  }
   const auto outcome = publisher_.update(position_of(state), now);
   if (outcome.report) send(*outcome.report, state.grabbed_ns());
   if (!outcome.refusal.empty()) {
@@ -154,7 +185,7 @@ void TprPublisherService::on_onboard(const msg::OnboardStatus& status) {
 }
 
 void TprPublisherService::on_tick() {
-  if (!state_seen_) return;  // ready, whatever the ground link says
+  if (!state_seen_ || !context_.in_charge()) return;  // ready, whatever the ground link says
   // The end of played data is no fault.
   if (!context_.common().lock_step && (!data_clock_ || data_clock_->ended() == 0)) {
     auto outcome = publisher_.tick(now_ns(0));
@@ -181,6 +212,7 @@ void TprPublisherService::to_ground(const Report& report) {
   if (!ground_link_) return;
   ground_link::GroundReport ground;
   ground.train = context_.common().train_id;
+  ground.host = context_.common().host;
   ground.stamp_ns = report.stamp_ns;
   ground.sent_ns = report.sent_ns;
   ground.baseline = static_cast<uint32_t>(baseline_);

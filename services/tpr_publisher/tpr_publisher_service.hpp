@@ -20,6 +20,10 @@ class TprPublisherService {
   void on_state(const msg::TrainState& state);
   void on_onboard(const msg::OnboardStatus& status);
   void on_tick();
+  void share_charge();
+  [[nodiscard]] int fitness() const;
+  /// Not in charge: works along and sends nothing.
+  void stand_by(const msg::TrainState& state, int64_t now_ns);
   /// Now, in the time of the data: the host's clock on a train, what data_clock says where data is played.
   [[nodiscard]] int64_t now_ns(int64_t stamp_ns) const;
   void send(const Report& report, int64_t grabbed_ns);
@@ -34,7 +38,8 @@ class TprPublisherService {
   messaging::Writer<msg::TrainPositionReport> writer_;
   std::optional<msg::DataClock> data_clock_;
   bool state_seen_ = false;
-  bool reference_known_ = false;  // in the last report
+  int64_t state_monotonic_ns_ = 0;  // when the last one came
+  bool reference_known_ = false;    // in the last report
   uint64_t seq_ = 0;
   std::unique_ptr<GroundLink> ground_link_;  // nullptr = no broker
   std::string report_trouble_;

@@ -69,6 +69,21 @@ class TwoHosts {
     plugged(in);
   }
 
+  /// Every tenth packet that comes over the cable is lost, on both sides. False without the program `iptables`.
+  bool lose(bool every_tenth) {
+    const std::string rule = std::string("iptables ") + (every_tenth ? "-A" : "-D");
+    bool done = true;
+    for (const Host host : {cab, coach}) {
+      done = on(host,
+                [&] {
+                  return run(rule + " INPUT -i " + kInterface[host] +
+                             " -m statistic --mode random --probability 0.1 -j DROP");
+                }) &&
+             done;
+    }
+    return done;
+  }
+
   /// Bytes that have gone over the cable, both ways.
   uint64_t bytes_on_cable() {
     return on(cab, [] {

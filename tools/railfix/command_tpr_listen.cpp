@@ -65,11 +65,17 @@ void print(const GroundReport& report, Arrival arrival, bool as_json) {
     std::printf("%s  %llu  %.3f s  %s  %s\n", report.train.c_str(), static_cast<unsigned long long>(report.sequence),
                 core::seconds(report.stamp_ns), text_of(arrival), sentence(report).c_str());
   } else {
-    const nlohmann::ordered_json json{{"train", report.train},          {"stream", report.stream},
-                                      {"sequence", report.sequence},    {"arrival", text_of(arrival)},
-                                      {"stamp_ns", report.stamp_ns},    {"sent_ns", report.sent_ns},
-                                      {"received_ns", core::wall_ns()}, {"baseline", report.baseline},
-                                      {"reason", report.reason},        {"hex", etcs::to_hex(report.message)}};
+    const nlohmann::ordered_json json{{"train", report.train},
+                                      {"host", report.host},
+                                      {"stream", report.stream},
+                                      {"sequence", report.sequence},
+                                      {"arrival", text_of(arrival)},
+                                      {"stamp_ns", report.stamp_ns},
+                                      {"sent_ns", report.sent_ns},
+                                      {"received_ns", core::wall_ns()},
+                                      {"baseline", report.baseline},
+                                      {"reason", report.reason},
+                                      {"hex", etcs::to_hex(report.message)}};
     // A train's name may be anything.
     std::printf("%s\n", json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
   }

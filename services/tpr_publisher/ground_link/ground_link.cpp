@@ -48,6 +48,11 @@ std::string GroundLink::trouble() const {
   return trouble_;
 }
 
+bool GroundLink::connected() const {
+  const std::lock_guard lock(mutex_);
+  return connected_;
+}
+
 void GroundLink::push(Event event) {
   {
     const std::lock_guard lock(mutex_);
@@ -154,6 +159,7 @@ void GroundLink::say() {
   }
   const std::lock_guard lock(mutex_);
   trouble_ = sentence;
+  connected_ = link_trouble_.empty();
 }
 
 }  // namespace railfix::tpr_publisher

@@ -36,6 +36,7 @@ class GroundLink {
   void send(ground_link::GroundReport report);
   /// Empty when all is well, otherwise one sentence for service_status.
   [[nodiscard]] std::string trouble() const;
+  [[nodiscard]] bool connected() const;
 
  private:
   struct Connected {};
@@ -65,6 +66,7 @@ class GroundLink {
   std::condition_variable wake_;
   std::deque<Event> events_;
   std::string trouble_;
+  bool connected_ = false;
   bool stop_ = false;
   std::unique_ptr<ground_link::MqttClient> client_;
   std::thread thread_;

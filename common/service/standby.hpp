@@ -1,0 +1,37 @@
+// Private to this folder: Charge on the air.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "messaging/charge_topic.hpp"
+#include "service/charge.hpp"
+#include "service/service.hpp"
+
+namespace railfix::service {
+
+class Standby {
+ public:
+  static constexpr std::chrono::milliseconds kPeriod{25};
+
+  Standby(messaging::Participant& participant, messaging::Queue& queue, std::string service, const CommonConfig& common,
+          ChargeHandlers handlers);
+  /// Once a period.
+  void update();
+  [[nodiscard]] bool in_charge() const;
+  [[nodiscard]] std::string holder() const { return charge_.holder(); }
+  /// The others need not wait: the last thing to call.
+  void leave();
+
+ private:
+  void say(bool leaving);
+
+  std::string service_;
+  std::string host_;
+  ChargeHandlers handlers_;
+  Charge charge_;
+  messaging::Writer<msg::InCharge> writer_;
+  messaging::Reader<msg::InCharge> reader_;
+};
+
+}  // namespace railfix::service

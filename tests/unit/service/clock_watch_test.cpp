@@ -1,0 +1,51 @@
+#include "service/clock_watch.hpp"
+
+#include <gtest/gtest.h>
+
+#include "core/time.hpp"
+
+namespace railfix::service {
+namespace {
+
+constexpr int64_t kMs = 1'000'000;
+
+class ClockWatchTest : public ::testing::Test {
+ protected:
+  void hear(const std::string& host, int64_t ahead_ns, int64_t way_ns, size_t count = ClockWatch::kMessages) {
+    for (size_t i = 0; i < count; ++i, now_ns_ += 250 * kMs) watch_.hear(host, now_ns_ + ahead_ns, now_ns_ + way_ns);
+  }
+  ClockWatch watch_{"coach"};
+  int64_t now_ns_ = 1'700'000'000 * core::kNsPerSecond;
+};
+
+TEST_F(ClockWatchTest, ClocksThatAgreeAreNoTrouble) {
+  hear("cab", 20 * kMs, 30 * kMs);
+  EXPECT_EQ(watch_.trouble(), "");
+}
+
+TEST_F(ClockWatchTest, SaysWhichIsOffByHowMuchAndWhatToDo) {
+  hear("cab", -1300 * kMs, 1 * kMs);
+  EXPECT_EQ(watch_.trouble(),
+            "The clock of cab is 1.3 s behind coach's: let chrony or PTP set both (railfix doctor says which is not).");
+  hear("cab", 2000 * kMs, 1 * kMs);
+  EXPECT_EQ(
+      watch_.trouble(),
+      "The clock of cab is 2.0 s ahead of coach's: let chrony or PTP set both (railfix doctor says which is not).");
+  hear("cab", 0, 1 * kMs);
+  EXPECT_EQ(watch_.trouble(), "");
+}
+
+TEST_F(ClockWatchTest, SlowMessagesAreNoWrongClock) {
+  hear("cab", 0, 3000 * kMs, ClockWatch::kMessages - 1);  // what a new reader gets of the past, a cable that was cut
+  EXPECT_EQ(watch_.trouble(), "");
+  hear("cab", 0, 2 * kMs, 1);
+  EXPECT_EQ(watch_.trouble(), "");
+}
+
+TEST_F(ClockWatchTest, ItsOwnHostHasTheSameClock) {
+  hear("coach", 5000 * kMs, 0);
+  EXPECT_EQ(watch_.trouble(), "");
+}
+
+}  // namespace
+}  // namespace railfix::service
