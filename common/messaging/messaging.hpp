@@ -67,7 +67,6 @@ struct ParticipantOptions {
   std::string host = "local";
   std::string service = "tool";
   int64_t domain = 0;
-  int64_t ownership_strength = 10;           // of exclusive topics' writers
   std::string qos_profiles;                  // Fast DDS XML that replaces the compiled-in profiles, empty = none
   std::vector<std::string> interfaces = {};  // names or addresses of those that DDS uses, empty = all
   std::vector<std::string> peers = {};  // addresses of the train's other hosts, asked where multicast does not pass
@@ -81,13 +80,6 @@ struct Connections {
   uint32_t matches = 0;           // their partners, summed up
   uint32_t remote_endpoints = 0;  // of all others on this train, as discovered
   uint32_t pairs = 0;             // reader-writer pairs of equal topics on this train, own and remote
-};
-
-/// Whom the readers of an exclusive topic hear.
-enum class Owner {
-  unknown,  // nothing has come back to the asker yet
-  self,
-  other,  // a stronger writer, or an equal one with a lower GUID
 };
 
 /// Samples that this participant has sent to a topic. SampleInfo::sequence of the last one is the same number.
@@ -164,13 +156,6 @@ class AnyWriter {
   bool write_in_place(const std::function<void(void*)>& fill);
   [[nodiscard]] int matched_readers() const;
 
-  /// Exclusive topics only: of all that is alive the strongest writer is heard. Readers know of a new strength once
-  /// discovery has told them, on one host after some milliseconds.
-  void set_ownership_strength(int64_t strength);
-  /// Who was heard last, by a reader beside this writer that is made at the first call. Takes what has come since the
-  /// last call, so ask again well within the topic's history.
-  [[nodiscard]] Owner owner();
-
  private:
   struct Impl;
   std::shared_ptr<Impl> impl_;
@@ -187,8 +172,6 @@ class Writer {
     return writer_.write_in_place([&](void* sample) { fill(*static_cast<T*>(sample)); });
   }
   [[nodiscard]] int matched_readers() const { return writer_.matched_readers(); }
-  void set_ownership_strength(int64_t strength) { writer_.set_ownership_strength(strength); }
-  [[nodiscard]] Owner owner() { return writer_.owner(); }
 
  private:
   AnyWriter writer_;

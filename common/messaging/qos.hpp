@@ -13,7 +13,7 @@ struct QosProfile {
   bool transient_local = false;  // late joiners get the last samples
   int32_t depth = 32;            // keep last, of an instance
   int32_t max_instances = 1;     // keyed topics: how many keys there may be
-  bool exclusive = false;        // one owner at a time, the strongest (standby services)
+  bool exclusive = false;        // a reader hears one writer at a time, and stays with it (standby services)
   int64_t deadline_ns = 0;       // 0 = none
   int64_t liveliness_lease_ns =
       0;                      // 0 = none; otherwise MANUAL_BY_TOPIC (AUTOMATIC does not see a dead writer in 2.9.1)

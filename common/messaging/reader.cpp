@@ -80,7 +80,7 @@ AnyReader::AnyReader(Participant& participant, const TopicInfo& topic, const std
   impl_->type = &fastdds(*topic.type);
   impl_->queue = &queue;
   impl_->handler = std::make_shared<const Handler>(std::move(handler));
-  impl_->exclusive = topic.qos.exclusive && !topic.qos.transient_local;  // every report counts
+  impl_->exclusive = topic.qos.exclusive;
   impl_->source.limit = topic.reader_queue;
   impl_->subscriber = inside.ends_of(topic).subscriber;
   dds::DataReaderQos qos;

@@ -40,7 +40,7 @@ inline constexpr Topic<msg::LandmarkSighting> landmark_sighting{"landmark_sighti
 inline constexpr Topic<msg::OdometryStep> odometry_step{"odometry_step", "odometry", {.depth = 32}, 64};
 inline constexpr Topic<msg::PositionFix> position_fix{"position_fix", "position", {.depth = 100}, 100};
 
-// A standby fusion or tpr_publisher takes over when the owner's deadline or liveliness lease runs out.
+// Of several fusions, or tpr_publishers, one is in charge and alone sends (common/service/charge.hpp).
 inline constexpr Topic<msg::TrainState> train_state{
     "train_state",
     "position",
@@ -51,7 +51,7 @@ inline constexpr Topic<msg::TrainPose> train_pose{
 inline constexpr Topic<msg::TrainPositionReport> train_position_report{
     "train_position_report",
     "position",
-    {.transient_local = true, .depth = 32, .exclusive = true, .liveliness_lease_ns = 300 * kMs},
+    {.transient_local = true, .depth = 32, .liveliness_lease_ns = 300 * kMs},
     64};
 
 inline constexpr Topic<msg::ServiceStatus> service_status{

@@ -12,45 +12,6 @@ namespace {
 
 const eprosima::fastrtps::Duration_t kLastWordsPatience{0, 300'000'000};
 
-// A reader of an exclusive topic beside its writer: it hears whom everybody hears.
-class OwnerWatch {
- public:
-  OwnerWatch(Participant::Impl& participant, const TopicInfo& topic, const dds::DataWriter& writer)
-      : participant_(participant), own_(writer.get_instance_handle()) {
-    dds::DataReaderQos qos;
-    apply(topic.qos, qos);
-    qos.durability().kind = dds::VOLATILE_DURABILITY_QOS;  // only what is said from now on
-    type_ = &fastdds(*topic.type);
-    reader_ = participant_.train.subscriber->create_datareader(writer.get_topic(), qos);
-    if (reader_ == nullptr) throw core::BadInput("topic " + topic.name + " cannot be read: permissions refuse it");
-    const std::lock_guard lock(participant_.mutex);
-    participant_.readers.insert(reader_);
-  }
-  ~OwnerWatch() {
-    {
-      const std::lock_guard lock(participant_.mutex);
-      participant_.readers.erase(reader_);
-    }
-    participant_.train.subscriber->delete_datareader(reader_);
-  }
-  OwnerWatch(const OwnerWatch&) = delete;
-  OwnerWatch& operator=(const OwnerWatch&) = delete;
-
-  Owner heard() {
-    type_->take_all(*reader_, [this](const auto&, const SampleInfo& info, const dds::InstanceHandle_t& writer) {
-      if (info.valid) heard_ = writer == own_ ? Owner::self : Owner::other;
-    });
-    return heard_;
-  }
-
- private:
-  Participant::Impl& participant_;
-  dds::InstanceHandle_t own_;
-  const FastDdsType* type_ = nullptr;
-  dds::DataReader* reader_ = nullptr;
-  Owner heard_ = Owner::unknown;
-};
-
 }  // namespace
 
 // A writer always has its own listener: in 2.9.1 an offered deadline that is missed crashes otherwise
@@ -60,14 +21,12 @@ struct AnyWriter::Impl : dds::DataWriterListener {
   TopicInfo topic;
   dds::Publisher* publisher = nullptr;
   dds::DataWriter* writer = nullptr;
-  std::unique_ptr<OwnerWatch> owner_watch;
   std::shared_ptr<void> scratch;  // for topics whose samples cannot be loaned
   std::shared_ptr<SentCount> sent;
 
   bool send(void* sample);
 
   ~Impl() override {
-    owner_watch.reset();
     if (writer == nullptr) return;
     {
       const std::lock_guard lock(participant->mutex);
@@ -91,7 +50,6 @@ AnyWriter::AnyWriter(Participant& participant, const TopicInfo& topic, const std
       impl_->publisher->get_datawriter_qos_from_profile(topic.name, qos) != ReturnCode_t::RETCODE_OK) {
     apply(topic.qos, qos);
   }
-  if (topic.qos.exclusive) qos.ownership_strength().value = static_cast<uint32_t>(inside.options.ownership_strength);
   auto* dds_topic = inside.topic(topic, instance);
   impl_->writer = impl_->publisher->create_datawriter(dds_topic, qos, impl_.get(), dds::StatusMask::all());
   if (impl_->writer == nullptr) {
@@ -127,18 +85,6 @@ bool AnyWriter::write_in_place(const std::function<void(void*)>& fill) {
   if (impl_->send(loan)) return true;
   impl_->writer->discard_loan(loan);
   return false;
-}
-
-void AnyWriter::set_ownership_strength(int64_t strength) {
-  auto qos = impl_->writer->get_qos();
-  qos.ownership_strength().value = static_cast<uint32_t>(strength);
-  impl_->writer->set_qos(qos);
-}
-
-Owner AnyWriter::owner() {
-  if (!impl_->owner_watch)
-    impl_->owner_watch = std::make_unique<OwnerWatch>(*impl_->participant, impl_->topic, *impl_->writer);
-  return impl_->owner_watch->heard();
 }
 
 int AnyWriter::matched_readers() const {

@@ -28,8 +28,8 @@ bool waits_for_turn(const messaging::TopicInfo& topic) {
 Loop::Loop(std::string service, const CommonConfig& common)
     : service_(std::move(service)),
       common_(common),
-      participant_({common.train_id, common.host, service_, common.domain, common.ownership_strength,
-                    common.qos_profiles, common.interfaces, common.peers, common.security}),
+      participant_({common.train_id, common.host, service_, common.domain, common.qos_profiles, common.interfaces,
+                    common.peers, common.security}),
       log_(make_logger(participant_, service_, common)),
       health_(std::make_unique<PublishedHealth>(participant_, service_, common)),
       reply_(std::make_unique<messaging::Writer<msg::ControlReply>>(participant_, messaging::topics::service_reply)),

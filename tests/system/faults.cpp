@@ -283,7 +283,6 @@ int be_rogue(const std::string& train_id, int64_t domain, const std::string& ser
   options.train_id = train_id;
   options.domain = domain;
   options.service = service;
-  options.ownership_strength = 1000;
   options.security_folder = keys;
   messaging::Participant participant(options);
   messaging::Writer<msg::TrainState> writer(participant, messaging::topics::train_state);

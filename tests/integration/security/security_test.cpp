@@ -72,13 +72,9 @@ struct Train {
                                             [this](const msg::TrainState& state) { heard.push_back(state.seq()); }};
 };
 
-// Somebody who reads and writes train_state, with the strength to be heard before all others.
+// Somebody who reads and writes train_state.
 struct Rogue {
-  explicit Rogue(messaging::ParticipantOptions options) : participant(strong(std::move(options))) {}
-  static messaging::ParticipantOptions strong(messaging::ParticipantOptions options) {
-    options.ownership_strength = 1000;
-    return options;
-  }
+  explicit Rogue(const messaging::ParticipantOptions& options) : participant(options) {}
   messaging::Queue queue;
   messaging::Participant participant;
   uint64_t heard = 0;
