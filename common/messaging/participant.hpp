@@ -21,6 +21,7 @@ struct SentCount {
   explicit SentCount(std::string name) : topic(std::move(name)) {}
   std::string topic;
   std::atomic<uint64_t> samples = 0;
+  std::atomic<int64_t> said_ns = 0;  // monotonic, of its last sample
 };
 
 struct Participant::Impl : eprosima::fastdds::dds::DomainParticipantListener {
@@ -40,7 +41,12 @@ struct Participant::Impl : eprosima::fastdds::dds::DomainParticipantListener {
 
   std::mutex mutex;
   std::map<std::string, eprosima::fastdds::dds::Topic*> topics;
-  std::set<eprosima::fastdds::dds::DataWriter*> manual_liveliness;  // writers to assert
+  struct Lease {
+    std::shared_ptr<const SentCount> sent;
+    int64_t lease_ns = 0;
+    int64_t asserted_ns = 0;
+  };
+  std::map<eprosima::fastdds::dds::DataWriter*, Lease> manual_liveliness;  // writers to assert
   std::set<eprosima::fastdds::dds::DataWriter*> writers;
   std::set<eprosima::fastdds::dds::DataReader*> readers;
   std::vector<std::shared_ptr<const SentCount>> sent;

@@ -95,14 +95,17 @@ class TypeOf final : public FastDdsType {
   bool deserialize(const std::vector<uint8_t>& cdr, void* sample) const override {
     if (cdr.size() < 4) return false;
     PubSub support;
-    eprosima::fastrtps::rtps::SerializedPayload_t payload(static_cast<uint32_t>(cdr.size()));
-    payload.length = static_cast<uint32_t>(cdr.size());
-    std::memcpy(payload.data, cdr.data(), cdr.size());
+    // Only read, and not the payload's own.
+    eprosima::fastrtps::rtps::SerializedPayload_t payload;
+    payload.data = const_cast<uint8_t*>(cdr.data());  // NOLINT(cppcoreguidelines-pro-type-const-cast)
+    payload.length = payload.max_size = static_cast<uint32_t>(cdr.size());
+    bool whole = false;
     try {
-      return support.deserialize(&payload, sample);
+      whole = support.deserialize(&payload, sample);
     } catch (const std::exception&) {
-      return false;
     }
+    payload.data = nullptr;
+    return whole;
   }
 
   void take_all(dds::DataReader& reader, const OnSample& on_sample) const override {

@@ -1,5 +1,6 @@
 #include <fastdds/dds/publisher/DataWriterListener.hpp>
 
+#include "core/time.hpp"
 #include "messaging/fastdds_qos.hpp"
 #include "messaging/fastdds_types.hpp"
 #include "messaging/participant.hpp"
@@ -25,6 +26,7 @@ struct AnyWriter::Impl : dds::DataWriterListener {
   std::shared_ptr<SentCount> sent;
 
   bool send(void* sample);
+  void touch_shared_memory();
 
   ~Impl() override {
     if (writer == nullptr) return;
@@ -56,17 +58,33 @@ AnyWriter::AnyWriter(Participant& participant, const TopicInfo& topic, const std
     throw core::BadInput("topic " + dds_topic->get_name() +
                          " cannot be written: quality of service or permissions refuse it");
   }
+  if (topic.qos.data_sharing) impl_->touch_shared_memory();
   impl_->scratch = topic.type->make();
   impl_->sent = std::make_shared<SentCount>(dds_topic->get_name());
   const std::lock_guard lock(inside.mutex);
   inside.sent.push_back(impl_->sent);
   inside.writers.insert(impl_->writer);
-  if (topic.qos.liveliness_lease_ns > 0) inside.manual_liveliness.insert(impl_->writer);
+  if (topic.qos.liveliness_lease_ns > 0) {
+    inside.manual_liveliness[impl_->writer] = {impl_->sent, topic.qos.liveliness_lease_ns};
+  }
+}
+
+// Shared memory is fresh when a writer is made: else each of its first pictures would wait for hundreds of page faults.
+void AnyWriter::Impl::touch_shared_memory() {
+  std::vector<void*> loans;
+  void* loan = nullptr;
+  while (loans.size() < static_cast<size_t>(topic.qos.depth) &&
+         writer->loan_sample(loan, dds::DataWriter::LoanInitializationKind::ZERO_LOAN_INITIALIZATION) ==
+             ReturnCode_t::RETCODE_OK) {
+    loans.push_back(loan);
+  }
+  for (void* one : loans) writer->discard_loan(one);
 }
 
 bool AnyWriter::Impl::send(void* sample) {
   if (!writer->write(sample)) return false;
   ++sent->samples;
+  sent->said_ns = core::monotonic_ns();
   return true;
 }
 

@@ -311,6 +311,7 @@ void MonitorService::read_certificates() {
 }
 
 void MonitorService::look_for_problems() {
+  looked_ = true;
   if (!problems_.update(find_problems(train_seen()), core::wall_ns())) return;
   live_.publish("problems", problems_message(problems_.problems()));
 }

@@ -123,6 +123,7 @@ class MonitorService {
   std::optional<std::set<std::string>> shown_cameras_;
   ProblemList problems_;
   std::vector<TrainSeen::Certificate> certificates_;
+  bool looked_ = false;
   int64_t begun_ns_ = 0;
   int64_t scraped_ns_ = 0;
   uint64_t slow_viewers_ = 0;

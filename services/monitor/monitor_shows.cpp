@@ -128,7 +128,10 @@ std::vector<json> MonitorService::first(const std::string& kind) {
   if (kind == "topics") return {topics_message(topics_shown())};
   if (kind == "log") return {log_message(json(log_))};
   if (kind == "reports") return {reports_.begin(), reports_.end()};
-  if (kind == "problems") return {problems_message(problems_.problems())};
+  if (kind == "problems") {
+    if (!looked_) look_for_problems();
+    return {problems_message(problems_.problems())};
+  }
   if (kind == "recorder" && recent(recorder_)) {
     return {status_message(kind, messaging::info_of(topics::recorder_status), &*recorder_.sample)};
   }

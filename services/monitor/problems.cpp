@@ -30,6 +30,12 @@ using Problems = std::vector<Problem>;
 
 void judge_services(const TrainSeen& train, Problems& problems) {
   const bool starting = core::seconds(train.now_ns - train.watched_since_ns) < kStartS;
+  const auto is_other = [](const auto& entry) { return entry.first.second != "monitor"; };
+  const bool nobody = std::ranges::none_of(train.services->services(), is_other);
+  if (nobody && !train.played && (starting || train.expected.empty())) {
+    problems.push_back({"nobody", Level::warning, "No service of this train has been heard yet",
+                        "Its services are found within seconds; if not, see that train_id and domain are theirs."});
+  }
   for (const std::string& name : train.expected) {
     if (train.played || starting || train.services->find(name) != nullptr) continue;
     problems.push_back({"missing " + name, Level::error, name + " is not there",

@@ -67,6 +67,17 @@ TEST_F(ProblemsTest, NamesServicesThatAreMissingDeadOrDegraded) {
   EXPECT_EQ(only().what, "odometry was stopped");
 }
 
+TEST_F(ProblemsTest, SaysThatNobodyWasHeardYet) {
+  ServiceBoard empty;
+  train_.services = &empty;
+  train_.watched_since_ns = kNow_ns;
+  EXPECT_THAT(only().what, HasSubstr("No service of this train has been heard yet"));
+  empty.note(status("monitor", msg::STATE_ACTIVE), kNow_ns);
+  EXPECT_THAT(only().what, HasSubstr("No service")) << "the monitor hears itself";
+  empty.note(status("fusion", msg::STATE_ACTIVE), kNow_ns);
+  EXPECT_THAT(find_problems(train_), IsEmpty());
+}
+
 TEST_F(ProblemsTest, APausedRecordingIsNone) {
   train_.now_ns += 10 * core::kNsPerSecond;
   EXPECT_EQ(find_problems(train_).size(), 2U) << "two services have said nothing for ten seconds";

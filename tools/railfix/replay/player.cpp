@@ -17,6 +17,7 @@ constexpr int64_t kTurnNs = 60 * core::kNsPerSecond;
 constexpr std::chrono::milliseconds kLinger{300};  // for the last samples to get out
 constexpr int64_t kAliveNs = 50'000'000;
 constexpr int64_t kStatusNs = 100'000'000;
+constexpr uint64_t kMostJudged = 10'000'000;
 constexpr size_t kMostInAStep = 100;  // samples without a picture: no reader's queue may run over
 
 }  // namespace
@@ -73,8 +74,8 @@ bool Player::prepare(const mcap::Channel& channel, const mcap::Message& message,
 
 ReplayReport Player::run() {
   begun_ns_ = core::monotonic_ns();
+  late_ms_.reserve(std::min<uint64_t>(reader_->statistics().messages, kMostJudged));
   go_to(from_ns_);
-  wake_promptly();
   if (!options_.paused) (void)play();
   while (!stopped_) play_on();
   publish_status();
@@ -95,7 +96,7 @@ void Player::play_on() {
   const int64_t time_ns = next_->time_ns;
   const int64_t due_ns = timeline_.playing() && !leader_ ? timeline_.due_ns(time_ns) : 0;
   send();
-  next_.reset();
+  feed_->give_back(*std::exchange(next_, std::nullopt));
   ++unused_;
   if (due_ns != 0) late_ms_.push_back(static_cast<float>(1e3 * core::seconds(core::monotonic_ns() - due_ns)));
   if (!stepping_ || !frame) return;

@@ -82,6 +82,10 @@ class Player {
   ReplayOptions options_;
   std::unique_ptr<mcap::Reader> reader_;
   SampleTypes types_;
+  /// The player waits for locks that the middleware's threads hold, so they are made as prompt as it is.
+  struct PromptThreads {
+    explicit PromptThreads(const ReplayOptions& options);
+  } prompt_threads_;
   messaging::Participant participant_;
   messaging::Queue queue_;
   std::optional<LockStepLeader> leader_;

@@ -111,11 +111,18 @@ core::Result<std::string> Player::set_rate(const std::string& argument) {
 }
 
 // On a busy machine a thread of the usual kind wakes up to 10 ms late. Where the system does not permit it, so it
-// stays. Threads made by this one are not concerned. Not for rates at which it would hardly sleep.
+// stays. Not for rates at which it would hardly sleep. Threads made by this one are not concerned.
 void Player::wake_promptly() const {
   const bool promptly = !leader_ && timeline_.rate() <= kMostPromptRate;
   const sched_param priority{promptly ? 1 : 0};
   (void)sched_setscheduler(0, (promptly ? SCHED_FIFO : SCHED_OTHER) | SCHED_RESET_ON_FORK, &priority);
+}
+
+// Until wake_promptly() they are.
+Player::PromptThreads::PromptThreads(const ReplayOptions& options) {
+  if (!options.lock_step.empty() || options.rate > kMostPromptRate) return;
+  const sched_param priority{1};
+  (void)sched_setscheduler(0, SCHED_FIFO, &priority);
 }
 
 }  // namespace railfix::tool

@@ -23,6 +23,7 @@ Player::Player(const ReplayOptions& options)
     : options_(options),
       reader_(core::value_or_throw(mcap::Reader::open(options.file))),
       types_(*reader_),
+      prompt_threads_(options),
       participant_(participant_options(options.network, "railfix-replay")),
       gathering_(options.lock_step),
       commands_(make_commands()),
@@ -44,6 +45,7 @@ Player::Player(const ReplayOptions& options)
   open_clock();
   connect();
   services_.reset();
+  wake_promptly();
 }
 
 Player::~Player() = default;

@@ -1,5 +1,7 @@
 #include "replay/sample_feed.hpp"
 
+#include <algorithm>
+
 #include "core/time.hpp"
 
 namespace railfix::tool {
@@ -34,31 +36,45 @@ void SampleFeed::read(mcap::Reader& reader, const mcap::Selection& selection) {
 }
 
 bool SampleFeed::keep(PreparedSample sample) {
+  std::vector<PreparedSample> discarded;  // goes after the lock
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [this] { return stopped_ || (samples_.size() < kMostSamples && bytes_ < kMostBytes); });
   if (stopped_) return false;
+  discarded.swap(discarded_);
   bytes_ += bytes_of(sample);
   samples_.push_back(std::move(sample));
   if (samples_.size() == 1) changed_.notify_all();
   return true;
 }
 
+void SampleFeed::fetch(int64_t deadline_ns) {
+  std::unique_lock lock(mutex_, std::defer_lock);
+  if (!coming_.empty()) {
+    if (!lock.try_lock()) return;
+  } else {
+    lock.lock();
+    const auto left = std::chrono::nanoseconds(std::max<int64_t>(0, deadline_ns - core::monotonic_ns()));
+    changed_.wait_for(lock, left, [this] { return read_all_ || !samples_.empty(); });
+  }
+  std::ranges::move(samples_, std::back_inserter(coming_));
+  samples_.clear();
+  bytes_ = 0;
+  std::ranges::move(used_, std::back_inserter(discarded_));
+  used_.clear();
+  changed_.notify_all();
+}
+
 std::optional<PreparedSample> SampleFeed::next(int64_t deadline_ns) {
-  std::unique_lock lock(mutex_);
-  const auto left = std::chrono::nanoseconds(std::max<int64_t>(0, deadline_ns - core::monotonic_ns()));
-  changed_.wait_for(lock, left, [this] { return read_all_ || !samples_.empty(); });
-  if (samples_.empty()) return std::nullopt;
-  PreparedSample sample = std::move(samples_.front());
-  samples_.pop_front();
-  bytes_ -= bytes_of(sample);
-  // Half full before the reader goes on: it need not be woken for every sample.
-  if (samples_.size() <= kMostSamples / 2 && bytes_ <= kMostBytes / 2) changed_.notify_all();
+  if (coming_.size() < kFewComing) fetch(deadline_ns);
+  if (coming_.empty()) return std::nullopt;
+  PreparedSample sample = std::move(coming_.front());
+  coming_.pop_front();
   return sample;
 }
 
 bool SampleFeed::ended() {
   const std::lock_guard lock(mutex_);
-  return read_all_ && samples_.empty();
+  return read_all_ && samples_.empty() && coming_.empty();
 }
 
 }  // namespace railfix::tool

@@ -4,6 +4,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <fstream>
+#include <map>
 
 #include "dataset/dataset.hpp"
 #include "track/import/build.hpp"
@@ -99,9 +100,22 @@ void add_overrides(YAML::Node& settings, const std::vector<std::string>& sets) {
   }
 }
 
+// The run must find its services where it looks for them.
+core::Status check_overrides(const std::vector<std::string>& sets) {
+  const std::map<std::string, std::string> own{{"common.domain", "is set with --domain"},
+                                               {"common.train_id", "is the run's own"},
+                                               {"common.lock_step", "is set with --pace"}};
+  for (const std::string& set : sets) {
+    const auto found = own.find(set.substr(0, set.find('=')));
+    if (found != own.end()) return core::Error{"--set " + set + ": " + found->first + " " + found->second};
+  }
+  return {};
+}
+
 }  // namespace
 
 core::Result<RunPlan> plan_run(const RunOptions& options) {
+  if (const auto checked = check_overrides(options.sets); !checked.ok()) return checked.error();
   dataset::PictureOptions picture_options;
   picture_options.fps = options.fps;
   const auto pictures = dataset::open_pictures(options.source, picture_options);

@@ -114,4 +114,13 @@ setInterval(() => {
   if (page_visible.value && connection.value.up && about.value?.cameras.length === 0) void fetch_about();
 }, CAMERAS_MS);
 
-render(<Page />, document.getElementById("page") as HTMLElement);
+/// Over what index.html shows until here.
+function show(): void {
+  const page = document.getElementById("page") as HTMLElement;
+  page.replaceChildren();
+  render(<Page />, page);
+}
+
+// That is painted first; a page in the background is not painted at all.
+if (document.hidden) show();
+else requestAnimationFrame(() => setTimeout(show));

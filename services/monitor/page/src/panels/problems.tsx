@@ -53,7 +53,7 @@ export function Problems() {
           ))}
         </ul>
       ) : (
-        <p class="fine">{problems.value === null ? "Asking the train …" : "No problems known"}</p>
+        <p class={problems.value === null ? "asking" : "fine"}>{problems.value === null ? "Asking the train …" : "No problems known"}</p>
       )}
       <Announcements />
     </section>
