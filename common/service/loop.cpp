@@ -37,12 +37,7 @@ Loop::Loop(std::string service, const CommonConfig& common)
       clocks_(common.host) {
   if (common_.lock_step) {
     progress_ = std::make_unique<messaging::Writer<msg::DataProgress>>(participant_, messaging::topics::data_progress);
-    readers_.push_back(
-        std::make_unique<messaging::AnyReader>(participant_, messaging::info_of(messaging::topics::data_clock), "",
-                                               queue_, [this](const auto& sample, const auto& info) {
-                                                 if (info.valid)
-                                                   clock(*static_cast<const msg::DataClock*>(sample.get()));
-                                               }));
+    read_clock();
   }
   on<msg::ControlRequest>(messaging::topics::service_control,
                           [this](const msg::ControlRequest& request) { answer(request); });
@@ -54,6 +49,22 @@ Loop::Loop(std::string service, const CommonConfig& common)
   if (!common_.interfaces.empty()) watch_cable();
   if (!common_.security.empty()) watch_certificate();
   if (!common_.peers.empty() && !common_.lock_step) watch_clocks();
+}
+
+void Loop::read_clock() {
+  if (clock_is_read_) return;
+  clock_is_read_ = true;
+  readers_.push_back(
+      std::make_unique<messaging::AnyReader>(participant_, messaging::info_of(messaging::topics::data_clock), "",
+                                             queue_, [this](const auto& sample, const auto& info) {
+                                               if (info.valid)
+                                                 clock(*static_cast<const msg::DataClock*>(sample.get()), info.writer);
+                                             }));
+}
+
+void Loop::at_restart(std::function<void(int64_t)> handler) {
+  read_clock();
+  at_restart_.push_back(std::move(handler));
 }
 
 // Started without the cable, this process would never use it.
@@ -127,14 +138,19 @@ void Loop::answer(const msg::ControlRequest& request) {
 }
 
 void Loop::listen(const messaging::TopicInfo& topic, const std::string& instance, Handler handler, StampOf stamp_of) {
-  if (common_.lock_step && topic.name == messaging::topics::data_clock.name) {
+  if (topic.name == messaging::topics::data_clock.name) {
+    read_clock();
     on_clock_.push_back(std::move(handler));
   } else if (common_.lock_step && waits_for_turn(topic)) {
     keep_in_turn(topic, instance, std::move(handler), stamp_of);
   } else {
     readers_.push_back(std::make_unique<messaging::AnyReader>(
-        participant_, topic, instance, queue_, [handler = std::move(handler)](const auto& sample, const auto& info) {
-          if (info.valid) handler(sample.get());
+        participant_, topic, instance, queue_,
+        [this, handler = std::move(handler), stamp_of = waits_for_turn(topic) ? stamp_of : nullptr](const auto& sample,
+                                                                                                    const auto& info) {
+          if (!info.valid) return;
+          if (stamp_of && restarts_.outdated(stamp_of(sample.get()), core::monotonic_ns())) return;
+          handler(sample.get());
         }));
   }
 }
@@ -147,12 +163,19 @@ void Loop::keep_in_turn(const messaging::TopicInfo& topic, const std::string& in
       participant_, topic, instance, queue_,
       [this, name, handler = std::move(handler), stamp_of](const auto& sample, const auto& info) {
         if (!info.valid) return;
-        turns_.keep(name, info.sequence, stamp_of(sample.get()), [handler, sample] { handler(sample.get()); });
+        const int64_t stamp_ns = stamp_of(sample.get());
+        turns_.keep(name, info.sequence, stamp_ns, [this, handler, sample, stamp_ns] {
+          if (!restarts_.outdated(stamp_ns, core::monotonic_ns())) handler(sample.get());
+        });
       }));
 }
 
 // What belongs to no turn: the end of the data, and real pace.
-void Loop::clock(const msg::DataClock& clock) {
+void Loop::clock(const msg::DataClock& clock, uint64_t writer) {
+  if (restarts_.heard(clock, writer, core::monotonic_ns())) {
+    if (!at_restart_.empty()) log_->info("the data begins anew: what was known of the data before is forgotten");
+    for (const auto& handler : at_restart_) handler(clock.data_ns());
+  }
   if (clock.lock_step() == 0 || clock.ended() != 0) {
     for (const auto& handler : on_clock_) handler(&clock);
     return;

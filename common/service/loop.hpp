@@ -6,6 +6,7 @@
 #include "service/clock_watch.hpp"
 #include "service/health.hpp"
 #include "service/notes.hpp"
+#include "service/restarts.hpp"
 #include "service/service.hpp"
 #include "service/standby.hpp"
 #include "service/turns.hpp"
@@ -33,6 +34,7 @@ class Loop final : public Context {
   void keep(const std::string& notes) override { notes_.keep(notes); }
   [[nodiscard]] const std::string& kept() const override { return notes_.kept(); }
   void finish(const std::string& why) override;
+  void at_restart(std::function<void(int64_t)> handler) override;
   void turn_ends_when(std::function<bool(int64_t)> done) override { turn_ended_ = std::move(done); }
 
   /// Until finish().
@@ -54,7 +56,8 @@ class Loop final : public Context {
   void watch_clocks();
   void answer(const msg::ControlRequest& request);
   void keep_in_turn(const messaging::TopicInfo& topic, const std::string& instance, Handler handler, StampOf stamp_of);
-  void clock(const msg::DataClock& clock);
+  void read_clock();
+  void clock(const msg::DataClock& clock, uint64_t writer);
   void take_turn();
   void end_turn();
 
@@ -76,7 +79,10 @@ class Loop final : public Context {
   std::optional<msg::DataClock> turn_;  // given to us, until we have answered
   bool turn_taken_ = false;             // all its samples are used
   std::function<bool(int64_t)> turn_ended_;
+  Restarts restarts_;
+  std::vector<std::function<void(int64_t)>> at_restart_;
   std::vector<Handler> on_clock_;
+  bool clock_is_read_ = false;
   std::vector<std::unique_ptr<messaging::AnyReader>> readers_;
   bool finished_ = false;
 };

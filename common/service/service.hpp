@@ -117,6 +117,11 @@ class Context {
   /// Ends the run loop; the program exits with 0.
   virtual void finish(const std::string& why) = 0;
 
+  /// Played data begins anew: a replay was moved, looped or begun again, or another one is played. What the service has
+  /// learnt from the data before is not true any more, what it was configured with is. `data_ns`: where it goes on.
+  /// Samples from before that were under way are not handled any more. Never called on a live train, whose clock may be
+  /// set: only played data has a data_clock.
+  virtual void at_restart(std::function<void(int64_t data_ns)> handler) = 0;
   /// Lock step: a turn that this service finishes in a thread of its own ends when `done` says so, which is asked after
   /// every handler.
   virtual void turn_ends_when(std::function<bool(int64_t data_ns)> done) = 0;

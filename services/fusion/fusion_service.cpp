@@ -21,7 +21,8 @@ constexpr std::chrono::milliseconds kTickPeriod{50};
 constexpr int64_t kKeepPeriodNs = 250'000'000;
 constexpr uint64_t kNumbersSinceKept = 100;  // at least as many as may have been used meanwhile
 constexpr double kOldestNotesS = 30.0;
-constexpr double kLiveDataS = 5.0;  // data stamps further from the host's clock are not live
+constexpr double kSameBeginS = 0.5;  // a replay that is looped begins where it began before
+constexpr double kLiveDataS = 5.0;   // data stamps further from the host's clock are not live
 
 Fusion make_fusion(const FusionConfig& config, const std::shared_ptr<const track::Map>& map) {
   std::optional<track::EdgePosition> start;
@@ -125,7 +126,8 @@ int fitness_of(const TrainEstimate& estimate, bool has_map) {
 }  // namespace
 
 FusionService::FusionService(const FusionConfig& config, service::Context& context)
-    : context_(context),
+    : config_(config),
+      context_(context),
       writer_(context.writer(train_state)),
       pose_writer_(context.writer(train_pose)),
       pose_(config.parameters.gnss_map_sigma_m),
@@ -142,6 +144,7 @@ FusionService::FusionService(const FusionConfig& config, service::Context& conte
     remember();
     share_charge();
   }
+  context_.at_restart([this](int64_t data_ns) { restart(data_ns); });
   context_.health().ready();
 }
 
@@ -226,6 +229,23 @@ void FusionService::begin_anew() {
   begun_anew_ = true;
 }
 
+// The train stood at the configured start when the data began, and nowhere else in it.
+void FusionService::restart(int64_t data_ns) {
+  FusionConfig config = config_;
+  const bool from_start = begun_ns_ && std::abs(core::seconds(data_ns - *begun_ns_)) < kSameBeginS;
+  if (!from_start) config.start = "unknown";
+  fusion_.emplace(make_fusion(config, map_));
+  latest_.reset();
+  known_.reset();
+  from_notes_ = false;
+  begun_anew_ = false;
+  heard_ns_ = 0;
+  distance_offset_m_ = 0;
+  pose_ = TrainPose(config.parameters.gnss_map_sigma_m);
+  clock_.reset();
+  live_ = false;
+}
+
 void FusionService::listen(const FusionConfig& config) {
   if (config.use_wheel) {
     context_.on<msg::WheelSample>(wheel_sample, [this](const msg::WheelSample& m) {
@@ -261,6 +281,7 @@ void FusionService::use_gnss(const msg::GnssFix& sample) {
 
 void FusionService::use(const Event& event, int64_t grabbed_ns) {
   context_.health().input();
+  if (!begun_ns_) begun_ns_ = std::visit([](const auto& input) { return input.stamp_ns; }, event);
   if (const auto estimate = fusion_->add(event)) publish(*estimate, grabbed_ns);
 }
 

@@ -19,6 +19,7 @@ class FusionService {
 
  private:
   void listen(const FusionConfig& config);
+  void restart(int64_t data_ns);
   void use(const Event& event, int64_t grabbed_ns);
   void use_gnss(const msg::GnssFix& sample);
   void keep_time(const msg::DataClock& clock);
@@ -35,6 +36,7 @@ class FusionService {
   void begin_anew();
   void take_over_known(const TrainEstimate& first);
 
+  FusionConfig config_;
   service::Context& context_;
   messaging::Writer<msg::TrainState> writer_;
   messaging::Writer<msg::TrainPose> pose_writer_;
@@ -44,6 +46,7 @@ class FusionService {
   FusionParameters parameters_;
   std::string kept_for_;  // map and start that the notes are for
   std::optional<msg::DataClock> clock_;
+  std::optional<int64_t> begun_ns_;  // stamp of the first measurement, when the train stood at the configured start
   bool live_ = false;
   int64_t newest_stamp_ns_ = 0;  // of the data ...
   int64_t newest_came_ns_ = 0;   // ... and when it was seen, monotonic

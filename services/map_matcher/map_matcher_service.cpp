@@ -73,7 +73,26 @@ MapMatcherService::MapMatcherService(const MapMatcherConfig& config, service::Co
   context_.on<msg::TrackView>(topics::track_view, [this](const msg::TrackView& m) { use(m); });
   context_.on<msg::LandmarkSighting>(topics::landmark_sighting, [this](const msg::LandmarkSighting& m) { use(m); });
   context_.on<msg::OdometryStep>(topics::odometry_step, [this](const msg::OdometryStep& m) { use(m); });
+  context_.at_restart([this](int64_t) { restart(); });
   context_.health().ready();
+}
+
+void MapMatcherService::restart() {
+  path_.reset();
+  landmarks_.reset();
+  curvature_.reset();
+  exits_.reset();
+  locator_.reset();
+  if (chooser_) chooser_.emplace(config_.track_parameters(), map_, ways_);
+  gyro_ = GyroTurn(config_.gyro);
+  state_.reset();
+  before_.reset();
+  step_.reset();
+  rails_seen_ns_ = 0;
+  located_m_ = 0;
+  place_m_ = 0;
+  matched_m_ = 0;
+  said_track_ = {};
 }
 
 void MapMatcherService::use(const msg::TrainState& state) {

@@ -23,6 +23,7 @@ class MapMatcherService {
   MapMatcherService(const MapMatcherConfig& config, service::Context& context);
 
  private:
+  void restart();
   void use(const msg::TrainState& state);
   void use(const msg::OdometryStep& step);
   void use(const msg::TrackView& view);

@@ -71,8 +71,18 @@ MonitorService::MonitorService(const Config& config, service::Context& context)
   }
   if (const std::string said = exposure(); !said.empty()) context_.log().warn("{}", said);
   context_.on_command("address", [this](const std::string&) { return core::Result<std::string>(address_); });
+  context_.at_restart([this](int64_t) { restart(); });
   start_timers();
   server_.start();
+}
+
+void MonitorService::restart() {
+  state_ = {};
+  state_sent_ns_ = 0;
+  pose_ = {};
+  choice_ = {};
+  gnss_ = {};
+  trail_ = {};
 }
 
 MonitorService::~MonitorService() = default;

@@ -51,6 +51,7 @@ class MonitorService {
 
   // monitor_service.cpp: samples, and what is wrong
   void start_timers();
+  void restart();
   void set_up_topics();
   void arrived(const Arrived& arrived);
   void hand_to_foxglove(const Arrived& arrived);

@@ -46,7 +46,20 @@ OdometryService::OdometryService(const Config& config, service::Context& context
   context_.on<msg::CameraFrame>(
       messaging::topics::camera_frame, [this](const msg::CameraFrame& frame) { pictured(frame); }, config_.camera);
   context_.every(kExpirePeriod, [this] { expire(); });
+  context_.at_restart([this](int64_t) { restart(); });
   context_.health().ready();
+}
+
+void OdometryService::restart() {
+  waiting_.clear();
+  early_.clear();
+  last_pose_ns_ = 0;
+  curvature_per_m_ = 0;
+  vertical_curvature_per_m_ = 0;
+  last_step_ = {};
+  last_seq_ = 0;
+  last_valid_ns_ = 0;
+  if (mouse_) mouse_ = std::make_unique<TrainMouse>(intrinsics_, config_.mouse);
 }
 
 void OdometryService::calibrated(const msg::CameraCalibration& c) {

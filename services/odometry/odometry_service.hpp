@@ -25,6 +25,7 @@ class OdometryService {
     cv::Mat grey;
   };
   void calibrated(const msg::CameraCalibration& calibration);
+  void restart();
   void pictured(const msg::CameraFrame& frame);
   void viewed(const msg::TrackView& view);
   void expire();

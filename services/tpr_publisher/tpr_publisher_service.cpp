@@ -98,7 +98,9 @@ TprPublisherService::TprPublisherService(const Config& config, service::Context&
     : context_(context),
       has_map_(!config.map.empty()),
       baseline_(config.settings().report.baseline),
-      publisher_(load_map(config.map), config.settings()),
+      map_(load_map(config.map)),
+      settings_(config.settings()),
+      publisher_(map_, settings_),
       writer_(context.writer(messaging::topics::train_position_report)) {
   if (const auto link = config.ground_link.settings(context.common().train_id, context.common().host))
     ground_link_ = std::make_unique<GroundLink>(*link);
@@ -110,12 +112,14 @@ TprPublisherService::TprPublisherService(const Config& config, service::Context&
                                  [this](const msg::OnboardStatus& status) { on_onboard(status); });
   context.every(kTickPeriod, [this] { on_tick(); });
   share_charge();
+  context.at_restart([this](int64_t) { restart(); });
   context.on_command("packet_58", [this](const std::string& hex) -> core::Result<std::string> {
     const auto bytes = etcs::parse_hex(hex);
     if (!bytes.ok()) return bytes.error();
     const auto parameters = etcs::decode_report_parameters(bytes.value());
     if (!parameters.ok()) return parameters.error();
     if (const auto status = publisher_.set_parameters(parameters.value()); !status.ok()) return status.error();
+    parameters_ = parameters.value();
     return std::string("position report parameters taken over");
   });
 }
@@ -143,6 +147,13 @@ void TprPublisherService::stand_by(const msg::TrainState& state, int64_t now_ns)
   report_trouble_.clear();
   const auto holder = context_.holder();
   context_.health().standing_by(holder.empty() ? "nobody is in charge yet" : "stands by, " + holder + " is in charge");
+}
+
+void TprPublisherService::restart() {
+  publisher_ = TprPublisher(map_, settings_);
+  if (parameters_) (void)publisher_.set_parameters(*parameters_);
+  state_seen_ = false;
+  reference_known_ = false;
 }
 
 int64_t TprPublisherService::now_ns(int64_t stamp_ns) const {

@@ -24,6 +24,7 @@ class TprPublisherService {
   [[nodiscard]] int fitness() const;
   /// Not in charge: works along and sends nothing.
   void stand_by(const msg::TrainState& state, int64_t now_ns);
+  void restart();
   /// Now, in the time of the data: the host's clock on a train, what data_clock says where data is played.
   [[nodiscard]] int64_t now_ns(int64_t stamp_ns) const;
   void send(const Report& report, int64_t grabbed_ns);
@@ -34,7 +35,10 @@ class TprPublisherService {
   service::Context& context_;
   bool has_map_;
   etcs::Baseline baseline_;
+  std::shared_ptr<const track::Map> map_;
+  Settings settings_;
   TprPublisher publisher_;
+  std::optional<etcs::ReportParameters> parameters_;  // as told by trackside
   messaging::Writer<msg::TrainPositionReport> writer_;
   std::optional<msg::DataClock> data_clock_;
   bool state_seen_ = false;

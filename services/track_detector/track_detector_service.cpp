@@ -62,11 +62,22 @@ TrackDetectorService::TrackDetectorService(const Config& config, service::Contex
       if (imu_roll_) imu_roll_->add(sample.stamp_ns(), sample.rate_x_rps());
     });
   }
+  context_.at_restart([this](int64_t) { restart(); });
   context_.health().ready();
+}
+
+void TrackDetectorService::restart() {
+  last_seq_ = 0;
+  last_stamp_ns_ = 0;
+  last_seen_ns_ = 0;
+  drift_.clear();
+  drift_ns_ = 0;
+  if (calibration_) calibrated(msg::CameraCalibration(*calibration_));
 }
 
 void TrackDetectorService::calibrated(const msg::CameraCalibration& c) {
   if (config_.camera != c.camera().c_str()) return;
+  calibration_ = c;
   const geometry::Intrinsics camera = messaging::intrinsics_of(c);
   const geometry::CameraPose mount = messaging::mount_of(c);
   detector_.reset();

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "service/service.hpp"
 #include "track_detector/imu_roll.hpp"
@@ -18,6 +19,7 @@ class TrackDetectorService {
 
  private:
   void calibrated(const msg::CameraCalibration& calibration);
+  void restart();
   void pictured(const msg::CameraFrame& frame);
   void detect(const msg::CameraFrame& frame);
   void publish(const TrackObservation& observation, const msg::CameraFrame& frame);
@@ -32,6 +34,7 @@ class TrackDetectorService {
   std::unique_ptr<ImuRoll> imu_roll_;
   std::unique_ptr<MountWatch> watch_;
   std::unique_ptr<LandmarkFinder> finder_;
+  std::optional<msg::CameraCalibration> calibration_;
   TrackObservation observation_;
   bool mount_known_ = false;
   uint64_t last_seq_ = 0;

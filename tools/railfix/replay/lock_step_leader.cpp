@@ -29,7 +29,8 @@ std::vector<std::string> in_order(const std::vector<std::string>& services) {
 LockStepLeader::LockStepLeader(messaging::Participant& participant, messaging::Queue& queue,
                                const std::vector<std::string>& services)
     : participant_(participant),
-      lock_step_(in_order(services)),
+      services_(in_order(services)),
+      lock_step_(services_),
       clock_(participant, messaging::topics::data_clock),
       progress_(participant, messaging::topics::data_progress, "", queue,
                 [this](const msg::DataProgress& progress) { answered(progress); }) {}

@@ -19,6 +19,8 @@ class LockStepLeader {
   LockStepLeader(messaging::Participant& participant, messaging::Queue& queue,
                  const std::vector<std::string>& services);
 
+  /// The next step is the first of data that begins anew. REQUIRES: done().
+  void restart() { lock_step_ = frame_grabber::LockStep(services_); }
   /// Gives everyone their turn with what was sent so far.
   void begin(int64_t data_ns);
   [[nodiscard]] bool done() const { return lock_step_.done(); }
@@ -32,6 +34,7 @@ class LockStepLeader {
   void answered(const msg::DataProgress& progress);
   void publish(bool ended);
   messaging::Participant& participant_;
+  std::vector<std::string> services_;  // in the order of their turns
   frame_grabber::LockStep lock_step_;
   messaging::Writer<msg::DataClock> clock_;
   messaging::Reader<msg::DataProgress> progress_;

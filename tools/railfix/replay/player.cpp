@@ -22,25 +22,17 @@ constexpr size_t kMostInAStep = 100;  // samples without a picture: no reader's 
 
 }  // namespace
 
-// Standing values that were said before this moment are said again, so that everyone is as they were.
 void Player::go_to(int64_t at_ns) {
-  ++moves_;
   feed_.reset();
   next_.reset();
-  std::set<std::string> names;
-  for (const auto& [name, channel] : channel_of_) names.insert(name);
-  for (const auto& value : standing_values(*reader_, names, at_ns)) {
-    const auto& channel = reader_->channels().at(value.channel_id);
-    next_.emplace();
-    const mcap::Message message{value.channel_id, value.sequence, at_ns, value.publish_time_ns, value.cdr};
-    if (prepare(channel, message, *next_)) send();
-  }
-  next_.reset();
+  unused_ = 0;
+  timeline_.seek(at_ns, core::monotonic_ns());
+  restart_clock(at_ns);
+  send_standing_values(at_ns);
   sent_to_ns_ = at_ns;
-  data_ns_ = 0;
   // The last sample belongs to the part: `to` is exclusive.
   const bool to_the_end = to_ns_ == reader_->statistics().end_ns;
-  mcap::Selection part{names, at_ns, to_the_end ? std::nullopt : std::optional(to_ns_)};
+  mcap::Selection part{recorded_names(), at_ns, to_the_end ? std::nullopt : std::optional(to_ns_)};
   feed_ = std::make_unique<SampleFeed>(*reader_, std::move(part),
                                        [this](const mcap::Channel& channel, const mcap::Message& message,
                                               PreparedSample& out) { return prepare(channel, message, out); });
@@ -50,6 +42,42 @@ void Player::go_to(int64_t at_ns) {
     keep_alive(core::monotonic_ns());
   }
   timeline_.seek(at_ns, core::monotonic_ns());
+}
+
+// Says where the data goes on before anything of it is sent: who has learnt from what came before begins anew.
+void Player::restart_clock(int64_t at_ns) {
+  data_ns_ = 0;
+  data_time_ns_ = 0;
+  clocks_ = 0;
+  if (leader_) return leader_->restart();
+  if (!clock_) return;
+  std::set<std::string> frames = recorded_names();
+  if (frame_channel_)
+    std::erase_if(frames, [this](const auto& name) { return channel_of_.at(name) != frame_channel_; });
+  auto messages = reader_->messages({frames, at_ns, {}});
+  while (const auto message = messages.next()) {
+    const auto* structure = types_.structure(reader_->channels().at(message->channel_id));
+    data_ns_ = structure != nullptr ? leading_int64(*structure, "stamp_ns", message->data).value_or(0) : 0;
+    data_time_ns_ = message->log_time_ns;
+    if (data_ns_ != 0) break;
+  }
+  publish_clock(false);
+}
+
+// Standing values that were said before this moment are said again, so that everyone is as they were.
+void Player::send_standing_values(int64_t at_ns) {
+  for (const auto& value : standing_values(*reader_, recorded_names(), at_ns)) {
+    const auto& channel = reader_->channels().at(value.channel_id);
+    PreparedSample sample;
+    const mcap::Message message{value.channel_id, value.sequence, at_ns, value.publish_time_ns, value.cdr};
+    if (prepare(channel, message, sample)) publish(sample);
+  }
+}
+
+std::set<std::string> Player::recorded_names() const {
+  std::set<std::string> names;
+  for (const auto& [name, channel] : channel_of_) names.insert(name);
+  return names;
 }
 
 bool Player::prepare(const mcap::Channel& channel, const mcap::Message& message, PreparedSample& sample) {
@@ -88,6 +116,7 @@ ReplayReport Player::run() {
 void Player::play_on() {
   const int64_t now_ns = core::monotonic_ns();
   serve(now_ns);
+  if (seek_to_) return seek_now();
   if (state_ != msg::PLAYER_PLAYING && !stepping_) return serve(now_ns + kAliveNs);
   if (!next_) next_ = feed_->next(now_ns + kAliveNs);
   if (!next_ && feed_->ended()) return at_end();
@@ -105,6 +134,12 @@ void Player::play_on() {
   if (leader_) (void)wait_for_turns();
 }
 
+void Player::seek_now() {
+  if (leader_ && unused_ > 0 && !wait_for_turns()) return;
+  go_to(*std::exchange(seek_to_, std::nullopt));
+  status_due_ns_ = 0;
+}
+
 /// The next sample has to wait; does so for a while.
 bool Player::hold_back(int64_t now_ns) {
   if (leader_) {
@@ -118,9 +153,8 @@ bool Player::hold_back(int64_t now_ns) {
   return true;
 }
 
-/// Lock step: everyone uses what was sent. False when the player was stopped, or moved by a command, meanwhile.
+/// Lock step: everyone uses what was sent. False when the player was stopped meanwhile.
 bool Player::wait_for_turns() {
-  const uint64_t moves = moves_;
   leader_->begin(data_ns_);
   unused_ = 0;
   const int64_t begun_ns = core::monotonic_ns();
@@ -131,7 +165,7 @@ bool Player::wait_for_turns() {
     throw std::runtime_error("no answer on data_progress from " + leader_->waiting_for() +
                              " for 60 s; see that it runs with common.lock_step");
   }
-  return moves == moves_;
+  return true;
 }
 
 void Player::send() {
@@ -141,10 +175,15 @@ void Player::send() {
     data_time_ns_ = next_->time_ns;
     if (timeline_.rate() > 1) publish_clock(false);  // readers let it run at rate 1
   }
-  if (channels_[next_->channel].send(*next_)) {
+  publish(*next_);
+}
+
+void Player::publish(const PreparedSample& sample) {
+  auto& channel = channels_[sample.channel];
+  if (channel.send(sample)) {
     ++published_;
   } else {
-    ++unsent_[channels_[next_->channel].written_as()];
+    ++unsent_[channel.written_as()];
   }
 }
 

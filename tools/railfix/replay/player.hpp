@@ -66,10 +66,15 @@ class Player {
 
   // player.cpp
   void go_to(int64_t at_ns);
+  void restart_clock(int64_t at_ns);
+  void send_standing_values(int64_t at_ns);
+  void seek_now();
+  [[nodiscard]] std::set<std::string> recorded_names() const;
   void play_on();
   bool hold_back(int64_t now_ns);
   bool wait_for_turns();
   void send();
+  void publish(const PreparedSample& sample);
   void at_end();
   bool prepare(const mcap::Channel& channel, const mcap::Message& message, PreparedSample& sample);
   void serve(int64_t until_ns);
@@ -108,7 +113,7 @@ class Player {
   uint8_t state_ = msg::PLAYER_PAUSED;
   bool stepping_ = false;
   std::atomic<bool> stopped_ = false;
-  uint64_t moves_ = 0;  // counts go_to()
+  std::optional<int64_t> seek_to_;  // as soon as everyone has had their turn
   std::unique_ptr<SampleFeed> feed_;
   std::optional<PreparedSample> next_;
   int64_t sent_to_ns_ = 0;    // log time of the last sample

@@ -97,7 +97,7 @@ core::Result<std::string> Player::seek(const std::string& argument) {
   }
   if (state_ == msg::PLAYER_ENDED) state_ = msg::PLAYER_PAUSED;
   stepping_ = false;
-  go_to(from_ns_ + core::to_ns(*into_s));
+  seek_to_ = from_ns_ + core::to_ns(*into_s);
   return "at " + argument + " s";
 }
 

@@ -1,0 +1,107 @@
+// Services beside a replay that is moved: the real fusion begins anew where the data goes on.
+#include <gmock/gmock.h>
+
+#include "integration/replay/recorded_ride.hpp"
+#include "support/program.hpp"
+#include "support/run_until.hpp"
+
+namespace railfix {
+namespace {
+
+namespace fs = std::filesystem;
+namespace topics = messaging::topics;
+
+constexpr int kDomain = 88;
+constexpr double kMiddleS = 10;
+
+class MovedReplay : public ::testing::Test {
+ protected:
+  MovedReplay() : participant_(network()), control_(participant_, topics::service_control) {
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+    test::write_map(folder_ / "line.map");
+    test::record_ride(folder_ / "ride.mcap");
+  }
+  ~MovedReplay() override { fs::remove_all(folder_); }
+
+  [[nodiscard]] messaging::ParticipantOptions network() const {
+    messaging::ParticipantOptions options;
+    options.train_id = train_;
+    options.domain = kDomain;
+    return options;
+  }
+  std::unique_ptr<test::Program> program(const std::vector<std::string>& arguments) {
+    const std::string name = "said-" + std::to_string(++programs_);
+    return std::make_unique<test::Program>(arguments,
+                                           test::Program::Options{folder_ / name, folder_ / (name + "-errors"), {}});
+  }
+  template <class Condition>
+  bool run_until(Condition condition) {
+    return test::run_until(participant_, queue_, condition);
+  }
+  void tell(const std::string& command, const std::string& argument = "") {
+    msg::ControlRequest request;
+    request.request_id(++request_);
+    request.service("player");
+    request.command(command);
+    request.argument(argument);
+    control_.write(request);
+    EXPECT_TRUE(run_until([this] { return replied_ == request_; })) << command;
+  }
+  [[nodiscard]] bool ended() const { return player_ && player_->state() == msg::PLAYER_ENDED; }
+  static double into_s(const msg::TrainState& state) { return core::seconds(state.stamp_ns() - test::kBegin); }
+
+  std::string train_ = "moved-" + std::to_string(getpid());
+  fs::path folder_ = fs::temp_directory_path() / ("railfix-" + train_);
+  messaging::Queue queue_;
+  messaging::Participant participant_;
+  messaging::Writer<msg::ControlRequest> control_;
+  std::vector<msg::TrainState> states_;
+  std::optional<msg::PlayerStatus> player_;
+  uint64_t replied_ = 0;
+  uint64_t request_ = 0;
+  int programs_ = 0;
+  messaging::Reader<msg::TrainState> state_reader_{participant_, topics::train_state, "", queue_,
+                                                   [this](const msg::TrainState& state) { states_.push_back(state); }};
+  messaging::Reader<msg::PlayerStatus> player_reader_{participant_, topics::player_status, "", queue_,
+                                                      [this](const msg::PlayerStatus& status) { player_ = status; }};
+  messaging::Reader<msg::ControlReply> reply_reader_{
+      participant_, topics::service_reply, "", queue_,
+      [this](const msg::ControlReply& reply) { replied_ = reply.request_id(); }};
+};
+
+TEST_F(MovedReplay, BeginsAnewWhereTheDataGoesOn) {
+  const std::string domain = std::to_string(kDomain);
+  const auto fusion = program(
+      test::with_settings("railfix-fusion", {"common.train_id=" + train_, "common.domain=" + domain,
+                                             "fusion.map=" + (folder_ / "line.map").string(), "fusion.start=1:100:+"}));
+  const auto replay = program({"railfix", "replay", (folder_ / "ride.mcap").string(), "--without", "train_state",
+                               "--train", train_, "--domain", domain, "--rate", "5", "--controlled"});
+  ASSERT_TRUE(run_until([this] { return ended() && !states_.empty() && into_s(states_.back()) > 19; }));
+  EXPECT_EQ(states_.back().track_known(), 1);
+  EXPECT_NEAR(states_.back().offset_m(), 100 + test::kFrames * test::kStepM, 10);
+
+  // Back to the beginning, where it stood at fusion.start.
+  states_.clear();
+  tell("seek", "0");
+  tell("play");
+  ASSERT_TRUE(run_until([this] { return !states_.empty() && into_s(states_.back()) > 4; }));
+  EXPECT_LT(into_s(states_.front()), 1);
+  EXPECT_NEAR(states_.front().offset_m(), 100, 30);
+  EXPECT_TRUE(std::ranges::is_sorted(states_, {}, [](const auto& state) { return state.stamp_ns(); }));
+  EXPECT_EQ(states_.back().track_known(), 1);
+  EXPECT_EQ(states_.back().integrity(), msg::INTEGRITY_OK);
+
+  // Into the middle, where nobody has said where it is: unknown, and not still at the start.
+  ASSERT_TRUE(run_until([this] { return ended(); }));
+  states_.clear();
+  tell("seek", std::to_string(kMiddleS));
+  tell("play");
+  ASSERT_TRUE(run_until([this] { return !states_.empty() && into_s(states_.back()) > kMiddleS + 4; }));
+  EXPECT_NEAR(into_s(states_.front()), kMiddleS, 1);
+  EXPECT_EQ(states_.back().track_known(), 0);
+  EXPECT_TRUE(std::ranges::is_sorted(states_, {}, [](const auto& state) { return state.stamp_ns(); }));
+}
+
+}  // namespace
+}  // namespace railfix
