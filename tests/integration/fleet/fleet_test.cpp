@@ -69,18 +69,22 @@ TEST_F(Fleet, ServicesComeUpComeBackAfterAKillAndGoDown) {
   EXPECT_EQ(started.exit_code, 0) << started.out << started.err;
   const auto before = status("fusion");
   EXPECT_TRUE(before["healthy"]);
+  ASSERT_GT(before["pid"].get<pid_t>(), 1);  // kill(0) would end this test
   ASSERT_EQ(kill(before["pid"].get<pid_t>(), SIGKILL), 0);
   EXPECT_TRUE(wait_until([&] {
     const auto now = status("fusion");
     return now["healthy"] && now["pid"] != before["pid"] && now["restarts"] == 1;
   }));
   const auto again = status("fusion");
+  ASSERT_GT(again["pid"].get<pid_t>(), 1);
   ASSERT_EQ(kill(again["pid"].get<pid_t>(), SIGSTOP), 0);
   EXPECT_TRUE(wait_until([&] {
     const auto now = status("fusion");
     return now["healthy"] && now["pid"] != again["pid"] && now["restarts"] == 2;
   })) << "one that hangs is not started anew";
-  ASSERT_EQ(kill(status("fusion")["pid"].get<pid_t>(), SIGKILL), 0);
+  const auto last = status("fusion");
+  ASSERT_GT(last["pid"].get<pid_t>(), 1);
+  ASSERT_EQ(kill(last["pid"].get<pid_t>(), SIGKILL), 0);
   EXPECT_EQ(train({"down", "--root", root()}).exit_code, 0);
   for (const auto& entry : fs::directory_iterator("/dev/shm"))
     EXPECT_THAT(entry.path().string(), Not(HasSubstr("railfix-health-" + id_))) << "left behind";
