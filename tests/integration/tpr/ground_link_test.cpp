@@ -257,7 +257,7 @@ TEST_F(GroundLinkTest, ManyLateReportsArriveInOrderWhileTheBrokerComesAndGoes) {
   };
   {
     tpr_publisher::GroundLink link(settings);
-    for (uint64_t i = 1; i <= kReports; ++i) link.send({train_, 0, 0, static_cast<int64_t>(i), 0, 3, 1, {0x88}});
+    for (uint64_t i = 1; i <= kReports; ++i) link.send({train_, 0, 0, static_cast<int64_t>(i), 0, 3, 1, {0x88}, ""});
   }  // stored, though nobody was there
   tpr_publisher::GroundLink link(settings);
   const int64_t begun_ns = core::monotonic_ns();

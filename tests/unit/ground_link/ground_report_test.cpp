@@ -11,7 +11,8 @@ namespace {
 using ::testing::HasSubstr;
 
 GroundReport example() {
-  return {"demo", 0xFEDCBA9876543210ULL, 17, 1'700'000'000'000'000'001, 1'700'000'000'040'000'000, 4, 5, {0x88, 0, 1}};
+  return {"demo", 0xFEDCBA9876543210ULL, 17,   1'700'000'000'000'000'001, 1'700'000'000'040'000'000, 4,
+          5,      {0x88, 0, 1},          "cab"};
 }
 
 TEST(GroundReport, ComesBack) {
