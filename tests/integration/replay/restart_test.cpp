@@ -48,6 +48,18 @@ class MovedReplay : public ::testing::Test {
     control_.write(request);
     EXPECT_TRUE(run_until([this] { return replied_ == request_; })) << command;
   }
+  /// Has the player moved to `into_s`, and waits for the first state of there; those before it are dropped.
+  void move_to(double into_s) {
+    tell("seek", std::to_string(into_s));
+    tell("play");
+    const auto earlier = [](const auto& a, const auto& b) { return b.stamp_ns() < a.stamp_ns(); };
+    auto first = states_.end();
+    ASSERT_TRUE(run_until([&] {
+      first = std::ranges::adjacent_find(states_, earlier);
+      return first != states_.end();
+    })) << "the states do not go back";
+    states_.erase(states_.begin(), std::next(first));
+  }
   [[nodiscard]] bool ended() const { return player_ && player_->state() == msg::PLAYER_ENDED; }
   static double into_s(const msg::TrainState& state) { return core::seconds(state.stamp_ns() - test::kBegin); }
 
@@ -82,10 +94,8 @@ TEST_F(MovedReplay, BeginsAnewWhereTheDataGoesOn) {
   EXPECT_NEAR(states_.back().offset_m(), 100 + test::kFrames * test::kStepM, 10);
 
   // Back to the beginning, where it stood at fusion.start.
-  states_.clear();
-  tell("seek", "0");
-  tell("play");
-  ASSERT_TRUE(run_until([this] { return !states_.empty() && into_s(states_.back()) > 4; }));
+  move_to(0);
+  ASSERT_TRUE(run_until([this] { return into_s(states_.back()) > 4; }));
   EXPECT_LT(into_s(states_.front()), 1);
   EXPECT_NEAR(states_.front().offset_m(), 100, 30);
   EXPECT_TRUE(std::ranges::is_sorted(states_, {}, [](const auto& state) { return state.stamp_ns(); }));
@@ -94,10 +104,8 @@ TEST_F(MovedReplay, BeginsAnewWhereTheDataGoesOn) {
 
   // Into the middle, where nobody has said where it is: unknown, and not still at the start.
   ASSERT_TRUE(run_until([this] { return ended(); }));
-  states_.clear();
-  tell("seek", std::to_string(kMiddleS));
-  tell("play");
-  ASSERT_TRUE(run_until([this] { return !states_.empty() && into_s(states_.back()) > kMiddleS + 4; }));
+  move_to(kMiddleS);
+  ASSERT_TRUE(run_until([this] { return into_s(states_.back()) > kMiddleS + 4; }));
   EXPECT_NEAR(into_s(states_.front()), kMiddleS, 1);
   EXPECT_EQ(states_.back().track_known(), 0);
   EXPECT_TRUE(std::ranges::is_sorted(states_, {}, [](const auto& state) { return state.stamp_ns(); }));
