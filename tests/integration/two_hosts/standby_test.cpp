@@ -182,7 +182,7 @@ TEST_F(StandbyTest, AFusionThatFailsIsFollowedByTheOtherAndComesBackSilently) {
   EXPECT_TRUE(stays()) << "it flaps when the cable is plugged in again\n" << all_say();
   EXPECT_EQ(heard.changes, before);
 
-  cab->end(SIGTERM);  // as an upgrade does
+  cab->send(SIGTERM);  // as an upgrade does
   ASSERT_TRUE(next_is_heard("fusion ended in order")) << all_say();
 
   EXPECT_GT(heard.known, heard.states / 2) << "who has come back knows its place";
