@@ -14,7 +14,7 @@ class PublishedHealth final : public Health {
   PublishedHealth(messaging::Participant& participant, const std::string& service, const CommonConfig& common);
 
   void ready() override { change(msg::STATE_READY, ""); }
-  void standing_by(const std::string& reason) override { change(msg::STATE_READY, reason); }
+  void standing_by(const std::string& reason) { change(msg::STATE_READY, reason); }
   void active() override { change(msg::STATE_ACTIVE, ""); }
   void degraded(const std::string& reason) override { change(msg::STATE_DEGRADED, reason); }
   void failed(const std::string& reason) override { change(msg::STATE_FAILED, reason); }

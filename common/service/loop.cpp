@@ -206,8 +206,17 @@ void Loop::end_turn() {
 
 void Loop::share_charge(ChargeHandlers handlers) {
   if (common_.lock_step || common_.ownership_strength == 0) return;
+  handlers.changed = [this, changed = std::move(handlers.changed)](bool taken) {
+    log_->info(taken ? "in charge from now on" : "stands by from now on");
+    if (changed) changed(taken);
+  };
   standby_ = std::make_unique<Standby>(participant_, queue_, service_, common_, std::move(handlers));
   every(Standby::kPeriod, [this] { standby_->update(); });
+}
+
+void Loop::stand_by() {
+  const auto holder = standby_->holder();
+  health_->standing_by(holder.empty() ? "nobody is in charge yet" : "stands by, " + holder + " is in charge");
 }
 
 void Loop::finish(const std::string& why) {

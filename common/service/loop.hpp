@@ -30,7 +30,7 @@ class Loop final : public Context {
   messaging::Participant& participant() override { return participant_; }
   void share_charge(ChargeHandlers handlers) override;
   [[nodiscard]] bool in_charge() const override { return !standby_ || standby_->in_charge(); }
-  [[nodiscard]] std::string holder() const override { return standby_ ? standby_->holder() : ""; }
+  void stand_by() override;
   void keep(const std::string& notes) override { notes_.keep(notes); }
   [[nodiscard]] const std::string& kept() const override { return notes_.kept(); }
   void finish(const std::string& why) override;

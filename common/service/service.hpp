@@ -48,8 +48,7 @@ struct CommonConfig {
 class Health {
  public:
   virtual ~Health() = default;
-  virtual void ready() = 0;                                 // set up, waits for input
-  virtual void standing_by(const std::string& reason) = 0;  // ready, but another one of its kind is in charge
+  virtual void ready() = 0;  // set up, waits for input
   virtual void active() = 0;
   virtual void degraded(const std::string& reason) = 0;  // goes on with less
   virtual void failed(const std::string& reason) = 0;
@@ -61,7 +60,7 @@ class Health {
 /// What a service that may have a standby says and hears of it.
 struct ChargeHandlers {
   std::function<int()> fitness;             // how good its output is, 0 to 255, more is better
-  std::function<void(bool taken)> changed;  // it has taken charge, or has given it away
+  std::function<void(bool taken)> changed;  // it has taken charge, or has given it away; may be empty
 };
 
 /// What a service gets from the run loop. All handlers run one after the other in the service's own thread, samples in
@@ -108,8 +107,8 @@ class Context {
   virtual void share_charge(ChargeHandlers handlers) = 0;
   /// To be asked right before sending. The only one of its kind is always in charge, and so is everybody in lock step.
   [[nodiscard]] virtual bool in_charge() const = 0;
-  /// Host of the one in charge, as far as it is known; empty when it is this one.
-  [[nodiscard]] virtual std::string holder() const = 0;
+  /// Its health says that it stands by, and who is in charge. REQUIRES: not in_charge().
+  virtual void stand_by() = 0;
   /// What this service wants to know when it is started anew on this host: in memory, gone when the computer restarts.
   /// kept() gives the notes of the process before, empty = none.
   virtual void keep(const std::string& notes) = 0;

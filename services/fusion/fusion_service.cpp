@@ -131,7 +131,6 @@ FusionService::FusionService(const FusionConfig& config, service::Context& conte
       writer_(context.writer(train_state)),
       pose_writer_(context.writer(train_pose)),
       pose_(config.parameters.gnss_map_sigma_m),
-      parameters_(config.parameters),
       kept_for_(config.map + ' ' + config.start + '\n') {
   if (!config.map.empty()) {
     map_ = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(config.map)));
@@ -155,7 +154,6 @@ void FusionService::share_charge() {
 }
 
 void FusionService::charge_changed(bool taken) {
-  context_.log().info(taken ? "in charge from now on" : "stands by from now on");
   learnt_ = taken;  // whoever is in charge now knows more than one that had to give it away
   // Readers have waited long enough for a state.
   if (taken && latest_ && latest_->stamp_ns() > heard_ns_) send(*latest_);
@@ -171,7 +169,7 @@ void FusionService::hear(const msg::TrainState& state) {
   const double since_s = core::seconds(state.stamp_ns() - latest_->stamp_ns());
   distance_offset_m_ += state.distance_m() - (latest_->distance_m() + speed_mps * since_s);
   if (learnt_ || !map_ || state.track_known() == 0 || state.integrity() == msg::INTEGRITY_UNUSABLE) return;
-  if (!place_at(map_, known_place_of(state), state.stamp_ns(), parameters_.interval_factor)) return;  // soon
+  if (!place_at(map_, known_place_of(state), state.stamp_ns(), config_.parameters.interval_factor)) return;  // soon
   learnt_ = true;
   known_ = state;
   begin_anew();
@@ -213,7 +211,8 @@ void FusionService::take_over_known(const TrainEstimate& first) {
   const double speed_mps = std::isfinite(known_->speed_mps()) ? known_->speed_mps() : 0;
   distance_offset_m_ = known_->distance_m() + speed_mps * age_s - first.distance_m;
   if (begun_anew_) {
-    if (const auto place = place_at(map_, known_place_of(*known_), first.stamp_ns, parameters_.interval_factor)) {
+    if (const auto place =
+            place_at(map_, known_place_of(*known_), first.stamp_ns, config_.parameters.interval_factor)) {
       fusion_->add(*place);
     } else {
       learnt_ = false;
@@ -225,7 +224,7 @@ void FusionService::take_over_known(const TrainEstimate& first) {
 
 // What is known of the place comes from another fusion: what this one believes of it is forgotten.
 void FusionService::begin_anew() {
-  fusion_.emplace(core::value_or_throw(Fusion::create(parameters_, map_, std::nullopt)));
+  fusion_.emplace(core::value_or_throw(Fusion::create(config_.parameters, map_, std::nullopt)));
   begun_anew_ = true;
 }
 
@@ -318,9 +317,7 @@ void FusionService::publish(const TrainEstimate& estimate, int64_t grabbed_ns) {
   fitness_ = fitness_of(estimate, map_ != nullptr);
   latest_ = message;
   if (!context_.in_charge()) {
-    const auto holder = context_.holder();
-    context_.health().standing_by(holder.empty() ? "nobody is in charge yet"
-                                                 : "stands by, " + holder + " is in charge");
+    context_.stand_by();
     return;
   }
   send(message);

@@ -43,7 +43,6 @@ class FusionService {
   std::shared_ptr<const track::Map> map_;
   std::optional<Fusion> fusion_;
   TrainPose pose_;
-  FusionParameters parameters_;
   std::string kept_for_;  // map and start that the notes are for
   std::optional<msg::DataClock> clock_;
   std::optional<int64_t> begun_ns_;  // stamp of the first measurement, when the train stood at the configured start

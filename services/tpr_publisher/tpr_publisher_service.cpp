@@ -126,9 +126,7 @@ TprPublisherService::TprPublisherService(const Config& config, service::Context&
 
 void TprPublisherService::share_charge() {
   if (context_.common().ownership_strength == 0) return;
-  context_.share_charge(
-      {[this] { return fitness(); },
-       [this](bool taken) { context_.log().info(taken ? "in charge from now on" : "stands by from now on"); }});
+  context_.share_charge({[this] { return fitness(); }, {}});
   // Numbers go on where the other one stopped.
   context_.on<msg::TrainPositionReport>(
       messaging::topics::train_position_report,
@@ -145,8 +143,7 @@ int TprPublisherService::fitness() const {
 void TprPublisherService::stand_by(const msg::TrainState& state, int64_t now_ns) {
   publisher_.watch(position_of(state), now_ns);
   report_trouble_.clear();
-  const auto holder = context_.holder();
-  context_.health().standing_by(holder.empty() ? "nobody is in charge yet" : "stands by, " + holder + " is in charge");
+  context_.stand_by();
 }
 
 void TprPublisherService::restart() {
