@@ -110,13 +110,13 @@ void Estimator::use(const FixInput& fix) {
 
 void Estimator::accept(const FixInput& fix) {
   watched(fix.kind == FixKind::curvature ? Source::curvature : Source::landmark).accept(fix.stamp_ns);
+  off_path_fixes_ = 0;
+  // A vague fix helps, but settles no doubt and is nothing to measure a distance from.
+  if (fix.kind == FixKind::curvature && fix.sigma_m > 2 * filter_.path_sigma_m()) return;
   fix_verdict_ = FixVerdict::used;
   refused_fix_.reset();
-  off_path_fixes_ = 0;
   doubt_m_ = doubt_behind_m_ = doubt_ahead_m_ = time_doubt_m_ = 0;
   unwatched_ = {.distance_m = unwatched_.distance_m};
-  // A vague fix helps, but is nothing to measure a distance from.
-  if (fix.kind == FixKind::curvature && fix.sigma_m > 2 * filter_.path_sigma_m()) return;
   reference_ = fix.landmark;
   filter_.mark_reference();
 }

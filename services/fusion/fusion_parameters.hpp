@@ -15,11 +15,11 @@ struct FusionParameters {
   // Camera and wheel: true over measured metres, which walks at random along the way (per square root of a metre), and
   // what each strays beside it (metres per square root of a metre).
   double visual_scale_sigma = 0.01;
-  double visual_scale_walk = 6e-5;
+  double visual_scale_walk = 1e-5;
   double visual_creep = 0.006;
   double step_sigma_floor_m = 0.001;
   double wheel_scale_sigma = 0.01;
-  double wheel_scale_walk = 6e-5;
+  double wheel_scale_walk = 3e-6;
   double wheel_creep = 0.001;
 
   // What a slip or slide can add that no other sensor would see: once, and over a long way.

@@ -9,7 +9,7 @@
 namespace railfix::fusion {
 namespace {
 
-constexpr double kSureProbability = 0.999;  // from here on a fix needs no second one
+constexpr int kFixesToSettle = 2;
 constexpr double kRivalGoneS = 1.0;
 constexpr double kProofS = 2.0;
 constexpr double kSameSpeedsS = 3.0;
@@ -39,7 +39,7 @@ void Hypotheses::apply(const Event& event) {
   const Source source = source_of(event);
   begin_rival(source);
   main_.apply(event);
-  if (without_last_fix_) without_last_fix_->apply(event);
+  for (auto& doubter : doubters_) doubter.estimator.apply(event);
   for (auto& rival : rivals_) {
     if (rival.estimator && rival.without != source) rival.estimator->apply(event);
   }
@@ -81,20 +81,42 @@ void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
   predict_to(fix.stamp_ns);
   Estimator before = main_;
   main_.apply(event);
+  for (auto& doubter : doubters_) doubter.estimator.apply(event);
   for (auto& rival : rivals_) {
     if (rival.estimator) rival.estimator->apply(event);
   }
-  if (main_.fix_refused() && adopt_by_fix(before)) return;
-  if (!main_.fix_used()) {
-    if (!without_last_fix_ || !main_.fix_refused()) return;
-    // The new fix contradicts the last one: if it agrees with what was known before, the last one was false.
-    Estimator other = *without_last_fix_;
-    other.apply(event);
-    if (other.fix_used()) main_ = std::move(other);
+  if (main_.fix_refused()) {
+    if (adopt_by_fix(before) || !adopt_doubter()) return;
+  } else if (main_.fix_used()) {
+    settle_doubters(fix, std::move(before));
+  } else {
     return;
   }
-  without_last_fix_.reset();
-  if (!fix.new_path && fix.probability < kSureProbability) without_last_fix_ = std::move(before);
+  confirm_rivals();
+}
+
+// The fix contradicts an earlier one and agrees with what is known without that one.
+bool Hypotheses::adopt_doubter() {
+  const auto fits = std::find_if(doubters_.rbegin(), doubters_.rend(),
+                                 [](const Doubter& doubter) { return doubter.estimator.fix_used(); });
+  if (fits == doubters_.rend()) return false;
+  std::swap(main_, fits->estimator);
+  doubters_ = {Doubter{std::move(fits->estimator)}};
+  return true;
+}
+
+// What the main one alone fits is confirmed. What both fit may be so by chance once, not twice.
+void Hypotheses::settle_doubters(const FixInput& fix, Estimator before) {
+  const bool of_shape = fix.kind == FixKind::curvature;
+  std::erase_if(doubters_, [&](Doubter& doubter) {
+    if (fix.new_path || doubter.estimator.fix_refused()) return true;
+    if (of_shape) return doubter.of_shape;
+    return doubter.of_shape || ++doubter.agreed >= kFixesToSettle;
+  });
+  if (!fix.new_path) doubters_.push_back({std::move(before), of_shape});
+}
+
+void Hypotheses::confirm_rivals() {
   for (auto& rival : rivals_) {
     rival.excess = rival.carried = {};
     // Confirmed is the main one: a rival that is elsewhere was wrong.
@@ -115,14 +137,14 @@ bool Hypotheses::adopt_by_fix(const Estimator& before) {
   const bool two_odometers = main_.watch(Source::camera).seen_ns != 0 && main_.watch(Source::wheel).seen_ns != 0;
   if (only == nullptr || !two_odometers) return false;
   adopt(*only);
-  without_last_fix_ = before;
+  doubters_ = {Doubter{before}};
   ask_rivals();
   return true;
 }
 
 void Hypotheses::predict_to(int64_t stamp_ns) {
   main_.predict_to(stamp_ns);
-  if (without_last_fix_) without_last_fix_->predict_to(stamp_ns);
+  for (auto& doubter : doubters_) doubter.estimator.predict_to(stamp_ns);
   for (auto& rival : rivals_) {
     if (rival.asked) rival.estimator->predict_to(stamp_ns);
   }
@@ -130,7 +152,7 @@ void Hypotheses::predict_to(int64_t stamp_ns) {
 
 void Hypotheses::rebase_clock(int64_t stamp_ns) {
   main_.rebase_clock(stamp_ns);
-  if (without_last_fix_) without_last_fix_->rebase_clock(stamp_ns);
+  for (auto& doubter : doubters_) doubter.estimator.rebase_clock(stamp_ns);
   for (auto& rival : rivals_) {
     if (rival.estimator) rival.estimator->rebase_clock(stamp_ns);
     rival.asked_ns = std::min(rival.asked_ns, stamp_ns);
@@ -151,7 +173,7 @@ uint32_t Hypotheses::slipping() const {
 void Hypotheses::block_wheel_until(int64_t stamp_ns, uint32_t slipping) {
   if ((slipping & 1U) != 0) {
     main_.block_wheel_until(stamp_ns);
-    if (without_last_fix_) without_last_fix_->block_wheel_until(stamp_ns);
+    for (auto& doubter : doubters_) doubter.estimator.block_wheel_until(stamp_ns);
   }
   for (size_t i = 0; i < rivals_.size(); ++i) {
     auto& estimator = rivals_[i].estimator;
@@ -231,13 +253,13 @@ TrainEstimate Hypotheses::estimate() const {
   main.predict_to(stamp_ns());
   Interval all = main.widened(promised(main.interval()));
   double since_sure_m = main.since_reference_m();
-  if (without_last_fix_) {
-    Estimator other = *without_last_fix_;
+  for (const auto& doubter : doubters_) {
+    Estimator other = doubter.estimator;
     other.predict_to(stamp_ns());
     const Interval its = other.widened(other.interval());
     all.behind_m = std::min(all.behind_m, its.behind_m);
     all.ahead_m = std::max(all.ahead_m, its.ahead_m);
-    since_sure_m = other.since_reference_m();
+    since_sure_m = std::max(since_sure_m, other.since_reference_m());
   }
   return main.estimate(all, since_sure_m);
 }

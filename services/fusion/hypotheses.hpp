@@ -1,7 +1,9 @@
 // Several estimators side by side, so that the promised interval holds whichever single source is wrong.
 //
-// The main one uses everything. One does without the last position fix, which may be false with full confidence, until
-// the next fix decides. Four rivals do without camera, wheel, IMU or GNSS: the interval holds their ends too (solution
+// The main one uses everything. Doubters do without one of the last two places that landmarks gave, which may be false
+// with full confidence, and without the last one of the track's shape; the interval holds their ends until later fixes
+// agree with the main one. When such a fix fits a doubter alone, that becomes the main one, and the main one a doubter:
+// either fix may be the false one. Four rivals do without camera, wheel, IMU or GNSS: the interval holds their ends too (solution
 // separation, as in receiver autonomous integrity monitoring: Brown and McBurney 1988), because a fault may be too slow
 // for any test on innovations. A rival that contradicts itself, or has no odometer left, is not asked; what it said
 // last is carried along until a fix confirms the main one. When the main one contradicts itself and one rival alone has
@@ -10,6 +12,7 @@
 
 #include <array>
 #include <optional>
+#include <vector>
 
 #include "fusion/estimator.hpp"
 
@@ -38,6 +41,12 @@ class Hypotheses {
     double behind_m = 0;
     double ahead_m = 0;
   };
+  /// The main one without a fix that no later one has confirmed.
+  struct Doubter {
+    Estimator estimator;
+    bool of_shape = false;  // the fix is of kind curvature
+    int agreed = 0;         // later fixes that both have used: these tell nothing of who is right
+  };
   struct Rival {
     Source without;
     std::optional<Estimator> estimator;  // from the source's first sample on; until then it is the main one
@@ -53,6 +62,9 @@ class Hypotheses {
 
   void apply_fix(const FixInput& fix, const Event& event);
   bool adopt_by_fix(const Estimator& before);
+  bool adopt_doubter();
+  void settle_doubters(const FixInput& fix, Estimator before);
+  void confirm_rivals();
   void exclude_faulty();
   void adopt(Rival& rival);
   void begin_rival(Source source);
@@ -63,7 +75,7 @@ class Hypotheses {
 
   const FusionParameters* parameters_;
   Estimator main_;
-  std::optional<Estimator> without_last_fix_;
+  std::vector<Doubter> doubters_;  // the latest one last
   std::array<Rival, 4> rivals_;
 };
 

@@ -58,6 +58,8 @@ double random_size(core::Random& random, Sensor sensor, FaultKind kind) {
       return std::abs(between(random, {0.05, 2.5}));
     case FaultKind::wrong_landmark:
       return between(random, {1, 400});
+    case FaultKind::wrong_sighting:
+      return between(random, {1, 3});
     case FaultKind::clock_step:
       return between(random, {0.01, 100});
     default:
@@ -74,7 +76,7 @@ std::string to_string(Sensor sensor) {
 
 std::string to_string(FaultKind kind) {
   static const std::array names{"none",    "bias",  "drift", "stuck",          "noise",        "outliers",
-                                "dropout", "blind", "delay", "wrong landmark", "wrong branch", "clock step"};
+                                "dropout", "blind", "delay", "wrong landmark", "wrong sighting", "wrong branch", "clock step"};
   return names.at(static_cast<size_t>(kind));
 }
 
@@ -96,6 +98,7 @@ const std::vector<std::pair<Sensor, FaultKind>>& all_faults() {
     all.emplace_back(Sensor::fix, FaultKind::wrong_branch);
     all.emplace_back(Sensor::clock, FaultKind::clock_step);
     all.emplace_back(Sensor::clock, FaultKind::drift);
+    all.emplace_back(Sensor::fix, FaultKind::wrong_sighting);
     return all;
   }();
   return list;

@@ -22,6 +22,7 @@ enum class FaultKind : uint8_t {
   blind,
   delay,
   wrong_landmark,
+  wrong_sighting,
   wrong_branch,
   clock_step
 };
@@ -29,7 +30,7 @@ std::string to_string(Sensor sensor);
 std::string to_string(FaultKind kind);
 
 /// size: of a bias or the end of a drift in the sensor's own unit (share of the way for camera and wheel, m/s^2, rad/s,
-/// m for GNSS and fixes); seconds for delay and clock_step; rate for clock drift; how many times noise; else unused.
+/// m for GNSS and fixes; of a wrong sighting, surely known and sharp as ever, one and every second one while it lasts); seconds for delay and clock_step; rate for clock drift; how many times noise; else unused.
 struct Fault {
   Sensor sensor = Sensor::none;
   FaultKind kind = FaultKind::none;

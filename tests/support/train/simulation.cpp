@@ -20,6 +20,7 @@ constexpr double kPulseS = 0.05;
 constexpr double kInertialS = 0.02;
 constexpr double kPulsesPerMetre = 90;
 constexpr double kKeyFrameM = 0.15;
+constexpr double kSureProbability = 0.9999;
 
 core::Random stream(uint64_t seed, uint64_t number) {
   core::Random mixed(seed * 1'000'003 + number);
@@ -263,6 +264,7 @@ void TrainSimulation::make_fixes() {
   const auto& fault = plan_.fault;
   uint32_t id = 0;
   bool wrong_once = false;
+  int sightings = 0;  // since the fault began
   std::optional<track::EdgePosition> stuck;
   double place_m = plan_.landmark_spacing_m;
   while (place_m < way_m()) {
@@ -277,11 +279,17 @@ void TrainSimulation::make_fixes() {
       wrong_m += fault.size;
       wrong_once = true;
     }
+    double probability = plan_.fix_probability;
+    if (fault.is(Sensor::fix, FaultKind::wrong_sighting) && t > fault.begin_s) {
+      const bool wrong = sightings++ % 2 == 0 && (sightings == 1 || t < fault.end_s);
+      wrong_m += wrong ? fault.size : 0;
+      probability = kSureProbability;
+    }
     auto place = path_->position_at(drive_.at(t).distance_m + wrong_m);
     if (faulty(Sensor::fix, FaultKind::wrong_branch, t)) place.edge = place.edge == 1 ? 2 : 1;
     if (faulty(Sensor::fix, FaultKind::stuck, t)) place = *(stuck = stuck.value_or(place));
     add(Sensor::fix, t,
-        FixInput{stamp_ns(t), place.edge, place.offset_m, plan_.fix_sigma_m, plan_.fix_probability, ++id,
+        FixInput{stamp_ns(t), place.edge, place.offset_m, plan_.fix_sigma_m, probability, ++id,
                  FixKind::landmark, place.direction, nullptr});
     place_m += plan_.landmark_spacing_m * (1 + plan_.landmark_spread * random.uniform(-1, 1));
   }
