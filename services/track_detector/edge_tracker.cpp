@@ -38,7 +38,7 @@ constexpr int kFewestStepLooks = 6;
 constexpr double kStepM = 0.03;
 constexpr double kStepTopM = 0.06;
 constexpr double kBesideStep = 0.8;  // of a step's evidence is beside it
-constexpr double kClearStep = 0.36;  // mean evidence
+constexpr double kClearStep = 0.5;   // mean evidence; noise alone comes to 0.4
 
 }  // namespace
 
@@ -371,10 +371,11 @@ std::optional<double> EdgeTracker::last_step(const std::array<double, 2>& walls_
       best = evidence;
       best_m = place_m;
     } else if (evidence < kBesideStep * best) {
-      break;
+      if (best_m < to_m - kStepTopM) break;
+      best = 0;  // the near side of something farther away
     }
   }
-  if (best_m < from_m + kStepTopM) return std::nullopt;
+  if (best_m < from_m + kStepTopM || best_m > to_m - kStepTopM) return std::nullopt;
   return best_m;
 }
 

@@ -31,6 +31,7 @@ constexpr double kExitLateralM = 0.6;   // an exit's edge from the wall
 constexpr double kExitWideShare = 0.7;  // of the widest bearing: near enough for the exit's place
 constexpr double kOneSideSigmaM = 0.2;
 constexpr double kDaylightShare = 0.8;  // of the brightness in front of the tunnel
+constexpr double kOpenShare = 0.8;      // of the brightness far behind it
 constexpr double kObjectSigmaM = 0.05;  // of where the surveyor's point of an object is
 constexpr double kSameMastM = 1.5;
 constexpr double kSameBridgeM = 15;
@@ -317,6 +318,8 @@ void UprightObjects::look_for_exit(const SettledEdge& edge) {
   Exit& exit = exits_[side];
   if (std::abs(edge.lateral_m - wall_m) > kExitLateralM || edge.outer_grey > kDarkShare * edge.inner_grey) return;
   if (std::min(edge.inner_grey, edge.wall_grey) < kDaylightShare * tunnel_.daylight_grey) return;
+  // A camera that is used to the dark shows panels as bright as land was before the tunnel, but the land behind brighter.
+  if (edge.inner_grey < kOpenShare * edge.deep_grey) return;
   const double widest = std::abs(edge.measured[edge.count - 1].bearing);
   double sum = 0, weights = 0;
   for (size_t i = 0; i < edge.count; ++i) {
