@@ -3,11 +3,11 @@
 // The main one uses everything. Doubters do without one of the last two places that landmarks gave, which may be false
 // with full confidence, and without the last one of the track's shape; the interval holds their ends until later fixes
 // agree with the main one. When such a fix fits a doubter alone, that becomes the main one, and the main one a doubter:
-// either fix may be the false one. Four rivals do without camera, wheel, IMU or GNSS: the interval holds their ends too (solution
-// separation, as in receiver autonomous integrity monitoring: Brown and McBurney 1988), because a fault may be too slow
-// for any test on innovations. A rival that contradicts itself, or has no odometer left, is not asked; what it said
-// last is carried along until a fix confirms the main one. When the main one contradicts itself and one rival alone has
-// two sensors that agree, or fits a fix that the main one refuses, that rival becomes the main one.
+// either fix may be the false one. Four rivals do without camera, wheel, IMU or GNSS: the interval holds their ends too
+// (solution separation, as in receiver autonomous integrity monitoring: Brown and McBurney 1988), because a fault may
+// be too slow for any test on innovations. A rival that contradicts itself, or has no odometer left, is not asked; what
+// it said last is carried along until a fix confirms the main one. When the main one contradicts itself and one rival
+// alone has two sensors that agree, or fits a fix that the main one refuses, that rival becomes the main one.
 #pragma once
 
 #include <array>

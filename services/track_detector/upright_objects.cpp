@@ -318,7 +318,8 @@ void UprightObjects::look_for_exit(const SettledEdge& edge) {
   Exit& exit = exits_[side];
   if (std::abs(edge.lateral_m - wall_m) > kExitLateralM || edge.outer_grey > kDarkShare * edge.inner_grey) return;
   if (std::min(edge.inner_grey, edge.wall_grey) < kDaylightShare * tunnel_.daylight_grey) return;
-  // A camera that is used to the dark shows panels as bright as land was before the tunnel, but the land behind brighter.
+  // A camera that is used to the dark shows panels as bright as land was before the tunnel, but the land behind
+  // brighter.
   if (edge.inner_grey < kOpenShare * edge.deep_grey) return;
   const double widest = std::abs(edge.measured[edge.count - 1].bearing);
   double sum = 0, weights = 0;

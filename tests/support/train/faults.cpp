@@ -75,8 +75,9 @@ std::string to_string(Sensor sensor) {
 }
 
 std::string to_string(FaultKind kind) {
-  static const std::array names{"none",    "bias",  "drift", "stuck",          "noise",        "outliers",
-                                "dropout", "blind", "delay", "wrong landmark", "wrong sighting", "wrong branch", "clock step"};
+  static const std::array names{"none",           "bias",         "drift",     "stuck", "noise",
+                                "outliers",       "dropout",      "blind",     "delay", "wrong landmark",
+                                "wrong sighting", "wrong branch", "clock step"};
   return names.at(static_cast<size_t>(kind));
 }
 

@@ -289,8 +289,8 @@ void TrainSimulation::make_fixes() {
     if (faulty(Sensor::fix, FaultKind::wrong_branch, t)) place.edge = place.edge == 1 ? 2 : 1;
     if (faulty(Sensor::fix, FaultKind::stuck, t)) place = *(stuck = stuck.value_or(place));
     add(Sensor::fix, t,
-        FixInput{stamp_ns(t), place.edge, place.offset_m, plan_.fix_sigma_m, probability, ++id,
-                 FixKind::landmark, place.direction, nullptr});
+        FixInput{stamp_ns(t), place.edge, place.offset_m, plan_.fix_sigma_m, probability, ++id, FixKind::landmark,
+                 place.direction, nullptr});
     place_m += plan_.landmark_spacing_m * (1 + plan_.landmark_spread * random.uniform(-1, 1));
   }
 }
