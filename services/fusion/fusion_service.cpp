@@ -21,6 +21,7 @@ constexpr std::chrono::milliseconds kTickPeriod{50};
 constexpr int64_t kKeepPeriodNs = 250'000'000;
 constexpr uint64_t kNumbersSinceKept = 100;  // at least as many as may have been used meanwhile
 constexpr double kOldestNotesS = 30.0;
+constexpr double kSameRideS = 0.5;   // data and the host's clock go on alike
 constexpr double kSameBeginS = 0.5;  // a replay that is looped begins where it began before
 constexpr double kLiveDataS = 5.0;   // data stamps further from the host's clock are not live
 
@@ -148,7 +149,6 @@ FusionService::FusionService(const FusionConfig& config, service::Context& conte
 }
 
 void FusionService::share_charge() {
-  if (context_.common().ownership_strength == 0) return;
   context_.share_charge({[this] { return fitness_; }, [this](bool taken) { charge_changed(taken); }});
   context_.on<msg::TrainState>(train_state, [this](const msg::TrainState& state) { hear(state); });
 }
@@ -179,33 +179,38 @@ void FusionService::hear(const msg::TrainState& state) {
 void FusionService::remember() {
   const auto& notes = context_.kept();
   if (!notes.starts_with(kept_for_)) return;
+  const size_t line_end = notes.find('\n', kept_for_.size());
+  if (line_end == std::string::npos) return;
   msg::TrainState state;
-  const std::vector<uint8_t> cdr(notes.begin() + static_cast<std::ptrdiff_t>(kept_for_.size()), notes.end());
-  from_notes_ = messaging::deserialize(cdr, state);
-  if (from_notes_) known_ = state;
+  const std::vector<uint8_t> cdr(notes.begin() + static_cast<std::ptrdiff_t>(line_end) + 1, notes.end());
+  if (!messaging::deserialize(cdr, state)) return;
+  known_ = state;
+  noted_ns_ = std::atoll(notes.c_str() + kept_for_.size());
 }
 
 void FusionService::keep(const msg::TrainState& state) {
-  if (context_.common().lock_step || clock_ || std::abs(state.stamp_ns() - kept_ns_) < kKeepPeriodNs) return;
+  if (context_.common().lock_step || std::abs(state.stamp_ns() - kept_ns_) < kKeepPeriodNs) return;
   kept_ns_ = state.stamp_ns();
   const auto cdr = messaging::serialize(state);
-  context_.keep(kept_for_ + std::string(cdr.begin(), cdr.end()));
+  context_.keep(kept_for_ + std::to_string(core::monotonic_ns()) + '\n' + std::string(cdr.begin(), cdr.end()));
 }
 
-// A known place is wanted at the time of the first state of the fusion that is to go on from it.
-void FusionService::take_over_known(const TrainEstimate& first) {
+// A known place is wanted at the time of the first state of the fusion that is to go on from it. False: that fusion has
+// only just been made, and this state is of the one that did not know.
+bool FusionService::take_over_known(const TrainEstimate& first) {
   const double age_s = core::seconds(first.stamp_ns - known_->stamp_ns());
-  if (from_notes_) {
-    from_notes_ = false;
-    const bool live = !clock_ && std::abs(core::seconds(core::wall_ns() - first.stamp_ns)) < kLiveDataS;
-    if (!live || age_s < 0 || age_s > kOldestNotesS) {
+  if (noted_ns_) {
+    // Of the same ride: neither the clock nor a replay has jumped since, nor has another one begun.
+    const double noted_s = core::seconds(core::monotonic_ns() - *noted_ns_);
+    noted_ns_.reset();
+    if (age_s < 0 || age_s > kOldestNotesS || std::abs(age_s - noted_s) > kSameRideS) {
       known_.reset();
-      return;
+      return true;
     }
     seq_ = std::max(seq_, known_->seq() + kNumbersSinceKept);
     if (map_ && known_->track_known() != 0) {
       begin_anew();
-      return;
+      return false;
     }
   }
   const double speed_mps = std::isfinite(known_->speed_mps()) ? known_->speed_mps() : 0;
@@ -220,6 +225,7 @@ void FusionService::take_over_known(const TrainEstimate& first) {
   }
   begun_anew_ = false;
   known_.reset();
+  return true;
 }
 
 // What is known of the place comes from another fusion: what this one believes of it is forgotten.
@@ -236,7 +242,7 @@ void FusionService::restart(int64_t data_ns) {
   fusion_.emplace(make_fusion(config, map_));
   latest_.reset();
   known_.reset();
-  from_notes_ = false;
+  noted_ns_.reset();
   begun_anew_ = false;
   heard_ns_ = 0;
   distance_offset_m_ = 0;
@@ -310,7 +316,7 @@ void FusionService::tick() {
 }
 
 void FusionService::publish(const TrainEstimate& estimate, int64_t grabbed_ns) {
-  if (known_) take_over_known(estimate);
+  if (known_ && !take_over_known(estimate)) return;
   msg::TrainState message = message_of(estimate);
   message.grabbed_ns(grabbed_ns);
   message.distance_m(message.distance_m() + distance_offset_m_);

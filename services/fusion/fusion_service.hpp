@@ -34,7 +34,7 @@ class FusionService {
   void keep(const msg::TrainState& state);
   void remember();
   void begin_anew();
-  void take_over_known(const TrainEstimate& first);
+  bool take_over_known(const TrainEstimate& first);
 
   FusionConfig config_;
   service::Context& context_;
@@ -53,7 +53,7 @@ class FusionService {
   uint64_t seq_ = 0;
   std::optional<msg::TrainState> latest_;  // of this fusion, sent or not
   std::optional<msg::TrainState> known_;   // of another one, to begin anew from
-  bool from_notes_ = false;                // known_ is of the process before
+  std::optional<int64_t> noted_ns_;        // known_ is of the process before, and when it was noted, monotonic
   bool begun_anew_ = false;                // known_ is to be used in the new one
   bool learnt_ = false;                    // nothing more to take over
   int64_t heard_ns_ = 0;                   // stamp of the newest state of the one in charge

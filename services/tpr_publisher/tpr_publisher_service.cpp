@@ -114,14 +114,23 @@ TprPublisherService::TprPublisherService(const Config& config, service::Context&
   share_charge();
   context.at_restart([this](int64_t) { restart(); });
   context.on_command("packet_58", [this](const std::string& hex) -> core::Result<std::string> {
-    const auto bytes = etcs::parse_hex(hex);
-    if (!bytes.ok()) return bytes.error();
-    const auto parameters = etcs::decode_report_parameters(bytes.value());
-    if (!parameters.ok()) return parameters.error();
-    if (const auto status = publisher_.set_parameters(parameters.value()); !status.ok()) return status.error();
-    parameters_ = parameters.value();
+    if (const auto taken = take_packet_58(hex); !taken.ok()) return taken.error();
+    context_.keep(hex);
     return std::string("position report parameters taken over");
   });
+  // The trackside sends it once: it outlives a restart.
+  if (!context.kept().empty() && !context.common().lock_step && take_packet_58(context.kept()).ok())
+    context.log().info("position report parameters of packet 58 as before");
+}
+
+core::Status TprPublisherService::take_packet_58(const std::string& hex) {
+  const auto bytes = etcs::parse_hex(hex);
+  if (!bytes.ok()) return bytes.error();
+  const auto parameters = etcs::decode_report_parameters(bytes.value());
+  if (!parameters.ok()) return parameters.error();
+  if (auto status = publisher_.set_parameters(parameters.value()); !status.ok()) return status;
+  parameters_ = parameters.value();
+  return {};
 }
 
 void TprPublisherService::share_charge() {

@@ -20,6 +20,7 @@ class TprPublisherService {
   void on_state(const msg::TrainState& state);
   void on_onboard(const msg::OnboardStatus& status);
   void on_tick();
+  core::Status take_packet_58(const std::string& hex);
   void share_charge();
   [[nodiscard]] int fitness() const;
   /// Not in charge: works along and sends nothing.

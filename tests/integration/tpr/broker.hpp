@@ -14,8 +14,8 @@ inline constexpr const char* kMosquitto = "/usr/sbin/mosquitto";
 
 class Broker {
  public:
-  explicit Broker(std::filesystem::path folder, std::string listener_settings = "")
-      : folder_(std::move(folder)), listener_settings_(std::move(listener_settings)) {
+  explicit Broker(std::filesystem::path folder, std::string listener_settings = "", bool anonymous = true)
+      : folder_(std::move(folder)), listener_settings_(std::move(listener_settings)), anonymous_(anonymous) {
     std::filesystem::create_directories(folder_);
   }
 
@@ -23,11 +23,11 @@ class Broker {
   bool start() {
     for (int attempt = 0; attempt < 10; ++attempt) {
       if (port_ == 0) port_ = free_port();
-      std::ofstream(folder_ / "broker.conf")
-          << "listener " << port_ << " 127.0.0.1\n"
-          << listener_settings_ << "allow_anonymous true\nuser root\npersistence true\n"
-          << "persistence_location " << folder_.string() << "/\n"
-          << "max_queued_messages 0\nmax_inflight_messages 0\n";
+      std::ofstream(folder_ / "broker.conf") << "listener " << port_ << " 127.0.0.1\n"
+                                             << listener_settings_ << "allow_anonymous "
+                                             << (anonymous_ ? "true" : "false") << "\nuser root\npersistence true\n"
+                                             << "persistence_location " << folder_.string() << "/\n"
+                                             << "max_queued_messages 0\nmax_inflight_messages 0\n";
       program_.emplace(std::vector<std::string>{kMosquitto, "-c", (folder_ / "broker.conf").string()},
                        Program::Options{folder_ / "broker.log", {}, {}});
       while (!program_->exit_code()) {
@@ -73,6 +73,7 @@ class Broker {
 
   std::filesystem::path folder_;
   std::string listener_settings_;
+  bool anonymous_;
   int port_ = 0;
   bool was_up_ = false;
   std::optional<Program> program_;

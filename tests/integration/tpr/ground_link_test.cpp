@@ -238,6 +238,34 @@ TEST_F(GroundLinkTest, TlsLetsOnlyTheRightCertificatesIn) {
                         [&] { write_state(last_.offset_m); }));
 }
 
+TEST_F(GroundLinkTest, APasswordLetsOnlyItsTrainIn) {
+  ASSERT_EQ(
+      test::run_program({"/usr/bin/mosquitto_passwd", "-c", "-b", file("passwords"), train_, "right"}, 60).exit_code,
+      0);
+  test::Broker broker(file("broker"), "password_file " + file("passwords").string() + "\n", false);
+  ASSERT_TRUE(broker.start());
+  const auto with_password = [&](const std::string& password) {
+    std::ofstream(file("password")) << password << '\n';
+    const std::string link = "tpr_publisher.ground_link.";
+    return linked_service(broker.address(),
+                          {link + "user=" + train_, link + "password_file=" + file("password").string()});
+  };
+  {
+    test::Program program(with_password("wrong"));
+    ASSERT_TRUE(run_until([&] { return connected(); }, [] {}));
+    ASSERT_TRUE(run_for(2));
+    ASSERT_TRUE(status_says("2 reports wait"));
+    EXPECT_THAT(reason(), HasSubstr("Ground link: not connected"));
+  }
+  ASSERT_TRUE(run_until([&] { return states_.matched_readers() == 0; }, [] {}));
+  test::Program program(with_password("right"));
+  ASSERT_TRUE(run_until([&] { return connected() && states_.matched_readers() > 0; }, [] {}));
+  ASSERT_TRUE(run_for(3));
+  ASSERT_TRUE(
+      run_until([&] { return status_ && status_->state() == msg::STATE_ACTIVE; }, [&] { write_state(last_.offset_m); }))
+      << reason();
+}
+
 TEST_F(GroundLinkTest, ManyLateReportsArriveInOrderWhileTheBrokerComesAndGoes) {
   constexpr uint64_t kReports = 2000;
   test::Broker broker(file("broker"));

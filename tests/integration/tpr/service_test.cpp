@@ -162,8 +162,8 @@ TEST_F(TprService, HearsTheOnboardCommand) {
                         [&] { write_state(450); }));
 }
 
-TEST_F(TprService, TakesPacket58FromACommand) {
-  test::Program program(service());
+TEST_F(TprService, TakesPacket58FromACommandAndKeepsItOverAKill) {
+  auto program = std::make_unique<test::Program>(service());
   ASSERT_TRUE(run_until([&] { return connected() && commands_.matched_readers() > 0; }, [] {}));
   ASSERT_TRUE(run_until([&] { return reports_.size() == 1; }, [&] { write_state(450); }));
   msg::ControlRequest request;
@@ -179,6 +179,11 @@ TEST_F(TprService, TakesPacket58FromACommand) {
   double offset_m = 450;
   ASSERT_TRUE(run_until([&] { return !reply_.empty(); }, [&] { write_state(offset_m); }));
   EXPECT_THAT(reply_, HasSubstr("taken over"));
+  program->end(SIGKILL);
+  ASSERT_TRUE(run_until([&] { return states_.matched_readers() == 0; }, [] {}));
+  reports_.clear();
+  program = std::make_unique<test::Program>(service());
+  ASSERT_TRUE(run_until([&] { return !reports_.empty(); }, [&] { write_state(offset_m); }));
   ASSERT_TRUE(run_until([&] { return reports_.back().reason() == msg::REPORT_LOCATION; },
                         [&] { write_state(offset_m = std::min(offset_m + 4, 920.0)); }));
   EXPECT_EQ(reports_.back().nid_lrbg(), tpr_publisher::testing::kC);

@@ -35,7 +35,10 @@ class TprService : public ::testing::Test {
                       [this](const msg::ControlReply& reply) { reply_ = reply.text().c_str(); }) {
     core::ok_or_throw(tpr_publisher::testing::balise_map()->save(map_file_));
   }
-  ~TprService() override { std::filesystem::remove(map_file_); }
+  ~TprService() override {
+    std::filesystem::remove(map_file_);
+    std::filesystem::remove("/dev/shm/railfix-notes-" + train_ + "-local-tpr_publisher");
+  }
 
   static messaging::ParticipantOptions options(const std::string& train) {
     messaging::ParticipantOptions options;
