@@ -87,10 +87,10 @@ dds::Topic* Participant::Impl::topic(const TopicInfo& info, const std::string& i
 
 namespace {
 
-// Keeps the topic of one remote endpoint of this train, or forgets it. Fast DDS tells of our own endpoints too.
-template <class Endpoint>
-void note(std::map<eprosima::fastrtps::rtps::GUID_t, std::string>& known, const Endpoint& endpoint, bool removed,
-          const std::vector<std::string>& own_partitions, const dds::DomainParticipant& own) {
+// Keeps one remote endpoint of this train, or forgets it. Fast DDS tells of our own endpoints too.
+template <class Known, class Endpoint>
+void note(Known& known, const Endpoint& endpoint, bool removed, const std::vector<std::string>& own_partitions,
+          const dds::DomainParticipant& own) {
   if (endpoint.guid().guidPrefix == own.guid().guidPrefix) return;
   if (removed) {
     known.erase(endpoint.guid());
@@ -100,10 +100,22 @@ void note(std::map<eprosima::fastrtps::rtps::GUID_t, std::string>& known, const 
   if (std::find_first_of(partitions.begin(), partitions.end(), own_partitions.begin(), own_partitions.end()) ==
       partitions.end())
     return;
-  known[endpoint.guid()] = endpoint.topicName().to_string();
+  known[endpoint.guid()] = {endpoint.topicName().to_string(), terms_of(endpoint.m_qos)};
 }
 
 }  // namespace
+
+void Participant::Impl::on_participant_discovery(dds::DomainParticipant*,
+                                                 eprosima::fastrtps::rtps::ParticipantDiscoveryInfo&& info) {
+  using Info = eprosima::fastrtps::rtps::ParticipantDiscoveryInfo;
+  const std::lock_guard lock(mutex);
+  const auto& prefix = info.info.m_guid.guidPrefix;
+  if (info.status == Info::REMOVED_PARTICIPANT || info.status == Info::DROPPED_PARTICIPANT) {
+    remote_names.erase(prefix);
+  } else {
+    remote_names[prefix] = info.info.m_participantName.to_string();
+  }
+}
 
 void Participant::Impl::on_publisher_discovery(dds::DomainParticipant* own,
                                                eprosima::fastrtps::rtps::WriterDiscoveryInfo&& info) {
@@ -195,8 +207,8 @@ Connections Participant::connections() const {
     connections.matches += static_cast<uint32_t>(status.current_count);
     ++ends[reader->get_topicdescription()->get_name()].second;
   }
-  for (const auto& [guid, topic] : impl_->remote_writers) ++ends[topic].first;
-  for (const auto& [guid, topic] : impl_->remote_readers) ++ends[topic].second;
+  for (const auto& [guid, writer] : impl_->remote_writers) ++ends[writer.topic].first;
+  for (const auto& [guid, reader] : impl_->remote_readers) ++ends[reader.topic].second;
   for (const auto& [topic, counts] : ends) connections.pairs += counts.first * counts.second;
   return connections;
 }
@@ -211,7 +223,7 @@ std::vector<Sent> Participant::sent() const {
 std::vector<std::string> Participant::written_topics() const {
   const std::lock_guard lock(impl_->mutex);
   std::vector<std::string> names;
-  for (const auto& [guid, name] : impl_->remote_writers) names.push_back(name);
+  for (const auto& [guid, writer] : impl_->remote_writers) names.push_back(writer.topic);
   std::sort(names.begin(), names.end());
   names.erase(std::unique(names.begin(), names.end()), names.end());
   return names;

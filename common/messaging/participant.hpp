@@ -13,6 +13,7 @@
 #include <set>
 
 #include "messaging/messaging.hpp"
+#include "messaging/qos_terms.hpp"
 
 namespace railfix::messaging {
 
@@ -50,11 +51,18 @@ struct Participant::Impl : eprosima::fastdds::dds::DomainParticipantListener {
   std::set<eprosima::fastdds::dds::DataWriter*> writers;
   std::set<eprosima::fastdds::dds::DataReader*> readers;
   std::vector<std::shared_ptr<const SentCount>> sent;
-  std::map<eprosima::fastrtps::rtps::GUID_t, std::string> remote_writers;  // topic name of each
-  std::map<eprosima::fastrtps::rtps::GUID_t, std::string> remote_readers;
+  struct Remote {
+    std::string topic;
+    Terms terms;
+  };
+  std::map<eprosima::fastrtps::rtps::GUID_t, Remote> remote_writers;
+  std::map<eprosima::fastrtps::rtps::GUID_t, Remote> remote_readers;
+  std::map<eprosima::fastrtps::rtps::GuidPrefix_t, std::string> remote_names;  // "odometry@cab"
   bool own_profiles = false;
 
   eprosima::fastdds::dds::Topic* topic(const TopicInfo& info, const std::string& instance);
+  void on_participant_discovery(eprosima::fastdds::dds::DomainParticipant*,
+                                eprosima::fastrtps::rtps::ParticipantDiscoveryInfo&& info) override;
   void on_publisher_discovery(eprosima::fastdds::dds::DomainParticipant*,
                               eprosima::fastrtps::rtps::WriterDiscoveryInfo&& info) override;
   void on_subscriber_discovery(eprosima::fastdds::dds::DomainParticipant*,

@@ -3,6 +3,7 @@
 #include <fastrtps/xmlparser/XMLProfileManager.h>
 
 #include "messaging/fastdds_qos.hpp"
+#include "messaging/qos_terms.hpp"
 #include "messaging/topics.hpp"
 
 namespace railfix::messaging {
@@ -11,34 +12,12 @@ namespace {
 namespace dds = eprosima::fastdds::dds;
 using Profiles = eprosima::fastrtps::xmlparser::XMLProfileManager;
 
-/// What decides whether a writer and a reader match.
-struct Terms {
-  bool reliable = false;
-  bool transient_local = false;
-  bool exclusive = false;
-  int64_t deadline_ns = 0;
-  int64_t lease_ns = 0;
-  int liveliness = 0;
-};
-
-template <class Qos>
-Terms terms_of(const Qos& qos) {
-  return {qos.m_reliability.kind == dds::RELIABLE_RELIABILITY_QOS,
-          qos.m_durability.kind >= dds::TRANSIENT_LOCAL_DURABILITY_QOS,
-          qos.m_ownership.kind == dds::EXCLUSIVE_OWNERSHIP_QOS,
-          qos.m_deadline.period.to_ns(),
-          qos.m_liveliness.lease_duration.to_ns(),
-          static_cast<int>(qos.m_liveliness.kind)};
-}
 Terms built_in(const TopicInfo& topic, bool writer) {
   dds::DataReaderQos qos;
   apply(topic.qos, qos);
-  return {writer ? topic.qos.writer_reliable : topic.qos.reliable,
-          topic.qos.transient_local,
-          false,
-          qos.deadline().period.to_ns(),
-          qos.liveliness().lease_duration.to_ns(),
-          static_cast<int>(qos.liveliness().kind)};
+  Terms terms = terms_of(qos);
+  terms.reliable = writer ? topic.qos.writer_reliable : topic.qos.reliable;
+  return terms;
 }
 
 // Fast DDS says nothing of a profile that is not there but on its own log.
@@ -55,6 +34,8 @@ Terms requested(const TopicInfo& topic) {
   return given ? terms_of(attributes.qos) : built_in(topic, false);
 }
 
+}  // namespace
+
 std::string mismatch(const Terms& writer, const Terms& reader) {
   if (reader.reliable && !writer.reliable) return "the reader wants RELIABLE, the writer offers BEST_EFFORT";
   if (reader.transient_local && !writer.transient_local)
@@ -66,8 +47,6 @@ std::string mismatch(const Terms& writer, const Terms& reader) {
   if (reader.lease_ns < writer.lease_ns) return "the reader's liveliness lease is shorter than the writer's";
   return "";
 }
-
-}  // namespace
 
 core::Result<std::vector<std::string>> qos_mismatches(const std::filesystem::path& profiles) {
   if (Profiles::loadXMLFile(profiles.string()) != eprosima::fastrtps::xmlparser::XMLP_ret::XML_OK)

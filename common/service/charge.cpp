@@ -5,8 +5,8 @@
 
 namespace railfix::service {
 
-Charge::Charge(uint64_t instance, int64_t strength, int64_t silence_ns)
-    : instance_(instance), strength_(strength), silence_ns_(silence_ns) {}
+Charge::Charge(uint64_t instance, int64_t strength, int64_t silence_ns, bool listens_first)
+    : instance_(instance), strength_(strength), silence_ns_(silence_ns), in_charge_(!listens_first) {}
 
 bool Charge::better(const ChargeBeat& a, const ChargeBeat& b) {
   return std::tuple(a.fitness, a.strength, b.instance) > std::tuple(b.fitness, b.strength, a.instance);
@@ -90,7 +90,7 @@ void Charge::stand_by(int64_t now_ns) {
 bool Charge::update(int fitness, int64_t now_ns) {
   if (!begun_) {
     begun_ = true;
-    listens_until_ns_ = now_ns + kNewcomerNs;
+    if (!in_charge_) listens_until_ns_ = now_ns + kNewcomerNs;
   } else if (held_up(now_ns)) {
     stand_by(now_ns);
   }

@@ -1,6 +1,8 @@
 // Of several services of one kind on a train one is in charge: it alone sends. This is the rule by which they agree,
 // each for itself, from what they hear of each other forty times a second. Knows no DDS and no clock.
 //
+// - The only one of its kind is in charge from the beginning. One that is started beside it, or that may have a peer on
+//   another host, listens first.
 // - Who is in charge stays so: one that comes back stands by, however strong it is.
 // - Who hears of nobody in charge for `silence` takes charge; the best first, the others give it one more `silence`.
 // - Who was held up for so long that somebody else may have taken charge (SIGSTOP, an overloaded host) stands by.
@@ -34,7 +36,7 @@ class Charge {
   static constexpr int64_t kSettledNs = 2'000'000'000;
   static constexpr int64_t kBetterNs = 5'000'000'000;
 
-  Charge(uint64_t instance, int64_t strength, int64_t silence_ns);
+  Charge(uint64_t instance, int64_t strength, int64_t silence_ns, bool listens_first = true);
 
   /// Times are of the monotonic clock.
   void hear(const ChargeBeat& beat, int64_t now_ns);
@@ -44,6 +46,7 @@ class Charge {
   [[nodiscard]] bool in_charge(int64_t now_ns) const { return in_charge_ && !held_up(now_ns); }
   /// What to tell the others.
   [[nodiscard]] ChargeBeat beat() const;
+  [[nodiscard]] bool alone() const { return peers_.empty(); }
   /// Host of another one in charge; empty when nobody else is known to be.
   [[nodiscard]] std::string holder() const;
 

@@ -40,10 +40,10 @@ double percentile(std::vector<double>& values, double share) {
 }  // namespace
 
 PublishedHealth::PublishedHealth(messaging::Participant& participant, const std::string& service,
-                                 const CommonConfig& common)
+                                 const CommonConfig& common, bool beside)
     : participant_(participant),
       writer_(participant, messaging::topics::service_status),
-      file_(health_path(common, service)),
+      file_(beside ? health_path_beside(common, service) : health_path(common, service)),
       measured_ns_(core::monotonic_ns()),
       cpu_ns_(used_cpu_ns()) {
   status_.service(service);
@@ -74,16 +74,19 @@ void PublishedHealth::publish() {
   status_.endpoints(connections.endpoints);
   status_.matches(connections.matches);
   status_.stamp_ns(core::wall_ns());
-  const auto said = clock_trouble_.empty() ? status_ : with_clock_trouble();
+  const auto said = with_troubles();
   writer_.write(said);
   file_.write(said);
 }
 
-msg::ServiceStatus PublishedHealth::with_clock_trouble() const {
+msg::ServiceStatus PublishedHealth::with_troubles() const {
   msg::ServiceStatus said = status_;
-  if (said.state() == msg::STATE_ACTIVE) said.state(msg::STATE_DEGRADED);
-  const std::string reason = said.reason().c_str();
-  said.reason((clock_trouble_ + (reason.empty() ? "" : " ") + reason).substr(0, kReasonBytes));
+  for (const auto& trouble : troubles_) {
+    if (trouble.empty()) continue;
+    if (said.state() == msg::STATE_READY || said.state() == msg::STATE_ACTIVE) said.state(msg::STATE_DEGRADED);
+    const std::string reason = said.reason().c_str();
+    said.reason((trouble + (reason.empty() ? "" : " ") + reason).substr(0, kReasonBytes));
+  }
   return said;
 }
 

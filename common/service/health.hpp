@@ -9,9 +9,13 @@
 
 namespace railfix::service {
 
+/// What the loop itself finds wrong, beside what the service says.
+enum class Trouble { clock, writers };
+
 class PublishedHealth final : public Health {
  public:
-  PublishedHealth(messaging::Participant& participant, const std::string& service, const CommonConfig& common);
+  PublishedHealth(messaging::Participant& participant, const std::string& service, const CommonConfig& common,
+                  bool beside);
 
   void ready() override { change(msg::STATE_READY, ""); }
   void standing_by(const std::string& reason) { change(msg::STATE_READY, reason); }
@@ -22,8 +26,8 @@ class PublishedHealth final : public Health {
   void output(int64_t grabbed_ns) override;
   void dropped(uint64_t count) override { status_.dropped(status_.dropped() + count); }
 
-  /// Empty = none; a service that is active is degraded by it.
-  void clock_trouble(const std::string& sentence) { clock_trouble_ = sentence; }
+  /// Empty = none; a service that is ready or active is degraded by it.
+  void trouble(Trouble kind, const std::string& sentence) { troubles_[static_cast<size_t>(kind)] = sentence; }
   void stopped() { change(msg::STATE_STOPPED, ""); }
   /// Publishes; measures processor and latency anew when the measuring period has passed.
   void publish();
@@ -31,12 +35,12 @@ class PublishedHealth final : public Health {
  private:
   void change(uint8_t state, const std::string& reason);
   void measure();
-  [[nodiscard]] msg::ServiceStatus with_clock_trouble() const;
+  [[nodiscard]] msg::ServiceStatus with_troubles() const;
   messaging::Participant& participant_;
   messaging::Writer<msg::ServiceStatus> writer_;
   HealthFile file_;
   msg::ServiceStatus status_;
-  std::string clock_trouble_;
+  std::array<std::string, 2> troubles_;
   std::vector<double> latencies_ms_;  // since the last measurement
   int64_t measured_ns_ = 0;
   int64_t cpu_ns_ = 0;

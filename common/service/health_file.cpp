@@ -31,6 +31,10 @@ std::filesystem::path health_path(const CommonConfig& common, const std::string&
   return "/dev/shm/railfix-health-" + common.train_id + "-" + common.host + "-" + service;
 }
 
+std::filesystem::path health_path_beside(const CommonConfig& common, const std::string& service) {
+  return health_path(common, service).string() + "-beside";
+}
+
 HealthFile::HealthFile(std::filesystem::path path) : path_(std::move(path)), file_(opened(path_)) {}
 
 // Another build of this service may have taken over the file; it makes a new one with its next words.
@@ -63,15 +67,17 @@ HealthAnswer ask_health(const std::filesystem::path& path) {
   int64_t said_ns = 0;
   int state = -1;
   std::string reason;
-  if (!(in >> said_ns >> state)) return {false, "does not run here: " + path.string() + " is missing"};
+  if (!(in >> said_ns >> state))
+    return {.healthy = false, .text = "does not run here: " + path.string() + " is missing"};
   std::getline(in >> std::ws, reason);
   const int64_t age_ns = core::monotonic_ns() - said_ns;
   if (age_ns > kSilentNs || age_ns < 0) {  // negative: from before the computer was started
-    return {false, "dead or frozen: silent for " + std::to_string(std::abs(age_ns) / core::kNsPerSecond) + " s"};
+    return {.healthy = false,
+            .text = "dead or frozen: silent for " + std::to_string(std::abs(age_ns) / core::kNsPerSecond) + " s"};
   }
   const std::string text =
       std::string(messaging::name_of_state(static_cast<uint8_t>(state))) + (reason.empty() ? "" : ": " + reason);
-  return {state != msg::STATE_FAILED && state != msg::STATE_STOPPED, text};
+  return {state != msg::STATE_FAILED && state != msg::STATE_STOPPED, state == msg::STATE_STARTING, text};
 }
 
 }  // namespace railfix::service

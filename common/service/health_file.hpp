@@ -14,6 +14,9 @@ namespace railfix::service {
 /// In the host's shared memory, one a service, host and train.
 std::filesystem::path health_path(const CommonConfig& common, const std::string& service);
 
+/// Of one that was started beside another one; renamed to the above by whoever started it once that one has gone.
+std::filesystem::path health_path_beside(const CommonConfig& common, const std::string& service);
+
 class HealthFile {
  public:
   explicit HealthFile(std::filesystem::path path);
@@ -35,7 +38,8 @@ std::optional<int64_t> silent_ns(const std::filesystem::path& path);
 
 struct HealthAnswer {
   bool healthy = false;
-  std::string text;  // one sentence
+  bool starting = false;  // it does not wait for input yet
+  std::string text;       // one sentence
 };
 /// Healthy: its run loop turned within the last two seconds and it has not failed. Degraded is healthy: a restart would
 /// not help.

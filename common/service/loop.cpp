@@ -5,6 +5,7 @@
 #include "core/time.hpp"
 #include "messaging/lock_step.hpp"
 #include "messaging/security.hpp"
+#include "messaging/unheard.hpp"
 #include "service/log.hpp"
 
 namespace railfix::service {
@@ -14,6 +15,7 @@ constexpr std::chrono::milliseconds kAssertPeriod{50};
 // Four times a second, so that a dead or frozen service shows within half a second.
 constexpr std::chrono::milliseconds kStatusPeriod{250};
 constexpr std::chrono::seconds kCablePeriod{1};
+constexpr std::chrono::seconds kWritersPeriod{1};
 constexpr std::chrono::hours kCertificatePeriod{6};
 constexpr int64_t kCertificateDays = 30;
 constexpr int64_t kIdleNs = core::kNsPerSecond;
@@ -25,13 +27,14 @@ bool waits_for_turn(const messaging::TopicInfo& topic) {
 
 }  // namespace
 
-Loop::Loop(std::string service, const CommonConfig& common)
+Loop::Loop(std::string service, const CommonConfig& common, bool beside)
     : service_(std::move(service)),
       common_(common),
+      beside_(beside),
       participant_({common.train_id, common.host, service_, common.domain, common.qos_profiles, common.interfaces,
                     common.peers, common.security}),
       log_(make_logger(participant_, service_, common)),
-      health_(std::make_unique<PublishedHealth>(participant_, service_, common)),
+      health_(std::make_unique<PublishedHealth>(participant_, service_, common, beside)),
       reply_(std::make_unique<messaging::Writer<msg::ControlReply>>(participant_, messaging::topics::service_reply)),
       notes_(notes_path(common, service_)),
       clocks_(common.host) {
@@ -46,6 +49,7 @@ Loop::Loop(std::string service, const CommonConfig& common)
     health_->dropped(queue_.take_dropped());
     health_->publish();
   });
+  watch_writers();
   if (!common_.interfaces.empty()) watch_cable();
   if (!common_.security.empty()) watch_certificate();
   if (!common_.peers.empty() && !common_.lock_step) watch_clocks();
@@ -75,6 +79,17 @@ void Loop::watch_cable() {
   });
 }
 
+// A writer that is there and not heard looks like one that has nothing to say.
+void Loop::watch_writers() {
+  every(kWritersPeriod, [this] {
+    auto unheard = messaging::unheard_writers(participant_);
+    if (unheard == unheard_) return;
+    for (const auto& sentence : unheard) log_->warn("{}", sentence);
+    health_->trouble(Trouble::writers, unheard.empty() ? "" : unheard.front());
+    unheard_ = std::move(unheard);
+  });
+}
+
 // What runs goes on when it has run out, but would not be let in again after a restart.
 void Loop::watch_certificate() {
   const auto look = [this] {
@@ -97,7 +112,7 @@ void Loop::watch_clocks() {
         if (!info.valid) return;
         const auto& status = *static_cast<const msg::ServiceStatus*>(sample.get());
         clocks_.hear(status.host().c_str(), status.stamp_ns(), info.received_ns);
-        health_->clock_trouble(clocks_.trouble());
+        health_->trouble(Trouble::clock, clocks_.trouble());
       }));
 }
 
@@ -205,12 +220,12 @@ void Loop::end_turn() {
 }
 
 void Loop::share_charge(ChargeHandlers handlers) {
-  if (common_.lock_step || common_.ownership_strength == 0) return;
+  if (common_.lock_step) return;
   handlers.changed = [this, changed = std::move(handlers.changed)](bool taken) {
     log_->info(taken ? "in charge from now on" : "stands by from now on");
     if (changed) changed(taken);
   };
-  standby_ = std::make_unique<Standby>(participant_, queue_, service_, common_, std::move(handlers));
+  standby_ = std::make_unique<Standby>(participant_, queue_, service_, common_, beside_, std::move(handlers));
   every(Standby::kPeriod, [this] { standby_->update(); });
 }
 

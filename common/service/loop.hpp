@@ -15,7 +15,8 @@ namespace railfix::service {
 
 class Loop final : public Context {
  public:
-  Loop(std::string service, const CommonConfig& common);
+  /// `beside`: another one of this service runs on this host, which this one is to replace.
+  Loop(std::string service, const CommonConfig& common, bool beside);
   ~Loop() override;
 
   void every(std::chrono::nanoseconds period, std::function<void()> handler) override;
@@ -54,6 +55,7 @@ class Loop final : public Context {
   void watch_cable();
   void watch_certificate();
   void watch_clocks();
+  void watch_writers();
   void answer(const msg::ControlRequest& request);
   void keep_in_turn(const messaging::TopicInfo& topic, const std::string& instance, Handler handler, StampOf stamp_of);
   void read_clock();
@@ -63,6 +65,7 @@ class Loop final : public Context {
 
   std::string service_;
   CommonConfig common_;
+  bool beside_;
   messaging::Participant participant_;
   messaging::Queue queue_;
   std::shared_ptr<spdlog::logger> log_;
@@ -71,6 +74,7 @@ class Loop final : public Context {
   std::unique_ptr<messaging::Writer<msg::ControlReply>> reply_;
   Notes notes_;
   ClockWatch clocks_;
+  std::vector<std::string> unheard_;  // writers that do not fit, as told last
   std::unique_ptr<Standby> standby_;  // nullptr = the only one of its kind
   std::map<std::string, std::function<core::Result<std::string>(const std::string&)>> commands_;
   std::vector<Timer> timers_;

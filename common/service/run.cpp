@@ -19,6 +19,7 @@ struct CommandLine {
   bool check = false;
   bool document = false;
   bool health = false;
+  bool beside = false;
 };
 
 std::vector<Override> overrides_of(const std::vector<std::string>& sets) {
@@ -74,9 +75,9 @@ int say_health(const CommonConfig& common, const std::string& service) {
   return answer.healthy ? kDone : kFailed;
 }
 
-int serve(const Program& program, const CommonConfig& common) {
+int serve(const Program& program, const CommonConfig& common, bool beside) {
   SignalWatch signals;
-  Loop loop(program.name, common);
+  Loop loop(program.name, common, beside);
   signals.watch(loop);
   try {
     const auto service = program.make(loop);
@@ -138,6 +139,8 @@ int run_program(const Program& program, int argc, char** argv) {
   app.add_flag("--document", line.document, "Print every key with its default, unit, range and meaning, and end");
   app.add_flag("--health", line.health,
                "Ask the service that runs here with this configuration how it is, and end: exit code 0 or 1");
+  app.add_flag("--beside", line.beside,
+               "Another one of this service runs here: stand by until it has gone (what `railfix train upgrade` does)");
   app.set_version_flag("--version", std::string(RAILFIX_VERSION));
   try {
     app.parse(argc, argv);
@@ -155,7 +158,7 @@ int run_program(const Program& program, int argc, char** argv) {
     if (line.health) return say_health(common, program.name);
     core::ok_or_throw(program.read(line.config, overrides));
     if (line.check) return kDone;
-    return serve(program, common);
+    return serve(program, common, line.beside);
   } catch (const core::BadInput& error) {
     std::cerr << program.name << ": " << error.what() << '\n';
     return kBadInput;

@@ -23,11 +23,12 @@ ChargeBeat beat_of(const msg::InCharge& said) {
 }  // namespace
 
 Standby::Standby(messaging::Participant& participant, messaging::Queue& queue, std::string service,
-                 const CommonConfig& common, ChargeHandlers handlers)
+                 const CommonConfig& common, bool beside, ChargeHandlers handlers)
     : service_(std::move(service)),
       host_(common.host),
+      expects_peers_(common.ownership_strength > 0 || beside),
       handlers_(std::move(handlers)),
-      charge_(random_number(), common.ownership_strength, core::to_ns(common.take_over_s)),
+      charge_(random_number(), common.ownership_strength, core::to_ns(common.take_over_s), expects_peers_),
       writer_(participant, messaging::topics::in_charge),
       reader_(participant, messaging::topics::in_charge, "", queue, [this](const msg::InCharge& said) {
         if (service_ == said.service().c_str()) charge_.hear(beat_of(said), core::monotonic_ns());
@@ -36,7 +37,7 @@ Standby::Standby(messaging::Participant& participant, messaging::Queue& queue, s
 void Standby::update() {
   const bool was = charge_.beat().in_charge;
   const bool taken = charge_.update(handlers_.fitness(), core::monotonic_ns());
-  say(false);
+  if (has_company()) say(false);
   if (taken || (was && !charge_.beat().in_charge)) handlers_.changed(taken);
 }
 
@@ -58,6 +59,7 @@ void Standby::say(bool leaving) {
 }
 
 void Standby::leave() {
+  if (!has_company()) return;
   for (int i = 0; i < kLastWords; ++i) say(true);
 }
 

@@ -14,8 +14,9 @@ class Standby {
  public:
   static constexpr std::chrono::milliseconds kPeriod{25};
 
+  /// `beside`: another one of this service runs on this host.
   Standby(messaging::Participant& participant, messaging::Queue& queue, std::string service, const CommonConfig& common,
-          ChargeHandlers handlers);
+          bool beside, ChargeHandlers handlers);
   /// Once a period.
   void update();
   [[nodiscard]] bool in_charge() const;
@@ -25,9 +26,11 @@ class Standby {
 
  private:
   void say(bool leaving);
+  [[nodiscard]] bool has_company() const { return expects_peers_ || !charge_.alone(); }
 
   std::string service_;
   std::string host_;
+  bool expects_peers_;
   ChargeHandlers handlers_;
   Charge charge_;
   messaging::Writer<msg::InCharge> writer_;

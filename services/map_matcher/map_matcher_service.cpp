@@ -74,6 +74,7 @@ MapMatcherService::MapMatcherService(const MapMatcherConfig& config, service::Co
   context_.on<msg::LandmarkSighting>(topics::landmark_sighting, [this](const msg::LandmarkSighting& m) { use(m); });
   context_.on<msg::OdometryStep>(topics::odometry_step, [this](const msg::OdometryStep& m) { use(m); });
   context_.at_restart([this](int64_t) { restart(); });
+  context_.share_charge({[] { return 1; }, {}});
   context_.health().ready();
 }
 
@@ -104,7 +105,11 @@ void MapMatcherService::use(const msg::TrainState& state) {
     context_.health().degraded(map_ ? "the place on the map is not known yet" : "no map is configured");
     return;
   }
-  context_.health().active();
+  if (context_.in_charge()) {
+    context_.health().active();
+  } else {
+    context_.stand_by();
+  }
   follow(state);
   if (chooser_) follow_without_camera();
 }
@@ -250,8 +255,7 @@ void MapMatcherService::publish_place(const msg::OdometryStep& step, const Locat
   message.stamp_ns(step.stamp_ns());
   message.kind(msg::FIX_NETWORK);
   message.sigma_m(location.places.front().sigma_m);
-  if (!writer_.write(message)) context_.health().dropped(1);
-  context_.health().output(step.grabbed_ns());
+  send(message, step.grabbed_ns());
 }
 
 void MapMatcherService::follow_turning(const msg::OdometryStep& step) {
@@ -306,8 +310,7 @@ void MapMatcherService::publish_track(int64_t stamp_ns, double odometer_m, int64
   message.stamp_ns(stamp_ns);
   message.kind(msg::FIX_TRACK);
   message.sigma_m(std::numeric_limits<double>::infinity());
-  if (!writer_.write(message)) context_.health().dropped(1);
-  context_.health().output(grabbed_ns);
+  send(message, grabbed_ns);
 }
 
 void MapMatcherService::use(const msg::TrackView& view) {
@@ -349,7 +352,12 @@ void MapMatcherService::publish(const Fix& fix, uint8_t kind, int64_t grabbed_ns
   message.landmark(fix.landmark);
   message.kind(kind);
   message.direction(direction_of(place.direction));
-  if (!writer_.write(message)) context_.health().dropped(1);
+  send(message, grabbed_ns);
+}
+
+void MapMatcherService::send(const msg::PositionFix& fix, int64_t grabbed_ns) {
+  if (!context_.in_charge()) return;
+  if (!writer_.write(fix)) context_.health().dropped(1);
   context_.health().output(grabbed_ns);
 }
 

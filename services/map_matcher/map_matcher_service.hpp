@@ -44,6 +44,8 @@ class MapMatcherService {
   void follow_without_camera();
   void publish_track(int64_t stamp_ns, double odometer_m, int64_t grabbed_ns);
   void publish(const Fix& fix, uint8_t kind, int64_t grabbed_ns);
+  /// Unless this one stands by.
+  void send(const msg::PositionFix& fix, int64_t grabbed_ns);
 
   MapMatcherConfig config_;
   service::Context& context_;

@@ -63,6 +63,7 @@ TrackDetectorService::TrackDetectorService(const Config& config, service::Contex
     });
   }
   context_.at_restart([this](int64_t) { restart(); });
+  context_.share_charge({[] { return 1; }, {}});
   context_.health().ready();
 }
 
@@ -133,8 +134,9 @@ void TrackDetectorService::detect(const msg::CameraFrame& frame) {
   observation.covariance *= factor * factor;
   if (observation.seen()) watch_->add(observation.shape, core::seconds(frame.stamp_ns() - last_stamp_ns_));
   last_stamp_ns_ = frame.stamp_ns();
-  publish(observation, frame);
+  if (context_.in_charge()) publish(observation, frame);
   if (observation.seen()) find_landmarks(grey, observation, frame);
+  if (!context_.in_charge()) return context_.stand_by();
   tell(observation, frame.stamp_ns());
 }
 
@@ -194,7 +196,7 @@ void TrackDetectorService::find_landmarks(const cv::Mat& grey, const TrackObserv
     out.sigma_m(sighting.sigma_m);
     out.confidence(sighting.confidence);
     out.kind(static_cast<uint8_t>(sighting.type));
-    sighting_writer_.write(out);
+    if (context_.in_charge()) sighting_writer_.write(out);
   }
 }
 

@@ -36,6 +36,22 @@ Fault frozen(const std::string& service) {
           .named = service_of(service)};
 }
 
+// No fault: another build of it comes, as `railfix train upgrade` does it.
+Fault swapped(const std::string& service) {
+  const auto before = std::make_shared<pid_t>(0);
+  return {.name = service + " swapped",
+          .begin =
+              [=](Rig& rig) {
+                *before = rig.pid(service);
+                rig.set_arguments(service, {"--set", "common.log_level=info"});
+              },
+          .end = {},
+          .over = [=](Rig& rig) { return rig.replaced(service, *before); },
+          .lasts_s = 30,
+          .watch_s = 5,
+          .named = ""};
+}
+
 void limit_memory(pid_t pid, rlim_t bytes) {
   const rlimit limit{bytes, RLIM_INFINITY};
   prlimit(pid, RLIMIT_AS, &limit, nullptr);
@@ -224,6 +240,7 @@ std::vector<Fault> fault_table(const Rig& rig) {
   std::vector<Fault> table;
   for (const auto& service : rig.services()) table.push_back(killed(service));
   for (const auto& service : rig.services()) table.push_back(frozen(service));
+  for (const auto& service : rig.services()) table.push_back(swapped(service));
   for (const auto& service : rig.services()) table.push_back(short_of_memory(service));
   table.push_back(full(
       "disk of cab", [](const Rig& r) { return r.root("cab"); }, "disk"));

@@ -193,11 +193,20 @@ std::vector<std::string> Rig::services() const {
   return names;
 }
 
-pid_t Rig::pid(const std::string& service_at_host) const {
+tool::RunningService Rig::running(const std::string& service_at_host) const {
   const size_t at = service_at_host.find('@');
   const auto state = tool::HostFolder(root(service_at_host.substr(at + 1))).state();
   const auto found = state.find(service_at_host.substr(0, at));
-  return found == state.end() ? 0 : static_cast<pid_t>(found->second.pid);
+  return found == state.end() ? tool::RunningService{} : found->second;
+}
+
+pid_t Rig::pid(const std::string& service_at_host) const {
+  return static_cast<pid_t>(running(service_at_host).pid);
+}
+
+bool Rig::replaced(const std::string& service_at_host, pid_t before) const {
+  const auto now = running(service_at_host);
+  return now.pid > 0 && now.pid != before && !now.beside;
 }
 
 void Rig::send(const std::string& service_at_host, int signal) const {

@@ -54,6 +54,8 @@ class Rig {
   /// 0 while it does not run.
   [[nodiscard]] pid_t pid(const std::string& service_at_host) const;
   void send(const std::string& service_at_host, int signal) const;
+  /// Another process than `before` runs, and nothing beside it any more.
+  [[nodiscard]] bool replaced(const std::string& service_at_host, pid_t before) const;
   /// More arguments for one service: it is started anew with them, as an upgrade would do; none = as it was.
   void set_arguments(const std::string& service_at_host, const std::vector<std::string>& arguments) const;
 
@@ -78,6 +80,7 @@ class Rig {
   [[nodiscard]] std::filesystem::path played() const {
     return options_.break_pictures ? folder_ / "ride" : options_.ride;
   }
+  [[nodiscard]] tool::RunningService running(const std::string& service_at_host) const;
   void copy_ride();
   void write_manifest();
   void start_broker();

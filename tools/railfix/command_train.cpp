@@ -6,6 +6,8 @@
 
 #include "commands.hpp"
 #include "core/result.hpp"
+#include "idl/operation.h"
+#include "messaging/operation_words.hpp"
 #include "train/check.hpp"
 #include "train/keys.hpp"
 #include "train/render.hpp"
@@ -227,6 +229,19 @@ int supervise_here(const Options& options) {
   return 0;
 }
 
+/// What the services that run on this computer complain of.
+std::vector<Finding> check_services(const HostFolder& folder) {
+  std::vector<Finding> findings;
+  const auto plan = folder.plan();
+  if (!plan || !supervisor_of(folder)) return findings;
+  for (const auto& service : plan->services) {
+    const auto health = health_of(*plan, folder.state(), service.name);
+    const bool degraded = health.text.starts_with(messaging::name_of_state(msg::STATE_DEGRADED));
+    if (!health.healthy || degraded) findings.push_back({!health.healthy, service.name + " " + health.text});
+  }
+  return findings;
+}
+
 int doctor(const Options& options) {
   const TrainHost* host = nullptr;
   Manifest manifest;
@@ -239,6 +254,7 @@ int doctor(const Options& options) {
     for (auto& finding : check_certificates(manifest, *host)) findings.push_back(std::move(finding));
   }
   for (auto& finding : check_installed_certificates(HostFolder(options.root))) findings.push_back(std::move(finding));
+  for (auto& finding : check_services(HostFolder(options.root))) findings.push_back(std::move(finding));
   const bool good = say(findings);
   std::cout << (good ? "this computer can run Railfix\n" : "this computer must not run Railfix like this\n");
   return good ? 0 : 1;

@@ -228,7 +228,7 @@ TEST_F(ContainerTrain, ComesUpOnTwoHostsIsUpgradedComesBackAndGoesDown) {
       container("coach", "tpr-publisher"));
   EXPECT_THAT(locked.out, HasSubstr("true 990:990 caps:[] /run/podman-init")) << locked.err;
 
-  ASSERT_EQ(shell("podman kill " + container("cab", "fusion")).exit_code, 0);
+  ASSERT_EQ(shell("podman kill " + container("cab", "fusion-1")).exit_code, 0);
   EXPECT_TRUE(test::run_until(*cab_, queue_, [&] {
     const auto fusion = service(TwoHosts::cab);
     return fusion["restarts"] == 1 && fusion["healthy"] == true;

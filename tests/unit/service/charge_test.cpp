@@ -139,6 +139,29 @@ TEST(Charge, TheOnlyOneOfItsKindIsNotDisturbedByBeingHeldUp) {
   EXPECT_TRUE(train.at(0).charge.in_charge(26'000 * kMs));
 }
 
+TEST(Charge, TheOnlyOneSendsAtOnceUntilItsSuccessorTakesItsPlace) {
+  Charge only(1, 0, kSilenceNs, false);
+  EXPECT_TRUE(only.in_charge(0));
+  int64_t now_ns = 0;
+  only.update(4, now_ns);
+  EXPECT_TRUE(only.in_charge(now_ns));
+  EXPECT_TRUE(only.alone());
+  // Its successor, started beside it, listens first and never speaks at the same time.
+  Charge successor(2, 0, kSilenceNs, true);
+  for (; now_ns < 4000 * kMs; now_ns += kPeriodNs) {
+    only.update(4, now_ns);
+    successor.update(4, now_ns);
+    only.hear(successor.beat(), now_ns);
+    successor.hear(only.beat(), now_ns);
+    EXPECT_TRUE(only.in_charge(now_ns));
+    EXPECT_FALSE(successor.in_charge(now_ns));
+  }
+  auto last = only.beat();
+  last.leaving = true;
+  successor.hear(last, now_ns);
+  EXPECT_TRUE(successor.update(4, now_ns));
+}
+
 TEST(Charge, ACutCableMakesTwoAndWhenTheyMeetTheOneThatKnowsMoreStays) {
   for (const bool first_knows_more : {true, false}) {
     Train train;

@@ -22,6 +22,7 @@ struct HostedService {
   std::string name;
   std::string release;
   bool standby = false;
+  int64_t strength = 0;  // 0 = no other one on this train
 };
 
 struct Container {

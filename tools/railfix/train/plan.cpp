@@ -46,6 +46,11 @@ PlannedService service_of(const YAML::Node& node) {
 
 }  // namespace
 
+bool PlannedService::runs_beside() const {
+  return name == "track_detector" || name == "odometry" || name == "map_matcher" || name == "fusion" ||
+         name == "recorder";
+}
+
 const PlannedService* HostPlan::service(const std::string& name) const {
   const auto found = std::find_if(services.begin(), services.end(), [&](const auto& one) { return one.name == name; });
   return found == services.end() ? nullptr : &*found;
@@ -125,9 +130,9 @@ HostState HostFolder::state() const {
   const auto root = load(folder_ / "state.yaml");
   if (!root || !root->IsMap()) return state;
   for (const auto& entry : *root) {
-    state[entry.first.as<std::string>()] = {entry.second["pid"].as<int64_t>(), entry.second["generation"].as<int>(),
-                                            entry.second["restarts"].as<int>(),
-                                            entry.second["last_end"].as<std::string>()};
+    state[entry.first.as<std::string>()] = {
+        entry.second["pid"].as<int64_t>(), entry.second["generation"].as<int>(), entry.second["restarts"].as<int>(),
+        entry.second["last_end"].as<std::string>(), entry.second["beside"].as<bool>(false)};
   }
   return state;
 }
@@ -139,6 +144,7 @@ core::Status HostFolder::write(const HostState& state) const {
     root[name]["generation"] = service.generation;
     root[name]["restarts"] = service.restarts;
     root[name]["last_end"] = service.last_end;
+    root[name]["beside"] = service.beside;
   }
   return replace(folder_ / "state.yaml", YAML::Dump(root) + "\n");
 }

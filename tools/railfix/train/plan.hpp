@@ -25,6 +25,11 @@ struct PlannedService {
   std::vector<std::string> clean_up;  // run before each start and after a kill; empty = nothing to do
   std::string settings;               // everything that the service reads; another text means that it must be restarted
 
+  /// Started anew it runs beside the one before until it has found everybody. Not for those that own what only one can
+  /// have: a camera, a serial line, a port, a store.
+  [[nodiscard]] bool runs_beside() const;
+  /// Whose processes the supervisor sees only through an engine.
+  [[nodiscard]] bool in_container() const { return !clean_up.empty(); }
   bool operator==(const PlannedService&) const = default;
 };
 
@@ -43,6 +48,7 @@ struct RunningService {
   int generation = 0;
   int restarts = 0;  // since it was started with this generation
   std::string last_end;
+  bool beside = false;  // the one before still runs, and sends
 };
 using HostState = std::map<std::string, RunningService>;
 

@@ -68,10 +68,6 @@ YAML::Node settings_on(const Manifest& manifest, const TrainHost& host, const st
   return settings;
 }
 
-std::string strength_of(const HostedService& service) {
-  return "common.ownership_strength=" + std::to_string(service.standby ? kStandbyStrength : kPrimaryStrength);
-}
-
 core::Status write(const fs::path& file, const std::string& text) {
   std::error_code failed;
   fs::create_directories(file.parent_path(), failed);
@@ -150,14 +146,17 @@ std::string fingerprint(const fs::path& path) {
 }  // namespace
 
 std::vector<std::string> service_arguments(const HostedService& service) {
-  return {"--set", strength_of(service)};
+  if (service.strength == 0) return {};
+  return {"--set", "common.ownership_strength=" + std::to_string(service.strength)};
 }
 
 std::vector<HostedService> services_on(const Manifest& manifest, const std::string& host) {
   std::vector<HostedService> here;
   for (const auto& service : manifest.services) {
-    if (service.host == host) here.push_back({service.name, manifest.release_of(service), false});
-    if (service.standby == host) here.push_back({service.name, manifest.release_of(service), true});
+    const auto release = manifest.release_of(service);
+    if (service.host == host)
+      here.push_back({service.name, release, false, service.standby.empty() ? 0 : kPrimaryStrength});
+    if (service.standby == host) here.push_back({service.name, release, true, kStandbyStrength});
   }
   return here;
 }
@@ -172,6 +171,10 @@ std::string settings_of(const Manifest& manifest, const TrainHost& host, const s
   const auto settings = settings_on(manifest, host, "FOLDER");
   std::string text = lines_of(settings["common"], "common");
   if (settings[service]) text += lines_of(settings[service], service);
+  for (const auto& one : services_on(manifest, host.name)) {
+    if (one.name == service && one.strength != 0)
+      text += "common.ownership_strength: " + std::to_string(one.strength) + "\n";
+  }
   const auto mentions = [&](const std::string& file) {
     return !file.empty() && text.find(in_folder("FOLDER", file)) != std::string::npos;
   };

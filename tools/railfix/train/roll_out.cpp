@@ -42,7 +42,8 @@ class Gate {
     const auto state = folder_.state();
     const auto found = state.find(service_);
     const int generation = plan_.service(service_)->generation;
-    const bool ours = found != state.end() && found->second.generation == generation && found->second.pid > 0;
+    const bool ours = found != state.end() && found->second.generation == generation && found->second.pid > 0 &&
+                      !found->second.beside;
     health_ = health_of(plan_, state, service_);
     const int64_t now_ns = core::monotonic_ns();
     if (!ours || !health_.healthy || found->second.pid != pid_) {
@@ -121,6 +122,7 @@ core::Status set_commands(const Manifest& manifest, const TrainHost& host, const
   const auto id = image_id(engine.value(), container.image);
   if (!id) return core::Error{"image " + container.image + " is not on this computer"};
   container.image = *id;
+  if (planned.runs_beside()) container.name += "-" + files.filename().string();
   planned.command = run_command(container, engine.value());
   planned.clean_up = remove_command(container, engine.value());
   return {};
@@ -171,7 +173,8 @@ ServiceHealth health_of(const HostPlan& plan, const HostState& state, const std:
   service::CommonConfig common;
   common.train_id = plan.train_id;
   common.host = plan.host;
-  const auto answer = service::ask_health(service::health_path(common, service));
+  const auto answer = service::ask_health(process->second.beside ? service::health_path_beside(common, service)
+                                                                 : service::health_path(common, service));
   return {answer.healthy, answer.text};
 }
 

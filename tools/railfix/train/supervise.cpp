@@ -17,6 +17,7 @@
 #include "core/time.hpp"
 #include "service/health_file.hpp"
 #include "train/left_behind.hpp"
+#include "train/stands_still.hpp"
 
 namespace railfix::tool {
 namespace {
@@ -24,13 +25,17 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kTurnMs = 20;
-constexpr int64_t kFirstPauseNs = 200'000'000;
+constexpr int64_t kFirstPauseNs = 200'000'000;  // of one that does not live long
 constexpr int64_t kLongestPauseNs = 5 * core::kNsPerSecond;
 constexpr int64_t kLivesNs = 10 * core::kNsPerSecond;
-// A run loop that does not turn for so long hangs; the longest work of any service in one go is about a second.
+// A run loop turns four times a second at least. One that is silent for kQuietNs while none of its threads does or
+// wants to do anything hangs; one that is busy may take longer, but not kFrozenNs: its longest work is about a second.
+constexpr int64_t kQuietNs = 800'000'000;
 constexpr int64_t kFrozenNs = 3 * core::kNsPerSecond;
-constexpr int64_t kLookNs = core::kNsPerSecond / 4;
+constexpr int64_t kLookNs = core::kNsPerSecond / 10;
 constexpr int kFrozenLooks = 3;  // after a computer that stood still everybody may speak first
+// DDS finds everybody within a second, and one that stands by counts as fit after two more (service/charge.hpp).
+constexpr int64_t kFoundNs = 3'500'000'000;
 // A participant that died is forgotten after 5 s, and then nobody has its pictures mapped.
 constexpr int64_t kForgottenNs = 10 * core::kNsPerSecond;
 constexpr size_t kLastWords = 300;
@@ -63,14 +68,16 @@ void run_quietly(const std::vector<std::string>& command) {
   if (pid > 0) waitpid(pid, nullptr, 0);
 }
 
-[[noreturn]] void become(const PlannedService& service, const fs::path& home, int log) {
+[[noreturn]] void become(const PlannedService& service, bool beside, const fs::path& home, int log) {
   prctl(PR_SET_PDEATHSIG, SIGTERM);  // a service without its supervisor would never be replaced
   setpgid(0, 0);
   for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, SIG_DFL);
   run_quietly(service.clean_up);
   dup2(log, STDOUT_FILENO);
   dup2(log, STDERR_FILENO);
-  if (chdir(home.c_str()) == 0) execute(service.command);
+  auto command = service.command;
+  if (beside) command.emplace_back("--beside");
+  if (chdir(home.c_str()) == 0) execute(command);
   _exit(127);
 }
 
@@ -88,20 +95,32 @@ std::string last_words(const fs::path& log, std::streamoff from) {
 /// One service of the plan and its process.
 class Child {
  public:
-  Child(PlannedService service, const HostFolder& folder, const service::CommonConfig& common)
+  /// `beside`: another one of this service runs, which it is to replace.
+  Child(PlannedService service, const HostFolder& folder, const service::CommonConfig& common, bool beside)
       : service_(std::move(service)),
         home_(folder.home()),
         log_(folder.log(service_.name)),
-        health_(service::health_path(common, service_.name)) {}
+        usual_health_(service::health_path(common, service_.name)),
+        health_(beside ? service::health_path_beside(common, service_.name) : usual_health_),
+        beside_(beside) {}
   [[nodiscard]] const PlannedService& service() const { return service_; }
-  [[nodiscard]] RunningService state() const { return {pid_, service_.generation, restarts_, last_end_}; }
+  [[nodiscard]] RunningService state() const { return {pid_, service_.generation, restarts_, last_end_, beside_}; }
   [[nodiscard]] bool runs() const { return pid_ > 0; }
+  /// Runs well for so long that it has found everybody.
+  [[nodiscard]] bool has_found_all() const { return pid_ > 0 && core::monotonic_ns() - well_since_ns_ > kFoundNs; }
+  /// The one that it ran beside has gone.
+  void take_its_place() {
+    std::error_code none;
+    fs::rename(health_, usual_health_, none);
+    health_ = usual_health_;
+    beside_ = false;
+  }
 
   /// Starts it when it is time, notes its end. True when something has changed.
   bool turn() {
     const int64_t now_ns = core::monotonic_ns();
     if (pid_ > 0) {
-      kill_when_frozen(now_ns);
+      look(now_ns);
       return note_end(now_ns);
     }
     if (now_ns < next_start_ns_) return false;
@@ -130,13 +149,21 @@ class Child {
     std::error_code none;
     fs::remove(health_, none);
   }
-  // One that has spoken since it was started, and is silent now: nobody else would ever end it.
-  void kill_when_frozen(int64_t now_ns) {
+  void look(int64_t now_ns) {
     if (now_ns - looked_ns_ < kLookNs) return;
     looked_ns_ = now_ns;
+    kill_when_frozen(now_ns);
+    if (!beside_) return;
+    const auto health = service::ask_health(health_);
+    if (!health.healthy || health.starting) well_since_ns_ = now_ns;
+  }
+  // One that has spoken since it was started, and is silent now: nobody else would ever end it.
+  void kill_when_frozen(int64_t now_ns) {
     const auto silent_ns = service::silent_ns(health_);
-    const bool silent = silent_ns && *silent_ns > kFrozenNs && *silent_ns < now_ns - started_ns_;
-    frozen_looks_ = silent ? frozen_looks_ + 1 : 0;
+    const bool has_spoken = silent_ns && *silent_ns < now_ns - started_ns_;
+    const bool hangs = has_spoken && (*silent_ns > kFrozenNs ||
+                                      (*silent_ns > kQuietNs && !service_.in_container() && stands_still(pid_)));
+    frozen_looks_ = hangs ? frozen_looks_ + 1 : 0;
     if (frozen_looks_ >= kFrozenLooks) kill(pid_, SIGKILL);
   }
   void start(int64_t now_ns) {
@@ -145,9 +172,9 @@ class Child {
     const int log = open(log_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
     log_began_ = log < 0 ? 0 : lseek(log, 0, SEEK_END);
     pid_ = fork();
-    if (pid_ == 0) become(service_, home_, log);
+    if (pid_ == 0) become(service_, beside_, home_, log);
     if (log >= 0) close(log);
-    started_ns_ = now_ns;
+    started_ns_ = well_since_ns_ = now_ns;
     if (pid_ > 0) return;
     pid_ = 0;
     next_start_ns_ = now_ns + kLongestPauseNs;
@@ -162,15 +189,19 @@ class Child {
     frozen_looks_ = 0;
     forget_health();
     if (const auto said = wait_status == 0 ? "" : last_words(log_, log_began_); !said.empty()) last_end_ += ": " + said;
-    pause_ns_ = now_ns - started_ns_ > kLivesNs ? kFirstPauseNs : std::min(2 * pause_ns_, kLongestPauseNs);
-    next_start_ns_ = now_ns + pause_ns_;
+    const bool lived = now_ns - started_ns_ > kLivesNs;
+    pause_ns_ = lived ? kFirstPauseNs : std::min(2 * pause_ns_, kLongestPauseNs);
+    next_start_ns_ = lived ? now_ns : now_ns + pause_ns_;
     return true;
   }
 
   PlannedService service_;
   fs::path home_;
   fs::path log_;
+  fs::path usual_health_;
   fs::path health_;
+  bool beside_ = false;
+  int64_t well_since_ns_ = 0;
   int frozen_looks_ = 0;
   int64_t looked_ns_ = 0;
   pid_t pid_ = 0;
@@ -201,7 +232,10 @@ class Supervision {
   void turn() {
     follow_plan();
     bool changed = false;
-    for (auto& child : children_) changed = child.turn() || changed;
+    for (auto* children : {&children_, &successors_}) {
+      for (auto& child : *children) changed = child.turn() || changed;
+    }
+    changed = hand_over() || changed;
     if (changed) {
       say();
       clean_ns_ = core::monotonic_ns() + kForgottenNs;
@@ -211,6 +245,7 @@ class Supervision {
   void end() {
     std::vector<Child*> speakers;
     std::vector<Child*> listeners;
+    for (auto& child : successors_) speakers.push_back(&child);
     for (auto& child : children_) {
       const bool listens = child.service().name == "recorder" || child.service().name == "monitor";
       (listens ? listeners : speakers).push_back(&child);
@@ -218,6 +253,7 @@ class Supervision {
     stop(speakers);
     stop(listeners);
     children_.clear();
+    successors_.clear();
     say();
   }
 
@@ -242,28 +278,71 @@ class Supervision {
     const auto plan = folder_.plan();
     if (!plan || plan->services == planned_) return;
     planned_ = plan->services;
+    const auto goes = [this](const Child& child) { return !is_planned(child) && !is_succeeded(child); };
+    const auto falls_out = [this](const Child& successor) { return !is_planned(successor); };
     std::vector<Child*> leaving;
     for (auto& child : children_) {
-      if (std::find(planned_.begin(), planned_.end(), child.service()) == planned_.end()) leaving.push_back(&child);
+      if (goes(child)) leaving.push_back(&child);
+    }
+    for (auto& successor : successors_) {
+      if (falls_out(successor)) leaving.push_back(&successor);
     }
     stop(leaving);
-    std::erase_if(children_, [&](const Child& child) {
-      return std::find(planned_.begin(), planned_.end(), child.service()) == planned_.end();
-    });
-    service::CommonConfig common;
-    common.train_id = plan->train_id;
-    common.host = plan->host;
-    // Against the way of the data: who listens is there before who speaks.
-    for (const auto& service : std::views::reverse(planned_)) {
-      const bool there = std::any_of(children_.begin(), children_.end(),
-                                     [&](const Child& child) { return child.service() == service; });
-      if (!there) children_.emplace_back(service, folder_, common);
-    }
+    std::erase_if(children_, goes);
+    std::erase_if(successors_, falls_out);
+    start_new(*plan);
     say();
+  }
+  [[nodiscard]] bool is_planned(const Child& child) const {
+    return std::find(planned_.begin(), planned_.end(), child.service()) != planned_.end();
+  }
+  /// It goes when the new one beside it has found everybody.
+  [[nodiscard]] bool is_succeeded(const Child& child) const {
+    return child.runs() && std::any_of(planned_.begin(), planned_.end(), [&](const PlannedService& service) {
+             return service.name == child.service().name && service.runs_beside();
+           });
+  }
+  // Against the way of the data: who listens is there before who speaks.
+  void start_new(const HostPlan& plan) {
+    service::CommonConfig common;
+    common.train_id = plan.train_id;
+    common.host = plan.host;
+    for (const auto& service : std::views::reverse(planned_)) {
+      const auto is_it = [&](const Child& child) { return child.service() == service; };
+      if (std::any_of(children_.begin(), children_.end(), is_it) ||
+          std::any_of(successors_.begin(), successors_.end(), is_it))
+        continue;
+      const bool beside = std::any_of(children_.begin(), children_.end(),
+                                      [&](const Child& child) { return child.service().name == service.name; });
+      (beside ? successors_ : children_).emplace_back(service, folder_, common, beside);
+    }
+  }
+  /// True when a successor has taken the place of the one before.
+  bool hand_over() {
+    const auto before_of = [this](const Child& successor) {
+      return std::find_if(children_.begin(), children_.end(),
+                          [&](const Child& child) { return child.service().name == successor.service().name; });
+    };
+    const auto is_due = [&](const Child& successor) {
+      const auto before = before_of(successor);
+      return before == children_.end() || (before->runs() ? successor.has_found_all() : successor.runs());
+    };
+    const auto due = std::find_if(successors_.begin(), successors_.end(), is_due);
+    if (due == successors_.end()) return false;
+    if (const auto before = before_of(*due); before != children_.end()) {
+      stop({&*before});
+      children_.erase(before);
+    }
+    children_.push_back(std::move(*due));
+    successors_.erase(due);
+    children_.back().take_its_place();
+    return true;
   }
   void say() const {
     HostState state;
-    for (const auto& child : children_) state[child.service().name] = child.state();
+    for (const auto* children : {&children_, &successors_}) {
+      for (const auto& child : *children) state[child.service().name] = child.state();
+    }
     static_cast<void>(folder_.write(state));  // a full disk must not end the train
   }
   const HostFolder& folder_;
@@ -272,6 +351,7 @@ class Supervision {
   std::optional<std::vector<fs::path>> left_;
   std::vector<PlannedService> planned_;
   std::vector<Child> children_;
+  std::vector<Child> successors_;  // each runs beside the child of its name
 };
 
 }  // namespace

@@ -13,9 +13,9 @@ const std::vector<std::string>& topics_written_by(const std::string& service) {
   static const std::map<std::string, std::vector<std::string>> topics{
       {"frame_grabber", {"camera_frame/*", "camera_preview/*", "camera_calibration", "data_clock"}},
       {"sensor_gateway", {"imu_sample", "wheel_sample", "gnss_fix"}},
-      {"track_detector", {"track_view", "landmark_sighting"}},
-      {"odometry", {"odometry_step"}},
-      {"map_matcher", {"position_fix"}},
+      {"track_detector", {"track_view", "landmark_sighting", "in_charge"}},
+      {"odometry", {"odometry_step", "in_charge"}},
+      {"map_matcher", {"position_fix", "in_charge"}},
       {"fusion", {"train_state", "train_pose", "in_charge"}},
       {"tpr_publisher", {"train_position_report", "in_charge"}},
       {"recorder", {"recorder_status"}},
