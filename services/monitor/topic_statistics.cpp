@@ -32,11 +32,7 @@ TopicStatistics::Slice& TopicStatistics::slice(int64_t at_ns) {
 }
 
 void TopicStatistics::add(const SeenSample& sample) {
-  const auto [last, first_of_writer] = last_sequence_.try_emplace(sample.writer, sample.sequence);
-  if (!first_of_writer) {
-    if (sample.sequence > last->second + 1) lost_ += sample.sequence - last->second - 1;
-    last->second = std::max(last->second, sample.sequence);
-  }
+  lost_ += sequences_.before(sample.writer, sample.sequence, exclusive_);
   if (samples_ == 0) {
     first_ns_ = sample.received_ns;
   } else {

@@ -5,9 +5,10 @@
 #include <array>
 #include <cstdint>
 #include <limits>
-#include <map>
 #include <optional>
 #include <vector>
+
+#include "core/sequence_gaps.hpp"
 
 namespace railfix::monitor {
 
@@ -40,6 +41,8 @@ struct TopicNumbers {
 
 class TopicStatistics {
  public:
+  /// exclusive: one of its writers is heard at a time.
+  explicit TopicStatistics(bool exclusive = false) : exclusive_(exclusive) {}
   void add(const SeenSample& sample);
   [[nodiscard]] TopicNumbers numbers(int64_t now_ns) const;
   /// How many latencies lay at or below each bound and above the one before; the last one counts those beyond.
@@ -78,7 +81,8 @@ class TopicStatistics {
   size_t next_latency_ = 0;
   std::array<uint64_t, kLatencyBounds_s.size() + 1> latency_counts_{};
   double latency_sum_s_ = 0;
-  std::map<uint64_t, uint64_t> last_sequence_;  // of each writer
+  bool exclusive_;
+  core::SequenceGaps sequences_;
 };
 
 }  // namespace railfix::monitor

@@ -30,7 +30,7 @@ void TrainWatch::read(const std::set<std::string>& names) {
     Topic& topic = topics_[name];
     if (topic.reader) continue;
     topic.info = info;
-    topic.statistics = {};
+    topic.statistics = TopicStatistics(info->qos.exclusive);
     topic.read_since_ns = core::wall_ns();
     messaging::TopicInfo lenient = *info;
     if (!info->qos.transient_local) lenient.qos.reliable = false;

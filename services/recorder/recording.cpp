@@ -73,11 +73,7 @@ core::Status Recording::write_event(const EventNote& note) {
 }
 
 void Recording::note_sequence(const std::string& topic, uint64_t writer, uint64_t sequence, bool exclusive) {
-  const bool taken_over = std::exchange(heard_[topic], writer) != writer;
-  const auto [last, first] = last_sequence_.try_emplace({topic, writer}, sequence);
-  if (first) return;
-  if (sequence > last->second + 1 && !(exclusive && taken_over)) gaps_[topic] += sequence - last->second - 1;
-  last->second = std::max(last->second, sequence);
+  gaps_[topic] += sequences_[topic].before(writer, sequence, exclusive);
 }
 
 void Recording::add_dropped(const std::string& topic, Loss cause, uint64_t count) {

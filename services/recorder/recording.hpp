@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/result.hpp"
+#include "core/sequence_gaps.hpp"
 #include "mcap/writer.hpp"
 #include "recorder/stored_sample.hpp"
 
@@ -54,7 +55,7 @@ class Recording {
   /// numbers of the others go on meanwhile.
   void note_sequence(const std::string& topic, uint64_t writer, uint64_t sequence, bool exclusive = false);
   /// What comes next does not follow what came last: no gap.
-  void forget_sequences() { last_sequence_.clear(); }
+  void forget_sequences() { sequences_.clear(); }
   /// So many more samples of the topic were dropped in front of the recorder's thread.
   void add_dropped(const std::string& topic, Loss cause, uint64_t count);
   /// Writes what is old enough; losses go into the file at most every ten seconds.
@@ -77,8 +78,7 @@ class Recording {
 
   std::unique_ptr<mcap::Writer> writer_;
   std::map<std::shared_ptr<const ChannelOf>, uint16_t> channels_;
-  std::map<std::pair<std::string, uint64_t>, uint64_t> last_sequence_;
-  std::map<std::string, uint64_t> heard_;  // the last writer of each topic
+  std::map<std::string, core::SequenceGaps> sequences_;
   std::map<std::string, uint64_t> gaps_;
   Losses dropped_;
   uint64_t lost_written_ = 0;

@@ -80,10 +80,10 @@ class Watch {
   [[nodiscard]] ordered_json json() {
     ordered_json json{
         {"train", options_.network.train}, {"services", ordered_json::array()}, {"topics", ordered_json::array()}};
-    for (const auto& [name, s] : services_) {
-      json["services"].push_back({{"service", name},
+    for (const auto& [key, s] : services_) {
+      json["services"].push_back({{"service", s.service().c_str()},
                                   {"host", s.host().c_str()},
-                                  {"state", silent_.contains(name) ? "silent" : messaging::name_of_state(s.state())},
+                                  {"state", silent_.contains(key) ? "silent" : messaging::name_of_state(s.state())},
                                   {"dropped", s.dropped()},
                                   {"cpu_percent", s.cpu_percent()},
                                   {"rss_mb", s.rss_mb()},
@@ -104,12 +104,12 @@ class Watch {
 
  private:
   void note(const msg::ServiceStatus& status, bool alive) {
-    const std::string name = status.service().c_str();
+    const std::string key = std::string(status.service().c_str()) + "/" + status.host().c_str();
     if (alive) {
-      silent_.erase(name);
-      services_[name] = status;
+      silent_.erase(key);
+      services_[key] = status;
     } else {
-      silent_.insert(name);
+      silent_.insert(key);
     }
   }
   // Whole pictures are copied for every listener: only when asked for.
@@ -130,7 +130,7 @@ class Watch {
              const messaging::SampleInfo& info) {
     auto& topic = topics_[name];
     topic.second.add(type, sample, info);
-    topic.whole.add(info);
+    topic.whole.add(type, info);
     topic.last_ns = core::monotonic_ns();
   }
   // By the clock, not by the gaps: one sample in ten seconds is no rate.
@@ -157,7 +157,7 @@ class Watch {
 
   Options options_;
   TopicListener listener_;
-  std::map<std::string, msg::ServiceStatus> services_;
+  std::map<std::string, msg::ServiceStatus> services_;  // by service and host
   std::set<std::string> silent_;
   std::map<std::string, WatchedTopic> topics_;
   std::vector<std::string> written_;

@@ -61,8 +61,8 @@ int list(const Options& options) {
   TopicListener listener(options.network, "railfix-topics");
   std::map<std::string, TopicStatistics> all;
   const auto watch = [&](const std::string& name) {
-    listener.listen(name, [&all](const std::string& topic, const auto&, const auto&,
-                                 const messaging::SampleInfo& info) { all[topic].add(info); });
+    listener.listen(name, [&all](const std::string& topic, const messaging::TopicInfo& type, const auto&,
+                                 const messaging::SampleInfo& info) { all[topic].add(type, info); });
   };
   listener.run(options.for_s > 0 ? options.for_s : kListS, [&] {
     for (const auto& name : listener.participant().written_topics()) watch(name);

@@ -2,6 +2,9 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include <algorithm>
+#include <functional>
+
 #include "messaging/operation_words.hpp"
 
 namespace railfix::tool {
@@ -14,19 +17,35 @@ const char* colour_of(uint8_t state, bool silent) {
   return state == msg::STATE_ACTIVE ? "\x1b[32m" : "";
 }
 
+/// Gives a host as a column of the table, or nothing where all services are on one.
+std::function<std::string(const std::string&)> host_column_of(
+    const std::map<std::string, msg::ServiceStatus>& services) {
+  std::set<std::string> hosts;
+  size_t width = std::string("host").size();
+  for (const auto& [key, status] : services) {
+    hosts.insert(status.host().c_str());
+    width = std::max(width, status.host().size());
+  }
+  if (hosts.size() < 2) return [](const std::string&) { return std::string(); };
+  return [width](const std::string& host) { return fmt::format("{:<{}} ", host, width); };
+}
+
 }  // namespace
 
 std::string service_table(const std::map<std::string, msg::ServiceStatus>& services,
                           const std::set<std::string>& silent, bool colours) {
-  std::string text = fmt::format("{:<15} {:<9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>6} {:>7}  {}\n", "service", "state",
-                                 "in", "out", "dropped", "p50 ms", "p99 ms", "cpu %", "MB", "reason");
-  for (const auto& [name, s] : services) {
-    const bool quiet = s.state() != msg::STATE_STOPPED && silent.contains(name);
+  const auto host_column = host_column_of(services);
+  std::string text =
+      fmt::format("{:<15} {}{:<9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>6} {:>7}  {}\n", "service", host_column("host"),
+                  "state", "in", "out", "dropped", "p50 ms", "p99 ms", "cpu %", "MB", "reason");
+  for (const auto& [key, s] : services) {
+    const bool quiet = s.state() != msg::STATE_STOPPED && silent.contains(key);
     const std::string state = fmt::format("{:<9}", quiet ? "SILENT" : messaging::name_of_state(s.state()));
-    text += fmt::format("{:<15} {} {:>8} {:>8} {:>8} {:>8.1f} {:>8.1f} {:>6.1f} {:>7.1f}  {}\n", name,
-                        colours ? colour_of(s.state(), quiet) + state + "\x1b[0m" : state, s.frames_in(),
-                        s.frames_out(), s.dropped(), s.latency_p50_ms(), s.latency_p99_ms(), s.cpu_percent(),
-                        s.rss_mb(), s.reason().c_str());
+    text +=
+        fmt::format("{:<15} {}{} {:>8} {:>8} {:>8} {:>8.1f} {:>8.1f} {:>6.1f} {:>7.1f}  {}\n", s.service().c_str(),
+                    host_column(s.host().c_str()), colours ? colour_of(s.state(), quiet) + state + "\x1b[0m" : state,
+                    s.frames_in(), s.frames_out(), s.dropped(), s.latency_p50_ms(), s.latency_p99_ms(), s.cpu_percent(),
+                    s.rss_mb(), s.reason().c_str());
   }
   return text;
 }

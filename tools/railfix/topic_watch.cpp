@@ -31,13 +31,9 @@ size_t distance(const std::string& a, const std::string& b) {
 
 }  // namespace
 
-void TopicStatistics::add(const messaging::SampleInfo& info) {
+void TopicStatistics::add(const messaging::TopicInfo& topic, const messaging::SampleInfo& info) {
   if (!info.valid) return;
-  const auto [last, first_of_writer] = last_sequence_.try_emplace(info.writer, info.sequence);
-  if (!first_of_writer) {
-    if (info.sequence > last->second + 1) lost_ += info.sequence - last->second - 1;
-    last->second = std::max(last->second, info.sequence);
-  }
+  lost_ += sequences_.before(info.writer, info.sequence, topic.qos.exclusive);
   if (samples_ == 0) {
     first_ns_ = info.received_ns;
   } else {
@@ -91,7 +87,7 @@ void BandwidthStatistics::add(const messaging::TopicInfo& topic, const void* sam
   smallest_ = all_.samples() == 0 ? bytes : std::min(smallest_, bytes);
   largest_ = std::max(largest_, bytes);
   bytes_ += bytes;
-  all_.add(info);
+  all_.add(topic, info);
 }
 
 double BandwidthStatistics::bytes_per_s() const {

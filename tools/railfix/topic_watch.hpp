@@ -2,18 +2,18 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "core/sequence_gaps.hpp"
 #include "messaging/messaging.hpp"
 
 namespace railfix::tool {
 
 class TopicStatistics {
  public:
-  void add(const messaging::SampleInfo& info);
+  void add(const messaging::TopicInfo& topic, const messaging::SampleInfo& info);
 
   [[nodiscard]] uint64_t samples() const { return samples_; }
   /// From the first to the last sample; 0 with less than two.
@@ -33,13 +33,13 @@ class TopicStatistics {
   int64_t shortest_ns_ = 0;
   int64_t longest_ns_ = 0;
   double latency_ms_ = 0;
-  std::map<uint64_t, uint64_t> last_sequence_;  // of each writer
+  core::SequenceGaps sequences_;
 };
 
 /// What `railfix topics hz`, `bw` and `delay` say of one topic.
 class RateStatistics {
  public:
-  void add(const messaging::TopicInfo&, const void*, const messaging::SampleInfo& info) { all_.add(info); }
+  void add(const messaging::TopicInfo& topic, const void*, const messaging::SampleInfo& info) { all_.add(topic, info); }
   [[nodiscard]] uint64_t samples() const { return all_.samples(); }
   [[nodiscard]] std::string line() const;
   [[nodiscard]] nlohmann::ordered_json json() const;

@@ -23,8 +23,9 @@ const std::string kDomain = "89";
 /// Says something twenty times a second while it lives.
 class Talker {
  public:
-  explicit Talker(const std::string& train)
+  explicit Talker(const std::string& train, bool with_standby = false)
       : participant_(network(train)),
+        with_standby_(with_standby),
         states_(participant_, topics::train_state),
         logs_(participant_, topics::log_record),
         statuses_(participant_, topics::service_status),
@@ -50,15 +51,19 @@ class Talker {
       log("fusion", 2, "goes on");
       log("fusion", 3, "wheel slides");
       log("odometry", 4, "camera is blind");
-      msg::ServiceStatus status;
-      status.service("fusion");
-      status.host("cab");
-      status.state(msg::STATE_DEGRADED);
-      status.reason("no wheel");
-      statuses_.write(status);
+      say("cab", msg::STATE_DEGRADED, "no wheel");
+      if (with_standby_) say("coach", msg::STATE_READY, "stands by, cab is in charge");
       participant_.assert_liveliness();
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
+  }
+  void say(const char* host, uint8_t state, const char* reason) {
+    msg::ServiceStatus status;
+    status.service("fusion");
+    status.host(host);
+    status.state(state);
+    status.reason(reason);
+    statuses_.write(status);
   }
   void log(const char* service, uint8_t level, const char* text) {
     msg::LogRecord record;
@@ -69,6 +74,7 @@ class Talker {
     logs_.write(record);
   }
   messaging::Participant participant_;
+  bool with_standby_;
   messaging::Writer<msg::TrainState> states_;
   messaging::Writer<msg::LogRecord> logs_;
   messaging::Writer<msg::ServiceStatus> statuses_;
@@ -113,6 +119,15 @@ TEST_F(Terminal, TopShowsServicesAndTopics) {
   const auto states = find(json["topics"], "topic", "train_state");
   EXPECT_GT(states["rate_hz"].get<double>(), 0);
   EXPECT_GT(states["bytes_per_s"].get<double>(), 0);
+}
+
+TEST_F(Terminal, TopTellsTwoHostsServicesOfOneNameApart) {
+  const Talker talker(train_, true);
+  const auto once = railfix({"top", "--once"});
+  EXPECT_EQ(once.exit_code, 0) << once.err;
+  EXPECT_THAT(once.out, ::testing::ContainsRegex("service +host +state"));
+  EXPECT_THAT(once.out, ::testing::ContainsRegex("fusion +cab +degraded .*no wheel"));
+  EXPECT_THAT(once.out, ::testing::ContainsRegex("fusion +coach +ready .*stands by"));
 }
 
 TEST_F(Terminal, TopTellsWhoHasFallenSilent) {

@@ -51,6 +51,19 @@ TEST(TopicStatistics, CountsWhatIsMissingAndTheGap) {
   EXPECT_NEAR(topic.usual_gap_s(), 0.01, 1e-3);
 }
 
+// A standby goes on counting while nobody hears it; it is heard when the other one falls silent.
+TEST(TopicStatistics, NothingIsLostWhenAStandbyTakesOver) {
+  for (const bool exclusive : {true, false}) {
+    TopicStatistics topic(exclusive);
+    topic.add({kBegin_ns, kBegin_ns, 10, 1, 100});
+    topic.add({kBegin_ns + kMs, kBegin_ns, 20, 2, 100});
+    topic.add({kBegin_ns + 2 * kMs, kBegin_ns, 500, 1, 100});
+    EXPECT_EQ(topic.numbers(kBegin_ns + 3 * kMs).lost, exclusive ? 0U : 489U);
+    topic.add({kBegin_ns + 4 * kMs, kBegin_ns, 503, 1, 100});
+    EXPECT_EQ(topic.numbers(kBegin_ns + 5 * kMs).lost, exclusive ? 2U : 491U);
+  }
+}
+
 TEST(TopicStatistics, TellsLatencyByPercentileAndBucket) {
   TopicStatistics topic;
   for (int i = 0; i < 100; ++i) topic.add(sample(10 * i, static_cast<uint64_t>(i), i + 1));

@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include "messaging/topics.hpp"
+
 namespace railfix::tool {
 
 namespace {
@@ -18,12 +20,15 @@ messaging::SampleInfo at(int64_t received_ms, uint64_t sequence, uint64_t writer
   return info;
 }
 
+const messaging::TopicInfo kOpen = messaging::info_of(messaging::topics::track_view);
+const messaging::TopicInfo kExclusive = messaging::info_of(messaging::topics::train_state);
+
 TEST(TopicStatistics, RateAndGaps) {
   TopicStatistics statistics;
   EXPECT_EQ(statistics.rate_hz(), 0);
-  statistics.add(at(1000, 1));
+  statistics.add(kOpen, at(1000, 1));
   EXPECT_EQ(statistics.rate_hz(), 0);
-  for (const int64_t ms : {1020, 1030, 1100}) statistics.add(at(ms, 2));
+  for (const int64_t ms : {1020, 1030, 1100}) statistics.add(kOpen, at(ms, 2));
   EXPECT_EQ(statistics.samples(), 4U);
   EXPECT_DOUBLE_EQ(statistics.rate_hz(), 30.0);
   EXPECT_DOUBLE_EQ(statistics.shortest_gap_ms(), 10.0);
@@ -33,17 +38,29 @@ TEST(TopicStatistics, RateAndGaps) {
 
 TEST(TopicStatistics, LossesAreCountedForEachWriter) {
   TopicStatistics statistics;
-  statistics.add(at(0, 10, 1));
-  statistics.add(at(1, 500, 2));
-  statistics.add(at(2, 11, 1));
+  statistics.add(kOpen, at(0, 10, 1));
+  statistics.add(kOpen, at(1, 500, 2));
+  statistics.add(kOpen, at(2, 11, 1));
   EXPECT_EQ(statistics.lost(), 0U);
-  statistics.add(at(3, 15, 1));
-  statistics.add(at(4, 502, 2));
+  statistics.add(kOpen, at(3, 15, 1));
+  statistics.add(kOpen, at(4, 502, 2));
   EXPECT_EQ(statistics.lost(), 4U);
   messaging::SampleInfo silent;
   silent.valid = false;
-  statistics.add(silent);
+  statistics.add(kOpen, silent);
   EXPECT_EQ(statistics.samples(), 5U);
+}
+
+// A standby goes on counting while nobody hears it; it is heard when the other one falls silent.
+TEST(TopicStatistics, NothingIsLostWhenAStandbyTakesOver) {
+  TopicStatistics statistics;
+  statistics.add(kExclusive, at(0, 10, 1));
+  statistics.add(kExclusive, at(1, 20, 2));
+  statistics.add(kExclusive, at(2, 500, 1));
+  statistics.add(kExclusive, at(3, 501, 1));
+  EXPECT_EQ(statistics.lost(), 0U);
+  statistics.add(kExclusive, at(4, 505, 1));
+  EXPECT_EQ(statistics.lost(), 3U);
 }
 
 TEST(SimilarNames, FindsWhatWasMeant) {
