@@ -36,10 +36,11 @@ std::optional<uint32_t> id_of(const json& value) {
 }  // namespace
 
 std::string foxglove_subprotocol(const std::vector<std::string>& offered) {
-  for (const char* known : {"foxglove.sdk.v1", "foxglove.websocket.v1"}) {
-    if (std::ranges::find(offered, known) != offered.end()) return known;
-  }
-  return "";
+  const auto known = [](const std::string& name) {
+    return name == "foxglove.sdk.v1" || name == "foxglove.websocket.v1";
+  };
+  const auto first = std::ranges::find_if(offered, known);
+  return first == offered.end() ? "" : *first;
 }
 
 std::string base64(std::string_view bytes) {
@@ -194,11 +195,10 @@ void FoxgloveApi::publish(const std::string& topic, const FoxgloveMessage& messa
   }
 }
 
-void FoxgloveApi::slow(const ClientPtr& client, uint64_t dropped) {
+// Always in the same words: viewers keep a list of those that differ.
+void FoxgloveApi::slow(const ClientPtr& client) {
   if (!clients_.contains(client->id())) return;
-  client->send(status(
-      kWarning, std::to_string(dropped) + " messages were left out: the connection is too slow for what is subscribed",
-      "slow"));
+  client->send(status(kWarning, "messages are left out: the connection is too slow for what is subscribed", "slow"));
 }
 
 }  // namespace railfix::monitor

@@ -11,7 +11,9 @@
 
 namespace railfix::monitor {
 
-/// The subprotocol to answer with, of those that the client offers; empty = none of Foxglove's.
+/// The subprotocol to answer with: the one that the client likes best (its order, RFC 6455, 1.9) of those that are
+/// known; empty = none is. Lichtblick offers both, but its client library up to 0.7.4 refuses any but
+/// `foxglove.websocket.v1`.
 std::string foxglove_subprotocol(const std::vector<std::string>& offered);
 
 struct FoxgloveChannel {
@@ -43,7 +45,7 @@ class FoxgloveApi {
   void closed(const ClientPtr& client);
   void message(const ClientPtr& client, const std::string& message, bool binary);
   /// Tells a client that messages were left out for it.
-  void slow(const ClientPtr& client, uint64_t dropped);
+  void slow(const ClientPtr& client);
 
   /// All channels that there are now; clients are told what is new and what is gone.
   void set_channels(const std::vector<FoxgloveChannel>& channels);

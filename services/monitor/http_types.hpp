@@ -67,7 +67,7 @@ struct Handlers {
   /// `why` is empty when the client went by itself.
   std::function<void(const ClientPtr&, const std::string& why)> closed;
   /// Droppable frames were left out; at most once a second.
-  std::function<void(const ClientPtr&, uint64_t dropped)> slow;
+  std::function<void(const ClientPtr&)> slow;
 };
 
 }  // namespace railfix::monitor

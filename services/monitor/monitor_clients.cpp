@@ -63,9 +63,7 @@ Handlers MonitorService::handlers() {
       live_.closed(client);
     });
   };
-  handlers.slow = [this](const ClientPtr& client, uint64_t dropped) {
-    context_.post([this, client, dropped] { foxglove_.slow(client, dropped); });
-  };
+  handlers.slow = [this](const ClientPtr& client) { context_.post([this, client] { foxglove_.slow(client); }); };
   return handlers;
 }
 

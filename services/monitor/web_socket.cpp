@@ -140,7 +140,7 @@ void WebSocket<Stream>::watch() {
     }
     if (self->dropped_ > self->dropped_told_) {
       self->dropped_told_ = self->dropped_;
-      self->shared_->handlers.slow(self, self->dropped_);
+      self->shared_->handlers.slow(self);
     }
     self->watch();
   });

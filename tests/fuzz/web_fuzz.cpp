@@ -41,7 +41,7 @@ class Server {
       client->resume();
     };
     handlers.closed = [](const ClientPtr&, const std::string&) {};
-    handlers.slow = [](const ClientPtr&, uint64_t) {};
+    handlers.slow = [](const ClientPtr&) {};
     return handlers;
   }
   HttpServer server_;

@@ -99,11 +99,13 @@ const actions = {
 
   // The protocol's own client, and the readers of Foxglove and Lichtblick: what is advertised, and messages as cdr and protobuf.
   foxglove() {
-    const wanted = ["serverInfo", "train_state", "picture/cam0", "rails/cam0", "place", "log", "camera_calibration"];
-    foxglove.FoxgloveClient.SUPPORTED_SUBPROTOCOL = argument; // the client knows the old name only
-    const client = new foxglove.FoxgloveClient({ ws: new WebSocket(`ws://127.0.0.1:${port}`, [argument]) });
+    const wanted = ["open", "serverInfo", "train_state", "picture/cam0", "rails/cam0", "place", "log", "camera_calibration"];
+    const protocols = argument.split(",");
+    foxglove.FoxgloveClient.SUPPORTED_SUBPROTOCOL = protocols[0]; // the client knows the old name only
+    const client = new foxglove.FoxgloveClient({ ws: new WebSocket(`ws://127.0.0.1:${port}`, protocols) });
     const names = new Map();
     const readers = new Map();
+    client.on("open", () => note("open", wanted)); // only with the subprotocol that it knows
     client.on("error", (error) => fail(error.message));
     client.on("close", () => fail("closed"));
     client.on("serverInfo", (info) => info.capabilities.length === 0 && note("serverInfo", wanted));

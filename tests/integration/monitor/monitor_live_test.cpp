@@ -286,6 +286,7 @@ TEST_F(MonitorLiveTest, SpeaksBothSubprotocolsOfFoxglove) {
   start();
   EXPECT_EQ(client("foxglove", "foxglove.websocket.v1"), "ok");
   EXPECT_EQ(client("foxglove", "foxglove.sdk.v1"), "ok");
+  EXPECT_EQ(client("foxglove", "foxglove.websocket.v1,foxglove.sdk.v1"), "ok") << "as Lichtblick asks";
 }
 
 TEST_F(MonitorLiveTest, SaysWhenTheTrainIsNotWell) {

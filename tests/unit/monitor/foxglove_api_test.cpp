@@ -44,7 +44,8 @@ class FoxgloveApiTest : public ::testing::Test {
 };
 
 TEST(Foxglove, ChoosesTheSubprotocol) {
-  EXPECT_EQ(foxglove_subprotocol({"foxglove.websocket.v1", "foxglove.sdk.v1"}), "foxglove.sdk.v1");
+  EXPECT_EQ(foxglove_subprotocol({"foxglove.websocket.v1", "foxglove.sdk.v1"}), "foxglove.websocket.v1");
+  EXPECT_EQ(foxglove_subprotocol({"foxglove.sdk.v1", "foxglove.websocket.v1"}), "foxglove.sdk.v1");
   EXPECT_EQ(foxglove_subprotocol({"other", "foxglove.websocket.v1"}), "foxglove.websocket.v1");
   EXPECT_EQ(foxglove_subprotocol({"foxglove.sdk.v2"}), "");
   EXPECT_EQ(foxglove_subprotocol({}), "");
