@@ -21,7 +21,7 @@ export const no_answer: Answer = { busy: false, done: true, text: "" };
 export async function send(answer: Signal<Answer>, service: string, command: string, argument = ""): Promise<boolean> {
   answer.value = { busy: true, done: true, text: "" };
   const reply = await ask.value(service, command, argument);
-  const text = reply.text || (reply.done ? `${command}: done` : `${command}: refused without a reason`);
+  const text = reply.done ? `Done: ${reply.text || command}` : reply.text || `${command}: refused without a reason`;
   answer.value = { busy: false, done: reply.done, text };
   return reply.done;
 }
