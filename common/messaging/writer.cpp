@@ -70,9 +70,13 @@ AnyWriter::AnyWriter(Participant& participant, const TopicInfo& topic, const std
 }
 
 // Shared memory is fresh when a writer is made: else each of its first pictures would wait for hundreds of page faults.
+// One sample more than may be loaned at a time lies in it; what is given back goes to the end of the row.
 void AnyWriter::Impl::touch_shared_memory() {
   std::vector<void*> loans;
   void* loan = nullptr;
+  if (writer->loan_sample(loan, dds::DataWriter::LoanInitializationKind::ZERO_LOAN_INITIALIZATION) ==
+      ReturnCode_t::RETCODE_OK)
+    writer->discard_loan(loan);
   while (loans.size() < static_cast<size_t>(topic.qos.depth) &&
          writer->loan_sample(loan, dds::DataWriter::LoanInitializationKind::ZERO_LOAN_INITIALIZATION) ==
              ReturnCode_t::RETCODE_OK) {
