@@ -87,7 +87,9 @@ class Estimator {
   [[nodiscard]] TrainEstimate estimate(const Interval& promised, double since_sure_m) const;
   [[nodiscard]] double since_reference_m() const { return std::abs(filter_.since_reference_m()); }
   /// What became of the last event, when it was a fix.
-  [[nodiscard]] bool fix_used() const { return fix_verdict_ == FixVerdict::used; }
+  [[nodiscard]] bool fix_used() const { return fix_verdict_ == FixVerdict::used || fix_corrected(); }
+  /// Used against the filter's word, because the one before, which was refused, says the same.
+  [[nodiscard]] bool fix_corrected() const { return fix_verdict_ == FixVerdict::corrected; }
   [[nodiscard]] bool fix_refused() const { return fix_verdict_ == FixVerdict::refused; }
 
   /// When the last event showed that the wheel slips: what it said since a little before is best taken back.
@@ -150,7 +152,7 @@ class Estimator {
     double ahead_m = 0;
   };
   static constexpr int kGnssProof = 30;
-  enum class FixVerdict : uint8_t { none, used, refused };
+  enum class FixVerdict : uint8_t { none, used, corrected, refused };
   struct RefusedFix {
     double residual_m = 0;
     double sigma_m = 0;

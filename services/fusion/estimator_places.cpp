@@ -135,6 +135,7 @@ void Estimator::refuse(const FixInput& fix, double path_distance_m, const Offer&
                              parameters_->gate_fix);
       corrected_ = true;
       accept(fix);
+      fix_verdict_ = FixVerdict::corrected;
       return;
     }
   }

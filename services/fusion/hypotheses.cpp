@@ -97,8 +97,9 @@ void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
 
 // The fix contradicts an earlier one and agrees with what is known without that one.
 bool Hypotheses::adopt_doubter() {
-  const auto fits = std::find_if(doubters_.rbegin(), doubters_.rend(),
-                                 [](const Doubter& doubter) { return doubter.estimator.fix_used(); });
+  const auto fits = std::find_if(doubters_.rbegin(), doubters_.rend(), [](const Doubter& doubter) {
+    return doubter.estimator.fix_used() && !doubter.estimator.fix_corrected();
+  });
   if (fits == doubters_.rend()) return false;
   std::swap(main_, fits->estimator);
   doubters_ = {Doubter{std::move(fits->estimator)}};
@@ -109,7 +110,7 @@ bool Hypotheses::adopt_doubter() {
 void Hypotheses::settle_doubters(const FixInput& fix, Estimator before) {
   const bool of_shape = fix.kind == FixKind::curvature;
   std::erase_if(doubters_, [&](Doubter& doubter) {
-    if (fix.new_path || doubter.estimator.fix_refused()) return true;
+    if (fix.new_path || doubter.estimator.fix_refused() || doubter.estimator.fix_corrected()) return true;
     if (of_shape) return doubter.of_shape;
     return doubter.of_shape || ++doubter.agreed >= kFixesToSettle;
   });

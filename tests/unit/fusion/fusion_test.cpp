@@ -6,52 +6,13 @@
 #include <cmath>
 #include <limits>
 
+#include "straight_run.hpp"
 #include "support/train/simulation.hpp"
 
 namespace railfix::fusion {
 namespace {
 
 using testing::HasSubstr;
-
-constexpr int64_t kBeginNs = 1'600'000'000'000'000'000;
-int64_t at(double t_s) {
-  return kBeginNs + core::to_ns(t_s);
-}
-
-std::shared_ptr<const track::Map> straight_line() {
-  auto map = std::make_shared<track::Map>();
-  map->edges.push_back({1, "line", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{20000, 0, 0}})});
-  map->nodes = {{1, track::NodeKind::end, "", 0, 0}, {2, track::NodeKind::end, "", 0, 20000}};
-  return map;
-}
-
-Fusion fusion_at(double offset_m, const FusionParameters& parameters = {}) {
-  return core::value_or_throw(
-      Fusion::create(parameters, straight_line(), track::EdgePosition{1, offset_m, track::Direction::forward}));
-}
-Fusion fusion_without_start() {
-  return core::value_or_throw(Fusion::create({}, straight_line(), std::nullopt));
-}
-
-OdometryInput step_at(double t_s, double speed_mps, double period_s = 0.02) {
-  return {at(t_s), at(t_s - period_s), speed_mps * period_s, 0.001, true};
-}
-FixInput fix_at(double t_s, double offset_m, uint32_t landmark, double probability = 0.9999) {
-  return {at(t_s), 1, offset_m, 0.1, probability, landmark, FixKind::landmark, track::Direction::forward, nullptr};
-}
-WheelInput wheel_at(double t_s, double metres) {
-  return {at(t_s), static_cast<int64_t>(std::floor(metres * 100)), 100};
-}
-
-// Runs with constant speed from `from_s` to `to_s`; the last state.
-TrainEstimate run(Fusion& fusion, double from_s, double to_s, double speed_mps) {
-  std::optional<TrainEstimate> last;
-  for (int i = 1; from_s + i * 0.02 <= to_s + 1e-9; ++i) {
-    if (auto state = fusion.add(step_at(from_s + i * 0.02, speed_mps))) last = state;
-  }
-  EXPECT_TRUE(last);
-  return last.value_or(TrainEstimate{});
-}
 
 TEST(Fusion, CameraAloneGivesPlaceSpeedAndInterval) {
   auto fusion = fusion_at(500);
@@ -79,46 +40,6 @@ TEST(Fusion, WithoutMapDistanceAndSpeedRun) {
   EXPECT_NEAR(state.distance_m, -50, 0.01);
   EXPECT_NEAR(state.speed_mps, -5, 0.05);
   EXPECT_THAT(state.reason, HasSubstr("place on the map not known"));
-}
-
-TEST(Fusion, NetworkFixStartsThePosition) {
-  auto fusion = fusion_without_start();
-  run(fusion, 0, 10, 20);
-  FixInput fix = fix_at(10, 4000, 0, 0.99);
-  fix.kind = FixKind::network;
-  fix.sigma_m = 3;
-  fix.direction = track::Direction::reverse;
-  fusion.add(fix);
-  const auto state = run(fusion, 10, 11, 20);
-  EXPECT_TRUE(state.track_known);
-  EXPECT_NEAR(state.position.offset_m, 3980, 0.1);
-  EXPECT_EQ(state.position.direction, track::Direction::reverse);
-  EXPECT_NEAR(state.distance_m, 220, 0.1);
-  EXPECT_GT(state.over_m, 4 * 3);
-  EXPECT_LT(state.over_m, 20);
-}
-
-TEST(Fusion, LandmarkIsIgnoredWhilePlaceIsUnknown) {
-  auto fusion = fusion_without_start();
-  run(fusion, 0, 1, 20);
-  fusion.add(fix_at(1, 4000, 7));
-  EXPECT_FALSE(run(fusion, 1, 2, 20).track_known);
-}
-
-TEST(Fusion, TwoLandmarksCalibrateTheCamerasScale) {
-  auto fusion = fusion_at(0);
-  double place_m = 0;
-  for (int k = 1; k <= 5; ++k) {
-    run(fusion, (k - 1) * 20.0, k * 20.0, 20);  // the camera says 400 m, truly it is 1 % more
-    place_m = k * 404.0;
-    fusion.add(fix_at(k * 20.0, place_m, static_cast<uint32_t>(k)));
-  }
-  const auto state = run(fusion, 100, 120, 20);
-  EXPECT_NEAR(state.visual_scale, 1.01, 0.001);
-  EXPECT_NEAR(state.position.offset_m, place_m + 404, 0.8);
-  EXPECT_EQ(state.reference, 5U);
-  EXPECT_NEAR(state.since_reference_m, 404, 1.0);
-  EXPECT_EQ(state.integrity, Integrity::ok) << state.reason;
 }
 
 // Motion alone says nothing of the scale; a filter that linearises badly believes otherwise.
@@ -290,55 +211,6 @@ TEST(Fusion, WithoutAnySensorTheIntervalGrowsAndSaysSo) {
   EXPECT_EQ(state->integrity, Integrity::unusable);
   EXPECT_THAT(state->reason, HasSubstr("no camera"));
   EXPECT_FALSE(fusion.tick(at(20)));  // no second state for one time
-}
-
-TEST(Fusion, OneFalseFixNeverMovesTheTrain) {
-  auto fusion = fusion_at(0);
-  run(fusion, 0, 10, 20);
-  fusion.add(fix_at(10, 260, 3));
-  const auto state = run(fusion, 10, 11, 20);
-  EXPECT_NEAR(state.position.offset_m, 220, 0.1);
-  EXPECT_THAT(state.reason, HasSubstr("a position fix was refused"));
-  EXPECT_GT(state.under_m, 60);  // but the interval admits that it may be right
-  EXPECT_LT(state.over_m, 20);
-}
-
-TEST(Fusion, TwoFixesThatAgreeMoveTheTrain) {
-  auto fusion = fusion_at(0);
-  run(fusion, 0, 10, 20);
-  fusion.add(fix_at(10, 260, 3));
-  run(fusion, 10, 15, 20);
-  fusion.add(fix_at(15, 360, 4));
-  const auto state = run(fusion, 15, 16, 20);
-  EXPECT_NEAR(state.position.offset_m, 380, 1);
-  EXPECT_EQ(state.integrity, Integrity::degraded);
-}
-
-// A false fix inside the interval is found out by the next one, and the interval held the truth meanwhile.
-TEST(Fusion, FalseFixInsideTheIntervalIsUndoneByTheNext) {
-  auto fusion = fusion_at(0);
-  run(fusion, 0, 20, 20);
-  fusion.add(fix_at(20, 410, 3, 0.99));
-  const auto misled = run(fusion, 20, 30, 20);
-  EXPECT_GT(misled.position.offset_m, 605);
-  EXPECT_GT(misled.over_m, misled.position.offset_m - 600);
-  fusion.add(fix_at(30, 600, 4, 0.99));
-  const auto state = run(fusion, 30, 31, 20);
-  EXPECT_NEAR(state.position.offset_m, 620, 0.5);
-  EXPECT_EQ(state.reference, 4U);
-}
-
-TEST(Fusion, ImprobableAndForeignFixesAreLeftOut) {
-  auto fusion = fusion_at(0);
-  run(fusion, 0, 10, 20);
-  fusion.add(fix_at(10, 203, 3, 0.5));
-  FixInput foreign = fix_at(10.01, 100, 4);
-  foreign.edge = 77;
-  fusion.add(foreign);
-  const auto state = run(fusion, 10, 11, 20);
-  EXPECT_NEAR(state.position.offset_m, 220, 0.1);
-  EXPECT_EQ(state.reference, 0U);
-  EXPECT_THAT(state.reason, HasSubstr("another track"));
 }
 
 TEST(Fusion, FollowsTheDeclaredTrackAndSaysWhileItIsOpen) {
