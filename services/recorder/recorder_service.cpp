@@ -97,6 +97,7 @@ void RecorderService::show_state() {
   if (now.lost > lost_) {
     context_.health().dropped(now.lost - lost_);
     lost_last_ns_ = core::monotonic_ns();
+    losses_ = now.losses;
   }
   lost_ = now.lost;
   for (const auto& news : now.news) {
@@ -114,7 +115,7 @@ void RecorderService::show_health(const RecorderState& now) {
   if (!now.problem.empty()) {
     context_.health().degraded(now.problem);
   } else if (now.recording && loses) {
-    context_.health().degraded("samples are lost: " + now.losses);
+    context_.health().degraded("samples are lost: " + losses_);
   } else if (now.recording && now.written > 0) {
     context_.health().active();
   } else {

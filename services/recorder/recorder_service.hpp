@@ -31,6 +31,7 @@ class RecorderService {
   uint64_t written_ = 0;
   uint64_t lost_ = 0;
   int64_t lost_last_ns_ = 0;
+  std::string losses_;  // as they were then: a new file begins at none
   std::string problem_;
   msg::RecorderStatus published_;
   int64_t published_ns_ = 0;

@@ -311,7 +311,8 @@ void RecorderThread::use(const Arrival& arrival) {
 void RecorderThread::record(const Arrival& arrival) {
   const std::string topic(arrival.topic);
   const auto* known = messaging::find_topic(topic);
-  if (arrival.live)
+  // Of a topic that is one sample deep only the newest is promised.
+  if (arrival.live && (known == nullptr || known->qos.depth > 1))
     recording_->note_sequence(topic, arrival.writer, arrival.sequence, known != nullptr && known->qos.exclusive);
   if (!arrival.recorded) return;
   ++received_;

@@ -43,7 +43,7 @@ Fault swapped(const std::string& service) {
           .begin =
               [=](Rig& rig) {
                 *before = rig.pid(service);
-                rig.set_arguments(service, {"--set", "common.log_level=info"});
+                rig.swap(service);
               },
           .end = {},
           .over = [=](Rig& rig) { return rig.replaced(service, *before); },

@@ -213,6 +213,16 @@ void Rig::send(const std::string& service_at_host, int signal) const {
   if (const pid_t one = pid(service_at_host); one > 0) kill(one, signal);
 }
 
+void Rig::swap(const std::string& service_at_host) const {
+  const size_t at = service_at_host.find('@');
+  const tool::HostFolder place(root(service_at_host.substr(at + 1)));
+  auto plan = place.plan();
+  for (auto& service : plan->services) {
+    if (service.name == service_at_host.substr(0, at)) service.settings += "swapped\n";
+  }
+  core::ok_or_throw(place.write(*plan));
+}
+
 void Rig::set_arguments(const std::string& service_at_host, const std::vector<std::string>& arguments) const {
   const size_t at = service_at_host.find('@');
   const tool::HostFolder place(root(service_at_host.substr(at + 1)));

@@ -56,6 +56,8 @@ class Rig {
   void send(const std::string& service_at_host, int signal) const;
   /// Another process than `before` runs, and nothing beside it any more.
   [[nodiscard]] bool replaced(const std::string& service_at_host, pid_t before) const;
+  /// Its process is replaced by another one of the same build, as an upgrade would do.
+  void swap(const std::string& service_at_host) const;
   /// More arguments for one service: it is started anew with them, as an upgrade would do; none = as it was.
   void set_arguments(const std::string& service_at_host, const std::vector<std::string>& arguments) const;
 

@@ -14,7 +14,7 @@ work=$(mktemp -d) id=first-report-$$
 on() { # on HOST COMMAND...
   local host=$1
   shift
-  ip netns exec "$id-$host" "$@"
+  nsenter --net="/run/netns/$id-$host" "$@" # `ip netns exec` would hide the control groups from the engine
 }
 end() {
   for host in cab coach; do
@@ -71,7 +71,10 @@ for host in cab coach; do
     { echo "$host does not come up:"; cat "$work/$host.log"; }) &
 done
 config=$work/coach/var/lib/railfix-train/generations/1/config.yaml
-until [ -f "$config" ]; do sleep 0.1; done
+until [ -f "$config" ]; do
+  [ -n "$(jobs -rp)" ] || exit 1 # said above
+  sleep 0.1
+done
 on coach railfix topics echo train_position_report --count 1 --for 600 --config "$config" >"$work/report"
 echo "first position report, heard in the coach: $(since) after railfix train up"
 cat "$work/report"
