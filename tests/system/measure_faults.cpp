@@ -118,7 +118,17 @@ void depart(Rig& rig, std::unique_ptr<Observer>& observer) {
   observer.reset();
   rig.depart();
   observer = std::make_unique<Observer>(rig, rig.options().ride / "truth");
-  if (observer->wait_whole(kUsualS)) return rig.forget_start();
+  if (observer->wait_whole(kUsualS)) {
+    rig.forget_start();
+    // Notes are for the start that a fusion was configured with.
+    for (const auto& service : rig.services()) {
+      if (!service.starts_with("fusion@")) continue;
+      const pid_t before = rig.pid(service);
+      rig.swap(service);
+      while (!rig.replaced(service, before)) observer->run(0.2);
+    }
+    if (observer->wait_whole(kUsualS)) return;
+  }
   std::string names;
   for (const auto& name : observer->heard().not_usual) names += (names.empty() ? "" : ", ") + name;
   throw std::runtime_error("the train does not get going: " + names + "; logs are in " + rig.folder().string());
