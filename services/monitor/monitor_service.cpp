@@ -24,6 +24,7 @@ constexpr int64_t kScrapeNs = 60 * core::kNsPerSecond;
 constexpr int64_t kLingerNs = 10 * core::kNsPerSecond;
 // What has come waits for so many turns of 50 ms when nobody looks.
 constexpr uint64_t kIdleTurns = 5;
+constexpr auto kSilencePeriod = 500ms;
 
 std::filesystem::path page_folder(const std::string& configured) {
   if (!configured.empty()) return configured;
@@ -98,7 +99,8 @@ void MonitorService::start_timers() {
   });
   context_.every(200ms, [this] { publish_curvature(); });
   context_.every(250ms, [this] { publish_log(); });
-  context_.every(500ms, [this] {
+  context_.every(kSilencePeriod, [this] {
+    look_for_silence();
     if (live_.watched("services")) live_.publish("services", services_message(services_, core::wall_ns()));
   });
   read_certificates();
@@ -117,12 +119,7 @@ void MonitorService::start_timers() {
 
 void MonitorService::set_up_topics() {
   on_topic_["service_status"] = [this](const Arrived& arrived) {
-    const auto& status = arrived.as<msg::ServiceStatus>();
-    if (arrived.info.valid) {
-      services_.note(status, core::wall_ns());
-    } else {
-      services_.note_silent(status, core::wall_ns());
-    }
+    if (arrived.info.valid) services_.note(arrived.as<msg::ServiceStatus>(), core::wall_ns());
   };
   const auto keep = [this]<class T>(const messaging::Topic<T>& topic, Newest<T>& newest) {
     on_topic_[topic.name] = [&newest](const Arrived& arrived) {
@@ -224,9 +221,9 @@ std::set<std::string> MonitorService::cameras() const {
 
 // What is light and needed to know whether the train is well is read all the time; the rest while somebody looks.
 std::set<std::string> MonitorService::wanted_topics() const {
-  std::set<std::string> names{"service_status", "log_record",        "recorder_status",       "player_status",
-                              "train_state",    "onboard_status",    "train_position_report", "gnss_fix",
-                              "service_reply",  "landmark_sighting", "camera_calibration",    "data_clock"};
+  std::set<std::string> names{
+      "service_status",        "log_record", "recorder_status", "player_status",      "train_state",
+      "train_position_report", "gnss_fix",   "service_reply",   "camera_calibration", "data_clock"};
   if (live_.watched("state")) names.insert({"train_pose", "position_fix"});
   if (live_.watched("curvature")) names.insert("track_view");
   const bool scraped = scraped_ns_ != 0 && core::wall_ns() - scraped_ns_ < kScrapeNs;
@@ -318,6 +315,15 @@ void MonitorService::read_certificates() {
       certificates_.push_back({file.substr(0, file.size() - kEnd.size()), left.value()});
   }
   std::ranges::sort(certificates_, {}, &TrainSeen::Certificate::name);
+}
+
+// A player sends statuses as they were recorded, at its own rate. Nor is anyone silent because the monitor itself was
+// held up, or because the clock was set.
+void MonitorService::look_for_silence() {
+  const int64_t now_ns = core::wall_ns();
+  const int64_t passed_ns = now_ns - std::exchange(silence_looked_ns_, now_ns);
+  const bool in_time = passed_ns >= 0 && passed_ns < ServiceBoard::kSilentNs - core::kNsPerSecond / 4;
+  if (in_time && !recent(player_)) services_.note_silence(now_ns);
 }
 
 void MonitorService::look_for_problems() {

@@ -65,6 +65,7 @@ class MonitorService {
   void show_channels();
   [[nodiscard]] TrainSeen train_seen();
   void read_certificates();
+  void look_for_silence();
   void look_for_problems();
 
   // monitor_shows.cpp: what is said to those who look
@@ -126,6 +127,7 @@ class MonitorService {
   std::vector<TrainSeen::Certificate> certificates_;
   bool looked_ = false;
   int64_t begun_ns_ = 0;
+  int64_t silence_looked_ns_ = 0;
   int64_t scraped_ns_ = 0;
   uint64_t slow_viewers_ = 0;
   uint64_t idle_turns_ = 0;

@@ -12,13 +12,12 @@ void ServiceBoard::note(const msg::ServiceStatus& status, int64_t now_ns) {
   seen.alive = true;
 }
 
-void ServiceBoard::note_silent(const msg::ServiceStatus& last, int64_t now_ns) {
-  const auto seen = services_.find(key_of(last));
-  if (seen == services_.end() || !seen->second.alive) return;
-  // A new program of this name may write already while the old one's lease runs out.
-  if (seen->second.status.pid() != last.pid()) return;
-  seen->second.alive = false;
-  if (!seen->second.stopped()) seen->second.since_ns = now_ns;
+void ServiceBoard::note_silence(int64_t now_ns) {
+  for (auto& [key, seen] : services_) {
+    if (!seen.alive || now_ns - seen.received_ns < kSilentNs) continue;
+    seen.alive = false;
+    if (!seen.stopped()) seen.since_ns = seen.received_ns;
+  }
 }
 
 const ServiceSeen* ServiceBoard::find(const std::string& service) const {

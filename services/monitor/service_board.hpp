@@ -14,19 +14,20 @@ struct ServiceSeen {
   msg::ServiceStatus status;
   int64_t received_ns = 0;
   int64_t since_ns = 0;  // in this state, for this reason, alive or not
-  bool alive = true;     // its liveliness lease has not run out
+  bool alive = true;     // has said something lately
   [[nodiscard]] bool stopped() const { return status.state() == msg::STATE_STOPPED; }
   [[nodiscard]] std::string name() const { return status.service().c_str(); }
 };
 
 class ServiceBoard {
  public:
+  static constexpr int64_t kSilentNs = 1'000'000'000;
   /// Its host and name tell one service from another.
   using Key = std::pair<std::string, std::string>;
 
   void note(const msg::ServiceStatus& status, int64_t now_ns);
-  /// Its liveliness lease ran out: dead, frozen or stopped.
-  void note_silent(const msg::ServiceStatus& last, int64_t now_ns);
+  /// Who has said nothing for kSilentNs is dead, frozen or stopped: services speak four times a second.
+  void note_silence(int64_t now_ns);
   [[nodiscard]] const std::map<Key, ServiceSeen>& services() const { return services_; }
   /// On whichever host; nullptr = never seen.
   [[nodiscard]] const ServiceSeen* find(const std::string& service) const;

@@ -33,9 +33,10 @@ void TrainWatch::read(const std::set<std::string>& names) {
     topic.statistics = TopicStatistics(info->qos.exclusive);
     topic.read_since_ns = core::wall_ns();
     messaging::TopicInfo lenient = *info;
-    if (!info->qos.transient_local) lenient.qos.reliable = false;
-    // Whether a writer lives is asked of service_status alone; every lease costs timers.
-    if (info->name != messaging::topics::service_status.name) lenient.qos.liveliness_lease_ns = 0;
+    // Statuses come again before anyone has missed one; asking for one again would cost an answer to each.
+    if (info->name == messaging::topics::service_status.name) lenient.qos.transient_local = false;
+    if (!lenient.qos.transient_local) lenient.qos.reliable = false;
+    lenient.qos.liveliness_lease_ns = 0;  // every lease costs timers at each word of its writer
     lenient.reader_queue = std::max(info->reader_queue, info->name == "camera_preview" ? size_t{4} : kWaiting);
     const size_t slash = name.find('/');
     topic.reader = std::make_unique<messaging::AnyReader>(

@@ -60,7 +60,8 @@ TEST_F(ProblemsTest, NamesServicesThatAreMissingDeadOrDegraded) {
   board_.note(status("odometry", msg::STATE_DEGRADED, "the picture is dark"), kNow_ns);
   EXPECT_THAT(only().what, HasSubstr("the picture is dark"));
   EXPECT_EQ(only().level, Level::warning);
-  board_.note_silent(status("odometry", msg::STATE_DEGRADED), kNow_ns);
+  board_.note(status("odometry", msg::STATE_DEGRADED), kNow_ns - ServiceBoard::kSilentNs);
+  board_.note_silence(kNow_ns);
   EXPECT_THAT(only().what, HasSubstr("dead or frozen"));
   EXPECT_EQ(only().level, Level::error);
   board_.note(status("odometry", msg::STATE_STOPPED), kNow_ns);

@@ -27,15 +27,21 @@ TEST(ServiceBoard, KnowsSinceWhen) {
 }
 
 TEST(ServiceBoard, TellsDeadFromStartedAnew) {
+  constexpr int64_t kSilentNs = ServiceBoard::kSilentNs;
   ServiceBoard board;
   board.note(status(msg::STATE_ACTIVE), 100);
-  board.note_silent(status(msg::STATE_ACTIVE), 200);
-  EXPECT_FALSE(board.find("odometry")->alive);
-  EXPECT_EQ(board.find("odometry")->since_ns, 200);
-  board.note(status(msg::STATE_STARTING, "", 2), 300);
+  board.note(status(msg::STATE_ACTIVE), 200);
+  board.note_silence(199 + kSilentNs);
   EXPECT_TRUE(board.find("odometry")->alive);
-  board.note_silent(status(msg::STATE_ACTIVE, "", 1), 400);
-  EXPECT_TRUE(board.find("odometry")->alive) << "the old program's lease ran out, the new one lives";
+  board.note_silence(200 + kSilentNs);
+  EXPECT_FALSE(board.find("odometry")->alive);
+  EXPECT_EQ(board.find("odometry")->since_ns, 200) << "since its last word";
+  board.note(status(msg::STATE_STARTING, "", 2), 300 + kSilentNs);
+  EXPECT_TRUE(board.find("odometry")->alive);
+  EXPECT_EQ(board.find("odometry")->since_ns, 300 + kSilentNs);
+  board.note(status(msg::STATE_STOPPED, "", 2), 400 + kSilentNs);
+  board.note_silence(400 + 2 * kSilentNs);
+  EXPECT_EQ(board.find("odometry")->since_ns, 400 + kSilentNs) << "stopped, not dead";
 }
 
 }  // namespace
