@@ -8,6 +8,7 @@
 #include "core/result.hpp"
 #include "mcap/reader.hpp"
 #include "messaging/operation_words.hpp"
+#include "not_negative.hpp"
 #include "recording/utc_text.hpp"
 #include "topic_listener.hpp"
 
@@ -95,7 +96,7 @@ void add_log(CLI::App& app, Action& chosen) {
   command->add_option("--level", options->level, "Only this level and more severe ones")
       ->check(CLI::IsMember(kLevels))
       ->capture_default_str();
-  command->add_option("--for", options->for_s, "End after this many seconds")->check(CLI::NonNegativeNumber);
+  command->add_option("--for", options->for_s, "End after this many seconds")->check(not_negative());
   command->add_flag("--json", options->json, "One JSON object a line");
   command->callback([options, &chosen] { chosen = [options] { return log(*options); }; });
 }

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "command_recording.hpp"
+#include "not_negative.hpp"
 #include "recording/copy.hpp"
 
 namespace railfix::tool {
@@ -49,8 +50,8 @@ void add_recording_cut(CLI::App& recording, Action& chosen) {
                                "standing values that held at its "
                                "beginning, e.g. railfix recording cut run.mcap --from 60 --to 90 --out event.mcap");
   command->add_option("file", options->files, "The recording")->required()->expected(1);
-  command->add_option("--from", options->cut.from_s, "Seconds into the recording")->check(CLI::NonNegativeNumber);
-  command->add_option("--to", options->cut.to_s, "Seconds into the recording")->check(CLI::NonNegativeNumber);
+  command->add_option("--from", options->cut.from_s, "Seconds into the recording")->check(not_negative());
+  command->add_option("--to", options->cut.to_s, "Seconds into the recording")->check(not_negative());
   command->add_option("--topics", options->cut.topics, "Only these, separated by commas")->delimiter(',');
   command->add_option("--without", options->cut.without, "Not these, separated by commas")->delimiter(',');
   command->add_option("--out", options->out, "The new recording")->required();

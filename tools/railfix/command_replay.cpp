@@ -9,6 +9,7 @@
 #include "commands.hpp"
 #include "core/time.hpp"
 #include "key_reader.hpp"
+#include "not_negative.hpp"
 #include "progress.hpp"
 #include "replay/player.hpp"
 
@@ -127,9 +128,8 @@ void add_options(CLI::App& command, CommandLine& line) {
   command.add_option("--without", options.without, "Not these, separated by commas")->delimiter(',');
   command.add_option("--remap", line.remaps, "RECORDED=NOW: publish a topic under another name; may be repeated");
   add_network(command, options.network);
-  command.add_option("--from", options.from_s, "Begin this many seconds into the recording")
-      ->check(CLI::NonNegativeNumber);
-  command.add_option("--to", options.to_s, "End this many seconds into the recording")->check(CLI::NonNegativeNumber);
+  command.add_option("--from", options.from_s, "Begin this many seconds into the recording")->check(not_negative());
+  command.add_option("--to", options.to_s, "End this many seconds into the recording")->check(not_negative());
   command.add_flag("--loop", options.loop, "Begin again at the end");
   command.add_flag("--paused", options.paused, "Wait for `play` or `step`");
   command.add_flag("--controlled", options.controlled, "Wait for commands at the end too; Ctrl-C ends");

@@ -12,6 +12,7 @@
 #include "core/time.hpp"
 #include "key_reader.hpp"
 #include "messaging/operation_words.hpp"
+#include "not_negative.hpp"
 #include "recording/utc_text.hpp"
 #include "service_table.hpp"
 #include "topic_listener.hpp"
@@ -221,7 +222,7 @@ void add_top(CLI::App& app, Action& chosen) {
   command->add_flag("--json", options->json, "One table as JSON, and end");
   command->add_flag("--no-colour", options->plain, "Without colours; as with NO_COLOR set");
   command->add_flag("--pictures", options->pictures, "Listen to whole pictures too, which costs processor time");
-  command->add_option("--for", options->for_s, "End after this many seconds")->check(CLI::NonNegativeNumber);
+  command->add_option("--for", options->for_s, "End after this many seconds")->check(not_negative());
   command->callback([options, &chosen] { chosen = [options] { return top(*options); }; });
 }
 

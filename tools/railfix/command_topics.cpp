@@ -10,6 +10,7 @@
 #include "commands.hpp"
 #include "core/time.hpp"
 #include "messaging/topics.hpp"
+#include "not_negative.hpp"
 #include "topic_listener.hpp"
 #include "topic_watch.hpp"
 
@@ -182,7 +183,7 @@ int echo(const Options& options) {
 void add_common(CLI::App& command, Options& options) {
   add_network(command, options.network);
   command.add_flag("--json", options.json, "JSON on standard output");
-  command.add_option("--for", options.for_s, "End after this many seconds")->check(CLI::NonNegativeNumber);
+  command.add_option("--for", options.for_s, "End after this many seconds")->check(not_negative());
 }
 
 }  // namespace

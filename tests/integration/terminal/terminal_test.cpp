@@ -163,6 +163,14 @@ TEST_F(Terminal, TopTellsWhoHasFallenSilent) {
   EXPECT_EQ(recorder.end(SIGTERM), 0);
 }
 
+TEST_F(Terminal, SaysWhatIsWrongWithATime) {
+  for (const char* wrong : {"-1", "soon"}) {
+    const auto top = railfix({"top", "--once", "--for", wrong});
+    EXPECT_EQ(top.exit_code, 2);
+    EXPECT_THAT(top.err, HasSubstr(std::string(wrong) + " is not a number of seconds from 0 on"));
+  }
+}
+
 TEST_F(Terminal, TopSaysWhenNobodyIsThere) {
   const auto top = railfix({"top", "--once", "--for", "1"});
   EXPECT_EQ(top.exit_code, 1);

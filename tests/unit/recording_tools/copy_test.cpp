@@ -135,7 +135,10 @@ TEST_F(Copy, ACutHasOnlyTheTopicsOneWants) {
   EXPECT_THAT(none.error().message, HasSubstr("it has camera_calibration, odometry_step"));
   const auto behind = cut_recording(a_, folder_ / "none.mcap", {5, 9, {}, {}});
   ASSERT_FALSE(behind.ok());
-  EXPECT_THAT(behind.error().message, HasSubstr("is 1.000000 s long"));
+  EXPECT_THAT(behind.error().message, HasSubstr("there is nothing from 5 s to 9 s: " + a_.string() + " is 1.0 s long"));
+  const auto open_end = cut_recording(a_, folder_ / "none.mcap", {5, kAll, {}, {}});
+  ASSERT_FALSE(open_end.ok());
+  EXPECT_THAT(open_end.error().message, HasSubstr("there is nothing from 5 s to the end"));
   EXPECT_FALSE(fs::exists(folder_ / "none.mcap"));
 }
 

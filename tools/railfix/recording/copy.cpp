@@ -1,5 +1,7 @@
 #include "recording/copy.hpp"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -97,9 +99,9 @@ core::Result<mcap::Selection> part_of(const mcap::Reader& reader, const CutOptio
   const auto& statistics = reader.statistics();
   const double length_s = core::seconds(statistics.end_ns - statistics.start_ns);
   if (options.from_s > length_s || options.to_s <= options.from_s) {
-    return core::Error{"there is nothing from " + std::to_string(options.from_s) + " s to " +
-                       std::to_string(options.to_s) + " s: " + reader.file().string() + " is " +
-                       std::to_string(length_s) + " s long"};
+    const std::string end = std::isfinite(options.to_s) ? fmt::format("{:g} s", options.to_s) : "the end";
+    return core::Error{fmt::format("there is nothing from {:g} s to {}: {} is {:.1f} s long", options.from_s, end,
+                                   reader.file().string(), length_s)};
   }
   auto topics = chosen_topics(reader, options);
   if (!topics.ok()) return topics.error();

@@ -1,5 +1,6 @@
 // What a player does when it is told to.
 #include <sched.h>
+#include <spdlog/fmt/fmt.h>
 
 #include "core/time.hpp"
 #include "replay/player.hpp"
@@ -93,7 +94,7 @@ core::Result<std::string> Player::seek(const std::string& argument) {
   const auto into_s = number_of(argument);
   const double length_s = core::seconds(to_ns_ - from_ns_);
   if (!into_s || *into_s < 0 || *into_s > length_s) {
-    return core::Error{"seek needs seconds from 0 to " + std::to_string(length_s) + ", not '" + argument + "'"};
+    return core::Error{fmt::format("seek needs seconds from 0 to {:.3f}, not '{}'", length_s, argument)};
   }
   if (state_ == msg::PLAYER_ENDED) state_ = msg::PLAYER_PAUSED;
   stepping_ = false;

@@ -1,4 +1,6 @@
 // How a player finds its part of the recording, the others on the train, and its channels.
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -54,8 +56,8 @@ void Player::find_part() {
   const auto& statistics = reader_->statistics();
   const double length_s = core::seconds(statistics.end_ns - statistics.start_ns);
   if (options_.from_s > length_s) {
-    throw core::BadInput("--from " + std::to_string(options_.from_s) + " is behind the end of " +
-                         options_.file.string() + ", which is " + std::to_string(length_s) + " s long");
+    throw core::BadInput(fmt::format("--from {:g} is behind the end of {}, which is {:.1f} s long", options_.from_s,
+                                     options_.file.string(), length_s));
   }
   if (options_.to_s <= options_.from_s) throw core::BadInput("--to must be behind --from");
   from_ns_ = statistics.start_ns + core::to_ns(options_.from_s);
