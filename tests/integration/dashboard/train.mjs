@@ -44,12 +44,12 @@ export function simulate(folder, seconds) {
 }
 
 export class Train {
-  static async start(seconds, settings = []) {
+  static async start(seconds, settings = [], draw = simulate) {
     const train = new Train();
     train.settings = settings;
     train.folder = mkdtempSync(join(tmpdir(), "railfix-dashboard-"));
     try {
-      simulate(train.path("line"), seconds);
+      draw(train.path("line"), seconds);
       train.port = await free_port();
       await train.run();
     } catch (error) {

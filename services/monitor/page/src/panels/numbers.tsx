@@ -63,7 +63,7 @@ function edge_name(edge: number): string {
 }
 
 function reference(one: TrainState): string {
-  return one.reference === null ? "not yet fixed to anything" : `${metres(one.since_reference_m)} since ${words(one.reference)}`;
+  return one.reference === null ? "no landmark passed yet" : `${metres(one.since_reference_m)} since ${words(one.reference)}`;
 }
 
 function Where({ one }: { one: TrainState }) {
