@@ -2,8 +2,10 @@
 
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastrtps/utils/IPLocator.h>
+#include <fastrtps/xmlparser/XMLProfileManager.h>
 #include <algorithm>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <mutex>
 
 #include "core/time.hpp"
 #include "messaging/fastdds_types.hpp"
@@ -140,7 +142,21 @@ void Participant::Impl::join(Ends& ends) {
   ends.subscriber = participant->create_subscriber(subscriber_qos);
 }
 
+namespace {
+
+// Participants of one process talk as those of two do. The short cut that 2.9.1 takes between them keeps pointers to
+// endpoints of a participant that may be leaving (eProsima/Fast-DDS#2199).
+void forbid_short_cuts() {
+  eprosima::fastrtps::LibrarySettingsAttributes settings;
+  settings.intraprocess_delivery = eprosima::fastrtps::INTRAPROCESS_OFF;
+  eprosima::fastrtps::xmlparser::XMLProfileManager::library_settings(settings);
+}
+
+}  // namespace
+
 Participant::Participant(const ParticipantOptions& options) : impl_(std::make_unique<Impl>()) {
+  static std::once_flag once;
+  std::call_once(once, forbid_short_cuts);
   impl_->options = options;
   auto* factory = dds::DomainParticipantFactory::get_instance();
   if (!options.qos_profiles.empty()) {
