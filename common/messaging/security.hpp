@@ -1,6 +1,7 @@
 // DDS Security (OMG DDS-SEC 1.1) of a train: who may join and which topics each service may write.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <utility>
@@ -16,6 +17,9 @@ namespace railfix::messaging {
 /// Empty folder name: none. Error: a file that is missing or cannot be read.
 core::Result<std::vector<std::pair<std::string, std::string>>> security_properties(const std::filesystem::path& folder,
                                                                                    const std::string& service);
+
+/// Who is asked about certificates warns from this many days before the end on.
+inline constexpr int64_t kCertificateWarningDays = 30;
 
 /// Days until the certificate runs out, negative when it has. Error: no certificate.
 core::Result<int64_t> days_left(const std::filesystem::path& certificate);

@@ -17,7 +17,6 @@ constexpr std::chrono::milliseconds kStatusPeriod{250};
 constexpr std::chrono::seconds kCablePeriod{1};
 constexpr std::chrono::seconds kWritersPeriod{1};
 constexpr std::chrono::hours kCertificatePeriod{6};
-constexpr int64_t kCertificateDays = 30;
 constexpr int64_t kIdleNs = core::kNsPerSecond;
 
 // Standing values and the words of operation are never held back.
@@ -94,7 +93,7 @@ void Loop::watch_writers() {
 void Loop::watch_certificate() {
   const auto look = [this] {
     const auto left = messaging::days_left(std::filesystem::path(common_.security) / (service_ + ".cert.pem"));
-    if (left.ok() && left.value() < kCertificateDays)
+    if (left.ok() && left.value() < messaging::kCertificateWarningDays)
       log_->warn(
           "this service's certificate {} days; railfix train keys --renew, then railfix train upgrade on each host",
           left.value() < 0 ? "ran out before " + std::to_string(-left.value())

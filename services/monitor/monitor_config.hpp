@@ -1,6 +1,7 @@
 // Configuration of the monitor: section `monitor`.
 #pragma once
 
+#include "messaging/security.hpp"
 #include "service/config.hpp"
 
 namespace railfix::monitor {
@@ -24,7 +25,7 @@ struct MonitorConfig {
                                        "map_matcher",   "fusion",         "tpr_publisher",  "recorder"};
   double interval_wide_m = 100;
   double disk_low_mb = 1000;
-  int64_t certificate_days = 30;
+  int64_t certificate_days = messaging::kCertificateWarningDays;
 
   void describe(service::Fields& fields) {
     fields.text("address", address,

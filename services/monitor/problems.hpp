@@ -51,7 +51,7 @@ struct TrainSeen {
     int64_t days_left = 0;
   };
   std::vector<Certificate> certificates;  // of this host's services
-  int64_t certificate_days = 30;
+  int64_t certificate_days = 0;
   double interval_wide_m = 100;
   double disk_low_mb = 1000;
 };

@@ -24,7 +24,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int64_t kSoonDays = 30;    // where settings.monitor.certificate_days does not say otherwise
 constexpr double kPicturesMb = 512;  // histories of two cameras
 constexpr double kSharedMemoryMb = 16;
 constexpr double kRecordingsMb = 2000;
@@ -132,7 +131,7 @@ void check_ports(const Manifest& manifest, Findings& findings) {
 }
 
 int64_t warning_days(const Manifest& manifest) {
-  int64_t days = kSoonDays;
+  int64_t days = messaging::kCertificateWarningDays;
   const auto section = manifest.settings["monitor"];
   if (section && section.IsMap() && section["certificate_days"])
     (void)YAML::convert<int64_t>::decode(section["certificate_days"], days);
@@ -267,7 +266,7 @@ std::vector<Finding> check_installed_certificates(const HostFolder& folder) {
   if (!plan) return findings;
   for (const auto& service : plan->services) {
     const auto keys = folder.generation(service.generation) / "security";
-    if (fs::exists(keys)) check_certificate(keys / (service.name + ".cert.pem"), kSoonDays, findings);
+    if (fs::exists(keys)) check_certificate(keys / (service.name + ".cert.pem"), messaging::kCertificateWarningDays, findings);
   }
   return findings;
 }
