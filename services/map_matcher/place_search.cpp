@@ -15,6 +15,7 @@ struct WindowShape {
 // 800 m between the switches, 2.4 km where the way is plain, 500 m where it bends much.
 constexpr std::array kWindowShapes{WindowShape{5, 8}, WindowShape{10, 12}, WindowShape{5, 5}};
 constexpr double kTurnRad = 0.035;
+constexpr double kBendRad = 0.045;
 constexpr double kShiftM = 20.0;      // grid, scale over half a window
 constexpr size_t kPlainHits = 25000;  // a stretch that fits at so many places is too plain
 constexpr size_t kMostStretches = 8;
@@ -48,7 +49,8 @@ std::vector<size_t> PlaceSearch::stretches(size_t bins) const {
 
 // A place is found to a cell or two, and the scale moves the ends: where the curvature changes that makes a difference.
 PlaceSearch::Window PlaceSearch::window_at(size_t first_bin, size_t segment_bins, size_t segments, double scale) const {
-  Window window{first_bin, segment_bins, scale, std::vector<double>(segments, 0), std::vector<double>(segments, 0), {}};
+  Window window{first_bin, segment_bins, scale, std::vector<double>(segments, 0), std::vector<double>(segments, 0),
+                {},        {},           {}};
   for (size_t k = 0; k < segments; ++k) {
     const size_t from = first_bin + k * segment_bins;
     double low = INFINITY;
@@ -66,7 +68,24 @@ PlaceSearch::Window PlaceSearch::window_at(size_t first_bin, size_t segment_bins
   std::sort(window.order.begin(), window.order.end(), [&](size_t a, size_t b) {
     return std::abs(window.turns[a]) - window.tolerances[a] > std::abs(window.turns[b]) - window.tolerances[b];
   });
+  add_bends(window);
   return window;
+}
+
+void PlaceSearch::add_bends(Window& window) const {
+  std::vector<double> headings{0};
+  for (const double turn : window.turns) headings.push_back(headings.back() + turn);
+  const double per_segment = headings.back() / static_cast<double>(window.turns.size());
+  for (size_t k = 0; k < headings.size(); ++k) {
+    window.bends.push_back(headings[k] - static_cast<double>(k) * per_segment);
+    double change = 0;
+    const size_t bin = window.first_bin + k * window.segment_bins;
+    for (size_t i = bin > 1 ? bin - 2 : 0; i < std::min(way_.size(), bin + 2); ++i) {
+      change = std::max(change, std::abs(way_[i].turn_rad - per_segment / static_cast<double>(window.segment_bins)));
+    }
+    const double share = parameters_.curvature_share * std::abs(window.bends.back());
+    window.bend_tolerances.push_back(kBendRad + kShiftM / kBinM * change + share);
+  }
 }
 
 // What tells most is compared everywhere, without a branch, the rest where that fits.
@@ -113,6 +132,12 @@ void PlaceSearch::look_on(size_t chain, bool forward, const Window& window, Scra
       fits = std::abs(error) < window.tolerances[k];
       if (!fits) break;
       squared += error * error / (window.tolerances[k] * window.tolerances[k]);
+    }
+    const auto segments = static_cast<double>(window.turns.size());
+    const double per_segment = static_cast<double>(heading[ends.back()] - heading[0]) / segments;
+    for (size_t k = 1; k + 1 < window.bends.size() && fits; ++k) {
+      const double bend = static_cast<double>(heading[ends[k]] - heading[0]) - static_cast<double>(k) * per_segment;
+      fits = std::abs(bend - window.bends[k]) < window.bend_tolerances[k];
     }
     if (!fits) continue;
     // Neighbouring cells are one place: the best of them is kept.

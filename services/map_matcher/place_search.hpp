@@ -27,6 +27,10 @@ class PlaceSearch {
     std::vector<double> turns;
     std::vector<double> tolerances;
     std::vector<size_t> order;  // what tells most, first
+    // Headings at the ends of the segments, less the straight line between the first and the last one: a constant error
+    // of the sensor does not matter, and errors of the map do not add up.
+    std::vector<double> bends;
+    std::vector<double> bend_tolerances;
     [[nodiscard]] size_t end_bin() const { return first_bin + segment_bins * turns.size(); }
   };
   /// A candidate before it is known on which edge it lies.
@@ -58,6 +62,7 @@ class PlaceSearch {
   [[nodiscard]] std::vector<Look> looks();
   [[nodiscard]] static int apart(std::vector<Window> windows);
   [[nodiscard]] static std::vector<Look> chosen(std::vector<Look> looks, bool& complete);
+  void add_bends(Window& window) const;
   struct Scratch {
     std::vector<std::ptrdiff_t> ends;
     std::vector<std::ptrdiff_t> fitting;
