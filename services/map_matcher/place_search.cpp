@@ -15,7 +15,7 @@ struct WindowShape {
 // 800 m between the switches, 2.4 km where the way is plain, 500 m where it bends much.
 constexpr std::array kWindowShapes{WindowShape{5, 8}, WindowShape{10, 12}, WindowShape{5, 5}};
 constexpr double kTurnRad = 0.035;
-constexpr double kBendRad = 0.045;
+constexpr double kBendRad = 0.045;    // of a heading against the straight line between the ends
 constexpr double kShiftM = 20.0;      // grid, scale over half a window
 constexpr size_t kPlainHits = 25000;  // a stretch that fits at so many places is too plain
 constexpr size_t kMostStretches = 8;
@@ -88,6 +88,22 @@ void PlaceSearch::add_bends(Window& window) const {
   }
 }
 
+std::optional<double> PlaceSearch::Window::squared_error(const float* heading,
+                                                         const std::vector<std::ptrdiff_t>& ends) const {
+  double squared = 0;
+  for (const size_t k : order) {
+    const double error = static_cast<double>(heading[ends[k + 1]] - heading[ends[k]]) - turns[k];
+    if (std::abs(error) >= tolerances[k]) return std::nullopt;
+    squared += error * error / (tolerances[k] * tolerances[k]);
+  }
+  const double per_segment = static_cast<double>(heading[ends.back()] - heading[0]) / static_cast<double>(turns.size());
+  for (size_t k = 1; k + 1 < bends.size(); ++k) {
+    const double bend = static_cast<double>(heading[ends[k]] - heading[0]) - static_cast<double>(k) * per_segment;
+    if (std::abs(bend - bends[k]) >= bend_tolerances[k]) return std::nullopt;
+  }
+  return squared;
+}
+
 // What tells most is compared everywhere, without a branch, the rest where that fits.
 void PlaceSearch::look_on(size_t chain, bool forward, const Window& window, Scratch& scratch,
                           std::vector<Hit>& hits) const {
@@ -124,28 +140,14 @@ void PlaceSearch::look_on(size_t chain, bool forward, const Window& window, Scra
   std::ptrdiff_t first = -kSameCells;
   for (size_t n = 0; n < count; ++n) {
     const std::ptrdiff_t i = fitting[n];
-    const float* heading = headings.data() + i;
-    double squared = 0;
-    bool fits = true;
-    for (const size_t k : window.order) {
-      const double error = static_cast<double>(heading[ends[k + 1]] - heading[ends[k]]) - window.turns[k];
-      fits = std::abs(error) < window.tolerances[k];
-      if (!fits) break;
-      squared += error * error / (window.tolerances[k] * window.tolerances[k]);
-    }
-    const auto segments = static_cast<double>(window.turns.size());
-    const double per_segment = static_cast<double>(heading[ends.back()] - heading[0]) / segments;
-    for (size_t k = 1; k + 1 < window.bends.size() && fits; ++k) {
-      const double bend = static_cast<double>(heading[ends[k]] - heading[0]) - static_cast<double>(k) * per_segment;
-      fits = std::abs(bend - window.bends[k]) < window.bend_tolerances[k];
-    }
-    if (!fits) continue;
+    const auto squared = window.squared_error(headings.data() + i, ends);
+    if (!squared) continue;
     // Neighbouring cells are one place: the best of them is kept.
     const bool same = i - first < kSameCells;
     if (!same) first = i;
-    if (same && squared >= hits.back().squared) continue;
+    if (same && *squared >= hits.back().squared) continue;
     if (same) hits.pop_back();
-    hits.push_back({chain, forward, i, squared, 0});
+    hits.push_back({chain, forward, i, *squared, 0});
   }
 }
 

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <tuple>
 #include <vector>
 
@@ -32,6 +33,9 @@ class PlaceSearch {
     std::vector<double> bends;
     std::vector<double> bend_tolerances;
     [[nodiscard]] size_t end_bin() const { return first_bin + segment_bins * turns.size(); }
+    /// Of a way that begins at `heading`, its segments' ends at these cells from there; nothing when it does not fit.
+    [[nodiscard]] std::optional<double> squared_error(const float* heading,
+                                                      const std::vector<std::ptrdiff_t>& ends) const;
   };
   /// A candidate before it is known on which edge it lies.
   struct Hit {
