@@ -30,6 +30,7 @@ constexpr double kBridgeS = 10.0;  // as long as the IMU alone is good for a spe
 constexpr double kTaughtS = 30.0;
 constexpr double kBlindS = 0.3;
 constexpr double kHiddenSlipMps = 0.7;
+constexpr double kHiddenSlipShare = 0.07;  // of the speed
 constexpr double kUnseenBiasSigmas = 4.0;
 constexpr double kUnknownSpeedMps = 10.0;
 
@@ -164,9 +165,10 @@ void Estimator::watch_alone(double way_m, double dt_s) {
     unwatched_.ahead_m = std::max(unwatched_.ahead_m, unwatched_.apart_m);
   }
   // Nobody else measures for a while: a slip may be no larger than what passes for a change of speed.
-  if (is_watched() && !used_within(Source::camera, kBlindS) && !used_within(Source::imu, kLatelyS)) {
-    const double most_m = kHiddenSlipMps * parameters_->wheel_slip_s;
-    const double more_m = std::min(kHiddenSlipMps * dt_s, parameters_->wheel_slip_share * std::abs(way_m));
+  if (is_watched() && wheel_is_alone()) {
+    const double hidden_mps = std::max(kHiddenSlipMps, kHiddenSlipShare * std::abs(filter_.speed_mps()));
+    const double more_m = std::min(hidden_mps * dt_s, parameters_->wheel_slip_share * std::abs(way_m));
+    const double most_m = std::max(unwatched_.hidden_m, hidden_mps * parameters_->wheel_slip_s);
     unwatched_.hidden_m = std::min(unwatched_.hidden_m + more_m, most_m);
   }
   const double share = unwatched_share();
@@ -174,9 +176,15 @@ void Estimator::watch_alone(double way_m, double dt_s) {
   unwatched_.fastest_mps = std::max(unwatched_.fastest_mps, share * std::abs(filter_.speed_mps()));
 }
 
-// A camera sees every slip; what it has taught an IMU is good for some time.
+bool Estimator::wheel_is_alone() const {
+  return !used_within(Source::camera, kBlindS) && !used_within(Source::imu, kLatelyS);
+}
+
+// A camera sees every slip; what it has taught an IMU is good for some time. A wheel that was seen to slip since then,
+// and has nobody beside it, is not believed when it seems well again.
 bool Estimator::is_watched() const {
-  return used_within(Source::camera, kTaughtS);
+  const bool slipped = watch(Source::wheel).changed_ns > watch(Source::camera).used_ns;
+  return used_within(Source::camera, kTaughtS) && !(slipped && wheel_is_alone());
 }
 
 // An IMU sees none that has been there from the beginning, and later as little as it knows

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/random.hpp"
 #include "track_detector/platform_tracker.hpp"
 #include "track_detector/upright_objects.hpp"
 
@@ -126,6 +127,39 @@ TEST(Uprights, TheFaintEndOfABrightWallIsThePortalOut) {
   ASSERT_EQ(told.size(), 2U);
   EXPECT_EQ(told[1].type, LandmarkType::portal_out);
   EXPECT_NEAR(told[1].place_m, 70.5, 0.08);
+}
+
+// Greys of a drawn tunnel: the camera is used to the dark, and one wall's panel as bright as land was before it.
+TEST(Uprights, APanelThatGlaresBeforeTheEndIsNotThePortalOut) {
+  std::vector<Corner> corners;
+  for (const double side : {1.0, -1.0}) {
+    corners.push_back({40, side * 2.7, 70, 120, 60, 15});
+    corners.push_back({60, side * 2.7, side > 0 ? 99.0 : 76.0, side > 0 ? 51.0 : 46.0, side > 0 ? 101.0 : 76.0, 211});
+    corners.push_back({62.5, side * 2.7, 79, 58, 80, 233});
+    corners.push_back({67.5, side * 2.7, 121, 65, 129, 249});
+    corners.push_back({70, side * 2.7, 164, 103, 176, 249});
+    corners.push_back({72.5, side * 2.7, 244, 143, 247, 249});
+  }
+  const auto told = pass(corners, 80);
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_EQ(told[1].type, LandmarkType::portal_out);
+  EXPECT_NEAR(told[1].place_m, 72.5, 0.08);
+}
+
+// A burnt-out picture shows noise where the last step of a wall is looked for.
+TEST(Uprights, NoiseIsNoLastStepOfAWall) {
+  for (uint64_t seed = 1; seed <= 40; ++seed) {
+    core::Random random(seed);
+    EdgeTracker tracker;
+    std::vector<UprightEdge> edges;
+    double way_m = 0;
+    for (; way_m < 30; way_m += kStepM) {
+      auto profile = see({}, way_m, edges);
+      for (float& score : profile.score) score = static_cast<float>(0.6 * random.normal());
+      tracker.follow(edges, profile, {}, way_m);
+    }
+    EXPECT_FALSE(tracker.last_step({-2.7, 2.7}, way_m, way_m + 2.3)) << "seed " << seed;
+  }
 }
 
 TEST(Uprights, WallsWithDaylightBehindAreABridge) {
