@@ -12,6 +12,7 @@ namespace dds = eprosima::fastdds::dds;
 namespace {
 
 const eprosima::fastrtps::Duration_t kLastWordsPatience{0, 300'000'000};
+constexpr int kFailuresBeforeClearing = 4;
 
 }  // namespace
 
@@ -24,8 +25,10 @@ struct AnyWriter::Impl : dds::DataWriterListener {
   dds::DataWriter* writer = nullptr;
   std::shared_ptr<void> scratch;  // for topics whose samples cannot be loaned
   std::shared_ptr<SentCount> sent;
+  int failed_in_a_row = 0;
 
   bool send(void* sample);
+  void free_memory_when_stuck();
   void touch_shared_memory();
 
   ~Impl() override {
@@ -85,8 +88,18 @@ void AnyWriter::Impl::touch_shared_memory() {
   for (void* one : loans) writer->discard_loan(one);
 }
 
+// Shared memory holds one sample more than the history. Should one be lost inside the middleware, a full history leaves
+// none for the next sample, whose coming would have made the oldest go: from then on every write would fail.
+void AnyWriter::Impl::free_memory_when_stuck() {
+  if (!topic.qos.data_sharing || ++failed_in_a_row < kFailuresBeforeClearing) return;
+  failed_in_a_row = 0;
+  size_t removed = 0;
+  writer->clear_history(&removed);
+}
+
 bool AnyWriter::Impl::send(void* sample) {
   if (!writer->write(sample)) return false;
+  failed_in_a_row = 0;
   ++sent->samples;
   sent->said_ns = core::monotonic_ns();
   return true;
@@ -101,11 +114,13 @@ bool AnyWriter::write_in_place(const std::function<void(void*)>& fill) {
   const auto loaned = impl_->writer->loan_sample(loan, dds::DataWriter::LoanInitializationKind::NO_LOAN_INITIALIZATION);
   if (loaned != ReturnCode_t::RETCODE_OK) {
     fill(impl_->scratch.get());
-    return impl_->send(impl_->scratch.get());
+    if (impl_->send(impl_->scratch.get())) return true;
+  } else {
+    fill(loan);
+    if (impl_->send(loan)) return true;
+    impl_->writer->discard_loan(loan);
   }
-  fill(loan);
-  if (impl_->send(loan)) return true;
-  impl_->writer->discard_loan(loan);
+  impl_->free_memory_when_stuck();
   return false;
 }
 

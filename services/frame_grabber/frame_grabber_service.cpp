@@ -211,8 +211,10 @@ void FrameGrabberService::publish(const RawPicture& picture, int64_t grabbed_ns)
     frame.health(health);
   });
   if (sent) {
+    unsent_in_a_row_ = 0;
     context_.health().output(grabbed_ns);
   } else {
+    ++unsent_in_a_row_;
     context_.health().dropped(1);
   }
   say_health(health);
@@ -300,6 +302,8 @@ void FrameGrabberService::publish_clock(int64_t data_ns, int64_t wall_ns, bool e
 }
 
 void FrameGrabberService::say_health(uint32_t health) {
+  if (unsent_in_a_row_ >= kBadBeforeDegraded)
+    return context_.health().degraded("pictures cannot be sent: the middleware takes none; see that /dev/shm has room");
   bad_in_a_row_ = health == 0 ? 0 : bad_in_a_row_ + 1;
   if (bad_in_a_row_ == 0) context_.health().active();
   if (bad_in_a_row_ == kBadBeforeDegraded) {

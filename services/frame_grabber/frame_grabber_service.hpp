@@ -66,6 +66,7 @@ class FrameGrabberService {
   std::optional<int64_t> gave_up_ns_;
   std::string gave_up_why_;
   int bad_in_a_row_ = 0;
+  int unsent_in_a_row_ = 0;
   cv::Mat preview_grey_;
   uint64_t bad_packets_ = 0;
   std::unique_ptr<Player> player_;  // last, as the feed: their threads call the context
