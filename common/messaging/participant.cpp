@@ -27,7 +27,8 @@ constexpr uint32_t kParticipantsOfHost = 32;
 // A third of a lease may pass without a sign of life; callers come every 50 ms, now and then a little early.
 constexpr int64_t kSignsInALease = 3;
 constexpr int64_t kCallsJitterNs = 10'000'000;
-constexpr const char* kDiscoveryGroup = "239.255.0.1";  // RTPS 2.2, 9.6.1.4.1
+constexpr int64_t kEndlessNs = 3600 * core::kNsPerSecond;  // who does not ask for a lease
+constexpr const char* kDiscoveryGroup = "239.255.0.1";     // RTPS 2.2, 9.6.1.4.1
 
 // Peers replace Fast DDS's own list, so the multicast group and this host are named, too. Port 0: those of the domain.
 rtps::LocatorList initial_peers(const std::vector<std::string>& peers) {
@@ -188,15 +189,21 @@ Participant::~Participant() {
   dds::DomainParticipantFactory::get_instance()->delete_participant(impl_->participant);
 }
 
+bool Participant::Impl::leased_by_somebody(const std::string& topic) const {
+  return std::ranges::any_of(remote_readers, [&](const auto& one) {
+    return one.second.topic == topic && one.second.terms.lease_ns < kEndlessNs;
+  });
+}
+
 // A sign of life goes to every reader as a datagram of its own, and a sample is one: nothing is said where something
-// was said lately.
+// was said lately, or where nobody would miss it.
 void Participant::assert_liveliness() {
   const int64_t now_ns = core::monotonic_ns();
   const std::lock_guard lock(impl_->mutex);
   for (auto& [writer, lease] : impl_->manual_liveliness) {
     const int64_t said_ns = std::max<int64_t>(lease.asserted_ns, lease.sent->said_ns);
     if (now_ns - said_ns < lease.lease_ns / kSignsInALease - kCallsJitterNs) continue;
-    writer->assert_liveliness();
+    if (impl_->leased_by_somebody(writer->get_topic()->get_name())) writer->assert_liveliness();
     lease.asserted_ns = now_ns;
   }
 }

@@ -38,6 +38,7 @@ struct Participant::Impl : eprosima::fastdds::dds::DomainParticipantListener {
   Ends train;
   Ends host;
   Ends& ends_of(const TopicInfo& info) { return info.qos.data_sharing ? host : train; }
+  [[nodiscard]] bool leased_by_somebody(const std::string& topic) const;
   void join(Ends& ends);
 
   std::mutex mutex;

@@ -36,7 +36,8 @@ Loop::Loop(std::string service, const CommonConfig& common, bool beside)
       health_(std::make_unique<PublishedHealth>(participant_, service_, common, beside)),
       reply_(std::make_unique<messaging::Writer<msg::ControlReply>>(participant_, messaging::topics::service_reply)),
       notes_(notes_path(common, service_)),
-      clocks_(common.host) {
+      clocks_(common.host),
+      born_ns_(core::monotonic_ns()) {
   if (common_.lock_step) {
     progress_ = std::make_unique<messaging::Writer<msg::DataProgress>>(participant_, messaging::topics::data_progress);
     read_clock();
@@ -121,7 +122,12 @@ Loop::~Loop() {
 }
 
 void Loop::every(std::chrono::nanoseconds period, std::function<void()> handler) {
-  timers_.push_back({period.count(), core::monotonic_ns() + period.count(), std::move(handler)});
+  timers_.push_back({period.count(), next_due_ns(period.count()), std::move(handler)});
+}
+
+// Periods that are multiples of each other fall due together: the processor is woken once.
+int64_t Loop::next_due_ns(int64_t period_ns) const {
+  return born_ns_ + ((core::monotonic_ns() - born_ns_) / period_ns + 1) * period_ns;
 }
 
 void Loop::on_command(const std::string& command,
@@ -242,9 +248,8 @@ void Loop::finish(const std::string& why) {
 void Loop::run_due_timers() {
   // By index: a handler may add a timer.
   for (size_t i = 0; i < timers_.size(); ++i) {
-    const int64_t now_ns = core::monotonic_ns();
-    if (now_ns < timers_[i].due_ns) continue;
-    timers_[i].due_ns = std::max(timers_[i].due_ns + timers_[i].period_ns, now_ns);
+    if (core::monotonic_ns() < timers_[i].due_ns) continue;
+    timers_[i].due_ns = next_due_ns(timers_[i].period_ns);
     const auto handler = timers_[i].handler;
     handler();
   }

@@ -51,6 +51,7 @@ class Loop final : public Context {
     int64_t due_ns;
     std::function<void()> handler;
   };
+  [[nodiscard]] int64_t next_due_ns(int64_t period_ns) const;
   void run_due_timers();
   void watch_cable();
   void watch_certificate();
@@ -77,6 +78,7 @@ class Loop final : public Context {
   std::vector<std::string> unheard_;  // writers that do not fit, as told last
   std::unique_ptr<Standby> standby_;  // nullptr = the only one of its kind
   std::map<std::string, std::function<core::Result<std::string>(const std::string&)>> commands_;
+  int64_t born_ns_;
   std::vector<Timer> timers_;
   std::vector<std::function<void()>> at_stop_;
   Turns turns_;

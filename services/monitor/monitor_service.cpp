@@ -24,7 +24,7 @@ constexpr int64_t kScrapeNs = 60 * core::kNsPerSecond;
 constexpr int64_t kLingerNs = 10 * core::kNsPerSecond;
 // What has come waits for so many turns of 50 ms when nobody looks.
 constexpr uint64_t kIdleTurns = 5;
-constexpr auto kSilencePeriod = 500ms;
+constexpr auto kSilencePeriod = 250ms;
 
 std::filesystem::path page_folder(const std::string& configured) {
   if (!configured.empty()) return configured;
@@ -99,10 +99,8 @@ void MonitorService::start_timers() {
   });
   context_.every(200ms, [this] { publish_curvature(); });
   context_.every(250ms, [this] { publish_log(); });
-  context_.every(kSilencePeriod, [this] {
-    look_for_silence();
-    if (live_.watched("services")) live_.publish("services", services_message(services_, core::wall_ns()));
-  });
+  context_.every(kSilencePeriod, [this] { look_for_silence(); });
+  context_.every(500ms, [this] { publish_services(); });
   read_certificates();
   context_.every(1h, [this] { read_certificates(); });
   context_.every(1s, [this] {
@@ -323,7 +321,13 @@ void MonitorService::look_for_silence() {
   const int64_t now_ns = core::wall_ns();
   const int64_t passed_ns = now_ns - std::exchange(silence_looked_ns_, now_ns);
   const bool in_time = passed_ns >= 0 && passed_ns < ServiceBoard::kSilentNs - core::kNsPerSecond / 4;
-  if (in_time && !recent(player_)) services_.note_silence(now_ns);
+  if (!in_time || recent(player_) || !services_.note_silence(now_ns)) return;
+  publish_services();
+  look_for_problems();
+}
+
+void MonitorService::publish_services() {
+  if (live_.watched("services")) live_.publish("services", services_message(services_, core::wall_ns()));
 }
 
 void MonitorService::look_for_problems() {

@@ -66,6 +66,7 @@ class MonitorService {
   [[nodiscard]] TrainSeen train_seen();
   void read_certificates();
   void look_for_silence();
+  void publish_services();
   void look_for_problems();
 
   // monitor_shows.cpp: what is said to those who look

@@ -12,12 +12,15 @@ void ServiceBoard::note(const msg::ServiceStatus& status, int64_t now_ns) {
   seen.alive = true;
 }
 
-void ServiceBoard::note_silence(int64_t now_ns) {
+bool ServiceBoard::note_silence(int64_t now_ns) {
+  bool fallen = false;
   for (auto& [key, seen] : services_) {
     if (!seen.alive || now_ns - seen.received_ns < kSilentNs) continue;
     seen.alive = false;
+    fallen = true;
     if (!seen.stopped()) seen.since_ns = seen.received_ns;
   }
+  return fallen;
 }
 
 const ServiceSeen* ServiceBoard::find(const std::string& service) const {

@@ -21,13 +21,14 @@ struct ServiceSeen {
 
 class ServiceBoard {
  public:
-  static constexpr int64_t kSilentNs = 1'000'000'000;
+  static constexpr int64_t kSilentNs = 700'000'000;
   /// Its host and name tell one service from another.
   using Key = std::pair<std::string, std::string>;
 
   void note(const msg::ServiceStatus& status, int64_t now_ns);
-  /// Who has said nothing for kSilentNs is dead, frozen or stopped: services speak four times a second.
-  void note_silence(int64_t now_ns);
+  /// Who has said nothing for kSilentNs is dead, frozen or stopped: services speak four times a second. True: somebody
+  /// is silent since the last time.
+  bool note_silence(int64_t now_ns);
   [[nodiscard]] const std::map<Key, ServiceSeen>& services() const { return services_; }
   /// On whichever host; nullptr = never seen.
   [[nodiscard]] const ServiceSeen* find(const std::string& service) const;

@@ -31,9 +31,10 @@ TEST(ServiceBoard, TellsDeadFromStartedAnew) {
   ServiceBoard board;
   board.note(status(msg::STATE_ACTIVE), 100);
   board.note(status(msg::STATE_ACTIVE), 200);
-  board.note_silence(199 + kSilentNs);
+  EXPECT_FALSE(board.note_silence(199 + kSilentNs));
   EXPECT_TRUE(board.find("odometry")->alive);
-  board.note_silence(200 + kSilentNs);
+  EXPECT_TRUE(board.note_silence(200 + kSilentNs));
+  EXPECT_FALSE(board.note_silence(201 + kSilentNs)) << "once";
   EXPECT_FALSE(board.find("odometry")->alive);
   EXPECT_EQ(board.find("odometry")->since_ns, 200) << "since its last word";
   board.note(status(msg::STATE_STARTING, "", 2), 300 + kSilentNs);
