@@ -133,10 +133,11 @@ Fault bad_pictures(const std::string& what, const std::string& named,
           .begin =
               [=](Rig& rig) {
                 const auto files = next_pictures(rig, 5);
+                const auto first = fs::read_symlink(files.front());
                 int number = 0;
                 for (const auto& file : files) {
                   const auto draft = rig.folder() / "draft";
-                  std::ofstream(draft, std::ios::binary) << bytes_of(fs::read_symlink(files.front()), number++);
+                  std::ofstream(draft, std::ios::binary) << bytes_of(first, number++);
                   fs::rename(draft, file);
                 }
               },

@@ -34,6 +34,7 @@ std::string describe(int wait_status) {
   setpgid(0, 0);                     // Ctrl-C reaches the run alone, which then stops services in order
   dup2(log, STDOUT_FILENO);
   dup2(log, STDERR_FILENO);
+  close_range(STDERR_FILENO + 1, ~0U, CLOSE_RANGE_CLOEXEC);  // DDS's sockets stay with the run
   std::vector<char*> argv{const_cast<char*>(program.c_str())};
   for (const auto& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
   argv.push_back(nullptr);
