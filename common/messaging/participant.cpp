@@ -47,6 +47,14 @@ rtps::LocatorList initial_peers(const std::vector<std::string>& peers) {
   return list;
 }
 
+// Participants of one process talk as those of two do. The short cut that 2.9.1 takes between them keeps pointers to
+// endpoints of a participant that may be leaving (eProsima/Fast-DDS#2199).
+void forbid_short_cuts() {
+  eprosima::fastrtps::LibrarySettingsAttributes settings;
+  settings.intraprocess_delivery = eprosima::fastrtps::INTRAPROCESS_OFF;
+  eprosima::fastrtps::xmlparser::XMLProfileManager::library_settings(settings);
+}
+
 // No shared-memory transport: in 2.9.1 a process that is killed and started again makes its queue anew, while those
 // that ran on write to the old one for ever (eProsima/Fast-DDS#4728), and a stopped one spins. Pictures are shared in
 // memory by data sharing, which does not need it.
@@ -142,18 +150,6 @@ void Participant::Impl::join(Ends& ends) {
   subscriber_qos.partition().push_back(ends.partition.c_str());
   ends.subscriber = participant->create_subscriber(subscriber_qos);
 }
-
-namespace {
-
-// Participants of one process talk as those of two do. The short cut that 2.9.1 takes between them keeps pointers to
-// endpoints of a participant that may be leaving (eProsima/Fast-DDS#2199).
-void forbid_short_cuts() {
-  eprosima::fastrtps::LibrarySettingsAttributes settings;
-  settings.intraprocess_delivery = eprosima::fastrtps::INTRAPROCESS_OFF;
-  eprosima::fastrtps::xmlparser::XMLProfileManager::library_settings(settings);
-}
-
-}  // namespace
 
 Participant::Participant(const ParticipantOptions& options) : impl_(std::make_unique<Impl>()) {
   static std::once_flag once;

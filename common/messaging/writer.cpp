@@ -77,12 +77,12 @@ AnyWriter::AnyWriter(Participant& participant, const TopicInfo& topic, const std
 void AnyWriter::Impl::touch_shared_memory() {
   std::vector<void*> loans;
   void* loan = nullptr;
-  if (writer->loan_sample(loan, dds::DataWriter::LoanInitializationKind::ZERO_LOAN_INITIALIZATION) ==
-      ReturnCode_t::RETCODE_OK)
-    writer->discard_loan(loan);
-  while (loans.size() < static_cast<size_t>(topic.qos.depth) &&
-         writer->loan_sample(loan, dds::DataWriter::LoanInitializationKind::ZERO_LOAN_INITIALIZATION) ==
-             ReturnCode_t::RETCODE_OK) {
+  const auto touched = [&] {
+    return writer->loan_sample(loan, dds::DataWriter::LoanInitializationKind::ZERO_LOAN_INITIALIZATION) ==
+           ReturnCode_t::RETCODE_OK;
+  };
+  if (touched()) writer->discard_loan(loan);
+  while (loans.size() < static_cast<size_t>(topic.qos.depth) && touched()) {
     loans.push_back(loan);
   }
   for (void* one : loans) writer->discard_loan(one);

@@ -77,7 +77,10 @@ HealthAnswer ask_health(const std::filesystem::path& path) {
   }
   const std::string text =
       std::string(messaging::name_of_state(static_cast<uint8_t>(state))) + (reason.empty() ? "" : ": " + reason);
-  return {state != msg::STATE_FAILED && state != msg::STATE_STOPPED, state == msg::STATE_STARTING, text};
+  return {.healthy = state != msg::STATE_FAILED && state != msg::STATE_STOPPED,
+          .starting = state == msg::STATE_STARTING,
+          .degraded = state == msg::STATE_DEGRADED,
+          .text = text};
 }
 
 }  // namespace railfix::service

@@ -39,7 +39,8 @@ std::optional<int64_t> silent_ns(const std::filesystem::path& path);
 struct HealthAnswer {
   bool healthy = false;
   bool starting = false;  // it does not wait for input yet
-  std::string text;       // one sentence
+  bool degraded = false;
+  std::string text;  // one sentence
 };
 /// Healthy: its run loop turned within the last two seconds and it has not failed. Degraded is healthy: a restart would
 /// not help.

@@ -6,8 +6,6 @@
 
 #include "commands.hpp"
 #include "core/result.hpp"
-#include "idl/operation.h"
-#include "messaging/operation_words.hpp"
 #include "train/check.hpp"
 #include "train/keys.hpp"
 #include "train/render.hpp"
@@ -115,7 +113,7 @@ int status(const Options& options) {
   for (const auto& service : plan.services) {
     const auto found = state.find(service.name);
     const RunningService process = found == state.end() || !supervisor ? RunningService{} : found->second;
-    const auto health = supervisor ? health_of(plan, state, service.name) : ServiceHealth{false, "is not started"};
+    const auto health = health_of(plan, supervisor ? state : HostState{}, service.name);
     healthy = healthy && health.healthy;
     json["services"].push_back({{"service", service.name},
                                 {"release", service.release},
@@ -236,8 +234,7 @@ std::vector<Finding> check_services(const HostFolder& folder) {
   if (!plan || !supervisor_of(folder)) return findings;
   for (const auto& service : plan->services) {
     const auto health = health_of(*plan, folder.state(), service.name);
-    const bool degraded = health.text.starts_with(messaging::name_of_state(msg::STATE_DEGRADED));
-    if (!health.healthy || degraded) findings.push_back({!health.healthy, service.name + " " + health.text});
+    if (!health.healthy || health.degraded) findings.push_back({!health.healthy, service.name + " " + health.text});
   }
   return findings;
 }

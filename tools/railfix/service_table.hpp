@@ -10,7 +10,8 @@
 namespace railfix::tool {
 
 /// One line for each, with a header, in the order of the keys; their hosts when there are several. `silent` keys have
-/// not been heard lately; they are so called unless they stopped in order. With colours: ANSI codes around what is wrong.
+/// not been heard lately; they are so called unless they stopped in order. With colours: ANSI codes around what is
+/// wrong.
 std::string service_table(const std::map<std::string, msg::ServiceStatus>& services,
                           const std::set<std::string>& silent, bool colours);
 

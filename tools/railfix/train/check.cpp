@@ -266,7 +266,8 @@ std::vector<Finding> check_installed_certificates(const HostFolder& folder) {
   if (!plan) return findings;
   for (const auto& service : plan->services) {
     const auto keys = folder.generation(service.generation) / "security";
-    if (fs::exists(keys)) check_certificate(keys / (service.name + ".cert.pem"), messaging::kCertificateWarningDays, findings);
+    if (fs::exists(keys))
+      check_certificate(keys / (service.name + ".cert.pem"), messaging::kCertificateWarningDays, findings);
   }
   return findings;
 }

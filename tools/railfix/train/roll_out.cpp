@@ -62,7 +62,7 @@ class Gate {
   int64_t healthy_ns_;
   int64_t healthy_since_ns_ = 0;
   int64_t pid_ = 0;
-  ServiceHealth health_;
+  service::HealthAnswer health_;
 };
 
 core::Status wait_healthy(const HostFolder& folder, const HostPlan& plan, const std::vector<std::string>& services,
@@ -163,19 +163,18 @@ std::vector<std::string> changed_services(const HostPlan& from, const HostPlan& 
 
 }  // namespace
 
-ServiceHealth health_of(const HostPlan& plan, const HostState& state, const std::string& service) {
+service::HealthAnswer health_of(const HostPlan& plan, const HostState& state, const std::string& service) {
   const auto process = state.find(service);
-  if (process == state.end()) return {false, "is not started"};
+  if (process == state.end()) return {.text = "is not started"};
   if (process->second.pid == 0) {
-    return {false,
-            "does not run: " + (process->second.last_end.empty() ? "not started yet" : process->second.last_end)};
+    return {.text =
+                "does not run: " + (process->second.last_end.empty() ? "not started yet" : process->second.last_end)};
   }
   service::CommonConfig common;
   common.train_id = plan.train_id;
   common.host = plan.host;
-  const auto answer = service::ask_health(process->second.beside ? service::health_path_beside(common, service)
-                                                                 : service::health_path(common, service));
-  return {answer.healthy, answer.text};
+  return service::ask_health(process->second.beside ? service::health_path_beside(common, service)
+                                                    : service::health_path(common, service));
 }
 
 std::string difference(const std::string& before, const std::string& after) {

@@ -3,6 +3,7 @@
 
 #include <functional>
 
+#include "service/health_file.hpp"
 #include "train/manifest.hpp"
 #include "train/plan.hpp"
 
@@ -28,12 +29,8 @@ core::Status bring_down(const std::filesystem::path& root);
 /// worked.
 core::Status roll_out(const std::filesystem::path& root, const HostPlan& plan, const HealthGate& gate, const Say& say);
 
-/// A sentence on a service: "active", "degraded: ...", "does not run: ended by Killed".
-struct ServiceHealth {
-  bool healthy = false;
-  std::string text;
-};
-ServiceHealth health_of(const HostPlan& plan, const HostState& state, const std::string& service);
+/// Its text: "active", "degraded: ...", "does not run: ended by Killed".
+service::HealthAnswer health_of(const HostPlan& plan, const HostState& state, const std::string& service);
 
 /// The lines of one settings text that the other has not, as "-line" and "+line"; empty when they are equal.
 std::string difference(const std::string& before, const std::string& after);
