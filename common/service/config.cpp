@@ -8,6 +8,8 @@
 #include <set>
 #include <sstream>
 
+#include "core/similar_names.hpp"
+
 namespace railfix::service {
 namespace {
 
@@ -96,9 +98,8 @@ class Reader final : public Fields {
     for (const auto& entry : node_) {
       const std::string key = entry.first.Scalar();
       if (known_.contains(key)) continue;
-      std::string names;
-      for (const auto& name : known_) names += (names.empty() ? "" : ", ") + name;
-      problem(entry.first, key.c_str(), "is not a key of this section, which has: " + names);
+      problem(entry.first, key.c_str(),
+              "is not a key of this section; " + core::did_you_mean(key, {known_.begin(), known_.end()}));
     }
   }
 

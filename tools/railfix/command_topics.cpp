@@ -8,6 +8,7 @@
 
 #include "cdr/decode.hpp"
 #include "commands.hpp"
+#include "core/similar_names.hpp"
 #include "core/time.hpp"
 #include "messaging/topics.hpp"
 #include "not_negative.hpp"
@@ -52,10 +53,7 @@ std::string resolve(TopicListener& listener, const Options& options) {
   for (const auto& topic : messaging::all_topics()) written.push_back(topic.name);
   std::ranges::sort(written);
   written.erase(std::ranges::unique(written).begin(), written.end());
-  std::string names;
-  for (const auto& name : similar_names(options.topic, written)) names += (names.empty() ? "" : ", ") + name;
-  throw core::BadInput("there is no topic '" + options.topic + "'" +
-                       (names.empty() ? "; see `railfix topics list`" : "; did you mean " + names + "?"));
+  throw core::BadInput("there is no topic '" + options.topic + "'; " + core::did_you_mean(options.topic, written));
 }
 
 int list(const Options& options) {

@@ -3,18 +3,37 @@
 
 #include "commands.hpp"
 #include "core/result.hpp"
+#include "core/similar_names.hpp"
 
 namespace {
 
 constexpr int kWorkFailed = 1;
 constexpr int kBadInput = 2;
 
+/// What is wrong when a command is missing, for which CLI11 has no word of help; empty when it is something else.
+std::string missing_command(const CLI::App& app) {
+  const CLI::App* at = &app;
+  std::string path = app.get_name();
+  while (!at->get_subcommands().empty()) {
+    at = at->get_subcommands().front();
+    path += " " + at->get_name();
+  }
+  if (at->get_require_subcommand_min() == 0) return "";
+  std::vector<std::string> names;
+  for (const auto* one : at->get_subcommands([](const CLI::App*) { return true; })) names.push_back(one->get_name());
+  const auto typed = at->remaining();
+  const std::string wanted = typed.empty() ? "" : typed.front();
+  return path + (typed.empty() ? ": a command is missing; " : ": there is no command '" + wanted + "'; ") +
+         railfix::core::did_you_mean(wanted, names);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   using namespace railfix::tool;
   CLI::App app{
-      "Railfix: where the train is, from a camera. `railfix COMMAND --help` explains a command with an example."};
+      "Railfix: where the train is, from a camera. `railfix COMMAND --help` explains a command with an example.",
+      "railfix"};
   app.set_version_flag("--version", std::string("railfix ") + RAILFIX_VERSION);
   app.require_subcommand(1);
   Action chosen;
@@ -24,6 +43,11 @@ int main(int argc, char** argv) {
   }
   try {
     app.parse(argc, argv);
+  } catch (const CLI::RequiredError& error) {
+    const auto missing = missing_command(app);
+    if (missing.empty()) return app.exit(error) == 0 ? 0 : kBadInput;
+    std::cerr << missing << '\n';
+    return kBadInput;
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kBadInput;
   }

@@ -3,33 +3,12 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <numeric>
 
 #include "core/time.hpp"
 #include "messaging/topics.hpp"
 #include "recording/sample_types.hpp"
 
 namespace railfix::tool {
-
-namespace {
-
-/// Edit distance: how many letters must be put in, taken out or changed (Wagner and Fischer 1974).
-size_t distance(const std::string& a, const std::string& b) {
-  std::vector<size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), size_t{0});
-  for (size_t i = 1; i <= a.size(); ++i) {
-    size_t diagonal = row[0];
-    row[0] = i;
-    for (size_t j = 1; j <= b.size(); ++j) {
-      const size_t changed = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = row[j];
-      row[j] = std::min({changed, row[j] + 1, row[j - 1] + 1});
-    }
-  }
-  return row[b.size()];
-}
-
-}  // namespace
 
 void TopicStatistics::add(const messaging::TopicInfo& topic, const messaging::SampleInfo& info) {
   if (!info.valid) return;
@@ -161,23 +140,6 @@ nlohmann::ordered_json DelayStatistics::json() const {
   nlohmann::ordered_json json{{"samples", samples()}, {"on_the_way", json_of(spread_of(on_the_way_ms_))}};
   if (!since_grabbed_ms_.empty()) json["since_grabbed"] = json_of(spread_of(since_grabbed_ms_));
   return json;
-}
-
-std::vector<std::string> similar_names(const std::string& wanted, const std::vector<std::string>& names) {
-  constexpr size_t kMost = 5;
-  std::vector<std::pair<size_t, std::string>> ranked;
-  for (const auto& name : names) {
-    const bool part =
-        !wanted.empty() && (name.find(wanted) != std::string::npos || wanted.find(name) != std::string::npos);
-    const size_t changes = part ? 1 : distance(wanted, name);
-    if (changes <= std::max<size_t>(2, wanted.size() / 3)) ranked.emplace_back(changes, name);
-  }
-  std::ranges::sort(ranked);
-  std::vector<std::string> similar;
-  for (const auto& [changes, name] : ranked) {
-    if (similar.size() < kMost) similar.push_back(name);
-  }
-  return similar;
 }
 
 }  // namespace railfix::tool

@@ -80,7 +80,4 @@ class DelayStatistics {
 /// As CDR; of a picture only the pixels in use.
 uint64_t bytes_of(const messaging::TopicInfo& topic, const void* sample);
 
-/// Those of the names that are like the wanted one, the most alike first; at most five.
-std::vector<std::string> similar_names(const std::string& wanted, const std::vector<std::string>& names);
-
 }  // namespace railfix::tool

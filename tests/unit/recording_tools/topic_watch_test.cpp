@@ -8,8 +8,6 @@ namespace railfix::tool {
 
 namespace {
 
-using ::testing::ElementsAre;
-using ::testing::IsEmpty;
 
 messaging::SampleInfo at(int64_t received_ms, uint64_t sequence, uint64_t writer = 1) {
   messaging::SampleInfo info;
@@ -61,14 +59,6 @@ TEST(TopicStatistics, NothingIsLostWhenAStandbyTakesOver) {
   EXPECT_EQ(statistics.lost(), 0U);
   statistics.add(kExclusive, at(4, 505, 1));
   EXPECT_EQ(statistics.lost(), 3U);
-}
-
-TEST(SimilarNames, FindsWhatWasMeant) {
-  const std::vector<std::string> names{"track_view", "train_state", "odometry_step", "camera_frame/cam0", "imu_sample"};
-  EXPECT_THAT(similar_names("track_veiw", names), ElementsAre("track_view"));
-  EXPECT_THAT(similar_names("odometry", names), ElementsAre("odometry_step"));
-  EXPECT_THAT(similar_names("camera_frame/cam1", names), ElementsAre("camera_frame/cam0"));
-  EXPECT_THAT(similar_names("zzzzzzzzz", names), IsEmpty());
 }
 
 }  // namespace

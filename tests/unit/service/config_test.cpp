@@ -44,7 +44,7 @@ TEST_F(ConfigTest, NamesFileLineKeyAndReason) {
   const auto config = read_config<Config>("odometry", file);
   ASSERT_FALSE(config.ok());
   EXPECT_THAT(error_of(config), HasSubstr(file.string() + " line 2: odometry.speed_mps 200 is outside 0 to 100 m/s"));
-  EXPECT_THAT(error_of(config), HasSubstr("line 3: odometry.cuont is not a key of this section, which has: count"));
+  EXPECT_THAT(error_of(config), HasSubstr("line 3: odometry.cuont is not a key of this section; did you mean count?"));
   EXPECT_THAT(error_of(config), HasSubstr("line 4: odometry.inner.inner_m 'far' is not a number; give it in m"));
 }
 

@@ -85,7 +85,7 @@ TEST_F(TrainFolder, MistakesAreToldWithLineKeyAndWayOut) {
   };
   EXPECT_THAT(told("domain: 12", "domain: 512"), HasSubstr("train.yaml line 3: train.domain must be a whole number"));
   EXPECT_THAT(told("domain: 12", "domian: 12"),
-              HasSubstr("line 3: train.domian is not known here; there are: id, domain"));
+              HasSubstr("line 3: train.domian is not known here; did you mean domain?"));
   EXPECT_THAT(
       told("odometry: cab", "odometry: caboose"),
       HasSubstr("train.services.odometry runs on 'caboose', which is no host of this train; there are: cab, coach"));

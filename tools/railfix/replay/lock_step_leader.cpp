@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/similar_names.hpp"
 #include "core/time.hpp"
 #include "service/service.hpp"
 
@@ -11,14 +12,12 @@ namespace {
 
 std::vector<std::string> in_order(const std::vector<std::string>& services) {
   std::vector<std::string> ordered;
-  std::string names;
-  for (const auto& name : service::service_names()) {
-    names += (names.empty() ? "" : ", ") + name;
+  for (const auto& name : service::service_names())
     if (std::ranges::find(services, name) != services.end()) ordered.push_back(name);
-  }
   for (const auto& name : services) {
     if (std::ranges::find(ordered, name) == ordered.end()) {
-      throw core::BadInput("--lock-step " + name + " is no service; there are: " + names);
+      throw core::BadInput("--lock-step " + name + " is no service; " +
+                           core::did_you_mean(name, service::service_names()));
     }
   }
   return ordered;

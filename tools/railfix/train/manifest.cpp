@@ -6,17 +6,12 @@
 #include <initializer_list>
 #include <set>
 
+#include "core/similar_names.hpp"
 #include "messaging/network.hpp"
 #include "service/service.hpp"
 
 namespace railfix::tool {
 namespace {
-
-std::string joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
-}
 
 // A name that can stand in a DDS partition, a file name and a systemd unit.
 bool is_name(const std::string& text) {
@@ -59,7 +54,7 @@ class ManifestReader {
     for (const auto& entry : section) {
       const std::string key = entry.first.Scalar();
       if (std::find(known.begin(), known.end(), key) == known.end())
-        problem(entry.first, path + key, "is not known here; there are: " + joined(known));
+        problem(entry.first, path + key, "is not known here; " + core::did_you_mean(key, known));
       if (!seen.insert(key).second) problem(entry.first, path + key, "is given twice");
     }
   }
@@ -153,14 +148,16 @@ class ManifestReader {
       return std::find(hosts.begin(), hosts.end(), host) != hosts.end();
     };
     if (!known(service.host))
-      problem(node, path,
-              "runs on '" + service.host + "', which is no host of this train; there are: " + joined(hosts));
+      problem(
+          node, path,
+          "runs on '" + service.host + "', which is no host of this train; " + core::did_you_mean(service.host, hosts));
     if (service.standby.empty()) return;
     if (!may_stand_by(service.name))
       problem(node, path + ".standby", "is not possible; only fusion and tpr_publisher can wait on another host");
     else if (!known(service.standby))
       problem(node, path + ".standby",
-              "is '" + service.standby + "', which is no host of this train; there are: " + joined(hosts));
+              "is '" + service.standby + "', which is no host of this train; " +
+                  core::did_you_mean(service.standby, hosts));
     else if (service.standby == service.host)
       problem(node, path + ".standby", "is the same host; a standby on it would fail together with the first");
   }
