@@ -21,10 +21,11 @@ constexpr int kRhythmSamples = 10;
 
 }  // namespace
 
-Estimator::Estimator(const FusionParameters* parameters, std::shared_ptr<const track::Path> path, int64_t stamp_ns)
+Estimator::Estimator(const FusionParameters* parameters, const OdometerScales& scales,
+                     std::shared_ptr<const track::Path> path, int64_t stamp_ns)
     : parameters_(parameters),
       path_(std::move(path)),
-      filter_(*parameters, stamp_ns, path_ != nullptr),
+      filter_(*parameters, scales, stamp_ns, path_ != nullptr),
       stamp_ns_(stamp_ns),
       rest_since_ns_(stamp_ns),
       start_ns_(stamp_ns) {}

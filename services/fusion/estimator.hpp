@@ -11,6 +11,7 @@
 #include "fusion/fusion_parameters.hpp"
 #include "fusion/fusion_types.hpp"
 #include "fusion/motion_filter.hpp"
+#include "fusion/odometer_scales.hpp"
 #include "fusion/slip_watch.hpp"
 #include "fusion/sudden_change.hpp"
 #include "fusion/track_doubt.hpp"
@@ -57,7 +58,8 @@ struct Interval {
 class Estimator {
  public:
   /// path: the way of the train with distance 0 at the start; nullptr when the place is not known.
-  Estimator(const FusionParameters* parameters, std::shared_ptr<const track::Path> path, int64_t stamp_ns);
+  Estimator(const FusionParameters* parameters, const OdometerScales& scales, std::shared_ptr<const track::Path> path,
+            int64_t stamp_ns);
 
   void apply(const Event& event);
   /// Moves on without a measurement.

@@ -59,7 +59,7 @@ void Estimator::use(const OdometryInput& step) {
   if (step.valid) doubt_time(camera, pictures_, step.stamp_ns);
   camera.seen_ns = step.stamp_ns;
   if (step.valid) {
-    if (filter_.unit() == Odometer::none) filter_.choose_unit(Odometer::camera, *parameters_);
+    if (filter_.unit() == Odometer::none) filter_.choose_unit(Odometer::camera);
     const double sigma_m = std::hypot(step.step_sigma_m, parameters_->step_sigma_floor_m);
     const double dt_s = core::seconds(step.stamp_ns - step.reference_stamp_ns);
     // Without the reference picture's clone the step is a mean speed, less sure by what the train may have changed it.
@@ -131,7 +131,7 @@ void Estimator::use(const WheelInput& sample) {
     slip_began_ = false;
   }
   if (first) {
-    if (filter_.unit() == Odometer::none) filter_.choose_unit(Odometer::wheel, *parameters_);
+    if (filter_.unit() == Odometer::none) filter_.choose_unit(Odometer::wheel);
     filter_.restart_wheel(wheel_m, sigma_m);
   } else if (watch.isolated) {
     recover_wheel(sample, wheel_m, sigma_m);

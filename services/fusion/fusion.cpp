@@ -58,16 +58,41 @@ std::tuple<int64_t, size_t, int, uint32_t> order_of(const Event& event) {
 }  // namespace
 
 core::Result<Fusion> Fusion::create(const FusionParameters& parameters, std::shared_ptr<const track::Map> map,
-                                    const std::optional<track::EdgePosition>& start) {
-  if (!start || !map) return Fusion(parameters, std::move(map), nullptr);
+                                    const std::optional<track::EdgePosition>& start,
+                                    const std::optional<SavedScales>& saved) {
+  if (!start || !map) return Fusion(parameters, std::move(map), nullptr, saved);
   auto path = track::Path::follow(map, *start, kPathAheadM, kPathBehindM);
   if (!path.ok()) return path.error();
-  return Fusion(parameters, std::move(map), std::make_shared<const track::Path>(std::move(path).value()));
+  return Fusion(parameters, std::move(map), std::make_shared<const track::Path>(std::move(path).value()), saved);
 }
 
 Fusion::Fusion(const FusionParameters& parameters, std::shared_ptr<const track::Map> map,
-               std::shared_ptr<const track::Path> path)
-    : parameters_(std::make_shared<const FusionParameters>(parameters)), map_(std::move(map)), path_(std::move(path)) {}
+               std::shared_ptr<const track::Path> path, const std::optional<SavedScales>& saved)
+    : parameters_(std::make_shared<const FusionParameters>(parameters)),
+      map_(std::move(map)),
+      path_(std::move(path)),
+      saved_(saved) {}
+
+void Fusion::begin(int64_t stamp_ns) {
+  const auto scales = saved_ ? std::optional(aged(*saved_, stamp_ns, *parameters_)) : std::nullopt;
+  now_.emplace(parameters_.get(), scales, path_, stamp_ns);
+  snapshots_.push_back(*now_);
+}
+
+SavedScalesAre Fusion::saved_scales() const {
+  return now_ ? now_->saved_scales() : saved_ ? SavedScalesAre::on_trial : SavedScalesAre::none;
+}
+
+void Fusion::drop_saved_scales() {
+  saved_.reset();
+  if (now_) now_->drop_saved();
+  if (before_backward_) before_backward_->drop_saved();
+  for (auto& snapshot : snapshots_) snapshot.drop_saved();
+}
+
+std::optional<OdometerScales> Fusion::learnt_scales() const {
+  return now_ ? now_->learnt() : std::nullopt;
+}
 
 std::optional<TrainEstimate> Fusion::add(Event event) {
   if (!std::visit([](const auto& input) { return has_sense(input); }, event)) {
@@ -79,8 +104,7 @@ std::optional<TrainEstimate> Fusion::add(Event event) {
     // The first step counts from a picture before it: begin there.
     const bool from_reference = step && step->reference_stamp_ns < step->stamp_ns &&
                                 core::seconds(step->stamp_ns - step->reference_stamp_ns) < parameters_->max_jump_s;
-    now_.emplace(parameters_.get(), path_, (from_reference ? step->reference_stamp_ns : stamp_of(event)) - 1);
-    snapshots_.push_back(*now_);
+    begin((from_reference ? step->reference_stamp_ns : stamp_of(event)) - 1);
   }
   if (is_clock_set_back(event)) return set_clock_back();
   if (!believable(event)) return std::nullopt;
@@ -96,7 +120,7 @@ std::optional<TrainEstimate> Fusion::add(Event event) {
 std::optional<TrainEstimate> Fusion::tick(int64_t now_ns) {
   if (!now_ || core::seconds(now_ns - last_output_ns_) < parameters_->output_period_s) return std::nullopt;
   if (now_ns <= now_->stamp_ns()) return std::nullopt;
-  Hypotheses ahead = *now_;
+  ScaleTrial ahead = *now_;
   ahead.predict_to(now_ns);
   return give(ahead.estimate());
 }
@@ -202,7 +226,7 @@ std::optional<TrainEstimate> Fusion::insert(const Event& event) {
     run(events_[static_cast<size_t>(next)]);
     if (wanted && next == mine) estimate = now_->estimate();
     ++next;
-    if (now_->main().slip_began() && ++rewinds <= kMostRewinds) {
+    if (now_->slip_began() && ++rewinds <= kMostRewinds) {
       const int64_t found_ns = now_->stamp_ns();
       const uint32_t slipping = now_->slipping();
       next = rewind_before(found_ns - kSlipUnseenNs);

@@ -13,7 +13,8 @@
 
 #include "fusion/fusion_parameters.hpp"
 #include "fusion/fusion_types.hpp"
-#include "fusion/hypotheses.hpp"
+#include "fusion/odometer_scales.hpp"
+#include "fusion/scale_trial.hpp"
 #include "track/path.hpp"
 
 namespace railfix::fusion {
@@ -30,10 +31,11 @@ struct FusionCounts {
 
 class Fusion {
  public:
-  /// map may be nullptr; start: nothing = unknown, then a network fix starts the position. Fails when there is no such
-  /// place.
+  /// map may be nullptr; start: nothing = unknown, then a network fix starts the position; saved: scales of an earlier
+  /// trip. Fails when there is no such place.
   static core::Result<Fusion> create(const FusionParameters& parameters, std::shared_ptr<const track::Map> map,
-                                     const std::optional<track::EdgePosition>& start);
+                                     const std::optional<track::EdgePosition>& start,
+                                     const std::optional<SavedScales>& saved = std::nullopt);
 
   /// Uses a measurement. Gives a state for every odometry step, and every output_period_s from the other sensors while
   /// there is no camera. Stamps of the states only grow.
@@ -44,10 +46,16 @@ class Fusion {
   [[nodiscard]] std::optional<int64_t> latest_stamp_ns() const;
   [[nodiscard]] const Estimator* estimator() const { return now_ ? &now_->main() : nullptr; }
   [[nodiscard]] const FusionCounts& counts() const { return counts_; }
+  [[nodiscard]] SavedScalesAre saved_scales() const;
+  /// The sensors are others than those whose scales were saved; those that this trip has confirmed stay.
+  void drop_saved_scales();
+  /// What this trip has taught of the scales, fit to be saved.
+  [[nodiscard]] std::optional<OdometerScales> learnt_scales() const;
 
  private:
   Fusion(const FusionParameters& parameters, std::shared_ptr<const track::Map> map,
-         std::shared_ptr<const track::Path> path);
+         std::shared_ptr<const track::Path> path, const std::optional<SavedScales>& saved);
+  void begin(int64_t stamp_ns);
   [[nodiscard]] bool believable(const Event& event);
   [[nodiscard]] bool is_clock_set_back(const Event& event);
   std::optional<TrainEstimate> set_clock_back();
@@ -65,15 +73,16 @@ class Fusion {
   std::shared_ptr<const track::Map> map_;
   std::shared_ptr<const track::Path> path_;
   std::optional<track::Ways> ways_;  // made when the first other track is declared
-  std::optional<Hypotheses> now_;
+  std::optional<SavedScales> saved_;
+  std::optional<ScaleTrial> now_;
   std::deque<Event> events_;          // by stamp, then kind
-  std::deque<Hypotheses> snapshots_;  // each has used all events up to its stamp
+  std::deque<ScaleTrial> snapshots_;  // each has used all events up to its stamp
   FusionCounts counts_;
   int64_t last_output_ns_ = 0;
   int64_t last_odometry_ns_ = 0;
   std::array<int64_t, std::variant_size_v<Event>> newest_ns_{};  // of each kind
   std::vector<Event> backward_;                                  // the last ones, each not newer than its kind's newest
-  std::optional<Hypotheses> before_backward_;                    // the state before them
+  std::optional<ScaleTrial> before_backward_;                    // the state before them
   std::array<int, std::variant_size_v<Event>> ahead_in_row_{};
 };
 

@@ -11,6 +11,7 @@ namespace railfix::fusion {
 struct FusionConfig {
   std::string map;
   std::string start = "unknown";
+  std::string scales_file;
   bool use_camera = true;
   bool use_wheel = true;
   bool use_imu = true;
@@ -29,6 +30,9 @@ struct FusionConfig {
     fields.flag("use_imu", use_imu, "Use imu_sample.");
     fields.flag("use_gnss", use_gnss, "Use gnss_fix.");
     fields.flag("use_fixes", use_fixes, "Use position_fix.");
+    fields.text("scales_file", scales_file,
+                "File on a lasting disk for the scales of camera and wheel: what references taught on one trip helps "
+                "the next; empty = every trip begins anew.");
     describe_train(fields);
     describe_motion_sensors(fields);
     describe_position_sensors(fields);
@@ -55,6 +59,10 @@ struct FusionConfig {
     f.number("wheel_scale_sigma", p.wheel_scale_sigma, {1e-5, 0.2}, "", "The same for the wheel (wear, creep).");
     f.number("wheel_scale_walk", p.wheel_scale_walk, {0, 0.01}, "1/sqrt(m)", "The same for the wheel.");
     f.number("wheel_creep", p.wheel_creep, {0, 1}, "m/sqrt(m)", "The same for the wheel.");
+    f.number("visual_scale_trip_sigma", p.visual_scale_trip_sigma, {0, 0.2}, "",
+             "A scale in scales_file may have changed by so much before the next trip (lens, load, mount) ...");
+    f.number("wheel_scale_trip_sigma", p.wheel_scale_trip_sigma, {0, 0.2}, "", "... the wheel's by so much ...");
+    f.number("scale_sigma_per_day", p.scale_sigma_per_day, {0, 0.01}, "1/day", "... and both by so much more a day.");
     f.number("wheel_slip_share", p.wheel_slip_share, {0, 1}, "",
              "Where the wheel measures alone, a slip or slide may be this share of the speed ...");
     f.number("wheel_slip_s", p.wheel_slip_s, {0, 60}, "s", "... for so long ...");

@@ -21,6 +21,10 @@ struct FusionParameters {
   double wheel_scale_sigma = 0.01;
   double wheel_scale_walk = 3e-6;
   double wheel_creep = 0.001;
+  // What a saved scale may have changed by before the next trip: once, and more for every day.
+  double visual_scale_trip_sigma = 5e-4;
+  double wheel_scale_trip_sigma = 1e-4;
+  double scale_sigma_per_day = 1e-4;
 
   // What a slip or slide can add that no other sensor would see: once, and over a long way.
   double wheel_slip_share = 0.3;  // of the speed ...

@@ -8,6 +8,7 @@
 namespace railfix::fusion {
 namespace {
 
+using messaging::topics::camera_calibration;
 using messaging::topics::data_clock;
 using messaging::topics::gnss_fix;
 using messaging::topics::imu_sample;
@@ -25,14 +26,15 @@ constexpr double kSameRideS = 0.5;   // data and the host's clock go on alike
 constexpr double kSameBeginS = 0.5;  // a replay that is looped begins where it began before
 constexpr double kLiveDataS = 5.0;   // data stamps further from the host's clock are not live
 
-Fusion make_fusion(const FusionConfig& config, const std::shared_ptr<const track::Map>& map) {
+Fusion make_fusion(const FusionConfig& config, const std::shared_ptr<const track::Map>& map,
+                   const std::optional<SavedScales>& saved) {
   std::optional<track::EdgePosition> start;
   if (config.start != "unknown") {
     if (!map)
       throw core::BadInput("fusion.start is a place on a map, but fusion.map is empty: give a map or start: unknown");
     start = core::value_or_throw(map->parse_position(config.start));
   }
-  return core::value_or_throw(Fusion::create(config.parameters, map, start));
+  return core::value_or_throw(Fusion::create(config.parameters, map, start, saved));
 }
 
 OdometryInput input_of(const msg::OdometryStep& m) {
@@ -131,12 +133,13 @@ FusionService::FusionService(const FusionConfig& config, service::Context& conte
       context_(context),
       writer_(context.writer(train_state)),
       pose_writer_(context.writer(train_pose)),
+      scale_file_(config.scales_file, context.log()),
       pose_(config.parameters.gnss_map_sigma_m),
       kept_for_(config.map + ' ' + config.start + '\n') {
   if (!config.map.empty()) {
     map_ = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(config.map)));
   }
-  fusion_.emplace(make_fusion(config, map_));
+  fusion_.emplace(make_fusion(config, map_, scale_file_.saved()));
   listen(config);
   context_.on<msg::DataClock>(data_clock, [this](const msg::DataClock& m) { keep_time(m); });
   context_.every(kTickPeriod, [this] { tick(); });
@@ -230,7 +233,7 @@ bool FusionService::take_over_known(const TrainEstimate& first) {
 
 // What is known of the place comes from another fusion: what this one believes of it is forgotten.
 void FusionService::begin_anew() {
-  fusion_.emplace(core::value_or_throw(Fusion::create(config_.parameters, map_, std::nullopt)));
+  fusion_.emplace(core::value_or_throw(Fusion::create(config_.parameters, map_, std::nullopt, scale_file_.saved())));
   begun_anew_ = true;
 }
 
@@ -239,7 +242,7 @@ void FusionService::restart(int64_t data_ns) {
   FusionConfig config = config_;
   const bool from_start = begun_ns_ && std::abs(core::seconds(data_ns - *begun_ns_)) < kSameBeginS;
   if (!from_start) config.start = "unknown";
-  fusion_.emplace(make_fusion(config, map_));
+  fusion_.emplace(make_fusion(config, map_, scale_file_.saved()));
   latest_.reset();
   known_.reset();
   noted_ns_.reset();
@@ -254,7 +257,9 @@ void FusionService::restart(int64_t data_ns) {
 void FusionService::listen(const FusionConfig& config) {
   if (config.use_wheel) {
     context_.on<msg::WheelSample>(wheel_sample, [this](const msg::WheelSample& m) {
-      use(WheelInput{m.stamp_ns(), m.pulses(), m.pulses_per_metre()}, m.grabbed_ns());
+      const WheelInput sample{m.stamp_ns(), m.pulses(), m.pulses_per_metre()};
+      if (!scale_file_.fits(sample)) fusion_->drop_saved_scales();
+      use(sample, m.grabbed_ns());
     });
   }
   if (config.use_imu) {
@@ -267,6 +272,9 @@ void FusionService::listen(const FusionConfig& config) {
   if (config.use_camera) {
     context_.on<msg::OdometryStep>(odometry_step,
                                    [this](const msg::OdometryStep& m) { use(input_of(m), m.grabbed_ns()); });
+    context_.on<msg::CameraCalibration>(camera_calibration, [this](const msg::CameraCalibration& m) {
+      if (!scale_file_.fits(m)) fusion_->drop_saved_scales();
+    });
   }
   if (config.use_fixes) {
     context_.on<msg::PositionFix>(position_fix, [this](const msg::PositionFix& m) { use(input_of(m), 0); });
@@ -317,6 +325,7 @@ void FusionService::tick() {
 
 void FusionService::publish(const TrainEstimate& estimate, int64_t grabbed_ns) {
   if (known_ && !take_over_known(estimate)) return;
+  scale_file_.follow(*fusion_, estimate);
   msg::TrainState message = message_of(estimate);
   message.grabbed_ns(grabbed_ns);
   message.distance_m(message.distance_m() + distance_offset_m_);

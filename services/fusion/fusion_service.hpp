@@ -7,6 +7,7 @@
 #include "fusion/fusion.hpp"
 #include "fusion/fusion_config.hpp"
 #include "fusion/handover.hpp"
+#include "fusion/scale_file.hpp"
 #include "fusion/train_pose.hpp"
 #include "service/service.hpp"
 
@@ -41,6 +42,7 @@ class FusionService {
   messaging::Writer<msg::TrainState> writer_;
   messaging::Writer<msg::TrainPose> pose_writer_;
   std::shared_ptr<const track::Map> map_;
+  ScaleFile scale_file_;
   std::optional<Fusion> fusion_;
   TrainPose pose_;
   std::string kept_for_;  // map and start that the notes are for

@@ -24,13 +24,21 @@ Source source_of(const Event& event) {
 
 }  // namespace
 
-Hypotheses::Hypotheses(const FusionParameters* parameters, std::shared_ptr<const track::Path> path, int64_t stamp_ns)
+void Promise::hold(const Promise& other) {
+  interval.behind_m = std::min(interval.behind_m, other.interval.behind_m);
+  interval.ahead_m = std::max(interval.ahead_m, other.interval.ahead_m);
+  since_sure_m = std::max(since_sure_m, other.since_sure_m);
+}
+
+Hypotheses::Hypotheses(const FusionParameters* parameters, const OdometerScales& scales,
+                       std::shared_ptr<const track::Path> path, int64_t stamp_ns)
     : parameters_(parameters),
-      main_(parameters, std::move(path), stamp_ns),
+      main_(parameters, scales, std::move(path), stamp_ns),
       rivals_{Rival{Source::camera, {}, {}, {}}, Rival{Source::wheel, {}, {}, {}}, Rival{Source::imu, {}, {}, {}},
               Rival{Source::gnss, {}, {}, {}}} {}
 
 void Hypotheses::apply(const Event& event) {
+  fix_fitted_.reset();
   const auto* fix = std::get_if<FixInput>(&event);
   if (fix != nullptr && fix->kind != FixKind::track) {
     apply_fix(*fix, event);
@@ -85,6 +93,7 @@ void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
   for (auto& rival : rivals_) {
     if (rival.estimator) rival.estimator->apply(event);
   }
+  if (main_.fix_refused() || main_.fix_used()) fix_fitted_ = main_.fix_used() && !main_.fix_corrected();
   if (main_.fix_refused()) {
     if (adopt_by_fix(before) || !adopt_doubter()) return;
   } else if (main_.fix_used()) {
@@ -249,20 +258,32 @@ Interval Hypotheses::promised(const Interval& main) const {
   return {main.behind_m - most.behind_m, main.ahead_m + most.ahead_m};
 }
 
-TrainEstimate Hypotheses::estimate() const {
+Promise Hypotheses::promise() const {
   Estimator main = main_;
   main.predict_to(stamp_ns());
-  Interval all = main.widened(promised(main.interval()));
-  double since_sure_m = main.since_reference_m();
+  Promise all{main.widened(promised(main.interval())), main.since_reference_m()};
   for (const auto& doubter : doubters_) {
     Estimator other = doubter.estimator;
     other.predict_to(stamp_ns());
-    const Interval its = other.widened(other.interval());
-    all.behind_m = std::min(all.behind_m, its.behind_m);
-    all.ahead_m = std::max(all.ahead_m, its.ahead_m);
-    since_sure_m = std::max(since_sure_m, other.since_reference_m());
+    all.hold({other.widened(other.interval()), other.since_reference_m()});
   }
-  return main.estimate(all, since_sure_m);
+  return all;
+}
+
+TrainEstimate Hypotheses::estimate(const Promise& promise) const {
+  Estimator main = main_;
+  main.predict_to(stamp_ns());
+  return main.estimate(promise.interval, promise.since_sure_m);
+}
+
+OdometerScales Hypotheses::scales() const {
+  OdometerScales all = main_.filter().scales();
+  for (const auto& doubter : doubters_) {
+    const auto other = doubter.estimator.filter().scales();
+    all.camera_sigma = std::max(all.camera_sigma, std::hypot(other.camera - all.camera, other.camera_sigma));
+    all.wheel_sigma = std::max(all.wheel_sigma, std::hypot(other.wheel - all.wheel, other.wheel_sigma));
+  }
+  return all;
 }
 
 }  // namespace railfix::fusion

@@ -15,13 +15,25 @@
 #include <vector>
 
 #include "fusion/estimator.hpp"
+#include "fusion/odometer_scales.hpp"
 
 namespace railfix::fusion {
+
+/// What is promised: the two ends, and the way since the last place that is beyond doubt.
+struct Promise {
+  Interval interval;
+  double since_sure_m = 0;
+
+  /// From now on also what the other one promises.
+  void hold(const Promise& other);
+};
 
 /// A plain value; the same events as Estimator.
 class Hypotheses {
  public:
-  Hypotheses(const FusionParameters* parameters, std::shared_ptr<const track::Path> path, int64_t stamp_ns);
+  /// scales: what is known of them when they are first used.
+  Hypotheses(const FusionParameters* parameters, const OdometerScales& scales, std::shared_ptr<const track::Path> path,
+             int64_t stamp_ns);
 
   void apply(const Event& event);
   void predict_to(int64_t stamp_ns);
@@ -30,7 +42,12 @@ class Hypotheses {
   [[nodiscard]] uint32_t slipping() const;
   /// Those do without wheel samples up to this stamp; what one has found says nothing of the others.
   void block_wheel_until(int64_t stamp_ns, uint32_t slipping);
-  [[nodiscard]] TrainEstimate estimate() const;
+  [[nodiscard]] Promise promise() const;
+  [[nodiscard]] TrainEstimate estimate(const Promise& promise) const;
+  /// The last event was a fix that the main one used as it was (true), or not without giving something up (false).
+  [[nodiscard]] std::optional<bool> fix_fitted() const { return fix_fitted_; }
+  /// As the main one knows them, with what they would be if one of the last landmarks was wrong.
+  [[nodiscard]] OdometerScales scales() const;
 
   [[nodiscard]] int64_t stamp_ns() const { return main_.stamp_ns(); }
   [[nodiscard]] const Estimator& main() const { return main_; }
@@ -77,6 +94,7 @@ class Hypotheses {
   Estimator main_;
   std::vector<Doubter> doubters_;  // the latest one last
   std::array<Rival, 4> rivals_;
+  std::optional<bool> fix_fitted_;
 };
 
 }  // namespace railfix::fusion

@@ -25,28 +25,33 @@ double squared(double value) {
 
 }  // namespace
 
-MotionFilter::MotionFilter(const FusionParameters& parameters, int64_t stamp_ns, bool origin_known)
-    : stamp_ns_(stamp_ns), x_(StateVector::Zero(kCore)) {
+MotionFilter::MotionFilter(const FusionParameters& parameters, const OdometerScales& scales, int64_t stamp_ns,
+                           bool origin_known)
+    : stamp_ns_(stamp_ns), known_before_(scales), x_(StateVector::Zero(kCore)) {
   StateVector sigma(kCore);
   sigma << 0.0, 0.0, origin_known ? parameters.start_sigma_m : kUnknownPositionM, kUnknownSpeedMps,
       parameters.acceleration_sigma_mps2,
       std::hypot(parameters.accel_bias_sigma_mps2, origin_known ? 0.0 : 9.81 * parameters.unknown_grade),
-      parameters.visual_scale_sigma, parameters.wheel_scale_sigma, kUnknownPositionM, 0.01,
-      parameters.shape_error_sigma_m, 1.0;
+      scales.camera_sigma, scales.wheel_sigma, kUnknownPositionM, 0.01, parameters.shape_error_sigma_m, 1.0;
   ud_ = estimation::UdFilter(StateVector(sigma.cwiseAbs2()));
 }
 
-void MotionFilter::choose_unit(Odometer odometer, const FusionParameters& parameters) {
+void MotionFilter::choose_unit(Odometer odometer) {
   unit_ = odometer;
+  const auto& before = known_before_;
   const bool camera = odometer == Odometer::camera;
   const int unit = index(StateIndex::unit_scale);
   const int other = index(StateIndex::other_scale);
-  ud_.reset(unit, squared(camera ? parameters.visual_scale_sigma : parameters.wheel_scale_sigma));
-  ud_.reset(other, squared(camera ? parameters.wheel_scale_sigma : parameters.visual_scale_sigma));
-  // Both are known on their own: against the unit the other one is its own error less the unit's.
+  const double unit_sigma = camera ? before.camera_sigma : before.wheel_sigma;
+  const double other_sigma = camera ? before.wheel_sigma : before.camera_sigma;
+  x_(unit) = camera ? before.camera : before.wheel;
+  x_(other) = (1 + (camera ? before.wheel : before.camera)) / (1 + x_(unit)) - 1;
+  ud_.reset(unit, squared(unit_sigma));
+  ud_.reset(other, squared(other_sigma) * (1 - squared(before.correlation)));
+  // Against the unit the other one is its own error less the unit's, of which it has a share in common.
   const auto n = x_.size();
   StateMatrix phi = StateMatrix::Identity(n, n);
-  phi(other, unit) = -1;
+  phi(other, unit) = before.correlation * other_sigma / unit_sigma - 1;
   ud_.propagate(phi, StateMatrix::Zero(n, 1), StateVector::Zero(1));
 }
 
@@ -296,11 +301,24 @@ double MotionFilter::to_unit(Odometer odometer) const {
   return unit_ == Odometer::none || odometer == unit_ ? 1.0 : 1 + value(StateIndex::other_scale);
 }
 
-double MotionFilter::scale_sigma(Odometer odometer) const {
+StateVector MotionFilter::scale_row(Odometer odometer) const {
   StateVector h = row();
   h(index(StateIndex::unit_scale)) = 1;
   if (odometer != unit_) h(index(StateIndex::other_scale)) = 1;
-  return std::sqrt(ud_.variance(h));
+  return h;
+}
+
+double MotionFilter::scale_sigma(Odometer odometer) const {
+  return std::sqrt(ud_.variance(scale_row(odometer)));
+}
+
+OdometerScales MotionFilter::scales() const {
+  if (unit_ == Odometer::none) return known_before_;
+  const double camera = scale_sigma(Odometer::camera);
+  const double wheel = scale_sigma(Odometer::wheel);
+  const double sum = ud_.variance(StateVector(scale_row(Odometer::camera) + scale_row(Odometer::wheel)));
+  const double covariance = 0.5 * (sum - squared(camera) - squared(wheel));
+  return {scale(Odometer::camera) - 1, scale(Odometer::wheel) - 1, camera, wheel, covariance / (camera * wheel)};
 }
 
 std::optional<int> MotionFilter::clone_index(int64_t stamp_ns) const {

@@ -17,6 +17,7 @@
 
 #include "estimation/ud_filter.hpp"
 #include "fusion/fusion_parameters.hpp"
+#include "fusion/odometer_scales.hpp"
 
 namespace railfix::fusion {
 
@@ -56,8 +57,9 @@ struct Offer {
 /// A plain value: copies of it are the snapshots from which late measurements are replayed.
 class MotionFilter {
  public:
-  /// origin_known: the path's distance 0 is the start; otherwise the place on the map is not known yet.
-  MotionFilter(const FusionParameters& parameters, int64_t stamp_ns, bool origin_known);
+  /// scales: as they are known when the first odometer measures. origin_known: the path's distance 0 is the start;
+  /// otherwise the place on the map is not known yet.
+  MotionFilter(const FusionParameters& parameters, const OdometerScales& scales, int64_t stamp_ns, bool origin_known);
 
   /// Moves on to the stamp. REQUIRES: not before the current one.
   void predict_to(int64_t stamp_ns, const FusionParameters& parameters);
@@ -65,7 +67,7 @@ class MotionFilter {
   void rebase_clock(int64_t stamp_ns);
 
   /// The first odometer that measures; the others are compared with it from then on.
-  void choose_unit(Odometer odometer, const FusionParameters& parameters);
+  void choose_unit(Odometer odometer);
   [[nodiscard]] Odometer unit() const { return unit_; }
 
   /// Remembers the odometer at the current stamp; forgets clones of older pictures but `keep_ns`.
@@ -117,6 +119,7 @@ class MotionFilter {
   /// Unit metres over measured metres of an odometer.
   [[nodiscard]] double to_unit(Odometer odometer) const;
   [[nodiscard]] double scale_sigma(Odometer odometer) const;
+  [[nodiscard]] OdometerScales scales() const;
   /// Way since the reference.
   [[nodiscard]] double since_reference_m() const { return value(StateIndex::distance) - reference_m_; }
 
@@ -125,6 +128,7 @@ class MotionFilter {
   [[nodiscard]] std::optional<int> clone_index(int64_t stamp_ns) const;
   [[nodiscard]] double unit_scale() const { return 1 + value(StateIndex::unit_scale); }
   [[nodiscard]] estimation::StateVector row() const;
+  [[nodiscard]] estimation::StateVector scale_row(Odometer odometer) const;
   void step(double dt_s, const FusionParameters& parameters);
   void remove_clone(int index);
   Offer offer(const estimation::StateVector& h, double residual, double sigma, double gate);
@@ -132,6 +136,7 @@ class MotionFilter {
   int64_t stamp_ns_ = 0;
   Odometer unit_ = Odometer::none;
   double reference_m_ = 0;
+  OdometerScales known_before_;
   std::vector<int64_t> clones_;  // their stamps in the order of the states: newest first
   estimation::StateVector x_;
   estimation::UdFilter ud_;

@@ -133,6 +133,8 @@ void add_run(CLI::App& app, Action& chosen) {
       ->check(CLI::IsMember({"real", "lossless"}))
       ->capture_default_str();
   command->add_option("--out", options->out, "Folder for the results")->required();
+  command->add_option("--state", options->state,
+                      "Folder of what a train keeps from trip to trip: this run begins with it and adds to it");
   command->add_flag("--camera-only", options->camera_only, "Leave out wheel, IMU and GNSS");
   command->add_option("--draw", options->draw, "Folder for the pictures with the rails drawn on them");
   command->add_flag("!--no-pictures", options->record_pictures, "Leave the pictures out of the recording");

@@ -10,20 +10,23 @@ namespace {
 
 constexpr size_t kBlock = 8;
 constexpr double kManyWider = 0.05;
+constexpr double kSavedSigma = 1e-4;
 
 struct Run {
   Fault fault;
   Verdict verdict;
   StanfordCounts stanford;
+  fusion::SavedScalesAre saved;
 };
 
 Run run_one(const CampaignPlan& plan, uint64_t number) {
   const auto simulation = simulation_of(plan, number);
-  auto fusion = core::value_or_throw(fusion::Fusion::create(plan.parameters, simulation.map, simulation.start()));
-  Run run{simulation.plan().fault, {}, {}};
+  auto fusion = fusion_of(plan, simulation, number);
+  Run run{simulation.plan().fault, {}, {}, {}};
   run.verdict = judge(simulation, fusion, 0, [&run](const fusion::TrainEstimate& state, double error_m) {
     run.stanford.add(std::abs(error_m), error_m > 0 ? state.over_m : state.under_m);
   });
+  run.saved = fusion.saved_scales();
   return run;
 }
 
@@ -59,6 +62,18 @@ TrainSimulation simulation_of(const CampaignPlan& plan, uint64_t number) {
   return TrainSimulation(one, seed, plan.map, plan.starts[number % plan.starts.size()]);
 }
 
+fusion::Fusion fusion_of(const CampaignPlan& plan, const TrainSimulation& simulation, uint64_t number) {
+  std::optional<fusion::SavedScales> saved;
+  if (plan.saved_wrong) {
+    const double wrong = (number / 3 % 2 == 0 ? 1 : -1) * *plan.saved_wrong;
+    saved.emplace();
+    saved->scales = {simulation.camera_scale_error + (number % 3 != 1 ? wrong : 0),
+                     simulation.wheel_scale_error + (number % 3 != 0 ? wrong : 0), kSavedSigma, kSavedSigma, 0};
+    saved->stamp_ns = simulation.stamp_ns(0);
+  }
+  return core::value_or_throw(fusion::Fusion::create(plan.parameters, simulation.map, simulation.start(), saved));
+}
+
 CampaignResult run_campaign(const CampaignPlan& plan, const std::function<void(const Verdict&)>& progress) {
   CampaignResult result;
   for (uint64_t first = 0; result.sum.way_m < 1000 * plan.km; first += kBlock) {
@@ -72,6 +87,7 @@ CampaignResult run_campaign(const CampaignPlan& plan, const std::function<void(c
       result.sum.add(run.verdict);
       ++result.run_count;
       result.stanford.add(run.stanford);
+      ++result.saved[run.saved];
       const auto& v = run.verdict;
       const double wider = static_cast<double>(v.wider) / static_cast<double>(std::max<size_t>(v.states, 1));
       const BadRun noted{first + i, run.fault, v.outside, v.wider_unsaid, v.worst_excess_m, wider};

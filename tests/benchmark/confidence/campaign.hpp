@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -18,10 +19,11 @@ struct CampaignPlan {
   double km = 100;
   uint64_t seed = 1;
   int threads = 2;
-  double duration_s = 240;        // of one run
-  std::vector<FaultName> faults;  // in turn, one a run
-  double no_fault_share = 0.25;   // of runs beside those
-  bool slip_always = false;       // beside faults of other motion sensors too
+  double duration_s = 240;            // of one run
+  std::vector<FaultName> faults;      // in turn, one a run
+  double no_fault_share = 0.25;       // of runs beside those
+  bool slip_always = false;           // beside faults of other motion sensors too
+  std::optional<double> saved_wrong;  // scales are saved, wrong by so much: camera's, wheel's and both in turn
   SimulationPlan simulation;
   fusion::FusionParameters parameters;
   std::shared_ptr<const track::Map> map;    // nullptr: every run on a random line
@@ -46,10 +48,12 @@ struct CampaignResult {
   std::vector<BadRun> bad;
   std::vector<BadRun> wide;  // none of the bad ones
   StanfordCounts stanford;
+  std::map<fusion::SavedScalesAre, size_t> saved;  // runs that ended so
 };
 
-/// Run `number` of the campaign alone.
+/// Run `number` of the campaign alone, and the fusion for it.
 TrainSimulation simulation_of(const CampaignPlan& plan, uint64_t number);
+fusion::Fusion fusion_of(const CampaignPlan& plan, const TrainSimulation& simulation, uint64_t number);
 /// progress hears of the sum so far now and then.
 CampaignResult run_campaign(const CampaignPlan& plan, const std::function<void(const Verdict&)>& progress = {});
 

@@ -28,6 +28,8 @@ struct Arguments {
   int64_t run = -1;
   int position = 0;
   std::string row;
+  double saved_wrong = -1;
+  bool learnt = false;
   bool list = false;
   bool sources = false;
 };
@@ -86,6 +88,14 @@ void print(const CampaignResult& result) {
   for (const auto& bad : result.bad)
     std::printf("%s: %zu outside by up to %.2f m, %zu wider unsaid\n", to_string(bad).c_str(), bad.outside,
                 bad.excess_m, bad.unsaid);
+  if (result.saved.size() > 1 || !result.saved.contains(fusion::SavedScalesAre::none)) {
+    const auto runs = [&](fusion::SavedScalesAre what) {
+      return result.saved.contains(what) ? result.saved.at(what) : 0;
+    };
+    std::printf("saved scales: confirmed in %zu runs, contradicted in %zu, still on trial in %zu\n",
+                runs(fusion::SavedScalesAre::confirmed), runs(fusion::SavedScalesAre::contradicted),
+                runs(fusion::SavedScalesAre::on_trial));
+  }
   auto wide = result.wide;
   std::ranges::sort(wide, std::ranges::greater{}, &BadRun::wider_share);
   for (size_t i = 0; i < std::min(wide.size(), kWideShown); ++i)
@@ -121,7 +131,7 @@ void compare_sources(const CampaignPlan& plan) {
 // One run, a line a second.
 void trace(const CampaignPlan& plan, uint64_t number) {
   const auto simulation = simulation_of(plan, number);
-  auto fusion = core::value_or_throw(fusion::Fusion::create(plan.parameters, simulation.map, simulation.start()));
+  auto fusion = fusion_of(plan, simulation, number);
   const auto& fault = simulation.plan().fault;
   std::printf("%s %s from %.1f s to %.1f s, size %g\n", to_string(fault.sensor).c_str(), to_string(fault.kind).c_str(),
               fault.begin_s, fault.end_s, fault.size);
@@ -166,6 +176,11 @@ int run(int argc, char** argv) {
   app.add_flag("--sources", a.sources, "Without faults: a table of what each source is worth");
   app.add_option("--position", a.position, "Position with frogs and portals as references: so many runs of 26 km");
   app.add_option("--row", a.row, "... with this set of sensors alone, as the table names it");
+  app.add_flag("--learnt", a.learnt, "... with the scales that an earlier trip of the same train has taught");
+  app.add_option(
+      "--saved-wrong", a.saved_wrong,
+      "Every run begins with saved scales that are wrong by this share: the camera's, the wheel's and both in "
+      "turn; 0: right");
   app.add_flag("--slip-always", a.plan.slip_always, "The wheel slips beside every fault: two faults at once");
   app.add_flag("--list", a.list, "Print the faults");
   CLI11_PARSE(app, argc, argv);
@@ -177,13 +192,14 @@ int run(int argc, char** argv) {
   s.max_speed_mps = a.max_kmh / 3.6;
   if (a.sudden_mps2 > 0) s.style = DriveStyle::sudden(a.sudden_mps2);
   leave_out(s, a.without);
+  if (a.saved_wrong >= 0) a.plan.saved_wrong = a.saved_wrong;
   load_map(a);
   if (a.run >= 0) {
     trace(a.plan, static_cast<uint64_t>(a.run));
     return 0;
   }
   if (a.position > 0) {
-    print_positions(a.plan.seed, a.position, a.row);
+    print_positions({a.plan.seed, a.position, a.row, a.learnt});
     return 0;
   }
   if (a.sources) {

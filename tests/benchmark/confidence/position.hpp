@@ -6,8 +6,15 @@
 
 namespace railfix::train {
 
-/// Runs the simulator's long line (26 km, frogs of ten stations, tunnel portals) `runs` times for each set of sensors
-/// and prints a table, or the row `only`. Camera and sightings are as good as they were measured on drawn pictures.
-void print_positions(uint64_t seed, int runs, const std::string& only = "");
+struct PositionPlan {
+  uint64_t seed = 1;
+  int runs = 1;
+  std::string only;     // this row alone, empty = all
+  bool learnt = false;  // every run begins with the scales that another trip of its train has taught
+};
+
+/// Runs the simulator's long line (26 km, frogs of ten stations, tunnel portals) so often for each set of sensors and
+/// prints a table. Camera and sightings are as good as they were measured on drawn pictures.
+void print_positions(const PositionPlan& plan);
 
 }  // namespace railfix::train

@@ -21,6 +21,9 @@ constexpr double kInertialS = 0.02;
 constexpr double kPulsesPerMetre = 90;
 constexpr double kKeyFrameM = 0.15;
 constexpr double kSureProbability = 0.9999;
+// Of a scale, between trips of one train: the light and the track for a camera, load and temperature for a wheel.
+constexpr double kCameraTripChange = 2e-4;
+constexpr double kWheelTripChange = 5e-5;
 
 core::Random stream(uint64_t seed, uint64_t number) {
   core::Random mixed(seed * 1'000'003 + number);
@@ -142,11 +145,18 @@ const TrainSimulation::Spell* TrainSimulation::within(const std::vector<Spell>& 
   return it == all.end() ? nullptr : &*it;
 }
 
+double TrainSimulation::scale_error_of(double usual, double trip_change, core::Random& random, uint64_t number) const {
+  const double here = random.normal();
+  if (!plan_.train) return usual * here;
+  return usual * stream(*plan_.train, number).normal() + trip_change * here;
+}
+
 // A key frame is kept until 0.15 m are run; steps refer to it. Scale wanders a little around its error.
 void TrainSimulation::make_steps() {
   auto random = stream(seed_, 10);
   const auto blind = plan_.blind_spells ? spells(random, 60, 5, 15, 0) : std::vector<Spell>{};
-  const double scale = 1 + plan_.visual_scale_error * random.normal();
+  camera_scale_error = scale_error_of(plan_.visual_scale_error, kCameraTripChange, random, 10);
+  const double scale = 1 + camera_scale_error;
   const double phase = random.uniform(0, 6);
   double reference_s = 0;
   double seen_m = 0;  // way as the camera measures it
@@ -178,7 +188,8 @@ void TrainSimulation::make_steps() {
 void TrainSimulation::make_pulses() {
   auto random = stream(seed_, 11);
   const auto slips = plan_.slip ? spells(random, 60, 2, 8, 0.3) : std::vector<Spell>{};
-  const double scale = 1 + plan_.wheel_scale_error * random.normal();
+  wheel_scale_error = scale_error_of(plan_.wheel_scale_error, kWheelTripChange, random, 11);
+  const double scale = 1 + wheel_scale_error;
   double wheel_m = random.uniform();
   for (int i = 0; i * kPulseS <= duration_s(); ++i) {
     const double t = i * kPulseS;

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -36,6 +37,7 @@ struct SimulationPlan {
   double visual_scale_error = 0.007;
   double visual_wander = 0.001;  // of the camera's scale, lasting about 3 km
   double wheel_scale_error = 0.007;
+  std::optional<uint64_t> train;  // trips of the same one have its scales, but for what changes from trip to trip
   double step_noise_m = 0.002;
   double outlier_share = 0.003;   // of odometry steps: one sleeper more or less
   double false_fix_share = 0.02;  // of fixes: somewhere else, with full confidence
@@ -82,6 +84,9 @@ class TrainSimulation {
   std::shared_ptr<const track::Map> map;
   std::vector<Arrival> arrivals;  // in the order in which they come
   double start_error_m = 0;
+  /// True over measured metres, less 1; the camera's wander beside it.
+  double camera_scale_error = 0;
+  double wheel_scale_error = 0;
 
  private:
   static constexpr int64_t kBeginNs = 1'700'000'000'000'000'000;
@@ -91,6 +96,7 @@ class TrainSimulation {
     double size;
   };
   void measure();
+  [[nodiscard]] double scale_error_of(double usual, double trip_change, core::Random& random, uint64_t number) const;
   void make_steps();
   void make_pulses();
   void make_inertial();

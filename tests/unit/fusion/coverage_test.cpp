@@ -40,7 +40,7 @@ Campaign run_campaign(const SimulationPlan& plan, int runs, double after_m = 0) 
 }
 
 TEST(Coverage, AllSensorsWithLandmarksEvery400m) {
-  const auto campaign = run_campaign({}, 100, 1250);  // behind the third landmark: scales are known
+  const auto campaign = run_campaign({}, 25, 1250);  // behind the third landmark: scales are known
   EXPECT_EQ(campaign.sum.outside, 0U);
   EXPECT_LE(campaign.p95_m, 0.5);
   EXPECT_GE(campaign.budget_share, 0.99);

@@ -98,42 +98,11 @@ TEST(References, ImprobableAndForeignFixesAreLeftOut) {
   EXPECT_THAT(state.reason, HasSubstr("another track"));
 }
 
-/// A train that runs 20 m/s by its camera, which counts `scale` true metres a metre, over landmarks every so often.
-class Passage {
- public:
-  explicit Passage(double scale) : scale_(scale) {}
-  /// Runs to the true place; every state must hold the train.
-  void run_to(double place_m) {
-    while (place_m_ < place_m) {
-      const double step_m = 20 * 0.02;
-      t_s_ += 0.02;
-      place_m_ += scale_ * step_m;
-      state_ = fusion_.add(OdometryInput{at(t_s_), at(t_s_ - 0.02), step_m, 0.001, true});
-      ASSERT_TRUE(state_);
-      const double error_m = state_->position.offset_m - place_m_;
-      ASSERT_LT(error_m, state_->over_m) << "at " << place_m_ << " m";
-      ASSERT_LT(-error_m, state_->under_m) << "at " << place_m_ << " m";
-    }
-  }
-  /// A landmark here, sighted so far ahead of where it is.
-  void sight(double wrong_m) { fusion_.add(fix_at(t_s_, place_m_ + wrong_m, ++landmark_, 0.999999)); }
-  [[nodiscard]] double error_m() const { return state_->position.offset_m - place_m_; }
-  [[nodiscard]] double scale_error() const { return state_->visual_scale - scale_; }
-
- private:
-  Fusion fusion_ = fusion_at(0);
-  double scale_;
-  double t_s_ = 0;
-  double place_m_ = 0;
-  uint32_t landmark_ = 0;
-  std::optional<TrainEstimate> state_;
-};
-
 // However sure and sharp: a portal may be sighted metres off.
 TEST(References, AWrongSightingCostsAccuracyUntilTheNextOnesAndTheIntervalHolds) {
   for (const double scale : {0.995, 1.0, 1.008}) {
     for (const double wrong_m : {-3.0, -1.0, 1.0, 2.0, 3.0}) {
-      Passage passage(scale);
+      Passage passage({.camera = scale});
       passage.run_to(600);
       passage.sight(0);
       passage.run_to(1100);
@@ -151,7 +120,7 @@ TEST(References, AWrongSightingCostsAccuracyUntilTheNextOnesAndTheIntervalHolds)
 }
 
 TEST(References, EverySecondSightingMayBeWrong) {
-  Passage passage(1.003);
+  Passage passage({.camera = 1.003});
   double place_m = 0;
   for (const double wrong_m : {0.05, 2.26, 0.1, -0.05, 0.1, -1.5, 0.05, 3.0, -0.1}) {
     passage.run_to(place_m += 700);

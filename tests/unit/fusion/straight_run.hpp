@@ -24,9 +24,9 @@ inline std::shared_ptr<const track::Map> straight_line() {
   return map;
 }
 
-inline Fusion fusion_at(double offset_m, const FusionParameters& parameters = {}) {
+inline Fusion fusion_at(double offset_m, const std::optional<SavedScales>& saved = std::nullopt) {
   return core::value_or_throw(
-      Fusion::create(parameters, straight_line(), track::EdgePosition{1, offset_m, track::Direction::forward}));
+      Fusion::create({}, straight_line(), track::EdgePosition{1, offset_m, track::Direction::forward}, saved));
 }
 inline Fusion fusion_without_start() {
   return core::value_or_throw(Fusion::create({}, straight_line(), std::nullopt));
@@ -51,5 +51,47 @@ inline TrainEstimate run(Fusion& fusion, double from_s, double to_s, double spee
   EXPECT_TRUE(last);
   return last.value_or(TrainEstimate{});
 }
+
+/// A train that runs 20 m/s over landmarks every so often, by a camera that counts a metre on `camera` true ones, and a
+/// wheel likewise when there is one.
+class Passage {
+ public:
+  struct Plan {
+    double camera = 1;
+    std::optional<double> wheel = std::nullopt;
+    std::optional<SavedScales> saved = std::nullopt;
+  };
+  explicit Passage(const Plan& plan) : fusion_(fusion_at(0, plan.saved)), plan_(plan) {}
+
+  /// Runs to the true place; every state must hold the train.
+  void run_to(double place_m) {
+    while (place_m_ < place_m) {
+      if (plan_.wheel) fusion_.add(wheel_at(t_s_, place_m_ / *plan_.wheel));
+      t_s_ += kPeriodS;
+      place_m_ += kSpeedMps * kPeriodS;
+      const double step_m = kSpeedMps * kPeriodS / plan_.camera;
+      state_ = fusion_.add(OdometryInput{at(t_s_), at(t_s_ - kPeriodS), step_m, 0.001, true});
+      ASSERT_TRUE(state_);
+      ASSERT_LT(error_m(), state_->over_m) << "at " << place_m_ << " m";
+      ASSERT_LT(-error_m(), state_->under_m) << "at " << place_m_ << " m";
+    }
+  }
+  /// A landmark here, sighted so far ahead of where it is.
+  void sight(double wrong_m) { fusion_.add(fix_at(t_s_, place_m_ + wrong_m, ++landmark_, 0.999999)); }
+  [[nodiscard]] double error_m() const { return state_->position.offset_m - place_m_; }
+  [[nodiscard]] double scale_error() const { return state_->visual_scale - plan_.camera; }
+  [[nodiscard]] const TrainEstimate& state() const { return *state_; }
+  [[nodiscard]] const Fusion& fusion() const { return fusion_; }
+
+ private:
+  static constexpr double kPeriodS = 0.1;
+  static constexpr double kSpeedMps = 20;
+  Fusion fusion_;
+  Plan plan_;
+  double t_s_ = 0;
+  double place_m_ = 0;
+  uint32_t landmark_ = 0;
+  std::optional<TrainEstimate> state_;
+};
 
 }  // namespace railfix::fusion

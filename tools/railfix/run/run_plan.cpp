@@ -74,6 +74,9 @@ void fill_settings(YAML::Node& settings, const RunOptions& options, const RunPla
 
   for (const char* service : {"fusion", "map_matcher", "tpr_publisher"}) settings[service]["map"] = plan.map.string();
   settings["fusion"]["start"] = options.start;
+  if (!options.state.empty()) {
+    settings["fusion"]["scales_file"] = std::filesystem::absolute(options.state / "scales.yaml").string();
+  }
   for (const char* service : {"recorder", "monitor"}) settings[service]["map"] = plan.map.string();
   settings["recorder"]["train_file"] = plan.config.string();
   settings["recorder"]["file"] = std::filesystem::absolute(options.out / "recording.mcap").string();
@@ -122,8 +125,10 @@ core::Result<RunPlan> plan_run(const RunOptions& options) {
   if (!pictures.ok()) return pictures.error();
 
   std::error_code failed;
-  std::filesystem::create_directories(options.out, failed);
-  if (failed) return core::Error{options.out.string() + " cannot be made: " + failed.message()};
+  for (const auto& folder : {options.out, options.state}) {
+    if (!folder.empty()) std::filesystem::create_directories(folder, failed);
+    if (failed) return core::Error{folder.string() + " cannot be made: " + failed.message()};
+  }
 
   RunPlan plan;
   plan.pictures = pictures.value()->count();

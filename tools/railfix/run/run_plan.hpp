@@ -20,6 +20,7 @@ struct RunOptions {
   bool camera_only = false;
   bool record_pictures = true;
   std::filesystem::path out;
+  std::filesystem::path state;    // folder of what is kept from trip to trip, empty = nothing
   std::filesystem::path draw;     // folder for annotated pictures, empty = none
   std::filesystem::path config;   // services' settings to begin with, empty = defaults
   std::vector<std::string> sets;  // section.key=value
