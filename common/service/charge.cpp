@@ -69,7 +69,7 @@ bool Charge::must_stand_by(int64_t now_ns) const {
   return std::any_of(peers_.begin(), peers_.end(), [&](const auto& entry) {
     const Peer& peer = entry.second;
     if (peer.beat.in_charge) return better(peer.beat, beat());
-    return peer.better_since_ns && now_ns - *peer.better_since_ns >= kBetterNs;
+    return peer.better_since_ns && now_ns - *peer.better_since_ns >= (worthless_ ? kWorthlessNs : kBetterNs);
   });
 }
 
@@ -95,6 +95,7 @@ bool Charge::update(int fitness, int64_t now_ns) {
     stand_by(now_ns);
   }
   updated_ns_ = now_ns;
+  worthless_ = fitness == 0;
   settle(fitness, now_ns);
   look_at_peers(now_ns);
   if (in_charge_) {

@@ -7,7 +7,8 @@
 // - Who hears of nobody in charge for `silence` takes charge; the best first, the others give it one more `silence`.
 // - Who was held up for so long that somebody else may have taken charge (SIGSTOP, an overloaded host) stands by.
 // - Two in charge (a cable is plugged in again): the worse one stands by at once.
-// - A standby whose output has been better for kBetterNs gets the charge.
+// - A standby whose output has been better for kBetterNs gets the charge; for kWorthlessNs when that of the one in
+//   charge is worth nothing (fitness 0): time enough for the other one to say the same of its own.
 // Fitness counts once it has stood for kSettledNs, and no more as soon as it falls.
 // Better: more fitness, then more strength, then the smaller instance; so any two agree on it.
 #pragma once
@@ -35,6 +36,7 @@ class Charge {
   static constexpr int64_t kNewcomerNs = 1'000'000'000;
   static constexpr int64_t kSettledNs = 2'000'000'000;
   static constexpr int64_t kBetterNs = 5'000'000'000;
+  static constexpr int64_t kWorthlessNs = 150'000'000;
 
   Charge(uint64_t instance, int64_t strength, int64_t silence_ns, bool listens_first = true);
 
@@ -68,6 +70,7 @@ class Charge {
   int64_t strength_;
   int64_t silence_ns_;
   int fitness_ = 0;            // that counts
+  bool worthless_ = false;     // as last told, whatever counts yet
   std::optional<int> more_;    // least fitness of those above it ...
   int64_t more_since_ns_ = 0;  // ... since then
   bool in_charge_ = false;

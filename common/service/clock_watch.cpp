@@ -8,26 +8,46 @@
 
 namespace railfix::service {
 
+void ClockWatch::look(int64_t wall_ns, int64_t monotonic_ns) {
+  const int64_t ahead_ns = wall_ns - monotonic_ns;
+  const int64_t set_by_ns = ahead_ns - ahead_ns_.value_or(ahead_ns);
+  ahead_ns_ = ahead_ns;
+  looked_ns_ = wall_ns;
+  if (std::abs(set_by_ns) <= kToleratedNs) return;
+  set_by_ns_ = set_by_ns;
+  set_at_ns_ = wall_ns;
+  late_ns_.clear();
+}
+
 void ClockWatch::hear(const std::string& host, int64_t stamp_ns, int64_t received_ns) {
   if (host == host_) return;
+  // What came before the clock was set says nothing of the clock now.
+  if (received_ns < set_at_ns_ || received_ns > looked_ns_) return;
   auto& late_ns = late_ns_[host];
   late_ns.push_back(received_ns - stamp_ns);
   if (late_ns.size() > kMessages) late_ns.pop_front();
+  if (const auto quickest = quickest_ns(late_ns); quickest && std::abs(*quickest) <= kToleratedNs) set_by_ns_ = 0;
+}
+
+std::optional<int64_t> ClockWatch::quickest_ns(const std::deque<int64_t>& late_ns) {
+  if (late_ns.size() < kMessages) return std::nullopt;
+  return *std::min_element(late_ns.begin(), late_ns.end());
 }
 
 std::string ClockWatch::trouble() const {
   std::string text;
+  char offset[32];
   for (const auto& [host, late_ns] : late_ns_) {
-    if (late_ns.size() < kMessages) continue;
-    const int64_t quickest_ns = *std::min_element(late_ns.begin(), late_ns.end());
-    if (std::abs(quickest_ns) <= kToleratedNs) continue;
-    char offset[32];
-    std::snprintf(offset, sizeof(offset), "%.1f s", std::abs(core::seconds(quickest_ns)));
+    const auto quickest = quickest_ns(late_ns);
+    if (!quickest || std::abs(*quickest) <= kToleratedNs) continue;
+    std::snprintf(offset, sizeof(offset), "%.1f s", std::abs(core::seconds(*quickest)));
     text += (text.empty() ? "" : " ") + ("The clock of " + host + " is " + offset) +
-            (quickest_ns > 0 ? " behind " : " ahead of ") + host_ +
+            (*quickest > 0 ? " behind " : " ahead of ") + host_ +
             "'s: let chrony or PTP set both (railfix doctor says which is not).";
   }
-  return text;
+  if (set_by_ns_ == 0) return text;
+  std::snprintf(offset, sizeof(offset), "%+.1f s", core::seconds(set_by_ns_));
+  return "The clock of " + host_ + " was set by " + offset + "." + (text.empty() ? "" : " ") + text;
 }
 
 }  // namespace railfix::service

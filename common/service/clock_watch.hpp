@@ -1,10 +1,11 @@
-// Whether the other hosts' clocks agree with this one's: stamps of two hosts can only be compared when they do. Knows
-// no DDS and no clock.
+// Whether the other hosts' clocks agree with this one's: stamps of two hosts can only be compared when they do. Of two
+// that do not, the one that was set is doubted. Knows no DDS and no clock.
 #pragma once
 
 #include <cstdint>
 #include <deque>
 #include <map>
+#include <optional>
 #include <string>
 
 namespace railfix::service {
@@ -17,14 +18,23 @@ class ClockWatch {
   static constexpr size_t kMessages = 20;
 
   explicit ClockWatch(std::string host) : host_(std::move(host)) {}
+  /// What this host's clock says, beside one that never jumps. To be called right before hear(), and often.
+  void look(int64_t wall_ns, int64_t monotonic_ns);
   /// A message that `host` has stamped with its wall clock came at `received_ns` of ours.
   void hear(const std::string& host, int64_t stamp_ns, int64_t received_ns);
   /// Empty when all agree, otherwise one sentence: which host, by how much, what to do.
   [[nodiscard]] std::string trouble() const;
+  /// This host's clock was set, and no other one's has agreed with it since.
+  [[nodiscard]] bool own_is_doubted() const { return set_by_ns_ != 0; }
 
  private:
   std::string host_;
+  [[nodiscard]] static std::optional<int64_t> quickest_ns(const std::deque<int64_t>& late_ns);
   std::map<std::string, std::deque<int64_t>> late_ns_;  // of each other host's last messages
+  std::optional<int64_t> ahead_ns_;                     // of the clock that never jumps
+  int64_t set_by_ns_ = 0;                               // 0 = it was not, or has agreed with another one since
+  int64_t set_at_ns_ = INT64_MIN;
+  int64_t looked_ns_ = INT64_MAX;
 };
 
 }  // namespace railfix::service

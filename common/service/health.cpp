@@ -51,6 +51,7 @@ PublishedHealth::PublishedHealth(messaging::Participant& participant, const std:
   status_.version(RAILFIX_VERSION);
   status_.pid(static_cast<uint32_t>(getpid()));
   status_.state(msg::STATE_STARTING);
+  published_ = status_;
 }
 
 void PublishedHealth::output(int64_t grabbed_ns) {
@@ -61,11 +62,14 @@ void PublishedHealth::output(int64_t grabbed_ns) {
 }
 
 void PublishedHealth::change(uint8_t state, const std::string& reason) {
-  const std::string cut = reason.substr(0, kReasonBytes);
-  if (status_.state() == state && cut == status_.reason().c_str()) return;
   status_.state(state);
-  status_.reason(cut);
-  publish();
+  status_.reason(reason.substr(0, kReasonBytes));
+  publish_news();
+}
+
+void PublishedHealth::publish_news() {
+  const auto now = said();
+  if (now.state() != published_.state() || now.reason() != published_.reason()) publish();
 }
 
 void PublishedHealth::publish() {
@@ -74,13 +78,17 @@ void PublishedHealth::publish() {
   status_.endpoints(connections.endpoints);
   status_.matches(connections.matches);
   status_.stamp_ns(core::wall_ns());
-  const auto said = with_troubles();
-  writer_.write(said);
-  file_.write(said);
+  published_ = said();
+  writer_.write(published_);
+  file_.write(published_);
 }
 
-msg::ServiceStatus PublishedHealth::with_troubles() const {
+msg::ServiceStatus PublishedHealth::said() const {
   msg::ServiceStatus said = status_;
+  if (!stands_by_.empty() && (said.state() == msg::STATE_ACTIVE || said.state() == msg::STATE_DEGRADED)) {
+    said.state(msg::STATE_READY);
+    said.reason(stands_by_);
+  }
   for (const auto& trouble : troubles_) {
     if (trouble.empty()) continue;
     if (said.state() == msg::STATE_READY || said.state() == msg::STATE_ACTIVE) said.state(msg::STATE_DEGRADED);

@@ -18,7 +18,6 @@ class PublishedHealth final : public Health {
                   bool beside);
 
   void ready() override { change(msg::STATE_READY, ""); }
-  void standing_by(const std::string& reason) { change(msg::STATE_READY, reason); }
   void active() override { change(msg::STATE_ACTIVE, ""); }
   void degraded(const std::string& reason) override { change(msg::STATE_DEGRADED, reason); }
   void failed(const std::string& reason) override { change(msg::STATE_FAILED, reason); }
@@ -26,20 +25,31 @@ class PublishedHealth final : public Health {
   void output(int64_t grabbed_ns) override;
   void dropped(uint64_t count) override { status_.dropped(status_.dropped() + count); }
 
+  /// Empty = it is in charge.
+  void stands_by(const std::string& sentence) {
+    stands_by_ = sentence;
+    publish_news();
+  }
   /// Empty = none; a service that is ready or active is degraded by it.
   void trouble(Trouble kind, const std::string& sentence) { troubles_[static_cast<size_t>(kind)] = sentence; }
   void stopped() { change(msg::STATE_STOPPED, ""); }
+  /// The loop turns: told to this host, many times between two publish().
+  void beat() { file_.beat(); }
   /// Publishes; measures processor and latency anew when the measuring period has passed.
   void publish();
 
  private:
   void change(uint8_t state, const std::string& reason);
   void measure();
-  [[nodiscard]] msg::ServiceStatus with_troubles() const;
+  /// When what it says is not what was published last.
+  void publish_news();
+  [[nodiscard]] msg::ServiceStatus said() const;
   messaging::Participant& participant_;
   messaging::Writer<msg::ServiceStatus> writer_;
   HealthFile file_;
-  msg::ServiceStatus status_;
+  msg::ServiceStatus status_;  // as the service says
+  msg::ServiceStatus published_;
+  std::string stands_by_;
   std::array<std::string, 2> troubles_;
   std::vector<double> latencies_ms_;  // since the last measurement
   int64_t measured_ns_ = 0;

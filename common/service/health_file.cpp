@@ -45,12 +45,17 @@ HealthFile::~HealthFile() {
 }
 
 void HealthFile::write(const msg::ServiceStatus& status) {
+  words_ = std::to_string(status.state()) + '\n' + status.reason().c_str();
+  beat();
+}
+
+void HealthFile::beat() {
+  if (words_.empty()) return;
   if (file_ >= 0 && removed(file_)) {
     close(file_);
     file_ = opened(path_);
   }
-  const std::string reason = status.reason().c_str();
-  std::string text = std::to_string(core::monotonic_ns()) + ' ' + std::to_string(status.state()) + '\n' + reason;
+  std::string text = std::to_string(core::monotonic_ns()) + ' ' + words_;
   text.resize(kBytes, '\n');
   if (file_ >= 0 && pwrite(file_, text.data(), text.size(), 0) < 0) unlink(path_.c_str());
 }

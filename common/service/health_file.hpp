@@ -27,10 +27,13 @@ class HealthFile {
   /// Over what stood there; takes memory at the first call only, so that a full /dev/shm later does not silence it.
   /// What cannot be written is left out: the check says so.
   void write(const msg::ServiceStatus& status);
+  /// The same words are true now; nothing before the first ones.
+  void beat();
 
  private:
   std::filesystem::path path_;
   int file_ = -1;
+  std::string words_;
 };
 
 /// How long ago the service said something there; nothing when it never did.

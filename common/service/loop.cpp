@@ -14,6 +14,8 @@ namespace {
 constexpr std::chrono::milliseconds kAssertPeriod{50};
 // Four times a second, so that a dead or frozen service shows within half a second.
 constexpr std::chrono::milliseconds kStatusPeriod{250};
+// To this host's supervisor, which starts one that hangs anew (tools/railfix/train/supervise.cpp).
+constexpr std::chrono::milliseconds kBeatPeriod{100};
 constexpr std::chrono::seconds kCablePeriod{1};
 constexpr std::chrono::seconds kWritersPeriod{1};
 constexpr std::chrono::hours kCertificatePeriod{6};
@@ -45,6 +47,7 @@ Loop::Loop(std::string service, const CommonConfig& common, bool beside)
   on<msg::ControlRequest>(messaging::topics::service_control,
                           [this](const msg::ControlRequest& request) { answer(request); });
   every(kAssertPeriod, [this] { participant_.assert_liveliness(); });
+  every(kBeatPeriod, [this] { health_->beat(); });
   every(kStatusPeriod, [this] {
     health_->dropped(queue_.take_dropped());
     health_->publish();
@@ -104,13 +107,22 @@ void Loop::watch_certificate() {
   every(kCertificatePeriod, look);
 }
 
+// Of no use when this thread was held up between the two.
+void Loop::look_at_clock() {
+  const int64_t before_ns = core::monotonic_ns();
+  const int64_t wall_ns = core::wall_ns();
+  if (core::monotonic_ns() - before_ns < ClockWatch::kToleratedNs / 10) clocks_.look(wall_ns, before_ns);
+}
+
 // Every service stamps its status with its host's clock.
 void Loop::watch_clocks() {
+  every(kBeatPeriod, [this] { look_at_clock(); });
   readers_.push_back(std::make_unique<messaging::AnyReader>(
       participant_, messaging::info_of(messaging::topics::service_status), "", queue_,
       [this](const auto& sample, const auto& info) {
         if (!info.valid) return;
         const auto& status = *static_cast<const msg::ServiceStatus*>(sample.get());
+        look_at_clock();
         clocks_.hear(status.host().c_str(), status.stamp_ns(), info.received_ns);
         health_->trouble(Trouble::clock, clocks_.trouble());
       }));
@@ -231,12 +243,13 @@ void Loop::share_charge(ChargeHandlers handlers) {
     if (changed) changed(taken);
   };
   standby_ = std::make_unique<Standby>(participant_, queue_, service_, common_, beside_, std::move(handlers));
-  every(Standby::kPeriod, [this] { standby_->update(); });
-}
-
-void Loop::stand_by() {
-  const auto holder = standby_->holder();
-  health_->standing_by(holder.empty() ? "nobody is in charge yet" : "stands by, " + holder + " is in charge");
+  every(Standby::kPeriod, [this] {
+    standby_->update();
+    const auto holder = standby_->holder();
+    health_->stands_by(in_charge()      ? ""
+                       : holder.empty() ? "nobody is in charge yet"
+                                        : "stands by, " + holder + " is in charge");
+  });
 }
 
 void Loop::finish(const std::string& why) {

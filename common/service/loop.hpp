@@ -31,7 +31,7 @@ class Loop final : public Context {
   messaging::Participant& participant() override { return participant_; }
   void share_charge(ChargeHandlers handlers) override;
   [[nodiscard]] bool in_charge() const override { return !standby_ || standby_->in_charge(); }
-  void stand_by() override;
+  [[nodiscard]] bool clock_is_doubted() const override { return clocks_.own_is_doubted(); }
   void keep(const std::string& notes) override { notes_.keep(notes); }
   [[nodiscard]] const std::string& kept() const override { return notes_.kept(); }
   void finish(const std::string& why) override;
@@ -56,6 +56,7 @@ class Loop final : public Context {
   void watch_cable();
   void watch_certificate();
   void watch_clocks();
+  void look_at_clock();
   void watch_writers();
   void answer(const msg::ControlRequest& request);
   void keep_in_turn(const messaging::TopicInfo& topic, const std::string& instance, Handler handler, StampOf stamp_of);

@@ -44,7 +44,7 @@ struct CommonConfig {
 };
 
 /// State, counters and latency of this service; published as service_status four times a second and at every change of
-/// state. Call from handlers only.
+/// state. Call from handlers only. Of one that is not in charge, active and degraded are told as "stands by".
 class Health {
  public:
   virtual ~Health() = default;
@@ -59,8 +59,9 @@ class Health {
 
 /// What a service that may have a standby says and hears of it.
 struct ChargeHandlers {
-  std::function<int()> fitness;             // how good its output is, 0 to 255, more is better
-  std::function<void(bool taken)> changed;  // it has taken charge, or has given it away; may be empty
+  // How good its output is: more is better, 0 to 255; 0 = anybody else's is better.
+  std::function<int()> fitness = [] { return 1; };
+  std::function<void(bool taken)> changed = {};  // it has taken charge, or has given it away
 };
 
 /// What a service gets from the run loop. All handlers run one after the other in the service's own thread, samples in
@@ -104,11 +105,12 @@ class Context {
   virtual messaging::Participant& participant() = 0;
   /// For a service of which there may be several (common.ownership_strength): one is in charge, the others work along
   /// and send nothing. See charge.hpp for the rule.
-  virtual void share_charge(ChargeHandlers handlers) = 0;
+  virtual void share_charge(ChargeHandlers handlers = {}) = 0;  // NOLINT(google-default-arguments)
   /// To be asked right before sending. The only one of its kind is always in charge, and so is everybody in lock step.
   [[nodiscard]] virtual bool in_charge() const = 0;
-  /// Its health says that it stands by, and who is in charge. REQUIRES: not in_charge().
-  virtual void stand_by() = 0;
+  /// This host's clock was set while this service ran, and does not agree with the other hosts' since. Always false on
+  /// a train with one host.
+  [[nodiscard]] virtual bool clock_is_doubted() const = 0;
   /// What this service wants to know when it is started anew on this host: in memory, gone when the computer restarts.
   /// kept() gives the notes of the process before, empty = none.
   virtual void keep(const std::string& notes) = 0;

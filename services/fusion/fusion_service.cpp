@@ -300,6 +300,7 @@ void FusionService::use(const Event& event, int64_t grabbed_ns) {
 
 void FusionService::keep_time(const msg::DataClock& clock) {
   clock_ = clock;
+  data_time_.hear(clock, core::wall_ns(), core::monotonic_ns());
   if (clock.ended() != 0) return;
   if (const auto estimate = fusion_->tick(clock.data_ns())) publish(*estimate, 0);
 }
@@ -309,17 +310,15 @@ void FusionService::tick() {
   if (clock_ && (clock_->lock_step() != 0 || clock_->ended() != 0)) return;
   const auto latest_ns = fusion_->latest_stamp_ns();
   if (!latest_ns) return;
-  const int64_t wall_ns = core::wall_ns();
   const int64_t monotonic_ns = core::monotonic_ns();
   if (*latest_ns != newest_stamp_ns_) {
     newest_stamp_ns_ = *latest_ns;
     newest_came_ns_ = monotonic_ns;
   }
-  live_ = live_ || clock_ || std::abs(core::seconds(wall_ns - *latest_ns)) < kLiveDataS;
+  live_ = live_ || clock_ || std::abs(core::seconds(core::wall_ns() - *latest_ns)) < kLiveDataS;
   if (!live_) return;
   // In the clock of the sensors' host, whatever this one's says.
-  const int64_t now_ns =
-      clock_ ? clock_->data_ns() + wall_ns - clock_->wall_ns() : newest_stamp_ns_ + monotonic_ns - newest_came_ns_;
+  const int64_t now_ns = clock_ ? data_time_.at(monotonic_ns) : newest_stamp_ns_ + monotonic_ns - newest_came_ns_;
   if (const auto estimate = fusion_->tick(now_ns)) publish(*estimate, 0);
 }
 
@@ -331,12 +330,10 @@ void FusionService::publish(const TrainEstimate& estimate, int64_t grabbed_ns) {
   message.distance_m(message.distance_m() + distance_offset_m_);
   fitness_ = fitness_of(estimate, map_ != nullptr);
   latest_ = message;
-  if (!context_.in_charge()) {
-    context_.stand_by();
-    return;
+  if (context_.in_charge()) {
+    send(message);
+    if (estimate.track_known) publish_pose(estimate);
   }
-  send(message);
-  if (estimate.track_known) publish_pose(estimate);
   if (estimate.integrity == Integrity::ok) {
     context_.health().active();
   } else {

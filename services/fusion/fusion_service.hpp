@@ -9,6 +9,7 @@
 #include "fusion/handover.hpp"
 #include "fusion/scale_file.hpp"
 #include "fusion/train_pose.hpp"
+#include "service/data_time.hpp"
 #include "service/service.hpp"
 
 namespace railfix::fusion {
@@ -47,6 +48,7 @@ class FusionService {
   TrainPose pose_;
   std::string kept_for_;  // map and start that the notes are for
   std::optional<msg::DataClock> clock_;
+  service::DataTime data_time_;      // while there is a clock
   std::optional<int64_t> begun_ns_;  // stamp of the first measurement, when the train stood at the configured start
   bool live_ = false;
   int64_t newest_stamp_ns_ = 0;  // of the data ...

@@ -74,7 +74,7 @@ MapMatcherService::MapMatcherService(const MapMatcherConfig& config, service::Co
   context_.on<msg::LandmarkSighting>(topics::landmark_sighting, [this](const msg::LandmarkSighting& m) { use(m); });
   context_.on<msg::OdometryStep>(topics::odometry_step, [this](const msg::OdometryStep& m) { use(m); });
   context_.at_restart([this](int64_t) { restart(); });
-  context_.share_charge({[] { return 1; }, {}});
+  context_.share_charge();
   context_.health().ready();
 }
 
@@ -105,11 +105,7 @@ void MapMatcherService::use(const msg::TrainState& state) {
     context_.health().degraded(map_ ? "the place on the map is not known yet" : "no map is configured");
     return;
   }
-  if (context_.in_charge()) {
-    context_.health().active();
-  } else {
-    context_.stand_by();
-  }
+  context_.health().active();
   follow(state);
   if (chooser_) follow_without_camera();
 }

@@ -47,7 +47,7 @@ OdometryService::OdometryService(const Config& config, service::Context& context
       messaging::topics::camera_frame, [this](const msg::CameraFrame& frame) { pictured(frame); }, config_.camera);
   context_.every(kExpirePeriod, [this] { expire(); });
   context_.at_restart([this](int64_t) { restart(); });
-  context_.share_charge({[] { return 1; }, {}});
+  context_.share_charge();
   context_.health().ready();
 }
 
@@ -170,12 +170,8 @@ void OdometryService::measure(const Waiting& waiting, const msg::TrackView* view
       last_step_ = mouse_->process(picture);
       last_step_.step_sigma_m *= messaging::sigma_factor(waiting.health);
     }
-    if (context_.in_charge()) {
-      publish(last_step_, waiting);
-      tell(last_step_, waiting.health);
-    } else {
-      context_.stand_by();
-    }
+    if (context_.in_charge()) publish(last_step_, waiting);
+    tell(last_step_, waiting.health);
   }
   spare_.push_back(waiting.grey);
 }

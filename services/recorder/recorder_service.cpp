@@ -11,8 +11,18 @@ namespace railfix::recorder {
 namespace {
 
 constexpr std::chrono::milliseconds kStatePeriod{200};
-// A loss is shown for this long after the last one.
+// A loss is shown for this long after the last one: of a recorder that does not keep up, and of samples that never
+// came, which is over when the cable is back.
 constexpr int64_t kLossShownNs = 10 * core::kNsPerSecond;
+constexpr int64_t kLossOnWayShownNs = core::kNsPerSecond;
+
+uint64_t lost_here(const std::vector<TopicLosses>& losses) {
+  uint64_t sum = 0;
+  for (const auto& topic : losses) {
+    for (const auto& [cause, count] : topic.by_cause) sum += cause == Loss::transport ? 0 : count;
+  }
+  return sum;
+}
 
 }  // namespace
 
@@ -74,7 +84,7 @@ std::map<std::string, std::string> RecorderService::about() const {
 core::Result<std::string> RecorderService::start(const std::string& file) {
   auto started = thread_.start(file);
   if (started.ok()) {
-    lost_ = 0;
+    lost_ = lost_here_ = 0;
     context_.log().info("recording {}", started.value());
   }
   return started;
@@ -94,12 +104,7 @@ void RecorderService::show_state() {
   const RecorderState now = thread_.take_state();
   for (; received_ < now.received; ++received_) context_.health().input();
   for (; written_ < now.written; ++written_) context_.health().output(0);
-  if (now.lost > lost_) {
-    context_.health().dropped(now.lost - lost_);
-    lost_last_ns_ = core::monotonic_ns();
-    losses_ = now.losses;
-  }
-  lost_ = now.lost;
+  note_losses(now);
   for (const auto& news : now.news) {
     context_.log().log(news.bad ? spdlog::level::err : spdlog::level::info, "{}", news.sentence);
   }
@@ -110,8 +115,25 @@ void RecorderService::show_state() {
   publish(now);
 }
 
+void RecorderService::note_losses(const RecorderState& now) {
+  const uint64_t here = lost_here(now.losses_by_topic);
+  const int64_t now_ns = core::monotonic_ns();
+  if (now.lost > lost_) {
+    context_.health().dropped(now.lost - lost_);
+    losses_ = now.losses;
+    const bool by_us = here > lost_here_;
+    loses_until_ns_ = std::max(loses_until_ns_, now_ns + (by_us ? kLossShownNs : kLossOnWayShownNs));
+    if (!by_us && now_ns >= lost_on_way_told_ns_ + kLossShownNs) {
+      context_.log().warn("samples never came: {}", now.losses);
+      lost_on_way_told_ns_ = now_ns;
+    }
+  }
+  lost_ = now.lost;
+  lost_here_ = here;
+}
+
 void RecorderService::show_health(const RecorderState& now) {
-  const bool loses = lost_last_ns_ != 0 && core::monotonic_ns() - lost_last_ns_ < kLossShownNs;
+  const bool loses = core::monotonic_ns() < loses_until_ns_;
   if (!now.problem.empty()) {
     context_.health().degraded(now.problem);
   } else if (now.recording && loses) {

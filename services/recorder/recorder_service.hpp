@@ -19,6 +19,7 @@ class RecorderService {
   core::Result<std::string> start(const std::string& file);
   core::Result<std::string> stop();
   void show_state();
+  void note_losses(const RecorderState& now);
   void show_health(const RecorderState& now);
   void publish(const RecorderState& now);
 
@@ -30,7 +31,9 @@ class RecorderService {
   uint64_t received_ = 0;
   uint64_t written_ = 0;
   uint64_t lost_ = 0;
-  int64_t lost_last_ns_ = 0;
+  uint64_t lost_here_ = 0;      // of these, by this recorder
+  int64_t loses_until_ns_ = 0;  // shown so long
+  int64_t lost_on_way_told_ns_ = 0;
   std::string losses_;  // as they were then: a new file begins at none
   std::string problem_;
   msg::RecorderStatus published_;

@@ -15,6 +15,7 @@ namespace fs = std::filesystem;
 constexpr int64_t kTickNs = core::kNsPerSecond / 4;
 constexpr int64_t kSplitAgainNs = core::kNsPerSecond;
 constexpr double kBytesPerMb = 1e6;
+constexpr double kRoomAgain = 2;  // times keep_free_mb: enough to record for some time
 
 mcap::Compression compression_of(const std::string& name) {
   if (name == "none") return mcap::Compression::none;
@@ -75,7 +76,11 @@ core::Result<std::string> RecorderThread::start(const fs::path& file) {
 }
 
 core::Result<std::string> RecorderThread::stop() {
-  return in_thread([this] { return end(); });
+  return in_thread([this]() -> core::Result<std::string> {
+    if (!std::exchange(stopped_by_disk_, false)) return end();
+    problem_.clear();
+    return std::string("recording had stopped already, and does not go on by itself");
+  });
 }
 
 core::Result<std::string> RecorderThread::pause() {
@@ -127,6 +132,7 @@ core::Result<std::string> RecorderThread::begin(const fs::path& file) {
   }
   record_into(std::move(created).value());
   paused_ = false;
+  stopped_by_disk_ = false;
   inlet_->want_recorded(true);
   if (inlet_->is_open()) {
     write_standing();
@@ -275,16 +281,17 @@ void RecorderThread::tick() {
     if (!status.ok()) problem_ = status.error().message;
     split_if_due();
   }
-  if (disk_is_full()) guard_disk();
+  if (disk_has_less_than(1)) guard_disk();
+  resume_when_there_is_room();
   tend_event_files(false);
   publish_state();
 }
 
-bool RecorderThread::disk_is_full() const {
+bool RecorderThread::disk_has_less_than(double times) const {
   std::error_code failed;
   const fs::path file = recording_ ? recording_->file() : folder() / "";
   const auto space = fs::space(file.has_parent_path() ? file.parent_path() : fs::path("."), failed);
-  return !failed && static_cast<double>(space.available) < config_.keep_free_mb * kBytesPerMb;
+  return !failed && static_cast<double>(space.available) < times * config_.keep_free_mb * kBytesPerMb;
 }
 
 void RecorderThread::guard_disk() {
@@ -292,8 +299,17 @@ void RecorderThread::guard_disk() {
   if (!recording_) return;
   const std::string file = recording_->file().string();
   (void)end();
-  problem_ = "recording stopped: the disk of " + file + " has less than " +
-             std::to_string(static_cast<int64_t>(config_.keep_free_mb)) + " MB free";
+  stopped_by_disk_ = true;
+  const auto free_mb = static_cast<int64_t>(config_.keep_free_mb);
+  problem_ = "recording stopped: the disk of " + file + " has less than " + std::to_string(free_mb) +
+             " MB free; goes on in a new file when " +
+             std::to_string(static_cast<int64_t>(kRoomAgain * config_.keep_free_mb)) + " MB are free";
+}
+
+void RecorderThread::resume_when_there_is_room() {
+  if (!stopped_by_disk_ || disk_has_less_than(kRoomAgain)) return;
+  if (const auto begun = begin(""); begun.ok())
+    say("there is room on the disk again: recording " + begun.value(), false);
 }
 
 void RecorderThread::use(const Arrival& arrival) {

@@ -79,7 +79,9 @@ class RecorderThread {
   void tick();
   void count_dropped();
   void guard_disk();
-  [[nodiscard]] bool disk_is_full() const;
+  void resume_when_there_is_room();
+  /// Less than so many times keep_free_mb are free.
+  [[nodiscard]] bool disk_has_less_than(double times) const;
   void publish_state();
   void use(const Arrival& arrival);
   void record(const Arrival& arrival);
@@ -102,6 +104,7 @@ class RecorderThread {
   std::unique_ptr<TopicInlet> inlet_;
   std::unique_ptr<Recording> recording_;
   bool paused_ = false;
+  bool stopped_by_disk_ = false;       // begins again by itself
   bool file_begun_ = false;            // the one that is configured
   std::future<core::Status> closing_;  // the file before
   int64_t recording_begun_ns_ = 0;

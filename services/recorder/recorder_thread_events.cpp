@@ -66,7 +66,7 @@ core::Result<std::string> RecorderThread::keep_event(const EventNote& note, bool
   }
   event_ends_ns_ = 0;
   tend_event_files(false);
-  if (disk_is_full()) return core::Error{"no file for it: the disk has less than keep_free_mb free"};
+  if (disk_has_less_than(1)) return core::Error{"no file for it: the disk has less than keep_free_mb free"};
   if (!by_hand && static_cast<double>(housekeeper_->survey().event_bytes) >= config_.events_mb * kBytesPerMb) {
     return core::Error{"no file for it: the files of events take more than events_mb; remove some"};
   }

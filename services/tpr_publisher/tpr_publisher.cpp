@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 
 #include "core/time.hpp"
 
@@ -10,12 +11,16 @@ namespace railfix::tpr_publisher {
 namespace {
 
 constexpr int64_t kOldestNs = core::kNsPerSecond;
+constexpr int64_t kOtherTimeNs = 3600 * core::kNsPerSecond;
 constexpr int64_t kOnboardSilentNs = 3 * core::kNsPerSecond;
 
 /// Empty when the position is young enough.
 std::string age_refusal(int64_t stamp_ns, int64_t now_ns) {
   const int64_t age_ns = now_ns - stamp_ns;
   if (age_ns < kOldestNs && age_ns > -kOldestNs) return "";
+  if (std::abs(age_ns) > kOtherTimeNs)
+    return "Position report not sent: the last train_state is of another time; played data has not said yet which time "
+           "it is there, or a host's clock is wrong.";
   char text[160];
   if (age_ns > 0) {
     std::snprintf(text, sizeof text, "Position report not sent: the last train_state is %.1f s old, the limit is 1 s.",

@@ -104,8 +104,10 @@ TprPublisherService::TprPublisherService(const Config& config, service::Context&
       writer_(context.writer(messaging::topics::train_position_report)) {
   if (const auto link = config.ground_link.settings(context.common().train_id, context.common().host))
     ground_link_ = std::make_unique<GroundLink>(*link);
-  context.on<msg::DataClock>(messaging::topics::data_clock,
-                             [this](const msg::DataClock& clock) { data_clock_ = clock; });
+  context.on<msg::DataClock>(messaging::topics::data_clock, [this](const msg::DataClock& clock) {
+    data_clock_ = clock;
+    data_time_.hear(clock, core::wall_ns(), core::monotonic_ns());
+  });
   context.on<msg::TrainState>(messaging::topics::train_state,
                               [this](const msg::TrainState& state) { on_state(state); });
   context.on<msg::OnboardStatus>(messaging::topics::onboard_status,
@@ -142,17 +144,20 @@ void TprPublisherService::share_charge() {
       [this](const msg::TrainPositionReport& report) { seq_ = std::max(seq_, report.seq() + 1); });
 }
 
-// Without a way to the ground reports only wait.
+// Without a way to the ground reports only wait; without a store a power cut loses some; with a wrong clock they would
+// say a wrong time.
 int TprPublisherService::fitness() const {
+  if (context_.clock_is_doubted()) return 0;
   const bool has_state = state_seen_ && core::monotonic_ns() - state_monotonic_ns_ < core::kNsPerSecond;
   const bool has_ground = !ground_link_ || ground_link_->connected();
-  return (has_ground ? 2 : 0) + (has_state ? 1 : 0);
+  const bool has_store = !ground_link_ || ground_link_->stores();
+  return (has_ground ? 4 : 0) + (has_store ? 2 : 0) + (has_state ? 1 : 0);
 }
 
 void TprPublisherService::stand_by(const msg::TrainState& state, int64_t now_ns) {
   publisher_.watch(position_of(state), now_ns);
   report_trouble_.clear();
-  context_.stand_by();
+  context_.health().active();
 }
 
 void TprPublisherService::restart() {
@@ -164,8 +169,7 @@ void TprPublisherService::restart() {
 
 int64_t TprPublisherService::now_ns(int64_t stamp_ns) const {
   if (context_.common().lock_step) return stamp_ns;  // the data waits for us
-  const int64_t wall_ns = core::wall_ns();
-  return data_clock_ ? data_clock_->data_ns() + (wall_ns - data_clock_->wall_ns()) : wall_ns;
+  return data_clock_ ? data_time_.at(core::monotonic_ns()) : core::wall_ns();
 }
 
 void TprPublisherService::on_state(const msg::TrainState& state) {

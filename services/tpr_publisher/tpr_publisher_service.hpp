@@ -6,6 +6,7 @@
 #include <string>
 
 #include "messaging/onboard_topic.hpp"
+#include "service/data_time.hpp"
 #include "service/service.hpp"
 #include "tpr_publisher/tpr_publisher_config.hpp"
 
@@ -42,6 +43,7 @@ class TprPublisherService {
   std::optional<etcs::ReportParameters> parameters_;  // as told by trackside
   messaging::Writer<msg::TrainPositionReport> writer_;
   std::optional<msg::DataClock> data_clock_;
+  service::DataTime data_time_;  // while there is a clock
   bool state_seen_ = false;
   int64_t state_monotonic_ns_ = 0;  // when the last one came
   bool reference_known_ = false;    // in the last report

@@ -63,7 +63,7 @@ TrackDetectorService::TrackDetectorService(const Config& config, service::Contex
     });
   }
   context_.at_restart([this](int64_t) { restart(); });
-  context_.share_charge({[] { return 1; }, {}});
+  context_.share_charge();
   context_.health().ready();
 }
 
@@ -136,7 +136,6 @@ void TrackDetectorService::detect(const msg::CameraFrame& frame) {
   last_stamp_ns_ = frame.stamp_ns();
   if (context_.in_charge()) publish(observation, frame);
   if (observation.seen()) find_landmarks(grey, observation, frame);
-  if (!context_.in_charge()) return context_.stand_by();
   tell(observation, frame.stamp_ns());
 }
 

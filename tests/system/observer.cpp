@@ -164,10 +164,8 @@ void Observer::judge(const msg::TrainState& state) {
 
 void Observer::report(const msg::TrainPositionReport& report, const messaging::SampleInfo& info) {
   reports_.heard(core::seconds(info.received_ns));
-  // A standby's own numbers go on while it is not heard.
-  if (last_report_ && last_report_->first == info.writer && report.seq() > last_report_->second + 1)
-    heard_.reports_lost += report.seq() - last_report_->second - 1;
-  last_report_ = {info.writer, report.seq()};
+  // One that comes back from behind a cut cable goes on behind the numbers of the other one.
+  numbers_.arrived("", 0, report.seq());
 }
 
 void Observer::status(const msg::ServiceStatus& status, bool alive) {
@@ -247,6 +245,7 @@ void Observer::begin() {
   monitor_said_.clear();
   known_complaints_.clear();
   missing_before_ = sequences_.missing();
+  numbers_missing_before_ = numbers_.missing();
   for (auto* pause : {&states_, &reports_, &ground_}) pause->longest_s = 0;
 }
 
@@ -259,6 +258,7 @@ Heard Observer::end() {
   heard_.state_gap_s = gap(states_);
   heard_.report_gap_s = gap(reports_);
   heard_.ground_gap_s = ground_client_ ? gap(ground_) : 0;
+  heard_.reports_lost = numbers_.missing() - std::min(numbers_.missing(), numbers_missing_before_);
   heard_.ground_lost = sequences_.missing() - std::min(sequences_.missing(), missing_before_);
   return heard_;
 }

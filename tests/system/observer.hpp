@@ -28,7 +28,7 @@ struct Heard {
   double worst_excess_m = 0;
   double widest_m = 0;              // interval of usable states
   uint64_t not_ok = 0;              // states that say degraded or unusable
-  uint64_t reports_lost = 0;        // numbers of a writer's reports that never came, in the cab
+  uint64_t reports_lost = 0;        // numbers that no report in the cab had
   uint64_t ground_lost = 0;         // ... at the ground
   double not_whole_s = 0;           // monotonic time of the last moment at which not everything was as usual
   std::vector<std::string> said;    // new complaints, in their order
@@ -88,12 +88,13 @@ class Observer {
   Pause states_;
   Pause reports_;
   Pause ground_;
-  std::optional<std::pair<uint64_t, uint64_t>> last_report_;  // writer, number
+  ground_link::SequenceWatch numbers_;  // of the reports on the train, whoever sent them
   Heard heard_;
   std::set<std::string> known_complaints_;
   std::mutex mutex_;  // of what other threads say: the ground's and the monitor's
   ground_link::SequenceWatch sequences_;
   size_t missing_before_ = 0;
+  size_t numbers_missing_before_ = 0;
   std::vector<std::string> monitor_said_;
   std::atomic<bool> ended_ = false;
   std::unique_ptr<ground_link::MqttClient> ground_client_;

@@ -16,6 +16,7 @@ GroundLink::GroundLink(const GroundLinkSettings& settings)
     : settings_(settings),
       store_(core::value_or_throw(ReportStore::open(settings.store))),
       outbox_(kMostUnderWay),
+      memory_stream_(ReportStore::new_stream()),
       link_trouble_("not yet connected") {
   for (const uint64_t sequence : core::value_or_throw(store_.sequences())) outbox_.stored(sequence);
   say();
@@ -53,6 +54,11 @@ bool GroundLink::connected() const {
   return connected_;
 }
 
+bool GroundLink::stores() const {
+  const std::lock_guard lock(mutex_);
+  return stores_;
+}
+
 void GroundLink::push(Event event) {
   {
     const std::lock_guard lock(mutex_);
@@ -64,7 +70,7 @@ void GroundLink::push(Event event) {
 std::deque<GroundLink::Event> GroundLink::wait() {
   std::unique_lock lock(mutex_);
   const auto ready = [this] { return stop_ || !events_.empty(); };
-  if (unstored_.empty()) {
+  if (unstored_.empty() && delivered_.empty()) {
     wake_.wait(lock, ready);
   } else {
     wake_.wait_for(lock, kRetryStore, ready);
@@ -79,17 +85,16 @@ void GroundLink::run() {
       const std::lock_guard lock(mutex_);
       last = stop_ && events.empty() && events_.empty();
     }
-    std::vector<uint64_t> done;
-    for (auto& event : events) take(event, done);
-    // Removed in one go: when that is lost in a power cut they are only sent again.
-    if (const auto removed = store_.remove(done); !removed.ok()) store_trouble_ = removed.error().message;
+    for (auto& event : events) take(event);
+    if (!unstored_.empty() || !delivered_.empty()) store_trouble_.clear();  // unless it is met again
+    remove_delivered();
     store_new();
     publish();
     say();
   }
 }
 
-void GroundLink::take(Event& event, std::vector<uint64_t>& done) {
+void GroundLink::take(Event& event) {
   if (auto* report = std::get_if<ground_link::GroundReport>(&event)) {
     unstored_.push_back(std::move(*report));
   } else if (std::holds_alternative<Connected>(event)) {
@@ -100,7 +105,17 @@ void GroundLink::take(Event& event, std::vector<uint64_t>& done) {
         "not connected to " + settings_.mqtt.host + ":" + std::to_string(settings_.mqtt.port) + " (" + lost->why + ")";
     outbox_.disconnected();
   } else if (const auto sequence = outbox_.delivered(std::get<Delivered>(event).id)) {
-    done.push_back(*sequence);
+    delivered_.push_back(*sequence);
+  }
+}
+
+// In one go: when that is lost in a power cut they are only sent again.
+void GroundLink::remove_delivered() {
+  const auto removed = store_.remove(delivered_);
+  if (removed.ok()) {
+    delivered_.clear();
+  } else {
+    store_trouble_ = removed.error().message;
   }
 }
 
@@ -115,7 +130,6 @@ void GroundLink::store_new() {
       }
       return;
     }
-    store_trouble_.clear();
     outbox_.stored(sequence.value());
     unstored_.pop_front();
   }
@@ -125,24 +139,43 @@ void GroundLink::store_new() {
 }
 
 void GroundLink::publish() {
+  publish_stored();
+  publish_unstored();
+}
+
+std::optional<int> GroundLink::give(ground_link::GroundReport report, uint64_t stream, uint64_t sequence) {
+  report.stream = stream;
+  report.sequence = sequence;
+  const auto id = client_->publish(settings_.topic, ground_link::to_bytes(report));
+  if (id.ok()) return id.value();
+  link_trouble_ = id.error().message;  // again next time something happens
+  return std::nullopt;
+}
+
+void GroundLink::publish_unstored() {
+  while (!unstored_.empty() && outbox_.takes_unstored()) {
+    const auto id = give(unstored_.front(), memory_stream_, memory_sequence_ + 1);
+    if (!id) return;
+    ++memory_sequence_;
+    outbox_.published_unstored(*id);
+    unstored_.pop_front();
+  }
+}
+
+void GroundLink::publish_stored() {
   while (const auto sequence = outbox_.next()) {
     const auto bytes = store_.read(*sequence);
-    auto report = bytes.ok() ? ground_link::ground_report_from(bytes.value())
-                             : core::Result<ground_link::GroundReport>(bytes.error());
+    const auto report = bytes.ok() ? ground_link::ground_report_from(bytes.value())
+                                   : core::Result<ground_link::GroundReport>(bytes.error());
     if (!report.ok()) {
       store_trouble_ = report.error().message;
       ++dropped_;
       outbox_.skip();
       continue;
     }
-    report.value().stream = store_.stream();
-    report.value().sequence = *sequence;
-    const auto id = client_->publish(settings_.topic, ground_link::to_bytes(report.value()));
-    if (!id.ok()) {
-      link_trouble_ = id.error().message;
-      return;  // next time something happens
-    }
-    outbox_.published(id.value());
+    const auto id = give(report.value(), store_.stream(), *sequence);
+    if (!id) return;
+    outbox_.published(*id);
   }
 }
 
@@ -154,12 +187,16 @@ void GroundLink::say() {
   }
   if (dropped_ > 0)
     sentence += (sentence.empty() ? "" : " ") + std::to_string(dropped_) + " reports for the ground are lost.";
-  for (const auto& trouble : {store_trouble_, store_.problem()}) {
+  const std::string storing =
+      store_trouble_.empty() ? ""
+                             : store_trouble_ + " Reports go from memory, and a power cut would lose those that wait.";
+  for (const auto& trouble : {storing, store_.problem()}) {
     if (!trouble.empty()) sentence += (sentence.empty() ? "" : " ") + trouble;
   }
   const std::lock_guard lock(mutex_);
   trouble_ = sentence;
   connected_ = link_trouble_.empty();
+  stores_ = store_trouble_.empty();
 }
 
 }  // namespace railfix::tpr_publisher

@@ -1,11 +1,12 @@
 // Position reports to the ground: stored first, then sent over MQTT (QoS 1) in the order in which they were made,
-// removed from the store when the broker has them. Two threads of its own: a slow disk or network never holds the
-// service up.
+// removed from the store when the broker has them. What cannot be stored (a full disk) goes from memory, in a stream of
+// its own. Two threads of its own: a slow disk or network never holds the service up.
 #pragma once
 
 #include <condition_variable>
 #include <deque>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <variant>
@@ -37,6 +38,8 @@ class GroundLink {
   /// Empty when all is well, otherwise one sentence for service_status.
   [[nodiscard]] std::string trouble() const;
   [[nodiscard]] bool connected() const;
+  /// What is sent survives a power cut.
+  [[nodiscard]] bool stores() const;
 
  private:
   struct Connected {};
@@ -50,15 +53,23 @@ class GroundLink {
   void push(Event event);
   [[nodiscard]] std::deque<Event> wait();
   void run();
-  void take(Event& event, std::vector<uint64_t>& done);
+  void take(Event& event);
+  void remove_delivered();
   void store_new();
   void publish();
+  void publish_stored();
+  void publish_unstored();
+  /// The client's id of it; nothing when the client does not take it now.
+  std::optional<int> give(ground_link::GroundReport report, uint64_t stream, uint64_t sequence);
   void say();
 
   GroundLinkSettings settings_;
   ReportStore store_;  // from here on the worker's own, until mutex_
   Outbox outbox_;
-  std::deque<ground_link::GroundReport> unstored_;  // a full disk may get room again
+  std::deque<ground_link::GroundReport> unstored_;
+  std::vector<uint64_t> delivered_;  // to be removed from the store
+  uint64_t memory_stream_;           // of what was never stored
+  uint64_t memory_sequence_ = 0;
   std::string link_trouble_;
   std::string store_trouble_;
   size_t dropped_ = 0;
@@ -67,6 +78,7 @@ class GroundLink {
   std::deque<Event> events_;
   std::string trouble_;
   bool connected_ = false;
+  bool stores_ = true;
   bool stop_ = false;
   std::unique_ptr<ground_link::MqttClient> client_;
   std::thread thread_;

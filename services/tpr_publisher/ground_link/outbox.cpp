@@ -8,7 +8,7 @@ void Outbox::connected() {
 }
 
 std::optional<uint64_t> Outbox::next() const {
-  if (!connected_ || repeating_ || waiting_.empty() || under_way_.size() >= most_under_way_) return std::nullopt;
+  if (!may_publish() || waiting_.empty()) return std::nullopt;
   return waiting_.front();
 }
 
@@ -20,7 +20,7 @@ void Outbox::published(int id) {
 std::optional<uint64_t> Outbox::delivered(int id) {
   const auto found = under_way_.find(id);
   if (found == under_way_.end()) return std::nullopt;
-  const uint64_t sequence = found->second;
+  const auto sequence = found->second;
   under_way_.erase(found);
   if (under_way_.empty()) repeating_ = false;
   return sequence;

@@ -22,11 +22,6 @@ struct Close {
   void operator()(sqlite3* handle) const { sqlite3_close(handle); }
 };
 
-uint64_t random_number() {
-  std::random_device device;
-  return uint64_t{device()} << 32U | device();
-}
-
 bool move_aside(const fs::path& file) {
   std::error_code failed;
   for (const char* part : {"-wal", "-shm"}) fs::remove(file.string() + ".damaged" + part, failed);
@@ -85,11 +80,16 @@ core::Status ReportStore::begin(const fs::path& file) {
     stream_ = static_cast<uint64_t>(sqlite3_column_int64(stream.get(), 0));
     return {};
   }
-  stream_ = random_number();
+  stream_ = new_stream();
   const auto insert = database_->prepare("INSERT INTO stream VALUES (?)");
   if (!insert) return database_->error();
   sqlite3_bind_int64(insert.get(), 1, static_cast<sqlite3_int64>(stream_));
   return sqlite3_step(insert.get()) == SQLITE_DONE ? core::Status() : core::Status(database_->error());
+}
+
+uint64_t ReportStore::new_stream() {
+  std::random_device device;
+  return uint64_t{device()} << 32U | device();
 }
 
 core::Result<ReportStore> ReportStore::open(const fs::path& file) {

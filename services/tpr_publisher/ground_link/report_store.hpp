@@ -22,6 +22,8 @@ class ReportStore {
   [[nodiscard]] const std::string& problem() const { return problem_; }
   /// Random, for the life of the file: sequence numbers begin anew in another one.
   [[nodiscard]] uint64_t stream() const { return stream_; }
+  /// One that nobody else has.
+  static uint64_t new_stream();
 
   /// Numbers 1, 2, 3, ... never come twice, also when reports were removed. On the disk when it returns.
   core::Result<uint64_t> append(std::span<const uint8_t> report);

@@ -1,6 +1,10 @@
 // Reports to the ground over a real Mosquitto: in order, none lost, over restarts of everything.
+#include <sys/resource.h>
+
 #include <atomic>
+#include <csignal>
 #include <iostream>
+#include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
 
@@ -150,6 +154,45 @@ TEST_F(GroundLinkTest, NothingIsLostOverAPowerCutAndADeadZone) {
               std::vector<uint8_t>(sent.message().begin(), sent.message().begin() + sent.message_bytes()));
     EXPECT_EQ(arrived[i].stamp_ns, sent.stamp_ns());
   }
+}
+
+// A limit on files stands for a full disk.
+TEST_F(GroundLinkTest, WhatCannotBeStoredGoesFromMemoryUntilThereIsRoomAgain) {
+  test::Broker broker(file("broker"));
+  ASSERT_TRUE(broker.start());
+  Ground ground(broker.address(), train_);
+  ASSERT_TRUE(ground.subscribed());
+  const auto usual = std::signal(SIGXFSZ, SIG_IGN);  // the service inherits it: a write fails as on a full disk
+  test::Program program(linked_service(broker.address()));
+  std::signal(SIGXFSZ, usual);
+  const auto limit_files = [&](rlim_t bytes) {
+    const rlimit limit{bytes, RLIM_INFINITY};
+    ASSERT_EQ(prlimit(program.pid(), RLIMIT_FSIZE, &limit, nullptr), 0);
+  };
+  ASSERT_TRUE(run_until([&] { return connected(); }, [] {}));
+  const auto ground_has = [&](size_t count) {
+    return run_until([&] { return ground.count() >= count; }, [&] { write_state(last_.offset_m); });
+  };
+  ASSERT_TRUE(run_for(3));
+  ASSERT_TRUE(ground_has(3));
+  limit_files(1024);
+  ASSERT_TRUE(run_for(6));
+  ASSERT_TRUE(ground_has(6));
+  ASSERT_TRUE(status_says("Reports go from memory"));
+  EXPECT_EQ(status_->state(), msg::STATE_DEGRADED);
+  limit_files(RLIM_INFINITY);
+  ASSERT_TRUE(run_for(9));
+  ASSERT_TRUE(ground_has(9));
+  ASSERT_TRUE(run_until([&] { return reason().find("from memory") == std::string::npos; },
+                        [&] { write_state(last_.offset_m); }));
+  const auto arrived = ground.reports();
+  std::map<uint64_t, uint64_t> last;  // of each stream
+  for (size_t i = 0; i < 9; ++i) {
+    EXPECT_EQ(arrived[i].stamp_ns, reports_[i].stamp_ns()) << "in order, none lost";
+    EXPECT_EQ(arrived[i].sequence, ++last[arrived[i].stream]);
+  }
+  EXPECT_EQ(last.size(), 2U);
+  EXPECT_EQ(arrived[8].stream, arrived[0].stream);
 }
 
 TEST_F(GroundLinkTest, ListenPrintsEachReportOnce) {

@@ -1,5 +1,6 @@
 // Real topics inside one process, recorded into a file.
 #include <gmock/gmock.h>
+#include <sys/mount.h>
 
 #include <fstream>
 #include <set>
@@ -197,6 +198,28 @@ TEST_F(RecorderThreadTest, FullDiskEndsTheRecordingProperly) {
   ASSERT_TRUE(wait_until([&] { return !recorder->state().recording; }));
   EXPECT_THAT(recorder->state().problem, HasSubstr("MB free"));
   EXPECT_TRUE(mcap::Reader::open(folder_ / "full.mcap").value()->indexed());
+}
+
+// On a small disk of its own.
+TEST_F(RecorderThreadTest, GoesOnByItselfWhenThereIsRoomAgain) {
+  fs::create_directories(folder_);
+  if (mount("tmpfs", folder_.c_str(), "tmpfs", 0, "size=20m") != 0) GTEST_SKIP() << "a disk can be made by root only";
+  config_.keep_free_mb = 5;
+  {
+    auto recorder = this->recorder();
+    ASSERT_TRUE(recorder->start("").ok());
+    std::ofstream(folder_ / "filler") << std::string(17'000'000, ' ');
+    EXPECT_TRUE(wait_until([&] { return !recorder->state().recording; }));
+    EXPECT_THAT(recorder->state().problem, HasSubstr("goes on in a new file when 10 MB are free"));
+    fs::remove(folder_ / "filler");
+    EXPECT_TRUE(wait_until([&] { return recorder->state().recording; }));
+    EXPECT_EQ(recorder->state().problem, "");
+    std::ofstream(folder_ / "filler") << std::string(17'000'000, ' ');
+    EXPECT_TRUE(wait_until([&] { return !recorder->state().recording; }));
+    EXPECT_TRUE(recorder->stop().ok()) << "does not begin again";
+    EXPECT_EQ(recorder->state().problem, "");
+  }
+  umount2(folder_.c_str(), MNT_DETACH);
 }
 
 TEST_F(RecorderThreadTest, ASecondStartKeepsWhatTheFirstRecorded) {

@@ -213,6 +213,37 @@ TEST(Charge, AStandbyThatHasKnownMoreForAWhileGetsTheCharge) {
   EXPECT_EQ(train.changes, 2);
 }
 
+TEST(Charge, OneThatIsWorthNothingGivesTheChargeAwayAndDoesNotGetItBack) {
+  Train train;
+  train.run(10);
+  train.at(0).fitness = 0;
+  train.run(0.25);
+  EXPECT_TRUE(train.speaks(1));
+  EXPECT_FALSE(train.speaks(0));
+  train.at(0).fitness = 4;
+  train.run(600);
+  EXPECT_TRUE(train.speaks(1));
+  EXPECT_EQ(train.changes, 2);
+  EXPECT_LE(train.longest_both, 0);
+}
+
+TEST(Charge, WhenNobodyIsWorthAnythingYetTheOneInChargeStays) {
+  Train train;
+  train.at(0).fitness = train.at(1).fitness = 0;
+  train.run(10);
+  EXPECT_TRUE(train.speaks(0));
+  for (const size_t first : {1U, 0U}) {  // data begins here, a moment later there
+    train.at(first).fitness = 3;
+    train.run(0.2);
+    train.at(1 - first).fitness = 3;
+    train.run(10);
+    EXPECT_TRUE(train.speaks(0));
+    EXPECT_EQ(train.changes, 1);
+    train.at(0).fitness = train.at(1).fitness = 0;
+    train.run(10);
+  }
+}
+
 TEST(Charge, WhoEndsInOrderIsFollowedAtOnce) {
   Train train;
   train.run(10);

@@ -1,5 +1,6 @@
 #include "service/clock_watch.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "core/time.hpp"
@@ -12,8 +13,14 @@ constexpr int64_t kMs = 1'000'000;
 class ClockWatchTest : public ::testing::Test {
  protected:
   void hear(const std::string& host, int64_t ahead_ns, int64_t way_ns, size_t count = ClockWatch::kMessages) {
-    for (size_t i = 0; i < count; ++i, now_ns_ += 250 * kMs) watch_.hear(host, now_ns_ + ahead_ns, now_ns_ + way_ns);
+    for (size_t i = 0; i < count; ++i, now_ns_ += 250 * kMs) {
+      const int64_t received_ns = now_ns_ + set_by_ns_ + way_ns;
+      watch_.look(received_ns, now_ns_ + way_ns - kBootedNs);
+      watch_.hear(host, now_ns_ + ahead_ns, received_ns);
+    }
   }
+  static constexpr int64_t kBootedNs = 1'600'000'000 * core::kNsPerSecond;
+  int64_t set_by_ns_ = 0;
   ClockWatch watch_{"coach"};
   int64_t now_ns_ = 1'700'000'000 * core::kNsPerSecond;
 };
@@ -40,6 +47,38 @@ TEST_F(ClockWatchTest, SlowMessagesAreNoWrongClock) {
   EXPECT_EQ(watch_.trouble(), "");
   hear("cab", 0, 2 * kMs, 1);
   EXPECT_EQ(watch_.trouble(), "");
+}
+
+TEST_F(ClockWatchTest, AClockThatWasSetIsDoubtedUntilItAgrees) {
+  for (const int64_t set_by_ns : {5000 * kMs, -5000 * kMs}) {
+    hear("cab", 0, 1 * kMs);
+    EXPECT_FALSE(watch_.own_is_doubted());
+    set_by_ns_ = set_by_ns;
+    watch_.look(now_ns_ + set_by_ns_, now_ns_ - kBootedNs);
+    EXPECT_TRUE(watch_.own_is_doubted());
+    watch_.hear("cab", now_ns_ - 1 * kMs, now_ns_);  // waited in the queue when the clock was set
+    hear("cab", 0, 1 * kMs);
+    EXPECT_TRUE(watch_.own_is_doubted());
+    EXPECT_THAT(watch_.trouble(),
+                ::testing::StartsWith(set_by_ns > 0 ? "The clock of coach was set by +5.0 s. The clock"
+                                                    : "The clock of coach was set by -5.0 s. The clock"));
+    set_by_ns_ = 0;
+    hear("cab", 0, 1 * kMs, ClockWatch::kMessages - 1);
+    EXPECT_TRUE(watch_.own_is_doubted()) << "not heard enough since";
+    hear("cab", 0, 1 * kMs, 1);
+    EXPECT_FALSE(watch_.own_is_doubted());
+    EXPECT_EQ(watch_.trouble(), "");
+  }
+}
+
+TEST_F(ClockWatchTest, AClockThatIsSetRightIsNotDoubtedForLong) {
+  hear("cab", 1300 * kMs, 1 * kMs);
+  EXPECT_FALSE(watch_.own_is_doubted()) << "nobody knows which of the two is wrong";
+  set_by_ns_ = 1300 * kMs;
+  hear("cab", 1300 * kMs, 1 * kMs, ClockWatch::kMessages - 1);
+  EXPECT_TRUE(watch_.own_is_doubted());
+  hear("cab", 1300 * kMs, 1 * kMs, 1);
+  EXPECT_FALSE(watch_.own_is_doubted());
 }
 
 TEST_F(ClockWatchTest, ItsOwnHostHasTheSameClock) {

@@ -5,6 +5,8 @@
 
 #include <optional>
 
+#include "core/time.hpp"
+
 namespace railfix::service {
 namespace {
 
@@ -12,6 +14,7 @@ TEST(HealthFile, StandsThereAgainWhenTheBuildBeforeTakesItAway) {
   const auto path = std::filesystem::temp_directory_path() / ("railfix-health-test-" + std::to_string(getpid()));
   msg::ServiceStatus status;
   status.state(msg::STATE_ACTIVE);
+  status.reason("as it should be");
   std::optional<HealthFile> before(path);
   before->write(status);
   std::optional<HealthFile> now(path);
@@ -19,6 +22,11 @@ TEST(HealthFile, StandsThereAgainWhenTheBuildBeforeTakesItAway) {
   EXPECT_FALSE(ask_health(path).healthy);
   now->write(status);
   EXPECT_TRUE(ask_health(path).healthy);
+  const auto asked_ns = core::monotonic_ns();
+  now->beat();
+  const auto silent = silent_ns(path);
+  EXPECT_LE(silent, core::monotonic_ns() - asked_ns);
+  EXPECT_EQ(ask_health(path).text, "active: as it should be");
   now.reset();
   EXPECT_FALSE(std::filesystem::exists(path));
 }

@@ -41,6 +41,24 @@ TEST(Outbox, NothingOvertakesWhatIsRepeated) {
   EXPECT_EQ(outbox.next(), 3U);
 }
 
+TEST(Outbox, WhatIsNotStoredGoesBehindWhatIs) {
+  Outbox outbox(2);
+  EXPECT_FALSE(outbox.takes_unstored());  // not connected
+  outbox.stored(7);
+  outbox.connected();
+  EXPECT_FALSE(outbox.takes_unstored());
+  outbox.published(101);
+  EXPECT_TRUE(outbox.takes_unstored());
+  outbox.published_unstored(102);
+  EXPECT_FALSE(outbox.takes_unstored()) << "two are under way";
+  outbox.disconnected();
+  outbox.connected();
+  EXPECT_EQ(outbox.delivered(101), 7U);
+  EXPECT_FALSE(outbox.takes_unstored()) << "102 is repeated";
+  EXPECT_EQ(outbox.delivered(102), std::nullopt);
+  EXPECT_TRUE(outbox.takes_unstored());
+}
+
 TEST(Outbox, DropsTheOldestBeyondTheLimit) {
   Outbox outbox(1);
   for (uint64_t sequence = 1; sequence <= 6; ++sequence) outbox.stored(sequence);

@@ -1,5 +1,8 @@
 #include "train/stands_still.hpp"
 
+#include <sys/stat.h>
+
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -19,6 +22,22 @@ bool stands_still(pid_t pid) {
     any = true;
   }
   return any;
+}
+
+pid_t holder_of(const std::filesystem::path& file) {
+  struct stat wanted {};
+  if (stat(file.c_str(), &wanted) != 0) return 0;
+  std::error_code gone;
+  for (const auto& process : std::filesystem::directory_iterator("/proc", gone)) {
+    const auto pid = static_cast<pid_t>(std::atoll(process.path().filename().c_str()));
+    if (pid <= 0) continue;
+    for (const auto& open : std::filesystem::directory_iterator(process.path() / "fd", gone)) {
+      struct stat held {};
+      if (stat(open.path().c_str(), &held) == 0 && held.st_dev == wanted.st_dev && held.st_ino == wanted.st_ino)
+        return pid;
+    }
+  }
+  return 0;
 }
 
 }  // namespace railfix::tool

@@ -28,9 +28,10 @@ constexpr int kTurnMs = 20;
 constexpr int64_t kFirstPauseNs = 200'000'000;  // of one that does not live long
 constexpr int64_t kLongestPauseNs = 5 * core::kNsPerSecond;
 constexpr int64_t kLivesNs = 10 * core::kNsPerSecond;
-// A run loop turns four times a second at least. One that is silent for kQuietNs while none of its threads does or
-// wants to do anything hangs; one that is busy may take longer, but not kFrozenNs: its longest work is about a second.
-constexpr int64_t kQuietNs = 800'000'000;
+// A run loop says ten times a second that it turns. One that is silent for kQuietNs while none of its threads does
+// or wants to do anything hangs; one that is busy may take longer, but not kFrozenNs: its longest work is about a
+// second.
+constexpr int64_t kQuietNs = 350'000'000;
 constexpr int64_t kFrozenNs = 3 * core::kNsPerSecond;
 constexpr int64_t kLookNs = core::kNsPerSecond / 10;
 constexpr int kFrozenLooks = 3;  // after a computer that stood still everybody may speak first
@@ -161,10 +162,15 @@ class Child {
   void kill_when_frozen(int64_t now_ns) {
     const auto silent_ns = service::silent_ns(health_);
     const bool has_spoken = silent_ns && *silent_ns < now_ns - started_ns_;
-    const bool hangs = has_spoken && (*silent_ns > kFrozenNs ||
-                                      (*silent_ns > kQuietNs && !service_.in_container() && stands_still(pid_)));
+    if (!has_spoken || *silent_ns < kQuietNs) {
+      frozen_looks_ = 0;
+      return;
+    }
+    // A container's process is no child of its engine's; with it the container ends.
+    const pid_t process = service_.in_container() ? holder_of(health_) : pid_;
+    const bool hangs = *silent_ns > kFrozenNs || (process > 0 && stands_still(process));
     frozen_looks_ = hangs ? frozen_looks_ + 1 : 0;
-    if (frozen_looks_ >= kFrozenLooks) kill(pid_, SIGKILL);
+    if (frozen_looks_ >= kFrozenLooks) kill(process > 0 ? process : pid_, SIGKILL);
   }
   void start(int64_t now_ns) {
     forget_health();
