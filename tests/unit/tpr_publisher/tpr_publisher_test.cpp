@@ -66,6 +66,8 @@ TEST(TprPublisher, OldPositionsAreNotReported) {
   EXPECT_THAT(outcome.refusal, HasSubstr("1.0 s old, the limit is 1 s"));
   outcome = publisher.update(position, position.stamp_ns - 5 * core::kNsPerSecond);
   EXPECT_THAT(outcome.refusal, HasSubstr("5.0 s in the future"));
+  outcome = publisher.update(position, position.stamp_ns + 1'000'000'000 * core::kNsPerSecond);
+  EXPECT_THAT(outcome.refusal, HasSubstr("of another time")) << "an age of 30 years helps nobody";
   outcome = publisher.update(position, position.stamp_ns + core::kNsPerSecond - 1);  // still due
   ASSERT_TRUE(outcome.report.has_value());
   EXPECT_EQ(outcome.report->reason, Reason::start);
