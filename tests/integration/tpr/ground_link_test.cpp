@@ -167,7 +167,7 @@ TEST_F(GroundLinkTest, WhatCannotBeStoredGoesFromMemoryUntilThereIsRoomAgain) {
   std::signal(SIGXFSZ, usual);
   const auto limit_files = [&](rlim_t bytes) {
     const rlimit limit{bytes, RLIM_INFINITY};
-    ASSERT_EQ(prlimit(program.pid(), RLIMIT_FSIZE, &limit, nullptr), 0);
+    ASSERT_EQ(prlimit(static_cast<pid_t>(status_->pid()), RLIMIT_FSIZE, &limit, nullptr), 0);
   };
   ASSERT_TRUE(run_until([&] { return connected(); }, [] {}));
   const auto ground_has = [&](size_t count) {
@@ -175,6 +175,7 @@ TEST_F(GroundLinkTest, WhatCannotBeStoredGoesFromMemoryUntilThereIsRoomAgain) {
   };
   ASSERT_TRUE(run_for(3));
   ASSERT_TRUE(ground_has(3));
+  ASSERT_TRUE(run_until([&] { return status_.has_value(); }, [] {}));
   limit_files(1024);
   ASSERT_TRUE(run_for(6));
   ASSERT_TRUE(ground_has(6));

@@ -31,9 +31,9 @@ constexpr int64_t kLivesNs = 10 * core::kNsPerSecond;
 // A run loop says ten times a second that it turns. One that is silent for kQuietNs while none of its threads does
 // or wants to do anything hangs; one that is busy may take longer, but not kFrozenNs: its longest work is about a
 // second.
-constexpr int64_t kQuietNs = 350'000'000;
+constexpr int64_t kQuietNs = 300'000'000;
 constexpr int64_t kFrozenNs = 3 * core::kNsPerSecond;
-constexpr int64_t kLookNs = core::kNsPerSecond / 10;
+constexpr int64_t kLookNs = core::kNsPerSecond / 20;
 constexpr int kFrozenLooks = 3;  // after a computer that stood still everybody may speak first
 // DDS finds everybody within a second, and one that stands by counts as fit after two more (service/charge.hpp).
 constexpr int64_t kFoundNs = 3'500'000'000;
