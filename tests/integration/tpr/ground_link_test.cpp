@@ -265,7 +265,7 @@ TEST_F(GroundLinkTest, TlsLetsOnlyTheRightCertificatesIn) {
     ASSERT_TRUE(run_until([&] { return connected(); }, [] {}));
     ASSERT_TRUE(run_for(2));
     ASSERT_TRUE(status_says("2 reports wait"));
-    EXPECT_THAT(reason(), HasSubstr("Ground link: not connected"));
+    ASSERT_TRUE(status_says("Ground link: not connected"));
   }
   ASSERT_TRUE(run_until([&] { return states_.matched_readers() == 0; }, [] {}));
   {
@@ -299,7 +299,7 @@ TEST_F(GroundLinkTest, APasswordLetsOnlyItsTrainIn) {
     ASSERT_TRUE(run_until([&] { return connected(); }, [] {}));
     ASSERT_TRUE(run_for(2));
     ASSERT_TRUE(status_says("2 reports wait"));
-    EXPECT_THAT(reason(), HasSubstr("Ground link: not connected"));
+    ASSERT_TRUE(status_says("Ground link: not connected"));
   }
   ASSERT_TRUE(run_until([&] { return states_.matched_readers() == 0; }, [] {}));
   test::Program program(with_password("right"));
