@@ -226,10 +226,15 @@ void Rig::swap(const std::string& service_at_host) const {
 void Rig::set_arguments(const std::string& service_at_host, const std::vector<std::string>& arguments) const {
   const size_t at = service_at_host.find('@');
   const tool::HostFolder place(root(service_at_host.substr(at + 1)));
-  auto plan = place.plan(place.newest_generation());
-  for (auto& service : plan->services) {
-    if (service.name == service_at_host.substr(0, at))
+  auto plan = place.plan();  // what was swapped stays so
+  const auto as_installed = place.plan(place.newest_generation());
+  for (const auto& usual : as_installed->services) {
+    if (usual.name != service_at_host.substr(0, at)) continue;
+    for (auto& service : plan->services) {
+      if (service.name != usual.name) continue;
+      service.command = usual.command;
       service.command.insert(service.command.end(), arguments.begin(), arguments.end());
+    }
   }
   core::ok_or_throw(place.write(*plan));
 }
