@@ -44,7 +44,13 @@ void UdFilter::propagate(const StateMatrix& phi, const StateMatrix& g, const Sta
   // Rows of the wide matrix are stored as columns, so that the inner products run through memory in order.
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 2 * kMaxStates, kMaxStates> w(from + noises, n);
   Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 2 * kMaxStates, 1> weight(from + noises);
-  w.topRows(from).noalias() = u_.transpose() * phi.transpose();
+  // (phi U)^T. Most of phi is zero, and so is U below its diagonal.
+  w.topRows(from).setZero();
+  for (int i = 0; i < n; ++i) {
+    for (int k = 0; k < from; ++k) {
+      if (phi(i, k) != 0) w.col(i).segment(k, from - k) += phi(i, k) * u_.row(k).tail(from - k).transpose();
+    }
+  }
   w.bottomRows(noises) = g.transpose();
   weight << d_, q;
 

@@ -118,7 +118,12 @@ std::optional<TrainEstimate> Fusion::add(Event event) {
 }
 
 std::optional<TrainEstimate> Fusion::tick(int64_t now_ns) {
-  if (!now_ || core::seconds(now_ns - last_output_ns_) < parameters_->output_period_s) return std::nullopt;
+  if (!now_) return std::nullopt;
+  // Before an odometer has measured there is nothing to go on with, and its first measurements may be late.
+  const auto measures = [this](Source source) { return now_->main().watch(source).used_ns != 0; };
+  const bool moved = measures(Source::camera) || measures(Source::wheel);
+  const double patience_s = moved ? parameters_->output_period_s : parameters_->sensor_timeout_s;
+  if (core::seconds(now_ns - last_output_ns_) < patience_s) return std::nullopt;
   if (now_ns <= now_->stamp_ns()) return std::nullopt;
   ScaleTrial ahead = *now_;
   ahead.predict_to(now_ns);

@@ -40,7 +40,8 @@ class Fusion {
   /// Uses a measurement. Gives a state for every odometry step, and every output_period_s from the other sensors while
   /// there is no camera. Stamps of the states only grow.
   std::optional<TrainEstimate> add(Event event);
-  /// Nothing came until now_ns: gives a state with what is left when the last one is older than output_period_s.
+  /// Nothing came until now_ns: gives a state with what is left when the last one is older than output_period_s
+  /// (sensor_timeout_s before an odometer has measured).
   std::optional<TrainEstimate> tick(int64_t now_ns);
   /// Stamp of the newest measurement; nothing before the first.
   [[nodiscard]] std::optional<int64_t> latest_stamp_ns() const;

@@ -10,6 +10,8 @@ namespace {
 
 using train::SimulationPlan;
 
+constexpr double kEarlierS = 15;  // faults begin after 25 s
+
 struct Campaign {
   train::Verdict sum;
   double p95_m = 0;
@@ -40,7 +42,7 @@ Campaign run_campaign(const SimulationPlan& plan, int runs, double after_m = 0) 
 }
 
 TEST(Coverage, AllSensorsWithLandmarksEvery400m) {
-  const auto campaign = run_campaign({}, 25, 1250);  // behind the third landmark: scales are known
+  const auto campaign = run_campaign({}, 12, 1250);  // behind the third landmark: scales are known
   EXPECT_EQ(campaign.sum.outside, 0U);
   EXPECT_LE(campaign.p95_m, 0.5);
   EXPECT_GE(campaign.budget_share, 0.99);
@@ -49,7 +51,7 @@ TEST(Coverage, AllSensorsWithLandmarksEvery400m) {
 TEST(Coverage, CameraAloneWithLandmarks) {
   SimulationPlan plan;
   plan.wheel = plan.imu = plan.gnss = plan.blind_spells = false;
-  const auto campaign = run_campaign(plan, 30, 1250);
+  const auto campaign = run_campaign(plan, 15, 1250);
   EXPECT_EQ(campaign.sum.outside, 0U);
   EXPECT_LE(campaign.p95_m, 0.8);
 }
@@ -74,7 +76,7 @@ TEST(Coverage, WheelAloneDriftsInsideItsInterval) {
 TEST(Coverage, BlindCameraWithImuOnly) {
   SimulationPlan plan;
   plan.wheel = plan.gnss = false;
-  const auto campaign = run_campaign(plan, 30);
+  const auto campaign = run_campaign(plan, 12);
   EXPECT_EQ(campaign.sum.outside, 0U);
 }
 
@@ -87,7 +89,7 @@ TEST(Coverage, SuddenAccelerationIsFollowed) {
     plan.gnss = plan.slip = plan.blind_spells = false;
     plan.landmark_spacing_m = 0;
     plan.outlier_share = 0;
-    const auto campaign = run_campaign(plan, 10);
+    const auto campaign = run_campaign(plan, 6);
     EXPECT_EQ(campaign.sum.outside, 0U) << mps2;
     EXPECT_GE(campaign.budget_share, 0.99) << mps2;
   }
@@ -99,11 +101,13 @@ TEST(Coverage, OneFaultySensorStaysInsideTheInterval) {
   uint64_t seed = 0;
   for (const auto& [sensor, kind] : train::all_faults()) {
     SimulationPlan plan;
-    plan.duration_s = 80;
     plan.visual_scale_error = 0.004;
     plan.false_fix_share = 0.005;
     core::Random random(++seed);
-    plan.fault = train::random_fault(random, sensor, kind, plan.duration_s);
+    plan.fault = train::random_fault(random, sensor, kind, 80);
+    plan.duration_s = 80 - kEarlierS;
+    plan.fault.begin_s -= kEarlierS;
+    plan.fault.end_s -= kEarlierS;
     const train::TrainSimulation simulation(plan, seed);
     auto fusion = core::value_or_throw(Fusion::create({}, simulation.map, simulation.start()));
     const auto verdict = train::judge(simulation, fusion);

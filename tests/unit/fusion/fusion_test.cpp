@@ -42,6 +42,27 @@ TEST(Fusion, WithoutMapDistanceAndSpeedRun) {
   EXPECT_THAT(state.reason, HasSubstr("place on the map not known"));
 }
 
+// The first pictures of a run take long: states at their own time are worth more than one that knows nothing.
+TEST(Fusion, WaitsForTheFirstStepsOfALateCamera) {
+  auto fusion = fusion_at(500);
+  const auto first = fusion.add(ImuInput{at(0), 0, 0});
+  ASSERT_TRUE(first);
+  for (double t_s = 0.01; t_s < 0.3; t_s += 0.01) {
+    fusion.add(ImuInput{at(t_s), 0, 0});
+    EXPECT_FALSE(fusion.tick(at(t_s + 0.005))) << t_s;
+  }
+  for (double t_s = 0.25; t_s < 0.3; t_s += 0.01) EXPECT_TRUE(fusion.add(step_at(t_s, 10, 0.01))) << t_s;
+  const auto silent = fusion.tick(at(0.6));
+  ASSERT_TRUE(silent);
+  EXPECT_LT(silent->over_m + silent->under_m, 15);
+
+  auto blind = fusion_at(500);
+  blind.add(ImuInput{at(0), 0, 0});
+  const auto alone = blind.tick(at(0.6));
+  ASSERT_TRUE(alone);
+  EXPECT_EQ(alone->integrity, Integrity::unusable);
+}
+
 // Motion alone says nothing of the scale; a filter that linearises badly believes otherwise.
 TEST(Fusion, ScaleIsNotLearntWithoutReferences) {
   auto camera = fusion_at(0);
