@@ -89,7 +89,9 @@ void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
   predict_to(fix.stamp_ns);
   Estimator before = main_;
   main_.apply(event);
-  for (auto& doubter : doubters_) doubter.estimator.apply(event);
+  for (auto& doubter : doubters_) {
+    if (!doubter.leaves_out(fix)) doubter.estimator.apply(event);
+  }
   for (auto& rival : rivals_) {
     if (rival.estimator) rival.estimator->apply(event);
   }
@@ -118,12 +120,13 @@ bool Hypotheses::adopt_doubter() {
 // What the main one alone fits is confirmed. What both fit may be so by chance once, not twice.
 void Hypotheses::settle_doubters(const FixInput& fix, Estimator before) {
   const bool of_shape = fix.kind == FixKind::curvature;
+  if (std::ranges::any_of(doubters_, [&](const Doubter& doubter) { return doubter.leaves_out(fix); })) return;
   std::erase_if(doubters_, [&](Doubter& doubter) {
     if (fix.new_path || doubter.estimator.fix_refused() || doubter.estimator.fix_corrected()) return true;
     if (of_shape) return doubter.of_shape;
     return doubter.of_shape || ++doubter.agreed >= kFixesToSettle;
   });
-  if (!fix.new_path) doubters_.push_back({std::move(before), of_shape});
+  if (!fix.new_path) doubters_.push_back({std::move(before), fix.landmark, of_shape});
 }
 
 void Hypotheses::confirm_rivals() {

@@ -61,8 +61,11 @@ class Hypotheses {
   /// The main one without a fix that no later one has confirmed.
   struct Doubter {
     Estimator estimator;
+    uint32_t landmark = 0;  // of that fix; a second sighting of it may have the same error
     bool of_shape = false;  // the fix is of kind curvature
     int agreed = 0;         // later fixes that both have used: these tell nothing of who is right
+
+    [[nodiscard]] bool leaves_out(const FixInput& fix) const { return landmark != 0 && landmark == fix.landmark; }
   };
   struct Rival {
     Source without;

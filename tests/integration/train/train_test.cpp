@@ -110,10 +110,13 @@ TEST_F(Train, TheTrueTrainIsInsideTheConfidenceInterval) {
   EXPECT_LT(worst_m, 2.0);
 }
 
+// Also when it learns for a next trip.
 TEST_F(Train, ASecondRunGivesTheSameTablesByteForByte) {
   const std::string again = (folder_ / "again").string();
-  const auto ran = test::run_program(
-      {"railfix", "run", "--dataset", sequence(), "--start", "1:250:+", "--no-pictures", "--out", again}, kRunS);
+  const fs::path state = folder_ / "state";
+  const auto ran = test::run_program({"railfix", "run", "--dataset", sequence(), "--start", "1:250:+", "--no-pictures",
+                                      "--state", state.string(), "--out", again},
+                                     kRunS);
   ASSERT_EQ(ran.exit_code, 0) << ran.err << ran.out;
   size_t compared = 0;
   for (const auto& file : fs::directory_iterator(out())) {
@@ -123,6 +126,7 @@ TEST_F(Train, ASecondRunGivesTheSameTablesByteForByte) {
     ++compared;
   }
   EXPECT_GE(compared, 5U);
+  EXPECT_THAT(test::slurp(state / "scales.yaml"), HasSubstr("camera_id: cam0=640x512,"));
 }
 
 TEST_F(Train, ReportsAreValidMessages136) {

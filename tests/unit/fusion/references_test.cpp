@@ -119,6 +119,22 @@ TEST(References, AWrongSightingCostsAccuracyUntilTheNextOnesAndTheIntervalHolds)
   }
 }
 
+// The same landmark, wrong in the same way, has nothing new to say.
+TEST(References, AWrongSightingIsNotConfirmedByAnotherOfTheSameLandmark) {
+  Passage passage({.camera = 1.003});
+  passage.run_to(600);
+  passage.sight(0);
+  passage.run_to(1100);
+  passage.sight(2);
+  for (const double place_m : {1106.0, 1112.0, 1118.0}) {
+    passage.run_to(place_m);
+    passage.sight_again(2);
+  }
+  passage.run_to(2600);
+  passage.sight(0);
+  passage.run_to(3200);
+}
+
 TEST(References, EverySecondSightingMayBeWrong) {
   Passage passage({.camera = 1.003});
   double place_m = 0;

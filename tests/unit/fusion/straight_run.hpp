@@ -78,6 +78,7 @@ class Passage {
   }
   /// A landmark here, sighted so far ahead of where it is.
   void sight(double wrong_m) { fusion_.add(fix_at(t_s_, place_m_ + wrong_m, ++landmark_, 0.999999)); }
+  void sight_again(double wrong_m) { fusion_.add(fix_at(t_s_, place_m_ + wrong_m, landmark_, 0.999999)); }
   [[nodiscard]] double error_m() const { return state_->position.offset_m - place_m_; }
   [[nodiscard]] double scale_error() const { return state_->visual_scale - plan_.camera; }
   [[nodiscard]] const TrainEstimate& state() const { return *state_; }
