@@ -1,7 +1,6 @@
 // Private to this folder: the Fast DDS side of a message type.
 #pragma once
 
-#include <fastdds/dds/common/InstanceHandle.hpp>
 #include <fastdds/dds/subscriber/DataReader.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
 #include <functional>
@@ -15,8 +14,7 @@ class FastDdsType : public Type {
   [[nodiscard]] virtual eprosima::fastdds::dds::TypeSupport support() const = 0;
   /// Takes everything that waits in the reader; samples are copied out of the middleware's memory at once, because a
   /// data-sharing writer may reuse it.
-  using OnSample = std::function<void(std::shared_ptr<const void>, const SampleInfo&,
-                                      const eprosima::fastdds::dds::InstanceHandle_t& writer)>;
+  using OnSample = std::function<void(std::shared_ptr<const void>, const SampleInfo&)>;
   virtual void take_all(eprosima::fastdds::dds::DataReader& reader, const OnSample& on_sample) const = 0;
 };
 

@@ -26,7 +26,6 @@ struct SampleInfo {
   int64_t received_ns = 0;
   uint64_t sequence = 0;  // counts the writer's samples; a step other than 1 means that some never came
   uint64_t writer = 0;    // tells one writer from another
-  bool valid = true;      // false: the writer of this sample (its last one) has fallen silent
 };
 
 /// What the middleware needs to know of a message type, behind a wall.
@@ -88,6 +87,12 @@ struct Sent {
   uint64_t samples = 0;
 };
 
+/// When the certificate runs out that a process of this train joined with.
+struct CertificateEnd {
+  std::string process;  // "odometry@cab"
+  int64_t ends_ns = 0;
+};
+
 /// This process on the train's DDS network. Must outlive its writers and readers.
 class Participant {
  public:
@@ -97,14 +102,14 @@ class Participant {
   Participant(const Participant&) = delete;
   Participant& operator=(const Participant&) = delete;
 
-  /// Tells readers of topics with a liveliness lease that this service's loop still turns.
-  void assert_liveliness();
   [[nodiscard]] Connections connections() const;
   /// An interface of ParticipantOptions::interfaces has got a carrier since this participant joined without it; only a
   /// new participant will use it.
   [[nodiscard]] bool interface_appeared() const;
   /// Names of all topics of this train that have a writer now, sorted ("camera_frame/cam0", ...).
   [[nodiscard]] std::vector<std::string> written_topics() const;
+  /// Of all processes that are there now, this one included; none on a train without security.
+  [[nodiscard]] std::vector<CertificateEnd> certificates() const;
   /// By own writers, in the order in which they were made.
   [[nodiscard]] std::vector<Sent> sent() const;
 
@@ -201,9 +206,7 @@ class Reader {
   Reader(Participant& participant, const Topic<T>& topic, const std::string& instance, Queue& queue,
          std::function<void(const T&)> handler)
       : Reader(participant, topic, instance, queue,
-               [handler = std::move(handler)](const T& sample, const SampleInfo& info) {
-                 if (info.valid) handler(sample);
-               }) {}
+               [handler = std::move(handler)](const T& sample, const SampleInfo&) { handler(sample); }) {}
   Reader(Participant& participant, const Topic<T>& topic, const std::string& instance, Queue& queue,
          std::function<void(const T&, const SampleInfo&)> handler)
       : reader_(participant, info_of(topic), instance, queue,

@@ -8,6 +8,7 @@
 #include <mutex>
 
 #include "core/time.hpp"
+#include "messaging/every_nth.hpp"
 #include "messaging/fastdds_types.hpp"
 #include "messaging/network.hpp"
 #include "messaging/security.hpp"
@@ -24,11 +25,7 @@ constexpr int32_t kParticipantLeaseS = 5;
 constexpr int32_t kAnnouncementS = 1;
 // Participants of one host that a peer is asked for: every service twice (standby, swap) and a few tools.
 constexpr uint32_t kParticipantsOfHost = 32;
-// A third of a lease may pass without a sign of life; callers come every 50 ms, now and then a little early.
-constexpr int64_t kSignsInALease = 3;
-constexpr int64_t kCallsJitterNs = 10'000'000;
-constexpr int64_t kEndlessNs = 3600 * core::kNsPerSecond;  // who does not ask for a lease
-constexpr const char* kDiscoveryGroup = "239.255.0.1";     // RTPS 2.2, 9.6.1.4.1
+constexpr const char* kDiscoveryGroup = "239.255.0.1";  // RTPS 2.2, 9.6.1.4.1
 
 // Peers replace Fast DDS's own list, so the multicast group and this host are named, too. Port 0: those of the domain.
 rtps::LocatorList initial_peers(const std::vector<std::string>& peers) {
@@ -55,12 +52,16 @@ void forbid_short_cuts() {
   eprosima::fastrtps::xmlparser::XMLProfileManager::library_settings(settings);
 }
 
+std::string name_of(const ParticipantOptions& options) {
+  return options.service + "@" + options.host;
+}
+
 // No shared-memory transport: in 2.9.1 a process that is killed and started again makes its queue anew, while those
 // that ran on write to the old one for ever (eProsima/Fast-DDS#4728), and a stopped one spins. Pictures are shared in
 // memory by data sharing, which does not need it.
 dds::DomainParticipantQos participant_qos(const ParticipantOptions& options) {
   dds::DomainParticipantQos qos;
-  qos.name(options.service + "@" + options.host);
+  qos.name(name_of(options));
   qos.transport().use_builtin_transports = false;
   auto udp = std::make_shared<rtps::UDPv4TransportDescriptor>();
   udp->sendBufferSize = kSocketBufferBytes;
@@ -96,7 +97,39 @@ dds::Topic* Participant::Impl::topic(const TopicInfo& info, const std::string& i
   return topic;
 }
 
+dds::TopicDescription* Participant::Impl::source(const TopicInfo& info, const std::string& instance) {
+  auto* whole = topic(info, instance);
+  if (info.qos.one_in <= 1) return whole;
+  const std::string every = std::to_string(info.qos.one_in);
+  const std::string name = whole->get_name() + " 1:" + every;
+  const std::lock_guard lock(mutex);
+  auto& part = thinned[name];
+  if (part == nullptr) part = participant->create_contentfilteredtopic(name, whole, "every %0", {every}, kEveryNth);
+  if (part == nullptr) throw core::BadInput("topic " + whole->get_name() + " cannot be thinned out");
+  return part;
+}
+
+std::string topic_of(const dds::DataReader& reader) {
+  const auto* source = reader.get_topicdescription();
+  const auto* part = dynamic_cast<const dds::ContentFilteredTopic*>(source);
+  return part == nullptr ? source->get_name() : part->get_related_topic()->get_name();
+}
+
 namespace {
+
+// What a participant says of itself beside its name, to everybody who discovers it.
+constexpr std::string_view kCertificateEnds = "certificate_ends_ns=";
+
+std::vector<uint8_t> user_data_of(int64_t certificate_ends_ns) {
+  if (certificate_ends_ns == 0) return {};
+  const std::string text = std::string(kCertificateEnds) + std::to_string(certificate_ends_ns);
+  return {text.begin(), text.end()};
+}
+
+int64_t certificate_ends_in(const std::vector<uint8_t>& user_data) {
+  const std::string text(user_data.begin(), user_data.end());
+  return text.starts_with(kCertificateEnds) ? std::strtoll(text.c_str() + kCertificateEnds.size(), nullptr, 10) : 0;
+}
 
 // Keeps one remote endpoint of this train, or forgets it. Fast DDS tells of our own endpoints too.
 template <class Known, class Endpoint>
@@ -122,9 +155,9 @@ void Participant::Impl::on_participant_discovery(dds::DomainParticipant*,
   const std::lock_guard lock(mutex);
   const auto& prefix = info.info.m_guid.guidPrefix;
   if (info.status == Info::REMOVED_PARTICIPANT || info.status == Info::DROPPED_PARTICIPANT) {
-    remote_names.erase(prefix);
+    remote_processes.erase(prefix);
   } else {
-    remote_names[prefix] = info.info.m_participantName.to_string();
+    remote_processes[prefix] = {info.info.m_participantName.to_string(), certificate_ends_in(info.info.m_userData)};
   }
 }
 
@@ -169,12 +202,19 @@ Participant::Participant(const ParticipantOptions& options) : impl_(std::make_un
   impl_->running_interfaces = running_interfaces(options.interfaces);
   impl_->train.partition = "train/" + options.train_id;
   impl_->host.partition = impl_->train.partition + "/memory/" + memory_id();
-  impl_->participant = factory->create_participant(static_cast<uint32_t>(options.domain), participant_qos(options),
-                                                   impl_.get(), dds::StatusMask::none());
+  auto qos = participant_qos(options);
+  if (!options.security_folder.empty()) {
+    impl_->certificate_ends_ns =
+        core::value_or_throw(certificate_ends_ns(certificate_of(options.security_folder, options.service)));
+  }
+  qos.user_data().data_vec(user_data_of(impl_->certificate_ends_ns));
+  impl_->participant =
+      factory->create_participant(static_cast<uint32_t>(options.domain), qos, impl_.get(), dds::StatusMask::none());
   if (impl_->participant == nullptr) {
     throw core::BadInput("cannot join DDS domain " + std::to_string(options.domain) +
                          "; check that the network of this host is up (`ip link set lo up` at least)");
   }
+  impl_->participant->register_content_filter_factory(kEveryNth, &every_nth_filters());
   for (auto* ends : {&impl_->train, &impl_->host}) impl_->join(*ends);
 }
 
@@ -183,25 +223,6 @@ Participant::~Participant() {
   impl_->participant->set_listener(nullptr);
   impl_->participant->delete_contained_entities();
   dds::DomainParticipantFactory::get_instance()->delete_participant(impl_->participant);
-}
-
-bool Participant::Impl::leased_by_somebody(const std::string& topic) const {
-  return std::ranges::any_of(remote_readers, [&](const auto& one) {
-    return one.second.topic == topic && one.second.terms.lease_ns < kEndlessNs;
-  });
-}
-
-// A sign of life goes to every reader as a datagram of its own, and a sample is one: nothing is said where something
-// was said lately, or where nobody would miss it.
-void Participant::assert_liveliness() {
-  const int64_t now_ns = core::monotonic_ns();
-  const std::lock_guard lock(impl_->mutex);
-  for (auto& [writer, lease] : impl_->manual_liveliness) {
-    const int64_t said_ns = std::max<int64_t>(lease.asserted_ns, lease.sent->said_ns);
-    if (now_ns - said_ns < lease.lease_ns / kSignsInALease - kCallsJitterNs) continue;
-    if (impl_->leased_by_somebody(writer->get_topic()->get_name())) writer->assert_liveliness();
-    lease.asserted_ns = now_ns;
-  }
 }
 
 bool Participant::interface_appeared() const {
@@ -224,7 +245,7 @@ Connections Participant::connections() const {
     dds::SubscriptionMatchedStatus status;
     reader->get_subscription_matched_status(status);
     connections.matches += static_cast<uint32_t>(status.current_count);
-    ++ends[reader->get_topicdescription()->get_name()].second;
+    ++ends[topic_of(*reader)].second;
   }
   for (const auto& [guid, writer] : impl_->remote_writers) ++ends[writer.topic].first;
   for (const auto& [guid, reader] : impl_->remote_readers) ++ends[reader.topic].second;
@@ -237,6 +258,21 @@ std::vector<Sent> Participant::sent() const {
   std::vector<Sent> sent;
   for (const auto& count : impl_->sent) sent.push_back({count->topic, count->samples});
   return sent;
+}
+
+// Anybody on the network can announce himself; only who has a certificate of this train gets his writers known.
+std::vector<CertificateEnd> Participant::certificates() const {
+  const std::lock_guard lock(impl_->mutex);
+  std::set<eprosima::fastrtps::rtps::GuidPrefix_t> known;
+  for (const auto& [guid, writer] : impl_->remote_writers) known.insert(guid.guidPrefix);
+  std::vector<CertificateEnd> all;
+  for (const auto& [prefix, process] : impl_->remote_processes) {
+    if (process.certificate_ends_ns != 0 && known.contains(prefix))
+      all.push_back({process.name, process.certificate_ends_ns});
+  }
+  if (const int64_t own_ns = impl_->certificate_ends_ns; own_ns != 0) all.push_back({name_of(impl_->options), own_ns});
+  std::ranges::sort(all, {}, &CertificateEnd::process);
+  return all;
 }
 
 std::vector<std::string> Participant::written_topics() const {

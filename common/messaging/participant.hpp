@@ -22,7 +22,6 @@ struct SentCount {
   explicit SentCount(std::string name) : topic(std::move(name)) {}
   std::string topic;
   std::atomic<uint64_t> samples = 0;
-  std::atomic<int64_t> said_ns = 0;  // monotonic, of its last sample
 };
 
 struct Participant::Impl : eprosima::fastdds::dds::DomainParticipantListener {
@@ -38,17 +37,11 @@ struct Participant::Impl : eprosima::fastdds::dds::DomainParticipantListener {
   Ends train;
   Ends host;
   Ends& ends_of(const TopicInfo& info) { return info.qos.data_sharing ? host : train; }
-  [[nodiscard]] bool leased_by_somebody(const std::string& topic) const;
   void join(Ends& ends);
 
   std::mutex mutex;
   std::map<std::string, eprosima::fastdds::dds::Topic*> topics;
-  struct Lease {
-    std::shared_ptr<const SentCount> sent;
-    int64_t lease_ns = 0;
-    int64_t asserted_ns = 0;
-  };
-  std::map<eprosima::fastdds::dds::DataWriter*, Lease> manual_liveliness;  // writers to assert
+  std::map<std::string, eprosima::fastdds::dds::ContentFilteredTopic*> thinned;
   std::set<eprosima::fastdds::dds::DataWriter*> writers;
   std::set<eprosima::fastdds::dds::DataReader*> readers;
   std::vector<std::shared_ptr<const SentCount>> sent;
@@ -58,10 +51,17 @@ struct Participant::Impl : eprosima::fastdds::dds::DomainParticipantListener {
   };
   std::map<eprosima::fastrtps::rtps::GUID_t, Remote> remote_writers;
   std::map<eprosima::fastrtps::rtps::GUID_t, Remote> remote_readers;
-  std::map<eprosima::fastrtps::rtps::GuidPrefix_t, std::string> remote_names;  // "odometry@cab"
+  struct Process {
+    std::string name;                 // "odometry@cab"
+    int64_t certificate_ends_ns = 0;  // 0 = it has none
+  };
+  std::map<eprosima::fastrtps::rtps::GuidPrefix_t, Process> remote_processes;
+  int64_t certificate_ends_ns = 0;  // own, 0 = none
   bool own_profiles = false;
 
   eprosima::fastdds::dds::Topic* topic(const TopicInfo& info, const std::string& instance);
+  /// What a reader reads: the topic, or every n-th sample of it.
+  eprosima::fastdds::dds::TopicDescription* source(const TopicInfo& info, const std::string& instance);
   void on_participant_discovery(eprosima::fastdds::dds::DomainParticipant*,
                                 eprosima::fastrtps::rtps::ParticipantDiscoveryInfo&& info) override;
   void on_publisher_discovery(eprosima::fastdds::dds::DomainParticipant*,
@@ -69,5 +69,8 @@ struct Participant::Impl : eprosima::fastdds::dds::DomainParticipantListener {
   void on_subscriber_discovery(eprosima::fastdds::dds::DomainParticipant*,
                                eprosima::fastrtps::rtps::ReaderDiscoveryInfo&& info) override;
 };
+
+/// The topic's name also of a reader that takes every n-th sample.
+std::string topic_of(const eprosima::fastdds::dds::DataReader& reader);
 
 }  // namespace railfix::messaging

@@ -9,9 +9,6 @@ namespace {
 
 namespace dds = eprosima::fastdds::dds;
 
-// Liveliness must be announced well within the lease; the run loop asserts every 50 ms.
-constexpr double kAnnounceShareOfLease = 0.5;
-
 eprosima::fastrtps::Duration_t duration(int64_t ns) {
   return {static_cast<int32_t>(ns / core::kNsPerSecond), static_cast<uint32_t>(ns % core::kNsPerSecond)};
 }
@@ -26,12 +23,6 @@ void apply_common(const QosProfile& profile, Qos& qos) {
   qos.resource_limits().max_samples = profile.depth * profile.max_instances;
   qos.resource_limits().allocated_samples = std::min(profile.depth * profile.max_instances, 16);
   if (profile.deadline_ns > 0) qos.deadline().period = duration(profile.deadline_ns);
-  if (profile.liveliness_lease_ns > 0) {
-    qos.liveliness().kind = dds::MANUAL_BY_TOPIC_LIVELINESS_QOS;
-    qos.liveliness().lease_duration = duration(profile.liveliness_lease_ns);
-    qos.liveliness().announcement_period =
-        duration(static_cast<int64_t>(static_cast<double>(profile.liveliness_lease_ns) * kAnnounceShareOfLease));
-  }
   if (profile.data_sharing) {
     qos.data_sharing().automatic();
   } else {
@@ -62,12 +53,6 @@ void write_xml(std::ostream& xml, const TopicInfo& topic, bool writer) {
   xml << "        <durability><kind>" << (p.transient_local ? "TRANSIENT_LOCAL" : "VOLATILE")
       << "</kind></durability>\n";
   if (p.deadline_ns > 0) xml << "        <deadline><period>" << xml_duration(p.deadline_ns) << "</period></deadline>\n";
-  if (p.liveliness_lease_ns > 0) {
-    const auto announce = static_cast<int64_t>(static_cast<double>(p.liveliness_lease_ns) * kAnnounceShareOfLease);
-    xml << "        <liveliness><kind>MANUAL_BY_TOPIC</kind><lease_duration>" << xml_duration(p.liveliness_lease_ns)
-        << "</lease_duration><announcement_period>" << xml_duration(announce)
-        << "</announcement_period></liveliness>\n";
-  }
   if (writer)
     xml << "        <publishMode><kind>" << (p.asynchronous ? "ASYNCHRONOUS" : "SYNCHRONOUS")
         << "</kind></publishMode>\n";

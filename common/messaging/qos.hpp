@@ -15,10 +15,9 @@ struct QosProfile {
   int32_t max_instances = 1;     // keyed topics: how many keys there may be
   bool exclusive = false;        // a reader hears one writer at a time, and stays with it (standby services)
   int64_t deadline_ns = 0;       // 0 = none
-  int64_t liveliness_lease_ns =
-      0;                      // 0 = none; otherwise MANUAL_BY_TOPIC (AUTOMATIC does not see a dead writer in 2.9.1)
-  bool data_sharing = false;  // zero copy on one host; for plain, unkeyed types
-  bool asynchronous = false;  // sending never blocks the service thread
+  bool data_sharing = false;     // zero copy on one host; for plain, unkeyed types
+  uint32_t one_in = 1;           // a reader may want every n-th sample only; the others are not sent to it
+  bool asynchronous = false;     // sending never blocks the service thread
 };
 
 }  // namespace railfix::messaging

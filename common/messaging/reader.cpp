@@ -44,31 +44,11 @@ struct AnyReader::Impl : dds::DataReaderListener {
   bool exclusive = false;
   OneWriter one_writer;  // the middleware's thread only
 
-  std::mutex mutex;
-  std::map<dds::InstanceHandle_t, std::shared_ptr<const void>>
-      last_of_writer;  // keyed topics: to say who has fallen silent
-
-  void push(std::shared_ptr<const void> sample, const SampleInfo& info) {
-    queue->push(&source, [run = handler, sample = std::move(sample), info] { (*run)(sample, info); });
-  }
-
   void on_data_available(dds::DataReader* from) override {
-    type->take_all(
-        *from, [this](std::shared_ptr<const void> sample, const SampleInfo& info, const dds::InstanceHandle_t& writer) {
-          if (exclusive && !one_writer.hears(info.writer)) return;
-          if (type->keyed()) {
-            const std::lock_guard lock(mutex);
-            last_of_writer[writer] = sample;
-          }
-          push(std::move(sample), info);
-        });
-  }
-
-  void on_liveliness_changed(dds::DataReader*, const dds::LivelinessChangedStatus& status) override {
-    if (status.alive_count_change >= 0) return;
-    const std::lock_guard lock(mutex);
-    const auto last = last_of_writer.find(status.last_publication_handle);
-    if (last != last_of_writer.end()) push(last->second, {.valid = false});
+    type->take_all(*from, [this](std::shared_ptr<const void> sample, const SampleInfo& info) {
+      if (exclusive && !one_writer.hears(info.writer)) return;
+      queue->push(&source, [run = handler, sample = std::move(sample), info] { (*run)(sample, info); });
+    });
   }
 };
 
@@ -88,11 +68,10 @@ AnyReader::AnyReader(Participant& participant, const TopicInfo& topic, const std
       impl_->subscriber->get_datareader_qos_from_profile(topic.name, qos) != ReturnCode_t::RETCODE_OK) {
     apply(topic.qos, qos);
   }
-  auto* dds_topic = inside.topic(topic, instance);
-  impl_->reader = impl_->subscriber->create_datareader(
-      dds_topic, qos, impl_.get(), dds::StatusMask::data_available() << dds::StatusMask::liveliness_changed());
+  auto* source = inside.source(topic, instance);
+  impl_->reader = impl_->subscriber->create_datareader(source, qos, impl_.get(), dds::StatusMask::data_available());
   if (impl_->reader == nullptr) {
-    throw core::BadInput("topic " + dds_topic->get_name() +
+    throw core::BadInput("topic " + source->get_name() +
                          " cannot be read: quality of service or permissions refuse it");
   }
   const std::lock_guard lock(inside.mutex);

@@ -6,7 +6,10 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <ctime>
 #include <memory>
+
+#include "core/time.hpp"
 
 namespace railfix::messaging {
 
@@ -43,18 +46,33 @@ core::Result<std::vector<std::pair<std::string, std::string>>> security_properti
   return properties;
 }
 
-core::Result<int64_t> days_left(const std::filesystem::path& certificate) {
+std::filesystem::path certificate_of(const std::filesystem::path& folder, const std::string& service) {
+  return folder / (identity_of(service) + ".cert.pem");
+}
+
+core::Result<int64_t> certificate_ends_ns(const std::filesystem::path& certificate) {
   const std::unique_ptr<FILE, int (*)(FILE*)> file(std::fopen(certificate.c_str(), "r"),
                                                    [](FILE* f) { return f != nullptr ? std::fclose(f) : 0; });
   if (!file) return core::Error{certificate.string() + " is missing; make it with railfix train keys"};
   const std::unique_ptr<X509, void (*)(X509*)> read(PEM_read_X509(file.get(), nullptr, nullptr, nullptr), X509_free);
   if (!read)
     return core::Error{certificate.string() + " is not a certificate; make it again with railfix train keys --renew"};
-  int days = 0;
-  int seconds = 0;
-  if (ASN1_TIME_diff(&days, &seconds, nullptr, X509_get0_notAfter(read.get())) != 1)
+  std::tm ends{};
+  if (ASN1_TIME_to_tm(X509_get0_notAfter(read.get()), &ends) != 1)
     return core::Error{certificate.string() + " has no readable end of validity"};
-  return seconds < 0 ? days - 1 : days;
+  return timegm(&ends) * core::kNsPerSecond;
+}
+
+int64_t days_until(int64_t ends_ns) {
+  constexpr int64_t kDayNs = 86'400 * core::kNsPerSecond;
+  const int64_t left_ns = ends_ns - core::wall_ns();
+  return left_ns / kDayNs - (left_ns % kDayNs < 0 ? 1 : 0);
+}
+
+core::Result<int64_t> days_left(const std::filesystem::path& certificate) {
+  const auto ends_ns = certificate_ends_ns(certificate);
+  if (!ends_ns.ok()) return ends_ns.error();
+  return days_until(ends_ns.value());
 }
 
 }  // namespace railfix::messaging

@@ -21,7 +21,12 @@ core::Result<std::vector<std::pair<std::string, std::string>>> security_properti
 /// Who is asked about certificates warns from this many days before the end on.
 inline constexpr int64_t kCertificateWarningDays = 30;
 
-/// Days until the certificate runs out, negative when it has. Error: no certificate.
+/// The file of this process's certificate.
+std::filesystem::path certificate_of(const std::filesystem::path& folder, const std::string& service);
+/// When a certificate runs out. Error: no certificate.
+core::Result<int64_t> certificate_ends_ns(const std::filesystem::path& certificate);
+/// Days until then, negative when it has run out.
+int64_t days_until(int64_t ends_ns);
 core::Result<int64_t> days_left(const std::filesystem::path& certificate);
 
 }  // namespace railfix::messaging

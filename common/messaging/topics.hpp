@@ -42,23 +42,13 @@ inline constexpr Topic<msg::PositionFix> position_fix{"position_fix", "position"
 
 // Of several fusions, or tpr_publishers, one is in charge and alone sends (common/service/charge.hpp).
 inline constexpr Topic<msg::TrainState> train_state{
-    "train_state",
-    "position",
-    {.depth = 16, .exclusive = true, .deadline_ns = 200 * kMs, .liveliness_lease_ns = 300 * kMs},
-    64};
-inline constexpr Topic<msg::TrainPose> train_pose{
-    "train_pose", "position", {.depth = 16, .exclusive = true, .liveliness_lease_ns = 300 * kMs}, 64};
+    "train_state", "position", {.depth = 16, .exclusive = true, .deadline_ns = 200 * kMs}, 64};
+inline constexpr Topic<msg::TrainPose> train_pose{"train_pose", "position", {.depth = 16, .exclusive = true}, 64};
 inline constexpr Topic<msg::TrainPositionReport> train_position_report{
-    "train_position_report",
-    "position",
-    {.transient_local = true, .depth = 32, .liveliness_lease_ns = 300 * kMs},
-    64};
+    "train_position_report", "position", {.transient_local = true, .depth = 32}, 64};
 
 inline constexpr Topic<msg::ServiceStatus> service_status{
-    "service_status",
-    "operation",
-    {.transient_local = true, .depth = 1, .max_instances = 64, .liveliness_lease_ns = 400 * kMs},
-    256};
+    "service_status", "operation", {.transient_local = true, .depth = 1, .max_instances = 64}, 256};
 inline constexpr Topic<msg::LogRecord> log_record{"log_record", "operation", {.depth = 256, .asynchronous = true}, 256};
 inline constexpr Topic<msg::RecorderStatus> recorder_status{
     "recorder_status", "operation", {.transient_local = true, .depth = 1}, 16};

@@ -121,7 +121,7 @@ class TypeOf final : public FastDdsType {
         info.writer = number_of(infos[i].sample_identity.writer_guid());
         auto copy = pool_->get();
         copy_sample(samples[i], *copy);
-        on_sample(std::move(copy), info, infos[i].publication_handle);
+        on_sample(std::move(copy), info);
       }
       reader.return_loan(samples, infos);
     }

@@ -1,6 +1,5 @@
 #include <fastdds/dds/publisher/DataWriterListener.hpp>
 
-#include "core/time.hpp"
 #include "messaging/fastdds_qos.hpp"
 #include "messaging/fastdds_types.hpp"
 #include "messaging/participant.hpp"
@@ -35,7 +34,6 @@ struct AnyWriter::Impl : dds::DataWriterListener {
     if (writer == nullptr) return;
     {
       const std::lock_guard lock(participant->mutex);
-      participant->manual_liveliness.erase(writer);
       participant->writers.erase(writer);
     }
     // A service's last words (its status, its last log line) would go with their writer.
@@ -67,9 +65,6 @@ AnyWriter::AnyWriter(Participant& participant, const TopicInfo& topic, const std
   const std::lock_guard lock(inside.mutex);
   inside.sent.push_back(impl_->sent);
   inside.writers.insert(impl_->writer);
-  if (topic.qos.liveliness_lease_ns > 0) {
-    inside.manual_liveliness[impl_->writer] = {impl_->sent, topic.qos.liveliness_lease_ns};
-  }
 }
 
 // Shared memory is fresh when a writer is made: else each of its first pictures would wait for hundreds of page faults.
@@ -101,7 +96,6 @@ bool AnyWriter::Impl::send(void* sample) {
   if (!writer->write(sample)) return false;
   failed_in_a_row = 0;
   ++sent->samples;
-  sent->said_ns = core::monotonic_ns();
   return true;
 }
 

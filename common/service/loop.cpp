@@ -11,8 +11,7 @@
 namespace railfix::service {
 namespace {
 
-constexpr std::chrono::milliseconds kAssertPeriod{50};
-// Four times a second, so that a dead or frozen service shows within half a second.
+// Four times a second, so that a dead or frozen service shows within a second (messaging::ServiceBoard).
 constexpr std::chrono::milliseconds kStatusPeriod{250};
 // To this host's supervisor, which starts one that hangs anew (tools/railfix/train/supervise.cpp).
 constexpr std::chrono::milliseconds kBeatPeriod{100};
@@ -46,7 +45,6 @@ Loop::Loop(std::string service, const CommonConfig& common, bool beside)
   }
   on<msg::ControlRequest>(messaging::topics::service_control,
                           [this](const msg::ControlRequest& request) { answer(request); });
-  every(kAssertPeriod, [this] { participant_.assert_liveliness(); });
   every(kBeatPeriod, [this] { health_->beat(); });
   every(kStatusPeriod, [this] {
     health_->dropped(queue_.take_dropped());
@@ -64,8 +62,7 @@ void Loop::read_clock() {
   readers_.push_back(
       std::make_unique<messaging::AnyReader>(participant_, messaging::info_of(messaging::topics::data_clock), "",
                                              queue_, [this](const auto& sample, const auto& info) {
-                                               if (info.valid)
-                                                 clock(*static_cast<const msg::DataClock*>(sample.get()), info.writer);
+                                               clock(*static_cast<const msg::DataClock*>(sample.get()), info.writer);
                                              }));
 }
 
@@ -96,7 +93,7 @@ void Loop::watch_writers() {
 // What runs goes on when it has run out, but would not be let in again after a restart.
 void Loop::watch_certificate() {
   const auto look = [this] {
-    const auto left = messaging::days_left(std::filesystem::path(common_.security) / (service_ + ".cert.pem"));
+    const auto left = messaging::days_left(messaging::certificate_of(common_.security, service_));
     if (left.ok() && left.value() < messaging::kCertificateWarningDays)
       log_->warn(
           "this service's certificate {} days; railfix train keys --renew, then railfix train upgrade on each host",
@@ -120,7 +117,6 @@ void Loop::watch_clocks() {
   readers_.push_back(std::make_unique<messaging::AnyReader>(
       participant_, messaging::info_of(messaging::topics::service_status), "", queue_,
       [this](const auto& sample, const auto& info) {
-        if (!info.valid) return;
         const auto& status = *static_cast<const msg::ServiceStatus*>(sample.get());
         look_at_clock();
         clocks_.hear(status.host().c_str(), status.stamp_ns(), info.received_ns);
@@ -179,8 +175,7 @@ void Loop::listen(const messaging::TopicInfo& topic, const std::string& instance
     readers_.push_back(std::make_unique<messaging::AnyReader>(
         participant_, topic, instance, queue_,
         [this, handler = std::move(handler), stamp_of = waits_for_turn(topic) ? stamp_of : nullptr](const auto& sample,
-                                                                                                    const auto& info) {
-          if (!info.valid) return;
+                                                                                                    const auto&) {
           if (stamp_of && restarts_.outdated(stamp_of(sample.get()), core::monotonic_ns())) return;
           handler(sample.get());
         }));
@@ -194,7 +189,6 @@ void Loop::keep_in_turn(const messaging::TopicInfo& topic, const std::string& in
   readers_.push_back(std::make_unique<messaging::AnyReader>(
       participant_, topic, instance, queue_,
       [this, name, handler = std::move(handler), stamp_of](const auto& sample, const auto& info) {
-        if (!info.valid) return;
         const int64_t stamp_ns = stamp_of(sample.get());
         turns_.keep(name, info.sequence, stamp_ns, [this, handler, sample, stamp_ns] {
           if (!restarts_.outdated(stamp_ns, core::monotonic_ns())) handler(sample.get());

@@ -82,7 +82,7 @@ json alternatives_of(const msg::PositionFix* choice) {
 
 }  // namespace
 
-json services_message(const ServiceBoard& board, int64_t now_ns) {
+json services_message(const messaging::ServiceBoard& board, int64_t now_ns) {
   json services = json::array();
   for (const auto& [key, seen] : board.services()) {
     const auto& status = seen.status;

@@ -7,14 +7,14 @@
 
 #include "idl/pose.h"
 #include "idl/position.h"
+#include "messaging/service_board.hpp"
 #include "monitor/problems.hpp"
-#include "monitor/service_board.hpp"
 #include "monitor/topic_statistics.hpp"
 #include "track/map.hpp"
 
 namespace railfix::monitor {
 
-nlohmann::json services_message(const ServiceBoard& board, int64_t now_ns);
+nlohmann::json services_message(const messaging::ServiceBoard& board, int64_t now_ns);
 
 struct TopicShown {
   std::string name;

@@ -182,8 +182,8 @@ std::string metrics_text(const MetricsInput& input) {
                    input.seen->shared_memory_free_mb * 1e6);
   }
   for (const auto& one : input.seen->certificates) {
-    families.gauge("railfix_certificate_days_left", "Until the certificate of a service on this host runs out.",
-                   static_cast<double>(one.days_left), {{"service", one.name}});
+    families.gauge("railfix_certificate_days_left", "Until the certificate of a service runs out.",
+                   static_cast<double>(one.days_left), {{"service", one.service}, {"host", one.host}});
   }
   families.gauge("railfix_monitor_viewers", "Connected to the monitor.", static_cast<double>(input.viewers));
   families.counter("railfix_monitor_slow_viewers_total", "Disconnected because they were too slow.",

@@ -24,7 +24,8 @@ constexpr int64_t kScrapeNs = 60 * core::kNsPerSecond;
 constexpr int64_t kLingerNs = 10 * core::kNsPerSecond;
 // What has come waits for so many turns of 50 ms when nobody looks.
 constexpr uint64_t kIdleTurns = 5;
-constexpr auto kSilencePeriod = 250ms;
+// Samples of train_state that one stands for then.
+constexpr uint32_t kIdleOneIn = 4;
 
 std::filesystem::path page_folder(const std::string& configured) {
   if (!configured.empty()) return configured;
@@ -99,10 +100,8 @@ void MonitorService::start_timers() {
   });
   context_.every(200ms, [this] { publish_curvature(); });
   context_.every(250ms, [this] { publish_log(); });
-  context_.every(kSilencePeriod, [this] { look_for_silence(); });
+  context_.every(std::chrono::nanoseconds(messaging::ServiceBoard::kLookNs), [this] { look_for_silence(); });
   context_.every(500ms, [this] { publish_services(); });
-  read_certificates();
-  context_.every(1h, [this] { read_certificates(); });
   context_.every(1s, [this] {
     written_ = context_.participant().written_topics();
     show_channels();
@@ -117,12 +116,10 @@ void MonitorService::start_timers() {
 
 void MonitorService::set_up_topics() {
   on_topic_["service_status"] = [this](const Arrived& arrived) {
-    if (arrived.info.valid) services_.note(arrived.as<msg::ServiceStatus>(), core::wall_ns());
+    services_.note(arrived.as<msg::ServiceStatus>(), core::wall_ns());
   };
   const auto keep = [this]<class T>(const messaging::Topic<T>& topic, Newest<T>& newest) {
-    on_topic_[topic.name] = [&newest](const Arrived& arrived) {
-      if (arrived.info.valid) newest.take(arrived);
-    };
+    on_topic_[topic.name] = [&newest](const Arrived& arrived) { newest.take(arrived); };
   };
   keep(topics::train_pose, pose_);
   keep(topics::gnss_fix, gnss_);
@@ -130,7 +127,6 @@ void MonitorService::set_up_topics() {
   keep(topics::player_status, player_);
   keep(topics::data_clock, clock_);
   on_topic_["train_state"] = [this](const Arrived& arrived) {
-    if (!arrived.info.valid) return;
     state_.take(arrived);
     if (foxglove_.watched(kFoxglovePlace)) {
       const auto fix = location_fix(*state_.sample, recent(pose_) ? &*pose_.sample : nullptr);
@@ -138,24 +134,19 @@ void MonitorService::set_up_topics() {
     }
   };
   on_topic_["camera_calibration"] = [this](const Arrived& arrived) {
-    if (arrived.info.valid) cab_.calibration(arrived.as<msg::CameraCalibration>());
+    cab_.calibration(arrived.as<msg::CameraCalibration>());
   };
-  on_topic_["track_view"] = [this](const Arrived& arrived) {
-    if (arrived.info.valid) on_track(arrived.as<msg::TrackView>());
-  };
+  on_topic_["track_view"] = [this](const Arrived& arrived) { on_track(arrived.as<msg::TrackView>()); };
   on_topic_["camera_preview"] = [this](const Arrived& arrived) {
-    if (!arrived.info.valid) return;
     cab_.picture(arrived.name.substr(arrived.name.find('/') + 1),
                  std::static_pointer_cast<const msg::CameraPreview>(arrived.sample), core::wall_ns());
   };
   on_topic_["position_fix"] = [this](const Arrived& arrived) {
-    if (arrived.info.valid && arrived.as<msg::PositionFix>().kind() == msg::FIX_TRACK) choice_.take(arrived);
+    if (arrived.as<msg::PositionFix>().kind() == msg::FIX_TRACK) choice_.take(arrived);
   };
   on_topic_["log_record"] = [this](const Arrived& arrived) { on_log(arrived); };
   on_topic_["train_position_report"] = [this](const Arrived& arrived) { on_report(arrived); };
-  on_topic_["service_reply"] = [this](const Arrived& arrived) {
-    if (arrived.info.valid) reply(arrived.as<msg::ControlReply>());
-  };
+  on_topic_["service_reply"] = [this](const Arrived& arrived) { reply(arrived.as<msg::ControlReply>()); };
 }
 
 void MonitorService::arrived(const Arrived& arrived) {
@@ -163,8 +154,8 @@ void MonitorService::arrived(const Arrived& arrived) {
   context_.health().active();
   const auto handler = on_topic_.find(arrived.topic.name);
   if (handler != on_topic_.end()) handler->second(arrived);
-  if (arrived.info.valid) hand_to_foxglove(arrived);
-  if (arrived.info.valid && (arrived.topic.name == "recorder_status" || arrived.topic.name == "player_status")) {
+  hand_to_foxglove(arrived);
+  if (arrived.topic.name == "recorder_status" || arrived.topic.name == "player_status") {
     const std::string kind = arrived.topic.name == "recorder_status" ? "recorder" : "player";
     if (live_.watched(kind)) live_.publish(kind, status_message(kind, arrived.topic, arrived.sample.get()));
   }
@@ -189,7 +180,6 @@ void MonitorService::on_track(const msg::TrackView& view) {
 }
 
 void MonitorService::on_log(const Arrived& arrived) {
-  if (!arrived.info.valid) return;
   const auto& record = arrived.as<msg::LogRecord>();
   if (foxglove_.watched(kFoxgloveLog)) {
     foxglove_.publish(kFoxgloveLog, {arrived.info.received_ns, foxglove_log(record)});
@@ -200,7 +190,6 @@ void MonitorService::on_log(const Arrived& arrived) {
 }
 
 void MonitorService::on_report(const Arrived& arrived) {
-  if (!arrived.info.valid) return;
   ++reports_sent_;
   reports_.push_back(report_message(arrived.as<msg::TrainPositionReport>()));
   if (reports_.size() > kReportsKept) reports_.pop_front();
@@ -224,8 +213,7 @@ std::set<std::string> MonitorService::wanted_topics() const {
       "train_position_report", "gnss_fix",   "service_reply",   "camera_calibration", "data_clock"};
   if (live_.watched("state")) names.insert({"train_pose", "position_fix"});
   if (live_.watched("curvature")) names.insert("track_view");
-  const bool scraped = scraped_ns_ != 0 && core::wall_ns() - scraped_ns_ < kScrapeNs;
-  if (live_.watched("topics") || scraped) {
+  if (live_.watched("topics") || scraped()) {
     for (const auto& topic : messaging::all_topics()) {
       if (!topic.name.starts_with("camera_")) names.insert(topic.name);
     }
@@ -241,6 +229,10 @@ std::set<std::string> MonitorService::wanted_topics() const {
   return names;
 }
 
+bool MonitorService::scraped() const {
+  return scraped_ns_ != 0 && core::wall_ns() - scraped_ns_ < kScrapeNs;
+}
+
 // A page in the background asks for the problems alone, and those are looked for once a second.
 bool MonitorService::nobody_looks() const {
   const auto is_problems = [](const std::string& kind) { return kind == "problems"; };
@@ -251,9 +243,12 @@ void MonitorService::choose_topics() {
   const int64_t now_ns = core::monotonic_ns();
   for (const auto& name : wanted_topics()) wanted_ns_[name] = now_ns;
   std::erase_if(wanted_ns_, [&](const auto& entry) { return now_ns - entry.second > kLingerNs; });
-  std::set<std::string> names;
-  for (const auto& [name, at_ns] : wanted_ns_) names.insert(name);
-  watch_.read(names);
+  if (!nobody_looks() || scraped()) watched_ns_ = now_ns;
+  std::map<std::string, uint32_t> one_in;
+  for (const auto& [name, at_ns] : wanted_ns_) one_in[name] = 1;
+  // Enough to say since when the position is wide or has stopped coming.
+  if (watched_ns_ == 0 || now_ns - watched_ns_ > kLingerNs) one_in[topics::train_state.name] = kIdleOneIn;
+  watch_.read(one_in);
 }
 
 void MonitorService::show_channels() {
@@ -294,34 +289,20 @@ TrainSeen MonitorService::train_seen() {
   std::error_code failed;
   const auto shared_memory = std::filesystem::space("/dev/shm", failed);
   if (!failed) train.shared_memory_free_mb = static_cast<double>(shared_memory.available) / 1e6;
-  train.certificates = certificates_;
+  for (const auto& one : context_.participant().certificates()) {
+    const size_t at = one.process.find('@');
+    train.certificates.push_back(
+        {one.process.substr(0, at), one.process.substr(at + 1), messaging::days_until(one.ends_ns)});
+  }
   train.certificate_days = config_.certificate_days;
   train.interval_wide_m = config_.interval_wide_m;
   train.disk_low_mb = config_.disk_low_mb;
   return train;
 }
 
-// The keys of all services of this host lie in one folder.
-void MonitorService::read_certificates() {
-  certificates_.clear();
-  constexpr std::string_view kEnd = ".cert.pem";
-  std::error_code none;
-  for (const auto& entry : std::filesystem::directory_iterator(context_.common().security, none)) {
-    const std::string file = entry.path().filename().string();
-    if (!file.ends_with(kEnd)) continue;
-    if (const auto left = messaging::days_left(entry.path()); left.ok())
-      certificates_.push_back({file.substr(0, file.size() - kEnd.size()), left.value()});
-  }
-  std::ranges::sort(certificates_, {}, &TrainSeen::Certificate::name);
-}
-
-// A player sends statuses as they were recorded, at its own rate. Nor is anyone silent because the monitor itself was
-// held up, or because the clock was set.
 void MonitorService::look_for_silence() {
-  const int64_t now_ns = core::wall_ns();
-  const int64_t passed_ns = now_ns - std::exchange(silence_looked_ns_, now_ns);
-  const bool in_time = passed_ns >= 0 && passed_ns < ServiceBoard::kSilentNs - core::kNsPerSecond / 4;
-  if (!in_time || recent(player_) || !services_.note_silence(now_ns)) return;
+  if (recent(player_)) services_.note_player(player_.received_ns);
+  if (!services_.note_silence(core::wall_ns())) return;
   publish_services();
   look_for_problems();
 }

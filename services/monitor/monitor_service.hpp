@@ -60,11 +60,11 @@ class MonitorService {
   void on_report(const Arrived& arrived);
   [[nodiscard]] std::set<std::string> cameras() const;
   [[nodiscard]] std::set<std::string> wanted_topics() const;
+  [[nodiscard]] bool scraped() const;
   [[nodiscard]] bool nobody_looks() const;
   void choose_topics();
   void show_channels();
   [[nodiscard]] TrainSeen train_seen();
-  void read_certificates();
   void look_for_silence();
   void publish_services();
   void look_for_problems();
@@ -106,7 +106,7 @@ class MonitorService {
   messaging::Writer<msg::ControlRequest> control_;
   std::map<std::string, std::function<void(const Arrived&)>> on_topic_;
 
-  ServiceBoard services_;
+  messaging::ServiceBoard services_;
   Newest<msg::TrainState> state_;
   int64_t state_sent_ns_ = 0;  // receipt of the one last published
   Newest<msg::TrainPose> pose_;
@@ -125,11 +125,10 @@ class MonitorService {
   std::map<std::string, int64_t> wanted_ns_;  // topics, and when they were last wanted
   std::optional<std::set<std::string>> shown_cameras_;
   ProblemList problems_;
-  std::vector<TrainSeen::Certificate> certificates_;
   bool looked_ = false;
   int64_t begun_ns_ = 0;
-  int64_t silence_looked_ns_ = 0;
   int64_t scraped_ns_ = 0;
+  int64_t watched_ns_ = 0;  // when somebody looked last
   uint64_t slow_viewers_ = 0;
   uint64_t idle_turns_ = 0;
 

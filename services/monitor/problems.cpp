@@ -131,9 +131,10 @@ void judge_certificates(const TrainSeen& train, Problems& problems) {
   for (const auto& one : train.certificates) {
     if (one.days_left >= train.certificate_days) continue;
     const bool over = one.days_left < 0;
-    problems.push_back({"certificate " + one.name, over ? Level::error : Level::warning,
-                        over ? fmt::format("The certificate of {} has run out", one.name)
-                             : fmt::format("The certificate of {} runs out in {} days", one.name, one.days_left),
+    const std::string whose = one.service + " on " + one.host;
+    problems.push_back({"certificate " + whose, over ? Level::error : Level::warning,
+                        over ? fmt::format("The certificate of {} has run out", whose)
+                             : fmt::format("The certificate of {} runs out in {} days", whose, one.days_left),
                         "railfix train keys --renew, then railfix train upgrade on each host."});
   }
 }

@@ -10,7 +10,7 @@
 #include "idl/position.h"
 #include "idl/recorder.h"
 #include "idl/sensors.h"
-#include "monitor/service_board.hpp"
+#include "messaging/service_board.hpp"
 #include "monitor/topic_statistics.hpp"
 
 namespace railfix::monitor {
@@ -30,7 +30,7 @@ struct Problem {
 struct TrainSeen {
   int64_t now_ns = 0;
   int64_t watched_since_ns = 0;
-  const ServiceBoard* services = nullptr;
+  const messaging::ServiceBoard* services = nullptr;
   std::vector<std::string> expected;
   struct Topic {
     std::string name;
@@ -47,10 +47,11 @@ struct TrainSeen {
   bool played = false;                // a player stands in for the services
   double shared_memory_free_mb = -1;  // < 0 = not known
   struct Certificate {
-    std::string name;  // the service's
+    std::string service;
+    std::string host;
     int64_t days_left = 0;
   };
-  std::vector<Certificate> certificates;  // of this host's services
+  std::vector<Certificate> certificates;  // of every service that is there
   int64_t certificate_days = 0;
   double interval_wide_m = 100;
   double disk_low_mb = 1000;

@@ -20,23 +20,27 @@ bool of_fixed_size(const cdr::Structure& structure) {
 
 }  // namespace
 
-void TrainWatch::read(const std::set<std::string>& names) {
+void TrainWatch::read(const std::map<std::string, uint32_t>& one_in_by_name) {
   for (auto& [name, topic] : topics_) {
-    if (topic.reader && !names.contains(name)) topic.reader.reset();
+    if (topic.reader && !one_in_by_name.contains(name)) topic.reader.reset();
   }
-  for (const std::string& name : names) {
+  for (const auto& [name, one_in] : one_in_by_name) {
     const auto* info = messaging::find_topic(name);
     if (info == nullptr) continue;
     Topic& topic = topics_[name];
-    if (topic.reader) continue;
+    if (topic.reader && topic.one_in == one_in) continue;
+    if (!topic.reader) topic.statistics = TopicStatistics(info->qos.exclusive);
+    topic.statistics.thin(one_in);
+    topic.reader.reset();
     topic.info = info;
-    topic.statistics = TopicStatistics(info->qos.exclusive);
+    topic.one_in = one_in;
     topic.read_since_ns = core::wall_ns();
     messaging::TopicInfo lenient = *info;
     // Statuses come again before anyone has missed one; asking for one again would cost an answer to each.
     if (info->name == messaging::topics::service_status.name) lenient.qos.transient_local = false;
     if (!lenient.qos.transient_local) lenient.qos.reliable = false;
-    lenient.qos.liveliness_lease_ns = 0;  // every lease costs timers at each word of its writer
+    lenient.qos.one_in = one_in;
+    if (one_in > 1) lenient.qos.deadline_ns = 0;
     lenient.reader_queue = std::max(info->reader_queue, info->name == "camera_preview" ? size_t{4} : kWaiting);
     const size_t slash = name.find('/');
     topic.reader = std::make_unique<messaging::AnyReader>(
@@ -55,7 +59,7 @@ void TrainWatch::drain() {
 void TrainWatch::arrived(const std::string& name, Topic& topic, const std::shared_ptr<const void>& sample,
                          const messaging::SampleInfo& info) {
   // What was sent before we listened says nothing about the way here.
-  if (info.valid && info.source_ns >= topic.read_since_ns) {
+  if (info.source_ns >= topic.read_since_ns) {
     size_t bytes = topic.fixed_bytes;
     if (bytes == 0) {
       bytes = topic.info->type->serialize(sample.get()).size();

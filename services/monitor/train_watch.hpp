@@ -5,7 +5,6 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <set>
 #include <string>
 
 #include "messaging/topics.hpp"
@@ -13,7 +12,7 @@
 
 namespace railfix::monitor {
 
-/// One sample on its way to a handler. `info.valid` false: its writer has fallen silent.
+/// One sample on its way to a handler.
 struct Arrived {
   const std::string& name;  // "camera_preview/cam0"
   const messaging::TopicInfo& topic;
@@ -31,8 +30,9 @@ class TrainWatch {
   TrainWatch(messaging::Participant& participant, Handler handler)
       : participant_(participant), handler_(std::move(handler)) {}
 
-  /// From now on exactly these topics ("track_view", "camera_preview/cam0") are read; unknown names are left out.
-  void read(const std::set<std::string>& names);
+  /// From now on exactly these topics ("track_view", "camera_preview/cam0") are read, each with "one in n samples";
+  /// unknown names are left out.
+  void read(const std::map<std::string, uint32_t>& one_in_by_name);
   /// Handles what has come since the last call.
   void drain();
   /// Samples that waited too long for drain(), since the last call.
@@ -43,6 +43,7 @@ class TrainWatch {
     TopicStatistics statistics;
     std::unique_ptr<messaging::AnyReader> reader;
     int64_t read_since_ns = 0;
+    uint32_t one_in = 1;
     size_t fixed_bytes = 0;  // of every sample, 0 = not fixed
   };
   /// All that were ever read.

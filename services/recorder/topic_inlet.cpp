@@ -149,7 +149,6 @@ void TopicInlet::listen(const messaging::TopicInfo& topic, const std::string& in
   info.reader_queue = static_cast<size_t>(config_.sample_queue);
   const auto handler = [this, channel = channel_of(topic, *topic.type, name), type = topic.type,
                         since_ns = core::wall_ns()](const Sample& sample, const messaging::SampleInfo& sample_info) {
-    if (!sample_info.valid) return;
     const auto one = stored(channel, sample_info, type->serialize(sample.get()));
     const bool live = sample_info.source_ns >= since_ns;
     use_({channel->topic, sample_info.writer, sample_info.sequence, one, one, std::nullopt, live});
@@ -167,7 +166,7 @@ void TopicInlet::listen_camera(Listening& listening, const messaging::TopicInfo&
   messaging::TopicInfo info = topic;
   info.reader_queue = static_cast<size_t>(config_.picture_queue);
   const auto handler = [this, name, &listening](const Sample& sample, const messaging::SampleInfo& sample_info) {
-    if (sample_info.valid) encode(name, listening, *static_cast<const msg::CameraFrame*>(sample.get()), sample_info);
+    encode(name, listening, *static_cast<const msg::CameraFrame*>(sample.get()), sample_info);
   };
   listening.reader = std::make_unique<messaging::AnyReader>(participant_, info, instance, encode_queue_, handler);
 }

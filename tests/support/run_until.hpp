@@ -8,13 +8,12 @@ namespace railfix::test {
 
 /// Handles the queue until the condition holds; false when that takes longer than 60 s.
 template <class Condition>
-bool run_until(messaging::Participant& participant, messaging::Queue& queue, Condition condition) {
+bool run_until(messaging::Queue& queue, Condition condition) {
   constexpr int64_t kPatienceNs = 60 * core::kNsPerSecond;
   constexpr int64_t kPeriodNs = 20'000'000;
   const int64_t deadline_ns = core::monotonic_ns() + kPatienceNs;
   while (!condition()) {
     if (core::monotonic_ns() > deadline_ns) return false;
-    participant.assert_liveliness();
     queue.run_one(core::monotonic_ns() + kPeriodNs);
   }
   return true;

@@ -20,7 +20,6 @@ namespace {
 constexpr uint8_t kWarning = 3;
 constexpr double kWholeS = 2;  // so long before a fault and after a repair
 constexpr double kToldS = 10;
-constexpr double kStatusS = 0.8;  // four come in a second
 constexpr double kStateS = 0.4;   // ten a second
 constexpr double kReportS = 2.5;  // T_CYCLOC is 1 s
 constexpr double kAcrossM = 2;    // another track
@@ -84,18 +83,15 @@ Observer::Observer(Rig& rig, const std::filesystem::path& truth_folder)
                                    std::function<void(const T&, const messaging::SampleInfo&)> handler) {
     readers_.push_back(std::make_shared<messaging::Reader<T>>(*participant_, topic, "", queue_, std::move(handler)));
   };
-  listen(topics::train_state, std::function([this](const msg::TrainState& one, const messaging::SampleInfo& info) {
-           if (info.valid) state(one, info);
-         }));
+  listen(topics::train_state,
+         std::function([this](const msg::TrainState& one, const messaging::SampleInfo& info) { state(one, info); }));
   listen(topics::train_position_report,
-         std::function([this](const msg::TrainPositionReport& one, const messaging::SampleInfo& info) {
-           if (info.valid) report(one, info);
-         }));
-  listen(topics::service_status, std::function([this](const msg::ServiceStatus& one,
-                                                      const messaging::SampleInfo& info) { status(one, info.valid); }));
-  listen(topics::log_record, std::function([this](const msg::LogRecord& record, const messaging::SampleInfo& info) {
-           if (info.valid && record.level() >= kWarning)
-             say(std::string(record.service().c_str()) + ": " + record.text().c_str());
+         std::function(
+             [this](const msg::TrainPositionReport& one, const messaging::SampleInfo& info) { report(one, info); }));
+  listen(topics::service_status,
+         std::function([this](const msg::ServiceStatus& one, const messaging::SampleInfo&) { status(one); }));
+  listen(topics::log_record, std::function([this](const msg::LogRecord& record, const messaging::SampleInfo&) {
+           if (record.level() >= kWarning) say(std::string(record.service().c_str()) + ": " + record.text().c_str());
          }));
   rig.hosts().on(TwoHosts::coach, [&] {
     listen_on_the_ground(rig);
@@ -168,18 +164,27 @@ void Observer::report(const msg::TrainPositionReport& report, const messaging::S
   numbers_.arrived("", 0, report.seq());
 }
 
-void Observer::status(const msg::ServiceStatus& status, bool alive) {
+void Observer::status(const msg::ServiceStatus& status) {
+  services_.note(status, core::wall_ns());
   const std::string name = std::string(status.service().c_str()) + "@" + status.host().c_str();
-  auto& service = services_[name];
-  if (!alive && service.alive) say(name + " is silent");
-  if (alive) {
-    service.status = status;
-    service.heard_s = now_s();
-    const std::string reason = status.reason().c_str();
-    if (!reason.empty()) say(name + ": " + reason);
-    if (status.state() == msg::STATE_STOPPED) say(name + " stopped");
+  const std::string reason = status.reason().c_str();
+  if (!reason.empty()) say(name + ": " + reason);
+  if (status.state() == msg::STATE_STOPPED) say(name + " stopped");
+}
+
+void Observer::look_for_silence() {
+  if (now_s() < silence_due_s_) return;
+  silence_due_s_ = now_s() + core::seconds(messaging::ServiceBoard::kLookNs);
+  if (!services_.note_silence(core::wall_ns())) return;
+  for (const auto& [key, seen] : services_.services()) {
+    if (!seen.alive && !seen.stopped()) say(seen.name() + "@" + key.first + " is silent");
   }
-  service.alive = alive;
+}
+
+const messaging::ServiceSeen* Observer::service(const std::string& name) const {
+  const size_t at = name.find('@');
+  const auto found = services_.services().find({name.substr(at + 1), name.substr(0, at)});
+  return found == services_.services().end() ? nullptr : &found->second;
 }
 
 void Observer::say(const std::string& text) {
@@ -191,12 +196,10 @@ void Observer::say(const std::string& text) {
 
 std::set<std::string> Observer::not_usual() const {
   std::set<std::string> names;
-  const double now = now_s();
   for (const auto& name : expected_) {
-    const auto found = services_.find(name);
-    const bool usual =
-        found != services_.end() && found->second.alive && now - found->second.heard_s < kStatusS &&
-        (found->second.status.state() == msg::STATE_READY || found->second.status.state() == msg::STATE_ACTIVE);
+    const auto* seen = service(name);
+    const bool usual = seen != nullptr && seen->alive &&
+                       (seen->status.state() == msg::STATE_READY || seen->status.state() == msg::STATE_ACTIVE);
     if (!usual) names.insert(name);
   }
   if (!state_ || wall_s() - states_.last_s > kStateS) {
@@ -211,6 +214,7 @@ std::set<std::string> Observer::not_usual() const {
 void Observer::turn() {
   if (interrupted != 0) throw std::runtime_error("interrupted");
   queue_.run_one(core::monotonic_ns() + 10'000'000);
+  look_for_silence();
   std::vector<std::string> said;
   {
     const std::lock_guard lock(mutex_);

@@ -13,6 +13,7 @@
 #include "evaluation/truth.hpp"
 #include "ground_link/mqtt_client.hpp"
 #include "ground_link/sequence_watch.hpp"
+#include "messaging/service_board.hpp"
 #include "messaging/topics.hpp"
 #include "system/rig.hpp"
 
@@ -52,17 +53,14 @@ class Observer {
   /// Counts what has not come yet, too.
   Heard end();
 
-  struct Service {
-    msg::ServiceStatus status;
-    double heard_s = 0;
-    bool alive = false;
-  };
-  [[nodiscard]] const std::map<std::string, Service>& services() const { return services_; }
+  /// By their names: "fusion@cab".
+  [[nodiscard]] const messaging::ServiceSeen* service(const std::string& name) const;
 
  private:
   void state(const msg::TrainState& state, const messaging::SampleInfo& info);
   void report(const msg::TrainPositionReport& report, const messaging::SampleInfo& info);
-  void status(const msg::ServiceStatus& status, bool alive);
+  void status(const msg::ServiceStatus& status);
+  void look_for_silence();
   void judge(const msg::TrainState& state);
   void say(const std::string& text);
   void listen_on_the_ground(Rig& rig);
@@ -83,7 +81,8 @@ class Observer {
   std::set<std::string> expected_;
   std::unique_ptr<messaging::Participant> participant_;
   messaging::Queue queue_;
-  std::map<std::string, Service> services_;
+  messaging::ServiceBoard services_;
+  double silence_due_s_ = 0;
   std::optional<msg::TrainState> state_;
   Pause states_;
   Pause reports_;

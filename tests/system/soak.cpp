@@ -109,9 +109,9 @@ int soak(Rig& rig, Observer& observer, double minutes) {
   for (double at_s = 0; at_s < 60 * minutes; at_s += kPeriodS) {
     observer.run(kPeriodS);
     for (const auto& name : rig.services()) {
-      const auto found = observer.services().find(name);
-      if (found == observer.services().end()) continue;
-      const auto& status = found->second.status;
+      const auto* seen = observer.service(name);
+      if (seen == nullptr) continue;
+      const auto& status = seen->status;
       auto& one = all[name];
       if (one.pid != 0 && one.pid != status.pid()) ++one.restarts;
       one.pid = status.pid();

@@ -135,6 +135,8 @@ void print(const ordered_json& json) {
   if (!json.contains("check")) return;
   std::printf("check: %s\n", json["problems"].empty() ? "every checksum, index entry and count is right" : "PROBLEMS");
   for (const auto& problem : json["problems"]) std::printf("  %s\n", problem.get<std::string>().c_str());
+  if (!json["problems"].empty())
+    std::printf("railfix recording repair makes a proper file of everything in whole chunks\n");
 }
 
 int info(const Options& options) {

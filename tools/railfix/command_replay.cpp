@@ -65,6 +65,7 @@ ReplayReport play(Player& player) {
       std::cerr << status_line(status) << std::flush;
       return;
     }
+    if (status.looped() != 0) return;  // there is no end to come nearer to
     const double length_s = core::seconds(status.to_ns() - status.from_ns());
     if (!progress) progress.emplace("replay (seconds)", static_cast<uint64_t>(std::max(1.0, std::ceil(length_s))));
     progress->update(static_cast<uint64_t>(std::ceil(core::seconds(status.at_ns() - status.from_ns()))));

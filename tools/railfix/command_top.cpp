@@ -48,13 +48,16 @@ struct WatchedTopic {
 class Watch {
  public:
   explicit Watch(const Options& options) : options_(options), listener_(options.network, "railfix-top") {
-    listener_.listen(
-        messaging::topics::service_status.name,
-        [this](const auto& name, const auto& topic, const auto& sample, const auto& info) {
-          note(*static_cast<const msg::ServiceStatus*>(sample.get()), info.valid);
-          if (info.valid) count(name, topic, sample.get(), info);
-        },
-        true);
+    listener_.listen(messaging::topics::service_status.name,
+                     [this](const auto& name, const auto& topic, const auto& sample, const auto& info) {
+                       services_.note(*static_cast<const msg::ServiceStatus*>(sample.get()), core::wall_ns());
+                       count(name, topic, sample.get(), info);
+                     });
+    listener_.listen(messaging::topics::player_status.name,
+                     [this](const auto& name, const auto& topic, const auto& sample, const auto& info) {
+                       services_.note_player(core::wall_ns());
+                       count(name, topic, sample.get(), info);
+                     });
   }
 
   /// `draw` is called once a second.
@@ -62,6 +65,7 @@ class Watch {
     int64_t due_ns = core::monotonic_ns() + kDrawNs;
     listener_.run(for_s, [&] {
       find_topics();
+      look_for_silence();
       if (core::monotonic_ns() < due_ns) return false;
       due_ns += kDrawNs;
       end_second();
@@ -71,8 +75,8 @@ class Watch {
   }
   [[nodiscard]] std::string table(bool colours) {
     std::string text = fmt::format("{}  {}  {} services, {} topics\n\n", where(options_.network),
-                                   utc_text(core::wall_ns()), services_.size(), written_.size());
-    text += service_table(services_, silent_, colours);
+                                   utc_text(core::wall_ns()), services_.services().size(), written_.size());
+    text += service_table(services_, colours);
     text += fmt::format("\n{:<26} {:>7} {:>9} {:>10} {:>8} {:>8} {:>7}\n", "topic", "writers", "Hz", "kB/s", "age s",
                         "ms", "lost");
     for (const auto& name : written_) text += line(name);
@@ -81,14 +85,16 @@ class Watch {
   [[nodiscard]] ordered_json json() {
     ordered_json json{
         {"train", options_.network.train}, {"services", ordered_json::array()}, {"topics", ordered_json::array()}};
-    for (const auto& [key, s] : services_) {
-      json["services"].push_back({{"service", s.service().c_str()},
-                                  {"host", s.host().c_str()},
-                                  {"state", silent_.contains(key) ? "silent" : messaging::name_of_state(s.state())},
-                                  {"dropped", s.dropped()},
-                                  {"cpu_percent", s.cpu_percent()},
-                                  {"rss_mb", s.rss_mb()},
-                                  {"reason", s.reason().c_str()}});
+    for (const auto& [key, seen] : services_.services()) {
+      const auto& s = seen.status;
+      json["services"].push_back(
+          {{"service", seen.name()},
+           {"host", key.first},
+           {"state", seen.alive || seen.stopped() ? messaging::name_of_state(s.state()) : "silent"},
+           {"dropped", s.dropped()},
+           {"cpu_percent", s.cpu_percent()},
+           {"rss_mb", s.rss_mb()},
+           {"reason", s.reason().c_str()}});
     }
     for (const auto& name : written_) {
       ordered_json topic{{"topic", name}, {"writers", listener_.writers(name)}};
@@ -101,17 +107,13 @@ class Watch {
     }
     return json;
   }
-  [[nodiscard]] bool nobody() const { return written_.empty() && services_.empty(); }
+  [[nodiscard]] bool nobody() const { return written_.empty() && services_.services().empty(); }
 
  private:
-  void note(const msg::ServiceStatus& status, bool alive) {
-    const std::string key = std::string(status.service().c_str()) + "/" + status.host().c_str();
-    if (alive) {
-      silent_.erase(key);
-      services_[key] = status;
-    } else {
-      silent_.insert(key);
-    }
+  void look_for_silence() {
+    if (core::monotonic_ns() < silence_due_ns_) return;
+    silence_due_ns_ = core::monotonic_ns() + messaging::ServiceBoard::kLookNs;
+    services_.note_silence(core::wall_ns());
   }
   // Whole pictures are copied for every listener: only when asked for.
   [[nodiscard]] bool listened_to(const std::string& name) const {
@@ -158,8 +160,8 @@ class Watch {
 
   Options options_;
   TopicListener listener_;
-  std::map<std::string, msg::ServiceStatus> services_;  // by service and host
-  std::set<std::string> silent_;
+  messaging::ServiceBoard services_;
+  int64_t silence_due_ns_ = 0;
   std::map<std::string, WatchedTopic> topics_;
   std::vector<std::string> written_;
   int64_t second_begun_ns_ = core::monotonic_ns();

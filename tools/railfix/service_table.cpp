@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <set>
 
 #include "messaging/operation_words.hpp"
 
@@ -18,13 +19,12 @@ const char* colour_of(uint8_t state, bool silent) {
 }
 
 /// Gives a host as a column of the table, or nothing where all services are on one.
-std::function<std::string(const std::string&)> host_column_of(
-    const std::map<std::string, msg::ServiceStatus>& services) {
+std::function<std::string(const std::string&)> host_column_of(const messaging::ServiceBoard& board) {
   std::set<std::string> hosts;
   size_t width = std::string("host").size();
-  for (const auto& [key, status] : services) {
-    hosts.insert(status.host().c_str());
-    width = std::max(width, status.host().size());
+  for (const auto& [key, seen] : board.services()) {
+    hosts.insert(key.first);
+    width = std::max(width, key.first.size());
   }
   if (hosts.size() < 2) return [](const std::string&) { return std::string(); };
   return [width](const std::string& host) { return fmt::format("{:<{}} ", host, width); };
@@ -32,14 +32,14 @@ std::function<std::string(const std::string&)> host_column_of(
 
 }  // namespace
 
-std::string service_table(const std::map<std::string, msg::ServiceStatus>& services,
-                          const std::set<std::string>& silent, bool colours) {
-  const auto host_column = host_column_of(services);
+std::string service_table(const messaging::ServiceBoard& board, bool colours) {
+  const auto host_column = host_column_of(board);
   std::string text =
       fmt::format("{:<15} {}{:<9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>6} {:>7}  {}\n", "service", host_column("host"),
                   "state", "in", "out", "dropped", "p50 ms", "p99 ms", "cpu %", "MB", "reason");
-  for (const auto& [key, s] : services) {
-    const bool quiet = s.state() != msg::STATE_STOPPED && silent.contains(key);
+  for (const auto& [key, seen] : board.services()) {
+    const auto& s = seen.status;
+    const bool quiet = !seen.stopped() && !seen.alive;
     const std::string state = fmt::format("{:<9}", quiet ? "SILENT" : messaging::name_of_state(s.state()));
     text +=
         fmt::format("{:<15} {}{} {:>8} {:>8} {:>8} {:>8.1f} {:>8.1f} {:>6.1f} {:>7.1f}  {}\n", s.service().c_str(),

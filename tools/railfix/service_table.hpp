@@ -1,18 +1,14 @@
 // The services of a train as a table for the terminal.
 #pragma once
 
-#include <map>
-#include <set>
 #include <string>
 
-#include "idl/operation.h"
+#include "messaging/service_board.hpp"
 
 namespace railfix::tool {
 
-/// One line for each, with a header, in the order of the keys; their hosts when there are several. `silent` keys have
-/// not been heard lately; they are so called unless they stopped in order. With colours: ANSI codes around what is
-/// wrong.
-std::string service_table(const std::map<std::string, msg::ServiceStatus>& services,
-                          const std::set<std::string>& silent, bool colours);
+/// One line for each, with a header, by host and name; their hosts when there are several. Who has not been heard
+/// lately is called silent, unless it stopped in order. With colours: ANSI codes around what is wrong.
+std::string service_table(const messaging::ServiceBoard& board, bool colours);
 
 }  // namespace railfix::tool

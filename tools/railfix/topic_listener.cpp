@@ -64,7 +64,7 @@ bool TopicListener::stopped() {
   return interrupted != 0;
 }
 
-void TopicListener::listen(const std::string& name, OnSample on_sample, bool with_silence) {
+void TopicListener::listen(const std::string& name, OnSample on_sample) {
   if (readers_.contains(name)) return;
   const auto* topic = messaging::find_topic(name);
   if (topic == nullptr) return;
@@ -73,8 +73,8 @@ void TopicListener::listen(const std::string& name, OnSample on_sample, bool wit
   info.reader_queue = std::max(info.reader_queue, topic->qos.data_sharing ? size_t{8} : kWaiting);
   readers_[name] = std::make_unique<messaging::AnyReader>(
       participant_, info, slash == std::string::npos ? "" : name.substr(slash + 1), queue_,
-      [name, topic, with_silence, on_sample = std::move(on_sample)](const auto& sample, const auto& sample_info) {
-        if (sample_info.valid || with_silence) on_sample(name, *topic, sample, sample_info);
+      [name, topic, on_sample = std::move(on_sample)](const auto& sample, const auto& sample_info) {
+        on_sample(name, *topic, sample, sample_info);
       });
 }
 

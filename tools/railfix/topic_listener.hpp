@@ -35,9 +35,8 @@ class TopicListener {
   /// Ctrl-C and SIGTERM end run() from now on.
   TopicListener(const TrainNetwork& network, const std::string& command);
 
-  /// A topic that is listened to already, or that is none of ours, is left alone. Without a sample
-  /// (SampleInfo::valid false) a writer has fallen silent: only `with_silence` hears of that.
-  void listen(const std::string& name, OnSample on_sample, bool with_silence = false);
+  /// A topic that is listened to already, or that is none of ours, is left alone.
+  void listen(const std::string& name, OnSample on_sample);
   /// Until time is up, `done` says so (asked about twenty times a second), or Ctrl-C. for_s 0 = no limit.
   void run(double for_s, const std::function<bool()>& done);
   /// Ends run(). Any thread.

@@ -11,7 +11,6 @@
 namespace railfix::tool {
 
 void TopicStatistics::add(const messaging::TopicInfo& topic, const messaging::SampleInfo& info) {
-  if (!info.valid) return;
   lost_ += sequences_.before(info.writer, info.sequence, topic.qos.exclusive);
   if (samples_ == 0) {
     first_ns_ = info.received_ns;

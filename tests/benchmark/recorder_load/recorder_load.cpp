@@ -132,8 +132,7 @@ class Measurement {
         }) {}
 
   int run() {
-    if (!test::run_until(participant_, queue_,
-                         [&] { return pid_ != 0 && load_.heard() && status_.file().size() > 0; })) {
+    if (!test::run_until(queue_, [&] { return pid_ != 0 && load_.heard() && status_.file().size() > 0; })) {
       std::cerr << "the recorder did not start: " << test::slurp(options_.folder / "recorder.log") << '\n';
       return 2;
     }
@@ -201,7 +200,7 @@ class Measurement {
   // What was sent reaches the file.
   void settle() {
     const int64_t until_ns = core::monotonic_ns() + 3 * core::kNsPerSecond;
-    (void)test::run_until(participant_, queue_, [&] { return core::monotonic_ns() > until_ns; });
+    (void)test::run_until(queue_, [&] { return core::monotonic_ns() > until_ns; });
   }
 
   void print(const Usage& before, const Usage& after, double took_s) {

@@ -99,7 +99,7 @@ class BadPictures : public ::testing::Test {
     c.mount_known(true);
     calibrations_.write(c);
     // Pictures until both answer: then everybody has found everybody.
-    ASSERT_TRUE(test::run_until(participant_, queue_, [this] {
+    ASSERT_TRUE(test::run_until(queue_, [this] {
       send(0);
       for (int i = 0; i < 20 && !answered(); ++i) queue_.run_one(core::monotonic_ns() + 20'000'000);
       return answered() && steps_[seq_].valid() != 0;
@@ -125,14 +125,13 @@ class BadPictures : public ::testing::Test {
   /// The answers to one more picture.
   void show(uint32_t health, int64_t later_ns = kPeriodNs) {
     send(health, later_ns);
-    ASSERT_TRUE(test::run_until(participant_, queue_, [this] { return answered(); })) << "no answer to " << seq_;
+    ASSERT_TRUE(test::run_until(queue_, [this] { return answered(); })) << "no answer to " << seq_;
   }
   [[nodiscard]] const msg::TrackView& view() { return views_[seq_]; }
   [[nodiscard]] const msg::OdometryStep& step() { return steps_[seq_]; }
   [[nodiscard]] bool says(const std::string& service, const std::string& words) {
-    return test::run_until(participant_, queue_, [&] {
-      return std::string(status_[service].reason().c_str()).find(words) != std::string::npos;
-    });
+    return test::run_until(
+        queue_, [&] { return std::string(status_[service].reason().c_str()).find(words) != std::string::npos; });
   }
 
   std::string train_;

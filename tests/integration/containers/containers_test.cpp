@@ -188,7 +188,7 @@ class Ride {
   /// False when no report comes that is newer than this call.
   bool reported() {
     const int before = heard_;
-    return test::run_until(participant_, queue_, [&] {
+    return test::run_until(queue_, [&] {
       step();
       return heard_ > before;
     });
@@ -229,7 +229,7 @@ TEST_F(ContainerTrain, ComesUpOnTwoHostsIsUpgradedComesBackAndGoesDown) {
   EXPECT_THAT(locked.out, HasSubstr("true 990:990 caps:[] /run/podman-init")) << locked.err;
 
   ASSERT_EQ(shell("podman kill " + container("cab", "fusion-1")).exit_code, 0);
-  EXPECT_TRUE(test::run_until(*cab_, queue_, [&] {
+  EXPECT_TRUE(test::run_until(queue_, [&] {
     const auto fusion = service(TwoHosts::cab);
     return fusion["restarts"] == 1 && fusion["healthy"] == true;
   })) << service(TwoHosts::cab);

@@ -26,7 +26,6 @@ static dds_entity_t make_reader(dds_entity_t participant, dds_entity_t subscribe
   dds_qset_durability(qos, durability);
   dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, kDepth);
   dds_qset_deadline(qos, deadline);
-  dds_qset_liveliness(qos, DDS_LIVELINESS_MANUAL_BY_TOPIC, DDS_MSECS(300));
   const dds_entity_t reader = dds_create_reader(subscriber, topic, qos, NULL);
   must(reader, name);
   dds_delete_qos(qos);

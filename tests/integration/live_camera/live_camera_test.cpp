@@ -74,7 +74,7 @@ class LiveCamera : public railfix::testing::TemporaryFolder {
   }
   template <class Condition>
   bool run_until(Condition condition) {
-    return test::run_until(participant_, queue_, condition);
+    return test::run_until(queue_, condition);
   }
   [[nodiscard]] std::string reason() const { return status_.reason().c_str(); }
   void expect_growing_stamps() const {

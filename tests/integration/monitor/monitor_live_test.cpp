@@ -81,7 +81,6 @@ class Train {
     report.message()[0] = 0x88;
     report.message()[1] = 0xAB;
     report_.write(report);
-    participant_.assert_liveliness();
     const int64_t end_ns = core::monotonic_ns() + kPeriodNs;
     while (queue_.run_one(end_ns)) {
     }

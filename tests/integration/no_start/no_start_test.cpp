@@ -91,7 +91,7 @@ class MatcherInLockStep : public ::testing::Test {
   }
   template <class Condition>
   bool run_until(Condition condition) {
-    return test::run_until(participant_, queue_, condition);
+    return test::run_until(queue_, condition);
   }
   bool connected(size_t services) {
     return status_.size() == services && messaging::all_connected(participant_.connections(), status_);

@@ -96,7 +96,7 @@ class Playback : public railfix::testing::TemporaryFolder {
 
   template <class Condition>
   bool run_until(Condition condition) {
-    return test::run_until(participant_, queue_, condition);
+    return test::run_until(queue_, condition);
   }
   /// Both services are ready and everyone has found everyone.
   bool connected() { return status_.size() == 2 && messaging::all_connected(participant_.connections(), status_); }

@@ -33,20 +33,20 @@ TEST(Qos, AWriterThatDoesNotFitIsTold) {
   test::Program fusion(test::with_settings(
       "railfix-fusion",
       {"common.train_id=" + train, "common.domain=" + std::to_string(kDomain), "common.log_level=error"}));
-  ASSERT_TRUE(test::run_until(participant, queue, [&] { return status && status->state() == msg::STATE_READY; }));
+  ASSERT_TRUE(test::run_until(queue, [&] { return status && status->state() == msg::STATE_READY; }));
 
   options.service = "odometry";
   options.host = "cab";
   options.qos_profiles = profiles;
   auto other = std::make_unique<messaging::Participant>(options);
   auto steps = std::make_unique<messaging::Writer<msg::OdometryStep>>(*other, topics::odometry_step);
-  EXPECT_TRUE(test::run_until(participant, queue, [&] { return status->state() == msg::STATE_DEGRADED; }));
+  EXPECT_TRUE(test::run_until(queue, [&] { return status->state() == msg::STATE_DEGRADED; }));
   EXPECT_STREQ(status->reason().c_str(),
                "odometry_step of odometry@cab is not heard, its quality of service does not fit: the reader wants "
                "RELIABLE, the writer offers BEST_EFFORT");
   steps.reset();
   other.reset();
-  EXPECT_TRUE(test::run_until(participant, queue, [&] { return status->state() == msg::STATE_READY; }));
+  EXPECT_TRUE(test::run_until(queue, [&] { return status->state() == msg::STATE_READY; }));
   EXPECT_STREQ(status->reason().c_str(), "");
   fs::remove(profiles);
 }

@@ -230,7 +230,7 @@ TEST_F(RecordingTest, IsLedOverDdsAndSaysHowItIs) {
       recorder({"--set", "recorder.folder=" + folder_.string(), "--set", "recorder.autostart=false", "--set",
                 "recorder.ring_s=5", "--set", "recorder.after_s=0"}),
       log());
-  const auto until = [&](const auto& condition) { return test::run_until(participant, queue, condition); };
+  const auto until = [&](const auto& condition) { return test::run_until(queue, condition); };
   const auto state = [&](uint8_t wanted) { return until([&] { return status.state() == wanted; }); };
   uint64_t id = 0;
   const auto command = [&](const char* name, const std::string& argument = "") {

@@ -53,7 +53,6 @@ class LockStepEar {
     readers_.push_back(std::make_shared<messaging::Reader<T>>(
         participant_, topic, "", queue_,
         std::function([this, name = std::string(topic.name)](const T& sample, const messaging::SampleInfo& info) {
-          if (!info.valid) return;
           const auto cdr = messaging::serialize(sample);
           bytes_[name].append(cdr.begin(), cdr.end());
           received_[name] = info.sequence;

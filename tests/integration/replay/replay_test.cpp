@@ -91,7 +91,7 @@ class Replay : public ::testing::Test {
   }
   template <class Condition>
   bool run_until(Condition condition) {
-    return test::run_until(participant_, queue_, condition);
+    return test::run_until(queue_, condition);
   }
   bool state_is(uint8_t state) {
     return run_until([&] { return status_ && status_->state() == state; });

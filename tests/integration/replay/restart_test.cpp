@@ -37,7 +37,7 @@ class MovedReplay : public ::testing::Test {
   }
   template <class Condition>
   bool run_until(Condition condition) {
-    return test::run_until(participant_, queue_, condition);
+    return test::run_until(queue_, condition);
   }
   void tell(const std::string& command, const std::string& argument = "") {
     msg::ControlRequest request;

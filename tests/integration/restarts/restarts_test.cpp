@@ -99,7 +99,7 @@ class Restarts : public ::testing::Test {
   [[nodiscard]] fs::path recordings() const { return folder_ / "recordings"; }
   template <class Condition>
   bool run_until(Condition condition) {
-    return test::run_until(*participant_, queue_, condition);
+    return test::run_until(queue_, condition);
   }
   /// So many more than now, and of what comes from now on.
   bool comes(const uint64_t& counter, uint64_t more) {

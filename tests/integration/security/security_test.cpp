@@ -88,7 +88,7 @@ void expect_nothing_crosses(Train& train, Rogue& rogue) {
   msg::TrainState lie;
   lie.seq(666);
   uint64_t seq = 0;
-  ASSERT_TRUE(test::run_until(train.fusion, train.queue,
+  ASSERT_TRUE(test::run_until(train.queue,
                               [&] {
                                 train.write(++seq);
                                 rogue.writer.write(lie);
@@ -151,7 +151,7 @@ TEST_F(Security, WithTheRightCertificateASecondFusionIsHeard) {
   Rogue second(options("fusion", keys));
   msg::TrainState state;
   state.seq(666);
-  EXPECT_TRUE(test::run_until(train.fusion, train.queue, [&] {
+  EXPECT_TRUE(test::run_until(train.queue, [&] {
     second.writer.write(state);
     return !train.heard.empty() && train.heard.back() == 666;
   }));
@@ -180,7 +180,7 @@ TEST_F(Security, FullPicturesReachTheirOwnHost) {
   messaging::Writer<msg::CameraFrame> writer(grabber, topics::camera_frame, "cam0");
   messaging::Reader<msg::CameraFrame> reader(odometry, topics::camera_frame, "cam0", queue,
                                              [&](const msg::CameraFrame&) { ++pictures; });
-  EXPECT_TRUE(test::run_until(grabber, queue, [&] {
+  EXPECT_TRUE(test::run_until(queue, [&] {
     writer.write_in_place([](msg::CameraFrame& frame) {
       frame.width_px(64);
       frame.height_px(48);

@@ -155,7 +155,6 @@ TEST_F(TprService, IsComparedWhileItRuns) {
     message.message_bytes(static_cast<uint32_t>(bytes.size()));
     std::copy(bytes.begin(), bytes.end(), message.message().begin());
     certified.write(message);
-    evc.assert_liveliness();
   };
   int turn = 0;
   const auto pairs = [&] {

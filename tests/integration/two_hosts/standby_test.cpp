@@ -95,9 +95,7 @@ class Heard {
   Heard(messaging::Participant& participant, messaging::Queue& queue, const Camera& camera)
       : camera_(camera),
         reader_(participant, topics::train_state, "", queue,
-                [this](const msg::TrainState& state, const messaging::SampleInfo& info) {
-                  if (info.valid) hear(state, info);
-                }) {}
+                [this](const msg::TrainState& state, const messaging::SampleInfo& info) { hear(state, info); }) {}
   uint64_t states = 0;
   int changes = 0;  // of the fusion that is heard
   uint64_t writer = 0;

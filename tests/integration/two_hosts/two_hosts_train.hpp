@@ -61,7 +61,7 @@ class TwoHostsTest : public ::testing::Test {
   }
   template <class Condition>
   bool run_until(Condition condition) {
-    return test::run_until(*cab_, queue_, condition);
+    return test::run_until(queue_, condition);
   }
 
   const std::string train_ = "two-hosts-" + std::to_string(getpid());

@@ -16,7 +16,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 
 TEST(Metrics, SayWhatIsKnownAndLeaveOutWhatIsNot) {
-  ServiceBoard board;
+  messaging::ServiceBoard board;
   msg::ServiceStatus status;
   status.service("fusion");
   status.host("cab \"A\"");
@@ -51,7 +51,7 @@ std::string read(const std::string& name) {
 }
 
 TEST(Metrics, HaveEverySeriesThatAlertsAndDashboardName) {
-  ServiceBoard board;
+  messaging::ServiceBoard board;
   msg::ServiceStatus status;
   status.service("fusion");
   board.note(status, 0);
@@ -60,7 +60,7 @@ TEST(Metrics, HaveEverySeriesThatAlertsAndDashboardName) {
   seen.state.emplace();
   seen.recorder.emplace();
   seen.shared_memory_free_mb = 1;
-  seen.certificates = {{"fusion", 300}};
+  seen.certificates = {{"fusion", "cab", 300}};
   const std::vector<Problem> problems;
   MetricTopic topic;
   topic.name = "train_state";

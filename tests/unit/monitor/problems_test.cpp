@@ -43,7 +43,7 @@ class ProblemsTest : public ::testing::Test {
     return problems.empty() ? Problem{} : problems.front();
   }
 
-  ServiceBoard board_;
+  messaging::ServiceBoard board_;
   TrainSeen train_;
 };
 
@@ -60,7 +60,8 @@ TEST_F(ProblemsTest, NamesServicesThatAreMissingDeadOrDegraded) {
   board_.note(status("odometry", msg::STATE_DEGRADED, "the picture is dark"), kNow_ns);
   EXPECT_THAT(only().what, HasSubstr("the picture is dark"));
   EXPECT_EQ(only().level, Level::warning);
-  board_.note(status("odometry", msg::STATE_DEGRADED), kNow_ns - ServiceBoard::kSilentNs);
+  board_.note(status("odometry", msg::STATE_DEGRADED), kNow_ns - messaging::ServiceBoard::kSilentNs);
+  board_.note_silence(kNow_ns - messaging::ServiceBoard::kLookNs);
   board_.note_silence(kNow_ns);
   EXPECT_THAT(only().what, HasSubstr("dead or frozen"));
   EXPECT_EQ(only().level, Level::error);
@@ -69,7 +70,7 @@ TEST_F(ProblemsTest, NamesServicesThatAreMissingDeadOrDegraded) {
 }
 
 TEST_F(ProblemsTest, SaysThatNobodyWasHeardYet) {
-  ServiceBoard empty;
+  messaging::ServiceBoard empty;
   train_.services = &empty;
   train_.watched_since_ns = kNow_ns;
   EXPECT_THAT(only().what, HasSubstr("No service of this train has been heard yet"));
@@ -113,13 +114,13 @@ TEST_F(ProblemsTest, TellsWhatIsWrongWithThePosition) {
 
 TEST_F(ProblemsTest, TellsOfCertificatesBeforeTheyRunOut) {
   train_.certificate_days = 20;
-  train_.certificates = {{"fusion", 20}};
+  train_.certificates = {{"fusion", "coach", 20}};
   EXPECT_THAT(find_problems(train_), IsEmpty());
-  train_.certificates = {{"fusion", 19}};
-  EXPECT_EQ(only().what, "The certificate of fusion runs out in 19 days");
+  train_.certificates = {{"fusion", "coach", 19}};
+  EXPECT_EQ(only().what, "The certificate of fusion on coach runs out in 19 days");
   EXPECT_EQ(only().level, Level::warning);
-  train_.certificates = {{"fusion", -1}};
-  EXPECT_EQ(only().what, "The certificate of fusion has run out");
+  train_.certificates = {{"fusion", "coach", -1}};
+  EXPECT_EQ(only().what, "The certificate of fusion on coach has run out");
   EXPECT_EQ(only().level, Level::error);
 }
 

@@ -9,13 +9,8 @@ namespace railfix::tool {
 
 namespace {
 
-// Of a writer that must show life all the time nothing stands any more when it has said nothing for so long.
+// Services show life all the time: of one that has said nothing for so long nothing stands any more.
 constexpr int64_t kSilentNs = 10 * core::kNsPerSecond;
-
-bool shows_life(const mcap::Channel& channel, SampleTypes& types) {
-  const auto* topic = messaging::find_topic(channel.topic);
-  return topic != nullptr && topic->qos.liveliness_lease_ns > 0 && types.keyed(channel);
-}
 
 }  // namespace
 
@@ -34,7 +29,7 @@ std::vector<StandingValue> standing_values(mcap::Reader& reader, const std::set<
   auto messages = reader.messages(selection);
   while (const auto message = messages.next()) {
     const auto& channel = reader.channels().at(message->channel_id);
-    if (before_ns - message->log_time_ns > kSilentNs && shows_life(channel, types)) {
+    if (before_ns - message->log_time_ns > kSilentNs && channel.topic == messaging::topics::service_status.name) {
       messages.leave_out(channel.id);
       continue;
     }

@@ -19,8 +19,8 @@ struct StandingValue {
 };
 
 /// The last value of every latched topic (and of every instance, where it is keyed) before this log time, in the order
-/// of their log times. `topics` as in mcap::Selection. Of keyed topics whose writers must show life (service_status)
-/// only what was said in the last ten seconds.
+/// of their log times. `topics` as in mcap::Selection. Of service_status only what was said in the last
+/// ten seconds.
 std::vector<StandingValue> standing_values(mcap::Reader& reader, const std::set<std::string>& topics,
                                            int64_t before_ns);
 

@@ -15,7 +15,7 @@ namespace topics = messaging::topics;
 
 constexpr int64_t kTurnNs = 60 * core::kNsPerSecond;
 constexpr std::chrono::milliseconds kLinger{300};  // for the last samples to get out
-constexpr int64_t kAliveNs = 50'000'000;
+constexpr int64_t kServeNs = 50'000'000;
 constexpr int64_t kStatusNs = 100'000'000;
 constexpr uint64_t kMostJudged = 10'000'000;
 constexpr size_t kMostInAStep = 100;  // samples without a picture: no reader's queue may run over
@@ -38,8 +38,8 @@ void Player::go_to(int64_t at_ns) {
                                               PreparedSample& out) { return prepare(channel, message, out); });
   // Filled before the clock runs, so that the first samples are not late.
   while (!next_ && !feed_->ended() && !stopped_) {
-    next_ = feed_->next(core::monotonic_ns() + kAliveNs);
-    keep_alive(core::monotonic_ns());
+    next_ = feed_->next(core::monotonic_ns() + kServeNs);
+    say_status(core::monotonic_ns());
   }
   timeline_.seek(at_ns, core::monotonic_ns());
 }
@@ -117,8 +117,8 @@ void Player::play_on() {
   const int64_t now_ns = core::monotonic_ns();
   serve(now_ns);
   if (seek_to_) return seek_now();
-  if (state_ != msg::PLAYER_PLAYING && !stepping_) return serve(now_ns + kAliveNs);
-  if (!next_) next_ = feed_->next(now_ns + kAliveNs);
+  if (state_ != msg::PLAYER_PLAYING && !stepping_) return serve(now_ns + kServeNs);
+  if (!next_) next_ = feed_->next(now_ns + kServeNs);
   if (!next_ && feed_->ended()) return at_end();
   if (!next_ || hold_back(now_ns)) return;
   const bool frame = next_->channel == frame_channel_ || !frame_channel_;
@@ -159,7 +159,7 @@ bool Player::wait_for_turns() {
   unused_ = 0;
   const int64_t begun_ns = core::monotonic_ns();
   while (!leader_->done()) {
-    serve(core::monotonic_ns() + kAliveNs);
+    serve(core::monotonic_ns() + kServeNs);
     if (stopped_) return false;
     if (core::monotonic_ns() - begun_ns < kTurnNs) continue;
     throw std::runtime_error("no answer on data_progress from " + leader_->waiting_for() +
@@ -200,22 +200,17 @@ void Player::at_end() {
   if (!options_.controlled) stop();
 }
 
-/// Handles one thing that came, or waits for it until then; tells meanwhile that the player lives.
+/// Handles one thing that came, or waits for it until then; says meanwhile how the player stands.
 void Player::serve(int64_t until_ns) {
-  keep_alive(core::monotonic_ns());
-  queue_.run_one(std::min({until_ns, alive_due_ns_, status_due_ns_}));
+  say_status(core::monotonic_ns());
+  queue_.run_one(std::min(until_ns, status_due_ns_));
 }
 
-void Player::keep_alive(int64_t now_ns) {
-  if (now_ns >= alive_due_ns_) {
-    participant_.assert_liveliness();
-    alive_due_ns_ = now_ns + kAliveNs;
-  }
-  if (now_ns >= status_due_ns_) {
-    publish_status();
-    if (state_ != msg::PLAYER_ENDED) publish_clock(false);
-    status_due_ns_ = now_ns + kStatusNs;
-  }
+void Player::say_status(int64_t now_ns) {
+  if (now_ns < status_due_ns_) return;
+  publish_status();
+  if (state_ != msg::PLAYER_ENDED) publish_clock(false);
+  status_due_ns_ = now_ns + kStatusNs;
 }
 
 int64_t Player::at_ns() const {

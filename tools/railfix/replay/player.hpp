@@ -78,7 +78,7 @@ class Player {
   void at_end();
   bool prepare(const mcap::Channel& channel, const mcap::Message& message, PreparedSample& sample);
   void serve(int64_t until_ns);
-  void keep_alive(int64_t now_ns);
+  void say_status(int64_t now_ns);
   void publish_status();
   void publish_clock(bool ended);
   [[nodiscard]] int64_t at_ns() const;
@@ -122,7 +122,6 @@ class Player {
   int64_t data_time_ns_ = 0;  // its log time
   uint64_t clocks_ = 0;       // sent
   std::optional<int64_t> waiting_since_ns_;
-  int64_t alive_due_ns_ = 0;
   int64_t status_due_ns_ = 0;
   int64_t begun_ns_ = 0;
 

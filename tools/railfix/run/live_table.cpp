@@ -48,7 +48,7 @@ std::string counts_line(const TrainPicture& picture) {
 
 std::string table_of(const TrainPicture& picture) {
   std::string text = position_line(picture) + "\n" + counts_line(picture) + "\n";
-  text += service_table(picture.services, picture.silent, false);
+  text += service_table(picture.services, false);
   for (const auto& line : picture.log) text += "! " + line + "\n";
   return text;
 }

@@ -23,11 +23,7 @@ Supervisor::Supervisor(const messaging::ParticipantOptions& options, std::vector
   const auto listen = [&]<class T>(const messaging::Topic<T>& topic, std::function<void(const T&)> handler) {
     readers_.push_back(std::make_shared<messaging::Reader<T>>(participant_, topic, "", queue_, std::move(handler)));
   };
-  readers_.push_back(std::make_shared<messaging::Reader<msg::ServiceStatus>>(
-      participant_, topics::service_status, "", queue_,
-      std::function([this](const msg::ServiceStatus& status, const messaging::SampleInfo& info) {
-        note_status(status, info.valid);
-      })));
+  listen(topics::service_status, std::function([this](const msg::ServiceStatus& status) { note_status(status); }));
   listen(topics::service_reply,
          std::function([this](const msg::ControlReply& reply) { replies_[reply.request_id()] = reply; }));
   listen(topics::data_clock,
@@ -54,19 +50,13 @@ Supervisor::Supervisor(const messaging::ParticipantOptions& options, std::vector
 }
 
 bool TrainPicture::gone(const std::string& service) const {
-  const auto found = services.find(service);
-  if (found == services.end() || silent.contains(service)) return true;
-  return found->second.state() == msg::STATE_FAILED || found->second.state() == msg::STATE_STOPPED;
+  const auto* seen = services.find(service);
+  return seen == nullptr || !seen->alive || seen->stopped() || seen->status.state() == msg::STATE_FAILED;
 }
 
-void Supervisor::note_status(const msg::ServiceStatus& status, bool alive) {
+void Supervisor::note_status(const msg::ServiceStatus& status) {
   const std::string service = status.service().c_str();
-  if (!alive) {
-    picture_.silent.insert(service);
-    return;
-  }
-  picture_.silent.erase(service);
-  picture_.services[service] = status;
+  picture_.services.note(status, core::wall_ns());
   if (service == "recorder" || service == "monitor") return;  // always have work: they hear the statuses too
   const uint64_t work = status.frames_in() + status.frames_out();
   unchanged_[service] = work_done_[service] == work ? unchanged_[service] + 1 : 0;
@@ -77,23 +67,26 @@ void Supervisor::turn(double seconds) {
   const int64_t deadline_ns = core::monotonic_ns() + core::to_ns(seconds);
   while (queue_.run_one(deadline_ns) && core::monotonic_ns() < deadline_ns) {
   }
+  if (core::monotonic_ns() < silence_due_ns_) return;
+  silence_due_ns_ = core::monotonic_ns() + messaging::ServiceBoard::kLookNs;
+  picture_.services.note_silence(core::wall_ns());
 }
 
 std::string Supervisor::missing() const {
   std::string names;
   for (const auto& service : services_) {
-    const auto found = picture_.services.find(service);
-    if (found != picture_.services.end() && found->second.state() != msg::STATE_STARTING) continue;
+    const auto* seen = picture_.services.find(service);
+    if (seen != nullptr && seen->status.state() != msg::STATE_STARTING) continue;
     names += (names.empty() ? "" : ", ") + service;
   }
   if (!names.empty()) return "not ready: " + names;
   const auto own = participant_.connections();
   uint32_t endpoints = 0;
   uint32_t matches = 0;
-  for (const auto& [service, status] : picture_.services) {
-    if (picture_.gone(service)) continue;
-    endpoints += status.endpoints();
-    matches += status.matches();
+  for (const auto& [key, seen] : picture_.services.services()) {
+    if (picture_.gone(key.second)) continue;
+    endpoints += seen.status.endpoints();
+    matches += seen.status.matches();
   }
   if (messaging::all_connected(own, endpoints, matches)) return "";
   return "services have not found each other (" + std::to_string((own.matches + matches) / 2) + " of " +

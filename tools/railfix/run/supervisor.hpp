@@ -3,10 +3,10 @@
 
 #include <map>
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
+#include "messaging/service_board.hpp"
 #include "messaging/topics.hpp"
 #include "run/processes.hpp"
 
@@ -14,8 +14,7 @@ namespace railfix::tool {
 
 /// The newest of everything that a person wants to see.
 struct TrainPicture {
-  std::map<std::string, msg::ServiceStatus> services;
-  std::set<std::string> silent;  // services whose liveliness lease has run out: dead or frozen
+  messaging::ServiceBoard services;
   std::optional<msg::TrainState> state;
   std::optional<msg::TrainPositionReport> report;
   uint64_t reports = 0;
@@ -26,7 +25,7 @@ struct TrainPicture {
   int64_t data_ns = 0;           // of the newest odometry step
   std::vector<std::string> log;  // the last warnings and errors
 
-  /// Never seen, failed, stopped, or dead.
+  /// Never seen, failed, stopped, or silent.
   [[nodiscard]] bool gone(const std::string& service) const;
 };
 
@@ -47,7 +46,7 @@ class Supervisor {
 
  private:
   [[nodiscard]] std::string missing() const;
-  void note_status(const msg::ServiceStatus& status, bool alive);
+  void note_status(const msg::ServiceStatus& status);
 
   std::vector<std::string> services_;
   messaging::Participant participant_;
@@ -55,6 +54,7 @@ class Supervisor {
   TrainPicture picture_;
   std::map<uint64_t, msg::ControlReply> replies_;
   uint64_t next_request_ = 1;
+  int64_t silence_due_ns_ = 0;
   bool ended_ = false;
   std::map<std::string, uint64_t> work_done_;  // frames in + out at the last status
   std::map<std::string, int> unchanged_;       // statuses since then without new work

@@ -1,7 +1,7 @@
 // What the recorder does, and its buttons.
 import { signal } from "@preact/signals";
 import { bytes, bytes_per_s, clock, duration, number } from "../format";
-import { host_ms, host_now_ms, now_ms, recorder } from "../store";
+import { host_ms, now_ms, recorder } from "../store";
 import type { RecorderStatus } from "../wire";
 import { AnswerLine, may_control, no_answer, send, TokenField } from "./control";
 import { Nothing, Panel } from "./panel";
@@ -65,7 +65,7 @@ function Disk({ one }: { one: RecorderStatus }) {
 
 function Facts({ one }: { one: RecorderStatus }) {
   const [name, level] = STATES[one.state];
-  const since = one.started_ns === 0 ? "" : ` since ${clock(host_ms(one.started_ns), now_ms.value)} (${duration((host_now_ms.value - one.started_ns / 1e6) / 1000)})`;
+  const since = one.started_ns === 0 ? "" : ` since ${clock(host_ms(one.started_ns), now_ms.value)} (${duration((one.stamp_ns - one.started_ns) / 1e9)})`;
   return (
     <dl class="facts">
       <dt>State</dt>

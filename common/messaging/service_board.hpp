@@ -1,4 +1,4 @@
-// Every service of the train as it says of itself and as it is seen: state, since when, alive or not.
+// Every service of the train as it says of itself and as it is heard: state, since when, alive or not.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@
 
 #include "idl/operation.h"
 
-namespace railfix::monitor {
+namespace railfix::messaging {
 
 struct ServiceSeen {
   msg::ServiceStatus status;
@@ -22,12 +22,17 @@ struct ServiceSeen {
 class ServiceBoard {
  public:
   static constexpr int64_t kSilentNs = 700'000'000;
+  /// How often note_silence wants to be called.
+  static constexpr int64_t kLookNs = 250'000'000;
   /// Its host and name tell one service from another.
   using Key = std::pair<std::string, std::string>;
 
   void note(const msg::ServiceStatus& status, int64_t now_ns);
-  /// Who has said nothing for kSilentNs is dead, frozen or stopped: services speak four times a second. True: somebody
-  /// is silent since the last time.
+  /// A player was heard: it sends statuses as they were recorded, at its own rate, so for 5 s nobody is called silent.
+  void note_player(int64_t now_ns) { player_ns_ = now_ns; }
+  /// Who has said nothing for kSilentNs is dead, frozen or stopped: services speak four times a second. Nobody is
+  /// silent because the caller was held up itself, or because the clock was set. True: somebody is silent since the
+  /// last time.
   bool note_silence(int64_t now_ns);
   [[nodiscard]] const std::map<Key, ServiceSeen>& services() const { return services_; }
   /// On whichever host; nullptr = never seen.
@@ -36,6 +41,8 @@ class ServiceBoard {
  private:
   static Key key_of(const msg::ServiceStatus& status) { return {status.host().c_str(), status.service().c_str()}; }
   std::map<Key, ServiceSeen> services_;
+  int64_t player_ns_ = 0;
+  int64_t looked_ns_ = 0;
 };
 
-}  // namespace railfix::monitor
+}  // namespace railfix::messaging

@@ -1,6 +1,13 @@
-#include "monitor/service_board.hpp"
+#include "messaging/service_board.hpp"
 
-namespace railfix::monitor {
+#include "core/time.hpp"
+
+namespace railfix::messaging {
+namespace {
+
+constexpr int64_t kPlayerNs = 5 * core::kNsPerSecond;
+
+}  // namespace
 
 void ServiceBoard::note(const msg::ServiceStatus& status, int64_t now_ns) {
   ServiceSeen& seen = services_[key_of(status)];
@@ -13,6 +20,10 @@ void ServiceBoard::note(const msg::ServiceStatus& status, int64_t now_ns) {
 }
 
 bool ServiceBoard::note_silence(int64_t now_ns) {
+  const int64_t passed_ns = now_ns - std::exchange(looked_ns_, now_ns);
+  const bool in_time = passed_ns >= 0 && passed_ns < kSilentNs - kLookNs;
+  const bool played = player_ns_ != 0 && now_ns - player_ns_ < kPlayerNs;
+  if (!in_time || played) return false;
   bool fallen = false;
   for (auto& [key, seen] : services_) {
     if (!seen.alive || now_ns - seen.received_ns < kSilentNs) continue;
@@ -31,4 +42,4 @@ const ServiceSeen* ServiceBoard::find(const std::string& service) const {
   return best;
 }
 
-}  // namespace railfix::monitor
+}  // namespace railfix::messaging
