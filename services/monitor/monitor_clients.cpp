@@ -175,7 +175,8 @@ Response MonitorService::metrics_answer() {
   return {200, "text/plain; version=0.0.4; charset=utf-8", metrics_text(input), "", "no-store"};
 }
 
-Response MonitorService::health_answer() const {
+Response MonitorService::health_answer() {
+  watched_ns_ = core::monotonic_ns();
   const auto& problems = problems_.problems();
   const bool bad = !problems.empty() && problems.front().level == Level::error;
   return {bad ? 503U : 200U, kText, bad ? problems.front().what + "\n" : "ok\n", "", "no-store"};
@@ -209,6 +210,7 @@ void MonitorService::control(const ClientPtr& client, const ControlAsk& ask) {
   request.command(ask.command.substr(0, 32));
   request.argument(ask.argument.substr(0, 256));
   waiting_[next_request_] = {ask.client, ask.id, ask.service, core::monotonic_ns()};
+  metronome_.want(true);
   context_.log().info("from the page: {} {} {}", ask.service, ask.command, ask.argument);
   control_.write(request);
 }

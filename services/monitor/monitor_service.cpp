@@ -1,6 +1,7 @@
 #include "monitor/monitor_service.hpp"
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <random>
 
@@ -22,10 +23,11 @@ constexpr size_t kReportsKept = 20;
 constexpr int64_t kScrapeNs = 60 * core::kNsPerSecond;
 // Readers go away this long after the last one looked, so that opening a page anew makes none.
 constexpr int64_t kLingerNs = 10 * core::kNsPerSecond;
-// What has come waits for so many turns of 50 ms when nobody looks.
-constexpr uint64_t kIdleTurns = 5;
-// Samples of train_state that one stands for then.
+constexpr auto kBeat = 50ms;
+// Of these one sample stands for so many when nobody looks: enough to say since when somebody is silent, the position
+// is wide or has stopped coming.
 constexpr uint32_t kIdleOneIn = 4;
+constexpr std::array kIdleTopics{topics::train_state.name, topics::gnss_fix.name, topics::service_status.name};
 
 std::filesystem::path page_folder(const std::string& configured) {
   if (!configured.empty()) return configured;
@@ -55,7 +57,8 @@ MonitorService::MonitorService(const Config& config, service::Context& context)
               handlers()),
       cab_(config.picture_hz),
       live_(live_actions()),
-      foxglove_(foxglove_actions()) {
+      foxglove_(foxglove_actions()),
+      metronome_(kBeat, [this] { context_.post([this] { beat(); }); }) {
   set_up_topics();
   choose_topics();
   port_ = server_.listen(static_cast<uint16_t>(config.port), static_cast<int>(config.port_search));
@@ -90,18 +93,10 @@ void MonitorService::restart() {
 MonitorService::~MonitorService() = default;
 
 void MonitorService::start_timers() {
-  context_.every(50ms, [this] {
-    if (nobody_looks() && ++idle_turns_ % kIdleTurns != 0) return;
+  context_.every(std::chrono::nanoseconds(messaging::ServiceBoard::kLookNs), [this] {
     watch_.drain();
-    publish_pictures();
+    look_for_silence();
   });
-  context_.every(100ms, [this] {
-    if (state_.received_ns != state_sent_ns_) publish_state();
-  });
-  context_.every(200ms, [this] { publish_curvature(); });
-  context_.every(250ms, [this] { publish_log(); });
-  context_.every(std::chrono::nanoseconds(messaging::ServiceBoard::kLookNs), [this] { look_for_silence(); });
-  context_.every(500ms, [this] { publish_services(); });
   context_.every(1s, [this] {
     written_ = context_.participant().written_topics();
     show_channels();
@@ -112,6 +107,19 @@ void MonitorService::start_timers() {
     context_.health().dropped(watch_.take_dropped());
     if (core::wall_ns() - state_.received_ns > core::kNsPerSecond) publish_state();
   });
+}
+
+// Twenty times a second while somebody looks.
+void MonitorService::beat() {
+  if (nobody_looks()) return;
+  const auto each = [this](uint64_t beats) { return beats_ % beats == 0; };
+  ++beats_;
+  watch_.drain();
+  publish_pictures();
+  if (each(2) && state_.received_ns != state_sent_ns_) publish_state();
+  if (each(4)) publish_curvature();
+  if (each(5)) publish_log();
+  if (each(10)) publish_services();
 }
 
 void MonitorService::set_up_topics() {
@@ -244,11 +252,13 @@ void MonitorService::choose_topics() {
   for (const auto& name : wanted_topics()) wanted_ns_[name] = now_ns;
   std::erase_if(wanted_ns_, [&](const auto& entry) { return now_ns - entry.second > kLingerNs; });
   if (!nobody_looks() || scraped()) watched_ns_ = now_ns;
+  const bool idle = watched_ns_ == 0 || now_ns - watched_ns_ > kLingerNs;
+  if (idle) idle_ns_ = now_ns;
   std::map<std::string, uint32_t> one_in;
-  for (const auto& [name, at_ns] : wanted_ns_) one_in[name] = 1;
-  // Enough to say since when the position is wide or has stopped coming.
-  if (watched_ns_ == 0 || now_ns - watched_ns_ > kLingerNs) one_in[topics::train_state.name] = kIdleOneIn;
+  for (const auto& [name, at_ns] : wanted_ns_)
+    one_in[name] = idle && std::ranges::find(kIdleTopics, name) != kIdleTopics.end() ? kIdleOneIn : 1;
   watch_.read(one_in);
+  metronome_.want(!nobody_looks());
 }
 
 void MonitorService::show_channels() {
@@ -302,7 +312,8 @@ TrainSeen MonitorService::train_seen() {
 
 void MonitorService::look_for_silence() {
   if (recent(player_)) services_.note_player(player_.received_ns);
-  if (!services_.note_silence(core::wall_ns())) return;
+  const bool sparse = core::monotonic_ns() - idle_ns_ < kIdleOneIn * core::kNsPerSecond;
+  if (!services_.note_silence(core::wall_ns(), sparse ? kIdleOneIn : 1)) return;
   publish_services();
   look_for_problems();
 }

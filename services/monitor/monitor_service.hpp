@@ -10,6 +10,7 @@
 #include "monitor/live_api.hpp"
 #include "monitor/live_messages.hpp"
 #include "monitor/map_view.hpp"
+#include "monitor/metronome.hpp"
 #include "monitor/monitor_config.hpp"
 #include "monitor/problems.hpp"
 #include "monitor/static_files.hpp"
@@ -51,6 +52,7 @@ class MonitorService {
 
   // monitor_service.cpp: samples, and what is wrong
   void start_timers();
+  void beat();
   void restart();
   void set_up_topics();
   void arrived(const Arrived& arrived);
@@ -90,7 +92,7 @@ class MonitorService {
   [[nodiscard]] Response answer(const Request& request);
   [[nodiscard]] Response map_answer(const Request& request) const;
   [[nodiscard]] Response metrics_answer();
-  [[nodiscard]] Response health_answer() const;
+  [[nodiscard]] Response health_answer();
   [[nodiscard]] nlohmann::json about(const Request& request) const;
   [[nodiscard]] std::string exposure() const;
   [[nodiscard]] std::string control_of(const Request& request) const;
@@ -130,7 +132,8 @@ class MonitorService {
   int64_t scraped_ns_ = 0;
   int64_t watched_ns_ = 0;  // when somebody looked last
   uint64_t slow_viewers_ = 0;
-  uint64_t idle_turns_ = 0;
+  int64_t idle_ns_ = 0;  // when nobody had looked for long, last
+  uint64_t beats_ = 0;
 
   uint64_t next_request_ = 0;
   std::map<uint64_t, ControlWaiting> waiting_;
@@ -142,6 +145,7 @@ class MonitorService {
   CabWatch cab_;
   LiveApi live_;  // these two hold clients, and go before the server
   FoxgloveApi foxglove_;
+  Metronome metronome_;
 };
 
 }  // namespace railfix::monitor

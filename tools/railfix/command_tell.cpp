@@ -1,5 +1,6 @@
 #include <unistd.h>
 
+#include <algorithm>
 #include <iostream>
 #include <map>
 #include <memory>
@@ -81,6 +82,9 @@ class Teller {
     return true;
   }
   [[nodiscard]] bool heard_of_it() const {
+    // `railfix replay` is no service.
+    if (options_.service == "player")
+      return std::ranges::binary_search(participant_.written_topics(), topics::player_status.name);
     const auto first = known_.lower_bound(options_.service + "@");
     return first != known_.end() && first->first.starts_with(options_.service + "@");
   }

@@ -38,6 +38,7 @@ struct Options {
 
 /// One topic, over the last second and since the beginning.
 struct WatchedTopic {
+  explicit WatchedTopic(int64_t since_ns) : whole(since_ns) {}
   BandwidthStatistics second;
   TopicStatistics whole;
   double rate_hz = 0;
@@ -99,9 +100,10 @@ class Watch {
     for (const auto& name : written_) {
       ordered_json topic{{"topic", name}, {"writers", listener_.writers(name)}};
       if (listened_to(name)) {
-        topic["rate_hz"] = topics_[name].rate_hz;
-        topic["bytes_per_s"] = topics_[name].bytes_per_s;
-        topic["lost"] = topics_[name].whole.lost();
+        const auto& watched = topics_.try_emplace(name, begun_ns_).first->second;
+        topic["rate_hz"] = watched.rate_hz;
+        topic["bytes_per_s"] = watched.bytes_per_s;
+        topic["lost"] = watched.whole.lost();
       }
       json["topics"].push_back(topic);
     }
@@ -131,7 +133,7 @@ class Watch {
   }
   void count(const std::string& name, const messaging::TopicInfo& type, const void* sample,
              const messaging::SampleInfo& info) {
-    auto& topic = topics_[name];
+    auto& topic = topics_.try_emplace(name, begun_ns_).first->second;
     topic.second.add(type, sample, info);
     topic.whole.add(type, info);
     topic.last_ns = core::monotonic_ns();
@@ -144,13 +146,13 @@ class Watch {
     for (auto& [name, topic] : topics_) {
       topic.rate_hz = static_cast<double>(topic.second.samples()) / length_s;
       topic.bytes_per_s = static_cast<double>(topic.second.bytes()) / length_s;
-      topic.second = {};
+      topic.second = BandwidthStatistics();
     }
   }
   std::string line(const std::string& name) {
     const std::string begin = fmt::format("{:<26} ", name);
     if (!listened_to(name)) return begin + "      - not listened to (--pictures)\n";
-    const auto& topic = topics_[name];
+    const auto& topic = topics_.try_emplace(name, begun_ns_).first->second;
     const double age_s = core::seconds(core::monotonic_ns() - topic.last_ns);
     const std::string age = topic.last_ns == 0 ? "never" : age_s > kOldS ? "> 1 h" : fmt::format("{:.1f}", age_s);
     return begin + fmt::format("{:>7} {:>9.1f} {:>10.1f} {:>8} {:>8.2f} {:>7}\n", listener_.writers(name),
@@ -159,6 +161,7 @@ class Watch {
   }
 
   Options options_;
+  int64_t begun_ns_ = core::wall_ns();
   TopicListener listener_;
   messaging::ServiceBoard services_;
   int64_t silence_due_ns_ = 0;

@@ -59,9 +59,12 @@ std::string resolve(TopicListener& listener, const Options& options) {
 int list(const Options& options) {
   TopicListener listener(options.network, "railfix-topics");
   std::map<std::string, TopicStatistics> all;
+  const int64_t since_ns = core::wall_ns();
   const auto watch = [&](const std::string& name) {
-    listener.listen(name, [&all](const std::string& topic, const messaging::TopicInfo& type, const auto&,
-                                 const messaging::SampleInfo& info) { all[topic].add(type, info); });
+    listener.listen(name, [&all, since_ns](const std::string& topic, const messaging::TopicInfo& type, const auto&,
+                                           const messaging::SampleInfo& info) {
+      all.try_emplace(topic, since_ns).first->second.add(type, info);
+    });
   };
   listener.run(options.for_s > 0 ? options.for_s : kListS, [&] {
     for (const auto& name : listener.participant().written_topics()) watch(name);
@@ -116,8 +119,9 @@ template <class Statistics>
 int watch(const Options& options) {
   TopicListener listener(options.network, "railfix-topics");
   const std::string topic = resolve(listener, options);
-  Statistics whole;
-  Statistics second;
+  const int64_t since_ns = core::wall_ns();
+  Statistics whole(since_ns);
+  Statistics second(since_ns);
   listener.listen(topic, [&](const auto&, const messaging::TopicInfo& info, const std::shared_ptr<const void>& sample,
                              const messaging::SampleInfo& sample_info) {
     whole.add(info, sample.get(), sample_info);
@@ -129,7 +133,7 @@ int watch(const Options& options) {
     hint.update(listener, topic, whole.samples(), options);
     if (!options.json && whole.samples() > 0 && core::monotonic_ns() - shown_ns >= core::kNsPerSecond) {
       std::cout << topic << ": " << second.line() << std::endl;
-      second = {};
+      second = Statistics(since_ns);
       shown_ns = core::monotonic_ns();
     }
     return options.count > 0 && whole.samples() >= options.count;
@@ -138,8 +142,11 @@ int watch(const Options& options) {
     auto json = whole.json();
     json["topic"] = topic;
     std::cout << json.dump() << '\n';
-  } else {
+  } else if (whole.samples() > 0) {
     std::cout << "all: " << topic << ": " << whole.line() << '\n';
+  } else {
+    std::cerr << topic << ": nothing came, it " << (listener.writers(topic) > 0 ? "has a writer" : "has no writer")
+              << " (" << where(options.network) << ")\n";
   }
   return whole.samples() > 0 ? 0 : 1;
 }

@@ -11,7 +11,12 @@
 namespace railfix::tool {
 
 void TopicStatistics::add(const messaging::TopicInfo& topic, const messaging::SampleInfo& info) {
-  lost_ += sequences_.before(info.writer, info.sequence, topic.qos.exclusive);
+  const uint64_t missing = sequences_.before(info.writer, info.sequence, topic.qos.exclusive);
+  if (info.source_ns < since_ns_) {
+    ++standing_;
+    return;
+  }
+  lost_ += missing;
   if (samples_ == 0) {
     first_ns_ = info.received_ns;
   } else {
@@ -85,6 +90,7 @@ nlohmann::ordered_json BandwidthStatistics::json() const {
 }
 
 void DelayStatistics::add(const messaging::TopicInfo& topic, const void* sample, const messaging::SampleInfo& info) {
+  if (info.source_ns < since_ns_) return;
   on_the_way_ms_.push_back(1e3 * core::seconds(info.received_ns - info.source_ns));
   const auto* type = cdr::own_types().find(topic.type->name());
   if (type == nullptr || std::ranges::find(type->members, "grabbed_ns", &cdr::Member::name) == type->members.end()) {

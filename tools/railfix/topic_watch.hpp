@@ -11,11 +11,14 @@
 
 namespace railfix::tool {
 
+/// Statistics of one topic are told since when it is listened to (host's clock): what was sent before and still stands
+/// says nothing of rate, losses and the way here.
 class TopicStatistics {
  public:
+  explicit TopicStatistics(int64_t since_ns = 0) : since_ns_(since_ns) {}
   void add(const messaging::TopicInfo& topic, const messaging::SampleInfo& info);
 
-  [[nodiscard]] uint64_t samples() const { return samples_; }
+  [[nodiscard]] uint64_t samples() const { return samples_ + standing_; }
   /// From the first to the last sample; 0 with less than two.
   [[nodiscard]] double rate_hz() const;
   [[nodiscard]] double shortest_gap_ms() const;
@@ -26,6 +29,8 @@ class TopicStatistics {
   [[nodiscard]] double latency_ms() const { return latency_ms_; }
 
  private:
+  int64_t since_ns_;
+  uint64_t standing_ = 0;
   uint64_t samples_ = 0;
   uint64_t lost_ = 0;
   int64_t first_ns_ = 0;
@@ -39,6 +44,7 @@ class TopicStatistics {
 /// What `railfix topics hz`, `bw` and `delay` say of one topic.
 class RateStatistics {
  public:
+  explicit RateStatistics(int64_t since_ns = 0) : all_(since_ns) {}
   void add(const messaging::TopicInfo& topic, const void*, const messaging::SampleInfo& info) { all_.add(topic, info); }
   [[nodiscard]] uint64_t samples() const { return all_.samples(); }
   [[nodiscard]] std::string line() const;
@@ -50,6 +56,7 @@ class RateStatistics {
 
 class BandwidthStatistics {
  public:
+  explicit BandwidthStatistics(int64_t since_ns = 0) : all_(since_ns) {}
   void add(const messaging::TopicInfo& topic, const void* sample, const messaging::SampleInfo& info);
   [[nodiscard]] uint64_t samples() const { return all_.samples(); }
   [[nodiscard]] uint64_t bytes() const { return bytes_; }
@@ -67,12 +74,14 @@ class BandwidthStatistics {
 
 class DelayStatistics {
  public:
+  explicit DelayStatistics(int64_t since_ns = 0) : since_ns_(since_ns) {}
   void add(const messaging::TopicInfo& topic, const void* sample, const messaging::SampleInfo& info);
   [[nodiscard]] uint64_t samples() const { return on_the_way_ms_.size(); }
   [[nodiscard]] std::string line() const;
   [[nodiscard]] nlohmann::ordered_json json() const;
 
  private:
+  int64_t since_ns_;
   std::vector<double> on_the_way_ms_;     // from sending to receiving
   std::vector<double> since_grabbed_ms_;  // from the grab of the input behind it to receiving, where the type tells it
 };

@@ -6,6 +6,7 @@
 
 #include <fstream>
 
+#include "messaging/security.hpp"
 #include "messaging/topics.hpp"
 #include "support/run_until.hpp"
 #include "train/keys.hpp"
@@ -102,6 +103,25 @@ void expect_nothing_crosses(Train& train, Rogue& rogue) {
   EXPECT_EQ(rogue.writer.matched_readers(), 1);
   EXPECT_EQ(train.reader.matched_writers(), 1);
   EXPECT_THAT(train.heard, ::testing::Not(::testing::Contains(666U)));
+}
+
+// So a dashboard on one host warns of those on the others.
+TEST_F(Security, EverybodySaysWhenHisCertificateEnds) {
+  const auto keys = keys_of("train");
+  Train train(options("fusion", keys), options("monitor", keys));
+  Rogue rogue(options("odometry", ""));
+  uint64_t seq = 0;
+  std::vector<messaging::CertificateEnd> ends;
+  EXPECT_TRUE(test::run_until(train.queue, [&] {
+    train.write(++seq);
+    ends = train.monitor.certificates();
+    return ends.size() == 2;
+  }));
+  ASSERT_EQ(ends.size(), 2U);
+  EXPECT_EQ(ends[0].process, "fusion@cab");
+  EXPECT_EQ(ends[1].process, "monitor@cab") << "its own, too";
+  EXPECT_EQ(messaging::days_until(ends[0].ends_ns), messaging::days_left(keys / "fusion.cert.pem").value());
+  EXPECT_TRUE(rogue.participant.certificates().empty()) << "it has none, and nobody is known to it";
 }
 
 TEST_F(Security, WithoutACertificateNothingIsHeardAndNothingSaid) {
