@@ -31,7 +31,7 @@ class LockStepEar {
 
   /// False when the replay takes too long.
   bool listen_until_the_end() {
-    return run_until(participant_, queue_, [this] {
+    return run_until(queue_, [this] {
       say_status();
       answer();
       return ended_;
