@@ -1,7 +1,6 @@
 #include "monitor/monitor_service.hpp"
 
 #include <algorithm>
-#include <array>
 #include <filesystem>
 #include <random>
 
@@ -26,8 +25,12 @@ constexpr int64_t kLingerNs = 10 * core::kNsPerSecond;
 constexpr auto kBeat = 50ms;
 // Of these one sample stands for so many when nobody looks: enough to say since when somebody is silent, the position
 // is wide or has stopped coming.
-constexpr uint32_t kIdleOneIn = 4;
-constexpr std::array kIdleTopics{topics::train_state.name, topics::gnss_fix.name, topics::service_status.name};
+constexpr uint32_t kIdleStatuses = 4;
+const std::map<std::string, uint32_t>& idle_one_in() {
+  static const std::map<std::string, uint32_t> one_in{
+      {topics::train_state.name, 8}, {topics::gnss_fix.name, 4}, {topics::service_status.name, kIdleStatuses}};
+  return one_in;
+}
 
 std::filesystem::path page_folder(const std::string& configured) {
   if (!configured.empty()) return configured;
@@ -255,8 +258,10 @@ void MonitorService::choose_topics() {
   const bool idle = watched_ns_ == 0 || now_ns - watched_ns_ > kLingerNs;
   if (idle) idle_ns_ = now_ns;
   std::map<std::string, uint32_t> one_in;
-  for (const auto& [name, at_ns] : wanted_ns_)
-    one_in[name] = idle && std::ranges::find(kIdleTopics, name) != kIdleTopics.end() ? kIdleOneIn : 1;
+  for (const auto& [name, at_ns] : wanted_ns_) {
+    const auto sparse = idle_one_in().find(name);
+    one_in[name] = idle && sparse != idle_one_in().end() ? sparse->second : 1;
+  }
   watch_.read(one_in);
   metronome_.want(!nobody_looks());
 }
@@ -312,8 +317,8 @@ TrainSeen MonitorService::train_seen() {
 
 void MonitorService::look_for_silence() {
   if (recent(player_)) services_.note_player(player_.received_ns);
-  const bool sparse = core::monotonic_ns() - idle_ns_ < kIdleOneIn * core::kNsPerSecond;
-  if (!services_.note_silence(core::wall_ns(), sparse ? kIdleOneIn : 1)) return;
+  const bool sparse = core::monotonic_ns() - idle_ns_ < kIdleStatuses * core::kNsPerSecond;
+  if (!services_.note_silence(core::wall_ns(), sparse ? kIdleStatuses : 1)) return;
   publish_services();
   look_for_problems();
 }

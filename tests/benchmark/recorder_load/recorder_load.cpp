@@ -33,6 +33,7 @@ namespace topics = messaging::topics;
 constexpr int64_t kDomain = 89;
 constexpr double kProgressS = 10;
 constexpr double kWantedLateMs = 1;  // 99 % of the replayed samples
+constexpr double kLateMs = 3;
 constexpr int64_t kBarePeriodNs = 5 * core::kNsPerSecond / 1000;
 
 struct Options {
@@ -72,6 +73,16 @@ Usage usage_of(uint32_t pid) {
   return usage;
 }
 
+// What the host of a virtual machine has taken from its processors (proc(5), /proc/stat).
+int64_t stolen_ticks() {
+  std::ifstream stat("/proc/stat");
+  std::string skipped;
+  for (int i = 0; i < 8; ++i) stat >> skipped;
+  int64_t ticks = 0;
+  stat >> ticks;
+  return ticks;
+}
+
 /// How late the system wakes a thread of the player's priority that does nothing: the share of any lateness that no
 /// program can mend.
 class BareThread {
@@ -88,9 +99,12 @@ class BareThread {
     std::vector<double> sorted = late_ms_;
     if (sorted.empty()) return "not measured";
     std::ranges::sort(sorted);
-    char text[80];
-    std::snprintf(text, sizeof text, "p50 %.3f, p99 %.3f, at most %.1f ms", sorted[sorted.size() / 2],
-                  sorted[sorted.size() * 99 / 100], sorted.back());
+    char text[160];
+    std::snprintf(
+        text, sizeof text,
+        "p50 %.3f, p99 %.3f, at most %.1f ms; later than %.0f ms %d times, %d of them because the machine's host "
+        "took the processor",
+        sorted[sorted.size() / 2], sorted[sorted.size() * 99 / 100], sorted.back(), kLateMs, late_, stolen_);
     return text;
   }
 
@@ -103,10 +117,19 @@ class BareThread {
       std::this_thread::sleep_for(std::chrono::nanoseconds(kBarePeriodNs));
       const std::lock_guard lock(mutex_);
       late_ms_.push_back(1e3 * core::seconds(core::monotonic_ns() - due_ns));
+      const int64_t ticks = stolen_ticks();
+      if (late_ms_.back() > kLateMs) {
+        ++late_;
+        stolen_ += ticks > ticks_ ? 1 : 0;
+      }
+      ticks_ = ticks;
     }
   }
   mutable std::mutex mutex_;
   std::vector<double> late_ms_;
+  int late_ = 0;    // later than kLateMs
+  int stolen_ = 0;  // ... while the machine's host had its processor
+  int64_t ticks_ = stolen_ticks();
   std::atomic<bool> ended_ = false;
   std::thread thread_;  // last: it uses all of the above
 };
