@@ -105,6 +105,23 @@ void expect_nothing_crosses(Train& train, Rogue& rogue) {
   EXPECT_THAT(train.heard, ::testing::Not(::testing::Contains(666U)));
 }
 
+// As the monitor reads while nobody looks.
+TEST_F(Security, AReaderOfEveryFourthSampleIsLetIn) {
+  const auto keys = keys_of("train");
+  Train train(options("fusion", keys), options("monitor", keys));
+  messaging::TopicInfo thinned = messaging::info_of(topics::train_state);
+  thinned.qos.one_in = 4;
+  std::vector<uint64_t> part;
+  messaging::AnyReader some(train.monitor, thinned, "", train.queue,
+                            [&](const auto&, const messaging::SampleInfo& info) { part.push_back(info.sequence); });
+  uint64_t seq = 0;
+  EXPECT_TRUE(test::run_until(train.queue, [&] {
+    train.write(++seq);
+    return part.size() >= 4;
+  }));
+  for (const uint64_t sequence : part) EXPECT_EQ(sequence % 4, 0U);
+}
+
 // So a dashboard on one host warns of those on the others.
 TEST_F(Security, EverybodySaysWhenHisCertificateEnds) {
   const auto keys = keys_of("train");
