@@ -57,6 +57,7 @@ class Program {
     if (pid_ == 0) {
       if (out >= 0) dup2(out, STDOUT_FILENO);
       if (err >= 0 || out >= 0) dup2(err >= 0 ? err : out, STDERR_FILENO);
+      close_range(STDERR_FILENO + 1, ~0U, CLOSE_RANGE_CLOEXEC);  // DDS's sockets stay with the test
       if (options.folder.empty() || chdir(options.folder.c_str()) == 0) execv(argv[0], argv.data());
       _exit(127);
     }

@@ -8,6 +8,7 @@
 
 #include "core/time.hpp"
 #include "messaging/topics.hpp"
+#include "support/network.hpp"
 #include "support/program.hpp"
 #include "support/run_until.hpp"
 #include "unit/track_detector/synthetic_picture.hpp"
@@ -61,7 +62,7 @@ class BadPictures : public ::testing::Test {
  protected:
   BadPictures()
       : train_("bad-" + std::to_string(getpid())),
-        participant_(options(train_)),
+        participant_(test::network(train_, kDomain)),
         calibrations_(participant_, topics::camera_calibration),
         frames_(participant_, topics::camera_frame, "cam0"),
         views_reader_(participant_, topics::track_view, "", queue_,
@@ -74,12 +75,6 @@ class BadPictures : public ::testing::Test {
         odometry_(test::with_settings("railfix-odometry",
                                       settings({"odometry.max_wait_ms=1000", "odometry.texture_depth_m=0.18"}))) {}
 
-  static messaging::ParticipantOptions options(const std::string& train) {
-    messaging::ParticipantOptions options;
-    options.train_id = train;
-    options.domain = kDomain;
-    return options;
-  }
   [[nodiscard]] std::vector<std::string> settings(std::vector<std::string> more) const {
     more.insert(more.end(),
                 {"common.train_id=" + train_, "common.domain=" + std::to_string(kDomain), "common.log_level=error"});

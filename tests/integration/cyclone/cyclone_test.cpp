@@ -15,6 +15,7 @@
 
 #include "core/time.hpp"
 #include "messaging/topics.hpp"
+#include "support/network.hpp"
 
 namespace railfix {
 namespace {
@@ -187,9 +188,7 @@ class CycloneReader {
 };
 
 TEST(Cyclone, ReadsStatesAndReportsAsTheyWereWritten) {
-  messaging::ParticipantOptions options;
-  options.train_id = "cyclone-" + std::to_string(getpid());
-  options.domain = kDomain;
+  const auto options = test::network("cyclone-" + std::to_string(getpid()), kDomain);
   messaging::Participant participant(options);
   messaging::Queue queue;  // paces the writer
   messaging::Writer<msg::TrainPositionReport> reports(participant, messaging::topics::train_position_report);

@@ -5,6 +5,7 @@
 
 #include "core/time.hpp"
 #include "messaging/topics.hpp"
+#include "support/network.hpp"
 #include "support/program.hpp"
 
 namespace railfix {
@@ -18,16 +19,9 @@ constexpr int kKills = 10;  // with the shared-memory transport one restart in 1
 constexpr int64_t kPatienceNs = 60 * core::kNsPerSecond;
 constexpr int64_t kPeriodNs = 20'000'000;
 
-messaging::ParticipantOptions options(const std::string& train) {
-  messaging::ParticipantOptions options;
-  options.train_id = train;
-  options.domain = kDomain;
-  return options;
-}
-
 class KilledReader : public ::testing::Test {
  protected:
-  KilledReader() : participant_(options(train_)), states_(participant_, topics::train_state) {}
+  KilledReader() : participant_(test::network(train_, kDomain)), states_(participant_, topics::train_state) {}
   ~KilledReader() override { fs::remove(out_); }
 
   [[nodiscard]] std::vector<std::string> listener() const {

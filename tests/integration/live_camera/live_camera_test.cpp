@@ -8,6 +8,7 @@
 
 #include "core/time.hpp"
 #include "messaging/topics.hpp"
+#include "support/network.hpp"
 #include "support/program.hpp"
 #include "support/run_until.hpp"
 #include "unit/dataset/temporary_folder.hpp"
@@ -40,7 +41,7 @@ class LiveCamera : public railfix::testing::TemporaryFolder {
  protected:
   LiveCamera()
       : train_("live-" + std::to_string(getpid())),
-        participant_(options(train_)),
+        participant_(test::network(train_, kDomain)),
         frames_reader_(participant_, topics::camera_frame, "cam0", queue_,
                        [this](const msg::CameraFrame& frame) { take(frame); }),
         status_reader_(participant_, topics::service_status, "", queue_,
@@ -48,12 +49,6 @@ class LiveCamera : public railfix::testing::TemporaryFolder {
         calibration_reader_(participant_, topics::camera_calibration, "", queue_,
                             [this](const msg::CameraCalibration& one) { calibration_ = one; }) {}
 
-  static messaging::ParticipantOptions options(const std::string& train) {
-    messaging::ParticipantOptions options;
-    options.train_id = train;
-    options.domain = kDomain;
-    return options;
-  }
   struct Frame {
     uint64_t seq;
     int64_t stamp_ns;

@@ -9,6 +9,7 @@
 
 #include "core/time.hpp"
 #include "messaging/topics.hpp"
+#include "support/network.hpp"
 #include "support/program.hpp"
 
 namespace railfix {
@@ -22,18 +23,11 @@ constexpr int64_t kPeriodNs = 50'000'000;
 constexpr int64_t kPatienceNs = 90 * core::kNsPerSecond;
 constexpr size_t kPictureBytes = 250'000;
 
-messaging::ParticipantOptions options_of(const std::string& train) {
-  messaging::ParticipantOptions options;
-  options.train_id = train;
-  options.domain = 79;
-  return options;
-}
-
 /// Writes what a train would, and answers as its recorder.
 class Train {
  public:
   explicit Train(const std::string& name)
-      : participant_(options_of(name)),
+      : participant_(test::network(name, 79)),
         status_(participant_, topics::service_status),
         state_(participant_, topics::train_state),
         view_(participant_, topics::track_view),

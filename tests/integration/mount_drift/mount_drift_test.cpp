@@ -6,6 +6,7 @@
 #include "core/time.hpp"
 #include "core/units.hpp"
 #include "messaging/topics.hpp"
+#include "support/network.hpp"
 #include "support/program.hpp"
 #include "unit/dataset/temporary_folder.hpp"
 #include "unit/track_detector/synthetic_picture.hpp"
@@ -25,14 +26,8 @@ const geometry::Intrinsics kCamera{575, 575, 319.5, 255.5, 0, 0, 0, 0, 640, 512}
 
 class MountDrift : public testing::TemporaryFolder {
  protected:
-  MountDrift() : train_("drift-" + std::to_string(getpid())), participant_(options(train_)) {}
+  MountDrift() : train_("drift-" + std::to_string(getpid())), participant_(test::network(train_, std::stoi(kDomain))) {}
 
-  static messaging::ParticipantOptions options(const std::string& train) {
-    messaging::ParticipantOptions options;
-    options.train_id = train;
-    options.domain = std::stoi(kDomain);
-    return options;
-  }
   void SetUp() override {
     TemporaryFolder::SetUp();
     std::string list = "#timestamp [ns],filename\n";

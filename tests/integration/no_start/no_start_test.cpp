@@ -10,6 +10,7 @@
 #include "core/units.hpp"
 #include "messaging/connected.hpp"
 #include "messaging/lock_step.hpp"
+#include "support/network.hpp"
 #include "support/program.hpp"
 #include "support/run_until.hpp"
 #include "support/sensed_ride.hpp"
@@ -57,7 +58,7 @@ class MatcherInLockStep : public ::testing::Test {
   MatcherInLockStep()
       : train_("no-start-" + std::to_string(getpid())),
         folder_(fs::temp_directory_path() / ("railfix-" + train_)),
-        participant_(options(train_)),
+        participant_(test::network(train_, kDomain)),
         steps_(participant_, topics::odometry_step),
         clock_(participant_, topics::data_clock) {
     listen<msg::DataProgress>(topics::data_progress, [this](const msg::DataProgress& p) { progress_ = p; });
@@ -71,12 +72,6 @@ class MatcherInLockStep : public ::testing::Test {
   MatcherInLockStep(const MatcherInLockStep&) = delete;
   MatcherInLockStep& operator=(const MatcherInLockStep&) = delete;
 
-  static messaging::ParticipantOptions options(const std::string& train) {
-    messaging::ParticipantOptions options;
-    options.train_id = train;
-    options.domain = kDomain;
-    return options;
-  }
   template <class T>
   void listen(const messaging::Topic<T>& topic, std::function<void(const T&)> handler) {
     readers_.push_back(std::make_shared<messaging::Reader<T>>(participant_, topic, "", queue_, std::move(handler)));

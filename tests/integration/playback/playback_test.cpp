@@ -6,6 +6,7 @@
 #include "core/time.hpp"
 #include "messaging/connected.hpp"
 #include "messaging/topics.hpp"
+#include "support/network.hpp"
 #include "support/program.hpp"
 #include "support/run_until.hpp"
 #include "unit/dataset/temporary_folder.hpp"
@@ -26,7 +27,7 @@ class Playback : public railfix::testing::TemporaryFolder {
  protected:
   Playback()
       : train_("playback-" + std::to_string(getpid())),
-        participant_(options(train_)),
+        participant_(test::network(train_, kDomain)),
         progress_(participant_, topics::data_progress),
         control_(participant_, topics::service_control) {
     listen<msg::DataClock>(topics::data_clock, [this](const msg::DataClock& clock) { take(clock); });
@@ -51,12 +52,6 @@ class Playback : public railfix::testing::TemporaryFolder {
               const std::string& instance = "") {
     readers_.push_back(
         std::make_shared<messaging::Reader<T>>(participant_, topic, instance, queue_, std::move(handler)));
-  }
-  static messaging::ParticipantOptions options(const std::string& train) {
-    messaging::ParticipantOptions options;
-    options.train_id = train;
-    options.domain = kDomain;
-    return options;
   }
 
   void SetUp() override {

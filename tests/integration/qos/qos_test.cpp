@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 
 #include "messaging/topics.hpp"
+#include "support/network.hpp"
 #include "support/program.hpp"
 #include "support/run_until.hpp"
 
@@ -22,9 +23,7 @@ TEST(Qos, AWriterThatDoesNotFitIsTold) {
   ASSERT_NE(at, std::string::npos);
   std::ofstream(profiles) << xml.replace(at, reliable.size(), "<kind>BEST_EFFORT</kind>");
 
-  messaging::ParticipantOptions options;
-  options.train_id = train;
-  options.domain = kDomain;
+  auto options = test::network(train, kDomain);
   messaging::Participant participant(options);
   messaging::Queue queue;
   std::optional<msg::ServiceStatus> status;

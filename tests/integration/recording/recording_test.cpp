@@ -10,6 +10,7 @@
 #include "messaging/topics.hpp"
 #include "recorder/pictures.hpp"
 #include "support/mcap_records.hpp"
+#include "support/network.hpp"
 #include "support/program.hpp"
 #include "support/run_until.hpp"
 
@@ -213,10 +214,7 @@ TEST_F(RecordingTest, KilledWhileItWritesItKeepsEveryWholeChunk) {
 }
 
 TEST_F(RecordingTest, IsLedOverDdsAndSaysHowItIs) {
-  messaging::ParticipantOptions options;
-  options.train_id = train_;
-  options.domain = std::stoi(kDomain);
-  messaging::Participant participant(options);
+  messaging::Participant participant(test::network(train_, std::stoi(kDomain)));
   messaging::Queue queue;
   msg::RecorderStatus status;
   status.state(255);
@@ -287,10 +285,7 @@ TEST_F(RecordingTest, ReplayRefusesWhatCannotBeMeant) {
   const auto topic = railfix({"replay", source().string(), "--topics", "imu_sample"});
   EXPECT_EQ(topic.exit_code, 2);
   EXPECT_THAT(topic.err, HasSubstr("it has odometry_step, camera_frame/cam0, service_control"));
-  messaging::ParticipantOptions options;
-  options.train_id = train_;
-  options.domain = std::stoi(kDomain);
-  messaging::Participant running(options);
+  messaging::Participant running(test::network(train_, std::stoi(kDomain)));
   messaging::Writer<msg::OdometryStep> writer(running, messaging::topics::odometry_step);
   const auto second = railfix({"replay", (folder_ / "source.mcap").string()});
   EXPECT_EQ(second.exit_code, 2);
@@ -301,10 +296,10 @@ TEST_F(RecordingTest, TopicsHelpWithNames) {
   const auto wrong = railfix({"topics", "echo", "train_sate"});
   EXPECT_EQ(wrong.exit_code, 2);
   EXPECT_THAT(wrong.err, HasSubstr("did you mean train_state"));
-  messaging::ParticipantOptions options;
-  options.train_id = train_;
-  options.domain = std::stoi(kDomain);
-  messaging::Participant running(options);
+  const auto command = railfix({"recording", "expotr"});
+  EXPECT_EQ(command.exit_code, 2);
+  EXPECT_THAT(command.err, HasSubstr("railfix recording: there is no command 'expotr'; did you mean export?"));
+  messaging::Participant running(test::network(train_, std::stoi(kDomain)));
   messaging::Writer<msg::GnssFix> writer(running, messaging::topics::gnss_fix);
   const auto list = railfix({"topics", "list", "--json", "--for", "2"});
   ASSERT_EQ(list.exit_code, 0) << list.err;

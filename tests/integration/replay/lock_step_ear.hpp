@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "messaging/topics.hpp"
+#include "support/network.hpp"
 #include "support/run_until.hpp"
 
 namespace railfix::test {
@@ -17,7 +18,7 @@ class LockStepEar {
  public:
   static inline const std::string kName = "tpr_publisher";  // whose turn it takes
 
-  LockStepEar(const std::string& train, int domain) : participant_(network(train, domain)) {
+  LockStepEar(const std::string& train, int domain) : participant_(test::network(train, domain)) {
     hear(messaging::topics::train_state);
     hear(messaging::topics::train_pose);
     hear(messaging::topics::position_fix);
@@ -41,12 +42,6 @@ class LockStepEar {
   [[nodiscard]] const std::map<std::string, uint64_t>& samples() const { return received_; }
 
  private:
-  static messaging::ParticipantOptions network(const std::string& train, int domain) {
-    messaging::ParticipantOptions options;
-    options.train_id = train;
-    options.domain = domain;
-    return options;
-  }
   template <class T>
   void hear(const messaging::Topic<T>& topic) {
     heard_.insert(topic.name);

@@ -3,6 +3,7 @@
 
 #include "mcap/writer.hpp"
 #include "messaging/topics.hpp"
+#include "support/network.hpp"
 #include "support/program.hpp"
 #include "support/run_until.hpp"
 
@@ -24,7 +25,7 @@ class Replay : public ::testing::Test {
   Replay()
       : train_("replay-" + std::to_string(getpid())),
         folder_(fs::temp_directory_path() / ("railfix-" + train_)),
-        participant_(network()),
+        participant_(test::network(train_, kDomain)),
         control_(participant_, topics::service_control) {
     fs::remove_all(folder_);
     fs::create_directories(folder_);
@@ -40,12 +41,6 @@ class Replay : public ::testing::Test {
   }
   ~Replay() override { fs::remove_all(folder_); }
 
-  [[nodiscard]] messaging::ParticipantOptions network() const {
-    messaging::ParticipantOptions options;
-    options.train_id = train_;
-    options.domain = kDomain;
-    return options;
-  }
   template <class T>
   void listen(const messaging::Topic<T>& topic, std::function<void(const T&)> handler,
               const std::string& instance = "") {

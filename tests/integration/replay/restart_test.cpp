@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 
 #include "integration/replay/recorded_ride.hpp"
+#include "support/network.hpp"
 #include "support/program.hpp"
 #include "support/run_until.hpp"
 
@@ -16,7 +17,7 @@ constexpr double kMiddleS = 10;
 
 class MovedReplay : public ::testing::Test {
  protected:
-  MovedReplay() : participant_(network()), control_(participant_, topics::service_control) {
+  MovedReplay() : participant_(test::network(train_, kDomain)), control_(participant_, topics::service_control) {
     fs::remove_all(folder_);
     fs::create_directories(folder_);
     test::write_map(folder_ / "line.map");
@@ -24,12 +25,6 @@ class MovedReplay : public ::testing::Test {
   }
   ~MovedReplay() override { fs::remove_all(folder_); }
 
-  [[nodiscard]] messaging::ParticipantOptions network() const {
-    messaging::ParticipantOptions options;
-    options.train_id = train_;
-    options.domain = kDomain;
-    return options;
-  }
   std::unique_ptr<test::Program> program(const std::vector<std::string>& arguments) {
     const std::string name = "said-" + std::to_string(++programs_);
     return std::make_unique<test::Program>(arguments,

@@ -9,6 +9,7 @@
 #include "mcap/reader.hpp"
 #include "messaging/connected.hpp"
 #include "messaging/topics.hpp"
+#include "support/network.hpp"
 #include "support/program.hpp"
 #include "support/run_until.hpp"
 
@@ -39,10 +40,7 @@ class Restarts : public ::testing::Test {
         kPatienceS);
     ASSERT_EQ(drawn.exit_code, 0) << drawn.err;
     truth_ = core::value_or_throw(evaluation::Truth::read(folder_ / "ride/truth"));
-    messaging::ParticipantOptions options;
-    options.train_id = train_;
-    options.domain = kDomain;
-    participant_ = std::make_unique<messaging::Participant>(options);
+    participant_ = std::make_unique<messaging::Participant>(test::network(train_, kDomain));
     control_.emplace(*participant_, topics::service_control);
     listen<msg::TrainState>(topics::train_state, [this](const msg::TrainState& state) { judge(state); });
     listen<msg::PositionFix>(topics::position_fix, [this](const msg::PositionFix& fix) {

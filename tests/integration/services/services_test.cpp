@@ -7,6 +7,7 @@
 #include "core/time.hpp"
 #include "messaging/topics.hpp"
 #include "service/service.hpp"
+#include "support/network.hpp"
 #include "support/program.hpp"
 
 namespace railfix {
@@ -62,10 +63,7 @@ TEST_P(EveryService, GetsReadyAndEndsCleanlyOnSigterm) {
   test::Program service(test::with_settings(program(), {"common.train_id=" + train, "common.domain=78",
                                                         "frame_grabber.source=.", "sensor_gateway.source=."}),
                         {{}, {}, folder});
-  messaging::ParticipantOptions options;
-  options.train_id = train;
-  options.domain = 78;
-  messaging::Participant participant(options);
+  messaging::Participant participant(test::network(train, 78));
   messaging::Queue queue;
   bool stopped = false;
   bool up = false;

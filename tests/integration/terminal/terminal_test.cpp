@@ -7,6 +7,7 @@
 
 #include "core/time.hpp"
 #include "messaging/topics.hpp"
+#include "support/network.hpp"
 #include "support/program.hpp"
 #include "support/run_until.hpp"
 
@@ -24,7 +25,7 @@ const std::string kDomain = "89";
 class Talker {
  public:
   explicit Talker(const std::string& train, bool with_standby = false)
-      : participant_(network(train)),
+      : participant_(test::network(train, std::stoi(kDomain))),
         with_standby_(with_standby),
         states_(participant_, topics::train_state),
         logs_(participant_, topics::log_record),
@@ -36,12 +37,6 @@ class Talker {
   }
 
  private:
-  static messaging::ParticipantOptions network(const std::string& train) {
-    messaging::ParticipantOptions options;
-    options.train_id = train;
-    options.domain = std::stoi(kDomain);
-    return options;
-  }
   void talk() {
     while (!ended_) {
       msg::TrainState state;
@@ -134,10 +129,7 @@ TEST_F(Terminal, TopTellsWhoHasFallenSilent) {
       test::with_settings("railfix-recorder", {"common.train_id=" + train_, "common.domain=" + kDomain,
                                                "recorder.folder=" + folder_.string(), "recorder.keep_free_mb=0"}),
       {folder_ / "recorder.log", {}, {}});
-  messaging::ParticipantOptions options;
-  options.train_id = train_;
-  options.domain = std::stoi(kDomain);
-  messaging::Participant participant(options);
+  messaging::Participant participant(test::network(train_, std::stoi(kDomain)));
   messaging::Queue queue;
   uint32_t partners = 0;
   int heard = 0;

@@ -8,6 +8,7 @@
 #include "core/time.hpp"
 #include "etcs/train_position_report.hpp"
 #include "messaging/topics.hpp"
+#include "support/network.hpp"
 #include "support/program.hpp"
 #include "unit/tpr_publisher/balise_map.hpp"
 
@@ -24,7 +25,7 @@ class TprService : public ::testing::Test {
   TprService()
       : train_("tpr-" + std::to_string(getpid())),
         map_file_(std::filesystem::temp_directory_path() / (train_ + ".map")),
-        participant_(options(train_)),
+        participant_(test::network(train_, kDomain)),
         states_(participant_, topics::train_state),
         commands_(participant_, topics::service_control),
         reports_reader_(participant_, topics::train_position_report, "", queue_,
@@ -40,12 +41,6 @@ class TprService : public ::testing::Test {
     std::filesystem::remove("/dev/shm/railfix-notes-" + train_ + "-local-tpr_publisher");
   }
 
-  static messaging::ParticipantOptions options(const std::string& train) {
-    messaging::ParticipantOptions options;
-    options.train_id = train;
-    options.domain = kDomain;
-    return options;
-  }
   [[nodiscard]] std::vector<std::string> service(const std::vector<std::string>& more = {}) const {
     std::vector<std::string> settings{"common.train_id=" + train_,       "common.domain=" + std::to_string(kDomain),
                                       "common.log_level=error",          "tpr_publisher.map=" + map_file_.string(),
