@@ -135,7 +135,7 @@ TEST_F(TprCompareFiles, OneLineAndItsTruth) {
 
 // What the service sends now, beside a certified system whose reports come as another train's.
 TEST_F(TprService, IsComparedWhileItRuns) {
-  const auto evc_options = options(train_ + "-evc");
+  const auto evc_options = test::network(train_ + "-evc", kDomain);
   messaging::Participant evc(evc_options);
   messaging::Writer<msg::TrainPositionReport> certified(evc, topics::train_position_report);
   test::Program program(service({"tpr_publisher.t_cycloc_s=1"}));

@@ -51,6 +51,9 @@ TEST(QosFile, MeansTheSameToFastDds) {
     apply(topic.qos, writer);
     expect_equal(writer_xml, writer, topic.name);
     EXPECT_EQ(writer_xml.publish_mode().kind, writer.publish_mode().kind) << topic.name;
+    EXPECT_TRUE(writer_xml.reliable_writer_qos().times.heartbeatPeriod ==
+                writer.reliable_writer_qos().times.heartbeatPeriod)
+        << topic.name;
     dds::DataReaderQos reader_xml;
     dds::DataReaderQos reader;
     ASSERT_EQ(subscriber->get_datareader_qos_from_profile(topic.name, reader_xml), ReturnCode_t::RETCODE_OK)
