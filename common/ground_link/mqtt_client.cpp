@@ -21,7 +21,8 @@ constexpr int kLoopMs = 200;
 constexpr double kFirstRetryS = 0.1;
 
 std::string text_of(int code) {
-  return code == MOSQ_ERR_ERRNO ? std::strerror(errno) : mosquitto_strerror(code);
+  if (code == MOSQ_ERR_ERRNO) return std::strerror(errno);
+  return code == MOSQ_ERR_UNKNOWN ? "the connection broke" : mosquitto_strerror(code);
 }
 
 struct Free {

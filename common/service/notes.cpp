@@ -1,9 +1,9 @@
 #include "service/notes.hpp"
 
-#include <unistd.h>
-
 #include <fstream>
 #include <sstream>
+
+#include "core/whole_file.hpp"
 
 namespace railfix::service {
 
@@ -18,11 +18,7 @@ Notes::Notes(std::filesystem::path path) : path_(std::move(path)) {
 }
 
 void Notes::keep(const std::string& notes) {
-  const std::string fresh = path_.string() + "." + std::to_string(getpid());
-  std::ofstream out(fresh, std::ios::binary);
-  const bool written = out && out.write(notes.data(), static_cast<std::streamsize>(notes.size())).flush();
-  out.close();
-  if (!written || rename(fresh.c_str(), path_.c_str()) != 0) unlink(fresh.c_str());
+  (void)core::write_whole(path_, notes);  // of a full /dev/shm the monitor tells
 }
 
 }  // namespace railfix::service

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <fstream>
 #include <string_view>
-#include <system_error>
 
+#include "core/whole_file.hpp"
 #include "idl/map.pb.h"
 #include "track/map.hpp"
 
@@ -287,19 +287,8 @@ core::Status Map::save(const std::filesystem::path& file) const {
     return core::Error{"the map " + file.string() + " cannot be stored: " + status.error().message +
                        "; is a coordinate of its source wrong?"};
 
-  // First beside its place, then moved there: a service never reads half a map.
-  const std::filesystem::path partial = file.string() + ".partial";
-  std::ofstream stream(partial, std::ios::binary | std::ios::trunc);
-  const bool written = stream && out.SerializeToOstream(&stream) && stream.flush();
-  stream.close();
-  std::error_code moved;
-  if (written) std::filesystem::rename(partial, file, moved);
-  if (!written || moved) {
-    std::error_code ignored;
-    std::filesystem::remove(partial, ignored);
-    return core::Error{"cannot write the map " + file.string() + "; does the folder exist and is there space?"};
-  }
-  return {};
+  if (core::write_whole(file, out.SerializeAsString())) return {};
+  return core::Error{"cannot write the map " + file.string() + "; does the folder exist and is there space?"};
 }
 
 }  // namespace railfix::track

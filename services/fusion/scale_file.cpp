@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "core/time.hpp"
+#include "core/whole_file.hpp"
 
 namespace railfix::fusion {
 namespace {
@@ -89,21 +90,13 @@ void ScaleFile::follow(const Fusion& fusion, const TrainEstimate& state) {
   if (const auto learnt = fusion.learnt_scales()) write(*learnt, state.stamp_ns);
 }
 
-// Whole or not at all.
 void ScaleFile::write(const OdometerScales& learnt, int64_t stamp_ns) {
   written_ns_ = stamp_ns;
   SavedScales saved{learnt, stamp_ns, "", pulses_per_metre_};
   for (const auto& [name, numbers] : cameras_) saved.camera_id += (saved.camera_id.empty() ? "" : " ") + name + numbers;
-  const std::string fresh = path_.string() + ".new";
-  std::ofstream out(fresh, std::ios::binary);
-  out << to_text(saved);
-  out.close();
-  std::error_code failed;
-  if (out) std::filesystem::rename(fresh, path_, failed);
-  if ((!out || failed) && !failure_told_) {
-    log_.warn("fusion.scales_file: {} cannot be written; name a file in a folder that there is", path_.string());
-    failure_told_ = true;
-  }
+  if (core::write_whole(path_, to_text(saved)) || failure_told_) return;
+  log_.warn("fusion.scales_file: {} cannot be written; name a file in a folder that there is", path_.string());
+  failure_told_ = true;
 }
 
 }  // namespace railfix::fusion

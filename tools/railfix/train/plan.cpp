@@ -1,11 +1,11 @@
 #include "train/plan.hpp"
 
-#include <unistd.h>
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
-#include <fstream>
 #include <set>
+
+#include "core/whole_file.hpp"
 
 namespace railfix::tool {
 namespace {
@@ -25,13 +25,8 @@ std::optional<YAML::Node> load(const fs::path& file) {
 core::Status replace(const fs::path& file, const std::string& text) {
   std::error_code failed;
   fs::create_directories(file.parent_path(), failed);
-  const auto draft = file.string() + "." + std::to_string(getpid());
-  std::ofstream out(draft);
-  out << text;
-  out.close();
-  if (out) fs::rename(draft, file, failed);
-  if (!out || failed) return core::Error{file.string() + " cannot be written; is the disk full, or are you not root?"};
-  return {};
+  if (core::write_whole(file, text)) return {};
+  return core::Error{file.string() + " cannot be written; is the disk full, or are you not root?"};
 }
 
 PlannedService service_of(const YAML::Node& node) {
