@@ -2,6 +2,7 @@
 #include <cstring>
 #include <fastdds/dds/core/LoanableSequence.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
+#include <mutex>
 
 #include "idl/cameraPubSubTypes.h"
 #include "idl/chargePubSubTypes.h"
@@ -76,12 +77,26 @@ uint64_t number_of(const eprosima::fastrtps::rtps::GUID_t& guid) {
   return number;
 }
 
+// The generated getKey() works in memory of the type support, which the writers and readers of a participant share. Two
+// of their threads in it at once give a sample a key that nobody has, and under it stays in the history for ever.
+template <class PubSub>
+class OneKeyAtATime final : public PubSub {
+ public:
+  bool getKey(void* data, eprosima::fastrtps::rtps::InstanceHandle_t* handle, bool force_md5) override {
+    const std::lock_guard lock(mutex_);
+    return PubSub::getKey(data, handle, force_md5);
+  }
+
+ private:
+  std::mutex mutex_;
+};
+
 template <class T, class PubSub>
 class TypeOf final : public FastDdsType {
  public:
   [[nodiscard]] std::string name() const override { return PubSub().getName(); }
   [[nodiscard]] bool keyed() const override { return PubSub().m_isGetKeyDefined; }
-  [[nodiscard]] dds::TypeSupport support() const override { return dds::TypeSupport(new PubSub()); }
+  [[nodiscard]] dds::TypeSupport support() const override { return dds::TypeSupport(new OneKeyAtATime<PubSub>()); }
   [[nodiscard]] std::shared_ptr<void> make() const override { return std::make_shared<T>(); }
 
   [[nodiscard]] std::vector<uint8_t> serialize(const void* sample) const override {

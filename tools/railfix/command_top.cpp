@@ -151,6 +151,7 @@ class Watch {
   }
   std::string line(const std::string& name) {
     const std::string begin = fmt::format("{:<26} ", name);
+    if (messaging::find_topic(name) == nullptr) return begin + "      - between services only\n";
     if (!listened_to(name)) return begin + "      - not listened to (--pictures)\n";
     const auto& topic = topics_.try_emplace(name, begun_ns_).first->second;
     const double age_s = core::seconds(core::monotonic_ns() - topic.last_ns);

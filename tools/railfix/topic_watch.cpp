@@ -11,12 +11,11 @@
 namespace railfix::tool {
 
 void TopicStatistics::add(const messaging::TopicInfo& topic, const messaging::SampleInfo& info) {
-  const uint64_t missing = sequences_.before(info.writer, info.sequence, topic.qos.exclusive);
   if (info.source_ns < since_ns_) {
     ++standing_;
     return;
   }
-  lost_ += missing;
+  lost_ += sequences_.before(info.writer, info.sequence, topic.qos.exclusive);
   if (samples_ == 0) {
     first_ns_ = info.received_ns;
   } else {

@@ -36,14 +36,24 @@ TEST(TopicStatistics, RateAndGaps) {
 
 TEST(TopicStatistics, LossesAreCountedForEachWriter) {
   TopicStatistics statistics;
-  statistics.add(kOpen, at(0, 10, 1));
-  statistics.add(kOpen, at(1, 500, 2));
-  statistics.add(kOpen, at(2, 11, 1));
+  statistics.add(kOpen, at(10, 10, 1));
+  statistics.add(kOpen, at(11, 500, 2));
+  statistics.add(kOpen, at(12, 11, 1));
   EXPECT_EQ(statistics.lost(), 0U);
-  statistics.add(kOpen, at(3, 15, 1));
-  statistics.add(kOpen, at(4, 502, 2));
+  statistics.add(kOpen, at(13, 15, 1));
+  statistics.add(kOpen, at(14, 502, 2));
   EXPECT_EQ(statistics.lost(), 4U);
   EXPECT_EQ(statistics.samples(), 5U);
+}
+
+// What stood there before somebody listened may be the last of many that nobody keeps.
+TEST(TopicStatistics, NothingIsLostBetweenAStandingValueAndTheNext) {
+  TopicStatistics statistics(1'000'000'000);
+  statistics.add(kOpen, at(1, 3, 1));
+  statistics.add(kOpen, at(2000, 2733, 1));
+  EXPECT_EQ(statistics.lost(), 0U);
+  statistics.add(kOpen, at(2010, 2735, 1));
+  EXPECT_EQ(statistics.lost(), 1U);
 }
 
 // A standby goes on counting while nobody hears it; it is heard when the other one falls silent.
