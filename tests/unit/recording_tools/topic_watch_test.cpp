@@ -8,7 +8,6 @@ namespace railfix::tool {
 
 namespace {
 
-
 messaging::SampleInfo at(int64_t received_ms, uint64_t sequence, uint64_t writer = 1) {
   messaging::SampleInfo info;
   info.received_ns = received_ms * 1'000'000;
