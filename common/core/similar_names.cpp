@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include "core/joined.hpp"
+
 namespace railfix::core {
 namespace {
 
@@ -20,12 +22,6 @@ size_t distance(const std::string& a, const std::string& b) {
     }
   }
   return row[b.size()];
-}
-
-std::string listed(const std::vector<std::string>& names) {
-  std::string list;
-  for (const auto& name : names) list += (list.empty() ? "" : ", ") + name;
-  return list;
 }
 
 }  // namespace
@@ -53,7 +49,7 @@ std::vector<std::string> similar_names(const std::string& wanted, const std::vec
 std::string did_you_mean(const std::string& wanted, const std::vector<std::string>& names) {
   constexpr size_t kFew = 4;
   const auto similar = names.size() <= kFew ? std::vector<std::string>{} : similar_names(wanted, names);
-  return similar.empty() ? "there are: " + listed(names) : "did you mean " + listed(similar) + "?";
+  return similar.empty() ? "there are: " + joined(names) : "did you mean " + joined(similar) + "?";
 }
 
 }  // namespace railfix::core

@@ -10,6 +10,8 @@
 #include <cstdio>
 #include <fstream>
 
+#include "core/joined.hpp"
+
 namespace railfix::messaging {
 namespace {
 
@@ -47,10 +49,9 @@ core::Result<std::vector<std::string>> addresses_of(const std::vector<std::strin
       if (one.name == wanted || one.address == wanted) addresses.push_back(one.address);
     }
     if (addresses.size() > before) continue;
-    std::string names;
-    for (const auto& one : here) names += (names.empty() ? "" : ", ") + one.name + " (" + one.address + ")";
+    const auto name_of = [](const auto& one) { return one.name + " (" + one.address + ")"; };
     return core::Error{"network interface " + wanted + " is not here or has no IPv4 address; this computer has " +
-                       names};
+                       core::joined(here, name_of)};
   }
   if (std::find(addresses.begin(), addresses.end(), kLoopback) == addresses.end()) addresses.emplace_back(kLoopback);
   return addresses;

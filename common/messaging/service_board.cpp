@@ -34,6 +34,11 @@ bool ServiceBoard::note_silence(int64_t now_ns, uint32_t one_in) {
   return fallen;
 }
 
+bool ServiceBoard::note_silence_now_and_then(int64_t now_ns) {
+  const bool lately = now_ns >= looked_ns_ && now_ns - looked_ns_ < kLookNs;
+  return !lately && note_silence(now_ns);
+}
+
 const ServiceSeen* ServiceBoard::find(const std::string& service) const {
   const ServiceSeen* best = nullptr;
   for (const auto& [key, seen] : services_) {

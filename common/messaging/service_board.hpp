@@ -34,6 +34,8 @@ class ServiceBoard {
   /// silent because the caller was held up itself, or because the clock was set. True: somebody is silent since the
   /// last time. `one_in`: only every n-th status comes here.
   bool note_silence(int64_t now_ns, uint32_t one_in = 1);
+  /// The same for who comes by all the time: looks no more often than kLookNs.
+  bool note_silence_now_and_then(int64_t now_ns);
   [[nodiscard]] const std::map<Key, ServiceSeen>& services() const { return services_; }
   /// On whichever host; nullptr = never seen.
   [[nodiscard]] const ServiceSeen* find(const std::string& service) const;

@@ -8,6 +8,7 @@
 #include <set>
 #include <sstream>
 
+#include "core/joined.hpp"
 #include "core/similar_names.hpp"
 
 namespace railfix::service {
@@ -68,11 +69,8 @@ class Reader final : public Fields {
     const auto node = find(key);
     if (!node) return;
     const std::string read = scalar(*node);
-    if (std::find(allowed.begin(), allowed.end(), read) == allowed.end()) {
-      std::string names;
-      for (const char* name : allowed) names += (names.empty() ? "" : ", ") + std::string(name);
-      return problem(*node, key, "'" + read + "' is none of: " + names);
-    }
+    if (std::find(allowed.begin(), allowed.end(), read) == allowed.end())
+      return problem(*node, key, "'" + read + "' is none of: " + core::joined(allowed));
     value = read;
   }
 
@@ -147,14 +145,10 @@ class Documenter final : public Fields {
   }
   void choice(const char* key, std::string& value, std::initializer_list<const char*> allowed,
               const char* what) override {
-    std::string names;
-    for (const char* name : allowed) names += (names.empty() ? "" : ", ") + std::string(name);
-    line(key, value, std::string(what) + " [" + names + "]");
+    line(key, value, std::string(what) + " [" + core::joined(allowed) + "]");
   }
   void list(const char* key, std::vector<std::string>& value, const char* what) override {
-    std::string names;
-    for (const auto& name : value) names += (names.empty() ? "" : ", ") + name;
-    line(key, "[" + names + "]", what);
+    line(key, "[" + core::joined(value) + "]", what);
   }
   void group(const char* key, const char* what, const std::function<void(Fields&)>& describe) override {
     line(key, "", what);

@@ -61,9 +61,25 @@ void PublishedHealth::output(int64_t grabbed_ns) {
   }
 }
 
+// Services say how they are with every sample.
 void PublishedHealth::change(uint8_t state, const std::string& reason) {
+  const std::string cut = reason.substr(0, kReasonBytes);
+  if (status_.state() == state && cut == status_.reason().c_str()) return;
   status_.state(state);
-  status_.reason(reason.substr(0, kReasonBytes));
+  status_.reason(cut);
+  publish_news();
+}
+
+void PublishedHealth::stands_by(const std::string& sentence) {
+  if (sentence == stands_by_) return;
+  stands_by_ = sentence;
+  publish_news();
+}
+
+void PublishedHealth::trouble(Trouble kind, const std::string& sentence) {
+  auto& known = troubles_[static_cast<size_t>(kind)];
+  if (sentence == known) return;
+  known = sentence;
   publish_news();
 }
 

@@ -26,12 +26,9 @@ class PublishedHealth final : public Health {
   void dropped(uint64_t count) override { status_.dropped(status_.dropped() + count); }
 
   /// Empty = it is in charge.
-  void stands_by(const std::string& sentence) {
-    stands_by_ = sentence;
-    publish_news();
-  }
+  void stands_by(const std::string& sentence);
   /// Empty = none; a service that is ready or active is degraded by it.
-  void trouble(Trouble kind, const std::string& sentence) { troubles_[static_cast<size_t>(kind)] = sentence; }
+  void trouble(Trouble kind, const std::string& sentence);
   void stopped() { change(msg::STATE_STOPPED, ""); }
   /// The loop turns: told to this host, many times between two publish().
   void beat() { file_.beat(); }

@@ -1,7 +1,9 @@
 #include "service/loop.hpp"
 
 #include <algorithm>
+#include <ranges>
 
+#include "core/joined.hpp"
 #include "core/time.hpp"
 #include "messaging/lock_step.hpp"
 #include "messaging/security.hpp"
@@ -130,7 +132,11 @@ Loop::~Loop() {
 }
 
 void Loop::every(std::chrono::nanoseconds period, std::function<void()> handler) {
-  timers_.push_back({period.count(), next_due_ns(period.count()), std::move(handler)});
+  every_while({}, period, std::move(handler));
+}
+
+void Loop::every_while(std::function<bool()> wanted, std::chrono::nanoseconds period, std::function<void()> handler) {
+  timers_.push_back({period.count(), next_due_ns(period.count()), std::move(handler), std::move(wanted)});
 }
 
 // Periods that are multiples of each other fall due together: the processor is woken once.
@@ -153,8 +159,7 @@ void Loop::answer(const msg::ControlRequest& request) {
   reply.request_id(request.request_id());
   reply.service(service_);
   if (known == commands_.end()) {
-    std::string names;
-    for (const auto& [name, handler] : commands_) names += (names.empty() ? "" : ", ") + name;
+    const auto names = core::joined(commands_ | std::views::keys);
     reply.done(false);
     reply.text(service_ + " does not know the command " + command + (names.empty() ? "" : "; it knows: " + names));
   } else {
@@ -255,7 +260,7 @@ void Loop::finish(const std::string& why) {
 void Loop::run_due_timers() {
   // By index: a handler may add a timer.
   for (size_t i = 0; i < timers_.size(); ++i) {
-    if (core::monotonic_ns() < timers_[i].due_ns) continue;
+    if (core::monotonic_ns() < timers_[i].due_ns || !timers_[i].is_wanted()) continue;
     timers_[i].due_ns = next_due_ns(timers_[i].period_ns);
     const auto handler = timers_[i].handler;
     handler();
@@ -266,7 +271,9 @@ void Loop::turn() {
   while (!finished_) {
     run_due_timers();
     int64_t due_ns = core::monotonic_ns() + kIdleNs;
-    for (const auto& timer : timers_) due_ns = std::min(due_ns, timer.due_ns);
+    for (const auto& timer : timers_) {
+      if (timer.due_ns < due_ns && timer.is_wanted()) due_ns = timer.due_ns;
+    }
     queue_.run_one(due_ns);
     if (turn_ && !turn_taken_ && turns_.ready()) take_turn();
     if (turn_ && turn_taken_ && (!turn_ended_ || turn_ended_(turn_->data_ns()))) end_turn();

@@ -20,6 +20,8 @@ class Loop final : public Context {
   ~Loop() override;
 
   void every(std::chrono::nanoseconds period, std::function<void()> handler) override;
+  void every_while(std::function<bool()> wanted, std::chrono::nanoseconds period,
+                   std::function<void()> handler) override;
   void post(std::function<void()> handler) override { queue_.push(nullptr, std::move(handler)); }
   void at_stop(std::function<void()> handler) override { at_stop_.push_back(std::move(handler)); }
   void on_command(const std::string& command,
@@ -50,6 +52,8 @@ class Loop final : public Context {
     int64_t period_ns;
     int64_t due_ns;
     std::function<void()> handler;
+    std::function<bool()> wanted;  // empty = always
+    [[nodiscard]] bool is_wanted() const { return !wanted || wanted(); }
   };
   [[nodiscard]] int64_t next_due_ns(int64_t period_ns) const;
   void run_due_timers();

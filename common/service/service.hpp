@@ -90,6 +90,9 @@ class Context {
   }
   /// Calls the handler in this period (host's monotonic clock).
   virtual void every(std::chrono::nanoseconds period, std::function<void()> handler) = 0;
+  /// The same, only while `wanted` says so: otherwise the processor is not woken for it.
+  virtual void every_while(std::function<bool()> wanted, std::chrono::nanoseconds period,
+                           std::function<void()> handler) = 0;
   /// Calls the handler once, soon, in the service thread. May be called from any thread.
   virtual void post(std::function<void()> handler) = 0;
   /// Calls the handler when the service is told to stop, before writers go away.

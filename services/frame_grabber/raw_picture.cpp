@@ -3,6 +3,8 @@
 #include <cstring>
 #include <opencv2/imgproc.hpp>
 
+#include "core/joined.hpp"
+
 namespace railfix::frame_grabber {
 namespace {
 
@@ -67,9 +69,7 @@ std::optional<PixelFormat> pixel_format(const std::string& genicam_name) {
 }
 
 std::string pixel_format_names() {
-  std::string names;
-  for (const auto& [name, format] : kNames) names += (names.empty() ? "" : ", ") + std::string(name);
-  return names;
+  return core::joined(kNames, [](const auto& known) { return known.first; });
 }
 
 size_t bytes_of_row(PixelFormat format, int width_px) {

@@ -210,7 +210,6 @@ void MonitorService::control(const ClientPtr& client, const ControlAsk& ask) {
   request.command(ask.command.substr(0, 32));
   request.argument(ask.argument.substr(0, 256));
   waiting_[next_request_] = {ask.client, ask.id, ask.service, core::monotonic_ns()};
-  metronome_.want(true);
   context_.log().info("from the page: {} {} {}", ask.service, ask.command, ask.argument);
   control_.write(request);
 }

@@ -60,8 +60,7 @@ MonitorService::MonitorService(const Config& config, service::Context& context)
               handlers()),
       cab_(config.picture_hz),
       live_(live_actions()),
-      foxglove_(foxglove_actions()),
-      metronome_(kBeat, [this] { context_.post([this] { beat(); }); }) {
+      foxglove_(foxglove_actions()) {
   set_up_topics();
   choose_topics();
   port_ = server_.listen(static_cast<uint16_t>(config.port), static_cast<int>(config.port_search));
@@ -96,6 +95,7 @@ void MonitorService::restart() {
 MonitorService::~MonitorService() = default;
 
 void MonitorService::start_timers() {
+  context_.every_while([this] { return !nobody_looks(); }, kBeat, [this] { beat(); });
   context_.every(std::chrono::nanoseconds(messaging::ServiceBoard::kLookNs), [this] {
     watch_.drain();
     look_for_silence();
@@ -114,7 +114,6 @@ void MonitorService::start_timers() {
 
 // Twenty times a second while somebody looks.
 void MonitorService::beat() {
-  if (nobody_looks()) return;
   const auto each = [this](uint64_t beats) { return beats_ % beats == 0; };
   ++beats_;
   watch_.drain();
@@ -263,7 +262,6 @@ void MonitorService::choose_topics() {
     one_in[name] = idle && sparse != idle_one_in().end() ? sparse->second : 1;
   }
   watch_.read(one_in);
-  metronome_.want(!nobody_looks());
 }
 
 void MonitorService::show_channels() {

@@ -10,7 +10,6 @@
 #include "monitor/live_api.hpp"
 #include "monitor/live_messages.hpp"
 #include "monitor/map_view.hpp"
-#include "monitor/metronome.hpp"
 #include "monitor/monitor_config.hpp"
 #include "monitor/problems.hpp"
 #include "monitor/static_files.hpp"
@@ -145,7 +144,6 @@ class MonitorService {
   CabWatch cab_;
   LiveApi live_;  // these two hold clients, and go before the server
   FoxgloveApi foxglove_;
-  Metronome metronome_;
 };
 
 }  // namespace railfix::monitor

@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "cdr/decode.hpp"
+#include "core/joined.hpp"
 #include "recorder/standing.hpp"
 
 namespace railfix::recorder {
@@ -86,13 +87,6 @@ core::Error wrong(const std::string& rule, const std::string& what) {
   return core::Error{"the event rule '" + rule + "' " + what};
 }
 
-template <class Names, class NameOf>
-std::string joined(const Names& names, const NameOf& name_of) {
-  std::string text;
-  for (const auto& name : names) text += (text.empty() ? "" : ", ") + std::string(name_of(name));
-  return text;
-}
-
 }  // namespace
 
 core::Result<EventRule> EventRule::parse(const std::string& text,
@@ -100,8 +94,7 @@ core::Result<EventRule> EventRule::parse(const std::string& text,
   static const std::regex kForm(R"(\s*([\w/]+)(?:\.([\w.]+)\s*(==|!=|<=|>=|<|>|has\s)\s*(.*?))?\s*)");
   std::smatch part;
   if (!std::regex_match(text, part, kForm)) {
-    return wrong(text, "is neither 'TOPIC.FIELD OP VALUE' nor 'TOPIC'; OP is one of " +
-                           joined(kOperations, [](const char* name) { return name; }));
+    return wrong(text, "is neither 'TOPIC.FIELD OP VALUE' nor 'TOPIC'; OP is one of " + core::joined(kOperations));
   }
   EventRule rule;
   rule.text_ = text;
@@ -133,7 +126,7 @@ core::Status EventRule::set_condition(const std::string& type, const std::string
     const auto found = std::ranges::find(structure->members, name, &cdr::Member::name);
     if (found == structure->members.end()) {
       return wrong(text_, "names '" + name + "', but " + structure->name + " has " +
-                              joined(structure->members, [](const cdr::Member& member) { return member.name; }));
+                              core::joined(structure->members, &cdr::Member::name));
     }
     leaf = &*found;
     dimensions = leaf->type.dimensions.size();
@@ -152,7 +145,7 @@ core::Status EventRule::set_condition(const std::string& type, const std::string
   } else if (const auto plain = number(value)) {
     value_ = *plain;
   } else {
-    const std::string known = joined(names, [](const auto& name) { return name.first; });
+    const std::string known = core::joined(names, [](const auto& name) { return name.first; });
     return wrong(text_, "compares " + leaf->name + " with '" + value + "', which is no number" +
                             (known.empty() ? "" : " and none of " + known));
   }

@@ -6,24 +6,15 @@
 #include <filesystem>
 #include <string>
 
+#include "support/npm.hpp"
+
 namespace railfix::test {
 
 class McapReference {
  public:
-  /// Installed below `work` once.
+  /// Installed below `work`.
   McapReference(const std::filesystem::path& source, std::filesystem::path work) : work_(std::move(work)) {
-    if (std::system("npm --version > /dev/null 2>&1") != 0) {
-      problem_ = "npm is not there";
-      return;
-    }
-    namespace fs = std::filesystem;
-    fs::create_directories(work_);
-    for (const char* name : {"package.json", "reference.mjs"}) {
-      fs::copy_file(source / name, work_ / name, fs::copy_options::overwrite_existing);
-    }
-    if (fs::exists(work_ / "node_modules" / "@mcap" / "support")) return;
-    const std::string install = "cd '" + work_.string() + "' && npm install --no-audit --no-fund > npm.log 2>&1";
-    if (std::system(install.c_str()) != 0) problem_ = "npm install failed, see " + (work_ / "npm.log").string();
+    problem_ = npm_is_there() ? install_script(source, "reference.mjs", work_) : "npm is not there";
   }
 
   /// Why it cannot be used; empty = it can.

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <iostream>
 
+#include "core/joined.hpp"
 #include "core/time.hpp"
 #include "system/faults.hpp"
 #include "system/observer.hpp"
@@ -129,9 +130,8 @@ void depart(Rig& rig, std::unique_ptr<Observer>& observer) {
     }
     if (observer->wait_whole(kUsualS)) return;
   }
-  std::string names;
-  for (const auto& name : observer->heard().not_usual) names += (names.empty() ? "" : ", ") + name;
-  throw std::runtime_error("the train does not get going: " + names + "; logs are in " + rig.folder().string());
+  throw std::runtime_error("the train does not get going: " + core::joined(observer->heard().not_usual) +
+                           "; logs are in " + rig.folder().string());
 }
 
 int campaign(const Options& options, Rig& rig) {

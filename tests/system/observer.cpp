@@ -173,9 +173,7 @@ void Observer::status(const msg::ServiceStatus& status) {
 }
 
 void Observer::look_for_silence() {
-  if (now_s() < silence_due_s_) return;
-  silence_due_s_ = now_s() + core::seconds(messaging::ServiceBoard::kLookNs);
-  if (!services_.note_silence(core::wall_ns())) return;
+  if (!services_.note_silence_now_and_then(core::wall_ns())) return;
   for (const auto& [key, seen] : services_.services()) {
     if (!seen.alive && !seen.stopped()) say(seen.name() + "@" + key.first + " is silent");
   }

@@ -82,7 +82,6 @@ class Observer {
   std::unique_ptr<messaging::Participant> participant_;
   messaging::Queue queue_;
   messaging::ServiceBoard services_;
-  double silence_due_s_ = 0;
   std::optional<msg::TrainState> state_;
   Pause states_;
   Pause reports_;

@@ -66,7 +66,7 @@ class Watch {
     int64_t due_ns = core::monotonic_ns() + kDrawNs;
     listener_.run(for_s, [&] {
       find_topics();
-      look_for_silence();
+      services_.note_silence_now_and_then(core::wall_ns());
       if (core::monotonic_ns() < due_ns) return false;
       due_ns += kDrawNs;
       end_second();
@@ -112,11 +112,6 @@ class Watch {
   [[nodiscard]] bool nobody() const { return written_.empty() && services_.services().empty(); }
 
  private:
-  void look_for_silence() {
-    if (core::monotonic_ns() < silence_due_ns_) return;
-    silence_due_ns_ = core::monotonic_ns() + messaging::ServiceBoard::kLookNs;
-    services_.note_silence(core::wall_ns());
-  }
   // Whole pictures are copied for every listener: only when asked for.
   [[nodiscard]] bool listened_to(const std::string& name) const {
     const auto* topic = messaging::find_topic(name);
@@ -165,7 +160,6 @@ class Watch {
   int64_t begun_ns_ = core::wall_ns();
   TopicListener listener_;
   messaging::ServiceBoard services_;
-  int64_t silence_due_ns_ = 0;
   std::map<std::string, WatchedTopic> topics_;
   std::vector<std::string> written_;
   int64_t second_begun_ns_ = core::monotonic_ns();

@@ -8,6 +8,7 @@
 
 #include "cdr/decode.hpp"
 #include "commands.hpp"
+#include "core/joined.hpp"
 #include "core/similar_names.hpp"
 #include "core/time.hpp"
 #include "messaging/topics.hpp"
@@ -42,8 +43,7 @@ std::string resolve(TopicListener& listener, const Options& options) {
   if (needs_camera) {
     std::erase_if(written, [&](const std::string& name) { return !name.starts_with(options.topic + "/"); });
     if (written.size() == 1) return written.front();
-    std::string names;
-    for (const auto& name : written) names += (names.empty() ? "" : ", ") + name;
+    const auto names = core::joined(written);
     throw core::BadInput(
         "topic " + options.topic + " is one for each camera; " +
         (names.empty() ? "none is written on " + where(options.network) + ", name one as " + options.topic + "/cam0"

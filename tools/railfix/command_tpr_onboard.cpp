@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "command_tpr.hpp"
+#include "core/joined.hpp"
 #include "core/time.hpp"
 #include "etcs/train_position_report.hpp"
 #include "messaging/onboard_topic.hpp"
@@ -44,9 +45,7 @@ struct Options {
 uint8_t index_of(const std::string& word, const Names& names, const std::string& value) {
   const auto found = std::ranges::find(names, value);
   if (found != names.end()) return static_cast<uint8_t>(found - names.begin());
-  std::string all;
-  for (const auto& name : names) all += (all.empty() ? "" : ", ") + name;
-  throw core::BadInput(word + ": must be one of " + all);
+  throw core::BadInput(word + ": must be one of " + core::joined(names));
 }
 
 double number_of(const std::string& word, const std::string& value, double most) {

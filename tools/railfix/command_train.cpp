@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.hpp"
+#include "core/joined.hpp"
 #include "core/result.hpp"
 #include "train/check.hpp"
 #include "train/keys.hpp"
@@ -42,9 +43,7 @@ fs::path programs_folder() {
 }
 
 std::string names_of(const Manifest& manifest) {
-  std::string names;
-  for (const auto& host : manifest.hosts) names += (names.empty() ? "" : ", ") + host.name;
-  return names;
+  return core::joined(manifest.hosts, &TrainHost::name);
 }
 
 const TrainHost& chosen_host(const Manifest& manifest, const Options& options) {

@@ -6,6 +6,7 @@
 
 #include "core/time.hpp"
 #include "messaging/topics.hpp"
+#include "support/npm.hpp"
 #include "support/program.hpp"
 #include "support/run_until.hpp"
 #include "support/two_hosts.hpp"
@@ -93,18 +94,15 @@ TEST_F(Images, ShareTheLayersOfWhatTheyHaveInCommon) {
 }
 
 TEST_F(Images, CarryAValidBillOfMaterials) {
-  if (shell("npm --version").exit_code != 0) GTEST_SKIP() << "skipped: npm is not there";
+  if (!test::npm_is_there()) GTEST_SKIP() << "skipped: npm is not there";
   const auto sbom = kWork / "sbom.json";
   const auto text = shell(
       "podman run --rm --no-healthcheck --entrypoint cat railfix/tpr-publisher:test "
       "/usr/share/railfix/sbom.cdx.json >'" +
       sbom.string() + "'");
   ASSERT_EQ(text.exit_code, 0) << text.err;
-  for (const char* name : {"package.json", "validate.mjs"})
-    fs::copy_file(kSource / "tests/integration/containers" / name, kWork / name, fs::copy_options::overwrite_existing);
+  ASSERT_EQ(test::install_script(kSource / "tests/integration/containers", "validate.mjs", kWork), "");
   const auto in_work = "cd '" + kWork.string() + "' && ";
-  const auto installed = shell(in_work + "npm install --no-audit --no-fund >npm.log 2>&1 || cat npm.log >&2");
-  ASSERT_EQ(installed.err, "");
   const auto valid = shell(in_work + "node validate.mjs sbom.json");
   EXPECT_EQ(valid.exit_code, 0) << valid.out << valid.err;
   const auto broken =

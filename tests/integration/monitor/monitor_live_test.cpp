@@ -10,6 +10,7 @@
 #include "core/time.hpp"
 #include "messaging/topics.hpp"
 #include "support/network.hpp"
+#include "support/npm.hpp"
 #include "support/program.hpp"
 
 namespace railfix {
@@ -166,15 +167,9 @@ class Train {
 class MonitorLiveTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    if (std::system("npm --version > /dev/null 2>&1") != 0) return;
-    npm_ = true;
-    fs::create_directories(kWork);
-    for (const char* name : {"package.json", "client.mjs"}) {
-      fs::copy_file(kSource / name, kWork / name, fs::copy_options::overwrite_existing);
-    }
-    if (!fs::exists(kWork / "node_modules" / "@foxglove" / "ws-protocol")) {
-      const std::string install = "cd '" + kWork.string() + "' && npm install --no-audit --no-fund > npm.log 2>&1";
-      ASSERT_EQ(std::system(install.c_str()), 0) << "npm install failed, see " << kWork / "npm.log";
+    npm_ = test::npm_is_there();
+    if (npm_) {
+      ASSERT_EQ(test::install_script(kSource, "client.mjs", kWork), "");
     }
   }
   void SetUp() override {

@@ -68,6 +68,20 @@ TEST(ServiceBoard, NobodyIsSilentBecauseTheListenerWasHeldUp) {
   EXPECT_TRUE(board.find("odometry")->alive);
 }
 
+TEST(ServiceBoard, WhoComesByAllTheTimeLooksNowAndThen) {
+  ServiceBoard board;
+  board.note(status(msg::STATE_ACTIVE), kBegin);
+  for (int64_t at_ns = kBegin; at_ns < kBegin + kSilentNs; at_ns += 1'000'000)
+    EXPECT_FALSE(board.note_silence_now_and_then(at_ns));
+  int64_t told_ns = kBegin + kSilentNs;
+  while (!board.note_silence_now_and_then(told_ns) && told_ns < kBegin + 2 * kSilentNs) told_ns += 1'000'000;
+  EXPECT_LE(told_ns, kBegin + kSilentNs + ServiceBoard::kLookNs);
+  board.note_silence_now_and_then(told_ns + 2 * kSilentNs);
+  board.note(status(msg::STATE_ACTIVE), told_ns + 1);
+  EXPECT_FALSE(board.note_silence_now_and_then(told_ns + 2 * kSilentNs + 1))
+      << "what has come meanwhile is handled first";
+}
+
 TEST(ServiceBoard, NobodyIsSilentWhileAPlayerSpeaksForAll) {
   ServiceBoard board;
   board.note(status(msg::STATE_ACTIVE), kBegin);

@@ -1,7 +1,9 @@
 // What a player does when it is told to.
 #include <sched.h>
 #include <spdlog/fmt/fmt.h>
+#include <ranges>
 
+#include "core/joined.hpp"
 #include "core/time.hpp"
 #include "replay/player.hpp"
 
@@ -62,9 +64,8 @@ core::Result<std::string> Player::carry_out(const std::string& name, const std::
     status_due_ns_ = 0;
     return result;
   }
-  std::string names;
-  for (const auto& [one, command] : commands_) names += (names.empty() ? "" : ", ") + one;
-  return core::Error{"player does not know the command " + name + "; it knows: " + names};
+  return core::Error{"player does not know the command " + name +
+                     "; it knows: " + core::joined(commands_ | std::views::keys)};
 }
 
 void Player::post(const std::string& name, const std::string& argument) {

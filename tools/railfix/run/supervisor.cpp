@@ -67,9 +67,7 @@ void Supervisor::turn(double seconds) {
   const int64_t deadline_ns = core::monotonic_ns() + core::to_ns(seconds);
   while (queue_.run_one(deadline_ns) && core::monotonic_ns() < deadline_ns) {
   }
-  if (core::monotonic_ns() < silence_due_ns_) return;
-  silence_due_ns_ = core::monotonic_ns() + messaging::ServiceBoard::kLookNs;
-  picture_.services.note_silence(core::wall_ns());
+  picture_.services.note_silence_now_and_then(core::wall_ns());
 }
 
 std::string Supervisor::missing() const {

@@ -54,7 +54,6 @@ class Supervisor {
   TrainPicture picture_;
   std::map<uint64_t, msg::ControlReply> replies_;
   uint64_t next_request_ = 1;
-  int64_t silence_due_ns_ = 0;
   bool ended_ = false;
   std::map<std::string, uint64_t> work_done_;  // frames in + out at the last status
   std::map<std::string, int> unchanged_;       // statuses since then without new work
