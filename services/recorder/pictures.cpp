@@ -1,6 +1,8 @@
 #include "recorder/pictures.hpp"
 
-#include <opencv2/imgcodecs.hpp>
+#include <turbojpeg.h>
+
+#include <memory>
 
 namespace railfix::recorder {
 
@@ -11,15 +13,16 @@ core::Result<std::vector<uint8_t>> encode_jpeg(const uint8_t* pixels, uint32_t w
     return core::Error{"a picture of " + std::to_string(width_px) + " x " + std::to_string(height_px) +
                        " cannot be a JPEG"};
   }
-  // OpenCV has no view of constant memory; imencode only reads.
-  const cv::Mat picture(static_cast<int>(height_px), static_cast<int>(width_px), CV_8UC1, const_cast<uint8_t*>(pixels));
-  std::vector<uint8_t> jpeg;
-  try {
-    if (cv::imencode(".jpg", picture, jpeg, {cv::IMWRITE_JPEG_QUALITY, quality})) return jpeg;
-  } catch (const cv::Exception& error) {
-    return core::Error{"a picture cannot be encoded: " + error.err};
-  }
-  return core::Error{"a picture cannot be encoded"};
+  const auto width = static_cast<int>(width_px);
+  const auto height = static_cast<int>(height_px);
+  const std::unique_ptr<void, int (*)(tjhandle)> compressor(tjInitCompress(), &tjDestroy);
+  std::vector<uint8_t> jpeg(tjBufSize(width, height, TJSAMP_GRAY));
+  unsigned char* bytes = jpeg.data();
+  unsigned long size = jpeg.size();
+  if (!compressor || tjCompress2(compressor.get(), pixels, width, 0, height, TJPF_GRAY, &bytes, &size, TJSAMP_GRAY,
+                                 quality, TJFLAG_NOREALLOC) != 0)
+    return core::Error{std::string("a picture cannot be encoded: ") + tjGetErrorStr2(compressor.get())};
+  return std::vector<uint8_t>(jpeg.begin(), jpeg.begin() + static_cast<ptrdiff_t>(size));
 }
 
 core::Result<std::vector<uint8_t>> encode_pgm(const uint8_t* pixels, uint32_t width_px, uint32_t height_px) {
@@ -30,16 +33,6 @@ core::Result<std::vector<uint8_t>> encode_pgm(const uint8_t* pixels, uint32_t wi
   pgm.insert(pgm.end(), head.begin(), head.end());
   pgm.insert(pgm.end(), pixels, pixels + static_cast<size_t>(width_px) * height_px);
   return pgm;
-}
-
-core::Result<cv::Mat> decode_picture(const std::vector<uint8_t>& bytes) {
-  try {
-    cv::Mat picture = cv::imdecode(bytes, cv::IMREAD_GRAYSCALE);
-    if (!picture.empty()) return picture;
-  } catch (const cv::Exception&) {
-    return core::Error{"a recorded picture is neither JPEG nor PGM"};
-  }
-  return core::Error{"a recorded picture is neither JPEG nor PGM"};
 }
 
 }  // namespace railfix::recorder

@@ -1,8 +1,7 @@
-// Pictures as JPEG or PGM and back.
+// Pictures as JPEG or PGM.
 #pragma once
 
 #include <cstdint>
-#include <opencv2/core.hpp>
 #include <vector>
 
 #include "core/result.hpp"
@@ -14,7 +13,5 @@ core::Result<std::vector<uint8_t>> encode_jpeg(const uint8_t* pixels, uint32_t w
                                                int quality);
 /// Every pixel as it is, behind a header of at most 20 bytes.
 core::Result<std::vector<uint8_t>> encode_pgm(const uint8_t* pixels, uint32_t width_px, uint32_t height_px);
-/// JPEG or PGM, grey; error: not a picture.
-core::Result<cv::Mat> decode_picture(const std::vector<uint8_t>& bytes);
 
 }  // namespace railfix::recorder

@@ -1,8 +1,8 @@
 // Commands, pauses, events and the quota, with real topics inside one process.
 #include <gmock/gmock.h>
+#include <opencv2/imgcodecs.hpp>
 
 #include "mcap/reader.hpp"
-#include "recorder/pictures.hpp"
 #include "recorder_fixture.hpp"
 
 namespace railfix::recorder {
@@ -159,7 +159,7 @@ TEST_F(RecorderEventsTest, ARuleMakesAProtectedFileWithFullPicturesAroundIt) {
   reader->for_each({{"camera_frame/cam0"}, {}, {}}, [&](const mcap::Channel&, const mcap::Message& message) {
     msg::CameraPreview picture;
     EXPECT_TRUE(messaging::deserialize({message.data.begin(), message.data.end()}, picture));
-    const auto pixels = decode_picture(picture.jpeg()).value();
+    const cv::Mat pixels = cv::imdecode(picture.jpeg(), cv::IMREAD_GRAYSCALE);
     auto sent = std::make_unique<msg::CameraFrame>();
     fill(*sent, ++pictures);
     EXPECT_TRUE(std::equal(pixels.datastart, pixels.dataend, sent->data().begin())) << "every pixel";
