@@ -174,17 +174,20 @@ YAML::Node compose_service(const Container& container) {
   return one;
 }
 
-core::Result<std::string> container_engine() {
+core::Result<std::string> container_engine(const Manifest& manifest) {
   const char* path = std::getenv("PATH");
-  for (const char* name : {"podman", "docker"}) {
+  for (const std::string name : {"podman", "docker"}) {
+    if (!manifest.engine.empty() && manifest.engine != name) continue;
     std::istringstream folders(path == nullptr ? "/usr/bin" : path);
     for (std::string folder; std::getline(folders, folder, ':');) {
       const auto program = fs::path(folder) / name;
       if (access(program.c_str(), X_OK) == 0) return program.string();
     }
   }
-  return core::Error{
-      "neither podman nor docker is installed; apt-get install podman catatonit, or set train.run_as to programs"};
+  const std::string missing = manifest.engine.empty() ? "neither podman nor docker" : "no " + manifest.engine;
+  return core::Error{missing + " is installed; apt-get install " +
+                     (manifest.engine == "docker" ? "docker.io" : "podman catatonit") +
+                     ", or set train.run_as to programs"};
 }
 
 std::optional<std::string> image_id(const std::string& engine, const std::string& image) {
@@ -193,9 +196,11 @@ std::optional<std::string> image_id(const std::string& engine, const std::string
 }
 
 std::vector<std::string> container_problems(const Manifest& manifest, const TrainHost& host) {
-  const auto engine = container_engine();
+  const auto engine = container_engine(manifest);
   if (!engine.ok()) return {engine.error().message};
   if (geteuid() != 0) return {"containers of a train are started by root: use sudo"};
+  if (const auto answer = run({engine.value(), "info"}); answer.exit_code != 0)
+    return {engine.value() + " does not work here: " + last_line(answer.text)};
   std::vector<std::string> problems;
   std::vector<std::string> images;
   for (const auto& service : services_on(manifest, host.name)) {

@@ -81,8 +81,10 @@ class ManifestReader {
     manifest_.qos_profiles = text_of(train["qos_profiles"], "train.qos_profiles");
     if (const std::string how = text_of(train["run_as"], "train.run_as"); how == "programs") {
       manifest_.containers = false;
+    } else if (how == "podman" || how == "docker") {
+      manifest_.engine = how;
     } else if (!how.empty() && how != "containers") {
-      problem(train["run_as"], "train.run_as", "must be containers or programs");
+      problem(train["run_as"], "train.run_as", "must be containers, podman, docker or programs");
     }
     if (const auto domain = train["domain"]; domain && (!YAML::convert<int64_t>::decode(domain, manifest_.domain) ||
                                                         manifest_.domain < 0 || manifest_.domain > 232))

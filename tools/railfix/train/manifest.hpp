@@ -33,6 +33,7 @@ struct Manifest {
   std::string release;
   bool security = false;
   bool containers = true;  // false: services run as programs of the host
+  std::string engine;      // of containers: podman or docker; empty = the first of them that is there
   std::vector<TrainHost> hosts;
   std::vector<TrainService> services;  // in the order of the data's way
   std::string map;                     // file names; empty = none

@@ -81,7 +81,7 @@ core::Status write(const fs::path& file, const std::string& text) {
 std::string unit_of(const Manifest& manifest, const TrainHost& host) {
   std::ostringstream unit;
   unit << "# " << kMade << "\n[Unit]\nDescription=Railfix on host " << host.name << " of train " << manifest.train_id
-       << "\nAfter=network-online.target\nWants=network-online.target\nStartLimitIntervalSec=0\n\n"
+       << "\nAfter=network-online.target docker.service\nWants=network-online.target\nStartLimitIntervalSec=0\n\n"
        << "[Service]\nExecStart=/usr/bin/railfix train supervise\nRestart=always\nRestartSec=1\nKillMode=mixed\n"
        << "TimeoutStopSec=" << 4 * kStopS << "\n\n[Install]\nWantedBy=multi-user.target\n";
   return unit.str();
@@ -187,7 +187,7 @@ std::string settings_of(const Manifest& manifest, const TrainHost& host, const s
   }
   if (manifest.containers) {
     // Another build of the same release is another image.
-    const auto engine = container_engine();
+    const auto engine = container_engine(manifest);
     const HostedService one{service, manifest.release_of(*manifest.service(service))};
     text +=
         "image: " + (engine.ok() ? image_id(engine.value(), image_of(one)) : std::nullopt).value_or("missing") + "\n";

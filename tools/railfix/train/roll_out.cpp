@@ -115,7 +115,7 @@ core::Status set_commands(const Manifest& manifest, const TrainHost& host, const
     planned.command = command.value();
     return {};
   }
-  const auto engine = container_engine();
+  const auto engine = container_engine(manifest);
   if (!engine.ok()) return engine.error();
   const auto absolute = [](const fs::path& path) { return fs::absolute(path).lexically_normal().string(); };
   auto container = container_of(manifest, host, service, absolute(files), absolute(HostFolder(root).home()));
