@@ -10,6 +10,7 @@ namespace {
 constexpr double kRatioSigmas = 5.0;
 constexpr double kRatioApartS = 2.0;
 constexpr double kTaughtShare = 0.1;  // of the sigma before any reference
+constexpr double kMissingS = 300;     // a sensor that has not measured for so long does not measure any more
 constexpr unsigned kBitsOfOne = 8;    // of Hypotheses::slipping
 
 OdometerScales prior(const FusionParameters& parameters, const std::optional<OdometerScales>& saved) {
@@ -38,6 +39,9 @@ void ScaleTrial::apply(const Event& event) {
   if (contradicted(event)) {
     drop_saved();
   } else if ((std::holds_alternative<FixInput>(event) || std::holds_alternative<GnssInput>(event)) && confirmed()) {
+    // What was saved of a sensor that is missing was not tried: the set that does not know it goes on.
+    const auto untried = [&](Odometer odometer) { return was_saved(odometer) && missing(odometer); };
+    if (untried(Odometer::camera) || untried(Odometer::wheel)) main_ = *std::move(unlearnt_);
     unlearnt_.reset();
     state_ = SavedScalesAre::confirmed;
   }
@@ -81,18 +85,32 @@ bool ScaleTrial::ratio_is_another() const {
   return std::abs(ratio - saved_ratio) > kRatioSigmas * std::hypot(saved_sigma, filter.sigma(StateIndex::other_scale));
 }
 
+bool ScaleTrial::was_saved(Odometer odometer) const {
+  const auto before = unlearnt_scales(*parameters_);
+  return odometer == Odometer::camera ? saved_.camera_sigma < before.camera_sigma
+                                      : saved_.wheel_sigma < before.wheel_sigma;
+}
+
+bool ScaleTrial::missing(Odometer odometer) const {
+  const auto source = odometer == Odometer::camera ? Source::camera : Source::wheel;
+  const int64_t used_ns = unlearnt_->main().watch(source).used_ns;
+  return used_ns == 0 || core::seconds(stamp_ns() - used_ns) > kMissingS;
+}
+
 // Whatever is left to be wrong of the scales is less than the interval grows with the way since the reference.
 bool ScaleTrial::confirmed() const {
   const auto& free = unlearnt_->main();
   if (!main().is_consistent() || !free.is_consistent()) return false;
-  const auto before = unlearnt_scales(*parameters_);
-  const auto good = [&](Odometer odometer, double saved_sigma, double unlearnt_sigma) {
-    if (saved_sigma >= unlearnt_sigma) return true;  // nothing was saved of it
+  bool tried = false;
+  bool untried = false;
+  for (const auto odometer : {Odometer::camera, Odometer::wheel}) {
+    if (!was_saved(odometer)) continue;
+    (missing(odometer) ? untried : tried) = true;
     const double apart = std::abs(main().filter().scale(odometer) - free.filter().scale(odometer));
-    return apart + parameters_->interval_factor * free.filter().scale_sigma(odometer) <= parameters_->interval_drift;
-  };
-  return good(Odometer::camera, saved_.camera_sigma, before.camera_sigma) &&
-         good(Odometer::wheel, saved_.wheel_sigma, before.wheel_sigma);
+    const double unsure = apart + parameters_->interval_factor * free.filter().scale_sigma(odometer);
+    if (!missing(odometer) && unsure > parameters_->interval_drift) return false;
+  }
+  return tried || !untried;
 }
 
 void ScaleTrial::predict_to(int64_t stamp_ns) {

@@ -41,6 +41,8 @@ class ScaleTrial {
  private:
   [[nodiscard]] bool contradicted(const Event& event);
   [[nodiscard]] bool ratio_is_another() const;
+  [[nodiscard]] bool was_saved(Odometer odometer) const;
+  [[nodiscard]] bool missing(Odometer odometer) const;
   [[nodiscard]] bool confirmed() const;
 
   const FusionParameters* parameters_;

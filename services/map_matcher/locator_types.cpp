@@ -6,7 +6,6 @@
 namespace railfix::map_matcher {
 namespace {
 
-constexpr double kMarkSigmaM = 4.0;
 constexpr double kDetailM = 2.0;
 
 }  // namespace
@@ -33,11 +32,6 @@ TurnModel::TurnModel(const LocatorParameters& parameters, const MeasuredWay& way
     variance_.push_back(way[i].variance + least + detail * detail);
     least_log_variance_ += std::log((fresh_ + variance_.back()) * per_least_variance_);
   }
-}
-
-double TurnModel::of_distance(double off_m) const {
-  const double z = off_m / kMarkSigmaM;
-  return std::abs(z) > 6 ? 0.0 : parameters_.detection * std::exp(-0.5 * z * z) / (kMarkSigmaM * 2.5066);
 }
 
 }  // namespace railfix::map_matcher

@@ -27,6 +27,13 @@ struct LocatorParameters {
   double certain = 0.9999;        // probability from which on the place is certain ...
   double certain_misfit = 1.3;    // ... when the bins fit to so many sigmas squared in the mean ...
   double certain_sigma_m = 20.0;  // ... and the place along the track to this sigma
+
+  /// Likelihood of a sighting so far from a mapped landmark.
+  [[nodiscard]] double mark_density(double off_m) const {
+    constexpr double kSigmaM = 4.0;
+    const double z = off_m / kSigmaM;
+    return std::abs(z) > 6 ? 0.0 : detection * std::exp(-0.5 * z * z) / (kSigmaM * 2.5066);
+  }
 };
 
 /// A landmark as the locator sees it; portals in and out are the same, since the direction is not known.
@@ -65,9 +72,9 @@ struct Candidate {
   track::Run run;
   double into_m = 0;
   size_t bin = 0;
-  double scale = 1;    // true over measured metres, as good as known
-  int found = 1;       // by so many stretches
-  double squared = 0;  // errors of the coarse search
+  double scale = 1;  // true over measured metres, as good as known
+  double scale_sigma = 0;
+  double log = 0;  // likelihood
 };
 
 /// Errors of the turns of a mapped way against the measured ones, bin after bin. The body's heading strays about the
@@ -144,7 +151,7 @@ class TurnModel {
   /// known to rough_m.
   [[nodiscard]] double of_false_mark() const { return parameters_.false_per_m; }
   [[nodiscard]] double of_mark(double off_m, double rough_m) const {
-    return of_distance(std::max(0.0, std::abs(off_m) - rough_m));
+    return parameters_.mark_density(std::max(0.0, std::abs(off_m) - rough_m));
   }
   [[nodiscard]] const MeasuredWay& way() const { return way_; }
   [[nodiscard]] const LocatorParameters& parameters() const { return parameters_; }
@@ -163,7 +170,6 @@ class TurnModel {
     const double least = whole > 0 ? changes_rad_[whole - 1][i] : 0.0;
     return part > 0 ? least + part * (changes_rad_[whole][i] - least) : least;
   }
-  [[nodiscard]] double of_distance(double off_m) const;
   LocatorParameters parameters_;
   const MeasuredWay& way_;
   std::array<std::vector<double>, kMostBins> changes_rad_;  // largest to one of the next 1, 2, ... bins

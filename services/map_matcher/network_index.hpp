@@ -1,9 +1,9 @@
 // The shape of a whole network, made once for searching it (0.2 s for 20,000 km): headings every 10 m of every edge,
-// chains of edges that follow each other straight on, and short ones through every other leg of a switch.
+// and which runs follow which, by numbers.
 #pragma once
 
-#include <cmath>
-#include <deque>
+#include <algorithm>
+#include <cstdint>
 #include <memory>
 #include <vector>
 
@@ -16,22 +16,9 @@ namespace railfix::map_matcher {
 class NetworkIndex {
  public:
   static constexpr double kCellM = 10.0;
-  static constexpr double kReachM = 2500.0;  // of a chain through the other leg of a switch, to either side
+  static constexpr uint32_t kNoRun = UINT32_MAX;
   explicit NetworkIndex(std::shared_ptr<const track::Map> map);
 
-  struct Leg {
-    track::Run run;
-    double begin_m = 0;
-  };
-  /// Runs that follow each other, with the heading every cell.
-  struct Chain {
-    std::vector<Leg> legs;
-    std::vector<float> heading_rad;
-    double length_m = 0;
-    double through_m =
-        NAN;  // of the other leg of a switch; what does not lie across this place is on another chain, too
-  };
-  [[nodiscard]] const std::vector<Chain>& chains() const { return chains_; }
   [[nodiscard]] const track::Ways& ways() const { return ways_; }
   [[nodiscard]] const track::Map& map() const { return *map_; }
   /// Runs beside a place in about the same direction, with the place beside it on each; its own run is among them.
@@ -40,25 +27,44 @@ class NetworkIndex {
     double into_m = 0;
   };
   [[nodiscard]] std::vector<Beside> beside(const track::Run& run, double into_m, double within_m) const;
-  /// Turn since the beginning of a run, in the direction of travel, left positive.
-  [[nodiscard]] double turned(const track::Run& run, double into_m) const;
+  /// Turn since the beginning of a run, in the direction of travel, left positive; straight beyond its ends.
+  [[nodiscard]] double turned(const track::Run& run, double into_m) const { return turned_on(number(run), into_m); }
   /// Landmarks on a run, in its direction.
-  [[nodiscard]] const std::vector<Mark>& marks_on(const track::Run& run) const {
-    return marks_[2 * (run.edge->id - 1) + (run.forward ? 0 : 1)];
-  }
+  [[nodiscard]] const std::vector<Mark>& marks_on(const track::Run& run) const { return marks_[number(run)]; }
+  /// The same by the numbers of the runs, which are quicker.
+  [[nodiscard]] uint32_t runs() const { return static_cast<uint32_t>(marks_.size()); }
+  [[nodiscard]] track::Run run(uint32_t number) const { return {&map_->edges[number / 2], number % 2 == 0}; }
+  [[nodiscard]] const std::vector<uint32_t>& after(uint32_t run) const { return after_[run]; }
+  [[nodiscard]] const std::vector<Mark>& marks_on(uint32_t run) const { return marks_[run]; }
+  [[nodiscard]] float length_m(uint32_t run) const { return lengths_m_[run / 2]; }
+  [[nodiscard]] float turned(uint32_t run, float into_m) const { return turned_on(run, into_m); }
 
  private:
-  void add_straight_on(const track::Run& first, std::vector<bool>& used);
-  void add_through(const track::Run& from, const track::Run& leg);
-  [[nodiscard]] Chain chain_of(const std::deque<track::Run>& runs) const;
+  static uint32_t number(const track::Run& run) { return 2 * (run.edge->id - 1) + (run.forward ? 0 : 1); }
+  template <typename Number>
+  [[nodiscard]] Number turned_on(uint32_t run, Number into_m) const {
+    const Number length_m = lengths_m_[run / 2];
+    if (run % 2 == 0) return heading_on<Number>(run / 2, into_m);
+    return heading_on<Number>(run / 2, length_m - into_m) - ends_rad_[run / 2];
+  }
   /// Heading on an edge relative to its start, along growing offset.
-  [[nodiscard]] double heading_on(const track::Edge& edge, double offset_m) const;
+  template <typename Number>
+  [[nodiscard]] Number heading_on(uint32_t edge, Number offset_m) const {
+    const float* headings = headings_.data() + first_cells_[edge];
+    const auto last = static_cast<Number>(first_cells_[edge + 1] - first_cells_[edge] - 2);
+    const Number cell = std::clamp(offset_m / static_cast<Number>(kCellM), Number{0}, last + 1);
+    const auto whole = static_cast<size_t>(std::min(cell, last));
+    return headings[whole] + (cell - static_cast<Number>(whole)) * (headings[whole + 1] - headings[whole]);
+  }
   std::shared_ptr<const track::Map> map_;
   track::Ways ways_;
   track::TrackFinder finder_;
-  std::vector<std::vector<float>> headings_;  // of each edge, every cell
+  std::vector<float> headings_;               // of one edge after the other, every cell; two or more for each
+  std::vector<size_t> first_cells_;           // of each edge, and the end
+  std::vector<float> lengths_m_;              // of each edge
+  std::vector<float> ends_rad_;               // heading at its end
   std::vector<std::vector<Mark>> marks_;      // of each run, in order
-  std::vector<Chain> chains_;
+  std::vector<std::vector<uint32_t>> after_;  // the straight way first
 };
 
 }  // namespace railfix::map_matcher

@@ -13,14 +13,19 @@ namespace {
 constexpr double kBesideM = 40.0;
 constexpr double kSettledM = 100.0;  // behind a switch
 constexpr double kLeastSigmaM = 3.0;
+constexpr size_t kAnewBins = 50;
+constexpr double kWorstMisfit = 7.0;     // over 200 m
+constexpr double kMostOfRange = 1.1;     // of the odometer's scale
+constexpr double kLeastEvidence = 20.0;  // that the track is on the map at all, a log
 
 }  // namespace
 
 std::string to_string(Doubt doubt) {
-  constexpr std::array<const char*, 8> kTexts = {"certain",
+  constexpr std::array<const char*, 9> kTexts = {"certain",
                                                  "the way is too short or bends too little",
                                                  "more places may fit than were compared",
                                                  "no place fits to the noise",
+                                                 "a track that is not on the map would fit by chance",
                                                  "several places fit",
                                                  "the place along the track is vague",
                                                  "not which of the tracks beside each other",
@@ -69,29 +74,44 @@ void NetworkLocator::sight(const Sighting& sighting) {
 void NetworkLocator::forget() {
   bins_.clear();
   gone_bins_ = 0;
-  memory_.clear();
+  filter_.reset();
   open_ = {};
   open_m_ = 0;
 }
 
+// A filter that began long ago may have been led astray by what is not on the map: another one begins.
+PlaceFilter& NetworkLocator::filtered(const MeasuredWay& way) {
+  const auto most_bins = static_cast<size_t>(parameters_.window_m / kBinM);
+  if (!filter_) {
+    filter_.emplace(parameters_, *index_, gone_bins_);
+  } else if (filter_->lost() || filter_->first_bin() + most_bins < gone_bins_) {
+    filter_.emplace(parameters_, *index_, gone_bins_ + way.size() - std::min(way.size(), kAnewBins));
+  }
+  filter_->advance(way, gone_bins_);
+  return *filter_;
+}
+
 Location NetworkLocator::locate() {
+  const MeasuredWay way(bins_.begin(), bins_.end());
+  const PlaceFilter& filter = filtered(way);
   double turn = 0;
   for (const MeasuredBin& bin : bins_) turn += std::abs(bin.turn_rad);
   if (way_m() < parameters_.least_way_m || turn < parameters_.least_turn_rad) return {};
-  const MeasuredWay way(bins_.begin(), bins_.end());
   const TurnModel model(parameters_, way);
-  const auto found = PlaceSearch(parameters_, *index_, way, gone_bins_, memory_).search();
-  const auto compared = WayComparison(model, *index_).compare(found.candidates);
+  const auto candidates = filter.candidates(gone_bins_);
+  const auto compared = WayComparison(model, *index_).compare(candidates);
   Location location = sum_up(compared.fits);
-  location.candidates = found.candidates.size();
-  location.doubt = doubt_of(location, found.complete && compared.complete);
+  location.candidates = candidates.size();
+  location.doubt = doubt_of(location, !filter.overflowed() && compared.complete, filter.evidence());
   return location;
 }
 
-Doubt NetworkLocator::doubt_of(const Location& location, bool complete) const {
+Doubt NetworkLocator::doubt_of(const Location& location, bool complete, double evidence) const {
   if (!complete || location.places.empty()) return Doubt::not_all_seen;
   const LocatedPlace& best = location.places.front();
-  if (best.misfit >= parameters_.certain_misfit) return Doubt::misfit;
+  const bool scaled = std::abs(best.scale - 1) < kMostOfRange * parameters_.scale_range;
+  if (best.misfit >= parameters_.certain_misfit || best.worst_misfit >= kWorstMisfit || !scaled) return Doubt::misfit;
+  if (evidence < kLeastEvidence) return Doubt::by_chance;
   if (location.place_probability < parameters_.certain) return Doubt::alike;
   if (best.sigma_m >= parameters_.certain_sigma_m) return Doubt::wide;
   if (best.probability < parameters_.certain) return Doubt::beside;
@@ -106,7 +126,8 @@ LocatedPlace NetworkLocator::place_of(const WayFit& fit) const {
           0,
           std::hypot(fit.sigma_m, kLeastSigmaM, parameters_.lag_m / std::sqrt(12.0)),
           fit.scale,
-          fit.misfit};
+          fit.misfit,
+          fit.worst_misfit};
 }
 
 // The body of a car turns up to a bogie distance behind the foot: which leg was taken shows only further on.

@@ -5,13 +5,14 @@
 
 #include <deque>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "map_matcher/locator_types.hpp"
 #include "map_matcher/match_types.hpp"
 #include "map_matcher/network_index.hpp"
-#include "map_matcher/place_search.hpp"
+#include "map_matcher/place_filter.hpp"
 #include "map_matcher/way_fit.hpp"
 
 namespace railfix::map_matcher {
@@ -20,8 +21,9 @@ struct LocatedPlace {
   track::EdgePosition place;
   double probability = 0;  // of this place on this track
   double sigma_m = 0;
-  double scale = 1;   // true over measured metres
-  double misfit = 0;  // mean of the squared errors in sigmas
+  double scale = 1;         // true over measured metres
+  double misfit = 0;        // mean of the squared errors in sigmas
+  double worst_misfit = 0;  // ... over the worst 200 m
 };
 
 /// Why a place is not certain: the first that applies.
@@ -30,6 +32,7 @@ enum class Doubt : uint8_t {
   too_plain,     // the way is too short or bends too little
   not_all_seen,  // the place may be one that was not compared
   misfit,        // nothing fits to the noise
+  by_chance,     // one of so many places would fit a track that is not on the map as well
   alike,         // several places fit
   wide,          // along the track
   beside,        // which of the tracks beside each other
@@ -41,7 +44,7 @@ struct Location {
   std::vector<LocatedPlace> places;  // best first
   double place_probability = 0;      // of the best place, on whichever of the tracks beside each other
   Doubt doubt = Doubt::too_plain;
-  size_t candidates = 0;  // places that were compared
+  size_t candidates = 0;  // places that may be the one
   [[nodiscard]] bool certain() const { return doubt == Doubt::none; }
   /// Certain but for the track: those beside each other are still open.
   [[nodiscard]] bool place_certain() const { return doubt == Doubt::none || doubt >= Doubt::beside; }
@@ -61,8 +64,9 @@ class NetworkLocator {
   [[nodiscard]] Location locate();
 
  private:
+  [[nodiscard]] PlaceFilter& filtered(const MeasuredWay& way);
   [[nodiscard]] Location sum_up(const std::vector<WayFit>& fits) const;
-  [[nodiscard]] Doubt doubt_of(const Location& location, bool complete) const;
+  [[nodiscard]] Doubt doubt_of(const Location& location, bool complete, double evidence) const;
   [[nodiscard]] double beside_probability(const std::vector<LocatedPlace>& places) const;
   [[nodiscard]] LocatedPlace place_of(const WayFit& fit) const;
   [[nodiscard]] bool just_behind_switch(const LocatedPlace& place) const;
@@ -71,7 +75,7 @@ class NetworkLocator {
   std::shared_ptr<const NetworkIndex> index_;
   std::deque<MeasuredBin> bins_;  // oldest first
   size_t gone_bins_ = 0;          // in front of them
-  PlaceSearch::Memory memory_;
+  std::optional<PlaceFilter> filter_;
   MeasuredBin open_;
   double open_m_ = 0;
 };

@@ -12,9 +12,10 @@ constexpr double kFarBelow = 20.0;  // a way whose log likelihood is so far belo
 constexpr double kRivalBelow = 14.0;
 constexpr std::array<double, 3> kScales = {0, -2.0 / 3, 2.0 / 3};  // of the range
 constexpr double kRoughM = 20.0;
+constexpr double kLeastRoughScale = 0.001;
 constexpr size_t kRoughWays = 4;
 constexpr WayWalker::Trial kExactly{8.0, 0.001, 8};
-constexpr size_t kMostComparedBins = 15'000'000;  // half a second
+constexpr size_t kMostComparedBins = 8'000'000;  // a quarter of a second
 constexpr size_t kMostTried = 16;
 constexpr WayFitter::Effort kFirst{3, 10, 4.0};
 constexpr WayFitter::Effort kFull{5, 120, 10.0};
@@ -63,14 +64,19 @@ class FittedWays {
 
 }  // namespace
 
+// Several scales where it is not known yet.
 std::vector<WalkedWay> WayComparison::roughly(const Candidate& candidate, double least_log) {
   const double range = model_.parameters().scale_range;
+  const double step = 2 * range / static_cast<double>(kScales.size());
+  const bool known = 2 * candidate.scale_sigma < step;
   std::vector<WalkedWay> ways;
   for (const double share : kScales) {
     Candidate scaled = candidate;
-    scaled.scale = 1 + share * range;
-    const WayWalker::Trial trial{kRoughM, range / static_cast<double>(kScales.size()), kRoughWays};
+    if (!known) scaled.scale = 1 + share * range;
+    const double rough_scale = known ? std::max(kLeastRoughScale, 2 * candidate.scale_sigma) : 0.5 * step;
+    const WayWalker::Trial trial{kRoughM, rough_scale, kRoughWays};
     for (auto& way : walker_.follow(scaled, trial, least_log)) ways.push_back(std::move(way));
+    if (known) break;
   }
   return ways;
 }

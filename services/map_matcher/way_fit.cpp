@@ -1,6 +1,7 @@
 #include "map_matcher/way_fit.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace railfix::map_matcher {
@@ -14,6 +15,7 @@ constexpr double kGridM = 5.0;
 constexpr size_t kFineEnough = 60;  // trials nearly as good as the best
 constexpr size_t kLookEvery = 8;    // bins, whether it is worth going on
 constexpr double kNearlyAsGood = 3.0;
+constexpr size_t kStretchBins = 10;
 
 }  // namespace
 
@@ -83,6 +85,8 @@ void WayFitter::weigh(const Shape& shape, const WalkedWay& walked, Trial& trial,
   const double most_squared = model_.most_squared(least_log);
   TurnSum sum = model_.begin();
   double marks = 0;
+  double worst = 0;
+  std::array<double, kStretchBins> squared{};  // of the last sums
   double from_m = place_m(0);
   double before = shape.heading(from_m);
   bool worth = true;
@@ -96,6 +100,8 @@ void WayFitter::weigh(const Shape& shape, const WalkedWay& walked, Trial& trial,
     for (const Mark& seen : way[i].marks) {
       marks += shape.of_mark(model_, seen, from_m + trial.scale * seen.along_m, here_rough_m);
     }
+    if (i + 1 >= kStretchBins) worst = std::max(worst, sum.squared - squared[i % kStretchBins]);
+    squared[i % kStretchBins] = sum.squared;
     before = after;
     from_m = to_m;
     if (i % kLookEvery == 0) worth = model_.squared_of(sum) < most_squared;
@@ -103,6 +109,7 @@ void WayFitter::weigh(const Shape& shape, const WalkedWay& walked, Trial& trial,
   compared_bins_ += i;
   trial.log = worth ? model_.log_of(sum) + marks : -INFINITY;
   trial.misfit = model_.misfit_of(sum);
+  trial.worst_misfit = worst / static_cast<double>(kStretchBins);
 }
 
 // From a wide grid to finer ones around what fits; on the wider ones the errors may be as large as the steps make them.
@@ -203,6 +210,7 @@ std::optional<WayFit> WayFitter::fit(const WalkedWay& walked, const Effort& effo
   result.best_log = best.log;
   result.log_evidence = best.log + std::log(sum * grid.shift_step_m * grid.scale_step);
   result.misfit = best.misfit;
+  result.worst_misfit = best.worst_misfit;
   return result;
 }
 

@@ -22,6 +22,7 @@ struct WayFit {
   double best_log = 0;      // log likelihood
   double log_evidence = 0;  // ... summed over places and scales
   double misfit = 0;        // mean of the squared errors in sigmas, of the best fit
+  double worst_misfit = 0;  // ... over the worst 200 m
 };
 
 /// A place `along_m` on runs that follow each other.
@@ -49,6 +50,7 @@ class WayFitter {
     double scale = 1;
     double log = 0;
     double misfit = 0;
+    double worst_misfit = 0;
   };
   struct Grid {
     std::vector<Trial> trials;

@@ -29,11 +29,12 @@ double processor_s() {
   return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
 }
 
+std::shared_ptr<const track::Map> made_map(double track_km, uint64_t seed) {
+  return std::make_shared<const track::Map>(track::made_network({.track_km = track_km, .seed = seed}));
+}
+
 std::shared_ptr<const track::Map> map_of(const MatchingOptions& options) {
-  if (options.map.empty()) {
-    return std::make_shared<const track::Map>(
-        track::made_network({.track_km = options.track_km, .seed = options.seed}));
-  }
+  if (options.map.empty()) return made_map(options.track_km, options.seed);
   auto loaded = track::Map::load(options.map);
   if (loaded.ok()) return std::make_shared<const track::Map>(std::move(loaded).value());
   return std::make_shared<const track::Map>(core::value_or_throw(track::build_map({options.map}, {})).map);
@@ -68,9 +69,17 @@ struct Trip {
   double bound_m = INFINITY;  // least error that could be had on the way
 };
 
-double apart_m(const track::Map& map, const track::EdgePosition& a, const track::EdgePosition& b) {
-  const auto p = map.edge(a.edge)->alignment.at(a.offset_m).pose;
-  const auto q = map.edge(b.edge)->alignment.at(b.offset_m).pose;
+/// What the locator knows, and where the train really is: mostly the same.
+struct Networks {
+  std::shared_ptr<const map_matcher::NetworkIndex> known;
+  std::shared_ptr<const map_matcher::NetworkIndex> real;
+};
+
+double apart_m(const Networks& networks, const track::EdgePosition& place, const track::EdgePosition& truth) {
+  if (networks.known != networks.real) return INFINITY;
+  const auto& map = networks.real->map();
+  const auto p = map.edge(place.edge)->alignment.at(place.offset_m).pose;
+  const auto q = map.edge(truth.edge)->alignment.at(truth.offset_m).pose;
   return std::hypot(p.easting_m - q.easting_m, p.northing_m - q.northing_m);
 }
 
@@ -122,8 +131,8 @@ double bound_m(const testing::VehicleHeading& heading, double begin_m, double en
   return det > 0 ? std::sqrt(scale / det) : INFINITY;
 }
 
-Trip run_trip(const std::shared_ptr<const map_matcher::NetworkIndex>& index, const track::Route& route,
-              const MatchingOptions& options, core::Random& random) {
+Trip run_trip(const Networks& networks, const track::Route& route, const MatchingOptions& options,
+              core::Random& random) {
   testing::RideErrors errors;
   errors.odometer_scale = random.uniform(-0.02, 0.02);
   errors.turn_bias_rps = 0.001 * random.normal();
@@ -136,7 +145,7 @@ Trip run_trip(const std::shared_ptr<const map_matcher::NetworkIndex>& index, con
   const testing::VehicleHeading heading([&](double m) { return route.curvature_at(m) + wander.curvature_at(m); },
                                         first_m, first_m + kTripM + 50, errors);
   testing::RideSensors sensors(errors, random.next());
-  map_matcher::NetworkLocator locator({}, index);
+  map_matcher::NetworkLocator locator({}, networks.known);
   Trip trip;
   double looked_m = 0;
   constexpr double kStepM = 1.0;
@@ -148,7 +157,7 @@ Trip run_trip(const std::shared_ptr<const map_matcher::NetworkIndex>& index, con
     locator.move(s.way_m, s.turn_rad, s.turn_sigma_rad);
     const double here_m = first_m + at_m + kStepM;
     const auto& leg = route.leg_at(here_m + 8);
-    for (const auto& mark : index->marks_on(leg.run)) {
+    for (const auto& mark : networks.real->marks_on(leg.run)) {
       const double mark_m = leg.begin_m + mark.along_m;
       if (mark_m <= here_m + 8 - kStepM || mark_m > here_m + 8 || random.uniform() < kMissed) continue;
       locator.sight({0, mark.kind, mark_m - here_m + kMapSigmaM * random.normal(), mark.lateral_m, 0.2, 0.95});
@@ -168,7 +177,7 @@ Trip run_trip(const std::shared_ptr<const map_matcher::NetworkIndex>& index, con
     if (location.places.empty()) continue;
     const auto truth = route.position_at(here_m);
     const auto& best = location.places.front().place;
-    const bool near = apart_m(index->map(), truth, best) < kRightM;
+    const bool near = apart_m(networks, best, truth) < kRightM;
     // Near a joint of edges the place may lie on the next one: on the route it must be.
     const auto on_route = route.distance_of(best, here_m);
     const bool right = near && on_route && std::abs(*on_route - here_m) < kRightM;
@@ -181,13 +190,13 @@ Trip run_trip(const std::shared_ptr<const map_matcher::NetworkIndex>& index, con
       trip.place_after_m = at_m;
     }
     trip.doubts.push_back(location.doubt);
-    const double sigmas = apart_m(index->map(), truth, best) / location.places.front().sigma_m;
+    const double sigmas = apart_m(networks, best, truth) / location.places.front().sigma_m;
     if (location.certain()) trip.most_sigmas = std::max(trip.most_sigmas, sigmas);
     if ((location.certain() && (!right || sigmas > 4)) || (location.place_certain() && !near)) trip.wrong = true;
     trip.best_right = near;
     if (options.each && ((location.certain() && !right) || (location.place_certain() && !near))) {
       std::printf("  wrong at %.0f m: %u:%.0f for %u:%.0f, %.0f m apart, sigma %.0f m, misfit %.2f\n", at_m, best.edge,
-                  best.offset_m, truth.edge, truth.offset_m, apart_m(index->map(), truth, best),
+                  best.offset_m, truth.edge, truth.offset_m, apart_m(networks, best, truth),
                   location.places.front().sigma_m, location.places.front().misfit);
     }
   }
@@ -249,12 +258,11 @@ void tell(int number, const Trip& t) {
 }
 
 /// Trips are drawn each for itself, so that a run may begin anywhere among them.
-std::optional<Trip> trip_of(int number, const std::shared_ptr<const map_matcher::NetworkIndex>& index,
-                            const MatchingOptions& options) {
+std::optional<Trip> trip_of(int number, const Networks& networks, const MatchingOptions& options) {
   core::Random random(options.seed * 7919 + 5 + 1000003 * static_cast<uint64_t>(number));
   for (int tries = 0; tries < 100; ++tries) {
-    if (const auto route = random_route(index->map(), index->ways(), random)) {
-      return run_trip(index, *route, options, random);
+    if (const auto route = random_route(networks.real->map(), networks.real->ways(), random)) {
+      return run_trip(networks, *route, options, random);
     }
   }
   return std::nullopt;
@@ -270,10 +278,14 @@ int measure_locate(const MatchingOptions& options) {
   const auto index = std::make_shared<const map_matcher::NetworkIndex>(map);
   std::printf("%.0f km of track, %zu edges, index made in %.2f s\n", track_m / 1000, map->edges.size(),
               processor_s() - begin_s);
+  auto real = index;
+  if (options.elsewhere > 0) {
+    real = std::make_shared<const map_matcher::NetworkIndex>(made_map(options.track_km, options.elsewhere));
+  }
   const int count = options.count > 0 ? options.count : 100;
   std::vector<Trip> trips;
   for (int i = options.from; i < options.from + count; ++i) {
-    const auto trip = trip_of(i, index, options);
+    const auto trip = trip_of(i, {index, real}, options);
     if (!trip) continue;
     trips.push_back(*trip);
     if (options.each) tell(i, trips.back());

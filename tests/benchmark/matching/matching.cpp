@@ -15,10 +15,11 @@ constexpr const char* kUsage =
     "railfix-measure-matching landmarks [--count N] [--seed N]\n"
     "  landmarks  which mapped landmark was sighted, with missed and false sightings and a map that is partly wrong\n"
     "railfix-measure-matching locate [--map FILE | --track-km KM] [--trips N] [--from N] [--seed N] [--map-error-m M]\n"
-    "                         [--each]\n"
+    "                         [--elsewhere SEED] [--each]\n"
     "  locate     the place without a prior, over trips of 5 km on a map or a made-up network; the real track wanders\n"
     "             about the mapped one by 0.5 m (1 sigma). --each prints every trip as it ends, --from goes on with\n"
-    "             those of the same seed\n";
+    "             those of the same seed; --elsewhere: the trains run on another made-up network, so no place is "
+    "right\n";
 
 }  // namespace
 
@@ -39,6 +40,8 @@ int main(int argc, char** argv) {
       options.track_km = std::atof(argv[++i]);
     } else if (std::strcmp(argv[i], "--map-error-m") == 0 && more) {
       options.map_error_m = std::atof(argv[++i]);
+    } else if (std::strcmp(argv[i], "--elsewhere") == 0 && more) {
+      options.elsewhere = std::strtoull(argv[++i], nullptr, 10);
     } else if (std::strcmp(argv[i], "--each") == 0) {
       options.each = true;
     } else if (what.empty() && argv[i][0] != '-') {

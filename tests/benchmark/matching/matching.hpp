@@ -13,6 +13,7 @@ struct MatchingOptions {
   std::string map;
   double track_km = 20000;   // of a made-up network
   double map_error_m = 0.5;  // of a track about the mapped one
+  uint64_t elsewhere = 0;    // the trips are on another made-up network, of this seed (locate)
   bool each = false;         // a line for each ride that went wrong
 };
 

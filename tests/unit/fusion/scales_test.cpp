@@ -117,6 +117,17 @@ TEST(Scales, ThatAReferenceContradictsAreDroppedAndTheIntervalHeldMeanwhile) {
   }
 }
 
+// What was saved of a wheel sensor that has failed cannot be tried; the camera's scale can.
+TEST(Scales, OfASensorThatIsMissingDoNotKeepTheOthersOnTrial) {
+  Passage passage({.camera = 1.002, .saved = saved_as(1.002, 0.997)});
+  for (const double place_m : {1500.0, 2500.0, 3500.0, 4500.0}) {
+    passage.run_to(place_m);
+    passage.sight(0.05);
+  }
+  EXPECT_EQ(passage.fusion().saved_scales(), SavedScalesAre::confirmed);
+  EXPECT_LT(std::abs(passage.scale_error()), 3e-4);
+}
+
 // A new wheelset shows by the camera at once.
 TEST(Scales, OfAnotherWheelAreDroppedByWhatTheCameraSays) {
   Passage passage({.camera = 1.0, .wheel = 1.02, .saved = saved_as(1.0, 1.0)});
