@@ -10,11 +10,21 @@ namespace {
 constexpr double kDensityReachM = 200;  // of mapped landmarks, for the chance of a random hit
 constexpr double kFitStepM = 0.7;       // earlier sightings fit within about so much
 constexpr double kClearSideM = 1.0;
+constexpr double kUsualConfidence = 0.95;  // of the sightings of which false_per_m are false
+constexpr double kMovedSigmas = 3.0;       // what is less is not moved
 constexpr size_t kMostSightings = 12;
+constexpr int kScaleSteps = 4;         // to either side
+constexpr double kScaleStep = 0.6;     // sigmas
+constexpr double kScaleChanges = 0.3;  // share of the scale's sigma that differs from place to place
+constexpr double kOddM = 0.1;
 
 double gauss(double error, double sigma) {
   const double z = error / sigma;
   return std::exp(-0.5 * z * z) / (sigma * std::sqrt(2 * std::numbers::pi));
+}
+
+bool before(const track::PathLandmark& landmark, double distance_m) {
+  return landmark.distance_m < distance_m;
 }
 
 bool other_side(const Sighting& sighting, const track::PathLandmark& landmark) {
@@ -26,8 +36,8 @@ bool other_side(const Sighting& sighting, const track::PathLandmark& landmark) {
 
 // Every mapped landmark of the kind in the window is one hypothesis, weighed by how well the earlier sightings fit it;
 // that it stands elsewhere than the map says is another; the last one is that this sighting is false, weighed by the
-// mean fit over the window. The confidence is a chance for the sighting, not for each landmark in the window. The
-// window itself only selects.
+// mean fit over the window. A confidence below the usual is a chance for the sighting, not for each landmark in the
+// window. The window itself only selects.
 std::optional<Fix> LandmarkMatcher::add(const Sighting& sighting, const Prior& prior) {
   const double place_m = prior.travelled_m + sighting.distance_ahead_m;
   const double margin_m = parameters_.window_margin_m + 3 * sighting.sigma_m;
@@ -40,15 +50,19 @@ std::optional<Fix> LandmarkMatcher::add(const Sighting& sighting, const Prior& p
   std::vector<const track::PathLandmark*> candidates = near(sighting.kind, from_m, to_m);
   std::erase_if(candidates, [&](const auto* landmark) { return other_side(sighting, *landmark); });
   const double expected = std::max(1.0, parameters_.detection * static_cast<double>(candidates.size()));
+  const double doubt = std::max(0.0, kUsualConfidence - confidence);
   double sum = mean_fit(from_m - place_m, to_m - place_m, place_m) *
-               ((1 - confidence) * expected + parameters_.false_per_m * (to_m - from_m));
+               (doubt * expected + parameters_.false_per_m * (to_m - from_m));
   const track::PathLandmark* best = nullptr;
   double best_weight = 0;
   for (const auto* landmark : candidates) {
     const double shift_m = landmark->distance_m - place_m;
     const double chance = confidence * parameters_.detection;
     const double weight = chance * (1 - parameters_.moved) * history_fits(shift_m, place_m);
-    const double elsewhere = mean_fit(shift_m - parameters_.moved_m, shift_m + parameters_.moved_m, place_m);
+    const double still_m =
+        std::min(kMovedSigmas * std::hypot(sighting.sigma_m, landmark->landmark->sigma_m), 0.5 * parameters_.moved_m);
+    const double elsewhere = 0.5 * (mean_fit(shift_m - parameters_.moved_m, shift_m - still_m, place_m) +
+                                    mean_fit(shift_m + still_m, shift_m + parameters_.moved_m, place_m));
     sum += weight + chance * parameters_.moved * elsewhere;
     if (weight > best_weight) {
       best = landmark;
@@ -69,14 +83,35 @@ double LandmarkMatcher::mean_fit(double from_m, double to_m, double now_m) const
   return sum / steps;
 }
 
+// The odometer's scale is unknown, but the same for all of them.
 double LandmarkMatcher::history_fits(double shift_m, double now_m) const {
   if (seen_.empty()) return 1;
+  double sum = 0;
+  double weights = 0;
+  for (int i = -kScaleSteps; i <= kScaleSteps; ++i) {
+    const double z = kScaleStep * i;
+    const double weight = std::exp(-0.5 * z * z);
+    weights += weight;
+    sum += weight * history_fits(shift_m, z * parameters_.scale_sigma, now_m);
+  }
+  return sum / weights;
+}
+
+double LandmarkMatcher::history_fits(double shift_m, double scale, double now_m) const {
   double fit = 1;
-  for (const auto& seen : seen_) fit *= sighting_fits(seen, seen.place_m + shift_m, relative_sigma_m(seen, now_m));
+  for (const auto& seen : seen_) {
+    const double path_m = seen.place_m + shift_m - scale * (now_m - seen.place_m);
+    fit *= sighting_fits(seen, path_m, relative_sigma_m(seen, now_m));
+  }
   // Landmarks between the sightings that nobody reported.
   const auto [first, last] = std::minmax(seen_.front().place_m, now_m);
-  for (const auto& landmark : path_->landmarks()) {
-    const double place_m = landmark.distance_m - shift_m;
+  const double reach_m = 1 + std::abs(scale) * (last - first);
+  const auto& all = path_->landmarks();
+  auto it = std::lower_bound(all.begin(), all.end(), first + shift_m - reach_m, before);
+  for (; it != all.end() && it->distance_m < last + shift_m + reach_m; ++it) {
+    const auto& landmark = *it;
+    const double nearly_m = landmark.distance_m - shift_m;
+    const double place_m = nearly_m + scale * (now_m - nearly_m);
     if (place_m < first + 1 || place_m > last - 0.5 || !sighted_before(landmark.kind)) continue;
     const bool reported = std::any_of(seen_.begin(), seen_.end(), [&](const Seen& seen) {
       return seen.sighting.kind == landmark.kind &&
@@ -94,7 +129,10 @@ double LandmarkMatcher::sighting_fits(const Seen& seen, double path_m, double re
   double density = by_chance;
   for (const auto* landmark : mapped) {
     if (other_side(seen.sighting, *landmark)) continue;
-    density += parameters_.detection * seen.sighting.confidence * gauss(landmark->distance_m - path_m, relative_m);
+    const double off_m = landmark->distance_m - path_m;
+    const double moved = std::abs(off_m) < parameters_.moved_m ? parameters_.moved / (2 * parameters_.moved_m) : 0.0;
+    density +=
+        parameters_.detection * seen.sighting.confidence * ((1 - parameters_.moved) * gauss(off_m, relative_m) + moved);
   }
   return density / (by_chance + parameters_.detection * mapped_per_m);
 }
@@ -102,8 +140,7 @@ double LandmarkMatcher::sighting_fits(const Seen& seen, double path_m, double re
 std::vector<const track::PathLandmark*> LandmarkMatcher::near(track::LandmarkKind kind, double from_m,
                                                               double to_m) const {
   const auto& all = path_->landmarks();
-  auto it = std::lower_bound(all.begin(), all.end(), from_m,
-                             [](const track::PathLandmark& landmark, double m) { return landmark.distance_m < m; });
+  auto it = std::lower_bound(all.begin(), all.end(), from_m, before);
   std::vector<const track::PathLandmark*> found;
   for (; it != all.end() && it->distance_m <= to_m; ++it) {
     if (it->kind == kind) found.push_back(&*it);
@@ -116,7 +153,8 @@ bool LandmarkMatcher::sighted_before(track::LandmarkKind kind) const {
 }
 
 double LandmarkMatcher::relative_sigma_m(const Seen& seen, double now_m) const {
-  return std::hypot(1.5 * seen.sighting.sigma_m, 0.1 + parameters_.scale_sigma * std::abs(now_m - seen.place_m));
+  return std::hypot(1.5 * seen.sighting.sigma_m,
+                    kOddM + kScaleChanges * parameters_.scale_sigma * std::abs(now_m - seen.place_m));
 }
 
 }  // namespace railfix::map_matcher

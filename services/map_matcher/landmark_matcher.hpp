@@ -39,8 +39,10 @@ class LandmarkMatcher {
     Sighting sighting;
     double place_m = 0;  // of the object in distance run
   };
-  /// How well all earlier sightings fit the map when path distance = distance run + shift, against chance.
+  /// How well all earlier sightings fit the map when path distance = distance run + shift, against chance; mean over
+  /// the scales of the odometer, or at one.
   [[nodiscard]] double history_fits(double shift_m, double now_m) const;
+  [[nodiscard]] double history_fits(double shift_m, double scale, double now_m) const;
   /// Mean of history_fits between two shifts.
   [[nodiscard]] double mean_fit(double from_m, double to_m, double now_m) const;
   [[nodiscard]] double sighting_fits(const Seen& seen, double path_m, double relative_m) const;

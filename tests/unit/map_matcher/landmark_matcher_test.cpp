@@ -98,6 +98,26 @@ TEST(LandmarkMatcher, AMovedMastAndABaliseThatTheMapLacksDoNotMislead) {
   }
 }
 
+// Its error adds up over the masts seen before, in the same direction for all of them.
+TEST(LandmarkMatcher, AnOdometerThatIsOffByTwoPerCentDoesNotNameTheWrongOneOfAPair) {
+  core::Random random(4);
+  std::vector<std::pair<LandmarkKind, double>> landmarks;
+  for (double m = 100; m < 990; m += random.uniform(40, 65)) landmarks.emplace_back(LandmarkKind::mast, m);
+  for (const double m : {1000.0, 1003.0}) landmarks.emplace_back(LandmarkKind::balise, m);
+  const auto path = line_with(landmarks);
+  for (const double scale : {0.98, 1.02}) {
+    LandmarkMatcher matcher({}, path);
+    std::optional<Fix> fix;
+    for (const auto& [kind, m] : landmarks) {
+      if (m == 1000.0) continue;  // missed
+      fix = matcher.add(sighting_of(kind, 0.95), prior_at(m - 5, 10, scale * (m - 5)));
+    }
+    ASSERT_TRUE(fix);
+    EXPECT_NEAR(fix->path_distance_m, 998, 1e-9) << scale;
+    EXPECT_GT(fix->probability, 0.9) << scale;
+  }
+}
+
 TEST(LandmarkMatcher, UnsureSightingGivesUnsureFix) {
   LandmarkMatcher matcher({}, line_with({{LandmarkKind::frog, 500}}));
   const auto fix = matcher.add(sighting_of(LandmarkKind::frog, 0.6), prior_at(495, 10, 0));
