@@ -84,7 +84,7 @@ PlaceFilter& NetworkLocator::filtered(const MeasuredWay& way) {
   const auto most_bins = static_cast<size_t>(parameters_.window_m / kBinM);
   if (!filter_) {
     filter_.emplace(parameters_, *index_, gone_bins_);
-  } else if (filter_->lost() || filter_->first_bin() + most_bins < gone_bins_) {
+  } else if (filter_->lost() || filter_->overflowed() || filter_->first_bin() + most_bins < gone_bins_) {
     filter_.emplace(parameters_, *index_, gone_bins_ + way.size() - std::min(way.size(), kAnewBins));
   }
   filter_->advance(way, gone_bins_);

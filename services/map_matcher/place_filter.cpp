@@ -24,8 +24,8 @@ constexpr float kTurnVariance = 2e-5F;      // of a block, at least about
 constexpr double kStraightTurnRad = 0.012;  // in a block of track of which nothing is known
 constexpr double kOnTurnRad = 0.04;
 constexpr double kAnyTurnRad = 0.1;
-constexpr double kMarksPerM = 0.0025;  // of one kind, where there is one
-constexpr size_t kMostPlaces = 1'500'000;
+constexpr double kMarksPerM = 0.0025;      // of one kind, where there is one
+constexpr size_t kMostPlaces = 3'000'000;  // 240 MB, of 60,000 km
 
 // Rows of the covariance's upper triangle.
 enum : size_t { kGg, kGb, kGp, kGc, kBb, kBp, kBc, kPp, kPc, kCc };
@@ -182,7 +182,7 @@ void PlaceFilter::go_on(const Place& place, float end_m, const Trail& trail, con
   to.push_back(place);
   Place& p = to.back();
   p.into_m = std::min(end_m, length_m);
-  weigh(p, block, parameters_.heading_sigma_rad * parameters_.heading_sigma_rad);
+  weigh(p, block);
   if (!block.marks.empty()) weigh_marks(p, trail, block);
   if (p.log < least_log) to.pop_back();
 }
@@ -202,7 +202,7 @@ float PlaceFilter::heading(const Place& place, float into_m) const {
 }
 
 // The heading is looked at as far about the place as that is unknown: what is not straight there is noise.
-void PlaceFilter::weigh(Place& place, const Block& block, double noise_variance) const {
+void PlaceFilter::weigh(Place& place, const Block& block) const {
   auto& c = place.covariance;
   const float look_m = std::clamp(std::sqrt(std::max(0.0F, c[kPp])), kLeastLookM, kMostLookM);
   const float here = heading(place, place.into_m);
@@ -210,7 +210,7 @@ void PlaceFilter::weigh(Place& place, const Block& block, double noise_variance)
   const float behind = heading(place, place.into_m - look_m);
   const float slope = (ahead - behind) / (2 * look_m);
   const float bend = 0.5F * (ahead + behind) - here;
-  const auto least = static_cast<float>(noise_variance);
+  const auto least = static_cast<float>(parameters_.heading_sigma_rad * parameters_.heading_sigma_rad);
   const float noise = least + bend * bend + kDetailM * kDetailM * slope * slope;
   const std::array<float, 4> h{c[kGg] + slope * c[kGp], c[kGb] + slope * c[kBp], c[kGp] + slope * c[kPp],
                                c[kGc] + slope * c[kPc]};

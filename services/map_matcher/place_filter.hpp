@@ -28,8 +28,6 @@ class PlaceFilter {
   /// How much likelier (log) the best place is than that the train is on a track that is not on the map, which many
   /// places had the chance to fit.
   [[nodiscard]] double evidence() const;
-  /// So many are left, likely or not.
-  [[nodiscard]] size_t places() const { return places_.size(); }
   /// Nothing on the map fits.
   [[nodiscard]] bool lost() const { return begun_ && places_.empty(); }
   /// More may fit than could be followed.
@@ -71,7 +69,7 @@ class PlaceFilter {
   void go(const Place& place, const Block& block, double least_log, std::vector<Place>& to) const;
   void go_on(const Place& place, float end_m, const Trail& trail, const Block& block, double least_log,
              std::vector<Place>& to) const;
-  void weigh(Place& place, const Block& block, double noise_variance) const;
+  void weigh(Place& place, const Block& block) const;
   void weigh_marks(Place& place, const Trail& trail, const Block& block) const;
   [[nodiscard]] float heading(const Place& place, float into_m) const;
   void drop_unlikely();
