@@ -37,8 +37,8 @@ constexpr double kStepReachM = 9;  // looks from farther away show the end of a 
 constexpr int kFewestStepLooks = 6;
 constexpr double kStepM = 0.03;
 constexpr double kStepTopM = 0.06;
-constexpr double kBesideStep = 0.8;  // of a step's evidence is beside it
-constexpr double kClearStep = 0.5;   // mean evidence; noise alone comes to 0.4
+constexpr double kBesideStep = 0.8;  // of a step is beside it
+constexpr double kClearStep = 3.5;   // grey levels; noise alone comes to 1
 
 }  // namespace
 
@@ -335,8 +335,8 @@ void EdgeTracker::settle() {
   std::erase_if(candidates_, [this](const Candidate& candidate) { return way_m_ - candidate.hit_m >= kPatienceM; });
 }
 
-// Mean over the looks and both walls, of the clearer sign on each.
-double EdgeTracker::step_evidence(double place_m, const std::array<double, 2>& walls_m) const {
+// Mean over the near looks, in grey levels, of how much brighter it is beyond a place on the walls than before it.
+double EdgeTracker::brightening(double place_m, const std::array<double, 2>& walls_m) const {
   const Look& now = looks_[newest_];
   const double k = now.curvature_per_m;
   const double ahead_m = place_m - now.way_m;
@@ -345,17 +345,15 @@ double EdgeTracker::step_evidence(double place_m, const std::array<double, 2>& w
   for (const double lateral_m : walls_m) {
     const double y_m = lateral_m + 0.5 * k * ahead_m * ahead_m - now.eye_lateral_m;
     const double x_m = ahead_m - lateral_m * k * ahead_m;
-    std::array<double, 2> sums{0, 0};
     for (const Relative& relative : relatives_) {
       if (ahead_m + relative.back_m < 1 || ahead_m + relative.back_m > kStepReachM) continue;
       const double at = bearing_of(relative, x_m, y_m, 0);
       const int column = static_cast<int>(at / cell_ + middle_ + 0.5);
       if (std::abs(at) > widest_ || column < 0 || column >= static_cast<int>(relative.look->step.size())) continue;
-      for (size_t i = 0; i < sums.size(); ++i)
-        sums[i] += static_cast<double>(relative.look->evidence[i][static_cast<size_t>(column)]);
+      const double step = static_cast<double>(relative.look->step[static_cast<size_t>(column)]);
+      sum += lateral_m > 0 ? -step : step;
       ++n;
     }
-    sum += std::max(sums[0], sums[1]);
   }
   return n < kFewestStepLooks ? 0.0 : sum / n;
 }
@@ -366,11 +364,11 @@ std::optional<double> EdgeTracker::last_step(const std::array<double, 2>& walls_
   double best = 0;
   double best_m = 0;
   for (double place_m = to_m; place_m > from_m; place_m -= kStepM) {
-    const double evidence = step_evidence(place_m, walls_m);
-    if (evidence > std::max(best, kClearStep)) {
-      best = evidence;
+    const double step = std::abs(brightening(place_m, walls_m));
+    if (step > std::max(best, kClearStep)) {
+      best = step;
       best_m = place_m;
-    } else if (evidence < kBesideStep * best) {
+    } else if (step < kBesideStep * best) {
       if (best_m < to_m - kStepTopM) break;
       best = 0;  // the near side of something farther away
     }

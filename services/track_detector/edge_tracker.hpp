@@ -49,8 +49,8 @@ class EdgeTracker {
   const std::vector<SettledEdge>& follow(const std::vector<UprightEdge>& found, const UprightProfile& profile,
                                          const LandmarkPicture& picture, double way_m);
   void forget();
-  /// Along the two walls at those lateral offsets: the last place in the range where the brightness steps, seen over
-  /// the near looks together.
+  /// Along the two walls at those lateral offsets: the last place in the range where the brightness steps alike on
+  /// both, seen over the near looks together.
   [[nodiscard]] std::optional<double> last_step(const std::array<double, 2>& walls_m, double from_m, double to_m) const;
 
  private:
@@ -91,7 +91,7 @@ class EdgeTracker {
   [[nodiscard]] std::array<Spot, 2> locate(double bearing, int sign) const;
   [[nodiscard]] std::optional<double> measure(const Relative& relative, double bearing, int sign) const;
   [[nodiscard]] std::optional<SettledEdge> refine(Spot& spot, int sign) const;
-  [[nodiscard]] double step_evidence(double place_m, const std::array<double, 2>& walls_m) const;
+  [[nodiscard]] double brightening(double place_m, const std::array<double, 2>& walls_m) const;
   [[nodiscard]] static Relative itself(const Look& look) { return {&look, 0, 0, 0, 1, 0}; }
   void settle();
 

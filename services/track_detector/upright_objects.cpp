@@ -25,7 +25,7 @@ constexpr double kSameWallM = 0.3;
 constexpr double kMouthM = 8;
 constexpr double kExitSigmaM = 0.12;
 constexpr double kStripeRmsM = 0.03;
-constexpr double kGlareM = 0.1;         // an end in glare looks so much nearer
+constexpr double kExitOffM = 0.6;       // of an exit that one side's edge told
 constexpr double kPanelM = 2.3;         // of the lining, at most
 constexpr double kExitLateralM = 0.6;   // an exit's edge from the wall
 constexpr double kExitWideShare = 0.7;  // of the widest bearing: near enough for the exit's place
@@ -371,8 +371,8 @@ void UprightObjects::release_exit(const EdgeTracker& tracker, double way_m) {
   if (first.pictures == 0 || first.place_m > way_m + kHoldM) return;
   const bool both = first.place_m - other.place_m < kSidesM;
   double place_m = both ? 0.5 * (first.place_m + other.place_m) : first.place_m;
-  // The last piece of wall may be as bright as the land behind it: its end is faint.
-  if (const auto end_m = tracker.last_step(tunnel_.wall_m, place_m + kGlareM, place_m + kPanelM)) place_m = *end_m;
+  // The last piece of wall may be nearly as bright as the land behind it: its end is faint.
+  if (const auto end_m = tracker.last_step(tunnel_.wall_m, place_m - kExitOffM, place_m + kPanelM)) place_m = *end_m;
   objects_.push_back(
       {LandmarkType::portal_out, place_m, 0, std::hypot(kExitSigmaM, both ? 0.0 : kOneSideSigmaM), first.pictures});
   tunnel_ = {};

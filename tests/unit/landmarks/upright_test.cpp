@@ -18,8 +18,10 @@ struct Corner {
   double place_m, lateral_m, inner_grey, outer_grey, wall_grey = 100, deep_grey = 100;
 };
 
-// The corners as seen from way_m: edges as a picture of 640 columns would show them.
-UprightProfile see(const std::vector<Corner>& corners, double way_m, std::vector<UprightEdge>& edges) {
+// The corners as seen from way_m: edges as a picture of 640 columns would show them. score_share: less where the ground
+// behind them is uneven in brightness.
+UprightProfile see(const std::vector<Corner>& corners, double way_m, std::vector<UprightEdge>& edges,
+                   float score_share = 1) {
   UprightProfile profile;
   profile.cell = 0.002;
   profile.widest = kWidest;
@@ -40,6 +42,7 @@ UprightProfile see(const std::vector<Corner>& corners, double way_m, std::vector
   }
   std::sort(edges.begin(), edges.end(), [](const auto& a, const auto& b) { return a.bearing < b.bearing; });
   profile.score = profile.step;
+  for (float& score : profile.score) score *= score_share;
   return profile;
 }
 
@@ -47,14 +50,15 @@ constexpr double kDay = 80;  // grey levels beside the track
 constexpr double kNight = 6;
 constexpr double kLining = 32;
 
-std::vector<UprightObject> pass(const std::vector<Corner>& corners, double to_m, double beside_grey = kDay) {
+std::vector<UprightObject> pass(const std::vector<Corner>& corners, double to_m, double beside_grey = kDay,
+                                float score_share = 1) {
   EdgeTracker tracker;
   UprightObjects objects;
   std::vector<UprightObject> told;
   std::vector<UprightEdge> edges;
   const LandmarkPicture picture;
   for (double way_m = 0; way_m < to_m; way_m += kStepM) {
-    const auto profile = see(corners, way_m, edges);
+    const auto profile = see(corners, way_m, edges, score_share);
     const auto& settled = tracker.follow(edges, profile, picture, way_m);
     for (const auto& object : objects.add(settled, tracker, way_m, beside_grey)) told.push_back(object);
   }
@@ -129,6 +133,20 @@ TEST(Uprights, TheFaintEndOfABrightWallIsThePortalOut) {
   EXPECT_NEAR(told[1].place_m, 70.5, 0.08);
 }
 
+// As in a drawn tunnel: half a metre of panel, nearly as bright as the uneven land behind it.
+TEST(Uprights, AShortBrightPanelBelongsToTheTunnel) {
+  std::vector<Corner> corners;
+  for (const double side : {1.0, -1.0}) {
+    corners.push_back({40, side * 2.7, 70, 120, 60, 15});
+    corners.push_back({70, side * 2.7, 205, 120, 205, 200});
+    corners.push_back({70.5, side * 2.7, 214, 205, 214, 200});
+  }
+  const auto told = pass(corners, 80, kDay, 0.2F);
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_EQ(told[1].type, LandmarkType::portal_out);
+  EXPECT_NEAR(told[1].place_m, 70.5, 0.08);
+}
+
 // Greys of a drawn tunnel: the camera is used to the dark, and one wall's panel as bright as land was before it.
 TEST(Uprights, APanelThatGlaresBeforeTheEndIsNotThePortalOut) {
   std::vector<Corner> corners;
@@ -156,6 +174,7 @@ TEST(Uprights, NoiseIsNoLastStepOfAWall) {
     for (; way_m < 30; way_m += kStepM) {
       auto profile = see({}, way_m, edges);
       for (float& score : profile.score) score = static_cast<float>(0.6 * random.normal());
+      for (float& step : profile.step) step = static_cast<float>(1.5 * random.normal());
       tracker.follow(edges, profile, {}, way_m);
     }
     EXPECT_FALSE(tracker.last_step({-2.7, 2.7}, way_m, way_m + 2.3)) << "seed " << seed;
