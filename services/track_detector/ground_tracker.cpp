@@ -122,7 +122,7 @@ GroundTracker::Mean GroundTracker::mean_of(const Thing& thing) const {
 double GroundTracker::confidence(const Thing& thing) const {
   const double score = thing.score / thing.clearness;
   const double by_score = tracking_.log_odds ? 1 / (1 + std::exp(tracking_.usual_score - score))
-                                             : 1 - 0.5 * std::exp(-score / tracking_.usual_score);
+                                             : 1 - 0.5 * std::exp(-std::pow(score / tracking_.usual_score, 2));
   return by_score * (1 - std::exp(-tracking_.trust_a_look * thing.seen));
 }
 
