@@ -8,7 +8,7 @@ namespace railfix::fusion {
 namespace {
 
 constexpr double kRatioSigmas = 5.0;
-constexpr double kRatioApartS = 2.0;
+constexpr double kRatioApartS = 10.0;  // longer than slips last
 constexpr double kTaughtShare = 0.1;  // of the sigma before any reference
 constexpr double kMissingS = 300;     // a sensor that has not measured for so long does not measure any more
 constexpr unsigned kBitsOfOne = 8;    // of Hypotheses::slipping
