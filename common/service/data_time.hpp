@@ -11,6 +11,9 @@ namespace railfix::service {
 
 class DataTime {
  public:
+  /// Who plays at real pace says the time so often: a service that comes back waits no longer for it.
+  static constexpr int64_t kPeriodNs = core::kNsPerSecond / 4;
+
   /// As it comes. Its way to here counts while the two hosts' clocks agree well enough to tell it.
   void hear(const msg::DataClock& clock, int64_t wall_ns, int64_t monotonic_ns) {
     const int64_t way_ns = wall_ns - clock.wall_ns();

@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/time.hpp"
+#include "service/data_time.hpp"
 
 namespace railfix::frame_grabber {
 namespace {
@@ -172,7 +173,8 @@ void FrameGrabberService::play(const dataset::Picture& picture) {
   }
   context_.health().input();
   newest_ns_ = std::max(newest_ns_, picture.stamp_ns);
-  if (!lossless() && grabbed_ns - clock_sent_ns_ >= core::kNsPerSecond) publish_clock(newest_ns_, grabbed_ns, false);
+  if (!lossless() && grabbed_ns - clock_sent_ns_ >= service::DataTime::kPeriodNs)
+    publish_clock(newest_ns_, grabbed_ns, false);
   publish(raw_of(picture.stamp_ns, picture.grey), grabbed_ns);
   if (!lossless()) return player_->complete();
   sent_.note(messaging::sent_samples(context_.participant()));

@@ -110,6 +110,7 @@ std::optional<TrainEstimate> Fusion::add(Event event) {
   if (!believable(event)) return std::nullopt;
   newest_ns_[event.index()] = std::max(newest_ns_[event.index()], stamp_of(event));
   if (auto* fix = std::get_if<FixInput>(&event)) {
+    catch_up();
     start_position(*fix);
     change_track(*fix);
   }
@@ -125,6 +126,7 @@ std::optional<TrainEstimate> Fusion::tick(int64_t now_ns) {
   const double patience_s = moved ? parameters_->output_period_s : parameters_->sensor_timeout_s;
   if (core::seconds(now_ns - last_output_ns_) < patience_s) return std::nullopt;
   if (now_ns <= now_->stamp_ns()) return std::nullopt;
+  catch_up();
   ScaleTrial ahead = *now_;
   ahead.predict_to(now_ns);
   return give(ahead.estimate());
@@ -133,6 +135,11 @@ std::optional<TrainEstimate> Fusion::tick(int64_t now_ns) {
 std::optional<int64_t> Fusion::latest_stamp_ns() const {
   if (!now_) return std::nullopt;
   return now_->stamp_ns();
+}
+
+const Estimator* Fusion::estimator() {
+  catch_up();
+  return now_ ? &now_->main() : nullptr;
 }
 
 // A single wild stamp must not carry the train away; a clock that was really set is followed.
@@ -158,7 +165,10 @@ bool Fusion::is_clock_set_back(const Event& event) {
     backward_.clear();
     return false;
   }
-  if (backward_.empty()) before_backward_ = *now_;
+  if (backward_.empty()) {
+    catch_up();
+    before_backward_ = *now_;
+  }
   backward_.push_back(event);
   return backward_.size() >= kBackwardToBelieve;
 }
@@ -175,6 +185,7 @@ std::optional<TrainEstimate> Fusion::set_clock_back() {
   now_->rebase_clock(first_ns - kSpacingNs);
   events_.clear();
   snapshots_.assign(1, *now_);
+  replay_from_ns_.reset();
   newest_ns_.fill(0);
   ahead_in_row_.fill(0);
   last_output_ns_ = last_odometry_ns_ = 0;
@@ -220,16 +231,31 @@ std::optional<TrainEstimate> Fusion::insert(const Event& event) {
   if (const auto* step = std::get_if<OdometryInput>(&event))
     last_odometry_ns_ = std::max(last_odometry_ns_, step->stamp_ns);
   const bool wanted = due(event);
-  std::optional<TrainEstimate> estimate;
   // Before the insertion, which may move the deque's begin.
   const auto mine = place - events_.begin();
+  const bool late = place != events_.end();
   events_.insert(place, event);
-  auto next = mine;
-  if (mine + 1 < static_cast<std::ptrdiff_t>(events_.size())) next = rewind_before(stamp_of(event));
+  if (late) replay_from_ns_ = std::min(replay_from_ns_.value_or(stamp_of(event)), stamp_of(event));
+  // Of many late ones in a row, as of a sensor that was away, the time is replayed once.
+  if (late && !wanted) return std::nullopt;
+  const auto estimate = replay_from_ns_ ? catch_up(wanted ? mine : -1) : run_from(mine, wanted ? mine : -1);
+  return estimate ? give(*estimate) : std::nullopt;
+}
+
+std::optional<TrainEstimate> Fusion::catch_up(std::ptrdiff_t wanted) {
+  if (!replay_from_ns_) return std::nullopt;
+  const auto next = rewind_before(*replay_from_ns_);
+  replay_from_ns_.reset();
+  return run_from(next, wanted);
+}
+
+// Gives the state after the wanted event.
+std::optional<TrainEstimate> Fusion::run_from(std::ptrdiff_t next, std::ptrdiff_t wanted) {
+  std::optional<TrainEstimate> estimate;
   int rewinds = 0;
   while (next < static_cast<std::ptrdiff_t>(events_.size())) {
     run(events_[static_cast<size_t>(next)]);
-    if (wanted && next == mine) estimate = now_->estimate();
+    if (next == wanted) estimate = now_->estimate();
     ++next;
     if (now_->slip_began() && ++rewinds <= kMostRewinds) {
       const int64_t found_ns = now_->stamp_ns();
@@ -240,7 +266,7 @@ std::optional<TrainEstimate> Fusion::insert(const Event& event) {
     }
   }
   forget_old();
-  return estimate ? give(*std::move(estimate)) : std::nullopt;
+  return estimate;
 }
 
 void Fusion::run(const Event& event) {

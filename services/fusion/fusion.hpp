@@ -1,7 +1,7 @@
 // The fusion of all sensors: takes measurements in any order, uses each at its own time, and gives the train's state.
 //
 // The state after a set of measurements does not depend on the order in which they came: late ones are put where they
-// belong and everything behind them is replayed from a snapshot.
+// belong and everything behind them is replayed from a snapshot, when the next state is wanted.
 #pragma once
 
 #include <array>
@@ -45,7 +45,8 @@ class Fusion {
   std::optional<TrainEstimate> tick(int64_t now_ns);
   /// Stamp of the newest measurement; nothing before the first.
   [[nodiscard]] std::optional<int64_t> latest_stamp_ns() const;
-  [[nodiscard]] const Estimator* estimator() const { return now_ ? &now_->main() : nullptr; }
+  /// With everything that was added; nullptr before the first measurement.
+  [[nodiscard]] const Estimator* estimator();
   [[nodiscard]] const FusionCounts& counts() const { return counts_; }
   [[nodiscard]] SavedScalesAre saved_scales() const;
   /// The sensors are others than those whose scales were saved; those that this trip has confirmed stay.
@@ -64,6 +65,8 @@ class Fusion {
   void change_track(FixInput& fix);
   void remember_reference(const OdometryInput& step);
   std::optional<TrainEstimate> insert(const Event& event);
+  std::optional<TrainEstimate> catch_up(std::ptrdiff_t wanted = -1);
+  std::optional<TrainEstimate> run_from(std::ptrdiff_t next, std::ptrdiff_t wanted);
   void run(const Event& event);
   std::ptrdiff_t rewind_before(int64_t stamp_ns);
   void forget_old();
@@ -76,8 +79,9 @@ class Fusion {
   std::optional<track::Ways> ways_;  // made when the first other track is declared
   std::optional<SavedScales> saved_;
   std::optional<ScaleTrial> now_;
-  std::deque<Event> events_;          // by stamp, then kind
-  std::deque<ScaleTrial> snapshots_;  // each has used all events up to its stamp
+  std::deque<Event> events_;               // by stamp, then kind
+  std::deque<ScaleTrial> snapshots_;       // each has used all events up to its stamp
+  std::optional<int64_t> replay_from_ns_;  // late events since then are not used yet
   FusionCounts counts_;
   int64_t last_output_ns_ = 0;
   int64_t last_odometry_ns_ = 0;

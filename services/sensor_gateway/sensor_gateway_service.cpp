@@ -1,6 +1,9 @@
 #include "sensor_gateway/sensor_gateway_service.hpp"
 
+#include <algorithm>
+
 #include "core/time.hpp"
+#include "service/data_time.hpp"
 
 namespace railfix::sensor_gateway {
 namespace {
@@ -22,13 +25,14 @@ dataset::Sensors read(const SensorGatewayConfig& config) {
 SensorGatewayService::SensorGatewayService(const Config& config, service::Context& context)
     : config_(config),
       context_(context),
+      born_wall_ns_(core::wall_ns()),
+      imu_(context.writer(messaging::topics::imu_sample)),
+      wheel_(context.writer(messaging::topics::wheel_sample)),
+      gnss_(context.writer(messaging::topics::gnss_fix)),
       playback_(read(config)),
       sinks_{[this](const dataset::ImuRow& row) { publish(row); },
              [this](const dataset::WheelRow& row) { publish(row); },
-             [this](const dataset::GnssRow& row) { publish(row); }},
-      imu_(context.writer(messaging::topics::imu_sample)),
-      wheel_(context.writer(messaging::topics::wheel_sample)),
-      gnss_(context.writer(messaging::topics::gnss_fix)) {
+             [this](const dataset::GnssRow& row) { publish(row); }} {
   const auto& sensors = playback_.sensors();
   context_.log().info("has {} IMU, {} wheel and {} GNSS samples", sensors.imu.size(), sensors.wheel.size(),
                       sensors.gnss.size());
@@ -44,15 +48,18 @@ SensorGatewayService::SensorGatewayService(const Config& config, service::Contex
   }
 }
 
-void SensorGatewayService::begin(int64_t data_ns) {
+void SensorGatewayService::begin(int64_t from_ns) {
   if (begun_) return;
   begun_ = true;
-  playback_.skip_to(data_ns - core::to_ns(config_.lead_s));
+  playback_.skip_to(from_ns);
   context_.health().active();
 }
 
+// A device delivers nothing from before it is asked: started anew in the middle of a ride, this one neither.
 void SensorGatewayService::follow(const msg::DataClock& clock) {
-  begin(clock.data_ns());
+  const int64_t lead_from_ns = clock.data_ns() - core::to_ns(config_.lead_s);
+  const int64_t born_ns = clock.data_ns() - (clock.wall_ns() - born_wall_ns_);
+  begin(clock.lock_step() != 0 ? lead_from_ns : std::max(lead_from_ns, born_ns));
   if (clock.lock_step() != 0 || clock.ended() != 0) {
     anchor_.reset();
     playback_.play_until(clock.data_ns(), sinks_);
@@ -82,7 +89,7 @@ void SensorGatewayService::play_by_wall_clock() {
     anchor_.reset();
     return end();
   }
-  if (wall_ns - clock_sent_ns_ >= core::kNsPerSecond) publish_clock(data_ns, wall_ns, false);
+  if (wall_ns - clock_sent_ns_ >= service::DataTime::kPeriodNs) publish_clock(data_ns, wall_ns, false);
 }
 
 void SensorGatewayService::publish_clock(int64_t data_ns, int64_t wall_ns, bool ended) {

@@ -17,7 +17,7 @@ class SensorGatewayService {
  private:
   void follow(const msg::DataClock& clock);
   core::Result<std::string> start();
-  void begin(int64_t data_ns);
+  void begin(int64_t from_ns);
   void play_by_wall_clock();
   void publish_clock(int64_t data_ns, int64_t wall_ns, bool ended);
   void end();
@@ -31,11 +31,12 @@ class SensorGatewayService {
   };
   Config config_;
   service::Context& context_;
-  Playback playback_;
-  Sinks sinks_;
-  messaging::Writer<msg::ImuSample> imu_;
+  int64_t born_wall_ns_;
+  messaging::Writer<msg::ImuSample> imu_;  // are found while the tables are read
   messaging::Writer<msg::WheelSample> wheel_;
   messaging::Writer<msg::GnssFix> gnss_;
+  Playback playback_;
+  Sinks sinks_;
   std::optional<messaging::Writer<msg::DataClock>> clock_;  // with clock own
   std::optional<Anchor> anchor_;                            // real pace, while it plays
   bool begun_ = false;

@@ -126,6 +126,33 @@ TEST(Fusion, LateMeasurementsAreUsedAtTheirOwnTime) {
   EXPECT_NEAR(a.scale(Odometer::camera), b.scale(Odometer::camera), 1e-9);
 }
 
+// A sensor that was away delivers what it has kept at once: the same state, and the time is replayed once.
+TEST(Fusion, ManyLateMeasurementsInARowAreUsedAtTheirOwnTimeToo) {
+  Fusion in_order = fusion_at(100);
+  Fusion burst = fusion_at(100);
+  std::vector<Event> kept;
+  for (int i = 1; i <= 400; ++i) {
+    const double t_s = i * 0.02;
+    const Event wheel = wheel_at(t_s, 10 * t_s);
+    in_order.add(wheel);
+    const bool away = i > 300 && i <= 350;
+    if (away) kept.push_back(wheel);
+    if (!away) {
+      for (const auto& late : kept) EXPECT_FALSE(burst.add(late));
+      kept.clear();
+    }
+    if (!away) burst.add(wheel);
+    if (i % 5 != 0) continue;
+    const auto expected = in_order.add(step_at(t_s, 10, 0.1));
+    const auto state = burst.add(step_at(t_s, 10, 0.1));
+    ASSERT_TRUE(expected && state) << t_s;
+    if (t_s < 7.1) continue;
+    EXPECT_NEAR(state->distance_m, expected->distance_m, 1e-9);
+    EXPECT_NEAR(state->over_m, expected->over_m, 1e-9);
+  }
+  EXPECT_EQ(burst.counts().too_late, 0U);
+}
+
 // Every picture is used and answered at once, however many came before it and whatever else the history holds.
 TEST(Fusion, EveryOdometryStepGivesAState) {
   for (const bool inertial : {false, true}) {

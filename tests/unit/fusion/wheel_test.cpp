@@ -117,6 +117,27 @@ TEST(Wheel, WhatItCountedWhileItWasSilentIsNotBelieved) {
   EXPECT_LT(train.worst_error_m, 3);
 }
 
+// sensor_gateway was away: the pulses of the gap are counted way, and may be slip.
+TEST(Wheel, WhatItCountedInAGapIsNoSlipAndASlipInItIsHeld) {
+  for (const double gap_s : {0.4, 1.0, 1.5}) {
+    for (const double slip : {0.0, 0.3, -0.3}) {
+      Train train;
+      train.run(60, 0.2);
+      train.wheel = train.imu = false;
+      train.slip = slip;
+      train.run(gap_s, 0.2);
+      train.wheel = train.imu = true;
+      train.slip = 0;
+      train.run(0.1, 0.2);
+      if (slip == 0) {
+        EXPECT_EQ(train.state->reason, "") << gap_s;
+      }
+      train.run(5, 0.2);
+      EXPECT_EQ(train.state->reason, "") << gap_s << " s with " << slip;
+    }
+  }
+}
+
 // Its rival without wheel once promised 19 km, because the clock was doubted for as long as the camera was away.
 TEST(Wheel, TheReturnOfASilentCameraDoesNotDoubtTheClock) {
   Train train;
