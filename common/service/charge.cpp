@@ -31,8 +31,17 @@ void Charge::hear(const ChargeBeat& beat, int64_t now_ns) {
   }
   Peer& peer = peers_[beat.instance];
   peer.beat = beat;
-  peer.heard_ns = now_ns;
-  if (beat.in_charge) holder_heard_ns_ = now_ns;
+  peer.heard_ns = turns_ns(now_ns);
+  if (beat.in_charge) holder_heard_ns_ = peer.heard_ns;
+}
+
+int64_t Charge::turns_ns(int64_t now_ns) const {
+  return turned_ns_ + std::min(now_ns - updated_ns_, kTurnNs);
+}
+
+void Charge::found_nobody(int64_t now_ns) {
+  if (!begun_ || in_charge_ || turns_ns(now_ns) - begun_ns_ > kLonelyNs) return;
+  listens_until_ns_ = std::max(listens_until_ns_, turns_ns(now_ns) + kNewcomerNs);
 }
 
 // With nobody to take over, being held up does no harm.
@@ -88,21 +97,24 @@ void Charge::stand_by(int64_t now_ns) {
 }
 
 bool Charge::update(int fitness, int64_t now_ns) {
+  const bool was_held_up = begun_ && held_up(now_ns);
+  turned_ns_ = turns_ns(now_ns);
+  updated_ns_ = now_ns;
   if (!begun_) {
     begun_ = true;
-    if (!in_charge_) listens_until_ns_ = now_ns + kNewcomerNs;
-  } else if (held_up(now_ns)) {
-    stand_by(now_ns);
+    begun_ns_ = turned_ns_;
+    if (!in_charge_) listens_until_ns_ = turned_ns_ + kNewcomerNs;
+  } else if (was_held_up) {
+    stand_by(turned_ns_);
   }
-  updated_ns_ = now_ns;
   worthless_ = fitness == 0;
-  settle(fitness, now_ns);
-  look_at_peers(now_ns);
+  settle(fitness, turned_ns_);
+  look_at_peers(turned_ns_);
   if (in_charge_) {
-    if (must_stand_by(now_ns)) stand_by(now_ns);
+    if (must_stand_by(turned_ns_)) stand_by(turned_ns_);
     return false;
   }
-  in_charge_ = may_take(now_ns);
+  in_charge_ = may_take(turned_ns_);
   return in_charge_;
 }
 

@@ -5,6 +5,9 @@
 //   another host, listens first.
 // - Who is in charge stays so: one that comes back stands by, however strong it is.
 // - Who hears of nobody in charge for `silence` takes charge; the best first, the others give it one more `silence`.
+// - Silence is counted in turns of one's own: a turn that comes late counts as one of kTurnNs. Who is held up itself,
+// on
+//   a host with too much to do, cannot tell whether the other one was silent.
 // - Who was held up for so long that somebody else may have taken charge (SIGSTOP, an overloaded host) stands by.
 // - Two in charge (a cable is plugged in again): the worse one stands by at once.
 // - A standby whose output has been better for kBetterNs gets the charge; for kWorthlessNs when that of the one in
@@ -32,8 +35,11 @@ struct ChargeBeat {
 
 class Charge {
  public:
-  /// The first one that starts listens for so long before it takes charge: others have to find it first.
+  /// The first one that starts listens for so long before it takes charge: others have to find it first. It counts
+  /// from the moment when anybody of the train was found; nobody is waited for longer than kLonelyNs.
   static constexpr int64_t kNewcomerNs = 1'000'000'000;
+  static constexpr int64_t kLonelyNs = 5'000'000'000;
+  static constexpr int64_t kTurnNs = 50'000'000;
   static constexpr int64_t kSettledNs = 2'000'000'000;
   static constexpr int64_t kBetterNs = 5'000'000'000;
   static constexpr int64_t kWorthlessNs = 150'000'000;
@@ -42,6 +48,8 @@ class Charge {
 
   /// Times are of the monotonic clock.
   void hear(const ChargeBeat& beat, int64_t now_ns);
+  /// Nobody of the train has been found yet: to be called before update() as long as that is so.
+  void found_nobody(int64_t now_ns);
   /// To be called many times within `silence`. True when the charge was taken by this call.
   bool update(int fitness, int64_t now_ns);
   /// May it send at this moment? False also when update() is overdue by so much that somebody else may have begun.
@@ -55,10 +63,12 @@ class Charge {
  private:
   struct Peer {
     ChargeBeat beat;
-    int64_t heard_ns = 0;
+    int64_t heard_ns = 0;                    // in own turns, as all that follows
     std::optional<int64_t> better_since_ns;  // in fitness than this one
   };
   [[nodiscard]] bool held_up(int64_t now_ns) const;
+  /// Time in own turns.
+  [[nodiscard]] int64_t turns_ns(int64_t now_ns) const;
   [[nodiscard]] static bool better(const ChargeBeat& a, const ChargeBeat& b);
   void settle(int fitness, int64_t now_ns);
   [[nodiscard]] bool must_stand_by(int64_t now_ns) const;
@@ -75,7 +85,9 @@ class Charge {
   int64_t more_since_ns_ = 0;  // ... since then
   bool in_charge_ = false;
   bool begun_ = false;
-  int64_t updated_ns_ = 0;
+  int64_t updated_ns_ = 0;  // of the monotonic clock ...
+  int64_t turned_ns_ = 0;   // ... and in own turns
+  int64_t begun_ns_ = 0;
   int64_t listens_until_ns_ = 0;  // does not take charge before
   int64_t holder_heard_ns_ = 0;   // the last word of one in charge
   std::map<uint64_t, Peer> peers_;

@@ -24,7 +24,8 @@ ChargeBeat beat_of(const msg::InCharge& said) {
 
 Standby::Standby(messaging::Participant& participant, messaging::Queue& queue, std::string service,
                  const CommonConfig& common, bool beside, ChargeHandlers handlers)
-    : service_(std::move(service)),
+    : participant_(participant),
+      service_(std::move(service)),
       host_(common.host),
       expects_peers_(common.ownership_strength > 0 || beside),
       handlers_(std::move(handlers)),
@@ -36,6 +37,8 @@ Standby::Standby(messaging::Participant& participant, messaging::Queue& queue, s
 
 void Standby::update() {
   const bool was = charge_.beat().in_charge;
+  found_somebody_ = found_somebody_ || participant_.connections().remote_endpoints > 0;
+  if (!found_somebody_) charge_.found_nobody(core::monotonic_ns());
   const bool taken = charge_.update(handlers_.fitness(), core::monotonic_ns());
   if (has_company()) say(false);
   if (taken || (was && !charge_.beat().in_charge)) handlers_.changed(taken);

@@ -28,9 +28,11 @@ class Standby {
   void say(bool leaving);
   [[nodiscard]] bool has_company() const { return expects_peers_ || !charge_.alone(); }
 
+  messaging::Participant& participant_;
   std::string service_;
   std::string host_;
   bool expects_peers_;
+  bool found_somebody_ = false;  // of the train
   ChargeHandlers handlers_;
   Charge charge_;
   messaging::Writer<msg::InCharge> writer_;

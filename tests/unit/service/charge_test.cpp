@@ -244,6 +244,46 @@ TEST(Charge, WhenNobodyIsWorthAnythingYetTheOneInChargeStays) {
   }
 }
 
+// On a busy host every other turn comes late, and the beats of the other one wait in a queue meanwhile.
+TEST(Charge, WhoseOwnTurnsComeLateDoesNotTakeTheOtherOneForSilent) {
+  Charge standby(1, 10, kSilenceNs);
+  ChargeBeat holder{2, 20, 4, true, false, "coach"};
+  int64_t now_ns = 0;
+  for (; now_ns < 3000 * kMs; now_ns += kPeriodNs) {
+    standby.hear(holder, now_ns);
+    standby.update(4, now_ns);
+  }
+  for (int i = 0; i < 5; ++i) EXPECT_FALSE(standby.update(4, now_ns += 150 * kMs)) << "held up itself for 0.75 s";
+  standby.hear(holder, now_ns);
+  int64_t silent_ns = 0;
+  while (!standby.update(4, now_ns += kPeriodNs)) silent_ns += kPeriodNs;
+  EXPECT_LE(silent_ns, kSilenceNs + kPeriodNs) << "in time again: as quick as ever";
+}
+
+// Where discovery takes seconds the other one may be there and not be heard yet.
+TEST(Charge, ANewcomerWaitsUntilItHasFoundAnybodyAndListensThen) {
+  for (const bool finds_somebody : {true, false}) {
+    Charge newcomer(1, 20, kSilenceNs);
+    const ChargeBeat holder{2, 10, 4, true, false, "cab"};
+    int64_t now_ns = 0;
+    for (; now_ns < 4000 * kMs; now_ns += kPeriodNs) {
+      newcomer.found_nobody(now_ns);
+      ASSERT_FALSE(newcomer.update(4, now_ns));
+    }
+    for (; finds_somebody && now_ns < 4900 * kMs; now_ns += kPeriodNs) ASSERT_FALSE(newcomer.update(4, now_ns));
+    for (; finds_somebody && now_ns < 20'000 * kMs; now_ns += kPeriodNs) {
+      newcomer.hear(holder, now_ns);
+      ASSERT_FALSE(newcomer.update(4, now_ns));
+    }
+    bool taken = finds_somebody;
+    for (; !taken && now_ns < 7000 * kMs; now_ns += kPeriodNs) {
+      newcomer.found_nobody(now_ns);
+      taken = newcomer.update(4, now_ns);
+    }
+    EXPECT_TRUE(taken) << "nobody is there: it does not wait for ever";
+  }
+}
+
 TEST(Charge, WhoEndsInOrderIsFollowedAtOnce) {
   Train train;
   train.run(10);
