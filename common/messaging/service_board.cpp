@@ -7,10 +7,18 @@ namespace {
 
 constexpr int64_t kPlayerNs = 5 * core::kNsPerSecond;
 
+// While a service is swapped two of its processes speak: the first one counts until it has ended.
+bool is_beside(const ServiceSeen& seen, const msg::ServiceStatus& status, int64_t now_ns) {
+  const int64_t ago_ns = now_ns - seen.received_ns;
+  return seen.received_ns != 0 && status.pid() != seen.status.pid() && !seen.stopped() && ago_ns >= 0 &&
+         ago_ns < ServiceBoard::kSilentNs;
+}
+
 }  // namespace
 
 void ServiceBoard::note(const msg::ServiceStatus& status, int64_t now_ns) {
   ServiceSeen& seen = services_[key_of(status)];
+  if (is_beside(seen, status, now_ns)) return;
   const bool same = seen.received_ns != 0 && seen.alive && seen.status.state() == status.state() &&
                     std::string(seen.status.reason().c_str()) == status.reason().c_str();
   if (!same) seen.since_ns = now_ns;

@@ -58,6 +58,24 @@ TEST(ServiceBoard, TellsDeadFromStartedAnew) {
   EXPECT_EQ(board.find("odometry")->since_ns, dead_ns + 3) << "stopped, not dead";
 }
 
+TEST(ServiceBoard, OfTwoThatAreSwappedTheFirstCountsUntilItHasEnded) {
+  ServiceBoard board;
+  int64_t now_ns = kBegin;
+  board.note(status(msg::STATE_ACTIVE, "", 1), now_ns);
+  for (int i = 0; i < 8; ++i) {
+    board.note(status(msg::STATE_READY, "stands by", 2), now_ns += 100'000'000);
+    EXPECT_EQ(board.find("odometry")->status.state(), msg::STATE_ACTIVE);
+    board.note(status(msg::STATE_ACTIVE, "", 1), now_ns += 100'000'000);
+  }
+  EXPECT_EQ(board.find("odometry")->since_ns, kBegin) << "nothing has changed";
+  board.note(status(msg::STATE_STOPPED, "", 1), now_ns);
+  board.note(status(msg::STATE_ACTIVE, "", 2), now_ns);
+  EXPECT_EQ(board.find("odometry")->status.pid(), 2U);
+  // One that was killed has said nothing of its end.
+  board.note(status(msg::STATE_STARTING, "", 3), now_ns + kSilentNs);
+  EXPECT_EQ(board.find("odometry")->status.pid(), 3U);
+}
+
 TEST(ServiceBoard, NobodyIsSilentBecauseTheListenerWasHeldUp) {
   ServiceBoard board;
   board.note_silence(kBegin);
