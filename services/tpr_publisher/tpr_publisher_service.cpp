@@ -1,5 +1,6 @@
 #include "tpr_publisher/tpr_publisher_service.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/time.hpp"
@@ -115,24 +116,34 @@ TprPublisherService::TprPublisherService(const Config& config, service::Context&
   context.every(kTickPeriod, [this] { on_tick(); });
   share_charge();
   context.at_restart([this](int64_t) { restart(); });
-  context.on_command("packet_58", [this](const std::string& hex) -> core::Result<std::string> {
-    if (const auto taken = take_packet_58(hex); !taken.ok()) return taken.error();
-    context_.keep(hex);
-    return std::string("position report parameters taken over");
-  });
-  // The trackside sends it once: it outlives a restart.
-  if (!context.kept().empty() && !context.common().lock_step && take_packet_58(context.kept()).ok())
+  // It outlives a restart, also while the on-board unit is silent.
+  const auto kept = etcs::parse_hex(context.kept());
+  if (!context.kept().empty() && !context.common().lock_step && kept.ok() && take_packet_58(kept.value()).ok()) {
+    packet_58_ = kept.value();
     context.log().info("position report parameters of packet 58 as before");
+  }
 }
 
-core::Status TprPublisherService::take_packet_58(const std::string& hex) {
-  const auto bytes = etcs::parse_hex(hex);
-  if (!bytes.ok()) return bytes.error();
-  const auto parameters = etcs::decode_report_parameters(bytes.value());
+core::Status TprPublisherService::take_packet_58(std::span<const uint8_t> packet) {
+  const auto parameters = etcs::decode_report_parameters(packet);
   if (!parameters.ok()) return parameters.error();
   if (auto status = publisher_.set_parameters(parameters.value()); !status.ok()) return status;
   parameters_ = parameters.value();
   return {};
+}
+
+// It stands in every onboard_status: who was away, or is the second one of two, hears it all the same.
+void TprPublisherService::hear_packet_58(const msg::OnboardStatus& status) {
+  const size_t bytes = std::min<size_t>(status.packet_58_bytes(), status.packet_58().size());
+  const std::span packet(status.packet_58().data(), bytes);
+  // One that was refused may fit when the train's direction is known.
+  if (packet.empty() || (packet_58_refusal_.empty() && std::ranges::equal(packet, packet_58_))) return;
+  packet_58_.assign(packet.begin(), packet.end());
+  const auto taken = take_packet_58(packet);
+  packet_58_refusal_ = taken.ok() ? "" : "packet 58 of onboard_status is not used: " + taken.error().message;
+  if (!taken.ok()) return;
+  context_.keep(etcs::to_hex(packet_58_));
+  context_.log().info("position report parameters taken over");
 }
 
 void TprPublisherService::share_charge() {
@@ -187,6 +198,8 @@ void TprPublisherService::on_state(const msg::TrainState& state) {
     report_trouble_ = outcome.refusal;
   } else if (!onboard_refusal_.empty()) {
     report_trouble_ = onboard_refusal_;
+  } else if (!packet_58_refusal_.empty()) {
+    report_trouble_ = packet_58_refusal_;
   } else if (publisher_.onboard_silent(now)) {
     report_trouble_ = "onboard_status is silent: mode and level as last heard, train integrity not known.";
   } else if (!reference_known_) {
@@ -203,6 +216,7 @@ void TprPublisherService::on_onboard(const msg::OnboardStatus& status) {
   const auto onboard = onboard_of(status);
   const auto taken = onboard.ok() ? publisher_.set_onboard(onboard.value()) : core::Status(onboard.error());
   onboard_refusal_ = taken.ok() ? "" : "onboard_status is not used: " + taken.error().message;
+  hear_packet_58(status);
 }
 
 void TprPublisherService::on_tick() {

@@ -3,7 +3,9 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "messaging/onboard_topic.hpp"
 #include "service/data_time.hpp"
@@ -21,7 +23,8 @@ class TprPublisherService {
   void on_state(const msg::TrainState& state);
   void on_onboard(const msg::OnboardStatus& status);
   void on_tick();
-  core::Status take_packet_58(const std::string& hex);
+  core::Status take_packet_58(std::span<const uint8_t> packet);
+  void hear_packet_58(const msg::OnboardStatus& status);
   void share_charge();
   [[nodiscard]] int fitness() const;
   /// Not in charge: works along and sends nothing.
@@ -40,7 +43,8 @@ class TprPublisherService {
   std::shared_ptr<const track::Map> map_;
   Settings settings_;
   TprPublisher publisher_;
-  std::optional<etcs::ReportParameters> parameters_;  // as told by trackside
+  std::optional<etcs::ReportParameters> parameters_;  // as told by trackside ...
+  std::vector<uint8_t> packet_58_;                    // ... in what was heard last, used or not
   messaging::Writer<msg::TrainPositionReport> writer_;
   std::optional<msg::DataClock> data_clock_;
   service::DataTime data_time_;  // while there is a clock
@@ -51,7 +55,8 @@ class TprPublisherService {
   std::unique_ptr<GroundLink> ground_link_;  // nullptr = no broker
   std::string report_trouble_;
   std::string degraded_by_;
-  std::string onboard_refusal_;  // empty = used
+  std::string onboard_refusal_;    // empty = used
+  std::string packet_58_refusal_;  // the same
 };
 
 }  // namespace railfix::tpr_publisher

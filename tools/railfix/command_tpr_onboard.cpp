@@ -15,6 +15,7 @@
 #include "command_tpr.hpp"
 #include "core/joined.hpp"
 #include "core/time.hpp"
+#include "etcs/report_parameters.hpp"
 #include "etcs/train_position_report.hpp"
 #include "messaging/onboard_topic.hpp"
 #include "topic_listener.hpp"
@@ -84,6 +85,7 @@ class OnboardUnit {
     std::ostringstream text;
     text << "mode " << kModes[status_.m_mode()] << ", level " << kLevels[status_.m_level()];
     if (status_.m_level() == etcs::kLevelNtc) text << " (" << int{status_.nid_ntc()} << ")";
+    if (status_.packet_58_bytes() > 0) text << ", packet 58 of " << status_.packet_58_bytes() << " bytes";
     text << ", integrity " << kIntegrities[status_.q_integrity()] << ", length ";
     status_.train_length_m() > 0 ? text << status_.train_length_m() << " m" : text << "not known";
     return text.str();
@@ -110,9 +112,19 @@ class OnboardUnit {
       // Another number than whoever spoke before: seconds do not come twice.
       const auto seconds = static_cast<uint32_t>(core::wall_ns() / core::kNsPerSecond);
       status_.reports_wanted(std::max(status_.reports_wanted() + 1, seconds));
+    } else if (name == "packet_58") {
+      take_packet_58(word, value);
     } else {
-      throw core::BadInput(word + ": must be mode=, level=, ntc=, integrity=, length= or report=");
+      throw core::BadInput(word + ": must be mode=, level=, ntc=, integrity=, length=, report= or packet_58=");
     }
+  }
+  void take_packet_58(const std::string& word, const std::string& hex) {
+    const auto packet = core::value_or_throw(etcs::parse_hex(hex));
+    if (const auto parameters = etcs::decode_report_parameters(packet); !parameters.ok())
+      throw core::BadInput(word + ": " + parameters.error().message);
+    if (packet.size() > status_.packet_58().size()) throw core::BadInput(word + ": is longer than a packet 58 can be");
+    std::ranges::copy(packet, status_.packet_58().begin());
+    status_.packet_58_bytes(static_cast<uint32_t>(packet.size()));
   }
   msg::OnboardStatus status_;
 };
@@ -214,7 +226,7 @@ void add_tpr_onboard(CLI::App& tpr, Action& chosen) {
       "  mode=FS, OS, SR, SH, UN, SL, SB, TR, PT, SF, IS, NL, LS, SN, RV, PS, and in 4.0.0 AD, SM   level=0, NTC, 1, "
       "2, 3\n"
       "  ntc=NID_NTC   integrity=none, device, driver, lost   length=safe length in m, 0 = not known\n"
-      "  report=border, session, error: a report is wanted now\n"
+      "  report=border, session, error: a report is wanted now   packet_58=HEX: position report parameters\n"
       "onboard_status is sent at every change and once a second until Ctrl-C. Lines of the same words on standard "
       "input\n"
       "change it. Silent for 3 s, tpr_publisher keeps mode and level and says nothing of train integrity.");

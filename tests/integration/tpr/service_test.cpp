@@ -149,7 +149,7 @@ TEST_F(TprService, HearsTheOnboardCommand) {
   input.say("level=NTC ntc=20");
   ASSERT_TRUE(reported(msg::REPORT_LEVEL));
   EXPECT_EQ(last().nid_ntc, 20U);
-  input.say("integrity=driver length=200");
+  input.say("integrity=driver length=200 packet_58=3A80908303E82103E9");
   ASSERT_TRUE(reported(msg::REPORT_INTEGRITY_CONFIRMED));
   input.say("report=session");
   ASSERT_TRUE(reported(msg::REPORT_SESSION));
@@ -162,31 +162,37 @@ TEST_F(TprService, HearsTheOnboardCommand) {
                         [&] { write_state(450); }));
 }
 
-TEST_F(TprService, TakesPacket58FromACommandAndKeepsItOverAKill) {
+// The trackside sends it once. It comes while the service is down, and to one that has no notes: the other one of two.
+TEST_F(TprService, TakesPacket58FromTheOnboardUnitAlsoAfterwardsAndKeepsIt) {
+  messaging::Writer<msg::OnboardStatus> onboard(participant_, topics::onboard_status);
+  msg::OnboardStatus status;
+  status.m_level(etcs::kLevel2);
+  const auto say = [&](const std::string& hex) {
+    const auto packet = hex.empty() ? std::vector<uint8_t>{} : etcs::parse_hex(hex).value();
+    std::ranges::copy(packet, status.packet_58().begin());
+    status.packet_58_bytes(static_cast<uint32_t>(packet.size()));
+    status.stamp_ns(core::wall_ns());
+    onboard.write(status);
+  };
   auto program = std::make_unique<test::Program>(service());
-  ASSERT_TRUE(run_until([&] { return connected() && commands_.matched_readers() > 0; }, [] {}));
-  ASSERT_TRUE(run_until([&] { return reports_.size() == 1; }, [&] { write_state(450); }));
-  msg::ControlRequest request;
-  request.service("tpr_publisher");
-  request.command("packet_58");
-  request.argument("3A80");
-  commands_.write(request);
-  ASSERT_TRUE(run_until([&] { return !reply_.empty(); }, [&] { write_state(450); }));
-  EXPECT_THAT(reply_, HasSubstr("ends inside"));
-  reply_.clear();
-  request.argument("3A80908303E82103E9");  // T_CYCLOC 6 s, D_CYCLOC 1000 m, a location 500 m beyond the LRBG
-  commands_.write(request);
+  ASSERT_TRUE(run_until([&] { return connected() && onboard.matched_readers() > 0; }, [] {}));
+  say("3A80");
+  ASSERT_TRUE(run_until([&] { return reason().find("ends inside") != std::string::npos; }, [&] { write_state(450); }));
   double offset_m = 450;
-  ASSERT_TRUE(run_until([&] { return !reply_.empty(); }, [&] { write_state(offset_m); }));
-  EXPECT_THAT(reply_, HasSubstr("taken over"));
-  program->end(SIGKILL);
-  ASSERT_TRUE(run_until([&] { return states_.matched_readers() == 0; }, [] {}));
-  reports_.clear();
-  program = std::make_unique<test::Program>(service());
-  ASSERT_TRUE(run_until([&] { return !reports_.empty(); }, [&] { write_state(offset_m); }));
-  ASSERT_TRUE(run_until([&] { return reports_.back().reason() == msg::REPORT_LOCATION; },
-                        [&] { write_state(offset_m = std::min(offset_m + 4, 920.0)); }));
-  EXPECT_EQ(reports_.back().nid_lrbg(), tpr_publisher::testing::kC);
+  for (const bool still_said : {true, false}) {
+    program->end(SIGKILL);
+    ASSERT_TRUE(run_until([&] { return states_.matched_readers() == 0; }, [] {}));
+    reports_.clear();
+    // T_CYCLOC 6 s, D_CYCLOC 1000 m, a location 500 m beyond the LRBG
+    say(still_said ? "3A80908303E82103E9" : "");
+    program = std::make_unique<test::Program>(service());
+    offset_m = 450;
+    ASSERT_TRUE(run_until([&] { return !reports_.empty(); }, [&] { write_state(offset_m); }));
+    ASSERT_TRUE(run_until([&] { return reports_.back().reason() == msg::REPORT_LOCATION; },
+                          [&] { write_state(offset_m = std::min(offset_m + 4, 920.0)); }))
+        << (still_said ? "said while it was down" : "kept over a kill");
+    EXPECT_EQ(reports_.back().nid_lrbg(), tpr_publisher::testing::kC);
+  }
 }
 
 }  // namespace

@@ -27,13 +27,10 @@ class TprService : public ::testing::Test {
         map_file_(std::filesystem::temp_directory_path() / (train_ + ".map")),
         participant_(test::network(train_, kDomain)),
         states_(participant_, topics::train_state),
-        commands_(participant_, topics::service_control),
         reports_reader_(participant_, topics::train_position_report, "", queue_,
                         [this](const msg::TrainPositionReport& report) { reports_.push_back(report); }),
         status_reader_(participant_, topics::service_status, "", queue_,
-                       [this](const msg::ServiceStatus& status) { status_ = status; }),
-        reply_reader_(participant_, topics::service_reply, "", queue_,
-                      [this](const msg::ControlReply& reply) { reply_ = reply.text().c_str(); }) {
+                       [this](const msg::ServiceStatus& status) { status_ = status; }) {
     core::ok_or_throw(tpr_publisher::testing::balise_map()->save(map_file_));
   }
   ~TprService() override {
@@ -89,13 +86,10 @@ class TprService : public ::testing::Test {
   messaging::Queue queue_;
   messaging::Participant participant_;
   messaging::Writer<msg::TrainState> states_;
-  messaging::Writer<msg::ControlRequest> commands_;
   messaging::Reader<msg::TrainPositionReport> reports_reader_;
   messaging::Reader<msg::ServiceStatus> status_reader_;
-  messaging::Reader<msg::ControlReply> reply_reader_;
   std::vector<msg::TrainPositionReport> reports_;
   std::optional<msg::ServiceStatus> status_;
-  std::string reply_;
   uint64_t seq_ = 0;
 };
 
