@@ -102,6 +102,7 @@ int status(const Options& options) {
   const auto plan = plan_here(options);
   const auto state = folder.state();
   const auto supervisor = supervisor_of(folder);
+  const bool runs = supervisor || any_runs(folder);
   bool healthy = supervisor.has_value();
   nlohmann::ordered_json json{{"train", plan.train_id},
                               {"host", plan.host},
@@ -111,8 +112,8 @@ int status(const Options& options) {
   std::string table;
   for (const auto& service : plan.services) {
     const auto found = state.find(service.name);
-    const RunningService process = found == state.end() || !supervisor ? RunningService{} : found->second;
-    const auto health = health_of(plan, supervisor ? state : HostState{}, service.name);
+    const RunningService process = found == state.end() || !runs ? RunningService{} : found->second;
+    const auto health = health_of(plan, runs ? state : HostState{}, service.name);
     healthy = healthy && health.healthy;
     json["services"].push_back({{"service", service.name},
                                 {"release", service.release},
@@ -131,7 +132,10 @@ int status(const Options& options) {
     std::cout << json.dump(2) << '\n';
   } else {
     std::cout << "train " << plan.train_id << ", host " << plan.host << ", generation " << plan.generation
-              << (supervisor ? "" : ", not running: railfix train up") << "\n"
+              << (supervisor ? ""
+                  : runs     ? ", without supervisor: railfix train up"
+                             : ", not running: railfix train up")
+              << "\n"
               << "service         release    generation      pid restarts  health\n"
               << table;
   }
@@ -230,7 +234,11 @@ int supervise_here(const Options& options) {
 std::vector<Finding> check_services(const HostFolder& folder) {
   std::vector<Finding> findings;
   const auto plan = folder.plan();
-  if (!plan || !supervisor_of(folder)) return findings;
+  if (!plan) return findings;
+  if (!supervisor_of(folder)) {
+    if (any_runs(folder)) findings.push_back({true, "services run without a supervisor: railfix train up starts it"});
+    return findings;
+  }
   for (const auto& service : plan->services) {
     const auto health = health_of(*plan, folder.state(), service.name);
     if (!health.healthy || health.degraded) findings.push_back({!health.healthy, service.name + " " + health.text});

@@ -60,6 +60,12 @@ class Fleet : public ::testing::Test {
     }
     return true;
   }
+  /// Not when it only waits for whoever reaps orphans here.
+  static bool lives(pid_t pid) {
+    const auto line = test::slurp("/proc/" + std::to_string(pid) + "/stat");
+    const size_t name_end = line.rfind(')');
+    return name_end != std::string::npos && name_end + 2 < line.size() && line[name_end + 2] != 'Z';
+  }
   const std::string id_ = "fleet-" + std::to_string(getpid());
   const fs::path folder_ = fs::temp_directory_path() / id_;
 };
@@ -91,6 +97,35 @@ TEST_F(Fleet, ServicesComeUpComeBackAfterAKillAndGoDown) {
   const auto after = train({"status", "--root", root()});
   EXPECT_EQ(after.exit_code, 1);
   EXPECT_THAT(after.out, HasSubstr("not running: railfix train up"));
+}
+
+// The kernel may take the supervisor when memory is short: the train goes on, and the next one looks after it.
+TEST_F(Fleet, ServicesOutliveTheirSupervisorAndTheNextOneGoesOnWithThem) {
+  ASSERT_EQ(up().exit_code, 0);
+  const auto fusion = status("fusion");
+  const auto lock = folder_ / "root/var/lib/railfix-train/supervisor.lock";
+  const auto kill_supervisor = [&] {
+    const auto pid = static_cast<pid_t>(std::stoll(test::slurp(lock)));
+    ASSERT_GT(pid, 1);
+    ASSERT_EQ(kill(pid, SIGKILL), 0);
+    ASSERT_TRUE(wait_until([&] { return !lives(pid); }));
+  };
+  kill_supervisor();
+  EXPECT_THAT(train({"status", "--root", root()}).out, HasSubstr("without supervisor"));
+  const auto again = up();
+  EXPECT_EQ(again.exit_code, 0) << again.out << again.err;
+  EXPECT_EQ(status("fusion")["pid"], fusion["pid"]);
+  ASSERT_GT(fusion["pid"].get<pid_t>(), 1);
+  ASSERT_EQ(kill(fusion["pid"].get<pid_t>(), SIGKILL), 0);
+  EXPECT_TRUE(wait_until([&] {
+    const auto now = status("fusion");
+    return now["healthy"] && now["pid"] != fusion["pid"];
+  })) << "nobody looks after it";
+  kill_supervisor();
+  const auto orphan = status("fusion")["pid"].get<pid_t>();
+  EXPECT_EQ(train({"down", "--root", root()}).exit_code, 0);
+  ASSERT_GT(orphan, 1);
+  EXPECT_FALSE(lives(orphan)) << "down ends what has no supervisor";
 }
 
 TEST_F(Fleet, AnUpgradeRestartsWhatChangedAndRollsBackByItselfWhenItIsBad) {

@@ -126,8 +126,9 @@ HostState HostFolder::state() const {
   if (!root || !root->IsMap()) return state;
   for (const auto& entry : *root) {
     state[entry.first.as<std::string>()] = {
-        entry.second["pid"].as<int64_t>(), entry.second["generation"].as<int>(), entry.second["restarts"].as<int>(),
-        entry.second["last_end"].as<std::string>(), entry.second["beside"].as<bool>(false)};
+        entry.second["pid"].as<int64_t>(),      entry.second["generation"].as<int>(),
+        entry.second["restarts"].as<int>(),     entry.second["last_end"].as<std::string>(),
+        entry.second["beside"].as<bool>(false), entry.second["born"].as<int64_t>(0)};
   }
   return state;
 }
@@ -140,6 +141,7 @@ core::Status HostFolder::write(const HostState& state) const {
     root[name]["restarts"] = service.restarts;
     root[name]["last_end"] = service.last_end;
     root[name]["beside"] = service.beside;
+    root[name]["born"] = service.born;
   }
   return replace(folder_ / "state.yaml", YAML::Dump(root) + "\n");
 }

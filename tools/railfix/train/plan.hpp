@@ -49,8 +49,11 @@ struct RunningService {
   int restarts = 0;  // since it was started with this generation
   std::string last_end;
   bool beside = false;  // the one before still runs, and sends
+  int64_t born = 0;     // born_of(pid)
 };
+/// By name; one that is being replaced stands there with kBefore behind its name.
 using HostState = std::map<std::string, RunningService>;
+inline constexpr const char* kBefore = " before";
 
 /// The folder of all this. Services that run in containers do not see it, but for their own files of their generation.
 class HostFolder {

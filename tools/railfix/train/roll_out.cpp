@@ -12,6 +12,7 @@
 #include "core/time.hpp"
 #include "service/health_file.hpp"
 #include "train/render.hpp"
+#include "train/stands_still.hpp"
 #include "train/supervise.hpp"
 
 namespace railfix::tool {
@@ -163,6 +164,14 @@ std::vector<std::string> changed_services(const HostPlan& from, const HostPlan& 
 
 }  // namespace
 
+bool any_runs(const HostFolder& folder) {
+  const auto state = folder.state();
+  return std::any_of(state.begin(), state.end(), [](const auto& entry) {
+    const auto& running = entry.second;
+    return running.pid > 0 && running.born != 0 && born_of(static_cast<pid_t>(running.pid)) == running.born;
+  });
+}
+
 service::HealthAnswer health_of(const HostPlan& plan, const HostState& state, const std::string& service) {
   const auto process = state.find(service);
   if (process == state.end()) return {.text = "is not started"};
@@ -234,8 +243,14 @@ core::Status bring_up(const fs::path& root, const HostPlan& plan, const HealthGa
 
 core::Status bring_down(const fs::path& root) {
   const HostFolder folder(root);
-  const auto pid = supervisor_of(folder);
-  if (!pid) return {};
+  auto pid = supervisor_of(folder);
+  if (!pid && !any_runs(folder)) return {};
+  // Services whose supervisor has died end in order, too.
+  if (!pid) {
+    if (const auto started = start_supervisor(root); !started.ok()) return started;
+    pid = supervisor_of(folder);
+  }
+  if (!pid) return core::Error{"the supervisor does not stay; why stands in " + folder.log("supervisor").string()};
   if (kill(static_cast<pid_t>(*pid), SIGTERM) != 0)
     return core::Error{"the supervisor " + std::to_string(*pid) + " cannot be told to end: " + std::strerror(errno)};
   if (!wait_until(kStopS, [&] { return !supervisor_of(folder).has_value(); }))

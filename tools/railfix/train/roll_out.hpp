@@ -29,6 +29,9 @@ core::Status bring_down(const std::filesystem::path& root);
 /// worked.
 core::Status roll_out(const std::filesystem::path& root, const HostPlan& plan, const HealthGate& gate, const Say& say);
 
+/// A service of this host runs, with or without a supervisor.
+bool any_runs(const HostFolder& folder);
+
 /// Its text: "active", "degraded: ...", "does not run: ended by Killed".
 service::HealthAnswer health_of(const HostPlan& plan, const HostState& state, const std::string& service);
 

@@ -5,9 +5,15 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 #include <string>
 
 namespace railfix::tool {
+namespace {
+
+constexpr int kStartTimeField = 22;  // of /proc/PID/stat
+
+}  // namespace
 
 bool stands_still(pid_t pid) {
   std::error_code gone;
@@ -38,6 +44,26 @@ pid_t holder_of(const std::filesystem::path& file) {
     }
   }
   return 0;
+}
+
+int64_t born_of(pid_t pid) {
+  std::string line;
+  std::getline(std::ifstream("/proc/" + std::to_string(pid) + "/stat"), line);
+  const size_t name_end = line.rfind(')');
+  if (name_end == std::string::npos) return 0;
+  std::istringstream fields(line.substr(name_end + 1));
+  std::string field;
+  fields >> field;  // state, field 3
+  if (field == "Z" || field == "X") return 0;
+  for (int number = 4; number <= kStartTimeField; ++number) fields >> field;
+  return std::atoll(field.c_str());
+}
+
+std::vector<std::string> command_of(pid_t pid) {
+  std::ifstream file("/proc/" + std::to_string(pid) + "/cmdline", std::ios::binary);
+  std::vector<std::string> command;
+  for (std::string argument; std::getline(file, argument, '\0');) command.push_back(argument);
+  return command;
 }
 
 }  // namespace railfix::tool

@@ -4,7 +4,6 @@
 #include <poll.h>
 #include <signal.h>
 #include <sys/file.h>
-#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -70,7 +69,6 @@ void run_quietly(const std::vector<std::string>& command) {
 }
 
 [[noreturn]] void become(const PlannedService& service, bool beside, const fs::path& home, int log) {
-  prctl(PR_SET_PDEATHSIG, SIGTERM);  // a service without its supervisor would never be replaced
   setpgid(0, 0);
   for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, SIG_DFL);
   run_quietly(service.clean_up);
@@ -105,7 +103,21 @@ class Child {
         health_(beside ? service::health_path_beside(common, service_.name) : usual_health_),
         beside_(beside) {}
   [[nodiscard]] const PlannedService& service() const { return service_; }
-  [[nodiscard]] RunningService state() const { return {pid_, service_.generation, restarts_, last_end_, beside_}; }
+  [[nodiscard]] RunningService state() const {
+    return {pid_, service_.generation, restarts_, last_end_, beside_, born_};
+  }
+  /// It runs already: the supervisor before has started it, and has died.
+  void adopt(const RunningService& running) {
+    pid_ = static_cast<pid_t>(running.pid);
+    born_ = running.born;
+    restarts_ = running.restarts;
+    last_end_ = running.last_end;
+    adopted_ = true;
+    well_since_ns_ = core::monotonic_ns();
+    std::error_code none;
+    const auto bytes = fs::file_size(log_, none);
+    log_began_ = none ? 0 : static_cast<std::streamoff>(bytes);
+  }
   [[nodiscard]] bool runs() const { return pid_ > 0; }
   /// Runs well for so long that it has found everybody.
   [[nodiscard]] bool has_found_all() const { return pid_ > 0 && core::monotonic_ns() - well_since_ns_ > kFoundNs; }
@@ -135,16 +147,20 @@ class Child {
     if (pid_ <= 0) return;
     run_quietly(service_.clean_up);
     kill(pid_, SIGKILL);
-    waitpid(pid_, nullptr, 0);
-    pid_ = 0;
+    while (!ended()) poll(nullptr, 0, kTurnMs);
     forget_health();
   }
   bool ended() {
-    if (pid_ > 0 && waitpid(pid_, nullptr, WNOHANG) == pid_) pid_ = 0;
+    int ignored = 0;
+    if (pid_ > 0 && has_ended(ignored)) pid_ = 0;
     return pid_ == 0;
   }
 
  private:
+  // One that was adopted is another process's child.
+  bool has_ended(int& wait_status) const {
+    return adopted_ ? born_of(pid_) != born_ : waitpid(pid_, &wait_status, WNOHANG) == pid_;
+  }
   // A killed one leaves its last words, which would speak for the next one.
   void forget_health() const {
     std::error_code none;
@@ -181,6 +197,8 @@ class Child {
     if (pid_ == 0) become(service_, beside_, home_, log);
     if (log >= 0) close(log);
     started_ns_ = well_since_ns_ = now_ns;
+    adopted_ = false;
+    born_ = pid_ > 0 ? born_of(pid_) : 0;
     if (pid_ > 0) return;
     pid_ = 0;
     next_start_ns_ = now_ns + kLongestPauseNs;
@@ -188,10 +206,11 @@ class Child {
   }
   bool note_end(int64_t now_ns) {
     int wait_status = 0;
-    if (waitpid(pid_, &wait_status, WNOHANG) != pid_) return false;
+    if (!has_ended(wait_status)) return false;
     pid_ = 0;
     ++restarts_;
-    last_end_ = (frozen_looks_ >= kFrozenLooks ? "was frozen, " : "") + said_of(wait_status);
+    last_end_ = (frozen_looks_ >= kFrozenLooks ? "was frozen, " : "") +
+                (adopted_ ? "ended, how only the supervisor before knew" : said_of(wait_status));
     frozen_looks_ = 0;
     forget_health();
     if (const auto said = wait_status == 0 ? "" : last_words(log_, log_began_); !said.empty()) last_end_ += ": " + said;
@@ -211,6 +230,8 @@ class Child {
   int frozen_looks_ = 0;
   int64_t looked_ns_ = 0;
   pid_t pid_ = 0;
+  int64_t born_ = 0;
+  bool adopted_ = false;
   int restarts_ = 0;
   std::string last_end_;
   std::streamoff log_began_ = 0;
@@ -283,7 +304,9 @@ class Supervision {
     plan_written_ = written;
     const auto plan = folder_.plan();
     if (!plan || plan->services == planned_) return;
+    const bool first = planned_.empty();
     planned_ = plan->services;
+    if (first) adopt_running(*plan);
     const auto goes = [this](const Child& child) { return !is_planned(child) && !is_succeeded(child); };
     const auto falls_out = [this](const Child& successor) { return !is_planned(successor); };
     std::vector<Child*> leaving;
@@ -299,6 +322,30 @@ class Supervision {
     start_new(*plan);
     say();
   }
+  // What a supervisor that was killed has left goes on. What the plan says by now replaces it in the usual way.
+  void adopt_running(const HostPlan& plan) {
+    const auto common = common_of(plan);
+    for (const auto& [key, running] : folder_.state()) {
+      const auto pid = static_cast<pid_t>(running.pid);
+      if (pid <= 0 || running.born == 0 || born_of(pid) != running.born) continue;
+      PlannedService service;
+      service.name = key.substr(0, key.find(kBefore));
+      service.generation = running.generation;
+      service.command = command_of(pid);
+      if (!service.command.empty() && service.command.back() == "--beside") service.command.pop_back();
+      const auto* planned = plan.service(service.name);
+      const bool as_planned = planned != nullptr && planned->command == service.command;
+      auto& children = running.beside ? successors_ : children_;
+      children.emplace_back(as_planned ? *planned : service, folder_, common, running.beside);
+      children.back().adopt(running);
+    }
+  }
+  [[nodiscard]] static service::CommonConfig common_of(const HostPlan& plan) {
+    service::CommonConfig common;
+    common.train_id = plan.train_id;
+    common.host = plan.host;
+    return common;
+  }
   [[nodiscard]] bool is_planned(const Child& child) const {
     return std::find(planned_.begin(), planned_.end(), child.service()) != planned_.end();
   }
@@ -310,9 +357,7 @@ class Supervision {
   }
   // Against the way of the data: who listens is there before who speaks.
   void start_new(const HostPlan& plan) {
-    service::CommonConfig common;
-    common.train_id = plan.train_id;
-    common.host = plan.host;
+    const auto common = common_of(plan);
     for (const auto& service : std::views::reverse(planned_)) {
       const auto is_it = [&](const Child& child) { return child.service() == service; };
       if (std::any_of(children_.begin(), children_.end(), is_it) ||
@@ -346,8 +391,11 @@ class Supervision {
   }
   void say() const {
     HostState state;
-    for (const auto* children : {&children_, &successors_}) {
-      for (const auto& child : *children) state[child.service().name] = child.state();
+    for (const auto& child : children_) state[child.service().name] = child.state();
+    for (const auto& successor : successors_) {
+      const auto& name = successor.service().name;
+      if (const auto before = state.extract(name)) state[name + kBefore] = before.mapped();
+      state[name] = successor.state();
     }
     static_cast<void>(folder_.write(state));  // a full disk must not end the train
   }
@@ -374,10 +422,11 @@ void supervise(const HostFolder& folder) {
     throw core::BadInput(folder.lock().string() + " cannot be written; is the disk full?");
   for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { asked_to_stop = 1; });
   Supervision supervision(folder);
-  while (asked_to_stop == 0) {
+  // Once in any case: who is told to end at once ends what the one before has left.
+  do {
     supervision.turn();
     poll(nullptr, 0, kTurnMs);
-  }
+  } while (asked_to_stop == 0);
   supervision.end();
   close(lock);
 }
