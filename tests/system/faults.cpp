@@ -17,6 +17,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr int64_t kWrongQosNs = 8 * core::kNsPerSecond;
+
 std::string service_of(const std::string& service_at_host) {
   return service_at_host.substr(0, service_at_host.find('@'));
 }
@@ -219,6 +221,31 @@ Fault certificates_renewed() {
           .named = ""};
 }
 
+/// Over when the mended one has taken its place: until then, as in every swap, the wrong one goes on.
+Fault other_quality_of_service(const std::string& service) {
+  const auto mended_ns = std::make_shared<int64_t>(0);
+  const auto wrong = std::make_shared<pid_t>(0);
+  return {.name = service_of(service) + " with another quality of service",
+          .begin =
+              [=](Rig& rig) {
+                *mended_ns = core::monotonic_ns() + kWrongQosNs;
+                *wrong = 0;
+                rig.set_arguments(service, {"--set", "common.qos_profiles=" + wrong_qos_profiles(rig)});
+              },
+          .end = {},
+          .over =
+              [=](Rig& rig) {
+                if (core::monotonic_ns() < *mended_ns) return false;
+                if (*wrong == 0) {
+                  *wrong = rig.pid(service);
+                  rig.set_arguments(service, {});
+                }
+                return rig.replaced(service, *wrong);
+              },
+          .lasts_s = 60,
+          .named = "quality of service"};
+}
+
 void clock_steps(std::vector<Fault>& table) {
   for (const char* host : {"cab", "coach"}) {
     for (const double seconds : {5.0, -5.0}) {
@@ -263,10 +290,10 @@ std::vector<Fault> fault_table(const Rig& rig) {
                    .named = "silent"});
   table.push_back({.name = "supervisor of cab killed",
                    .begin = [](Rig& r) { r.kill_supervisor("cab"); },
-                   .end = [](Rig& r) { r.power_on("cab"); },  // systemd does so after RestartSec
+                   .end = [](Rig& r) { r.power_on("cab"); },  // systemd does so after RestartSec; services live on
                    .lasts_s = 1,
                    .watch_s = 15,
-                   .named = "stopped"});
+                   .named = ""});
   clock_steps(table);
   table.push_back(bad_pictures("broken picture files", "picture", [](const auto&, int n) { return noise(5000, n); }));
   table.push_back(
@@ -279,14 +306,7 @@ std::vector<Fault> fault_table(const Rig& rig) {
       return std::vector<std::string>{"fusion", foreign_keys(r).string()};
     }));
   }
-  table.push_back({.name = "odometry with another quality of service",
-                   .begin =
-                       [](Rig& r) {
-                         r.set_arguments("odometry@cab", {"--set", "common.qos_profiles=" + wrong_qos_profiles(r)});
-                       },
-                   .end = [](Rig& r) { r.set_arguments("odometry@cab", {}); },
-                   .lasts_s = 8,
-                   .named = "quality of service"});
+  table.push_back(other_quality_of_service("odometry@cab"));
   if (rig.options().security) table.push_back(certificates_renewed());
   for (auto& fault : table) {
     for (const char* name :

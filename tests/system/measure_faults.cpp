@@ -150,7 +150,7 @@ int campaign(const Options& options, Rig& rig) {
     rows.push_back(measure(fault, rig, *observer, options.short_one));
     print(rows.back(), targets);
     for (const auto& text : rows.back().heard.said) std::cerr << "  " << rows.back().name << ": " << text << '\n';
-    for (const auto& name : rows.back().heard.not_usual) std::cerr << "  still not usual: " << name << '\n';
+    for (const auto& text : rows.back().heard.last) std::cerr << "  last in the way: " << text << '\n';
   }
   const auto bad =
       std::count_if(rows.begin(), rows.end(), [&](const Row& row) { return !missed(row, targets).empty(); });

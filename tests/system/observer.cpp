@@ -209,6 +209,12 @@ std::set<std::string> Observer::not_usual() const {
   return names;
 }
 
+std::string Observer::with_reason(const std::string& name) const {
+  const auto* seen = service(name);
+  if (seen == nullptr) return name;
+  return name + ": " + (seen->alive ? seen->status.reason().c_str() : "silent");
+}
+
 void Observer::turn() {
   if (interrupted != 0) throw std::runtime_error("interrupted");
   queue_.run_one(core::monotonic_ns() + 10'000'000);
@@ -220,7 +226,10 @@ void Observer::turn() {
   }
   for (const auto& text : said) say(text);
   heard_.not_usual = not_usual();
-  if (!heard_.not_usual.empty()) heard_.not_whole_s = now_s();
+  if (heard_.not_usual.empty()) return;
+  heard_.not_whole_s = now_s();
+  heard_.last.clear();
+  for (const auto& name : heard_.not_usual) heard_.last.insert(with_reason(name));
 }
 
 void Observer::run(double seconds) {

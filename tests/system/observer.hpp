@@ -32,6 +32,7 @@ struct Heard {
   uint64_t reports_lost = 0;        // numbers that no report in the cab had
   uint64_t ground_lost = 0;         // ... at the ground
   double not_whole_s = 0;           // monotonic time of the last moment at which not everything was as usual
+  std::set<std::string> last;       // what kept the train from being whole at that moment, and why
   std::vector<std::string> said;    // new complaints, in their order
   std::set<std::string> not_usual;  // what keeps the train from being whole now
 };
@@ -67,6 +68,7 @@ class Observer {
   void ask_monitor();
   void turn();
   [[nodiscard]] std::set<std::string> not_usual() const;
+  [[nodiscard]] std::string with_reason(const std::string& name) const;
 
   struct Pause {
     double last_s = 0;

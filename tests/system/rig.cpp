@@ -160,12 +160,14 @@ void Rig::power_on(const std::string& host) {
 
 void Rig::cut_power(const std::string& host) {
   hosts_->plug(false);
-  std::vector<pid_t> pids;
-  for (const auto& [name, service] : tool::HostFolder(root(host)).state())
-    pids.push_back(static_cast<pid_t>(service.pid));
   kill_supervisor(host);
-  for (const pid_t one : pids) {
-    if (one > 0) kill(one, SIGKILL);
+  kill_services(host);
+}
+
+// What a supervisor that was killed has left.
+void Rig::kill_services(const std::string& host) const {
+  for (const auto& [name, service] : tool::HostFolder(root(host)).state()) {
+    if (service.pid > 0) kill(static_cast<pid_t>(service.pid), SIGKILL);
   }
 }
 
@@ -175,7 +177,10 @@ void Rig::kill_supervisor(const std::string& host) {
 
 void Rig::stop() {
   for (auto& [host, supervisor] : supervisors_) supervisor->send(SIGTERM);
-  for (auto& [host, supervisor] : supervisors_) supervisor->wait_for_end();
+  for (auto& [host, supervisor] : supervisors_) {
+    supervisor->wait_for_end();
+    kill_services(host);
+  }
   supervisors_.clear();
 }
 

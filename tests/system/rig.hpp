@@ -84,6 +84,7 @@ class Rig {
   }
   [[nodiscard]] tool::RunningService running(const std::string& service_at_host) const;
   void copy_ride();
+  void kill_services(const std::string& host) const;
   void write_manifest();
   void start_broker();
   RigOptions options_;
