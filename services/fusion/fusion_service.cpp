@@ -20,7 +20,7 @@ using messaging::topics::wheel_sample;
 
 constexpr std::chrono::milliseconds kTickPeriod{50};
 constexpr int64_t kKeepPeriodNs = 250'000'000;
-constexpr uint64_t kNumbersSinceKept = 100;  // at least as many as may have been used meanwhile
+constexpr uint64_t kNumbersUnheard = 100;  // at least as many as the one before may have used since it was heard last
 constexpr double kOldestNotesS = 30.0;
 constexpr double kSameRideS = 0.5;   // data and the host's clock go on alike
 constexpr double kSameBeginS = 0.5;  // a replay that is looped begins where it began before
@@ -158,6 +158,7 @@ void FusionService::share_charge() {
 
 void FusionService::charge_changed(bool taken) {
   learnt_ = taken;  // whoever is in charge now knows more than one that had to give it away
+  if (taken && seq_ > 0) seq_ += kNumbersUnheard;
   // Readers have waited long enough for a state.
   if (taken && latest_ && latest_->stamp_ns() > heard_ns_) send(*latest_);
 }
@@ -210,7 +211,7 @@ bool FusionService::take_over_known(const TrainEstimate& first) {
       known_.reset();
       return true;
     }
-    seq_ = std::max(seq_, known_->seq() + kNumbersSinceKept);
+    seq_ = std::max(seq_, known_->seq() + kNumbersUnheard);
     if (map_ && known_->track_known() != 0) {
       begin_anew();
       return false;
