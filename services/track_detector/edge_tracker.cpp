@@ -236,7 +236,7 @@ std::optional<SettledEdge> EdgeTracker::refine(Spot& spot, int sign) const {
       kept += sure ? 1 : 0;
       narrowest = std::min(narrowest, std::abs(*measured));
       widest = std::max(widest, std::abs(*measured));
-      edge.measured[edge.count++] = {relative.look->way_m, *measured, relative.look->eye_lateral_m};
+      edge.measured[edge.count++] = {relative.look->way_m, *measured, relative.look->eye_lateral_m, residual};
     };
     for (size_t i = relatives_.size(); i-- > 0;) add(relatives_[i]);
     add(itself(now));

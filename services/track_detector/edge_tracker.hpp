@@ -16,6 +16,7 @@ constexpr size_t kMostStripes = 12;
 
 struct EdgeMeasurement {
   double way_m, bearing, eye_lateral_m;
+  double residual;  // of the bearing: measured less the settled edge's
 };
 
 /// How far from an edge the brightness stepped back, in one look.

@@ -10,12 +10,9 @@ namespace {
 constexpr double kForgetM = 12;                 // edges this far behind the camera
 constexpr double kMastSizeM[] = {0.155, 0.60};  // of its side or front; posts of lamps and boards are thinner
 constexpr double kMastLateralM[] = {2.0, 9.0};
-constexpr double kNearShare = 0.5;  // of the widest bearing: near enough to see both edges
 constexpr double kUsualAheadM = 8;  // when both edges are seen
-constexpr int kFewestTogether = 3;  // looks that show both
 constexpr double kTunnelWidthM[] = {3.6, 12.0};
 constexpr double kBridgeWidthM[] = {6.0, 28.0};
-constexpr double kApartCells = 3.3;  // between edges, so that they do not disturb each other
 constexpr double kSidesM = 1.3;      // both sides stand at one place
 constexpr double kDarkShare = 0.93;  // of the outer brightness
 constexpr double kWallShare = 0.85;  // of the outer brightness
@@ -50,75 +47,10 @@ constexpr double kUsualGreyM = 40;  // of way that both are averaged over; longe
 constexpr double kNearGreyM = 6;
 constexpr double kWaitM = 1.5;  // the other edge of a mast leaves the picture so much later, at most
 
-struct Size {
-  double front_m = 0;
-  double side_m = 0;
-  double rms_m = 0;
-  int looks = 0;
-};
-
-// Size of a thing from how far apart its two edges are in the same pictures: its front looks smaller with the distance,
-// its side with the distance squared. Errors of the pose move both edges alike. Far away the edges run together.
-class SizeFit {
- public:
-  SizeFit(const SettledEdge& edge, double place_m, double lateral_m)
-      : place_m_(place_m), lateral_m_(std::abs(lateral_m)), apart_(kApartCells * edge.cell) {
-    widest_ = std::abs(edge.measured[edge.count - 1].bearing);
-  }
-  void add(double way_m, double bearing, double apart) {
-    if (std::abs(bearing) < kNearShare * widest_ || apart < apart_) return;
-    const double ahead_m = std::max(1.0, place_m_ - way_m);
-    const double side = lateral_m_ / ahead_m;
-    const double weight = 1 / (ahead_m * ahead_m);
-    n_ += weight;
-    x_ += weight * side;
-    y_ += weight * apart * ahead_m;
-    xx_ += weight * side * side;
-    xy_ += weight * side * apart * ahead_m;
-    yy_ += weight * apart * ahead_m * apart * ahead_m;
-    ++looks_;
-  }
-  [[nodiscard]] std::optional<Size> solve() const {
-    const double spread = n_ * xx_ - x_ * x_;
-    if (looks_ < kFewestTogether || spread < 1e-4 * n_ * n_) return std::nullopt;
-    double side_m = (n_ * xy_ - x_ * y_) / spread;
-    double front_m = (y_ - side_m * x_) / n_;
-    if (side_m < 0) {
-      side_m = 0;
-      front_m = y_ / n_;
-    } else if (front_m < 0) {
-      front_m = 0;
-      side_m = xy_ / xx_;
-    }
-    const double squared = yy_ - 2 * front_m * y_ - 2 * side_m * xy_ + front_m * front_m * n_ +
-                           2 * front_m * side_m * x_ + side_m * side_m * xx_;
-    return Size{front_m, side_m, std::sqrt(std::max(0.0, squared / n_)), looks_};
-  }
-
- private:
-  double place_m_, lateral_m_, apart_, widest_ = 0;
-  double n_ = 0, x_ = 0, y_ = 0, xx_ = 0, xy_ = 0, yy_ = 0;
-  int looks_ = 0;
-};
-
-std::optional<Size> size_of(const SettledEdge& a, const SettledEdge& b) {
-  SizeFit fit(a, 0.5 * (a.place_m + b.place_m), 0.5 * (a.lateral_m + b.lateral_m));
-  size_t k = 0;
-  for (size_t i = 0; i < a.count; ++i) {
-    while (k < b.count && b.measured[k].way_m < a.measured[i].way_m) ++k;
-    if (k == b.count || b.measured[k].way_m > a.measured[i].way_m) continue;
-    fit.add(a.measured[i].way_m, a.measured[i].bearing, std::abs(b.measured[k].bearing - a.measured[i].bearing));
-  }
-  return fit.solve();
-}
-
 // What stands behind a post must not be taken for a mast together with the post's far side.
 bool is_far_side_of_post(const SettledEdge& edge) {
-  SizeFit fit(edge, edge.place_m, edge.lateral_m);
-  for (size_t i = 0; i < edge.stripe_count; ++i)
-    fit.add(edge.stripe[i].way_m, edge.stripe[i].bearing, edge.stripe[i].inward);
-  const auto size = fit.solve();
-  return size && std::max(size->front_m, size->side_m) < kMastSizeM[0];
+  const auto size = size_inward(edge);
+  return size && size->largest_m() < kMastSizeM[0];
 }
 
 // Of two edges on one side, as they are seen in the same picture.
@@ -201,7 +133,7 @@ void UprightObjects::pair_masts() {
   while (true) {
     Edge* best_inner = nullptr;
     Edge* best_outer = nullptr;
-    Size best;
+    MastSize best;
     double smallest_m = kMastSizeM[1];
     for (Edge& a : edges_) {
       for (Edge& b : edges_) {
@@ -210,10 +142,10 @@ void UprightObjects::pair_masts() {
         if (std::abs(a.edge.place_m - b.edge.place_m) > kMastSizeM[1] ||
             std::abs(a.edge.lateral_m - b.edge.lateral_m) > kMastSizeM[1])
           continue;
-        const auto size = size_of(a.edge, b.edge);
-        if (!size || std::max(size->front_m, size->side_m) >= smallest_m) continue;
-        if (std::max(size->front_m, size->side_m) >= kMastSizeM[0] && is_far_side_of_post(a.edge)) continue;
-        smallest_m = std::max(size->front_m, size->side_m);
+        const auto size = size_between(a.edge, b.edge);
+        if (!size || size->largest_m() >= smallest_m) continue;
+        if (size->largest_m() >= kMastSizeM[0] && is_far_side_of_post(a.edge)) continue;
+        smallest_m = size->largest_m();
         best = *size;
         best_inner = &a;
         best_outer = &b;
@@ -221,7 +153,7 @@ void UprightObjects::pair_masts() {
     }
     if (best_inner == nullptr) return;
     best_inner->used = best_outer->used = true;
-    if (smallest_m >= kMastSizeM[0]) tell_mast(best_inner->edge, best.front_m, best.side_m);
+    if (smallest_m >= kMastSizeM[0]) tell_mast(best_inner->edge, mast_place(best_inner->edge, &best_outer->edge, best));
   }
 }
 
@@ -229,28 +161,22 @@ void UprightObjects::pair_masts() {
 void UprightObjects::find_stripes(double way_m) {
   for (Edge& e : edges_) {
     if (e.used || e.way_m > way_m - kWaitM || e.edge.stripe_count == 0 || belongs_to_mast(e.edge)) continue;
-    SizeFit fit(e.edge, e.edge.place_m, e.edge.lateral_m);
-    for (size_t i = 0; i < e.edge.stripe_count; ++i)
-      fit.add(e.edge.stripe[i].way_m, e.edge.stripe[i].bearing, e.edge.stripe[i].outward);
-    const auto size = fit.solve();
-    if (!size || size->rms_m > kStripeRmsM || !between(std::max(size->front_m, size->side_m), kMastSizeM)) continue;
+    const auto size = size_outward(e.edge);
+    if (!size || size->rms_m > kStripeRmsM || !between(size->largest_m(), kMastSizeM)) continue;
     if (is_far_side_of_post(e.edge)) continue;
     e.used = true;
-    tell_mast(e.edge, size->front_m, size->side_m);
+    tell_mast(e.edge, mast_place(e.edge, nullptr, *size));
   }
 }
 
-// From the edge towards the track, which stands before the clearest background; its far corner when the side shows.
-void UprightObjects::tell_mast(const SettledEdge& inner, double front_m, double side_m) {
-  const double half_m = 0.5 * std::max(front_m, side_m);
-  const double lateral_m = inner.lateral_m + std::copysign(half_m, inner.lateral_m);
-  if (!between(std::abs(lateral_m), kMastLateralM) || inner.sigma_m > kWorstSigmaM) return;
-  const double place_m = inner.place_m + (side_m > front_m ? -half_m : half_m);
-  if (in_tunnel(place_m)) return;  // lamps, niches, panels
+void UprightObjects::tell_mast(const SettledEdge& inner, const MastPlace& at) {
+  if (!between(std::abs(at.lateral_m), kMastLateralM) || inner.sigma_m > kWorstSigmaM) return;
+  if (in_tunnel(at.place_m)) return;  // lamps, niches, panels
   for (const UprightObject& mast : masts_) {
-    if (std::abs(mast.place_m - place_m) < kSameMastM && mast.lateral_m * lateral_m > 0) return;
+    if (std::abs(mast.place_m - at.place_m) < kSameMastM && mast.lateral_m * at.lateral_m > 0) return;
   }
-  masts_.push_back({LandmarkType::mast, place_m, lateral_m, std::hypot(inner.sigma_m, kObjectSigmaM), inner.pictures});
+  masts_.push_back(
+      {LandmarkType::mast, at.place_m, at.lateral_m, std::hypot(at.sigma_m, kObjectSigmaM), inner.pictures});
   objects_.push_back(masts_.back());
 }
 

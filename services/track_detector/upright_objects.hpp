@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "track_detector/edge_tracker.hpp"
+#include "track_detector/mast_fit.hpp"
 
 namespace railfix::track_detector {
 
@@ -41,7 +42,7 @@ class UprightObjects {
   [[nodiscard]] bool daylight() const;
   void pair_masts();
   void find_stripes(double way_m);
-  void tell_mast(const SettledEdge& inner, double front_m, double side_m);
+  void tell_mast(const SettledEdge& inner, const MastPlace& at);
   void pair_sides(double way_m);
   [[nodiscard]] bool belongs_to_mast(const SettledEdge& edge) const;
   void move_to_mouth(UprightObject& portal, const SettledEdge& left, const SettledEdge& right) const;
