@@ -62,7 +62,7 @@ class SizeFit {
   int looks_ = 0;
 };
 
-// Looks in which both edges were measured, for each the way back, the outer edge's bearing off the inner one's.
+// Every look in which both edges were measured, and how far apart they show in it (bearing).
 template <typename Use>
 void together(const SettledEdge& inner, const SettledEdge& outer, const Use& use) {
   for (size_t i = 0, k = 0; i < inner.count; ++i) {
