@@ -9,9 +9,9 @@ namespace {
 
 constexpr double kRatioSigmas = 5.0;
 constexpr double kRatioApartS = 10.0;  // longer than slips last
-constexpr double kTaughtShare = 0.1;  // of the sigma before any reference
-constexpr double kMissingS = 300;     // a sensor that has not measured for so long does not measure any more
-constexpr unsigned kBitsOfOne = 8;    // of Hypotheses::slipping
+constexpr double kTaughtShare = 0.1;   // of the sigma before any reference
+constexpr double kMissingS = 300;      // a sensor that has not measured for so long does not measure any more
+constexpr unsigned kBitsOfOne = 8;     // of Hypotheses::slipping
 
 OdometerScales prior(const FusionParameters& parameters, const std::optional<OdometerScales>& saved) {
   return saved.value_or(unlearnt_scales(parameters));

@@ -74,10 +74,14 @@ void PlaceFilter::weigh_unmapped(const Block& block) {
   last_turn_rad_ = x;
 }
 
-double PlaceFilter::evidence() const {
+float PlaceFilter::best_log() const {
   float best = -INFINITY;
   for (const Place& place : places_) best = std::max(best, place.log);
-  return best - unmapped_log_ - std::log(static_cast<double>(std::max<size_t>(origins_, 1)));
+  return best;
+}
+
+double PlaceFilter::evidence() const {
+  return best_log() - unmapped_log_ - std::log(static_cast<double>(std::max<size_t>(origins_, 1)));
 }
 
 void PlaceFilter::advance(const MeasuredWay& way, size_t gone_bins) {
@@ -257,9 +261,7 @@ void PlaceFilter::weigh_marks(Place& place, const Trail& trail, const Block& blo
 
 // Those that have met go on as one.
 void PlaceFilter::drop_unlikely() {
-  float best = -INFINITY;
-  for (const Place& place : places_) best = std::max(best, place.log);
-  const auto least = best - static_cast<float>(kFarBelow);
+  const float least = best_log() - static_cast<float>(kFarBelow);
   std::erase_if(places_, [&](const Place& place) { return place.log < least; });
   const auto cell = [](const Place& place) { return static_cast<int64_t>(std::floor(place.into_m / kSameM)); };
   std::sort(places_.begin(), places_.end(), [&](const Place& a, const Place& b) {
@@ -270,11 +272,10 @@ void PlaceFilter::drop_unlikely() {
 }
 
 std::vector<Candidate> PlaceFilter::candidates(size_t gone_bins) const {
-  float best = -INFINITY;
-  for (const Place& place : places_) best = std::max(best, place.log);
+  const float least = best_log() - static_cast<float>(kLikelyBelow);
   std::vector<Candidate> candidates;
   for (const Place& place : places_) {
-    if (place.log < best - static_cast<float>(kLikelyBelow)) continue;
+    if (place.log < least) continue;
     const float length_m = index_->length_m(place.run);
     candidates.push_back({index_->run(place.run), std::clamp(place.into_m, 0.0F, length_m), taken_bins_ - gone_bins,
                           1.0 + place.scale_error, std::sqrt(std::max(0.0F, place.covariance[kCc])), place.log});

@@ -72,6 +72,7 @@ class PlaceFilter {
   void weigh(Place& place, const Block& block) const;
   void weigh_marks(Place& place, const Trail& trail, const Block& block) const;
   [[nodiscard]] float heading(const Place& place, float into_m) const;
+  [[nodiscard]] float best_log() const;
   void drop_unlikely();
   void weigh_unmapped(const Block& block);
 

@@ -50,6 +50,15 @@ constexpr double kDay = 80;  // grey levels beside the track
 constexpr double kNight = 6;
 constexpr double kLining = 32;
 
+/// These and their like on the other wall.
+std::vector<Corner> on_both_walls(std::vector<Corner> corners) {
+  for (size_t i = 0, n = corners.size(); i < n; ++i) {
+    corners.push_back(corners[i]);
+    corners.back().lateral_m *= -1;
+  }
+  return corners;
+}
+
 std::vector<UprightObject> pass(const std::vector<Corner>& corners, double to_m, double beside_grey = kDay,
                                 float score_share = 1) {
   EdgeTracker tracker;
@@ -112,13 +121,10 @@ TEST(Uprights, ThePlaceHoldsInACurveThatIsSeenWrongly) {
 }
 
 TEST(Uprights, ATunnelHasOnePortalInAndOneOut) {
-  std::vector<Corner> corners;
-  for (const double side : {1.0, -1.0}) {
-    corners.push_back({40, side * 2.7, 70, 120, 60, 15});
-    corners.push_back({42.5, side * 2.7, 40, 70, 40, 15});
-    corners.push_back({70, side * 2.7, 150, 90, 160, 200});
-    corners.push_back({72.5, side * 2.7, 210, 170, 210, 200});
-  }
+  const auto corners = on_both_walls({{40, 2.7, 70, 120, 60, 15},
+                                      {42.5, 2.7, 40, 70, 40, 15},
+                                      {70, 2.7, 150, 90, 160, 200},
+                                      {72.5, 2.7, 210, 170, 210, 200}});
   const auto told = pass(corners, 80);
   ASSERT_EQ(told.size(), 2U);
   EXPECT_EQ(told[0].type, LandmarkType::portal_in);
@@ -128,12 +134,8 @@ TEST(Uprights, ATunnelHasOnePortalInAndOneOut) {
 }
 
 TEST(Uprights, TheFaintEndOfABrightWallIsThePortalOut) {
-  std::vector<Corner> corners;
-  for (const double side : {1.0, -1.0}) {
-    corners.push_back({40, side * 2.7, 70, 120, 60, 15});
-    corners.push_back({70, side * 2.7, 210, 120, 205, 200});
-    corners.push_back({70.5, side * 2.7, 206, 210, 206, 200});
-  }
+  const auto corners =
+      on_both_walls({{40, 2.7, 70, 120, 60, 15}, {70, 2.7, 210, 120, 205, 200}, {70.5, 2.7, 206, 210, 206, 200}});
   const auto told = pass(corners, 80);
   ASSERT_EQ(told.size(), 2U);
   EXPECT_EQ(told[1].type, LandmarkType::portal_out);
@@ -142,12 +144,8 @@ TEST(Uprights, TheFaintEndOfABrightWallIsThePortalOut) {
 
 // As in a drawn tunnel: half a metre of panel, nearly as bright as the uneven land behind it.
 TEST(Uprights, AShortBrightPanelBelongsToTheTunnel) {
-  std::vector<Corner> corners;
-  for (const double side : {1.0, -1.0}) {
-    corners.push_back({40, side * 2.7, 70, 120, 60, 15});
-    corners.push_back({70, side * 2.7, 205, 120, 205, 200});
-    corners.push_back({70.5, side * 2.7, 214, 205, 214, 200});
-  }
+  const auto corners =
+      on_both_walls({{40, 2.7, 70, 120, 60, 15}, {70, 2.7, 205, 120, 205, 200}, {70.5, 2.7, 214, 205, 214, 200}});
   const auto told = pass(corners, 80, kDay, 0.2F);
   ASSERT_EQ(told.size(), 2U);
   EXPECT_EQ(told[1].type, LandmarkType::portal_out);

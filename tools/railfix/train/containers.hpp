@@ -49,7 +49,8 @@ std::vector<std::string> remove_command(const Container& container, const std::s
 /// For a compose file; a subset that docker-compose 1.29 understands.
 YAML::Node compose_service(const Container& container);
 
-/// Absolute path of the engine that the manifest names, or else of podman, or else of docker. Error: it is not installed.
+/// Absolute path of the engine that the manifest names, or else of podman, or else of docker. Error: it is not
+/// installed.
 core::Result<std::string> container_engine(const Manifest& manifest);
 /// What exactly is behind an image's name now; nothing when this computer does not have it.
 std::optional<std::string> image_id(const std::string& engine, const std::string& image);

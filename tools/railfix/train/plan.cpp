@@ -6,6 +6,7 @@
 #include <set>
 
 #include "core/whole_file.hpp"
+#include "train/stands_still.hpp"
 
 namespace railfix::tool {
 namespace {
@@ -118,6 +119,10 @@ core::Status HostFolder::write_to(const fs::path& folder, const HostPlan& plan) 
     root["services"].push_back(node);
   }
   return replace(folder / "plan.yaml", YAML::Dump(root) + "\n");
+}
+
+bool RunningService::runs() const {
+  return pid > 0 && born != 0 && born_of(static_cast<pid_t>(pid)) == born;
 }
 
 HostState HostFolder::state() const {

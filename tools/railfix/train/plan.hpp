@@ -50,6 +50,9 @@ struct RunningService {
   std::string last_end;
   bool beside = false;  // the one before still runs, and sends
   int64_t born = 0;     // born_of(pid)
+
+  /// It, and no later process of the same number.
+  [[nodiscard]] bool runs() const;
 };
 /// By name; one that is being replaced stands there with kBefore behind its name.
 using HostState = std::map<std::string, RunningService>;

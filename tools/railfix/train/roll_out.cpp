@@ -12,7 +12,6 @@
 #include "core/time.hpp"
 #include "service/health_file.hpp"
 #include "train/render.hpp"
-#include "train/stands_still.hpp"
 #include "train/supervise.hpp"
 
 namespace railfix::tool {
@@ -166,10 +165,7 @@ std::vector<std::string> changed_services(const HostPlan& from, const HostPlan& 
 
 bool any_runs(const HostFolder& folder) {
   const auto state = folder.state();
-  return std::any_of(state.begin(), state.end(), [](const auto& entry) {
-    const auto& running = entry.second;
-    return running.pid > 0 && running.born != 0 && born_of(static_cast<pid_t>(running.pid)) == running.born;
-  });
+  return std::any_of(state.begin(), state.end(), [](const auto& entry) { return entry.second.runs(); });
 }
 
 service::HealthAnswer health_of(const HostPlan& plan, const HostState& state, const std::string& service) {
@@ -243,13 +239,12 @@ core::Status bring_up(const fs::path& root, const HostPlan& plan, const HealthGa
 
 core::Status bring_down(const fs::path& root) {
   const HostFolder folder(root);
-  auto pid = supervisor_of(folder);
-  if (!pid && !any_runs(folder)) return {};
-  // Services whose supervisor has died end in order, too.
-  if (!pid) {
+  if (!supervisor_of(folder)) {
+    if (!any_runs(folder)) return {};
+    // Services whose supervisor has died end in order, too.
     if (const auto started = start_supervisor(root); !started.ok()) return started;
-    pid = supervisor_of(folder);
   }
+  const auto pid = supervisor_of(folder);
   if (!pid) return core::Error{"the supervisor does not stay; why stands in " + folder.log("supervisor").string()};
   if (kill(static_cast<pid_t>(*pid), SIGTERM) != 0)
     return core::Error{"the supervisor " + std::to_string(*pid) + " cannot be told to end: " + std::strerror(errno)};

@@ -112,12 +112,11 @@ class Supervision {
   void adopt_running(const HostPlan& plan) {
     const auto common = common_of(plan);
     for (const auto& [key, running] : folder_.state()) {
-      const auto pid = static_cast<pid_t>(running.pid);
-      if (pid <= 0 || running.born == 0 || born_of(pid) != running.born) continue;
+      if (!running.runs()) continue;
       PlannedService service;
       service.name = key.substr(0, key.find(kBefore));
       service.generation = running.generation;
-      service.command = command_of(pid);
+      service.command = command_of(static_cast<pid_t>(running.pid));
       if (!service.command.empty() && service.command.back() == "--beside") service.command.pop_back();
       const auto* planned = plan.service(service.name);
       const bool as_planned = planned != nullptr && planned->command == service.command;
