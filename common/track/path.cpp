@@ -177,8 +177,8 @@ Route Path::route() const {
   return route;
 }
 
-Path rerouted(const Path& old, const Ways& ways, const EdgePosition& place, double near_m, double ahead_m,
-              double behind_m) {
+std::optional<Path> rerouted(const Path& old, const Ways& ways, const EdgePosition& place, double near_m,
+                             double ahead_m, double behind_m) {
   const Route old_route = old.route();
   const Run run{old.map().edge(place.edge), place.direction != Direction::reverse};
   const auto distance_on = [&](const Route& route) { return route.distance_of(place, near_m); };
@@ -191,7 +191,8 @@ Path rerouted(const Path& old, const Ways& ways, const EdgePosition& place, doub
     best = joined;
     best_off_m = std::abs(*distance - near_m);
   }
-  Route route = best && best_off_m < kLongestJoinM ? *best : Route(run, place.offset_m, near_m);
+  if (!best || best_off_m > kLongestJoinM) return std::nullopt;
+  Route route = *std::move(best);
   while (route.end_m() < near_m + ahead_m && route.legs().size() < kMostLegs) {
     const auto& next = ways.after(route.legs().back().run);
     if (next.empty()) break;

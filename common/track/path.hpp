@@ -73,8 +73,8 @@ class Path {
   [[nodiscard]] const Leg& leg_at(double distance_m) const;
   static double offset_on(const Leg& leg, double distance_m);
   [[nodiscard]] const std::shared_ptr<const Map>& shared_map() const { return map_; }
-  friend Path rerouted(const Path& old, const Ways& ways, const EdgePosition& place, double near_m, double ahead_m,
-                       double behind_m);
+  friend std::optional<Path> rerouted(const Path& old, const Ways& ways, const EdgePosition& place, double near_m,
+                                      double ahead_m, double behind_m);
   void collect_marks();
   void collect_switches();
   std::shared_ptr<const Map> map_;
@@ -86,8 +86,8 @@ class Path {
 
 /// The way of a train that is on another track than `old` says: through `place`, joined to the old way where that leads
 /// there (behind or in front), with distances that go on from it, and the straight way up to `ahead_m` and `behind_m`
-/// from there. Where nothing joins them the place gets the distance `near_m`. REQUIRES: the edge is on the map.
-Path rerouted(const Path& old, const Ways& ways, const EdgePosition& place, double near_m, double ahead_m,
-              double behind_m);
+/// from there. Nothing when they do not join near `near_m`, where the train is. REQUIRES: the edge is on the map.
+std::optional<Path> rerouted(const Path& old, const Ways& ways, const EdgePosition& place, double near_m,
+                             double ahead_m, double behind_m);
 
 }  // namespace railfix::track

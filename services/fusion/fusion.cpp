@@ -12,9 +12,8 @@ namespace {
 
 constexpr double kPathAheadM = 300000;
 constexpr double kPathBehindM = 50000;
-constexpr double kNetworkProbability = 0.95;
 constexpr double kTrackProbability = 0.999;  // from here on a track is declared
-constexpr double kSameTrackM = 500.0;        // the edge is on the path, but not elsewhere on a ring
+constexpr double kBesideM = 50.0;            // beyond the interval: what is further off is no track beside the train
 constexpr double kNoCameraS = 0.3;
 constexpr int64_t kSnapshotNs = 50'000'000;
 constexpr int64_t kSlipUnseenNs = 1'200'000'000;  // a slip may have grown for so long before it is found
@@ -112,7 +111,10 @@ std::optional<TrainEstimate> Fusion::add(Event event) {
   if (auto* fix = std::get_if<FixInput>(&event)) {
     catch_up();
     start_position(*fix);
-    change_track(*fix);
+    if (!change_track(*fix)) {
+      ++counts_.elsewhere;
+      return std::nullopt;
+    }
   }
   if (step) remember_reference(*step);
   return insert(event);
@@ -197,22 +199,33 @@ std::optional<TrainEstimate> Fusion::set_clock_back() {
 }
 
 void Fusion::start_position(FixInput& fix) const {
-  if (now_->main().path() || !map_ || fix.kind != FixKind::network || fix.probability < kNetworkProbability) return;
+  if (now_->main().path() || !map_ || fix.kind != FixKind::network || fix.probability < kBeginProbability) return;
   auto path = track::Path::follow(map_, {fix.edge, fix.offset_m, fix.direction}, kPathAheadM, kPathBehindM);
   if (path.ok()) fix.new_path = std::make_shared<const track::Path>(std::move(path).value());
 }
 
-// The place along the track stays; only the edges below it become others.
-void Fusion::change_track(FixInput& fix) {
+// The place along the track stays; only the edges below it become others. False: that track is not beside the train,
+// but elsewhere on its way or on the map, and who says so is lost.
+bool Fusion::change_track(FixInput& fix) {
   const auto& path = now_->main().path();
-  if (fix.kind != FixKind::track || !path || fix.probability < kTrackProbability) return;
-  if (map_->edge(fix.edge) == nullptr) return;
-  const double here_m = now_->main().filter().path_distance_m();
-  const auto on_path_m = path->distance_of(fix.edge, fix.offset_m);
-  if (on_path_m && std::abs(*on_path_m - here_m) < kSameTrackM) return;
+  if (fix.kind != FixKind::track || !path) return true;
+  if (map_->edge(fix.edge) == nullptr) return false;
+  const auto& filter = now_->main().filter();
+  const double here_m = filter.path_distance_m() - filter.speed_mps() * core::seconds(filter.stamp_ns() - fix.stamp_ns);
+  const auto promised = now_->main().interval();
+  const double reach_m = kBesideM + promised.ahead_m - promised.behind_m;
+  const track::EdgePosition place{fix.edge, fix.offset_m, fix.direction};
+  const auto runs_here = [&](const track::Path& way) {
+    const auto place_m = way.route().distance_of(place, here_m);
+    return place_m && std::abs(*place_m - here_m) < reach_m;
+  };
+  if (path->distance_of(fix.edge, fix.offset_m)) return runs_here(*path);
+  if (fix.probability < kTrackProbability) return true;
   if (!ways_) ways_.emplace(*map_);
-  fix.new_path = std::make_shared<const track::Path>(
-      track::rerouted(*path, *ways_, {fix.edge, fix.offset_m, fix.direction}, here_m, kPathAheadM, kPathBehindM));
+  auto way = track::rerouted(*path, *ways_, place, here_m, kPathAheadM, kPathBehindM);
+  if (!way || !runs_here(*way)) return false;
+  fix.new_path = std::make_shared<const track::Path>(std::move(*way));
+  return true;
 }
 
 void Fusion::remember_reference(const OdometryInput& step) {

@@ -22,10 +22,11 @@ namespace railfix::fusion {
 /// What was not used, since the start.
 struct FusionCounts {
   uint64_t used = 0;
-  uint64_t too_late = 0;  // older than the history
-  uint64_t repeated = 0;  // the same sensor and stamp again
-  uint64_t jumped = 0;    // stamp too far ahead to be believed
-  uint64_t nonsense = 0;  // not a number, counts from the future, no pulses per metre
+  uint64_t too_late = 0;   // older than the history
+  uint64_t repeated = 0;   // the same sensor and stamp again
+  uint64_t jumped = 0;     // stamp too far ahead to be believed
+  uint64_t nonsense = 0;   // not a number, counts from the future, no pulses per metre
+  uint64_t elsewhere = 0;  // tracks that are not where the train is
   uint64_t clock_resets = 0;
 };
 
@@ -62,7 +63,7 @@ class Fusion {
   [[nodiscard]] bool is_clock_set_back(const Event& event);
   std::optional<TrainEstimate> set_clock_back();
   void start_position(FixInput& fix) const;
-  void change_track(FixInput& fix);
+  bool change_track(FixInput& fix);
   void remember_reference(const OdometryInput& step);
   std::optional<TrainEstimate> insert(const Event& event);
   std::optional<TrainEstimate> catch_up(std::ptrdiff_t wanted = -1);

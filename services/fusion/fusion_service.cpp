@@ -25,6 +25,8 @@ constexpr double kOldestNotesS = 30.0;
 constexpr double kSameRideS = 0.5;   // data and the host's clock go on alike
 constexpr double kSameBeginS = 0.5;  // a replay that is looped begins where it began before
 constexpr double kLiveDataS = 5.0;   // data stamps further from the host's clock are not live
+constexpr double kOutOfOrderS = 2.0;
+constexpr double kStandsMps = 1.0;
 
 Fusion make_fusion(const FusionConfig& config, const std::shared_ptr<const track::Map>& map,
                    const std::optional<SavedScales>& saved) {
@@ -140,6 +142,7 @@ FusionService::FusionService(const FusionConfig& config, service::Context& conte
     map_ = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(config.map)));
   }
   fusion_.emplace(make_fusion(config, map_, scale_file_.saved()));
+  believes_start_ = map_ && config.start != "unknown";
   listen(config);
   context_.on<msg::DataClock>(data_clock, [this](const msg::DataClock& m) { keep_time(m); });
   context_.every(kTickPeriod, [this] { tick(); });
@@ -164,8 +167,11 @@ void FusionService::charge_changed(bool taken) {
 }
 
 void FusionService::hear(const msg::TrainState& state) {
-  if (context_.in_charge() || state.stamp_ns() <= heard_ns_) return;
+  if (context_.in_charge()) return;
+  const bool clock_set_back = core::seconds(heard_ns_ - state.stamp_ns()) > kOutOfOrderS;
+  if (state.stamp_ns() <= heard_ns_ && !clock_set_back) return;
   heard_ns_ = state.stamp_ns();
+  if (believes_start_) forget_start();
   seq_ = std::max(seq_, state.seq());
   if (!latest_ || known_) return;
   // The travelled distance must not jump at a take-over.
@@ -207,9 +213,13 @@ bool FusionService::take_over_known(const TrainEstimate& first) {
     // Of the same ride: neither the clock nor a replay has jumped since, nor has another one begun.
     const double noted_s = core::seconds(core::monotonic_ns() - *noted_ns_);
     noted_ns_.reset();
-    if (age_s < 0 || age_s > kOldestNotesS || std::abs(age_s - noted_s) > kSameRideS) {
+    const bool same_time = age_s >= 0 && std::abs(age_s - noted_s) <= kSameRideS;
+    if (!same_time || age_s > kOldestNotesS) {
       known_.reset();
-      return true;
+      // Only what is played begins where it began before: a train has gone on, and its clock was set.
+      const bool under_way = believes_start_ && (same_time || !is_played(first.stamp_ns));
+      if (under_way) forget_start();
+      return !under_way;
     }
     seq_ = std::max(seq_, known_->seq() + kNumbersUnheard);
     if (map_ && known_->track_known() != 0) {
@@ -234,8 +244,24 @@ bool FusionService::take_over_known(const TrainEstimate& first) {
 
 // What is known of the place comes from another fusion: what this one believes of it is forgotten.
 void FusionService::begin_anew() {
-  fusion_.emplace(core::value_or_throw(Fusion::create(config_.parameters, map_, std::nullopt, scale_file_.saved())));
+  forget_start();
   begun_anew_ = true;
+}
+
+void FusionService::forget_start() {
+  fusion_.emplace(core::value_or_throw(Fusion::create(config_.parameters, map_, std::nullopt, scale_file_.saved())));
+  believes_start_ = false;
+}
+
+// A train that already runs left its start before this computer was switched on.
+bool FusionService::stands_at_start(const TrainEstimate& estimate) {
+  if (start_seen_ || !std::isfinite(estimate.speed_mps)) return true;
+  start_seen_ = true;
+  return is_played(estimate.stamp_ns) || std::abs(estimate.speed_mps) < kStandsMps;
+}
+
+bool FusionService::is_played(int64_t stamp_ns) const {
+  return clock_ || std::abs(core::seconds(core::wall_ns() - stamp_ns)) > kLiveDataS;
 }
 
 // The train stood at the configured start when the data began, and nowhere else in it.
@@ -243,6 +269,7 @@ void FusionService::restart(int64_t data_ns) {
   FusionConfig config = config_;
   const bool from_start = begun_ns_ && std::abs(core::seconds(data_ns - *begun_ns_)) < kSameBeginS;
   if (!from_start) config.start = "unknown";
+  believes_start_ = map_ && config.start != "unknown";
   fusion_.emplace(make_fusion(config, map_, scale_file_.saved()));
   latest_.reset();
   known_.reset();
@@ -324,6 +351,10 @@ void FusionService::tick() {
 }
 
 void FusionService::publish(const TrainEstimate& estimate, int64_t grabbed_ns) {
+  if (believes_start_ && !stands_at_start(estimate)) {
+    forget_start();
+    return;
+  }
   if (known_ && !take_over_known(estimate)) return;
   scale_file_.follow(*fusion_, estimate);
   msg::TrainState message = message_of(estimate);

@@ -36,6 +36,10 @@ class FusionService {
   void keep(const msg::TrainState& state);
   void remember();
   void begin_anew();
+  /// Of a train that was under way when this one began: nobody knows where it is.
+  void forget_start();
+  [[nodiscard]] bool stands_at_start(const TrainEstimate& estimate);
+  [[nodiscard]] bool is_played(int64_t stamp_ns) const;
   bool take_over_known(const TrainEstimate& first);
 
   FusionConfig config_;
@@ -60,6 +64,8 @@ class FusionService {
   std::optional<int64_t> noted_ns_;        // known_ is of the process before, and when it was noted, monotonic
   bool begun_anew_ = false;                // known_ is to be used in the new one
   bool learnt_ = false;                    // nothing more to take over
+  bool believes_start_ = false;            // no other fusion of this ride was heard of yet
+  bool start_seen_ = false;                // the train's first speed
   int64_t heard_ns_ = 0;                   // stamp of the newest state of the one in charge
   int64_t kept_ns_ = 0;
   double distance_offset_m_ = 0;  // of what is sent to what has been measured here

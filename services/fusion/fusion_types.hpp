@@ -43,6 +43,9 @@ struct GnssInput {
 
 enum class FixKind : uint8_t { curvature = 1, landmark = 2, network = 3, track = 4 };
 
+/// A network fix begins the position from this probability on.
+inline constexpr double kBeginProbability = 0.95;
+
 /// A place on the map, of the camera's foot at the stamp.
 struct FixInput {
   int64_t stamp_ns = 0;

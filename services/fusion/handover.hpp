@@ -21,7 +21,7 @@ struct KnownPlace {
 };
 
 /// That place as a network fix at a later time: moved on with its speed, and as uncertain as that makes it, so that an
-/// interval of `interval_factor` sigma holds the train. Nothing when it is too old, the speed is not known, or a
+/// interval of `interval_factor` sigma holds the train. Nothing when it is too old, speed or track are not known, or a
 /// switch may have led the train elsewhere meanwhile.
 std::optional<FixInput> place_at(const std::shared_ptr<const track::Map>& map, const KnownPlace& known,
                                  int64_t stamp_ns, double interval_factor);

@@ -33,6 +33,8 @@ class LandmarkMatcher {
 
   /// Nothing when no mapped landmark fits or it cannot be told which one.
   std::optional<Fix> add(const Sighting& sighting, const Prior& prior);
+  /// The travelled distance does not go on from the one before: earlier sightings say nothing any more.
+  void forget() { seen_.clear(); }
 
  private:
   struct Seen {

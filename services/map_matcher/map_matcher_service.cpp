@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "core/time.hpp"
 
@@ -20,8 +21,10 @@ constexpr double kLeastWayM = 1e-5;       // standing still turns nothing
 constexpr double kTrackEveryS = 1.0;      // the track is said again after this time ...
 constexpr double kOpenTrackEveryM = 2.0;  // ... or, while it is not known, this way
 constexpr double kNoCameraS = 0.5;        // without an odometry step
-constexpr int kCurvatureVariance = 25;    // place of the curvature's variance in TrackView.covariance
-constexpr double kRateShare = 0.75;       // of the curvature's sigma comes from its unknown rate
+constexpr double kCountM = 20.0;
+constexpr double kLostS = 30.0;         // after so long unseen the track is chosen anew
+constexpr int kCurvatureVariance = 25;  // place of the curvature's variance in TrackView.covariance
+constexpr double kRateShare = 0.75;     // of the curvature's sigma comes from its unknown rate
 
 track::EdgePosition place_of(const msg::TrainState& state) {
   return {state.edge(), state.offset_m(),
@@ -33,6 +36,22 @@ uint8_t direction_of(track::Direction direction) {
 Sighting input_of(const msg::LandmarkSighting& m) {
   return {m.stamp_ns(),  static_cast<track::LandmarkKind>(m.kind()), m.distance_ahead_m(), m.lateral_m(), m.sigma_m(),
           m.confidence()};
+}
+StepInput input_of(const msg::OdometryStep& m) {
+  return {m.stamp_ns(),
+          m.reference_stamp_ns(),
+          m.valid() != 0 && m.mode() != msg::ODOMETRY_BLIND,
+          m.step_m(),
+          m.yaw_rad(),
+          m.yaw_sigma_rad(),
+          m.distance_m(),
+          m.speed_mps()};
+}
+
+// A fusion that was started anew may count the travelled distance from elsewhere.
+bool counts_on(const msg::TrainState& before, const msg::TrainState& state) {
+  const double expected_m = state.speed_mps() * core::seconds(state.stamp_ns() - before.stamp_ns());
+  return std::abs(state.distance_m() - before.distance_m() - expected_m) <= kCountM + 0.5 * std::abs(expected_m);
 }
 
 /// The first place, with the others as alternatives.
@@ -87,25 +106,26 @@ void MapMatcherService::restart() {
   if (chooser_) chooser_.emplace(config_.track_parameters(), map_, ways_);
   gyro_ = GyroTurn(config_.gyro);
   state_.reset();
-  before_.reset();
   step_.reset();
+  chain_ = {};
   rails_seen_ns_ = 0;
   located_m_ = 0;
   place_m_ = 0;
   matched_m_ = 0;
+  moved_ns_ = 0;
   said_track_ = {};
 }
 
 void MapMatcherService::use(const msg::TrainState& state) {
   context_.health().input();
-  before_ = state_;
-  state_ = state;
-  if (before_ && before_->standstill() != 0 && state.standstill() != 0) stand(before_->stamp_ns(), state.stamp_ns());
+  const auto before = std::exchange(state_, state);
+  if (before && before->standstill() != 0 && state.standstill() != 0) stand(before->stamp_ns(), state.stamp_ns());
   if (!map_ || state.track_known() == 0) {
     context_.health().degraded(map_ ? "the place on the map is not known yet" : "no map is configured");
     return;
   }
   context_.health().active();
+  if (landmarks_ && before && !counts_on(*before, state)) landmarks_->forget();
   follow(state);
   if (chooser_) follow_without_camera();
 }
@@ -127,9 +147,11 @@ void MapMatcherService::follow(const msg::TrainState& state) {
       place_m_ = *place_m;
       return;
     }
-    if (!place_m && map_->edge(state.edge()) != nullptr) {
-      path_ = std::make_shared<const track::Path>(
-          track::rerouted(*path_, *ways_, place_of(state), place_m_, kPathAheadM, kPathBehindM));
+    const bool other_track = !place_m && map_->edge(state.edge()) != nullptr;
+    auto way = other_track ? track::rerouted(*path_, *ways_, place_of(state), place_m_, kPathAheadM, kPathBehindM)
+                           : std::nullopt;
+    if (way) {
+      path_ = std::make_shared<const track::Path>(std::move(*way));
       landmarks_->change_path(path_);
       curvature_->change_path(path_);
       if (exits_) exits_.emplace(CurveExitParameters{}, path_);
@@ -158,11 +180,12 @@ std::optional<Prior> MapMatcherService::prior_at(int64_t stamp_ns) const {
 }
 
 void MapMatcherService::use(const msg::OdometryStep& step) {
+  chain_.add(input_of(step));
   if (map_ && config_.locate) look_for_place(step);
   if (chooser_) follow_turning(step);
   step_ = step;
   if (!curvature_ || !config_.use_curvature) return;
-  if (step.valid() == 0 || step.mode() == msg::ODOMETRY_BLIND) {
+  if (chain_.broken()) {
     curvature_->forget();
     return;
   }
@@ -176,14 +199,14 @@ void MapMatcherService::use(const msg::OdometryStep& step) {
   const bool rails_seen = std::abs(core::seconds(step.stamp_ns() - rails_seen_ns_)) < kRailsFreshS;
   if (!rails_seen && step.mode() == msg::ODOMETRY_TRACK && std::abs(step_m) > kShortestStepM &&
       std::abs(step.speed_mps()) > config_.least_speed_mps) {
-    curvature_->add(step.distance_m() - 0.5 * step_m, step.yaw_rad() / step_m,
+    curvature_->add(chain_.odometer_m() - 0.5 * step_m, step.yaw_rad() / step_m,
                     std::hypot(step.yaw_sigma_rad(), kYawNoise) / std::abs(step_m), CurvatureOf::body);
   }
-  if (std::abs(step.distance_m() - matched_m_) < config_.match_every_m) return;
-  matched_m_ = step.distance_m();
+  if (std::abs(chain_.odometer_m() - matched_m_) < config_.match_every_m) return;
+  matched_m_ = chain_.odometer_m();
   const auto prior = prior_at(step.stamp_ns());
   if (!prior) return;
-  if (const auto fix = curvature_->match(step.stamp_ns(), step.distance_m(), *prior)) {
+  if (const auto fix = curvature_->match(step.stamp_ns(), chain_.odometer_m(), *prior)) {
     publish(*fix, msg::FIX_CURVATURE, step.grabbed_ns());
   }
 }
@@ -192,33 +215,21 @@ void MapMatcherService::match_exits(const msg::OdometryStep& step) {
   const double step_m = step.step_m();
   const auto prior = prior_at(step.stamp_ns());
   if (!prior || step.mode() != msg::ODOMETRY_TRACK || step_m < kShortestStepM) return;
-  exits_->add(step.distance_m() - 0.5 * step_m, step.yaw_rad() / step_m);
-  if (const auto fix = exits_->match(step.stamp_ns(), step.distance_m(), *prior)) {
+  exits_->add(chain_.odometer_m() - 0.5 * step_m, step.yaw_rad() / step_m);
+  if (const auto fix = exits_->match(step.stamp_ns(), chain_.odometer_m(), *prior)) {
     publish(*fix, msg::FIX_CURVATURE, step.grabbed_ns());
   }
 }
 
-// Key frames overlap: what counts is how the turn since the same picture grew.
-std::optional<Turn> MapMatcherService::turn_of(const msg::OdometryStep& step) const {
-  if (!step_) return std::nullopt;
-  const double dt_s = core::seconds(step.stamp_ns() - step_->stamp_ns());
-  if (dt_s <= 0 || step.valid() == 0 || step.mode() == msg::ODOMETRY_BLIND || step_->valid() == 0) return std::nullopt;
-  Turn turn;
-  turn.way_m = step.distance_m() - step_->distance_m();
-  turn.bias_rad = config_.camera_bias_per_m * std::abs(turn.way_m);
-  const double part = step.step_m() == 0 ? 1.0 : std::clamp(turn.way_m / step.step_m(), -1.0, 1.0);
-  turn.sigma_rad = std::hypot(step.yaw_sigma_rad(), kYawNoise);
-  if (step.reference_stamp_ns() != step_->reference_stamp_ns()) {
-    turn.turn_rad = part * step.yaw_rad();
-  } else {
-    turn.turn_rad = step.yaw_rad() - step_->yaw_rad();
-    turn.sigma_rad *= std::sqrt(std::abs(part));
-  }
+std::optional<Turn> MapMatcherService::turn_of_camera() const {
+  auto turn = chain_.turn();
+  if (turn) turn->bias_rad = config_.camera_bias_per_m * std::abs(turn->way_m);
   return turn;
 }
 
 std::optional<Turn> MapMatcherService::turn_of_gyro(int64_t from_ns, int64_t to_ns) const {
   if (!state_ || !std::isfinite(state_->speed_mps())) return std::nullopt;
+  if (std::abs(core::seconds(to_ns - state_->stamp_ns())) > kOldStateS) return std::nullopt;
   auto turn = gyro_.between(from_ns, to_ns);
   if (turn) turn->way_m = state_->speed_mps() * core::seconds(to_ns - from_ns);
   return turn;
@@ -231,17 +242,18 @@ void MapMatcherService::look_for_place(const msg::OdometryStep& step) {
   }
   if (!locator_) {
     locator_.emplace(config_.locator_parameters(), std::make_shared<const NetworkIndex>(map_));
-    located_m_ = step.distance_m();
+    located_m_ = chain_.odometer_m();
   }
-  auto turn = turn_of(step);
-  if (!turn && step_) turn = turn_of_gyro(step_->stamp_ns(), step.stamp_ns());
+  auto turn = turn_of_camera();
+  if (!turn && step_ && core::seconds(step.stamp_ns() - step_->stamp_ns()) < kOldStateS)
+    turn = turn_of_gyro(step_->stamp_ns(), step.stamp_ns());
   if (!turn) {
     if (step_) locator_->forget();
     return;
   }
   if (std::abs(turn->way_m) > kLeastWayM) locator_->move(turn->way_m, turn->turn_rad, turn->sigma_rad);
-  if (std::abs(step.distance_m() - located_m_) < config_.locate_every_m) return;
-  located_m_ = step.distance_m();
+  if (std::abs(chain_.odometer_m() - located_m_) < config_.locate_every_m) return;
+  located_m_ = chain_.odometer_m();
   const Location location = locator_->locate();
   if (location.certain()) publish_place(step, location);
 }
@@ -259,38 +271,46 @@ void MapMatcherService::follow_turning(const msg::OdometryStep& step) {
   if (!prior || !step_) return;
   const auto place = path_->position_at(prior->path_distance_m);
   chooser_->follow({place, prior->over_m, prior->under_m, state_->sigma_m()});
-  auto turn = turn_of(step);
+  auto turn = moved_ns_ == step_->stamp_ns() ? turn_of_camera() : std::nullopt;
   if (turn) {
     turn->way_m *= state_->visual_scale();
+    move(*turn, step.stamp_ns());
   } else {
-    turn = turn_of_gyro(step_->stamp_ns(), step.stamp_ns());
+    move_without_camera(step.stamp_ns());
   }
-  if (turn) {
-    if (std::abs(turn->way_m) > kLeastWayM) chooser_->move(*turn);
-  } else {
-    const double dt_s = core::seconds(step.stamp_ns() - step_->stamp_ns());
-    const double way_m = state_->speed_mps() * std::max(dt_s, 0.0);
-    if (std::isfinite(way_m)) chooser_->move_blind(way_m);
-  }
-  publish_track(step.stamp_ns(), step.distance_m(), step.grabbed_ns());
+  publish_track(step.stamp_ns(), chain_.odometer_m(), step.grabbed_ns());
 }
 
 // Without a camera fusion's states lead: they come ten times a second.
 void MapMatcherService::follow_without_camera() {
-  if (!before_ || before_->track_known() == 0 || before_->stamp_ns() >= state_->stamp_ns()) return;
   if (step_ && core::seconds(state_->stamp_ns() - step_->stamp_ns()) < kNoCameraS) return;
   const auto prior = prior_at(state_->stamp_ns());
   if (!prior) return;
   chooser_->follow({place_of(*state_), prior->over_m, prior->under_m, state_->sigma_m()});
-  const double way_m = state_->distance_m() - before_->distance_m();
-  auto turn = gyro_.between(before_->stamp_ns(), state_->stamp_ns());
-  if (turn && std::abs(way_m) > kLeastWayM) {
-    turn->way_m = way_m;
-    chooser_->move(*turn);
-  } else if (!turn) {
-    chooser_->move_blind(way_m);
-  }
+  move_without_camera(state_->stamp_ns());
   publish_track(state_->stamp_ns(), state_->distance_m(), 0);
+}
+
+void MapMatcherService::move(const Turn& turn, int64_t to_ns) {
+  if (std::abs(turn.way_m) > kLeastWayM) chooser_->move(turn);
+  moved_ns_ = to_ns;
+}
+
+// From where the chooser has come to, whoever had led it there.
+void MapMatcherService::move_without_camera(int64_t to_ns) {
+  const double dt_s = core::seconds(to_ns - moved_ns_);
+  if (moved_ns_ == 0 || dt_s > kLostS) {
+    if (moved_ns_ != 0) chooser_.emplace(config_.track_parameters(), map_, ways_);
+    moved_ns_ = to_ns;
+    return;
+  }
+  if (dt_s <= 0 || !std::isfinite(state_->speed_mps())) return;
+  if (const auto turn = turn_of_gyro(moved_ns_, to_ns)) {
+    move(*turn, to_ns);
+    return;
+  }
+  chooser_->move_blind(state_->speed_mps() * dt_s);
+  moved_ns_ = to_ns;
 }
 
 void MapMatcherService::publish_track(int64_t stamp_ns, double odometer_m, int64_t grabbed_ns) {
@@ -323,7 +343,7 @@ void MapMatcherService::use(const msg::TrackView& view) {
   // foot.
   const double sigma_per_m = std::sqrt(variance);
   const double ahead_m = std::min(config_.view_ahead_m, kRateShare * sigma_per_m / config_.view_rate_sigma_per_m2);
-  const double odometer_m = step_->distance_m() + step_->speed_mps() * dt_s + ahead_m;
+  const double odometer_m = chain_.odometer_m() + step_->speed_mps() * dt_s + ahead_m;
   curvature_->add(odometer_m, view.curvature_per_m(), sigma_per_m, CurvatureOf::rails);
 }
 

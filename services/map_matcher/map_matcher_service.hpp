@@ -11,6 +11,7 @@
 #include "map_matcher/landmark_matcher.hpp"
 #include "map_matcher/map_matcher_config.hpp"
 #include "map_matcher/network_locator.hpp"
+#include "map_matcher/step_chain.hpp"
 #include "map_matcher/track_chooser.hpp"
 #include "service/service.hpp"
 #include "track/path.hpp"
@@ -33,8 +34,8 @@ class MapMatcherService {
   /// The window at a stamp, extrapolated from the last state; nothing when the place is not known or the state is too
   /// old.
   [[nodiscard]] std::optional<Prior> prior_at(int64_t stamp_ns) const;
-  /// What this step adds to the one before it, as the camera saw it.
-  [[nodiscard]] std::optional<Turn> turn_of(const msg::OdometryStep& step) const;
+  /// What the last step adds to the one before it, as the camera saw it.
+  [[nodiscard]] std::optional<Turn> turn_of_camera() const;
   /// The same from the gyro, for as long as the camera cannot say.
   [[nodiscard]] std::optional<Turn> turn_of_gyro(int64_t from_ns, int64_t to_ns) const;
   void match_exits(const msg::OdometryStep& step);
@@ -42,6 +43,8 @@ class MapMatcherService {
   void publish_place(const msg::OdometryStep& step, const Location& location);
   void follow_turning(const msg::OdometryStep& step);
   void follow_without_camera();
+  void move(const Turn& turn, int64_t to_ns);
+  void move_without_camera(int64_t to_ns);
   void publish_track(int64_t stamp_ns, double odometer_m, int64_t grabbed_ns);
   void publish(const Fix& fix, uint8_t kind, int64_t grabbed_ns);
   /// Unless this one stands by.
@@ -58,14 +61,15 @@ class MapMatcherService {
   std::optional<CurveExitMatcher> exits_;  // instead of it, where the configuration says so
   GyroTurn gyro_;
   std::optional<msg::TrainState> state_;
-  std::optional<msg::TrainState> before_;  // the state before it
   std::optional<msg::OdometryStep> step_;
+  StepChain chain_;  // of all steps so far
   int64_t rails_seen_ns_ = 0;
   std::optional<TrackChooser> chooser_;
   std::optional<NetworkLocator> locator_;  // only while the place is not known
   double located_m_ = 0;                   // odometer at the last search
   double place_m_ = 0;                     // on the path, of the last state
   double matched_m_ = 0;                   // odometer at the last match
+  int64_t moved_ns_ = 0;                   // the chooser has come to this time
   /// What was said of the track last.
   struct SaidTrack {
     uint32_t edge = 0;

@@ -289,6 +289,33 @@ TEST(Fusion, FollowsTheDeclaredTrackAndSaysWhileItIsOpen) {
   EXPECT_LT(state.over_m, 10);
 }
 
+// As a matcher would say that has lost the train.
+TEST(Fusion, ATrackThatIsNotBesideTheTrainIsNotBelieved) {
+  auto map = std::make_shared<track::Map>();
+  map->edges.push_back({1, "first", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{3000, 0, 0}})});
+  map->edges.push_back({2, "second", 2, 3, "", track::Alignment::chained({0, 3000, 0}, {{3000, 0, 0}})});
+  map->edges.push_back({3, "left", 2, 4, "", track::Alignment::chained({0, 3000, 0}, {{3000, 0.001, 0.001}})});
+  map->edges.push_back({4, "of another line", 5, 6, "", track::Alignment::chained({30, 0, 0}, {{6000, 0, 0}})});
+  map->connections = {{2, 1, 2, false}, {2, 1, 3, true}};
+  auto fusion = core::value_or_throw(Fusion::create({}, map, track::EdgePosition{2, 1000, track::Direction::forward}));
+  run(fusion, 0, 10, 20);
+  const auto forward = track::Direction::forward;
+  for (const auto& place : {track::EdgePosition{2, 100, forward}, track::EdgePosition{1, 1200, forward},
+                            track::EdgePosition{3, 100, forward}, track::EdgePosition{4, 4200, forward},
+                            track::EdgePosition{9, 0, forward}}) {
+    fusion.add(FixInput{at(10), place.edge, place.offset_m, INFINITY, 1.0, 0, FixKind::track, forward, nullptr});
+  }
+  EXPECT_EQ(fusion.counts().elsewhere, 5U);
+  const auto state = run(fusion, 10, 12, 20);
+  EXPECT_EQ(state.position.edge, 2U);
+  EXPECT_NEAR(state.position.offset_m, 1240, 0.2);
+  EXPECT_EQ(state.track_probability, 1);
+  // The track beside it is another matter.
+  fusion.add(FixInput{at(12), 3, 1238, INFINITY, 1.0, 0, FixKind::track, forward, nullptr});
+  EXPECT_EQ(fusion.counts().elsewhere, 5U);
+  EXPECT_EQ(run(fusion, 12, 13, 20).position.edge, 3U);
+}
+
 TEST(Fusion, WithoutAMatcherTheTrackBehindASwitchIsAGuessAndOnTheStemItIsNot) {
   auto map = std::make_shared<track::Map>();
   map->edges.push_back({1, "stem", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{1000, 0, 0}})});
