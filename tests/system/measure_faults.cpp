@@ -38,6 +38,7 @@ struct Options {
   double ride_s = 900;
   double rate_hz = 10;
   std::vector<std::string> only;
+  int repeat = 1;
   bool short_one = false;
   bool list = false;
   double soak_minutes = 0;
@@ -139,7 +140,12 @@ int campaign(const Options& options, Rig& rig) {
   depart(rig, observer);
   std::vector<Row> rows;
   const Targets targets = options.short_one ? kShort : Targets{};
-  for (const auto& fault : fault_table(rig)) {
+  std::vector<Fault> faults;
+  for (int i = 0; i < options.repeat; ++i) {
+    const auto once = fault_table(rig);
+    faults.insert(faults.end(), once.begin(), once.end());
+  }
+  for (const auto& fault : faults) {
     const bool wanted = std::any_of(options.only.begin(), options.only.end(),
                                     [&](const auto& text) { return fault.name.find(text) != std::string::npos; });
     if (!options.only.empty() ? !wanted : options.short_one && !fault.in_short) continue;
@@ -151,6 +157,7 @@ int campaign(const Options& options, Rig& rig) {
     print(rows.back(), targets);
     for (const auto& text : rows.back().heard.said) std::cerr << "  " << rows.back().name << ": " << text << '\n';
     for (const auto& text : rows.back().heard.last) std::cerr << "  last in the way: " << text << '\n';
+    if (rows.back().heard.outside > 0) std::cerr << "  recordings and logs: " << rig.keep_evidence().string() << '\n';
   }
   const auto bad =
       std::count_if(rows.begin(), rows.end(), [&](const Row& row) { return !missed(row, targets).empty(); });
@@ -229,6 +236,7 @@ int main(int argc, char** argv) {
   system_test::Options options;
   CLI::App app{"What a whole train does when one thing of it breaks. Needs root (own network, own /dev/shm)."};
   app.add_option("--only", options.only, "Only faults whose name contains this; may be repeated");
+  app.add_option("--repeat", options.repeat, "The table so many times")->check(CLI::PositiveNumber);
   app.add_flag("--short", options.short_one,
                "A few faults in a minute, judged for truth and recovery, not for times: for every build");
   app.add_flag("--list", options.list, "Names of all faults");

@@ -154,7 +154,15 @@ void Observer::judge(const msg::TrainState& state) {
   if (std::abs(along_m) < 20 && across_m > kAcrossM && state.track_probability() >= kSureOfTrack)
     excess_m = std::max(excess_m, across_m);
   heard_.widest_m = std::max(heard_.widest_m, state.over_m() + state.under_m());
-  if (excess_m > 0) ++heard_.outside;
+  if (excess_m > 0 && heard_.outside++ == 0) {
+    char text[200];
+    std::snprintf(text, sizeof text,
+                  "train_state is wrong since its stamp %lld: %.1f m along and %.1f m across, although it says -%.1f m "
+                  "to +%.1f m, edge %u at %.1f m with probability %.4f",
+                  static_cast<long long>(state.stamp_ns()), along_m, across_m, state.over_m(), state.under_m(),
+                  state.edge(), state.offset_m(), state.track_probability());
+    say(text);
+  }
   heard_.worst_excess_m = std::max(heard_.worst_excess_m, excess_m);
 }
 

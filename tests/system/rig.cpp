@@ -248,6 +248,18 @@ fs::path Rig::keys() const {
   return options_.security ? folder_ / "train/security/cab" : fs::path();
 }
 
+fs::path Rig::keep_evidence() const {
+  const auto there = folder_.parent_path() / (train_id_ + "-at-" + std::to_string(static_cast<int>(ridden_s())) + "s");
+  for (const char* host : kHosts) {
+    fs::create_directories(there / host);
+    const tool::HostFolder place(root(host));
+    for (const auto& folder : {place.home() / "recordings", place.log("any").parent_path()}) {
+      if (fs::exists(folder)) fs::copy(folder, there / host / folder.filename(), fs::copy_options::recursive);
+    }
+  }
+  return there;
+}
+
 void Rig::step_clock(const std::string& host, double seconds) const {
   const int64_t step_ns = core::to_ns(seconds);
   const int file = open(clock_file(host).c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);

@@ -61,6 +61,9 @@ class Rig {
   /// More arguments for one service: it is started anew with them, as an upgrade would do; none = as it was.
   void set_arguments(const std::string& service_at_host, const std::vector<std::string>& arguments) const;
 
+  /// Copies recordings and logs as they are now to where they outlive the rig, and gives that folder.
+  [[nodiscard]] std::filesystem::path keep_evidence() const;
+
   TwoHosts& hosts() { return *hosts_; }
   [[nodiscard]] const RigOptions& options() const { return options_; }
   [[nodiscard]] const std::string& train_id() const { return train_id_; }
