@@ -7,8 +7,8 @@
 namespace railfix::etcs {
 namespace {
 
-using testing::random_parameters;
 using ::testing::HasSubstr;
+using testing::random_parameters;
 using testing::set_bits;
 
 TEST(ReportParameters, HandMadePacket) {
