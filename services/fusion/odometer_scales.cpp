@@ -1,11 +1,11 @@
 #include "fusion/odometer_scales.hpp"
 
+#include <yaml-cpp/yaml.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <map>
-#include <sstream>
 
 #include "core/time.hpp"
 
@@ -26,20 +26,24 @@ constexpr std::array<Number, 5> kNumbers{{{"camera", &OdometerScales::camera},
                                           {"wheel_sigma", &OdometerScales::wheel_sigma},
                                           {"correlation", &OdometerScales::correlation}}};
 
-std::map<std::string, std::string> values_of(const std::string& text) {
-  std::map<std::string, std::string> values;
-  std::istringstream lines(text);
-  for (std::string line; std::getline(lines, line);) {
-    const size_t colon = line.find(": ");
-    if (colon != std::string::npos && !line.starts_with('#')) values[line.substr(0, colon)] = line.substr(colon + 2);
+core::Result<YAML::Node> values_of(const std::string& text) {
+  // A number that is cut is a number still, and a shorter camera_id is that of another camera: only the end tells.
+  if (!text.ends_with('\n')) return core::Error{"its last line is cut off"};
+  try {
+    YAML::Node values = YAML::Load(text);
+    if (values.IsMap()) return values;
+    return core::Error{"it holds no 'key: value' lines"};
+  } catch (const YAML::Exception& problem) {
+    return core::Error{"line " + std::to_string(problem.mark.line + 1) + " is not YAML: " + problem.msg};
   }
-  return values;
 }
 
-bool possible(const OdometerScales& s) {
+bool possible(const SavedScales& saved) {
+  const OdometerScales& s = saved.scales;
   const auto sigma_possible = [](double sigma) { return sigma > 0 && sigma <= kLargestError; };
   return std::abs(s.camera) < kLargestError && std::abs(s.wheel) < kLargestError && sigma_possible(s.camera_sigma) &&
-         sigma_possible(s.wheel_sigma) && std::abs(s.correlation) < 1;
+         sigma_possible(s.wheel_sigma) && std::abs(s.correlation) < 1 && saved.stamp_ns >= 0 &&
+         saved.pulses_per_metre >= 0;
 }
 
 double aged_sigma(double sigma, double trip_sigma, double days, const FusionParameters& p, double unlearnt_sigma) {
@@ -68,21 +72,27 @@ std::string to_text(const SavedScales& saved) {
 }
 
 core::Result<SavedScales> saved_scales(const std::string& text) {
-  const auto values = values_of(text);
+  const auto read = values_of(text);
+  if (!read.ok()) return read.error();
+  const YAML::Node& values = read.value();  // const: a look-up adds nothing
   SavedScales saved;
-  const auto read = [&](const char* key, double& number) {
-    const auto found = values.find(key);
-    if (found == values.end()) return false;
-    char* end = nullptr;
-    number = std::strtod(found->second.c_str(), &end);
-    return end != found->second.c_str() && *end == '\0' && std::isfinite(number);
+  std::string wrong;
+  const auto number = [&]<class T>(const char* key, T& value) {
+    const YAML::Node node = values[key];
+    const bool is_number = node.IsDefined() && node.IsScalar() && YAML::convert<T>::decode(node, value);
+    if (!is_number || !std::isfinite(static_cast<double>(value))) wrong = key;
   };
-  bool whole = values.contains("stamp_ns") && values.contains("camera_id");
-  for (const auto& [key, member] : kNumbers) whole = read(key, saved.scales.*member) && whole;
-  whole = read("pulses_per_metre", saved.pulses_per_metre) && whole;
-  if (!whole || !possible(saved.scales)) return core::Error{"it does not hold the scales of camera and wheel"};
-  saved.stamp_ns = std::atoll(values.at("stamp_ns").c_str());
-  saved.camera_id = values.at("camera_id");
+  for (const auto& [key, member] : kNumbers) number(key, saved.scales.*member);
+  number("pulses_per_metre", saved.pulses_per_metre);
+  number("stamp_ns", saved.stamp_ns);
+  const YAML::Node camera_id = values["camera_id"];
+  if (camera_id.IsDefined() && camera_id.IsScalar()) {
+    saved.camera_id = camera_id.Scalar();
+  } else if (!camera_id.IsDefined() || !camera_id.IsNull()) {
+    return core::Error{"camera_id is missing or no text"};
+  }
+  if (!wrong.empty()) return core::Error{wrong + " is missing or no number"};
+  if (!possible(saved)) return core::Error{"its numbers are none that an odometer has"};
   return saved;
 }
 

@@ -31,7 +31,7 @@ struct SavedScales {
 
 /// A line each, `key: value` (YAML).
 std::string to_text(const SavedScales& saved);
-/// Fails on text that to_text did not write, or on numbers that no odometer has.
+/// Fails on text that to_text did not write to its end, or on numbers that no odometer has; says what is wrong with it.
 core::Result<SavedScales> saved_scales(const std::string& text);
 
 /// At the begin of a trip at that time: lens, load and wear have changed them meanwhile.

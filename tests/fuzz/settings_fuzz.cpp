@@ -1,11 +1,12 @@
 // What people and other programs write into files beside the pictures: configuration, calibration, tables of sensors
-// and of the truth, reports to compare, scenarios. The first byte of the input chooses.
+// and of the truth, reports to compare, scenarios, scales of an earlier trip. The first byte of the input chooses.
 #include <array>
 #include <cmath>
 
 #include "compare/report_file.hpp"
 #include "dataset/calibration.hpp"
 #include "dataset/dataset.hpp"
+#include "fusion/odometer_scales.hpp"
 #include "fuzz/fuzz_target.hpp"
 #include "fuzz/input_file.hpp"
 #include "service/config.hpp"
@@ -46,6 +47,14 @@ void calibration(const std::filesystem::path& file, const std::filesystem::path&
                 "a written calibration is the same");
 }
 
+void scales(const std::string& text) {
+  const auto read = fusion::saved_scales(text);
+  if (!taken(read)) return;
+  const auto now = fusion::aged(read.value(), 0, {});
+  fuzz::require(std::abs(now.camera) < 0.2 && std::abs(now.wheel) < 0.2 && now.camera_sigma > 0 && now.wheel_sigma > 0,
+                "scales that are taken are those of odometers");
+}
+
 }  // namespace
 
 }  // namespace railfix
@@ -56,7 +65,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   static const fuzz::InputFolder folder;
   const std::span<const uint8_t> rest{data + 1, size - 1};
   static constexpr std::array kTables{"imu0", "wheel0", "gnss0"};
-  const int choice = data[0] == 's' ? 10 : (data[0] + 2) % 10;  // the digits in their order
+  const int choice = data[0] == 's' ? 10 : data[0] == 'k' ? 11 : (data[0] + 2) % 10;  // the digits in their order
   switch (choice) {
     case 0:
       configuration(folder.write("a.yaml", rest));
@@ -81,6 +90,9 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       break;
     case 7:
       (void)taken(dataset::read_truth_landmarks(folder.write("landmarks.csv", rest)));
+      break;
+    case 11:
+      scales({rest.begin(), rest.end()});
       break;
     case 10:
       scenario(folder.write("scenario.yaml", rest));

@@ -1,4 +1,5 @@
 // Scales of camera and wheel that an earlier trip has taught: what they are worth, and what when they are wrong.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "straight_run.hpp"
@@ -25,8 +26,7 @@ TEST(Scales, AreWrittenAndReadAgain) {
 
 TEST(Scales, ADamagedFileIsRefused) {
   const std::string whole = to_text(saved_as(1.0021, 0.9971));
-  const size_t end_of_numbers = whole.find("camera_id: ");
-  for (size_t length = 0; length < end_of_numbers; ++length)
+  for (size_t length = 0; length < whole.size(); ++length)
     EXPECT_FALSE(saved_scales(whole.substr(0, length)).ok()) << length;
   for (const auto& [number, other] :
        {std::pair{"-0.0029", "nan"}, {"-0.0029", "3"}, {"0.0001\n", "0\n"}, {"0.5", "1"}}) {
@@ -34,6 +34,43 @@ TEST(Scales, ADamagedFileIsRefused) {
     text.replace(text.find(number), std::string(number).size(), other);
     EXPECT_FALSE(saved_scales(text).ok()) << text;
   }
+}
+
+TEST(Scales, WhatIsWrongWithAFileIsSaid) {
+  const std::string whole = to_text(saved_as(1.0021, 0.9971));
+  const auto said = [](const std::string& text) {
+    const auto read = saved_scales(text);
+    return read.ok() ? std::string("taken") : read.error().message;
+  };
+  EXPECT_EQ(said(whole.substr(0, whole.size() - 1)), "its last line is cut off");
+  EXPECT_EQ(said("\n"), "it holds no 'key: value' lines");
+  EXPECT_EQ(said("- 1\n- 2\n"), "it holds no 'key: value' lines");
+  EXPECT_THAT(said(whole + "wheel: [\n"), ::testing::HasSubstr("is not YAML"));
+  EXPECT_THAT(said(std::string("\x00\xFF\xFE: {\n", 7)), ::testing::Not("taken"));
+  EXPECT_THAT(said(std::string(100'000, '[') + "\n"), ::testing::HasSubstr("is not YAML"));
+  std::string text = whole;
+  text.replace(text.find("wheel: -0.0029"), 14, "wheel: [1, 2]");
+  EXPECT_EQ(said(text), "wheel is missing or no number");
+  text.replace(text.find("camera_id"), 9, "camera");
+  EXPECT_EQ(said(text), "camera_id is missing or no text");
+}
+
+TEST(Scales, AFileOfTheReleaseBeforeIsRead) {
+  const auto read = saved_scales(
+      "# True over measured metres, less 1, as references on the last trip have taught them to railfix-fusion.\n"
+      "# Remove this file when a wheelset, the lens or the camera's mount has been exchanged.\n"
+      "camera: 0.00209999987\ncamera_sigma: 1.9e-05\nwheel: -0.0029\nwheel_sigma: 0.0001\ncorrelation: 0.5\n"
+      "pulses_per_metre: 98.039215686274517\nstamp_ns: 1763700000000000000\n"
+      "camera_id: cam0=1280x1024,1154,1154,640,512,0,0,0,0,2.5,-0.08,0,0.001,0 "
+      "cam1=640x512,577,577,320,256,0,0,0,0,2.5,0,0,0,0\n");
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  EXPECT_EQ(read.value().scales.camera_sigma, 1.9e-05);
+  EXPECT_EQ(read.value().pulses_per_metre, 98.039215686274517);
+  EXPECT_EQ(read.value().stamp_ns, 1763700000000000000);
+  EXPECT_TRUE(read.value().camera_id.ends_with("cam1=640x512,577,577,320,256,0,0,0,0,2.5,0,0,0,0"));
+  const auto of_no_camera = saved_scales(to_text({read.value().scales, 0, "", 0}));
+  ASSERT_TRUE(of_no_camera.ok()) << of_no_camera.error().message;
+  EXPECT_EQ(of_no_camera.value().camera_id, "");
 }
 
 TEST(Scales, GrowOldToWhatIsKnownWithoutThem) {
