@@ -16,7 +16,7 @@ let train, chromium, page;
 const errors = []; // of the page's own code
 const watched = []; // lists that the page has sent
 
-async function open(viewport, scheme) {
+async function open(viewport, scheme, address = train.address) {
   const one = await chromium.newPage({ viewport, colorScheme: scheme });
   one.setDefaultTimeout(60000);
   one.on("pageerror", (error) => errors.push(String(error)));
@@ -26,7 +26,7 @@ async function open(viewport, scheme) {
       if (list !== undefined && one === page) watched.push(list);
     }),
   );
-  await one.goto(train.address);
+  await one.goto(address);
   return one;
 }
 
@@ -273,6 +273,21 @@ describe("the page", { timeout: 600000 }, () => {
     await problem.waitFor({ state: "detached" });
   });
 
+  it("does not call a train well of which nothing, or no position, was heard", async () => {
+    const { address, start } = await train.start_lonely_monitor();
+    const one = await open(DESK, "light", address);
+    const nobody = one.locator(".problem", { hasText: "No service of this train has been heard yet" });
+    await nobody.waitFor();
+    assert.equal(await one.locator("#problems .fine").count(), 0);
+    await picture("nobody-heard", one);
+    start("fusion");
+    await nobody.waitFor({ state: "detached" });
+    await one.locator("#problems .asking", { hasText: "No position of the train has been heard yet" }).waitFor();
+    assert.equal(await one.locator("#problems .fine").count(), 0);
+    await picture("no-position-heard", one);
+    await one.close();
+  });
+
   it("greys everything out when the connection is lost, and comes back by itself", async () => {
     train.signal("monitor", "SIGKILL");
     await until("the page says so", async () => /No connection to the train since \d\d:\d\d:\d\d/.test(await text(".connection")));
@@ -281,6 +296,7 @@ describe("the page", { timeout: 600000 }, () => {
     assert.match(await text("#numbers .age"), /Not live: .+ old/);
     for (const panel of ["line", "camera"]) await page.locator(`#${panel}.stale .age`).waitFor();
     assert.match(await page.title(), /not connected/);
+    assert.equal(await page.locator("#problems .fine").count(), 0);
     await picture("no-connection");
     train.start_monitor();
     await until("it is connected again", async () => /Connected/.test(await text(".connection")));

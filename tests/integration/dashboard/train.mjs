@@ -44,6 +44,8 @@ export function simulate(folder, seconds) {
 }
 
 export class Train {
+  lonely = [];
+
   static async start(seconds, settings = [], draw = simulate) {
     const train = new Train();
     train.settings = settings;
@@ -90,6 +92,17 @@ export class Train {
     this.monitor = spawn(program("railfix-monitor"), ["--config", this.path("out/run.yaml"), ...set], { stdio: "ignore" });
   }
 
+  /// A monitor of a train that nobody has heard; returns where its page is, and what starts a service beside it.
+  async start_lonely_monitor() {
+    const port = await free_port();
+    const start = (service, ...settings) =>
+      this.lonely.push(spawn(program(`railfix-${service}`), [`common.train_id=nobody-${process.pid}`, ...settings].flatMap((one) => ["--set", one]), { stdio: "ignore" }));
+    start("monitor", `monitor.port=${port}`, "monitor.expected=[]", "monitor.foxglove_port=-1");
+    const address = `http://127.0.0.1:${port}/`;
+    await until("the lonely monitor answers", () => fetch(address).then((answer) => answer.ok, () => false), START_MS);
+    return { address, start };
+  }
+
   /// Ends the services; what was recorded stays until stop().
   async end_run() {
     this.monitor?.kill("SIGKILL");
@@ -107,7 +120,7 @@ export class Train {
   }
 
   async stop() {
-    this.player?.kill("SIGKILL");
+    for (const one of [this.player, ...this.lonely]) one?.kill("SIGKILL");
     await this.end_run();
     rmSync(this.folder, { recursive: true, force: true });
   }

@@ -63,9 +63,9 @@ export const fresh = (kind: Kind): Freshness => freshness(age_of(kind), FRESH_S[
 function take_state(message: Partial<TrainState>): void {
   if (message.edge !== undefined) {
     state.value = { value: message as TrainState, at_ms: Date.now() };
-  } else if (state.value.value !== null) {
-    state.value = { value: { ...state.value.value, age_s: message.age_s ?? Infinity }, at_ms: Date.now() };
-  }
+  } else if (state.value.value !== null && typeof message.age_s === "number") {
+    state.value = { value: { ...state.value.value, age_s: message.age_s }, at_ms: Date.now() };
+  } // null: a monitor that has just begun knows of none; what we hold grows old
 }
 
 /// Called once a second.
@@ -91,6 +91,7 @@ export function take(message: Message): void {
   switch (message.kind) {
     case "hello":
       clock_offset_ms.value = at_ms - message.now_ns / 1e6;
+      problems.value = null; // of the connection before
       break;
     case "state":
       take_state(message);

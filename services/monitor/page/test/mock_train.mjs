@@ -1,5 +1,5 @@
 // A made-up train that speaks the monitor's protocol, to work on the page without one:
-//   npm run build && npm run mock -- [PORT] [well|no_gnss|blind|dead|unknown|disk_full|no_recorder|replay|silent]
+//   npm run build && npm run mock -- [PORT] [well|no_gnss|blind|dead|unknown|disk_full|no_recorder|replay|silent|unheard]
 import { createReadStream, existsSync, readFileSync } from "node:fs";
 import { createServer } from "node:http";
 import { extname, join, normalize } from "node:path";
@@ -89,7 +89,7 @@ export function start_train({ port = 0, scenario = "well", page = join(here, "..
     const jpeg = picture === null ? null : readFileSync(picture);
 
     const speak = {
-      state: [1, () => say(scenario === "silent" && ticks > 30 ? { kind: "state", age_s: (ticks - 30) / 10 } : state())],
+      state: [1, () => say(scenario === "unheard" ? { kind: "state", age_s: null } : scenario === "silent" && ticks > 30 ? { kind: "state", age_s: (ticks - 30) / 10 } : state())],
       curvature: [2, () => say(curvature())],
       services: [5, () => say({ kind: "services", services: services_of(scenario, began) })],
       topics: [10, () => say({ kind: "topics", topics: topics_of(scenario) })],

@@ -40,7 +40,7 @@ function move(dx_px: number, dy_px: number): void {
   centre.value = [here[0] - dx_px * metres_per_px.value, here[1] + dy_px * metres_per_px.value];
 }
 
-/// The train while it is followed; the whole line when it is nowhere yet.
+/// The train while it is followed; the middle of the line when it is nowhere yet.
 function middle(): [number, number] {
   const one = state.value.value;
   if (following.value && one !== null && track.value !== null) {
@@ -52,13 +52,19 @@ function middle(): [number, number] {
   return [(box.west + box.east) / 2, (box.south + box.north) / 2];
 }
 
-function whole_line(width: number, height: number): void {
-  const box = track.value?.box();
-  if (box === undefined) return;
-  following.value = false;
+/// All of the line, below the buttons.
+function around_line(lines: TrackMap, width: number, height: number): Camera {
+  const box = lines.box();
   const m = Math.max((box.east - box.west) / (width - 40), (box.north - box.south) / (height - 40 - BUTTONS_PX), NEAREST);
-  metres_per_px.value = m;
-  centre.value = [(box.west + box.east) / 2, (box.south + box.north + BUTTONS_PX * m) / 2];
+  return { easting_m: (box.west + box.east) / 2, northing_m: (box.south + box.north + BUTTONS_PX * m) / 2, metres_per_px: m };
+}
+
+function whole_line(width: number, height: number): void {
+  if (track.value === null) return;
+  following.value = false;
+  const all = around_line(track.value, width, height);
+  metres_per_px.value = all.metres_per_px;
+  centre.value = [all.easting_m, all.northing_m];
 }
 
 function key(event: KeyboardEvent): void {
@@ -79,7 +85,8 @@ function key(event: KeyboardEvent): void {
 }
 
 /// All places that are possible, while the track is not known.
-function around_all(one: TrainState, lines: TrackMap, canvas: HTMLCanvasElement): Camera | null {
+function around_all(one: TrainState | null, lines: TrackMap, canvas: HTMLCanvasElement): Camera | null {
+  if (one === null) return following.value ? around_line(lines, canvas.clientWidth, canvas.clientHeight) : null;
   const points = one.alternatives.map((place) => lines.at(place)).filter((point) => point !== null);
   if (one.track_known || !following.value || points.length === 0) return null;
   const [east, north] = [points.map((point) => point[0]), points.map((point) => point[1])];
@@ -97,7 +104,7 @@ function draw(canvas: HTMLCanvasElement): void {
   const one = state.value.value;
   const [easting_m, northing_m] = middle();
   const near: Camera = { easting_m, northing_m, metres_per_px: metres_per_px.value };
-  draw_map(canvas, lines, one, fresh("state") === "live", (one === null ? null : around_all(one, lines, canvas)) ?? near);
+  draw_map(canvas, lines, one, fresh("state") === "live", around_all(one, lines, canvas) ?? near);
 }
 
 function draw_near(canvas: HTMLCanvasElement): void {

@@ -2,7 +2,8 @@
 import { useSignal, useSignalEffect } from "@preact/signals";
 import { useRef } from "preact/hooks";
 import { clock, duration } from "../format";
-import { connection, host_ms, now_ms, problems } from "../store";
+import { age_of, connection, fresh, host_ms, now_ms, problems } from "../store";
+import { verdict } from "../verdict";
 import type { Problem } from "../wire";
 
 export const LOST = "connection";
@@ -38,6 +39,11 @@ function One({ problem, old }: { problem: Problem; old: boolean }) {
   );
 }
 
+function NoProblem() {
+  const { level, text } = verdict(problems.value !== null, fresh("state"), age_of("state"));
+  return <p class={level}>{text}</p>;
+}
+
 export function Problems() {
   const list = all_problems();
   const up = connection.value.up;
@@ -53,7 +59,7 @@ export function Problems() {
           ))}
         </ul>
       ) : (
-        <p class={problems.value === null ? "asking" : "fine"}>{problems.value === null ? "Asking the train …" : "No problems known"}</p>
+        <NoProblem />
       )}
       <Announcements />
     </section>
@@ -68,6 +74,7 @@ function Announcements() {
   const said = useRef(new Map<string, string>());
   const last_ms = useRef(0);
   useSignalEffect(() => {
+    if (connection.value.up && problems.value === null) return; // just asked for: not over
     const current = new Map(all_problems().map((one) => [one.id, one.what]));
     if (now_ms.value - last_ms.current < QUIET_MS) return;
     const begun = [...current].filter(([id]) => !said.current.has(id)).map(([, what]) => what);
