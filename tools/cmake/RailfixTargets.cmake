@@ -50,6 +50,7 @@ function(railfix_service name)
   target_link_libraries(railfix-${program} PRIVATE railfix_${name} railfix_service)
   railfix_warnings(railfix-${program})
   add_dependencies(railfix-services railfix-${program})
+  set_property(GLOBAL APPEND PROPERTY RAILFIX_SERVICES railfix-${program})
 endfunction()
 
 # railfix_test(core SOURCES a_test.cpp DEPENDS railfix_core)  -> program railfix-test-core, run by CTest test by test

@@ -38,8 +38,8 @@ bool say(const std::vector<Finding>& findings) {
   return good;
 }
 
-fs::path programs_folder() {
-  return fs::read_symlink("/proc/self/exe").parent_path();
+std::vector<Finding> findings_of(const Manifest& manifest, const Options& options) {
+  return check_train(manifest, [&](const HostedService& service) { return program_of(service, options.root); });
 }
 
 std::string names_of(const Manifest& manifest) {
@@ -62,9 +62,15 @@ HostPlan plan_here(const Options& options) {
   return *plan;
 }
 
+HostPlan running_plan_here(const Options& options) {
+  auto plan = plan_here(options);
+  if (plan.down) throw core::BadInput("the train is down; railfix train up starts it as the manifest says");
+  return plan;
+}
+
 int check(const Options& options) {
   const auto manifest = core::value_or_throw(read_manifest(options.train));
-  auto findings = check_train(manifest, programs_folder());
+  auto findings = findings_of(manifest, options);
   const auto* here = options.host.empty() ? manifest.host_here() : &chosen_host(manifest, options);
   if (here != nullptr) {
     for (auto& finding : check_computer(&manifest, here)) findings.push_back(std::move(finding));
@@ -80,7 +86,7 @@ int check(const Options& options) {
 
 int render(const Options& options) {
   const auto manifest = core::value_or_throw(read_manifest(options.train));
-  if (!say(check_train(manifest, programs_folder()))) return 1;
+  if (!say(findings_of(manifest, options))) return 1;
   for (const auto& host : manifest.hosts) {
     core::ok_or_throw(render_host(manifest, host, options.out / host.name));
     std::cout << host.name << " (" << host.address << "): " << (options.out / host.name).string() << '\n';
@@ -108,6 +114,7 @@ int status(const Options& options) {
                               {"host", plan.host},
                               {"generation", plan.generation},
                               {"supervised", supervisor.has_value()},
+                              {"down", plan.down},
                               {"services", nlohmann::ordered_json::array()}};
   std::string table;
   for (const auto& service : plan.services) {
@@ -132,9 +139,10 @@ int status(const Options& options) {
     std::cout << json.dump(2) << '\n';
   } else {
     std::cout << "train " << plan.train_id << ", host " << plan.host << ", generation " << plan.generation
-              << (supervisor ? ""
-                  : runs     ? ", without supervisor: railfix train up"
-                             : ", not running: railfix train up")
+              << (plan.down    ? ", down: railfix train up"
+                  : supervisor ? ""
+                  : runs       ? ", without supervisor: railfix train up"
+                               : ", not running: railfix train up")
               << "\n"
               << "service         release    generation      pid restarts  health\n"
               << table;
@@ -145,10 +153,12 @@ int status(const Options& options) {
 int up(const Options& options) {
   const auto manifest = core::value_or_throw(read_manifest(options.train));
   const auto& host = chosen_host(manifest, options);
-  auto findings = check_train(manifest, programs_folder());
+  auto findings = findings_of(manifest, options);
   for (auto& finding : check_computer(&manifest, &host)) findings.push_back(std::move(finding));
   if (!say(findings)) return 1;
-  if (supervisor_of(HostFolder(options.root))) {
+  const HostFolder folder(options.root);
+  const auto installed = folder.plan();
+  if (supervisor_of(folder) && installed && !installed->down) {
     std::cout << "services run here already; railfix train diff says what the manifest would change, upgrade does it\n";
     return status(options);
   }
@@ -200,8 +210,8 @@ int diff(const Options& options) {
 int upgrade(const Options& options) {
   const auto manifest = core::value_or_throw(read_manifest(options.train));
   const auto& host = chosen_host(manifest, options);
-  plan_here(options);
-  auto findings = check_train(manifest, programs_folder());
+  running_plan_here(options);
+  auto findings = findings_of(manifest, options);
   for (auto& finding : check_computer(&manifest, &host)) findings.push_back(std::move(finding));
   if (!say(findings)) return 1;
   const auto plan = core::value_or_throw(install(manifest, host, options.root));
@@ -214,7 +224,7 @@ int upgrade(const Options& options) {
 
 int rollback(const Options& options) {
   const HostFolder folder(options.root);
-  const auto now = plan_here(options);
+  const auto now = running_plan_here(options);
   const auto before = folder.plan(now.previous);
   if (now.previous == 0 || !before)
     throw core::BadInput("there is no generation before " + std::to_string(now.generation));
@@ -234,7 +244,7 @@ int supervise_here(const Options& options) {
 std::vector<Finding> check_services(const HostFolder& folder) {
   std::vector<Finding> findings;
   const auto plan = folder.plan();
-  if (!plan) return findings;
+  if (!plan || plan->down) return findings;
   if (!supervisor_of(folder)) {
     if (any_runs(folder)) findings.push_back({true, "services run without a supervisor: railfix train up starts it"});
     return findings;

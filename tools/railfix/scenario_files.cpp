@@ -9,9 +9,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// Of the source that this program was built from, or of the package.
 fs::path folder() {
-  const char* other = std::getenv("RAILFIX_SCENARIOS");
-  return other != nullptr ? other : RAILFIX_SCENARIOS_FOLDER;
+  if (const char* other = std::getenv("RAILFIX_SCENARIOS")) return other;
+  return fs::exists(RAILFIX_SCENARIOS_FOLDER) ? RAILFIX_SCENARIOS_FOLDER : "/usr/share/railfix/scenarios";
 }
 
 }  // namespace

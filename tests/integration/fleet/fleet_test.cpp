@@ -96,7 +96,7 @@ TEST_F(Fleet, ServicesComeUpComeBackAfterAKillAndGoDown) {
     EXPECT_THAT(entry.path().string(), Not(HasSubstr("railfix-health-" + id_))) << "left behind";
   const auto after = train({"status", "--root", root()});
   EXPECT_EQ(after.exit_code, 1);
-  EXPECT_THAT(after.out, HasSubstr("not running: railfix train up"));
+  EXPECT_THAT(after.out, HasSubstr("down: railfix train up"));
 }
 
 // The kernel may take the supervisor when memory is short: the train goes on, and the next one looks after it.

@@ -160,21 +160,19 @@ std::string complaint_of(const std::string& command) {
   return pclose(pipe) == 0 ? "" : text;
 }
 
-void check_configurations(const Manifest& manifest, const fs::path& programs, Findings& findings) {
+void check_configurations(const Manifest& manifest, const FindProgram& find_program, Findings& findings) {
   for (const auto& host : manifest.hosts) {
     const auto config =
         fs::temp_directory_path() / ("railfix-check-" + std::to_string(getpid()) + "-" + host.name + ".yaml");
     std::ofstream(config) << render_config(manifest, host, manifest.folder.string());
     for (const auto& service : services_on(manifest, host.name)) {
-      std::string program = "railfix-" + service.name;
-      std::replace(program.begin(), program.end(), '_', '-');
-      if (!fs::exists(programs / program)) {
-        warning(findings,
-                "settings of " + service.name + " are not checked: " + (programs / program).string() + " is missing");
+      const auto program = find_program(service);
+      if (!program) {
+        warning(findings, "settings of " + service.name + " are not checked: its program of release " +
+                              service.release + " is not on this computer");
         continue;
       }
-      const auto text =
-          complaint_of("'" + (programs / program).string() + "' --check --config '" + config.string() + "'");
+      const auto text = complaint_of("'" + program->string() + "' --check --config '" + config.string() + "'");
       if (!text.empty()) {
         // The rendered file is ours; the operator knows train.yaml.
         std::string for_operator = text;
@@ -235,7 +233,7 @@ void check_interface(const TrainHost& host, Findings& findings) {
 
 }  // namespace
 
-std::vector<Finding> check_train(const Manifest& manifest, const fs::path& programs) {
+std::vector<Finding> check_train(const Manifest& manifest, const FindProgram& find_program) {
   Findings findings;
   check_placement(manifest, findings);
   check_files(manifest, findings);
@@ -245,7 +243,7 @@ std::vector<Finding> check_train(const Manifest& manifest, const fs::path& progr
   for (const auto& host : manifest.hosts) {
     for (auto& finding : check_certificates(manifest, host)) findings.push_back(std::move(finding));
   }
-  check_configurations(manifest, programs, findings);
+  check_configurations(manifest, find_program, findings);
   return findings;
 }
 

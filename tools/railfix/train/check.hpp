@@ -1,11 +1,14 @@
 // Everything that can be known to go wrong before a train starts.
 #pragma once
 
+#include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "train/manifest.hpp"
 #include "train/plan.hpp"
+#include "train/render.hpp"
 
 namespace railfix::tool {
 
@@ -15,9 +18,10 @@ struct Finding {
 };
 
 /// The manifest against itself and the files beside it: placement of services, ports, files, certificates, and every
-/// service's own check of its configuration (with the programs in `programs`, skipped and said when they are not
-/// there).
-std::vector<Finding> check_train(const Manifest& manifest, const std::filesystem::path& programs);
+/// service's own check of its configuration, with the program that is found for it; skipped and said when there is
+/// none.
+using FindProgram = std::function<std::optional<std::filesystem::path>(const HostedService&)>;
+std::vector<Finding> check_train(const Manifest& manifest, const FindProgram& find_program);
 
 /// Certificates of one host beside the manifest: missing, run out, or about to (settings.monitor.certificate_days).
 std::vector<Finding> check_certificates(const Manifest& manifest, const TrainHost& host);

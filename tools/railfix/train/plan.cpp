@@ -96,6 +96,7 @@ std::optional<HostPlan> HostFolder::plan_in(const fs::path& folder) {
   plan.host = (*root)["host"].as<std::string>();
   plan.generation = (*root)["generation"].as<int>();
   plan.previous = (*root)["previous"].as<int>();
+  plan.down = (*root)["down"].as<bool>(false);
   for (const auto& node : (*root)["services"]) plan.services.push_back(service_of(node));
   return plan;
 }
@@ -106,6 +107,7 @@ core::Status HostFolder::write_to(const fs::path& folder, const HostPlan& plan) 
   root["host"] = plan.host;
   root["generation"] = plan.generation;
   root["previous"] = plan.previous;
+  root["down"] = plan.down;
   root["services"] = YAML::Node(YAML::NodeType::Sequence);
   for (const auto& service : plan.services) {
     YAML::Node node;

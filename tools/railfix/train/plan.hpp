@@ -38,6 +38,7 @@ struct HostPlan {
   std::string host;
   int generation = 0;  // the newest one whose roll-out succeeded or is under way
   int previous = 0;    // the one before, 0 = none
+  bool down = false;   // nothing is to run until the train is brought up again, after a restart of the computer neither
   std::vector<PlannedService> services;
 
   [[nodiscard]] const PlannedService* service(const std::string& name) const;

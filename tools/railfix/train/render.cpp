@@ -6,6 +6,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "train/host_files.hpp"
 #include "train/setting_files.hpp"
 
 namespace railfix::tool {
@@ -15,7 +16,6 @@ namespace fs = std::filesystem;
 
 constexpr int kPrimaryStrength = 20;
 constexpr int kStandbyStrength = 10;
-constexpr int kStopS = 10;
 constexpr const char* kMade = "Made by railfix train from train.yaml; edit that.";
 
 std::string dashed(std::string name) {
@@ -76,25 +76,6 @@ core::Status write(const fs::path& file, const std::string& text) {
   out.close();
   if (!out) return core::Error{file.string() + " cannot be written; is the disk full, or are you not root?"};
   return {};
-}
-
-std::string unit_of(const Manifest& manifest, const TrainHost& host) {
-  std::ostringstream unit;
-  unit << "# " << kMade << "\n[Unit]\nDescription=Railfix on host " << host.name << " of train " << manifest.train_id
-       << "\nAfter=network-online.target docker.service\nWants=network-online.target\nStartLimitIntervalSec=0\n\n"
-       << "[Service]\nExecStart=/usr/bin/railfix train supervise\nRestart=always\nRestartSec=200ms\n"
-       << "# Services outlive a supervisor that dies, and the next one goes on with them; stopping the unit ends them "
-          "in order.\n"
-       << "KillMode=process\nOOMPolicy=continue\n"
-       << "TimeoutStopSec=" << 4 * kStopS << "\n\n[Install]\nWantedBy=multi-user.target\n";
-  return unit.str();
-}
-
-std::string sysctl_text() {
-  return std::string("# ") + kMade +
-         "\n# Socket buffers for DDS between the hosts, and fragments that do not block the link for 30 s.\n"
-         "net.core.rmem_max = 16777216\nnet.core.wmem_max = 16777216\nnet.ipv4.ipfrag_time = 3\n"
-         "net.ipv4.ipfrag_high_thresh = 134217728\n";
 }
 
 // The keys of this host: the owner and the services' group may read them.
@@ -203,18 +184,25 @@ std::string settings_of(const Manifest& manifest, const TrainHost& host, const s
   return text;
 }
 
-core::Result<std::vector<std::string>> program_command(const HostedService& service, const fs::path& folder,
-                                                       const fs::path& root) {
-  const auto at = fs::absolute(folder).lexically_normal().string();
+std::optional<fs::path> program_of(const HostedService& service, const fs::path& root) {
   const std::string name = "railfix-" + dashed(service.name);
   auto program = fs::absolute(root) / "opt/railfix" / service.release / "bin" / name;
   if (!fs::exists(program) && service.release == RAILFIX_VERSION)
     program = fs::read_symlink("/proc/self/exe").parent_path() / name;
-  if (!fs::exists(program)) {
+  return fs::exists(program) ? std::optional(program.lexically_normal()) : std::nullopt;
+}
+
+core::Result<std::vector<std::string>> program_command(const HostedService& service, const fs::path& folder,
+                                                       const fs::path& root) {
+  const auto at = fs::absolute(folder).lexically_normal().string();
+  const auto program = program_of(service, root);
+  if (!program) {
+    const auto missing = root / "opt/railfix" / service.release / "bin";
     return core::Error{"release " + service.release + " of " + service.name + " is not installed on this computer: " +
-                       (root / "opt/railfix" / service.release / "bin" / name).string() + " is missing"};
+                       (missing / ("railfix-" + dashed(service.name))).string() + " is missing (package railfix-" +
+                       service.release + ")"};
   }
-  std::vector<std::string> command{program.lexically_normal().string(), "--config", at + "/config.yaml"};
+  std::vector<std::string> command{program->string(), "--config", at + "/config.yaml"};
   const auto arguments = service_arguments(service);
   command.insert(command.end(), arguments.begin(), arguments.end());
   return command;
@@ -242,8 +230,8 @@ core::Status render_host(const Manifest& manifest, const TrainHost& host, const 
   for (const auto& [name, text] :
        std::map<std::string, std::string>{{"config.yaml", render_config(manifest, host, at)},
                                           {"compose.yaml", render_compose(manifest, host, at)},
-                                          {"systemd/railfix.service", unit_of(manifest, host)},
-                                          {"systemd/60-railfix.conf", sysctl_text()}}) {
+                                          {"systemd/railfix.service", kSystemdUnit},
+                                          {"systemd/60-railfix.conf", kSysctl}}) {
     if (const auto written = write(folder / name, text); !written.ok()) return written;
   }
   if (!manifest.containers || geteuid() != 0) return {};

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,8 +24,9 @@ core::Status render_host(const Manifest& manifest, const TrainHost& host, const 
 std::string render_config(const Manifest& manifest, const TrainHost& host, const std::string& folder);
 std::string render_compose(const Manifest& manifest, const TrainHost& host, const std::string& folder);
 
-/// What starts one service whose files lie in `folder`; programs are looked for in ROOT/opt/railfix/RELEASE/bin, and
-/// beside this program when it is of that release. Error: there is no such program.
+/// Where this computer has the program: ROOT/opt/railfix/RELEASE/bin, or beside this one when it is of that release.
+std::optional<std::filesystem::path> program_of(const HostedService& service, const std::filesystem::path& root);
+/// What starts one service whose files lie in `folder`. Error: there is no such program.
 core::Result<std::vector<std::string>> program_command(const HostedService& service,
                                                        const std::filesystem::path& folder,
                                                        const std::filesystem::path& root);

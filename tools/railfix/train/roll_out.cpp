@@ -239,6 +239,11 @@ core::Status bring_up(const fs::path& root, const HostPlan& plan, const HealthGa
 
 core::Status bring_down(const fs::path& root) {
   const HostFolder folder(root);
+  // First of all, so that a supervisor that systemd starts again keeps still.
+  if (auto plan = folder.plan(); plan && !plan->down) {
+    plan->down = true;
+    if (const auto written = folder.write(*plan); !written.ok()) return written;
+  }
   if (!supervisor_of(folder)) {
     if (!any_runs(folder)) return {};
     // Services whose supervisor has died end in order, too.
@@ -248,8 +253,8 @@ core::Status bring_down(const fs::path& root) {
   if (!pid) return core::Error{"the supervisor does not stay; why stands in " + folder.log("supervisor").string()};
   if (kill(static_cast<pid_t>(*pid), SIGTERM) != 0)
     return core::Error{"the supervisor " + std::to_string(*pid) + " cannot be told to end: " + std::strerror(errno)};
-  if (!wait_until(kStopS, [&] { return !supervisor_of(folder).has_value(); }))
-    return core::Error{"the supervisor " + std::to_string(*pid) + " has not ended within " +
+  if (!wait_until(kStopS, [&] { return supervisor_of(folder) != pid && !any_runs(folder); }))
+    return core::Error{"the supervisor " + std::to_string(*pid) + " has not ended its services within " +
                        std::to_string(static_cast<int>(kStopS)) + " s"};
   return {};
 }

@@ -89,10 +89,14 @@ class Supervision {
     if (written == plan_written_) return;
     plan_written_ = written;
     const auto plan = folder_.plan();
-    if (!plan || plan->services == planned_) return;
-    const bool first = planned_.empty();
+    if (!plan || (!plan->down && plan->services == planned_)) return;
+    if (planned_.empty()) adopt_running(*plan);
+    if (plan->down) {
+      end();
+      planned_.clear();
+      return;
+    }
     planned_ = plan->services;
-    if (first) adopt_running(*plan);
     const auto goes = [this](const SupervisedService& child) { return !is_planned(child) && !is_succeeded(child); };
     const auto falls_out = [this](const SupervisedService& successor) { return !is_planned(successor); };
     std::vector<SupervisedService*> leaving;
