@@ -84,10 +84,11 @@ void judge_position(const TrainSeen& train, Problems& problems) {
   if (!train.state || train.data_stands) return;
   const auto& state = *train.state;
   if (state.track_known() == 0) {
-    problems.push_back({"track", Level::warning,
-                        fmt::format("It is not known which track the train is on ({:.1f} % for edge {})",
-                                    100 * state.track_probability(), state.edge()),
-                        "It becomes known behind the next switch, curve or balise; or give fusion.start."});
+    problems.push_back(
+        {"track", Level::warning,
+         fmt::format("It is not known which track the train is on ({:.1f} % for edge {})",
+                     100 * state.track_probability(), state.edge()),
+         "It becomes known behind the next switch, curve or balise; if not, see what map_matcher says."});
   } else if (state.over_m() + state.under_m() > train.interval_wide_m) {
     problems.push_back({"wide", Level::warning,
                         fmt::format("The confidence interval is {:.0f} m wide", state.over_m() + state.under_m()),

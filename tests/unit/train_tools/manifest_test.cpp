@@ -111,7 +111,7 @@ TEST_F(TrainFolder, TheCheckSaysWhatWouldGoWrong) {
               Contains(HasSubstr("odometry is on coach, but full pictures do not leave the camera's host cab")));
   EXPECT_THAT(findings("recorder: cab", "recorder: coach"), Contains(HasSubstr("records no pictures")));
   EXPECT_THAT(findings("settings:\n", "settings:\n  fusion: { start: '1:250:+' }\n"),
-              Contains(HasSubstr("a fusion that is started again would believe to stand there")));
+              Contains(HasSubstr("a train that was switched off elsewhere would believe to stand there")));
   EXPECT_THAT(findings("settings:\n", "settings:\n  monitor: { port: 8080, foxglove_port: 8080 }\n"),
               Contains(HasSubstr("want the same port 8080 on coach")));
   fs::remove(folder_ / "line.map");

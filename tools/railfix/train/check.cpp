@@ -96,8 +96,8 @@ std::string setting_of(const Manifest& manifest, const char* service, const char
 void check_settings(const Manifest& manifest, Findings& findings) {
   if (const auto start = setting_of(manifest, "fusion", "start"); !start.empty() && start != "unknown")
     warning(findings, "settings.fusion.start is " + start +
-                          ": a fusion that is started again would believe to stand there; leave it out, and "
-                          "map_matcher finds the place");
+                          ": a train that was switched off elsewhere would believe to stand there; leave it out, "
+                          "and map_matcher finds the place");
   if (setting_of(manifest, "monitor", "address") == "0.0.0.0")
     warning(findings,
             "settings.monitor.address is 0.0.0.0: page and metrics are open to every network that the computer is in; "
