@@ -1,6 +1,7 @@
 #include "tpr_publisher/report_trigger.hpp"
 
 #include <cmath>
+#include <cstdlib>
 
 #include "core/time.hpp"
 
@@ -63,7 +64,8 @@ bool ReportTrigger::cycle_distance_over(const Moment& moment) const {
 
 bool ReportTrigger::cycle_time_over(const Moment& moment) const {
   const int64_t period_ns = int64_t{parameters_.t_cycloc} * core::kNsPerSecond;
-  return parameters_.t_cycloc != etcs::kNoCycleTime && moment.now_ns - reported_->now_ns >= period_ns;
+  // A clock that was set back by an hour does not silence the train for an hour.
+  return parameters_.t_cycloc != etcs::kNoCycleTime && std::abs(moment.now_ns - reported_->now_ns) >= period_ns;
 }
 
 std::optional<Reason> ReportTrigger::onboard_reason(const Moment& moment) const {

@@ -50,6 +50,16 @@ TEST_F(Trigger, ReportsEveryTCyclocSeconds) {
   }
 }
 
+TEST_F(Trigger, AClockThatWasSetBackSilencesNobody) {
+  step();
+  run(-3600, 0);
+  EXPECT_EQ(step(), Reason::cycle_time);
+  run(5.99, 100);
+  EXPECT_EQ(step(), std::nullopt);
+  run(0.01, 0);
+  EXPECT_EQ(step(), Reason::cycle_time);
+}
+
 TEST_F(Trigger, ReportsEveryDCyclocMetresEitherWay) {
   auto wanted = parameters();
   wanted.t_cycloc = etcs::kNoCycleTime;
