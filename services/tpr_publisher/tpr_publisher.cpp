@@ -1,5 +1,6 @@
 #include "tpr_publisher/tpr_publisher.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -13,6 +14,8 @@ namespace {
 constexpr int64_t kOldestNs = core::kNsPerSecond;
 constexpr int64_t kOtherTimeNs = 3600 * core::kNsPerSecond;
 constexpr int64_t kOnboardSilentNs = 3 * core::kNsPerSecond;
+constexpr double kFastestMps = 150;  // 540 km/h
+constexpr double kCorrectionM = 20;  // a distance may be corrected by so much, and by what it was not sure of
 
 /// Empty when the position is young enough.
 std::string age_refusal(int64_t stamp_ns, int64_t now_ns) {
@@ -34,6 +37,21 @@ std::string age_refusal(int64_t stamp_ns, int64_t now_ns) {
   return text;
 }
 
+double doubt_m(const TrainPosition& position) {
+  const double doubt_m = std::max(position.over_m, position.under_m);
+  return std::isfinite(doubt_m) ? std::max(doubt_m, 0.0) : 0.0;
+}
+
+/// The travelled distance of both counts from one origin, and nothing is missing between them. Not so when fusion was
+/// away and has nobody to go on from (its distance begins again at 0), has guessed how far the train went meanwhile, or
+/// a clock was set.
+bool goes_on(const TrainPosition& last, const TrainPosition& now) {
+  const int64_t since_ns = now.stamp_ns - last.stamp_ns;
+  if (since_ns < 0 || since_ns > kOldestNs) return false;
+  const double most_m = kFastestMps * core::seconds(since_ns) + kCorrectionM + doubt_m(last) + doubt_m(now);
+  return std::abs(now.distance_m - last.distance_m) <= most_m;
+}
+
 bool is_number(const TrainPosition& position) {
   return !std::isinf(position.speed_mps) && std::isfinite(position.distance_m);
 }
@@ -48,6 +66,7 @@ TprPublisher::TprPublisher(std::shared_ptr<const track::Map> map, const Settings
 }
 
 void TprPublisher::follow(const TrainPosition& position) {
+  if (position_ && !goes_on(*position_, position)) integrity_.lose_way();
   position_ = position;
   if (std::isnan(position.speed_mps)) {
     motion_ = Motion::unknown;
@@ -62,8 +81,12 @@ void TprPublisher::follow(const TrainPosition& position) {
     }
     reference_ = tracker_->reference();
   }
-  const double over_m = position.over_m + (reference_ ? reference_->group->q_locacc_m : 0.0);
-  integrity_.follow({position.stamp_ns, position.distance_m, over_m});
+  if (position.usable) {
+    const double over_m = position.over_m + (reference_ ? reference_->group->q_locacc_m : 0.0);
+    integrity_.follow({position.stamp_ns, position.distance_m, over_m});
+  } else {
+    integrity_.lose_way();
+  }
 }
 
 core::Status TprPublisher::set_parameters(const etcs::ReportParameters& parameters) {
@@ -95,10 +118,21 @@ bool TprPublisher::onboard_silent(int64_t now_ns) const {
   return onboard_ && now_ns - onboard_->stamp_ns > kOnboardSilentNs;
 }
 
+std::string TprPublisher::left_out(int64_t now_ns) const {
+  if (onboard_silent(now_ns))
+    return "onboard_status is silent: mode and level as last heard, train integrity not known.";
+  if (integrity_.forgotten())
+    return "Train integrity is not reported: how far the train has gone since it was confirmed is not known, because "
+           "train_state was away, unusable or began again; confirm it again.";
+  return "";
+}
+
 etcs::TrainPositionReport TprPublisher::fields(int64_t now_ns) const {
   auto fields = make_report(*position_, reference_, motion_, settings_.report, now_ns);
   if (onboard_silent(now_ns)) return fields;
   const auto said = integrity_.said(position_->distance_m);
+  // Nobody can place a length from a front end that is not referred to a group (3.6.5.2.7).
+  if (said.l_trainint && fields.nid_lrbg == etcs::kUnknownBaliseGroup) return fields;
   fields.q_length = said.q_length;
   fields.l_trainint = said.l_trainint;
   return fields;

@@ -54,6 +54,8 @@ class TprPublisher {
   core::Status set_onboard(const Onboard& onboard);
   /// The on-board unit was heard once, but not lately: its mode and level stand, train integrity is not known.
   [[nodiscard]] bool onboard_silent(int64_t now_ns) const;
+  /// What the reports leave out of what the on-board unit says, and why; empty = nothing.
+  [[nodiscard]] std::string left_out(int64_t now_ns) const;
 
  private:
   void follow(const TrainPosition& position);

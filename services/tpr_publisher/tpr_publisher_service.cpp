@@ -200,8 +200,8 @@ void TprPublisherService::on_state(const msg::TrainState& state) {
     report_trouble_ = onboard_refusal_;
   } else if (!packet_58_refusal_.empty()) {
     report_trouble_ = packet_58_refusal_;
-  } else if (publisher_.onboard_silent(now)) {
-    report_trouble_ = "onboard_status is silent: mode and level as last heard, train integrity not known.";
+  } else if (auto left_out = publisher_.left_out(now); !left_out.empty()) {
+    report_trouble_ = std::move(left_out);
   } else if (!reference_known_) {
     report_trouble_ = !has_map_                  ? "Reports say LRBG unknown: tpr_publisher.map is not set."
                       : state.track_known() == 0 ? "Reports say LRBG unknown: the track is not known."

@@ -22,12 +22,19 @@ void TrainIntegrity::follow(const Place& place) {
   settle();
 }
 
+void TrainIntegrity::lose_way() {
+  places_.clear();
+  forgotten_ = forgotten_ || rear_m_;
+  rear_m_.reset();
+}
+
 void TrainIntegrity::hear(uint32_t q_integrity, int64_t integrity_ns, double train_length_m) {
   q_integrity_ = q_integrity;
   if (integrity_ns == integrity_ns_ && train_length_m == train_length_m_) return;
   integrity_ns_ = integrity_ns;
   train_length_m_ = train_length_m;
   rear_m_.reset();
+  forgotten_ = false;
   settled_ = false;
   settle();
 }
@@ -45,8 +52,12 @@ void TrainIntegrity::settle() {
   at_distance_m_ = then.distance_m;
 }
 
+bool TrainIntegrity::is_confirmed() const {
+  return q_integrity_ == kByDevice || q_integrity_ == kByDriver;
+}
+
 TrainIntegrity::Said TrainIntegrity::said(double distance_m) const {
-  if (q_integrity_ != kByDevice && q_integrity_ != kByDriver) return {q_integrity_, std::nullopt};
+  if (!is_confirmed()) return {q_integrity_, std::nullopt};
   if (!rear_m_) return {};
   const double length_m = std::ceil(std::max(distance_m, *at_distance_m_) - *rear_m_);
   if (!(length_m <= kLongest)) return {};

@@ -20,15 +20,21 @@ class TrainIntegrity {
     std::optional<uint32_t> l_trainint;  // m, with q_length 1 or 2
   };
 
-  /// REQUIRES: stamps do not go back.
+  /// REQUIRES: stamps do not go back and the distance goes on, or lose_way() was called.
   void follow(const Place& place);
+  /// How far the train has gone since the last place is not known, as when whoever counts the distance began again: the
+  /// rear end of the confirmation is not known any more, and only another confirmation gives one.
+  void lose_way();
   /// q_integrity as in the message; the train was complete at integrity_ns. Confirmed without a length, at a time that
   /// is longer ago than ten seconds, or before any place is known, it says nothing.
   void hear(uint32_t q_integrity, int64_t integrity_ns, double train_length_m);
   /// A train that has backed since then is not taken for shorter.
   [[nodiscard]] Said said(double distance_m) const;
+  /// A confirmation that could be said before the way was lost.
+  [[nodiscard]] bool forgotten() const { return forgotten_ && is_confirmed(); }
 
  private:
+  [[nodiscard]] bool is_confirmed() const;
   void settle();
 
   std::deque<Place> places_;  // of the last ten seconds
@@ -36,6 +42,7 @@ class TrainIntegrity {
   int64_t integrity_ns_ = 0;
   double train_length_m_ = 0;
   bool settled_ = true;                  // rear_m_ belongs to integrity_ns_
+  bool forgotten_ = false;               // it was known before the way was lost
   std::optional<double> rear_m_;         // min safe rear end, on the travelled distance
   std::optional<double> at_distance_m_;  // travelled then
 };

@@ -168,6 +168,77 @@ TEST(TprPublisher, TheOnboardUnitSetsModeLevelAndIntegrity) {
   EXPECT_THAT(publisher.set_onboard(onboard).error().message, HasSubstr("M_MODE"));
 }
 
+/// Standing at 450 m of edge 1 with 8700 m behind it, confirmed by the driver after a second.
+class ConfirmedTrain : public ::testing::Test {
+ protected:
+  static constexpr double kPeriodS = 1 / 60.0;
+  static constexpr double kNextS = 1 + kPeriodS;
+
+  ConfirmedTrain() {
+    for (int i = 0; i <= 60; ++i) step(i * kPeriodS, 8700);
+  }
+  /// The on-board unit goes on saying the same.
+  void step(double run_s, double distance_m, bool track_known = true) {
+    auto position = at(forward(1, 450), run_s, 0);
+    position.distance_m = distance_m;
+    position.track_known = track_known;
+    now_ns = position.stamp_ns;
+    onboard.stamp_ns = now_ns;
+    if (run_s >= 1 && onboard.q_integrity == 0) {
+      onboard.q_integrity = 2;
+      onboard.integrity_ns = now_ns;
+      onboard.train_length_m = 200;
+    }
+    core::ok_or_throw(publisher.set_onboard(onboard));
+    const auto outcome = publisher.update(position, now_ns);
+    if (outcome.report) reported = outcome.report->fields;
+  }
+  etcs::TrainPositionReport next_report(double run_s, double distance_m, bool track_known = true) {
+    reported.reset();
+    for (int i = 0; !reported && i < 420; ++i) step(run_s + i * kPeriodS, distance_m, track_known);
+    return reported.value();
+  }
+  TprPublisher publisher{balise_map(), settings()};
+  Onboard onboard;
+  std::optional<etcs::TrainPositionReport> reported;
+  int64_t now_ns = kStart;
+};
+
+TEST_F(ConfirmedTrain, SaysItsLength) {
+  EXPECT_EQ(reported->l_trainint, 208U);
+  const auto report = next_report(kNextS, 8700);
+  EXPECT_EQ(report.q_length, 2U);
+  EXPECT_EQ(report.l_trainint, 208U);
+  EXPECT_EQ(publisher.left_out(now_ns), "");
+}
+
+TEST_F(ConfirmedTrain, SaysNothingWhenTheDistanceBeganAgain) {
+  const auto report = next_report(45, 0);
+  EXPECT_EQ(report.q_length, 0U);
+  EXPECT_FALSE(report.l_trainint.has_value());
+  EXPECT_THAT(publisher.left_out(now_ns), HasSubstr("confirm it again"));
+}
+
+TEST_F(ConfirmedTrain, SaysNothingWhenTheDistanceJumpsWithoutAPause) {
+  EXPECT_EQ(next_report(kNextS, 8200).q_length, 0U);
+}
+
+TEST_F(ConfirmedTrain, SaysNothingWhenTheWayWasGuessed) {
+  // fusion goes on from its notes, with the distance that the train would have gone at an even speed
+  EXPECT_EQ(next_report(21, 8700).q_length, 0U);
+}
+
+TEST_F(ConfirmedTrain, SaysNothingWhenTheClockWasSetBack) {
+  EXPECT_EQ(next_report(-30, 8700).q_length, 0U);
+}
+
+TEST_F(ConfirmedTrain, SaysNothingWithoutABaliseGroup) {
+  const auto report = next_report(kNextS, 8700, false);
+  EXPECT_EQ(report.nid_lrbg, etcs::kUnknownBaliseGroup);
+  EXPECT_EQ(report.q_length, 0U);
+  EXPECT_FALSE(report.l_trainint.has_value());
+}
+
 TEST(TprPublisher, Packet58ForTheOtherDirectionIsRefused) {
   TprPublisher publisher(balise_map(), settings());
   etcs::ReportParameters parameters;

@@ -77,6 +77,30 @@ TEST(TrainIntegrity, LossIsSaidWithoutALength) {
   EXPECT_FALSE(integrity.said(50).l_trainint.has_value());
 }
 
+TEST(TrainIntegrity, AWayThatIsNotKnownForgetsTheConfirmation) {
+  auto integrity = running_until(5);
+  integrity.hear(kByDriver, at(5), 200);
+  ASSERT_EQ(integrity.said(50).l_trainint, 205U);
+  integrity.lose_way();
+  for (int i = 0; i < 10; ++i) integrity.follow({at(45 + i * 0.1), i * 1.0, 5});
+  expect_nothing(integrity.said(9));  // not 205 m, which would be the whole train 45 m behind where it was complete
+  EXPECT_TRUE(integrity.forgotten());
+  integrity.hear(kByDriver, at(5), 200);  // said every second: not a new confirmation
+  expect_nothing(integrity.said(9));
+  integrity.hear(kByDriver, at(45.9), 200);
+  EXPECT_EQ(integrity.said(9).l_trainint, 205U);
+  EXPECT_FALSE(integrity.forgotten());
+}
+
+TEST(TrainIntegrity, AConfirmationFromBeforeTheWayWasLostHasNoPlace) {
+  auto integrity = running_until(5);
+  integrity.lose_way();
+  integrity.follow({at(4), 0, 5});  // the clock was set back, too
+  integrity.hear(kByDevice, at(3.9), 200);
+  expect_nothing(integrity.said(0));
+  EXPECT_FALSE(integrity.forgotten());
+}
+
 TEST(TrainIntegrity, BackingMakesNoShorterTrain) {
   auto integrity = running_until(5);
   integrity.hear(kByDevice, at(5), 200);
