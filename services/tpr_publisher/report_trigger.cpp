@@ -4,6 +4,7 @@
 #include <cstdlib>
 
 #include "core/time.hpp"
+#include "tpr_publisher/train_integrity.hpp"
 
 namespace railfix::tpr_publisher {
 
@@ -71,11 +72,9 @@ bool ReportTrigger::cycle_time_over(const Moment& moment) const {
 std::optional<Reason> ReportTrigger::onboard_reason(const Moment& moment) const {
   const auto& now = moment.onboard;
   const auto& then = reported_->onboard;
-  constexpr uint32_t kByDriver = 2;
-  constexpr uint32_t kLost = 3;
   if (now.m_mode != then.m_mode) return Reason::mode;
   if (now.m_level != then.m_level || now.nid_ntc != then.nid_ntc) return Reason::level;
-  if (now.q_integrity == kLost && then.q_integrity != kLost) return Reason::integrity_lost;
+  if (now.q_integrity == kIntegrityLost && then.q_integrity != kIntegrityLost) return Reason::integrity_lost;
   const bool confirmed = now.q_integrity != then.q_integrity || now.integrity_ns != then.integrity_ns;
   if (now.q_integrity == kByDriver && confirmed) return Reason::integrity_confirmed;
   if (now.reports_wanted != then.reports_wanted) return now.wanted_because;

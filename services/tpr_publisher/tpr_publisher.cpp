@@ -14,6 +14,7 @@ namespace {
 constexpr int64_t kOldestNs = core::kNsPerSecond;
 constexpr int64_t kOtherTimeNs = 3600 * core::kNsPerSecond;
 constexpr int64_t kOnboardSilentNs = 3 * core::kNsPerSecond;
+constexpr int64_t kMostAheadNs = core::kNsPerSecond;
 constexpr double kFastestMps = 150;  // 540 km/h
 constexpr double kCorrectionM = 20;  // a distance may be corrected by so much, and by what it was not sure of
 
@@ -100,7 +101,7 @@ core::Status TprPublisher::set_parameters(const etcs::ReportParameters& paramete
   return trigger_.set_parameters(parameters);
 }
 
-core::Status TprPublisher::set_onboard(const Onboard& onboard) {
+core::Status TprPublisher::set_onboard(const Onboard& onboard, int64_t now_ns) {
   ReportSettings report = settings_.report;
   report.m_mode = onboard.m_mode;
   report.m_level = onboard.m_level;
@@ -109,18 +110,44 @@ core::Status TprPublisher::set_onboard(const Onboard& onboard) {
   const auto trial = etcs::encode(make_report({}, std::nullopt, Motion::unknown, report, 0), report.baseline);
   if (!trial.ok()) return trial.error();
   settings_.report = report;
-  onboard_ = onboard;
-  integrity_.hear(onboard.q_integrity, onboard.integrity_ns, onboard.train_length_m);
+  hear_integrity(onboard, now_ns);
   return {};
 }
 
+void TprPublisher::hear_integrity(const Onboard& onboard, int64_t now_ns) {
+  const bool again = onboard_ && onboard.integrity_ns == onboard_->integrity_ns;
+  onboard_ = onboard;
+  onboard_->stamp_ns = std::min(onboard.stamp_ns, now_ns);
+  // What has come was said before now: what is later is the other clock's error.
+  onboard_ahead_ns_ = onboard.stamp_ns - onboard_->stamp_ns;
+  if (!again) {
+    complete_ns_ = std::min(onboard.integrity_ns, onboard.stamp_ns) - onboard_ahead_ns_;
+    complete_ahead_ns_ = std::max(onboard.integrity_ns - now_ns, onboard_ahead_ns_);
+  }
+  if (is_confirmed(onboard.q_integrity)) {
+    onboard_ahead_ns_ = std::max(onboard_ahead_ns_, complete_ahead_ns_);
+    if (onboard_ahead_ns_ > kMostAheadNs) onboard_->q_integrity = kNoIntegrityInformation;
+  }
+  integrity_.hear(onboard_->q_integrity, complete_ns_, onboard.train_length_m);
+}
+
+// One that is ahead of its time is as little to be believed as one that says nothing.
 bool TprPublisher::onboard_silent(int64_t now_ns) const {
-  return onboard_ && now_ns - onboard_->stamp_ns > kOnboardSilentNs;
+  return onboard_ && std::abs(now_ns - onboard_->stamp_ns) > kOnboardSilentNs;
 }
 
 std::string TprPublisher::left_out(int64_t now_ns) const {
   if (onboard_silent(now_ns))
     return "onboard_status is silent: mode and level as last heard, train integrity not known.";
+  if (onboard_ahead_ns_ > kMostAheadNs) {
+    char text[160];
+    std::snprintf(
+        text, sizeof text,
+        "Train integrity is not reported: onboard_status is %.1f s ahead of this host's clock; synchronise the "
+        "clocks, then confirm it again.",
+        core::seconds(onboard_ahead_ns_));
+    return text;
+  }
   if (integrity_.forgotten())
     return "Train integrity is not reported: how far the train has gone since it was confirmed is not known, because "
            "train_state was away, unusable or began again; confirm it again.";

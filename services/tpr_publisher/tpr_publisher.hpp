@@ -50,8 +50,10 @@ class TprPublisher {
   Outcome tick(int64_t now_ns);
   /// A packet 58 from trackside. One for the other running direction than the train's (Q_DIR) is refused.
   core::Status set_parameters(const etcs::ReportParameters& parameters);
-  /// What the on-board unit says replaces mode and level of the settings. Refused when it cannot be encoded.
-  core::Status set_onboard(const Onboard& onboard);
+  /// What the on-board unit says replaces mode and level of the settings. Refused when it cannot be encoded. Of one
+  /// whose clock is more than a second ahead no confirmation of the train's integrity is taken, also not afterwards:
+  /// its time would be taken for the place of a later one.
+  core::Status set_onboard(const Onboard& onboard, int64_t now_ns);
   /// The on-board unit was heard once, but not lately: its mode and level stand, train integrity is not known.
   [[nodiscard]] bool onboard_silent(int64_t now_ns) const;
   /// What the reports leave out of what the on-board unit says, and why; empty = nothing.
@@ -59,6 +61,7 @@ class TprPublisher {
 
  private:
   void follow(const TrainPosition& position);
+  void hear_integrity(const Onboard& onboard, int64_t now_ns);
   [[nodiscard]] Moment moment(int64_t now_ns) const;
   [[nodiscard]] etcs::TrainPositionReport fields(int64_t now_ns) const;
 
@@ -66,7 +69,10 @@ class TprPublisher {
   std::optional<BaliseTracker> tracker_;
   ReportTrigger trigger_;
   TrainIntegrity integrity_;
-  std::optional<Onboard> onboard_;
+  std::optional<Onboard> onboard_;  // its stamp is never later than when it was heard
+  int64_t complete_ns_ = 0;         // its integrity_ns in this host's clock ...
+  int64_t complete_ahead_ns_ = 0;   // ... and how far it was ahead when it was heard first
+  int64_t onboard_ahead_ns_ = 0;    // too much of it, and no confirmation is taken
   std::optional<Reference> reference_;
   std::optional<TrainPosition> position_;
   Motion motion_ = Motion::unknown;  // the last one; kept at standstill

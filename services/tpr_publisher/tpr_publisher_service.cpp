@@ -214,7 +214,8 @@ void TprPublisherService::on_state(const msg::TrainState& state) {
 
 void TprPublisherService::on_onboard(const msg::OnboardStatus& status) {
   const auto onboard = onboard_of(status);
-  const auto taken = onboard.ok() ? publisher_.set_onboard(onboard.value()) : core::Status(onboard.error());
+  const auto taken =
+      onboard.ok() ? publisher_.set_onboard(onboard.value(), now_ns(status.stamp_ns())) : core::Status(onboard.error());
   onboard_refusal_ = taken.ok() ? "" : "onboard_status is not used: " + taken.error().message;
   hear_packet_58(status);
 }

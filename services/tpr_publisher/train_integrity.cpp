@@ -11,8 +11,6 @@ namespace {
 
 constexpr int64_t kHistoryNs = 10 * core::kNsPerSecond;
 constexpr uint32_t kLongest = 32767;  // m, L_TRAININT
-constexpr uint32_t kByDevice = 1;
-constexpr uint32_t kByDriver = 2;
 
 }  // namespace
 
@@ -52,12 +50,8 @@ void TrainIntegrity::settle() {
   at_distance_m_ = then.distance_m;
 }
 
-bool TrainIntegrity::is_confirmed() const {
-  return q_integrity_ == kByDevice || q_integrity_ == kByDriver;
-}
-
 TrainIntegrity::Said TrainIntegrity::said(double distance_m) const {
-  if (!is_confirmed()) return {q_integrity_, std::nullopt};
+  if (!is_confirmed(q_integrity_)) return {q_integrity_, std::nullopt};
   if (!rear_m_) return {};
   const double length_m = std::ceil(std::max(distance_m, *at_distance_m_) - *rear_m_);
   if (!(length_m <= kLongest)) return {};

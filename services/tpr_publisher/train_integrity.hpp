@@ -8,6 +8,16 @@
 
 namespace railfix::tpr_publisher {
 
+constexpr uint32_t kNoIntegrityInformation = 0;
+constexpr uint32_t kByDevice = 1;
+constexpr uint32_t kByDriver = 2;
+constexpr uint32_t kIntegrityLost = 3;
+
+/// Q_LENGTH (Q_INTEGRITY) that says of the train that it is complete.
+constexpr bool is_confirmed(uint32_t q_integrity) {
+  return q_integrity == kByDevice || q_integrity == kByDriver;
+}
+
 class TrainIntegrity {
  public:
   struct Place {
@@ -31,10 +41,9 @@ class TrainIntegrity {
   /// A train that has backed since then is not taken for shorter.
   [[nodiscard]] Said said(double distance_m) const;
   /// A confirmation that could be said before the way was lost.
-  [[nodiscard]] bool forgotten() const { return forgotten_ && is_confirmed(); }
+  [[nodiscard]] bool forgotten() const { return forgotten_ && is_confirmed(q_integrity_); }
 
  private:
-  [[nodiscard]] bool is_confirmed() const;
   void settle();
 
   std::deque<Place> places_;  // of the last ten seconds

@@ -137,7 +137,7 @@ TEST(TprPublisher, TheOnboardUnitSetsModeLevelAndIntegrity) {
   ASSERT_TRUE(publisher.update(at(forward(1, 450), 0, 20), kStart).report.has_value());
   Onboard onboard;
   onboard.stamp_ns = kStart + core::to_ns(0.5);
-  ASSERT_TRUE(publisher.set_onboard(onboard).ok());
+  ASSERT_TRUE(publisher.set_onboard(onboard, onboard.stamp_ns).ok());
   EXPECT_FALSE(publisher.update(at(forward(1, 460), 0.5, 20), onboard.stamp_ns).report.has_value());  // nothing new
   onboard.m_mode = 1;
   onboard.m_level = etcs::kLevelNtc;
@@ -145,7 +145,7 @@ TEST(TprPublisher, TheOnboardUnitSetsModeLevelAndIntegrity) {
   onboard.q_integrity = 1;
   onboard.integrity_ns = kStart + core::to_ns(0.5);
   onboard.train_length_m = 120;
-  ASSERT_TRUE(publisher.set_onboard(onboard).ok());
+  ASSERT_TRUE(publisher.set_onboard(onboard, onboard.stamp_ns).ok());
   auto position = at(forward(1, 470), 1, 20);
   const auto report = publisher.update(position, position.stamp_ns).report;
   ASSERT_TRUE(report.has_value());
@@ -165,49 +165,57 @@ TEST(TprPublisher, TheOnboardUnitSetsModeLevelAndIntegrity) {
   EXPECT_EQ(silent->fields.q_length, 0U);
 
   onboard.m_mode = 17;  // 4.0.0 only
-  EXPECT_THAT(publisher.set_onboard(onboard).error().message, HasSubstr("M_MODE"));
+  EXPECT_THAT(publisher.set_onboard(onboard, onboard.stamp_ns).error().message, HasSubstr("M_MODE"));
 }
 
-/// Standing at 450 m of edge 1 with 8700 m behind it, confirmed by the driver after a second.
-class ConfirmedTrain : public ::testing::Test {
+/// Beyond group B; 60 positions a second, before each of which the on-board unit says the same again.
+class TrainWithOnboard : public ::testing::Test {
  protected:
   static constexpr double kPeriodS = 1 / 60.0;
-  static constexpr double kNextS = 1 + kPeriodS;
 
-  ConfirmedTrain() {
-    for (int i = 0; i <= 60; ++i) step(i * kPeriodS, 8700);
-  }
-  /// The on-board unit goes on saying the same.
   void step(double run_s, double distance_m, bool track_known = true) {
     auto position = at(forward(1, 450), run_s, 0);
     position.distance_m = distance_m;
     position.track_known = track_known;
     now_ns = position.stamp_ns;
-    onboard.stamp_ns = now_ns;
-    if (run_s >= 1 && onboard.q_integrity == 0) {
-      onboard.q_integrity = 2;
-      onboard.integrity_ns = now_ns;
-      onboard.train_length_m = 200;
-    }
-    core::ok_or_throw(publisher.set_onboard(onboard));
+    onboard.stamp_ns = now_ns + ahead_ns;
+    core::ok_or_throw(publisher.set_onboard(onboard, now_ns));
     const auto outcome = publisher.update(position, now_ns);
     if (outcome.report) reported = outcome.report->fields;
+  }
+  void confirm(double at_s) {
+    onboard.q_integrity = kByDriver;
+    onboard.integrity_ns = kStart + core::to_ns(at_s) + ahead_ns;
+    onboard.train_length_m = 200;
+  }
+  TprPublisher publisher{balise_map(), settings()};
+  Onboard onboard;
+  int64_t ahead_ns = 0;  // the on-board unit's clock
+  std::optional<etcs::TrainPositionReport> reported;
+  int64_t now_ns = kStart;
+};
+
+/// Stands 8700 m from where its distance began, confirmed after a second.
+class ConfirmedTrain : public TrainWithOnboard {
+ protected:
+  static constexpr double kNextS = 1 + kPeriodS;
+
+  ConfirmedTrain() {
+    for (int i = 0; i < 60; ++i) step(i * kPeriodS, 8700);
+    confirm(1);
+    step(1, 8700);
   }
   etcs::TrainPositionReport next_report(double run_s, double distance_m, bool track_known = true) {
     reported.reset();
     for (int i = 0; !reported && i < 420; ++i) step(run_s + i * kPeriodS, distance_m, track_known);
     return reported.value();
   }
-  TprPublisher publisher{balise_map(), settings()};
-  Onboard onboard;
-  std::optional<etcs::TrainPositionReport> reported;
-  int64_t now_ns = kStart;
 };
 
 TEST_F(ConfirmedTrain, SaysItsLength) {
   EXPECT_EQ(reported->l_trainint, 208U);
   const auto report = next_report(kNextS, 8700);
-  EXPECT_EQ(report.q_length, 2U);
+  EXPECT_EQ(report.q_length, kByDriver);
   EXPECT_EQ(report.l_trainint, 208U);
   EXPECT_EQ(publisher.left_out(now_ns), "");
 }
@@ -237,6 +245,57 @@ TEST_F(ConfirmedTrain, SaysNothingWithoutABaliseGroup) {
   EXPECT_EQ(report.nid_lrbg, etcs::kUnknownBaliseGroup);
   EXPECT_EQ(report.q_length, 0U);
   EXPECT_FALSE(report.l_trainint.has_value());
+}
+
+/// At 40 m/s.
+class RunningTrain : public TrainWithOnboard {
+ protected:
+  /// The last report on the way.
+  etcs::TrainPositionReport run_until(double end_s) {
+    for (; run_s_ < end_s; run_s_ += kPeriodS) step(run_s_, 40 * run_s_);
+    return reported.value();
+  }
+
+ private:
+  double run_s_ = 0;
+};
+
+TEST_F(RunningTrain, TheClockOfTheOnboardUnitIsNotTakenForThePlaceOfALaterTime) {
+  ahead_ns = 30 * core::kNsPerSecond;
+  run_until(10);
+  EXPECT_THAT(publisher.left_out(now_ns), HasSubstr("30.0 s ahead"));
+  confirm(10);
+  EXPECT_EQ(run_until(45).q_length, 0U);
+  EXPECT_EQ(reported->m_mode, onboard.m_mode);
+  ahead_ns = 0;  // synchronised, but the confirmation is still of the other time
+  EXPECT_EQ(run_until(55).q_length, 0U);
+  EXPECT_THAT(publisher.left_out(now_ns), HasSubstr("confirm it again"));
+  confirm(55);
+  EXPECT_EQ(run_until(55.1).q_length, kByDriver);
+  EXPECT_LE(*reported->l_trainint, 215U);
+  EXPECT_EQ(publisher.left_out(now_ns), "");
+  onboard.q_integrity = kIntegrityLost;
+  ahead_ns = 30 * core::kNsPerSecond;
+  EXPECT_EQ(run_until(57).q_length, kIntegrityLost) << "a loss has no time";
+}
+
+TEST_F(RunningTrain, ALittleAheadIsTakenOut) {
+  ahead_ns = core::to_ns(0.8);
+  run_until(10);
+  confirm(10);
+  run_until(20);
+  const double since_m = 40 * core::seconds(static_cast<int64_t>(reported->t_train) * 10'000'000 -
+                                            (kStart + core::to_ns(10)) % (int64_t{etcs::kUnknownTime} * 10'000'000));
+  EXPECT_NEAR(*reported->l_trainint, since_m + 208, 2);
+}
+
+TEST_F(RunningTrain, OneWhoIsAheadAndDiesIsSilent) {
+  Onboard ahead;
+  ahead.stamp_ns = kStart + 30 * core::kNsPerSecond;
+  ASSERT_TRUE(publisher.set_onboard(ahead, kStart).ok());
+  EXPECT_FALSE(publisher.onboard_silent(kStart + core::to_ns(3)));
+  EXPECT_TRUE(publisher.onboard_silent(kStart + core::to_ns(3.1)));
+  EXPECT_TRUE(publisher.onboard_silent(kStart - core::to_ns(3.1))) << "this host's clock was set back";
 }
 
 TEST(TprPublisher, Packet58ForTheOtherDirectionIsRefused) {

@@ -9,9 +9,6 @@
 namespace railfix::tpr_publisher {
 namespace {
 
-constexpr uint32_t kByDevice = 1;
-constexpr uint32_t kByDriver = 2;
-
 int64_t at(double run_s) {
   return core::to_ns(1000 + run_s);
 }
