@@ -38,7 +38,7 @@ struct Onboard {
   uint32_t m_level = etcs::kLevel2;
   uint32_t nid_ntc = 0;
   uint32_t q_integrity = 0;
-  uint32_t reports_wanted = 0;
+  uint32_t reports_wanted = 0;  // counts up; begins again at 0 with its writer
   Reason wanted_because = Reason::session;
 };
 

@@ -136,6 +136,10 @@ bool TprPublisher::onboard_silent(int64_t now_ns) const {
   return onboard_ && std::abs(now_ns - onboard_->stamp_ns) > kOnboardSilentNs;
 }
 
+bool TprPublisher::onboard_overtaken(int64_t stamp_ns, int64_t now_ns) const {
+  return onboard_ && stamp_ns < onboard_->stamp_ns && !onboard_silent(now_ns);
+}
+
 std::string TprPublisher::left_out(int64_t now_ns) const {
   if (onboard_silent(now_ns))
     return "onboard_status is silent: mode and level as last heard, train integrity not known.";

@@ -54,6 +54,8 @@ class TprPublisher {
   /// whose clock is more than a second ahead no confirmation of the train's integrity is taken, also not afterwards:
   /// its time would be taken for the place of a later one.
   core::Status set_onboard(const Onboard& onboard, int64_t now_ns);
+  /// A newer one was heard lately: this is what another writer has left behind.
+  [[nodiscard]] bool onboard_overtaken(int64_t stamp_ns, int64_t now_ns) const;
   /// The on-board unit was heard once, but not lately: its mode and level stand, train integrity is not known.
   [[nodiscard]] bool onboard_silent(int64_t now_ns) const;
   /// What the reports leave out of what the on-board unit says, and why; empty = nothing.

@@ -213,9 +213,10 @@ void TprPublisherService::on_state(const msg::TrainState& state) {
 }
 
 void TprPublisherService::on_onboard(const msg::OnboardStatus& status) {
+  const int64_t now = now_ns(status.stamp_ns());
+  if (publisher_.onboard_overtaken(status.stamp_ns(), now)) return;
   const auto onboard = onboard_of(status);
-  const auto taken =
-      onboard.ok() ? publisher_.set_onboard(onboard.value(), now_ns(status.stamp_ns())) : core::Status(onboard.error());
+  const auto taken = onboard.ok() ? publisher_.set_onboard(onboard.value(), now) : core::Status(onboard.error());
   onboard_refusal_ = taken.ok() ? "" : "onboard_status is not used: " + taken.error().message;
   hear_packet_58(status);
 }

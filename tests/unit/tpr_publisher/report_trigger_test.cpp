@@ -163,6 +163,19 @@ TEST_F(Trigger, TheOnboardUnitCallsForReports) {
   }
 }
 
+TEST_F(Trigger, AnOnboardUnitThatBeganAgainWantsNothingUntilItSaysSo) {
+  moment.onboard.reports_wanted = 5;
+  moment.onboard.wanted_because = Reason::border;
+  step();
+  moment.onboard.reports_wanted = 0;
+  moment.onboard.wanted_because = Reason{};
+  EXPECT_EQ(step(), std::nullopt);
+  moment.onboard.reports_wanted = 1;
+  moment.onboard.wanted_because = Reason::session;
+  EXPECT_EQ(step(), Reason::session);
+  EXPECT_EQ(step(), std::nullopt);
+}
+
 TEST_F(Trigger, StaysDueUntilSent) {
   step();
   moment.nid_lrbg = 7;

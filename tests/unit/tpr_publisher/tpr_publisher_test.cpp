@@ -298,6 +298,21 @@ TEST_F(RunningTrain, OneWhoIsAheadAndDiesIsSilent) {
   EXPECT_TRUE(publisher.onboard_silent(kStart - core::to_ns(3.1))) << "this host's clock was set back";
 }
 
+TEST(TprPublisher, WhatAnotherOnboardUnitLeftBehindIsOvertaken) {
+  TprPublisher publisher(balise_map(), settings());
+  const auto after = [](double s) { return kStart + core::to_ns(s); };
+  EXPECT_FALSE(publisher.onboard_overtaken(kStart, after(0.1)));  // the first one, whatever it is
+  Onboard onboard;
+  onboard.stamp_ns = after(1);
+  ASSERT_TRUE(publisher.set_onboard(onboard, after(1.1)).ok());
+  EXPECT_TRUE(publisher.onboard_overtaken(kStart, after(1.2)));
+  EXPECT_FALSE(publisher.onboard_overtaken(after(2), after(2.1)));
+  EXPECT_FALSE(publisher.onboard_overtaken(kStart, after(4.1))) << "its clock was set back";
+  onboard.stamp_ns = after(30);  // ahead: the next one of another writer is not older than when it came
+  ASSERT_TRUE(publisher.set_onboard(onboard, after(5)).ok());
+  EXPECT_FALSE(publisher.onboard_overtaken(after(5.5), after(5.6)));
+}
+
 TEST(TprPublisher, Packet58ForTheOtherDirectionIsRefused) {
   TprPublisher publisher(balise_map(), settings());
   etcs::ReportParameters parameters;
