@@ -51,6 +51,18 @@ void BaliseTracker::update(const EdgePosition& place) {
   last_ = foot;
 }
 
+std::optional<double> BaliseTracker::foot_beyond_m(uint32_t nid_lrbg) const {
+  if (reference_ && reference_->group->nid_lrbg() == nid_lrbg) return reference_->foot_m;
+  if (!last_) return std::nullopt;
+  const auto path = track::Path::follow(map_, *last_, 0, search_behind_m_);
+  if (!path.ok()) return std::nullopt;
+  std::optional<double> beyond_m;
+  for (const auto& mark : path.value().balise_groups()) {  // by distance: the last one is the nearest
+    if (mark.distance_m <= 0 && mark.group->nid_lrbg() == nid_lrbg) beyond_m = -mark.distance_m;
+  }
+  return beyond_m;
+}
+
 bool BaliseTracker::step_on_edge(const EdgePosition& foot) {
   if (foot.edge != last_->edge || foot.direction != last_->direction) return false;
   const double sign = sign_of(foot.direction);

@@ -33,6 +33,9 @@ class BaliseTracker {
   void update(const track::EdgePosition& foot);
   void lose();
   [[nodiscard]] const std::optional<Reference>& reference() const { return reference_; }
+  /// How far the foot is beyond this group, along, when it is the reference or lies behind the train, no farther than
+  /// one is looked for at the start.
+  [[nodiscard]] std::optional<double> foot_beyond_m(uint32_t nid_lrbg) const;
 
  private:
   /// A group on the way from the last place to this one.

@@ -13,7 +13,7 @@ ReportTrigger::ReportTrigger(const etcs::ReportParameters& parameters, double tr
   core::ok_or_throw(set_parameters(parameters));
 }
 
-core::Status ReportTrigger::set_parameters(const etcs::ReportParameters& parameters) {
+core::Status ReportTrigger::set_parameters(const etcs::ReportParameters& parameters, std::optional<uint32_t> origin) {
   if (parameters.t_cycloc == 0 || parameters.d_cycloc == 0) {
     return core::Error{"Packet 58 asks for reports without a pause (T_CYCLOC or D_CYCLOC is 0): use 1 or more."};
   }
@@ -24,22 +24,39 @@ core::Status ReportTrigger::set_parameters(const etcs::ReportParameters& paramet
     }
   }
   parameters_ = parameters;
-  locations_placed_ = false;
+  origin_ = origin;
+  origin_m_.reset();
+  passed_before_ = true;
   locations_.clear();
+  double at_m = 0;
+  for (const auto& location : parameters.locations) {
+    if (origin == etcs::kUnknownBaliseGroup) break;
+    at_m += location.d_loc * etcs::scale_m(parameters.q_scale);
+    locations_.push_back({at_m, location.q_lgtloc == 0, false});
+  }
   location_passed_ = false;
   asked_ = parameters.m_loc == etcs::kReportNow;
   return {};
 }
 
 void ReportTrigger::place_locations(const Moment& moment) {
-  if (locations_placed_ || !moment.beyond_lrbg_m) return;
-  locations_placed_ = true;
-  double at_m = moment.front_m - *moment.beyond_lrbg_m;
-  for (const auto& location : parameters_.locations) {
-    at_m += location.d_loc * etcs::scale_m(parameters_.q_scale);
-    const bool rear_end = location.q_lgtloc == 0;
-    locations_.push_back({at_m, rear_end, reached_m(moment, rear_end) >= at_m});
+  if (locations_.empty() || origin_m_ || !moment.beyond_lrbg_m) return;
+  if (!origin_) origin_ = moment.nid_lrbg;
+  const auto beyond_m = *origin_ == moment.nid_lrbg ? moment.beyond_lrbg_m : moment.beyond_origin_m;
+  if (!beyond_m) {  // nor will it come to lie behind a train that has left it
+    locations_.clear();
+    return;
   }
+  origin_m_ = moment.front_m - *beyond_m;
+  for (auto& location : locations_) {
+    if (passed_before_) location.passed = reached_m(moment, location.rear_end) - *origin_m_ >= location.at_m;
+  }
+  passed_before_ = false;
+}
+
+void ReportTrigger::lose_way() {
+  origin_m_.reset();
+  way_lost_ = true;
 }
 
 double ReportTrigger::reached_m(const Moment& moment, bool rear_end) const {
@@ -52,7 +69,7 @@ void ReportTrigger::note_events(const Moment& moment) {
     group_passed_ = true;
   }
   for (auto& location : locations_) {
-    if (location.passed || reached_m(moment, location.rear_end) < location.at_m) continue;
+    if (!origin_m_ || location.passed || reached_m(moment, location.rear_end) - *origin_m_ < location.at_m) continue;
     location.passed = true;
     location_passed_ = true;
   }
@@ -60,7 +77,8 @@ void ReportTrigger::note_events(const Moment& moment) {
 
 bool ReportTrigger::cycle_distance_over(const Moment& moment) const {
   const double period_m = parameters_.d_cycloc * etcs::scale_m(parameters_.q_scale);
-  return parameters_.d_cycloc != etcs::kNoCycleDistance && std::abs(moment.front_m - reported_->front_m) >= period_m;
+  return parameters_.d_cycloc != etcs::kNoCycleDistance &&
+         (way_lost_ || std::abs(moment.front_m - reported_->front_m) >= period_m);
 }
 
 bool ReportTrigger::cycle_time_over(const Moment& moment) const {
@@ -103,6 +121,7 @@ void ReportTrigger::sent(const Moment& moment) {
   asked_ = false;
   group_passed_ = false;
   location_passed_ = false;
+  way_lost_ = false;
 }
 
 void ReportTrigger::watch(const Moment& moment) {

@@ -50,7 +50,8 @@ struct Moment {
   double min_safe_front_m = 0;
   bool standstill = false;
   uint32_t nid_lrbg = etcs::kUnknownBaliseGroup;
-  std::optional<double> beyond_lrbg_m;  // front end beyond the LRBG, along the cab's forward axis
+  std::optional<double> beyond_lrbg_m;    // front end beyond the LRBG, along the cab's forward axis
+  std::optional<double> beyond_origin_m;  // ... beyond the group that wanted_origin() names
   Onboard onboard;
 };
 
@@ -59,9 +60,18 @@ class ReportTrigger {
   /// train_length_m: 0 = not known; then no location may ask for the rear end.
   ReportTrigger(const etcs::ReportParameters& parameters, double train_length_m);
 
-  /// A new packet 58; one that asks for reports without a pause or for what is not known is refused. Its locations
-  /// count from the LRBG, along the cab's forward axis, from the next moment with an LRBG on.
-  core::Status set_parameters(const etcs::ReportParameters& parameters);
+  /// A packet 58; one that asks for reports without a pause or for what is not known is refused. Its locations count
+  /// along the cab's forward axis from `origin`, the LRBG when it came; nothing = the next one that is known, because
+  /// it has only just come, kUnknownBaliseGroup = nobody knows any more, and locations are left out.
+  core::Status set_parameters(const etcs::ReportParameters& parameters, std::optional<uint32_t> origin = std::nullopt);
+  /// The group that locations count from; nothing before it is known and when there are no locations.
+  [[nodiscard]] std::optional<uint32_t> origin() const { return locations_.empty() ? std::nullopt : origin_; }
+  /// The same, while moments must say where it is.
+  [[nodiscard]] std::optional<uint32_t> wanted_origin() const { return origin_m_ ? std::nullopt : origin(); }
+  /// Locations are asked for, but where they are is not known.
+  [[nodiscard]] bool locations_left_out() const { return locations_.empty() && !parameters_.locations.empty(); }
+  /// Moments before and after this one have no distance in common.
+  void lose_way();
   /// The most urgent reason to report now; the same again until sent() is called.
   [[nodiscard]] std::optional<Reason> due(const Moment& moment);
   void sent(const Moment& moment);
@@ -70,7 +80,7 @@ class ReportTrigger {
 
  private:
   struct Location {
-    double at_m = 0;  // travelled distance
+    double at_m = 0;  // beyond the origin
     bool rear_end = false;
     bool passed = false;
   };
@@ -83,13 +93,16 @@ class ReportTrigger {
 
   etcs::ReportParameters parameters_;
   double train_length_m_;
-  bool locations_placed_ = false;
   std::vector<Location> locations_;
+  std::optional<uint32_t> origin_;  // balise group
+  std::optional<double> origin_m_;  // its travelled distance; nothing = must be found
+  bool passed_before_ = true;       // locations that lie behind when the origin is found were passed long ago
   std::optional<Moment> reported_;  // last moment that was sent
   uint32_t last_group_ = etcs::kUnknownBaliseGroup;
   bool asked_ = false;  // "now"
   bool group_passed_ = false;
   bool location_passed_ = false;
+  bool way_lost_ = false;  // since the last report
 };
 
 }  // namespace railfix::tpr_publisher

@@ -67,7 +67,10 @@ TprPublisher::TprPublisher(std::shared_ptr<const track::Map> map, const Settings
 }
 
 void TprPublisher::follow(const TrainPosition& position) {
-  if (position_ && !goes_on(*position_, position)) integrity_.lose_way();
+  if (position_ && !goes_on(*position_, position)) {
+    integrity_.lose_way();
+    trigger_.lose_way();
+  }
   position_ = position;
   if (std::isnan(position.speed_mps)) {
     motion_ = Motion::unknown;
@@ -90,7 +93,7 @@ void TprPublisher::follow(const TrainPosition& position) {
   }
 }
 
-core::Status TprPublisher::set_parameters(const etcs::ReportParameters& parameters) {
+core::Status TprPublisher::set_parameters(const etcs::ReportParameters& parameters, std::optional<uint32_t> origin) {
   if (parameters.q_dir != etcs::kUnknownSide) {  // here the value 2 says "both"
     const uint32_t side = reference_ ? orientation(*reference_) : uint32_t{etcs::kUnknownSide};
     if (side == etcs::kUnknownSide)
@@ -98,7 +101,7 @@ core::Status TprPublisher::set_parameters(const etcs::ReportParameters& paramete
     if (side != parameters.q_dir)
       return core::Error{"Packet 58 is for trains of the other direction (Q_DIR) than this one's."};
   }
-  return trigger_.set_parameters(parameters);
+  return trigger_.set_parameters(parameters, origin);
 }
 
 core::Status TprPublisher::set_onboard(const Onboard& onboard, int64_t now_ns) {
@@ -155,6 +158,9 @@ std::string TprPublisher::left_out(int64_t now_ns) const {
   if (integrity_.forgotten())
     return "Train integrity is not reported: how far the train has gone since it was confirmed is not known, because "
            "train_state was away, unusable or began again; confirm it again.";
+  if (trigger_.locations_left_out())
+    return "No reports at the locations of packet 58: it came while nobody listened, or the group that they count from "
+           "is not on the way behind the train.";
   return "";
 }
 
@@ -182,6 +188,10 @@ Moment TprPublisher::moment(int64_t now_ns) const {
   if (reference_) {
     moment.nid_lrbg = reference_->group->nid_lrbg();
     moment.beyond_lrbg_m = reference_->foot_m + settings_.report.foot_to_front_m;
+    if (const auto origin = trigger_.wanted_origin()) {
+      if (const auto foot_m = tracker_->foot_beyond_m(*origin))
+        moment.beyond_origin_m = *foot_m + settings_.report.foot_to_front_m;
+    }
   }
   if (onboard_) {
     moment.onboard = *onboard_;

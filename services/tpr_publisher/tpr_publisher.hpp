@@ -48,8 +48,11 @@ class TprPublisher {
   void watch(const TrainPosition& position, int64_t now_ns);
   /// Time goes on without a position: says when a report is due that cannot be sent.
   Outcome tick(int64_t now_ns);
-  /// A packet 58 from trackside. One for the other running direction than the train's (Q_DIR) is refused.
-  core::Status set_parameters(const etcs::ReportParameters& parameters);
+  /// A packet 58 from trackside. One for the other running direction than the train's (Q_DIR) is refused. `origin`: as
+  /// for the trigger.
+  core::Status set_parameters(const etcs::ReportParameters& parameters, std::optional<uint32_t> origin = std::nullopt);
+  /// The group that its locations count from, when it has any and it is known.
+  [[nodiscard]] std::optional<uint32_t> origin() const { return trigger_.origin(); }
   /// What the on-board unit says replaces mode and level of the settings. Refused when it cannot be encoded. Of one
   /// whose clock is more than a second ahead no confirmation of the train's integrity is taken, also not afterwards:
   /// its time would be taken for the place of a later one.
@@ -58,6 +61,7 @@ class TprPublisher {
   [[nodiscard]] bool onboard_overtaken(int64_t stamp_ns, int64_t now_ns) const;
   /// The on-board unit was heard once, but not lately: its mode and level stand, train integrity is not known.
   [[nodiscard]] bool onboard_silent(int64_t now_ns) const;
+  [[nodiscard]] bool onboard_heard(int64_t now_ns) const { return onboard_ && !onboard_silent(now_ns); }
   /// What the reports leave out of what the on-board unit says, and why; empty = nothing.
   [[nodiscard]] std::string left_out(int64_t now_ns) const;
 

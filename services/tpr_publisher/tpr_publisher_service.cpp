@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 
 #include "core/time.hpp"
 
@@ -116,28 +117,48 @@ TprPublisherService::TprPublisherService(const Config& config, service::Context&
   context.every(kTickPeriod, [this] { on_tick(); });
   share_charge();
   context.at_restart([this](int64_t) { restart(); });
-  // It outlives a restart, also while the on-board unit is silent.
-  const auto kept = etcs::parse_hex(context.kept());
-  if (!context.kept().empty() && !context.common().lock_step && kept.ok() && take_packet_58(kept.value()).ok()) {
-    packet_58_ = kept.value();
-    context.log().info("position report parameters of packet 58 as before");
-  }
+  remember_packet_58();
+}
+
+// It outlives a restart, also while the on-board unit is silent: "HEX LRBG", or "HEX" when there was no LRBG yet.
+void TprPublisherService::remember_packet_58() {
+  const auto& notes = context_.kept();
+  if (notes.empty() || context_.common().lock_step) return;
+  const size_t blank = std::min(notes.find(' '), notes.size());
+  const auto kept = etcs::parse_hex(notes.substr(0, blank));
+  if (!kept.ok()) return;
+  const uint64_t lrbg = std::strtoull(notes.c_str() + blank, nullptr, 10);
+  origin_ = lrbg > 0 && lrbg < etcs::kUnknownBaliseGroup ? static_cast<uint32_t>(lrbg) : etcs::kUnknownBaliseGroup;
+  packet_58_ = kept.value();
+  const auto taken = take_packet_58(packet_58_);
+  packet_58_refusal_ = taken.ok() ? "" : "packet 58 of before is not used: " + taken.error().message;
+  if (taken.ok()) context_.log().info("position report parameters of packet 58 as before");
+}
+
+// Once it is known where its locations count from they are not moved to where a later process begins.
+void TprPublisherService::keep_packet_58() {
+  const auto origin = publisher_.origin();
+  if (!parameters_ || !origin || origin == origin_) return;
+  origin_ = origin;
+  context_.keep(etcs::to_hex(packet_58_) + ' ' + std::to_string(*origin));
 }
 
 core::Status TprPublisherService::take_packet_58(std::span<const uint8_t> packet) {
   const auto parameters = etcs::decode_report_parameters(packet);
   if (!parameters.ok()) return parameters.error();
-  if (auto status = publisher_.set_parameters(parameters.value()); !status.ok()) return status;
+  if (auto status = publisher_.set_parameters(parameters.value(), origin_); !status.ok()) return status;
   parameters_ = parameters.value();
   return {};
 }
 
 // It stands in every onboard_status: who was away, or is the second one of two, hears it all the same.
-void TprPublisherService::hear_packet_58(const msg::OnboardStatus& status) {
+void TprPublisherService::hear_packet_58(const msg::OnboardStatus& status, bool just_come) {
   const size_t bytes = std::min<size_t>(status.packet_58_bytes(), status.packet_58().size());
   const std::span packet(status.packet_58().data(), bytes);
   // One that was refused may fit when the train's direction is known.
   if (packet.empty() || (packet_58_refusal_.empty() && std::ranges::equal(packet, packet_58_))) return;
+  if (!std::ranges::equal(packet, packet_58_))
+    origin_ = just_come ? std::nullopt : std::optional(etcs::kUnknownBaliseGroup);
   packet_58_.assign(packet.begin(), packet.end());
   const auto taken = take_packet_58(packet);
   packet_58_refusal_ = taken.ok() ? "" : "packet 58 of onboard_status is not used: " + taken.error().message;
@@ -167,13 +188,14 @@ int TprPublisherService::fitness() const {
 
 void TprPublisherService::stand_by(const msg::TrainState& state, int64_t now_ns) {
   publisher_.watch(position_of(state), now_ns);
+  keep_packet_58();
   report_trouble_.clear();
   context_.health().active();
 }
 
 void TprPublisherService::restart() {
   publisher_ = TprPublisher(map_, settings_);
-  if (parameters_) (void)publisher_.set_parameters(*parameters_);
+  if (parameters_) (void)publisher_.set_parameters(*parameters_, origin_);
   state_seen_ = false;
   reference_known_ = false;
 }
@@ -193,6 +215,7 @@ void TprPublisherService::on_state(const msg::TrainState& state) {
     return;
   }
   const auto outcome = publisher_.update(position_of(state), now);
+  keep_packet_58();
   if (outcome.report) send(*outcome.report, state.grabbed_ns());
   if (!outcome.refusal.empty()) {
     report_trouble_ = outcome.refusal;
@@ -215,10 +238,11 @@ void TprPublisherService::on_state(const msg::TrainState& state) {
 void TprPublisherService::on_onboard(const msg::OnboardStatus& status) {
   const int64_t now = now_ns(status.stamp_ns());
   if (publisher_.onboard_overtaken(status.stamp_ns(), now)) return;
+  const bool heard_before = publisher_.onboard_heard(now);
   const auto onboard = onboard_of(status);
   const auto taken = onboard.ok() ? publisher_.set_onboard(onboard.value(), now) : core::Status(onboard.error());
   onboard_refusal_ = taken.ok() ? "" : "onboard_status is not used: " + taken.error().message;
-  hear_packet_58(status);
+  hear_packet_58(status, heard_before);
 }
 
 void TprPublisherService::on_tick() {

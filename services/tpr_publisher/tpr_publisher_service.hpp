@@ -24,7 +24,10 @@ class TprPublisherService {
   void on_onboard(const msg::OnboardStatus& status);
   void on_tick();
   core::Status take_packet_58(std::span<const uint8_t> packet);
-  void hear_packet_58(const msg::OnboardStatus& status);
+  /// `just_come`: it did not stand in an onboard_status of some seconds ago.
+  void hear_packet_58(const msg::OnboardStatus& status, bool just_come);
+  void remember_packet_58();
+  void keep_packet_58();
   void share_charge();
   [[nodiscard]] int fitness() const;
   /// Not in charge: works along and sends nothing.
@@ -45,6 +48,7 @@ class TprPublisherService {
   TprPublisher publisher_;
   std::optional<etcs::ReportParameters> parameters_;  // as told by trackside ...
   std::vector<uint8_t> packet_58_;                    // ... in what was heard last, used or not
+  std::optional<uint32_t> origin_;                    // LRBG when it came, for its locations; nothing = the next one
   messaging::Writer<msg::TrainPositionReport> writer_;
   std::optional<msg::DataClock> data_clock_;
   service::DataTime data_time_;  // while there is a clock

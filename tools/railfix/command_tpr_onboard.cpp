@@ -176,7 +176,10 @@ class Station {
     listener_.run(options_.for_s, [&] {
       bool changed = false;
       for (const auto& line : lines_.take()) changed |= heard(unit, line);
-      heard_once_ |= writer_.matched_readers() > 0;
+      if (!heard_once_ && writer_.matched_readers() > 0) {
+        heard_once_ = true;
+        next_ns_ = 0;
+      }
       if (changed) say(unit);
       if (core::monotonic_ns() >= next_ns_) write(unit);
       return false;
@@ -202,7 +205,11 @@ class Station {
     write(unit);
   }
   void write(const OnboardUnit& unit) {
-    writer_.write(unit.status(data_ahead_ns_));
+    auto status = unit.status(data_ahead_ns_);
+    // Its locations count from where the train is when it comes: nobody knows that of one that has always been there.
+    if (!introduced_) status.packet_58_bytes(0);
+    introduced_ = heard_once_;
+    writer_.write(status);
     next_ns_ = core::monotonic_ns() + kPeriodNs;
   }
 
@@ -213,6 +220,7 @@ class Station {
   int64_t data_ahead_ns_ = 0;
   int64_t next_ns_ = 0;
   bool heard_once_ = false;
+  bool introduced_ = false;  // has spoken to somebody
 };
 
 }  // namespace

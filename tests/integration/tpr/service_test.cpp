@@ -1,6 +1,7 @@
 // The service program itself, over DDS: states in, reports and status out.
 #include <gmock/gmock.h>
 
+#include "etcs/report_parameters.hpp"
 #include "integration/tpr/tpr_service.hpp"
 #include "messaging/onboard_topic.hpp"
 
@@ -162,37 +163,51 @@ TEST_F(TprService, HearsTheOnboardCommand) {
                         [&] { write_state(450); }));
 }
 
-// The trackside sends it once. It comes while the service is down, and to one that has no notes: the other one of two.
-TEST_F(TprService, TakesPacket58FromTheOnboardUnitAlsoAfterwardsAndKeepsIt) {
+// The trackside sends it once, with locations that count from the LRBG of that moment. It outlives the service, with
+// its LRBG; of one that came while the service was down nobody knows where its locations are.
+TEST_F(TprService, KeepsPacket58AndTheBaliseGroupThatItCountsFrom) {
   messaging::Writer<msg::OnboardStatus> onboard(participant_, topics::onboard_status);
-  msg::OnboardStatus status;
-  status.m_level(etcs::kLevel2);
-  const auto say = [&](const std::string& hex) {
-    const auto packet = hex.empty() ? std::vector<uint8_t>{} : etcs::parse_hex(hex).value();
+  std::string said;
+  double offset_m = 450;
+  const auto go_on = [&](double to_m) {
+    msg::OnboardStatus status;
+    const auto packet = said.empty() ? std::vector<uint8_t>{} : etcs::parse_hex(said).value();
     std::ranges::copy(packet, status.packet_58().begin());
     status.packet_58_bytes(static_cast<uint32_t>(packet.size()));
+    status.m_level(etcs::kLevel2);
     status.stamp_ns(core::wall_ns());
     onboard.write(status);
+    write_state(offset_m = std::min(offset_m + 4, to_m));
+  };
+  const auto says = [&](const std::string& what) {
+    return run_until([&] { return reason().find(what) != std::string::npos; }, [&] { go_on(450); });
   };
   auto program = std::make_unique<test::Program>(service());
-  ASSERT_TRUE(run_until([&] { return connected() && onboard.matched_readers() > 0; }, [] {}));
-  say("3A80");
-  ASSERT_TRUE(run_until([&] { return reason().find("ends inside") != std::string::npos; }, [&] { write_state(450); }));
-  double offset_m = 450;
-  for (const bool still_said : {true, false}) {
+  const auto begin_again = [&](const std::string& packet) {
     program->end(SIGKILL);
     ASSERT_TRUE(run_until([&] { return states_.matched_readers() == 0; }, [] {}));
     reports_.clear();
-    // T_CYCLOC 6 s, D_CYCLOC 1000 m, a location 500 m beyond the LRBG
-    say(still_said ? "3A80908303E82103E9" : "");
+    said = packet;
     program = std::make_unique<test::Program>(service());
-    offset_m = 450;
-    ASSERT_TRUE(run_until([&] { return !reports_.empty(); }, [&] { write_state(offset_m); }));
-    ASSERT_TRUE(run_until([&] { return reports_.back().reason() == msg::REPORT_LOCATION; },
-                          [&] { write_state(offset_m = std::min(offset_m + 4, 920.0)); }))
-        << (still_said ? "said while it was down" : "kept over a kill");
+  };
+  ASSERT_TRUE(run_until([&] { return connected() && onboard.matched_readers() > 0; }, [] {}));
+  said = "3A80";
+  ASSERT_TRUE(says("ends inside"));
+  said = "3A80908303E82103E9";  // T_CYCLOC 6 s, D_CYCLOC 1000 m, a location 500 m beyond the LRBG, which is B at 400 m
+  ASSERT_TRUE(run_until([&] { return reason().empty(); }, [&] { go_on(450); }));
+  for (const bool still_said : {true, false}) {
+    begin_again(still_said ? said : "");
+    offset_m = 750;  // beyond C
+    ASSERT_TRUE(run_until([&] { return !reports_.empty(); }, [&] { go_on(750); }));
+    ASSERT_TRUE(run_until([&] { return reports_.back().reason() == msg::REPORT_LOCATION; }, [&] { go_on(950); }));
     EXPECT_EQ(reports_.back().nid_lrbg(), tpr_publisher::testing::kC);
+    EXPECT_NEAR(reports_.back().d_lrbg_m(), 200 - 4, 4.1) << "the front end may be 4 m farther than it seems";
   }
+  auto other = etcs::decode_report_parameters(etcs::parse_hex("3A80908303E82103E9").value()).value();
+  other.locations[0].d_loc = 100;
+  begin_again(etcs::to_hex(etcs::encode(other).value()));
+  offset_m = 450;
+  EXPECT_TRUE(says("No reports at the locations of packet 58"));
 }
 
 }  // namespace

@@ -137,6 +137,96 @@ TEST_F(Trigger, LocationsCountFromTheBaliseGroup) {
   EXPECT_EQ(step(), std::nullopt);
 }
 
+/// Packet 58 with one location, 500 m beyond group 7 for the front end; nothing else calls for a report.
+class TriggerWithLocation : public Trigger {
+ protected:
+  TriggerWithLocation() {
+    wanted.t_cycloc = etcs::kNoCycleTime;
+    wanted.m_loc = etcs::kReportNotAtGroups;
+    wanted.locations = {{500, 1}};
+  }
+  etcs::ReportParameters wanted;
+};
+
+TEST_F(TriggerWithLocation, CountsFromTheGroupOfThePacketNotFromThePresentOne) {
+  core::ok_or_throw(trigger.set_parameters(wanted, 7));
+  step();  // no LRBG yet
+  EXPECT_EQ(trigger.wanted_origin(), 7U);
+  moment.nid_lrbg = 8;
+  moment.beyond_lrbg_m = 20;
+  moment.beyond_origin_m = 420;
+  run(1, 0);
+  EXPECT_EQ(step(), std::nullopt);
+  EXPECT_EQ(trigger.wanted_origin(), std::nullopt);
+  run(1, 69);  // 489 m, max safe front end 499 m
+  EXPECT_EQ(step(), std::nullopt);
+  run(1, 2);
+  EXPECT_EQ(step(), Reason::location);
+}
+
+TEST_F(TriggerWithLocation, IsLeftOutWhereNobodyKnowsIt) {
+  core::ok_or_throw(trigger.set_parameters(wanted, etcs::kUnknownBaliseGroup));
+  EXPECT_TRUE(trigger.locations_left_out());
+  core::ok_or_throw(trigger.set_parameters(wanted, 7));
+  EXPECT_FALSE(trigger.locations_left_out());
+  step();
+  moment.nid_lrbg = 8;  // group 7 is not behind the train
+  moment.beyond_lrbg_m = 20;
+  run(1, 10000);
+  EXPECT_EQ(step(), std::nullopt);
+  EXPECT_TRUE(trigger.locations_left_out());
+  EXPECT_EQ(trigger.origin(), std::nullopt);
+}
+
+TEST_F(TriggerWithLocation, IsFoundAgainWhenTheDistanceBeganAgain) {
+  ask(wanted);
+  moment.nid_lrbg = 7;
+  moment.beyond_lrbg_m = 100;
+  run(0, 8700);
+  moment.beyond_lrbg_m = 100;
+  step();
+  EXPECT_EQ(trigger.origin(), 7U);
+  moment.front_m = 0;  // fusion is back, 300 m farther
+  moment.nid_lrbg = 8;
+  moment.beyond_lrbg_m = 50;
+  moment.beyond_origin_m = 400;
+  run(40, 0);
+  trigger.lose_way();
+  EXPECT_EQ(step(), std::nullopt);
+  run(2, 91);  // 491 m, max safe front end 501 m
+  EXPECT_EQ(step(), Reason::location);
+  moment.front_m = 0;  // and once more: passed is passed
+  moment.beyond_origin_m = 600;
+  run(40, 0);
+  trigger.lose_way();
+  EXPECT_EQ(step(), std::nullopt);
+}
+
+TEST_F(TriggerWithLocation, IsReportedWhenItWasPassedMeanwhile) {
+  ask(wanted);
+  moment.nid_lrbg = 7;
+  moment.beyond_lrbg_m = 100;
+  step();
+  trigger.lose_way();
+  moment.beyond_lrbg_m = 700;
+  run(40, 0);
+  EXPECT_EQ(step(), Reason::location);
+}
+
+TEST_F(Trigger, ADistanceThatBeganAgainIsReportedForDCycloc) {
+  auto wanted = parameters();
+  wanted.t_cycloc = etcs::kNoCycleTime;
+  wanted.d_cycloc = 1000;
+  ask(wanted);
+  run(0, 500);
+  step();
+  moment.front_m = 0;
+  run(40, 0);
+  trigger.lose_way();
+  EXPECT_EQ(step(), Reason::cycle_distance);
+  EXPECT_EQ(step(), std::nullopt);
+}
+
 TEST_F(Trigger, TheOnboardUnitCallsForReports) {
   step();
   const auto expect_once = [&](Reason reason) {

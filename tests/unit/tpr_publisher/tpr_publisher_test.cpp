@@ -298,6 +298,32 @@ TEST_F(RunningTrain, OneWhoIsAheadAndDiesIsSilent) {
   EXPECT_TRUE(publisher.onboard_silent(kStart - core::to_ns(3.1))) << "this host's clock was set back";
 }
 
+TEST(TprPublisher, LocationsOfPacket58CountFromItsGroup) {
+  TprPublisher publisher(balise_map(), settings());
+  etcs::ReportParameters parameters;
+  parameters.locations = {{500, 1}};
+  ASSERT_TRUE(publisher.set_parameters(parameters, kB).ok());  // at 400 m: the location is at 900 m
+  auto position = at(forward(1, 750), 0, 20);
+  position.distance_m = 3;
+  ASSERT_EQ(publisher.update(position, position.stamp_ns).report->fields.nid_lrbg, kC);
+  EXPECT_EQ(publisher.origin(), kB);
+  EXPECT_EQ(publisher.left_out(position.stamp_ns), "");
+  position = at(forward(1, 893), 0.9, 20);
+  position.distance_m = 146;
+  EXPECT_FALSE(publisher.update(position, position.stamp_ns).report.has_value());
+  position = at(forward(1, 896), 30, 20);  // fusion was away and begins again at 0
+  position.distance_m = 0;
+  const auto report = publisher.update(position, position.stamp_ns).report;
+  ASSERT_TRUE(report.has_value());
+  EXPECT_EQ(report->reason, Reason::location);
+
+  ASSERT_TRUE(publisher.set_parameters(parameters, kE).ok());  // on another track
+  position = at(forward(1, 897), 30.1, 20);
+  position.distance_m = 1;
+  EXPECT_FALSE(publisher.update(position, position.stamp_ns).report.has_value());
+  EXPECT_THAT(publisher.left_out(position.stamp_ns), HasSubstr("locations of packet 58"));
+}
+
 TEST(TprPublisher, WhatAnotherOnboardUnitLeftBehindIsOvertaken) {
   TprPublisher publisher(balise_map(), settings());
   const auto after = [](double s) { return kStart + core::to_ns(s); };
