@@ -17,7 +17,6 @@ namespace topics = messaging::topics;
 using namespace std::chrono_literals;
 
 constexpr size_t kLogKept = 200;
-constexpr size_t kReportsKept = 20;
 // Who reads /metrics counts as somebody who looks for this long.
 constexpr int64_t kScrapeNs = 60 * core::kNsPerSecond;
 // Readers go away this long after the last one looked, so that opening a page anew makes none.
@@ -90,6 +89,7 @@ void MonitorService::restart() {
   choice_ = {};
   gnss_ = {};
   trail_ = {};
+  reports_.clear();
 }
 
 MonitorService::~MonitorService() = default;
@@ -178,7 +178,8 @@ void MonitorService::hand_to_foxglove(const Arrived& arrived) {
   const auto cdr = arrived.topic.type->serialize(arrived.sample.get());
   FoxgloveMessage message{arrived.info.received_ns, std::string(cdr.begin(), cdr.end())};
   foxglove_.publish(arrived.name, message);
-  if (standing) standing_[arrived.name] = std::move(message);
+  const bool overtaken = arrived.topic.name == topics::train_position_report.name && !report_is_newest_;
+  if (standing && !overtaken) standing_[arrived.name] = std::move(message);
 }
 
 // Curvature is the sixth of seven states in track_view's covariance (upper triangle, row by row).
@@ -201,9 +202,9 @@ void MonitorService::on_log(const Arrived& arrived) {
 
 void MonitorService::on_report(const Arrived& arrived) {
   ++reports_sent_;
-  reports_.push_back(report_message(arrived.as<msg::TrainPositionReport>()));
-  if (reports_.size() > kReportsKept) reports_.pop_front();
-  live_.publish("reports", reports_.back(), true);
+  const auto& report = arrived.as<msg::TrainPositionReport>();
+  report_is_newest_ = reports_.take(report, arrived.info.received_ns);
+  if (report_is_newest_) live_.publish("reports", report_message(report), true);
 }
 
 // Cameras that have a preview now.

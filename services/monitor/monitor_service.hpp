@@ -12,6 +12,7 @@
 #include "monitor/map_view.hpp"
 #include "monitor/monitor_config.hpp"
 #include "monitor/problems.hpp"
+#include "monitor/report_list.hpp"
 #include "monitor/static_files.hpp"
 #include "monitor/train_watch.hpp"
 #include "service/service.hpp"
@@ -118,7 +119,8 @@ class MonitorService {
   Newest<msg::DataClock> clock_;
   std::deque<nlohmann::json> log_;
   nlohmann::json log_fresh_ = nlohmann::json::array();
-  std::deque<nlohmann::json> reports_;
+  ReportList reports_;
+  bool report_is_newest_ = true;  // the last one that came
   uint64_t reports_sent_ = 0;
   CurvatureTrail trail_;
   std::map<std::string, FoxgloveMessage> standing_;  // by topic

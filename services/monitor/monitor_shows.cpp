@@ -127,7 +127,7 @@ std::vector<json> MonitorService::first(const std::string& kind) {
   if (kind == "services") return {services_message(services_, now_ns)};
   if (kind == "topics") return {topics_message(topics_shown())};
   if (kind == "log") return {log_message(json(log_))};
-  if (kind == "reports") return {reports_.begin(), reports_.end()};
+  if (kind == "reports") return reports_.messages();
   if (kind == "problems") {
     if (!looked_) look_for_problems();
     return {problems_message(problems_.problems())};
