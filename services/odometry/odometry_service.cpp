@@ -14,7 +14,6 @@ constexpr std::chrono::milliseconds kExpirePeriod{2};
 constexpr int64_t kLockStepWaitNs = 10 * core::kNsPerSecond;
 constexpr int64_t kPoseLifeNs = core::kNsPerSecond / 2;
 constexpr int64_t kBlindNs = core::kNsPerSecond;
-constexpr size_t kLongestQueue = 8;
 // Places in TrackView.covariance: upper triangle of 7x7, row by row.
 constexpr size_t kCurvatureVariance = 25;
 constexpr size_t kPoseCovariance[3][3] = {
@@ -39,21 +38,23 @@ uint8_t mode_of(MouseMode mode) {
 }  // namespace
 
 OdometryService::OdometryService(const Config& config, service::Context& context)
-    : config_(config), context_(context), writer_(context.writer(messaging::topics::odometry_step)) {
+    : config_(config),
+      context_(context),
+      writer_(context.writer(messaging::topics::odometry_step)),
+      views_([this](const Waiting& waiting, const msg::TrackView* view) { measure(waiting, view); }) {
   context_.on<msg::CameraCalibration>(messaging::topics::camera_calibration,
                                       [this](const msg::CameraCalibration& c) { calibrated(c); });
-  context_.on<msg::TrackView>(messaging::topics::track_view, [this](const msg::TrackView& view) { viewed(view); });
+  context_.on<msg::TrackView>(messaging::topics::track_view, [this](const msg::TrackView& view) { views_.hear(view); });
   context_.on<msg::CameraFrame>(
       messaging::topics::camera_frame, [this](const msg::CameraFrame& frame) { pictured(frame); }, config_.camera);
-  context_.every(kExpirePeriod, [this] { expire(); });
+  context_.every(kExpirePeriod, [this] { views_.expire(core::monotonic_ns()); });
   context_.at_restart([this](int64_t) { restart(); });
   context_.share_charge();
   context_.health().ready();
 }
 
 void OdometryService::restart() {
-  waiting_.clear();
-  early_.clear();
+  views_.clear();
   last_pose_ns_ = 0;
   curvature_per_m_ = 0;
   vertical_curvature_per_m_ = 0;
@@ -99,35 +100,8 @@ void OdometryService::pictured(const msg::CameraFrame& frame) {
   waiting.grey = spare();
   waiting.grey.create(height, width, CV_8UC1);
   std::memcpy(waiting.grey.data, frame.data().data(), static_cast<size_t>(width) * static_cast<size_t>(height));
-  waiting_.push_back(std::move(waiting));
-  while (!early_.empty() && early_.front().frame_seq() <= frame.seq()) {  // the view has overtaken its picture
-    const msg::TrackView view = early_.front();
-    early_.pop_front();
-    viewed(view);
-  }
-  if (waiting_.size() > kLongestQueue) expire();
-}
-
-// Pictures are measured in their order: those before this view's picture will get no view of their own any more.
-void OdometryService::viewed(const msg::TrackView& view) {
-  while (!waiting_.empty() && waiting_.front().frame_seq <= view.frame_seq()) {
-    const Waiting waiting = std::move(waiting_.front());
-    waiting_.pop_front();
-    const bool own = waiting.frame_seq == view.frame_seq();
-    measure(waiting, own ? &view : nullptr);
-    if (own) return;
-  }
-  if (view.frame_seq() <= last_seq_) return;
-  early_.push_back(view);
-  if (early_.size() > kLongestQueue) early_.pop_front();
-}
-
-void OdometryService::expire() {
-  while (!waiting_.empty() && (waiting_.front().until_ns < core::monotonic_ns() || waiting_.size() > kLongestQueue)) {
-    const Waiting waiting = std::move(waiting_.front());
-    waiting_.pop_front();
-    measure(waiting, nullptr);
-  }
+  views_.add(std::move(waiting));
+  views_.expire(core::monotonic_ns());
 }
 
 void OdometryService::take_pose(const Waiting& waiting, const msg::TrackView* view, MousePicture& picture) {

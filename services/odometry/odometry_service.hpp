@@ -1,11 +1,11 @@
 // camera_frame, camera_calibration, track_view in; odometry_step out.
 #pragma once
 
-#include <deque>
 #include <memory>
-#include <optional>
+#include <vector>
 
 #include "odometry/odometry_config.hpp"
+#include "odometry/picture_views.hpp"
 #include "service/service.hpp"
 
 namespace railfix::odometry {
@@ -27,8 +27,6 @@ class OdometryService {
   void calibrated(const msg::CameraCalibration& calibration);
   void restart();
   void pictured(const msg::CameraFrame& frame);
-  void viewed(const msg::TrackView& view);
-  void expire();
   void measure(const Waiting& waiting, const msg::TrackView* view);
   void take_pose(const Waiting& waiting, const msg::TrackView* view, MousePicture& picture);
   void publish(const MouseStep& step, const Waiting& waiting);
@@ -42,9 +40,8 @@ class OdometryService {
   geometry::CameraPose mount_;
   bool mount_known_ = false;
   std::unique_ptr<TrainMouse> mouse_;  // nothing before the calibration is known
-  std::deque<Waiting> waiting_;
-  std::deque<msg::TrackView> early_;  // views that came before their picture
-  std::vector<cv::Mat> spare_;        // picture buffers to use again
+  PictureViews<Waiting, msg::TrackView> views_;
+  std::vector<cv::Mat> spare_;  // picture buffers to use again
   geometry::CameraPose last_pose_;
   int64_t last_pose_ns_ = 0;
   double curvature_per_m_ = 0;
