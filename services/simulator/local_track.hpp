@@ -53,12 +53,7 @@ class LocalTrack {
     float slope;
   };
   [[nodiscard]] Height height(float x_m, float y_m) const {
-    const float position = (x_m - kBehindM) * (1.0F / kStepM) - static_cast<float>(first_);
-    const auto index =
-        static_cast<size_t>(std::clamp(static_cast<int>(position), 0, static_cast<int>(rows_.size()) - 2));
-    const float w = position - static_cast<float>(index);
-    const Row& a = rows_[index];
-    const Row& b = rows_[index + 1];
+    const auto [a, b, w] = between(x_m);
     const float twist = a.twist + w * (b.twist - a.twist);
     const float beside = std::clamp(y_m - a.y, -kCantedM, kCantedM);
     return {a.z + w * (b.z - a.z) + twist * beside, (b.z - a.z) * (1.0F / kStepM)};
@@ -72,13 +67,20 @@ class LocalTrack {
   struct Row {
     float y, s, cos, sin, curvature, z, twist, unused;
   };
-  [[nodiscard]] Row at(float x_m) const {
+  /// The rows before and behind a place, and its share of the way from the one to the other.
+  struct Between {
+    const Row& a;
+    const Row& b;
+    float w;
+  };
+  [[nodiscard]] Between between(float x_m) const {
     const float position = (x_m - kBehindM) * (1.0F / kStepM) - static_cast<float>(first_);
     const auto index =
         static_cast<size_t>(std::clamp(static_cast<int>(position), 0, static_cast<int>(rows_.size()) - 2));
-    const float w = position - static_cast<float>(index);
-    const Row& a = rows_[index];
-    const Row& b = rows_[index + 1];
+    return {rows_[index], rows_[index + 1], position - static_cast<float>(index)};
+  }
+  [[nodiscard]] Row at(float x_m) const {
+    const auto [a, b, w] = between(x_m);
     return {a.y + w * (b.y - a.y),
             a.s + w * (b.s - a.s),
             a.cos + w * (b.cos - a.cos),

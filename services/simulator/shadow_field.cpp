@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "simulator/smooth_noise.hpp"
+
 namespace railfix::simulator {
 namespace {
 
@@ -13,16 +15,7 @@ constexpr int kTexelsPerShadow = 24;
 float lattice(uint64_t seed, float at_x, float at_y, int cells_x, int cells_y) {
   const float x = at_x * static_cast<float>(cells_x);
   const float y = at_y * static_cast<float>(cells_y);
-  const int i = static_cast<int>(x);
-  const int j = static_cast<int>(y);
-  const float fx = x - static_cast<float>(i);
-  const float fy = y - static_cast<float>(j);
-  const float wx = fx * fx * (3.0F - 2.0F * fx);
-  const float wy = fy * fy * (3.0F - 2.0F * fy);
-  const auto corner = [&](int a, int b) { return unit_float(mix_bits(seed, a % cells_x, b % cells_y)); };
-  const float top = corner(i, j) + wy * (corner(i, j + 1) - corner(i, j));
-  const float bottom = corner(i + 1, j) + wy * (corner(i + 1, j + 1) - corner(i + 1, j));
-  return top + wx * (bottom - top);
+  return smooth_noise(x, y, [&](int i, int j) { return unit_float(mix_bits(seed, i % cells_x, j % cells_y)); });
 }
 
 // Crowns with smaller branches: two octaves of noise, cut where half of it is light.

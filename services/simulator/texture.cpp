@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "simulator/smooth_noise.hpp"
+
 namespace railfix::simulator {
 namespace {
 
@@ -15,16 +17,8 @@ constexpr float kVergeTexelM = 0.012F;
 
 // Smooth periodic value noise with `cells` cells over the tile, in [-1, 1].
 float value_noise(uint64_t seed, float x, float y, int cells) {
-  const int i = static_cast<int>(x);
-  const int j = static_cast<int>(y);
-  const float fx = x - static_cast<float>(i);
-  const float fy = y - static_cast<float>(j);
-  const float wx = fx * fx * (3.0F - 2.0F * fx);
-  const float wy = fy * fy * (3.0F - 2.0F * fy);
-  const auto corner = [&](int a, int b) { return unit_float(mix_bits(seed, a % cells, b % cells)) * 2.0F - 1.0F; };
-  const float top = corner(i, j) + wy * (corner(i, j + 1) - corner(i, j));
-  const float bottom = corner(i + 1, j) + wy * (corner(i + 1, j + 1) - corner(i + 1, j));
-  return top + wx * (bottom - top);
+  return smooth_noise(x, y,
+                      [&](int i, int j) { return unit_float(mix_bits(seed, i % cells, j % cells)) * 2.0F - 1.0F; });
 }
 
 // Octaves of value noise, the coarsest with `cells` cells, each next half as strong times `keep`.
