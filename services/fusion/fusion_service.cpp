@@ -278,7 +278,7 @@ void FusionService::restart(int64_t data_ns) {
   heard_ns_ = 0;
   distance_offset_m_ = 0;
   pose_ = TrainPose(config.parameters.gnss_map_sigma_m);
-  clock_.reset();
+  data_time_.reset();
   live_ = false;
 }
 
@@ -327,15 +327,14 @@ void FusionService::use(const Event& event, int64_t grabbed_ns) {
 }
 
 void FusionService::keep_time(const msg::DataClock& clock) {
-  clock_ = clock;
-  data_time_.hear(clock, core::wall_ns(), core::monotonic_ns());
+  data_time_.emplace(clock, core::wall_ns(), core::monotonic_ns());
   if (clock.ended() != 0) return;
   if (const auto estimate = fusion_->tick(clock.data_ns())) publish(*estimate, 0);
 }
 
-// When nothing comes any more the interval must still grow. Lock step knows no time but that of the data.
+// When nothing comes any more the interval must still grow.
 void FusionService::tick() {
-  if (clock_ && (clock_->lock_step() != 0 || clock_->ended() != 0)) return;
+  if (data_time_ && data_time_->stands()) return;
   const auto latest_ns = fusion_->latest_stamp_ns();
   if (!latest_ns) return;
   const int64_t monotonic_ns = core::monotonic_ns();
@@ -343,10 +342,10 @@ void FusionService::tick() {
     newest_stamp_ns_ = *latest_ns;
     newest_came_ns_ = monotonic_ns;
   }
-  live_ = live_ || clock_ || std::abs(core::seconds(core::wall_ns() - *latest_ns)) < kLiveDataS;
+  live_ = live_ || data_time_ || std::abs(core::seconds(core::wall_ns() - *latest_ns)) < kLiveDataS;
   if (!live_) return;
   // In the clock of the sensors' host, whatever this one's says.
-  const int64_t now_ns = clock_ ? data_time_.at(monotonic_ns) : newest_stamp_ns_ + monotonic_ns - newest_came_ns_;
+  const int64_t now_ns = data_time_ ? data_time_->at(monotonic_ns) : newest_stamp_ns_ + monotonic_ns - newest_came_ns_;
   if (const auto estimate = fusion_->tick(now_ns)) publish(*estimate, 0);
 }
 

@@ -50,9 +50,8 @@ class FusionService {
   ScaleFile scale_file_;
   std::optional<Fusion> fusion_;
   TrainPose pose_;
-  std::string kept_for_;  // map and start that the notes are for
-  std::optional<msg::DataClock> clock_;
-  service::DataTime data_time_;      // while there is a clock
+  std::string kept_for_;                        // map and start that the notes are for
+  std::optional<service::DataTime> data_time_;  // of played data
   std::optional<int64_t> begun_ns_;  // stamp of the first measurement, when the train stood at the configured start
   bool live_ = false;
   int64_t newest_stamp_ns_ = 0;  // of the data ...

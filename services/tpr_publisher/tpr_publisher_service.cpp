@@ -107,8 +107,7 @@ TprPublisherService::TprPublisherService(const Config& config, service::Context&
   if (const auto link = config.ground_link.settings(context.common().train_id, context.common().host))
     ground_link_ = std::make_unique<GroundLink>(*link);
   context.on<msg::DataClock>(messaging::topics::data_clock, [this](const msg::DataClock& clock) {
-    data_clock_ = clock;
-    data_time_.hear(clock, core::wall_ns(), core::monotonic_ns());
+    data_time_.emplace(clock, core::wall_ns(), core::monotonic_ns());
   });
   context.on<msg::TrainState>(messaging::topics::train_state,
                               [this](const msg::TrainState& state) { on_state(state); });
@@ -202,7 +201,7 @@ void TprPublisherService::restart() {
 
 int64_t TprPublisherService::now_ns(int64_t stamp_ns) const {
   if (context_.common().lock_step) return stamp_ns;  // the data waits for us
-  return data_clock_ ? data_time_.at(core::monotonic_ns()) : core::wall_ns();
+  return data_time_ ? data_time_->at(core::monotonic_ns()) : core::wall_ns();
 }
 
 void TprPublisherService::on_state(const msg::TrainState& state) {
@@ -248,7 +247,7 @@ void TprPublisherService::on_onboard(const msg::OnboardStatus& status) {
 void TprPublisherService::on_tick() {
   if (!state_seen_ || !context_.in_charge()) return;  // ready, whatever the ground link says
   // The end of played data is no fault.
-  if (!context_.common().lock_step && (!data_clock_ || data_clock_->ended() == 0)) {
+  if (!context_.common().lock_step && !(data_time_ && data_time_->stands())) {
     auto outcome = publisher_.tick(now_ns(0));
     if (!outcome.refusal.empty()) report_trouble_ = std::move(outcome.refusal);
   }

@@ -50,8 +50,7 @@ class TprPublisherService {
   std::vector<uint8_t> packet_58_;                    // ... in what was heard last, used or not
   std::optional<uint32_t> origin_;                    // LRBG when it came, for its locations; nothing = the next one
   messaging::Writer<msg::TrainPositionReport> writer_;
-  std::optional<msg::DataClock> data_clock_;
-  service::DataTime data_time_;  // while there is a clock
+  std::optional<service::DataTime> data_time_;  // of played data
   bool state_seen_ = false;
   int64_t state_monotonic_ns_ = 0;  // when the last one came
   bool reference_known_ = false;    // in the last report
