@@ -7,10 +7,8 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/time.hpp"
-#include "messaging/topics.hpp"
-#include "support/network.hpp"
+#include "support/on_train.hpp"
 #include "support/program.hpp"
-#include "support/run_until.hpp"
 #include "unit/track_detector/synthetic_picture.hpp"
 
 namespace railfix {
@@ -58,22 +56,19 @@ cv::Mat picture(double distance_m) {
   return grey;
 }
 
-class BadPictures : public ::testing::Test {
+class BadPictures : public ::testing::Test, protected test::OnTrain {
  protected:
   BadPictures()
-      : train_("bad-" + std::to_string(getpid())),
-        participant_(test::network(train_, kDomain)),
+      : OnTrain("bad-" + std::to_string(getpid()), kDomain),
         calibrations_(participant_, topics::camera_calibration),
         frames_(participant_, topics::camera_frame, "cam0"),
-        views_reader_(participant_, topics::track_view, "", queue_,
-                      [this](const msg::TrackView& view) { views_[view.frame_seq()] = view; }),
-        steps_reader_(participant_, topics::odometry_step, "", queue_,
-                      [this](const msg::OdometryStep& step) { steps_[step.frame_seq()] = step; }),
-        status_reader_(participant_, topics::service_status, "", queue_,
-                       [this](const msg::ServiceStatus& one) { status_[one.service().c_str()] = one; }),
         detector_(test::with_settings("railfix-track-detector", settings({}))),
         odometry_(test::with_settings("railfix-odometry",
-                                      settings({"odometry.max_wait_ms=1000", "odometry.texture_depth_m=0.18"}))) {}
+                                      settings({"odometry.max_wait_ms=1000", "odometry.texture_depth_m=0.18"}))) {
+    listen(topics::track_view, [this](const msg::TrackView& view) { views_[view.frame_seq()] = view; });
+    listen(topics::odometry_step, [this](const msg::OdometryStep& step) { steps_[step.frame_seq()] = step; });
+    listen(topics::service_status, [this](const msg::ServiceStatus& one) { status_[one.service().c_str()] = one; });
+  }
 
   [[nodiscard]] std::vector<std::string> settings(std::vector<std::string> more) const {
     more.insert(more.end(),
@@ -94,7 +89,7 @@ class BadPictures : public ::testing::Test {
     c.mount_known(true);
     calibrations_.write(c);
     // Pictures until both answer: then everybody has found everybody.
-    ASSERT_TRUE(test::run_until(queue_, [this] {
+    ASSERT_TRUE(run_until([this] {
       send(0);
       for (int i = 0; i < 20 && !answered(); ++i) queue_.run_one(core::monotonic_ns() + 20'000'000);
       return answered() && steps_[seq_].valid() != 0;
@@ -120,23 +115,16 @@ class BadPictures : public ::testing::Test {
   /// The answers to one more picture.
   void show(uint32_t health, int64_t later_ns = kPeriodNs) {
     send(health, later_ns);
-    ASSERT_TRUE(test::run_until(queue_, [this] { return answered(); })) << "no answer to " << seq_;
+    ASSERT_TRUE(run_until([this] { return answered(); })) << "no answer to " << seq_;
   }
   [[nodiscard]] const msg::TrackView& view() { return views_[seq_]; }
   [[nodiscard]] const msg::OdometryStep& step() { return steps_[seq_]; }
   [[nodiscard]] bool says(const std::string& service, const std::string& words) {
-    return test::run_until(
-        queue_, [&] { return std::string(status_[service].reason().c_str()).find(words) != std::string::npos; });
+    return run_until([&] { return std::string(status_[service].reason().c_str()).find(words) != std::string::npos; });
   }
 
-  std::string train_;
-  messaging::Queue queue_;
-  messaging::Participant participant_;
   messaging::Writer<msg::CameraCalibration> calibrations_;
   messaging::Writer<msg::CameraFrame> frames_;
-  messaging::Reader<msg::TrackView> views_reader_;
-  messaging::Reader<msg::OdometryStep> steps_reader_;
-  messaging::Reader<msg::ServiceStatus> status_reader_;
   test::Program detector_;
   test::Program odometry_;
   std::map<uint64_t, msg::TrackView> views_;

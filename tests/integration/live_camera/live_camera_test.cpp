@@ -7,10 +7,8 @@
 #include <opencv2/videoio.hpp>
 
 #include "core/time.hpp"
-#include "messaging/topics.hpp"
-#include "support/network.hpp"
+#include "support/on_train.hpp"
 #include "support/program.hpp"
-#include "support/run_until.hpp"
 #include "unit/dataset/temporary_folder.hpp"
 
 namespace railfix {
@@ -37,17 +35,14 @@ class OnlyOne {
   int file_;
 };
 
-class LiveCamera : public railfix::testing::TemporaryFolder {
+class LiveCamera : public railfix::testing::TemporaryFolder, protected test::OnTrain {
  protected:
-  LiveCamera()
-      : train_("live-" + std::to_string(getpid())),
-        participant_(test::network(train_, kDomain)),
-        frames_reader_(participant_, topics::camera_frame, "cam0", queue_,
-                       [this](const msg::CameraFrame& frame) { take(frame); }),
-        status_reader_(participant_, topics::service_status, "", queue_,
-                       [this](const msg::ServiceStatus& status) { status_ = status; }),
-        calibration_reader_(participant_, topics::camera_calibration, "", queue_,
-                            [this](const msg::CameraCalibration& one) { calibration_ = one; }) {}
+  LiveCamera() : OnTrain("live-" + std::to_string(getpid()), kDomain) {
+    listen(
+        topics::camera_frame, [this](const msg::CameraFrame& frame) { take(frame); }, "cam0");
+    listen(topics::service_status, [this](const msg::ServiceStatus& status) { status_ = status; });
+    listen(topics::camera_calibration, [this](const msg::CameraCalibration& one) { calibration_ = one; });
+  }
 
   struct Frame {
     uint64_t seq;
@@ -67,10 +62,6 @@ class LiveCamera : public railfix::testing::TemporaryFolder {
     sets.insert(sets.end(), more.begin(), more.end());
     return std::make_unique<test::Program>(test::with_settings("railfix-frame-grabber", sets));
   }
-  template <class Condition>
-  bool run_until(Condition condition) {
-    return test::run_until(queue_, condition);
-  }
   [[nodiscard]] std::string reason() const { return status_.reason().c_str(); }
   void expect_growing_stamps() const {
     for (size_t i = 1; i < frames_.size(); ++i) {
@@ -79,12 +70,6 @@ class LiveCamera : public railfix::testing::TemporaryFolder {
     }
   }
 
-  std::string train_;
-  messaging::Queue queue_;
-  messaging::Participant participant_;
-  messaging::Reader<msg::CameraFrame> frames_reader_;
-  messaging::Reader<msg::ServiceStatus> status_reader_;
-  messaging::Reader<msg::CameraCalibration> calibration_reader_;
   std::vector<Frame> frames_;
   msg::ServiceStatus status_;
   std::optional<msg::CameraCalibration> calibration_;

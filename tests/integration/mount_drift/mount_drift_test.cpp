@@ -5,8 +5,8 @@
 
 #include "core/time.hpp"
 #include "core/units.hpp"
-#include "messaging/topics.hpp"
-#include "support/network.hpp"
+#include "messaging/connected.hpp"
+#include "support/on_train.hpp"
 #include "support/program.hpp"
 #include "unit/dataset/temporary_folder.hpp"
 #include "unit/track_detector/synthetic_picture.hpp"
@@ -17,16 +17,21 @@ namespace {
 using ::testing::HasSubstr;
 namespace topics = messaging::topics;
 
-const std::string kDomain = "84";
-constexpr int64_t kPatienceNs = 120 * core::kNsPerSecond;
+constexpr int kDomain = 84;
+constexpr double kPatienceS = 120;
 constexpr int kGood = 60;      // pictures, one a second
 constexpr int kKnocked = 110;  // behind them
 constexpr double kKnockRad = 0.5 / 57.29578;
 const geometry::Intrinsics kCamera{575, 575, 319.5, 255.5, 0, 0, 0, 0, 640, 512};
 
-class MountDrift : public testing::TemporaryFolder {
+class MountDrift : public testing::TemporaryFolder, protected test::OnTrain {
  protected:
-  MountDrift() : train_("drift-" + std::to_string(getpid())), participant_(test::network(train_, std::stoi(kDomain))) {}
+  MountDrift() : OnTrain("drift-" + std::to_string(getpid()), kDomain) {
+    listen(topics::track_view, [this](const msg::TrackView& view) {
+      drifted_[view.stamp_ns() / core::kNsPerSecond] = view.mount_drifted() != 0;
+    });
+    listen(topics::service_status, [this](const msg::ServiceStatus& one) { status_[one.service().c_str()] = one; });
+  }
 
   void SetUp() override {
     TemporaryFolder::SetUp();
@@ -52,67 +57,38 @@ class MountDrift : public testing::TemporaryFolder {
     return track_detector::test::render(scene, kCamera);
   }
   [[nodiscard]] test::Program service(const std::string& program, std::vector<std::string> settings) const {
-    settings.insert(settings.end(),
-                    {"common.train_id=" + train_, "common.domain=" + kDomain, "common.log_level=error"});
+    settings.insert(settings.end(), {"common.train_id=" + train_, "common.domain=" + std::to_string(kDomain),
+                                     "common.log_level=error"});
     return test::Program(test::with_settings(program, settings));
   }
-  template <class Condition>
-  bool run_until(Condition condition) {
-    const int64_t deadline_ns = core::monotonic_ns() + kPatienceNs;
-    while (!condition()) {
-      if (core::monotonic_ns() > deadline_ns) return false;
-      queue_.run_one(core::monotonic_ns() + 20'000'000);
-    }
-    return true;
-  }
-  /// Both services are ready and everyone has found everyone.
-  bool connected(const std::map<std::string, msg::ServiceStatus>& all) {
-    const auto own = participant_.connections();
-    uint32_t endpoints = 0;
-    uint32_t matches = own.matches;
-    for (const auto& [name, one] : all) {
-      endpoints += one.endpoints();
-      matches += one.matches();
-    }
-    return all.size() == 2 && own.remote_endpoints == endpoints && matches == 2 * own.pairs;
-  }
+  [[nodiscard]] std::string reason() { return status_["track_detector"].reason().c_str(); }
 
-  std::string train_;
-  messaging::Queue queue_;
-  messaging::Participant participant_;
+  std::map<int64_t, bool> drifted_;  // by picture
+  std::map<std::string, msg::ServiceStatus> status_;
 };
 
 TEST_F(MountDrift, IsToldWithNumbersAndWhatToDo) {
-  std::map<int64_t, bool> drifted;  // by picture
-  int64_t last_seen = 0;
-  double pitch_rad = 0;
-  messaging::Reader<msg::TrackView> views(
-      participant_, topics::track_view, "", queue_,
-      [&](const msg::TrackView& view) { drifted[view.stamp_ns() / core::kNsPerSecond] = view.mount_drifted() != 0; });
-  std::map<std::string, msg::ServiceStatus> all;
-  messaging::Reader<msg::ServiceStatus> status(
-      participant_, topics::service_status, "", queue_,
-      [&](const msg::ServiceStatus& one) { all[one.service().c_str()] = one; });
   messaging::Writer<msg::ControlRequest> control(participant_, topics::service_control);
   const auto detector = service("railfix-track-detector", {"common.lock_step=true"});
   const auto grabber =
       service("railfix-frame-grabber", {"frame_grabber.source=" + root_.string(), "frame_grabber.pace=lossless",
                                         "frame_grabber.wait_for=[track_detector]"});
-  const auto reason = [&all] { return std::string(all["track_detector"].reason().c_str()); };
-  ASSERT_TRUE(run_until([&] { return connected(all); }));
+  ASSERT_TRUE(run_until(
+      [this] { return status_.size() == 2 && messaging::all_connected(participant_.connections(), status_); }));
   msg::ControlRequest request;
   request.service("frame_grabber");
   request.command("start");
   control.write(request);
-  (void)run_until([&] { return drifted.contains(kGood + kKnocked); });
-  ASSERT_TRUE(drifted.contains(kGood + kKnocked)) << "the last picture did not come; " << reason();
-  (void)run_until([&] { return reason().find("pitch by +0.4") != std::string::npos || !drifted.at(kGood + kKnocked); });
-  for (const auto& [picture, drift] : drifted) {
+  ASSERT_TRUE(run_until([this] { return drifted_.contains(kGood + kKnocked); }, kPatienceS))
+      << "the last picture did not come; " << reason();
+  (void)run_until(
+      [this] { return reason().find("pitch by +0.4") != std::string::npos || !drifted_.at(kGood + kKnocked); });
+  for (const auto& [picture, drift] : drifted_) {
     if (picture <= kGood) {
       EXPECT_FALSE(drift) << "false alarm at picture " << picture;
     }
   }
-  EXPECT_TRUE(drifted.at(kGood + kKnocked)) << "last seen " << last_seen << " with pitch " << pitch_rad;
+  EXPECT_TRUE(drifted_.at(kGood + kKnocked));
   EXPECT_THAT(reason(), HasSubstr("the camera has moved in its mount: pitch by +0.4"));
   EXPECT_THAT(reason(), HasSubstr("run railfix calibrate mount again"));
 }

@@ -10,9 +10,8 @@
 #include "core/units.hpp"
 #include "messaging/connected.hpp"
 #include "messaging/lock_step.hpp"
-#include "support/network.hpp"
+#include "support/on_train.hpp"
 #include "support/program.hpp"
-#include "support/run_until.hpp"
 #include "support/sensed_ride.hpp"
 #include "track/path.hpp"
 
@@ -53,29 +52,21 @@ track::Map made_map() {
   return map;
 }
 
-class MatcherInLockStep : public ::testing::Test {
+class MatcherInLockStep : public ::testing::Test, protected test::OnTrain {
  protected:
   MatcherInLockStep()
-      : train_("no-start-" + std::to_string(getpid())),
+      : OnTrain("no-start-" + std::to_string(getpid()), kDomain),
         folder_(fs::temp_directory_path() / ("railfix-" + train_)),
-        participant_(test::network(train_, kDomain)),
         steps_(participant_, topics::odometry_step),
         clock_(participant_, topics::data_clock) {
-    listen<msg::DataProgress>(topics::data_progress, [this](const msg::DataProgress& p) { progress_ = p; });
-    listen<msg::TrainState>(topics::train_state, [this](const msg::TrainState& s) { states_.push_back(s); });
-    listen<msg::PositionFix>(topics::position_fix, [this](const msg::PositionFix& f) { fixes_.push_back(f); });
-    listen<msg::ServiceStatus>(topics::service_status,
-                               [this](const msg::ServiceStatus& s) { status_[s.service().c_str()] = s; });
+    listen(topics::data_progress, [this](const msg::DataProgress& p) { progress_ = p; });
+    listen(topics::train_state, [this](const msg::TrainState& s) { states_.push_back(s); });
+    listen(topics::position_fix, [this](const msg::PositionFix& f) { fixes_.push_back(f); });
+    listen(topics::service_status, [this](const msg::ServiceStatus& s) { status_[s.service().c_str()] = s; });
     fs::create_directories(folder_);
   }
   ~MatcherInLockStep() override { fs::remove_all(folder_); }
-  MatcherInLockStep(const MatcherInLockStep&) = delete;
-  MatcherInLockStep& operator=(const MatcherInLockStep&) = delete;
 
-  template <class T>
-  void listen(const messaging::Topic<T>& topic, std::function<void(const T&)> handler) {
-    readers_.push_back(std::make_shared<messaging::Reader<T>>(participant_, topic, "", queue_, std::move(handler)));
-  }
   [[nodiscard]] std::unique_ptr<test::Program> service(const std::string& name, const std::string& program,
                                                        std::vector<std::string> more) const {
     std::vector<std::string> sets{"common.train_id=" + train_, "common.domain=" + std::to_string(kDomain),
@@ -83,10 +74,6 @@ class MatcherInLockStep : public ::testing::Test {
                                   name + ".map=" + (folder_ / "map.railfix").string()};
     sets.insert(sets.end(), more.begin(), more.end());
     return std::make_unique<test::Program>(test::with_settings(program, sets));
-  }
-  template <class Condition>
-  bool run_until(Condition condition) {
-    return test::run_until(queue_, condition);
   }
   bool connected(size_t services) {
     return status_.size() == services && messaging::all_connected(participant_.connections(), status_);
@@ -116,13 +103,9 @@ class MatcherInLockStep : public ::testing::Test {
     return 0;
   }
 
-  std::string train_;
   fs::path folder_;
-  messaging::Queue queue_;
-  messaging::Participant participant_;
   messaging::Writer<msg::OdometryStep> steps_;
   messaging::Writer<msg::DataClock> clock_;
-  std::vector<std::shared_ptr<void>> readers_;
   msg::DataProgress progress_;
   std::vector<msg::TrainState> states_;
   std::vector<msg::PositionFix> fixes_;

@@ -6,9 +6,8 @@
 #include "core/time.hpp"
 #include "messaging/connected.hpp"
 #include "messaging/topics.hpp"
-#include "support/network.hpp"
+#include "support/on_train.hpp"
 #include "support/program.hpp"
-#include "support/run_until.hpp"
 #include "unit/dataset/temporary_folder.hpp"
 
 namespace railfix {
@@ -23,35 +22,25 @@ constexpr int64_t kPictureNs = 20'000'000;
 constexpr int64_t kImuNs = 5'000'000;
 constexpr size_t kImuSamples = (kPictures - 1) * kPictureNs / kImuNs + 1;  // up to the last picture
 
-class Playback : public railfix::testing::TemporaryFolder {
+class Playback : public railfix::testing::TemporaryFolder, protected test::OnTrain {
  protected:
   Playback()
-      : train_("playback-" + std::to_string(getpid())),
-        participant_(test::network(train_, kDomain)),
+      : OnTrain("playback-" + std::to_string(getpid()), kDomain),
         progress_(participant_, topics::data_progress),
         control_(participant_, topics::service_control) {
-    listen<msg::DataClock>(topics::data_clock, [this](const msg::DataClock& clock) { take(clock); });
-    listen<msg::ImuSample>(topics::imu_sample,
-                           [this](const msg::ImuSample& sample) { imu_.push_back(sample.stamp_ns()); });
-    listen<msg::WheelSample>(topics::wheel_sample,
-                             [this](const msg::WheelSample& sample) { wheel_.push_back(sample.pulses()); });
-    listen<msg::CameraFrame>(
+    listen(topics::data_clock, [this](const msg::DataClock& clock) { take(clock); });
+    listen(topics::imu_sample, [this](const msg::ImuSample& sample) { imu_.push_back(sample.stamp_ns()); });
+    listen(topics::wheel_sample, [this](const msg::WheelSample& sample) { wheel_.push_back(sample.pulses()); });
+    listen(
         topics::camera_frame, [this](const msg::CameraFrame& frame) { take(frame); }, "cam0");
-    listen<msg::CameraPreview>(
+    listen(
         topics::camera_preview, [this](const msg::CameraPreview& preview) { preview_ = preview; }, "cam0");
-    listen<msg::CameraCalibration>(topics::camera_calibration,
-                                   [this](const msg::CameraCalibration& calibration) { calibration_ = calibration; });
-    listen<msg::ServiceStatus>(topics::service_status, [this](const msg::ServiceStatus& status) {
+    listen(topics::camera_calibration,
+           [this](const msg::CameraCalibration& calibration) { calibration_ = calibration; });
+    listen(topics::service_status, [this](const msg::ServiceStatus& status) {
       status_[status.service().c_str()] = status;
       if (status.state() == msg::STATE_FAILED) failure_ = status.reason().c_str();
     });
-  }
-
-  template <class T>
-  void listen(const messaging::Topic<T>& topic, std::function<void(const T&)> handler,
-              const std::string& instance = "") {
-    readers_.push_back(
-        std::make_shared<messaging::Reader<T>>(participant_, topic, instance, queue_, std::move(handler)));
   }
 
   void SetUp() override {
@@ -89,10 +78,6 @@ class Playback : public railfix::testing::TemporaryFolder {
     return std::make_unique<test::Program>(test::with_settings("railfix-frame-grabber", sets));
   }
 
-  template <class Condition>
-  bool run_until(Condition condition) {
-    return test::run_until(queue_, condition);
-  }
   /// Both services are ready and everyone has found everyone.
   bool connected() { return status_.size() == 2 && messaging::all_connected(participant_.connections(), status_); }
   void start() {
@@ -135,12 +120,8 @@ class Playback : public railfix::testing::TemporaryFolder {
     int grey;
   };
   static constexpr int64_t kBeginNs = 1'700'000'000'000'000'000;
-  std::string train_;
-  messaging::Queue queue_;
-  messaging::Participant participant_;
   messaging::Writer<msg::DataProgress> progress_;
   messaging::Writer<msg::ControlRequest> control_;
-  std::vector<std::shared_ptr<void>> readers_;
   std::vector<msg::DataClock> clocks_;
   std::vector<Frame> frames_;
   std::vector<int64_t> imu_;

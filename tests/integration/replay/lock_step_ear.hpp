@@ -9,30 +9,30 @@
 #include <vector>
 
 #include "messaging/topics.hpp"
-#include "support/network.hpp"
-#include "support/run_until.hpp"
+#include "support/on_train.hpp"
 
 namespace railfix::test {
 
-class LockStepEar {
+class LockStepEar : OnTrain {
  public:
   static inline const std::string kName = "tpr_publisher";  // whose turn it takes
 
-  LockStepEar(const std::string& train, int domain) : participant_(test::network(train, domain)) {
+  LockStepEar(const std::string& train, int domain)
+      : OnTrain(train, domain),
+        progress_(participant_, messaging::topics::data_progress),
+        status_(participant_, messaging::topics::service_status) {
     hear(messaging::topics::train_state);
     hear(messaging::topics::train_pose);
     hear(messaging::topics::position_fix);
-    clock_.emplace(participant_, messaging::topics::data_clock, "", queue_, [this](const msg::DataClock& clock) {
+    listen(messaging::topics::data_clock, [this](const msg::DataClock& clock) {
       if (clock.lock_step() != 0 && clock.ended() == 0 && kName == clock.turn().c_str()) turn_ = clock;
       ended_ = ended_ || clock.ended() != 0;
     });
-    progress_.emplace(participant_, messaging::topics::data_progress);
-    status_.emplace(participant_, messaging::topics::service_status);
   }
 
   /// False when the replay takes too long.
   bool listen_until_the_end() {
-    return run_until(queue_, [this] {
+    return run_until([this] {
       say_status();
       answer();
       return ended_;
@@ -45,13 +45,11 @@ class LockStepEar {
   template <class T>
   void hear(const messaging::Topic<T>& topic) {
     heard_.insert(topic.name);
-    readers_.push_back(std::make_shared<messaging::Reader<T>>(
-        participant_, topic, "", queue_,
-        std::function([this, name = std::string(topic.name)](const T& sample, const messaging::SampleInfo& info) {
-          const auto cdr = messaging::serialize(sample);
-          bytes_[name].append(cdr.begin(), cdr.end());
-          received_[name] = info.sequence;
-        })));
+    listen(topic, [this, name = std::string(topic.name)](const T& sample, const messaging::SampleInfo& info) {
+      const auto cdr = messaging::serialize(sample);
+      bytes_[name].append(cdr.begin(), cdr.end());
+      received_[name] = info.sequence;
+    });
   }
   void say_status() {
     if (core::monotonic_ns() < status_due_ns_) return;
@@ -63,7 +61,7 @@ class LockStepEar {
     status.state(msg::STATE_ACTIVE);
     status.endpoints(here.endpoints);
     status.matches(here.matches);
-    status_->write(status);
+    status_.write(status);
   }
   void answer() {
     if (!turn_) return;
@@ -76,15 +74,11 @@ class LockStepEar {
     progress.seq(turn_->seq());
     progress.service(kName);
     turn_.reset();
-    progress_->write(progress);
+    progress_.write(progress);
   }
 
-  messaging::Queue queue_;
-  messaging::Participant participant_;
-  std::optional<messaging::Writer<msg::DataProgress>> progress_;
-  std::optional<messaging::Writer<msg::ServiceStatus>> status_;
-  std::vector<std::shared_ptr<void>> readers_;
-  std::optional<messaging::Reader<msg::DataClock>> clock_;
+  messaging::Writer<msg::DataProgress> progress_;
+  messaging::Writer<msg::ServiceStatus> status_;
   std::optional<msg::DataClock> turn_;
   std::set<std::string> heard_;
   std::map<std::string, uint64_t> received_;

@@ -3,9 +3,8 @@
 
 #include "mcap/writer.hpp"
 #include "messaging/topics.hpp"
-#include "support/network.hpp"
+#include "support/on_train.hpp"
 #include "support/program.hpp"
-#include "support/run_until.hpp"
 
 namespace railfix {
 namespace {
@@ -20,33 +19,25 @@ constexpr int kViews = 200;
 constexpr int64_t kViewNs = 50'000'000;
 constexpr double kLengthS = (kViews - 1) * 0.05;
 
-class Replay : public ::testing::Test {
+class Replay : public ::testing::Test, protected test::OnTrain {
  protected:
   Replay()
-      : train_("replay-" + std::to_string(getpid())),
+      : OnTrain("replay-" + std::to_string(getpid()), kDomain),
         folder_(fs::temp_directory_path() / ("railfix-" + train_)),
-        participant_(test::network(train_, kDomain)),
-        control_(participant_, topics::service_control) {
+        control_(participant_, topics::service_control),
+        view_reader_(
+            listen(topics::track_view, [this](const msg::TrackView& view) { views_.push_back(view.stamp_ns()); })) {
     fs::remove_all(folder_);
     fs::create_directories(folder_);
-    listen<msg::PlayerStatus>(topics::player_status, [this](const msg::PlayerStatus& status) { status_ = status; });
-    listen<msg::ControlReply>(topics::service_reply, [this](const msg::ControlReply& reply) { reply_ = reply; });
-    view_reader_.emplace(participant_, topics::track_view, "", queue_,
-                         [this](const msg::TrackView& view) { views_.push_back(view.stamp_ns()); });
-    listen<msg::CameraCalibration>(topics::camera_calibration, [this](const msg::CameraCalibration& calibration) {
+    listen(topics::player_status, [this](const msg::PlayerStatus& status) { status_ = status; });
+    listen(topics::service_reply, [this](const msg::ControlReply& reply) { reply_ = reply; });
+    listen(topics::camera_calibration, [this](const msg::CameraCalibration& calibration) {
       focal_px_[calibration.camera().c_str()] = calibration.fu_px();
     });
-    listen<msg::DataClock>(topics::data_clock, [this](const msg::DataClock& clock) { clock_ = clock; });
+    listen(topics::data_clock, [this](const msg::DataClock& clock) { clock_ = clock; });
     source();
   }
   ~Replay() override { fs::remove_all(folder_); }
-
-  template <class T>
-  void listen(const messaging::Topic<T>& topic, std::function<void(const T&)> handler,
-              const std::string& instance = "") {
-    readers_.push_back(
-        std::make_shared<messaging::Reader<T>>(participant_, topic, instance, queue_, std::move(handler)));
-  }
 
   // Ten seconds of views; two cameras, the calibration of one of them changes in the middle.
   void source() const {
@@ -84,10 +75,6 @@ class Replay : public ::testing::Test {
     arguments.insert(arguments.end(), more.begin(), more.end());
     return std::make_unique<test::Program>(arguments, test::Program::Options{folder_ / "out", folder_ / "err", {}});
   }
-  template <class Condition>
-  bool run_until(Condition condition) {
-    return test::run_until(queue_, condition);
-  }
   bool state_is(uint8_t state) {
     return run_until([&] { return status_ && status_->state() == state; });
   }
@@ -106,13 +93,9 @@ class Replay : public ::testing::Test {
   }
   [[nodiscard]] double at_s() const { return core::seconds(status_->at_ns() - status_->from_ns()); }
 
-  std::string train_;
   fs::path folder_;
-  messaging::Queue queue_;
-  messaging::Participant participant_;
   messaging::Writer<msg::ControlRequest> control_;
-  std::vector<std::shared_ptr<void>> readers_;
-  std::optional<messaging::Reader<msg::TrackView>> view_reader_;
+  const messaging::Reader<msg::TrackView>& view_reader_;
   std::optional<msg::PlayerStatus> status_;
   std::optional<msg::ControlReply> reply_;
   std::optional<msg::DataClock> clock_;
@@ -124,7 +107,7 @@ class Replay : public ::testing::Test {
 TEST_F(Replay, IsLedOverDds) {
   auto player = replay({"--controlled", "--paused"});
   ASSERT_TRUE(state_is(msg::PLAYER_PAUSED));
-  ASSERT_TRUE(run_until([this] { return view_reader_->matched_writers() > 0; }));
+  ASSERT_TRUE(run_until([this] { return view_reader_.matched_writers() > 0; }));
   EXPECT_EQ(status_->file(), file().string());
   EXPECT_NEAR(core::seconds(status_->to_ns() - status_->from_ns()), kLengthS, 1e-6);
   EXPECT_TRUE(views_.empty());

@@ -2,9 +2,8 @@
 #include <gmock/gmock.h>
 
 #include "integration/replay/recorded_ride.hpp"
-#include "support/network.hpp"
+#include "support/on_train.hpp"
 #include "support/program.hpp"
-#include "support/run_until.hpp"
 
 namespace railfix {
 namespace {
@@ -15,9 +14,13 @@ namespace topics = messaging::topics;
 constexpr int kDomain = 88;
 constexpr double kMiddleS = 10;
 
-class MovedReplay : public ::testing::Test {
+class MovedReplay : public ::testing::Test, protected test::OnTrain {
  protected:
-  MovedReplay() : participant_(test::network(train_, kDomain)), control_(participant_, topics::service_control) {
+  MovedReplay()
+      : OnTrain("moved-" + std::to_string(getpid()), kDomain), control_(participant_, topics::service_control) {
+    listen(topics::train_state, [this](const msg::TrainState& state) { states_.push_back(state); });
+    listen(topics::player_status, [this](const msg::PlayerStatus& status) { player_ = status; });
+    listen(topics::service_reply, [this](const msg::ControlReply& reply) { replied_ = reply.request_id(); });
     fs::remove_all(folder_);
     fs::create_directories(folder_);
     test::write_map(folder_ / "line.map");
@@ -29,10 +32,6 @@ class MovedReplay : public ::testing::Test {
     const std::string name = "said-" + std::to_string(++programs_);
     return std::make_unique<test::Program>(arguments,
                                            test::Program::Options{folder_ / name, folder_ / (name + "-errors"), {}});
-  }
-  template <class Condition>
-  bool run_until(Condition condition) {
-    return test::run_until(queue_, condition);
   }
   void tell(const std::string& command, const std::string& argument = "") {
     msg::ControlRequest request;
@@ -58,23 +57,13 @@ class MovedReplay : public ::testing::Test {
   [[nodiscard]] bool ended() const { return player_ && player_->state() == msg::PLAYER_ENDED; }
   static double into_s(const msg::TrainState& state) { return core::seconds(state.stamp_ns() - test::kBegin); }
 
-  std::string train_ = "moved-" + std::to_string(getpid());
   fs::path folder_ = fs::temp_directory_path() / ("railfix-" + train_);
-  messaging::Queue queue_;
-  messaging::Participant participant_;
   messaging::Writer<msg::ControlRequest> control_;
   std::vector<msg::TrainState> states_;
   std::optional<msg::PlayerStatus> player_;
   uint64_t replied_ = 0;
   uint64_t request_ = 0;
   int programs_ = 0;
-  messaging::Reader<msg::TrainState> state_reader_{participant_, topics::train_state, "", queue_,
-                                                   [this](const msg::TrainState& state) { states_.push_back(state); }};
-  messaging::Reader<msg::PlayerStatus> player_reader_{participant_, topics::player_status, "", queue_,
-                                                      [this](const msg::PlayerStatus& status) { player_ = status; }};
-  messaging::Reader<msg::ControlReply> reply_reader_{
-      participant_, topics::service_reply, "", queue_,
-      [this](const msg::ControlReply& reply) { replied_ = reply.request_id(); }};
 };
 
 TEST_F(MovedReplay, BeginsAnewWhereTheDataGoesOn) {

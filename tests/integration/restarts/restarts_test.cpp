@@ -9,9 +9,8 @@
 #include "mcap/reader.hpp"
 #include "messaging/connected.hpp"
 #include "messaging/topics.hpp"
-#include "support/network.hpp"
+#include "support/on_train.hpp"
 #include "support/program.hpp"
-#include "support/run_until.hpp"
 
 namespace railfix {
 namespace {
@@ -27,8 +26,10 @@ constexpr const char* kStart = "1:420";
 constexpr double kStepTwiceM = 1.0;
 constexpr double kStraysMps2 = 0.3;
 
-class Restarts : public ::testing::Test {
+class Restarts : public ::testing::Test, protected test::OnTrain {
  protected:
+  Restarts()
+      : OnTrain("restarts-" + std::to_string(getpid()), kDomain), control_(participant_, topics::service_control) {}
   void SetUp() override {
     fs::create_directories(folder_);
     // Balises every 400 m; twice as long as it takes on a quiet machine.
@@ -40,39 +41,31 @@ class Restarts : public ::testing::Test {
         kPatienceS);
     ASSERT_EQ(drawn.exit_code, 0) << drawn.err;
     truth_ = core::value_or_throw(evaluation::Truth::read(folder_ / "ride/truth"));
-    participant_ = std::make_unique<messaging::Participant>(test::network(train_, kDomain));
-    control_.emplace(*participant_, topics::service_control);
-    listen<msg::TrainState>(topics::train_state, [this](const msg::TrainState& state) { judge(state); });
-    listen<msg::PositionFix>(topics::position_fix, [this](const msg::PositionFix& fix) {
+    listen(topics::train_state, [this](const msg::TrainState& state) { judge(state); });
+    listen(topics::position_fix, [this](const msg::PositionFix& fix) {
       if (fix.kind() == msg::FIX_LANDMARK) ++landmark_fixes_;
     });
-    listen<msg::OdometryStep>(topics::odometry_step, [this](const msg::OdometryStep& step) {
+    listen(topics::odometry_step, [this](const msg::OdometryStep& step) {
       if (step.valid() == 0) return;
       ++valid_steps_;
       pause_s_ = std::max(pause_s_, core::seconds(step.stamp_ns() - last_step_ns_));
       last_step_ns_ = step.stamp_ns();
     });
-    listen<msg::TrackView>(topics::track_view, [this](const msg::TrackView& view) {
+    listen(topics::track_view, [this](const msg::TrackView& view) {
       if (view.seen_left() != 0 && view.seen_right() != 0) ++views_;
     });
-    listen<msg::ServiceStatus>(topics::service_status, [this](const msg::ServiceStatus& status) {
-      statuses_[status.service().c_str()] = status;
-    });
+    listen(topics::service_status,
+           [this](const msg::ServiceStatus& status) { statuses_[status.service().c_str()] = status; });
     for (const char* service :
          {"recorder", "fusion", "map-matcher", "odometry", "track-detector", "sensor-gateway", "frame-grabber"})
       start(service);
   }
   void TearDown() override {
     programs_.clear();
-    readers_.clear();
     fs::remove_all(folder_);
     fs::remove("/dev/shm/railfix-notes-" + train_ + "-local-fusion");
   }
 
-  template <class T>
-  void listen(const messaging::Topic<T>& topic, std::function<void(const T&)> handler) {
-    readers_.push_back(std::make_shared<messaging::Reader<T>>(*participant_, topic, "", queue_, std::move(handler)));
-  }
   [[nodiscard]] std::string ride() const { return (folder_ / "ride").string(); }
   void start(const std::string& service) {
     const std::string map = (folder_ / "ride/map/line.map").string();
@@ -95,10 +88,6 @@ class Restarts : public ::testing::Test {
     start(service);
   }
   [[nodiscard]] fs::path recordings() const { return folder_ / "recordings"; }
-  template <class Condition>
-  bool run_until(Condition condition) {
-    return test::run_until(queue_, condition);
-  }
   /// So many more than now, and of what comes from now on.
   bool comes(const uint64_t& counter, uint64_t more) {
     const uint64_t before = counter;
@@ -122,12 +111,9 @@ class Restarts : public ::testing::Test {
     if (error_m_ > state.over_m() || -error_m_ > state.under_m()) ++outside_;
   }
 
-  const std::string train_ = "restarts-" + std::to_string(getpid());
   const fs::path folder_ = fs::temp_directory_path() / train_;
   std::optional<evaluation::Truth> truth_;
-  messaging::Queue queue_;
-  std::unique_ptr<messaging::Participant> participant_;
-  std::optional<messaging::Writer<msg::ControlRequest>> control_;
+  messaging::Writer<msg::ControlRequest> control_;
   std::map<std::string, std::unique_ptr<test::Program>> programs_;
   std::map<std::string, msg::ServiceStatus> statuses_;
   std::optional<msg::TrainState> state_;
@@ -139,16 +125,15 @@ class Restarts : public ::testing::Test {
   int64_t last_step_ns_ = 0;
   double pause_s_ = 0;  // longest between two steps
   uint64_t views_ = 0;
-  std::vector<std::shared_ptr<void>> readers_;  // before what they write to
 };
 
 TEST_F(Restarts, WhatComesAfterAKillIsTrue) {
   ASSERT_TRUE(run_until(
-      [this] { return statuses_.size() == 7 && messaging::all_connected(participant_->connections(), statuses_); }));
+      [this] { return statuses_.size() == 7 && messaging::all_connected(participant_.connections(), statuses_); }));
   msg::ControlRequest request;
   request.service("frame_grabber");
   request.command("start");
-  control_->write(request);
+  control_.write(request);
   ASSERT_TRUE(comes(landmark_fixes_, 1));
   ASSERT_TRUE(knows_its_place());
 
