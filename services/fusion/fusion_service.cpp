@@ -261,7 +261,7 @@ bool FusionService::stands_at_start(const TrainEstimate& estimate) {
 }
 
 bool FusionService::is_played(int64_t stamp_ns) const {
-  return clock_ || std::abs(core::seconds(core::wall_ns() - stamp_ns)) > kLiveDataS;
+  return data_time_ || std::abs(core::seconds(core::wall_ns() - stamp_ns)) > kLiveDataS;
 }
 
 // The train stood at the configured start when the data began, and nowhere else in it.
