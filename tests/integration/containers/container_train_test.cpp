@@ -165,6 +165,15 @@ TEST_P(ContainerTrain, ComesUpOnTwoHostsIsUpgradedComesBackAndGoesDown) {
     return fusion["restarts"] == 1 && fusion["healthy"] == true;
   })) << service(TwoHosts::cab);
 
+  const auto init = engine(TwoHosts::cab, "inspect --format '{{.State.Pid}}' " + container(TwoHosts::cab, "fusion-1"));
+  ASSERT_EQ(shell("pid=" + init.out + "kill -STOP $(cat /proc/$pid/task/$pid/children)").exit_code, 0) << init.err;
+  EXPECT_TRUE(run_until(queue_,
+                        [&] {
+                          const auto fusion = service(TwoHosts::cab);
+                          return fusion["restarts"] == 2 && fusion["healthy"] == true;
+                        }))
+      << "one that hangs is not started anew: " << service(TwoHosts::cab);
+
   const std::string image = "railfix/tpr-publisher:test";
   ASSERT_EQ(engine(TwoHosts::coach, "tag " + image + " " + image + "-next").exit_code, 0);
   write_manifest("test", "test-next");
