@@ -35,7 +35,7 @@ int cut(const Options& options) {
 int merge(const Options& options) {
   const auto report = core::value_or_throw(merge_recordings(options.files, options.out));
   print(report, options.out);
-  if (report.duplicates > 0) std::cout << "; " << report.duplicates << " stood in more than one and are kept once";
+  if (report.duplicates > 0) std::cout << "; " << report.duplicates << " stood in more than one, kept once";
   std::cout << '\n';
   return 0;
 }

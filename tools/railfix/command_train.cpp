@@ -79,8 +79,8 @@ int check(const Options& options) {
   if (here == nullptr)
     std::cout << "this computer is none of " << names_of(manifest) << ": on each of them, run railfix doctor --train\n";
   std::cout << "train " << manifest.train_id << ": " << manifest.services.size() << " services on "
-            << manifest.hosts.size() << " hosts, release " << manifest.release
-            << (good ? ", can start" : ", must not start like this") << '\n';
+            << manifest.hosts.size() << (manifest.hosts.size() == 1 ? " host" : " hosts") << ", release "
+            << manifest.release << (good ? ", can start" : ", must not start like this") << '\n';
   return good ? 0 : 1;
 }
 

@@ -1,5 +1,6 @@
 #include "progress.hpp"
 
+#include <spdlog/fmt/fmt.h>
 #include <unistd.h>
 
 #include <cstdio>
@@ -11,6 +12,7 @@ namespace {
 
 constexpr int kBarCells = 30;
 constexpr int64_t kRedrawNs = 100'000'000;
+constexpr double kGuessFromS = 1;  // what is left is not guessed before
 
 }  // namespace
 
@@ -57,13 +59,13 @@ void Progress::draw() {
     return;
   }
   const double share = static_cast<double>(done_) / static_cast<double>(total_);
-  const double left_s = share > 0 ? elapsed_s * (1.0 - share) / share : 0;
+  const bool guessed = share > 0 && elapsed_s > kGuessFromS;
+  const std::string left = guessed ? fmt::format(", {:.0f} s left", elapsed_s * (1.0 - share) / share) : "";
   std::string bar(kBarCells, ' ');
   for (int i = 0; i < kBarCells && i < static_cast<int>(share * kBarCells + 0.5); ++i)
     bar[static_cast<size_t>(i)] = '#';
-  std::fprintf(stderr, "%s%s [%s] %3.0f %%  %llu of %llu, %.0f s left%s", terminal_ ? "\r" : "", title_.c_str(),
-               bar.c_str(), share * 100, done, static_cast<unsigned long long>(total_), left_s,
-               terminal_ ? "   " : "\n");
+  std::fprintf(stderr, "%s%s [%s] %3.0f %%  %llu of %llu%s%s", terminal_ ? "\r" : "", title_.c_str(), bar.c_str(),
+               share * 100, done, static_cast<unsigned long long>(total_), left.c_str(), terminal_ ? "   " : "\n");
 }
 
 }  // namespace railfix::tool

@@ -74,6 +74,20 @@ TEST_F(RealInput, EveryPictureOfAFolderIsDrawnAndAStrangeOneIsNamed) {
   EXPECT_THAT(test::slurp(folder_ / "of_folder" / "log" / "frame_grabber.log"), HasSubstr("zz_other_size.jpg"));
 }
 
+TEST_F(RealInput, AStartThatIsNotOnTheMapIsRefusedBeforeAnythingStarts) {
+  const auto out = folder_ / "of_wrong_start";
+  for (const auto& [start, why] : {std::pair{"99:1:+", "the map has no edge \"99\""},
+                                   {"1:1e9", "is not on edge 1"},
+                                   {"banana", "is not a place on the map"}}) {
+    const auto outcome =
+        test::run_program({"railfix", "run", "--dataset", folder_ / "seq", "--start", start, "--out", out}, kRunS);
+    EXPECT_EQ(outcome.exit_code, 2) << start;
+    EXPECT_THAT(outcome.err, ::testing::StartsWith("railfix: --start: "));
+    EXPECT_THAT(outcome.err, HasSubstr(why));
+    EXPECT_FALSE(fs::exists(out / "log"));
+  }
+}
+
 TEST_F(RealInput, AVideoKeepsItsColours) {
   const std::string video = folder_ / "cab.avi";
   cv::VideoWriter writer(video, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 5, {640, 512});

@@ -139,6 +139,9 @@ TEST_F(Copy, ACutHasOnlyTheTopicsOneWants) {
   const auto open_end = cut_recording(a_, folder_ / "none.mcap", {5, kAll, {}, {}});
   ASSERT_FALSE(open_end.ok());
   EXPECT_THAT(open_end.error().message, HasSubstr("there is nothing from 5 s to the end"));
+  const auto turned_round = cut_recording(a_, folder_ / "none.mcap", {1, 0.5, {}, {}});
+  ASSERT_FALSE(turned_round.ok());
+  EXPECT_EQ(turned_round.error().message, "--to 0.5 must lie behind --from 1");
   EXPECT_FALSE(fs::exists(folder_ / "none.mcap"));
 }
 

@@ -136,12 +136,17 @@ TEST_F(TrainFolder, AQualityOfServiceThatDoesNotMatchIsTold) {
 TEST_F(TrainFolder, CertificatesThatAreMissingOrRunOutAreTold) {
   std::ofstream(folder_ / "line.map") << "map";
   EXPECT_THAT(findings("run_as: programs", "security: true"),
-              Contains(HasSubstr("fusion.cert.pem is missing; make it with railfix train keys")));
+              Contains(HasSubstr("security/cab is missing; make the train's certificates with railfix train keys ")));
   const auto secured = manifest(kTrain, "run_as: programs", "security: true").value();
   KeysOptions soon;
   soon.valid_days = 20;
   ASSERT_TRUE(make_keys(secured, soon).ok());
   EXPECT_THAT(findings("run_as: programs", "security: true"), Contains(HasSubstr("fusion.cert.pem runs out in ")));
+  const auto fusion = folder_ / "security/cab/fusion.cert.pem";
+  fs::rename(fusion, folder_ / "aside");
+  EXPECT_THAT(findings("run_as: programs", "security: true"),
+              Contains(HasSubstr("fusion.cert.pem is missing; make it with railfix train keys")));
+  fs::rename(folder_ / "aside", fusion);
   const auto patient =
       manifest(std::string(kTrain) + "  monitor: { certificate_days: 5 }\n", "run_as: programs", "security: true")
           .value();

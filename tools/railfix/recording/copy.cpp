@@ -98,7 +98,9 @@ void note_problems(const mcap::Reader& reader, CopyReport& report) {
 core::Result<mcap::Selection> part_of(const mcap::Reader& reader, const CutOptions& options) {
   const auto& statistics = reader.statistics();
   const double length_s = core::seconds(statistics.end_ns - statistics.start_ns);
-  if (options.from_s > length_s || options.to_s <= options.from_s) {
+  if (options.to_s <= options.from_s)
+    return core::Error{fmt::format("--to {:g} must lie behind --from {:g}", options.to_s, options.from_s)};
+  if (options.from_s > length_s) {
     const std::string end = std::isfinite(options.to_s) ? fmt::format("{:g} s", options.to_s) : "the end";
     return core::Error{fmt::format("there is nothing from {:g} s to {}: {} is {:.1f} s long", options.from_s, end,
                                    reader.file().string(), length_s)};

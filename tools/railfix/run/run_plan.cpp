@@ -30,6 +30,19 @@ core::Result<std::filesystem::path> prepare_map(const RunOptions& options) {
   return compiled;
 }
 
+// Said here in one sentence, before anything starts, and not by a service that ends.
+core::Status check_start(const RunOptions& options, const std::filesystem::path& map) {
+  if (options.start == "unknown") return {};
+  if (map.empty()) {
+    return core::Error{"--start " + options.start + " needs a map: give --map, or put one into " +
+                       (options.source / "map").string()};
+  }
+  const auto loaded = track::Map::load(map);
+  if (!loaded.ok()) return loaded.error();
+  const auto place = loaded.value().parse_position(options.start);
+  return place.ok() ? core::Status() : core::Status(core::Error{"--start: " + place.error().message});
+}
+
 core::Result<YAML::Node> load_settings(const std::filesystem::path& file) {
   if (file.empty()) return YAML::Node(YAML::NodeType::Map);
   try {
@@ -136,10 +149,7 @@ core::Result<RunPlan> plan_run(const RunOptions& options) {
   const auto map = prepare_map(options);
   if (!map.ok()) return map.error();
   plan.map = map.value();
-  if (plan.map.empty() && options.start != "unknown") {
-    return core::Error{"--start " + options.start + " needs a map: give --map, or put one into " +
-                       (options.source / "map").string()};
-  }
+  if (const auto start = check_start(options, plan.map); !start.ok()) return start.error();
 
   auto settings = load_settings(options.config);
   if (!settings.ok()) return settings.error();

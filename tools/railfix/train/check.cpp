@@ -250,11 +250,16 @@ std::vector<Finding> check_train(const Manifest& manifest, const FindProgram& fi
 std::vector<Finding> check_certificates(const Manifest& manifest, const TrainHost& host) {
   Findings findings;
   if (!manifest.security) return findings;
+  const auto folder = manifest.folder / "security" / host.name;
+  if (!fs::exists(folder)) {  // one reason, one sentence
+    error(findings, folder.string() + " is missing; make the train's certificates with railfix train keys " +
+                        manifest.folder.string());
+    return findings;
+  }
   std::vector<std::string> services{kOperator};
   for (const auto& service : services_on(manifest, host.name)) services.push_back(service.name);
   for (const auto& service : services)
-    check_certificate(manifest.folder / "security" / host.name / (service + ".cert.pem"), warning_days(manifest),
-                      findings);
+    check_certificate(folder / (service + ".cert.pem"), warning_days(manifest), findings);
   return findings;
 }
 
