@@ -143,6 +143,7 @@ void Observer::state(const msg::TrainState& state, const messaging::SampleInfo& 
 // The promise of TrainState: the true place lies within over_m behind and under_m in front of the estimate.
 void Observer::judge(const msg::TrainState& state) {
   if (state.track_known() == 0 || state.integrity() == msg::INTEGRITY_UNUSABLE) return;
+  ++heard_.located;
   const auto truth = truth_.at(state.stamp_ns());
   if (!truth || !std::isfinite(state.easting_m())) return;
   const double east = state.easting_m() - truth->easting_m;

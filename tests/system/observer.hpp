@@ -25,6 +25,7 @@ struct Heard {
   double report_gap_s = 0;  // ... of train_position_report
   double ground_gap_s = 0;  // ... of new reports at the ground
   uint64_t states = 0;
+  uint64_t located = 0;  // of them, which say a place and may be used
   uint64_t outside = 0;  // the interval does not hold the truth although the state is not unusable
   double worst_excess_m = 0;
   double widest_m = 0;              // interval of usable states

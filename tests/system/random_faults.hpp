@@ -14,8 +14,7 @@ struct RandomFaults {
   double every_s = 3;  // on average
 };
 
-/// `depart` begins the ride anew, `ride_s` long. Judged for truth, and whether the train becomes whole again; 0 = both
-/// are right.
+/// `depart` begins the ride anew, `ride_s` long. 0 = no confident wrong position, and no report lost.
 int random_faults(Rig& rig, std::unique_ptr<Observer>& observer, const RandomFaults& options, double ride_s,
                   const std::function<void()>& depart);
 
