@@ -8,21 +8,22 @@ namespace {
 constexpr int64_t kPlayerNs = 5 * core::kNsPerSecond;
 
 // While a service is swapped two of its processes speak: the first one counts until it has ended.
-bool is_beside(const ServiceSeen& seen, const msg::ServiceStatus& status, int64_t now_ns) {
+bool is_beside(const ServiceSeen& seen, const msg::ServiceStatus& status, int64_t now_ns, uint64_t writer) {
   const int64_t ago_ns = now_ns - seen.received_ns;
-  return seen.received_ns != 0 && status.pid() != seen.status.pid() && !seen.stopped() && ago_ns >= 0 &&
-         ago_ns < ServiceBoard::kSilentNs;
+  const bool another = status.pid() != seen.status.pid() || writer != seen.writer;
+  return seen.received_ns != 0 && another && !seen.stopped() && ago_ns >= 0 && ago_ns < ServiceBoard::kSilentNs;
 }
 
 }  // namespace
 
-void ServiceBoard::note(const msg::ServiceStatus& status, int64_t now_ns) {
+void ServiceBoard::note(const msg::ServiceStatus& status, int64_t now_ns, uint64_t writer) {
   ServiceSeen& seen = services_[key_of(status)];
-  if (is_beside(seen, status, now_ns)) return;
+  if (is_beside(seen, status, now_ns, writer)) return;
   const bool same = seen.received_ns != 0 && seen.alive && seen.status.state() == status.state() &&
                     std::string(seen.status.reason().c_str()) == status.reason().c_str();
   if (!same) seen.since_ns = now_ns;
   seen.status = status;
+  seen.writer = writer;
   seen.received_ns = now_ns;
   seen.alive = true;
 }

@@ -12,6 +12,7 @@ namespace railfix::messaging {
 
 struct ServiceSeen {
   msg::ServiceStatus status;
+  uint64_t writer = 0;  // SampleInfo::writer of the status
   int64_t received_ns = 0;
   int64_t since_ns = 0;  // in this state, for this reason, alive or not
   bool alive = true;     // has said something lately
@@ -27,7 +28,9 @@ class ServiceBoard {
   /// Its host and name tell one service from another.
   using Key = std::pair<std::string, std::string>;
 
-  void note(const msg::ServiceStatus& status, int64_t now_ns);
+  /// `writer` tells two processes of a service from each other when their numbers do not: those of containers are
+  /// equal.
+  void note(const msg::ServiceStatus& status, int64_t now_ns, uint64_t writer = 0);
   /// A player was heard: it sends statuses as they were recorded, at its own rate, so for 5 s nobody is called silent.
   void note_player(int64_t now_ns) { player_ns_ = now_ns; }
   /// Who has said nothing for kSilentNs is dead, frozen or stopped: services speak four times a second. Nobody is

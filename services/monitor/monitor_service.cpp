@@ -126,7 +126,7 @@ void MonitorService::beat() {
 
 void MonitorService::set_up_topics() {
   on_topic_["service_status"] = [this](const Arrived& arrived) {
-    services_.note(arrived.as<msg::ServiceStatus>(), core::wall_ns());
+    services_.note(arrived.as<msg::ServiceStatus>(), core::wall_ns(), arrived.info.writer);
   };
   const auto keep = [this]<class T>(const messaging::Topic<T>& topic, Newest<T>& newest) {
     on_topic_[topic.name] = [&newest](const Arrived& arrived) { newest.take(arrived); };

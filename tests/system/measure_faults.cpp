@@ -48,6 +48,7 @@ struct Options {
 struct Row {
   std::string name;
   Heard heard;
+  double over_s = 0;  // monotonic; when the train could begin to recover
   double recovery_s = 0;
   bool recovered = false;
   bool told = false;
@@ -97,24 +98,34 @@ Row measure(const Fault& fault, Rig& rig, Observer& observer, bool short_one) {
   row.name = fault.name;
   observer.begin();
   fault.begin(rig);
-  double over_s = now_s();  // when the train can begin to recover
+  row.over_s = now_s();
   if (fault.lasts_s > 0) {
     for (const double until_s = now_s() + fault.lasts_s; now_s() < until_s && !(fault.over && fault.over(rig));)
       observer.run(std::min(0.2, until_s - now_s()));
     if (fault.end) fault.end(rig);
-    over_s = now_s();
+    row.over_s = now_s();
   }
   observer.run(fault.watch_s);
   if (short_one) (void)observer.wait_whole(kShortPatienceS);
   row.heard = observer.end();
   row.recovered = row.heard.not_usual.empty();
-  row.recovery_s = std::max(0.0, row.heard.not_whole_s - over_s);
+  row.recovery_s = std::max(0.0, row.heard.not_whole_s - row.over_s);
   row.told = fault.named.empty() || std::any_of(row.heard.said.begin(), row.heard.said.end(), [&](const auto& text) {
                return text.find(fault.named) != std::string::npos;
              });
   if (fault.lasts_s == 0 && fault.end) fault.end(rig);
   observer.run(kTakenAwayS);  // so that the next fault does not begin before this one's end is heard
   return row;
+}
+
+// What was said, and where the time of the recovery went.
+void tell_course(const Row& row) {
+  for (const auto& text : row.heard.said) std::cerr << "  " << row.name << ": " << text << '\n';
+  for (const auto& step : row.heard.course) {
+    char when[32];
+    std::snprintf(when, sizeof when, "  %+.2f s ", step.from_s - row.over_s);
+    std::cerr << when << (step.what.empty() ? "as usual" : "in the way: " + core::joined(step.what)) << '\n';
+  }
 }
 
 void depart(Rig& rig, std::unique_ptr<Observer>& observer) {
@@ -156,8 +167,7 @@ int campaign(const Options& options, Rig& rig) {
     if (rows.empty()) print_head();
     rows.push_back(measure(fault, rig, *observer, options.short_one));
     print(rows.back(), targets);
-    for (const auto& text : rows.back().heard.said) std::cerr << "  " << rows.back().name << ": " << text << '\n';
-    for (const auto& text : rows.back().heard.last) std::cerr << "  last in the way: " << text << '\n';
+    tell_course(rows.back());
     if (rows.back().heard.outside > 0) std::cerr << "  recordings and logs: " << rig.keep_evidence().string() << '\n';
   }
   const auto bad =

@@ -70,6 +70,13 @@ std::string ask(int port, const std::string& path) {
   return body == std::string::npos ? "" : answer.substr(body + 4);
 }
 
+// Figures in a sentence change; the sentence is the same.
+std::string kind_of(const std::string& text) {
+  std::string kind;
+  for (const char c : text) kind += std::isdigit(static_cast<unsigned char>(c)) != 0 ? '#' : c;
+  return kind;
+}
+
 }  // namespace
 
 Observer::Observer(Rig& rig, const std::filesystem::path& truth_folder)
@@ -88,8 +95,8 @@ Observer::Observer(Rig& rig, const std::filesystem::path& truth_folder)
   listen(topics::train_position_report,
          std::function(
              [this](const msg::TrainPositionReport& one, const messaging::SampleInfo& info) { report(one, info); }));
-  listen(topics::service_status,
-         std::function([this](const msg::ServiceStatus& one, const messaging::SampleInfo&) { status(one); }));
+  listen(topics::service_status, std::function([this](const msg::ServiceStatus& one,
+                                                      const messaging::SampleInfo& info) { status(one, info); }));
   listen(topics::log_record, std::function([this](const msg::LogRecord& record, const messaging::SampleInfo&) {
            if (record.level() >= kWarning) say(std::string(record.service().c_str()) + ": " + record.text().c_str());
          }));
@@ -173,8 +180,8 @@ void Observer::report(const msg::TrainPositionReport& report, const messaging::S
   numbers_.arrived("", 0, report.seq());
 }
 
-void Observer::status(const msg::ServiceStatus& status) {
-  services_.note(status, core::wall_ns());
+void Observer::status(const msg::ServiceStatus& status, const messaging::SampleInfo& info) {
+  services_.note(status, core::wall_ns(), info.writer);
   const std::string name = std::string(status.service().c_str()) + "@" + status.host().c_str();
   const std::string reason = status.reason().c_str();
   if (!reason.empty()) say(name + ": " + reason);
@@ -195,10 +202,7 @@ const messaging::ServiceSeen* Observer::service(const std::string& name) const {
 }
 
 void Observer::say(const std::string& text) {
-  // Figures in a sentence change; the sentence is the same.
-  std::string kind;
-  for (const char c : text) kind += std::isdigit(static_cast<unsigned char>(c)) != 0 ? '#' : c;
-  if (known_complaints_.insert(kind).second) heard_.said.push_back(text);
+  if (known_complaints_.insert(kind_of(text)).second) heard_.said.push_back(text);
 }
 
 std::set<std::string> Observer::not_usual() const {
@@ -235,10 +239,15 @@ void Observer::turn() {
   }
   for (const auto& text : said) say(text);
   heard_.not_usual = not_usual();
-  if (heard_.not_usual.empty()) return;
-  heard_.not_whole_s = now_s();
-  heard_.last.clear();
-  for (const auto& name : heard_.not_usual) heard_.last.insert(with_reason(name));
+  if (!heard_.not_usual.empty()) heard_.not_whole_s = now_s();
+  note_course();
+}
+
+void Observer::note_course() {
+  std::set<std::string> what;
+  for (const auto& name : heard_.not_usual) what.insert(kind_of(with_reason(name)));
+  if (what != (heard_.course.empty() ? std::set<std::string>() : heard_.course.back().what))
+    heard_.course.push_back({now_s(), std::move(what)});
 }
 
 void Observer::run(double seconds) {

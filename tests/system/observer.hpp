@@ -19,6 +19,12 @@
 
 namespace railfix::system_test {
 
+/// What kept the train from being whole, and why, from this moment on; nothing = it was as usual again.
+struct InTheWay {
+  double from_s = 0;  // monotonic
+  std::set<std::string> what;
+};
+
 /// What was heard since Observer::begin().
 struct Heard {
   double state_gap_s = 0;   // longest pause of train_state
@@ -33,7 +39,7 @@ struct Heard {
   uint64_t reports_lost = 0;        // numbers that no report in the cab had
   uint64_t ground_lost = 0;         // ... at the ground
   double not_whole_s = 0;           // monotonic time of the last moment at which not everything was as usual
-  std::set<std::string> last;       // what kept the train from being whole at that moment, and why
+  std::vector<InTheWay> course;     // of the way back: where the time went
   std::vector<std::string> said;    // new complaints, in their order
   std::set<std::string> not_usual;  // what keeps the train from being whole now
 };
@@ -61,13 +67,14 @@ class Observer {
  private:
   void state(const msg::TrainState& state, const messaging::SampleInfo& info);
   void report(const msg::TrainPositionReport& report, const messaging::SampleInfo& info);
-  void status(const msg::ServiceStatus& status);
+  void status(const msg::ServiceStatus& status, const messaging::SampleInfo& info);
   void look_for_silence();
   void judge(const msg::TrainState& state);
   void say(const std::string& text);
   void listen_on_the_ground(Rig& rig);
   void ask_monitor();
   void turn();
+  void note_course();
   [[nodiscard]] std::set<std::string> not_usual() const;
   [[nodiscard]] std::string with_reason(const std::string& name) const;
 

@@ -49,11 +49,11 @@ struct WatchedTopic {
 class Watch {
  public:
   explicit Watch(const Options& options) : options_(options), listener_(options.network, "railfix-top") {
-    listener_.listen(messaging::topics::service_status.name,
-                     [this](const auto& name, const auto& topic, const auto& sample, const auto& info) {
-                       services_.note(*static_cast<const msg::ServiceStatus*>(sample.get()), core::wall_ns());
-                       count(name, topic, sample.get(), info);
-                     });
+    listener_.listen(messaging::topics::service_status.name, [this](const auto& name, const auto& topic,
+                                                                    const auto& sample, const auto& info) {
+      services_.note(*static_cast<const msg::ServiceStatus*>(sample.get()), core::wall_ns(), info.writer);
+      count(name, topic, sample.get(), info);
+    });
     listener_.listen(messaging::topics::player_status.name,
                      [this](const auto& name, const auto& topic, const auto& sample, const auto& info) {
                        services_.note_player(core::wall_ns());

@@ -158,11 +158,14 @@ int up(const Options& options) {
   if (!say(findings)) return 1;
   const HostFolder folder(options.root);
   const auto installed = folder.plan();
-  if (supervisor_of(folder) && installed && !installed->down) {
-    std::cout << "services run here already; railfix train diff says what the manifest would change, upgrade does it\n";
-    return status(options);
+  const bool supervised = supervisor_of(folder).has_value();
+  const bool runs = installed && !installed->down && (supervised || any_runs(folder));
+  if (runs) {
+    std::cout << "services run here already" << (supervised ? "" : ", without a supervisor: it is started")
+              << "; railfix train diff says what the manifest would change, upgrade does it\n";
+    if (supervised) return status(options);
   }
-  const auto plan = core::value_or_throw(install(manifest, host, options.root));
+  const auto plan = runs ? *installed : core::value_or_throw(install(manifest, host, options.root));
   const auto healthy = bring_up(options.root, plan, options.gate);
   if (!healthy.ok()) std::cerr << "railfix: not healthy: " << healthy.error().message << '\n';
   const int shown = status(options);

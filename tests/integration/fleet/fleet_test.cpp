@@ -114,7 +114,9 @@ TEST_F(Fleet, ServicesOutliveTheirSupervisorAndTheNextOneGoesOnWithThem) {
   EXPECT_THAT(train({"status", "--root", root()}).out, HasSubstr("without supervisor"));
   const auto again = up();
   EXPECT_EQ(again.exit_code, 0) << again.out << again.err;
+  EXPECT_THAT(again.out, HasSubstr("without a supervisor: it is started"));
   EXPECT_EQ(status("fusion")["pid"], fusion["pid"]);
+  EXPECT_FALSE(fs::exists(folder_ / "root/var/lib/railfix-train/generations/2")) << "nothing was installed";
   ASSERT_GT(fusion["pid"].get<pid_t>(), 1);
   ASSERT_EQ(kill(fusion["pid"].get<pid_t>(), SIGKILL), 0);
   EXPECT_TRUE(wait_until([&] {

@@ -76,6 +76,22 @@ TEST(ServiceBoard, OfTwoThatAreSwappedTheFirstCountsUntilItHasEnded) {
   EXPECT_EQ(board.find("odometry")->status.pid(), 3U);
 }
 
+// In its container every service is process 2.
+TEST(ServiceBoard, OfTwoThatAreSwappedInContainersTheFirstCountsToo) {
+  ServiceBoard board;
+  int64_t now_ns = kBegin;
+  board.note(status(msg::STATE_ACTIVE, "", 2), now_ns, 11);
+  for (int i = 0; i < 8; ++i) {
+    board.note(status(msg::STATE_READY, "stands by", 2), now_ns += 100'000'000, 12);
+    EXPECT_EQ(board.find("odometry")->status.state(), msg::STATE_ACTIVE);
+    board.note(status(msg::STATE_ACTIVE, "", 2), now_ns += 100'000'000, 11);
+  }
+  EXPECT_EQ(board.find("odometry")->since_ns, kBegin) << "nothing has changed";
+  board.note(status(msg::STATE_STOPPED, "", 2), now_ns, 11);
+  board.note(status(msg::STATE_DEGRADED, "no picture", 2), now_ns, 12);
+  EXPECT_EQ(board.find("odometry")->status.state(), msg::STATE_DEGRADED);
+}
+
 TEST(ServiceBoard, NobodyIsSilentBecauseTheListenerWasHeldUp) {
   ServiceBoard board;
   board.note_silence(kBegin);
