@@ -3,6 +3,7 @@
 #include <iostream>
 #include <random>
 
+#include "core/joined.hpp"
 #include "core/time.hpp"
 #include "system/faults.hpp"
 
@@ -66,7 +67,8 @@ void end_of_ride(Rig& rig, Observer& observer, Sum& sum) {
   sum.outside += heard.outside;
   sum.reports_lost += heard.reports_lost + heard.ground_lost;
   if (!heard.not_usual.empty()) {
-    for (const auto& text : heard.last) std::cerr << "  not as usual at the end: " << text << '\n';
+    if (!heard.course.empty())
+      std::cerr << "  not as usual at the end: " << core::joined(heard.course.back().what) << '\n';
   }
   for (const auto& text : heard.said) {
     if (text.find("wrong since") != std::string::npos) std::cerr << "  " << text << '\n';
