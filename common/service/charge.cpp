@@ -27,11 +27,13 @@ void Charge::hear(const ChargeBeat& beat, int64_t now_ns) {
   if (beat.instance == instance_) return;
   if (beat.leaving) {
     peers_.erase(beat.instance);
+    if (peers_.empty()) peer_heard_ns_.reset();
     return;
   }
   Peer& peer = peers_[beat.instance];
   peer.beat = beat;
   peer.heard_ns = turns_ns(now_ns);
+  peer_heard_ns_ = peer.heard_ns;
   if (beat.in_charge) holder_heard_ns_ = peer.heard_ns;
 }
 
@@ -44,9 +46,10 @@ void Charge::found_nobody(int64_t now_ns) {
   listens_until_ns_ = std::max(listens_until_ns_, turns_ns(now_ns) + kNewcomerNs);
 }
 
-// With nobody to take over, being held up does no harm.
+// With nobody to take over, being held up does no harm. One who was silent for a moment may have gone on meanwhile.
 bool Charge::held_up(int64_t now_ns) const {
-  return !peers_.empty() && now_ns - updated_ns_ > silence_ns_ - silence_ns_ / 5;
+  const bool has_peer = peer_heard_ns_ && turned_ns_ - *peer_heard_ns_ < kRememberedNs;
+  return has_peer && now_ns - updated_ns_ > silence_ns_ - silence_ns_ / 5;
 }
 
 void Charge::look_at_peers(int64_t now_ns) {

@@ -7,7 +7,8 @@
 // - Who hears of nobody in charge for `silence` takes charge; the best first, the others give it one more `silence`.
 // - Silence is counted in turns of one's own: a turn that comes late counts as one of kTurnNs. Who is held up itself,
 //   on a host with too much to do, cannot tell whether the other one was silent.
-// - Who was held up for so long that somebody else may have taken charge (SIGSTOP, an overloaded host) stands by.
+// - Who was held up for so long that somebody else may have taken charge (SIGSTOP, an overloaded host) stands by, also
+//   when that one was last heard up to kRememberedNs ago; not when it has left in order.
 // - Two in charge (a cable is plugged in again): the worse one stands by at once.
 // - A standby whose output has been better for kBetterNs gets the charge; for kWorthlessNs when that of the one in
 //   charge is worth nothing (fitness 0): time enough for the other one to say the same of its own.
@@ -42,6 +43,7 @@ class Charge {
   static constexpr int64_t kSettledNs = 2'000'000'000;
   static constexpr int64_t kBetterNs = 5'000'000'000;
   static constexpr int64_t kWorthlessNs = 150'000'000;
+  static constexpr int64_t kRememberedNs = 5'000'000'000;
 
   Charge(uint64_t instance, int64_t strength, int64_t silence_ns, bool listens_first = true);
 
@@ -87,8 +89,9 @@ class Charge {
   int64_t updated_ns_ = 0;  // of the monotonic clock ...
   int64_t turned_ns_ = 0;   // ... and in own turns
   int64_t begun_ns_ = 0;
-  int64_t listens_until_ns_ = 0;  // does not take charge before
-  int64_t holder_heard_ns_ = 0;   // the last word of one in charge
+  int64_t listens_until_ns_ = 0;          // does not take charge before
+  int64_t holder_heard_ns_ = 0;           // the last word of one in charge
+  std::optional<int64_t> peer_heard_ns_;  // of anybody who has not left in order
   std::map<uint64_t, Peer> peers_;
 };
 

@@ -116,6 +116,23 @@ TEST(Charge, OneThatHungDoesNotSpeakAtItsFirstMoment) {
   EXPECT_EQ(train.changes, 2);
 }
 
+TEST(Charge, OneThatHungWhileItHeardNobodyAsksFirstToo) {
+  Train train;
+  train.run(10);
+  train.at(1).frozen = true;
+  train.run(0.5);
+  train.at(0).frozen = true;
+  train.at(1).frozen = false;
+  train.run(5);
+  EXPECT_TRUE(train.speaks(1));
+  train.at(0).frozen = false;
+  train.run(0.025);
+  EXPECT_FALSE(train.speaks(0));
+  train.run(60);
+  EXPECT_TRUE(train.speaks(1));
+  EXPECT_FALSE(train.speaks(0));
+}
+
 TEST(Charge, HavingBeenHeldUpIsKnownWithoutAnUpdate) {
   Charge charge(1, 20, kSilenceNs);
   ChargeBeat other;
