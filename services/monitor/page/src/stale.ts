@@ -23,9 +23,11 @@ export function freshness(age: number, limit_s: number, connected: boolean): Fre
   return connected && age <= limit_s ? "live" : "stale";
 }
 
-/// Newest `limit` of both, the newer ones last, nothing twice: a new subscription repeats what is known.
-export function appended<T>(old: readonly T[], more: readonly T[], limit: number, key: (item: T) => string): T[] {
+/// Newest `limit` of both, the newer ones last, nothing twice: a new subscription repeats what is known. What comes last is
+/// the newest, unless `time` tells.
+export function appended<T>(old: readonly T[], more: readonly T[], limit: number, key: (item: T) => string, time?: (item: T) => number): T[] {
   const known = new Set(old.map(key));
   const all = old.concat(more.filter((item) => !known.has(key(item)) && known.add(key(item))));
+  if (time) all.sort((one, other) => time(one) - time(other));
   return all.length > limit ? all.slice(all.length - limit) : all;
 }

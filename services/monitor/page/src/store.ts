@@ -110,7 +110,7 @@ export function take(message: Message): void {
       topics.value = { value: message.topics, at_ms };
       break;
     case "report":
-      reports.value = appended(reports.value, [message], REPORT_LIMIT, report_key);
+      reports.value = appended(reports.value, [message], REPORT_LIMIT, report_key, (report) => report.sent_ns);
       break;
     case "log":
       log.value = appended(log.value, message.records, LOG_LIMIT, log_key);

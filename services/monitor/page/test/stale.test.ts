@@ -23,6 +23,7 @@ describe("bounded lists", () => {
   const key = (n: number) => String(n);
   it("keep the newest", () => expect(appended([1, 2, 3], [4, 5], 3, key)).toEqual([3, 4, 5]));
   it("hold nothing twice when a subscription repeats itself", () => expect(appended([1, 2, 3], [2, 3, 4, 4], 10, key)).toEqual([1, 2, 3, 4]));
+  it("stand by their time where they have one", () => expect(appended([2, 5], [3, 9, 1], 4, key, (one) => one)).toEqual([2, 3, 5, 9]));
   it("do not grow", () => {
     let list: number[] = [];
     for (let i = 0; i < 10000; ++i) list = appended(list, [i], 500, key);
