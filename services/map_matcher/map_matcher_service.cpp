@@ -270,7 +270,7 @@ void MapMatcherService::follow_turning(const msg::OdometryStep& step) {
   const auto prior = prior_at(step.stamp_ns());
   if (!prior || !step_) return;
   const auto place = path_->position_at(prior->path_distance_m);
-  chooser_->follow({place, prior->over_m, prior->under_m, state_->sigma_m()});
+  chooser_->follow(window_at(place, *prior));
   auto turn = moved_ns_ == step_->stamp_ns() ? turn_of_camera() : std::nullopt;
   if (turn) {
     turn->way_m *= state_->visual_scale();
@@ -281,12 +281,17 @@ void MapMatcherService::follow_turning(const msg::OdometryStep& step) {
   publish_track(step.stamp_ns(), chain_.odometer_m(), step.grabbed_ns());
 }
 
+TrackWindow MapMatcherService::window_at(const track::EdgePosition& place, const Prior& prior) const {
+  return {
+      place, prior.over_m, prior.under_m, state_->sigma_m(), state_->track_probability(), !(state_->speed_mps() < 0)};
+}
+
 // Without a camera fusion's states lead: they come ten times a second.
 void MapMatcherService::follow_without_camera() {
   if (step_ && core::seconds(state_->stamp_ns() - step_->stamp_ns()) < kNoCameraS) return;
   const auto prior = prior_at(state_->stamp_ns());
   if (!prior) return;
-  chooser_->follow({place_of(*state_), prior->over_m, prior->under_m, state_->sigma_m()});
+  chooser_->follow(window_at(place_of(*state_), *prior));
   move_without_camera(state_->stamp_ns());
   publish_track(state_->stamp_ns(), state_->distance_m(), 0);
 }

@@ -43,6 +43,7 @@ class MapMatcherService {
   void publish_place(const msg::OdometryStep& step, const Location& location);
   void follow_turning(const msg::OdometryStep& step);
   void follow_without_camera();
+  [[nodiscard]] TrackWindow window_at(const track::EdgePosition& place, const Prior& prior) const;
   void move(const Turn& turn, int64_t to_ns);
   void move_without_camera(int64_t to_ns);
   void publish_track(int64_t stamp_ns, double odometer_m, int64_t grabbed_ns);

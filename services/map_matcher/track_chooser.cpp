@@ -16,7 +16,9 @@ constexpr double kSameM = 5.0;  // two routes whose distances differ by less are
 constexpr double kFarFromWindowM = 200;
 constexpr double kMostWindowM = 300;
 constexpr size_t kMostHypotheses = 24;
-constexpr double kNoLagShare = 0.3;  // of the cars
+constexpr double kNoLagShare = 0.3;   // of the cars
+constexpr double kWatched = 0.9;      // a track less probable lies behind a switch that nobody watched ...
+constexpr double kUnwatchedM = 3000;  // ... no further back
 
 double log_sum(double a, double b) {
   const double most = std::max(a, b);
@@ -34,10 +36,45 @@ void TrackChooser::start(const TrackWindow& window) {
   window_ = window;
   const track::Run run{map_->edge(window.place.edge), window.place.direction != track::Direction::reverse};
   hypotheses_.push_back({track::Route(run, window.place.offset_m, 0), 0, {0, std::log(parameters_.astray)}, {}});
+  forwards_ = window.forwards;
+  told_ = 1;
+  if (window.probability < kWatched) open_ways_behind();
   cells_m_ = first_m();
-  extend_behind(hypotheses_.front().route);
+  for (auto& hypothesis : hypotheses_) extend_behind(hypothesis.route);
   fit_cells();
   extend();
+}
+
+// Who begins behind a switch that nobody watched does not know more than fusion: the train may be on any of the ways
+// from there, as far beyond the switch.
+void TrackChooser::open_ways_behind() {
+  track::Route back = hypotheses_.front().route;
+  std::vector<track::Route> others;
+  const auto behind_m = [&] { return forwards_ ? -back.begin_m() : back.end_m(); };
+  for (double even = 1; even > window_.probability + 0.01 && behind_m() < kUnwatchedM;) {
+    const track::Run here = forwards_ ? back.legs().front().run : back.legs().back().run;
+    const auto before = forwards_ ? ways_->before(here) : ways_->after(here);
+    if (before.empty()) break;
+    const track::Run& from = before.front();
+    const auto ways = forwards_ ? ways_->after(from) : ways_->before(from);
+    even /= static_cast<double>(ways.size());
+    for (const auto& way : ways) {
+      if (way == here) continue;
+      const double switch_m = from.forward == forwards_ ? from.length_m() : 0.0;  // on the edge before it
+      auto& other = others.emplace_back(from, switch_m, forwards_ ? back.begin_m() : back.end_m());
+      forwards_ ? other.push_ahead(way) : other.push_behind(way);
+    }
+    forwards_ ? back.push_behind(from) : back.push_ahead(from);
+  }
+  if (others.empty()) {
+    told_ = window_.probability;
+    return;
+  }
+  hypotheses_.front().log_prior = std::log(window_.probability);
+  for (auto& other : others) {
+    const double share = (1 - window_.probability) / static_cast<double>(others.size());
+    hypotheses_.push_back({std::move(other), std::log(share), {0, std::log(parameters_.astray)}, {}});
+  }
 }
 
 void TrackChooser::follow(const TrackWindow& window) {
@@ -323,7 +360,7 @@ void TrackChooser::see(double curvature_per_m, double sigma_per_m) {
 std::optional<TrackChoice> TrackChooser::choice() const {
   if (hypotheses_.empty()) return std::nullopt;
   if (hypotheses_.size() == 1) {
-    return TrackChoice{{{hypotheses_.front().route.position_at(place_m_), 1.0}}, true};
+    return TrackChoice{{{hypotheses_.front().route.position_at(place_m_), told_}}, told_ >= parameters_.declare};
   }
   struct Sum {
     track::EdgePosition place;
@@ -340,7 +377,7 @@ std::optional<TrackChoice> TrackChooser::choice() const {
     all = log_sum(all, log);
   }
   TrackChoice choice;
-  for (const auto& [edge, sum] : by_edge) choice.options.push_back({sum.place, std::exp(sum.log - all)});
+  for (const auto& [edge, sum] : by_edge) choice.options.push_back({sum.place, told_ * std::exp(sum.log - all)});
   std::sort(choice.options.begin(), choice.options.end(),
             [](const TrackOption& a, const TrackOption& b) { return a.probability > b.probability; });
   choice.known = choice.options.front().probability >= parameters_.declare;

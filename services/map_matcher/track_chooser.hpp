@@ -21,6 +21,8 @@ struct TrackWindow {
   double over_m = 0;  // may be so far behind
   double under_m = 0;
   double sigma_m = 0;
+  double probability = 1;  // of this edge, as long as nothing is known here
+  bool forwards = true;    // the train moves the way that the cab looks
 };
 
 struct TrackOption {
@@ -28,7 +30,8 @@ struct TrackOption {
   double probability = 0;
 };
 
-/// Best first; the probabilities add up to 1.
+/// Best first; the probabilities add up to 1, or to less when the train may be on another track that is not looked
+/// into.
 struct TrackChoice {
   std::vector<TrackOption> options;
   bool known = false;
@@ -71,6 +74,7 @@ class TrackChooser {
     std::vector<TurnCell> cells;
   };
   void start(const TrackWindow& window);
+  void open_ways_behind();
   void use_pending();
   void fit_cells();
   void turn_round();
@@ -99,6 +103,7 @@ class TrackChooser {
   double moved_back_m_ = 0;
   bool forwards_ = true;      // the way that the train moves, seen from the cab
   double seen_m_ = INFINITY;  // run since a picture was used
+  double told_ = 1;           // probability of what was told at the start and cannot be looked into
   TurnSensor sensor_ = TurnSensor::camera;
   BinTurn pending_;
 };

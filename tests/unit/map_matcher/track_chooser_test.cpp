@@ -73,6 +73,56 @@ TEST(TrackChooser, WithoutAnyTurningMeasuredItSaysNotYetKnown) {
   }
 }
 
+// As a map_matcher that was away while the train ran over the switch.
+TEST(TrackChooser, WhoBeginsBehindASwitchThatNobodyWatchedDoesNotKnowTheTrack) {
+  const auto map = fork();
+  const auto ways = std::make_shared<const track::Ways>(*map);
+  const auto forward = track::Direction::forward;
+  TrackChooser sure({}, map, ways);
+  sure.follow({{2, 100, forward}, 3, 3, 0.5, 0.99});
+  EXPECT_TRUE(sure.choice()->known) << "fusion knows why";
+
+  TrackChooser chooser({}, map, ways);
+  chooser.follow({{2, 15, forward}, 3, 3, 0.5, 0.5});
+  const auto begin = chooser.choice();
+  EXPECT_FALSE(begin->known);
+  ASSERT_EQ(begin->options.size(), 2U);
+  EXPECT_NEAR(begin->options[0].probability, 0.5, 1e-6);
+  EXPECT_NEAR(begin->options[0].place.offset_m, 15, 1e-6);
+  EXPECT_NEAR(begin->options[1].place.offset_m, 15, 1e-6);
+  // The train turns left, until the body has left the curve.
+  for (double place_m = 15; place_m < 75; place_m += 1) {
+    chooser.move({1, place_m < 50 ? 0.003 : 0.0, 1e-4});
+    chooser.follow({{2, place_m + 1, forward}, 3, 3, 0.5, 0.5});
+  }
+  EXPECT_EQ(chooser.choice()->options.front().place.edge, 3U);
+  EXPECT_TRUE(chooser.choice()->known);
+}
+
+TEST(TrackChooser, WaysThatMeetAgainNeedNotBeToldApart) {
+  auto made = std::make_shared<track::Map>(*fork());
+  made->edges.push_back({4, "together", 5, 6, "", track::Alignment::chained({0, 1000, 0}, {{900, 0, 0}})});
+  made->edges[1].to_node = made->edges[2].to_node = 5;
+  made->connections.insert(made->connections.end(), {{5, 2, 4, false}, {5, 3, 4, true}});
+  const std::shared_ptr<const track::Map> map = made;
+  TrackChooser chooser({}, map, std::make_shared<const track::Ways>(*map));
+  chooser.follow({{2, 300, track::Direction::forward}, 3, 3, 0.5, 0.5});
+  EXPECT_FALSE(chooser.choice()->known);
+  for (double place_m = 300; place_m < 650; place_m += 1) chooser.move({1, 0, 1e-4});
+  EXPECT_EQ(chooser.choice()->options.front().place.edge, 4U);
+  EXPECT_TRUE(chooser.choice()->known);
+}
+
+TEST(TrackChooser, ADoubtThatCannotBeLookedIntoStays) {
+  auto made = std::make_shared<track::Map>();
+  made->edges.push_back({1, "alone", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{5000, 0, 0}})});
+  const std::shared_ptr<const track::Map> map = made;
+  TrackChooser chooser({}, map, std::make_shared<const track::Ways>(*map));
+  chooser.follow({{1, 4000, track::Direction::forward}, 3, 3, 0.5, 0.5});
+  EXPECT_FALSE(chooser.choice()->known);
+  EXPECT_NEAR(chooser.choice()->options.front().probability, 0.5, 1e-9);
+}
+
 TEST(TrackChooser, TheSideOfTheFrogCounts) {
   auto made = std::make_shared<track::Map>(*fork());
   made->landmarks = {{1, track::LandmarkKind::frog, 2, 30, 0.72, 0.1, ""},
