@@ -5,8 +5,12 @@
 
 namespace railfix::service {
 
-Charge::Charge(uint64_t instance, int64_t strength, int64_t silence_ns, bool listens_first)
-    : instance_(instance), strength_(strength), silence_ns_(silence_ns), in_charge_(!listens_first) {}
+Charge::Charge(uint64_t instance, int64_t strength, int64_t silence_ns, bool expects_peers)
+    : instance_(instance),
+      strength_(strength),
+      silence_ns_(silence_ns),
+      expects_peers_(expects_peers),
+      in_charge_(!expects_peers) {}
 
 bool Charge::better(const ChargeBeat& a, const ChargeBeat& b) {
   return std::tuple(a.fitness, a.strength, b.instance) > std::tuple(b.fitness, b.strength, a.instance);
@@ -46,9 +50,10 @@ void Charge::found_nobody(int64_t now_ns) {
   listens_until_ns_ = std::max(listens_until_ns_, turns_ns(now_ns) + kNewcomerNs);
 }
 
-// With nobody to take over, being held up does no harm. One who was silent for a moment may have gone on meanwhile.
+// With nobody to take over, being held up does no harm. One who was silent for a moment, or whom DDS has not announced
+// yet, may have gone on meanwhile.
 bool Charge::held_up(int64_t now_ns) const {
-  const bool has_peer = peer_heard_ns_ && turned_ns_ - *peer_heard_ns_ < kRememberedNs;
+  const bool has_peer = expects_peers_ || (peer_heard_ns_ && turned_ns_ - *peer_heard_ns_ < kRememberedNs);
   return has_peer && now_ns - updated_ns_ > silence_ns_ - silence_ns_ / 5;
 }
 
@@ -101,6 +106,7 @@ void Charge::stand_by(int64_t now_ns) {
 
 bool Charge::update(int fitness, int64_t now_ns) {
   const bool was_held_up = begun_ && held_up(now_ns);
+  const bool was_away = was_held_up && now_ns - updated_ns_ > kAwayNs;
   turned_ns_ = turns_ns(now_ns);
   updated_ns_ = now_ns;
   if (!begun_) {
@@ -109,6 +115,7 @@ bool Charge::update(int fitness, int64_t now_ns) {
     if (!in_charge_) listens_until_ns_ = turned_ns_ + kNewcomerNs;
   } else if (was_held_up) {
     stand_by(turned_ns_);
+    if (was_away) listens_until_ns_ = turned_ns_ + kFoundAgainNs;
   }
   worthless_ = fitness == 0;
   settle(fitness, turned_ns_);

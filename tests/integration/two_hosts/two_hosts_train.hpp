@@ -99,7 +99,7 @@ class Camera {
     msg::OdometryStep step;
     step.stamp_ns(now_ns);
     step.reference_stamp_ns(last_ns_);
-    step.step_m(last_ns_ == 0 ? 0 : kSpeedMps * core::seconds(now_ns - last_ns_));
+    step.step_m(last_ns_ == 0 ? 0 : speed_mps(now_ns) * core::seconds(now_ns - last_ns_));
     step.step_sigma_m(0.01);
     step.valid(last_ns_ == 0 ? 0 : 1);
     step.mode(msg::ODOMETRY_KEYFRAME);
@@ -110,6 +110,13 @@ class Camera {
   }
 
  private:
+  /// It stands at first, as a train does whose fusion believes `fusion.start`.
+  [[nodiscard]] double speed_mps(int64_t now_ns) const {
+    const double since_s = core::seconds(now_ns - ways_m_.begin()->first);
+    return std::clamp((since_s - kStandsS) * kAccelerationMps2, 0.0, kSpeedMps);
+  }
+  static constexpr double kStandsS = 0.5;
+  static constexpr double kAccelerationMps2 = 2;
   messaging::Writer<msg::CameraFrame> frames_;
   messaging::Writer<msg::OdometryStep> steps_;
   uint64_t seq_ = 0;

@@ -148,12 +148,23 @@ TEST(Charge, HavingBeenHeldUpIsKnownWithoutAnUpdate) {
 }
 
 TEST(Charge, TheOnlyOneOfItsKindIsNotDisturbedByBeingHeldUp) {
+  Charge alone(1, 0, kSilenceNs, false);
+  for (int64_t now_ns = 0; now_ns < 5000 * kMs; now_ns += kPeriodNs) alone.update(4, now_ns);
+  EXPECT_TRUE(alone.in_charge(25'000 * kMs));
+}
+
+TEST(Charge, OneOfTwoAsksFirstAlsoWhenItHasNeverHeardTheOther) {
   Train train;
   train.kill(1);
   train.run(5);
   train.at(0).frozen = true;
   train.run(20);
-  EXPECT_TRUE(train.at(0).charge.in_charge(26'000 * kMs));
+  EXPECT_FALSE(train.at(0).charge.in_charge(26'000 * kMs));
+  train.at(0).frozen = false;
+  train.run(1.9);
+  EXPECT_FALSE(train.speaks(0)) << "DDS may have to find the other one again";
+  train.run(0.2);
+  EXPECT_TRUE(train.speaks(0)) << "nobody answers";
 }
 
 TEST(Charge, TheOnlyOneSendsAtOnceUntilItsSuccessorTakesItsPlace) {
