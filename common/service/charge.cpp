@@ -5,12 +5,8 @@
 
 namespace railfix::service {
 
-Charge::Charge(uint64_t instance, int64_t strength, int64_t silence_ns, bool expects_peers)
-    : instance_(instance),
-      strength_(strength),
-      silence_ns_(silence_ns),
-      expects_peers_(expects_peers),
-      in_charge_(!expects_peers) {}
+Charge::Charge(uint64_t instance, int64_t strength, int64_t silence_ns, bool listens_first)
+    : instance_(instance), strength_(strength), silence_ns_(silence_ns), in_charge_(!listens_first) {}
 
 bool Charge::better(const ChargeBeat& a, const ChargeBeat& b) {
   return std::tuple(a.fitness, a.strength, b.instance) > std::tuple(b.fitness, b.strength, a.instance);
@@ -53,7 +49,8 @@ void Charge::found_nobody(int64_t now_ns) {
 // With nobody to take over, being held up does no harm. One who was silent for a moment, or whom DDS has not announced
 // yet, may have gone on meanwhile.
 bool Charge::held_up(int64_t now_ns) const {
-  const bool has_peer = expects_peers_ || (peer_heard_ns_ && turned_ns_ - *peer_heard_ns_ < kRememberedNs);
+  const bool one_of_two = strength_ > 0;
+  const bool has_peer = one_of_two || (peer_heard_ns_ && turned_ns_ - *peer_heard_ns_ < kRememberedNs);
   return has_peer && now_ns - updated_ns_ > silence_ns_ - silence_ns_ / 5;
 }
 

@@ -7,10 +7,9 @@
 // - Who hears of nobody in charge for `silence` takes charge; the best first, the others give it one more `silence`.
 // - Silence is counted in turns of one's own: a turn that comes late counts as one of kTurnNs. Who is held up itself,
 //   on a host with too much to do, cannot tell whether the other one was silent.
-// - Who was held up for so long that somebody else may have taken charge (SIGSTOP, an overloaded host) stands by: who
-// is
-//   one of two by its configuration always, another one when it has heard a peer within kRememberedNs that has not left
-//   in order.
+// - Who was held up for so long that somebody else may have taken charge (SIGSTOP, an overloaded host) stands by. One of
+//   two by its configuration (it has a strength) always, another one when it has heard a peer within kRememberedNs
+//   that has not left in order.
 // - Two in charge (a cable is plugged in again): the worse one stands by at once.
 // - A standby whose output has been better for kBetterNs gets the charge; for kWorthlessNs when that of the one in
 //   charge is worth nothing (fitness 0): time enough for the other one to say the same of its own.
@@ -51,7 +50,7 @@ class Charge {
   static constexpr int64_t kAwayNs = 3'000'000'000;
   static constexpr int64_t kFoundAgainNs = 2'000'000'000;
 
-  Charge(uint64_t instance, int64_t strength, int64_t silence_ns, bool expects_peers = true);
+  Charge(uint64_t instance, int64_t strength, int64_t silence_ns, bool listens_first = true);
 
   /// Times are of the monotonic clock.
   void hear(const ChargeBeat& beat, int64_t now_ns);
@@ -86,7 +85,6 @@ class Charge {
   uint64_t instance_;
   int64_t strength_;
   int64_t silence_ns_;
-  bool expects_peers_;
   int fitness_ = 0;            // that counts
   bool worthless_ = false;     // as last told, whatever counts yet
   std::optional<int> more_;    // least fitness of those above it ...
