@@ -7,8 +7,8 @@
 // - Who hears of nobody in charge for `silence` takes charge; the best first, the others give it one more `silence`.
 // - Silence is counted in turns of one's own: a turn that comes late counts as one of kTurnNs. Who is held up itself,
 //   on a host with too much to do, cannot tell whether the other one was silent.
-// - Who was held up for so long that somebody else may have taken charge (SIGSTOP, an overloaded host) stands by. One of
-//   two by its configuration (it has a strength) always, another one when it has heard a peer within kRememberedNs
+// - Who was held up for so long that somebody else may have taken charge (SIGSTOP, an overloaded host) stands by. One
+//   of two by its configuration (it has a strength) always, another one when it has heard a peer within kRememberedNs
 //   that has not left in order.
 // - Two in charge (a cable is plugged in again): the worse one stands by at once.
 // - A standby whose output has been better for kBetterNs gets the charge; for kWorthlessNs when that of the one in
