@@ -1,4 +1,5 @@
-// The topic of the ETCS on-board unit: apart from topics.hpp, because one service only reads it and nobody of ours writes it.
+// The topic of the ETCS on-board unit: apart from topics.hpp, because one service only reads it and nobody of ours
+// writes it.
 #pragma once
 
 #include "idl/onboard.h"
