@@ -14,7 +14,6 @@ constexpr double kPathAheadM = 30000;
 constexpr double kPathBehindM = 5000;
 constexpr double kPathLeftM = 3000;  // the path is followed anew when less of it is left
 constexpr double kOldStateS = 2.0;
-constexpr double kYawNoise = 3e-4;  // turning of the car body within one step, rad
 constexpr double kRailsFreshS = 0.5;
 constexpr double kShortestStepM = 0.05;
 constexpr double kLeastWayM = 1e-5;       // standing still turns nothing

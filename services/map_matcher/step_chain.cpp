@@ -8,7 +8,6 @@
 namespace railfix::map_matcher {
 namespace {
 
-constexpr double kYawNoise = 3e-4;     // turning of the car body within one step, rad
 constexpr double kSameWayM = 0.5;      // two counts of one way differ by less than this ...
 constexpr double kSameWayShare = 0.5;  // ... and this share of it
 

@@ -9,6 +9,9 @@
 
 namespace railfix::map_matcher {
 
+/// Turning of the car body within one step, rad.
+inline constexpr double kYawNoise = 3e-4;
+
 /// One OdometryStep.
 struct StepInput {
   int64_t stamp_ns = 0;

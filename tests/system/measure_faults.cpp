@@ -1,7 +1,7 @@
 // What a whole train does when one thing of it breaks: every fault of the table, one after the other, on one train.
-//   railfix-measure-faults              the whole campaign, about 20 minutes: a table, exit code 1 when a target is
-//   missed railfix-measure-faults --random 15  faults at random that meet each other railfix-measure-faults --soak 60
-//   sixty minutes without a fault: memory and latency
+//   railfix-measure-faults              the whole campaign, about 20 minutes; exit code 1 when a target is missed
+//   railfix-measure-faults --random 15  faults at random that meet each other
+//   railfix-measure-faults --soak 60    sixty minutes without a fault: memory and latency
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <iostream>
@@ -87,10 +87,6 @@ void print(const Row& row, const Targets& targets) {
               h.ground_gap_s, whole, lost.c_str(), outside.c_str(), h.widest_m, missed(row, targets).c_str(),
               h.said.empty() ? "-" : h.said.front().substr(0, 100).c_str());
   std::fflush(stdout);
-}
-
-double now_s() {
-  return core::seconds(core::monotonic_ns());
 }
 
 Row measure(const Fault& fault, Rig& rig, Observer& observer, bool short_one) {

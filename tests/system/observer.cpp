@@ -39,10 +39,6 @@ messaging::ParticipantOptions options_of(const Rig& rig) {
   return options;
 }
 
-double now_s() {
-  return core::seconds(core::monotonic_ns());
-}
-
 // Samples carry the host's clock: this thread may be busy with a fault when they come.
 double wall_s() {
   return core::seconds(core::wall_ns());

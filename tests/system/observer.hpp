@@ -10,6 +10,7 @@
 #include <thread>
 #include <vector>
 
+#include "core/time.hpp"
 #include "evaluation/truth.hpp"
 #include "ground_link/mqtt_client.hpp"
 #include "ground_link/sequence_watch.hpp"
@@ -18,6 +19,11 @@
 #include "system/rig.hpp"
 
 namespace railfix::system_test {
+
+/// Of the monotonic clock.
+inline double now_s() {
+  return core::seconds(core::monotonic_ns());
+}
 
 /// What kept the train from being whole, and why, from this moment on; nothing = it was as usual again.
 struct InTheWay {

@@ -16,10 +16,6 @@ constexpr double kLongestS = 15;     // of one fault: the longer ones leave no t
 constexpr double kEndOfRideS = 60;   // before which the ride begins anew
 constexpr double kWholeAgainS = 60;  // when nothing is broken any more
 
-double now_s() {
-  return core::seconds(core::monotonic_ns());
-}
-
 /// What is broken at the moment.
 class Broken {
  public:
@@ -66,10 +62,8 @@ void end_of_ride(Rig& rig, Observer& observer, Sum& sum) {
   sum.located += heard.located;
   sum.outside += heard.outside;
   sum.reports_lost += heard.reports_lost + heard.ground_lost;
-  if (!heard.not_usual.empty()) {
-    if (!heard.course.empty())
-      std::cerr << "  not as usual at the end: " << core::joined(heard.course.back().what) << '\n';
-  }
+  if (!heard.not_usual.empty() && !heard.course.empty())
+    std::cerr << "  not as usual at the end: " << core::joined(heard.course.back().what) << '\n';
   for (const auto& text : heard.said) {
     if (text.find("wrong since") != std::string::npos) std::cerr << "  " << text << '\n';
   }
@@ -81,8 +75,10 @@ void end_of_ride(Rig& rig, Observer& observer, Sum& sum) {
 int random_faults(Rig& rig, std::unique_ptr<Observer>& observer, const RandomFaults& options, double ride_s,
                   const std::function<void()>& depart) {
   auto table = fault_table(rig);
-  std::erase_if(table, [](const Fault& fault) { return fault.lasts_s > kLongestS && !fault.over; });
-  std::erase_if(table, [](const Fault& fault) { return fault.lasts_s > 2 * kEndOfRideS; });
+  std::erase_if(table, [](const Fault& fault) {
+    // What says itself when it is over lasts less than its limit.
+    return fault.lasts_s > (fault.over ? 2 * kEndOfRideS : kLongestS);
+  });
   std::mt19937 random(options.seed);
   std::exponential_distribution<double> pause_s(1 / options.every_s);
   Sum sum;

@@ -2,9 +2,8 @@
 #include <gmock/gmock.h>
 
 #include "messaging/topics.hpp"
-#include "support/network.hpp"
+#include "support/on_train.hpp"
 #include "support/program.hpp"
-#include "support/run_until.hpp"
 #include "track/map.hpp"
 
 namespace railfix {
@@ -20,8 +19,9 @@ constexpr double kEdgeM = 3000;
 constexpr double kBeginM = kEdgeM + 100;  // of the data, on the way of both edges
 constexpr double kCountedM = 2900;        // by the first odometry until then
 
-class OdometryAnew : public ::testing::Test {
+class OdometryAnew : public ::testing::Test, public test::OnTrain {
  protected:
+  OdometryAnew() : OnTrain("odometry-anew-" + std::to_string(getpid()), kDomain) {}
   void SetUp() override {
     track::Map map;
     map.edges.push_back({1, "behind", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{kEdgeM, 0, 0}})});
@@ -31,9 +31,8 @@ class OdometryAnew : public ::testing::Test {
     matcher_ = std::make_unique<test::Program>(test::with_settings(
         "railfix-map-matcher", {"map_matcher.map=" + map_.string(), "common.train_id=" + train_,
                                 "common.domain=" + std::to_string(kDomain), "common.log_level=error"}));
-    ASSERT_TRUE(test::run_until(queue_, [&] {
-      return states_.matched_readers() > 0 && steps_.matched_readers() > 0 && fixes_.matched_writers() > 0;
-    }));
+    ASSERT_TRUE(run_until(
+        [&] { return states_.matched_readers() > 0 && steps_.matched_readers() > 0 && fixes_.matched_writers() > 0; }));
   }
   void TearDown() override { fs::remove(map_); }
 
@@ -78,12 +77,9 @@ class OdometryAnew : public ::testing::Test {
     for (double t_s = 0; t_s < seconds; t_s += kPeriodS) tick(counted_m += kSpeedMps * kPeriodS);
   }
 
-  const std::string train_ = "odometry-anew-" + std::to_string(getpid());
   const fs::path map_ = fs::temp_directory_path() / (train_ + ".map");
   int64_t tick_ = 0;
   std::vector<msg::PositionFix> said_;
-  messaging::Queue queue_;
-  messaging::Participant participant_{test::network(train_, kDomain)};
   messaging::Writer<msg::TrainState> states_{participant_, topics::train_state};
   messaging::Writer<msg::OdometryStep> steps_{participant_, topics::odometry_step};
   messaging::Reader<msg::PositionFix> fixes_{participant_, topics::position_fix, "", queue_,
@@ -96,8 +92,7 @@ TEST_F(OdometryAnew, TheTrackIsSaidWhereTheTrainIs) {
   ride(5, 0);     // warm already, beside the one before
   ride(10, NAN);  // nobody
   ride(5, 0);
-  ASSERT_TRUE(
-      test::run_until(queue_, [&] { return !said_.empty() && said_.back().stamp_ns() > stamp_ns(tick_ - 12); }));
+  ASSERT_TRUE(run_until([&] { return !said_.empty() && said_.back().stamp_ns() > stamp_ns(tick_ - 12); }));
   EXPECT_GT(said_.size(), 15U) << "one a second";
   for (const auto& fix : said_) {
     const double train_m = kBeginM + kSpeedMps * core::seconds(fix.stamp_ns() - stamp_ns(0));

@@ -3,9 +3,8 @@
 #include <gmock/gmock.h>
 
 #include "messaging/topics.hpp"
-#include "support/network.hpp"
+#include "support/on_train.hpp"
 #include "support/program.hpp"
-#include "support/run_until.hpp"
 #include "track/map.hpp"
 
 namespace railfix {
@@ -20,8 +19,9 @@ constexpr double kPulsesPerM = 100;
 constexpr double kAccelerationMps2 = 1;
 constexpr int64_t kPeriodNs = 20'000'000;
 
-class StartPlace : public ::testing::Test {
+class StartPlace : public ::testing::Test, public test::OnTrain {
  protected:
+  StartPlace() : OnTrain("start-place-" + std::to_string(getpid()), kDomain) {}
   void SetUp() override {
     track::Map map;
     map.edges.push_back({1, "line", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{9000, 0, 0}})});
@@ -39,12 +39,12 @@ class StartPlace : public ::testing::Test {
         "railfix-fusion",
         {"fusion.map=" + map_.string(), "fusion.start=1:" + std::to_string(static_cast<int>(kStartM)) + ":+",
          "common.train_id=" + train_, "common.domain=" + std::to_string(kDomain), "common.log_level=error"}));
-    ASSERT_TRUE(test::run_until(queue_, [&] { return wheel_.matched_readers() > 0 && states_.matched_writers() > 0; }));
+    ASSERT_TRUE(run_until([&] { return wheel_.matched_readers() > 0 && states_.matched_writers() > 0; }));
     state_.reset();
   }
   void kill_and_start() {
     fusion_->end(SIGKILL);
-    ASSERT_TRUE(test::run_until(queue_, [&] { return wheel_.matched_readers() == 0; }));
+    ASSERT_TRUE(run_until([&] { return wheel_.matched_readers() == 0; }));
     start();
   }
   /// A wheel on its way to this speed, with the computer's own clock, which is `ahead_s` ahead of this one.
@@ -64,13 +64,10 @@ class StartPlace : public ::testing::Test {
   }
   [[nodiscard]] bool knows_its_place() const { return state_ && state_->track_known() != 0; }
 
-  const std::string train_ = "start-place-" + std::to_string(getpid());
   const fs::path map_ = fs::temp_directory_path() / (train_ + ".map");
   double way_m_ = 0;
   double speed_mps_ = 0;
   std::optional<msg::TrainState> state_;
-  messaging::Queue queue_;
-  messaging::Participant participant_{test::network(train_, kDomain)};
   messaging::Writer<msg::WheelSample> wheel_{participant_, topics::wheel_sample};
   messaging::Reader<msg::TrainState> states_{participant_, topics::train_state, "", queue_,
                                              [this](const msg::TrainState& state) { state_ = state; }};
