@@ -303,7 +303,8 @@ void MapMatcherService::move(const Turn& turn, int64_t to_ns) {
 // From where the chooser has come to, whoever had led it there.
 void MapMatcherService::move_without_camera(int64_t to_ns) {
   const double dt_s = core::seconds(to_ns - moved_ns_);
-  if (moved_ns_ == 0 || dt_s > kLostS) {
+  // A clock that was set back leaves it in the future.
+  if (moved_ns_ == 0 || dt_s > kLostS || dt_s < -kOldStateS) {
     if (moved_ns_ != 0) chooser_.emplace(config_.track_parameters(), map_, ways_);
     moved_ns_ = to_ns;
     return;
