@@ -1,6 +1,5 @@
 #include "messaging/participant.hpp"
 
-#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastrtps/utils/IPLocator.h>
 #include <fastrtps/xmlparser/XMLProfileManager.h>
 #include <algorithm>
@@ -12,6 +11,7 @@
 #include "messaging/fastdds_types.hpp"
 #include "messaging/network.hpp"
 #include "messaging/security.hpp"
+#include "messaging/transport.hpp"
 
 namespace railfix::messaging {
 namespace {
@@ -23,15 +23,16 @@ constexpr uint32_t kSocketBufferBytes = 4U << 20U;
 // Dead participants vanish after the lease; the default of 20 s would show ghosts.
 constexpr int32_t kParticipantLeaseS = 5;
 constexpr int32_t kAnnouncementS = 1;
+// The first announcement that is heard comes so long after the participant is made.
+constexpr uint32_t kFirstAnnouncementNs = 20'000'000;
 // Participants of one host that a peer is asked for: every service twice (standby, swap) and a few tools.
 constexpr uint32_t kParticipantsOfHost = 32;
-constexpr const char* kDiscoveryGroup = "239.255.0.1";  // RTPS 2.2, 9.6.1.4.1
 
-// Peers replace Fast DDS's own list, so the multicast group and this host are named, too. Port 0: those of the domain.
+// Peers replace Fast DDS's own list, so this host is named, too. Port 0: those of the domain.
 rtps::LocatorList initial_peers(const std::vector<std::string>& peers) {
   rtps::LocatorList list;
-  std::vector<std::string> addresses{kDiscoveryGroup, "127.0.0.1"};
-  addresses.insert(addresses.end(), peers.begin(), peers.end());
+  std::vector<std::string> addresses = peers;
+  addresses.emplace_back("127.0.0.1");
   for (const auto& address : addresses) {
     eprosima::fastrtps::rtps::Locator_t locator;
     locator.kind = LOCATOR_KIND_UDPv4;
@@ -59,20 +60,26 @@ std::string name_of(const ParticipantOptions& options) {
 // No shared-memory transport: in 2.9.1 a process that is killed and started again makes its queue anew, while those
 // that ran on write to the old one for ever (eProsima/Fast-DDS#4728), and a stopped one spins. Pictures are shared in
 // memory by data sharing, which does not need it.
-dds::DomainParticipantQos participant_qos(const ParticipantOptions& options) {
-  dds::DomainParticipantQos qos;
-  qos.name(name_of(options));
-  qos.transport().use_builtin_transports = false;
+std::shared_ptr<TrainTransport> transport_of(const ParticipantOptions& options) {
   auto udp = std::make_shared<rtps::UDPv4TransportDescriptor>();
   udp->sendBufferSize = kSocketBufferBytes;
   udp->receiveBufferSize = kSocketBufferBytes;
   udp->non_blocking_send = true;
   udp->maxInitialPeersRange = kParticipantsOfHost;
   udp->interfaceWhiteList = core::value_or_throw(addresses_of(options.interfaces));
-  qos.transport().user_transports.push_back(udp);
+  return std::make_shared<TrainTransport>(std::move(udp));
+}
+
+dds::DomainParticipantQos participant_qos(const ParticipantOptions& options,
+                                          const std::shared_ptr<TrainTransport>& transport) {
+  dds::DomainParticipantQos qos;
+  qos.name(name_of(options));
+  qos.transport().use_builtin_transports = false;
+  qos.transport().user_transports.push_back(transport);
   auto& discovery = qos.wire_protocol().builtin.discovery_config;
   discovery.leaseDuration = {kParticipantLeaseS, 0};
   discovery.leaseDuration_announcementperiod = {kAnnouncementS, 0};
+  discovery.initial_announcements.period = {0, kFirstAnnouncementNs};
   if (!options.peers.empty()) qos.wire_protocol().builtin.initialPeersList = initial_peers(options.peers);
   for (const auto& [name, value] :
        core::value_or_throw(security_properties(options.security_folder, options.service))) {
@@ -202,7 +209,8 @@ Participant::Participant(const ParticipantOptions& options) : impl_(std::make_un
   impl_->running_interfaces = running_interfaces(options.interfaces);
   impl_->train.partition = "train/" + options.train_id;
   impl_->host.partition = impl_->train.partition + "/memory/" + memory_id();
-  auto qos = participant_qos(options);
+  const auto transport = transport_of(options);
+  auto qos = participant_qos(options, transport);
   if (!options.security_folder.empty()) {
     impl_->certificate_ends_ns =
         core::value_or_throw(certificate_ends_ns(certificate_of(options.security_folder, options.service)));
@@ -214,6 +222,7 @@ Participant::Participant(const ParticipantOptions& options) : impl_(std::make_un
     throw core::BadInput("cannot join DDS domain " + std::to_string(options.domain) +
                          "; check that the network of this host is up (`ip link set lo up` at least)");
   }
+  *transport->open = true;
   impl_->participant->register_content_filter_factory(kEveryNth, &every_nth_filters());
   for (auto* ends : {&impl_->train, &impl_->host}) impl_->join(*ends);
 }

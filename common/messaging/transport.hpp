@@ -1,0 +1,28 @@
+// Private to this folder: Fast DDS's UDP, with two habits of 2.9.1 mended that cost a train of many participants time.
+//
+// - A participant announces itself before its own sockets are listened to (RTPSParticipantImpl::enable), and everybody
+//   answers an announcement once: the fastest answers were lost, and their senders found only with their next regular
+//   announcement, up to a period later. Here nothing is said and nothing heard before the participant is whole.
+// - With an interface whitelist every datagram is sent by the socket of every interface: twice to each neighbour in
+// this
+//   host. Here the loopback's socket serves loopback addresses, and the others the rest.
+#pragma once
+
+#include <fastdds/rtps/transport/ChainingTransportDescriptor.h>
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+
+#include <atomic>
+#include <memory>
+
+namespace railfix::messaging {
+
+struct TrainTransport : eprosima::fastdds::rtps::ChainingTransportDescriptor {
+  explicit TrainTransport(std::shared_ptr<eprosima::fastdds::rtps::UDPv4TransportDescriptor> udp)
+      : ChainingTransportDescriptor(std::move(udp)) {}
+  [[nodiscard]] eprosima::fastdds::rtps::TransportInterface* create_transport() const override;
+
+  /// Whether the participant is whole; set once, by who made it.
+  std::shared_ptr<std::atomic<bool>> open = std::make_shared<std::atomic<bool>>(false);
+};
+
+}  // namespace railfix::messaging
