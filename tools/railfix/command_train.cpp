@@ -312,7 +312,14 @@ void add_train(CLI::App& app, Action& chosen) {
   make->add_option("--days", options->keys.valid_days, "How long certificates are valid")
       ->check(CLI::Range(1, 3650))
       ->capture_default_str();
-  make->add_flag("--renew", options->keys.renew, "Make new ones although there are some; the old ones stay valid");
+  auto* renew = make->add_flag("--renew", options->keys.renew,
+                               "Make new ones although there are some, by the next authority if there is one; the old "
+                               "ones stay valid");
+  auto* next = make->add_flag("--next-authority", options->keys.next_authority,
+                              "Make a second authority, which every host trusts beside the first one");
+  auto* drop = make->add_flag("--drop-authority", options->keys.drop_authority, "Trust the former authority no more");
+  next->excludes(renew)->excludes(drop);
+  drop->excludes(renew);
   add("up", "Check, then start this computer's services and a supervisor that keeps them running", up,
       kManifest | kHost | kRoot | kGate);
   add("down", "Stop this computer's services and their supervisor", down, kRoot);

@@ -122,6 +122,36 @@ TEST_F(Security, AReaderOfEveryFourthSampleIsLetIn) {
   for (const uint64_t sequence : part) EXPECT_EQ(sequence % 4, 0U);
 }
 
+// Service by service, as an upgrade goes: each step's keys are understood by those that still have the step before.
+TEST_F(Security, TheAuthorityIsExchangedInThreeStepsWithoutSilence) {
+  const auto keys = keys_of("train");
+  const auto manifest = core::value_or_throw(tool::read_manifest(folder_ / "train"));
+  EXPECT_FALSE(tool::make_keys(manifest, {.drop_authority = true}).ok()) << "there is no other one";
+  const std::vector<tool::KeysOptions> steps{{}, {.next_authority = true}, {.renew = true}, {.drop_authority = true}};
+  std::vector<fs::path> stages;
+  for (const auto& step : steps) {
+    const auto made = tool::make_keys(manifest, step);
+    ASSERT_TRUE(made.ok()) << made.error().message;
+    stages.push_back(folder_ / ("stage" + std::to_string(stages.size())));
+    fs::copy(keys, stages.back(), fs::copy_options::recursive);
+  }
+  for (size_t i = 1; i < stages.size(); ++i) {
+    for (const auto& [writes, reads] : {std::pair(i - 1, i), std::pair(i, i - 1)}) {
+      Train train(options("fusion", stages[writes]), options("monitor", stages[reads]));
+      uint64_t seq = 0;
+      EXPECT_TRUE(test::run_until(train.queue,
+                                  [&] {
+                                    train.write(++seq);
+                                    return train.heard.size() >= 3;
+                                  }))
+          << "step " << reads << " does not hear step " << writes;
+    }
+  }
+  Train train(options("fusion", stages[3]), options("monitor", stages[3]));
+  Rogue former(options("fusion", stages[0]));
+  expect_nothing_crosses(train, former);
+}
+
 // So a dashboard on one host warns of those on the others.
 TEST_F(Security, EverybodySaysWhenHisCertificateEnds) {
   const auto keys = keys_of("train");

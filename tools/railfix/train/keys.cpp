@@ -56,19 +56,45 @@ core::Status write_text(const fs::path& file, const std::string& text) {
   return {};
 }
 
-/// Where the authority lives, and what is done with it.
+/// Where the authority lives, and what is done with it. While it is exchanged there is a second one beside it: `next`,
+/// which signs nothing yet, or `former`, which signs nothing any more; every host trusts both.
 class Authority {
  public:
   explicit Authority(fs::path folder) : folder_(std::move(folder)) {}
-  [[nodiscard]] fs::path certificate() const { return folder_ / "ca.pem"; }
 
-  core::Status make(const std::string& train_id) {
-    if (fs::exists(certificate())) return {};
-    fs::create_directories(folder_);
-    fs::permissions(folder_, fs::perms::owner_all);
-    return openssl({"req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-sha256",
-                    "-days", std::to_string(kAuthorityDays), "-subj", "/O=Railfix/CN=train " + train_id, "-keyout",
-                    key().string(), "-out", certificate().string()});
+  /// All that a host trusts; the first one is the one that signs.
+  [[nodiscard]] std::string trusted() const {
+    std::string text;
+    for (const char* name : {"ca", "next", "former"}) {
+      std::ifstream file(certificate(name));
+      text += std::string(std::istreambuf_iterator<char>(file), {});
+    }
+    return text;
+  }
+
+  core::Status make(const std::string& train_id) const {
+    return fs::exists(certificate("ca")) ? core::Status{} : make("ca", train_id);
+  }
+  core::Status make_next(const std::string& train_id) const {
+    if (fs::exists(certificate("next")))
+      return core::Error{certificate("next").string() + " is there already; go on with railfix train keys --renew"};
+    if (fs::exists(certificate("former")))
+      return core::Error{certificate("former").string() +
+                         " is still trusted; end that exchange with railfix train keys --drop-authority"};
+    return make("next", train_id);
+  }
+  /// From now on the next one signs, if there is one.
+  void take_over() const {
+    if (!fs::exists(certificate("next"))) return;
+    fs::rename(certificate("ca"), certificate("former"));
+    fs::remove(key("ca"));
+    fs::rename(key("next"), key("ca"));
+    fs::rename(certificate("next"), certificate("ca"));
+  }
+  core::Status drop() const {
+    if (fs::remove(certificate("former"))) return {};
+    return core::Error{"there is no former authority of " + folder_.string() +
+                       "; begin an exchange with railfix train keys --next-authority"};
   }
 
   core::Status issue(const std::string& name, const fs::path& certificate_file, const fs::path& key_file,
@@ -77,10 +103,15 @@ class Authority {
     auto status = openssl({"req", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-sha256",
                            "-subj", "/O=Railfix/CN=" + name, "-keyout", key_file.string(), "-out", request.string()});
     if (!status.ok()) return status;
-    status = openssl({"x509", "-req", "-in", request.string(), "-CA", certificate().string(), "-CAkey", key().string(),
-                      "-set_serial", "0x" + serial(), "-days", std::to_string(valid_days), "-sha256", "-out",
-                      certificate_file.string()});
+    // By name alone nobody could tell which of two authorities has signed.
+    const auto extensions = folder_ / "extensions";
+    status = write_text(extensions, "authorityKeyIdentifier=keyid:always\n");
+    if (!status.ok()) return status;
+    status = openssl({"x509", "-req", "-in", request.string(), "-CA", certificate("ca").string(), "-CAkey",
+                      key("ca").string(), "-set_serial", "0x" + serial(), "-days", std::to_string(valid_days),
+                      "-sha256", "-extfile", extensions.string(), "-out", certificate_file.string()});
     fs::remove(request);
+    fs::remove(extensions);
     return status;
   }
 
@@ -89,13 +120,22 @@ class Authority {
     auto status = write_text(draft, text);
     if (!status.ok()) return status;
     status = openssl({"smime", "-sign", "-in", draft.string(), "-text", "-out", signed_file.string(), "-signer",
-                      certificate().string(), "-inkey", key().string()});
+                      certificate("ca").string(), "-inkey", key("ca").string()});
     fs::remove(draft);
     return status;
   }
 
  private:
-  [[nodiscard]] fs::path key() const { return folder_ / "ca.key.pem"; }
+  [[nodiscard]] fs::path certificate(const std::string& name) const { return folder_ / (name + ".pem"); }
+  [[nodiscard]] fs::path key(const std::string& name) const { return folder_ / (name + ".key.pem"); }
+  // All authorities of a train have one name: Fast DDS 2.9.1 refuses who got his permissions from one of another name.
+  core::Status make(const std::string& name, const std::string& train_id) const {
+    fs::create_directories(folder_);
+    fs::permissions(folder_, fs::perms::owner_all);
+    return openssl({"req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-sha256",
+                    "-days", std::to_string(kAuthorityDays), "-subj", "/O=Railfix/CN=train " + train_id, "-keyout",
+                    key(name).string(), "-out", certificate(name).string()});
+  }
   static std::string serial() {
     std::ifstream random("/dev/urandom", std::ios::binary);
     std::string hex = "1";
@@ -192,12 +232,16 @@ core::Result<std::vector<fs::path>> make_keys(const Manifest& manifest, const Ke
   const fs::path folder = manifest.folder / "security";
   Authority authority(folder / "authority");
   auto status = authority.make(manifest.train_id);
+  if (status.ok() && options.next_authority) status = authority.make_next(manifest.train_id);
+  if (status.ok() && options.drop_authority) status = authority.drop();
   if (!status.ok()) return status.error();
+  if (options.renew) authority.take_over();
   std::vector<fs::path> made;
   for (const auto& host : manifest.hosts) {
     const auto here = folder / host.name;
     fs::create_directories(here);
-    fs::copy_file(authority.certificate(), here / "ca.pem", fs::copy_options::overwrite_existing);
+    status = write_text(here / "ca.pem", authority.trusted());
+    if (!status.ok()) return status.error();
     status = authority.sign(governance_xml(manifest), here / "governance.p7s");
     if (!status.ok()) return status.error();
     std::vector<std::string> services{kOperator, "onboard"};

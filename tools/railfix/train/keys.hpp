@@ -12,7 +12,9 @@ namespace railfix::tool {
 
 struct KeysOptions {
   int64_t valid_days = 365;
-  bool renew = false;  // new certificates under the same authority; the old ones stay valid until they run out
+  bool renew = false;           // new certificates, by the next authority if there is one; the old ones stay valid
+  bool next_authority = false;  // a second one, which everybody trusts from now on
+  bool drop_authority = false;  // the former one is trusted no more
 };
 
 /// Governance and permissions as XML, before they are signed.
@@ -22,7 +24,7 @@ std::string permissions_xml(const Manifest& manifest, const std::string& service
 
 /// Fills FOLDER/security/<host>/ for every host and FOLDER/security/authority/ with the authority, whose key stays with
 /// the operator. What is there stays unless it is renewed. Gives the folders of the hosts. Error: openssl is missing or
-/// refuses.
+/// refuses; an exchange of the authority out of turn.
 core::Result<std::vector<std::filesystem::path>> make_keys(const Manifest& manifest, const KeysOptions& options);
 
 }  // namespace railfix::tool

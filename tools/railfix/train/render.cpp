@@ -177,9 +177,8 @@ std::string settings_of(const Manifest& manifest, const TrainHost& host, const s
         "image: " + (engine.ok() ? image_id(engine.value(), image_of(one)) : std::nullopt).value_or("missing") + "\n";
   }
   if (manifest.security) {
-    for (const char* part : {".cert.pem", ".permissions.p7s"})
-      text += service + part + ": fingerprint " +
-              fingerprint(manifest.folder / "security" / host.name / (service + part)) + "\n";
+    for (const auto& file : {service + ".cert.pem", service + ".permissions.p7s", std::string("ca.pem")})
+      text += file + ": fingerprint " + fingerprint(manifest.folder / "security" / host.name / file) + "\n";
   }
   return text;
 }
