@@ -2,7 +2,9 @@
 #include <signal.h>
 
 #include <CLI/CLI.hpp>
+#include <cstdlib>
 #include <iostream>
+#include <memory>
 #include <thread>
 
 #include "service/health_file.hpp"
@@ -10,6 +12,8 @@
 
 namespace railfix::service {
 namespace {
+
+constexpr std::chrono::seconds kFoundByAll{1};
 
 enum ExitCode { kDone = 0, kFailed = 1, kBadInput = 2 };
 
@@ -75,12 +79,25 @@ int say_health(const CommonConfig& common, const std::string& service) {
   return answer.healthy ? kDone : kFailed;
 }
 
+// Who finds this service a moment later, as everybody does, would not hear what it logged at once.
+void say_why_again(Loop& loop) {
+  const char* end = std::getenv(kEndedBefore);
+  if (end == nullptr || *end == '\0') return;
+  const auto said = std::make_shared<bool>(false);
+  loop.every_while([said] { return !*said; }, kFoundByAll,
+                   [&loop, said, end = std::string(end)] {
+                     *said = true;
+                     loop.log().warn("started again: the process before {}", end);
+                   });
+}
+
 int serve(const Program& program, const CommonConfig& common, bool beside) {
   SignalWatch signals;
   Loop loop(program.name, common, beside);
   signals.watch(loop);
   try {
     const auto service = program.make(loop);
+    say_why_again(loop);
     loop.log().info("version {}, train {}, domain {}", RAILFIX_VERSION, common.train_id, common.domain);
     loop.health().ready();
     loop.turn();

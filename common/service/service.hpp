@@ -146,6 +146,10 @@ struct Program {
 };
 int run_program(const Program& program, int argc, char** argv);
 
+/// Environment variable that a supervisor sets for the process that follows one that has ended by itself: how that one
+/// ended. The new one says it to the train, in log_record.
+inline constexpr const char* kEndedBefore = "RAILFIX_ENDED_BEFORE";
+
 /// All services of a train, in the order of the data's way; each has a configuration section of its name.
 const std::vector<std::string>& service_names();
 

@@ -1,24 +1,44 @@
 #!/usr/bin/env bash
 # A whole train in containers on two hosts, from `railfix train up` to the first position report; and how large its images are.
-#   tests/benchmark/containers/first_report.sh RIDE      (a folder of `railfix simulate`; root, after `./dev images`)
+#   tests/benchmark/containers/first_report.sh RIDE [docker]   (a folder of `railfix simulate`; root, after `./dev images`)
+# With `docker` the hosts have an engine of Docker's each (apt-get install docker.io), which gets Podman's images.
 # The hosts are two network namespaces with a cable between them; certificates and standby as in deploy/trains/re460-042.
 set -euo pipefail
-ride=$(readlink -f "${1:?"give a folder of railfix simulate"}")
+ride=$(readlink -f "${1:?"give a folder of railfix simulate"}") engine=${2:-podman}
 cd "$(dirname "$(readlink -f "$0")")/../../.."
 export PATH=$PWD/build/${RAILFIX_PRESET:-release}/bin:$PATH
 [ -n "${CONTAINERS_CONF:-}" ] || [ ! -f /etc/containers/railfix-containers.conf ] ||
   export CONTAINERS_CONF=/etc/containers/railfix-containers.conf
 release=$(sed -n 's/^project(railfix VERSION \([^ ]*\).*/\1/p' CMakeLists.txt)
-work=$(mktemp -d) id=first-report-$$
+work=$(mktemp -d) id=first-report-$$ engines=()
 
 on() { # on HOST COMMAND...
   local host=$1
   shift
-  nsenter --net="/run/netns/$id-$host" "$@" # `ip netns exec` would hide the control groups from the engine
+  # `ip netns exec` would hide the control groups from the engine
+  DOCKER_HOST=unix://$work/$host.docker/socket nsenter --net="/run/netns/$id-$host" "$@"
+}
+images() { podman images --filter reference="railfix/*:$release" --format '{{.Repository}}:{{.Tag}}'; }
+docker_on() { # HOST: an engine of its own, with our images; it leaves the network alone, as containers use the host's
+  local host=$1 image
+  mkdir -p "$work/$host.docker"
+  on "$host" dockerd --iptables=false --ip6tables=false --bridge=none --host="unix://$work/$host.docker/socket" \
+    --data-root="$work/$host.docker/data" --exec-root="$work/$host.docker/exec" --pidfile="$work/$host.docker/pid" \
+    >"$work/$host.docker/log" 2>&1 &
+  engines+=($!)
+  for _ in $(seq 300); do on "$host" docker info >/dev/null 2>&1 && break || sleep 0.1; done
+  for image in $(images); do
+    podman save --quiet "$image" | on "$host" docker load >/dev/null
+    on "$host" docker tag "$image" "${image#localhost/}"
+  done
 }
 end() {
   for host in cab coach; do
     on "$host" railfix train down --root "$work/$host" >/dev/null || true
+  done
+  [ ${#engines[@]} = 0 ] || { kill "${engines[@]}" && wait "${engines[@]}" || true; }
+  for host in cab coach; do
+    umount -l "$work/$host.docker/exec/netns/default" 2>/dev/null || true
     ip netns delete "$id-$host"
   done
   rm -rf "$work"
@@ -39,6 +59,7 @@ train:
   id: $id
   domain: 24
   release: $release
+  run_as: $engine
   security: true
   map: line.map
   hosts:
@@ -62,25 +83,28 @@ settings:
   monitor: { foxglove_port: -1 }
 YAML
 railfix train keys "$work/train" >/dev/null
+[ "$engine" != docker ] || for host in cab coach; do docker_on "$host"; done
 
 began=$(date +%s.%N)
+ups=()
 since() { awk -v now="$(date +%s.%N)" -v began="$began" 'BEGIN { printf "%.1f s", now - began }'; }
 for host in cab coach; do
   (on "$host" railfix train up "$work/train" --root "$work/$host" >"$work/$host.log" 2>&1 &&
     echo "$host: $(grep -c ' active\| ready\| degraded' "$work/$host.log") services healthy after $(since)" ||
     { echo "$host does not come up:"; cat "$work/$host.log"; }) &
+  ups+=($!)
 done
 config=$work/coach/var/lib/railfix-train/generations/1/config.yaml
 until [ -f "$config" ]; do
-  [ -n "$(jobs -rp)" ] || exit 1 # said above
+  kill -0 "${ups[@]}" 2>/dev/null || exit 1 # said above
   sleep 0.1
 done
 on coach railfix topics echo train_position_report --count 1 --for 600 --config "$config" >"$work/report"
 echo "first position report, heard in the coach: $(since) after railfix train up"
 cat "$work/report"
-wait $(jobs -p)
+wait "${ups[@]}"
 echo "images: each as it is listed, with the layers that it shares"
 podman images --filter reference="railfix/*:$release" --format '{{.Repository}} {{.Size}}'
-mapfile -t images < <(podman images --filter reference="railfix/*:$release" --format '{{.Repository}}:{{.Tag}}')
-podman save --quiet --multi-image-archive --output "$work/images.tar" "${images[@]}"
+mapfile -t all < <(images)
+podman save --quiet --multi-image-archive --output "$work/images.tar" "${all[@]}"
 echo "all of them in one archive, each layer once: $(($(stat -c %s "$work/images.tar") / 1000000)) MB"

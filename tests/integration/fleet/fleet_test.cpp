@@ -73,6 +73,13 @@ class Fleet : public ::testing::Test {
 TEST_F(Fleet, ServicesComeUpComeBackAfterAKillAndGoDown) {
   const auto started = up();
   EXPECT_EQ(started.exit_code, 0) << started.out << started.err;
+  const auto heard = folder_ / "heard";
+  test::Program log({"railfix", "log", "-f", "--config", root() + "/var/lib/railfix-train/generations/1/config.yaml"},
+                    {heard, {}, {}});
+  const auto is_told = [&](const std::string& end) {
+    return wait_until(
+        [&] { return test::slurp(heard).find("started again: the process before " + end) != std::string::npos; });
+  };
   const auto before = status("fusion");
   EXPECT_TRUE(before["healthy"]);
   ASSERT_GT(before["pid"].get<pid_t>(), 1);  // kill(0) would end this test
@@ -81,6 +88,7 @@ TEST_F(Fleet, ServicesComeUpComeBackAfterAKillAndGoDown) {
     const auto now = status("fusion");
     return now["healthy"] && now["pid"] != before["pid"] && now["restarts"] == 1;
   }));
+  EXPECT_TRUE(is_told("ended by Killed")) << "the train does not hear of it: " << test::slurp(heard);
   const auto again = status("fusion");
   ASSERT_GT(again["pid"].get<pid_t>(), 1);
   ASSERT_EQ(kill(again["pid"].get<pid_t>(), SIGSTOP), 0);
@@ -88,6 +96,7 @@ TEST_F(Fleet, ServicesComeUpComeBackAfterAKillAndGoDown) {
     const auto now = status("fusion");
     return now["healthy"] && now["pid"] != again["pid"] && now["restarts"] == 2;
   })) << "one that hangs is not started anew";
+  EXPECT_TRUE(is_told("was frozen, ended by Killed")) << test::slurp(heard);
   const auto last = status("fusion");
   ASSERT_GT(last["pid"].get<pid_t>(), 1);
   ASSERT_EQ(kill(last["pid"].get<pid_t>(), SIGKILL), 0);

@@ -8,6 +8,7 @@
 #include <map>
 #include <sstream>
 
+#include "service/service.hpp"
 #include "train/render.hpp"
 #include "train/setting_files.hpp"
 
@@ -134,6 +135,7 @@ std::vector<std::string> run_command(const Container& container, const std::stri
                                    "--ulimit=nproc=" + threads + ":" + threads,
                                    "--ulimit=core=0:0",
                                    "--env=RAILFIX_CONFIG=" + container.config,
+                                   std::string("--env=") + service::kEndedBefore,
                                    "--workdir=" + std::string(kContainerHome),
                                    "--tmpfs=/tmp"};
   for (const auto& volume : container.volumes) command.push_back("--volume=" + volume);

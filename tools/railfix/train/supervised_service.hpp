@@ -55,6 +55,7 @@ class SupervisedService {
   bool adopted_ = false;  // another process's child
   int restarts_ = 0;
   std::string last_end_;
+  std::string ended_before_;  // told to the next process; empty = it is the first one
   std::streamoff log_began_ = 0;
   int64_t started_ns_ = 0;
   int64_t next_start_ns_ = 0;
