@@ -15,6 +15,7 @@ namespace railfix::tool {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::Field;
@@ -145,7 +146,7 @@ TEST_F(TrainFolder, CertificatesThatAreMissingOrRunOutAreTold) {
   const auto fusion = folder_ / "security/cab/fusion.cert.pem";
   fs::rename(fusion, folder_ / "aside");
   EXPECT_THAT(findings("run_as: programs", "security: true"),
-              Contains(HasSubstr("fusion.cert.pem is missing; make it with railfix train keys")));
+              Contains(HasSubstr("fusion.cert.pem is missing or cannot be read by this user; make the train's keys")));
   fs::rename(folder_ / "aside", fusion);
   const auto patient =
       manifest(std::string(kTrain) + "  monitor: { certificate_days: 5 }\n", "run_as: programs", "security: true")
@@ -155,6 +156,45 @@ TEST_F(TrainFolder, CertificatesThatAreMissingOrRunOutAreTold) {
   renewed.renew = true;
   ASSERT_TRUE(make_keys(secured, renewed).ok());
   EXPECT_THAT(findings("run_as: programs", "security: true"), IsEmpty());
+}
+
+TEST_F(TrainFolder, WhatIsMissingOfASecuredTrainIsToldOnceAndMadeAgain) {
+  std::ofstream(folder_ / "line.map") << "map";
+  const auto secured = manifest(kTrain, "run_as: programs", "security: true").value();
+  ASSERT_TRUE(make_keys(secured, {}).ok());
+  const auto certificate = test::slurp(folder_ / "security/coach/fusion.cert.pem");
+  for (const char* file : {"ca.pem", "governance.p7s", "fusion.key.pem", "fusion.permissions.p7s", "tool.key.pem"}) {
+    fs::remove(folder_ / "security/cab" / file);
+    EXPECT_THAT(findings("run_as: programs", "security: true"),
+                ElementsAre(HasSubstr(std::string("security/cab/") + file + " is missing or cannot be read")));
+    ASSERT_TRUE(make_keys(secured, {}).ok());
+    EXPECT_THAT(findings("run_as: programs", "security: true"), IsEmpty()) << file;
+  }
+  EXPECT_EQ(test::slurp(folder_ / "security/coach/fusion.cert.pem"), certificate) << "what was there has stayed";
+}
+
+TEST_F(TrainFolder, PermissionsThatDoNotFitAreTold) {
+  std::ofstream(folder_ / "line.map") << "map";
+  const auto secured = manifest(kTrain, "run_as: programs", "security: true").value();
+  ASSERT_TRUE(make_keys(secured, {}).ok());
+  const auto told = [&](const std::string& domain) {
+    const auto train = manifest(kTrain, "domain: 12\n  release: 1.2.0\n  run_as: programs",
+                                "domain: " + domain + "\n  release: 1.2.0\n  security: true")
+                           .value();
+    return check_certificates(train, *train.host("coach"));
+  };
+  EXPECT_THAT(told("12"), IsEmpty());
+  EXPECT_THAT(told("13"), Contains(AllOf(Field(&Finding::error, true),
+                                         Field(&Finding::text, HasSubstr("fusion.permissions.p7s does not allow "
+                                                                         "domain 13; railfix train keys --renew")))));
+  // As the release before would have made them.
+  const auto permissions = folder_ / "security/coach/fusion.permissions.p7s";
+  auto before = test::slurp(permissions);
+  const std::string pose = "<topic>train_pose</topic>";
+  before.erase(before.find(pose), pose.size());
+  std::ofstream(permissions) << before;
+  EXPECT_THAT(told("12"), ElementsAre(AllOf(Field(&Finding::error, false),
+                                            Field(&Finding::text, HasSubstr("does: publish train_pose;")))));
 }
 
 TEST_F(TrainFolder, EachHostGetsItsConfigurationComposeFileAndUnit) {

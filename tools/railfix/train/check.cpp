@@ -13,11 +13,8 @@
 
 #include "messaging/network.hpp"
 #include "messaging/qos_match.hpp"
-#include "messaging/security.hpp"
-#include "train/keys.hpp"
 #include "train/render.hpp"
 #include "train/setting_files.hpp"
-#include "train/topic_rights.hpp"
 
 namespace railfix::tool {
 namespace {
@@ -130,26 +127,6 @@ void check_ports(const Manifest& manifest, Findings& findings) {
   }
 }
 
-int64_t warning_days(const Manifest& manifest) {
-  int64_t days = messaging::kCertificateWarningDays;
-  const auto section = manifest.settings["monitor"];
-  if (section && section.IsMap() && section["certificate_days"])
-    (void)YAML::convert<int64_t>::decode(section["certificate_days"], days);
-  return days;
-}
-
-void check_certificate(const fs::path& certificate, int64_t soon_days, Findings& findings) {
-  const auto left = messaging::days_left(certificate);
-  constexpr const char* kRenew = "; railfix train keys --renew, then railfix train upgrade on each host";
-  if (!left.ok()) {
-    error(findings, left.error().message);
-  } else if (left.value() < 0) {
-    error(findings, certificate.string() + " ran out " + std::to_string(-left.value()) + " days ago" + kRenew);
-  } else if (left.value() < soon_days) {
-    warning(findings, certificate.string() + " runs out in " + std::to_string(left.value()) + " days" + kRenew);
-  }
-}
-
 // Runs a program; what it says on its standard error when it does not end well.
 std::string complaint_of(const std::string& command) {
   FILE* pipe = popen((command + " 2>&1 >/dev/null").c_str(), "r");
@@ -244,34 +221,6 @@ std::vector<Finding> check_train(const Manifest& manifest, const FindProgram& fi
     for (auto& finding : check_certificates(manifest, host)) findings.push_back(std::move(finding));
   }
   check_configurations(manifest, find_program, findings);
-  return findings;
-}
-
-std::vector<Finding> check_certificates(const Manifest& manifest, const TrainHost& host) {
-  Findings findings;
-  if (!manifest.security) return findings;
-  const auto folder = manifest.folder / "security" / host.name;
-  if (!fs::exists(folder)) {  // one reason, one sentence
-    error(findings, folder.string() + " is missing; make the train's certificates with railfix train keys " +
-                        manifest.folder.string());
-    return findings;
-  }
-  std::vector<std::string> services{kOperator};
-  for (const auto& service : services_on(manifest, host.name)) services.push_back(service.name);
-  for (const auto& service : services)
-    check_certificate(folder / (service + ".cert.pem"), warning_days(manifest), findings);
-  return findings;
-}
-
-std::vector<Finding> check_installed_certificates(const HostFolder& folder) {
-  Findings findings;
-  const auto plan = folder.plan();
-  if (!plan) return findings;
-  for (const auto& service : plan->services) {
-    const auto keys = folder.generation(service.generation) / "security";
-    if (fs::exists(keys))
-      check_certificate(keys / (service.name + ".cert.pem"), messaging::kCertificateWarningDays, findings);
-  }
   return findings;
 }
 

@@ -6,6 +6,7 @@
 
 #include <ctime>
 #include <fstream>
+#include <set>
 
 #include "train/render.hpp"
 #include "train/topic_rights.hpp"
@@ -154,15 +155,16 @@ class Authority {
 core::Status make_identity(const Manifest& manifest, const Authority& authority, const fs::path& folder,
                            const std::string& service, const std::string& host, const KeysOptions& options) {
   const auto certificate = folder / (service + ".cert.pem");
-  if (fs::exists(certificate) && !options.renew) return {};
   const auto key = folder / (service + ".key.pem");
+  const auto permissions = folder / (service + ".permissions.p7s");
+  if (fs::exists(certificate) && fs::exists(key) && fs::exists(permissions) && !options.renew) return {};
   auto status = authority.issue(service + "@" + host, certificate, key, options.valid_days);
   if (!status.ok()) return status;
   fs::permissions(key, fs::perms::owner_read | fs::perms::owner_write | fs::perms::group_read);
   const std::time_t now = std::time(nullptr);
   return authority.sign(
       permissions_xml(manifest, service, host, xml_time(now - 86400), xml_time(now + options.valid_days * 86400)),
-      folder / (service + ".permissions.p7s"));
+      permissions);
 }
 
 std::string topic_rule(const std::string& expression, bool protect) {
@@ -182,6 +184,33 @@ std::string rights(const char* what, const std::vector<std::string>& topics, con
   for (const auto& topic : topics) text += "          <topic>" + topic + "</topic>\n";
   return text + "        </topics><partitions><partition>" + partition + "</partition><partition>" + partition +
          "/memory/*</partition></partitions></" + what + ">\n";
+}
+
+std::string part_of(const std::string& text, const std::string& tag) {
+  const auto begin = text.find("<" + tag + ">");
+  const auto end = text.find("</" + tag + ">", begin);
+  return end == std::string::npos ? "" : text.substr(begin, end - begin);
+}
+
+// Of every <tag>value</tag>.
+std::set<std::string> values_in(const std::string& text, const std::string& tag) {
+  const std::string begin = "<" + tag + ">";
+  std::set<std::string> values;
+  for (size_t at = 0; (at = text.find(begin, at)) != std::string::npos;) {
+    at += begin.size();
+    values.insert(text.substr(at, text.find('<', at) - at));
+  }
+  return values;
+}
+
+std::vector<std::string> missing_values(const std::string& wanted, const std::string& given, const std::string& tag,
+                                        const std::string& say_before) {
+  const auto have = values_in(given, tag);
+  std::vector<std::string> missing;
+  for (const auto& value : values_in(wanted, tag)) {
+    if (!have.contains(value) && !have.contains("*")) missing.push_back(say_before + value);
+  }
+  return missing;
 }
 
 }  // namespace
@@ -226,6 +255,21 @@ std::string permissions_xml(const Manifest& manifest, const std::string& service
          std::to_string(manifest.domain) + "</id></domains>\n" + rights("publish", writes, partition) +
          rights("subscribe", topics_read_by(service), partition) +
          "    </allow_rule>\n    <default>DENY</default>\n  </grant></permissions>\n</dds>\n";
+}
+
+MissingRights missing_rights(const Manifest& manifest, const std::string& service, const std::string& host,
+                             const fs::path& signed_file) {
+  std::ifstream file(signed_file);  // the text stands readable before its signature
+  const std::string given(std::istreambuf_iterator<char>(file), {});
+  const std::string wanted = permissions_xml(manifest, service, host, "", "");
+  MissingRights missing{missing_values(wanted, given, "id", "domain "), {}};
+  for (const std::string what : {"publish", "subscribe"}) {
+    const auto wants = part_of(wanted, what);
+    const auto has = part_of(given, what);
+    if (missing.train.empty()) missing.train = missing_values(wants, has, "partition", "partition ");
+    for (auto& topic : missing_values(wants, has, "topic", what + " ")) missing.topics.push_back(std::move(topic));
+  }
+  return missing;
 }
 
 core::Result<std::vector<fs::path>> make_keys(const Manifest& manifest, const KeysOptions& options) {

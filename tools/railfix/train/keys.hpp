@@ -22,6 +22,14 @@ std::string governance_xml(const Manifest& manifest);
 std::string permissions_xml(const Manifest& manifest, const std::string& service, const std::string& host,
                             const std::string& not_before, const std::string& not_after);
 
+struct MissingRights {
+  std::vector<std::string> train;   // its domain and name: without them nobody is let in
+  std::vector<std::string> topics;  // "publish train_state"
+};
+/// What a signed file of permissions does not give of those that would be made now. What it gives beyond is no matter.
+MissingRights missing_rights(const Manifest& manifest, const std::string& service, const std::string& host,
+                             const std::filesystem::path& signed_file);
+
 /// Fills FOLDER/security/<host>/ for every host and FOLDER/security/authority/ with the authority, whose key stays with
 /// the operator. What is there stays unless it is renewed. Gives the folders of the hosts. Error: openssl is missing or
 /// refuses; an exchange of the authority out of turn.

@@ -1,0 +1,101 @@
+// Certificates, keys and permissions of a train: what is missing, runs out, or was made for another manifest.
+#include <algorithm>
+#include <set>
+
+#include "core/joined.hpp"
+#include "messaging/security.hpp"
+#include "train/check.hpp"
+#include "train/keys.hpp"
+#include "train/topic_rights.hpp"
+
+namespace railfix::tool {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kRenew = "; railfix train keys --renew, then railfix train upgrade on each host";
+
+/// A file that all services share is told once.
+void add_once(std::vector<Finding>& findings, const Finding& finding) {
+  const bool told =
+      std::any_of(findings.begin(), findings.end(), [&](const auto& one) { return one.text == finding.text; });
+  if (!told) findings.push_back(finding);
+}
+
+int64_t warning_days(const Manifest& manifest) {
+  int64_t days = messaging::kCertificateWarningDays;
+  const auto section = manifest.settings["monitor"];
+  if (section && section.IsMap() && section["certificate_days"])
+    (void)YAML::convert<int64_t>::decode(section["certificate_days"], days);
+  return days;
+}
+
+void check_end(const fs::path& certificate, int64_t soon_days, std::vector<Finding>& findings) {
+  const auto left = messaging::days_left(certificate);
+  if (!left.ok()) {
+    add_once(findings, {true, left.error().message});
+  } else if (left.value() < 0) {
+    add_once(findings,
+             {true, certificate.string() + " ran out " + std::to_string(-left.value()) + " days ago" + kRenew});
+  } else if (left.value() < soon_days) {
+    add_once(findings,
+             {false, certificate.string() + " runs out in " + std::to_string(left.value()) + " days" + kRenew});
+  }
+}
+
+/// Everything that DDS asks for when this service joins. False when a file is missing.
+bool check_identity(const fs::path& folder, const std::string& service, int64_t soon_days,
+                    std::vector<Finding>& findings) {
+  if (const auto files = messaging::security_properties(folder, service); !files.ok()) {
+    add_once(findings, {true, files.error().message});
+    return false;
+  }
+  check_end(messaging::certificate_of(folder, service), soon_days, findings);
+  return true;
+}
+
+/// Permissions that were made before the train got another domain or name let nobody in; those of a release whose
+/// service used fewer topics leave a topic silent.
+void check_permissions(const Manifest& manifest, const std::string& host, const std::string& service,
+                       const fs::path& file, std::vector<Finding>& findings) {
+  const auto missing = missing_rights(manifest, service, host, file);
+  if (!missing.train.empty()) {
+    add_once(findings, {true, file.string() + " does not allow " + core::joined(missing.train) + kRenew});
+  } else if (!missing.topics.empty()) {
+    add_once(findings, {false, file.string() + " does not allow what " + service +
+                                   " of release " RAILFIX_VERSION " does: " + core::joined(missing.topics) + kRenew});
+  }
+}
+
+}  // namespace
+
+std::vector<Finding> check_certificates(const Manifest& manifest, const TrainHost& host) {
+  std::vector<Finding> findings;
+  if (!manifest.security) return findings;
+  const auto folder = manifest.folder / "security" / host.name;
+  if (!fs::exists(folder)) {  // one reason, one sentence
+    findings.push_back({true, folder.string() + " is missing; make the train's certificates with railfix train keys " +
+                                  manifest.folder.string()});
+    return findings;
+  }
+  std::vector<std::string> services{kOperator};
+  for (const auto& service : services_on(manifest, host.name)) services.push_back(service.name);
+  for (const auto& service : services) {
+    if (check_identity(folder, service, warning_days(manifest), findings))
+      check_permissions(manifest, host.name, service, folder / (service + ".permissions.p7s"), findings);
+  }
+  return findings;
+}
+
+std::vector<Finding> check_installed_certificates(const HostFolder& folder) {
+  std::vector<Finding> findings;
+  const auto plan = folder.plan();
+  if (!plan) return findings;
+  for (const auto& service : plan->services) {
+    const auto keys = folder.generation(service.generation) / "security";
+    if (fs::exists(keys)) check_identity(keys, service.name, messaging::kCertificateWarningDays, findings);
+  }
+  return findings;
+}
+
+}  // namespace railfix::tool
