@@ -54,7 +54,15 @@ PublishedHealth::PublishedHealth(messaging::Participant& participant, const std:
   published_ = status_;
 }
 
+void PublishedHealth::input() {
+  status_.frames_in(status_.frames_in() + 1);
+  const int64_t now_ns = core::monotonic_ns();
+  if (now_ns - traffic_.last_input_ns > kFlowGapNs) traffic_.input_since_ns = now_ns;
+  traffic_.last_input_ns = now_ns;
+}
+
 void PublishedHealth::output(int64_t grabbed_ns) {
+  traffic_.last_output_ns = core::monotonic_ns();
   status_.frames_out(status_.frames_out() + 1);
   if (grabbed_ns > 0 && latencies_ms_.size() < kMostLatencies) {
     latencies_ms_.push_back(core::seconds(core::wall_ns() - grabbed_ns) * 1e3);
@@ -96,7 +104,8 @@ void PublishedHealth::publish() {
   status_.stamp_ns(core::wall_ns());
   published_ = said();
   writer_.write(published_);
-  file_.write(published_);
+  traffic_.stands_by = !stands_by_.empty();
+  file_.write(published_, traffic_);
 }
 
 msg::ServiceStatus PublishedHealth::said() const {

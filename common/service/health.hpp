@@ -21,9 +21,10 @@ class PublishedHealth final : public Health {
   void active() override { change(msg::STATE_ACTIVE, ""); }
   void degraded(const std::string& reason) override { change(msg::STATE_DEGRADED, reason); }
   void failed(const std::string& reason) override { change(msg::STATE_FAILED, reason); }
-  void input() override { status_.frames_in(status_.frames_in() + 1); }
+  void input() override;
   void output(int64_t grabbed_ns) override;
   void dropped(uint64_t count) override { status_.dropped(status_.dropped() + count); }
+  void flows(Flow flow) override { traffic_.flow = flow; }
 
   /// Empty = it is in charge.
   void stands_by(const std::string& sentence);
@@ -47,6 +48,7 @@ class PublishedHealth final : public Health {
   msg::ServiceStatus status_;  // as the service says
   msg::ServiceStatus published_;
   std::string stands_by_;
+  Traffic traffic_;
   std::array<std::string, 2> troubles_;
   std::vector<double> latencies_ms_;  // since the last measurement
   int64_t measured_ns_ = 0;

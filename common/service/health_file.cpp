@@ -5,7 +5,9 @@
 #include <unistd.h>
 
 #include <array>
+#include <cstdio>
 #include <fstream>
+#include <sstream>
 
 #include "core/time.hpp"
 #include "messaging/operation_words.hpp"
@@ -44,8 +46,13 @@ HealthFile::~HealthFile() {
   unlink(path_.c_str());
 }
 
-void HealthFile::write(const msg::ServiceStatus& status) {
-  words_ = std::to_string(status.state()) + '\n' + status.reason().c_str();
+void HealthFile::write(const msg::ServiceStatus& status, const Traffic& traffic) {
+  std::ostringstream words;
+  words << static_cast<int>(status.state()) << '\n'
+        << status.reason().c_str() << '\n'
+        << static_cast<int>(traffic.flow) << ' ' << traffic.stands_by << ' ' << traffic.input_since_ns << ' '
+        << traffic.last_input_ns << ' ' << traffic.last_output_ns;
+  words_ = words.str();
   beat();
 }
 
@@ -67,6 +74,34 @@ std::optional<int64_t> silent_ns(const std::filesystem::path& path) {
   return core::monotonic_ns() - said_ns;
 }
 
+namespace {
+
+std::string ago(const char* what, int64_t at_ns, int64_t now_ns) {
+  if (at_ns == 0) return std::string("no ") + what + " yet";
+  char text[48];
+  std::snprintf(text, sizeof text, "last %s %.1f s ago", what, core::seconds(now_ns - at_ns));
+  return text;
+}
+
+// Nothing by a build that does not say it.
+void judge_traffic(std::istream& in, int64_t now_ns, HealthAnswer& answer) {
+  Traffic traffic;
+  int flow = 0;
+  if (!(in >> flow >> traffic.stands_by >> traffic.input_since_ns >> traffic.last_input_ns >> traffic.last_output_ns))
+    return;
+  traffic.flow = static_cast<Flow>(flow);
+  const auto lately = [&](int64_t at_ns) { return at_ns != 0 && now_ns - at_ns < kFlowGapNs; };
+  const bool input_flows = lately(traffic.last_input_ns) && !lately(traffic.input_since_ns);
+  answer.stands_by = traffic.stands_by;
+  answer.sends = traffic.flow != Flow::sporadic && lately(traffic.last_output_ns);
+  answer.stuck = traffic.flow == Flow::answers && !traffic.stands_by && input_flows && !lately(traffic.last_output_ns);
+  if (answer.stuck) answer.text = "input comes, nothing goes out: " + answer.text;
+  answer.text +=
+      " (" + ago("input", traffic.last_input_ns, now_ns) + ", " + ago("output", traffic.last_output_ns, now_ns) + ")";
+}
+
+}  // namespace
+
 HealthAnswer ask_health(const std::filesystem::path& path) {
   std::ifstream in(path);
   int64_t said_ns = 0;
@@ -74,7 +109,8 @@ HealthAnswer ask_health(const std::filesystem::path& path) {
   std::string reason;
   if (!(in >> said_ns >> state))
     return {.healthy = false, .text = "does not run here: " + path.string() + " is missing"};
-  std::getline(in >> std::ws, reason);
+  in.ignore();  // the end of the line before: a reason may be empty
+  std::getline(in, reason);
   const int64_t age_ns = core::monotonic_ns() - said_ns;
   if (age_ns > kSilentNs || age_ns < 0) {  // negative: from before the computer was started
     return {.healthy = false,
@@ -82,10 +118,12 @@ HealthAnswer ask_health(const std::filesystem::path& path) {
   }
   const std::string text =
       std::string(messaging::name_of_state(static_cast<uint8_t>(state))) + (reason.empty() ? "" : ": " + reason);
-  return {.healthy = state != msg::STATE_FAILED && state != msg::STATE_STOPPED,
-          .starting = state == msg::STATE_STARTING,
-          .degraded = state == msg::STATE_DEGRADED,
-          .text = text};
+  HealthAnswer answer{.healthy = state != msg::STATE_FAILED && state != msg::STATE_STOPPED,
+                      .starting = state == msg::STATE_STARTING,
+                      .degraded = state == msg::STATE_DEGRADED,
+                      .text = text};
+  judge_traffic(in, said_ns, answer);
+  return answer;
 }
 
 }  // namespace railfix::service

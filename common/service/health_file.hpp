@@ -17,6 +17,16 @@ std::filesystem::path health_path(const CommonConfig& common, const std::string&
 /// Of one that was started beside another one; renamed to the above by whoever started it once that one has gone.
 std::filesystem::path health_path_beside(const CommonConfig& common, const std::string& service);
 
+/// What has gone through a service, on the host's monotonic clock; 0 = nothing yet.
+struct Traffic {
+  Flow flow = Flow::sporadic;
+  bool stands_by = false;      // another one sends
+  int64_t input_since_ns = 0;  // without a gap of kFlowGapNs
+  int64_t last_input_ns = 0;
+  int64_t last_output_ns = 0;
+};
+inline constexpr int64_t kFlowGapNs = 2'000'000'000;
+
 class HealthFile {
  public:
   explicit HealthFile(std::filesystem::path path);
@@ -26,7 +36,7 @@ class HealthFile {
 
   /// Over what stood there; takes memory at the first call only, so that a full /dev/shm later does not silence it.
   /// What cannot be written is left out: the check says so.
-  void write(const msg::ServiceStatus& status);
+  void write(const msg::ServiceStatus& status, const Traffic& traffic = {});
   /// The same words are true now; nothing before the first ones.
   void beat();
 
@@ -43,10 +53,13 @@ struct HealthAnswer {
   bool healthy = false;
   bool starting = false;  // it does not wait for input yet
   bool degraded = false;
-  std::string text;  // one sentence
+  bool stands_by = false;
+  bool sends = false;  // one that sends steadily has done so within the last two seconds
+  bool stuck = false;  // one that answers every input has had input for two seconds and answered none of it
+  std::string text;    // one sentence
 };
 /// Healthy: its run loop turned within the last two seconds and it has not failed. Degraded is healthy: a restart would
-/// not help.
+/// not help; so is stuck: a camera may lack its calibration still.
 HealthAnswer ask_health(const std::filesystem::path& path);
 
 }  // namespace railfix::service

@@ -76,7 +76,7 @@ class SignalWatch {
 int say_health(const CommonConfig& common, const std::string& service) {
   const auto answer = ask_health(health_path(common, service));
   std::cout << service << ": " << answer.text << '\n';
-  return answer.healthy ? kDone : kFailed;
+  return answer.healthy && !answer.stuck ? kDone : kFailed;
 }
 
 // Who finds this service a moment later, as everybody does, would not hear what it logged at once.

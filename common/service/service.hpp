@@ -43,6 +43,13 @@ struct CommonConfig {
   void describe(Fields& fields);
 };
 
+/// What a service that works sends, so that who asks how it is can tell whether data flows through it.
+enum class Flow {
+  sporadic,  // now and then
+  steady,    // all the time, while data comes
+  answers,   // something for every input
+};
+
 /// State, counters and latency of this service; published as service_status four times a second and at every change of
 /// state. Call from handlers only. Of one that is not in charge, active and degraded are told as "stands by".
 class Health {
@@ -55,6 +62,7 @@ class Health {
   virtual void input() = 0;                     // one input sample used
   virtual void output(int64_t grabbed_ns) = 0;  // one output sent; grabbed_ns of the input behind it, 0 = none
   virtual void dropped(uint64_t count) = 0;
+  virtual void flows(Flow flow) = 0;  // sporadic until said
 };
 
 /// What a service that may have a standby says and hears of it.

@@ -94,6 +94,7 @@ FrameGrabberService::FrameGrabberService(const Config& config, service::Context&
       picture_health_(config.health),
       lock_step_(config.wait_for),
       gathering_(config.wait_for) {
+  context_.health().flows(service::Flow::steady);
   if (config_.source.empty()) {
     throw core::BadInput(
         "frame_grabber.source is empty; give a dataset folder, a folder of pictures, a video, genicam:ID or "

@@ -138,6 +138,7 @@ FusionService::FusionService(const FusionConfig& config, service::Context& conte
       scale_file_(config.scales_file, context.log()),
       pose_(config.parameters.gnss_map_sigma_m),
       kept_for_(config.map + ' ' + config.start + '\n') {
+  context_.health().flows(service::Flow::steady);
   if (!config.map.empty()) {
     map_ = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(config.map)));
   }

@@ -42,6 +42,7 @@ OdometryService::OdometryService(const Config& config, service::Context& context
       context_(context),
       writer_(context.writer(messaging::topics::odometry_step)),
       views_([this](const Waiting& waiting, const msg::TrackView* view) { measure(waiting, view); }) {
+  context_.health().flows(service::Flow::answers);
   context_.on<msg::CameraCalibration>(messaging::topics::camera_calibration,
                                       [this](const msg::CameraCalibration& c) { calibrated(c); });
   context_.on<msg::TrackView>(messaging::topics::track_view, [this](const msg::TrackView& view) { views_.hear(view); });

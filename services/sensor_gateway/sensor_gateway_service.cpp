@@ -33,6 +33,7 @@ SensorGatewayService::SensorGatewayService(const Config& config, service::Contex
       sinks_{[this](const dataset::ImuRow& row) { publish(row); },
              [this](const dataset::WheelRow& row) { publish(row); },
              [this](const dataset::GnssRow& row) { publish(row); }} {
+  context_.health().flows(service::Flow::steady);
   const auto& sensors = playback_.sensors();
   context_.log().info("has {} IMU, {} wheel and {} GNSS samples", sensors.imu.size(), sensors.wheel.size(),
                       sensors.gnss.size());

@@ -53,6 +53,7 @@ TrackDetectorService::TrackDetectorService(const Config& config, service::Contex
       context_(context),
       writer_(context.writer(messaging::topics::track_view)),
       sighting_writer_(context.writer(messaging::topics::landmark_sighting)) {
+  context_.health().flows(service::Flow::answers);
   context_.on<msg::CameraCalibration>(messaging::topics::camera_calibration,
                                       [this](const msg::CameraCalibration& c) { calibrated(c); });
   context_.on<msg::CameraFrame>(

@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
+#include <atomic>
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "core/time.hpp"
+#include "messaging/topics.hpp"
 #include "support/program.hpp"
 
 namespace railfix {
@@ -137,6 +140,58 @@ TEST_F(Fleet, ServicesOutliveTheirSupervisorAndTheNextOneGoesOnWithThem) {
   EXPECT_EQ(train({"down", "--root", root()}).exit_code, 0);
   ASSERT_GT(orphan, 1);
   EXPECT_FALSE(lives(orphan)) << "down ends what has no supervisor";
+}
+
+// A wheel that turns, on this train's network, until the end.
+class Wheel {
+ public:
+  explicit Wheel(const std::string& train) : participant_(options(train)) {}
+  ~Wheel() {
+    ended_ = true;
+    thread_.join();
+  }
+
+ private:
+  static messaging::ParticipantOptions options(const std::string& train) {
+    messaging::ParticipantOptions options;
+    options.train_id = train;
+    options.domain = 95;
+    options.interfaces = {"127.0.0.1"};
+    return options;
+  }
+  void turn() {
+    msg::WheelSample sample;
+    sample.pulses_per_metre(100);
+    for (; !ended_; poll(nullptr, 0, 50)) {
+      sample.stamp_ns(core::wall_ns());
+      sample.grabbed_ns(sample.stamp_ns());
+      sample.seq(sample.seq() + 1);
+      sample.pulses(sample.pulses() + 50);
+      writer_.write(sample);
+    }
+  }
+  messaging::Participant participant_;
+  messaging::Writer<msg::WheelSample> writer_{participant_, messaging::topics::wheel_sample};
+  std::atomic<bool> ended_ = false;
+  std::thread thread_{[this] { turn(); }};
+};
+
+TEST_F(Fleet, AnUpgradeThatSilencesAServiceIsRolledBack) {
+  ASSERT_EQ(up().exit_code, 0);
+  const Wheel wheel(id_);
+  EXPECT_TRUE(wait_until([&] {
+    return status("fusion")["text"].get<std::string>().find("last output 0.") != std::string::npos;
+  })) << status("fusion");
+  const auto before = status("fusion");
+  write_manifest(RAILFIX_TEST_RELEASE, ", fusion: { use_wheel: false }");
+  const auto failed = upgrade("12");
+  EXPECT_EQ(failed.exit_code, 1) << failed.out << failed.err;
+  EXPECT_THAT(failed.err, HasSubstr("did not pass: fusion sends nothing, and did before"));
+  EXPECT_THAT(failed.err, HasSubstr("runs again"));
+  EXPECT_EQ(status("fusion")["generation"], before["generation"]);
+  write_manifest(RAILFIX_TEST_RELEASE, ", fusion: { use_gnss: false }");
+  const auto passed = upgrade();
+  EXPECT_EQ(passed.exit_code, 0) << passed.out << passed.err;
 }
 
 TEST_F(Fleet, AnUpgradeRestartsWhatChangedAndRollsBackByItselfWhenItIsBad) {

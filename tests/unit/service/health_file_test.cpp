@@ -26,9 +26,44 @@ TEST(HealthFile, StandsThereAgainWhenTheBuildBeforeTakesItAway) {
   now->beat();
   const auto silent = silent_ns(path);
   EXPECT_LE(silent, core::monotonic_ns() - asked_ns);
-  EXPECT_EQ(ask_health(path).text, "active: as it should be");
+  EXPECT_EQ(ask_health(path).text, "active: as it should be (no input yet, no output yet)");
   now.reset();
   EXPECT_FALSE(std::filesystem::exists(path));
+}
+
+class HealthFileFlow : public ::testing::Test {
+ protected:
+  HealthAnswer ask(Flow flow, double input_since_s, double last_input_s, double last_output_s, bool stands_by = false) {
+    const int64_t now_ns = core::monotonic_ns();
+    const auto at = [&](double ago_s) { return ago_s < 0 ? 0 : now_ns - core::to_ns(ago_s); };
+    msg::ServiceStatus status;
+    status.state(msg::STATE_DEGRADED);
+    HealthFile file(path_);
+    file.write(status, {flow, stands_by, at(input_since_s), at(last_input_s), at(last_output_s)});
+    return ask_health(path_);
+  }
+  const std::filesystem::path path_ =
+      std::filesystem::temp_directory_path() / ("railfix-health-flow-" + std::to_string(getpid()));
+};
+
+TEST_F(HealthFileFlow, OneThatAnswersNothingIsStuck) {
+  const auto answer = ask(Flow::answers, 10, 0.1, 5);
+  EXPECT_TRUE(answer.stuck);
+  EXPECT_TRUE(answer.healthy) << "its supervisor leaves it alone";
+  EXPECT_EQ(answer.text, "input comes, nothing goes out: degraded (last input 0.1 s ago, last output 5.0 s ago)");
+  EXPECT_TRUE(ask(Flow::answers, 10, 0.1, -1).stuck);
+  EXPECT_FALSE(ask(Flow::answers, 10, 0.1, 0.1).stuck);
+  EXPECT_FALSE(ask(Flow::answers, 1, 0.1, -1).stuck) << "input has only begun";
+  EXPECT_FALSE(ask(Flow::answers, 60, 10, 10).stuck) << "no input, no output";
+  EXPECT_FALSE(ask(Flow::answers, 10, 0.1, 5, true).stuck) << "another one sends";
+  EXPECT_FALSE(ask(Flow::steady, 10, 0.1, 5).stuck) << "it may wait for another input";
+}
+
+TEST_F(HealthFileFlow, WhoSendsSteadilyIsTold) {
+  EXPECT_TRUE(ask(Flow::steady, 10, 0.1, 0.1).sends);
+  EXPECT_TRUE(ask(Flow::answers, 10, 0.1, 0.1).sends);
+  EXPECT_FALSE(ask(Flow::steady, 10, 0.1, 3).sends);
+  EXPECT_FALSE(ask(Flow::sporadic, 10, 0.1, 0.1).sends);
 }
 
 }  // namespace

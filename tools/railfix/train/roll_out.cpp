@@ -36,8 +36,13 @@ bool wait_until(double patience_s, Condition condition) {
 /// Watches one service until it has been healthy for long enough.
 class Gate {
  public:
-  Gate(const HostFolder& folder, const HostPlan& plan, std::string service, double healthy_s)
-      : folder_(folder), plan_(plan), service_(std::move(service)), healthy_ns_(core::to_ns(healthy_s)) {}
+  /// `must_send`: it did before.
+  Gate(const HostFolder& folder, const HostPlan& plan, std::string service, double healthy_s, bool must_send)
+      : folder_(folder),
+        plan_(plan),
+        service_(std::move(service)),
+        healthy_ns_(core::to_ns(healthy_s)),
+        must_send_(must_send) {}
   bool passed() {
     const auto state = folder_.state();
     const auto found = state.find(service_);
@@ -46,29 +51,33 @@ class Gate {
                       !found->second.beside;
     health_ = health_of(plan_, state, service_);
     const int64_t now_ns = core::monotonic_ns();
-    if (!ours || !health_.healthy || found->second.pid != pid_) {
+    if (!ours || !health_.healthy || is_mute() || found->second.pid != pid_) {
       healthy_since_ns_ = now_ns;
       pid_ = ours ? found->second.pid : 0;
       return false;
     }
     return now_ns - healthy_since_ns_ >= healthy_ns_;
   }
-  [[nodiscard]] std::string why_not() const { return service_ + " " + health_.text; }
+  [[nodiscard]] std::string why_not() const {
+    return service_ + (health_.healthy && is_mute() ? " sends nothing, and did before: " : " ") + health_.text;
+  }
 
  private:
+  [[nodiscard]] bool is_mute() const { return must_send_ && !health_.sends && !health_.stands_by; }
   const HostFolder& folder_;
   const HostPlan& plan_;
   std::string service_;
   int64_t healthy_ns_;
+  bool must_send_;
   int64_t healthy_since_ns_ = 0;
   int64_t pid_ = 0;
   service::HealthAnswer health_;
 };
 
 core::Status wait_healthy(const HostFolder& folder, const HostPlan& plan, const std::vector<std::string>& services,
-                          const HealthGate& gate) {
+                          const HealthGate& gate, bool must_send = false) {
   std::vector<Gate> gates;
-  for (const auto& service : services) gates.emplace_back(folder, plan, service, gate.healthy_s);
+  for (const auto& service : services) gates.emplace_back(folder, plan, service, gate.healthy_s, must_send);
   const bool healthy = wait_until(gate.patience_s, [&] {
     bool all = true;
     for (auto& one : gates) all = one.passed() && all;
@@ -267,13 +276,14 @@ core::Status roll_out(const fs::path& root, const HostPlan& plan, const HealthGa
   now.generation = plan.generation;
   now.previous = before->generation;
   for (const auto& name : changed_services(*before, plan)) {
+    const bool sent = health_of(now, folder.state(), name).sends;
     now = with_service(now, plan, name);
     if (const auto written = folder.write(now); !written.ok()) return written;
     const auto* target = plan.service(name);
     say(target != nullptr ? name + ": release " + target->release + ", generation " + std::to_string(target->generation)
                           : name + ": leaves this host");
     if (target == nullptr) continue;
-    const auto healthy = wait_healthy(folder, now, {name}, gate);
+    const auto healthy = wait_healthy(folder, now, {name}, gate, sent);
     if (healthy.ok()) continue;
     say(healthy.error().message + "; back to generation " + std::to_string(before->generation));
     if (const auto written = folder.write(*before); !written.ok()) return written;
