@@ -29,6 +29,12 @@ void ClockWatch::hear(const std::string& host, int64_t stamp_ns, int64_t receive
   if (const auto quickest = quickest_ns(late_ns); quickest && std::abs(*quickest) <= kToleratedNs) set_by_ns_ = 0;
 }
 
+// Without its keeper the kernel's bound grows by half a millisecond a second, so an end is told after three minutes.
+void ClockWatch::kept(std::optional<int64_t> max_error_ns) {
+  is_kept_ = max_error_ns && *max_error_ns <= kToleratedNs;
+  was_kept_ = was_kept_ || is_kept_;
+}
+
 std::optional<int64_t> ClockWatch::quickest_ns(const std::deque<int64_t>& late_ns) {
   if (late_ns.size() < kMessages) return std::nullopt;
   return *std::min_element(late_ns.begin(), late_ns.end());
@@ -44,6 +50,10 @@ std::string ClockWatch::trouble() const {
     text += (text.empty() ? "" : " ") + ("The clock of " + host + " is " + offset) +
             (*quickest > 0 ? " behind " : " ahead of ") + host_ +
             "'s: let chrony or PTP set both (railfix doctor says which is not).";
+  }
+  if (was_kept_ && !is_kept_) {
+    text += (text.empty() ? "" : " ") + ("The clock of " + host_) +
+            " is not kept by PTP or NTP any more: see to its chronyd, or ptp4l and phc2sys.";
   }
   if (set_by_ns_ == 0) return text;
   std::snprintf(offset, sizeof(offset), "%+.1f s", core::seconds(set_by_ns_));

@@ -22,6 +22,9 @@ class ClockWatch {
   void look(int64_t wall_ns, int64_t monotonic_ns);
   /// A message that `host` has stamped with its wall clock came at `received_ns` of ours.
   void hear(const std::string& host, int64_t stamp_ns, int64_t received_ns);
+  /// What the kernel says of this host's clock: how far off it can be at most, by whom it is kept (PTP, NTP); nothing
+  /// when nobody keeps it.
+  void kept(std::optional<int64_t> max_error_ns);
   /// Empty when all agree, otherwise one sentence: which host, by how much, what to do.
   [[nodiscard]] std::string trouble() const;
   /// This host's clock was set, and no other one's has agreed with it since.
@@ -32,7 +35,9 @@ class ClockWatch {
   [[nodiscard]] static std::optional<int64_t> quickest_ns(const std::deque<int64_t>& late_ns);
   std::map<std::string, std::deque<int64_t>> late_ns_;  // of each other host's last messages
   std::optional<int64_t> ahead_ns_;                     // of the clock that never jumps
-  int64_t set_by_ns_ = 0;                               // 0 = it was not, or has agreed with another one since
+  bool was_kept_ = false;
+  bool is_kept_ = false;
+  int64_t set_by_ns_ = 0;  // 0 = it was not, or has agreed with another one since
   int64_t set_at_ns_ = INT64_MIN;
   int64_t looked_ns_ = INT64_MAX;
 };

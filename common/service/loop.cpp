@@ -4,6 +4,7 @@
 #include <ranges>
 
 #include "core/joined.hpp"
+#include "core/kernel_clock.hpp"
 #include "core/time.hpp"
 #include "messaging/lock_step.hpp"
 #include "messaging/security.hpp"
@@ -19,6 +20,7 @@ constexpr std::chrono::milliseconds kStatusPeriod{250};
 constexpr std::chrono::milliseconds kBeatPeriod{100};
 constexpr std::chrono::seconds kCablePeriod{1};
 constexpr std::chrono::seconds kWritersPeriod{1};
+constexpr std::chrono::seconds kKeeperPeriod{10};
 constexpr std::chrono::hours kCertificatePeriod{6};
 constexpr int64_t kIdleNs = core::kNsPerSecond;
 
@@ -115,6 +117,7 @@ void Loop::look_at_clock() {
 
 // Every service stamps its status with its host's clock.
 void Loop::watch_clocks() {
+  every(kKeeperPeriod, [this] { clocks_.kept(core::clock_error_ns()); });
   every(kBeatPeriod, [this] { look_at_clock(); });
   readers_.push_back(std::make_unique<messaging::AnyReader>(
       participant_, messaging::info_of(messaging::topics::service_status), "", queue_,

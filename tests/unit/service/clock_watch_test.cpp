@@ -86,5 +86,20 @@ TEST_F(ClockWatchTest, ItsOwnHostHasTheSameClock) {
   EXPECT_EQ(watch_.trouble(), "");
 }
 
+TEST_F(ClockWatchTest, SaysWhenNobodyKeepsTheClockAnyMore) {
+  watch_.kept(std::nullopt);
+  EXPECT_EQ(watch_.trouble(), "") << "nobody ever did: railfix train check says that";
+  watch_.kept(2 * kMs);
+  EXPECT_EQ(watch_.trouble(), "");
+  watch_.kept(150 * kMs);
+  EXPECT_EQ(watch_.trouble(),
+            "The clock of coach is not kept by PTP or NTP any more: see to its chronyd, or ptp4l and phc2sys.");
+  EXPECT_FALSE(watch_.own_is_doubted()) << "it still agrees with the others";
+  watch_.kept(1 * kMs);
+  EXPECT_EQ(watch_.trouble(), "");
+  watch_.kept(std::nullopt);
+  EXPECT_NE(watch_.trouble(), "");
+}
+
 }  // namespace
 }  // namespace railfix::service

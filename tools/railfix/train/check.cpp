@@ -1,7 +1,6 @@
 #include "train/check.hpp"
 
 #include <sys/statvfs.h>
-#include <sys/timex.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -11,6 +10,7 @@
 #include <memory>
 #include <set>
 
+#include "core/kernel_clock.hpp"
 #include "messaging/network.hpp"
 #include "messaging/qos_match.hpp"
 #include "train/render.hpp"
@@ -181,9 +181,7 @@ void check_shared_memory(bool pictures, Findings& findings) {
 }
 
 void check_clock(Findings& findings) {
-  timex clock{};
-  const int state = adjtimex(&clock);
-  if (state == TIME_ERROR || (clock.status & STA_UNSYNC) != 0)
+  if (!core::clock_error_ns())
     warning(findings,
             "this computer's clock is not disciplined (chrony or PTP): stamps of two hosts cannot be compared");
 }
