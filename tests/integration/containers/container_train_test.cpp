@@ -60,7 +60,7 @@ class ContainerTrain : public Images, public ::testing::WithParamInterface<const
       ASSERT_EQ(taken.exit_code, 0) << taken.err;
     }
   }
-  void write_manifest(const std::string& fusion, const std::string& reports) const {
+  void write_manifest(const std::string& fusion, const std::string& reports, const std::string& settings = "") const {
     std::ofstream(folder_ / "train" / "train.yaml")
         << "train:\n  id: " << id_ << "\n  domain: " << kDomain << "\n  release: test\n  run_as: " << GetParam()
         << "\n  hosts:\n"
@@ -68,7 +68,8 @@ class ContainerTrain : public Images, public ::testing::WithParamInterface<const
         << "    coach: { address: " << TwoHosts::kAddress[TwoHosts::coach] << " }\n"
         << "  services:\n    fusion: { host: cab, release: " << fusion << " }\n"
         << "    tpr_publisher: { host: coach, release: " << reports << " }\n"
-        << "settings: { common: { log_level: warning } }\n";
+        << "settings:\n  common: { log_level: warning }\n"
+        << settings;
   }
   // The host is found by its address, as on a train.
   Outcome train(TwoHosts::Host host, std::vector<std::string> arguments) {
@@ -185,7 +186,7 @@ TEST_P(ContainerTrain, ComesUpOnTwoHostsIsUpgradedComesBackAndGoesDown) {
   // The engine's own builder, without its network: nothing is fetched.
   const auto bad = here(TwoHosts::coach, [&] {
     return shell("printf 'FROM " + image +
-                 "\\nENTRYPOINT [\"/bin/sh\",\"-c\",\"test $0 = --version\"]\\n' | "
+                 "\\nENTRYPOINT [\"/bin/sh\",\"-c\",\"test $0 = --version -o $0 = --check\"]\\n' | "
                  "BUILDAH_FORMAT=docker DOCKER_BUILDKIT=0 " +
                  GetParam() + " build -q -t " + image + "-bad -");
   });
@@ -208,6 +209,17 @@ TEST_P(ContainerTrain, AnImageThatIsMissingStartsNothing) {
   EXPECT_EQ(up.exit_code, 1);
   EXPECT_THAT(up.out, HasSubstr("image railfix/fusion:test-missing is not on this computer; "));
   EXPECT_EQ(train(TwoHosts::cab, {"status"}).exit_code, 2) << "something was started";
+}
+
+TEST_P(ContainerTrain, AWrongKeyIsToldByTheImageAndStartsNothing) {
+  write_manifest("test", "test", "  fusion: { no_such_key: 1 }\n");
+  const auto up = train(TwoHosts::cab, {"up"});
+  EXPECT_EQ(up.exit_code, 1);
+  EXPECT_THAT(up.out, HasSubstr("error: fusion: settings for cab line "));
+  EXPECT_THAT(up.out, HasSubstr("fusion.no_such_key is not a key of this section"));
+  EXPECT_THAT(up.out, Not(HasSubstr("settings of fusion are not checked")));
+  EXPECT_EQ(train(TwoHosts::cab, {"status"}).exit_code, 2) << "something was started";
+  EXPECT_THAT(engine(TwoHosts::cab, "ps --all --format '{{.Names}}'").out, Not(HasSubstr(id_)));
 }
 
 TEST_P(ContainerTrain, ItsComposeFileRuns) {

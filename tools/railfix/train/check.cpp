@@ -4,16 +4,14 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
-#include <cstdio>
 #include <fstream>
-#include <memory>
-#include <set>
+#include <future>
 
 #include "core/kernel_clock.hpp"
 #include "messaging/network.hpp"
 #include "messaging/qos_match.hpp"
 #include "train/render.hpp"
+#include "train/run.hpp"
 #include "train/setting_files.hpp"
 
 namespace railfix::tool {
@@ -127,40 +125,67 @@ void check_ports(const Manifest& manifest, Findings& findings) {
   }
 }
 
-// Runs a program; what it says on its standard error when it does not end well.
-std::string complaint_of(const std::string& command) {
-  FILE* pipe = popen((command + " 2>&1 >/dev/null").c_str(), "r");
-  if (pipe == nullptr) return "cannot be run: " + command;
-  std::string text;
-  std::array<char, 512> part{};
-  while (std::fgets(part.data(), part.size(), pipe) != nullptr) text += part.data();
-  return pclose(pipe) == 0 ? "" : text;
+// The way to let a service look at its settings on this computer: its image, for a train of containers, or its program.
+// Nothing when there is neither.
+std::optional<std::vector<std::string>> way_to_check(const Manifest& manifest, const TrainHost& host,
+                                                     const HostedService& service, const FindProgram& find_program,
+                                                     const std::string& config) {
+  if (manifest.containers) {
+    const auto engine = container_engine(manifest);
+    if (engine.ok() && image_id(engine.value(), image_of(service)))
+      return check_command(manifest, host, service, engine.value(), config);
+  }
+  const auto program = find_program(service);
+  if (!program) return std::nullopt;
+  return std::vector<std::string>{program->string(), "--check", "--config", config};
+}
+
+std::string missing_program(const Manifest& manifest, const HostedService& service) {
+  if (!manifest.containers)
+    return "its program of release " + service.release + " is not on this computer; check it on the train's hosts";
+  return "its image " + image_of(service) + " is not on this computer" +
+         (geteuid() == 0 ? "" : ", or only for root: use sudo") + "; check it on the train's hosts";
+}
+
+Finding not_checked(const HostedService& service, const std::string& why) {
+  return {false, "settings of " + service.name + " are not checked: " + why};
+}
+
+// What the service says of its settings; nothing when they are right.
+std::optional<Finding> settings_finding(const Manifest& manifest, const TrainHost& host, const HostedService& service,
+                                        const FindProgram& find_program, const std::string& config) {
+  const auto command = way_to_check(manifest, host, service, find_program, config);
+  if (!command) return not_checked(service, missing_program(manifest, service));
+  auto [exit_code, text] = run(*command);
+  if (exit_code == 0) return std::nullopt;
+  if (manifest.containers && is_engine_failure(exit_code))
+    return not_checked(service, "a container of " + image_of(service) + " cannot be run here: " + text);
+  // The rendered file is ours; the operator knows train.yaml.
+  for (size_t at = 0; (at = text.find(config)) != std::string::npos;)
+    text.replace(at, config.size(), "settings for " + host.name);
+  if (text.empty()) text = service.name + " does not accept its settings, and does not say why: " + command->front();
+  return Finding{true, text};
 }
 
 void check_configurations(const Manifest& manifest, const FindProgram& find_program, Findings& findings) {
+  // Side by side: a container takes half a second.
+  std::vector<std::future<std::optional<Finding>>> answers;
+  std::vector<fs::path> configs;
   for (const auto& host : manifest.hosts) {
-    const auto config =
-        fs::temp_directory_path() / ("railfix-check-" + std::to_string(getpid()) + "-" + host.name + ".yaml");
+    const auto& config = configs.emplace_back(
+        fs::temp_directory_path() / ("railfix-check-" + std::to_string(getpid()) + "-" + host.name + ".yaml"));
     std::ofstream(config) << render_config(manifest, host, manifest.folder.string());
     for (const auto& service : services_on(manifest, host.name)) {
-      const auto program = find_program(service);
-      if (!program) {
-        warning(findings, "settings of " + service.name + " are not checked: its program of release " +
-                              service.release + " is not on this computer");
-        continue;
-      }
-      const auto text = complaint_of("'" + program->string() + "' --check --config '" + config.string() + "'");
-      if (!text.empty()) {
-        // The rendered file is ours; the operator knows train.yaml.
-        std::string for_operator = text;
-        for (size_t at = 0; (at = for_operator.find(config.string())) != std::string::npos;)
-          for_operator.replace(at, config.string().size(), "settings for " + host.name);
-        while (!for_operator.empty() && for_operator.back() == '\n') for_operator.pop_back();
-        error(findings, for_operator);
-      }
+      answers.push_back(
+          std::async(std::launch::async, [&manifest, &host, &find_program, service, file = config.string()] {
+            return settings_finding(manifest, host, service, find_program, file);
+          }));
     }
-    fs::remove(config);
   }
+  for (auto& answer : answers) {
+    if (auto finding = answer.get()) findings.push_back(*std::move(finding));
+  }
+  for (const auto& config : configs) fs::remove(config);
 }
 
 double megabytes_free(const char* folder) {

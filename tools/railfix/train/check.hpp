@@ -18,8 +18,8 @@ struct Finding {
 };
 
 /// The manifest against itself and the files beside it: placement of services, ports, files, certificates, and every
-/// service's own check of its configuration, with the program that is found for it; skipped and said when there is
-/// none.
+/// service's own check of its configuration, with its image or the program that is found for it; skipped and said when
+/// this computer has none.
 using FindProgram = std::function<std::optional<std::filesystem::path>(const HostedService&)>;
 std::vector<Finding> check_train(const Manifest& manifest, const FindProgram& find_program);
 

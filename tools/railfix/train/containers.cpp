@@ -3,13 +3,12 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
-#include <cstdio>
 #include <map>
 #include <sstream>
 
 #include "service/service.hpp"
 #include "train/render.hpp"
+#include "train/run.hpp"
 #include "train/setting_files.hpp"
 
 namespace railfix::tool {
@@ -29,24 +28,6 @@ std::string user() {
 std::string dashed(std::string name) {
   std::replace(name.begin(), name.end(), '_', '-');
   return name;
-}
-
-struct Ran {
-  int exit_code = -1;
-  std::string text;  // all that it said, without the last line end
-};
-
-Ran run(const std::vector<std::string>& command) {
-  std::string line;
-  for (const auto& word : command) line += "'" + word + "' ";
-  FILE* pipe = popen((line + "2>&1 </dev/null").c_str(), "r");
-  Ran ran;
-  if (pipe == nullptr) return ran;
-  std::array<char, 512> part{};
-  while (std::fgets(part.data(), part.size(), pipe) != nullptr) ran.text += part.data();
-  while (!ran.text.empty() && ran.text.back() == '\n') ran.text.pop_back();
-  ran.exit_code = pclose(pipe) == 0 ? 0 : 1;
-  return ran;
 }
 
 std::string last_line(const std::string& text) {
@@ -195,6 +176,18 @@ core::Result<std::string> container_engine(const Manifest& manifest) {
 std::optional<std::string> image_id(const std::string& engine, const std::string& image) {
   const auto ran = run({engine, "image", "inspect", "--format", "{{.Id}}", image});
   return ran.exit_code == 0 ? std::optional(last_line(ran.text)) : std::nullopt;
+}
+
+std::vector<std::string> check_command(const Manifest& manifest, const TrainHost& host, const HostedService& service,
+                                       const std::string& engine, const std::string& config) {
+  Container check;
+  check.name = "railfix-" + manifest.train_id + "-" + host.name + "-" + dashed(service.name) + "-check-" +
+               std::to_string(getpid());
+  check.image = image_of(service);
+  check.config = config;
+  check.arguments = {"--check"};
+  check.volumes = {config + ":" + config + ":ro"};
+  return run_command(check, engine);
 }
 
 std::vector<std::string> container_problems(const Manifest& manifest, const TrainHost& host) {

@@ -55,6 +55,14 @@ core::Result<std::string> container_engine(const Manifest& manifest);
 /// What exactly is behind an image's name now; nothing when this computer does not have it.
 std::optional<std::string> image_id(const std::string& engine, const std::string& image);
 
+/// Lets the service's image say what is wrong with a configuration.
+std::vector<std::string> check_command(const Manifest& manifest, const TrainHost& host, const HostedService& service,
+                                       const std::string& engine, const std::string& config);
+/// Such an exit code is the engine's own: it could not run what it was to run.
+inline bool is_engine_failure(int exit_code) {
+  return exit_code >= 125 && exit_code <= 127;
+}
+
 /// Everything that keeps this computer from running the host's containers, a sentence each.
 std::vector<std::string> container_problems(const Manifest& manifest, const TrainHost& host);
 
