@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "track/path.hpp"
 
@@ -33,27 +34,116 @@ std::optional<double> distance_on(const track::Path& path, const EdgePosition& f
 }  // namespace
 
 BaliseTracker::BaliseTracker(std::shared_ptr<const track::Map> map, double search_behind_m)
-    : map_(std::move(map)), search_behind_m_(search_behind_m) {
+    : map_(std::move(map)), ways_(*map_), search_behind_m_(search_behind_m) {
   for (const auto& group : map_->balise_groups) groups_on_[group.edge].push_back(&group);
 }
 
 void BaliseTracker::lose() {
   last_.reset();
+  undeclared_.reset();
   reference_.reset();
 }
 
-void BaliseTracker::update(const EdgePosition& place) {
+void BaliseTracker::update(const EdgePosition& place, bool declared) {
   const track::Edge* edge = map_->edge(place.edge);
   if (edge == nullptr || !std::isfinite(place.offset_m)) return lose();
   EdgePosition foot = place;
   foot.offset_m = std::clamp(foot.offset_m, 0.0, edge->alignment.length_m());
-  if (!last_ || (!step_on_edge(foot) && !step_over_edges(foot))) acquire(foot);
+  if (!declared) {
+    go_undeclared(foot);
+  } else if (!go_declared(foot)) {
+    acquire(foot);
+  }
   last_ = foot;
+}
+
+std::optional<double> BaliseTracker::undeclared_m() const {
+  if (!undeclared_) return std::nullopt;
+  return std::abs(undeclared_->turns.way_m());
+}
+
+void BaliseTracker::go_undeclared(const EdgePosition& foot) {
+  if (!undeclared_) undeclared_ = Undeclared{last_, {}};
+  if (!undeclared_->from) return;
+  const double before_m = undeclared_->turns.way_m();
+  if (const auto step = step_to(foot)) {
+    undeclared_->turns.run(step->way_m);
+  } else if (const auto ways = ways_between(*map_, ways_, *undeclared_->from, foot, before_m); !ways.empty()) {
+    undeclared_->turns.run(ways.front().length_m - before_m);  // onto another leg, behind one more switch
+  } else {
+    undeclared_->from.reset();
+    reference_.reset();
+  }
+  if (reference_) reference_->foot_m += undeclared_->turns.way_m() - before_m;
+}
+
+bool BaliseTracker::go_declared(const EdgePosition& foot) {
+  if (!last_) return false;
+  if (!undeclared_) {
+    auto step = step_to(foot);
+    if (step) pass(std::move(step->groups), step->way_m);
+    return step.has_value();
+  }
+  const auto undeclared = *std::exchange(undeclared_, std::nullopt);
+  if (!undeclared.from) return false;
+  const auto step = step_to(foot);
+  const double counted_m = undeclared.turns.way_m();
+  const double about_m = counted_m + (step ? step->way_m : 0.0);
+  const auto ways = ways_between(*map_, ways_, *undeclared.from, foot, about_m);
+  if (ways.empty()) return false;
+  const double length_m = ways.front().length_m;
+  if (reference_) {
+    reference_->foot_m -= counted_m;
+    for (const auto& way : ways) reference_->doubt_m = std::max(reference_->doubt_m, std::abs(way.length_m - length_m));
+  }
+  Turns turns = undeclared.turns;
+  turns.run(length_m - counted_m);
+  const auto groups = groups_on(ways);
+  const auto& points = turns.points();
+  for (size_t i = 1; i < points.size(); ++i) {
+    auto passed = groups;
+    for (auto& mark : passed)
+      mark.way_m += length_m - points[i - 1];  // from the last place to where this stretch began
+    pass(std::move(passed), points[i] - points[i - 1]);
+  }
+  return true;
+}
+
+/// At their distances from where the ways end. Beyond both ends the train may have been as well, before it turned:
+/// there, too, up to the next switch only.
+std::vector<BaliseTracker::Passed> BaliseTracker::groups_on(const std::vector<WayBetween>& ways) const {
+  std::vector<Passed> common;
+  for (const auto& way : ways) {
+    auto route = way.route;
+    const double reach_m = kLongestStepM + std::abs(way.length_m);
+    for (auto next = ways_.after(route.legs().back().run); next.size() == 1 && route.end_m() < reach_m;
+         next = ways_.after(next.front()))
+      route.push_ahead(next.front());
+    for (auto next = ways_.before(route.legs().front().run); next.size() == 1 && route.begin_m() > -reach_m;
+         next = ways_.before(next.front()))
+      route.push_behind(next.front());
+    const auto path = track::Path::along(map_, route);
+    if (&way == &ways.front()) {
+      for (const auto& mark : path.balise_groups())
+        common.push_back({mark.group, mark.distance_m, mark.nominal_is_along_path});
+      continue;
+    }
+    std::erase_if(common, [&](Passed& known) {
+      const auto& marks = path.balise_groups();
+      const auto same = std::find_if(marks.begin(), marks.end(), [&](const track::PathBaliseGroup& mark) {
+        return mark.group == known.group && mark.nominal_is_along_path == known.nominal_along;
+      });
+      if (same == marks.end()) return true;
+      known.doubt_m = std::max(known.doubt_m, std::abs(same->distance_m - known.way_m));
+      return false;
+    });
+  }
+  return common;
 }
 
 std::optional<double> BaliseTracker::foot_beyond_m(uint32_t nid_lrbg) const {
   if (reference_ && reference_->group->nid_lrbg() == nid_lrbg) return reference_->foot_m;
-  if (!last_) return std::nullopt;
+  if (!last_ || undeclared_) return std::nullopt;
   const auto path = track::Path::follow(map_, *last_, 0, search_behind_m_);
   if (!path.ok()) return std::nullopt;
   std::optional<double> beyond_m;
@@ -63,20 +153,25 @@ std::optional<double> BaliseTracker::foot_beyond_m(uint32_t nid_lrbg) const {
   return beyond_m;
 }
 
-bool BaliseTracker::step_on_edge(const EdgePosition& foot) {
-  if (foot.edge != last_->edge || foot.direction != last_->direction) return false;
-  const double sign = sign_of(foot.direction);
-  std::vector<Passed> passed;
-  if (const auto groups = groups_on_.find(foot.edge); groups != groups_on_.end()) {
-    for (const auto* group : groups->second) {
-      passed.push_back({group, sign * (group->offset_m - last_->offset_m), group->nominal_is_forward == (sign > 0)});
-    }
-  }
-  pass(std::move(passed), sign * (foot.offset_m - last_->offset_m));
-  return true;
+std::optional<BaliseTracker::Step> BaliseTracker::step_to(const EdgePosition& foot) const {
+  const auto step = step_on_edge(foot);
+  return step ? step : step_over_edges(foot);
 }
 
-bool BaliseTracker::step_over_edges(const EdgePosition& foot) {
+std::optional<BaliseTracker::Step> BaliseTracker::step_on_edge(const EdgePosition& foot) const {
+  if (foot.edge != last_->edge || foot.direction != last_->direction) return std::nullopt;
+  const double sign = sign_of(foot.direction);
+  Step step{sign * (foot.offset_m - last_->offset_m), {}};
+  if (const auto groups = groups_on_.find(foot.edge); groups != groups_on_.end()) {
+    for (const auto* group : groups->second) {
+      step.groups.push_back(
+          {group, sign * (group->offset_m - last_->offset_m), group->nominal_is_forward == (sign > 0)});
+    }
+  }
+  return step;
+}
+
+std::optional<BaliseTracker::Step> BaliseTracker::step_over_edges(const EdgePosition& foot) const {
   // From here a diverging way ahead is not found, but seen from there it is the only way back; and the other way round.
   for (const bool from_last : {true, false}) {
     const auto path = track::Path::follow(map_, from_last ? *last_ : foot, kLongestStepM, kLongestStepM);
@@ -84,14 +179,13 @@ bool BaliseTracker::step_over_edges(const EdgePosition& foot) {
     const auto distance = distance_on(path.value(), from_last ? foot : *last_);
     if (!distance) continue;
     const double origin_m = from_last ? 0.0 : *distance;  // of the last place on this path
-    std::vector<Passed> passed;
+    Step step{from_last ? *distance : -*distance, {}};
     for (const auto& mark : path.value().balise_groups()) {
-      passed.push_back({mark.group, mark.distance_m - origin_m, mark.nominal_is_along_path});
+      step.groups.push_back({mark.group, mark.distance_m - origin_m, mark.nominal_is_along_path});
     }
-    pass(std::move(passed), from_last ? *distance : -*distance);
-    return true;
+    return step;
   }
-  return false;
+  return std::nullopt;
 }
 
 void BaliseTracker::pass(std::vector<Passed> passed, double step_m) {
@@ -105,7 +199,7 @@ void BaliseTracker::pass(std::vector<Passed> passed, double step_m) {
   for (const auto& mark : passed) {
     if (reference_ && reference_->group == mark.group) continue;  // passed again: the same group stays the reference
     const auto* previous = reference_ ? reference_->group : nullptr;
-    reference_ = Reference{mark.group, previous, mark.nominal_along, along, step_m - mark.way_m};
+    reference_ = Reference{mark.group, previous, mark.nominal_along, along, step_m - mark.way_m, mark.doubt_m};
   }
 }
 

@@ -8,6 +8,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "tpr_publisher/undeclared_way.hpp"
 #include "track/map.hpp"
 
 namespace railfix::tpr_publisher {
@@ -19,10 +20,16 @@ struct Reference {
   bool nominal_along = true;                     // the group's nominal direction runs along
   bool from_previous_along = true;               // the way from `previous` to `group` runs along
   double foot_m = 0;                             // camera's foot beyond the group, along; negative = in front of it
+  double doubt_m = 0;                            // the way from the group may be longer or shorter by so much
 };
 
 /// Follows the camera's foot over the map. A group counts as passed when the foot's estimate passes it, in either
 /// direction. The distance to the LRBG is summed along the way really run, so that it stays right beyond switches.
+///
+/// Behind a facing switch the followed leg is a guess until the track is declared: the distance goes on from the group
+/// before the switch, and no group is taken. Once it is declared, the groups on the way that really led there count as
+/// passed. Where ways of different legs have joined again and nobody said which one it was, those that all of them
+/// have.
 class BaliseTracker {
  public:
   /// At the start, and after a jump to another track, the nearest group up to `search_behind_m` behind the train is
@@ -30,9 +37,11 @@ class BaliseTracker {
   BaliseTracker(std::shared_ptr<const track::Map> map, double search_behind_m);
 
   /// REQUIRES: the direction is known. A place that is not on the map loses the reference.
-  void update(const track::EdgePosition& foot);
+  void update(const track::EdgePosition& foot, bool declared);
   void lose();
   [[nodiscard]] const std::optional<Reference>& reference() const { return reference_; }
+  /// How far the train has come since its track was declared last; nothing while it is declared.
+  [[nodiscard]] std::optional<double> undeclared_m() const;
   /// How far the foot is beyond this group, along, when it is the reference or lies behind the train, no farther than
   /// one is looked for at the start.
   [[nodiscard]] std::optional<double> foot_beyond_m(uint32_t nid_lrbg) const;
@@ -43,16 +52,31 @@ class BaliseTracker {
     const track::BaliseGroup* group;
     double way_m;  // from the last place, along
     bool nominal_along;
+    double doubt_m = 0;  // as in Reference
   };
-  [[nodiscard]] bool step_on_edge(const track::EdgePosition& foot);
-  [[nodiscard]] bool step_over_edges(const track::EdgePosition& foot);
+  struct Step {
+    double way_m = 0;
+    std::vector<Passed> groups;  // near it, passed or not
+  };
+  struct Undeclared {
+    std::optional<track::EdgePosition> from;  // the last declared place; nothing = there was none
+    Turns turns;
+  };
+  [[nodiscard]] std::optional<Step> step_to(const track::EdgePosition& foot) const;
+  [[nodiscard]] std::optional<Step> step_on_edge(const track::EdgePosition& foot) const;
+  [[nodiscard]] std::optional<Step> step_over_edges(const track::EdgePosition& foot) const;
+  void go_undeclared(const track::EdgePosition& foot);
+  [[nodiscard]] bool go_declared(const track::EdgePosition& foot);
+  [[nodiscard]] std::vector<Passed> groups_on(const std::vector<WayBetween>& ways) const;
   void pass(std::vector<Passed> passed, double step_m);
   void acquire(const track::EdgePosition& foot);
 
   std::shared_ptr<const track::Map> map_;
+  track::Ways ways_;
   std::unordered_map<uint32_t, std::vector<const track::BaliseGroup*>> groups_on_;  // edge id
   double search_behind_m_;
   std::optional<track::EdgePosition> last_;
+  std::optional<Undeclared> undeclared_;
   std::optional<Reference> reference_;
 };
 

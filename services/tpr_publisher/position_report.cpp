@@ -60,8 +60,9 @@ void refer(const TrainPosition& position, const Reference& reference, Motion mot
            etcs::TrainPositionReport& report) {
   const double front_m = reference.foot_m + settings.foot_to_front_m;
   const auto allowance = train_allowance(settings);
-  const double over_m = amount_m(position.over_m) + amount_m(reference.group->q_locacc_m) + allowance.over_m;
-  const double under_m = amount_m(position.under_m) + amount_m(reference.group->q_locacc_m) + allowance.under_m;
+  const double group_m = amount_m(reference.group->q_locacc_m) + amount_m(reference.doubt_m);
+  const double over_m = amount_m(position.over_m) + group_m + allowance.over_m;
+  const double under_m = amount_m(position.under_m) + group_m + allowance.under_m;
   const int best = distances_in(etcs::scale_m(kCoarsestScale), front_m, over_m, under_m).known();
   Distances distances;
   for (uint32_t q_scale = settings.finest_q_scale; q_scale <= kCoarsestScale; ++q_scale) {

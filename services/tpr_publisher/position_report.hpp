@@ -7,6 +7,7 @@
 
 #include "etcs/train_position_report.hpp"
 #include "tpr_publisher/balise_tracker.hpp"
+#include "track/declared.hpp"
 
 namespace railfix::tpr_publisher {
 
@@ -15,16 +16,18 @@ struct TrainPosition {
   int64_t stamp_ns = 0;
   track::EdgePosition foot;  // of the camera
   bool track_known = false;
-  bool usable = true;     // false: integrity lost, the place must not be used
-  double distance_m = 0;  // travelled since start, signed
-  double speed_mps = 0;   // along the cab's forward axis, signed; NaN = not known
-  double over_m = 0;      // the true foot may lie this far behind the estimate
-  double under_m = 0;     // ... and this far in front of it
+  double track_probability = 0;  // that it is this track and no other behind a switch
+  bool usable = true;            // false: integrity lost, the place must not be used
+  double distance_m = 0;         // travelled since start, signed
+  double speed_mps = 0;          // along the cab's forward axis, signed; NaN = not known
+  double over_m = 0;             // the true foot may lie this far behind the estimate
+  double under_m = 0;            // ... and this far in front of it
   bool standstill = false;
 
   [[nodiscard]] bool place_known() const {
     return track_known && usable && foot.direction != track::Direction::unknown;
   }
+  [[nodiscard]] bool track_declared() const { return track_probability >= track::kDeclaredProbability; }
 };
 
 enum class Motion : uint8_t { unknown, forward, backward };  // along the cab's forward axis

@@ -15,8 +15,9 @@ constexpr int64_t kOldestNs = core::kNsPerSecond;
 constexpr int64_t kOtherTimeNs = 3600 * core::kNsPerSecond;
 constexpr int64_t kOnboardSilentNs = 3 * core::kNsPerSecond;
 constexpr int64_t kMostAheadNs = core::kNsPerSecond;
-constexpr double kFastestMps = 150;  // 540 km/h
-constexpr double kCorrectionM = 20;  // a distance may be corrected by so much, and by what it was not sure of
+constexpr double kFastestMps = 150;       // 540 km/h
+constexpr double kLongUndeclaredM = 500;  // a switch every few kilometres, declared soon, is no trouble
+constexpr double kCorrectionM = 20;       // a distance may be corrected by so much, and by what it was not sure of
 
 /// Empty when the position is young enough.
 std::string age_refusal(int64_t stamp_ns, int64_t now_ns) {
@@ -79,18 +80,27 @@ void TprPublisher::follow(const TrainPosition& position) {
   }
   if (tracker_) {
     if (position.place_known()) {
-      tracker_->update(position.foot);
+      tracker_->update(position.foot, position.track_declared());
     } else {
       tracker_->lose();
     }
     reference_ = tracker_->reference();
   }
+  doubt_.follow(position, reference_ ? std::optional(reference_->foot_m) : std::nullopt, position.track_declared());
   if (position.usable) {
-    const double over_m = position.over_m + (reference_ ? reference_->group->q_locacc_m : 0.0);
+    const double group_m = reference_ ? reference_->group->q_locacc_m + reference_->doubt_m : 0.0;
+    const double over_m = doubt_.over_m() + group_m;
     integrity_.follow({position.stamp_ns, position.distance_m, over_m});
   } else {
     integrity_.lose_way();
   }
+}
+
+TrainPosition TprPublisher::doubted_position() const {
+  auto position = *position_;
+  position.over_m = doubt_.over_m();
+  position.under_m = doubt_.under_m();
+  return position;
 }
 
 core::Status TprPublisher::set_parameters(const etcs::ReportParameters& parameters, std::optional<uint32_t> origin) {
@@ -164,8 +174,19 @@ std::string TprPublisher::left_out(int64_t now_ns) const {
   return "";
 }
 
+std::string TprPublisher::undeclared() const {
+  const auto way_m = tracker_ ? tracker_->undeclared_m() : std::nullopt;
+  if (!way_m || *way_m < kLongUndeclaredM) return "";
+  char text[160];
+  std::snprintf(text, sizeof text,
+                "The LRBG stays the one before the switch: which way the train took there has not been declared for "
+                "%.0f m.",
+                *way_m);
+  return text;
+}
+
 etcs::TrainPositionReport TprPublisher::fields(int64_t now_ns) const {
-  auto fields = make_report(*position_, reference_, motion_, settings_.report, now_ns);
+  auto fields = make_report(doubted_position(), reference_, motion_, settings_.report, now_ns);
   if (onboard_silent(now_ns)) return fields;
   const auto said = integrity_.said(position_->distance_m);
   // Nobody can place a length from a front end that is not referred to a group (3.6.5.2.7).
@@ -181,14 +202,17 @@ Moment TprPublisher::moment(int64_t now_ns) const {
   moment.standstill = position_->standstill;
   moment.front_m = position_->distance_m + settings_.report.foot_to_front_m;
   const auto allowance = train_allowance(settings_.report);
-  const double over_m = position_->over_m + allowance.over_m;
-  const double under_m = position_->under_m + allowance.under_m;
-  moment.max_safe_front_m = position_->under_m >= 0 ? moment.front_m + under_m : HUGE_VAL;
-  moment.min_safe_front_m = position_->over_m >= 0 ? moment.front_m - over_m : -HUGE_VAL;
+  const double over_m = doubt_.over_m() + allowance.over_m;
+  const double under_m = doubt_.under_m() + allowance.under_m;
+  moment.max_safe_front_m = doubt_.under_m() >= 0 ? moment.front_m + under_m : HUGE_VAL;
+  moment.min_safe_front_m = doubt_.over_m() >= 0 ? moment.front_m - over_m : -HUGE_VAL;
   if (reference_) {
     moment.nid_lrbg = reference_->group->nid_lrbg();
-    moment.beyond_lrbg_m = reference_->foot_m + settings_.report.foot_to_front_m;
-    if (const auto origin = trigger_.wanted_origin()) {
+    const auto origin = trigger_.wanted_origin();
+    // A group behind a train on a leg that is guessed is not found, and not known to be nowhere either.
+    if (position_->track_declared() || !origin || *origin == moment.nid_lrbg)
+      moment.beyond_lrbg_m = reference_->foot_m + settings_.report.foot_to_front_m;
+    if (origin) {
       if (const auto foot_m = tracker_->foot_beyond_m(*origin))
         moment.beyond_origin_m = *foot_m + settings_.report.foot_to_front_m;
     }

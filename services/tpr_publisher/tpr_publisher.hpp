@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tpr_publisher/balise_tracker.hpp"
+#include "tpr_publisher/held_doubt.hpp"
 #include "tpr_publisher/position_report.hpp"
 #include "tpr_publisher/report_trigger.hpp"
 #include "tpr_publisher/train_integrity.hpp"
@@ -64,15 +65,20 @@ class TprPublisher {
   [[nodiscard]] bool onboard_heard(int64_t now_ns) const { return onboard_ && !onboard_silent(now_ns); }
   /// What the reports leave out of what the on-board unit says, and why; empty = nothing.
   [[nodiscard]] std::string left_out(int64_t now_ns) const;
+  /// The track has not been declared for so long a way that balise groups may have been passed; empty = it has.
+  [[nodiscard]] std::string undeclared() const;
 
  private:
   void follow(const TrainPosition& position);
+  /// With the doubt of an undeclared track.
+  [[nodiscard]] TrainPosition doubted_position() const;
   void hear_integrity(const Onboard& onboard, int64_t now_ns);
   [[nodiscard]] Moment moment(int64_t now_ns) const;
   [[nodiscard]] etcs::TrainPositionReport fields(int64_t now_ns) const;
 
   Settings settings_;
   std::optional<BaliseTracker> tracker_;
+  HeldDoubt doubt_;
   ReportTrigger trigger_;
   TrainIntegrity integrity_;
   std::optional<Onboard> onboard_;  // its stamp is never later than when it was heard

@@ -37,6 +37,7 @@ TrainPosition position_of(const msg::TrainState& state) {
   position.stamp_ns = state.stamp_ns();
   position.foot = {state.edge(), state.offset_m(), direction_of(state.direction())};
   position.track_known = state.track_known() != 0;
+  position.track_probability = state.track_probability();
   position.usable = state.integrity() != msg::INTEGRITY_UNUSABLE;
   position.distance_m = state.distance_m();
   position.speed_mps = state.speed_mps();
@@ -227,9 +228,11 @@ void TprPublisherService::on_state(const msg::TrainState& state) {
   } else if (!reference_known_) {
     report_trouble_ = !has_map_                  ? "Reports say LRBG unknown: tpr_publisher.map is not set."
                       : state.track_known() == 0 ? "Reports say LRBG unknown: the track is not known."
-                                                 : "Reports say LRBG unknown: no balise group behind the train yet.";
+                      : !position_of(state).track_declared()
+                          ? "Reports say LRBG unknown: which track it is has not been declared yet."
+                          : "Reports say LRBG unknown: no balise group behind the train yet.";
   } else {
-    report_trouble_.clear();
+    report_trouble_ = publisher_.undeclared();
   }
   show();
 }

@@ -70,6 +70,7 @@ class TprService : public ::testing::Test {
     state.distance_m(offset_m);
     state.direction(msg::DIRECTION_FORWARD);
     state.track_known(1);
+    state.track_probability(1);
     state.speed_mps(speed_mps);
     state.standstill(speed_mps == 0 ? 1 : 0);
     state.over_m(3);

@@ -23,129 +23,129 @@ class Tracker : public ::testing::Test {
 };
 
 TEST_F(Tracker, KnowsNoGroupBeforeTheFirst) {
-  tracker.update(forward(1, 50));
+  tracker.update(forward(1, 50), true);
   EXPECT_FALSE(tracker.reference().has_value());
-  tracker.update(forward(1, 99));
+  tracker.update(forward(1, 99), true);
   EXPECT_FALSE(tracker.reference().has_value());
-  tracker.update(forward(1, 100));
+  tracker.update(forward(1, 100), true);
   expect(kA, 0);
   EXPECT_EQ(previous(), 0U);
   EXPECT_TRUE(tracker.reference()->nominal_along);
 }
 
 TEST_F(Tracker, TakesTheGroupsBehindAtTheStart) {
-  tracker.update(forward(1, 450));
+  tracker.update(forward(1, 450), true);
   expect(kB, 50);
   EXPECT_EQ(previous(), kA);
   EXPECT_FALSE(tracker.reference()->nominal_along);
 }
 
 TEST_F(Tracker, PassesSeveralGroupsInOneStep) {
-  tracker.update(forward(1, 50));
-  tracker.update(forward(1, 705));
+  tracker.update(forward(1, 50), true);
+  tracker.update(forward(1, 705), true);
   expect(kC, 5);
   EXPECT_EQ(previous(), kB);
   EXPECT_TRUE(tracker.reference()->from_previous_along);
 }
 
 TEST_F(Tracker, RollingBackKeepsTheGroupUntilAnotherIsPassed) {
-  tracker.update(forward(1, 410));
-  tracker.update(forward(1, 390));
+  tracker.update(forward(1, 410), true);
+  tracker.update(forward(1, 390), true);
   expect(kB, -10);
-  tracker.update(forward(1, 410));
+  tracker.update(forward(1, 410), true);
   expect(kB, 10);
-  tracker.update(forward(1, 90));
+  tracker.update(forward(1, 90), true);
   expect(kA, -10);
   EXPECT_EQ(previous(), kB);
   EXPECT_FALSE(tracker.reference()->from_previous_along);
 }
 
 TEST_F(Tracker, JitterOnAGroupChangesNothing) {
-  tracker.update(forward(1, 399));
+  tracker.update(forward(1, 399), true);
   for (int i = 0; i < 10; ++i) {
-    tracker.update(forward(1, 400.2));
+    tracker.update(forward(1, 400.2), true);
     expect(kB, 0.2);
-    tracker.update(forward(1, 399.8));
+    tracker.update(forward(1, 399.8), true);
     expect(kB, -0.2);
     EXPECT_EQ(previous(), kA);
   }
 }
 
 TEST_F(Tracker, GoesStraightOverTheSwitch) {
-  tracker.update(forward(1, 990));
-  tracker.update(forward(2, 10));
+  tracker.update(forward(1, 990), true);
+  tracker.update(forward(2, 10), true);
   expect(kC, 310);
-  tracker.update(forward(2, 205));
+  tracker.update(forward(2, 205), true);
   expect(kD, 5);
   EXPECT_EQ(previous(), kC);
 }
 
 TEST_F(Tracker, GoesOverTheDivergingWay) {
-  tracker.update(forward(1, 990));
-  tracker.update(reverse(3, 490));  // the siding is drawn the other way
+  tracker.update(forward(1, 990), true);
+  tracker.update(reverse(3, 490), true);  // the siding is drawn the other way
   expect(kC, 310);
-  tracker.update(reverse(3, 390));
+  tracker.update(reverse(3, 390), true);
   expect(kE, 10);
   EXPECT_FALSE(tracker.reference()->nominal_along);
 }
 
 TEST_F(Tracker, ComesOutOfTheSidingWithTheRightGroup) {
-  tracker.update(forward(3, 450));
+  tracker.update(forward(3, 450), true);
   expect(kE, 50);
-  tracker.update(reverse(1, 990));
+  tracker.update(reverse(1, 990), true);
   expect(kE, 110);  // the straight way back from here would lead to D
-  tracker.update(reverse(1, 690));
+  tracker.update(reverse(1, 690), true);
   expect(kC, 10);
   EXPECT_EQ(previous(), kE);
   EXPECT_FALSE(tracker.reference()->nominal_along);
 }
 
 TEST_F(Tracker, BacksOverTheSwitch) {
-  tracker.update(forward(2, 250));
-  tracker.update(forward(2, 20));
+  tracker.update(forward(2, 250), true);
+  tracker.update(forward(2, 20), true);
   expect(kD, -180);
-  tracker.update(forward(1, 980));
+  tracker.update(forward(1, 980), true);
   expect(kD, -220);
-  tracker.update(forward(1, 650));
+  tracker.update(forward(1, 650), true);
   expect(kC, -50);
 }
 
 TEST_F(Tracker, StandsExactlyWhereEdgesMeet) {
-  tracker.update(forward(1, 990));
-  tracker.update(forward(1, 1000));
-  tracker.update(forward(2, 0));
+  tracker.update(forward(1, 990), true);
+  tracker.update(forward(1, 1000), true);
+  tracker.update(forward(2, 0), true);
   expect(kC, 300);
-  tracker.update(forward(2, 1));
+  tracker.update(forward(2, 1), true);
   expect(kC, 301);
   EXPECT_EQ(previous(), kB);
 }
 
 TEST_F(Tracker, AJumpToAnotherTrackStartsAnew) {
-  tracker.update(forward(2, 250));
-  tracker.update(forward(3, 450));
+  tracker.update(forward(2, 250), true);
+  tracker.update(forward(3, 450), true);
   expect(kE, 50);
   EXPECT_EQ(previous(), 0U);
 }
 
 TEST_F(Tracker, TurningTheCabStartsAnew) {
-  tracker.update(forward(1, 450));
-  tracker.update(reverse(1, 450));
+  tracker.update(forward(1, 450), true);
+  tracker.update(reverse(1, 450), true);
   expect(kC, 250);
 }
 
 TEST_F(Tracker, LosesItselfOffTheMap) {
-  tracker.update(forward(1, 450));
-  tracker.update(forward(9, 450));
+  tracker.update(forward(1, 450), true);
+  tracker.update(forward(9, 450), true);
   EXPECT_FALSE(tracker.reference().has_value());
-  tracker.update(forward(1, 450));
+  tracker.update(forward(1, 450), true);
   expect(kB, 50);
 }
 
 TEST_F(Tracker, SearchesOnlySoFarBehind) {
   BaliseTracker near(balise_map(), 40);
-  near.update(forward(1, 450));
+  near.update(forward(1, 450), true);
   EXPECT_FALSE(near.reference().has_value());
-  near.update(forward(2, 20));  // steps beyond 500 m are jumps
+  near.update(forward(2, 20), true);  // steps beyond 500 m are jumps
   EXPECT_FALSE(near.reference().has_value());
 }
 

@@ -20,6 +20,7 @@ class PositionReport : public ::testing::Test {
  protected:
   PositionReport() {
     position.track_known = true;
+    position.track_probability = 1;
     position.speed_mps = 20;
     position.over_m = 5;
     position.under_m = 7;

@@ -29,6 +29,7 @@ TrainPosition at(const track::EdgePosition& foot, double run_s, double speed_mps
   position.stamp_ns = kStart + core::to_ns(run_s);
   position.foot = foot;
   position.track_known = true;
+  position.track_probability = 1;
   position.speed_mps = speed_mps;
   position.distance_m = foot.offset_m;
   position.over_m = position.under_m = 3;

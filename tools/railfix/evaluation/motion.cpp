@@ -4,14 +4,14 @@
 #include <cmath>
 
 #include "core/time.hpp"
+#include "track/declared.hpp"
 
 namespace railfix::evaluation {
 namespace {
 
 constexpr double kWindowM = 100.0;
 constexpr double kWindowStepM = 10.0;
-constexpr double kDeclared = 0.999;  // as TrainState.track_probability says
-constexpr double kOwnTrackM = 2.0;   // neighbouring tracks are at least 3.5 m apart
+constexpr double kOwnTrackM = 2.0;  // neighbouring tracks are at least 3.5 m apart
 
 double speed_rms(const std::vector<MotionSample>& samples) {
   std::vector<double> errors;
@@ -62,7 +62,7 @@ void sum_up_interval(PositionResult& result) {
 }
 
 bool declared(const StateRow& row) {
-  return row.track_known && !(row.track_probability < kDeclared);
+  return row.track_known && !(row.track_probability < track::kDeclaredProbability);
 }
 
 void sum_up_errors(PositionResult& result) {
