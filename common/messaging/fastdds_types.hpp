@@ -18,6 +18,14 @@ class FastDdsType : public Type {
   virtual void take_all(eprosima::fastdds::dds::DataReader& reader, const OnSample& on_sample) const = 0;
 };
 
+/// SampleInfo::writer: half of the participant's prefix and the entity are enough to tell writers apart.
+inline uint64_t number_of(const eprosima::fastrtps::rtps::GUID_t& writer) {
+  uint64_t number = 0;
+  for (size_t i = 4; i < 12; ++i) number = number * 31 + writer.guidPrefix.value[i];
+  for (size_t i = 0; i < 4; ++i) number = number * 257 + writer.entityId.value[i];
+  return number;
+}
+
 inline const FastDdsType& fastdds(const Type& type) {
   return static_cast<const FastDdsType&>(type);
 }

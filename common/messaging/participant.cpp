@@ -9,6 +9,7 @@
 #include "core/time.hpp"
 #include "messaging/every_nth.hpp"
 #include "messaging/fastdds_types.hpp"
+#include "messaging/layout.hpp"
 #include "messaging/network.hpp"
 #include "messaging/security.hpp"
 #include "messaging/transport.hpp"
@@ -151,7 +152,8 @@ void note(Known& known, const Endpoint& endpoint, bool removed, const std::vecto
   if (std::find_first_of(partitions.begin(), partitions.end(), own_partitions.begin(), own_partitions.end()) ==
       partitions.end())
     return;
-  known[endpoint.guid()] = {endpoint.topicName().to_string(), terms_of(endpoint.m_qos)};
+  known[endpoint.guid()] = {endpoint.topicName().to_string(), terms_of(endpoint.m_qos),
+                            layout_in(endpoint.m_qos.m_userData.data_vec())};
 }
 
 }  // namespace
@@ -170,6 +172,15 @@ void Participant::Impl::on_participant_discovery(dds::DomainParticipant*,
 
 void Participant::Impl::on_publisher_discovery(dds::DomainParticipant* own,
                                                eprosima::fastrtps::rtps::WriterDiscoveryInfo&& info) {
+  {
+    const std::lock_guard lock(layouts_mutex);
+    const uint64_t writer = number_of(info.info.guid());
+    if (info.status == eprosima::fastrtps::rtps::WriterDiscoveryInfo::REMOVED_WRITER) {
+      layouts.erase(writer);
+    } else {
+      layouts[writer] = layout_in(info.info.m_qos.m_userData.data_vec());
+    }
+  }
   const std::lock_guard lock(mutex);
   note(remote_writers, info.info, info.status == eprosima::fastrtps::rtps::WriterDiscoveryInfo::REMOVED_WRITER,
        {train.partition, host.partition}, *own);

@@ -3,6 +3,7 @@
 #include "core/time.hpp"
 #include "messaging/fastdds_qos.hpp"
 #include "messaging/fastdds_types.hpp"
+#include "messaging/layout.hpp"
 #include "messaging/participant.hpp"
 
 namespace railfix::messaging {
@@ -42,10 +43,25 @@ struct AnyReader::Impl : dds::DataReaderListener {
   std::shared_ptr<const Handler> handler;
   Queue::Source source;
   bool exclusive = false;
-  OneWriter one_writer;  // the middleware's thread only
+  uint64_t layout = 0;
+  OneWriter one_writer;                     // the middleware's thread only
+  std::map<uint64_t, bool> fits_by_writer;  // the same
+
+  // Its writer was discovered before its samples come.
+  bool fits(uint64_t writer) {
+    const auto [known, is_new] = fits_by_writer.try_emplace(writer, true);
+    if (is_new) {
+      const std::lock_guard lock(participant->layouts_mutex);
+      const auto theirs = participant->layouts.find(writer);
+      known->second =
+          theirs == participant->layouts.end() || theirs->second == 0 || layout == 0 || theirs->second == layout;
+    }
+    return known->second;
+  }
 
   void on_data_available(dds::DataReader* from) override {
     type->take_all(*from, [this](std::shared_ptr<const void> sample, const SampleInfo& info) {
+      if (!fits(info.writer)) return;
       if (exclusive && !one_writer.hears(info.writer)) return;
       queue->push(&source, [run = handler, sample = std::move(sample), info] { (*run)(sample, info); });
     });
@@ -68,6 +84,8 @@ AnyReader::AnyReader(Participant& participant, const TopicInfo& topic, const std
       impl_->subscriber->get_datareader_qos_from_profile(topic.name, qos) != ReturnCode_t::RETCODE_OK) {
     apply(topic.qos, qos);
   }
+  impl_->layout = layout_of(topic);
+  qos.user_data().data_vec(user_data_of_layout(impl_->layout));
   auto* source = inside.source(topic, instance);
   impl_->reader = impl_->subscriber->create_datareader(source, qos, impl_.get(), dds::StatusMask::data_available());
   if (impl_->reader == nullptr) {

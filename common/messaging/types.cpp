@@ -69,14 +69,6 @@ class Pool : public std::enable_shared_from_this<Pool<T>> {
   std::vector<std::unique_ptr<T>> free_;
 };
 
-// Half of the participant's prefix and the entity are enough to tell writers apart.
-uint64_t number_of(const eprosima::fastrtps::rtps::GUID_t& guid) {
-  uint64_t number = 0;
-  for (size_t i = 4; i < 12; ++i) number = number * 31 + guid.guidPrefix.value[i];
-  for (size_t i = 0; i < 4; ++i) number = number * 257 + guid.entityId.value[i];
-  return number;
-}
-
 // The generated getKey() works in memory of the type support, which the writers and readers of a participant share. Two
 // of their threads in it at once give a sample a key that nobody has, and under it stays in the history for ever.
 template <class PubSub>

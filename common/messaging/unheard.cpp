@@ -2,9 +2,21 @@
 
 #include <algorithm>
 
+#include "messaging/layout.hpp"
 #include "messaging/participant.hpp"
 
 namespace railfix::messaging {
+
+namespace {
+
+std::string why_unheard(const Participant::Impl::Remote& writer, uint64_t layout, const Terms& wanted) {
+  if (writer.layout != 0 && layout != 0 && writer.layout != layout)
+    return ": its release has another layout of this topic (IDL); bring both to one release";
+  const auto why = mismatch(writer.terms, wanted);
+  return why.empty() ? "" : ", its quality of service does not fit: " + why;
+}
+
+}  // namespace
 
 std::vector<std::string> unheard_writers(Participant& participant) {
   auto& inside = participant.impl();
@@ -13,13 +25,14 @@ std::vector<std::string> unheard_writers(Participant& participant) {
   for (const auto* reader : inside.readers) {
     const std::string topic = topic_of(*reader);
     const Terms wanted = terms_of(reader->get_qos());
+    const uint64_t layout = layout_in(reader->get_qos().user_data().data_vec());
     for (const auto& [guid, writer] : inside.remote_writers) {
       if (writer.topic != topic) continue;
-      const auto why = mismatch(writer.terms, wanted);
+      const auto why = why_unheard(writer, layout, wanted);
       if (why.empty()) continue;
       const auto name = inside.remote_processes.find(guid.guidPrefix);
       sentences.push_back(topic + (name == inside.remote_processes.end() ? "" : " of " + name->second.name) +
-                          " is not heard, its quality of service does not fit: " + why);
+                          " is not heard" + why);
     }
   }
   std::sort(sentences.begin(), sentences.end());

@@ -2,6 +2,7 @@
 
 #include "messaging/fastdds_qos.hpp"
 #include "messaging/fastdds_types.hpp"
+#include "messaging/layout.hpp"
 #include "messaging/participant.hpp"
 
 namespace railfix::messaging {
@@ -53,6 +54,7 @@ AnyWriter::AnyWriter(Participant& participant, const TopicInfo& topic, const std
       impl_->publisher->get_datawriter_qos_from_profile(topic.name, qos) != ReturnCode_t::RETCODE_OK) {
     apply(topic.qos, qos);
   }
+  qos.user_data().data_vec(user_data_of_layout(layout_of(topic)));
   auto* dds_topic = inside.topic(topic, instance);
   impl_->writer = impl_->publisher->create_datawriter(dds_topic, qos, impl_.get(), dds::StatusMask::all());
   if (impl_->writer == nullptr) {

@@ -1,9 +1,13 @@
 // Real DDS inside one process: typed, loaned, raw and late.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <set>
+
 #include "core/time.hpp"
 #include "messaging/topics.hpp"
+#include "messaging/unheard.hpp"
 
 namespace railfix::messaging {
 namespace {
@@ -162,6 +166,32 @@ TEST_F(Exchange, AnInterfaceThatIsNotHereIsNamedWithThoseThatAre) {
     EXPECT_NE(std::string(error.what()).find("no-such-interface is not here"), std::string::npos) << error.what();
     EXPECT_NE(std::string(error.what()).find("lo (127.0.0.1)"), std::string::npos) << error.what();
   }
+}
+
+// Two releases in one train, in the middle of an upgrade: nonsense must not be taken for a position.
+TEST_F(Exchange, AWriterOfAnotherLayoutIsNotHeardAndNamed) {
+  auto other = info_of(topics::train_state);
+  other.idl = "sensors";  // stands for train_state as another release has it
+  std::set<uint64_t> heard;
+  Reader<msg::TrainState> reader(participant_, topics::train_state, "", queue_,
+                                 [&](const msg::TrainState& state) { heard.insert(state.seq()); });
+  Participant theirs(options("train-" + std::to_string(getpid())));
+  AnyWriter wrong(theirs, other, "");
+  Writer<msg::TrainState> right(theirs, topics::train_state);
+  ASSERT_TRUE(run_until([&] { return reader.matched_writers() == 2; }));
+  msg::TrainState lie;
+  lie.seq(666);
+  msg::TrainState truth;
+  for (const uint64_t seq : {1U, 2U, 3U}) {
+    ASSERT_TRUE(wrong.write(&lie));
+    truth.seq(seq);
+    ASSERT_TRUE(run_until([&] { return right.write(truth) && heard.contains(seq); }));
+  }
+  EXPECT_THAT(heard, ::testing::ElementsAre(1U, 2U, 3U));
+  EXPECT_THAT(unheard_writers(participant_),
+              ::testing::ElementsAre(
+                  "train_state of tool@local is not heard: its release has another layout of this topic (IDL); "
+                  "bring both to one release"));
 }
 
 // Which ones is decided by their numbers, so a reader that joins later gets the same.

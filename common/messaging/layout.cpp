@@ -1,0 +1,45 @@
+#include "messaging/layout.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <string>
+
+#include "idl/embedded_idl.hpp"
+
+namespace railfix::messaging {
+namespace {
+
+constexpr std::string_view kLayout = "layout=";
+
+// FNV-1a over what decides the layout.
+uint64_t hash_of(std::string_view idl) {
+  uint64_t hash = 0xcbf29ce484222325U;
+  for (size_t at = 0; at < idl.size(); ++at) {
+    if (idl.substr(at, 2) == "//") at = std::min(idl.find('\n', at), idl.size() - 1);
+    const auto c = static_cast<unsigned char>(idl[at]);
+    if (std::isspace(c) == 0) hash = (hash ^ c) * 0x100000001b3U;
+  }
+  return hash;
+}
+
+}  // namespace
+
+uint64_t layout_of(const TopicInfo& topic) {
+  const auto file = std::ranges::find(idl::kEmbeddedIdl, topic.idl, &idl::EmbeddedIdl::name);
+  return file == idl::kEmbeddedIdl.end() ? 0 : hash_of(file->text);
+}
+
+std::vector<uint8_t> user_data_of_layout(uint64_t layout) {
+  const std::string text = std::string(kLayout) + std::to_string(layout);
+  return {text.begin(), text.end()};
+}
+
+uint64_t layout_in(const std::vector<uint8_t>& user_data) {
+  const std::string text(user_data.begin(), user_data.end());
+  uint64_t layout = 0;
+  if (text.starts_with(kLayout)) std::from_chars(text.data() + kLayout.size(), text.data() + text.size(), layout);
+  return layout;
+}
+
+}  // namespace railfix::messaging
