@@ -10,8 +10,9 @@
 namespace railfix::track {
 namespace {
 
-constexpr std::array<std::string_view, 9> kLandmarkKinds{"unknown", "frog",   "balise",   "portal_in",     "portal_out",
-                                                         "mast",    "bridge", "platform", "level_crossing"};
+constexpr std::array<std::string_view, 10> kLandmarkKinds{"unknown",        "frog",       "balise", "portal_in",
+                                                          "portal_out",     "mast",       "bridge", "platform",
+                                                          "level_crossing", "underbridge"};
 constexpr std::array<std::string_view, 4> kNodeKinds{"end", "joint", "switch", "crossing"};
 
 std::optional<double> number_from(std::string_view text) {

@@ -20,13 +20,18 @@ enum class LandmarkKind : uint8_t {
   portal_in,
   portal_out,
   mast,
-  bridge,
+  bridge,  // over the track: a road's, a footway's, another line's
   platform,
-  level_crossing  // known from maps only: the camera does not tell it
+  level_crossing,  // this and the next are known from maps only
+  underbridge      // carries the track; nobody sees it from the cab
 };
 /// "frog", "balise", "portal_in", ... as in the run tables; and back.
 std::string to_string(LandmarkKind kind);
 std::optional<LandmarkKind> landmark_kind_from(const std::string& text);
+/// Does a camera in the cab tell it? The other kinds are on the map for people, and no reference.
+constexpr bool can_be_sighted(LandmarkKind kind) {
+  return kind >= LandmarkKind::frog && kind <= LandmarkKind::platform;
+}
 
 enum class NodeKind : uint8_t { end, joint, railway_switch, crossing };
 /// "end", "joint", "switch", "crossing".

@@ -122,6 +122,7 @@ core::Status DatasetWriter::write_truth(const Trajectory& trajectory, const std:
   for (const auto& thing : trajectory.line().things()) {
     // A balise of the neighbouring track is seen, but it is no landmark of this one.
     if (!thing.own && thing.kind == track::LandmarkKind::balise) continue;
+    if (!track::can_be_sighted(thing.kind)) continue;
     landmarks << track::to_string(thing.kind) << thing.distance_m << thing.lateral_m;
     landmarks.end_row();
   }

@@ -257,6 +257,7 @@ void Line::collect_objects() {
         break;
       case track::LandmarkKind::frog:
       case track::LandmarkKind::level_crossing:
+      case track::LandmarkKind::underbridge:
       case track::LandmarkKind::unknown:
         break;
     }

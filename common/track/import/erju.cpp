@@ -32,7 +32,7 @@ class Reader {
     read_links();
     read_balises();
     read_marks("tunnel", LandmarkKind::portal_in);
-    read_marks("bridge", LandmarkKind::bridge);
+    read_marks("bridge", LandmarkKind::underbridge);
     read_marks("levelCrossing", LandmarkKind::level_crossing);
     read_speeds();
     return std::move(net_);

@@ -58,7 +58,7 @@ void OsmMarks::add_structures(ImportedTrack& track) const {
     }
     if (!has(i, "bridge")) continue;
     if (i == 0 || !has(i - 1, "bridge")) bridge_begin = i;
-    if (i + 1 == count || !has(i + 1, "bridge")) add_bridge(at(bridge_begin), at(i + 1), chain_.ways[i], track);
+    if (i + 1 == count || !has(i + 1, "bridge")) add_underbridge(at(bridge_begin), at(i + 1), chain_.ways[i], track);
   }
   for (size_t i = 1; i < count; ++i) add_point_mark(chain_.nodes[i], at(i), track);
 }
@@ -91,10 +91,10 @@ double OsmMarks::offset_of(size_t point, const ImportedTrack& track) const {
   return track.alignment.nearest(chain_.points[point].x(), chain_.points[point].y()).offset_m;
 }
 
-/// One landmark in the middle; the uncertainty covers the bridge.
-void OsmMarks::add_bridge(double from_m, double to_m, size_t way, ImportedTrack& track) const {
+/// A bridge that carries the track, as one landmark in the middle; the uncertainty covers the bridge.
+void OsmMarks::add_underbridge(double from_m, double to_m, size_t way, ImportedTrack& track) const {
   const double length = to_m - from_m;
-  track.marks.push_back({LandmarkKind::bridge, from_m + 0.5 * length, 0,
+  track.marks.push_back({LandmarkKind::underbridge, from_m + 0.5 * length, 0,
                          std::hypot(kMappingSigmaM, length / std::sqrt(12.0)),
                          value_of(data_.ways[way].tags, "bridge:name")});
 }

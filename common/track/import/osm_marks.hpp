@@ -26,7 +26,7 @@ class OsmMarks {
  private:
   void add_structures(ImportedTrack& track) const;
   void add_speeds(ImportedTrack& track) const;
-  void add_bridge(double from_m, double to_m, size_t way, ImportedTrack& track) const;
+  void add_underbridge(double from_m, double to_m, size_t way, ImportedTrack& track) const;
   void add_point_mark(int64_t node, double offset_m, ImportedTrack& track) const;
   [[nodiscard]] double offset_of(size_t point, const ImportedTrack& track) const;
   [[nodiscard]] const OsmTags& tags_of(size_t segment) const { return data_.ways[chain_.ways[segment]].tags; }

@@ -156,8 +156,14 @@ class Reader {
       add(LandmarkKind::portal_in, pos(of) - origin_m_, 0, of);
       add(LandmarkKind::portal_out, pos(of) - origin_m_ + length(of), 0, of);
     }
-    for (const pugi::xml_node& of : elements.child("bridges").children("bridge"))
-      add(LandmarkKind::bridge, pos(of) - origin_m_ + 0.5 * length(of), 0, of);
+    // The schema of railML 2 spells the element "brigde"; files by hand may not.
+    for (const char* spelling : {"brigde", "bridge"}) {
+      for (const pugi::xml_node& of : elements.child("bridges").children(spelling)) {
+        // Only what says that it crosses the track leads over it (kind as wiki2.railml.org, IS:brigde, suggests).
+        const bool is_over = std::string(of.attribute("kind").value()) == "crossing";
+        add(is_over ? LandmarkKind::bridge : LandmarkKind::underbridge, pos(of) - origin_m_ + 0.5 * length(of), 0, of);
+      }
+    }
     for (const pugi::xml_node& of : elements.child("levelCrossings").children("levelCrossing"))
       add(LandmarkKind::level_crossing, pos(of) - origin_m_, 0, of);
     for (const pugi::xml_node& of : elements.child("platformEdges").children("platformEdge")) {

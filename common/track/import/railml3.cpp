@@ -237,7 +237,7 @@ class Reader {
     }
     for (const pugi::xml_node& of : descendants(source_.root(), "underCrossing")) {
       for (const Place& place : places_of(of))
-        add(LandmarkKind::bridge, place, 0.5 * (place.from_m + place.to_m), 0, of);
+        add(LandmarkKind::underbridge, place, 0.5 * (place.from_m + place.to_m), 0, of);
     }
     for (const pugi::xml_node& of : descendants(source_.root(), "levelCrossingIS")) {
       for (const Place& place : places_of(of))

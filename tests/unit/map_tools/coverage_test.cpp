@@ -69,5 +69,16 @@ TEST(Coverage, NaturalReferencesCountWhereAskedFor) {
   EXPECT_NEAR(found.gaps[0].from_m, 900 + (10 - 5) / 0.01, 1e-6);
 }
 
+TEST(Coverage, WhatNobodySightsIsNoReference) {
+  auto map = std::make_shared<track::Map>(track::small_map());
+  map->landmarks.push_back({4, track::LandmarkKind::underbridge, 1, 500, 0, 3, "viaduct"});
+  map->landmarks.push_back({5, track::LandmarkKind::level_crossing, 1, 600, 0, 3, "lane"});
+  const auto path = core::value_or_throw(track::Path::follow(map, {1, 0, Direction::forward}, 5000, 0));
+  EXPECT_EQ(coverage_of(path, {.natural = true}).references, 2U);
+  map->landmarks[3].kind = track::LandmarkKind::bridge;
+  const auto over = core::value_or_throw(track::Path::follow(map, {1, 0, Direction::forward}, 5000, 0));
+  EXPECT_EQ(coverage_of(over, {.natural = true}).references, 3U);
+}
+
 }  // namespace
 }  // namespace railfix::tool

@@ -31,6 +31,8 @@ TEST(Drawing, SvgShowsTracksSwitchesAndGroups) {
   EXPECT_THAT(text, HasSubstr("W&lt;1&gt;&amp;"));
   EXPECT_THAT(text, HasSubstr("85/100"));
   EXPECT_THAT(text, HasSubstr("200 m"));  // the scale bar
+  EXPECT_THAT(text, HasSubstr("bridge over"));
+  EXPECT_THAT(text, HasSubstr("bridge under"));
   std::filesystem::remove(file);
 }
 

@@ -128,7 +128,7 @@ TEST(Map, KnowsLandmarksOfAnEdgeInOrder) {
 }
 
 TEST(Map, NamesOfLandmarkKindsGoBothWays) {
-  for (int kind = 0; kind <= static_cast<int>(LandmarkKind::level_crossing); ++kind) {
+  for (int kind = 0; kind <= static_cast<int>(LandmarkKind::underbridge); ++kind) {
     EXPECT_EQ(landmark_kind_from(to_string(static_cast<LandmarkKind>(kind))), static_cast<LandmarkKind>(kind));
   }
   EXPECT_FALSE(landmark_kind_from("tree"));

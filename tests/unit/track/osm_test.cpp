@@ -105,6 +105,22 @@ TEST_F(OsmTest, TunnelsAndSignalsBecomeLandmarks) {
   EXPECT_NE(of(LandmarkKind::mast), map.landmarks.end());
 }
 
+// A way's own bridge=* carries the track: on the map, but nothing that a camera tells.
+TEST_F(OsmTest, ABridgeThatCarriesTheTrackIsAnUnderbridge) {
+  std::string text = kOverpass;
+  const std::string tag = "\"maxspeed\":\"100\"";
+  text.replace(text.find(tag), tag.size(), tag + ",\"bridge\":\"viaduct\",\"bridge:name\":\"Long One\"");
+  const Map map = core::value_or_throw(build_map({write("a.json", text)}, {})).map;
+  std::vector<const Landmark*> bridges;
+  for (const Landmark& mark : map.landmarks) {
+    EXPECT_NE(mark.kind, LandmarkKind::bridge);
+    if (mark.kind == LandmarkKind::underbridge) bridges.push_back(&mark);
+  }
+  ASSERT_EQ(bridges.size(), 1U);
+  EXPECT_EQ(bridges[0]->name, "Long One");
+  EXPECT_GT(bridges[0]->sigma_m, 50);  // 300 m long
+}
+
 TEST_F(OsmTest, LevelCrossingsAndSpeedsAreKeptInEveryFormat) {
   for (const auto& file :
        {write_osm("a.osm"), write_osm("a.osm.pbf"), write("a.json", kOverpass), write("a.geojson", kGeoJson)}) {

@@ -28,6 +28,26 @@ const Node* node_named(const Map& map, const std::string& name) {
   return found == map.nodes.end() ? nullptr : &*found;
 }
 
+size_t count_of(const Map& map, LandmarkKind kind) {
+  return static_cast<size_t>(
+      std::count_if(map.landmarks.begin(), map.landmarks.end(), [&](const Landmark& m) { return m.kind == kind; }));
+}
+
+/// "KIND NAME at OFFSET on EDGE" of every landmark of these kinds, in order of the edges.
+std::vector<std::string> marks_of(const Map& map, std::initializer_list<LandmarkKind> kinds) {
+  std::vector<std::string> out;
+  for (const Edge& edge : map.edges) {
+    for (const Landmark* mark : map.landmarks_on(edge.id)) {
+      if (std::find(kinds.begin(), kinds.end(), mark->kind) == kinds.end()) continue;
+      char text[120];
+      std::snprintf(text, sizeof text, "%s %s at %.1f on %u", to_string(mark->kind).c_str(), mark->name.c_str(),
+                    mark->offset_m, mark->edge);
+      out.emplace_back(text);
+    }
+  }
+  return out;
+}
+
 /// Name and offset of the only level crossing.
 std::pair<std::string, double> level_crossing_of(const Map& map) {
   std::vector<const Landmark*> found;
@@ -58,12 +78,15 @@ constexpr const char* kRailml2 = R"(<?xml version="1.0"?>
 </connections></trackTopology><trackElements><radiusChanges><radiusChange id="r1" pos="800" radius="500" superelevation="60"/>
 <radiusChange id="r2" pos="950" radius="0"/></radiusChanges><gradientChanges><gradientChange id="g1" pos="0" slope="5"/>
 <gradientChange id="g2" pos="400" slope="-10"/></gradientChanges>
-<bridges><bridge id="br1" name="B" pos="40" length="20"/></bridges>
+<bridges><brigde id="br1" name="B" pos="40" length="20" kind="under"/><bridge id="br2" name="C" pos="80" length="20"/>
+<brigde id="br3" name="D" pos="120" length="10" kind="crossing"/></bridges>
+<tunnels><tunnel id="tu1" name="T" pos="820" length="100"/></tunnels>
+<platformEdges><platformEdge id="pe1" name="P" pos="400" length="150" side="left"/></platformEdges>
 <levelCrossings><levelCrossing id="lc1" name="Mill Lane" pos="100"/></levelCrossings>
 <speedChanges><speedChange id="v1" pos="0" dir="up" vMax="80"/><speedChange id="v2" pos="500" dir="up" vMax="120"/>
 <speedChange id="v3" pos="900" dir="down" vMax="60"/><speedChange id="v4" pos="200" dir="down" vMax="end"/>
 <speedChange id="v5" pos="0" dir="up" vMax="20" profileRef="slow"/></speedChanges></trackElements>
-<ocsElements><balises><balise id="x1" pos="200"/><balise id="x2" pos="203"/>
+<ocsElements><signals><signal id="s1" name="S" pos="280"/></signals><balises><balise id="x1" pos="200"/><balise id="x2" pos="203"/>
 <baliseGroup id="bg1" name="BG" countryID="97" groupID="1234"><baliseRef ref="x1" sequence="1"/><baliseRef ref="x2" sequence="2"/></baliseGroup>
 </balises></ocsElements></track>
 <track id="t2" name="siding"><trackTopology><trackBegin id="b2" pos="0"><connection id="c3" ref="c1"/></trackBegin>
@@ -80,10 +103,17 @@ constexpr const char* kRailml3 = R"(<?xml version="1.0"?>
 <netRelation id="r12" navigability="Both" positionOnA="1" positionOnB="0"><elementA ref="n1"/><elementB ref="n2"/></netRelation>
 <netRelation id="r13" navigability="Both" positionOnA="1" positionOnB="0"><elementA ref="n1"/><elementB ref="n3"/></netRelation>
 <netRelation id="r23" navigability="None" positionOnA="0" positionOnB="0"><elementA ref="n2"/><elementB ref="n3"/></netRelation>
-</netRelations></topology><functionalInfrastructure>
+</netRelations></topology><geometry><gradientCurves><gradientCurve id="g1" curveType="straight" gradient="5"><linearLocation>
+<associatedNetElement netElementRef="n2" posBegin="0" posEnd="200"/></linearLocation></gradientCurve></gradientCurves></geometry><functionalInfrastructure>
 <switchesIS><switchIS id="s1" branchCourse="right" continueCourse="left" type="ordinarySwitch"><name name="W7"/>
 <leftBranch netRelationRef="r12"/><rightBranch netRelationRef="r13"/></switchIS></switchesIS>
-<overCrossings><overCrossing id="o1" constructionType="tunnel"><linearLocation><associatedNetElement netElementRef="n2" posBegin="50" posEnd="150"/></linearLocation></overCrossing></overCrossings>
+<overCrossings><overCrossing id="o1" constructionType="tunnel"><linearLocation><associatedNetElement netElementRef="n2" posBegin="50" posEnd="150"/></linearLocation></overCrossing>
+<overCrossing id="o2" constructionType="bridge"><linearLocation><associatedNetElement netElementRef="n3" posBegin="20" posEnd="30"/></linearLocation></overCrossing></overCrossings>
+<underCrossings><underCrossing id="u1" constructionType="bridge"><linearLocation><associatedNetElement netElementRef="n3" posBegin="40" posEnd="60"/></linearLocation></underCrossing></underCrossings>
+<signalsIS><signalIS id="s2"><spotLocation netElementRef="n1" pos="250"/></signalIS></signalsIS>
+<balises><balise id="b1" baliseGroupRef="bg"><spotLocation netElementRef="n1" pos="200"/></balise>
+<balise id="b2" baliseGroupRef="bg"><spotLocation netElementRef="n1" pos="203"/></balise><balise id="b3"><spotLocation netElementRef="n2" pos="20"/></balise></balises>
+<baliseGroups><baliseGroup id="bg"><etcs countryID="97" groupID="77"/></baliseGroup></baliseGroups>
 <platformEdges><platformEdge id="p1"><linearLocation><associatedNetElement netElementRef="n3" posBegin="100" posEnd="180"/></linearLocation></platformEdge></platformEdges>
 <levelCrossingsIS><levelCrossingIS id="x1"><name name="Mill Lane"/><spotLocation netElementRef="n1" pos="120"/></levelCrossingIS></levelCrossingsIS>
 <speeds><speedProfile id="basic" isBasicSpeedProfile="true"/><speedProfile id="tilting" isBasicSpeedProfile="false"/>
@@ -100,6 +130,8 @@ constexpr const char* kInfra = R"(<?xml version="1.0"?>
 <teSpeedProfiles><teSpeedProfile id="T1"><sameDirProfile><staticSpeedProfile><staticSpeedProfileItem pos="0" speed="60"/>
 <staticSpeedProfileItem pos="200000" speed="40"/></staticSpeedProfile></sameDirProfile><oppositeDirProfile><staticSpeedProfile>
 <staticSpeedProfileItem pos="300000" speed="50"/><staticSpeedProfileItem pos="500000" speed="70"/></staticSpeedProfile></oppositeDirProfile></teSpeedProfile></teSpeedProfiles>
+<tunnels><tunnel id="TU"><trackArea><trackEdgeSections><trackEdgeSection trackEdge="T2" skipFromStart="120000" skipFromEnd="80000"/></trackEdgeSections></trackArea></tunnel></tunnels>
+<bridges><bridge id="BR"><trackArea><trackEdgeSections><trackEdgeSection trackEdge="T2" skipFromStart="240000" skipFromEnd="40000"/></trackEdgeSections></trackArea></bridge></bridges>
 <levelCrossings><levelCrossing id="LX"><trackArea><trackEdgeSection trackEdge="T2" skipFromStart="100000" skipFromEnd="190000"/></trackArea></levelCrossing></levelCrossings>
 <baliseGroups><baliseGroup id="G" nid_c="97" nid_bg="5050" linkOrientationDirection="dirReverse"><balises>
 <balise id="G0"><spotLocation trackEdge="T2" pos="13000"/></balise><balise id="G1"><spotLocation trackEdge="T2" pos="10000"/></balise></balises></baliseGroup></baliseGroups>
@@ -137,6 +169,13 @@ TEST_F(PlanImport, Railml2KeepsWhatThePlanSays) {
   EXPECT_NEAR(map.balise_groups[0].offset_m, 200, 1e-6);
   EXPECT_EQ(map.balise_groups[0].balises.size(), 2U);
   EXPECT_EQ(level_crossing_of(map), std::pair(std::string("Mill Lane"), 100.0));
+  using Kind = LandmarkKind;
+  EXPECT_THAT(marks_of(map, {Kind::bridge, Kind::underbridge, Kind::mast, Kind::platform}),
+              testing::ElementsAre("underbridge B at 50.0 on 1", "underbridge C at 90.0 on 1", "bridge D at 125.0 on 1",
+                                   "mast S at 280.0 on 1", "platform P at 100.0 on 3", "platform P at 250.0 on 3"));
+  EXPECT_THAT(marks_of(map, {Kind::portal_in, Kind::portal_out}),
+              testing::ElementsAre("portal_in T at 120.0 on 4", "portal_out T at 220.0 on 4"));
+  EXPECT_GT(map.landmarks_on(3).front()->lateral_m, 1);  // the platform stands to the left
   // The whole main track: its curve, cant and height.
   const auto shared = std::make_shared<const Map>(map);
   const Path path = core::value_or_throw(Path::follow(shared, {1, 0, Direction::forward}, 2000, 0));
@@ -233,12 +272,19 @@ TEST_F(PlanImport, Railml3KeepsWhatThePlanSays) {
   EXPECT_FALSE(map.connections[0].diverging);
   EXPECT_EQ(std::max(map.connections[0].edge_a, map.connections[0].edge_b), 2U);
   EXPECT_TRUE(map.connections[1].diverging);
-  const auto count = [&](LandmarkKind kind) {
-    return std::count_if(map.landmarks.begin(), map.landmarks.end(), [&](const Landmark& m) { return m.kind == kind; });
-  };
-  EXPECT_EQ(count(LandmarkKind::portal_in), 1);
-  EXPECT_EQ(count(LandmarkKind::portal_out), 1);
-  EXPECT_EQ(count(LandmarkKind::platform), 2);
+  using Kind = LandmarkKind;
+  EXPECT_THAT(
+      marks_of(map, {Kind::mast, Kind::balise, Kind::portal_in, Kind::portal_out}),
+      testing::ElementsAre("balise b1 at 200.0 on 1", "balise b2 at 203.0 on 1", "mast s2 at 250.0 on 1",
+                           "balise b3 at 20.0 on 2", "portal_in o1 at 50.0 on 2", "portal_out o1 at 150.0 on 2"));
+  EXPECT_THAT(marks_of(map, {Kind::bridge, Kind::underbridge, Kind::platform}),
+              testing::ElementsAre("bridge o2 at 25.0 on 3", "underbridge u1 at 50.0 on 3", "platform p1 at 100.0 on 3",
+                                   "platform p1 at 180.0 on 3"));
+  ASSERT_EQ(map.balise_groups.size(), 1U);
+  EXPECT_EQ(map.balise_groups[0].nid_lrbg(), 97U << 14U | 77U);
+  EXPECT_EQ(map.balise_groups[0].balises.size(), 2U);
+  EXPECT_NEAR(map.balise_groups[0].offset_m, 200, 1e-6);
+  EXPECT_NEAR(map.edges[1].alignment.at(100).elevation_m - map.edges[1].alignment.at(0).elevation_m, 0.5, 1e-6);
   EXPECT_EQ(level_crossing_of(map).first, "Mill Lane");
   EXPECT_NEAR(level_crossing_of(map).second, 120, 0.01);
   EXPECT_NEAR(limit_kmh(map, 1, 100, Direction::forward), 100, 1e-9);
@@ -274,18 +320,34 @@ TEST_F(PlanImport, Railml3ClothoidsLeadFromOneArcToTheNext) {
 }
 
 TEST_F(PlanImport, TheExamplesOfBothGenerationsAgree) {
-  for (const auto& [zip, length_m, switches] :
-       {std::tuple("Simplest Example-2.4.zip", 1630.0, 2), {"Simple Example+RTC.zip", 6900.0, 3}}) {
-    SCOPED_TRACE(zip);
-    const std::vector<std::filesystem::path> files = unzipped(zip);
-    if (files.empty()) GTEST_SKIP() << "skipped: no " << zip << ", or no unzip";
-    for (const std::filesystem::path& file : files) {
-      SCOPED_TRACE(file.filename().string());
-      const Map map = core::value_or_throw(build_map({file}, {})).map;
-      EXPECT_NEAR(length_of(map), length_m, 1e-3);
+  struct Example {
+    const char* zip;
+    double length_m;
+    int switches;
+    size_t platform_ends;
+    std::vector<size_t> balises, signals;  // of 2.4 and 3.2, which has no balises and counts stop posts as signals
+  };
+  for (const Example& example : {Example{"Simplest Example-2.4.zip", 1630, 2, 2, {5, 0}, {4, 5}},
+                                 {"Simple Example+RTC.zip", 6900, 3, 8, {7, 0}, {20, 28}}}) {
+    SCOPED_TRACE(example.zip);
+    const std::vector<std::filesystem::path> files = unzipped(example.zip);
+    if (files.empty()) GTEST_SKIP() << "skipped: no " << example.zip << ", or no unzip";
+    ASSERT_EQ(files.size(), 2U);
+    for (size_t i = 0; i < files.size(); ++i) {
+      SCOPED_TRACE(files[i].filename().string());
+      const Map map = core::value_or_throw(build_map({files[i]}, {})).map;
+      EXPECT_NEAR(length_of(map), example.length_m, 1e-3);
       EXPECT_EQ(std::count_if(map.nodes.begin(), map.nodes.end(),
                               [](const Node& node) { return node.kind == NodeKind::railway_switch; }),
-                switches);
+                example.switches);
+      EXPECT_EQ(count_of(map, LandmarkKind::underbridge), 1U);
+      EXPECT_EQ(count_of(map, LandmarkKind::bridge), 0U);
+      EXPECT_EQ(count_of(map, LandmarkKind::portal_in), 1U);
+      EXPECT_EQ(count_of(map, LandmarkKind::portal_out), 1U);
+      EXPECT_EQ(count_of(map, LandmarkKind::level_crossing), 1U);
+      EXPECT_EQ(count_of(map, LandmarkKind::platform), example.platform_ends);
+      EXPECT_EQ(count_of(map, LandmarkKind::balise), example.balises[i]);
+      EXPECT_EQ(count_of(map, LandmarkKind::mast), example.signals[i]);
       EXPECT_TRUE(std::none_of(map.problems.begin(), map.problems.end(), [](const std::string& problem) {
         return problem.find("cannot be reached") != std::string::npos;
       }));
@@ -307,6 +369,10 @@ TEST_F(PlanImport, ErjuWithoutCoordinatesIsADrawing) {
   EXPECT_NEAR(map.edges[1].alignment.at(0).elevation_m, 5, 1e-9);
   EXPECT_EQ(level_crossing_of(map).first, "LX");
   EXPECT_NEAR(level_crossing_of(map).second, 105, 1e-9);
+  using Kind = LandmarkKind;
+  EXPECT_THAT(marks_of(map, {Kind::portal_in, Kind::portal_out, Kind::bridge, Kind::underbridge}),
+              testing::ElementsAre("portal_in TU at 120.0 on 2", "portal_out TU at 220.0 on 2",
+                                   "underbridge BR at 250.0 on 2"));
   EXPECT_NEAR(limit_kmh(map, 1, 100, Direction::forward), 60, 1e-9);
   EXPECT_NEAR(limit_kmh(map, 1, 250, Direction::forward), 40, 1e-9);
   EXPECT_NEAR(limit_kmh(map, 1, 100, Direction::reverse), 50, 1e-9);

@@ -16,9 +16,8 @@ std::vector<Reference> references_on(const track::Path& path, const CoverageOpti
   for (const track::PathBaliseGroup& group : path.balise_groups())
     out.push_back({group.distance_m, group.group->q_locacc_m});
   for (const track::PathLandmark& mark : path.landmarks()) {
-    // Balises come with their groups; no camera tells level crossings.
-    const bool is_natural = mark.kind != track::LandmarkKind::balise && mark.kind != track::LandmarkKind::unknown &&
-                            mark.kind != track::LandmarkKind::level_crossing;
+    // Balises come with their groups.
+    const bool is_natural = track::can_be_sighted(mark.kind) && mark.kind != track::LandmarkKind::balise;
     if (options.natural && is_natural) out.push_back({mark.distance_m, options.sigmas * mark.landmark->sigma_m});
   }
   std::sort(out.begin(), out.end(), [](const Reference& a, const Reference& b) { return a.at_m < b.at_m; });

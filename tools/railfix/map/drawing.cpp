@@ -28,6 +28,8 @@ Colour colour_of(track::LandmarkKind kind) {
       return {120, 60, 20};
     case track::LandmarkKind::bridge:
       return {150, 0, 150};
+    case track::LandmarkKind::underbridge:
+      return {215, 160, 215};
     case track::LandmarkKind::platform:
       return {0, 160, 180};
     case track::LandmarkKind::mast:
@@ -210,7 +212,8 @@ class Painter {
     entry(kSwitch, "switch", false);
     entry(kBalise, "balise group", false);
     entry(colour_of(track::LandmarkKind::portal_in), "portal", false);
-    entry(colour_of(track::LandmarkKind::bridge), "bridge", false);
+    entry(colour_of(track::LandmarkKind::bridge), "bridge over", false);
+    entry(colour_of(track::LandmarkKind::underbridge), "bridge under", false);
     entry(colour_of(track::LandmarkKind::platform), "platform", false);
     entry(colour_of(track::LandmarkKind::mast), "mast", false);
     entry(colour_of(track::LandmarkKind::level_crossing), "level crossing", false);

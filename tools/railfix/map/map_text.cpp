@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <map>
 #include <numeric>
 
 #include "core/units.hpp"
@@ -65,6 +66,9 @@ void print_summary(const track::Map& map) {
               count_of(map, track::NodeKind::railway_switch), count_of(map, track::NodeKind::crossing),
               count_of(map, track::NodeKind::joint), count_of(map, track::NodeKind::end));
   std::printf("landmarks        %zu, balise groups %zu\n", map.landmarks.size(), map.balise_groups.size());
+  std::map<track::LandmarkKind, size_t> of_kind;
+  for (const track::Landmark& mark : map.landmarks) ++of_kind[mark.kind];
+  for (const auto& [kind, count] : of_kind) std::printf("  %-14s %zu\n", track::to_string(kind).c_str(), count);
   const double limited = limited_m(map);
   if (limited > 0) std::printf("speed limits     on %.3f km\n", limited / 1000.0);
 }
