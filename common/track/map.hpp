@@ -93,7 +93,7 @@ struct BaliseGroup {
   bool nominal_is_forward = true;
   bool is_virtual = false;
   double q_locacc_m = 0;
-  std::vector<uint32_t> balises;  // landmark ids
+  std::vector<uint32_t> balises;  // landmark ids, 0 = not among the landmarks
   [[nodiscard]] uint32_t nid_lrbg() const { return nid_c << 14U | nid_bg; }
 };
 

@@ -52,8 +52,9 @@ double amount_m(double value_m) {
   return value_m >= 0 ? value_m : HUGE_VAL;
 }
 
+/// Not when the map does not say of how many balises the group is: then no direction of its own is claimed.
 bool has_co_ordinate_system(const track::BaliseGroup& group) {
-  return group.is_virtual || group.balises.size() != 1;
+  return group.is_virtual || group.balises.size() > 1;
 }
 
 void refer(const TrainPosition& position, const Reference& reference, Motion motion, const ReportSettings& settings,

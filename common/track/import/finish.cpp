@@ -127,8 +127,7 @@ core::Status keep_landmarks(Map& map, const std::vector<std::string>& kinds) {
   }
   map.landmarks = std::move(kept);
   for (BaliseGroup& group : map.balise_groups) {
-    std::erase_if(group.balises, [&](uint32_t id) { return !new_ids.contains(id); });
-    for (uint32_t& id : group.balises) id = new_ids.at(id);
+    for (uint32_t& id : group.balises) id = new_ids.contains(id) ? new_ids.at(id) : 0;
   }
   return {};
 }

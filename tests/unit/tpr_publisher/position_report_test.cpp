@@ -195,6 +195,18 @@ TEST_F(PositionReport, ASingleBaliseGivesPacket1) {
   EXPECT_EQ(fields.q_dirtrain, kNominal);
 }
 
+TEST_F(PositionReport, AGroupOfUnknownSizeClaimsNoDirectionOfItsOwn) {
+  auto unknown_size = *group(kA);
+  unknown_size.balises.clear();
+  reference = Reference{&unknown_size, nullptr, true, true, 30};
+  EXPECT_EQ(report().nid_packet, 1U);
+  EXPECT_EQ(report().q_dirlrbg, kUnknownSide);
+  unknown_size.balises = {0, 0};  // two that are not among the map's landmarks
+  EXPECT_EQ(report().nid_packet, 0U);
+  unknown_size.balises = {0};
+  EXPECT_EQ(report().nid_packet, 1U);
+}
+
 TEST_F(PositionReport, ASingleBaliseAloneHasNoDirections) {
   reference = Reference{group(kC), nullptr, true, true, 30};
   const auto fields = report();
