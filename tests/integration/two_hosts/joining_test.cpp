@@ -1,5 +1,6 @@
 // What the transport under DDS owes a train whose services are bound to the interface of the train network.
 #include <algorithm>
+#include <set>
 
 #include "integration/two_hosts/two_hosts_train.hpp"
 
@@ -20,6 +21,9 @@ class JoiningTest : public TwoHostsTest {
   }
   std::unique_ptr<Participant> join() {
     return hosts_.on(TwoHosts::cab, [&] { return std::make_unique<Participant>(in_cab()); });
+  }
+  bool shell_on(TwoHosts::Host host, const std::string& command) {
+    return hosts_.on(host, [&] { return std::system(command.c_str()) == 0; });
   }
   uint64_t datagrams_in_cab() {
     return hosts_.on(TwoHosts::cab, [] {
@@ -76,6 +80,36 @@ TEST_F(JoiningTest, ANeighbourGetsASampleOnceNotFromEveryInterface) {
   const uint64_t datagrams = datagrams_in_cab() - before;
   std::cout << datagrams << " datagrams for " << kSamples << " samples\n";
   EXPECT_LT(datagrams, kSamples * 3 / 2);
+}
+
+// A switch on a train may pass no multicast: then the addresses of the peers must do.
+TEST_F(JoiningTest, HostsFindEachOtherWithoutMulticast) {
+  for (const auto host : {TwoHosts::cab, TwoHosts::coach}) {
+    if (!shell_on(host, "iptables -A INPUT -d 224.0.0.0/4 -j DROP")) GTEST_SKIP() << "skipped: iptables is not here";
+  }
+  auto reports = start(TwoHosts::coach, "railfix-tpr-publisher");
+  std::set<std::string> services;
+  messaging::Reader<msg::ServiceStatus> status(
+      *cab_, topics::service_status, "", queue_,
+      [&](const msg::ServiceStatus& one) { services.insert(one.service().c_str()); });
+  EXPECT_TRUE(run_until([&] { return services.contains("tpr_publisher"); }));
+}
+
+// Passengers' network, another train's: what is not named in the manifest hears nothing.
+TEST_F(JoiningTest, AnInterfaceThatIsNotNamedStaysSilent) {
+  const bool made =
+      shell_on(TwoHosts::cab,
+               "ip link add other0 type veth peer name other1 && ip address add 10.43.1.1/24 dev other0 && "
+               "ip link set other0 up && ip link set other1 up && "
+               "iptables -A OUTPUT -o other0 -p udp -j ACCEPT && iptables -A OUTPUT -o train0 -p udp -j ACCEPT");
+  if (!made) GTEST_SKIP() << "skipped: iptables is not here";
+  const auto participant = join();
+  messaging::Writer<msg::TrainState> writer(*participant, topics::train_state);
+  auto monitor = start(TwoHosts::coach, "railfix-monitor", {"monitor.port=0", "monitor.foxglove_port=-1"});
+  ASSERT_TRUE(run_until([&] { return writer.write({}) && writer.matched_readers() > 0; }));
+  // Each rule's packets come first in its line.
+  EXPECT_TRUE(shell_on(TwoHosts::cab, "iptables -nvxL OUTPUT | awk '/train0/ { exit !($1 > 0) }'"));
+  EXPECT_TRUE(shell_on(TwoHosts::cab, "iptables -nvxL OUTPUT | awk '/other0/ { exit !($1 == 0) }'"));
 }
 
 }  // namespace
