@@ -120,7 +120,11 @@ std::string MonitorService::exposure() const {
   const std::string sees = "everybody who reaches " + config_.address + " sees the page, its pictures and /metrics" +
                            (tls ? "; " : ", without encryption; ");
   if (!config_.control) return sees + "nobody can control anything";
-  if (config_.token.empty()) return sees + "control only from this computer, because monitor.token is empty";
+  if (config_.token.empty()) {
+    const bool local_too = config_.address == "0.0.0.0" || config_.address == "::";
+    return sees + (local_too ? "control only from this computer at localhost" : "nobody can control anything") +
+           ", because neither monitor.token nor monitor.token_file is set";
+  }
   if (tls) return sees + "control asks for the token";
   return sees +
          "control asks for the token, which travels as it is: use a network that only the train is on, or "

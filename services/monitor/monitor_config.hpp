@@ -15,6 +15,7 @@ struct MonitorConfig {
   std::string map;
   bool control = true;
   std::string token;
+  std::string token_file;
   std::string tls_certificate;
   std::string tls_key;
   double picture_hz = 5;
@@ -40,6 +41,7 @@ struct MonitorConfig {
     fields.text("map", map, "Map file in use (from `railfix map build`); empty = no line is drawn.");
     fields.flag("control", control, "Whether recorder and player can be controlled from the page.");
     fields.text("token", token, "Word that control asks for; empty = control only from this computer itself.");
+    fields.text("token_file", token_file, "File whose first line is that word, which then stands in no configuration.");
     fields.text("tls_certificate", tls_certificate,
                 "PEM file with this computer's certificate and those above it: everything is served with TLS; empty = "
                 "without.");

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 #include <random>
 
 #include "cdr/types.hpp"
@@ -41,10 +42,18 @@ std::optional<track::Map> load_map(const std::string& file) {
   return core::value_or_throw(track::Map::load(file));
 }
 
+MonitorConfig with_token(MonitorConfig config) {
+  if (config.token_file.empty()) return config;
+  if (!config.token.empty()) throw core::BadInput("monitor.token and monitor.token_file are both set; leave one out");
+  if (std::ifstream file(config.token_file); !std::getline(file, config.token) || config.token.empty())
+    throw core::BadInput("monitor.token_file: " + config.token_file + " has no word in its first line; put one there");
+  return config;
+}
+
 }  // namespace
 
 MonitorService::MonitorService(const Config& config, service::Context& context)
-    : config_(config),
+    : config_(with_token(config)),
       context_(context),
       map_(load_map(config.map)),
       map_view_(map_ ? std::make_unique<MapView>(*map_) : nullptr),

@@ -73,7 +73,7 @@ int check(const Options& options) {
   auto findings = findings_of(manifest, options);
   const auto* here = options.host.empty() ? manifest.host_here() : &chosen_host(manifest, options);
   if (here != nullptr) {
-    for (auto& finding : check_computer(&manifest, here)) findings.push_back(std::move(finding));
+    for (auto& finding : check_computer(&manifest, here, options.root)) findings.push_back(std::move(finding));
   }
   const bool good = say(findings);
   if (here == nullptr)
@@ -154,7 +154,7 @@ int up(const Options& options) {
   const auto manifest = core::value_or_throw(read_manifest(options.train));
   const auto& host = chosen_host(manifest, options);
   auto findings = findings_of(manifest, options);
-  for (auto& finding : check_computer(&manifest, &host)) findings.push_back(std::move(finding));
+  for (auto& finding : check_computer(&manifest, &host, options.root)) findings.push_back(std::move(finding));
   if (!say(findings)) return 1;
   const HostFolder folder(options.root);
   const auto installed = folder.plan();
@@ -215,7 +215,7 @@ int upgrade(const Options& options) {
   const auto& host = chosen_host(manifest, options);
   running_plan_here(options);
   auto findings = findings_of(manifest, options);
-  for (auto& finding : check_computer(&manifest, &host)) findings.push_back(std::move(finding));
+  for (auto& finding : check_computer(&manifest, &host, options.root)) findings.push_back(std::move(finding));
   if (!say(findings)) return 1;
   const auto plan = core::value_or_throw(install(manifest, host, options.root));
   const auto done =
@@ -266,7 +266,7 @@ int doctor(const Options& options) {
     manifest = core::value_or_throw(read_manifest(options.train));
     host = &chosen_host(manifest, options);
   }
-  auto findings = check_computer(host == nullptr ? nullptr : &manifest, host);
+  auto findings = check_computer(host == nullptr ? nullptr : &manifest, host, options.root);
   if (host != nullptr) {
     for (auto& finding : check_certificates(manifest, *host)) findings.push_back(std::move(finding));
   }

@@ -57,10 +57,12 @@ class TrainFolder : public ::testing::Test {
     std::ofstream(folder_ / "train.yaml") << text;
     return read_manifest(folder_);
   }
-  std::vector<std::string> findings(const std::string& replace = "", const std::string& by = "") {
+  std::vector<std::string> findings(const std::string& replace = "", const std::string& by = "",
+                                    const std::string& train = kTrain) {
     std::vector<std::string> texts;
-    for (const auto& finding : check_train(manifest(kTrain, replace, by).value(), kNoPrograms)) {
-      if (finding.text.find("are not checked") == std::string::npos) texts.push_back(finding.text);
+    for (const auto& finding : check_train(manifest(train, replace, by).value(), kNoPrograms)) {
+      if (finding.text.find("are not checked") != std::string::npos) continue;  // there are no programs
+      if (finding.text.find("there is no token") == std::string::npos) texts.push_back(finding.text);
     }
     return texts;
   }
@@ -195,6 +197,132 @@ TEST_F(TrainFolder, PermissionsThatDoNotFitAreTold) {
   std::ofstream(permissions) << before;
   EXPECT_THAT(told("12"), ElementsAre(AllOf(Field(&Finding::error, false),
                                             Field(&Finding::text, HasSubstr("does: publish train_pose;")))));
+}
+
+TEST_F(TrainFolder, CertificatesThatOthersHaveMadeRunOutToo) {
+  std::ofstream(folder_ / "line.map") << "map";
+  const auto make = [&](const char* name) {
+    const auto made = test::run_program({"/usr/bin/openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt",
+                                         "ec_paramgen_curve:prime256v1", "-nodes", "-days", "20", "-subj", "/CN=broker",
+                                         "-keyout", (folder_ / "key.pem").string(), "-out", (folder_ / name).string()},
+                                        60);
+    ASSERT_EQ(made.exit_code, 0) << made.err;
+  };
+  make("ca.pem");
+  make("page.pem");
+  std::ofstream(folder_ / "train.pem") << "no certificate";
+  const auto train = [&](const std::string& more) {
+    return manifest(std::string(kTrain) +
+                    "    ground_link: { broker: \"ground.example:8883\", store: reports.db, ca_file: ca.pem,\n"
+                    "      certificate_file: train.pem, key_file: key.pem }\n"
+                    "  monitor: { tls_certificate: " +
+                    (folder_ / "page.pem").string() + ", tls_key: key.pem" + more + " }\n")
+        .value();
+  };
+  const auto texts = [](const std::vector<Finding>& findings) {
+    std::vector<std::string> of;
+    for (const auto& finding : findings) of.push_back((finding.error ? "error: " : "warning: ") + finding.text);
+    return of;
+  };
+  const auto told = texts(check_certificates(train(""), *train("").host("coach")));
+  EXPECT_THAT(told, ElementsAre(AllOf(HasSubstr("warning: "), HasSubstr("/ca.pem runs out in 19 days; get a new one")),
+                                HasSubstr("error: settings.tpr_publisher.ground_link.certificate_file: "),
+                                HasSubstr("/page.pem runs out in 19 days; get a new one")));
+  fs::remove(folder_ / "train.pem");
+  const auto patient = train(", certificate_days: 5");
+  EXPECT_THAT(texts(check_certificates(patient, *patient.host("coach"))), IsEmpty());
+  EXPECT_THAT(texts(check_certificates(train(""), *train("").host("cab"))), ElementsAre(HasSubstr("/ca.pem runs out")))
+      << "the page is on the other host";
+
+  // The same files, as a host runs with them.
+  const HostFolder installed(folder_ / "host");
+  const auto generation = installed.generation(1);
+  HostPlan plan{"re460-042", "coach", 1, 0, false, {{"tpr_publisher", "1.2.0", 1, false, {"x"}, {}, ""}}};
+  ASSERT_TRUE(installed.write(plan).ok());
+  fs::create_directories(generation);
+  std::ofstream(generation / "config.yaml")
+      << "tpr_publisher: { ground_link: { ca_file: " << (folder_ / "ca.pem").string() << " } }\n";
+  EXPECT_THAT(texts(check_installed_certificates(installed)), ElementsAre(HasSubstr("/ca.pem runs out in 19 days")));
+  std::ofstream(generation / "config.yaml", std::ios::app) << "monitor: { certificate_days: 5 }\n";
+  EXPECT_THAT(texts(check_installed_certificates(installed)), IsEmpty());
+}
+
+TEST_F(TrainFolder, ReportsThatLeaveASecuredTrainInTheOpenAreTold) {
+  std::ofstream(folder_ / "line.map") << "map";
+  for (const char* file : {"ca.pem", "password"}) std::ofstream(folder_ / file) << "x";
+  ASSERT_TRUE(make_keys(manifest(kTrain, "run_as: programs", "security: true").value(), {}).ok());
+  const auto told = [&](const std::string& link, const char* run_as = "security: true") {
+    std::string train = kTrain;
+    train.replace(train.find("run_as: programs"), 16, run_as);
+    return findings("settings:\n  tpr_publisher:\n",
+                    "settings:\n  tpr_publisher:\n    ground_link: { broker: g:1883, store: s" + link + " }\n", train);
+  };
+  EXPECT_THAT(told(""), ElementsAre(HasSubstr("reports go to g:1883 without TLS: who is on the way"),
+                                    HasSubstr("reports go to g:1883 without a name: the broker cannot tell")));
+  EXPECT_THAT(told(", user: a, password_file: password"), ElementsAre(HasSubstr("without TLS")));
+  EXPECT_THAT(told("", "run_as: programs"), IsEmpty()) << "nothing is locked down there";
+}
+
+TEST_F(TrainFolder, APageThatNobodyCanControlIsTold) {
+  std::ofstream(folder_ / "line.map") << "map";
+  std::ofstream(folder_ / "word") << "secret";
+  const auto told = [&](const std::string& monitor) {
+    const auto train = manifest(kTrain, "settings:\n", "settings:\n  monitor: " + monitor + "\n").value();
+    const auto found = check_train(train, kNoPrograms);
+    return std::any_of(found.begin(), found.end(), [](const Finding& finding) {
+      return !finding.error && finding.text.find("nobody can control recorder and player") != std::string::npos;
+    });
+  };
+  EXPECT_TRUE(told("{ port: 8080 }"));
+  EXPECT_FALSE(told("{ token_file: word }"));
+  EXPECT_FALSE(told("{ control: false }"));
+  EXPECT_FALSE(told("{ address: 127.0.0.1 }")) << "who sits there may";
+}
+
+TEST_F(TrainFolder, TheWordForControlStandsInNoConfiguration) {
+  std::ofstream(folder_ / "line.map") << "map";
+  std::ofstream(folder_ / "word") << "secret";
+  const auto train = manifest(kTrain, "settings:\n", "settings:\n  monitor: { token_file: word }\n").value();
+  ASSERT_TRUE(render_host(train, *train.host("coach"), folder_ / "out").ok());
+  const auto file = folder_ / "out/files/monitor.token_file";
+  EXPECT_EQ(test::slurp(file), "secret");
+  EXPECT_THAT(test::slurp(folder_ / "out/config.yaml"),
+              AllOf(HasSubstr("token_file: " + file.string()), Not(HasSubstr("secret"))));
+  EXPECT_THAT(settings_of(train, *train.host("coach"), "monitor"), Not(HasSubstr("secret")));
+}
+
+TEST_F(TrainFolder, AComputerThatIsNotSetUpIsTold) {
+  const auto conf = YAML::Load(
+      "{net.core.rmem_max: 212992, net.core.wmem_max: 212992, net.ipv4.ipfrag_time: 30, "
+      "net.ipv4.ipfrag_high_thresh: 4194304}");
+  const auto set = [&](const std::string& name, const std::string& value) {
+    std::string path = name;
+    std::replace(path.begin(), path.end(), '.', '/');
+    fs::create_directories((folder_ / path).parent_path());
+    std::ofstream(folder_ / path) << value << '\n';
+  };
+  for (const auto& entry : conf) set(entry.first.Scalar(), entry.second.Scalar());
+  const auto found = check_kernel(folder_);
+  ASSERT_EQ(found.size(), conf.size()) << "as Linux begins";
+  EXPECT_THAT(found[2].text, HasSubstr("net.ipv4.ipfrag_time is 30, so long that lost fragments block the link"));
+  std::ifstream ours(std::string(RAILFIX_SOURCE_DIR) + "/deploy/host/60-railfix.conf");
+  for (std::string name, equals, value; ours >> name;) {
+    if (name.starts_with("net.")) ours >> equals >> value, set(name, value);
+  }
+  EXPECT_THAT(check_kernel(folder_), IsEmpty()) << "60-railfix.conf sets it";
+}
+
+TEST_F(TrainFolder, DisksOfTheRootAndOfRecordingsAreLookedAt) {
+  const auto told = [&](const std::string& recorder, const fs::path& root) {
+    const auto train = manifest(kTrain, "settings:\n", "settings:\n  recorder: { folder: " + recorder + " }\n").value();
+    std::vector<std::string> texts;
+    for (const auto& finding : check_computer(&train, train.host("cab"), root)) texts.push_back(finding.text);
+    return texts;
+  };
+  // Nothing can be written below /proc: it has no room.
+  EXPECT_THAT(told("/proc/recordings", folder_), Contains(HasSubstr("/proc has 0 MB free; recordings")));
+  EXPECT_THAT(told("recordings", "/proc/root-of-nobody"), Contains(HasSubstr("/proc has 0 MB free; recordings")));
+  EXPECT_THAT(told("recordings", folder_), Not(Contains(HasSubstr("/proc has"))));
 }
 
 TEST_F(TrainFolder, EachHostGetsItsConfigurationComposeFileAndUnit) {

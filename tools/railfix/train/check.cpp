@@ -7,8 +7,6 @@
 #include <fstream>
 #include <future>
 
-#include "core/kernel_clock.hpp"
-#include "messaging/network.hpp"
 #include "messaging/qos_match.hpp"
 #include "train/render.hpp"
 #include "train/run.hpp"
@@ -18,12 +16,6 @@ namespace railfix::tool {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr double kPicturesMb = 512;  // histories of two cameras
-constexpr double kSharedMemoryMb = 16;
-constexpr double kRecordingsMb = 2000;
-constexpr double kDiskMb = 200;
-constexpr int64_t kSocketBytes = 4 << 20;
 
 using Findings = std::vector<Finding>;
 
@@ -79,12 +71,43 @@ void check_quality_of_service(const Manifest& manifest, Findings& findings) {
   for (const auto& mismatch : mismatches.value()) error(findings, mismatch);
 }
 
-// Empty when it is not given.
-std::string setting_of(const Manifest& manifest, const char* service, const char* key) {
+// Of "key" or "group.key"; empty when it is not given.
+std::string setting_of(const Manifest& manifest, const char* service, const std::string& key) {
   const YAML::Node section = manifest.settings[service];
-  if (!section || !section.IsMap()) return "";
-  const YAML::Node value = section[key];
+  const auto dot = key.find('.');
+  const bool grouped = dot != std::string::npos && section && section.IsMap();
+  const YAML::Node group = grouped ? section[key.substr(0, dot)] : section;
+  if (!group || !group.IsMap()) return "";
+  const YAML::Node value = group[key.substr(dot == std::string::npos ? 0 : dot + 1)];
   return value && value.IsScalar() ? value.Scalar() : "";
+}
+
+// Reports leave a train that locks everything else in.
+void check_ground_link(const Manifest& manifest, Findings& findings) {
+  const auto link = [&](const char* key) {
+    return setting_of(manifest, "tpr_publisher", std::string("ground_link.") + key);
+  };
+  if (!manifest.security || manifest.service("tpr_publisher") == nullptr || link("broker").empty()) return;
+  const std::string broker = "settings.tpr_publisher.ground_link: reports go to " + link("broker");
+  if (link("ca_file").empty())
+    warning(findings, broker +
+                          " without TLS: who is on the way reads and changes them; set ca_file to the broker's "
+                          "authority, and the broker's port for TLS (8883)");
+  if (link("user").empty() && link("certificate_file").empty())
+    warning(findings, broker +
+                          " without a name: the broker cannot tell this train from another one; set user and "
+                          "password_file, or certificate_file and key_file");
+}
+
+// A page that is not on this computer alone lets nobody control without a token.
+void check_control(const Manifest& manifest, Findings& findings) {
+  const auto of = [&](const char* key) { return setting_of(manifest, "monitor", key); };
+  const bool local = of("address").starts_with("127.") || of("address") == "localhost";
+  if (manifest.service("monitor") == nullptr || of("control") == "false" || local) return;
+  if (!of("token").empty() || !of("token_file").empty()) return;
+  warning(findings,
+          "settings.monitor: nobody can control recorder and player from the page, because there is no token; put a "
+          "word into a file beside train.yaml and name it in token_file, or set control to false");
 }
 
 // Settings that are right for a run of recorded data and wrong for a train.
@@ -97,6 +120,8 @@ void check_settings(const Manifest& manifest, Findings& findings) {
     warning(findings,
             "settings.monitor.address is 0.0.0.0: page and metrics are open to every network that the computer is in; "
             "leave it out, and they are on the train network only");
+  check_ground_link(manifest, findings);
+  check_control(manifest, findings);
   const auto* camera = manifest.service("frame_grabber");
   const auto* recorder = manifest.service("recorder");
   if (camera != nullptr && recorder != nullptr && camera->host != recorder->host &&
@@ -188,49 +213,6 @@ void check_configurations(const Manifest& manifest, const FindProgram& find_prog
   for (const auto& config : configs) fs::remove(config);
 }
 
-double megabytes_free(const char* folder) {
-  struct statvfs disk {};
-  if (statvfs(folder, &disk) != 0) return -1;
-  return static_cast<double>(disk.f_bavail) * static_cast<double>(disk.f_frsize) / 1e6;
-}
-
-void check_shared_memory(bool pictures, Findings& findings) {
-  const double needed_mb = pictures ? kPicturesMb : kSharedMemoryMb;
-  const double free_mb = megabytes_free("/dev/shm");
-  if (free_mb < 0) return error(findings, "/dev/shm is not there; mount a tmpfs on it");
-  if (free_mb < needed_mb)
-    error(findings, "/dev/shm has " + std::to_string(static_cast<int>(free_mb)) + " MB free, this host needs " +
-                        std::to_string(static_cast<int>(needed_mb)) +
-                        "; mount -o remount,size=2G /dev/shm, and remove " +
-                        "fast_datasharing_* there when no service runs");
-}
-
-void check_clock(Findings& findings) {
-  if (!core::clock_error_ns())
-    warning(findings,
-            "this computer's clock is not disciplined (chrony or PTP): stamps of two hosts cannot be compared");
-}
-
-void check_sockets(Findings& findings) {
-  for (const char* limit : {"rmem_max", "wmem_max"}) {
-    int64_t bytes = 0;
-    std::ifstream(std::string("/proc/sys/net/core/") + limit) >> bytes;
-    if (bytes < kSocketBytes)
-      warning(findings, std::string("net.core.") + limit + " is " + std::to_string(bytes) +
-                            " bytes, too small for bursts between hosts; sysctl -w net.core." + limit + "=16777216 " +
-                            "(60-railfix.conf of railfix train render does it)");
-  }
-}
-
-void check_interface(const TrainHost& host, Findings& findings) {
-  const std::string interface = host.interface.empty() ? host.address : host.interface;
-  if (const auto found = messaging::addresses_of({interface}); !found.ok()) {
-    error(findings, "host " + host.name + ": " + found.error().message);
-  } else if (messaging::running_interfaces({interface}) == 0) {
-    warning(findings, "host " + host.name + ": interface " + interface + " has no carrier; is the cable in?");
-  }
-}
-
 }  // namespace
 
 std::vector<Finding> check_train(const Manifest& manifest, const FindProgram& find_program) {
@@ -241,33 +223,13 @@ std::vector<Finding> check_train(const Manifest& manifest, const FindProgram& fi
   check_settings(manifest, findings);
   check_ports(manifest, findings);
   for (const auto& host : manifest.hosts) {
-    for (auto& finding : check_certificates(manifest, host)) findings.push_back(std::move(finding));
+    for (auto& finding : check_certificates(manifest, host)) {
+      // A file that two hosts get is told once.
+      if (std::find(findings.begin(), findings.end(), finding) == findings.end())
+        findings.push_back(std::move(finding));
+    }
   }
   check_configurations(manifest, find_program, findings);
-  return findings;
-}
-
-std::vector<Finding> check_computer(const Manifest* manifest, const TrainHost* host) {
-  Findings findings;
-  const auto runs = [&](const char* service) {
-    if (manifest == nullptr || host == nullptr) return true;
-    const auto* one = manifest->service(service);
-    return one != nullptr && one->host == host->name;
-  };
-  check_shared_memory(runs("frame_grabber"), findings);
-  if (manifest == nullptr || manifest->hosts.size() > 1) {
-    check_sockets(findings);
-    check_clock(findings);
-  }
-  const char* state = fs::exists("/var/lib/railfix") ? "/var/lib/railfix" : "/var/lib";
-  const double needed_mb = runs("recorder") ? kRecordingsMb : kDiskMb;
-  if (const double disk_mb = megabytes_free(state); disk_mb < needed_mb)
-    error(findings, std::string(state) + " has " + std::to_string(static_cast<int>(disk_mb)) +
-                        " MB free; recordings and unsent reports need " + std::to_string(static_cast<int>(needed_mb)));
-  if (host != nullptr) check_interface(*host, findings);
-  if (manifest != nullptr && host != nullptr && manifest->containers) {
-    for (const auto& problem : container_problems(*manifest, *host)) error(findings, problem);
-  }
   return findings;
 }
 

@@ -15,6 +15,7 @@ namespace railfix::tool {
 struct Finding {
   bool error = true;  // false: a warning; the train may start
   std::string text;   // what is wrong, where, what to do
+  bool operator==(const Finding&) const = default;
 };
 
 /// The manifest against itself and the files beside it: placement of services, ports, files, certificates, and every
@@ -23,13 +24,16 @@ struct Finding {
 using FindProgram = std::function<std::optional<std::filesystem::path>(const HostedService&)>;
 std::vector<Finding> check_train(const Manifest& manifest, const FindProgram& find_program);
 
-/// Certificates of one host beside the manifest: missing, run out, or about to (settings.monitor.certificate_days).
+/// Certificates of one host beside the manifest, and those that its services' settings name: missing, run out, or about
+/// to (settings.monitor.certificate_days).
 std::vector<Finding> check_certificates(const Manifest& manifest, const TrainHost& host);
 /// Those that the services of this computer run with.
 std::vector<Finding> check_installed_certificates(const HostFolder& folder);
 
-/// This computer as a host: shared memory, socket buffers, clock, disk, interface. With a manifest, for what `host`
-/// runs.
-std::vector<Finding> check_computer(const Manifest* manifest, const TrainHost* host);
+/// This computer as a host: shared memory, kernel, clock, disks, interface. With a manifest, for what `host` runs, with
+/// its files below `root`.
+std::vector<Finding> check_computer(const Manifest* manifest, const TrainHost* host, const std::filesystem::path& root);
+/// The kernel's settings for traffic between hosts.
+std::vector<Finding> check_kernel(const std::filesystem::path& proc_sys = "/proc/sys");
 
 }  // namespace railfix::tool

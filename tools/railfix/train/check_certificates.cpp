@@ -6,6 +6,7 @@
 #include "messaging/security.hpp"
 #include "train/check.hpp"
 #include "train/keys.hpp"
+#include "train/setting_files.hpp"
 #include "train/topic_rights.hpp"
 
 namespace railfix::tool {
@@ -13,6 +14,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* kRenewAuthority = "; exchange the authority, beginning with railfix train keys --next-authority";
+constexpr const char* kRenewElsewhere = "; get a new one, put it there, then railfix train upgrade on each host";
 constexpr const char* kRenew = "; railfix train keys --renew, then railfix train upgrade on each host";
 
 /// A file that all services share is told once.
@@ -22,24 +25,24 @@ void add_once(std::vector<Finding>& findings, const Finding& finding) {
   if (!told) findings.push_back(finding);
 }
 
-int64_t warning_days(const Manifest& manifest) {
+int64_t warning_days(const YAML::Node& settings) {
   int64_t days = messaging::kCertificateWarningDays;
-  const auto section = manifest.settings["monitor"];
+  if (!settings || !settings.IsMap()) return days;
+  const YAML::Node section = settings["monitor"];
   if (section && section.IsMap() && section["certificate_days"])
     (void)YAML::convert<int64_t>::decode(section["certificate_days"], days);
   return days;
 }
 
-void check_end(const fs::path& certificate, int64_t soon_days, std::vector<Finding>& findings) {
+void check_end(const fs::path& certificate, int64_t soon_days, const char* remedy, std::vector<Finding>& findings) {
   const auto left = messaging::days_left(certificate);
+  const std::string name = certificate.string();
   if (!left.ok()) {
     add_once(findings, {true, left.error().message});
   } else if (left.value() < 0) {
-    add_once(findings,
-             {true, certificate.string() + " ran out " + std::to_string(-left.value()) + " days ago" + kRenew});
+    add_once(findings, {true, name + " ran out " + std::to_string(-left.value()) + " days ago" + remedy});
   } else if (left.value() < soon_days) {
-    add_once(findings,
-             {false, certificate.string() + " runs out in " + std::to_string(left.value()) + " days" + kRenew});
+    add_once(findings, {false, name + " runs out in " + std::to_string(left.value()) + " days" + remedy});
   }
 }
 
@@ -50,8 +53,25 @@ bool check_identity(const fs::path& folder, const std::string& service, int64_t 
     add_once(findings, {true, files.error().message});
     return false;
   }
-  check_end(messaging::certificate_of(folder, service), soon_days, findings);
+  check_end(folder / "ca.pem", soon_days, kRenewAuthority, findings);
+  check_end(messaging::certificate_of(folder, service), soon_days, kRenew, findings);
   return true;
+}
+
+/// Certificates that somebody else has made: the broker's authority, the train's name there, the page's. Of several in
+/// one file the first counts.
+void check_named_certificates(const YAML::Node& settings, const fs::path& folder, const std::string& service,
+                              std::vector<Finding>& findings) {
+  for (const auto& named : certificate_files(settings)) {
+    const auto file = folder / named.file;  // an absolute one stays so
+    if (named.service != service || !fs::exists(file)) continue;
+    if (messaging::days_left(file).ok()) {
+      check_end(file, warning_days(settings), kRenewElsewhere, findings);
+    } else {
+      add_once(findings,
+               {true, "settings." + service + "." + named.key + ": " + file.string() + " is not a certificate in PEM"});
+    }
+  }
 }
 
 /// Permissions that were made before the train got another domain or name let nobody in; those of a release whose
@@ -67,23 +87,36 @@ void check_permissions(const Manifest& manifest, const std::string& host, const 
   }
 }
 
+void check_keys(const Manifest& manifest, const TrainHost& host, std::vector<Finding>& findings) {
+  const auto folder = manifest.folder / "security" / host.name;
+  if (!fs::exists(folder))  // one reason, one sentence
+    return findings.push_back({true, folder.string() +
+                                         " is missing; make the train's certificates with railfix train keys " +
+                                         manifest.folder.string()});
+  std::vector<std::string> services{kOperator};
+  for (const auto& service : services_on(manifest, host.name)) services.push_back(service.name);
+  for (const auto& service : services) {
+    if (check_identity(folder, service, warning_days(manifest.settings), findings))
+      check_permissions(manifest, host.name, service, folder / (service + ".permissions.p7s"), findings);
+  }
+}
+
+/// The configuration of a generation; empty when it cannot be read, which others say.
+YAML::Node installed_settings(const fs::path& generation) {
+  try {
+    return YAML::LoadFile((generation / "config.yaml").string());
+  } catch (const YAML::Exception&) {
+    return {};
+  }
+}
+
 }  // namespace
 
 std::vector<Finding> check_certificates(const Manifest& manifest, const TrainHost& host) {
   std::vector<Finding> findings;
-  if (!manifest.security) return findings;
-  const auto folder = manifest.folder / "security" / host.name;
-  if (!fs::exists(folder)) {  // one reason, one sentence
-    findings.push_back({true, folder.string() + " is missing; make the train's certificates with railfix train keys " +
-                                  manifest.folder.string()});
-    return findings;
-  }
-  std::vector<std::string> services{kOperator};
-  for (const auto& service : services_on(manifest, host.name)) services.push_back(service.name);
-  for (const auto& service : services) {
-    if (check_identity(folder, service, warning_days(manifest), findings))
-      check_permissions(manifest, host.name, service, folder / (service + ".permissions.p7s"), findings);
-  }
+  if (manifest.security) check_keys(manifest, host, findings);
+  for (const auto& service : services_on(manifest, host.name))
+    check_named_certificates(manifest.settings, manifest.folder, service.name, findings);
   return findings;
 }
 
@@ -92,8 +125,11 @@ std::vector<Finding> check_installed_certificates(const HostFolder& folder) {
   const auto plan = folder.plan();
   if (!plan) return findings;
   for (const auto& service : plan->services) {
-    const auto keys = folder.generation(service.generation) / "security";
-    if (fs::exists(keys)) check_identity(keys, service.name, messaging::kCertificateWarningDays, findings);
+    const auto generation = folder.generation(service.generation);
+    const auto settings = installed_settings(generation);
+    if (fs::exists(generation / "security"))
+      check_identity(generation / "security", service.name, warning_days(settings), findings);
+    check_named_certificates(settings, generation, service.name, findings);
   }
   return findings;
 }

@@ -7,11 +7,15 @@ struct Place {
   const char* service;
   const char* group;  // empty = the section itself
   const char* key;
+  bool is_certificate = false;
 };
-constexpr Place kPlaces[] = {
-    {"tpr_publisher", "ground_link", "ca_file"},  {"tpr_publisher", "ground_link", "certificate_file"},
-    {"tpr_publisher", "ground_link", "key_file"}, {"tpr_publisher", "ground_link", "password_file"},
-    {"monitor", "", "tls_certificate"},           {"monitor", "", "tls_key"}};
+constexpr Place kPlaces[] = {{"tpr_publisher", "ground_link", "ca_file", true},
+                             {"tpr_publisher", "ground_link", "certificate_file", true},
+                             {"tpr_publisher", "ground_link", "key_file"},
+                             {"tpr_publisher", "ground_link", "password_file"},
+                             {"monitor", "", "token_file"},
+                             {"monitor", "", "tls_certificate", true},
+                             {"monitor", "", "tls_key"}};
 
 std::string key_of(const Place& place) {
   return (*place.group == '\0' ? "" : std::string(place.group) + ".") + place.key;
@@ -25,16 +29,28 @@ YAML::Node section_of(const YAML::Node& settings, const Place& place) {
   return section[place.group];
 }
 
+std::vector<SettingFile> files_named(const YAML::Node& settings) {
+  std::vector<SettingFile> files;
+  for (const auto& place : kPlaces) {
+    const auto section = section_of(settings, place);
+    if (!section || !section.IsMap() || !section[place.key] || !section[place.key].IsScalar()) continue;
+    const std::filesystem::path file = section[place.key].Scalar();
+    if (!file.empty()) files.push_back({place.service, key_of(place), file, place.is_certificate});
+  }
+  return files;
+}
+
 }  // namespace
 
 std::vector<SettingFile> setting_files(const Manifest& manifest) {
-  std::vector<SettingFile> files;
-  for (const auto& place : kPlaces) {
-    const auto section = section_of(manifest.settings, place);
-    if (!section || !section.IsMap() || !section[place.key] || !section[place.key].IsScalar()) continue;
-    const std::filesystem::path file = section[place.key].Scalar();
-    if (!file.empty() && file.is_relative()) files.push_back({place.service, key_of(place), file});
-  }
+  auto files = files_named(manifest.settings);
+  std::erase_if(files, [](const auto& file) { return file.file.is_absolute(); });
+  return files;
+}
+
+std::vector<SettingFile> certificate_files(const YAML::Node& settings) {
+  auto files = files_named(settings);
+  std::erase_if(files, [](const auto& file) { return !file.is_certificate; });
   return files;
 }
 

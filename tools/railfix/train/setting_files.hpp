@@ -1,4 +1,5 @@
-// Settings that name files which lie beside train.yaml: certificates and passwords of the ground link and of the page.
+// Settings that name files which lie beside train.yaml: certificates and passwords of the ground link and of the
+// page.
 #pragma once
 
 #include <string>
@@ -12,6 +13,7 @@ struct SettingFile {
   std::string service;
   std::string key;             // "ground_link.ca_file"
   std::filesystem::path file;  // as train.yaml has it, beside train.yaml
+  bool is_certificate = false;
   /// Where it lies in the folder of a host.
   [[nodiscard]] std::string on_host(const std::string& folder) const {
     return folder + "/files/" + service + "." + key + file.extension().string();
@@ -20,6 +22,8 @@ struct SettingFile {
 
 /// Those that the manifest gives. An absolute path is a file that the host has already, and not among them.
 std::vector<SettingFile> setting_files(const Manifest& manifest);
+/// Certificates that the settings name, those that the host has already among them.
+std::vector<SettingFile> certificate_files(const YAML::Node& settings);
 /// Makes the settings name the files in the folder of a host.
 void point_to_host(YAML::Node settings, const std::vector<SettingFile>& files, const std::string& folder);
 

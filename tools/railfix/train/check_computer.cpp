@@ -1,0 +1,143 @@
+// This computer as a host of a train.
+#include <sys/statvfs.h>
+#include <sys/timex.h>
+
+#include <algorithm>
+#include <fstream>
+
+#include "core/kernel_clock.hpp"
+#include "messaging/network.hpp"
+#include "train/check.hpp"
+
+namespace railfix::tool {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kPicturesMb = 512;  // histories of two cameras
+constexpr double kSharedMemoryMb = 16;
+constexpr double kRecordingsMb = 2000;
+constexpr double kDiskMb = 200;
+
+using Findings = std::vector<Finding>;
+
+void error(Findings& findings, const std::string& text) {
+  findings.push_back({true, text});
+}
+void warning(Findings& findings, const std::string& text) {
+  findings.push_back({false, text});
+}
+
+double megabytes_free(const fs::path& folder) {
+  struct statvfs disk {};
+  if (statvfs(folder.c_str(), &disk) != 0) return -1;
+  return static_cast<double>(disk.f_bavail) * static_cast<double>(disk.f_frsize) / 1e6;
+}
+
+void check_shared_memory(bool pictures, Findings& findings) {
+  const double needed_mb = pictures ? kPicturesMb : kSharedMemoryMb;
+  const double free_mb = megabytes_free("/dev/shm");
+  if (free_mb < 0) return error(findings, "/dev/shm is not there; mount a tmpfs on it");
+  if (free_mb < needed_mb)
+    error(findings, "/dev/shm has " + std::to_string(static_cast<int>(free_mb)) + " MB free, this host needs " +
+                        std::to_string(static_cast<int>(needed_mb)) +
+                        "; mount -o remount,size=2G /dev/shm, and remove " +
+                        "fast_datasharing_* there when no service runs");
+}
+
+void check_clock(Findings& findings) {
+  if (!core::clock_error_ns())
+    warning(findings,
+            "this computer's clock is not disciplined (chrony or PTP): stamps of two hosts cannot be compared");
+}
+
+// The folder, or the one above it that is there: where its disk will be.
+fs::path standing(fs::path folder) {
+  while (!fs::exists(folder) && folder.has_relative_path()) folder = folder.parent_path();
+  return folder;
+}
+
+// Containers see the host's folder of services under its usual name.
+fs::path recordings_of(const Manifest* manifest, const fs::path& home) {
+  fs::path folder = "recordings";
+  if (manifest != nullptr) {
+    const YAML::Node section = manifest->settings["recorder"];
+    if (section && section.IsMap() && section["folder"] && section["folder"].IsScalar())
+      folder = section["folder"].Scalar();
+    const auto inside = folder.lexically_relative(kContainerHome);
+    if (manifest->containers && !inside.empty() && *inside.begin() != "..") folder = inside;
+  }
+  return home / folder;
+}
+
+void check_disk(const fs::path& folder, double needed_mb, Findings& findings) {
+  const auto there = standing(folder);
+  if (const double free_mb = megabytes_free(there); free_mb < needed_mb)
+    error(findings, there.string() + " has " + std::to_string(static_cast<int>(std::max(free_mb, 0.0))) +
+                        " MB free; recordings and unsent reports need " + std::to_string(static_cast<int>(needed_mb)));
+}
+
+void check_interface(const TrainHost& host, Findings& findings) {
+  const std::string interface = host.interface.empty() ? host.address : host.interface;
+  if (const auto found = messaging::addresses_of({interface}); !found.ok()) {
+    error(findings, "host " + host.name + ": " + found.error().message);
+  } else if (messaging::running_interfaces({interface}) == 0) {
+    warning(findings, "host " + host.name + ": interface " + interface + " has no carrier; is the cable in?");
+  }
+}
+
+}  // namespace
+
+std::vector<Finding> check_kernel(const fs::path& proc_sys) {
+  // What 60-railfix.conf sets, and what is still enough. Fragments of a datagram that has lost one fill the memory for
+  // them until their time is over: with 30 s a link that drops is blocked.
+  struct Setting {
+    const char* name;
+    int64_t set;
+    int64_t enough;
+    bool at_least;
+    const char* otherwise;
+  };
+  static constexpr Setting kSettings[] = {
+      {"net.core.rmem_max", 16777216, 4 << 20, true, "too small for bursts between hosts"},
+      {"net.core.wmem_max", 16777216, 4 << 20, true, "too small for bursts between hosts"},
+      {"net.ipv4.ipfrag_time", 3, 5, false, "so long that lost fragments block the link between hosts"},
+      {"net.ipv4.ipfrag_high_thresh", 134217728, 16 << 20, true, "too small for fragments of bursts between hosts"}};
+  Findings findings;
+  for (const auto& setting : kSettings) {
+    const std::string name = setting.name;
+    std::string path = name;
+    std::replace(path.begin(), path.end(), '.', '/');
+    int64_t value = 0;
+    std::ifstream file(proc_sys / path);
+    if (!(file >> value) || (setting.at_least ? value >= setting.enough : value <= setting.enough)) continue;
+    warning(findings, name + " is " + std::to_string(value) + ", " + setting.otherwise + "; sysctl -w " + name + "=" +
+                          std::to_string(setting.set) + " (60-railfix.conf of railfix train render does it)");
+  }
+  return findings;
+}
+
+std::vector<Finding> check_computer(const Manifest* manifest, const TrainHost* host, const fs::path& root) {
+  Findings findings;
+  const auto add = [&](std::vector<Finding> more) { findings.insert(findings.end(), more.begin(), more.end()); };
+  const auto runs = [&](const char* service) {
+    if (manifest == nullptr || host == nullptr) return true;
+    const auto* one = manifest->service(service);
+    return one != nullptr && one->host == host->name;
+  };
+  check_shared_memory(runs("frame_grabber"), findings);
+  if (manifest == nullptr || manifest->hosts.size() > 1) {
+    add(check_kernel());
+    check_clock(findings);
+  }
+  const auto home = HostFolder(fs::absolute(root)).home();
+  check_disk(home, kDiskMb, findings);
+  if (runs("recorder")) check_disk(recordings_of(manifest, home), kRecordingsMb, findings);
+  if (host != nullptr) check_interface(*host, findings);
+  if (manifest != nullptr && host != nullptr && manifest->containers) {
+    for (const auto& problem : container_problems(*manifest, *host)) error(findings, problem);
+  }
+  return findings;
+}
+
+}  // namespace railfix::tool
