@@ -250,6 +250,21 @@ TEST_F(MonitorLiveTest, SaysWhatItMeansToListenForOthers) {
                                HasSubstr("control asks for the token, which travels as it is")));
 }
 
+TEST_F(MonitorLiveTest, SaysWhoMayControlWithoutAToken) {
+  start({"monitor.address=0.0.0.0"}, "localhost");
+  EXPECT_THAT(test::slurp(kWork / "monitor.log"), HasSubstr("control only from this computer at localhost, because "
+                                                            "neither monitor.token nor monitor.token_file is set"));
+}
+
+TEST_F(MonitorLiveTest, TakesTheWordForControlFromAFile) {
+  const auto word = kWork / "word";
+  std::ofstream(word) << "secret\n";
+  start({"monitor.address=0.0.0.0", "monitor.token_file=" + word.string()}, "localhost");
+  EXPECT_THAT(client("get", "/api/about"), HasSubstr("\"control\":\"token\""));
+  EXPECT_THAT(test::slurp(kWork / "monitor.log"),
+              ::testing::AllOf(HasSubstr("control asks for the token"), ::testing::Not(HasSubstr("secret"))));
+}
+
 TEST_F(MonitorLiveTest, SpeaksTlsWithTheCertificateThatItIsGiven) {
   const std::string certificate = (kWork / "certificate.pem").string();
   const std::string key = (kWork / "key.pem").string();
