@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kMostLegs = 100000;  // ends a path round a ring of tiny edges
 constexpr size_t kMostJoinSteps = 200;
-constexpr double kLongestJoinM = 3000;
+constexpr double kLongestJoinM = 30000;  // a wrong leg may have been followed for so long
 
 double end_heading(const Run& run) {
   return run.edge->alignment.at(run.forward ? run.edge->alignment.length_m() : 0.0).pose.heading_rad +
@@ -85,10 +85,14 @@ std::optional<Route> join(const Route& old, const Ways& ways, const Run& run, bo
     const std::vector<Run> further = behind ? ways.before(steps[i].run) : ways.after(steps[i].run);
     for (const Run& next : further) {
       const auto& legs = old.legs();
+      // The nearest one: a ring is run over several times.
       std::optional<size_t> met;
+      double met_off_m = kLongestJoinM;
       for (size_t k = 0; k < legs.size(); ++k) {
         const double off_m = std::abs((behind ? legs[k].end_m() : legs[k].begin_m) - near_m);
-        if (legs[k].run == next && off_m < kLongestJoinM) met = k;
+        if (legs[k].run != next || off_m >= met_off_m) continue;
+        met = k;
+        met_off_m = off_m;
       }
       if (!met) {
         steps.push_back({next, static_cast<int>(i)});

@@ -140,7 +140,8 @@ void Estimator::judge(TrainEstimate& e, double since_sure_m) const {
   if (time_doubt_m_ > 0) add_reason(e, "a gap in time: the clock was set, or nothing measured");
   if (refused_fix_) add_reason(e, "a position fix was refused");
   if (corrected_) add_reason(e, "position was corrected by two fixes against the filter");
-  if (off_path_fixes_ > 0) add_reason(e, "a position fix lies on another track");
+  if (off_path_) add_reason(e, "a position fix lies on another track");
+  if (track_doubt_.turns_otherwise()) add_reason(e, "the train turns otherwise than this track");
   if (!path_) add_reason(e, "place on the map not known");
   if (path_ && (filter_.path_distance_m() < path_->begin_m() || filter_.path_distance_m() > path_->end_m())) {
     add_reason(e, "beyond the end of the mapped track");

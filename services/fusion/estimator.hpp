@@ -182,6 +182,7 @@ class Estimator {
   [[nodiscard]] double unwatched_share() const;
   void recover_wheel(const WheelInput& sample, double wheel_m, double sigma_m);
   void use_yaw_rate(double rate_rps);
+  void use_track(const FixInput& fix);
   void refuse(const FixInput& fix, double path_distance_m, const Offer& offer);
   void accept(const FixInput& fix);
   void watch_standstill();
@@ -212,9 +213,9 @@ class Estimator {
   int gnss_agreed_ = 0;     // in a row
   bool corrected_ = false;  // the place was moved against the filter's word, not confirmed yet
   uint32_t reference_ = 0;
-  uint32_t off_path_fixes_ = 0;  // since the last fix that was used
-  double doubt_m_ = 0;           // camera and the rest contradict each other by so much since the reference
-  double time_doubt_m_ = 0;      // so far behind, because time without data may be no time but a clock that was set
+  std::optional<track::EdgePosition> off_path_;  // a fix was there since the last one that was used
+  double doubt_m_ = 0;       // camera and the rest contradict each other by so much since the reference
+  double time_doubt_m_ = 0;  // so far behind, because time without data may be no time but a clock that was set
   int64_t gap_begin_ns_ = 0;
   double doubt_behind_m_ = 0;  // a refused fix says that the train is so far behind
   double doubt_ahead_m_ = 0;

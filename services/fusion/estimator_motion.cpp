@@ -284,8 +284,10 @@ void Estimator::use_yaw_rate(double rate_rps) {
   // A tenth of the curvature covers the map's error, which is the same for a whole curve.
   const double sigma_rps =
       parameters_->gyro_sigma_rps + std::abs(point.curvature_per_m) * (0.1 * std::abs(speed_mps) + speed_sigma_mps);
-  filter_.offer_yaw_rate(rate_rps, point.curvature_per_m, point.curvature_rate_per_m2, sigma_rps,
-                         parameters_->gate_gyro);
+  const auto offer = filter_.offer_yaw_rate(rate_rps, point.curvature_per_m, point.curvature_rate_per_m2, sigma_rps,
+                                            parameters_->gate_gyro);
+  const bool bends = std::abs(speed_mps * point.curvature_per_m) > parameters_->gate_gyro * sigma_rps;
+  track_doubt_.turned(offer.used, bends);
 }
 
 }  // namespace railfix::fusion

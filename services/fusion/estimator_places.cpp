@@ -69,14 +69,25 @@ void Estimator::use(const GnssInput& sample) {
   }
 }
 
+void Estimator::use_track(const FixInput& fix) {
+  if (fix.new_path) {
+    path_ = fix.new_path;
+    track_doubt_.changed();
+    // What was seen beside the old way lies on the new one: it spoke for it.
+    if (off_path_ && path_->distance_of(off_path_->edge, off_path_->offset_m)) {
+      off_path_.reset();
+      track_doubt_.seen_here();
+    }
+  }
+  // What is said of another track is no more than its rest for this one.
+  const auto of_m = path_->distance_of(fix.edge, fix.offset_m);
+  const double here_m = filter_.path_distance_m();
+  track_doubt_.said(of_m ? fix.probability : std::min(fix.probability, 1 - fix.probability), of_m, here_m);
+}
+
 void Estimator::use(const FixInput& fix) {
   if (fix.kind == FixKind::track) {
-    if (!path_) return;
-    if (fix.new_path) path_ = fix.new_path;
-    // What is said of another track is no more than its rest for this one.
-    const auto of_m = path_->distance_of(fix.edge, fix.offset_m);
-    const double here_m = filter_.path_distance_m();
-    track_doubt_.said(of_m ? fix.probability : std::min(fix.probability, 1 - fix.probability), of_m, here_m);
+    if (path_) use_track(fix);
     return;
   }
   auto& watch = watched(fix.kind == FixKind::curvature ? Source::curvature : Source::landmark);
@@ -91,7 +102,8 @@ void Estimator::use(const FixInput& fix) {
   if (!path_ || fix.probability < parameters_->fix_min_probability) return;
   const auto path_distance_m = path_->distance_of(fix.edge, fix.offset_m);
   if (!path_distance_m) {
-    ++off_path_fixes_;
+    off_path_ = track::EdgePosition{fix.edge, fix.offset_m, fix.direction};
+    track_doubt_.seen_elsewhere(fix.probability);
     return;
   }
   // A second fix on the landmark of the first has the same error of the map in it.
@@ -110,7 +122,8 @@ void Estimator::use(const FixInput& fix) {
 
 void Estimator::accept(const FixInput& fix) {
   watched(fix.kind == FixKind::curvature ? Source::curvature : Source::landmark).accept(fix.stamp_ns);
-  off_path_fixes_ = 0;
+  off_path_.reset();
+  track_doubt_.seen_here();
   // A vague fix helps, but settles no doubt and is nothing to measure a distance from.
   if (fix.kind == FixKind::curvature && fix.sigma_m > 2 * filter_.path_sigma_m()) return;
   fix_verdict_ = FixVerdict::used;

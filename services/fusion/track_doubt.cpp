@@ -7,6 +7,10 @@ namespace railfix::fusion {
 namespace {
 
 constexpr double kSameSwitchM = 1.0;  // a path that was joined anew may have it elsewhere by so much
+// Seconds in which the train turns otherwise, or as the track does: one may be a bump.
+constexpr int kTurnsToDoubt = 3;
+constexpr int kTurnsToBelieve = 5;
+constexpr double kTurnsOtherwise = 0.5;  // the gyro may be wrong as well as the track
 
 }  // namespace
 
@@ -17,6 +21,29 @@ void TrackDoubt::said(double probability, std::optional<double> of_m, double pla
     const bool between = of_m && (one.distance_m - *of_m) * (one.distance_m - place_m) < 0;
     return !between;
   });
+}
+
+void TrackDoubt::changed() {
+  turned_otherwise_ = turned_alike_ = 0;
+  turns_otherwise_ = false;
+}
+
+void TrackDoubt::seen_elsewhere(double probability) {
+  here_at_most_ = std::min(here_at_most_, 1 - probability);
+}
+
+void TrackDoubt::seen_here() {
+  changed();
+  divided_ = false;
+  here_at_most_ = 1;
+}
+
+void TrackDoubt::turned(bool fits, bool bends) {
+  turned_otherwise_ = fits ? 0 : turned_otherwise_ + 1;
+  if (!fits) turned_alike_ = 0;
+  if (fits && bends) ++turned_alike_;
+  if (turned_alike_ >= kTurnsToBelieve) turns_otherwise_ = false;
+  if (divided_ && turned_otherwise_ >= kTurnsToDoubt) turns_otherwise_ = true;
 }
 
 void TrackDoubt::move(const track::Path& path, double place_m) {
@@ -34,13 +61,14 @@ void TrackDoubt::move(const track::Path& path, double place_m) {
       return s.ahead != ahead && std::abs(s.distance_m - one->distance_m) < kSameSwitchM;
     });
     if (one->ahead == ahead) open_.push_back(*one);
+    divided_ = divided_ || one->ahead == ahead;
   }
 }
 
 double TrackDoubt::probability() const {
   double probability = said_;
   for (const auto& one : open_) probability /= one.ways;
-  return probability;
+  return std::min({probability, here_at_most_, turns_otherwise_ ? kTurnsOtherwise : 1.0});
 }
 
 double TrackDoubt::probability_at(const track::Path& path, double place_m) const {

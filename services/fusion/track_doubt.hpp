@@ -1,5 +1,7 @@
 // Is the train on the track that is followed? Certain where it starts; behind every switch that could have led it
-// elsewhere only as probable as somebody says who looked (map_matcher), else as one of the ways.
+// elsewhere only as probable as somebody says who looked (map_matcher), else as one of the ways. He may be wrong: a
+// place that was seen on another track, or a train that turns otherwise, speaks against him however often he repeats
+// himself.
 #pragma once
 
 #include <optional>
@@ -14,6 +16,14 @@ class TrackDoubt {
   /// Somebody says that the track is right with this probability, for a train at `of_m` (nothing: not on this path)
   /// while it is at `place_m`. Switches between the two stay open.
   void said(double probability, std::optional<double> of_m, double place_m);
+  /// Another track is followed from now on.
+  void changed();
+  /// A place on another track was seen with this probability; a place on this one.
+  void seen_elsewhere(double probability);
+  void seen_here();
+  /// The train turned as this track does, or not; bends: where that says something.
+  void turned(bool fits, bool bends);
+  [[nodiscard]] bool turns_otherwise() const { return turns_otherwise_; }
   /// The train is at `place_m` of its path now.
   void move(const track::Path& path, double place_m);
   [[nodiscard]] double probability() const;
@@ -24,6 +34,11 @@ class TrackDoubt {
   double said_ = 1;
   std::optional<double> place_m_;
   std::vector<track::PathSwitch> open_;  // run over since somebody looked
+  bool divided_ = false;                 // a switch was run over since a place on this track was seen
+  double here_at_most_ = 1;              // by what was seen elsewhere
+  int turned_otherwise_ = 0;             // in a row
+  int turned_alike_ = 0;                 // in bends, in a row
+  bool turns_otherwise_ = false;
 };
 
 }  // namespace railfix::fusion

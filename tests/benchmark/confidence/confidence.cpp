@@ -96,6 +96,8 @@ void print(const CampaignResult& result) {
                 runs(fusion::SavedScalesAre::confirmed), runs(fusion::SavedScalesAre::contradicted),
                 runs(fusion::SavedScalesAre::on_trial));
   }
+  std::printf("on a leg that the train did not take: %zu states, %zu of them declared and ok, for up to %.1f s\n",
+              result.sum.other_leg, result.sum.other_leg_sure, result.sum.other_leg_sure_s);
   auto wide = result.wide;
   std::ranges::sort(wide, std::ranges::greater{}, &BadRun::wider_share);
   for (size_t i = 0; i < std::min(wide.size(), kWideShown); ++i)
@@ -144,9 +146,12 @@ void trace(const CampaignPlan& plan, uint64_t number) {
     if (t_s < next_s && t_s > next_s - 2 && outside == was_outside) return;
     next_s = t_s + 1;
     was_outside = outside;
-    std::printf("%8.2f s %8.1f m %5.1f m/s error %8.3f in [-%.2f, +%.2f] sigma %.3f since %.0f scales %.4f %.4f %s%s\n",
-                t_s, e.distance_m, e.speed_mps, error_m, e.under_m, e.over_m, e.sigma_m, e.since_reference_m,
-                e.visual_scale, e.wheel_scale, outside ? "OUTSIDE " : "", e.reason.c_str());
+    std::printf(
+        "%8.2f s %8.1f m %5.1f m/s error %8.3f in [-%.2f, +%.2f] sigma %.3f since %.0f scales %.4f %.4f track %u "
+        "%.4f%s %s%s\n",
+        t_s, e.distance_m, e.speed_mps, error_m, e.under_m, e.over_m, e.sigma_m, e.since_reference_m, e.visual_scale,
+        e.wheel_scale, e.position.edge, e.track_probability, simulation.on_way(e.position) ? "" : " OTHER LEG",
+        outside ? "OUTSIDE " : "", e.reason.c_str());
   });
 }
 
@@ -158,6 +163,8 @@ int run(int argc, char** argv) {
   s.landmark_spread = 0.7;
   s.false_fix_share = 0.005;
   s.fix_probability = 0.995;
+  s.track_fixes = true;
+  s.switch_spacing_m = 1500;
   CLI::App app("Confidence campaign: simulated sensors with faults through fusion, the interval against the truth");
   app.add_option("--km", a.plan.km, "Way to run in total")->capture_default_str();
   app.add_option("--seed", a.plan.seed, "Other seeds, other runs")->capture_default_str();
@@ -167,6 +174,7 @@ int run(int argc, char** argv) {
   app.add_option("--sudden", a.sudden_mps2,
                  "Accelerate and brake so hard (m/s2), from one moment to the next; 0: gently");
   app.add_option("--landmarks-m", s.landmark_spacing_m, "Mean distance of landmarks, 0 = none")->capture_default_str();
+  app.add_option("--switches-m", s.switch_spacing_m, "Mean distance of facing points, 0 = none")->capture_default_str();
   app.add_option("--fault", a.fault, "all, none, SENSOR or SENSOR:KIND")->capture_default_str();
   app.add_option("--without", a.without, "Leave out any of camera, wheel, imu, gnss, landmarks (comma between)");
   app.add_option("--map", a.map, "Compiled map instead of random lines");

@@ -15,44 +15,52 @@ using fusion::ImuInput;
 using fusion::OdometryInput;
 using fusion::WheelInput;
 
-constexpr double kPictureS = 0.05;
 constexpr double kPulseS = 0.05;
 constexpr double kInertialS = 0.02;
 constexpr double kPulsesPerMetre = 90;
 constexpr double kKeyFrameM = 0.15;
-constexpr double kSureProbability = 0.9999;
 // Of a scale, between trips of one train: the light and the track for a camera, load and temperature for a wheel.
 constexpr double kCameraTripChange = 2e-4;
 constexpr double kWheelTripChange = 5e-5;
-
-core::Random stream(uint64_t seed, uint64_t number) {
-  core::Random mixed(seed * 1'000'003 + number);
-  return core::Random(mixed.next());
-}
 
 Drive drive_on(uint64_t seed, const SimulationPlan& plan, double most_m) {
   auto random = stream(seed, 2);
   return Drive(random, plan.duration_s, plan.max_speed_mps, most_m, plan.style);
 }
 
-std::shared_ptr<const track::Map> line_of(uint64_t seed, const SimulationPlan& plan) {
+RandomLine line_of(uint64_t seed, const SimulationPlan& plan) {
   auto random = stream(seed, 1);
-  return random_line(random, TrainSimulation::kStartOffsetM + (plan.max_speed_mps + 3) * plan.duration_s + 1000);
+  return random_line(random, TrainSimulation::kStartOffsetM + (plan.max_speed_mps + 3) * plan.duration_s + 1000,
+                     plan.switch_spacing_m);
 }
 
 }  // namespace
 
+core::Random stream(uint64_t seed, uint64_t number) {
+  core::Random mixed(seed * 1'000'003 + number);
+  return core::Random(mixed.next());
+}
+
 TrainSimulation::TrainSimulation(const SimulationPlan& plan, uint64_t seed)
-    : TrainSimulation(plan, seed, line_of(seed, plan), {1, kStartOffsetM, track::Direction::forward}) {}
+    : TrainSimulation(plan, seed, line_of(seed, plan)) {}
+
+TrainSimulation::TrainSimulation(const SimulationPlan& plan, uint64_t seed, const RandomLine& line)
+    : TrainSimulation(plan, seed, line.map, {1, kStartOffsetM, track::Direction::forward}, line.way) {}
 
 TrainSimulation::TrainSimulation(const SimulationPlan& plan, uint64_t seed, std::shared_ptr<const track::Map> on,
                                  const track::EdgePosition& start)
+    : TrainSimulation(plan, seed, std::move(on), start, {}) {}
+
+TrainSimulation::TrainSimulation(const SimulationPlan& plan, uint64_t seed, std::shared_ptr<const track::Map> on,
+                                 const track::EdgePosition& start, const std::vector<uint32_t>& via)
     : map(std::move(on)),
       plan_(plan),
       seed_(seed),
       start_(start),
-      path_(std::make_shared<const track::Path>(core::value_or_throw(track::Path::follow(map, start, 300000, 1000)))),
+      path_(std::make_shared<const track::Path>(
+          core::value_or_throw(track::Path::follow(map, start, 300000, 1000, via)))),
       drive_(drive_on(seed, plan, path_->end_m() - 10)) {
+  if (plan_.track_fixes) find_points();
   measure();
 }
 
@@ -63,6 +71,10 @@ void TrainSimulation::measure() {
   if (plan_.wheel) make_pulses();
   if (plan_.imu) make_inertial();
   if (plan_.gnss) make_gnss();
+  if (plan_.track_fixes) {
+    make_declarations();
+    make_track_fixes();
+  }
   if (!plan_.map_landmarks.empty()) {
     make_fixes_of_map();
   } else if (plan_.landmark_spacing_m > 0) {
@@ -109,8 +121,16 @@ Motion TrainSimulation::truth_at(int64_t stamp_ns, double arrival_s) const {
 
 std::optional<double> TrainSimulation::error_m(const track::EdgePosition& place, const Motion& truth) const {
   const auto distance_m = path_->distance_of(place.edge, place.offset_m);
-  if (!distance_m) return std::nullopt;
-  return *distance_m - truth.distance_m;
+  if (distance_m) return *distance_m - truth.distance_m;
+  const auto points = std::ranges::find(points_, place.edge, [](const Points& one) { return one.other.edge->id; });
+  if (points == points_.end()) return std::nullopt;
+  const auto& other = points->other;
+  const double behind_m = other.forward ? place.offset_m : other.length_m() - place.offset_m;
+  return points->distance_m + behind_m - truth.distance_m;
+}
+
+bool TrainSimulation::on_way(const track::EdgePosition& place) const {
+  return path_->distance_of(place.edge, place.offset_m).has_value();
 }
 
 bool TrainSimulation::faulty(Sensor sensor, FaultKind kind, double t_s) const {
@@ -297,11 +317,13 @@ void TrainSimulation::make_fixes() {
       probability = kSureProbability;
     }
     auto place = path_->position_at(drive_.at(t).distance_m + wrong_m);
-    if (faulty(Sensor::fix, FaultKind::wrong_branch, t)) place.edge = place.edge == 1 ? 2 : 1;
     if (faulty(Sensor::fix, FaultKind::stuck, t)) place = *(stuck = stuck.value_or(place));
-    add(Sensor::fix, t,
-        FixInput{stamp_ns(t), place.edge, place.offset_m, plan_.fix_sigma_m, probability, ++id, FixKind::landmark,
-                 place.direction, nullptr});
+    ++id;
+    if (!misled_landmarks_ || !faulty(Sensor::fix, FaultKind::wrong_branch, t)) {
+      add(Sensor::fix, t,
+          FixInput{stamp_ns(t), place.edge, place.offset_m, plan_.fix_sigma_m, probability, id, FixKind::landmark,
+                   place.direction, nullptr});
+    }
     place_m += plan_.landmark_spacing_m * (1 + plan_.landmark_spread * random.uniform(-1, 1));
   }
 }

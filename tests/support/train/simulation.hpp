@@ -43,8 +43,10 @@ struct SimulationPlan {
   double false_fix_share = 0.02;  // of fixes: somewhere else, with full confidence
   double fix_sigma_m = 0.15;
   double fix_probability = 0.99;
-  bool blind_spells = true;  // 5 to 15 s without camera, now and then
-  bool slip = true;          // wheel turns up to 30 % too fast or slow for some seconds
+  double switch_spacing_m = 0;  // of a random line, 0 = none; the way takes either leg
+  bool track_fixes = false;     // map_matcher says the track once a second, and which leg behind facing points
+  bool blind_spells = true;     // 5 to 15 s without camera, now and then
+  bool slip = true;             // wheel turns up to 30 % too fast or slow for some seconds
   double start_sigma_m = 0.3;
   Fault fault;
 };
@@ -54,6 +56,9 @@ struct Arrival {
   double arrival_s = 0;
   fusion::Event event;
 };
+
+/// Random numbers of one sensor's own.
+core::Random stream(uint64_t seed, uint64_t number);
 
 class TrainSimulation {
  public:
@@ -72,8 +77,10 @@ class TrainSimulation {
   [[nodiscard]] track::EdgePosition start() const;
   /// Truth at a stamp; arrival_s: when fusion said it (a clock that was set back gives every stamp twice).
   [[nodiscard]] Motion truth_at(int64_t stamp_ns, double arrival_s = 1e9) const;
-  /// Place minus truth, along the way; nothing when the place lies on another track.
+  /// Place minus truth, along the way, or along the other leg of points that the train has run over; nothing when the
+  /// place lies elsewhere.
   [[nodiscard]] std::optional<double> error_m(const track::EdgePosition& place, const Motion& truth) const;
+  [[nodiscard]] bool on_way(const track::EdgePosition& place) const;
   [[nodiscard]] int64_t stamp_ns(double t_s) const;
   [[nodiscard]] double duration_s() const { return drive_.duration_s(); }
   [[nodiscard]] double way_m() const { return drive_.way_m(); }
@@ -90,11 +97,36 @@ class TrainSimulation {
 
  private:
   static constexpr int64_t kBeginNs = 1'700'000'000'000'000'000;
+  static constexpr double kPictureS = 0.05;
+  static constexpr double kSureProbability = 0.9999;
   struct Spell {
     double begin_s;
     double end_s;
     double size;
   };
+  /// Facing points on the way.
+  struct Points {
+    double distance_m = 0;
+    track::Run other;  // the leg that the way does not take
+  };
+  /// What map_matcher says of the track.
+  struct SaidTrack {
+    track::EdgePosition place;
+    double probability = 0;
+    bool known = false;
+  };
+  /// How it comes to that behind one of the points.
+  struct Declaration {
+    double after_m = 0;        // of the way behind the points it is known
+    double wrong_until_m = 0;  // that far behind them it is the other leg
+    double leaning = 0;        // probability of the likelier leg before that
+    bool leans_wrong = false;
+    double declared = 0;
+  };
+  TrainSimulation(const SimulationPlan& plan, uint64_t seed, std::shared_ptr<const track::Map> map,
+                  const track::EdgePosition& start, const std::vector<uint32_t>& via);
+  TrainSimulation(const SimulationPlan& plan, uint64_t seed, const RandomLine& line);
+  void find_points();
   void measure();
   [[nodiscard]] double scale_error_of(double usual, double trip_change, core::Random& random, uint64_t number) const;
   void make_steps();
@@ -103,6 +135,9 @@ class TrainSimulation {
   void make_gnss();
   void make_fixes();
   void make_fixes_of_map();
+  void make_declarations();
+  void make_track_fixes();
+  [[nodiscard]] SaidTrack track_at(double way_m) const;
   void add(Sensor sensor, double t_s, fusion::Event event);
   [[nodiscard]] bool faulty(Sensor sensor, FaultKind kind, double t_s) const;
   [[nodiscard]] double offset_of(Sensor sensor, double t_s) const;
@@ -115,6 +150,9 @@ class TrainSimulation {
   track::EdgePosition start_;
   std::shared_ptr<const track::Path> path_;
   Drive drive_;
+  std::vector<Points> points_;
+  std::vector<Declaration> declarations_;  // one for each of the points
+  bool misled_landmarks_ = false;          // the landmarks are looked for on the leg that is wrongly declared
 };
 
 }  // namespace railfix::train

@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/time.hpp"
+
 namespace railfix::train {
 namespace {
 
 constexpr double kTickS = 0.1;
+constexpr double kDeclared = 0.999;  // as TrainState.track_probability says
 
 // Words by which the state's reason names a sensor.
 const char* name_in_reason(Sensor sensor) {
@@ -50,6 +53,7 @@ class Judge {
     verdict_.wider_unsaid += wider && ok ? 1 : 0;
     verdict_.not_ok += ok ? 0 : 1;
     verdict_.width_sum_m += state.over_m + state.under_m;
+    judge_track(state, ok);
     const auto& fault = simulation_.plan().fault;
     const bool named = state.reason.find(name_in_reason(fault.sensor)) != std::string::npos;
     if (fault.sensor != Sensor::none && fault.active(arrival_s) && named) ++verdict_.told;
@@ -60,10 +64,21 @@ class Judge {
   Verdict take() { return std::move(verdict_); }
 
  private:
+  void judge_track(const fusion::TrainEstimate& state, bool ok) {
+    const bool other = state.track_known && !simulation_.on_way(state.position);
+    const bool sure = other && ok && state.track_probability >= kDeclared;
+    verdict_.other_leg += other ? 1 : 0;
+    verdict_.other_leg_sure += sure ? 1 : 0;
+    if (!sure || !sure_since_ns_) sure_since_ns_ = sure ? std::optional(state.stamp_ns) : std::nullopt;
+    if (sure)
+      verdict_.other_leg_sure_s = std::max(verdict_.other_leg_sure_s, core::seconds(state.stamp_ns - *sure_since_ns_));
+  }
+
   const TrainSimulation& simulation_;
   double after_m_;
   const Watcher& watcher_;
   Verdict verdict_;
+  std::optional<int64_t> sure_since_ns_;  // a leg is declared that the train did not take
 };
 
 }  // namespace
@@ -77,6 +92,9 @@ void Verdict::add(const Verdict& other) {
   wider_unsaid += other.wider_unsaid;
   not_ok += other.not_ok;
   told += other.told;
+  other_leg += other.other_leg;
+  other_leg_sure += other.other_leg_sure;
+  other_leg_sure_s = std::max(other_leg_sure_s, other.other_leg_sure_s);
   width_sum_m += other.width_sum_m;
   errors_m.insert(errors_m.end(), other.errors_m.begin(), other.errors_m.end());
 }

@@ -105,6 +105,8 @@ TEST(Coverage, OneFaultySensorStaysInsideTheInterval) {
     plan.false_fix_share = 0.005;
     core::Random random(++seed);
     plan.fault = train::random_fault(random, sensor, kind, 80);
+    plan.track_fixes = true;
+    plan.switch_spacing_m = 800;
     plan.duration_s = 80 - kEarlierS;
     plan.fault.begin_s -= kEarlierS;
     plan.fault.end_s -= kEarlierS;

@@ -1,0 +1,135 @@
+// A leg that is declared wrongly: what speaks against it, and the way back.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "straight_run.hpp"
+#include "support/train/verdict.hpp"
+
+namespace railfix::fusion {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr uint32_t kStraight = 2;
+constexpr uint32_t kLeft = 3;
+
+/// A train that comes to points at 1000 m; the left leg is an arc of 1000 m radius.
+class WrongLeg : public testing::Test {
+ protected:
+  static Fusion at_900_m() {
+    auto map = std::make_shared<track::Map>();
+    map->edges.push_back({1, "stem", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{1000, 0, 0}})});
+    map->edges.push_back({2, "straight", 2, 3, "", track::Alignment::chained({0, 1000, 0}, {{9000, 0, 0}})});
+    map->edges.push_back({3, "left", 2, 4, "", track::Alignment::chained({0, 1000, 0}, {{9000, 0.001, 0.001}})});
+    map->connections = {{2, 1, 2, false}, {2, 1, 3, true}};
+    return core::value_or_throw(Fusion::create({}, map, track::EdgePosition{1, 900, track::Direction::forward}));
+  }
+  void declare(double t_s, uint32_t edge, double offset_m) {
+    fusion_.add(FixInput{at(t_s), edge, offset_m, INFINITY, 0.9995, 0, FixKind::track, track::Direction::forward, {}});
+  }
+  void landmark(double t_s, uint32_t edge, double offset_m) {
+    fusion_.add(
+        FixInput{at(t_s), edge, offset_m, 0.1, 0.995, ++seen_, FixKind::landmark, track::Direction::forward, {}});
+  }
+  /// 20 m/s; the gyro feels this curvature.
+  TrainEstimate go(double from_s, double to_s, double curvature_per_m) {
+    std::optional<TrainEstimate> last;
+    for (int i = 1; from_s + i * 0.02 <= to_s + 1e-9; ++i) {
+      const double t_s = from_s + i * 0.02;
+      fusion_.add(ImuInput{at(t_s), 0, 20 * curvature_per_m});
+      if (auto state = fusion_.add(step_at(t_s, 20))) last = state;
+    }
+    return last.value_or(TrainEstimate{});
+  }
+
+  Fusion fusion_ = at_900_m();
+  uint32_t seen_ = 0;
+};
+
+TEST_F(WrongLeg, ALandmarkOnTheOtherLegDoubtsItHoweverOftenItIsDeclared) {
+  run(fusion_, 0, 7, 20);
+  declare(7, kLeft, 40);
+  EXPECT_EQ(run(fusion_, 7, 10, 20).track_probability, 0.9995);
+  landmark(10, kStraight, 100);
+  declare(10.1, kLeft, 102);
+  auto state = run(fusion_, 10, 12, 20);
+  EXPECT_EQ(state.position.edge, kLeft);
+  EXPECT_LT(state.track_probability, 0.01);
+  EXPECT_EQ(state.integrity, Integrity::degraded);
+  declare(12, kStraight, 140);
+  state = run(fusion_, 12, 13, 20);
+  EXPECT_EQ(state.position.edge, kStraight);
+  EXPECT_NEAR(state.position.offset_m, 160, 0.1);
+  EXPECT_EQ(state.track_probability, 0.9995);
+  EXPECT_THAT(state.reason, Not(HasSubstr("another track")));  // it spoke for this one
+}
+
+TEST_F(WrongLeg, ALandmarkOnTheTrackSettlesADoubt) {
+  run(fusion_, 0, 7, 20);
+  declare(7, kLeft, 40);
+  landmark(8, kStraight, 60);
+  EXPECT_LT(run(fusion_, 7, 10, 20).track_probability, 0.01);
+  landmark(10, kLeft, 100);
+  EXPECT_EQ(run(fusion_, 10, 11, 20).track_probability, 0.9995);
+}
+
+TEST_F(WrongLeg, ATrainThatTurnsOtherwiseDoubtsIt) {
+  go(0, 7, 0);
+  declare(7, kLeft, 40);
+  auto state = go(7, 12, 0);
+  EXPECT_EQ(state.track_probability, 0.5);
+  EXPECT_THAT(state.reason, HasSubstr("turns otherwise"));
+  declare(12, kLeft, 140);
+  EXPECT_EQ(go(12, 13, 0).track_probability, 0.5);
+  declare(13, kStraight, 160);
+  state = go(13, 20, 0);
+  EXPECT_EQ(state.position.edge, kStraight);
+  EXPECT_NEAR(state.position.offset_m, 300, 0.5);
+  EXPECT_EQ(state.track_probability, 0.9995);
+  EXPECT_THAT(state.reason, Not(HasSubstr("turns otherwise")));
+}
+
+TEST_F(WrongLeg, ATrainThatTurnsAsTheTrackDoesDoubtsNothing) {
+  go(0, 5, 0);
+  go(5, 7, 0.001);
+  declare(7, kLeft, 40);
+  const auto state = go(7, 30, 0.001);
+  EXPECT_EQ(state.track_probability, 0.9995);
+  EXPECT_THAT(state.reason, Not(HasSubstr("turns otherwise")));
+}
+
+TEST_F(WrongLeg, TheRightOneIsNeverRefusedHoweverLate) {
+  run(fusion_, 0, 7, 20);
+  declare(7, kLeft, 40);
+  run(fusion_, 7, 300, 20);
+  declare(300, kStraight, 5900);
+  const auto state = run(fusion_, 300, 301, 20);
+  EXPECT_EQ(state.position.edge, kStraight);
+  EXPECT_NEAR(state.position.offset_m, 5920, 1);
+}
+
+// The short form of railfix-measure-confidence --fault "fix:wrong branch".
+TEST(WrongLegDeclared, TheIntervalHoldsAlongTheTrackAndTheLegIsDoubted) {
+  train::Verdict sum;
+  for (uint64_t seed = 1; seed <= 12; ++seed) {
+    train::SimulationPlan plan;
+    plan.duration_s = 150;
+    plan.false_fix_share = 0.005;
+    plan.fix_probability = 0.995;
+    plan.track_fixes = true;
+    plan.switch_spacing_m = 800;
+    core::Random random(seed);
+    plan.fault = train::random_fault(random, train::Sensor::fix, train::FaultKind::wrong_branch, plan.duration_s);
+    const train::TrainSimulation simulation(plan, seed);
+    auto fusion = core::value_or_throw(Fusion::create({}, simulation.map, simulation.start()));
+    sum.add(train::judge(simulation, fusion));
+  }
+  std::cout << sum.way_m / 1000 << " km, " << sum.states << " states, " << sum.other_leg << " on the other leg, "
+            << sum.other_leg_sure << " of them declared and ok, for up to " << sum.other_leg_sure_s << " s\n";
+  EXPECT_EQ(sum.outside, 0U);
+  EXPECT_GT(sum.other_leg, 1000U);                   // it was injected
+  EXPECT_LT(2 * sum.other_leg_sure, sum.other_leg);  // parallel legs without a landmark: nobody can know
+}
+
+}  // namespace
+}  // namespace railfix::fusion
