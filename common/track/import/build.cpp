@@ -149,6 +149,8 @@ class Sources {
   void take(OsmData read) {
     osm_.nodes.merge(read.nodes);
     std::move(read.ways.begin(), read.ways.end(), std::back_inserter(osm_.ways));
+    std::move(read.bridges.begin(), read.bridges.end(), std::back_inserter(osm_.bridges));
+    std::move(read.problems.begin(), read.problems.end(), std::back_inserter(map_.problems));
   }
 
   void take(Map read, const std::filesystem::path& file) {

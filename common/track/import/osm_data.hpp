@@ -28,13 +28,23 @@ struct OsmWay {
 
 struct OsmData {
   std::unordered_map<int64_t, OsmNode> nodes;
-  std::vector<OsmWay> ways;
+  std::vector<OsmWay> ways;     // tracks
+  std::vector<OsmWay> bridges;  // of other things, which may lead over a track
+  std::vector<std::string> problems;
 };
 
 /// Is this way track that a train runs on? railway=rail, light_rail, narrow_gauge, subway, and tram where asked for.
 bool is_track(const OsmTags& tags, bool with_trams);
 
-/// OSM XML or PBF, also compressed (.osm, .pbf, .osm.gz, .osm.bz2). Memory grows with the railways in the file only.
+/// Is this way no such track, but a road, path, canal or other railway on a bridge?
+bool leads_over(const OsmTags& tags, bool with_trams);
+/// There, and not "no".
+bool is_set(const OsmTags& tags, const char* key);
+/// Empty where there is no such key.
+std::string value_of(const OsmTags& tags, const char* key);
+
+/// OSM XML or PBF, also compressed (.osm, .pbf, .osm.gz, .osm.bz2). Memory grows with the railways and bridges in the
+/// file only.
 core::Result<OsmData> read_osm(const std::filesystem::path& file, bool with_trams);
 
 /// Overpass JSON ("elements") or GeoJSON ("features"). GeoJSON has no nodes: equal coordinates (1e-7 degree) are one

@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -31,9 +33,11 @@ void read_overpass(const json& elements, bool with_trams, OsmData& out) {
       if (plausible(place)) out.nodes[element.at("id").get<int64_t>()] = {place, tags_in(element, "tags")};
     } else if (type == "way") {
       OsmTags tags = tags_in(element, "tags");
-      if (!is_track(tags, with_trams) || !element.contains("nodes")) continue;
-      out.ways.push_back(
-          {element.at("id").get<int64_t>(), element.at("nodes").get<std::vector<int64_t>>(), std::move(tags)});
+      const bool over = leads_over(tags, with_trams);
+      if (!(is_track(tags, with_trams) || over) || !element.contains("nodes")) continue;
+      (over ? out.bridges : out.ways)
+          .push_back(
+              {element.at("id").get<int64_t>(), element.at("nodes").get<std::vector<int64_t>>(), std::move(tags)});
     }
   }
 }
@@ -60,18 +64,36 @@ int64_t number_in(const OsmTags& tags, size_t position) {
   return -static_cast<int64_t>(position) - 1;
 }
 
-void add_line(const json& coordinates, const OsmTags& tags, OsmData& out) {
-  OsmWay way{number_in(tags, out.ways.size()), {}, tags};
+void add_line(const json& coordinates, const OsmTags& tags, std::vector<OsmWay>& ways, OsmData& out) {
+  OsmWay way{number_in(tags, ways.size()), {}, tags};
   for (const json& pair : coordinates) {
     const GeoPoint place = place_in(pair);
     if (!plausible(place)) continue;
     way.nodes.push_back(identity(place));
     out.nodes[way.nodes.back()].place = place;
   }
-  out.ways.push_back(std::move(way));
+  ways.push_back(std::move(way));
+}
+
+/// Keys that say what a line is; with one of them it is no track, unless it is a train's route.
+constexpr std::array kOtherThings{"aerialway", "aeroway", "amenity", "barrier",  "boundary", "building",
+                                  "highway",   "landuse", "leisure", "man_made", "natural",  "pipeline",
+                                  "power",     "route",   "telecom", "waterway"};
+
+/// The first of these keys; empty where the line says nothing of the kind.
+std::string other_thing(const OsmTags& tags) {
+  const auto* const found =
+      std::find_if(kOtherThings.begin(), kOtherThings.end(), [&](const char* key) { return tags.contains(key); });
+  return found == kOtherThings.end() ? "" : *found;
+}
+
+std::string features_named(size_t count) {
+  return std::to_string(count) + (count == 1 ? " line" : " lines");
 }
 
 void read_features(const json& features, bool with_trams, OsmData& out) {
+  std::map<std::string, size_t> others;
+  size_t silent_lines = 0;
   for (const json& feature : features) {
     const OsmTags tags = tags_in(feature, "properties");
     const auto geometry = feature.find("geometry");
@@ -86,13 +108,24 @@ void read_features(const json& features, bool with_trams, OsmData& out) {
     // A line that does not say what it is, or is a train's route, is taken as track.
     const auto route = tags.find("route");
     const bool train_route = route != tags.end() && (route->second == "train" || route->second == "railway");
-    const bool silent = !tags.contains("railway") && !tags.contains("@id") && !tags.contains("highway");
-    if (!is_track(tags, with_trams) && !train_route && !silent) continue;
-    if (type == "LineString") add_line(coordinates, tags, out);
+    const std::string other = other_thing(tags);
+    const bool silent = !tags.contains("railway") && !tags.contains("@id") && other.empty();
+    const bool over = leads_over(tags, with_trams);
+    if (!is_track(tags, with_trams) && !train_route && !silent && !over) {
+      if (!other.empty()) ++others[other];
+      continue;
+    }
+    if (silent) ++silent_lines;
+    std::vector<OsmWay>& ways = over ? out.bridges : out.ways;
+    if (type == "LineString") add_line(coordinates, tags, ways, out);
     if (type == "MultiLineString") {
-      for (const json& line : coordinates) add_line(line, tags, out);
+      for (const json& line : coordinates) add_line(line, tags, ways, out);
     }
   }
+  for (const auto& [key, count] : others)
+    out.problems.push_back(features_named(count) + " with \"" + key + "\" and no railway: no track, left out");
+  if (silent_lines > 0)
+    out.problems.push_back(features_named(silent_lines) + " without a word of what it is: taken as track");
 }
 
 }  // namespace

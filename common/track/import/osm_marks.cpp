@@ -9,13 +9,6 @@ namespace railfix::track {
 
 namespace {
 
-constexpr double kMappingSigmaM = 3.0;
-
-bool is_set(const OsmTags& tags, const char* key) {
-  const std::string value = value_of(tags, key);
-  return !value.empty() && value != "no";
-}
-
 /// "80" (km/h) or "50 mph"; nothing where it says anything else.
 std::optional<double> speed_mps_of(const std::string& text) {
   double value = 0;
@@ -32,11 +25,6 @@ std::optional<double> speed_mps_of(const std::string& text) {
 }
 
 }  // namespace
-
-std::string value_of(const OsmTags& tags, const char* key) {
-  const auto found = tags.find(key);
-  return found == tags.end() ? std::string() : found->second;
-}
 
 void OsmMarks::add(ImportedTrack& track) const {
   add_structures(track);

@@ -6,6 +6,8 @@
 
 namespace railfix::track {
 
+constexpr double kMappingSigmaM = 3.0;
+
 /// Segments from one break to the next.
 struct OsmChain {
   std::vector<int64_t> nodes;
@@ -34,8 +36,5 @@ class OsmMarks {
   const OsmData& data_;
   const OsmChain& chain_;
 };
-
-/// Empty where there is no such key.
-std::string value_of(const OsmTags& tags, const char* key);
 
 }  // namespace railfix::track

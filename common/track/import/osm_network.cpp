@@ -7,6 +7,7 @@
 #include "core/units.hpp"
 #include "track/import/biarc.hpp"
 #include "track/import/osm_marks.hpp"
+#include "track/import/osm_overbridges.hpp"
 #include "track/import/smooth.hpp"
 
 namespace railfix::track {
@@ -39,7 +40,11 @@ struct ChainEnd {
 class Builder {
  public:
   Builder(const OsmData& data, const Projection& projection, double smooth_m, bool with_clothoids)
-      : data_(data), projection_(projection), smooth_m_(smooth_m), with_clothoids_(with_clothoids) {}
+      : data_(data),
+        projection_(projection),
+        overbridges_(data, projection),
+        smooth_m_(smooth_m),
+        with_clothoids_(with_clothoids) {}
 
   OsmNetwork build() {
     collect_segments();
@@ -245,6 +250,7 @@ class Builder {
     }
     edge.track.alignment = std::move(fit.alignment);
     OsmMarks(data_, chain).add(edge.track);
+    overbridges_.add(data_, chain, edge.track);
     if (fit.straightened > 0) {
       out_.problems.push_back("edge " + edge.track.name + " has " + std::to_string(fit.straightened) +
                               " stretches with points too crooked for a track; they are straight lines now");
@@ -284,6 +290,7 @@ class Builder {
 
   const OsmData& data_;
   const Projection& projection_;
+  OsmOverbridges overbridges_;
   double smooth_m_;
   bool with_clothoids_;
   double usual_sigma_m_ = 0.3;

@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <array>
 #include <osmium/io/any_input.hpp>
 #include <osmium/osm/node.hpp>
 #include <osmium/osm/way.hpp>
@@ -23,8 +25,9 @@ OsmData read_two_passes(const std::string& file, bool with_trams) {
   while (const osmium::memory::Buffer buffer = ways.read()) {
     for (const osmium::Way& way : buffer.select<osmium::Way>()) {
       OsmTags tags = tags_of(way);
-      if (!is_track(tags, with_trams)) continue;
-      OsmWay& taken = out.ways.emplace_back(OsmWay{way.id(), {}, std::move(tags)});
+      const bool over = leads_over(tags, with_trams);
+      if (!is_track(tags, with_trams) && !over) continue;
+      OsmWay& taken = (over ? out.bridges : out.ways).emplace_back(OsmWay{way.id(), {}, std::move(tags)});
       for (const osmium::NodeRef& node : way.nodes()) taken.nodes.push_back(node.ref());
       wanted.insert(taken.nodes.begin(), taken.nodes.end());
     }
@@ -49,6 +52,26 @@ bool is_track(const OsmTags& tags, bool with_trams) {
   const std::string& kind = railway->second;
   return kind == "rail" || kind == "light_rail" || kind == "narrow_gauge" || kind == "subway" ||
          (with_trams && kind == "tram");
+}
+
+std::string value_of(const OsmTags& tags, const char* key) {
+  const auto found = tags.find(key);
+  return found == tags.end() ? std::string() : found->second;
+}
+
+bool is_set(const OsmTags& tags, const char* key) {
+  const std::string value = value_of(tags, key);
+  return !value.empty() && value != "no";
+}
+
+bool leads_over(const OsmTags& tags, bool with_trams) {
+  if (is_track(tags, with_trams) || !is_set(tags, "bridge")) return false;
+  // What was, or is not yet: nobody knows whether its bridge stands.
+  constexpr std::array kGone{"abandoned", "razed", "dismantled", "proposed", "construction"};
+  const auto stands = [&](const char* key) {
+    return is_set(tags, key) && std::find(kGone.begin(), kGone.end(), value_of(tags, key)) == kGone.end();
+  };
+  return stands("highway") || stands("railway") || stands("waterway");
 }
 
 core::Result<OsmData> read_osm(const std::filesystem::path& file, bool with_trams) {

@@ -62,6 +62,10 @@ class OsmTest : public ImportTest {
     osmium::builder::add_way(buffer, _id(12), _version(1), _nodes({3, 20, 21}), _tag("railway", "rail"),
                              _tag("service", "siding"), _tag("maxspeed", "signals"));
     osmium::builder::add_way(buffer, _id(13), _version(1), _nodes({1, 20}), _tag("highway", "primary"));
+    osmium::builder::add_node(buffer, _id(30), _version(1), _location(15.6015, 48.2010));
+    osmium::builder::add_node(buffer, _id(31), _version(1), _location(15.6015, 48.1990));
+    osmium::builder::add_way(buffer, _id(15), _version(1), _nodes({30, 31}), _tag("highway", "track"),
+                             _tag("bridge", "yes"), _tag("name", "Field Way"));
     osmium::builder::add_way(buffer, _id(14), _version(1), _nodes({20, 2}), _tag("railway", "abandoned"));
     osmium::io::Writer writer(in_folder(name).string(), osmium::io::overwrite::allow);
     writer(std::move(buffer));
@@ -86,6 +90,10 @@ TEST_F(OsmTest, XmlAndPbfGiveTheSameNetwork) {
     EXPECT_FALSE(map.connections[0].diverging);
     EXPECT_TRUE(map.connections[1].diverging);
     EXPECT_THAT(map.problems, testing::Not(testing::Contains(HasSubstr("node"))));
+    EXPECT_EQ(std::count_if(
+                  map.landmarks.begin(), map.landmarks.end(),
+                  [](const Landmark& mark) { return mark.kind == LandmarkKind::bridge && mark.name == "Field Way"; }),
+              1);
   }
 }
 
@@ -119,6 +127,94 @@ TEST_F(OsmTest, ABridgeThatCarriesTheTrackIsAnUnderbridge) {
   ASSERT_EQ(bridges.size(), 1U);
   EXPECT_EQ(bridges[0]->name, "Long One");
   EXPECT_GT(bridges[0]->sigma_m, 50);  // 300 m long
+}
+
+/// The line of OsmTest with one more way from north to south across it, between its nodes 5 and 6.
+std::string with_a_way_across(const std::string& tags) {
+  std::string text = kOverpass;
+  text.replace(
+      text.rfind("]}"), 2,
+      R"(,{"type":"node","id":30,"lat":48.2013,"lon":15.6055},{"type":"node","id":31,"lat":48.1993,"lon":15.6055},
+{"type":"way","id":40,"nodes":[30,31],"tags":{)" +
+          tags + "}}]}");
+  return text;
+}
+
+// Only what leads over the track is a bridge that the camera tells.
+TEST_F(OsmTest, ABridgeOverTheTrackIsFoundWhereItCrosses) {
+  const auto bridges = [&](const std::string& text) {
+    const Map map = core::value_or_throw(build_map({write("a.json", text)}, {.crs = "local"})).map;
+    std::vector<std::pair<std::string, double>> found;  // name, metres from where the ways cross
+    const auto crossing = map.from_geo({48.200305, 15.6055});
+    for (const Landmark& mark : map.landmarks) {
+      if (mark.kind != LandmarkKind::bridge) continue;
+      const PlanPose pose = map.edge(mark.edge)->alignment.at(mark.offset_m).pose;
+      found.emplace_back(mark.name, std::hypot(pose.easting_m - crossing->x(), pose.northing_m - crossing->y()));
+      EXPECT_GT(mark.sigma_m, 3);
+      EXPECT_LT(mark.sigma_m, 6);
+    }
+    return found;
+  };
+  for (const char* road : {R"("highway":"primary","bridge":"yes","layer":"1","name":"Road")",
+                           R"("highway":"primary","bridge":"yes","name":"Road")",
+                           R"("waterway":"canal","bridge":"aqueduct","name":"Road")",
+                           R"("railway":"rail","bridge":"yes","name":"Road")"}) {
+    SCOPED_TRACE(road);
+    const auto found = bridges(with_a_way_across(road));
+    ASSERT_EQ(found.size(), 1U);
+    EXPECT_EQ(found[0].first, "Road");
+    EXPECT_LT(found[0].second, 1);
+  }
+  for (const char* other :
+       {R"("highway":"primary")", R"("highway":"primary","bridge":"no")", R"("highway":"primary","tunnel":"yes")",
+        R"("highway":"primary","bridge":"yes","layer":"0")", R"("highway":"proposed","bridge":"yes")",
+        R"("railway":"abandoned","bridge":"yes")"}) {
+    EXPECT_TRUE(bridges(with_a_way_across(other)).empty()) << other;
+  }
+  // Not over a tunnel, and not over a viaduct of its own height.
+  for (const char* tag : {R"("tunnel":"yes")", R"("bridge":"yes")"}) {
+    std::string text = with_a_way_across(R"("highway":"primary","bridge":"yes")");
+    const std::string of_track = R"("maxspeed":"100")";
+    EXPECT_TRUE(bridges(text.replace(text.find(of_track), of_track.size(), tag)).empty()) << tag;
+  }
+}
+
+TEST_F(OsmTest, ARoadAndItsFootwayAreOneBridge) {
+  std::string text = with_a_way_across(R"("highway":"primary","bridge":"yes")");
+  text.replace(
+      text.rfind("]}"), 2,
+      R"(,{"type":"node","id":32,"lat":48.2013,"lon":15.6056},{"type":"node","id":33,"lat":48.1993,"lon":15.6056},
+{"type":"way","id":41,"nodes":[32,33],"tags":{"highway":"footway","bridge":"yes"}}]})");
+  const Map map = core::value_or_throw(build_map({write("a.json", text)}, {})).map;
+  EXPECT_EQ(std::count_if(map.landmarks.begin(), map.landmarks.end(),
+                          [](const Landmark& mark) { return mark.kind == LandmarkKind::bridge; }),
+            1);
+}
+
+TEST_F(OsmTest, GeoJsonTakesNoRiverForATrack) {
+  const auto with_line = [&](const std::string& properties) {
+    std::string text = kGeoJson;
+    text.replace(text.rfind("]}"), 2,
+                 R"(,{"type":"Feature","properties":)" + properties +
+                     R"(,"geometry":{"type":"LineString","coordinates":[[15.6055,48.2013],[15.6055,48.1993]]}}]})");
+    return core::value_or_throw(build_map({write("a.geojson", text)}, {})).map;
+  };
+  const size_t edges = core::value_or_throw(build_map({write("b.geojson", kGeoJson)}, {})).map.edges.size();
+  for (const char* key : {"waterway", "power", "highway", "route", "barrier"}) {
+    const Map map = with_line(std::string("{\"") + key + "\":\"line\"}");
+    EXPECT_EQ(map.edges.size(), edges) << key;
+    EXPECT_THAT(map.problems,
+                testing::Contains(std::string("1 line with \"") + key + "\" and no railway: no track, left out"));
+  }
+  const Map silent = with_line(R"({"stroke":"#f00"})");
+  EXPECT_EQ(silent.edges.size(), edges + 1);
+  EXPECT_THAT(silent.problems, testing::Contains("1 line without a word of what it is: taken as track"));
+  EXPECT_EQ(with_line(R"({"route":"train","type":"route"})").edges.size(), edges + 1);
+  const Map over = with_line(R"({"highway":"primary","bridge":"yes"})");
+  EXPECT_EQ(over.edges.size(), edges);
+  EXPECT_EQ(std::count_if(over.landmarks.begin(), over.landmarks.end(),
+                          [](const Landmark& mark) { return mark.kind == LandmarkKind::bridge; }),
+            1);
 }
 
 TEST_F(OsmTest, LevelCrossingsAndSpeedsAreKeptInEveryFormat) {
