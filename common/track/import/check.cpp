@@ -174,6 +174,7 @@ class Check {
   }
 
   void check_balises() {
+    check_balise_places();
     std::map<uint32_t, std::vector<const BaliseGroup*>> on_edge;
     for (const BaliseGroup& group : map_.balise_groups) on_edge[group.edge].push_back(&group);
     for (auto& [edge, groups] : on_edge) {
@@ -190,6 +191,27 @@ class Check {
     for (const BaliseGroup& group : map_.balise_groups) {
       if (seen.insert(group.nid_lrbg()).second) continue;
       problems_.push_back("balise group " + identity(group) + " is there twice");
+    }
+  }
+
+  /// Of groups or alone: two balises at one place are one that is there twice.
+  void check_balise_places() {
+    std::map<uint32_t, std::vector<const Landmark*>> on_edge;
+    for (const Landmark& mark : map_.landmarks) {
+      if (mark.kind == LandmarkKind::balise) on_edge[mark.edge].push_back(&mark);
+    }
+    const auto called = [](const Landmark& mark) {
+      return mark.name.empty() ? std::to_string(mark.id) : "\"" + mark.name + "\"";
+    };
+    for (auto& [edge, balises] : on_edge) {
+      std::stable_sort(balises.begin(), balises.end(),
+                       [](const auto* a, const auto* b) { return a->offset_m < b->offset_m; });
+      for (size_t i = 1; i < balises.size(); ++i) {
+        if (balises[i]->offset_m - balises[i - 1]->offset_m > kSamePlaceM) continue;
+        problems_.push_back("balises " + called(*balises[i - 1]) + " and " + called(*balises[i]) +
+                            " are at the same place, edge " + std::to_string(edge) + " at " +
+                            metres(balises[i]->offset_m));
+      }
     }
   }
 

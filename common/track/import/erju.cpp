@@ -34,6 +34,7 @@ class Reader {
     read_marks("tunnel", LandmarkKind::portal_in);
     read_marks("bridge", LandmarkKind::underbridge);
     read_marks("levelCrossing", LandmarkKind::level_crossing);
+    read_platforms();
     read_speeds();
     return std::move(net_);
   }
@@ -209,6 +210,44 @@ class Reader {
         NetTrack& track = net_.tracks[track_of(infra_, spot, "trackEdge")];
         track.track.marks.push_back({kind, metres(infra_.required(spot, "pos")), 0, kSurveyedM, id});
       }
+    }
+  }
+
+  /// Both ends of every edge of a platform, along a path of track edges. Which side it lies on is not said.
+  void read_platforms() {
+    for (const pugi::xml_node& node : descendants(infra_.root(), "platformEdge")) {
+      const pugi::xml_node location = node.child("linearLocation");
+      const std::vector<pugi::xml_node> path = descendants(location, "dirTrackEdge");
+      double length_m = 0;
+      for (const pugi::xml_node& edge : path) length_m += net_.tracks[track_of(infra_, edge, "trackEdge")].length_m;
+      const double from_m = metres(XmlSource::number(location, "skipFromPathStart").value_or(0));
+      const double to_m = length_m - metres(XmlSource::number(location, "skipFromPathEnd").value_or(0));
+      if (from_m < 0 || to_m > length_m || from_m > to_m) {
+        net_.problems.push_back("platform edge \"" + platform_name(node) +
+                                "\" is not on its track edges; it is left out");
+        continue;
+      }
+      add_on_path(path, from_m, platform_name(node));
+      add_on_path(path, to_m, platform_name(node));
+    }
+  }
+
+  static std::string platform_name(const pugi::xml_node& edge) {
+    const std::string name = edge.attribute("name").value();
+    return name.empty() ? edge.attribute("platformId").value() : name;
+  }
+
+  void add_on_path(const std::vector<pugi::xml_node>& path, double along_m, const std::string& name) {
+    for (const pugi::xml_node& edge : path) {
+      NetTrack& track = net_.tracks[track_of(infra_, edge, "trackEdge")];
+      if (along_m > track.length_m && edge != path.back()) {
+        along_m -= track.length_m;
+        continue;
+      }
+      const bool same = edge.attribute("sameDir").as_bool(true);
+      const double offset_m = std::clamp(same ? along_m : track.length_m - along_m, 0.0, track.length_m);
+      track.track.marks.push_back({LandmarkKind::platform, offset_m, 0, kSurveyedM, name});
+      return;
     }
   }
 

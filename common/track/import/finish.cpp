@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <set>
 #include <unordered_map>
 
 namespace railfix::track {
@@ -93,14 +94,22 @@ void add_frogs(Map& map, double sigma_m) {
 core::Status add_virtual_balises(Map& map, double every_m, uint32_t nid_c, uint32_t first_nid_bg, double q_locacc_m) {
   if (!(every_m >= 1.0)) return core::Error{"virtual balise groups must be at least 1 m apart"};
   if (nid_c > 1023) return core::Error{"NID_C must be between 0 and 1023"};
+  // Numbers of this country that groups have already are left to them.
+  std::set<uint32_t> taken;
+  for (const BaliseGroup& group : map.balise_groups) {
+    if (group.nid_c == nid_c) taken.insert(group.nid_bg);
+  }
   uint32_t next = first_nid_bg;
   for (const Edge& edge : map.edges) {
     const double length = edge.alignment.length_m();
     const auto count = static_cast<uint32_t>(std::lround(length / every_m));
-    if (next + count > kLastBaliseGroup + 1) {
-      return core::Error{"the map needs more than 16382 virtual balise groups; place them farther apart"};
-    }
     for (uint32_t i = 0; i < count; ++i) {
+      while (taken.contains(next)) ++next;
+      if (next > kLastBaliseGroup) {
+        return core::Error{
+            "there are no more numbers for virtual balise groups of this NID_C (16382 at most); place "
+            "them farther apart"};
+      }
       map.balise_groups.push_back({.nid_c = nid_c,
                                    .nid_bg = next++,
                                    .edge = edge.id,

@@ -1,6 +1,7 @@
 #include "track/import/railml.hpp"
 
 #include <cmath>
+#include <map>
 
 #include "track/import/railml_readers.hpp"
 
@@ -45,15 +46,49 @@ std::optional<EtcsIdentity> etcs_identity(const XmlSource& source, const pugi::x
   return std::nullopt;
 }
 
+namespace {
+
+/// An id names one element of a file; references to one that is there twice lead to either.
+void tell_repeated_ids(const XmlSource& source, std::vector<std::string>& problems) {
+  struct Ids : pugi::xml_tree_walker {
+    std::map<std::string, pugi::xml_node> first;
+    std::vector<std::string>* problems = nullptr;
+    bool for_each(pugi::xml_node& at) override {
+      const std::string id = at.attribute("id").value();
+      if (id.empty()) return true;
+      const auto [entry, is_new] = first.try_emplace(id, at);
+      if (!is_new)
+        problems->push_back("the id \"" + id + "\" is there twice, for " + called(entry->second) + " and for " +
+                            called(at));
+      return true;
+    }
+    static std::string called(const pugi::xml_node& node) {
+      const std::string at = node.attribute("pos").value();
+      return "<" + std::string(node.name()) + "> \"" + railml_name(node) + "\"" +
+             (at.empty() ? "" : " at " + at + " m");
+    }
+  } ids;
+  ids.problems = &problems;
+  source.root().traverse(ids);
+}
+
+RailNet read_version(const XmlSource& source) {
+  const std::string name = source.root().name();
+  const std::string version = source.root().attribute("version").value();
+  if (name == "railml" && version.starts_with("2.")) return read_railml2(source);
+  if (name == "railML" && version.starts_with("3.")) return read_railml3(source);
+  throw core::BadInput(source.file_name() + " is <" + name + "> version \"" + version +
+                       "\"; railML 2.x and 3.x can be read");
+}
+
+}  // namespace
+
 core::Result<RailNet> read_railml(const std::filesystem::path& file) {
   try {
     const XmlSource source(file);
-    const std::string name = source.root().name();
-    const std::string version = source.root().attribute("version").value();
-    if (name == "railml" && version.starts_with("2.")) return read_railml2(source);
-    if (name == "railML" && version.starts_with("3.")) return read_railml3(source);
-    return core::Error{source.file_name() + " is <" + name + "> version \"" + version +
-                       "\"; railML 2.x and 3.x can be read"};
+    RailNet net = read_version(source);
+    tell_repeated_ids(source, net.problems);
+    return net;
   } catch (const core::BadInput& bad) {
     return core::Error{bad.what()};
   }

@@ -179,7 +179,9 @@ class Reader {
     std::map<std::string, TrackMark> by_id;
     for (const pugi::xml_node& balise : balises.children("balise")) {
       const double at = std::clamp(pos(balise) - origin_m_, 0.0, track.length_m);
-      by_id[balise.attribute("id").value()] = {LandmarkKind::balise, at, 0, kRailmlSigmaM, railml_name(balise)};
+      const TrackMark mark{LandmarkKind::balise, at, 0, kRailmlSigmaM, railml_name(balise)};
+      // A second one of that id is told for the whole file; it belongs to no group.
+      if (!by_id.emplace(balise.attribute("id").value(), mark).second) track.track.marks.push_back(mark);
     }
     for (const pugi::xml_node& node : balises.children("baliseGroup")) {
       const std::optional<EtcsIdentity> identity = etcs_identity(source_, node);

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "core/units.hpp"
 #include "small_map.hpp"
 #include "track/import/finish.hpp"
@@ -125,6 +127,15 @@ TEST(VirtualBalises, AreSpreadAlongTheEdges) {
   EXPECT_EQ(map.balise_groups[7].nid_bg, 27U);
   EXPECT_NEAR(map.balise_groups[1].offset_m, 500, 1e-9);
   EXPECT_TRUE(map.balise_groups[0].is_virtual);
+  // A second time they go on behind the first; another country counts for itself.
+  const size_t once = map.balise_groups.size();
+  ASSERT_TRUE(add_virtual_balises(map, 200, 7, 20, 5).ok());
+  ASSERT_TRUE(add_virtual_balises(map, 200, 8, 20, 5).ok());
+  EXPECT_EQ(map.balise_groups[once].nid_bg, map.balise_groups[once - 1].nid_bg + 1);
+  std::set<uint32_t> identities;
+  for (const BaliseGroup& group : map.balise_groups) identities.insert(group.nid_lrbg());
+  EXPECT_EQ(identities.size(), map.balise_groups.size());
+  EXPECT_TRUE(identities.contains(8U << 14U | 20U));
   EXPECT_FALSE(add_virtual_balises(map, 1, 7, 16000, 5).ok());
   EXPECT_FALSE(add_virtual_balises(map, 0, 7, 1, 5).ok());
   EXPECT_FALSE(add_virtual_balises(map, 300, 1024, 1, 5).ok());

@@ -130,6 +130,12 @@ constexpr const char* kInfra = R"(<?xml version="1.0"?>
 <teSpeedProfiles><teSpeedProfile id="T1"><sameDirProfile><staticSpeedProfile><staticSpeedProfileItem pos="0" speed="60"/>
 <staticSpeedProfileItem pos="200000" speed="40"/></staticSpeedProfile></sameDirProfile><oppositeDirProfile><staticSpeedProfile>
 <staticSpeedProfileItem pos="300000" speed="50"/><staticSpeedProfileItem pos="500000" speed="70"/></staticSpeedProfile></oppositeDirProfile></teSpeedProfile></teSpeedProfiles>
+<platforms><platform id="P"><platformEdges><platformEdge platformId="P1" height="380"><linearLocation skipFromPathStart="420000" skipFromPathEnd="260000">
+<dirTrackEdges><dirTrackEdge trackEdge="T1" sameDir="true"/><dirTrackEdge trackEdge="T2" sameDir="true"/></dirTrackEdges></linearLocation></platformEdge>
+<platformEdge platformId="P2" height="380"><linearLocation skipFromPathStart="200000" skipFromPathEnd="50000"><dirTrackEdges>
+<dirTrackEdge trackEdge="T2" sameDir="false"/></dirTrackEdges></linearLocation></platformEdge>
+<platformEdge platformId="P3" height="380"><linearLocation skipFromPathStart="900000" skipFromPathEnd="0"><dirTrackEdges>
+<dirTrackEdge trackEdge="T2" sameDir="true"/></dirTrackEdges></linearLocation></platformEdge></platformEdges></platform></platforms>
 <tunnels><tunnel id="TU"><trackArea><trackEdgeSections><trackEdgeSection trackEdge="T2" skipFromStart="120000" skipFromEnd="80000"/></trackEdgeSections></trackArea></tunnel></tunnels>
 <bridges><bridge id="BR"><trackArea><trackEdgeSections><trackEdgeSection trackEdge="T2" skipFromStart="240000" skipFromEnd="40000"/></trackEdgeSections></trackArea></bridge></bridges>
 <levelCrossings><levelCrossing id="LX"><trackArea><trackEdgeSection trackEdge="T2" skipFromStart="100000" skipFromEnd="190000"/></trackArea></levelCrossing></levelCrossings>
@@ -197,6 +203,34 @@ TEST_F(PlanImport, Railml2KeepsWhatThePlanSays) {
   const Path over = core::value_or_throw(Path::follow(shared, {1, 0, Direction::forward}, 2000, 0, {4, 2}));
   EXPECT_NEAR(over.end_m(), 1000, 1e-6);
   EXPECT_THAT(map.problems, Contains(HasSubstr("laid out as a drawing")));
+}
+
+TEST_F(PlanImport, WhatIsThereTwiceIsTold) {
+  using testing::Not;
+  EXPECT_THAT(core::value_or_throw(build_map({write("good.railml", kRailml2)}, {})).map.problems,
+              Not(Contains(HasSubstr("twice"))));
+  // The same id at two places: both stay, and the file is told to be wrong.
+  std::string text = kRailml2;
+  const std::string second = "<balise id=\"x2\" pos=\"203\"/>";
+  text.replace(text.find(second), second.size(), second + "<balise id=\"x1\" pos=\"280\"/>");
+  const Map map = core::value_or_throw(build_map({write("a.railml", text)}, {})).map;
+  EXPECT_THAT(map.problems,
+              Contains("the id \"x1\" is there twice, for <balise> \"x1\" at 200 m and for <balise> \"x1\" at 280 m"));
+  EXPECT_THAT(marks_of(map, {LandmarkKind::balise}),
+              testing::ElementsAre("balise x1 at 200.0 on 1", "balise x2 at 203.0 on 1", "balise x1 at 280.0 on 1"));
+  ASSERT_EQ(map.balise_groups.size(), 1U);
+  EXPECT_NEAR(map.balise_groups[0].offset_m, 200, 1e-9);
+  // Two at one place, in no group.
+  text = kRailml2;
+  text.replace(text.find(second), second.size(),
+               second + "<balise id=\"x3\" pos=\"250\"/><balise id=\"x4\" pos=\"250.2\"/>");
+  EXPECT_THAT(core::value_or_throw(build_map({write("b.railml", text)}, {})).map.problems,
+              Contains("balises \"x3\" and \"x4\" are at the same place, edge 1 at 250.20 m"));
+  // In railML 3 too.
+  text = kRailml3;
+  text.replace(text.find("id=\"b3\""), 7, "id=\"b1\"");
+  EXPECT_THAT(core::value_or_throw(build_map({write("c.xml", text)}, {})).map.problems,
+              Contains(HasSubstr("the id \"b1\" is there twice")));
 }
 
 /// 400 m straight to the north-east and a left arc of 500 m radius over 400 m; a siding of 200 m leaves at 300 m.
@@ -340,6 +374,7 @@ TEST_F(PlanImport, TheExamplesOfBothGenerationsAgree) {
       EXPECT_EQ(std::count_if(map.nodes.begin(), map.nodes.end(),
                               [](const Node& node) { return node.kind == NodeKind::railway_switch; }),
                 example.switches);
+      EXPECT_THAT(map.problems, testing::Not(Contains(HasSubstr("twice"))));
       EXPECT_EQ(count_of(map, LandmarkKind::underbridge), 1U);
       EXPECT_EQ(count_of(map, LandmarkKind::bridge), 0U);
       EXPECT_EQ(count_of(map, LandmarkKind::portal_in), 1U);
@@ -373,6 +408,10 @@ TEST_F(PlanImport, ErjuWithoutCoordinatesIsADrawing) {
   EXPECT_THAT(marks_of(map, {Kind::portal_in, Kind::portal_out, Kind::bridge, Kind::underbridge}),
               testing::ElementsAre("portal_in TU at 120.0 on 2", "portal_out TU at 220.0 on 2",
                                    "underbridge BR at 250.0 on 2"));
+  EXPECT_THAT(marks_of(map, {Kind::platform}),
+              testing::ElementsAre("platform P1 at 420.0 on 1", "platform P1 at 40.0 on 2", "platform P2 at 50.0 on 2",
+                                   "platform P2 at 100.0 on 2"));
+  EXPECT_THAT(map.problems, Contains("platform edge \"P3\" is not on its track edges; it is left out"));
   EXPECT_NEAR(limit_kmh(map, 1, 100, Direction::forward), 60, 1e-9);
   EXPECT_NEAR(limit_kmh(map, 1, 250, Direction::forward), 40, 1e-9);
   EXPECT_NEAR(limit_kmh(map, 1, 100, Direction::reverse), 50, 1e-9);
