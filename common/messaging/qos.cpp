@@ -14,10 +14,12 @@ eprosima::fastrtps::Duration_t duration(int64_t ns) {
 }
 
 // What the cable has lost is asked for again at the writer's next heartbeat; Fast DDS's own come every 3 s. Each costs
-// every reader two messages, so only what position and reports hang on is asked for sooner.
-constexpr int64_t kHeartbeatNs = 200'000'000;
-bool is_asked_for_soon(const QosProfile& profile) {
-  return profile.writer_reliable && (profile.exclusive || (profile.transient_local && profile.max_instances == 1));
+// every reader two messages, so only what position and reports hang on is asked for much sooner, and what everybody
+// says of himself so that he is not called silent for long behind a short interruption. 0 = Fast DDS's own.
+int64_t heartbeat_ns(const QosProfile& profile) {
+  if (!profile.writer_reliable) return 0;
+  if (profile.exclusive || (profile.transient_local && profile.max_instances == 1)) return 200'000'000;
+  return profile.transient_local ? core::kNsPerSecond : 0;
 }
 
 template <class Qos>
@@ -69,8 +71,8 @@ void write_xml(std::ostream& xml, const TopicInfo& topic, bool writer) {
       << p.max_instances << "</max_instances><max_samples_per_instance>" << p.depth
       << "</max_samples_per_instance><allocated_samples>" << std::min(p.depth * p.max_instances, 16)
       << "</allocated_samples></resourceLimitsQos>\n      </topic>\n";
-  if (writer && is_asked_for_soon(p))
-    xml << "      <times><heartbeatPeriod>" << xml_duration(kHeartbeatNs) << "</heartbeatPeriod></times>\n";
+  if (const int64_t period_ns = writer ? heartbeat_ns(p) : 0; period_ns > 0)
+    xml << "      <times><heartbeatPeriod>" << xml_duration(period_ns) << "</heartbeatPeriod></times>\n";
   xml << "      <historyMemoryPolicy>" << (p.data_sharing ? "PREALLOCATED" : "PREALLOCATED_WITH_REALLOC")
       << "</historyMemoryPolicy>\n    </" << tag << ">\n";
 }
@@ -81,7 +83,8 @@ void apply(const QosProfile& profile, dds::DataWriterQos& qos) {
   apply_common(profile, qos);
   qos.reliability().kind = profile.writer_reliable ? dds::RELIABLE_RELIABILITY_QOS : dds::BEST_EFFORT_RELIABILITY_QOS;
   qos.publish_mode().kind = profile.asynchronous ? dds::ASYNCHRONOUS_PUBLISH_MODE : dds::SYNCHRONOUS_PUBLISH_MODE;
-  if (is_asked_for_soon(profile)) qos.reliable_writer_qos().times.heartbeatPeriod = duration(kHeartbeatNs);
+  if (const int64_t period_ns = heartbeat_ns(profile); period_ns > 0)
+    qos.reliable_writer_qos().times.heartbeatPeriod = duration(period_ns);
 }
 
 void apply(const QosProfile& profile, dds::DataReaderQos& qos) {
