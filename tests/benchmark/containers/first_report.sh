@@ -36,9 +36,9 @@ end() {
   for host in cab coach; do
     on "$host" railfix train down --root "$work/$host" >/dev/null || true
   done
-  [ ${#engines[@]} = 0 ] || { kill "${engines[@]}" && wait "${engines[@]}" || true; }
+  [ "$engine" != docker ] || { kill $(cat "$work"/*.docker/pid) && wait "${engines[@]}" || true; }
   for host in cab coach; do
-    umount -l "$work/$host.docker/exec/netns/default" 2>/dev/null || true
+    umount -l "$work/$host".docker/{exec/netns/default,data} 2>/dev/null || true # the engine leaves them mounted
     ip netns delete "$id-$host"
   done
   rm -rf "$work"
