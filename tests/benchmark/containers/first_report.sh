@@ -36,7 +36,10 @@ end() {
   for host in cab coach; do
     on "$host" railfix train down --root "$work/$host" >/dev/null || true
   done
-  [ "$engine" != docker ] || { kill $(cat "$work"/*.docker/pid) && wait "${engines[@]}" || true; }
+  for host in cab coach; do
+    [ "$engine" != docker ] || kill "$(cat "$work/$host.docker/pid")" || true
+  done
+  [ ${#engines[@]} = 0 ] || wait "${engines[@]}" || true
   for host in cab coach; do
     umount -l "$work/$host".docker/{exec/netns/default,data} 2>/dev/null || true # the engine leaves them mounted
     ip netns delete "$id-$host"
