@@ -86,7 +86,8 @@ void TprPublisher::follow(const TrainPosition& position) {
     }
     reference_ = tracker_->reference();
   }
-  doubt_.follow(position, reference_ ? std::optional(reference_->foot_m) : std::nullopt, position.track_declared());
+  const bool guessed = position.place_known() && !position.track_declared();
+  doubt_.follow(position, reference_ ? std::optional(reference_->foot_m) : std::nullopt, !guessed);
   if (position.usable) {
     const double group_m = reference_ ? reference_->group->q_locacc_m + reference_->doubt_m : 0.0;
     const double over_m = doubt_.over_m() + group_m;
