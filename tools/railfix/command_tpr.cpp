@@ -11,6 +11,7 @@
 #include "core/result.hpp"
 #include "etcs/layout.hpp"
 #include "etcs/report_json.hpp"
+#include "etcs/report_parameters.hpp"
 
 namespace railfix::tool {
 
@@ -89,8 +90,50 @@ void print_table(const nlohmann::ordered_json& json, const etcs::TrainPositionRe
   }
 }
 
+std::string cycle_text(uint32_t value, uint32_t none, const std::string& every) {
+  return value == none ? "not cyclic" : "a report every " + every;
+}
+
+int print_packet_58(const etcs::ReportParameters& packet, bool json_wanted) {
+  struct Row {
+    const char* name;
+    uint32_t value;
+    std::string meaning;
+  };
+  std::vector<Row> rows{
+      {"NID_PACKET", etcs::kNidPacketReportParameters, "position report parameters (SUBSET-026 3.6.5.1.4, 7.4.2)"},
+      {"Q_DIR", packet.q_dir, "for trains that run: " + one_of({"reverse", "nominal", "both ways"}, packet.q_dir)},
+      {"Q_SCALE", packet.q_scale, one_of({"10 cm", "1 m", "10 m"}, packet.q_scale)},
+      {"T_CYCLOC", packet.t_cycloc,
+       cycle_text(packet.t_cycloc, etcs::kNoCycleTime, std::to_string(packet.t_cycloc) + " s")},
+      {"D_CYCLOC", packet.d_cycloc,
+       cycle_text(packet.d_cycloc, etcs::kNoCycleDistance, distance_text(packet.d_cycloc, packet.q_scale))},
+      {"M_LOC", packet.m_loc, one_of({"a report now", "a report at every LRBG", "no report at an LRBG"}, packet.m_loc)},
+      {"N_ITER", static_cast<uint32_t>(packet.locations.size()), "locations with a report"}};
+  for (const auto& location : packet.locations) {
+    rows.push_back({"D_LOC", location.d_loc,
+                    distance_text(location.d_loc, packet.q_scale) + " from the LRBG, or from the location before"});
+    rows.push_back({"Q_LGTLOC", location.q_lgtloc,
+                    "when passed by the " + one_of({"min safe rear end", "max safe front end"}, location.q_lgtloc)});
+  }
+  if (json_wanted) {
+    auto json = nlohmann::ordered_json::object();
+    for (size_t i = 0; i < rows.size() - 2 * packet.locations.size(); ++i) json[rows[i].name] = rows[i].value;
+    json["locations"] = nlohmann::ordered_json::array();
+    for (const auto& location : packet.locations)
+      json["locations"].push_back({{"D_LOC", location.d_loc}, {"Q_LGTLOC", location.q_lgtloc}});
+    std::cout << json.dump(2) << '\n';
+    return 0;
+  }
+  std::printf("%-12s %10s  %s\n", "field", "value", "meaning");
+  for (const auto& row : rows) std::printf("%-12s %10u  %s\n", row.name, row.value, row.meaning.c_str());
+  return 0;
+}
+
 int decode(const std::string& hex, Baseline baseline, bool json_wanted) {
   const auto bytes = core::value_or_throw(etcs::parse_hex(hex));
+  if (!bytes.empty() && bytes.front() == etcs::kNidPacketReportParameters)
+    return print_packet_58(core::value_or_throw(etcs::decode_report_parameters(bytes)), json_wanted);
   const auto report = etcs::decode(bytes, baseline);
   if (!report.ok()) {
     const auto other = baseline == Baseline::b3 ? Baseline::b4 : Baseline::b3;
@@ -145,8 +188,9 @@ void add_tpr(CLI::App& app, Action& chosen) {
   };
 
   auto* decoder = tpr->add_subcommand(
-      "decode", "Explain a message, e.g. railfix tpr decode 880601D6F345402AF34000E48F68EB84D250014010C38830");
-  decoder->add_option("hex", options->hex, "The message in hexadecimal digits")->required();
+      "decode",
+      "Explain a message 136 or a packet 58, e.g. railfix tpr decode 880601D6F345402AF34000E48F68EB84D250014010C38830");
+  decoder->add_option("hex", options->hex, "The message, or the packet, in hexadecimal digits")->required();
   decoder->add_flag("--json", options->json, "One JSON object with the raw values");
   add_baseline(decoder);
   decoder->callback([options, &chosen] {

@@ -38,6 +38,20 @@ TEST_F(TprCommand, DecodesForPeople) {
   EXPECT_EQ(outcome.err, "");
 }
 
+TEST_F(TprCommand, DecodesAPacket58) {
+  const auto outcome = tpr({"decode", "3A80908303E82103E9"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  for (const char* said :
+       {"SUBSET-026 3.6.5.1.4", "for trains that run: both ways", "a report every 6 s", "a report every 1000 m",
+        "a report at every LRBG", "500 m from the LRBG", "when passed by the max safe front end"}) {
+    EXPECT_THAT(outcome.out, HasSubstr(said));
+  }
+  const auto json = tpr({"decode", "3A80908303E82103E9", "--json"});
+  EXPECT_THAT(json.out, HasSubstr("\"D_CYCLOC\": 1000"));
+  EXPECT_THAT(json.out, HasSubstr("\"Q_LGTLOC\": 1"));
+  EXPECT_EQ(tpr({"decode", "3A80908303E821"}).exit_code, 2) << "cut";
+}
+
 TEST_F(TprCommand, JsonGoesBothWays) {
   const auto json = tpr({"decode", kCheckVector, "--json"});
   EXPECT_EQ(json.exit_code, 0);
