@@ -18,18 +18,19 @@ std::string hex_of(const etcs::TrainPositionReport& report) {
   return etcs::to_hex(core::value_or_throw(etcs::encode(report, etcs::Baseline::b3)));
 }
 
-/// 20 m/s away from one group after the other, a report every 5 s; `error_m` in front of the true place.
-std::string table(double error_m, uint32_t doubt_m) {
+/// 20 m/s away from one group after the other, a report every 5 s; `error_m` in front of the true place. Of the five
+/// reports of a leg the first ones have an interval.
+std::string table(double error_m, uint32_t doubt_m, int legs = 12, int with_interval = 5) {
   std::ostringstream text;
   text << "stamp_ns,hex\n";
-  for (int leg = 0; leg < 12; ++leg) {
+  for (int leg = 0; leg < legs; ++leg) {
     for (int i = 0; i < 5; ++i) {
       etcs::TrainPositionReport report;
       report.nid_lrbg = static_cast<uint32_t>(85 << 14 | (leg + 1));
       report.q_scale = 0;
       report.d_lrbg = static_cast<uint32_t>(10 * (10 + i * 100 + error_m));
       report.q_dirlrbg = report.q_dlrbg = report.q_dirtrain = etcs::kNominal;
-      report.l_doubtover = report.l_doubtunder = doubt_m * 10;
+      report.l_doubtover = report.l_doubtunder = i < with_interval ? doubt_m * 10 : uint32_t{etcs::kUnknownDistance};
       report.v_train = 14;
       text << (leg * 5 + i) * 5'000'000'000LL << ',' << hex_of(report) << '\n';
     }
@@ -83,8 +84,18 @@ TEST(TprCompare, SaysWhatIsShownAndWhatIsNot) {
   EXPECT_THAT(outcome.out, HasSubstr("mean +2.00 m"));
   EXPECT_THAT(outcome.out, HasSubstr("overlap        60 of 60"));
   EXPECT_THAT(outcome.out, HasSubstr("ratio 0.250 (0.158 to 0.396)"));
-  EXPECT_THAT(outcome.out, HasSubstr("intervals at least as good; errors not known"));
+  EXPECT_THAT(outcome.out,
+              HasSubstr("interval known           ours 100.0 %, certified 100.0 % of 60 certified reports"));
+  EXPECT_THAT(outcome.out, HasSubstr("verdict                  not shown")) << "a silent leg among the next 12?";
   outcome = test::run_program({"railfix", "tpr", "compare", "--ours", certified, "--certified", ours}, kPatienceS);
+  EXPECT_THAT(outcome.out, HasSubstr("verdict                  WORSE"));
+  std::ofstream(ours) << table(0.5, 5, 70);
+  std::ofstream(certified) << table(-1.5, 20, 70);
+  outcome = test::run_program({"railfix", "tpr", "compare", "--ours", ours, "--certified", certified}, kPatienceS);
+  EXPECT_THAT(outcome.out, HasSubstr("intervals at least as good, and as often known; errors not known"));
+  std::ofstream(ours) << table(0.5, 5, 70, 1);
+  outcome = test::run_program({"railfix", "tpr", "compare", "--ours", ours, "--certified", certified}, kPatienceS);
+  EXPECT_THAT(outcome.out, HasSubstr("interval known           ours 20.0 %, certified 100.0 % of 350"));
   EXPECT_THAT(outcome.out, HasSubstr("verdict                  WORSE"));
   outcome = test::run_program({"railfix", "tpr", "compare", "--ours", ours, "--certified", "/no/such.csv"}, kPatienceS);
   EXPECT_EQ(outcome.exit_code, 2);

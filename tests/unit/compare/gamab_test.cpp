@@ -99,8 +99,53 @@ TEST(Gamab, BrokenPromisesCountByLeg) {
   EXPECT_EQ(many.verdict, Verdict::worse);
   EXPECT_EQ(many.ours, 8U);
   EXPECT_EQ(compare_broken(broken(40, 1, 0), Demand{}).verdict, Verdict::open);
-  EXPECT_EQ(compare_broken(broken(40, 1, 3), Demand{}).verdict, Verdict::at_least_as_good);
+  EXPECT_EQ(compare_broken(broken(100, 1, 3), Demand{}).verdict, Verdict::at_least_as_good);
+  EXPECT_EQ(compare_broken(broken(40, 1, 3), Demand{}).verdict, Verdict::open)
+      << "up to 0.11 of our legs may be broken";
+  EXPECT_EQ(compare_broken(broken(40, 1, 3), {.broken_at_most = 0.2}).verdict, Verdict::at_least_as_good);
   EXPECT_EQ(compare_broken(broken(9, 0, 0), Demand{}).verdict, Verdict::open);
+  const auto few = compare_broken(broken(10, 0, 0), Demand{});
+  EXPECT_EQ(few.verdict, Verdict::open);
+  EXPECT_NEAR(few.ours_at_most, 0.26, 0.01);
+}
+
+/// Ten reports a leg, of which ours has `ours` and the certified system `certified` with a known interval.
+RatioResult share(size_t legs, size_t ours, size_t certified) {
+  std::vector<Sample> samples;
+  for (size_t i = 0; i < 10 * legs; ++i)
+    samples.push_back({i / 10, i % 10 < ours ? 1.0 : 0.0, i % 10 < certified ? 1.0 : 0.0});
+  return compare_share(samples, Demand{});
+}
+
+TEST(Gamab, ASystemThatIsSilentIsWorse) {
+  EXPECT_EQ(share(20, 2, 10).verdict, Verdict::worse);
+  EXPECT_NEAR(share(20, 2, 10).ratio, 5, 1e-9);
+  EXPECT_EQ(share(20, 0, 10).verdict, Verdict::worse);
+  EXPECT_EQ(share(70, 10, 10).verdict, Verdict::at_least_as_good);
+  EXPECT_EQ(share(20, 10, 10).verdict, Verdict::open) << "the next leg may be a silent one";
+  EXPECT_EQ(share(20, 10, 5).verdict, Verdict::at_least_as_good);
+  EXPECT_EQ(share(20, 0, 0).verdict, Verdict::open);
+}
+
+// Silent on whole legs now and then, just as often as the margin allows.
+TEST(Gamab, TheConfidenceHoldsForSharesToo) {
+  core::Random random(9);
+  for (const size_t legs : {60U, 100U}) {
+    int good = 0;
+    int worse = 0;
+    for (int turn = 0; turn < 200; ++turn) {
+      std::vector<Sample> samples;
+      for (size_t leg = 0; leg < legs; ++leg) {
+        const bool silent = random.uniform() < 1 - 1 / 1.05;
+        for (int i = 0; i < 10; ++i) samples.push_back({leg, silent ? 0.0 : 1.0, 1.0});
+      }
+      const auto verdict = compare_share(samples, Demand{}).verdict;
+      good += verdict == Verdict::at_least_as_good;
+      worse += verdict == Verdict::worse;
+    }
+    EXPECT_LE(good, 19) << legs;  // 5 % are 10, with 3 of scatter
+    EXPECT_LE(worse, 19) << legs;
+  }
 }
 
 }  // namespace

@@ -95,6 +95,22 @@ TEST(Pairing, NeedsOursBeforeAndBehindOnTheSameAxis) {
   EXPECT_EQ(pairing.pairs[1].leg, 1U);
 }
 
+TEST(Pairing, TellsWhoHadAKnownInterval) {
+  auto no_interval = report(40, kA, 500);
+  no_interval.fields.l_doubtover = etcs::kUnknownDistance;
+  auto lost = report(50, kA, 0);
+  lost.fields.nid_lrbg = etcs::kUnknownBaliseGroup;
+  const auto pairing = pair_up({report(0, kA, 0), no_interval},
+                               {report(-1, kA, 0), report(1, kA, 20), report(15, kA, 300), report(16, kA, 320),
+                                report(41, kA, 520), lost, report(60, kB, 0)},
+                               Axes(), kGapNs);
+  std::vector<int> seen;
+  for (const auto& at : pairing.availability)
+    seen.push_back(static_cast<int>(100 * at.leg) + (at.ours ? 10 : 0) + (at.certified ? 1 : 0));
+  EXPECT_EQ(seen, (std::vector<int>{1, 11, 11, 1, 1, 0, 101}));
+  EXPECT_EQ(pairing.certified_placed, 6U);
+}
+
 TEST(Pairing, DifferencesAreInRunningDirection) {
   const auto pairing = pair_up({report(0, kA, -100, 72, false)}, {report(0, kA, -103, 72, false)}, Axes(), kGapNs);
   EXPECT_NEAR(pairing.pairs.at(0).difference_m(), -3, 1e-9);  // the certified one is farther on

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <utility>
 
 #include "core/random.hpp"
 
@@ -73,11 +74,12 @@ Bounds bounds_of(const std::vector<Leg>& legs, Figure figure, double confidence)
   std::vector<double> subsets;
   std::vector<double> pessimist;
   std::vector<double> optimist;
+  const double unseen_over_worst = figure == Figure::share ? 1 : kUnseenOverWorst;
   for (size_t draw = 0; draw < draws; ++draw) {
     subsets.push_back(ratio_of(random_subset(legs, random), figure));
     Leg sum;
     for (const auto& leg : legs) sum = sum + leg * random_weight(random);
-    const double unseen = kUnseenOverWorst * random_weight(random);
+    const double unseen = unseen_over_worst * random_weight(random);
     pessimist.push_back(ratio_of({sum.ours + unseen * worst.ours, sum.certified}, figure));
     optimist.push_back(ratio_of({sum.ours, sum.certified + unseen * worst.certified}, figure));
   }
@@ -119,6 +121,7 @@ RatioResult compare_ratio(const std::vector<Sample>& samples, Figure figure, con
   if (legs.empty()) return result;
   Leg all;
   for (const auto& leg : legs) all = all + leg;
+  if (all.ours == 0 && all.certified == 0) return result;
   result.ratio = ratio_of(all, figure);
   if (legs.size() < kFewestLegs) {
     result.legs_needed = static_cast<double>(kFewestLegs);
@@ -139,6 +142,12 @@ RatioResult compare_ratio(const std::vector<Sample>& samples, Figure figure, con
                                       : std::numeric_limits<double>::infinity();
   }
   return result;
+}
+
+RatioResult compare_share(const std::vector<Sample>& samples, const Demand& demand) {
+  auto swapped = samples;
+  for (auto& sample : swapped) std::swap(sample.ours, sample.certified);
+  return compare_ratio(swapped, Figure::share, demand);
 }
 
 BrokenResult compare_broken(const std::vector<Sample>& samples, const Demand& demand) {
@@ -166,7 +175,7 @@ BrokenResult compare_broken(const std::vector<Sample>& samples, const Demand& de
   if (result.legs < kFewestLegs) return result;
   const size_t alone = only_ours + only_certified;
   if (only_ours <= only_certified) {
-    result.verdict = Verdict::at_least_as_good;
+    if (result.ours_at_most <= demand.broken_at_most) result.verdict = Verdict::at_least_as_good;
   } else if (binomial_up_to(only_certified, alone, 0.5) <= 1 - demand.confidence) {
     result.verdict = Verdict::worse;
   }

@@ -9,7 +9,7 @@
 // - Random weights on the legs and on one more that was not seen, twice as bad as the worst one seen (Gaffke, "Three
 //   test statistics for a nonparametric one-sided hypothesis on the mean of a nonnegative variable", Math. Methods
 //   Statist. 14, 2005, whose bound puts the unseen one at the end of the range). For systems whose errors are not
-//   alike.
+//   alike. A share ends at all reports: there the unseen one is the longest seen, and has nothing of ours.
 // No bound can hold against a failure so rare that the legs at hand likely do not show it: see compare_broken.
 #pragma once
 
@@ -28,7 +28,7 @@ struct Sample {
   double certified = 0;
 };
 
-enum class Figure : uint8_t { mean, root_mean_square };
+enum class Figure : uint8_t { mean, root_mean_square, share };
 
 struct RatioResult {
   Verdict verdict = Verdict::open;
@@ -42,13 +42,19 @@ struct RatioResult {
 
 struct Demand {
   double confidence = 0.95;
-  double margin = 0.05;  // at least as good: the ratio is at most 1 + margin
+  double margin = 0.05;          // at least as good: the ratio is at most 1 + margin
+  double broken_at_most = 0.05;  // ... and so large a share of our legs at most has a broken promise
 };
 
 /// Samples with a value that is not finite are left out. Fewer than 10 legs give no verdict.
 RatioResult compare_ratio(const std::vector<Sample>& samples, Figure figure, const Demand& demand);
 
-/// Legs on which a promise was broken, by one system alone: sign test.
+/// Which share of the reports had what both should have: certified over ours, so that more is worse here, too. A value
+/// is 1 where it was there, else 0.
+RatioResult compare_share(const std::vector<Sample>& samples, const Demand& demand);
+
+/// Legs on which a promise was broken, by one system alone: sign test. At least as good needs a shown bound, too: no
+/// broken leg of few shows nothing.
 struct BrokenResult {
   Verdict verdict = Verdict::open;
   size_t legs = 0;

@@ -47,6 +47,19 @@ std::vector<PlacedReport> placed(const std::vector<TimedReport>& reports, const 
   return places;
 }
 
+bool interval_known(const PlacedReport& report) {
+  return std::isfinite(report.high_m - report.low_m);
+}
+
+/// In the last report, when it is no older than `longest_gap_ns`.
+bool interval_known_at(const std::vector<PlacedReport>& reports, int64_t stamp_ns, int64_t longest_gap_ns) {
+  const auto next = std::upper_bound(reports.begin(), reports.end(), stamp_ns,
+                                     [](int64_t ns, const PlacedReport& report) { return ns < report.stamp_ns; });
+  if (next == reports.begin()) return false;
+  const auto& last = *std::prev(next);
+  return stamp_ns - last.stamp_ns <= longest_gap_ns && interval_known(last);
+}
+
 }  // namespace
 
 double Pair::difference_m() const {
@@ -61,12 +74,18 @@ bool Pair::overlap() const {
 Pairing pair_up(const std::vector<TimedReport>& ours, const std::vector<TimedReport>& certified, const Axes& axes,
                 int64_t longest_gap_ns) {
   const auto own = placed(ours, axes);
-  const auto other = placed(certified, axes);
-  Pairing pairing{{}, 0, own.size(), other.size(), 0};
-  const PlacedReport* before = nullptr;
-  for (const auto& report : other) {
-    if (before == nullptr || before->nid_lrbg != report.nid_lrbg) ++pairing.legs;
-    before = &report;
+  Pairing pairing{{}, {}, 0, own.size(), 0, 0};
+  uint32_t group_before = 0;
+  for (const auto& timed : certified) {
+    const auto place = axes.place(timed);
+    if (place && (pairing.legs == 0 || place->nid_lrbg != group_before)) ++pairing.legs;
+    pairing.availability.push_back({std::max<size_t>(pairing.legs, 1) - 1,
+                                    interval_known_at(own, timed.stamp_ns, longest_gap_ns),
+                                    place && interval_known(*place)});
+    if (!place) continue;
+    ++pairing.certified_placed;
+    const auto& report = *place;
+    group_before = report.nid_lrbg;
     const auto next = std::lower_bound(own.begin(), own.end(), report.stamp_ns,
                                        [](const PlacedReport& a, int64_t stamp_ns) { return a.stamp_ns < stamp_ns; });
     const bool exact = next != own.end() && next->stamp_ns == report.stamp_ns;

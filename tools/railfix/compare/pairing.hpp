@@ -21,8 +21,16 @@ struct Pair {
   [[nodiscard]] bool overlap() const;
 };
 
+/// Who had a position with a known interval at the time of a certified report.
+struct Availability {
+  size_t leg = 0;
+  bool ours = false;  // in a report that is no older than ours are carried
+  bool certified = false;
+};
+
 struct Pairing {
   std::vector<Pair> pairs;
+  std::vector<Availability> availability;  // of every certified report, those without a place included
   size_t legs = 0;
   size_t ours_placed = 0;
   size_t certified_placed = 0;
