@@ -1,25 +1,34 @@
-// Cost of the UD filter against the dense filter with Joseph's update, at the size that fusion has (9 states, 0 to 4
-// clones).
+// Cost of the UD filter against the dense filter with Joseph's update, at the size that fusion has: its states with 2
+// to 4 clones before them.
 #include <benchmark/benchmark.h>
 
 #include "core/random.hpp"
 #include "estimation/ud_filter.hpp"
+#include "fusion/motion_filter.hpp"
 #include "unit/estimation/joseph_filter.hpp"
 
 namespace railfix::estimation {
 namespace {
 
+constexpr int kStates = static_cast<int>(fusion::StateIndex::count);
+constexpr int kNoisy = 9;  // of them walk
+
+int index(int n, fusion::StateIndex state) {
+  return n - kStates + static_cast<int>(state);
+}
+
 StateMatrix transition(int n) {
+  using enum fusion::StateIndex;
   StateMatrix phi = StateMatrix::Identity(n, n);
-  phi(n - 9, n - 7) = 0.0167;
-  phi(n - 7, n - 6) = 0.0167;
+  for (const auto way : {camera_odometer, distance, wheel_odometer}) phi(index(n, way), index(n, speed)) = 0.0167;
+  phi(index(n, speed), index(n, acceleration)) = 0.0167;
   return phi;
 }
 
 StateVector relative(int n) {
   StateVector h = StateVector::Zero(n);
   h(0) = -1;
-  h(n - 9) = 1;
+  h(index(n, fusion::StateIndex::camera_odometer)) = 1;
   return h;
 }
 
@@ -27,8 +36,8 @@ template <class Filter>
 void cycle(benchmark::State& state, Filter filter) {
   const auto n = static_cast<int>(state.range(0));
   const StateMatrix phi = transition(n);
-  const StateMatrix g = StateMatrix::Identity(n, n).rightCols(4);
-  const StateVector q = StateVector::Constant(4, 1e-6);
+  const StateMatrix g = StateMatrix::Identity(n, n).rightCols(kNoisy);
+  const StateVector q = StateVector::Constant(kNoisy, 1e-6);
   const StateVector h = relative(n);
   for (auto _ : state) {
     filter.propagate(phi, g, q);
@@ -42,8 +51,8 @@ void ud_filter(benchmark::State& state) {
 void joseph_filter(benchmark::State& state) {
   cycle(state, JosephFilter{StateMatrix::Identity(state.range(0), state.range(0))});
 }
-BENCHMARK(ud_filter)->Arg(9)->Arg(13);
-BENCHMARK(joseph_filter)->Arg(9)->Arg(13);
+BENCHMARK(ud_filter)->Arg(kStates + 2)->Arg(kStates + 4);
+BENCHMARK(joseph_filter)->Arg(kStates + 2)->Arg(kStates + 4);
 
 }  // namespace
 }  // namespace railfix::estimation

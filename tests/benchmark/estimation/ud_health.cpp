@@ -9,43 +9,62 @@
 #include <optional>
 
 #include "estimation/ud_filter.hpp"
+#include "fusion/motion_filter.hpp"
 
 namespace railfix::estimation {
 namespace {
 
-constexpr int kStates = 9;
+using fusion::StateIndex;
+constexpr int kStates = static_cast<int>(StateIndex::count);
 
-// Odometer, distance, origin, speed, acceleration, bias, scale, other scale, wheel: as fusion has them.
+constexpr int at(StateIndex state) {
+  return static_cast<int>(state);
+}
+
 StateMatrix transition() {
+  using enum StateIndex;
   StateMatrix phi = StateMatrix::Identity(kStates, kStates);
-  phi(0, 3) = phi(1, 3) = phi(8, 3) = 0.05;
-  phi(1, 6) = 1.5;
-  phi(8, 7) = -1.5;
-  phi(3, 4) = 0.05;
-  phi(4, 4) = 0.99;
-  phi(6, 6) = phi(7, 7) = 1 - 2.5e-5;
+  for (const auto way : {camera_odometer, distance, wheel_odometer}) phi(at(way), at(speed)) = 0.05;
+  phi(at(distance), at(unit_scale)) = 1.5;
+  phi(at(wheel_odometer), at(other_scale)) = -1.5;
+  phi(at(speed), at(acceleration)) = 0.05;
+  phi(at(acceleration), at(acceleration)) = 0.99;
+  for (const auto scale : {unit_scale, other_scale}) phi(at(scale), at(scale)) = 1 - 2.5e-5;
+  phi(at(shape_error), at(shape_error)) = 1 - 7.5e-4;
+  phi(at(gnss_error), at(gnss_error)) = 1 - 8.3e-4;
   return phi;
 }
 StateVector noise() {
   StateVector q(kStates);
-  q << 0, 0, 0, 0, 4e-3, 5e-7, 5e-9, 5e-9, 1e-6;
+  q << 1e-6, 0, 0, 0, 4e-3, 5e-7, 5e-9, 5e-9, 1e-6, 5e-12, 1.5e-3, 1.7e-3;
   return q;
 }
 StateVector variances() {
   StateVector v(kStates);
-  v << 1e-6, 1e-6, 1e10, 3600, 0.16, 0.02, 1e-4, 1e-4, 1e10;
+  v << 1e-6, 1e-6, 1e10, 3600, 0.16, 0.02, 1e-4, 1e-4, 1e10, 1e-4, 1, 1;
   return v;
 }
-// In turn: wheel, speed by the camera, acceleration; now and then a landmark, very exact.
+// In turn: wheel, speed by the camera, acceleration; now and then GNSS, turning in a curve, and a landmark, very exact.
 std::pair<StateVector, double> measurement(uint64_t k) {
+  using enum StateIndex;
   StateVector h = StateVector::Zero(kStates);
-  if (k % 600 == 599) {
-    h(1) = h(2) = 1;
-    return {h, 1e-4};
+  const bool landmark = k % 600 == 599;
+  const bool gnss = k % 60 == 30;
+  const bool turning = k % 60 == 10;
+  if (landmark || gnss) h(at(distance)) = h(at(origin)) = 1;
+  if (landmark) return {h, 1e-4};
+  if (gnss) {
+    h(at(gnss_error)) = 2.6;
+    return {h, 2.25};
   }
-  if (k % 3 == 0) h(8) = 1;
-  if (k % 3 == 1) h(3) = 1;
-  if (k % 3 == 2) h(4) = h(5) = 1;
+  if (turning) {
+    h(at(distance)) = h(at(origin)) = h(at(shape_error)) = 3e-4;
+    h(at(gyro_bias)) = 1;
+    return {h, 1.6e-5};
+  }
+  if (k % 3 == 0) h(at(wheel_odometer)) = 1;
+  if (k % 3 == 1) h(at(speed)) = 1;
+  if (k % 3 == 2) h(at(acceleration)) = h(at(accel_bias)) = 1;
   return {h, k % 3 == 0 ? 1e-5 : k % 3 == 1 ? 1e-3 : 2e-2};
 }
 
@@ -109,8 +128,8 @@ void run(const char* name, uint64_t updates) {
     filter.cycle(k);
     if (!broke && (k < 1000 || k % 1000 == 0) && !filter.healthy()) broke = k;
   }
-  std::printf("%-24s sigma of speed %.6g, of scale %.6g; ", name, std::sqrt(filter.variance(3)),
-              std::sqrt(filter.variance(6)));
+  std::printf("%-24s sigma of speed %.6g, of scale %.6g; ", name, std::sqrt(filter.variance(at(StateIndex::speed))),
+              std::sqrt(filter.variance(at(StateIndex::unit_scale))));
   if (broke) {
     std::printf("not positive definite from update %llu on\n", static_cast<unsigned long long>(*broke));
   } else {
