@@ -163,7 +163,9 @@ void print_place(const track::Map& map, const track::EdgePosition& place, bool a
     std::printf("curvature        %.3e per m (radius %.1f m to the %s)\n", curvature, 1.0 / std::abs(curvature),
                 curvature > 0 ? "left" : "right");
   }
-  std::printf("cant             %.1f mm\n", sign * point.cant_m * 1e3);
+  // Seen the other way both stay: the value and the way change their signs together.
+  std::printf("its rate         %.3e per m2\n", point.curvature_rate_per_m2 + 0.0);
+  std::printf("cant, twist      %.1f mm, %.3f mm per m\n", sign * point.cant_m * 1e3 + 0.0, point.twist * 1e3 + 0.0);
   std::printf("elevation, grade %.3f m, %.2f per mille\n", point.elevation_m, sign * point.grade * 1e3);
   if (limit) std::printf("speed limit      %.0f km/h\n", core::kmh_from_mps(*limit));
   if (geo) std::printf("latitude         %.8f\nlongitude        %.8f\n", geo->lat_deg, geo->lon_deg);

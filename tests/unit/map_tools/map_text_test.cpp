@@ -1,0 +1,47 @@
+#include "map/map_text.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "unit/track/small_map.hpp"
+
+namespace railfix::tool {
+namespace {
+
+using testing::HasSubstr;
+
+std::string printed(const std::function<void()>& print) {
+  testing::internal::CaptureStdout();
+  print();
+  return testing::internal::GetCapturedStdout();
+}
+
+// 10 cm of cant over 1000 m; a clothoid for the rate of its curvature.
+TEST(MapText, APlaceIsToldWhole) {
+  track::Map map = track::small_map();
+  const std::string text = printed([&] { print_place(map, {1, 500}, false); });
+  EXPECT_THAT(text, HasSubstr("cant, twist      50.0 mm, 0.100 mm per m"));
+  EXPECT_THAT(text, HasSubstr("its rate         0.000e+00 per m2"));
+  EXPECT_THAT(text, HasSubstr("heading"));
+  EXPECT_THAT(text, HasSubstr("latitude"));
+  map.edges[1].alignment = track::Alignment::chained({}, {{100, 0, 1.0 / 500}});
+  for (const auto direction : {track::Direction::forward, track::Direction::reverse}) {
+    EXPECT_THAT(printed([&] {
+                  print_place(map, {2, 50, direction}, false);
+                }),
+                HasSubstr("its rate         2.000e-05 per m2"));
+  }
+}
+
+TEST(MapText, TheSummaryCountsTheKinds) {
+  track::Map map = track::small_map();
+  map.landmarks.push_back({4, track::LandmarkKind::underbridge, 1, 500, 0, 3, ""});
+  map.landmarks.push_back({5, track::LandmarkKind::bridge, 1, 510, 0, 3, ""});
+  map.landmarks.push_back({6, track::LandmarkKind::bridge, 1, 520, 0, 3, ""});
+  const std::string text = printed([&] { print_summary(map); });
+  EXPECT_THAT(text, HasSubstr("  underbridge    1\n"));
+  EXPECT_THAT(text, HasSubstr("  bridge         2\n"));
+}
+
+}  // namespace
+}  // namespace railfix::tool
