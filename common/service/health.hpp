@@ -10,7 +10,7 @@
 namespace railfix::service {
 
 /// What the loop itself finds wrong, beside what the service says.
-enum class Trouble { clock, writers };
+enum class Trouble { clock, writers, certificates };
 
 class PublishedHealth final : public Health {
  public:
@@ -49,7 +49,7 @@ class PublishedHealth final : public Health {
   msg::ServiceStatus published_;
   std::string stands_by_;
   Traffic traffic_;
-  std::array<std::string, 2> troubles_;
+  std::array<std::string, 3> troubles_;
   std::vector<double> latencies_ms_;  // since the last measurement
   int64_t measured_ns_ = 0;
   int64_t cpu_ns_ = 0;

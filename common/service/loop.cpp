@@ -56,7 +56,7 @@ Loop::Loop(std::string service, const CommonConfig& common, bool beside)
   });
   watch_writers();
   if (!common_.interfaces.empty()) watch_cable();
-  if (!common_.security.empty()) watch_certificate();
+  if (!common_.security.empty()) watch_own_certificate();
   if (!common_.peers.empty() && !common_.lock_step) watch_clocks();
 }
 
@@ -94,18 +94,43 @@ void Loop::watch_writers() {
   });
 }
 
+namespace {
+
+// Empty while there is time.
+std::string end_of(const std::filesystem::path& certificate) {
+  const auto left = messaging::days_left(certificate);
+  if (!left.ok() || left.value() >= messaging::kCertificateWarningDays) return "";
+  return left.value() < 0 ? "ran out before " + std::to_string(-left.value()) + " days"
+                          : "runs out in " + std::to_string(left.value()) + " days";
+}
+
+}  // namespace
+
 // What runs goes on when it has run out, but would not be let in again after a restart.
-void Loop::watch_certificate() {
+void Loop::watch_own_certificate() {
   const auto look = [this] {
-    const auto left = messaging::days_left(messaging::certificate_of(common_.security, service_));
-    if (left.ok() && left.value() < messaging::kCertificateWarningDays)
-      log_->warn(
-          "this service's certificate {} days; railfix train keys --renew, then railfix train upgrade on each host",
-          left.value() < 0 ? "ran out before " + std::to_string(-left.value())
-                           : "runs out in " + std::to_string(left.value()));
+    const auto end = end_of(messaging::certificate_of(common_.security, service_));
+    if (!end.empty())
+      log_->warn("this service's certificate {}; railfix train keys --renew, then railfix train upgrade on each host",
+                 end);
   };
   look();
   every(kCertificatePeriod, look);
+}
+
+void Loop::watch_certificate(const std::string& what, const std::filesystem::path& file) {
+  if (file.empty()) return;
+  certificates_[what] = file;
+  const auto look = [this] {
+    std::string text;
+    for (const auto& [name, certificate] : certificates_) {
+      const auto end = end_of(certificate);
+      if (!end.empty()) text += (text.empty() ? "" : " ") + name + " (" + certificate.string() + ") " + end + ".";
+    }
+    health_->trouble(Trouble::certificates, text);
+  };
+  look();
+  if (certificates_.size() == 1) every(kCertificatePeriod, look);
 }
 
 // Of no use when this thread was held up between the two.

@@ -34,6 +34,7 @@ class Loop final : public Context {
   void share_charge(ChargeHandlers handlers) override;
   [[nodiscard]] bool in_charge() const override { return !standby_ || standby_->in_charge(); }
   [[nodiscard]] bool clock_is_doubted() const override { return clocks_.own_is_doubted(); }
+  void watch_certificate(const std::string& what, const std::filesystem::path& file) override;
   void keep(const std::string& notes) override { notes_.keep(notes); }
   [[nodiscard]] const std::string& kept() const override { return notes_.kept(); }
   void finish(const std::string& why) override;
@@ -58,7 +59,7 @@ class Loop final : public Context {
   [[nodiscard]] int64_t next_due_ns(int64_t period_ns) const;
   void run_due_timers();
   void watch_cable();
-  void watch_certificate();
+  void watch_own_certificate();
   void watch_clocks();
   void look_at_clock();
   void watch_writers();
@@ -80,8 +81,9 @@ class Loop final : public Context {
   std::unique_ptr<messaging::Writer<msg::ControlReply>> reply_;
   Notes notes_;
   ClockWatch clocks_;
-  std::vector<std::string> unheard_;  // writers that do not fit, as told last
-  std::unique_ptr<Standby> standby_;  // nullptr = the only one of its kind
+  std::vector<std::string> unheard_;                           // writers that do not fit, as told last
+  std::map<std::string, std::filesystem::path> certificates_;  // not of DDS, by what they are
+  std::unique_ptr<Standby> standby_;                           // nullptr = the only one of its kind
   std::map<std::string, std::function<core::Result<std::string>(const std::string&)>> commands_;
   int64_t born_ns_;
   std::vector<Timer> timers_;

@@ -18,6 +18,7 @@
 #include <spdlog/logger.h>
 
 #include <chrono>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <string>
@@ -122,6 +123,9 @@ class Context {
   /// This host's clock was set while this service ran, and does not agree with the other hosts' since. Always false on
   /// a train with one host.
   [[nodiscard]] virtual bool clock_is_doubted() const = 0;
+  /// One that is not of DDS (of a broker, of a page). Degraded from messaging::kCertificateWarningDays before it runs
+  /// out; one that cannot be read is for whoever uses it to tell. `what` begins a sentence.
+  virtual void watch_certificate(const std::string& what, const std::filesystem::path& file) = 0;
   /// What this service wants to know when it is started anew on this host: in memory, gone when the computer restarts.
   /// kept() gives the notes of the process before, empty = none.
   virtual void keep(const std::string& notes) = 0;

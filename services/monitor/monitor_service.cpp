@@ -69,6 +69,7 @@ MonitorService::MonitorService(const Config& config, service::Context& context)
       cab_(config.picture_hz),
       live_(live_actions()),
       foxglove_(foxglove_actions()) {
+  context_.watch_certificate("The page's certificate", config.tls_certificate);
   set_up_topics();
   choose_topics();
   port_ = server_.listen(static_cast<uint16_t>(config.port), static_cast<int>(config.port_search));

@@ -107,6 +107,10 @@ TprPublisherService::TprPublisherService(const Config& config, service::Context&
       writer_(context.writer(messaging::topics::train_position_report)) {
   if (const auto link = config.ground_link.settings(context.common().train_id, context.common().host))
     ground_link_ = std::make_unique<GroundLink>(*link);
+  if (ground_link_) {
+    context.watch_certificate("The ground link's certificate", config.ground_link.certificate_file);
+    context.watch_certificate("The certificate of the broker's authority", config.ground_link.ca_file);
+  }
   context.on<msg::DataClock>(messaging::topics::data_clock, [this](const msg::DataClock& clock) {
     data_time_.emplace(clock, core::wall_ns(), core::monotonic_ns());
   });

@@ -224,16 +224,17 @@ TEST_F(GroundLinkTest, ListenPrintsEachReportOnce) {
 // Own authority, a certificate for the broker and one for the train, as docs/configuration/reports.md asks for.
 class Certificates {
  public:
-  explicit Certificates(const std::filesystem::path& folder) : folder_(folder) {
+  explicit Certificates(const std::filesystem::path& folder, const std::string& days = "400") : folder_(folder) {
     std::filesystem::create_directories(folder);
-    ok_ = openssl({"req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=railfix test",
+    ok_ = openssl({"req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", days, "-subj", "/CN=railfix test",
                    "-keyout", of("ca.key"), "-out", of("ca.pem")});
     for (const std::string name : {"broker", "train"}) {
       std::ofstream(folder_ / (name + ".ext")) << "subjectAltName=DNS:localhost\n";
       ok_ = ok_ && openssl({"req", "-newkey", "rsa:2048", "-nodes", "-subj", "/CN=" + name, "-keyout",
                             of(name + ".key"), "-out", of(name + ".csr")});
-      ok_ = ok_ && openssl({"x509", "-req", "-in", of(name + ".csr"), "-CA", of("ca.pem"), "-CAkey", of("ca.key"),
-                            "-CAcreateserial", "-days", "2", "-extfile", of(name + ".ext"), "-out", of(name + ".pem")});
+      ok_ =
+          ok_ && openssl({"x509", "-req", "-in", of(name + ".csr"), "-CA", of("ca.pem"), "-CAkey", of("ca.key"),
+                          "-CAcreateserial", "-days", days, "-extfile", of(name + ".ext"), "-out", of(name + ".pem")});
     }
   }
   [[nodiscard]] bool ok() const { return ok_; }
@@ -250,7 +251,7 @@ class Certificates {
 
 TEST_F(GroundLinkTest, TlsLetsOnlyTheRightCertificatesIn) {
   const Certificates ours(file("ours"));
-  const Certificates others(file("others"));
+  const Certificates others(file("others"), "5");
   ASSERT_TRUE(ours.ok() && others.ok());
   test::Broker broker(file("broker"), "cafile " + ours.of("ca.pem") + "\ncertfile " + ours.of("broker.pem") +
                                           "\nkeyfile " + ours.of("broker.key") + "\nrequire_certificate true\n");
@@ -273,6 +274,7 @@ TEST_F(GroundLinkTest, TlsLetsOnlyTheRightCertificatesIn) {
     ASSERT_TRUE(run_until([&] { return connected() && states_.matched_readers() > 0; }, [] {}));
     ASSERT_TRUE(run_for(4));
     ASSERT_TRUE(status_says("4 reports wait"));
+    ASSERT_TRUE(status_says("train.pem) runs out in 4 days."));
   }
   ASSERT_TRUE(run_until([&] { return states_.matched_readers() == 0; }, [] {}));
   test::Program program(secured(ours.of("ca.pem"), ours));
