@@ -1,5 +1,6 @@
 // What people and other programs write into files beside the pictures: configuration, calibration, tables of sensors
-// and of the truth, reports to compare, scenarios, scales of an earlier trip. The first byte of the input chooses.
+// and of the truth, reports to compare, scenarios, scales of an earlier trip, a train's manifest, the plan and the
+// state of a host. The first byte of the input chooses.
 #include <array>
 #include <cmath>
 
@@ -12,6 +13,8 @@
 #include "service/config.hpp"
 #include "simulator/simulator_config.hpp"
 #include "support/every_setting.hpp"
+#include "train/plan.hpp"
+#include "train/render.hpp"
 
 namespace railfix {
 
@@ -47,6 +50,44 @@ void calibration(const std::filesystem::path& file, const std::filesystem::path&
                 "a written calibration is the same");
 }
 
+void manifest(const std::filesystem::path& file) {
+  const auto read = tool::read_manifest(file);
+  if (!taken(read)) return;
+  const auto& train = read.value();
+  fuzz::require(!train.train_id.empty() && !train.release.empty() && !train.hosts.empty(), "a train has what it needs");
+  for (const auto& service : train.services)
+    fuzz::require(train.host(service.host) != nullptr, "every service runs on a host of the train");
+  for (const auto& host : train.hosts) {
+    fuzz::require(!tool::render_config(train, host, "/g").empty(), "a manifest that was taken is made into settings");
+    fuzz::require(!tool::render_compose(train, host, "/g").empty(), "and into containers");
+  }
+}
+
+// Written by ourselves; a broken disk may give back anything.
+template <class Read>
+void host_file(Read read) {
+  try {
+    read();
+  } catch (const core::BadInput& damaged) {
+    fuzz::require(std::string(damaged.what()).find("is damaged") != std::string::npos, "what is damaged is told");
+  }
+}
+
+void plan(const tool::HostFolder& folder) {
+  host_file([&] {
+    auto read = folder.plan();
+    if (!read) return;
+    for (const auto& service : read->services) fuzz::require(!service.command.empty(), "a service has a command");
+    // Bytes that are no UTF-8 are replaced the first time.
+    for (int times = 0; times < 2; ++times) {
+      fuzz::require(folder.write(*read).ok(), "a plan that was taken can be written");
+      const auto again = folder.plan();
+      fuzz::require(again && (times == 0 || again->services == read->services), "a written plan is the same");
+      read = again;
+    }
+  });
+}
+
 void scales(const std::string& text) {
   const auto read = fusion::saved_scales(text);
   if (!taken(read)) return;
@@ -65,7 +106,9 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   static const fuzz::InputFolder folder;
   const std::span<const uint8_t> rest{data + 1, size - 1};
   static constexpr std::array kTables{"imu0", "wheel0", "gnss0"};
-  const int choice = data[0] == 's' ? 10 : data[0] == 'k' ? 11 : (data[0] + 2) % 10;  // the digits in their order
+  static const std::string letters = "skmpr";
+  const auto letter = letters.find(static_cast<char>(data[0]));
+  const int choice = letter != std::string::npos ? 10 + static_cast<int>(letter) : (data[0] + 2) % 10;  // as digits go
   switch (choice) {
     case 0:
       configuration(folder.write("a.yaml", rest));
@@ -93,6 +136,17 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       break;
     case 11:
       scales({rest.begin(), rest.end()});
+      break;
+    case 12:
+      manifest(folder.write("train/train.yaml", rest));
+      break;
+    case 13:
+      (void)folder.write("host/var/lib/railfix-train/plan.yaml", rest);
+      plan(tool::HostFolder(folder.at("host")));
+      break;
+    case 14:
+      (void)folder.write("host/var/lib/railfix-train/state.yaml", rest);
+      host_file([] { (void)tool::HostFolder(folder.at("host")).state(); });
       break;
     case 10:
       scenario(folder.write("scenario.yaml", rest));

@@ -101,6 +101,8 @@ TEST_F(TrainFolder, MistakesAreToldWithLineKeyAndWayOut) {
   EXPECT_THAT(told("10.42.1.12", "coach.local"), HasSubstr("'coach.local' is not an IPv4 address such as 10.42.1.11"));
   EXPECT_THAT(told("settings:\n", "settings:\n  common: { domain: 3 }\n"),
               HasSubstr("settings.common.domain is made from the section train; leave it out"));
+  EXPECT_THAT(told("settings:\n", "settings:\n  common: 3\n"),
+              HasSubstr("line 20: settings.common must be a section of keys, such as {key: value}"));
   EXPECT_THAT(told("run_as: programs", "run_as: magic"),
               HasSubstr("train.run_as must be containers, podman, docker or programs"));
   EXPECT_THAT(told("id: re460-042", "id: a/b"), HasSubstr("train.id must be a name"));

@@ -170,7 +170,12 @@ class ManifestReader {
     auto known = service::service_names();
     known.insert(known.begin(), "common");
     refuse_unknown(settings, "settings.", known);
-    if (!settings["common"]) return;
+    for (const auto& section : settings) {
+      if (!section.second.IsMap() && !section.second.IsNull())
+        problem(section.second, "settings." + section.first.Scalar(),
+                "must be a section of keys, such as {key: value}");
+    }
+    if (!settings["common"] || !settings["common"].IsMap()) return;
     for (const char* key : {"train_id", "host", "domain", "interfaces", "peers", "ownership_strength", "qos_profiles",
                             "security", "lock_step"}) {
       if (settings["common"][key])

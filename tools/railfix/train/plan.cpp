@@ -15,11 +15,19 @@ namespace fs = std::filesystem;
 
 constexpr int kGenerationsKept = 5;
 
-std::optional<YAML::Node> load(const fs::path& file) {
+core::BadInput damaged(const fs::path& file, const std::string& how) {
+  return core::BadInput(file.string() + " is damaged (" + how + "); remove it, then railfix train up");
+}
+
+// What `read` makes of a file of ours; nothing when it is not there.
+template <class Read>
+auto load(const fs::path& file, Read read) -> std::optional<decltype(read(YAML::Node()))> {
   try {
-    return YAML::LoadFile(file.string());
-  } catch (const YAML::Exception&) {
+    return read(YAML::LoadFile(file.string()));
+  } catch (const YAML::BadFile&) {
     return std::nullopt;
+  } catch (const YAML::Exception& error) {
+    throw damaged(file, error.what());
   }
 }
 
@@ -30,7 +38,12 @@ core::Status replace(const fs::path& file, const std::string& text) {
   return core::Error{file.string() + " cannot be written; is the disk full, or are you not root?"};
 }
 
+void require(bool holds, const YAML::Node& node, const char* what) {
+  if (!holds) throw YAML::RepresentationException(node.Mark(), what);
+}
+
 PlannedService service_of(const YAML::Node& node) {
+  require(node["command"].IsSequence() && node["command"].size() > 0, node, "a service without a command");
   return {node["name"].as<std::string>(),
           node["release"].as<std::string>(),
           node["generation"].as<int>(),
@@ -38,6 +51,29 @@ PlannedService service_of(const YAML::Node& node) {
           node["command"].as<std::vector<std::string>>(),
           node["clean_up"].as<std::vector<std::string>>(std::vector<std::string>{}),
           node["settings"].as<std::string>()};
+}
+
+HostPlan plan_of(const YAML::Node& root) {
+  HostPlan plan;
+  plan.train_id = root["train_id"].as<std::string>();
+  plan.host = root["host"].as<std::string>();
+  plan.generation = root["generation"].as<int>();
+  plan.previous = root["previous"].as<int>();
+  plan.down = root["down"].as<bool>(false);
+  require(root["services"].IsSequence(), root, "no list of services");
+  for (const auto& node : root["services"]) plan.services.push_back(service_of(node));
+  return plan;
+}
+
+HostState state_of(const YAML::Node& root) {
+  HostState state;
+  for (const auto& entry : root) {
+    const auto& one = entry.second;
+    state[entry.first.as<std::string>()] = {one["pid"].as<int64_t>(),      one["generation"].as<int>(),
+                                            one["restarts"].as<int>(),     one["last_end"].as<std::string>(),
+                                            one["beside"].as<bool>(false), one["born"].as<int64_t>(0)};
+  }
+  return state;
 }
 
 }  // namespace
@@ -89,16 +125,7 @@ fs::file_time_type HostFolder::plan_written() const {
 }
 
 std::optional<HostPlan> HostFolder::plan_in(const fs::path& folder) {
-  const auto root = load(folder / "plan.yaml");
-  if (!root) return std::nullopt;
-  HostPlan plan;
-  plan.train_id = (*root)["train_id"].as<std::string>();
-  plan.host = (*root)["host"].as<std::string>();
-  plan.generation = (*root)["generation"].as<int>();
-  plan.previous = (*root)["previous"].as<int>();
-  plan.down = (*root)["down"].as<bool>(false);
-  for (const auto& node : (*root)["services"]) plan.services.push_back(service_of(node));
-  return plan;
+  return load(folder / "plan.yaml", plan_of);
 }
 
 core::Status HostFolder::write_to(const fs::path& folder, const HostPlan& plan) {
@@ -128,16 +155,7 @@ bool RunningService::runs() const {
 }
 
 HostState HostFolder::state() const {
-  HostState state;
-  const auto root = load(folder_ / "state.yaml");
-  if (!root || !root->IsMap()) return state;
-  for (const auto& entry : *root) {
-    state[entry.first.as<std::string>()] = {
-        entry.second["pid"].as<int64_t>(),      entry.second["generation"].as<int>(),
-        entry.second["restarts"].as<int>(),     entry.second["last_end"].as<std::string>(),
-        entry.second["beside"].as<bool>(false), entry.second["born"].as<int64_t>(0)};
-  }
-  return state;
+  return load(folder_ / "state.yaml", state_of).value_or(HostState{});
 }
 
 core::Status HostFolder::write(const HostState& state) const {

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <csignal>
+#include <iostream>
 #include <ranges>
 
 #include "core/time.hpp"
@@ -88,7 +89,7 @@ class Supervision {
     const auto written = folder_.plan_written();
     if (written == plan_written_) return;
     plan_written_ = written;
-    const auto plan = folder_.plan();
+    const auto plan = or_nothing([this] { return folder_.plan(); });
     if (!plan || (!plan->down && plan->services == planned_)) return;
     if (planned_.empty()) adopt_running(*plan);
     if (plan->down) {
@@ -112,10 +113,20 @@ class Supervision {
     start_new(*plan);
     say();
   }
+  /// Of a file of ours that is damaged, which is said: what runs goes on.
+  template <class Read>
+  static auto or_nothing(Read read) -> decltype(read()) {
+    try {
+      return read();
+    } catch (const core::BadInput& damaged) {
+      std::cerr << "railfix: " << damaged.what() << std::endl;
+      return {};
+    }
+  }
   // What a supervisor that was killed has left goes on. What the plan says by now replaces it in the usual way.
   void adopt_running(const HostPlan& plan) {
     const auto common = common_of(plan);
-    for (const auto& [key, running] : folder_.state()) {
+    for (const auto& [key, running] : or_nothing([this] { return folder_.state(); })) {
       if (!running.runs()) continue;
       PlannedService service;
       service.name = key.substr(0, key.find(kBefore));

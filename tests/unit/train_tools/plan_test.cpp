@@ -1,0 +1,73 @@
+// The files of a host's folder, as they are written and as a broken disk may give them back.
+#include "train/plan.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+
+namespace railfix::tool {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+class HostFiles : public ::testing::Test {
+ protected:
+  ~HostFiles() override { fs::remove_all(root_); }
+  void write(const char* name, const std::string& text) const {
+    fs::create_directories(folder_.plan_file().parent_path());
+    std::ofstream(folder_.plan_file().parent_path() / name) << text;
+  }
+  template <class Read>
+  static std::string told(Read read) {
+    try {
+      static_cast<void>(read());
+    } catch (const core::BadInput& damaged) {
+      return damaged.what();
+    }
+    return "nothing";
+  }
+  const fs::path root_ = fs::temp_directory_path() / ("railfix-host-files-" + std::to_string(getpid()));
+  const HostFolder folder_{root_};
+};
+
+TEST_F(HostFiles, AreReadAsTheyWereWritten) {
+  EXPECT_FALSE(folder_.plan());
+  EXPECT_TRUE(folder_.state().empty());
+  HostPlan plan{"t", "cab", 3, 2, true, {{"fusion", "1.0", 3, false, {"/bin/true", "x"}, {}, "a: b\n"}}};
+  ASSERT_TRUE(folder_.write(plan).ok());
+  const auto read = folder_.plan();
+  ASSERT_TRUE(read);
+  EXPECT_EQ(read->services, plan.services);
+  EXPECT_TRUE(read->down);
+  plan.services.clear();  // a host that every service has left
+  ASSERT_TRUE(folder_.write(plan).ok());
+  EXPECT_TRUE(folder_.plan()->services.empty());
+  ASSERT_TRUE(folder_.write(HostState{{"fusion", {7, 3, 1, "ended", false, 9}}}).ok());
+  EXPECT_EQ(folder_.state().at("fusion").pid, 7);
+}
+
+TEST_F(HostFiles, ThatAreDamagedAreTold) {
+  const auto plan = [&](const std::string& text) {
+    write("plan.yaml", text);
+    return told([&] { return folder_.plan(); });
+  };
+  const std::string head = "train_id: t\nhost: cab\ngeneration: 3\nprevious: 2\n";
+  EXPECT_EQ(plan(head + "services: []\n"), "nothing");
+  EXPECT_THAT(plan(""), AllOf(HasSubstr("plan.yaml is damaged ("), HasSubstr("); remove it, then railfix train up")));
+  EXPECT_THAT(plan("train_id: ["), HasSubstr("plan.yaml is damaged (yaml-cpp: error at line 1"));
+  EXPECT_THAT(plan(head), HasSubstr("first invalid key: \"services\""));
+  EXPECT_THAT(plan(head + "services: x\n"), HasSubstr("no list of services")) << "the supervisor would end everything";
+  EXPECT_THAT(plan(head + "services: [{name: fusion, release: a, generation: x, standby: false, command: [y]}]\n"),
+              HasSubstr("error at line 5"));
+  EXPECT_THAT(plan(head + "services: [{name: fusion, release: a, generation: 1, standby: false, command: []}]\n"),
+              HasSubstr("a service without a command"));
+  write("state.yaml", "fusion: {pid: many}\n");
+  EXPECT_THAT(told([&] { return folder_.state(); }), HasSubstr("state.yaml is damaged (yaml-cpp: error at line 1"));
+}
+
+}  // namespace
+}  // namespace railfix::tool
