@@ -8,6 +8,7 @@
 
 #include "messaging/security.hpp"
 #include "messaging/topics.hpp"
+#include "support/program.hpp"
 #include "support/run_until.hpp"
 #include "train/keys.hpp"
 
@@ -229,6 +230,41 @@ TEST_F(Security, ARightCertificateDoesNotOpenAnotherServicesTopic) {
   messaging::Participant odometry(options("odometry", keys));
   EXPECT_THROW(messaging::Writer<msg::TrainState>(odometry, topics::train_state), core::BadInput);
   EXPECT_NO_THROW(messaging::Writer<msg::OdometryStep>(odometry, topics::odometry_step));
+}
+
+// A stolen key in a program that does not keep to the rules: it believes a governance of its own, without access
+// control, so its library refuses nothing. The train's services must.
+TEST_F(Security, AStolenKeyWhoseProgramRefusesNothingHearsAndSaysNothing) {
+  const auto keys = keys_of("train");
+  const auto own = keys_of("own").parent_path() / "authority";
+  const auto stolen = folder_ / "stolen";
+  fs::create_directories(stolen);
+  // As if it were the fusion's: what the library asks for by name, with the rights of odometry.
+  for (const char* part : {".cert.pem", ".key.pem", ".permissions.p7s"})
+    fs::copy_file(keys / (std::string("odometry") + part), stolen / (std::string("odometry") + part));
+  std::ofstream(stolen / "ca.pem") << test::slurp(keys / "ca.pem") << test::slurp(own / "ca.pem");
+  auto governance = tool::governance_xml(core::value_or_throw(tool::read_manifest(folder_ / "train")));
+  for (const char* control : {"join", "read", "write"}) {
+    const std::string on = std::string("<enable_") + control + "_access_control>true";
+    for (size_t at = 0; (at = governance.find(on)) != std::string::npos;)
+      governance.replace(at + on.size() - 4, 4, "false");
+  }
+  std::ofstream(stolen / "governance.xml") << governance;
+  ASSERT_EQ(test::run_program({"/usr/bin/openssl", "smime", "-sign", "-in", (stolen / "governance.xml").string(),
+                               "-text", "-out", (stolen / "governance.p7s").string(), "-signer",
+                               (own / "ca.pem").string(), "-inkey", (own / "ca.key.pem").string()},
+                              60)
+                .exit_code,
+            0);
+  Train train(options("fusion", keys), options("monitor", keys));
+  Rogue rogue(options("odometry", stolen));  // its own library lets it make reader and writer of train_state
+  messaging::Writer<msg::OdometryStep> own_topic(rogue.participant, topics::odometry_step);
+  expect_nothing_crosses(train, rogue);
+  const auto is_let_in = [&] {
+    return std::ranges::any_of(train.monitor.certificates(),
+                               [](const auto& end) { return end.process == "odometry@cab"; });
+  };
+  EXPECT_TRUE(test::run_until(train.queue, is_let_in)) << "it was kept out as a whole: its topics were not refused";
 }
 
 TEST_F(Security, ToolsHaveTheOperatorsCertificate) {
