@@ -1,6 +1,7 @@
 #include "track/import/clothoid_fit.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -19,13 +20,25 @@ constexpr double kLeastSigmaM = 0.02;
 constexpr double kShortestM = 3.0;
 constexpr double kSharpestPerM = 1.0 / 50.0;
 constexpr int kSteps = 12;
+constexpr int kClosingSteps = 5;
+constexpr double kCurvatureStep = 1e-9;
 
 /// Levenberg-Marquardt over the heading at the start, the curvatures and the inner knots.
 class Refiner {
  public:
   Refiner(const CurvatureTarget& target, SparseProfile profile) : target_(target), best_(std::move(profile)) {}
 
+  /// The refined profile, closed: where the steps ended before the end was met, the least change of the curvatures
+  /// that meets it (the end is exact, the points have scatter).
   SparseProfile run() {
+    refine();
+    for (int step = 0; step < kClosingSteps && !close(); ++step) {
+    }
+    return best_;
+  }
+
+ private:
+  void refine() {
     Eigen::VectorXd residual = residuals(best_);
     double cost = residual.squaredNorm();
     double damping = 1e-3;
@@ -50,10 +63,40 @@ class Refiner {
         if (damping > 1e6) break;
       }
     }
-    return best_;
   }
 
- private:
+  /// Metres beside the last point, and heading there off by so many radians (0 where it is free).
+  [[nodiscard]] Eigen::Vector2d end_errors(const Eigen::VectorXd& residual) const {
+    const auto count = static_cast<Eigen::Index>(target_.points.size());
+    return {residual[count - 1] * kExactM, residual[count + 1] * kExactRad};
+  }
+
+  /// One step; true where there is nothing to do, or nothing to be done.
+  bool close() {
+    const Eigen::VectorXd residual = residuals(best_);
+    const Eigen::Vector2d errors = end_errors(residual);
+    if (best_.values.size() < 2 || !residual.allFinite() ||
+        (std::abs(errors[0]) < kExactM && std::abs(errors[1]) < kExactRad))
+      return true;
+    const auto values = static_cast<Eigen::Index>(best_.values.size());
+    Eigen::MatrixXd slope(2, values - 1);  // of the errors, by every curvature
+    for (Eigen::Index i = 1; i < values; ++i) {
+      Eigen::VectorXd change = Eigen::VectorXd::Zero(size());
+      change[i] = kCurvatureStep;
+      slope.col(i - 1) = (end_errors(residuals(changed(best_, change))) - errors) / kCurvatureStep;
+    }
+    if (!slope.allFinite()) return true;
+    Eigen::VectorXd change = Eigen::VectorXd::Zero(size());
+    change.segment(1, values - 1) = slope.completeOrthogonalDecomposition().solve(-errors);
+    const SparseProfile tried = changed(best_, change);
+    const Eigen::Vector2d after = end_errors(residuals(tried));
+    // The two need each other: a turn of the end moves it sideways for a step.
+    const auto size_of = [](const Eigen::Vector2d& e) { return std::hypot(e[0] / kExactM, 0.1 * e[1] / kExactRad); };
+    if (!(size_of(after) < size_of(errors))) return true;
+    best_ = tried;
+    return false;
+  }
+
   [[nodiscard]] size_t inner_knots() const { return best_.at_m.size() - 2; }
   [[nodiscard]] Eigen::Index size() const {
     return static_cast<Eigen::Index>(1 + best_.values.size() - 1 + inner_knots());
@@ -70,7 +113,9 @@ class Refiner {
     const auto count = static_cast<Eigen::Index>(target_.points.size());
     out.head(count) = distances_of(track, target_.points, stations) / target_.sigma_m;
     out[count - 1] *= target_.sigma_m / kExactM;
-    const double end = track.at(track.length_m()).pose.heading_rad;
+    // Where the track will be cut, or carried on to, beside the last point.
+    const double end_m = std::min(stations.back(), track.length_m());
+    const double end = track.at(end_m).pose.heading_rad - track.curvature_at(end_m) * (stations.back() - end_m);
     out[count] = target_.heading_at_start
                      ? core::wrap_pi(profile.start.heading_rad - *target_.heading_at_start) / kExactRad
                      : 0.0;
@@ -81,7 +126,7 @@ class Refiner {
   [[nodiscard]] Eigen::MatrixXd derivatives(const Eigen::VectorXd& residual) const {
     Eigen::MatrixXd out(residual.size(), size());
     for (Eigen::Index i = 0; i < size(); ++i) {
-      const double step = i == 0 ? 1e-7 : i < static_cast<Eigen::Index>(best_.values.size()) ? 1e-9 : 1e-2;
+      const double step = i == 0 ? 1e-7 : i < static_cast<Eigen::Index>(best_.values.size()) ? kCurvatureStep : 1e-2;
       Eigen::VectorXd change = Eigen::VectorXd::Zero(size());
       change[i] = step;
       out.col(i) = (residuals(changed(best_, change)) - residual) / step;
@@ -120,7 +165,10 @@ Alignment merged(const SparseProfile& profile, const std::vector<Eigen::Vector2d
     if (is_constant && was_constant && value == profile.value[i]) {
       elements.back().length_m += span;
     } else {
-      elements.push_back({span, profile.values[profile.value[i]], profile.values[profile.value[i + 1]]});
+      // A clothoid that is cut keeps its rate, not the curvature that it would have had at its end.
+      const double begins = profile.values[profile.value[i]];
+      const double part = is_last ? span / (profile.at_m[i + 1] - profile.at_m[i]) : 1.0;
+      elements.push_back({span, begins, begins + part * (profile.values[profile.value[i + 1]] - begins)});
     }
     was_constant = is_constant;
     value = profile.value[i + 1];

@@ -91,6 +91,34 @@ TEST(ClothoidFit, IsBetterThanArcsThroughThePoints) {
   }
 }
 
+// A mountain line, drawn coarsely: the steps of the fit end early, its end is still met. An edge that ends beside its
+// node is a gap that nobody drew.
+TEST(ClothoidFit, MeetsTheEndOfAHardDrawing) {
+  size_t fitted = 0;
+  for (uint64_t seed = 1; seed <= 6; ++seed) {
+    core::Random random(seed);
+    std::vector<Element> elements;
+    for (int i = 0; i < 24; ++i) {
+      const double curvature = (random.uniform() < 0.5 ? -1 : 1) / random.uniform(90, 300);
+      const double arc_m = std::min(random.uniform(40, 200), 2.0 / std::abs(curvature));
+      elements.insert(
+          elements.end(),
+          {{random.uniform(10, 80), 0, 0}, {30, 0, curvature}, {arc_m, curvature, curvature}, {30, curvature, 0}});
+    }
+    const Alignment truth = Alignment::chained({400000, 5300000, 0.4}, elements);
+    const std::vector<Eigen::Vector2d> points = drawn(truth, truth.length_m(), 30, 0.4, seed);
+    const double end_rad =
+        truth.at(truth.nearest(points.back().x(), points.back().y()).offset_m).pose.heading_rad + 0.03;
+    const auto fit = fit_clothoids(points, {.heading_at_start = 0.4, .heading_at_end = end_rad, .usual_sigma_m = 0.4});
+    if (!fit) continue;
+    ++fitted;
+    const PlanPose end = fit->alignment.at(fit->alignment.length_m()).pose;
+    EXPECT_LT(std::hypot(end.easting_m - points.back().x(), end.northing_m - points.back().y()), 0.005) << seed;
+    EXPECT_NEAR(core::wrap_pi(end.heading_rad - end_rad), 0, 0.002) << seed;
+  }
+  EXPECT_GE(fitted, 3U);
+}
+
 TEST(DrawingFit, LeavesOutThePointsThatLieApart) {
   const Alignment truth = curve_between_straights();
   std::vector<Eigen::Vector2d> points = drawn(truth, truth.length_m(), 20, 0.1, 5);
