@@ -211,7 +211,7 @@ TEST_F(Fleet, AnUpgradeRestartsWhatChangedAndRollsBackByItselfWhenItIsBad) {
   // A release whose fusion does not live.
   const auto bin = folder_ / "root/opt/railfix/9.9.9/bin";
   fs::create_directories(bin);
-  std::ofstream(bin / "railfix-fusion") << "#!/bin/sh\nexit 3\n";
+  std::ofstream(bin / "railfix-fusion") << "#!/bin/sh\ncase \"$*\" in *--check*) exit 0 ;; esac\nexit 3\n";
   fs::permissions(bin / "railfix-fusion", fs::perms::owner_all);
   fs::create_symlink(fs::path(RAILFIX_BIN_DIR) / "railfix-tpr-publisher", bin / "railfix-tpr-publisher");
   write_manifest("9.9.9", ", tpr_publisher: { nid_engine: 4711 }");
