@@ -89,6 +89,8 @@ void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
   predict_to(fix.stamp_ns);
   Estimator before = main_;
   main_.apply(event);
+  std::vector<Doubter> doubters_before;  // only a refused fix asks for them
+  if (main_.fix_refused()) doubters_before = doubters_;
   for (auto& doubter : doubters_) {
     if (!doubter.leaves_out(fix)) doubter.estimator.apply(event);
   }
@@ -97,7 +99,7 @@ void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
   }
   if (main_.fix_refused() || main_.fix_used()) fix_fitted_ = main_.fix_used() && !main_.fix_corrected();
   if (main_.fix_refused()) {
-    if (adopt_by_fix(before) || !adopt_doubter()) return;
+    if (adopt_by_fix(before) || !adopt_doubter(fix, std::move(doubters_before))) return;
   } else if (main_.fix_used()) {
     settle_doubters(fix, std::move(before));
   } else {
@@ -106,14 +108,19 @@ void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
   confirm_rivals();
 }
 
-// The fix contradicts an earlier one and agrees with what is known without that one.
-bool Hypotheses::adopt_doubter() {
+// The fix contradicts an earlier one and agrees with what is known without that one. Without that one less is known, so
+// the fix may agree by chance: the interval holds what is known without either, too.
+bool Hypotheses::adopt_doubter(const FixInput& fix, std::vector<Doubter> before) {
   const auto fits = std::find_if(doubters_.rbegin(), doubters_.rend(), [](const Doubter& doubter) {
     return doubter.estimator.fix_used() && !doubter.estimator.fix_corrected();
   });
   if (fits == doubters_.rend()) return false;
+  Doubter without_both = std::move(before[static_cast<size_t>(doubters_.rend() - fits) - 1]);
+  without_both.landmark = fix.landmark;
+  without_both.of_shape = fix.kind == FixKind::curvature;
+  without_both.agreed = 0;
   std::swap(main_, fits->estimator);
-  doubters_ = {Doubter{std::move(fits->estimator)}};
+  doubters_ = {Doubter{std::move(fits->estimator)}, std::move(without_both)};
   return true;
 }
 
