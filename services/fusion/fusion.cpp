@@ -1,4 +1,5 @@
 #include "fusion/fusion.hpp"
+#include "track/declared.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -12,8 +13,7 @@ namespace {
 
 constexpr double kPathAheadM = 300000;
 constexpr double kPathBehindM = 50000;
-constexpr double kTrackProbability = 0.999;  // from here on a track is declared
-constexpr double kBesideM = 50.0;            // beyond the interval: what is further off is no track beside the train
+constexpr double kBesideM = 50.0;  // beyond the interval: what is further off is no track beside the train
 constexpr double kNoCameraS = 0.3;
 constexpr int64_t kSnapshotNs = 50'000'000;
 constexpr int64_t kSlipUnseenNs = 1'200'000'000;  // a slip may have grown for so long before it is found
@@ -220,7 +220,7 @@ bool Fusion::change_track(FixInput& fix) {
     return place_m && std::abs(*place_m - here_m) < reach_m;
   };
   if (path->distance_of(fix.edge, fix.offset_m)) return runs_here(*path);
-  if (fix.probability < kTrackProbability) return true;
+  if (fix.probability < track::kDeclaredProbability) return true;
   if (!ways_) ways_.emplace(*map_);
   auto way = track::rerouted(*path, *ways_, place, here_m, kPathAheadM, kPathBehindM);
   if (!way || !runs_here(*way)) return false;
