@@ -5,6 +5,7 @@
 #include <charconv>
 #include <string>
 
+#include "core/fnv.hpp"
 #include "idl/embedded_idl.hpp"
 
 namespace railfix::messaging {
@@ -12,15 +13,14 @@ namespace {
 
 constexpr std::string_view kLayout = "layout=";
 
-// FNV-1a over what decides the layout.
+// Of what decides the layout.
 uint64_t hash_of(std::string_view idl) {
-  uint64_t hash = 0xcbf29ce484222325U;
+  core::Fnv hash;
   for (size_t at = 0; at < idl.size(); ++at) {
     if (idl.substr(at, 2) == "//") at = std::min(idl.find('\n', at), idl.size() - 1);
-    const auto c = static_cast<unsigned char>(idl[at]);
-    if (std::isspace(c) == 0) hash = (hash ^ c) * 0x100000001b3U;
+    if (std::isspace(static_cast<unsigned char>(idl[at])) == 0) hash.add(idl[at]);
   }
-  return hash;
+  return hash.value();
 }
 
 }  // namespace

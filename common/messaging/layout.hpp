@@ -16,5 +16,9 @@ uint64_t layout_of(const TopicInfo& topic);
 std::vector<uint8_t> user_data_of_layout(uint64_t layout);
 /// 0 = it says none: another program than ours.
 uint64_t layout_in(const std::vector<uint8_t>& user_data);
+/// As far as both say it.
+inline bool fits(uint64_t layout, uint64_t other) {
+  return layout == 0 || other == 0 || layout == other;
+}
 
 }  // namespace railfix::messaging

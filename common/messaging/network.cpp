@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <fstream>
 
+#include "core/fnv.hpp"
 #include "core/joined.hpp"
 
 namespace railfix::messaging {
@@ -71,10 +72,10 @@ std::string memory_id() {
   std::ifstream("/proc/sys/kernel/random/boot_id") >> text;
   struct stat network {};
   if (stat("/proc/thread-self/ns/net", &network) == 0) text += std::to_string(network.st_ino);
-  uint64_t hash = 0xcbf29ce484222325U;  // FNV-1a
-  for (const unsigned char c : text) hash = (hash ^ c) * 0x100000001b3U;
+  core::Fnv hash;
+  hash.add(text);
   char hex[17];
-  std::snprintf(hex, sizeof(hex), "%016llx", static_cast<unsigned long long>(hash));
+  std::snprintf(hex, sizeof(hex), "%016llx", static_cast<unsigned long long>(hash.value()));
   return hex;
 }
 

@@ -152,8 +152,7 @@ void note(Known& known, const Endpoint& endpoint, bool removed, const std::vecto
   if (std::find_first_of(partitions.begin(), partitions.end(), own_partitions.begin(), own_partitions.end()) ==
       partitions.end())
     return;
-  known[endpoint.guid()] = {endpoint.topicName().to_string(), terms_of(endpoint.m_qos),
-                            layout_in(endpoint.m_qos.m_userData.data_vec())};
+  known[endpoint.guid()] = {endpoint.topicName().to_string(), terms_of(endpoint.m_qos)};
 }
 
 }  // namespace
@@ -168,6 +167,12 @@ void Participant::Impl::on_participant_discovery(dds::DomainParticipant*,
   } else {
     remote_processes[prefix] = {info.info.m_participantName.to_string(), certificate_ends_in(info.info.m_userData)};
   }
+}
+
+uint64_t Participant::Impl::layout_of_writer(uint64_t writer) {
+  const std::lock_guard lock(layouts_mutex);
+  const auto known = layouts.find(writer);
+  return known == layouts.end() ? 0 : known->second;
 }
 
 void Participant::Impl::on_publisher_discovery(dds::DomainParticipant* own,

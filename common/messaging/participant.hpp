@@ -48,13 +48,14 @@ struct Participant::Impl : eprosima::fastdds::dds::DomainParticipantListener {
   struct Remote {
     std::string topic;
     Terms terms;
-    uint64_t layout = 0;
   };
   std::map<eprosima::fastrtps::rtps::GUID_t, Remote> remote_writers;
   std::map<eprosima::fastrtps::rtps::GUID_t, Remote> remote_readers;
   // Asked for by readers, inside the middleware: this mutex is held for nothing else.
   std::mutex layouts_mutex;
   std::map<uint64_t, uint64_t> layouts;  // of remote writers, by SampleInfo::writer
+  /// 0 = not known.
+  uint64_t layout_of_writer(uint64_t writer);
   struct Process {
     std::string name;                 // "odometry@cab"
     int64_t certificate_ends_ns = 0;  // 0 = it has none

@@ -48,20 +48,15 @@ struct AnyReader::Impl : dds::DataReaderListener {
   std::map<uint64_t, bool> fits_by_writer;  // the same
 
   // Its writer was discovered before its samples come.
-  bool fits(uint64_t writer) {
-    const auto [known, is_new] = fits_by_writer.try_emplace(writer, true);
-    if (is_new) {
-      const std::lock_guard lock(participant->layouts_mutex);
-      const auto theirs = participant->layouts.find(writer);
-      known->second =
-          theirs == participant->layouts.end() || theirs->second == 0 || layout == 0 || theirs->second == layout;
-    }
-    return known->second;
+  bool hears(uint64_t writer) {
+    const auto known = fits_by_writer.find(writer);
+    if (known != fits_by_writer.end()) return known->second;
+    return fits_by_writer[writer] = fits(layout, participant->layout_of_writer(writer));
   }
 
   void on_data_available(dds::DataReader* from) override {
     type->take_all(*from, [this](std::shared_ptr<const void> sample, const SampleInfo& info) {
-      if (!fits(info.writer)) return;
+      if (!hears(info.writer)) return;
       if (exclusive && !one_writer.hears(info.writer)) return;
       queue->push(&source, [run = handler, sample = std::move(sample), info] { (*run)(sample, info); });
     });

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "messaging/fastdds_types.hpp"
 #include "messaging/layout.hpp"
 #include "messaging/participant.hpp"
 
@@ -9,10 +10,9 @@ namespace railfix::messaging {
 
 namespace {
 
-std::string why_unheard(const Participant::Impl::Remote& writer, uint64_t layout, const Terms& wanted) {
-  if (writer.layout != 0 && layout != 0 && writer.layout != layout)
-    return ": its release has another layout of this topic (IDL); bring both to one release";
-  const auto why = mismatch(writer.terms, wanted);
+std::string why_unheard(const Terms& offered, const Terms& wanted, bool layouts_fit) {
+  if (!layouts_fit) return ": its release has another layout of this topic (IDL); bring both to one release";
+  const auto why = mismatch(offered, wanted);
   return why.empty() ? "" : ", its quality of service does not fit: " + why;
 }
 
@@ -28,7 +28,7 @@ std::vector<std::string> unheard_writers(Participant& participant) {
     const uint64_t layout = layout_in(reader->get_qos().user_data().data_vec());
     for (const auto& [guid, writer] : inside.remote_writers) {
       if (writer.topic != topic) continue;
-      const auto why = why_unheard(writer, layout, wanted);
+      const auto why = why_unheard(writer.terms, wanted, fits(layout, inside.layout_of_writer(number_of(guid))));
       if (why.empty()) continue;
       const auto name = inside.remote_processes.find(guid.guidPrefix);
       sentences.push_back(topic + (name == inside.remote_processes.end() ? "" : " of " + name->second.name) +

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "core/fnv.hpp"
 #include "train/host_files.hpp"
 #include "train/setting_files.hpp"
 
@@ -111,7 +112,7 @@ std::string lines_of(const YAML::Node& node, const std::string& key) {
 
 // Changes with every byte of the file, or of the files in the folder.
 std::string fingerprint(const fs::path& path) {
-  uint64_t hash = 0xcbf29ce484222325U;  // FNV-1a
+  core::Fnv hash;
   std::vector<fs::path> files;
   if (fs::is_directory(path)) {
     for (const auto& entry : fs::directory_iterator(path)) files.push_back(entry.path());
@@ -121,10 +122,9 @@ std::string fingerprint(const fs::path& path) {
   }
   for (const auto& file : files) {
     std::ifstream in(file, std::ios::binary);
-    for (std::istreambuf_iterator<char> byte(in), end; byte != end; ++byte)
-      hash = (hash ^ static_cast<unsigned char>(*byte)) * 0x100000001b3U;
+    for (std::istreambuf_iterator<char> byte(in), end; byte != end; ++byte) hash.add(*byte);
   }
-  return std::to_string(hash);
+  return std::to_string(hash.value());
 }
 
 }  // namespace
