@@ -69,6 +69,11 @@ int64_t days_until(int64_t ends_ns) {
   return left_ns / kDayNs - (left_ns % kDayNs < 0 ? 1 : 0);
 }
 
+std::string end_text(int64_t days_left) {
+  return days_left < 0 ? "ran out " + std::to_string(-days_left) + " days ago"
+                       : "runs out in " + std::to_string(days_left) + " days";
+}
+
 core::Result<int64_t> days_left(const std::filesystem::path& certificate) {
   const auto ends_ns = certificate_ends_ns(certificate);
   if (!ends_ns.ok()) return ends_ns.error();

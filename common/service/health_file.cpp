@@ -27,6 +27,30 @@ bool removed(int file) {
   return fstat(file, &now) == 0 && now.st_nlink == 0;
 }
 
+std::string ago(const char* what, int64_t at_ns, int64_t now_ns) {
+  if (at_ns == 0) return std::string("no ") + what + " yet";
+  char text[48];
+  std::snprintf(text, sizeof text, "last %s %.1f s ago", what, core::seconds(now_ns - at_ns));
+  return text;
+}
+
+// Nothing by a build that does not say it.
+void judge_traffic(std::istream& in, int64_t now_ns, HealthAnswer& answer) {
+  Traffic traffic;
+  int flow = 0;
+  if (!(in >> flow >> traffic.stands_by >> traffic.input_since_ns >> traffic.last_input_ns >> traffic.last_output_ns))
+    return;
+  traffic.flow = static_cast<Flow>(flow);
+  const auto lately = [&](int64_t at_ns) { return at_ns != 0 && now_ns - at_ns < kFlowGapNs; };
+  const bool input_flows = lately(traffic.last_input_ns) && !lately(traffic.input_since_ns);
+  answer.stands_by = traffic.stands_by;
+  answer.sends = traffic.flow != Flow::sporadic && lately(traffic.last_output_ns);
+  answer.stuck = traffic.flow == Flow::answers && !traffic.stands_by && input_flows && !lately(traffic.last_output_ns);
+  if (answer.stuck) answer.text = "input comes, nothing goes out: " + answer.text;
+  answer.text +=
+      " (" + ago("input", traffic.last_input_ns, now_ns) + ", " + ago("output", traffic.last_output_ns, now_ns) + ")";
+}
+
 }  // namespace
 
 std::filesystem::path health_path(const CommonConfig& common, const std::string& service) {
@@ -73,34 +97,6 @@ std::optional<int64_t> silent_ns(const std::filesystem::path& path) {
   if (!(in >> said_ns)) return std::nullopt;
   return core::monotonic_ns() - said_ns;
 }
-
-namespace {
-
-std::string ago(const char* what, int64_t at_ns, int64_t now_ns) {
-  if (at_ns == 0) return std::string("no ") + what + " yet";
-  char text[48];
-  std::snprintf(text, sizeof text, "last %s %.1f s ago", what, core::seconds(now_ns - at_ns));
-  return text;
-}
-
-// Nothing by a build that does not say it.
-void judge_traffic(std::istream& in, int64_t now_ns, HealthAnswer& answer) {
-  Traffic traffic;
-  int flow = 0;
-  if (!(in >> flow >> traffic.stands_by >> traffic.input_since_ns >> traffic.last_input_ns >> traffic.last_output_ns))
-    return;
-  traffic.flow = static_cast<Flow>(flow);
-  const auto lately = [&](int64_t at_ns) { return at_ns != 0 && now_ns - at_ns < kFlowGapNs; };
-  const bool input_flows = lately(traffic.last_input_ns) && !lately(traffic.input_since_ns);
-  answer.stands_by = traffic.stands_by;
-  answer.sends = traffic.flow != Flow::sporadic && lately(traffic.last_output_ns);
-  answer.stuck = traffic.flow == Flow::answers && !traffic.stands_by && input_flows && !lately(traffic.last_output_ns);
-  if (answer.stuck) answer.text = "input comes, nothing goes out: " + answer.text;
-  answer.text +=
-      " (" + ago("input", traffic.last_input_ns, now_ns) + ", " + ago("output", traffic.last_output_ns, now_ns) + ")";
-}
-
-}  // namespace
 
 HealthAnswer ask_health(const std::filesystem::path& path) {
   std::ifstream in(path);

@@ -29,6 +29,12 @@ bool waits_for_turn(const messaging::TopicInfo& topic) {
   return topic.idl != "operation" && !topic.qos.transient_local;
 }
 
+// Empty while there is time.
+std::string end_of(const std::filesystem::path& certificate) {
+  const auto left = messaging::days_left(certificate);
+  return left.ok() && left.value() < messaging::kCertificateWarningDays ? messaging::end_text(left.value()) : "";
+}
+
 }  // namespace
 
 Loop::Loop(std::string service, const CommonConfig& common, bool beside)
@@ -93,18 +99,6 @@ void Loop::watch_writers() {
     unheard_ = std::move(unheard);
   });
 }
-
-namespace {
-
-// Empty while there is time.
-std::string end_of(const std::filesystem::path& certificate) {
-  const auto left = messaging::days_left(certificate);
-  if (!left.ok() || left.value() >= messaging::kCertificateWarningDays) return "";
-  return left.value() < 0 ? "ran out before " + std::to_string(-left.value()) + " days"
-                          : "runs out in " + std::to_string(left.value()) + " days";
-}
-
-}  // namespace
 
 // What runs goes on when it has run out, but would not be let in again after a restart.
 void Loop::watch_own_certificate() {

@@ -1,6 +1,5 @@
 #include "train/check.hpp"
 
-#include <sys/statvfs.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -8,6 +7,7 @@
 #include <future>
 
 #include "messaging/qos_match.hpp"
+#include "train/findings.hpp"
 #include "train/render.hpp"
 #include "train/run.hpp"
 #include "train/setting_files.hpp"
@@ -16,15 +16,6 @@ namespace railfix::tool {
 namespace {
 
 namespace fs = std::filesystem;
-
-using Findings = std::vector<Finding>;
-
-void error(Findings& findings, const std::string& text) {
-  findings.push_back({true, text});
-}
-void warning(Findings& findings, const std::string& text) {
-  findings.push_back({false, text});
-}
 
 // Full pictures stay in the memory of one host.
 void check_placement(const Manifest& manifest, Findings& findings) {
@@ -223,11 +214,7 @@ std::vector<Finding> check_train(const Manifest& manifest, const FindProgram& fi
   check_settings(manifest, findings);
   check_ports(manifest, findings);
   for (const auto& host : manifest.hosts) {
-    for (auto& finding : check_certificates(manifest, host)) {
-      // A file that two hosts get is told once.
-      if (std::find(findings.begin(), findings.end(), finding) == findings.end())
-        findings.push_back(std::move(finding));
-    }
+    for (auto& finding : check_certificates(manifest, host)) add_once(findings, std::move(finding));
   }
   check_configurations(manifest, find_program, findings);
   return findings;

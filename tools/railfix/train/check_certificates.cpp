@@ -1,10 +1,7 @@
 // Certificates, keys and permissions of a train: what is missing, runs out, or was made for another manifest.
-#include <algorithm>
-#include <set>
-
 #include "core/joined.hpp"
 #include "messaging/security.hpp"
-#include "train/check.hpp"
+#include "train/findings.hpp"
 #include "train/keys.hpp"
 #include "train/setting_files.hpp"
 #include "train/topic_rights.hpp"
@@ -18,13 +15,6 @@ constexpr const char* kRenewAuthority = "; exchange the authority, beginning wit
 constexpr const char* kRenewElsewhere = "; get a new one, put it there, then railfix train upgrade on each host";
 constexpr const char* kRenew = "; railfix train keys --renew, then railfix train upgrade on each host";
 
-/// A file that all services share is told once.
-void add_once(std::vector<Finding>& findings, const Finding& finding) {
-  const bool told =
-      std::any_of(findings.begin(), findings.end(), [&](const auto& one) { return one.text == finding.text; });
-  if (!told) findings.push_back(finding);
-}
-
 int64_t warning_days(const YAML::Node& settings) {
   int64_t days = messaging::kCertificateWarningDays;
   if (!settings || !settings.IsMap()) return days;
@@ -34,21 +24,17 @@ int64_t warning_days(const YAML::Node& settings) {
   return days;
 }
 
-void check_end(const fs::path& certificate, int64_t soon_days, const char* remedy, std::vector<Finding>& findings) {
+void check_end(const fs::path& certificate, int64_t soon_days, const char* remedy, Findings& findings) {
   const auto left = messaging::days_left(certificate);
-  const std::string name = certificate.string();
   if (!left.ok()) {
     add_once(findings, {true, left.error().message});
-  } else if (left.value() < 0) {
-    add_once(findings, {true, name + " ran out " + std::to_string(-left.value()) + " days ago" + remedy});
   } else if (left.value() < soon_days) {
-    add_once(findings, {false, name + " runs out in " + std::to_string(left.value()) + " days" + remedy});
+    add_once(findings, {left.value() < 0, certificate.string() + " " + messaging::end_text(left.value()) + remedy});
   }
 }
 
 /// Everything that DDS asks for when this service joins. False when a file is missing.
-bool check_identity(const fs::path& folder, const std::string& service, int64_t soon_days,
-                    std::vector<Finding>& findings) {
+bool check_identity(const fs::path& folder, const std::string& service, int64_t soon_days, Findings& findings) {
   if (const auto files = messaging::security_properties(folder, service); !files.ok()) {
     add_once(findings, {true, files.error().message});
     return false;
@@ -61,7 +47,7 @@ bool check_identity(const fs::path& folder, const std::string& service, int64_t 
 /// Certificates that somebody else has made: the broker's authority, the train's name there, the page's. Of several in
 /// one file the first counts.
 void check_named_certificates(const YAML::Node& settings, const fs::path& folder, const std::string& service,
-                              std::vector<Finding>& findings) {
+                              Findings& findings) {
   for (const auto& named : certificate_files(settings)) {
     const auto file = folder / named.file;  // an absolute one stays so
     if (named.service != service || !fs::exists(file)) continue;
@@ -77,7 +63,7 @@ void check_named_certificates(const YAML::Node& settings, const fs::path& folder
 /// Permissions that were made before the train got another domain or name let nobody in; those of a release whose
 /// service used fewer topics leave a topic silent.
 void check_permissions(const Manifest& manifest, const std::string& host, const std::string& service,
-                       const fs::path& file, std::vector<Finding>& findings) {
+                       const fs::path& file, Findings& findings) {
   const auto missing = missing_rights(manifest, service, host, file);
   if (!missing.train.empty()) {
     add_once(findings, {true, file.string() + " does not allow " + core::joined(missing.train) + kRenew});
@@ -87,7 +73,7 @@ void check_permissions(const Manifest& manifest, const std::string& host, const 
   }
 }
 
-void check_keys(const Manifest& manifest, const TrainHost& host, std::vector<Finding>& findings) {
+void check_keys(const Manifest& manifest, const TrainHost& host, Findings& findings) {
   const auto folder = manifest.folder / "security" / host.name;
   if (!fs::exists(folder))  // one reason, one sentence
     return findings.push_back({true, folder.string() +
@@ -113,7 +99,7 @@ YAML::Node installed_settings(const fs::path& generation) {
 }  // namespace
 
 std::vector<Finding> check_certificates(const Manifest& manifest, const TrainHost& host) {
-  std::vector<Finding> findings;
+  Findings findings;
   if (manifest.security) check_keys(manifest, host, findings);
   for (const auto& service : services_on(manifest, host.name))
     check_named_certificates(manifest.settings, manifest.folder, service.name, findings);
@@ -121,7 +107,7 @@ std::vector<Finding> check_certificates(const Manifest& manifest, const TrainHos
 }
 
 std::vector<Finding> check_installed_certificates(const HostFolder& folder) {
-  std::vector<Finding> findings;
+  Findings findings;
   const auto plan = folder.plan();
   if (!plan) return findings;
   for (const auto& service : plan->services) {

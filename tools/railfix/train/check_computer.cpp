@@ -1,13 +1,12 @@
 // This computer as a host of a train.
 #include <sys/statvfs.h>
-#include <sys/timex.h>
 
 #include <algorithm>
 #include <fstream>
 
 #include "core/kernel_clock.hpp"
 #include "messaging/network.hpp"
-#include "train/check.hpp"
+#include "train/findings.hpp"
 
 namespace railfix::tool {
 namespace {
@@ -18,15 +17,6 @@ constexpr double kPicturesMb = 512;  // histories of two cameras
 constexpr double kSharedMemoryMb = 16;
 constexpr double kRecordingsMb = 2000;
 constexpr double kDiskMb = 200;
-
-using Findings = std::vector<Finding>;
-
-void error(Findings& findings, const std::string& text) {
-  findings.push_back({true, text});
-}
-void warning(Findings& findings, const std::string& text) {
-  findings.push_back({false, text});
-}
 
 double megabytes_free(const fs::path& folder) {
   struct statvfs disk {};

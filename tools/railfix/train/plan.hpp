@@ -74,8 +74,8 @@ class HostFolder {
   [[nodiscard]] std::filesystem::path lock() const { return folder_ / "supervisor.lock"; }
   [[nodiscard]] int newest_generation() const;
 
-  // Of these and state(): throws BadInput, a sentence with the file and the way out, when the file is damaged.
-  /// Nothing when no train was brought up here.
+  /// Nothing when no train was brought up here. Of all these and state(): throws BadInput, a sentence with the file and
+  /// the way out, when the file is damaged.
   [[nodiscard]] std::optional<HostPlan> plan() const { return plan_in(folder_); }
   /// As it was installed, with all services of this generation.
   [[nodiscard]] std::optional<HostPlan> plan(int number) const { return plan_in(generation(number)); }

@@ -1,5 +1,4 @@
-// Settings that name files which lie beside train.yaml: certificates and passwords of the ground link and of the
-// page.
+// Settings that name files which lie beside train.yaml: certificates and passwords of the ground link and of the page.
 #pragma once
 
 #include <string>

@@ -190,7 +190,7 @@ void SupervisedService::start(int64_t now_ns) {
   const int log = open(log_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
   log_began_ = log < 0 ? 0 : lseek(log, 0, SEEK_END);
   pid_ = fork();
-  if (pid_ == 0) become(service_, beside_, ended_before_, home_, log);
+  if (pid_ == 0) become(service_, beside_, last_end_, home_, log);
   if (log >= 0) close(log);
   started_ns_ = well_since_ns_ = now_ns;
   adopted_ = false;
@@ -211,7 +211,6 @@ bool SupervisedService::note_end(int64_t now_ns) {
   frozen_looks_ = 0;
   forget_health();
   if (const auto said = wait_status == 0 ? "" : last_words(log_, log_began_); !said.empty()) last_end_ += ": " + said;
-  ended_before_ = last_end_;
   const bool lived = now_ns - started_ns_ > kLivesNs;
   pause_ns_ = lived ? kFirstPauseNs : std::min(2 * pause_ns_, kLongestPauseNs);
   next_start_ns_ = lived ? now_ns : now_ns + pause_ns_;

@@ -54,8 +54,7 @@ class SupervisedService {
   int64_t born_ = 0;
   bool adopted_ = false;  // another process's child
   int restarts_ = 0;
-  std::string last_end_;
-  std::string ended_before_;  // told to the next process; empty = it is the first one
+  std::string last_end_;  // told to the next process; empty = it is the first one
   std::streamoff log_began_ = 0;
   int64_t started_ns_ = 0;
   int64_t next_start_ns_ = 0;
