@@ -174,19 +174,17 @@ class Check {
   }
 
   void check_balises() {
-    check_balise_places();
-    std::map<uint32_t, std::vector<const BaliseGroup*>> on_edge;
-    for (const BaliseGroup& group : map_.balise_groups) on_edge[group.edge].push_back(&group);
-    for (auto& [edge, groups] : on_edge) {
-      std::sort(groups.begin(), groups.end(),
-                [](const BaliseGroup* a, const BaliseGroup* b) { return a->offset_m < b->offset_m; });
-      for (size_t i = 1; i < groups.size(); ++i) {
-        if (groups[i]->offset_m - groups[i - 1]->offset_m > kSamePlaceM) continue;
-        problems_.push_back("balise groups " + identity(*groups[i - 1]) + " and " + identity(*groups[i]) +
-                            " are at the same place, edge " + std::to_string(edge) + " at " +
-                            metres(groups[i]->offset_m));
-      }
+    std::vector<const Landmark*> balises;
+    for (const Landmark& mark : map_.landmarks) {
+      if (mark.kind == LandmarkKind::balise) balises.push_back(&mark);
     }
+    // Of groups or alone: two at one place are one that is there twice.
+    tell_same_places("balises", balises, [](const Landmark& mark) {
+      return mark.name.empty() ? std::to_string(mark.id) : "\"" + mark.name + "\"";
+    });
+    std::vector<const BaliseGroup*> groups;
+    for (const BaliseGroup& group : map_.balise_groups) groups.push_back(&group);
+    tell_same_places("balise groups", groups, [](const BaliseGroup& group) { return identity(group); });
     std::set<uint32_t> seen;
     for (const BaliseGroup& group : map_.balise_groups) {
       if (seen.insert(group.nid_lrbg()).second) continue;
@@ -194,24 +192,15 @@ class Check {
     }
   }
 
-  /// Of groups or alone: two balises at one place are one that is there twice.
-  void check_balise_places() {
-    std::map<uint32_t, std::vector<const Landmark*>> on_edge;
-    for (const Landmark& mark : map_.landmarks) {
-      if (mark.kind == LandmarkKind::balise) on_edge[mark.edge].push_back(&mark);
-    }
-    const auto called = [](const Landmark& mark) {
-      return mark.name.empty() ? std::to_string(mark.id) : "\"" + mark.name + "\"";
-    };
-    for (auto& [edge, balises] : on_edge) {
-      std::stable_sort(balises.begin(), balises.end(),
-                       [](const auto* a, const auto* b) { return a->offset_m < b->offset_m; });
-      for (size_t i = 1; i < balises.size(); ++i) {
-        if (balises[i]->offset_m - balises[i - 1]->offset_m > kSamePlaceM) continue;
-        problems_.push_back("balises " + called(*balises[i - 1]) + " and " + called(*balises[i]) +
-                            " are at the same place, edge " + std::to_string(edge) + " at " +
-                            metres(balises[i]->offset_m));
-      }
+  template <class Thing, class Called>
+  void tell_same_places(const std::string& what, std::vector<const Thing*> things, const Called& called) {
+    std::ranges::stable_sort(things, {}, [](const Thing* one) { return std::pair(one->edge, one->offset_m); });
+    for (size_t i = 1; i < things.size(); ++i) {
+      const Thing& before = *things[i - 1];
+      const Thing& one = *things[i];
+      if (one.edge != before.edge || one.offset_m - before.offset_m > kSamePlaceM) continue;
+      problems_.push_back(what + " " + called(before) + " and " + called(one) + " are at the same place, edge " +
+                          std::to_string(one.edge) + " at " + metres(one.offset_m));
     }
   }
 

@@ -43,6 +43,9 @@ bool is_set(const OsmTags& tags, const char* key);
 /// Empty where there is no such key.
 std::string value_of(const OsmTags& tags, const char* key);
 
+/// The ways among which this one belongs; nullptr = it is of no use.
+std::vector<OsmWay>* ways_for(OsmData& data, const OsmTags& tags, bool with_trams);
+
 /// OSM XML or PBF, also compressed (.osm, .pbf, .osm.gz, .osm.bz2). Memory grows with the railways and bridges in the
 /// file only.
 core::Result<OsmData> read_osm(const std::filesystem::path& file, bool with_trams);

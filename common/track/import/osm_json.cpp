@@ -33,11 +33,10 @@ void read_overpass(const json& elements, bool with_trams, OsmData& out) {
       if (plausible(place)) out.nodes[element.at("id").get<int64_t>()] = {place, tags_in(element, "tags")};
     } else if (type == "way") {
       OsmTags tags = tags_in(element, "tags");
-      const bool over = leads_over(tags, with_trams);
-      if (!(is_track(tags, with_trams) || over) || !element.contains("nodes")) continue;
-      (over ? out.bridges : out.ways)
-          .push_back(
-              {element.at("id").get<int64_t>(), element.at("nodes").get<std::vector<int64_t>>(), std::move(tags)});
+      std::vector<OsmWay>* const ways = ways_for(out, tags, with_trams);
+      if (ways == nullptr || !element.contains("nodes")) continue;
+      ways->push_back(
+          {element.at("id").get<int64_t>(), element.at("nodes").get<std::vector<int64_t>>(), std::move(tags)});
     }
   }
 }
@@ -110,16 +109,16 @@ void read_features(const json& features, bool with_trams, OsmData& out) {
     const bool train_route = route != tags.end() && (route->second == "train" || route->second == "railway");
     const std::string other = other_thing(tags);
     const bool silent = !tags.contains("railway") && !tags.contains("@id") && other.empty();
-    const bool over = leads_over(tags, with_trams);
-    if (!is_track(tags, with_trams) && !train_route && !silent && !over) {
+    std::vector<OsmWay>* ways = ways_for(out, tags, with_trams);
+    if (ways == nullptr && (train_route || silent)) ways = &out.ways;
+    if (ways == nullptr) {
       if (!other.empty()) ++others[other];
       continue;
     }
     if (silent) ++silent_lines;
-    std::vector<OsmWay>& ways = over ? out.bridges : out.ways;
-    if (type == "LineString") add_line(coordinates, tags, ways, out);
+    if (type == "LineString") add_line(coordinates, tags, *ways, out);
     if (type == "MultiLineString") {
-      for (const json& line : coordinates) add_line(line, tags, ways, out);
+      for (const json& line : coordinates) add_line(line, tags, *ways, out);
     }
   }
   for (const auto& [key, count] : others)

@@ -25,9 +25,9 @@ OsmData read_two_passes(const std::string& file, bool with_trams) {
   while (const osmium::memory::Buffer buffer = ways.read()) {
     for (const osmium::Way& way : buffer.select<osmium::Way>()) {
       OsmTags tags = tags_of(way);
-      const bool over = leads_over(tags, with_trams);
-      if (!is_track(tags, with_trams) && !over) continue;
-      OsmWay& taken = (over ? out.bridges : out.ways).emplace_back(OsmWay{way.id(), {}, std::move(tags)});
+      std::vector<OsmWay>* const ways_like_it = ways_for(out, tags, with_trams);
+      if (ways_like_it == nullptr) continue;
+      OsmWay& taken = ways_like_it->emplace_back(OsmWay{way.id(), {}, std::move(tags)});
       for (const osmium::NodeRef& node : way.nodes()) taken.nodes.push_back(node.ref());
       wanted.insert(taken.nodes.begin(), taken.nodes.end());
     }
@@ -72,6 +72,11 @@ bool leads_over(const OsmTags& tags, bool with_trams) {
     return is_set(tags, key) && std::find(kGone.begin(), kGone.end(), value_of(tags, key)) == kGone.end();
   };
   return stands("highway") || stands("railway") || stands("waterway");
+}
+
+std::vector<OsmWay>* ways_for(OsmData& data, const OsmTags& tags, bool with_trams) {
+  if (is_track(tags, with_trams)) return &data.ways;
+  return leads_over(tags, with_trams) ? &data.bridges : nullptr;
 }
 
 core::Result<OsmData> read_osm(const std::filesystem::path& file, bool with_trams) {
