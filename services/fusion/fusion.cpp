@@ -1,5 +1,4 @@
 #include "fusion/fusion.hpp"
-#include "track/declared.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,6 +6,7 @@
 #include <tuple>
 
 #include "core/time.hpp"
+#include "track/declared.hpp"
 
 namespace railfix::fusion {
 namespace {

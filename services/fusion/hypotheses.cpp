@@ -115,10 +115,8 @@ bool Hypotheses::adopt_doubter(const FixInput& fix, std::vector<Doubter> before)
     return doubter.estimator.fix_used() && !doubter.estimator.fix_corrected();
   });
   if (fits == doubters_.rend()) return false;
-  Doubter without_both = std::move(before[static_cast<size_t>(doubters_.rend() - fits) - 1]);
-  without_both.landmark = fix.landmark;
-  without_both.of_shape = fix.kind == FixKind::curvature;
-  without_both.agreed = 0;
+  auto& without_it = before[static_cast<size_t>(doubters_.rend() - fits) - 1];
+  Doubter without_both{std::move(without_it.estimator), fix.landmark, fix.kind == FixKind::curvature};
   std::swap(main_, fits->estimator);
   doubters_ = {Doubter{std::move(fits->estimator)}, std::move(without_both)};
   return true;

@@ -94,7 +94,21 @@ std::string cycle_text(uint32_t value, uint32_t none, const std::string& every) 
   return value == none ? "not cyclic" : "a report every " + every;
 }
 
-int print_packet_58(const etcs::ReportParameters& packet, bool json_wanted) {
+nlohmann::ordered_json json_of(const etcs::ReportParameters& packet) {
+  auto locations = nlohmann::ordered_json::array();
+  for (const auto& location : packet.locations)
+    locations.push_back({{"D_LOC", location.d_loc}, {"Q_LGTLOC", location.q_lgtloc}});
+  return {{"NID_PACKET", etcs::kNidPacketReportParameters},
+          {"Q_DIR", packet.q_dir},
+          {"Q_SCALE", packet.q_scale},
+          {"T_CYCLOC", packet.t_cycloc},
+          {"D_CYCLOC", packet.d_cycloc},
+          {"M_LOC", packet.m_loc},
+          {"N_ITER", packet.locations.size()},
+          {"locations", std::move(locations)}};
+}
+
+void print_packet_58(const etcs::ReportParameters& packet) {
   struct Row {
     const char* name;
     uint32_t value;
@@ -116,24 +130,21 @@ int print_packet_58(const etcs::ReportParameters& packet, bool json_wanted) {
     rows.push_back({"Q_LGTLOC", location.q_lgtloc,
                     "when passed by the " + one_of({"min safe rear end", "max safe front end"}, location.q_lgtloc)});
   }
-  if (json_wanted) {
-    auto json = nlohmann::ordered_json::object();
-    for (size_t i = 0; i < rows.size() - 2 * packet.locations.size(); ++i) json[rows[i].name] = rows[i].value;
-    json["locations"] = nlohmann::ordered_json::array();
-    for (const auto& location : packet.locations)
-      json["locations"].push_back({{"D_LOC", location.d_loc}, {"Q_LGTLOC", location.q_lgtloc}});
-    std::cout << json.dump(2) << '\n';
-    return 0;
-  }
   std::printf("%-12s %10s  %s\n", "field", "value", "meaning");
   for (const auto& row : rows) std::printf("%-12s %10u  %s\n", row.name, row.value, row.meaning.c_str());
-  return 0;
 }
 
 int decode(const std::string& hex, Baseline baseline, bool json_wanted) {
   const auto bytes = core::value_or_throw(etcs::parse_hex(hex));
-  if (!bytes.empty() && bytes.front() == etcs::kNidPacketReportParameters)
-    return print_packet_58(core::value_or_throw(etcs::decode_report_parameters(bytes)), json_wanted);
+  if (!bytes.empty() && bytes.front() == etcs::kNidPacketReportParameters) {
+    const auto packet = core::value_or_throw(etcs::decode_report_parameters(bytes));
+    if (json_wanted) {
+      std::cout << json_of(packet).dump(2) << '\n';
+    } else {
+      print_packet_58(packet);
+    }
+    return 0;
+  }
   const auto report = etcs::decode(bytes, baseline);
   if (!report.ok()) {
     const auto other = baseline == Baseline::b3 ? Baseline::b4 : Baseline::b3;
