@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "messaging/network.hpp"
+#include "support/network.hpp"
 
 namespace railfix::test {
 
@@ -22,6 +23,14 @@ class TwoHosts {
   enum Host { cab, coach };
   static constexpr const char* kAddress[] = {"10.42.1.11", "10.42.1.12"};
   static constexpr const char* kInterface[] = {"train0", "train1"};
+
+  /// What a participant on that host joins this train with.
+  static messaging::ParticipantOptions network(Host host, const std::string& train, int64_t domain) {
+    auto options = test::network(train, domain);
+    options.interfaces = {kInterface[host]};
+    options.peers = {kAddress[host == cab ? coach : cab]};
+    return options;
+  }
 
   TwoHosts() : home_(opened()) {
     for (int& host : hosts_) {

@@ -28,13 +28,9 @@ constexpr double kSureOfTrack = 0.999;
 volatile std::sig_atomic_t interrupted = 0;
 
 messaging::ParticipantOptions options_of(const Rig& rig) {
-  messaging::ParticipantOptions options;
-  options.train_id = rig.train_id();
-  options.domain = Rig::kDomain;
+  auto options = TwoHosts::network(TwoHosts::cab, rig.train_id(), Rig::kDomain);
   options.service = "railfix-measure-faults";
   options.host = "cab";
-  options.interfaces = {TwoHosts::kInterface[TwoHosts::cab]};
-  options.peers = {TwoHosts::kAddress[TwoHosts::coach]};
   options.security_folder = rig.keys().string();
   return options;
 }

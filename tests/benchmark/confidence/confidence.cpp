@@ -158,11 +158,7 @@ void trace(const CampaignPlan& plan, uint64_t number) {
 int run(int argc, char** argv) {
   Arguments a;
   auto& s = a.plan.simulation;
-  s.visual_scale_error = 0.004;
-  s.landmark_spacing_m = 600;
-  s.landmark_spread = 0.7;
-  s.false_fix_share = 0.005;
-  s.fix_probability = 0.995;
+  s = campaign_plan();
   s.track_fixes = true;
   s.switch_spacing_m = 1500;
   CLI::App app("Confidence campaign: simulated sensors with faults through fusion, the interval against the truth");

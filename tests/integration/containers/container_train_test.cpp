@@ -34,12 +34,9 @@ class ContainerTrain : public Images, public ::testing::WithParamInterface<const
     if (docker()) start_engines();
     if (IsSkipped() || HasFatalFailure()) return;
     write_manifest("test", "test");
-    messaging::ParticipantOptions options;
-    options.train_id = id_;
-    options.domain = kDomain;
-    options.interfaces = {TwoHosts::kInterface[TwoHosts::cab]};
-    options.peers = {TwoHosts::kAddress[TwoHosts::coach]};
-    cab_ = hosts_.on(TwoHosts::cab, [&] { return std::make_unique<messaging::Participant>(options); });
+    cab_ = hosts_.on(TwoHosts::cab, [&] {
+      return std::make_unique<messaging::Participant>(TwoHosts::network(TwoHosts::cab, id_, kDomain));
+    });
   }
   void TearDown() override {
     for (const auto host : {TwoHosts::cab, TwoHosts::coach}) train(host, {"down"});

@@ -9,6 +9,7 @@
 
 #include "core/time.hpp"
 #include "messaging/topics.hpp"
+#include "support/network.hpp"
 #include "support/program.hpp"
 
 namespace railfix {
@@ -153,9 +154,7 @@ class Wheel {
 
  private:
   static messaging::ParticipantOptions options(const std::string& train) {
-    messaging::ParticipantOptions options;
-    options.train_id = train;
-    options.domain = 95;
+    auto options = test::network(train, 95);
     options.interfaces = {"127.0.0.1"};
     return options;
   }

@@ -11,17 +11,7 @@ using messaging::Participant;
 
 class JoiningTest : public TwoHostsTest {
  protected:
-  messaging::ParticipantOptions in_cab() const {
-    messaging::ParticipantOptions options;
-    options.train_id = train_;
-    options.domain = kDomain;
-    options.interfaces = {TwoHosts::kInterface[TwoHosts::cab]};
-    options.peers = {TwoHosts::kAddress[TwoHosts::coach]};
-    return options;
-  }
-  std::unique_ptr<Participant> join() {
-    return hosts_.on(TwoHosts::cab, [&] { return std::make_unique<Participant>(in_cab()); });
-  }
+  std::unique_ptr<Participant> join() { return join_in_cab(train_); }
   bool shell_on(TwoHosts::Host host, const std::string& command) {
     return hosts_.on(host, [&] { return std::system(command.c_str()) == 0; });
   }

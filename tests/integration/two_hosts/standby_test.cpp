@@ -374,14 +374,10 @@ TEST_F(StandbyTest, AServiceSaysWhichHostsClockIsOff) {
 
 // Two trains on one network, each with both services: neither hears one message of the other.
 TEST_F(StandbyTest, TwoTrainsOnOneNetworkHearNothingOfEachOther) {
-  messaging::ParticipantOptions options;
-  options.train_id = train_ + "-other";
-  options.domain = kDomain;
-  options.interfaces = {TwoHosts::kInterface[TwoHosts::cab]};
-  options.peers = {TwoHosts::kAddress[TwoHosts::coach]};
-  auto other = hosts_.on(TwoHosts::cab, [&] { return std::make_unique<messaging::Participant>(options); });
+  const std::string other_train = train_ + "-other";
+  auto other = join_in_cab(other_train);
   auto mine = start(TwoHosts::coach, "railfix-fusion", {"common.host=mine"});
-  auto others = start(TwoHosts::coach, "railfix-fusion", {"common.train_id=" + options.train_id, "common.host=others"});
+  auto others = start(TwoHosts::coach, "railfix-fusion", {"common.train_id=" + other_train, "common.host=others"});
   Camera other_camera(*other);
   std::map<std::string, uint64_t> heard;  // by train, where it came from
   const auto count = [&](const char* train) {

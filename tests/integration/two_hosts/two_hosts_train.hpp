@@ -30,16 +30,16 @@ class TwoHostsTest : public ::testing::Test {
  protected:
   void SetUp() override {
     if (!hosts_.ready()) GTEST_SKIP() << "skipped: two network namespaces need root and the program ip (iproute2)";
-    messaging::ParticipantOptions options;
-    options.train_id = train_;
-    options.domain = kDomain;
-    options.interfaces = {TwoHosts::kInterface[TwoHosts::cab]};
-    options.peers = {TwoHosts::kAddress[TwoHosts::coach]};
-    cab_ = hosts_.on(TwoHosts::cab, [&] { return std::make_unique<messaging::Participant>(options); });
+    cab_ = join_in_cab(train_);
     fs::create_directories(folder_);
   }
   void TearDown() override { fs::remove_all(folder_); }
 
+  std::unique_ptr<messaging::Participant> join_in_cab(const std::string& train) {
+    return hosts_.on(TwoHosts::cab, [&] {
+      return std::make_unique<messaging::Participant>(TwoHosts::network(TwoHosts::cab, train, kDomain));
+    });
+  }
   std::unique_ptr<test::Program> start(TwoHosts::Host host, const std::string& program,
                                        const std::vector<std::string>& more = {}) {
     std::vector<std::string> settings{"common.train_id=" + train_,

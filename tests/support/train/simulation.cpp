@@ -36,6 +36,18 @@ RandomLine line_of(uint64_t seed, const SimulationPlan& plan) {
 
 }  // namespace
 
+SimulationPlan campaign_plan() {
+  SimulationPlan plan;
+  plan.duration_s = 240;
+  plan.max_speed_mps = 150 / 3.6;
+  plan.visual_scale_error = 0.004;
+  plan.landmark_spacing_m = 600;
+  plan.landmark_spread = 0.7;
+  plan.false_fix_share = 0.005;
+  plan.fix_probability = 0.995;
+  return plan;
+}
+
 core::Random stream(uint64_t seed, uint64_t number) {
   core::Random mixed(seed * 1'000'003 + number);
   return core::Random(mixed.next());

@@ -51,6 +51,9 @@ struct SimulationPlan {
   Fault fault;
 };
 
+/// What runs of the confidence campaign have in common.
+SimulationPlan campaign_plan();
+
 /// A measurement with the time at which it comes to fusion.
 struct Arrival {
   double arrival_s = 0;

@@ -4,12 +4,12 @@
 #include <cmath>
 
 #include "core/time.hpp"
+#include "track/declared.hpp"
 
 namespace railfix::train {
 namespace {
 
 constexpr double kTickS = 0.1;
-constexpr double kDeclared = 0.999;  // as TrainState.track_probability says
 
 // Words by which the state's reason names a sensor.
 const char* name_in_reason(Sensor sensor) {
@@ -66,7 +66,7 @@ class Judge {
  private:
   void judge_track(const fusion::TrainEstimate& state, bool ok) {
     const bool other = state.track_known && !simulation_.on_way(state.position);
-    const bool sure = other && ok && state.track_probability >= kDeclared;
+    const bool sure = other && ok && state.track_probability >= track::kDeclaredProbability;
     verdict_.other_leg += other ? 1 : 0;
     verdict_.other_leg_sure += sure ? 1 : 0;
     if (!sure || !sure_since_ns_) sure_since_ns_ = sure ? std::optional(state.stamp_ns) : std::nullopt;

@@ -127,14 +127,7 @@ TEST(Coverage, OneFaultySensorStaysInsideTheInterval) {
 TEST(Coverage, TheSensorThatIsWrongIsFoundOut) {
   using train::FaultKind;
   using train::Sensor;
-  SimulationPlan plan;
-  plan.duration_s = 240;
-  plan.max_speed_mps = 150 / 3.6;
-  plan.visual_scale_error = 0.004;
-  plan.landmark_spacing_m = 600;
-  plan.landmark_spread = 0.7;
-  plan.false_fix_share = 0.005;
-  plan.fix_probability = 0.995;
+  SimulationPlan plan = train::campaign_plan();
   for (const auto& [seed, fault] :
        {std::pair<uint64_t, train::Fault>{11'000'009, {Sensor::wheel, FaultKind::stuck, 109.5, 169.5, 1}},
         {12'000'016, {Sensor::accelerometer, FaultKind::stuck, 111.1, 140.8, 1}},
@@ -156,14 +149,7 @@ TEST(Coverage, TheSensorThatIsWrongIsFoundOut) {
 // Run 86 of seed 1504 of the campaign: two landmarks in a row are off by metres, the second contradicts the first and
 // fits what is known without it, which is little. 136 states were outside before neither of the two was sure.
 TEST(Coverage, TwoLandmarksInARowThatAreOffByMetres) {
-  SimulationPlan plan;
-  plan.duration_s = 240;
-  plan.max_speed_mps = 150 / 3.6;
-  plan.visual_scale_error = 0.004;
-  plan.landmark_spacing_m = 600;
-  plan.landmark_spread = 0.7;
-  plan.false_fix_share = 0.005;
-  plan.fix_probability = 0.995;
+  SimulationPlan plan = train::campaign_plan();
   plan.track_fixes = true;
   plan.switch_spacing_m = 1500;
   constexpr uint64_t kSeed = 1504'000'086;

@@ -1,26 +1,11 @@
-#include "tpr_publisher/balise_tracker.hpp"
-
-#include <gtest/gtest.h>
-
-#include "unit/tpr_publisher/balise_map.hpp"
+#include "unit/tpr_publisher/tracker_fixture.hpp"
 
 namespace railfix::tpr_publisher {
 namespace {
 
 using namespace testing;
 
-class Tracker : public ::testing::Test {
- protected:
-  void expect(uint32_t nid_lrbg, double foot_m) {
-    ASSERT_TRUE(tracker.reference().has_value());
-    EXPECT_EQ(tracker.reference()->group->nid_lrbg(), nid_lrbg);
-    EXPECT_NEAR(tracker.reference()->foot_m, foot_m, 1e-9);
-  }
-  [[nodiscard]] uint32_t previous() const {
-    return tracker.reference()->previous == nullptr ? 0 : tracker.reference()->previous->nid_lrbg();
-  }
-  BaliseTracker tracker{balise_map(), 5000};
-};
+using Tracker = TrackerFixture;
 
 TEST_F(Tracker, KnowsNoGroupBeforeTheFirst) {
   tracker.update(forward(1, 50), true);

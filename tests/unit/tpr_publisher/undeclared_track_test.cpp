@@ -5,7 +5,7 @@
 
 #include "core/time.hpp"
 #include "tpr_publisher/tpr_publisher.hpp"
-#include "unit/tpr_publisher/balise_map.hpp"
+#include "unit/tpr_publisher/tracker_fixture.hpp"
 
 namespace railfix::tpr_publisher {
 namespace {
@@ -25,22 +25,13 @@ TEST(Turns, LeaveOutWhatALongerStretchRunsOverAgain) {
 }
 
 /// Follows the straight leg, or the siding, before it is known which one it is.
-class UndeclaredTrack : public ::testing::Test {
+class UndeclaredTrack : public TrackerFixture {
  protected:
-  void expect(uint32_t nid_lrbg, double foot_m) {
-    ASSERT_TRUE(tracker.reference().has_value());
-    EXPECT_EQ(tracker.reference()->group->nid_lrbg(), nid_lrbg);
-    EXPECT_NEAR(tracker.reference()->foot_m, foot_m, 1e-6);
-  }
-  [[nodiscard]] uint32_t previous() const {
-    return tracker.reference()->previous == nullptr ? 0 : tracker.reference()->previous->nid_lrbg();
-  }
   /// 250 m beyond the switch on the straight leg, beyond its group D; E of the siding lies 100 m beyond the switch.
   void run_past_the_groups() {
     tracker.update(forward(1, 990), true);
     for (double offset_m = 10; offset_m <= 250; offset_m += 20) tracker.update(forward(2, offset_m), false);
   }
-  BaliseTracker tracker{balise_map(), 5000};
 };
 
 TEST_F(UndeclaredTrack, NoGroupIsTakenBehindTheSwitch) {
