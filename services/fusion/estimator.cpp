@@ -122,6 +122,12 @@ void Estimator::exclude(Source source, const Estimator& other) {
   wheel_.window_m.reset();
 }
 
+void Estimator::doubt_place(double behind_m, double ahead_m) {
+  const auto known = interval();
+  if (behind_m > 0) doubt_behind_m_ = centre_m() - known.behind_m + behind_m;
+  if (ahead_m > 0) doubt_ahead_m_ = known.ahead_m - centre_m() + ahead_m;
+}
+
 void Estimator::place_like(const Estimator& other) {
   path_ = other.path_;
   track_doubt_ = other.track_doubt_;

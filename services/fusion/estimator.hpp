@@ -84,6 +84,10 @@ class Estimator {
   [[nodiscard]] bool gnss_proven() const { return gnss_agreed_ >= kGnssProof; }
   /// Takes over place and speed, as independent knowledge.
   void place_like(const Estimator& other);
+  /// The train may be so far beyond the interval's ends, until a fix says where it is.
+  void doubt_place(double behind_m, double ahead_m);
+  /// Others promise so much more than this one: a fix that it uses must not be weighed against its sigma alone.
+  void contradicted_by(double excess_m) { excess_m_ = excess_m; }
   /// The state with this promised interval; since_sure_m: way since the last place that is beyond doubt.
   /// REQUIRES: predict_to(stamp_ns()) was the last call (as for interval()).
   [[nodiscard]] TrainEstimate estimate(const Interval& promised, double since_sure_m) const;
@@ -183,6 +187,9 @@ class Estimator {
   void recover_wheel(const WheelInput& sample, double wheel_m, double sigma_m);
   void use_yaw_rate(double rate_rps);
   void use_track(const FixInput& fix);
+  Offer offer_place(const MeasuredPlace& place);
+  /// What the promised interval holds more than the filter's own uncertainty.
+  [[nodiscard]] double doubted_beyond_sigma_m() const;
   void refuse(const FixInput& fix, double path_distance_m, const Offer& offer);
   void accept(const FixInput& fix);
   void watch_standstill();
@@ -214,6 +221,7 @@ class Estimator {
   bool corrected_ = false;  // the place was moved against the filter's word, not confirmed yet
   uint32_t reference_ = 0;
   std::optional<track::EdgePosition> off_path_;  // a fix was there since the last one that was used
+  double excess_m_ = 0;                          // that others promise beyond this one's interval
   double doubt_m_ = 0;       // camera and the rest contradict each other by so much since the reference
   double time_doubt_m_ = 0;  // so far behind, because time without data may be no time but a clock that was set
   int64_t gap_begin_ns_ = 0;

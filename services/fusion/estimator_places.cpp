@@ -110,7 +110,7 @@ void Estimator::use(const FixInput& fix) {
   const bool again = fix.landmark != 0 && fix.landmark == reference_ && std::abs(filter_.since_reference_m()) < 50;
   const double sigma_m = std::hypot(fix.sigma_m, parameters_->fix_sigma_floor_m) * (again ? 3.0 : 1.0);
   const auto lasting = fix.kind == FixKind::curvature ? std::optional(StateIndex::shape_error) : std::nullopt;
-  const auto offer = filter_.offer_position({*path_distance_m, sigma_m, lasting}, parameters_->gate_fix);
+  const auto offer = offer_place({*path_distance_m, sigma_m, lasting});
   if (offer.used) {
     corrected_ = false;
     accept(fix);
@@ -118,6 +118,30 @@ void Estimator::use(const FixInput& fix) {
     ++watch.refused;
     refuse(fix, *path_distance_m, offer);
   }
+}
+
+// Where more is in doubt than a vague fix leaves open, it says where the train is and not the filter, which is too
+// sure: else it would end the doubt and move nothing. What a sharp one leaves open is little anyway.
+Offer Estimator::offer_place(const MeasuredPlace& place) {
+  const double doubted_m = place.lasting ? doubted_beyond_sigma_m() : 0;
+  if (doubted_m <= parameters_->interval_factor * place.sigma_m) {
+    return filter_.offer_position(place, parameters_->gate_fix);
+  }
+  MotionFilter doubted = filter_;
+  const auto offer = filter_.offer_position(place, parameters_->gate_fix);
+  if (!offer.used) return offer;
+  doubted.loosen_origin(doubted_m / parameters_->interval_factor);
+  filter_ = std::move(doubted);
+  filter_.offer_position(place, parameters_->gate_fix);
+  return offer;
+}
+
+double Estimator::doubted_beyond_sigma_m() const {
+  const double known_m = parameters_->interval_factor * filter_.path_sigma_m() + parameters_->interval_floor_m +
+                         parameters_->interval_drift * since_reference_m();
+  const auto promised = widened(interval());
+  const double centre_m = filter_.path_distance_m();
+  return std::max(centre_m - promised.behind_m, promised.ahead_m - centre_m) - known_m + excess_m_;
 }
 
 void Estimator::accept(const FixInput& fix) {

@@ -34,8 +34,8 @@ Hypotheses::Hypotheses(const FusionParameters* parameters, const OdometerScales&
                        std::shared_ptr<const track::Path> path, int64_t stamp_ns)
     : parameters_(parameters),
       main_(parameters, scales, std::move(path), stamp_ns),
-      rivals_{Rival{Source::camera, {}, {}, {}}, Rival{Source::wheel, {}, {}, {}}, Rival{Source::imu, {}, {}, {}},
-              Rival{Source::gnss, {}, {}, {}}} {}
+      rivals_{Rival{Source::camera, {}, {}, {}, {}}, Rival{Source::wheel, {}, {}, {}, {}},
+              Rival{Source::imu, {}, {}, {}, {}}, Rival{Source::gnss, {}, {}, {}, {}}} {}
 
 void Hypotheses::apply(const Event& event) {
   fix_fitted_.reset();
@@ -81,14 +81,18 @@ void Hypotheses::exclude_faulty() {
 void Hypotheses::adopt(Rival& rival) {
   Estimator next = *rival.estimator;
   next.exclude(rival.without, main_);
+  next.doubt_place(rival.unseen.behind_m, rival.unseen.ahead_m);
   main_ = std::move(next);
-  for (auto& other : rivals_) other.excess = other.carried = {};
+  for (auto& other : rivals_) other.excess = other.carried = other.unseen = {};
 }
 
 void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
   predict_to(fix.stamp_ns);
   Estimator before = main_;
+  const Excess most = most_excess();
+  main_.contradicted_by(std::max(most.behind_m, most.ahead_m));
   main_.apply(event);
+  main_.contradicted_by(0);
   std::vector<Doubter> doubters_before;  // only a refused fix asks for them
   if (main_.fix_refused()) doubters_before = doubters_;
   for (auto& doubter : doubters_) {
@@ -136,7 +140,7 @@ void Hypotheses::settle_doubters(const FixInput& fix, Estimator before) {
 
 void Hypotheses::confirm_rivals() {
   for (auto& rival : rivals_) {
-    rival.excess = rival.carried = {};
+    rival.excess = rival.carried = rival.unseen = {};
     // Confirmed is the main one: a rival that is elsewhere was wrong.
     if (rival.estimator && rival.estimator->fix_refused()) rival.estimator = main_;
   }
@@ -223,6 +227,7 @@ void Hypotheses::ask(Rival& rival) {
   auto& other = *rival.estimator;
   if (!rival.asked && core::seconds(now_ns - rival.asked_ns) > kRivalGoneS) {
     // It was away: it begins again where the main one is, and what it had said before stays.
+    lose_sight(rival, now_ns);
     // A train without camera may have nothing but the rival's wheel.
     if (rival.contradicted && (main_.knows_motion() || main_.watch(Source::camera).seen_ns != 0)) {
       other = main_;
@@ -250,6 +255,17 @@ void Hypotheses::ask(Rival& rival) {
   rival.strayed_ns = now_ns;
 }
 
+// It takes over a place that the main one has counted by the very sensor that this rival doubts: should that prove
+// wrong, the train is where the rival's own reckoning allows.
+void Hypotheses::lose_sight(Rival& rival, int64_t now_ns) const {
+  Estimator own = *rival.estimator;
+  own.predict_to(now_ns);
+  const Interval mine = main_.widened(main_.interval());
+  const Interval its = own.interval();
+  rival.unseen.behind_m = std::max(rival.unseen.behind_m, mine.behind_m - its.behind_m);
+  rival.unseen.ahead_m = std::max(rival.unseen.ahead_m, its.ahead_m - mine.ahead_m);
+}
+
 // Nothing tells any more how far they come apart: for a while as fast as they did last.
 void Hypotheses::stray(Rival& rival, int64_t now_ns) {
   const double apart_m = rival.faster_mps * core::seconds(now_ns - std::exchange(rival.strayed_ns, now_ns));
@@ -257,12 +273,17 @@ void Hypotheses::stray(Rival& rival, int64_t now_ns) {
   rival.excess.ahead_m += std::max(0.0, apart_m);
 }
 
-Interval Hypotheses::promised(const Interval& main) const {
+Hypotheses::Excess Hypotheses::most_excess() const {
   Excess most;
   for (const auto& rival : rivals_) {
     most.behind_m = std::max(most.behind_m, rival.excess.behind_m);
     most.ahead_m = std::max(most.ahead_m, rival.excess.ahead_m);
   }
+  return most;
+}
+
+Interval Hypotheses::promised(const Interval& main) const {
+  const Excess most = most_excess();
   return {main.behind_m - most.behind_m, main.ahead_m + most.ahead_m};
 }
 

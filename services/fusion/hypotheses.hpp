@@ -72,6 +72,7 @@ class Hypotheses {
     std::optional<Estimator> estimator;  // from the source's first sample on; until then it is the main one
     Excess excess;
     Excess carried;               // when it came back
+    Excess unseen;                // so far it may have been from the main one while it was away
     bool asked = false;           // its word counts at present
     int64_t asked_ns = 0;         // ... and counted last
     bool contradicted = false;    // itself, while it was not asked
@@ -90,7 +91,9 @@ class Hypotheses {
   void begin_rival(Source source);
   void ask_rivals();
   void ask(Rival& rival);
+  void lose_sight(Rival& rival, int64_t now_ns) const;
   static void stray(Rival& rival, int64_t now_ns);
+  [[nodiscard]] Excess most_excess() const;
   [[nodiscard]] Interval promised(const Interval& main) const;
 
   const FusionParameters* parameters_;

@@ -52,6 +52,7 @@ void leave_out(SimulationPlan& plan, const std::string& names) {
   plan.wheel = plan.wheel && !has("wheel");
   plan.imu = plan.imu && !has("imu");
   plan.gnss = plan.gnss && !has("gnss");
+  plan.shape = plan.shape && !has("shape");
   if (has("landmarks")) plan.landmark_spacing_m = 0;
 }
 
@@ -161,6 +162,7 @@ int run(int argc, char** argv) {
   s = campaign_plan();
   s.track_fixes = true;
   s.switch_spacing_m = 1500;
+  s.shape = true;
   CLI::App app("Confidence campaign: simulated sensors with faults through fusion, the interval against the truth");
   app.add_option("--km", a.plan.km, "Way to run in total")->capture_default_str();
   app.add_option("--seed", a.plan.seed, "Other seeds, other runs")->capture_default_str();
@@ -172,7 +174,7 @@ int run(int argc, char** argv) {
   app.add_option("--landmarks-m", s.landmark_spacing_m, "Mean distance of landmarks, 0 = none")->capture_default_str();
   app.add_option("--switches-m", s.switch_spacing_m, "Mean distance of facing points, 0 = none")->capture_default_str();
   app.add_option("--fault", a.fault, "all, none, SENSOR or SENSOR:KIND")->capture_default_str();
-  app.add_option("--without", a.without, "Leave out any of camera, wheel, imu, gnss, landmarks (comma between)");
+  app.add_option("--without", a.without, "Leave out any of camera, wheel, imu, gnss, landmarks, shape (comma between)");
   app.add_option("--map", a.map, "Compiled map instead of random lines");
   app.add_option("--start", a.start, "EDGE:OFFSET[:+|-] on the map");
   app.add_option("--stanford", a.stanford, "Write the Stanford diagram (SVG)");

@@ -30,6 +30,8 @@ Range bias_range(Sensor sensor) {
       return {0.002, 0.3};
     case Sensor::gnss:
       return {5, 500};
+    case Sensor::shape:
+      return {1, 10};  // the curve was laid anew, or drawn roughly
     default:
       return {0.1, 0.8};  // of a place: the mount's pitch, the map; more is a wrong landmark
   }
@@ -41,6 +43,8 @@ Range drift_range(Sensor sensor) {
       return {3, 12};  // unseen, slow: multipath; faster ones are seen as a bias is
     case Sensor::clock:
       return {1e-5, 1e-3};
+    case Sensor::shape:
+      return {3e-5, 1e-3};  // of the curvature: the mount turns
     default:
       return bias_range(sensor);
   }
@@ -70,7 +74,7 @@ double random_size(core::Random& random, Sensor sensor, FaultKind kind) {
 }  // namespace
 
 std::string to_string(Sensor sensor) {
-  static const std::array names{"none", "camera", "wheel", "accelerometer", "gyro", "gnss", "fix", "clock"};
+  static const std::array names{"none", "camera", "wheel", "accelerometer", "gyro", "gnss", "fix", "shape", "clock"};
   return names.at(static_cast<size_t>(sensor));
 }
 
@@ -88,8 +92,8 @@ double Fault::progress(double t_s) const {
 const std::vector<std::pair<Sensor, FaultKind>>& all_faults() {
   static const auto list = [] {
     std::vector<std::pair<Sensor, FaultKind>> all{{Sensor::none, FaultKind::none}};
-    for (const auto sensor :
-         {Sensor::camera, Sensor::wheel, Sensor::accelerometer, Sensor::gyro, Sensor::gnss, Sensor::fix}) {
+    for (const auto sensor : {Sensor::camera, Sensor::wheel, Sensor::accelerometer, Sensor::gyro, Sensor::gnss,
+                              Sensor::fix, Sensor::shape}) {
       for (const auto kind : {FaultKind::bias, FaultKind::drift, FaultKind::stuck, FaultKind::noise,
                               FaultKind::outliers, FaultKind::dropout, FaultKind::delay})
         all.emplace_back(sensor, kind);

@@ -19,6 +19,7 @@ constexpr double kPulseS = 0.05;
 constexpr double kInertialS = 0.02;
 constexpr double kPulsesPerMetre = 90;
 constexpr double kKeyFrameM = 0.15;
+constexpr double kShapeM = 500;  // a curve and the next err by themselves
 // Of a scale, between trips of one train: the light and the track for a camera, load and temperature for a wheel.
 constexpr double kCameraTripChange = 2e-4;
 constexpr double kWheelTripChange = 5e-5;
@@ -79,6 +80,7 @@ TrainSimulation::TrainSimulation(const SimulationPlan& plan, uint64_t seed, std:
 void TrainSimulation::measure() {
   auto random = stream(seed_, 3);
   start_error_m = plan_.start_sigma_m * random.normal();
+  if (plan_.shape) lay_track();
   if (plan_.camera) make_steps();
   if (plan_.wheel) make_pulses();
   if (plan_.imu) make_inertial();
@@ -143,6 +145,23 @@ std::optional<double> TrainSimulation::error_m(const track::EdgePosition& place,
 
 bool TrainSimulation::on_way(const track::EdgePosition& place) const {
   return path_->distance_of(place.edge, place.offset_m).has_value();
+}
+
+void TrainSimulation::lay_track() {
+  auto random = stream(seed_, 16);
+  for (double m = 0; m < way_m() + 2 * kShapeM; m += kShapeM) {
+    shape_errors_m_.push_back(plan_.map_shape_m * random.normal());
+  }
+}
+
+double TrainSimulation::curvature_at(double distance_m, double t_s) const {
+  double error_m = faulty(Sensor::shape, FaultKind::bias, t_s) ? plan_.fault.size : 0;
+  if (!shape_errors_m_.empty()) {
+    const double cell = std::clamp(distance_m / kShapeM, 0.0, static_cast<double>(shape_errors_m_.size() - 2));
+    const auto i = static_cast<size_t>(cell);
+    error_m += std::lerp(shape_errors_m_[i], shape_errors_m_[i + 1], cell - static_cast<double>(i));
+  }
+  return path_->curvature_at(distance_m + error_m);
 }
 
 bool TrainSimulation::faulty(Sensor sensor, FaultKind kind, double t_s) const {
@@ -256,7 +275,7 @@ void TrainSimulation::make_inertial() {
     const double accel_times = faulty(Sensor::accelerometer, FaultKind::noise, t) ? fault.size : 1;
     const double rate_times = faulty(Sensor::gyro, FaultKind::noise, t) ? fault.size : 1;
     ImuInput sample{stamp_ns(t), accel + core::kGravityMps2 * point.grade + bias + accel_times * 0.2 * random.normal(),
-                    now.speed_mps * point.curvature_per_m + gyro_bias + rate_times * 0.01 * random.normal()};
+                    now.speed_mps * curvature_at(now.distance_m, t) + gyro_bias + rate_times * 0.01 * random.normal()};
     sample.accel_x_mps2 += offset_of(Sensor::accelerometer, t);
     sample.rate_z_rps += offset_of(Sensor::gyro, t);
     const bool wild = random.uniform() < 0.1;

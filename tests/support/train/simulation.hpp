@@ -45,6 +45,8 @@ struct SimulationPlan {
   double fix_probability = 0.99;
   double switch_spacing_m = 0;  // of a random line, 0 = none; the way takes either leg
   bool track_fixes = false;     // map_matcher says the track once a second, and which leg behind facing points
+  bool shape = false;           // map_matcher finds places from the shape that the camera sees (ShapeFixes)
+  double map_shape_m = 0.7;     // curves lie so far from where the map has them, if there is `shape`
   bool blind_spells = true;     // 5 to 15 s without camera, now and then
   bool slip = true;             // wheel turns up to 30 % too fast or slow for some seconds
   double start_sigma_m = 0.3;
@@ -84,6 +86,9 @@ class TrainSimulation {
   /// place lies elsewhere.
   [[nodiscard]] std::optional<double> error_m(const track::EdgePosition& place, const Motion& truth) const;
   [[nodiscard]] bool on_way(const track::EdgePosition& place) const;
+  /// Of the track as it lies, not as it is mapped.
+  [[nodiscard]] double curvature_at(double distance_m, double t_s) const;
+  [[nodiscard]] core::Random stream_of(uint64_t number) const { return stream(seed_, number); }
   [[nodiscard]] int64_t stamp_ns(double t_s) const;
   [[nodiscard]] double duration_s() const { return drive_.duration_s(); }
   [[nodiscard]] double way_m() const { return drive_.way_m(); }
@@ -132,6 +137,7 @@ class TrainSimulation {
   void find_points();
   void measure();
   [[nodiscard]] double scale_error_of(double usual, double trip_change, core::Random& random, uint64_t number) const;
+  void lay_track();
   void make_steps();
   void make_pulses();
   void make_inertial();
@@ -153,6 +159,7 @@ class TrainSimulation {
   track::EdgePosition start_;
   std::shared_ptr<const track::Path> path_;
   Drive drive_;
+  std::vector<double> shape_errors_m_;  // every kShapeM of the way
   std::vector<Points> points_;
   std::vector<Declaration> declarations_;  // one for each of the points
   bool misled_landmarks_ = false;          // the landmarks are looked for on the leg that is wrongly declared

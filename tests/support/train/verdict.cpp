@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/time.hpp"
+#include "support/train/shape_fixes.hpp"
 #include "track/declared.hpp"
 
 namespace railfix::train {
@@ -24,6 +25,7 @@ const char* name_in_reason(Sensor sensor) {
     case Sensor::gnss:
       return "GNSS";
     case Sensor::fix:
+    case Sensor::shape:
       return "fix";
     case Sensor::clock:
       return "clock";
@@ -101,13 +103,21 @@ void Verdict::add(const Verdict& other) {
 
 Verdict judge(const TrainSimulation& simulation, fusion::Fusion& fusion, double after_m, const Watcher& watcher) {
   Judge judge(simulation, after_m, watcher);
+  std::optional<ShapeFixes> shape;
+  if (simulation.plan().shape) shape.emplace(simulation);
   double tick_s = 0;
   for (const auto& arrival : simulation.arrivals) {
     if (arrival.arrival_s > simulation.duration_s()) break;
     for (; tick_s < arrival.arrival_s; tick_s += kTickS) {
       if (const auto state = fusion.tick(simulation.stamp_ns(tick_s))) judge.see(*state, tick_s);
     }
-    if (const auto state = fusion.add(arrival.event)) judge.see(*state, arrival.arrival_s);
+    const auto state = fusion.add(arrival.event);
+    if (!state) continue;
+    judge.see(*state, arrival.arrival_s);
+    const auto* step = std::get_if<fusion::OdometryInput>(&arrival.event);
+    const auto fix = shape && step != nullptr ? shape->see(*step, *state, arrival.arrival_s) : std::nullopt;
+    if (!fix) continue;
+    if (const auto behind = fusion.add(*fix)) judge.see(*behind, arrival.arrival_s);
   }
   return judge.take();
 }

@@ -105,7 +105,7 @@ TEST(Coverage, OneFaultySensorStaysInsideTheInterval) {
     plan.false_fix_share = 0.005;
     core::Random random(++seed);
     plan.fault = train::random_fault(random, sensor, kind, 80);
-    plan.track_fixes = true;
+    plan.track_fixes = plan.shape = true;
     plan.switch_spacing_m = 800;
     plan.duration_s = 80 - kEarlierS;
     plan.fault.begin_s -= kEarlierS;
@@ -156,6 +156,21 @@ TEST(Coverage, TwoLandmarksInARowThatAreOffByMetres) {
   core::Random random(kSeed * 77 + 5);
   (void)random.uniform();
   plan.fault = train::random_fault(random, train::Sensor::fix, train::FaultKind::noise, plan.duration_s);
+  const train::TrainSimulation simulation(plan, kSeed);
+  auto fusion = core::value_or_throw(Fusion::create({}, simulation.map, simulation.start()));
+  EXPECT_EQ(train::judge(simulation, fusion).outside, 0U);
+}
+
+// Run 64 of seed 2001: the train starts in the dark with a stuck wheel. What does without the wheel had taken its place
+// over from what the wheel had counted, and a vague fix of the shape ended all doubt. 13 states were outside.
+TEST(Coverage, APlaceThatTheWrongSensorHadCountedIsNotSure) {
+  SimulationPlan plan = train::campaign_plan();
+  plan.track_fixes = plan.shape = true;
+  plan.switch_spacing_m = 1500;
+  constexpr uint64_t kSeed = 2001'000'064;
+  core::Random random(kSeed * 77 + 5);
+  (void)random.uniform();
+  plan.fault = train::random_fault(random, train::Sensor::wheel, train::FaultKind::stuck, plan.duration_s);
   const train::TrainSimulation simulation(plan, kSeed);
   auto fusion = core::value_or_throw(Fusion::create({}, simulation.map, simulation.start()));
   EXPECT_EQ(train::judge(simulation, fusion).outside, 0U);
