@@ -59,17 +59,20 @@ void limit_memory(pid_t pid, rlim_t bytes) {
   prlimit(pid, RLIMIT_AS, &limit, nullptr);
 }
 
-// No more memory than it has now: what asks for more dies.
+// No more memory than it has now: what asks for more dies, now or seconds later. From then on the train must help itself.
 Fault short_of_memory(const std::string& service) {
+  const auto limited = std::make_shared<pid_t>(0);
   return {.name = service + " gets no more memory",
           .begin =
               [=](Rig& rig) {
-                const pid_t pid = rig.pid(service);
+                *limited = rig.pid(service);
                 size_t pages = 0;
-                std::ifstream("/proc/" + std::to_string(pid) + "/statm") >> pages;
-                limit_memory(pid, pages * 4096);
+                std::ifstream("/proc/" + std::to_string(*limited) + "/statm") >> pages;
+                limit_memory(*limited, pages * 4096);
               },
           .end = [=](Rig& rig) { limit_memory(rig.pid(service), RLIM_INFINITY); },
+          .over = [=](Rig&) { return kill(*limited, 0) != 0; },
+          .lasts_s = 8,
           .named = ""};
 }
 
