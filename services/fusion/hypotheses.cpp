@@ -103,7 +103,7 @@ void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
   }
   if (main_.fix_refused() || main_.fix_used()) fix_fitted_ = main_.fix_used() && !main_.fix_corrected();
   if (main_.fix_refused()) {
-    if (adopt_by_fix(before) || !adopt_doubter(fix, std::move(doubters_before))) return;
+    if (adopt_by_fix(fix, before, doubters_before) || !adopt_doubter(fix, std::move(doubters_before))) return;
   } else if (main_.fix_used()) {
     settle_doubters(fix, std::move(before));
   } else {
@@ -149,7 +149,7 @@ void Hypotheses::confirm_rivals() {
 
 // The main one refuses the fix, but without one certain sensor it fits: that sensor is wrong, or the fix is; until the
 // next one the interval holds both.
-bool Hypotheses::adopt_by_fix(const Estimator& before) {
+bool Hypotheses::adopt_by_fix(const FixInput& fix, const Estimator& before, const std::vector<Doubter>& doubters) {
   Rival* only = nullptr;
   for (auto& rival : rivals_) {
     if (!rival.asked || !rival.estimator->fix_used()) continue;
@@ -159,7 +159,9 @@ bool Hypotheses::adopt_by_fix(const Estimator& before) {
   const bool two_odometers = main_.watch(Source::camera).seen_ns != 0 && main_.watch(Source::wheel).seen_ns != 0;
   if (only == nullptr || !two_odometers) return false;
   adopt(*only);
-  doubters_ = {Doubter{before}};
+  // The fixes that were not sure are no surer now.
+  doubters_ = doubters;
+  doubters_.push_back({before, fix.landmark, fix.kind == FixKind::curvature});
   ask_rivals();
   return true;
 }

@@ -82,7 +82,7 @@ class Hypotheses {
   };
 
   void apply_fix(const FixInput& fix, const Event& event);
-  bool adopt_by_fix(const Estimator& before);
+  bool adopt_by_fix(const FixInput& fix, const Estimator& before, const std::vector<Doubter>& doubters);
   bool adopt_doubter(const FixInput& fix, std::vector<Doubter> before);
   void settle_doubters(const FixInput& fix, Estimator before);
   void confirm_rivals();
