@@ -58,6 +58,7 @@ TrainSimulation simulation_of(const CampaignPlan& plan, uint64_t number) {
     one.slip = one.slip && (plan.slip_always || sensor == Sensor::wheel || sensor == Sensor::gnss ||
                             sensor == Sensor::fix || sensor == Sensor::clock);
   }
+  if (random.uniform() < plan.unknown_start_share) one.start_told = false;
   if (!plan.map) return TrainSimulation(one, seed);
   return TrainSimulation(one, seed, plan.map, plan.starts[number % plan.starts.size()]);
 }

@@ -22,6 +22,7 @@ struct CampaignPlan {
   double duration_s = 240;            // of one run
   std::vector<FaultName> faults;      // in turn, one a run
   double no_fault_share = 0.25;       // of runs beside those
+  double unknown_start_share = 0;     // of runs that are not told where they begin
   bool slip_always = false;           // beside faults of other motion sensors too
   std::optional<double> saved_wrong;  // scales are saved, wrong by so much: camera's, wheel's and both in turn
   SimulationPlan simulation;

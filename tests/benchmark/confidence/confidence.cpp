@@ -163,6 +163,7 @@ int run(int argc, char** argv) {
   s.track_fixes = true;
   s.switch_spacing_m = 1500;
   s.shape = true;
+  a.plan.unknown_start_share = 0.1;
   CLI::App app("Confidence campaign: simulated sensors with faults through fusion, the interval against the truth");
   app.add_option("--km", a.plan.km, "Way to run in total")->capture_default_str();
   app.add_option("--seed", a.plan.seed, "Other seeds, other runs")->capture_default_str();

@@ -19,6 +19,7 @@ constexpr double kPulseS = 0.05;
 constexpr double kInertialS = 0.02;
 constexpr double kPulsesPerMetre = 90;
 constexpr double kKeyFrameM = 0.15;
+constexpr double kLocateEveryM = 500;
 constexpr double kShapeM = 500;  // a curve and the next err by themselves
 // Of a scale, between trips of one train: the light and the track for a camera, load and temperature for a wheel.
 constexpr double kCameraTripChange = 2e-4;
@@ -94,11 +95,13 @@ void TrainSimulation::measure() {
   } else if (plan_.landmark_spacing_m > 0) {
     make_fixes();
   }
+  if (!plan_.start_told) make_network_fixes();
   std::stable_sort(arrivals.begin(), arrivals.end(),
                    [](const Arrival& a, const Arrival& b) { return a.arrival_s < b.arrival_s; });
 }
 
-track::EdgePosition TrainSimulation::start() const {
+std::optional<track::EdgePosition> TrainSimulation::start() const {
+  if (!plan_.start_told) return std::nullopt;
   auto place = start_;
   place.offset_m += place.direction == track::Direction::reverse ? -start_error_m : start_error_m;
   return place;
@@ -356,6 +359,22 @@ void TrainSimulation::make_fixes() {
                    place.direction, nullptr});
     }
     place_m += plan_.landmark_spacing_m * (1 + plan_.landmark_spread * random.uniform(-1, 1));
+  }
+}
+
+// Found after 0.4 to 3 km, to 3 to 25 m; said again every 500 m, with much the same error, until fusion knows the
+// place.
+void TrainSimulation::make_network_fixes() {
+  auto random = stream(seed_, 18);
+  const double sigma_m = 3 * std::pow(8, random.uniform());
+  const double wrong_m = sigma_m * random.normal();
+  const double probability = random.uniform(fusion::kBeginProbability, 1);
+  for (double place_m = random.uniform(400, 3000); place_m < way_m(); place_m += kLocateEveryM) {
+    const double t = drive_.time_at(place_m) + 0.003;
+    const auto place = path_->position_at(place_m + wrong_m);
+    add(Sensor::fix, t,
+        FixInput{stamp_ns(t), place.edge, place.offset_m, sigma_m, probability, 0, FixKind::network, place.direction,
+                 nullptr});
   }
 }
 

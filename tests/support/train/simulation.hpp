@@ -50,6 +50,7 @@ struct SimulationPlan {
   bool blind_spells = true;     // 5 to 15 s without camera, now and then
   bool slip = true;             // wheel turns up to 30 % too fast or slow for some seconds
   double start_sigma_m = 0.3;
+  bool start_told = true;  // otherwise map_matcher finds the place after some way
   Fault fault;
 };
 
@@ -78,8 +79,8 @@ class TrainSimulation {
   static int64_t stamp(const fusion::Event& event) {
     return std::visit([](const auto& input) { return input.stamp_ns; }, event);
   }
-  /// What fusion is told of the start.
-  [[nodiscard]] track::EdgePosition start() const;
+  /// What fusion is told of the start, if anything.
+  [[nodiscard]] std::optional<track::EdgePosition> start() const;
   /// Truth at a stamp; arrival_s: when fusion said it (a clock that was set back gives every stamp twice).
   [[nodiscard]] Motion truth_at(int64_t stamp_ns, double arrival_s = 1e9) const;
   /// Place minus truth, along the way, or along the other leg of points that the train has run over; nothing when the
@@ -144,6 +145,7 @@ class TrainSimulation {
   void make_gnss();
   void make_fixes();
   void make_fixes_of_map();
+  void make_network_fixes();
   void make_declarations();
   void make_track_fixes();
   [[nodiscard]] SaidTrack track_at(double way_m) const;

@@ -65,6 +65,18 @@ TEST(Coverage, CameraAloneWithoutLandmarksDriftsInsideItsInterval) {
   EXPECT_GE(campaign.budget_share, 0.99);
 }
 
+// Nobody says where the train begins: the way counts until map_matcher has found the place, to some metres.
+TEST(Coverage, APlaceThatIsFoundOnTheWayIsHeld) {
+  SimulationPlan plan;
+  plan.start_told = false;
+  plan.shape = plan.track_fixes = true;
+  plan.switch_spacing_m = 1500;
+  plan.duration_s = 240;
+  const auto campaign = run_campaign(plan, 8, 4000);  // behind it, and a landmark
+  EXPECT_EQ(campaign.sum.outside, 0U);
+  EXPECT_LE(campaign.p95_m, 2);
+}
+
 TEST(Coverage, WheelAloneDriftsInsideItsInterval) {
   SimulationPlan plan;
   plan.camera = plan.imu = plan.gnss = plan.slip = false;
