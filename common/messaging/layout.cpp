@@ -7,6 +7,7 @@
 
 #include "core/fnv.hpp"
 #include "idl/embedded_idl.hpp"
+#include "messaging/topic_layouts.hpp"
 
 namespace railfix::messaging {
 namespace {
@@ -28,6 +29,12 @@ uint64_t hash_of(std::string_view idl) {
 uint64_t layout_of(const TopicInfo& topic) {
   const auto file = std::ranges::find(idl::kEmbeddedIdl, topic.idl, &idl::EmbeddedIdl::name);
   return file == idl::kEmbeddedIdl.end() ? 0 : hash_of(file->text);
+}
+
+std::map<std::string, uint64_t> topic_layouts() {
+  std::map<std::string, uint64_t> layouts;
+  for (const auto& file : idl::kEmbeddedIdl) layouts.emplace(file.name, hash_of(file.text));
+  return layouts;
 }
 
 std::vector<uint8_t> user_data_of_layout(uint64_t layout) {

@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "core/time.hpp"
+#include "service/release.hpp"
 
 namespace railfix::service {
 namespace {
@@ -48,7 +49,7 @@ PublishedHealth::PublishedHealth(messaging::Participant& participant, const std:
       cpu_ns_(used_cpu_ns()) {
   status_.service(service);
   status_.host(common.host);
-  status_.version(RAILFIX_VERSION);
+  status_.version(release());
   status_.pid(static_cast<uint32_t>(getpid()));
   status_.state(msg::STATE_STARTING);
   published_ = status_;

@@ -2,13 +2,16 @@
 #include <signal.h>
 
 #include <CLI/CLI.hpp>
+#include <cstdio>
 #include <cstdlib>
 #include <iostream>
 #include <memory>
 #include <thread>
 
+#include "messaging/topic_layouts.hpp"
 #include "service/health_file.hpp"
 #include "service/loop.hpp"
+#include "service/release.hpp"
 
 namespace railfix::service {
 namespace {
@@ -79,6 +82,12 @@ int say_health(const CommonConfig& common, const std::string& service) {
   return answer.healthy && !answer.stuck ? kDone : kFailed;
 }
 
+// `railfix train` compares them: programs that were made of different ones do not hear each other.
+int say_topics() {
+  for (const auto& [idl, layout] : messaging::topic_layouts()) std::printf("topics %s %016lx\n", idl.c_str(), layout);
+  return kDone;
+}
+
 // Who finds this service a moment later, as everybody does, would not hear what it logged at once.
 void say_why_again(Loop& loop) {
   const char* end = std::getenv(kEndedBefore);
@@ -98,7 +107,7 @@ int serve(const Program& program, const CommonConfig& common, bool beside) {
   try {
     const auto service = program.make(loop);
     say_why_again(loop);
-    loop.log().info("version {}, train {}, domain {}", RAILFIX_VERSION, common.train_id, common.domain);
+    loop.log().info("version {}, train {}, domain {}", release(), common.train_id, common.domain);
     loop.health().ready();
     loop.turn();
   } catch (const core::BadInput& error) {
@@ -152,13 +161,15 @@ int run_program(const Program& program, int argc, char** argv) {
                  "YAML file with the sections `common` and `" + program.name + "` (others are ignored)")
       ->envname("RAILFIX_CONFIG");
   app.add_option("--set", line.sets, "section.key=value, over the file; may be repeated");
-  app.add_flag("--check", line.check, "Read the configuration, say what is wrong with it, and end");
+  app.add_flag(
+      "--check", line.check,
+      "Read the configuration, say what is wrong with it, or which topics (IDL) the program was made of, and end");
   app.add_flag("--document", line.document, "Print every key with its default, unit, range and meaning, and end");
   app.add_flag("--health", line.health,
                "Ask the service that runs here with this configuration how it is, and end: exit code 0 or 1");
   app.add_flag("--beside", line.beside,
                "Another one of this service runs here: stand by until it has gone (what `railfix train upgrade` does)");
-  app.set_version_flag("--version", std::string(RAILFIX_VERSION));
+  app.set_version_flag("--version", std::string(release()));
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -174,7 +185,7 @@ int run_program(const Program& program, int argc, char** argv) {
         core::value_or_throw(read_config<CommonConfig>("common", line.config, overrides, service_names()));
     if (line.health) return say_health(common, program.name);
     core::ok_or_throw(program.read(line.config, overrides));
-    if (line.check) return kDone;
+    if (line.check) return say_topics();
     return serve(program, common, line.beside);
   } catch (const core::BadInput& error) {
     std::cerr << program.name << ": " << error.what() << '\n';

@@ -5,6 +5,7 @@
 #include "messaging/reader_troubles.hpp"
 #include "monitor/metrics.hpp"
 #include "monitor/monitor_service.hpp"
+#include "service/release.hpp"
 
 namespace railfix::monitor {
 namespace {
@@ -88,7 +89,7 @@ LiveApi::Actions MonitorService::live_actions() {
   actions.hello = [this](const Client&) {
     return json{{"kind", "hello"},
                 {"train", context_.common().train_id},
-                {"version", RAILFIX_VERSION},
+                {"version", service::release()},
                 {"host", context_.common().host},
                 {"now_ns", core::wall_ns()}};
   };
@@ -102,7 +103,7 @@ FoxgloveApi::Actions MonitorService::foxglove_actions() {
   FoxgloveApi::Actions actions;
   actions.name = "Railfix, train " + context_.common().train_id;
   actions.metadata = {{"train", context_.common().train_id},
-                      {"version", RAILFIX_VERSION},
+                      {"version", service::release()},
                       {"host", context_.common().host},
                       {"session", context_.common().train_id + "-" + std::to_string(begun_ns_)}};
   actions.watch_changed = [this] { choose_topics(); };
@@ -141,7 +142,7 @@ json MonitorService::about(const Request& request) const {
   json map = nullptr;
   if (map_) map = {{"name", map_->name}, {"edges", map_->edges.size()}, {"length_m", map_view_->length_m()}};
   return {{"train", context_.common().train_id},
-          {"version", RAILFIX_VERSION},
+          {"version", service::release()},
           {"host", context_.common().host},
           {"now_ns", core::wall_ns()},
           {"cameras", cameras()},
@@ -165,8 +166,8 @@ Response MonitorService::map_answer(const Request& request) const {
 Response MonitorService::metrics_answer() {
   scraped_ns_ = core::wall_ns();
   const TrainSeen seen = train_seen();
-  MetricsInput input{context_.common().train_id, RAILFIX_VERSION, context_.common().host, &seen,        {},
-                     &problems_.problems(),      reports_sent_,   server_.clients(),      slow_viewers_};
+  MetricsInput input{context_.common().train_id, service::release(), context_.common().host, &seen,        {},
+                     &problems_.problems(),      reports_sent_,      server_.clients(),      slow_viewers_};
   const auto troubles = messaging::reader_troubles(context_.participant());
   for (const auto& [name, topic] : watch_.topics()) {
     if (!topic.reader) continue;

@@ -5,6 +5,7 @@
 
 #include "core/time.hpp"
 #include "recorder/recorder_status.hpp"
+#include "service/release.hpp"
 
 namespace railfix::recorder {
 
@@ -74,7 +75,7 @@ std::map<std::string, std::string> RecorderService::about() const {
   const auto& common = context_.common();
   return {{"train_id", common.train_id},
           {"host", common.host},
-          {"version", RAILFIX_VERSION},
+          {"version", service::release()},
           {"domain", std::to_string(common.domain)},
           {"pictures", config_.pictures},
           {"map", fingerprint(config_.map)},

@@ -38,7 +38,7 @@ bool say(const std::vector<Finding>& findings) {
   return good;
 }
 
-std::vector<Finding> findings_of(const Manifest& manifest, const Options& options) {
+TrainCheck checked(const Manifest& manifest, const Options& options) {
   return check_train(manifest, [&](const HostedService& service) { return program_of(service, options.root); });
 }
 
@@ -70,7 +70,7 @@ HostPlan running_plan_here(const Options& options) {
 
 int check(const Options& options) {
   const auto manifest = core::value_or_throw(read_manifest(options.train));
-  auto findings = findings_of(manifest, options);
+  auto findings = checked(manifest, options).findings;
   const auto* here = options.host.empty() ? manifest.host_here() : &chosen_host(manifest, options);
   if (here != nullptr) {
     for (auto& finding : check_computer(&manifest, here, options.root)) findings.push_back(std::move(finding));
@@ -86,7 +86,7 @@ int check(const Options& options) {
 
 int render(const Options& options) {
   const auto manifest = core::value_or_throw(read_manifest(options.train));
-  if (!say(findings_of(manifest, options))) return 1;
+  if (!say(checked(manifest, options).findings)) return 1;
   for (const auto& host : manifest.hosts) {
     core::ok_or_throw(render_host(manifest, host, options.out / host.name));
     std::cout << host.name << " (" << host.address << "): " << (options.out / host.name).string() << '\n';
@@ -153,7 +153,7 @@ int status(const Options& options) {
 int up(const Options& options) {
   const auto manifest = core::value_or_throw(read_manifest(options.train));
   const auto& host = chosen_host(manifest, options);
-  auto findings = findings_of(manifest, options);
+  auto [findings, made_of] = checked(manifest, options);
   for (auto& finding : check_computer(&manifest, &host, options.root)) findings.push_back(std::move(finding));
   if (!say(findings)) return 1;
   const HostFolder folder(options.root);
@@ -165,7 +165,7 @@ int up(const Options& options) {
               << "; railfix train diff says what the manifest would change, upgrade does it\n";
     if (supervised) return status(options);
   }
-  const auto plan = runs ? *installed : core::value_or_throw(install(manifest, host, options.root));
+  const auto plan = runs ? *installed : core::value_or_throw(install(manifest, host, options.root, made_of));
   const auto healthy = bring_up(options.root, plan, options.gate);
   if (!healthy.ok()) std::cerr << "railfix: not healthy: " << healthy.error().message << '\n';
   const int shown = status(options);
@@ -214,10 +214,10 @@ int upgrade(const Options& options) {
   const auto manifest = core::value_or_throw(read_manifest(options.train));
   const auto& host = chosen_host(manifest, options);
   running_plan_here(options);
-  auto findings = findings_of(manifest, options);
+  auto [findings, made_of] = checked(manifest, options);
   for (auto& finding : check_computer(&manifest, &host, options.root)) findings.push_back(std::move(finding));
   if (!say(findings)) return 1;
-  const auto plan = core::value_or_throw(install(manifest, host, options.root));
+  const auto plan = core::value_or_throw(install(manifest, host, options.root, made_of));
   const auto done =
       roll_out(options.root, plan, options.gate, [](const std::string& text) { std::cout << text << std::endl; });
   if (!done.ok()) throw std::runtime_error(done.error().message);

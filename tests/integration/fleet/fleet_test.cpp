@@ -1,34 +1,24 @@
-// `railfix train` as an operator uses it: real services under a real supervisor, in a folder of their own.
+// A train comes up, goes down, is changed, and survives its supervisor.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 
 #include <atomic>
-#include <nlohmann/json.hpp>
 #include <thread>
 
-#include "core/time.hpp"
+#include "integration/fleet/fleet_train.hpp"
 #include "messaging/topics.hpp"
 #include "support/network.hpp"
-#include "support/program.hpp"
 
 namespace railfix {
 namespace {
 
-namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-class Fleet : public ::testing::Test {
+class Fleet : public FleetTest {
  protected:
-  Fleet() {
-    fs::create_directories(folder_ / "train");
-    write_manifest(RAILFIX_TEST_RELEASE);
-  }
-  ~Fleet() override {
-    train({"down", "--root", root()});
-    fs::remove_all(folder_);
-  }
+  Fleet() { write_manifest(RAILFIX_TEST_RELEASE); }
   void write_manifest(const std::string& release, const std::string& more = "") {
     std::ofstream(folder_ / "train" / "train.yaml")
         << "train:\n  id: " << id_ << "\n  domain: 95\n  release: " << release
@@ -37,41 +27,6 @@ class Fleet : public ::testing::Test {
            "settings: { common: { log_level: warning }"
         << more << " }\n";
   }
-  [[nodiscard]] std::string root() const { return (folder_ / "root").string(); }
-  [[nodiscard]] std::string manifest() const { return (folder_ / "train").string(); }
-  static test::Outcome train(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), {"railfix", "train"});
-    return test::run_program(arguments, 180);
-  }
-  test::Outcome up() { return train({"up", manifest(), "--root", root(), "--healthy-for", "1", "--patience", "60"}); }
-  test::Outcome upgrade(const std::string& patience_s = "60") {
-    return train({"upgrade", manifest(), "--root", root(), "--healthy-for", "1", "--patience", patience_s});
-  }
-  nlohmann::json status(const std::string& service) {
-    const auto said = train({"status", "--root", root(), "--json"});
-    const auto all = nlohmann::json::parse(said.out);
-    for (const auto& one : all["services"]) {
-      if (one["service"] == service) return one;
-    }
-    return {};
-  }
-  template <class Condition>
-  static bool wait_until(Condition condition) {
-    const int64_t deadline_ns = core::monotonic_ns() + 60 * core::kNsPerSecond;
-    while (!condition()) {
-      if (core::monotonic_ns() > deadline_ns) return false;
-      poll(nullptr, 0, 100);
-    }
-    return true;
-  }
-  /// Not when it only waits for whoever reaps orphans here.
-  static bool lives(pid_t pid) {
-    const auto line = test::slurp("/proc/" + std::to_string(pid) + "/stat");
-    const size_t name_end = line.rfind(')');
-    return name_end != std::string::npos && name_end + 2 < line.size() && line[name_end + 2] != 'Z';
-  }
-  const std::string id_ = "fleet-" + std::to_string(getpid());
-  const fs::path folder_ = fs::temp_directory_path() / id_;
 };
 
 TEST_F(Fleet, ServicesComeUpComeBackAfterAKillAndGoDown) {

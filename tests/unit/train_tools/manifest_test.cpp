@@ -60,7 +60,7 @@ class TrainFolder : public ::testing::Test {
   std::vector<std::string> findings(const std::string& replace = "", const std::string& by = "",
                                     const std::string& train = kTrain) {
     std::vector<std::string> texts;
-    for (const auto& finding : check_train(manifest(train, replace, by).value(), kNoPrograms)) {
+    for (const auto& finding : check_train(manifest(train, replace, by).value(), kNoPrograms).findings) {
       if (finding.text.find("are not checked") != std::string::npos) continue;  // there are no programs
       if (finding.text.find("there is no token") == std::string::npos) texts.push_back(finding.text);
     }
@@ -270,7 +270,7 @@ TEST_F(TrainFolder, APageThatNobodyCanControlIsTold) {
   std::ofstream(folder_ / "word") << "secret";
   const auto told = [&](const std::string& monitor) {
     const auto train = manifest(kTrain, "settings:\n", "settings:\n  monitor: " + monitor + "\n").value();
-    const auto found = check_train(train, kNoPrograms);
+    const auto found = check_train(train, kNoPrograms).findings;
     return std::any_of(found.begin(), found.end(), [](const Finding& finding) {
       return !finding.error && finding.text.find("nobody can control recorder and player") != std::string::npos;
     });
@@ -374,7 +374,7 @@ TEST_F(TrainFolder, CertificatesAndPasswordsOfTheGroundLinkComeAlong) {
   fs::remove(folder_ / "ground/password");
   EXPECT_THAT(findings("settings:\n  tpr_publisher:", "settings:\n  monitor: { address: 0.0.0.0 }\n  tpr_publisher:"),
               Contains(HasSubstr("open to every network")));
-  const auto missing = check_train(manifest(with_link).value(), kNoPrograms);
+  const auto missing = check_train(manifest(with_link).value(), kNoPrograms).findings;
   EXPECT_TRUE(std::any_of(missing.begin(), missing.end(), [](const Finding& finding) {
     return finding.error && finding.text.find("settings.tpr_publisher.ground_link.password_file") == 0;
   }));

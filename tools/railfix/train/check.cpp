@@ -8,6 +8,7 @@
 
 #include "messaging/qos_match.hpp"
 #include "train/findings.hpp"
+#include "train/made_of.hpp"
 #include "train/render.hpp"
 #include "train/run.hpp"
 #include "train/setting_files.hpp"
@@ -167,25 +168,32 @@ Finding not_checked(const HostedService& service, const std::string& why) {
   return {false, "settings of " + service.name + " are not checked: " + why};
 }
 
-// What the service says of its settings; nothing when they are right.
-std::optional<Finding> settings_finding(const Manifest& manifest, const TrainHost& host, const HostedService& service,
-                                        const FindProgram& find_program, const std::string& config) {
+// What the service says of its settings and of itself.
+struct Answer {
+  std::string service;
+  std::optional<Finding> finding;  // nothing when its settings are right
+  TopicLayouts made_of;
+};
+
+Answer ask_service(const Manifest& manifest, const TrainHost& host, const HostedService& service,
+                   const FindProgram& find_program, const std::string& config) {
+  const auto answer = [&](Finding finding) { return Answer{service.name, std::move(finding), {}}; };
   const auto command = way_to_check(manifest, host, service, find_program, config);
-  if (!command) return not_checked(service, missing_program(manifest, service));
+  if (!command) return answer(not_checked(service, missing_program(manifest, service)));
   auto [exit_code, text] = run(*command);
-  if (exit_code == 0) return std::nullopt;
+  if (exit_code == 0) return {service.name, std::nullopt, topic_layouts_in(text)};
   if (manifest.containers && is_engine_failure(exit_code))
-    return not_checked(service, "a container of " + image_of(service) + " cannot be run here: " + text);
+    return answer(not_checked(service, "a container of " + image_of(service) + " cannot be run here: " + text));
   // The rendered file is ours; the operator knows train.yaml.
   for (size_t at = 0; (at = text.find(config)) != std::string::npos;)
     text.replace(at, config.size(), "settings for " + host.name);
   if (text.empty()) text = service.name + " does not accept its settings, and does not say why: " + command->front();
-  return Finding{true, text};
+  return answer({true, text});
 }
 
-void check_configurations(const Manifest& manifest, const FindProgram& find_program, Findings& findings) {
+void check_services(const Manifest& manifest, const FindProgram& find_program, TrainCheck& check) {
   // Side by side: a container takes half a second.
-  std::vector<std::future<std::optional<Finding>>> answers;
+  std::vector<std::future<Answer>> answers;
   std::vector<fs::path> configs;
   for (const auto& host : manifest.hosts) {
     const auto& config = configs.emplace_back(
@@ -194,20 +202,35 @@ void check_configurations(const Manifest& manifest, const FindProgram& find_prog
     for (const auto& service : services_on(manifest, host.name)) {
       answers.push_back(
           std::async(std::launch::async, [&manifest, &host, &find_program, service, file = config.string()] {
-            return settings_finding(manifest, host, service, find_program, file);
+            return ask_service(manifest, host, service, find_program, file);
           }));
     }
   }
-  for (auto& answer : answers) {
-    if (auto finding = answer.get()) findings.push_back(*std::move(finding));
+  for (auto& asked : answers) {
+    auto answer = asked.get();
+    if (answer.finding) check.findings.push_back(*std::move(answer.finding));
+    check.made_of[answer.service] = std::move(answer.made_of);
   }
   for (const auto& config : configs) fs::remove(config);
 }
 
+void check_topics(const Manifest& manifest, TrainCheck& check) {
+  std::vector<PlannedService> services;
+  for (const auto& service : manifest.services) {
+    PlannedService& one = services.emplace_back();
+    one.name = service.name;
+    one.release = manifest.release_of(service);
+    one.made_of = check.made_of[service.name];
+  }
+  if (const auto found = misfit(services, services))
+    error(check.findings, *found + ": they would not hear each other; take releases that fit");
+}
+
 }  // namespace
 
-std::vector<Finding> check_train(const Manifest& manifest, const FindProgram& find_program) {
-  Findings findings;
+TrainCheck check_train(const Manifest& manifest, const FindProgram& find_program) {
+  TrainCheck check;
+  auto& findings = check.findings;
   check_placement(manifest, findings);
   check_files(manifest, findings);
   check_quality_of_service(manifest, findings);
@@ -216,8 +239,9 @@ std::vector<Finding> check_train(const Manifest& manifest, const FindProgram& fi
   for (const auto& host : manifest.hosts) {
     for (auto& finding : check_certificates(manifest, host)) add_once(findings, std::move(finding));
   }
-  check_configurations(manifest, find_program, findings);
-  return findings;
+  check_services(manifest, find_program, check);
+  check_topics(manifest, check);
+  return check;
 }
 
 }  // namespace railfix::tool

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -18,11 +19,16 @@ struct Finding {
   bool operator==(const Finding&) const = default;
 };
 
+struct TrainCheck {
+  std::vector<Finding> findings;
+  std::map<std::string, TopicLayouts> made_of;  // of each service whose program or image is here
+};
+
 /// The manifest against itself and the files beside it: placement of services, ports, files, certificates, and every
 /// service's own check of its configuration, with its image or the program that is found for it; skipped and said when
-/// this computer has none.
+/// this computer has none. So is it known whether all of them were made of the same topics.
 using FindProgram = std::function<std::optional<std::filesystem::path>(const HostedService&)>;
-std::vector<Finding> check_train(const Manifest& manifest, const FindProgram& find_program);
+TrainCheck check_train(const Manifest& manifest, const FindProgram& find_program);
 
 /// Certificates of one host beside the manifest, and those that its services' settings name: missing, run out, or about
 /// to (settings.monitor.certificate_days).

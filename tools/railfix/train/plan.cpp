@@ -50,7 +50,8 @@ PlannedService service_of(const YAML::Node& node) {
           node["standby"].as<bool>(),
           node["command"].as<std::vector<std::string>>(),
           node["clean_up"].as<std::vector<std::string>>(std::vector<std::string>{}),
-          node["settings"].as<std::string>()};
+          node["settings"].as<std::string>(),
+          node["made_of"].as<TopicLayouts>(TopicLayouts{})};
 }
 
 HostPlan plan_of(const YAML::Node& root) {
@@ -145,6 +146,7 @@ core::Status HostFolder::write_to(const fs::path& folder, const HostPlan& plan) 
     node["command"] = service.command;
     node["clean_up"] = service.clean_up;
     node["settings"] = service.settings;
+    node["made_of"] = service.made_of;
     root["services"].push_back(node);
   }
   return replace(folder / "plan.yaml", YAML::Dump(root) + "\n");

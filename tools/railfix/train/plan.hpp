@@ -16,6 +16,9 @@
 
 namespace railfix::tool {
 
+/// Of each IDL file that a program was made of, a number that tells its layout.
+using TopicLayouts = std::map<std::string, std::string>;
+
 struct PlannedService {
   std::string name;
   std::string release;
@@ -24,6 +27,7 @@ struct PlannedService {
   std::vector<std::string> command;
   std::vector<std::string> clean_up;  // run before each start and after a kill; empty = nothing to do
   std::string settings;               // everything that the service reads; another text means that it must be restarted
+  TopicLayouts made_of = {};          // empty = it did not say
 
   /// Started anew it runs beside the one before until it has found everybody. Not for those that own what only one can
   /// have: a camera, a serial line, a port, a store.

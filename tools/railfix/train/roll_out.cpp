@@ -11,6 +11,7 @@
 
 #include "core/time.hpp"
 #include "service/health_file.hpp"
+#include "train/made_of.hpp"
 #include "train/render.hpp"
 #include "train/supervise.hpp"
 
@@ -22,6 +23,8 @@ namespace fs = std::filesystem;
 constexpr int kTurnMs = 50;
 constexpr double kStopS = 40;
 constexpr double kBackS = 60;
+constexpr const char* kNotTogether =
+    ", which runs here: they would not hear each other; railfix train down on every host, then up";
 
 template <class Condition>
 bool wait_until(double patience_s, Condition condition) {
@@ -210,7 +213,8 @@ std::string difference(const std::string& before, const std::string& after) {
   return text;
 }
 
-core::Result<HostPlan> install(const Manifest& manifest, const TrainHost& host, const fs::path& root) {
+core::Result<HostPlan> install(const Manifest& manifest, const TrainHost& host, const fs::path& root,
+                               const std::map<std::string, TopicLayouts>& made_of) {
   const HostFolder folder(root);
   const auto now = folder.plan();
   HostPlan plan;
@@ -225,6 +229,7 @@ core::Result<HostPlan> install(const Manifest& manifest, const TrainHost& host, 
     planned.settings = settings_of(manifest, host, service.name);
     if (const auto commanded = set_commands(manifest, host, service, files, root, planned); !commanded.ok())
       return commanded.error();
+    if (const auto found = made_of.find(service.name); found != made_of.end()) planned.made_of = found->second;
     const auto* runs = now ? now->service(service.name) : nullptr;
     const bool same = runs != nullptr && runs->release == planned.release && runs->standby == planned.standby &&
                       runs->settings == planned.settings;
@@ -272,6 +277,8 @@ core::Status roll_out(const fs::path& root, const HostPlan& plan, const HealthGa
   const HostFolder folder(root);
   const auto before = folder.plan();
   if (!before) return core::Error{"no train was brought up here; begin with railfix train up"};
+  // While one after the other is swapped they have to hear each other.
+  if (const auto found = misfit(plan.services, before->services)) return core::Error{*found + kNotTogether};
   auto now = *before;
   now.generation = plan.generation;
   now.previous = before->generation;

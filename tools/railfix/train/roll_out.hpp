@@ -10,8 +10,9 @@
 namespace railfix::tool {
 
 /// Renders the manifest for this host as its next generation. Nothing is started. Services that would run exactly as
-/// they do now keep their old entry. Error: a file or program that is missing.
-core::Result<HostPlan> install(const Manifest& manifest, const TrainHost& host, const std::filesystem::path& root);
+/// they do now keep their old entry. `made_of` is noted in the plan. Error: a file or program that is missing.
+core::Result<HostPlan> install(const Manifest& manifest, const TrainHost& host, const std::filesystem::path& root,
+                               const std::map<std::string, TopicLayouts>& made_of = {});
 
 struct HealthGate {
   double healthy_s = 3;     // without a break, and without being started again
@@ -24,7 +25,8 @@ core::Status bring_up(const std::filesystem::path& root, const HostPlan& plan, c
 /// Ends the supervisor and its services.
 core::Status bring_down(const std::filesystem::path& root);
 
-/// Service by service in the order of the data's way: restarts those whose entry differs from what runs now. When one
+/// Service by service in the order of the data's way: restarts those whose entry differs from what runs now; none when
+/// they were made of other topics (IDL). When one
 /// does not pass the gate all of them go back to what ran before; then the error says which, why, and whether that
 /// worked.
 core::Status roll_out(const std::filesystem::path& root, const HostPlan& plan, const HealthGate& gate, const Say& say);

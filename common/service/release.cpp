@@ -1,0 +1,9 @@
+#include "service/release.hpp"
+
+namespace railfix::service {
+
+const char* release() {
+  return RAILFIX_VERSION;
+}
+
+}  // namespace railfix::service

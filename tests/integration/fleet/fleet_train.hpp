@@ -1,0 +1,60 @@
+// `railfix train` as an operator uses it: real services under a real supervisor, in a folder of their own.
+#pragma once
+
+#include <gtest/gtest.h>
+#include <poll.h>
+
+#include <nlohmann/json.hpp>
+
+#include "core/time.hpp"
+#include "support/program.hpp"
+
+namespace railfix {
+
+namespace fs = std::filesystem;
+
+class FleetTest : public ::testing::Test {
+ protected:
+  FleetTest() { fs::create_directories(folder_ / "train"); }
+  ~FleetTest() override {
+    train({"down", "--root", root()});
+    fs::remove_all(folder_);
+  }
+  [[nodiscard]] std::string root() const { return (folder_ / "root").string(); }
+  [[nodiscard]] std::string manifest() const { return (folder_ / "train").string(); }
+  static test::Outcome train(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {"railfix", "train"});
+    return test::run_program(arguments, 180);
+  }
+  test::Outcome up() { return train({"up", manifest(), "--root", root(), "--healthy-for", "1", "--patience", "60"}); }
+  test::Outcome upgrade(const std::string& patience_s = "60") {
+    return train({"upgrade", manifest(), "--root", root(), "--healthy-for", "1", "--patience", patience_s});
+  }
+  nlohmann::json status() { return nlohmann::json::parse(train({"status", "--root", root(), "--json"}).out); }
+  nlohmann::json status(const std::string& service) {
+    const auto all = status();
+    for (const auto& one : all["services"]) {
+      if (one["service"] == service) return one;
+    }
+    return {};
+  }
+  template <class Condition>
+  static bool wait_until(Condition condition) {
+    const int64_t deadline_ns = core::monotonic_ns() + 60 * core::kNsPerSecond;
+    while (!condition()) {
+      if (core::monotonic_ns() > deadline_ns) return false;
+      poll(nullptr, 0, 100);
+    }
+    return true;
+  }
+  /// Not when it only waits for whoever reaps orphans here.
+  static bool lives(pid_t pid) {
+    const auto line = test::slurp("/proc/" + std::to_string(pid) + "/stat");
+    const size_t name_end = line.rfind(')');
+    return name_end != std::string::npos && name_end + 2 < line.size() && line[name_end + 2] != 'Z';
+  }
+  const std::string id_ = "fleet-" + std::to_string(getpid());
+  const fs::path folder_ = fs::temp_directory_path() / id_;
+};
+
+}  // namespace railfix
