@@ -150,6 +150,7 @@ class Sources {
     osm_.nodes.merge(read.nodes);
     std::move(read.ways.begin(), read.ways.end(), std::back_inserter(osm_.ways));
     std::move(read.bridges.begin(), read.bridges.end(), std::back_inserter(osm_.bridges));
+    std::move(read.platforms.begin(), read.platforms.end(), std::back_inserter(osm_.platforms));
     std::move(read.problems.begin(), read.problems.end(), std::back_inserter(map_.problems));
   }
 

@@ -28,8 +28,9 @@ struct OsmWay {
 
 struct OsmData {
   std::unordered_map<int64_t, OsmNode> nodes;
-  std::vector<OsmWay> ways;     // tracks
-  std::vector<OsmWay> bridges;  // of other things, which may lead over a track
+  std::vector<OsmWay> ways;       // tracks
+  std::vector<OsmWay> bridges;    // of other things, which may lead over a track
+  std::vector<OsmWay> platforms;  // outlines, edges, or lines along the middle
   std::vector<std::string> problems;
 };
 
@@ -38,6 +39,12 @@ bool is_track(const OsmTags& tags, bool with_trams);
 
 /// Is this way no such track, but a road, path, canal or other railway on a bridge?
 bool leads_over(const OsmTags& tags, bool with_trams);
+/// Is this a platform of such trains, or an edge of one? Those of buses (public_transport=platform without a word of a
+/// train) are none.
+bool is_platform(const OsmTags& tags, bool with_trams);
+/// A platform with holes in it; the ways around it, by their role, are then its outline.
+bool is_platform_relation(const OsmTags& tags, bool with_trams);
+bool is_outline(const std::string& role);
 /// There, and not "no".
 bool is_set(const OsmTags& tags, const char* key);
 /// Empty where there is no such key.

@@ -25,7 +25,22 @@ bool plausible(const GeoPoint& place) {
   return std::abs(place.lat_deg) <= 90.0 && std::abs(place.lon_deg) <= 180.0;
 }
 
+std::map<int64_t, OsmTags> platform_outlines(const json& elements, bool with_trams) {
+  std::map<int64_t, OsmTags> out;
+  for (const json& element : elements) {
+    if (element.value("type", "") != "relation" || !element.contains("members")) continue;
+    const OsmTags tags = tags_in(element, "tags");
+    if (!is_platform_relation(tags, with_trams)) continue;
+    for (const json& member : element.at("members")) {
+      if (member.value("type", "") == "way" && is_outline(member.value("role", "")))
+        out.emplace(member.at("ref").get<int64_t>(), tags);
+    }
+  }
+  return out;
+}
+
 void read_overpass(const json& elements, bool with_trams, OsmData& out) {
+  const std::map<int64_t, OsmTags> outlines = platform_outlines(elements, with_trams);
   for (const json& element : elements) {
     const std::string type = element.value("type", "");
     if (type == "node") {
@@ -33,10 +48,14 @@ void read_overpass(const json& elements, bool with_trams, OsmData& out) {
       if (plausible(place)) out.nodes[element.at("id").get<int64_t>()] = {place, tags_in(element, "tags")};
     } else if (type == "way") {
       OsmTags tags = tags_in(element, "tags");
-      std::vector<OsmWay>* const ways = ways_for(out, tags, with_trams);
+      const auto id = element.at("id").get<int64_t>();
+      std::vector<OsmWay>* ways = ways_for(out, tags, with_trams);
+      if (const auto outline = outlines.find(id); ways == nullptr && outline != outlines.end()) {
+        ways = &out.platforms;
+        tags = outline->second;
+      }
       if (ways == nullptr || !element.contains("nodes")) continue;
-      ways->push_back(
-          {element.at("id").get<int64_t>(), element.at("nodes").get<std::vector<int64_t>>(), std::move(tags)});
+      ways->push_back({id, element.at("nodes").get<std::vector<int64_t>>(), std::move(tags)});
     }
   }
 }
@@ -75,9 +94,9 @@ void add_line(const json& coordinates, const OsmTags& tags, std::vector<OsmWay>&
 }
 
 /// Keys that say what a line is; with one of them it is no track, unless it is a train's route.
-constexpr std::array kOtherThings{"aerialway", "aeroway", "amenity", "barrier",  "boundary", "building",
-                                  "highway",   "landuse", "leisure", "man_made", "natural",  "pipeline",
-                                  "power",     "route",   "telecom", "waterway"};
+constexpr std::array kOtherThings{"aerialway", "aeroway",          "amenity", "barrier",  "boundary", "building",
+                                  "highway",   "landuse",          "leisure", "man_made", "natural",  "pipeline",
+                                  "power",     "public_transport", "route",   "telecom",  "waterway"};
 
 /// The first of these keys; empty where the line says nothing of the kind.
 std::string other_thing(const OsmTags& tags) {
@@ -102,6 +121,12 @@ void read_features(const json& features, bool with_trams, OsmData& out) {
     if (type == "Point") {
       const GeoPoint place = place_in(coordinates);
       if (plausible(place)) out.nodes[identity(place)] = {place, tags};
+      continue;
+    }
+    if (type == "Polygon" || type == "MultiPolygon") {
+      if (!is_platform(tags, with_trams)) continue;
+      const json parts = type == "Polygon" ? json::array({coordinates}) : coordinates;
+      for (const json& rings : parts) add_line(rings.at(0), tags, out.platforms, out);  // the first is the outline
       continue;
     }
     // A line that does not say what it is, or is a train's route, is taken as track.

@@ -8,6 +8,7 @@
 #include "track/import/biarc.hpp"
 #include "track/import/osm_marks.hpp"
 #include "track/import/osm_overbridges.hpp"
+#include "track/import/osm_platforms.hpp"
 #include "track/import/smooth.hpp"
 
 namespace railfix::track {
@@ -53,6 +54,7 @@ class Builder {
     gather_ends();
     for (const auto& [node, ends] : ends_) agree_on_tangents(ends);
     for (OsmChain& chain : chains_) add_edge(chain);
+    add_platforms();
     return std::move(out_);
   }
 
@@ -266,6 +268,24 @@ class Builder {
       out_.figures.max_point_distance_m = std::max(out_.figures.max_point_distance_m, distance);
     }
     out_.draft.edges.push_back(std::move(edge));
+  }
+
+  void add_platforms() {
+    const size_t beside_nothing = OsmPlatforms(data_, projection_, chains_, out_.draft).add();
+    if (beside_nothing > 0) {
+      out_.problems.push_back(std::to_string(beside_nothing) + " of " + std::to_string(data_.platforms.size()) +
+                              " platforms lie beside no track; left out");
+    }
+    const auto stops = std::count_if(data_.nodes.begin(), data_.nodes.end(), [](const auto& entry) {
+      const OsmTags& tags = entry.second.tags;
+      return value_of(tags, "railway") == "stop" || value_of(tags, "public_transport") == "stop_position";
+    });
+    // Where trains stop, there is something to see, but the point on the track does not tell from where to where.
+    if (stops > 0 && data_.platforms.empty()) {
+      out_.problems.push_back("the data hold " + std::to_string(stops) +
+                              " stop positions and no platform; an extract with railway=platform and platform_edge "
+                              "would have their ends as references");
+    }
   }
 
   void tell_left_out(const std::string& track, const ClothoidFit& fit) {

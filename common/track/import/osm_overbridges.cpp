@@ -5,32 +5,14 @@
 #include <cmath>
 #include <set>
 
+#include "track/import/osm_cells.hpp"
+
 namespace railfix::track {
 namespace {
 
-constexpr double kCellM = 100;
-constexpr double kLongestSegmentM = 5000;  // longer ones are mistakes
-constexpr double kUsualWidthM = 12;        // of a road with its walls
-constexpr double kOneBridgeM = 15;         // a road and its footway lie on one
-constexpr double kLeastSine = 0.2;         // flatter crossings are no narrower than this makes them
-
-int64_t cell_number(double value_m) {
-  return static_cast<int64_t>(std::floor(value_m / kCellM));
-}
-
-/// Calls `use` with every cell that the box around a segment touches.
-template <class Use>
-void for_cells(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Use& use) {
-  const Eigen::Vector2d low = a.cwiseMin(b);
-  const Eigen::Vector2d high = a.cwiseMax(b);
-  for (int64_t x = cell_number(low.x()); x <= cell_number(high.x()); ++x) {
-    for (int64_t y = cell_number(low.y()); y <= cell_number(high.y()); ++y) use(x * 4'000'037 + y);
-  }
-}
-
-double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-  return a.x() * b.y() - a.y() * b.x();
-}
+constexpr double kUsualWidthM = 12;  // of a road with its walls
+constexpr double kOneBridgeM = 15;   // a road and its footway lie on one
+constexpr double kLeastSine = 0.2;   // flatter crossings are no narrower than this makes them
 
 }  // namespace
 
@@ -59,7 +41,7 @@ void OsmOverbridges::take(const OsmWay& way, const OsmData& data, const Projecti
     const auto a = place(way.nodes[i - 1]);
     const auto b = place(way.nodes[i]);
     if (!a || !b || !((*a - *b).norm() < kLongestSegmentM)) continue;
-    for_cells(*a, *b, [&](int64_t cell) { in_cell_[cell].push_back(segments_.size()); });
+    for_cells(a->cwiseMin(*b), a->cwiseMax(*b), [&](int64_t cell) { in_cell_[cell].push_back(segments_.size()); });
     segments_.push_back({*a, *b, way.nodes[i - 1], way.nodes[i], layer_of(way.tags), &way.tags});
   }
 }
@@ -71,10 +53,11 @@ std::vector<OsmOverbridges::Crossing> OsmOverbridges::crossings(const OsmData& d
     const OsmTags& tags = data.ways[chain.ways[i]].tags;
     if (is_set(tags, "tunnel")) continue;  // nobody sees from in there what crosses above
     const Eigen::Vector2d& a = chain.points[i];
-    const Eigen::Vector2d along = chain.points[i + 1] - a;
+    const Eigen::Vector2d& b = chain.points[i + 1];
+    const Eigen::Vector2d along = b - a;
     if (!(along.norm() < kLongestSegmentM)) continue;
     std::set<size_t> near;
-    for_cells(a, chain.points[i + 1], [&](int64_t cell) {
+    for_cells(a.cwiseMin(b), a.cwiseMax(b), [&](int64_t cell) {
       const auto in = in_cell_.find(cell);
       if (in != in_cell_.end()) near.insert(in->second.begin(), in->second.end());
     });

@@ -2,6 +2,7 @@
 #include <array>
 #include <osmium/io/any_input.hpp>
 #include <osmium/osm/node.hpp>
+#include <osmium/osm/relation.hpp>
 #include <osmium/osm/way.hpp>
 #include <osmium/visitor.hpp>
 #include <unordered_set>
@@ -17,15 +18,37 @@ OsmTags tags_of(const osmium::OSMObject& object) {
   return tags;
 }
 
-/// Ways first, then only the nodes they use: a country fits into memory.
-OsmData read_two_passes(const std::string& file, bool with_trams) {
+/// The outlines of platforms with holes: their ways say nothing themselves.
+std::unordered_map<int64_t, OsmTags> platform_outlines(const std::string& file, bool with_trams) {
+  std::unordered_map<int64_t, OsmTags> out;
+  osmium::io::Reader relations(file, osmium::osm_entity_bits::relation);
+  while (const osmium::memory::Buffer buffer = relations.read()) {
+    for (const osmium::Relation& relation : buffer.select<osmium::Relation>()) {
+      const OsmTags tags = tags_of(relation);
+      if (!is_platform_relation(tags, with_trams)) continue;
+      for (const osmium::RelationMember& member : relation.members()) {
+        if (member.type() == osmium::item_type::way && is_outline(member.role())) out.emplace(member.ref(), tags);
+      }
+    }
+  }
+  relations.close();
+  return out;
+}
+
+/// What the ways are comes before the nodes, and of these only what they use: a country fits into memory.
+OsmData read_passes(const std::string& file, bool with_trams) {
   OsmData out;
+  const std::unordered_map<int64_t, OsmTags> outlines = platform_outlines(file, with_trams);
   std::unordered_set<int64_t> wanted;
   osmium::io::Reader ways(file, osmium::osm_entity_bits::way);
   while (const osmium::memory::Buffer buffer = ways.read()) {
     for (const osmium::Way& way : buffer.select<osmium::Way>()) {
       OsmTags tags = tags_of(way);
-      std::vector<OsmWay>* const ways_like_it = ways_for(out, tags, with_trams);
+      std::vector<OsmWay>* ways_like_it = ways_for(out, tags, with_trams);
+      if (const auto outline = outlines.find(way.id()); ways_like_it == nullptr && outline != outlines.end()) {
+        ways_like_it = &out.platforms;
+        tags = outline->second;
+      }
       if (ways_like_it == nullptr) continue;
       OsmWay& taken = ways_like_it->emplace_back(OsmWay{way.id(), {}, std::move(tags)});
       for (const osmium::NodeRef& node : way.nodes()) taken.nodes.push_back(node.ref());
@@ -74,14 +97,32 @@ bool leads_over(const OsmTags& tags, bool with_trams) {
   return stands("highway") || stands("railway") || stands("waterway");
 }
 
+bool is_platform(const OsmTags& tags, bool with_trams) {
+  if (is_set(tags, "disused") || is_set(tags, "abandoned")) return false;
+  const bool for_trains = is_set(tags, "train") || is_set(tags, "light_rail") || is_set(tags, "subway");
+  const bool for_trams = is_set(tags, "tram");
+  const std::string kind = value_of(tags, "railway");
+  if (kind == "platform" || kind == "platform_edge") return for_trains || with_trams || !for_trams;
+  return value_of(tags, "public_transport") == "platform" && (for_trains || (with_trams && for_trams));
+}
+
+bool is_platform_relation(const OsmTags& tags, bool with_trams) {
+  return value_of(tags, "type") == "multipolygon" && is_platform(tags, with_trams);
+}
+
+bool is_outline(const std::string& role) {
+  return role.empty() || role == "outer";
+}
+
 std::vector<OsmWay>* ways_for(OsmData& data, const OsmTags& tags, bool with_trams) {
   if (is_track(tags, with_trams)) return &data.ways;
+  if (is_platform(tags, with_trams)) return &data.platforms;
   return leads_over(tags, with_trams) ? &data.bridges : nullptr;
 }
 
 core::Result<OsmData> read_osm(const std::filesystem::path& file, bool with_trams) {
   try {
-    return read_two_passes(file.string(), with_trams);
+    return read_passes(file.string(), with_trams);
   } catch (const std::exception& reason) {
     return core::Error{"cannot read " + file.string() + " as OpenStreetMap data: " + reason.what()};
   }

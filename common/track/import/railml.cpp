@@ -16,6 +16,11 @@ std::string railml_name(const pugi::xml_node& node) {
   return named.empty() ? std::string(node.attribute("id").value()) : named;
 }
 
+double platform_lateral_m(const std::string& side) {
+  if (side != "left" && side != "right") return 0;
+  return side == "left" ? kPlatformEdgeM : -kPlatformEdgeM;
+}
+
 std::set<std::string> special_speed_profiles(const XmlSource& source) {
   std::set<std::string> out;
   for (const pugi::xml_node& profile : descendants(source.root(), "speedProfile")) {

@@ -167,7 +167,7 @@ class Reader {
     for (const pugi::xml_node& of : elements.child("levelCrossings").children("levelCrossing"))
       add(LandmarkKind::level_crossing, pos(of) - origin_m_, 0, of);
     for (const pugi::xml_node& of : elements.child("platformEdges").children("platformEdge")) {
-      const double lateral = std::string(of.attribute("side").value()) == "left" ? 1.7 : -1.7;
+      const double lateral = platform_lateral_m(of.attribute("side").value());
       add(LandmarkKind::platform, pos(of) - origin_m_, lateral, of);
       add(LandmarkKind::platform, pos(of) - origin_m_ + length(of), lateral, of);
     }

@@ -244,12 +244,12 @@ class Reader {
         add(LandmarkKind::level_crossing, place, 0.5 * (place.from_m + place.to_m), 0, of);
     }
     for (const pugi::xml_node& of : descendants(source_.root(), "platformEdge")) {
-      const bool is_left = !of.find_node([](const pugi::xml_node& node) {
-                                return std::string(node.attribute("lateralSide").value()) == "left";
-                              }).empty();
+      const pugi::xml_node sided =
+          of.find_node([](const pugi::xml_node& node) { return node.attribute("lateralSide"); });
+      const double lateral_m = platform_lateral_m(sided.attribute("lateralSide").value());
       for (const Place& place : places_of(of)) {
-        add(LandmarkKind::platform, place, place.from_m, is_left ? 1.7 : -1.7, of);
-        add(LandmarkKind::platform, place, place.to_m, is_left ? 1.7 : -1.7, of);
+        add(LandmarkKind::platform, place, place.from_m, lateral_m, of);
+        add(LandmarkKind::platform, place, place.to_m, lateral_m, of);
       }
     }
     for (const pugi::xml_node& of : descendants(source_.root(), "signalIS")) {

@@ -17,6 +17,9 @@ constexpr double kRailmlSigmaM = 1.0;
 /// Name of an element for a human: its name, else its code, else its id.
 std::string railml_name(const pugi::xml_node& node);
 
+/// Of a platform edge on the "left" or "right", else 0: the file does not say on which side.
+double platform_lateral_m(const std::string& side);
+
 /// Speed profiles for some trains only (tilting, temporary, ...), by id: what is not the basic profile, or, where the
 /// file marks none as that, what lowers it.
 std::set<std::string> special_speed_profiles(const XmlSource& source);

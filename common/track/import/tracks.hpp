@@ -8,6 +8,9 @@
 
 namespace railfix::track {
 
+/// From the track's middle to the edge of a platform, where the source does not say.
+constexpr double kPlatformEdgeM = 1.7;
+
 /// A landmark on one track, not yet numbered.
 struct TrackMark {
   LandmarkKind kind = LandmarkKind::unknown;

@@ -314,6 +314,7 @@ TEST_F(PlanImport, Railml3KeepsWhatThePlanSays) {
   EXPECT_THAT(marks_of(map, {Kind::bridge, Kind::underbridge, Kind::platform}),
               testing::ElementsAre("bridge o2 at 25.0 on 3", "underbridge u1 at 50.0 on 3", "platform p1 at 100.0 on 3",
                                    "platform p1 at 180.0 on 3"));
+  EXPECT_EQ(map.landmarks_on(3).back()->lateral_m, 0);  // nobody says on which side the platform lies
   ASSERT_EQ(map.balise_groups.size(), 1U);
   EXPECT_EQ(map.balise_groups[0].nid_lrbg(), 97U << 14U | 77U);
   EXPECT_EQ(map.balise_groups[0].balises.size(), 2U);
@@ -390,6 +391,29 @@ TEST_F(PlanImport, TheExamplesOfBothGenerationsAgree) {
     std::filesystem::remove(files[0]);
     std::filesystem::remove(files[1]);
   }
+}
+
+// A side that is not said is not made up: half of those made up would be wrong.
+TEST_F(PlanImport, PlatformsStandWhereTheFileSaysOrOnNeitherSide) {
+  const auto lateral_m = [&](std::string text, const std::string& from, const std::string& to) {
+    text.replace(text.find(from), from.size(), to);
+    const Map map = core::value_or_throw(build_map({write("a.xml", text)}, {})).map;
+    const auto found = std::find_if(map.landmarks.begin(), map.landmarks.end(),
+                                    [](const Landmark& mark) { return mark.kind == LandmarkKind::platform; });
+    return found == map.landmarks.end() ? NAN : found->lateral_m;
+  };
+  const std::string of_2 = " side=\"left\"";
+  EXPECT_EQ(lateral_m(kRailml2, of_2, of_2), kPlatformEdgeM);
+  EXPECT_EQ(lateral_m(kRailml2, of_2, " side=\"right\""), -kPlatformEdgeM);
+  EXPECT_EQ(lateral_m(kRailml2, of_2, ""), 0);
+  const std::string of_3 = R"(<associatedNetElement netElementRef="n3" posBegin="100" posEnd="180"/>)";
+  const auto with_side = [&](const std::string& side) {
+    return of_3.substr(0, of_3.size() - 2) + "><linearCoordinateBegin lateralSide=\"" + side +
+           "\"/></associatedNetElement>";
+  };
+  EXPECT_EQ(lateral_m(kRailml3, of_3, with_side("left")), kPlatformEdgeM);
+  EXPECT_EQ(lateral_m(kRailml3, of_3, with_side("right")), -kPlatformEdgeM);
+  EXPECT_EQ(lateral_m(kRailml3, of_3, with_side("both")), 0);
 }
 
 TEST_F(PlanImport, ErjuWithoutCoordinatesIsADrawing) {
