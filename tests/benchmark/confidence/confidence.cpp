@@ -31,7 +31,6 @@ struct Arguments {
   double saved_wrong = -1;
   bool learnt = false;
   bool list = false;
-  bool sources = false;
 };
 
 std::vector<FaultName> faults_named(const std::string& text) {
@@ -106,31 +105,6 @@ void print(const CampaignResult& result) {
                 100 * wide[i].wider_share);
 }
 
-// What each source is worth: the same runs without faults, with less and less.
-void compare_sources(const CampaignPlan& plan) {
-  std::printf("%-32s %9s %9s %9s %14s %9s\n", "sources", "p50 (m)", "p95 (m)", "max (m)", "interval (m)", "outside");
-  for (const auto& [name, without] :
-       std::vector<std::pair<std::string, std::string>>{{"all", ""},
-                                                        {"no GNSS", "gnss"},
-                                                        {"no landmarks", "landmarks"},
-                                                        {"camera, landmarks", "wheel,imu,gnss"},
-                                                        {"wheel, IMU, landmarks", "camera,gnss"},
-                                                        {"camera, wheel, IMU", "gnss,landmarks"},
-                                                        {"wheel, IMU", "camera,gnss,landmarks"},
-                                                        {"camera", "wheel,imu,gnss,landmarks"},
-                                                        {"wheel", "camera,imu,gnss,landmarks"},
-                                                        {"GNSS, IMU", "camera,wheel,landmarks"},
-                                                        {"landmarks, IMU", "camera,wheel,gnss"}}) {
-    CampaignPlan one = plan;
-    one.faults.clear();
-    leave_out(one.simulation, without);
-    auto sum = run_campaign(one).sum;
-    std::printf("%-32s %9.2f %9.2f %9.2f %14.1f %9zu\n", name.c_str(), quantile(sum.errors_m, 0.5),
-                quantile(sum.errors_m, 0.95), quantile(sum.errors_m, 1),
-                sum.width_sum_m / static_cast<double>(sum.states), sum.outside);
-  }
-}
-
 // One run, a line a second.
 void trace(const CampaignPlan& plan, uint64_t number) {
   const auto simulation = simulation_of(plan, number);
@@ -154,6 +128,13 @@ void trace(const CampaignPlan& plan, uint64_t number) {
         e.wheel_scale, e.position.edge, e.track_probability, simulation.on_way(e.position) ? "" : " OTHER LEG",
         outside ? "OUTSIDE " : "", e.reason.c_str());
   });
+}
+
+void write_stanford(const std::string& file, const StanfordCounts& counts, const std::string& title) {
+  if (file.empty()) return;
+  std::ofstream out(file);
+  out << counts.svg(title);
+  if (!out) throw core::BadInput("--stanford " + file + ": cannot be written");
 }
 
 int run(int argc, char** argv) {
@@ -180,8 +161,8 @@ int run(int argc, char** argv) {
   app.add_option("--start", a.start, "EDGE:OFFSET[:+|-] on the map");
   app.add_option("--stanford", a.stanford, "Write the Stanford diagram (SVG)");
   app.add_option("--run", a.run, "Print one run of the campaign second by second");
-  app.add_flag("--sources", a.sources, "Without faults: a table of what each source is worth");
-  app.add_option("--position", a.position, "Position with frogs and portals as references: so many runs of 26 km");
+  app.add_option("--position", a.position,
+                 "What each source is worth, frogs and portals as references: a table of so many runs of 33 km");
   app.add_option("--row", a.row, "... with this set of sensors alone, as the table names it");
   app.add_flag("--learnt", a.learnt, "... with the scales that an earlier trip of the same train has taught");
   app.add_option(
@@ -206,11 +187,11 @@ int run(int argc, char** argv) {
     return 0;
   }
   if (a.position > 0) {
-    print_positions({a.plan.seed, a.position, a.row, a.learnt});
-    return 0;
-  }
-  if (a.sources) {
-    compare_sources(a.plan);
+    const auto stanford = print_positions({a.plan.seed, a.position, a.row, a.learnt});
+    char title[100];
+    std::snprintf(title, sizeof title, "what each source is worth: %d runs, seed %llu", a.position,
+                  static_cast<unsigned long long>(a.plan.seed));
+    write_stanford(a.stanford, stanford, title);
     return 0;
   }
   double next_km = 0;
@@ -221,14 +202,10 @@ int run(int argc, char** argv) {
                  sum.states);
   });
   print(result);
-  if (!a.stanford.empty()) {
-    std::ofstream out(a.stanford);
-    char title[100];
-    std::snprintf(title, sizeof title, "%.0f km, %zu runs, seed %llu, faults: ", result.sum.way_m / 1000,
-                  result.run_count, static_cast<unsigned long long>(a.plan.seed));
-    out << result.stanford.svg(title + a.fault);
-    if (!out) throw core::BadInput("--stanford " + a.stanford + ": cannot be written");
-  }
+  char title[100];
+  std::snprintf(title, sizeof title, "%.0f km, %zu runs, seed %llu, faults: ", result.sum.way_m / 1000,
+                result.run_count, static_cast<unsigned long long>(a.plan.seed));
+  write_stanford(a.stanford, result.stanford, title + a.fault);
   std::printf("%s: %zu of %zu states outside their interval, %zu wider than allowed without saying so\n",
               result.bad.empty() ? "PASSED" : "FAILED", result.sum.outside, result.sum.states, result.sum.wider_unsaid);
   return result.bad.empty() ? 0 : 1;

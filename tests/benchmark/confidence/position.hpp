@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <string>
 
+#include "stanford.hpp"
+
 namespace railfix::train {
 
 struct PositionPlan {
@@ -14,7 +16,8 @@ struct PositionPlan {
 };
 
 /// Runs the simulator's long line (26 km, frogs of ten stations, tunnel portals) so often for each set of sensors and
-/// prints a table. Camera and sightings are as good as they were measured on drawn pictures.
-void print_positions(const PositionPlan& plan);
+/// prints the table of docs/sources.md (Markdown). Camera and sightings are as good as they were measured on drawn
+/// pictures. Gives the Stanford diagram of all rows.
+StanfordCounts print_positions(const PositionPlan& plan);
 
 }  // namespace railfix::train

@@ -18,6 +18,7 @@ class StanfordCounts {
  private:
   static constexpr int kCells = 100;  // 20 a decade, from 1 cm to 1 km
   static int cell_of(double metres);
+  [[nodiscard]] std::string cells_of(int shade, bool wrong) const;
   std::array<uint64_t, kCells * kCells> cells_{};
   uint64_t samples_ = 0;
   uint64_t wrong_ = 0;

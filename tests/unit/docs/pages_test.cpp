@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "../../benchmark/confidence/sensor_sets.hpp"
+
 namespace railfix {
 namespace {
 
@@ -118,6 +120,15 @@ TEST(Documentation, LinksLeadSomewhere) {
     for (std::sregex_iterator link(text.begin(), text.end(), kLink), end; link != end; ++link) {
       EXPECT_TRUE(fs::exists(page.parent_path() / link->str(1))) << page << " links to " << link->str(1);
     }
+  }
+}
+
+// The table of what each source is worth has a row for every set that the program compares.
+TEST(SourcesPage, HasARowForEverySetOfSensors) {
+  std::ifstream stream(kRoot / "docs" / "sources.md");
+  const std::string page{std::istreambuf_iterator<char>(stream), {}};
+  for (const auto& set : train::kSensorSets) {
+    EXPECT_NE(page.find("| " + std::string(set.name) + " |"), std::string::npos) << set.name;
   }
 }
 
