@@ -19,6 +19,29 @@ std::string identity_of(const std::string& service) {
   return service.starts_with("railfix-") ? "tool" : service;
 }
 
+/// What `read` makes of a PEM file; nullptr when the file cannot be read.
+template <class Read>
+auto read_pem(const std::filesystem::path& path, Read read) -> decltype(read(nullptr)) {
+  FILE* file = std::fopen(path.c_str(), "r");
+  if (file == nullptr) return nullptr;
+  auto* found = read(file);
+  std::fclose(file);
+  return found;
+}
+
+using Certificate = std::unique_ptr<X509, void (*)(X509*)>;
+using PrivateKey = std::unique_ptr<EVP_PKEY, void (*)(EVP_PKEY*)>;
+
+Certificate read_certificate(const std::filesystem::path& path) {
+  return {read_pem(path, [](FILE* file) { return PEM_read_X509(file, nullptr, nullptr, nullptr); }), X509_free};
+}
+
+PrivateKey read_key(const std::filesystem::path& path) {
+  constexpr auto kNoPassword = [](char*, int, int, void*) { return -1; };
+  return {read_pem(path, [&](FILE* file) { return PEM_read_PrivateKey(file, nullptr, kNoPassword, nullptr); }),
+          EVP_PKEY_free};
+}
+
 }  // namespace
 
 core::Result<std::vector<std::pair<std::string, std::string>>> security_properties(const std::filesystem::path& folder,
@@ -51,16 +74,23 @@ std::filesystem::path certificate_of(const std::filesystem::path& folder, const 
 }
 
 core::Result<int64_t> certificate_ends_ns(const std::filesystem::path& certificate) {
-  const std::unique_ptr<FILE, int (*)(FILE*)> file(std::fopen(certificate.c_str(), "r"),
-                                                   [](FILE* f) { return f != nullptr ? std::fclose(f) : 0; });
-  if (!file) return core::Error{certificate.string() + " is missing; make it with railfix train keys"};
-  const std::unique_ptr<X509, void (*)(X509*)> read(PEM_read_X509(file.get(), nullptr, nullptr, nullptr), X509_free);
+  if (access(certificate.c_str(), R_OK) != 0)
+    return core::Error{certificate.string() + " is missing; make it with railfix train keys"};
+  const auto read = read_certificate(certificate);
   if (!read)
     return core::Error{certificate.string() + " is not a certificate; make it again with railfix train keys --renew"};
   std::tm ends{};
   if (ASN1_TIME_to_tm(X509_get0_notAfter(read.get()), &ends) != 1)
     return core::Error{certificate.string() + " has no readable end of validity"};
   return timegm(&ends) * core::kNsPerSecond;
+}
+
+core::Status key_fits(const std::filesystem::path& key, const std::filesystem::path& certificate) {
+  const auto own = read_key(key);
+  if (!own) return core::Error{key.string() + " is not a private key in PEM without password"};
+  const auto of = read_certificate(certificate);
+  if (of && X509_check_private_key(of.get(), own.get()) == 1) return {};
+  return core::Error{key.string() + " is not the private key of " + certificate.string()};
 }
 
 int64_t days_until(int64_t ends_ns) {

@@ -28,6 +28,8 @@ core::Result<int64_t> certificate_ends_ns(const std::filesystem::path& certifica
 /// Days until then, negative when it has run out.
 int64_t days_until(int64_t ends_ns);
 core::Result<int64_t> days_left(const std::filesystem::path& certificate);
+/// Error: `key` is no private key, asks for a password, or belongs to another certificate than this one.
+core::Status key_fits(const std::filesystem::path& key, const std::filesystem::path& certificate);
 /// "runs out in 5 days", "ran out 2 days ago".
 std::string end_text(int64_t days_left);
 

@@ -281,6 +281,42 @@ TEST_F(TrainFolder, APageThatNobodyCanControlIsTold) {
   EXPECT_FALSE(told("{ address: 127.0.0.1 }")) << "who sits there may";
 }
 
+TEST_F(TrainFolder, APrivateKeyOfAnotherCertificateIsTold) {
+  std::ofstream(folder_ / "line.map") << "map";
+  const auto secured = manifest(kTrain, "run_as: programs", "security: true").value();
+  ASSERT_TRUE(make_keys(secured, {}).ok());
+  const auto security = folder_ / "security/cab";
+  fs::copy_file(security / "odometry.key.pem", security / "fusion.key.pem", fs::copy_options::overwrite_existing);
+  EXPECT_THAT(findings("run_as: programs", "security: true"),
+              ElementsAre(HasSubstr("security/cab/fusion.key.pem is not the private key of " +
+                                    (security / "fusion.cert.pem").string() + "; railfix train keys --renew")));
+
+  // Those of the broker and of the page, as the manifest names them and as a host runs with them.
+  const auto tool = [&](const char* what) { return (security / (std::string("tool.") + what)).string(); };
+  const auto link = [&](const std::string& key) {
+    return "ground_link: { broker: \"g:8883\", store: s, certificate_file: " + tool("cert.pem") + ", key_file: " + key +
+           " }\n";
+  };
+  const auto told = [&](const std::string& key) {
+    const auto train = manifest(std::string(kTrain) + "    " + link(key)).value();
+    return check_certificates(train, *train.host("coach"));
+  };
+  const auto is = [](const std::string& text) {
+    return ElementsAre(AllOf(Field(&Finding::error, true), Field(&Finding::text, HasSubstr(text))));
+  };
+  EXPECT_THAT(told(tool("key.pem")), IsEmpty());
+  const auto other = (security / "odometry.key.pem").string();
+  EXPECT_THAT(told(other), is("settings.tpr_publisher.ground_link.key_file: " + other + " is not the private key of " +
+                              tool("cert.pem") + "; put there the one that the certificate was made with"));
+  EXPECT_THAT(told(tool("cert.pem")), is("tool.cert.pem is not a private key in PEM without password"));
+  const HostFolder installed(folder_ / "host");
+  HostPlan plan{"re460-042", "coach", 1, 0, false, {{"tpr_publisher", "1.2.0", 1, false, {"x"}, {}, ""}}};
+  ASSERT_TRUE(installed.write(plan).ok());
+  fs::create_directories(installed.generation(1));
+  std::ofstream(installed.generation(1) / "config.yaml") << "tpr_publisher:\n  " << link(other);
+  EXPECT_THAT(check_installed_certificates(installed), is(other + " is not the private key of"));
+}
+
 TEST_F(TrainFolder, TheWordForControlStandsInNoConfiguration) {
   std::ofstream(folder_ / "line.map") << "map";
   std::ofstream(folder_ / "word") << "secret";
@@ -294,6 +330,42 @@ TEST_F(TrainFolder, TheWordForControlStandsInNoConfiguration) {
 }
 
 TEST_F(TrainFolder, AComputerThatIsNotSetUpIsTold) {
+TEST_F(TrainFolder, APrivateKeyOfAnotherCertificateIsTold) {
+  std::ofstream(folder_ / "line.map") << "map";
+  const auto secured = manifest(kTrain, "run_as: programs", "security: true").value();
+  ASSERT_TRUE(make_keys(secured, {}).ok());
+  const auto security = folder_ / "security/cab";
+  fs::copy_file(security / "odometry.key.pem", security / "fusion.key.pem", fs::copy_options::overwrite_existing);
+  EXPECT_THAT(findings("run_as: programs", "security: true"),
+              ElementsAre(HasSubstr("security/cab/fusion.key.pem is not the private key of " +
+                                    (security / "fusion.cert.pem").string() + "; railfix train keys --renew")));
+
+  // Those of the broker and of the page, as the manifest names them and as a host runs with them.
+  const auto tool = [&](const char* what) { return (security / (std::string("tool.") + what)).string(); };
+  const auto settings = [&](const std::string& key) {
+    return "tpr_publisher: { ground_link: { broker: g:8883, store: s, certificate_file: " + tool("cert.pem") +
+           ", key_file: " + key + " } }\n";
+  };
+  const auto told = [&](const std::string& key) {
+    const auto train = manifest(std::string(kTrain) + "  " + settings(key)).value();
+    return check_certificates(train, *train.host("coach"));
+  };
+  const auto is = [](const std::string& text) {
+    return ElementsAre(AllOf(Field(&Finding::error, true), Field(&Finding::text, HasSubstr(text))));
+  };
+  EXPECT_THAT(told(tool("key.pem")), IsEmpty());
+  const auto other = (security / "odometry.key.pem").string();
+  EXPECT_THAT(told(other), is("settings.tpr_publisher.ground_link.key_file: " + other + " is not the private key of " +
+                              tool("cert.pem") + "; put there the one that the certificate was made with"));
+  EXPECT_THAT(told(tool("cert.pem")), is("tool.cert.pem is not a private key in PEM without password"));
+  const HostFolder installed(folder_ / "host");
+  HostPlan plan{"re460-042", "coach", 1, 0, false, {{"tpr_publisher", "1.2.0", 1, false, {"x"}, {}, ""}}};
+  ASSERT_TRUE(installed.write(plan).ok());
+  fs::create_directories(installed.generation(1));
+  std::ofstream(installed.generation(1) / "config.yaml") << settings(other);
+  EXPECT_THAT(check_installed_certificates(installed), is(other + " is not the private key of"));
+}
+
   const auto conf = YAML::Load(
       "{net.core.rmem_max: 212992, net.core.wmem_max: 212992, net.ipv4.ipfrag_time: 30, "
       "net.ipv4.ipfrag_high_thresh: 4194304}");

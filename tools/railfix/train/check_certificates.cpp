@@ -1,4 +1,6 @@
 // Certificates, keys and permissions of a train: what is missing, runs out, or was made for another manifest.
+#include <unistd.h>
+
 #include "core/joined.hpp"
 #include "messaging/security.hpp"
 #include "train/findings.hpp"
@@ -13,6 +15,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kRenewAuthority = "; exchange the authority, beginning with railfix train keys --next-authority";
 constexpr const char* kRenewElsewhere = "; get a new one, put it there, then railfix train upgrade on each host";
+constexpr const char* kOtherKey = "; put there the one that the certificate was made with";
 constexpr const char* kRenew = "; railfix train keys --renew, then railfix train upgrade on each host";
 
 int64_t warning_days(const YAML::Node& settings) {
@@ -33,6 +36,13 @@ void check_end(const fs::path& certificate, int64_t soon_days, const char* remed
   }
 }
 
+void check_key(const fs::path& key, const fs::path& certificate, const std::string& setting, const char* remedy,
+               Findings& findings) {
+  if (!messaging::days_left(certificate).ok()) return;  // told already
+  if (const auto fits = messaging::key_fits(key, certificate); !fits.ok())
+    add_once(findings, {true, setting + fits.error().message + remedy});
+}
+
 /// Everything that DDS asks for when this service joins. False when a file is missing.
 bool check_identity(const fs::path& folder, const std::string& service, int64_t soon_days, Findings& findings) {
   if (const auto files = messaging::security_properties(folder, service); !files.ok()) {
@@ -40,7 +50,9 @@ bool check_identity(const fs::path& folder, const std::string& service, int64_t 
     return false;
   }
   check_end(folder / "ca.pem", soon_days, kRenewAuthority, findings);
-  check_end(messaging::certificate_of(folder, service), soon_days, kRenew, findings);
+  const auto certificate = messaging::certificate_of(folder, service);
+  check_end(certificate, soon_days, kRenew, findings);
+  check_key(folder / (service + ".key.pem"), certificate, "", kRenew, findings);
   return true;
 }
 
@@ -58,6 +70,23 @@ void check_named_certificates(const YAML::Node& settings, const fs::path& folder
                {true, "settings." + service + "." + named.key + ": " + file.string() + " is not a certificate in PEM"});
     }
   }
+}
+
+/// Their private keys, as far as this user may read them.
+void check_named_keys(const YAML::Node& settings, const fs::path& folder, const std::string& service,
+                      Findings& findings) {
+  for (const auto& named : key_files(settings)) {
+    const auto file = folder / named.key.file;
+    if (named.key.service != service || access(file.c_str(), R_OK) != 0) continue;
+    check_key(file, folder / named.certificate, "settings." + service + "." + named.key.key + ": ", kOtherKey,
+              findings);
+  }
+}
+
+void check_named_files(const YAML::Node& settings, const fs::path& folder, const std::string& service,
+                       Findings& findings) {
+  check_named_certificates(settings, folder, service, findings);
+  check_named_keys(settings, folder, service, findings);
 }
 
 /// Permissions that were made before the train got another domain or name let nobody in; those of a release whose
@@ -102,7 +131,7 @@ std::vector<Finding> check_certificates(const Manifest& manifest, const TrainHos
   Findings findings;
   if (manifest.security) check_keys(manifest, host, findings);
   for (const auto& service : services_on(manifest, host.name))
-    check_named_certificates(manifest.settings, manifest.folder, service.name, findings);
+    check_named_files(manifest.settings, manifest.folder, service.name, findings);
   return findings;
 }
 
@@ -115,7 +144,7 @@ std::vector<Finding> check_installed_certificates(const HostFolder& folder) {
     const auto settings = installed_settings(generation);
     if (fs::exists(generation / "security"))
       check_identity(generation / "security", service.name, warning_days(settings), findings);
-    check_named_certificates(settings, generation, service.name, findings);
+    check_named_files(settings, generation, service.name, findings);
   }
   return findings;
 }

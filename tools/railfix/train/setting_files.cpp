@@ -8,14 +8,15 @@ struct Place {
   const char* group;  // empty = the section itself
   const char* key;
   bool is_certificate = false;
+  const char* key_of_certificate = "";  // it is the private key of the certificate that this key names
 };
 constexpr Place kPlaces[] = {{"tpr_publisher", "ground_link", "ca_file", true},
                              {"tpr_publisher", "ground_link", "certificate_file", true},
-                             {"tpr_publisher", "ground_link", "key_file"},
+                             {"tpr_publisher", "ground_link", "key_file", false, "certificate_file"},
                              {"tpr_publisher", "ground_link", "password_file"},
                              {"monitor", "", "token_file"},
                              {"monitor", "", "tls_certificate", true},
-                             {"monitor", "", "tls_key"}};
+                             {"monitor", "", "tls_key", false, "tls_certificate"}};
 
 std::string key_of(const Place& place) {
   return (*place.group == '\0' ? "" : std::string(place.group) + ".") + place.key;
@@ -29,12 +30,16 @@ YAML::Node section_of(const YAML::Node& settings, const Place& place) {
   return section[place.group];
 }
 
+// Empty when it is not given.
+std::filesystem::path file_in(const YAML::Node& section, const std::string& key) {
+  const bool given = section && section.IsMap() && section[key] && section[key].IsScalar();
+  return given ? section[key].Scalar() : std::string();
+}
+
 std::vector<SettingFile> files_named(const YAML::Node& settings) {
   std::vector<SettingFile> files;
   for (const auto& place : kPlaces) {
-    const auto section = section_of(settings, place);
-    if (!section || !section.IsMap() || !section[place.key] || !section[place.key].IsScalar()) continue;
-    const std::filesystem::path file = section[place.key].Scalar();
+    const auto file = file_in(section_of(settings, place), place.key);
     if (!file.empty()) files.push_back({place.service, key_of(place), file, place.is_certificate});
   }
   return files;
@@ -52,6 +57,17 @@ std::vector<SettingFile> certificate_files(const YAML::Node& settings) {
   auto files = files_named(settings);
   std::erase_if(files, [](const auto& file) { return !file.is_certificate; });
   return files;
+}
+
+std::vector<KeyFile> key_files(const YAML::Node& settings) {
+  std::vector<KeyFile> keys;
+  for (const auto& place : kPlaces) {
+    const auto section = section_of(settings, place);
+    const auto file = file_in(section, place.key);
+    const auto certificate = file_in(section, place.key_of_certificate);
+    if (!file.empty() && !certificate.empty()) keys.push_back({{place.service, key_of(place), file}, certificate});
+  }
+  return keys;
 }
 
 void point_to_host(YAML::Node settings, const std::vector<SettingFile>& files, const std::string& folder) {

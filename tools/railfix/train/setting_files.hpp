@@ -23,6 +23,12 @@ struct SettingFile {
 std::vector<SettingFile> setting_files(const Manifest& manifest);
 /// Certificates that the settings name, those that the host has already among them.
 std::vector<SettingFile> certificate_files(const YAML::Node& settings);
+/// Private keys that the settings name, each with the file of the certificate that it has to belong to.
+struct KeyFile {
+  SettingFile key;
+  std::filesystem::path certificate;
+};
+std::vector<KeyFile> key_files(const YAML::Node& settings);
 /// Makes the settings name the files in the folder of a host.
 void point_to_host(YAML::Node settings, const std::vector<SettingFile>& files, const std::string& folder);
 
