@@ -124,13 +124,18 @@ TEST_F(Security, AReaderOfEveryFourthSampleIsLetIn) {
 }
 
 // Service by service, as an upgrade goes: each step's keys are understood by those that still have the step before.
-TEST_F(Security, TheAuthorityIsExchangedInThreeStepsWithoutSilence) {
+class Exchange : public Security, public ::testing::WithParamInterface<bool> {};
+INSTANTIATE_TEST_SUITE_P(LostKey, Exchange, ::testing::Bool());
+
+TEST_P(Exchange, OfTheAuthorityInThreeStepsWithoutSilence) {
+  const bool key_is_lost = GetParam();
   const auto keys = keys_of("train");
   const auto manifest = core::value_or_throw(tool::read_manifest(folder_ / "train"));
   EXPECT_FALSE(tool::make_keys(manifest, {.drop_authority = true}).ok()) << "there is no other one";
   const std::vector<tool::KeysOptions> steps{{}, {.next_authority = true}, {.renew = true}, {.drop_authority = true}};
   std::vector<fs::path> stages;
   for (const auto& step : steps) {
+    if (step.next_authority && key_is_lost) fs::remove_all(folder_ / "train/security/authority");
     const auto made = tool::make_keys(manifest, step);
     ASSERT_TRUE(made.ok()) << made.error().message;
     stages.push_back(folder_ / ("stage" + std::to_string(stages.size())));

@@ -203,6 +203,25 @@ TEST_F(TrainFolder, PermissionsThatDoNotFitAreTold) {
 
 TEST_F(TrainFolder, CertificatesThatOthersHaveMadeRunOutToo) {
   std::ofstream(folder_ / "line.map") << "map";
+// Another authority would be a stranger to the train that runs.
+TEST_F(TrainFolder, NoOtherAuthorityIsMadeWhereTheOneOfTheCertificatesIsNot) {
+  const auto secured = manifest(kTrain, "run_as: programs", "security: true").value();
+  ASSERT_TRUE(make_keys(secured, {}).ok());
+  const auto trusted = test::slurp(folder_ / "security/cab/ca.pem");
+  fs::rename(folder_ / "security/authority", folder_ / "aside");  // as a host has it
+  for (const bool renew : {false, true}) {
+    const auto refused = make_keys(secured, {.renew = renew});
+    ASSERT_FALSE(refused.ok());
+    EXPECT_THAT(refused.error().message, AllOf(HasSubstr("authority/ca.key.pem is not here, and "),
+                                               HasSubstr("has certificates by that authority"),
+                                               HasSubstr("If it is lost: railfix train keys --next-authority")));
+  }
+  EXPECT_EQ(test::slurp(folder_ / "security/cab/ca.pem"), trusted);
+  EXPECT_FALSE(fs::exists(folder_ / "security/authority"));
+  fs::rename(folder_ / "aside", folder_ / "security/authority");
+  EXPECT_TRUE(make_keys(secured, {.renew = true}).ok());
+}
+
   const auto make = [&](const char* name) {
     const auto made = test::run_program({"/usr/bin/openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt",
                                          "ec_paramgen_curve:prime256v1", "-nodes", "-days", "20", "-subj", "/CN=broker",

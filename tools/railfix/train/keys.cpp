@@ -6,6 +6,7 @@
 
 #include <ctime>
 #include <fstream>
+#include <optional>
 #include <set>
 
 #include "train/render.hpp"
@@ -73,9 +74,18 @@ class Authority {
     return text;
   }
 
-  core::Status make(const std::string& train_id) const {
-    return fs::exists(certificate("ca")) ? core::Status{} : make("ca", train_id);
+  [[nodiscard]] bool can_sign() const { return fs::exists(certificate("ca")) && fs::exists(key("ca")); }
+  core::Status make(const std::string& train_id) const { return make("ca", train_id); }
+  /// Its key is lost: nothing can be signed until the next one takes over. Hosts that have what it signed trust it.
+  core::Status remember(const fs::path& trusted_by_host) const {
+    if (fs::exists(certificate("ca"))) return {};
+    std::error_code failed;
+    fs::create_directories(folder_, failed);
+    fs::permissions(folder_, fs::perms::owner_all, failed);
+    if (fs::copy_file(trusted_by_host, certificate("ca"), failed)) return {};
+    return core::Error{certificate("ca").string() + " cannot be made of " + trusted_by_host.string()};
   }
+  [[nodiscard]] bool has_next() const { return fs::exists(key("next")); }
   core::Status make_next(const std::string& train_id) const {
     if (fs::exists(certificate("next")))
       return core::Error{certificate("next").string() + " is there already; go on with railfix train keys --renew"};
@@ -213,6 +223,31 @@ std::vector<std::string> missing_values(const std::string& wanted, const std::st
   return missing;
 }
 
+/// What a host of the train trusts already, if there is one: certificates have been made then.
+std::optional<fs::path> trusted_by_a_host(const fs::path& security) {
+  std::error_code none;
+  for (const auto& host : fs::directory_iterator(security, none)) {
+    const auto trusted = host.path() / "ca.pem";
+    if (host.path().filename() != "authority" && fs::exists(trusted)) return trusted;
+  }
+  return std::nullopt;
+}
+
+/// An authority that can sign, or one that is about to be exchanged because its key is lost. Never another one
+/// silently: its certificates would be strangers to the train that runs.
+core::Status have_authority(const Authority& authority, const Manifest& manifest, const fs::path& folder,
+                            const KeysOptions& options) {
+  if (authority.can_sign()) return {};
+  const auto trusted = trusted_by_a_host(folder);
+  if (!trusted) return authority.make(manifest.train_id);
+  if (options.next_authority || (options.renew && authority.has_next())) return authority.remember(*trusted);
+  return core::Error{(folder / "authority/ca.key.pem").string() + " is not here, and " +
+                     trusted->parent_path().string() +
+                     " has certificates by that authority; run this where the train's keys were made, or copy " +
+                     (folder / "authority").string() +
+                     " from there. If it is lost: railfix train keys --next-authority, which begins its exchange"};
+}
+
 }  // namespace
 
 std::string governance_xml(const Manifest& manifest) {
@@ -275,7 +310,7 @@ MissingRights missing_rights(const Manifest& manifest, const std::string& servic
 core::Result<std::vector<fs::path>> make_keys(const Manifest& manifest, const KeysOptions& options) {
   const fs::path folder = manifest.folder / "security";
   Authority authority(folder / "authority");
-  auto status = authority.make(manifest.train_id);
+  auto status = have_authority(authority, manifest, folder, options);
   if (status.ok() && options.next_authority) status = authority.make_next(manifest.train_id);
   if (status.ok() && options.drop_authority) status = authority.drop();
   if (!status.ok()) return status.error();
@@ -286,6 +321,8 @@ core::Result<std::vector<fs::path>> make_keys(const Manifest& manifest, const Ke
     fs::create_directories(here);
     status = write_text(here / "ca.pem", authority.trusted());
     if (!status.ok()) return status.error();
+    made.push_back(here);
+    if (!authority.can_sign()) continue;  // what it has signed stays valid
     status = authority.sign(governance_xml(manifest), here / "governance.p7s");
     if (!status.ok()) return status.error();
     std::vector<std::string> services{kOperator, "onboard"};
@@ -294,7 +331,6 @@ core::Result<std::vector<fs::path>> make_keys(const Manifest& manifest, const Ke
       status = make_identity(manifest, authority, here, service, host.name, options);
       if (!status.ok()) return status.error();
     }
-    made.push_back(here);
   }
   return made;
 }
