@@ -42,6 +42,11 @@ struct MapMatcherConfig {
     p.lag_m = lag_m;
     return p;
   }
+  [[nodiscard]] CurveExitParameters exit_parameters() const {
+    CurveExitParameters p;
+    p.most_lag_m = lag_m;
+    return p;
+  }
 
   void describe(service::Fields& fields) {
     fields.text("map", map, "Compiled map (railfix map build); empty = nothing is matched.");

@@ -153,7 +153,7 @@ void MapMatcherService::follow(const msg::TrainState& state) {
       path_ = std::make_shared<const track::Path>(std::move(*way));
       landmarks_->change_path(path_);
       curvature_->change_path(path_);
-      if (exits_) exits_.emplace(CurveExitParameters{}, path_);
+      if (exits_) exits_.emplace(config_.exit_parameters(), path_);
       return;
     }
   }
@@ -165,7 +165,7 @@ void MapMatcherService::follow(const msg::TrainState& state) {
   path_ = std::make_shared<const track::Path>(std::move(path).value());
   landmarks_.emplace(config_.landmarks, path_);
   curvature_.emplace(config_.curvature_parameters(), path_);
-  if (config_.curve_method == "exits") exits_.emplace(CurveExitParameters{}, path_);
+  if (config_.curve_method == "exits") exits_.emplace(config_.exit_parameters(), path_);
   place_m_ = 0;
 }
 
@@ -186,10 +186,7 @@ void MapMatcherService::use(const msg::OdometryStep& step) {
   if (!curvature_ || !config_.use_curvature) return;
   if (chain_.broken()) {
     curvature_->forget();
-    return;
-  }
-  if (exits_) {
-    match_exits(step);
+    if (exits_) exits_->forget();
     return;
   }
   // Where the rails are seen they tell the shape: pictures turn as the track ahead does (by 10 to 13 m, measured), not
@@ -198,26 +195,19 @@ void MapMatcherService::use(const msg::OdometryStep& step) {
   const bool rails_seen = std::abs(core::seconds(step.stamp_ns() - rails_seen_ns_)) < kRailsFreshS;
   if (!rails_seen && step.mode() == msg::ODOMETRY_TRACK && std::abs(step_m) > kShortestStepM &&
       std::abs(step.speed_mps()) > config_.least_speed_mps) {
-    curvature_->add(chain_.odometer_m() - 0.5 * step_m, step.yaw_rad() / step_m,
-                    std::hypot(step.yaw_sigma_rad(), kYawNoise) / std::abs(step_m), CurvatureOf::body);
+    const double at_m = chain_.odometer_m() - 0.5 * step_m;
+    const double sigma_per_m = std::hypot(step.yaw_sigma_rad(), kYawNoise) / std::abs(step_m);
+    curvature_->add(at_m, step.yaw_rad() / step_m, sigma_per_m, CurvatureOf::body);
+    if (exits_) exits_->add(at_m, step.yaw_rad() / step_m, CurvatureOf::body);
   }
-  if (std::abs(chain_.odometer_m() - matched_m_) < config_.match_every_m) return;
+  // The exit of a curve is a minimum, which would be missed between.
+  if (!exits_ && std::abs(chain_.odometer_m() - matched_m_) < config_.match_every_m) return;
   matched_m_ = chain_.odometer_m();
   const auto prior = prior_at(step.stamp_ns());
   if (!prior) return;
-  if (const auto fix = curvature_->match(step.stamp_ns(), chain_.odometer_m(), *prior)) {
-    publish(*fix, msg::FIX_CURVATURE, step.grabbed_ns());
-  }
-}
-
-void MapMatcherService::match_exits(const msg::OdometryStep& step) {
-  const double step_m = step.step_m();
-  const auto prior = prior_at(step.stamp_ns());
-  if (!prior || step.mode() != msg::ODOMETRY_TRACK || step_m < kShortestStepM) return;
-  exits_->add(chain_.odometer_m() - 0.5 * step_m, step.yaw_rad() / step_m);
-  if (const auto fix = exits_->match(step.stamp_ns(), chain_.odometer_m(), *prior)) {
-    publish(*fix, msg::FIX_CURVATURE, step.grabbed_ns());
-  }
+  const auto fix = exits_ ? exits_->match(step.stamp_ns(), chain_.odometer_m(), *prior)
+                          : curvature_->match(step.stamp_ns(), chain_.odometer_m(), *prior);
+  if (fix) publish(*fix, msg::FIX_CURVATURE, step.grabbed_ns());
 }
 
 std::optional<Turn> MapMatcherService::turn_of_camera() const {
@@ -350,6 +340,7 @@ void MapMatcherService::use(const msg::TrackView& view) {
   const double ahead_m = std::min(config_.view_ahead_m, kRateShare * sigma_per_m / config_.view_rate_sigma_per_m2);
   const double odometer_m = chain_.odometer_m() + step_->speed_mps() * dt_s + ahead_m;
   curvature_->add(odometer_m, view.curvature_per_m(), sigma_per_m, CurvatureOf::rails);
+  if (exits_) exits_->add(odometer_m, view.curvature_per_m(), CurvatureOf::rails);
 }
 
 void MapMatcherService::use(const msg::LandmarkSighting& sighting) {

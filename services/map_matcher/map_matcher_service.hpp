@@ -38,7 +38,6 @@ class MapMatcherService {
   [[nodiscard]] std::optional<Turn> turn_of_camera() const;
   /// The same from the gyro, for as long as the camera cannot say.
   [[nodiscard]] std::optional<Turn> turn_of_gyro(int64_t from_ns, int64_t to_ns) const;
-  void match_exits(const msg::OdometryStep& step);
   void look_for_place(const msg::OdometryStep& step);
   void publish_place(const msg::OdometryStep& step, const Location& location);
   void follow_turning(const msg::OdometryStep& step);

@@ -100,7 +100,10 @@ void run(const std::shared_ptr<const track::Path>& path, uint64_t seed, Comparis
   map_matcher::CurvatureParameters likelihood_parameters;
   likelihood_parameters.bias_per_m = 1e-4;
   map_matcher::CurvatureMatcher likelihood(likelihood_parameters, path);
-  map_matcher::CurveExitMatcher exits({}, path);
+  const double lag_m = errors.bogies_behind_m + 0.5 * errors.bogie_distance_m;
+  map_matcher::CurveExitParameters exit_parameters;
+  exit_parameters.least_lag_m = exit_parameters.most_lag_m = lag_m;
+  map_matcher::CurveExitMatcher exits(exit_parameters, path);
   PlaceFilter by_likelihood(begin_m);
   PlaceFilter by_exits(begin_m);
   double odometer_m = begin_m;
@@ -121,15 +124,14 @@ void run(const std::shared_ptr<const track::Path>& path, uint64_t seed, Comparis
     pending_m += s.way_m;
     pending_rad += s.turn_rad;
   };
-  const double lag_m = errors.bogies_behind_m + 0.5 * errors.bogie_distance_m;
   for (int i = 0; at_m < end_m; ++i) {
     if (i % 500 == 0) speed_mps = std::clamp(speed_mps + 3 * random.normal(), 14.0, 36.0);
     step(i / kRateHz);
     if (pending_m < kBinM) continue;
-    const double middle_m = odometer_m - 0.5 * pending_m - lag_m;
+    const double middle_m = odometer_m - 0.5 * pending_m;
     const double noise_per_m = errors.turn_noise_rps * std::sqrt(pending_m / speed_mps / kRateHz) / pending_m;
-    likelihood.add(middle_m, pending_rad / pending_m, noise_per_m, map_matcher::CurvatureOf::body);
-    exits.add(middle_m, pending_rad / pending_m);
+    likelihood.add(middle_m - lag_m, pending_rad / pending_m, noise_per_m, map_matcher::CurvatureOf::body);
+    exits.add(middle_m, pending_rad / pending_m, map_matcher::CurvatureOf::body);
     pending_m = pending_rad = 0;
     const auto window = [&](const PlaceFilter& filter) {
       const double bound_m = std::max(10.0, 4 * filter.sigma_m());
@@ -142,9 +144,7 @@ void run(const std::shared_ptr<const track::Path>& path, uint64_t seed, Comparis
       sum.fixes_outside += std::abs(fix->path_distance_m - at_m) > 4 * fix->sigma_m ? 1 : 0;
       filter.fix(fix->path_distance_m, fix->sigma_m);
     };
-    auto exit = exits.match(1, odometer_m - lag_m, window(by_exits));
-    if (exit) exit->path_distance_m += lag_m;
-    use(exit, by_exits, sums.exits);
+    use(exits.match(1, odometer_m, window(by_exits)), by_exits, sums.exits);
     if (odometer_m - looked_m > 5) {
       looked_m = odometer_m;
       use(likelihood.match(1, odometer_m, window(by_likelihood)), by_likelihood, sums.likelihood);
@@ -152,15 +152,15 @@ void run(const std::shared_ptr<const track::Path>& path, uint64_t seed, Comparis
     const bool curve = std::abs(path->curvature_at(at_m)) > kCurve;
     sums.wheel.add(odometer_m - at_m, curve);
     sums.exits.add(by_exits.place_m() - at_m, curve);
-    stations.push_back({odometer_m - lag_m, at_m - lag_m});
+    stations.push_back({odometer_m, at_m});
     sums.likelihood.add(by_likelihood.place_m() - at_m, curve);
   }
-  // The paper corrects afterwards, when the exits on both sides are known.
+  // The paper corrects afterwards, when the curves on both sides are known.
   for (const auto& station : stations) {
     const bool curve = std::abs(path->curvature_at(station.place_m)) > kCurve;
     sums.exits_linear.add(exits.corrected_m(station.odometer_m) - station.place_m, curve);
   }
-  sums.exits_linear.fixes += static_cast<int>(exits.anchors().size());
+  sums.exits_linear.fixes += static_cast<int>(exits.anchors().size() / 2);
 }
 
 }  // namespace

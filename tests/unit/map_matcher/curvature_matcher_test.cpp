@@ -76,13 +76,114 @@ TEST(CurveExitMatcher, TheExitOfACurveIsFoundWhereItIs) {
     CurveExitMatcher matcher({}, path);
     int exits = 0;
     for (double s = 5; s < 1000; s += step_m) {
-      matcher.add(s - 0.5 * step_m, path->curvature_at(s - 0.5 * step_m));
+      matcher.add(s - 0.5 * step_m, path->curvature_at(s - 0.5 * step_m), CurvatureOf::body);
       const auto fix = matcher.match(1, s, {s, 30, 30, s});
       if (!fix) continue;
       ++exits;
       EXPECT_NEAR(fix->path_distance_m, s, 5) << "step " << step_m;
     }
     EXPECT_EQ(exits, 1) << "step " << step_m;
+  }
+}
+
+/// Runs a foot over the path with a body so far behind it; the odometer reads `scale` times the way.
+struct ExitRun {
+  std::vector<double> errors_m;  // of the fixes
+  std::vector<double> sigmas_m;
+  std::vector<std::pair<double, double>> readings;  // odometer, truth
+};
+ExitRun run_exits(CurveExitMatcher& matcher, const track::Path& path, double lag_m, double scale, double promised_m,
+                  CurvatureOf of = CurvatureOf::body) {
+  ExitRun out;
+  for (double s = path.begin_m() + 40; s < path.end_m(); s += 0.7) {
+    matcher.add(s * scale, path.curvature_at(s - lag_m) / scale, of);
+    out.readings.emplace_back(s * scale, s);
+    const auto fix = matcher.match(1, s * scale, {s, promised_m, promised_m, s * scale});
+    if (!fix) continue;
+    out.errors_m.push_back(fix->path_distance_m - s);
+    out.sigmas_m.push_back(fix->sigma_m);
+  }
+  return out;
+}
+
+// Paper 004, section 8: a double trapezoid is one curvature function, not two.
+TEST(CurveExitMatcher, AnSCurveIsOneCurve) {
+  const auto path = line_of({{300, 0, 0},
+                             {80, 0, 0.002},
+                             {150, 0.002, 0.002},
+                             {160, 0.002, -0.002},
+                             {150, -0.002, -0.002},
+                             {80, -0.002, 0},
+                             {300, 0, 0}});
+  CurveExitMatcher matcher({}, path);
+  const ExitRun run = run_exits(matcher, *path, 0, 1, 30);
+  ASSERT_EQ(run.errors_m.size(), 1U);
+  ASSERT_EQ(matcher.anchors().size(), 2U);  // where it begins and where it ends
+  EXPECT_NEAR(matcher.anchors()[0].place_m, 300, 8);
+  EXPECT_NEAR(matcher.anchors()[1].place_m, 920, 8);
+  for (const Anchor& anchor : matcher.anchors()) EXPECT_NEAR(anchor.odometer_m, anchor.place_m, 2);
+}
+
+// Figure 17: between the exit of one curve and the entry of the next the wheel's error is spread evenly.
+TEST(CurveExitMatcher, TheOdometerIsMappedLinearlyBetweenCurves) {
+  std::vector<track::Element> elements;
+  for (int i = 0; i < 3; ++i) {
+    for (const auto& e : {track::Element{600, 0, 0}, track::Element{60, 0, 0.002}, track::Element{120, 0.002, 0.002},
+                          track::Element{60, 0.002, 0}})
+      elements.push_back(e);
+  }
+  elements.push_back({600, 0, 0});
+  const auto path = line_of(elements);
+  CurveExitMatcher matcher({}, path);
+  const ExitRun run = run_exits(matcher, *path, 0, 1.01, 40);
+  ASSERT_EQ(matcher.anchors().size(), 6U);
+  for (const auto& [odometer_m, place_m] : run.readings) {
+    if (place_m < 600) continue;  // the first curve tells nothing of the scale before it
+    EXPECT_NEAR(matcher.corrected_m(odometer_m), place_m, 3.5) << place_m;
+  }
+  EXPECT_NEAR(matcher.corrected_m(run.readings.back().first), run.readings.back().second, 3.5);
+  ASSERT_EQ(run.errors_m.size(), 3U);
+  for (const double error_m : run.errors_m) EXPECT_LT(std::abs(error_m), 4);
+}
+
+TEST(CurveExitMatcher, TheLagOfTheBodyIsTakenOff) {
+  const auto path = line_of({{400, 0, 0}, {80, 0, 0.002}, {250, 0.002, 0.002}, {80, 0.002, 0}, {400, 0, 0}});
+  CurveExitParameters known;
+  known.least_lag_m = known.most_lag_m = 11.5;
+  CurveExitMatcher of_known(known, path);
+  const ExitRun exact = run_exits(of_known, *path, 11.5, 1, 15);
+  ASSERT_EQ(exact.errors_m.size(), 1U);
+  EXPECT_LT(std::abs(exact.errors_m[0]), 2);
+  EXPECT_NEAR(exact.sigmas_m[0], known.sigma_m, 1e-9);
+
+  CurveExitParameters open;
+  open.most_lag_m = 20;
+  for (const double lag_m : {0.0, 10.0, 20.0}) {
+    CurveExitMatcher matcher(open, path);
+    const ExitRun run = run_exits(matcher, *path, lag_m, 1, 25);
+    ASSERT_EQ(run.errors_m.size(), 1U) << lag_m;
+    EXPECT_GT(run.sigmas_m[0], 8);
+    EXPECT_LT(std::abs(run.errors_m[0]), 1.5 * run.sigmas_m[0]) << lag_m;
+    CurveExitMatcher sure(open, path);
+    EXPECT_TRUE(run_exits(sure, *path, lag_m, 1, 15).errors_m.empty()) << "surer than the lag lets anybody be";
+  }
+  CurveExitMatcher seen(open, path);
+  const ExitRun rails = run_exits(seen, *path, 0, 1, 15, CurvatureOf::rails);
+  ASSERT_EQ(rails.errors_m.size(), 1U);
+  EXPECT_LT(std::abs(rails.errors_m[0]), 2);
+}
+
+TEST(CurveExitMatcher, ForgetsWhatCameBeforeTheCameraWasBlind) {
+  const auto path = line_of({{400, 0, 0}, {80, 0, 0.002}, {250, 0.002, 0.002}, {80, 0.002, 0}, {400, 0, 0}});
+  CurveExitMatcher matcher({}, path);
+  for (double s = 50; s < 805; s += 1) {
+    matcher.add(s, path->curvature_at(s), CurvatureOf::body);
+    EXPECT_FALSE(matcher.match(1, s, {s, 30, 30, s}));
+  }
+  matcher.forget();
+  for (double s = 805; s < 1200; s += 1) {
+    matcher.add(s, path->curvature_at(s), CurvatureOf::body);
+    EXPECT_FALSE(matcher.match(1, s, {s, 30, 30, s})) << s;
   }
 }
 
