@@ -104,6 +104,11 @@ void check_control(const Manifest& manifest, Findings& findings) {
 
 // Settings that are right for a run of recorded data and wrong for a train.
 void check_settings(const Manifest& manifest, Findings& findings) {
+  for (const char* service : {"frame_grabber", "sensor_gateway"}) {
+    if (manifest.service(service) != nullptr && setting_of(manifest, service, "source").empty())
+      error(findings, std::string("settings.") + service + ".source is not given, and " + service +
+                          " does not start without; say where its data come from, or take it out of train.services");
+  }
   if (const auto start = setting_of(manifest, "fusion", "start"); !start.empty() && start != "unknown")
     warning(findings, "settings.fusion.start is " + start +
                           ": a train that was switched off elsewhere would believe to stand there; leave it out, "
