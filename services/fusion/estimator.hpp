@@ -182,6 +182,7 @@ class Estimator {
   void doubt_silent_wheel(int64_t silent_since_ns, double way_m);
   void watch_alone(double way_m, double dt_s);
   [[nodiscard]] bool is_watched() const;
+  [[nodiscard]] bool slipped_unseen() const;
   [[nodiscard]] bool wheel_is_alone() const;
   [[nodiscard]] double unwatched_share() const;
   void recover_wheel(const WheelInput& sample, double wheel_m, double sigma_m);

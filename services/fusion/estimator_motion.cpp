@@ -164,8 +164,10 @@ void Estimator::watch_alone(double way_m, double dt_s) {
     unwatched_.behind_m = std::max(unwatched_.behind_m, -unwatched_.apart_m);
     unwatched_.ahead_m = std::max(unwatched_.ahead_m, unwatched_.apart_m);
   }
-  // Nobody else measures for a while: a slip may be no larger than what passes for a change of speed.
-  if (is_watched() && wheel_is_alone()) {
+  // Nobody else measures for a while, or the wheel came back in the dark, where an IMU alone had said that it is well
+  // again: a slip may be no larger than what passes for a change of speed.
+  const bool came_back = slipped_unseen() && !used_within(Source::camera, kBlindS);
+  if (is_watched() && (wheel_is_alone() || came_back)) {
     const double hidden_mps = std::max(kHiddenSlipMps, kHiddenSlipShare * std::abs(filter_.speed_mps()));
     const double more_m = std::min(hidden_mps * dt_s, parameters_->wheel_slip_share * std::abs(way_m));
     const double most_m = std::max(unwatched_.hidden_m, hidden_mps * parameters_->wheel_slip_s);
@@ -183,8 +185,11 @@ bool Estimator::wheel_is_alone() const {
 // A camera sees every slip; what it has taught an IMU is good for some time. A wheel that was seen to slip since then,
 // and has nobody beside it, is not believed when it seems well again.
 bool Estimator::is_watched() const {
-  const bool slipped = watch(Source::wheel).changed_ns > watch(Source::camera).used_ns;
-  return used_within(Source::camera, kTaughtS) && !(slipped && wheel_is_alone());
+  return used_within(Source::camera, kTaughtS) && !(slipped_unseen() && wheel_is_alone());
+}
+
+bool Estimator::slipped_unseen() const {
+  return watch(Source::wheel).changed_ns > watch(Source::camera).used_ns;
 }
 
 // An IMU sees none that has been there from the beginning, and later as little as it knows

@@ -161,6 +161,9 @@ int run(int argc, char** argv) {
   app.add_option("--start", a.start, "EDGE:OFFSET[:+|-] on the map");
   app.add_option("--stanford", a.stanford, "Write the Stanford diagram (SVG)");
   app.add_option("--run", a.run, "Print one run of the campaign second by second");
+  app.add_flag(
+      "--sightings", s.sightings,
+      "Places come from masts and balises that are sighted, by the real matcher, on a map that is not quite right");
   app.add_option("--position", a.position,
                  "What each source is worth, frogs and portals as references: a table of so many runs of 33 km");
   app.add_option("--row", a.row, "... with this set of sensors alone, as the table names it");
@@ -180,6 +183,7 @@ int run(int argc, char** argv) {
   s.max_speed_mps = a.max_kmh / 3.6;
   if (a.sudden_mps2 > 0) s.style = DriveStyle::sudden(a.sudden_mps2);
   leave_out(s, a.without);
+  if (s.sightings) s.landmark_spacing_m = 0;
   if (a.saved_wrong >= 0) a.plan.saved_wrong = a.saved_wrong;
   load_map(a);
   if (a.run >= 0) {

@@ -1,5 +1,6 @@
 #include "support/train/line.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -11,6 +12,8 @@ using track::PlanPose;
 
 constexpr double kBesideM = 4.5;
 constexpr double kProfileM = 800;
+constexpr double kMapSigmaM = 0.1;
+constexpr double kWrongOnMap = 0.03;
 
 std::vector<Element> random_elements(core::Random& random, double length_m) {
   std::vector<Element> elements;
@@ -163,6 +166,32 @@ RandomLine random_line(core::Random& random, double length_m, double switch_spac
     next_m = layer.laid_m() + switch_spacing_m * random.uniform(0.5, 1.5);
   }
   return layer.take();
+}
+
+void furnish(RandomLine& line, core::Random& random) {
+  auto& landmarks = line.map->landmarks;
+  const auto put = [&](const Thing& thing, double mapped_m) {
+    const auto id = static_cast<uint32_t>(landmarks.size()) + 1;
+    landmarks.push_back({id, thing.kind, thing.edge, mapped_m, thing.lateral_m, kMapSigmaM, ""});
+  };
+  for (const auto& edge : line.map->edges) {
+    const double end_m = edge.alignment.length_m() - 1;
+    for (double m = random.uniform(0, 65); m < end_m; m += random.uniform(40, 65)) {
+      line.things.push_back({track::LandmarkKind::mast, edge.id, m, kMastBesideM});
+      const double moved_m = (random.uniform() < 0.5 ? -1 : 1) * random.uniform(1, 6);
+      const double mapped_m = m + kMapSigmaM * random.normal() + (random.uniform() < kWrongOnMap ? moved_m : 0);
+      put(line.things.back(), std::clamp(mapped_m, 0.0, end_m));
+    }
+    for (double m = random.uniform(0, 1600); m + 3 < end_m; m += random.uniform(400, 1600)) {
+      for (const double balise_m : {m, m + 3}) {
+        const Thing balise{track::LandmarkKind::balise, edge.id, balise_m, 0};
+        const double luck = random.uniform();
+        const double mapped_m = balise_m + kMapSigmaM * random.normal();
+        if (luck < 1 - kWrongOnMap) line.things.push_back(balise);
+        if (luck > kWrongOnMap) put(balise, std::max(mapped_m, 0.0));
+      }
+    }
+  }
 }
 
 }  // namespace railfix::train

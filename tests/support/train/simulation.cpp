@@ -8,8 +8,6 @@
 namespace railfix::train {
 namespace {
 
-using fusion::FixInput;
-using fusion::FixKind;
 using fusion::GnssInput;
 using fusion::ImuInput;
 using fusion::OdometryInput;
@@ -19,7 +17,6 @@ constexpr double kPulseS = 0.05;
 constexpr double kInertialS = 0.02;
 constexpr double kPulsesPerMetre = 90;
 constexpr double kKeyFrameM = 0.15;
-constexpr double kLocateEveryM = 500;
 constexpr double kShapeM = 500;  // a curve and the next err by themselves
 // Of a scale, between trips of one train: the light and the track for a camera, load and temperature for a wheel.
 constexpr double kCameraTripChange = 2e-4;
@@ -32,8 +29,11 @@ Drive drive_on(uint64_t seed, const SimulationPlan& plan, double most_m) {
 
 RandomLine line_of(uint64_t seed, const SimulationPlan& plan) {
   auto random = stream(seed, 1);
-  return random_line(random, TrainSimulation::kStartOffsetM + (plan.max_speed_mps + 3) * plan.duration_s + 1000,
-                     plan.switch_spacing_m);
+  auto line = random_line(random, TrainSimulation::kStartOffsetM + (plan.max_speed_mps + 3) * plan.duration_s + 1000,
+                          plan.switch_spacing_m);
+  auto things = stream(seed, 19);
+  if (plan.sightings) furnish(line, things);
+  return line;
 }
 
 }  // namespace
@@ -59,7 +59,9 @@ TrainSimulation::TrainSimulation(const SimulationPlan& plan, uint64_t seed)
     : TrainSimulation(plan, seed, line_of(seed, plan)) {}
 
 TrainSimulation::TrainSimulation(const SimulationPlan& plan, uint64_t seed, const RandomLine& line)
-    : TrainSimulation(plan, seed, line.map, {1, kStartOffsetM, track::Direction::forward}, line.way) {}
+    : TrainSimulation(plan, seed, line.map, {1, kStartOffsetM, track::Direction::forward}, line.way) {
+  if (plan.sightings) make_sightings(line.things);
+}
 
 TrainSimulation::TrainSimulation(const SimulationPlan& plan, uint64_t seed, std::shared_ptr<const track::Map> on,
                                  const track::EdgePosition& start)
@@ -167,6 +169,11 @@ double TrainSimulation::curvature_at(double distance_m, double t_s) const {
   return path_->curvature_at(distance_m + error_m);
 }
 
+bool TrainSimulation::sees(double t_s) const {
+  return within(blind_, t_s) == nullptr && !faulty(Sensor::camera, FaultKind::blind, t_s) &&
+         !faulty(Sensor::camera, FaultKind::dropout, t_s) && !faulty(Sensor::camera, FaultKind::stuck, t_s);
+}
+
 bool TrainSimulation::faulty(Sensor sensor, FaultKind kind, double t_s) const {
   return plan_.fault.is(sensor, kind) && plan_.fault.active(t_s);
 }
@@ -208,7 +215,7 @@ double TrainSimulation::scale_error_of(double usual, double trip_change, core::R
 // A key frame is kept until 0.15 m are run; steps refer to it. Scale wanders a little around its error.
 void TrainSimulation::make_steps() {
   auto random = stream(seed_, 10);
-  const auto blind = plan_.blind_spells ? spells(random, 60, 5, 15, 0) : std::vector<Spell>{};
+  if (plan_.blind_spells) blind_ = spells(random, 60, 5, 15, 0);
   camera_scale_error = scale_error_of(plan_.visual_scale_error, kCameraTripChange, random, 10);
   const double scale = 1 + camera_scale_error;
   const double phase = random.uniform(0, 6);
@@ -228,7 +235,7 @@ void TrainSimulation::make_steps() {
     const double sleeper = random.uniform() < 0.5 ? 0.6 : -0.6;
     if (random.uniform() < share) step.step_m += sleeper;
     if (faulty(Sensor::camera, FaultKind::stuck, t)) step.step_m = 0;
-    const bool dark = within(blind, t) != nullptr || faulty(Sensor::camera, FaultKind::blind, t);
+    const bool dark = within(blind_, t) != nullptr || faulty(Sensor::camera, FaultKind::blind, t);
     if (dark) step = {step.stamp_ns, step.reference_stamp_ns, 0, 0, false};
     if (lost) continue;
     add(Sensor::camera, t, step);
@@ -321,75 +328,6 @@ void TrainSimulation::make_gnss() {
       sample.northing_m = stuck->northing_m;
     }
     add(Sensor::gnss, i, sample);
-  }
-}
-
-void TrainSimulation::make_fixes() {
-  auto random = stream(seed_, 14);
-  const auto& fault = plan_.fault;
-  uint32_t id = 0;
-  bool wrong_once = false;
-  int sightings = 0;  // since the fault began
-  std::optional<track::EdgePosition> stuck;
-  double place_m = plan_.landmark_spacing_m;
-  while (place_m < way_m()) {
-    const double t = drive_.time_at(place_m) + 0.003;
-    const double sign = random.uniform() < 0.5 ? -1 : 1;
-    const double false_m = sign * random.uniform(3, 60);
-    const double noise_m = plan_.fix_sigma_m * random.normal();
-    const double share = faulty(Sensor::fix, FaultKind::outliers, t) ? 0.3 : plan_.false_fix_share;
-    double wrong_m = random.uniform() < share ? false_m : 0;
-    wrong_m += (faulty(Sensor::fix, FaultKind::noise, t) ? fault.size : 1) * noise_m + offset_of(Sensor::fix, t);
-    if (fault.is(Sensor::fix, FaultKind::wrong_landmark) && t > fault.begin_s && !wrong_once) {
-      wrong_m += fault.size;
-      wrong_once = true;
-    }
-    double probability = plan_.fix_probability;
-    if (fault.is(Sensor::fix, FaultKind::wrong_sighting) && t > fault.begin_s) {
-      const bool wrong = sightings++ % 2 == 0 && (sightings == 1 || t < fault.end_s);
-      wrong_m += wrong ? fault.size : 0;
-      probability = kSureProbability;
-    }
-    auto place = path_->position_at(drive_.at(t).distance_m + wrong_m);
-    if (faulty(Sensor::fix, FaultKind::stuck, t)) place = *(stuck = stuck.value_or(place));
-    ++id;
-    if (!misled_landmarks_ || !faulty(Sensor::fix, FaultKind::wrong_branch, t)) {
-      add(Sensor::fix, t,
-          FixInput{stamp_ns(t), place.edge, place.offset_m, plan_.fix_sigma_m, probability, id, FixKind::landmark,
-                   place.direction, nullptr});
-    }
-    place_m += plan_.landmark_spacing_m * (1 + plan_.landmark_spread * random.uniform(-1, 1));
-  }
-}
-
-// Found after 0.4 to 3 km, to 3 to 25 m; said again every 500 m, with much the same error, until fusion knows the
-// place.
-void TrainSimulation::make_network_fixes() {
-  auto random = stream(seed_, 18);
-  const double sigma_m = 3 * std::pow(8, random.uniform());
-  const double wrong_m = sigma_m * random.normal();
-  const double probability = random.uniform(fusion::kBeginProbability, 1);
-  for (double place_m = random.uniform(400, 3000); place_m < way_m(); place_m += kLocateEveryM) {
-    const double t = drive_.time_at(place_m) + 0.003;
-    const auto place = path_->position_at(place_m + wrong_m);
-    add(Sensor::fix, t,
-        FixInput{stamp_ns(t), place.edge, place.offset_m, sigma_m, probability, 0, FixKind::network, place.direction,
-                 nullptr});
-  }
-}
-
-void TrainSimulation::make_fixes_of_map() {
-  auto random = stream(seed_, 14);
-  for (const auto& mark : path_->landmarks()) {
-    const auto wanted =
-        std::ranges::find(plan_.map_landmarks, mark.kind, &std::pair<track::LandmarkKind, double>::first);
-    const double noise = random.normal();
-    if (wanted == plan_.map_landmarks.end() || mark.distance_m < 1 || mark.distance_m > way_m()) continue;
-    const double t = drive_.time_at(mark.distance_m) + 0.003;
-    const auto place = path_->position_at(drive_.at(t).distance_m + wanted->second * noise);
-    add(Sensor::fix, t,
-        FixInput{stamp_ns(t), place.edge, place.offset_m, wanted->second, plan_.fix_probability, mark.landmark->id,
-                 FixKind::landmark, place.direction, nullptr});
   }
 }
 

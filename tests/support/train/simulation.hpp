@@ -14,6 +14,7 @@
 #include "core/random.hpp"
 #include "core/time.hpp"
 #include "fusion/fusion.hpp"
+#include "map_matcher/match_types.hpp"
 #include "support/train/drive.hpp"
 #include "support/train/faults.hpp"
 #include "support/train/line.hpp"
@@ -45,7 +46,8 @@ struct SimulationPlan {
   double fix_probability = 0.99;
   double switch_spacing_m = 0;  // of a random line, 0 = none; the way takes either leg
   bool track_fixes = false;     // map_matcher says the track once a second, and which leg behind facing points
-  bool shape = false;           // map_matcher finds places from the shape that the camera sees (ShapeFixes)
+  bool shape = false;           // map_matcher finds places from the shape that the camera sees (MatcherLoop)
+  bool sightings = false;       // ... and from what it sees beside a random line, masts and balises
   double map_shape_m = 0.7;     // curves lie so far from where the map has them, if there is `shape`
   bool blind_spells = true;     // 5 to 15 s without camera, now and then
   bool slip = true;             // wheel turns up to 30 % too fast or slow for some seconds
@@ -61,6 +63,12 @@ SimulationPlan campaign_plan();
 struct Arrival {
   double arrival_s = 0;
   fusion::Event event;
+};
+
+/// Of what the camera sees beside the track, for map_matcher.
+struct SightingArrival {
+  double arrival_s = 0;
+  map_matcher::Sighting sighting;
 };
 
 /// Random numbers of one sensor's own.
@@ -89,6 +97,8 @@ class TrainSimulation {
   [[nodiscard]] bool on_way(const track::EdgePosition& place) const;
   /// Of the track as it lies, not as it is mapped.
   [[nodiscard]] double curvature_at(double distance_m, double t_s) const;
+  /// The camera shows what is there.
+  [[nodiscard]] bool sees(double t_s) const;
   [[nodiscard]] core::Random stream_of(uint64_t number) const { return stream(seed_, number); }
   [[nodiscard]] int64_t stamp_ns(double t_s) const;
   [[nodiscard]] double duration_s() const { return drive_.duration_s(); }
@@ -99,6 +109,7 @@ class TrainSimulation {
 
   std::shared_ptr<const track::Map> map;
   std::vector<Arrival> arrivals;  // in the order in which they come
+  std::vector<SightingArrival> sightings;
   double start_error_m = 0;
   /// True over measured metres, less 1; the camera's wander beside it.
   double camera_scale_error = 0;
@@ -108,6 +119,7 @@ class TrainSimulation {
   static constexpr int64_t kBeginNs = 1'700'000'000'000'000'000;
   static constexpr double kPictureS = 0.05;
   static constexpr double kSureProbability = 0.9999;
+  class PlaceErrors;
   struct Spell {
     double begin_s;
     double end_s;
@@ -146,6 +158,7 @@ class TrainSimulation {
   void make_fixes();
   void make_fixes_of_map();
   void make_network_fixes();
+  void make_sightings(const std::vector<Thing>& things);
   void make_declarations();
   void make_track_fixes();
   [[nodiscard]] SaidTrack track_at(double way_m) const;
@@ -161,6 +174,7 @@ class TrainSimulation {
   track::EdgePosition start_;
   std::shared_ptr<const track::Path> path_;
   Drive drive_;
+  std::vector<Spell> blind_;
   std::vector<double> shape_errors_m_;  // every kShapeM of the way
   std::vector<Points> points_;
   std::vector<Declaration> declarations_;  // one for each of the points

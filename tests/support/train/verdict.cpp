@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "core/time.hpp"
-#include "support/train/shape_fixes.hpp"
+#include "support/train/matcher_loop.hpp"
 #include "track/declared.hpp"
 
 namespace railfix::train {
@@ -103,8 +103,8 @@ void Verdict::add(const Verdict& other) {
 
 Verdict judge(const TrainSimulation& simulation, fusion::Fusion& fusion, double after_m, const Watcher& watcher) {
   Judge judge(simulation, after_m, watcher);
-  std::optional<ShapeFixes> shape;
-  if (simulation.plan().shape) shape.emplace(simulation);
+  std::optional<MatcherLoop> matcher;
+  if (simulation.plan().shape || simulation.plan().sightings) matcher.emplace(simulation);
   double tick_s = 0;
   for (const auto& arrival : simulation.arrivals) {
     if (arrival.arrival_s > simulation.duration_s()) break;
@@ -115,9 +115,10 @@ Verdict judge(const TrainSimulation& simulation, fusion::Fusion& fusion, double 
     if (!state) continue;
     judge.see(*state, arrival.arrival_s);
     const auto* step = std::get_if<fusion::OdometryInput>(&arrival.event);
-    const auto fix = shape && step != nullptr ? shape->see(*step, *state, arrival.arrival_s) : std::nullopt;
-    if (!fix) continue;
-    if (const auto behind = fusion.add(*fix)) judge.see(*behind, arrival.arrival_s);
+    if (!matcher || step == nullptr) continue;
+    for (const auto& fix : matcher->see(*step, *state, arrival.arrival_s)) {
+      if (const auto behind = fusion.add(fix)) judge.see(*behind, arrival.arrival_s);
+    }
   }
   return judge.take();
 }

@@ -1,0 +1,55 @@
+// map_matcher in the loop with fusion: what the camera sees of the track's shape, and beside the track, goes into the
+// real matchers, which search where fusion says, and fusion is told what they find. So errors follow from those of
+// odometer and map, last, and a wrong place leads to the next one, as on a train.
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "fusion/fusion.hpp"
+#include "map_matcher/curvature_matcher.hpp"
+#include "map_matcher/landmark_matcher.hpp"
+#include "map_matcher/step_chain.hpp"
+#include "support/train/simulation.hpp"
+#include "track/ways.hpp"
+
+namespace railfix::train {
+
+class MatcherLoop {
+ public:
+  /// REQUIRES: the simulation outlives this.
+  explicit MatcherLoop(const TrainSimulation& simulation);
+
+  /// `state`: what fusion says behind this step. What comes out is due now, but may be late.
+  std::vector<fusion::FixInput> see(const fusion::OdometryInput& step, const fusion::TrainEstimate& state,
+                                    double arrival_s);
+
+ private:
+  void match_shape(int64_t stamp_ns, const fusion::TrainEstimate& state, double arrival_s);
+  void match_sightings(const fusion::TrainEstimate& state, double arrival_s);
+  [[nodiscard]] map_matcher::Prior prior_at(int64_t stamp_ns, const fusion::TrainEstimate& state) const;
+  void found(const map_matcher::Fix& fix, fusion::FixKind kind, double due_s);
+  /// False while the place is not known.
+  bool follow(const fusion::TrainEstimate& state);
+  void look(double arrival_s, const Motion& truth);
+
+  const TrainSimulation& simulation_;
+  track::Ways ways_;
+  std::shared_ptr<const track::Path> path_;
+  double place_m_ = 0;  // on the path
+  map_matcher::StepChain chain_;
+  std::optional<map_matcher::CurvatureMatcher> shape_;
+  std::optional<map_matcher::LandmarkMatcher> landmarks_;
+  size_t next_sighting_ = 0;
+  double matched_m_ = 0;
+  std::deque<std::pair<double, fusion::FixInput>> found_;  // when they are due
+  core::Random random_;
+  double bias_per_m_;
+  double wander_per_m_ = 0;
+  double looked_m_ = 0;
+  std::optional<double> stuck_per_m_;
+};
+
+}  // namespace railfix::train
