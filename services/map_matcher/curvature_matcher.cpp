@@ -131,7 +131,7 @@ CurvatureMatcher::Peak CurvatureMatcher::search(double odometer_m, const Prior& 
 }
 
 std::optional<Fix> CurvatureMatcher::match(int64_t stamp_ns, double odometer_m, const Prior& prior) {
-  if (bins_.size() < kFewestBins) return std::nullopt;
+  if (bins_.size() < kFewestBins || !prior.usable()) return std::nullopt;
   const Peak peak = search(odometer_m, prior);
   const double sigma_m = std::hypot(peak.sigma_m, parameters_.sigma_floor_m);
   if (peak.at_edge || sigma_m > parameters_.max_sigma_m || peak.probability < parameters_.min_probability) {

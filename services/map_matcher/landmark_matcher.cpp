@@ -39,6 +39,7 @@ bool other_side(const Sighting& sighting, const track::PathLandmark& landmark) {
 // mean fit over the window. A confidence below the usual is a chance for the sighting, not for each landmark in the
 // window. The window itself only selects.
 std::optional<Fix> LandmarkMatcher::add(const Sighting& sighting, const Prior& prior) {
+  if (!prior.usable() || !std::isfinite(sighting.distance_ahead_m) || !(sighting.sigma_m > 0)) return std::nullopt;
   const double place_m = prior.travelled_m + sighting.distance_ahead_m;
   const double margin_m = parameters_.window_margin_m + 3 * sighting.sigma_m;
   const double expected_m = prior.path_distance_m + sighting.distance_ahead_m;

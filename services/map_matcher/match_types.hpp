@@ -1,6 +1,7 @@
 // What goes into the map matcher and what comes out of it, without DDS.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 
 #include "track/map.hpp"
@@ -33,6 +34,13 @@ struct Prior {
   double over_m = 0;       // may be so far behind
   double under_m = 0;      // ... or in front
   double travelled_m = 0;  // distance run, to relate sightings to each other
+
+  /// Every figure is one, and the window is small enough to search while the train runs.
+  [[nodiscard]] bool usable() const {
+    return std::isfinite(path_distance_m) && std::isfinite(travelled_m) && over_m >= 0 && under_m >= 0 &&
+           over_m + under_m < kWidestM;
+  }
+  static constexpr double kWidestM = 10000;
 };
 
 /// A place of the camera's foot, from map and measurement alone.

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "core/random.hpp"
 #include "core/result.hpp"
 #include "map_matcher/curve_exit_matcher.hpp"
@@ -45,6 +47,19 @@ Result run(const std::shared_ptr<const track::Path>& path, uint64_t seed, double
 TEST(CurvatureMatcher, SaysNothingOnAStraightOrInAnArc) {
   EXPECT_EQ(run(line_of({{3000, 0, 0}}), 1, 20, 3e-4).fixes, 0);
   EXPECT_EQ(run(line_of({{3000, 0.002, 0.002}}), 2, 20, 3e-4).fixes, 0);
+}
+
+// A speed that nobody knows once made the place no number, and the search ran beyond its memory.
+TEST(CurvatureMatcher, SaysNothingWhenThePlaceIsNoNumberOrTheIntervalHasNoEnd) {
+  const auto path = line_of({{300, 0, 0}, {80, 0, 0.002}, {300, 0.002, 0.002}});
+  for (const Prior& prior : {Prior{NAN, 20, 20, 400}, Prior{400, NAN, 20, 400}, Prior{400, 20, INFINITY, 400},
+                             Prior{400, 1e12, 20, 400}, Prior{400, -20, 20, 400}}) {
+    CurvatureMatcher matcher({}, path);
+    for (double s = 10; s < 450; s += 0.5) {
+      matcher.add(s, path->curvature_at(s), 3e-4, CurvatureOf::rails);
+      EXPECT_FALSE(matcher.match(1, s, prior));
+    }
+  }
 }
 
 TEST(CurvatureMatcher, EntriesAndExitsOfCurvesGiveHonestFixes) {

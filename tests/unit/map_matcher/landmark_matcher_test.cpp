@@ -30,6 +30,15 @@ Prior prior_at(double place_m, double interval_m, double travelled_m) {
   return {place_m, interval_m, interval_m, travelled_m};
 }
 
+TEST(LandmarkMatcher, SaysNothingWhenThePlaceIsNoNumberOrTheIntervalHasNoEnd) {
+  for (const Prior& prior :
+       {prior_at(NAN, 10, 0), prior_at(495, INFINITY, 0), prior_at(495, NAN, 0), prior_at(495, 10, NAN)}) {
+    LandmarkMatcher matcher({}, line_with({{LandmarkKind::balise, 500}}));
+    EXPECT_FALSE(matcher.add(sighting_of(LandmarkKind::balise), prior));
+    EXPECT_TRUE(matcher.add(sighting_of(LandmarkKind::balise), prior_at(495, 10, 0)));
+  }
+}
+
 TEST(LandmarkMatcher, FixComesFromMapAndSightingNotFromThePrior) {
   const auto path = line_with({{LandmarkKind::balise, 500}});
   for (const double prior_error_m : {-6.0, 0.0, 7.0}) {
