@@ -175,7 +175,8 @@ std::optional<Prior> MapMatcherService::prior_at(int64_t stamp_ns) const {
   const auto place_m = path_->distance_of(state_->edge(), state_->offset_m());
   if (!place_m || std::abs(dt_s) > kOldStateS) return std::nullopt;
   const double way_m = std::isnan(state_->speed_mps()) ? 0.0 : state_->speed_mps() * dt_s;
-  return Prior{*place_m + way_m, state_->over_m(), state_->under_m(), state_->distance_m() + way_m};
+  const Prior prior{*place_m + way_m, state_->over_m(), state_->under_m(), state_->distance_m() + way_m};
+  return prior.usable() ? std::optional(prior) : std::nullopt;
 }
 
 void MapMatcherService::use(const msg::OdometryStep& step) {
