@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
+#include <algorithm>
 #include <atomic>
 #include <thread>
 
@@ -18,6 +19,17 @@ using ::testing::Not;
 
 class Fleet : public FleetTest {
  protected:
+  /// Of this train.
+  int processes_of(std::string service) const {
+    std::ranges::replace(service, '_', '-');
+    int count = 0;
+    for (const auto& process : fs::directory_iterator("/proc")) {
+      const auto command = test::slurp(process.path() / "cmdline");
+      const bool is_it = command.substr(0, command.find('\0')).ends_with("/railfix-" + service);
+      if (is_it && command.find(root()) != std::string::npos) ++count;
+    }
+    return count;
+  }
   Fleet() { write_manifest(RAILFIX_TEST_RELEASE); }
   void write_manifest(const std::string& release, const std::string& more = "") {
     std::ofstream(folder_ / "train" / "train.yaml")
@@ -96,6 +108,44 @@ TEST_F(Fleet, ServicesOutliveTheirSupervisorAndTheNextOneGoesOnWithThem) {
   EXPECT_EQ(train({"down", "--root", root()}).exit_code, 0);
   ASSERT_GT(orphan, 1);
   EXPECT_FALSE(lives(orphan)) << "down ends what has no supervisor";
+}
+
+// A disk that has damaged the supervisor's notes must not give the train two fusions.
+TEST_F(Fleet, ANewSupervisorFindsTheServicesWithoutTheNotesOfTheOneBefore) {
+  ASSERT_EQ(up().exit_code, 0);
+  const auto before = status();
+  const auto home = folder_ / "root/var/lib/railfix-train";
+  const auto kill_supervisor = [&] {
+    const auto pid = static_cast<pid_t>(std::stoll(test::slurp(home / "supervisor.lock")));
+    ASSERT_GT(pid, 1);
+    ASSERT_EQ(kill(pid, SIGKILL), 0);
+    ASSERT_TRUE(wait_until([&] { return !lives(pid); }));
+  };
+  const auto expect_same = [&](const std::string& how) {
+    for (const auto& service : before["services"]) {
+      const auto now = status(service["service"]);
+      EXPECT_EQ(now["pid"], service["pid"]) << how;
+      EXPECT_TRUE(now["healthy"]) << now;
+      EXPECT_EQ(processes_of(service["service"]), 1) << how;
+    }
+  };
+  kill_supervisor();
+  std::ofstream(home / "state.yaml") << "fusion: {pid: [";
+  EXPECT_THAT(train({"status", "--root", root()}).err, HasSubstr("state.yaml is damaged (yaml-cpp: error at line 1"));
+  {
+    test::Program systemds({"railfix", "train", "supervise", "--root", root()}, {folder_ / "supervisor.log", {}, {}});
+    EXPECT_TRUE(wait_until([&] { return test::slurp(home / "state.yaml").find("born") != std::string::npos; }));
+    expect_same("of another supervisor, with a damaged file");
+  }
+  fs::remove(home / "state.yaml");
+  const auto again = up();
+  EXPECT_EQ(again.exit_code, 0) << again.out << again.err;
+  EXPECT_THAT(again.out, HasSubstr("without a supervisor: it is started"));
+  expect_same("of railfix train up, without the file");
+  kill_supervisor();
+  fs::remove(home / "state.yaml");
+  EXPECT_EQ(train({"down", "--root", root()}).exit_code, 0);
+  for (const auto& service : before["services"]) EXPECT_EQ(processes_of(service["service"]), 0);
 }
 
 // A wheel that turns, on this train's network, until the end.

@@ -13,6 +13,7 @@
 #include "service/health_file.hpp"
 #include "train/made_of.hpp"
 #include "train/render.hpp"
+#include "train/running.hpp"
 #include "train/supervise.hpp"
 
 namespace railfix::tool {
@@ -176,8 +177,7 @@ std::vector<std::string> changed_services(const HostPlan& from, const HostPlan& 
 }  // namespace
 
 bool any_runs(const HostFolder& folder) {
-  const auto state = folder.state();
-  return std::any_of(state.begin(), state.end(), [](const auto& entry) { return entry.second.runs(); });
+  return !running_on(folder, folder.state()).empty();
 }
 
 service::HealthAnswer health_of(const HostPlan& plan, const HostState& state, const std::string& service) {

@@ -11,7 +11,21 @@
 namespace railfix::tool {
 namespace {
 
-constexpr int kStartTimeField = 22;  // of /proc/PID/stat
+// Of /proc/PID/stat.
+constexpr int kStateField = 3;
+constexpr int kParentField = 4;
+constexpr int kStartTimeField = 22;
+
+std::string field_of(pid_t pid, int number) {
+  std::string line;
+  std::getline(std::ifstream("/proc/" + std::to_string(pid) + "/stat"), line);
+  const size_t name_end = line.rfind(')');  // the name may hold anything
+  if (name_end == std::string::npos) return "";
+  std::istringstream fields(line.substr(name_end + 1));
+  std::string field;
+  for (int at = kStateField; at <= number; ++at) fields >> field;
+  return field;
+}
 
 }  // namespace
 
@@ -47,16 +61,13 @@ pid_t holder_of(const std::filesystem::path& file) {
 }
 
 int64_t born_of(pid_t pid) {
-  std::string line;
-  std::getline(std::ifstream("/proc/" + std::to_string(pid) + "/stat"), line);
-  const size_t name_end = line.rfind(')');
-  if (name_end == std::string::npos) return 0;
-  std::istringstream fields(line.substr(name_end + 1));
-  std::string field;
-  fields >> field;  // state, field 3
-  if (field == "Z" || field == "X") return 0;
-  for (int number = 4; number <= kStartTimeField; ++number) fields >> field;
-  return std::atoll(field.c_str());
+  const auto state = field_of(pid, kStateField);
+  if (state.empty() || state == "Z" || state == "X") return 0;
+  return std::atoll(field_of(pid, kStartTimeField).c_str());
+}
+
+pid_t parent_of(pid_t pid) {
+  return static_cast<pid_t>(std::atoll(field_of(pid, kParentField).c_str()));
 }
 
 std::vector<std::string> command_of(pid_t pid) {

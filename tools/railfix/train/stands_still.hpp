@@ -22,6 +22,9 @@ pid_t holder_of(const std::filesystem::path& file);
 /// 0 = there is none, or it has ended and waits for its parent.
 int64_t born_of(pid_t pid);
 
+/// 0 = there is none.
+pid_t parent_of(pid_t pid);
+
 /// Its command line; empty = there is none.
 std::vector<std::string> command_of(pid_t pid);
 

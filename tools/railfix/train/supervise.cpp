@@ -12,6 +12,7 @@
 
 #include "core/time.hpp"
 #include "train/left_behind.hpp"
+#include "train/running.hpp"
 #include "train/stands_still.hpp"
 #include "train/supervised_service.hpp"
 
@@ -126,18 +127,23 @@ class Supervision {
   // What a supervisor that was killed has left goes on. What the plan says by now replaces it in the usual way.
   void adopt_running(const HostPlan& plan) {
     const auto common = common_of(plan);
-    for (const auto& [key, running] : or_nothing([this] { return folder_.state(); })) {
-      if (!running.runs()) continue;
+    const auto all = running_on(folder_, or_nothing([this] { return folder_.state(); }));
+    for (const auto& [key, running] : all) {
       PlannedService service;
       service.name = key.substr(0, key.find(kBefore));
       service.generation = running.generation;
-      service.command = command_of(static_cast<pid_t>(running.pid));
-      if (!service.command.empty() && service.command.back() == "--beside") service.command.pop_back();
+      service.command = usual_command(command_of(static_cast<pid_t>(running.pid)));
       const auto* planned = plan.service(service.name);
       const bool as_planned = planned != nullptr && planned->command == service.command;
       auto& children = running.beside ? successors_ : children_;
       children.emplace_back(as_planned ? *planned : service, folder_, common, running.beside);
       children.back().adopt(running);
+      const bool stays = key == service.name || all.at(service.name).beside;
+      std::cerr << "railfix: " << (stays ? "goes on with " : "ends a second ") << service.name << ", process "
+                << running.pid << std::endl;
+      if (stays) continue;
+      stop({&children.back()});
+      children.pop_back();
     }
   }
   [[nodiscard]] static service::CommonConfig common_of(const HostPlan& plan) {
