@@ -244,6 +244,21 @@ TEST_F(Fleet, AMistakeInTheManifestStartsNothing) {
   EXPECT_EQ(train({"status", "--root", root()}).exit_code, 2) << "something was started";
 }
 
+TEST_F(Fleet, CheckSaysWhichComputersItHasNotAsked) {
+  const auto check_with = [&](const std::string& hosts, const std::string& host) {
+    std::ofstream(folder_ / "train/train.yaml")
+        << "train:\n  id: " << id_ << "\n  release: " RAILFIX_TEST_RELEASE "\n  run_as: programs\n  hosts: { " << hosts
+        << " }\n  services: { fusion: cab, tpr_publisher: cab }\n";
+    return train({"check", manifest(), "--host", host});
+  };
+  EXPECT_THAT(check_with("cab: { address: 127.0.0.1 }", "cab").out, Not(HasSubstr("not asked")));
+  const auto two = check_with("cab: { address: 127.0.0.1 }, coach: { address: 10.99.1.12 }", "cab");
+  EXPECT_EQ(two.exit_code, 0) << two.out << two.err;
+  EXPECT_THAT(two.out, HasSubstr("not asked: the computer coach "));
+  EXPECT_THAT(two.out, HasSubstr("ssh 10.99.1.12 railfix train check TRAIN"));
+  EXPECT_THAT(two.out, Not(HasSubstr("the computer cab ")));
+}
+
 // The lines of the page work as they stand there.
 TEST(FleetPage, AThirdTrainIsMadeStepByStep) {
   const auto page = test::slurp(fs::path(RAILFIX_SOURCE_DIR) / "docs" / "fleet.md");
