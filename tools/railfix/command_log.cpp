@@ -92,6 +92,7 @@ void add_log(CLI::App& app, Action& chosen) {
   command->add_option("FILE", options->file, "Recording (.mcap)");
   command->add_flag("-f,--follow", options->follow, "Follow a running train; Ctrl-C ends");
   add_network(*command, options->network);
+  find_running_train(*command, options->network);
   command->add_option("--service", options->services, "Only these, separated by commas")->delimiter(',');
   command->add_option("--level", options->level, "Only this level and more severe ones")
       ->check(CLI::IsMember(kLevels))

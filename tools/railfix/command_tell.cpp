@@ -113,6 +113,7 @@ void add_tell(CLI::App& app, Action& chosen) {
   tell->add_option("command", options->command)->required();
   tell->add_option("argument", options->argument);
   add_network(*tell, options->network);
+  find_running_train(*tell, options->network);
   tell->callback([options, &chosen] { chosen = [options] { return Teller(*options).tell(); }; });
 }
 

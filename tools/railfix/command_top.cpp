@@ -218,6 +218,7 @@ void add_top(CLI::App& app, Action& chosen) {
       "top",
       "Services and topics of a train, live; q quits.  Example: railfix top --train demo; railfix top --once --json");
   add_network(*command, options->network);
+  find_running_train(*command, options->network);
   command->add_flag("--once", options->once, "Listen for three seconds (or --for), print one table, and end");
   command->add_flag("--json", options->json, "One table as JSON, and end");
   command->add_flag("--no-colour", options->plain, "Without colours; as with NO_COLOR set");

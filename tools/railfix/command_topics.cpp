@@ -187,6 +187,7 @@ int echo(const Options& options) {
 
 void add_common(CLI::App& command, Options& options) {
   add_network(command, options.network);
+  find_running_train(command, options.network);
   command.add_flag("--json", options.json, "JSON on standard output");
   command.add_option("--for", options.for_s, "End after this many seconds")->check(not_negative());
 }

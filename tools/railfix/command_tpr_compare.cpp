@@ -291,6 +291,7 @@ void add_tpr_compare(CLI::App& tpr, Action& chosen) {
       ->required();
   command->add_option("--certified", options->certified, "The certified system's, as --ours")->required();
   add_domain(*command, options->network);
+  find_running_train(*command, options->network);
   command->add_option("--for-s", options->for_s, "Listen for so many seconds, 0 = until a file is over, or Ctrl-C")
       ->check(CLI::NonNegativeNumber);
   command->add_option("--map", options->map, "Compiled map: also reports with different LRBGs can be compared");

@@ -242,6 +242,7 @@ void add_tpr_onboard(CLI::App& tpr, Action& chosen) {
   command->add_option("--for-s", options->for_s, "End after so many seconds, 0 = run until interrupted")
       ->check(CLI::NonNegativeNumber);
   add_network(*command, options->network);
+  find_running_train(*command, options->network);
   command->callback([options, &chosen] {
     chosen = [options] {
       OnboardUnit unit;

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/time.hpp"
+#include "train/plan.hpp"
 
 namespace railfix::tool {
 
@@ -14,6 +15,27 @@ constexpr int64_t kTurnNs = 50'000'000;
 constexpr size_t kWaiting = 1000;
 
 volatile std::sig_atomic_t interrupted = 0;
+
+void take(const std::filesystem::path& config, TrainNetwork& network) {
+  const auto common = service::read_config<service::CommonConfig>("common", config, {}, service::service_names());
+  if (!common.ok()) throw CLI::ValidationError(common.error().message);
+  network.host = common.value();
+  network.train = network.host.train_id;
+  network.domain = network.host.domain;
+}
+
+/// Of the train that is up on this computer; empty when there is none.
+std::filesystem::path running_config(const std::filesystem::path& root) {
+  try {
+    const HostFolder folder(root);
+    const auto plan = folder.plan();
+    if (!plan || plan->down) return {};
+    const auto file = folder.generation(plan->generation) / "config.yaml";
+    return std::filesystem::exists(file) ? file : std::filesystem::path();
+  } catch (const core::BadInput& damaged) {
+    throw CLI::ValidationError(damaged.what());
+  }
+}
 
 }  // namespace
 
@@ -36,15 +58,20 @@ void add_network(CLI::App& command, TrainNetwork& network) {
 void add_domain(CLI::App& command, TrainNetwork& network) {
   command.add_option("--domain", network.domain, "DDS domain")->capture_default_str()->check(CLI::Range(0, 232));
   command.add_option_function<std::string>(
-      "--config",
-      [&network](const std::string& file) {
-        const auto common = service::read_config<service::CommonConfig>("common", file, {}, service::service_names());
-        if (!common.ok()) throw CLI::ValidationError(common.error().message);
-        network.host = common.value();
-        network.train = network.host.train_id;
-        network.domain = network.host.domain;
-      },
+      "--config", [&network](const std::string& file) { take(file, network); },
       "Configuration of the services on this computer: their train, domain, interfaces and keys");
+}
+
+void find_running_train(CLI::App& command, TrainNetwork& network) {
+  command.add_option("--root", network.root, "Where var/lib/railfix-train of the train that runs here is")
+      ->capture_default_str();
+  command.parse_complete_callback([&command, &network] {
+    for (const char* given : {"--train", "--domain", "--config"}) {
+      const auto* option = command.get_option_no_throw(given);
+      if (option != nullptr && option->count() > 0) return;
+    }
+    if (const auto file = running_config(network.root); !file.empty()) take(file, network);
+  });
 }
 
 std::string where(const TrainNetwork& network) {

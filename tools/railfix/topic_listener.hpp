@@ -2,6 +2,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
@@ -17,11 +18,15 @@ struct TrainNetwork {
   std::string train = "demo";
   int64_t domain = 0;
   service::CommonConfig host;  // interfaces, peers and keys
+  std::filesystem::path root = "/";
 };
 /// --train and --domain, or --config for everything at once.
 void add_network(CLI::App& command, TrainNetwork& network);
 /// The same without --train.
 void add_domain(CLI::App& command, TrainNetwork& network);
+/// When none of these is given: the train that runs on this computer (railfix train up), if there is one. Not for who
+/// plays data.
+void find_running_train(CLI::App& command, TrainNetwork& network);
 /// As a tool of this name (it begins with "railfix-").
 messaging::ParticipantOptions participant_options(const TrainNetwork& network, const std::string& command);
 /// "train demo, domain 0"

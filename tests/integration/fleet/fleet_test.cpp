@@ -45,8 +45,7 @@ TEST_F(Fleet, ServicesComeUpComeBackAfterAKillAndGoDown) {
   const auto started = up();
   EXPECT_EQ(started.exit_code, 0) << started.out << started.err;
   const auto heard = folder_ / "heard";
-  test::Program log({"railfix", "log", "-f", "--config", root() + "/var/lib/railfix-train/generations/1/config.yaml"},
-                    {heard, {}, {}});
+  test::Program log({"railfix", "log", "-f", "--root", root()}, {heard, {}, {}});  // finds the train by itself
   const auto is_told = [&](const std::string& end) {
     return wait_until(
         [&] { return test::slurp(heard).find("started again: the process before " + end) != std::string::npos; });
