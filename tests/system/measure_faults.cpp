@@ -1,7 +1,7 @@
 // What a whole train does when one thing of it breaks: every fault of the table, one after the other, on one train.
 //   railfix-measure-faults              the whole campaign, about 20 minutes; exit code 1 when a target is missed
 //   railfix-measure-faults --random 15  faults at random that meet each other
-//   railfix-measure-faults --soak 60    sixty minutes without a fault: memory and latency
+//   railfix-measure-faults --soak 60    sixty minutes without a fault: memory, latency, processor time
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <iostream>

@@ -67,11 +67,21 @@ struct Series {
     line.sigma = std::sqrt(rest / (n - 2) / xx);
     return line;
   }
+  /// From the settled part.
+  [[nodiscard]] double median() const {
+    if (value.empty()) return 0;
+    std::vector<double> settled(
+        value.begin() + static_cast<std::ptrdiff_t>(kSettleShare * static_cast<double>(value.size())), value.end());
+    std::nth_element(settled.begin(), settled.begin() + static_cast<std::ptrdiff_t>(settled.size() / 2), settled.end());
+    return settled[settled.size() / 2];
+  }
 };
 
 struct Watched {
   Series memory_mb;
-  Series latency_ms;
+  Series latency_ms;  // from the picture's grab to this service's output, 99 of 100
+  Series usual_latency_ms;
+  Series cpu_percent;
   uint32_t pid = 0;
   int restarts = 0;
   uint64_t dropped = 0;
@@ -80,10 +90,10 @@ struct Watched {
 bool print(const std::map<std::string, Watched>& all, const Heard& heard, double ridden_s) {
   std::printf(
       "\nsoak after %.1f minutes: %llu states, %llu outside, longest pause of train_state %.2f s, of reports "
-      "%.2f s\n%-24s %26s %30s %8s %8s\n",
+      "%.2f s\n%-24s %26s %30s %8s %8s %8s %8s %8s\n",
       ridden_s / 60, static_cast<unsigned long long>(heard.states), static_cast<unsigned long long>(heard.outside),
       heard.state_gap_s, heard.report_gap_s, "service", "resident MB, slope an hour", "latency p99 ms, slope an hour",
-      "dropped", "restarts");
+      "p50 ms", "p99 ms", "CPU %", "dropped", "restarts");
   bool good = true;
   for (const auto& [name, one] : all) {
     const auto memory = one.memory_mb.line();
@@ -91,10 +101,11 @@ bool print(const std::map<std::string, Watched>& all, const Heard& heard, double
     const bool grows = memory.slope_per_hour - 2 * memory.sigma > kGrowthMbPerHour ||
                        latency.slope_per_hour - 2 * latency.sigma > kLatencyMsPerHour;
     good = good && !grows && one.restarts == 0;
-    std::printf("%-24s %6.1f to %6.1f, %+5.2f +- %4.2f  %6.1f to %6.1f, %+6.2f +- %4.2f  %8llu %8d%s\n", name.c_str(),
-                memory.first, memory.last, memory.slope_per_hour, memory.sigma, latency.first, latency.last,
-                latency.slope_per_hour, latency.sigma, static_cast<unsigned long long>(one.dropped), one.restarts,
-                grows ? "  GROWS" : "");
+    std::printf(
+        "%-24s %6.1f to %6.1f, %+5.2f +- %4.2f  %6.1f to %6.1f, %+6.2f +- %4.2f  %8.2f %8.2f %8.2f %8llu %8d%s\n",
+        name.c_str(), memory.first, memory.last, memory.slope_per_hour, memory.sigma, latency.first, latency.last,
+        latency.slope_per_hour, latency.sigma, one.usual_latency_ms.median(), one.latency_ms.median(),
+        one.cpu_percent.median(), static_cast<unsigned long long>(one.dropped), one.restarts, grows ? "  GROWS" : "");
   }
   std::fflush(stdout);
   return good && heard.outside == 0;
@@ -118,6 +129,8 @@ int soak(Rig& rig, Observer& observer, double minutes) {
       one.dropped = status.dropped();
       one.memory_mb.add(at_s, status.rss_mb());
       one.latency_ms.add(at_s, status.latency_p99_ms());
+      one.usual_latency_ms.add(at_s, status.latency_p50_ms());
+      one.cpu_percent.add(at_s, status.cpu_percent());
     }
     if (at_s - said_s < 600) continue;
     said_s = at_s;
