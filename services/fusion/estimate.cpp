@@ -38,7 +38,7 @@ Interval Estimator::interval() const {
   const double centre_m = path_ ? filter_.path_distance_m() : filter_.value(StateIndex::distance);
   const double sigma_m = path_ ? filter_.path_sigma_m() : filter_.sigma(StateIndex::distance);
   const double bound_m = parameters_->interval_factor * sigma_m + parameters_->interval_floor_m +
-                         parameters_->interval_drift * since_reference_m() + doubt_m_;
+                         parameters_->interval_drift * since_reference_m() + doubt_m_ + unchecked_m_;
   // Since the last sample the train may have stopped counting, or the clock may have run ahead.
   const double silent_s = core::seconds(filter_.stamp_ns() - stamp_ns_) - kFreshS;
   const double silent_m = std::abs(filter_.speed_mps()) * std::max(0.0, silent_s);

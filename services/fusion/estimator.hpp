@@ -224,6 +224,7 @@ class Estimator {
   std::optional<track::EdgePosition> off_path_;  // a fix was there since the last one that was used
   double excess_m_ = 0;                          // that others promise beyond this one's interval
   double doubt_m_ = 0;       // camera and the rest contradict each other by so much since the reference
+  double unchecked_m_ = 0;   // of the first step, until a second one or the wheel agrees
   double time_doubt_m_ = 0;  // so far behind, because time without data may be no time but a clock that was set
   int64_t gap_begin_ns_ = 0;
   double doubt_behind_m_ = 0;  // a refused fix says that the train is so far behind

@@ -28,6 +28,7 @@ constexpr double kGyroPositionSigmaM = 30.0;  // within which the curvature may 
 constexpr double kLatelyS = 1.0;
 constexpr double kBridgeS = 10.0;  // as long as the IMU alone is good for a speed
 constexpr double kTaughtS = 30.0;
+constexpr double kSleeperM = 0.7;  // one more or less: the odd error of a step
 constexpr double kBlindS = 0.3;
 constexpr double kHiddenSlipMps = 0.7;
 constexpr double kHiddenSlipShare = 0.07;  // of the speed
@@ -76,6 +77,8 @@ void Estimator::use(const OdometryInput& step) {
       camera.hear(offer.used, kAgreementsOfCamera, step.stamp_ns);
       if (alone) doubt_m_ += std::abs(offer.residual);
     } else if (const auto offer = offer_motion(Source::camera, step.stamp_ns, offered_to); offer.used) {
+      const bool nobody_before = camera.used_ns == 0 && watch(Source::wheel).used_ns == 0;
+      unchecked_m_ = nobody_before ? std::min(std::abs(step.step_m), kSleeperM) : 0;
       camera.accept(step.stamp_ns);
       if (step.reference_stamp_ns <= gap_begin_ns_ && filter_.has_clone(step.reference_stamp_ns)) time_doubt_m_ = 0;
       compare_with_wheel(step, sigma_m);
@@ -139,7 +142,7 @@ void Estimator::use(const WheelInput& sample) {
                return filter.offer_wheel(wheel_m, sigma_m, parameters_->gate_wheel);
              }).used) {
     watch.accept(sample.stamp_ns);
-    time_doubt_m_ = 0;
+    time_doubt_m_ = unchecked_m_ = 0;
   } else if (++watch.refused >= kRefusalsToIsolate) {
     isolate_wheel();
   }

@@ -3,6 +3,7 @@
 
 #include <iostream>
 
+#include "core/time.hpp"
 #include "support/train/verdict.hpp"
 
 namespace railfix::fusion {
@@ -156,6 +157,20 @@ TEST(Coverage, TheSensorThatIsWrongIsFoundOut) {
     EXPECT_EQ(verdict.wider_unsaid, 0U);
     EXPECT_LT(static_cast<double>(verdict.wider), 0.25 * static_cast<double>(verdict.states));
   }
+}
+
+// Nothing is known before it, so that no gate refuses it.
+TEST(Coverage, TheFirstStepMayCountASleeperTooMany) {
+  auto fusion = core::value_or_throw(Fusion::create({}, nullptr, std::nullopt));
+  constexpr int64_t kBeginNs = 1'700'000'000'000'000'000;
+  const auto at = [](int picture) { return kBeginNs + picture * core::kNsPerSecond / 20; };
+  const auto first = fusion.add(OdometryInput{at(1), at(0), 2.05, 0.002, true});
+  ASSERT_TRUE(first);
+  EXPECT_GT(first->over_m, 0.7);
+  EXPECT_GT(first->under_m, 0.7);
+  const auto second = fusion.add(OdometryInput{at(2), at(1), 2.05, 0.002, true});
+  ASSERT_TRUE(second);
+  EXPECT_LT(second->over_m, 0.7);
 }
 
 // One run of railfix-measure-confidence.
