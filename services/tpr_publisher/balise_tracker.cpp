@@ -15,6 +15,9 @@ using track::EdgePosition;
 
 constexpr double kAsideM = 0.001;
 constexpr double kLongestStepM = 500.0;  // farther apart two places are no way but a jump
+constexpr double kSameWayM = 1.0;        // a group passed again after another way than back is passed anew
+constexpr double kNearSwitchM = 50.0;    // a switch is doubted a little before the foot's estimate reaches it
+constexpr double kDecidedM = 3000.0;     // so far behind a switch its declaration may still be taken back
 
 double sign_of(Direction direction) {
   return direction == Direction::reverse ? -1.0 : 1.0;
@@ -41,6 +44,7 @@ BaliseTracker::BaliseTracker(std::shared_ptr<const track::Map> map, double searc
 void BaliseTracker::lose() {
   last_.reset();
   undeclared_.reset();
+  decided_.reset();
   reference_.reset();
 }
 
@@ -62,8 +66,26 @@ std::optional<double> BaliseTracker::undeclared_m() const {
   return std::abs(undeclared_->turns.way_m());
 }
 
+// Where the track divides on this step the last place is the stem. Doubted elsewhere, it is an earlier declaration that
+// is taken back.
+BaliseTracker::Undeclared BaliseTracker::undeclared_since(const EdgePosition& foot) {
+  if (!last_) return {};
+  const auto step = step_to(foot);
+  if (step && step->divides) return {last_, reference_, {}};
+  if (decided_) return *decided_;
+  if (!divides_near()) return {};
+  return {last_, reference_, {}};
+}
+
+void BaliseTracker::go_back_to(Undeclared undeclared) {
+  decided_.reset();
+  undeclared_ = std::move(undeclared);
+  reference_ = undeclared_->reference;
+  if (reference_) reference_->foot_m += undeclared_->turns.way_m();
+}
+
 void BaliseTracker::go_undeclared(const EdgePosition& foot) {
-  if (!undeclared_) undeclared_ = Undeclared{last_, {}};
+  if (!undeclared_) go_back_to(undeclared_since(foot));
   if (!undeclared_->from) return;
   const double before_m = undeclared_->turns.way_m();
   if (const auto step = step_to(foot)) {
@@ -77,14 +99,24 @@ void BaliseTracker::go_undeclared(const EdgePosition& foot) {
   if (reference_) reference_->foot_m += undeclared_->turns.way_m() - before_m;
 }
 
+/// To either side, because fusion and whoever declares the track do not place the train alike.
+bool BaliseTracker::divides_near() const {
+  const auto path = track::Path::follow(map_, *last_, kNearSwitchM, kNearSwitchM);
+  return path.ok() && !path.value().switches().empty();
+}
+
 bool BaliseTracker::go_declared(const EdgePosition& foot) {
   if (!last_) return false;
   if (!undeclared_) {
-    auto step = step_to(foot);
-    if (step) pass(std::move(step->groups), step->way_m);
-    return step.has_value();
+    if (auto step = step_to(foot)) {
+      run_on(step->way_m);
+      pass(std::move(step->groups), step->way_m);
+      return true;
+    }
+    if (!decided_) return false;
+    go_back_to(*std::exchange(decided_, std::nullopt));  // another leg than was declared before
   }
-  const auto undeclared = *std::exchange(undeclared_, std::nullopt);
+  auto undeclared = *std::exchange(undeclared_, std::nullopt);
   if (!undeclared.from) return false;
   const auto step = step_to(foot);
   const double counted_m = undeclared.turns.way_m();
@@ -96,17 +128,23 @@ bool BaliseTracker::go_declared(const EdgePosition& foot) {
     reference_->foot_m -= counted_m;
     for (const auto& way : ways) reference_->doubt_m = std::max(reference_->doubt_m, std::abs(way.length_m - length_m));
   }
-  Turns turns = undeclared.turns;
-  turns.run(length_m - counted_m);
+  undeclared.turns.run(length_m - counted_m);
   const auto groups = groups_on(ways);
-  const auto& points = turns.points();
+  const auto& points = undeclared.turns.points();
   for (size_t i = 1; i < points.size(); ++i) {
     auto passed = groups;
     for (auto& mark : passed)
       mark.way_m += length_m - points[i - 1];  // from the last place to where this stretch began
     pass(std::move(passed), points[i] - points[i - 1]);
   }
+  decided_ = std::move(undeclared);
   return true;
+}
+
+void BaliseTracker::run_on(double way_m) {
+  if (!decided_) return;
+  decided_->turns.run(way_m);
+  if (std::abs(decided_->turns.way_m()) > kDecidedM) decided_.reset();
 }
 
 /// At their distances from where the ways end. Beyond both ends the train may have been as well, before it turned:
@@ -160,8 +198,11 @@ std::optional<BaliseTracker::Step> BaliseTracker::step_to(const EdgePosition& fo
 
 std::optional<BaliseTracker::Step> BaliseTracker::step_on_edge(const EdgePosition& foot) const {
   if (foot.edge != last_->edge || foot.direction != last_->direction) return std::nullopt;
+  const track::Edge& edge = *map_->edge(foot.edge);
+  const bool over_its_end = std::abs(foot.offset_m - last_->offset_m) > 0.5 * edge.alignment.length_m();
+  if (edge.from_node == edge.to_node && over_its_end) return std::nullopt;  // a ring of one edge
   const double sign = sign_of(foot.direction);
-  Step step{sign * (foot.offset_m - last_->offset_m), {}};
+  Step step{sign * (foot.offset_m - last_->offset_m)};
   if (const auto groups = groups_on_.find(foot.edge); groups != groups_on_.end()) {
     for (const auto* group : groups->second) {
       step.groups.push_back(
@@ -179,7 +220,12 @@ std::optional<BaliseTracker::Step> BaliseTracker::step_over_edges(const EdgePosi
     const auto distance = distance_on(path.value(), from_last ? foot : *last_);
     if (!distance) continue;
     const double origin_m = from_last ? 0.0 : *distance;  // of the last place on this path
-    Step step{from_last ? *distance : -*distance, {}};
+    Step step{from_last ? *distance : -*distance};
+    const double low_m = origin_m + std::min(step.way_m, 0.0);
+    const double high_m = origin_m + std::max(step.way_m, 0.0);
+    step.divides = std::ranges::any_of(path.value().switches(), [&](const track::PathSwitch& one) {
+      return one.ahead == (step.way_m > 0) && one.distance_m >= low_m && one.distance_m <= high_m;
+    });
     for (const auto& mark : path.value().balise_groups()) {
       step.groups.push_back({mark.group, mark.distance_m - origin_m, mark.nominal_is_along_path});
     }
@@ -197,18 +243,29 @@ void BaliseTracker::pass(std::vector<Passed> passed, double step_m) {
   std::sort(passed.begin(), passed.end(),
             [&](const Passed& a, const Passed& b) { return along ? a.way_m < b.way_m : a.way_m > b.way_m; });
   for (const auto& mark : passed) {
-    if (reference_ && reference_->group == mark.group) continue;  // passed again: the same group stays the reference
-    const auto* previous = reference_ ? reference_->group : nullptr;
-    reference_ = Reference{mark.group, previous, mark.nominal_along, along, step_m - mark.way_m, mark.doubt_m};
+    const double foot_m = step_m - mark.way_m;
+    const bool again = reference_ && reference_->group == mark.group;
+    // Over and back it stays as it is. Round a loop it is passed anew, and no group lies before it.
+    if (again && reference_->nominal_along == mark.nominal_along &&
+        std::abs(reference_->foot_m - foot_m) <= kSameWayM + reference_->doubt_m)
+      continue;
+    const auto* previous = reference_ && !again ? reference_->group : nullptr;
+    reference_ = Reference{mark.group, previous, mark.nominal_along, along, foot_m, mark.doubt_m};
   }
 }
 
 void BaliseTracker::acquire(const EdgePosition& foot) {
   reference_.reset();
+  decided_.reset();
   const auto path = track::Path::follow(map_, foot, 0, search_behind_m_);
   if (!path.ok()) return;
+  // Where tracks have met behind the train nobody knows from which one it came.
+  double from_m = -search_behind_m_;
+  for (const auto& one : path.value().switches()) {
+    if (!one.ahead && one.distance_m <= 0) from_m = std::max(from_m, one.distance_m);
+  }
   for (const auto& mark : path.value().balise_groups()) {  // by distance: the last one is the nearest
-    if (mark.distance_m > 0) continue;
+    if (mark.distance_m > 0 || mark.distance_m < from_m) continue;
     const auto* previous = reference_ ? reference_->group : nullptr;
     reference_ = Reference{mark.group, previous, mark.nominal_is_along_path, true, -mark.distance_m};
   }

@@ -30,10 +30,13 @@ struct Reference {
 /// before the switch, and no group is taken. Once it is declared, the groups on the way that really led there count as
 /// passed. Where ways of different legs have joined again and nobody said which one it was, those that all of them
 /// have.
+///
+/// A declaration may be taken back, or another leg be declared: then the groups taken on the leg count no more, and the
+/// one before the switch is the reference again. Doubted without a switch to go back to, no group is known.
 class BaliseTracker {
  public:
   /// At the start, and after a jump to another track, the nearest group up to `search_behind_m` behind the train is
-  /// taken.
+  /// taken, when only one way leads from there.
   BaliseTracker(std::shared_ptr<const track::Map> map, double search_behind_m);
 
   /// REQUIRES: the direction is known. A place that is not on the map loses the reference.
@@ -56,17 +59,23 @@ class BaliseTracker {
   };
   struct Step {
     double way_m = 0;
-    std::vector<Passed> groups;  // near it, passed or not
+    std::vector<Passed> groups{};  // near it, passed or not
+    bool divides = false;          // over a switch that could have led elsewhere
   };
   struct Undeclared {
     std::optional<track::EdgePosition> from;  // the last declared place; nothing = there was none
+    std::optional<Reference> reference;       // there
     Turns turns;
   };
   [[nodiscard]] std::optional<Step> step_to(const track::EdgePosition& foot) const;
   [[nodiscard]] std::optional<Step> step_on_edge(const track::EdgePosition& foot) const;
   [[nodiscard]] std::optional<Step> step_over_edges(const track::EdgePosition& foot) const;
+  [[nodiscard]] Undeclared undeclared_since(const track::EdgePosition& foot);
+  [[nodiscard]] bool divides_near() const;
+  void go_back_to(Undeclared undeclared);
   void go_undeclared(const track::EdgePosition& foot);
   [[nodiscard]] bool go_declared(const track::EdgePosition& foot);
+  void run_on(double way_m);
   [[nodiscard]] std::vector<Passed> groups_on(const std::vector<WayBetween>& ways) const;
   void pass(std::vector<Passed> passed, double step_m);
   void acquire(const track::EdgePosition& foot);
@@ -77,6 +86,7 @@ class BaliseTracker {
   double search_behind_m_;
   std::optional<track::EdgePosition> last_;
   std::optional<Undeclared> undeclared_;
+  std::optional<Undeclared> decided_;  // the same after its track was declared, run on since then
   std::optional<Reference> reference_;
 };
 

@@ -110,6 +110,9 @@ std::optional<Reason> ReportTrigger::due(const Moment& moment) {
   }
   if (const auto reason = onboard_reason(moment)) return reason;
   if (group_passed_ && parameters_.m_loc == etcs::kReportAtGroups) return Reason::balise_group;
+  // What was said is not known any more: trackside must not go on with it until the cycle is over.
+  const bool taken_back = moment.nid_lrbg == etcs::kUnknownBaliseGroup && reported_->nid_lrbg != moment.nid_lrbg;
+  if (taken_back) return Reason::balise_group;
   if (location_passed_) return Reason::location;
   if (cycle_distance_over(moment)) return Reason::cycle_distance;
   if (cycle_time_over(moment)) return Reason::cycle_time;

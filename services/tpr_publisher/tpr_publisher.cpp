@@ -54,6 +54,10 @@ bool goes_on(const TrainPosition& last, const TrainPosition& now) {
   return std::abs(now.distance_m - last.distance_m) <= most_m;
 }
 
+// Of a train that comes to rest the estimated speed may have any sign: its direction is that of its way.
+constexpr double kSurelyMovesMps = 1.0;
+constexpr double kMovesM = 0.05;  // what fusion takes for rest
+
 bool is_number(const TrainPosition& position) {
   return !std::isinf(position.speed_mps) && std::isfinite(position.distance_m);
 }
@@ -71,13 +75,10 @@ void TprPublisher::follow(const TrainPosition& position) {
   if (position_ && !goes_on(*position_, position)) {
     integrity_.lose_way();
     trigger_.lose_way();
+    furthest_m_.reset();
   }
   position_ = position;
-  if (std::isnan(position.speed_mps)) {
-    motion_ = Motion::unknown;
-  } else if (!position.standstill && position.speed_mps != 0) {
-    motion_ = position.speed_mps > 0 ? Motion::forward : Motion::backward;
-  }
+  follow_motion(position);
   if (tracker_) {
     if (position.place_known()) {
       tracker_->update(position.foot, position.track_declared());
@@ -95,6 +96,20 @@ void TprPublisher::follow(const TrainPosition& position) {
   } else {
     integrity_.lose_way();
   }
+}
+
+void TprPublisher::follow_motion(const TrainPosition& position) {
+  if (!furthest_m_ || std::isnan(position.speed_mps)) {
+    motion_ = Motion::unknown;
+    furthest_m_ = position.distance_m;
+  }
+  const double moved_m = position.distance_m - *furthest_m_;
+  const bool fast = !position.standstill && std::abs(position.speed_mps) >= kSurelyMovesMps;
+  const Motion moves = (fast ? position.speed_mps : moved_m) > 0 ? Motion::forward : Motion::backward;
+  const bool agree = std::abs(moved_m) >= kMovesM && (moved_m > 0) == (position.speed_mps > 0);
+  if (!fast && moves != motion_ && !agree) return;
+  motion_ = moves;
+  furthest_m_ = position.distance_m;
 }
 
 TrainPosition TprPublisher::doubted_position() const {

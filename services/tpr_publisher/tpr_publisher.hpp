@@ -70,6 +70,7 @@ class TprPublisher {
 
  private:
   void follow(const TrainPosition& position);
+  void follow_motion(const TrainPosition& position);
   /// With the doubt of an undeclared track.
   [[nodiscard]] TrainPosition doubted_position() const;
   void hear_integrity(const Onboard& onboard, int64_t now_ns);
@@ -87,7 +88,8 @@ class TprPublisher {
   int64_t onboard_ahead_ns_ = 0;    // too much of it, and no confirmation is taken
   std::optional<Reference> reference_;
   std::optional<TrainPosition> position_;
-  Motion motion_ = Motion::unknown;  // the last one; kept at standstill
+  Motion motion_ = Motion::unknown;   // the last one; kept at standstill
+  std::optional<double> furthest_m_;  // travelled distance that it has come to
 };
 
 }  // namespace railfix::tpr_publisher

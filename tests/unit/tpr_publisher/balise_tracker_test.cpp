@@ -1,3 +1,5 @@
+#include <cmath>
+
 #include "unit/tpr_publisher/tracker_fixture.hpp"
 
 namespace railfix::tpr_publisher {
@@ -132,6 +134,38 @@ TEST_F(Tracker, SearchesOnlySoFarBehind) {
   EXPECT_FALSE(near.reference().has_value());
   near.update(forward(2, 20), true);  // steps beyond 500 m are jumps
   EXPECT_FALSE(near.reference().has_value());
+}
+
+TEST_F(Tracker, WhereTracksHaveMetBehindTheTrainNoGroupIsTaken) {
+  tracker.update(reverse(1, 900), true);  // from the line or from the siding, nobody knows
+  EXPECT_FALSE(tracker.reference().has_value());
+  tracker.update(reverse(1, 690), true);
+  expect(kC, 10);
+  EXPECT_EQ(previous(), 0U);
+}
+
+constexpr double kRoundM = 471;
+
+/// A ring of one edge with D at 100 m.
+std::shared_ptr<const track::Map> ring_map() {
+  auto map = std::make_shared<track::Map>();
+  const double curvature_per_m = 2 * core::kPi / kRoundM;
+  map->edges = {
+      {1, "ring", 1, 1, "", track::Alignment::chained({0, 0, 0}, {{kRoundM, curvature_per_m, curvature_per_m}})}};
+  map->connections = {{1, 1, 1, false}};
+  map->balise_groups = {{85, 4, 1, 100, true, true, 5, {}}};
+  return map;
+}
+
+TEST(Ring, AGroupPassedAgainRoundARingIsPassedAnew) {
+  BaliseTracker tracker(ring_map(), 5000);
+  for (int i = 9; i <= 105; ++i) {
+    tracker.update(forward(1, std::fmod(10.0 * i, kRoundM)), true);
+    if (i < 10) continue;
+    ASSERT_TRUE(tracker.reference().has_value());
+    EXPECT_EQ(tracker.reference()->group->nid_lrbg(), kD);
+    EXPECT_NEAR(tracker.reference()->foot_m, std::fmod(10.0 * i - 100, kRoundM), 1e-6);
+  }
 }
 
 }  // namespace

@@ -96,6 +96,7 @@ TEST_F(Trigger, EveryNewBaliseGroupUnlessNotWanted) {
   moment.nid_lrbg = 7;
   EXPECT_EQ(step(), Reason::balise_group);
   moment.nid_lrbg = etcs::kUnknownBaliseGroup;
+  EXPECT_EQ(step(), Reason::balise_group) << "what was said must not stand";
   EXPECT_EQ(step(), std::nullopt);
   moment.nid_lrbg = 7;  // found again, not new
   EXPECT_EQ(step(), std::nullopt);

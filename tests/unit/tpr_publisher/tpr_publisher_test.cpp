@@ -101,6 +101,44 @@ TEST(TprPublisher, DirectionOfMovementIsKeptAtStandstill) {
   EXPECT_EQ(publisher.update(position, position.stamp_ns).report->fields.q_dirtrain, etcs::kReverse);
 }
 
+TEST(TprPublisher, TheSpeedsNoiseAtRestIsNoMovement) {
+  TprPublisher publisher(balise_map(), settings());
+  double run_s = 0;
+  const auto direction = [&](double offset_m, double speed_mps, bool standstill) {
+    auto position = at(forward(1, offset_m), run_s, speed_mps);
+    position.standstill = standstill;
+    const auto outcome = publisher.update(position, position.stamp_ns);
+    run_s += 0.1;
+    return outcome.report ? outcome.report->fields.q_dirtrain : 99;
+  };
+  direction(150, 2, false);
+  for (int i = 0; i < 10; ++i) direction(150.2 + (i % 2) * 0.01, i % 2 == 0 ? -0.03 : 0.03, false);
+  EXPECT_EQ(direction(150.2, 0, true), etcs::kNominal);
+  for (int i = 1; i <= 5; ++i) direction(150.2 - 0.012 * i, -0.12, true);  // begins to back
+  EXPECT_EQ(direction(150.13, -0.12, false), etcs::kReverse);
+}
+
+TEST(TprPublisher, ADirectionOfBeforeAGapIsNotKnownAtStandstill) {
+  TprPublisher publisher(balise_map(), settings());
+  publisher.update(at(forward(1, 150), 0, 20), kStart);
+  const auto later = at(forward(1, 150), 60, 0);
+  const auto outcome = publisher.update(later, later.stamp_ns);
+  ASSERT_TRUE(outcome.report.has_value());
+  EXPECT_EQ(outcome.report->fields.q_dirtrain, etcs::kUnknownSide);
+}
+
+TEST(TprPublisher, AReferenceThatIsTakenBackIsSaidAtOnce) {
+  TprPublisher publisher(balise_map(), settings());
+  publisher.update(at(forward(1, 450), 0, 20), kStart);
+  auto position = at(forward(1, 454), 0.2, 20);
+  position.track_probability = 0.5;  // no switch is near
+  const auto outcome = publisher.update(position, position.stamp_ns);
+  ASSERT_TRUE(outcome.report.has_value());
+  EXPECT_EQ(outcome.report->reason, Reason::balise_group);
+  EXPECT_EQ(outcome.report->fields.nid_lrbg, etcs::kUnknownBaliseGroup);
+  EXPECT_EQ(outcome.report->fields.l_doubtunder, etcs::kUnknownDistance);
+}
+
 TEST(TprPublisher, NumbersThatAreNoneAreRefused) {
   TprPublisher publisher(balise_map(), settings());
   auto position = at(forward(1, 150), 0, 20);

@@ -145,6 +145,63 @@ TEST_F(UndeclaredTrack, MovedOntoAnotherLegBehindWhichTheNextSwitchIsOpen) {
   expect(kE, 154);
 }
 
+TEST_F(UndeclaredTrack, ADeclarationThatIsTakenBackTakesItsGroupsAlong) {
+  run_past_the_groups();
+  tracker.update(forward(2, 252), true);
+  for (double offset_m = 260; offset_m <= 700; offset_m += 20) tracker.update(forward(2, offset_m), true);
+  expect(kD, 500);
+  tracker.update(forward(2, 720), false);
+  expect(kC, 1020);
+  EXPECT_EQ(previous(), kB);
+  EXPECT_NEAR(*tracker.undeclared_m(), 730, 1e-9);
+  tracker.update(forward(2, 740), true);
+  expect(kD, 540);
+}
+
+TEST_F(UndeclaredTrack, AnotherLegThanWasDeclaredCountsFromTheSwitch) {
+  run_past_the_groups();
+  tracker.update(forward(2, 252), true);
+  tracker.update(forward(2, 262), true);
+  expect(kD, 62);
+  tracker.update(reverse(3, 228), true);
+  expect(kE, 172);
+  EXPECT_EQ(previous(), kC) << "D was never passed";
+  tracker.update(reverse(3, 218), false);
+  expect(kC, 582);
+}
+
+TEST_F(UndeclaredTrack, DoubtedAfreshAtTheNextSwitchTheGroupOfTheStemStays) {
+  run_past_the_groups();
+  tracker.update(forward(2, 252), true);
+  for (double offset_m = 240; offset_m > 0; offset_m -= 20) tracker.update(forward(2, offset_m), true);
+  tracker.update(forward(1, 980), true);
+  expect(kD, -220);  // passed there and back
+  tracker.update(forward(2, 10), false);
+  expect(kD, -190);
+}
+
+TEST_F(UndeclaredTrack, DoubtedWithoutASwitchNoGroupIsKnown) {
+  tracker.update(forward(1, 450), true);
+  tracker.update(forward(1, 500), true);
+  tracker.update(forward(1, 520), false);
+  EXPECT_FALSE(tracker.reference().has_value());
+  tracker.update(forward(1, 720), false);
+  EXPECT_FALSE(tracker.reference().has_value());
+  tracker.update(forward(1, 740), true);
+  expect(kC, 40);
+}
+
+TEST_F(UndeclaredTrack, DoubtedALittleBeforeTheSwitchTheGroupStays) {
+  tracker.update(forward(1, 990), true);
+  tracker.update(forward(1, 995), false);
+  expect(kC, 295);
+  tracker.update(forward(2, 5), false);
+  tracker.update(forward(2, 250), false);
+  expect(kC, 550);
+  tracker.update(reverse(3, 248), true);
+  expect(kE, 152);
+}
+
 /// A loop whose siding is 5 m longer than the straight track; groups A 100 on 1, D 200 on 2, E 200 on 3, B 100 on 4.
 std::shared_ptr<const track::Map> loop_map() {
   using track::Alignment;
