@@ -16,6 +16,7 @@ constexpr int kColumns = 2 * 75 + 1;
 constexpr double kHalfHeadM = 0.036;
 constexpr double kInsideM[] = {-0.45, -0.13};  // where the other rail is looked for, outward from the crossing
 constexpr double kOutsideM[] = {0.13, 0.45};
+constexpr double kApartM = 0.22;  // outside, from here on its head stands clear of ours and of the wing rail
 constexpr double kSlopes[] = {0.04, 0.05, 0.06, 0.07, 0.08, 0.09, 0.10, 0.11, 0.12, 0.135, 0.15, 0.17};
 constexpr double kStepM = 0.2;  // between crossings that are tried
 constexpr double kCrossingM[] = {5.0, 16.0};
@@ -24,6 +25,8 @@ constexpr double kCoarseScore = 0.45;
 constexpr double kLowestScore = 0.55;
 constexpr float kLowestContrast = 5.0F;  // grey levels of our own rails
 constexpr double kPeakReachM = 0.05;
+constexpr double kEdgeReachM = 0.03;
+constexpr double kNextM = 0.1;
 constexpr size_t kFewestPoints = 16;
 constexpr double kWorstFitM = 0.012;
 
@@ -52,20 +55,29 @@ const std::vector<GroundCandidate>& FrogSearch::find(const LandmarkPicture& pict
   while (first_row_ < rows_ && grey_.at<float>(first_row_, kColumns / 4) < 0) ++first_row_;
   Crossing crossing = best_crossing();
   GroundCandidate candidate;
-  if (crossing.score() > kCoarseScore && refine(crossing, candidate)) found_.push_back(candidate);
+  if (crossing.score() > kCoarseScore && refine(picture, crossing, candidate)) found_.push_back(candidate);
   return found_;
 }
 
+// On the plane of the rail heads.
+Eigen::Vector3d FrogSearch::point_at(double ahead_m, double lateral_m) const {
+  const double turn = curvature_per_m_ * ahead_m;
+  const Eigen::Vector3d left(-std::sin(turn), std::cos(turn), 0);
+  const Eigen::Vector3d centre(ahead_m, 0.5 * ahead_m * turn, 0.5 * vertical_curvature_per_m_ * ahead_m * ahead_m);
+  return centre + left * lateral_m;
+}
+
 void FrogSearch::look(const LandmarkPicture& picture) {
+  curvature_per_m_ = picture.curvature_per_m;
+  vertical_curvature_per_m_ = picture.vertical_curvature_per_m;
   const Eigen::Matrix3d camera_from_track = geometry::rotation_camera_from_track(picture.pose);
   const Eigen::Vector3d eye(0, picture.pose.lateral_m, picture.pose.height_m);
   for (int row = 0; row < rows_; ++row) {
     const double s = kNearM + row * kRowM;
-    const double turn = picture.curvature_per_m * s;
-    const Eigen::Vector3d left(-std::sin(turn), std::cos(turn), 0);
-    const Eigen::Vector3d centre(s, 0.5 * s * turn, 0.5 * picture.vertical_curvature_per_m * s * s);
-    lines_.sample(picture.grey, (camera_from_track * (centre - left * kHalfWidthM - eye)).cast<float>(),
-                  (camera_from_track * left * kColumnM).cast<float>(), kColumns, grey_.ptr<float>(row));
+    const Eigen::Vector3d first = point_at(s, -kHalfWidthM);
+    const Eigen::Vector3d across = (point_at(s, kHalfWidthM) - first) / (2 * kHalfWidthM);
+    lines_.sample(picture.grey, (camera_from_track * (first - eye)).cast<float>(),
+                  (camera_from_track * across * kColumnM).cast<float>(), kColumns, grey_.ptr<float>(row));
   }
 }
 
@@ -167,9 +179,30 @@ bool FrogSearch::peak_near(int row, double lateral_m, double& found_m) const {
   return true;
 }
 
-bool FrogSearch::refine(Crossing& crossing, GroundCandidate& candidate) {
-  const double zero_m = 0.5 * options_.gauge_m - kHalfHeadM;
-  const double own_m = 0.5 * options_.gauge_m + kHalfHeadM;
+// Inner edge of a rail of the side's kind, near the middle that its ridge has there, where it has it. The middle of a
+// ridge alone is drawn to one side by the dark flank of the head, most where the rail runs across the line of sight.
+std::optional<double> FrogSearch::inner_edge(const cv::Mat& grey, const geometry::View& view, const Place& place) {
+  double middle_m = 0;
+  if (!peak_near(place.row, place.lateral_m, middle_m)) return std::nullopt;
+  const double inner_m = middle_m - place.kind * kHalfHeadM;
+  const double ahead_m = kNearM + place.row * kRowM;
+  const auto inner = view.project(point_at(ahead_m, inner_m));
+  const auto outer = view.project(point_at(ahead_m, inner_m + place.kind * 2 * kHalfHeadM));
+  const auto next = view.project(point_at(ahead_m + kNextM, inner_m + place.slope * kNextM));
+  if (!inner || !outer || !next) return std::nullopt;
+  EdgeOptions options;
+  options.head_m = 2 * kHalfHeadM;
+  options.reach_m = kEdgeReachM;
+  RailEdge edge;
+  if (edges_.find_at(grey, {*inner, *outer, *next}, options, edge) != EdgeFinder::Look::found) return std::nullopt;
+  return inner_m + place.kind * edge.offset_m;
+}
+
+bool FrogSearch::refine(const LandmarkPicture& picture, Crossing& crossing, GroundCandidate& candidate) {
+  const geometry::View view(lines_.camera(), picture.pose);
+  const double half_gauge_m = 0.5 * options_.gauge_m;
+  const double zero_m = half_gauge_m - kHalfHeadM;
+  const double own_m = half_gauge_m + kHalfHeadM;
   points_.clear();
   double own_off_m = 0;
   int own_count = 0;
@@ -177,14 +210,16 @@ bool FrogSearch::refine(Crossing& crossing, GroundCandidate& candidate) {
     const double ahead_m = kNearM + row * kRowM;
     const double out_m = (ahead_m - crossing.at_m) * crossing.slope;
     if (out_m < kInsideM[0] || out_m > kOutsideM[1]) continue;
-    if (out_m > kInsideM[1] && out_m < kOutsideM[0]) continue;
-    double found_m = 0;
-    if (peak_near(row, crossing.side * (zero_m + out_m), found_m)) {
-      points_.push_back({ahead_m - crossing.at_m, crossing.side * found_m - zero_m});
+    if (out_m > kInsideM[1] && out_m < kApartM) continue;
+    const int side = crossing.side;
+    // Of its own track it is the rail on the other side.
+    if (const auto edge =
+            inner_edge(picture.grey, view, {row, side * (zero_m + out_m), -side, side * crossing.slope})) {
+      points_.push_back({ahead_m - crossing.at_m, side * *edge - half_gauge_m});
     }
-    // The other rail is the same rail of its track as our opposite one: light from one side shifts both alike.
-    if (peak_near(row, -crossing.side * own_m, found_m)) {
-      own_off_m += crossing.side * found_m + own_m;
+    // Our opposite rail is the same rail of its track: light from one side shifts both alike.
+    if (const auto edge = inner_edge(picture.grey, view, {row, -side * own_m, -side, 0})) {
+      own_off_m += side * *edge + half_gauge_m;
       ++own_count;
     }
   }

@@ -1,10 +1,12 @@
 // Frogs: where the rail of another track crosses one of our rails at a small angle (paper 002, figure 10).
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "track_detector/landmark_types.hpp"
 #include "track_detector/picture_lines.hpp"
+#include "track_detector/rail_edges.hpp"
 
 namespace railfix::track_detector {
 
@@ -34,7 +36,16 @@ class FrogSearch {
   void rate_ridges(int row);
   [[nodiscard]] Crossing best_crossing() const;
   void rate(Crossing& crossing) const;
-  bool refine(Crossing& crossing, GroundCandidate& candidate);
+  bool refine(const LandmarkPicture& picture, Crossing& crossing, GroundCandidate& candidate);
+  /// Where a rail is looked for: a row, the middle of its head, +1 for a left rail of its track, and how it runs.
+  struct Place {
+    int row = 0;
+    double lateral_m = 0;
+    int kind = 1;
+    double slope = 0;
+  };
+  std::optional<double> inner_edge(const cv::Mat& grey, const geometry::View& view, const Place& place);
+  [[nodiscard]] Eigen::Vector3d point_at(double ahead_m, double lateral_m) const;
   [[nodiscard]] bool peak_near(int row, double lateral_m, double& found_m) const;
 
   LandmarkOptions options_;
@@ -46,6 +57,9 @@ class FrogSearch {
   cv::Mat spread_;     // the largest of each column and its neighbours
   std::vector<float> sums_;
   std::vector<Point> points_;
+  double curvature_per_m_ = 0;  // of the picture
+  double vertical_curvature_per_m_ = 0;
+  EdgeFinder edges_;
   std::vector<GroundCandidate> found_;
 };
 

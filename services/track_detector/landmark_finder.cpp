@@ -17,8 +17,9 @@ constexpr double kFrogScore = 0.36;  // a frog is false with half of exp(-(its s
 constexpr double kPlateEvenOdds = -3.5;
 constexpr double kPlateTrustALook = 0.8;
 constexpr int kFewestPlatePictures = 3;
-constexpr double kShutterS = 0.002;   // open about so long
-constexpr double kFrogSigmaM = 0.09;  // what does not average out: wear, the blades' gap
+constexpr double kShutterS = 0.002;  // open about so long
+constexpr double kFrogSigmaM =
+    0.06;  // what does not average out: 3 to 4 mm of wear between two edges that cross at 1:14
 
 GroundTracking frog_tracking(const LandmarkOptions& options) {
   GroundTracking tracking;

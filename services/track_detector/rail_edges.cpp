@@ -129,34 +129,42 @@ const std::vector<RailEdge>& EdgeFinder::find(const cv::Mat& grey, const geometr
       const auto outer = view.project(rail_point(shape, side, options.gauge_m, ahead_m, options.head_m));
       const auto next = view.project(rail_point(shape, side, options.gauge_m, ahead_m * 1.01));
       if (!inner || !outer || !next) continue;
-      const double head_px = (*outer - *inner).norm();
-      if (head_px < options.smallest_head_px || !inside(grey, *inner)) continue;
-      const double px_per_m = head_px / options.head_m;
-      const Eigen::Vector2d outward = (*outer - *inner) / head_px * kStepPx;
-      const Eigen::Vector2d along = (*next - *inner).normalized();
-      const double reach_px = std::max(options.reach_m * px_per_m, 2.0);
-      const double side_px = std::max(kSideM * px_per_m, 1.5);
-      const int before = static_cast<int>(std::ceil((reach_px + side_px) / kStepPx)) + 1;
-      const int behind = static_cast<int>(std::ceil((reach_px + head_px + side_px) / kStepPx)) + 1;
-      if (!profile_.take(grey, *inner - outward * before, outward, along, before + behind + 1)) continue;
-      ++count;
-      const auto crossing = find_crossing(profile_, head_px / kStepPx, side_px / kStepPx, options.dark ? -1.0 : 1.0,
-                                          options.min_contrast);
-      if (!crossing) continue;
       RailEdge edge;
-      double at = crossing->at - before;
-      if (crossing->burnt_out) at += (options.dark ? -kSwallowedPx : kSwallowedPx) / kStepPx;
-      edge.point.pixel = *inner + outward * at;
+      const auto look = find_at(grey, {*inner, *outer, *next}, options, edge);
+      if (look == Look::outside) continue;
+      ++count;
+      if (look == Look::unclear) continue;
       edge.point.side = side;
-      edge.point.bias_sigma_px = crossing->burnt_out ? kSwallowedSigmaPx : kBiasPx;
-      edge.point.sigma_px = std::hypot(kEdgeSigmaPx, kEdgeSigmaM * px_per_m);
       edge.ahead_m = ahead_m;
-      edge.offset_m = at * kStepPx / px_per_m;
-      edge.contrast = crossing->contrast;
       edges_.push_back(edge);
     }
   }
   return edges_;
+}
+
+EdgeFinder::Look EdgeFinder::find_at(const cv::Mat& grey, const Place& place, const EdgeOptions& options,
+                                     RailEdge& edge) {
+  const double head_px = (place.outer - place.inner).norm();
+  if (head_px < options.smallest_head_px || !inside(grey, place.inner)) return Look::outside;
+  const double px_per_m = head_px / options.head_m;
+  const Eigen::Vector2d outward = (place.outer - place.inner) / head_px * kStepPx;
+  const Eigen::Vector2d along = (place.next - place.inner).normalized();
+  const double reach_px = std::max(options.reach_m * px_per_m, 2.0);
+  const double side_px = std::max(kSideM * px_per_m, 1.5);
+  const int before = static_cast<int>(std::ceil((reach_px + side_px) / kStepPx)) + 1;
+  const int behind = static_cast<int>(std::ceil((reach_px + head_px + side_px) / kStepPx)) + 1;
+  if (!profile_.take(grey, place.inner - outward * before, outward, along, before + behind + 1)) return Look::outside;
+  const auto crossing =
+      find_crossing(profile_, head_px / kStepPx, side_px / kStepPx, options.dark ? -1.0 : 1.0, options.min_contrast);
+  if (!crossing) return Look::unclear;
+  double at = crossing->at - before;
+  if (crossing->burnt_out) at += (options.dark ? -kSwallowedPx : kSwallowedPx) / kStepPx;
+  edge.point.pixel = place.inner + outward * at;
+  edge.point.bias_sigma_px = crossing->burnt_out ? kSwallowedSigmaPx : kBiasPx;
+  edge.point.sigma_px = std::hypot(kEdgeSigmaPx, kEdgeSigmaM * px_per_m);
+  edge.offset_m = at * kStepPx / px_per_m;
+  edge.contrast = crossing->contrast;
+  return Look::found;
 }
 
 }  // namespace railfix::track_detector

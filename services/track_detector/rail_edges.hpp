@@ -50,6 +50,14 @@ class EdgeFinder {
   const std::vector<RailEdge>& find(const cv::Mat& grey, const geometry::Intrinsics& camera, const TrackShape& shape,
                                     const EdgeOptions& options, int tried[2]);
 
+  /// Where a rail is expected, in pixels: its inner edge, the other side of its head, and a place further along.
+  struct Place {
+    Eigen::Vector2d inner, outer, next;
+  };
+  enum class Look : uint8_t { outside, unclear, found };
+  /// The inner edge of one rail at one place; `edge` is set (but for side and ahead_m) when it is found.
+  Look find_at(const cv::Mat& grey, const Place& place, const EdgeOptions& options, RailEdge& edge);
+
  private:
   EdgeProfile profile_;
   std::vector<RailEdge> edges_;
