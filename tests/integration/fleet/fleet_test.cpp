@@ -24,6 +24,7 @@ class Fleet : public FleetTest {
     std::ranges::replace(service, '_', '-');
     int count = 0;
     for (const auto& process : fs::directory_iterator("/proc")) {
+      if (!lives(static_cast<pid_t>(std::atoll(process.path().filename().c_str())))) continue;
       const auto command = test::slurp(process.path() / "cmdline");
       const bool is_it = command.substr(0, command.find('\0')).ends_with("/railfix-" + service);
       if (is_it && command.find(root()) != std::string::npos) ++count;
@@ -129,11 +130,19 @@ TEST_F(Fleet, ANewSupervisorFindsTheServicesWithoutTheNotesOfTheOneBefore) {
     }
   };
   kill_supervisor();
+  const auto fusion = before["services"][0];
+  ASSERT_EQ(fusion["service"], "fusion");
+  std::vector<std::string> command;
+  std::istringstream words(test::slurp("/proc/" + std::to_string(fusion["pid"].get<pid_t>()) + "/cmdline"));
+  for (std::string word; std::getline(words, word, '\0');) command.push_back(word);
+  const test::Program second(command, {folder_ / "second.log", {}, {}});
+  ASSERT_TRUE(wait_until([&] { return processes_of("fusion") == 2; }));
   std::ofstream(home / "state.yaml") << "fusion: {pid: [";
   EXPECT_THAT(train({"status", "--root", root()}).err, HasSubstr("state.yaml is damaged (yaml-cpp: error at line 1"));
   {
     test::Program systemds({"railfix", "train", "supervise", "--root", root()}, {folder_ / "supervisor.log", {}, {}});
     EXPECT_TRUE(wait_until([&] { return test::slurp(home / "state.yaml").find("born") != std::string::npos; }));
+    EXPECT_THAT(test::slurp(folder_ / "supervisor.log"), HasSubstr("ends a second fusion"));
     expect_same("of another supervisor, with a damaged file");
   }
   fs::remove(home / "state.yaml");

@@ -25,17 +25,22 @@ std::vector<PlannedService> known_services(const HostFolder& folder) {
   return known;
 }
 
-/// The younger of two has the name.
-void add(HostState& all, const std::string& name, const RunningService& one) {
-  const auto there = all.find(name);
-  if (there == all.end()) {
-    all.emplace(name, one);
-  } else if (there->second.born <= one.born) {
-    all[name + kBefore] = there->second;
-    all[name] = one;
-  } else {
-    all[name + kBefore] = one;
+using Processes = std::map<std::string, std::vector<RunningService>>;
+
+/// The oldest knows most; the youngest may be there to succeed it.
+HostState in_their_places(Processes processes) {
+  HostState all;
+  for (auto& [name, of_one] : processes) {
+    std::ranges::sort(of_one, {}, &RunningService::born);
+    const bool succeeded = of_one.size() > 1 && of_one.back().beside;
+    for (size_t i = 0; i < of_one.size(); ++i) {
+      const bool has_name = i == (succeeded ? of_one.size() - 1 : 0);
+      const bool is_succeeded = succeeded && i == 0;
+      const std::string place = has_name ? "" : is_succeeded ? kBefore : kTooMany + std::to_string(of_one[i].pid);
+      all[name + place] = of_one[i];
+    }
   }
+  return all;
 }
 
 }  // namespace
@@ -45,13 +50,15 @@ std::vector<std::string> usual_command(std::vector<std::string> command) {
   return command;
 }
 
+std::string service_of(const std::string& key) {
+  return key.substr(0, key.find(' '));
+}
+
 HostState running_on(const HostFolder& folder, const HostState& noted) {
-  HostState all;
+  Processes processes;
   std::set<int64_t> pids;
-  for (const auto& [name, service] : noted) {
-    if (!service.runs()) continue;
-    all.emplace(name, service);
-    pids.insert(service.pid);
+  for (const auto& [key, service] : noted) {
+    if (service.runs() && pids.insert(service.pid).second) processes[service_of(key)].push_back(service);
   }
   const auto known = known_services(folder);
   std::error_code none;
@@ -68,9 +75,9 @@ HostState running_on(const HostFolder& folder, const HostState& noted) {
     found.generation = is->generation;
     found.beside = usual != command;
     found.born = born_of(pid);
-    if (found.runs()) add(all, is->name, found);
+    if (found.runs()) processes[is->name].push_back(found);
   }
-  return all;
+  return in_their_places(std::move(processes));
 }
 
 }  // namespace railfix::tool

@@ -130,7 +130,7 @@ class Supervision {
     const auto all = running_on(folder_, or_nothing([this] { return folder_.state(); }));
     for (const auto& [key, running] : all) {
       PlannedService service;
-      service.name = key.substr(0, key.find(kBefore));
+      service.name = service_of(key);
       service.generation = running.generation;
       service.command = usual_command(command_of(static_cast<pid_t>(running.pid)));
       const auto* planned = plan.service(service.name);
@@ -138,10 +138,10 @@ class Supervision {
       auto& children = running.beside ? successors_ : children_;
       children.emplace_back(as_planned ? *planned : service, folder_, common, running.beside);
       children.back().adopt(running);
-      const bool stays = key == service.name || all.at(service.name).beside;
-      std::cerr << "railfix: " << (stays ? "goes on with " : "ends a second ") << service.name << ", process "
+      const bool too_many = key.find(kTooMany) != std::string::npos;
+      std::cerr << "railfix: " << (too_many ? "ends a second " : "goes on with ") << service.name << ", process "
                 << running.pid << std::endl;
-      if (stays) continue;
+      if (!too_many) continue;
       stop({&children.back()});
       children.pop_back();
     }
