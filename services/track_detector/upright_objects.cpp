@@ -28,7 +28,9 @@ constexpr double kExitLateralM = 0.6;   // an exit's edge from the wall
 constexpr double kExitWideShare = 0.7;  // of the widest bearing: near enough for the exit's place
 constexpr double kOneSideSigmaM = 0.2;
 constexpr double kDaylightShare = 0.8;  // of the brightness in front of the tunnel
-constexpr double kOpenShare = 0.8;      // of the brightness far behind it
+constexpr double kOpenShare = 0.92;     // of the brightness far behind it
+constexpr double kBurntOutGrey = 243;   // a picture does not show the last panel apart from brighter land
+constexpr double kHiddenSigmaM = 0.6;   // ... and the wall may end where that panel does
 constexpr double kObjectSigmaM = 0.05;  // of where the surveyor's point of an object is
 constexpr double kSameMastM = 1.5;
 constexpr double kSameBridgeM = 15;
@@ -257,7 +259,7 @@ void UprightObjects::look_for_exit(const SettledEdge& edge) {
     weights += weight;
   }
   if (sum < exit.place_m * weights) return;
-  exit = {sum / weights, edge.sigma_m, edge.pictures};
+  exit = {sum / weights, edge.sigma_m, edge.pictures, edge.inner_grey > kBurntOutGrey};
 }
 
 // A portal's outer corners look like a bridge and come first.
@@ -299,8 +301,9 @@ void UprightObjects::release_exit(const EdgeTracker& tracker, double way_m) {
   double place_m = both ? 0.5 * (first.place_m + other.place_m) : first.place_m;
   // The last piece of wall may be nearly as bright as the land behind it: its end is faint.
   if (const auto end_m = tracker.last_step(tunnel_.wall_m, place_m - kExitOffM, place_m + kPanelM)) place_m = *end_m;
-  objects_.push_back(
-      {LandmarkType::portal_out, place_m, 0, std::hypot(kExitSigmaM, both ? 0.0 : kOneSideSigmaM), first.pictures});
+  const bool hidden = first.burnt_out && (!both || other.burnt_out);
+  const double sigma_m = std::hypot(kExitSigmaM, both ? 0.0 : kOneSideSigmaM, hidden ? kHiddenSigmaM : 0.0);
+  objects_.push_back({LandmarkType::portal_out, place_m, 0, sigma_m, first.pictures});
   tunnel_ = {};
   exits_ = {};
 }

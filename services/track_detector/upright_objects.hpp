@@ -65,6 +65,7 @@ class UprightObjects {
   struct Exit {
     double place_m = -1e9, sigma_m = 0;
     int pictures = 0;
+    bool burnt_out = false;  // what is behind it
   };
   std::vector<Edge> edges_;             // not yet forgotten
   std::vector<UprightObject> held_;     // told when nothing better can follow

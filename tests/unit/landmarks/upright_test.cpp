@@ -169,6 +169,23 @@ TEST(Uprights, APanelThatGlaresBeforeTheEndIsNotThePortalOut) {
   EXPECT_NEAR(told[1].place_m, 72.5, 0.08);
 }
 
+// As in a drawn tunnel whose last half metre of wall was as burnt out as the land behind it.
+TEST(Uprights, AnEndBeforeBurntOutLandMayHideAPanel) {
+  const auto sigma_m = [](double land_grey) {
+    const auto told = pass(on_both_walls({{40, 2.7, 70, 120, 60, 15}, {70, 2.7, land_grey, 150, land_grey, 248}}), 80);
+    return told.size() == 2 ? told[1].sigma_m : 0.0;
+  };
+  EXPECT_GT(sigma_m(247), 0.6);
+  EXPECT_NEAR(sigma_m(238), 0.2, 0.05);
+}
+
+// Greys of a drawn tunnel: the last panel but one glares, and the last one is nearly as bright as the land.
+TEST(Uprights, AWallThatIsDarkerThanTheOpenLandHasNotEnded) {
+  const auto told = pass(on_both_walls({{40, 2.7, 70, 120, 60, 15}, {70, 2.7, 213, 109, 226, 249}}), 80);
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0].type, LandmarkType::portal_in);
+}
+
 // A burnt-out picture shows noise where the last step of a wall is looked for.
 TEST(Uprights, NoiseIsNoLastStepOfAWall) {
   for (uint64_t seed = 1; seed <= 40; ++seed) {
