@@ -40,8 +40,8 @@ Interval Estimator::interval() const {
   const double bound_m = parameters_->interval_factor * sigma_m + parameters_->interval_floor_m +
                          parameters_->interval_drift * since_reference_m() + doubt_m_ + unchecked_m_;
   // Since the last sample the train may have stopped counting, or the clock may have run ahead.
-  const double silent_s = core::seconds(filter_.stamp_ns() - stamp_ns_) - kFreshS;
-  const double silent_m = std::abs(filter_.speed_mps()) * std::max(0.0, silent_s);
+  const double silent_s = core::seconds(filter_.stamp_ns() - stamp_ns_);
+  const double silent_m = silent_s > kFreshS ? std::abs(filter_.speed_mps()) * silent_s : 0;
   const double behind_m = std::max(bound_m, doubt_behind_m_) + time_doubt_m_ + silent_m;
   return {centre_m - behind_m, centre_m + std::max(bound_m, doubt_ahead_m_)};
 }

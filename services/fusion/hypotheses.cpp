@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "core/time.hpp"
@@ -10,6 +11,7 @@ namespace railfix::fusion {
 namespace {
 
 constexpr int kFixesToSettle = 2;
+constexpr double kSureFix = 0.99;
 constexpr double kRivalGoneS = 1.0;
 constexpr double kProofS = 2.0;
 constexpr double kSameSpeedsS = 3.0;
@@ -93,8 +95,8 @@ void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
   main_.contradicted_by(std::max(most.behind_m, most.ahead_m));
   main_.apply(event);
   main_.contradicted_by(0);
-  std::vector<Doubter> doubters_before;  // only a refused fix asks for them
-  if (main_.fix_refused()) doubters_before = doubters_;
+  std::vector<Doubter> doubters_before;  // a refused fix asks for them, and one that is not sure
+  if (main_.fix_refused() || fix.probability < kSureFix) doubters_before = doubters_;
   for (auto& doubter : doubters_) {
     if (!doubter.leaves_out(fix)) doubter.estimator.apply(event);
   }
@@ -105,7 +107,8 @@ void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
   if (main_.fix_refused()) {
     if (adopt_by_fix(fix, before, doubters_before) || !adopt_doubter(fix, std::move(doubters_before))) return;
   } else if (main_.fix_used()) {
-    settle_doubters(fix, std::move(before));
+    auto without_both = without_two(fix, doubters_before);
+    settle_doubters(fix, std::move(before), std::move(without_both));
   } else {
     return;
   }
@@ -126,8 +129,21 @@ bool Hypotheses::adopt_doubter(const FixInput& fix, std::vector<Doubter> before)
   return true;
 }
 
+// A landmark that is told by those before it may be wrong because one of them is.
+std::vector<Hypotheses::Doubter> Hypotheses::without_two(const FixInput& fix,
+                                                         const std::vector<Doubter>& before) const {
+  std::vector<Doubter> without;
+  if (fix.kind == FixKind::curvature || fix.new_path || fix.probability >= kSureFix) return without;
+  for (size_t i = 0; i < before.size(); ++i) {
+    const auto& now = doubters_[i];
+    if (now.of_shape || now.of_two || !now.estimator.fix_used() || now.estimator.fix_corrected()) continue;
+    without.push_back({before[i].estimator, fix.landmark, false, 0, true});
+  }
+  return without;
+}
+
 // What the main one alone fits is confirmed. What both fit may be so by chance once, not twice.
-void Hypotheses::settle_doubters(const FixInput& fix, Estimator before) {
+void Hypotheses::settle_doubters(const FixInput& fix, Estimator before, std::vector<Doubter> without_both) {
   const bool of_shape = fix.kind == FixKind::curvature;
   if (std::ranges::any_of(doubters_, [&](const Doubter& doubter) { return doubter.leaves_out(fix); })) return;
   std::erase_if(doubters_, [&](Doubter& doubter) {
@@ -135,6 +151,7 @@ void Hypotheses::settle_doubters(const FixInput& fix, Estimator before) {
     if (of_shape) return doubter.of_shape;
     return doubter.of_shape || ++doubter.agreed >= kFixesToSettle;
   });
+  std::ranges::move(without_both, std::back_inserter(doubters_));
   if (!fix.new_path) doubters_.push_back({std::move(before), fix.landmark, of_shape});
 }
 

@@ -1,13 +1,14 @@
 // Several estimators side by side, so that the promised interval holds whichever single source is wrong.
 //
 // The main one uses everything. Doubters do without one of the last two places that landmarks gave, which may be false
-// with full confidence, and without the last one of the track's shape; the interval holds their ends until later fixes
-// agree with the main one. When such a fix fits a doubter alone, that becomes the main one, and the main one a doubter:
-// either fix may be the false one. Four rivals do without camera, wheel, IMU or GNSS: the interval holds their ends too
-// (solution separation, as in receiver autonomous integrity monitoring: Brown and McBurney 1988), because a fault may
-// be too slow for any test on innovations. A rival that contradicts itself, or has no odometer left, is not asked; what
-// it said last is carried along until a fix confirms the main one. When the main one contradicts itself and one rival
-// alone has two sensors that agree, or fits a fix that the main one refuses, that rival becomes the main one.
+// with full confidence, without both where the second was told by those before it, and without the last one of the
+// track's shape; the interval holds their ends until later fixes agree with the main one. When such a fix fits a
+// doubter alone, that becomes the main one, and the main one a doubter: either fix may be the false one. Four rivals do
+// without camera, wheel, IMU or GNSS: the interval holds their ends too (solution separation, as in receiver autonomous
+// integrity monitoring: Brown and McBurney 1988), because a fault may be too slow for any test on innovations. A rival
+// that contradicts itself, or has no odometer left, is not asked; what it said last is carried along until a fix
+// confirms the main one. When the main one contradicts itself and one rival alone has two sensors that agree, or fits a
+// fix that the main one refuses, that rival becomes the main one.
 #pragma once
 
 #include <array>
@@ -64,6 +65,7 @@ class Hypotheses {
     uint32_t landmark = 0;  // of that fix; a second sighting of it may have the same error
     bool of_shape = false;  // the fix is of kind curvature
     int agreed = 0;         // later fixes that both have used: these tell nothing of who is right
+    bool of_two = false;    // also without the fix before that one
 
     [[nodiscard]] bool leaves_out(const FixInput& fix) const { return landmark != 0 && landmark == fix.landmark; }
   };
@@ -84,7 +86,8 @@ class Hypotheses {
   void apply_fix(const FixInput& fix, const Event& event);
   bool adopt_by_fix(const FixInput& fix, const Estimator& before, const std::vector<Doubter>& doubters);
   bool adopt_doubter(const FixInput& fix, std::vector<Doubter> before);
-  void settle_doubters(const FixInput& fix, Estimator before);
+  [[nodiscard]] std::vector<Doubter> without_two(const FixInput& fix, const std::vector<Doubter>& before) const;
+  void settle_doubters(const FixInput& fix, Estimator before, std::vector<Doubter> without_both);
   void confirm_rivals();
   void exclude_faulty();
   void adopt(Rival& rival);

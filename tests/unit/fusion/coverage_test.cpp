@@ -9,6 +9,8 @@
 namespace railfix::fusion {
 namespace {
 
+using train::FaultKind;
+using train::Sensor;
 using train::SimulationPlan;
 
 constexpr double kEarlierS = 15;  // faults begin after 25 s
@@ -138,8 +140,6 @@ TEST(Coverage, OneFaultySensorStaysInsideTheInterval) {
 // Runs in which the interval once grew to kilometres, or the train was outside it, because fusion believed the wrong
 // one.
 TEST(Coverage, TheSensorThatIsWrongIsFoundOut) {
-  using train::FaultKind;
-  using train::Sensor;
   SimulationPlan plan = train::campaign_plan();
   for (const auto& [seed, fault] :
        {std::pair<uint64_t, train::Fault>{11'000'009, {Sensor::wheel, FaultKind::stuck, 109.5, 169.5, 1}},
@@ -173,37 +173,71 @@ TEST(Coverage, TheFirstStepMayCountASleeperTooMany) {
   EXPECT_LT(second->over_m, 0.7);
 }
 
+struct CampaignRun {
+  uint64_t seed;
+  uint64_t number;
+  train::Sensor sensor;
+  train::FaultKind kind;
+  bool shape = true;
+  bool sightings = false;
+};
+
 // One run of railfix-measure-confidence.
-train::Verdict campaign_run(uint64_t seed, uint64_t number, train::Sensor sensor, train::FaultKind kind, bool shape) {
+size_t outside_in(const CampaignRun& run) {
   SimulationPlan plan = train::campaign_plan();
   plan.track_fixes = true;
   plan.switch_spacing_m = 1500;
-  plan.shape = shape;
-  const uint64_t run_seed = seed * 1'000'000 + number;
-  core::Random random(run_seed * 77 + 5);
+  plan.shape = run.shape;
+  plan.sightings = run.sightings;
+  if (run.sightings) plan.landmark_spacing_m = 0;
+  const uint64_t seed = run.seed * 1'000'000 + run.number;
+  core::Random random(seed * 77 + 5);
   (void)random.uniform();
-  plan.fault = train::random_fault(random, sensor, kind, plan.duration_s);
-  const train::TrainSimulation simulation(plan, run_seed);
+  if (run.sensor != Sensor::none) plan.fault = train::random_fault(random, run.sensor, run.kind, plan.duration_s);
+  const train::TrainSimulation simulation(plan, seed);
   auto fusion = core::value_or_throw(Fusion::create({}, simulation.map, simulation.start()));
-  return train::judge(simulation, fusion);
+  return train::judge(simulation, fusion).outside;
 }
 
 // Two landmarks in a row are off by metres, the second contradicts the first and fits what is known without it, which
 // is little. 136 states were outside before neither of the two was sure.
 TEST(Coverage, TwoLandmarksInARowThatAreOffByMetres) {
-  EXPECT_EQ(campaign_run(1504, 86, train::Sensor::fix, train::FaultKind::noise, false).outside, 0U);
+  EXPECT_EQ(outside_in({1504, 86, Sensor::fix, FaultKind::noise, false}), 0U);
 }
 
 // The same, but the second one fits what is known without the wheel, so that the wheel is found guilty. 26 states were
 // outside, because the doubt about the first one was forgotten over that.
 TEST(Coverage, TwoLandmarksThatAreOffAndAWheelThatIsBlamedForIt) {
-  EXPECT_EQ(campaign_run(2002, 368, train::Sensor::fix, train::FaultKind::noise, true).outside, 0U);
+  EXPECT_EQ(outside_in({2002, 368, Sensor::fix, FaultKind::noise}), 0U);
 }
 
 // The train starts in the dark with a stuck wheel. What does without the wheel had taken its place over from what the
 // wheel had counted, and a vague fix of the shape ended all doubt. 13 states were outside.
 TEST(Coverage, APlaceThatTheWrongSensorHadCountedIsNotSure) {
-  EXPECT_EQ(campaign_run(2001, 64, train::Sensor::wheel, train::FaultKind::stuck, true).outside, 0U);
+  EXPECT_EQ(outside_in({2001, 64, Sensor::wheel, FaultKind::stuck}), 0U);
+}
+
+// The wheel had slipped, an IMU that does not know the speed any more finds it well again in the dark, and it slips on.
+// 507 states were outside.
+TEST(Coverage, AWheelThatComesBackInTheDarkMaySlipOn) {
+  EXPECT_EQ(
+      outside_in({.seed = 2102, .number = 62, .sensor = Sensor::wheel, .kind = FaultKind::bias, .sightings = true}),
+      0U);
+}
+
+// A mast was moved, and the next balise is told by it: both are wrong. 21 states were outside.
+TEST(Coverage, ALandmarkThatIsToldByAWrongOneIsNotSure) {
+  EXPECT_EQ(
+      outside_in({.seed = 2202, .number = 385, .sensor = Sensor::none, .kind = FaultKind::none, .sightings = true}),
+      0U);
+}
+
+// For 0.1 s more than it waits for samples anyway the interval did not grow; the clock had stepped by 0.3 s.
+TEST(Coverage, AClockThatStepsIsHeldFromTheFirstMoment) {
+  EXPECT_EQ(
+      outside_in(
+          {.seed = 2202, .number = 52, .sensor = Sensor::clock, .kind = FaultKind::clock_step, .sightings = true}),
+      0U);
 }
 
 }  // namespace
