@@ -72,8 +72,7 @@ TEST_F(Fleet, ServicesComeUpComeBackAfterAKillAndGoDown) {
   ASSERT_GT(last["pid"].get<pid_t>(), 1);
   ASSERT_EQ(kill(last["pid"].get<pid_t>(), SIGKILL), 0);
   EXPECT_EQ(train({"down", "--root", root()}).exit_code, 0);
-  for (const auto& entry : fs::directory_iterator("/dev/shm"))
-    EXPECT_THAT(entry.path().string(), Not(HasSubstr("railfix-health-" + id_))) << "left behind";
+  EXPECT_THAT(in_memory("health"), ::testing::IsEmpty()) << "left behind";
   const auto after = train({"status", "--root", root()});
   EXPECT_EQ(after.exit_code, 1);
   EXPECT_THAT(after.out, HasSubstr("down: railfix train up"));
@@ -238,6 +237,17 @@ TEST_F(Fleet, AnUpgradeRestartsWhatChangedAndRollsBackByItselfWhenItIsBad) {
   const auto back = train({"rollback", "--root", root(), "--healthy-for", "1", "--patience", "60"});
   EXPECT_EQ(back.exit_code, 0) << back.out << back.err;
   EXPECT_EQ(status("tpr_publisher")["generation"], reports["generation"]);
+}
+
+// A fusion that was started beside another one has taken its place, and its file in the host's memory another name.
+TEST_F(Fleet, AfterAnUpgradeDownLeavesNothingBehind) {
+  ASSERT_EQ(up().exit_code, 0);
+  write_manifest(RAILFIX_TEST_RELEASE, ", fusion: { use_gnss: false }");
+  const auto upgraded = upgrade();
+  ASSERT_EQ(upgraded.exit_code, 0) << upgraded.out << upgraded.err;
+  EXPECT_EQ(in_memory("health").size(), 2U);
+  EXPECT_EQ(train({"down", "--root", root()}).exit_code, 0);
+  EXPECT_THAT(in_memory("health"), ::testing::IsEmpty());
 }
 
 TEST_F(Fleet, AMistakeInTheManifestStartsNothing) {

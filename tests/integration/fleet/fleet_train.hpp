@@ -18,6 +18,7 @@ class FleetTest : public ::testing::Test {
   FleetTest() { fs::create_directories(folder_ / "train"); }
   ~FleetTest() override {
     train({"down", "--root", root()});
+    for (const auto& notes : in_memory("notes")) fs::remove(notes);  // they are for a restart
     fs::remove_all(folder_);
   }
   [[nodiscard]] std::string root() const { return (folder_ / "root").string(); }
@@ -46,6 +47,14 @@ class FleetTest : public ::testing::Test {
       poll(nullptr, 0, 100);
     }
     return true;
+  }
+  /// Of this train, in the host's memory.
+  [[nodiscard]] std::vector<fs::path> in_memory(const std::string& what) const {
+    std::vector<fs::path> files;
+    for (const auto& entry : fs::directory_iterator("/dev/shm")) {
+      if (entry.path().filename().string().starts_with("railfix-" + what + "-" + id_)) files.push_back(entry.path());
+    }
+    return files;
   }
   /// Not when it only waits for whoever reaps orphans here.
   static bool lives(pid_t pid) {

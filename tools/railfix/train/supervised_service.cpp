@@ -145,7 +145,10 @@ void SupervisedService::kill_it() {
 
 bool SupervisedService::ended() {
   int ignored = 0;
-  if (pid_ > 0 && has_ended(ignored)) pid_ = 0;
+  if (pid_ > 0 && has_ended(ignored)) {
+    pid_ = 0;
+    forget_health();  // one that was started beside another one does not know its file under the usual name
+  }
   return pid_ == 0;
 }
 
