@@ -93,6 +93,20 @@ core::Status key_fits(const std::filesystem::path& key, const std::filesystem::p
   return core::Error{key.string() + " is not the private key of " + certificate.string()};
 }
 
+core::Status signed_by(const std::filesystem::path& authorities, const std::filesystem::path& certificate) {
+  const auto issued = read_certificate(certificate);
+  const auto issuer = read_pem(authorities, [&](FILE* file) {
+    Certificate authority{nullptr, X509_free};
+    do {
+      authority.reset(PEM_read_X509(file, nullptr, nullptr, nullptr));
+    } while (authority && issued && X509_verify(issued.get(), X509_get0_pubkey(authority.get())) != 1);
+    return authority.release();
+  });
+  const Certificate found{issuer, X509_free};
+  if (issued && found) return {};
+  return core::Error{certificate.string() + " was not signed by the authority in " + authorities.string()};
+}
+
 int64_t days_until(int64_t ends_ns) {
   constexpr int64_t kDayNs = 86'400 * core::kNsPerSecond;
   const int64_t left_ns = ends_ns - core::wall_ns();

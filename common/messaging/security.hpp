@@ -30,6 +30,8 @@ int64_t days_until(int64_t ends_ns);
 core::Result<int64_t> days_left(const std::filesystem::path& certificate);
 /// Error: `key` is no private key, asks for a password, or belongs to another certificate than this one.
 core::Status key_fits(const std::filesystem::path& key, const std::filesystem::path& certificate);
+/// Error: none of the authorities in this file has signed the certificate.
+core::Status signed_by(const std::filesystem::path& authorities, const std::filesystem::path& certificate);
 /// "runs out in 5 days", "ran out 2 days ago".
 std::string end_text(int64_t days_left);
 

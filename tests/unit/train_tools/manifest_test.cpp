@@ -209,6 +209,35 @@ TEST_F(TrainFolder, WhatIsMissingOfASecuredTrainIsToldOnceAndMadeAgain) {
   EXPECT_EQ(test::slurp(folder_ / "security/coach/fusion.cert.pem"), certificate) << "what was there has stayed";
 }
 
+// A folder that was copied in parts.
+TEST_F(TrainFolder, ACertificateOfAnotherAuthorityIsTold) {
+  std::ofstream(folder_ / "line.map") << "map";
+  const auto secured = manifest(kTrain, "run_as: programs", "security: true").value();
+  ASSERT_TRUE(make_keys(secured, {}).ok());
+  const auto certificate = folder_ / "security/cab/fusion.cert.pem";
+  const auto key = folder_ / "security/cab/fusion.key.pem";
+  fs::copy_file(certificate, folder_ / "cert");
+  fs::copy_file(key, folder_ / "key");
+  fs::remove_all(folder_ / "security");
+  ASSERT_TRUE(make_keys(secured, {}).ok());
+  EXPECT_THAT(findings("run_as: programs", "security: true"), IsEmpty());
+  fs::copy_file(folder_ / "cert", certificate, fs::copy_options::overwrite_existing);
+  fs::copy_file(folder_ / "key", key, fs::copy_options::overwrite_existing);
+  EXPECT_THAT(findings("run_as: programs", "security: true"),
+              ElementsAre(HasSubstr("fusion.cert.pem was not signed by the authority in " +
+                                    (folder_ / "security/cab/ca.pem").string() + "; copy the whole folder anew")));
+  // While the authority is exchanged both count.
+  ASSERT_TRUE(make_keys(secured, {.renew = true}).ok());
+  ASSERT_TRUE(make_keys(secured, {.next_authority = true}).ok());
+  EXPECT_THAT(findings("run_as: programs", "security: true"), IsEmpty());
+  fs::copy_file(certificate, folder_ / "cert", fs::copy_options::overwrite_existing);
+  fs::copy_file(key, folder_ / "key", fs::copy_options::overwrite_existing);
+  ASSERT_TRUE(make_keys(secured, {.renew = true}).ok());
+  fs::copy_file(folder_ / "cert", certificate, fs::copy_options::overwrite_existing);
+  fs::copy_file(folder_ / "key", key, fs::copy_options::overwrite_existing);
+  EXPECT_THAT(findings("run_as: programs", "security: true"), IsEmpty()) << "by the former one";
+}
+
 // Another authority would be a stranger to the train that runs.
 TEST_F(TrainFolder, NoOtherAuthorityIsMadeWhereTheOneOfTheCertificatesIsNot) {
   const auto secured = manifest(kTrain, "run_as: programs", "security: true").value();

@@ -16,6 +16,7 @@ namespace fs = std::filesystem;
 constexpr const char* kRenewAuthority = "; exchange the authority, beginning with railfix train keys --next-authority";
 constexpr const char* kRenewElsewhere = "; get a new one, put it there, then railfix train upgrade on each host";
 constexpr const char* kOtherKey = "; put there the one that the certificate was made with";
+constexpr const char* kOneMaking = "; copy the whole folder anew from where the train's keys were made";
 constexpr const char* kRenew = "; railfix train keys --renew, then railfix train upgrade on each host";
 
 int64_t warning_days(const YAML::Node& settings) {
@@ -53,6 +54,10 @@ bool check_identity(const fs::path& folder, const std::string& service, int64_t 
   const auto certificate = messaging::certificate_of(folder, service);
   check_end(certificate, soon_days, kRenew, findings);
   check_key(folder / (service + ".key.pem"), certificate, "", kRenew, findings);
+  if (messaging::days_left(certificate).ok() && messaging::days_left(folder / "ca.pem").ok()) {
+    if (const auto issued = messaging::signed_by(folder / "ca.pem", certificate); !issued.ok())
+      add_once(findings, {true, issued.error().message + kOneMaking});
+  }
   return true;
 }
 
