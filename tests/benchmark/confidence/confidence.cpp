@@ -29,6 +29,7 @@ struct Arguments {
   int position = 0;
   std::string row;
   double saved_wrong = -1;
+  double every_m = 0;
   bool learnt = false;
   bool list = false;
 };
@@ -167,6 +168,7 @@ int run(int argc, char** argv) {
   app.add_option("--position", a.position,
                  "What each source is worth, frogs and portals as references: a table of so many runs of 33 km");
   app.add_option("--row", a.row, "... with this set of sensors alone, as the table names it");
+  app.add_option("--every-m", a.every_m, "... with a reference as good as a frog every so many metres instead");
   app.add_flag("--learnt", a.learnt, "... with the scales that an earlier trip of the same train has taught");
   app.add_option(
       "--saved-wrong", a.saved_wrong,
@@ -191,7 +193,7 @@ int run(int argc, char** argv) {
     return 0;
   }
   if (a.position > 0) {
-    const auto stanford = print_positions({a.plan.seed, a.position, a.row, a.learnt});
+    const auto stanford = print_positions({a.plan.seed, a.position, a.row, a.every_m, a.learnt});
     char title[100];
     std::snprintf(title, sizeof title, "what each source is worth: %d runs, seed %llu", a.position,
                   static_cast<unsigned long long>(a.plan.seed));

@@ -18,21 +18,24 @@ constexpr double kPassedM = 5;             // a sighting has come to fusion so f
 constexpr uint64_t kTripBefore = 500'000;  // to its seed
 constexpr double kEveryM = 1;  // of the way a state counts: a train that stands for an hour is one place, not many
 
+constexpr double kFrogSigmaM = 0.06;
 constexpr double kUnheard = 1e3;  // sigma of a sensor that is not there
 
 // As measured: drift up to 0.03 % over 26 km, 0.07 % in the mean over 100 m; frogs 0.05 to 0.06 m, portals 0.07 to
 // 0.19 m (docs/figures.md).
-SimulationPlan plan_of(const SensorSet& row) {
+SimulationPlan plan_of(const SensorSet& row, double every_m) {
   SimulationPlan plan;
   plan.duration_s = 6000;
   plan.camera = row.camera;
   plan.wheel = row.wheel;
   plan.imu = row.imu || row.curvature;
   plan.gnss = row.gnss;
-  plan.landmark_spacing_m = 0;
-  if (row.landmarks) {
+  plan.shape = row.curvature;
+  plan.landmark_spacing_m = row.landmarks ? every_m : 0;
+  plan.fix_sigma_m = kFrogSigmaM;
+  if (row.landmarks && every_m == 0) {
     plan.map_landmarks = {
-        {LandmarkKind::frog, 0.06}, {LandmarkKind::portal_in, 0.10}, {LandmarkKind::portal_out, 0.19}};
+        {LandmarkKind::frog, kFrogSigmaM}, {LandmarkKind::portal_in, 0.10}, {LandmarkKind::portal_out, 0.19}};
   }
   plan.visual_scale_error = 0.0003;
   plan.visual_wander = 0.0007;
@@ -56,8 +59,10 @@ fusion::FusionParameters parameters_of(const SensorSet& row) {
 }
 
 // Places of the references that a run with landmarks has; the same for all rows.
-std::vector<double> references_on(const track::Path& path) {
+std::vector<double> references_on(const track::Path& path, double every_m) {
   std::vector<double> places;
+  for (double place_m = every_m; every_m > 0 && place_m < path.end_m(); place_m += every_m) places.push_back(place_m);
+  if (every_m > 0) return places;
   for (const auto& mark : path.landmarks()) {
     const bool one = mark.kind == LandmarkKind::frog || mark.kind == LandmarkKind::portal_in ||
                      mark.kind == LandmarkKind::portal_out;
@@ -95,7 +100,7 @@ void run_once(const PositionPlan& asked, const SensorSet& row, int run, const st
               Verdict& sum, Errors& errors, StanfordCounts& stanford) {
   const auto start = map->parse_position("1:100").value();
   const uint64_t seed = asked.seed * 1000 + static_cast<uint64_t>(run);
-  SimulationPlan plan = plan_of(row);
+  SimulationPlan plan = plan_of(row, asked.every_m);
   std::optional<fusion::SavedScales> saved;
   if (asked.learnt) {
     plan.train = seed;
@@ -104,7 +109,7 @@ void run_once(const PositionPlan& asked, const SensorSet& row, int run, const st
   }
   const TrainSimulation simulation(plan, seed, map, start);
   auto fusion = core::value_or_throw(fusion::Fusion::create(parameters_of(row), map, simulation.start(), saved));
-  const auto places = references_on(simulation.path());
+  const auto places = references_on(simulation.path(), asked.every_m);
   double next_m = 0;
   int outside = 0;
   sum.add(judge(simulation, fusion, 0, [&](const fusion::TrainEstimate& state, double error_m) {

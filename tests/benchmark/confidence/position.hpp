@@ -12,6 +12,7 @@ struct PositionPlan {
   uint64_t seed = 1;
   int runs = 1;
   std::string only;     // this row alone, empty = all
+  double every_m = 0;   // references so far apart instead of the line's own
   bool learnt = false;  // every run begins with the scales that another trip of its train has taught
 };
 
