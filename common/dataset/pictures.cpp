@@ -2,15 +2,13 @@
 #include <cctype>
 #include <charconv>
 #include <fstream>
-#include <opencv2/core/utils/logger.hpp>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
-#include <opencv2/videoio.hpp>
 #include <set>
 
 #include "core/csv.hpp"
 #include "core/time.hpp"
 #include "dataset/dataset.hpp"
+#include "dataset/video_source.hpp"
+#include "pictures/decode.hpp"
 
 namespace railfix::dataset {
 namespace {
@@ -18,11 +16,6 @@ namespace {
 namespace fs = std::filesystem;
 using core::Error;
 using core::Result;
-
-constexpr double kDefaultFps = 30.0;
-
-using MaybePicture = Result<std::optional<Picture>>;
-using MaybeSource = Result<std::unique_ptr<PictureSource>>;
 
 std::string lower_extension(const fs::path& file) {
   std::string extension = file.extension().string();
@@ -41,6 +34,24 @@ struct Entry {
   fs::path file;
 };
 
+Result<std::vector<uint8_t>> bytes_of(const fs::path& file) {
+  std::error_code problem;
+  const auto size = fs::file_size(file, problem);
+  std::vector<uint8_t> bytes(problem ? 0 : size);
+  std::ifstream in(file, std::ios::binary);
+  if (problem || !in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size())))
+    return Error{file.string() + " cannot be read; it is missing, or not a file that may be read"};
+  return bytes;
+}
+
+core::Status decode_into(cv::Mat& picture, int type, const std::vector<uint8_t>& bytes) {
+  return pictures::decode(bytes, type == CV_8UC1 ? pictures::Pixels::grey : pictures::Pixels::bgr,
+                          [&](int width_px, int height_px) {
+                            picture.create(height_px, width_px, type);
+                            return picture.data;
+                          });
+}
+
 /// Pictures in files of their own.
 class FileSource : public PictureSource {
  public:
@@ -50,14 +61,11 @@ class FileSource : public PictureSource {
     if (position_ == entries_.size()) return std::optional<Picture>();
     const Entry& entry = entries_[position_++];
     Picture picture{entry.stamp_ns, entry.file.filename().string(), {}};
-    try {
-      picture.grey = cv::imread(entry.file.string(), cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
-      if (colour_) picture.colour = cv::imread(entry.file.string(), cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
-    } catch (const cv::Exception& problem) {
-      return Error{entry.file.string() + " cannot be read as a picture: " + problem.err};
-    }
-    if (picture.grey.empty())
-      return Error{entry.file.string() + " cannot be read as a picture; it is missing or broken"};
+    const auto bytes = bytes_of(entry.file);
+    if (!bytes.ok()) return bytes.error();
+    core::Status read = decode_into(picture.grey, CV_8UC1, bytes.value());
+    if (read.ok() && colour_) read = decode_into(picture.colour, CV_8UC3, bytes.value());
+    if (!read.ok()) return Error{entry.file.string() + " " + read.error().message};
     return std::optional<Picture>(std::move(picture));
   }
   [[nodiscard]] std::optional<int64_t> next_stamp_ns() const override {
@@ -75,47 +83,6 @@ class FileSource : public PictureSource {
   std::vector<Entry> entries_;
   bool colour_;
   size_t position_ = 0;
-};
-
-/// Frames of a video; their times are frame number / fps, as players do it.
-class VideoSource : public PictureSource {
- public:
-  VideoSource(const cv::VideoCapture& capture, double fps, bool colour)
-      : capture_(capture), fps_(fps), colour_(colour) {}
-
-  MaybePicture next() override {
-    cv::Mat frame;
-    try {
-      if (!capture_.read(frame) || frame.empty()) return std::optional<Picture>();
-      Picture picture{*next_stamp_ns(), std::to_string(number_), {}};
-      ++number_;
-      if (frame.channels() == 1) {
-        picture.grey = frame;
-        if (colour_) cv::cvtColor(frame, picture.colour, cv::COLOR_GRAY2BGR);
-      } else {
-        cv::cvtColor(frame, picture.grey, cv::COLOR_BGR2GRAY);
-        if (colour_) picture.colour = frame;
-      }
-      return std::optional<Picture>(std::move(picture));
-    } catch (const cv::Exception& problem) {
-      return Error{"video frame " + std::to_string(number_++) + " cannot be decoded: " + problem.err};
-    }
-  }
-  [[nodiscard]] std::optional<int64_t> next_stamp_ns() const override {
-    return core::to_ns(static_cast<double>(number_) / fps_);
-  }
-  bool skip() override {
-    if (!capture_.grab()) return false;
-    ++number_;
-    return true;
-  }
-  [[nodiscard]] std::optional<size_t> count() const override { return std::nullopt; }
-
- private:
-  cv::VideoCapture capture_;
-  double fps_;
-  bool colour_;
-  int64_t number_ = 0;
 };
 
 MaybeSource open_euroc(const fs::path& camera, const PictureOptions& options) {
@@ -185,19 +152,9 @@ MaybeSource open_kitti(const fs::path& sequence, const PictureOptions& options) 
   return std::unique_ptr<PictureSource>(std::make_unique<FileSource>(std::move(entries), options.colour));
 }
 
-MaybeSource open_video(const fs::path& file, const PictureOptions& options) {
-  double fps = options.fps;
-  cv::VideoCapture capture(file.string());
-  if (!capture.isOpened()) return Error{file.string() + " is neither a picture nor a video that can be opened"};
-  if (fps <= 0) fps = capture.get(cv::CAP_PROP_FPS);
-  if (!(fps > 0 && fps < 100'000)) fps = kDefaultFps;
-  return std::unique_ptr<PictureSource>(std::make_unique<VideoSource>(capture, fps, options.colour));
-}
-
 }  // namespace
 
 MaybeSource open_pictures(const fs::path& path, const PictureOptions& options) {
-  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // our sentence is enough
   if (!fs::exists(path))
     return Error{path.string() + " does not exist; give a dataset folder, a folder of pictures or a video"};
   if (!fs::is_directory(path)) {

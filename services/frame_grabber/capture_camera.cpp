@@ -1,17 +1,17 @@
-// V4L2, GStreamer and network cameras through OpenCV. Stamps are arrival less latency: these cameras tell no time.
+// V4L2, GStreamer pipelines and network cameras. Stamps are the time at which a picture, or the first of its data, came
+// to this computer, less latency: these cameras tell no time. What decoding takes is no part of it.
 //
 // Opening and reading may block for as long as the device likes, so a thread does it that nobody has to wait for.
 #include <atomic>
 #include <cctype>
 #include <condition_variable>
 #include <mutex>
-#include <opencv2/core/utils/logger.hpp>
-#include <opencv2/videoio.hpp>
 #include <thread>
 #include <utility>
 
 #include "core/time.hpp"
 #include "frame_grabber/live_camera.hpp"
+#include "video/stream.hpp"
 
 namespace railfix::frame_grabber {
 namespace {
@@ -26,15 +26,16 @@ struct Shared {
   std::condition_variable changed;
   bool stop = false;
   bool ended = false;   // the thread is through
-  std::string backend;  // once it is open
+  bool open = false;    // it runs
   std::string problem;  // why it cannot be opened or read any more
   std::optional<RawPicture> newest;
 };
 
 constexpr std::chrono::seconds kOpenPatience{15};
 constexpr std::chrono::milliseconds kEndPatience{500};
+constexpr std::chrono::milliseconds kStopCheck{100};
 
-/// One device, pipeline or file, as OpenCV opens it.
+/// One device, pipeline, address or file.
 class Capture {
  public:
   Capture(std::string what, const LiveConfig& config) : what_(std::move(what)), config_(config) {}
@@ -43,17 +44,11 @@ class Capture {
   /// The thread.
   void run(Shared& shared) {
     std::string problem;
-    try {
-      if (open()) {
-        tell(shared, [this](Shared& s) { s.backend = capture_.getBackendName(); });
-        while (problem.empty() && !stopped(shared)) problem = take(shared);
-      } else {
-        problem = how_it_failed();
-      }
-    } catch (const cv::Exception& error) {
-      problem = shared.backend.empty() ? how_it_failed() : name() + " cannot be read: " + error.err;
+    {
+      auto opened = open();
+      if (!opened.ok()) problem = how_it_failed(opened.error().message);
+      while (problem.empty() && !stopped(shared)) problem = take(shared, *opened.value());
     }
-    capture_.release();
     tell(shared, [&problem](Shared& s) {
       s.problem = problem;
       s.ended = true;
@@ -75,42 +70,30 @@ class Capture {
     return what_.starts_with("/dev/") || (what_.size() == 1 && std::isdigit(static_cast<unsigned char>(what_[0])) != 0);
   }
   [[nodiscard]] bool pipeline() const { return what_.find('!') != std::string::npos; }
-  bool open() {
-    cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // our sentence is enough
-    const bool opened = pipeline()                      ? capture_.open(what_, cv::CAP_GSTREAMER)
-                        : what_.size() == 1 && device() ? capture_.open(what_[0] - '0', cv::CAP_V4L2)
-                                                        : capture_.open(what_, device() ? cv::CAP_V4L2 : cv::CAP_ANY);
-    if (!opened) return false;
-    if (config_.width_px > 0) capture_.set(cv::CAP_PROP_FRAME_WIDTH, static_cast<double>(config_.width_px));
-    if (config_.height_px > 0) capture_.set(cv::CAP_PROP_FRAME_HEIGHT, static_cast<double>(config_.height_px));
-    if (config_.rate_hz > 0) capture_.set(cv::CAP_PROP_FPS, config_.rate_hz);
-    const double rate_hz = config_.rate_hz > 0 ? config_.rate_hz : capture_.get(cv::CAP_PROP_FPS);
-    const bool is_file = !device() && !pipeline() && capture_.get(cv::CAP_PROP_FRAME_COUNT) > 0;
-    file_period_ns_ = is_file && rate_hz > 0 ? core::to_ns(1 / rate_hz) : 0;  // a file waits for nobody
-    next_due_ns_ = core::monotonic_ns();
-    return true;
+  [[nodiscard]] bool address() const { return what_.find("://") != std::string::npos; }
+  [[nodiscard]] bool is_file() const { return !pipeline() && !device() && !address(); }
+  [[nodiscard]] Result<std::unique_ptr<video::Stream>> open() const {
+    if (pipeline()) return video::open_pipeline(what_);
+    if (device()) {
+      return video::open_device(what_.size() == 1 ? "/dev/video" + what_ : what_,
+                                {config_.width_px, config_.height_px, config_.rate_hz});
+    }
+    return address() ? video::open_url(what_) : video::open_file(what_, video::Pace::real, video::Colours::grey);
   }
   /// Waits for the next picture; says why there is none.
-  std::string take(Shared& shared) {
-    if (file_period_ns_ > 0) {
-      std::this_thread::sleep_for(std::chrono::nanoseconds(next_due_ns_ - core::monotonic_ns()));
-      next_due_ns_ += file_period_ns_;
-    }
-    const auto grabbed = capture_.grab();
+  std::string take(Shared& shared, video::Stream& stream) const {
+    auto next = stream.next(kStopCheck);
     const int64_t arrival_ns = core::wall_ns();
-    auto frame = std::make_shared<cv::Mat>();
-    if (!grabbed || !capture_.retrieve(*frame) || frame->empty()) {
-      return name() + " has ended or was unplugged; check cable and power, it is tried again";
-    }
-    if (frame->depth() != CV_8U || (frame->channels() != 1 && frame->channels() != 3)) {
-      return name() + " gives neither grey nor colour pictures of 8 bits; set it to one of them";
-    }
+    if (!next.ok()) return shared.open ? gone(next.error().message) : how_it_failed(next.error().message);
+    if (!shared.open && (next.value() || stream.playing())) tell(shared, [](Shared& s) { s.open = true; });
+    if (!next.value()) return stream.ended() ? gone("") : "";
+    const auto frame = std::make_shared<video::Frame>(*std::move(next).value());
     RawPicture picture;
-    picture.stamp_ns = arrival_ns - core::to_ns(config_.latency_ms * 1e-3);
-    picture.size = frame->size();
-    picture.format = frame->channels() == 1 ? PixelFormat::mono8 : PixelFormat::bgr8;
-    picture.bytes = frame->data;
-    picture.row_bytes = frame->step;
+    picture.stamp_ns = arrival_ns - (is_file() ? 0 : frame->age_ns) - core::to_ns(config_.latency_ms * 1e-3);
+    picture.size = frame->pixels.size();
+    picture.format = PixelFormat::mono8;
+    picture.bytes = frame->pixels.data;
+    picture.row_bytes = frame->pixels.step;
     picture.keep = frame;
     tell(shared, [&picture](Shared& s) {
       if (s.newest) picture.lost = s.newest->lost + 1;
@@ -118,23 +101,26 @@ class Capture {
     });
     return {};
   }
-  [[nodiscard]] std::string how_it_failed() const {
+  [[nodiscard]] std::string gone(const std::string& why) const {
+    return name() + " has ended or was unplugged; check cable and power, it is tried again" + in_brackets(why);
+  }
+  [[nodiscard]] std::string how_it_failed(const std::string& why) const {
     if (pipeline()) {
-      return name() + " cannot be opened; try it with gst-launch-1.0, and end it with `! videoconvert ! appsink`";
+      return name() + " cannot be opened; try it with gst-launch-1.0, and end it with `! videoconvert ! appsink`" +
+             in_brackets(why);
     }
     if (device()) {
       return name() +
-             " cannot be opened; see with `v4l2-ctl --list-devices` that it is there, and that no other program "
-             "uses it";
+             " cannot be opened; see with `v4l2-ctl --list-devices` that it is there, that no other program uses it, "
+             "and with --list-formats-ext that it has such a size and rate" +
+             in_brackets(why);
     }
-    return name() + " cannot be opened; check the address or the file";
+    return name() + " cannot be opened; check the address or the file" + in_brackets(why);
   }
+  static std::string in_brackets(const std::string& why) { return why.empty() ? "" : " (" + why + ")"; }
 
   std::string what_;
   LiveConfig config_;
-  cv::VideoCapture capture_;
-  int64_t file_period_ns_ = 0;  // 0: not a file
-  int64_t next_due_ns_ = 0;
 };
 
 class CaptureCamera final : public LiveCamera {
@@ -151,11 +137,14 @@ class CaptureCamera final : public LiveCamera {
     thread_ =
         std::thread([capture = std::make_shared<Capture>(what_, config_), shared = shared_] { capture->run(*shared); });
     std::unique_lock lock(shared_->mutex);
-    const bool answered = shared_->changed.wait_for(
-        lock, kOpenPatience, [this] { return cancelled_ || shared_->ended || !shared_->backend.empty(); });
+    const bool answered = shared_->changed.wait_for(lock, kOpenPatience,
+                                                    [this] { return cancelled_ || shared_->ended || shared_->open; });
     if (shared_->ended) return Error{shared_->problem};
-    if (!answered || cancelled_) return Error{name() + " does not answer; check cable, power and address"};
-    return name() + " is open through " + shared_->backend;
+    if (!answered || cancelled_) {
+      return Error{name() +
+                   " does not answer; check cable, power and address, and that a camera with trigger gets one"};
+    }
+    return name() + " is open";
   }
 
   Result<std::optional<RawPicture>> next(std::chrono::milliseconds patience) override {

@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cstring>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "core/time.hpp"
+#include "pictures/encode.hpp"
 #include "service/data_time.hpp"
 
 namespace railfix::frame_grabber {
@@ -237,8 +237,9 @@ void FrameGrabberService::publish_preview(const RawPicture& picture, int64_t gra
     small = cv::Mat();
     cv::resize(preview_grey_, small, {}, scale, scale, cv::INTER_AREA);
   }
-  std::vector<uint8_t> jpeg;
-  cv::imencode(".jpg", small, jpeg, {cv::IMWRITE_JPEG_QUALITY, static_cast<int>(config_.preview_quality)});
+  auto jpeg = pictures::encode_jpeg(small.data, static_cast<uint32_t>(small.cols), static_cast<uint32_t>(small.rows),
+                                    static_cast<int>(config_.preview_quality));
+  if (!jpeg.ok()) return context_.log().warn("no preview: {}", jpeg.error().message);
   msg::CameraPreview preview;
   preview.stamp_ns(picture.stamp_ns);
   preview.grabbed_ns(grabbed_ns);
@@ -247,7 +248,7 @@ void FrameGrabberService::publish_preview(const RawPicture& picture, int64_t gra
   preview.height_px(static_cast<uint32_t>(small.rows));
   preview.exposure_s(picture.exposure_s);
   preview.health(health);
-  preview.jpeg(std::move(jpeg));
+  preview.jpeg(std::move(jpeg).value());
   previews_.write(preview);
 }
 

@@ -5,7 +5,7 @@
 
 #include "cdr/types.hpp"
 #include "core/time.hpp"
-#include "recorder/pictures.hpp"
+#include "pictures/encode.hpp"
 #include "recorder/standing.hpp"
 
 namespace railfix::recorder {
@@ -173,9 +173,9 @@ void TopicInlet::listen_camera(Listening& listening, const messaging::TopicInfo&
 
 SamplePtr TopicInlet::encoded(const std::string& how, const Listening& listening, const msg::CameraFrame& frame,
                               const messaging::SampleInfo& info) const {
-  auto bytes = how == "jpeg" ? encode_jpeg(frame.data().data(), frame.width_px(), frame.height_px(),
+  auto bytes = how == "jpeg" ? pictures::encode_jpeg(frame.data().data(), frame.width_px(), frame.height_px(),
                                            static_cast<int>(config_.picture_quality))
-                             : encode_pgm(frame.data().data(), frame.width_px(), frame.height_px());
+                             : pictures::encode_pgm(frame.data().data(), frame.width_px(), frame.height_px());
   if (!bytes.ok()) return nullptr;
   if (bytes.value().size() > kMostPictureBytes) {
     return stored(listening.plain_pictures, info, messaging::serialize(frame));

@@ -26,5 +26,5 @@ set(CPACK_DEBIAN_TOOL_PACKAGE_CONTROL_EXTRA
   ${CMAKE_SOURCE_DIR}/deploy/host/postinst ${CMAKE_SOURCE_DIR}/deploy/host/prerm ${CMAKE_SOURCE_DIR}/deploy/host/postrm)
 set(CPACK_DEBIAN_RELEASE_PACKAGE_NAME railfix-${PROJECT_VERSION})
 set(CPACK_COMPONENT_RELEASE_DESCRIPTION "Railfix ${PROJECT_VERSION}: the services as programs\n For trains that run them without containers.")
-set(CPACK_DEBIAN_RELEASE_PACKAGE_RECOMMENDS gstreamer1.0-plugins-base)
+set(CPACK_DEBIAN_RELEASE_PACKAGE_RECOMMENDS "gstreamer1.0-plugins-good, gstreamer1.0-libav")
 include(CPack)

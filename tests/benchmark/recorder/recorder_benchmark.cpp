@@ -8,7 +8,7 @@
 #include "mcap/reader.hpp"
 #include "mcap/writer.hpp"
 #include "messaging/topics.hpp"
-#include "recorder/pictures.hpp"
+#include "pictures/encode.hpp"
 
 namespace railfix {
 
@@ -90,7 +90,7 @@ void encode_picture(benchmark::State& state) {
   }
   size_t bytes = 0;
   for (auto _ : state) {
-    bytes = recorder::encode_jpeg(pixels.data(), 1280, 1024, static_cast<int>(state.range(0))).value().size();
+    bytes = pictures::encode_jpeg(pixels.data(), 1280, 1024, static_cast<int>(state.range(0))).value().size();
   }
   state.counters["jpeg_kB"] = static_cast<double>(bytes) / 1000;
 }

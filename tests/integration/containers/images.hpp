@@ -7,7 +7,7 @@
 
 namespace railfix::test {
 
-/// Images railfix/SERVICE:test of this build's fusion and tpr_publisher, with Podman.
+/// Images railfix/SERVICE:test of this build's frame_grabber, fusion and tpr_publisher, with Podman.
 class Images : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -27,9 +27,9 @@ class Images : public ::testing::Test {
     if (!skipped_.empty()) return;
     std::filesystem::create_directories(kWork);
     const auto programs = "'" + (kWork / "programs").string() + "'";
-    const auto built =
-        shell("cd '" + kSource.string() + "' && docker/collect '" RAILFIX_BUILD_DIR "' " + programs +
-              " && docker/build --engine podman --release test --programs " + programs + " fusion tpr-publisher");
+    const auto built = shell("cd '" + kSource.string() + "' && docker/collect '" RAILFIX_BUILD_DIR "' " + programs +
+                             " && docker/build --engine podman --release test --programs " + programs +
+                             " frame-grabber fusion tpr-publisher");
     if (built.exit_code == 0) return;
     const bool no_network = is_no_network(built);
     (no_network ? skipped_ : failed_) =

@@ -12,6 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 TEST_F(Images, SayWhatTheyAreAndRunAsNobodyInParticular) {
   const auto said = shell("podman image inspect railfix/fusion:test");
@@ -39,6 +40,23 @@ TEST_F(Images, ShareTheLayersOfWhatTheyHaveInCommon) {
   const auto other = layers("tpr-publisher");
   const auto differ = std::mismatch(one.begin(), one.end(), other.begin(), other.end()).first;
   EXPECT_GE(differ - one.begin(), 4) << "base, user, packages of all, packages of those that know the map";
+}
+
+// OpenCV's own readers of pictures and films would bring 300 MB of formats.
+TEST_F(Images, ThatOfTheCameraIsSmallAndItsPluginsLoad) {
+  const auto size = shell("podman image inspect --format '{{.Size}}' railfix/frame-grabber:test");
+  ASSERT_EQ(size.exit_code, 0) << size.err;
+  EXPECT_LT(std::stod(size.out), 260e6);
+  const auto needed = shell(
+      "podman run --rm --no-healthcheck --entrypoint sh railfix/frame-grabber:test -c "
+      "'ls /usr/lib/*/gstreamer-1.0/libgstvideo4linux2.so && ldd /usr/lib/*/gstreamer-1.0/*.so "
+      "/usr/lib/*/libsoup-3.0.so.0'");
+  ASSERT_EQ(needed.exit_code, 0) << needed.err;
+  EXPECT_THAT(needed.out, HasSubstr("libv4l2.so.0 => /"));
+  EXPECT_THAT(needed.out, Not(HasSubstr("not found")));
+  const auto bill = shell(
+      "podman run --rm --no-healthcheck --entrypoint cat railfix/frame-grabber:test /usr/share/railfix/sbom.cdx.json");
+  EXPECT_THAT(bill.out, HasSubstr("gstreamer1.0-plugins-good"));
 }
 
 TEST_F(Images, CarryAValidBillOfMaterials) {

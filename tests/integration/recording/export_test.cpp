@@ -8,7 +8,7 @@
 #include "core/time.hpp"
 #include "mcap/writer.hpp"
 #include "messaging/topics.hpp"
-#include "recorder/pictures.hpp"
+#include "pictures/encode.hpp"
 #include "support/program.hpp"
 
 namespace railfix {
@@ -55,7 +55,7 @@ class Export : public ::testing::Test {
     const std::vector<uint8_t> pixels(320 * 240, static_cast<uint8_t>(4 * i));
     msg::CameraPreview picture;
     picture.stamp_ns(kBegin + time_ns);
-    picture.jpeg(recorder::encode_jpeg(pixels.data(), 320, 240, 90).value());
+    picture.jpeg(pictures::encode_jpeg(pixels.data(), 320, 240, 90).value());
     if (i != 10) write(topics::camera_preview, picture, "camera_frame/cam0", time_ns);
     msg::TrackView view;
     view.stamp_ns(kBegin + time_ns);

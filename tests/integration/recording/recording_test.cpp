@@ -9,7 +9,7 @@
 #include "mcap/reader.hpp"
 #include "mcap/writer.hpp"
 #include "messaging/topics.hpp"
-#include "recorder/pictures.hpp"
+#include "pictures/encode.hpp"
 #include "support/mcap_records.hpp"
 #include "support/network.hpp"
 #include "support/program.hpp"
@@ -59,7 +59,7 @@ class RecordingTest : public ::testing::Test {
       msg::CameraPreview picture;
       picture.seq(static_cast<uint64_t>(i));
       const std::vector<uint8_t> pixels(640 * 480, static_cast<uint8_t>(10 * i));
-      picture.jpeg(recorder::encode_jpeg(pixels.data(), 640, 480, 95).value());
+      picture.jpeg(pictures::encode_jpeg(pixels.data(), 640, 480, 95).value());
       write(camera, i * kPictureNs, messaging::serialize(picture));
     }
     const uint16_t control = channel("service_control", messaging::type_of<msg::ControlRequest>());

@@ -4,10 +4,8 @@
 #include <unistd.h>
 
 #include <fstream>
-#include <opencv2/imgcodecs.hpp>
 
 #include "mcap/reader.hpp"
-#include "recorder/pictures.hpp"
 
 namespace railfix::recorder {
 
@@ -110,34 +108,10 @@ TEST_F(RecordingFolder, APauseIsNoLoss) {
   EXPECT_EQ(recording->loss_text(), "track_view: 1 transport");
 }
 
-TEST(Pictures, PgmKeepsEveryPixel) {
-  std::vector<uint8_t> pixels(63 * 48);
-  for (size_t i = 0; i < pixels.size(); ++i) pixels[i] = static_cast<uint8_t>(i * i);
-  const auto pgm = encode_pgm(pixels.data(), 63, 48);
-  ASSERT_TRUE(pgm.ok());
-  const cv::Mat back = cv::imdecode(pgm.value(), cv::IMREAD_GRAYSCALE);
-  ASSERT_EQ(back.size(), cv::Size(63, 48));
-  EXPECT_TRUE(std::equal(pixels.begin(), pixels.end(), back.data));
-  EXPECT_FALSE(encode_pgm(pixels.data(), 0, 48).ok());
-}
-
 TEST(Configuration, IsRecordedWithoutItsSecrets) {
   EXPECT_EQ(without_secrets("monitor:\n  token: abc def\n  port: 8080\ntpr_publisher:\n  mqtt_password: \"x: y\"\n"),
             "monitor:\n  token: not recorded\n  port: 8080\ntpr_publisher:\n  mqtt_password: not recorded\n");
   EXPECT_EQ(without_secrets("monitor: {token: abc, port: 1}"), "monitor: {token: not recorded}");
-}
-
-TEST(Pictures, JpegKeepsThePicture) {
-  std::vector<uint8_t> pixels(64 * 48);
-  for (size_t i = 0; i < pixels.size(); ++i) pixels[i] = static_cast<uint8_t>(i % 64 * 3);
-  const auto jpeg = encode_jpeg(pixels.data(), 64, 48, 90);
-  ASSERT_TRUE(jpeg.ok());
-  const cv::Mat back = cv::imdecode(jpeg.value(), cv::IMREAD_UNCHANGED);
-  ASSERT_EQ(back.type(), CV_8UC1) << "grey, not three colours";
-  ASSERT_EQ(back.size(), cv::Size(64, 48));
-  for (size_t i = 0; i < pixels.size(); ++i) EXPECT_NEAR(back.data[i], pixels[i], 6);
-  EXPECT_FALSE(encode_jpeg(pixels.data(), 0, 48, 90).ok());
-  EXPECT_FALSE(encode_jpeg(pixels.data(), 65501, 48, 90).ok());
 }
 
 }  // namespace

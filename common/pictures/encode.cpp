@@ -1,10 +1,10 @@
-#include "recorder/pictures.hpp"
+#include "pictures/encode.hpp"
 
 #include <turbojpeg.h>
 
 #include <memory>
 
-namespace railfix::recorder {
+namespace railfix::pictures {
 
 core::Result<std::vector<uint8_t>> encode_jpeg(const uint8_t* pixels, uint32_t width_px, uint32_t height_px,
                                                int quality) {
@@ -35,4 +35,4 @@ core::Result<std::vector<uint8_t>> encode_pgm(const uint8_t* pixels, uint32_t wi
   return pgm;
 }
 
-}  // namespace railfix::recorder
+}  // namespace railfix::pictures
