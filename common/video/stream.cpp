@@ -152,8 +152,9 @@ class Pipeline final : public Stream {
   [[nodiscard]] int64_t age_ns(GstSample& sample) const {
     const Clock clock(gst_element_get_clock(pipeline_.get()));
     const GstClockTime stamp = GST_BUFFER_PTS(gst_sample_get_buffer(&sample));
-    if (!clock || !GST_CLOCK_TIME_IS_VALID(stamp)) return 0;
-    const GstClockTime taken = gst_segment_to_running_time(gst_sample_get_segment(&sample), GST_FORMAT_TIME, stamp);
+    const GstSegment* const segment = gst_sample_get_segment(&sample);
+    if (!clock || !GST_CLOCK_TIME_IS_VALID(stamp) || segment->format != GST_FORMAT_TIME) return 0;
+    const GstClockTime taken = gst_segment_to_running_time(segment, GST_FORMAT_TIME, stamp);
     if (!GST_CLOCK_TIME_IS_VALID(taken)) return 0;
     const GstClockTime now = gst_clock_get_time(clock.get()) - gst_element_get_base_time(pipeline_.get());
     return std::max<int64_t>(0, GST_CLOCK_DIFF(taken, now));
@@ -248,11 +249,13 @@ void set_uri(const Opened& opened, const std::string& uri) {
   g_object_set(source.get(), "uri", uri.c_str(), nullptr);
 }
 
-/// "width=640, height=480, framerate=[ ... ]" of what is asked, with the leading comma.
+/// ", width=640, height=[ 1, 1200 ], framerate=[ ... ]" of what is asked.
 std::string wanted(const DeviceOptions& options) {
-  std::string text;
-  if (options.width_px > 0) text += ", width=" + std::to_string(options.width_px);
-  if (options.height_px > 0) text += ", height=" + std::to_string(options.height_px);
+  const auto exactly = [](int64_t asked, int64_t most) {
+    return "=(int)" + (asked > 0 ? std::to_string(asked) : "[ 1, " + std::to_string(most) + " ]");
+  };
+  std::string text = ", width" + exactly(options.width_px, options.most_width_px) + ", height" +
+                     exactly(options.height_px, options.most_height_px);
   if (options.rate_hz > 0) {
     // 30 also means 30000/1001.
     const auto milli_hz = [&](double factor) { return std::to_string(std::lround(options.rate_hz * factor * 1e3)); };

@@ -18,11 +18,13 @@ struct Frame {
   int64_t age_ns = 0;  // since the source has stamped it; 0 where the source has no clock
 };
 
-/// What is asked of a device; 0 = as it is set.
+/// What is asked of a device; 0 = the most that it has, up to `most_*`.
 struct DeviceOptions {
   int64_t width_px = 0;
   int64_t height_px = 0;
   double rate_hz = 0;
+  int64_t most_width_px = 1920;
+  int64_t most_height_px = 1200;
 };
 
 /// Grey is the luma of the video as it is coded, 0 to 255 also where it is coded as 16 to 235.
