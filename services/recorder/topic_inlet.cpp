@@ -174,7 +174,7 @@ void TopicInlet::listen_camera(Listening& listening, const messaging::TopicInfo&
 SamplePtr TopicInlet::encoded(const std::string& how, const Listening& listening, const msg::CameraFrame& frame,
                               const messaging::SampleInfo& info) const {
   auto bytes = how == "jpeg" ? pictures::encode_jpeg(frame.data().data(), frame.width_px(), frame.height_px(),
-                                           static_cast<int>(config_.picture_quality))
+                                                     static_cast<int>(config_.picture_quality))
                              : pictures::encode_pgm(frame.data().data(), frame.width_px(), frame.height_px());
   if (!bytes.ok()) return nullptr;
   if (bytes.value().size() > kMostPictureBytes) {
