@@ -114,6 +114,20 @@ std::optional<Route> join(const Route& old, const Ways& ways, const Run& run, bo
   return std::nullopt;
 }
 
+/// The straight way up to `ahead_m` and `behind_m` from `near_m`, or until the track ends.
+void follow_on(Route& route, const Ways& ways, double near_m, double ahead_m, double behind_m) {
+  while (route.end_m() < near_m + ahead_m && route.legs().size() < kMostLegs) {
+    const auto& next = ways.after(route.legs().back().run);
+    if (next.empty()) break;
+    route.push_ahead(next.front());
+  }
+  while (route.begin_m() > near_m - behind_m && route.legs().size() < kMostLegs) {
+    const auto before = ways.before(route.legs().front().run);
+    if (before.empty()) break;
+    route.push_behind(before.front());
+  }
+}
+
 LandmarkKind seen_along(LandmarkKind kind, bool forward) {
   if (forward) return kind;
   if (kind == LandmarkKind::portal_in) return LandmarkKind::portal_out;
@@ -181,6 +195,15 @@ Route Path::route() const {
   return route;
 }
 
+std::optional<Path> followed_on(const Path& old, const Ways& ways, double near_m, double ahead_m, double behind_m) {
+  Route route = old.route();
+  const size_t legs = route.legs().size();
+  const bool cut = route.end_m() > old.end_m() + 1e-6 || route.begin_m() < old.begin_m() - 1e-6;
+  follow_on(route, ways, near_m, ahead_m, behind_m);
+  if (route.legs().size() == legs && !cut) return std::nullopt;
+  return Path::along(old.shared_map(), route);
+}
+
 std::optional<Path> rerouted(const Path& old, const Ways& ways, const EdgePosition& place, double near_m,
                              double ahead_m, double behind_m) {
   const Route old_route = old.route();
@@ -197,16 +220,7 @@ std::optional<Path> rerouted(const Path& old, const Ways& ways, const EdgePositi
   }
   if (!best || best_off_m > kLongestJoinM) return std::nullopt;
   Route route = *std::move(best);
-  while (route.end_m() < near_m + ahead_m && route.legs().size() < kMostLegs) {
-    const auto& next = ways.after(route.legs().back().run);
-    if (next.empty()) break;
-    route.push_ahead(next.front());
-  }
-  while (route.begin_m() > near_m - behind_m && route.legs().size() < kMostLegs) {
-    const auto before = ways.before(route.legs().front().run);
-    if (before.empty()) break;
-    route.push_behind(before.front());
-  }
+  follow_on(route, ways, near_m, ahead_m, behind_m);
   return Path::along(old.shared_map(), route);
 }
 
@@ -303,6 +317,19 @@ std::optional<double> Path::distance_of(uint32_t edge, double offset_m) const {
     if (into < -1e-6 || into > leg.length_m + 1e-6) continue;
     const double distance = leg.begin_m + into;
     if (!best || std::abs(distance) < std::abs(*best)) best = distance;
+  }
+  return best;
+}
+
+std::optional<double> Path::distance_of(const EdgePosition& place, double near_m) const {
+  std::optional<double> best;
+  for (const Leg& leg : legs_) {
+    if (leg.edge->id != place.edge) continue;
+    if (place.direction != Direction::unknown && leg.forward != (place.direction == Direction::forward)) continue;
+    const double into = (leg.forward ? 1.0 : -1.0) * (place.offset_m - leg.offset_begin_m);
+    if (into < -1e-6 || into > leg.length_m + 1e-6) continue;
+    const double distance = leg.begin_m + into;
+    if (!best || std::abs(distance - near_m) < std::abs(*best - near_m)) best = distance;
   }
   return best;
 }

@@ -52,6 +52,9 @@ class Path {
   [[nodiscard]] EdgePosition position_at(double distance_m) const;  // clamped to the ends
   /// Distance of a place on the map, the one nearest to 0 on a ring; nothing when the path does not run over it.
   [[nodiscard]] std::optional<double> distance_of(uint32_t edge, double offset_m) const;
+  /// The same for a train there, the one nearest to `near_m`: where the path runs over the place more than once, or
+  /// round a loop the other way, only the passes in its direction count (unknown = either).
+  [[nodiscard]] std::optional<double> distance_of(const EdgePosition& place, double near_m) const;
   /// Geometry seen along the path: heading, curvature, grade and cant have the sign of the path's direction.
   [[nodiscard]] TrackPoint at(double distance_m) const;
   [[nodiscard]] double curvature_at(double distance_m) const;
@@ -73,6 +76,8 @@ class Path {
   [[nodiscard]] const Leg& leg_at(double distance_m) const;
   static double offset_on(const Leg& leg, double distance_m);
   [[nodiscard]] const std::shared_ptr<const Map>& shared_map() const { return map_; }
+  friend std::optional<Path> followed_on(const Path& old, const Ways& ways, double near_m, double ahead_m,
+                                         double behind_m);
   friend std::optional<Path> rerouted(const Path& old, const Ways& ways, const EdgePosition& place, double near_m,
                                       double ahead_m, double behind_m);
   void collect_marks();
@@ -83,6 +88,10 @@ class Path {
   std::vector<PathBaliseGroup> groups_;
   std::vector<PathSwitch> switches_;
 };
+
+/// The same way with the same distances, followed on over the straight way of every switch up to `ahead_m` and
+/// `behind_m` from `near_m`. Nothing when the track ends before, or it reaches so far.
+std::optional<Path> followed_on(const Path& old, const Ways& ways, double near_m, double ahead_m, double behind_m);
 
 /// The way of a train that is on another track than `old` says: through `place`, joined to the old way where that leads
 /// there (behind or in front), with distances that go on from it, and the straight way up to `ahead_m` and `behind_m`

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/time.hpp"
+#include "track/same_map.hpp"
 
 namespace railfix::map_matcher {
 namespace {
@@ -123,6 +124,11 @@ void MapMatcherService::use(const msg::TrainState& state) {
     context_.health().degraded(map_ ? "the place on the map is not known yet" : "no map is configured");
     return;
   }
+  if (!track::lies_there(*map_, place_of(state), state.easting_m(), state.northing_m())) {
+    restart();  // what was matched so far is of another map as well
+    context_.health().degraded("train_state is of another map than map_matcher.map: give both services the same file");
+    return;
+  }
   context_.health().active();
   if (landmarks_ && before && !counts_on(*before, state)) landmarks_->forget();
   follow(state);
@@ -140,13 +146,14 @@ void MapMatcherService::stand(int64_t from_ns, int64_t to_ns) {
 
 void MapMatcherService::follow(const msg::TrainState& state) {
   if (path_) {
-    const auto place_m = path_->distance_of(state.edge(), state.offset_m());
+    const auto place_m = path_->distance_of(place_of(state), place_m_);
     const bool ends = place_m && path_->end_m() > 0.5 * kPathAheadM && path_->end_m() - *place_m < kPathLeftM;
     if (place_m && !ends) {
       place_m_ = *place_m;
       return;
     }
-    const bool other_track = !place_m && map_->edge(state.edge()) != nullptr;
+    // The same track the other way round is another trip.
+    const bool other_track = !place_m && !path_->distance_of(state.edge(), state.offset_m());
     auto way = other_track ? track::rerouted(*path_, *ways_, place_of(state), place_m_, kPathAheadM, kPathBehindM)
                            : std::nullopt;
     if (way) {
@@ -172,7 +179,7 @@ void MapMatcherService::follow(const msg::TrainState& state) {
 std::optional<Prior> MapMatcherService::prior_at(int64_t stamp_ns) const {
   if (!state_ || !path_ || state_->track_known() == 0) return std::nullopt;
   const double dt_s = core::seconds(stamp_ns - state_->stamp_ns());
-  const auto place_m = path_->distance_of(state_->edge(), state_->offset_m());
+  const auto place_m = path_->distance_of(place_of(*state_), place_m_);
   if (!place_m || std::abs(dt_s) > kOldStateS) return std::nullopt;
   const double way_m = std::isnan(state_->speed_mps()) ? 0.0 : state_->speed_mps() * dt_s;
   const Prior prior{*place_m + way_m, state_->over_m(), state_->under_m(), state_->distance_m() + way_m};

@@ -5,6 +5,7 @@
 #include <cstdlib>
 
 #include "core/time.hpp"
+#include "track/same_map.hpp"
 
 namespace railfix::tpr_publisher {
 
@@ -32,11 +33,17 @@ track::Direction direction_of(uint8_t direction) {
   return direction == msg::DIRECTION_REVERSE ? track::Direction::reverse : track::Direction::unknown;
 }
 
-TrainPosition position_of(const msg::TrainState& state) {
+bool of_another_map(const track::Map* map, const msg::TrainState& state) {
+  const track::EdgePosition foot{state.edge(), state.offset_m(), direction_of(state.direction())};
+  return map != nullptr && state.track_known() != 0 &&
+         !track::lies_there(*map, foot, state.easting_m(), state.northing_m());
+}
+
+TrainPosition position_of(const track::Map* map, const msg::TrainState& state) {
   TrainPosition position;
   position.stamp_ns = state.stamp_ns();
   position.foot = {state.edge(), state.offset_m(), direction_of(state.direction())};
-  position.track_known = state.track_known() != 0;
+  position.track_known = state.track_known() != 0 && !of_another_map(map, state);
   position.track_probability = state.track_probability();
   position.usable = state.integrity() != msg::INTEGRITY_UNUSABLE;
   position.distance_m = state.distance_m();
@@ -190,7 +197,7 @@ int TprPublisherService::fitness() const {
 }
 
 void TprPublisherService::stand_by(const msg::TrainState& state, int64_t now_ns) {
-  publisher_.watch(position_of(state), now_ns);
+  publisher_.watch(position_of(map_.get(), state), now_ns);
   keep_packet_58();
   report_trouble_.clear();
   context_.health().active();
@@ -217,7 +224,8 @@ void TprPublisherService::on_state(const msg::TrainState& state) {
     stand_by(state, now);
     return;
   }
-  const auto outcome = publisher_.update(position_of(state), now);
+  const auto position = position_of(map_.get(), state);
+  const auto outcome = publisher_.update(position, now);
   keep_packet_58();
   if (outcome.report) send(*outcome.report, state.grabbed_ns());
   if (!outcome.refusal.empty()) {
@@ -229,11 +237,12 @@ void TprPublisherService::on_state(const msg::TrainState& state) {
   } else if (auto left_out = publisher_.left_out(now); !left_out.empty()) {
     report_trouble_ = std::move(left_out);
   } else if (!reference_known_) {
-    report_trouble_ = !has_map_                  ? "Reports say LRBG unknown: tpr_publisher.map is not set."
-                      : state.track_known() == 0 ? "Reports say LRBG unknown: the track is not known."
-                      : !position_of(state).track_declared()
-                          ? "Reports say LRBG unknown: which track it is has not been declared yet."
-                          : "Reports say LRBG unknown: no balise group behind the train yet.";
+    report_trouble_ =
+        !has_map_                    ? "Reports say LRBG unknown: tpr_publisher.map is not set."
+        : state.track_known() == 0   ? "Reports say LRBG unknown: the track is not known."
+        : !position.track_known      ? "Reports say LRBG unknown: train_state is of another map than tpr_publisher.map."
+        : !position.track_declared() ? "Reports say LRBG unknown: which track it is has not been declared yet."
+                                     : "Reports say LRBG unknown: no balise group behind the train yet.";
   } else {
     report_trouble_ = publisher_.undeclared();
   }

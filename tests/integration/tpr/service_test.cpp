@@ -46,6 +46,17 @@ TEST_F(TprService, OldStatesAreNotReportedAndTheStatusSaysWhy) {
   ASSERT_TRUE(run_until([&] { return reports_.size() == 1; }, [&] { write_state(450); }));
 }
 
+TEST_F(TprService, AStateOfAnotherMapIsNoPlace) {
+  test::Program program(service());
+  ASSERT_TRUE(run_until([&] { return connected(); }, [] {}));
+  ASSERT_TRUE(run_until([&] { return reports_.size() == 1; }, [&] { write_state(450, 0, 20, 9000); }));
+  EXPECT_EQ(reports_[0].nid_lrbg(), etcs::kUnknownBaliseGroup);
+  ASSERT_TRUE(run_until([&] { return reason() != ""; }, [&] { write_state(450, 0, 20, 9000); }));
+  EXPECT_THAT(reason(), HasSubstr("of another map"));
+  ASSERT_TRUE(run_until([&] { return reports_.size() == 2; }, [&] { write_state(450, 0, 20, 450); }));
+  EXPECT_EQ(reports_[1].nid_lrbg(), tpr_publisher::testing::kB);
+}
+
 // What the on-board unit says goes over DDS into the very next report, and back out when it falls silent.
 TEST_F(TprService, TakesModeLevelAndIntegrityFromTheOnboardUnit) {
   messaging::Writer<msg::OnboardStatus> onboard(participant_, topics::onboard_status);

@@ -61,7 +61,7 @@ class TprService : public ::testing::Test {
     }
     return true;
   }
-  void write_state(double offset_m, int64_t age_ns = 0, double speed_mps = 20) {
+  void write_state(double offset_m, int64_t age_ns = 0, double speed_mps = 20, double easting_m = 0) {
     msg::TrainState state;
     state.stamp_ns(core::wall_ns() - age_ns);
     state.seq(seq_++);
@@ -73,6 +73,7 @@ class TprService : public ::testing::Test {
     state.track_probability(1);
     state.speed_mps(speed_mps);
     state.standstill(speed_mps == 0 ? 1 : 0);
+    state.easting_m(easting_m);
     state.over_m(3);
     state.under_m(4);
     states_.write(state);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "small_map.hpp"
+#include "track/same_map.hpp"
 
 namespace railfix::track {
 namespace {
@@ -103,6 +104,33 @@ TEST(Path, EndsOnARing) {
   EXPECT_NEAR(path.position_at(length).offset_m, 10, 1e-9);
   EXPECT_EQ(path.position_at(1500).direction, Direction::forward);
   EXPECT_NEAR(*path.distance_of(1, 5), -5, 1e-9);
+  EXPECT_NEAR(*path.distance_of({1, 5, Direction::forward}, 1.9 * length), 2 * length - 5, 1e-9);
+  EXPECT_FALSE(path.distance_of({1, 5, Direction::reverse}, 0));
+}
+
+TEST(Path, IsFollowedOnWithItsDistances) {
+  const auto map = shared_small_map();
+  const Ways ways(*map);
+  const Path siding = core::value_or_throw(Path::follow(map, {3, 300, Direction::forward}, 100, 100));
+  const Path longer = followed_on(siding, ways, 50, 5000, 5000).value();
+  EXPECT_NEAR(longer.distance_of(3, 300).value(), 0, 1e-9);
+  EXPECT_NEAR(longer.distance_of({1, 900, Direction::reverse}, 0).value(), 300, 1e-9);
+  EXPECT_FALSE(longer.distance_of({1, 900, Direction::forward}, 0));
+  EXPECT_NEAR(longer.begin_m(), -300, 1e-9);
+  EXPECT_NEAR(longer.end_m(), 1200, 1e-9);
+  EXPECT_EQ(longer.position_at(60).offset_m, siding.position_at(60).offset_m);
+  EXPECT_FALSE(followed_on(longer, ways, 0, 9000, 9000)) << "the track ends";
+}
+
+TEST(SameMap, APlaceThatLiesElsewhereIsOfAnotherMap) {
+  const auto map = shared_small_map();
+  const auto pose = map->edge(2)->alignment.at(300).pose;
+  EXPECT_TRUE(lies_there(*map, {2, 300, Direction::reverse}, pose.easting_m + 0.1, pose.northing_m));
+  EXPECT_TRUE(lies_there(*map, {2, 300, Direction::forward}, NAN, NAN));
+  EXPECT_TRUE(lies_there(*map, {2, 300, Direction::forward}, 0, 0)) << "not told";
+  EXPECT_FALSE(lies_there(*map, {2, 310, Direction::forward}, pose.easting_m, pose.northing_m));
+  EXPECT_FALSE(lies_there(*map, {1, 300, Direction::forward}, pose.easting_m, pose.northing_m));
+  EXPECT_FALSE(lies_there(*map, {99, 300, Direction::forward}, NAN, NAN));
 }
 
 TEST(Path, GoesOnWithItsDistancesOnAnotherTrackBehindASwitch) {
