@@ -15,10 +15,10 @@ double speed_mps(const TrainPosition& position) {
 
 }  // namespace
 
-void HeldDoubt::follow(const TrainPosition& position, std::optional<double> foot_m, bool declared) {
+void HeldDoubt::follow(const TrainPosition& position, std::optional<double> foot_m, bool same_group, bool declared) {
   if (declared) {
     widest_over_m_ = widest_under_m_ = corrected_m_ = 0;
-  } else if (last_ && foot_m && last_foot_m_) {
+  } else if (same_group && last_ && foot_m && last_foot_m_) {
     const double run_m =
         0.5 * (speed_mps(*last_) + speed_mps(position)) * core::seconds(position.stamp_ns - last_->stamp_ns);
     if (std::isfinite(run_m)) corrected_m_ += *foot_m - *last_foot_m_ - run_m;

@@ -12,8 +12,8 @@ namespace railfix::tpr_publisher {
 /// interval does not shrink, and takes up by how much the place moved otherwise than the speed says.
 class HeldDoubt {
  public:
-  /// `foot_m`: beyond the LRBG, along; nothing = not known.
-  void follow(const TrainPosition& position, std::optional<double> foot_m, bool declared);
+  /// `foot_m`: beyond the LRBG, along; nothing = not known. `same_group`: the LRBG is the one of the position before.
+  void follow(const TrainPosition& position, std::optional<double> foot_m, bool same_group, bool declared);
   [[nodiscard]] double over_m() const { return over_m_; }
   [[nodiscard]] double under_m() const { return under_m_; }
 

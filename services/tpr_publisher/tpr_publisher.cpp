@@ -79,6 +79,7 @@ void TprPublisher::follow(const TrainPosition& position) {
   }
   position_ = position;
   follow_motion(position);
+  const auto* group_before = reference_ ? reference_->group : nullptr;
   if (tracker_) {
     if (position.place_known()) {
       tracker_->update(position.foot, position.track_declared());
@@ -88,7 +89,8 @@ void TprPublisher::follow(const TrainPosition& position) {
     reference_ = tracker_->reference();
   }
   const bool guessed = position.place_known() && !position.track_declared();
-  doubt_.follow(position, reference_ ? std::optional(reference_->foot_m) : std::nullopt, !guessed);
+  const bool same_group = reference_ && reference_->group == group_before;
+  doubt_.follow(position, reference_ ? std::optional(reference_->foot_m) : std::nullopt, same_group, !guessed);
   if (position.usable) {
     const double group_m = reference_ ? reference_->group->q_locacc_m + reference_->doubt_m : 0.0;
     const double over_m = doubt_.over_m() + group_m;

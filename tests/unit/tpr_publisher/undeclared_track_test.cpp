@@ -329,6 +329,18 @@ TEST_F(UndeclaredReports, ALandmarkOfTheGuessedLegNarrowsNothing) {
   EXPECT_EQ(last.l_doubtover, 55U);
 }
 
+TEST_F(UndeclaredReports, ADeclarationThatIsTakenBackIsNoCorrectionOfThePlace) {
+  run(100);
+  for (; beyond_m < 300; beyond_m += 4) step(forward(2, beyond_m), 0.9995);
+  EXPECT_EQ(last.nid_lrbg, kD);
+  const auto report = step(forward(2, beyond_m), 0.5);
+  ASSERT_TRUE(report.has_value());
+  EXPECT_EQ(report->fields.nid_lrbg, kC);
+  EXPECT_NEAR(report->fields.d_lrbg * 0.1, 300 + beyond_m, 0.051);
+  EXPECT_EQ(report->fields.l_doubtover, 80U);
+  EXPECT_EQ(report->fields.l_doubtunder, 80U);
+}
+
 TEST_F(UndeclaredReports, AProbabilityThatIsNoneDeclaresNothing) {
   run(0);
   for (; beyond_m < 260; beyond_m += 4) step(forward(2, beyond_m), NAN);
