@@ -74,9 +74,11 @@ TrainEstimate Estimator::estimate(const Interval& promised, double since_sure_m)
   e.track_known = path_ != nullptr;
   e.track_probability = path_ ? track_doubt_.probability_at(*path_, filter_.path_distance_m()) : 0;
   e.sigma_m = path_ ? filter_.path_sigma_m() : filter_.sigma(StateIndex::distance);
-  const double centre_m = path_ ? filter_.path_distance_m() : e.distance_m;
-  e.over_m = centre_m - promised.behind_m;
-  e.under_m = promised.ahead_m - centre_m;
+  // The place is one on the map, the ends are where the train is: beyond the end of the map one reaches further.
+  const double centre_m =
+      path_ ? std::clamp(filter_.path_distance_m(), path_->begin_m(), path_->end_m()) : e.distance_m;
+  e.over_m = std::max(0.0, centre_m - promised.behind_m);
+  e.under_m = std::max(0.0, promised.ahead_m - centre_m);
   locate(e);
   judge(e, since_sure_m);
   return e;
@@ -137,6 +139,9 @@ void Estimator::judge(TrainEstimate& e, double since_sure_m) const {
   }
   const auto& gnss = watch(Source::gnss);
   if (gnss.isolated) add_reason(e, "GNSS contradicts the position" + since(gnss));
+  // Somebody said where the train begins, and the first that measures it says otherwise.
+  const bool only_told = watch(Source::landmark).used_ns == 0 && watch(Source::gnss).used_ns == 0;
+  if (gnss.isolated && only_told) e.integrity = Integrity::unusable;
   if (time_doubt_m_ > 0) add_reason(e, "a gap in time: the clock was set, or nothing measured");
   if (refused_fix_) add_reason(e, "a position fix was refused");
   if (corrected_) add_reason(e, "position was corrected by two fixes against the filter");

@@ -65,6 +65,10 @@ class Estimator {
   /// Moves on without a measurement.
   void predict_to(int64_t stamp_ns);
   void rebase_clock(int64_t stamp_ns);
+  /// The same way, which goes on beyond the ends of `path`: nothing else changes.
+  void follow_on(const std::shared_ptr<const track::Path>& path, const std::shared_ptr<const track::Path>& longer) {
+    if (path_ == path) path_ = longer;
+  }
   /// Of the sensors that work, without widened().
   [[nodiscard]] Interval interval() const;
   /// With what slips may have added since the reference that no camera watched.

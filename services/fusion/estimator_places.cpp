@@ -74,14 +74,14 @@ void Estimator::use_track(const FixInput& fix) {
     path_ = fix.new_path;
     track_doubt_.changed();
     // What was seen beside the old way lies on the new one: it spoke for it.
-    if (off_path_ && path_->distance_of(off_path_->edge, off_path_->offset_m)) {
+    if (off_path_ && path_->distance_of(*off_path_, filter_.path_distance_m())) {
       off_path_.reset();
       track_doubt_.seen_here();
     }
   }
   // What is said of another track is no more than its rest for this one.
-  const auto of_m = path_->distance_of(fix.edge, fix.offset_m);
   const double here_m = filter_.path_distance_m();
+  const auto of_m = path_->distance_of({fix.edge, fix.offset_m, fix.direction}, here_m);
   track_doubt_.said(of_m ? fix.probability : std::min(fix.probability, 1 - fix.probability), of_m, here_m);
 }
 
@@ -100,9 +100,10 @@ void Estimator::use(const FixInput& fix) {
     return;
   }
   if (!path_ || fix.probability < parameters_->fix_min_probability) return;
-  const auto path_distance_m = path_->distance_of(fix.edge, fix.offset_m);
+  const track::EdgePosition place{fix.edge, fix.offset_m, fix.direction};
+  const auto path_distance_m = path_->distance_of(place, filter_.path_distance_m());
   if (!path_distance_m) {
-    off_path_ = track::EdgePosition{fix.edge, fix.offset_m, fix.direction};
+    off_path_ = place;
     track_doubt_.seen_elsewhere(fix.probability);
     return;
   }

@@ -13,7 +13,9 @@ namespace {
 
 constexpr double kPathAheadM = 300000;
 constexpr double kPathBehindM = 50000;
-constexpr double kBesideM = 50.0;  // beyond the interval: what is further off is no track beside the train
+constexpr double kPathLeftM = 20000;  // it is followed on when less of it is left, ...
+constexpr double kPathAgainM = 5000;  // ... and tried again so much further on where it could not be
+constexpr double kBesideM = 50.0;     // beyond the interval: what is further off is no track beside the train
 constexpr double kNoCameraS = 0.3;
 constexpr int64_t kSnapshotNs = 50'000'000;
 constexpr int64_t kSlipUnseenNs = 1'200'000'000;  // a slip may have grown for so long before it is found
@@ -117,6 +119,7 @@ std::optional<TrainEstimate> Fusion::add(Event event) {
     }
   }
   if (step) remember_reference(*step);
+  follow_path_on();
   return insert(event);
 }
 
@@ -226,6 +229,24 @@ bool Fusion::change_track(FixInput& fix) {
   if (!way || !runs_here(*way)) return false;
   fix.new_path = std::make_shared<const track::Path>(std::move(*way));
   return true;
+}
+
+// A train may run further than the path was followed at the start, backwards as well. What is behind and below it
+// stays.
+void Fusion::follow_path_on() {
+  const auto path = now_->main().path();
+  if (!path) return;
+  const double here_m = now_->main().filter().path_distance_m();
+  if (std::min(path->end_m() - here_m, here_m - path->begin_m()) > kPathLeftM) return;
+  if (followed_on_at_m_ && std::abs(here_m - *followed_on_at_m_) < kPathAgainM) return;
+  followed_on_at_m_ = here_m;
+  if (!ways_) ways_.emplace(*map_);
+  auto longer = track::followed_on(*path, *ways_, here_m, kPathAheadM, kPathBehindM);
+  if (!longer) return;
+  const auto shared = std::make_shared<const track::Path>(std::move(*longer));
+  now_->follow_on(path, shared);
+  if (before_backward_) before_backward_->follow_on(path, shared);
+  for (auto& snapshot : snapshots_) snapshot.follow_on(path, shared);
 }
 
 void Fusion::remember_reference(const OdometryInput& step) {

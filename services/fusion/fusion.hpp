@@ -64,6 +64,7 @@ class Fusion {
   std::optional<TrainEstimate> set_clock_back();
   void start_position(FixInput& fix) const;
   bool change_track(FixInput& fix);
+  void follow_path_on();
   void remember_reference(const OdometryInput& step);
   std::optional<TrainEstimate> insert(const Event& event);
   std::optional<TrainEstimate> catch_up(std::ptrdiff_t wanted = -1);
@@ -77,7 +78,8 @@ class Fusion {
   std::shared_ptr<const FusionParameters> parameters_;
   std::shared_ptr<const track::Map> map_;
   std::shared_ptr<const track::Path> path_;
-  std::optional<track::Ways> ways_;  // made when the first other track is declared
+  std::optional<track::Ways> ways_;         // made when they are first asked for
+  std::optional<double> followed_on_at_m_;  // where the path was followed on last, or could not be
   std::optional<SavedScales> saved_;
   std::optional<ScaleTrial> now_;
   std::deque<Event> events_;               // by stamp, then kind

@@ -55,7 +55,9 @@ FixInput input_of(const msg::PositionFix& m) {
              : m.kind() == msg::FIX_NETWORK ? FixKind::network
              : m.kind() == msg::FIX_TRACK   ? FixKind::track
                                             : FixKind::landmark;
-  fix.direction = m.direction() == msg::DIRECTION_REVERSE ? track::Direction::reverse : track::Direction::forward;
+  fix.direction = m.direction() == msg::DIRECTION_REVERSE   ? track::Direction::reverse
+                  : m.direction() == msg::DIRECTION_FORWARD ? track::Direction::forward
+                                                            : track::Direction::unknown;
   return fix;
 }
 

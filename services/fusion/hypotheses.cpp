@@ -202,6 +202,15 @@ void Hypotheses::rebase_clock(int64_t stamp_ns) {
   }
 }
 
+void Hypotheses::follow_on(const std::shared_ptr<const track::Path>& path,
+                           const std::shared_ptr<const track::Path>& longer) {
+  main_.follow_on(path, longer);
+  for (auto& doubter : doubters_) doubter.estimator.follow_on(path, longer);
+  for (auto& rival : rivals_) {
+    if (rival.estimator) rival.estimator->follow_on(path, longer);
+  }
+}
+
 uint32_t Hypotheses::slipping() const {
   uint32_t bits = main_.watch(Source::wheel).isolated ? 1U : 0U;
   for (size_t i = 0; i < rivals_.size(); ++i) {

@@ -39,6 +39,7 @@ class Hypotheses {
   void apply(const Event& event);
   void predict_to(int64_t stamp_ns);
   void rebase_clock(int64_t stamp_ns);
+  void follow_on(const std::shared_ptr<const track::Path>& path, const std::shared_ptr<const track::Path>& longer);
   /// Which of the estimators have found that the wheel slips: a bit each.
   [[nodiscard]] uint32_t slipping() const;
   /// Those do without wheel samples up to this stamp; what one has found says nothing of the others.

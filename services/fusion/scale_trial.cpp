@@ -124,6 +124,12 @@ void ScaleTrial::rebase_clock(int64_t stamp_ns) {
   apart_since_ns_ = 0;
 }
 
+void ScaleTrial::follow_on(const std::shared_ptr<const track::Path>& path,
+                           const std::shared_ptr<const track::Path>& longer) {
+  main_.follow_on(path, longer);
+  if (unlearnt_) unlearnt_->follow_on(path, longer);
+}
+
 bool ScaleTrial::slip_began() const {
   return main().slip_began() || (unlearnt_ && unlearnt_->main().slip_began());
 }

@@ -28,6 +28,8 @@ class ScaleTrial {
   [[nodiscard]] bool slip_began() const;
   [[nodiscard]] uint32_t slipping() const;
   void block_wheel_until(int64_t stamp_ns, uint32_t slipping);
+  /// The path below the train is longer now, and the same otherwise.
+  void follow_on(const std::shared_ptr<const track::Path>& path, const std::shared_ptr<const track::Path>& longer);
   /// The saved scales are known to be of other sensors.
   void drop_saved();
 

@@ -1,7 +1,7 @@
-// Is the train on the track that is followed? Certain where it starts; behind every switch that could have led it
-// elsewhere only as probable as somebody says who looked (map_matcher), else as one of the ways. He may be wrong: a
-// place that was seen on another track, or a train that turns otherwise, speaks against him however often he repeats
-// himself.
+// Is the train on the track that is followed? Certain where it starts, until it turns otherwise; behind every switch
+// that could have led it elsewhere only as probable as somebody says who looked (map_matcher), else as one of the ways.
+// He may be wrong: a place that was seen on another track, or a train that turns otherwise, speaks against him however
+// often he repeats himself.
 #pragma once
 
 #include <optional>
@@ -34,7 +34,7 @@ class TrackDoubt {
   double said_ = 1;
   std::optional<double> place_m_;
   std::vector<track::PathSwitch> open_;  // run over since somebody looked
-  bool divided_ = false;                 // a switch was run over since a place on this track was seen
+  bool divided_ = true;                  // a switch was run over since a place on this track was seen, or none was
   double here_at_most_ = 1;              // by what was seen elsewhere
   int turned_otherwise_ = 0;             // in a row
   int turned_alike_ = 0;                 // in bends, in a row

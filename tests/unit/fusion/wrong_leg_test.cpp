@@ -108,6 +108,15 @@ TEST_F(WrongLeg, TheRightOneIsNeverRefusedHoweverLate) {
   EXPECT_NEAR(state.position.offset_m, 5920, 1);
 }
 
+TEST_F(WrongLeg, AStartOnAnotherTrackIsDoubtedInItsFirstBend) {
+  EXPECT_EQ(go(0, 4, 0).track_probability, 1);
+  const auto state = go(4, 10, 0.001);  // on the stem, which is straight
+  EXPECT_EQ(state.track_probability, 0.5);
+  EXPECT_THAT(state.reason, HasSubstr("turns otherwise"));
+  landmark(10, 2, 100);
+  EXPECT_EQ(go(10, 10.5, 0).track_probability, 0.5) << "its first sight of anything fits";
+}
+
 // The short form of railfix-measure-confidence --fault "fix:wrong branch".
 TEST(WrongLegDeclared, TheIntervalHoldsAlongTheTrackAndTheLegIsDoubted) {
   train::Verdict sum;
