@@ -8,7 +8,7 @@
 #include "track/import/biarc.hpp"
 #include "track/import/osm_marks.hpp"
 #include "track/import/osm_overbridges.hpp"
-#include "track/import/osm_platforms.hpp"
+#include "track/import/osm_trackside.hpp"
 #include "track/import/smooth.hpp"
 
 namespace railfix::track {
@@ -54,7 +54,7 @@ class Builder {
     gather_ends();
     for (const auto& [node, ends] : ends_) agree_on_tangents(ends);
     for (OsmChain& chain : chains_) add_edge(chain);
-    add_platforms();
+    add_trackside();
     return std::move(out_);
   }
 
@@ -270,12 +270,13 @@ class Builder {
     out_.draft.edges.push_back(std::move(edge));
   }
 
-  void add_platforms() {
-    const size_t beside_nothing = OsmPlatforms(data_, projection_, chains_, out_.draft).add();
-    if (beside_nothing > 0) {
-      out_.problems.push_back(std::to_string(beside_nothing) + " of " + std::to_string(data_.platforms.size()) +
-                              " platforms lie beside no track; left out");
-    }
+  void add_trackside() {
+    OsmTrackside trackside(data_, projection_, chains_, out_.draft);
+    const auto tell = [&](size_t count, const std::string& of) {
+      if (count > 0) out_.problems.push_back(std::to_string(count) + " of " + of + " beside no track; left out");
+    };
+    tell(trackside.add_platforms(), std::to_string(data_.platforms.size()) + " platforms lie");
+    tell(trackside.add_masts(), "the catenary masts stand");
     const auto stops = std::count_if(data_.nodes.begin(), data_.nodes.end(), [](const auto& entry) {
       const OsmTags& tags = entry.second.tags;
       return value_of(tags, "railway") == "stop" || value_of(tags, "public_transport") == "stop_position";

@@ -12,6 +12,8 @@
 namespace railfix::track {
 namespace {
 
+constexpr std::array kMast{"power", "catenary_mast"};
+
 OsmTags tags_of(const osmium::OSMObject& object) {
   OsmTags tags;
   for (const osmium::Tag& tag : object.tags()) tags.emplace(tag.key(), tag.value());
@@ -59,7 +61,8 @@ OsmData read_passes(const std::string& file, bool with_trams) {
   osmium::io::Reader nodes(file, osmium::osm_entity_bits::node);
   while (const osmium::memory::Buffer buffer = nodes.read()) {
     for (const osmium::Node& node : buffer.select<osmium::Node>()) {
-      if (!wanted.contains(node.id()) || !node.location().valid()) continue;
+      const bool is_wanted = wanted.contains(node.id()) || node.tags().has_tag(kMast[0], kMast[1]);
+      if (!is_wanted || !node.location().valid()) continue;
       out.nodes[node.id()] = {{node.location().lat(), node.location().lon()}, tags_of(node)};
     }
   }
@@ -108,6 +111,10 @@ bool is_platform(const OsmTags& tags, bool with_trams) {
 
 bool is_platform_relation(const OsmTags& tags, bool with_trams) {
   return value_of(tags, "type") == "multipolygon" && is_platform(tags, with_trams);
+}
+
+bool is_mast(const OsmTags& tags) {
+  return value_of(tags, kMast[0]) == kMast[1];
 }
 
 bool is_outline(const std::string& role) {

@@ -1,20 +1,25 @@
-// Platforms of an OpenStreetMap extract: which tracks they lie beside, on which side, from where to where.
+// What stands beside the tracks of an OpenStreetMap extract and is drawn there: platforms, with the tracks that they
+// lie along, on which side, from where to where, and catenary masts.
 #pragma once
 
+#include <array>
 #include <unordered_map>
 
 #include "track/import/osm_marks.hpp"
 
 namespace railfix::track {
 
-class OsmPlatforms {
+class OsmTrackside {
  public:
   /// REQUIRES: the draft's edges were made from the chains, in their order. All outlive this.
-  OsmPlatforms(const OsmData& data, const Projection& projection, const std::vector<OsmChain>& chains, Draft& draft);
+  OsmTrackside(const OsmData& data, const Projection& projection, const std::vector<OsmChain>& chains, Draft& draft);
 
   /// Marks the beginning and the end of the edge beside every track that a platform lies next to. Where it goes on
   /// beside the next track, or beyond the last one, it does not end. Returns how many platforms lie beside no track.
-  size_t add();
+  size_t add_platforms();
+  /// Marks every catenary mast beside the nearest track, and the one on its other side. Returns how many stand beside
+  /// no track.
+  size_t add_masts();
 
  private:
   enum class Drawn { edge, area, line };  // the most exact first
@@ -39,23 +44,38 @@ class OsmPlatforms {
     size_t chain = 0;
     size_t index = 0;
   };
+  /// Of the perpendicular from a place to a drawn track.
   struct Foot {
     Side side;
     double along_m = 0;
     double away_m = 0;
+    Eigen::Vector2d at;
+    Eigen::Vector2d direction;       // of the track
+    const OsmTags* track = nullptr;  // what is said of it there
   };
 
   void index_tracks();
   void look_beside(const OsmWay& platform);
   [[nodiscard]] std::vector<Foot> tracks_beside(const Eigen::Vector2d& at, const Eigen::Vector2d& direction,
                                                 const OsmTags& platform, Drawn drawn) const;
-  [[nodiscard]] std::optional<Foot> foot_on(const Segment& segment, const Eigen::Vector2d& at,
-                                            const Eigen::Vector2d& direction) const;
+  /// The nearest on the right and on the left of a line through the place that runs in this direction.
+  template <class Accept>
+  [[nodiscard]] std::array<std::optional<Foot>, 2> on_either_side(const Eigen::Vector2d& at,
+                                                                  const Eigen::Vector2d& direction, double reach_m,
+                                                                  const Accept& accept) const;
+  /// Calls `use` with the foot on every track within reach.
+  template <class Use>
+  void for_feet(const Eigen::Vector2d& at, double reach_m, const Use& use) const;
+  [[nodiscard]] std::optional<Foot> foot_on(const Segment& segment, const Eigen::Vector2d& at) const;
+  [[nodiscard]] std::optional<Eigen::Vector2d> place_of(int64_t node) const;
+  /// false: beside no track.
+  bool add_mast(int64_t node);
   void merge();
   void find_where_they_go_on();
   [[nodiscard]] bool goes_on(const Stretch& stretch, bool at_end) const;
   [[nodiscard]] bool reaches(const Stretch& stretch, bool at_end) const;
-  void add_mark(const Stretch& stretch, double along_m);
+  void add_end(const Stretch& stretch, double along_m);
+  [[nodiscard]] double offset_of(size_t chain, double along_m) const;
 
   [[nodiscard]] static Drawn drawn_as(const OsmWay& way);
   [[nodiscard]] int64_t node_of(size_t chain, bool at_end) const {

@@ -1,4 +1,4 @@
-#include "track/import/osm_platforms.hpp"
+#include "track/import/osm_trackside.hpp"
 
 #include <algorithm>
 #include <array>
@@ -16,6 +16,7 @@ constexpr double kEdgeReachM = 4;    // an edge is 1.7 m from the track; the res
 constexpr double kMiddleReachM = 8;  // the middle of a wide platform
 constexpr double kAsFarM = 1.5;      // a middle line is as far from both its tracks, give or take this
 constexpr double kLeastM = 0.7;      // nearer, and the side is anyone's guess
+constexpr double kMastReachM = 6;    // of a mast from its track
 constexpr double kParallelSine = 0.35;
 constexpr double kShortestM = 15;  // what is shorter is a corner
 constexpr double kSliverM = 5;
@@ -47,13 +48,13 @@ std::string name_of(const OsmTags& tags) {
 
 }  // namespace
 
-OsmPlatforms::OsmPlatforms(const OsmData& data, const Projection& projection, const std::vector<OsmChain>& chains,
+OsmTrackside::OsmTrackside(const OsmData& data, const Projection& projection, const std::vector<OsmChain>& chains,
                            Draft& draft)
     : data_(data), projection_(projection), chains_(chains), draft_(draft) {
   index_tracks();
 }
 
-void OsmPlatforms::index_tracks() {
+void OsmTrackside::index_tracks() {
   for (size_t chain = 0; chain < chains_.size(); ++chain) {
     const std::vector<Eigen::Vector2d>& points = chains_[chain].points;
     std::vector<double>& along_m = along_m_.emplace_back(1, 0.0);
@@ -69,7 +70,7 @@ void OsmPlatforms::index_tracks() {
   }
 }
 
-size_t OsmPlatforms::add() {
+size_t OsmTrackside::add_platforms() {
   size_t beside_nothing = 0;
   for (const OsmWay& platform : data_.platforms) {
     const size_t before = stretches_.size();
@@ -82,13 +83,13 @@ size_t OsmPlatforms::add() {
     const bool is_corner =
         stretch.to_m - stretch.from_m < kShortestM && !stretch.goes_on_before && !stretch.goes_on_behind;
     if (is_corner) continue;
-    if (!stretch.goes_on_before) add_mark(stretch, stretch.from_m);
-    if (!stretch.goes_on_behind) add_mark(stretch, stretch.to_m);
+    if (!stretch.goes_on_before) add_end(stretch, stretch.from_m);
+    if (!stretch.goes_on_behind) add_end(stretch, stretch.to_m);
   }
   return beside_nothing;
 }
 
-OsmPlatforms::Drawn OsmPlatforms::drawn_as(const OsmWay& way) {
+OsmTrackside::Drawn OsmTrackside::drawn_as(const OsmWay& way) {
   if (value_of(way.tags, "railway") == "platform_edge") return Drawn::edge;
   const bool is_ring = way.nodes.size() > 3 && way.nodes.front() == way.nodes.back();
   // A way of an outline need not be the whole of it.
@@ -97,16 +98,12 @@ OsmPlatforms::Drawn OsmPlatforms::drawn_as(const OsmWay& way) {
 }
 
 /// Walks along the drawing and notes where which tracks are beside it.
-void OsmPlatforms::look_beside(const OsmWay& platform) {
-  const auto place = [&](int64_t node) -> std::optional<Eigen::Vector2d> {
-    const auto found = data_.nodes.find(node);
-    return found == data_.nodes.end() ? std::nullopt : projection_.from_geo(found->second.place);
-  };
+void OsmTrackside::look_beside(const OsmWay& platform) {
   const Drawn drawn = drawn_as(platform);
   std::map<Side, std::vector<double>> beside_m;
   for (size_t i = 1; i < platform.nodes.size(); ++i) {
-    const auto a = place(platform.nodes[i - 1]);
-    const auto b = place(platform.nodes[i]);
+    const auto a = place_of(platform.nodes[i - 1]);
+    const auto b = place_of(platform.nodes[i]);
     if (!a || !b || !((*b - *a).norm() < kLongestSegmentM) || *a == *b) continue;
     const Eigen::Vector2d step = *b - *a;
     const int count = std::max(1, static_cast<int>(std::ceil(step.norm() / kStepM)));
@@ -127,51 +124,102 @@ void OsmPlatforms::look_beside(const OsmWay& platform) {
 
 /// The nearest track beside this place of a drawing that runs in `direction`; of a line in the middle of a platform,
 /// the nearest on either side.
-std::vector<OsmPlatforms::Foot> OsmPlatforms::tracks_beside(const Eigen::Vector2d& at, const Eigen::Vector2d& direction,
+std::vector<OsmTrackside::Foot> OsmTrackside::tracks_beside(const Eigen::Vector2d& at, const Eigen::Vector2d& direction,
                                                             const OsmTags& platform, Drawn drawn) const {
   const double reach_m = drawn == Drawn::line ? kMiddleReachM : kEdgeReachM;
+  auto sides =
+      on_either_side(at, direction, reach_m, [&](const OsmTags& track) { return same_level(platform, track); });
+  if (sides[1] && (!sides[0] || sides[1]->away_m < sides[0]->away_m)) std::swap(sides[0], sides[1]);
+  const auto& [nearest, other] = sides;
+  std::vector<Foot> found;
+  if (nearest && nearest->away_m > kLeastM) found.push_back(*nearest);
+  if (!found.empty() && drawn == Drawn::line && other && other->away_m < nearest->away_m + kAsFarM)
+    found.push_back(*other);
+  return found;
+}
+
+template <class Accept>
+std::array<std::optional<OsmTrackside::Foot>, 2> OsmTrackside::on_either_side(const Eigen::Vector2d& at,
+                                                                              const Eigen::Vector2d& direction,
+                                                                              double reach_m,
+                                                                              const Accept& accept) const {
+  std::array<std::optional<Foot>, 2> nearest;
+  for_feet(at, reach_m, [&](const Foot& foot) {
+    if (!(std::abs(cross(foot.direction, direction)) < kParallelSine) || !accept(*foot.track)) return;
+    std::optional<Foot>& best = nearest[cross(direction, foot.at - at) > 0 ? 1 : 0];
+    if (!best || foot.away_m < best->away_m) best = foot;
+  });
+  return nearest;
+}
+
+template <class Use>
+void OsmTrackside::for_feet(const Eigen::Vector2d& at, double reach_m, const Use& use) const {
   const Eigen::Vector2d reach(reach_m, reach_m);
-  std::array<std::optional<Foot>, 2> nearest;  // right and left of the drawing
   for_cells(at - reach, at + reach, [&](int64_t cell) {
     const auto in = in_cell_.find(cell);
     if (in == in_cell_.end()) return;
     for (const size_t number : in->second) {
-      const Segment& segment = segments_[number];
-      const auto foot = foot_on(segment, at, direction);
-      if (!foot || foot->away_m > reach_m) continue;
-      if (!same_level(platform, data_.ways[chains_[segment.chain].ways[segment.index]].tags)) continue;
-      const std::vector<Eigen::Vector2d>& points = chains_[segment.chain].points;
-      const bool on_left = cross(direction, points[segment.index] - at) > 0;
-      std::optional<Foot>& best = nearest[on_left ? 1 : 0];
-      if (!best || foot->away_m < best->away_m) best = foot;
+      const auto foot = foot_on(segments_[number], at);
+      if (foot && foot->away_m <= reach_m) use(*foot);
     }
   });
-  if (nearest[0] && (!nearest[1] || nearest[0]->away_m < nearest[1]->away_m)) std::swap(nearest[0], nearest[1]);
-  std::vector<Foot> found;
-  if (nearest[1] && nearest[1]->away_m > kLeastM) found.push_back(*nearest[1]);
-  if (!found.empty() && drawn == Drawn::line && nearest[0] && nearest[0]->away_m < found[0].away_m + kAsFarM)
-    found.push_back(*nearest[0]);
-  return found;
 }
 
-std::optional<OsmPlatforms::Foot> OsmPlatforms::foot_on(const Segment& segment, const Eigen::Vector2d& at,
-                                                        const Eigen::Vector2d& direction) const {
+std::optional<OsmTrackside::Foot> OsmTrackside::foot_on(const Segment& segment, const Eigen::Vector2d& at) const {
   const OsmChain& chain = chains_[segment.chain];
   const Eigen::Vector2d& begin = chain.points[segment.index];
   const Eigen::Vector2d step = chain.points[segment.index + 1] - begin;
   const double length_m = step.norm();
-  const Eigen::Vector2d track = step / length_m;
-  if (!(std::abs(cross(track, direction)) < kParallelSine)) return std::nullopt;
-  const double along_m = track.dot(at - begin);
+  const Eigen::Vector2d direction = step / length_m;
+  const double along_m = direction.dot(at - begin);
   const double within_m = std::clamp(along_m, 0.0, length_m);
   // Where the track bends away from the place, its feet on both segments miss each other by a little.
-  if (std::abs(along_m - within_m) > 0.5 * kStepM) return std::nullopt;
-  const double left_m = cross(track, at - begin);
-  return Foot{{segment.chain, left_m > 0}, along_m_[segment.chain][segment.index] + within_m, std::abs(left_m)};
+  if (!(std::abs(along_m - within_m) <= 0.5 * kStepM)) return std::nullopt;
+  const double left_m = cross(direction, at - begin);
+  return Foot{{segment.chain, left_m > 0},
+              along_m_[segment.chain][segment.index] + within_m,
+              std::abs(left_m),
+              begin + within_m * direction,
+              direction,
+              &data_.ways[chain.ways[segment.index]].tags};
+}
+
+std::optional<Eigen::Vector2d> OsmTrackside::place_of(int64_t node) const {
+  const auto found = data_.nodes.find(node);
+  return found == data_.nodes.end() ? std::nullopt : projection_.from_geo(found->second.place);
+}
+
+size_t OsmTrackside::add_masts() {
+  std::vector<int64_t> masts;
+  for (const auto& [id, node] : data_.nodes) {
+    if (is_mast(node.tags)) masts.push_back(id);
+  }
+  std::sort(masts.begin(), masts.end());  // the same file always gives the same map
+  size_t beside_nothing = 0;
+  for (const int64_t id : masts) beside_nothing += add_mast(id) ? 0 : 1;
+  return beside_nothing;
+}
+
+bool OsmTrackside::add_mast(int64_t node) {
+  const auto at = place_of(node);
+  if (!at) return false;
+  const auto in_the_open = [](const OsmTags& track) { return !is_below_ground(track); };
+  std::optional<Foot> nearest;
+  for_feet(*at, kMastReachM, [&](const Foot& foot) {
+    if (in_the_open(*foot.track) && (!nearest || foot.away_m < nearest->away_m)) nearest = foot;
+  });
+  if (!nearest || nearest->away_m < kLeastM) return false;
+  for (const auto& foot : on_either_side(*at, nearest->direction, kMastReachM, in_the_open)) {
+    if (!foot) continue;
+    draft_.edges[foot->side.chain].track.marks.push_back(
+        {LandmarkKind::mast, offset_of(foot->side.chain, foot->along_m), foot->side.left ? foot->away_m : -foot->away_m,
+         kMappingSigmaM, value_of(data_.nodes.at(node).tags, "ref")});
+  }
+  return true;
 }
 
 /// Beside one side of one track the most exact drawing counts, and what lies close together is one platform.
-void OsmPlatforms::merge() {
+void OsmTrackside::merge() {
   std::stable_sort(stretches_.begin(), stretches_.end(), [](const Stretch& a, const Stretch& b) {
     return std::tie(a.side, a.drawn, a.from_m) < std::tie(b.side, b.drawn, b.from_m);
   });
@@ -198,19 +246,19 @@ void OsmPlatforms::merge() {
   stretches_ = std::move(kept);
 }
 
-void OsmPlatforms::find_where_they_go_on() {
+void OsmTrackside::find_where_they_go_on() {
   for (Stretch& stretch : stretches_) {
     stretch.goes_on_before = goes_on(stretch, false);
     stretch.goes_on_behind = goes_on(stretch, true);
   }
 }
 
-bool OsmPlatforms::reaches(const Stretch& stretch, bool at_end) const {
+bool OsmTrackside::reaches(const Stretch& stretch, bool at_end) const {
   return at_end ? along_m_[stretch.side.chain].back() - stretch.to_m < kAtEndM : stretch.from_m < kAtEndM;
 }
 
 /// Past this end of its track: beside the next one, or where no track is any more.
-bool OsmPlatforms::goes_on(const Stretch& stretch, bool at_end) const {
+bool OsmTrackside::goes_on(const Stretch& stretch, bool at_end) const {
   if (!reaches(stretch, at_end)) return false;
   const auto& ends = ends_at_.at(node_of(stretch.side.chain, at_end));
   if (ends.size() == 1) return true;
@@ -225,18 +273,22 @@ bool OsmPlatforms::goes_on(const Stretch& stretch, bool at_end) const {
   });
 }
 
-void OsmPlatforms::add_mark(const Stretch& stretch, double along_m) {
-  const std::vector<double>& of_points = along_m_[stretch.side.chain];
+void OsmTrackside::add_end(const Stretch& stretch, double along_m) {
+  const double drawn_m = stretch.drawn == Drawn::line ? std::hypot(kMappingSigmaM, kMiddleEndM) : kMappingSigmaM;
+  draft_.edges[stretch.side.chain].track.marks.push_back({LandmarkKind::platform,
+                                                          offset_of(stretch.side.chain, along_m),
+                                                          stretch.side.left ? kPlatformEdgeM : -kPlatformEdgeM,
+                                                          std::hypot(drawn_m, kRampM / std::sqrt(12.0)), stretch.name});
+}
+
+double OsmTrackside::offset_of(size_t chain, double along_m) const {
+  const std::vector<double>& of_points = along_m_[chain];
   const auto after = std::upper_bound(of_points.begin() + 1, of_points.end() - 1, along_m);
   const auto i = static_cast<size_t>(after - of_points.begin());
-  const std::vector<Eigen::Vector2d>& points = chains_[stretch.side.chain].points;
+  const std::vector<Eigen::Vector2d>& points = chains_[chain].points;
   const double part = (along_m - of_points[i - 1]) / std::max(of_points[i] - of_points[i - 1], 1e-9);
   const Eigen::Vector2d at = points[i - 1] + part * (points[i] - points[i - 1]);
-  ImportedTrack& track = draft_.edges[stretch.side.chain].track;
-  const double drawn_m = stretch.drawn == Drawn::line ? std::hypot(kMappingSigmaM, kMiddleEndM) : kMappingSigmaM;
-  track.marks.push_back({LandmarkKind::platform, track.alignment.nearest(at.x(), at.y()).offset_m,
-                         stretch.side.left ? kPlatformEdgeM : -kPlatformEdgeM,
-                         std::hypot(drawn_m, kRampM / std::sqrt(12.0)), stretch.name});
+  return draft_.edges[chain].track.alignment.nearest(at.x(), at.y()).offset_m;
 }
 
 }  // namespace railfix::track
