@@ -173,6 +173,8 @@ void Estimator::refuse(const FixInput& fix, double path_distance_m, const Offer&
                              parameters_->gate_fix);
       corrected_ = true;
       accept(fix);
+      // Either side: what told where to look for these two was wrong by as much. Until a third one agrees.
+      doubt_behind_m_ = doubt_ahead_m_ = std::abs(offer.residual) + parameters_->interval_factor * fix.sigma_m;
       fix_verdict_ = FixVerdict::corrected;
       return;
     }

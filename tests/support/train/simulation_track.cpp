@@ -13,6 +13,7 @@ using fusion::FixKind;
 
 // Behind the points a leg is declared: up to 30 m behind the frog, or a little before it.
 constexpr std::pair kDeclaredM{20.0, 60.0};
+constexpr double kBeyondM = 1000;    // the estimate may be in front of the train
 constexpr double kPointsEndM = 5.0;  // a leg that comes back is no other track any more
 constexpr double kTrackEveryS = 1.0;
 constexpr double kOpenTrackEveryM = 2.0;
@@ -22,7 +23,7 @@ constexpr double kOpenTrackEveryM = 2.0;
 void TrainSimulation::find_points() {
   const track::Ways ways(*map);
   for (const auto& one : path_->switches()) {
-    if (!one.ahead || one.distance_m < 0 || one.distance_m > way_m()) continue;
+    if (!one.ahead || one.distance_m < 0 || one.distance_m > way_m() + kBeyondM) continue;
     const auto run_at = [&](double distance_m) {
       const auto place = path_->position_at(distance_m);
       return track::Run{map->edge(place.edge), place.direction != track::Direction::reverse};
@@ -45,10 +46,11 @@ void TrainSimulation::make_declarations() {
     declarations_.push_back(one);
   }
   auto& fault = plan_.fault;
-  if (fault.kind != FaultKind::wrong_branch || points_.empty()) return;
-  const auto behind =
-      std::ranges::find_if(points_, [&](const Points& one) { return drive_.time_at(one.distance_m) > fault.begin_s; });
-  const auto wrong = behind == points_.end() ? std::prev(behind) : behind;
+  const auto end = std::ranges::find_if(points_, [&](const Points& one) { return one.distance_m > way_m(); });
+  if (fault.kind != FaultKind::wrong_branch || end == points_.begin()) return;
+  const auto behind = std::find_if(points_.begin(), end,
+                                   [&](const Points& one) { return drive_.time_at(one.distance_m) > fault.begin_s; });
+  const auto wrong = behind == end ? std::prev(behind) : behind;
   auto& one = declarations_[static_cast<size_t>(wrong - points_.begin())];
   one.wrong_until_m =
       std::min(one.after_m + 20 * std::pow(100, random.uniform()), wrong->other.length_m() - kPointsEndM);
