@@ -35,15 +35,17 @@ std::string since(const SensorWatch& watch) {
 }  // namespace
 
 Interval Estimator::interval() const {
-  const double centre_m = path_ ? filter_.path_distance_m() : filter_.value(StateIndex::distance);
-  const double sigma_m = path_ ? filter_.path_sigma_m() : filter_.sigma(StateIndex::distance);
-  const double bound_m = parameters_->interval_factor * sigma_m + parameters_->interval_floor_m +
-                         parameters_->interval_drift * since_reference_m() + doubt_m_ + unchecked_m_;
+  const double bound_m = known_to_m() + doubt_m_ + unchecked_m_;
   // Since the last sample the train may have stopped counting, or the clock may have run ahead.
   const double silent_s = core::seconds(filter_.stamp_ns() - stamp_ns_);
   const double silent_m = silent_s > kFreshS ? std::abs(filter_.speed_mps()) * silent_s : 0;
   const double behind_m = std::max(bound_m, doubt_behind_m_) + time_doubt_m_ + silent_m;
-  return {centre_m - behind_m, centre_m + std::max(bound_m, doubt_ahead_m_)};
+  return {centre_m() - behind_m, centre_m() + std::max(bound_m, doubt_ahead_m_)};
+}
+
+double Estimator::known_to_m() const {
+  return parameters_->interval_factor * sigma_m() + parameters_->interval_floor_m +
+         parameters_->interval_drift * since_reference_m();
 }
 
 // As an odometer's accuracy is stated: a share of the way, and one slip at the highest speed.
@@ -73,13 +75,12 @@ TrainEstimate Estimator::estimate(const Interval& promised, double since_sure_m)
   e.standstill = standstill_;
   e.track_known = path_ != nullptr;
   e.track_probability = path_ ? track_doubt_.probability_at(*path_, filter_.path_distance_m()) : 0;
-  e.sigma_m = path_ ? filter_.path_sigma_m() : filter_.sigma(StateIndex::distance);
+  e.sigma_m = sigma_m();
+  locate(e);
   // The place is one on the map, the ends are where the train is: beyond the end of the map one reaches further.
-  const double centre_m =
-      path_ ? std::clamp(filter_.path_distance_m(), path_->begin_m(), path_->end_m()) : e.distance_m;
+  const double centre_m = path_ ? e.path_distance_m : e.distance_m;
   e.over_m = std::max(0.0, centre_m - promised.behind_m);
   e.under_m = std::max(0.0, promised.ahead_m - centre_m);
-  locate(e);
   judge(e, since_sure_m);
   return e;
 }
@@ -100,6 +101,11 @@ void Estimator::locate(TrainEstimate& e) const {
   }
 }
 
+double Estimator::unused_for_s(Source source) const {
+  const auto used_ns = watch(source).used_ns;
+  return core::seconds(filter_.stamp_ns() - (used_ns == 0 ? start_ns_ : used_ns));
+}
+
 bool Estimator::silent(Source source) const {
   const auto& w = watch(source);
   return w.seen_ns != 0 && core::seconds(filter_.stamp_ns() - w.seen_ns) > parameters_->sensor_timeout_s;
@@ -107,14 +113,17 @@ bool Estimator::silent(Source source) const {
 
 void Estimator::judge(TrainEstimate& e, double since_sure_m) const {
   e.integrity = Integrity::ok;
-  const auto ago_s = [&](Source source) {
-    const auto used_ns = watch(source).used_ns;
-    return core::seconds(filter_.stamp_ns() - (used_ns == 0 ? start_ns_ : used_ns));
-  };
+  judge_sensors(e);
+  judge_place(e);
+  judge_bounds(e, since_sure_m);
+}
+
+void Estimator::judge_sensors(TrainEstimate& e) const {
   for (int i = 0; i < kSources; ++i) {
     const auto source = static_cast<Source>(i);
     const bool motion = source == Source::camera || source == Source::wheel || source == Source::imu;
-    if (watch(source).used_ns != 0 && ago_s(source) < (motion ? kRecentS : kRecentPositionS)) e.sources |= 1U << i;
+    if (watch(source).used_ns != 0 && unused_for_s(source) < (motion ? kRecentS : kRecentPositionS))
+      e.sources |= 1U << i;
   }
 
   const auto& camera = watch(Source::camera);
@@ -122,7 +131,7 @@ void Estimator::judge(TrainEstimate& e, double since_sure_m) const {
     add_reason(e, "no camera");
   } else if (camera.isolated) {
     add_reason(e, "camera motion contradicts the other sensors" + since(camera));
-  } else if (camera.seen_ns != 0 && ago_s(Source::camera) > parameters_->sensor_timeout_s) {
+  } else if (camera.seen_ns != 0 && unused_for_s(Source::camera) > parameters_->sensor_timeout_s) {
     add_reason(e, "camera blind");
   }
   if (silent(Source::wheel)) {
@@ -137,6 +146,9 @@ void Estimator::judge(TrainEstimate& e, double since_sure_m) const {
   } else if (watch(Source::imu).isolated) {
     add_reason(e, "IMU contradicts the other sensors" + since(watch(Source::imu)));
   }
+}
+
+void Estimator::judge_place(TrainEstimate& e) const {
   const auto& gnss = watch(Source::gnss);
   if (gnss.isolated) add_reason(e, "GNSS contradicts the position" + since(gnss));
   // Somebody said where the train begins, and the first that measures it says otherwise.
@@ -151,15 +163,17 @@ void Estimator::judge(TrainEstimate& e, double since_sure_m) const {
   if (path_ && (filter_.path_distance_m() < path_->begin_m() || filter_.path_distance_m() > path_->end_m())) {
     add_reason(e, "beyond the end of the mapped track");
   }
+}
 
+void Estimator::judge_bounds(TrainEstimate& e, double since_sure_m) const {
   const double budget_m = parameters_->budget_m + parameters_->budget_per_m * since_sure_m;
   const double bound_m = std::max(e.over_m, e.under_m);
   if (bound_m > budget_m) add_reason(e, "interval wider than allowed");
-  const bool wheel = ago_s(Source::wheel) < kRecentS;
-  if (wheel && ago_s(Source::camera) > kRecentS && ago_s(Source::imu) > kRecentS) {
+  const bool wheel = unused_for_s(Source::wheel) < kRecentS;
+  if (wheel && unused_for_s(Source::camera) > kRecentS && unused_for_s(Source::imu) > kRecentS) {
     add_reason(e, "the wheel alone measures: nothing would see it slip");
   }
-  const double no_motion_s = std::min(ago_s(Source::camera), ago_s(Source::wheel));
+  const double no_motion_s = std::min(unused_for_s(Source::camera), unused_for_s(Source::wheel));
   if (no_motion_s > parameters_->sensor_timeout_s) add_reason(e, "nothing measures the motion");
   const bool moved = watch(Source::camera).used_ns != 0 || watch(Source::wheel).used_ns != 0;
   if (!e.standstill && (!moved || no_motion_s > kNoMotionUnusableS))

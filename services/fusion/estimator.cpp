@@ -150,6 +150,7 @@ void Estimator::notice_gap(int64_t stamp_ns) {
     events_.period_s += (gap_s - events_.period_s) / std::min(++events_.samples, 50);
   }
 }
+
 void Estimator::watch_standstill() {
   const double distance_m = filter_.value(StateIndex::distance);
   if (std::abs(distance_m - rest_distance_m_) > kRestM || filter_.sigma(StateIndex::speed) > kRestSpeedSigmaMps) {

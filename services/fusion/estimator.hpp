@@ -193,14 +193,20 @@ class Estimator {
   void use_yaw_rate(double rate_rps);
   void use_track(const FixInput& fix);
   Offer offer_place(const MeasuredPlace& place);
-  /// What the promised interval holds more than the filter's own uncertainty.
+  /// What the interval reaches to either side where nothing is in doubt.
+  [[nodiscard]] double known_to_m() const;
+  /// What the promised interval holds more.
   [[nodiscard]] double doubted_beyond_sigma_m() const;
   void refuse(const FixInput& fix, double path_distance_m, const Offer& offer);
   void accept(const FixInput& fix);
   void watch_standstill();
   SensorWatch& watched(Source source) { return watches_[static_cast<size_t>(source)]; }
   [[nodiscard]] bool silent(Source source) const;
+  [[nodiscard]] double unused_for_s(Source source) const;
   void judge(TrainEstimate& estimate, double since_sure_m) const;
+  void judge_sensors(TrainEstimate& estimate) const;
+  void judge_place(TrainEstimate& estimate) const;
+  void judge_bounds(TrainEstimate& estimate, double since_sure_m) const;
   void locate(TrainEstimate& estimate) const;
 
   const FusionParameters* parameters_;

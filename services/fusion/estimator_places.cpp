@@ -128,21 +128,16 @@ Offer Estimator::offer_place(const MeasuredPlace& place) {
   if (doubted_m <= parameters_->interval_factor * place.sigma_m) {
     return filter_.offer_position(place, parameters_->gate_fix);
   }
-  MotionFilter doubted = filter_;
-  const auto offer = filter_.offer_position(place, parameters_->gate_fix);
+  const auto offer = MotionFilter(filter_).offer_position(place, parameters_->gate_fix);
   if (!offer.used) return offer;
-  doubted.loosen_origin(doubted_m / parameters_->interval_factor);
-  filter_ = std::move(doubted);
+  filter_.loosen_origin(doubted_m / parameters_->interval_factor);
   filter_.offer_position(place, parameters_->gate_fix);
   return offer;
 }
 
 double Estimator::doubted_beyond_sigma_m() const {
-  const double known_m = parameters_->interval_factor * filter_.path_sigma_m() + parameters_->interval_floor_m +
-                         parameters_->interval_drift * since_reference_m();
   const auto promised = widened(interval());
-  const double centre_m = filter_.path_distance_m();
-  return std::max(centre_m - promised.behind_m, promised.ahead_m - centre_m) - known_m + excess_m_;
+  return std::max(centre_m() - promised.behind_m, promised.ahead_m - centre_m()) - known_to_m() + excess_m_;
 }
 
 void Estimator::accept(const FixInput& fix) {

@@ -24,6 +24,11 @@ Source source_of(const Event& event) {
   return Source::camera;
 }
 
+// A landmark that is named by those before it may be wrong because one of them is.
+bool told_by_others(const FixInput& fix) {
+  return fix.kind != FixKind::curvature && !fix.new_path && fix.probability < kSureFix;
+}
+
 }  // namespace
 
 void Promise::hold(const Promise& other) {
@@ -85,7 +90,7 @@ void Hypotheses::adopt(Rival& rival) {
   next.exclude(rival.without, main_);
   next.doubt_place(rival.unseen.behind_m, rival.unseen.ahead_m);
   main_ = std::move(next);
-  for (auto& other : rivals_) other.excess = other.carried = other.unseen = {};
+  for (auto& other : rivals_) other.forget_excess();
 }
 
 void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
@@ -95,8 +100,8 @@ void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
   main_.contradicted_by(std::max(most.behind_m, most.ahead_m));
   main_.apply(event);
   main_.contradicted_by(0);
-  std::vector<Doubter> doubters_before;  // a refused fix asks for them, and one that is not sure
-  if (main_.fix_refused() || fix.probability < kSureFix) doubters_before = doubters_;
+  std::vector<Doubter> doubters_before;
+  if (main_.fix_refused() || told_by_others(fix)) doubters_before = doubters_;
   for (auto& doubter : doubters_) {
     if (!doubter.leaves_out(fix)) doubter.estimator.apply(event);
   }
@@ -129,11 +134,10 @@ bool Hypotheses::adopt_doubter(const FixInput& fix, std::vector<Doubter> before)
   return true;
 }
 
-// A landmark that is told by those before it may be wrong because one of them is.
 std::vector<Hypotheses::Doubter> Hypotheses::without_two(const FixInput& fix,
                                                          const std::vector<Doubter>& before) const {
   std::vector<Doubter> without;
-  if (fix.kind == FixKind::curvature || fix.new_path || fix.probability >= kSureFix) return without;
+  if (!told_by_others(fix)) return without;
   for (size_t i = 0; i < before.size(); ++i) {
     const auto& now = doubters_[i];
     if (now.of_shape || now.of_two || !now.estimator.fix_used() || now.estimator.fix_corrected()) continue;
@@ -157,7 +161,7 @@ void Hypotheses::settle_doubters(const FixInput& fix, Estimator before, std::vec
 
 void Hypotheses::confirm_rivals() {
   for (auto& rival : rivals_) {
-    rival.excess = rival.carried = rival.unseen = {};
+    rival.forget_excess();
     // Confirmed is the main one: a rival that is elsewhere was wrong.
     if (rival.estimator && rival.estimator->fix_refused()) rival.estimator = main_;
   }

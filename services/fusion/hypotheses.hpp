@@ -82,6 +82,8 @@ class Hypotheses {
     int64_t proven_since_ns = 0;  // two sensors have agreed in it since then; 0 = they do not
     double faster_mps = 0;        // than the main one, when it was asked last
     int64_t strayed_ns = 0;
+
+    void forget_excess() { excess = carried = unseen = {}; }
   };
 
   void apply_fix(const FixInput& fix, const Event& event);
