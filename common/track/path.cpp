@@ -310,15 +310,7 @@ EdgePosition Path::position_at(double distance_m) const {
 }
 
 std::optional<double> Path::distance_of(uint32_t edge, double offset_m) const {
-  std::optional<double> best;
-  for (const Leg& leg : legs_) {
-    if (leg.edge->id != edge) continue;
-    const double into = (leg.forward ? 1.0 : -1.0) * (offset_m - leg.offset_begin_m);
-    if (into < -1e-6 || into > leg.length_m + 1e-6) continue;
-    const double distance = leg.begin_m + into;
-    if (!best || std::abs(distance) < std::abs(*best)) best = distance;
-  }
-  return best;
+  return distance_of({edge, offset_m, Direction::unknown}, 0);
 }
 
 std::optional<double> Path::distance_of(const EdgePosition& place, double near_m) const {
