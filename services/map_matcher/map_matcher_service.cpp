@@ -11,9 +11,6 @@
 namespace railfix::map_matcher {
 namespace {
 
-constexpr double kPathAheadM = 30000;
-constexpr double kPathBehindM = 5000;
-constexpr double kPathLeftM = 3000;  // the path is followed anew when less of it is left
 constexpr double kOldStateS = 2.0;
 constexpr double kRailsFreshS = 0.5;
 constexpr double kShortestStepM = 0.05;
@@ -32,6 +29,9 @@ track::EdgePosition place_of(const msg::TrainState& state) {
 }
 uint8_t direction_of(track::Direction direction) {
   return direction == track::Direction::reverse ? msg::DIRECTION_REVERSE : msg::DIRECTION_FORWARD;
+}
+PlacedTrain placed(const msg::TrainState& m) {
+  return {m.stamp_ns(), place_of(m), m.speed_mps(), m.distance_m(), m.over_m(), m.under_m()};
 }
 Sighting input_of(const msg::LandmarkSighting& m) {
   return {m.stamp_ns(),  static_cast<track::LandmarkKind>(m.kind()), m.distance_ahead_m(), m.lateral_m(), m.sigma_m(),
@@ -81,6 +81,7 @@ MapMatcherService::MapMatcherService(const MapMatcherConfig& config, service::Co
   if (!config.map.empty()) {
     map_ = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(config.map)));
     ways_ = std::make_shared<const track::Ways>(*map_);
+    followed_.emplace(map_, ways_);
     if (config.choose_track) chooser_.emplace(config.track_parameters(), map_, ways_);
   }
   namespace topics = messaging::topics;
@@ -98,7 +99,7 @@ MapMatcherService::MapMatcherService(const MapMatcherConfig& config, service::Co
 }
 
 void MapMatcherService::restart() {
-  path_.reset();
+  if (followed_) followed_.emplace(map_, ways_);
   landmarks_.reset();
   curvature_.reset();
   exits_.reset();
@@ -110,7 +111,6 @@ void MapMatcherService::restart() {
   chain_ = {};
   rails_seen_ns_ = 0;
   located_m_ = 0;
-  place_m_ = 0;
   matched_m_ = 0;
   moved_ns_ = 0;
   said_track_ = {};
@@ -145,45 +145,26 @@ void MapMatcherService::stand(int64_t from_ns, int64_t to_ns) {
 }
 
 void MapMatcherService::follow(const msg::TrainState& state) {
-  if (path_) {
-    const auto place_m = path_->distance_of(place_of(state), place_m_);
-    const bool ends = place_m && path_->end_m() > 0.5 * kPathAheadM && path_->end_m() - *place_m < kPathLeftM;
-    if (place_m && !ends) {
-      place_m_ = *place_m;
-      return;
-    }
-    // The same track the other way round is another trip.
-    const bool other_track = !place_m && !path_->distance_of(state.edge(), state.offset_m());
-    auto way = other_track ? track::rerouted(*path_, *ways_, place_of(state), place_m_, kPathAheadM, kPathBehindM)
-                           : std::nullopt;
-    if (way) {
-      path_ = std::make_shared<const track::Path>(std::move(*way));
-      landmarks_->change_path(path_);
-      curvature_->change_path(path_);
-      if (exits_) exits_.emplace(config_.exit_parameters(), path_);
-      return;
-    }
-  }
-  auto path = track::Path::follow(map_, place_of(state), kPathAheadM, kPathBehindM);
-  if (!path.ok()) {
-    context_.health().degraded(path.error().message);
+  const auto way = followed_->follow(placed(state));
+  if (!way.ok()) {
+    context_.health().degraded(way.error().message);
     return;
   }
-  path_ = std::make_shared<const track::Path>(std::move(path).value());
-  landmarks_.emplace(config_.landmarks, path_);
-  curvature_.emplace(config_.curvature_parameters(), path_);
-  if (config_.curve_method == "exits") exits_.emplace(config_.exit_parameters(), path_);
-  place_m_ = 0;
+  if (way.value() == FollowedPath::Way::same) return;
+  const auto& path = followed_->path();
+  if (way.value() == FollowedPath::Way::other_track) {
+    landmarks_->change_path(path);
+    curvature_->change_path(path);
+  } else {
+    landmarks_.emplace(config_.landmarks, path);
+    curvature_.emplace(config_.curvature_parameters(), path);
+  }
+  if (config_.curve_method == "exits") exits_.emplace(config_.exit_parameters(), path);
 }
 
 std::optional<Prior> MapMatcherService::prior_at(int64_t stamp_ns) const {
-  if (!state_ || !path_ || state_->track_known() == 0) return std::nullopt;
-  const double dt_s = core::seconds(stamp_ns - state_->stamp_ns());
-  const auto place_m = path_->distance_of(place_of(*state_), place_m_);
-  if (!place_m || std::abs(dt_s) > kOldStateS) return std::nullopt;
-  const double way_m = std::isnan(state_->speed_mps()) ? 0.0 : state_->speed_mps() * dt_s;
-  const Prior prior{*place_m + way_m, state_->over_m(), state_->under_m(), state_->distance_m() + way_m};
-  return prior.usable() ? std::optional(prior) : std::nullopt;
+  if (!state_ || !followed_ || state_->track_known() == 0) return std::nullopt;
+  return followed_->prior_at(stamp_ns, placed(*state_));
 }
 
 void MapMatcherService::use(const msg::OdometryStep& step) {
@@ -266,7 +247,7 @@ void MapMatcherService::publish_place(const msg::OdometryStep& step, const Locat
 void MapMatcherService::follow_turning(const msg::OdometryStep& step) {
   const auto prior = prior_at(step.stamp_ns());
   if (!prior || !step_) return;
-  const auto place = path_->position_at(prior->path_distance_m);
+  const auto place = followed_->path()->position_at(prior->path_distance_m);
   chooser_->follow(window_at(place, *prior));
   auto turn = moved_ns_ == step_->stamp_ns() ? turn_of_camera() : std::nullopt;
   if (turn) {
@@ -362,7 +343,7 @@ void MapMatcherService::use(const msg::LandmarkSighting& sighting) {
 }
 
 void MapMatcherService::publish(const Fix& fix, uint8_t kind, int64_t grabbed_ns) {
-  const auto place = path_->position_at(fix.path_distance_m);
+  const auto place = followed_->path()->position_at(fix.path_distance_m);
   msg::PositionFix message;
   message.stamp_ns(fix.stamp_ns);
   message.offset_m(place.offset_m);

@@ -7,6 +7,7 @@
 
 #include "map_matcher/curvature_matcher.hpp"
 #include "map_matcher/curve_exit_matcher.hpp"
+#include "map_matcher/followed_path.hpp"
 #include "map_matcher/gyro_turn.hpp"
 #include "map_matcher/landmark_matcher.hpp"
 #include "map_matcher/map_matcher_config.hpp"
@@ -14,7 +15,6 @@
 #include "map_matcher/step_chain.hpp"
 #include "map_matcher/track_chooser.hpp"
 #include "service/service.hpp"
-#include "track/path.hpp"
 
 namespace railfix::map_matcher {
 
@@ -55,7 +55,7 @@ class MapMatcherService {
   messaging::Writer<msg::PositionFix> writer_;
   std::shared_ptr<const track::Map> map_;
   std::shared_ptr<const track::Ways> ways_;
-  std::shared_ptr<const track::Path> path_;
+  std::optional<FollowedPath> followed_;
   std::optional<LandmarkMatcher> landmarks_;
   std::optional<CurvatureMatcher> curvature_;
   std::optional<CurveExitMatcher> exits_;  // instead of it, where the configuration says so
@@ -67,7 +67,6 @@ class MapMatcherService {
   std::optional<TrackChooser> chooser_;
   std::optional<NetworkLocator> locator_;  // only while the place is not known
   double located_m_ = 0;                   // odometer at the last search
-  double place_m_ = 0;                     // on the path, of the last state
   double matched_m_ = 0;                   // odometer at the last match
   int64_t moved_ns_ = 0;                   // the chooser has come to this time
   /// What was said of the track last.

@@ -7,13 +7,9 @@ namespace {
 
 using map_matcher::CurvatureOf;
 
-constexpr double kPathAheadM = 20000;
-constexpr double kPathBehindM = 1000;
-constexpr double kPathLeftM = 3000;
 // As map_matcher has them by default.
 constexpr double kMatchEveryM = 5;
 constexpr double kLeastSpeedMps = 1;
-constexpr double kOldStateS = 2;
 // Curvature from pictures: 9e-5 1/m rms where a sigma of 1.4e-4 is said (docs/figures.md, 26 km at 8 degrees).
 constexpr double kSigmaPerM = 1.4e-4;
 constexpr double kWhitePerM = 7e-5;
@@ -22,40 +18,31 @@ constexpr double kWanderLengthM = 20;
 constexpr double kBiasPerM = 2e-5;
 constexpr double kOutlierPerM = 2e-3;
 
-std::shared_ptr<const track::Path> path_of(const std::shared_ptr<const track::Map>& map,
-                                           const track::EdgePosition& place) {
-  return std::make_shared<const track::Path>(
-      core::value_or_throw(track::Path::follow(map, place, kPathAheadM, kPathBehindM)));
+map_matcher::PlacedTrain placed(const fusion::TrainEstimate& state) {
+  return {state.stamp_ns, state.position, state.speed_mps, state.distance_m, state.over_m, state.under_m};
 }
 
 }  // namespace
 
 MatcherLoop::MatcherLoop(const TrainSimulation& simulation)
     : simulation_(simulation),
-      ways_(*simulation.map),
+      followed_(simulation.map, std::make_shared<const track::Ways>(*simulation.map)),
       random_(simulation.stream_of(17)),
       bias_per_m_(kBiasPerM * random_.normal()) {}
 
 bool MatcherLoop::follow(const fusion::TrainEstimate& state) {
+  using Way = map_matcher::FollowedPath::Way;
   if (!state.track_known) return false;
-  const auto place_m = path_ ? path_->distance_of(state.position.edge, state.position.offset_m) : std::nullopt;
-  if (place_m && path_->end_m() - *place_m > std::min(kPathLeftM, 0.5 * path_->end_m())) {
-    place_m_ = *place_m;
-    return true;
+  const Way way = core::value_or_throw(followed_.follow(placed(state)));
+  if (way == Way::same) return true;
+  const auto& path = followed_.path();
+  if (way == Way::other_track) {
+    shape_->change_path(path);
+    landmarks_->change_path(path);
+  } else {
+    shape_.emplace(map_matcher::CurvatureParameters{}, path);
+    landmarks_.emplace(map_matcher::LandmarkParameters{}, path);
   }
-  auto way = path_ && !place_m ? track::rerouted(*path_, ways_, state.position, place_m_, kPathAheadM, kPathBehindM)
-                               : std::nullopt;
-  if (way) {
-    path_ = std::make_shared<const track::Path>(std::move(*way));
-    shape_->change_path(path_);
-    landmarks_->change_path(path_);
-    place_m_ = path_->distance_of(state.position.edge, state.position.offset_m).value_or(place_m_);
-    return true;
-  }
-  path_ = path_of(simulation_.map, state.position);
-  shape_.emplace(map_matcher::CurvatureParameters{}, path_);
-  landmarks_.emplace(map_matcher::LandmarkParameters{}, path_);
-  place_m_ = 0;
   return true;
 }
 
@@ -77,14 +64,8 @@ void MatcherLoop::look(double arrival_s, const Motion& truth) {
   shape_->add(chain_.odometer_m(), seen_per_m, kSigmaPerM, CurvatureOf::rails);
 }
 
-map_matcher::Prior MatcherLoop::prior_at(int64_t stamp_ns, const fusion::TrainEstimate& state) const {
-  const double dt_s = core::seconds(stamp_ns - state.stamp_ns);
-  const double way_m = std::isnan(state.speed_mps) ? 0.0 : state.speed_mps * dt_s;
-  return {place_m_ + way_m, state.over_m, state.under_m, state.distance_m + way_m};
-}
-
 void MatcherLoop::found(const map_matcher::Fix& fix, fusion::FixKind kind, double due_s) {
-  const auto place = path_->position_at(fix.path_distance_m);
+  const auto place = followed_.path()->position_at(fix.path_distance_m);
   found_.emplace_back(due_s, fusion::FixInput{fix.stamp_ns, place.edge, place.offset_m, fix.sigma_m, fix.probability,
                                               fix.landmark, kind, place.direction, nullptr});
 }
@@ -92,7 +73,8 @@ void MatcherLoop::found(const map_matcher::Fix& fix, fusion::FixKind kind, doubl
 void MatcherLoop::match_shape(int64_t stamp_ns, const fusion::TrainEstimate& state, double arrival_s) {
   if (std::abs(chain_.odometer_m() - matched_m_) < kMatchEveryM) return;
   matched_m_ = chain_.odometer_m();
-  const auto fix = shape_->match(stamp_ns, chain_.odometer_m(), prior_at(stamp_ns, state));
+  const auto prior = followed_.prior_at(stamp_ns, placed(state));
+  const auto fix = prior ? shape_->match(stamp_ns, chain_.odometer_m(), *prior) : std::nullopt;
   if (!fix) return;
   const auto& fault = simulation_.plan().fault;
   const bool late = fault.is(Sensor::shape, FaultKind::delay) && fault.active(arrival_s);
@@ -103,8 +85,8 @@ void MatcherLoop::match_sightings(const fusion::TrainEstimate& state, double arr
   const auto& all = simulation_.sightings;
   for (; next_sighting_ < all.size() && all[next_sighting_].arrival_s <= arrival_s; ++next_sighting_) {
     const auto& sighting = all[next_sighting_].sighting;
-    if (!state.track_known || std::abs(core::seconds(sighting.stamp_ns - state.stamp_ns)) > kOldStateS) continue;
-    const auto fix = landmarks_->add(sighting, prior_at(sighting.stamp_ns, state));
+    const auto prior = state.track_known ? followed_.prior_at(sighting.stamp_ns, placed(state)) : std::nullopt;
+    const auto fix = prior ? landmarks_->add(sighting, *prior) : std::nullopt;
     if (fix) found(*fix, fusion::FixKind::landmark, arrival_s);
   }
 }

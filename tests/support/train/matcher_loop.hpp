@@ -4,16 +4,15 @@
 #pragma once
 
 #include <deque>
-#include <memory>
 #include <optional>
 #include <vector>
 
 #include "fusion/fusion.hpp"
 #include "map_matcher/curvature_matcher.hpp"
+#include "map_matcher/followed_path.hpp"
 #include "map_matcher/landmark_matcher.hpp"
 #include "map_matcher/step_chain.hpp"
 #include "support/train/simulation.hpp"
-#include "track/ways.hpp"
 
 namespace railfix::train {
 
@@ -29,16 +28,13 @@ class MatcherLoop {
  private:
   void match_shape(int64_t stamp_ns, const fusion::TrainEstimate& state, double arrival_s);
   void match_sightings(const fusion::TrainEstimate& state, double arrival_s);
-  [[nodiscard]] map_matcher::Prior prior_at(int64_t stamp_ns, const fusion::TrainEstimate& state) const;
   void found(const map_matcher::Fix& fix, fusion::FixKind kind, double due_s);
   /// False while the place is not known.
   bool follow(const fusion::TrainEstimate& state);
   void look(double arrival_s, const Motion& truth);
 
   const TrainSimulation& simulation_;
-  track::Ways ways_;
-  std::shared_ptr<const track::Path> path_;
-  double place_m_ = 0;  // on the path
+  map_matcher::FollowedPath followed_;
   map_matcher::StepChain chain_;
   std::optional<map_matcher::CurvatureMatcher> shape_;
   std::optional<map_matcher::LandmarkMatcher> landmarks_;
