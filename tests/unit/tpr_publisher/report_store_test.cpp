@@ -10,6 +10,7 @@
 #include <iostream>
 
 #include "core/random.hpp"
+#include "ground_link/ground_report.hpp"
 
 namespace railfix::tpr_publisher {
 namespace {
@@ -65,6 +66,19 @@ TEST_F(Store, KeepsReportsAndNeverGivesANumberTwice) {
   EXPECT_EQ(store.stream(), stream);
   EXPECT_THAT(whole_reports(store), ElementsAre(2U));
   EXPECT_EQ(store.append(report_of(4)).value(), 4U);
+}
+
+// So much disk does `railfix train check` ask for (tools/railfix/train/disk_need.hpp).
+TEST_F(Store, AReportTakesNoMoreThan256Bytes) {
+  constexpr uint64_t kReports = 10'000;
+  const ground_link::GroundReport longest{
+      std::string(30, 't'),     ~uint64_t{0},        10'000'000, INT64_MAX, INT64_MAX, 4, 10,
+      std::vector<uint8_t>(60), std::string(20, 'h')};
+  auto store = opened(file_);
+  for (uint64_t i = 1; i <= kReports; ++i) ASSERT_TRUE(store.append(ground_link::to_bytes(longest)).ok());
+  uintmax_t bytes = 0;
+  for (const auto& entry : fs::directory_iterator(folder_)) bytes += entry.file_size();
+  EXPECT_LE(bytes, kReports * 256 + 2'000'000) << "with the log of 1000 pages";
 }
 
 TEST_F(Store, OneServiceOnly) {

@@ -5,9 +5,12 @@
 
 #include <fstream>
 
+#include "recorder/recorder_config.hpp"
 #include "support/program.hpp"
+#include "tpr_publisher/tpr_publisher_config.hpp"
 #include "train/check.hpp"
 #include "train/containers.hpp"
+#include "train/disk_need.hpp"
 #include "train/keys.hpp"
 #include "train/render.hpp"
 
@@ -432,15 +435,50 @@ TEST_F(TrainFolder, AComputerThatIsNotSetUpIsTold) {
 
 TEST_F(TrainFolder, DisksOfTheRootAndOfRecordingsAreLookedAt) {
   const auto told = [&](const std::string& recorder, const fs::path& root) {
-    const auto train = manifest(kTrain, "settings:\n", "settings:\n  recorder: { folder: " + recorder + " }\n").value();
+    const auto train = manifest(kTrain, "settings:\n", "settings:\n  recorder: " + recorder + "\n").value();
     std::vector<std::string> texts;
     for (const auto& finding : check_computer(&train, train.host("cab"), root)) texts.push_back(finding.text);
     return texts;
   };
   // Nothing can be written below /proc: it has no room.
-  EXPECT_THAT(told("/proc/recordings", folder_), Contains(HasSubstr("/proc has 0 MB free; recordings")));
-  EXPECT_THAT(told("recordings", "/proc/root-of-nobody"), Contains(HasSubstr("/proc has 0 MB free; recordings")));
-  EXPECT_THAT(told("recordings", folder_), Not(Contains(HasSubstr("/proc has"))));
+  EXPECT_THAT(
+      told("{ folder: /proc/recordings }", folder_),
+      Contains(AllOf(HasSubstr("/proc has 0 MB free, this host needs 2500 MB there (2000 MB to begin recording"),
+                     HasSubstr("recorder.quota_mb is not set"), HasSubstr("recorder.keep_free_mb"))));
+  EXPECT_THAT(told("{ folder: recordings, quota_mb: 150, keep_free_mb: 20 }", "/proc/root-of-nobody"),
+              Contains(HasSubstr("/proc has 0 MB free, this host needs 370 MB there (200 MB of logs and "
+                                 "configurations, 150 MB of recordings up to recorder.quota_mb, 20 MB that")));
+  EXPECT_THAT(told("{ folder: recordings }", folder_), Not(Contains(HasSubstr("/proc has"))));
+}
+
+TEST_F(TrainFolder, DisksNeedRoomForWhatTheSettingsAllowBesideWhatIsThere) {
+  const auto needed_mb = [&](const char* host, const std::string& settings) {
+    const auto train = manifest(kTrain, "settings:\n  tpr_publisher:\n", "settings:\n" + settings).value();
+    double sum = 0;
+    for (const auto& need : disk_needs(train, *train.host(host), folder_)) sum += need.mb;
+    return sum;
+  };
+  const std::string link =
+      "  tpr_publisher:\n    ground_link: { broker: b, store: reports.db, store_limit: 1000000 }\n";
+  EXPECT_DOUBLE_EQ(needed_mb("cab", "  recorder: { quota_mb: 150, keep_free_mb: 20 }\n  tpr_publisher:\n"), 370);
+  EXPECT_DOUBLE_EQ(needed_mb("coach", "  recorder: { quota_mb: 150 }\n  tpr_publisher:\n"), 200) << "records nothing";
+  EXPECT_DOUBLE_EQ(needed_mb("coach", link), 456) << "a million reports";
+  EXPECT_DOUBLE_EQ(needed_mb("cab", "  recorder: { quota_mb: 150, keep_free_mb: 20 }\n" + link), 626) << "a standby";
+  const auto recordings = HostFolder(folder_).home() / "recordings";
+  fs::create_directories(recordings);
+  std::ofstream(recordings / "re460-042-1.mcap");
+  fs::resize_file(recordings / "re460-042-1.mcap", 100'000'000);
+  const std::string quota = "  recorder: { folder: recordings, quota_mb: 150, keep_free_mb: 20 }\n  tpr_publisher:\n";
+  EXPECT_DOUBLE_EQ(needed_mb("cab", quota), 270);
+  std::ofstream(recordings / "re460-042-2.mcap.active");
+  fs::resize_file(recordings / "re460-042-2.mcap.active", 50'000'000);
+  EXPECT_DOUBLE_EQ(needed_mb("cab", quota), 200) << "an upgrade of a train whose quota is full";
+}
+
+TEST_F(TrainFolder, SettingsThatAreNotGivenBeginAsTheServicesSay) {
+  EXPECT_EQ(recorder::RecorderConfig{}.keep_free_mb, kUsualKeepFreeMb);
+  EXPECT_EQ(recorder::RecorderConfig{}.quota_mb, 0);
+  EXPECT_EQ(tpr_publisher::GroundLinkConfig{}.store_limit, kUsualStoreLimit);
 }
 
 TEST_F(TrainFolder, EachHostGetsItsConfigurationComposeFileAndUnit) {

@@ -63,21 +63,10 @@ void check_quality_of_service(const Manifest& manifest, Findings& findings) {
   for (const auto& mismatch : mismatches.value()) error(findings, mismatch);
 }
 
-// Of "key" or "group.key"; empty when it is not given.
-std::string setting_of(const Manifest& manifest, const char* service, const std::string& key) {
-  const YAML::Node section = manifest.settings[service];
-  const auto dot = key.find('.');
-  const bool grouped = dot != std::string::npos && section && section.IsMap();
-  const YAML::Node group = grouped ? section[key.substr(0, dot)] : section;
-  if (!group || !group.IsMap()) return "";
-  const YAML::Node value = group[key.substr(dot == std::string::npos ? 0 : dot + 1)];
-  return value && value.IsScalar() ? value.Scalar() : "";
-}
-
 // Reports leave a train that locks everything else in.
 void check_ground_link(const Manifest& manifest, Findings& findings) {
   const auto link = [&](const char* key) {
-    return setting_of(manifest, "tpr_publisher", std::string("ground_link.") + key);
+    return setting_of(manifest.settings, "tpr_publisher", std::string("ground_link.") + key);
   };
   if (!manifest.security || manifest.service("tpr_publisher") == nullptr || link("broker").empty()) return;
   const std::string broker = "settings.tpr_publisher.ground_link: reports go to " + link("broker");
@@ -93,7 +82,7 @@ void check_ground_link(const Manifest& manifest, Findings& findings) {
 
 // A page that is not on this computer alone lets nobody control without a token.
 void check_control(const Manifest& manifest, Findings& findings) {
-  const auto of = [&](const char* key) { return setting_of(manifest, "monitor", key); };
+  const auto of = [&](const char* key) { return setting_of(manifest.settings, "monitor", key); };
   const bool local = of("address").starts_with("127.") || of("address") == "localhost";
   if (manifest.service("monitor") == nullptr || of("control") == "false" || local) return;
   if (!of("token").empty() || !of("token_file").empty()) return;
@@ -105,15 +94,15 @@ void check_control(const Manifest& manifest, Findings& findings) {
 // Settings that are right for a run of recorded data and wrong for a train.
 void check_settings(const Manifest& manifest, Findings& findings) {
   for (const char* service : {"frame_grabber", "sensor_gateway"}) {
-    if (manifest.service(service) != nullptr && setting_of(manifest, service, "source").empty())
+    if (manifest.service(service) != nullptr && setting_of(manifest.settings, service, "source").empty())
       error(findings, std::string("settings.") + service + ".source is not given, and " + service +
                           " does not start without; say where its data come from, or take it out of train.services");
   }
-  if (const auto start = setting_of(manifest, "fusion", "start"); !start.empty() && start != "unknown")
+  if (const auto start = setting_of(manifest.settings, "fusion", "start"); !start.empty() && start != "unknown")
     warning(findings, "settings.fusion.start is " + start +
                           ": a train that was switched off elsewhere would believe to stand there; leave it out, "
                           "and map_matcher finds the place");
-  if (setting_of(manifest, "monitor", "address") == "0.0.0.0")
+  if (setting_of(manifest.settings, "monitor", "address") == "0.0.0.0")
     warning(findings,
             "settings.monitor.address is 0.0.0.0: page and metrics are open to every network that the computer is in; "
             "leave it out, and they are on the train network only");
@@ -122,7 +111,7 @@ void check_settings(const Manifest& manifest, Findings& findings) {
   const auto* camera = manifest.service("frame_grabber");
   const auto* recorder = manifest.service("recorder");
   if (camera != nullptr && recorder != nullptr && camera->host != recorder->host &&
-      setting_of(manifest, "recorder", "pictures") != "none")
+      setting_of(manifest.settings, "recorder", "pictures") != "none")
     warning(findings, "recorder is on " + recorder->host + " and records no pictures: they do not leave " +
                           camera->host + "; put it there, or set settings.recorder.pictures to none");
 }

@@ -121,15 +121,6 @@ void check_keys(const Manifest& manifest, const TrainHost& host, Findings& findi
   }
 }
 
-/// The configuration of a generation; empty when it cannot be read, which others say.
-YAML::Node installed_settings(const fs::path& generation) {
-  try {
-    return YAML::LoadFile((generation / "config.yaml").string());
-  } catch (const YAML::Exception&) {
-    return {};
-  }
-}
-
 }  // namespace
 
 std::vector<Finding> check_certificates(const Manifest& manifest, const TrainHost& host) {

@@ -1,11 +1,15 @@
 // This computer as a host of a train.
+#include <sys/stat.h>
 #include <sys/statvfs.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
+#include <map>
 
 #include "core/kernel_clock.hpp"
 #include "messaging/network.hpp"
+#include "train/disk_need.hpp"
 #include "train/findings.hpp"
 
 namespace railfix::tool {
@@ -15,8 +19,10 @@ namespace fs = std::filesystem;
 
 constexpr double kPicturesMb = 512;  // histories of two cameras
 constexpr double kSharedMemoryMb = 16;
-constexpr double kRecordingsMb = 2000;
-constexpr double kDiskMb = 200;
+
+std::string rounded(double mb) {
+  return std::to_string(static_cast<int64_t>(mb));
+}
 
 double megabytes_free(const fs::path& folder) {
   struct statvfs disk {};
@@ -47,24 +53,33 @@ fs::path standing(fs::path folder) {
   return folder;
 }
 
-// Containers see the host's folder of services under its usual name.
-fs::path recordings_of(const Manifest* manifest, const fs::path& home) {
-  fs::path folder = "recordings";
-  if (manifest != nullptr) {
-    const YAML::Node section = manifest->settings["recorder"];
-    if (section && section.IsMap() && section["folder"] && section["folder"].IsScalar())
-      folder = section["folder"].Scalar();
-    const auto inside = folder.lexically_relative(kContainerHome);
-    if (manifest->containers && !inside.empty() && *inside.begin() != "..") folder = inside;
-  }
-  return home / folder;
+dev_t disk_of(const fs::path& folder) {
+  struct stat found {};
+  return stat(folder.c_str(), &found) == 0 ? found.st_dev : 0;
 }
 
-void check_disk(const fs::path& folder, double needed_mb, Findings& findings) {
-  const auto there = standing(folder);
-  if (const double free_mb = megabytes_free(there); free_mb < needed_mb)
-    error(findings, there.string() + " has " + std::to_string(static_cast<int>(std::max(free_mb, 0.0))) +
-                        " MB free; recordings and unsent reports need " + std::to_string(static_cast<int>(needed_mb)));
+// What lies on one disk needs room there together.
+void check_disks(const std::vector<DiskNeed>& needs, Findings& findings) {
+  struct Disk {
+    fs::path folder;
+    double needed_mb = 0;
+    std::string what_for;
+  };
+  std::map<dev_t, Disk> disks;
+  for (const auto& need : needs) {
+    const auto there = standing(need.folder);
+    auto& disk = disks[disk_of(there)];
+    if (disk.folder.empty()) disk.folder = there;
+    disk.needed_mb += need.mb;
+    disk.what_for += (disk.what_for.empty() ? "" : ", ") + need.what;
+  }
+  for (const auto& [device, disk] : disks) {
+    const double free_mb = std::max(megabytes_free(disk.folder), 0.0);
+    if (free_mb >= disk.needed_mb) continue;
+    error(findings, disk.folder.string() + " has " + rounded(free_mb) + " MB free, this host needs " +
+                        rounded(std::ceil(disk.needed_mb)) + " MB there (" + disk.what_for +
+                        "); make room, or set what is named to less");
+  }
 }
 
 void check_interface(const TrainHost& host, Findings& findings) {
@@ -120,9 +135,9 @@ std::vector<Finding> check_computer(const Manifest* manifest, const TrainHost* h
     add(check_kernel());
     check_clock(findings);
   }
-  const auto home = HostFolder(fs::absolute(root)).home();
-  check_disk(home, kDiskMb, findings);
-  if (runs("recorder")) check_disk(recordings_of(manifest, home), kRecordingsMb, findings);
+  check_disks(manifest == nullptr || host == nullptr ? installed_disk_needs(HostFolder(fs::absolute(root)))
+                                                     : disk_needs(*manifest, *host, fs::absolute(root)),
+              findings);
   if (host != nullptr) check_interface(*host, findings);
   if (manifest != nullptr && host != nullptr && manifest->containers) {
     for (const auto& problem : container_problems(*manifest, *host)) error(findings, problem);

@@ -47,6 +47,25 @@ std::vector<SettingFile> files_named(const YAML::Node& settings) {
 
 }  // namespace
 
+YAML::Node installed_settings(const std::filesystem::path& generation) {
+  try {
+    return YAML::LoadFile((generation / "config.yaml").string());
+  } catch (const YAML::Exception&) {
+    return {};
+  }
+}
+
+std::string setting_of(const YAML::Node& settings, const std::string& service, const std::string& key) {
+  if (!settings || !settings.IsMap()) return "";
+  const YAML::Node section = settings[service];
+  const auto dot = key.find('.');
+  const bool grouped = dot != std::string::npos && section && section.IsMap();
+  const YAML::Node group = grouped ? section[key.substr(0, dot)] : section;
+  if (!group || !group.IsMap()) return "";
+  const YAML::Node value = group[key.substr(dot == std::string::npos ? 0 : dot + 1)];
+  return value && value.IsScalar() ? value.Scalar() : "";
+}
+
 std::vector<SettingFile> setting_files(const Manifest& manifest) {
   auto files = files_named(manifest.settings);
   std::erase_if(files, [](const auto& file) { return file.file.is_absolute(); });

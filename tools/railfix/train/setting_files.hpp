@@ -19,6 +19,11 @@ struct SettingFile {
   }
 };
 
+/// The settings of a generation; empty when they cannot be read, which others say.
+YAML::Node installed_settings(const std::filesystem::path& generation);
+/// The text of "key" or "group.key" in a service's section; empty when it is not given.
+std::string setting_of(const YAML::Node& settings, const std::string& service, const std::string& key);
+
 /// Those that the manifest gives. An absolute path is a file that the host has already, and not among them.
 std::vector<SettingFile> setting_files(const Manifest& manifest);
 /// Certificates that the settings name, those that the host has already among them.
