@@ -3,8 +3,8 @@
 
 #include <cmath>
 
+#include "core/device_clock.hpp"
 #include "core/time.hpp"
-#include "frame_grabber/camera_clock.hpp"
 #include "frame_grabber/live_camera.hpp"
 
 namespace railfix::frame_grabber {
@@ -77,7 +77,7 @@ class GenicamCamera final : public LiveCamera {
   LiveConfig config_;
   Held<ArvCamera> camera_;
   Held<ArvStream> stream_;
-  CameraClock clock_;
+  core::DeviceClock clock_;
   std::optional<uint64_t> last_id_;
   float exposure_s_ = 0;
   bool host_time_ = false;  // the camera's clock is the host's, by PTP
@@ -182,7 +182,7 @@ core::Status GenicamCamera::start() {
   for (int i = 0; i < kBuffers; ++i) arv_stream_push_buffer(stream_.get(), arv_buffer_new(payload, nullptr));
   const double exposure_us = arv_camera_get_exposure_time(camera_.get(), nullptr);
   exposure_s_ = static_cast<float>(exposure_us > 0 ? exposure_us * 1e-6 : 0);
-  clock_ = CameraClock();
+  clock_ = core::DeviceClock();
   last_id_.reset();
   arv_camera_start_acquisition(camera_.get(), said);
   if (said.failed()) return Error{name() + " does not start: " + said.text()};
