@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "sensor_gateway/live_sensor.hpp"
 #include "service/config.hpp"
 
 namespace railfix::sensor_gateway {
@@ -16,10 +17,15 @@ struct SensorGatewayConfig {
   bool wheel = true;
   bool gnss = true;
   double lead_s = 1;
+  LiveConfig live;
+
+  [[nodiscard]] bool is_live() const { return source == "live"; }
 
   void describe(service::Fields& fields) {
-    fields.text("source", source,
-                "Dataset folder; tables that it does not have are sensors that the train does not have.");
+    fields.text(
+        "source", source,
+        "Dataset folder, whose missing tables are sensors that the train does not have; or `live`: the sensors of "
+        "the group live.");
     fields.choice(
         "clock", clock, {"follow", "own"},
         "follow: play along with data_clock of the frame_grabber; own: no camera, play at the recorded rate and "
@@ -31,6 +37,18 @@ struct SensorGatewayConfig {
     fields.flag("wheel", wheel, "Play mav0/wheel0.");
     fields.flag("gnss", gnss, "Play mav0/gnss0.");
     fields.number("lead_s", lead_s, {0, 60}, "s", "Samples from so long before the first picture are played, too.");
+    fields.group("live", "The sensors of a train that runs.", [this](service::Fields& f) { describe_live(f); });
+  }
+
+ private:
+  void describe_live(service::Fields& f) {
+    f.text("gnss", live.gnss,
+           "GNSS receiver: gpsd://ADDRESS:PORT, or gpsd://ADDRESS:PORT/DEVICE where gpsd has several; empty = none.");
+    f.number("gnss_latency_ms", live.gnss_latency_ms, {0, 2000}, "ms",
+             "From a position to the arrival of its report; taken off the stamps where nobody keeps this computer's "
+             "clock.");
+    f.number("silent_s", live.silent_s, {0.2, 600}, "s", "A sensor without a sample for so long is connected anew.");
+    f.number("reconnect_s", live.reconnect_s, {0.1, 600}, "s", "Pause between attempts to connect.");
   }
 };
 

@@ -12,7 +12,8 @@ constexpr std::chrono::milliseconds kTick{5};  // one IMU sample at 200 Hz
 constexpr int64_t kLastWordsNs = 300'000'000;  // for the last samples to arrive before the program ends
 
 dataset::Sensors read(const SensorGatewayConfig& config) {
-  if (config.source.empty()) throw core::BadInput("sensor_gateway.source is empty; give a dataset folder");
+  if (config.is_live()) return {};
+  if (config.source.empty()) throw core::BadInput("sensor_gateway.source is empty; give a dataset folder, or live");
   auto sensors = core::value_or_throw(dataset::read_sensors(config.source));
   if (!config.imu) sensors.imu.clear();
   if (!config.wheel) sensors.wheel.clear();
@@ -34,6 +35,14 @@ SensorGatewayService::SensorGatewayService(const Config& config, service::Contex
              [this](const dataset::WheelRow& row) { publish(row); },
              [this](const dataset::GnssRow& row) { publish(row); }} {
   context_.health().flows(service::Flow::steady);
+  if (config_.is_live()) {
+    prepare_live();
+  } else {
+    prepare_played();
+  }
+}
+
+void SensorGatewayService::prepare_played() {
   const auto& sensors = playback_.sensors();
   context_.log().info("has {} IMU, {} wheel and {} GNSS samples", sensors.imu.size(), sensors.wheel.size(),
                       sensors.gnss.size());

@@ -1,9 +1,14 @@
-// The sensor tables of a dataset -> imu_sample, wheel_sample, gnss_fix, in step with data_clock.
+// The sensor tables of a dataset, in step with data_clock, or live sensors -> imu_sample, wheel_sample, gnss_fix.
 #pragma once
 
+#include <array>
+#include <map>
+#include <memory>
 #include <optional>
+#include <vector>
 
 #include "sensor_gateway/playback.hpp"
+#include "sensor_gateway/sensor_feed.hpp"
 #include "sensor_gateway/sensor_gateway_config.hpp"
 #include "service/service.hpp"
 
@@ -15,6 +20,11 @@ class SensorGatewayService {
   SensorGatewayService(const Config& config, service::Context& context);
 
  private:
+  void prepare_played();
+  void prepare_live();
+  void feed_from(std::unique_ptr<LiveSensor> sensor, const std::string& source);
+  void take(const std::string& source, const std::vector<Sample>& samples);
+  void say_live();
   void follow(const msg::DataClock& clock);
   core::Result<std::string> start();
   void begin(int64_t from_ns);
@@ -35,7 +45,7 @@ class SensorGatewayService {
   messaging::Writer<msg::ImuSample> imu_;  // are found while the tables are read
   messaging::Writer<msg::WheelSample> wheel_;
   messaging::Writer<msg::GnssFix> gnss_;
-  Playback playback_;
+  Playback playback_;  // of nothing with live sensors
   Sinks sinks_;
   std::optional<messaging::Writer<msg::DataClock>> clock_;  // with clock own
   std::optional<Anchor> anchor_;                            // real pace, while it plays
@@ -45,6 +55,13 @@ class SensorGatewayService {
   uint64_t gnss_seq_ = 0;
   uint64_t clock_seq_ = 0;
   int64_t clock_sent_ns_ = 0;
+  struct Wanted {  // a live sensor
+    std::string source;
+    int64_t heard_ns = 0;  // monotonic; 0 = never
+  };
+  std::array<Wanted, std::variant_size_v<Sample>> wanted_;  // in the order of Sample
+  std::map<std::string, std::string> troubles_;             // of each source, since its last sample
+  std::vector<std::unique_ptr<SensorFeed>> feeds_;          // last: their threads call the context
 };
 
 }  // namespace railfix::sensor_gateway

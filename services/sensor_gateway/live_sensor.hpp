@@ -1,0 +1,45 @@
+// Sensors that deliver by themselves, behind one small interface.
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/result.hpp"
+#include "dataset/dataset.hpp"
+
+namespace railfix::sensor_gateway {
+
+struct LiveConfig {
+  std::string gnss;
+  double gnss_latency_ms = 100;
+  double silent_s = 3;
+  double reconnect_s = 1;
+};
+
+/// With its stamp in this host's time.
+using Sample = std::variant<dataset::ImuRow, dataset::WheelRow, dataset::GnssRow>;
+
+/// Used by one thread. Errors are sentences for a technician: what, where, what to do.
+class LiveSensor {
+ public:
+  virtual ~LiveSensor() = default;
+  /// The text says what was found.
+  virtual core::Result<std::string> connect() = 0;
+  /// Empty when nothing came in time; an error when the device is gone or cannot be used as it is.
+  virtual core::Result<std::vector<Sample>> next(std::chrono::milliseconds patience) = 0;
+  virtual void disconnect() = 0;
+  /// Makes connect() and next() return soon, now and from now on. The only one that another thread may call.
+  virtual void cancel() = 0;
+  /// As in the configuration, for messages.
+  [[nodiscard]] virtual std::string name() const = 0;
+  /// Behind the name: why nothing may come, and what to do.
+  [[nodiscard]] virtual std::string why_silent() const = 0;
+};
+
+/// "gpsd://ADDRESS:PORT", or "gpsd://ADDRESS:PORT/DEVICE" for one of several receivers.
+core::Result<std::unique_ptr<LiveSensor>> make_gpsd_receiver(const std::string& source, const LiveConfig& config);
+
+}  // namespace railfix::sensor_gateway
