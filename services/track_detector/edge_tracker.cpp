@@ -261,6 +261,7 @@ std::optional<SettledEdge> EdgeTracker::refine(Spot& spot, int sign) const {
   edge.lateral_sigma_m = std::sqrt(covariance(1, 1));
   edge.pictures = static_cast<int>(edge.count);
   edge.cell = cell_;
+  edge.curvature_per_m = now.curvature_per_m;
   return edge;
 }
 

@@ -33,9 +33,10 @@ struct SettledEdge {
   double lateral_sigma_m = 0;
   double inner_grey = 0;  // beside it towards the track, mean
   double outer_grey = 0;
-  double wall_grey = 0;  // behind it towards the track, mean
-  double deep_grey = 0;  // the same, farther away
-  double cell = 0;       // bearing between two columns
+  double wall_grey = 0;        // behind it towards the track, mean
+  double deep_grey = 0;        // the same, farther away
+  double cell = 0;             // bearing between two columns
+  double curvature_per_m = 0;  // of the track there
   int pictures = 0;
   size_t count = 0;                                           // of the measurements
   std::array<EdgeMeasurement, kMostMeasurements> measured{};  // far to near

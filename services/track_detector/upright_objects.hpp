@@ -49,6 +49,7 @@ class UprightObjects {
   void look_for_exit(const SettledEdge& edge);
   void release(double way_m);
   void release_exit(const EdgeTracker& tracker, double way_m);
+  [[nodiscard]] double mean_of_walls_m() const;
   void hold(const UprightObject& object);
 
   struct Tunnel {

@@ -18,10 +18,18 @@ struct Corner {
   double place_m, lateral_m, inner_grey, outer_grey, wall_grey = 100, deep_grey = 100;
 };
 
+// Of a place so far on along the track and beside it, from a camera that looks along the track.
+double bearing_of(double along_m, double lateral_m, double curvature_per_m) {
+  if (curvature_per_m == 0) return lateral_m / along_m;
+  const double radius_m = 1 / curvature_per_m;
+  const double turn = curvature_per_m * along_m;
+  return (radius_m - (radius_m - lateral_m) * std::cos(turn)) / ((radius_m - lateral_m) * std::sin(turn));
+}
+
 // The corners as seen from way_m: edges as a picture of 640 columns would show them. score_share: less where the ground
 // behind them is uneven in brightness.
 UprightProfile see(const std::vector<Corner>& corners, double way_m, std::vector<UprightEdge>& edges,
-                   float score_share = 1) {
+                   float score_share = 1, double curvature_per_m = 0) {
   UprightProfile profile;
   profile.cell = 0.002;
   profile.widest = kWidest;
@@ -29,7 +37,7 @@ UprightProfile see(const std::vector<Corner>& corners, double way_m, std::vector
   edges.clear();
   for (const Corner& corner : corners) {
     const double ahead_m = corner.place_m - way_m;
-    const double bearing = corner.lateral_m / ahead_m;
+    const double bearing = bearing_of(ahead_m, corner.lateral_m, curvature_per_m);
     if (ahead_m < 2 || ahead_m > 40 || std::abs(bearing) > kWidest) continue;
     const double side = corner.lateral_m > 0 ? 1 : -1;
     edges.push_back({bearing, corner.inner_grey, corner.outer_grey, corner.wall_grey, corner.deep_grey});
@@ -60,14 +68,15 @@ std::vector<Corner> on_both_walls(std::vector<Corner> corners) {
 }
 
 std::vector<UprightObject> pass(const std::vector<Corner>& corners, double to_m, double beside_grey = kDay,
-                                float score_share = 1) {
+                                float score_share = 1, double curvature_per_m = 0) {
   EdgeTracker tracker;
   UprightObjects objects;
   std::vector<UprightObject> told;
   std::vector<UprightEdge> edges;
-  const LandmarkPicture picture;
+  LandmarkPicture picture;
+  picture.curvature_per_m = curvature_per_m;
   for (double way_m = 0; way_m < to_m; way_m += kStepM) {
-    const auto profile = see(corners, way_m, edges, score_share);
+    const auto profile = see(corners, way_m, edges, score_share, curvature_per_m);
     const auto& settled = tracker.follow(edges, profile, picture, way_m);
     for (const auto& object : objects.add(settled, tracker, way_m, beside_grey)) told.push_back(object);
   }
@@ -150,6 +159,28 @@ TEST(Uprights, AShortBrightPanelBelongsToTheTunnel) {
   ASSERT_EQ(told.size(), 2U);
   EXPECT_EQ(told[1].type, LandmarkType::portal_out);
   EXPECT_NEAR(told[1].place_m, 70.5, 0.08);
+}
+
+// For two tracks: the wall beside the other track is far away, and a curve bends it by 0.3 m before it is seen.
+TEST(Uprights, InACurveTheFarWallAloneTellsThePortalOut) {
+  for (const double curvature_per_m : {-0.002, 0.0, 0.002}) {
+    const auto told = pass({{40, 2.7, 70, 120, 60, 15}, {40, -6.8, 70, 120, 60, 15}, {72.5, -6.8, 240, 150, 240, 240}},
+                           85, kDay, 1, curvature_per_m);
+    ASSERT_EQ(told.size(), 2U) << curvature_per_m;
+    EXPECT_EQ(told[1].type, LandmarkType::portal_out);
+    EXPECT_NEAR(told[1].place_m, 72.5, 0.15) << curvature_per_m;
+  }
+}
+
+TEST(Uprights, TheNearWallTellsThePortalOutBetterThanTheFarOne) {
+  const auto told = pass({{40, 2.7, 70, 120, 60, 15},
+                          {40, -6.8, 70, 120, 60, 15},
+                          {72.5, 2.7, 240, 150, 240, 240},
+                          {73.7, -6.8, 240, 150, 240, 240}},
+                         85);
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_EQ(told[1].type, LandmarkType::portal_out);
+  EXPECT_NEAR(told[1].place_m, 72.5, 0.2);
 }
 
 // Greys of a drawn tunnel: the camera is used to the dark, and one wall's panel as bright as land was before it.
