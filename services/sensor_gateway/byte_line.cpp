@@ -4,9 +4,12 @@
 #include <netdb.h>
 #include <poll.h>
 #include <sys/eventfd.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
+#include <termios.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <memory>
@@ -15,6 +18,16 @@ namespace railfix::sensor_gateway {
 namespace {
 
 constexpr std::chrono::seconds kConnectPatience{2};
+
+struct Baud {
+  int64_t baud;
+  speed_t speed;
+};
+constexpr Baud kBauds[] = {{9600, B9600},     {19200, B19200},   {38400, B38400},   {57600, B57600},
+                           {115200, B115200}, {230400, B230400}, {460800, B460800}, {921600, B921600}};
+const Baud* find(int64_t baud) {
+  return std::find_if(std::begin(kBauds), std::end(kBauds), [baud](const Baud& one) { return one.baud == baud; });
+}
 
 using Found = std::unique_ptr<addrinfo, decltype(&freeaddrinfo)>;
 Found find(const Address& address) {
@@ -34,6 +47,10 @@ core::Error why(int error) {
 
 bool is_address(const Address& address) {
   return !address.ip.empty() && !address.port.empty() && find(address) != nullptr;
+}
+
+bool is_baud(int64_t baud) {
+  return find(baud) != std::end(kBauds);
 }
 
 ByteLine::ByteLine() : cancelled_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {}
@@ -56,6 +73,21 @@ core::Status ByteLine::connect(const Address& address) {
   socklen_t size = sizeof error;
   getsockopt(file_, SOL_SOCKET, SO_ERROR, &error, &size);
   return error == 0 ? core::Status() : why(error);
+}
+
+core::Status ByteLine::open_serial(const std::string& device, int64_t baud) {
+  close();
+  file_ = open(device.c_str(), O_RDONLY | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+  if (file_ < 0) return why(errno);
+  termios line{};
+  if (tcgetattr(file_, &line) != 0) return core::Error{"it is no serial line"};
+  cfmakeraw(&line);
+  line.c_cflag |= CLOCAL | CREAD;
+  line.c_cflag &= ~static_cast<tcflag_t>(CRTSCTS);
+  if (cfsetspeed(&line, find(baud)->speed) != 0 || tcsetattr(file_, TCSANOW, &line) != 0) return why(errno);
+  ioctl(file_, TIOCEXCL);
+  tcflush(file_, TCIFLUSH);
+  return {};
 }
 
 core::Status ByteLine::write(std::string_view text) {

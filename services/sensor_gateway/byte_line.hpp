@@ -18,6 +18,7 @@ struct Address {
 };
 /// False for names and for what is neither.
 bool is_address(const Address& address);
+bool is_baud(int64_t baud);
 
 /// Used by one thread. Errors are the bare reason; who has opened the line knows what is at its other end.
 class ByteLine {
@@ -28,6 +29,8 @@ class ByteLine {
   ByteLine& operator=(const ByteLine&) = delete;
 
   core::Status connect(const Address& address);
+  /// For reading, and for nobody else.
+  core::Status open_serial(const std::string& device, int64_t baud);
   core::Status write(std::string_view text);
   /// How many bytes came; 0 = none in time.
   core::Result<size_t> read(std::span<uint8_t> bytes, std::chrono::milliseconds patience);

@@ -15,6 +15,13 @@ namespace railfix::sensor_gateway {
 struct LiveConfig {
   std::string gnss;
   double gnss_latency_ms = 100;
+  std::string imu;
+  std::string imu_axes = "x y z";
+  std::string wheel;
+  double wheel_pulses_per_metre = 0;
+  bool wheel_reversed = false;
+  int64_t baud = 115200;
+  double line_latency_ms = 5;
   double silent_s = 3;
   double reconnect_s = 1;
 };
@@ -41,5 +48,7 @@ class LiveSensor {
 
 /// "gpsd://ADDRESS:PORT", or "gpsd://ADDRESS:PORT/DEVICE" for one of several receivers.
 core::Result<std::unique_ptr<LiveSensor>> make_gpsd_receiver(const std::string& source, const LiveConfig& config);
+/// "ubx:DEVICE": IMU and wheel, those of the two that the configuration takes from this source.
+core::Result<std::unique_ptr<LiveSensor>> make_ubx_receiver(const std::string& source, const LiveConfig& config);
 
 }  // namespace railfix::sensor_gateway

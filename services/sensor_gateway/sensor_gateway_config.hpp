@@ -47,6 +47,17 @@ struct SensorGatewayConfig {
     f.number("gnss_latency_ms", live.gnss_latency_ms, {0, 2000}, "ms",
              "From a position to the arrival of its report; taken off the stamps where nobody keeps this computer's "
              "clock.");
+    f.text("imu", live.imu, "IMU of a u-blox receiver on a serial line: ubx:DEVICE; empty = none.");
+    f.text("imu_axes", live.imu_axes,
+           "Which of the IMU's axes point forward, left and up: x, y or z, with - where it points the other way.");
+    f.text("wheel", live.wheel, "Wheel pulses of a u-blox receiver: ubx:DEVICE, which may be the IMU's; empty = none.");
+    f.number("wheel_pulses_per_metre", live.wheel_pulses_per_metre, {0, 100000}, "1/m",
+             "Pulses of the wheel in a metre; must be given with a wheel.");
+    f.flag("wheel_reversed", live.wheel_reversed, "Pulses that the receiver calls forward are backward.");
+    f.integer("baud", live.baud, {9600, 921600}, "1/s", "Of serial lines; USB takes any.");
+    f.number("line_latency_ms", live.line_latency_ms, {0, 1000}, "ms",
+             "From a measurement of IMU or wheel to the arrival of its message when nothing delays it; taken off the "
+             "stamps.");
     f.number("silent_s", live.silent_s, {0.2, 600}, "s", "A sensor without a sample for so long is connected anew.");
     f.number("reconnect_s", live.reconnect_s, {0.1, 600}, "s", "Pause between attempts to connect.");
   }

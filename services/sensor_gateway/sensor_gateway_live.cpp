@@ -1,4 +1,9 @@
 // The part of the service that deals with live sensors.
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <set>
+
 #include "core/time.hpp"
 #include "sensor_gateway/sensor_gateway_service.hpp"
 
@@ -16,15 +21,19 @@ void SensorGatewayService::prepare_live() {
     throw core::BadInput(
         "sensor_gateway.clock is own, which is for played data; live sensors have this computer's time: leave it out");
   }
-  if (live.gnss.empty()) {
+  wanted_ = {Wanted{live.imu}, Wanted{live.wheel}, Wanted{live.gnss}};
+  for (auto& one : wanted_) one.heard_ns = core::monotonic_ns();
+  std::set<std::string> lines{live.imu, live.wheel};  // one line may carry both
+  lines.erase("");
+  if (lines.empty() && live.gnss.empty()) {
     throw core::BadInput(
-        "sensor_gateway.source is live, but no sensor is named; give sensor_gateway.live.gnss, or take sensor_gateway "
-        "out of the train's services");
+        "sensor_gateway.source is live, but no sensor is named; give live.gnss, live.imu or live.wheel, or take "
+        "sensor_gateway out of the train's services");
   }
   context_.at_stop([this] { feeds_.clear(); });
   context_.health().ready();
-  wanted_[Sample(dataset::GnssRow()).index()].source = live.gnss;
-  feed_from(core::value_or_throw(make_gpsd_receiver(live.gnss, live)), live.gnss);
+  if (!live.gnss.empty()) feed_from(core::value_or_throw(make_gpsd_receiver(live.gnss, live)), live.gnss);
+  for (const auto& line : lines) feed_from(core::value_or_throw(make_ubx_receiver(line, live)), line);
   context_.every(kSilenceCheck, [this] { say_live(); });
 }
 
@@ -50,20 +59,35 @@ void SensorGatewayService::take(const std::string& source, const std::vector<Sam
   troubles_.erase(source);
   for (const auto& sample : samples) {
     context_.health().input();
-    wanted_[sample.index()].heard_ns = core::monotonic_ns();
+    auto& wanted = wanted_[sample.index()];
+    wanted.heard = true;
+    wanted.heard_ns = core::monotonic_ns();
     std::visit([this](const auto& row) { publish(row); }, sample);
   }
   say_live();
 }
 
+/// A source that is gone says why itself; one that delivers may still lack one of its sensors.
 void SensorGatewayService::say_live() {
+  constexpr const char* kLacks[] = {
+      "no IMU samples from {}, which sends others; switch on gyroscope and accelerometer in its UBX-ESF-MEAS",
+      "no wheel pulses from {}, which sends others; check the wheel's cable, and that its receiver takes pulses", ""};
   std::string reasons;
-  for (const auto& [source, why] : troubles_) reasons += (reasons.empty() ? "" : "; ") + why;
-  if (!reasons.empty()) return context_.health().degraded(reasons);
-  for (const auto& one : wanted_) {
-    if (!one.source.empty() && one.heard_ns == 0) return;  // it has still to be heard of
+  const auto add = [&reasons](const std::string& why) { reasons += (reasons.empty() ? "" : "; ") + why; };
+  for (const auto& [source, why] : troubles_) add(why);
+  bool all_heard = true;
+  for (size_t i = 0; i < wanted_.size(); ++i) {
+    const auto& one = wanted_[i];
+    if (one.source.empty()) continue;
+    all_heard = all_heard && one.heard;
+    const bool silent = core::seconds(core::monotonic_ns() - one.heard_ns) > config_.live.silent_s;
+    const bool delivers = std::any_of(wanted_.begin(), wanted_.end(), [&](const Wanted& other) {
+      return other.source == one.source && other.heard_ns > one.heard_ns;
+    });
+    if (silent && delivers && !troubles_.contains(one.source)) add(fmt::format(fmt::runtime(kLacks[i]), one.source));
   }
-  context_.health().active();
+  if (!reasons.empty()) return context_.health().degraded(reasons);
+  if (all_heard) context_.health().active();
 }
 
 }  // namespace railfix::sensor_gateway

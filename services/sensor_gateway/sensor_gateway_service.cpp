@@ -142,7 +142,8 @@ void SensorGatewayService::publish(const dataset::WheelRow& row) {
   sample.grabbed_ns(core::wall_ns());
   sample.seq(++wheel_seq_);
   sample.pulses(row.pulses);
-  sample.pulses_per_metre(playback_.sensors().pulses_per_metre);
+  sample.pulses_per_metre(config_.is_live() ? config_.live.wheel_pulses_per_metre
+                                            : playback_.sensors().pulses_per_metre);
   wheel_.write(sample);
   context_.health().output(sample.grabbed_ns());
 }

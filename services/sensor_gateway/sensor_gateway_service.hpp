@@ -57,7 +57,8 @@ class SensorGatewayService {
   int64_t clock_sent_ns_ = 0;
   struct Wanted {  // a live sensor
     std::string source;
-    int64_t heard_ns = 0;  // monotonic; 0 = never
+    bool heard = false;
+    int64_t heard_ns = 0;  // monotonic; at first since when it is waited for
   };
   std::array<Wanted, std::variant_size_v<Sample>> wanted_;  // in the order of Sample
   std::map<std::string, std::string> troubles_;             // of each source, since its last sample

@@ -1,0 +1,157 @@
+// sensor_gateway as a program with IMU and wheel on a serial line, which is a pseudo-terminal.
+#include <atomic>
+#include <cmath>
+#include <numbers>
+#include <thread>
+
+#include "core/time.hpp"
+#include "live_sensors.hpp"
+#include "support/ubx_frames.hpp"
+
+namespace railfix {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+constexpr int64_t kPeriodMs = 10;
+
+/// A u-blox receiver on a train that turns left by 1 degree/s, 3 pulses every 10 ms; its x points left, its y back. Its
+/// time began at `origin_ns`.
+class Receiver {
+ public:
+  Receiver(const std::filesystem::path& name, int64_t origin_ns, bool has_wheel = true)
+      : line_(name), origin_ns_(origin_ns), has_wheel_(has_wheel), thread_([this] { run(); }) {}
+  ~Receiver() {
+    stop_ = true;
+    thread_.join();
+  }
+  Receiver(const Receiver&) = delete;
+  Receiver& operator=(const Receiver&) = delete;
+
+ private:
+  void run() {
+    int64_t tag_ms = (core::wall_ns() - origin_ns_) / 1'000'000 / kPeriodMs * kPeriodMs;
+    while (!stop_) {
+      tag_ms += kPeriodMs;
+      const int64_t due_ns = origin_ns_ + tag_ms * 1'000'000;
+      std::this_thread::sleep_for(std::chrono::nanoseconds(due_ns - core::wall_ns()));  // its rate
+      const auto tag = static_cast<uint32_t>(tag_ms);
+      line_.write(test::ubx_measurements(tag, test::ubx_imu({0, 0, 4096}, {0, -1024, 10042})));
+      if (has_wheel_) {
+        const auto ticks = static_cast<uint32_t>(tag_ms / kPeriodMs * 3);
+        line_.write(test::ubx_measurements(tag, {test::ubx_ticks(0x7FFFFF - 600 + ticks, false)}));
+      }
+    }
+  }
+  test::PseudoTerminal line_;
+  int64_t origin_ns_;
+  bool has_wheel_;
+  std::atomic<bool> stop_ = false;
+  std::thread thread_;
+};
+
+class Line : public LiveSensors {
+ protected:
+  void SetUp() override {
+    LiveSensors::SetUp();
+    listen(messaging::topics::imu_sample, [this](const msg::ImuSample& one) { imu_.push_back(one); });
+    listen(messaging::topics::wheel_sample, [this](const msg::WheelSample& one) { wheel_.push_back(one); });
+  }
+  [[nodiscard]] std::string device() const { return (root_ / "ttyACM0").string(); }
+  std::unique_ptr<test::Program> both() {
+    return gateway({"sensor_gateway.live.imu=ubx:" + device(), "sensor_gateway.live.wheel=ubx:" + device(),
+                    "sensor_gateway.live.wheel_pulses_per_metre=100", "sensor_gateway.live.imu_axes=-y x z",
+                    "sensor_gateway.live.line_latency_ms=0", "sensor_gateway.live.silent_s=1"});
+  }
+  bool more(size_t count) {
+    const size_t imu = imu_.size();
+    const size_t wheel = wheel_.size();
+    return run_until([&] {
+      return imu_.size() >= imu + count && wheel_.size() >= wheel + count && status_.state() == msg::STATE_ACTIVE;
+    });
+  }
+  void expect_imu_of_the_train() const {
+    for (const auto& one : imu_) {
+      EXPECT_NEAR(one.rate_z_rps(), std::numbers::pi / 180, 1e-9);
+      EXPECT_NEAR(one.accel_x_mps2(), 1, 1e-9);
+      EXPECT_NEAR(one.accel_y_mps2(), 0, 1e-9);
+      EXPECT_NEAR(one.accel_z_mps2(), 9.81, 0.01);
+    }
+  }
+  /// 300 pulses a second from the first on, also over a time when nobody listened.
+  void expect_pulses_as_time_went() const {
+    for (const auto& one : wheel_) {
+      const double s = core::seconds(one.stamp_ns() - wheel_[0].stamp_ns());
+      EXPECT_NEAR(static_cast<double>(one.pulses() - wheel_[0].pulses()), 300 * s, 300 * 0.05) << one.seq();
+      EXPECT_EQ(one.pulses_per_metre(), 100);
+    }
+  }
+  std::vector<msg::ImuSample> imu_;
+  std::vector<msg::WheelSample> wheel_;
+};
+
+TEST_F(Line, ThatIsCutAndMended) {
+  const auto service = both();
+  ASSERT_TRUE(told("cannot be opened (No such file or directory)")) << reason();
+  EXPECT_THAT(reason(), AllOf(HasSubstr("ubx:" + device()), HasSubstr("plugged in")));
+
+  const int64_t origin_ns = core::wall_ns() - 3600 * core::kNsPerSecond;
+  auto receiver = std::make_unique<Receiver>(device(), origin_ns);
+  ASSERT_TRUE(more(150)) << reason();
+  receiver.reset();
+  ASSERT_TRUE(told("ubx:" + device())) << reason();
+  EXPECT_THAT(reason(), ::testing::AnyOf(HasSubstr("was unplugged"), HasSubstr("cannot be opened")));
+  receiver = std::make_unique<Receiver>(device(), origin_ns);
+  ASSERT_TRUE(more(150)) << reason();
+
+  expect_growing(imu_);
+  expect_growing(wheel_);
+  expect_imu_of_the_train();
+  expect_pulses_as_time_went();
+  EXPECT_LT(std::abs(core::seconds(imu_.back().grabbed_ns() - imu_.back().stamp_ns())), 2.0);
+  EXPECT_EQ(service->end(SIGTERM), 0);
+}
+
+TEST_F(Line, AReceiverThatWasSwitchedOffHasLostItsCount) {
+  const auto service = both();
+  auto receiver = std::make_unique<Receiver>(device(), core::wall_ns() - 3600 * core::kNsPerSecond);
+  ASSERT_TRUE(more(20)) << reason();
+  receiver.reset();
+  ASSERT_TRUE(told("ubx:" + device())) << reason();
+  const auto before = wheel_.back();
+  receiver = std::make_unique<Receiver>(device(), core::wall_ns());
+  ASSERT_TRUE(more(20)) << reason();
+  EXPECT_GT(wheel_.back().pulses() - before.pulses(), 1'000'000) << "a leap that no train can make";
+  expect_growing(wheel_);
+}
+
+TEST_F(Line, AWheelThatIsMissingIsSaid) {
+  const auto service = both();
+  const Receiver receiver(device(), core::wall_ns(), false);
+  ASSERT_TRUE(told("no wheel pulses from ubx:" + device())) << reason();
+  EXPECT_GT(imu_.size(), 10U);
+}
+
+TEST_F(Line, ThatIsSilentOrSpeaksSomethingElseIsSaidAndDoesNotHoldUpTheEnd) {
+  const test::PseudoTerminal line(device());
+  const auto service = both();
+  ASSERT_TRUE(told("sends nothing; check its power")) << reason();
+  ASSERT_TRUE(run_until([&] {
+    line.write(std::string("$GNRMC,,V,,,,,,,,,,N*4D\r\n"));
+    return reason().find("sends what is no UBX") != std::string::npos;
+  })) << reason();
+  EXPECT_EQ(service->end(SIGTERM), 0);
+}
+
+TEST_F(Line, WhatCannotBeIsExitCodeTwo) {
+  const std::string wheel = "sensor_gateway.live.wheel=ubx:/dev/ttyACM0";
+  const std::string scale = "sensor_gateway.live.wheel_pulses_per_metre=100";
+  EXPECT_EQ(gateway({wheel})->wait_for_end(), 2) << "no pulses per metre";
+  EXPECT_EQ(gateway({wheel, scale, "sensor_gateway.live.baud=100000"})->wait_for_end(), 2);
+  EXPECT_EQ(gateway({"sensor_gateway.live.imu=/dev/ttyACM0"})->wait_for_end(), 2);
+  EXPECT_EQ(gateway({"sensor_gateway.live.imu=ubx:/dev/ttyACM0", "sensor_gateway.live.imu_axes=x y y"})->wait_for_end(),
+            2);
+}
+
+}  // namespace
+}  // namespace railfix
