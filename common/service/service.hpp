@@ -6,7 +6,8 @@
 //
 //   class OdometryService {
 //    public:
-//     using Config = OdometryConfig;                            // has describe(service::Fields&)
+//     using Config = OdometryConfig;   // has describe(service::Fields&), and check() where keys must fit together: a
+//                                      // core::Status, which --check and so `railfix train check` tell, too
 //     OdometryService(const Config& config, service::Context& context);   // creates writers, registers handlers; may
 //     throw BadInput
 //   };
@@ -175,6 +176,7 @@ int run(const std::string& name, int argc, char** argv) {
     auto read = read_config<typename Service::Config>(name, file, overrides, service_names());
     if (!read.ok()) return read.error();
     *config = read.value();
+    if constexpr (requires { config->check(); }) return config->check();
     return {};
   };
   program.document = [name] { return document_config<typename Service::Config>(name); };

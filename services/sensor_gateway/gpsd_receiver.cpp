@@ -78,6 +78,7 @@ class GpsdReceiver final : public LiveSensor {
 
   void disconnect() override { line_.close(); }
   void cancel() override { line_.cancel(); }
+  [[nodiscard]] const std::string& source() const override { return source_; }
   [[nodiscard]] std::string name() const override { return "GNSS receiver " + source_; }
   [[nodiscard]] std::string why_silent() const override { return reports_.why_silent(); }
 

@@ -40,11 +40,16 @@ class LiveSensor {
   virtual void disconnect() = 0;
   /// Makes connect() and next() return soon, now and from now on. The only one that another thread may call.
   virtual void cancel() = 0;
-  /// As in the configuration, for messages.
+  /// As in the configuration.
+  [[nodiscard]] virtual const std::string& source() const = 0;
+  /// For messages.
   [[nodiscard]] virtual std::string name() const = 0;
   /// Behind the name: why nothing may come, and what to do.
   [[nodiscard]] virtual std::string why_silent() const = 0;
 };
+
+/// All that are named, each source once; an error where one cannot be. Connects to none.
+core::Result<std::vector<std::unique_ptr<LiveSensor>>> make_live_sensors(const LiveConfig& config);
 
 /// "gpsd://ADDRESS:PORT", or "gpsd://ADDRESS:PORT/DEVICE" for one of several receivers.
 core::Result<std::unique_ptr<LiveSensor>> make_gpsd_receiver(const std::string& source, const LiveConfig& config);

@@ -20,6 +20,16 @@ struct SensorGatewayConfig {
   LiveConfig live;
 
   [[nodiscard]] bool is_live() const { return source == "live"; }
+  [[nodiscard]] core::Status check() const {
+    if (!is_live()) return {};
+    if (clock == "own") {
+      return core::Error{
+          "sensor_gateway.clock is own, which is for played data; live sensors have this computer's time: leave it "
+          "out"};
+    }
+    const auto sensors = make_live_sensors(live);
+    return sensors.ok() ? core::Status() : sensors.error();
+  }
 
   void describe(service::Fields& fields) {
     fields.text(

@@ -2,7 +2,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <set>
 
 #include "core/time.hpp"
 #include "sensor_gateway/sensor_gateway_service.hpp"
@@ -17,27 +16,16 @@ constexpr std::chrono::milliseconds kSilenceCheck{500};
 /// A sensor may be switched on later than the train: nothing here waits for it.
 void SensorGatewayService::prepare_live() {
   const auto& live = config_.live;
-  if (config_.clock == "own") {
-    throw core::BadInput(
-        "sensor_gateway.clock is own, which is for played data; live sensors have this computer's time: leave it out");
-  }
   wanted_ = {Wanted{live.imu}, Wanted{live.wheel}, Wanted{live.gnss}};
   for (auto& one : wanted_) one.heard_ns = core::monotonic_ns();
-  std::set<std::string> lines{live.imu, live.wheel};  // one line may carry both
-  lines.erase("");
-  if (lines.empty() && live.gnss.empty()) {
-    throw core::BadInput(
-        "sensor_gateway.source is live, but no sensor is named; give live.gnss, live.imu or live.wheel, or take "
-        "sensor_gateway out of the train's services");
-  }
   context_.at_stop([this] { feeds_.clear(); });
   context_.health().ready();
-  if (!live.gnss.empty()) feed_from(core::value_or_throw(make_gpsd_receiver(live.gnss, live)), live.gnss);
-  for (const auto& line : lines) feed_from(core::value_or_throw(make_ubx_receiver(line, live)), line);
+  for (auto& sensor : core::value_or_throw(make_live_sensors(live))) feed_from(std::move(sensor));
   context_.every(kSilenceCheck, [this] { say_live(); });
 }
 
-void SensorGatewayService::feed_from(std::unique_ptr<LiveSensor> sensor, const std::string& source) {
+void SensorGatewayService::feed_from(std::unique_ptr<LiveSensor> sensor) {
+  const std::string source = sensor->source();
   FeedEvents events;
   events.connected = [this](const std::string& what) {
     context_.post([this, what] { context_.log().info("{}", what); });

@@ -22,7 +22,7 @@ class SensorGatewayService {
  private:
   void prepare_played();
   void prepare_live();
-  void feed_from(std::unique_ptr<LiveSensor> sensor, const std::string& source);
+  void feed_from(std::unique_ptr<LiveSensor> sensor);
   void take(const std::string& source, const std::vector<Sample>& samples);
   void say_live();
   void follow(const msg::DataClock& clock);

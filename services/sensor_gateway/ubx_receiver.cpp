@@ -46,6 +46,7 @@ class UbxReceiver final : public LiveSensor {
 
   void disconnect() override { line_.close(); }
   void cancel() override { line_.cancel(); }
+  [[nodiscard]] const std::string& source() const override { return source_; }
   [[nodiscard]] std::string name() const override { return "receiver " + source_; }
   [[nodiscard]] std::string why_silent() const override { return readings_.why_silent(); }
 

@@ -153,5 +153,18 @@ TEST_F(Line, WhatCannotBeIsExitCodeTwo) {
             2);
 }
 
+/// What `railfix train check` asks of it, on a computer without any of the devices.
+TEST_F(Line, ADeviceThatCannotBeIsFoundBeforeItStarts) {
+  const auto asked = [](const std::string& key, const std::string& value) {
+    std::vector<std::string> command =
+        test::with_settings("railfix-sensor-gateway", {"sensor_gateway.source=live", key + "=" + value});
+    command.emplace_back("--check");
+    return test::run_program(command, 10);
+  };
+  EXPECT_EQ(asked("sensor_gateway.live.imu", "ubx:/dev/ttyACM0").exit_code, 0);
+  EXPECT_EQ(asked("sensor_gateway.live.gnss", "gpsd://train.example:2947").exit_code, 2);
+  EXPECT_THAT(asked("sensor_gateway.live.gnss", "/dev/ttyACM0").err, HasSubstr("give gpsd://ADDRESS:PORT"));
+}
+
 }  // namespace
 }  // namespace railfix
