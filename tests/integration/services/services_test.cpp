@@ -1,4 +1,5 @@
-// What every service program does alike: documents and checks its configuration, gets ready, ends cleanly on SIGTERM.
+// What every service program does alike: documents and checks its configuration, gets ready, ends cleanly on SIGTERM,
+// and needs no other rights than those of its own certificate.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -9,12 +10,15 @@
 #include "service/service.hpp"
 #include "support/network.hpp"
 #include "support/program.hpp"
+#include "train/keys.hpp"
 
 namespace railfix {
 namespace {
 
 using ::testing::HasSubstr;
 namespace fs = std::filesystem;
+
+constexpr int64_t kDomain = 78;
 
 class EveryService : public ::testing::TestWithParam<std::string> {
  protected:
@@ -56,14 +60,19 @@ TEST_P(EveryService, RefusesAnUnknownKeyByNameAndFile) {
   fs::remove(file);
 }
 
-TEST_P(EveryService, GetsReadyAndEndsCleanlyOnSigterm) {
-  const std::string train = "services-test-" + GetParam() + "-" + std::to_string(getpid());
-  const auto folder = fs::temp_directory_path() / train;
+/// `keys`: of the train's only host; empty without certificates.
+void expect_ready_and_clean_end(const std::string& name, const std::string& program, const fs::path& folder,
+                                const std::string& keys) {
+  const std::string train = folder.filename();
   write_dataset(folder);
-  test::Program service(test::with_settings(program(), {"common.train_id=" + train, "common.domain=78",
-                                                        "frame_grabber.source=.", "sensor_gateway.source=."}),
-                        {{}, {}, folder});
-  messaging::Participant participant(test::network(train, 78));
+  std::vector<std::string> settings{"common.train_id=" + train, "common.domain=" + std::to_string(kDomain),
+                                    "common.host=cab", "frame_grabber.source=.", "sensor_gateway.source=."};
+  if (!keys.empty()) settings.push_back("common.security=" + keys);
+  test::Program service(test::with_settings(program, settings), {{}, {}, folder});
+  auto network = test::network(train, kDomain);
+  network.service = "railfix-test";
+  network.security_folder = keys;
+  messaging::Participant participant(network);
   messaging::Queue queue;
   bool stopped = false;
   bool up = false;
@@ -72,7 +81,7 @@ TEST_P(EveryService, GetsReadyAndEndsCleanlyOnSigterm) {
                                                  if (status.state() == msg::STATE_STOPPED) stopped = true;
                                                  if (status.state() != msg::STATE_STARTING && !up) {
                                                    up = true;
-                                                   EXPECT_EQ(std::string(status.service().c_str()), GetParam());
+                                                   EXPECT_EQ(std::string(status.service().c_str()), name);
                                                    service.send(SIGTERM);
                                                  }
                                                });
@@ -85,6 +94,25 @@ TEST_P(EveryService, GetsReadyAndEndsCleanlyOnSigterm) {
   EXPECT_TRUE(up) << "never got ready";
   EXPECT_TRUE(stopped) << "did not say that it stops";
   EXPECT_EQ(service.exit_code(), 0) << "did not end on SIGTERM, or not cleanly";
+}
+
+TEST_P(EveryService, GetsReadyAndEndsCleanlyOnSigterm) {
+  const auto folder = fs::temp_directory_path() / ("services-test-" + GetParam() + "-" + std::to_string(getpid()));
+  expect_ready_and_clean_end(GetParam(), program(), folder, "");
+  fs::remove_all(folder);
+}
+
+// A topic that it reads or writes and has no right to would end it at the start, on secured trains only.
+TEST_P(EveryService, GetsReadyWithNoOtherRightsThanItsOwn) {
+  const auto folder = fs::temp_directory_path() / ("services-locked-" + GetParam() + "-" + std::to_string(getpid()));
+  fs::create_directories(folder);
+  std::ofstream(folder / "train.yaml") << "train:\n  id: " << folder.filename().string() << "\n  domain: " << kDomain
+                                       << "\n  release: 1.0\n  security: true\n"
+                                       << "  hosts: { cab: { address: 127.0.0.1 } }\n  services: { " << GetParam()
+                                       << ": cab }\n";
+  const auto made = tool::make_keys(core::value_or_throw(tool::read_manifest(folder)), {});
+  ASSERT_TRUE(made.ok()) << made.error().message;
+  expect_ready_and_clean_end(GetParam(), program(), folder, (folder / "security/cab").string());
   fs::remove_all(folder);
 }
 
