@@ -33,6 +33,7 @@ class Scripted : public LiveSensor {
   }
   void disconnect() override {}
   void cancel() override { cancelled_.set_value(); }
+  [[nodiscard]] const std::string& source() const override { return script_; }
   [[nodiscard]] std::string name() const override { return "sensor scripted"; }
   [[nodiscard]] std::string why_silent() const override { return "is silent"; }
 
@@ -76,11 +77,13 @@ class Silent : public LiveSensor {
   core::Result<std::vector<Sample>> next(std::chrono::milliseconds) override { return std::vector<Sample>(); }
   void disconnect() override {}
   void cancel() override {}
+  [[nodiscard]] const std::string& source() const override { return source_; }
   [[nodiscard]] std::string name() const override { return "sensor"; }
   [[nodiscard]] std::string why_silent() const override { return "is silent"; }
 
  private:
   std::promise<void>& anew_;
+  const std::string source_ = "silent";
   int connections_ = 0;
 };
 
