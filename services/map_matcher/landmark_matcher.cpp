@@ -17,6 +17,8 @@ constexpr int kScaleSteps = 4;         // to either side
 constexpr double kScaleStep = 0.6;     // sigmas
 constexpr double kScaleChanges = 0.3;  // share of the scale's sigma that differs from place to place
 constexpr double kOddM = 0.1;
+constexpr double kConfirmed = 1e-6;  // odds against the place behind three or four landmarks that fit, ...
+constexpr double kMostOdds = 1e3;    // ... and so many more bring it back when nothing has
 
 double gauss(double error, double sigma) {
   const double z = error / sigma;
@@ -37,7 +39,8 @@ bool other_side(const Sighting& sighting, const track::PathLandmark& landmark) {
 // Every mapped landmark of the kind in the window is one hypothesis, weighed by how well the earlier sightings fit it;
 // that it stands elsewhere than the map says is another; the last one is that this sighting is false, weighed by the
 // mean fit over the window. A confidence below the usual is a chance for the sighting, not for each landmark in the
-// window. The window itself only selects.
+// window. The window itself only selects. That the train is not in it at all is weighed by what such a sighting would
+// be by chance; the odds of that go on from sighting to sighting.
 std::optional<Fix> LandmarkMatcher::add(const Sighting& sighting, const Prior& prior) {
   if (!prior.usable() || !std::isfinite(sighting.distance_ahead_m) || !(sighting.sigma_m > 0)) return std::nullopt;
   const double place_m = prior.travelled_m + sighting.distance_ahead_m;
@@ -52,8 +55,8 @@ std::optional<Fix> LandmarkMatcher::add(const Sighting& sighting, const Prior& p
   std::erase_if(candidates, [&](const auto* landmark) { return other_side(sighting, *landmark); });
   const double expected = std::max(1.0, parameters_.detection * static_cast<double>(candidates.size()));
   const double doubt = std::max(0.0, kUsualConfidence - confidence);
-  double sum = mean_fit(from_m - place_m, to_m - place_m, place_m) *
-               (doubt * expected + parameters_.false_per_m * (to_m - from_m));
+  const double earlier = mean_fit(from_m - place_m, to_m - place_m, place_m);
+  double here = earlier * (doubt * expected + parameters_.false_per_m * (to_m - from_m));
   const track::PathLandmark* best = nullptr;
   double best_weight = 0;
   for (const auto* landmark : candidates) {
@@ -62,14 +65,20 @@ std::optional<Fix> LandmarkMatcher::add(const Sighting& sighting, const Prior& p
     const double weight = chance * (1 - parameters_.moved) * history_fits(shift_m, place_m);
     const double still_m =
         std::min(kMovedSigmas * std::hypot(sighting.sigma_m, landmark->landmark->sigma_m), 0.5 * parameters_.moved_m);
-    const double elsewhere = 0.5 * (mean_fit(shift_m - parameters_.moved_m, shift_m - still_m, place_m) +
-                                    mean_fit(shift_m + still_m, shift_m + parameters_.moved_m, place_m));
-    sum += weight + chance * parameters_.moved * elsewhere;
+    const double moved = 0.5 * (mean_fit(shift_m - parameters_.moved_m, shift_m - still_m, place_m) +
+                                mean_fit(shift_m + still_m, shift_m + parameters_.moved_m, place_m));
+    here += weight + chance * parameters_.moved * moved;
     if (weight > best_weight) {
       best = landmark;
       best_weight = weight;
     }
   }
+  const double by_chance_per_m =
+      parameters_.false_per_m + parameters_.detection * mapped_per_m(sighting.kind, expected_m);
+  const double elsewhere = odds_elsewhere_ * earlier * (to_m - from_m) * by_chance_per_m;
+  const double sum = here + elsewhere;
+  if (here > 0) odds_elsewhere_ = std::clamp(elsewhere / here, std::min(odds_elsewhere_, kConfirmed), kMostOdds);
+  confirmed_ = confirmed_ || odds_elsewhere_ <= kConfirmed;
   seen_.push_back({sighting, place_m});
   if (seen_.size() > kMostSightings) seen_.pop_front();
   if (best == nullptr || !(best_weight >= parameters_.min_probability * sum)) return std::nullopt;
@@ -102,7 +111,7 @@ double LandmarkMatcher::history_fits(double shift_m, double scale, double now_m)
   double fit = 1;
   for (const auto& seen : seen_) {
     const double path_m = seen.place_m + shift_m - scale * (now_m - seen.place_m);
-    fit *= sighting_fits(seen, path_m, relative_sigma_m(seen, now_m));
+    fit *= sighting_fits(seen, path_m, now_m);
   }
   // Landmarks between the sightings that nobody reported.
   const auto [first, last] = std::minmax(seen_.front().place_m, now_m);
@@ -116,26 +125,32 @@ double LandmarkMatcher::history_fits(double shift_m, double scale, double now_m)
     if (place_m < first + 1 || place_m > last - 0.5 || !sighted_before(landmark.kind)) continue;
     const bool reported = std::any_of(seen_.begin(), seen_.end(), [&](const Seen& seen) {
       return seen.sighting.kind == landmark.kind &&
-             std::abs(seen.place_m - place_m) < 3 * relative_sigma_m(seen, now_m);
+             std::abs(seen.place_m - place_m) < 3 * relative_sigma_m(seen, landmark.landmark->sigma_m, now_m);
     });
     if (!reported) fit *= 1 - parameters_.detection;
   }
   return fit;
 }
 
-double LandmarkMatcher::sighting_fits(const Seen& seen, double path_m, double relative_m) const {
+double LandmarkMatcher::sighting_fits(const Seen& seen, double path_m, double now_m) const {
   const auto mapped = near(seen.sighting.kind, path_m - kDensityReachM, path_m + kDensityReachM);
-  const double mapped_per_m = static_cast<double>(mapped.size()) / (2 * kDensityReachM);
-  const double by_chance = parameters_.false_per_m + (1 - seen.sighting.confidence) * mapped_per_m;
+  const double per_m = static_cast<double>(mapped.size()) / (2 * kDensityReachM);
+  const double by_chance = parameters_.false_per_m + (1 - seen.sighting.confidence) * per_m;
   double density = by_chance;
   for (const auto* landmark : mapped) {
     if (other_side(seen.sighting, *landmark)) continue;
     const double off_m = landmark->distance_m - path_m;
     const double moved = std::abs(off_m) < parameters_.moved_m ? parameters_.moved / (2 * parameters_.moved_m) : 0.0;
+    const double relative_m = relative_sigma_m(seen, landmark->landmark->sigma_m, now_m);
     density +=
         parameters_.detection * seen.sighting.confidence * ((1 - parameters_.moved) * gauss(off_m, relative_m) + moved);
   }
-  return density / (by_chance + parameters_.detection * mapped_per_m);
+  return density / (by_chance + parameters_.detection * per_m);
+}
+
+double LandmarkMatcher::mapped_per_m(track::LandmarkKind kind, double path_m) const {
+  return static_cast<double>(near(kind, path_m - kDensityReachM, path_m + kDensityReachM).size()) /
+         (2 * kDensityReachM);
 }
 
 std::vector<const track::PathLandmark*> LandmarkMatcher::near(track::LandmarkKind kind, double from_m,
@@ -153,8 +168,8 @@ bool LandmarkMatcher::sighted_before(track::LandmarkKind kind) const {
   return std::any_of(seen_.begin(), seen_.end(), [&](const Seen& seen) { return seen.sighting.kind == kind; });
 }
 
-double LandmarkMatcher::relative_sigma_m(const Seen& seen, double now_m) const {
-  return std::hypot(1.5 * seen.sighting.sigma_m,
+double LandmarkMatcher::relative_sigma_m(const Seen& seen, double map_sigma_m, double now_m) const {
+  return std::hypot(1.5 * seen.sighting.sigma_m, std::numbers::sqrt2 * map_sigma_m,
                     kOddM + kScaleChanges * parameters_.scale_sigma * std::abs(now_m - seen.place_m));
 }
 

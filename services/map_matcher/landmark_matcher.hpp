@@ -17,6 +17,7 @@ struct LandmarkParameters {
   double false_per_m = 0.0005;   // false sightings of one kind per metre
   double moved = 0.03;           // chance that a landmark stands elsewhere than the map says, ...
   double moved_m = 6.0;          // ... by so much at most
+  double elsewhere = 1e-3;       // chance that the train is not in the window: somebody has told its start wrongly
   double scale_sigma = 0.01;     // of the distance run between sightings
   double window_margin_m = 2.0;  // beyond the promised interval of train_state
   double history_m = 600;        // sightings further back are forgotten
@@ -26,15 +27,23 @@ struct LandmarkParameters {
 class LandmarkMatcher {
  public:
   LandmarkMatcher(const LandmarkParameters& parameters, std::shared_ptr<const track::Path> path)
-      : parameters_(parameters), path_(std::move(path)) {}
+      : parameters_(parameters), path_(std::move(path)) {
+    forget();
+  }
 
   /// Another way with distances that go on from the old one's; the sightings so far stay.
   void change_path(std::shared_ptr<const track::Path> path) { path_ = std::move(path); }
 
   /// Nothing when no mapped landmark fits or it cannot be told which one.
   std::optional<Fix> add(const Sighting& sighting, const Prior& prior);
+  /// How probable it is, by all sightings so far, that the train is not in the window; 0 from where they confirm it.
+  [[nodiscard]] double doubt() const { return confirmed_ ? 0 : odds_elsewhere_ / (1 + odds_elsewhere_); }
   /// The travelled distance does not go on from the one before: earlier sightings say nothing any more.
-  void forget() { seen_.clear(); }
+  void forget() {
+    seen_.clear();
+    odds_elsewhere_ = parameters_.elsewhere / (1 - parameters_.elsewhere);
+    confirmed_ = false;
+  }
 
  private:
   struct Seen {
@@ -47,15 +56,20 @@ class LandmarkMatcher {
   [[nodiscard]] double history_fits(double shift_m, double scale, double now_m) const;
   /// Mean of history_fits between two shifts.
   [[nodiscard]] double mean_fit(double from_m, double to_m, double now_m) const;
-  [[nodiscard]] double sighting_fits(const Seen& seen, double path_m, double relative_m) const;
+  [[nodiscard]] double sighting_fits(const Seen& seen, double path_m, double now_m) const;
+  /// Mapped landmarks of the kind per metre around a place.
+  [[nodiscard]] double mapped_per_m(track::LandmarkKind kind, double path_m) const;
   [[nodiscard]] std::vector<const track::PathLandmark*> near(track::LandmarkKind kind, double from_m,
                                                              double to_m) const;
   [[nodiscard]] bool sighted_before(track::LandmarkKind kind) const;
-  [[nodiscard]] double relative_sigma_m(const Seen& seen, double now_m) const;
+  /// Of its place from another one's; `map_sigma_m` is that of either on the map.
+  [[nodiscard]] double relative_sigma_m(const Seen& seen, double map_sigma_m, double now_m) const;
 
   LandmarkParameters parameters_;
   std::shared_ptr<const track::Path> path_;
   std::deque<Seen> seen_;
+  double odds_elsewhere_ = 0;  // against that it is in the window
+  bool confirmed_ = false;
 };
 
 }  // namespace railfix::map_matcher

@@ -74,6 +74,8 @@ struct MapMatcherConfig {
       f.number("false_per_m", p.false_per_m, {1e-7, 1}, "1/m", "False sightings of one kind per metre.");
       f.number("moved", p.moved, {0, 0.5}, "", "Chance that a landmark stands elsewhere than the map says ...");
       f.number("moved_m", p.moved_m, {0.1, 100}, "m", "... by so much at most.");
+      f.number("elsewhere", p.elsewhere, {0, 0.5}, "",
+               "Chance that the train is not where train_state says: its start was told wrongly.");
       f.number("scale_sigma", p.scale_sigma, {1e-5, 0.2}, "", "Error of the way run between sightings.");
       f.number("window_margin_m", p.window_margin_m, {0, 1000}, "m", "Search beyond the interval of train_state.");
       f.number("history_m", p.history_m, {0, 10000}, "m", "Sightings are judged together over this way.");

@@ -18,6 +18,7 @@ constexpr double kLeastWayM = 1e-5;       // standing still turns nothing
 constexpr double kTrackEveryS = 1.0;      // the track is said again after this time ...
 constexpr double kOpenTrackEveryM = 2.0;  // ... or, while it is not known, this way
 constexpr double kNoCameraS = 0.5;        // without an odometry step
+constexpr double kDoubted = 0.5;          // the place is said to be in doubt from this probability on
 constexpr double kCountM = 20.0;
 constexpr double kLostS = 30.0;         // after so long unseen the track is chosen anew
 constexpr int kCurvatureVariance = 25;  // place of the curvature's variance in TrackView.covariance
@@ -132,6 +133,8 @@ void MapMatcherService::use(const msg::TrainState& state) {
   context_.health().active();
   if (landmarks_ && before && !counts_on(*before, state)) landmarks_->forget();
   follow(state);
+  if (place_doubt() > 0)
+    context_.health().degraded("the sightings fit the map nowhere near the place that train_state says");
   if (chooser_) follow_without_camera();
 }
 
@@ -297,16 +300,26 @@ void MapMatcherService::move_without_camera(int64_t to_ns) {
   moved_ns_ = to_ns;
 }
 
+// What GNSS holds is there: then the map or the sightings are wrong.
+double MapMatcherService::place_doubt() const {
+  if (!landmarks_ || (state_->sources() & msg::SOURCE_GNSS) != 0) return 0;
+  return landmarks_->doubt() > kDoubted ? landmarks_->doubt() : 0;
+}
+
 void MapMatcherService::publish_track(int64_t stamp_ns, double odometer_m, int64_t grabbed_ns) {
   const auto choice = chooser_->choice();
   if (!choice) return;
   const auto& best = choice->options.front();
   const double since_m = std::abs(odometer_m - said_track_.odometer_m);
-  const bool changed = best.place.edge != said_track_.edge || choice->known != said_track_.known;
+  const double there = 1 - place_doubt();  // and not elsewhere on the map
+  const bool known = choice->known && there == 1;
+  const bool changed = best.place.edge != said_track_.edge || known != said_track_.known;
   const bool due = core::seconds(stamp_ns - said_track_.stamp_ns) > kTrackEveryS;
   if (!changed && !due && (choice->known || since_m < kOpenTrackEveryM)) return;
-  said_track_ = {best.place.edge, choice->known, stamp_ns, odometer_m};
+  said_track_ = {best.place.edge, known, stamp_ns, odometer_m};
   auto message = message_of(choice->options);
+  message.probability(there * message.probability());
+  for (double& probability : message.alternative_probability()) probability *= there;
   message.stamp_ns(stamp_ns);
   message.kind(msg::FIX_TRACK);
   message.sigma_m(std::numeric_limits<double>::infinity());

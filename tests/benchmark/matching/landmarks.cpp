@@ -98,30 +98,33 @@ struct Count {
   int wrong_false = 0;  // not on the map at all, or seen where nothing is
   int wrong_other = 0;  // another one was named
   int wrong_moved = 0;  // standing elsewhere than the map says
+  int doubted = 0;      // sightings after which the place is more probably wrong than not
   double promised = 0;  // sum of 1 - probability
 
   void print(const char* what) const {
     std::printf(
         "%-8s %5d sightings of mapped, %4d of others: sure %.1f %% of the mapped, %d wrong (promised %.1f), "
-        "%.1f %% of the sure: false or unmapped %d, moved %d, another one named %d\n",
+        "%.1f %% of the sure: false or unmapped %d, moved %d, another one named %d; place doubted at %d\n",
         what, mapped, others, 100.0 * right / std::max(mapped, 1), wrong, promised, 100.0 * wrong / std::max(sure, 1),
-        wrong_false, wrong_moved, wrong_other);
+        wrong_false, wrong_moved, wrong_other, doubted);
   }
 };
 
-void run_line(core::Random& random, double interval_m, Count& balises, Count& masts) {
+/// told_off_m: the state is of a place so far away, as after a wrong start.
+void run_line(core::Random& random, double interval_m, double told_off_m, Count& balises, Count& masts) {
   const auto things = things_of(random);
   map_matcher::LandmarkMatcher matcher({}, path_of(things));
   const double scale = 1 + 0.007 * random.normal();
   for (const Seen& seen : sightings_of(things, random)) {
     const double foot_m = seen.place_m - kAheadM;
-    const double off_m = interval_m * std::clamp(random.normal() / 3, -1.0, 1.0);
+    const double off_m = told_off_m + interval_m * std::clamp(random.normal() / 3, -1.0, 1.0);
     const double lateral_m = seen.kind == LandmarkKind::mast ? 3 : 0;
     const map_matcher::Sighting sighting{1,         seen.kind,       kAheadM + kSightingSigmaM * random.normal(),
                                          lateral_m, kSightingSigmaM, 0.95};
     const auto fix = matcher.add(sighting, {foot_m + off_m, interval_m, interval_m, foot_m * scale});
     Count& count = seen.kind == LandmarkKind::balise ? balises : masts;
     ++(seen.on_map ? count.mapped : count.others);
+    count.doubted += matcher.doubt() > 0.5 ? 1 : 0;
     if (!fix || fix->probability < kSure) continue;
     const bool right = std::abs(fix->path_distance_m - foot_m) < kRightM;
     ++count.sure;
@@ -136,14 +139,18 @@ void run_line(core::Random& random, double interval_m, Count& balises, Count& ma
 
 int measure_landmarks(const MatchingOptions& options) {
   const int count = options.count > 0 ? options.count : 20;
-  for (const double interval_m : {5.0, 20.0, 60.0}) {
-    core::Random random(options.seed * 101 + 7);
-    Count balises;
-    Count masts;
-    for (int i = 0; i < count; ++i) run_line(random, interval_m, balises, masts);
-    std::printf("interval of the state +-%.0f m, %d lines of %.0f km\n", interval_m, count, kLineM / 1000);
-    balises.print("balises");
-    masts.print("masts");
+  for (const double told_off_m : {0.0, 2170.0}) {
+    for (const double interval_m : {5.0, 20.0, 60.0}) {
+      if (told_off_m > 0 && interval_m > 20) continue;
+      core::Random random(options.seed * 101 + 7);
+      Count balises;
+      Count masts;
+      for (int i = 0; i < count; ++i) run_line(random, interval_m, told_off_m, balises, masts);
+      std::printf("interval of the state +-%.0f m, %.0f m off, %d lines of %.0f km\n", interval_m, told_off_m, count,
+                  kLineM / 1000);
+      balises.print("balises");
+      masts.print("masts");
+    }
   }
   return 0;
 }

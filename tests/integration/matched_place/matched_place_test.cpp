@@ -2,6 +2,7 @@
 // the state for another place, it would confirm a wrong one with the landmarks that stand there.
 #include <gmock/gmock.h>
 
+#include "core/random.hpp"
 #include "support/on_map_matcher.hpp"
 
 namespace railfix {
@@ -15,10 +16,10 @@ constexpr int kDomain = 76;
 constexpr double kSpeedMps = 10;
 constexpr double kPromisedM = 25;
 
-/// 2 km northwards.
-track::Map north(double begin_m = 0) {
+/// Straight northwards.
+track::Map line(double length_m, double begin_m = 0) {
   track::Map map;
-  map.edges.push_back({1, "line", 1, 2, "", track::Alignment::chained({0, begin_m, 0}, {{2000, 0, 0}})});
+  map.edges.push_back({1, "line", 1, 2, "", track::Alignment::chained({0, begin_m, 0}, {{length_m, 0, 0}})});
   return map;
 }
 
@@ -30,9 +31,9 @@ class MatchedPlace : public ::testing::Test, public test::OnMapMatcher {
   }
 
   /// The next state of the train, with its coordinates on the map that fusion has.
-  void tick(const track::Map& map, const EdgePosition& place) {
+  void tick(const track::Map& map, const EdgePosition& place, double promised_m = kPromisedM) {
     ++tick_;
-    msg::TrainState here = state(place, kPromisedM);
+    msg::TrainState here = state(place, promised_m);
     const auto pose = map.edge(place.edge)->alignment.at(place.offset_m).pose;
     here.easting_m(pose.easting_m);
     here.northing_m(pose.northing_m);
@@ -40,15 +41,14 @@ class MatchedPlace : public ::testing::Test, public test::OnMapMatcher {
     steps_.write(step());
     pause();
   }
-  /// A bridge this far in front of the train: the only one, a single sighting names it.
-  void sight(double ahead_m) {
-    msg::LandmarkSighting bridge;
-    bridge.stamp_ns(stamp_ns(tick_));
-    bridge.kind(msg::SIGHTING_BRIDGE);
-    bridge.distance_ahead_m(ahead_m);
-    bridge.sigma_m(0.3);
-    bridge.confidence(0.95);
-    sightings_.write(bridge);
+  void sight(double ahead_m, uint8_t kind = msg::SIGHTING_BRIDGE) {
+    msg::LandmarkSighting seen;
+    seen.stamp_ns(stamp_ns(tick_));
+    seen.kind(kind);
+    seen.distance_ahead_m(ahead_m);
+    seen.sigma_m(0.3);
+    seen.confidence(0.95);
+    sightings_.write(seen);
     pause();
   }
   [[nodiscard]] std::vector<msg::PositionFix> landmark_fixes() const {
@@ -63,9 +63,9 @@ class MatchedPlace : public ::testing::Test, public test::OnMapMatcher {
 };
 
 TEST_F(MatchedPlace, AStateOfAnotherMapIsNone) {
-  track::Map own = north();
+  track::Map own = line(2000);
   own.landmarks = {{1, track::LandmarkKind::bridge, 1, 600, 0, 0.1, ""}};
-  const track::Map of_fusion = north(9000);  // the edges are numbered anew
+  const track::Map of_fusion = line(2000, 9000);  // the edges are numbered anew
   ASSERT_TRUE(start_matcher(own));
   const auto ride = [&](const track::Map& map, double seconds) {
     for (double t_s = 0; t_s < seconds; t_s += kPeriodS) {
@@ -89,7 +89,7 @@ TEST_F(MatchedPlace, AStateOfAnotherMapIsNone) {
 
 // The driver has gone to the other cab: what stands behind the place along the edge is in front of the train.
 TEST_F(MatchedPlace, ATurnedTrainIsOnAnotherTrip) {
-  track::Map map = north();
+  track::Map map = line(2000);
   map.landmarks = {{1, track::LandmarkKind::bridge, 1, 498, 0, 0.1, ""}};
   ASSERT_TRUE(start_matcher(map));
   for (int i = 0; i < 10; ++i) tick(map, {1, way_m(), Direction::forward});
@@ -104,6 +104,54 @@ TEST_F(MatchedPlace, ATurnedTrainIsOnAnotherTrip) {
     EXPECT_NEAR(fix.offset_m(), turned(fix.stamp_ns()), 0.5);
   }
 }
+
+/// Masts every 40 to 65 m on a straight track; the start was told 2.2 km too far back, or rightly.
+class ToldStart : public MatchedPlace, public ::testing::WithParamInterface<bool> {
+ protected:
+  static constexpr double kPromisedStartM = 5;
+  void SetUp() override {
+    core::Random random(5);
+    map_ = line(6000);
+    for (double m = 300; m < 6000; m += random.uniform(40, 65))
+      map_.landmarks.push_back(
+          {static_cast<uint32_t>(map_.landmarks.size() + 1), track::LandmarkKind::mast, 1, m, 0, 0.1, ""});
+    ASSERT_TRUE(start_matcher(map_));
+  }
+  void ride(double way_m, double told_off_m) {
+    const double end_m = this->way_m() + way_m;
+    auto mast = std::ranges::find_if(map_.landmarks, [&](const auto& one) { return one.offset_m > this->way_m() + 5; });
+    while (this->way_m() < end_m) {
+      tick(map_, {1, this->way_m() + told_off_m}, kPromisedStartM);
+      if (mast->offset_m - this->way_m() > 5) continue;
+      sight(mast->offset_m - this->way_m(), msg::SIGHTING_MAST);
+      ++mast;
+    }
+  }
+  [[nodiscard]] bool said_lately() const { return !said_.empty() && said_.back().stamp_ns() > stamp_ns(tick_ - 12); }
+
+  track::Map map_;
+};
+
+TEST_P(ToldStart, IsDoubtedWhereTheMastsFitTheMapNowhereNearIt) {
+  const bool wrong = GetParam();
+  ride(600, wrong ? 2200 : 0);
+  ASSERT_TRUE(run_until([&] { return said_lately(); }));
+  const auto last_of_track =
+      std::find_if(said_.rbegin(), said_.rend(), [](const auto& fix) { return fix.kind() == msg::FIX_TRACK; });
+  ASSERT_NE(last_of_track, said_.rend());
+  if (wrong) {
+    EXPECT_LT(last_of_track->probability(), 0.5);
+    EXPECT_LE(landmark_fixes().size(), 3U) << "of about eleven masts";
+    ASSERT_TRUE(run_until([&] { return !reason().empty(); }));
+    EXPECT_THAT(reason(), HasSubstr("fit the map nowhere"));
+  } else {
+    EXPECT_GT(last_of_track->probability(), 0.999);
+    EXPECT_GT(landmark_fixes().size(), 8U);
+    EXPECT_EQ(reason(), "");
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(WrongOrRight, ToldStart, ::testing::Bool());
 
 }  // namespace
 }  // namespace railfix

@@ -168,5 +168,88 @@ TEST(LandmarkMatcher, ProbabilitiesAreHonest) {
   EXPECT_LT(wrong, sure / 20) << wrong << " of " << sure;
 }
 
+/// 6 km with a mast every 40 to 65 m; the map has them `map_sigma_m` elsewhere.
+class MastLine {
+ public:
+  MastLine(uint64_t seed, double map_sigma_m) : random_(seed) {
+    auto map = std::make_shared<track::Map>();
+    map->edges.push_back({1, "line", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{6500, 0, 0}})});
+    uint32_t id = 0;
+    for (double m = 100; m < 6000; m += random_.uniform(40, 65)) {
+      masts_m_.push_back(m);
+      map->landmarks.push_back(
+          {++id, LandmarkKind::mast, 1, m + map_sigma_m * random_.normal(), 0, std::max(map_sigma_m, 0.1), ""});
+    }
+    const auto path = core::value_or_throw(track::Path::follow(map, {1, 0, track::Direction::forward}, 6500, 0));
+    matcher_.emplace(LandmarkParameters{}, std::make_shared<const track::Path>(path));
+  }
+  /// From 500 m on while train_state says that the train is `told_off_m` further on.
+  void run(double way_m, double told_off_m, double missed = 0.15) {
+    for (const double m : masts_m_) {
+      if (m < 500 || m > 500 + way_m || random_.uniform() < missed) continue;
+      ++seen_;
+      const auto fix = matcher_->add(sighting_of(LandmarkKind::mast, 0.95), prior_at(m - 5 + told_off_m, 5, m - 5));
+      sure_ += fix && fix->probability >= 0.9 ? 1 : 0;
+      doubted_ += matcher_->doubt() > 0.5 ? 1 : 0;
+    }
+  }
+  [[nodiscard]] double sure_share() const { return static_cast<double>(sure_) / seen_; }
+  [[nodiscard]] int sure() const { return sure_; }
+  [[nodiscard]] double doubted_share() const { return static_cast<double>(doubted_) / seen_; }
+  [[nodiscard]] int doubted() const { return doubted_; }
+  [[nodiscard]] double doubt() const { return matcher_->doubt(); }
+
+ private:
+  core::Random random_;
+  std::vector<double> masts_m_;
+  std::optional<LandmarkMatcher> matcher_;
+  int seen_ = 0;
+  int sure_ = 0;
+  int doubted_ = 0;
+};
+
+// The start is somebody's word. Among equal masts one stands by chance where the next is expected, again and again.
+TEST(LandmarkMatcher, MastsDoNotConfirmAPlaceWhereTheTrainIsNot) {
+  int sure = 0;
+  for (uint64_t seed = 1; seed <= 20; ++seed) {
+    MastLine line(seed, 0.1);
+    line.run(1500, 2170);
+    EXPECT_GT(line.doubted_share(), 0.6) << seed;
+    sure += line.sure();
+  }
+  EXPECT_LE(sure, 20) << "one before there is anything to compare it with";
+}
+
+TEST(LandmarkMatcher, MastsConfirmThePlaceWhereTheTrainIs) {
+  for (uint64_t seed = 1; seed <= 20; ++seed) {
+    MastLine line(seed, 0.1);
+    line.run(1500, 0);
+    EXPECT_EQ(line.doubted(), 0) << seed;
+    EXPECT_EQ(line.doubt(), 0) << seed;
+    EXPECT_GT(line.sure_share(), 0.9) << seed;
+  }
+}
+
+TEST(LandmarkMatcher, MastsThatAreRarelySightedDoNotSpeakAgainstThePlace) {
+  for (uint64_t seed = 1; seed <= 20; ++seed) {
+    MastLine line(seed, 0.1);
+    line.run(3000, 0, 0.7);
+    EXPECT_EQ(line.doubted(), 0) << seed;
+    EXPECT_GT(line.sure_share(), 0.9) << seed;
+  }
+}
+
+// OpenStreetMap has them within metres: that is no evidence against the place.
+TEST(LandmarkMatcher, MastsThatTheMapHasWithinMetresDoNotSpeakAgainstThePlace) {
+  double share = 0;
+  for (uint64_t seed = 1; seed <= 20; ++seed) {
+    MastLine line(seed, 3);
+    line.run(1500, 0);
+    EXPECT_EQ(line.doubted(), 0) << seed;
+    share += line.sure_share() / 20;
+  }
+  EXPECT_GT(share, 0.5);
+}
+
 }  // namespace
 }  // namespace railfix::map_matcher
