@@ -159,6 +159,7 @@ void Estimator::judge_place(TrainEstimate& e) const {
   if (corrected_) add_reason(e, "position was corrected by two fixes against the filter");
   if (off_path_) add_reason(e, "a position fix lies on another track");
   if (track_doubt_.turns_otherwise()) add_reason(e, "the train turns otherwise than this track");
+  if (track_doubt_.disbelieved()) add_reason(e, "map_matcher finds some other place far more probable");
   if (!path_) add_reason(e, "place on the map not known");
   if (path_ && (filter_.path_distance_m() < path_->begin_m() || filter_.path_distance_m() > path_->end_m())) {
     add_reason(e, "beyond the end of the mapped track");

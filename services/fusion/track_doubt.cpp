@@ -10,6 +10,7 @@ constexpr double kSameSwitchM = 1.0;  // a path that was joined anew may have it
 // Seconds in which the train turns otherwise, or as the track does: one may be a bump.
 constexpr int kTurnsToDoubt = 3;
 constexpr int kTurnsToBelieve = 5;
+constexpr double kDisbelieved = 0.1;
 constexpr double kTurnsOtherwise = 0.5;  // the gyro may be wrong as well as the track
 
 }  // namespace
@@ -44,6 +45,10 @@ void TrackDoubt::turned(bool fits, bool bends) {
   if (fits && bends) ++turned_alike_;
   if (turned_alike_ >= kTurnsToBelieve) turns_otherwise_ = false;
   if (divided_ && turned_otherwise_ >= kTurnsToDoubt) turns_otherwise_ = true;
+}
+
+bool TrackDoubt::disbelieved() const {
+  return said_ < kDisbelieved;
 }
 
 void TrackDoubt::move(const track::Path& path, double place_m) {

@@ -24,6 +24,8 @@ class TrackDoubt {
   /// The train turned as this track does, or not; bends: where that says something.
   void turned(bool fits, bool bends);
   [[nodiscard]] bool turns_otherwise() const { return turns_otherwise_; }
+  /// Who looked holds some other place to be far more probable.
+  [[nodiscard]] bool disbelieved() const;
   /// The train is at `place_m` of its path now.
   void move(const track::Path& path, double place_m);
   [[nodiscard]] double probability() const;

@@ -117,6 +117,24 @@ TEST_F(WrongLeg, AStartOnAnotherTrackIsDoubtedInItsFirstBend) {
   EXPECT_EQ(go(10, 10.5, 0).track_probability, 0.5) << "its first sight of anything fits";
 }
 
+// As map_matcher does when the landmarks that are sighted fit the map nowhere near the place: see its `elsewhere`.
+TEST_F(WrongLeg, APlaceThatWhatIsSeenContradictsIsDoubtedUntilItFits) {
+  run(fusion_, 0, 1, 20);
+  const auto said = [&](double t_s, double probability) {
+    fusion_.add(
+        FixInput{at(t_s), 1, 900 + 20 * t_s, INFINITY, probability, 0, FixKind::track, track::Direction::forward, {}});
+  };
+  said(1, 0.004);
+  auto state = run(fusion_, 1, 2, 20);
+  EXPECT_EQ(state.track_probability, 0.004);
+  EXPECT_EQ(state.integrity, Integrity::degraded);
+  EXPECT_THAT(state.reason, HasSubstr("far more probable"));
+  said(2, 0.9999);
+  state = run(fusion_, 2, 3, 20);
+  EXPECT_EQ(state.track_probability, 0.9999);
+  EXPECT_THAT(state.reason, Not(HasSubstr("far more probable")));
+}
+
 // The short form of railfix-measure-confidence --fault "fix:wrong branch".
 TEST(WrongLegDeclared, TheIntervalHoldsAlongTheTrackAndTheLegIsDoubted) {
   train::Verdict sum;
