@@ -13,7 +13,7 @@
 
 namespace railfix::tpr_publisher {
 
-/// "Along" means along the cab's forward axis.
+/// "Along" means along the axis that the camera looks.
 struct Reference {
   const track::BaliseGroup* group = nullptr;
   const track::BaliseGroup* previous = nullptr;  // LRBG before this one, nullptr = not known

@@ -31,7 +31,7 @@ uint32_t steps_or_unknown(double steps) {
   return steps < kUnknownDistance ? static_cast<uint32_t>(steps) : kUnknownDistance;
 }
 
-/// front_m: estimated front end beyond the group, along the cab's forward axis.
+/// front_m: estimated front end beyond the group, along the train.
 Distances distances_in(double step_m, double front_m, double over_m, double under_m) {
   Distances distances;
   distances.d_lrbg = steps_or_unknown(std::round(std::abs(front_m) / step_m));

@@ -11,7 +11,7 @@
 
 namespace railfix::tpr_publisher {
 
-/// What is known of the train at one moment. "Front" and "rear" are along the cab's forward axis.
+/// What is known of the train at one moment, along one axis of the train ("forward").
 struct TrainPosition {
   int64_t stamp_ns = 0;
   track::EdgePosition foot;  // of the camera
@@ -19,7 +19,7 @@ struct TrainPosition {
   double track_probability = 0;  // that it is this track and no other behind a switch
   bool usable = true;            // false: integrity lost, the place must not be used
   double distance_m = 0;         // travelled since start, signed
-  double speed_mps = 0;          // along the cab's forward axis, signed; NaN = not known
+  double speed_mps = 0;          // signed; NaN = not known
   double over_m = 0;             // the true foot may lie this far behind the estimate
   double under_m = 0;            // ... and this far in front of it
   bool standstill = false;
@@ -30,7 +30,7 @@ struct TrainPosition {
   [[nodiscard]] bool track_declared() const { return track_probability >= track::kDeclaredProbability; }
 };
 
-enum class Motion : uint8_t { unknown, forward, backward };  // along the cab's forward axis
+enum class Motion : uint8_t { unknown, forward, backward };
 
 /// What the position does not say.
 struct ReportSettings {

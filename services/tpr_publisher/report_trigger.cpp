@@ -59,6 +59,13 @@ void ReportTrigger::lose_way() {
   way_lost_ = true;
 }
 
+void ReportTrigger::turn() {
+  lose_way();
+  locations_.clear();
+  reported_.reset();
+  asked_ = group_passed_ = location_passed_ = false;
+}
+
 double ReportTrigger::reached_m(const Moment& moment, bool rear_end) const {
   return rear_end ? moment.min_safe_front_m - train_length_m_ : moment.max_safe_front_m;
 }

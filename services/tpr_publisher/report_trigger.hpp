@@ -8,6 +8,7 @@
 
 #include "core/result.hpp"
 #include "etcs/report_parameters.hpp"
+#include "tpr_publisher/front_end.hpp"
 
 namespace railfix::tpr_publisher {
 
@@ -38,6 +39,7 @@ struct Onboard {
   uint32_t m_level = etcs::kLevel2;
   uint32_t nid_ntc = 0;
   uint32_t q_integrity = 0;
+  ActiveCab active_cab = ActiveCab::not_said;
   uint32_t reports_wanted = 0;  // counts up; begins again at 0 with its writer
   Reason wanted_because = Reason::session;
 };
@@ -50,7 +52,7 @@ struct Moment {
   double min_safe_front_m = 0;
   bool standstill = false;
   uint32_t nid_lrbg = etcs::kUnknownBaliseGroup;
-  std::optional<double> beyond_lrbg_m;    // front end beyond the LRBG, along the cab's forward axis
+  std::optional<double> beyond_lrbg_m;    // front end beyond the LRBG, along the train
   std::optional<double> beyond_origin_m;  // ... beyond the group that wanted_origin() names
   Onboard onboard;
 };
@@ -61,7 +63,7 @@ class ReportTrigger {
   ReportTrigger(const etcs::ReportParameters& parameters, double train_length_m);
 
   /// A packet 58; one that asks for reports without a pause or for what is not known is refused. Its locations count
-  /// along the cab's forward axis from `origin`, the LRBG when it came; nothing = the next one that is known, because
+  /// along the train from `origin`, the LRBG when it came; nothing = the next one that is known, because
   /// it has only just come, kUnknownBaliseGroup = nobody knows any more, and locations are left out.
   core::Status set_parameters(const etcs::ReportParameters& parameters, std::optional<uint32_t> origin = std::nullopt);
   /// The group that locations count from; nothing before it is known and when there are no locations.
@@ -72,6 +74,9 @@ class ReportTrigger {
   [[nodiscard]] bool locations_left_out() const { return locations_.empty() && !parameters_.locations.empty(); }
   /// Moments before and after this one have no distance in common.
   void lose_way();
+  /// The front is at the other end now: the next report is a first one, and what the trackside asked to know at
+  /// locations ahead is over.
+  void turn();
   /// The most urgent reason to report now; the same again until sent() is called.
   [[nodiscard]] std::optional<Reason> due(const Moment& moment);
   void sent(const Moment& moment);

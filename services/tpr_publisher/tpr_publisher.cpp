@@ -65,7 +65,9 @@ bool is_number(const TrainPosition& position) {
 }  // namespace
 
 TprPublisher::TprPublisher(std::shared_ptr<const track::Map> map, const Settings& settings)
-    : settings_(settings), trigger_(settings.parameters, settings.train_length_m) {
+    : settings_(settings),
+      trigger_(settings.parameters, settings.train_length_m),
+      ends_{settings.report.foot_to_front_m, settings.foot_to_rear_m} {
   if (map) tracker_.emplace(std::move(map), settings.search_behind_m);
   const auto trial = make_report({}, std::nullopt, Motion::unknown, settings.report, 0);
   core::value_or_throw(etcs::encode(trial, settings.report.baseline));
@@ -92,9 +94,7 @@ void TprPublisher::follow(const TrainPosition& position) {
   const bool same_group = reference_ && reference_->group == group_before;
   doubt_.follow(position, reference_ ? std::optional(reference_->foot_m) : std::nullopt, same_group, !guessed);
   if (position.usable) {
-    const double group_m = reference_ ? reference_->group->q_locacc_m + reference_->doubt_m : 0.0;
-    const double over_m = doubt_.over_m() + group_m;
-    integrity_.follow({position.stamp_ns, position.distance_m, over_m});
+    integrity_.follow(integrity_place());
   } else {
     integrity_.lose_way();
   }
@@ -118,12 +118,24 @@ TrainPosition TprPublisher::doubted_position() const {
   auto position = *position_;
   position.over_m = doubt_.over_m();
   position.under_m = doubt_.under_m();
-  return position;
+  return is_turned() ? turned(position) : position;
+}
+
+std::optional<Reference> TprPublisher::reference() const {
+  if (!reference_ || !ends_.to_front_m(cab_)) return std::nullopt;
+  return is_turned() ? turned(*reference_) : reference_;
+}
+
+TrainIntegrity::Place TprPublisher::integrity_place() const {
+  const auto position = doubted_position();
+  const double group_m = reference_ ? reference_->group->q_locacc_m + reference_->doubt_m : 0.0;
+  return {position.stamp_ns, position.distance_m, position.over_m + group_m};
 }
 
 core::Status TprPublisher::set_parameters(const etcs::ReportParameters& parameters, std::optional<uint32_t> origin) {
   if (parameters.q_dir != etcs::kUnknownSide) {  // here the value 2 says "both"
-    const uint32_t side = reference_ ? orientation(*reference_) : uint32_t{etcs::kUnknownSide};
+    const auto here = reference();
+    const uint32_t side = here ? orientation(*here) : uint32_t{etcs::kUnknownSide};
     if (side == etcs::kUnknownSide)
       return core::Error{"Packet 58 is for one direction only (Q_DIR), but the train's is not known yet."};
     if (side != parameters.q_dir)
@@ -141,8 +153,25 @@ core::Status TprPublisher::set_onboard(const Onboard& onboard, int64_t now_ns) {
   const auto trial = etcs::encode(make_report({}, std::nullopt, Motion::unknown, report, 0), report.baseline);
   if (!trial.ok()) return trial.error();
   settings_.report = report;
+  hear_cab(onboard.active_cab);
   hear_integrity(onboard, now_ns);
   return {};
+}
+
+// While the driver walks to the other end nobody says anything: then the front stays where it was.
+void TprPublisher::hear_cab(ActiveCab cab) {
+  if (cab == ActiveCab::not_said) return;
+  const bool was_turned = is_turned();
+  cab_ = cab;
+  if (is_turned() == was_turned) return;
+  integrity_.lose_way();
+  trigger_.turn();
+}
+
+std::string TprPublisher::front_unknown() const {
+  if (ends_.to_front_m(cab_)) return "";
+  return is_turned() ? "the cab at the other end is active, and tpr_publisher.foot_to_rear_m is not set."
+                     : "onboard_status has not said yet at which end the cab is active.";
 }
 
 void TprPublisher::hear_integrity(const Onboard& onboard, int64_t now_ns) {
@@ -188,7 +217,7 @@ std::string TprPublisher::left_out(int64_t now_ns) const {
            "train_state was away, unusable or began again; confirm it again.";
   if (trigger_.locations_left_out())
     return "No reports at the locations of packet 58: it came while nobody listened, or the group that they count from "
-           "is not on the way behind the train.";
+           "is not on the way behind the train, or the cab was changed since.";
   return "";
 }
 
@@ -204,9 +233,12 @@ std::string TprPublisher::undeclared() const {
 }
 
 etcs::TrainPositionReport TprPublisher::fields(int64_t now_ns) const {
-  auto fields = make_report(doubted_position(), reference_, motion_, settings_.report, now_ns);
+  const auto position = doubted_position();
+  auto settings = settings_.report;
+  settings.foot_to_front_m = ends_.to_front_m(cab_).value_or(0);
+  auto fields = make_report(position, reference(), is_turned() ? turned(motion_) : motion_, settings, now_ns);
   if (onboard_silent(now_ns)) return fields;
-  const auto said = integrity_.said(position_->distance_m);
+  const auto said = integrity_.said(position.distance_m);
   // Nobody can place a length from a front end that is not referred to a group (3.6.5.2.7).
   if (said.l_trainint && fields.nid_lrbg == etcs::kUnknownBaliseGroup) return fields;
   fields.q_length = said.q_length;
@@ -217,22 +249,22 @@ etcs::TrainPositionReport TprPublisher::fields(int64_t now_ns) const {
 Moment TprPublisher::moment(int64_t now_ns) const {
   Moment moment;
   moment.now_ns = now_ns;
-  moment.standstill = position_->standstill;
-  moment.front_m = position_->distance_m + settings_.report.foot_to_front_m;
+  const auto position = doubted_position();
+  const double to_front_m = ends_.to_front_m(cab_).value_or(0);
+  moment.standstill = position.standstill;
+  moment.front_m = position.distance_m + to_front_m;
   const auto allowance = train_allowance(settings_.report);
-  const double over_m = doubt_.over_m() + allowance.over_m;
-  const double under_m = doubt_.under_m() + allowance.under_m;
-  moment.max_safe_front_m = doubt_.under_m() >= 0 ? moment.front_m + under_m : HUGE_VAL;
-  moment.min_safe_front_m = doubt_.over_m() >= 0 ? moment.front_m - over_m : -HUGE_VAL;
-  if (reference_) {
-    moment.nid_lrbg = reference_->group->nid_lrbg();
+  moment.max_safe_front_m = position.under_m >= 0 ? moment.front_m + position.under_m + allowance.under_m : HUGE_VAL;
+  moment.min_safe_front_m = position.over_m >= 0 ? moment.front_m - position.over_m - allowance.over_m : -HUGE_VAL;
+  if (const auto here = reference()) {
+    moment.nid_lrbg = here->group->nid_lrbg();
     const auto origin = trigger_.wanted_origin();
     // A group behind a train on a leg that is guessed is not found, and not known to be nowhere either.
     if (position_->track_declared() || !origin || *origin == moment.nid_lrbg)
-      moment.beyond_lrbg_m = reference_->foot_m + settings_.report.foot_to_front_m;
+      moment.beyond_lrbg_m = here->foot_m + to_front_m;
     if (origin) {
       if (const auto foot_m = tracker_->foot_beyond_m(*origin))
-        moment.beyond_origin_m = *foot_m + settings_.report.foot_to_front_m;
+        moment.beyond_origin_m = (is_turned() ? -*foot_m : *foot_m) + to_front_m;
     }
   }
   if (onboard_) {

@@ -18,7 +18,8 @@ namespace railfix::tpr_publisher {
 struct Settings {
   ReportSettings report;
   etcs::ReportParameters parameters;
-  double train_length_m = 0;  // 0 = not known
+  double train_length_m = 0;   // 0 = not known
+  double foot_to_rear_m = -1;  // as TrainEnds
   double search_behind_m = 5000;
 };
 
@@ -65,14 +66,20 @@ class TprPublisher {
   [[nodiscard]] bool onboard_heard(int64_t now_ns) const { return onboard_ && !onboard_silent(now_ns); }
   /// What the reports leave out of what the on-board unit says, and why; empty = nothing.
   [[nodiscard]] std::string left_out(int64_t now_ns) const;
+  /// Nobody knows where the train's front is, and why; empty = it is known.
+  [[nodiscard]] std::string front_unknown() const;
   /// The track has not been declared for so long a way that balise groups may have been passed; empty = it has.
   [[nodiscard]] std::string undeclared() const;
 
  private:
   void follow(const TrainPosition& position);
   void follow_motion(const TrainPosition& position);
-  /// With the doubt of an undeclared track.
+  void hear_cab(ActiveCab cab);
+  [[nodiscard]] bool is_turned() const { return cab_ == ActiveCab::other; }
+  /// With the doubt of an undeclared track; along the train's own axis, as the two below.
   [[nodiscard]] TrainPosition doubted_position() const;
+  [[nodiscard]] std::optional<Reference> reference() const;
+  [[nodiscard]] TrainIntegrity::Place integrity_place() const;
   void hear_integrity(const Onboard& onboard, int64_t now_ns);
   [[nodiscard]] Moment moment(int64_t now_ns) const;
   [[nodiscard]] etcs::TrainPositionReport fields(int64_t now_ns) const;
@@ -86,6 +93,9 @@ class TprPublisher {
   int64_t complete_ns_ = 0;         // its integrity_ns in this host's clock ...
   int64_t complete_ahead_ns_ = 0;   // ... and how far it was ahead when it was heard first
   int64_t onboard_ahead_ns_ = 0;    // too much of it, and no confirmation is taken
+  TrainEnds ends_;
+  ActiveCab cab_ = ActiveCab::not_said;
+  // Along the axis that the camera looks.
   std::optional<Reference> reference_;
   std::optional<TrainPosition> position_;
   Motion motion_ = Motion::unknown;   // the last one; kept at standstill

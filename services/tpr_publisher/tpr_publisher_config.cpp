@@ -58,6 +58,9 @@ void TprPublisherConfig::describe(service::Fields& fields) {
   fields.integer("nid_ntc", nid_ntc, {0, 255}, "", "National system, NID_NTC; used with level NTC only.");
   fields.number("foot_to_front_m", foot_to_front_m, {-500, 500}, "m",
                 "From the camera's foot forward to the train's front end.");
+  fields.number("foot_to_rear_m", foot_to_rear_m, {-1, 2000}, "m",
+                "From the camera's foot backward to the other end, the front end while its cab is active; -1 = nobody "
+                "drives from there.");
   fields.number("train_length_m", train_length_m, {0, 2000}, "m",
                 "For reports where the rear end passes, and valid train data; 0 = not known.");
   fields.number("train_over_m", train_over_m, {-1, 2000}, "m",
@@ -91,6 +94,7 @@ Settings TprPublisherConfig::settings() const {
   settings.report.train_over_m = train_over_m;
   settings.report.train_under_m = train_under_m;
   settings.train_length_m = train_length_m;
+  settings.foot_to_rear_m = foot_to_rear_m;
   settings.search_behind_m = search_behind_m;
   settings.parameters.t_cycloc = static_cast<uint32_t>(t_cycloc_s);
   settings.parameters.d_cycloc = static_cast<uint32_t>(d_cycloc_m);

@@ -38,6 +38,7 @@ struct TprPublisherConfig {
   int64_t m_level = 3;
   int64_t nid_ntc = 0;
   double foot_to_front_m = 0;
+  double foot_to_rear_m = -1;
   double train_length_m = 0;
   double train_over_m = -1;
   double train_under_m = -1;

@@ -57,6 +57,8 @@ TrainPosition position_of(const track::Map* map, const msg::TrainState& state) {
 core::Result<Onboard> onboard_of(const msg::OnboardStatus& status) {
   if (status.q_integrity() > 3)
     return core::Error{"q_integrity is " + std::to_string(status.q_integrity()) + ", not 0 to 3."};
+  if (status.active_cab() > 2)
+    return core::Error{"active_cab is " + std::to_string(status.active_cab()) + ", not 0 to 2."};
   if (status.reports_wanted() != 0 &&
       (status.wanted_because() < msg::REPORT_BORDER || status.wanted_because() > msg::REPORT_ERROR))
     return core::Error{"wanted_because is " + std::to_string(status.wanted_because()) +
@@ -69,6 +71,7 @@ core::Result<Onboard> onboard_of(const msg::OnboardStatus& status) {
   onboard.m_level = status.m_level();
   onboard.nid_ntc = status.nid_ntc();
   onboard.q_integrity = status.q_integrity();
+  onboard.active_cab = static_cast<ActiveCab>(status.active_cab());
   onboard.reports_wanted = status.reports_wanted();
   onboard.wanted_because = static_cast<Reason>(status.wanted_because());
   return onboard;
@@ -234,6 +237,8 @@ void TprPublisherService::on_state(const msg::TrainState& state) {
     report_trouble_ = onboard_refusal_;
   } else if (!packet_58_refusal_.empty()) {
     report_trouble_ = packet_58_refusal_;
+  } else if (const auto unknown = publisher_.front_unknown(); !unknown.empty()) {
+    report_trouble_ = "Reports say LRBG unknown: " + unknown;
   } else if (auto left_out = publisher_.left_out(now); !left_out.empty()) {
     report_trouble_ = std::move(left_out);
   } else if (!reference_known_) {

@@ -35,6 +35,7 @@ const Names kModes{"FS", "OS", "SR", "SH", "UN", "SL", "SB", "TR", "PT",
                    "SF", "IS", "NL", "LS", "SN", "RV", "PS", "AD", "SM"};
 const Names kLevels{"0", "NTC", "1", "2", "3"};
 const Names kIntegrities{"none", "device", "driver", "lost"};
+const Names kCabs{"unsaid", "camera", "other"};
 const Names kReports{"border", "session", "error"};
 
 struct Options {
@@ -85,6 +86,7 @@ class OnboardUnit {
     std::ostringstream text;
     text << "mode " << kModes[status_.m_mode()] << ", level " << kLevels[status_.m_level()];
     if (status_.m_level() == etcs::kLevelNtc) text << " (" << int{status_.nid_ntc()} << ")";
+    if (status_.active_cab() > 0) text << ", cab " << kCabs[status_.active_cab()];
     if (status_.packet_58_bytes() > 0) text << ", packet 58 of " << status_.packet_58_bytes() << " bytes";
     text << ", integrity " << kIntegrities[status_.q_integrity()] << ", length ";
     status_.train_length_m() > 0 ? text << status_.train_length_m() << " m" : text << "not known";
@@ -105,6 +107,8 @@ class OnboardUnit {
     } else if (name == "integrity") {
       status_.q_integrity(index_of(word, kIntegrities, value));
       if (status_.q_integrity() == kByDriver) status_.integrity_ns(core::wall_ns());
+    } else if (name == "cab") {
+      status_.active_cab(index_of(word, kCabs, value));
     } else if (name == "length") {
       status_.train_length_m(number_of(word, value, 2000));
     } else if (name == "report") {
@@ -115,7 +119,7 @@ class OnboardUnit {
     } else if (name == "packet_58") {
       take_packet_58(word, value);
     } else {
-      throw core::BadInput(word + ": must be mode=, level=, ntc=, integrity=, length=, report= or packet_58=");
+      throw core::BadInput(word + ": must be mode=, level=, ntc=, cab=, integrity=, length=, report= or packet_58=");
     }
   }
   void take_packet_58(const std::string& word, const std::string& hex) {
@@ -234,7 +238,8 @@ void add_tpr_onboard(CLI::App& tpr, Action& chosen) {
       "  mode=FS, OS, SR, SH, UN, SL, SB, TR, PT, SF, IS, NL, LS, SN, RV, PS, and in 4.0.0 AD, SM   level=0, NTC, 1, "
       "2, 3\n"
       "  ntc=NID_NTC   integrity=none, device, driver, lost   length=safe length in m, 0 = not known\n"
-      "  report=border, session, error: a report is wanted now   packet_58=HEX: position report parameters\n"
+      "  cab=camera, other: at which end the active cab is, that of the camera or the other   report=border, session, "
+      "error: a\n  report is wanted now   packet_58=HEX: position report parameters\n"
       "onboard_status is sent at every change and once a second until Ctrl-C. Lines of the same words on standard "
       "input\n"
       "change it. Silent for 3 s, tpr_publisher keeps mode and level and says nothing of train integrity.");

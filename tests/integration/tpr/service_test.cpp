@@ -169,6 +169,13 @@ TEST_F(TprService, HearsTheOnboardCommand) {
   EXPECT_GE(last().l_trainint.value_or(0), 200U);
   input.say("integrity=lost");
   ASSERT_TRUE(reported(msg::REPORT_INTEGRITY_LOST));
+  input.say("cab=other");  // nobody has said where that end is
+  ASSERT_TRUE(reported(msg::REPORT_START));
+  EXPECT_EQ(last().nid_lrbg, etcs::kUnknownBaliseGroup);
+  EXPECT_TRUE(run_until([&] { return reason().find("foot_to_rear_m is not set") != std::string::npos; },
+                        [&] { write_state(450); }));
+  input.say("cab=camera");
+  ASSERT_TRUE(run_until([&] { return last().nid_lrbg == tpr_publisher::testing::kB; }, [&] { write_state(450); }));
   EXPECT_EQ(onboard.end(SIGTERM), 0);
   EXPECT_TRUE(run_until([&] { return reason().find("onboard_status is silent") != std::string::npos; },
                         [&] { write_state(450); }));
