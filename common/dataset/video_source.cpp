@@ -16,7 +16,8 @@ constexpr std::chrono::seconds kPatience{60};
 /// Frames of a video; their times are frame number / fps, as players do it.
 class VideoSource : public PictureSource {
  public:
-  VideoSource(std::string name, std::unique_ptr<video::Stream> stream, std::optional<video::Frame> first, double fps)
+  VideoSource(std::string name, std::unique_ptr<video::VideoStream> stream, std::optional<video::Frame> first,
+              double fps)
       : name_(std::move(name)), stream_(std::move(stream)), waiting_(std::move(first)), fps_(fps) {}
 
   MaybePicture next() override {
@@ -60,7 +61,7 @@ class VideoSource : public PictureSource {
   }
 
   std::string name_;
-  std::unique_ptr<video::Stream> stream_;
+  std::unique_ptr<video::VideoStream> stream_;
   std::optional<video::Frame> waiting_;
   double fps_;
   bool through_ = false;

@@ -18,7 +18,7 @@ namespace {
 using core::Error;
 using core::Result;
 using std::chrono::milliseconds;
-using MaybeStream = Result<std::unique_ptr<Stream>>;
+using MaybeStream = Result<std::unique_ptr<VideoStream>>;
 
 /// Decoders give one of the luma formats, of which the luma is taken without any conversion; others become BGR.
 constexpr const char* kForGrey =
@@ -98,7 +98,7 @@ class MappedSample {
 };
 
 /// A pipeline with one appsink.
-class Pipeline final : public Stream {
+class Pipeline final : public VideoStream {
  public:
   Pipeline(Element pipeline, Element sink)
       : pipeline_(std::move(pipeline)), sink_(std::move(sink)), bus_(gst_element_get_bus(pipeline_.get())) {}
@@ -221,7 +221,7 @@ void keep_newest(GstElement* sink, bool at_its_rate) {
 MaybeStream begin(Opened opened) {
   auto stream = std::make_unique<Pipeline>(std::move(opened.pipeline), std::move(opened.sink));
   if (auto status = stream->play(); !status.ok()) return status.error();
-  return std::unique_ptr<Stream>(std::move(stream));
+  return std::unique_ptr<VideoStream>(std::move(stream));
 }
 
 void set_where_known(GstElement* element, const char* property, const char* value) {

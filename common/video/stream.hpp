@@ -38,9 +38,9 @@ enum class Pace : uint8_t {
 
 /// Used by one thread. Opening and closing may block for as long as a device likes, next() only as long as it is told.
 /// Errors are sentences without their subject, as GStreamer says them.
-class Stream {
+class VideoStream {
  public:
-  virtual ~Stream() = default;
+  virtual ~VideoStream() = default;
   /// Nothing when none came in time and at the end, which ended() tells apart.
   virtual core::Result<std::optional<Frame>> next(std::chrono::milliseconds patience) = 0;
   [[nodiscard]] virtual bool ended() const = 0;
@@ -50,10 +50,10 @@ class Stream {
   [[nodiscard]] virtual double rate_hz() const = 0;
 };
 
-core::Result<std::unique_ptr<Stream>> open_file(const std::string& file, Pace pace, Colours colours);
-core::Result<std::unique_ptr<Stream>> open_url(const std::string& url);
-core::Result<std::unique_ptr<Stream>> open_device(const std::string& device, const DeviceOptions& options);
+core::Result<std::unique_ptr<VideoStream>> open_file(const std::string& file, Pace pace, Colours colours);
+core::Result<std::unique_ptr<VideoStream>> open_url(const std::string& url);
+core::Result<std::unique_ptr<VideoStream>> open_device(const std::string& device, const DeviceOptions& options);
 /// In the notation of gst-launch-1.0, with one appsink in it.
-core::Result<std::unique_ptr<Stream>> open_pipeline(const std::string& description);
+core::Result<std::unique_ptr<VideoStream>> open_pipeline(const std::string& description);
 
 }  // namespace railfix::video

@@ -72,7 +72,7 @@ class Capture {
   [[nodiscard]] bool pipeline() const { return what_.find('!') != std::string::npos; }
   [[nodiscard]] bool address() const { return what_.find("://") != std::string::npos; }
   [[nodiscard]] bool is_file() const { return !pipeline() && !device() && !address(); }
-  [[nodiscard]] Result<std::unique_ptr<video::Stream>> open() const {
+  [[nodiscard]] Result<std::unique_ptr<video::VideoStream>> open() const {
     if (pipeline()) return video::open_pipeline(what_);
     if (device()) {
       return video::open_device(what_.size() == 1 ? "/dev/video" + what_ : what_,
@@ -81,7 +81,7 @@ class Capture {
     return address() ? video::open_url(what_) : video::open_file(what_, video::Pace::real, video::Colours::grey);
   }
   /// Waits for the next picture; says why there is none.
-  std::string take(Shared& shared, video::Stream& stream) const {
+  std::string take(Shared& shared, video::VideoStream& stream) const {
     auto next = stream.next(kStopCheck);
     const int64_t arrival_ns = core::wall_ns();
     if (!next.ok()) return shared.open ? gone(next.error().message) : how_it_failed(next.error().message);
