@@ -98,7 +98,6 @@ void GpsdReports::connected() {
   first_device_.clear();
   devices_.clear();
   trouble_.clear();
-  quality_.reset();
   lacks_quality_ = false;
 }
 
@@ -154,7 +153,7 @@ bool GpsdReports::is_ours(const Message& message) {
 
 void GpsdReports::read_quality(const Message& message, int64_t arrival_ns) {
   const double hdop = message.number("hdop");
-  if (std::isfinite(hdop) && hdop > 0) quality_ = Quality{hdop, arrival_ns};
+  if (std::isfinite(hdop) && hdop > 0) quality_ = Quality{hdop, arrival_ns, message.text("device")};
 }
 
 std::optional<GpsdReport> GpsdReports::read_position(const Message& message, int64_t arrival_ns) {
@@ -169,7 +168,8 @@ std::optional<GpsdReport> GpsdReports::read_position(const Message& message, int
   row.alt_m = message.number("altMSL");
   const bool on_earth = std::abs(row.lat_deg) <= 90 && std::abs(row.lon_deg) <= 180;
   if (!on_earth || !report.utc_ns) return std::nullopt;
-  lacks_quality_ = !quality_ || arrival_ns - quality_->arrival_ns > kQualityLastsNs;
+  lacks_quality_ =
+      !quality_ || quality_->device != message.text("device") || arrival_ns - quality_->arrival_ns > kQualityLastsNs;
   if (lacks_quality_) return std::nullopt;
   row.hdop = quality_->hdop;
   return report;

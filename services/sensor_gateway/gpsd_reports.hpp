@@ -49,8 +49,9 @@ class GpsdReports {
   struct Quality {
     double hdop;
     int64_t arrival_ns;
+    std::string device;
   };
-  std::optional<Quality> quality_;
+  std::optional<Quality> quality_;  // also of the connection before: some receivers tell it every few seconds only
   bool lacks_quality_ = false;
   std::optional<int64_t> last_utc_ns_;
 };

@@ -22,7 +22,7 @@ struct LiveConfig {
   bool wheel_reversed = false;
   int64_t baud = 115200;
   double line_latency_ms = 5;
-  double silent_s = 3;
+  double silent_s = 5;
   double reconnect_s = 1;
 };
 

@@ -50,9 +50,21 @@ void SensorGatewayService::take(const std::string& source, const std::vector<Sam
     auto& wanted = wanted_[sample.index()];
     wanted.heard = true;
     wanted.heard_ns = core::monotonic_ns();
-    std::visit([this](const auto& row) { publish(row); }, sample);
+    if (usable(sample)) {
+      std::visit([this](const auto& row) { publish(row); }, sample);
+    } else {
+      context_.health().dropped(1);
+    }
   }
   say_live();
+}
+
+/// An IMU that sits otherwise than it is said to measures another motion than the train's.
+bool SensorGatewayService::usable(const Sample& sample) {
+  const auto* imu = std::get_if<dataset::ImuRow>(&sample);
+  if (imu == nullptr) return true;
+  gravity_watch_.add(*imu);
+  return gravity_watch_.trouble().empty();
 }
 
 /// A source that is gone says why itself; one that delivers may still lack one of its sensors.
@@ -63,6 +75,7 @@ void SensorGatewayService::say_live() {
   std::string reasons;
   const auto add = [&reasons](const std::string& why) { reasons += (reasons.empty() ? "" : "; ") + why; };
   for (const auto& [source, why] : troubles_) add(why);
+  if (const auto why = gravity_watch_.trouble(); !why.empty()) add(why);
   bool all_heard = true;
   for (size_t i = 0; i < wanted_.size(); ++i) {
     const auto& one = wanted_[i];

@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "sensor_gateway/gravity_watch.hpp"
 #include "sensor_gateway/playback.hpp"
 #include "sensor_gateway/sensor_feed.hpp"
 #include "sensor_gateway/sensor_gateway_config.hpp"
@@ -25,6 +26,7 @@ class SensorGatewayService {
   void feed_from(std::unique_ptr<LiveSensor> sensor);
   void take(const std::string& source, const std::vector<Sample>& samples);
   void say_live();
+  [[nodiscard]] bool usable(const Sample& sample);
   void follow(const msg::DataClock& clock);
   core::Result<std::string> start();
   void begin(int64_t from_ns);
@@ -61,8 +63,9 @@ class SensorGatewayService {
     int64_t heard_ns = 0;  // monotonic; at first since when it is waited for
   };
   std::array<Wanted, std::variant_size_v<Sample>> wanted_;  // in the order of Sample
-  std::map<std::string, std::string> troubles_;             // of each source, since its last sample
-  std::vector<std::unique_ptr<SensorFeed>> feeds_;          // last: their threads call the context
+  GravityWatch gravity_watch_;
+  std::map<std::string, std::string> troubles_;     // of each source, since its last sample
+  std::vector<std::unique_ptr<SensorFeed>> feeds_;  // last: their threads call the context
 };
 
 }  // namespace railfix::sensor_gateway

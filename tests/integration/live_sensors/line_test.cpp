@@ -82,7 +82,7 @@ class Line : public LiveSensors {
   void expect_pulses_as_time_went() const {
     for (const auto& one : wheel_) {
       const double s = core::seconds(one.stamp_ns() - wheel_[0].stamp_ns());
-      EXPECT_NEAR(static_cast<double>(one.pulses() - wheel_[0].pulses()), 300 * s, 300 * 0.05) << one.seq();
+      EXPECT_NEAR(static_cast<double>(one.pulses() - wheel_[0].pulses()), 300 * s, 300 * 0.5) << one.seq();
       EXPECT_EQ(one.pulses_per_metre(), 100);
     }
   }
@@ -101,6 +101,8 @@ TEST_F(Line, ThatIsCutAndMended) {
   receiver.reset();
   ASSERT_TRUE(told("ubx:" + device())) << reason();
   EXPECT_THAT(reason(), ::testing::AnyOf(HasSubstr("was unplugged"), HasSubstr("cannot be opened")));
+  const int64_t cut_ns = core::monotonic_ns();
+  ASSERT_TRUE(run_until([&] { return core::monotonic_ns() - cut_ns > 2 * core::kNsPerSecond; }));
   receiver = std::make_unique<Receiver>(device(), origin_ns);
   ASSERT_TRUE(more(150)) << reason();
 
@@ -123,6 +125,18 @@ TEST_F(Line, AReceiverThatWasSwitchedOffHasLostItsCount) {
   ASSERT_TRUE(more(20)) << reason();
   EXPECT_GT(wheel_.back().pulses() - before.pulses(), 1'000'000) << "a leap that no train can make";
   expect_growing(wheel_);
+}
+
+TEST_F(Line, AnImuThatSitsOtherwiseIsNotUsedAndTheWheelGoesOn) {
+  const auto service =
+      gateway({"sensor_gateway.live.imu=ubx:" + device(), "sensor_gateway.live.wheel=ubx:" + device(),
+               "sensor_gateway.live.wheel_pulses_per_metre=100", "sensor_gateway.live.imu_axes=z x y"});
+  const Receiver receiver(device(), core::wall_ns());
+  ASSERT_TRUE(told("the one that live.imu_axes calls forward")) << reason();
+  const size_t imu = imu_.size();
+  const size_t wheel = wheel_.size();
+  ASSERT_TRUE(run_until([&] { return wheel_.size() > wheel + 50; }));
+  EXPECT_LE(imu_.size(), imu + 5) << "what was on its way";
 }
 
 TEST_F(Line, AWheelThatIsMissingIsSaid) {

@@ -96,6 +96,17 @@ TEST_F(GpsdReportsTest, AQualityThatIsNotToldAnyMoreIsNotBelieved) {
   EXPECT_THAT(say(tpv("00:11.000", R"("mode":3)")), IsEmpty());
 }
 
+// A receiver that tells its quality more rarely than a silent connection is made anew.
+TEST_F(GpsdReportsTest, AQualityIsStillKnownOnTheNextConnection) {
+  say(tpv("00:00.000", R"("mode":1)"));
+  say(sky("1.3"));
+  now_ns_ += 3 * core::kNsPerSecond;
+  reports_.connected();
+  EXPECT_EQ(say(tpv("00:03.000", R"("mode":3)")).size(), 1U);
+  reports_.connected();
+  EXPECT_THAT(say(tpv("00:04.000", R"("mode":3)", "/dev/ttyACM1")), IsEmpty()) << "of another receiver";
+}
+
 TEST_F(GpsdReportsTest, OneOfSeveralReceiversIsNamed) {
   say(kTwo);
   EXPECT_THAT(reports_.trouble(), AllOf(HasSubstr("/dev/ttyACM0, /dev/ttyACM1"), HasSubstr("name one")));

@@ -1,0 +1,27 @@
+// Whether an IMU sits as it is said to: over many seconds a train stands upright and gravity is all that is left. Knows
+// no clock.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "dataset/dataset.hpp"
+
+namespace railfix::sensor_gateway {
+
+class GravityWatch {
+ public:
+  void add(const dataset::ImuRow& row);
+  /// Empty while up is up or it is not known yet; otherwise what is wrong and what to do. Its samples are then no
+  /// motion of the train.
+  [[nodiscard]] std::string trouble() const;
+
+ private:
+  std::array<double, 3> mean_mps2_{};  // forward, left, up
+  std::optional<int64_t> since_ns_;
+  int64_t last_ns_ = 0;
+};
+
+}  // namespace railfix::sensor_gateway

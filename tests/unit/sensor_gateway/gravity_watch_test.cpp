@@ -1,0 +1,49 @@
+#include "sensor_gateway/gravity_watch.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "core/time.hpp"
+
+namespace railfix::sensor_gateway {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+/// What it says at the end of so long with this specific force, 50 samples a second.
+std::string after(GravityWatch& watch, double from_s, double seconds, double forward, double left, double up) {
+  for (int i = 0; i < std::lround(seconds * 50); ++i)
+    watch.add({core::to_ns(1000 + from_s + i * 0.02), {0, 0, 0}, {forward, left, up}});
+  return watch.trouble();
+}
+std::string after(double forward, double left, double up) {
+  GravityWatch watch;
+  return after(watch, 0, 60, forward, left, up);
+}
+
+TEST(GravityWatch, ATrainMayTilt) {
+  EXPECT_THAT(after(0, 0, 9.81), IsEmpty());
+  EXPECT_THAT(after(1.4, -1.6, 9.6), IsEmpty()) << "long braking in a canted curve";
+}
+
+TEST(GravityWatch, AnImuThatSitsOtherwiseIsToldWithTheAxis) {
+  EXPECT_THAT(after(9.81, 0.2, 0.1), HasSubstr("calls forward, so its samples are not used; correct live.imu_axes"));
+  EXPECT_THAT(after(0.3, -9.81, 0.1), HasSubstr("calls left, the other way round"));
+  EXPECT_THAT(after(0, 0, -9.81), HasSubstr("calls up, the other way round"));
+  EXPECT_THAT(after(0.01, 0.01, 0.02), HasSubstr("feels no gravity"));
+}
+
+TEST(GravityWatch, NothingIsSaidBeforeTenSecondsAndAShockIsNone) {
+  GravityWatch watch;
+  EXPECT_THAT(after(watch, 0, 9, 9.81, 0, 0), IsEmpty());
+  EXPECT_THAT(after(watch, 60, 9, 9.81, 0, 0), IsEmpty()) << "behind a gap it begins anew";
+  EXPECT_THAT(after(watch, 69, 3, 9.81, 0, 0), HasSubstr("forward"));
+  GravityWatch shaken;
+  EXPECT_THAT(after(shaken, 0, 20, 0, 0, 9.81), IsEmpty());
+  EXPECT_THAT(after(shaken, 20, 1, 30, 0, 0), IsEmpty());
+}
+
+}  // namespace
+}  // namespace railfix::sensor_gateway
