@@ -262,9 +262,10 @@ void MapMatcherService::follow_turning(const msg::OdometryStep& step) {
   publish_track(step.stamp_ns(), chain_.odometer_m(), step.grabbed_ns());
 }
 
+// The doubt that was said comes back in the state; counted again it would never end.
 TrackWindow MapMatcherService::window_at(const track::EdgePosition& place, const Prior& prior) const {
-  return {
-      place, prior.over_m, prior.under_m, state_->sigma_m(), state_->track_probability(), !(state_->speed_mps() < 0)};
+  const double probability = std::min(1.0, state_->track_probability() / said_track_.there);
+  return {place, prior.over_m, prior.under_m, state_->sigma_m(), probability, !(state_->speed_mps() < 0)};
 }
 
 // Without a camera fusion's states lead: they come ten times a second.
@@ -316,7 +317,7 @@ void MapMatcherService::publish_track(int64_t stamp_ns, double odometer_m, int64
   const bool changed = best.place.edge != said_track_.edge || known != said_track_.known;
   const bool due = core::seconds(stamp_ns - said_track_.stamp_ns) > kTrackEveryS;
   if (!changed && !due && (choice->known || since_m < kOpenTrackEveryM)) return;
-  said_track_ = {best.place.edge, known, stamp_ns, odometer_m};
+  said_track_ = {best.place.edge, known, stamp_ns, odometer_m, there};
   auto message = message_of(choice->options);
   message.probability(there * message.probability());
   for (double& probability : message.alternative_probability()) probability *= there;

@@ -77,6 +77,7 @@ class MapMatcherService {
     bool known = false;
     int64_t stamp_ns = 0;
     double odometer_m = 0;
+    double there = 1;  // the share of place_doubt() in the probability
   };
   SaidTrack said_track_;
 };
