@@ -18,8 +18,8 @@ namespace {
 
 using Bytes = std::vector<uint8_t>;
 
-constexpr const char* kLastInput = "fuzz-crash";  // written where the program runs when the target aborts
-Bytes current;                                    // for the handler of the abort
+constexpr const char* kLastInput = "fuzz-crash";  // written where the program runs when the target aborts or crashes
+Bytes current;                                    // for the handler of that
 
 std::vector<Bytes> read_seeds(const std::filesystem::path& folder) {
   std::vector<std::filesystem::path> files;
@@ -70,10 +70,10 @@ void change(Bytes& input, const std::vector<Bytes>& seeds, railfix::core::Random
   }
 }
 
-extern "C" void keep_input(int) {
+extern "C" void keep_input(int signal) {
   std::ofstream(kLastInput, std::ios::binary)
       .write(reinterpret_cast<const char*>(current.data()), static_cast<std::streamsize>(current.size()));
-  std::signal(SIGABRT, SIG_DFL);
+  std::signal(signal, SIG_DFL);
 }
 
 }  // namespace
@@ -90,8 +90,11 @@ int main(int argc, char** argv) {
     std::cerr << argv[1] << ": no seeds\n";
     return 2;
   }
-  std::signal(SIGABRT, keep_input);
-  for (const auto& seed : seeds) LLVMFuzzerTestOneInput(seed.data(), seed.size());
+  for (const int signal : {SIGABRT, SIGSEGV, SIGBUS, SIGFPE, SIGILL}) std::signal(signal, keep_input);
+  for (const auto& seed : seeds) {
+    current = seed;
+    LLVMFuzzerTestOneInput(current.data(), current.size());
+  }
   railfix::core::Random random(1);
   for (size_t run = 0; run < runs; ++run) {
     current = seeds[below(random, seeds.size())];

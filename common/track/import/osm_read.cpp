@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <cstring>
 #include <osmium/io/any_input.hpp>
 #include <osmium/osm/node.hpp>
 #include <osmium/osm/relation.hpp>
@@ -14,9 +15,24 @@ namespace {
 
 constexpr std::array kMast{"power", "catenary_mast"};
 
+/// A text of a PBF file can hold a zero byte, behind which osmium's own iterator misses the end of the list.
+std::vector<const char*> texts_of(const osmium::TagList& list) {
+  std::vector<const char*> texts;
+  const char* const end = reinterpret_cast<const char*>(&list) + list.byte_size();
+  for (const char* at = reinterpret_cast<const char*>(&list) + sizeof(osmium::TagList); at < end;) {
+    texts.push_back(at);
+    at = static_cast<const char*>(std::memchr(at, 0, static_cast<size_t>(end - at)));
+    if (at == nullptr) throw std::runtime_error("a tag does not end");
+    ++at;
+  }
+  if (texts.size() % 2 != 0) throw std::runtime_error("a tag holds a zero byte");
+  return texts;
+}
+
 OsmTags tags_of(const osmium::OSMObject& object) {
   OsmTags tags;
-  for (const osmium::Tag& tag : object.tags()) tags.emplace(tag.key(), tag.value());
+  const auto texts = texts_of(object.tags());
+  for (size_t i = 0; i < texts.size(); i += 2) tags.emplace(texts[i], texts[i + 1]);
   return tags;
 }
 
@@ -61,9 +77,10 @@ OsmData read_passes(const std::string& file, bool with_trams) {
   osmium::io::Reader nodes(file, osmium::osm_entity_bits::node);
   while (const osmium::memory::Buffer buffer = nodes.read()) {
     for (const osmium::Node& node : buffer.select<osmium::Node>()) {
-      const bool is_wanted = wanted.contains(node.id()) || node.tags().has_tag(kMast[0], kMast[1]);
-      if (!is_wanted || !node.location().valid()) continue;
-      out.nodes[node.id()] = {{node.location().lat(), node.location().lon()}, tags_of(node)};
+      if (!node.location().valid()) continue;
+      OsmTags tags = tags_of(node);
+      if (!wanted.contains(node.id()) && !is_mast(tags)) continue;
+      out.nodes[node.id()] = {{node.location().lat(), node.location().lon()}, std::move(tags)};
     }
   }
   nodes.close();
