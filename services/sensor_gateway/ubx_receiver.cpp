@@ -38,8 +38,8 @@ class UbxReceiver final : public LiveSensor {
       return core::Error{name() + " was unplugged (" + got.error().message + "); check the cable, it is tried again"};
     const int64_t arrival_ns = core::wall_ns();
     std::vector<Sample> samples;
-    for (auto& sample : readings_.read(std::span(bytes_).first(got.value()), arrival_ns)) {
-      if (wanted(sample)) samples.push_back(in_train(std::move(sample), arrival_ns));
+    for (const auto& sample : readings_.read(std::span(bytes_).first(got.value()), arrival_ns)) {
+      if (wanted(sample)) samples.push_back(in_train(sample, arrival_ns));
     }
     return samples;
   }
