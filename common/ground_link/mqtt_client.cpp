@@ -1,8 +1,10 @@
 #include "ground_link/mqtt_client.hpp"
 
 #include <mosquitto.h>
+#include <mqtt_protocol.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <charconv>
 #include <chrono>
@@ -19,10 +21,17 @@ namespace {
 constexpr int kQos1 = 1;
 constexpr int kLoopMs = 200;
 constexpr double kFirstRetryS = 0.1;
+constexpr int kIdBits = 16;
+constexpr int kMostConnections = 0x7FFF;  // that ids can tell apart
+constexpr int kFirstFailure = 0x80;       // of MQTT 5's reason codes
 
 std::string text_of(int code) {
   if (code == MOSQ_ERR_ERRNO) return std::strerror(errno);
   return code == MOSQ_ERR_UNKNOWN ? "the connection broke" : mosquitto_strerror(code);
+}
+
+std::string refusal_text(int code) {
+  return code >= kFirstFailure ? mosquitto_reason_string(code) : mosquitto_connack_string(code);
 }
 
 struct Free {
@@ -36,14 +45,7 @@ class MqttClient::Connection {
   Connection(const MqttOptions& options, MqttEvents events) : options_(options), events_(std::move(events)) {
     static const int initialised = mosquitto_lib_init();
     (void)initialised;
-    const bool clean = !options_.keep_session;
-    client_.reset(mosquitto_new(options_.client_id.empty() ? nullptr : options_.client_id.c_str(), clean, this));
-    if (!client_) throw core::BadInput("MQTT client id \"" + options_.client_id + "\": " + text_of(MOSQ_ERR_ERRNO));
-    mosquitto_threaded_set(client_.get(), true);
-    if (!options_.user.empty())
-      mosquitto_username_pw_set(client_.get(), options_.user.c_str(), options_.password.c_str());
-    set_tls();
-    set_callbacks();
+    make_client();
     thread_ = std::thread([this] { run(); });
   }
   ~Connection() {
@@ -52,19 +54,40 @@ class MqttClient::Connection {
       stop_ = true;
     }
     wake_.notify_all();
-    mosquitto_disconnect(client_.get());
+    {
+      const std::lock_guard lock(client_mutex_);
+      mosquitto_disconnect(client_.get());
+    }
     thread_.join();
   }
   core::Result<int> publish(const std::string& topic, std::span<const uint8_t> payload) {
+    const std::lock_guard lock(client_mutex_);
+    if (!connected_) return core::Error{"not connected"};
     int id = 0;
     const int code = mosquitto_publish(client_.get(), &id, topic.c_str(), static_cast<int>(payload.size()),
                                        payload.data(), kQos1, false);
-    // Without a connection the message is kept and sent with the next one.
-    if (code == MOSQ_ERR_SUCCESS || code == MOSQ_ERR_NO_CONN || code == MOSQ_ERR_CONN_LOST) return id;
-    return core::Error{text_of(code)};
+    if (code != MOSQ_ERR_SUCCESS) return core::Error{text_of(code)};
+    return own_id(id);
   }
 
  private:
+  // Mosquitto counts anew in each connection.
+  [[nodiscard]] int own_id(int id) const { return connections_ << kIdBits | id; }
+
+  // One for each connection: Mosquitto's library would repeat what the last one had under way, all at once.
+  void make_client() {
+    const char* id = options_.client_id.empty() ? nullptr : options_.client_id.c_str();
+    const std::lock_guard lock(client_mutex_);
+    client_.reset(mosquitto_new(id, !options_.keep_session, this));
+    connections_ = (connections_ + 1) & kMostConnections;
+    if (!client_) throw core::BadInput("MQTT client id \"" + options_.client_id + "\": " + text_of(MOSQ_ERR_ERRNO));
+    mosquitto_threaded_set(client_.get(), true);
+    if (!options_.user.empty())
+      mosquitto_username_pw_set(client_.get(), options_.user.c_str(), options_.password.c_str());
+    set_tls();
+    set_callbacks();
+  }
+
   void set_tls() {
     if (options_.ca_file.empty()) return;
     const auto or_null = [](const std::string& file) { return file.empty() ? nullptr : file.c_str(); };
@@ -80,18 +103,30 @@ class MqttClient::Connection {
     mosquitto_connect_callback_set(client_.get(), [](mosquitto* client, void* self, int code) {
       auto& connection = *static_cast<Connection*>(self);
       if (code != 0) {
-        connection.refusal_ = mosquitto_connack_string(code);
+        connection.refusal_ = refusal_text(code);
+        connection.version_is_unknown_ =
+            code == CONNACK_REFUSED_PROTOCOL_VERSION || code == MQTT_RC_UNSUPPORTED_PROTOCOL_VERSION;
         return;
       }
       connection.retry_s_ = kFirstRetryS;
+      connection.connected_ = true;
       const auto& filter = connection.options_.subscribe_to;
       if (!filter.empty()) mosquitto_subscribe(client, nullptr, filter.c_str(), kQos1);
-      if (connection.events_.connected) connection.events_.connected();
+      if (connection.events_.connected) connection.events_.connected(connection.version_);
     });
-    mosquitto_publish_callback_set(client_.get(), [](mosquitto*, void* self, int id) {
-      const auto& events = static_cast<Connection*>(self)->events_;
-      if (events.delivered) events.delivered(id);
+    mosquitto_disconnect_callback_set(client_.get(), [](mosquitto*, void* self, int code) {
+      if (code >= kFirstFailure) static_cast<Connection*>(self)->refusal_ = refusal_text(code);
     });
+    mosquitto_publish_v5_callback_set(client_.get(),
+                                      [](mosquitto*, void* self, int id, int code, const mosquitto_property*) {
+                                        const auto& connection = *static_cast<Connection*>(self);
+                                        const auto& events = connection.events_;
+                                        if (code < kFirstFailure) {
+                                          if (events.delivered) events.delivered(connection.own_id(id));
+                                        } else if (events.refused) {
+                                          events.refused(connection.own_id(id), refusal_text(code));
+                                        }
+                                      });
     mosquitto_message_callback_set(client_.get(), [](mosquitto*, void* self, const mosquitto_message* message) {
       const auto& events = static_cast<Connection*>(self)->events_;
       if (events.received)
@@ -104,15 +139,40 @@ class MqttClient::Connection {
     return stop_;
   }
 
+  // Mosquitto's library has no way to connect with MQTT 5 that neither blocks nor lets the broker forget the session.
+  [[nodiscard]] MqttVersion best_version() const {
+    return options_.keep_session ? MqttVersion::v3_1_1 : MqttVersion::v5;
+  }
+
   void run() {
+    version_ = best_version();
     while (!stopped()) {
-      refusal_.clear();
-      int code = mosquitto_connect_async(client_.get(), options_.host.c_str(), options_.port, options_.keep_alive_s);
-      while (code == MOSQ_ERR_SUCCESS && !stopped()) code = mosquitto_loop(client_.get(), kLoopMs, 1);
+      const auto why = connect_once();
       if (stopped()) break;
-      if (events_.disconnected) events_.disconnected(refusal_.empty() ? text_of(code) : refusal_);
+      const bool older = version_is_unknown_ && version_ == MqttVersion::v5;
+      version_ = older ? MqttVersion::v3_1_1 : best_version();
+      if (older) continue;
+      if (events_.disconnected) events_.disconnected(why);
       pause();
     }
+  }
+
+  // Until it is lost; gives why.
+  std::string connect_once() {
+    refusal_.clear();
+    version_is_unknown_ = false;
+    try {
+      make_client();
+    } catch (const core::BadInput& error) {  // the certificates were there when this began
+      return error.what();
+    }
+    mosquitto_int_option(client_.get(), MOSQ_OPT_PROTOCOL_VERSION, static_cast<int>(version_));
+    int code = mosquitto_connect_async(client_.get(), options_.host.c_str(), options_.port, options_.keep_alive_s);
+    while (code == MOSQ_ERR_SUCCESS && !stopped()) code = mosquitto_loop(client_.get(), kLoopMs, 1);
+    const std::string why = refusal_.empty() ? text_of(code) : refusal_;
+    const std::lock_guard lock(client_mutex_);
+    connected_ = false;
+    return why;
   }
 
   void pause() {
@@ -123,9 +183,14 @@ class MqttClient::Connection {
 
   MqttOptions options_;
   MqttEvents events_;
+  std::mutex client_mutex_;
   std::unique_ptr<mosquitto, Free> client_;
-  double retry_s_ = kFirstRetryS;  // these two: the thread's own
+  std::atomic<bool> connected_ = false;
+  std::atomic<int> connections_ = 0;
+  double retry_s_ = kFirstRetryS;  // from here on the thread's own, until mutex_
   std::string refusal_;
+  MqttVersion version_ = MqttVersion::v5;
+  bool version_is_unknown_ = false;  // to the broker
   std::mutex mutex_;
   std::condition_variable wake_;
   bool stop_ = false;

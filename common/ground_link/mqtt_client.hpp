@@ -1,4 +1,6 @@
-// A connection to an MQTT broker that is made again by itself. Mosquitto's headers appear only in mqtt_client.cpp.
+// A connection to an MQTT broker that is made again by itself. Each begins with MQTT 5, in which the broker says what
+// it refuses, and goes over to 3.1.1 with a broker that knows only that. Mosquitto's headers appear only in
+// mqtt_client.cpp.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +18,7 @@ struct MqttOptions {
   std::string host;
   int port = 1883;
   std::string client_id;      // of two clients with the same one the broker throws out the first
-  bool keep_session = false;  // the broker keeps messages for this client while it is away
+  bool keep_session = false;  // the broker keeps messages for this client while it is away; 3.1.1 only
   std::string ca_file;        // PEM; empty = no TLS
   std::string certificate_file;
   std::string key_file;
@@ -27,11 +29,15 @@ struct MqttOptions {
   std::string subscribe_to;     // topic filter, QoS 1; empty = none
 };
 
+enum class MqttVersion : uint8_t { v3_1_1 = 4, v5 = 5 };
+
 /// Called in the client's own thread.
 struct MqttEvents {
-  std::function<void()> connected;
+  std::function<void(MqttVersion)> connected;
   std::function<void(const std::string& why)> disconnected;  // also after every attempt that failed
   std::function<void(int id)> delivered;                     // the broker has it
+  /// The broker has it not, and does not want it. Version 3.1.1 has no words for that: there it is `delivered`.
+  std::function<void(int id, const std::string& why)> refused;
   std::function<void(std::span<const uint8_t> payload)> received;
 };
 
@@ -44,8 +50,8 @@ class MqttClient {
   MqttClient(const MqttClient&) = delete;
   MqttClient& operator=(const MqttClient&) = delete;
 
-  /// QoS 1; gives the id that `delivered` will have. The client repeats the message over lost connections until then.
-  /// An error: it was not taken. From any thread.
+  /// QoS 1; gives the id that `delivered` or `refused` will have, unless `disconnected` comes first: then the broker
+  /// may have the message or not, and who published it publishes it again. An error: it was not taken. From any thread.
   core::Result<int> publish(const std::string& topic, std::span<const uint8_t> payload);
 
  private:

@@ -310,6 +310,10 @@ void TprPublisherService::show() {
   } else {
     context_.health().degraded(degraded_by);
   }
+  if (const auto remark = ground_link_ ? ground_link_->remark() : ""; remark != remark_) {
+    remark_ = remark;
+    if (!remark.empty()) context_.log().warn("{}", remark);
+  }
   // Figures in the sentence change all the time; the kind of it is worth one line in the log.
   const auto kind = degraded_by.substr(0, degraded_by.find_first_of("0123456789"));
   if (kind == degraded_by_) return;

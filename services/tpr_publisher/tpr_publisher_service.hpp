@@ -58,6 +58,7 @@ class TprPublisherService {
   std::unique_ptr<GroundLink> ground_link_;  // nullptr = no broker
   std::string report_trouble_;
   std::string degraded_by_;
+  std::string remark_;             // of the ground link, as it was logged
   std::string onboard_refusal_;    // empty = used
   std::string packet_58_refusal_;  // the same
 };

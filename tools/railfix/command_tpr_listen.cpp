@@ -90,7 +90,7 @@ int listen(const Options& options) {
   ground_link::SequenceWatch watch;
   uint64_t count = 0;
   ground_link::MqttEvents events;
-  events.connected = [] { std::cerr << "connected\n"; };
+  events.connected = [](auto) { std::cerr << "connected\n"; };
   events.disconnected = [&](const std::string& why) {
     std::cerr << "not connected to " << options.mqtt.host << ":" << options.mqtt.port << " (" << why << ")\n";
   };

@@ -1,6 +1,6 @@
 #include "tpr_publisher/ground_link/ground_link.hpp"
 
-#include <chrono>
+#include <algorithm>
 
 namespace railfix::tpr_publisher {
 
@@ -9,6 +9,7 @@ namespace {
 constexpr size_t kMostUnderWay = 20;
 constexpr size_t kMostUnstored = 1000;
 constexpr std::chrono::seconds kRetryStore{1};
+using Clock = std::chrono::steady_clock;
 
 }  // namespace
 
@@ -22,9 +23,13 @@ GroundLink::GroundLink(const GroundLinkSettings& settings)
   say();
   client_ = std::make_unique<ground_link::MqttClient>(
       settings.mqtt, ground_link::MqttEvents{
-                         .connected = [this] { push(Connected{}); },
+                         .connected = [this](auto version) { push(Connected{version}); },
                          .disconnected = [this](const std::string& why) { push(Disconnected{why}); },
                          .delivered = [this](int id) { push(Delivered{id}); },
+                         .refused =
+                             [this](int id, const std::string& why) {
+                               push(Refused{id, why});
+                             },
                          .received = {},
                      });
   thread_ = std::thread([this] { run(); });
@@ -49,6 +54,11 @@ std::string GroundLink::trouble() const {
   return trouble_;
 }
 
+std::string GroundLink::remark() const {
+  const std::lock_guard lock(mutex_);
+  return remark_;
+}
+
 bool GroundLink::connected() const {
   const std::lock_guard lock(mutex_);
   return connected_;
@@ -70,10 +80,13 @@ void GroundLink::push(Event event) {
 std::deque<GroundLink::Event> GroundLink::wait() {
   std::unique_lock lock(mutex_);
   const auto ready = [this] { return stop_ || !events_.empty(); };
-  if (unstored_.empty() && delivered_.empty()) {
-    wake_.wait(lock, ready);
+  const bool stores_again = !unstored_.empty() || !delivered_.empty();
+  auto until = Clock::now() + kRetryStore;
+  if (outbox_.held()) until = stores_again ? std::min(until, try_again_at_) : try_again_at_;
+  if (stores_again || outbox_.held()) {
+    wake_.wait_until(lock, until, ready);
   } else {
-    wake_.wait_for(lock, kRetryStore, ready);
+    wake_.wait(lock, ready);
   }
   return std::exchange(events_, {});
 }
@@ -89,24 +102,58 @@ void GroundLink::run() {
     if (!unstored_.empty() || !delivered_.empty()) store_trouble_.clear();  // unless it is met again
     remove_delivered();
     store_new();
+    try_again();
     publish();
     say();
   }
 }
 
 void GroundLink::take(Event& event) {
-  if (auto* report = std::get_if<ground_link::GroundReport>(&event)) {
-    unstored_.push_back(std::move(*report));
-  } else if (std::holds_alternative<Connected>(event)) {
-    link_trouble_.clear();
-    outbox_.connected();
-  } else if (const auto* lost = std::get_if<Disconnected>(&event)) {
-    link_trouble_ =
-        "not connected to " + settings_.mqtt.host + ":" + std::to_string(settings_.mqtt.port) + " (" + lost->why + ")";
-    outbox_.disconnected();
-  } else if (const auto sequence = outbox_.delivered(std::get<Delivered>(event).id)) {
-    delivered_.push_back(*sequence);
-  }
+  std::visit([this](auto& one) { take(one); }, event);
+}
+
+void GroundLink::take(const Connected& now) {
+  link_trouble_.clear();
+  outbox_.connected();
+  const std::lock_guard lock(mutex_);
+  remark_ = now.version == ground_link::MqttVersion::v5
+                ? ""
+                : "Ground link: the broker " + broker() +
+                      " knows only MQTT 3.1.1, which confirms what its list of rights refuses: such reports are lost "
+                      "unseen. Look on the ground with railfix tpr listen whether they come.";
+}
+
+void GroundLink::take(const Disconnected& lost) {
+  link_trouble_ = "not connected to " + broker() + " (" + lost.why + ")";
+  outbox_.disconnected();
+  while (!unstored_under_way_.empty()) wait_again(unstored_under_way_.begin()->first);
+}
+
+void GroundLink::take(const Delivered& report) {
+  unstored_under_way_.erase(report.id);
+  if (const auto sequence = outbox_.delivered(report.id)) delivered_.push_back(*sequence);
+  if (!outbox_.held()) refusal_.clear();
+}
+
+void GroundLink::take(const Refused& report) {
+  if (!outbox_.held()) try_again_at_ = Clock::now() + pause();
+  outbox_.refused(report.id);
+  const std::string user = settings_.mqtt.user.empty() ? "a client without a user name" : "user " + settings_.mqtt.user;
+  refusal_ = "the broker " + broker() + " refuses what " + user + " writes to " + settings_.topic + " (" + report.why +
+             "); let it write there in the broker's list of rights (acl_file)";
+  wait_again(report.id);
+}
+
+// With its number: under another one the ground would miss this one.
+void GroundLink::wait_again(int id) {
+  auto unstored = unstored_under_way_.extract(id);
+  if (!unstored) return;
+  const auto later = [&](const auto& one) { return one.sequence == 0 || one.sequence > unstored.mapped().sequence; };
+  unstored_.insert(std::ranges::find_if(unstored_, later), std::move(unstored.mapped()));
+}
+
+void GroundLink::try_again() {
+  if (outbox_.held() && Clock::now() >= try_again_at_) outbox_.try_again();
 }
 
 // In one go: when that is lost in a power cut they are only sent again.
@@ -143,6 +190,15 @@ void GroundLink::publish() {
   publish_unstored();
 }
 
+std::string GroundLink::broker() const {
+  return settings_.mqtt.host + ":" + std::to_string(settings_.mqtt.port);
+}
+
+std::chrono::nanoseconds GroundLink::pause() const {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+      std::chrono::duration<double>(settings_.mqtt.longest_retry_s));
+}
+
 std::optional<int> GroundLink::give(ground_link::GroundReport report, uint64_t stream, uint64_t sequence) {
   report.stream = stream;
   report.sequence = sequence;
@@ -154,10 +210,14 @@ std::optional<int> GroundLink::give(ground_link::GroundReport report, uint64_t s
 
 void GroundLink::publish_unstored() {
   while (!unstored_.empty() && outbox_.takes_unstored()) {
-    const auto id = give(unstored_.front(), memory_stream_, memory_sequence_ + 1);
+    auto& report = unstored_.front();
+    const uint64_t sequence = report.sequence != 0 ? report.sequence : memory_sequence_ + 1;
+    const auto id = give(report, memory_stream_, sequence);
     if (!id) return;
-    ++memory_sequence_;
+    memory_sequence_ = std::max(memory_sequence_, sequence);
+    report.sequence = sequence;
     outbox_.published_unstored(*id);
+    unstored_under_way_.insert_or_assign(*id, std::move(report));
     unstored_.pop_front();
   }
 }
@@ -181,9 +241,8 @@ void GroundLink::publish_stored() {
 
 void GroundLink::say() {
   std::string sentence;
-  if (!link_trouble_.empty()) {
-    sentence =
-        "Ground link: " + link_trouble_ + "; " + std::to_string(outbox_.size() + unstored_.size()) + " reports wait.";
+  if (const auto& trouble = link_trouble_.empty() ? refusal_ : link_trouble_; !trouble.empty()) {
+    sentence = "Ground link: " + trouble + "; " + std::to_string(outbox_.size() + unstored_.size()) + " reports wait.";
   }
   if (dropped_ > 0)
     sentence += (sentence.empty() ? "" : " ") + std::to_string(dropped_) + " reports for the ground are lost.";
@@ -195,7 +254,7 @@ void GroundLink::say() {
   }
   const std::lock_guard lock(mutex_);
   trouble_ = sentence;
-  connected_ = link_trouble_.empty();
+  connected_ = link_trouble_.empty() && refusal_.empty();
   stores_ = store_trouble_.empty();
 }
 

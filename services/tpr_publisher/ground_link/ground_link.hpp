@@ -1,8 +1,10 @@
 // Position reports to the ground: stored first, then sent over MQTT (QoS 1) in the order in which they were made,
-// removed from the store when the broker has them. What cannot be stored (a full disk) goes from memory, in a stream of
-// its own. Two threads of its own: a slow disk or network never holds the service up.
+// removed from the store when the broker has them; what it refuses stays there, and is offered again. What cannot be
+// stored (a full disk) goes from memory, in a stream of its own. Two threads of its own: a slow disk or network never
+// holds the service up.
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <mutex>
@@ -37,23 +39,39 @@ class GroundLink {
   void send(ground_link::GroundReport report);
   /// Empty when all is well, otherwise one sentence for service_status.
   [[nodiscard]] std::string trouble() const;
+  /// What is to be known of a link that works; usually empty.
+  [[nodiscard]] std::string remark() const;
+  /// Reports go to the broker.
   [[nodiscard]] bool connected() const;
   /// What is sent survives a power cut.
   [[nodiscard]] bool stores() const;
 
  private:
-  struct Connected {};
+  struct Connected {
+    ground_link::MqttVersion version;
+  };
   struct Disconnected {
     std::string why;
   };
   struct Delivered {
     int id;
   };
-  using Event = std::variant<ground_link::GroundReport, Connected, Disconnected, Delivered>;
+  struct Refused {
+    int id;
+    std::string why;
+  };
+  using Event = std::variant<ground_link::GroundReport, Connected, Disconnected, Delivered, Refused>;
   void push(Event event);
   [[nodiscard]] std::deque<Event> wait();
   void run();
   void take(Event& event);
+  void take(ground_link::GroundReport& report) { unstored_.push_back(std::move(report)); }
+  void take(const Connected& now);
+  void take(const Disconnected& lost);
+  void take(const Delivered& report);
+  void take(const Refused& report);
+  void wait_again(int id);
+  void try_again();
   void remove_delivered();
   void store_new();
   void publish();
@@ -62,21 +80,28 @@ class GroundLink {
   /// The client's id of it; nothing when the client does not take it now.
   std::optional<int> give(ground_link::GroundReport report, uint64_t stream, uint64_t sequence);
   void say();
+  [[nodiscard]] std::string broker() const;
+  /// Before what was refused is tried again.
+  [[nodiscard]] std::chrono::nanoseconds pause() const;
 
   GroundLinkSettings settings_;
   ReportStore store_;  // from here on the worker's own, until mutex_
   Outbox outbox_;
-  std::deque<ground_link::GroundReport> unstored_;
+  std::deque<ground_link::GroundReport> unstored_;  // one that was under way has its number
+  std::map<int, ground_link::GroundReport> unstored_under_way_;
   std::vector<uint64_t> delivered_;  // to be removed from the store
   uint64_t memory_stream_;           // of what was never stored
   uint64_t memory_sequence_ = 0;
   std::string link_trouble_;
+  std::string refusal_;  // empty = the broker takes what it gets
+  std::chrono::steady_clock::time_point try_again_at_;
   std::string store_trouble_;
   size_t dropped_ = 0;
   mutable std::mutex mutex_;
   std::condition_variable wake_;
   std::deque<Event> events_;
   std::string trouble_;
+  std::string remark_;
   bool connected_ = false;
   bool stores_ = true;
   bool stop_ = false;

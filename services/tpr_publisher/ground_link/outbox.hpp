@@ -1,4 +1,6 @@
 // Which report goes to the broker next: in order, a few under way at a time, each until the broker has confirmed it.
+// On a new connection, and after a report that the broker refused, one goes alone until it is confirmed: of several the
+// broker could take a later one first, or end the connection before its refusal of the first is heard.
 // What could not be stored is newer than everything stored, and goes behind it.
 #pragma once
 
@@ -17,9 +19,9 @@ class Outbox {
   /// A report is in the store. REQUIRES: numbers grow.
   void stored(uint64_t sequence) { waiting_.push_back(sequence); }
   void connected();
-  void disconnected() { connected_ = false; }
-  /// The report to publish now. After a lost connection the client first repeats what was under way; nothing new goes
-  /// out until that is confirmed, because it could overtake.
+  /// Whether the broker has what was under way is not known: it waits in its place again.
+  void disconnected();
+  /// The report to publish now.
   [[nodiscard]] std::optional<uint64_t> next() const;
   /// All that is stored is under way, and one more may be.
   [[nodiscard]] bool takes_unstored() const { return may_publish() && waiting_.empty(); }
@@ -30,18 +32,27 @@ class Outbox {
   void skip() { waiting_.pop_front(); }
   /// The stored report that the broker has confirmed; nothing for an unknown id, or when it is not stored.
   std::optional<uint64_t> delivered(int id);
+  /// The broker has not taken it: it waits in its place again. Nothing goes out until try_again().
+  void refused(int id);
+  [[nodiscard]] bool held() const { return held_; }
+  void try_again() { held_ = false; }
   /// Drops the oldest that are not under way until no more than `limit` wait; gives what was dropped.
   std::vector<uint64_t> limit(size_t limit);
 
   [[nodiscard]] size_t size() const { return waiting_.size() + under_way_.size(); }
 
  private:
-  [[nodiscard]] bool may_publish() const { return connected_ && !repeating_ && under_way_.size() < most_under_way_; }
+  using UnderWay = std::map<int, std::optional<uint64_t>>;
+  UnderWay::iterator wait_again(UnderWay::iterator report);
+  [[nodiscard]] bool may_publish() const {
+    return connected_ && !held_ && under_way_.size() < (alone_ ? 1 : most_under_way_);
+  }
   size_t most_under_way_;
   bool connected_ = false;
-  bool repeating_ = false;
+  bool alone_ = true;
+  bool held_ = false;
   std::deque<uint64_t> waiting_;
-  std::map<int, std::optional<uint64_t>> under_way_;  // by the client's id; nothing = not stored
+  UnderWay under_way_;  // by the client's id; nothing = not stored
 };
 
 }  // namespace railfix::tpr_publisher

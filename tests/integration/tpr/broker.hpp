@@ -44,7 +44,10 @@ class Broker {
     was_up_ = true;
     program_->end(SIGTERM);
   }
+  /// Reads its files of passwords and rights again.
+  void reload() { program_->send(SIGHUP); }
   [[nodiscard]] std::string address() const { return "localhost:" + std::to_string(port_); }
+  [[nodiscard]] int port() const { return port_; }
 
  private:
   static sockaddr_in local(int port) {

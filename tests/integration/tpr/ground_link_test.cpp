@@ -1,123 +1,18 @@
 // Reports to the ground over a real Mosquitto: in order, none lost, over restarts of everything.
 #include <sys/resource.h>
 
-#include <atomic>
 #include <csignal>
 #include <iostream>
 #include <map>
-#include <mutex>
 #include <nlohmann/json.hpp>
 
-#include "ground_link/ground_report.hpp"
-#include "ground_link/mqtt_client.hpp"
-#include "ground_link/sequence_watch.hpp"
-#include "integration/tpr/broker.hpp"
-#include "integration/tpr/tpr_service.hpp"
-#include "tpr_publisher/ground_link/ground_link.hpp"
+#include "integration/tpr/ground_link_fixture.hpp"
 
 namespace railfix {
 namespace {
 
 using ::testing::HasSubstr;
 using ::testing::Not;
-
-/// The ground's end: a session at the broker that outlives connections, and what came over it.
-class Ground {
- public:
-  Ground(const std::string& broker, const std::string& name) : probe_topic_("railfix/" + name + "/position_report") {
-    ground_link::MqttOptions options;
-    core::ok_or_throw(ground_link::parse_broker(broker, options));
-    options.client_id = "ground-" + name;
-    options.keep_session = true;
-    options.subscribe_to = probe_topic_;
-    options.longest_retry_s = 0.2;
-    client_ = std::make_unique<ground_link::MqttClient>(
-        options, ground_link::MqttEvents{{}, {}, {}, [this](std::span<const uint8_t> payload) { receive(payload); }});
-  }
-  /// Waits until the broker has the subscription: a message to ourselves comes back.
-  bool subscribed() {
-    const std::vector<uint8_t> probe{0};
-    for (int i = 0; i < 600; ++i) {
-      if (i % 20 == 0) (void)client_->publish(probe_topic_, probe);
-      if (probed_) return true;
-      poll(nullptr, 0, 50);
-    }
-    return false;
-  }
-  /// Without those that came twice.
-  [[nodiscard]] std::vector<ground_link::GroundReport> reports() const {
-    const std::lock_guard lock(mutex_);
-    return reports_;
-  }
-  [[nodiscard]] size_t count() const {
-    const std::lock_guard lock(mutex_);
-    return reports_.size();
-  }
-  [[nodiscard]] size_t twice() const {
-    const std::lock_guard lock(mutex_);
-    return twice_;
-  }
-
- private:
-  void receive(std::span<const uint8_t> payload) {
-    if (payload.size() == 1) {
-      probed_ = true;
-      return;
-    }
-    auto report = ground_link::ground_report_from(payload).value();
-    const std::lock_guard lock(mutex_);
-    if (watch_.arrived(report.train, report.stream, report.sequence) == ground_link::Arrival::twice) {
-      ++twice_;
-    } else {
-      reports_.push_back(std::move(report));
-    }
-  }
-  std::string probe_topic_;
-  std::atomic<bool> probed_ = false;
-  mutable std::mutex mutex_;
-  ground_link::SequenceWatch watch_;
-  std::vector<ground_link::GroundReport> reports_;
-  size_t twice_ = 0;
-  std::unique_ptr<ground_link::MqttClient> client_;
-};
-
-class GroundLinkTest : public TprService {
- protected:
-  GroundLinkTest() { std::filesystem::create_directories(folder_); }
-  ~GroundLinkTest() override { std::filesystem::remove_all(folder_); }
-  void SetUp() override {
-    if (!std::filesystem::exists(test::kMosquitto)) GTEST_SKIP() << "mosquitto is not installed (./dev setup)";
-  }
-
-  [[nodiscard]] std::vector<std::string> linked_service(const std::string& broker,
-                                                        std::vector<std::string> more = {}) const {
-    const std::string link = "tpr_publisher.ground_link.";
-    more.insert(more.end(), {"tpr_publisher.d_cycloc_m=1", link + "broker=" + broker, link + "longest_retry_s=0.2",
-                             link + "store=" + (folder_ / "reports.db").string()});
-    return service(more);
-  }
-  /// Runs on, a report a metre, until so many have come over DDS.
-  bool run_for(size_t reports) {
-    return run_until([&] { return reports_.size() >= reports; },
-                     [&] {
-                       if (reports_.size() >= last_.reports) {
-                         last_.offset_m += 1.5;
-                         last_.reports = reports_.size() + 1;
-                       }
-                       write_state(last_.offset_m);
-                     });
-  }
-  bool status_says(const std::string& text) {
-    return run_until([&] { return reason().find(text) != std::string::npos; }, [&] { write_state(last_.offset_m); });
-  }
-  [[nodiscard]] std::filesystem::path file(const std::string& name) const { return folder_ / name; }
-
-  struct {
-    double offset_m = 110;
-    size_t reports = 0;
-  } last_;
-  std::filesystem::path folder_ = std::filesystem::temp_directory_path() / ("ground-" + std::to_string(getpid()));
-};
 
 TEST_F(GroundLinkTest, NothingIsLostOverAPowerCutAndADeadZone) {
   test::Broker broker(file("broker"));
@@ -319,29 +214,20 @@ TEST_F(GroundLinkTest, ManyLateReportsArriveInOrderWhileTheBrokerComesAndGoes) {
   Ground ground(broker.address(), train_);
   ASSERT_TRUE(ground.subscribed());
   broker.stop();
-  tpr_publisher::GroundLinkSettings settings;
-  core::ok_or_throw(ground_link::parse_broker(broker.address(), settings.mqtt));
-  settings.mqtt.client_id = "railfix-" + train_;
-  settings.mqtt.longest_retry_s = 0.2;
-  settings.topic = "railfix/" + train_ + "/position_report";
-  settings.store = file("many.db");
-  const auto wait_for = [&](size_t count) {
-    for (int i = 0; i < 6000 && ground.count() < count; ++i) poll(nullptr, 0, 10);
-    return ground.count() >= count;
-  };
+  const auto settings = link_settings(broker.address());
   {
     tpr_publisher::GroundLink link(settings);
-    for (uint64_t i = 1; i <= kReports; ++i) link.send({train_, 0, 0, static_cast<int64_t>(i), 0, 3, 1, {0x88}, ""});
+    for (uint64_t i = 1; i <= kReports; ++i) link.send(report(i));
   }  // stored, though nobody was there
   tpr_publisher::GroundLink link(settings);
   const int64_t begun_ns = core::monotonic_ns();
   for (const size_t until : {size_t{200}, size_t{900}, size_t{1500}}) {
     ASSERT_TRUE(broker.start());
-    ASSERT_TRUE(wait_for(until));
+    ASSERT_TRUE(wait_for([&] { return ground.count() >= until; }));
     broker.stop();
   }
   ASSERT_TRUE(broker.start());
-  ASSERT_TRUE(wait_for(kReports)) << link.trouble();
+  ASSERT_TRUE(wait_for([&] { return ground.count() >= kReports; })) << link.trouble();
   const double took_s = core::seconds(core::monotonic_ns() - begun_ns);
   const auto arrived = ground.reports();
   for (uint64_t i = 0; i < kReports; ++i) {
