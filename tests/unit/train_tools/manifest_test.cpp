@@ -8,6 +8,7 @@
 #include "recorder/recorder_config.hpp"
 #include "support/program.hpp"
 #include "tpr_publisher/tpr_publisher_config.hpp"
+#include "track/map.hpp"
 #include "train/check.hpp"
 #include "train/containers.hpp"
 #include "train/disk_need.hpp"
@@ -25,6 +26,7 @@ using ::testing::Field;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
+using ::testing::StartsWith;
 
 const FindProgram kNoPrograms = [](const HostedService&) { return std::nullopt; };
 
@@ -55,6 +57,12 @@ class TrainFolder : public ::testing::Test {
  protected:
   TrainFolder() { fs::create_directories(folder_); }
   ~TrainFolder() override { fs::remove_all(folder_); }
+  void write_map() {
+    track::Map map;
+    map.edges = {{1, "line", 1, 2, "", track::Alignment::chained({0, 0, 1}, {{1000, 0, 0}})}};
+    map.nodes = {{1, track::NodeKind::end, "", 0, 0}, {2, track::NodeKind::end, "", 1000, 0}};
+    core::ok_or_throw(map.save(folder_ / "line.map"));
+  }
   core::Result<Manifest> manifest(std::string text, const std::string& replace = "", const std::string& by = "") {
     if (!replace.empty()) text.replace(text.find(replace), replace.size(), by);
     std::ofstream(folder_ / "train.yaml") << text;
@@ -114,7 +122,7 @@ TEST_F(TrainFolder, MistakesAreToldWithLineKeyAndWayOut) {
 }
 
 TEST_F(TrainFolder, TheCheckSaysWhatWouldGoWrong) {
-  std::ofstream(folder_ / "line.map") << "map";
+  write_map();
   EXPECT_THAT(findings(), IsEmpty());
   EXPECT_THAT(findings("odometry: cab", "odometry: coach"),
               Contains(HasSubstr("odometry is on coach, but full pictures do not leave the camera's host cab")));
@@ -127,8 +135,39 @@ TEST_F(TrainFolder, TheCheckSaysWhatWouldGoWrong) {
   EXPECT_THAT(findings(), Contains(HasSubstr("line.map is missing or cannot be read; put it beside train.yaml")));
 }
 
+TEST_F(TrainFolder, FilesThatNoServiceCouldReadAreTold) {
+  for (const char* file : {"line.map", "camera.yaml"}) std::ofstream(folder_ / file) << "what a broken copy has left";
+  EXPECT_THAT(findings("map: line.map", "map: line.map\n  calibration: camera.yaml"),
+              ElementsAre(AllOf(HasSubstr("train.map: "), HasSubstr("line.map is not a compiled map or is cut short")),
+                          AllOf(HasSubstr("train.calibration: "), HasSubstr("camera.yaml"))));
+  write_map();
+  std::ofstream(folder_ / "camera.yaml")
+      << "resolution: [640, 480]\ncamera_model: pinhole\nintrinsics: [600, 600, 320, 240]\n"
+         "distortion_model: radial-tangential\ndistortion_coefficients: [0, 0, 0, 0]\n";
+  EXPECT_THAT(findings("map: line.map", "map: line.map\n  calibration: camera.yaml"), IsEmpty());
+}
+
+TEST_F(TrainFolder, DataThatAreToBePlayedAndAreNotOnTheComputerAreTold) {
+  const auto told = [&](const std::string& source) {
+    auto train = manifest(kTrain).value();
+    train.settings["frame_grabber"]["source"] = source;
+    std::string text;
+    for (const char* host : {"cab", "coach"}) {
+      for (const auto& finding : check_computer(&train, train.host(host), folder_))
+        text += finding.text.find("settings.frame_grabber.source") == 0 ? host + (": " + finding.text) : "";
+    }
+    return text;
+  };
+  EXPECT_THAT(told("/nonexistent/ride"),
+              StartsWith("cab: settings.frame_grabber.source: /nonexistent/ride is not on this computer"));
+  EXPECT_THAT(told("/nonexistent/ride"), Not(HasSubstr("coach"))) << "it stands in the cab";
+  EXPECT_EQ(told(folder_.string()), "");
+  EXPECT_EQ(told("genicam:any"), "");
+  EXPECT_EQ(place_on_host("/var/lib/railfix/ride", "/host/home", true), "/host/home/ride") << "as a container sees it";
+}
+
 TEST_F(TrainFolder, AQualityOfServiceThatDoesNotMatchIsTold) {
-  std::ofstream(folder_ / "line.map") << "map";
+  write_map();
   const auto with_profiles =
       [&](const std::string& reliability) {
         std::ofstream(folder_ / "qos.xml")
@@ -174,7 +213,7 @@ TEST(Examples, HaveNothingMissingButTheirKeys) {
 }
 
 TEST_F(TrainFolder, CertificatesThatAreMissingOrRunOutAreTold) {
-  std::ofstream(folder_ / "line.map") << "map";
+  write_map();
   EXPECT_THAT(findings("run_as: programs", "security: true"),
               Contains(HasSubstr("security/cab is missing; make the train's certificates with railfix train keys ")));
   const auto secured = manifest(kTrain, "run_as: programs", "security: true").value();
@@ -198,7 +237,7 @@ TEST_F(TrainFolder, CertificatesThatAreMissingOrRunOutAreTold) {
 }
 
 TEST_F(TrainFolder, WhatIsMissingOfASecuredTrainIsToldOnceAndMadeAgain) {
-  std::ofstream(folder_ / "line.map") << "map";
+  write_map();
   const auto secured = manifest(kTrain, "run_as: programs", "security: true").value();
   ASSERT_TRUE(make_keys(secured, {}).ok());
   const auto certificate = test::slurp(folder_ / "security/coach/fusion.cert.pem");
@@ -214,7 +253,7 @@ TEST_F(TrainFolder, WhatIsMissingOfASecuredTrainIsToldOnceAndMadeAgain) {
 
 // A folder that was copied in parts.
 TEST_F(TrainFolder, ACertificateOfAnotherAuthorityIsTold) {
-  std::ofstream(folder_ / "line.map") << "map";
+  write_map();
   const auto secured = manifest(kTrain, "run_as: programs", "security: true").value();
   ASSERT_TRUE(make_keys(secured, {}).ok());
   const auto certificate = folder_ / "security/cab/fusion.cert.pem";
@@ -261,7 +300,7 @@ TEST_F(TrainFolder, NoOtherAuthorityIsMadeWhereTheOneOfTheCertificatesIsNot) {
 }
 
 TEST_F(TrainFolder, PermissionsThatDoNotFitAreTold) {
-  std::ofstream(folder_ / "line.map") << "map";
+  write_map();
   const auto secured = manifest(kTrain, "run_as: programs", "security: true").value();
   ASSERT_TRUE(make_keys(secured, {}).ok());
   const auto told = [&](const std::string& domain) {
@@ -285,7 +324,7 @@ TEST_F(TrainFolder, PermissionsThatDoNotFitAreTold) {
 }
 
 TEST_F(TrainFolder, CertificatesThatOthersHaveMadeRunOutToo) {
-  std::ofstream(folder_ / "line.map") << "map";
+  write_map();
   const auto make = [&](const char* name) {
     const auto made = test::run_program({"/usr/bin/openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt",
                                          "ec_paramgen_curve:prime256v1", "-nodes", "-days", "20", "-subj", "/CN=broker",
@@ -333,7 +372,7 @@ TEST_F(TrainFolder, CertificatesThatOthersHaveMadeRunOutToo) {
 }
 
 TEST_F(TrainFolder, APrivateKeyOfAnotherCertificateIsTold) {
-  std::ofstream(folder_ / "line.map") << "map";
+  write_map();
   const auto secured = manifest(kTrain, "run_as: programs", "security: true").value();
   ASSERT_TRUE(make_keys(secured, {}).ok());
   const auto security = folder_ / "security/cab";
@@ -369,7 +408,7 @@ TEST_F(TrainFolder, APrivateKeyOfAnotherCertificateIsTold) {
 }
 
 TEST_F(TrainFolder, ReportsThatLeaveASecuredTrainInTheOpenAreTold) {
-  std::ofstream(folder_ / "line.map") << "map";
+  write_map();
   for (const char* file : {"ca.pem", "password"}) std::ofstream(folder_ / file) << "x";
   ASSERT_TRUE(make_keys(manifest(kTrain, "run_as: programs", "security: true").value(), {}).ok());
   const auto told = [&](const std::string& link, const char* run_as = "security: true") {
@@ -385,7 +424,7 @@ TEST_F(TrainFolder, ReportsThatLeaveASecuredTrainInTheOpenAreTold) {
 }
 
 TEST_F(TrainFolder, APageThatNobodyCanControlIsTold) {
-  std::ofstream(folder_ / "line.map") << "map";
+  write_map();
   std::ofstream(folder_ / "word") << "secret";
   const auto told = [&](const std::string& monitor) {
     const auto train = manifest(kTrain, "settings:\n", "settings:\n  monitor: " + monitor + "\n").value();
@@ -401,7 +440,7 @@ TEST_F(TrainFolder, APageThatNobodyCanControlIsTold) {
 }
 
 TEST_F(TrainFolder, TheWordForControlStandsInNoConfiguration) {
-  std::ofstream(folder_ / "line.map") << "map";
+  write_map();
   std::ofstream(folder_ / "word") << "secret";
   const auto train = manifest(kTrain, "settings:\n", "settings:\n  monitor: { token_file: word }\n").value();
   ASSERT_TRUE(render_host(train, *train.host("coach"), folder_ / "out").ok());
@@ -482,7 +521,7 @@ TEST_F(TrainFolder, SettingsThatAreNotGivenBeginAsTheServicesSay) {
 }
 
 TEST_F(TrainFolder, EachHostGetsItsConfigurationComposeFileAndUnit) {
-  std::ofstream(folder_ / "line.map") << "map";
+  write_map();
   const auto train = manifest(kTrain).value();
   const auto out = folder_ / "out";
   ASSERT_TRUE(render_host(train, *train.host("coach"), out).ok());
@@ -505,7 +544,7 @@ TEST_F(TrainFolder, EachHostGetsItsConfigurationComposeFileAndUnit) {
 }
 
 TEST_F(TrainFolder, CertificatesAndPasswordsOfTheGroundLinkComeAlong) {
-  std::ofstream(folder_ / "line.map") << "map";
+  write_map();
   fs::create_directories(folder_ / "ground");
   std::ofstream(folder_ / "ground/ca.pem") << "authority";
   std::ofstream(folder_ / "ground/password") << "secret";
@@ -535,13 +574,13 @@ TEST_F(TrainFolder, CertificatesAndPasswordsOfTheGroundLinkComeAlong) {
 }
 
 TEST_F(TrainFolder, ThePageIsOnTheTrainNetworkOnly) {
-  std::ofstream(folder_ / "line.map") << "map";
+  write_map();
   const auto train = manifest(kTrain).value();
   EXPECT_THAT(render_config(train, *train.host("coach"), "FOLDER"), HasSubstr("address: 10.42.1.12"));
 }
 
 TEST_F(TrainFolder, AContainerIsLockedDownAndSeesNoKeysButItsOwn) {
-  std::ofstream(folder_ / "line.map") << "map";
+  write_map();
   const auto train = manifest(kTrain, "run_as: programs", "security: true").value();
   const auto container = container_of(train, *train.host("coach"), {"fusion", "1.3.0", false}, "/g/7", "/home");
   EXPECT_EQ(container.image, "railfix/fusion:1.3.0");
@@ -560,7 +599,7 @@ TEST_F(TrainFolder, AContainerIsLockedDownAndSeesNoKeysButItsOwn) {
 }
 
 TEST_F(TrainFolder, SettingsOfAServiceChangeWithWhatItReadsAndNothingElse) {
-  std::ofstream(folder_ / "line.map") << "map";
+  write_map();
   const auto train = manifest(kTrain).value();
   const auto settings = [](const Manifest& of, const char* service) {
     return settings_of(of, *of.host("coach"), service);

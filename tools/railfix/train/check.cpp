@@ -6,7 +6,9 @@
 #include <fstream>
 #include <future>
 
+#include "dataset/calibration.hpp"
 #include "messaging/qos_match.hpp"
+#include "track/map.hpp"
 #include "train/findings.hpp"
 #include "train/made_of.hpp"
 #include "train/render.hpp"
@@ -37,6 +39,21 @@ void check_placement(const Manifest& manifest, Findings& findings) {
   needs("tpr_publisher", "fusion");
   needs("fusion", "odometry");
   needs("map_matcher", "odometry");
+}
+
+// A copy that was cut short would end every service that reads it.
+void check_contents(const Manifest& manifest, Findings& findings) {
+  const auto is_there = [&](const std::string& name) {
+    return !name.empty() && access((manifest.folder / name).c_str(), R_OK) == 0;
+  };
+  if (is_there(manifest.map)) {
+    if (const auto map = track::Map::load(manifest.folder / manifest.map); !map.ok())
+      error(findings, "train.map: " + map.error().message);
+  }
+  if (is_there(manifest.calibration)) {
+    if (const auto camera = dataset::read_calibration(manifest.folder / manifest.calibration); !camera.ok())
+      error(findings, "train.calibration: " + camera.error().message);
+  }
 }
 
 void check_files(const Manifest& manifest, Findings& findings) {
@@ -227,6 +244,7 @@ TrainCheck check_train(const Manifest& manifest, const FindProgram& find_program
   auto& findings = check.findings;
   check_placement(manifest, findings);
   check_files(manifest, findings);
+  check_contents(manifest, findings);
   check_quality_of_service(manifest, findings);
   check_settings(manifest, findings);
   check_ports(manifest, findings);

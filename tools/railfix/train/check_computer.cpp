@@ -11,6 +11,7 @@
 #include "messaging/network.hpp"
 #include "train/disk_need.hpp"
 #include "train/findings.hpp"
+#include "train/setting_files.hpp"
 
 namespace railfix::tool {
 namespace {
@@ -82,6 +83,19 @@ void check_disks(const std::vector<DiskNeed>& needs, Findings& findings) {
   }
 }
 
+// Cameras and receivers come and go, and their services wait for them; recorded data are there or not.
+void check_sources(const Manifest& manifest, const TrainHost& host, const fs::path& root, Findings& findings) {
+  for (const char* player : {"frame_grabber", "sensor_gateway"}) {
+    const auto* service = manifest.service(player);
+    const std::string source = setting_of(manifest.settings, player, "source");
+    if (service == nullptr || service->host != host.name || !source.starts_with('/')) continue;
+    const auto place = place_on_host(source, HostFolder(fs::absolute(root)).home(), manifest.containers);
+    if (!fs::exists(place))
+      error(findings, std::string("settings.") + player + ".source: " + place.string() +
+                          " is not on this computer, and " + player + " would have nothing to play; copy it there");
+  }
+}
+
 void check_interface(const TrainHost& host, Findings& findings) {
   const std::string interface = host.interface.empty() ? host.address : host.interface;
   if (const auto found = messaging::addresses_of({interface}); !found.ok()) {
@@ -139,6 +153,7 @@ std::vector<Finding> check_computer(const Manifest* manifest, const TrainHost* h
                                                      : disk_needs(*manifest, *host, fs::absolute(root)),
               findings);
   if (host != nullptr) check_interface(*host, findings);
+  if (manifest != nullptr && host != nullptr) check_sources(*manifest, *host, root, findings);
   if (manifest != nullptr && host != nullptr && manifest->containers) {
     for (const auto& problem : container_problems(*manifest, *host)) error(findings, problem);
   }

@@ -29,11 +29,7 @@ struct Host {
     if (!text.empty()) (void)YAML::convert<double>::decode(YAML::Node(text), value);
     return value;
   }
-  /// Containers see the host's folder of services under its usual name.
-  [[nodiscard]] fs::path place(const fs::path& path) const {
-    const auto inside = path.lexically_relative(kContainerHome);
-    return home / (containers && !inside.empty() && *inside.begin() != ".." ? inside : path);
-  }
+  [[nodiscard]] fs::path place(const fs::path& path) const { return place_on_host(path, home, containers); }
 };
 
 std::string megabytes(double mb) {
@@ -88,6 +84,11 @@ std::vector<DiskNeed> needs_of(const Host& host) {
 }
 
 }  // namespace
+
+fs::path place_on_host(const fs::path& path, const fs::path& home, bool containers) {
+  const auto inside = path.lexically_relative(kContainerHome);
+  return home / (containers && !inside.empty() && *inside.begin() != ".." ? inside : path);
+}
 
 std::vector<DiskNeed> disk_needs(const Manifest& manifest, const TrainHost& host, const fs::path& root) {
   Host all{manifest.settings, {}, manifest.containers, HostFolder(root).home()};

@@ -16,6 +16,11 @@ struct DiskNeed {
   std::string what;              // "150 MB of recordings (recorder.quota_mb)"
 };
 
+/// Where a service's path lies on the computer whose folder of services is `home`: containers see that folder under its
+/// usual name.
+std::filesystem::path place_on_host(const std::filesystem::path& path, const std::filesystem::path& home,
+                                    bool containers);
+
 /// Of what `host` will run with its files below `root`.
 std::vector<DiskNeed> disk_needs(const Manifest& manifest, const TrainHost& host, const std::filesystem::path& root);
 /// Of what was brought up on this computer; with nothing brought up, of a host that does everything as settings begin.
