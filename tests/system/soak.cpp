@@ -12,6 +12,8 @@ constexpr double kPeriodS = 10;
 constexpr double kSettleShare = 0.2;  // of the time: caches and histories fill
 constexpr double kGrowthMbPerHour = 5;
 constexpr double kLatencyMsPerHour = 5;
+constexpr double kStatePauseS = 0.35;  // as when something breaks
+constexpr double kReportPauseS = 2;
 
 /// Least squares.
 struct Line {
@@ -85,6 +87,7 @@ struct Watched {
   uint32_t pid = 0;
   int restarts = 0;
   uint64_t dropped = 0;
+  bool silent = true;  // at the last look
 };
 
 bool print(const std::map<std::string, Watched>& all, const Heard& heard, double ridden_s) {
@@ -100,15 +103,21 @@ bool print(const std::map<std::string, Watched>& all, const Heard& heard, double
     const auto latency = one.latency_ms.line();
     const bool grows = memory.slope_per_hour - 2 * memory.sigma > kGrowthMbPerHour ||
                        latency.slope_per_hour - 2 * latency.sigma > kLatencyMsPerHour;
-    good = good && !grows && one.restarts == 0;
+    good = good && !grows && !one.silent && one.restarts == 0;
     std::printf(
         "%-24s %6.1f to %6.1f, %+5.2f +- %4.2f  %6.1f to %6.1f, %+6.2f +- %4.2f  %8.2f %8.2f %8.2f %8llu %8d%s\n",
         name.c_str(), memory.first, memory.last, memory.slope_per_hour, memory.sigma, latency.first, latency.last,
         latency.slope_per_hour, latency.sigma, one.usual_latency_ms.median(), one.latency_ms.median(),
-        one.cpu_percent.median(), static_cast<unsigned long long>(one.dropped), one.restarts, grows ? "  GROWS" : "");
+        one.cpu_percent.median(), static_cast<unsigned long long>(one.dropped), one.restarts,
+        one.silent ? "  SILENT"
+        : grows    ? "  GROWS"
+                   : "");
   }
+  std::printf("reports lost: %llu in the train, %llu at the ground\n",
+              static_cast<unsigned long long>(heard.reports_lost), static_cast<unsigned long long>(heard.ground_lost));
   std::fflush(stdout);
-  return good && heard.outside == 0;
+  return good && heard.state_gap_s <= kStatePauseS && heard.report_gap_s <= kReportPauseS &&
+         heard.outside + heard.reports_lost + heard.ground_lost == 0;
 }
 
 }  // namespace
@@ -120,10 +129,11 @@ int soak(Rig& rig, Observer& observer, double minutes) {
   for (double at_s = 0; at_s < 60 * minutes; at_s += kPeriodS) {
     observer.run(kPeriodS);
     for (const auto& name : rig.services()) {
-      const auto* seen = observer.service(name);
-      if (seen == nullptr) continue;
-      const auto& status = seen->status;
       auto& one = all[name];
+      const auto* seen = observer.service(name);
+      one.silent = seen == nullptr || !seen->alive;
+      if (one.silent) continue;
+      const auto& status = seen->status;
       if (one.pid != 0 && one.pid != status.pid()) ++one.restarts;
       one.pid = status.pid();
       one.dropped = status.dropped();
