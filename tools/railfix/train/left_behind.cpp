@@ -5,6 +5,8 @@
 #include <set>
 #include <string>
 
+#include "train/stands_still.hpp"
+
 namespace railfix::tool {
 namespace {
 
@@ -12,18 +14,13 @@ namespace fs = std::filesystem;
 
 constexpr const char* kName = "fast_datasharing_";
 
-bool is_process(const fs::path& entry) {
-  const std::string name = entry.filename();
-  return std::all_of(name.begin(), name.end(), [](char c) { return c >= '0' && c <= '9'; });
-}
-
 /// Names of data sharing's files that somebody has mapped; false when that cannot be known.
 bool find_mapped(std::set<std::string>& names) {
-  std::error_code none;
-  for (const auto& entry : fs::directory_iterator("/proc", none)) {
-    if (!is_process(entry.path())) continue;
-    std::ifstream maps(entry.path() / "maps");
-    if (!maps && fs::exists(entry.path(), none)) return false;
+  for (const pid_t pid : processes()) {
+    const fs::path process = "/proc/" + std::to_string(pid);
+    std::ifstream maps(process / "maps");
+    std::error_code none;
+    if (!maps && fs::exists(process, none)) return false;
     for (std::string line; std::getline(maps, line);) {
       const size_t at = line.find(kName);
       if (at != std::string::npos) names.insert(line.substr(at, line.find(' ', at) - at));

@@ -8,8 +8,6 @@
 namespace railfix::tool {
 namespace {
 
-namespace fs = std::filesystem;
-
 constexpr const char* kBeside = "--beside";
 
 /// Every command that this host may have started.
@@ -61,10 +59,8 @@ HostState running_on(const HostFolder& folder, const HostState& noted) {
     if (service.runs() && pids.insert(service.pid).second) processes[service_of(key)].push_back(service);
   }
   const auto known = known_services(folder);
-  std::error_code none;
-  for (const auto& process : fs::directory_iterator("/proc", none)) {
-    const auto pid = static_cast<pid_t>(std::atoll(process.path().filename().c_str()));
-    if (pid <= 0 || pids.contains(pid)) continue;
+  for (const pid_t pid : tool::processes()) {
+    if (pids.contains(pid)) continue;
     const auto command = command_of(pid);
     const auto usual = usual_command(command);
     const auto is = std::ranges::find(known, usual, &PlannedService::command);

@@ -11,6 +11,9 @@
 
 namespace railfix::tool {
 
+/// All that run now, as far as this one may see them.
+std::vector<pid_t> processes();
+
 /// At this moment none of its threads runs, waits for a processor or waits for a disk (proc(5),
 /// /proc/PID/task/TID/stat, field 3). False when there is no such process.
 bool stands_still(pid_t pid);
