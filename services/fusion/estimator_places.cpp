@@ -144,8 +144,9 @@ void Estimator::accept(const FixInput& fix) {
   watched(fix.kind == FixKind::curvature ? Source::curvature : Source::landmark).accept(fix.stamp_ns);
   off_path_.reset();
   track_doubt_.seen_here();
-  // A vague fix helps, but settles no doubt and is nothing to measure a distance from.
-  if (fix.kind == FixKind::curvature && fix.sigma_m > 2 * filter_.path_sigma_m()) return;
+  // A vague fix helps, but settles no doubt and is nothing to measure a distance from. Landmarks are sharp by
+  // themselves.
+  if (fix.kind != FixKind::landmark && fix.sigma_m > 2 * filter_.path_sigma_m()) return;
   fix_verdict_ = FixVerdict::used;
   refused_fix_.reset();
   doubt_m_ = doubt_behind_m_ = doubt_ahead_m_ = time_doubt_m_ = 0;

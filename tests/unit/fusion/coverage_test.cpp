@@ -182,6 +182,7 @@ struct CampaignRun {
   bool sightings = false;
   double landmarks_m = 600;
   bool gnss = true;
+  bool start_told = true;
 };
 
 // One run of railfix-measure-confidence.
@@ -193,6 +194,7 @@ size_t outside_in(const CampaignRun& run) {
   plan.sightings = run.sightings;
   plan.landmark_spacing_m = run.sightings ? 0 : run.landmarks_m;
   plan.gnss = run.gnss;
+  plan.start_told = run.start_told;
   plan.slip = run.sensor != Sensor::camera;  // as the campaign has it: no slip beside it
   const uint64_t seed = run.seed * 1'000'000 + run.number;
   core::Random random(seed * 77 + 5);
@@ -219,6 +221,14 @@ TEST(Coverage, TwoLandmarksThatAreOffAndAWheelThatIsBlamedForIt) {
 // wheel had counted, and a vague fix of the shape ended all doubt. 13 states were outside.
 TEST(Coverage, APlaceThatTheWrongSensorHadCountedIsNotSure) {
   EXPECT_EQ(outside_in({2001, 64, Sensor::wheel, FaultKind::stuck}), 0U);
+}
+
+// A false landmark over which the wheel was blamed, and then the search of the network, which places a train to 14 m:
+// it fits anywhere, and was taken for the confirmation. 540 states were outside, by up to 10.8 m.
+TEST(Coverage, AVaguePlaceOnTheNetworkConfirmsNothing) {
+  const CampaignRun run{
+      .seed = 2901, .number = 64, .sensor = Sensor::wheel, .kind = FaultKind::stuck, .start_told = false};
+  EXPECT_EQ(outside_in(run), 0U);
 }
 
 // The wheel had slipped, an IMU that does not know the speed any more finds it well again in the dark, and it slips on.
