@@ -1,6 +1,8 @@
 // What an operator may write into train.yaml, what is said of mistakes, and what each host gets.
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <fstream>
@@ -470,6 +472,28 @@ TEST_F(TrainFolder, AComputerThatIsNotSetUpIsTold) {
     if (name.starts_with("net.")) ours >> equals >> value, set(name, value);
   }
   EXPECT_THAT(check_kernel(folder_), IsEmpty()) << "60-railfix.conf sets it";
+}
+
+TEST_F(TrainFolder, AClockThatSaysLessThanWhatIsThereIsWrong) {
+  constexpr int64_t kYearS = 365 * 86400;
+  const auto old = folder_ / "old.yaml";
+  const auto young = folder_ / "young.yaml";
+  for (const auto& file : {old, young}) std::ofstream(file) << "x";
+  fs::last_write_time(old, fs::last_write_time(young) - std::chrono::hours(48));
+  const int64_t now_s = time(nullptr);
+  EXPECT_THAT(check_clock_date({old, young, folder_ / "missing"}, now_s), IsEmpty());
+  EXPECT_THAT(check_clock_date({old, young}, now_s - 1800), IsEmpty()) << "written on another computer";
+  const auto found = check_clock_date({young, old}, 1'000'000'000);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_TRUE(found[0].error);
+  EXPECT_THAT(found[0].text, AllOf(HasSubstr("it says 2001-09-09 01:46 UTC, but " + young.string() + " is of 20"),
+                                   HasSubstr("chronyc makestep"), HasSubstr("touch " + young.string())));
+  const auto train = manifest(kTrain).value();
+  const timespec next_year[2]{{now_s + kYearS, 0}, {now_s + kYearS, 0}};
+  ASSERT_EQ(utimensat(AT_FDCWD, (folder_ / "train.yaml").c_str(), next_year, 0), 0);
+  std::vector<std::string> texts;
+  for (const auto& finding : check_computer(&train, train.host("cab"), folder_)) texts.push_back(finding.text);
+  EXPECT_THAT(texts, Contains(AllOf(HasSubstr("clock is wrong"), HasSubstr("train.yaml"))));
 }
 
 TEST_F(TrainFolder, DisksOfTheRootAndOfRecordingsAreLookedAt) {

@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ctime>
 #include <fstream>
 #include <map>
 
 #include "core/kernel_clock.hpp"
+#include "core/time.hpp"
 #include "messaging/network.hpp"
 #include "train/disk_need.hpp"
 #include "train/findings.hpp"
@@ -20,6 +22,7 @@ namespace fs = std::filesystem;
 
 constexpr double kPicturesMb = 512;  // histories of two cameras
 constexpr double kSharedMemoryMb = 16;
+constexpr int64_t kClocksMayDifferS = 3600;  // of who wrote train.yaml elsewhere
 
 std::string rounded(double mb) {
   return std::to_string(static_cast<int64_t>(mb));
@@ -42,10 +45,28 @@ void check_shared_memory(bool pictures, Findings& findings) {
                         "fast_datasharing_* there when no service runs");
 }
 
-void check_clock(Findings& findings) {
-  if (!core::clock_error_ns())
-    warning(findings,
-            "this computer's clock is not disciplined (chrony or PTP): stamps of two hosts cannot be compared");
+std::string utc(int64_t time_s) {
+  const time_t time = time_s;
+  tm parts{};
+  char text[32];
+  std::strftime(text, sizeof text, "%Y-%m-%d %H:%M UTC", gmtime_r(&time, &parts));
+  return text;
+}
+
+void check_clock_keeper(bool several_hosts, Findings& findings) {
+  if (core::clock_error_ns()) return;
+  warning(findings, std::string("nobody keeps this computer's clock (chronyd, or ptp4l with phc2sys): reports and "
+                                "recordings may carry wrong times") +
+                        (several_hosts ? ", and stamps of two hosts cannot be compared" : ""));
+}
+
+// What cannot be of the future: this program, the manifest, what was brought up here last.
+std::vector<fs::path> dated_files(const Manifest* manifest, const HostFolder& folder) {
+  std::vector<fs::path> files{"/proc/self/exe"};
+  if (manifest != nullptr) files.push_back(manifest->folder / "train.yaml");
+  if (const int newest = folder.newest_generation(); newest > 0)
+    files.push_back(folder.generation(newest) / "plan.yaml");
+  return files;
 }
 
 // The folder, or the one above it that is there: where its disk will be.
@@ -136,6 +157,22 @@ std::vector<Finding> check_kernel(const fs::path& proc_sys) {
   return findings;
 }
 
+std::vector<Finding> check_clock_date(const std::vector<fs::path>& files, int64_t now_s) {
+  fs::path newest;
+  int64_t made_s = now_s + kClocksMayDifferS;
+  for (const auto& file : files) {
+    struct stat found {};
+    if (stat(file.c_str(), &found) != 0 || found.st_mtime <= made_s) continue;
+    made_s = found.st_mtime;
+    std::error_code none;
+    newest = fs::is_symlink(file, none) ? fs::read_symlink(file, none) : file;
+  }
+  if (newest.empty()) return {};
+  return {{true, "this computer's clock is wrong: it says " + utc(now_s) + ", but " + newest.string() + " is of " +
+                     utc(made_s) + "; set it (chronyc makestep, or date --set), otherwise reports and recordings " +
+                     "carry wrong times. If the clock is right: touch " + newest.string()}};
+}
+
 std::vector<Finding> check_computer(const Manifest* manifest, const TrainHost* host, const fs::path& root) {
   Findings findings;
   const auto add = [&](std::vector<Finding> more) { findings.insert(findings.end(), more.begin(), more.end()); };
@@ -145,10 +182,10 @@ std::vector<Finding> check_computer(const Manifest* manifest, const TrainHost* h
     return one != nullptr && one->host == host->name;
   };
   check_shared_memory(runs("frame_grabber"), findings);
-  if (manifest == nullptr || manifest->hosts.size() > 1) {
-    add(check_kernel());
-    check_clock(findings);
-  }
+  const bool several_hosts = manifest == nullptr || manifest->hosts.size() > 1;
+  if (several_hosts) add(check_kernel());
+  add(check_clock_date(dated_files(manifest, HostFolder(fs::absolute(root))), core::wall_ns() / core::kNsPerSecond));
+  check_clock_keeper(several_hosts, findings);
   check_disks(manifest == nullptr || host == nullptr ? installed_disk_needs(HostFolder(fs::absolute(root)))
                                                      : disk_needs(*manifest, *host, fs::absolute(root)),
               findings);
