@@ -2,9 +2,13 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sched.h>
+#include <sys/mount.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <fstream>
 
 #include "recorder/recorder_config.hpp"
@@ -472,6 +476,38 @@ TEST_F(TrainFolder, AComputerThatIsNotSetUpIsTold) {
     if (name.starts_with("net.")) ours >> equals >> value, set(name, value);
   }
   EXPECT_THAT(check_kernel(folder_), IsEmpty()) << "60-railfix.conf sets it";
+}
+
+TEST_F(TrainFolder, AnAddressThatThisComputerHasNotIsTold) {
+  const auto told = [&](const std::string& address) {
+    const auto train = manifest(kTrain, "10.42.1.11", address).value();
+    std::vector<std::string> texts;
+    for (const auto& finding : check_computer(&train, train.host("cab"), folder_)) texts.push_back(finding.text);
+    return texts;
+  };
+  EXPECT_THAT(told("203.0.113.7"), Contains(AllOf(HasSubstr("host cab: "), HasSubstr("203.0.113.7"))));
+  EXPECT_THAT(told("127.0.0.1"), Not(Contains(HasSubstr("host cab: "))));
+}
+
+TEST_F(TrainFolder, SharedMemoryThatIsTooSmallForPicturesIsTold) {
+  if (geteuid() != 0) GTEST_SKIP() << "needs root, for a /dev/shm of its own";
+  const auto train = manifest(kTrain).value();
+  const auto told_with = [&](const char* size) {
+    const pid_t child = fork();
+    if (child == 0) {
+      const bool own = unshare(CLONE_NEWNS) == 0 && mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0 &&
+                       mount("tmpfs", "/dev/shm", "tmpfs", 0, size) == 0;
+      const auto findings = check_computer(&train, train.host("cab"), folder_);
+      const bool told = std::ranges::any_of(
+          findings, [](const auto& finding) { return finding.error && finding.text.starts_with("/dev/shm has "); });
+      _exit(!own ? 2 : told ? 1 : 0);
+    }
+    int status = 0;
+    waitpid(child, &status, 0);
+    return WEXITSTATUS(status);
+  };
+  EXPECT_EQ(told_with("size=64M"), 1);
+  EXPECT_EQ(told_with("size=1G"), 0);
 }
 
 TEST_F(TrainFolder, AClockThatSaysLessThanWhatIsThereIsWrong) {
