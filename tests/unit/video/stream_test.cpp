@@ -47,7 +47,7 @@ class StreamTest : public railfix::testing::TemporaryFolder {
     return frame.ok() && frame.value() ? frame.value()->pixels.clone() : cv::Mat();
   }
   /// How many pictures come, and what then happens.
-  static std::pair<int, std::string> play(core::Result<std::unique_ptr<Stream>> opened) {
+  static std::pair<int, std::string> play(core::Result<std::unique_ptr<VideoStream>> opened) {
     if (!opened.ok()) return {0, opened.error().message};
     for (int pictures = 0;; ++pictures) {
       const auto next = opened.value()->next(seconds(60));
