@@ -1,13 +1,10 @@
 // Raw bytes to the monitor's port: HTTP requests and, behind an upgrade, WebSocket frames. The first byte of the input
 // chooses. Every connection must come to its end, whatever was sent.
-#include <netinet/in.h>
-#include <sys/socket.h>
-#include <unistd.h>
-
 #include <string>
 
 #include "fuzz/fuzz_target.hpp"
 #include "monitor/http_server.hpp"
+#include "support/loopback.hpp"
 
 namespace railfix::monitor {
 
@@ -49,12 +46,8 @@ class Server {
 };
 
 void talk(uint16_t port, const std::string& bytes) {
-  const int connection = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  address.sin_port = htons(port);
-  fuzz::require(connect(connection, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0, "the server is there");
+  const int connection = test::tcp_socket();
+  fuzz::require(test::connect_to_loopback(connection, port), "the server is there");
   const timeval patience{60, 0};
   setsockopt(connection, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
   (void)send(connection, bytes.data(), bytes.size(), MSG_NOSIGNAL);

@@ -1,8 +1,5 @@
 // frame_grabber as a program with network cameras on the loopback: H.264, H.265 and JPEG over RTSP, JPEG over HTTP.
-#include <arpa/inet.h>
 #include <gst/rtsp-server/rtsp-server.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
 
 #include <array>
 #include <atomic>
@@ -12,6 +9,7 @@
 #include "core/time.hpp"
 #include "live_camera.hpp"
 #include "pictures/encode.hpp"
+#include "support/loopback.hpp"
 #include "video/gstreamer.hpp"
 #include "video/stream.hpp"
 
@@ -62,15 +60,8 @@ class RtspCamera {
 /// A web camera: one picture behind the other in one answer that does not end.
 class HttpCamera {
  public:
-  HttpCamera() : socket_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    socklen_t size = sizeof address;
-    bind(socket_, reinterpret_cast<sockaddr*>(&address), size);
+  HttpCamera() : socket_(test::tcp_socket()), port_(test::bind_to_loopback(socket_)) {
     listen(socket_, 4);
-    getsockname(socket_, reinterpret_cast<sockaddr*>(&address), &size);
-    port_ = ntohs(address.sin_port);
     thread_ = std::thread([this] { serve(); });
   }
   ~HttpCamera() {
@@ -109,7 +100,7 @@ class HttpCamera {
 
   std::array<std::atomic<int64_t>, kGreys> sent_ns_{};
   int socket_;
-  int port_ = 0;
+  int port_;
   std::atomic<bool> stop_ = false;
   std::thread thread_;
 };

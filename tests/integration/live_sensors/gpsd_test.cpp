@@ -1,8 +1,4 @@
 // sensor_gateway as a program with the real gpsd, which reads NMEA from a receiver on a pseudo-terminal.
-#include <arpa/inet.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
-
 #include <atomic>
 #include <cmath>
 #include <ctime>
@@ -10,6 +6,7 @@
 
 #include "core/time.hpp"
 #include "live_sensors.hpp"
+#include "support/loopback.hpp"
 
 namespace railfix {
 namespace {
@@ -79,19 +76,6 @@ class Receiver {
   std::thread thread_;
 };
 
-/// One that nobody listens on.
-int free_port() {
-  const int file = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t size = sizeof address;
-  bind(file, reinterpret_cast<sockaddr*>(&address), size);
-  getsockname(file, reinterpret_cast<sockaddr*>(&address), &size);
-  close(file);
-  return ntohs(address.sin_port);
-}
-
 class Gpsd : public LiveSensors {
  protected:
   void SetUp() override {
@@ -133,7 +117,7 @@ class Gpsd : public LiveSensors {
       EXPECT_NEAR(fix.alt_m(), 545.4, 0.1);
     }
   }
-  const int port_ = free_port();
+  const int port_ = test::free_port();
   const std::string socket_ = "/tmp/railfix-gpsd-" + std::to_string(getpid());
   const int64_t origin_ns_ = core::wall_ns() / kPeriodNs * kPeriodNs;
 };

@@ -1,11 +1,9 @@
 // A real Mosquitto for tests: on a free port of this machine, its sessions kept over a restart.
 #pragma once
 
-#include <netinet/in.h>
-#include <sys/socket.h>
-
 #include <optional>
 
+#include "support/loopback.hpp"
 #include "support/program.hpp"
 
 namespace railfix::test {
@@ -50,26 +48,9 @@ class Broker {
   [[nodiscard]] int port() const { return port_; }
 
  private:
-  static sockaddr_in local(int port) {
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    address.sin_port = htons(static_cast<uint16_t>(port));
-    return address;
-  }
-  static int free_port() {
-    const int socket_number = socket(AF_INET, SOCK_STREAM, 0);
-    auto address = local(0);
-    socklen_t length = sizeof address;
-    bind(socket_number, reinterpret_cast<sockaddr*>(&address), length);
-    getsockname(socket_number, reinterpret_cast<sockaddr*>(&address), &length);
-    close(socket_number);
-    return ntohs(address.sin_port);
-  }
   [[nodiscard]] bool accepts() const {
-    const int socket_number = socket(AF_INET, SOCK_STREAM, 0);
-    auto address = local(port_);
-    const bool connected = connect(socket_number, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0;
+    const int socket_number = tcp_socket();
+    const bool connected = connect_to_loopback(socket_number, port_);
     close(socket_number);
     return connected;
   }

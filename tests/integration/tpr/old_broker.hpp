@@ -2,27 +2,21 @@
 // words of the standard (3.1.1, 3.2.2.3: CONNACK with return code 1, then the connection ends).
 #pragma once
 
-#include <netinet/in.h>
 #include <poll.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
 #include <array>
 #include <atomic>
 #include <string>
 #include <thread>
 
+#include "support/loopback.hpp"
+
 namespace railfix::test {
 
 class OldBroker {
  public:
-  explicit OldBroker(int broker_port) : broker_port_(broker_port), door_(socket(AF_INET, SOCK_STREAM, 0)) {
-    auto address = local(0);
-    socklen_t length = sizeof address;
-    bind(door_, reinterpret_cast<sockaddr*>(&address), length);
-    getsockname(door_, reinterpret_cast<sockaddr*>(&address), &length);
+  explicit OldBroker(int broker_port) : broker_port_(broker_port), door_(tcp_socket()), port_(bind_to_loopback(door_)) {
     listen(door_, 4);
-    port_ = ntohs(address.sin_port);
     thread_ = std::thread([this] { serve(); });
   }
   ~OldBroker() {
@@ -41,13 +35,6 @@ class OldBroker {
   static constexpr size_t kVersionAt = 8;  // of CONNECT, behind "MQTT"; its length takes one byte here
   static constexpr uint8_t kVersion311 = 4;
 
-  static sockaddr_in local(int port) {
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    address.sin_port = htons(static_cast<uint16_t>(port));
-    return address;
-  }
   static bool readable(int from) {
     pollfd one{from, POLLIN, 0};
     return poll(&one, 1, kTurnMs) > 0;
@@ -75,9 +62,8 @@ class OldBroker {
     ++refused_;
   }
   void let_in(int client) {
-    const int broker = socket(AF_INET, SOCK_STREAM, 0);
-    auto address = local(broker_port_);
-    bool goes = connect(broker, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0;
+    const int broker = tcp_socket();
+    bool goes = connect_to_loopback(broker, broker_port_);
     while (goes && !ending_) {
       std::array<pollfd, 2> ends{{{client, POLLIN, 0}, {broker, POLLIN, 0}}};
       if (poll(ends.data(), ends.size(), kTurnMs) <= 0) continue;
@@ -95,7 +81,7 @@ class OldBroker {
 
   int broker_port_;
   int door_;
-  int port_ = 0;
+  int port_;
   std::atomic<int> refused_ = 0;
   std::atomic<bool> ending_ = false;
   std::thread thread_;
