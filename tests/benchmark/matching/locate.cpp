@@ -7,7 +7,7 @@
 #include <iostream>
 
 #include "core/units.hpp"
-#include "map_matcher/network_locator.hpp"
+#include "map_matcher/map_matcher_config.hpp"
 #include "matching.hpp"
 #include "support/sensed_ride.hpp"
 #include "track/import/build.hpp"
@@ -17,7 +17,6 @@ namespace railfix::measure {
 namespace {
 
 constexpr double kTripM = 5000;
-constexpr double kEveryM = 500;
 constexpr double kRightM = 50;
 constexpr double kMissed = 0.15;    // landmarks that are not sighted
 constexpr double kMapSigmaM = 1.0;  // ... and are so far from where the map has them
@@ -148,6 +147,7 @@ Trip run_trip(const Networks& networks, const track::Route& route, const Matchin
   map_matcher::NetworkLocator locator({}, networks.known);
   Trip trip;
   double looked_m = 0;
+  const double every_m = map_matcher::MapMatcherConfig{}.locate_every_m;
   constexpr double kStepM = 1.0;
   for (double m = first_m; m < first_m + kTripM; m += 20) {
     trip.turn_rad += std::abs(mapped.at(m + 20) - mapped.at(m));
@@ -168,7 +168,7 @@ Trip run_trip(const Networks& networks, const track::Route& route, const Matchin
       locator.sight({0, kind, 8, kind == track::LandmarkKind::frog ? 0.72 * side : 0, 0.2, 0.95});
     }
     const bool last = at_m + 1.5 * kStepM > kTripM;
-    if (!last && at_m - looked_m < kEveryM) continue;
+    if (!last && at_m - looked_m < every_m) continue;
     looked_m = at_m;
     trip.bound_m = std::min(trip.bound_m, bound_m(mapped, first_m, here_m, errors.step_turn_noise_rad));
     const double begin_s = processor_s();
