@@ -14,10 +14,18 @@ constexpr size_t kUsualSamples = 1024;
 constexpr double kSideM = 0.05;  // ground beside the head that it is compared with
 // The dark web beside a head draws the steepest place towards the head, by up to this.
 constexpr double kBiasPx = 0.05;
-// What is k times too bright for the camera swallows 1/2 - 1/(2k) of the pixel at its edge; k is 1 to 3 and unknown.
+// What is too bright for the camera swallows up to half of the pixel at its edge: by how much, the darker side tells
+// once the usual ratio of both is known, else nobody.
 constexpr double kSwallowedPx = 0.2;
 constexpr double kSwallowedSigmaPx = 0.2;
+constexpr double kKnownSwallowedSigmaPx = 0.1;
 constexpr double kBurntOutGrey = 245;
+constexpr double kWhiteGrey = 255;
+constexpr double kNearlyWhiteGrey = 210;  // single pixels of it are burnt out already
+constexpr double kClearGrey = 60;         // of the brighter side; less is noise and what the camera calls black
+constexpr double kNoGlint = 0.8;    // of white; a head that the ratio says is darker, and is white, mirrors the sun
+constexpr int kFewestLearnt = 100;  // edges
+constexpr int kRemembered = 4000;
 
 /// Bilinear; the caller keeps it inside.
 double sample(const cv::Mat& grey, double u, double v) {
@@ -38,7 +46,8 @@ bool inside(const cv::Mat& grey, const Eigen::Vector2d& pixel) {
 struct Crossing {
   double at = 0;
   double contrast = 0;
-  bool burnt_out = false;  // the brighter side of the edge
+  double brighter = 0;  // grey levels of the edge's sides
+  double darker = 0;
 };
 
 /// The band that stands out most on both sides, then the steepest step at its inner side.
@@ -77,12 +86,27 @@ std::optional<Crossing> find_crossing(const EdgeProfile& profile, double head, d
   const double bend = before - 2 * peak_value + after;
   const double shift = bend < 0 ? std::clamp(0.5 * (before - after) / bend, -1.0, 1.0) : 0.0;
   // Border between samples peak - 1 and peak.
-  const double brighter =
-      sign > 0 ? profile.mean(peak + 1, peak + 1 + crown_n) : profile.mean(peak - 1 - side_n, peak - 1);
-  return Crossing{peak + shift - 0.5, best_contrast, brighter > kBurntOutGrey};
+  const double head_grey = profile.mean(peak + 1, peak + 1 + crown_n);
+  const double side_grey = profile.mean(peak - 1 - side_n, peak - 1);
+  return Crossing{peak + shift - 0.5, best_contrast, std::max(head_grey, side_grey), std::min(head_grey, side_grey)};
 }
 
 }  // namespace
+
+void EdgeBrightness::learn(const RailEdge& edge) {
+  if (edge.brighter < kClearGrey || edge.brighter > kNearlyWhiteGrey || edge.darker < 1) return;
+  count_ = std::min(count_ + 1, kRemembered);
+  log_ratio_ += (std::log(edge.brighter / edge.darker) - log_ratio_) / count_;
+}
+
+// An edge is a ramp of one pixel from the darker to the brighter side; of what lies beyond white nothing is left, and
+// the steepest place is the middle of the rest.
+std::optional<double> EdgeBrightness::swallowed_px(double darker) const {
+  const double usually_brighter = darker * std::exp(log_ratio_);
+  if (count_ < kFewestLearnt || usually_brighter < kNoGlint * kWhiteGrey) return std::nullopt;
+  const double truly_brighter = std::max(kWhiteGrey, usually_brighter);
+  return 0.5 * (truly_brighter - kWhiteGrey) / std::max(1.0, truly_brighter - darker);
+}
 
 EdgeProfile::EdgeProfile() {
   values_.reserve(kUsualSamples);
@@ -130,7 +154,7 @@ const std::vector<RailEdge>& EdgeFinder::find(const cv::Mat& grey, const geometr
       const auto next = view.project(rail_point(shape, side, options.gauge_m, ahead_m * 1.01));
       if (!inner || !outer || !next) continue;
       RailEdge edge;
-      const auto look = find_at(grey, {*inner, *outer, *next}, options, edge);
+      const auto look = find_at(grey, {*inner, *outer, *next}, options, brightness_[rail(side, options.dark)], edge);
       if (look == Look::outside) continue;
       ++count;
       if (look == Look::unclear) continue;
@@ -142,8 +166,12 @@ const std::vector<RailEdge>& EdgeFinder::find(const cv::Mat& grey, const geometr
   return edges_;
 }
 
+void EdgeFinder::learn(bool dark) {
+  for (const auto& edge : edges_) brightness_[rail(edge.point.side, dark)].learn(edge);
+}
+
 EdgeFinder::Look EdgeFinder::find_at(const cv::Mat& grey, const Place& place, const EdgeOptions& options,
-                                     RailEdge& edge) {
+                                     const EdgeBrightness& brightness, RailEdge& edge) {
   const double head_px = (place.outer - place.inner).norm();
   if (head_px < options.smallest_head_px || !inside(grey, place.inner)) return Look::outside;
   const double px_per_m = head_px / options.head_m;
@@ -158,12 +186,19 @@ EdgeFinder::Look EdgeFinder::find_at(const cv::Mat& grey, const Place& place, co
       find_crossing(profile_, head_px / kStepPx, side_px / kStepPx, options.dark ? -1.0 : 1.0, options.min_contrast);
   if (!crossing) return Look::unclear;
   double at = crossing->at - before;
-  if (crossing->burnt_out) at += (options.dark ? -kSwallowedPx : kSwallowedPx) / kStepPx;
+  edge.point.bias_sigma_px = kBiasPx;
+  if (crossing->brighter > kBurntOutGrey) {
+    const auto known_px = brightness.swallowed_px(crossing->darker);
+    const double swallowed_px = known_px.value_or(kSwallowedPx);
+    at += (options.dark ? -swallowed_px : swallowed_px) / kStepPx;
+    edge.point.bias_sigma_px = known_px ? std::hypot(kBiasPx, kKnownSwallowedSigmaPx) : kSwallowedSigmaPx;
+  }
   edge.point.pixel = place.inner + outward * at;
-  edge.point.bias_sigma_px = crossing->burnt_out ? kSwallowedSigmaPx : kBiasPx;
   edge.point.sigma_px = std::hypot(kEdgeSigmaPx, kEdgeSigmaM * px_per_m);
   edge.offset_m = at * kStepPx / px_per_m;
   edge.contrast = crossing->contrast;
+  edge.brighter = crossing->brighter;
+  edge.darker = crossing->darker;
   return Look::found;
 }
 

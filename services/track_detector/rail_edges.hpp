@@ -1,7 +1,9 @@
 // Sub-pixel points of the inner edges of the rail heads, in the original picture, near where a first shape puts them.
 #pragma once
 
+#include <array>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <vector>
 
 #include "track_detector/rail_fit.hpp"
@@ -25,6 +27,21 @@ struct RailEdge {
   double ahead_m = 0;   // of the station; only as right as the shape it was looked for with
   double offset_m = 0;  // outwards from the expected place
   double contrast = 0;  // grey levels
+  double brighter = 0;  // grey level of the edge's brighter side, ...
+  double darker = 0;    // ... and of the other
+};
+
+/// How many times brighter the one side of an edge is than the other, learnt where the camera shows both. From it and
+/// the darker side follows by how much a burnt-out side is too bright for the camera.
+class EdgeBrightness {
+ public:
+  void learn(const RailEdge& edge);
+  /// How far the burnt-out side has swallowed the edge; unknown as long as nothing has been learnt.
+  [[nodiscard]] std::optional<double> swallowed_px(double darker) const;
+
+ private:
+  double log_ratio_ = 0;
+  int count_ = 0;
 };
 
 /// Grey levels across one rail; index 0 is innermost.
@@ -56,11 +73,22 @@ class EdgeFinder {
   };
   enum class Look : uint8_t { outside, unclear, found };
   /// The inner edge of one rail at one place; `edge` is set (but for side and ahead_m) when it is found.
-  Look find_at(const cv::Mat& grey, const Place& place, const EdgeOptions& options, RailEdge& edge);
+  Look find_at(const cv::Mat& grey, const Place& place, const EdgeOptions& options, RailEdge& edge) {
+    return find_at(grey, place, options, {}, edge);
+  }
+  /// The edges that find() gave last are rails.
+  void learn(bool dark);
+  /// What was learnt is of another place.
+  void forget() { brightness_ = {}; }
 
  private:
+  Look find_at(const cv::Mat& grey, const Place& place, const EdgeOptions& options, const EdgeBrightness& brightness,
+               RailEdge& edge);
+  [[nodiscard]] static size_t rail(Side side, bool dark) { return (side == Side::left ? 0U : 1U) + (dark ? 2U : 0U); }
+
   EdgeProfile profile_;
   std::vector<RailEdge> edges_;
+  std::array<EdgeBrightness, 4> brightness_;  // of the left and the right rail, bright and dark
 };
 
 }  // namespace railfix::track_detector

@@ -185,6 +185,7 @@ void TrackDetector::refine(const cv::Mat& grey, const TrackShape& start, bool da
   observation.near_m = edge_options.near_m;
   observation.far_m = edge_options.far_m;
   judge(*edges, tried, *result, observation);
+  if (observation.seen()) edge_finder_.learn(dark);
   if (observation.seen_left != observation.seen_right) keep_one_rail(*edges, observation);
   if (!observation.seen_left && !observation.seen_right) forget(observation);
 }

@@ -68,6 +68,7 @@ class TrackDetector {
     previous_.reset();
     misses_ = 0;
     usual_ = to_vector(mount_);
+    edge_finder_.forget();
   }
 
   [[nodiscard]] const geometry::Intrinsics& camera() const { return camera_; }

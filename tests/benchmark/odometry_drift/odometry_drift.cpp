@@ -27,6 +27,7 @@ struct Arguments {
   double speed_kmh = 72;
   double pitch_deg = 12;
   double focal_px = 1509;  // 8 mm and 5.3 um, as in paper 002
+  int width_px = 1280, height_px = 1024;
   std::string pose = "detected";
   double height_error_m = 0;
   double pitch_noise_rad = 0, pitch_bias_rad = 0, height_noise_m = 0, curvature_noise_per_m = 0;
@@ -51,6 +52,8 @@ void add_simulation(CLI::App& app, Arguments& a) {
   app.add_option("--rate-hz", simulation.rate_hz, "")->group("Simulation");
   app.add_option("--pitch-deg", a.pitch_deg, "")->group("Simulation");
   app.add_option("--focal-px", a.focal_px, "")->group("Simulation");
+  app.add_option("--width-px", a.width_px, "")->group("Simulation");
+  app.add_option("--height-px", a.height_px, "")->group("Simulation");
   app.add_option("--height-m", simulation.mount.height_m, "")->group("Simulation");
   app.add_option("--shake", simulation.shake.scale, "")->group("Simulation");
   app.add_option("--exposure-s", simulation.scenario.exposure.time_s, "")->group("Simulation");
@@ -140,7 +143,9 @@ std::unique_ptr<Scene> open_scene(Arguments& a) {
     simulation.map = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(a.map)));
   read_scenarios(a.scenarios, simulation);
   const auto lens = simulation.render.camera;
-  simulation.render.camera = {a.focal_px, a.focal_px, 639.5, 511.5, lens.k1, lens.k2, lens.p1, lens.p2, 1280, 1024};
+  simulation.render.camera = {
+      a.focal_px, a.focal_px, 0.5 * (a.width_px - 1), 0.5 * (a.height_px - 1), lens.k1, lens.k2, lens.p1, lens.p2,
+      a.width_px, a.height_px};
   simulation.mount.pitch_rad = core::rad_from_deg(a.pitch_deg);
   simulation.run.cruise_mps = core::mps_from_kmh(a.speed_kmh);
   simulation.run.brake_mps2 = simulation.run.accelerate_mps2;
