@@ -55,6 +55,7 @@ void Estimator::rebase_clock(int64_t stamp_ns) {
 void Estimator::apply(const Event& event) {
   slip_began_ = false;
   fix_verdict_ = FixVerdict::none;
+  fix_offer_ = {};
   notice_gap(std::visit([](const auto& input) { return input.stamp_ns; }, event));
   std::visit(
       [this](const auto& input) {
@@ -136,6 +137,7 @@ void Estimator::place_like(const Estimator& other) {
   time_doubt_m_ = std::max(time_doubt_m_, other.time_doubt_m_);
   unwatched_ = other.unwatched_;
   reference_ = other.reference_;
+  landmarks_agreed_ = other.landmarks_agreed_;
 }
 
 // Nothing from any sensor for a while: the clock may have been set forward. What counts way over the gap tells.

@@ -101,6 +101,10 @@ class Estimator {
   /// Used against the filter's word, because the one before, which was refused, says the same.
   [[nodiscard]] bool fix_corrected() const { return fix_verdict_ == FixVerdict::corrected; }
   [[nodiscard]] bool fix_refused() const { return fix_verdict_ == FixVerdict::refused; }
+  /// How far beyond `excused_m` it was from where it was expected, in standard deviations.
+  [[nodiscard]] double fix_sigmas_off(double excused_m) const;
+  /// So many landmarks in a row say that it is here.
+  [[nodiscard]] int landmarks_agreed() const { return landmarks_agreed_; }
 
   /// When the last event showed that the wheel slips: what it said since a little before is best taken back.
   [[nodiscard]] bool slip_began() const { return slip_began_; }
@@ -227,6 +231,8 @@ class Estimator {
   SuddenChange sudden_change_;
   bool slip_began_ = false;
   FixVerdict fix_verdict_ = FixVerdict::none;
+  Offer fix_offer_;           // of the last fix
+  int landmarks_agreed_ = 0;  // in a row
   std::optional<RefusedFix> refused_fix_;
   int gnss_agreed_ = 0;     // in a row
   bool corrected_ = false;  // the place was moved against the filter's word, not confirmed yet

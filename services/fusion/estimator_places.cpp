@@ -111,14 +111,20 @@ void Estimator::use(const FixInput& fix) {
   const bool again = fix.landmark != 0 && fix.landmark == reference_ && std::abs(filter_.since_reference_m()) < 50;
   const double sigma_m = std::hypot(fix.sigma_m, parameters_->fix_sigma_floor_m) * (again ? 3.0 : 1.0);
   const auto lasting = fix.kind == FixKind::curvature ? std::optional(StateIndex::shape_error) : std::nullopt;
-  const auto offer = offer_place({*path_distance_m, sigma_m, lasting});
-  if (offer.used) {
+  fix_offer_ = offer_place({*path_distance_m, sigma_m, lasting});
+  if (fix_offer_.used) {
     corrected_ = false;
     accept(fix);
+    if (fix_used() && fix.kind == FixKind::landmark && !again) ++landmarks_agreed_;
   } else {
     ++watch.refused;
-    refuse(fix, *path_distance_m, offer);
+    refuse(fix, *path_distance_m, fix_offer_);
   }
+}
+
+double Estimator::fix_sigmas_off(double excused_m) const {
+  const double off_m = std::abs(fix_offer_.residual);
+  return off_m > excused_m ? std::sqrt(fix_offer_.nis) * (1 - excused_m / off_m) : 0;
 }
 
 // Where more is in doubt than a vague fix leaves open, it says where the train is and not the filter, which is too
@@ -172,6 +178,7 @@ void Estimator::refuse(const FixInput& fix, double path_distance_m, const Offer&
       // Either side: what told where to look for these two was wrong by as much. Until a third one agrees.
       doubt_behind_m_ = doubt_ahead_m_ = std::abs(offer.residual) + parameters_->interval_factor * fix.sigma_m;
       fix_verdict_ = FixVerdict::corrected;
+      landmarks_agreed_ = 2;
       return;
     }
   }

@@ -2,15 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <iterator>
 #include <utility>
 
 #include "core/time.hpp"
+#include "fusion/jump_evidence.hpp"
 
 namespace railfix::fusion {
 namespace {
 
 constexpr int kFixesToSettle = 2;
+constexpr int kFixesOfAClaim = 2;  // move the train against the filter
 constexpr double kSureFix = 0.99;
 constexpr double kRivalGoneS = 1.0;
 constexpr double kProofS = 2.0;
@@ -100,8 +103,7 @@ void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
   main_.contradicted_by(std::max(most.behind_m, most.ahead_m));
   main_.apply(event);
   main_.contradicted_by(0);
-  std::vector<Doubter> doubters_before;
-  if (main_.fix_refused() || told_by_others(fix)) doubters_before = doubters_;
+  std::vector<Doubter> doubters_before = doubters_;
   for (auto& doubter : doubters_) {
     if (!doubter.leaves_out(fix)) doubter.estimator.apply(event);
   }
@@ -112,8 +114,12 @@ void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
   if (main_.fix_refused()) {
     if (adopt_by_fix(fix, before, doubters_before) || !adopt_doubter(fix, std::move(doubters_before))) return;
   } else if (main_.fix_used()) {
-    auto without_both = without_two(fix, doubters_before);
-    settle_doubters(fix, std::move(before), std::move(without_both));
+    auto without = without_two(fix, doubters_before);
+    without.push_back(without_one(fix, std::move(before), most));
+    if (std::ranges::none_of(doubters_, [&](const Doubter& doubter) { return doubter.leaves_out(fix); })) {
+      settle_doubters(fix, doubters_before);
+      if (!fix.new_path) std::ranges::move(without, std::back_inserter(doubters_));
+    }
   } else {
     return;
   }
@@ -121,17 +127,29 @@ void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
 }
 
 // The fix contradicts an earlier one and agrees with what is known without that one. Without that one less is known, so
-// the fix may agree by chance: the interval holds what is known without either, too.
+// the fix may agree by chance: the interval holds what is known without either, too. One that more landmarks have
+// outvoted comes back when as many speak for it.
 bool Hypotheses::adopt_doubter(const FixInput& fix, std::vector<Doubter> before) {
-  const auto fits = std::find_if(doubters_.rbegin(), doubters_.rend(), [](const Doubter& doubter) {
-    return doubter.estimator.fix_used() && !doubter.estimator.fix_corrected();
-  });
+  const auto fits = std::find_if(doubters_.rbegin(), doubters_.rend(), std::mem_fn(&Doubter::fits));
   if (fits == doubters_.rend()) return false;
+  if (fits->against > kFixesOfAClaim) {
+    for (auto& doubter : doubters_) doubter.against -= doubter.fits() ? 1 : 0;
+    return false;
+  }
   auto& without_it = before[static_cast<size_t>(doubters_.rend() - fits) - 1];
   Doubter without_both{std::move(without_it.estimator), fix.landmark, fix.kind == FixKind::curvature};
   std::swap(main_, fits->estimator);
   doubters_ = {Doubter{std::move(fits->estimator)}, std::move(without_both)};
   return true;
+}
+
+Hypotheses::Doubter Hypotheses::without_one(const FixInput& fix, Estimator before, const Excess& most) const {
+  Doubter doubter{std::move(before), fix.landmark, fix.kind == FixKind::curvature};
+  const Interval slip = doubter.estimator.widened({});
+  doubter.excused_m = std::max({most.behind_m, most.ahead_m, -slip.behind_m, slip.ahead_m});
+  doubter.confirmed_by = doubter.estimator.landmarks_agreed();
+  doubter.against = main_.fix_corrected() ? kFixesOfAClaim : 1;
+  return doubter;
 }
 
 std::vector<Hypotheses::Doubter> Hypotheses::without_two(const FixInput& fix,
@@ -140,23 +158,41 @@ std::vector<Hypotheses::Doubter> Hypotheses::without_two(const FixInput& fix,
   if (!told_by_others(fix)) return without;
   for (size_t i = 0; i < before.size(); ++i) {
     const auto& now = doubters_[i];
-    if (now.of_shape || now.of_two || !now.estimator.fix_used() || now.estimator.fix_corrected()) continue;
-    without.push_back({before[i].estimator, fix.landmark, false, 0, true});
+    if (now.of_shape || now.of_two || !now.fits()) continue;
+    auto both = before[i];
+    both.landmark = fix.landmark;
+    both.of_two = true;
+    both.agreed = 0;
+    both.against = kFixesOfAClaim;
+    without.push_back(std::move(both));
   }
   return without;
 }
 
-// What the main one alone fits is confirmed. What both fit may be so by chance once, not twice.
-void Hypotheses::settle_doubters(const FixInput& fix, Estimator before, std::vector<Doubter> without_both) {
+void Hypotheses::settle_doubters(const FixInput& fix, const std::vector<Doubter>& before) {
+  std::vector<Doubter> open;
+  for (size_t i = 0; i < doubters_.size(); ++i) {
+    if (!fix.new_path && !settle(doubters_[i], before[i].estimator, fix)) open.push_back(std::move(doubters_[i]));
+  }
+  doubters_ = std::move(open);
+}
+
+// What the main one alone fits is confirmed, what both fit may be so by chance once, not twice. But where the doubter's
+// odometers cannot be so far off, and no single one of them either, landmarks may be wrong alike: it does without them
+// until they are too many for that, or GNSS speaks against it.
+bool Hypotheses::settle(Doubter& doubter, const Estimator& before, const FixInput& fix) const {
+  const bool contradicted = doubter.estimator.fix_refused() || doubter.estimator.fix_corrected();
   const bool of_shape = fix.kind == FixKind::curvature;
-  if (std::ranges::any_of(doubters_, [&](const Doubter& doubter) { return doubter.leaves_out(fix); })) return;
-  std::erase_if(doubters_, [&](Doubter& doubter) {
-    if (fix.new_path || doubter.estimator.fix_refused() || doubter.estimator.fix_corrected()) return true;
-    if (of_shape) return doubter.of_shape;
-    return doubter.of_shape || ++doubter.agreed >= kFixesToSettle;
-  });
-  std::ranges::move(without_both, std::back_inserter(doubters_));
-  if (!fix.new_path) doubters_.push_back({std::move(before), fix.landmark, of_shape});
+  if (doubter.of_shape) return of_shape || contradicted;
+  if (of_shape && !contradicted) return false;
+  const bool enough = contradicted || ++doubter.agreed >= kFixesToSettle;
+  const double sigmas = doubter.estimator.fix_sigmas_off(doubter.excused_m);
+  if (sigmas < kUnlikelySigmas) return enough;
+  const bool gnss_denies = before.watch(Source::gnss).isolated && !main_.watch(Source::gnss).isolated;
+  doubter.estimator = before;
+  doubter.against += of_shape ? 0 : 1;
+  const bool outvoted = landmark_evidence(doubter.against) >= evidence_to_settle(sigmas, doubter.confirmed_by);
+  return enough && (gnss_denies || outvoted);
 }
 
 void Hypotheses::confirm_rivals() {

@@ -3,12 +3,13 @@
 // The main one uses everything. Doubters do without one of the last two places that landmarks gave, which may be false
 // with full confidence, without both where the second was told by those before it, and without the last one of the
 // track's shape; the interval holds their ends until later fixes agree with the main one. When such a fix fits a
-// doubter alone, that becomes the main one, and the main one a doubter: either fix may be the false one. Four rivals do
-// without camera, wheel, IMU or GNSS: the interval holds their ends too (solution separation, as in receiver autonomous
-// integrity monitoring: Brown and McBurney 1988), because a fault may be too slow for any test on innovations. A rival
-// that contradicts itself, or has no odometer left, is not asked; what it said last is carried along until a fix
-// confirms the main one. When the main one contradicts itself and one rival alone has two sensors that agree, or fits a
-// fix that the main one refuses, that rival becomes the main one.
+// doubter alone, that becomes the main one, and the main one a doubter: either fix may be the false one. Where no
+// odometer can be so far off as landmarks say, a doubter stays until they are too many to be wrong alike. Four rivals
+// do without camera, wheel, IMU or GNSS: the interval holds their ends too (solution separation, as in receiver
+// autonomous integrity monitoring: Brown and McBurney 1988), because a fault may be too slow for any test on
+// innovations. A rival that contradicts itself, or has no odometer left, is not asked; what it said last is carried
+// along until a fix confirms the main one. When the main one contradicts itself and one rival alone has two sensors
+// that agree, or fits a fix that the main one refuses, that rival becomes the main one.
 #pragma once
 
 #include <array>
@@ -67,7 +68,11 @@ class Hypotheses {
     bool of_shape = false;  // the fix is of kind curvature
     int agreed = 0;         // later fixes that both have used: these tell nothing of who is right
     bool of_two = false;    // also without the fix before that one
+    double excused_m = 0;   // one motion sensor alone, or a slip, may be wrong by so much
+    int confirmed_by = 0;   // landmarks before that fix
+    int against = 0;        // that fix and later ones that the main one alone fits
 
+    [[nodiscard]] bool fits() const { return estimator.fix_used() && !estimator.fix_corrected(); }
     [[nodiscard]] bool leaves_out(const FixInput& fix) const { return landmark != 0 && landmark == fix.landmark; }
   };
   struct Rival {
@@ -90,7 +95,9 @@ class Hypotheses {
   bool adopt_by_fix(const FixInput& fix, const Estimator& before, const std::vector<Doubter>& doubters);
   bool adopt_doubter(const FixInput& fix, std::vector<Doubter> before);
   [[nodiscard]] std::vector<Doubter> without_two(const FixInput& fix, const std::vector<Doubter>& before) const;
-  void settle_doubters(const FixInput& fix, Estimator before, std::vector<Doubter> without_both);
+  [[nodiscard]] Doubter without_one(const FixInput& fix, Estimator before, const Excess& most) const;
+  void settle_doubters(const FixInput& fix, const std::vector<Doubter>& before);
+  bool settle(Doubter& doubter, const Estimator& before, const FixInput& fix) const;
   void confirm_rivals();
   void exclude_faulty();
   void adopt(Rival& rival);

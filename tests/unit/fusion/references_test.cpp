@@ -135,6 +135,54 @@ TEST(References, AWrongSightingIsNotConfirmedByAnotherOfTheSameLandmark) {
   passage.run_to(3200);
 }
 
+// A place that six landmarks have confirmed, and camera and wheel, which agree, counted on from there.
+void run_over_right_ones(Passage& passage) {
+  for (int i = 1; i <= 6; ++i) {
+    passage.run_to(400.0 * i);
+    passage.sight(i % 2 == 0 ? 0.05 : -0.05);
+  }
+}
+
+// A mount that was knocked, signs that were moved: the odometers cannot have run so far ahead, so the interval holds
+// their place too.
+TEST(References, LandmarksInARowThatAreWrongAlikeAreHeld) {
+  for (const double wrong_m : {-3.0, 2.0, 3.0, 12.0}) {
+    Passage passage({.camera = 1.003, .wheel = 0.998});
+    run_over_right_ones(passage);
+    for (const double place_m : {2500.0, 2550.0, 2600.0, 2640.0, 2700.0, 2750.0}) {
+      passage.run_to(place_m);
+      passage.sight(wrong_m);
+    }
+    passage.run_to(2950);
+    EXPECT_GT(std::abs(passage.error_m()), 0.5 * std::abs(wrong_m));  // they were believed
+    for (const double place_m : {3000.0, 3050.0, 3100.0, 3150.0}) {
+      passage.run_to(place_m);
+      passage.sight(0.05);
+    }
+    EXPECT_LT(std::abs(passage.error_m()), 0.5) << wrong_m;
+  }
+}
+
+// However improbable it is that the odometers strayed: so many landmarks are right.
+TEST(References, ManyLandmarksSettleThatTheTrainIsElsewhere) {
+  auto fusion = fusion_at(0);
+  double t_s = 0;
+  uint32_t landmark = 0;
+  const auto width_behind = [&](int landmarks, double off_m, double apart_s) {
+    for (int i = 0; i < landmarks; ++i) {
+      run(fusion, t_s, t_s + apart_s, 20);
+      t_s += apart_s;
+      fusion.add(fix_at(t_s, 20 * t_s + off_m, ++landmark));
+    }
+    const auto state = run(fusion, t_s, t_s + 0.2, 20);
+    t_s += 0.2;
+    return state.over_m + state.under_m;
+  };
+  EXPECT_LT(width_behind(6, 0, 2.5), 4);
+  EXPECT_GT(width_behind(6, 6, 2.5), 6);
+  EXPECT_LT(width_behind(7, 6, 2.5), 4);
+}
+
 TEST(References, EverySecondSightingMayBeWrong) {
   Passage passage({.camera = 1.003});
   double place_m = 0;
