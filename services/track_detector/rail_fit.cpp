@@ -40,7 +40,8 @@ class RailPicture {
   bool at(double half_gauge_m, double inverse_m, Eigen::Vector2d& pixel, Eigen::Vector2d& along) {
     const double w = inverse_m;
     direction_ = {1.0, (half_gauge_m - p_(3)) * w + 0.5 * p_(5) / w + p_(7) / (6.0 * w * w),
-                  0.5 * p_(6) / w - p_(4) * w};
+                  0.5 * p_(6) / w - p_(4) * w + kTwistPerRateM * p_(7) * half_gauge_m};
+    half_gauge_m_ = half_gauge_m;
     const Eigen::Vector3d by_w(0.0, (half_gauge_m - p_(3)) - 0.5 * p_(5) / (w * w) - p_(7) / (3.0 * w * w * w),
                                -0.5 * p_(6) / (w * w) - p_(4));
     seen_ = rotation_ * direction_;
@@ -65,7 +66,7 @@ class RailPicture {
     j.col(4) = in_picture(rotation_.col(2) * -w);
     j.col(5) = in_picture(rotation_.col(1) * (0.5 / w));
     j.col(6) = in_picture(rotation_.col(2) * (0.5 / w));
-    j.col(7) = in_picture(rotation_.col(1) / (6.0 * w * w));
+    j.col(7) = in_picture(rotation_.col(1) / (6.0 * w * w) + rotation_.col(2) * (kTwistPerRateM * half_gauge_m_));
     return j;
   }
 
@@ -87,6 +88,7 @@ class RailPicture {
   Eigen::Matrix3d rotation_;
   std::array<Eigen::Matrix3d, 3> turn_;
   Eigen::Vector3d direction_ = Eigen::Vector3d::Zero();
+  double half_gauge_m_ = 0;  // of the last at()
   Eigen::Vector3d seen_ = Eigen::Vector3d::Zero();
 };
 
@@ -247,12 +249,11 @@ ShapeVector to_vector(const TrackShapeSigma& s) {
 }
 
 Eigen::Vector3d rail_point(const TrackShape& shape, Side side, double gauge_m, double ahead_m, double outward_m) {
-  const double half = gauge_m / 2 + outward_m;
+  const double beside_m = (side == Side::left ? 1 : -1) * (gauge_m / 2 + outward_m);
   const double x2 = ahead_m * ahead_m;
-  return {ahead_m,
-          (side == Side::left ? half : -half) + 0.5 * shape.curvature_per_m * x2 +
-              shape.curvature_rate_per_m2 * x2 * ahead_m / 6.0,
-          0.5 * shape.vertical_curvature_per_m * x2};
+  return {
+      ahead_m, beside_m + 0.5 * shape.curvature_per_m * x2 + shape.curvature_rate_per_m2 * x2 * ahead_m / 6.0,
+      0.5 * shape.vertical_curvature_per_m * x2 + kTwistPerRateM * shape.curvature_rate_per_m2 * ahead_m * beside_m};
 }
 
 void RailFitter::prepare(const geometry::Intrinsics& camera, const std::vector<EdgePoint>& points, double gauge_m) {

@@ -12,8 +12,8 @@ namespace railfix::track_detector {
 
 enum class Side { left, right };
 
-/// Camera against the track, and the rails Y = +-gauge/2 + beta X^2/2 + rate X^3/6, Z = alpha X^2/2 in track axes at
-/// the camera's foot.
+/// Camera against the track, and the rails Y = +-gauge/2 + beta X^2/2 + rate X^3/6, Z = alpha X^2/2 +- twist X gauge/2
+/// in track axes at the camera's foot. The twist is that of a cant ramp and follows the rate.
 struct TrackShape {
   geometry::CameraPose camera;
   double curvature_per_m = 0;           // beta, left positive
@@ -36,6 +36,13 @@ using ShapeVector = Eigen::Matrix<double, kShapeSize, 1>;
 ShapeVector to_vector(const TrackShape& shape);
 TrackShape to_shape(const ShapeVector& vector);
 ShapeVector to_vector(const TrackShapeSigma& sigma);
+
+/// Where the curvature changes so does the cant, and in the curve a rail that goes up and one that goes down look like
+/// a vertical curvature, of up to 1e-4 per metre. 40 m of cant per curvature are right for trains of 60 km/h that lean
+/// nowhere; faster lines have more. Twist per curvature rate: in a left curve the right rail is the higher one.
+constexpr double kCantPerCurvatureM = 40.0;
+constexpr double kHeadsApartM = 1.5;
+constexpr double kTwistPerRateM = -kCantPerCurvatureM / kHeadsApartM;
 
 /// Inner edge of a rail head at X, in track axes.
 Eigen::Vector3d rail_point(const TrackShape& shape, Side side, double gauge_m, double ahead_m, double outward_m = 0);

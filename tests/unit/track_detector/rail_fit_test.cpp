@@ -245,6 +245,33 @@ TEST(RailFit, AnOffsetOfAWholeRailWidensTheHeight) {
   EXPECT_NEAR(std::sqrt(worn.covariance(4, 4) - exact.covariance(4, 4)), expected_m, 0.2 * expected_m);
 }
 
+// The end of a left curve: the right rail, which was the higher one, comes down.
+TEST(RailFit, ACantRampIsNoVerticalCurve) {
+  const Intrinsics camera{755, 755, 319.5, 255.5, 0, 0, 0, 0, 640, 512};
+  TrackShape shape;
+  shape.camera = {0, rad_from_deg(8), 0, 0, 2.6};
+  shape.curvature_per_m = 0.0025;
+  shape.curvature_rate_per_m2 = -1.0 / 300 / 90;
+  constexpr double kCantM = 0.13;  // at a radius of 300 m, gone after 90 m
+  const double twist = kCantM / 90 / 1.5;
+  const View view(camera, shape.camera);
+  std::vector<EdgePoint> points;
+  for (const double side : {1.0, -1.0}) {
+    for (double x = 5; x < 17; x *= 1.03) {
+      const double beside_m = side * 1.435 / 2;
+      const double y = beside_m + shape.curvature_per_m * x * x / 2 + shape.curvature_rate_per_m2 * x * x * x / 6;
+      points.push_back({*view.project({x, y, twist * x * beside_m}), side > 0 ? Side::left : Side::right, 0.35});
+    }
+  }
+  RailFitOptions options;
+  options.prior.camera = shape.camera;
+  options.prior_sigma = {0.008, 0.008, 0.02, 0.10, 0.04, 0.003, 0.0005, 3e-5};
+  options.least_sigma_factor = 0.15;
+  const auto fit = fit_rails(camera, points, options.prior, options);
+  EXPECT_LT(std::abs(fit.shape.vertical_curvature_per_m), 1.5e-5);
+  EXPECT_LT(std::abs(fit.shape.camera.pitch_rad - shape.camera.pitch_rad), 2e-4);
+}
+
 TEST(RailFit, NoPointsGiveThePriorBack) {
   const CabCase cab;
   const auto fit = fit_rails(kCab, {}, cab.mount, cab.options);
