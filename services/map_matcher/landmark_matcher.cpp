@@ -17,8 +17,9 @@ constexpr int kScaleSteps = 4;         // to either side
 constexpr double kScaleStep = 0.6;     // sigmas
 constexpr double kScaleChanges = 0.3;  // share of the scale's sigma that differs from place to place
 constexpr double kOddM = 0.1;
-constexpr double kConfirmed = 1e-6;  // odds against the place behind three or four landmarks that fit, ...
-constexpr double kMostOdds = 1e3;    // ... and so many more bring it back when nothing has
+constexpr double kUnmappedReachM = 5000;  // over which a map lacks landmarks as it does here
+constexpr double kConfirmed = 1e-6;       // odds against the place behind three or four landmarks that fit, ...
+constexpr double kMostOdds = 1e3;         // ... and so many more bring it back when nothing has
 
 double gauss(double error, double sigma) {
   const double z = error / sigma;
@@ -36,6 +37,14 @@ bool other_side(const Sighting& sighting, const track::PathLandmark& landmark) {
 
 }  // namespace
 
+void UnmappedRate::learn(double place_m, double probability) {
+  const double way_m = std::max(0.0, place_m - last_m_.value_or(place_m));
+  const double kept = std::exp(-way_m / kUnmappedReachM);
+  count_ = kept * count_ + probability;
+  way_m_ = kept * way_m_ + way_m;
+  last_m_ = place_m;
+}
+
 // Every mapped landmark of the kind in the window is one hypothesis, weighed by how well the earlier sightings fit it;
 // that it stands elsewhere than the map says is another; the last one is that this sighting is false, weighed by the
 // mean fit over the window. A confidence below the usual is a chance for the sighting, not for each landmark in the
@@ -49,6 +58,7 @@ std::optional<Fix> LandmarkMatcher::add(const Sighting& sighting, const Prior& p
   const double from_m = expected_m - prior.over_m - margin_m;
   const double to_m = expected_m + prior.under_m + margin_m;
   std::erase_if(seen_, [&](const Seen& seen) { return std::abs(place_m - seen.place_m) > parameters_.history_m; });
+  for (Seen& seen : seen_) seen.unmapped_per_m = unmapped(seen.sighting.kind).per_m();
 
   const double confidence = std::clamp(sighting.confidence, 0.01, 0.999);
   std::vector<const track::PathLandmark*> candidates = near(sighting.kind, from_m, to_m);
@@ -56,7 +66,9 @@ std::optional<Fix> LandmarkMatcher::add(const Sighting& sighting, const Prior& p
   const double expected = std::max(1.0, parameters_.detection * static_cast<double>(candidates.size()));
   const double doubt = std::max(0.0, kUsualConfidence - confidence);
   const double earlier = mean_fit(from_m - place_m, to_m - place_m, place_m);
-  double here = earlier * (doubt * expected + parameters_.false_per_m * (to_m - from_m));
+  UnmappedRate& unmapped_rate = unmapped(sighting.kind);
+  const double nothing = earlier * (doubt * expected + unmapped_rate.per_m() * (to_m - from_m));
+  double here = nothing;
   const track::PathLandmark* best = nullptr;
   double best_weight = 0;
   for (const auto* landmark : candidates) {
@@ -74,11 +86,12 @@ std::optional<Fix> LandmarkMatcher::add(const Sighting& sighting, const Prior& p
     }
   }
   const double by_chance_per_m =
-      parameters_.false_per_m + parameters_.detection * mapped_per_m(sighting.kind, expected_m);
+      unmapped_rate.per_m() + parameters_.detection * mapped_per_m(sighting.kind, expected_m);
   const double elsewhere = odds_elsewhere_ * earlier * (to_m - from_m) * by_chance_per_m;
   const double sum = here + elsewhere;
   if (here > 0) odds_elsewhere_ = std::clamp(elsewhere / here, std::min(odds_elsewhere_, kConfirmed), kMostOdds);
   confirmed_ = confirmed_ || odds_elsewhere_ <= kConfirmed;
+  if (here > 0) unmapped_rate.learn(place_m, nothing / here);
   seen_.push_back({sighting, place_m});
   if (seen_.size() > kMostSightings) seen_.pop_front();
   if (best == nullptr || !(best_weight >= parameters_.min_probability * sum)) return std::nullopt;
@@ -135,7 +148,7 @@ double LandmarkMatcher::history_fits(double shift_m, double scale, double now_m)
 double LandmarkMatcher::sighting_fits(const Seen& seen, double path_m, double now_m) const {
   const auto mapped = near(seen.sighting.kind, path_m - kDensityReachM, path_m + kDensityReachM);
   const double per_m = static_cast<double>(mapped.size()) / (2 * kDensityReachM);
-  const double by_chance = parameters_.false_per_m + (1 - seen.sighting.confidence) * per_m;
+  const double by_chance = seen.unmapped_per_m + (1 - seen.sighting.confidence) * per_m;
   double density = by_chance;
   for (const auto* landmark : mapped) {
     if (other_side(seen.sighting, *landmark)) continue;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <deque>
+#include <map>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -14,7 +15,7 @@ namespace railfix::map_matcher {
 
 struct LandmarkParameters {
   double detection = 0.8;        // chance that a mapped landmark is sighted
-  double false_per_m = 0.0005;   // false sightings of one kind per metre
+  double false_per_m = 0.0005;   // false sightings of one kind per metre, where the map has all of them
   double moved = 0.03;           // chance that a landmark stands elsewhere than the map says, ...
   double moved_m = 6.0;          // ... by so much at most
   double elsewhere = 1e-3;       // chance that the train is not in the window: somebody has told its start wrongly
@@ -22,6 +23,24 @@ struct LandmarkParameters {
   double window_margin_m = 2.0;  // beyond the promised interval of train_state
   double history_m = 600;        // sightings further back are forgotten
   double min_probability = 0.5;  // of a fix that is worth sending
+};
+
+/// How many sightings of one kind a metre are of nothing on the map: false ones, and of what the map lacks (many have
+/// few masts). Learnt on the way: a Poisson rate with what is expected as its prior, forgotten over some kilometres.
+class UnmappedRate {
+ public:
+  explicit UnmappedRate(double expected_per_m) : expected_way_m_(1 / expected_per_m) {}
+  [[nodiscard]] double per_m() const { return (1 + count_) / (expected_way_m_ + way_m_); }
+  /// Another sighting; it is of nothing on the map with so much probability.
+  void learn(double place_m, double probability);
+  /// Places do not go on from those before.
+  void begin_way() { last_m_.reset(); }
+
+ private:
+  double expected_way_m_;
+  double count_ = 0;
+  double way_m_ = 0;
+  std::optional<double> last_m_;
 };
 
 class LandmarkMatcher {
@@ -41,6 +60,7 @@ class LandmarkMatcher {
   /// The travelled distance does not go on from the one before: earlier sightings say nothing any more.
   void forget() {
     seen_.clear();
+    for (auto& [kind, rate] : unmapped_) rate.begin_way();
     odds_elsewhere_ = parameters_.elsewhere / (1 - parameters_.elsewhere);
     confirmed_ = false;
   }
@@ -48,7 +68,8 @@ class LandmarkMatcher {
  private:
   struct Seen {
     Sighting sighting;
-    double place_m = 0;  // of the object in distance run
+    double place_m = 0;         // of the object in distance run
+    double unmapped_per_m = 0;  // of its kind, as it is known by now
   };
   /// How well all earlier sightings fit the map when path distance = distance run + shift, against chance; mean over
   /// the scales of the odometer, or at one.
@@ -62,12 +83,16 @@ class LandmarkMatcher {
   [[nodiscard]] std::vector<const track::PathLandmark*> near(track::LandmarkKind kind, double from_m,
                                                              double to_m) const;
   [[nodiscard]] bool sighted_before(track::LandmarkKind kind) const;
+  UnmappedRate& unmapped(track::LandmarkKind kind) {
+    return unmapped_.try_emplace(kind, parameters_.false_per_m).first->second;
+  }
   /// Of its place from another one's; `map_sigma_m` is that of either on the map.
   [[nodiscard]] double relative_sigma_m(const Seen& seen, double map_sigma_m, double now_m) const;
 
   LandmarkParameters parameters_;
   std::shared_ptr<const track::Path> path_;
   std::deque<Seen> seen_;
+  std::map<track::LandmarkKind, UnmappedRate> unmapped_;
   double odds_elsewhere_ = 0;  // against that it is in the window
   bool confirmed_ = false;
 };

@@ -71,7 +71,8 @@ struct MapMatcherConfig {
     fields.group("landmarks", "Matching of sightings.", [this](service::Fields& f) {
       auto& p = landmarks;
       f.number("detection", p.detection, {0.01, 0.999}, "", "Chance that a mapped landmark is sighted.");
-      f.number("false_per_m", p.false_per_m, {1e-7, 1}, "1/m", "False sightings of one kind per metre.");
+      f.number("false_per_m", p.false_per_m, {1e-7, 1}, "1/m",
+               "False sightings of one kind per metre. What the map lacks is learnt on the way.");
       f.number("moved", p.moved, {0, 0.5}, "", "Chance that a landmark stands elsewhere than the map says ...");
       f.number("moved_m", p.moved_m, {0.1, 100}, "m", "... by so much at most.");
       f.number("elsewhere", p.elsewhere, {0, 0.5}, "",

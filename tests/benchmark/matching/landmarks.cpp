@@ -32,7 +32,7 @@ struct Thing {
 };
 
 /// Pairs of balises every kilometre or so, masts every 40 to 65 m.
-std::vector<Thing> things_of(core::Random& random) {
+std::vector<Thing> things_of(core::Random& random, double masts_mapped) {
   std::vector<Thing> things;
   for (double m = 200; m < kLineM; m += random.uniform(400, 1600)) {
     for (const double balise_m : {m, m + 3}) {
@@ -46,6 +46,7 @@ std::vector<Thing> things_of(core::Random& random) {
   for (double m = 100; m < kLineM; m += random.uniform(40, 65)) {
     Thing thing{LandmarkKind::mast, m, m + 0.1 * random.normal()};
     if (random.uniform() < kMoved) thing.real_m += (random.uniform() < 0.5 ? -1 : 1) * random.uniform(1, 6);
+    if (masts_mapped < 1 && random.uniform() > masts_mapped) thing.mapped_m = NAN;
     things.push_back(thing);
   }
   return things;
@@ -111,8 +112,9 @@ struct Count {
 };
 
 /// told_off_m: the state is of a place so far away, as after a wrong start.
-void run_line(core::Random& random, double interval_m, double told_off_m, Count& balises, Count& masts) {
-  const auto things = things_of(random);
+void run_line(core::Random& random, double masts_mapped, double interval_m, double told_off_m, Count& balises,
+              Count& masts) {
+  const auto things = things_of(random, masts_mapped);
   map_matcher::LandmarkMatcher matcher({}, path_of(things));
   const double scale = 1 + 0.007 * random.normal();
   for (const Seen& seen : sightings_of(things, random)) {
@@ -145,7 +147,7 @@ int measure_landmarks(const MatchingOptions& options) {
       core::Random random(options.seed * 101 + 7);
       Count balises;
       Count masts;
-      for (int i = 0; i < count; ++i) run_line(random, interval_m, told_off_m, balises, masts);
+      for (int i = 0; i < count; ++i) run_line(random, options.masts_mapped, interval_m, told_off_m, balises, masts);
       std::printf("interval of the state +-%.0f m, %.0f m off, %d lines of %.0f km\n", interval_m, told_off_m, count,
                   kLineM / 1000);
       balises.print("balises");

@@ -12,8 +12,9 @@ constexpr const char* kUsage =
     "  switches   track choice over simulated passages of switches\n"
     "railfix-measure-matching curvature [--map FILE] [--count N] [--seed N]\n"
     "  curvature  wheel and gyro alone against a map, by default ../shared/data/alignment/sbb_mszw_a2.landxml\n"
-    "railfix-measure-matching landmarks [--count N] [--seed N]\n"
-    "  landmarks  which mapped landmark was sighted, with missed and false sightings and a map that is partly wrong\n"
+    "railfix-measure-matching landmarks [--count N] [--seed N] [--masts-mapped SHARE]\n"
+    "  landmarks  which mapped landmark was sighted, with missed and false sightings and a map that is partly wrong;\n"
+    "             --masts-mapped: the map has only so many of the masts\n"
     "railfix-measure-matching locate [--map FILE | --track-km KM] [--trips N] [--from N] [--seed N] [--map-error-m M]\n"
     "                         [--elsewhere SEED] [--each]\n"
     "  locate     the place without a prior, over trips of 5 km on a map or a made-up network; the real track wanders\n"
@@ -40,6 +41,8 @@ int main(int argc, char** argv) {
       options.track_km = std::atof(argv[++i]);
     } else if (std::strcmp(argv[i], "--map-error-m") == 0 && more) {
       options.map_error_m = std::atof(argv[++i]);
+    } else if (std::strcmp(argv[i], "--masts-mapped") == 0 && more) {
+      options.masts_mapped = std::atof(argv[++i]);
     } else if (std::strcmp(argv[i], "--elsewhere") == 0 && more) {
       options.elsewhere = std::strtoull(argv[++i], nullptr, 10);
     } else if (std::strcmp(argv[i], "--each") == 0) {
