@@ -44,7 +44,8 @@ void Estimator::rebase_clock(int64_t stamp_ns) {
   }
   accel_ = {};
   yaw_ = {};
-  wheel_.blocked_until_ns = wheel_.window_begin_ns = 0;
+  wheel_.blocks.clear();
+  wheel_.window_begin_ns = 0;
   filter_.doubt_way(filter_.value(StateIndex::speed) * kRebaseS);
   slip_watch_ = {};
   sudden_change_ = {};

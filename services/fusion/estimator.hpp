@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "fusion/fusion_parameters.hpp"
 #include "fusion/fusion_types.hpp"
@@ -108,8 +109,8 @@ class Estimator {
 
   /// When the last event showed that the wheel slips: what it said since a little before is best taken back.
   [[nodiscard]] bool slip_began() const { return slip_began_; }
-  /// Wheel samples up to this stamp are not to be used.
-  void block_wheel_until(int64_t stamp_ns) { wheel_.blocked_until_ns = stamp_ns; }
+  /// Wheel samples of that time are not to be used.
+  void block_wheel(const WheelBlock& block);
 
   /// Of the last event. The filter itself may be a little behind, because samples wait for their mean.
   [[nodiscard]] int64_t stamp_ns() const { return stamp_ns_; }
@@ -133,7 +134,7 @@ class Estimator {
     double last_m = 0;  // its reading
     double resolution_m = 0;
     bool scatters = false;
-    int64_t blocked_until_ns = 0;
+    std::vector<WheelBlock> blocks;
     int64_t window_begin_ns = 0;
     std::optional<double> window_m;  // its reading then
     int good_windows = 0;

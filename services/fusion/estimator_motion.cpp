@@ -106,6 +106,10 @@ void Estimator::compare_with_wheel(const OdometryInput& step, double sigma_m) {
   if (ratio_moved || ratio_impossible) isolate_wheel();
 }
 
+void Estimator::block_wheel(const WheelBlock& block) {
+  if (std::ranges::find(wheel_.blocks, block) == wheel_.blocks.end()) wheel_.blocks.push_back(block);
+}
+
 void Estimator::isolate_wheel() {
   watched(Source::wheel).isolate(stamp_ns_);
   wheel_.good_windows = 0;
@@ -129,7 +133,8 @@ void Estimator::use(const WheelInput& sample) {
   wheel_.resolution_m = wheel_.scatters ? sigma_m * std::sqrt(2.0) : 1 / sample.pulses_per_metre;
   slip_watch_.wheel(sample.stamp_ns, wheel_m);
   doubt_silent_wheel(before_ns, way_m);
-  if (sample.stamp_ns <= wheel_.blocked_until_ns) {
+  std::erase_if(wheel_.blocks, [&](const WheelBlock& block) { return block.until_ns < sample.stamp_ns; });
+  if (std::ranges::any_of(wheel_.blocks, [&](const WheelBlock& b) { return b.from_ns < sample.stamp_ns; })) {
     isolate_wheel();
     slip_began_ = false;
   }

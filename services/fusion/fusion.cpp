@@ -19,7 +19,6 @@ constexpr double kBesideM = 50.0;     // beyond the interval: what is further of
 constexpr double kNoCameraS = 0.3;
 constexpr int64_t kSnapshotNs = 50'000'000;
 constexpr int64_t kSlipUnseenNs = 1'200'000'000;  // a slip may have grown for so long before it is found
-constexpr int kMostRewinds = 3;                   // for slips found again while the time is replayed
 constexpr int kJumpsToBelieve = 3;
 constexpr size_t kBackwardToBelieve = 5;
 constexpr int64_t kSpacingNs = 10'000'000;  // of samples, about
@@ -190,6 +189,7 @@ std::optional<TrainEstimate> Fusion::set_clock_back() {
   now_->rebase_clock(first_ns - kSpacingNs);
   events_.clear();
   snapshots_.assign(1, *now_);
+  slips_.clear();
   replay_from_ns_.reset();
   newest_ns_.fill(0);
   ahead_in_row_.fill(0);
@@ -278,7 +278,7 @@ std::optional<TrainEstimate> Fusion::insert(const Event& event) {
 
 std::optional<TrainEstimate> Fusion::catch_up(std::ptrdiff_t wanted) {
   if (!replay_from_ns_) return std::nullopt;
-  const auto next = rewind_before(*replay_from_ns_);
+  const auto next = rewind_before(undo_slips_since(*replay_from_ns_));
   replay_from_ns_.reset();
   return run_from(next, wanted);
 }
@@ -286,18 +286,11 @@ std::optional<TrainEstimate> Fusion::catch_up(std::ptrdiff_t wanted) {
 // Gives the state after the wanted event.
 std::optional<TrainEstimate> Fusion::run_from(std::ptrdiff_t next, std::ptrdiff_t wanted) {
   std::optional<TrainEstimate> estimate;
-  int rewinds = 0;
   while (next < static_cast<std::ptrdiff_t>(events_.size())) {
     run(events_[static_cast<size_t>(next)]);
     if (next == wanted) estimate = now_->estimate();
     ++next;
-    if (now_->slip_began() && ++rewinds <= kMostRewinds) {
-      const int64_t found_ns = now_->stamp_ns();
-      const uint32_t slipping = now_->slipping();
-      next = rewind_before(found_ns - kSlipUnseenNs);
-      now_->block_wheel_until(found_ns, slipping);
-      snapshots_.back() = *now_;
-    }
+    if (now_->slip_began() && take_slip_back()) next = rewind_before(slips_.back().block.from_ns);
   }
   forget_old();
   return estimate;
@@ -312,10 +305,31 @@ void Fusion::run(const Event& event) {
   }
 }
 
+// False: it is taken back already, and was found again while the time was replayed.
+bool Fusion::take_slip_back() {
+  const int64_t found_ns = now_->stamp_ns();
+  if (!slips_.empty() && slips_.back().block.until_ns >= found_ns) return false;
+  slips_.push_back({{found_ns - kSlipUnseenNs, found_ns}, now_->slipping()});
+  return true;
+}
+
+// With a measurement of that stamp slips may be found at other moments: those since then are forgotten. Gives the stamp
+// from which on the time is to be replayed.
+int64_t Fusion::undo_slips_since(int64_t stamp_ns) {
+  while (!slips_.empty() && slips_.back().block.until_ns >= stamp_ns) {
+    stamp_ns = std::min(stamp_ns, slips_.back().block.from_ns);
+    slips_.pop_back();
+  }
+  return stamp_ns;
+}
+
 // Gives the index of the first event that is to be used again.
 std::ptrdiff_t Fusion::rewind_before(int64_t stamp_ns) {
   while (snapshots_.size() > 1 && snapshots_.back().stamp_ns() >= stamp_ns) snapshots_.pop_back();
   now_ = snapshots_.back();
+  for (const auto& slip : slips_) {
+    if (slip.block.until_ns > now_->stamp_ns()) now_->block_wheel(slip.block, slip.slipping);
+  }
   const auto again = std::find_if(events_.begin(), events_.end(),
                                   [&](const Event& event) { return stamp_of(event) > now_->stamp_ns(); });
   return again - events_.begin();
@@ -324,6 +338,7 @@ std::ptrdiff_t Fusion::rewind_before(int64_t stamp_ns) {
 void Fusion::forget_old() {
   const int64_t oldest_ns = now_->stamp_ns() - core::to_ns(parameters_->history_s);
   while (snapshots_.size() > 1 && snapshots_[1].stamp_ns() <= oldest_ns) snapshots_.pop_front();
+  std::erase_if(slips_, [&](const FoundSlip& slip) { return slip.block.until_ns <= snapshots_.front().stamp_ns(); });
   while (!events_.empty() && stamp_of(events_.front()) <= snapshots_.front().stamp_ns()) events_.pop_front();
 }
 

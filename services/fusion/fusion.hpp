@@ -56,6 +56,11 @@ class Fusion {
   [[nodiscard]] std::optional<OdometerScales> learnt_scales() const;
 
  private:
+  /// What it blocks follows from the stamps of the data before it, as does everything else.
+  struct FoundSlip {
+    WheelBlock block;
+    uint32_t slipping = 0;  // bits of those that found it
+  };
   Fusion(const FusionParameters& parameters, std::shared_ptr<const track::Map> map,
          std::shared_ptr<const track::Path> path, const std::optional<SavedScales>& saved);
   void begin(int64_t stamp_ns);
@@ -71,6 +76,8 @@ class Fusion {
   std::optional<TrainEstimate> run_from(std::ptrdiff_t next, std::ptrdiff_t wanted);
   void run(const Event& event);
   std::ptrdiff_t rewind_before(int64_t stamp_ns);
+  [[nodiscard]] bool take_slip_back();
+  int64_t undo_slips_since(int64_t stamp_ns);
   void forget_old();
   [[nodiscard]] bool due(const Event& event) const;
   std::optional<TrainEstimate> give(TrainEstimate estimate);
@@ -84,6 +91,7 @@ class Fusion {
   std::optional<ScaleTrial> now_;
   std::deque<Event> events_;               // by stamp, then kind
   std::deque<ScaleTrial> snapshots_;       // each has used all events up to its stamp
+  std::vector<FoundSlip> slips_;           // found within the history, in the order of their stamps
   std::optional<int64_t> replay_from_ns_;  // late events since then are not used yet
   FusionCounts counts_;
   int64_t last_output_ns_ = 0;

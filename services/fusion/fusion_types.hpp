@@ -68,6 +68,14 @@ struct PictureInput {
 /// In the order in which events of the same stamp are used.
 using Event = std::variant<ImuInput, WheelInput, PictureInput, OdometryInput, GnssInput, FixInput>;
 
+/// What the wheel said then is taken back: behind from_ns, up to until_ns, when its slip was found.
+struct WheelBlock {
+  int64_t from_ns = 0;
+  int64_t until_ns = 0;
+
+  bool operator==(const WheelBlock&) const = default;
+};
+
 enum class Source : uint8_t { camera, wheel, imu, gnss, landmark, curvature };
 constexpr int kSources = 6;
 inline constexpr std::array kMotionSources{Source::camera, Source::wheel, Source::imu};

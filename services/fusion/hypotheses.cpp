@@ -260,14 +260,14 @@ uint32_t Hypotheses::slipping() const {
   return bits;
 }
 
-void Hypotheses::block_wheel_until(int64_t stamp_ns, uint32_t slipping) {
+void Hypotheses::block_wheel(const WheelBlock& block, uint32_t slipping) {
   if ((slipping & 1U) != 0) {
-    main_.block_wheel_until(stamp_ns);
-    for (auto& doubter : doubters_) doubter.estimator.block_wheel_until(stamp_ns);
+    main_.block_wheel(block);
+    for (auto& doubter : doubters_) doubter.estimator.block_wheel(block);
   }
   for (size_t i = 0; i < rivals_.size(); ++i) {
     auto& estimator = rivals_[i].estimator;
-    if (estimator && (slipping & (2U << i)) != 0) estimator->block_wheel_until(stamp_ns);
+    if (estimator && (slipping & (2U << i)) != 0) estimator->block_wheel(block);
   }
 }
 

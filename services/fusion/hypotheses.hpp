@@ -43,8 +43,8 @@ class Hypotheses {
   void follow_on(const std::shared_ptr<const track::Path>& path, const std::shared_ptr<const track::Path>& longer);
   /// Which of the estimators have found that the wheel slips: a bit each.
   [[nodiscard]] uint32_t slipping() const;
-  /// Those do without wheel samples up to this stamp; what one has found says nothing of the others.
-  void block_wheel_until(int64_t stamp_ns, uint32_t slipping);
+  /// Those do without the wheel for that time; what one has found says nothing of the others.
+  void block_wheel(const WheelBlock& block, uint32_t slipping);
   [[nodiscard]] Promise promise() const;
   [[nodiscard]] TrainEstimate estimate(const Promise& promise) const;
   /// The last event was a fix that the main one used as it was (true), or not without giving something up (false).

@@ -138,9 +138,9 @@ uint32_t ScaleTrial::slipping() const {
   return main_.slipping() | (unlearnt_ ? unlearnt_->slipping() << kBitsOfOne : 0U);
 }
 
-void ScaleTrial::block_wheel_until(int64_t stamp_ns, uint32_t slipping) {
-  main_.block_wheel_until(stamp_ns, slipping);
-  if (unlearnt_) unlearnt_->block_wheel_until(stamp_ns, slipping >> kBitsOfOne);
+void ScaleTrial::block_wheel(const WheelBlock& block, uint32_t slipping) {
+  main_.block_wheel(block, slipping);
+  if (unlearnt_) unlearnt_->block_wheel(block, slipping >> kBitsOfOne);
 }
 
 TrainEstimate ScaleTrial::estimate() const {

@@ -27,7 +27,7 @@ class ScaleTrial {
   /// An estimator has found that the wheel slips.
   [[nodiscard]] bool slip_began() const;
   [[nodiscard]] uint32_t slipping() const;
-  void block_wheel_until(int64_t stamp_ns, uint32_t slipping);
+  void block_wheel(const WheelBlock& block, uint32_t slipping);
   /// The path below the train is longer now, and the same otherwise.
   void follow_on(const std::shared_ptr<const track::Path>& path, const std::shared_ptr<const track::Path>& longer);
   /// The saved scales are known to be of other sensors.
