@@ -21,8 +21,8 @@ constexpr double kEveryM = 1;  // of the way a state counts: a train that stands
 constexpr double kFrogSigmaM = 0.06;
 constexpr double kUnheard = 1e3;  // sigma of a sensor that is not there
 
-// As measured: drift up to 0.03 % over 26 km, 0.07 % in the mean over 100 m; frogs 0.05 to 0.06 m, portals 0.07 to
-// 0.19 m (docs/figures.md).
+// As measured: drift up to 0.03 % over 26 km, 0.07 % in the mean over 100 m; portals 0.07 to 0.19 m. Frogs as wear and
+// the map leave them.
 SimulationPlan plan_of(const SensorSet& row, double every_m) {
   SimulationPlan plan;
   plan.duration_s = 6000;

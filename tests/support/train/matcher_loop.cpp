@@ -10,7 +10,7 @@ using map_matcher::CurvatureOf;
 // As map_matcher has them by default.
 constexpr double kMatchEveryM = 5;
 constexpr double kLeastSpeedMps = 1;
-// Curvature from pictures: 9e-5 1/m rms where a sigma of 1.4e-4 is said (docs/figures.md, 26 km at 8 degrees).
+// Curvature from pictures: 9e-5 1/m rms where a sigma of 1.4e-4 is said, over 26 km at 8 degrees.
 constexpr double kSigmaPerM = 1.4e-4;
 constexpr double kWhitePerM = 7e-5;
 constexpr double kWanderPerM = 5e-5;
