@@ -24,7 +24,7 @@ constexpr double kFixedByRails = 6;  // unknowns that two curved rails fix; the 
 class RailPicture {
  public:
   RailPicture(const geometry::Intrinsics& camera, const ShapeVector& shape)
-      : fu_(camera.fu_px), fv_(camera.fv_px), p_(shape) {
+      : fu_(camera.fu_px), fv_(camera.fv_px), p_(shape), twist_(twist_of(shape(7))) {
     const geometry::CameraPose pose{p_(0), p_(1), p_(2), p_(3), p_(4)};
     rotation_ = geometry::rotation_camera_from_track(pose);
     // d/dangle of R = B Rx' Ry' Rz' is a rotation about an axis that the later turns have moved.
@@ -40,7 +40,7 @@ class RailPicture {
   bool at(double half_gauge_m, double inverse_m, Eigen::Vector2d& pixel, Eigen::Vector2d& along) {
     const double w = inverse_m;
     direction_ = {1.0, (half_gauge_m - p_(3)) * w + 0.5 * p_(5) / w + p_(7) / (6.0 * w * w),
-                  0.5 * p_(6) / w - p_(4) * w + kTwistPerRateM * p_(7) * half_gauge_m};
+                  0.5 * p_(6) / w - p_(4) * w + twist_.per_m * half_gauge_m};
     half_gauge_m_ = half_gauge_m;
     const Eigen::Vector3d by_w(0.0, (half_gauge_m - p_(3)) - 0.5 * p_(5) / (w * w) - p_(7) / (3.0 * w * w * w),
                                -0.5 * p_(6) / (w * w) - p_(4));
@@ -66,7 +66,7 @@ class RailPicture {
     j.col(4) = in_picture(rotation_.col(2) * -w);
     j.col(5) = in_picture(rotation_.col(1) * (0.5 / w));
     j.col(6) = in_picture(rotation_.col(2) * (0.5 / w));
-    j.col(7) = in_picture(rotation_.col(1) / (6.0 * w * w) + rotation_.col(2) * (kTwistPerRateM * half_gauge_m_));
+    j.col(7) = in_picture(rotation_.col(1) / (6.0 * w * w) + rotation_.col(2) * (twist_.by_rate * half_gauge_m_));
     return j;
   }
 
@@ -85,6 +85,7 @@ class RailPicture {
   double fu_;
   double fv_;
   ShapeVector p_;
+  Twist twist_;
   Eigen::Matrix3d rotation_;
   std::array<Eigen::Matrix3d, 3> turn_;
   Eigen::Vector3d direction_ = Eigen::Vector3d::Zero();
@@ -248,12 +249,22 @@ ShapeVector to_vector(const TrackShapeSigma& s) {
   return v;
 }
 
+// In a left curve the right rail is the higher one.
+Twist twist_of(double curvature_rate_per_m2) {
+  constexpr double kCantPerCurvatureM = 40.0;
+  constexpr double kHeadsApartM = 1.5;
+  constexpr double kFastestRatePerM2 = 7e-5;  // from straight to 300 m within 48 m
+  constexpr double kPerRateM = -kCantPerCurvatureM / kHeadsApartM;
+  const double share = curvature_rate_per_m2 / kFastestRatePerM2;
+  const double damped = 1 + share * share;
+  return {kPerRateM * curvature_rate_per_m2 / damped, kPerRateM * (1 - share * share) / (damped * damped)};
+}
+
 Eigen::Vector3d rail_point(const TrackShape& shape, Side side, double gauge_m, double ahead_m, double outward_m) {
   const double beside_m = (side == Side::left ? 1 : -1) * (gauge_m / 2 + outward_m);
   const double x2 = ahead_m * ahead_m;
-  return {
-      ahead_m, beside_m + 0.5 * shape.curvature_per_m * x2 + shape.curvature_rate_per_m2 * x2 * ahead_m / 6.0,
-      0.5 * shape.vertical_curvature_per_m * x2 + kTwistPerRateM * shape.curvature_rate_per_m2 * ahead_m * beside_m};
+  return {ahead_m, beside_m + 0.5 * shape.curvature_per_m * x2 + shape.curvature_rate_per_m2 * x2 * ahead_m / 6.0,
+          0.5 * shape.vertical_curvature_per_m * x2 + twist_of(shape.curvature_rate_per_m2).per_m * ahead_m * beside_m};
 }
 
 void RailFitter::prepare(const geometry::Intrinsics& camera, const std::vector<EdgePoint>& points, double gauge_m) {

@@ -37,12 +37,15 @@ ShapeVector to_vector(const TrackShape& shape);
 TrackShape to_shape(const ShapeVector& vector);
 ShapeVector to_vector(const TrackShapeSigma& sigma);
 
+/// How the cant ramp of a transition curve twists the track, and how that changes with the curvature's rate.
+struct Twist {
+  double per_m = 0;    // rad/m, positive where the left rail rises
+  double by_rate = 0;  // rad m
+};
 /// Where the curvature changes so does the cant, and in the curve a rail that goes up and one that goes down look like
 /// a vertical curvature, of up to 1e-4 per metre. 40 m of cant per curvature are right for trains of 60 km/h that lean
-/// nowhere; faster lines have more. Twist per curvature rate: in a left curve the right rail is the higher one.
-constexpr double kCantPerCurvatureM = 40.0;
-constexpr double kHeadsApartM = 1.5;
-constexpr double kTwistPerRateM = -kCantPerCurvatureM / kHeadsApartM;
+/// nowhere; faster lines have more. What bends faster than a transition curve does is a switch, which has no cant.
+Twist twist_of(double curvature_rate_per_m2);
 
 /// Inner edge of a rail head at X, in track axes.
 Eigen::Vector3d rail_point(const TrackShape& shape, Side side, double gauge_m, double ahead_m, double outward_m = 0);

@@ -246,30 +246,44 @@ TEST(RailFit, AnOffsetOfAWholeRailWidensTheHeight) {
 }
 
 // The end of a left curve: the right rail, which was the higher one, comes down.
-TEST(RailFit, ACantRampIsNoVerticalCurve) {
+/// What is fitted to rails whose curvature grows from `curvature_per_m` at `rate_per_m2`, and that twist beside it.
+TrackShape fit_of_twisted_rails(TrackShape shape, double twist_per_m, double rate_sigma_per_m2) {
   const Intrinsics camera{755, 755, 319.5, 255.5, 0, 0, 0, 0, 640, 512};
-  TrackShape shape;
-  shape.camera = {0, rad_from_deg(8), 0, 0, 2.6};
-  shape.curvature_per_m = 0.0025;
-  shape.curvature_rate_per_m2 = -1.0 / 300 / 90;
-  constexpr double kCantM = 0.13;  // at a radius of 300 m, gone after 90 m
-  const double twist = kCantM / 90 / 1.5;
   const View view(camera, shape.camera);
   std::vector<EdgePoint> points;
   for (const double side : {1.0, -1.0}) {
     for (double x = 5; x < 17; x *= 1.03) {
       const double beside_m = side * 1.435 / 2;
       const double y = beside_m + shape.curvature_per_m * x * x / 2 + shape.curvature_rate_per_m2 * x * x * x / 6;
-      points.push_back({*view.project({x, y, twist * x * beside_m}), side > 0 ? Side::left : Side::right, 0.35});
+      points.push_back({*view.project({x, y, twist_per_m * x * beside_m}), side > 0 ? Side::left : Side::right, 0.35});
     }
   }
   RailFitOptions options;
   options.prior.camera = shape.camera;
-  options.prior_sigma = {0.008, 0.008, 0.02, 0.10, 0.04, 0.003, 0.0005, 3e-5};
+  options.prior_sigma = {0.008, 0.008, 0.02, 0.10, 0.04, 0.003, 0.0005, rate_sigma_per_m2};
   options.least_sigma_factor = 0.15;
-  const auto fit = fit_rails(camera, points, options.prior, options);
-  EXPECT_LT(std::abs(fit.shape.vertical_curvature_per_m), 1.5e-5);
-  EXPECT_LT(std::abs(fit.shape.camera.pitch_rad - shape.camera.pitch_rad), 2e-4);
+  return fit_rails(camera, points, options.prior, options).shape;
+}
+
+TEST(RailFit, ACantRampIsNoVerticalCurve) {
+  TrackShape shape;
+  shape.camera = {0, rad_from_deg(8), 0, 0, 2.6};
+  shape.curvature_per_m = 0.0025;
+  shape.curvature_rate_per_m2 = -1.0 / 300 / 90;
+  constexpr double kCantM = 0.13;  // at a radius of 300 m, gone after 90 m
+  const auto fit = fit_of_twisted_rails(shape, kCantM / 90 / 1.5, 3e-5);
+  EXPECT_LT(std::abs(fit.vertical_curvature_per_m), 1.5e-5);
+  EXPECT_LT(std::abs(fit.camera.pitch_rad - shape.camera.pitch_rad), 2e-4);
+}
+
+// Its curvature comes within metres, and there is no ramp.
+TEST(RailFit, ASwitchIsNotTakenForACantRamp) {
+  TrackShape shape;
+  shape.camera = {0, rad_from_deg(8), 0, 0, 2.6};
+  shape.curvature_rate_per_m2 = 1.0 / 190 / 15;
+  const auto fit = fit_of_twisted_rails(shape, 0, 1e-3);
+  EXPECT_LT(std::abs(fit.camera.roll_rad), 2e-3);
+  EXPECT_LT(std::abs(fit.camera.pitch_rad - shape.camera.pitch_rad), 5e-4);
 }
 
 TEST(RailFit, NoPointsGiveThePriorBack) {
