@@ -26,6 +26,24 @@ TEST(References, NetworkFixStartsThePosition) {
   EXPECT_LT(state.over_m, 20);
 }
 
+// Its gate is wide as long as the place is vague. The line runs to the north.
+TEST(References, AnOutlierOfGnssBehindAVaguePlaceIsHeld) {
+  auto fusion = fusion_without_start();
+  for (int k = 0; k < 10; ++k) {
+    run(fusion, k, k + 1, 20);
+    fusion.add(GnssInput{at(k + 1.001), 0, 20.0 * (k + 1), 1.0, 1});
+  }
+  FixInput fix = fix_at(10.01, 200, 0, 0.99);
+  fix.kind = FixKind::network;
+  fix.sigma_m = 17;
+  fusion.add(fix);
+  run(fusion, 10.02, 11, 20);
+  fusion.add(GnssInput{at(11.001), 0, 220 + 60, 1.0, 1});
+  const auto state = run(fusion, 11, 11.5, 20);
+  EXPECT_NEAR(state.position.offset_m, 290, 5);
+  EXPECT_GT(state.over_m, state.position.offset_m - 230);
+}
+
 TEST(References, LandmarkIsIgnoredWhilePlaceIsUnknown) {
   auto fusion = fusion_without_start();
   run(fusion, 0, 1, 20);
