@@ -287,12 +287,12 @@ void Hypotheses::ask(Rival& rival) {
                        rival.estimator->is_consistent();
   if (!can_say) {
     rival.asked = false;
+    if (!rival.estimator) return;
+    const bool consistent = rival.estimator->is_consistent();
     // What the main one has not used yet the rival does not lack: it is not away.
-    const bool not_used_yet = main_.watch(rival.without).used_ns == 0;
-    if (not_used_yet && rival.estimator && rival.estimator->knows_motion()) rival.asked_ns = now_ns;
-    if (rival.estimator && rival.estimator->is_consistent() && core::seconds(now_ns - rival.asked_ns) < kSameSpeedsS)
-      stray(rival, now_ns);
-    rival.contradicted = rival.contradicted || (rival.estimator && !rival.estimator->is_consistent());
+    if (main_.watch(rival.without).used_ns == 0 && rival.estimator->knows_motion()) rival.asked_ns = now_ns;
+    if (consistent && core::seconds(now_ns - rival.asked_ns) < kSameSpeedsS) stray(rival, now_ns);
+    rival.contradicted = rival.contradicted || !consistent;
     return;
   }
   auto& other = *rival.estimator;

@@ -89,9 +89,11 @@ std::optional<Fix> LandmarkMatcher::add(const Sighting& sighting, const Prior& p
       unmapped_rate.per_m() + parameters_.detection * mapped_per_m(sighting.kind, expected_m);
   const double elsewhere = odds_elsewhere_ * earlier * (to_m - from_m) * by_chance_per_m;
   const double sum = here + elsewhere;
-  if (here > 0) odds_elsewhere_ = std::clamp(elsewhere / here, std::min(odds_elsewhere_, kConfirmed), kMostOdds);
+  if (here > 0) {
+    odds_elsewhere_ = std::clamp(elsewhere / here, std::min(odds_elsewhere_, kConfirmed), kMostOdds);
+    unmapped_rate.learn(place_m, nothing / here);
+  }
   confirmed_ = confirmed_ || odds_elsewhere_ <= kConfirmed;
-  if (here > 0) unmapped_rate.learn(place_m, nothing / here);
   seen_.push_back({sighting, place_m});
   if (seen_.size() > kMostSightings) seen_.pop_front();
   if (best == nullptr || !(best_weight >= parameters_.min_probability * sum)) return std::nullopt;

@@ -245,7 +245,6 @@ TEST(RailFit, AnOffsetOfAWholeRailWidensTheHeight) {
   EXPECT_NEAR(std::sqrt(worn.covariance(4, 4) - exact.covariance(4, 4)), expected_m, 0.2 * expected_m);
 }
 
-// The end of a left curve: the right rail, which was the higher one, comes down.
 /// What is fitted to rails whose curvature grows from `curvature_per_m` at `rate_per_m2`, and that twist beside it.
 TrackShape fit_of_twisted_rails(TrackShape shape, double twist_per_m, double rate_sigma_per_m2) {
   const Intrinsics camera{755, 755, 319.5, 255.5, 0, 0, 0, 0, 640, 512};
@@ -265,6 +264,7 @@ TrackShape fit_of_twisted_rails(TrackShape shape, double twist_per_m, double rat
   return fit_rails(camera, points, options.prior, options).shape;
 }
 
+// The end of a left curve: the right rail, which was the higher one, comes down.
 TEST(RailFit, ACantRampIsNoVerticalCurve) {
   TrackShape shape;
   shape.camera = {0, rad_from_deg(8), 0, 0, 2.6};
