@@ -12,6 +12,8 @@ namespace railfix::tpr_publisher {
 namespace {
 
 constexpr std::chrono::milliseconds kTickPeriod{500};
+constexpr int64_t kGapNs = 500'000'000;
+constexpr int64_t kListenNs = 150'000'000;  // others in charge say so forty times a second
 
 static_assert(static_cast<uint8_t>(Reason::cycle_time) == msg::REPORT_CYCLE_TIME);
 static_assert(static_cast<uint8_t>(Reason::cycle_distance) == msg::REPORT_CYCLE_DISTANCE);
@@ -220,10 +222,9 @@ int64_t TprPublisherService::now_ns(int64_t stamp_ns) const {
 
 void TprPublisherService::on_state(const msg::TrainState& state) {
   context_.health().input();
-  state_seen_ = true;
-  state_monotonic_ns_ = core::monotonic_ns();
+  notice_gap();
   const int64_t now = now_ns(state.stamp_ns());
-  if (!context_.in_charge()) {
+  if (!context_.in_charge() || state_monotonic_ns_ < listens_until_ns_) {
     stand_by(state, now);
     return;
   }
@@ -252,6 +253,15 @@ void TprPublisherService::on_state(const msg::TrainState& state) {
     report_trouble_ = publisher_.undeclared();
   }
   show();
+}
+
+// A cable that is plugged in again may bring the state before the word of the one that has taken charge meanwhile.
+void TprPublisherService::notice_gap() {
+  const bool one_of_two = context_.common().ownership_strength > 0 && !context_.common().lock_step;
+  const int64_t now = core::monotonic_ns();
+  if (one_of_two && state_seen_ && now - state_monotonic_ns_ > kGapNs) listens_until_ns_ = now + kListenNs;
+  state_seen_ = true;
+  state_monotonic_ns_ = now;
 }
 
 void TprPublisherService::on_onboard(const msg::OnboardStatus& status) {

@@ -23,6 +23,7 @@ class TprPublisherService {
   void on_state(const msg::TrainState& state);
   void on_onboard(const msg::OnboardStatus& status);
   void on_tick();
+  void notice_gap();
   core::Status take_packet_58(std::span<const uint8_t> packet);
   /// `just_come`: it did not stand in an onboard_status of some seconds ago.
   void hear_packet_58(const msg::OnboardStatus& status, bool just_come);
@@ -53,6 +54,7 @@ class TprPublisherService {
   std::optional<service::DataTime> data_time_;  // of played data
   bool state_seen_ = false;
   int64_t state_monotonic_ns_ = 0;  // when the last one came
+  int64_t listens_until_ns_ = 0;    // sends nothing before
   bool reference_known_ = false;    // in the last report
   uint64_t seq_ = 0;
   std::unique_ptr<GroundLink> ground_link_;  // nullptr = no broker
