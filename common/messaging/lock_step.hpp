@@ -35,6 +35,10 @@ class SentTotals {
       clock.sent().back().samples(samples);
     }
   }
+  [[nodiscard]] uint64_t samples(const std::string& topic) const {
+    const auto sent = samples_.find(topic);
+    return sent == samples_.end() ? 0 : sent->second;
+  }
 
  private:
   std::map<std::string, uint64_t> samples_;

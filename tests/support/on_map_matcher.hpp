@@ -1,22 +1,20 @@
-// A test that is the train of a real map_matcher: it writes the states, odometry steps and sightings of a ride at a
-// steady speed, and keeps what the matcher says.
+// A test that is the train of a real map_matcher and gives it its turns of lock step: it writes the states, odometry
+// steps and sightings of a ride at a steady speed, and keeps what the matcher says.
 #pragma once
 
 #include <unistd.h>
 
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <vector>
 
-#include "support/on_train.hpp"
-#include "support/program.hpp"
+#include "support/lock_step.hpp"
 #include "track/map.hpp"
 
 namespace railfix::test {
 
 /// Tick 0 is where the data begin.
-class OnMapMatcher : public OnTrain {
+class OnMapMatcher : public InLockStep {
  protected:
   static constexpr double kPeriodS = 0.1;
   struct Ride {
@@ -25,20 +23,15 @@ class OnMapMatcher : public OnTrain {
   };
 
   OnMapMatcher(const std::string& name, int64_t domain, const Ride& ride)
-      : OnTrain(name + "-" + std::to_string(getpid()), domain), domain_(domain), ride_(ride) {}
+      : InLockStep(name + "-" + std::to_string(getpid()), domain), ride_(ride) {}
   ~OnMapMatcher() { std::filesystem::remove(map_file_); }
 
   /// With `map_matcher.key=value` settings besides the map; false when it does not come up.
-  bool start_matcher(const track::Map& map, const std::vector<std::string>& more_settings = {}) {
+  bool start_matcher(const track::Map& map, std::vector<std::string> settings = {}) {
     core::ok_or_throw(map.save(map_file_));
-    std::vector<std::string> settings{"map_matcher.map=" + map_file_.string(), "common.train_id=" + train_,
-                                      "common.domain=" + std::to_string(domain_), "common.log_level=error"};
-    settings.insert(settings.end(), more_settings.begin(), more_settings.end());
-    matcher_ = std::make_unique<Program>(with_settings("railfix-map-matcher", settings));
-    return run_until([&] {
-      return states_.matched_readers() > 0 && steps_.matched_readers() > 0 && sightings_.matched_readers() > 0 &&
-             fixes_.matched_writers() > 0;
-    });
+    settings.push_back("map_matcher.map=" + map_file_.string());
+    start("map_matcher", settings);
+    return connected();
   }
 
   [[nodiscard]] static int64_t stamp_ns(int64_t tick) {
@@ -81,8 +74,11 @@ class OnMapMatcher : public OnTrain {
     step.valid(1);
     return step;
   }
-  /// Handles what has come, at a pace that the matcher keeps.
-  void pause() { queue_.run_one(core::monotonic_ns() + 5'000'000); }
+  /// The matcher uses what was written, and what it says of that is heard.
+  void match() {
+    give_turns({"map_matcher"}, stamp_ns(tick_));
+    hear_all("position_fix", said_);
+  }
 
   int64_t tick_ = 0;
   std::vector<msg::PositionFix> said_;
@@ -91,12 +87,10 @@ class OnMapMatcher : public OnTrain {
   messaging::Writer<msg::LandmarkSighting> sightings_{participant_, messaging::topics::landmark_sighting};
 
  private:
-  const int64_t domain_;
   const Ride ride_;
   const std::filesystem::path map_file_ = std::filesystem::temp_directory_path() / (train_ + ".map");
   messaging::Reader<msg::PositionFix> fixes_{participant_, messaging::topics::position_fix, "", queue_,
                                              [this](const msg::PositionFix& fix) { said_.push_back(fix); }};
-  std::unique_ptr<Program> matcher_;
 };
 
 }  // namespace railfix::test

@@ -8,10 +8,7 @@
 #include "core/random.hpp"
 #include "core/time.hpp"
 #include "core/units.hpp"
-#include "messaging/connected.hpp"
-#include "messaging/lock_step.hpp"
-#include "support/on_train.hpp"
-#include "support/program.hpp"
+#include "support/lock_step.hpp"
 #include "support/sensed_ride.hpp"
 #include "track/path.hpp"
 
@@ -52,74 +49,27 @@ track::Map made_map() {
   return map;
 }
 
-class MatcherInLockStep : public ::testing::Test, protected test::OnTrain {
+class MatcherInLockStep : public ::testing::Test, protected test::InLockStep {
  protected:
-  MatcherInLockStep()
-      : OnTrain("no-start-" + std::to_string(getpid()), kDomain),
-        folder_(fs::temp_directory_path() / ("railfix-" + train_)),
-        steps_(participant_, topics::odometry_step),
-        clock_(participant_, topics::data_clock) {
-    listen(topics::data_progress, [this](const msg::DataProgress& p) { progress_ = p; });
+  MatcherInLockStep() : InLockStep("no-start-" + std::to_string(getpid()), kDomain) {
     listen(topics::train_state, [this](const msg::TrainState& s) { states_.push_back(s); });
     listen(topics::position_fix, [this](const msg::PositionFix& f) { fixes_.push_back(f); });
-    listen(topics::service_status, [this](const msg::ServiceStatus& s) { status_[s.service().c_str()] = s; });
-    fs::create_directories(folder_);
   }
-  ~MatcherInLockStep() override { fs::remove_all(folder_); }
+  ~MatcherInLockStep() override { fs::remove(map_file_); }
 
-  [[nodiscard]] std::unique_ptr<test::Program> service(const std::string& name, const std::string& program,
-                                                       std::vector<std::string> more) const {
-    std::vector<std::string> sets{"common.train_id=" + train_, "common.domain=" + std::to_string(kDomain),
-                                  "common.log_level=error", "common.lock_step=true",
-                                  name + ".map=" + (folder_ / "map.railfix").string()};
-    sets.insert(sets.end(), more.begin(), more.end());
-    return std::make_unique<test::Program>(test::with_settings(program, sets));
-  }
-  bool connected(size_t services) {
-    return status_.size() == services && messaging::all_connected(participant_.connections(), status_);
-  }
-
-  /// Gives a service its turn and waits until it has taken it.
-  bool turn_of(const std::string& service, uint64_t seq, int64_t data_ns) {
-    msg::DataClock clock;
-    clock.data_ns(data_ns);
-    clock.seq(seq);
-    clock.lock_step(1);
-    clock.turn(service);
-    auto sent = messaging::sent_samples(participant_);
-    for (const auto& [name, samples] : sent_) sent.insert(sent.end(), samples.begin(), samples.end());
-    clock.sent(sent);
-    clock_.write(clock);
-    const bool taken = run_until([&] { return progress_.seq() == seq && service == progress_.service().c_str(); });
-    if (taken) sent_[service] = progress_.sent();
-    return taken;
-  }
-  [[nodiscard]] uint64_t sent_by(const std::string& service, const std::string& topic) const {
-    const auto samples = sent_.find(service);
-    if (samples == sent_.end()) return 0;
-    for (const auto& one : samples->second) {
-      if (topic == one.topic().c_str()) return one.samples();
-    }
-    return 0;
-  }
-
-  fs::path folder_;
-  messaging::Writer<msg::OdometryStep> steps_;
-  messaging::Writer<msg::DataClock> clock_;
-  msg::DataProgress progress_;
+  const fs::path map_file_ = fs::temp_directory_path() / ("railfix-" + train_ + ".map");
   std::vector<msg::TrainState> states_;
   std::vector<msg::PositionFix> fixes_;
-  std::map<std::string, msg::ServiceStatus> status_;
-  std::map<std::string, std::vector<msg::SentSamples>> sent_;
 };
 
 using NoStart = MatcherInLockStep;
 TEST_F(NoStart, ThePlaceIsFoundOnTheMapAndFusionStartsThere) {
   const track::Map map = made_map();
-  ASSERT_TRUE(map.save(folder_ / "map.railfix").ok());
-  const auto matcher = service("map_matcher", "railfix-map-matcher", {"map_matcher.locate_every_m=100"});
-  const auto fusion = service("fusion", "railfix-fusion", {"fusion.start=unknown"});
-  ASSERT_TRUE(run_until([&] { return connected(2); }));
+  ASSERT_TRUE(map.save(map_file_).ok());
+  messaging::Writer<msg::OdometryStep> steps(participant_, topics::odometry_step);
+  start("map_matcher", {"map_matcher.map=" + map_file_.string(), "map_matcher.locate_every_m=100"});
+  start("fusion", {"fusion.map=" + map_file_.string(), "fusion.start=unknown"});
+  ASSERT_TRUE(connected());
 
   testing::RideErrors errors;
   errors.odometer_scale = kScale - 1;
@@ -148,11 +98,10 @@ TEST_F(NoStart, ThePlaceIsFoundOnTheMapAndFusionStartsThere) {
     step.speed_mps(sensed.way_m / core::seconds(kStepNs));
     step.mode(msg::ODOMETRY_TRACK);
     step.valid(1);
-    ASSERT_TRUE(steps_.write(step));
-    ASSERT_TRUE(turn_of("map_matcher", seq, stamp_ns)) << "at step " << seq;
-    ASSERT_TRUE(turn_of("fusion", seq, stamp_ns)) << "at step " << seq;
+    ASSERT_TRUE(steps.write(step));
+    give_turns({"map_matcher", "fusion"}, stamp_ns);
   }
-  ASSERT_TRUE(run_until([&] { return states_.size() >= sent_by("fusion", "train_state"); }));
+  hear_all("train_state", states_);
 
   size_t unknown = 0;
   size_t known = 0;
@@ -203,11 +152,11 @@ TEST_F(NoCamera, TheGyroTellsTheLegWithoutAnOdometryStep) {
   constexpr double kEndM = 400;
   constexpr int kStandingSteps = 50;
   const track::Map map = switch_map();
-  ASSERT_TRUE(map.save(folder_ / "map.railfix").ok());
+  ASSERT_TRUE(map.save(map_file_).ok());
   messaging::Writer<msg::TrainState> state_writer(participant_, topics::train_state);
   messaging::Writer<msg::ImuSample> imu_writer(participant_, topics::imu_sample);
-  const auto matcher = service("map_matcher", "railfix-map-matcher", {});
-  ASSERT_TRUE(run_until([&] { return connected(1); }));
+  start("map_matcher", {"map_matcher.map=" + map_file_.string()});
+  ASSERT_TRUE(connected());
 
   core::Random random(3);
   double at_m = 200;
@@ -239,8 +188,8 @@ TEST_F(NoCamera, TheGyroTellsTheLegWithoutAnOdometryStep) {
     state.under_m(4);
     state.sigma_m(1);
     ASSERT_TRUE(state_writer.write(state));
-    ASSERT_TRUE(turn_of("map_matcher", seq, stamp_ns)) << "at step " << seq;
-    ASSERT_TRUE(run_until([&] { return fixes_.size() >= sent_by("map_matcher", "position_fix"); }));
+    give_turns({"map_matcher"}, stamp_ns);
+    hear_all("position_fix", fixes_);
   }
   ASSERT_FALSE(fixes_.empty());
   EXPECT_EQ(fixes_.back().edge(), 3U);
