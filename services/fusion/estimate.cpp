@@ -16,13 +16,6 @@ constexpr double kRecentPositionS = 30.0;
 constexpr double kNoMotionUnusableS = 5.0;
 constexpr double kHeldByGnssS = 5.0;
 
-// The sentences that people read on the dashboard.
-void add_reason(TrainEstimate& estimate, const std::string& what) {
-  estimate.integrity = std::max(estimate.integrity, Integrity::degraded);
-  if (!estimate.reason.empty()) estimate.reason += "; ";
-  estimate.reason += what;
-}
-
 // Operators ask since when a sensor is distrusted.
 std::string since(const SensorWatch& watch) {
   const int64_t second = watch.changed_ns / 1'000'000'000 % 86'400;
@@ -33,6 +26,13 @@ std::string since(const SensorWatch& watch) {
 }
 
 }  // namespace
+
+// The sentences that people read on the dashboard.
+void TrainEstimate::degrade(const std::string& why) {
+  integrity = std::max(integrity, Integrity::degraded);
+  if (!reason.empty()) reason += "; ";
+  reason += why;
+}
 
 Interval Estimator::interval() const {
   const double bound_m = known_to_m() + doubt_m_ + unchecked_m_;
@@ -128,54 +128,54 @@ void Estimator::judge_sensors(TrainEstimate& e) const {
 
   const auto& camera = watch(Source::camera);
   if (silent(Source::camera)) {
-    add_reason(e, "no camera");
+    e.degrade("no camera");
   } else if (camera.isolated) {
-    add_reason(e, "camera motion contradicts the other sensors" + since(camera));
+    e.degrade("camera motion contradicts the other sensors" + since(camera));
   } else if (camera.seen_ns != 0 && unused_for_s(Source::camera) > parameters_->sensor_timeout_s) {
-    add_reason(e, "camera blind");
+    e.degrade("camera blind");
   }
   if (silent(Source::wheel)) {
-    add_reason(e, "no wheel pulses");
+    e.degrade("no wheel pulses");
   } else if (watch(Source::wheel).isolated) {
-    add_reason(e, "wheel slips or slides" + since(watch(Source::wheel)));
+    e.degrade("wheel slips or slides" + since(watch(Source::wheel)));
   } else if (wheel_.scatters) {
-    add_reason(e, "wheel readings scatter");
+    e.degrade("wheel readings scatter");
   }
   if (silent(Source::imu)) {
-    add_reason(e, "no IMU");
+    e.degrade("no IMU");
   } else if (watch(Source::imu).isolated) {
-    add_reason(e, "IMU contradicts the other sensors" + since(watch(Source::imu)));
+    e.degrade("IMU contradicts the other sensors" + since(watch(Source::imu)));
   }
 }
 
 void Estimator::judge_place(TrainEstimate& e) const {
   const auto& gnss = watch(Source::gnss);
-  if (gnss.isolated) add_reason(e, "GNSS contradicts the position" + since(gnss));
+  if (gnss.isolated) e.degrade("GNSS contradicts the position" + since(gnss));
   // Somebody said where the train begins, and the first that measures it says otherwise.
   const bool only_told = watch(Source::landmark).used_ns == 0 && watch(Source::gnss).used_ns == 0;
   if (gnss.isolated && only_told) e.integrity = Integrity::unusable;
-  if (time_doubt_m_ > 0) add_reason(e, "a gap in time: the clock was set, or nothing measured");
-  if (refused_fix_) add_reason(e, "a position fix was refused");
-  if (corrected_) add_reason(e, "position was corrected by two fixes against the filter");
-  if (off_path_) add_reason(e, "a position fix lies on another track");
-  if (track_doubt_.turns_otherwise()) add_reason(e, "the train turns otherwise than this track");
-  if (track_doubt_.disbelieved()) add_reason(e, "map_matcher finds some other place far more probable");
-  if (!path_) add_reason(e, "place on the map not known");
+  if (time_doubt_m_ > 0) e.degrade("a gap in time: the clock was set, or nothing measured");
+  if (refused_fix_) e.degrade("a position fix was refused");
+  if (corrected_) e.degrade("position was corrected by two fixes against the filter");
+  if (off_path_) e.degrade("a position fix lies on another track");
+  if (track_doubt_.turns_otherwise()) e.degrade("the train turns otherwise than this track");
+  if (track_doubt_.disbelieved()) e.degrade("map_matcher finds some other place far more probable");
+  if (!path_) e.degrade("place on the map not known");
   if (path_ && (filter_.path_distance_m() < path_->begin_m() || filter_.path_distance_m() > path_->end_m())) {
-    add_reason(e, "beyond the end of the mapped track");
+    e.degrade("beyond the end of the mapped track");
   }
 }
 
 void Estimator::judge_bounds(TrainEstimate& e, double since_sure_m) const {
   const double budget_m = parameters_->budget_m + parameters_->budget_per_m * since_sure_m;
   const double bound_m = std::max(e.over_m, e.under_m);
-  if (bound_m > budget_m) add_reason(e, "interval wider than allowed");
+  if (bound_m > budget_m) e.degrade("interval wider than allowed");
   const bool wheel = unused_for_s(Source::wheel) < kRecentS;
   if (wheel && unused_for_s(Source::camera) > kRecentS && unused_for_s(Source::imu) > kRecentS) {
-    add_reason(e, "the wheel alone measures: nothing would see it slip");
+    e.degrade("the wheel alone measures: nothing would see it slip");
   }
   const double no_motion_s = std::min(unused_for_s(Source::camera), unused_for_s(Source::wheel));
-  if (no_motion_s > parameters_->sensor_timeout_s) add_reason(e, "nothing measures the motion");
+  if (no_motion_s > parameters_->sensor_timeout_s) e.degrade("nothing measures the motion");
   const bool moved = watch(Source::camera).used_ns != 0 || watch(Source::wheel).used_ns != 0;
   if (!e.standstill && (!moved || no_motion_s > kNoMotionUnusableS))
     e.speed_mps = std::numeric_limits<double>::quiet_NaN();

@@ -46,6 +46,8 @@ void Estimator::rebase_clock(int64_t stamp_ns) {
   yaw_ = {};
   wheel_.blocks.clear();
   wheel_.window_begin_ns = 0;
+  wheel_.counts_since_ns = std::min(wheel_.counts_since_ns, stamp_ns);
+  gap_begin_ns_ = std::min(gap_begin_ns_, stamp_ns);
   filter_.doubt_way(filter_.value(StateIndex::speed) * kRebaseS);
   slip_watch_ = {};
   sudden_change_ = {};
@@ -134,7 +136,7 @@ void Estimator::place_like(const Estimator& other) {
   path_ = other.path_;
   track_doubt_ = other.track_doubt_;
   filter_.place_like(other.filter_);
-  doubt_m_ = std::max(doubt_m_, other.doubt_m_);
+  doubt_m_ = other.doubt_m_;
   time_doubt_m_ = std::max(time_doubt_m_, other.time_doubt_m_);
   unwatched_ = other.unwatched_;
   reference_ = other.reference_;
@@ -147,8 +149,8 @@ void Estimator::notice_gap(int64_t stamp_ns) {
   if (gap_s <= 0) return;
   for (auto* rhythm : {&pictures_, &pulses_}) rhythm->pause_s = std::max(rhythm->pause_s, gap_s);
   if (events_.samples >= kRhythmSamples && gap_s > std::max(kGapS, 5 * events_.period_s)) {
+    if (time_doubt_m_ == 0) gap_begin_ns_ = stamp_ns_;
     time_doubt_m_ += std::abs(filter_.speed_mps()) * gap_s;
-    gap_begin_ns_ = stamp_ns_;
   } else {
     events_.period_s += (gap_s - events_.period_s) / std::min(++events_.samples, 50);
   }

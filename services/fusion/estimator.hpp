@@ -85,6 +85,8 @@ class Estimator {
   [[nodiscard]] int sensors_at_work() const;
   /// That sensor is found to be wrong: it is isolated, with what `other` knows of it.
   void exclude(Source source, const Estimator& other);
+  /// From now on that sensor's samples do not come here; that it is isolated is no contradiction.
+  void do_without(Source source) { watched(source).isolated = watched(source).convicted = false; }
   /// GNSS has agreed with the motion for a while.
   [[nodiscard]] bool gnss_proven() const { return gnss_agreed_ >= kGnssProof; }
   /// Takes over place and speed, as independent knowledge.
@@ -102,6 +104,8 @@ class Estimator {
   /// Used against the filter's word, because the one before, which was refused, says the same.
   [[nodiscard]] bool fix_corrected() const { return fix_verdict_ == FixVerdict::corrected; }
   [[nodiscard]] bool fix_refused() const { return fix_verdict_ == FixVerdict::refused; }
+  /// How far it was from where it was expected.
+  [[nodiscard]] double fix_residual_m() const { return fix_offer_.residual; }
   /// How far beyond `excused_m` it was from where it was expected, in standard deviations.
   [[nodiscard]] double fix_sigmas_off(double excused_m) const;
   /// So many landmarks in a row say that it is here.
@@ -135,6 +139,8 @@ class Estimator {
     double resolution_m = 0;
     bool scatters = false;
     std::vector<WheelBlock> blocks;
+    int64_t counts_since_ns = 0;
+    bool on_trial = false;  // had slipped, and was taken back in the dark on the word of an IMU alone
     int64_t window_begin_ns = 0;
     std::optional<double> window_m;  // its reading then
     int good_windows = 0;
@@ -188,12 +194,14 @@ class Estimator {
   void use_acceleration(double accel_mps2, int64_t stamp_ns);
   void compare_with_wheel(const OdometryInput& step, double sigma_m);
   void isolate_wheel();
+  bool blame_wheel_on_trial();
   void doubt_silent_wheel(int64_t silent_since_ns, double way_m);
   void watch_alone(double way_m, double dt_s);
   [[nodiscard]] bool is_watched() const;
   [[nodiscard]] bool slipped_unseen() const;
   [[nodiscard]] bool wheel_is_alone() const;
   [[nodiscard]] double unwatched_share() const;
+  void restart_wheel(int64_t stamp_ns, double wheel_m, double sigma_m);
   void recover_wheel(const WheelInput& sample, double wheel_m, double sigma_m);
   void use_yaw_rate(double rate_rps);
   void use_track(const FixInput& fix);

@@ -84,13 +84,21 @@ void Estimator::use(const OdometryInput& step) {
       compare_with_wheel(step, sigma_m);
     } else {
       slip_watch_.no_picture();
-      if (++camera.refused >= kRefusalsToIsolate) camera.isolate(step.stamp_ns);
+      if (++camera.refused >= kRefusalsToIsolate && !blame_wheel_on_trial()) camera.isolate(step.stamp_ns);
       // With the wheel the rivals' ends are wide enough; without it nobody knows who is right.
       if (camera.refused >= kRefusalsToDoubt && alone) doubt_m_ += std::abs(offer.residual);
     }
   }
   if (!step.valid) slip_watch_.no_picture();
   filter_.clone_now(step.reference_stamp_ns);
+}
+
+// The camera is back and finds a speed that a wheel on trial had told.
+bool Estimator::blame_wheel_on_trial() {
+  if (!wheel_.on_trial || watch(Source::wheel).isolated || watch(Source::camera).isolated) return false;
+  isolate_wheel();
+  watched(Source::camera).refused = 0;
+  return true;
 }
 
 void Estimator::compare_with_wheel(const OdometryInput& step, double sigma_m) {
@@ -103,7 +111,11 @@ void Estimator::compare_with_wheel(const OdometryInput& step, double sigma_m) {
   const double raw_m = std::hypot(parameters_->visual_scale_sigma, parameters_->wheel_scale_sigma) * std::abs(visual_m);
   const bool ratio_moved = std::abs(wheel_m - visual_m) > kSlipSigmas * std::hypot(noise_m, known_m);
   const bool ratio_impossible = std::abs(ways->wheel_m - ways->visual_m) > kSlipSigmas * std::hypot(noise_m, raw_m);
-  if (ratio_moved || ratio_impossible) isolate_wheel();
+  if (ratio_moved || ratio_impossible) {
+    isolate_wheel();
+  } else {
+    wheel_.on_trial = false;
+  }
 }
 
 void Estimator::block_wheel(const WheelBlock& block) {
@@ -115,7 +127,12 @@ void Estimator::isolate_wheel() {
   wheel_.good_windows = 0;
   wheel_.window_begin_ns = filter_.stamp_ns();
   wheel_.window_m.reset();
-  slip_began_ = true;
+  // On trial it was wrong all the time, not since a second ago, and the speed at which the camera came back was its
+  // own.
+  const bool failed_trial = wheel_.on_trial && used_within(Source::camera, kBlindS);
+  if (failed_trial) filter_.loosen_speed(kUnknownSpeedMps);
+  slip_began_ = !failed_trial;
+  wheel_.on_trial = false;
 }
 
 void Estimator::use(const WheelInput& sample) {
@@ -140,14 +157,15 @@ void Estimator::use(const WheelInput& sample) {
   }
   if (first) {
     if (filter_.unit() == Odometer::none) filter_.choose_unit(Odometer::wheel);
-    filter_.restart_wheel(wheel_m, sigma_m);
+    restart_wheel(sample.stamp_ns, wheel_m, sigma_m);
   } else if (watch.isolated) {
     recover_wheel(sample, wheel_m, sigma_m);
   } else if (offer_motion(Source::wheel, sample.stamp_ns, [&](MotionFilter& filter) {
                return filter.offer_wheel(wheel_m, sigma_m, parameters_->gate_wheel);
              }).used) {
     watch.accept(sample.stamp_ns);
-    time_doubt_m_ = unchecked_m_ = 0;
+    unchecked_m_ = 0;
+    if (wheel_.counts_since_ns <= gap_begin_ns_) time_doubt_m_ = 0;
   } else if (++watch.refused >= kRefusalsToIsolate) {
     isolate_wheel();
   }
@@ -211,13 +229,18 @@ double Estimator::unwatched_share() const {
   return std::min(1.0, unseen_mps / (parameters_->wheel_slip_share * std::abs(filter_.speed_mps()) + 0.01));
 }
 
+void Estimator::restart_wheel(int64_t stamp_ns, double wheel_m, double sigma_m) {
+  wheel_.counts_since_ns = stamp_ns;
+  filter_.restart_wheel(wheel_m, sigma_m);
+}
+
 // While the wheel slips its odometer is only compared, window by window; two good windows in which it turned end the
 // slip: a wheel that is stuck agrees with every train that stands. Where there is no camera it must be taken as it is.
 void Estimator::recover_wheel(const WheelInput& sample, double wheel_m, double sigma_m) {
   const auto begin_window = [&] {
     wheel_.window_begin_ns = sample.stamp_ns;
     wheel_.window_m = wheel_m;
-    filter_.restart_wheel(wheel_m, sigma_m);
+    restart_wheel(sample.stamp_ns, wheel_m, sigma_m);
   };
   if (wheel_.window_begin_ns >= sample.stamp_ns || !wheel_.window_m) begin_window();
   if (core::seconds(sample.stamp_ns - wheel_.window_begin_ns) < kSlipWindowS) return;
@@ -231,7 +254,11 @@ void Estimator::recover_wheel(const WheelInput& sample, double wheel_m, double s
   const bool alone = !is_watched() && core::seconds(sample.stamp_ns - watch(Source::wheel).changed_ns) > kBridgeS;
   if (alone && turns && !good) filter_.loosen_speed(kUnknownSpeedMps);
   begin_window();
-  if (wheel_.good_windows >= kGoodWindows || (alone && turns)) watched(Source::wheel).accept(sample.stamp_ns);
+  if (wheel_.good_windows < kGoodWindows && !(alone && turns)) return;
+  watched(Source::wheel).accept(sample.stamp_ns);
+  wheel_.on_trial = !used_within(Source::camera, kBlindS);
+  // It tells how fast the train is from now on, not how far the IMU was out before.
+  if (wheel_.on_trial) filter_.loosen_speed(filter_.sigma(StateIndex::speed));
 }
 
 std::optional<double> Estimator::Mean::add(int64_t stamp_ns, double value, double period_s) {

@@ -108,6 +108,8 @@ struct TrainEstimate {
   Integrity integrity = Integrity::unusable;
   bool standstill = false;
   std::string reason;  // why it is not ok, one sentence
+
+  void degrade(const std::string& why);
 };
 
 }  // namespace railfix::fusion

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "fusion/estimator.hpp"
+#include "fusion/fix_residuals.hpp"
 #include "fusion/odometer_scales.hpp"
 
 namespace railfix::fusion {
@@ -98,12 +99,15 @@ class Hypotheses {
   [[nodiscard]] Doubter without_one(const FixInput& fix, Estimator before, const Excess& most) const;
   void settle_doubters(const FixInput& fix, const std::vector<Doubter>& before);
   bool settle(Doubter& doubter, const Estimator& before, const FixInput& fix) const;
+  [[nodiscard]] bool differs_in_scale(const Doubter& doubter) const;
   void confirm_rivals();
   void exclude_faulty();
   void adopt(Rival& rival);
   void begin_rival(Source source);
   void ask_rivals();
   void ask(Rival& rival);
+  [[nodiscard]] bool can_say(const Rival& rival) const;
+  void begin_again(Rival& rival) const;
   void lose_sight(Rival& rival, int64_t now_ns) const;
   static void stray(Rival& rival, int64_t now_ns);
   [[nodiscard]] Excess most_excess() const;
@@ -114,6 +118,7 @@ class Hypotheses {
   std::vector<Doubter> doubters_;  // the latest one last
   std::array<Rival, 4> rivals_;
   std::optional<bool> fix_fitted_;
+  FixResiduals residuals_;
 };
 
 }  // namespace railfix::fusion

@@ -140,8 +140,12 @@ void MotionFilter::step(double dt_s, const FusionParameters& p) {
 }
 
 void MotionFilter::rebase_clock(int64_t stamp_ns) {
-  while (!clones_.empty()) remove_clone(0);
+  forget_clones();
   stamp_ns_ = stamp_ns;
+}
+
+void MotionFilter::forget_clones() {
+  while (!clones_.empty()) remove_clone(0);
 }
 
 void MotionFilter::clone_now(int64_t keep_ns) {
@@ -259,6 +263,7 @@ void MotionFilter::doubt_way(double sigma_m) {
 }
 
 void MotionFilter::loosen_speed(double sigma_mps) {
+  forget_clones();
   ud_.reset(index(StateIndex::speed), squared(sigma_mps));
 }
 

@@ -103,7 +103,7 @@ class MotionFilter {
   void doubt_way(double sigma_m);
   /// The acceleration may have become another one by sigma, up to `since_s` ago.
   void doubt_acceleration(double since_s, double sigma_mps2);
-  /// The speed is another one within sigma (unit metres).
+  /// The speed is another one within sigma (unit metres); steps from pictures so far cannot be measured against it.
   void loosen_speed(double sigma_mps);
   /// Takes over another filter's place (distance, path distance and their sigmas) as independent knowledge.
   void place_like(const MotionFilter& other);
@@ -131,6 +131,7 @@ class MotionFilter {
   [[nodiscard]] estimation::StateVector scale_row(Odometer odometer) const;
   void step(double dt_s, const FusionParameters& parameters);
   void remove_clone(int index);
+  void forget_clones();
   Offer offer(const estimation::StateVector& h, double residual, double sigma, double gate);
 
   int64_t stamp_ns_ = 0;

@@ -261,5 +261,29 @@ TEST(Coverage, AClockThatStepsIsHeldFromTheFirstMoment) {
       0U);
 }
 
+// A wheel that the camera had found to drift comes back in the dark, and the camera, back too, was taken for the faulty
+// one: 430 states were outside, by up to 29 m.
+TEST(Coverage, AWheelThatComesBackInTheDarkIsOnTrialUntilTheCameraIsBack) {
+  EXPECT_EQ(outside_in({3110, 1273, Sensor::wheel, FaultKind::drift}), 0U);
+}
+
+// The clock is set forward while the wheel slips. The wheel was found well a second later and was taken to have counted
+// over the gap: 724 states were outside, by up to 56 m.
+TEST(Coverage, AWheelThatBeganAnewBehindAGapHasNotCountedOverIt) {
+  EXPECT_EQ(outside_in({3110, 2142, Sensor::clock, FaultKind::clock_step}), 0U);
+}
+
+// A false fix inside the interval teaches a scale that is 0.9 % wrong. Later fixes corrected the place again and again,
+// and what knew the right scale was forgotten over that: 638 states were outside, by up to 2.2 m.
+TEST(Coverage, AScaleThatAFalseFixHasTaughtIsDoubted) {
+  EXPECT_EQ(outside_in({3110, 2306, Sensor::none, FaultKind::none}), 0U);
+}
+
+// A wheel that drifts to 1.5 times its way, and the correction by the next landmarks goes into the camera's scale, 1.5
+// % of it: 9 states were outside, by up to 0.05 m.
+TEST(Coverage, AScaleThatACorrectionHasTaughtIsDoubted) {
+  EXPECT_EQ(outside_in({3120, 1493, Sensor::wheel, FaultKind::drift}), 0U);
+}
+
 }  // namespace
 }  // namespace railfix::fusion

@@ -1,0 +1,151 @@
+// Rivals: the estimates without camera, without wheel, without IMU and without GNSS.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/time.hpp"
+#include "fusion/hypotheses.hpp"
+
+namespace railfix::fusion {
+namespace {
+
+constexpr double kRivalGoneS = 1.0;
+constexpr double kProofS = 2.0;
+constexpr double kSameSpeedsS = 3.0;
+
+}  // namespace
+
+// Main contradicts itself, without one certain sensor two others have agreed for a while, and without any other sensor
+// the contradiction stays: that sensor is wrong. A rival that has only little left to say does not contradict itself
+// and leaves the matter open.
+void Hypotheses::exclude_faulty() {
+  const int64_t now_ns = main_.filter().stamp_ns();
+  Rival* proven = nullptr;
+  int consistent = 0;
+  for (auto& rival : rivals_) {
+    if (!rival.estimator || rival.without == Source::gnss) continue;
+    const bool agrees = rival.estimator->is_consistent();
+    consistent += agrees ? 1 : 0;
+    const bool proves = agrees && rival.estimator->sensors_at_work() >= 2;
+    if (!proves || rival.proven_since_ns == 0) rival.proven_since_ns = proves ? now_ns : 0;
+    if (proves && core::seconds(now_ns - rival.proven_since_ns) >= kProofS) proven = &rival;
+  }
+  if (proven == nullptr || consistent > 1 || main_.is_consistent()) return;
+  // Nothing is left to prove when that sensor alone is isolated.
+  if (main_.is_consistent(1U << static_cast<unsigned>(proven->without))) return;
+  adopt(*proven);
+}
+
+void Hypotheses::adopt(Rival& rival) {
+  Estimator next = *rival.estimator;
+  next.exclude(rival.without, main_);
+  next.doubt_place(rival.unseen.behind_m, rival.unseen.ahead_m);
+  main_ = std::move(next);
+  for (auto& other : rivals_) other.forget_excess();
+}
+
+void Hypotheses::confirm_rivals() {
+  for (auto& rival : rivals_) {
+    rival.forget_excess();
+    // Confirmed is the main one: a rival that is elsewhere was wrong.
+    if (rival.estimator && rival.estimator->fix_refused()) begin_again(rival);
+  }
+  ask_rivals();
+}
+
+void Hypotheses::begin_rival(Source source) {
+  for (auto& rival : rivals_) {
+    if (rival.without == source && !rival.estimator) rival.estimator = main_;
+  }
+}
+
+void Hypotheses::ask_rivals() {
+  for (auto& rival : rivals_) ask(rival);
+}
+
+void Hypotheses::ask(Rival& rival) {
+  const int64_t now_ns = main_.filter().stamp_ns();
+  if (!can_say(rival)) {
+    rival.asked = false;
+    if (!rival.estimator) return;
+    const bool consistent = rival.estimator->is_consistent();
+    // What the main one has not used yet the rival does not lack: it is not away.
+    if (main_.watch(rival.without).used_ns == 0 && rival.estimator->knows_motion()) rival.asked_ns = now_ns;
+    if (consistent && core::seconds(now_ns - rival.asked_ns) < kSameSpeedsS) stray(rival, now_ns);
+    rival.contradicted = rival.contradicted || !consistent;
+    return;
+  }
+  auto& other = *rival.estimator;
+  if (!rival.asked && core::seconds(now_ns - rival.asked_ns) > kRivalGoneS) {
+    // It was away: it begins again where the main one is, and what it had said before stays.
+    lose_sight(rival, now_ns);
+    // A train without camera may have nothing but the rival's wheel.
+    if (rival.contradicted && (main_.knows_motion() || main_.watch(Source::camera).seen_ns != 0)) {
+      begin_again(rival);
+    } else {
+      other.place_like(main_);
+    }
+    rival.carried = rival.excess;
+  }
+  rival.contradicted = false;
+  rival.asked = true;
+  rival.asked_ns = now_ns;
+  other.predict_to(now_ns);
+  const Interval mine = main_.interval();
+  Interval its = other.interval();
+  double apart_m = other.centre_m() - main_.centre_m();
+  if (rival.without == Source::gnss && main_.gnss_proven()) {
+    apart_m = std::clamp(apart_m, -parameters_->gnss_bound_m, parameters_->gnss_bound_m);
+    its.behind_m = std::max(its.behind_m, mine.behind_m - parameters_->gnss_bound_m);
+    its.ahead_m = std::min(its.ahead_m, mine.ahead_m + parameters_->gnss_bound_m);
+  }
+  // Since it came back both have gone on from one place: how far they come apart since adds to what it had said before.
+  rival.excess.behind_m = std::max(rival.carried.behind_m + std::max(0.0, -apart_m), mine.behind_m - its.behind_m);
+  rival.excess.ahead_m = std::max(rival.carried.ahead_m + std::max(0.0, apart_m), its.ahead_m - mine.ahead_m);
+  rival.faster_mps = other.filter().speed_mps() - main_.filter().speed_mps();
+  rival.strayed_ns = now_ns;
+}
+
+bool Hypotheses::can_say(const Rival& rival) const {
+  return rival.estimator && main_.watch(rival.without).used_ns != 0 && rival.estimator->knows_motion() &&
+         rival.estimator->is_consistent();
+}
+
+void Hypotheses::begin_again(Rival& rival) const {
+  rival.estimator = main_;
+  rival.estimator->do_without(rival.without);
+}
+
+// It takes over a place that the main one has counted by the very sensor that this rival doubts: should that prove
+// wrong, the train is where the rival's own reckoning allows.
+void Hypotheses::lose_sight(Rival& rival, int64_t now_ns) const {
+  Estimator own = *rival.estimator;
+  own.predict_to(now_ns);
+  const Interval mine = main_.widened(main_.interval());
+  const Interval its = own.interval();
+  rival.unseen.behind_m = std::max(rival.unseen.behind_m, mine.behind_m - its.behind_m);
+  rival.unseen.ahead_m = std::max(rival.unseen.ahead_m, its.ahead_m - mine.ahead_m);
+}
+
+// Nothing tells any more how far they come apart: for a while as fast as they did last.
+void Hypotheses::stray(Rival& rival, int64_t now_ns) {
+  const double apart_m = rival.faster_mps * core::seconds(now_ns - std::exchange(rival.strayed_ns, now_ns));
+  rival.excess.behind_m += std::max(0.0, -apart_m);
+  rival.excess.ahead_m += std::max(0.0, apart_m);
+}
+
+Hypotheses::Excess Hypotheses::most_excess() const {
+  Excess most;
+  for (const auto& rival : rivals_) {
+    most.behind_m = std::max(most.behind_m, rival.excess.behind_m);
+    most.ahead_m = std::max(most.ahead_m, rival.excess.ahead_m);
+  }
+  return most;
+}
+
+Interval Hypotheses::promised(const Interval& main) const {
+  const Excess most = most_excess();
+  return {main.behind_m - most.behind_m, main.ahead_m + most.ahead_m};
+}
+
+}  // namespace railfix::fusion
