@@ -99,10 +99,16 @@ void Estimator::doubt_time(const SensorWatch& watch, Rhythm& rhythm, int64_t sta
   }
 }
 
+uint32_t Estimator::isolated() const {
+  uint32_t bits = 0;
+  for (const auto source : kMotionSources) {
+    if (watch(source).isolated) bits |= 1U << static_cast<unsigned>(source);
+  }
+  return bits;
+}
+
 bool Estimator::is_consistent(uint32_t excepted) const {
-  return std::ranges::none_of(kMotionSources, [&](Source source) {
-    return watch(source).isolated && (excepted & 1U << static_cast<unsigned>(source)) == 0;
-  });
+  return (isolated() & ~excepted) == 0;
 }
 
 int Estimator::sensors_at_work() const {

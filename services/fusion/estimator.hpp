@@ -81,6 +81,8 @@ class Estimator {
   [[nodiscard]] bool knows_motion() const;
   /// No motion sensor is isolated but those of `excepted` (bits 1 << Source).
   [[nodiscard]] bool is_consistent(uint32_t excepted = 0) const;
+  /// Motion sensors that are isolated, a bit each.
+  [[nodiscard]] uint32_t isolated() const;
   /// So many motion sensors measured in the last moments and were believed.
   [[nodiscard]] int sensors_at_work() const;
   /// That sensor is found to be wrong: it is isolated, with what `other` knows of it.

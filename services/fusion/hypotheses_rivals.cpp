@@ -68,7 +68,7 @@ void Hypotheses::ask(Rival& rival) {
   if (!can_say(rival)) {
     rival.asked = false;
     if (!rival.estimator) return;
-    const bool consistent = rival.estimator->is_consistent();
+    const bool consistent = !contradicts_itself(rival);
     // What the main one has not used yet the rival does not lack: it is not away.
     if (main_.watch(rival.without).used_ns == 0 && rival.estimator->knows_motion()) rival.asked_ns = now_ns;
     if (consistent && core::seconds(now_ns - rival.asked_ns) < kSameSpeedsS) stray(rival, now_ns);
@@ -108,7 +108,12 @@ void Hypotheses::ask(Rival& rival) {
 
 bool Hypotheses::can_say(const Rival& rival) const {
   return rival.estimator && main_.watch(rival.without).used_ns != 0 && rival.estimator->knows_motion() &&
-         rival.estimator->is_consistent();
+         !contradicts_itself(rival);
+}
+
+// The one without GNSS has the main one's motion sensors: what that has isolated is no contradiction here.
+bool Hypotheses::contradicts_itself(const Rival& rival) const {
+  return !rival.estimator->is_consistent(rival.without == Source::gnss ? main_.isolated() : 0);
 }
 
 void Hypotheses::begin_again(Rival& rival) const {
