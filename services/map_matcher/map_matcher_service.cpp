@@ -130,11 +130,14 @@ void MapMatcherService::use(const msg::TrainState& state) {
     context_.health().degraded("train_state is of another map than map_matcher.map: give both services the same file");
     return;
   }
-  context_.health().active();
   if (landmarks_ && before && !counts_on(*before, state)) landmarks_->forget();
-  follow(state);
-  if (place_doubt() > 0)
+  if (const auto followed = follow(state); !followed.ok()) {
+    context_.health().degraded(followed.error().message);
+  } else if (place_doubt() > 0) {
     context_.health().degraded("the sightings fit the map nowhere near the place that train_state says");
+  } else {
+    context_.health().active();
+  }
   if (chooser_) follow_without_camera();
 }
 
@@ -147,13 +150,10 @@ void MapMatcherService::stand(int64_t from_ns, int64_t to_ns) {
   }
 }
 
-void MapMatcherService::follow(const msg::TrainState& state) {
+core::Status MapMatcherService::follow(const msg::TrainState& state) {
   const auto way = followed_->follow(placed(state));
-  if (!way.ok()) {
-    context_.health().degraded(way.error().message);
-    return;
-  }
-  if (way.value() == FollowedPath::Way::same) return;
+  if (!way.ok()) return way.error();
+  if (way.value() == FollowedPath::Way::same) return {};
   const auto& path = followed_->path();
   if (way.value() == FollowedPath::Way::other_track) {
     landmarks_->change_path(path);
@@ -163,6 +163,7 @@ void MapMatcherService::follow(const msg::TrainState& state) {
     curvature_.emplace(config_.curvature_parameters(), path);
   }
   if (config_.curve_method == "exits") exits_.emplace(config_.exit_parameters(), path);
+  return {};
 }
 
 std::optional<Prior> MapMatcherService::prior_at(int64_t stamp_ns) const {

@@ -29,7 +29,7 @@ class MapMatcherService {
   void use(const msg::OdometryStep& step);
   void use(const msg::TrackView& view);
   void use(const msg::LandmarkSighting& sighting);
-  void follow(const msg::TrainState& state);
+  core::Status follow(const msg::TrainState& state);
   void stand(int64_t from_ns, int64_t to_ns);
   /// The window at a stamp, extrapolated from the last state; nothing when the place is not known or the state is too
   /// old.

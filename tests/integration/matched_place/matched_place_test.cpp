@@ -2,12 +2,15 @@
 // the state for another place, it would confirm a wrong one with the landmarks that stand there.
 #include <gmock/gmock.h>
 
+#include <set>
+
 #include "core/random.hpp"
 #include "support/on_map_matcher.hpp"
 
 namespace railfix {
 namespace {
 
+using testing::ElementsAre;
 using testing::HasSubstr;
 using track::Direction;
 using track::EdgePosition;
@@ -146,6 +149,14 @@ TEST_P(ToldStartWrongOrRight, IsDoubtedWhereTheMastsFitTheMapNowhereNearIt) {
     EXPECT_LT(last_of_track()->probability(), 0.5);
     EXPECT_LE(landmark_fixes().size(), 3U) << "of about eleven masts";
     EXPECT_THAT(reason(), HasSubstr("fit the map nowhere"));
+    // And not in turns with "active": the dashboard would flicker.
+    std::set<std::string> said;
+    listen(messaging::topics::service_status, [&](const msg::ServiceStatus& status) {
+      if (status.service() == "map_matcher") said.insert(status.reason().c_str());
+    });
+    ride(50, 2200);
+    EXPECT_THAT(reason(), HasSubstr("fit the map nowhere"));
+    EXPECT_THAT(said, ElementsAre(HasSubstr("fit the map nowhere")));
   } else {
     EXPECT_GT(last_of_track()->probability(), 0.999);
     EXPECT_GT(landmark_fixes().size(), 8U);
