@@ -146,6 +146,7 @@ class Estimator {
     int64_t window_begin_ns = 0;
     std::optional<double> window_m;  // its reading then
     int good_windows = 0;
+    bool camera_agrees = false;  // over the last second, and it turned
   };
   /// A sensor that is stuck repeats itself to the last digit.
   struct Repeated {
@@ -204,6 +205,7 @@ class Estimator {
   [[nodiscard]] bool wheel_is_alone() const;
   [[nodiscard]] double unwatched_share() const;
   void restart_wheel(int64_t stamp_ns, double wheel_m, double sigma_m);
+  void take_wheel_back(int64_t stamp_ns, double wheel_m, double sigma_m);
   void recover_wheel(const WheelInput& sample, double wheel_m, double sigma_m);
   void use_yaw_rate(double rate_rps);
   void use_track(const FixInput& fix);

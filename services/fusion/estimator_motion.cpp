@@ -17,6 +17,9 @@ constexpr int kAgreementsOfImu = 60;
 constexpr int kRepeatedSamples = 10;   // and for ...
 constexpr double kRepeatedS = 0.15;    // ... so long
 constexpr double kRecoveryWayM = 1.0;  // a wheel shows by turning that it is well again
+constexpr double kRecoveryS = 0.9;     // beside a camera ...
+constexpr double kTurnsM = 0.3;
+constexpr double kBrieflyS = 5.0;
 constexpr double kSlipWindowS = 0.5;
 constexpr int kGoodWindows = 2;
 constexpr double kSlipTestSigmas = 3.0;
@@ -103,7 +106,7 @@ bool Estimator::blame_wheel_on_trial() {
 
 void Estimator::compare_with_wheel(const OdometryInput& step, double sigma_m) {
   const auto ways = slip_watch_.picture(step);
-  if (!ways || watch(Source::wheel).isolated) return;
+  if (!ways) return;
   const double visual_m = ways->visual_m * filter_.to_unit(Odometer::camera);
   const double wheel_m = ways->wheel_m * filter_.to_unit(Odometer::wheel);
   const double noise_m = std::hypot(sigma_m * std::sqrt(ways->steps), wheel_.resolution_m);
@@ -111,7 +114,11 @@ void Estimator::compare_with_wheel(const OdometryInput& step, double sigma_m) {
   const double raw_m = std::hypot(parameters_->visual_scale_sigma, parameters_->wheel_scale_sigma) * std::abs(visual_m);
   const bool ratio_moved = std::abs(wheel_m - visual_m) > kSlipSigmas * std::hypot(noise_m, known_m);
   const bool ratio_impossible = std::abs(ways->wheel_m - ways->visual_m) > kSlipSigmas * std::hypot(noise_m, raw_m);
-  if (ratio_moved || ratio_impossible) {
+  const bool apart = ratio_moved || ratio_impossible;
+  if (watch(Source::wheel).isolated) {
+    const bool turns = std::abs(ways->wheel_m) >= kTurnsM;
+    wheel_.camera_agrees = !apart && turns && ways->time_s >= kRecoveryS;
+  } else if (apart) {
     isolate_wheel();
   } else {
     wheel_.on_trial = false;
@@ -127,6 +134,8 @@ void Estimator::isolate_wheel() {
   wheel_.good_windows = 0;
   wheel_.window_begin_ns = filter_.stamp_ns();
   wheel_.window_m.reset();
+  wheel_.camera_agrees = false;
+  slip_watch_.no_picture();
   // On trial it was wrong all the time, not since a second ago, and the speed at which the camera came back was its
   // own.
   const bool failed_trial = wheel_.on_trial && used_within(Source::camera, kBlindS);
@@ -234,9 +243,24 @@ void Estimator::restart_wheel(int64_t stamp_ns, double wheel_m, double sigma_m) 
   filter_.restart_wheel(wheel_m, sigma_m);
 }
 
+// The camera may have strayed and the wheel was blamed for it: where what it counted meanwhile is no further off than
+// that, it is used for that time, too.
+void Estimator::take_wheel_back(int64_t stamp_ns, double wheel_m, double sigma_m) {
+  auto& watch = watched(Source::wheel);
+  const bool briefly = core::seconds(stamp_ns - watch.changed_ns) < kBrieflyS;
+  if (!briefly || !filter_.offer_wheel(wheel_m, sigma_m, kSlipTestSigmas).used) {
+    restart_wheel(stamp_ns, wheel_m, sigma_m);
+  }
+  watch.accept(stamp_ns);
+}
+
 // While the wheel slips its odometer is only compared, window by window; two good windows in which it turned end the
 // slip: a wheel that is stuck agrees with every train that stands. Where there is no camera it must be taken as it is.
 void Estimator::recover_wheel(const WheelInput& sample, double wheel_m, double sigma_m) {
+  if (used_within(Source::camera, kBlindS)) {
+    if (wheel_.camera_agrees) take_wheel_back(sample.stamp_ns, wheel_m, sigma_m);
+    return;
+  }
   const auto begin_window = [&] {
     wheel_.window_begin_ns = sample.stamp_ns;
     wheel_.window_m = wheel_m;

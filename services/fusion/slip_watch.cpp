@@ -61,8 +61,9 @@ std::optional<SlipWatch::Ways> SlipWatch::picture(const OdometryInput& step) {
     marks_.push_back({step.stamp_ns, visual_m, *wheel_m, steps_});
   }
   const Mark& oldest = marks_.front();
-  if (core::seconds(step.stamp_ns - oldest.stamp_ns) < kShortestS) return std::nullopt;
-  return Ways{visual_m - oldest.visual_m, *wheel_m - oldest.wheel_m, steps_ - oldest.steps};
+  const double time_s = core::seconds(step.stamp_ns - oldest.stamp_ns);
+  if (time_s < kShortestS) return std::nullopt;
+  return Ways{visual_m - oldest.visual_m, *wheel_m - oldest.wheel_m, steps_ - oldest.steps, time_s};
 }
 
 }  // namespace railfix::fusion

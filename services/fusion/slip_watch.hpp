@@ -23,6 +23,7 @@ class SlipWatch {
     double visual_m = 0;
     double wheel_m = 0;
     int steps = 0;
+    double time_s = 0;
   };
   /// Way since the oldest picture of the window; nothing while the window is too short.
   std::optional<Ways> picture(const OdometryInput& step);
