@@ -9,6 +9,7 @@ namespace railfix::fusion {
 namespace {
 
 constexpr int kRefusalsToIsolate = 3;
+constexpr int kAgreementsOfGnss = 5;  // in a row: where it scatters one agrees by chance
 constexpr double kOffTrackM = 15.0;  // a GNSS fix further beside the track is none
 // Of the sigma of a GNSS fix; squares add up to the whole.
 constexpr double kGnssLastingShare = 0.866;
@@ -60,7 +61,9 @@ void Estimator::use(const GnssInput& sample) {
   const bool beside = std::abs(place.lateral_m) > kOffTrackM + 3 * once_m;
   const bool agrees = !beside && filter_.test_position(foot_m, once_m, parameters_->gate_gnss).used;
   const MeasuredPlace measured{foot_m, kGnssNewShare * once_m, StateIndex::gnss_error, kGnssLastingShare * once_m};
-  if (agrees && filter_.offer_position(measured, parameters_->gate_gnss).used) {
+  if (gnss.isolated) {
+    gnss.hear(agrees, kAgreementsOfGnss, sample.stamp_ns);
+  } else if (agrees && filter_.offer_position(measured, parameters_->gate_gnss).used) {
     gnss.accept(sample.stamp_ns);
     ++gnss_agreed_;
   } else if (++gnss.refused >= kRefusalsToIsolate) {
