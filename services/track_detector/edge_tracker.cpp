@@ -33,8 +33,9 @@ constexpr double kGrowth = 1.4;           // of the bearing while it was seen
 constexpr float kLeastStep = 1.5F;        // grey levels
 constexpr double kSameM = 0.35;
 
-constexpr double kStepReachM = 9;  // looks from farther away show the end of a wall too narrow
-constexpr int kFewestStepLooks = 6;
+constexpr double kStepWideShare =
+    0.65;  // of the widest bearing: looks from farther away show the end of a wall too narrow
+constexpr int kFewestStepLooks = 3;
 constexpr double kStepM = 0.03;
 constexpr double kStepTopM = 0.06;
 constexpr double kBesideStep = 0.8;  // of a step is beside it
@@ -276,6 +277,7 @@ void EdgeTracker::take(const UprightEdge& found) {
     candidate.outer_grey += found.outer_grey;
     candidate.wall_grey += found.wall_grey;
     candidate.deep_grey += found.deep_grey;
+    candidate.near_inner_grey = found.inner_grey;
     ++candidate.hits;
     if (candidate.stripe_count < kMostStripes)
       candidate.stripe[candidate.stripe_count++] = {now.way_m, found.bearing, found.outward, found.inward};
@@ -329,6 +331,7 @@ void EdgeTracker::settle() {
     edge.outer_grey = candidate.outer_grey / candidate.hits;
     edge.wall_grey = candidate.wall_grey / candidate.hits;
     edge.deep_grey = candidate.deep_grey / candidate.hits;
+    edge.near_inner_grey = candidate.near_inner_grey;
     edge.stripe = candidate.stripe;
     edge.stripe_count = candidate.stripe_count;
     settled_.push_back(edge);
@@ -336,36 +339,42 @@ void EdgeTracker::settle() {
   std::erase_if(candidates_, [this](const Candidate& candidate) { return way_m_ - candidate.hit_m >= kPatienceM; });
 }
 
-// Mean over the near looks, in grey levels, of how much brighter it is beyond a place on the walls than before it.
-double EdgeTracker::brightening(double place_m, const std::array<double, 2>& walls_m) const {
+double EdgeTracker::leaves_ahead_m(double lateral_m) const {
+  return widest_ > 0 ? std::abs(lateral_m) / widest_ : 0.0;
+}
+
+// Mean over the near looks, in grey levels, of how much brighter it is beyond a place on a wall than before it.
+double EdgeTracker::brightening(double place_m, double wall_m) const {
   const Look& now = looks_[newest_];
   const double k = now.curvature_per_m;
   const double ahead_m = place_m - now.way_m;
+  const double y_m = wall_m + 0.5 * k * ahead_m * ahead_m - now.eye_lateral_m;
+  const double x_m = ahead_m - wall_m * k * ahead_m;
   double sum = 0;
   int n = 0;
-  for (const double lateral_m : walls_m) {
-    const double y_m = lateral_m + 0.5 * k * ahead_m * ahead_m - now.eye_lateral_m;
-    const double x_m = ahead_m - lateral_m * k * ahead_m;
-    for (const Relative& relative : relatives_) {
-      if (ahead_m + relative.back_m < 1 || ahead_m + relative.back_m > kStepReachM) continue;
-      const double at = bearing_of(relative, x_m, y_m, 0);
-      const int column = static_cast<int>(at / cell_ + middle_ + 0.5);
-      if (std::abs(at) > widest_ || column < 0 || column >= static_cast<int>(relative.look->step.size())) continue;
-      const double step = static_cast<double>(relative.look->step[static_cast<size_t>(column)]);
-      sum += lateral_m > 0 ? -step : step;
-      ++n;
-    }
+  for (const Relative& relative : relatives_) {
+    if (ahead_m + relative.back_m < 1) continue;
+    const double at = bearing_of(relative, x_m, y_m, 0);
+    if (std::abs(at) > widest_) continue;
+    if (std::abs(at) < kStepWideShare * widest_) break;
+    const double column = at / cell_ + middle_;
+    const auto below = static_cast<size_t>(column);
+    const auto& step = relative.look->step;
+    if (column < 0 || below + 1 >= step.size()) continue;
+    const double part = column - static_cast<double>(below);
+    sum += (1 - part) * static_cast<double>(step[below]) + part * static_cast<double>(step[below + 1]);
+    ++n;
   }
-  return n < kFewestStepLooks ? 0.0 : sum / n;
+  return n < kFewestStepLooks ? 0.0 : (wall_m > 0 ? -sum : sum) / n;
 }
 
-std::optional<double> EdgeTracker::last_step(const std::array<double, 2>& walls_m, double from_m, double to_m) const {
+std::optional<double> EdgeTracker::last_step(double wall_m, double from_m, double to_m) const {
   if (count_ == 0) return std::nullopt;
   // From the far end: the first clear one, at its top.
   double best = 0;
   double best_m = 0;
   for (double place_m = to_m; place_m > from_m; place_m -= kStepM) {
-    const double step = std::abs(brightening(place_m, walls_m));
+    const double step = std::abs(brightening(place_m, wall_m));
     if (step > std::max(best, kClearStep)) {
       best = step;
       best_m = place_m;

@@ -35,6 +35,7 @@ struct SettledEdge {
   double outer_grey = 0;
   double wall_grey = 0;        // behind it towards the track, mean
   double deep_grey = 0;        // the same, farther away
+  double near_inner_grey = 0;  // inner_grey of the nearest look alone: exposure has adapted most
   double cell = 0;             // bearing between two columns
   double curvature_per_m = 0;  // of the track there
   int pictures = 0;
@@ -51,9 +52,11 @@ class EdgeTracker {
   const std::vector<SettledEdge>& follow(const std::vector<UprightEdge>& found, const UprightProfile& profile,
                                          const LandmarkPicture& picture, double way_m);
   void forget();
-  /// Along the two walls at those lateral offsets: the last place in the range where the brightness steps alike on
-  /// both, seen over the near looks together.
-  [[nodiscard]] std::optional<double> last_step(const std::array<double, 2>& walls_m, double from_m, double to_m) const;
+  /// Along the wall at that lateral offset: the last place in the range where the brightness steps, seen over the near
+  /// looks together.
+  [[nodiscard]] std::optional<double> last_step(double wall_m, double from_m, double to_m) const;
+  /// What stands so far beside the eye leaves the picture so far ahead.
+  [[nodiscard]] double leaves_ahead_m(double lateral_m) const;
 
  private:
   // Where the eye was in the plan, and what it saw.
@@ -74,6 +77,7 @@ class EdgeTracker {
     double support = 0;
     double hit_m = 0;                                                     // way where it was seen last
     double inner_grey = 0, outer_grey = 0, wall_grey = 0, deep_grey = 0;  // sums
+    double near_inner_grey = 0;
     int hits = 0;
     size_t stripe_count = 0;
     std::array<StripeMeasurement, kMostStripes> stripe{};
@@ -93,7 +97,7 @@ class EdgeTracker {
   [[nodiscard]] std::array<Spot, 2> locate(double bearing, int sign) const;
   [[nodiscard]] std::optional<double> measure(const Relative& relative, double bearing, int sign) const;
   [[nodiscard]] std::optional<SettledEdge> refine(Spot& spot, int sign) const;
-  [[nodiscard]] double brightening(double place_m, const std::array<double, 2>& walls_m) const;
+  [[nodiscard]] double brightening(double place_m, double wall_m) const;
   [[nodiscard]] static Relative itself(const Look& look) { return {&look, 0, 0, 0, 1, 0}; }
   void settle();
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 namespace railfix::track_detector {
 namespace {
@@ -20,7 +19,13 @@ constexpr double kDeepShare = 0.5;
 constexpr double kPairShare = 0.5;  // of one side's sigma
 constexpr double kSameWallM = 0.3;
 constexpr double kMouthM = 8;
-constexpr double kExitSigmaM = 0.2;  // the last piece of wall may be as bright as the land in the glare
+constexpr double kWallSigmaM = 0.03;    // of its lateral offset at the portal in
+constexpr double kWallStray_m2 = 4e-5;  // ... and more from one edge on it to the next
+constexpr double kExitSigmaM = 0.2;     // the last piece of wall may be as bright as the land in the glare
+constexpr double kEndSigmaM = 0.08;     // of an end that was measured on both walls
+constexpr double kExitAgreesM = 0.15;   // both ways to measure it
+constexpr double kAlikeShare = 0.7;     // of the farther wall's lateral offset
+constexpr double kOneEndSigmaM = 0.12;
 constexpr double kStripeRmsM = 0.03;
 constexpr double kExitOffM = 0.6;       // of an exit that one side's edge told
 constexpr double kPanelM = 2.3;         // of the lining, at most
@@ -123,7 +128,9 @@ const std::vector<UprightObject>& UprightObjects::add(const std::vector<SettledE
   for (const SettledEdge& edge : edges) {
     if (lit_walls()) continue;  // of a tunnel at night, perhaps: lamps, niches, panels
     if (edge.sigma_m < kWorstEdgeM) edges_.push_back({edge, way_m});
-    if (in_tunnel(edge.place_m)) look_for_exit(edge);
+    if (!in_tunnel(edge.place_m)) continue;
+    follow_wall(edge);
+    look_for_exit(edge);
   }
   if (!edges.empty()) {
     std::sort(edges_.begin(), edges_.end(),
@@ -133,7 +140,7 @@ const std::vector<UprightObject>& UprightObjects::add(const std::vector<SettledE
   find_stripes(way_m);
   pair_sides(way_m);
   release(way_m);
-  release_exit(tracker, way_m);
+  release_exit(tracker, way_m, beside_grey);
   std::erase_if(edges_, [way_m](const Edge& e) { return e.edge.place_m < way_m - kForgetM; });
   std::erase_if(masts_, [way_m](const UprightObject& mast) { return mast.place_m < way_m - 2 * kForgetM; });
   return objects_;
@@ -247,6 +254,18 @@ void UprightObjects::move_to_mouth(UprightObject& portal, const SettledEdge& lef
   }
 }
 
+// Joints, niches and panels on a wall tell where it is now: the place of its end is as good as its lateral offset, and
+// that of the portal in was measured with another error of the way, of a profile that may be another one.
+void UprightObjects::follow_wall(const SettledEdge& edge) {
+  const size_t side = edge.lateral_m > 0 ? 1 : 0;
+  const double off_m = edge.lateral_m - tunnel_.wall_m[side];
+  if (std::abs(off_m) > kSameWallM) return;
+  const double variance = std::pow(tunnel_.wall_sigma_m[side], 2) + kWallStray_m2;
+  const double gain = variance / (variance + std::pow(edge.lateral_sigma_m, 2));
+  tunnel_.wall_m[side] += gain * off_m;
+  tunnel_.wall_sigma_m[side] = std::sqrt((1 - gain) * variance);
+}
+
 // Where the walls end there is daylight. Before the camera has got used to it, the end is hidden in glare and only the
 // panels before it show; so it is taken from the near looks alone, with the wall's lateral offset, which is known.
 void UprightObjects::look_for_exit(const SettledEdge& edge) {
@@ -268,7 +287,7 @@ void UprightObjects::look_for_exit(const SettledEdge& edge) {
     weights += weight;
   }
   if (sum < exit.place_m * weights) return;
-  exit = {sum / weights, edge.sigma_m, edge.pictures, edge.inner_grey > kBurntOutGrey};
+  exit = {sum / weights, edge.sigma_m, edge.pictures, edge.near_inner_grey > kBurntOutGrey};
 }
 
 // A portal's outer corners look like a bridge and come first.
@@ -289,7 +308,7 @@ void UprightObjects::release(double way_m) {
   for (const UprightObject& held : held_) {
     if (held.place_m > way_m + kHoldM || in_tunnel(held.place_m + kForgetM)) continue;
     if (held.type == LandmarkType::portal_in) {
-      tunnel_ = {held.place_m, held.outer_grey, held.wall_m};
+      tunnel_ = {held.place_m, held.outer_grey, held.wall_m, {kWallSigmaM, kWallSigmaM}};
       exits_ = {};
     }
     if (held.type == LandmarkType::bridge) {
@@ -302,27 +321,57 @@ void UprightObjects::release(double way_m) {
 }
 
 // The wall beside another track is seen from farther away: an error of its bearing counts by that much more.
-double UprightObjects::mean_of_walls_m() const {
-  double sum = 0, weights = 0;
-  for (size_t side = 0; side < 2; ++side) {
-    const double weight = 1 / std::pow(tunnel_.wall_m[side], 2);
-    sum += weight * exits_[side].place_m;
-    weights += weight;
-  }
-  return sum / weights;
+double UprightObjects::mean_of_walls_m(double right_m, double left_m) const {
+  const double right_weight = 1 / std::pow(tunnel_.wall_m[0], 2);
+  const double left_weight = 1 / std::pow(tunnel_.wall_m[1], 2);
+  return (right_weight * right_m + left_weight * left_m) / (right_weight + left_weight);
 }
 
-// When the last end of a wall is behind the train, no panel can follow.
-void UprightObjects::release_exit(const EdgeTracker& tracker, double way_m) {
+// Where the brightness steps last. Each wall by itself: on the one the last piece may be as bright as the land while
+// the other one shows its end. Walls that are equally near see alike: what one of them alone shows far from the
+// followed edges stands behind the tunnel.
+std::optional<UprightObjects::End> UprightObjects::end_of_walls(const EdgeTracker& tracker, double place_m) const {
+  const size_t near = std::abs(tunnel_.wall_m[0]) < std::abs(tunnel_.wall_m[1]) ? 0 : 1;
+  const bool alike = kAlikeShare * std::abs(tunnel_.wall_m[1 - near]) < std::abs(tunnel_.wall_m[near]);
+  std::array<std::optional<double>, 2> ends_m;
+  for (size_t side = 0; side < 2; ++side) {
+    ends_m[side] = tracker.last_step(tunnel_.wall_m[side], place_m - kExitOffM, place_m + kPanelM);
+  }
+  if (ends_m[0] && ends_m[1] && std::abs(*ends_m[0] - *ends_m[1]) < kSidesM)
+    return End{mean_of_walls_m(*ends_m[0], *ends_m[1]), kEndSigmaM};
+  for (const size_t side : {near, 1 - near}) {
+    const auto& end_m = ends_m[side];
+    if (end_m && (!alike || std::abs(*end_m - place_m) < kSidesM)) return End{*end_m, kOneEndSigmaM};
+  }
+  return std::nullopt;
+}
+
+// From so far ahead on an end and the panel that may follow it show no more, even on the wall that is nearer. What the
+// train runs until then is known less well than the end.
+double UprightObjects::exit_hold_m(const EdgeTracker& tracker) const {
+  const double near_m = std::min(std::abs(tunnel_.wall_m[0]), std::abs(tunnel_.wall_m[1]));
+  return std::max(kHoldM, tracker.leaves_ahead_m(near_m) - kPanelM);
+}
+
+void UprightObjects::release_exit(const EdgeTracker& tracker, double way_m, double beside_grey) {
   const Exit& first = exits_[0].place_m > exits_[1].place_m ? exits_[0] : exits_[1];
   const Exit& other = &first == exits_.data() ? exits_[1] : exits_[0];
-  if (first.pictures == 0 || first.place_m > way_m + kHoldM) return;
+  if (first.pictures == 0 || first.place_m > way_m + exit_hold_m(tracker)) return;
+  if (beside_grey < kOutShare * light_.usual_grey) {  // a lamp's light on the wall, and behind it the dark again
+    exits_ = {};
+    return;
+  }
   const bool both = first.place_m - other.place_m < kSidesM;
-  double place_m = both ? mean_of_walls_m() : first.place_m;
-  // The last piece of wall may be nearly as bright as the land behind it: its end is faint.
-  if (const auto end_m = tracker.last_step(tunnel_.wall_m, place_m - kExitOffM, place_m + kPanelM)) place_m = *end_m;
   const bool hidden = first.burnt_out && (!both || other.burnt_out);
-  const double sigma_m = std::hypot(kExitSigmaM, both ? 0.0 : kOneSideSigmaM, hidden ? kHiddenSigmaM : 0.0);
+  double place_m = both ? mean_of_walls_m(exits_[0].place_m, exits_[1].place_m) : first.place_m;
+  double sigma_m = std::hypot(kExitSigmaM, both ? 0.0 : kOneSideSigmaM);
+  // The last piece of wall may be nearly as bright as the land behind it: its end is faint.
+  if (const auto end = end_of_walls(tracker, place_m)) {
+    // Where an edge stood farther on, a panel may follow that is as bright as the land.
+    sigma_m = std::hypot(end->sigma_m, std::max(0.0, first.place_m - end->place_m - kExitAgreesM));
+    place_m = end->place_m;
+  }
+  if (hidden) sigma_m = std::hypot(sigma_m, kHiddenSigmaM);
   objects_.push_back({LandmarkType::portal_out, place_m, 0, sigma_m, first.pictures});
   tunnel_ = {};
   exits_ = {};

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "track_detector/edge_tracker.hpp"
@@ -46,16 +47,23 @@ class UprightObjects {
   void pair_sides(double way_m);
   [[nodiscard]] bool belongs_to_mast(const SettledEdge& edge) const;
   void move_to_mouth(UprightObject& portal, const SettledEdge& left, const SettledEdge& right) const;
+  void follow_wall(const SettledEdge& edge);
   void look_for_exit(const SettledEdge& edge);
   void release(double way_m);
-  void release_exit(const EdgeTracker& tracker, double way_m);
-  [[nodiscard]] double mean_of_walls_m() const;
+  void release_exit(const EdgeTracker& tracker, double way_m, double beside_grey);
+  [[nodiscard]] double exit_hold_m(const EdgeTracker& tracker) const;
+  [[nodiscard]] double mean_of_walls_m(double right_m, double left_m) const;
+  struct End {
+    double place_m = 0, sigma_m = 0;
+  };
+  [[nodiscard]] std::optional<End> end_of_walls(const EdgeTracker& tracker, double place_m) const;
   void hold(const UprightObject& object);
 
   struct Tunnel {
     double since_m = -1e9;               // the portal in that no portal out has followed yet
     double daylight_grey = 0;            // beside it
-    std::array<double, 2> wall_m{0, 0};  // right and left
+    std::array<double, 2> wall_m{0, 0};  // right and left, where the last edges on them stood
+    std::array<double, 2> wall_sigma_m{0, 0};
   };
   struct Light {
     bool known = false;

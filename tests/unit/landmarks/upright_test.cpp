@@ -16,6 +16,8 @@ constexpr double kWidest = 0.55;
 /// An upright line beside straight track; `wall` and `deep` is what lies behind it towards the track.
 struct Corner {
   double place_m, lateral_m, inner_grey, outer_grey, wall_grey = 100, deep_grey = 100;
+  double shows_m = 40;  // from nearer than this: it is burnt out until the camera has got used to the light
+  double fades_m = 2;   // until nearer than this: the land behind it is as bright
 };
 
 // Of a place so far on along the track and beside it, from a camera that looks along the track.
@@ -38,7 +40,7 @@ UprightProfile see(const std::vector<Corner>& corners, double way_m, std::vector
   for (const Corner& corner : corners) {
     const double ahead_m = corner.place_m - way_m;
     const double bearing = bearing_of(ahead_m, corner.lateral_m, curvature_per_m);
-    if (ahead_m < 2 || ahead_m > 40 || std::abs(bearing) > kWidest) continue;
+    if (ahead_m < corner.fades_m || ahead_m > corner.shows_m || std::abs(bearing) > kWidest) continue;
     const double side = corner.lateral_m > 0 ? 1 : -1;
     edges.push_back({bearing, corner.inner_grey, corner.outer_grey, corner.wall_grey, corner.deep_grey});
     for (int c = 0; c < 641; ++c) {
@@ -183,6 +185,96 @@ TEST(Uprights, TheNearWallTellsThePortalOutBetterThanTheFarOne) {
   EXPECT_NEAR(told[1].place_m, 72.5, 0.2);
 }
 
+// As in a drawn tunnel for two tracks: behind the last panel but one everything is burnt out until a few looks before
+// the near wall's end leaves the picture, too few to follow it; the far wall's end has left before.
+TEST(Uprights, TheNearWallShowsItsEndInAFewLooksOnly) {
+  const auto told = pass({{40, -2.7, 70, 120, 60, 15},
+                          {40, 6.8, 70, 120, 60, 15},
+                          {70, 6.8, 240, 130, 240, 238},
+                          {72, -2.7, 245, 225, 245, 245, 7.3}},
+                         85);
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_EQ(told[1].type, LandmarkType::portal_out);
+  EXPECT_NEAR(told[1].place_m, 72, 0.1);
+}
+
+// Narrower than its portal in by a hand's width on each side: 0.2 m too near for who does not look again.
+TEST(Uprights, ATunnelThatGetsNarrowerEndsWhereItsWallsAre) {
+  std::vector<Corner> corners = {{40, 2.7, 70, 120, 60, 15}};
+  for (double place_m = 45; place_m < 70; place_m += 5) corners.push_back({place_m, 2.6, 60, 40, 60, 15});
+  corners.push_back({72, 2.6, 240, 150, 240, 238});
+  const auto told = pass(on_both_walls(corners), 85);
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_EQ(told[1].type, LandmarkType::portal_out);
+  EXPECT_NEAR(told[1].place_m, 72, 0.08);
+}
+
+// What the train runs after its end has left the picture is known less well than the end.
+TEST(Uprights, APortalOutIsToldWhenItHasLeftThePicture) {
+  const auto corners = on_both_walls({{40, 2.7, 70, 120, 60, 15}, {70, 2.7, 240, 150, 240, 238}});
+  const double leaves_m = 2.7 / kWidest;
+  EXPECT_EQ(pass(corners, 70 - leaves_m).size(), 1U);
+  EXPECT_EQ(pass(corners, 70 - leaves_m + 2.3 + 2 * kStepM).size(), 2U);
+}
+
+// As on a drawn line: something stands in line with one wall behind the tunnel.
+TEST(Uprights, WhatOneOfTwoLikeWallsShowsBehindTheEndIsNotTheEnd) {
+  auto corners = on_both_walls({{40, 2.7, 70, 120, 60, 15}, {70, 2.7, 236, 150, 236, 238}});
+  corners.push_back({72, 2.7, 225, 236, 225, 236, 7.3});
+  const auto told = pass(corners, 80);
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_EQ(told[1].type, LandmarkType::portal_out);
+  EXPECT_NEAR(told[1].place_m, 70, 0.08);
+}
+
+// Land as bright as the last half metre of wall: what was followed and the clearest step do not agree.
+TEST(Uprights, AnEndThatIsToldInTwoWaysSaysSo) {
+  const auto told = pass({{40, 2.7, 70, 120, 60, 15},
+                          {40, -2.7, 70, 120, 60, 15},
+                          {69.5, 2.7, 236, 150, 236, 238},
+                          {69.5, -2.7, 236, 150, 236, 238},
+                          {70, -2.7, 239, 221, 239, 238, 40, 7.6}},
+                         80);
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_EQ(told[1].type, LandmarkType::portal_out);
+  EXPECT_LT(std::abs(told[1].place_m - 70), 2 * told[1].sigma_m);
+}
+
+// As in a drawn tunnel in a curve: a panel in a lamp's light is as bright to a camera that is used to the dark as land
+// was before the tunnel, and the mouth shows elsewhere.
+TEST(Uprights, APanelInALampsLightIsNotThePortalOut) {
+  EdgeTracker tracker;
+  UprightObjects objects;
+  std::vector<UprightObject> told;
+  std::vector<UprightEdge> edges;
+  const auto corners =
+      on_both_walls({{40, 2.7, 70, 110, 60, 15}, {70, 2.7, 100, 46, 100, 34}, {72.5, 2.7, 29, 60, 29, 34}});
+  for (double way_m = 0; way_m < 80; way_m += kStepM) {
+    const auto profile = see(corners, way_m, edges);
+    const auto& settled = tracker.follow(edges, profile, {}, way_m);
+    for (const auto& object : objects.add(settled, tracker, way_m, way_m < 40 ? kDay : kLining)) told.push_back(object);
+  }
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0].type, LandmarkType::portal_in);
+}
+
+// The look that has adapted most decides whether a panel may be hidden.
+TEST(Uprights, AnEndThatWasBurntOutAtFirstHidesNothing) {
+  EdgeTracker tracker;
+  UprightObjects objects;
+  std::vector<UprightObject> told;
+  std::vector<UprightEdge> edges;
+  for (double way_m = 0; way_m < 80; way_m += kStepM) {
+    const double land_grey = way_m < 64.3 ? 252 : 238;
+    const auto profile =
+        see(on_both_walls({{40, 2.7, 70, 120, 60, 15}, {70, 2.7, land_grey, 150, land_grey, 248}}), way_m, edges);
+    const auto& settled = tracker.follow(edges, profile, {}, way_m);
+    for (const auto& object : objects.add(settled, tracker, way_m, kDay)) told.push_back(object);
+  }
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_LT(told[1].sigma_m, 0.2);
+}
+
 // Greys of a drawn tunnel: the camera is used to the dark, and one wall's panel as bright as land was before it.
 TEST(Uprights, APanelThatGlaresBeforeTheEndIsNotThePortalOut) {
   std::vector<Corner> corners;
@@ -207,7 +299,7 @@ TEST(Uprights, AnEndBeforeBurntOutLandMayHideAPanel) {
     return told.size() == 2 ? told[1].sigma_m : 0.0;
   };
   EXPECT_GT(sigma_m(247), 0.6);
-  EXPECT_NEAR(sigma_m(238), 0.2, 0.05);
+  EXPECT_LT(sigma_m(238), 0.2);
 }
 
 // Greys of a drawn tunnel: the last panel but one glares, and the last one is nearly as bright as the land.
@@ -230,7 +322,8 @@ TEST(Uprights, NoiseIsNoLastStepOfAWall) {
       for (float& step : profile.step) step = static_cast<float>(1.5 * random.normal());
       tracker.follow(edges, profile, {}, way_m);
     }
-    EXPECT_FALSE(tracker.last_step({-2.7, 2.7}, way_m, way_m + 2.3)) << "seed " << seed;
+    for (const double wall_m : {-2.7, 2.7})
+      EXPECT_FALSE(tracker.last_step(wall_m, way_m, way_m + 2.3)) << "seed " << seed;
   }
 }
 
