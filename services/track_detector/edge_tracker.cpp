@@ -277,7 +277,6 @@ void EdgeTracker::take(const UprightEdge& found) {
     candidate.outer_grey += found.outer_grey;
     candidate.wall_grey += found.wall_grey;
     candidate.deep_grey += found.deep_grey;
-    candidate.near_inner_grey = found.inner_grey;
     ++candidate.hits;
     if (candidate.stripe_count < kMostStripes)
       candidate.stripe[candidate.stripe_count++] = {now.way_m, found.bearing, found.outward, found.inward};
@@ -331,7 +330,6 @@ void EdgeTracker::settle() {
     edge.outer_grey = candidate.outer_grey / candidate.hits;
     edge.wall_grey = candidate.wall_grey / candidate.hits;
     edge.deep_grey = candidate.deep_grey / candidate.hits;
-    edge.near_inner_grey = candidate.near_inner_grey;
     edge.stripe = candidate.stripe;
     edge.stripe_count = candidate.stripe_count;
     settled_.push_back(edge);

@@ -35,7 +35,6 @@ struct SettledEdge {
   double outer_grey = 0;
   double wall_grey = 0;        // behind it towards the track, mean
   double deep_grey = 0;        // the same, farther away
-  double near_inner_grey = 0;  // inner_grey of the nearest look alone: exposure has adapted most
   double cell = 0;             // bearing between two columns
   double curvature_per_m = 0;  // of the track there
   int pictures = 0;
@@ -77,7 +76,6 @@ class EdgeTracker {
     double support = 0;
     double hit_m = 0;                                                     // way where it was seen last
     double inner_grey = 0, outer_grey = 0, wall_grey = 0, deep_grey = 0;  // sums
-    double near_inner_grey = 0;
     int hits = 0;
     size_t stripe_count = 0;
     std::array<StripeMeasurement, kMostStripes> stripe{};

@@ -24,6 +24,7 @@ constexpr double kWallStray_m2 = 4e-5;  // ... and more from one edge on it to t
 constexpr double kExitSigmaM = 0.2;     // the last piece of wall may be as bright as the land in the glare
 constexpr double kEndSigmaM = 0.08;     // of an end that was measured on both walls
 constexpr double kExitAgreesM = 0.15;   // both ways to measure it
+constexpr double kSettlesM = 2.1;       // after it has left the picture, an edge is given
 constexpr double kAlikeShare = 0.7;     // of the farther wall's lateral offset
 constexpr double kOneEndSigmaM = 0.12;
 constexpr double kStripeRmsM = 0.03;
@@ -287,7 +288,7 @@ void UprightObjects::look_for_exit(const SettledEdge& edge) {
     weights += weight;
   }
   if (sum < exit.place_m * weights) return;
-  exit = {sum / weights, edge.sigma_m, edge.pictures, edge.near_inner_grey > kBurntOutGrey};
+  exit = {sum / weights, edge.sigma_m, edge.pictures, edge.inner_grey > kBurntOutGrey};
 }
 
 // A portal's outer corners look like a bridge and come first.
@@ -327,12 +328,21 @@ double UprightObjects::mean_of_walls_m(double right_m, double left_m) const {
   return (right_weight * right_m + left_weight * left_m) / (right_weight + left_weight);
 }
 
+size_t UprightObjects::near_wall() const {
+  return std::abs(tunnel_.wall_m[0]) < std::abs(tunnel_.wall_m[1]) ? 0 : 1;
+}
+
+bool UprightObjects::walls_alike() const {
+  const size_t near = near_wall();
+  return kAlikeShare * std::abs(tunnel_.wall_m[1 - near]) < std::abs(tunnel_.wall_m[near]);
+}
+
 // Where the brightness steps last. Each wall by itself: on the one the last piece may be as bright as the land while
 // the other one shows its end. Walls that are equally near see alike: what one of them alone shows far from the
 // followed edges stands behind the tunnel.
 std::optional<UprightObjects::End> UprightObjects::end_of_walls(const EdgeTracker& tracker, double place_m) const {
-  const size_t near = std::abs(tunnel_.wall_m[0]) < std::abs(tunnel_.wall_m[1]) ? 0 : 1;
-  const bool alike = kAlikeShare * std::abs(tunnel_.wall_m[1 - near]) < std::abs(tunnel_.wall_m[near]);
+  const size_t near = near_wall();
+  const bool alike = walls_alike();
   std::array<std::optional<double>, 2> ends_m;
   for (size_t side = 0; side < 2; ++side) {
     ends_m[side] = tracker.last_step(tunnel_.wall_m[side], place_m - kExitOffM, place_m + kPanelM);
@@ -350,7 +360,7 @@ std::optional<UprightObjects::End> UprightObjects::end_of_walls(const EdgeTracke
 // train runs until then is known less well than the end.
 double UprightObjects::exit_hold_m(const EdgeTracker& tracker) const {
   const double near_m = std::min(std::abs(tunnel_.wall_m[0]), std::abs(tunnel_.wall_m[1]));
-  return std::max(kHoldM, tracker.leaves_ahead_m(near_m) - kPanelM);
+  return std::max(kHoldM, tracker.leaves_ahead_m(near_m) - kPanelM - kSettlesM);
 }
 
 void UprightObjects::release_exit(const EdgeTracker& tracker, double way_m, double beside_grey) {
@@ -367,9 +377,13 @@ void UprightObjects::release_exit(const EdgeTracker& tracker, double way_m, doub
   double sigma_m = std::hypot(kExitSigmaM, both ? 0.0 : kOneSideSigmaM);
   // The last piece of wall may be nearly as bright as the land behind it: its end is faint.
   if (const auto end = end_of_walls(tracker, place_m)) {
-    // Where an edge stood farther on, a panel may follow that is as bright as the land.
-    sigma_m = std::hypot(end->sigma_m, std::max(0.0, first.place_m - end->place_m - kExitAgreesM));
-    place_m = end->place_m;
+    // Where an edge was followed farther on, the last panel is about as bright as the land and shows no clear step.
+    // What the wall beside another track shows tells less.
+    const double followed_m = walls_alike() ? first.place_m : exits_[near_wall()].place_m;
+    const double farther_m = followed_m - end->place_m;
+    const bool agree = farther_m < kExitAgreesM;
+    place_m = agree ? end->place_m : followed_m;
+    sigma_m = agree ? end->sigma_m : std::hypot(kOneEndSigmaM, farther_m);
   }
   if (hidden) sigma_m = std::hypot(sigma_m, kHiddenSigmaM);
   objects_.push_back({LandmarkType::portal_out, place_m, 0, sigma_m, first.pictures});

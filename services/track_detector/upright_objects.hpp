@@ -53,6 +53,8 @@ class UprightObjects {
   void release_exit(const EdgeTracker& tracker, double way_m, double beside_grey);
   [[nodiscard]] double exit_hold_m(const EdgeTracker& tracker) const;
   [[nodiscard]] double mean_of_walls_m(double right_m, double left_m) const;
+  [[nodiscard]] size_t near_wall() const;
+  [[nodiscard]] bool walls_alike() const;
   struct End {
     double place_m = 0, sigma_m = 0;
   };
