@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kRefusalsToIsolate = 3;
 constexpr int kAgreementsOfGnss = 5;  // in a row: where it scatters one agrees by chance
-constexpr double kOffTrackM = 15.0;  // a GNSS fix further beside the track is none
+constexpr double kOffTrackM = 15.0;   // a GNSS fix further beside the track is none
 // Of the sigma of a GNSS fix; squares add up to the whole.
 constexpr double kGnssLastingShare = 0.866;
 constexpr double kGnssNewShare = 0.5;

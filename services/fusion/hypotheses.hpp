@@ -108,6 +108,7 @@ class Hypotheses {
   void ask(Rival& rival);
   [[nodiscard]] bool can_say(const Rival& rival) const;
   [[nodiscard]] bool contradicts_itself(const Rival& rival) const;
+  [[nodiscard]] bool main_is_sound_without(Source source) const;
   void begin_again(Rival& rival) const;
   void lose_sight(Rival& rival, int64_t now_ns) const;
   static void stray(Rival& rival, int64_t now_ns);

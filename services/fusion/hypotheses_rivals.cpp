@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kRivalGoneS = 1.0;
 constexpr double kProofS = 2.0;
+constexpr double kMeasuresS = 0.3;
 constexpr double kSameSpeedsS = 3.0;
 
 }  // namespace
@@ -73,6 +74,7 @@ void Hypotheses::ask(Rival& rival) {
     if (main_.watch(rival.without).used_ns == 0 && rival.estimator->knows_motion()) rival.asked_ns = now_ns;
     if (consistent && core::seconds(now_ns - rival.asked_ns) < kSameSpeedsS) stray(rival, now_ns);
     rival.contradicted = rival.contradicted || !consistent;
+    if (rival.contradicted && main_is_sound_without(rival.without)) begin_again(rival);
     return;
   }
   auto& other = *rival.estimator;
@@ -114,6 +116,15 @@ bool Hypotheses::can_say(const Rival& rival) const {
 // The one without GNSS has the main one's motion sensors: what that has isolated is no contradiction here.
 bool Hypotheses::contradicts_itself(const Rival& rival) const {
   return !rival.estimator->is_consistent(rival.without == Source::gnss ? main_.isolated() : 0);
+}
+
+// Nothing contradicts anything, and another odometer measures: a rival that has lost its way may begin again, so that
+// it knows its own when it is needed.
+bool Hypotheses::main_is_sound_without(Source source) const {
+  const int64_t now_ns = main_.filter().stamp_ns();
+  return main_.is_consistent() && std::ranges::any_of(std::array{Source::camera, Source::wheel}, [&](Source odometer) {
+           return odometer != source && core::seconds(now_ns - main_.watch(odometer).used_ns) < kMeasuresS;
+         });
 }
 
 void Hypotheses::begin_again(Rival& rival) const {

@@ -299,5 +299,13 @@ TEST(Coverage, GnssThatContradictsIsNotBelievedForOneAgreement) {
   EXPECT_EQ(outside_in({3150, 1406, Sensor::gnss, FaultKind::noise}), 0U);
 }
 
+// The train stands for minutes, and starts with a stuck wheel. What does without the wheel had lost its way before that
+// and could not say that the train moves: 179 states were outside, by up to 51 m.
+TEST(Coverage, WhatLostItsWayIsWellAgainWhenItIsNeeded) {
+  const CampaignRun run{
+      .seed = 3160, .number = 2539, .sensor = Sensor::wheel, .kind = FaultKind::stuck, .start_told = false};
+  EXPECT_EQ(outside_in(run), 0U);
+}
+
 }  // namespace
 }  // namespace railfix::fusion
