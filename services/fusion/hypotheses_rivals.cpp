@@ -127,9 +127,11 @@ bool Hypotheses::main_is_sound_without(Source source) const {
          });
 }
 
+// What it had said before stays.
 void Hypotheses::begin_again(Rival& rival) const {
   rival.estimator = main_;
   rival.estimator->do_without(rival.without);
+  rival.carried = rival.excess;
 }
 
 // It takes over a place that the main one has counted by the very sensor that this rival doubts: should that prove
