@@ -114,9 +114,10 @@ bool Hypotheses::adopt_doubter(const FixInput& fix, std::vector<Doubter> before)
 }
 
 Hypotheses::Doubter Hypotheses::without_one(const FixInput& fix, Estimator before, const Excess& most) const {
-  Doubter doubter{std::move(before), fix.landmark, fix.kind == FixKind::curvature};
+  Doubter doubter{.estimator = std::move(before), .landmark = fix.landmark, .of_shape = fix.kind == FixKind::curvature};
   const Interval slip = doubter.estimator.widened({});
   doubter.excused_m = std::max({most.behind_m, most.ahead_m, -slip.behind_m, slip.ahead_m});
+  doubter.surprising = doubter.of_shape && main_.fix_sigmas_off(0) >= kUnlikelySigmas;
   doubter.confirmed_by = doubter.estimator.landmarks_agreed();
   doubter.against = main_.fix_corrected() ? kFixesOfAClaim : 1;
   return doubter;

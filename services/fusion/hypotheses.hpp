@@ -65,16 +65,19 @@ class Hypotheses {
   /// The main one without a fix that no later one has confirmed.
   struct Doubter {
     Estimator estimator;
-    uint32_t landmark = 0;  // of that fix; a second sighting of it may have the same error
-    bool of_shape = false;  // the fix is of kind curvature
-    int agreed = 0;         // later fixes that both have used: these tell nothing of who is right
-    bool of_two = false;    // also without the fix before that one
-    double excused_m = 0;   // one motion sensor alone, or a slip, may be wrong by so much
-    int confirmed_by = 0;   // landmarks before that fix
-    int against = 0;        // that fix and later ones that the main one alone fits
+    uint32_t landmark = 0;    // of that fix; a second sighting of it may have the same error
+    bool of_shape = false;    // the fix is of kind curvature
+    bool surprising = false;  // ... and was no small way off: the next one may be so likewise
+    int agreed = 0;           // later fixes that both have used: these tell nothing of who is right
+    bool of_two = false;      // also without the fix before that one
+    double excused_m = 0;     // one motion sensor alone, or a slip, may be wrong by so much
+    int confirmed_by = 0;     // landmarks before that fix
+    int against = 0;          // that fix and later ones that the main one alone fits
 
     [[nodiscard]] bool fits() const { return estimator.fix_used() && !estimator.fix_corrected(); }
-    [[nodiscard]] bool leaves_out(const FixInput& fix) const { return landmark != 0 && landmark == fix.landmark; }
+    [[nodiscard]] bool leaves_out(const FixInput& fix) const {
+      return surprising ? fix.kind == FixKind::curvature : landmark != 0 && landmark == fix.landmark;
+    }
   };
   struct Rival {
     Source without;

@@ -307,5 +307,11 @@ TEST(Coverage, WhatLostItsWayIsWellAgainWhenItIsNeeded) {
   EXPECT_EQ(outside_in(run), 0U);
 }
 
+// A curve lies 9 m from where the map has it. What the second fix from it said was taken for a word on the first: 232
+// states were outside, by up to 0.5 m.
+TEST(Coverage, FixesFromACurveThatLiesElsewhereErrAlike) {
+  EXPECT_EQ(outside_in({3170, 152, Sensor::shape, FaultKind::bias}), 0U);
+}
+
 }  // namespace
 }  // namespace railfix::fusion
