@@ -71,6 +71,7 @@ void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
   main_.apply(event);
   main_.contradicted_by(0);
   const bool told = main_.fix_used() || main_.fix_refused();
+  const bool hardly = main_.fix_refused() || main_.fix_sigmas_off(0) >= kUnlikelySigmas;
   if (told && fix.kind == FixKind::landmark)
     residuals_.add(fix.landmark, main_.fix_residual_m(), main_.fix_sigmas_off(0), before.since_reference_m());
   std::vector<Doubter> doubters_before = doubters_;
@@ -93,7 +94,7 @@ void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
   } else {
     return;
   }
-  confirm_rivals();
+  confirm_rivals(hardly);
 }
 
 // The fix contradicts an earlier one and agrees with what is known without that one. Without that one less is known, so

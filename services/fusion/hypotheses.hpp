@@ -103,7 +103,8 @@ class Hypotheses {
   void settle_doubters(const FixInput& fix, const std::vector<Doubter>& before);
   bool settle(Doubter& doubter, const Estimator& before, const FixInput& fix) const;
   [[nodiscard]] bool differs_in_scale(const Doubter& doubter) const;
-  void confirm_rivals();
+  /// The main one is confirmed; `hardly`: the fix was no small way from where it had been expected.
+  void confirm_rivals(bool hardly);
   void exclude_faulty();
   void adopt(Rival& rival);
   void begin_rival(Source source);
@@ -112,6 +113,7 @@ class Hypotheses {
   [[nodiscard]] bool can_say(const Rival& rival) const;
   [[nodiscard]] bool contradicts_itself(const Rival& rival) const;
   [[nodiscard]] bool main_is_sound_without(Source source) const;
+  [[nodiscard]] bool stands_for_another(const Rival& rival) const;
   void begin_again(Rival& rival) const;
   void lose_sight(Rival& rival, int64_t now_ns) const;
   static void stray(Rival& rival, int64_t now_ns);

@@ -45,11 +45,16 @@ void Hypotheses::adopt(Rival& rival) {
   for (auto& other : rivals_) other.forget_excess();
 }
 
-void Hypotheses::confirm_rivals() {
+void Hypotheses::confirm_rivals(bool hardly) {
   for (auto& rival : rivals_) {
     rival.forget_excess();
     // Confirmed is the main one: a rival that is elsewhere was wrong.
-    if (rival.estimator && rival.estimator->fix_refused()) begin_again(rival);
+    if (!rival.estimator || !rival.estimator->fix_refused()) continue;
+    if (hardly && stands_for_another(rival)) {
+      rival.estimator->place_like(main_);
+    } else {
+      begin_again(rival);
+    }
   }
   ask_rivals();
 }
@@ -124,6 +129,14 @@ bool Hypotheses::main_is_sound_without(Source source) const {
   const int64_t now_ns = main_.filter().stamp_ns();
   return main_.is_consistent() && std::ranges::any_of(std::array{Source::camera, Source::wheel}, [&](Source odometer) {
            return odometer != source && core::seconds(now_ns - main_.watch(odometer).used_ns) < kMeasuresS;
+         });
+}
+
+// Two sensors agree in it, of which the main one has left one out without proof: should it begin again, nobody would
+// speak for that sensor.
+bool Hypotheses::stands_for_another(const Rival& rival) const {
+  return rival.proven_since_ns != 0 && std::ranges::any_of(kMotionSources, [&](Source source) {
+           return source != rival.without && main_.watch(source).isolated && !main_.watch(source).convicted;
          });
 }
 
