@@ -111,9 +111,12 @@ bool Estimator::is_consistent(uint32_t excepted) const {
   return (isolated() & ~excepted) == 0;
 }
 
+bool Estimator::measures(Source source) const {
+  return used_within(source, kAtWorkS);
+}
+
 int Estimator::sensors_at_work() const {
-  return static_cast<int>(
-      std::ranges::count_if(kMotionSources, [&](Source source) { return used_within(source, kAtWorkS); }));
+  return static_cast<int>(std::ranges::count_if(kMotionSources, [&](Source source) { return measures(source); }));
 }
 
 void Estimator::exclude(Source source, const Estimator& other) {

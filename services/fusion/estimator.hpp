@@ -83,6 +83,8 @@ class Estimator {
   [[nodiscard]] bool is_consistent(uint32_t excepted = 0) const;
   /// Motion sensors that are isolated, a bit each.
   [[nodiscard]] uint32_t isolated() const;
+  /// It measured in the last moments and was believed.
+  [[nodiscard]] bool measures(Source source) const;
   /// So many motion sensors measured in the last moments and were believed.
   [[nodiscard]] int sensors_at_work() const;
   /// That sensor is found to be wrong: it is isolated, with what `other` knows of it.
@@ -110,6 +112,8 @@ class Estimator {
   [[nodiscard]] double fix_residual_m() const { return fix_offer_.residual; }
   /// How far beyond `excused_m` it was from where it was expected, in standard deviations.
   [[nodiscard]] double fix_sigmas_off(double excused_m) const;
+  /// It was hardly to be believed where it was expected.
+  [[nodiscard]] bool fix_unexpected() const;
   /// So many landmarks in a row say that it is here.
   [[nodiscard]] int landmarks_agreed() const { return landmarks_agreed_; }
 

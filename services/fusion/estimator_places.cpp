@@ -4,6 +4,7 @@
 
 #include "core/time.hpp"
 #include "fusion/estimator.hpp"
+#include "fusion/jump_evidence.hpp"
 
 namespace railfix::fusion {
 namespace {
@@ -123,6 +124,10 @@ void Estimator::use(const FixInput& fix) {
     ++watch.refused;
     refuse(fix, *path_distance_m, fix_offer_);
   }
+}
+
+bool Estimator::fix_unexpected() const {
+  return fix_refused() || fix_sigmas_off(0) >= kUnlikelySigmas;
 }
 
 double Estimator::fix_sigmas_off(double excused_m) const {

@@ -71,7 +71,7 @@ void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
   main_.apply(event);
   main_.contradicted_by(0);
   const bool told = main_.fix_used() || main_.fix_refused();
-  const bool hardly = main_.fix_refused() || main_.fix_sigmas_off(0) >= kUnlikelySigmas;
+  const bool hardly = main_.fix_unexpected();
   if (told && fix.kind == FixKind::landmark)
     residuals_.add(fix.landmark, main_.fix_residual_m(), main_.fix_sigmas_off(0), before.since_reference_m());
   std::vector<Doubter> doubters_before = doubters_;
@@ -118,7 +118,7 @@ Hypotheses::Doubter Hypotheses::without_one(const FixInput& fix, Estimator befor
   Doubter doubter{.estimator = std::move(before), .landmark = fix.landmark, .of_shape = fix.kind == FixKind::curvature};
   const Interval slip = doubter.estimator.widened({});
   doubter.excused_m = std::max({most.behind_m, most.ahead_m, -slip.behind_m, slip.ahead_m});
-  doubter.surprising = doubter.of_shape && main_.fix_sigmas_off(0) >= kUnlikelySigmas;
+  doubter.surprising = doubter.of_shape && main_.fix_unexpected();
   doubter.confirmed_by = doubter.estimator.landmarks_agreed();
   doubter.against = main_.fix_corrected() ? kFixesOfAClaim : 1;
   return doubter;
@@ -245,7 +245,8 @@ void Hypotheses::block_wheel(const WheelBlock& block, uint32_t slipping) {
 Promise Hypotheses::promise() const {
   Estimator main = main_;
   main.predict_to(stamp_ns());
-  Promise all{main.widened(promised(main.interval())), main.since_reference_m()};
+  const Interval mine = main.interval();
+  Promise all{main.widened(promised(mine)), main.since_reference_m()};
   for (const auto& doubter : doubters_) {
     Estimator other = doubter.estimator;
     other.predict_to(stamp_ns());
@@ -253,8 +254,8 @@ Promise Hypotheses::promise() const {
   }
   const double doubt_m =
       parameters_->interval_factor * residuals_.scatter_m() + residuals_.error_per_m() * main.since_reference_m();
-  const Interval mine = main.widened(main.interval());
-  all.hold({{mine.behind_m - doubt_m, mine.ahead_m + doubt_m}, all.since_sure_m});
+  const Interval doubted = main.widened({mine.behind_m - doubt_m, mine.ahead_m + doubt_m});
+  all.hold({doubted, all.since_sure_m});
   return all;
 }
 

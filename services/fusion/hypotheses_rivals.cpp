@@ -11,7 +11,6 @@ namespace {
 
 constexpr double kRivalGoneS = 1.0;
 constexpr double kProofS = 2.0;
-constexpr double kMeasuresS = 0.3;
 constexpr double kSameSpeedsS = 3.0;
 
 }  // namespace
@@ -91,8 +90,8 @@ void Hypotheses::ask(Rival& rival) {
       begin_again(rival);
     } else {
       other.place_like(main_);
+      rival.carried = rival.excess;
     }
-    rival.carried = rival.excess;
   }
   rival.contradicted = false;
   rival.asked = true;
@@ -126,9 +125,8 @@ bool Hypotheses::contradicts_itself(const Rival& rival) const {
 // Nothing contradicts anything, and another odometer measures: a rival that has lost its way may begin again, so that
 // it knows its own when it is needed.
 bool Hypotheses::main_is_sound_without(Source source) const {
-  const int64_t now_ns = main_.filter().stamp_ns();
   return main_.is_consistent() && std::ranges::any_of(std::array{Source::camera, Source::wheel}, [&](Source odometer) {
-           return odometer != source && core::seconds(now_ns - main_.watch(odometer).used_ns) < kMeasuresS;
+           return odometer != source && main_.measures(odometer);
          });
 }
 

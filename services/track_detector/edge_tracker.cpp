@@ -33,8 +33,8 @@ constexpr double kGrowth = 1.4;           // of the bearing while it was seen
 constexpr float kLeastStep = 1.5F;        // grey levels
 constexpr double kSameM = 0.35;
 
-constexpr double kStepWideShare =
-    0.65;  // of the widest bearing: looks from farther away show the end of a wall too narrow
+// Of the widest bearing: looks from farther away show the end of a wall too narrow.
+constexpr double kStepWideShare = 0.65;
 constexpr int kFewestStepLooks = 3;
 constexpr double kStepM = 0.03;
 constexpr double kStepTopM = 0.06;
