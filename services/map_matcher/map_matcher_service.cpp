@@ -249,10 +249,7 @@ void MapMatcherService::publish_place(const msg::OdometryStep& step, const Locat
 }
 
 void MapMatcherService::follow_turning(const msg::OdometryStep& step) {
-  const auto prior = prior_at(step.stamp_ns());
-  if (!prior || !step_) return;
-  const auto place = followed_->path()->position_at(prior->path_distance_m);
-  chooser_->follow(window_at(place, *prior));
+  if (!step_ || !prior_at(step.stamp_ns())) return;
   auto turn = moved_ns_ == step_->stamp_ns() ? turn_of_camera() : std::nullopt;
   if (turn) {
     turn->way_m *= state_->visual_scale();
@@ -260,11 +257,12 @@ void MapMatcherService::follow_turning(const msg::OdometryStep& step) {
   } else {
     move_without_camera(step.stamp_ns());
   }
-  publish_track(step.stamp_ns(), chain_.odometer_m(), step.grabbed_ns());
+  say_track(chain_.odometer_m(), step.grabbed_ns());
 }
 
 // The doubt that was said comes back in the state; counted again it would never end.
-TrackWindow MapMatcherService::window_at(const track::EdgePosition& place, const Prior& prior) const {
+TrackWindow MapMatcherService::window_at(const Prior& prior) const {
+  const auto place = followed_->path()->position_at(prior.path_distance_m);
   const double probability = std::min(1.0, state_->track_probability() / said_track_.there);
   return {place, prior.over_m, prior.under_m, state_->sigma_m(), probability, !(state_->speed_mps() < 0)};
 }
@@ -272,11 +270,9 @@ TrackWindow MapMatcherService::window_at(const track::EdgePosition& place, const
 // Without a camera fusion's states lead: they come ten times a second.
 void MapMatcherService::follow_without_camera() {
   if (step_ && core::seconds(state_->stamp_ns() - step_->stamp_ns()) < kNoCameraS) return;
-  const auto prior = prior_at(state_->stamp_ns());
-  if (!prior) return;
-  chooser_->follow(window_at(place_of(*state_), *prior));
+  if (!prior_at(state_->stamp_ns())) return;
   move_without_camera(state_->stamp_ns());
-  publish_track(state_->stamp_ns(), state_->distance_m(), 0);
+  say_track(state_->distance_m(), 0);
 }
 
 void MapMatcherService::move(const Turn& turn, int64_t to_ns) {
@@ -308,7 +304,12 @@ double MapMatcherService::place_doubt() const {
   return landmarks_->doubt() > kDoubted ? landmarks_->doubt() : 0;
 }
 
-void MapMatcherService::publish_track(int64_t stamp_ns, double odometer_m, int64_t grabbed_ns) {
+// The chooser is where it was moved to: a step that comes late does not take it back.
+void MapMatcherService::say_track(double odometer_m, int64_t grabbed_ns) {
+  const int64_t stamp_ns = moved_ns_;
+  const auto prior = prior_at(stamp_ns);
+  if (!prior) return;
+  chooser_->follow(window_at(*prior));
   const auto choice = chooser_->choice();
   if (!choice) return;
   const auto& best = choice->options.front();

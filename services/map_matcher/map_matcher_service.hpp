@@ -42,12 +42,12 @@ class MapMatcherService {
   void publish_place(const msg::OdometryStep& step, const Location& location);
   void follow_turning(const msg::OdometryStep& step);
   void follow_without_camera();
-  [[nodiscard]] TrackWindow window_at(const track::EdgePosition& place, const Prior& prior) const;
+  [[nodiscard]] TrackWindow window_at(const Prior& prior) const;
   void move(const Turn& turn, int64_t to_ns);
   void move_without_camera(int64_t to_ns);
   /// How probable it is that the train is somewhere else on the map; 0 where that is less probable than not.
   [[nodiscard]] double place_doubt() const;
-  void publish_track(int64_t stamp_ns, double odometer_m, int64_t grabbed_ns);
+  void say_track(double odometer_m, int64_t grabbed_ns);
   void publish(const Fix& fix, uint8_t kind, int64_t grabbed_ns);
   /// Unless this one stands by.
   void send(const msg::PositionFix& fix, int64_t grabbed_ns);

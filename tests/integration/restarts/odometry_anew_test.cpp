@@ -1,4 +1,4 @@
-// Another odometry takes over from one that has counted for kilometres: what map_matcher says of the track stays true.
+// Another odometry takes over, or one that comes late: what map_matcher says of the track stays true.
 #include <gmock/gmock.h>
 
 #include "support/on_map_matcher.hpp"
@@ -54,7 +54,47 @@ TEST_F(OdometryAnew, TheTrackIsSaidWhereTheTrainIs) {
     const double train_m = way_m(fix.stamp_ns());
     EXPECT_EQ(fix.kind(), msg::FIX_TRACK);
     EXPECT_EQ(fix.edge(), 2U) << "at " << train_m;
-    EXPECT_NEAR(kEdgeM + fix.offset_m(), train_m, 3) << "edge " << fix.edge();
+    EXPECT_NEAR(kEdgeM + fix.offset_m(), train_m, 0.5) << "edge " << fix.edge();
+  }
+}
+
+class OdometryLate : public ::testing::Test, public test::OnMapMatcher {
+ protected:
+  OdometryLate() : OnMapMatcher("odometry-late", kDomain, {.speed_mps = kSpeedMps, .begin_m = kEdgeM - 50}) {}
+  // Two tracks that nothing tells apart: the choice stays open.
+  void SetUp() override {
+    track::Map map;
+    map.edges.push_back({1, "before", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{kEdgeM, 0, 0}})});
+    map.edges.push_back({2, "left", 2, 3, "", track::Alignment::chained({0, kEdgeM, 0}, {{kEdgeM, 0, 0}})});
+    map.edges.push_back({3, "right", 2, 4, "", track::Alignment::chained({0, kEdgeM, 0}, {{kEdgeM, 0, 0}})});
+    map.connections = {{2, 1, 2, false}, {2, 1, 3, false}};
+    ASSERT_TRUE(start_matcher(map));
+  }
+  void tick(const std::optional<msg::OdometryStep>& counted) {
+    ++tick_;
+    const bool behind = way_m() < kEdgeM;
+    states_.write(
+        state(behind ? track::EdgePosition{1, way_m()} : track::EdgePosition{2, way_m() - kEdgeM}, kPromisedM));
+    if (counted) steps_.write(*counted);
+    match();
+  }
+};
+
+TEST_F(OdometryLate, ThePlaceIsSaidForItsOwnTime) {
+  for (int n = 0; n < 80; ++n) {
+    ++tick_;
+    const auto counted = step();
+    --tick_;
+    tick(counted);
+  }
+  const auto late = step();
+  for (int n = 0; n < 12; ++n) tick(std::nullopt);
+  const size_t said_before = said_.size();
+  tick(late);
+  ASSERT_GT(said_.size(), said_before);
+  for (const auto& fix : said_) {
+    const double on_edge_m = way_m(fix.stamp_ns()) - (fix.edge() == 1U ? 0 : kEdgeM);
+    EXPECT_NEAR(fix.offset_m(), on_edge_m, 0.5) << "edge " << fix.edge();
   }
 }
 
