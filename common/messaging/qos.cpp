@@ -22,9 +22,19 @@ int64_t heartbeat_ns(const QosProfile& profile) {
   return profile.transient_local ? core::kNsPerSecond : 0;
 }
 
+// A volatile writer forgets what nobody waits for any more, and in 2.9.1 it waits for ever where a reader leaves while
+// that is just being sent (eProsima/Fast-DDS#3468). One that keeps its history does not, and readers that ask for
+// nothing old get nothing old. Shared memory is not sent, and would stay full.
+bool keeps_history(const QosProfile& profile, bool writer) {
+  return profile.transient_local || (writer && profile.writer_reliable && !profile.data_sharing);
+}
+
+dds::DurabilityQosPolicyKind durability(const QosProfile& profile, bool writer) {
+  return keeps_history(profile, writer) ? dds::TRANSIENT_LOCAL_DURABILITY_QOS : dds::VOLATILE_DURABILITY_QOS;
+}
+
 template <class Qos>
 void apply_common(const QosProfile& profile, Qos& qos) {
-  qos.durability().kind = profile.transient_local ? dds::TRANSIENT_LOCAL_DURABILITY_QOS : dds::VOLATILE_DURABILITY_QOS;
   qos.history().kind = dds::KEEP_LAST_HISTORY_QOS;
   qos.history().depth = profile.depth;
   qos.resource_limits().max_instances = profile.max_instances;
@@ -59,7 +69,7 @@ void write_xml(std::ostream& xml, const TopicInfo& topic, bool writer) {
     xml << "        <data_sharing><kind>OFF</kind></data_sharing>\n";
   }
   xml << "        <reliability><kind>" << (reliable ? "RELIABLE" : "BEST_EFFORT") << "</kind></reliability>\n";
-  xml << "        <durability><kind>" << (p.transient_local ? "TRANSIENT_LOCAL" : "VOLATILE")
+  xml << "        <durability><kind>" << (keeps_history(p, writer) ? "TRANSIENT_LOCAL" : "VOLATILE")
       << "</kind></durability>\n";
   if (p.deadline_ns > 0) xml << "        <deadline><period>" << xml_duration(p.deadline_ns) << "</period></deadline>\n";
   if (writer)
@@ -82,6 +92,7 @@ void write_xml(std::ostream& xml, const TopicInfo& topic, bool writer) {
 void apply(const QosProfile& profile, dds::DataWriterQos& qos) {
   apply_common(profile, qos);
   qos.reliability().kind = profile.writer_reliable ? dds::RELIABLE_RELIABILITY_QOS : dds::BEST_EFFORT_RELIABILITY_QOS;
+  qos.durability().kind = durability(profile, true);
   qos.publish_mode().kind = profile.asynchronous ? dds::ASYNCHRONOUS_PUBLISH_MODE : dds::SYNCHRONOUS_PUBLISH_MODE;
   if (const int64_t period_ns = heartbeat_ns(profile); period_ns > 0)
     qos.reliable_writer_qos().times.heartbeatPeriod = duration(period_ns);
@@ -89,6 +100,7 @@ void apply(const QosProfile& profile, dds::DataWriterQos& qos) {
 
 void apply(const QosProfile& profile, dds::DataReaderQos& qos) {
   apply_common(profile, qos);
+  qos.durability().kind = durability(profile, false);
   qos.reliability().kind = profile.reliable ? dds::RELIABLE_RELIABILITY_QOS : dds::BEST_EFFORT_RELIABILITY_QOS;
 }
 

@@ -1,0 +1,60 @@
+// Readers come and go while a writer goes on: it is never stopped by that.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <cstdlib>
+#include <future>
+#include <thread>
+
+#include "core/time.hpp"
+#include "messaging/topics.hpp"
+#include "support/network.hpp"
+
+namespace railfix::messaging {
+namespace {
+
+constexpr int kDomain = 94;
+constexpr int kReaders = 250;
+constexpr std::chrono::seconds kPatience{10};
+
+class LeavingReaders : public ::testing::Test {
+ protected:
+  void write() {
+    while (!ended_) {
+      for (int i = 0; i < 3; ++i) logs_.write({});
+      std::this_thread::sleep_for(std::chrono::microseconds(300));
+    }
+  }
+  void read() {
+    for (int n = 0; n < kReaders; ++n) {
+      const Reader<msg::LogRecord> reader(listening_, topics::log_record, "", queue_,
+                                          [&](const msg::LogRecord&) { ++heard_; });
+      const int64_t until_ns = core::monotonic_ns() + (10 + 7 * n % 40) * 1'000'000;
+      while (queue_.run_one(until_ns)) continue;
+    }
+  }
+
+  const std::string train_ = "leaving-" + std::to_string(getpid());
+  Participant talking_{test::network(train_, kDomain)};
+  Participant listening_{test::network(train_, kDomain)};
+  Writer<msg::LogRecord> logs_{talking_, topics::log_record};
+  Queue queue_;
+  int heard_ = 0;
+  std::atomic<bool> ended_ = false;
+};
+
+TEST_F(LeavingReaders, DoNotStopAWriter) {
+  const auto writer = std::async(std::launch::async, [&] { write(); });
+  read();
+  ended_ = true;
+  if (writer.wait_for(kPatience) != std::future_status::ready) {
+    ADD_FAILURE() << "the writer hangs";
+    std::_Exit(EXIT_FAILURE);  // nothing gets a thread back that waits inside the middleware for ever
+  }
+  EXPECT_GT(heard_, 0);
+}
+
+}  // namespace
+}  // namespace railfix::messaging
