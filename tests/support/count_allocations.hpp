@@ -39,14 +39,15 @@ class CountMatrices {
 
 }  // namespace railfix::test
 
-void* operator new(size_t size) {
+// Not inlined: g++ 12 would take one that is for a mismatch with the other that is not.
+[[gnu::noinline]] void* operator new(size_t size) {
   if (railfix::test::counting) ++railfix::test::allocations;
   if (void* memory = std::malloc(size == 0 ? 1 : size)) return memory;
   throw std::bad_alloc();
 }
-void operator delete(void* memory) noexcept {
+[[gnu::noinline]] void operator delete(void* memory) noexcept {
   std::free(memory);
 }
-void operator delete(void* memory, size_t) noexcept {
+[[gnu::noinline]] void operator delete(void* memory, size_t) noexcept {
   std::free(memory);
 }
