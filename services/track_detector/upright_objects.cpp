@@ -23,6 +23,7 @@ constexpr double kWallSigmaM = 0.03;    // of its lateral offset at the portal i
 constexpr double kWallStray_m2 = 4e-5;  // ... and more from one edge on it to the next
 constexpr double kExitSigmaM = 0.2;     // the last piece of wall may be as bright as the land in the glare
 constexpr double kEndSigmaM = 0.08;     // of an end that was measured on both walls
+constexpr double kEndsAgreeM = 0.3;     // of the two walls; they did within 0.15 m
 constexpr double kExitAgreesM = 0.15;   // both ways to measure it
 constexpr double kSettlesM = 2.1;       // after it has left the picture, an edge is given
 constexpr double kAlikeShare = 0.7;     // of the farther wall's lateral offset
@@ -339,7 +340,8 @@ bool UprightObjects::walls_alike() const {
 
 // Where the brightness steps last. Each wall by itself: on the one the last piece may be as bright as the land while
 // the other one shows its end. Walls that are equally near see alike: what one of them alone shows far from the
-// followed edges stands behind the tunnel.
+// followed edges stands behind the tunnel. An end that the other wall or the followed edges contradict is in doubt by
+// half of that.
 std::optional<UprightObjects::End> UprightObjects::end_of_walls(const EdgeTracker& tracker, double place_m) const {
   const size_t near = near_wall();
   const bool alike = walls_alike();
@@ -347,11 +349,18 @@ std::optional<UprightObjects::End> UprightObjects::end_of_walls(const EdgeTracke
   for (size_t side = 0; side < 2; ++side) {
     ends_m[side] = tracker.last_step(tunnel_.wall_m[side], place_m - kExitOffM, place_m + kPanelM);
   }
-  if (ends_m[0] && ends_m[1] && std::abs(*ends_m[0] - *ends_m[1]) < kSidesM)
-    return End{mean_of_walls_m(*ends_m[0], *ends_m[1]), kEndSigmaM};
-  for (const size_t side : {near, 1 - near}) {
-    const auto& end_m = ends_m[side];
-    if (end_m && (!alike || std::abs(*end_m - place_m) < kSidesM)) return End{*end_m, kOneEndSigmaM};
+  const auto off_m = [&](size_t side) { return std::abs(*ends_m[side] - place_m); };
+  size_t first = near;
+  double doubt_m = 0;
+  if (ends_m[0] && ends_m[1]) {
+    doubt_m = std::abs(*ends_m[0] - *ends_m[1]);
+    if (doubt_m < kEndsAgreeM) return End{mean_of_walls_m(*ends_m[0], *ends_m[1]), kEndSigmaM};
+    if (alike && off_m(1 - near) < off_m(near)) first = 1 - near;
+  }
+  for (const size_t side : {first, 1 - first}) {
+    if (!ends_m[side] || (alike && off_m(side) >= kSidesM)) continue;
+    if (alike) doubt_m = std::max(doubt_m, off_m(side));
+    return End{*ends_m[side], std::hypot(kOneEndSigmaM, 0.5 * doubt_m)};
   }
   return std::nullopt;
 }

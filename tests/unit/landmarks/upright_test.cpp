@@ -227,6 +227,18 @@ TEST(Uprights, WhatOneOfTwoLikeWallsShowsBehindTheEndIsNotTheEnd) {
   EXPECT_NEAR(told[1].place_m, 70, 0.08);
 }
 
+// The same a metre behind the end: once that was taken for one end of two that agree, and their mean for the place.
+TEST(Uprights, WallsThatEndAtTwoPlacesSaySo) {
+  for (const double behind_m : {0.6, 0.8, 1.0, 1.2}) {
+    auto corners = on_both_walls({{40, 2.7, 70, 120, 60, 15}, {70, 2.7, 236, 150, 236, 238}});
+    corners.push_back({70 + behind_m, 2.7, 225, 236, 225, 236, 7.3});
+    const auto told = pass(corners, 80);
+    ASSERT_EQ(told.size(), 2U);
+    EXPECT_EQ(told[1].type, LandmarkType::portal_out);
+    EXPECT_LT(std::abs(told[1].place_m - 70), 2 * told[1].sigma_m) << behind_m;
+  }
+}
+
 // Land as bright as the last half metre of wall: what was followed and the clearest step do not agree.
 TEST(Uprights, AnEndThatIsToldInTwoWaysSaysSo) {
   const auto told = pass({{40, 2.7, 70, 120, 60, 15},
