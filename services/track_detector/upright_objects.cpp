@@ -340,29 +340,25 @@ bool UprightObjects::walls_alike() const {
 
 // Where the brightness steps last. Each wall by itself: on the one the last piece may be as bright as the land while
 // the other one shows its end. Walls that are equally near see alike: what one of them alone shows far from the
-// followed edges stands behind the tunnel. An end that the other wall or the followed edges contradict is in doubt by
-// half of that.
+// followed edges stands behind the tunnel, and what the other one or those edges contradict is in doubt by half of
+// that.
 std::optional<UprightObjects::End> UprightObjects::end_of_walls(const EdgeTracker& tracker, double place_m) const {
   const size_t near = near_wall();
-  const bool alike = walls_alike();
   std::array<std::optional<double>, 2> ends_m;
   for (size_t side = 0; side < 2; ++side) {
     ends_m[side] = tracker.last_step(tunnel_.wall_m[side], place_m - kExitOffM, place_m + kPanelM);
   }
-  const auto off_m = [&](size_t side) { return std::abs(*ends_m[side] - place_m); };
-  size_t first = near;
-  double doubt_m = 0;
-  if (ends_m[0] && ends_m[1]) {
-    doubt_m = std::abs(*ends_m[0] - *ends_m[1]);
-    if (doubt_m < kEndsAgreeM) return End{mean_of_walls_m(*ends_m[0], *ends_m[1]), kEndSigmaM};
-    if (alike && off_m(1 - near) < off_m(near)) first = 1 - near;
+  const bool both = ends_m[0] && ends_m[1];
+  const double apart_m = both ? std::abs(*ends_m[0] - *ends_m[1]) : 0.0;
+  if (both && apart_m < kEndsAgreeM) return End{mean_of_walls_m(*ends_m[0], *ends_m[1]), kEndSigmaM};
+  if (!walls_alike()) {
+    const auto& end_m = ends_m[near] ? ends_m[near] : ends_m[1 - near];
+    return end_m ? std::optional(End{*end_m, kOneEndSigmaM}) : std::nullopt;
   }
-  for (const size_t side : {first, 1 - first}) {
-    if (!ends_m[side] || (alike && off_m(side) >= kSidesM)) continue;
-    if (alike) doubt_m = std::max(doubt_m, off_m(side));
-    return End{*ends_m[side], std::hypot(kOneEndSigmaM, 0.5 * doubt_m)};
-  }
-  return std::nullopt;
+  const auto off_m = [&](size_t side) { return ends_m[side] ? std::abs(*ends_m[side] - place_m) : kSidesM; };
+  const size_t side = off_m(0) < off_m(1) ? 0 : 1;
+  if (off_m(side) >= kSidesM) return std::nullopt;
+  return End{*ends_m[side], std::hypot(kOneEndSigmaM, 0.5 * std::max(apart_m, off_m(side)))};
 }
 
 // From so far ahead on an end and the panel that may follow it show no more, even on the wall that is nearer. What the
