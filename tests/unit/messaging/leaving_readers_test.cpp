@@ -31,7 +31,7 @@ class LeavingReaders : public ::testing::Test {
     for (int n = 0; n < kReaders; ++n) {
       const Reader<msg::LogRecord> reader(listening_, topics::log_record, "", queue_,
                                           [&](const msg::LogRecord&) { ++heard_; });
-      const int64_t until_ns = core::monotonic_ns() + (10 + 7 * n % 40) * 1'000'000;
+      const int64_t until_ns = core::monotonic_ns() + int64_t{10 + 7 * n % 40} * 1'000'000;
       while (queue_.run_one(until_ns)) continue;
     }
   }
