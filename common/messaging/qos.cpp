@@ -1,4 +1,5 @@
 #include <sstream>
+#include <type_traits>
 
 #include "core/time.hpp"
 #include "messaging/fastdds_qos.hpp"
@@ -29,12 +30,11 @@ bool keeps_history(const QosProfile& profile, bool writer) {
   return profile.transient_local || (writer && profile.writer_reliable && !profile.data_sharing);
 }
 
-dds::DurabilityQosPolicyKind durability(const QosProfile& profile, bool writer) {
-  return keeps_history(profile, writer) ? dds::TRANSIENT_LOCAL_DURABILITY_QOS : dds::VOLATILE_DURABILITY_QOS;
-}
-
 template <class Qos>
 void apply_common(const QosProfile& profile, Qos& qos) {
+  constexpr bool kWriter = std::is_same_v<Qos, dds::DataWriterQos>;
+  qos.durability().kind =
+      keeps_history(profile, kWriter) ? dds::TRANSIENT_LOCAL_DURABILITY_QOS : dds::VOLATILE_DURABILITY_QOS;
   qos.history().kind = dds::KEEP_LAST_HISTORY_QOS;
   qos.history().depth = profile.depth;
   qos.resource_limits().max_instances = profile.max_instances;
@@ -92,7 +92,6 @@ void write_xml(std::ostream& xml, const TopicInfo& topic, bool writer) {
 void apply(const QosProfile& profile, dds::DataWriterQos& qos) {
   apply_common(profile, qos);
   qos.reliability().kind = profile.writer_reliable ? dds::RELIABLE_RELIABILITY_QOS : dds::BEST_EFFORT_RELIABILITY_QOS;
-  qos.durability().kind = durability(profile, true);
   qos.publish_mode().kind = profile.asynchronous ? dds::ASYNCHRONOUS_PUBLISH_MODE : dds::SYNCHRONOUS_PUBLISH_MODE;
   if (const int64_t period_ns = heartbeat_ns(profile); period_ns > 0)
     qos.reliable_writer_qos().times.heartbeatPeriod = duration(period_ns);
@@ -100,7 +99,6 @@ void apply(const QosProfile& profile, dds::DataWriterQos& qos) {
 
 void apply(const QosProfile& profile, dds::DataReaderQos& qos) {
   apply_common(profile, qos);
-  qos.durability().kind = durability(profile, false);
   qos.reliability().kind = profile.reliable ? dds::RELIABLE_RELIABILITY_QOS : dds::BEST_EFFORT_RELIABILITY_QOS;
 }
 

@@ -1,4 +1,5 @@
-// Quality of service of a topic: one profile that its writers offer and its readers request, so that both always match.
+// Quality of service of a topic: one profile of which its writers offer at least what its readers request, so that both
+// always match.
 // deploy/qos/railfix_qos.xml holds the same profiles for people and tools; a test keeps the two equal.
 #pragma once
 

@@ -20,7 +20,7 @@ inline double landmark_evidence(int landmarks) {
 /// Against a place that is so many of the odometers' standard deviations from where landmarks say, and that so many had
 /// confirmed before: what settles the matter. Little speaks for a place that was only told: three landmarks outvote it.
 inline double evidence_to_settle(double sigmas, int confirmed_by) {
-  constexpr double kTold = 3.0;
+  constexpr double kTold = 3.0;          // two false ones in a row agree by chance
   constexpr double kMostEvidence = 9.2;  // both odometers are wrong as well, unseen: 1e-4
   constexpr double kSettled = 4.6;       // remaining odds: 0.01
   if (confirmed_by == 0) return kTold;

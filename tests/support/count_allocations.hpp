@@ -40,14 +40,13 @@ class CountMatrices {
 }  // namespace railfix::test
 
 // Not inlined: g++ 12 would take one that is for a mismatch with the other that is not.
-[[gnu::noinline]] void* operator new(size_t size) {
-  if (railfix::test::counting) ++railfix::test::allocations;
-  if (void* memory = std::malloc(size == 0 ? 1 : size)) return memory;
-  throw std::bad_alloc();
-}
 [[gnu::noinline]] void* operator new(size_t size, const std::nothrow_t&) noexcept {
   if (railfix::test::counting) ++railfix::test::allocations;
   return std::malloc(size == 0 ? 1 : size);
+}
+[[gnu::noinline]] void* operator new(size_t size) {
+  if (void* memory = operator new(size, std::nothrow)) return memory;
+  throw std::bad_alloc();
 }
 [[gnu::noinline]] void operator delete(void* memory) noexcept {
   std::free(memory);

@@ -46,17 +46,14 @@ std::vector<Run> run_block(const CampaignPlan& plan, uint64_t first) {
 }  // namespace
 
 TrainSimulation simulation_of(const CampaignPlan& plan, uint64_t number) {
-  const uint64_t seed = plan.seed * 1'000'000 + number;
-  core::Random random(seed * 77 + 5);
+  const uint64_t seed = seed_of_run(plan.seed, number);
+  core::Random random = draws_of_run(seed);
   SimulationPlan one = plan.simulation;
   one.duration_s = plan.duration_s;
   const bool none = plan.faults.empty() || random.uniform() < plan.no_fault_share;
   if (!none) {
     const auto& [sensor, kind] = plan.faults[number % plan.faults.size()];
-    one.fault = random_fault(random, sensor, kind, plan.duration_s);
-    // Slip is a fault of its own: not while another motion sensor is wrong (tunnels, outages and false fixes stay).
-    one.slip = one.slip && (plan.slip_always || sensor == Sensor::wheel || sensor == Sensor::gnss ||
-                            sensor == Sensor::fix || sensor == Sensor::clock);
+    draw_fault(one, random, sensor, kind, plan.slip_always);
   }
   if (random.uniform() < plan.unknown_start_share) one.start_told = false;
   if (!plan.map) return TrainSimulation(one, seed);

@@ -70,27 +70,29 @@ class OdometryLate : public ::testing::Test, public test::OnMapMatcher {
     map.connections = {{2, 1, 2, false}, {2, 1, 3, false}};
     ASSERT_TRUE(start_matcher(map));
   }
-  void tick(const std::optional<msg::OdometryStep>& counted) {
+  void tick() {
     ++tick_;
     const bool behind = way_m() < kEdgeM;
     states_.write(
         state(behind ? track::EdgePosition{1, way_m()} : track::EdgePosition{2, way_m() - kEdgeM}, kPromisedM));
-    if (counted) steps_.write(*counted);
-    match();
   }
 };
 
 TEST_F(OdometryLate, ThePlaceIsSaidForItsOwnTime) {
   for (int n = 0; n < 80; ++n) {
-    ++tick_;
-    const auto counted = step();
-    --tick_;
-    tick(counted);
+    tick();
+    steps_.write(step());
+    match();
   }
   const auto late = step();
-  for (int n = 0; n < 12; ++n) tick(std::nullopt);
+  for (int n = 0; n < 12; ++n) {
+    tick();
+    match();
+  }
   const size_t said_before = said_.size();
-  tick(late);
+  tick();
+  steps_.write(late);
+  match();
   ASSERT_GT(said_.size(), said_before);
   for (const auto& fix : said_) {
     const double on_edge_m = way_m(fix.stamp_ns()) - (fix.edge() == 1U ? 0 : kEdgeM);

@@ -50,6 +50,20 @@ SimulationPlan campaign_plan() {
   return plan;
 }
 
+uint64_t seed_of_run(uint64_t campaign_seed, uint64_t number) {
+  return campaign_seed * 1'000'000 + number;
+}
+
+core::Random draws_of_run(uint64_t seed) {
+  return core::Random(seed * 77 + 5);
+}
+
+void draw_fault(SimulationPlan& plan, core::Random& draws, Sensor sensor, FaultKind kind, bool slip_always) {
+  plan.fault = random_fault(draws, sensor, kind, plan.duration_s);
+  plan.slip = plan.slip && (slip_always || sensor == Sensor::wheel || sensor == Sensor::gnss || sensor == Sensor::fix ||
+                            sensor == Sensor::clock);
+}
+
 core::Random stream(uint64_t seed, uint64_t number) {
   core::Random mixed(seed * 1'000'003 + number);
   return core::Random(mixed.next());

@@ -58,6 +58,13 @@ struct SimulationPlan {
 
 /// What runs of the confidence campaign have in common.
 SimulationPlan campaign_plan();
+/// Seed of one run of a campaign.
+uint64_t seed_of_run(uint64_t campaign_seed, uint64_t number);
+/// What is drawn for that run beside the errors of its sensors.
+core::Random draws_of_run(uint64_t seed);
+/// The next fault that is drawn. Slip is a fault of its own: not while another motion sensor is wrong, unless always
+/// (tunnels, outages and false fixes stay).
+void draw_fault(SimulationPlan& plan, core::Random& draws, Sensor sensor, FaultKind kind, bool slip_always = false);
 
 /// A measurement with the time at which it comes to fusion.
 struct Arrival {

@@ -38,11 +38,10 @@ TEST_P(OnceOutside, HoldsTheTruth) {
   plan.landmark_spacing_m = run.sightings ? 0 : run.landmarks_m;
   plan.gnss = run.gnss;
   plan.start_told = run.start_told;
-  plan.slip = run.sensor != Sensor::camera;  // as the campaign has it: no slip beside it
-  const uint64_t seed = run.seed * 1'000'000 + run.number;
-  core::Random random(seed * 77 + 5);
-  (void)random.uniform();
-  if (run.sensor != Sensor::none) plan.fault = train::random_fault(random, run.sensor, run.kind, plan.duration_s);
+  const uint64_t seed = train::seed_of_run(run.seed, run.number);
+  core::Random random = train::draws_of_run(seed);
+  (void)random.uniform();  // whether there is a fault
+  if (run.sensor != Sensor::none) train::draw_fault(plan, random, run.sensor, run.kind);
   const train::TrainSimulation simulation(plan, seed);
   auto fusion = core::value_or_throw(Fusion::create({}, simulation.map, simulation.start()));
   EXPECT_EQ(train::judge(simulation, fusion).outside, 0U);

@@ -15,7 +15,7 @@
 namespace railfix::messaging {
 namespace {
 
-constexpr int kDomain = 94;
+constexpr int kDomain = 97;
 constexpr int kReaders = 250;
 constexpr std::chrono::seconds kPatience{10};
 
