@@ -59,7 +59,8 @@ void limit_memory(pid_t pid, rlim_t bytes) {
   prlimit(pid, RLIMIT_AS, &limit, nullptr);
 }
 
-// No more memory than it has now: what asks for more dies, now or seconds later. From then on the train must help itself.
+// No more memory than it has now: what asks for more dies, now or seconds later. From then on the train must help
+// itself.
 Fault short_of_memory(const std::string& service) {
   const auto limited = std::make_shared<pid_t>(0);
   return {.name = service + " gets no more memory",

@@ -20,7 +20,7 @@ namespace {
 constexpr const char* kHosts[] = {"cab", "coach"};
 constexpr const char* kMosquitto = "/usr/sbin/mosquitto";
 constexpr const char* kStart = "1:100:+";
-constexpr int64_t kRootMb = 500;  // check asks for 400: the quota below, the store of reports, logs
+constexpr int64_t kRootMb = 500;                      // check asks for 400: the quota below, the store of reports, logs
 constexpr int64_t kStartNs = 6 * core::kNsPerSecond;  // so that the first pictures are heard
 
 void mount_memory(const fs::path& at, int64_t mb) {

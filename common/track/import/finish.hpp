@@ -19,7 +19,8 @@ void add_frogs(Map& map, double sigma_m);
 core::Status add_virtual_balises(Map& map, double every_m, uint32_t nid_c, uint32_t first_nid_bg, double q_locacc_m);
 
 /// Leaves out landmarks of other kinds than these; the others get new numbers. Balise groups keep the number of
-/// their balises, because one of a single balise is reported otherwise (ETCS packet 1). Fails when there is no such kind.
+/// their balises, because one of a single balise is reported otherwise (ETCS packet 1). Fails when there is no such
+/// kind.
 core::Status keep_landmarks(Map& map, const std::vector<std::string>& kinds);
 
 /// What is wrong with the map, one sentence each, naming the element: gaps and kinks within edges and between connected
