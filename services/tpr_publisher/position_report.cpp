@@ -36,8 +36,8 @@ Distances distances_in(double step_m, double front_m, double over_m, double unde
   Distances distances;
   distances.d_lrbg = steps_or_unknown(std::round(std::abs(front_m) / step_m));
   if (distances.d_lrbg == kUnknownDistance) return distances;
-  const double reported_m = std::copysign(distances.d_lrbg * step_m, front_m);
-  const double moved_m = reported_m - front_m;  // the reported front end lies this far in front of the estimated one
+  // The reported front end lies this far in front of the estimated one.
+  const double moved_m = reported_front_m(distances.d_lrbg, step_m, front_m) - front_m;
   distances.l_doubtover = steps_or_unknown(std::ceil(std::max(0.0, over_m + moved_m) / step_m));
   distances.l_doubtunder = steps_or_unknown(std::ceil(std::max(0.0, under_m - moved_m) / step_m));
   return distances;
@@ -100,6 +100,10 @@ Allowance train_allowance(const ReportSettings& settings) {
 uint32_t orientation(const Reference& reference) {
   if (has_co_ordinate_system(*reference.group)) return side(reference.nominal_along);
   return reference.previous != nullptr ? side(reference.from_previous_along) : uint32_t{etcs::kUnknownSide};
+}
+
+double reported_front_m(uint32_t d_lrbg, double step_m, double front_m) {
+  return std::copysign(d_lrbg * step_m, front_m);
 }
 
 uint32_t v_train(double speed_mps, bool standstill, etcs::Baseline baseline) {

@@ -66,6 +66,9 @@ uint32_t orientation(const Reference& reference);
 etcs::TrainPositionReport make_report(const TrainPosition& position, const std::optional<Reference>& reference,
                                       Motion motion, const ReportSettings& settings, int64_t now_ns);
 
+/// Where a report that refers to a group says the front end to be that is front_m beyond it, along the train.
+double reported_front_m(uint32_t d_lrbg, double step_m, double front_m);
+
 /// Nearest step of 5 km/h; at standstill 0, or 127 in 4.0.0.
 uint32_t v_train(double speed_mps, bool standstill, etcs::Baseline baseline);
 /// Trainborne clock: steps of 10 ms, never the value "unknown"; starts anew after 497 days.

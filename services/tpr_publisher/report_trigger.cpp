@@ -1,5 +1,6 @@
 #include "tpr_publisher/report_trigger.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 
@@ -16,12 +17,6 @@ ReportTrigger::ReportTrigger(const etcs::ReportParameters& parameters, double tr
 core::Status ReportTrigger::set_parameters(const etcs::ReportParameters& parameters, std::optional<uint32_t> origin) {
   if (parameters.t_cycloc == 0 || parameters.d_cycloc == 0) {
     return core::Error{"Packet 58 asks for reports without a pause (T_CYCLOC or D_CYCLOC is 0): use 1 or more."};
-  }
-  for (const auto& location : parameters.locations) {
-    if (location.q_lgtloc == 0 && train_length_m_ <= 0) {
-      return core::Error{
-          "Packet 58 asks for a report where the rear end passes, but train_length_m is not known: set it."};
-    }
   }
   parameters_ = parameters;
   origin_ = origin;
@@ -54,6 +49,12 @@ void ReportTrigger::place_locations(const Moment& moment) {
   passed_before_ = false;
 }
 
+bool ReportTrigger::rear_end_left_out() const {
+  return !(train_length_m_ > 0) && std::any_of(locations_.begin(), locations_.end(), [](const Location& location) {
+    return location.rear_end && !location.passed;
+  });
+}
+
 void ReportTrigger::lose_way() {
   origin_m_.reset();
   way_lost_ = true;
@@ -67,7 +68,8 @@ void ReportTrigger::turn() {
 }
 
 double ReportTrigger::reached_m(const Moment& moment, bool rear_end) const {
-  return rear_end ? moment.min_safe_front_m - train_length_m_ : moment.max_safe_front_m;
+  if (!rear_end) return moment.max_safe_front_m;
+  return train_length_m_ > 0 ? moment.min_safe_front_m - train_length_m_ : -HUGE_VAL;
 }
 
 void ReportTrigger::note_events(const Moment& moment) {

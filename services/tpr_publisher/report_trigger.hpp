@@ -59,10 +59,10 @@ struct Moment {
 
 class ReportTrigger {
  public:
-  /// train_length_m: 0 = not known; then no location may ask for the rear end.
+  /// train_length_m: 0 = not known; then nothing is reported where the rear end passes.
   ReportTrigger(const etcs::ReportParameters& parameters, double train_length_m);
 
-  /// A packet 58; one that asks for reports without a pause or for what is not known is refused. Its locations count
+  /// A packet 58; one that asks for reports without a pause is refused. Its locations count
   /// along the train from `origin`, the LRBG when it came; nothing = the next one that is known, because
   /// it has only just come, kUnknownBaliseGroup = nobody knows any more, and locations are left out.
   core::Status set_parameters(const etcs::ReportParameters& parameters, std::optional<uint32_t> origin = std::nullopt);
@@ -72,6 +72,9 @@ class ReportTrigger {
   [[nodiscard]] std::optional<uint32_t> wanted_origin() const { return origin_m_ ? std::nullopt : origin(); }
   /// Locations are asked for, but where they are is not known.
   [[nodiscard]] bool locations_left_out() const { return locations_.empty() && !parameters_.locations.empty(); }
+  /// A location waits for the rear end of a train whose length is not known.
+  [[nodiscard]] bool rear_end_left_out() const;
+  void set_train_length(double train_length_m) { train_length_m_ = train_length_m; }
   /// Moments before and after this one have no distance in common.
   void lose_way();
   /// The front is at the other end now: the next report is a first one, and what the trackside asked to know at

@@ -126,10 +126,13 @@ std::optional<Reference> TprPublisher::reference() const {
   return is_turned() ? turned(*reference_) : reference_;
 }
 
+double TprPublisher::group_m() const {
+  return reference_ ? reference_->group->q_locacc_m + reference_->doubt_m : 0.0;
+}
+
 TrainIntegrity::Place TprPublisher::integrity_place() const {
   const auto position = doubted_position();
-  const double group_m = reference_ ? reference_->group->q_locacc_m + reference_->doubt_m : 0.0;
-  return {position.stamp_ns, position.distance_m, position.over_m + group_m};
+  return {position.stamp_ns, position.distance_m, position.over_m + group_m()};
 }
 
 core::Status TprPublisher::set_parameters(const etcs::ReportParameters& parameters, std::optional<uint32_t> origin) {
@@ -153,6 +156,7 @@ core::Status TprPublisher::set_onboard(const Onboard& onboard, int64_t now_ns) {
   const auto trial = etcs::encode(make_report({}, std::nullopt, Motion::unknown, report, 0), report.baseline);
   if (!trial.ok()) return trial.error();
   settings_.report = report;
+  if (report.train_data) trigger_.set_train_length(onboard.train_length_m);
   hear_cab(onboard.active_cab);
   hear_integrity(onboard, now_ns);
   return {};
@@ -215,6 +219,9 @@ std::string TprPublisher::left_out(int64_t now_ns) const {
   if (integrity_.forgotten())
     return "Train integrity is not reported: how far the train has gone since it was confirmed is not known, because "
            "train_state was away, unusable or began again; confirm it again.";
+  if (trigger_.rear_end_left_out())
+    return "No reports where the rear end passes the locations of packet 58: the train's length is not known; the "
+           "on-board unit must say it, or set tpr_publisher.train_length_m.";
   if (trigger_.locations_left_out())
     return "No reports at the locations of packet 58: it came while nobody listened, or the group that they count from "
            "is not on the way behind the train, or the cab was changed since.";
@@ -236,9 +243,15 @@ etcs::TrainPositionReport TprPublisher::fields(int64_t now_ns) const {
   const auto position = doubted_position();
   auto settings = settings_.report;
   settings.foot_to_front_m = ends_.to_front_m(cab_).value_or(0);
-  auto fields = make_report(position, reference(), is_turned() ? turned(motion_) : motion_, settings, now_ns);
+  const auto here = reference();
+  auto fields = make_report(position, here, is_turned() ? turned(motion_) : motion_, settings, now_ns);
   if (onboard_silent(now_ns)) return fields;
-  const auto said = integrity_.said(position.distance_m);
+  double said_at_m = position.distance_m;
+  if (here && fields.d_lrbg != etcs::kUnknownDistance) {  // trackside counts the length from the front end it was told
+    const double front_m = here->foot_m + settings.foot_to_front_m;
+    said_at_m += reported_front_m(fields.d_lrbg, etcs::scale_m(fields.q_scale), front_m) - front_m;
+  }
+  const auto said = integrity_.said(said_at_m);
   // Nobody can place a length from a front end that is not referred to a group (3.6.5.2.7).
   if (said.l_trainint && fields.nid_lrbg == etcs::kUnknownBaliseGroup) return fields;
   fields.q_length = said.q_length;
@@ -254,8 +267,10 @@ Moment TprPublisher::moment(int64_t now_ns) const {
   moment.standstill = position.standstill;
   moment.front_m = position.distance_m + to_front_m;
   const auto allowance = train_allowance(settings_.report);
-  moment.max_safe_front_m = position.under_m >= 0 ? moment.front_m + position.under_m + allowance.under_m : HUGE_VAL;
-  moment.min_safe_front_m = position.over_m >= 0 ? moment.front_m - position.over_m - allowance.over_m : -HUGE_VAL;
+  moment.max_safe_front_m =
+      position.under_m >= 0 ? moment.front_m + position.under_m + group_m() + allowance.under_m : HUGE_VAL;
+  moment.min_safe_front_m =
+      position.over_m >= 0 ? moment.front_m - position.over_m - group_m() - allowance.over_m : -HUGE_VAL;
   if (const auto here = reference()) {
     moment.nid_lrbg = here->group->nid_lrbg();
     const auto origin = trigger_.wanted_origin();
@@ -269,6 +284,8 @@ Moment TprPublisher::moment(int64_t now_ns) const {
   }
   if (onboard_) {
     moment.onboard = *onboard_;
+    moment.onboard.q_integrity = integrity_.q_integrity();
+    moment.onboard.integrity_ns = integrity_.integrity_ns();
   } else {  // no change when it is heard for the first time and says the same
     moment.onboard.m_mode = settings_.report.m_mode;
     moment.onboard.m_level = settings_.report.m_level;

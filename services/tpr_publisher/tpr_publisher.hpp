@@ -79,6 +79,8 @@ class TprPublisher {
   /// With the doubt of an undeclared track; along the train's own axis, as the two below.
   [[nodiscard]] TrainPosition doubted_position() const;
   [[nodiscard]] std::optional<Reference> reference() const;
+  /// What nobody knows of the place of the group that is referred to.
+  [[nodiscard]] double group_m() const;
   [[nodiscard]] TrainIntegrity::Place integrity_place() const;
   void hear_integrity(const Onboard& onboard, int64_t now_ns);
   [[nodiscard]] Moment moment(int64_t now_ns) const;

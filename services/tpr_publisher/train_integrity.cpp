@@ -27,22 +27,25 @@ void TrainIntegrity::lose_way() {
 }
 
 void TrainIntegrity::hear(uint32_t q_integrity, int64_t integrity_ns, double train_length_m) {
-  q_integrity_ = q_integrity;
-  if (integrity_ns == integrity_ns_ && train_length_m == train_length_m_) return;
-  integrity_ns_ = integrity_ns;
+  const bool other_length = train_length_m != train_length_m_;
+  const bool again = integrity_ns == heard_.integrity_ns && !other_length;
+  if (!again && settled_) before_ = heard_;
+  heard_ = {q_integrity, integrity_ns};
+  if (again) return;
   train_length_m_ = train_length_m;
-  rear_m_.reset();
+  if (other_length) rear_m_.reset();
   forgotten_ = false;
   settled_ = false;
   settle();
 }
 
 void TrainIntegrity::settle() {
-  if (settled_ || places_.empty() || places_.back().stamp_ns < integrity_ns_)
+  if (settled_ || places_.empty() || places_.back().stamp_ns < heard_.integrity_ns)
     return;  // the place then is still to come
   settled_ = true;
+  rear_m_.reset();
   // The last place before is taken: farther behind when the train runs forward, which is the safe side.
-  const auto after = std::upper_bound(places_.begin(), places_.end(), integrity_ns_,
+  const auto after = std::upper_bound(places_.begin(), places_.end(), heard_.integrity_ns,
                                       [](int64_t stamp_ns, const Place& place) { return stamp_ns < place.stamp_ns; });
   if (after == places_.begin() || !(train_length_m_ > 0)) return;
   const Place& then = *std::prev(after);
@@ -51,11 +54,11 @@ void TrainIntegrity::settle() {
 }
 
 TrainIntegrity::Said TrainIntegrity::said(double distance_m) const {
-  if (!is_confirmed(q_integrity_)) return {q_integrity_, std::nullopt};
+  if (!is_confirmed(q_integrity())) return {q_integrity(), std::nullopt};
   if (!rear_m_) return {};
   const double length_m = std::ceil(std::max(distance_m, *at_distance_m_) - *rear_m_);
   if (!(length_m <= kLongest)) return {};
-  return {q_integrity_, static_cast<uint32_t>(length_m)};
+  return {q_integrity(), static_cast<uint32_t>(length_m)};
 }
 
 }  // namespace railfix::tpr_publisher

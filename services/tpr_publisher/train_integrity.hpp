@@ -36,21 +36,33 @@ class TrainIntegrity {
   /// rear end of the confirmation is not known any more, and only another confirmation gives one.
   void lose_way();
   /// q_integrity as in the message; the train was complete at integrity_ns. Confirmed without a length, at a time that
-  /// is longer ago than ten seconds, or before any place is known, it says nothing.
+  /// is longer ago than ten seconds, or before any place is known, it says nothing. Until the place of that time has
+  /// come, what was heard before stands.
   void hear(uint32_t q_integrity, int64_t integrity_ns, double train_length_m);
   /// A train that has backed since then is not taken for shorter.
   [[nodiscard]] Said said(double distance_m) const;
+  /// What said() speaks of.
+  [[nodiscard]] uint32_t q_integrity() const { return stands().q_integrity; }
+  [[nodiscard]] int64_t integrity_ns() const { return stands().integrity_ns; }
   /// A confirmation that could be said before the way was lost.
-  [[nodiscard]] bool forgotten() const { return forgotten_ && is_confirmed(q_integrity_); }
+  [[nodiscard]] bool forgotten() const { return forgotten_ && is_confirmed(heard_.q_integrity); }
 
  private:
+  struct Confirmation {
+    uint32_t q_integrity = kNoIntegrityInformation;
+    int64_t integrity_ns = 0;
+  };
   void settle();
+  /// A loss stands at once.
+  [[nodiscard]] const Confirmation& stands() const {
+    return settled_ || !is_confirmed(heard_.q_integrity) ? heard_ : before_;
+  }
 
   std::deque<Place> places_;  // of the last ten seconds
-  uint32_t q_integrity_ = 0;
-  int64_t integrity_ns_ = 0;
+  Confirmation heard_;
+  Confirmation before_;  // stands until heard_ is settled
   double train_length_m_ = 0;
-  bool settled_ = true;                  // rear_m_ belongs to integrity_ns_
+  bool settled_ = true;                  // rear_m_ belongs to heard_
   bool forgotten_ = false;               // it was known before the way was lost
   std::optional<double> rear_m_;         // min safe rear end, on the travelled distance
   std::optional<double> at_distance_m_;  // travelled then

@@ -347,17 +347,17 @@ TEST(TprPublisher, LocationsOfPacket58CountFromItsGroup) {
   ASSERT_EQ(publisher.update(position, position.stamp_ns).report->fields.nid_lrbg, kC);
   EXPECT_EQ(publisher.origin(), kB);
   EXPECT_EQ(publisher.left_out(position.stamp_ns), "");
-  position = at(forward(1, 893), 0.9, 20);
-  position.distance_m = 146;
+  position = at(forward(1, 888), 0.9, 20);
+  position.distance_m = 141;
   EXPECT_FALSE(publisher.update(position, position.stamp_ns).report.has_value());
-  position = at(forward(1, 896), 30, 20);  // fusion was away and begins again at 0
+  position = at(forward(1, 891), 30, 20);  // fusion was away and begins again at 0
   position.distance_m = 0;
   const auto report = publisher.update(position, position.stamp_ns).report;
   ASSERT_TRUE(report.has_value());
   EXPECT_EQ(report->reason, Reason::location);
 
   ASSERT_TRUE(publisher.set_parameters(parameters, kE).ok());  // on another track
-  position = at(forward(1, 897), 30.1, 20);
+  position = at(forward(1, 892), 30.1, 20);
   position.distance_m = 1;
   EXPECT_FALSE(publisher.update(position, position.stamp_ns).report.has_value());
   EXPECT_THAT(publisher.left_out(position.stamp_ns), HasSubstr("locations of packet 58"));
