@@ -96,18 +96,6 @@ void take_marks(const ImportedTrack& track, double from_m, double to_m, bool is_
   }
 }
 
-/// Points of a list by offset that matter between two offsets: those within and two on either side.
-template <class Point>
-std::vector<Point> points_between(const std::vector<Point>& points, double from_m, double to_m) {
-  const auto before = [](const Point& point, double offset_m) { return point.offset_m < offset_m; };
-  const auto first = std::lower_bound(points.begin(), points.end(), from_m, before);
-  const auto last = std::lower_bound(points.begin(), points.end(), to_m, before);
-  std::vector<Point> out(first - std::min<ptrdiff_t>(2, first - points.begin()),
-                         last + std::min<ptrdiff_t>(2, points.end() - last));
-  for (Point& point : out) point.offset_m -= from_m;
-  return out;
-}
-
 /// One edge's end at a node.
 struct Meeting {
   size_t edge = 0;

@@ -1,6 +1,7 @@
 // From pieces of track to a connected map: nodes, what a train can do at them, numbered landmarks.
 #pragma once
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -43,6 +44,18 @@ void add_pieces(const ImportedTrack& track, const std::vector<TrackCut>& cuts, D
 /// Cuts tracks where the end of another touches them (within 5 cm and 20 mrad) and joins ends that meet. Every end that
 /// meets nothing is told in `problems` with its nearest neighbour.
 Draft cut_tracks(std::vector<ImportedTrack> tracks, std::vector<std::string>& problems);
+
+/// Points of a list by offset that matter between two offsets: those within and two on either side.
+template <class Point>
+std::vector<Point> points_between(const std::vector<Point>& points, double from_m, double to_m) {
+  const auto before = [](const Point& point, double offset_m) { return point.offset_m < offset_m; };
+  const auto first = std::lower_bound(points.begin(), points.end(), from_m, before);
+  const auto last = std::lower_bound(points.begin(), points.end(), to_m, before);
+  std::vector<Point> out(first - std::min<ptrdiff_t>(2, first - points.begin()),
+                         last + std::min<ptrdiff_t>(2, points.end() - last));
+  for (Point& point : out) point.offset_m -= from_m;
+  return out;
+}
 
 /// The part of an alignment between two offsets, with its profile and cant and what of them lies next to it.
 Alignment slice(const Alignment& alignment, double from_m, double to_m);

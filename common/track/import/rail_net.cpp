@@ -338,7 +338,8 @@ size_t split(RailNet& net, size_t track, double offset_m) {
   std::erase_if(first.track.speed_limits, [](const SpeedLimit& limit) { return limit.from_m >= limit.to_m; });
   rest.slopes = taken_from(first.slopes, offset_m);
   if (!first.slopes.empty()) rest.slopes.insert(rest.slopes.begin(), {0, first.slopes.back().grade});
-  rest.cant = taken_from(first.cant, offset_m);
+  rest.cant = points_between(first.cant, offset_m, offset_m + rest.length_m);
+  first.cant = points_between(first.cant, 0, offset_m);
   for (NetBend& bend : first.bends) {
     if (bend.to_m <= offset_m) continue;
     NetBend after{std::max(0.0, bend.from_m - offset_m), bend.to_m - offset_m, bend.curvature_start_per_m,

@@ -27,6 +27,12 @@ struct Connector {
   pugi::xml_node node{};
 };
 
+struct RadiusChange {
+  double offset_m = 0;
+  double curvature_per_m = 0;
+  std::optional<double> cant_m;
+};
+
 class Reader {
  public:
   explicit Reader(const XmlSource& source) : source_(source), coordinates_(source) {}
@@ -102,26 +108,43 @@ class Reader {
   }
 
   void read_plan(const pugi::xml_node& elements, NetTrack& track) {
-    std::vector<std::pair<double, double>> radii;
+    std::vector<RadiusChange> changes;
     for (const pugi::xml_node& change : elements.child("radiusChanges").children("radiusChange")) {
       const double radius = source_.required(change, "radius");
       if (radius != 0 && std::abs(radius) < 10)
         throw source_.wrong(change, "a radius of less than 10 m is no railway's");
-      radii.emplace_back(pos(change) - origin_m_, radius == 0 ? 0.0 : -1.0 / radius);
-      const auto cant = XmlSource::number(change, "superelevation");
-      if (cant) track.cant.push_back({radii.back().first, std::copysign(1e-3 * *cant, radii.back().second)});
+      changes.push_back({pos(change) - origin_m_, radius == 0 ? 0.0 : -1.0 / radius, {}});
+      if (const auto cant_mm = XmlSource::number(change, "superelevation"))
+        changes.back().cant_m = std::copysign(1e-3 * *cant_mm, changes.back().curvature_per_m);
     }
-    std::sort(radii.begin(), radii.end());
-    for (size_t i = 0; i < radii.size(); ++i) {
-      const double to = i + 1 < radii.size() ? radii[i + 1].first : track.length_m;
-      if (radii[i].second != 0 && to > radii[i].first)
-        track.bends.push_back({radii[i].first, to, radii[i].second, radii[i].second});
+    const auto by_offset = [](const auto& a, const auto& b) { return a.offset_m < b.offset_m; };
+    std::stable_sort(changes.begin(), changes.end(), by_offset);
+    for (size_t i = 0; i < changes.size(); ++i) {
+      const double from = changes[i].offset_m;
+      const double to = i + 1 < changes.size() ? changes[i + 1].offset_m : track.length_m;
+      const double curvature = changes[i].curvature_per_m;
+      if (curvature != 0 && to > from) track.bends.push_back({from, to, curvature, curvature});
     }
+    add_cant(changes, track);
     for (const pugi::xml_node& change : elements.child("gradientChanges").children("gradientChange"))
       track.slopes.push_back({pos(change) - origin_m_, 1e-3 * source_.required(change, "slope")});
-    const auto by_offset = [](const auto& a, const auto& b) { return a.offset_m < b.offset_m; };
     std::stable_sort(track.slopes.begin(), track.slopes.end(), by_offset);
-    std::stable_sort(track.cant.begin(), track.cant.end(), by_offset);
+  }
+
+  /// Like the radius, the cant holds from a change on up to the next one, so that it steps there.
+  static void add_cant(const std::vector<RadiusChange>& changes, NetTrack& track) {
+    if (std::none_of(changes.begin(), changes.end(), [](const RadiusChange& c) { return c.cant_m.has_value(); }))
+      return;
+    track.cant = {{0, 0}};
+    for (const RadiusChange& change : changes) {
+      const double cant_m = change.cant_m.value_or(0);
+      if (change.offset_m <= 0) {
+        track.cant = {{0, cant_m}};
+        continue;
+      }
+      track.cant.push_back({change.offset_m, track.cant.back().cant_m});
+      track.cant.push_back({change.offset_m, cant_m});
+    }
   }
 
   /// Every profile for itself: the lowest holds. "end" as speed ends a limit. On its own track only.

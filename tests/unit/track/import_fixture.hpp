@@ -5,13 +5,33 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <vector>
+
+#include "track/map.hpp"
 
 namespace railfix::track {
+
+/// "KIND NAME at OFFSET on EDGE" of every landmark of these kinds, in order of the edges.
+inline std::vector<std::string> marks_of(const Map& map, std::initializer_list<LandmarkKind> kinds) {
+  std::vector<std::string> out;
+  for (const Edge& edge : map.edges) {
+    for (const Landmark* mark : map.landmarks_on(edge.id)) {
+      if (std::find(kinds.begin(), kinds.end(), mark->kind) == kinds.end()) continue;
+      char text[120];
+      std::snprintf(text, sizeof text, "%s %s at %.1f on %u", to_string(mark->kind).c_str(), mark->name.c_str(),
+                    mark->offset_m, mark->edge);
+      out.emplace_back(text);
+    }
+  }
+  return out;
+}
 
 class ImportTest : public testing::Test {
  protected:

@@ -33,21 +33,6 @@ size_t count_of(const Map& map, LandmarkKind kind) {
       std::count_if(map.landmarks.begin(), map.landmarks.end(), [&](const Landmark& m) { return m.kind == kind; }));
 }
 
-/// "KIND NAME at OFFSET on EDGE" of every landmark of these kinds, in order of the edges.
-std::vector<std::string> marks_of(const Map& map, std::initializer_list<LandmarkKind> kinds) {
-  std::vector<std::string> out;
-  for (const Edge& edge : map.edges) {
-    for (const Landmark* mark : map.landmarks_on(edge.id)) {
-      if (std::find(kinds.begin(), kinds.end(), mark->kind) == kinds.end()) continue;
-      char text[120];
-      std::snprintf(text, sizeof text, "%s %s at %.1f on %u", to_string(mark->kind).c_str(), mark->name.c_str(),
-                    mark->offset_m, mark->edge);
-      out.emplace_back(text);
-    }
-  }
-  return out;
-}
-
 /// Name and offset of the only level crossing.
 std::pair<std::string, double> level_crossing_of(const Map& map) {
   std::vector<const Landmark*> found;
