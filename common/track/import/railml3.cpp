@@ -4,20 +4,13 @@
 #include <set>
 
 #include "core/units.hpp"
+#include "track/import/net_places.hpp"
 #include "track/import/railml_readers.hpp"
 
 namespace railfix::track {
 namespace {
 
 constexpr double kTouchM = 0.5;
-
-/// A place or stretch on a net element, along it.
-struct Place {
-  size_t track = 0;
-  double from_m = 0;
-  double to_m = 0;
-  bool same_direction = true;
-};
 
 class Reader {
  public:
@@ -62,7 +55,7 @@ class Reader {
     }
     if (net_.tracks.empty()) throw core::BadInput(source_.file_name() + " holds no <netElement> with a length");
     for (const pugi::xml_node& node : descendants(source_.root(), "track")) {
-      for (const Place& place : places_of(node)) {
+      for (const NetPlace& place : places_of(node)) {
         ImportedTrack& track = net_.tracks[place.track].track;
         if (!track.line.empty()) continue;
         track.line = node.attribute("id").value();
@@ -100,14 +93,18 @@ class Reader {
   }
 
   /// Where an element lies; what lies on coarser net elements only is left out.
-  [[nodiscard]] std::vector<Place> places_of(const pugi::xml_node& node) const {
-    std::vector<Place> out;
+  [[nodiscard]] std::vector<NetPlace> places_of(const pugi::xml_node& node) const {
+    std::vector<NetPlace> out;
     for (const pugi::xml_node& part : descendants(node, "associatedNetElement")) {
       const auto found = index_.find(part.attribute("netElementRef").value());
       if (found == index_.end()) continue;
       const double length = net_.tracks[found->second].length_m;
-      const double from = XmlSource::number(part, "posBegin").value_or(0);
-      const double to = XmlSource::number(part, "posEnd").value_or(length);
+      const auto along_m = [&](const char* pos, const char* part_of_length, double otherwise) {
+        const double share = XmlSource::number(part, part_of_length).value_or(otherwise);
+        return XmlSource::number(part, pos).value_or(share * length);
+      };
+      const double from = along_m("posBegin", "intrinsicCoordBegin", 0);
+      const double to = along_m("posEnd", "intrinsicCoordEnd", 1);
       const auto within = [&](double value) { return std::clamp(value, 0.0, length); };
       const bool turned = std::string(part.attribute("keepsOrientation").value()) == "false";
       out.push_back({found->second, within(std::min(from, to)), within(std::max(from, to)), from <= to && !turned});
@@ -171,7 +168,7 @@ class Reader {
       const auto radius = XmlSource::number(curve, "radius");
       if (!radius || *radius == 0 || (!type.empty() && type != "arc")) continue;
       if (std::abs(*radius) < 10) throw source_.wrong(curve, "a radius of less than 10 m is no railway's");
-      for (const Place& place : places_of(curve)) {
+      for (const NetPlace& place : places_of(curve)) {
         const double curvature = (place.same_direction ? -1.0 : 1.0) / *radius;
         if (place.to_m > place.from_m)
           net_.tracks[place.track].bends.push_back({place.from_m, place.to_m, curvature, curvature});
@@ -181,7 +178,7 @@ class Reader {
     for (const pugi::xml_node& curve : descendants(source_.root(), "gradientCurve")) {
       const auto gradient = XmlSource::number(curve, "gradient");
       if (!gradient) continue;
-      for (const Place& place : places_of(curve)) {
+      for (const NetPlace& place : places_of(curve)) {
         const double grade = (place.same_direction ? 1e-3 : -1e-3) * *gradient;
         net_.tracks[place.track].slopes.push_back({place.from_m, grade});
       }
@@ -201,7 +198,7 @@ class Reader {
     for (const pugi::xml_node& curve : descendants(source_.root(), "horizontalCurve")) {
       const std::string type = curve.attribute("curveType").value();
       if (type.empty() || type == "arc" || type == "straight") continue;
-      for (const Place& place : places_of(curve)) {
+      for (const NetPlace& place : places_of(curve)) {
         if (place.to_m - place.from_m < kTouchM) continue;
         NetBend bend{place.from_m, place.to_m, 0, 0};
         for (const NetBend& arc : net_.tracks[place.track].bends) {
@@ -218,42 +215,45 @@ class Reader {
     for (const auto& [track, bend] : found) net_.tracks[track].bends.push_back(bend);
   }
 
-  void add(LandmarkKind kind, const Place& place, double offset_m, double lateral_m, const pugi::xml_node& of) {
+  void add(LandmarkKind kind, const NetPlace& place, double offset_m, double lateral_m, const pugi::xml_node& of) {
     net_.tracks[place.track].track.marks.push_back(
         {kind, offset_m, place.same_direction ? lateral_m : -lateral_m, kRailmlSigmaM, railml_name(of)});
   }
 
+  /// Where the whole thing begins and ends, not every net element's part of it.
+  void add_ends(LandmarkKind begin, LandmarkKind end, double lateral_m, const pugi::xml_node& of) {
+    const std::vector<NetPlace> places = places_of(of);
+    for (const NetPlace& place : places) {
+      if (!goes_on(net_, places, place, false)) add(begin, place, place.from_m, lateral_m, of);
+      if (!goes_on(net_, places, place, true)) add(end, place, place.to_m, lateral_m, of);
+    }
+  }
+
+  void add_middles(LandmarkKind kind, const pugi::xml_node& of) {
+    for (const auto& [track, offset_m] : middles(net_, places_of(of)))
+      net_.tracks[track].track.marks.push_back({kind, offset_m, 0, kRailmlSigmaM, railml_name(of)});
+  }
+
   void read_marks() {
     for (const pugi::xml_node& of : descendants(source_.root(), "overCrossing")) {
-      const bool is_tunnel = std::string(of.attribute("constructionType").value()) == "tunnel";
-      for (const Place& place : places_of(of)) {
-        if (is_tunnel) {
-          add(LandmarkKind::portal_in, place, place.from_m, 0, of);
-          add(LandmarkKind::portal_out, place, place.to_m, 0, of);
-        } else {
-          add(LandmarkKind::bridge, place, 0.5 * (place.from_m + place.to_m), 0, of);
-        }
+      if (std::string(of.attribute("constructionType").value()) == "tunnel") {
+        add_ends(LandmarkKind::portal_in, LandmarkKind::portal_out, 0, of);
+      } else {
+        add_middles(LandmarkKind::bridge, of);
       }
     }
-    for (const pugi::xml_node& of : descendants(source_.root(), "underCrossing")) {
-      for (const Place& place : places_of(of))
-        add(LandmarkKind::underbridge, place, 0.5 * (place.from_m + place.to_m), 0, of);
-    }
-    for (const pugi::xml_node& of : descendants(source_.root(), "levelCrossingIS")) {
-      for (const Place& place : places_of(of))
-        add(LandmarkKind::level_crossing, place, 0.5 * (place.from_m + place.to_m), 0, of);
-    }
+    for (const pugi::xml_node& of : descendants(source_.root(), "underCrossing"))
+      add_middles(LandmarkKind::underbridge, of);
+    for (const pugi::xml_node& of : descendants(source_.root(), "levelCrossingIS"))
+      add_middles(LandmarkKind::level_crossing, of);
     for (const pugi::xml_node& of : descendants(source_.root(), "platformEdge")) {
       const pugi::xml_node sided =
           of.find_node([](const pugi::xml_node& node) { return node.attribute("lateralSide"); });
       const double lateral_m = platform_lateral_m(sided.attribute("lateralSide").value());
-      for (const Place& place : places_of(of)) {
-        add(LandmarkKind::platform, place, place.from_m, lateral_m, of);
-        add(LandmarkKind::platform, place, place.to_m, lateral_m, of);
-      }
+      add_ends(LandmarkKind::platform, LandmarkKind::platform, lateral_m, of);
     }
     for (const pugi::xml_node& of : descendants(source_.root(), "signalIS")) {
-      for (const Place& place : places_of(of)) add(LandmarkKind::mast, place, place.from_m, 0, of);
+      for (const NetPlace& place : places_of(of)) add(LandmarkKind::mast, place, place.from_m, 0, of);
     }
   }
 
@@ -269,7 +269,7 @@ class Reader {
       if (is_special || section.attribute("isTemporary").as_bool()) continue;
       const pugi::xml_node location = section.child("linearLocation");
       const std::string applies = location.attribute("applicationDirection").value();
-      for (const Place& place : places_of(section)) {
+      for (const NetPlace& place : places_of(section)) {
         Direction running = Direction::unknown;
         if (applies == "normal" || applies == "reverse")
           running = (applies == "normal") == place.same_direction ? Direction::forward : Direction::reverse;
@@ -282,9 +282,9 @@ class Reader {
   }
 
   void read_balises() {
-    std::map<std::string, std::vector<std::pair<Place, pugi::xml_node>>> of_group;
+    std::map<std::string, std::vector<std::pair<NetPlace, pugi::xml_node>>> of_group;
     for (const pugi::xml_node& balise : descendants(source_.root(), "balise")) {
-      const std::vector<Place> places = places_of(balise);
+      const std::vector<NetPlace> places = places_of(balise);
       if (places.empty()) continue;
       std::string group = balise.attribute("baliseGroupRef").value();
       if (group.empty()) group = balise.attribute("belongsToBaliseGroup").value();
@@ -297,8 +297,8 @@ class Reader {
     }
     for (const pugi::xml_node& node : descendants(source_.root(), "baliseGroup")) {
       const auto identity = etcs_identity(source_, node);
-      std::vector<std::pair<Place, pugi::xml_node>>& balises = of_group[node.attribute("id").value()];
-      const std::vector<Place> own = places_of(node);
+      std::vector<std::pair<NetPlace, pugi::xml_node>>& balises = of_group[node.attribute("id").value()];
+      const std::vector<NetPlace> own = places_of(node);
       if (balises.empty() && !own.empty()) balises.emplace_back(own.front(), node);
       if (balises.empty()) continue;
       if (!identity) {

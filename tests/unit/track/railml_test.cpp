@@ -41,5 +41,58 @@ TEST_F(RailmlTest, CantHoldsFromOneRadiusChangeToTheNextOverCutsToo) {
   }
 }
 
+// n1 (1000 m) leads into n2 (800 m) or, over a switch, into n3 (500 m).
+std::string railml3(const std::string& infrastructure) {
+  return R"(<railML version="3.2"><infrastructure><topology><netElements>
+<netElement id="n1" length="1000"/><netElement id="n2" length="800"/><netElement id="n3" length="500"/></netElements><netRelations>
+<netRelation id="r12" navigability="Both" positionOnA="1" positionOnB="0"><elementA ref="n1"/><elementB ref="n2"/></netRelation>
+<netRelation id="r13" navigability="Both" positionOnA="1" positionOnB="0"><elementA ref="n1"/><elementB ref="n3"/></netRelation>
+<netRelation id="r23" navigability="None" positionOnA="0" positionOnB="0"><elementA ref="n2"/><elementB ref="n3"/></netRelation>
+</netRelations></topology><functionalInfrastructure>)" +
+         infrastructure + "</functionalInfrastructure></infrastructure></railML>";
+}
+
+std::string on(const std::string& net_element, const std::string& attributes) {
+  return "<associatedNetElement netElementRef=\"" + net_element + "\" " + attributes + "/>";
+}
+
+std::string crossing(const std::string& attributes, const std::string& places) {
+  return "<overCrossing " + attributes + "><linearLocation>" + places + "</linearLocation></overCrossing>";
+}
+
+TEST_F(RailmlTest, ThingsOverSeveralNetElementsHaveTwoEnds) {
+  const std::string over_n1_n2 =
+      on("n1", "posBegin=\"600\" posEnd=\"1000\"") + on("n2", "posBegin=\"0\" posEnd=\"300\"");
+  const std::string text = railml3(crossing("id=\"long\" constructionType=\"tunnel\"", over_n1_n2) +
+                                   crossing("id=\"short\" constructionType=\"tunnel\"",
+                                            on("n3", "intrinsicCoordBegin=\"0.4\" intrinsicCoordEnd=\"0.6\"")) +
+                                   crossing("id=\"road\"", over_n1_n2) + "<platformEdge id=\"p\"><linearLocation>" +
+                                   on("n2", "keepsOrientation=\"false\" posBegin=\"0\" posEnd=\"150\"") +
+                                   on("n1", "keepsOrientation=\"false\" posBegin=\"900\" posEnd=\"1000\"") +
+                                   "</linearLocation></platformEdge>");
+  const Map map = core::value_or_throw(build_map({write("a.railml", text)}, {})).map;
+  using Kind = LandmarkKind;
+  EXPECT_THAT(marks_of(map, {Kind::portal_in, Kind::portal_out}),
+              testing::ElementsAre("portal_in long at 600.0 on 1", "portal_out long at 300.0 on 2",
+                                   "portal_in short at 200.0 on 3", "portal_out short at 300.0 on 3"));
+  EXPECT_THAT(marks_of(map, {Kind::platform}),
+              testing::ElementsAre("platform p at 900.0 on 1", "platform p at 150.0 on 2"));
+  EXPECT_THAT(marks_of(map, {Kind::bridge}), testing::ElementsAre("bridge road at 950.0 on 1"));
+}
+
+// A tunnel with a switch in it, and one over two tracks side by side.
+TEST_F(RailmlTest, TunnelsEndOnEveryTrackThatLeavesThem) {
+  const std::string fork = on("n1", "posBegin=\"900\"") + on("n2", "posEnd=\"50\"") + on("n3", "posEnd=\"60\"");
+  const std::string beside = on("n2", "posBegin=\"100\" posEnd=\"200\"") + on("n3", "posBegin=\"100\" posEnd=\"200\"");
+  const std::string tunnel = " constructionType=\"tunnel\"";
+  const std::string text = railml3(crossing("id=\"fork\"" + tunnel, fork) + crossing("id=\"beside\"" + tunnel, beside));
+  const Map map = core::value_or_throw(build_map({write("a.railml", text)}, {})).map;
+  EXPECT_THAT(marks_of(map, {LandmarkKind::portal_in, LandmarkKind::portal_out}),
+              testing::UnorderedElementsAre("portal_in fork at 900.0 on 1", "portal_out fork at 50.0 on 2",
+                                            "portal_out fork at 60.0 on 3", "portal_in beside at 100.0 on 2",
+                                            "portal_out beside at 200.0 on 2", "portal_in beside at 100.0 on 3",
+                                            "portal_out beside at 200.0 on 3"));
+}
+
 }  // namespace
 }  // namespace railfix::track
