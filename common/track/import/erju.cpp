@@ -197,8 +197,8 @@ class Reader {
       const std::string id = node.attribute("id").value();
       for (const pugi::xml_node& section : descendants(node, "trackEdgeSection")) {
         NetTrack& track = net_.tracks[track_of(infra_, section, "trackEdge")];
-        const double from = metres(XmlSource::number(section, "skipFromStart").value_or(0));
-        const double to = track.length_m - metres(XmlSource::number(section, "skipFromEnd").value_or(0));
+        const double from = metres(infra_.number(section, "skipFromStart").value_or(0));
+        const double to = track.length_m - metres(infra_.number(section, "skipFromEnd").value_or(0));
         if (kind == LandmarkKind::portal_in) {
           if (from > 0) track.track.marks.push_back({LandmarkKind::portal_in, from, 0, kSurveyedM, id});
           if (to < track.length_m) track.track.marks.push_back({LandmarkKind::portal_out, to, 0, kSurveyedM, id});
@@ -220,8 +220,8 @@ class Reader {
       const std::vector<pugi::xml_node> path = descendants(location, "dirTrackEdge");
       double length_m = 0;
       for (const pugi::xml_node& edge : path) length_m += net_.tracks[track_of(infra_, edge, "trackEdge")].length_m;
-      const double from_m = metres(XmlSource::number(location, "skipFromPathStart").value_or(0));
-      const double to_m = length_m - metres(XmlSource::number(location, "skipFromPathEnd").value_or(0));
+      const double from_m = metres(infra_.number(location, "skipFromPathStart").value_or(0));
+      const double to_m = length_m - metres(infra_.number(location, "skipFromPathEnd").value_or(0));
       if (from_m < 0 || to_m > length_m || from_m > to_m) {
         net_.problems.push_back("platform edge \"" + platform_name(node) +
                                 "\" is not on its track edges; it is left out");

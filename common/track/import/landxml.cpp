@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <optional>
 #include <string_view>
 
@@ -14,6 +15,7 @@ namespace {
 constexpr double kToleratedLengthM = 1e-3;
 constexpr double kToleratedStepRad = 1e-3;
 constexpr double kToleratedGapM = 1e-4;
+constexpr double kToldOutsideM = 1.0;
 constexpr size_t kMostProblems = 200;
 
 /// Reads one document; errors are thrown as BadInput inside and become values at the door.
@@ -106,7 +108,7 @@ class Reader {
     if (length > 1e6 || !(chord < 1e6) || std::max(std::abs(start), std::abs(end)) * length > core::kPi) {
       throw source_.wrong(node, "the element turns by more than half a circle or is longer than 1000 km");
     }
-    take(close_element(from, to, start, end, length), to, XmlSource::number(node, "length").value_or(chord),
+    take(close_element(from, to, start, end, length), to, source_.number(node, "length").value_or(chord),
          track + ": the element in line " + source_.line_of(node), plan);
   }
 
@@ -147,10 +149,25 @@ class Reader {
     return offset_a + (station - station_a) * (offset_b - offset_a) / (station_b - station_a);
   }
 
+  /// Stations that cannot be of this alignment, as when its staStart is missing.
+  void tell_outside(const Plan& plan, const std::vector<double>& stations, const std::string& track,
+                    const std::string& what) {
+    const double begin = plan.stations.front().first;
+    const double end = plan.stations.back().first;
+    std::vector<double> outside;
+    std::copy_if(stations.begin(), stations.end(), std::back_inserter(outside),
+                 [&](double station) { return station < begin - kToldOutsideM || station > end + kToldOutsideM; });
+    if (outside.empty()) return;
+    problem(track + ": " + std::to_string(outside.size()) + " of " + std::to_string(stations.size()) + " " + what +
+            " stations lie outside the alignment, which reaches from " + std::to_string(begin) + " to " +
+            std::to_string(end) + ": " + std::to_string(outside.front()) +
+            (outside.size() > 1 ? " to " + std::to_string(outside.back()) : ""));
+  }
+
   [[nodiscard]] std::vector<GradePoint> read_profile(const pugi::xml_node& alignment, const std::string& track,
                                                      const Plan& plan) {
     std::vector<GradePoint> points;
-    std::vector<double> radii;
+    std::vector<double> stations;
     for (const pugi::xml_node& node : alignment.child("Profile").child("ProfAlign").children()) {
       const std::string_view kind = node.name();
       if (kind != "PVI" && kind != "CircCurve" && kind != "ParaCurve") {
@@ -160,9 +177,11 @@ class Reader {
       }
       const std::vector<double> numbers = numbers_of(node.text().get());
       if (numbers.size() != 2)
-        throw source_.wrong(node, "<" + std::string(kind) + "> needs a station and an elevation");
+        throw source_.wrong(
+            node, "<" + std::string(kind) + "> needs a station and an elevation, not \"" + node.text().get() + "\"");
       const double length = kind == "PVI" ? 0.0 : source_.required(node, "length");
       if (length < 0) throw source_.wrong(node, "a vertical curve cannot have a negative length");
+      stations.push_back(numbers[0]);
       points.push_back({offset_at(plan, numbers[0]), numbers[1], length});
       if (points.size() > 1 && points.back().offset_m <= points[points.size() - 2].offset_m) {
         throw source_.wrong(node, "the profile's stations must grow");
@@ -175,21 +194,26 @@ class Reader {
                 std::to_string(points[i].offset_m) + " m overlap");
       }
     }
+    tell_outside(plan, stations, track, "profile");
     return points;
   }
 
   /// Applied cant is never negative in the file; the curve's direction says which rail is higher.
-  [[nodiscard]] std::vector<CantPoint> read_cant(const pugi::xml_node& alignment, const Plan& plan) const {
+  [[nodiscard]] std::vector<CantPoint> read_cant(const pugi::xml_node& alignment, const std::string& track,
+                                                 const Plan& plan) {
     std::vector<CantPoint> points;
+    std::vector<double> stations;
     for (const pugi::xml_node& node : alignment.child("Cant").children("CantStation")) {
       const std::string_view direction = node.attribute("curvature").value();
       if (direction != "cw" && direction != "ccw") throw source_.wrong(node, "curvature must be cw or ccw");
       const double cant_m = source_.required(node, "appliedCant") * 1e-3 * (direction == "ccw" ? 1.0 : -1.0);
-      points.push_back({offset_at(plan, source_.required(node, "station")), cant_m});
+      stations.push_back(source_.required(node, "station"));
+      points.push_back({offset_at(plan, stations.back()), cant_m});
       if (points.size() > 1 && points.back().offset_m < points[points.size() - 2].offset_m) {
         throw source_.wrong(node, "the cant stations must grow");
       }
     }
+    tell_outside(plan, stations, track, "cant");
     return points;
   }
 
@@ -198,21 +222,20 @@ class Reader {
     if (!geometry) return;
     const std::string name = node.attribute("name").as_string("alignment");
     Plan plan;
-    plan.stations.push_back({XmlSource::number(node, "staStart").value_or(0.0), 0.0});
+    plan.stations.push_back({source_.number(node, "staStart").value_or(0.0), 0.0});
     for (const pugi::xml_node& element : geometry.children()) {
       if (element.type() == pugi::node_element && std::string_view(element.name()) != "Feature")
         add_element(element, name, plan);
     }
     if (plan.elements.empty()) throw source_.wrong(geometry, "the alignment " + name + " has no elements");
     const double plan_length = plan.stations.back().first - plan.stations.front().first;
-    if (const double told = XmlSource::number(node, "length").value_or(plan_length);
-        std::abs(told - plan_length) > 0.01) {
+    if (const double told = source_.number(node, "length").value_or(plan_length); std::abs(told - plan_length) > 0.01) {
       problem(name + ": its elements cover " + std::to_string(plan_length) + " m of the " + std::to_string(told) +
               " m that it claims");
     }
     if (node.child("StaEquation")) problem(name + ": station equations are not applied; stations count from its start");
     std::vector<GradePoint> profile = read_profile(node, name, plan);
-    std::vector<CantPoint> cant = read_cant(node, plan);
+    std::vector<CantPoint> cant = read_cant(node, name, plan);
     ImportedTrack track{.name = name, .line = name, .alignment = {}, .marks = {}};
     track.alignment = Alignment(std::move(plan.elements), std::move(plan.starts), std::move(profile), std::move(cant));
     out_.tracks.push_back(std::move(track));

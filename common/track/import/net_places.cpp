@@ -1,6 +1,7 @@
 #include "track/import/net_places.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace railfix::track {
 namespace {

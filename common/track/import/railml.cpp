@@ -38,8 +38,8 @@ std::optional<EtcsIdentity> etcs_identity(const XmlSource& source, const pugi::x
   for (const pugi::xml_node& place : places) {
     for (const auto& [country, number] :
          {std::pair("countryID", "groupID"), std::pair("nid_c", "nid_bg"), std::pair("nidC", "nidBG")}) {
-      const auto c = XmlSource::number(place, country);
-      const auto bg = XmlSource::number(place, number);
+      const auto c = source.number(place, country);
+      const auto bg = source.number(place, number);
       if (!c || !bg) continue;
       if (!(*c >= 0 && *c <= 1023 && *bg >= 0 && *bg <= 16382)) {
         throw source.wrong(place, "balise group \"" + railml_name(group) +

@@ -114,7 +114,7 @@ class Reader {
       if (radius != 0 && std::abs(radius) < 10)
         throw source_.wrong(change, "a radius of less than 10 m is no railway's");
       changes.push_back({pos(change) - origin_m_, radius == 0 ? 0.0 : -1.0 / radius, {}});
-      if (const auto cant_mm = XmlSource::number(change, "superelevation"))
+      if (const auto cant_mm = source_.number(change, "superelevation"))
         changes.back().cant_m = std::copysign(1e-3 * *cant_mm, changes.back().curvature_per_m);
     }
     const auto by_offset = [](const auto& a, const auto& b) { return a.offset_m < b.offset_m; };
@@ -154,8 +154,10 @@ class Reader {
     for (const pugi::xml_node& change : elements.child("speedChanges").children("speedChange")) {
       const std::string profile = change.attribute("profileRef").value();
       if (special_profiles_.contains(profile)) continue;
-      const double speed = core::mps_from_kmh(XmlSource::number(change, "vMax").value_or(0));
-      changes[{profile, change.attribute("dir").value()}].emplace_back(pos(change) - origin_m_, speed);
+      const bool is_end = std::string(change.attribute("vMax").value()) == "end";
+      const double speed_kmh = is_end ? 0 : source_.number(change, "vMax").value_or(0);
+      changes[{profile, change.attribute("dir").value()}].emplace_back(pos(change) - origin_m_,
+                                                                       core::mps_from_kmh(speed_kmh));
     }
     for (const auto& [of, list] : changes) {
       if (of.second != "down") add_speeds(list, Direction::forward, track.length_m, track.track);
@@ -174,7 +176,7 @@ class Reader {
       track.track.marks.push_back(
           {kind, std::clamp(offset_m, 0.0, track.length_m), lateral_m, kRailmlSigmaM, railml_name(of)});
     };
-    const auto length = [](const pugi::xml_node& of) { return XmlSource::number(of, "length").value_or(0); };
+    const auto length = [this](const pugi::xml_node& of) { return source_.number(of, "length").value_or(0); };
     for (const pugi::xml_node& of : elements.child("tunnels").children("tunnel")) {
       add(LandmarkKind::portal_in, pos(of) - origin_m_, 0, of);
       add(LandmarkKind::portal_out, pos(of) - origin_m_ + length(of), 0, of);
@@ -211,7 +213,7 @@ class Reader {
       TrackGroup group;
       std::vector<std::pair<double, std::string>> order;
       for (const pugi::xml_node& ref : node.children("baliseRef"))
-        order.emplace_back(XmlSource::number(ref, "sequence").value_or(0), ref.attribute("ref").value());
+        order.emplace_back(source_.number(ref, "sequence").value_or(0), ref.attribute("ref").value());
       std::stable_sort(order.begin(), order.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
       for (const auto& [sequence, id] : order) {
         const auto balise = by_id.find(id);

@@ -90,7 +90,7 @@ std::vector<Railml2Coordinates::Point> Railml2Coordinates::points_of(const pugi:
   std::vector<Point> points;
   for (const pugi::xml_node& coordinate : descendants(track, "geoCoord")) {
     const pugi::xml_node of = coordinate.parent();
-    const auto pos = XmlSource::number(of, "pos");
+    const auto pos = source_.number(of, "pos");
     if (!pos || !kOnAxis.contains(of.name())) continue;
     points.push_back({*pos - origin_m, in_plane(coordinate)});
   }

@@ -37,7 +37,7 @@ class Reader {
 
   void read_elements() {
     for (const pugi::xml_node& element : descendants(source_.root(), "netElement")) {
-      const auto length = XmlSource::number(element, "length");
+      const auto length = source_.number(element, "length");
       // Elements made of others are the same tracks once more, coarser.
       if (element.child("elementCollectionUnordered") || element.child("elementCollectionOrdered") || !length) {
         coarse_.insert(element.attribute("id").value());
@@ -100,8 +100,8 @@ class Reader {
       if (found == index_.end()) continue;
       const double length = net_.tracks[found->second].length_m;
       const auto along_m = [&](const char* pos, const char* part_of_length, double otherwise) {
-        const double share = XmlSource::number(part, part_of_length).value_or(otherwise);
-        return XmlSource::number(part, pos).value_or(share * length);
+        const double share = source_.number(part, part_of_length).value_or(otherwise);
+        return source_.number(part, pos).value_or(share * length);
       };
       const double from = along_m("posBegin", "intrinsicCoordBegin", 0);
       const double to = along_m("posEnd", "intrinsicCoordEnd", 1);
@@ -114,8 +114,8 @@ class Reader {
       const auto found = index_.find(spot.attribute("netElementRef").value());
       if (found == index_.end()) continue;
       const double length = net_.tracks[found->second].length_m;
-      const auto along = XmlSource::number(spot, "intrinsicCoord");
-      const double at = std::clamp(XmlSource::number(spot, "pos").value_or(along.value_or(0) * length), 0.0, length);
+      const auto along = source_.number(spot, "intrinsicCoord");
+      const double at = std::clamp(source_.number(spot, "pos").value_or(along.value_or(0) * length), 0.0, length);
       out.push_back({found->second, at, at, std::string(spot.attribute("applicationDirection").value()) != "reverse"});
     }
     return out;
@@ -165,7 +165,7 @@ class Reader {
   void read_plan() {
     for (const pugi::xml_node& curve : descendants(source_.root(), "horizontalCurve")) {
       const std::string type = curve.attribute("curveType").value();
-      const auto radius = XmlSource::number(curve, "radius");
+      const auto radius = source_.number(curve, "radius");
       if (!radius || *radius == 0 || (!type.empty() && type != "arc")) continue;
       if (std::abs(*radius) < 10) throw source_.wrong(curve, "a radius of less than 10 m is no railway's");
       for (const NetPlace& place : places_of(curve)) {
@@ -176,7 +176,7 @@ class Reader {
     }
     read_transitions();
     for (const pugi::xml_node& curve : descendants(source_.root(), "gradientCurve")) {
-      const auto gradient = XmlSource::number(curve, "gradient");
+      const auto gradient = source_.number(curve, "gradient");
       if (!gradient) continue;
       for (const NetPlace& place : places_of(curve)) {
         const double grade = (place.same_direction ? 1e-3 : -1e-3) * *gradient;
@@ -260,7 +260,7 @@ class Reader {
   void read_speeds() {
     const std::set<std::string> special = special_speed_profiles(source_);
     for (const pugi::xml_node& section : descendants(source_.root(), "speedSection")) {
-      const auto speed = XmlSource::number(section, "maxSpeed");
+      const auto speed = source_.number(section, "maxSpeed");
       if (!speed || *speed <= 0 || core::mps_from_kmh(*speed) >= SpeedLimit::kFastestMps) continue;
       const auto profiles = section.children("validForSpeedProfile");
       const bool is_special = !profiles.empty() && std::all_of(profiles.begin(), profiles.end(), [&](const auto& of) {

@@ -8,6 +8,15 @@
 #include <iterator>
 
 namespace railfix::track {
+namespace {
+
+constexpr std::string_view kWhite = " \t\r\n";
+
+bool is_white(char letter) {
+  return kWhite.find(letter) != std::string_view::npos;
+}
+
+}  // namespace
 
 XmlSource::XmlSource(const std::filesystem::path& file) : file_name_(file.string()) {
   std::ifstream stream(file, std::ios::binary);
@@ -30,16 +39,24 @@ core::BadInput XmlSource::wrong(const pugi::xml_node& node, const std::string& w
   return core::BadInput(file_name_ + " line " + line_of(node) + ": " + what);
 }
 
-std::optional<double> XmlSource::number(const pugi::xml_node& node, const char* attribute) {
-  const std::vector<double> numbers = numbers_of(node.attribute(attribute).value());
-  return numbers.size() == 1 ? std::optional(numbers.front()) : std::nullopt;
+std::optional<double> XmlSource::number(const pugi::xml_node& node, const char* attribute) const {
+  const std::string text = node.attribute(attribute).value();
+  if (text.find_first_not_of(kWhite) == std::string::npos) return std::nullopt;
+  const std::vector<double> numbers = numbers_of(text);
+  if (numbers.size() != 1) throw needs_number(node, attribute, ", not \"" + text + "\"");
+  return numbers.front();
 }
 
 double XmlSource::required(const pugi::xml_node& node, const char* attribute) const {
   const std::optional<double> value = number(node, attribute);
-  if (!value)
-    throw wrong(node, "<" + std::string(node.name()) + "> needs a number in the attribute \"" + attribute + "\"");
+  if (!value) throw needs_number(node, attribute, "");
   return *value;
+}
+
+core::BadInput XmlSource::needs_number(const pugi::xml_node& node, const char* attribute,
+                                       const std::string& instead) const {
+  return wrong(node,
+               "<" + std::string(node.name()) + "> needs a number in the attribute \"" + attribute + "\"" + instead);
 }
 
 std::string XmlSource::required_text(const pugi::xml_node& node, const char* attribute) const {
@@ -53,11 +70,12 @@ std::vector<double> numbers_of(std::string_view text) {
   const char* at = text.data();
   const char* const end = at + text.size();
   while (true) {
-    while (at != end && std::string_view(" \t\r\n").find(*at) != std::string_view::npos) ++at;
+    while (at != end && is_white(*at)) ++at;
     if (at == end) return numbers;
+    if (*at == '+' && end - at > 1 && *(at + 1) != '-') ++at;
     double value = 0;
     const auto [next, error] = std::from_chars(at, end, value);
-    if (error != std::errc() || !std::isfinite(value)) return {};
+    if (error != std::errc() || !std::isfinite(value) || (next != end && !is_white(*next))) return {};
     numbers.push_back(value);
     at = next;
   }

@@ -22,13 +22,16 @@ class XmlSource {
   /// Where it stands in the file, from 1.
   [[nodiscard]] std::string line_of(const pugi::xml_node& node) const { return line_at(node.offset_debug()); }
   [[nodiscard]] core::BadInput wrong(const pugi::xml_node& node, const std::string& what) const;
-  /// A finite number in an attribute; `required` throws without one.
-  [[nodiscard]] static std::optional<double> number(const pugi::xml_node& node, const char* attribute);
+  /// A finite number in an attribute, nothing without the attribute or with an empty one; `required` throws then, and
+  /// both throw where there is anything else.
+  [[nodiscard]] std::optional<double> number(const pugi::xml_node& node, const char* attribute) const;
   [[nodiscard]] double required(const pugi::xml_node& node, const char* attribute) const;
   /// Text of an attribute that must be there.
   [[nodiscard]] std::string required_text(const pugi::xml_node& node, const char* attribute) const;
 
  private:
+  [[nodiscard]] core::BadInput needs_number(const pugi::xml_node& node, const char* attribute,
+                                            const std::string& instead) const;
   [[nodiscard]] std::string line_at(ptrdiff_t offset) const;
   std::string file_name_;
   std::string text_;

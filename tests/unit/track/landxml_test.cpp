@@ -110,6 +110,10 @@ TEST_F(LandXmlTest, NamesTheLineThatIsWrong) {
   EXPECT_THAT(message("linearUnit=\"meter\"", "linearUnit=\"foot\""), HasSubstr("metres"));
   EXPECT_THAT(message("<PVI>1260", "<PVI>1100"), HasSubstr("must grow"));
   EXPECT_THAT(message("appliedCant=\"120\"", "appliedCant=\"nan\""), HasSubstr("appliedCant"));
+  EXPECT_THAT(message("staStart=\"1000\"", "staStart=\"1+000\""),
+              HasSubstr("line 2: <Alignment> needs a number in the attribute \"staStart\", not \"1+000\""));
+  EXPECT_THAT(message("staStart=\"1000\"", "staStart=\"1000,0\""), HasSubstr("not \"1000,0\""));
+  EXPECT_THAT(message("<PVI>1000 400", "<PVI>1+000 400"), HasSubstr("not \"1+000 400\""));
   EXPECT_THAT(message("</CoordGeom>", ""), HasSubstr("not sound XML"));
   EXPECT_THAT(message("<Line ", "<Chain "), HasSubstr("not sound XML"));
   EXPECT_FALSE(read_landxml(in_folder("none.xml")).ok());
@@ -121,6 +125,14 @@ TEST_F(LandXmlTest, TellsOfElementsThatDoNotFit) {
   const LandXml read = core::value_or_throw(read_landxml(write("bad.xml", text)));
   ASSERT_THAT(read.problems, testing::Not(testing::IsEmpty()));
   EXPECT_THAT(read.problems[0], HasSubstr("line 6"));
+}
+
+TEST_F(LandXmlTest, TellsOfStationsOutsideTheAlignment) {
+  std::string text = kSample;
+  text.replace(text.find(" staStart=\"1000\""), 16, "");
+  EXPECT_THAT(core::value_or_throw(read_landxml(write("a.xml", text))).problems,
+              testing::ElementsAre(AllOf(HasSubstr("L1: 3 of 3 profile stations"), HasSubstr(": 1000")),
+                                   AllOf(HasSubstr("L1: 2 of 2 cant stations"), HasSubstr(": 1100"))));
 }
 
 TEST_F(LandXmlTest, NoDamageToTheFileCrashesIt) {

@@ -6,6 +6,7 @@
 namespace railfix::track {
 namespace {
 
+using testing::HasSubstr;
 using RailmlTest = ImportTest;
 
 // 1000 m with a left curve from 300 m to 800 m; a branch leaves to the right at the place put in.
@@ -92,6 +93,23 @@ TEST_F(RailmlTest, TunnelsEndOnEveryTrackThatLeavesThem) {
                                             "portal_out fork at 60.0 on 3", "portal_in beside at 100.0 on 2",
                                             "portal_out beside at 200.0 on 2", "portal_in beside at 100.0 on 3",
                                             "portal_out beside at 200.0 on 3"));
+}
+
+TEST_F(RailmlTest, NumbersThatCannotBeReadAreRefused) {
+  const auto message = [&](const std::string& text) {
+    const auto built = build_map({write("bad.railml", text)}, {});
+    return built.ok() ? std::string("was built") : built.error().message;
+  };
+  EXPECT_THAT(message(railml2("500", "100,0")),
+              HasSubstr("line 4: <radiusChange> needs a number in the attribute \"superelevation\", not \"100,0\""));
+  const auto tunnel_from = [](const std::string& pos) {
+    return railml3("\n" + crossing("constructionType=\"tunnel\"", on("n1", "posBegin=\"" + pos + "\"")));
+  };
+  EXPECT_THAT(message(tunnel_from("600,0")),
+              HasSubstr("line 7: <associatedNetElement> needs a number in the attribute \"posBegin\", not \"600,0\""));
+  EXPECT_THAT(message(tunnel_from("1-2")), HasSubstr("not \"1-2\""));
+  EXPECT_EQ(message(tunnel_from(" +600.0 ")), "was built");
+  EXPECT_EQ(message(tunnel_from("")), "was built");
 }
 
 }  // namespace
