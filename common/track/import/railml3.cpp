@@ -92,13 +92,27 @@ class Reader {
     return found->second;
   }
 
+  [[nodiscard]] std::optional<size_t> find_track(const pugi::xml_node& of, const pugi::xml_node& location) {
+    const std::string id = location.attribute("netElementRef").value();
+    const auto found = index_.find(id);
+    if (found != index_.end()) return found->second;
+    if (!coarse_.contains(id)) tell_missing(of, "net element", id, "it is left out there");
+    return std::nullopt;
+  }
+
+  void tell_missing(const pugi::xml_node& of, const std::string& kind, const std::string& id,
+                    const std::string& therefore) {
+    net_.problems.push_back("<" + std::string(of.name()) + "> \"" + railml_name(of) + "\" names the " + kind + " \"" +
+                            id + "\", which does not exist; " + therefore);
+  }
+
   /// Where an element lies; what lies on coarser net elements only is left out.
-  [[nodiscard]] std::vector<NetPlace> places_of(const pugi::xml_node& node) const {
+  [[nodiscard]] std::vector<NetPlace> places_of(const pugi::xml_node& node) {
     std::vector<NetPlace> out;
     for (const pugi::xml_node& part : descendants(node, "associatedNetElement")) {
-      const auto found = index_.find(part.attribute("netElementRef").value());
-      if (found == index_.end()) continue;
-      const double length = net_.tracks[found->second].length_m;
+      const std::optional<size_t> track = find_track(node, part);
+      if (!track) continue;
+      const double length = net_.tracks[*track].length_m;
       const auto along_m = [&](const char* pos, const char* part_of_length, double otherwise) {
         const double share = source_.number(part, part_of_length).value_or(otherwise);
         return source_.number(part, pos).value_or(share * length);
@@ -107,36 +121,40 @@ class Reader {
       const double to = along_m("posEnd", "intrinsicCoordEnd", 1);
       const auto within = [&](double value) { return std::clamp(value, 0.0, length); };
       const bool turned = std::string(part.attribute("keepsOrientation").value()) == "false";
-      out.push_back({found->second, within(std::min(from, to)), within(std::max(from, to)), from <= to && !turned});
+      out.push_back({*track, within(std::min(from, to)), within(std::max(from, to)), from <= to && !turned});
     }
     if (!out.empty()) return out;
     for (const pugi::xml_node& spot : descendants(node, "spotLocation")) {
-      const auto found = index_.find(spot.attribute("netElementRef").value());
-      if (found == index_.end()) continue;
-      const double length = net_.tracks[found->second].length_m;
+      const std::optional<size_t> track = find_track(node, spot);
+      if (!track) continue;
+      const double length = net_.tracks[*track].length_m;
       const auto along = source_.number(spot, "intrinsicCoord");
       const double at = std::clamp(source_.number(spot, "pos").value_or(along.value_or(0) * length), 0.0, length);
-      out.push_back({found->second, at, at, std::string(spot.attribute("applicationDirection").value()) != "reverse"});
+      out.push_back({*track, at, at, std::string(spot.attribute("applicationDirection").value()) != "reverse"});
     }
     return out;
   }
 
   void read_relations() {
     for (const pugi::xml_node& relation : descendants(source_.root(), "netRelation")) {
+      const std::string id = relation.attribute("id").value();
       const std::string a = relation.child("elementA").attribute("ref").value();
       const std::string b = relation.child("elementB").attribute("ref").value();
       for (const std::string& end : {a, b}) {
         if (!index_.contains(end) && !coarse_.contains(end)) {
-          throw source_.wrong(relation, "net relation \"" + std::string(relation.attribute("id").value()) +
-                                            "\" names the net element \"" + end + "\", which does not exist");
+          throw source_.wrong(
+              relation, "net relation \"" + id + "\" names the net element \"" + end + "\", which does not exist");
         }
       }
-      if (!index_.contains(a) || !index_.contains(b)) continue;  // between coarser elements
+      if (!index_.contains(a) || !index_.contains(b)) {
+        coarse_.insert(id);
+        continue;
+      }
       NetLink link;
       link.a = {track_of(relation, a), source_.required(relation, "positionOnA") > 0.5};
       link.b = {track_of(relation, b), source_.required(relation, "positionOnB") > 0.5};
       link.passable = std::string(relation.attribute("navigability").value()) != "None";
-      link_of_[relation.attribute("id").value()] = net_.links.size();
+      link_of_[id] = net_.links.size();
       net_.links.push_back(link);
     }
   }
@@ -146,8 +164,13 @@ class Reader {
       const std::string branch_course = points.attribute("branchCourse").value();
       const bool has_turning = points.child("turningBranch");
       for (const pugi::xml_node& branch : points.children()) {
-        const auto link = link_of_.find(branch.attribute("netRelationRef").value());
-        if (link == link_of_.end()) continue;
+        const std::string relation = branch.attribute("netRelationRef").value();
+        const auto link = link_of_.find(relation);
+        if (link == link_of_.end()) {
+          if (!relation.empty() && !coarse_.contains(relation))
+            tell_missing(points, "net relation", relation, "its <" + std::string(branch.name()) + "> is left out");
+          continue;
+        }
         NetLink& way = net_.links[link->second];
         way.switch_name = railml_name(points);
         const std::string kind = branch.name();
@@ -322,7 +345,7 @@ class Reader {
   const XmlSource& source_;
   RailNet net_;
   std::map<std::string, size_t> index_;
-  std::set<std::string> coarse_;
+  std::set<std::string> coarse_;  // net elements made of others, and relations between them
   std::map<std::string, size_t> link_of_;
   std::map<std::string, std::string> crs_of_;
 };

@@ -112,5 +112,19 @@ TEST_F(RailmlTest, NumbersThatCannotBeReadAreRefused) {
   EXPECT_EQ(message(tunnel_from("")), "was built");
 }
 
+TEST_F(RailmlTest, NamesOfThingsThatAreNotThereAreTold) {
+  const std::string text = railml3(crossing("id=\"t\" constructionType=\"tunnel\"", on("nX", "posBegin=\"100\"")) +
+                                   "<signalIS id=\"s\"><spotLocation netElementRef=\"nY\" pos=\"1\"/></signalIS>"
+                                   "<switchIS id=\"w\" branchCourse=\"right\"><leftBranch "
+                                   "netRelationRef=\"r12\"/><rightBranch netRelationRef=\"rX\"/></switchIS>");
+  const Map map = core::value_or_throw(build_map({write("a.railml", text)}, {})).map;
+  EXPECT_THAT(
+      map.problems,
+      testing::IsSupersetOf(
+          {"<overCrossing> \"t\" names the net element \"nX\", which does not exist; it is left out there",
+           "<signalIS> \"s\" names the net element \"nY\", which does not exist; it is left out there",
+           "<switchIS> \"w\" names the net relation \"rX\", which does not exist; its <rightBranch> is left out"}));
+}
+
 }  // namespace
 }  // namespace railfix::track
