@@ -1,6 +1,7 @@
 #include "track/import/landxml.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <iterator>
 #include <optional>
@@ -164,13 +165,53 @@ class Reader {
             (outside.size() > 1 ? " to " + std::to_string(outside.back()) : ""));
   }
 
+  static bool is_profile_point(const pugi::xml_node& node) {
+    const std::string_view kind = node.name();
+    return kind == "PVI" || kind == "CircCurve" || kind == "ParaCurve";
+  }
+
+  /// Of the ground as it was before the track, by its own state or name or that of the <Profile> around it.
+  static bool is_existing(const pugi::xml_node& profile) {
+    for (const pugi::xml_node& node : {profile, profile.parent()}) {
+      std::string name = node.attribute("name").value();
+      std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::tolower(c); });
+      if (std::string_view(node.attribute("state").value()) == "existing" || name.find("existing") != std::string::npos)
+        return true;
+    }
+    return false;
+  }
+
+  /// The first that holds heights and is not of what existed before, else the first that holds heights.
+  [[nodiscard]] pugi::xml_node choose_profile(const pugi::xml_node& alignment, const std::string& track) {
+    std::vector<pugi::xml_node> all;
+    for (const pugi::xml_node& profile : alignment.children("Profile")) {
+      for (const pugi::xml_node& node : profile.children()) {
+        const std::string_view kind = node.name();
+        if (kind == "ProfAlign" || kind == "ProfSurf") all.push_back(node);
+      }
+    }
+    std::vector<pugi::xml_node> usable;
+    std::copy_if(all.begin(), all.end(), std::back_inserter(usable), [](const pugi::xml_node& node) {
+      return std::string_view(node.name()) == "ProfAlign" && node.find_child(is_profile_point);
+    });
+    const auto design = std::find_if_not(usable.begin(), usable.end(), is_existing);
+    pugi::xml_node chosen;
+    if (!usable.empty()) chosen = design != usable.end() ? *design : usable.front();
+    for (const pugi::xml_node& node : all) {
+      if (node != chosen)
+        problem(track + ": the <" + node.name() + "> \"" + node.attribute("name").value() + "\" in line " +
+                source_.line_of(node) + " is not used");
+    }
+    return chosen;
+  }
+
   [[nodiscard]] std::vector<GradePoint> read_profile(const pugi::xml_node& alignment, const std::string& track,
                                                      const Plan& plan) {
     std::vector<GradePoint> points;
     std::vector<double> stations;
-    for (const pugi::xml_node& node : alignment.child("Profile").child("ProfAlign").children()) {
+    for (const pugi::xml_node& node : choose_profile(alignment, track).children()) {
       const std::string_view kind = node.name();
-      if (kind != "PVI" && kind != "CircCurve" && kind != "ParaCurve") {
+      if (!is_profile_point(node)) {
         if (node.type() == pugi::node_element)
           problem(track + ": <" + std::string(kind) + "> of the profile is left out");
         continue;

@@ -135,6 +135,35 @@ TEST_F(LandXmlTest, TellsOfStationsOutsideTheAlignment) {
                                    AllOf(HasSubstr("L1: 2 of 2 cant stations"), HasSubstr(": 1100"))));
 }
 
+TEST_F(LandXmlTest, TakesTheDesignOutOfSeveralProfiles) {
+  const std::string profile = "<Profile><ProfAlign>";
+  const auto elevation_m = [&](const std::string& before, const std::string& of_design,
+                               const std::vector<std::string>& problems) {
+    std::string text = kSample;
+    text.replace(text.find(profile), profile.size(), before + "<ProfAlign" + of_design + ">");
+    const LandXml read = core::value_or_throw(read_landxml(write("a.xml", text)));
+    EXPECT_EQ(read.problems, problems);
+    return read.tracks[0].alignment.at(0).elevation_m;
+  };
+  const std::string ground = "<PVI>1000 0</PVI><PVI>1260 0</PVI></ProfAlign>";
+  const std::string unused = "L1: the <ProfAlign> \"Existing\" in line 8 is not used";
+  EXPECT_NEAR(elevation_m("<Profile><ProfAlign name=\"Existing\">" + ground, "", {unused}), 400, 1e-9);
+  EXPECT_NEAR(elevation_m("<Profile name=\"g\" state=\"existing\"><ProfAlign name=\"Existing\">" + ground +
+                              "</Profile><Profile>",
+                          "", {unused}),
+              400, 1e-9);
+  EXPECT_NEAR(
+      elevation_m("<Profile><ProfSurf name=\"s\"><PntList2D>1000 0 1260 0</PntList2D></ProfSurf></Profile><Profile>",
+                  "", {"L1: the <ProfSurf> \"s\" in line 8 is not used"}),
+      400, 1e-9);
+  // One without heights is none; of two alike the first holds.
+  EXPECT_NEAR(elevation_m("<Profile><ProfAlign name=\"e\"/>", "", {"L1: the <ProfAlign> \"e\" in line 8 is not used"}),
+              400, 1e-9);
+  EXPECT_NEAR(elevation_m("<Profile><ProfAlign name=\"a\">" + ground, " name=\"b\"",
+                          {"L1: the <ProfAlign> \"b\" in line 8 is not used"}),
+              0, 1e-9);
+}
+
 TEST_F(LandXmlTest, NoDamageToTheFileCrashesIt) {
   const std::string whole = kSample;
   core::Random random(9);
