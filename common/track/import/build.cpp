@@ -1,7 +1,6 @@
 #include "track/import/build.hpp"
 
 #include <algorithm>
-#include <fstream>
 
 #include "track/import/erju.hpp"
 #include "track/import/finish.hpp"
@@ -10,6 +9,7 @@
 #include "track/import/network.hpp"
 #include "track/import/osm_network.hpp"
 #include "track/import/railml.hpp"
+#include "track/import/xml_root.hpp"
 
 namespace railfix::track {
 namespace {
@@ -36,14 +36,15 @@ core::Result<Kind> kind_of(const std::filesystem::path& file) {
   if (ends({".map"})) return Kind::compiled;
   if (ends({".railml", ".railML"})) return Kind::railml;
   if (ends({".xml", ".XML"})) {
-    std::ifstream stream(file, std::ios::binary);
-    std::string head(1000, '\0');
-    stream.read(head.data(), static_cast<std::streamsize>(head.size()));
-    const auto holds = [&](const char* text) { return head.find(text) != std::string::npos; };
-    if (holds("<osm")) return Kind::osm;
-    if (holds("<railml") || holds("<railML")) return Kind::railml;
-    if (holds("erju.org/infra")) return Kind::erju_infra;
-    if (holds("erju.org/map")) return Kind::erju_map;
+    const XmlRoot root = xml_root(file);
+    const auto is_of = [&](std::string_view text) {
+      return std::any_of(root.values.begin(), root.values.end(),
+                         [&](const std::string& value) { return value.find(text) != std::string::npos; });
+    };
+    if (root.name.starts_with("osm")) return Kind::osm;
+    if (root.name == "railml" || root.name == "railML") return Kind::railml;
+    if (is_of("erju.org/infra")) return Kind::erju_infra;
+    if (is_of("erju.org/map")) return Kind::erju_map;
     return Kind::landxml;
   }
   return core::Error{file.string() +

@@ -24,6 +24,8 @@ XmlSource::XmlSource(const std::filesystem::path& file) : file_name_(file.string
     throw core::BadInput("cannot read " + file_name_ + "; is the path right?");
   text_.assign(std::istreambuf_iterator<char>(stream), {});
   const pugi::xml_parse_result parsed = document_.load_buffer(text_.data(), text_.size());
+  // Places are counted in UTF-8, which pugixml makes of UTF-16.
+  if (text_.starts_with("\xff\xfe") || text_.starts_with("\xfe\xff")) std::erase(text_, '\0');
   if (!parsed) {
     throw core::BadInput(file_name_ + " line " + line_at(parsed.offset) + ": this is not sound XML (" +
                          parsed.description() + ")");

@@ -126,5 +126,26 @@ TEST_F(RailmlTest, NamesOfThingsThatAreNotThereAreTold) {
            "<switchIS> \"w\" names the net relation \"rX\", which does not exist; its <rightBranch> is left out"}));
 }
 
+// By its first element, wherever it stands and however it is written.
+TEST_F(RailmlTest, XmlIsKnownByItsFirstElement) {
+  const auto message = [&](const std::string& text) {
+    const auto built = build_map({write("a.xml", text)}, {});
+    return built.ok() ? std::string("was built") : built.error().message;
+  };
+  const auto utf16 = [](const std::string& text) {
+    std::string out = "\xff\xfe";
+    for (const char letter : text) out += {letter, '\0'};
+    return out;
+  };
+  const std::string head = "<?xml version=\"1.0\" encoding=\"UTF-16\"?>\n";
+  EXPECT_EQ(message("<!-- " + std::string(20000, '.') + " <osm> <LandXML> -->" + railml2("500")), "was built");
+  EXPECT_EQ(message("\xef\xbb\xbf" + railml2("500")), "was built");
+  EXPECT_EQ(message("<?xml version=\"1.0\" encoding=\"windows-1252\"?>\n<!-- \xfc -->" + railml2("500")), "was built");
+  EXPECT_EQ(message(utf16(head + railml2("500"))), "was built");
+  EXPECT_THAT(message(utf16(head + railml2("500", "1,0"))), HasSubstr("line 5: <radiusChange>"));
+  EXPECT_THAT(message("<svg/>"), HasSubstr("not LandXML"));
+  EXPECT_THAT(message("no XML"), HasSubstr("not sound XML"));
+}
+
 }  // namespace
 }  // namespace railfix::track
