@@ -304,21 +304,31 @@ class Reader {
     }
   }
 
+  static std::string group_of(const pugi::xml_node& balise) {
+    for (const char* attribute : {"baliseGroupRef", "belongsToBaliseGroup"}) {
+      const std::string group = balise.attribute(attribute).value();
+      if (!group.empty()) return group;
+    }
+    return balise.child("belongsToBaliseGroup").attribute("ref").value();
+  }
+
   void read_balises() {
     std::map<std::string, std::vector<std::pair<NetPlace, pugi::xml_node>>> of_group;
+    const std::vector<pugi::xml_node> groups = descendants(source_.root(), "baliseGroup");
+    for (const pugi::xml_node& group : groups) of_group[group.attribute("id").value()];
     for (const pugi::xml_node& balise : descendants(source_.root(), "balise")) {
       const std::vector<NetPlace> places = places_of(balise);
       if (places.empty()) continue;
-      std::string group = balise.attribute("baliseGroupRef").value();
-      if (group.empty()) group = balise.attribute("belongsToBaliseGroup").value();
-      if (group.empty()) group = balise.child("belongsToBaliseGroup").attribute("ref").value();
-      if (group.empty()) {
+      const std::string group = group_of(balise);
+      const bool is_known = of_group.contains(group);
+      if (!group.empty() && !is_known) tell_missing(balise, "balise group", group, "it is kept as a landmark");
+      if (group.empty() || !is_known) {
         add(LandmarkKind::balise, places.front(), places.front().from_m, 0, balise);
       } else {
         of_group[group].emplace_back(places.front(), balise);
       }
     }
-    for (const pugi::xml_node& node : descendants(source_.root(), "baliseGroup")) {
+    for (const pugi::xml_node& node : groups) {
       const auto identity = etcs_identity(source_, node);
       std::vector<std::pair<NetPlace, pugi::xml_node>>& balises = of_group[node.attribute("id").value()];
       const std::vector<NetPlace> own = places_of(node);

@@ -113,17 +113,21 @@ TEST_F(RailmlTest, NumbersThatCannotBeReadAreRefused) {
 }
 
 TEST_F(RailmlTest, NamesOfThingsThatAreNotThereAreTold) {
-  const std::string text = railml3(crossing("id=\"t\" constructionType=\"tunnel\"", on("nX", "posBegin=\"100\"")) +
-                                   "<signalIS id=\"s\"><spotLocation netElementRef=\"nY\" pos=\"1\"/></signalIS>"
-                                   "<switchIS id=\"w\" branchCourse=\"right\"><leftBranch "
-                                   "netRelationRef=\"r12\"/><rightBranch netRelationRef=\"rX\"/></switchIS>");
+  const std::string text =
+      railml3(crossing("id=\"t\" constructionType=\"tunnel\"", on("nX", "posBegin=\"100\"")) +
+              "<signalIS id=\"s\"><spotLocation netElementRef=\"nY\" pos=\"1\"/></signalIS>"
+              "<balise id=\"b\" baliseGroupRef=\"gX\"><spotLocation netElementRef=\"n1\" pos=\"70\"/></balise>"
+              "<switchIS id=\"w\" branchCourse=\"right\"><leftBranch "
+              "netRelationRef=\"r12\"/><rightBranch netRelationRef=\"rX\"/></switchIS>");
   const Map map = core::value_or_throw(build_map({write("a.railml", text)}, {})).map;
   EXPECT_THAT(
       map.problems,
       testing::IsSupersetOf(
-          {"<overCrossing> \"t\" names the net element \"nX\", which does not exist; it is left out there",
+          {"<balise> \"b\" names the balise group \"gX\", which does not exist; it is kept as a landmark",
+           "<overCrossing> \"t\" names the net element \"nX\", which does not exist; it is left out there",
            "<signalIS> \"s\" names the net element \"nY\", which does not exist; it is left out there",
            "<switchIS> \"w\" names the net relation \"rX\", which does not exist; its <rightBranch> is left out"}));
+  EXPECT_THAT(marks_of(map, {LandmarkKind::balise}), testing::ElementsAre("balise b at 70.0 on 1"));
 }
 
 // By its first element, wherever it stands and however it is written.
