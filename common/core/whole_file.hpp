@@ -1,10 +1,18 @@
-// A file that others may read at any time.
+// A file as one text: read whole, or written so that others may read it at any time.
 #pragma once
 
 #include <filesystem>
+#include <istream>
 #include <string>
 
+#include "core/result.hpp"
+
 namespace railfix::core {
+
+/// An error names the file.
+Result<std::string> read_whole(const std::filesystem::path& file);
+/// What is left of it; an error calls it `name`.
+Result<std::string> read_whole(std::istream& stream, const std::string& name);
 
 /// Writes beside the file's place and moves it there, so that nobody ever reads half of it, and of two processes that
 /// write it at once one wins. False: what was there is as it was. Does not wait for the disk: it is for run loops, too.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/json_text.hpp"
 #include "monitor/live_api.hpp"
 
 namespace railfix::monitor {
@@ -117,7 +118,8 @@ void FoxgloveApi::set_channels(const std::vector<FoxgloveChannel>& channels) {
 void FoxgloveApi::message(const ClientPtr& client, const std::string& text, bool binary) {
   const auto found = clients_.find(client->id());
   if (found == clients_.end()) return;
-  const json message = binary ? json() : json::parse(text, nullptr, false);
+  const auto parsed = binary ? core::Result<json>(json()) : core::parse_json(text);
+  const json message = parsed.ok() ? parsed.value() : json();
   if (binary) {
     client->send(
         status(kWarning, "this server takes no binary messages: nothing can be published through it", "binary"));

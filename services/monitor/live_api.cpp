@@ -1,5 +1,7 @@
 #include "monitor/live_api.hpp"
 
+#include "core/json_text.hpp"
+
 namespace railfix::monitor {
 namespace {
 
@@ -35,11 +37,12 @@ void LiveApi::closed(const ClientPtr& client) {
 void LiveApi::message(const ClientPtr& client, const std::string& text) {
   const auto watcher = clients_.find(client->id());
   if (watcher == clients_.end()) return;
-  const json message = json::parse(text, nullptr, false);
-  if (!message.is_object()) {
+  const auto parsed = core::parse_json(text);
+  if (!parsed.ok() || !parsed.value().is_object()) {
     client->close("not a JSON object");
     return;
   }
+  const json& message = parsed.value();
   if (const auto kinds = message.find("watch"); kinds != message.end() && kinds->is_array()) {
     change(watcher->second, *kinds);
   }

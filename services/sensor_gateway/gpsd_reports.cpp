@@ -7,6 +7,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "core/json_text.hpp"
 #include "core/time.hpp"
 
 namespace railfix::sensor_gateway {
@@ -118,8 +119,9 @@ std::vector<GpsdReport> GpsdReports::read(std::span<const uint8_t> bytes, int64_
 }
 
 void GpsdReports::read_line(int64_t arrival_ns, std::vector<GpsdReport>& reports) {
-  const Message message{nlohmann::json::parse(line_, nullptr, false)};
-  if (!message.json.is_object()) return;
+  auto json = core::parse_json(line_);
+  if (!json.ok() || !json.value().is_object()) return;
+  const Message message{std::move(json).value()};
   const std::string kind = message.text("class");
   if (kind == "DEVICES") read_devices(message);
   if (!trouble_.empty() || !is_ours(message)) return;

@@ -2,6 +2,7 @@
 // chooses.
 #include <nlohmann/json.hpp>
 
+#include "core/json_text.hpp"
 #include "etcs/report_json.hpp"
 #include "etcs/report_parameters.hpp"
 #include "fuzz/fuzz_target.hpp"
@@ -53,9 +54,9 @@ void parameters_from_fields(fuzz::Choices& choices) {
 }
 
 void from_json_text(Bytes text, Baseline baseline) {
-  const auto json = nlohmann::ordered_json::parse(text.begin(), text.end(), nullptr, false);
-  if (json.is_discarded()) return;
-  const auto report = report_from_json(json, baseline);
+  const auto json = core::parse_json<nlohmann::ordered_json>({reinterpret_cast<const char*>(text.data()), text.size()});
+  if (!json.ok()) return require(!json.error().message.empty(), "a refusal says why");
+  const auto report = report_from_json(json.value(), baseline);
   if (!report.ok()) return require(!report.error().message.empty(), "a refusal says why");
   const auto message = encode(report.value(), baseline);
   require(message.ok(), "what JSON gave can be encoded");

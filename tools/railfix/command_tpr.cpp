@@ -1,14 +1,14 @@
 #include <cstdio>
-#include <fstream>
 #include <iostream>
-#include <iterator>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "command_tpr.hpp"
+#include "core/json_text.hpp"
 #include "core/result.hpp"
+#include "core/whole_file.hpp"
 #include "etcs/layout.hpp"
 #include "etcs/report_json.hpp"
 #include "etcs/report_parameters.hpp"
@@ -163,18 +163,11 @@ int decode(const std::string& hex, Baseline baseline, bool json_wanted) {
 }
 
 int encode(const std::string& file, Baseline baseline) {
-  std::string text;
-  if (file == "-") {
-    text.assign(std::istreambuf_iterator<char>(std::cin), {});
-  } else {
-    std::ifstream stream(file);
-    if (!stream) throw BadInput(file + ": cannot be read; does it exist?");
-    text.assign(std::istreambuf_iterator<char>(stream), {});
-  }
   const std::string where = file == "-" ? "standard input" : file;
-  const auto json = nlohmann::ordered_json::parse(text, nullptr, false);
-  if (json.is_discarded()) throw BadInput(where + ": not JSON.");
-  const auto report = etcs::report_from_json(json, baseline);
+  const auto text = core::value_or_throw(file == "-" ? core::read_whole(std::cin, where) : core::read_whole(file));
+  const auto json = core::parse_json<nlohmann::ordered_json>(text);
+  if (!json.ok()) throw BadInput(where + ": " + json.error().message);
+  const auto report = etcs::report_from_json(json.value(), baseline);
   if (!report.ok()) throw BadInput(where + ": " + report.error().message);
   std::cout << etcs::to_hex(core::value_or_throw(etcs::encode(report.value(), baseline))) << '\n';
   return 0;

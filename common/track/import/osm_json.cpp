@@ -1,9 +1,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "core/json_text.hpp"
+#include "core/whole_file.hpp"
 #include "track/import/osm_data.hpp"
 
 namespace railfix::track {
@@ -155,12 +156,15 @@ void read_features(const json& features, bool with_trams, OsmData& out) {
 }  // namespace
 
 core::Result<OsmData> read_osm_json(const std::filesystem::path& file, bool with_trams) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream || std::filesystem::is_directory(file)) {
-    return core::Error{"cannot read " + file.string() + "; is the path right?"};
-  }
+  const auto wrong = [&](const std::string& why) {
+    return core::Error{"cannot read " + file.string() + " as JSON map data: " + why};
+  };
+  const auto text = core::read_whole(file);
+  if (!text.ok()) return text.error();
+  const auto parsed = core::parse_json(text.value());
+  if (!parsed.ok()) return wrong(parsed.error().message);
   try {
-    const json document = json::parse(stream);
+    const json& document = parsed.value();
     OsmData out;
     if (document.is_object() && document.contains("elements")) {
       read_overpass(document.at("elements"), with_trams, out);
@@ -171,7 +175,7 @@ core::Result<OsmData> read_osm_json(const std::filesystem::path& file, bool with
     }
     return out;
   } catch (const json::exception& reason) {
-    return core::Error{"cannot read " + file.string() + " as JSON map data: " + reason.what()};
+    return wrong(reason.what());
   }
 }
 

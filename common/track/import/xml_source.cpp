@@ -4,8 +4,8 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
-#include <fstream>
-#include <iterator>
+
+#include "core/whole_file.hpp"
 
 namespace railfix::track {
 namespace {
@@ -19,10 +19,7 @@ bool is_white(char letter) {
 }  // namespace
 
 XmlSource::XmlSource(const std::filesystem::path& file) : file_name_(file.string()) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream || std::filesystem::is_directory(file))
-    throw core::BadInput("cannot read " + file_name_ + "; is the path right?");
-  text_.assign(std::istreambuf_iterator<char>(stream), {});
+  text_ = core::value_or_throw(core::read_whole(file));
   const pugi::xml_parse_result parsed = document_.load_buffer(text_.data(), text_.size());
   // Places are counted in UTF-8, which pugixml makes of UTF-16.
   if (text_.starts_with("\xff\xfe") || text_.starts_with("\xfe\xff")) std::erase(text_, '\0');

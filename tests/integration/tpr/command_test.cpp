@@ -77,6 +77,15 @@ TEST_F(TprCommand, WrongInputGivesOneSentenceAndTwo) {
   }
 }
 
+TEST_F(TprCommand, SaysWhatIsWrongWithAFile) {
+  const auto said = [](const std::string& file) { return tpr({"encode", "--json", file}).err; };
+  EXPECT_EQ(said("/tmp"), "railfix: cannot read /tmp (Is a directory); is the path right?\n");
+  EXPECT_EQ(said(file_with("{\n  \"T_TRAIN\": 1,\n}\n")), "railfix: " + file_ + ": not JSON at line 3, column 1.\n");
+  const std::string deep = std::string(150'000, '[') + std::string(150'000, ']');
+  EXPECT_EQ(said(file_with("{\"T_TRAIN\":" + deep + "}")),
+            "railfix: " + file_ + ": its lists and objects nest more than 64 deep.\n");
+}
+
 TEST_F(TprCommand, SaysWhichBaselineWouldFit) {
   EXPECT_THAT(tpr({"decode", kCheckVector, "--baseline", "4"}).err, HasSubstr("--baseline 3"));
 }

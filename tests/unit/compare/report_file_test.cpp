@@ -42,6 +42,9 @@ TEST_F(ReportFile, ErrorsNameTheLine) {
   EXPECT_THAT(read("a.jsonl", "{\"stamp_ns\": 1}\n").error().message, HasSubstr("\"hex\""));
   EXPECT_THAT(read("a.jsonl", "{\"stamp_ns\": 1, \"hex\": \"" + kHex + "\", \"baseline\": 4}").error().message,
               HasSubstr("line 1"));
+  EXPECT_THAT(read("a.jsonl", "\n{\"stamp_ns\": 1,}\n").error().message, HasSubstr("line 2: not JSON at byte 16."));
+  const std::string deep = std::string(150'000, '[') + std::string(150'000, ']');
+  EXPECT_THAT(read("a.jsonl", "{\"stamp_ns\": " + deep + "}\n").error().message, HasSubstr("line 1: its lists"));
   EXPECT_THAT(read_reports("/no/such.jsonl", etcs::Baseline::b3).error().message, HasSubstr("/no/such.jsonl"));
 }
 

@@ -24,5 +24,20 @@ TEST(WholeFile, TakesThePlaceOfTheOldOneAndLeavesNothingBeside) {
   fs::remove_all(folder);
 }
 
+TEST(WholeFile, IsReadToItsEndOrNamed) {
+  const fs::path folder = fs::path(::testing::TempDir()) / ("railfix-whole-file-" + std::to_string(getpid()));
+  fs::create_directories(folder);
+  const std::string bytes = std::string(200'000, 'x') + std::string("\0\r\n", 3);
+  for (const auto& text : {std::string(), bytes}) {
+    ASSERT_TRUE(write_whole(folder / "file", text));
+    EXPECT_EQ(read_whole(folder / "file").value(), text);
+  }
+  EXPECT_EQ(read_whole(folder).error().message,
+            "cannot read " + folder.string() + " (Is a directory); is the path right?");
+  EXPECT_EQ(read_whole(folder / "none").error().message,
+            "cannot read " + (folder / "none").string() + " (No such file or directory); is the path right?");
+  fs::remove_all(folder);
+}
+
 }  // namespace
 }  // namespace railfix::core

@@ -109,6 +109,7 @@ TEST_F(FoxgloveApiTest, AnswersMistakesWithAStatus) {
                                           R"({"op": "subscribe", "subscriptions": [{"id": -1, "channelId": 1}, 3]})",
                                           R"({"op": "getParameters", "parameterNames": []})",
                                           "no JSON",
+                                          R"({"op": )" + std::string(150'000, '[') + std::string(150'000, ']') + "}",
                                           R"({"noop": 1})"};
   for (const auto& mistake : mistakes) {
     api_.message(client_, mistake, false);

@@ -85,6 +85,11 @@ TEST_F(LiveApiTest, LetsGoOfWhoSendsNonsense) {
     live_.message(one_, text);
     EXPECT_EQ(one_->closed, "not a JSON object") << text;
   }
+  one_->closed.clear();
+  const std::string deep = std::string(150'000, '[') + std::string(150'000, ']');  // would come back as a reply's id
+  live_.message(one_, R"({"control": {"id": )" + deep + "}}");
+  EXPECT_EQ(one_->closed, "not a JSON object");
+  EXPECT_TRUE(asks_.empty());
   for (const char* text : {"{}", R"({"watch": 1})", R"({"watch": [1, null]})", R"({"control": []})"}) {
     one_->closed.clear();
     live_.message(one_, text);

@@ -144,6 +144,9 @@ TEST_F(GpsdReportsTest, BytesInAnyPiecesAndWhatIsNoReport) {
   EXPECT_THAT(
       say(R"({"class":"TPV","device":"/dev/ttyACM0","time":"2026-11-23T12:00:04Z","lat":146,"lon":7,"mode":3})"),
       IsEmpty());
+  const std::string deep = std::string(32'000, '[') + std::string(32'000, ']');
+  EXPECT_THAT(say(R"({"class":"DEVICES","devices":[{"path":"/dev/ttyACM0","activated":)" + deep + "}]}"), IsEmpty());
+  EXPECT_THAT(reports_.why_silent(), HasSubstr("has no receiver")) << "such a line is not read";
 }
 
 }  // namespace

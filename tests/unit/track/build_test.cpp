@@ -29,7 +29,11 @@ std::string line_of_kind(const std::string& kind) {
 TEST_F(BuildTest, SaysWhatIsWrongInOneSentence) {
   EXPECT_THAT(message({in_folder("none.osm")}), HasSubstr("is the path right?"));
   EXPECT_THAT(message({write("a.txt", "x")}), HasSubstr("of no kind that can be read"));
-  EXPECT_THAT(message({write("a.json", "{")}), HasSubstr("as JSON map data"));
+  EXPECT_THAT(message({write("a.json", "{\n")}), HasSubstr("as JSON map data: not JSON at line 2, column 1."));
+  const std::string deep = std::string(150'000, '[') + std::string(150'000, ']');
+  EXPECT_THAT(
+      message({write("a.json", R"({"features":[{"geometry":{"type":"Polygon","coordinates":)" + deep + "}}]}")}),
+      HasSubstr("as JSON map data: its lists and objects nest"));
   EXPECT_THAT(message({write("b.json", "{}")}), HasSubstr("neither"));
   EXPECT_THAT(message({write("c.json", R"({"elements":[{"type":"node"}]})")}), HasSubstr("as JSON map data"));
   EXPECT_THAT(message({write("d.json", R"({"elements":[]})")}), HasSubstr("no railway tracks"));

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/csv_table.hpp"
+#include "core/json_text.hpp"
 
 namespace railfix::compare {
 
@@ -43,7 +44,9 @@ core::Result<std::vector<TimedReport>> read_table(const fs::path& file, etcs::Ba
 }
 
 core::Result<TimedReport> read_line(const std::string& line, etcs::Baseline baseline) {
-  const auto json = nlohmann::json::parse(line, nullptr, false);
+  const auto parsed = core::parse_json(line);
+  if (!parsed.ok()) return parsed.error();
+  const auto& json = parsed.value();
   if (!json.is_object()) return core::Error{"not a JSON object."};
   const auto stamp = json.contains("stamp_ns") ? json["stamp_ns"] : json.value("time_ns", nlohmann::json());
   const auto hex = json.contains("hex") ? json["hex"] : json.value("message", nlohmann::json());
