@@ -26,9 +26,13 @@ std::string format(const char* pattern, double value) {
   return text;
 }
 
-std::string distance_text(uint32_t raw, uint32_t q_scale) {
-  if (raw == etcs::kUnknownDistance) return "unknown, or more than 327.66 km";
+std::string metres_text(uint32_t raw, uint32_t q_scale) {
   return format(q_scale == 0 ? "%.1f m" : "%.0f m", raw * etcs::scale_m(q_scale));
+}
+
+/// Of the distances that may be unknown; those of packet 58 may not.
+std::string distance_text(uint32_t raw, uint32_t q_scale) {
+  return raw == etcs::kUnknownDistance ? "unknown, or more than 327.66 km" : metres_text(raw, q_scale);
 }
 
 std::string group_text(uint32_t nid_lrbg) {
@@ -121,12 +125,12 @@ void print_packet_58(const etcs::ReportParameters& packet) {
       {"T_CYCLOC", packet.t_cycloc,
        cycle_text(packet.t_cycloc, etcs::kNoCycleTime, std::to_string(packet.t_cycloc) + " s")},
       {"D_CYCLOC", packet.d_cycloc,
-       cycle_text(packet.d_cycloc, etcs::kNoCycleDistance, distance_text(packet.d_cycloc, packet.q_scale))},
+       cycle_text(packet.d_cycloc, etcs::kNoCycleDistance, metres_text(packet.d_cycloc, packet.q_scale))},
       {"M_LOC", packet.m_loc, one_of({"a report now", "a report at every LRBG", "no report at an LRBG"}, packet.m_loc)},
       {"N_ITER", static_cast<uint32_t>(packet.locations.size()), "locations with a report"}};
   for (const auto& location : packet.locations) {
     rows.push_back({"D_LOC", location.d_loc,
-                    distance_text(location.d_loc, packet.q_scale) + " from the LRBG, or from the location before"});
+                    metres_text(location.d_loc, packet.q_scale) + " from the LRBG, or from the location before"});
     rows.push_back({"Q_LGTLOC", location.q_lgtloc,
                     "when passed by the " + one_of({"min safe rear end", "max safe front end"}, location.q_lgtloc)});
   }

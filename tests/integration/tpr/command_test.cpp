@@ -10,6 +10,7 @@ namespace railfix {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 constexpr const char* kCheckVector = "880601D6F345402AF34000E48F68EB84D250014010C38830";
@@ -50,6 +51,13 @@ TEST_F(TprCommand, DecodesAPacket58) {
   EXPECT_THAT(json.out, HasSubstr("\"D_CYCLOC\": 1000"));
   EXPECT_THAT(json.out, HasSubstr("\"Q_LGTLOC\": 1"));
   EXPECT_EQ(tpr({"decode", "3A80908303E821"}).exit_code, 2) << "cut";
+}
+
+TEST_F(TprCommand, TheLargestDistanceOfAPacket58IsADistance) {
+  const auto outcome = tpr({"decode", "3A80917FFFFF21FFFF"});
+  EXPECT_THAT(outcome.out, HasSubstr("not cyclic"));
+  EXPECT_THAT(outcome.out, HasSubstr("327670 m from the LRBG"));
+  EXPECT_THAT(outcome.out, Not(HasSubstr("unknown")));
 }
 
 TEST_F(TprCommand, JsonGoesBothWays) {
