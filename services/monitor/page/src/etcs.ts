@@ -14,7 +14,7 @@ const SIDE = ["reverse", "nominal", "unknown"];
 const MODES = ["full supervision", "on-sight", "staff responsible", "shunting", "unfitted", "sleeping", "stand by", "trip", "post trip",
   "system failure", "isolation", "non leading", "limited supervision", "national system", "reversing", "passive shunting",
   "automatic driving", "supervised manoeuvre"];
-const LEVELS3 = ["level 0", "level NTC", "level 1", "level 2", "level 3"];
+const LEVELS = ["level 0", "level NTC", "level 1", "level 2"];
 const INTEGRITY = ["no information", "confirmed by a device", "confirmed by the driver", "lost"];
 
 class Bits {
@@ -88,6 +88,6 @@ function position(field: Take, baseline: number): void {
   field("V_TRAIN", 7, speed);
   field("Q_DIRTRAIN", 2, side);
   field("M_MODE", baseline >= 4 ? 5 : 4, (v) => MODES[v] ?? "");
-  const level = field("M_LEVEL", 3, (v) => (baseline >= 4 && v > 2 ? "spare" : (LEVELS3[v] ?? "spare")));
+  const level = field("M_LEVEL", 3, (v) => LEVELS[v] ?? (v === 4 && baseline < 4 ? "level 3" : "spare"));
   if (level === 1) field("NID_NTC", 8);
 }
