@@ -43,6 +43,7 @@ struct Free {
 class MqttClient::Connection {
  public:
   Connection(const MqttOptions& options, MqttEvents events) : options_(options), events_(std::move(events)) {
+    core::ok_or_throw(check_tls(options));
     static const int initialised = mosquitto_lib_init();
     (void)initialised;
     make_client();
@@ -203,6 +204,23 @@ MqttClient::~MqttClient() = default;
 
 core::Result<int> MqttClient::publish(const std::string& topic, std::span<const uint8_t> payload) {
   return connection_->publish(topic, payload);
+}
+
+core::Status check_tls(const MqttOptions& options) {
+  const bool certificate = !options.certificate_file.empty();
+  const bool key = !options.key_file.empty();
+  if (options.ca_file.empty() && (certificate || key))
+    return core::Error{
+        "certificate and key without the broker's authority would go unused, over a link in plain text: "
+        "name the authority, too (ca_file, --ca)."};
+  if (certificate != key) return core::Error{"certificate and key go together: name both, or none."};
+  return {};
+}
+
+std::string plain_password(const MqttOptions& options) {
+  if (options.password.empty() || !options.ca_file.empty()) return "";
+  return "the password goes in plain text to " + options.host + ":" + std::to_string(options.port) +
+         "; name the broker's authority (ca_file, --ca), and its port for TLS (8883)";
 }
 
 core::Status parse_broker(const std::string& text, MqttOptions& options) {

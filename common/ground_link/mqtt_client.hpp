@@ -43,7 +43,7 @@ struct MqttEvents {
 
 class MqttClient {
  public:
-  /// Begins to connect. Throws BadInput when the certificate files cannot be used.
+  /// Begins to connect. Throws BadInput when the certificate files cannot be used, or not without another one.
   MqttClient(const MqttOptions& options, MqttEvents events);
   /// Says good-bye to the broker; what it has not confirmed is not delivered.
   ~MqttClient();
@@ -59,6 +59,10 @@ class MqttClient {
   std::unique_ptr<Connection> connection_;
 };
 
+/// Whether authority, certificate and key go together: without the authority there is no TLS, whatever else is named.
+core::Status check_tls(const MqttOptions& options);
+/// One sentence when whoever is on the way reads the password; otherwise empty.
+std::string plain_password(const MqttOptions& options);
 /// "HOST" or "HOST:PORT" into the options.
 core::Status parse_broker(const std::string& text, MqttOptions& options);
 /// First line of a file that holds a password.

@@ -21,6 +21,27 @@ void GroundLinkConfig::describe(service::Fields& fields) {
   fields.text("password_file", password_file, "File whose first line is the password.");
 }
 
+core::Result<ground_link::MqttOptions> GroundLinkConfig::mqtt() const {
+  ground_link::MqttOptions options;
+  if (const auto address = ground_link::parse_broker(broker, options); !address.ok()) return address.error();
+  options.ca_file = ca_file;
+  options.certificate_file = certificate_file;
+  options.key_file = key_file;
+  options.user = user;
+  options.keep_alive_s = static_cast<int>(keep_alive_s);
+  options.longest_retry_s = longest_retry_s;
+  if (const auto tls = ground_link::check_tls(options); !tls.ok())
+    return core::Error{"tpr_publisher.ground_link: " + tls.error().message};
+  return options;
+}
+
+core::Status GroundLinkConfig::check() const {
+  if (broker.empty()) return {};
+  if (store.empty()) return core::Error{"tpr_publisher.ground_link.store is not set: name a file on a lasting disk."};
+  if (const auto options = mqtt(); !options.ok()) return options.error();
+  return {};
+}
+
 std::optional<GroundLinkSettings> GroundLinkConfig::settings(const std::string& train_id,
                                                              const std::string& host) const {
   if (broker.empty()) return std::nullopt;
@@ -30,19 +51,11 @@ std::optional<GroundLinkSettings> GroundLinkConfig::settings(const std::string& 
     }
     return text;
   };
-  if (store.empty()) throw core::BadInput("tpr_publisher.ground_link.store is not set: name a file on a lasting disk.");
-  if (certificate_file.empty() != key_file.empty())
-    throw core::BadInput("tpr_publisher.ground_link: certificate_file and key_file go together.");
+  core::ok_or_throw(check());
   GroundLinkSettings settings;
-  core::ok_or_throw(ground_link::parse_broker(broker, settings.mqtt));
+  settings.mqtt = core::value_or_throw(mqtt());
   settings.mqtt.client_id = filled_in(client_id.empty() ? "railfix-{train}-{host}" : client_id);
-  settings.mqtt.ca_file = ca_file;
-  settings.mqtt.certificate_file = certificate_file;
-  settings.mqtt.key_file = key_file;
-  settings.mqtt.user = user;
   if (!password_file.empty()) settings.mqtt.password = core::value_or_throw(ground_link::read_password(password_file));
-  settings.mqtt.keep_alive_s = static_cast<int>(keep_alive_s);
-  settings.mqtt.longest_retry_s = longest_retry_s;
   settings.topic = filled_in(topic);
   settings.store = store;
   settings.store_limit = static_cast<size_t>(store_limit);

@@ -26,8 +26,14 @@ struct GroundLinkConfig {
   std::string password_file;
 
   void describe(service::Fields& fields);
-  /// Nothing without a broker. Throws BadInput when the keys do not go together.
+  /// Whether the keys go together; looks into no file.
+  [[nodiscard]] core::Status check() const;
+  /// Nothing without a broker. Throws BadInput when check() refuses, or the password cannot be read.
   [[nodiscard]] std::optional<GroundLinkSettings> settings(const std::string& train_id, const std::string& host) const;
+
+ private:
+  /// Without the password.
+  [[nodiscard]] core::Result<ground_link::MqttOptions> mqtt() const;
 };
 
 struct TprPublisherConfig {
@@ -51,6 +57,7 @@ struct TprPublisherConfig {
   GroundLinkConfig ground_link;
 
   void describe(service::Fields& fields);
+  [[nodiscard]] core::Status check() const { return ground_link.check(); }
   /// Throws BadInput when packet_58 cannot be read.
   [[nodiscard]] Settings settings() const;
 };

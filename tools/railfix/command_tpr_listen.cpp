@@ -139,6 +139,7 @@ void add_tpr_listen(CLI::App& tpr, Action& chosen) {
       core::ok_or_throw(ground_link::parse_broker(options->broker, options->mqtt));
       if (!options->password_file.empty())
         options->mqtt.password = core::value_or_throw(ground_link::read_password(options->password_file));
+      if (const auto plain = ground_link::plain_password(options->mqtt); !plain.empty()) std::cerr << plain << '\n';
       options->mqtt.keep_session = !options->mqtt.client_id.empty();
       return listen(*options);
     };

@@ -116,6 +116,19 @@ TEST_F(GroundLinkTest, ListenPrintsEachReportOnce) {
   }
 }
 
+TEST_F(GroundLinkTest, ACertificateWithoutAuthorityIsRefusedBeforeAnythingIsSent) {
+  auto command = linked_service("localhost:1", {"tpr_publisher.ground_link.certificate_file=train.pem",
+                                                "tpr_publisher.ground_link.key_file=train.key"});
+  command.emplace_back("--check");
+  const auto service = test::run_program(command, 20);
+  EXPECT_EQ(service.exit_code, 2);
+  EXPECT_THAT(service.err, HasSubstr("tpr_publisher.ground_link: certificate and key without the broker's authority"));
+  const auto listen = test::run_program(
+      {"railfix", "tpr", "listen", "--broker", "localhost:1", "--certificate", "train.pem", "--key", "train.key"}, 20);
+  EXPECT_EQ(listen.exit_code, 2);
+  EXPECT_THAT(listen.err, HasSubstr("certificate and key without the broker's authority"));
+}
+
 // Own authority, a certificate for the broker and one for the train, as docs/configuration/reports.md asks for.
 class Certificates {
  public:
@@ -192,8 +205,11 @@ TEST_F(GroundLinkTest, APasswordLetsOnlyItsTrainIn) {
                           {link + "user=" + train_, link + "password_file=" + file("password").string()});
   };
   {
-    test::Program program(with_password("wrong"));
+    auto command = with_password("wrong");
+    command.insert(command.end(), {"--set", "common.log_level=warning"});
+    test::Program program(command, {{}, file("err"), {}});
     ASSERT_TRUE(run_until([&] { return connected(); }, [] {}));
+    EXPECT_THAT(test::slurp(file("err")), HasSubstr("Ground link: the password goes in plain text to localhost:"));
     ASSERT_TRUE(run_for(2));
     ASSERT_TRUE(status_says("2 reports wait"));
     ASSERT_TRUE(status_says("Ground link: not connected"));
