@@ -55,8 +55,11 @@ std::string sentence(const GroundReport& report) {
   const auto& f = decoded.value();
   if (f.nid_lrbg == etcs::kUnknownBaliseGroup) return "LRBG unknown";
   const std::string speed = f.v_train == etcs::kStandstillSpeed ? "0" : std::to_string(f.v_train * 5);
-  return "LRBG " + std::to_string(f.nid_lrbg >> 14U) + "/" + std::to_string(f.nid_lrbg & 16383U) + " + " +
-         metres(f.d_lrbg, f.q_scale) + " m  -" + metres(f.l_doubtover, f.q_scale) + "/+" +
+  const char* side = f.q_dlrbg == etcs::kNominal   ? "the nominal"
+                     : f.q_dlrbg == etcs::kReverse ? "the reverse"
+                                                   : "an unknown";
+  return metres(f.d_lrbg, f.q_scale) + " m on " + side + " side of LRBG " + std::to_string(f.nid_lrbg >> 14U) + "/" +
+         std::to_string(f.nid_lrbg & 16383U) + "  -" + metres(f.l_doubtover, f.q_scale) + "/+" +
          metres(f.l_doubtunder, f.q_scale) + " m  " + speed + " km/h";
 }
 

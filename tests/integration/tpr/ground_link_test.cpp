@@ -116,6 +116,38 @@ TEST_F(GroundLinkTest, ListenPrintsEachReportOnce) {
   }
 }
 
+TEST_F(GroundLinkTest, ListenSaysOnWhichSideOfTheGroupTheFrontIs) {
+  test::Broker broker(file("broker"));
+  ASSERT_TRUE(broker.start());
+  const test::Program listen({"railfix", "tpr", "listen", "--broker", broker.address()},
+                             {file("out"), file("err"), {}});
+  ASSERT_TRUE(wait_for([&] { return test::slurp(file("err")).find("connected") != std::string::npos; }));
+  std::atomic<bool> connected = false;
+  ground_link::MqttOptions options;
+  core::ok_or_throw(ground_link::parse_broker(broker.address(), options));
+  ground_link::MqttClient train(options, {[&](auto) { connected = true; }, {}, {}, {}, {}});
+  ASSERT_TRUE(wait_for([&] { return connected.load(); }));
+  uint64_t sequence = 0;
+  const auto send = [&](uint32_t side) {
+    auto fields =
+        etcs::decode(etcs::parse_hex("880601D6F345402AF34000E48F68EB84D250014010C38830").value(), etcs::Baseline::b3)
+            .value();
+    fields.q_dlrbg = side;
+    auto sent = report(side);
+    sent.sequence = ++sequence;
+    sent.message = etcs::encode(fields, etcs::Baseline::b3).value();
+    return train.publish("railfix/" + train_ + "/position_report", ground_link::to_bytes(sent));
+  };
+  const std::string group = " side of LRBG 123/4567  -10.0/+67.0 m  140 km/h\n";
+  const auto says = [&](const std::string& side) {
+    return test::slurp(file("out")).find("  1234.0 m on " + side + group) != std::string::npos;
+  };
+  EXPECT_TRUE(wait_for([&] {  // whoever subscribes late misses the first ones
+    for (const auto side : {etcs::kReverse, etcs::kNominal, etcs::kUnknownSide}) (void)send(side);
+    return says("the nominal") && says("the reverse") && says("an unknown");
+  }));
+}
+
 TEST_F(GroundLinkTest, ACertificateWithoutAuthorityIsRefusedBeforeAnythingIsSent) {
   auto command = linked_service("localhost:1", {"tpr_publisher.ground_link.certificate_file=train.pem",
                                                 "tpr_publisher.ground_link.key_file=train.key"});
