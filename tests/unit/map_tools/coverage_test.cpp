@@ -69,6 +69,40 @@ TEST(Coverage, NaturalReferencesCountWhereAskedFor) {
   EXPECT_NEAR(found.gaps[0].from_m, 900 + (10 - 5) / 0.01, 1e-6);
 }
 
+/// A mast every 50 m on the first 1000 m, so roughly known that none brings the train under 12 m.
+track::Path line_of_rough_masts() {
+  auto map = std::make_shared<track::Map>(track::small_map());
+  map->balise_groups.clear();
+  map->landmarks.clear();
+  for (uint32_t id = 1; id <= 20; ++id)
+    map->landmarks.push_back({id, track::LandmarkKind::mast, 1, 50.0 * id - 25, -3, 3, "mast"});
+  return core::value_or_throw(track::Path::follow(map, {1, 0, Direction::forward}, 5000, 0));
+}
+
+TEST(Coverage, CountsEveryMetreOnceHoweverManyReferencesDoNotHelp) {
+  const track::Path path = line_of_rough_masts();
+  CoverageOptions options{.scale_sigma = 0.01, .sigmas = 4.5, .limit_m = 12, .virtual_locacc_m = 5, .natural = true};
+  for (const bool backwards : {false, true}) {
+    const Coverage found = coverage_of(path, options, backwards);
+    EXPECT_NEAR(found.covered_m, 7 / 0.045, 1e-6);  // masts of 13.5 m, each of which helps a train that knows less
+    ASSERT_EQ(found.gaps.size(), 1U);
+    EXPECT_NEAR(std::abs(found.gaps[0].to_m - found.gaps[0].from_m), 1800 - 7 / 0.045, 1e-6);
+    EXPECT_EQ(found.gaps[0].references_m.size(), 11U);  // every 155.6 m of it
+    EXPECT_NEAR(std::abs(found.gaps[0].references_m[1] - found.gaps[0].references_m[0]), 7 / 0.045, 1e-6);
+  }
+  options.limit_m = 30;
+  const Coverage all = coverage_of(path, options);
+  EXPECT_LE(all.covered_m, path.end_m());
+  EXPECT_NEAR(all.covered_m + (all.gaps.empty() ? 0 : all.gaps[0].to_m - all.gaps[0].from_m), path.end_m(), 1e-6);
+}
+
+TEST(Coverage, AWayHasALength) {
+  const auto map = std::make_shared<const track::Map>(track::small_map());
+  EXPECT_NEAR(core::value_or_throw(way_from(map, {1, 0, Direction::forward}, 500)).end_m(), 500, 1e-9);
+  for (const double length_m : {0.0, -5.0, std::nan("")})
+    EXPECT_FALSE(way_from(map, {1, 0, Direction::forward}, length_m).ok()) << length_m;
+}
+
 TEST(Coverage, WhatNobodySightsIsNoReference) {
   auto map = std::make_shared<track::Map>(track::small_map());
   map->landmarks.push_back({4, track::LandmarkKind::underbridge, 1, 500, 0, 3, "viaduct"});

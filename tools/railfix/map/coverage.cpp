@@ -29,10 +29,34 @@ double reach_m(const CoverageOptions& options, double accuracy_m) {
   return std::max(0.0, (options.limit_m - accuracy_m) / (options.sigmas * options.scale_sigma));
 }
 
+/// Gaps that touch are one.
+void add_gap(const CoverageGap& gap, std::vector<CoverageGap>& gaps) {
+  if (gaps.empty() || gaps.back().to_m < gap.from_m) {
+    gaps.push_back(gap);
+    return;
+  }
+  CoverageGap& last = gaps.back();
+  last.to_m = gap.to_m;
+  last.largest_m = std::max(last.largest_m, gap.largest_m);
+  last.outside_budget = last.outside_budget || gap.outside_budget;
+}
+
+void propose_references(const CoverageOptions& options, CoverageGap& gap) {
+  const double step = reach_m(options, options.virtual_locacc_m);
+  // With no reach at all no virtual reference helps.
+  for (double at = gap.from_m; step > 1.0 && at < gap.to_m; at += step) gap.references_m.push_back(at);
+}
+
 }  // namespace
 
 double half_interval_m(const CoverageOptions& options, double locacc_m, double way_m) {
   return locacc_m + options.sigmas * options.scale_sigma * way_m;
+}
+
+core::Result<track::Path> way_from(std::shared_ptr<const track::Map> map, const track::EdgePosition& start,
+                                   double length_m) {
+  if (!(length_m > 0)) return core::Error{"--length must be more than 0 m"};
+  return track::Path::follow(std::move(map), start, length_m, 0);
 }
 
 Coverage coverage_of(const track::Path& path, const CoverageOptions& options, bool backwards) {
@@ -49,19 +73,15 @@ Coverage coverage_of(const track::Path& path, const CoverageOptions& options, bo
   for (const Reference& next : references) {
     const double way = next.at_m - last.at_m;
     const double half = half_interval_m(options, last.accuracy_m, way);
+    // A reference that knows less than the train does not help it: the stretch goes on.
+    if (next.accuracy_m >= half) continue;
     out.largest_m = std::max(out.largest_m, half);
     const double reach = reach_m(options, last.accuracy_m);
     out.covered_m += std::min(way, reach);
-    if (way > reach) {
-      CoverageGap gap{last.at_m + reach, next.at_m, half, {}, half > 5.0 + 0.05 * way};
-      const double step = reach_m(options, options.virtual_locacc_m);
-      // With no reach at all no virtual reference helps.
-      for (double at = gap.from_m; step > 1.0 && at < next.at_m; at += step) gap.references_m.push_back(at);
-      out.gaps.push_back(std::move(gap));
-    }
-    // A reference that knows less than the train does not help it.
-    if (next.accuracy_m < half) last = next;
+    if (way > reach) add_gap({last.at_m + reach, next.at_m, half, {}, half > 5.0 + 0.05 * way}, out.gaps);
+    last = next;
   }
+  for (CoverageGap& gap : out.gaps) propose_references(options, gap);
   if (backwards) {
     for (CoverageGap& gap : out.gaps) {
       gap.from_m = -gap.from_m;

@@ -1,8 +1,10 @@
 // Where on a way the confidence interval outgrows a limit, from how odometry drifts between references.
 #pragma once
 
+#include <memory>
 #include <vector>
 
+#include "core/result.hpp"
 #include "track/path.hpp"
 
 namespace railfix::tool {
@@ -33,8 +35,12 @@ struct Coverage {
 /// Half the interval behind a reference of this location accuracy.
 double half_interval_m(const CoverageOptions& options, double locacc_m, double way_m);
 
+/// The straight way from a place, as long as asked for or to the end of the track; a length must be more than 0 m.
+core::Result<track::Path> way_from(std::shared_ptr<const track::Map> map, const track::EdgePosition& start,
+                                   double length_m);
+
 /// The path is run from its begin (backwards: from its end), where the place is known as at a virtual reference. Gaps
-/// come as the train meets them, in distances on the path.
+/// come as the train meets them, in distances on the path; where references do not help within one, it stays one.
 Coverage coverage_of(const track::Path& path, const CoverageOptions& options, bool backwards = false);
 
 }  // namespace railfix::tool

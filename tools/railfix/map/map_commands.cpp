@@ -84,7 +84,7 @@ void print_coverage(const char* way_name, const track::Path& path, const Coverag
 int coverage(const CoverageRequest& request) {
   const auto map = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(request.map)));
   const track::EdgePosition start = core::value_or_throw(map->parse_position(request.start));
-  const track::Path path = core::value_or_throw(track::Path::follow(map, start, request.length_m, 0));
+  const track::Path path = core::value_or_throw(way_from(map, start, request.length_m));
   const Coverage found = coverage_of(path, request.options);
   const Coverage back = coverage_of(path, request.options, true);
   if (request.as_json) {
