@@ -170,6 +170,41 @@ TEST_F(RunTables, SightingsArePutOnTheMap) {
   EXPECT_NEAR(moved[0].place_ahead_m, 3, 1e-9) << "a fix moved the place by 3 m, beyond the switch";
 }
 
+TEST_F(RunTables, ASightingThatWeighsNothingOrAllIsRefused) {
+  write("train_state.csv",
+        "stamp_ns,edge,offset_m,direction,track_known,speed_mps,sigma_m\n"
+        "1000000000,1,980,+,1,20,0.4\n2000000000,2,0,+,1,20,0.5\n");
+  const auto reading = [&](const std::string& ahead, const std::string& sigma) {
+    write("sightings.csv", "stamp_ns,kind,distance_ahead_m,lateral_m,sigma_m,confidence\n1500000000,mast," + ahead +
+                               ",-3," + sigma + ",0.9\n");
+    return read_sightings(map_, folder_, 0);
+  };
+  EXPECT_TRUE(reading("5", "0.1").ok());
+  for (const char* sigma : {"inf", "nan", "-1", "0", ""}) {
+    const auto read = reading("5", sigma);
+    ASSERT_FALSE(read.ok()) << sigma;
+    EXPECT_THAT(read.error().message, HasSubstr("sightings.csv line 2"));
+    EXPECT_THAT(read.error().message, HasSubstr("column sigma_m"));
+  }
+  EXPECT_FALSE(reading("nan", "0.1").ok());
+  write("train_state.csv",
+        "stamp_ns,edge,offset_m,direction,track_known,speed_mps,sigma_m\n1000000000,1,980,+,1,20,-0.4\n");
+  EXPECT_THAT(reading("5", "0.1").error().message, HasSubstr("train_state.csv line 2"));
+}
+
+TEST_F(RunTables, OneRunGivenTwiceIsRefused) {
+  write("train_state.csv",
+        "stamp_ns,edge,offset_m,direction,track_known,speed_mps,sigma_m\n1000000000,1,980,+,1,20,0.4\n");
+  write("sightings.csv", "stamp_ns,kind,distance_ahead_m,lateral_m,sigma_m,confidence\n");
+  EXPECT_TRUE(read_runs(map_, {folder_}).ok());
+  for (const auto& again : {folder_, folder_ / ".", folder_ / ".." / folder_.filename()}) {
+    const auto read = read_runs(map_, {folder_, again});
+    ASSERT_FALSE(read.ok()) << again;
+    EXPECT_THAT(read.error().message, HasSubstr("the same run as"));
+  }
+  EXPECT_THAT(read_runs(map_, {folder_, folder_ / "none"}).error().message, HasSubstr("none"));
+}
+
 TEST_F(RunTables, BadTablesAreOneSentence) {
   EXPECT_FALSE(read_sightings(map_, folder_, 0).ok());
   write("train_state.csv", "stamp_ns,edge,offset_m,direction,track_known,speed_mps,sigma_m\n1,77,0,+,1,0,1\n");

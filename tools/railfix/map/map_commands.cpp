@@ -113,11 +113,7 @@ struct LearnRequest {
 
 int learn(const LearnRequest& request) {
   const auto map = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(request.map)));
-  std::vector<SurveySighting> sightings;
-  for (size_t i = 0; i < request.runs.size(); ++i) {
-    const auto read = core::value_or_throw(read_sightings(map, request.runs[i], i));
-    sightings.insert(sightings.end(), read.begin(), read.end());
-  }
+  const auto sightings = core::value_or_throw(read_runs(map, {request.runs.begin(), request.runs.end()}));
   const Survey survey = survey_landmarks(*map, sightings, request.options);
   std::printf("sightings        %zu of %zu runs, %zu used, %zu outliers, %zu of things seen by fewer than %zu runs\n",
               sightings.size(), request.runs.size(), survey.sightings, survey.outliers, survey.left_alone,

@@ -64,4 +64,8 @@ void apply_survey(const Survey& survey, track::Map& map);
 core::Result<std::vector<SurveySighting>> read_sightings(const std::shared_ptr<const track::Map>& map,
                                                          const std::filesystem::path& run_folder, size_t run);
 
+/// Those of several runs; a folder given twice, however its path is spelled, is no second run and an error.
+core::Result<std::vector<SurveySighting>> read_runs(const std::shared_ptr<const track::Map>& map,
+                                                    const std::vector<std::filesystem::path>& run_folders);
+
 }  // namespace railfix::tool

@@ -43,6 +43,24 @@ size_t column_of(const core::CsvReader& table, const std::filesystem::path& file
   return *column;
 }
 
+core::BadInput bad_cell(const core::CsvReader& table, size_t column, const std::string& what) {
+  return core::BadInput(
+      table.error("'" + std::string(table.text(column)) + "' in column " + table.header().at(column) + what));
+}
+
+/// An infinite sigma counts for nothing, one of 0 for everything.
+double sigma_in(const core::CsvReader& table, size_t column) {
+  const double sigma_m = read_or_throw(table.number(column));
+  if (!std::isfinite(sigma_m) || sigma_m <= 0) throw bad_cell(table, column, " is not a length of more than 0 m");
+  return sigma_m;
+}
+
+double finite_in(const core::CsvReader& table, size_t column) {
+  const double value = read_or_throw(table.number(column));
+  if (!std::isfinite(value)) throw bad_cell(table, column, " is not a finite number");
+  return value;
+}
+
 /// The way that the speeds give, trapezoids; an empty cell is a train that stands or is not known to move.
 class WayBySpeed {
  public:
@@ -84,6 +102,7 @@ std::vector<State> read_states(const std::shared_ptr<const track::Map>& map, con
           table.error("edge " + std::to_string(state.place.edge) + " is not on the map; was the run made on it?"));
     }
     if (!std::isfinite(state.place.offset_m) || !std::isfinite(state.sigma_m)) continue;
+    if (state.sigma_m < 0) throw bad_cell(table, sigma, " is less than 0 m");
     if (!out.empty()) {
       const double run_m = state.way_m - out.back().way_m;
       state.place_ahead_m = out.back().place_ahead_m + way_between(map, out.back(), state).value_or(run_m) - run_m;
@@ -129,23 +148,42 @@ core::Result<std::vector<SurveySighting>> read_sightings(const std::shared_ptr<c
       const int64_t when = read_or_throw(table.integer(stamp));
       const auto what = track::landmark_kind_from(std::string(table.text(kind)));
       if (!what) return table.error("\"" + std::string(table.text(kind)) + "\" is no kind of landmark");
+      const double ahead_m = finite_in(table, ahead);
+      const double sigma_m = sigma_in(table, sigma);
       const auto after = std::lower_bound(states.begin(), states.end(), when,
                                           [](const State& state, int64_t ns) { return state.stamp_ns < ns; });
       if (after == states.begin() || after == states.end()) continue;
       const State& before = *(after - 1);
-      const auto place = place_at(map, before, *after, when, read_or_throw(table.number(ahead)));
+      const auto place = place_at(map, before, *after, when, ahead_m);
       if (!place) continue;
       const bool is_reverse = place->direction == track::Direction::reverse;
       const double side = read_or_throw(table.number(lateral));
       out.push_back({run, before.way_m, as_on_map(*what, place->direction), place->edge, place->offset_m,
-                     std::isfinite(side) ? (is_reverse ? -side : side) : 0.0, read_or_throw(table.number(sigma)),
-                     before.sigma_m, before.place_ahead_m, is_reverse});
+                     std::isfinite(side) ? (is_reverse ? -side : side) : 0.0, sigma_m, before.sigma_m,
+                     before.place_ahead_m, is_reverse});
     }
     core::ok_or_throw(table.status());
     return out;
   } catch (const core::BadInput& bad) {
     return core::Error{bad.what()};
   }
+}
+
+core::Result<std::vector<SurveySighting>> read_runs(const std::shared_ptr<const track::Map>& map,
+                                                    const std::vector<std::filesystem::path>& run_folders) {
+  std::vector<SurveySighting> out;
+  for (size_t i = 0; i < run_folders.size(); ++i) {
+    for (size_t before = 0; before < i; ++before) {
+      std::error_code unreadable;  // told below
+      if (std::filesystem::equivalent(run_folders[i], run_folders[before], unreadable))
+        return core::Error{run_folders[i].string() + " is the same run as " + run_folders[before].string() +
+                           "; give every run once"};
+    }
+    auto read = read_sightings(map, run_folders[i], i);
+    if (!read.ok()) return read.error();
+    out.insert(out.end(), read.value().begin(), read.value().end());
+  }
+  return out;
 }
 
 }  // namespace railfix::tool
