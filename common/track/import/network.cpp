@@ -96,11 +96,6 @@ void take_marks(const ImportedTrack& track, double from_m, double to_m, bool is_
   }
 }
 
-/// One edge's end at a node.
-struct Meeting {
-  size_t edge = 0;
-  double leaving_rad = 0;
-};
 
 struct Pair {
   size_t a = 0;
@@ -109,14 +104,14 @@ struct Pair {
   bool same_line = false;
 };
 
-std::vector<Pair> possible_pairs(const Draft& draft, const std::vector<Meeting>& meetings) {
+std::vector<Pair> possible_pairs(const Draft& draft, const std::vector<EdgeEnd>& ends) {
   std::vector<Pair> pairs;
-  for (size_t a = 0; a < meetings.size(); ++a) {
-    for (size_t b = a + 1; b < meetings.size(); ++b) {
-      const double turn = std::abs(core::wrap_pi(meetings[b].leaving_rad - meetings[a].leaving_rad - core::kPi));
+  for (size_t a = 0; a < ends.size(); ++a) {
+    for (size_t b = a + 1; b < ends.size(); ++b) {
+      const double turn = std::abs(core::wrap_pi(ends[b].leaving_rad - ends[a].leaving_rad - core::kPi));
       if (turn > kSharpestTurnRad) continue;
-      const std::string& line = draft.edges[meetings[a].edge].track.line;
-      pairs.push_back({a, b, turn, !line.empty() && line == draft.edges[meetings[b].edge].track.line});
+      const std::string& line = draft.edges[ends[a].edge].track.line;
+      pairs.push_back({a, b, turn, !line.empty() && line == draft.edges[ends[b].edge].track.line});
     }
   }
   // A line's own pieces first where the turn does not tell them apart, else the smallest turn.
@@ -127,31 +122,38 @@ std::vector<Pair> possible_pairs(const Draft& draft, const std::vector<Meeting>&
   return pairs;
 }
 
-void connect(const Draft& draft, size_t node, const std::vector<Meeting>& meetings, uint32_t first_edge,
-             uint32_t node_id, Map& map) {
-  std::set<size_t> has_straight_way;
-  std::vector<Connection> diverging;
-  for (const Pair& pair : possible_pairs(draft, meetings)) {
-    Connection connection{node_id, first_edge + static_cast<uint32_t>(meetings[pair.a].edge),
-                          first_edge + static_cast<uint32_t>(meetings[pair.b].edge), false};
-    if (!has_straight_way.contains(pair.a) && !has_straight_way.contains(pair.b)) {
-      has_straight_way.insert({pair.a, pair.b});
-      map.connections.push_back(connection);
-    } else if (!draft.nodes[node].is_crossing) {
-      connection.diverging = true;
-      diverging.push_back(connection);
-    }
-  }
-  map.connections.insert(map.connections.end(), diverging.begin(), diverging.end());
-}
-
-NodeKind kind_of(const DraftNode& node, size_t meetings) {
+NodeKind kind_of(const DraftNode& node, size_t ends) {
   if (node.is_crossing) return NodeKind::crossing;
-  if (node.is_switch || meetings > 2) return NodeKind::railway_switch;
-  return meetings == 2 ? NodeKind::joint : NodeKind::end;
+  if (node.is_switch || ends > 2) return NodeKind::railway_switch;
+  return ends == 2 ? NodeKind::joint : NodeKind::end;
 }
 
 }  // namespace
+
+std::vector<std::vector<EdgeEnd>> ends_at_nodes(const Draft& draft) {
+  std::vector<std::vector<EdgeEnd>> ends(draft.nodes.size());
+  for (size_t i = 0; i < draft.edges.size(); ++i) {
+    ends[draft.edges[i].from_node].push_back({i, false, draft.edges[i].leaving_from_rad});
+    ends[draft.edges[i].to_node].push_back({i, true, draft.edges[i].leaving_to_rad});
+  }
+  return ends;
+}
+
+std::vector<WayOver> ways_over(const Draft& draft, size_t node, const std::vector<EdgeEnd>& ends) {
+  std::set<size_t> has_straight_way;
+  std::vector<WayOver> straight;
+  std::vector<WayOver> diverging;
+  for (const Pair& pair : possible_pairs(draft, ends)) {
+    if (!has_straight_way.contains(pair.a) && !has_straight_way.contains(pair.b)) {
+      has_straight_way.insert({pair.a, pair.b});
+      straight.push_back({pair.a, pair.b, false});
+    } else if (!draft.nodes[node].is_crossing) {
+      diverging.push_back({pair.a, pair.b, true});
+    }
+  }
+  straight.insert(straight.end(), diverging.begin(), diverging.end());
+  return straight;
+}
 
 Alignment slice(const Alignment& alignment, double from_m, double to_m) {
   std::vector<Element> elements;
@@ -225,11 +227,7 @@ void append(const Draft& draft, Map& map) {
   };
   const auto first_node = static_cast<uint32_t>(map.nodes.size() + 1);
   const auto first_edge = static_cast<uint32_t>(map.edges.size() + 1);
-  std::vector<std::vector<Meeting>> meetings(draft.nodes.size());
-  for (size_t i = 0; i < draft.edges.size(); ++i) {
-    const DraftEdge& in = draft.edges[i];
-    meetings[in.from_node].push_back({i, in.leaving_from_rad});
-    meetings[in.to_node].push_back({i, in.leaving_to_rad});
+  for (const DraftEdge& in : draft.edges) {
     const auto id = static_cast<uint32_t>(map.edges.size() + 1);
     map.edges.push_back({.id = id,
                          .name = in.track.name,
@@ -252,11 +250,15 @@ void append(const Draft& draft, Map& map) {
       map.balise_groups.push_back(std::move(group));
     }
   }
+  const std::vector<std::vector<EdgeEnd>> ends = ends_at_nodes(draft);
   for (size_t i = 0; i < draft.nodes.size(); ++i) {
     const DraftNode& node = draft.nodes[i];
     const uint32_t id = first_node + static_cast<uint32_t>(i);
-    map.nodes.push_back({id, kind_of(node, meetings[i].size()), node.name, node.easting_m, node.northing_m});
-    connect(draft, i, meetings[i], first_edge, id, map);
+    map.nodes.push_back({id, kind_of(node, ends[i].size()), node.name, node.easting_m, node.northing_m});
+    for (const WayOver& way : ways_over(draft, i, ends[i])) {
+      map.connections.push_back({id, first_edge + static_cast<uint32_t>(ends[i][way.a].edge),
+                                 first_edge + static_cast<uint32_t>(ends[i][way.b].edge), way.diverging});
+    }
   }
 }
 

@@ -32,6 +32,27 @@ struct Draft {
   std::vector<DraftEdge> edges;
 };
 
+/// One edge's end at a node.
+struct EdgeEnd {
+  size_t edge = 0;  // index into Draft::edges
+  bool at_end = false;
+  double leaving_rad = 0;
+};
+
+/// A train can run over a node from one of its ends to another; indices into the ends.
+struct WayOver {
+  size_t a = 0;
+  size_t b = 0;
+  bool diverging = false;
+};
+
+/// Of every node of the draft.
+std::vector<std::vector<EdgeEnd>> ends_at_nodes(const Draft& draft);
+
+/// Straight ways first. Two ends are connected where the turn between them is less than 60 degrees; pieces of one line
+/// (else the smallest turn) are the straight way.
+std::vector<WayOver> ways_over(const Draft& draft, size_t node, const std::vector<EdgeEnd>& ends);
+
 /// A node that lies on a track.
 struct TrackCut {
   double offset_m = 0;
@@ -60,8 +81,7 @@ std::vector<Point> points_between(const std::vector<Point>& points, double from_
 /// The part of an alignment between two offsets, with its profile and cant and what of them lies next to it.
 Alignment slice(const Alignment& alignment, double from_m, double to_m);
 
-/// Adds the draft to the map. Two edges are connected at a node where the turn between them is less than 60 degrees;
-/// pieces of one line (else the smallest turn) are the straight way.
+/// Adds the draft to the map, its edges connected as ways_over() says.
 void append(const Draft& draft, Map& map);
 
 }  // namespace railfix::track

@@ -26,6 +26,16 @@ std::optional<double> speed_mps_of(const std::string& text) {
 
 }  // namespace
 
+std::optional<TrackMark> point_mark(const OsmTags& tags, double offset_m) {
+  const std::string kind = value_of(tags, "railway");
+  if (kind == "balise" || is_set(tags, "railway:balise"))
+    return TrackMark{LandmarkKind::balise, offset_m, 0, kMappingSigmaM, value_of(tags, "ref")};
+  if (kind == "signal") return TrackMark{LandmarkKind::mast, offset_m, 0, kMappingSigmaM, value_of(tags, "ref")};
+  if (kind == "level_crossing" || kind == "crossing")  // of a road, of a footpath
+    return TrackMark{LandmarkKind::level_crossing, offset_m, 0, kMappingSigmaM, value_of(tags, "name")};
+  return std::nullopt;
+}
+
 void OsmMarks::add(ImportedTrack& track) const {
   add_structures(track);
   add_speeds(track);
@@ -48,7 +58,9 @@ void OsmMarks::add_structures(ImportedTrack& track) const {
     if (i == 0 || !has(i - 1, "bridge")) bridge_begin = i;
     if (i + 1 == count || !has(i + 1, "bridge")) add_underbridge(at(bridge_begin), at(i + 1), chain_.ways[i], track);
   }
-  for (size_t i = 1; i < count; ++i) add_point_mark(chain_.nodes[i], at(i), track);
+  for (size_t i = 1; i < count; ++i) {
+    if (auto mark = point_mark(data_.nodes.at(chain_.nodes[i]).tags, at(i))) track.marks.push_back(std::move(*mark));
+  }
 }
 
 /// maxspeed, and maxspeed:forward and :backward as the way is drawn; equal neighbours are one limit.
@@ -85,18 +97,6 @@ void OsmMarks::add_underbridge(double from_m, double to_m, size_t way, ImportedT
   track.marks.push_back({LandmarkKind::underbridge, from_m + 0.5 * length, 0,
                          std::hypot(kMappingSigmaM, length / std::sqrt(12.0)),
                          value_of(data_.ways[way].tags, "bridge:name")});
-}
-
-void OsmMarks::add_point_mark(int64_t node, double offset_m, ImportedTrack& track) const {
-  const OsmTags& tags = data_.nodes.at(node).tags;
-  const std::string kind = value_of(tags, "railway");
-  if (kind == "balise" || is_set(tags, "railway:balise")) {
-    track.marks.push_back({LandmarkKind::balise, offset_m, 0, kMappingSigmaM, value_of(tags, "ref")});
-  } else if (kind == "signal") {
-    track.marks.push_back({LandmarkKind::mast, offset_m, 0, kMappingSigmaM, value_of(tags, "ref")});
-  } else if (kind == "level_crossing" || kind == "crossing") {  // of a road, of a footpath
-    track.marks.push_back({LandmarkKind::level_crossing, offset_m, 0, kMappingSigmaM, value_of(tags, "name")});
-  }
 }
 
 }  // namespace railfix::track

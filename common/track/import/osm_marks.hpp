@@ -19,6 +19,10 @@ struct OsmChain {
   std::optional<double> heading_at_end;
 };
 
+/// What a node says that stands there, if anything.
+std::optional<TrackMark> point_mark(const OsmTags& tags, double offset_m);
+
+/// Between the ends of the chain; add_marks_at_nodes() does those.
 class OsmMarks {
  public:
   OsmMarks(const OsmData& data, const OsmChain& chain) : data_(data), chain_(chain) {}
@@ -29,7 +33,6 @@ class OsmMarks {
   void add_structures(ImportedTrack& track) const;
   void add_speeds(ImportedTrack& track) const;
   void add_underbridge(double from_m, double to_m, size_t way, ImportedTrack& track) const;
-  void add_point_mark(int64_t node, double offset_m, ImportedTrack& track) const;
   [[nodiscard]] double offset_of(size_t point, const ImportedTrack& track) const;
   [[nodiscard]] const OsmTags& tags_of(size_t segment) const { return data_.ways[chain_.ways[segment]].tags; }
 

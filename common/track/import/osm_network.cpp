@@ -6,7 +6,7 @@
 
 #include "core/units.hpp"
 #include "track/import/biarc.hpp"
-#include "track/import/osm_marks.hpp"
+#include "track/import/osm_node_marks.hpp"
 #include "track/import/osm_overbridges.hpp"
 #include "track/import/osm_trackside.hpp"
 #include "track/import/smooth.hpp"
@@ -54,6 +54,7 @@ class Builder {
     gather_ends();
     for (const auto& [node, ends] : ends_) agree_on_tangents(ends);
     for (OsmChain& chain : chains_) add_edge(chain);
+    add_marks_at_nodes(data_, chains_, out_.draft);
     add_trackside();
     return std::move(out_);
   }
