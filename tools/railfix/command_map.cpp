@@ -10,6 +10,7 @@
 #include "map/map_text.hpp"
 #include "track/import/build.hpp"
 #include "track/import/made_network.hpp"
+#include "track/import/scale.hpp"
 
 namespace railfix::tool {
 namespace {
@@ -32,6 +33,8 @@ int build(const BuildRequest& request) {
                       {"edges", built.map.edges.size()},
                       {"length_m", total_length_m(built.map)},
                       {"crs", built.map.crs}};
+    if (const auto scale = track::scale_over(built.map))
+      json["scale_m_per_km"] = {scale->least_m_per_km, scale->most_m_per_km};
     if (built.landxml.elements > 0) json["landxml"] = to_json(built.landxml);
     if (built.fit.tracks > 0) json["fit"] = to_json(built.fit);
     if (built.plans.elements > 0) json["plans"] = to_json(built.plans);
@@ -81,7 +84,8 @@ void add_build(CLI::App& map, Action& chosen) {
   command->add_option(
       "--crs", request->options.crs,
       "Coordinate system for PROJ, such as EPSG:2056; without it the plan's own, else the UTM zone of the data; "
-      "local = true to scale around the middle of OpenStreetMap data (UTM shortens up to 0.4 m per km)");
+      "local = true to scale in the middle of OpenStreetMap data, 0.5 m per km too long 200 km east or west of it. UTM "
+      "is 0.4 m per km too short in the middle of its zone and too long beyond 180 km from it");
   command->add_flag(
       "!--arcs", request->options.with_clothoids,
       "Two arcs between every pair of points of OpenStreetMap, through every point, instead of straights, "

@@ -9,6 +9,7 @@
 #include "track/import/network.hpp"
 #include "track/import/osm_network.hpp"
 #include "track/import/railml.hpp"
+#include "track/import/scale.hpp"
 #include "track/import/xml_root.hpp"
 
 namespace railfix::track {
@@ -50,6 +51,12 @@ core::Result<Kind> kind_of(const std::filesystem::path& file) {
   return core::Error{file.string() +
                      " is of no kind that can be read; give LandXML, railML or ERJU maps (.xml, .landxml, .railml), "
                      "OpenStreetMap (.osm, .pbf), Overpass JSON, GeoJSON or a compiled map (.map)"};
+}
+
+std::vector<std::string> problems_of(const Map& map) {
+  std::vector<std::string> found = check_topology(map);
+  if (std::string of_scale = scale_problem(map); !of_scale.empty()) found.push_back(std::move(of_scale));
+  return found;
 }
 
 /// Everything that was read, before it becomes one map. Errors are thrown as BadInput and become a value at the door.
@@ -116,7 +123,7 @@ class Sources {
                                             all_surveyed ? kSurveyLocationM : kMappingLocationM));
     }
     if (!options_.landmarks.empty()) core::ok_or_throw(keep_landmarks(map_, options_.landmarks));
-    for (std::string& problem : check_topology(map_)) map_.problems.push_back(std::move(problem));
+    for (std::string& problem : problems_of(map_)) map_.problems.push_back(std::move(problem));
     out_.map = std::move(map_);
     return std::move(out_);
   }
@@ -163,7 +170,7 @@ class Sources {
     std::move(map_.problems.begin(), map_.problems.end(), std::back_inserter(read.problems));
     map_ = std::move(read);
     // What the check finds is found anew.
-    const std::vector<std::string> found = check_topology(map_);
+    const std::vector<std::string> found = problems_of(map_);
     std::erase_if(map_.problems,
                   [&](const std::string& p) { return std::find(found.begin(), found.end(), p) != found.end(); });
   }

@@ -96,7 +96,6 @@ void take_marks(const ImportedTrack& track, double from_m, double to_m, bool is_
   }
 }
 
-
 struct Pair {
   size_t a = 0;
   size_t b = 0;

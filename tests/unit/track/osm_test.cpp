@@ -7,6 +7,7 @@
 #include "track/import/build.hpp"
 #include "track/import/finish.hpp"
 #include "track/import/osm_network.hpp"
+#include "track/import/scale.hpp"
 #include "track/path.hpp"
 
 namespace railfix::track {
@@ -273,6 +274,39 @@ TEST_F(OsmTest, LocalProjectionIsTrueToScale) {
   EXPECT_NEAR(ratio, 0.9996, 1e-4);
   EXPECT_LT(ratio, 1 - 3e-4);
   ASSERT_TRUE(local.to_geo(100000, 100000));
+}
+
+/// A line 1 km from west to east at every one of these longitudes.
+std::string lines_at(const std::vector<double>& lons_deg) {
+  std::string text;
+  for (const double lon : lons_deg) {
+    text += std::string(text.empty() ? "" : ",") +
+            R"({"type":"Feature","properties":{"railway":"rail"},"geometry":{"type":"LineString","coordinates":[[)" +
+            std::to_string(lon) + ",47.2],[" + std::to_string(lon + 0.0132) + ",47.2]]}}";
+  }
+  return R"({"type":"FeatureCollection","features":[)" + text + "]}";
+}
+
+TEST_F(OsmTest, TheScaleOfAWideMapIsToldWithWhatToDo) {
+  const auto map_at = [&](const std::vector<double>& lons_deg, const std::string& crs) {
+    return core::value_or_throw(build_map({write("a.geojson", lines_at(lons_deg))}, {.crs = crs})).map;
+  };
+  const auto told = testing::Contains(HasSubstr("give another --crs"));
+  const Map wide = map_at({9.6, 15.0, 16.9}, "");  // UTM zone 33
+  const ScaleRange range = *scale_over(wide);
+  EXPECT_NEAR(range.least_m_per_km, -0.4, 0.001);
+  EXPECT_NEAR(range.most_m_per_km, 1.65, 0.02);
+  EXPECT_THAT(wide.problems, told);
+  EXPECT_THAT(map_at({9.6, 16.9}, "local").problems, told);
+  const Map narrow = map_at({15.0, 15.1}, "local");
+  EXPECT_NEAR(scale_over(narrow)->most_m_per_km, 0, 0.001);
+  EXPECT_THAT(narrow.problems, testing::Not(told));
+  EXPECT_THAT(map_at({15.0, 17.0}, "").problems, testing::Not(told));
+  // A map that is built upon is measured anew.
+  ASSERT_TRUE(wide.save(in_folder("wide.map")).ok());
+  const auto again = core::value_or_throw(build_map({in_folder("wide.map")}, {})).map.problems;
+  EXPECT_EQ(std::count_if(again.begin(), again.end(), [](const auto& p) { return p.find("--crs") != p.npos; }), 1);
+  EXPECT_FALSE(scale_over(Map()));
 }
 
 TEST_F(OsmTest, NoDamageToAFileCrashesIt) {

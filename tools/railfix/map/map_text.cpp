@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "core/units.hpp"
+#include "track/import/scale.hpp"
 
 namespace railfix::tool {
 
@@ -61,6 +62,9 @@ void print_problems(const std::vector<std::string>& problems, size_t most) {
 void print_summary(const track::Map& map) {
   std::printf("map              %s, from %s\n", map.name.c_str(), map.source.c_str());
   std::printf("coordinates      %s\n", map.crs.empty() ? "local metres, no latitude and longitude" : map.crs.c_str());
+  if (const auto scale = track::scale_over(map)) {
+    std::printf("scale            %+.2f to %+.2f m per km on the map\n", scale->least_m_per_km, scale->most_m_per_km);
+  }
   std::printf("track            %.3f km in %zu edges\n", total_length_m(map) / 1000.0, map.edges.size());
   std::printf("nodes            %zu switches, %zu crossings, %zu joints, %zu ends\n",
               count_of(map, track::NodeKind::railway_switch), count_of(map, track::NodeKind::crossing),
