@@ -207,6 +207,7 @@ class Sources {
     if (osm_.ways.empty())
       throw core::BadInput(
           "the inputs hold no railway tracks (railway=rail, light_rail, narrow_gauge or subway; --trams adds trams)");
+    if (const std::string lack = lack_of_nodes(osm_); !lack.empty()) throw core::BadInput(lack);
     if (map_.crs.empty() || map_.crs == "local")
       throw core::BadInput("OpenStreetMap data need a coordinate system; give --crs");
     const Projection projection = core::value_or_throw(Projection::open(map_.crs));

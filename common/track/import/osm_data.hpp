@@ -59,8 +59,8 @@ std::vector<OsmWay>* ways_for(OsmData& data, const OsmTags& tags, bool with_tram
 /// file only.
 core::Result<OsmData> read_osm(const std::filesystem::path& file, bool with_trams);
 
-/// Overpass JSON ("elements") or GeoJSON ("features"). GeoJSON has no nodes: equal coordinates (1e-7 degree) are one
-/// node.
+/// Overpass JSON ("elements", the places of nodes in their own or by `out geom;` in the ways) or GeoJSON ("features").
+/// GeoJSON has no nodes: equal coordinates (1e-7 degree) are one node.
 core::Result<OsmData> read_osm_json(const std::filesystem::path& file, bool with_trams);
 
 }  // namespace railfix::track

@@ -338,6 +338,18 @@ core::Result<OsmNetwork> build_osm_network(const OsmData& data, const Projection
   return network;
 }
 
+std::string lack_of_nodes(const OsmData& data) {
+  const auto held = [&](const OsmWay& way) {
+    return std::count_if(way.nodes.begin(), way.nodes.end(), [&](int64_t id) { return data.nodes.contains(id); });
+  };
+  if (data.ways.empty() || std::any_of(data.ways.begin(), data.ways.end(), [&](const auto& w) { return held(w) > 1; }))
+    return "";
+  const OsmWay& first = data.ways.front();
+  return "no railway track has two of its nodes in the data (of way " + std::to_string(first.id) + " they hold " +
+         std::to_string(held(first)) + " of " + std::to_string(first.nodes.size()) +
+         "); extract the ways together with their nodes, from Overpass by (._;>;); or by out geom;";
+}
+
 std::optional<GeoPoint> middle_of(const OsmData& data) {
   double south = 90;
   double north = -90;

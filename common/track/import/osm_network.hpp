@@ -23,6 +23,9 @@ struct OsmNetwork {
 core::Result<OsmNetwork> build_osm_network(const OsmData& data, const Projection& projection, double smooth_m,
                                            bool with_clothoids = false);
 
+/// What to do where no track has two of its nodes in the data; else empty.
+std::string lack_of_nodes(const OsmData& data);
+
 /// Middle of the tracks' bounding box.
 std::optional<GeoPoint> middle_of(const OsmData& data);
 

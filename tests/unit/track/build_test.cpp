@@ -46,6 +46,62 @@ TEST_F(BuildTest, SaysWhatIsWrongInOneSentence) {
   EXPECT_THAT(message({}), HasSubstr("no railway tracks"));
 }
 
+/// A track of these coordinates in GeoJSON.
+std::string track_of(const std::string& coordinates) {
+  return R"({"features":[{"type":"Feature","id":"way/7","properties":{"railway":"rail","@id":"way/7"},
+"geometry":{"type":"LineString","coordinates":[)" +
+         coordinates + "]}}]}";
+}
+
+TEST_F(BuildTest, CoordinatesThatAreNoDegreesAreTold) {
+  EXPECT_THAT(message({write("lv95.geojson", track_of("[2600000.0,1200000.0],[2600100.0,1200000.0]"))}),
+              HasSubstr("way/7: the coordinates [2600000.0,1200000.0] and 1 more are not degrees"));
+  EXPECT_THAT(message({write("comma.geojson", track_of(R"([15.0,48.0],["15,02","48,0"])"))}),
+              HasSubstr(R"(Feature way/7: "48,0" is not a number of degrees)"));
+  EXPECT_THAT(message({write("one.geojson", track_of("[15.0,48.0],15.1"))}),
+              HasSubstr("Feature way/7: 15.1 is no pair of longitude and latitude"));
+  const auto huge = write("huge.geojson", track_of("[15.0,48.0],[1e300,48.0],[15.02,48.0]"));
+  EXPECT_THAT(core::value_or_throw(build_map({huge}, {})).map.problems,
+              testing::Contains(HasSubstr("way/7: the coordinates [1e+300,48.0] are not degrees; left out")));
+}
+
+TEST_F(BuildTest, OverpassSaysWhichElementIsWrong) {
+  const auto with = [&](const std::string& element) { return write("a.json", R"({"elements":[)" + element + "]}"); };
+  EXPECT_THAT(message({with(R"({"type":"node","id":"1","lat":48,"lon":15})")}),
+              HasSubstr(R"(node 1: "1" is not an id; ids are whole numbers)"));
+  EXPECT_THAT(message({with(R"({"type":"node","id":5,"lat":"48,0","lon":15})")}),
+              HasSubstr(R"(node 5: "48,0" is not a number of degrees)"));
+  EXPECT_THAT(message({with(R"({"type":"node","id":5,"lon":15})")}), HasSubstr(R"(node 5: there is no "lat")"));
+  EXPECT_THAT(message({with(R"({"type":"way","id":7,"nodes":[1,"2"],"tags":{"railway":"rail"}})")}),
+              HasSubstr(R"(way 7: "2" is not an id)"));
+}
+
+TEST_F(BuildTest, TracksWithoutTheirNodesSayWhatToAskFor) {
+  const std::string way = R"({"type":"way","id":7,"nodes":[1,2],"tags":{"railway":"rail"}})";
+  EXPECT_THAT(message({write("a.json", R"({"elements":[)" + way + "]}")}), HasSubstr("of way 7 they hold 0 of 2"));
+  EXPECT_THAT(message({write("a.osm", R"(<osm version="0.6"><node id="2" lat="48.0" lon="15.01"/>
+<way id="1"><nd ref="1"/><nd ref="2"/><tag k="railway" v="rail"/></way></osm>)")}),
+              HasSubstr("of way 1 they hold 1 of 2); extract the ways together with their nodes"));
+}
+
+// `out geom;` of Overpass.
+TEST_F(BuildTest, TheGeometryWithinAWayIsRead) {
+  const std::string tags = R"("tags":{"railway":"rail"})";
+  const std::string geometry = R"("geometry":[{"lat":48,"lon":15},null,{"lat":48,"lon":15.01},{"lat":48,"lon":15.02}])";
+  const auto length_m = [&](const std::string& way) {
+    const Map map =
+        core::value_or_throw(build_map({write("a.json", R"({"elements":[{"type":"way","id":7,)" + way + "}]}")}, {}))
+            .map;
+    EXPECT_EQ(map.edges.size(), 1U);
+    return map.edges[0].alignment.length_m();
+  };
+  EXPECT_NEAR(length_m(tags + "," + geometry + R"(,"nodes":[1,2,3,4])"), 745, 2);  // one was cut off, behind the first
+  EXPECT_NEAR(length_m(tags + "," + geometry), 745, 2);
+  EXPECT_THAT(
+      message({write("b.json", R"({"elements":[{"type":"way","id":7,"nodes":[1],)" + tags + "," + geometry + "}]}")}),
+      HasSubstr("way 7: it has 1 nodes but 4 places"));
+}
+
 TEST_F(BuildTest, TramsOnlyWhereAskedFor) {
   const auto file = write("tram.geojson", line_of_kind("tram"));
   EXPECT_THAT(message({file}), HasSubstr("no railway tracks"));
