@@ -54,6 +54,7 @@ TEST_F(OsmNodeMarksTest, ATunnelThatBeginsAtASwitchHasItsPortal) {
   const std::string tunnel = R"("tunnel":"yes","tunnel:name":"T")";
   using Marks = std::vector<std::string>;
   const auto east = map_of({.east = tunnel});
+  ASSERT_EQ(east->landmarks.size(), 1U);
   EXPECT_EQ(met(east, "way/2"), Marks{"portal_in 298"});
   EXPECT_EQ(met(east, "way/3"), Marks{});
   EXPECT_EQ(east->landmarks[0].name, "T");
