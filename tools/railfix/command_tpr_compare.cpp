@@ -265,7 +265,11 @@ int compare_reports(const Options& options) {
   std::optional<Judge> judge;
   if (truth) judge = Judge{&*truth, options.foot_to_front_m};
   std::printf("reports                  ours %zu, %zu with a place; certified %zu, %zu with a place\n",
-              ours.reports().size(), pairing.ours_placed, certified.reports().size(), pairing.certified_placed);
+              ours.reports().size(), pairing.ours.placed, certified.reports().size(), pairing.certified.placed);
+  if (!options.map.empty()) {
+    std::printf("group not on the line    ours %zu, certified %zu reports: not paired, but \"known\" as they say\n",
+                pairing.ours.off_line, pairing.certified.off_line);
+  }
   std::printf("paired in time           %zu in %zu legs; %zu certified reports have none of ours beside them\n",
               pairing.pairs.size(), pairing.legs, pairing.alone);
   if (pairing.pairs.empty())

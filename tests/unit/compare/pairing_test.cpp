@@ -28,6 +28,12 @@ TimedReport report(double run_s, uint32_t group, double front_m, double speed_km
   return timed;
 }
 
+TimedReport lost(double run_s) {
+  auto report = railfix::compare::report(run_s, etcs::kUnknownBaliseGroup, 0);
+  report.fields.d_lrbg = etcs::kUnknownDistance;
+  return report;
+}
+
 constexpr int64_t kGapNs = 15 * core::kNsPerSecond;
 
 TEST(Axes, PlaceAReportOnItsGroup) {
@@ -98,17 +104,44 @@ TEST(Pairing, NeedsOursBeforeAndBehindOnTheSameAxis) {
 TEST(Pairing, TellsWhoHadAKnownInterval) {
   auto no_interval = report(40, kA, 500);
   no_interval.fields.l_doubtover = etcs::kUnknownDistance;
-  auto lost = report(50, kA, 0);
-  lost.fields.nid_lrbg = etcs::kUnknownBaliseGroup;
   const auto pairing = pair_up({report(0, kA, 0), no_interval},
                                {report(-1, kA, 0), report(1, kA, 20), report(15, kA, 300), report(16, kA, 320),
-                                report(41, kA, 520), lost, report(60, kB, 0)},
+                                report(41, kA, 520), lost(50), report(60, kB, 0)},
                                Axes(), kGapNs);
   std::vector<int> seen;
   for (const auto& at : pairing.availability)
     seen.push_back(static_cast<int>(100 * at.leg) + (at.ours ? 10 : 0) + (at.certified ? 1 : 0));
   EXPECT_EQ(seen, (std::vector<int>{1, 11, 11, 1, 1, 0, 101}));
-  EXPECT_EQ(pairing.certified_placed, 6U);
+  EXPECT_EQ(pairing.certified.placed, 6U);
+}
+
+TEST(Pairing, AReportThatSaysUnknownEndsWhatTheOneBeforeSaid) {
+  const auto pairing = pair_up({report(0, kA, 0), lost(5), report(10, kA, 200)},
+                               {report(0, kA, 0), report(4, kA, 80), report(5, kA, 100), report(6, kA, 120),
+                                report(10, kA, 200), report(12, kA, 240)},
+                               Axes(), kGapNs);
+  std::vector<bool> ours;
+  for (const auto& at : pairing.availability) ours.push_back(at.ours);
+  EXPECT_EQ(ours, (std::vector<bool>{true, true, false, false, true, true}));
+  ASSERT_EQ(pairing.pairs.size(), 2U) << "nothing is carried over it";
+  EXPECT_EQ(pairing.pairs[1].stamp_ns, 10 * core::kNsPerSecond);
+  EXPECT_EQ(pairing.alone, 4U);
+}
+
+TEST(Pairing, AHoleInTheMapIsNoFaultOfTheReports) {
+  const Axes line(track::Path::follow(balise_map(), forward(1, 0), 900, 0).value());
+  const auto pairing =
+      pair_up({report(0, kA, 0), lost(10), report(20, kE, 0)},
+              {report(0, kA, 0), report(10, kE, 0), report(20, kE, 100), report(30, kA, 0)}, line, kGapNs);
+  std::vector<int> seen;
+  for (const auto& at : pairing.availability)
+    seen.push_back(static_cast<int>(100 * at.leg) + (at.ours ? 10 : 0) + (at.certified ? 1 : 0));
+  EXPECT_EQ(seen, (std::vector<int>{11, 101, 111, 211}));
+  EXPECT_EQ(pairing.ours.off_line, 1U);
+  EXPECT_EQ(pairing.ours.placed, 1U);
+  EXPECT_EQ(pairing.certified.off_line, 2U);
+  EXPECT_EQ(pairing.certified.placed, 2U);
+  EXPECT_EQ(pairing.legs, 1U);
 }
 
 TEST(Pairing, DifferencesAreInRunningDirection) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "core/time.hpp"
 #include "core/units.hpp"
@@ -39,25 +40,50 @@ PlacedReport carried(const PlacedReport& a, const PlacedReport& b, int64_t stamp
   return at;
 }
 
-std::vector<PlacedReport> placed(const std::vector<TimedReport>& reports, const Axes& axes) {
-  std::vector<PlacedReport> places;
-  for (const auto& report : reports) {
-    if (const auto place = axes.place(report)) places.push_back(*place);
-  }
-  return places;
+struct Said {
+  int64_t stamp_ns = 0;
+  bool interval_known = false;
+  std::optional<PlacedReport> place;
+};
+
+Said said(const TimedReport& report, const Axes& axes, Counted& counted) {
+  Said said{report.stamp_ns, interval_known(report.fields), axes.place(report)};
+  counted.placed += said.place.has_value();
+  counted.off_line += !said.place && position_known(report.fields);
+  return said;
 }
 
-bool interval_known(const PlacedReport& report) {
-  return std::isfinite(report.high_m - report.low_m);
+/// The last report of any kind, for one that says "unknown" ends what the one before it said, and the next one. Both
+/// are the same at its very time.
+struct Around {
+  const Said* last = nullptr;
+  const Said* next = nullptr;
+};
+
+Around around(const std::vector<Said>& reports, int64_t stamp_ns) {
+  const auto later = std::upper_bound(reports.begin(), reports.end(), stamp_ns,
+                                      [](int64_t ns, const Said& report) { return ns < report.stamp_ns; });
+  Around found;
+  if (later != reports.end()) found.next = &*later;
+  if (later != reports.begin()) found.last = &*std::prev(later);
+  if (found.last != nullptr && found.last->stamp_ns == stamp_ns) found.next = found.last;
+  return found;
 }
 
-/// In the last report, when it is no older than `longest_gap_ns`.
-bool interval_known_at(const std::vector<PlacedReport>& reports, int64_t stamp_ns, int64_t longest_gap_ns) {
-  const auto next = std::upper_bound(reports.begin(), reports.end(), stamp_ns,
-                                     [](int64_t ns, const PlacedReport& report) { return ns < report.stamp_ns; });
-  if (next == reports.begin()) return false;
-  const auto& last = *std::prev(next);
-  return stamp_ns - last.stamp_ns <= longest_gap_ns && interval_known(last);
+/// Ours at the time of a certified report.
+std::optional<Pair> paired(const Around& ours, const PlacedReport& certified, int64_t longest_gap_ns) {
+  if (ours.last == nullptr || ours.next == nullptr || !ours.last->place || !ours.next->place) return std::nullopt;
+  const auto& last = *ours.last->place;
+  const auto& next = *ours.next->place;
+  const bool usable =
+      last.axis == certified.axis && next.axis == certified.axis && next.stamp_ns - last.stamp_ns <= longest_gap_ns;
+  if (!usable) return std::nullopt;
+  Pair pair;
+  pair.stamp_ns = certified.stamp_ns;
+  pair.certified = certified;
+  pair.ours = carried(last, next, certified.stamp_ns, pair.carried_m);
+  pair.ours_sent = last;
+  return pair;
 }
 
 }  // namespace
@@ -73,36 +99,30 @@ bool Pair::overlap() const {
 
 Pairing pair_up(const std::vector<TimedReport>& ours, const std::vector<TimedReport>& certified, const Axes& axes,
                 int64_t longest_gap_ns) {
-  const auto own = placed(ours, axes);
-  Pairing pairing{{}, {}, 0, own.size(), 0, 0};
-  uint32_t group_before = 0;
+  Pairing pairing;
+  std::vector<Said> own;
+  for (const auto& report : ours) own.push_back(said(report, axes, pairing.ours));
+  size_t leg = 0;
+  std::optional<uint32_t> group_before;
   for (const auto& timed : certified) {
-    const auto place = axes.place(timed);
-    if (place && (pairing.legs == 0 || place->nid_lrbg != group_before)) ++pairing.legs;
-    pairing.availability.push_back({std::max<size_t>(pairing.legs, 1) - 1,
-                                    interval_known_at(own, timed.stamp_ns, longest_gap_ns),
-                                    place && interval_known(*place)});
-    if (!place) continue;
-    ++pairing.certified_placed;
-    const auto& report = *place;
-    group_before = report.nid_lrbg;
-    const auto next = std::lower_bound(own.begin(), own.end(), report.stamp_ns,
-                                       [](const PlacedReport& a, int64_t stamp_ns) { return a.stamp_ns < stamp_ns; });
-    const bool exact = next != own.end() && next->stamp_ns == report.stamp_ns;
-    const auto last = exact ? next : next == own.begin() ? own.end() : std::prev(next);
-    const bool usable = next != own.end() && last != own.end() && next->axis == report.axis &&
-                        last->axis == report.axis && next->stamp_ns - last->stamp_ns <= longest_gap_ns;
-    if (!usable) {
+    const uint32_t group = timed.fields.nid_lrbg;
+    if (group != etcs::kUnknownBaliseGroup) {
+      leg += group_before && group != *group_before;
+      group_before = group;
+    }
+    const auto report = said(timed, axes, pairing.certified);
+    const auto beside = around(own, timed.stamp_ns);
+    const bool fresh = beside.last != nullptr && timed.stamp_ns - beside.last->stamp_ns <= longest_gap_ns;
+    pairing.availability.push_back({leg, fresh && beside.last->interval_known, report.interval_known});
+    if (!report.place) continue;
+    auto pair = paired(beside, *report.place, longest_gap_ns);
+    if (!pair) {
       ++pairing.alone;
       continue;
     }
-    Pair pair;
-    pair.stamp_ns = report.stamp_ns;
-    pair.leg = pairing.legs - 1;
-    pair.certified = report;
-    pair.ours = carried(*last, *next, report.stamp_ns, pair.carried_m);
-    pair.ours_sent = *last;
-    pairing.pairs.push_back(pair);
+    pair->leg = leg;
+    pairing.legs += pairing.pairs.empty() || pairing.pairs.back().leg != leg;
+    pairing.pairs.push_back(*pair);
   }
   return pairing;
 }

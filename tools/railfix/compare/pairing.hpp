@@ -21,24 +21,31 @@ struct Pair {
   [[nodiscard]] bool overlap() const;
 };
 
-/// Who had a position with a known interval at the time of a certified report.
+/// Who had a position with a known interval at the time of a certified report. By the messages alone: what is missing
+/// on our map says nothing about them.
 struct Availability {
   size_t leg = 0;
-  bool ours = false;  // in a report that is no older than ours are carried
+  bool ours = false;  // in the last report, when it is no older than ours are carried
   bool certified = false;
+};
+
+/// Reports of one side.
+struct Counted {
+  size_t placed = 0;
+  size_t off_line = 0;  // with a position, but relative to a group that the line does not have
 };
 
 struct Pairing {
   std::vector<Pair> pairs;
   std::vector<Availability> availability;  // of every certified report, those without a place included
-  size_t legs = 0;
-  size_t ours_placed = 0;
-  size_t certified_placed = 0;
+  size_t legs = 0;                         // that have pairs
+  Counted ours;
+  Counted certified;
   size_t alone = 0;  // placed certified reports without one of ours before and behind
 };
 
-/// Ours are carried between two reports on the same axis that are at most `longest_gap_ns` apart. REQUIRES: both
-/// sorted.
+/// Ours are carried between two reports on the same axis that follow each other and are at most `longest_gap_ns` apart.
+/// REQUIRES: both sorted.
 Pairing pair_up(const std::vector<TimedReport>& ours, const std::vector<TimedReport>& certified, const Axes& axes,
                 int64_t longest_gap_ns);
 

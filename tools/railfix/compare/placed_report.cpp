@@ -26,6 +26,16 @@ double speed_mps(const etcs::TrainPositionReport& fields) {
 
 }  // namespace
 
+bool position_known(const etcs::TrainPositionReport& fields) {
+  return fields.nid_lrbg != etcs::kUnknownBaliseGroup && fields.d_lrbg != etcs::kUnknownDistance &&
+         fields.q_dlrbg != etcs::kUnknownSide;
+}
+
+bool interval_known(const etcs::TrainPositionReport& fields) {
+  return position_known(fields) && fields.l_doubtover != etcs::kUnknownDistance &&
+         fields.l_doubtunder != etcs::kUnknownDistance;
+}
+
 Axes::Axes(const track::Path& path) : line_(std::in_place) {
   for (const auto& mark : path.balise_groups())
     line_->insert({mark.group->nid_lrbg(), {mark.distance_m, mark.nominal_is_along_path}});
@@ -33,9 +43,7 @@ Axes::Axes(const track::Path& path) : line_(std::in_place) {
 
 std::optional<PlacedReport> Axes::place(const TimedReport& report) const {
   const auto& fields = report.fields;
-  const bool known = fields.nid_lrbg != etcs::kUnknownBaliseGroup && fields.d_lrbg != etcs::kUnknownDistance &&
-                     fields.q_dlrbg != etcs::kUnknownSide;
-  if (!known) return std::nullopt;
+  if (!position_known(fields)) return std::nullopt;
   const double front_m = metres(fields.d_lrbg, fields.q_scale) * (fields.q_dlrbg == etcs::kNominal ? 1 : -1);
   double behind_m = metres(fields.l_doubtover, fields.q_scale);  // in rear of the train's front end
   double ahead_m = metres(fields.l_doubtunder, fields.q_scale);

@@ -19,6 +19,11 @@ struct PlacedReport {
   double speed_mps = 0;  // along the axis, signed; NaN = its sign is not known
 };
 
+/// By the message alone, whatever map there is: a group, a distance and a side.
+bool position_known(const etcs::TrainPositionReport& fields);
+/// ... and both doubts.
+bool interval_known(const etcs::TrainPositionReport& fields);
+
 class Axes {
  public:
   /// Each balise group alone, along its nominal direction.
