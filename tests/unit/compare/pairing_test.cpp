@@ -28,6 +28,13 @@ TimedReport report(double run_s, uint32_t group, double front_m, double speed_km
   return timed;
 }
 
+/// Packet 1: `nominal` is the way from the group before.
+TimedReport report_from(uint32_t before, TimedReport report) {
+  report.fields.nid_packet = 1;
+  report.fields.nid_prvlrbg = before;
+  return report;
+}
+
 TimedReport lost(double run_s) {
   auto report = railfix::compare::report(run_s, etcs::kUnknownBaliseGroup, 0);
   report.fields.d_lrbg = etcs::kUnknownDistance;
@@ -74,6 +81,35 @@ TEST(Axes, PlaceAReportOnTheLine) {
   EXPECT_NEAR(reverse_group.high_m, 457, 1e-9);
   EXPECT_GT(reverse_group.speed_mps, 0);
   EXPECT_FALSE(line.place(report(1, kE, 50)).has_value());  // on the siding
+}
+
+// A single-balise group has no direction of its own: C's on the map counts for packet 0 only.
+TEST(Axes, InPacketOneTheWayFromTheGroupBeforeIsNominal) {
+  const Axes line(track::Path::follow(balise_map(), forward(1, 0), 1900, 0).value());
+  const auto along = line.place(report_from(kB, report(1, kC, 50))).value();
+  EXPECT_NEAR(along.front_m, 750, 1e-9);
+  EXPECT_GT(along.speed_mps, 0);
+  const auto against = line.place(report_from(kD, report(1, kC, 50))).value();  // comes back from D at 1200 m
+  EXPECT_NEAR(against.front_m, 650, 1e-9);
+  EXPECT_NEAR(against.low_m, 643, 1e-9);
+  EXPECT_NEAR(against.high_m, 653, 1e-9);
+  EXPECT_LT(against.speed_mps, 0);
+  EXPECT_FALSE(line.place(report_from(kE, report(1, kC, 50))).has_value()) << "E is on the siding";
+  EXPECT_FALSE(line.place(report_from(kC, report(1, kC, 50))).has_value());
+}
+
+TEST(Axes, InPacketOneWithoutAGroupBeforeNothingIsKnown) {
+  const auto nowhere = report_from(etcs::kUnknownBaliseGroup, report(1, kC, 50));
+  EXPECT_FALSE(interval_known(nowhere.fields));
+  EXPECT_FALSE(Axes().place(nowhere).has_value());
+  EXPECT_TRUE(interval_known(report_from(kE, report(1, kC, 50)).fields)) << "whatever our map has";
+}
+
+TEST(Axes, WithoutALineEachPairOfGroupsIsItsOwn) {
+  const auto axis = [](const TimedReport& report) { return Axes().place(report)->axis; };
+  EXPECT_EQ(axis(report_from(kB, report(1, kC, 50))), axis(report_from(kB, report(2, kC, 60))));
+  EXPECT_NE(axis(report_from(kB, report(1, kC, 50))), axis(report_from(kD, report(1, kC, 50))));
+  EXPECT_NE(axis(report_from(kB, report(1, kC, 50))), axis(report(1, kC, 50)));
 }
 
 TEST(Pairing, CarriesBySpeedNotByAStraightLine) {

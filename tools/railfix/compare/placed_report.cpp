@@ -24,11 +24,17 @@ double speed_mps(const etcs::TrainPositionReport& fields) {
   return fields.q_dirtrain == etcs::kNominal ? speed : -speed;
 }
 
+/// The LRBG in packet 0, together with the group before in packet 1.
+uint64_t co_ordinate_system(const etcs::TrainPositionReport& fields) {
+  const uint64_t before = fields.nid_prvlrbg ? *fields.nid_prvlrbg + 1U : 0U;
+  return before << 24U | fields.nid_lrbg;
+}
+
 }  // namespace
 
 bool position_known(const etcs::TrainPositionReport& fields) {
   return fields.nid_lrbg != etcs::kUnknownBaliseGroup && fields.d_lrbg != etcs::kUnknownDistance &&
-         fields.q_dlrbg != etcs::kUnknownSide;
+         fields.q_dlrbg != etcs::kUnknownSide && fields.nid_prvlrbg != etcs::kUnknownBaliseGroup;
 }
 
 bool interval_known(const etcs::TrainPositionReport& fields) {
@@ -41,6 +47,17 @@ Axes::Axes(const track::Path& path) : line_(std::in_place) {
     line_->insert({mark.group->nid_lrbg(), {mark.distance_m, mark.nominal_is_along_path}});
 }
 
+/// The LRBG, and whether "nominal" is along the line.
+std::optional<Axes::Group> Axes::on_line(const etcs::TrainPositionReport& fields) const {
+  const auto lrbg = line_->find(fields.nid_lrbg);
+  if (lrbg == line_->end()) return std::nullopt;
+  if (!fields.nid_prvlrbg) return lrbg->second;
+  const auto previous = line_->find(*fields.nid_prvlrbg);
+  if (previous == line_->end() || previous == lrbg) return std::nullopt;
+  // The way from the group before is nominal, whatever the direction of the group itself (SUBSET-026 3.4.2.3.3).
+  return Group{lrbg->second.at_m, previous->second.at_m < lrbg->second.at_m};
+}
+
 std::optional<PlacedReport> Axes::place(const TimedReport& report) const {
   const auto& fields = report.fields;
   if (!position_known(fields)) return std::nullopt;
@@ -49,14 +66,14 @@ std::optional<PlacedReport> Axes::place(const TimedReport& report) const {
   double ahead_m = metres(fields.l_doubtunder, fields.q_scale);
   if (fields.q_dirlrbg == etcs::kUnknownSide) behind_m = ahead_m = std::max(behind_m, ahead_m);
   if (fields.q_dirlrbg == etcs::kReverse) std::swap(behind_m, ahead_m);
-  PlacedReport placed{report.stamp_ns,    fields.nid_lrbg,   fields.nid_lrbg,  front_m,
-                      front_m - behind_m, front_m + ahead_m, speed_mps(fields)};
+  PlacedReport placed{report.stamp_ns,    co_ordinate_system(fields), fields.nid_lrbg,  front_m,
+                      front_m - behind_m, front_m + ahead_m,          speed_mps(fields)};
   if (!line_) return placed;
-  const auto group = line_->find(fields.nid_lrbg);
-  if (group == line_->end()) return std::nullopt;
-  const double sign = group->second.along ? 1 : -1;
+  const auto group = on_line(fields);
+  if (!group) return std::nullopt;
+  const double sign = group->along ? 1 : -1;
   placed.axis = 0;
-  placed.front_m = group->second.at_m + sign * placed.front_m;
+  placed.front_m = group->at_m + sign * placed.front_m;
   placed.speed_mps *= sign;
   if (sign < 0) std::swap(behind_m, ahead_m);
   placed.low_m = placed.front_m - behind_m;

@@ -11,7 +11,7 @@ namespace railfix::compare {
 
 struct PlacedReport {
   int64_t stamp_ns = 0;
-  uint32_t axis = 0;  // reports of different axes cannot be compared: the LRBG, or 0 = the line
+  uint64_t axis = 0;  // reports of different axes cannot be compared: the co-ordinate system, or 0 = the line
   uint32_t nid_lrbg = 0;
   double front_m = 0;  // estimated front end
   double low_m = 0;    // the front end lies between these two; infinite where a doubt is unknown
@@ -19,19 +19,20 @@ struct PlacedReport {
   double speed_mps = 0;  // along the axis, signed; NaN = its sign is not known
 };
 
-/// By the message alone, whatever map there is: a group, a distance and a side.
+/// By the message alone, whatever map there is: a group, a distance, a side, and what "nominal" means.
 bool position_known(const etcs::TrainPositionReport& fields);
 /// ... and both doubts.
 bool interval_known(const etcs::TrainPositionReport& fields);
 
 class Axes {
  public:
-  /// Each balise group alone, along its nominal direction.
+  /// Each balise group alone, along its nominal direction; that of packet 1 is the way from NID_PRVLRBG, an axis of its
+  /// own.
   Axes() = default;
   /// The groups of this path, along it.
   explicit Axes(const track::Path& path);
 
-  /// Nothing when the report says "unknown", or its group is not on the path.
+  /// Nothing when the report says "unknown", or a group that it names is not on the path.
   [[nodiscard]] std::optional<PlacedReport> place(const TimedReport& report) const;
 
  private:
@@ -39,6 +40,7 @@ class Axes {
     double at_m;
     bool along;
   };
+  [[nodiscard]] std::optional<Group> on_line(const etcs::TrainPositionReport& fields) const;
   std::optional<std::map<uint32_t, Group>> line_;
 };
 
