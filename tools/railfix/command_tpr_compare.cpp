@@ -163,8 +163,10 @@ void print_pairs(const compare::Pairing& pairing) {
       mean_m, size.p50, size.p95, size.max, carried_m);
   const auto shift = compare::time_shift(pairing.pairs);
   if (std::isfinite(shift.shift_s)) {
-    std::printf("difference over speed    %+.3f s +- %.3f s: stamps of the certified system %s by that much, or ours\n",
-                shift.shift_s, shift.sigma_s, shift.shift_s >= 0 ? "are late" : "are early");
+    const bool late = shift.shift_s >= 0;
+    std::printf(
+        "difference over speed    %+.3f s +- %.3f s: stamps of the certified system are %s by that much, or ours %s\n",
+        shift.shift_s, shift.sigma_s, late ? "late" : "early", late ? "early" : "late");
   }
   std::printf("intervals overlap        %zu of %zu\n", pairing.pairs.size() - disjoint, pairing.pairs.size());
 }

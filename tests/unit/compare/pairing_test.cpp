@@ -94,6 +94,7 @@ TEST(Axes, InPacketOneTheWayFromTheGroupBeforeIsNominal) {
   EXPECT_NEAR(against.low_m, 643, 1e-9);
   EXPECT_NEAR(against.high_m, 653, 1e-9);
   EXPECT_LT(against.speed_mps, 0);
+  EXPECT_EQ(against.running, -1);
   EXPECT_FALSE(line.place(report_from(kE, report(1, kC, 50))).has_value()) << "E is on the siding";
   EXPECT_FALSE(line.place(report_from(kC, report(1, kC, 50))).has_value());
 }
@@ -183,6 +184,28 @@ TEST(Pairing, AHoleInTheMapIsNoFaultOfTheReports) {
 TEST(Pairing, DifferencesAreInRunningDirection) {
   const auto pairing = pair_up({report(0, kA, -100, 72, false)}, {report(0, kA, -103, 72, false)}, Axes(), kGapNs);
   EXPECT_NEAR(pairing.pairs.at(0).difference_m(), -3, 1e-9);  // the certified one is farther on
+}
+
+TEST(Pairing, ATrainThatStandsStillRanSomeWay) {
+  auto certified = report(0, kA, -103, 0, false);
+  EXPECT_NEAR(pair_up({report(0, kA, -108, 0, false)}, {certified}, Axes(), kGapNs).pairs.at(0).difference_m(), 5,
+              1e-9);
+  certified.fields.q_dirtrain = etcs::kUnknownSide;  // it looks the same way
+  EXPECT_NEAR(pair_up({report(0, kA, -108, 0, false)}, {certified}, Axes(), kGapNs).pairs.at(0).difference_m(), 5,
+              1e-9);
+}
+
+// Half of the reports at standstill, ours always 5 m ahead: the place differs, not the time.
+TEST(Pairing, AHaltIsNoTimeShift) {
+  std::vector<TimedReport> ours;
+  std::vector<TimedReport> certified;
+  for (int i = 0; i < 40; ++i) {
+    const double speed_kmh = i < 20 ? 100 : 0;
+    const double front_m = -std::min(i, 20) * 100 / 3.6;
+    ours.push_back(report(i, kA, front_m - 5, speed_kmh, false));
+    certified.push_back(report(i, kA, front_m, speed_kmh, false));
+  }
+  EXPECT_NEAR(time_shift(pair_up(ours, certified, Axes(), kGapNs).pairs).shift_s, 0, 1e-3);
 }
 
 TEST(Pairing, IntervalsThatDoNotMeetAreSeen) {

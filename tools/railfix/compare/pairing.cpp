@@ -89,8 +89,7 @@ std::optional<Pair> paired(const Around& ours, const PlacedReport& certified, in
 }  // namespace
 
 double Pair::difference_m() const {
-  const double ahead_m = ours.front_m - certified.front_m;
-  return certified.speed_mps < 0 ? -ahead_m : ahead_m;
+  return certified.running * (ours.front_m - certified.front_m);
 }
 
 bool Pair::overlap() const {

@@ -15,7 +15,7 @@ struct Pair {
   PlacedReport ours;       // at stamp_ns
   double carried_m = 0;    // bound of what carrying may add: V_TRAIN is rounded to 5 km/h
   PlacedReport ours_sent;  // the last one before, as it was sent
-  /// Positive: ours lies in front, in running direction (along the axis at standstill).
+  /// Positive: ours lies in front, in the certified report's running direction.
   [[nodiscard]] double difference_m() const;
   /// The two intervals, ours wider by carried_m, have a place in common.
   [[nodiscard]] bool overlap() const;

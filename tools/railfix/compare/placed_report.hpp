@@ -17,6 +17,7 @@ struct PlacedReport {
   double low_m = 0;    // the front end lies between these two; infinite where a doubt is unknown
   double high_m = 0;
   double speed_mps = 0;  // along the axis, signed; NaN = its sign is not known
+  double running = 1;  // 1 or -1: the way it runs or, where it does not say, looks, along the axis; also at standstill
 };
 
 /// By the message alone, whatever map there is: a group, a distance, a side, and what "nominal" means.
