@@ -128,14 +128,20 @@ const char* text_of(Verdict verdict) {
   return verdict == Verdict::at_least_as_good ? "at least as good" : verdict == Verdict::worse ? "WORSE" : "not shown";
 }
 
+std::string text_of_need(const compare::RatioResult& result) {
+  if (result.legs < compare::kFewestLegs)
+    return "needs " + std::to_string(compare::kFewestLegs) + " legs at least, how many is not known yet";
+  if (std::isnan(result.legs_needed)) return "how many legs it needs is not known yet";
+  if (std::isinf(result.legs_needed)) return "more legs would not show it at this ratio";
+  char text[64];
+  std::snprintf(text, sizeof text, "needs about %.0f legs if they go on like these", result.legs_needed);
+  return text;
+}
+
 Verdict print_ratio(const char* what, const compare::RatioResult& result) {
   std::printf("%-24s ratio %.3f (%.3f to %.3f), %zu pairs in %zu legs: %s", what, result.ratio, result.low, result.high,
               result.samples, result.legs, text_of(result.verdict));
-  if (result.verdict == Verdict::open && std::isfinite(result.legs_needed)) {
-    std::printf("; needs about %.0f legs", result.legs_needed);
-  } else if (result.verdict == Verdict::open && result.samples > 0) {
-    std::printf("; more legs would not show it at this ratio");
-  }
+  if (result.verdict == Verdict::open && result.samples > 0) std::printf("; %s", text_of_need(result).c_str());
   std::printf("\n");
   return result.verdict;
 }

@@ -48,8 +48,37 @@ TEST(Gamab, TellsTheBetterTheWorseAndTheUndecided) {
 TEST(Gamab, TenLegsAreTheLeast) {
   const auto few = judged(runs(9, 1, 10, 4));
   EXPECT_EQ(few.verdict, Verdict::open);
-  EXPECT_EQ(few.legs_needed, 10);
+  EXPECT_TRUE(std::isnan(few.legs_needed)) << "nine legs do not tell how many it takes";
   EXPECT_EQ(judged({}).samples, 0U);
+}
+
+/// Legs of the same errors on both sides.
+RatioResult alike(size_t legs, double confidence = 0.95) {
+  std::vector<Sample> samples;
+  for (size_t leg = 0; leg < legs; ++leg) samples.push_back({leg, 10, 10});
+  return compare_ratio(samples, Figure::mean, {.confidence = confidence});
+}
+
+TEST(Gamab, LegsNeededAreAboutAsManyAsItTakes) {
+  EXPECT_EQ(alike(130).verdict, Verdict::at_least_as_good);
+  for (const size_t legs : {10U, 20U, 59U, 110U}) EXPECT_NEAR(alike(legs).legs_needed, 121, 12) << legs;
+  EXPECT_NEAR(alike(20, 0.999).legs_needed, 270, 40);
+}
+
+// Where errors scatter, the bound comes nearer with the root of the number of legs.
+TEST(Gamab, LegsNeededWhereErrorsScatter) {
+  const auto forty = runs(40, 0.8, 1, 3);
+  const auto times = [&](size_t n) {
+    std::vector<Sample> more;
+    for (size_t turn = 0; turn < n; ++turn) {
+      for (const auto& sample : forty) more.push_back({sample.leg + 40 * turn, sample.ours, sample.certified});
+    }
+    return judged(more);
+  };
+  EXPECT_EQ(times(2).verdict, Verdict::open);
+  EXPECT_EQ(times(4).verdict, Verdict::at_least_as_good);
+  EXPECT_GT(judged(forty).legs_needed, 80);
+  EXPECT_LT(judged(forty).legs_needed, 160);
 }
 
 TEST(Gamab, ValuesThatAreNotKnownAreLeftOut) {

@@ -12,10 +12,10 @@ namespace railfix::compare {
 
 namespace {
 
-constexpr size_t kFewestLegs = 10;
 constexpr double kFewestDraws = 1999;
 constexpr double kDrawsBeyondBound = 20;
 constexpr double kUnseenOverWorst = 2;
+constexpr double kMostLegDraws = 5e5;  // spent on one more guess of how many legs are needed
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 struct Leg {
@@ -66,8 +66,12 @@ double random_weight(core::Random& random) {
   return -std::log1p(-random.uniform());
 }
 
+size_t draws_for(double confidence) {
+  return static_cast<size_t>(std::max(kFewestDraws, std::ceil(kDrawsBeyondBound / (1 - confidence))));
+}
+
 Bounds bounds_of(const std::vector<Leg>& legs, Figure figure, double confidence) {
-  const auto draws = static_cast<size_t>(std::max(kFewestDraws, std::ceil(kDrawsBeyondBound / (1 - confidence))));
+  const size_t draws = draws_for(confidence);
   Leg worst;
   for (const auto& leg : legs) worst = {std::max(worst.ours, leg.ours), std::max(worst.certified, leg.certified)};
   core::Random random(1);
@@ -87,6 +91,26 @@ Bounds bounds_of(const std::vector<Leg>& legs, Figure figure, double confidence)
   const auto beyond = static_cast<size_t>((1 - confidence) * static_cast<double>(draws + 1) + 1e-9);
   return {std::min(subsets[beyond - 1], optimist[beyond - 1]),
           std::max(subsets[draws - beyond], pessimist[draws - beyond])};
+}
+
+/// How many legs like these bring the upper bound to the limit: tried on the same ones twice, four times, ... as often,
+/// because the bound comes nearer with their number where the unseen leg decides, with its root where the scatter does.
+double legs_needed(std::vector<Leg> legs, Figure figure, const Demand& demand, double ratio, double high) {
+  const double to_limit = std::log((1 + demand.margin) / ratio);
+  if (!(to_limit > 0)) return std::numeric_limits<double>::infinity();
+  const double draws = static_cast<double>(draws_for(demand.confidence));
+  double to_bound = std::log(high / ratio);
+  for (;;) {
+    const auto count = static_cast<double>(legs.size());
+    const double before = to_bound;
+    legs.reserve(2 * legs.size());
+    legs.insert(legs.end(), legs.begin(), legs.end());
+    to_bound = std::log(bounds_of(legs, figure, demand.confidence).high / ratio);
+    if (to_bound > to_limit && count * draws < kMostLegDraws) continue;
+    if (!std::isfinite(before)) return std::isfinite(to_bound) ? 2 * count : kUnknown;
+    const double power = std::clamp(std::log2(before / to_bound), 0.5, 1.0);
+    return std::ceil(count * std::pow(before / to_limit, 1 / power));
+  }
 }
 
 /// Probability of at most k heads in n throws.
@@ -123,10 +147,7 @@ RatioResult compare_ratio(const std::vector<Sample>& samples, Figure figure, con
   for (const auto& leg : legs) all = all + leg;
   if (all.ours == 0 && all.certified == 0) return result;
   result.ratio = ratio_of(all, figure);
-  if (legs.size() < kFewestLegs) {
-    result.legs_needed = static_cast<double>(kFewestLegs);
-    return result;
-  }
+  if (legs.size() < kFewestLegs) return result;
   const auto bounds = bounds_of(legs, figure, demand.confidence);
   result.low = bounds.low;
   result.high = bounds.high;
@@ -135,11 +156,8 @@ RatioResult compare_ratio(const std::vector<Sample>& samples, Figure figure, con
     result.verdict = Verdict::at_least_as_good;
   } else if (result.low > limit) {
     result.verdict = Verdict::worse;
-  } else {  // the bound comes nearer with the root of the number of legs
-    const double to_bound = std::log(result.high / result.ratio);
-    const double to_limit = std::log(limit / result.ratio);
-    result.legs_needed = to_limit > 0 ? std::ceil(static_cast<double>(legs.size()) * std::pow(to_bound / to_limit, 2))
-                                      : std::numeric_limits<double>::infinity();
+  } else {
+    result.legs_needed = legs_needed(legs, figure, demand, result.ratio, result.high);
   }
   return result;
 }

@@ -20,6 +20,8 @@
 
 namespace railfix::compare {
 
+constexpr size_t kFewestLegs = 10;  // for a verdict
+
 enum class Verdict : uint8_t { at_least_as_good, worse, open };
 
 struct Sample {
@@ -37,7 +39,8 @@ struct RatioResult {
   double high = 0;
   size_t samples = 0;
   size_t legs = 0;
-  double legs_needed = 0;  // for "at least as good" if the ratio stays; infinite when it never would, NaN unless open
+  double legs_needed = 0;  // about, for "at least as good" if all go on like these; infinite when it never would, NaN
+                           // unless open and with too few legs to tell
 };
 
 struct Demand {
@@ -46,7 +49,7 @@ struct Demand {
   double broken_at_most = 0.05;  // ... and so large a share of our legs at most has a broken promise
 };
 
-/// Samples with a value that is not finite are left out. Fewer than 10 legs give no verdict.
+/// Samples with a value that is not finite are left out. Fewer than kFewestLegs give no verdict.
 RatioResult compare_ratio(const std::vector<Sample>& samples, Figure figure, const Demand& demand);
 
 /// Which share of the reports had what both should have: certified over ours, so that more is worse here, too. A value
