@@ -166,6 +166,16 @@ core::Result<TrainPositionReport> decode(std::span<const uint8_t> message, Basel
   return report;
 }
 
+core::Result<TrainPositionReport> decode_or_advise(std::span<const uint8_t> message, Baseline baseline,
+                                                   const std::string& option) {
+  auto report = decode(message, baseline);
+  if (report.ok()) return report;
+  const auto other = baseline == Baseline::b3 ? Baseline::b4 : Baseline::b3;
+  if (!decode(message, other).ok()) return report;
+  return core::Error{report.error().message + " It reads well as " + option + " " + number(static_cast<int>(other)) +
+                     "."};
+}
+
 double scale_m(uint32_t q_scale) {
   constexpr std::array<double, 3> kScales{0.1, 1.0, 10.0};
   return kScales.at(q_scale);

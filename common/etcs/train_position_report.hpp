@@ -59,6 +59,11 @@ core::Result<std::vector<uint8_t>> encode(const TrainPositionReport& report, Bas
 /// wrong.
 core::Result<TrainPositionReport> decode(std::span<const uint8_t> message, Baseline baseline);
 
+/// decode(); where it refuses a message of the other baseline, the sentence ends with "It reads well as `option` 4.",
+/// or 3.
+core::Result<TrainPositionReport> decode_or_advise(std::span<const uint8_t> message, Baseline baseline,
+                                                   const std::string& option);
+
 /// L_PACKET of packet 0 or 1 of this report in bits. REQUIRES: encode() accepts the report.
 uint32_t position_packet_bits(const TrainPositionReport& report, Baseline baseline);
 

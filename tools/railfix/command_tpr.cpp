@@ -149,14 +149,8 @@ int decode(const std::string& hex, Baseline baseline, bool json_wanted) {
     }
     return 0;
   }
-  const auto report = etcs::decode(bytes, baseline);
-  if (!report.ok()) {
-    const auto other = baseline == Baseline::b3 ? Baseline::b4 : Baseline::b3;
-    const bool fits_other = etcs::decode(bytes, other).ok();
-    const std::string hint =
-        fits_other ? " It reads well as --baseline " + std::to_string(static_cast<int>(other)) + "." : "";
-    throw BadInput(report.error().message + hint);
-  }
+  const auto report = etcs::decode_or_advise(bytes, baseline, "--baseline");
+  if (!report.ok()) throw BadInput(report.error().message);
   const auto json = etcs::to_json(report.value(), baseline);
   if (json_wanted) {
     std::cout << json.dump(2) << '\n';

@@ -35,6 +35,12 @@ TEST_F(ReportFile, TableOrLinesSayTheSame) {
   EXPECT_EQ(read_reports(folder_, etcs::Baseline::b3).value().at(0).stamp_ns, 5);
 }
 
+TEST_F(ReportFile, TheOtherBaselineIsNamedWhereItFits) {
+  const auto refusal = read("a.csv", "stamp_ns,hex,baseline\n1," + kHex + ",4\n").error().message;
+  EXPECT_THAT(refusal, HasSubstr("line 2"));
+  EXPECT_THAT(refusal, HasSubstr("It reads well as baseline 3."));
+}
+
 TEST_F(ReportFile, ErrorsNameTheLine) {
   EXPECT_THAT(read("a.csv", "stamp_ns,hex\n1," + kHex + "\n2,88\n").error().message, HasSubstr("line 3"));
   EXPECT_THAT(read("a.csv", "stamp_ns\n1\n").error().message, HasSubstr("hex"));

@@ -201,6 +201,16 @@ TEST(TrainPositionReport, EncoderRefusesWhatDoesNotBelongTogether) {
   EXPECT_THAT(encode_refusal(report), HasSubstr("NID_PACKET = 2"));
 }
 
+TEST(TrainPositionReport, TheOtherBaselineIsAdvisedWhereItFits) {
+  const auto message = encode(check_report(), Baseline::b3).value();
+  EXPECT_TRUE(decode_or_advise(message, Baseline::b3, "--baseline").ok());
+  EXPECT_THAT(decode_or_advise(message, Baseline::b4, "--baseline").error().message,
+              ::testing::EndsWith(" It reads well as --baseline 3."));
+  const std::vector<uint8_t> short_one{136};
+  EXPECT_EQ(decode_or_advise(short_one, Baseline::b3, "--baseline").error().message,
+            decode(short_one, Baseline::b3).error().message);
+}
+
 TEST(Hex, IsReadStrictly) {
   EXPECT_EQ(parse_hex("A5 0f").value(), (std::vector<uint8_t>{0xA5, 0x0F}));
   EXPECT_THAT(parse_hex("A5G0").error().message, HasSubstr("Character 3 ('G')"));

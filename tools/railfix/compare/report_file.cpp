@@ -19,7 +19,7 @@ core::Result<TimedReport> report_of(int64_t stamp_ns, const std::string& hex, in
     return core::Error{"baseline must be 3 or 4, not " + std::to_string(baseline) + "."};
   const auto bytes = etcs::parse_hex(hex);
   if (!bytes.ok()) return bytes.error();
-  auto fields = etcs::decode(bytes.value(), static_cast<etcs::Baseline>(baseline));
+  auto fields = etcs::decode_or_advise(bytes.value(), static_cast<etcs::Baseline>(baseline), "baseline");
   if (!fields.ok()) return fields.error();
   return TimedReport{stamp_ns, std::move(fields).value()};
 }
