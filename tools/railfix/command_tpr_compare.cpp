@@ -11,6 +11,7 @@
 #include "core/time.hpp"
 #include "evaluation/statistics.hpp"
 #include "evaluation/truth.hpp"
+#include "number_between.hpp"
 #include "report_source.hpp"
 
 namespace railfix::tool {
@@ -38,6 +39,9 @@ struct Options {
 
 constexpr double kPathM = 1e6;
 constexpr double kTurnS = 0.1;
+constexpr const char* kSeconds = "a number of seconds";
+constexpr double kLongestGapS = 86400;
+constexpr double kLargestOffsetS = 4e9;  // from a clock that begins at 0 to UTC, twice; sums fit nanoseconds
 
 /// Where reports are compared: on the line through `start`, or through the first group of the map that the certified
 /// system reports. The map is read once.
@@ -77,9 +81,13 @@ class Line {
 struct Judge {
   const evaluation::Truth* truth;
   double foot_to_front_m;
+  [[nodiscard]] bool covers(const compare::Pair& pair) const {
+    return truth->at(pair.stamp_ns) && truth->at(pair.ours_sent.stamp_ns);
+  }
   [[nodiscard]] double error_m(const compare::PlacedReport& report) const {
     const auto real = truth->at(report.stamp_ns);
-    return real ? report.front_m - real->distance_m - foot_to_front_m : evaluation::kUnknown;
+    const double begin_m = truth->rows().front().distance_m;
+    return real ? report.front_m - (real->distance_m - begin_m) - foot_to_front_m : evaluation::kUnknown;
   }
   /// 1 where the true front end lies outside the promised interval, else 0.
   [[nodiscard]] double outside(const compare::PlacedReport& report) const {
@@ -257,9 +265,29 @@ int print_comparison(const Options& options, const compare::Pairing& pairing, co
   return verdict(columns, options);
 }
 
-int compare_reports(const Options& options) {
+void check(const Options& options) {
+  if (options.map.empty() && !options.start.empty()) throw core::BadInput("--start needs --map: it is a place on it.");
+  if (options.map.empty() && !options.via.empty()) throw core::BadInput("--via needs --map: it names edges of it.");
   if (!options.truth.empty() && (options.map.empty() || options.start.empty()))
     throw core::BadInput("--truth needs --map and --start, the place on the map where the truth begins.");
+}
+
+std::string span_text(int64_t from_ns, int64_t to_ns) {
+  char text[64];
+  std::snprintf(text, sizeof text, "from %.3f to %.3f s", core::seconds(from_ns), core::seconds(to_ns));
+  return text;
+}
+
+void check_times(const Judge& judge, const std::vector<compare::Pair>& pairs, const std::string& folder) {
+  if (std::ranges::any_of(pairs, [&](const auto& pair) { return judge.covers(pair); })) return;
+  const auto& rows = judge.truth->rows();
+  throw core::BadInput(folder + ": the truth is " + span_text(rows.front().stamp_ns, rows.back().stamp_ns) +
+                       " and does not overlap with the paired reports, " +
+                       span_text(pairs.front().stamp_ns, pairs.back().stamp_ns) + ".");
+}
+
+int compare_reports(const Options& options) {
+  check(options);
   std::optional<evaluation::Truth> truth;
   if (!options.truth.empty()) truth = core::value_or_throw(evaluation::Truth::read(options.truth));
   ReportSource ours(options.ours, static_cast<etcs::Baseline>(options.baseline), options.network);
@@ -274,7 +302,7 @@ int compare_reports(const Options& options) {
   if (truth) judge = Judge{&*truth, options.foot_to_front_m};
   std::printf("reports                  ours %zu, %zu with a place; certified %zu, %zu with a place\n",
               ours.reports().size(), pairing.ours.placed, certified.reports().size(), pairing.certified.placed);
-  if (!options.map.empty()) {
+  if (pairing.ours.off_line + pairing.certified.off_line > 0) {
     std::printf("group not on the line    ours %zu, certified %zu reports: not paired, but \"known\" as they say\n",
                 pairing.ours.off_line, pairing.certified.off_line);
   }
@@ -282,6 +310,7 @@ int compare_reports(const Options& options) {
               pairing.pairs.size(), pairing.legs, pairing.alone);
   if (pairing.pairs.empty())
     throw core::BadInput("No reports can be compared: do the times and balise groups of both sides belong together?");
+  if (judge) check_times(*judge, pairing.pairs, options.truth);
   return print_comparison(options, pairing, judge);
 }
 
@@ -305,7 +334,7 @@ void add_tpr_compare(CLI::App& tpr, Action& chosen) {
   add_domain(*command, options->network);
   find_running_train(*command, options->network);
   command->add_option("--for-s", options->for_s, "Listen for so many seconds, 0 = until a file is over, or Ctrl-C")
-      ->check(CLI::NonNegativeNumber);
+      ->check(number_between(0, kLargestOffsetS, kSeconds));
   command->add_option("--map", options->map, "Compiled map: also reports with different LRBGs can be compared");
   command->add_option("--start", options->start, "Place on the map where the line begins, EDGE:OFFSET[:+|-]");
   command->add_option("--via", options->via, "Edges taken at switches");
@@ -316,16 +345,18 @@ void add_tpr_compare(CLI::App& tpr, Action& chosen) {
   command->add_option("--certified-baseline", options->certified_baseline, "Layout of the certified: 3 or 4")
       ->check(baselines);
   command->add_option("--longest-gap-s", options->longest_gap_s, "Ours are carried between reports not farther apart")
+      ->check(number_between(0, kLongestGapS, kSeconds))
       ->capture_default_str();
-  command->add_option("--offset-s", options->offset_s, "Added to the certified system's stamps");
-  command->add_option("--confidence", options->demand.confidence, "One-sided")->check(CLI::Range(0.5, 0.9999));
+  command->add_option("--offset-s", options->offset_s, "Added to the certified system's stamps")
+      ->check(number_between(-kLargestOffsetS, kLargestOffsetS, kSeconds));
+  command->add_option("--confidence", options->demand.confidence, "One-sided")->check(number_between(0.5, 0.9999));
   command->add_option("--margin", options->demand.margin, "At least as good: a ratio of at most 1 + margin")
-      ->check(CLI::Range(0.0, 1.0));
+      ->check(number_between(0, 1));
   command
       ->add_option("--broken-at-most", options->demand.broken_at_most,
                    "At least as good: shown that at most this share of our legs has a true place outside our interval; "
                    "0.05 takes 59 legs without one, and where fewer were run the verdict is \"not shown\"")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(number_between(0, 1))
       ->capture_default_str();
   command->callback([options, &chosen] { chosen = [options] { return compare_reports(*options); }; });
 }

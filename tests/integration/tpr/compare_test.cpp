@@ -144,6 +144,76 @@ TEST_F(TprCompareFiles, OneLineAndItsTruth) {
   EXPECT_THAT(outcome.err, HasSubstr("--truth needs --map and --start"));
 }
 
+// Ours 1.5 m in front of the certified position at 20 m/s and level with it at 5 m/s, 300 m and more beyond A; the
+// truth begins at 5 km of its own count.
+TEST_F(TprCompareFiles, TheTruthCountsFromItsFirstRow) {
+  std::ofstream ours(file("ours.csv"));
+  std::ofstream certified(file("certified.csv"));
+  std::ofstream truth(file("truth/track.csv"));
+  ours << "stamp_ns,hex\n";
+  certified << "stamp_ns,hex\n";
+  truth << "timestamp,distance\n";
+  for (int i = 0; i < 20; ++i) {
+    const int64_t stamp_ns = i * core::kNsPerSecond;
+    const double way_m = i < 10 ? 20 * i : 200 + 5 * (i - 10);
+    auto report = beyond(tpr_publisher::testing::kA, 400 + way_m, 10);
+    report.v_train = i < 10 ? 14 : 4;
+    ours << stamp_ns << ',' << hex_of(report) << '\n';
+    report.d_lrbg -= i < 10 ? 15 : 0;
+    certified << stamp_ns << ',' << hex_of(report) << '\n';
+    truth << stamp_ns << ',' << 5000 + way_m << '\n';
+  }
+  ours.close();
+  certified.close();
+  truth.close();
+  const std::vector<std::string> arguments{"--map", file("line.map"), "--start", "1:400:+", "--truth", file("truth")};
+  auto outcome = compare(arguments);
+  EXPECT_THAT(outcome.out, HasSubstr("error, size                   0.00      0.00      0.00        0.75"));
+  EXPECT_THAT(outcome.out, HasSubstr("stamps of the certified system are late by that much, or ours early"));
+  EXPECT_THAT(outcome.out, HasSubstr("needs 10 legs at least, how many is not known yet"));
+  std::ofstream(file("truth/track.csv")) << "timestamp,distance\n90000000000,0\n100000000000,5\n";
+  outcome = compare(arguments);
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("the truth is from 90.000 to 100.000 s and does not overlap with the paired "
+                                     "reports, from 0.000 to 19.000 s."));
+}
+
+TEST_F(TprCompareFiles, GroupsThatTheMapDoesNotHaveAreCounted) {
+  std::ofstream ours(file("ours.csv"));
+  ours << "stamp_ns,hex\n";
+  for (int i = 0; i < 20; ++i) {
+    const uint32_t group = i < 10 ? tpr_publisher::testing::kA : 300U << 14U | 1U;
+    ours << i * core::kNsPerSecond << ',' << hex_of(beyond(group, 700 + 20 * i, 10)) << '\n';
+  }
+  ours.close();
+  std::filesystem::copy(file("ours.csv"), file("certified.csv"));
+  const auto outcome = compare({"--map", file("line.map")});
+  EXPECT_THAT(outcome.out, HasSubstr("group not on the line    ours 10, certified 10 reports"));
+  EXPECT_THAT(outcome.out, HasSubstr("ours 100.0 %, certified 100.0 % of 20 certified reports"));
+}
+
+TEST_F(TprCompareFiles, OptionsOutOfRangeAreRefused) {
+  const auto refusal = [&](const std::vector<std::string>& more) {
+    const auto outcome = compare(more);
+    EXPECT_EQ(outcome.exit_code, 2) << more[1];
+    return outcome.err;
+  };
+  EXPECT_THAT(refusal({"--confidence", "nan"}), HasSubstr("--confidence: nan is not a number from 0.5 to 0.9999"));
+  EXPECT_THAT(refusal({"--margin", "nan"}), HasSubstr("--margin: nan is not a number from 0 to 1"));
+  EXPECT_THAT(refusal({"--broken-at-most", "nan"}), HasSubstr("--broken-at-most: nan is not a number from 0 to 1"));
+  for (const std::string wrong : {"nan", "-5", "1e300"}) {
+    EXPECT_THAT(refusal({"--longest-gap-s", wrong}),
+                HasSubstr("--longest-gap-s: " + wrong + " is not a number of seconds from 0 to 86400"));
+  }
+  for (const std::string wrong : {"nan", "inf", "1e300"}) {
+    EXPECT_THAT(refusal({"--offset-s", wrong}),
+                HasSubstr("--offset-s: " + wrong + " is not a number of seconds from -4e+09 to 4e+09"));
+  }
+  EXPECT_THAT(refusal({"--for-s", "inf"}), HasSubstr("--for-s: inf is not a number of seconds"));
+  EXPECT_THAT(refusal({"--start", "1:0"}), HasSubstr("--start needs --map"));
+  EXPECT_THAT(refusal({"--via", "2"}), HasSubstr("--via needs --map"));
+}
+
 // What the service sends now, beside a certified system whose reports come as another train's.
 TEST_F(TprService, IsComparedWhileItRuns) {
   const auto evc_options = test::network(train_ + "-evc", kDomain);
