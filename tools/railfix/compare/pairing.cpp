@@ -100,6 +100,7 @@ Pairing pair_up(const std::vector<TimedReport>& ours, const std::vector<TimedRep
                 int64_t longest_gap_ns) {
   Pairing pairing;
   std::vector<Said> own;
+  own.reserve(ours.size());
   for (const auto& report : ours) own.push_back(said(report, axes, pairing.ours));
   size_t leg = 0;
   std::optional<uint32_t> group_before;
