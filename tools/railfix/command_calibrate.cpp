@@ -11,6 +11,7 @@
 #include "core/result.hpp"
 #include "core/units.hpp"
 #include "dataset/dataset.hpp"
+#include "number_between.hpp"
 #include "progress.hpp"
 #include "track_detector/draw.hpp"
 #include "track_detector/mount_calibration.hpp"
@@ -266,10 +267,10 @@ void add_calibrate(CLI::App& app, Action& chosen) {
   mount->add_option("--pictures", arguments->pictures, "Folder of pictures or dataset, straight track among them");
   mount->add_option("--video", arguments->video, "Video file instead of pictures");
   mount->add_option("--gauge", arguments->gauge_m, "Track gauge in metres")
-      ->check(CLI::Range(0.5, 2.0))
+      ->check(number_between(0.5, 2.0))
       ->capture_default_str();
   mount->add_option("--focal", arguments->focal_px, "Focal length in pixels; else it is assumed")
-      ->check(CLI::Range(50.0, 50000.0));
+      ->check(number_between(50.0, 50000.0));
   mount->add_option("--camera", arguments->camera,
                     "Calibration with the lens (intrinsics and distortion), instead of --focal");
   mount->add_option("--out", arguments->out, "Calibration file to write")->required();

@@ -11,6 +11,7 @@
 #include "frame_grabber/live_camera.hpp"
 #include "lens/lens_calibration.hpp"
 #include "lens/lens_drawing.hpp"
+#include "number_between.hpp"
 #include "progress.hpp"
 
 namespace railfix::tool {
@@ -178,12 +179,15 @@ void add_calibrate_lens(CLI::App& calibrate_app, Action& chosen) {
   lens->add_option("--pictures", arguments->pictures, "Folder of pictures or a video: the board in all places, tilted");
   lens->add_option("--live", arguments->live, "Live camera instead: genicam:ID, capture:DEVICE");
   lens->add_option("--seconds", arguments->seconds, "How long the live camera is watched")
-      ->check(CLI::Range(5.0, 3600.0))
+      ->check(number_between(5.0, 3600.0))
       ->capture_default_str();
   lens->add_option("--board", arguments->size_text, "Squares of the board, COLUMNSxROWS")->required();
-  lens->add_option("--square", arguments->board.square_m, "Side of a square in metres")->required();
+  lens->add_option("--square", arguments->board.square_m, "Side of a square in metres")
+      ->required()
+      ->check(number_between(0.001, 10));
   lens->add_option("--marker", arguments->board.marker_m,
-                   "Side of a ChArUco marker in metres; without it: a chessboard");
+                   "Side of a ChArUco marker in metres; without it: a chessboard")
+      ->check(number_between(0.001, 10));
   lens->add_option("--dictionary", arguments->board.dictionary, "Of the markers")->capture_default_str();
   lens->add_option("--out", arguments->out, "Calibration file to write; a mount in it is kept")->required();
   lens->add_option("--draw", arguments->draw, "Picture to check by eye; else beside --out");

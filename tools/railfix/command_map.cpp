@@ -8,6 +8,7 @@
 #include "core/result.hpp"
 #include "map/map_commands.hpp"
 #include "map/map_text.hpp"
+#include "number_between.hpp"
 #include "track/import/build.hpp"
 #include "track/import/made_network.hpp"
 #include "track/import/scale.hpp"
@@ -95,11 +96,11 @@ void add_build(CLI::App& map, Action& chosen) {
   command
       ->add_option("--smooth", request->options.smooth_m,
                    "Let the points of OpenStreetMap move by up to so many metres, so that the curvature is even")
-      ->check(CLI::Range(0.0, 10.0));
+      ->check(number_between(0.0, 10.0));
   command
       ->add_option("--virtual-balises", request->options.virtual_balises_every_m,
                    "Virtual balise groups about every so many metres along every edge")
-      ->check(CLI::Range(1.0, 1e6));
+      ->check(number_between(1.0, 1e6));
   command->add_option("--nid-c", request->options.nid_c, "NID_C of the virtual balise groups")
       ->check(CLI::Range(0, 1023))
       ->capture_default_str();
@@ -141,11 +142,11 @@ void add_make(CLI::App& map, Action& chosen) {
   CLI::App* command = map.add_subcommand("make", "Make up a railway network of any size, for tests");
   command->add_option("--out", request->out, "The map file to write")->required();
   command->add_option("--track-km", request->options.track_km, "Length of all tracks together")
-      ->check(CLI::Range(20.0, 100000.0))
+      ->check(number_between(20.0, 100000.0))
       ->capture_default_str();
   command->add_option("--seed", request->options.seed, "Another network of the same kind")->capture_default_str();
   command->add_option("--masts", request->options.mast_spacing_m, "Masts about every so many metres; 0 = none")
-      ->check(CLI::Range(0.0, 1000.0))
+      ->check(number_between(0.0, 1000.0))
       ->capture_default_str();
   command->footer("Example:\n  railfix map make --track-km 20000 --seed 1 --out national.map");
   command->callback([request, &chosen] {

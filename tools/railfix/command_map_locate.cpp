@@ -7,6 +7,7 @@
 #include "core/csv_table.hpp"
 #include "core/result.hpp"
 #include "map_matcher/network_locator.hpp"
+#include "number_between.hpp"
 
 namespace railfix::tool {
 namespace {
@@ -76,7 +77,7 @@ void add_map_locate(CLI::App& map, Action& chosen) {
   CLI::App* command = map.add_subcommand("locate", "Where on a map a run took place, from how it turned alone");
   command->add_option("MAP", request->map, "A map made by `railfix map build` or `railfix map make`")->required();
   command->add_option("--run", request->run, "Folder of a run, with odometry.csv")->required();
-  command->add_option("--until", request->until_m, "Use the run up to this distance")->check(CLI::Range(0.0, 1e9));
+  command->add_option("--until", request->until_m, "Use the run up to this distance")->check(number_between(0.0, 1e9));
   command->footer("Example:\n  railfix map locate national.map --run OUT");
   command->callback([request, &chosen] { chosen = [request] { return locate(*request); }; });
 }

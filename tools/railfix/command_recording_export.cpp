@@ -7,6 +7,7 @@
 #include "command_recording.hpp"
 #include "core/time.hpp"
 #include "not_negative.hpp"
+#include "number_between.hpp"
 #include "recording/export_csv.hpp"
 #include "recording/export_track.hpp"
 #include "recording/export_video.hpp"
@@ -103,7 +104,7 @@ void add_recording_export(CLI::App& recording, Action& chosen) {
   command->add_option("--topics", options->topics, "Only tables of these, separated by commas")->delimiter(',');
   command->add_option("--camera", options->video.camera, "Camera of the film; the first one that has pictures");
   command->add_option("--fps", options->video.fps, "Frames a second of the film; as the pictures come")
-      ->check(CLI::Range(1.0, 120.0));
+      ->check(number_between(1.0, 120.0));
   command->add_option("--from", options->from_s, "Seconds into the recording")->check(not_negative());
   command->add_option("--to", options->to_s, "Seconds into the recording")->check(not_negative());
   command->callback([options, &chosen] { chosen = [options] { return run(*options); }; });

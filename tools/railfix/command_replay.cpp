@@ -10,6 +10,7 @@
 #include "core/time.hpp"
 #include "key_reader.hpp"
 #include "not_negative.hpp"
+#include "number_between.hpp"
 #include "progress.hpp"
 #include "replay/player.hpp"
 
@@ -121,7 +122,7 @@ void add_options(CLI::App& command, CommandLine& line) {
   command.add_option("FILE", options.file, "Recording (.mcap, also one that was cut off)")->required();
   command.add_option("--rate", options.rate, "Times faster than recorded")
       ->capture_default_str()
-      ->check(CLI::Range(0.01, 1000.0));
+      ->check(number_between(0.01, 1000.0));
   command
       .add_option("--topics", options.topics,
                   "Only these, separated by commas; without it all but commands and the data clock")

@@ -4,6 +4,7 @@
 
 #include "commands.hpp"
 #include "core/result.hpp"
+#include "number_between.hpp"
 #include "progress.hpp"
 #include "run/draw_run.hpp"
 #include "run/live_table.hpp"
@@ -125,7 +126,7 @@ void add_run(CLI::App& app, Action& chosen) {
   command->add_option("--camera", options->camera,
                       "Calibration file (from `railfix calibrate`), when the source has none");
   command->add_option("--fps", options->fps, "Pictures a second, for folders and videos without times")
-      ->check(CLI::Range(0.01, 1000.0));
+      ->check(number_between(0.01, 1000.0));
   command->add_option("--map", options->map, "Map (compiled, LandXML or OSM); the dataset's own when not given");
   command->add_option("--start", options->start, "EDGE:OFFSET[:+|-] where the train stands, or unknown");
   command

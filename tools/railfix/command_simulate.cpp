@@ -4,6 +4,7 @@
 
 #include "commands.hpp"
 #include "core/units.hpp"
+#include "number_between.hpp"
 #include "progress.hpp"
 #include "scenario_files.hpp"
 #include "simulator/simulation.hpp"
@@ -124,26 +125,26 @@ void add_camera_options(CLI::App& app, Settings& settings) {
   const std::string group = "Camera";
   app.add_option("--size", settings.size, "WIDTHxHEIGHT in pixels")->capture_default_str()->group(group);
   app.add_option("--rate-hz", simulation.rate_hz, "pictures a second")
-      ->check(CLI::Range(0.1, 1000.0))
+      ->check(number_between(0.1, 1000.0))
       ->capture_default_str()
       ->group(group);
   app.add_option("--focal-px", settings.focal_px, "focal length (default 0.9 x width)")
-      ->check(CLI::Range(10.0, 50000.0))
+      ->check(number_between(10.0, 50000.0))
       ->group(group);
   app.add_option("--height-m", simulation.mount.height_m, "camera over the rail heads")
-      ->check(CLI::Range(0.3, 20.0))
+      ->check(number_between(0.3, 20.0))
       ->capture_default_str()
       ->group(group);
   app.add_option("--pitch-deg", settings.pitch_deg, "camera down")
-      ->check(CLI::Range(-10.0, 80.0))
+      ->check(number_between(-10.0, 80.0))
       ->capture_default_str()
       ->group(group);
   app.add_option("--lateral-m", simulation.mount.lateral_m, "camera left of the track's middle")
-      ->check(CLI::Range(-3.0, 3.0))
+      ->check(number_between(-3.0, 3.0))
       ->capture_default_str()
       ->group(group);
   app.add_option("--texture-depth-m", simulation.render.texture_depth_m, "sleeper tops below the rail heads")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(number_between(0.0, 1.0))
       ->capture_default_str()
       ->group(group);
   app.add_option("--format", simulation.format, "png, jpg or pgm")
@@ -186,7 +187,7 @@ void add_scenario_options(CLI::App& app, Settings& settings) {
 void add_sensor_options(CLI::App& app, simulator::SensorOptions& sensors) {
   const std::string group = "Sensor errors (1 sigma)";
   const auto option = [&](const char* name, double& value, const char* what) {
-    app.add_option(name, value, what)->check(CLI::NonNegativeNumber)->capture_default_str()->group(group);
+    app.add_option(name, value, what)->check(number_between(0, 1e9))->capture_default_str()->group(group);
   };
   option("--gyro-noise", sensors.gyro_noise_rps, "rad/s a sample");
   option("--gyro-bias", sensors.gyro_bias_rps, "rad/s");
@@ -194,7 +195,7 @@ void add_sensor_options(CLI::App& app, simulator::SensorOptions& sensors) {
   option("--accel-bias", sensors.accel_bias_mps2, "m/s2");
   option("--pulses-per-metre", sensors.pulses_per_metre, "of the wheel sensor, as its data sheet says");
   app.add_option("--wheel-scale", sensors.wheel_scale_error, "share of pulses too many")
-      ->check(CLI::Range(-0.2, 0.2))
+      ->check(number_between(-0.2, 0.2))
       ->capture_default_str()
       ->group(group);
   app.add_option("--slips", sensors.slip_episodes, "times that the wheel slips or slides")
@@ -231,27 +232,27 @@ void add_simulate(CLI::App& app, Action& chosen) {
   command->add_option("--start", simulation.start, "EDGE:OFFSET[:+|-] where the train stands first")
       ->capture_default_str();
   command->add_option("--length-m", simulation.run.length_m, "way to run")
-      ->check(CLI::Range(1.0, 1e6))
+      ->check(number_between(1.0, 1e6))
       ->capture_default_str();
   command->add_option("--duration-s", simulation.run.duration_s, "time to run, instead of --length-m")
-      ->check(CLI::Range(1.0, 1e5));
+      ->check(number_between(1.0, 1e5));
   command->add_option("--speed-kmh", settings->speed_kmh, "cruising speed")
-      ->check(CLI::Range(1.0, 400.0))
+      ->check(number_between(1.0, 400.0))
       ->capture_default_str();
   command->add_option("--accelerate", simulation.run.accelerate_mps2, "m/s2")
-      ->check(CLI::Range(0.05, 5.0))
+      ->check(number_between(0.05, 5.0))
       ->capture_default_str();
   command->add_option("--brake", simulation.run.brake_mps2, "m/s2")
-      ->check(CLI::Range(0.05, 5.0))
+      ->check(number_between(0.05, 5.0))
       ->capture_default_str();
   command->add_option("--dwell-s", simulation.run.dwell_s, "standing still at both ends")
-      ->check(CLI::Range(0.0, 3600.0))
+      ->check(number_between(0.0, 3600.0))
       ->capture_default_str();
   command->add_option("--stop-at-m", simulation.run.stop_at_m, "stop on the way here (0 = no stop)")
-      ->check(CLI::Range(0.0, 1e6))
+      ->check(number_between(0.0, 1e6))
       ->capture_default_str();
   command->add_option("--stop-s", simulation.run.stop_s, "how long it stops")
-      ->check(CLI::Range(0.0, 3600.0))
+      ->check(number_between(0.0, 3600.0))
       ->capture_default_str();
   command->add_option("--seed", simulation.seed)->capture_default_str();
   command->add_option("--threads", simulation.threads, "pictures rendered at a time")

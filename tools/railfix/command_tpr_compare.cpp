@@ -339,7 +339,8 @@ void add_tpr_compare(CLI::App& tpr, Action& chosen) {
   command->add_option("--start", options->start, "Place on the map where the line begins, EDGE:OFFSET[:+|-]");
   command->add_option("--via", options->via, "Edges taken at switches");
   command->add_option("--truth", options->truth, "Folder with track.csv (SEQ/truth): errors of both systems");
-  command->add_option("--foot-to-front-m", options->foot_to_front_m, "From the truth's place to the train's front end");
+  command->add_option("--foot-to-front-m", options->foot_to_front_m, "From the truth's place to the train's front end")
+      ->check(number_between(-1000, 1000));
   const auto baselines = CLI::IsMember({3, 4});
   command->add_option("--baseline", options->baseline, "Layout of ours: 3 or 4")->check(baselines);
   command->add_option("--certified-baseline", options->certified_baseline, "Layout of the certified: 3 or 4")

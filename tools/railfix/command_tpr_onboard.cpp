@@ -18,6 +18,7 @@
 #include "etcs/report_parameters.hpp"
 #include "etcs/train_position_report.hpp"
 #include "messaging/onboard_topic.hpp"
+#include "number_between.hpp"
 #include "topic_listener.hpp"
 
 namespace railfix::tool {
@@ -245,7 +246,7 @@ void add_tpr_onboard(CLI::App& tpr, Action& chosen) {
       "change it. Silent for 3 s, tpr_publisher keeps mode and level and says nothing of train integrity.");
   command->add_option("WORD=VALUE", options->words, "As below; without any: mode=FS level=2 integrity=none");
   command->add_option("--for-s", options->for_s, "End after so many seconds, 0 = run until interrupted")
-      ->check(CLI::NonNegativeNumber);
+      ->check(number_between(0, 1e9));
   add_network(*command, options->network);
   find_running_train(*command, options->network);
   command->callback([options, &chosen] {

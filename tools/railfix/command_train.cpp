@@ -7,6 +7,7 @@
 #include "commands.hpp"
 #include "core/joined.hpp"
 #include "core/result.hpp"
+#include "number_between.hpp"
 #include "train/check.hpp"
 #include "train/keys.hpp"
 #include "train/render.hpp"
@@ -303,10 +304,10 @@ void add_train(CLI::App& app, Action& chosen) {
       command->add_option("--root", options->root, "Where var/lib/railfix and opt/railfix are")->capture_default_str();
     if ((takes & kGate) != 0) {
       command->add_option("--healthy-for", options->gate.healthy_s, "Seconds that a service must be healthy")
-          ->check(CLI::Range(0.5, 600.0))
+          ->check(number_between(0.5, 600.0))
           ->capture_default_str();
       command->add_option("--patience", options->gate.patience_s, "Seconds that it may take to become so")
-          ->check(CLI::Range(1.0, 3600.0))
+          ->check(number_between(1.0, 3600.0))
           ->capture_default_str();
     }
     command->callback([&chosen, options, work] { chosen = [options, work] { return work(*options); }; });

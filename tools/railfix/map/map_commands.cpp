@@ -10,6 +10,7 @@
 #include "map/coverage.hpp"
 #include "map/drawing.hpp"
 #include "map/survey.hpp"
+#include "number_between.hpp"
 
 namespace railfix::tool {
 namespace {
@@ -143,10 +144,10 @@ void add_map_draw(CLI::App& map, Action& chosen) {
   command->add_option("--out", request->out, "The picture to write, .svg or .png")->required();
   command->add_option("--at", request->at, "EDGE:OFFSET, a place to look at closely");
   command->add_option("--radius", request->options.radius_m, "Metres around that place")
-      ->check(CLI::Range(1.0, 1e6))
+      ->check(number_between(1.0, 1e6))
       ->capture_default_str();
   command->add_option("--width", request->options.width_px, "Pixels")
-      ->check(CLI::Range(200.0, 8000.0))
+      ->check(number_between(200.0, 8000.0))
       ->capture_default_str();
   command->footer(
       "Examples:\n  railfix map draw line.map --out line.svg\n"
@@ -162,17 +163,17 @@ void add_map_coverage(CLI::App& map, Action& chosen) {
   command->add_option("--start", request->start, "EDGE:OFFSET[:+|-] where the way begins")->capture_default_str();
   command->add_option("--length", request->length_m, "Metres of way; the whole line without");
   command->add_option("--limit", request->options.limit_m, "Metres that half the interval may be long")
-      ->check(CLI::Range(0.1, 1e5))
+      ->check(number_between(0.1, 1e5))
       ->capture_default_str();
   command
       ->add_option("--scale-sigma", request->options.scale_sigma, "Drift of the odometry as a part of the way, 1 sigma")
-      ->check(CLI::Range(1e-6, 0.1))
+      ->check(number_between(1e-6, 0.1))
       ->capture_default_str();
   command->add_option("--sigmas", request->options.sigmas, "Half the interval in sigmas of the drift")
-      ->check(CLI::Range(0.1, 10.0))
+      ->check(number_between(0.1, 10.0))
       ->capture_default_str();
   command->add_option("--virtual-locacc", request->options.virtual_locacc_m, "Q_LOCACC of proposed references, metres")
-      ->check(CLI::Range(0.0, 63.0))
+      ->check(number_between(0.0, 63.0))
       ->capture_default_str();
   command->add_flag("--natural", request->options.natural, "Count frogs, portals, bridges, masts and platforms too");
   command->add_flag("--json", request->as_json, "JSON on standard output");
@@ -191,7 +192,7 @@ void add_map_learn(CLI::App& map, Action& chosen) {
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   command->add_option("--gate", request->options.gate_m, "Sightings within so many metres are of one thing")
-      ->check(CLI::Range(0.1, 50.0))
+      ->check(number_between(0.1, 50.0))
       ->capture_default_str();
   command->footer("Example:\n  railfix map learn line.map RUN1 RUN2 RUN3 --out surveyed.map");
   command->callback([request, &chosen] { chosen = [request] { return learn(*request); }; });
