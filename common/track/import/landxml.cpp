@@ -109,7 +109,9 @@ class Reader {
     if (length > 1e6 || !(chord < 1e6) || std::max(std::abs(start), std::abs(end)) * length > core::kPi) {
       throw source_.wrong(node, "the element turns by more than half a circle or is longer than 1000 km");
     }
-    take(close_element(from, to, start, end, length), to, source_.number(node, "length").value_or(chord),
+    const double told_m = source_.number(node, "length").value_or(chord);
+    if (!(told_m > 0)) throw source_.wrong(node, "the element's points are apart, but its length is not above 0");
+    take(close_element(from, to, start, end, length), to, told_m,
          track + ": the element in line " + source_.line_of(node), plan);
   }
 

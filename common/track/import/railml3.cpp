@@ -106,6 +106,15 @@ class Reader {
                             id + "\", which does not exist; " + therefore);
   }
 
+  [[nodiscard]] double within(const pugi::xml_node& of, double at_m, double length_m) {
+    if (at_m < -kTouchM || at_m > length_m + kTouchM) {
+      net_.problems.push_back("<" + std::string(of.name()) + "> \"" + railml_name(of) + "\" lies at " +
+                              std::to_string(at_m) + " m of a net element of " + std::to_string(length_m) +
+                              " m; it is put to its end");
+    }
+    return std::clamp(at_m, 0.0, length_m);
+  }
+
   /// Where an element lies; what lies on coarser net elements only is left out.
   [[nodiscard]] std::vector<NetPlace> places_of(const pugi::xml_node& node) {
     std::vector<NetPlace> out;
@@ -119,9 +128,9 @@ class Reader {
       };
       const double from = along_m("posBegin", "intrinsicCoordBegin", 0);
       const double to = along_m("posEnd", "intrinsicCoordEnd", 1);
-      const auto within = [&](double value) { return std::clamp(value, 0.0, length); };
       const bool turned = std::string(part.attribute("keepsOrientation").value()) == "false";
-      out.push_back({*track, within(std::min(from, to)), within(std::max(from, to)), from <= to && !turned});
+      out.push_back({*track, within(node, std::min(from, to), length), within(node, std::max(from, to), length),
+                     from <= to && !turned});
     }
     if (!out.empty()) return out;
     for (const pugi::xml_node& spot : descendants(node, "spotLocation")) {
@@ -129,7 +138,7 @@ class Reader {
       if (!track) continue;
       const double length = net_.tracks[*track].length_m;
       const auto along = source_.number(spot, "intrinsicCoord");
-      const double at = std::clamp(source_.number(spot, "pos").value_or(along.value_or(0) * length), 0.0, length);
+      const double at = within(node, source_.number(spot, "pos").value_or(along.value_or(0) * length), length);
       out.push_back({*track, at, at, std::string(spot.attribute("applicationDirection").value()) != "reverse"});
     }
     return out;

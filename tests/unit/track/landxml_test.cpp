@@ -114,6 +114,7 @@ TEST_F(LandXmlTest, NamesTheLineThatIsWrong) {
               HasSubstr("line 2: <Alignment> needs a number in the attribute \"staStart\", not \"1+000\""));
   EXPECT_THAT(message("staStart=\"1000\"", "staStart=\"1000,0\""), HasSubstr("not \"1000,0\""));
   EXPECT_THAT(message("<PVI>1000 400", "<PVI>1+000 400"), HasSubstr("not \"1+000 400\""));
+  EXPECT_THAT(message("<Line length=\"100\"", "<Line length=\"0\""), HasSubstr("its length is not above 0"));
   EXPECT_THAT(message("</CoordGeom>", ""), HasSubstr("not sound XML"));
   EXPECT_THAT(message("<Line ", "<Chain "), HasSubstr("not sound XML"));
   EXPECT_FALSE(read_landxml(in_folder("none.xml")).ok());

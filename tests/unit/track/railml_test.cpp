@@ -130,6 +130,13 @@ TEST_F(RailmlTest, NamesOfThingsThatAreNotThereAreTold) {
   EXPECT_THAT(marks_of(map, {LandmarkKind::balise}), testing::ElementsAre("balise b at 70.0 on 1"));
 }
 
+TEST_F(RailmlTest, PlacesBeyondTheirNetElementAreTold) {
+  const std::string text = railml3("<balise id=\"b\"><spotLocation netElementRef=\"n1\" pos=\"70000\"/></balise>");
+  EXPECT_THAT(core::value_or_throw(build_map({write("a.railml", text)}, {})).map.problems,
+              testing::Contains(testing::AllOf(testing::StartsWith("<balise> \"b\" lies at 70000"),
+                                               testing::EndsWith("it is put to its end"))));
+}
+
 // By its first element, wherever it stands and however it is written.
 TEST_F(RailmlTest, XmlIsKnownByItsFirstElement) {
   const auto message = [&](const std::string& text) {
