@@ -43,7 +43,8 @@ core::Result<Kind> kind_of(const std::filesystem::path& file) {
                          [&](const std::string& value) { return value.find(text) != std::string::npos; });
     };
     if (root.name.starts_with("osm")) return Kind::osm;
-    if (root.name == "railml" || root.name == "railML") return Kind::railml;
+    const std::string local = root.name.substr(root.name.find(':') + 1);  // npos + 1 = 0
+    if (local == "railml" || local == "railML") return Kind::railml;
     if (is_of("erju.org/infra")) return Kind::erju_infra;
     if (is_of("erju.org/map")) return Kind::erju_map;
     return Kind::landxml;

@@ -151,6 +151,7 @@ TEST_F(RailmlTest, XmlIsKnownByItsFirstElement) {
   const std::string head = "<?xml version=\"1.0\" encoding=\"UTF-16\"?>\n";
   EXPECT_EQ(message("<!-- " + std::string(20000, '.') + " <osm> <LandXML> -->" + railml2("500")), "was built");
   EXPECT_EQ(message("\xef\xbb\xbf" + railml2("500")), "was built");
+  EXPECT_THAT(message("<r:railml xmlns:r=\"x\" version=\"2.4\"/>"), HasSubstr("the prefix \"r:\""));
   EXPECT_EQ(message("<?xml version=\"1.0\" encoding=\"windows-1252\"?>\n<!-- \xfc -->" + railml2("500")), "was built");
   EXPECT_EQ(message(utf16(head + railml2("500"))), "was built");
   EXPECT_THAT(message(utf16(head + railml2("500", "1,0"))), HasSubstr("line 5: <radiusChange>"));
