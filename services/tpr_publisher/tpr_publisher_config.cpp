@@ -75,7 +75,8 @@ void TprPublisherConfig::describe(service::Fields& fields) {
                 "From the camera's foot backward to the other end, the front end while its cab is active; -1 = nobody "
                 "drives from there.");
   fields.number("train_length_m", train_length_m, {0, 2000}, "m",
-                "For reports where the rear end passes, and valid train data; 0 = not known.");
+                "For reports where the rear end passes, and valid train data, until onboard_status says a length; 0 = "
+                "not known.");
   fields.number("train_over_m", train_over_m, {-1, 2000}, "m",
                 "4.0.0, supervised manoeuvre or stand-by without train data: added to L_DOUBTOVER; -1 = not known.");
   fields.number("train_under_m", train_under_m, {-1, 2000}, "m",
