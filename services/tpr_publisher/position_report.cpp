@@ -61,7 +61,7 @@ void refer(const TrainPosition& position, const Reference& reference, Motion mot
            etcs::TrainPositionReport& report) {
   const double front_m = reference.foot_m + settings.foot_to_front_m;
   const auto allowance = train_allowance(settings);
-  const double group_m = amount_m(reference.group->q_locacc_m) + amount_m(reference.doubt_m);
+  const double group_m = place_doubt_m(reference);
   const double over_m = amount_m(position.over_m) + group_m + allowance.over_m;
   const double under_m = amount_m(position.under_m) + group_m + allowance.under_m;
   const int best = distances_in(etcs::scale_m(kCoarsestScale), front_m, over_m, under_m).known();
@@ -100,6 +100,10 @@ Allowance train_allowance(const ReportSettings& settings) {
 uint32_t orientation(const Reference& reference) {
   if (has_co_ordinate_system(*reference.group)) return side(reference.nominal_along);
   return reference.previous != nullptr ? side(reference.from_previous_along) : uint32_t{etcs::kUnknownSide};
+}
+
+double place_doubt_m(const Reference& reference) {
+  return amount_m(reference.group->q_locacc_m) + amount_m(reference.doubt_m);
 }
 
 double reported_front_m(uint32_t d_lrbg, double step_m, double front_m) {

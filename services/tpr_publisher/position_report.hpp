@@ -66,6 +66,8 @@ uint32_t orientation(const Reference& reference);
 etcs::TrainPositionReport make_report(const TrainPosition& position, const std::optional<Reference>& reference,
                                       Motion motion, const ReportSettings& settings, int64_t now_ns);
 
+/// How far off the place of the group may be, from the map and from how it was found; infinite when nobody knows.
+double place_doubt_m(const Reference& reference);
 /// Where a report that refers to a group says the front end to be that is front_m beyond it, along the train.
 double reported_front_m(uint32_t d_lrbg, double step_m, double front_m);
 

@@ -127,7 +127,7 @@ std::optional<Reference> TprPublisher::reference() const {
 }
 
 double TprPublisher::group_m() const {
-  return reference_ ? reference_->group->q_locacc_m + reference_->doubt_m : 0.0;
+  return reference_ ? place_doubt_m(*reference_) : 0.0;
 }
 
 TrainIntegrity::Place TprPublisher::integrity_place() const {
@@ -156,7 +156,8 @@ core::Status TprPublisher::set_onboard(const Onboard& onboard, int64_t now_ns) {
   const auto trial = etcs::encode(make_report({}, std::nullopt, Motion::unknown, report, 0), report.baseline);
   if (!trial.ok()) return trial.error();
   settings_.report = report;
-  if (report.train_data) trigger_.set_train_length(onboard.train_length_m);
+  length_said_ = length_said_ || report.train_data;
+  if (length_said_) trigger_.set_train_length(onboard.train_length_m);
   hear_cab(onboard.active_cab);
   hear_integrity(onboard, now_ns);
   return {};
@@ -246,12 +247,12 @@ etcs::TrainPositionReport TprPublisher::fields(int64_t now_ns) const {
   const auto here = reference();
   auto fields = make_report(position, here, is_turned() ? turned(motion_) : motion_, settings, now_ns);
   if (onboard_silent(now_ns)) return fields;
-  double said_at_m = position.distance_m;
+  double reported_ahead_m = 0;
   if (here && fields.d_lrbg != etcs::kUnknownDistance) {  // trackside counts the length from the front end it was told
     const double front_m = here->foot_m + settings.foot_to_front_m;
-    said_at_m += reported_front_m(fields.d_lrbg, etcs::scale_m(fields.q_scale), front_m) - front_m;
+    reported_ahead_m = reported_front_m(fields.d_lrbg, etcs::scale_m(fields.q_scale), front_m) - front_m;
   }
-  const auto said = integrity_.said(said_at_m);
+  const auto said = integrity_.said(position.distance_m, reported_ahead_m);
   // Nobody can place a length from a front end that is not referred to a group (3.6.5.2.7).
   if (said.l_trainint && fields.nid_lrbg == etcs::kUnknownBaliseGroup) return fields;
   fields.q_length = said.q_length;

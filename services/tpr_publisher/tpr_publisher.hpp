@@ -92,6 +92,7 @@ class TprPublisher {
   ReportTrigger trigger_;
   TrainIntegrity integrity_;
   std::optional<Onboard> onboard_;  // its stamp is never later than when it was heard
+  bool length_said_ = false;        // by the on-board unit, which may take it back
   int64_t complete_ns_ = 0;         // its integrity_ns in this host's clock ...
   int64_t complete_ahead_ns_ = 0;   // ... and how far it was ahead when it was heard first
   int64_t onboard_ahead_ns_ = 0;    // too much of it, and no confirmation is taken

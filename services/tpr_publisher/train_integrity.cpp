@@ -27,11 +27,27 @@ void TrainIntegrity::lose_way() {
 }
 
 void TrainIntegrity::hear(uint32_t q_integrity, int64_t integrity_ns, double train_length_m) {
+  if (!is_confirmed(q_integrity)) {
+    heard_ = {q_integrity, integrity_ns};
+    next_.reset();
+    rear_m_.reset();
+    settled_ = true;
+    return;
+  }
   const bool other_length = train_length_m != train_length_m_;
-  const bool again = integrity_ns == heard_.integrity_ns && !other_length;
-  if (!again && settled_) before_ = heard_;
+  if (is_confirmed(heard_.q_integrity) && !other_length) {
+    if (integrity_ns == heard_.integrity_ns) {
+      heard_.q_integrity = q_integrity;
+      return;
+    }
+    if (!settled_) {
+      next_ = {q_integrity, integrity_ns};
+      return;
+    }
+  }
+  if (settled_) before_ = heard_;
   heard_ = {q_integrity, integrity_ns};
-  if (again) return;
+  next_.reset();
   train_length_m_ = train_length_m;
   if (other_length) rear_m_.reset();
   forgotten_ = false;
@@ -40,9 +56,18 @@ void TrainIntegrity::hear(uint32_t q_integrity, int64_t integrity_ns, double tra
 }
 
 void TrainIntegrity::settle() {
-  if (settled_ || places_.empty() || places_.back().stamp_ns < heard_.integrity_ns)
-    return;  // the place then is still to come
-  settled_ = true;
+  while (!settled_ && !places_.empty() && places_.back().stamp_ns >= heard_.integrity_ns) {
+    place_rear();
+    settled_ = true;
+    if (!next_) return;
+    before_ = heard_;
+    heard_ = *next_;
+    next_.reset();
+    settled_ = false;
+  }
+}
+
+void TrainIntegrity::place_rear() {
   rear_m_.reset();
   // The last place before is taken: farther behind when the train runs forward, which is the safe side.
   const auto after = std::upper_bound(places_.begin(), places_.end(), heard_.integrity_ns,
@@ -53,10 +78,10 @@ void TrainIntegrity::settle() {
   at_distance_m_ = then.distance_m;
 }
 
-TrainIntegrity::Said TrainIntegrity::said(double distance_m) const {
+TrainIntegrity::Said TrainIntegrity::said(double distance_m, double reported_ahead_m) const {
   if (!is_confirmed(q_integrity())) return {q_integrity(), std::nullopt};
   if (!rear_m_) return {};
-  const double length_m = std::ceil(std::max(distance_m, *at_distance_m_) - *rear_m_);
+  const double length_m = std::ceil(std::max(distance_m, *at_distance_m_) - *rear_m_ + reported_ahead_m);
   if (!(length_m <= kLongest)) return {};
   return {q_integrity(), static_cast<uint32_t>(length_m)};
 }

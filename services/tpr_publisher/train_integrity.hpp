@@ -37,10 +37,11 @@ class TrainIntegrity {
   void lose_way();
   /// q_integrity as in the message; the train was complete at integrity_ns. Confirmed without a length, at a time that
   /// is longer ago than ten seconds, or before any place is known, it says nothing. Until the place of that time has
-  /// come, what was heard before stands.
+  /// come, what was heard before stands; newer ones wait until then. What is no confirmation stands at once.
   void hear(uint32_t q_integrity, int64_t integrity_ns, double train_length_m);
-  /// A train that has backed since then is not taken for shorter.
-  [[nodiscard]] Said said(double distance_m) const;
+  /// A train that has backed since then is not taken for shorter. reported_ahead_m: how far in front of distance_m the
+  /// report says the front end to be, from which trackside counts the length.
+  [[nodiscard]] Said said(double distance_m, double reported_ahead_m = 0) const;
   /// What said() speaks of.
   [[nodiscard]] uint32_t q_integrity() const { return stands().q_integrity; }
   [[nodiscard]] int64_t integrity_ns() const { return stands().integrity_ns; }
@@ -53,14 +54,13 @@ class TrainIntegrity {
     int64_t integrity_ns = 0;
   };
   void settle();
-  /// A loss stands at once.
-  [[nodiscard]] const Confirmation& stands() const {
-    return settled_ || !is_confirmed(heard_.q_integrity) ? heard_ : before_;
-  }
+  void place_rear();
+  [[nodiscard]] const Confirmation& stands() const { return settled_ ? heard_ : before_; }
 
   std::deque<Place> places_;  // of the last ten seconds
   Confirmation heard_;
-  Confirmation before_;  // stands until heard_ is settled
+  Confirmation before_;               // stands until heard_ is settled
+  std::optional<Confirmation> next_;  // waits until heard_ is settled
   double train_length_m_ = 0;
   bool settled_ = true;                  // rear_m_ belongs to heard_
   bool forgotten_ = false;               // it was known before the way was lost

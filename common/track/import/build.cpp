@@ -42,9 +42,10 @@ core::Result<Kind> kind_of(const std::filesystem::path& file) {
       return std::any_of(root.values.begin(), root.values.end(),
                          [&](const std::string& value) { return value.find(text) != std::string::npos; });
     };
-    if (root.name.starts_with("osm")) return Kind::osm;
+    if (root.name.starts_with("osm") || (root.name.empty() && is_of("<osm"))) return Kind::osm;
     const std::string local = root.name.substr(root.name.find(':') + 1);  // npos + 1 = 0
-    if (local == "railml" || local == "railML") return Kind::railml;
+    const bool seems_railml = root.name.empty() && (is_of("<railml") || is_of("<railML"));
+    if (local == "railml" || local == "railML" || seems_railml) return Kind::railml;
     if (is_of("erju.org/infra")) return Kind::erju_infra;
     if (is_of("erju.org/map")) return Kind::erju_map;
     return Kind::landxml;

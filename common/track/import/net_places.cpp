@@ -44,7 +44,9 @@ std::vector<std::pair<size_t, double>> middles(const RailNet& net, const std::ve
     } while (last != places.end() && (meets(net, *(last - 1), true, *last) || meets(net, *(last - 1), false, *last)));
     auto at = first;
     for (; at + 1 != last && left_m > at->to_m - at->from_m; ++at) left_m -= at->to_m - at->from_m;
-    out.emplace_back(at->track, at->same_direction ? at->from_m + left_m : at->to_m - left_m);
+    const bool forward =
+        at + 1 != last ? meets(net, *at, true, *(at + 1)) : at == first || meets(net, *at, false, *(at - 1));
+    out.emplace_back(at->track, forward ? at->from_m + left_m : at->to_m - left_m);
     first = last;
   }
   return out;

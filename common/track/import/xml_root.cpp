@@ -40,11 +40,15 @@ XmlRoot xml_root(const std::filesystem::path& file) {
   XML_SetUnknownEncodingHandler(parser.get(), on_encoding, nullptr);
   std::ifstream stream(file, std::ios::binary);
   std::array<char, 4096> part{};
+  std::string head;
+  stream >> std::ws;  // pugixml takes it before the declaration, too
   while (stream) {
     stream.read(part.data(), part.size());
+    if (head.empty()) head.assign(part.data(), static_cast<size_t>(stream.gcount()));
     if (XML_Parse(parser.get(), part.data(), static_cast<int>(stream.gcount()), stream.eof() ? 1 : 0) != XML_STATUS_OK)
       break;
   }
+  if (search.root.name.empty()) search.root.values = {std::move(head)};
   return search.root;
 }
 

@@ -7,7 +7,8 @@
 
 namespace railfix::track {
 
-/// The first element of a file, empty where it has none that can be read.
+/// The first element of a file. Where none can be read the name is empty, and values hold the file's first part, so
+/// that the reader of what it seems to be says what is wrong.
 struct XmlRoot {
   std::string name;
   std::vector<std::string> values;  // of its attributes, namespaces too

@@ -133,6 +133,10 @@ TEST_F(SafeEnds, ALocationIsPassedByTheMinSafeRearEndOfTheTrainAsTheOnboardUnitS
   EXPECT_NE(publisher_.left_out(now_ns_), "");  // nobody has said how long the train is
   hear(kNoIntegrityInformation);
   EXPECT_EQ(publisher_.left_out(now_ns_), "");
+  onboard_.train_length_m = 0;  // taken back, as while wagons are coupled
+  core::ok_or_throw(publisher_.set_onboard(onboard_, now_ns_));
+  EXPECT_NE(publisher_.left_out(now_ns_), "");
+  hear(kNoIntegrityInformation);
   std::optional<Report> report;
   for (double offset_m = 121; !report && offset_m < 400; offset_m += 0.1) report = run_to(offset_m);
   ASSERT_TRUE(report.has_value());

@@ -98,6 +98,32 @@ TEST(TrainIntegrity, AConfirmationFromBeforeTheWayWasLostHasNoPlace) {
   EXPECT_FALSE(integrity.forgotten());
 }
 
+TEST(TrainIntegrity, ALossStandsUntilALaterConfirmationHasAPlace) {
+  auto integrity = running_until(5);
+  integrity.hear(kByDriver, at(5), 200);
+  integrity.hear(kIntegrityLost, at(5.02), 200);
+  EXPECT_EQ(integrity.said(50).q_length, kIntegrityLost);
+  integrity.hear(kByDriver, at(5.05), 200);
+  EXPECT_EQ(integrity.said(50).q_length, kIntegrityLost);
+  integrity.follow({at(5.1), 51, 5});
+  EXPECT_EQ(integrity.said(51).l_trainint, 206U);
+}
+
+TEST(TrainIntegrity, ConfirmationsThatComeFasterThanPlacesDoNotKeepEachOtherWaiting) {
+  auto integrity = running_until(5);
+  for (int i = 0; i < 20; ++i) {
+    integrity.hear(kByDevice, at(5.15 + i * 0.1), 200);
+    integrity.follow({at(5.05 + i * 0.1), 50.5 + i, 5});  // later than what is heard next
+  }
+  EXPECT_LE(integrity.said(69.5).l_trainint, 208U);
+}
+
+TEST(TrainIntegrity, BackingAndRoundingTogetherMakeNoShorterTrain) {
+  auto integrity = running_until(5);
+  integrity.hear(kByDevice, at(5), 200);  // at 50 m, rear end at -155 m
+  EXPECT_EQ(integrity.said(25, 5).l_trainint, 210U);
+}
+
 TEST(TrainIntegrity, BackingMakesNoShorterTrain) {
   auto integrity = running_until(5);
   integrity.hear(kByDevice, at(5), 200);

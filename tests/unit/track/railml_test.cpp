@@ -137,6 +137,17 @@ TEST_F(RailmlTest, PlacesBeyondTheirNetElementAreTold) {
                                                testing::EndsWith("it is put to its end"))));
 }
 
+TEST_F(RailmlTest, TheMiddleDoesNotDependOnTheOrderOfTheStretches) {
+  const auto bridge = [&](const std::string& first, const std::string& second) {
+    const std::string text = railml3(crossing("id=\"b\"", on("n1", first) + on("n1", second)));
+    return marks_of(core::value_or_throw(build_map({write("a.railml", text)}, {})).map, {LandmarkKind::bridge});
+  };
+  const std::string near = "posBegin=\"40\" posEnd=\"60\"";
+  const std::string far = "posBegin=\"60\" posEnd=\"100\"";
+  EXPECT_EQ(bridge(near, far), bridge(far, near));
+  EXPECT_THAT(bridge(far, near), testing::ElementsAre(HasSubstr(" at 70.0 on 1")));
+}
+
 // By its first element, wherever it stands and however it is written.
 TEST_F(RailmlTest, XmlIsKnownByItsFirstElement) {
   const auto message = [&](const std::string& text) {
@@ -151,6 +162,8 @@ TEST_F(RailmlTest, XmlIsKnownByItsFirstElement) {
   const std::string head = "<?xml version=\"1.0\" encoding=\"UTF-16\"?>\n";
   EXPECT_EQ(message("<!-- " + std::string(20000, '.') + " <osm> <LandXML> -->" + railml2("500")), "was built");
   EXPECT_EQ(message("\xef\xbb\xbf" + railml2("500")), "was built");
+  EXPECT_EQ(message("\n\n" + railml2("500")), "was built");
+  EXPECT_THAT(message("<!-- \xfc --><osm version=\"0.6\"/>"), HasSubstr("XML parsing error at line 1"));
   EXPECT_THAT(message("<r:railml xmlns:r=\"x\" version=\"2.4\"/>"), HasSubstr("the prefix \"r:\""));
   EXPECT_EQ(message("<?xml version=\"1.0\" encoding=\"windows-1252\"?>\n<!-- \xfc -->" + railml2("500")), "was built");
   EXPECT_EQ(message(utf16(head + railml2("500"))), "was built");
