@@ -118,8 +118,8 @@ void FoxgloveApi::set_channels(const std::vector<FoxgloveChannel>& channels) {
 void FoxgloveApi::message(const ClientPtr& client, const std::string& text, bool binary) {
   const auto found = clients_.find(client->id());
   if (found == clients_.end()) return;
-  const auto parsed = binary ? core::Result<json>(json()) : core::parse_json(text);
-  const json message = parsed.ok() ? parsed.value() : json();
+  auto parsed = binary ? core::Result<json>(json()) : core::parse_json(text);
+  const json message = parsed.ok() ? std::move(parsed).value() : json();
   if (binary) {
     client->send(
         status(kWarning, "this server takes no binary messages: nothing can be published through it", "binary"));

@@ -36,8 +36,7 @@ Distances distances_in(double step_m, double front_m, double over_m, double unde
   Distances distances;
   distances.d_lrbg = steps_or_unknown(std::round(std::abs(front_m) / step_m));
   if (distances.d_lrbg == kUnknownDistance) return distances;
-  // The reported front end lies this far in front of the estimated one.
-  const double moved_m = reported_front_m(distances.d_lrbg, step_m, front_m) - front_m;
+  const double moved_m = reported_ahead_m(distances.d_lrbg, step_m, front_m);
   distances.l_doubtover = steps_or_unknown(std::ceil(std::max(0.0, over_m + moved_m) / step_m));
   distances.l_doubtunder = steps_or_unknown(std::ceil(std::max(0.0, under_m - moved_m) / step_m));
   return distances;
@@ -106,8 +105,8 @@ double place_doubt_m(const Reference& reference) {
   return amount_m(reference.group->q_locacc_m) + amount_m(reference.doubt_m);
 }
 
-double reported_front_m(uint32_t d_lrbg, double step_m, double front_m) {
-  return std::copysign(d_lrbg * step_m, front_m);
+double reported_ahead_m(uint32_t d_lrbg, double step_m, double front_m) {
+  return std::copysign(d_lrbg * step_m, front_m) - front_m;
 }
 
 uint32_t v_train(double speed_mps, bool standstill, etcs::Baseline baseline) {

@@ -68,8 +68,8 @@ etcs::TrainPositionReport make_report(const TrainPosition& position, const std::
 
 /// How far off the place of the group may be, from the map and from how it was found; infinite when nobody knows.
 double place_doubt_m(const Reference& reference);
-/// Where a report that refers to a group says the front end to be that is front_m beyond it, along the train.
-double reported_front_m(uint32_t d_lrbg, double step_m, double front_m);
+/// How far in front of it a report says the front end to be that is front_m beyond its group, along the train.
+double reported_ahead_m(uint32_t d_lrbg, double step_m, double front_m);
 
 /// Nearest step of 5 km/h; at standstill 0, or 127 in 4.0.0.
 uint32_t v_train(double speed_mps, bool standstill, etcs::Baseline baseline);

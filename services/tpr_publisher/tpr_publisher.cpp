@@ -247,12 +247,12 @@ etcs::TrainPositionReport TprPublisher::fields(int64_t now_ns) const {
   const auto here = reference();
   auto fields = make_report(position, here, is_turned() ? turned(motion_) : motion_, settings, now_ns);
   if (onboard_silent(now_ns)) return fields;
-  double reported_ahead_m = 0;
+  double ahead_m = 0;
   if (here && fields.d_lrbg != etcs::kUnknownDistance) {  // trackside counts the length from the front end it was told
     const double front_m = here->foot_m + settings.foot_to_front_m;
-    reported_ahead_m = reported_front_m(fields.d_lrbg, etcs::scale_m(fields.q_scale), front_m) - front_m;
+    ahead_m = reported_ahead_m(fields.d_lrbg, etcs::scale_m(fields.q_scale), front_m);
   }
-  const auto said = integrity_.said(position.distance_m, reported_ahead_m);
+  const auto said = integrity_.said(position.distance_m, ahead_m);
   // Nobody can place a length from a front end that is not referred to a group (3.6.5.2.7).
   if (said.l_trainint && fields.nid_lrbg == etcs::kUnknownBaliseGroup) return fields;
   fields.q_length = said.q_length;

@@ -37,17 +37,12 @@ core::Result<Kind> kind_of(const std::filesystem::path& file) {
   if (ends({".map"})) return Kind::compiled;
   if (ends({".railml", ".railML"})) return Kind::railml;
   if (ends({".xml", ".XML"})) {
-    const XmlRoot root = xml_root(file);
-    const auto is_of = [&](std::string_view text) {
-      return std::any_of(root.values.begin(), root.values.end(),
-                         [&](const std::string& value) { return value.find(text) != std::string::npos; });
-    };
-    if (root.name.starts_with("osm") || (root.name.empty() && is_of("<osm"))) return Kind::osm;
-    const std::string local = root.name.substr(root.name.find(':') + 1);  // npos + 1 = 0
-    const bool seems_railml = root.name.empty() && (is_of("<railml") || is_of("<railML"));
-    if (local == "railml" || local == "railML" || seems_railml) return Kind::railml;
-    if (is_of("erju.org/infra")) return Kind::erju_infra;
-    if (is_of("erju.org/map")) return Kind::erju_map;
+    const std::string root = xml_root(file);
+    const auto holds = [&](const char* text) { return root.find(text) != std::string::npos; };
+    if (holds("<osm")) return Kind::osm;
+    if (holds("<railml") || holds("<railML")) return Kind::railml;
+    if (holds("erju.org/infra")) return Kind::erju_infra;
+    if (holds("erju.org/map")) return Kind::erju_map;
     return Kind::landxml;
   }
   return core::Error{file.string() +

@@ -6,16 +6,14 @@
 namespace railfix::track {
 namespace {
 
-constexpr double kTouchM = 0.5;
-
 bool reaches(const RailNet& net, const NetPlace& place, bool at_end) {
-  return at_end ? place.to_m > net.tracks[place.track].length_m - kTouchM : place.from_m < kTouchM;
+  return at_end ? place.to_m > net.tracks[place.track].length_m - kNetTouchM : place.from_m < kNetTouchM;
 }
 
 bool meets(const RailNet& net, const NetPlace& place, bool at_end, const NetPlace& other) {
   if (place.track == other.track) {
     const double gap_m = at_end ? other.from_m - place.to_m : place.from_m - other.to_m;
-    return place.to_m > place.from_m && other.to_m > other.from_m && std::abs(gap_m) < kTouchM;
+    return place.to_m > place.from_m && other.to_m > other.from_m && std::abs(gap_m) < kNetTouchM;
   }
   if (!reaches(net, place, at_end)) return false;
   const NetEnd end{place.track, at_end};

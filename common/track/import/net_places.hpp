@@ -7,6 +7,8 @@
 
 namespace railfix::track {
 
+constexpr double kNetTouchM = 0.5;  // what is nearer meets
+
 /// A spot or a stretch of a track, along it.
 struct NetPlace {
   size_t track = 0;

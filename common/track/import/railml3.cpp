@@ -10,8 +10,6 @@
 namespace railfix::track {
 namespace {
 
-constexpr double kTouchM = 0.5;
-
 class Reader {
  public:
   explicit Reader(const XmlSource& source) : source_(source) {}
@@ -107,7 +105,7 @@ class Reader {
   }
 
   [[nodiscard]] double within(const pugi::xml_node& of, double at_m, double length_m) {
-    if (at_m < -kTouchM || at_m > length_m + kTouchM) {
+    if (at_m < -kNetTouchM || at_m > length_m + kNetTouchM) {
       net_.problems.push_back("<" + std::string(of.name()) + "> \"" + railml_name(of) + "\" lies at " +
                               std::to_string(at_m) + " m of a net element of " + std::to_string(length_m) +
                               " m; it is put to its end");
@@ -231,11 +229,11 @@ class Reader {
       const std::string type = curve.attribute("curveType").value();
       if (type.empty() || type == "arc" || type == "straight") continue;
       for (const NetPlace& place : places_of(curve)) {
-        if (place.to_m - place.from_m < kTouchM) continue;
+        if (place.to_m - place.from_m < kNetTouchM) continue;
         NetBend bend{place.from_m, place.to_m, 0, 0};
         for (const NetBend& arc : net_.tracks[place.track].bends) {
-          if (std::abs(arc.to_m - bend.from_m) < kTouchM) bend.curvature_start_per_m = arc.curvature_end_per_m;
-          if (std::abs(arc.from_m - bend.to_m) < kTouchM) bend.curvature_end_per_m = arc.curvature_start_per_m;
+          if (std::abs(arc.to_m - bend.from_m) < kNetTouchM) bend.curvature_start_per_m = arc.curvature_end_per_m;
+          if (std::abs(arc.from_m - bend.to_m) < kNetTouchM) bend.curvature_end_per_m = arc.curvature_start_per_m;
         }
         if (bend.curvature_start_per_m == 0 && bend.curvature_end_per_m == 0) {
           net_.problems.push_back("horizontal curve \"" + std::string(curve.attribute("id").value()) + "\" of type " +

@@ -5,19 +5,21 @@
 #include <array>
 #include <fstream>
 #include <memory>
+#include <string_view>
 
 namespace railfix::track {
 namespace {
 
 struct Search {
   XML_Parser parser = nullptr;
-  XmlRoot root;
+  std::string root;
 };
 
 void on_start(void* data, const XML_Char* name, const XML_Char** attributes) {
   auto& search = *static_cast<Search*>(data);
-  search.root.name = name;
-  for (; *attributes != nullptr; attributes += 2) search.root.values.emplace_back(attributes[1]);
+  const std::string_view whole = name;
+  search.root.append("<").append(whole.substr(whole.find(':') + 1));  // npos + 1 = 0
+  for (; *attributes != nullptr; attributes += 2) search.root.append(" ").append(attributes[1]);
   XML_StopParser(search.parser, XML_FALSE);
 }
 
@@ -32,7 +34,7 @@ int on_encoding(void* /*data*/, const XML_Char* /*name*/, XML_Encoding* encoding
 
 }  // namespace
 
-XmlRoot xml_root(const std::filesystem::path& file) {
+std::string xml_root(const std::filesystem::path& file) {
   const std::unique_ptr<XML_ParserStruct, decltype(&XML_ParserFree)> parser(XML_ParserCreate(nullptr), &XML_ParserFree);
   Search search{parser.get(), {}};
   XML_SetUserData(parser.get(), &search);
@@ -48,8 +50,7 @@ XmlRoot xml_root(const std::filesystem::path& file) {
     if (XML_Parse(parser.get(), part.data(), static_cast<int>(stream.gcount()), stream.eof() ? 1 : 0) != XML_STATUS_OK)
       break;
   }
-  if (search.root.name.empty()) search.root.values = {std::move(head)};
-  return search.root;
+  return search.root.empty() ? head : search.root;
 }
 
 }  // namespace railfix::track

@@ -3,16 +3,11 @@
 
 #include <filesystem>
 #include <string>
-#include <vector>
 
 namespace railfix::track {
 
-/// The first element of a file. Where none can be read the name is empty, and values hold the file's first part, so
-/// that the reader of what it seems to be says what is wrong.
-struct XmlRoot {
-  std::string name;
-  std::vector<std::string> values;  // of its attributes, namespaces too
-};
-XmlRoot xml_root(const std::filesystem::path& file);
+/// The first element of a file, without its prefix: "<name", then the values of its attributes, namespaces too. Where
+/// none can be read the file's first part, so that the reader of what it seems to be says what is wrong.
+std::string xml_root(const std::filesystem::path& file);
 
 }  // namespace railfix::track
