@@ -260,6 +260,15 @@ class Reader {
     return points;
   }
 
+  void tell_unread(const pugi::xml_node& alignment, const std::string& track) {
+    for (const char* part : {"CoordGeom", "Cant"}) {
+      if (alignment.child(part).next_sibling(part))
+        problem(track + ": it has more than one <" + part + ">; only the first is read");
+    }
+    if (alignment.child("StaEquation"))
+      problem(track + ": station equations are not applied; stations count from its start");
+  }
+
   void read_alignment(const pugi::xml_node& node) {
     const pugi::xml_node geometry = node.child("CoordGeom");
     if (!geometry) return;
@@ -276,7 +285,7 @@ class Reader {
       problem(name + ": its elements cover " + std::to_string(plan_length) + " m of the " + std::to_string(told) +
               " m that it claims");
     }
-    if (node.child("StaEquation")) problem(name + ": station equations are not applied; stations count from its start");
+    tell_unread(node, name);
     std::vector<GradePoint> profile = read_profile(node, name, plan);
     std::vector<CantPoint> cant = read_cant(node, name, plan);
     ImportedTrack track{.name = name, .line = name, .alignment = {}, .marks = {}};

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <utility>
+#include <vector>
 
 #include "track/import/rail_net.hpp"
 
@@ -19,6 +20,10 @@ struct NetPlace {
 
 /// Whether a stretch goes on at this end in another stretch of the same thing, over a link that trains run.
 bool goes_on(const RailNet& net, const std::vector<NetPlace>& places, const NetPlace& place, bool at_end);
+
+/// Ends of tracks on which trains leave the thing beside where it goes on: the other leg of a switch inside it.
+std::vector<NetEnd> legs_outside(const RailNet& net, const std::vector<NetPlace>& places, const NetPlace& place,
+                                 bool at_end);
 
 /// The middle of the thing on every track that it crosses: stretches that follow one another are one. Track, offset.
 std::vector<std::pair<size_t, double>> middles(const RailNet& net, const std::vector<NetPlace>& places);

@@ -82,10 +82,6 @@ RailNet read_version(const XmlSource& source) {
   const std::string version = source.root().attribute("version").value();
   if (name == "railml" && version.starts_with("2.")) return read_railml2(source);
   if (name == "railML" && version.starts_with("3.")) return read_railml3(source);
-  if (const size_t colon = name.find(':'); colon != std::string::npos) {
-    throw core::BadInput(source.file_name() + " writes its elements with the prefix \"" + name.substr(0, colon + 1) +
-                         "\", which is not read: write railML's own without one");
-  }
   throw core::BadInput(source.file_name() + " is <" + name + "> version \"" + version +
                        "\"; railML 2.x and 3.x can be read");
 }

@@ -16,6 +16,21 @@ bool is_white(char letter) {
   return kWhite.find(letter) != std::string_view::npos;
 }
 
+/// <railml3:track> is <track> where the file's own namespace goes by that prefix, as its first element says.
+void strip_own_prefix(pugi::xml_document& document) {
+  struct Stripper : pugi::xml_tree_walker {
+    std::string prefix;
+    bool for_each(pugi::xml_node& at) override {
+      const std::string name = at.name();
+      if (name.starts_with(prefix)) at.set_name(name.substr(prefix.size()).c_str());
+      return true;
+    }
+  } stripper;
+  const std::string root = document.document_element().name();
+  stripper.prefix = root.substr(0, root.find(':') + 1);  // npos + 1 = 0
+  if (!stripper.prefix.empty()) document.traverse(stripper);
+}
+
 }  // namespace
 
 XmlSource::XmlSource(const std::filesystem::path& file) : file_name_(file.string()) {
@@ -27,6 +42,7 @@ XmlSource::XmlSource(const std::filesystem::path& file) : file_name_(file.string
     throw core::BadInput(file_name_ + " line " + line_at(parsed.offset) + ": this is not sound XML (" +
                          parsed.description() + ")");
   }
+  strip_own_prefix(document_);
 }
 
 std::string XmlSource::line_at(ptrdiff_t offset) const {

@@ -16,7 +16,7 @@ class XmlSource {
   /// Throws core::BadInput with file and line where the file cannot be read or is not sound XML.
   explicit XmlSource(const std::filesystem::path& file);
 
-  /// First element, without its namespace.
+  /// First element. It and all others go without the prefix that the first one has in the file.
   [[nodiscard]] pugi::xml_node root() const { return document_.document_element(); }
   [[nodiscard]] const std::string& file_name() const { return file_name_; }
   /// Where it stands in the file, from 1.

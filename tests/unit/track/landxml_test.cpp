@@ -136,6 +136,13 @@ TEST_F(LandXmlTest, TellsOfStationsOutsideTheAlignment) {
                                    AllOf(HasSubstr("L1: 2 of 2 cant stations"), HasSubstr(": 1100"))));
 }
 
+TEST_F(LandXmlTest, TellsWhatIsThereTwice) {
+  std::string text = kSample;
+  text.insert(text.find("</Alignment>"), "<Cant/>");
+  EXPECT_THAT(core::value_or_throw(read_landxml(write("a.xml", text))).problems,
+              testing::ElementsAre(HasSubstr("L1: it has more than one <Cant>")));
+}
+
 TEST_F(LandXmlTest, TakesTheDesignOutOfSeveralProfiles) {
   const std::string profile = "<Profile><ProfAlign>";
   const auto elevation_m = [&](const std::string& before, const std::string& of_design,
