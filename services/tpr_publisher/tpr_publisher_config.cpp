@@ -22,6 +22,7 @@ void GroundLinkConfig::describe(service::Fields& fields) {
 }
 
 core::Result<ground_link::MqttOptions> GroundLinkConfig::mqtt() const {
+  if (store.empty()) return core::Error{"tpr_publisher.ground_link.store is not set: name a file on a lasting disk."};
   ground_link::MqttOptions options;
   if (const auto address = ground_link::parse_broker(broker, options); !address.ok()) return address.error();
   options.ca_file = ca_file;
@@ -37,7 +38,6 @@ core::Result<ground_link::MqttOptions> GroundLinkConfig::mqtt() const {
 
 core::Status GroundLinkConfig::check() const {
   if (broker.empty()) return {};
-  if (store.empty()) return core::Error{"tpr_publisher.ground_link.store is not set: name a file on a lasting disk."};
   if (const auto options = mqtt(); !options.ok()) return options.error();
   return {};
 }
@@ -51,7 +51,6 @@ std::optional<GroundLinkSettings> GroundLinkConfig::settings(const std::string& 
     }
     return text;
   };
-  core::ok_or_throw(check());
   GroundLinkSettings settings;
   settings.mqtt = core::value_or_throw(mqtt());
   settings.mqtt.client_id = filled_in(client_id.empty() ? "railfix-{train}-{host}" : client_id);
@@ -110,17 +109,32 @@ Settings TprPublisherConfig::settings() const {
   settings.train_length_m = train_length_m;
   settings.foot_to_rear_m = foot_to_rear_m;
   settings.search_behind_m = search_behind_m;
-  settings.parameters.t_cycloc = static_cast<uint32_t>(t_cycloc_s);
-  settings.parameters.d_cycloc = static_cast<uint32_t>(d_cycloc_m);
-  settings.parameters.m_loc = m_loc == "groups" ? etcs::kReportAtGroups : etcs::kReportNotAtGroups;
-  if (!packet_58.empty()) {
-    const auto bytes = etcs::parse_hex(packet_58);
-    if (!bytes.ok()) throw core::BadInput("tpr_publisher.packet_58: " + bytes.error().message);
-    auto parameters = etcs::decode_report_parameters(bytes.value());
-    if (!parameters.ok()) throw core::BadInput("tpr_publisher.packet_58: " + parameters.error().message);
-    settings.parameters = std::move(parameters).value();
-  }
+  settings.parameters = core::value_or_throw(parameters());
   return settings;
+}
+
+core::Status TprPublisherConfig::check() const {
+  if (const auto link = ground_link.check(); !link.ok()) return link;
+  if (const auto out = parameters(); !out.ok()) return out.error();
+  return {};
+}
+
+core::Result<etcs::ReportParameters> TprPublisherConfig::parameters() const {
+  if (packet_58.empty()) {
+    etcs::ReportParameters parameters;
+    parameters.t_cycloc = static_cast<uint32_t>(t_cycloc_s);
+    parameters.d_cycloc = static_cast<uint32_t>(d_cycloc_m);
+    parameters.m_loc = m_loc == "groups" ? etcs::kReportAtGroups : etcs::kReportNotAtGroups;
+    return parameters;
+  }
+  const auto refused = [](const core::Error& error) {
+    return core::Error{"tpr_publisher.packet_58: " + error.message};
+  };
+  const auto bytes = etcs::parse_hex(packet_58);
+  if (!bytes.ok()) return refused(bytes.error());
+  auto parameters = etcs::decode_report_parameters(bytes.value());
+  if (!parameters.ok()) return refused(parameters.error());
+  return parameters;
 }
 
 }  // namespace railfix::tpr_publisher

@@ -32,7 +32,7 @@ struct GroundLinkConfig {
   [[nodiscard]] std::optional<GroundLinkSettings> settings(const std::string& train_id, const std::string& host) const;
 
  private:
-  /// Without the password.
+  /// Without the password. An error where the keys do not go together.
   [[nodiscard]] core::Result<ground_link::MqttOptions> mqtt() const;
 };
 
@@ -57,9 +57,13 @@ struct TprPublisherConfig {
   GroundLinkConfig ground_link;
 
   void describe(service::Fields& fields);
-  [[nodiscard]] core::Status check() const { return ground_link.check(); }
+  [[nodiscard]] core::Status check() const;
   /// Throws BadInput when packet_58 cannot be read.
   [[nodiscard]] Settings settings() const;
+
+ private:
+  /// Out of packet_58, or of the three keys before it.
+  [[nodiscard]] core::Result<etcs::ReportParameters> parameters() const;
 };
 
 }  // namespace railfix::tpr_publisher

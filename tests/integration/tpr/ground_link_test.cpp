@@ -161,6 +161,14 @@ TEST_F(GroundLinkTest, ACertificateWithoutAuthorityIsRefusedBeforeAnythingIsSent
   EXPECT_THAT(listen.err, HasSubstr("certificate and key without the broker's authority"));
 }
 
+TEST_F(GroundLinkTest, APacket58ThatCannotBeReadIsRefusedBeforeTheServiceStarts) {
+  auto command = linked_service("localhost:1", {"tpr_publisher.packet_58=3A80"});
+  command.emplace_back("--check");
+  const auto service = test::run_program(command, 20);
+  EXPECT_EQ(service.exit_code, 2);
+  EXPECT_THAT(service.err, HasSubstr("tpr_publisher.packet_58: "));
+}
+
 // Own authority, a certificate for the broker and one for the train, as docs/configuration/reports.md asks for.
 class Certificates {
  public:

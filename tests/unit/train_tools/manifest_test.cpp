@@ -427,6 +427,8 @@ TEST_F(TrainFolder, ReportsThatLeaveASecuredTrainInTheOpenAreTold) {
                                     HasSubstr("reports go to g:1883 without a name: the broker cannot tell")));
   EXPECT_THAT(told(", user: a, password_file: password"), ElementsAre(HasSubstr("without TLS")));
   EXPECT_THAT(told("", "run_as: programs"), IsEmpty()) << "nothing is locked down there";
+  EXPECT_THAT(told(", user: a, password_file: password", "run_as: programs"),
+              ElementsAre(HasSubstr("a password in plain text")));
 }
 
 TEST_F(TrainFolder, APageThatNobodyCanControlIsTold) {

@@ -85,8 +85,15 @@ void check_ground_link(const Manifest& manifest, Findings& findings) {
   const auto link = [&](const char* key) {
     return setting_of(manifest.settings, "tpr_publisher", std::string("ground_link.") + key);
   };
-  if (!manifest.security || manifest.service("tpr_publisher") == nullptr || link("broker").empty()) return;
+  if (manifest.service("tpr_publisher") == nullptr || link("broker").empty()) return;
   const std::string broker = "settings.tpr_publisher.ground_link: reports go to " + link("broker");
+  if (!manifest.security) {
+    if (!link("password_file").empty() && link("ca_file").empty())
+      warning(findings, broker +
+                            " with a password in plain text; set ca_file to the broker's authority, and the "
+                            "broker's port for TLS (8883)");
+    return;
+  }
   if (link("ca_file").empty())
     warning(findings, broker +
                           " without TLS: who is on the way reads and changes them; set ca_file to the broker's "
