@@ -1,8 +1,5 @@
 #include "service/notes.hpp"
 
-#include <fstream>
-#include <sstream>
-
 #include "core/whole_file.hpp"
 
 namespace railfix::service {
@@ -12,9 +9,7 @@ std::filesystem::path notes_path(const CommonConfig& common, const std::string& 
 }
 
 Notes::Notes(std::filesystem::path path) : path_(std::move(path)) {
-  std::stringstream text;
-  text << std::ifstream(path_, std::ios::binary).rdbuf();
-  kept_ = text.str();
+  if (auto text = core::read_whole(path_); text.ok()) kept_ = std::move(text).value();
 }
 
 void Notes::keep(const std::string& notes) {

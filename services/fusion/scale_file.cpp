@@ -2,8 +2,6 @@
 
 #include <cmath>
 #include <cstdio>
-#include <fstream>
-#include <sstream>
 
 #include "core/time.hpp"
 #include "core/whole_file.hpp"
@@ -36,11 +34,10 @@ ScaleFile::ScaleFile(std::filesystem::path path, spdlog::logger& log) : path_(st
 }
 
 void ScaleFile::read() {
-  std::ifstream file(path_, std::ios::binary);
-  if (!file) return;
-  std::stringstream text;
-  text << file.rdbuf();
-  auto saved = saved_scales(text.str());
+  std::error_code failed;
+  if (!std::filesystem::exists(path_, failed)) return;
+  const auto text = core::read_whole(path_);
+  auto saved = text.ok() ? saved_scales(text.value()) : text.error();
   if (!saved.ok()) {
     log_.warn("{} is not used: {}; it is replaced when references have taught them", path_.string(),
               saved.error().message);

@@ -1,7 +1,6 @@
 #include "monitor/static_files.hpp"
 
-#include <fstream>
-#include <sstream>
+#include "core/whole_file.hpp"
 
 namespace railfix::monitor {
 namespace {
@@ -64,9 +63,9 @@ Response StaticFiles::get(const Request& request) const {
     response.status = 304;
     return response;
   }
-  std::ostringstream content;
-  content << std::ifstream(file, std::ios::binary).rdbuf();
-  response.body = std::move(content).str();
+  auto content = core::read_whole(file);
+  if (!content.ok()) return {500, "text/plain; charset=utf-8", "this file cannot be read\n", "", "no-store"};
+  response.body = std::move(content).value();
   return response;
 }
 

@@ -1,10 +1,9 @@
 #include "recorder/recorder_thread.hpp"
 
-#include <fstream>
-#include <iterator>
 #include <utility>
 
 #include "core/time.hpp"
+#include "core/whole_file.hpp"
 
 namespace railfix::recorder {
 
@@ -159,11 +158,10 @@ core::Result<std::unique_ptr<Recording>> RecorderThread::create(const fs::path& 
   options.overwrite = !config_.file.empty() && file == config_.file;
   about_["started_ns"] = std::to_string(core::wall_ns());
   auto recording = Recording::create(file, options, about_);
-  std::ifstream configuration(config_.train_file);
-  if (!recording.ok() || config_.train_file.empty() || !configuration) return recording;
-  const std::string text{std::istreambuf_iterator<char>(configuration), {}};
+  const auto text = core::read_whole(config_.train_file);
+  if (!recording.ok() || !text.ok()) return recording;
   const auto status = recording.value()->write_metadata(
-      {"railfix_configuration", {{"file", config_.train_file}, {"text", without_secrets(text)}}});
+      {"railfix_configuration", {{"file", config_.train_file}, {"text", without_secrets(text.value())}}});
   if (!status.ok()) return status.error();
   return recording;
 }

@@ -9,6 +9,7 @@
 #include <optional>
 #include <set>
 
+#include "core/whole_file.hpp"
 #include "train/render.hpp"
 #include "train/topic_rights.hpp"
 
@@ -68,8 +69,7 @@ class Authority {
   [[nodiscard]] std::string trusted() const {
     std::string text;
     for (const char* name : {"ca", "next", "former"}) {
-      std::ifstream file(certificate(name));
-      text += std::string(std::istreambuf_iterator<char>(file), {});
+      if (const auto file = core::read_whole(certificate(name)); file.ok()) text += file.value();
     }
     return text;
   }
@@ -294,8 +294,8 @@ std::string permissions_xml(const Manifest& manifest, const std::string& service
 
 MissingRights missing_rights(const Manifest& manifest, const std::string& service, const std::string& host,
                              const fs::path& signed_file) {
-  std::ifstream file(signed_file);  // the text stands readable before its signature
-  const std::string given(std::istreambuf_iterator<char>(file), {});
+  const auto file = core::read_whole(signed_file);  // the text stands readable before its signature
+  const std::string given = file.ok() ? file.value() : "";
   const std::string wanted = permissions_xml(manifest, service, host, "", "");
   MissingRights missing{missing_values(wanted, given, "id", "domain "), {}};
   for (const std::string what : {"publish", "subscribe"}) {

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "core/fnv.hpp"
+#include "core/whole_file.hpp"
 #include "train/host_files.hpp"
 #include "train/setting_files.hpp"
 
@@ -121,8 +122,7 @@ std::string fingerprint(const fs::path& path) {
     files.push_back(path);
   }
   for (const auto& file : files) {
-    std::ifstream in(file, std::ios::binary);
-    for (std::istreambuf_iterator<char> byte(in), end; byte != end; ++byte) hash.add(*byte);
+    if (const auto text = core::read_whole(file); text.ok()) hash.add(text.value());
   }
   return std::to_string(hash.value());
 }
