@@ -54,15 +54,20 @@ Interval Estimator::widened(const Interval& interval) const {
   const double once_m = p.wheel_slip_share * std::min(unwatched_.way_m, unwatched_.fastest_mps * p.wheel_slip_s);
   const double slip_m = std::min(once_m + p.wheel_slip_per_m * unwatched_.way_m, p.wheel_slip_share * unwatched_.way_m);
   const bool held = gnss_proven() && used_within(Source::gnss, kHeldByGnssS);
-  const double most_m = held ? p.gnss_bound_m : std::numeric_limits<double>::infinity();
+  const double most_m = held ? gnss_bound_m() : std::numeric_limits<double>::infinity();
   // A wheel that slides counts less than it is judged by.
   const double slide_m = slip_m / (1 - std::min(p.wheel_slip_share, 0.9));
   return {interval.behind_m - std::min(slip_m + unwatched_.hidden_m + unwatched_.behind_m, most_m),
           interval.ahead_m + std::min(slide_m + unwatched_.hidden_m + unwatched_.ahead_m, most_m)};
 }
 
+double Estimator::gnss_bound_m() const {
+  return parameters_->gnss_bound_m + parameters_->gnss_lag_s * std::abs(filter_.speed_mps());
+}
+
 TrainEstimate Estimator::estimate(const Interval& promised, double since_sure_m) const {
   TrainEstimate e;
+  e.integrity = Integrity::ok;
   e.stamp_ns = filter_.stamp_ns();
   e.distance_m = filter_.value(StateIndex::distance);
   e.speed_mps = filter_.speed_mps();
@@ -81,6 +86,10 @@ TrainEstimate Estimator::estimate(const Interval& promised, double since_sure_m)
   const double centre_m = path_ ? e.path_distance_m : e.distance_m;
   e.over_m = std::max(0.0, centre_m - promised.behind_m);
   e.under_m = std::max(0.0, promised.ahead_m - centre_m);
+  if (!std::isfinite(centre_m + e.sigma_m + promised.behind_m + promised.ahead_m)) {
+    e.over_m = e.under_m = std::numeric_limits<double>::infinity();
+    e.degrade("the filter's numbers ran over");
+  }
   judge(e, since_sure_m);
   return e;
 }
@@ -112,7 +121,6 @@ bool Estimator::silent(Source source) const {
 }
 
 void Estimator::judge(TrainEstimate& e, double since_sure_m) const {
-  e.integrity = Integrity::ok;
   judge_sensors(e);
   judge_place(e);
   judge_bounds(e, since_sure_m);

@@ -93,6 +93,8 @@ class Estimator {
   void do_without(Source source) { watched(source).isolated = watched(source).convicted = false; }
   /// GNSS has agreed with the motion for a while.
   [[nodiscard]] bool gnss_proven() const { return gnss_agreed_ >= kGnssProof; }
+  /// What GNSS that agrees with the motion may still be wrong by.
+  [[nodiscard]] double gnss_bound_m() const;
   /// Takes over place and speed, as independent knowledge.
   void place_like(const Estimator& other);
   /// The train may be so far beyond the interval's ends, until a fix says where it is.

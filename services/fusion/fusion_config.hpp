@@ -85,7 +85,8 @@ struct FusionConfig {
     f.number("gnss_map_sigma_m", p.gnss_map_sigma_m, {0, 50}, "m", "Antenna's place on the train and map.");
     f.number("gnss_error_time_s", p.gnss_error_time_s, {0, 3600}, "s", "How long one error of GNSS lasts.");
     f.number("gnss_bound_m", p.gnss_bound_m, {0, 1000}, "m",
-             "A lasting error of GNSS that agrees with the motion is no larger; the interval allows for it.");
+             "A lasting error of GNSS that agrees with the motion is no larger; the interval allows for it, ...");
+    f.number("gnss_lag_s", p.gnss_lag_s, {0, 10}, "s", "... and for stamps that are so late.");
     f.number("gnss_antenna_ahead_m", p.gnss_antenna_ahead_m, {-500, 500}, "m", "Antenna ahead of the camera's foot.");
     f.number("shape_error_sigma_m", p.shape_error_sigma_m, {0, 100}, "m",
              "Fixes from the track's shape, and the turning, err alike by so much ...");

@@ -47,7 +47,8 @@ struct FusionParameters {
   double gnss_rtk_float_sigma_m = 0.5;
   double gnss_map_sigma_m = 0.3;  // antenna's lever arm and map
   double gnss_error_time_s = 60.0;
-  double gnss_bound_m = 15.0;         // an error that the tests do not see is no larger
+  double gnss_bound_m = 30.0;         // an error that the tests do not see is no larger, ...
+  double gnss_lag_s = 1.0;            // ... but for a stamp that is so late
   double gnss_antenna_ahead_m = 0.0;  // of the camera's foot
 
   // The shape of the track (fixes of kind curvature, turning): it lies elsewhere than on the map, and seems to.

@@ -101,9 +101,10 @@ void Hypotheses::ask(Rival& rival) {
   Interval its = other.interval();
   double apart_m = other.centre_m() - main_.centre_m();
   if (rival.without == Source::gnss && main_.gnss_proven()) {
-    apart_m = std::clamp(apart_m, -parameters_->gnss_bound_m, parameters_->gnss_bound_m);
-    its.behind_m = std::max(its.behind_m, mine.behind_m - parameters_->gnss_bound_m);
-    its.ahead_m = std::min(its.ahead_m, mine.ahead_m + parameters_->gnss_bound_m);
+    const double most_m = main_.gnss_bound_m();
+    apart_m = std::clamp(apart_m, -most_m, most_m);
+    its.behind_m = std::max(its.behind_m, mine.behind_m - most_m);
+    its.ahead_m = std::min(its.ahead_m, mine.ahead_m + most_m);
   }
   // Since it came back both have gone on from one place: how far they come apart since adds to what it had said before.
   rival.excess.behind_m = std::max(rival.carried.behind_m + std::max(0.0, -apart_m), mine.behind_m - its.behind_m);

@@ -40,7 +40,7 @@ Range bias_range(Sensor sensor) {
 Range drift_range(Sensor sensor) {
   switch (sensor) {
     case Sensor::gnss:
-      return {3, 12};  // unseen, slow: multipath; faster ones are seen as a bias is
+      return {3, 60};  // slow: multipath; faster ones are seen as a bias is
     case Sensor::clock:
       return {1e-5, 1e-3};
     case Sensor::shape:
@@ -60,6 +60,8 @@ double random_size(core::Random& random, Sensor sensor, FaultKind kind) {
       return 10;
     case FaultKind::delay:
       return std::abs(between(random, {0.05, 2.5}));
+    case FaultKind::lag:
+      return std::abs(between(random, {0.1, 1.5}));
     case FaultKind::wrong_landmark:
       return between(random, {1, 400});
     case FaultKind::wrong_sighting:
@@ -80,7 +82,7 @@ std::string to_string(Sensor sensor) {
 
 std::string to_string(FaultKind kind) {
   static const std::array names{"none",           "bias",         "drift",     "stuck", "noise",
-                                "outliers",       "dropout",      "blind",     "delay", "wrong landmark",
+                                "outliers",       "dropout",      "blind",     "delay", "lag", "wrong landmark",
                                 "wrong sighting", "wrong branch", "clock step"};
   return names.at(static_cast<size_t>(kind));
 }
@@ -104,6 +106,7 @@ const std::vector<std::pair<Sensor, FaultKind>>& all_faults() {
     all.emplace_back(Sensor::clock, FaultKind::clock_step);
     all.emplace_back(Sensor::clock, FaultKind::drift);
     all.emplace_back(Sensor::fix, FaultKind::wrong_sighting);
+    all.emplace_back(Sensor::gnss, FaultKind::lag);
     return all;
   }();
   return list;

@@ -326,7 +326,8 @@ void TrainSimulation::make_gnss() {
   for (int i = 0; i <= duration_s(); ++i) {
     east = 0.98 * east + 0.4 * random.normal();
     north = 0.98 * north + 0.4 * random.normal();
-    const auto pose = path_->at(drive_.at(i).distance_m).pose;
+    const double lag_s = faulty(Sensor::gnss, FaultKind::lag, i) ? fault.size : 0;
+    const auto pose = path_->at(drive_.at(i - lag_s).distance_m).pose;
     const double noisy_east = random.normal();
     const double noisy_north = random.normal();
     const double times = faulty(Sensor::gnss, FaultKind::noise, i) ? 3 * fault.size : 0;
