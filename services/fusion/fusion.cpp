@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <initializer_list>
+#include <limits>
 #include <tuple>
 
 #include "core/time.hpp"
@@ -19,34 +19,31 @@ constexpr double kBesideM = 50.0;     // beyond the interval: what is further of
 constexpr double kNoCameraS = 0.3;
 constexpr int64_t kSnapshotNs = 50'000'000;
 constexpr int64_t kSlipUnseenNs = 1'200'000'000;  // a slip may have grown for so long before it is found
-constexpr int kJumpsToBelieve = 3;
-constexpr size_t kBackwardToBelieve = 5;
-constexpr int64_t kSpacingNs = 10'000'000;  // of samples, about
+constexpr double kMeanSpeedS = 1.0;               // over longer times a mean speed says little of the speed now
+constexpr size_t kMostEarly = 50;
 
-int64_t stamp_of(const Event& event) {
-  return std::visit([](const auto& input) { return input.stamp_ns; }, event);
-}
-
-bool finite(std::initializer_list<double> numbers) {
-  return std::all_of(numbers.begin(), numbers.end(), [](double number) { return std::isfinite(number); });
+// Beyond what any train has, squares of it run over.
+bool within(double number, double most) {
+  return std::abs(number) <= most;  // false for NaN, too
 }
 bool has_sense(const ImuInput& e) {
-  return finite({e.accel_x_mps2, e.rate_z_rps});
+  return within(e.accel_x_mps2, 1e3) && within(e.rate_z_rps, 1e3);
 }
 bool has_sense(const WheelInput& e) {
-  return finite({e.pulses_per_metre}) && e.pulses_per_metre > 0;
+  return within(e.pulses_per_metre, 1e6) && e.pulses_per_metre > 0 && within(static_cast<double>(e.pulses), 1e15);
 }
 bool has_sense(const PictureInput&) {
   return true;
 }
 bool has_sense(const OdometryInput& e) {
-  return finite({e.step_m, e.step_sigma_m}) && (!e.valid || e.reference_stamp_ns < e.stamp_ns);
+  return within(e.step_m, 1e6) && within(e.step_sigma_m, 1e6) && (!e.valid || e.reference_stamp_ns != e.stamp_ns);
 }
 bool has_sense(const GnssInput& e) {
-  return finite({e.easting_m, e.northing_m, e.hdop});
+  return within(e.easting_m, 1e9) && within(e.northing_m, 1e9) && within(e.hdop, 1e6);
 }
 bool has_sense(const FixInput& e) {
-  return finite({e.offset_m, e.probability}) && (std::isfinite(e.sigma_m) || e.kind == FixKind::track);
+  const bool sigma = e.kind == FixKind::track ? true : within(e.sigma_m, 1e7);
+  return sigma && within(e.offset_m, 1e9) && e.probability >= 0 && e.probability <= 1;
 }
 
 // Two fixes may have one stamp; everything else has one measurement for each stamp.
@@ -73,9 +70,14 @@ Fusion::Fusion(const FusionParameters& parameters, std::shared_ptr<const track::
       path_(std::move(path)),
       saved_(saved) {}
 
-void Fusion::begin(int64_t stamp_ns) {
-  const auto scales = saved_ ? std::optional(aged(*saved_, stamp_ns, *parameters_)) : std::nullopt;
-  now_.emplace(parameters_.get(), scales, path_, stamp_ns);
+void Fusion::begin_before(const Event& event) {
+  // The first step counts from a picture before it: begin there.
+  const auto* step = std::get_if<OdometryInput>(&event);
+  const bool from_reference = step && step->reference_stamp_ns < step->stamp_ns &&
+                              core::seconds(step->stamp_ns - step->reference_stamp_ns) < parameters_->max_jump_s;
+  const int64_t begin_ns = (from_reference ? step->reference_stamp_ns : stamp_of(event)) - 1;
+  const auto scales = saved_ ? std::optional(aged(*saved_, begin_ns, *parameters_)) : std::nullopt;
+  now_.emplace(parameters_.get(), scales, path_, begin_ns);
   snapshots_.push_back(*now_);
 }
 
@@ -86,7 +88,7 @@ SavedScalesAre Fusion::saved_scales() const {
 void Fusion::drop_saved_scales() {
   saved_.reset();
   if (now_) now_->drop_saved();
-  if (before_backward_) before_backward_->drop_saved();
+  if (before_behind_) before_behind_->drop_saved();
   for (auto& snapshot : snapshots_) snapshot.drop_saved();
 }
 
@@ -99,16 +101,36 @@ std::optional<TrainEstimate> Fusion::add(Event event) {
     ++counts_.nonsense;
     return std::nullopt;
   }
-  const auto* step = std::get_if<OdometryInput>(&event);
-  if (!now_) {
-    // The first step counts from a picture before it: begin there.
-    const bool from_reference = step && step->reference_stamp_ns < step->stamp_ns &&
-                                core::seconds(step->stamp_ns - step->reference_stamp_ns) < parameters_->max_jump_s;
-    begin((from_reference ? step->reference_stamp_ns : stamp_of(event)) - 1);
+  if (is_early(event)) {
+    early_.push_back(std::get<GnssInput>(event));
+    if (early_.size() > kMostEarly) early_.pop_front();
+    return std::nullopt;
   }
-  if (is_clock_set_back(event)) return set_clock_back();
-  if (!believable(event)) return std::nullopt;
-  newest_ns_[event.index()] = std::max(newest_ns_[event.index()], stamp_of(event));
+  if (!now_) begin_before(event);
+  const int64_t oldest_ns = snapshots_.front().stamp_ns();
+  const auto [stamp, believed] = stamps_.judge(event, now_->stamp_ns(), oldest_ns, parameters_->max_jump_s);
+  if (stamp == Stamp::ahead) return hear_ahead(event, believed);
+  if (!stamps_.holds(Stamp::behind)) {
+    before_behind_.reset();
+  } else if (!before_behind_) {
+    catch_up();
+    before_behind_ = *now_;
+  }
+  if (stamp == Stamp::behind && believed) {
+    // What the samples did to the state before the new clock was believed is undone.
+    now_ = std::move(before_behind_);
+    return set_clock(stamps_.take_held(Stamp::behind), event.index());
+  }
+  if (stamp_of(event) <= oldest_ns) {
+    ++counts_.too_late;
+    return std::nullopt;
+  }
+  const auto estimate = use(std::move(event));
+  use_waiting();
+  return estimate;
+}
+
+std::optional<TrainEstimate> Fusion::use(Event event) {
   if (auto* fix = std::get_if<FixInput>(&event)) {
     catch_up();
     start_position(*fix);
@@ -117,7 +139,11 @@ std::optional<TrainEstimate> Fusion::add(Event event) {
       return std::nullopt;
     }
   }
-  if (step) remember_reference(*step);
+  if (const auto* wheel = std::get_if<WheelInput>(&event)) last_wheel_ = *wheel;
+  if (auto* step = std::get_if<OdometryInput>(&event)) {
+    anchor(*step);
+    remember_reference(*step);
+  }
   follow_path_on();
   return insert(event);
 }
@@ -144,61 +170,6 @@ std::optional<int64_t> Fusion::latest_stamp_ns() const {
 const Estimator* Fusion::estimator() {
   catch_up();
   return now_ ? &now_->main() : nullptr;
-}
-
-// A single wild stamp must not carry the train away; a clock that was really set is followed.
-bool Fusion::believable(const Event& event) {
-  const int64_t stamp_ns = stamp_of(event);
-  auto& ahead_in_row = ahead_in_row_[event.index()];
-  if (core::seconds(stamp_ns - now_->stamp_ns()) > parameters_->max_jump_s && ++ahead_in_row < kJumpsToBelieve) {
-    ++counts_.jumped;
-    return false;
-  }
-  ahead_in_row = 0;
-  if (stamp_ns > snapshots_.front().stamp_ns()) return true;
-  ++counts_.too_late;
-  return false;
-}
-
-// Samples of one sensor come in order, so several in a row that are older than their own kind's newest mean that the
-// clock was set back.
-bool Fusion::is_clock_set_back(const Event& event) {
-  if (std::holds_alternative<FixInput>(event) || std::holds_alternative<GnssInput>(event)) return false;
-  const int64_t newest_ns = newest_ns_[event.index()];
-  if (newest_ns == 0 || stamp_of(event) > newest_ns) {
-    backward_.clear();
-    return false;
-  }
-  if (backward_.empty()) {
-    catch_up();
-    before_backward_ = *now_;
-  }
-  backward_.push_back(event);
-  return backward_.size() >= kBackwardToBelieve;
-}
-
-// What the samples did to the state before the new clock was believed is undone; then they are used in it.
-std::optional<TrainEstimate> Fusion::set_clock_back() {
-  ++counts_.clock_resets;
-  const std::vector<Event> again = std::move(backward_);
-  backward_.clear();
-  int64_t first_ns = stamp_of(again.front());
-  for (const auto& event : again) first_ns = std::min(first_ns, stamp_of(event));
-  now_ = std::move(before_backward_);
-  before_backward_.reset();
-  now_->rebase_clock(first_ns - kSpacingNs);
-  events_.clear();
-  snapshots_.assign(1, *now_);
-  slips_.clear();
-  replay_from_ns_.reset();
-  newest_ns_.fill(0);
-  ahead_in_row_.fill(0);
-  last_output_ns_ = last_odometry_ns_ = 0;
-  std::optional<TrainEstimate> last;
-  for (const auto& event : again) {
-    if (auto state = add(event)) last = std::move(state);
-  }
-  return last;
 }
 
 void Fusion::start_position(FixInput& fix) const {
@@ -245,8 +216,27 @@ void Fusion::follow_path_on() {
   if (!longer) return;
   const auto shared = std::make_shared<const track::Path>(std::move(*longer));
   now_->follow_on(path, shared);
-  if (before_backward_) before_backward_->follow_on(path, shared);
+  if (before_behind_) before_behind_->follow_on(path, shared);
   for (auto& snapshot : snapshots_) snapshot.follow_on(path, shared);
+}
+
+// At rest odometry keeps its reference picture, and that may be older than fusion, or of the clock before: then the
+// first step that counts from it is taken off the next ones, which count from the first one's picture so.
+void Fusion::anchor(OdometryInput& step) {
+  const auto knows = [&](int64_t picture_ns) {
+    return picture_ns < step.stamp_ns &&
+           (now_->main().knows_picture(picture_ns) || picture_ns > snapshots_.front().stamp_ns());
+  };
+  if (!step.valid || knows(step.reference_stamp_ns)) return;
+  if (anchor_ && anchor_->reference_stamp_ns == step.reference_stamp_ns && knows(anchor_->stamp_ns)) {
+    step.reference_stamp_ns = anchor_->stamp_ns;
+    step.step_m -= anchor_->step_m;
+    step.step_sigma_m = std::hypot(step.step_sigma_m, anchor_->step_sigma_m);
+    return;
+  }
+  anchor_ = step;
+  const double since_s = core::seconds(step.stamp_ns - step.reference_stamp_ns);
+  step.valid = since_s > 0 && since_s < kMeanSpeedS;
 }
 
 void Fusion::remember_reference(const OdometryInput& step) {

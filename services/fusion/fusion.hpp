@@ -4,7 +4,6 @@
 // belong and everything behind them is replayed from a snapshot, when the next state is wanted.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <deque>
 #include <memory>
@@ -15,6 +14,7 @@
 #include "fusion/fusion_types.hpp"
 #include "fusion/odometer_scales.hpp"
 #include "fusion/scale_trial.hpp"
+#include "fusion/stamp_watch.hpp"
 #include "track/path.hpp"
 
 namespace railfix::fusion {
@@ -25,7 +25,7 @@ struct FusionCounts {
   uint64_t too_late = 0;   // older than the history
   uint64_t repeated = 0;   // the same sensor and stamp again
   uint64_t jumped = 0;     // stamp too far ahead to be believed
-  uint64_t nonsense = 0;   // not a number, counts from the future, no pulses per metre
+  uint64_t nonsense = 0;   // not a number, or none that a train can have
   uint64_t elsewhere = 0;  // tracks that are not where the train is
   uint64_t clock_resets = 0;
 };
@@ -63,10 +63,14 @@ class Fusion {
   };
   Fusion(const FusionParameters& parameters, std::shared_ptr<const track::Map> map,
          std::shared_ptr<const track::Path> path, const std::optional<SavedScales>& saved);
-  void begin(int64_t stamp_ns);
-  [[nodiscard]] bool believable(const Event& event);
-  [[nodiscard]] bool is_clock_set_back(const Event& event);
-  std::optional<TrainEstimate> set_clock_back();
+  void begin_before(const Event& event);
+  std::optional<TrainEstimate> use(Event event);
+  std::optional<TrainEstimate> hear_ahead(const Event& event, bool believed);
+  std::optional<TrainEstimate> set_clock(const std::vector<Event>& held, size_t decided_by);
+  [[nodiscard]] bool clock_was_set(const std::vector<Event>& held, size_t decided_by) const;
+  [[nodiscard]] bool is_early(const Event& event) const;
+  void use_waiting();
+  void anchor(OdometryInput& step);
   void start_position(FixInput& fix) const;
   bool change_track(FixInput& fix);
   void follow_path_on();
@@ -96,10 +100,11 @@ class Fusion {
   FusionCounts counts_;
   int64_t last_output_ns_ = 0;
   int64_t last_odometry_ns_ = 0;
-  std::array<int64_t, std::variant_size_v<Event>> newest_ns_{};  // of each kind
-  std::vector<Event> backward_;                                  // the last ones, each not newer than its kind's newest
-  std::optional<ScaleTrial> before_backward_;                    // the state before them
-  std::array<int, std::variant_size_v<Event>> ahead_in_row_{};
+  StampWatch stamps_;
+  std::optional<ScaleTrial> before_behind_;  // the state before those that are behind
+  std::deque<GnssInput> early_;              // GNSS that waits for what measures motion
+  std::optional<WheelInput> last_wheel_;
+  std::optional<OdometryInput> anchor_;  // the first step that counts from a picture before all that is known
 };
 
 }  // namespace railfix::fusion

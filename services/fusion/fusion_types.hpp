@@ -68,6 +68,10 @@ struct PictureInput {
 /// In the order in which events of the same stamp are used.
 using Event = std::variant<ImuInput, WheelInput, PictureInput, OdometryInput, GnssInput, FixInput>;
 
+inline int64_t stamp_of(const Event& event) {
+  return std::visit([](const auto& input) { return input.stamp_ns; }, event);
+}
+
 /// What the wheel said then is taken back: behind from_ns, up to until_ns, when its slip was found.
 struct WheelBlock {
   int64_t from_ns = 0;

@@ -58,7 +58,7 @@ void MotionFilter::choose_unit(Odometer odometer) {
 void MotionFilter::predict_to(int64_t stamp_ns, const FusionParameters& parameters) {
   const double dt_s = core::seconds(stamp_ns - stamp_ns_);
   if (dt_s > 0) {
-    const int steps = std::clamp(static_cast<int>(std::ceil(dt_s / kLongestStepS)), 1, 100);
+    const int steps = static_cast<int>(std::clamp(std::ceil(dt_s / kLongestStepS), 1.0, 100.0));
     for (int k = 0; k < steps; ++k) step(dt_s / steps, parameters);
   }
   stamp_ns_ = std::max(stamp_ns, stamp_ns_);
@@ -348,7 +348,8 @@ void MotionFilter::remove_clone(int index) {
 Offer MotionFilter::offer(const StateVector& h, double residual, double sigma, double gate) {
   const double r = squared(sigma);
   const auto innovation = ud_.innovation(h, residual, r);
-  const bool inside = innovation.nis <= squared(gate);  // false for NaN too
+  // False for NaN, too.
+  const bool inside = std::isfinite(innovation.variance) && innovation.nis <= squared(gate);
   if (inside) x_ += ud_.update(h, residual, r);
   return {inside, residual, innovation.nis};
 }
