@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <utility>
 
 #include "core/time.hpp"
 
@@ -64,79 +65,99 @@ void MotionFilter::predict_to(int64_t stamp_ns, const FusionParameters& paramete
   stamp_ns_ = std::max(stamp_ns, stamp_ns_);
 }
 
-void MotionFilter::step(double dt_s, const FusionParameters& p) {
-  const int n = static_cast<int>(x_.size());
+MotionFilter::Prediction MotionFilter::prediction(double dt_s, const FusionParameters& p) const {
+  Prediction m;
+  const double tau = p.acceleration_time_s;
+  m.dt_s = dt_s;
+  m.acceleration_keep = std::exp(-dt_s / tau);
+  m.speed_per_accel = tau * (1 - m.acceleration_keep);
+  m.way_per_accel = tau * (dt_s - m.speed_per_accel);
+  m.way_m = value(StateIndex::speed) * dt_s + value(StateIndex::acceleration) * m.way_per_accel;
+  m.per_camera = 1 / to_unit(Odometer::camera);
+  m.per_wheel = 1 / to_unit(Odometer::wheel);
+  // A scale walks, but stays within its sigma.
+  const auto scale_keep = [&](double walk, double sigma) {
+    return std::exp(-0.5 * squared(walk / sigma) * std::abs(m.way_m));
+  };
+  m.unit_keep = scale_keep(p.visual_scale_walk, p.visual_scale_sigma);
+  m.other_keep = scale_keep(p.wheel_scale_walk, p.wheel_scale_sigma);
+  m.unit_noise = squared(p.visual_scale_sigma) * (1 - squared(m.unit_keep));
+  m.other_noise = squared(p.wheel_scale_sigma) * (1 - squared(m.other_keep));
+  if (unit_ == Odometer::wheel) {
+    std::swap(m.unit_keep, m.other_keep);
+    std::swap(m.unit_noise, m.other_noise);
+  }
+  m.shape_keep = std::exp(-std::abs(m.way_m) / p.shape_error_length_m);
+  m.gnss_keep = p.gnss_error_time_s > 0 ? std::exp(-dt_s / p.gnss_error_time_s) : 0.0;
+  return m;
+}
+
+StateMatrix MotionFilter::transition(const Prediction& m) const {
+  const auto n = x_.size();
   const int camera = index(StateIndex::camera_odometer);
+  const int wheel = index(StateIndex::wheel_odometer);
   const int distance = index(StateIndex::distance);
   const int speed = index(StateIndex::speed);
   const int acceleration = index(StateIndex::acceleration);
-  const int wheel = index(StateIndex::wheel_odometer);
   const int unit_scale = index(StateIndex::unit_scale);
   const int other_scale = index(StateIndex::other_scale);
-  const double tau = p.acceleration_time_s;
-  const double keep = std::exp(-dt_s / tau);
-  const double speed_per_accel = tau * (1 - keep);
-  const double way_per_accel = tau * (dt_s - speed_per_accel);
-  const double way_m = x_(speed) * dt_s + x_(acceleration) * way_per_accel;  // in unit metres
   const double k = 1 + x_(unit_scale);
-  const double per_camera = 1 / to_unit(Odometer::camera);
-  const double per_wheel = 1 / to_unit(Odometer::wheel);
-  const bool camera_unit = unit_ != Odometer::wheel;
-  // A scale walks, but stays within its sigma.
-  const auto scale_keep = [&](double walk, double sigma) {
-    return std::exp(-0.5 * squared(walk / sigma) * std::abs(way_m));
-  };
-  const double visual_keep = scale_keep(p.visual_scale_walk, p.visual_scale_sigma);
-  const double wheel_keep = scale_keep(p.wheel_scale_walk, p.wheel_scale_sigma);
-  const double visual_noise = squared(p.visual_scale_sigma) * (1 - squared(visual_keep));
-  const double wheel_noise = squared(p.wheel_scale_sigma) * (1 - squared(wheel_keep));
-
   StateMatrix phi = StateMatrix::Identity(n, n);
-  phi(unit_scale, unit_scale) = camera_unit ? visual_keep : wheel_keep;
-  phi(other_scale, other_scale) = camera_unit ? wheel_keep : visual_keep;
-  phi(camera, speed) = per_camera * dt_s;
-  phi(camera, acceleration) = per_camera * way_per_accel;
-  phi(distance, speed) = k * dt_s;
-  phi(distance, acceleration) = k * way_per_accel;
-  phi(distance, unit_scale) = way_m;
-  phi(speed, acceleration) = speed_per_accel;
-  phi(acceleration, acceleration) = keep;
-  phi(wheel, speed) = per_wheel * dt_s;
-  phi(wheel, acceleration) = per_wheel * way_per_accel;
-  phi(camera_unit ? wheel : camera, other_scale) = -way_m * squared(camera_unit ? per_wheel : per_camera);
-  const double shape_keep = std::exp(-std::abs(way_m) / p.shape_error_length_m);
-  const double gnss_keep = p.gnss_error_time_s > 0 ? std::exp(-dt_s / p.gnss_error_time_s) : 0.0;
-  phi(index(StateIndex::shape_error), index(StateIndex::shape_error)) = shape_keep;
-  phi(index(StateIndex::gnss_error), index(StateIndex::gnss_error)) = gnss_keep;
+  phi(unit_scale, unit_scale) = m.unit_keep;
+  phi(other_scale, other_scale) = m.other_keep;
+  phi(camera, speed) = m.per_camera * m.dt_s;
+  phi(camera, acceleration) = m.per_camera * m.way_per_accel;
+  phi(distance, speed) = k * m.dt_s;
+  phi(distance, acceleration) = k * m.way_per_accel;
+  phi(distance, unit_scale) = m.way_m;
+  phi(speed, acceleration) = m.speed_per_accel;
+  phi(acceleration, acceleration) = m.acceleration_keep;
+  phi(wheel, speed) = m.per_wheel * m.dt_s;
+  phi(wheel, acceleration) = m.per_wheel * m.way_per_accel;
+  if (unit_ == Odometer::wheel) {
+    phi(camera, other_scale) = -m.way_m * squared(m.per_camera);
+  } else {
+    phi(wheel, other_scale) = -m.way_m * squared(m.per_wheel);
+  }
+  phi(index(StateIndex::shape_error), index(StateIndex::shape_error)) = m.shape_keep;
+  phi(index(StateIndex::gnss_error), index(StateIndex::gnss_error)) = m.gnss_keep;
+  return phi;
+}
 
-  const int noisy[] = {acceleration,
-                       index(StateIndex::accel_bias),
-                       unit_scale,
-                       other_scale,
-                       camera,
-                       wheel,
-                       index(StateIndex::gyro_bias),
-                       index(StateIndex::shape_error),
-                       index(StateIndex::gnss_error)};
-  constexpr int kNoisy = static_cast<int>(std::size(noisy));
-  StateVector q(kNoisy);
-  q << squared(p.acceleration_sigma_mps2) * (1 - squared(keep)), squared(p.accel_bias_walk) * dt_s,
-      camera_unit ? visual_noise : wheel_noise, camera_unit ? wheel_noise : visual_noise,
-      squared(p.visual_creep) * std::abs(way_m), squared(p.wheel_creep) * std::abs(way_m), 1e-10 * dt_s,
-      squared(p.shape_error_sigma_m) * (1 - squared(shape_keep)), 1 - squared(gnss_keep);
-  StateMatrix g = StateMatrix::Zero(n, kNoisy);
-  for (int i = 0; i < kNoisy; ++i) g(noisy[i], i) = 1;
-  ud_.propagate(phi, g, q);
+void MotionFilter::step(double dt_s, const FusionParameters& p) {
+  const Prediction m = prediction(dt_s, p);
+  const double way_m = std::abs(m.way_m);
+  const std::pair<StateIndex, double> noises[] = {
+      {StateIndex::acceleration, squared(p.acceleration_sigma_mps2) * (1 - squared(m.acceleration_keep))},
+      {StateIndex::accel_bias, squared(p.accel_bias_walk) * dt_s},
+      {StateIndex::unit_scale, m.unit_noise},
+      {StateIndex::other_scale, m.other_noise},
+      {StateIndex::camera_odometer, squared(p.visual_creep) * way_m},
+      {StateIndex::wheel_odometer, squared(p.wheel_creep) * way_m},
+      {StateIndex::gyro_bias, 1e-10 * dt_s},
+      {StateIndex::shape_error, squared(p.shape_error_sigma_m) * (1 - squared(m.shape_keep))},
+      {StateIndex::gnss_error, 1 - squared(m.gnss_keep)}};
+  constexpr int kNoises = static_cast<int>(std::size(noises));
+  StateMatrix g = StateMatrix::Zero(x_.size(), kNoises);
+  StateVector q(kNoises);
+  for (int i = 0; i < kNoises; ++i) {
+    g(index(noises[i].first), i) = 1;
+    q(i) = noises[i].second;
+  }
+  ud_.propagate(transition(m), g, q);
+  move(m);
+}
 
-  x_(camera) += way_m * per_camera;
-  x_(distance) += k * way_m;
-  x_(wheel) += way_m * per_wheel;
-  x_(speed) += x_(acceleration) * speed_per_accel;
-  x_(acceleration) *= keep;
-  x_(unit_scale) *= camera_unit ? visual_keep : wheel_keep;
-  x_(other_scale) *= camera_unit ? wheel_keep : visual_keep;
-  x_(index(StateIndex::shape_error)) *= shape_keep;
-  x_(index(StateIndex::gnss_error)) *= gnss_keep;
+void MotionFilter::move(const Prediction& m) {
+  x_(index(StateIndex::camera_odometer)) += m.way_m * m.per_camera;
+  x_(index(StateIndex::distance)) += (1 + x_(index(StateIndex::unit_scale))) * m.way_m;
+  x_(index(StateIndex::wheel_odometer)) += m.way_m * m.per_wheel;
+  x_(index(StateIndex::speed)) += x_(index(StateIndex::acceleration)) * m.speed_per_accel;
+  x_(index(StateIndex::acceleration)) *= m.acceleration_keep;
+  x_(index(StateIndex::unit_scale)) *= m.unit_keep;
+  x_(index(StateIndex::other_scale)) *= m.other_keep;
+  x_(index(StateIndex::shape_error)) *= m.shape_keep;
+  x_(index(StateIndex::gnss_error)) *= m.gnss_keep;
 }
 
 void MotionFilter::rebase_clock(int64_t stamp_ns) {

@@ -129,7 +129,26 @@ class MotionFilter {
   [[nodiscard]] double unit_scale() const { return 1 + value(StateIndex::unit_scale); }
   [[nodiscard]] estimation::StateVector row() const;
   [[nodiscard]] estimation::StateVector scale_row(Odometer odometer) const;
+  /// One step of time: what of every state is kept, and what it adds to others.
+  struct Prediction {
+    double dt_s = 0;
+    double acceleration_keep = 0;
+    double speed_per_accel = 0;
+    double way_per_accel = 0;
+    double way_m = 0;  // in metres of the unit, as counted by ...
+    double per_camera = 1;
+    double per_wheel = 1;
+    double unit_keep = 1;
+    double other_keep = 1;
+    double unit_noise = 0;
+    double other_noise = 0;
+    double shape_keep = 1;
+    double gnss_keep = 1;
+  };
+  [[nodiscard]] Prediction prediction(double dt_s, const FusionParameters& p) const;
+  [[nodiscard]] estimation::StateMatrix transition(const Prediction& m) const;
   void step(double dt_s, const FusionParameters& parameters);
+  void move(const Prediction& m);
   void remove_clone(int index);
   void forget_clones();
   Offer offer(const estimation::StateVector& h, double residual, double sigma, double gate);
