@@ -343,6 +343,8 @@ bool Fusion::due(const Event& event) const {
 std::optional<TrainEstimate> Fusion::give(TrainEstimate estimate) {
   if (estimate.stamp_ns <= last_output_ns_) return std::nullopt;
   last_output_ns_ = estimate.stamp_ns;
+  if (const auto names = stamps_.left_out(now_->stamp_ns()); !names.empty())
+    estimate.degrade("left out, its stamps are seconds from those of the odometers: " + names);
   return estimate;
 }
 

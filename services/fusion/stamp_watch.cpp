@@ -12,6 +12,7 @@ constexpr int kAheadToBelieve = 3;
 constexpr int kBehindToBelieve = 5;
 constexpr int kOfImuToBelieve = 200;  // while an odometer may only be slow
 constexpr int kOfGnssToBelieve = 5;
+constexpr int kLeftOutToTell = 5;
 constexpr double kLatelyS = 5.0;
 constexpr double kLagsS = 0.3;
 
@@ -52,6 +53,7 @@ StampWatch::Verdict StampWatch::judge(const Event& event, int64_t now_ns, int64_
     hear_sound(event);
     return {};
   }
+  if (is_ahead || stamp_ns <= oldest_ns) leave_out(kind, now_ns);
   if (is_behind && !moves) return {Stamp::behind, false};
   const Stamp stamp = is_behind ? Stamp::behind : Stamp::ahead;
   Side& side = is_behind ? behind_ : ahead_;
@@ -63,6 +65,7 @@ StampWatch::Verdict StampWatch::judge(const Event& event, int64_t now_ns, int64_
 void StampWatch::hear_sound(const Event& event) {
   auto& newest_ns = newest_ns_[event.index()];
   newest_ns = std::max(newest_ns, stamp_of(event));
+  left_out_[event.index()] = {};
   if (core::seconds(newest_motion_ns() - stamp_of(event)) > kLagsS) return;
   for (Side* side : {&ahead_, &behind_}) {
     for (size_t kind = 0; kind < kKinds; ++kind) {
@@ -70,6 +73,21 @@ void StampWatch::hear_sound(const Event& event) {
     }
     if (std::ranges::all_of(side->in_row, [](int count) { return count == 0; })) side->held.clear();
   }
+}
+
+void StampWatch::leave_out(size_t kind, int64_t now_ns) {
+  ++left_out_[kind].in_row;
+  left_out_[kind].last_ns = now_ns;
+}
+
+std::string StampWatch::left_out(int64_t now_ns) const {
+  static const std::array<std::string, kKinds> names{"IMU", "wheel", "picture", "camera", "GNSS", "map_matcher"};
+  std::string out;
+  for (size_t kind = 0; kind < kKinds; ++kind) {
+    if (left_out_[kind].in_row < kLeftOutToTell || core::seconds(now_ns - left_out_[kind].last_ns) > kLatelyS) continue;
+    out += (out.empty() ? "" : ", ") + names[kind];
+  }
+  return out;
 }
 
 int StampWatch::enough(const Event& event, Stamp side, int64_t now_ns) const {

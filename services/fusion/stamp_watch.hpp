@@ -7,6 +7,7 @@
 
 #include <array>
 #include <cstdint>
+#include <string>
 #include <variant>
 #include <vector>
 
@@ -30,6 +31,8 @@ class StampWatch {
   [[nodiscard]] bool holds(Stamp side) const { return !side_of(side).held.empty(); }
   /// Whether an odometer went on lately.
   [[nodiscard]] bool has_odometer(int64_t now_ns) const;
+  /// Whose samples are left out for their stamps again and again; in words, empty = nobody's.
+  [[nodiscard]] std::string left_out(int64_t now_ns) const;
   /// Newest sound stamp of what measures motion; 0 = none yet.
   [[nodiscard]] int64_t newest_motion_ns() const;
 
@@ -41,9 +44,15 @@ class StampWatch {
   };
   [[nodiscard]] const Side& side_of(Stamp side) const { return side == Stamp::ahead ? ahead_ : behind_; }
   void hear_sound(const Event& event);
+  void leave_out(size_t kind, int64_t now_ns);
   [[nodiscard]] int enough(const Event& event, Stamp side, int64_t now_ns) const;
 
+  struct LeftOut {
+    int in_row = 0;
+    int64_t last_ns = 0;  // in the time of the others
+  };
   std::array<int64_t, kKinds> newest_ns_{};  // of each kind
+  std::array<LeftOut, kKinds> left_out_{};
   Side ahead_;
   Side behind_;
 };

@@ -63,8 +63,12 @@ TEST(Clock, OfOneSensorThatLeapsIsNotFollowed) {
       train.run_to(t);
       train.gnss(leap_s);
     }
+    EXPECT_NE(train.state->reason.find("left out, its stamps are seconds from those of the odometers: GNSS"),
+              std::string::npos)
+        << leap_s << train.state->reason;
     train.run_to(41, {.imu_s = leap_s});
     train.run_to(60);
+    EXPECT_EQ(train.state->reason, "") << leap_s;
     EXPECT_EQ(train.outside, 0) << leap_s;
     EXPECT_NEAR(train.states, 60 * 50, 5) << leap_s;
     EXPECT_NEAR(train.state->distance_m, 1200, 1) << leap_s;
