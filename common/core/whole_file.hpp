@@ -15,7 +15,8 @@ Result<std::string> read_whole(const std::filesystem::path& file);
 Result<std::string> read_whole(std::istream& stream, const std::string& name);
 
 /// Writes beside the file's place and moves it there, so that nobody ever reads half of it, and of two processes that
-/// write it at once one wins. False: what was there is as it was. Does not wait for the disk: it is for run loops, too.
+/// write it at once one wins. A link stays and its target is written. False: what was there is as it was, and always so
+/// where that is no regular file. Does not wait for the disk: it is for run loops, too.
 [[nodiscard]] bool write_whole(const std::filesystem::path& file, const std::string& bytes);
 
 }  // namespace railfix::core

@@ -288,7 +288,8 @@ core::Status Map::save(const std::filesystem::path& file) const {
                        "; is a coordinate of its source wrong?"};
 
   if (core::write_whole(file, out.SerializeAsString())) return {};
-  return core::Error{"cannot write the map " + file.string() + "; does the folder exist and is there space?"};
+  return core::Error{"cannot write the map " + file.string() +
+                     "; does the folder exist, is there space, and is it no folder or device itself?"};
 }
 
 }  // namespace railfix::track
