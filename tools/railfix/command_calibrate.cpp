@@ -12,6 +12,7 @@
 #include "core/units.hpp"
 #include "dataset/dataset.hpp"
 #include "number_between.hpp"
+#include "output_file.hpp"
 #include "progress.hpp"
 #include "track_detector/draw.hpp"
 #include "track_detector/mount_calibration.hpp"
@@ -220,6 +221,9 @@ int calibrate_mount(const MountArguments& arguments) {
     throw core::BadInput("give either --pictures DIR or --video FILE");
   }
   const std::string& path = arguments.pictures.empty() ? arguments.video : arguments.pictures;
+  // It may be that of --camera, to whose lens the mount is added, or that of an earlier time beside the pictures.
+  check_output("--out", arguments.out, {arguments.video});
+  check_output("--draw", arguments.draw, {path, arguments.camera, arguments.out});
   const auto pictures = load_pictures(path, arguments.json);
   const Roll roll = arguments.roll_from_imu ? roll_from_gravity(path) : Roll{};
   std::string remark;

@@ -12,6 +12,7 @@
 #include "lens/lens_calibration.hpp"
 #include "lens/lens_drawing.hpp"
 #include "number_between.hpp"
+#include "output_file.hpp"
 #include "progress.hpp"
 
 namespace railfix::tool {
@@ -139,6 +140,8 @@ int calibrate(LensArguments arguments) {
     throw core::BadInput("give either --pictures DIR (or video) or --live SOURCE");
   }
   parse_board(arguments, arguments.board);
+  check_output("--out", arguments.out, {});  // what an older file knows of the mount stays
+  check_output("--draw", arguments.draw, {arguments.pictures, arguments.out});
   const auto finder = core::value_or_throw(BoardFinder::make(arguments.board));
   const Boards boards = arguments.live.empty() ? from_recording(arguments, finder) : from_camera(arguments, finder);
   const auto found = calibrate_lens(boards.views, boards.size);

@@ -1,12 +1,13 @@
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <nlohmann/json.hpp>
 
 #include "commands.hpp"
 #include "core/result.hpp"
+#include "core/whole_file.hpp"
 #include "evaluation/evaluation.hpp"
 #include "evaluation/html_report.hpp"
+#include "output_file.hpp"
 
 namespace railfix::tool {
 namespace {
@@ -19,13 +20,13 @@ struct Options {
 };
 
 void write_file(const std::string& name, const std::string& content) {
-  std::ofstream file(name);
-  file << content;
-  file.close();
-  if (!file) throw core::BadInput(name + " cannot be written; check the folder and its permissions");
+  if (!core::write_whole(name, content))
+    throw core::BadInput(name + " cannot be written; check its folder, the permissions and the space on the disk");
 }
 
 int evaluate(const Options& options) {
+  if (options.json != "-") check_output("--json", options.json, {options.truth, options.run});
+  check_output("--report", options.report, {options.truth, options.run});
   const auto truth = core::value_or_throw(evaluation::Truth::read(options.truth));
   const auto run = core::value_or_throw(evaluation::read_run(options.run));
   const auto result = evaluation::evaluate(truth, run);

@@ -1,4 +1,5 @@
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -9,6 +10,7 @@
 #include "map/map_commands.hpp"
 #include "map/map_text.hpp"
 #include "number_between.hpp"
+#include "output_file.hpp"
 #include "track/import/build.hpp"
 #include "track/import/made_network.hpp"
 #include "track/import/scale.hpp"
@@ -27,6 +29,7 @@ struct BuildRequest {
 
 int build(const BuildRequest& request) {
   const std::vector<std::filesystem::path> inputs(request.inputs.begin(), request.inputs.end());
+  check_output("--out", request.out, inputs);
   const track::BuiltMap built = core::value_or_throw(track::build_map(inputs, request.options));
   core::ok_or_throw(built.map.save(request.out));
   if (request.as_json) {
@@ -151,6 +154,7 @@ void add_make(CLI::App& map, Action& chosen) {
   command->footer("Example:\n  railfix map make --track-km 20000 --seed 1 --out national.map");
   command->callback([request, &chosen] {
     chosen = [request] {
+      check_output("--out", request->out, {});
       const track::Map made = track::made_network(request->options);
       core::ok_or_throw(made.save(request->out));
       print_summary(made);

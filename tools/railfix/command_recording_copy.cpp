@@ -5,6 +5,7 @@
 
 #include "command_recording.hpp"
 #include "not_negative.hpp"
+#include "output_file.hpp"
 #include "recording/copy.hpp"
 
 namespace railfix::tool {
@@ -25,6 +26,7 @@ void print(const CopyReport& report, const fs::path& out) {
 }
 
 int cut(const Options& options) {
+  check_output("--out", options.out, options.files);
   const auto report = core::value_or_throw(cut_recording(options.files.front(), options.out, options.cut));
   print(report, options.out);
   if (report.standing > 0) std::cout << ", and " << report.standing << " values that held at the beginning";
@@ -33,6 +35,7 @@ int cut(const Options& options) {
 }
 
 int merge(const Options& options) {
+  check_output("--out", options.out, options.files);
   const auto report = core::value_or_throw(merge_recordings(options.files, options.out));
   print(report, options.out);
   if (report.duplicates > 0) std::cout << "; " << report.duplicates << " stood in more than one, kept once";

@@ -8,6 +8,7 @@
 #include "core/time.hpp"
 #include "not_negative.hpp"
 #include "number_between.hpp"
+#include "output_file.hpp"
 #include "recording/export_csv.hpp"
 #include "recording/export_track.hpp"
 #include "recording/export_video.hpp"
@@ -75,10 +76,22 @@ void write_film(mcap::Reader& reader, const mcap::Selection& part, const Options
             << " Hz of " << report.pictures << " pictures, both rails drawn in " << report.with_rails << '\n';
 }
 
+/// The tables of a topic have the names that those of a run have, and other columns.
+void check_outputs(const Options& options) {
+  check_output("--gpx", options.gpx, {options.file});
+  check_output("--geojson", options.geojson, {options.file});
+  check_output("--mp4", options.mp4, {options.file});
+  if (!options.csv.empty() && fs::exists(options.csv / "run.yaml")) {
+    throw core::BadInput("--csv " + options.csv.string() +
+                         " is the folder of a run, whose tables have the same names; give another folder");
+  }
+}
+
 int run(const Options& options) {
   if (options.csv.empty() && options.gpx.empty() && options.geojson.empty() && options.mp4.empty()) {
     throw core::BadInput("say what to make of it: --csv FOLDER, --gpx FILE, --geojson FILE or --mp4 FILE");
   }
+  check_outputs(options);
   const auto reader = core::value_or_throw(mcap::Reader::open(options.file));
   const auto part = part_of(*reader, options);
   if (!options.csv.empty()) write_tables(*reader, part, options.csv);

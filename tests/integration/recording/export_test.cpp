@@ -151,6 +151,22 @@ TEST_F(Export, MapsGetTheTrackWithItsConfidence) {
   EXPECT_THAT(nowhere.err, HasSubstr("says nowhere where on the Earth the train was"));
 }
 
+TEST_F(Export, NothingIsWrittenOverARecordingOrTheTablesOfARun) {
+  const auto size = fs::file_size(file());
+  for (const std::string kind : {"--gpx", "--geojson", "--mp4"}) {
+    const auto refused = recording({"export", file().string(), kind, file().string()});
+    EXPECT_EQ(refused.exit_code, 2);
+    EXPECT_THAT(refused.err, HasSubstr(kind + " " + file().string() + " is " + file().string() + " itself"));
+  }
+  EXPECT_EQ(recording({"cut", file().string(), "--out", file().string()}).exit_code, 2);
+  EXPECT_EQ(fs::file_size(file()), size);
+  fs::create_directories(folder_ / "run");
+  std::ofstream(folder_ / "run" / "run.yaml") << "common:\n";
+  const auto refused = recording({"export", file().string(), "--csv", (folder_ / "run").string()});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("is the folder of a run"));
+}
+
 TEST_F(Export, AFilmRunsAsFastAsTheTrain) {
   const auto mp4 = folder_ / "ride.mp4";
   const auto exported = recording({"export", file().string(), "--mp4", mp4.string()});

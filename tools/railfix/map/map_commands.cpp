@@ -11,6 +11,7 @@
 #include "map/drawing.hpp"
 #include "map/survey.hpp"
 #include "number_between.hpp"
+#include "output_file.hpp"
 
 namespace railfix::tool {
 namespace {
@@ -25,6 +26,7 @@ struct DrawRequest {
 };
 
 int draw(DrawRequest request) {
+  check_output("--out", request.out, {request.map});
   const track::Map map = core::value_or_throw(track::Map::load(request.map));
   if (!request.at.empty()) request.options.around = core::value_or_throw(map.parse_position(request.at));
   core::ok_or_throw(write_drawing(draw_map(map, request.options), request.out));
@@ -113,6 +115,9 @@ struct LearnRequest {
 };
 
 int learn(const LearnRequest& request) {
+  std::vector<std::filesystem::path> inputs(request.runs.begin(), request.runs.end());
+  inputs.emplace_back(request.map);
+  check_output("--out", request.out, inputs);
   const auto map = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(request.map)));
   const auto sightings = core::value_or_throw(read_runs(map, {request.runs.begin(), request.runs.end()}));
   const Survey survey = survey_landmarks(*map, sightings, request.options);

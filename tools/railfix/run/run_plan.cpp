@@ -128,10 +128,21 @@ core::Status check_overrides(const std::vector<std::string>& sets) {
   return {};
 }
 
+core::Status check_drawing(const RunOptions& options) {
+  for (const char* pictures : {"", "data", "cam0/data", "mav0/cam0/data", "image_0"}) {
+    std::error_code failed;
+    if (!options.draw.empty() && std::filesystem::equivalent(options.draw, options.source / pictures, failed))
+      return core::Error{"--draw " + options.draw.string() +
+                         " is the folder of the pictures themselves; give another folder"};
+  }
+  return {};
+}
+
 }  // namespace
 
 core::Result<RunPlan> plan_run(const RunOptions& options) {
   if (const auto checked = check_overrides(options.sets); !checked.ok()) return checked.error();
+  if (const auto checked = check_drawing(options); !checked.ok()) return checked.error();
   dataset::PictureOptions picture_options;
   picture_options.fps = options.fps;
   const auto pictures = dataset::open_pictures(options.source, picture_options);

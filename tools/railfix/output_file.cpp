@@ -1,0 +1,44 @@
+#include "output_file.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "core/result.hpp"
+
+namespace railfix::tool {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// What datasets and runs are made of; figures, reports and drawings may be written beside it again and again.
+bool is_data(const fs::path& file) {
+  static constexpr std::array kEndings{".csv", ".jsonl", ".yaml", ".mcap", ".png", ".jpg", ".jpeg", ".pgm"};
+  return std::ranges::find(kEndings, file.extension()) != kEndings.end();
+}
+
+bool lies_in(const fs::path& file, const fs::path& folder) {
+  std::error_code failed;
+  const auto from_there = fs::canonical(file, failed).lexically_relative(fs::canonical(folder, failed));
+  return !failed && !from_there.empty() && *from_there.begin() != "..";
+}
+
+}  // namespace
+
+void check_output(const std::string& option, const fs::path& out, const std::vector<fs::path>& inputs) {
+  if (out.empty()) return;
+  const std::string what = option + " " + out.string();
+  const auto folder = out.has_parent_path() ? out.parent_path() : fs::path(".");
+  std::error_code failed;
+  if (!fs::is_directory(folder, failed))
+    throw core::BadInput(what + ": there is no folder " + folder.string() + "; make it first");
+  if (fs::is_directory(out, failed)) throw core::BadInput(what + " is a folder; give the name of a file");
+  if (!fs::exists(out, failed)) return;
+  for (const auto& input : inputs) {
+    if (fs::equivalent(out, input, failed))
+      throw core::BadInput(what + " is " + input.string() + " itself, which is read; give another name");
+    if (is_data(out) && fs::is_directory(input, failed) && lies_in(out, input))
+      throw core::BadInput(what + " belongs to " + input.string() + ", which is read; give another name");
+  }
+}
+
+}  // namespace railfix::tool
