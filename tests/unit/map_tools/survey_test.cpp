@@ -210,8 +210,48 @@ TEST_F(RunTables, BadTablesAreOneSentence) {
   write("train_state.csv", "stamp_ns,edge,offset_m,direction,track_known,speed_mps,sigma_m\n1,77,0,+,1,0,1\n");
   write("sightings.csv", "stamp_ns,kind,distance_ahead_m,lateral_m,sigma_m,confidence\n");
   EXPECT_THAT(read_sightings(map_, folder_, 0).error().message, HasSubstr("edge 77 is not on the map"));
+  for (const char* edge : {"4294967297", "-4294967295", "-1"}) {  // 1, where it is cut to 32 bits
+    write("train_state.csv",
+          std::string("stamp_ns,edge,offset_m,direction,track_known,speed_mps,sigma_m\n1,") + edge + ",0,+,1,0,1\n");
+    EXPECT_THAT(read_sightings(map_, folder_, 0).error().message,
+                HasSubstr("train_state.csv line 2: edge " + std::string(edge) + " is not on the map"));
+  }
   write("train_state.csv", "stamp_ns,edge\n");
   EXPECT_THAT(read_sightings(map_, folder_, 0).error().message, HasSubstr("no column"));
+}
+
+TEST_F(RunTables, ARunOnAnotherMapIsRefused) {
+  write("sightings.csv", "stamp_ns,kind,distance_ahead_m,lateral_m,sigma_m,confidence\n");
+  const auto reading = [&](const std::string& easting_northing) {
+    write("train_state.csv",
+          "stamp_ns,edge,offset_m,direction,track_known,speed_mps,sigma_m,easting_m,northing_m\n"
+          "1,1,500,+,1,0,1,2680500,1250000\n2,1,500,+,1,0,1," +
+              easting_northing + "\n3,,,,0,0,,1,1\n");
+    return read_runs(map_, {folder_});
+  };
+  for (const char* alike : {"2680500.2,1249999.8", ",", "nan,nan"}) EXPECT_TRUE(reading(alike).ok()) << alike;
+  const auto other = reading("2680500,1250004");  // the parallel track
+  ASSERT_FALSE(other.ok());
+  EXPECT_THAT(other.error().message,
+              HasSubstr((folder_ / "train_state.csv").string() + " line 3: this map has edge 1"));
+}
+
+TEST_F(RunTables, StampsThatGoFarBackAreRefused) {
+  const auto reading = [&](const std::string& state_s, const std::string& sighting_s) {
+    write("train_state.csv",
+          "stamp_ns,edge,offset_m,direction,track_known,speed_mps,sigma_m\n10000000000,1,100,+,1,20,1\n"
+          "11000000000,1,120,+,1,20,1\n" +
+              state_s + "000000000,1,110,+,1,20,1\n12000000000,1,140,+,1,20,1\n");
+    write("sightings.csv", "stamp_ns,kind,distance_ahead_m,lateral_m,sigma_m,confidence\n11500000000,mast,5,3,0.1,1\n" +
+                               sighting_s + "500000000,mast,5,3,0.1,1\n");
+    return read_sightings(map_, folder_, 0);
+  };
+  const auto read = core::value_or_throw(reading("10", "10"));
+  ASSERT_EQ(read.size(), 2U) << "a standby's late state does not count, two cameras take turns";
+  EXPECT_NEAR(read[0].offset_m, 135, 1e-6);
+  EXPECT_NEAR(read[1].offset_m, 115, 1e-6);
+  EXPECT_THAT(reading("9", "10").error().message, HasSubstr("train_state.csv line 4: the stamp 9000000000 goes back"));
+  EXPECT_THAT(reading("10", "6").error().message, HasSubstr("sightings.csv line 3: the stamp 6500000000 goes back"));
 }
 
 }  // namespace

@@ -1,16 +1,19 @@
 // The tables of a run as sightings on the map.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/csv.hpp"
 #include "core/time.hpp"
 #include "map/survey.hpp"
 #include "track/path.hpp"
+#include "track/same_map.hpp"
 
 namespace railfix::tool {
 
 namespace {
 
+constexpr uint64_t kInterleavedNs = 1'000'000'000;  // several cameras, or a standby that takes over, write in turn
 constexpr double kNearM = 50;  // a state's place lies so near to where the speed would have brought the train
 
 struct State {
@@ -61,6 +64,27 @@ double finite_in(const core::CsvReader& table, size_t column) {
   return value;
 }
 
+/// The stamps of a table, in the order of its rows.
+class Stamps {
+ public:
+  /// Of this row. Throws where it lies far before that of a row above.
+  int64_t next(const core::CsvReader& table, size_t column) {
+    const int64_t stamp_ns = read_or_throw(table.integer(column));
+    is_late_ = newest_ns_ && stamp_ns < *newest_ns_;
+    if (is_late_ && static_cast<uint64_t>(*newest_ns_) - static_cast<uint64_t>(stamp_ns) > kInterleavedNs)
+      throw core::BadInput(table.error("the stamp " + std::to_string(stamp_ns) +
+                                       " goes back by more than 1 s; was the clock set, or are these two runs?"));
+    if (!is_late_) newest_ns_ = stamp_ns;
+    return stamp_ns;
+  }
+  /// A row above is newer.
+  [[nodiscard]] bool late() const { return is_late_; }
+
+ private:
+  std::optional<int64_t> newest_ns_;
+  bool is_late_ = false;
+};
+
 /// The way that the speeds give, trapezoids; an empty cell is a train that stands or is not known to move.
 class WayBySpeed {
  public:
@@ -80,27 +104,56 @@ class WayBySpeed {
   double way_m_ = 0;
 };
 
+/// The place in a row, which must be one of this map, and where this map has it.
+class PlaceColumns {
+ public:
+  PlaceColumns(const core::CsvReader& table, const std::filesystem::path& file)
+      : edge_(column_of(table, file, "edge")),
+        offset_(column_of(table, file, "offset_m")),
+        direction_(column_of(table, file, "direction")),
+        easting_(table.column({"easting_m"})),
+        northing_(table.column({"northing_m"})) {}
+
+  [[nodiscard]] bool empty(const core::CsvReader& table) const { return table.text(edge_).empty(); }
+  [[nodiscard]] track::EdgePosition read(const core::CsvReader& table, const track::Map& map) const {
+    const int64_t edge = read_or_throw(table.integer(edge_));
+    const bool possible = edge >= 0 && edge <= std::numeric_limits<uint32_t>::max();
+    const track::EdgePosition place{
+        possible ? static_cast<uint32_t>(edge) : 0, read_or_throw(table.number(offset_)),
+        table.text(direction_) == "-" ? track::Direction::reverse : track::Direction::forward};
+    if (!possible || map.edge(place.edge) == nullptr) {
+      throw core::BadInput(table.error("edge " + std::to_string(edge) + " is not on the map; was the run made on it?"));
+    }
+    if (!easting_ || !northing_) return place;
+    if (!track::lies_there(map, place, read_or_throw(table.number(*easting_)), read_or_throw(table.number(*northing_))))
+      throw core::BadInput(table.error("this map has edge " + std::to_string(edge) +
+                                       " elsewhere than at the row's easting_m and northing_m; give the map that the "
+                                       "run was made on"));
+    return place;
+  }
+
+ private:
+  size_t edge_, offset_, direction_;
+  std::optional<size_t> easting_, northing_;
+};
+
 std::vector<State> read_states(const std::shared_ptr<const track::Map>& map, const std::filesystem::path& file) {
   core::CsvReader table = core::value_or_throw(core::CsvReader::open(file));
   const auto at = [&](std::string_view name) { return column_of(table, file, name); };
-  const size_t stamp = at("stamp_ns"), edge = at("edge"), offset = at("offset_m"), direction = at("direction");
-  const size_t speed = at("speed_mps"), sigma = at("sigma_m"), known = at("track_known");
+  const size_t stamp = at("stamp_ns"), speed = at("speed_mps"), sigma = at("sigma_m"), known = at("track_known");
+  const PlaceColumns place(table, file);
+  Stamps stamps;
   WayBySpeed way;
   std::vector<State> out;
   while (table.next()) {
     State state;
-    state.stamp_ns = read_or_throw(table.integer(stamp));
+    state.stamp_ns = stamps.next(table, stamp);
+    if (stamps.late()) continue;
     state.way_m = way.at(state.stamp_ns, read_or_throw(table.number(speed)));
     const std::string_view is_known = table.text(known);
-    if (table.text(edge).empty() || is_known == "0" || is_known == "false") continue;
-    state.place.edge = static_cast<uint32_t>(read_or_throw(table.integer(edge)));
-    state.place.offset_m = read_or_throw(table.number(offset));
-    state.place.direction = table.text(direction) == "-" ? track::Direction::reverse : track::Direction::forward;
+    if (place.empty(table) || is_known == "0" || is_known == "false") continue;
+    state.place = place.read(table, *map);
     state.sigma_m = read_or_throw(table.number(sigma));
-    if (map->edge(state.place.edge) == nullptr) {
-      throw core::BadInput(
-          table.error("edge " + std::to_string(state.place.edge) + " is not on the map; was the run made on it?"));
-    }
     if (!std::isfinite(state.place.offset_m) || !std::isfinite(state.sigma_m)) continue;
     if (state.sigma_m < 0) throw bad_cell(table, sigma, " is less than 0 m");
     if (!out.empty()) {
@@ -144,8 +197,9 @@ core::Result<std::vector<SurveySighting>> read_sightings(const std::shared_ptr<c
     const size_t stamp = at("stamp_ns"), kind = at("kind"), ahead = at("distance_ahead_m"), lateral = at("lateral_m");
     const size_t sigma = at("sigma_m");
     std::vector<SurveySighting> out;
+    Stamps stamps;
     while (table.next()) {
-      const int64_t when = read_or_throw(table.integer(stamp));
+      const int64_t when = stamps.next(table, stamp);
       const auto what = track::landmark_kind_from(std::string(table.text(kind)));
       if (!what) return table.error("\"" + std::string(table.text(kind)) + "\" is no kind of landmark");
       const double ahead_m = finite_in(table, ahead);
