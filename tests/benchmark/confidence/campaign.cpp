@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <exception>
 #include <thread>
 
 namespace railfix::train {
@@ -32,14 +33,24 @@ Run run_one(const CampaignPlan& plan, uint64_t number) {
 
 std::vector<Run> run_block(const CampaignPlan& plan, uint64_t first) {
   std::vector<Run> runs(kBlock);
+  std::vector<std::exception_ptr> failures(kBlock);  // one that leaves a thread would end the program
   std::atomic<size_t> next{0};
   std::vector<std::thread> threads;
   for (int t = 0; t < plan.threads; ++t) {
     threads.emplace_back([&] {
-      for (size_t i = next++; i < kBlock; i = next++) runs[i] = run_one(plan, first + i);
+      for (size_t i = next++; i < kBlock; i = next++) {
+        try {
+          runs[i] = run_one(plan, first + i);
+        } catch (...) {
+          failures[i] = std::current_exception();
+        }
+      }
     });
   }
   for (auto& thread : threads) thread.join();
+  for (const auto& failure : failures) {
+    if (failure) std::rethrow_exception(failure);
+  }
   return runs;
 }
 

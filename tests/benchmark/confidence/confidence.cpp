@@ -1,15 +1,18 @@
 // railfix-measure-confidence: does the promised interval hold the train, over thousands of kilometres with one faulty
 // sensor at a time? Sensor-level simulation (tests/support/train), the real fusion.
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <iostream>
+#include <limits>
 
 #include "campaign.hpp"
 #include "core/units.hpp"
+#include "measuring_tool.hpp"
+#include "number_between.hpp"
 #include "position.hpp"
+#include "whole_number.hpp"
 
 namespace railfix::train {
 namespace {
@@ -138,49 +141,58 @@ void write_stanford(const std::string& file, const StanfordCounts& counts, const
   if (!out) throw core::BadInput("--stanford " + file + ": cannot be written");
 }
 
-int run(int argc, char** argv) {
-  Arguments a;
+void add_options(CLI::App& app, Arguments& a) {
   auto& s = a.plan.simulation;
-  s = campaign_plan();
-  s.track_fixes = true;
-  s.switch_spacing_m = 1500;
-  s.shape = true;
-  a.plan.unknown_start_share = 0.1;
-  CLI::App app("Confidence campaign: simulated sensors with faults through fusion, the interval against the truth");
-  app.add_option("--km", a.plan.km, "Way to run in total")->capture_default_str();
-  app.add_option("--seed", a.plan.seed, "Other seeds, other runs")->capture_default_str();
-  app.add_option("--threads", a.plan.threads, "Threads")->capture_default_str();
-  app.add_option("--duration-s", a.plan.duration_s, "Length of one run")->capture_default_str();
-  app.add_option("--max-kmh", a.max_kmh, "Highest speed")->capture_default_str();
+  app.add_option("--km", a.plan.km, "Way to run in total")
+      ->check(tool::number_between(0.001, 1e9))
+      ->capture_default_str();
+  app.add_option("--seed", a.plan.seed, "Other seeds, other runs")->check(tool::whole_number())->capture_default_str();
+  app.add_option("--threads", a.plan.threads, "Threads")->check(tool::whole_number(1, 1024))->capture_default_str();
+  app.add_option("--duration-s", a.plan.duration_s, "Length of one run")
+      ->check(tool::number_between(1, 1e6))
+      ->capture_default_str();
+  app.add_option("--max-kmh", a.max_kmh, "Highest speed")->check(tool::number_between(1, 1000))->capture_default_str();
   app.add_option("--sudden", a.sudden_mps2,
-                 "Accelerate and brake so hard (m/s2), from one moment to the next; 0: gently");
-  app.add_option("--landmarks-m", s.landmark_spacing_m, "Mean distance of landmarks, 0 = none")->capture_default_str();
-  app.add_option("--switches-m", s.switch_spacing_m, "Mean distance of facing points, 0 = none")->capture_default_str();
+                 "Accelerate and brake so hard (m/s2), from one moment to the next; 0: gently")
+      ->check(tool::number_between(0, 10));
+  app.add_option("--landmarks-m", s.landmark_spacing_m, "Mean distance of landmarks, 0 = none")
+      ->check(tool::number_between(0, 1e6))
+      ->capture_default_str();
+  app.add_option("--switches-m", s.switch_spacing_m, "Mean distance of facing points, 0 = none")
+      ->check(tool::number_between(0, 1e6))
+      ->capture_default_str();
   app.add_option("--fault", a.fault, "all, none, SENSOR or SENSOR:KIND")->capture_default_str();
   app.add_option("--without", a.without, "Leave out any of camera, wheel, imu, gnss, landmarks, shape (comma between)");
   app.add_option("--map", a.map, "Compiled map instead of random lines");
   app.add_option("--start", a.start, "EDGE:OFFSET[:+|-] on the map");
   app.add_option("--stanford", a.stanford, "Write the Stanford diagram (SVG)");
-  app.add_option("--run", a.run, "Print one run of the campaign second by second");
+  app.add_option("--run", a.run, "Print one run of the campaign second by second")
+      ->check(tool::whole_number(0, std::numeric_limits<int64_t>::max()));
   app.add_flag(
       "--sightings", s.sightings,
       "Places come from masts and balises that are sighted, by the real matcher, on a map that is not quite right");
   app.add_option("--position", a.position,
-                 "What each source is worth, frogs and portals as references: a table of so many runs of 33 km");
+                 "What each source is worth, frogs and portals as references: a table of so many runs of 33 km")
+      ->check(tool::whole_number(1, 1000000));
   app.add_option("--row", a.row, "... with this set of sensors alone, as the table names it");
-  app.add_option("--every-m", a.every_m, "... with a reference as good as a frog every so many metres instead");
+  app.add_option("--every-m", a.every_m, "... with a reference as good as a frog every so many metres instead")
+      ->check(tool::number_between(0, 1e6));
   app.add_flag("--learnt", a.learnt, "... with the scales that an earlier trip of the same train has taught");
   app.add_option(
-      "--saved-wrong", a.saved_wrong,
-      "Every run begins with saved scales that are wrong by this share: the camera's, the wheel's and both in "
-      "turn; 0: right");
+         "--saved-wrong", a.saved_wrong,
+         "Every run begins with saved scales that are wrong by this share: the camera's, the wheel's and both in "
+         "turn; 0: right")
+      ->check(tool::number_between(0, 1));
   app.add_flag("--slip-always", a.plan.slip_always, "The wheel slips beside every fault: two faults at once");
   app.add_flag("--list", a.list, "Print the faults");
-  CLI11_PARSE(app, argc, argv);
-  if (a.list) {
-    for (const auto& [sensor, kind] : all_faults()) std::cout << to_string(sensor) << ":" << to_string(kind) << "\n";
-    return 0;
-  }
+}
+
+void list_faults() {
+  for (const auto& [sensor, kind] : all_faults()) std::cout << to_string(sensor) << ":" << to_string(kind) << "\n";
+}
+
+void fill_plan(Arguments& a) {
+  auto& s = a.plan.simulation;
   a.plan.faults = faults_named(a.fault);
   s.max_speed_mps = a.max_kmh / 3.6;
   if (a.sudden_mps2 > 0) s.style = DriveStyle::sudden(a.sudden_mps2);
@@ -188,18 +200,18 @@ int run(int argc, char** argv) {
   if (s.sightings) s.landmark_spacing_m = 0;
   if (a.saved_wrong >= 0) a.plan.saved_wrong = a.saved_wrong;
   load_map(a);
-  if (a.run >= 0) {
-    trace(a.plan, static_cast<uint64_t>(a.run));
-    return 0;
-  }
-  if (a.position > 0) {
-    const auto stanford = print_positions({a.plan.seed, a.position, a.row, a.every_m, a.learnt});
-    char title[100];
-    std::snprintf(title, sizeof title, "what each source is worth: %d runs, seed %llu", a.position,
-                  static_cast<unsigned long long>(a.plan.seed));
-    write_stanford(a.stanford, stanford, title);
-    return 0;
-  }
+}
+
+int measure_positions(const Arguments& a) {
+  const auto stanford = print_positions({a.plan.seed, a.position, a.row, a.every_m, a.learnt});
+  char title[100];
+  std::snprintf(title, sizeof title, "what each source is worth: %d runs, seed %llu", a.position,
+                static_cast<unsigned long long>(a.plan.seed));
+  write_stanford(a.stanford, stanford, title);
+  return 0;
+}
+
+int measure_campaign(const Arguments& a) {
   double next_km = 0;
   const auto result = run_campaign(a.plan, [&](const Verdict& sum) {
     if (sum.way_m < 1000 * next_km) return;
@@ -217,14 +229,41 @@ int run(int argc, char** argv) {
   return result.bad.empty() ? 0 : 1;
 }
 
+int measure_all(Arguments& a) {
+  if (a.list) {
+    list_faults();
+    return 0;
+  }
+  fill_plan(a);
+  if (a.run >= 0) {
+    trace(a.plan, static_cast<uint64_t>(a.run));
+    return 0;
+  }
+  return a.position > 0 ? measure_positions(a) : measure_campaign(a);
+}
+
+Arguments defaults() {
+  Arguments a;
+  auto& s = a.plan.simulation;
+  s = campaign_plan();
+  s.track_fixes = true;
+  s.switch_spacing_m = 1500;
+  s.shape = true;
+  a.plan.unknown_start_share = 0.1;
+  return a;
+}
+
+int run(int argc, char** argv) {
+  CLI::App app("Confidence campaign: simulated sensors with faults through fusion, the interval against the truth",
+               "railfix-measure-confidence");
+  auto arguments = defaults();
+  add_options(app, arguments);
+  return measure::run_tool(app, argc, argv, [&] { return measure_all(arguments); });
+}
+
 }  // namespace
 }  // namespace railfix::train
 
 int main(int argc, char** argv) {
-  try {
-    return railfix::train::run(argc, argv);
-  } catch (const railfix::core::BadInput& e) {
-    std::cerr << "railfix-measure-confidence: " << e.what() << "\n";
-    return 2;
-  }
+  return railfix::train::run(argc, argv);
 }

@@ -5,11 +5,12 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <optional>
 
 #include "estimation/ud_filter.hpp"
 #include "fusion/motion_filter.hpp"
+#include "measuring_tool.hpp"
+#include "whole_number.hpp"
 
 namespace railfix::estimation {
 namespace {
@@ -142,12 +143,18 @@ void run(const char* name, uint64_t updates) {
 
 int main(int argc, char** argv) {
   using namespace railfix::estimation;
-  const uint64_t updates = argc > 1 ? std::strtoull(argv[1], nullptr, 10) : 10'000'000;
-  std::printf("%llu updates, %d states\n", static_cast<unsigned long long>(updates), kStates);
-  run<Factors>("U-D factors, double", updates);
-  run<Full<double, true>>("Joseph, double", updates);
-  run<Full<double, false>>("naive, double", updates);
-  run<Full<float, true>>("Joseph, float", updates);
-  run<Full<float, false>>("naive, float", updates);
-  return 0;
+  uint64_t updates = 10'000'000;
+  CLI::App app("Does the covariance of the filter stay positive definite?", "railfix-measure-filter-health");
+  app.add_option("UPDATES", updates, "Time and measurement updates")
+      ->check(railfix::tool::whole_number(1))
+      ->capture_default_str();
+  return railfix::measure::run_tool(app, argc, argv, [&] {
+    std::printf("%llu updates, %d states\n", static_cast<unsigned long long>(updates), kStates);
+    run<Factors>("U-D factors, double", updates);
+    run<Full<double, true>>("Joseph, double", updates);
+    run<Full<double, false>>("naive, double", updates);
+    run<Full<float, true>>("Joseph, float", updates);
+    run<Full<float, false>>("naive, float", updates);
+    return 0;
+  });
 }

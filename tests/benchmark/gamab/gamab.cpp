@@ -5,10 +5,11 @@
 //   railfix-measure-gamab SEED CASES
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 
 #include "compare/gamab.hpp"
 #include "core/random.hpp"
+#include "measuring_tool.hpp"
+#include "whole_number.hpp"
 
 namespace {
 
@@ -100,15 +101,8 @@ bool too_often(int wrong, int cases) {
   return wrong > expected + 3 * std::sqrt(expected * (1 - kNominal));
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  if (argc != 3) {
-    std::fputs("usage: railfix-measure-gamab SEED CASES\n", stderr);
-    return 2;
-  }
-  Random random(std::strtoull(argv[1], nullptr, 10));
-  const int cases = std::atoi(argv[2]);
+int measure_bounds(uint64_t seed, int cases) {
+  Random random(seed);
   bool holds = true;
   for (const auto& shape : kShapes) {
     const double truth = truth_of(shape);
@@ -133,4 +127,17 @@ int main(int argc, char** argv) {
   }
   std::puts(holds ? "PASSED" : "FAILED: a bound that is promised does not hold");
   return holds ? 0 : 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Do the one-sided 95 % bounds of `railfix tpr compare` hold?", "railfix-measure-gamab");
+  uint64_t seed = 0;
+  int cases = 0;
+  app.add_option("SEED", seed, "Other seeds, other legs")->required()->check(tool::whole_number());
+  app.add_option("CASES", cases, "Of each shape and number of legs")
+      ->required()
+      ->check(tool::whole_number(1, 1'000'000'000));
+  return measure::run_tool(app, argc, argv, [&] { return measure_bounds(seed, cases); });
 }

@@ -9,11 +9,13 @@
 #include <ctime>
 
 #include "core/random.hpp"
+#include "measuring_tool.hpp"
 #include "track/import/biarc.hpp"
 #include "track/import/clothoid_fit.hpp"
 #include "track/import/landxml.hpp"
 #include "track/import/made_lines.hpp"
 #include "track/import/smooth.hpp"
+#include "whole_number.hpp"
 
 namespace {
 
@@ -54,36 +56,23 @@ void judge(const char* name, const Alignment& fit, const Alignment& truth, doubl
       curvature[curvature.size() * 95 / 100], fit.length_m() - truth.length_m(), seconds);
 }
 
-/// Nothing where there is no such file; the reason is printed.
-std::optional<Alignment> truth_of(const std::string& name) {
+Alignment truth_of(const std::string& name) {
   if (name.starts_with("made:")) {
-    for (const MadeLine& line : make_lines(3, 25e3, std::stoull(name.substr(5))).lines) {
+    std::string text = name.substr(5);
+    if (const auto wrong = tool::whole_number()(text); !wrong.empty()) throw core::BadInput(name + ": " + wrong);
+    for (const MadeLine& line : make_lines(3, 25e3, std::stoull(text)).lines) {
       if (line.main.alignment.length_m() > 10e3) return line.main.alignment;
     }
-    std::fputs("no line of 10 km in this network\n", stderr);
-    return std::nullopt;
+    throw core::BadInput(name + ": no line of 10 km in this network");
   }
-  const core::Result<LandXml> read = read_landxml(name);
-  if (!read.ok()) {
-    std::fprintf(stderr, "%s\n", read.error().message.c_str());
-    return std::nullopt;
-  }
-  const auto& tracks = read.value().tracks;
+  const LandXml read = core::value_or_throw(read_landxml(name));
+  const auto& tracks = read.tracks;
   return std::max_element(tracks.begin(), tracks.end(),
                           [](const auto& a, const auto& b) { return a.alignment.length_m() < b.alignment.length_m(); })
       ->alignment;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  if (argc != 2) {
-    std::fputs("usage: railfix-measure-map-fit LINE.landxml | made:SEED\n", stderr);
-    return 2;
-  }
-  const std::optional<Alignment> found = truth_of(argv[1]);
-  if (!found) return 2;
-  const Alignment& truth = *found;
+int measure_fits(const Alignment& truth) {
   std::printf("truth: %.3f km, %zu elements\n", truth.length_m() / 1e3, truth.elements().size());
   for (const auto& [spacing_m, sigma_m] : {std::pair(20.0, 0.0), {20.0, 0.2}, {20.0, 0.5}, {20.0, 1.0}, {30.0, 0.5}}) {
     const std::vector<Eigen::Vector2d> points = drawn(truth, spacing_m, sigma_m, 21);
@@ -99,4 +88,13 @@ int main(int argc, char** argv) {
     if (!fit) std::puts("  straights, clothoids, arcs: no fit");
   }
   return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("How well a hand-drawn polyline gives a real alignment back", "railfix-measure-map-fit");
+  std::string line;
+  app.add_option("LINE", line, "LINE.landxml, or made:SEED for a line of a made-up network")->required();
+  return measure::run_tool(app, argc, argv, [&] { return measure_fits(truth_of(line)); });
 }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <ctime>
 #include <functional>
 #include <opencv2/imgproc.hpp>
@@ -12,6 +11,9 @@
 
 #include "dataset/dataset.hpp"
 #include "frame_grabber/picture_health.hpp"
+#include "measuring_tool.hpp"
+#include "number_between.hpp"
+#include "whole_number.hpp"
 
 namespace {
 
@@ -93,22 +95,19 @@ void judge(const std::string& path, const Spoiling& spoiling, double fps, int mo
 
 }  // namespace
 
-int main(int argc, char** argv) try {
+int main(int argc, char** argv) {
   double fps = 0;
   int most = 1 << 30;
-  for (int i = 1; i < argc; ++i) {
-    const std::string word = argv[i];
-    if (word == "--fps" && i + 1 < argc) {
-      fps = std::atof(argv[++i]);
-    } else if (word == "--most" && i + 1 < argc) {
-      most = std::atoi(argv[++i]);
-    } else {
-      std::printf("%s\n", argv[i]);
-      for (const Spoiling& spoiling : kSpoilings) judge(word, spoiling, fps, most);
+  std::vector<std::string> paths;
+  CLI::App app("Picture health: false alarms, what spoilt pictures are called, time", "railfix-bench-picture-health");
+  app.add_option("SEQ", paths, "Datasets and folders of pictures")->required();
+  app.add_option("--fps", fps, "Pictures a second, where they have no times")->check(tool::number_between(0.01, 1000));
+  app.add_option("--most", most, "No more than so many of each")->check(tool::whole_number(1, 1U << 30U));
+  return measure::run_tool(app, argc, argv, [&] {
+    for (const auto& path : paths) {
+      std::printf("%s\n", path.c_str());
+      for (const Spoiling& spoiling : kSpoilings) judge(path, spoiling, fps, most);
     }
-  }
-  return 0;
-} catch (const core::BadInput& error) {
-  std::fprintf(stderr, "railfix-bench-picture-health: %s\n", error.what());
-  return 2;
+    return 0;
+  });
 }

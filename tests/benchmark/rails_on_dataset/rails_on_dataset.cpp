@@ -23,11 +23,13 @@
 
 #include "core/time.hpp"
 #include "dataset/dataset.hpp"
+#include "measuring_tool.hpp"
 #include "rails_on_dataset/true_rails.hpp"
 #include "track_detector/draw.hpp"
 #include "track_detector/imu_roll.hpp"
 #include "track_detector/mount_watch.hpp"
 #include "track_detector/track_detector.hpp"
+#include "whole_number.hpp"
 
 namespace {
 
@@ -172,7 +174,7 @@ void count(const geometry::Intrinsics& camera, const cv::Mat& grey, const TrackO
   }
 }
 
-void measure(const std::string& sequence, const Options& wanted) {
+void measure_sequence(const std::string& sequence, const Options& wanted) {
   const auto calibration = core::value_or_throw(dataset::read_calibration(sequence + "/mav0/cam0/sensor.yaml"));
   if (!calibration.mount) throw core::BadInput(sequence + " has no mount");
   std::map<int64_t, dataset::TruthRow> truth;
@@ -236,27 +238,23 @@ void measure(const std::string& sequence, const Options& wanted) {
 int main(int argc, char** argv) {
   cv::setNumThreads(1);
   std::vector<std::string> sequences;
+  std::pair<std::string, std::string> draw;
   Options options;
-  for (int i = 1; i < argc; ++i) {
-    if (std::string(argv[i]) == "--draw" && i + 2 < argc) {
-      options.draw_folder = argv[++i];
-      options.draw_every = std::max(2, std::atoi(argv[++i]));
-    } else if (std::string(argv[i]) == "--poses") {
-      options.poses = true;
-    } else if (std::string(argv[i]) == "--imu") {
-      options.imu = true;
-    } else {
-      sequences.emplace_back(argv[i]);
+  CLI::App app("The track detector alone on simulated datasets with truth", "railfix-bench-rails-on-dataset");
+  app.add_option("SEQ", sequences, "Dataset folders with truth")->required();
+  app.add_flag("--poses", options.poses, "Pose and curvature errors too, and the honesty of the sigmas");
+  app.add_flag("--imu", options.imu, "The roll's prior comes from the dataset's gyro");
+  app.add_option("--draw", draw, "Folder to draw into, and every how many pictures (DIR EVERY)");
+  return measure::run_tool(app, argc, argv, [&] {
+    if (!draw.first.empty()) {
+      const auto wrong = tool::whole_number(1, 1'000'000)(draw.second);
+      if (!wrong.empty()) throw core::BadInput("--draw DIR EVERY: " + wrong);
+      options.draw_folder = draw.first;
+      options.draw_every = std::max(2, std::stoi(draw.second));
     }
-  }
-  std::printf("%-28s %6s %8s %8s %6s %8s %8s %8s %8s %8s %8s\n", "dataset", "frames", "visible", "seen %", "wrong",
-              "edge px", "p95 px", "outward", "ms", "p99 ms", "max ms");
-  try {
-    for (const auto& sequence : sequences) measure(sequence, options);
-  } catch (const core::BadInput& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 2;
-  }
-  if (sequences.empty()) std::printf("skipped: name dataset folders with truth\n");
-  return 0;
+    std::printf("%-28s %6s %8s %8s %6s %8s %8s %8s %8s %8s %8s\n", "dataset", "frames", "visible", "seen %", "wrong",
+                "edge px", "p95 px", "outward", "ms", "p99 ms", "max ms");
+    for (const auto& sequence : sequences) measure_sequence(sequence, options);
+    return 0;
+  });
 }

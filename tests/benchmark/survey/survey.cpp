@@ -5,13 +5,13 @@
 //   railfix simulate --map TRUE.map ... --out S1     railfix run --dataset S1 --map POOR.map --out R1     (and so on)
 //   railfix map learn POOR.map R1 R2 R3 --out LEARNED.map
 //   railfix-measure-survey TRUE.map POOR.map LEARNED.map
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <map>
 #include <set>
 
+#include "measuring_tool.hpp"
 #include "track/map.hpp"
 
 namespace {
@@ -96,13 +96,12 @@ int judge(const std::string& truth_file, const std::string& poor_file, const std
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"Accuracy of `railfix map learn`: learned landmarks against the true ones"};
+  CLI::App app{"Accuracy of `railfix map learn`: learned landmarks against the true ones", "railfix-measure-survey"};
   std::string truth;
   std::string poor;
   std::string learned;
   app.add_option("TRUE", truth, "The map that the pictures were drawn from")->required();
   app.add_option("POOR", poor, "The map that the runs were made on")->required();
   app.add_option("LEARNED", learned, "What `railfix map learn` made of it")->required();
-  CLI11_PARSE(app, argc, argv);
-  return judge(truth, poor, learned);
+  return railfix::measure::run_tool(app, argc, argv, [&] { return judge(truth, poor, learned); });
 }

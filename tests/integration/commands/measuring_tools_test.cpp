@@ -1,0 +1,57 @@
+// The measuring tools: each explains itself, and says what is wrong with its arguments.
+#include <gmock/gmock.h>
+
+#include "support/program.hpp"
+
+namespace railfix {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr double kPatienceS = 20;
+
+const std::vector<std::vector<std::string>> kTools{
+    {"railfix-measure-survey", "a", "b", "c"},  {"railfix-measure-confidence", "--fault", "none", "--map", "none.map"},
+    {"railfix-measure-filter-health", "x"},     {"railfix-measure-map-fit", "none.landxml"},
+    {"railfix-measure-gamab", "x", "y"},        {"railfix-measure-matching", "locate", "--map", "none.map"},
+    {"railfix-bench-rails-on-dataset", "none"}, {"railfix-bench-picture-health", "none"}};
+
+TEST(MeasuringTools, ExplainThemselves) {
+  for (const auto& tool : kTools) {
+    const auto help = test::run_program({tool[0], "--help"}, kPatienceS);
+    EXPECT_EQ(help.exit_code, 0) << tool[0] << help.err;
+    EXPECT_THAT(help.out, HasSubstr("Usage: " + tool[0]));
+    EXPECT_EQ(test::run_program({tool[0], "--none"}, kPatienceS).exit_code, 2) << tool[0];
+  }
+}
+
+TEST(MeasuringTools, SayWhatIsWrong) {
+  for (const auto& arguments : kTools) {
+    const auto outcome = test::run_program(arguments, kPatienceS);
+    EXPECT_EQ(outcome.exit_code, 2) << arguments[0] << outcome.out << outcome.err;
+    EXPECT_NE(outcome.err, "") << arguments[0];
+  }
+}
+
+TEST(MeasuringTools, RefuseNumbersThatMeanNothing) {
+  const std::vector<std::vector<std::string>> wrong{
+      {"railfix-measure-confidence", "--threads", "0"},
+      {"railfix-measure-confidence", "--km", "nan"},
+      {"railfix-measure-confidence", "--km", "-1"},
+      {"railfix-measure-confidence", "--seed", "-1"},
+      {"railfix-measure-filter-health", "0"},
+      {"railfix-measure-map-fit", "made:x"},
+      {"railfix-measure-gamab", "1", "0"},
+      {"railfix-measure-matching", "switches", "--count", "x"},
+      {"railfix-measure-matching", "nothing"},
+      {"railfix-bench-picture-health", "none", "--fps", "nan"},
+      {"railfix-bench-rails-on-dataset", "none", "--draw", "folder", "0"}};
+  for (const auto& arguments : wrong) {
+    const auto outcome = test::run_program(arguments, kPatienceS);
+    EXPECT_EQ(outcome.exit_code, 2) << arguments[0] << arguments[1] << outcome.out;
+    EXPECT_NE(outcome.err, "");
+  }
+}
+
+}  // namespace
+}  // namespace railfix
