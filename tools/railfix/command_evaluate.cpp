@@ -29,6 +29,7 @@ int evaluate(const Options& options) {
   check_output("--report", options.report, {options.truth, options.run});
   const auto truth = core::value_or_throw(evaluation::Truth::read(options.truth));
   const auto run = core::value_or_throw(evaluation::read_run(options.run));
+  core::ok_or_throw(evaluation::check_times(truth, run));
   const auto result = evaluation::evaluate(truth, run);
   if (!options.report.empty()) {
     const auto name = std::filesystem::absolute(options.run + "/").parent_path().filename().string();

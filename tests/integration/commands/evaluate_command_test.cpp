@@ -52,6 +52,11 @@ TEST_F(EvaluateCommand, NeverWritesOverATable) {
   EXPECT_EQ(test::slurp(table), before);
 }
 
+TEST_F(EvaluateCommand, RefusesTheTruthOfAnotherTime) {
+  write("seq/truth/track.csv", "timestamp,distance,speed\n30000000000,0,20\n40000000000,400,20\n");
+  refuses({}, "the run is from 0.000 to 20.000 s and the truth from 30.000 to 40.000 s");
+}
+
 TEST_F(EvaluateCommand, LooksForTheFoldersBeforeItWorks) {
   refuses({"--report", root_ / "report.html", "--json", root_ / "none/figures.json"}, "/none; make it first");
   EXPECT_FALSE(fs::exists(root_ / "report.html"));

@@ -109,6 +109,33 @@ TEST_F(RunFolder, EmptyTablesGiveNoFiguresAndNoCrash) {
   EXPECT_THAT(html_report(truth, evaluation, "empty"), Not(HasSubstr("nan")));
 }
 
+TEST_F(RunFolder, RowsOutOfOrderAreTold) {
+  write_run();
+  write("out/sightings.csv", "stamp_ns,kind,distance_ahead_m\n5,frog,1\n9,frog,1\n4,frog,1\n9,frog,1\n8,frog,1\n");
+  const auto run = read_run(root_ / "out").value();
+  EXPECT_THAT(run.out_of_order, ElementsAre(::testing::Pair("sightings.csv", 2U)));
+  EXPECT_EQ(run.sightings->front().stamp_ns, 4);
+  const auto evaluation = evaluate(MadeTruth().make(), run);
+  EXPECT_EQ(to_json(evaluation)["out_of_order"].dump(), "{\"sightings.csv\":2}");
+  std::ostringstream out;
+  print(evaluation, out);
+  EXPECT_THAT(out.str(), HasSubstr("sightings.csv: OUT OF ORDER, 2 rows are older than one above them"));
+}
+
+TEST_F(RunFolder, OfAnotherTimeThanTheTruthCannotBeJudged) {
+  write_run();
+  const Truth truth = MadeTruth().make();  // 50 s
+  EXPECT_TRUE(check_times(truth, read_run(root_ / "out").value()).ok());
+  const auto rows = [&](const std::string& first_s) {
+    write("later/odometry.csv", "stamp_ns,valid,distance_m,speed_mps,mode\n" + first_s +
+                                    "000000000,1,0,20,track\n90000000000,1,202,20,track\n");
+    return check_times(truth, read_run(root_ / "later").value());
+  };
+  EXPECT_TRUE(rows("50").ok());
+  EXPECT_THAT(rows("51").error().message,
+              HasSubstr("the run is from 51.000 to 90.000 s and the truth from 0.000 to 50.000 s"));
+}
+
 TEST_F(RunFolder, BrokenInputIsASentence) {
   EXPECT_THAT(read_run(root_ / "nothing").error().message, HasSubstr("is not a folder"));
   EXPECT_THAT(read_run(root_).error().message, HasSubstr("holds no table"));

@@ -1,7 +1,9 @@
 #include "evaluation/evaluation.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 
 #include "core/time.hpp"
 
@@ -45,11 +47,26 @@ ReportResult judge_reports(const std::vector<ReportRow>& rows) {
   return result;
 }
 
+core::Status check_times(const Truth& truth, const RunTables& run) {
+  const auto said = run.span();
+  const RunTables::Span real{truth.rows().front().stamp_ns, truth.rows().back().stamp_ns};
+  if (!said || (said->from_ns <= real.to_ns && said->to_ns >= real.from_ns)) return {};
+  const auto text = [](const RunTables::Span& span) {
+    std::array<char, 80> seconds{};
+    std::snprintf(seconds.data(), seconds.size(), "from %.3f to %.3f s", core::seconds(span.from_ns),
+                  core::seconds(span.to_ns));
+    return std::string(seconds.data());
+  };
+  return core::Error{"the run is " + text(*said) + " and the truth " + text(real) +
+                     ", with no time in common; give the truth of the dataset that was run"};
+}
+
 Evaluation evaluate(const Truth& truth, const RunTables& run) {
   Evaluation result;
   result.duration_s = core::seconds(truth.rows().back().stamp_ns - truth.rows().front().stamp_ns);
   result.travelled_m = truth.travelled_m();
   result.missing = run.missing;
+  result.out_of_order = run.out_of_order;
   if (run.odometry) result.odometry = judge_odometry(truth, *run.odometry);
   if (run.states) result.position = judge_position(truth, *run.states);
   if (run.views) result.views = judge_views(truth, *run.views);

@@ -46,7 +46,10 @@ struct Evaluation {
   std::optional<ReportResult> reports;
   std::optional<std::vector<ServiceResult>> services;
   std::vector<std::string> missing;
+  std::map<std::string, size_t> out_of_order;  // rows that stood below a newer one, by table
 };
+/// An error names both times where run and truth have none in common: nothing could be judged.
+core::Status check_times(const Truth& truth, const RunTables& run);
 Evaluation evaluate(const Truth& truth, const RunTables& run);
 
 void print(const Evaluation& evaluation, std::ostream& out);

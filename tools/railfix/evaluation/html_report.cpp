@@ -199,6 +199,8 @@ std::string html_report(const Truth& truth, const Evaluation& evaluation, const 
     for (const std::string& name : evaluation.missing) html.raw(" " + tool::escape_html(name));
     html.raw(".");
   }
+  for (const auto& [name, rows] : evaluation.out_of_order)
+    html.raw(" Out of order: " + std::to_string(rows) + " rows of " + tool::escape_html(name) + ".");
   html.raw("</p>\n");
   headline_figures(html, evaluation);
   html.raw("<h2>Plots</h2>\n<div class=\"plots\">\n");

@@ -250,11 +250,14 @@ void print(const Evaluation& evaluation, std::ostream& out) {
   }
   if (evaluation.services) print_services(out, *evaluation.services);
   for (const std::string& name : evaluation.missing) out << name << ": not in this run\n";
+  for (const auto& [name, rows] : evaluation.out_of_order)
+    out << name << ": OUT OF ORDER, " << rows << " rows are older than one above them\n";
 }
 
 ordered_json to_json(const Evaluation& evaluation) {
   ordered_json json = {
       {"duration_s", evaluation.duration_s}, {"travelled_m", evaluation.travelled_m}, {"missing", evaluation.missing}};
+  json["out_of_order"] = evaluation.out_of_order;
   json["odometry"] = or_null(evaluation.odometry, odometry_json);
   json["position"] = or_null(evaluation.position, position_json);
   json["track_choice"] = or_null(evaluation.position, choice_json);

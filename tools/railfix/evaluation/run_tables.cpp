@@ -141,33 +141,64 @@ Status read(const fs::path& file, std::vector<StatusRow>& rows) {
 }
 
 template <class Row>
+size_t put_in_order(std::vector<Row>& rows) {
+  size_t older = 0;
+  const Row* newest = nullptr;
+  for (const Row& row : rows) {
+    if (newest != nullptr && row.stamp_ns < newest->stamp_ns) {
+      ++older;
+    } else {
+      newest = &row;
+    }
+  }
+  if (older > 0)
+    std::stable_sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.stamp_ns < b.stamp_ns; });
+  return older;
+}
+
+template <class Row>
 Status read_if_there(const fs::path& folder, const std::string& name, std::optional<std::vector<Row>>& rows,
-                     std::vector<std::string>& missing) {
+                     RunTables& run) {
   if (!fs::exists(folder / name)) {
-    missing.push_back(name);
+    run.missing.push_back(name);
     return {};
   }
   rows.emplace();
   const Status status = read(folder / name, *rows);
   if constexpr (requires(Row row) { row.stamp_ns; }) {
-    std::stable_sort(rows->begin(), rows->end(), [](const Row& a, const Row& b) { return a.stamp_ns < b.stamp_ns; });
+    if (const size_t older = put_in_order(*rows)) run.out_of_order[name] = older;
   }
   return status;
 }
 
 }  // namespace
 
+std::optional<RunTables::Span> RunTables::span() const {
+  std::optional<Span> span;
+  const auto add = [&span](const auto& rows) {
+    if (!rows || rows->empty()) return;
+    const Span its{rows->front().stamp_ns, rows->back().stamp_ns};
+    span = span ? Span{std::min(span->from_ns, its.from_ns), std::max(span->to_ns, its.to_ns)} : its;
+  };
+  add(odometry);
+  add(states);
+  add(views);
+  add(rails);
+  add(sightings);
+  add(reports);
+  return span;
+}
+
 core::Result<RunTables> read_run(const fs::path& folder) {
   if (!fs::is_directory(folder)) return Error{folder.string() + " is not a folder; give the --out folder of a run"};
   RunTables run;
-  for (const Status& status : {read_if_there(folder, "odometry.csv", run.odometry, run.missing),
-                               read_if_there(folder, "train_state.csv", run.states, run.missing),
-                               read_if_there(folder, "track_view.csv", run.views, run.missing),
-                               read_if_there(folder, "rails.csv", run.rails, run.missing),
-                               read_if_there(folder, "sightings.csv", run.sightings, run.missing),
-                               read_if_there(folder, "position_fix.csv", run.fixes, run.missing),
-                               read_if_there(folder, "tpr.csv", run.reports, run.missing),
-                               read_if_there(folder, "status.csv", run.status, run.missing)}) {
+  for (const Status& status :
+       {read_if_there(folder, "odometry.csv", run.odometry, run),
+        read_if_there(folder, "train_state.csv", run.states, run),
+        read_if_there(folder, "track_view.csv", run.views, run), read_if_there(folder, "rails.csv", run.rails, run),
+        read_if_there(folder, "sightings.csv", run.sightings, run),
+        read_if_there(folder, "position_fix.csv", run.fixes, run), read_if_there(folder, "tpr.csv", run.reports, run),
+        read_if_there(folder, "status.csv", run.status, run)}) {
     if (!status.ok()) return status.error();
   }
   constexpr size_t kTables = 8;

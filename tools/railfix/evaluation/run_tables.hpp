@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -92,6 +93,15 @@ struct RunTables {
   std::optional<std::vector<ReportRow>> reports;
   std::optional<std::vector<StatusRow>> status;
   std::vector<std::string> missing;  // names of the tables that are not in this run
+  /// By the table's name: rows that stood below a newer one.
+  std::map<std::string, size_t> out_of_order{};
+
+  struct Span {
+    int64_t from_ns = 0;
+    int64_t to_ns = 0;
+  };
+  /// Of all stamps; nothing when no table has any.
+  [[nodiscard]] std::optional<Span> span() const;
 };
 
 /// A folder that does not exist, or that holds none of the tables, is an error; so is a broken row (file and line).
