@@ -272,6 +272,13 @@ void check(const Options& options) {
     throw core::BadInput("--truth needs --map and --start, the place on the map where the truth begins.");
 }
 
+void check_reports(const char* side, const std::string& where, const ReportSource& source) {
+  if (!source.reports().empty()) return;
+  throw core::BadInput(std::string(side) + " " + where +
+                       (source.live() ? ": no position report has come; is the train's tpr_publisher running?"
+                                      : ": it holds no position report; is it the right file?"));
+}
+
 std::string span_text(int64_t from_ns, int64_t to_ns) {
   char text[64];
   std::snprintf(text, sizeof text, "from %.3f to %.3f s", core::seconds(from_ns), core::seconds(to_ns));
@@ -294,7 +301,11 @@ int compare_reports(const Options& options) {
   ReportSource certified(options.certified, static_cast<etcs::Baseline>(options.certified_baseline), options.network);
   certified.shift(core::to_ns(options.offset_s));
   Line line(options);
+  if (!ours.live()) check_reports("--ours", options.ours, ours);
+  if (!certified.live()) check_reports("--certified", options.certified, certified);
   if (ours.live() || certified.live()) listen(ours, certified, line, options);
+  check_reports("--ours", options.ours, ours);
+  check_reports("--certified", options.certified, certified);
   const auto* axes = line.axes(certified.reports());
   if (axes == nullptr) throw core::BadInput(options.map + ": has none of the reported balise groups.");
   const auto pairing = compare::pair_up(ours.reports(), certified.reports(), *axes, core::to_ns(options.longest_gap_s));

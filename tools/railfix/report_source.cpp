@@ -16,6 +16,7 @@ constexpr const char* kTopic = "topic:";
 ReportSource::ReportSource(const std::string& where, etcs::Baseline baseline, TrainNetwork network) {
   if (where.starts_with(kTopic)) {
     network.train = where.substr(std::string(kTopic).size());
+    if (network.train.empty()) throw core::BadInput(where + " lacks the name of the train; write topic:TRAIN");
     listener_ = std::make_unique<TopicListener>(network, "railfix-tpr-compare");
     listener_->listen(messaging::topics::train_position_report.name,
                       [this](const auto&, const auto&, const auto& sample, const auto&) {

@@ -192,6 +192,24 @@ TEST_F(TprCompareFiles, GroupsThatTheMapDoesNotHaveAreCounted) {
   EXPECT_THAT(outcome.out, HasSubstr("ours 100.0 %, certified 100.0 % of 20 certified reports"));
 }
 
+TEST_F(TprCompareFiles, ASideWithoutReportsIsNamed) {
+  const auto refusal = [&](const std::vector<std::string>& more) {
+    const auto outcome = compare(more);
+    EXPECT_EQ(outcome.exit_code, 2) << outcome.out;
+    return outcome.err;
+  };
+  std::ofstream(file("certified.csv")) << table(1, 10);
+  std::ofstream(file("ours.csv")) << "stamp_ns,hex\n";
+  EXPECT_THAT(refusal({}), HasSubstr("--ours " + file("ours.csv") + ": it holds no position report"));
+  std::ofstream(file("ours.csv")) << table(1, 10);
+  std::ofstream(file("certified.csv")) << "stamp_ns,hex\n";
+  EXPECT_THAT(refusal({}), HasSubstr("--certified " + file("certified.csv") + ": it holds no position report"));
+  const auto nameless = test::run_program(
+      {"railfix", "tpr", "compare", "--ours", "topic:", "--certified", file("certified.csv")}, kPatienceS);
+  EXPECT_EQ(nameless.exit_code, 2);
+  EXPECT_THAT(nameless.err, HasSubstr("lacks the name of the train; write topic:TRAIN"));
+}
+
 TEST_F(TprCompareFiles, OptionsOutOfRangeAreRefused) {
   const auto refusal = [&](const std::vector<std::string>& more) {
     const auto outcome = compare(more);
