@@ -80,7 +80,7 @@ void GroundLink::push(Event event) {
 std::deque<GroundLink::Event> GroundLink::wait() {
   std::unique_lock lock(mutex_);
   const auto ready = [this] { return stop_ || !events_.empty(); };
-  const bool stores_again = !unstored_.empty() || !delivered_.empty();
+  const bool stores_again = !unstored_.empty() || !delivered_.empty() || !read_trouble_.empty();
   auto until = Clock::now() + kRetryStore;
   if (outbox_.held()) until = stores_again ? std::min(until, try_again_at_) : try_again_at_;
   if (stores_again || outbox_.held()) {
@@ -223,12 +223,16 @@ void GroundLink::publish_unstored() {
 }
 
 void GroundLink::publish_stored() {
+  read_trouble_.clear();
   while (const auto sequence = outbox_.next()) {
     const auto bytes = store_.read(*sequence);
-    const auto report = bytes.ok() ? ground_link::ground_report_from(bytes.value())
-                                   : core::Result<ground_link::GroundReport>(bytes.error());
-    if (!report.ok()) {
-      store_trouble_ = report.error().message;
+    if (!bytes.ok()) {  // those behind it wait, too: the ground gets them in order
+      read_trouble_ = bytes.error().message;
+      return;
+    }
+    const auto report = bytes.value() ? ground_link::ground_report_from(*bytes.value())
+                                      : core::Result<ground_link::GroundReport>(core::Error{"damaged"});
+    if (!report.ok()) {  // for good
       ++dropped_;
       outbox_.skip();
       continue;
@@ -249,7 +253,9 @@ void GroundLink::say() {
   const std::string storing =
       store_trouble_.empty() ? ""
                              : store_trouble_ + " Reports go from memory, and a power cut would lose those that wait.";
-  for (const auto& trouble : {storing, store_.problem()}) {
+  const std::string reading =
+      read_trouble_.empty() ? "" : read_trouble_ + " Stored reports wait until they can be read again.";
+  for (const auto& trouble : {storing, reading, store_.problem()}) {
     if (!trouble.empty()) sentence += (sentence.empty() ? "" : " ") + trouble;
   }
   const std::lock_guard lock(mutex_);

@@ -96,6 +96,7 @@ class GroundLink {
   std::string refusal_;  // empty = the broker takes what it gets
   std::chrono::steady_clock::time_point try_again_at_;
   std::string store_trouble_;
+  std::string read_trouble_;  // why the next stored report cannot be read now; tried again
   size_t dropped_ = 0;
   mutable std::mutex mutex_;
   std::condition_variable wake_;

@@ -142,16 +142,17 @@ core::Result<std::vector<uint64_t>> ReportStore::sequences() const {
   return sequences;
 }
 
-core::Result<std::vector<uint8_t>> ReportStore::read(uint64_t sequence) const {
+core::Result<std::optional<std::vector<uint8_t>>> ReportStore::read(uint64_t sequence) const {
+  using Report = std::optional<std::vector<uint8_t>>;
   const auto select = database_->prepare("SELECT checksum, bytes FROM report WHERE sequence = ?");
   if (!select) return database_->error();
   sqlite3_bind_int64(select.get(), 1, static_cast<sqlite3_int64>(sequence));
-  if (sqlite3_step(select.get()) != SQLITE_ROW) return database_->error();
+  const int code = sqlite3_step(select.get());
+  if (code == SQLITE_DONE || (code != SQLITE_ROW && database_->damaged())) return Report();
+  if (code != SQLITE_ROW) return database_->error();
   const auto* begin = static_cast<const uint8_t*>(sqlite3_column_blob(select.get(), 1));
   std::vector<uint8_t> bytes(begin, begin + sqlite3_column_bytes(select.get(), 1));
-  if (sqlite3_column_int64(select.get(), 0) != checksum(bytes))
-    return core::Error{database_->file + ": the checksum of report " + std::to_string(sequence) + " is wrong."};
-  return bytes;
+  return sqlite3_column_int64(select.get(), 0) == checksum(bytes) ? Report(std::move(bytes)) : Report();
 }
 
 }  // namespace railfix::tpr_publisher

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -28,9 +29,10 @@ class ReportStore {
   /// Numbers 1, 2, 3, ... never come twice, also when reports were removed. On the disk when it returns.
   core::Result<uint64_t> append(std::span<const uint8_t> report);
   core::Status remove(std::span<const uint64_t> sequences);
-  /// In order. An error also when the checksum of the report is wrong.
+  /// In order.
   [[nodiscard]] core::Result<std::vector<uint64_t>> sequences() const;
-  [[nodiscard]] core::Result<std::vector<uint8_t>> read(uint64_t sequence) const;
+  /// Nothing when it is damaged (a wrong checksum) or gone: it will never be read. After an error it may be, later.
+  [[nodiscard]] core::Result<std::optional<std::vector<uint8_t>>> read(uint64_t sequence) const;
 
  private:
   struct Database;

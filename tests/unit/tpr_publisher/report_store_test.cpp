@@ -154,7 +154,54 @@ TEST_F(Store, ADamagedReportIsNotSent) {
   stream.seekp(static_cast<std::streamoff>(place));
   stream.put('\0');
   stream.close();
-  EXPECT_THAT(opened(file_).read(1).error().message, HasSubstr("checksum of report 1 is wrong"));
+  const auto store = opened(file_);
+  const auto damaged = store.read(1);
+  ASSERT_TRUE(damaged.ok()) << damaged.error().message;
+  EXPECT_FALSE(damaged.value().has_value());
+  EXPECT_FALSE(store.read(2).value().has_value()) << "was never there";
+}
+
+/// While it lives, reading the file fails, as on a disk that is gone for a moment.
+class Unreadable {
+ public:
+  explicit Unreadable(const fs::path& file) {
+    for (const auto& entry : fs::directory_iterator("/proc/self/fd")) {
+      std::error_code gone;
+      if (fs::read_symlink(entry, gone) == file) fd_ = std::stoi(entry.path().filename());
+    }
+    EXPECT_GE(fd_, 0);
+    kept_ = dup(fd_);
+    const int write_only = ::open(file.c_str(), O_WRONLY | O_CLOEXEC);
+    dup2(write_only, fd_);
+    close(write_only);
+  }
+  ~Unreadable() {
+    dup2(kept_, fd_);
+    close(kept_);
+  }
+  Unreadable(const Unreadable&) = delete;
+  Unreadable& operator=(const Unreadable&) = delete;
+
+ private:
+  int fd_ = -1;
+  int kept_ = -1;
+};
+
+TEST_F(Store, AReportThatCannotBeReadNowIsReadLater) {
+  constexpr uint64_t kReports = 4000;  // not all of them stay in SQLite's memory: the last is looked at first
+  const std::vector<uint8_t> report(1000, 7);
+  {
+    auto store = opened(file_);
+    for (uint64_t i = 0; i < kReports; ++i) ASSERT_TRUE(store.append(report).ok());
+  }
+  const auto store = opened(file_);
+  {
+    const Unreadable disk(file_);
+    const auto read = store.read(kReports);
+    ASSERT_FALSE(read.ok()) << "an error is not taken for a damaged report";
+    EXPECT_THAT(read.error().message, HasSubstr("I/O error"));
+  }
+  EXPECT_EQ(store.read(kReports).value(), report);
 }
 
 /// Appends until it is killed, and tells each number once append() has promised it. REQUIRES: runs in a child.
