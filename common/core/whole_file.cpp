@@ -12,10 +12,6 @@ namespace railfix::core {
 
 namespace {
 
-Error cannot_read(const std::string& name) {
-  return {"cannot read " + name + " (" + std::strerror(errno) + "); is the path right?"};
-}
-
 /// Where the links at this place lead, whether or not there is something yet; nothing where no file may be put.
 std::optional<std::filesystem::path> place_of(std::filesystem::path file) {
   namespace fs = std::filesystem;
@@ -32,6 +28,10 @@ std::optional<std::filesystem::path> place_of(std::filesystem::path file) {
 }
 
 }  // namespace
+
+Error cannot_read(const std::string& name) {
+  return {"cannot read " + name + " (" + std::strerror(errno) + "); is the path right?"};
+}
 
 Result<std::string> read_whole(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);

@@ -9,6 +9,9 @@
 
 namespace railfix::core {
 
+/// The sentence for a file that cannot be read, with the system's reason. REQUIRES: errno says it.
+Error cannot_read(const std::string& name);
+
 /// An error names the file.
 Result<std::string> read_whole(const std::filesystem::path& file);
 /// What is left of it; an error calls it `name`.

@@ -259,9 +259,9 @@ void write_marks(const Map& map, map::Map& out) {
 
 core::Result<Map> Map::load(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
-  if (!stream || std::filesystem::is_directory(file)) {
-    return core::Error{"cannot read the map " + file.string() + "; is the path right?"};
-  }
+  const bool ends_at_once = stream.peek() == std::ifstream::traits_type::eof();
+  if (!stream.is_open() || stream.bad()) return core::cannot_read("the map " + file.string());
+  if (ends_at_once) return core::Error{file.string() + " is empty; make it again with `railfix map build`"};
   const google::protobuf::LogSilencer silence;  // the one sentence below is enough
   map::Map in;
   if (!in.ParseFromIstream(&stream)) {

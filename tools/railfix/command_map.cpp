@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "track/import/build.hpp"
 #include "track/import/made_network.hpp"
 #include "track/import/scale.hpp"
+#include "whole_number.hpp"
 
 namespace railfix::tool {
 namespace {
@@ -59,14 +61,14 @@ int build(const BuildRequest& request) {
 
 struct InfoRequest {
   std::string map;
-  std::string at;
+  std::optional<std::string> at;
   bool as_json = false;
 };
 
 int info(const InfoRequest& request) {
   const track::Map map = core::value_or_throw(track::Map::load(request.map));
-  if (!request.at.empty()) {
-    print_place(map, core::value_or_throw(map.parse_position(request.at)), request.as_json);
+  if (request.at) {
+    print_place(map, core::value_or_throw(map.parse_position(*request.at)), request.as_json);
   } else if (request.as_json) {
     print_json(map_json(map));
   } else {
@@ -147,7 +149,9 @@ void add_make(CLI::App& map, Action& chosen) {
   command->add_option("--track-km", request->options.track_km, "Length of all tracks together")
       ->check(number_between(20.0, 100000.0))
       ->capture_default_str();
-  command->add_option("--seed", request->options.seed, "Another network of the same kind")->capture_default_str();
+  command->add_option("--seed", request->options.seed, "Another network of the same kind")
+      ->check(whole_number())
+      ->capture_default_str();
   command->add_option("--masts", request->options.mast_spacing_m, "Masts about every so many metres; 0 = none")
       ->check(number_between(0.0, 1000.0))
       ->capture_default_str();

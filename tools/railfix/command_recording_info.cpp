@@ -76,13 +76,14 @@ ordered_json topic_json(const Info& info, const mcap::Channel& channel) {
 
 ordered_json to_json(const Options& options, const Info& info) {
   const auto& statistics = info.reader->statistics();
+  const auto when = [&](int64_t ns) { return statistics.messages > 0 ? ordered_json(utc_text(ns)) : ordered_json(); };
   ordered_json json{
-      {"file", options.file.string()},     {"bytes", fs::file_size(options.file)},
-      {"closed", info.reader->indexed()},  {"from", utc_text(statistics.start_ns)},
-      {"to", utc_text(statistics.end_ns)}, {"from_ns", statistics.start_ns},
-      {"to_ns", statistics.end_ns},        {"duration_s", core::seconds(statistics.end_ns - statistics.start_ns)},
-      {"samples", statistics.messages},    {"chunks", statistics.chunks},
-      {"topics", ordered_json::array()},   {"lost", losses_of(*info.reader)},
+      {"file", options.file.string()},    {"bytes", fs::file_size(options.file)},
+      {"closed", info.reader->indexed()}, {"from", when(statistics.start_ns)},
+      {"to", when(statistics.end_ns)},    {"from_ns", statistics.start_ns},
+      {"to_ns", statistics.end_ns},       {"duration_s", core::seconds(statistics.end_ns - statistics.start_ns)},
+      {"samples", statistics.messages},   {"chunks", statistics.chunks},
+      {"topics", ordered_json::array()},  {"lost", losses_of(*info.reader)},
       {"metadata", ordered_json::array()}};
   std::multimap<std::string, ordered_json> by_name;
   for (const auto& [id, channel] : info.reader->channels()) by_name.emplace(channel.topic, topic_json(info, channel));
@@ -115,9 +116,13 @@ void print_topics(const ordered_json& topics, bool checked) {
 void print(const ordered_json& json) {
   std::printf("%s: %.1f MB, %s\n", json["file"].get<std::string>().c_str(), json["bytes"].get<double>() / kBytesPerMb,
               json["closed"].get<bool>() ? "closed properly" : "NOT closed properly");
-  std::printf("from %s, %.1f s, %llu samples in %llu chunks\n\n", json["from"].get<std::string>().c_str(),
-              json["duration_s"].get<double>(), static_cast<unsigned long long>(json["samples"].get<uint64_t>()),
-              static_cast<unsigned long long>(json["chunks"].get<uint64_t>()));
+  if (json["from"].is_null()) {
+    std::printf("no samples\n\n");
+  } else {
+    std::printf("from %s, %.1f s, %llu samples in %llu chunks\n\n", json["from"].get<std::string>().c_str(),
+                json["duration_s"].get<double>(), static_cast<unsigned long long>(json["samples"].get<uint64_t>()),
+                static_cast<unsigned long long>(json["chunks"].get<uint64_t>()));
+  }
   print_topics(json["topics"], json.contains("check"));
   std::printf("\n");
   for (const auto& metadata : json["metadata"]) {

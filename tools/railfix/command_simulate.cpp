@@ -9,6 +9,7 @@
 #include "scenario_files.hpp"
 #include "simulator/simulation.hpp"
 #include "simulator/simulator_config.hpp"
+#include "whole_number.hpp"
 
 namespace railfix::tool {
 namespace {
@@ -254,7 +255,7 @@ void add_simulate(CLI::App& app, Action& chosen) {
   command->add_option("--stop-s", simulation.run.stop_s, "how long it stops")
       ->check(number_between(0.0, 3600.0))
       ->capture_default_str();
-  command->add_option("--seed", simulation.seed)->capture_default_str();
+  command->add_option("--seed", simulation.seed)->check(whole_number())->capture_default_str();
   command->add_option("--threads", simulation.threads, "pictures rendered at a time")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();

@@ -1,5 +1,8 @@
+#include <algorithm>
 #include <exception>
 #include <iostream>
+#include <string>
+#include <vector>
 
 #include "commands.hpp"
 #include "core/result.hpp"
@@ -27,6 +30,21 @@ std::string missing_command(const CLI::App& app) {
          railfix::core::did_you_mean(wanted, names);
 }
 
+/// `railfix help tpr decode` is `railfix tpr decode --help`; a command that is not there is told as such.
+std::vector<std::string> words_of(const CLI::App& app, int argc, char** argv) {
+  std::vector<std::string> words(argv + 1, argv + argc);
+  if (words.empty() || words.front() != "help") return words;
+  words.erase(words.begin());
+  const CLI::App* at = &app;
+  for (const auto& word : words) {
+    const auto named = at->get_subcommands([&](const CLI::App* one) { return one->get_name() == word; });
+    if (named.empty()) return words;
+    at = named.front();
+  }
+  words.emplace_back("--help");
+  return words;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -42,7 +60,9 @@ int main(int argc, char** argv) {
     add(app, chosen);
   }
   try {
-    app.parse(argc, argv);
+    auto words = words_of(app, argc, argv);
+    std::ranges::reverse(words);  // CLI11 takes them from the end
+    app.parse(words);
   } catch (const CLI::RequiredError& error) {
     const auto missing = missing_command(app);
     if (missing.empty()) return app.exit(error) == 0 ? 0 : kBadInput;

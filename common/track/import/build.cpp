@@ -1,7 +1,10 @@
 #include "track/import/build.hpp"
 
 #include <algorithm>
+#include <cerrno>
+#include <fstream>
 
+#include "core/whole_file.hpp"
 #include "track/import/erju.hpp"
 #include "track/import/finish.hpp"
 #include "track/import/landxml.hpp"
@@ -23,14 +26,25 @@ constexpr double kMappingLocationM = 5.0;
 
 enum class Kind { landxml, osm, json, compiled, railml, erju_infra, erju_map };
 
+core::Status check_readable(const std::filesystem::path& file) {
+  std::error_code failed;
+  const auto type = std::filesystem::status(file, failed).type();
+  if (type == std::filesystem::file_type::directory) {
+    errno = EISDIR;
+    return core::cannot_read(file.string());
+  }
+  const bool special = type != std::filesystem::file_type::regular && std::filesystem::exists(file, failed);
+  if (special) return core::Error{"cannot read " + file.string() + ": it is no file; is the path right?"};
+  return std::ifstream(file) ? core::Status() : core::Status(core::cannot_read(file.string()));
+}
+
 /// By the name's ending; .xml by its first element.
 core::Result<Kind> kind_of(const std::filesystem::path& file) {
   const std::string name = file.filename().string();
   const auto ends = [&](std::initializer_list<std::string_view> endings) {
     return std::any_of(endings.begin(), endings.end(), [&](std::string_view ending) { return name.ends_with(ending); });
   };
-  if (!std::filesystem::is_regular_file(file))
-    return core::Error{"cannot read " + file.string() + "; is the path right?"};
+  if (const core::Status readable = check_readable(file); !readable) return readable.error();
   if (ends({".osm", ".pbf", ".osm.gz", ".osm.bz2", ".osm.xml"})) return Kind::osm;
   if (ends({".json", ".geojson"})) return Kind::json;
   if (ends({".landxml", ".LandXML"})) return Kind::landxml;

@@ -46,5 +46,43 @@ TEST_F(MapCommand, NeverWritesOverWhatItReads) {
   EXPECT_EQ(test::slurp(drawn), before);
 }
 
+TEST_F(MapCommand, SaysWhyAFileCannotBeRead) {
+  const auto empty = write("empty.map", "").string();
+  refuses({"info", empty}, "empty.map is empty; make it again");
+  refuses({"info", root_}, "(Is a directory); is the path right?");
+  refuses({"info", root_ / "none.map"}, "(No such file or directory); is the path right?");
+  fs::create_directories(root_ / "folder.landxml");
+  const std::string out = root_ / "out.map";
+  refuses({"build", root_ / "folder.landxml", "--out", out}, "(Is a directory); is the path right?");
+  refuses({"build", root_ / "none.osm", "--out", out}, "(No such file or directory); is the path right?");
+  refuses({"draw", root_ / "folder.landxml", "--out", root_ / "out.svg"}, "(Is a directory); is the path right?");
+}
+
+TEST_F(MapCommand, RefusesValuesThatMeanNothing) {
+  for (const char* command : {"info", "draw"}) {
+    const auto refused = map({command, map_, "--out", root_ / "out.svg", "--at", ""});
+    EXPECT_EQ(refused.exit_code, 2) << command << refused.out;
+  }
+  refuses({"info", map_, "--at", ""}, "is not a place on the map");
+  const auto seed = map({"make", "--seed", "-1", "--out", root_ / "made.map"});
+  EXPECT_EQ(seed.exit_code, 2);
+  EXPECT_THAT(seed.err, HasSubstr("--seed: -1 is not a whole number from 0 on"));
+}
+
+TEST(Help, IsAWordToo) {
+  const auto same = [](const std::vector<std::string>& word, const std::vector<std::string>& flag) {
+    const auto a = test::run_program(word, kPatienceS);
+    EXPECT_EQ(a.exit_code, 0) << a.err;
+    EXPECT_EQ(a.out, test::run_program(flag, kPatienceS).out);
+    EXPECT_THAT(a.out, HasSubstr("Usage: railfix"));
+  };
+  same({"railfix", "help"}, {"railfix", "--help"});
+  same({"railfix", "help", "map"}, {"railfix", "map", "--help"});
+  same({"railfix", "help", "tpr", "decode"}, {"railfix", "tpr", "decode", "--help"});
+  const auto unknown = test::run_program({"railfix", "help", "maps"}, kPatienceS);
+  EXPECT_EQ(unknown.exit_code, 2);
+  EXPECT_THAT(unknown.err, HasSubstr("there is no command 'maps'"));
+}
+
 }  // namespace
 }  // namespace railfix

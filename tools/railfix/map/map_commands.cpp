@@ -5,6 +5,7 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "core/units.hpp"
 #include "map/coverage.hpp"
@@ -21,14 +22,14 @@ using nlohmann::ordered_json;
 struct DrawRequest {
   std::string map;
   std::string out;
-  std::string at;
+  std::optional<std::string> at;
   DrawOptions options;
 };
 
 int draw(DrawRequest request) {
   check_output("--out", request.out, {request.map});
   const track::Map map = core::value_or_throw(track::Map::load(request.map));
-  if (!request.at.empty()) request.options.around = core::value_or_throw(map.parse_position(request.at));
+  if (request.at) request.options.around = core::value_or_throw(map.parse_position(*request.at));
   core::ok_or_throw(write_drawing(draw_map(map, request.options), request.out));
   std::printf("written          %s\n", request.out.c_str());
   return 0;
