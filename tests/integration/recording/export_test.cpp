@@ -117,6 +117,16 @@ TEST_F(Export, InfoTellsWhatIsThereAndWhetherItIsWhole) {
   EXPECT_THAT(damaged.out, HasSubstr("check: PROBLEMS"));
 }
 
+TEST_F(Export, ARecordingWithoutSamplesHasNoBeginning) {
+  const auto empty = folder_ / "empty.mcap";
+  ASSERT_TRUE(core::value_or_throw(mcap::Writer::create(empty, {}))->close().ok());
+  const auto info = recording({"info", empty.string()});
+  EXPECT_EQ(info.exit_code, 0) << info.err;
+  EXPECT_THAT(info.out, HasSubstr("no samples"));
+  EXPECT_THAT(info.out, ::testing::Not(HasSubstr("1970")));
+  EXPECT_TRUE(nlohmann::json::parse(recording({"info", empty.string(), "--json"}).out)["from"].is_null());
+}
+
 TEST_F(Export, TablesHaveAColumnForEachMember) {
   const auto exported = recording({"export", file().string(), "--csv", (folder_ / "csv").string()});
   ASSERT_EQ(exported.exit_code, 0) << exported.err;
