@@ -18,6 +18,10 @@ constexpr double kWorstMisfit = 7.0;     // over 200 m
 constexpr double kMostOfRange = 1.1;     // of the odometer's scale
 constexpr double kLeastEvidence = 20.0;  // that the track is on the map at all, a log
 
+track::Direction turned_round(track::Direction direction) {
+  return direction == track::Direction::reverse ? track::Direction::forward : track::Direction::reverse;
+}
+
 }  // namespace
 
 std::string to_string(Doubt doubt) {
@@ -34,75 +38,67 @@ std::string to_string(Doubt doubt) {
 }
 
 void NetworkLocator::move(double way_m, double turn_rad, double turn_sigma_rad) {
-  if (way_m <= 0) {
-    if (way_m < -1) forget();
-    return;
-  }
-  open_.turn_rad += turn_rad;
-  open_.variance += turn_sigma_rad * turn_sigma_rad;
-  open_m_ += way_m;
-  if (open_m_ < kBinM) return;
-  // What is too much belongs to the next bin, with its share of the turn.
-  const double over_m = std::fmod(open_m_, kBinM);
-  const double share = std::min(1.0, over_m / way_m);
-  MeasuredBin next;
-  next.turn_rad = share * turn_rad;
-  next.variance = share * turn_sigma_rad * turn_sigma_rad;
-  open_.turn_rad -= next.turn_rad;
-  open_.variance = std::max(0.0, open_.variance - next.variance);
-  for (Mark mark : open_.marks) {
-    if (mark.along_m < kBinM) continue;
-    mark.along_m -= kBinM;
-    next.marks.push_back(mark);
-  }
-  std::erase_if(open_.marks, [](const Mark& mark) { return mark.along_m >= kBinM; });
-  bins_.push_back(std::move(open_));
-  open_ = std::move(next);
-  open_m_ = over_m;
-  if (way_m > 2 * kBinM) forget();  // a gap
-  while (static_cast<double>(bins_.size()) * kBinM > parameters_.window_m) {
-    bins_.pop_front();
-    ++gone_bins_;
+  for (auto& [run, filter] : searches_) {
+    run.move(way_m, turn_rad, turn_sigma_rad);
+    // What was taken back stays in the filter: another one begins.
+    if (filter && filter->taken_bins() > run.end_bin()) filter.reset();
   }
 }
 
 void NetworkLocator::sight(const Sighting& sighting) {
   if (!is_mark(sighting.kind)) return;
-  open_.marks.push_back({open_m_ + sighting.distance_ahead_m, mark_kind(sighting.kind), sighting.lateral_m});
+  for (auto& search : searches_) search.run.sight(sighting);
 }
 
 void NetworkLocator::forget() {
-  bins_.clear();
-  gone_bins_ = 0;
-  filter_.reset();
-  open_ = {};
-  open_m_ = 0;
+  for (auto& [run, filter] : searches_) {
+    run.clear();
+    filter.reset();
+  }
+}
+
+size_t NetworkLocator::leading() const {
+  const auto bins = [](const MeasuredRun& run) { return run.at_front() ? run.bins() : 0; };
+  return bins(searches_[1].run) > bins(searches_[0].run) ? 1 : 0;
+}
+
+double NetworkLocator::way_m() const {
+  const MeasuredRun& run = searches_[leading()].run;
+  return run.at_front() ? static_cast<double>(run.bins()) * kBinM : 0.0;
 }
 
 // A filter that began long ago may have been led astray by what is not on the map: another one begins.
-PlaceFilter& NetworkLocator::filtered(const MeasuredWay& way) {
+PlaceFilter& NetworkLocator::filtered(Search& search, const MeasuredWay& way) const {
+  auto& filter = search.filter;
+  const size_t gone_bins = search.run.gone_bins();
   const auto most_bins = static_cast<size_t>(parameters_.window_m / kBinM);
-  if (!filter_) {
-    filter_.emplace(parameters_, *index_, gone_bins_);
-  } else if (filter_->lost() || filter_->overflowed() || filter_->first_bin() + most_bins < gone_bins_) {
-    filter_.emplace(parameters_, *index_, gone_bins_ + way.size() - std::min(way.size(), kAnewBins));
+  if (!filter) {
+    filter.emplace(parameters_, *index_, gone_bins);
+  } else if (filter->lost() || filter->overflowed() || filter->first_bin() + most_bins < gone_bins) {
+    filter.emplace(parameters_, *index_, gone_bins + way.size() - std::min(way.size(), kAnewBins));
   }
-  filter_->advance(way, gone_bins_);
-  return *filter_;
+  filter->advance(way, gone_bins);
+  return *filter;
 }
 
 Location NetworkLocator::locate() {
-  const MeasuredWay way(bins_.begin(), bins_.end());
-  const PlaceFilter& filter = filtered(way);
+  Search& search = searches_[leading()];
+  const MeasuredRun& run = search.run;
+  if (!run.at_front()) return {};
+  const MeasuredWay way = run.way();
+  const PlaceFilter& filter = filtered(search, way);
   double turn = 0;
-  for (const MeasuredBin& bin : bins_) turn += std::abs(bin.turn_rad);
+  for (const MeasuredBin& bin : way) turn += std::abs(bin.turn_rad);
   if (way_m() < parameters_.least_way_m || turn < parameters_.least_turn_rad) return {};
   const TurnModel model(parameters_, way);
-  const auto candidates = filter.candidates(gone_bins_);
+  const auto candidates = filter.candidates(run.gone_bins());
   const auto compared = WayComparison(model, *index_).compare(candidates);
-  Location location = sum_up(compared.fits);
+  Location location = sum_up(compared.fits, run);
   location.candidates = candidates.size();
   location.doubt = doubt_of(location, !filter.overflowed() && compared.complete, filter.evidence());
+  if (run.ahead()) return location;
+  // Found in the direction of the run: its front looks the other way.
+  for (auto& place : location.places) place.place.direction = turned_round(place.place.direction);
   return location;
 }
 
@@ -119,8 +115,8 @@ Doubt NetworkLocator::doubt_of(const Location& location, bool complete, double e
 }
 
 // On from the last whole bin.
-LocatedPlace NetworkLocator::place_of(const WayFit& fit) const {
-  const auto here = place_on(fit.runs, fit.end_m + fit.scale * open_m_);
+LocatedPlace NetworkLocator::place_of(const WayFit& fit, const MeasuredRun& run) const {
+  const auto here = place_on(fit.runs, fit.end_m + fit.scale * run.open_m());
   const double offset_m = here.run.forward ? here.into_m : here.run.length_m() - here.into_m;
   return {{here.run.edge->id, offset_m, here.run.forward ? track::Direction::forward : track::Direction::reverse},
           0,
@@ -146,13 +142,13 @@ bool NetworkLocator::just_behind_switch(const LocatedPlace& place) const {
   return false;
 }
 
-Location NetworkLocator::sum_up(const std::vector<WayFit>& fits) const {
+Location NetworkLocator::sum_up(const std::vector<WayFit>& fits, const MeasuredRun& run) const {
   Location location;
   double most = -INFINITY;
   double sum = 0;
   for (const WayFit& fit : fits) most = std::max(most, fit.log_evidence);
   for (const WayFit& fit : fits) {
-    location.places.push_back(place_of(fit));
+    location.places.push_back(place_of(fit, run));
     location.places.back().probability = std::exp(fit.log_evidence - most);
     sum += location.places.back().probability;
   }

@@ -3,7 +3,7 @@
 // their probabilities, and "certain" only when nothing else fits.
 #pragma once
 
-#include <deque>
+#include <array>
 #include <memory>
 #include <optional>
 #include <string>
@@ -11,6 +11,7 @@
 
 #include "map_matcher/locator_types.hpp"
 #include "map_matcher/match_types.hpp"
+#include "map_matcher/measured_run.hpp"
 #include "map_matcher/network_index.hpp"
 #include "map_matcher/place_filter.hpp"
 #include "map_matcher/way_fit.hpp"
@@ -55,29 +56,36 @@ class NetworkLocator {
   NetworkLocator(const LocatorParameters& parameters, std::shared_ptr<const NetworkIndex> index)
       : parameters_(parameters), index_(std::move(index)) {}
 
-  /// Moved forward by way_m (measured) and turned meanwhile (left positive). Running backwards begins anew.
+  /// Moved by way_m (measured, forward positive) and turned meanwhile (left positive).
   void move(double way_m, double turn_rad, double turn_sigma_rad);
   void sight(const Sighting& sighting);
   void forget();
-  [[nodiscard]] double way_m() const { return static_cast<double>(bins_.size()) * kBinM; }
-  /// Where the train is now. No places where the way is too short or too plain.
+  /// That is searched for.
+  [[nodiscard]] double way_m() const;
+  /// Where the train is now, in the direction that its own front looks, whichever way it runs. No places where the way
+  /// is too short or too plain, nor while the train is back from where it was before: it may have come back on another
+  /// leg of a switch.
   [[nodiscard]] Location locate();
 
  private:
-  [[nodiscard]] PlaceFilter& filtered(const MeasuredWay& way);
-  [[nodiscard]] Location sum_up(const std::vector<WayFit>& fits) const;
+  /// The way ahead or astern, and the search on it.
+  struct Search {
+    MeasuredRun run;
+    std::optional<PlaceFilter> filter;
+  };
+  /// The one that the train is at the front of, with the longer way.
+  [[nodiscard]] size_t leading() const;
+  [[nodiscard]] PlaceFilter& filtered(Search& search, const MeasuredWay& way) const;
+  [[nodiscard]] Location sum_up(const std::vector<WayFit>& fits, const MeasuredRun& run) const;
   [[nodiscard]] Doubt doubt_of(const Location& location, bool complete, double evidence) const;
   [[nodiscard]] double beside_probability(const std::vector<LocatedPlace>& places) const;
-  [[nodiscard]] LocatedPlace place_of(const WayFit& fit) const;
+  [[nodiscard]] LocatedPlace place_of(const WayFit& fit, const MeasuredRun& run) const;
   [[nodiscard]] bool just_behind_switch(const LocatedPlace& place) const;
 
   LocatorParameters parameters_;
   std::shared_ptr<const NetworkIndex> index_;
-  std::deque<MeasuredBin> bins_;  // oldest first
-  size_t gone_bins_ = 0;          // in front of them
-  std::optional<PlaceFilter> filter_;
-  MeasuredBin open_;
-  double open_m_ = 0;
+  std::array<Search, 2> searches_{Search{{parameters_, MeasuredRun::Direction::ahead}, {}},
+                                  Search{{parameters_, MeasuredRun::Direction::astern}, {}}};
 };
 
 }  // namespace railfix::map_matcher

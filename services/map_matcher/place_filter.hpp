@@ -25,6 +25,8 @@ class PlaceFilter {
   /// Those that may be the place, the likely ones first; their bins count from the way's first one.
   [[nodiscard]] std::vector<Candidate> candidates(size_t gone_bins) const;
   [[nodiscard]] size_t first_bin() const { return first_bin_; }
+  /// The number of the first bin that it has not taken yet.
+  [[nodiscard]] size_t taken_bins() const { return taken_bins_; }
   /// How much likelier (log) the best place is than that the train is on a track that is not on the map, which many
   /// places had the chance to fit.
   [[nodiscard]] double evidence() const;

@@ -43,6 +43,12 @@ void add_options(CLI::App& app, measure::MatchingOptions& options) {
       ->check(tool::whole_number(1));
   app.add_option("--masts-mapped", options.masts_mapped, "landmarks: the map has only this share of the masts")
       ->check(tool::number_between(0, 1));
+  auto* astern = app.add_flag("--astern", options.astern, "locate: the trains back all the way");
+  auto* back = app.add_option("--back-m", options.back_m, "locate: after 1.5 km the trains set back so far, and go on")
+                   ->check(tool::number_between(0, 1500))
+                   ->excludes(astern);
+  app.add_flag("--other-leg", options.other_leg, "... over another leg of a switch that they set back over")
+      ->needs(back);
   app.add_flag("--each", options.each, "A line for each ride that went wrong; locate: for every trip as it ends");
 }
 

@@ -14,6 +14,9 @@ struct MatchingOptions {
   double track_km = 20000;   // of a made-up network
   double map_error_m = 0.5;  // of a track about the mapped one
   uint64_t elsewhere = 0;    // the trips are on another made-up network, of this seed (locate)
+  bool astern = false;       // the trains back all the way (locate)
+  double back_m = 0;         // after 1.5 km the trains set back so far, and go on (locate)
+  bool other_leg = false;    // ... over another leg of a switch that they set back over
   double masts_mapped = 1;   // share of the masts that the map has (landmarks)
   bool each = false;         // a line for each ride that went wrong
 };

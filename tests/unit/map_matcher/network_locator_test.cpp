@@ -35,13 +35,18 @@ std::shared_ptr<const NetworkIndex> network_of(const std::vector<std::vector<tra
   return std::make_shared<const NetworkIndex>(map);
 }
 
-Location ride(const std::shared_ptr<const NetworkIndex>& index, const track::Route& route, double from_m, double to_m,
-              double scale, double every_m = 1e9) {
+testing::RideErrors errors_of(double scale) {
   testing::RideErrors errors;
   errors.odometer_scale = scale;
   errors.turn_bias_rps = 0;
   errors.turn_noise_rps = 0;
   errors.step_turn_noise_rad = 3e-4;
+  return errors;
+}
+
+Location ride(const std::shared_ptr<const NetworkIndex>& index, const track::Route& route, double from_m, double to_m,
+              double scale, double every_m = 1e9) {
+  const auto errors = errors_of(scale);
   const testing::VehicleHeading heading([&](double m) { return route.curvature_at(m); }, from_m - 1, to_m + 1, errors);
   testing::RideSensors sensors(errors, 5);
   NetworkLocator locator({}, index);
@@ -54,6 +59,45 @@ Location ride(const std::shared_ptr<const NetworkIndex>& index, const track::Rou
     if (std::fmod(m - from_m, every_m) == every_m - 1) static_cast<void>(locator.locate());
   }
   return locator.locate();
+}
+
+/// A train that runs to one place after the other, in steps as short as those from picture to picture.
+class Shuttle {
+ public:
+  Shuttle(const std::shared_ptr<const NetworkIndex>& index, double from_m) : locator_({}, index), at_m_(from_m) {}
+  void run(const track::Route& route, double to_m, double step_m = 0.5) {
+    const testing::VehicleHeading heading([&](double m) { return route.curvature_at(m); }, std::min(at_m_, to_m) - 30,
+                                          std::max(at_m_, to_m) + 1, errors_);
+    const double way_m = to_m < at_m_ ? -step_m : step_m;
+    for (; std::abs(to_m - at_m_) > 0.5 * step_m; at_m_ += way_m) {
+      const auto s = sensors_.step(heading, 0, at_m_, at_m_ + way_m, 0.05);
+      locator_.move(s.way_m, s.turn_rad, s.turn_sigma_rad);
+    }
+  }
+  /// Stands for so many pictures, of which the odometer errs by centimetres.
+  void stand(int pictures) {
+    core::Random random(8);
+    double last_m = 0;
+    for (int i = 0; i < pictures; ++i) {
+      const double off_m = 0.02 * random.normal();
+      locator_.move(off_m - last_m, 1e-4 * random.normal(), 1e-4);
+      last_m = off_m;
+    }
+  }
+  NetworkLocator& locator() { return locator_; }
+
+ private:
+  testing::RideErrors errors_ = errors_of(0.01);
+  testing::RideSensors sensors_{errors_, 5};
+  NetworkLocator locator_;
+  double at_m_;
+};
+
+void expect_right(const Location& location, const track::Route& route, double at_m) {
+  ASSERT_FALSE(location.places.empty());
+  EXPECT_TRUE(location.certain()) << to_string(location.doubt);
+  EXPECT_NEAR(route.distance_of(location.places.front().place, at_m).value_or(0), at_m, 15);
+  EXPECT_EQ(location.places.front().place.direction, route.position_at(at_m).direction);
 }
 
 class NetworkLocatorTest : public ::testing::Test {
@@ -78,6 +122,85 @@ TEST_F(NetworkLocatorTest, FindsTheOnePlaceInEitherDirectionWithAWrongScale) {
     EXPECT_NEAR(route.distance_of(best.place, 4200).value_or(0), 4200, 15);
     EXPECT_NEAR(best.scale, forward ? 1 - 0.017 : 1 + 0.015, 0.006);
   }
+}
+
+TEST_F(NetworkLocatorTest, ATrainThatBacksIsFoundAndItsOwnFrontIsTold) {
+  const auto index = network_of(lines_);
+  for (const bool forward : {true, false}) {
+    const track::Route route({index->map().edge(17), forward},
+                             forward ? 0 : index->map().edge(17)->alignment.length_m(), 0);
+    Shuttle train(index, 4900);
+    train.run(route, 1400);
+    expect_right(train.locator().locate(), route, 1400);
+  }
+}
+
+TEST_F(NetworkLocatorTest, ATrainThatSetsBackAndGoesOnIsFound) {
+  const auto index = network_of(lines_);
+  const track::Route route({index->map().edge(17), true}, 0, 0);
+  for (const double back_m : {30.0, 100.0, 300.0}) {
+    Shuttle train(index, 700);
+    train.run(route, 2200);
+    train.run(route, 2200 - back_m);
+    EXPECT_TRUE(train.locator().locate().places.empty()) << back_m << " m back";
+    train.run(route, 4200);
+    EXPECT_GT(train.locator().way_m(), 3400);
+    expect_right(train.locator().locate(), route, 4200);
+  }
+}
+
+TEST_F(NetworkLocatorTest, ATrainThatTurnsBackForGoodIsFoundOnTheWayBack) {
+  const auto index = network_of(lines_);
+  const track::Route route({index->map().edge(17), true}, 0, 0);
+  Shuttle train(index, 2500);
+  train.run(route, 4500);
+  train.run(route, 700);
+  expect_right(train.locator().locate(), route, 700);
+  EXPECT_LT(train.locator().way_m(), 3900) << "no metre twice";
+}
+
+TEST_F(NetworkLocatorTest, RockingAtAHaltDoesNoHarm) {
+  const auto index = network_of(lines_);
+  const track::Route route({index->map().edge(17), true}, 0, 0);
+  Shuttle train(index, 700);
+  train.run(route, 2200);
+  train.stand(72'000);
+  EXPECT_NEAR(train.locator().way_m(), 1510, 30);
+  train.run(route, 4200);
+  expect_right(train.locator().locate(), route, 4200);
+}
+
+// On over a switch, back behind it, and on over its other leg, which runs beside the first one.
+TEST_F(NetworkLocatorTest, WhatWasSetBackOverASwitchIsMeasuredAnewOnItsOtherLeg) {
+  auto lines = lines_;
+  const auto stem = static_cast<uint32_t>(lines.size() + 1);
+  lines.push_back({{300, 0, 0}, {80, 0, 1 / 700.0}, {300, 1 / 700.0, 1 / 700.0}, {80, 1 / 700.0, 0}, {440, 0, 0}});
+  const std::vector<track::Element> leg = {
+      {300, 0, 0}, {80, 0, -1 / 500.0}, {200, -1 / 500.0, -1 / 500.0}, {80, -1 / 500.0, 0}, {900, 0, 0}};
+  lines.push_back(leg);
+  lines.push_back(leg);
+  for (const double curvature : {-1 / 300.0, 1 / 300.0}) {
+    lines.back().insert(lines.back().begin(), {35, curvature, curvature});
+  }
+  auto map = std::make_shared<track::Map>(network_of(lines)->map());
+  const uint32_t node = map->edges[stem - 1].to_node;
+  map->edges[stem].from_node = map->edges[stem + 1].from_node = node;
+  map->nodes.push_back({node, track::NodeKind::railway_switch, "", 0, 0});
+  map->connections = {{node, stem, stem + 1, false}, {node, stem, stem + 2, true}};
+  const auto index = std::make_shared<const NetworkIndex>(map);
+  track::Route first({map->edge(stem), true}, 0, 0);
+  track::Route second = first;
+  first.push_ahead({map->edge(stem + 1), true});
+  second.push_ahead({map->edge(stem + 2), true});
+  Shuttle train(index, 50);
+  train.run(first, 1300);
+  static_cast<void>(train.locator().locate());
+  train.run(first, 1150);
+  train.run(second, 2200);
+  const auto location = train.locator().locate();
+  ASSERT_FALSE(location.places.empty());
+  EXPECT_EQ(location.places.front().place.edge, stem + 2) << to_string(location.doubt);
+  EXPECT_GT(train.locator().way_m(), 2000) << "the way before the switch counts";
 }
 
 TEST_F(NetworkLocatorTest, TwoPlacesThatLookTheSameAreBothNamedAndNeitherIsCertain) {
