@@ -223,7 +223,8 @@ class TripRun {
 void TripRun::step(const Course& course, double from_m, double to_m) {
   const auto s = sensors_.step(course.heading, 0, from_m, to_m, kStepM / 20);
   locator_.move(s.way_m, s.turn_rad, s.turn_sigma_rad);
-  const auto [behind_m, ahead_m] = std::minmax(from_m + kAheadM, to_m + kAheadM);
+  const double behind_m = std::min(from_m, to_m) + kAheadM;
+  const double ahead_m = std::max(from_m, to_m) + kAheadM;
   const auto& leg = course.route->leg_at(ahead_m);
   for (const auto& mark : networks_.real->marks_on(leg.run)) {
     const double mark_m = leg.begin_m + mark.along_m;
