@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "map_matcher/inputs.hpp"
+
 namespace railfix::map_matcher {
 namespace {
 
@@ -35,14 +37,20 @@ class CurvatureMatcher::MapCurvature {
 };
 
 void CurvatureMatcher::add(double odometer_m, double curvature_per_m, double sigma_per_m, CurvatureOf of) {
-  if (!std::isfinite(curvature_per_m) || !(sigma_per_m > 0)) return;
+  if (!std::isfinite(odometer_m) || !has_sense(ViewInput{curvature_per_m, sigma_per_m * sigma_per_m})) return;
   const double weight = 1 / (sigma_per_m * sigma_per_m);
   const auto cell = [this](double m) { return std::floor(m / parameters_.bin_m); };
   auto bin = std::find_if(bins_.rbegin(), bins_.rend(),
                           [&](const Bin& b) { return b.of == of && cell(b.odometer_m) == cell(odometer_m); });
   if (bin == bins_.rend()) {
     bins_.push_back({odometer_m, curvature_per_m, weight, of});
-    while (std::abs(bins_.back().odometer_m - bins_.front().odometer_m) > parameters_.window_m) bins_.pop_front();
+    // A train that runs to and fro does not leave its window: as many as that has, of rails and of the body, are
+    // enough.
+    const auto most_bins = static_cast<size_t>(2 * (parameters_.window_m / parameters_.bin_m + 1));
+    while (bins_.size() > most_bins ||
+           std::abs(bins_.back().odometer_m - bins_.front().odometer_m) > parameters_.window_m) {
+      bins_.pop_front();
+    }
     return;
   }
   const double part = weight / (bin->weight + weight);

@@ -41,6 +41,7 @@ class CurvatureMatcher {
   void change_path(std::shared_ptr<const track::Path> path) { path_ = std::move(path); }
   /// The odometer lost the way (camera blind): what came before cannot be used any more.
   void forget() { bins_.clear(); }
+  [[nodiscard]] size_t bins() const { return bins_.size(); }
   /// Best place now. A fix uses up its measurements, so that none is counted twice. Call it every few metres.
   std::optional<Fix> match(int64_t stamp_ns, double odometer_m, const Prior& prior);
 

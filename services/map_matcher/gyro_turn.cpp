@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/time.hpp"
+#include "map_matcher/inputs.hpp"
 
 namespace railfix::map_matcher {
 namespace {
@@ -13,7 +14,7 @@ constexpr double kHistoryS = 10.0;
 }  // namespace
 
 void GyroTurn::add(int64_t stamp_ns, double rate_rps) {
-  if (!std::isfinite(rate_rps)) return;
+  if (!has_sense(GyroInput{rate_rps})) return;
   double heading_rad = 0;
   if (!samples_.empty()) {
     const double dt_s = core::seconds(stamp_ns - samples_.back().stamp_ns);

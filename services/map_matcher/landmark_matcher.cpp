@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "map_matcher/inputs.hpp"
+
 namespace railfix::map_matcher {
 namespace {
 
@@ -51,7 +53,7 @@ void UnmappedRate::learn(double place_m, double probability) {
 // window. The window itself only selects. That the train is not in it at all is weighed by what such a sighting would
 // be by chance; the odds of that go on from sighting to sighting.
 std::optional<Fix> LandmarkMatcher::add(const Sighting& sighting, const Prior& prior) {
-  if (!prior.usable() || !std::isfinite(sighting.distance_ahead_m) || !(sighting.sigma_m > 0)) return std::nullopt;
+  if (!prior.usable() || !has_sense(sighting)) return std::nullopt;
   const double place_m = prior.travelled_m + sighting.distance_ahead_m;
   const double margin_m = parameters_.window_margin_m + 3 * sighting.sigma_m;
   const double expected_m = prior.path_distance_m + sighting.distance_ahead_m;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/time.hpp"
+#include "map_matcher/matcher_messages.hpp"
 #include "track/same_map.hpp"
 
 namespace railfix::map_matcher {
@@ -20,59 +21,13 @@ constexpr double kOpenTrackEveryM = 2.0;  // ... or, while it is not known, this
 constexpr double kNoCameraS = 0.5;        // without an odometry step
 constexpr double kDoubted = 0.5;          // the place is said to be in doubt from this probability on
 constexpr double kCountM = 20.0;
-constexpr double kLostS = 30.0;         // after so long unseen the track is chosen anew
-constexpr int kCurvatureVariance = 25;  // place of the curvature's variance in TrackView.covariance
-constexpr double kRateShare = 0.75;     // of the curvature's sigma comes from its unknown rate
-
-track::EdgePosition place_of(const msg::TrainState& state) {
-  return {state.edge(), state.offset_m(),
-          state.direction() == msg::DIRECTION_REVERSE ? track::Direction::reverse : track::Direction::forward};
-}
-uint8_t direction_of(track::Direction direction) {
-  return direction == track::Direction::reverse ? msg::DIRECTION_REVERSE : msg::DIRECTION_FORWARD;
-}
-PlacedTrain placed(const msg::TrainState& m) {
-  return {m.stamp_ns(), place_of(m), m.speed_mps(), m.distance_m(), m.over_m(), m.under_m()};
-}
-Sighting input_of(const msg::LandmarkSighting& m) {
-  return {m.stamp_ns(),  static_cast<track::LandmarkKind>(m.kind()), m.distance_ahead_m(), m.lateral_m(), m.sigma_m(),
-          m.confidence()};
-}
-StepInput input_of(const msg::OdometryStep& m) {
-  return {m.stamp_ns(),
-          m.reference_stamp_ns(),
-          m.valid() != 0 && m.mode() != msg::ODOMETRY_BLIND,
-          m.step_m(),
-          m.yaw_rad(),
-          m.yaw_sigma_rad(),
-          m.distance_m(),
-          m.speed_mps()};
-}
+constexpr double kLostS = 30.0;      // after so long unseen the track is chosen anew
+constexpr double kRateShare = 0.75;  // of the curvature's sigma comes from its unknown rate
 
 // A fusion that was started anew may count the travelled distance from elsewhere.
 bool counts_on(const msg::TrainState& before, const msg::TrainState& state) {
   const double expected_m = state.speed_mps() * core::seconds(state.stamp_ns() - before.stamp_ns());
   return std::abs(state.distance_m() - before.distance_m() - expected_m) <= kCountM + 0.5 * std::abs(expected_m);
-}
-
-/// The first place, with the others as alternatives.
-template <typename Places>
-msg::PositionFix message_of(const Places& places) {
-  msg::PositionFix message;
-  message.edge(places.front().place.edge);
-  message.offset_m(places.front().place.offset_m);
-  message.direction(direction_of(places.front().place.direction));
-  message.probability(places.front().probability);
-  const size_t others = std::min<size_t>(places.size() - 1, msg::FIX_ALTERNATIVES);
-  for (size_t i = 0; i < others; ++i) {
-    const auto& other = places[i + 1];
-    message.alternative_edge()[i] = other.place.edge;
-    message.alternative_offset_m()[i] = other.place.offset_m;
-    message.alternative_probability()[i] = other.probability;
-    message.alternative_direction()[i] = direction_of(other.place.direction);
-  }
-  message.alternatives(static_cast<uint8_t>(others));
-  return message;
 }
 
 }  // namespace
@@ -87,8 +42,9 @@ MapMatcherService::MapMatcherService(const MapMatcherConfig& config, service::Co
   }
   namespace topics = messaging::topics;
   if (config.use_imu) {
-    context_.on<msg::ImuSample>(topics::imu_sample,
-                                [this](const msg::ImuSample& m) { gyro_.add(m.stamp_ns(), m.rate_z_rps()); });
+    context_.on<msg::ImuSample>(topics::imu_sample, [this](const msg::ImuSample& m) {
+      if (takes("imu_sample", input_of(m))) gyro_.add(m.stamp_ns(), m.rate_z_rps());
+    });
   }
   context_.on<msg::TrainState>(topics::train_state, [this](const msg::TrainState& m) { use(m); });
   context_.on<msg::TrackView>(topics::track_view, [this](const msg::TrackView& m) { use(m); });
@@ -115,14 +71,28 @@ void MapMatcherService::restart() {
   matched_m_ = 0;
   moved_ns_ = 0;
   said_track_ = {};
+  left_out_ = {};
+}
+
+template <typename Input>
+bool MapMatcherService::takes(const char* topic, const Input& input) {
+  if (has_sense(input)) return true;
+  left_out_.add(topic, state_ ? state_->stamp_ns() : 0);
+  return false;
 }
 
 void MapMatcherService::use(const msg::TrainState& state) {
+  if (state.track_known() != 0 && !takes("train_state", input_of(state))) {
+    context_.health().degraded(left_out_.sentence(state_ ? state_->stamp_ns() : 0));
+    return;
+  }
   context_.health().input();
   const auto before = std::exchange(state_, state);
   if (before && before->standstill() != 0 && state.standstill() != 0) stand(before->stamp_ns(), state.stamp_ns());
   if (!map_ || state.track_known() == 0) {
-    context_.health().degraded(map_ ? "the place on the map is not known yet" : "no map is configured");
+    const auto left_out = left_out_.sentence(state.stamp_ns());
+    const auto* unknown = map_ ? "the place on the map is not known yet" : "no map is configured";
+    context_.health().degraded(left_out.empty() ? unknown : unknown + ("; " + left_out));
     return;
   }
   if (!track::lies_there(*map_, place_of(state), state.easting_m(), state.northing_m())) {
@@ -133,6 +103,8 @@ void MapMatcherService::use(const msg::TrainState& state) {
   if (landmarks_ && before && !counts_on(*before, state)) landmarks_->forget();
   if (const auto followed = follow(state); !followed.ok()) {
     context_.health().degraded(followed.error().message);
+  } else if (const auto left_out = left_out_.sentence(state.stamp_ns()); !left_out.empty()) {
+    context_.health().degraded(left_out);
   } else if (place_doubt() > 0) {
     context_.health().degraded("the sightings fit the map nowhere near the place that train_state says");
   } else {
@@ -172,6 +144,7 @@ std::optional<Prior> MapMatcherService::prior_at(int64_t stamp_ns) const {
 }
 
 void MapMatcherService::use(const msg::OdometryStep& step) {
+  if (!takes("odometry_step", input_of(step))) return;
   chain_.add(input_of(step));
   if (map_ && config_.locate) look_for_place(step);
   if (chooser_) follow_turning(step);
@@ -330,9 +303,8 @@ void MapMatcherService::say_track(double odometer_m, int64_t grabbed_ns) {
 }
 
 void MapMatcherService::use(const msg::TrackView& view) {
-  if (view.seen_left() == 0 || view.seen_right() == 0) return;
-  const double variance = view.covariance()[kCurvatureVariance];
-  if (!(variance > 0)) return;
+  if (view.seen_left() == 0 || view.seen_right() == 0 || !takes("track_view", input_of(view))) return;
+  const double variance = input_of(view).variance;
   rails_seen_ns_ = view.stamp_ns();
   if (chooser_ && prior_at(view.stamp_ns())) chooser_->see(view.curvature_per_m(), std::sqrt(variance));
   if (!curvature_ || !config_.use_curvature || !step_ || step_->valid() == 0) return;
@@ -349,6 +321,7 @@ void MapMatcherService::use(const msg::TrackView& view) {
 }
 
 void MapMatcherService::use(const msg::LandmarkSighting& sighting) {
+  if (!takes("landmark_sighting", input_of(sighting))) return;
   context_.health().input();
   if (locator_) locator_->sight(input_of(sighting));
   const auto prior = prior_at(sighting.stamp_ns());

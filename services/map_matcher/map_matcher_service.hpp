@@ -9,6 +9,7 @@
 #include "map_matcher/curve_exit_matcher.hpp"
 #include "map_matcher/followed_path.hpp"
 #include "map_matcher/gyro_turn.hpp"
+#include "map_matcher/inputs.hpp"
 #include "map_matcher/landmark_matcher.hpp"
 #include "map_matcher/map_matcher_config.hpp"
 #include "map_matcher/network_locator.hpp"
@@ -25,6 +26,9 @@ class MapMatcherService {
 
  private:
   void restart();
+  /// False, and counted, where an input makes no sense.
+  template <typename Input>
+  [[nodiscard]] bool takes(const char* topic, const Input& input);
   void use(const msg::TrainState& state);
   void use(const msg::OdometryStep& step);
   void use(const msg::TrackView& view);
@@ -65,6 +69,7 @@ class MapMatcherService {
   std::optional<msg::TrainState> state_;
   std::optional<msg::OdometryStep> step_;
   StepChain chain_;  // of all steps so far
+  LeftOut left_out_;
   int64_t rails_seen_ns_ = 0;
   std::optional<TrackChooser> chooser_;
   std::optional<NetworkLocator> locator_;  // only while the place is not known

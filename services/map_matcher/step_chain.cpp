@@ -20,6 +20,7 @@ void StepChain::add(const StepInput& step) {
   if (way_m) {
     odometer_m_ += *way_m;
     if (linked(step)) turn_ = turn_to(step, *way_m);
+    if (turn_ && !std::isfinite(turn_->turn_rad + turn_->sigma_rad)) turn_.reset();
   }
   last_ = step;
 }
@@ -41,7 +42,7 @@ std::optional<double> StepChain::way_to(const StepInput& step) const {
   }
   const double counted_m = step.distance_m - last_->distance_m;
   if (std::abs(counted_m - expected_m) <= kSameWayM + kSameWayShare * std::abs(expected_m)) return counted_m;
-  return linked(step) ? std::optional(expected_m) : std::nullopt;
+  return linked(step) && std::isfinite(expected_m) ? std::optional(expected_m) : std::nullopt;
 }
 
 // Key frames overlap: what counts is how the turn since the same picture grew.

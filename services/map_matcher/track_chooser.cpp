@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 
+#include "map_matcher/inputs.hpp"
 #include "map_matcher/picture_fits.hpp"
 
 namespace railfix::map_matcher {
@@ -102,7 +103,7 @@ void TrackChooser::follow(const TrackWindow& window) {
 }
 
 void TrackChooser::move(const Turn& turn) {
-  if (hypotheses_.empty()) return;
+  if (hypotheses_.empty() || !has_sense(turn)) return;
   if (turn.sensor != sensor_) {
     sensor_ = turn.sensor;
     for (auto& hypothesis : hypotheses_) {
@@ -122,7 +123,7 @@ void TrackChooser::move(const Turn& turn) {
 }
 
 void TrackChooser::stand(const Turn& turn) {
-  if (turn.sensor != sensor_ || !(turn.sigma_rad > 0)) return;
+  if (turn.sensor != sensor_ || !has_sense(turn) || !(turn.sigma_rad > 0)) return;
   const double noise = turn.sigma_rad * turn.sigma_rad;
   for (auto& hypothesis : hypotheses_) {
     for (auto& cell : hypothesis.cells)
@@ -131,7 +132,7 @@ void TrackChooser::stand(const Turn& turn) {
 }
 
 void TrackChooser::move_blind(double way_m) {
-  if (hypotheses_.empty()) return;
+  if (hypotheses_.empty() || !has_sense(Turn{way_m})) return;
   cells_m_ += pending_.way_m + way_m;
   pending_ = {};
   place_m_ += way_m;
@@ -337,7 +338,7 @@ void TrackChooser::run_pictures(double way_m) {
 }
 
 void TrackChooser::sight(const Sighting& sighting) {
-  if (hypotheses_.size() < 2) return;
+  if (hypotheses_.size() < 2 || !has_sense(sighting)) return;
   const SightedOnRoute seen{sighting, place_m_ + sighting.distance_ahead_m,
                             std::hypot(sighting.sigma_m, window_.sigma_m, parameters_.map_sigma_m)};
   std::vector<double> fits;
@@ -349,6 +350,7 @@ void TrackChooser::sight(const Sighting& sighting) {
 
 void TrackChooser::see(double curvature_per_m, double sigma_per_m) {
   if (hypotheses_.size() < 2 || seen_m_ < parameters_.bin_m) return;
+  if (!has_sense(ViewInput{curvature_per_m, sigma_per_m * sigma_per_m})) return;
   seen_m_ = 0;
   const double sigma = std::hypot(sigma_per_m, parameters_.noise_per_m);
   std::vector<double> fits;

@@ -1,0 +1,75 @@
+#include "map_matcher/inputs.hpp"
+
+#include <cmath>
+#include <cstdlib>
+
+#include "core/time.hpp"
+
+namespace railfix::map_matcher {
+namespace {
+
+constexpr double kFarthestM = 1000;  // of what is sighted, or run in one step
+constexpr double kLongestM = 1e9;    // a count of metres, an offset, a coordinate
+constexpr double kFastestMps = 300;
+constexpr double kMostTurnRad = 10;  // in one step, or in a second
+constexpr double kTightestPerM = 1;  // curvature
+constexpr double kToldS = 10;
+
+// False for NaN.
+bool within(double number, double least, double most) {
+  return number >= least && number <= most;
+}
+bool up_to(double number, double most) {
+  return within(number, -most, most);
+}
+bool positive(double number, double most) {
+  return number > 0 && number <= most;
+}
+
+}  // namespace
+
+bool has_sense(const Sighting& s) {
+  return up_to(s.distance_ahead_m, kFarthestM) && up_to(s.lateral_m, kFarthestM) && positive(s.sigma_m, kFarthestM) &&
+         within(s.confidence, 0, 1);
+}
+
+bool has_sense(const Turn& t) {
+  return up_to(t.way_m, kFarthestM) && up_to(t.turn_rad, kMostTurnRad) && within(t.sigma_rad, 0, kMostTurnRad) &&
+         within(t.bias_rad, 0, kMostTurnRad);
+}
+
+bool has_sense(const StepInput& s) {
+  if (!s.measured) return true;
+  return s.reference_stamp_ns < s.stamp_ns && up_to(s.step_m, kFarthestM) && up_to(s.yaw_rad, kMostTurnRad) &&
+         within(s.yaw_sigma_rad, 0, kMostTurnRad) && up_to(s.distance_m, kLongestM) && up_to(s.speed_mps, kFastestMps);
+}
+
+bool has_sense(const ViewInput& v) {
+  return up_to(v.curvature_per_m, kTightestPerM) && positive(v.variance, kTightestPerM);
+}
+
+bool has_sense(const GyroInput& g) {
+  return up_to(g.rate_rps, kMostTurnRad);
+}
+
+bool has_sense(const StateInput& s) {
+  const PlacedTrain& p = s.placed;
+  return up_to(p.place.offset_m, kLongestM) && up_to(p.distance_m, kLongestM) && p.over_m >= 0 && p.under_m >= 0 &&
+         (std::isnan(p.speed_mps) || up_to(p.speed_mps, kFastestMps)) && s.sigma_m >= 0 &&
+         within(s.track_probability, 0, 1) && within(s.visual_scale, 0, 2) && up_to(s.easting_m, kLongestM) &&
+         up_to(s.northing_m, kLongestM);
+}
+
+void LeftOut::add(const std::string& topic, int64_t data_ns) {
+  ++counts_[topic];
+  last_ = topic;
+  last_ns_ = data_ns;
+}
+
+std::string LeftOut::sentence(int64_t data_ns) const {
+  if (last_.empty() || std::abs(core::seconds(data_ns - last_ns_)) > kToldS) return "";
+  return std::to_string(counts_.at(last_)) + " of " + last_ +
+         " were left out: their values are no numbers, or such as no train has";
+}
+
+}  // namespace railfix::map_matcher

@@ -1,0 +1,55 @@
+// What may come in: numbers that are numbers, and such as a train can have. One that is none would stay in every sum.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+
+#include "map_matcher/followed_path.hpp"
+#include "map_matcher/match_types.hpp"
+#include "map_matcher/step_chain.hpp"
+
+namespace railfix::map_matcher {
+
+/// What track_view says of rails that are seen.
+struct ViewInput {
+  double curvature_per_m = 0;
+  double variance = 0;
+};
+/// What imu_sample says of the turning.
+struct GyroInput {
+  double rate_rps = 0;
+};
+/// What train_state says of a train whose place is known.
+struct StateInput {
+  PlacedTrain placed;
+  double sigma_m = 0;
+  double track_probability = 0;
+  double visual_scale = 1;
+  double easting_m = 0;
+  double northing_m = 0;
+};
+
+[[nodiscard]] bool has_sense(const Sighting& sighting);
+[[nodiscard]] bool has_sense(const Turn& turn);
+/// One that was not measured says nothing that could be wrong.
+[[nodiscard]] bool has_sense(const StepInput& step);
+[[nodiscard]] bool has_sense(const ViewInput& view);
+[[nodiscard]] bool has_sense(const GyroInput& gyro);
+/// The speed may be unknown (NaN), and the interval without end.
+[[nodiscard]] bool has_sense(const StateInput& state);
+
+/// Counts what was left out, topic by topic.
+class LeftOut {
+ public:
+  void add(const std::string& topic, int64_t data_ns);
+  /// Of the topic that was left out last, for some seconds; empty = none.
+  [[nodiscard]] std::string sentence(int64_t data_ns) const;
+
+ private:
+  std::map<std::string, uint64_t> counts_;
+  std::string last_;
+  int64_t last_ns_ = 0;
+};
+
+}  // namespace railfix::map_matcher
