@@ -19,6 +19,7 @@ constexpr int kScaleSteps = 4;         // to either side
 constexpr double kScaleStep = 0.6;     // sigmas
 constexpr double kScaleChanges = 0.3;  // share of the scale's sigma that differs from place to place
 constexpr double kOddM = 0.1;
+constexpr double kWidestM = 2100;  // a window that is searched within a quarter of a second: a mast comes every second
 constexpr double kUnmappedReachM = 5000;  // over which a map lacks landmarks as it does here
 constexpr double kConfirmed = 1e-6;       // odds against the place behind three or four landmarks that fit, ...
 constexpr double kMostOdds = 1e3;         // ... and so many more bring it back when nothing has
@@ -60,6 +61,10 @@ std::optional<Fix> LandmarkMatcher::add(const Sighting& sighting, const Prior& p
   const double from_m = expected_m - prior.over_m - margin_m;
   const double to_m = expected_m + prior.under_m + margin_m;
   std::erase_if(seen_, [&](const Seen& seen) { return std::abs(place_m - seen.place_m) > parameters_.history_m; });
+  if (to_m - from_m > kWidestM) {
+    remember(sighting, place_m);  // for when the window is smaller
+    return std::nullopt;
+  }
   for (Seen& seen : seen_) seen.unmapped_per_m = unmapped(seen.sighting.kind).per_m();
 
   const double confidence = std::clamp(sighting.confidence, 0.01, 0.999);
@@ -96,11 +101,15 @@ std::optional<Fix> LandmarkMatcher::add(const Sighting& sighting, const Prior& p
     unmapped_rate.learn(place_m, nothing / here);
   }
   confirmed_ = confirmed_ || odds_elsewhere_ <= kConfirmed;
-  seen_.push_back({sighting, place_m});
-  if (seen_.size() > kMostSightings) seen_.pop_front();
+  remember(sighting, place_m);
   if (best == nullptr || !(best_weight >= parameters_.min_probability * sum)) return std::nullopt;
   return Fix{sighting.stamp_ns, best->distance_m - sighting.distance_ahead_m,
              std::hypot(sighting.sigma_m, best->landmark->sigma_m), best_weight / sum, best->landmark->id};
+}
+
+void LandmarkMatcher::remember(const Sighting& sighting, double place_m) {
+  seen_.push_back({sighting, place_m});
+  if (seen_.size() > kMostSightings) seen_.pop_front();
 }
 
 double LandmarkMatcher::mean_fit(double from_m, double to_m, double now_m) const {

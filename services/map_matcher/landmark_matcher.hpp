@@ -53,7 +53,7 @@ class LandmarkMatcher {
   /// Another way with distances that go on from the old one's; the sightings so far stay.
   void change_path(std::shared_ptr<const track::Path> path) { path_ = std::move(path); }
 
-  /// Nothing when no mapped landmark fits or it cannot be told which one.
+  /// Nothing when no mapped landmark fits or it cannot be told which one, nor in a window wider than 2 km.
   std::optional<Fix> add(const Sighting& sighting, const Prior& prior);
   /// How probable it is, by all sightings so far, that the train is not in the window; 0 from where they confirm it.
   [[nodiscard]] double doubt() const { return confirmed_ ? 0 : odds_elsewhere_ / (1 + odds_elsewhere_); }
@@ -75,6 +75,7 @@ class LandmarkMatcher {
   /// the scales of the odometer, or at one.
   [[nodiscard]] double history_fits(double shift_m, double now_m) const;
   [[nodiscard]] double history_fits(double shift_m, double scale, double now_m) const;
+  void remember(const Sighting& sighting, double place_m);
   /// Mean of history_fits between two shifts.
   [[nodiscard]] double mean_fit(double from_m, double to_m, double now_m) const;
   [[nodiscard]] double sighting_fits(const Seen& seen, double path_m, double now_m) const;

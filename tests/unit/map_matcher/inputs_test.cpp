@@ -226,6 +226,26 @@ TEST(Inputs, TheGyroGoesOnWhateverOneSampleWas) {
   }
 }
 
+// Sightings in a window that is too wide to search are not lost for when it is smaller.
+TEST(Inputs, AWideWindowIsNotSearchedButRemembered) {
+  auto map = std::make_shared<track::Map>();
+  map->edges.push_back({1, "line", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{9000, 0, 0}})});
+  for (const double at_m : {4000.0, 4100.0, 4250.0, 4310.0}) {
+    const auto id = static_cast<uint32_t>(map->landmarks.size() + 1);
+    map->landmarks.push_back({id, track::LandmarkKind::mast, 1, at_m, 3.3, 0.1, ""});
+  }
+  const auto path = std::make_shared<const track::Path>(
+      core::value_or_throw(track::Path::follow(map, {1, 0, track::Direction::forward}, 8900, 0)));
+  LandmarkMatcher landmarks({}, path);
+  const auto sight = [&](double at_m, double half_m) {
+    return landmarks.add({1, track::LandmarkKind::mast, 8, 3.3, 0.1, 0.95}, Prior{at_m - 8, half_m, half_m, at_m - 8});
+  };
+  for (const double at_m : {4000.0, 4100.0, 4250.0}) EXPECT_FALSE(sight(at_m, 1100));
+  const auto fix = sight(4310, 1000);
+  ASSERT_TRUE(fix);
+  EXPECT_EQ(fix->landmark, 4U);
+}
+
 // To and fro on the same stretch, the readings off the marks by a little more every time.
 TEST(Inputs, ShuntingOnTheSpotDoesNotCostMoreAndMore) {
   auto map = std::make_shared<track::Map>();
