@@ -19,7 +19,7 @@ constexpr int kScaleSteps = 4;         // to either side
 constexpr double kScaleStep = 0.6;     // sigmas
 constexpr double kScaleChanges = 0.3;  // share of the scale's sigma that differs from place to place
 constexpr double kOddM = 0.1;
-constexpr double kWidestM = 2100;  // a window that is searched within a quarter of a second: a mast comes every second
+constexpr size_t kMostCandidates = 50;    // are searched in a quarter of a second: a mast comes every second
 constexpr double kUnmappedReachM = 5000;  // over which a map lacks landmarks as it does here
 constexpr double kConfirmed = 1e-6;       // odds against the place behind three or four landmarks that fit, ...
 constexpr double kMostOdds = 1e3;         // ... and so many more bring it back when nothing has
@@ -61,15 +61,15 @@ std::optional<Fix> LandmarkMatcher::add(const Sighting& sighting, const Prior& p
   const double from_m = expected_m - prior.over_m - margin_m;
   const double to_m = expected_m + prior.under_m + margin_m;
   std::erase_if(seen_, [&](const Seen& seen) { return std::abs(place_m - seen.place_m) > parameters_.history_m; });
-  if (to_m - from_m > kWidestM) {
-    remember(sighting, place_m);  // for when the window is smaller
+  std::vector<const track::PathLandmark*> candidates = near(sighting.kind, from_m, to_m);
+  std::erase_if(candidates, [&](const auto* landmark) { return other_side(sighting, *landmark); });
+  if (candidates.size() > kMostCandidates) {
+    remember(sighting, place_m);  // for when the window is smaller, or for those of a rarer kind
     return std::nullopt;
   }
   for (Seen& seen : seen_) seen.unmapped_per_m = unmapped(seen.sighting.kind).per_m();
 
   const double confidence = std::clamp(sighting.confidence, 0.01, 0.999);
-  std::vector<const track::PathLandmark*> candidates = near(sighting.kind, from_m, to_m);
-  std::erase_if(candidates, [&](const auto* landmark) { return other_side(sighting, *landmark); });
   const double expected = std::max(1.0, parameters_.detection * static_cast<double>(candidates.size()));
   const double doubt = std::max(0.0, kUsualConfidence - confidence);
   const double earlier = mean_fit(from_m - place_m, to_m - place_m, place_m);

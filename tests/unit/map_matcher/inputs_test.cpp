@@ -226,24 +226,33 @@ TEST(Inputs, TheGyroGoesOnWhateverOneSampleWas) {
   }
 }
 
-// Sightings in a window that is too wide to search are not lost for when it is smaller.
-TEST(Inputs, AWideWindowIsNotSearchedButRemembered) {
+// Sightings among too many of their kind are not lost for when the window is smaller, nor for those of a rarer kind.
+TEST(Inputs, AWindowWithTooManyOfAKindIsNotSearchedButRemembered) {
   auto map = std::make_shared<track::Map>();
   map->edges.push_back({1, "line", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{9000, 0, 0}})});
-  for (const double at_m : {4000.0, 4100.0, 4250.0, 4310.0}) {
+  const auto put = [&](track::LandmarkKind kind, double at_m, double lateral_m) {
     const auto id = static_cast<uint32_t>(map->landmarks.size() + 1);
-    map->landmarks.push_back({id, track::LandmarkKind::mast, 1, at_m, 3.3, 0.1, ""});
-  }
+    map->landmarks.push_back({id, kind, 1, at_m, lateral_m, 0.1, ""});
+  };
+  for (int i = 0; i < 200; ++i) put(track::LandmarkKind::mast, 1000 + 34.0 * i + (i * i * 11) % 29, 3.3);
+  put(track::LandmarkKind::balise, 4333, 0);
   const auto path = std::make_shared<const track::Path>(
       core::value_or_throw(track::Path::follow(map, {1, 0, track::Direction::forward}, 8900, 0)));
   LandmarkMatcher landmarks({}, path);
-  const auto sight = [&](double at_m, double half_m) {
-    return landmarks.add({1, track::LandmarkKind::mast, 8, 3.3, 0.1, 0.95}, Prior{at_m - 8, half_m, half_m, at_m - 8});
+  const auto sight = [&](track::LandmarkKind kind, double at_m, double half_m) {
+    const double lateral_m = kind == track::LandmarkKind::mast ? 3.3 : 0;
+    return landmarks.add({1, kind, 8, lateral_m, 0.1, 0.95}, Prior{at_m - 8, half_m, half_m, at_m - 8});
   };
-  for (const double at_m : {4000.0, 4100.0, 4250.0}) EXPECT_FALSE(sight(at_m, 1100));
-  const auto fix = sight(4310, 1000);
-  ASSERT_TRUE(fix);
-  EXPECT_EQ(fix->landmark, 4U);
+  for (size_t i = 90; i < 94; ++i)
+    EXPECT_FALSE(sight(track::LandmarkKind::mast, map->landmarks[i].offset_m, 4000)) << "in so wide a window";
+  LandmarkMatcher with_masts = landmarks;
+  const auto balise = landmarks.add({1, track::LandmarkKind::balise, 8, 0, 0.1, 0.95}, Prior{4325, 4000, 4000, 4325});
+  ASSERT_TRUE(balise);
+  EXPECT_EQ(balise->landmark, 201U);
+  const auto mast = with_masts.add({1, track::LandmarkKind::mast, 8, 3.3, 0.1, 0.95},
+                                   Prior{map->landmarks[94].offset_m - 8, 700, 700, map->landmarks[94].offset_m - 8});
+  ASSERT_TRUE(mast);
+  EXPECT_EQ(mast->landmark, 95U);
 }
 
 // To and fro on the same stretch, the readings off the marks by a little more every time.
