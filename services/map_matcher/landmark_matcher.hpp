@@ -53,7 +53,8 @@ class LandmarkMatcher {
   /// Another way with distances that go on from the old one's; the sightings so far stay.
   void change_path(std::shared_ptr<const track::Path> path) { path_ = std::move(path); }
 
-  /// Nothing when no mapped landmark fits or it cannot be told which one, nor where the window has too many of its kind.
+  /// Nothing when no mapped landmark fits or it cannot be told which one, nor where the window has too many of its
+  /// kind.
   std::optional<Fix> add(const Sighting& sighting, const Prior& prior);
   /// How probable it is, by all sightings so far, that the train is not in the window; 0 from where they confirm it.
   [[nodiscard]] double doubt() const { return confirmed_ ? 0 : odds_elsewhere_ / (1 + odds_elsewhere_); }
