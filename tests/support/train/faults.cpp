@@ -81,9 +81,9 @@ std::string to_string(Sensor sensor) {
 }
 
 std::string to_string(FaultKind kind) {
-  static const std::array names{"none",           "bias",         "drift",     "stuck", "noise",
-                                "outliers",       "dropout",      "blind",     "delay", "lag", "wrong landmark",
-                                "wrong sighting", "wrong branch", "clock step"};
+  static const std::array names{"none",           "bias",           "drift",        "stuck",     "noise",
+                                "outliers",       "dropout",        "blind",        "delay",     "lag",
+                                "wrong landmark", "wrong sighting", "wrong branch", "clock step"};
   return names.at(static_cast<size_t>(kind));
 }
 
