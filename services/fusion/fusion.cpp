@@ -108,11 +108,10 @@ std::optional<TrainEstimate> Fusion::add(Event event) {
   }
   if (!now_) begin_before(event);
   const int64_t oldest_ns = snapshots_.front().stamp_ns();
-  const auto [stamp, believed] = stamps_.judge(event, now_->stamp_ns(), oldest_ns, parameters_->max_jump_s);
+  const auto [stamp, believed, first] = stamps_.judge(event, now_->stamp_ns(), oldest_ns, parameters_->max_jump_s);
   if (stamp == Stamp::ahead) return hear_ahead(event, believed);
-  if (!stamps_.holds(Stamp::behind)) {
-    before_behind_.reset();
-  } else if (!before_behind_) {
+  if (!stamps_.holds_behind()) before_behind_.reset();
+  if (stamp == Stamp::behind && first) {
     catch_up();
     before_behind_ = *now_;
   }

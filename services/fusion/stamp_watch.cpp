@@ -32,13 +32,16 @@ int rank_of(size_t kind) {
 }  // namespace
 
 bool StampWatch::has_odometer(int64_t now_ns) const {
-  return std::ranges::any_of(std::array{kWheel, kCamera}, [&](size_t kind) {
-    return newest_ns_[kind] != 0 && core::seconds(now_ns - newest_ns_[kind]) < kLatelyS;
-  });
+  const int64_t newest_ns = newest_of_rank(2);
+  return newest_ns != 0 && core::seconds(now_ns - newest_ns) < kLatelyS;
 }
 
-int64_t StampWatch::newest_motion_ns() const {
-  return std::max({newest_ns_[kImu], newest_ns_[kWheel], newest_ns_[kCamera]});
+int64_t StampWatch::newest_of_rank(int least) const {
+  int64_t newest_ns = 0;
+  for (size_t kind = 0; kind < kKinds; ++kind) {
+    if (rank_of(kind) >= least) newest_ns = std::max(newest_ns, newest_ns_[kind]);
+  }
+  return newest_ns;
 }
 
 // Samples of one sensor come in order, so what is older than its own kind's newest is out of its time. GNSS and fixes
@@ -57,8 +60,10 @@ StampWatch::Verdict StampWatch::judge(const Event& event, int64_t now_ns, int64_
   if (is_behind && !moves) return {Stamp::behind, false};
   const Stamp stamp = is_behind ? Stamp::behind : Stamp::ahead;
   Side& side = is_behind ? behind_ : ahead_;
+  if (core::seconds(now_ns - side.last_ns) > kLatelyS) side = {};
+  side.last_ns = now_ns;
   side.held.push_back(event);
-  return {stamp, ++side.in_row[kind] >= enough(event, stamp, now_ns)};
+  return {stamp, ++side.in_row[kind] >= enough(event, stamp, now_ns), side.held.size() == 1};
 }
 
 // One that lags behind the others may itself be of the time that was set back.
@@ -66,10 +71,11 @@ void StampWatch::hear_sound(const Event& event) {
   auto& newest_ns = newest_ns_[event.index()];
   newest_ns = std::max(newest_ns, stamp_of(event));
   left_out_[event.index()] = {};
-  if (core::seconds(newest_motion_ns() - stamp_of(event)) > kLagsS) return;
+  const int rank = rank_of(event.index());
+  if (core::seconds(newest_of_rank(rank) - stamp_of(event)) > kLagsS) return;
   for (Side* side : {&ahead_, &behind_}) {
     for (size_t kind = 0; kind < kKinds; ++kind) {
-      if (rank_of(kind) <= rank_of(event.index())) side->in_row[kind] = 0;
+      if (rank_of(kind) <= rank) side->in_row[kind] = 0;
     }
     if (std::ranges::all_of(side->in_row, [](int count) { return count == 0; })) side->held.clear();
   }
