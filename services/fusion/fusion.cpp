@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <tuple>
+#include <utility>
 
 #include "core/time.hpp"
 #include "track/declared.hpp"
@@ -52,6 +53,19 @@ std::tuple<int64_t, size_t, int, uint32_t> order_of(const Event& event) {
   return {stamp_of(event), event.index(), fix ? static_cast<int>(fix->kind) : 0, fix ? fix->landmark : 0};
 }
 
+/// Of one sensor's samples.
+double period_of(const std::vector<Event>& events, size_t kind) {
+  int64_t first_ns = 0;
+  int64_t last_ns = 0;
+  int count = 0;
+  for (const auto& event : events) {
+    if (event.index() != kind) continue;
+    if (count++ == 0) first_ns = stamp_of(event);
+    last_ns = stamp_of(event);
+  }
+  return count < 2 ? 0 : core::seconds(last_ns - first_ns) / (count - 1);
+}
+
 }  // namespace
 
 core::Result<Fusion> Fusion::create(const FusionParameters& parameters, std::shared_ptr<const track::Map> map,
@@ -69,6 +83,14 @@ Fusion::Fusion(const FusionParameters& parameters, std::shared_ptr<const track::
       map_(std::move(map)),
       path_(std::move(path)),
       saved_(saved) {}
+
+void Fusion::begin_with(const Event& event) {
+  if (!std::holds_alternative<GnssInput>(event)) return begin_before(event);
+  // It has waited in vain: nothing measures motion.
+  const auto waiting = std::exchange(early_, {});
+  begin_before(waiting.front());
+  for (const auto& gnss : waiting) add(gnss);
+}
 
 void Fusion::begin_before(const Event& event) {
   // The first step counts from a picture before it: begin there.
@@ -106,7 +128,7 @@ std::optional<TrainEstimate> Fusion::add(Event event) {
     if (early_.size() > kMostEarly) early_.pop_front();
     return std::nullopt;
   }
-  if (!now_) begin_before(event);
+  if (!now_) begin_with(event);
   const int64_t oldest_ns = snapshots_.front().stamp_ns();
   const auto [stamp, believed, first] = stamps_.judge(event, now_->stamp_ns(), oldest_ns, parameters_->max_jump_s);
   if (stamp == Stamp::ahead) return hear_ahead(event, believed);
@@ -118,14 +140,15 @@ std::optional<TrainEstimate> Fusion::add(Event event) {
   if (stamp == Stamp::behind && believed) {
     // What the samples did to the state before the new clock was believed is undone.
     now_ = std::move(before_behind_);
-    return set_clock(stamps_.take_held(Stamp::behind), event.index());
+    const auto held = stamps_.take_held(Stamp::behind);
+    return set_clock(held, event.index(), period_of(held, event.index()));
   }
   if (stamp_of(event) <= oldest_ns) {
     ++counts_.too_late;
     return std::nullopt;
   }
   const auto estimate = use(std::move(event));
-  use_waiting();
+  if (!early_.empty()) use_waiting();
   return estimate;
 }
 

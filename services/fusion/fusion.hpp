@@ -63,11 +63,12 @@ class Fusion {
   };
   Fusion(const FusionParameters& parameters, std::shared_ptr<const track::Map> map,
          std::shared_ptr<const track::Path> path, const std::optional<SavedScales>& saved);
+  void begin_with(const Event& event);
   void begin_before(const Event& event);
   std::optional<TrainEstimate> use(Event event);
   std::optional<TrainEstimate> hear_ahead(const Event& event, bool believed);
-  std::optional<TrainEstimate> set_clock(const std::vector<Event>& held, size_t decided_by);
-  [[nodiscard]] bool clock_was_set(const std::vector<Event>& held, size_t decided_by) const;
+  std::optional<TrainEstimate> set_clock(const std::vector<Event>& held, size_t decided_by, double since_s);
+  [[nodiscard]] std::optional<double> time_since_counted(const std::vector<Event>& held) const;
   [[nodiscard]] bool is_early(const Event& event) const;
   void use_waiting();
   void anchor(OdometryInput& step);

@@ -9,8 +9,10 @@
 namespace railfix::fusion {
 namespace {
 
-constexpr double kStoodM = 1.0;
-constexpr int64_t kSpacingNs = 10'000'000;  // of samples, about
+constexpr double kStoodM = 0.3;
+constexpr double kSlowMps = 0.5;
+constexpr double kFewPeriodsS = 1.5;
+constexpr double kShortestPeriodS = 0.01;
 
 /// Of the kind that decided what time it is.
 int64_t first_stamp_of(const std::vector<Event>& events, size_t kind) {
@@ -23,21 +25,26 @@ int64_t first_stamp_of(const std::vector<Event>& events, size_t kind) {
 
 }  // namespace
 
-// GNSS never says what time it is: it waits for what measures motion.
+// GNSS never says what time it is where something measures motion: it waits for that.
 bool Fusion::is_early(const Event& event) const {
   if (!std::holds_alternative<GnssInput>(event)) return false;
-  if (!now_) return true;
+  const auto is_soon_after = [&](int64_t begin_ns) {
+    return core::seconds(stamp_of(event) - begin_ns) < parameters_->max_jump_s;
+  };
+  if (!now_) return early_.empty() || is_soon_after(early_.front().stamp_ns);
   const int64_t newest_ns = stamps_.newest_motion_ns();
-  const double early_s = core::seconds(stamp_of(event) - newest_ns);
-  return newest_ns != 0 && early_s > 0 && early_s < parameters_->max_jump_s;
+  return newest_ns != 0 && stamp_of(event) > newest_ns && is_soon_after(newest_ns);
 }
 
 void Fusion::use_waiting() {
-  while (!early_.empty() && early_.front().stamp_ns <= stamps_.newest_motion_ns()) {
-    const GnssInput gnss = early_.front();
-    early_.pop_front();
-    add(gnss);
-  }
+  const int64_t newest_ns = stamps_.newest_motion_ns();
+  const int64_t wild_ns = newest_ns + core::to_ns(parameters_->max_jump_s);
+  std::deque<GnssInput> due;
+  std::erase_if(early_, [&](const GnssInput& gnss) {
+    if (gnss.stamp_ns <= newest_ns) due.push_back(gnss);
+    return gnss.stamp_ns <= newest_ns || gnss.stamp_ns > wild_ns;
+  });
+  for (const auto& gnss : due) add(gnss);
 }
 
 // A single wild stamp must not carry the train away; a clock that was really set is followed, and so is time that went
@@ -50,7 +57,7 @@ std::optional<TrainEstimate> Fusion::hear_ahead(const Event& event, bool believe
   std::vector<Event> held = stamps_.take_held(Stamp::ahead);
   counts_.jumped -= held.size() - 1;
   catch_up();
-  if (clock_was_set(held, event.index())) return set_clock(held, event.index());
+  if (const auto time_s = time_since_counted(held)) return set_clock(held, event.index(), *time_s);
   const auto first = std::ranges::find(held, event.index(), &Event::index);
   auto last = use(*first);
   held.erase(first);
@@ -60,28 +67,39 @@ std::optional<TrainEstimate> Fusion::hear_ahead(const Event& event, bool believe
   return last;
 }
 
-// What counts way over the gap tells: a train that would have run far and has hardly moved has a clock that was set.
-bool Fusion::clock_was_set(const std::vector<Event>& held, size_t decided_by) const {
+// What counts way over the gap tells how long it was: after a few periods' way the clock was set, and after more the
+// train ran on while nothing was heard.
+std::optional<double> Fusion::time_since_counted(const std::vector<Event>& held) const {
   const auto& main = now_->main();
-  const double gap_s = core::seconds(first_stamp_of(held, decided_by) - now_->stamp_ns());
-  const double most_m = kStoodM + 0.5 * std::abs(main.filter().speed_mps()) * gap_s;
+  std::optional<double> way_m;
   for (const auto& event : held) {
-    if (const auto* wheel = std::get_if<WheelInput>(&event)) {
-      if (!last_wheel_ || main.watch(Source::wheel).isolated) continue;
-      return std::abs(static_cast<double>(wheel->pulses - last_wheel_->pulses)) < most_m * wheel->pulses_per_metre;
-    }
+    const auto* wheel = std::get_if<WheelInput>(&event);
     const auto* step = std::get_if<OdometryInput>(&event);
-    if (step && step->valid && main.knows_picture(step->reference_stamp_ns)) return std::abs(step->step_m) < most_m;
+    if (wheel && last_wheel_ && !main.watch(Source::wheel).isolated) {
+      way_m = static_cast<double>(wheel->pulses - last_wheel_->pulses) / wheel->pulses_per_metre;
+    } else if (step && step->valid && main.knows_picture(step->reference_stamp_ns)) {
+      way_m = step->step_m;
+    }
+    if (way_m) break;
   }
-  return false;
+  if (!way_m) return std::nullopt;
+  const double speed_mps = main.filter().speed_mps();
+  if (std::abs(speed_mps) < kSlowMps) return std::abs(*way_m) < kStoodM ? std::optional(0.0) : std::nullopt;
+  const double time_s = *way_m / speed_mps;
+  return time_s > -kStoodM / std::abs(speed_mps) && time_s < kFewPeriodsS ? std::optional(time_s) : std::nullopt;
 }
 
 // The state goes on in the new time, and nothing that is held is lost.
-std::optional<TrainEstimate> Fusion::set_clock(const std::vector<Event>& held, size_t decided_by) {
+std::optional<TrainEstimate> Fusion::set_clock(const std::vector<Event>& held, size_t decided_by, double since_s) {
   ++counts_.clock_resets;
-  now_->rebase_clock(first_stamp_of(held, decided_by) - kSpacingNs);
+  snapshots_.clear();
+  if (stamps_.newest_motion_ns() == 0) {
+    now_.reset();  // GNSS or a fix alone had begun it: in their time the train was elsewhere
+  } else {
+    now_->rebase_clock(first_stamp_of(held, decided_by) - core::to_ns(std::max(since_s, kShortestPeriodS)));
+    snapshots_.push_back(*now_);
+  }
   events_.clear();
-  snapshots_.assign(1, *now_);
   slips_.clear();
   replay_from_ns_.reset();
   stamps_ = {};

@@ -15,6 +15,7 @@ constexpr int kOfGnssToBelieve = 5;
 constexpr int kLeftOutToTell = 5;
 constexpr double kLatelyS = 5.0;
 constexpr double kLagsS = 0.3;
+constexpr size_t kMostHeld = 1000;
 
 constexpr size_t kImu = 0;
 constexpr size_t kWheel = 1;
@@ -57,11 +58,17 @@ StampWatch::Verdict StampWatch::judge(const Event& event, int64_t now_ns, int64_
     return {};
   }
   if (is_ahead || stamp_ns <= oldest_ns) leave_out(kind, now_ns);
-  if (is_behind && !moves) return {Stamp::behind, false};
+  // What has just begun to measure may be late by as much as its pictures take.
+  const bool just_begun = newest_ns_[kind] == 0 && core::seconds(oldest_ns - stamp_ns) < max_jump_s;
+  if (is_behind && (!moves || just_begun)) return {Stamp::behind, false};
   const Stamp stamp = is_behind ? Stamp::behind : Stamp::ahead;
   Side& side = is_behind ? behind_ : ahead_;
-  if (core::seconds(now_ns - side.last_ns) > kLatelyS) side = {};
+  if (core::seconds(now_ns - side.last_ns) > kLatelyS || side.held.size() >= kMostHeld) side = {};
+  // A stamp that comes again says nothing of the time; in a new one they grow.
+  const bool again = stamp_ns == newest_ns_[kind] || (side.in_row[kind] > 0 && stamp_ns <= side.last_held_ns[kind]);
+  if (again) return {stamp, false};
   side.last_ns = now_ns;
+  side.last_held_ns[kind] = stamp_ns;
   side.held.push_back(event);
   return {stamp, ++side.in_row[kind] >= enough(event, stamp, now_ns), side.held.size() == 1};
 }
@@ -99,7 +106,8 @@ std::string StampWatch::left_out(int64_t now_ns) const {
 int StampWatch::enough(const Event& event, Stamp side, int64_t now_ns) const {
   const int rank = rank_of(event.index());
   const int alone = side == Stamp::ahead ? kAheadToBelieve : kBehindToBelieve;
-  if (rank == 2) return alone;
+  // An IMU that has set the clock back alone is put right by the next odometer.
+  if (rank == 2 || (rank == 1 && side == Stamp::behind)) return alone;
   if (rank == 1) return has_odometer(now_ns) ? kOfImuToBelieve : alone;
   return newest_motion_ns() != 0 ? kOfGnssToBelieve : alone;
 }

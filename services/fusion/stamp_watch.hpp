@@ -42,6 +42,7 @@ class StampWatch {
   struct Side {
     std::array<int, kKinds> in_row{};
     std::vector<Event> held;
+    std::array<int64_t, kKinds> last_held_ns{};
     int64_t last_ns = 0;  // when the last of them came, in the time of the others
   };
   [[nodiscard]] int64_t newest_of_rank(int least) const;

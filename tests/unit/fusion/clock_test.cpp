@@ -170,6 +170,65 @@ TEST(Clock, AReferencePictureOfBeforeIsNoReasonToDoubtAStand) {
   }
 }
 
+// Pictures take 0.4 s to be measured, and the IMU has begun before them.
+TEST(Clock, IsNotSetBackByWhatBeginsLate) {
+  Fusion fusion = fusion_at(0);
+  std::optional<TrainEstimate> state;
+  for (double t = 0.01; t < 30; t += 0.01) {
+    if (auto estimate = fusion.add(ImuInput{at(t), 0.001, 0})) state = estimate;
+    if (auto estimate = fusion.add(step_at(t - 0.4, 0, 0.01))) state = estimate;
+  }
+  EXPECT_EQ(fusion.counts().clock_resets, 0U);
+  ASSERT_TRUE(state);
+  EXPECT_GT(core::seconds(state->stamp_ns - kBeginNs), 29);
+  EXPECT_NEAR(state->distance_m, 0, 0.1);
+}
+
+// A train brakes while nothing is heard: what the wheel has counted is where it is.
+TEST(Clock, ASilenceInWhichTheTrainBrakesIsNotTakenForAClockThatWasSet) {
+  for (const auto& [speed_mps, gap_s] : {std::pair(20.0, 30.0), {5.0, 6.0}, {10.0, 14.0}}) {
+    Fusion fusion = fusion_at(0);
+    double way_m = 0;
+    std::optional<TrainEstimate> state;
+    const auto hear = [&](double t, double step_m) {
+      way_m += step_m;
+      fusion.add(wheel_at(t, way_m));
+      state = fusion.add(OdometryInput{at(t), at(t - 0.02), step_m, 0.001, true});
+      if (!state) return;
+      const double error_m = state->distance_m - way_m;
+      ASSERT_LT(error_m, state->over_m) << speed_mps << " m/s at " << t;
+      ASSERT_LT(-error_m, state->under_m) << speed_mps << " m/s at " << t;
+    };
+    for (double t = 0.02; t < 20; t += 0.02) hear(t, 0.02 * speed_mps);
+    way_m += 0.5 * speed_mps * speed_mps / 1.0;  // to a halt, at 1 m/s^2
+    for (double t = 20 + gap_s; t < 60 + gap_s; t += 0.02) hear(t, 0);
+    EXPECT_EQ(fusion.counts().clock_resets, 0U) << speed_mps;
+    EXPECT_NEAR(state->distance_m, way_m, 3) << speed_mps;
+  }
+}
+
+TEST(Clock, AStampThatFreezesHoldsNothing) {
+  Train train;
+  train.run_to(20);
+  Fusion fusion = train.fusion;
+  const auto resets = fusion.counts().clock_resets;
+  std::optional<TrainEstimate> state;
+  for (double t = 20.02; t < 40; t += 0.02) {
+    fusion.add(ImuInput{at(t), 0.001, 0});
+    fusion.add(wheel_at(20, kSpeedMps * t));
+    if (auto estimate = fusion.add(step_at(t, kSpeedMps))) state = estimate;
+  }
+  EXPECT_EQ(fusion.counts().clock_resets, resets);
+  EXPECT_NEAR(core::seconds(state->stamp_ns - kBeginNs), 40, 0.03);
+  EXPECT_NEAR(state->distance_m, 800, 2);
+}
+
+TEST(Clock, GnssAloneBeginsWhenNothingMeasuresMotion) {
+  Fusion fusion = fusion_without_start();
+  for (int i = 0; i < 30; ++i) fusion.add(GnssInput{at(i), 0, 20.0 * i, 1, 1});
+  EXPECT_GT(fusion.counts().used, 20U);
+}
+
 // Whoever says "not known" with the largest number there is.
 TEST(Clock, NumbersWhoseSquaresRunOverPromiseNothing) {
   const double most = std::numeric_limits<double>::max();
