@@ -167,6 +167,10 @@ class ElementSearch {
 
 }  // namespace
 
+PlanPose turned_round(const PlanPose& pose) {
+  return {pose.easting_m, pose.northing_m, core::wrap_pi(pose.heading_rad + core::kPi)};
+}
+
 PlanPose advance(const PlanPose& start, const Element& element, double distance_m) {
   const double curvature = element.curvature_start_per_m;
   const double rate = element.length_m > 0 ? rate_of(element) : 0.0;

@@ -21,6 +21,9 @@ struct PlanPose {
   double heading_rad = 0;  // clockwise from grid north
 };
 
+/// The same place, looking back.
+PlanPose turned_round(const PlanPose& pose);
+
 /// End pose of an element after `distance_m` of it (may be beyond its length or negative), closed form or series,
 /// correct to rounding for lengths of kilometres and radii down to 50 m.
 PlanPose advance(const PlanPose& start, const Element& element, double distance_m);

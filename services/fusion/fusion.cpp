@@ -2,14 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <tuple>
 #include <utility>
 
 #include "core/time.hpp"
+#include "core/within.hpp"
 #include "track/declared.hpp"
 
 namespace railfix::fusion {
+
+using core::positive;
+using core::up_to;
+using core::within;
+
 namespace {
 
 constexpr double kPathAheadM = 300000;
@@ -21,49 +26,31 @@ constexpr double kNoCameraS = 0.3;
 constexpr int64_t kSnapshotNs = 50'000'000;
 constexpr int64_t kSlipUnseenNs = 1'200'000'000;  // a slip may have grown for so long before it is found
 constexpr double kMeanSpeedS = 1.0;               // over longer times a mean speed says little of the speed now
-constexpr size_t kMostEarly = 50;
 
-// Beyond what any train has, squares of it run over.
-bool within(double number, double most) {
-  return std::abs(number) <= most;  // false for NaN, too
-}
+// Beyond what any train has, squares run over.
 bool has_sense(const ImuInput& e) {
-  return within(e.accel_x_mps2, 1e3) && within(e.rate_z_rps, 1e3);
+  return up_to(e.accel_x_mps2, 1e3) && up_to(e.rate_z_rps, 1e3);
 }
 bool has_sense(const WheelInput& e) {
-  return within(e.pulses_per_metre, 1e6) && e.pulses_per_metre > 0 && within(static_cast<double>(e.pulses), 1e15);
+  return positive(e.pulses_per_metre, 1e6) && up_to(static_cast<double>(e.pulses), 1e15);
 }
 bool has_sense(const PictureInput&) {
   return true;
 }
 bool has_sense(const OdometryInput& e) {
-  return within(e.step_m, 1e6) && within(e.step_sigma_m, 1e6) && (!e.valid || e.reference_stamp_ns != e.stamp_ns);
+  return up_to(e.step_m, 1e6) && up_to(e.step_sigma_m, 1e6) && (!e.valid || e.reference_stamp_ns != e.stamp_ns);
 }
 bool has_sense(const GnssInput& e) {
-  return within(e.easting_m, 1e9) && within(e.northing_m, 1e9) && within(e.hdop, 1e6);
+  return up_to(e.easting_m, 1e9) && up_to(e.northing_m, 1e9) && up_to(e.hdop, 1e6);
 }
 bool has_sense(const FixInput& e) {
-  const bool sigma = e.kind == FixKind::track ? true : within(e.sigma_m, 1e7);
-  return sigma && within(e.offset_m, 1e9) && e.probability >= 0 && e.probability <= 1;
+  return (e.kind == FixKind::track || up_to(e.sigma_m, 1e7)) && up_to(e.offset_m, 1e9) && within(e.probability, 0, 1);
 }
 
 // Two fixes may have one stamp; everything else has one measurement for each stamp.
 std::tuple<int64_t, size_t, int, uint32_t> order_of(const Event& event) {
   const auto* fix = std::get_if<FixInput>(&event);
   return {stamp_of(event), event.index(), fix ? static_cast<int>(fix->kind) : 0, fix ? fix->landmark : 0};
-}
-
-/// Of one sensor's samples.
-double period_of(const std::vector<Event>& events, size_t kind) {
-  int64_t first_ns = 0;
-  int64_t last_ns = 0;
-  int count = 0;
-  for (const auto& event : events) {
-    if (event.index() != kind) continue;
-    if (count++ == 0) first_ns = stamp_of(event);
-    last_ns = stamp_of(event);
-  }
-  return count < 2 ? 0 : core::seconds(last_ns - first_ns) / (count - 1);
 }
 
 }  // namespace
@@ -83,14 +70,6 @@ Fusion::Fusion(const FusionParameters& parameters, std::shared_ptr<const track::
       map_(std::move(map)),
       path_(std::move(path)),
       saved_(saved) {}
-
-void Fusion::begin_with(const Event& event) {
-  if (!std::holds_alternative<GnssInput>(event)) return begin_before(event);
-  // It has waited in vain: nothing measures motion.
-  const auto waiting = std::exchange(early_, {});
-  begin_before(waiting.front());
-  for (const auto& gnss : waiting) add(gnss);
-}
 
 void Fusion::begin_before(const Event& event) {
   // The first step counts from a picture before it: begin there.
@@ -124,8 +103,7 @@ std::optional<TrainEstimate> Fusion::add(Event event) {
     return std::nullopt;
   }
   if (is_early(event)) {
-    early_.push_back(std::get<GnssInput>(event));
-    if (early_.size() > kMostEarly) early_.pop_front();
+    wait_with(std::get<GnssInput>(event));
     return std::nullopt;
   }
   if (!now_) begin_with(event);
@@ -137,12 +115,7 @@ std::optional<TrainEstimate> Fusion::add(Event event) {
     catch_up();
     before_behind_ = *now_;
   }
-  if (stamp == Stamp::behind && believed) {
-    // What the samples did to the state before the new clock was believed is undone.
-    now_ = std::move(before_behind_);
-    const auto held = stamps_.take_held(Stamp::behind);
-    return set_clock(held, event.index(), period_of(held, event.index()));
-  }
+  if (stamp == Stamp::behind && believed) return set_clock_back(event.index());
   if (stamp_of(event) <= oldest_ns) {
     ++counts_.too_late;
     return std::nullopt;

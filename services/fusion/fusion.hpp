@@ -67,9 +67,11 @@ class Fusion {
   void begin_before(const Event& event);
   std::optional<TrainEstimate> use(Event event);
   std::optional<TrainEstimate> hear_ahead(const Event& event, bool believed);
+  std::optional<TrainEstimate> set_clock_back(size_t decided_by);
   std::optional<TrainEstimate> set_clock(const std::vector<Event>& held, size_t decided_by, double since_s);
   [[nodiscard]] std::optional<double> time_since_counted(const std::vector<Event>& held) const;
   [[nodiscard]] bool is_early(const Event& event) const;
+  void wait_with(const GnssInput& gnss);
   void use_waiting();
   void anchor(OdometryInput& step);
   void start_position(FixInput& fix) const;

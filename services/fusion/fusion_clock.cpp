@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "core/time.hpp"
 #include "fusion/fusion.hpp"
@@ -9,6 +10,7 @@
 namespace railfix::fusion {
 namespace {
 
+constexpr size_t kMostEarly = 50;
 constexpr double kStoodM = 0.3;
 constexpr double kSlowMps = 0.5;
 constexpr double kFewPeriodsS = 1.5;
@@ -23,6 +25,19 @@ int64_t first_stamp_of(const std::vector<Event>& events, size_t kind) {
   return first_ns;
 }
 
+/// Of one sensor's samples.
+double period_of(const std::vector<Event>& events, size_t kind) {
+  int64_t first_ns = 0;
+  int64_t last_ns = 0;
+  int count = 0;
+  for (const auto& event : events) {
+    if (event.index() != kind) continue;
+    if (count++ == 0) first_ns = stamp_of(event);
+    last_ns = stamp_of(event);
+  }
+  return count < 2 ? 0 : core::seconds(last_ns - first_ns) / (count - 1);
+}
+
 }  // namespace
 
 // GNSS never says what time it is where something measures motion: it waits for that.
@@ -34,6 +49,19 @@ bool Fusion::is_early(const Event& event) const {
   if (!now_) return early_.empty() || is_soon_after(early_.front().stamp_ns);
   const int64_t newest_ns = stamps_.newest_motion_ns();
   return newest_ns != 0 && stamp_of(event) > newest_ns && is_soon_after(newest_ns);
+}
+
+void Fusion::wait_with(const GnssInput& gnss) {
+  early_.push_back(gnss);
+  if (early_.size() > kMostEarly) early_.pop_front();
+}
+
+void Fusion::begin_with(const Event& event) {
+  if (!std::holds_alternative<GnssInput>(event)) return begin_before(event);
+  // It has waited in vain: nothing measures motion.
+  const auto waiting = std::exchange(early_, {});
+  begin_before(waiting.front());
+  for (const auto& gnss : waiting) add(gnss);
 }
 
 void Fusion::use_waiting() {
@@ -87,6 +115,13 @@ std::optional<double> Fusion::time_since_counted(const std::vector<Event>& held)
   if (std::abs(speed_mps) < kSlowMps) return std::abs(*way_m) < kStoodM ? std::optional(0.0) : std::nullopt;
   const double time_s = *way_m / speed_mps;
   return time_s > -kStoodM / std::abs(speed_mps) && time_s < kFewPeriodsS ? std::optional(time_s) : std::nullopt;
+}
+
+// What the samples did to the state before the new clock was believed is undone.
+std::optional<TrainEstimate> Fusion::set_clock_back(size_t decided_by) {
+  now_ = std::move(before_behind_);
+  const auto held = stamps_.take_held(Stamp::behind);
+  return set_clock(held, decided_by, period_of(held, decided_by));
 }
 
 // The state goes on in the new time, and nothing that is held is lost.

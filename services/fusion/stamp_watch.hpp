@@ -22,16 +22,14 @@ class StampWatch {
  public:
   struct Verdict {
     Stamp stamp = Stamp::sound;
-    bool believed = true;  // ahead or behind: it goes on from there, with those that are held
-    bool first = false;    // of those that are held now
+    bool believed = false;  // ahead or behind: it goes on from there, with those that are held
+    bool first = false;     // of those that are held now
   };
   /// now_ns: time until now; oldest_ns: what is not newer is too late to be used.
   Verdict judge(const Event& event, int64_t now_ns, int64_t oldest_ns, double max_jump_s);
   /// The measurements ahead, or behind, that are not believed yet, in the order in which they came. They are forgotten.
   std::vector<Event> take_held(Stamp side);
   [[nodiscard]] bool holds_behind() const { return !behind_.held.empty(); }
-  /// Whether an odometer went on lately.
-  [[nodiscard]] bool has_odometer(int64_t now_ns) const;
   /// Whose samples are left out for their stamps again and again; in words, empty = nobody's.
   [[nodiscard]] std::string left_out(int64_t now_ns) const;
   /// Newest sound stamp of what measures motion; 0 = none yet.
@@ -46,6 +44,8 @@ class StampWatch {
     int64_t last_ns = 0;  // when the last of them came, in the time of the others
   };
   [[nodiscard]] int64_t newest_of_rank(int least) const;
+  /// Whether an odometer went on lately.
+  [[nodiscard]] bool has_odometer(int64_t now_ns) const;
   void hear_sound(const Event& event);
   void leave_out(size_t kind, int64_t now_ns);
   [[nodiscard]] int enough(const Event& event, Stamp side, int64_t now_ns) const;

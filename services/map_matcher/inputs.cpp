@@ -4,8 +4,14 @@
 #include <cstdlib>
 
 #include "core/time.hpp"
+#include "core/within.hpp"
 
 namespace railfix::map_matcher {
+
+using core::positive;
+using core::up_to;
+using core::within;
+
 namespace {
 
 constexpr double kFarthestM = 1000;  // of what is sighted, or run in one step
@@ -14,17 +20,6 @@ constexpr double kFastestMps = 300;
 constexpr double kMostTurnRad = 10;  // in one step, or in a second
 constexpr double kTightestPerM = 1;  // curvature
 constexpr double kToldS = 10;
-
-// False for NaN.
-bool within(double number, double least, double most) {
-  return number >= least && number <= most;
-}
-bool up_to(double number, double most) {
-  return within(number, -most, most);
-}
-bool positive(double number, double most) {
-  return number > 0 && number <= most;
-}
 
 }  // namespace
 

@@ -25,9 +25,6 @@ Eigen::Vector2d place_of(const PlanPose& pose) {
 Eigen::Vector2d direction(double heading_rad) {
   return {std::sin(heading_rad), std::cos(heading_rad)};
 }
-PlanPose turned_round(const PlanPose& pose) {
-  return {pose.easting_m, pose.northing_m, core::wrap_pi(pose.heading_rad + core::kPi)};
-}
 
 /// The way out of a junction: nothing, or the arc of a turnout.
 struct WayOut {

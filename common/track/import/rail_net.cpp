@@ -19,10 +19,6 @@ constexpr double kLengthToldM = 1.0;
 constexpr double kLengthToldPart = 1e-3;
 constexpr double kNextPlanM = 500.0;  // between schematic plans that are not connected
 
-PlanPose turned_round(const PlanPose& pose) {
-  return {pose.easting_m, pose.northing_m, core::wrap_pi(pose.heading_rad + core::kPi)};
-}
-
 Alignment reversed(const Alignment& track) {
   std::vector<Element> elements;
   std::vector<PlanPose> starts;

@@ -1,7 +1,5 @@
 // `railfix evaluate` as scripts use it: what it refuses, in which words, and what it leaves as it was.
-#include <gmock/gmock.h>
-
-#include "support/program.hpp"
+#include "integration/commands/refusal.hpp"
 #include "unit/dataset/temporary_folder.hpp"
 
 namespace railfix {
@@ -9,8 +7,6 @@ namespace {
 
 using ::testing::HasSubstr;
 namespace fs = std::filesystem;
-
-constexpr double kPatienceS = 30;
 
 class EvaluateCommand : public testing::TemporaryFolder {
  protected:
@@ -26,12 +22,8 @@ class EvaluateCommand : public testing::TemporaryFolder {
                      {"railfix", "evaluate", "--truth", root_ / "seq/truth", "--run", root_ / "run"});
     return test::run_program(arguments, kPatienceS);
   }
-  /// One sentence, exit code 2, and nothing else.
   void refuses(const std::vector<std::string>& arguments, const std::string& words) const {
-    const auto outcome = evaluate(arguments);
-    EXPECT_EQ(outcome.exit_code, 2) << outcome.out;
-    EXPECT_THAT(outcome.err, HasSubstr(words));
-    EXPECT_EQ(outcome.out, "");
+    expect_refusal(evaluate(arguments), words);
   }
 };
 

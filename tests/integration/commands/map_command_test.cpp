@@ -1,7 +1,5 @@
 // `railfix map` as scripts use it: what it refuses, in which words, and what it leaves as it was.
-#include <gmock/gmock.h>
-
-#include "support/program.hpp"
+#include "integration/commands/refusal.hpp"
 #include "unit/dataset/temporary_folder.hpp"
 #include "unit/track/small_map.hpp"
 
@@ -10,8 +8,6 @@ namespace {
 
 using ::testing::HasSubstr;
 namespace fs = std::filesystem;
-
-constexpr double kPatienceS = 30;
 
 class MapCommand : public testing::TemporaryFolder {
  protected:
@@ -24,12 +20,8 @@ class MapCommand : public testing::TemporaryFolder {
     arguments.insert(arguments.begin(), {"railfix", "map"});
     return test::run_program(arguments, kPatienceS);
   }
-  /// One sentence and exit code 2.
   static void refuses(const std::vector<std::string>& arguments, const std::string& words) {
-    const auto outcome = map(arguments);
-    EXPECT_EQ(outcome.exit_code, 2) << outcome.out;
-    EXPECT_THAT(outcome.err, HasSubstr(words));
-    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+    expect_refusal(map(arguments), words);
   }
   std::string map_;
 };

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "support/switch_passage.hpp"
+#include "unit/map_matcher/fork_map.hpp"
 
 namespace railfix::map_matcher {
 namespace {
@@ -44,16 +45,6 @@ TEST(TrackChooser, AThrownSwitchIsFollowedAfterGoingBack) {
     EXPECT_FALSE(result.wrong) << seed;
     EXPECT_TRUE(result.known_at_end) << seed;
   }
-}
-
-std::shared_ptr<const track::Map> fork() {
-  auto map = std::make_shared<track::Map>();
-  map->edges.push_back({1, "stem", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{500, 0, 0}})});
-  map->edges.push_back({2, "straight", 2, 3, "", track::Alignment::chained({0, 500, 0}, {{500, 0, 0}})});
-  map->edges.push_back(
-      {3, "left", 2, 4, "", track::Alignment::chained({0, 500, 0}, {{40, 0.003, 0.003}, {460, 0, 0}})});
-  map->connections = {{2, 1, 2, false}, {2, 1, 3, true}};
-  return map;
 }
 
 TEST(TrackChooser, WithoutAnyTurningMeasuredItSaysNotYetKnown) {
