@@ -222,17 +222,24 @@ void GroundLink::publish_unstored() {
   }
 }
 
+// Those behind it wait, too: the ground gets them in order. Where the disk stays broken every next one is given up at
+// once.
+bool GroundLink::waits_to_read(const core::Error& error) {
+  if (!unreadable_since_) unreadable_since_ = Clock::now();
+  if (Clock::now() - *unreadable_since_ >= settings_.read_patience) return false;
+  read_trouble_ = error.message;
+  return true;
+}
+
 void GroundLink::publish_stored() {
   read_trouble_.clear();
   while (const auto sequence = outbox_.next()) {
     const auto bytes = store_.read(*sequence);
-    if (!bytes.ok()) {  // those behind it wait, too: the ground gets them in order
-      read_trouble_ = bytes.error().message;
-      return;
-    }
-    const auto report = bytes.value() ? ground_link::ground_report_from(*bytes.value())
-                                      : core::Result<ground_link::GroundReport>(core::Error{"damaged"});
-    if (!report.ok()) {  // for good
+    if (!bytes.ok() && waits_to_read(bytes.error())) return;
+    if (bytes.ok()) unreadable_since_.reset();
+    const auto report = bytes.ok() && bytes.value() ? ground_link::ground_report_from(*bytes.value())
+                                                    : core::Result<ground_link::GroundReport>(core::Error{"damaged"});
+    if (!report.ok()) {  // it stays in the store: a new start tries it again
       ++dropped_;
       outbox_.skip();
       continue;

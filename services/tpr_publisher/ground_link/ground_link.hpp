@@ -25,6 +25,7 @@ struct GroundLinkSettings {
   std::string topic;
   std::filesystem::path store;
   size_t store_limit = 100'000;
+  std::chrono::seconds read_patience{60};  // those behind a stored report that cannot be read wait so long
 };
 
 class GroundLink {
@@ -76,6 +77,7 @@ class GroundLink {
   void store_new();
   void publish();
   void publish_stored();
+  [[nodiscard]] bool waits_to_read(const core::Error& error);
   void publish_unstored();
   /// The client's id of it; nothing when the client does not take it now.
   std::optional<int> give(ground_link::GroundReport report, uint64_t stream, uint64_t sequence);
@@ -97,6 +99,7 @@ class GroundLink {
   std::chrono::steady_clock::time_point try_again_at_;
   std::string store_trouble_;
   std::string read_trouble_;  // why the next stored report cannot be read now; tried again
+  std::optional<std::chrono::steady_clock::time_point> unreadable_since_;
   size_t dropped_ = 0;
   mutable std::mutex mutex_;
   std::condition_variable wake_;

@@ -5,6 +5,8 @@
 
 #include <random>
 
+#include "core/whole_file.hpp"
+
 namespace railfix::tpr_publisher {
 
 namespace {
@@ -98,7 +100,10 @@ core::Result<ReportStore> ReportStore::open(const fs::path& file) {
   if (begun.ok()) return store;
   const bool damaged = store.database_->damaged() || begun.error().message.ends_with(": damaged.");
   store.database_.reset();
-  if (!damaged || !move_aside(file)) return begun.error();
+  if (!damaged) return begun.error();
+  // SQLite calls it damage when the disk gives EIO, too: it may be whole.
+  if (const auto whole = core::read_whole(file); !whole.ok()) return whole.error();
+  if (!move_aside(file)) return begun.error();
   if (const auto again = store.begin(file); !again.ok()) return again.error();
   store.problem_ = "The store of unsent reports was damaged: it was moved to " + file.string() + ".damaged.";
   return store;
@@ -119,7 +124,7 @@ core::Status ReportStore::remove(std::span<const uint64_t> sequences) {
   {
     const auto erase = database_->prepare("DELETE FROM report WHERE sequence = ?");
     for (const uint64_t sequence : sequences) {
-      sqlite3_bind_int64(erase.get(), 1, static_cast<sqlite3_int64>(sequence));
+      if (erase) sqlite3_bind_int64(erase.get(), 1, static_cast<sqlite3_int64>(sequence));
       if (!erase || sqlite3_step(erase.get()) != SQLITE_DONE) {
         const auto error = database_->error();
         (void)database_->run("ROLLBACK");
@@ -148,8 +153,8 @@ core::Result<std::optional<std::vector<uint8_t>>> ReportStore::read(uint64_t seq
   if (!select) return database_->error();
   sqlite3_bind_int64(select.get(), 1, static_cast<sqlite3_int64>(sequence));
   const int code = sqlite3_step(select.get());
-  if (code == SQLITE_DONE || (code != SQLITE_ROW && database_->damaged())) return Report();
-  if (code != SQLITE_ROW) return database_->error();
+  if (code == SQLITE_DONE) return Report();
+  if (code != SQLITE_ROW) return database_->error();  // SQLite calls it damage when the disk gives EIO, too
   const auto* begin = static_cast<const uint8_t*>(sqlite3_column_blob(select.get(), 1));
   std::vector<uint8_t> bytes(begin, begin + sqlite3_column_bytes(select.get(), 1));
   return sqlite3_column_int64(select.get(), 0) == checksum(bytes) ? Report(std::move(bytes)) : Report();

@@ -16,7 +16,8 @@ namespace railfix::tpr_publisher {
 
 class ReportStore {
  public:
-  /// Makes the file when it is missing. One that is damaged is moved aside (FILE.damaged) and a new one begun.
+  /// Makes the file when it is missing. One that can be read and is damaged is moved aside (FILE.damaged) and a new one
+  /// begun.
   static core::Result<ReportStore> open(const std::filesystem::path& file);
 
   /// Empty, or that a damaged file was moved aside.
@@ -31,7 +32,7 @@ class ReportStore {
   core::Status remove(std::span<const uint64_t> sequences);
   /// In order.
   [[nodiscard]] core::Result<std::vector<uint64_t>> sequences() const;
-  /// Nothing when it is damaged (a wrong checksum) or gone: it will never be read. After an error it may be, later.
+  /// Nothing when its checksum is wrong or it is gone: it will never be read. After an error it may be, later.
   [[nodiscard]] core::Result<std::optional<std::vector<uint8_t>>> read(uint64_t sequence) const;
 
  private:
