@@ -48,7 +48,7 @@ void Estimator::rebase_clock(int64_t stamp_ns) {
   wheel_.window_begin_ns = 0;
   wheel_.counts_since_ns = std::min(wheel_.counts_since_ns, stamp_ns);
   gap_begin_ns_ = std::min(gap_begin_ns_, stamp_ns);
-  filter_.doubt_way(filter_.value(StateIndex::speed) * kRebaseS);
+  filter_.doubt_time(kRebaseS);
   slip_watch_ = {};
   sudden_change_ = {};
   rest_since_ns_ = stamp_ns;
@@ -83,8 +83,8 @@ bool Estimator::knows_motion() const {
          (lately && used_within(Source::imu, kLatelyS));
 }
 
-// A sample that comes out of rhythm may have another clock behind it: then the way run by time alone is in doubt by as
-// much, and the sample itself says how far the train ran.
+// A sample that comes out of rhythm may have another clock behind it: then what was predicted by time alone is in doubt
+// by as much, and the sample itself says how far the train ran.
 void Estimator::doubt_time(const SensorWatch& watch, Rhythm& rhythm, int64_t stamp_ns) {
   if (watch.seen_ns == 0 || stamp_ns <= watch.seen_ns) return;
   const double dt_s = core::seconds(stamp_ns - watch.seen_ns);
@@ -93,7 +93,7 @@ void Estimator::doubt_time(const SensorWatch& watch, Rhythm& rhythm, int64_t sta
   const double off_s = std::max(late_s, rhythm.period_s - dt_s);
   rhythm.pause_s = 0;
   if (rhythm.samples >= kRhythmSamples && off_s > std::max(kRhythmS, 0.1 * rhythm.period_s)) {
-    filter_.doubt_way(filter_.value(StateIndex::speed) * off_s);
+    filter_.doubt_time(off_s);
   } else {
     rhythm.period_s += (dt_s - rhythm.period_s) / std::min(++rhythm.samples, 20);
   }

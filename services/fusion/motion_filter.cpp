@@ -274,13 +274,15 @@ void MotionFilter::set_origin(double path_distance_m, double sigma_m) {
   ud_.reset(index(StateIndex::origin), squared(sigma_m));
 }
 
-void MotionFilter::doubt_way(double sigma_m) {
+void MotionFilter::doubt_time(double sigma_s) {
   const auto n = x_.size();
-  StateMatrix g = StateMatrix::Zero(n, 1);
-  g(index(StateIndex::camera_odometer), 0) = 1 / to_unit(Odometer::camera);
-  g(index(StateIndex::distance), 0) = unit_scale();
-  g(index(StateIndex::wheel_odometer), 0) = 1 / to_unit(Odometer::wheel);
-  ud_.propagate(StateMatrix::Identity(n, n), g, StateVector::Constant(1, squared(sigma_m)));
+  const double speed = value(StateIndex::speed);
+  StateMatrix per_s = StateMatrix::Zero(n, 1);
+  per_s(index(StateIndex::camera_odometer), 0) = speed / to_unit(Odometer::camera);
+  per_s(index(StateIndex::distance), 0) = speed * unit_scale();
+  per_s(index(StateIndex::wheel_odometer), 0) = speed / to_unit(Odometer::wheel);
+  per_s(index(StateIndex::speed), 0) = value(StateIndex::acceleration);
+  ud_.propagate(StateMatrix::Identity(n, n), per_s, StateVector::Constant(1, squared(sigma_s)));
 }
 
 void MotionFilter::loosen_speed(double sigma_mps) {

@@ -99,8 +99,8 @@ class MotionFilter {
   /// Path distance becomes `path_distance_m`, unknown within sigma, whatever it was.
   void set_origin(double path_distance_m, double sigma_m);
 
-  /// The train may have run so much more or less than was thought (unit metres).
-  void doubt_way(double sigma_m);
+  /// So much more or less time may have gone by than was thought: way and speed are in doubt together.
+  void doubt_time(double sigma_s);
   /// The acceleration may have become another one by sigma, up to `since_s` ago.
   void doubt_acceleration(double since_s, double sigma_mps2);
   /// The speed is another one within sigma (unit metres); steps from pictures so far cannot be measured against it.
