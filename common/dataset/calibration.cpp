@@ -4,6 +4,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "core/whole_file.hpp"
 #include "dataset/yaml_file.hpp"
 
 namespace railfix::dataset {
@@ -158,8 +159,7 @@ Result<CameraCalibration> read_calibration(const std::filesystem::path& file) {
 }
 
 Status write_calibration(const std::filesystem::path& file, const CameraCalibration& calibration) {
-  std::ofstream stream(file);
-  if (!stream) return Error{file.string() + " cannot be written; check the folder and its permissions"};
+  std::ostringstream stream;
   const auto& c = calibration.intrinsics;
   stream.precision(17);
   stream << "sensor_type: camera\n";
@@ -176,9 +176,9 @@ Status write_calibration(const std::filesystem::path& file, const CameraCalibrat
   }
   if (calibration.mount) write_pose(stream, "mount", *calibration.mount);
   if (calibration.mount_sigma) write_pose(stream, "mount_sigma", *calibration.mount_sigma);
-  stream.close();
-  if (!stream) return Error{file.string() + " could not be written completely; is the disk full?"};
-  return {};
+  if (core::write_whole(file, stream.str())) return {};
+  return Error{file.string() +
+               " cannot be written; what was there is as it was. Is the folder there, writable, not full?"};
 }
 
 Result<std::optional<CameraCalibration>> find_calibration(const std::filesystem::path& pictures) {

@@ -23,6 +23,7 @@ struct CameraCalibration {
 /// intrinsics_sigma, distortion_sigma and mount_sigma of the same shapes. Other keys are ignored (EuRoC files carry
 /// more).
 core::Result<CameraCalibration> read_calibration(const std::filesystem::path& file);
+/// On an error the file that was there is as it was.
 core::Status write_calibration(const std::filesystem::path& file, const CameraCalibration& calibration);
 
 /// The calibration that lies with the pictures: mav0/cam0/sensor.yaml, camera.yaml or KITTI's calib.txt (which has no

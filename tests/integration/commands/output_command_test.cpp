@@ -1,0 +1,48 @@
+// Commands that read pictures or recordings never write over them.
+#include "core/whole_file.hpp"
+#include "integration/commands/refusal.hpp"
+#include "unit/dataset/temporary_folder.hpp"
+
+namespace railfix {
+namespace {
+
+class OutputCommand : public testing::TemporaryFolder {
+ protected:
+  void SetUp() override {
+    TemporaryFolder::SetUp();
+    write("film.mp4", "a film");
+    write("seq/mav0/cam0/data/0001.jpg", "a picture");
+  }
+  [[nodiscard]] std::string path(const std::string& name) const { return (root_ / name).string(); }
+  [[nodiscard]] std::string text_of(const std::string& name) const {
+    return core::value_or_throw(core::read_whole(root_ / name));
+  }
+  static void refuses(std::vector<std::string> arguments, const std::string& words) {
+    arguments.insert(arguments.begin(), "railfix");
+    expect_refusal(test::run_program(arguments, kPatienceS), words);
+  }
+};
+
+TEST_F(OutputCommand, CalibrateLeavesWhatItReads) {
+  refuses({"calibrate", "mount", "--video", path("film.mp4"), "--out", path("film.mp4")}, "itself, which is read");
+  refuses({"calibrate", "mount", "--pictures", path("seq"), "--out", path("camera.yaml"), "--draw",
+           path("seq/mav0/cam0/data/0001.jpg")},
+          "belongs to");
+  refuses({"calibrate", "lens", "--board", "9x7", "--square", "0.03", "--pictures", path("seq/mav0/cam0/data"), "--out",
+           path("camera.yaml"), "--draw", path("seq/mav0/cam0/data/0001.jpg")},
+          "belongs to");
+  EXPECT_EQ(text_of("film.mp4"), "a film");
+  EXPECT_EQ(text_of("seq/mav0/cam0/data/0001.jpg"), "a picture");
+}
+
+TEST_F(OutputCommand, RunDrawsIntoNoFolderOfPictures) {
+  for (const char* pictures : {"seq/mav0/cam0/data", "seq/mav0/cam0/../cam0/data"}) {
+    refuses({"run", "--dataset", path("seq"), "--draw", path(pictures), "--out", path("out")},
+            "is the folder of the pictures themselves");
+  }
+  EXPECT_EQ(text_of("seq/mav0/cam0/data/0001.jpg"), "a picture");
+  EXPECT_FALSE(std::filesystem::exists(path("out")));
+}
+
+}  // namespace
+}  // namespace railfix
