@@ -18,6 +18,7 @@ constexpr double kRebaseS = 0.1;   // lost when the clock is set
 constexpr double kRhythmS = 0.003;
 constexpr double kGapS = 0.05;
 constexpr int kRhythmSamples = 10;
+constexpr double kPointsOffM = 5.0;  // from where the map has them, or the wheels behind the foot
 
 }  // namespace
 
@@ -28,7 +29,12 @@ Estimator::Estimator(const FusionParameters* parameters, const OdometerScales& s
       filter_(*parameters, scales, stamp_ns, path_ != nullptr),
       stamp_ns_(stamp_ns),
       rest_since_ns_(stamp_ns),
-      start_ns_(stamp_ns) {}
+      start_ns_(stamp_ns) {
+  if (!path_) return;
+  // It may stand in front of points that the place which was told lies behind.
+  track_doubt_.move(*path_, -known_to_m() - kPointsOffM);
+  track_doubt_.move(*path_, 0);
+}
 
 void Estimator::predict_to(int64_t stamp_ns) {
   filter_.predict_to(stamp_ns, *parameters_);
@@ -59,6 +65,7 @@ void Estimator::apply(const Event& event) {
   slip_began_ = false;
   fix_verdict_ = FixVerdict::none;
   fix_offer_ = {};
+  fix_again_ = false;
   notice_gap(std::visit([](const auto& input) { return input.stamp_ns; }, event));
   std::visit(
       [this](const auto& input) {
@@ -149,6 +156,7 @@ void Estimator::place_like(const Estimator& other) {
   time_doubt_m_ = std::max(time_doubt_m_, other.time_doubt_m_);
   unwatched_ = other.unwatched_;
   reference_ = other.reference_;
+  met_ = other.met_;
   landmarks_agreed_ = other.landmarks_agreed_;
 }
 

@@ -109,6 +109,8 @@ class Estimator {
   [[nodiscard]] bool fix_used() const { return fix_verdict_ == FixVerdict::used || fix_corrected(); }
   /// Used against the filter's word, because the one before, which was refused, says the same.
   [[nodiscard]] bool fix_corrected() const { return fix_verdict_ == FixVerdict::corrected; }
+  /// Of a landmark that was met before, since when little was forgotten: it says hardly anything new.
+  [[nodiscard]] bool fix_again() const { return fix_again_; }
   [[nodiscard]] bool fix_refused() const { return fix_verdict_ == FixVerdict::refused; }
   /// How far it was from where it was expected.
   [[nodiscard]] double fix_residual_m() const { return fix_offer_.residual; }
@@ -216,6 +218,8 @@ class Estimator {
   void use_yaw_rate(double rate_rps);
   void use_track(const FixInput& fix);
   Offer offer_place(const MeasuredPlace& place);
+  Offer offer_place_again(double path_distance_m, double sigma_m);
+  [[nodiscard]] bool has_met(uint32_t landmark) const;
   /// What the interval reaches to either side where nothing is in doubt.
   [[nodiscard]] double known_to_m() const;
   /// What the promised interval holds more.
@@ -256,6 +260,8 @@ class Estimator {
   int gnss_agreed_ = 0;     // in a row
   bool corrected_ = false;  // the place was moved against the filter's word, not confirmed yet
   uint32_t reference_ = 0;
+  std::array<uint32_t, 16> met_{};  // landmarks that were used last, newest first; 0 = none
+  bool fix_again_ = false;
   std::optional<track::EdgePosition> off_path_;  // a fix was there since the last one that was used
   double excess_m_ = 0;                          // that others promise beyond this one's interval
   double doubt_m_ = 0;       // camera and the rest contradict each other by so much since the reference

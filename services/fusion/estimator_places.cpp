@@ -11,6 +11,7 @@ namespace {
 
 constexpr int kRefusalsToIsolate = 3;
 constexpr int kAgreementsOfGnss = 5;  // in a row: where it scatters one agrees by chance
+constexpr double kForgotten = 2.0;    // of a landmark's sigmas is the place's when the way since has outgrown it
 constexpr double kOffTrackM = 15.0;   // a GNSS fix further beside the track is none
 // Of the sigma of a GNSS fix; squares add up to the whole.
 constexpr double kGnssLastingShare = 0.866;
@@ -111,19 +112,23 @@ void Estimator::use(const FixInput& fix) {
     track_doubt_.seen_elsewhere(fix.probability);
     return;
   }
-  // A second fix on the landmark of the first has the same error of the map in it.
-  const bool again = fix.landmark != 0 && fix.landmark == reference_ && std::abs(filter_.since_reference_m()) < 50;
-  const double sigma_m = std::hypot(fix.sigma_m, parameters_->fix_sigma_floor_m) * (again ? 3.0 : 1.0);
+  const double sigma_m = std::hypot(fix.sigma_m, parameters_->fix_sigma_floor_m);
   const auto lasting = fix.kind == FixKind::curvature ? std::optional(StateIndex::shape_error) : std::nullopt;
-  fix_offer_ = offer_place({*path_distance_m, sigma_m, lasting});
+  fix_again_ = has_met(fix.landmark) && filter_.path_sigma_m() < kForgotten * sigma_m;
+  fix_offer_ =
+      fix_again_ ? offer_place_again(*path_distance_m, sigma_m) : offer_place({*path_distance_m, sigma_m, lasting});
   if (fix_offer_.used) {
     corrected_ = false;
     accept(fix);
-    if (fix_used() && fix.kind == FixKind::landmark && !again) ++landmarks_agreed_;
+    if (fix_used() && fix.kind == FixKind::landmark && !fix_again_) ++landmarks_agreed_;
   } else {
     ++watch.refused;
     refuse(fix, *path_distance_m, fix_offer_);
   }
+}
+
+bool Estimator::has_met(uint32_t landmark) const {
+  return landmark != 0 && std::ranges::find(met_, landmark) != met_.end();
 }
 
 bool Estimator::fix_unexpected() const {
@@ -149,6 +154,15 @@ Offer Estimator::offer_place(const MeasuredPlace& place) {
   return offer;
 }
 
+// What the map has wrong about a landmark is in the place already since it was met: no number of sightings makes that
+// surer than one (the bound of covariance intersection, Julier and Uhlmann 1997).
+Offer Estimator::offer_place_again(double path_distance_m, double sigma_m) {
+  const auto offer = filter_.test_position(path_distance_m, sigma_m, parameters_->gate_fix);
+  const double news = 1 / (sigma_m * sigma_m) - 1 / (filter_.path_sigma_m() * filter_.path_sigma_m());
+  if (offer.used && news > 0) filter_.offer_position({path_distance_m, 1 / std::sqrt(news)}, parameters_->gate_fix);
+  return offer;
+}
+
 double Estimator::doubted_beyond_sigma_m() const {
   const auto promised = widened(interval());
   return std::max(centre_m() - promised.behind_m, promised.ahead_m - centre_m()) - known_to_m() + excess_m_;
@@ -166,6 +180,10 @@ void Estimator::accept(const FixInput& fix) {
   doubt_m_ = doubt_behind_m_ = doubt_ahead_m_ = time_doubt_m_ = 0;
   unwatched_ = {.distance_m = unwatched_.distance_m};
   reference_ = fix.landmark;
+  if (fix.landmark != 0 && !has_met(fix.landmark)) {
+    std::ranges::rotate(met_, met_.end() - 1);
+    met_.front() = fix.landmark;
+  }
   filter_.mark_reference();
 }
 

@@ -72,7 +72,7 @@ void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
   main_.contradicted_by(0);
   const bool told = main_.fix_used() || main_.fix_refused();
   const bool hardly = main_.fix_unexpected();
-  if (told && fix.kind == FixKind::landmark)
+  if (told && fix.kind == FixKind::landmark && !main_.fix_again())
     residuals_.add(fix.landmark, main_.fix_residual_m(), main_.fix_sigmas_off(0), before.since_reference_m());
   std::vector<Doubter> doubters_before = doubters_;
   for (auto& doubter : doubters_) {
@@ -87,7 +87,8 @@ void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
   } else if (main_.fix_used()) {
     auto without = without_two(fix, doubters_before);
     without.push_back(without_one(fix, std::move(before), most));
-    if (std::ranges::none_of(doubters_, [&](const Doubter& doubter) { return doubter.leaves_out(fix); })) {
+    const auto leaves_out = [&](const Doubter& doubter) { return doubter.leaves_out(fix); };
+    if (!main_.fix_again() && std::ranges::none_of(doubters_, leaves_out)) {
       settle_doubters(fix, doubters_before);
       if (!fix.new_path) std::ranges::move(without, std::back_inserter(doubters_));
     }

@@ -13,7 +13,9 @@ namespace {
 constexpr double kLostM = 60.0;  // afterwards the window is right and the routes are not
 constexpr double kLeastProbability = 1e-7;
 constexpr double kTurnRoundM = 0.3;
-constexpr double kSameM = 5.0;  // two routes whose distances differ by less are one
+constexpr double kMapSigmas = 3;      // points are no further from where the map has them
+constexpr double kWheelsBehindM = 5;  // the foot: points may be thrown in front of the first wheels
+constexpr double kSameM = 5.0;        // two routes whose distances differ by less are one
 constexpr double kFarFromWindowM = 200;
 constexpr double kMostWindowM = 300;
 constexpr size_t kMostHypotheses = 24;
@@ -176,8 +178,11 @@ void TrackChooser::fit_cells() {
   }
 }
 
-// What lies ahead may be set otherwise once the train has left it: only what it certainly stands on is kept.
+// What lies ahead may be set otherwise once the train has left it: only what its wheels certainly stand on is kept.
 void TrackChooser::turn_round() {
+  const double map_m = kMapSigmas * parameters_.map_sigma_m;
+  const double wheels_m = place_m_ - window_.over_m - map_m - kWheelsBehindM;
+  const double foot_m = place_m_ + window_.under_m + map_m;
   forwards_ = !forwards_;
   moved_back_m_ = 0;
   cells_m_ += pending_.way_m;
@@ -185,9 +190,9 @@ void TrackChooser::turn_round() {
   for (auto& hypothesis : hypotheses_) {
     auto& route = hypothesis.route;
     if (forwards_) {
-      while (route.legs().size() > 1 && route.legs().back().begin_m > place_m_ - window_.over_m) route.drop_ahead();
+      while (route.legs().size() > 1 && route.legs().back().begin_m > wheels_m) route.drop_ahead();
     } else {
-      while (route.legs().size() > 1 && route.legs().front().end_m() < place_m_ + window_.under_m) route.drop_behind();
+      while (route.legs().size() > 1 && route.legs().front().end_m() < foot_m) route.drop_behind();
     }
   }
   merge();

@@ -16,7 +16,7 @@
 
 namespace railfix::testing {
 
-enum class Manoeuvre : uint8_t { through, stop_on_switch, back_and_forth, backwards };
+enum class Manoeuvre : uint8_t { through, stop_on_switch, back_and_forth, just_clear, backwards };
 
 struct PassagePlan {
   bool facing = true;
@@ -27,8 +27,9 @@ struct PassagePlan {
   double side = 1;
   double main_curvature_per_m = 0;
   double speed_mps = 20;
-  double sigma_m = 1;  // of the place along the track
-  bool camera = true;  // else a cheap gyro
+  double sigma_m = 1;           // of the place along the track
+  double switch_sigma_m = 0.5;  // of the switch on the map
+  bool camera = true;           // else a cheap gyro
   bool frog_seen = true;
   bool views = true;  // the rails' curvature in the pictures, with a camera
   std::string text() const {
@@ -96,7 +97,7 @@ class SwitchPassage {
     result_.astray = plan.camera && random_.uniform() < 0.02;
     error_m_ = plan.sigma_m * std::clamp(random_.normal(), -3.0, 3.0);
     curvature_scale_ = 1 + 0.05 * random_.normal();
-    map_shift_m_ = 0.5 * random_.normal();
+    map_shift_m_ = plan.switch_sigma_m * random_.normal();
   }
 
   PassageResult run(const map_matcher::TrackParameters& parameters = {}) {
@@ -116,6 +117,13 @@ class SwitchPassage {
       drive(-(random_.uniform(10, 40) + 8 * plan_.sigma_m + 2));
       rest(3);
       if (plan_.facing && random_.uniform() < 0.5) set_route(!diverging_now_);  // it was thrown meanwhile
+    }
+    if (plan_.manoeuvre == Manoeuvre::just_clear) {
+      drive(60);
+      rest(3);
+      drive(map_shift_m_ - 1);  // a metre before the points, wherever the map has them
+      rest(3);
+      set_route(!diverging_now_);
     }
     drive(beyond_m);
     result_.known_at_end = known_;
@@ -318,7 +326,8 @@ class SwitchPassage {
     const bool right = std::any_of(legs.begin(), legs.end(), [&](const auto& leg) {
       return leg.run.edge->id == place.edge && at_m_ > leg.begin_m - tolerance_m && at_m_ < leg.end_m() + tolerance_m;
     });
-    if (!right) {
+    const bool before_points = plan_.manoeuvre == Manoeuvre::just_clear && toward < map_shift_m_;  // it is on no leg
+    if (!right && !before_points) {
       result_.wrong = true;
       result_.wrong_at_m = toward;
     }

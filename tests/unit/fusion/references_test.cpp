@@ -44,6 +44,55 @@ TEST(References, AnOutlierOfGnssBehindAVaguePlaceIsHeld) {
   EXPECT_GT(state.over_m, state.position.offset_m - 230);
 }
 
+// The map has it a metre off, and so has every sighting of it.
+TEST(References, ALandmarkThatIsSightedAThousandTimesIsNoSurerThanOnce) {
+  const auto sigma_after = [](int sightings) {
+    auto fusion = fusion_at(0);
+    auto state = run(fusion, 0, 20, 20);
+    for (int i = 1; i <= sightings; ++i) {
+      auto mast = fix_at(20 + 0.1 * i, 401, 7);
+      mast.sigma_m = 1;
+      fusion.add(mast);
+      state = run(fusion, 20 + 0.1 * i, 20.1 + 0.1 * i, 0);
+    }
+    EXPECT_LT(state.position.offset_m - 400, state.over_m);
+    return state.sigma_m;
+  };
+  const double once_m = sigma_after(1);
+  EXPECT_LT(once_m, 1);
+  EXPECT_NEAR(sigma_after(1000), once_m, 0.1 * once_m);
+}
+
+// As a shunter does: A, B, A, B, ...
+TEST(References, TwoLandmarksThatAreMetInTurnAreNoSurerThanOnce) {
+  auto fusion = fusion_at(0);
+  double t_s = 0;
+  const auto go = [&](double time_s, double speed_mps) {
+    t_s += time_s;
+    return run(fusion, t_s - time_s, t_s, speed_mps);
+  };
+  const auto sight = [&](double place_m, uint32_t landmark) {
+    auto mast = fix_at(t_s, place_m, landmark);
+    mast.sigma_m = 1;
+    fusion.add(mast);
+  };
+  go(20, 20);
+  sight(400.8, 7);
+  go(3, 20);
+  sight(460.8, 8);
+  const double once_m = go(1, 20).sigma_m;
+  TrainEstimate state;
+  for (int i = 0; i < 20; ++i) {
+    go(1, -20);
+    sight(460.8, 8);
+    go(3, -20);
+    sight(400.8, 7);
+    state = go(4, 20);
+  }
+  EXPECT_GT(state.sigma_m, 0.9 * once_m);
+  EXPECT_LT(state.position.offset_m - 480, state.over_m);
+}
+
 TEST(References, LandmarkIsIgnoredWhilePlaceIsUnknown) {
   auto fusion = fusion_without_start();
   run(fusion, 0, 1, 20);

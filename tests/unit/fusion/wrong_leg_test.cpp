@@ -16,13 +16,14 @@ constexpr uint32_t kLeft = 3;
 /// A train that comes to points at 1000 m; the left leg is an arc of 1000 m radius.
 class WrongLeg : public testing::Test {
  protected:
-  static Fusion at_900_m() {
+  static Fusion at_900_m() { return starting_at({1, 900, track::Direction::forward}); }
+  static Fusion starting_at(const track::EdgePosition& start) {
     auto map = std::make_shared<track::Map>();
     map->edges.push_back({1, "stem", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{1000, 0, 0}})});
     map->edges.push_back({2, "straight", 2, 3, "", track::Alignment::chained({0, 1000, 0}, {{9000, 0, 0}})});
     map->edges.push_back({3, "left", 2, 4, "", track::Alignment::chained({0, 1000, 0}, {{9000, 0.001, 0.001}})});
     map->connections = {{2, 1, 2, false}, {2, 1, 3, true}};
-    return core::value_or_throw(Fusion::create({}, map, track::EdgePosition{1, 900, track::Direction::forward}));
+    return core::value_or_throw(Fusion::create({}, map, start));
   }
   void declare(double t_s, uint32_t edge, double offset_m) {
     fusion_.add(FixInput{at(t_s), edge, offset_m, INFINITY, 0.9995, 0, FixKind::track, track::Direction::forward, {}});
@@ -45,6 +46,17 @@ class WrongLeg : public testing::Test {
   Fusion fusion_ = at_900_m();
   uint32_t seen_ = 0;
 };
+
+TEST_F(WrongLeg, WhoIsToldToStartJustBehindPointsMayStandInFrontOfThem) {
+  const auto probability = [](uint32_t edge, double offset_m) {
+    auto fusion = starting_at({edge, offset_m, track::Direction::forward});
+    return run(fusion, 0, 0.1, 1).track_probability;
+  };
+  EXPECT_EQ(probability(kStraight, 3), 0.5);
+  EXPECT_EQ(probability(kLeft, 3), 0.5);
+  EXPECT_EQ(probability(kStraight, 20), 1);
+  EXPECT_EQ(probability(1, 999), 1) << "the points are still to come";
+}
 
 TEST_F(WrongLeg, ALandmarkOnTheOtherLegDoubtsItHoweverOftenItIsDeclared) {
   run(fusion_, 0, 7, 20);

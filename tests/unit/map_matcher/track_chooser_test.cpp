@@ -47,6 +47,23 @@ TEST(TrackChooser, AThrownSwitchIsFollowedAfterGoingBack) {
   }
 }
 
+// The map has the points up to some metres behind where they are, so that the foot seems to be past them still.
+TEST(TrackChooser, AThrownSwitchIsFollowedAfterGoingBackNoFurtherThanItsPoints) {
+  for (uint64_t seed = 1; seed <= 60; ++seed) {
+    PassagePlan plan;
+    plan.diverging = seed % 2 == 0;
+    plan.manoeuvre = Manoeuvre::just_clear;
+    plan.radius_m = 215;
+    plan.speed_mps = 5;
+    plan.sigma_m = 0.1;
+    plan.switch_sigma_m = 1.5;
+    plan.camera = seed % 4 < 2;
+    const auto result = SwitchPassage(plan, seed).run();
+    EXPECT_FALSE(result.wrong) << seed << ", " << result.wrong_at_m << " m behind the points";
+    EXPECT_TRUE(result.known_at_end) << seed;
+  }
+}
+
 TEST(TrackChooser, WithoutAnyTurningMeasuredItSaysNotYetKnown) {
   const auto map = fork();
   TrackChooser chooser({}, map, std::make_shared<const track::Ways>(*map));
