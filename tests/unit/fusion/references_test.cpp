@@ -9,6 +9,13 @@ namespace {
 
 using testing::HasSubstr;
 
+/// Known, and sighted, to a metre.
+FixInput mast_at(double t_s, double offset_m, uint32_t landmark) {
+  auto fix = fix_at(t_s, offset_m, landmark);
+  fix.sigma_m = 1;
+  return fix;
+}
+
 TEST(References, NetworkFixStartsThePosition) {
   auto fusion = fusion_without_start();
   run(fusion, 0, 10, 20);
@@ -50,9 +57,7 @@ TEST(References, ALandmarkThatIsSightedAThousandTimesIsNoSurerThanOnce) {
     auto fusion = fusion_at(0);
     auto state = run(fusion, 0, 20, 20);
     for (int i = 1; i <= sightings; ++i) {
-      auto mast = fix_at(20 + 0.1 * i, 401, 7);
-      mast.sigma_m = 1;
-      fusion.add(mast);
+      fusion.add(mast_at(20 + 0.1 * i, 401, 7));
       state = run(fusion, 20 + 0.1 * i, 20.1 + 0.1 * i, 0);
     }
     EXPECT_LT(state.position.offset_m - 400, state.over_m);
@@ -71,22 +76,17 @@ TEST(References, TwoLandmarksThatAreMetInTurnAreNoSurerThanOnce) {
     t_s += time_s;
     return run(fusion, t_s - time_s, t_s, speed_mps);
   };
-  const auto sight = [&](double place_m, uint32_t landmark) {
-    auto mast = fix_at(t_s, place_m, landmark);
-    mast.sigma_m = 1;
-    fusion.add(mast);
-  };
   go(20, 20);
-  sight(400.8, 7);
+  fusion.add(mast_at(t_s, 400.8, 7));
   go(3, 20);
-  sight(460.8, 8);
+  fusion.add(mast_at(t_s, 460.8, 8));
   const double once_m = go(1, 20).sigma_m;
   TrainEstimate state;
   for (int i = 0; i < 20; ++i) {
     go(1, -20);
-    sight(460.8, 8);
+    fusion.add(mast_at(t_s, 460.8, 8));
     go(3, -20);
-    sight(400.8, 7);
+    fusion.add(mast_at(t_s, 400.8, 7));
     state = go(4, 20);
   }
   EXPECT_GT(state.sigma_m, 0.9 * once_m);
