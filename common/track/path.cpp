@@ -349,4 +349,8 @@ double Path::curvature_at(double distance_m) const {
   return leg.forward ? curvature : -curvature;
 }
 
+bool Path::grade_known_at(double distance_m) const {
+  return distance_m >= begin_m() && distance_m <= end_m() && !leg_at(distance_m).edge->alignment.profile().empty();
+}
+
 }  // namespace railfix::track

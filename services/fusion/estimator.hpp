@@ -203,6 +203,7 @@ class Estimator {
   void use(const FixInput& fix);
   void use(const PictureInput& picture);
   void use_acceleration(double accel_mps2, int64_t stamp_ns);
+  void doubt_grade();
   void compare_with_wheel(const OdometryInput& step, double sigma_m);
   void isolate_wheel();
   bool blame_wheel_on_trial();
@@ -246,6 +247,8 @@ class Estimator {
   Rhythm pulses_;
   Mean accel_;
   Repeated accel_repeated_;
+  bool grade_known_ = true;
+  double graded_m_ = 0;  // the distance up to which the bias allows for a grade that is not known
   Mean yaw_;
   Wheel wheel_;
   WheelNoise wheel_noise_;

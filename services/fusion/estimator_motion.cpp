@@ -72,7 +72,7 @@ void Estimator::use(const OdometryInput& step) {
                  ? filter.offer_step(step.reference_stamp_ns, step.step_m, sigma_m, parameters_->gate_camera)
                  : filter.offer_speed(step.step_m / dt_s, sigma_m / dt_s + 0.5 * dt_s, parameters_->gate_camera);
     };
-    const bool alone = !used_within(Source::wheel, kLatelyS);
+    const bool alone = !used_within(Source::wheel, kLatelyS) || wheel_.on_trial;
     if (camera.isolated && !(alone && !used_within(Source::imu, kLatelyS))) {
       slip_watch_.no_picture();
       MotionFilter trial = filter_;
@@ -87,7 +87,10 @@ void Estimator::use(const OdometryInput& step) {
       compare_with_wheel(step, sigma_m);
     } else {
       slip_watch_.no_picture();
-      if (++camera.refused >= kRefusalsToIsolate && !blame_wheel_on_trial()) camera.isolate(step.stamp_ns);
+      if (++camera.refused >= kRefusalsToIsolate && !blame_wheel_on_trial()) {
+        if (alone && !camera.isolated) doubt_m_ += camera.refused * std::abs(offer.residual);
+        camera.isolate(step.stamp_ns);
+      }
       // With the wheel the rivals' ends are wide enough; without it nobody knows who is right.
       if (camera.refused >= kRefusalsToDoubt && alone) doubt_m_ += std::abs(offer.residual);
     }
@@ -275,7 +278,8 @@ void Estimator::recover_wheel(const WheelInput& sample, double wheel_m, double s
   if (with_camera && good && !turns) return;
   wheel_.good_windows = good ? wheel_.good_windows + 1 : 0;
   // Without a camera for so long nothing knows the speed better than a wheel that turns.
-  const bool alone = !is_watched() && core::seconds(sample.stamp_ns - watch(Source::wheel).changed_ns) > kBridgeS;
+  const int64_t since_ns = std::max(watch(Source::wheel).changed_ns, watch(Source::camera).used_ns);
+  const bool alone = !is_watched() && core::seconds(sample.stamp_ns - since_ns) > kBridgeS;
   if (alone && turns && !good) filter_.loosen_speed(kUnknownSpeedMps);
   begin_window();
   if (wheel_.good_windows < kGoodWindows && !(alone && turns)) return;
@@ -307,6 +311,18 @@ void Estimator::use(const ImuInput& sample) {
   if (rate_rps) use_yaw_rate(*rate_rps);
 }
 
+// Where no map tells the grade it hides in the bias, and changes along the way.
+void Estimator::doubt_grade() {
+  const bool known = path_ && path_->grade_known_at(filter_.path_distance_m());
+  const double way_m = std::abs(distance_m() - std::exchange(graded_m_, distance_m()));
+  const double sigma_mps2 = core::kGravityMps2 * parameters_->unknown_grade;
+  if (std::exchange(grade_known_, known) != known) {
+    filter_.doubt_accel_bias(sigma_mps2);
+  } else if (!known) {
+    filter_.doubt_accel_bias(sigma_mps2 * std::sqrt(way_m / parameters_->unknown_grade_m));
+  }
+}
+
 void Estimator::use_acceleration(double accel_mps2, int64_t stamp_ns) {
   auto& imu = watched(Source::imu);
   const bool stuck =
@@ -317,7 +333,8 @@ void Estimator::use_acceleration(double accel_mps2, int64_t stamp_ns) {
     imu.agreed = 0;
     return;
   }
-  const double grade = path_ ? path_->at(filter_.path_distance_m()).grade : 0.0;
+  doubt_grade();
+  const double grade = grade_known_ ? path_->at(filter_.path_distance_m()).grade : 0.0;
   const double force_mps2 = accel_mps2 - core::kGravityMps2 * grade / std::hypot(1.0, grade);
   const double sigma_mps2 = parameters_->accel_sigma_mps2;
   if (imu.convicted) {

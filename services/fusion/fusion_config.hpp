@@ -72,7 +72,8 @@ struct FusionConfig {
     f.number("accel_bias_sigma_mps2", p.accel_bias_sigma_mps2, {0.001, 5}, "m/s^2",
              "Accelerometer bias with the mount's tilt (1 degree is 0.17).");
     f.number("accel_bias_walk", p.accel_bias_walk, {0, 1}, "m/s^2/sqrt(s)", "How fast the bias may wander.");
-    f.number("unknown_grade", p.unknown_grade, {0, 0.1}, "", "Grade to be expected where there is no map.");
+    f.number("unknown_grade", p.unknown_grade, {0, 0.1}, "", "Grade to be expected where no map tells it ...");
+    f.number("unknown_grade_m", p.unknown_grade_m, {10, 1e5}, "m", "... and the way over which it becomes another one.");
     f.number("gyro_period_s", p.gyro_period_s, {0.1, 10}, "s",
              "Turning is compared with the map's curvature as a mean over this time.");
     f.number("gyro_sigma_rps", p.gyro_sigma_rps, {1e-5, 1}, "rad/s", "Noise of such a mean, with the body's motion.");

@@ -36,7 +36,8 @@ struct FusionParameters {
   double accel_sigma_mps2 = 0.15;
   double accel_bias_sigma_mps2 = 0.15;
   double accel_bias_walk = 0.003;  // m/s^2 per square root of a second
-  double unknown_grade = 0.03;     // grade that must be expected where there is no map
+  double unknown_grade = 0.03;     // grade that must be expected where no map tells it ...
+  double unknown_grade_m = 500.0;  // ... and the way over which it becomes another one
 
   double gyro_period_s = 1.0;     // of yaw rate against the map's curvature
   double gyro_sigma_rps = 0.004;  // of its mean, with the car body's own turning

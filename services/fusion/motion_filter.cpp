@@ -32,7 +32,7 @@ MotionFilter::MotionFilter(const FusionParameters& parameters, const OdometerSca
   StateVector sigma(kCore);
   sigma << 0.0, 0.0, origin_known ? parameters.start_sigma_m : kUnknownPositionM, kUnknownSpeedMps,
       parameters.acceleration_sigma_mps2,
-      std::hypot(parameters.accel_bias_sigma_mps2, origin_known ? 0.0 : 9.81 * parameters.unknown_grade),
+      parameters.accel_bias_sigma_mps2,
       scales.camera_sigma, scales.wheel_sigma, kUnknownPositionM, 0.01, parameters.shape_error_sigma_m, 1.0;
   ud_ = estimation::UdFilter(StateVector(sigma.cwiseAbs2()));
 }
@@ -257,6 +257,10 @@ void MotionFilter::restart_wheel(double wheel_m, double sigma_m) {
 
 void MotionFilter::doubt_wheel(double sigma_m) {
   ud_.inflate(index(StateIndex::wheel_odometer), squared(sigma_m));
+}
+
+void MotionFilter::doubt_accel_bias(double sigma_mps2) {
+  ud_.inflate(index(StateIndex::accel_bias), squared(sigma_mps2));
 }
 
 void MotionFilter::loosen_origin(double sigma_m) {

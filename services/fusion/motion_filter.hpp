@@ -92,6 +92,8 @@ class MotionFilter {
   void restart_wheel(double wheel_m, double sigma_m);
   /// The wheel may have counted so much too much or too little.
   void doubt_wheel(double sigma_m);
+  /// The accelerometer's bias may have become another one by sigma.
+  void doubt_accel_bias(double sigma_mps2);
   /// The place is not where it was thought: the origin becomes unknown within sigma and the next fix decides.
   void loosen_origin(double sigma_m);
   /// What a false fix taught of the scale of both odometers is forgotten.

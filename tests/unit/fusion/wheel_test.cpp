@@ -25,21 +25,26 @@ class Train {
     map->edges.push_back({1, "line", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{20000, 0, 0}})});
     map->nodes = {{1, track::NodeKind::end, "", 0, 0}, {2, track::NodeKind::end, "", 0, 20000}};
     fusion_.emplace(
-        core::value_or_throw(Fusion::create({}, map, track::EdgePosition{1, 1000, track::Direction::forward})));
+        core::value_or_throw(Fusion::create({}, map, track::EdgePosition{1, kStartM, track::Direction::forward})));
   }
 
   bool camera = true;  // false: there is none, or it is silent
   bool blind = false;  // it says that it sees nothing
   bool wheel = true;   // its samples arrive
   bool imu = true;
-  double slip = 0;     // share that the wheel counts too much
-  double stray = 0;    // ... and the camera
-  double noise_m = 0;  // of the wheel's readings
+  double slip = 0;       // share that the wheel counts too much
+  double stray = 0;      // ... and the camera
+  double noise_m = 0;    // of the wheel's readings
+  double bias_mps2 = 0;  // of the accelerometer
   double speed_mps = 0;
   double way_m = 0;
   double worst_error_m = 0;  // since it was set to 0 last
   void leap(int64_t pulses) { wheel_m_ += static_cast<double>(pulses) / 90; }
   std::optional<TrainEstimate> state;
+  void pass_landmark() {
+    const auto forward = track::Direction::forward;
+    fusion_->add(FixInput{now(), 1, kStartM + way_m, 0.1, 0.9999, ++landmarks_, FixKind::landmark, forward, nullptr});
+  }
 
   /// Runs so long with this acceleration; every state must hold the train.
   void run(double time_s, double acceleration_mps2 = 0) {
@@ -49,7 +54,7 @@ class Train {
       way_m += step_m;
       wheel_m_ += step_m * (1 + slip);
       ++ticks_;
-      if (imu) see(fusion_->add(ImuInput{now(), acceleration_mps2 + 0.05 * random_.normal(), 0}));
+      if (imu) see(fusion_->add(ImuInput{now(), acceleration_mps2 + bias_mps2 + 0.05 * random_.normal(), 0}));
       const double reading_m = wheel_m_ + noise_m * random_.normal();
       if (wheel) see(fusion_->add(WheelInput{now(), static_cast<int64_t>(std::floor(reading_m * 90)), 90}));
       if (camera)
@@ -72,6 +77,8 @@ class Train {
 
   core::Random random_{7};
   std::optional<Fusion> fusion_;
+  static constexpr double kStartM = 1000;
+  uint32_t landmarks_ = 0;
   int64_t ticks_ = 0;
   double wheel_m_ = 0;
 };
@@ -103,6 +110,28 @@ TEST(Wheel, ReadingsThatScatterMoveNothingWhileTheCameraIsBlind) {
   EXPECT_LT(train.worst_error_m, 1.5);
   EXPECT_EQ(train.state->integrity, Integrity::degraded);
   EXPECT_THAT(train.state->reason, HasSubstr("wheel"));
+}
+
+// Whoever is right when the camera is back from a tunnel, it is not the wheel that it had found to slip.
+TEST(Wheel, ThatTheCameraHadFoundOutDoesNotReplaceIt) {
+  for (const double bias_mps2 : {-0.8, -0.6, -0.4, -0.3, -0.2, 0.2, 0.3, 0.4, 0.6, 0.8}) {
+    for (const double slip : {-0.4, 0.4}) {
+      SCOPED_TRACE(testing::Message() << "bias " << bias_mps2 << ", slip " << slip);
+      Train train;
+      train.run(60, 0.25);
+      train.slip = slip;
+      train.run(20);
+      train.bias_mps2 = bias_mps2;
+      train.blind = true;
+      train.run(12);
+      train.blind = false;
+      train.run(20);
+      for (int i = 0; i < 3; ++i) {
+        train.pass_landmark();
+        train.run(20);
+      }
+    }
+  }
 }
 
 TEST(Wheel, WhatItCountedWhileItWasSilentIsNotBelieved) {
