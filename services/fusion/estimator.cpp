@@ -90,6 +90,10 @@ bool Estimator::knows_motion() const {
          (lately && used_within(Source::imu, kLatelyS));
 }
 
+bool Estimator::bridges() const {
+  return used_within(Source::imu, kLatelyS) && !measures(Source::camera) && !measures(Source::wheel);
+}
+
 // A sample that comes out of rhythm may have another clock behind it: then what was predicted by time alone is in doubt
 // by as much, and the sample itself says how far the train ran.
 void Estimator::doubt_time(const SensorWatch& watch, Rhythm& rhythm, int64_t stamp_ns) {

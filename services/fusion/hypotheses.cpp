@@ -57,7 +57,7 @@ void Hypotheses::apply(const Event& event) {
   for (auto& rival : rivals_) {
     if (rival.estimator && rival.without != source) rival.estimator->apply(event);
   }
-  if (source == Source::camera || source == Source::wheel) {
+  if (source == Source::camera || source == Source::wheel || (source == Source::imu && main_.bridges())) {
     exclude_faulty();
     ask_rivals();
   }

@@ -114,6 +114,9 @@ void Hypotheses::ask(Rival& rival) {
 }
 
 bool Hypotheses::can_say(const Rival& rival) const {
+  // What the train may do while the IMU alone measures is known without it, too.
+  if (rival.without == Source::imu && rival.estimator && main_.bridges())
+    return rival.estimator->is_consistent(main_.isolated());
   return rival.estimator && main_.watch(rival.without).used_ns != 0 && rival.estimator->knows_motion() &&
          !contradicts_itself(rival);
 }
