@@ -90,8 +90,8 @@ bool Estimator::knows_motion() const {
          (lately && used_within(Source::imu, kLatelyS));
 }
 
-bool Estimator::bridges() const {
-  return used_within(Source::imu, kLatelyS) && !measures(Source::camera) && !measures(Source::wheel);
+bool Estimator::in_the_dark() const {
+  return !measures(Source::camera) && !measures(Source::wheel);
 }
 
 // A sample that comes out of rhythm may have another clock behind it: then what was predicted by time alone is in doubt

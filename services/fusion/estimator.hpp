@@ -79,8 +79,8 @@ class Estimator {
   [[nodiscard]] double distance_m() const { return filter_.value(StateIndex::distance); }
   /// Camera or wheel measured lately and was believed, or the IMU bridges a short while without them.
   [[nodiscard]] bool knows_motion() const;
-  /// The IMU alone measures the motion.
-  [[nodiscard]] bool bridges() const;
+  /// No odometer has measured in the last moments: the IMU alone is left, at best.
+  [[nodiscard]] bool in_the_dark() const;
   /// No motion sensor is isolated but those of `excepted` (bits 1 << Source).
   [[nodiscard]] bool is_consistent(uint32_t excepted = 0) const;
   /// Motion sensors that are isolated, a bit each.

@@ -338,10 +338,9 @@ void Estimator::use_acceleration(double accel_mps2, int64_t stamp_ns) {
   const double force_mps2 = accel_mps2 - core::kGravityMps2 * grade / std::hypot(1.0, grade);
   const double sigma_mps2 = parameters_->accel_sigma_mps2;
   // Nobody could contradict it in the dark: with whom it did not agree before is asked for longer.
-  const bool in_the_dark = !used_within(Source::camera, kLatelyS) && !used_within(Source::wheel, kLatelyS);
-  imu.convicted = imu.convicted || (imu.isolated && in_the_dark);
+  imu.convicted = imu.convicted || (imu.isolated && in_the_dark());
   if (imu.convicted) {
-    if (in_the_dark) return;
+    if (in_the_dark()) return;
     MotionFilter trial = filter_;
     imu.hear(trial.offer_acceleration(force_mps2, sigma_mps2, parameters_->gate_imu).used, kAgreementsOfImu, stamp_ns);
     return;

@@ -57,7 +57,7 @@ void Hypotheses::apply(const Event& event) {
   for (auto& rival : rivals_) {
     if (rival.estimator && rival.without != source) rival.estimator->apply(event);
   }
-  if (source == Source::camera || source == Source::wheel || (source == Source::imu && main_.bridges())) {
+  if (source == Source::camera || source == Source::wheel || (source == Source::imu && main_.in_the_dark())) {
     exclude_faulty();
     ask_rivals();
   }

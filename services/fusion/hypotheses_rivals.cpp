@@ -114,8 +114,8 @@ void Hypotheses::ask(Rival& rival) {
 }
 
 bool Hypotheses::can_say(const Rival& rival) const {
-  // What the train may do while the IMU alone measures is known without it, too.
-  if (rival.without == Source::imu && rival.estimator && main_.bridges())
+  // Nobody watches an IMU in the dark: what the train may do is known without it, too.
+  if (rival.without == Source::imu && rival.estimator && main_.in_the_dark())
     return rival.estimator->is_consistent(main_.isolated());
   return rival.estimator && main_.watch(rival.without).used_ns != 0 && rival.estimator->knows_motion() &&
          !contradicts_itself(rival);

@@ -29,7 +29,8 @@ bool SuddenChange::called(Source source, int64_t stamp_ns, bool forward) {
     if (works && lately(other.called_ns, stamp_ns, kCallS) && other.forward == forward) return true;
     alone = alone && !lately(other.agreed_ns, stamp_ns, kCallS);
   }
-  return alone;
+  // An accelerometer alone may throw outliers: an odometer's way is what a change leaves behind.
+  return alone && source != Source::imu;
 }
 
 double SuddenChange::since_s(int64_t stamp_ns) const {

@@ -32,8 +32,8 @@ std::shared_ptr<const track::Map> line_with_a_rise() {
 
 struct Ride {
   double error_in_the_dark_m = 0;
-  double interval_before_m = 0;
-  double grown_m = 0;  // the interval, in the dark
+  double sigma_before_m = 0;
+  double grown_m = 0;  // sigma, in the dark; the interval holds the train without IMU, too
   std::string reason;  // once the camera is back
 };
 
@@ -56,11 +56,11 @@ Ride ride_over_the_rise(const std::shared_ptr<const track::Map>& map) {
     const double error_m = state->distance_m - way_m;
     EXPECT_LT(error_m, state->over_m) << t_s << " s: " << state->reason;
     EXPECT_LT(-error_m, state->under_m) << t_s << " s: " << state->reason;
-    const double interval_m = state->over_m + state->under_m;
-    if (t_s <= kBlindFromS) ride.interval_before_m = interval_m;
+    const double sigma_m = state->sigma_m;
+    if (t_s <= kBlindFromS) ride.sigma_before_m = sigma_m;
     if (blind) {
       ride.error_in_the_dark_m = std::max(ride.error_in_the_dark_m, std::abs(error_m));
-      ride.grown_m = interval_m - ride.interval_before_m;
+      ride.grown_m = sigma_m - ride.sigma_before_m;
     }
     ride.reason = state->reason;
   }
