@@ -32,20 +32,18 @@ core::Status check_position_packet(uint32_t nid_packet) {
 }
 
 /// Lengths of packets 4 (M_ERROR), 5 (NID_OPERATIONAL) and 44 (at least NID_XUSER); 4 and 5 may come once.
-core::Status check_other_packet(uint32_t nid_packet, size_t content_bits, const std::vector<OtherPacket>& before) {
+core::Status check_other_packet(uint32_t nid_packet, size_t packet_bits, const std::vector<OtherPacket>& before) {
   const std::string packet = "Packet " + number(nid_packet);
   if (nid_packet != 4 && nid_packet != 5 && nid_packet != 44) {
     return core::Error{packet +
                        " does not belong in message 136: after the position only packets 4, 5 and 44 may follow."};
   }
-  const size_t least = nid_packet == 4 ? 8 : nid_packet == 5 ? 32 : 9;
-  if (nid_packet == 44 ? content_bits < least : content_bits != least) {
-    return core::Error{"L_PACKET of packet " + number(nid_packet) + " is " + number(content_bits + kPacketHeadBits) +
-                       " bits, but must be " + (nid_packet == 44 ? "at least " : "") + number(least + kPacketHeadBits) +
-                       "."};
+  const size_t least = kPacketHeadBits + (nid_packet == 4 ? 8 : nid_packet == 5 ? 32 : 9);
+  if (nid_packet == 44 ? packet_bits < least : packet_bits != least) {
+    return core::Error{"L_PACKET of packet " + number(nid_packet) + " is " + number(packet_bits) +
+                       " bits, but must be " + (nid_packet == 44 ? "at least " : "") + number(least) + "."};
   }
-  if (content_bits + kPacketHeadBits > kLPacket.limit())
-    return core::Error{packet + " is longer than L_PACKET can say."};
+  if (packet_bits > kLPacket.limit()) return core::Error{packet + " is longer than L_PACKET can say."};
   for (const auto& other : before) {
     if (nid_packet != 44 && other.nid_packet == nid_packet) return core::Error{packet + " comes twice."};
   }
@@ -55,10 +53,11 @@ core::Status check_other_packet(uint32_t nid_packet, size_t content_bits, const 
 core::Status write_other_packets(const std::vector<OtherPacket>& packets, BitWriter& bits) {
   std::vector<OtherPacket> before;
   for (const auto& packet : packets) {
-    const auto status = check_other_packet(packet.nid_packet, packet.content.size(), before);
+    const size_t packet_bits = kPacketHeadBits + packet.content.size();
+    const auto status = check_other_packet(packet.nid_packet, packet_bits, before);
     if (!status.ok()) return status;
     bits.write(packet.nid_packet, kNidPacket.bits);
-    bits.write(static_cast<uint32_t>(packet.content.size()) + kPacketHeadBits, kLPacket.bits);
+    bits.write(static_cast<uint32_t>(packet_bits), kLPacket.bits);
     for (const bool bit : packet.content) bits.write_bit(bit);
     before.push_back(packet);
   }
@@ -77,8 +76,8 @@ core::Status read_other_packet(BitReader& bits, std::vector<OtherPacket>& packet
   }
   reader.field(kLPacket, l_packet);
   if (!reader.status().ok()) return reader.status();
-  const size_t content_bits = l_packet < kPacketHeadBits ? 0 : l_packet - kPacketHeadBits;
-  if (auto status = check_other_packet(packet.nid_packet, content_bits, packets); !status.ok()) return status;
+  if (auto status = check_other_packet(packet.nid_packet, l_packet, packets); !status.ok()) return status;
+  const size_t content_bits = l_packet - kPacketHeadBits;
   if (content_bits > bits.left()) {
     return core::Error{"The message ends inside packet " + number(packet.nid_packet) + ": L_PACKET is " +
                        number(l_packet) + " bits, " + number(bits.left() + kPacketHeadBits) + " are there."};

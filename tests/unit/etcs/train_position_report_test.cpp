@@ -172,6 +172,21 @@ TEST(TrainPositionReport, ErrorsSayWhatIsWrong) {
   EXPECT_THAT(refusal(longer), HasSubstr("Packet 2 does not belong in message 136"));
 }
 
+TEST(TrainPositionReport, ALengthShorterThanThePacketsOwnHeadIsToldAsItIs) {
+  auto message = bytes_of(check_report());
+  message.resize(30);
+  set_bits(message, 8, 10, 30);
+  const auto with = [&](uint32_t nid_packet, uint32_t l_packet) {
+    set_bits(message, 188, 8, nid_packet);
+    set_bits(message, 196, 13, l_packet);
+    return refusal(message);
+  };
+  EXPECT_THAT(with(4, 5), HasSubstr("L_PACKET of packet 4 is 5 bits, but must be 29."));
+  EXPECT_THAT(with(5, 0), HasSubstr("L_PACKET of packet 5 is 0 bits, but must be 53."));
+  EXPECT_THAT(with(44, 20), HasSubstr("L_PACKET of packet 44 is 20 bits, but must be at least 30."));
+  EXPECT_THAT(with(44, 22), HasSubstr("L_PACKET of packet 44 is 22 bits, but must be at least 30."));
+}
+
 TEST(TrainPositionReport, OtherPacketsAreChecked) {
   auto report = check_report();
   report.other_packets = {{4, std::vector<bool>(8)}, {4, std::vector<bool>(8)}};
