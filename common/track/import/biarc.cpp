@@ -4,22 +4,13 @@
 #include <cmath>
 
 #include "core/units.hpp"
+#include "track/import/plane.hpp"
 
 namespace railfix::track {
 namespace {
 
 constexpr double kClosestPointsM = 2.0;
 constexpr double kSharpestPerM = 1.0 / 15.0;
-
-double heading_of(const Eigen::Vector2d& step) {
-  return std::atan2(step.x(), step.y());
-}
-Eigen::Vector2d direction(double heading_rad) {
-  return {std::sin(heading_rad), std::cos(heading_rad)};
-}
-double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-  return a.x() * b.y() - a.y() * b.x();
-}
 
 struct Arc {
   Element element;
@@ -99,11 +90,11 @@ class Fitter {
     const double turn_in = std::abs(core::wrap_pi(chord - tangents_[i]));
     const double turn_out = std::abs(core::wrap_pi(tangents_[i + 1] - chord));
     if (std::max(turn_in, turn_out) < core::kPi / 2.5) {
-      const Eigen::Vector2d t0 = direction(tangents_[i]);
-      const Eigen::Vector2d middle = meeting_point(from, t0, to, direction(tangents_[i + 1]));
+      const Eigen::Vector2d t0 = direction_of(tangents_[i]);
+      const Eigen::Vector2d middle = meeting_point(from, t0, to, direction_of(tangents_[i + 1]));
       const Arc first = arc_to(from, t0, middle);
       const PlanPose half = advance(first.start, first.element, first.element.length_m);
-      const Arc second = arc_to(middle, direction(half.heading_rad), to);
+      const Arc second = arc_to(middle, direction_of(half.heading_rad), to);
       const double sharpest =
           std::max(std::abs(first.element.curvature_start_per_m), std::abs(second.element.curvature_start_per_m));
       if (sharpest < kSharpestPerM && first.element.length_m > 1e-3 && second.element.length_m > 1e-3) {
@@ -113,7 +104,7 @@ class Fitter {
       }
     }
     ++out.straightened;
-    take(arc_to(from, direction(chord), to), from, to, out);
+    take(arc_to(from, direction_of(chord), to), from, to, out);
   }
 
   void take(const Arc& arc, const Eigen::Vector2d& from, const Eigen::Vector2d& to, PolylineFit& out) {

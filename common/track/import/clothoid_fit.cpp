@@ -8,6 +8,7 @@
 
 #include "core/units.hpp"
 #include "track/import/curvature_profile.hpp"
+#include "track/import/plane.hpp"
 
 namespace railfix::track {
 namespace {
@@ -212,7 +213,7 @@ bool bows_out(const Alignment& track, const std::vector<Eigen::Vector2d>& points
     if (i == 0 || i + 1 >= points.size()) return 0.0;
     const Eigen::Vector2d before = points[i] - points[i - 1];
     const Eigen::Vector2d after = points[i + 1] - points[i];
-    return std::abs(core::wrap_pi(std::atan2(after.x(), after.y()) - std::atan2(before.x(), before.y())));
+    return std::abs(core::wrap_pi(heading_of(after) - heading_of(before)));
   };
   const std::vector<double> stations = stations_of(track, points);
   for (size_t i = 0; i + 1 < points.size(); ++i) {

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/units.hpp"
+#include "track/import/plane.hpp"
 
 namespace railfix::track {
 namespace {
@@ -17,10 +18,6 @@ constexpr double kDoneSigmas = 1e-3;  // of the largest change
 constexpr double kSlopeSigma = 1e-4;  // change of the curvature's rate at a knot, per metre squared
 constexpr int kSteps = 6;
 constexpr double kWald = 25.0;  // five sigma: chosen on made-up lines
-
-double heading_of(const Eigen::Vector2d& step) {
-  return std::atan2(step.x(), step.y());
-}
 
 /// Knots on the chords, curvature from the turn at every point.
 CurvatureProfile first_guess(const CurvatureTarget& target) {
@@ -115,7 +112,7 @@ class Problem {
     for (size_t k = 1; k < target_.points.size(); ++k) {
       const PlanPose pose = track.at(stations[k]).pose;
       const Eigen::Vector2d here(pose.easting_m, pose.northing_m);
-      const Eigen::Vector2d along(std::sin(pose.heading_rad), std::cos(pose.heading_rad));
+      const Eigen::Vector2d along = direction_of(pose.heading_rad);
       row.setZero();
       row[0] = (here - knots[0]).dot(along);
       for (size_t i = 0; i < knots.size() && profile_.at_m[i] < stations[k]; ++i)

@@ -5,6 +5,7 @@
 #include "core/units.hpp"
 #include "track/import/biarc.hpp"
 #include "track/import/clothoid_fit.hpp"
+#include "track/import/plane.hpp"
 
 namespace railfix::track {
 namespace {
@@ -80,7 +81,7 @@ PlanPose pose_beside(const Points& points, size_t at, const ClothoidFitOptions& 
       fit_clothoids(near, {.heading_at_start = {}, .heading_at_end = {}, .usual_sigma_m = options.usual_sigma_m});
   if (fit) return fit->alignment.at(fit->alignment.nearest(middle->x(), middle->y()).offset_m).pose;
   const Eigen::Vector2d along = *(middle + 1) - *(middle - 1);
-  return {middle->x(), middle->y(), std::atan2(along.x(), along.y())};
+  return {middle->x(), middle->y(), heading_of(along)};
 }
 
 void append(const Alignment& part, std::vector<Element>& elements, std::vector<PlanPose>& starts) {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/units.hpp"
+#include "track/import/plane.hpp"
 
 namespace railfix::track {
 namespace {
@@ -21,9 +22,6 @@ constexpr std::array<Terrain, 3> kTerrains{
 
 Eigen::Vector2d place_of(const PlanPose& pose) {
   return {pose.easting_m, pose.northing_m};
-}
-Eigen::Vector2d direction(double heading_rad) {
-  return {std::sin(heading_rad), std::cos(heading_rad)};
 }
 
 /// The way out of a junction: nothing, or the arc of a turnout.
@@ -54,7 +52,7 @@ class LineMaker {
     if (junction.lines[side].front() == index) return out;
     // A branch leaves towards the junction at its other end.
     const Eigen::Vector2d away = place_of(junctions_[line_.junctions[1 - end]].middle) - place_of(junction.middle);
-    const Eigen::Vector2d ahead = direction(out.start.heading_rad);
+    const Eigen::Vector2d ahead = direction_of(out.start.heading_rad);
     const double side_of = std::copysign(1.0, ahead.x() * away.y() - ahead.y() * away.x());
     out.elements = {{kBranchRadiusM * kBranchTurnRad, side_of / kBranchRadiusM, side_of / kBranchRadiusM}};
     out.end = advance(out.start, out.elements[0], out.elements[0].length_m);
@@ -66,8 +64,8 @@ class LineMaker {
     end_ = place_of(ways_[1].end);
     const double first = std::min(random_.uniform(1200, 2400), 0.15 * spacing_m_);
     const double last = std::min(random_.uniform(1200, 2400), 0.15 * spacing_m_);
-    const Eigen::Vector2d from = begin_ + first * direction(ways_[0].end.heading_rad);
-    const Eigen::Vector2d to = end_ + last * direction(ways_[1].end.heading_rad);
+    const Eigen::Vector2d from = begin_ + first * direction_of(ways_[0].end.heading_rad);
+    const Eigen::Vector2d to = end_ + last * direction_of(ways_[1].end.heading_rad);
     const Eigen::Vector2d way = to - from;
     const Eigen::Vector2d left = Eigen::Vector2d(-way.y(), way.x()).normalized();
     const auto legs = std::max<size_t>(2, static_cast<size_t>(way.norm() / line_.terrain.leg_m));

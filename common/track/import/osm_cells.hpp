@@ -16,11 +16,6 @@ void for_cells(const Eigen::Vector2d& low, const Eigen::Vector2d& high, const Us
   }
 }
 
-/// Positive where b is to the left of a.
-inline double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-  return a.x() * b.y() - a.y() * b.x();
-}
-
 constexpr double kLongestSegmentM = 5000;  // of a drawn line; longer ones are mistakes
 
 }  // namespace railfix::track

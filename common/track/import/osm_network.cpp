@@ -9,6 +9,7 @@
 #include "track/import/osm_node_marks.hpp"
 #include "track/import/osm_overbridges.hpp"
 #include "track/import/osm_trackside.hpp"
+#include "track/import/plane.hpp"
 #include "track/import/smooth.hpp"
 
 namespace railfix::track {
@@ -18,10 +19,6 @@ constexpr size_t kPointsForSigma = 12;
 constexpr double kLeastUsualSigmaM = 0.05;
 constexpr double kSharpestTurnRad = core::kPi / 3.0;
 constexpr double kTangentBranchRad = core::kPi / 6.0;
-
-double heading_of(const Eigen::Vector2d& step) {
-  return std::atan2(step.x(), step.y());
-}
 
 struct Segment {
   int64_t a = 0;

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "track/import/osm_cells.hpp"
+#include "track/import/plane.hpp"
 
 namespace railfix::track {
 namespace {

@@ -13,8 +13,6 @@
 namespace railfix::track {
 namespace {
 
-constexpr std::array kMast{"power", "catenary_mast"};
-
 /// A text of a PBF file can hold a zero byte, behind which osmium's own iterator misses the end of the list.
 std::vector<const char*> texts_of(const osmium::TagList& list) {
   std::vector<const char*> texts;
@@ -131,7 +129,7 @@ bool is_platform_relation(const OsmTags& tags, bool with_trams) {
 }
 
 bool is_mast(const OsmTags& tags) {
-  return value_of(tags, kMast[0]) == kMast[1];
+  return value_of(tags, "power") == "catenary_mast";
 }
 
 bool is_outline(const std::string& role) {

@@ -7,6 +7,7 @@
 
 #include "track/import/osm_cells.hpp"
 #include "track/import/osm_overbridges.hpp"
+#include "track/import/plane.hpp"
 
 namespace railfix::track {
 namespace {

@@ -4,19 +4,13 @@
 #include <cmath>
 
 #include "core/units.hpp"
+#include "track/import/plane.hpp"
 
 namespace railfix::track {
 namespace {
 
 constexpr double kShareOfTangent = 0.45;
 constexpr double kLeastTurnRad = 1e-6;
-
-double heading_of(const Eigen::Vector2d& step) {
-  return std::atan2(step.x(), step.y());
-}
-Eigen::Vector2d direction(double heading_rad) {
-  return {std::sin(heading_rad), std::cos(heading_rad)};
-}
 
 /// Clothoid, arc, clothoid for one corner, and how far along the tangents it begins and ends.
 struct Curve {
@@ -86,7 +80,7 @@ std::vector<Corner> parallel_corners(const Eigen::Vector2d& begin, const std::ve
     const Eigen::Vector2d& at = corners[i].at;
     const double in = heading_of(at - (i == 0 ? begin : corners[i - 1].at));
     const double turn = core::wrap_pi(heading_of((i + 1 == corners.size() ? end : corners[i + 1].at) - at) - in);
-    const Eigen::Vector2d left = direction(in + 0.5 * turn - 0.5 * core::kPi);
+    const Eigen::Vector2d left = direction_of(in + 0.5 * turn - 0.5 * core::kPi);
     out[i].at += left_m / std::cos(0.5 * turn) * left;
     out[i].radius_m += turn > 0 ? left_m : -left_m;  // a right curve is outside on the left
   }
