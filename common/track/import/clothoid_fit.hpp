@@ -1,8 +1,8 @@
 // Straights, clothoids and arcs through noisy points: curvature is piecewise linear, with as few pieces as the points
 // justify.
 //
-// 1. Curvature at a knot per point (20 m or more apart), by least squares on the distances of the points from the
-//    track, with a weak prior on how fast curvature may change.
+// 1. Curvature at a knot per point (15 m or more apart, half of that at the end; more where points are far apart), by
+//    least squares on the distances of the points from the track, with a weak prior on how fast curvature may change.
 // 2. Knots that a Wald test does not need go one after the other; neighbours that are not different become one arc,
 //    curvatures that are not different from zero a straight (general least squares with linear restrictions).
 // 3. Curvatures and the places where pieces meet, by least squares once more (Levenberg, Marquardt).

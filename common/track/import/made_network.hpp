@@ -16,8 +16,8 @@ struct MadeNetworkOptions {
 
 /// Lines of plain, hills and mountains (R 250-4000 m with clothoids, cant, grades), half of them of two tracks; a
 /// station every few kilometres with loops, crossovers and platforms; junctions where lines branch off; tunnels,
-/// bridges, level crossings; a group of two balises about every 1.4 km of main track; frogs. True to scale, with
-/// local coordinates in EPSG:2056 (so that it has latitudes and longitudes).
+/// bridges; a group of two balises about every 1.4 km of main track; frogs. True to scale, with local coordinates in
+/// EPSG:32632 (so that it has latitudes and longitudes).
 /// Tracks are called L<line> (main), L<line>b (second), S<station>... and J<junction>.
 Map made_network(const MadeNetworkOptions& options);
 
