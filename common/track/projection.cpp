@@ -6,6 +6,42 @@
 #include <cmath>
 
 namespace railfix::track {
+namespace {
+
+using Owned = std::unique_ptr<PJ, decltype(&proj_destroy)>;
+
+/// The plane's own system: without heights, and without what leads from it to another datum.
+Owned horizontal(PJ_CONTEXT* context, const char* crs) {
+  Owned system(proj_create(context, crs), &proj_destroy);
+  while (system) {
+    const PJ_TYPE type = proj_get_type(system.get());
+    if (type == PJ_TYPE_BOUND_CRS) {
+      system.reset(proj_get_source_crs(context, system.get()));
+    } else if (type == PJ_TYPE_COMPOUND_CRS) {
+      system.reset(proj_crs_get_sub_crs(context, system.get(), 0));
+    } else {
+      break;
+    }
+  }
+  return system;
+}
+
+bool is_plane_in_metres(PJ_CONTEXT* context, const char* crs) {
+  const Owned system = horizontal(context, crs);
+  if (!system || proj_get_type(system.get()) != PJ_TYPE_PROJECTED_CRS) return false;
+  const Owned axes(proj_crs_get_coordinate_system(context, system.get()), &proj_destroy);
+  if (!axes) return false;
+  for (const int axis : {0, 1}) {
+    double metres = 0;
+    if (proj_cs_get_axis_info(context, axes.get(), axis, nullptr, nullptr, nullptr, &metres, nullptr, nullptr,
+                              nullptr) == 0)
+      return false;
+    if (metres != 1.0) return false;
+  }
+  return true;
+}
+
+}  // namespace
 
 struct Projection::Handle {
   PJ_CONTEXT* context = proj_context_create();
@@ -24,10 +60,7 @@ core::Result<Projection> Projection::open(const std::string& crs) {
   auto handle = std::make_shared<Handle>();
   const core::Error unknown{"\"" + crs +
                             "\" is not a coordinate system in metres that PROJ knows; give one such as EPSG:2056"};
-  PJ* system = proj_create(handle->context, crs.c_str());
-  const PJ_TYPE type = system != nullptr ? proj_get_type(system) : PJ_TYPE_UNKNOWN;
-  proj_destroy(system);
-  if (type != PJ_TYPE_PROJECTED_CRS && type != PJ_TYPE_COMPOUND_CRS && type != PJ_TYPE_BOUND_CRS) return unknown;
+  if (!is_plane_in_metres(handle->context, crs.c_str())) return unknown;
   PJ* raw = proj_create_crs_to_crs(handle->context, "EPSG:4326", crs.c_str(), nullptr);
   if (raw == nullptr) return unknown;
   // Easting before northing and longitude before latitude, whatever order the authority of the system wrote down.

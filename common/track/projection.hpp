@@ -18,7 +18,7 @@ struct GeoPoint {
 /// One PROJ context of its own: many may run in as many threads, one must stay in one thread at a time.
 class Projection {
  public:
-  /// crs as PROJ knows it ("EPSG:2056"); must be a projected one in metres.
+  /// crs as PROJ knows it ("EPSG:2056"); must be a projected one in metres, or one whose plane is that.
   static core::Result<Projection> open(const std::string& crs);
 
   /// Nothing where the projection is not defined.
