@@ -39,14 +39,18 @@ const Projection* projection_for(const std::string& crs) {
   return cached.projection.get();
 }
 
-/// A line that was cut at switches is called NAME, NAME#2, ...: counts on over its pieces.
+/// A line that was cut at switches is called NAME, NAME#2, ...: counts on over its pieces, which need not follow one
+/// another in the map, as far as each begins where the last one ends.
 const Edge* piece_at(const Map& map, const Edge& first, double& offset_m) {
   const Edge* piece = &first;
   for (int number = 2; offset_m > piece->alignment.length_m(); ++number) {
-    const Edge* next = map.edge(piece->id + 1);
-    if (next == nullptr || next->name != first.name + "#" + std::to_string(number)) break;
+    const std::string name = first.name + "#" + std::to_string(number);
+    const auto next = std::find_if(map.edges.begin(), map.edges.end(), [&](const Edge& edge) {
+      return edge.from_node == piece->to_node && edge.name == name;
+    });
+    if (next == map.edges.end()) break;
     offset_m -= piece->alignment.length_m();
-    piece = next;
+    piece = &*next;
   }
   return piece;
 }
@@ -61,6 +65,12 @@ std::optional<LandmarkKind> landmark_kind_from(const std::string& text) {
   const auto* const found = std::find(kLandmarkKinds.begin(), kLandmarkKinds.end(), text);
   if (found == kLandmarkKinds.end()) return std::nullopt;
   return static_cast<LandmarkKind>(found - kLandmarkKinds.begin());
+}
+
+LandmarkKind seen_along(LandmarkKind kind, bool forward) {
+  if (forward) return kind;
+  if (kind == LandmarkKind::portal_in) return LandmarkKind::portal_out;
+  return kind == LandmarkKind::portal_out ? LandmarkKind::portal_in : kind;
 }
 
 std::string to_string(NodeKind kind) {
@@ -122,11 +132,27 @@ core::Result<EdgePosition> Map::parse_position(const std::string& text) const {
 
 std::vector<const Landmark*> Map::landmarks_on(uint32_t edge_id) const {
   std::vector<const Landmark*> found;
-  for (const Landmark& candidate : landmarks) {
+  const auto take = [&](const Landmark& candidate) {
     if (candidate.edge == edge_id) found.push_back(&candidate);
+  };
+  if (by_edge_.all == landmarks.data() && by_edge_.count == landmarks.size()) {
+    if (edge_id < 1 || edge_id >= by_edge_.first.size()) return found;
+    for (uint32_t i = by_edge_.first[edge_id - 1]; i < by_edge_.first[edge_id]; ++i) take(landmarks[by_edge_.order[i]]);
+  } else {
+    for (const Landmark& candidate : landmarks) take(candidate);
   }
   std::stable_sort(found.begin(), found.end(), [](const auto* a, const auto* b) { return a->offset_m < b->offset_m; });
   return found;
+}
+
+void Map::index_landmarks() {
+  by_edge_ = {.all = landmarks.data(), .count = landmarks.size(), .first = {}, .order = {}};
+  by_edge_.first.assign(edges.size() + 1, 0);
+  for (const Landmark& landmark : landmarks) ++by_edge_.first[landmark.edge];
+  for (size_t i = 1; i < by_edge_.first.size(); ++i) by_edge_.first[i] += by_edge_.first[i - 1];
+  std::vector<uint32_t> next = by_edge_.first;
+  by_edge_.order.resize(landmarks.size());
+  for (uint32_t i = 0; i < landmarks.size(); ++i) by_edge_.order[next[landmarks[i].edge - 1]++] = i;
 }
 
 std::optional<GeoPoint> Map::to_geo(double easting_m, double northing_m) const {

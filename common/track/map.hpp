@@ -28,6 +28,8 @@ enum class LandmarkKind : uint8_t {
 /// "frog", "balise", "portal_in", ... as in the run tables; and back.
 std::string to_string(LandmarkKind kind);
 std::optional<LandmarkKind> landmark_kind_from(const std::string& text);
+/// As a train meets it that runs along growing offsets, or against them: a portal in is a portal out the other way.
+LandmarkKind seen_along(LandmarkKind kind, bool forward);
 /// Does a camera in the cab tell it? The other kinds are on the map for people, and no reference.
 constexpr bool can_be_sighted(LandmarkKind kind) {
   return kind >= LandmarkKind::frog && kind <= LandmarkKind::platform;
@@ -86,6 +88,8 @@ struct Landmark {
 };
 
 struct BaliseGroup {
+  static constexpr uint32_t kLastNidC = 1023;    // that ETCS can carry
+  static constexpr uint32_t kLastNidBg = 16382;  // 16383 means unknown
   uint32_t nid_c = 0;
   uint32_t nid_bg = 0;
   uint32_t edge = 0;
@@ -114,7 +118,7 @@ class Map {
   std::string source;
   std::string crs;          // for PROJ, empty = local metres
   std::vector<Edge> edges;  // edges[i].id == i + 1
-  std::vector<Node> nodes;
+  std::vector<Node> nodes;  // nodes[i].id == i + 1
   std::vector<Connection> connections;
   std::vector<Landmark> landmarks;  // landmarks[i].id == i + 1
   std::vector<BaliseGroup> balise_groups;
@@ -124,13 +128,25 @@ class Map {
   [[nodiscard]] const Edge* edge(uint32_t id) const;
   [[nodiscard]] const Landmark* landmark(uint32_t id) const;
   /// "EDGE:OFFSET[:+|-]", EDGE a number or a name. Behind a name the offset may run on over the line's next pieces,
-  /// which are called NAME#2, NAME#3, ... where switches cut it.
+  /// which are called NAME#2, NAME#3, ... where switches cut it, as far as each begins where the last one ends.
   [[nodiscard]] core::Result<EdgePosition> parse_position(const std::string& text) const;
-  /// Landmarks of one edge, by offset.
+  /// Landmarks of one edge, by offset. Looked up in a map as it was loaded, not in a copy or after landmarks came or
+  /// went: there all are gone through. REQUIRES: no landmark of a loaded map was put onto another edge.
   [[nodiscard]] std::vector<const Landmark*> landmarks_on(uint32_t edge) const;
   /// WGS 84 of a map coordinate; nothing without a crs.
   [[nodiscard]] std::optional<GeoPoint> to_geo(double easting_m, double northing_m) const;
   [[nodiscard]] std::optional<Eigen::Vector2d> from_geo(const GeoPoint& point) const;
+
+ private:
+  /// Which landmarks lie on which edge, as they were loaded.
+  struct LandmarksByEdge {
+    const Landmark* all = nullptr;  // another list than this one is not known
+    size_t count = 0;
+    std::vector<uint32_t> first;  // of every edge, in `order`; one more at the end
+    std::vector<uint32_t> order;  // places in `landmarks`
+  };
+  void index_landmarks();
+  LandmarksByEdge by_edge_;
 };
 
 }  // namespace railfix::track

@@ -86,13 +86,38 @@ core::Result<Edge> edge_from(const map::Edge& in) {
   return out;
 }
 
-/// Fills the map's lists from the message; the error says which element is wrong.
-core::Status read_edges(const map::Map& in, Map& out) {
+/// These fill the map's lists from the message; the error says which element is wrong.
+core::Status read_nodes(const map::Map& in, Map& out) {
   for (const map::Node& n : in.nodes()) {
+    if (n.id() != out.nodes.size() + 1) return core::Error{"its nodes are not numbered 1, 2, 3, ..."};
     if (!map::Node::Kind_IsValid(n.kind()))
       return core::Error{"node " + std::to_string(n.id()) + " is of an unknown kind"};
+    if (!finite({n.easting_m(), n.northing_m()}))
+      return core::Error{"node " + std::to_string(n.id()) + " has a coordinate that is not a number"};
     out.nodes.push_back({n.id(), static_cast<NodeKind>(n.kind()), n.name(), n.easting_m(), n.northing_m()});
   }
+  return {};
+}
+
+/// A map made by hand may leave its nodes out: they are the ends of its tracks.
+void add_missing_nodes(Map& map) {
+  if (!map.nodes.empty()) return;
+  const auto add = [&](uint32_t id, const PlanPose& pose) {
+    if (id > 2 * map.edges.size()) return;
+    while (map.nodes.size() < id) map.nodes.push_back({static_cast<uint32_t>(map.nodes.size() + 1), NodeKind::end, ""});
+    if (id > 0) map.nodes[id - 1] = {id, NodeKind::end, "", pose.easting_m, pose.northing_m};
+  };
+  for (const Edge& edge : map.edges) {
+    add(edge.from_node, edge.alignment.at(0).pose);
+    add(edge.to_node, edge.alignment.at(edge.alignment.length_m()).pose);
+  }
+}
+
+bool has_node(const Map& map, uint32_t id) {
+  return id >= 1 && id <= map.nodes.size();
+}
+
+core::Status read_edges(const map::Map& in, Map& out) {
   for (const map::Edge& e : in.edges()) {
     if (e.id() != out.edges.size() + 1) return core::Error{"its edges are not numbered 1, 2, 3, ..."};
     core::Result<Edge> edge = edge_from(e);
@@ -100,7 +125,18 @@ core::Status read_edges(const map::Map& in, Map& out) {
     out.edges.push_back(std::move(edge).value());
   }
   if (out.edges.empty()) return core::Error{"it holds no track"};
+  add_missing_nodes(out);
+  for (const Edge& edge : out.edges) {
+    if (!has_node(out, edge.from_node) || !has_node(out, edge.to_node))
+      return core::Error{"edge " + std::to_string(edge.id) + " begins or ends at a node that does not exist"};
+  }
+  return {};
+}
+
+core::Status read_connections(const map::Map& in, Map& out) {
   for (const map::Connection& c : in.connections()) {
+    if (!has_node(out, c.node()))
+      return core::Error{"a connection lies at node " + std::to_string(c.node()) + ", which does not exist"};
     if (out.edge(c.edge_a()) == nullptr || out.edge(c.edge_b()) == nullptr) {
       return core::Error{"a connection at node " + std::to_string(c.node()) + " names an edge that does not exist"};
     }
@@ -114,7 +150,7 @@ bool on_edge(const Map& map, uint32_t edge_id, double offset_m) {
   return edge != nullptr && offset_m >= -1e-3 && offset_m <= edge->alignment.length_m() + 1e-3;
 }
 
-core::Status read_marks(const map::Map& in, Map& out) {
+core::Status read_landmarks(const map::Map& in, Map& out) {
   for (const map::Landmark& l : in.landmarks()) {
     const std::string where = "landmark " + std::to_string(l.id());
     if (l.id() != out.landmarks.size() + 1) return core::Error{"its landmarks are not numbered 1, 2, 3, ..."};
@@ -125,10 +161,21 @@ core::Status read_marks(const map::Map& in, Map& out) {
     out.landmarks.push_back(
         {l.id(), static_cast<LandmarkKind>(l.kind()), l.edge(), l.offset_m(), l.lateral_m(), l.sigma_m(), l.name()});
   }
+  return {};
+}
+
+core::Status read_groups(const map::Map& in, Map& out) {
   for (const map::BaliseGroup& g : in.balise_groups()) {
     const std::string where = "balise group " + std::to_string(g.nid_c()) + "/" + std::to_string(g.nid_bg());
-    if (g.nid_c() > 1023 || g.nid_bg() > 16383) return core::Error{where + " has an identity that ETCS cannot carry"};
+    if (g.nid_c() > BaliseGroup::kLastNidC || g.nid_bg() > BaliseGroup::kLastNidBg)
+      return core::Error{where + " has an identity that ETCS cannot carry"};
     if (!on_edge(out, g.edge(), g.offset_m())) return core::Error{where + " is not on an edge"};
+    if (!std::isfinite(g.q_locacc_m()) || g.q_locacc_m() < 0)
+      return core::Error{where + " has a location accuracy that is not a length of 0 m or more"};
+    for (const uint32_t balise : g.balises()) {
+      if (balise != 0 && out.landmark(balise) == nullptr)
+        return core::Error{where + " names a balise that is not among the landmarks"};
+    }
     out.balise_groups.push_back({g.nid_c(),
                                  g.nid_bg(),
                                  g.edge(),
@@ -146,8 +193,10 @@ core::Status read_map(const map::Map& in, Map& out) {
   out.source = in.source();
   out.crs = in.crs();
   out.problems.assign(in.problems().begin(), in.problems().end());
-  core::Status status = read_edges(in, out);
-  return status.ok() ? read_marks(in, out) : status;
+  for (const auto& read : {read_nodes, read_edges, read_connections, read_landmarks, read_groups}) {
+    if (core::Status status = read(in, out); !status) return status;
+  }
+  return {};
 }
 
 /// Length of the UTF-8 character (RFC 3629) that begins there; 0 where none does.
@@ -271,6 +320,7 @@ core::Result<Map> Map::load(const std::filesystem::path& file) {
   if (const core::Status status = read_map(in, out); !status)
     return core::Error{file.string() + " is not a sound map: " + status.error().message +
                        "; build it again with `railfix map build`"};
+  out.index_landmarks();
   return out;
 }
 

@@ -128,12 +128,6 @@ void follow_on(Route& route, const Ways& ways, double near_m, double ahead_m, do
   }
 }
 
-LandmarkKind seen_along(LandmarkKind kind, bool forward) {
-  if (forward) return kind;
-  if (kind == LandmarkKind::portal_in) return LandmarkKind::portal_out;
-  return kind == LandmarkKind::portal_out ? LandmarkKind::portal_in : kind;
-}
-
 }  // namespace
 
 core::Result<Path> Path::follow(std::shared_ptr<const Map> map, const EdgePosition& start, double ahead_m,

@@ -40,13 +40,7 @@ double sighting_fits(const track::Map& map, const track::Route& route, const Sig
     if (leg.begin_m > seen_m + 5 * sigma_m || leg.end_m() < seen_m - 5 * sigma_m) continue;
     for (const auto* landmark : map.landmarks_on(leg.run.edge->id)) {
       const bool turned = !leg.run.forward;
-      auto kind = landmark->kind;
-      if (turned && kind == track::LandmarkKind::portal_in) {
-        kind = track::LandmarkKind::portal_out;
-      } else if (turned && kind == track::LandmarkKind::portal_out) {
-        kind = track::LandmarkKind::portal_in;
-      }
-      if (kind != sighting.kind) continue;
+      if (track::seen_along(landmark->kind, leg.run.forward) != sighting.kind) continue;
       const double at_m = leg.begin_m + (turned ? leg.run.length_m() - landmark->offset_m : landmark->offset_m);
       const double z = (at_m - seen_m) / sigma_m;
       const double lateral_m = turned ? -landmark->lateral_m : landmark->lateral_m;

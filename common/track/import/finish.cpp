@@ -12,7 +12,6 @@ namespace {
 constexpr double kGaugeM = 1.435;
 constexpr double kLongestSwitchM = 150.0;
 constexpr double kStepM = 0.5;
-constexpr uint32_t kLastBaliseGroup = 16382;  // 16383 means unknown
 
 /// An edge as seen when leaving a node.
 struct Branch {
@@ -93,7 +92,7 @@ void add_frogs(Map& map, double sigma_m) {
 
 core::Status add_virtual_balises(Map& map, double every_m, uint32_t nid_c, uint32_t first_nid_bg, double q_locacc_m) {
   if (!(every_m >= 1.0)) return core::Error{"virtual balise groups must be at least 1 m apart"};
-  if (nid_c > 1023) return core::Error{"NID_C must be between 0 and 1023"};
+  if (nid_c > BaliseGroup::kLastNidC) return core::Error{"NID_C must be between 0 and 1023"};
   // Numbers of this country that groups have already are left to them.
   std::set<uint32_t> taken;
   for (const BaliseGroup& group : map.balise_groups) {
@@ -105,7 +104,7 @@ core::Status add_virtual_balises(Map& map, double every_m, uint32_t nid_c, uint3
     const auto count = static_cast<uint32_t>(std::lround(length / every_m));
     for (uint32_t i = 0; i < count; ++i) {
       while (taken.contains(next)) ++next;
-      if (next > kLastBaliseGroup) {
+      if (next > BaliseGroup::kLastNidBg) {
         return core::Error{
             "there are no more numbers for virtual balise groups of this NID_C (16382 at most); place "
             "them farther apart"};

@@ -26,6 +26,24 @@ void load_20000_km(benchmark::State& state) {
 }
 BENCHMARK(load_20000_km)->Unit(benchmark::kMillisecond);
 
+// 300,000 masts: looked up in a map that was loaded (1), gone through in one that was made (0).
+void landmarks_on_an_edge(benchmark::State& state) {
+  static const auto made =
+      std::make_shared<const track::Map>(track::made_network({.track_km = 20000, .seed = 1, .mast_spacing_m = 65}));
+  std::shared_ptr<const track::Map> map = made;
+  if (state.range(0) == 1) {
+    const auto file = std::filesystem::temp_directory_path() / ("railfix_bench_" + std::to_string(::getpid()) + ".map");
+    core::ok_or_throw(made->save(file));
+    map = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(file)));
+    std::filesystem::remove(file);
+  }
+  core::Random random(1);
+  for (auto _ : state)
+    benchmark::DoNotOptimize(map->landmarks_on(1 + static_cast<uint32_t>(random.next() % map->edges.size())).data());
+  state.counters["landmarks"] = static_cast<double>(map->landmarks.size());
+}
+BENCHMARK(landmarks_on_an_edge)->Arg(0)->Arg(1)->Unit(benchmark::kMicrosecond);
+
 void make_track_finder(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(track::TrackFinder(network()));
 }

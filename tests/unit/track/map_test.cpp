@@ -3,7 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <fstream>
+#include <functional>
 #include <thread>
 
 #include "small_map.hpp"
@@ -106,6 +108,78 @@ TEST_F(MapFile, NamesWhatIsWrong) {
   EXPECT_FALSE(small_map().save(folder_ / "no" / "folder.map").ok());
 }
 
+// Whoever has a map relies on its references and identities.
+TEST_F(MapFile, RefusesWhatRefersToNothing) {
+  const auto message = [&](const std::function<void(Map&)>& spoil) {
+    Map map = small_map();
+    spoil(map);
+    const core::Status saved = map.save(file());
+    return saved.ok() ? std::string("was saved") : saved.error().message;
+  };
+  EXPECT_THAT(message([](Map& map) { map.balise_groups[0].nid_bg = 16383; }),  // means unknown
+              HasSubstr("balise group 85/16383 has an identity that ETCS cannot carry"));
+  EXPECT_EQ(message([](Map& map) { map.balise_groups[0].nid_bg = 16382; }), "was saved");
+  for (const double accuracy_m : {-1.0, double{NAN}, double{INFINITY}}) {
+    EXPECT_THAT(message([&](Map& map) { map.balise_groups[0].q_locacc_m = accuracy_m; }),
+                HasSubstr("balise group 85/100 has a location accuracy that is not a length"));
+  }
+  EXPECT_THAT(message([](Map& map) { map.balise_groups[0].balises = {4}; }),
+              HasSubstr("balise group 85/100 names a balise that is not among the landmarks"));
+  EXPECT_EQ(message([](Map& map) { map.balise_groups[0].balises = {0, 1}; }), "was saved");
+  EXPECT_THAT(message([](Map& map) { map.nodes.pop_back(); }),
+              HasSubstr("edge 3 begins or ends at a node that does not exist"));
+  EXPECT_THAT(message([](Map& map) { map.edges[1].to_node = 0; }), HasSubstr("edge 2 begins or ends at a node"));
+  EXPECT_THAT(message([](Map& map) { map.connections[1].node = 5; }),
+              HasSubstr("a connection lies at node 5, which does not exist"));
+  EXPECT_THAT(message([](Map& map) { map.nodes[2].id = 7; }), HasSubstr("its nodes are not numbered"));
+  EXPECT_THAT(message([](Map& map) { map.nodes[2].easting_m = NAN; }), HasSubstr("node 3 has a coordinate"));
+}
+
+TEST_F(MapFile, NodesThatWereLeftOutAreTheEndsOfTheTracks) {
+  Map map = small_map();
+  const std::vector<Node> nodes = std::exchange(map.nodes, {});
+  ASSERT_TRUE(map.save(file()).ok());
+  const Map read = core::value_or_throw(Map::load(file()));
+  ASSERT_EQ(read.nodes.size(), 4U);
+  for (size_t i = 0; i < nodes.size(); ++i) {
+    EXPECT_EQ(read.nodes[i].id, i + 1);
+    EXPECT_NEAR(read.nodes[i].easting_m, nodes[i].easting_m, 1e-6);
+    EXPECT_NEAR(read.nodes[i].northing_m, nodes[i].northing_m, 1e-6);
+  }
+  map.edges[0].to_node = 4'000'000'000;
+  EXPECT_THAT(map.save(file()).error().message, HasSubstr("edge 1 begins or ends at a node that does not exist"));
+}
+
+TEST_F(MapFile, LandmarksOfAnEdgeAreFoundInAnyMap) {
+  Map made = small_map();
+  for (uint32_t id = 4; id <= 300; ++id)
+    made.landmarks.push_back({id, LandmarkKind::mast, 1 + id % 3, 7.0 * (id * 37 % 71), 3, 0.2, ""});
+  ASSERT_TRUE(made.save(file()).ok());
+  Map loaded = core::value_or_throw(Map::load(file()));
+  const auto expect_same = [&](const Map& map) {
+    for (uint32_t edge = 0; edge <= 4; ++edge) {
+      std::vector<uint32_t> found, wanted;
+      for (const Landmark* mark : map.landmarks_on(edge)) found.push_back(mark->id);
+      Map fresh = small_map();
+      fresh.landmarks = map.landmarks;
+      for (const Landmark* mark : fresh.landmarks_on(edge)) wanted.push_back(mark->id);
+      EXPECT_EQ(found, wanted) << "edge " << edge;
+    }
+  };
+  expect_same(made);
+  expect_same(loaded);
+  const Map copy = loaded;
+  expect_same(copy);
+  std::swap(loaded.landmarks[10].offset_m, loaded.landmarks[13].offset_m);  // of one edge
+  expect_same(loaded);
+  loaded.landmarks.push_back({301, LandmarkKind::mast, 2, 5, 3, 0.2, ""});
+  expect_same(loaded);
+  std::erase_if(loaded.landmarks, [](const Landmark& mark) { return mark.edge == 1; });
+  expect_same(loaded);
+  loaded.landmarks.clear();
+  expect_same(loaded);
+}
+
 TEST(Map, ParsesPositions) {
   const Map map = small_map();
   EXPECT_EQ(map.parse_position("1:300").value().edge, 1U);
@@ -118,6 +192,17 @@ TEST(Map, ParsesPositions) {
   }
 }
 
+// Pieces may lie anywhere in the map; a line of the same name elsewhere does not go on.
+TEST(Map, PlacesCountOnOverPiecesThatMeet) {
+  Map map = small_map();
+  map.edges[1].name = "siding#2";
+  EXPECT_EQ(map.parse_position("siding:600").value().edge, 2U);
+  EXPECT_DOUBLE_EQ(map.parse_position("siding:600").value().offset_m, 100);
+  EXPECT_FALSE(map.parse_position("siding:1301").ok());
+  map.edges[2].name = "main#2";  // drawn towards the switch
+  EXPECT_FALSE(map.parse_position("main:1100").ok());
+}
+
 TEST(Map, KnowsLandmarksOfAnEdgeInOrder) {
   const Map map = small_map();
   const auto found = map.landmarks_on(1);
@@ -125,6 +210,14 @@ TEST(Map, KnowsLandmarksOfAnEdgeInOrder) {
   EXPECT_EQ(found[0]->id, 3U);
   EXPECT_EQ(map.landmark(0), nullptr);
   EXPECT_EQ(map.edge(4), nullptr);
+}
+
+TEST(Map, APortalInIsAPortalOutTheOtherWay) {
+  using Kind = LandmarkKind;
+  EXPECT_EQ(seen_along(Kind::portal_in, true), Kind::portal_in);
+  EXPECT_EQ(seen_along(Kind::portal_in, false), Kind::portal_out);
+  EXPECT_EQ(seen_along(Kind::portal_out, false), Kind::portal_in);
+  EXPECT_EQ(seen_along(Kind::mast, false), Kind::mast);
 }
 
 TEST(Map, NamesOfLandmarkKindsGoBothWays) {
@@ -155,6 +248,25 @@ TEST(Map, HasNoGeographyWithoutASystem) {
   EXPECT_FALSE(map.to_geo(0, 0));
   map.crs = "EPSG:4326";  // degrees are not metres
   EXPECT_FALSE(map.to_geo(0, 0));
+}
+
+TEST(Projection, TakesPlanesInMetresOnly) {
+  for (const char* crs : {"EPSG:2263", "EPSG:2263+5703", "EPSG:4326", "EPSG:4326+5773", "EPSG:9518", "EPSG:4979",
+                          "EPSG:4978", "EPSG:5773", "+proj=utm +zone=32 +units=us-ft +type=crs", "no system"}) {
+    const auto opened = Projection::open(crs);
+    ASSERT_FALSE(opened.ok()) << crs;
+    EXPECT_THAT(opened.error().message, HasSubstr("is not a coordinate system in metres that PROJ knows")) << crs;
+  }
+  for (const char* crs : {"EPSG:2056", "EPSG:2056+5728", "EPSG:31468", "EPSG:25832+7837",
+                          "+proj=tmerc +lat_0=47 +lon_0=8 +k=1 +ellps=WGS84 +units=m +no_defs +type=crs",
+                          "+proj=tmerc +lat_0=47 +lon_0=8 +ellps=bessel +towgs84=600,100,400 +type=crs"}) {
+    EXPECT_TRUE(Projection::open(crs).ok()) << crs;
+  }
+  // Heights change nothing in the plane.
+  const GeoPoint bern{.lat_deg = 46.951, .lon_deg = 7.4386};
+  const auto flat = core::value_or_throw(Projection::open("EPSG:2056")).from_geo(bern).value();
+  const auto high = core::value_or_throw(Projection::open("EPSG:2056+5728")).from_geo(bern).value();
+  EXPECT_NEAR((flat - high).norm(), 0, 5e-3);
 }
 
 TEST(Map, ProjectsInManyThreadsAtOnce) {
