@@ -170,6 +170,30 @@ TEST_F(RunTables, SightingsArePutOnTheMap) {
   EXPECT_NEAR(moved[0].place_ahead_m, 3, 1e-9) << "a fix moved the place by 3 m, beyond the switch";
 }
 
+// The cab looks ahead while the train runs back: forwards along the edge, and against it.
+TEST_F(RunTables, ATrainThatBacksSeesFromWhereItIs) {
+  const auto seen_from = [&](const std::string& states, const std::string& ahead) {
+    write("train_state.csv", "stamp_ns,edge,offset_m,direction,track_known,speed_mps,sigma_m\n" + states);
+    write("sightings.csv", "stamp_ns,kind,distance_ahead_m,lateral_m,sigma_m,confidence\n1500000000,portal_in," +
+                               ahead + ",-3,0.1,0.9\n");
+    return core::value_or_throw(read_sightings(map_, folder_, 0)).at(0);
+  };
+  const std::string forward = "1000000000,1,500,+,1,-20,0.4\n2000000000,1,480,+,1,-20,0.4\n";
+  EXPECT_NEAR(seen_from(forward, "5").offset_m, 495, 1e-6);
+  EXPECT_NEAR(seen_from(forward, "-5").offset_m, 485, 1e-6);
+  EXPECT_EQ(seen_from(forward, "5").kind, LandmarkKind::portal_in);
+  EXPECT_NEAR(seen_from(forward, "5").place_ahead_m, 0, 1e-9);
+  const std::string reverse = "1000000000,1,500,-,1,-20,0.4\n2000000000,1,520,-,1,-20,0.4\n";
+  const SurveySighting against = seen_from(reverse, "5");
+  EXPECT_NEAR(against.offset_m, 505, 1e-6);
+  EXPECT_EQ(against.kind, LandmarkKind::portal_out);
+  EXPECT_NEAR(against.lateral_m, 3, 1e-9);
+  // Back over the switch: the cab still looks to edge 2.
+  const SurveySighting over = seen_from("1000000000,2,5,+,1,-20,0.4\n2000000000,1,985,+,1,-20,0.4\n", "2");
+  EXPECT_EQ(over.edge, 1U);
+  EXPECT_NEAR(over.offset_m, 997, 1e-6);
+}
+
 TEST_F(RunTables, ASightingThatWeighsNothingOrAllIsRefused) {
   write("train_state.csv",
         "stamp_ns,edge,offset_m,direction,track_known,speed_mps,sigma_m\n"

@@ -166,23 +166,17 @@ std::vector<State> read_states(const std::shared_ptr<const track::Map>& map, con
   return out;
 }
 
-/// The place at a time between two states, on the map along the way that the train takes.
+/// The place at a time between two states, on the map along the way that the cab looks; the train may run back.
 std::optional<track::EdgePosition> place_at(const std::shared_ptr<const track::Map>& map, const State& before,
                                             const State& after, int64_t stamp_ns, double ahead_m) {
   const double span = static_cast<double>(after.stamp_ns - before.stamp_ns);
   const double part = span > 0 ? static_cast<double>(stamp_ns - before.stamp_ns) / span : 0.0;
-  const double ahead = part * std::abs(after.way_m - before.way_m) + ahead_m;
+  const double ahead = part * (after.way_m - before.way_m) + ahead_m;
   track::EdgePosition from = before.place;
   from.offset_m = std::clamp(from.offset_m, 0.0, map->edge(from.edge)->alignment.length_m());
   const auto path = track::Path::follow(map, from, std::max(ahead, 0.0) + 1, std::max(-ahead, 0.0) + 1);
   if (!path.ok() || ahead > path.value().end_m() || ahead < path.value().begin_m()) return std::nullopt;
   return path.value().position_at(ahead);
-}
-
-track::LandmarkKind as_on_map(track::LandmarkKind kind, track::Direction direction) {
-  if (direction != track::Direction::reverse) return kind;
-  if (kind == track::LandmarkKind::portal_in) return track::LandmarkKind::portal_out;
-  return kind == track::LandmarkKind::portal_out ? track::LandmarkKind::portal_in : kind;
 }
 
 }  // namespace
@@ -212,7 +206,7 @@ core::Result<std::vector<SurveySighting>> read_sightings(const std::shared_ptr<c
       if (!place) continue;
       const bool is_reverse = place->direction == track::Direction::reverse;
       const double side = read_or_throw(table.number(lateral));
-      out.push_back({run, before.way_m, as_on_map(*what, place->direction), place->edge, place->offset_m,
+      out.push_back({run, before.way_m, track::seen_along(*what, !is_reverse), place->edge, place->offset_m,
                      std::isfinite(side) ? (is_reverse ? -side : side) : 0.0, sigma_m, before.sigma_m,
                      before.place_ahead_m, is_reverse});
     }
