@@ -157,13 +157,11 @@ class Reader {
   void read_balises() {
     for (const pugi::xml_node& node : descendants(infra_.root(), "baliseGroup")) {
       const std::string id = node.attribute("id").value();
-      const double nid_c = infra_.required(node, "nid_c");
-      const double nid_bg = infra_.required(node, "nid_bg");
-      if (!(nid_c >= 0 && nid_c <= 1023 && nid_bg >= 0 && nid_bg <= 16382))
-        throw infra_.wrong(node, "balise group \"" + id + "\" has an identity that ETCS cannot carry");
+      const auto identity = etcs_identity(infra_.required(node, "nid_c"), infra_.required(node, "nid_bg"));
+      if (!identity) throw infra_.wrong(node, "balise group \"" + id + "\" has " + kNoEtcsIdentity);
       TrackGroup group;
-      group.nid_c = static_cast<uint32_t>(nid_c);
-      group.nid_bg = static_cast<uint32_t>(nid_bg);
+      group.nid_c = identity->nid_c;
+      group.nid_bg = identity->nid_bg;
       group.nominal_is_forward = std::string(node.attribute("linkOrientationDirection").value()) != "dirReverse";
       group.q_locacc_m = 1;
       std::optional<size_t> on;

@@ -313,10 +313,10 @@ Draft draft_of(RailNet& net) {
   return Planner(net).make();
 }
 
-size_t split(RailNet& net, size_t track, double offset_m) {
+size_t split(RailNet& net, size_t track, double offset_m, const std::string& name) {
   NetTrack rest;
   NetTrack& first = net.tracks[track];
-  rest.track.name = first.track.name + "'";
+  rest.track.name = name;
   rest.track.line = first.track.line;
   rest.length_m = first.length_m - offset_m;
   first.length_m = offset_m;

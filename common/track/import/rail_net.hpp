@@ -61,8 +61,8 @@ struct RailNet {
 /// before it end: its lengths and links are right, its coordinates are not, and `problems` says so.
 Draft draft_of(RailNet& net);
 
-/// Cuts the track at an offset: the part from there on becomes the last track, ends of links are moved along. Returns
-/// the new track's index.
-size_t split(RailNet& net, size_t track, double offset_m);
+/// Cuts the track at an offset: the part from there on becomes the last track, of this name; ends of links are moved
+/// along. Returns the new track's index.
+size_t split(RailNet& net, size_t track, double offset_m, const std::string& name);
 
 }  // namespace railfix::track

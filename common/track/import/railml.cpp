@@ -41,14 +41,20 @@ std::optional<EtcsIdentity> etcs_identity(const XmlSource& source, const pugi::x
       const auto c = source.number(place, country);
       const auto bg = source.number(place, number);
       if (!c || !bg) continue;
-      if (!(*c >= 0 && *c <= 1023 && *bg >= 0 && *bg <= 16382)) {
-        throw source.wrong(place, "balise group \"" + railml_name(group) +
-                                      "\" has an identity that ETCS cannot carry (NID_C 0-1023, NID_BG 0-16382)");
-      }
-      return EtcsIdentity{static_cast<uint32_t>(*c), static_cast<uint32_t>(*bg)};
+      const auto identity = etcs_identity(*c, *bg);
+      if (!identity) throw source.wrong(place, "balise group \"" + railml_name(group) + "\" has " + kNoEtcsIdentity);
+      return identity;
     }
   }
   return std::nullopt;
+}
+
+std::string balise_group_of(const pugi::xml_node& balise) {
+  for (const char* attribute : {"baliseGroupRef", "belongsToBaliseGroup"}) {
+    const std::string group = balise.attribute(attribute).value();
+    if (!group.empty()) return group;
+  }
+  return balise.child("belongsToBaliseGroup").attribute("ref").value();
 }
 
 namespace {

@@ -250,11 +250,12 @@ class Reader {
     const size_t count = net_.tracks.size();
     for (size_t i = 0; i < count; ++i) {
       pieces_[i][0.0] = i;
+      const std::string name = net_.tracks[i].track.name;
       double begin = 0;
       size_t piece = i;
       for (const double cut : cuts[i]) {
         if (cut - begin < kAtEndM) continue;
-        piece = split(net_, piece, cut - begin);
+        piece = split(net_, piece, cut - begin, name + "#" + std::to_string(pieces_[i].size() + 1));
         pieces_[i][cut] = piece;
         begin = cut;
       }

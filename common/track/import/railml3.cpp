@@ -328,22 +328,16 @@ class Reader {
     }
   }
 
-  static std::string group_of(const pugi::xml_node& balise) {
-    for (const char* attribute : {"baliseGroupRef", "belongsToBaliseGroup"}) {
-      const std::string group = balise.attribute(attribute).value();
-      if (!group.empty()) return group;
-    }
-    return balise.child("belongsToBaliseGroup").attribute("ref").value();
-  }
+  using PlacedBalises = std::vector<std::pair<NetPlace, pugi::xml_node>>;
 
   void read_balises() {
-    std::map<std::string, std::vector<std::pair<NetPlace, pugi::xml_node>>> of_group;
+    std::map<std::string, PlacedBalises> of_group;
     const std::vector<pugi::xml_node> groups = descendants(source_.root(), "baliseGroup");
     for (const pugi::xml_node& group : groups) of_group[group.attribute("id").value()];
     for (const pugi::xml_node& balise : descendants(source_.root(), "balise")) {
       const std::vector<NetPlace> places = places_of(balise);
       if (places.empty()) continue;
-      const std::string group = group_of(balise);
+      const std::string group = balise_group_of(balise);
       const bool is_known = of_group.contains(group);
       if (!group.empty() && !is_known) tell_missing(balise, "balise group", group, "it is kept as a landmark");
       if (group.empty() || !is_known) {
@@ -354,7 +348,7 @@ class Reader {
     }
     for (const pugi::xml_node& node : groups) {
       const auto identity = etcs_identity(source_, node);
-      std::vector<std::pair<NetPlace, pugi::xml_node>>& balises = of_group[node.attribute("id").value()];
+      PlacedBalises& balises = of_group[node.attribute("id").value()];
       const std::vector<NetPlace> own = places_of(node);
       if (balises.empty() && !own.empty()) balises.emplace_back(own.front(), node);
       if (balises.empty()) continue;
@@ -364,16 +358,27 @@ class Reader {
         for (const auto& [place, balise] : balises) add(LandmarkKind::balise, place, place.from_m, 0, balise);
         continue;
       }
-      TrackGroup group;
-      group.nid_c = identity->nid_c;
-      group.nid_bg = identity->nid_bg;
-      group.offset_m = balises.front().first.from_m;
-      group.nominal_is_forward = balises.front().first.same_direction;
-      group.q_locacc_m = kRailmlSigmaM;
-      for (const auto& [place, balise] : balises)
-        group.balises.push_back({LandmarkKind::balise, place.from_m, 0, kRailmlSigmaM, railml_name(balise)});
-      net_.tracks[balises.front().first.track].track.groups.push_back(std::move(group));
+      add_group(node, *identity, balises);
     }
+  }
+
+  /// A group lies on one track, that of its first balise.
+  void add_group(const pugi::xml_node& of, const EtcsIdentity& identity, const PlacedBalises& balises) {
+    const NetPlace& first = balises.front().first;
+    ImportedTrack& track = net_.tracks[first.track].track;
+    TrackGroup group{identity.nid_c, identity.nid_bg, first.from_m, first.same_direction, kRailmlSigmaM, {}};
+    for (const auto& [place, balise] : balises) {
+      if (place.track != first.track) {
+        add(LandmarkKind::balise, place, place.from_m, 0, balise);
+      } else {
+        group.balises.push_back({LandmarkKind::balise, place.from_m, 0, kRailmlSigmaM, railml_name(balise)});
+      }
+    }
+    if (group.balises.size() < balises.size())
+      net_.problems.push_back("balise group \"" + railml_name(of) +
+                              "\" lies on two net elements; only its balises on \"" + track.name +
+                              "\" are kept in it, the others as landmarks");
+    track.groups.push_back(std::move(group));
   }
 
   const XmlSource& source_;

@@ -25,10 +25,9 @@ double platform_lateral_m(const std::string& side);
 std::set<std::string> special_speed_profiles(const XmlSource& source);
 
 /// The ETCS identity of a balise group, wherever the file has it; nothing when it has none.
-struct EtcsIdentity {
-  uint32_t nid_c = 0;
-  uint32_t nid_bg = 0;
-};
 std::optional<EtcsIdentity> etcs_identity(const XmlSource& source, const pugi::xml_node& group);
+
+/// The id of the group that a balise of railML 3 says it belongs to; empty when it says none.
+std::string balise_group_of(const pugi::xml_node& balise);
 
 }  // namespace railfix::track

@@ -1,6 +1,7 @@
 #include "track/import/tracks.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace railfix::track {
 
@@ -12,6 +13,14 @@ void FitFigures::include(const FitFigures& other) {
   max_gap_m = std::max(max_gap_m, other.max_gap_m);
   max_point_distance_m = std::max(max_point_distance_m, other.max_point_distance_m);
   max_chord_deviation_m = std::max(max_chord_deviation_m, other.max_chord_deviation_m);
+}
+
+std::optional<EtcsIdentity> etcs_identity(double nid_c, double nid_bg) {
+  const auto is_whole = [](double value, uint32_t last) {
+    return value >= 0 && value <= last && value == std::floor(value);
+  };
+  if (!is_whole(nid_c, BaliseGroup::kLastNidC) || !is_whole(nid_bg, BaliseGroup::kLastNidBg)) return std::nullopt;
+  return EtcsIdentity{static_cast<uint32_t>(nid_c), static_cast<uint32_t>(nid_bg)};
 }
 
 void add_speeds(std::vector<std::pair<double, double>> changes, Direction running, double length_m,

@@ -1,6 +1,7 @@
 // What the readers of map sources hand over to the builder.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,16 @@ struct TrackGroup {
   double q_locacc_m = 0;
   std::vector<TrackMark> balises;
 };
+
+/// The identity of a balise group, whole numbers that ETCS can carry; nothing where these are none.
+struct EtcsIdentity {
+  uint32_t nid_c = 0;
+  uint32_t nid_bg = 0;
+};
+std::optional<EtcsIdentity> etcs_identity(double nid_c, double nid_bg);
+/// For the sentence that refuses another one.
+constexpr const char* kNoEtcsIdentity =
+    "an identity that ETCS cannot carry: NID_C is a whole number from 0 to 1023, NID_BG one from 0 to 16382";
 
 /// One track as a source describes it, before it is cut at switches.
 struct ImportedTrack {

@@ -468,6 +468,16 @@ TEST_F(PlanImport, SaysWhatIsWrongInOneSentence) {
   EXPECT_THAT(message(kRailml2, "radius=\"500\"", "radius=\"5\""), HasSubstr("less than 10 m"));
   EXPECT_THAT(message(kRailml2, "slope=\"5\"", "slope=\"x\""), HasSubstr("needs a number in the attribute \"slope\""));
   EXPECT_THAT(message(kRailml2, "groupID=\"1234\"", "groupID=\"99999\""), HasSubstr("ETCS cannot carry"));
+  for (const char* not_whole : {"12.5", "16382.1", "-0.5"}) {
+    const std::string said = "identity that ETCS cannot carry: NID_C is a whole number";
+    const std::string bad = "\"" + std::string(not_whole) + "\"";
+    EXPECT_THAT(message(kRailml2, "groupID=\"1234\"", "groupID=" + bad), HasSubstr(said));
+    EXPECT_THAT(message(kRailml3, "countryID=\"97\"", "countryID=" + bad), HasSubstr(said));
+    EXPECT_THAT(message(kInfra, "nid_c=\"97\"", "nid_c=" + bad), HasSubstr(said));
+    EXPECT_THAT(message(kInfra, "nid_bg=\"5050\"", "nid_bg=" + bad), HasSubstr(said));
+  }
+  EXPECT_THAT(message(kRailml2, "groupID=\"1234\"", "groupID=\"16383\""), HasSubstr("ETCS cannot carry"));
+  EXPECT_THAT(message(kRailml2, "groupID=\"1234\"", "groupID=\"1234.0\""), HasSubstr("was built"));
   EXPECT_THAT(message(kRailml2, "</tracks>", ""), HasSubstr("not sound XML"));
   EXPECT_THAT(message(kRailml3, "elementB ref=\"n2\"", "elementB ref=\"n9\""), HasSubstr("does not exist"));
   EXPECT_THAT(message(kRailml3, "length=\"300\"", "length=\"-3\""), HasSubstr("between 0 and 1000 km"));

@@ -152,6 +152,54 @@ TEST_F(RailmlTest, NamesOfThingsThatAreNotThereAreTold) {
   EXPECT_THAT(marks_of(map, {LandmarkKind::balise}), testing::ElementsAre("balise b at 70.0 on 1"));
 }
 
+TEST_F(RailmlTest, AGroupOverTwoNetElementsKeepsTheBalisesOfTheFirst) {
+  const auto balise = [](const std::string& id, const std::string& net_element, const std::string& pos) {
+    return "<balise id=\"" + id + "\" baliseGroupRef=\"g\"><spotLocation netElementRef=\"" + net_element + "\" pos=\"" +
+           pos + "\"/></balise>";
+  };
+  const std::string text = railml3(balise("b1", "n1", "995") + balise("b2", "n1", "998") + balise("b3", "n2", "1") +
+                                   "<baliseGroup id=\"g\"><etcs countryID=\"97\" groupID=\"77\"/></baliseGroup>");
+  const Map map = core::value_or_throw(build_map({write("a.railml", text)}, {})).map;
+  EXPECT_THAT(marks_of(map, {LandmarkKind::balise}),
+              testing::ElementsAre("balise b1 at 995.0 on 1", "balise b2 at 998.0 on 1", "balise b3 at 1.0 on 2"));
+  ASSERT_EQ(map.balise_groups.size(), 1U);
+  EXPECT_EQ(map.balise_groups[0].edge, 1U);
+  std::vector<std::string> in_group;
+  for (const uint32_t id : map.balise_groups[0].balises) in_group.push_back(map.landmark(id)->name);
+  EXPECT_THAT(in_group, testing::ElementsAre("b1", "b2"));
+  EXPECT_THAT(map.problems,
+              testing::Contains("balise group \"g\" lies on two net elements; only its balises on \"n1\" are kept in "
+                                "it, the others as landmarks"));
+}
+
+// Switches at 200, 500 and 900 m cut the track, whose pieces do not follow one another in the map.
+TEST_F(RailmlTest, PlacesCountOnOverTheSwitchesOfATrack) {
+  std::string text = railml2("500");
+  const auto switch_at = [](const std::string& pos) {
+    return "<switch id=\"w" + pos + "\" pos=\"" + pos + "\"><connection id=\"c" + pos +
+           "\" ref=\"none\" orientation=\"outgoing\" course=\"left\"/></switch>";
+  };
+  text.insert(text.find("</connections>"), switch_at("200") + switch_at("900"));
+  const auto file = in_folder("a.map");
+  ASSERT_TRUE(core::value_or_throw(build_map({write("a.railml", text)}, {})).map.save(file).ok());
+  const Map map = core::value_or_throw(Map::load(file));
+  std::vector<std::string> names;
+  for (const Edge& edge : map.edges) names.push_back(edge.name);
+  EXPECT_THAT(names, testing::ElementsAre("t1", "t2", "t1#2", "t1#3", "t1#4"));
+  for (const auto& [text_at, edge, offset_m] : {std::tuple("t1:150", 1U, 150.0),
+                                                {"t1:450:-", 3U, 250.0},
+                                                {"t1:550", 4U, 50.0},
+                                                {"t1:1000", 5U, 100.0},
+                                                {"t1#3:10", 4U, 10.0},
+                                                {"t2:300", 2U, 300.0}}) {
+    const auto place = map.parse_position(text_at);
+    ASSERT_TRUE(place.ok()) << place.error().message;
+    EXPECT_EQ(place.value().edge, edge) << text_at;
+    EXPECT_NEAR(place.value().offset_m, offset_m, 1e-9) << text_at;
+  }
+  EXPECT_THAT(map.parse_position("t1:1001").error().message, HasSubstr("which is 1000.0"));
+}
+
 TEST_F(RailmlTest, PlacesBeyondTheirNetElementAreTold) {
   const std::string text = railml3("<balise id=\"b\"><spotLocation netElementRef=\"n1\" pos=\"70000\"/></balise>");
   EXPECT_THAT(core::value_or_throw(build_map({write("a.railml", text)}, {})).map.problems,
