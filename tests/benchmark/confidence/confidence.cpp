@@ -75,6 +75,18 @@ void print_row(const std::string& name, size_t runs, Verdict verdict) {
               quantile(verdict.errors_m, 0.95), quantile(verdict.errors_m, 1));
 }
 
+void print_widths(const Verdict& sum) {
+  const auto percent = [&](size_t states) {
+    return 100 * static_cast<double>(states) / static_cast<double>(std::max<size_t>(sum.states, 1));
+  };
+  const size_t named = sum.wider - sum.wider_placeless - sum.wider_alone;
+  std::printf(
+      "wider than 5 m + 5 %%: %.2f %% of the states, %.2f %% without a place on the map, %.2f %% with a sensor, a fix "
+      "or "
+      "the track in doubt, %.2f %% with nothing else wrong any more\n",
+      percent(sum.wider), percent(sum.wider_placeless), percent(named), percent(sum.wider_alone));
+}
+
 std::string to_string(const BadRun& run) {
   char text[120];
   std::snprintf(text, sizeof text, "run %llu: %s %s from %.1f s to %.1f s, size %g",
@@ -89,6 +101,7 @@ void print(const CampaignResult& result) {
   for (const auto& [name, verdict] : result.by_fault)
     print_row(to_string(name.first) + " " + to_string(name.second), result.runs.at(name), verdict);
   print_row("all", result.run_count, result.sum);
+  print_widths(result.sum);
   for (const auto& bad : result.bad)
     std::printf("%s: %zu outside by up to %.2f m, %zu wider unsaid\n", to_string(bad).c_str(), bad.outside,
                 bad.excess_m, bad.unsaid);

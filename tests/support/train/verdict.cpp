@@ -51,8 +51,7 @@ class Judge {
     verdict_.worst_excess_m = std::max(verdict_.worst_excess_m, excess_m);
     const bool ok = state.integrity == fusion::Integrity::ok;
     const bool wider = std::max(state.over_m, state.under_m) > 5 + 0.05 * state.since_sure_m;
-    verdict_.wider += wider ? 1 : 0;
-    verdict_.wider_unsaid += wider && ok ? 1 : 0;
+    if (wider) judge_width(state, ok);
     verdict_.not_ok += ok ? 0 : 1;
     verdict_.width_sum_m += state.over_m + state.under_m;
     judge_track(state, ok);
@@ -66,6 +65,13 @@ class Judge {
   Verdict take() { return std::move(verdict_); }
 
  private:
+  void judge_width(const fusion::TrainEstimate& state, bool ok) {
+    ++verdict_.wider;
+    verdict_.wider_unsaid += ok ? 1 : 0;
+    verdict_.wider_placeless += state.track_known ? 0 : 1;
+    verdict_.wider_alone += state.reason == "interval wider than allowed" ? 1 : 0;
+  }
+
   void judge_track(const fusion::TrainEstimate& state, bool ok) {
     const bool other = state.track_known && !simulation_.on_way(state.position);
     const bool sure = other && ok && state.track_probability >= track::kDeclaredProbability;
@@ -92,6 +98,8 @@ void Verdict::add(const Verdict& other) {
   worst_excess_m = std::max(worst_excess_m, other.worst_excess_m);
   wider += other.wider;
   wider_unsaid += other.wider_unsaid;
+  wider_placeless += other.wider_placeless;
+  wider_alone += other.wider_alone;
   not_ok += other.not_ok;
   told += other.told;
   other_leg += other.other_leg;
