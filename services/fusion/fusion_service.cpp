@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/time.hpp"
+#include "messaging/direction.hpp"
 
 namespace railfix::fusion {
 namespace {
@@ -21,10 +22,9 @@ using messaging::topics::wheel_sample;
 constexpr std::chrono::milliseconds kTickPeriod{50};
 constexpr int64_t kKeepPeriodNs = 250'000'000;
 constexpr uint64_t kNumbersUnheard = 100;  // at least as many as the one before may have used since it was heard last
-constexpr double kOldestNotesS = 30.0;
-constexpr double kSameRideS = 0.5;   // data and the host's clock go on alike
-constexpr double kSameBeginS = 0.5;  // a replay that is looped begins where it began before
-constexpr double kLiveDataS = 5.0;   // data stamps further from the host's clock are not live
+constexpr double kSameRideS = 0.5;         // data and the host's clock go on alike
+constexpr double kSameBeginS = 0.5;        // a replay that is looped begins where it began before
+constexpr double kLiveDataS = 5.0;         // data stamps further from the host's clock are not live
 constexpr double kOutOfOrderS = 2.0;
 constexpr double kStandsMps = 1.0;
 
@@ -55,9 +55,7 @@ FixInput input_of(const msg::PositionFix& m) {
              : m.kind() == msg::FIX_NETWORK ? FixKind::network
              : m.kind() == msg::FIX_TRACK   ? FixKind::track
                                             : FixKind::landmark;
-  fix.direction = m.direction() == msg::DIRECTION_REVERSE   ? track::Direction::reverse
-                  : m.direction() == msg::DIRECTION_FORWARD ? track::Direction::forward
-                                                            : track::Direction::unknown;
+  fix.direction = messaging::direction_of(m.direction());
   return fix;
 }
 
@@ -83,9 +81,7 @@ msg::TrainState message_of(const TrainEstimate& e) {
   m.edge(e.track_known ? e.position.edge : 0);
   m.reference(e.reference);
   m.sources(e.sources);
-  m.direction(!e.track_known                                      ? msg::DIRECTION_UNKNOWN
-              : e.position.direction == track::Direction::reverse ? msg::DIRECTION_REVERSE
-                                                                  : msg::DIRECTION_FORWARD);
+  m.direction(messaging::direction_of(e.track_known ? e.position.direction : track::Direction::unknown));
   m.track_known(e.track_known ? 1 : 0);
   m.integrity(static_cast<uint8_t>(e.integrity));
   m.standstill(e.standstill ? 1 : 0);
@@ -118,10 +114,16 @@ msg::TrainPose message_of(const PoseEstimate& p) {
 }
 
 KnownPlace known_place_of(const msg::TrainState& m) {
-  const auto direction =
-      m.direction() == msg::DIRECTION_REVERSE ? track::Direction::reverse : track::Direction::forward;
+  const auto direction = messaging::direction_of(m.direction());
   return {m.stamp_ns(),         {m.edge(), m.offset_m(), direction}, m.speed_mps(), m.over_m(), m.under_m(),
           m.track_probability()};
+}
+
+const char* topic_of(const Event& event) {
+  if (std::holds_alternative<ImuInput>(event)) return imu_sample.name;
+  if (std::holds_alternative<WheelInput>(event)) return wheel_sample.name;
+  if (std::holds_alternative<GnssInput>(event)) return gnss_fix.name;
+  return std::holds_alternative<FixInput>(event) ? position_fix.name : odometry_step.name;
 }
 
 // Which of two fusions is to be heard: the one that knows its place, or that has more to measure with.
@@ -217,7 +219,7 @@ bool FusionService::take_over_known(const TrainEstimate& first) {
     const double noted_s = core::seconds(core::monotonic_ns() - *noted_ns_);
     noted_ns_.reset();
     const bool same_time = age_s >= 0 && std::abs(age_s - noted_s) <= kSameRideS;
-    if (!same_time || age_s > kOldestNotesS) {
+    if (!same_time || age_s > kOldestPlaceS) {
       known_.reset();
       // Only what is played begins where it began before: a train has gone on, and its clock was set.
       const bool under_way = believes_start_ && (same_time || !is_played(first.stamp_ns));
@@ -280,6 +282,7 @@ void FusionService::restart(int64_t data_ns) {
   begun_anew_ = false;
   heard_ns_ = 0;
   distance_offset_m_ = 0;
+  left_out_ = {};
   pose_ = TrainPose(config.parameters.gnss_map_sigma_m);
   data_time_.reset();
   live_ = false;
@@ -325,8 +328,26 @@ void FusionService::use_gnss(const msg::GnssFix& sample) {
 
 void FusionService::use(const Event& event, int64_t grabbed_ns) {
   context_.health().input();
-  if (!begun_ns_) begun_ns_ = std::visit([](const auto& input) { return input.stamp_ns; }, event);
-  if (const auto estimate = fusion_->add(event)) publish(*estimate, grabbed_ns);
+  if (!begun_ns_) begun_ns_ = stamp_of(event);
+  const FusionCounts before = fusion_->counts();
+  const auto estimate = fusion_->add(event);
+  note_left_out(event, before);
+  if (estimate) publish(*estimate, grabbed_ns);
+}
+
+void FusionService::note_left_out(const Event& event, const FusionCounts& before) {
+  const FusionCounts& now = fusion_->counts();
+  const char* why = now.nonsense > before.nonsense   ? service::LeftOut::kNoSense
+                    : now.too_late > before.too_late ? "they came later than fusion.history_s behind the newest"
+                    : now.jumped > before.jumped     ? "their clock is ahead of the other sensors'"
+                                                     : nullptr;
+  if (why == nullptr) return;
+  left_out_.add(topic_of(event), why, fusion_->latest_stamp_ns().value_or(0));
+  if (!latest_) context_.health().degraded(left_out());
+}
+
+std::string FusionService::left_out() const {
+  return left_out_.sentence(fusion_->latest_stamp_ns().value_or(0));
 }
 
 void FusionService::keep_time(const msg::DataClock& clock) {
@@ -368,10 +389,12 @@ void FusionService::publish(const TrainEstimate& estimate, int64_t grabbed_ns) {
     send(message);
     if (estimate.track_known) publish_pose(estimate);
   }
-  if (estimate.integrity == Integrity::ok) {
+  std::string why = estimate.reason;
+  if (const auto unused = left_out(); !unused.empty()) why += (why.empty() ? "" : "; ") + unused;
+  if (why.empty()) {
     context_.health().active();
   } else {
-    context_.health().degraded(estimate.reason);
+    context_.health().degraded(why);
   }
 }
 

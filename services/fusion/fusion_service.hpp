@@ -10,6 +10,7 @@
 #include "fusion/scale_file.hpp"
 #include "fusion/train_pose.hpp"
 #include "service/data_time.hpp"
+#include "service/left_out.hpp"
 #include "service/service.hpp"
 
 namespace railfix::fusion {
@@ -23,6 +24,8 @@ class FusionService {
   void listen(const FusionConfig& config);
   void restart(int64_t data_ns);
   void use(const Event& event, int64_t grabbed_ns);
+  void note_left_out(const Event& event, const FusionCounts& before);
+  [[nodiscard]] std::string left_out() const;
   void use_gnss(const msg::GnssFix& sample);
   void keep_time(const msg::DataClock& clock);
   void tick();
@@ -57,6 +60,7 @@ class FusionService {
   int64_t newest_stamp_ns_ = 0;  // of the data ...
   int64_t newest_came_ns_ = 0;   // ... and when it was seen, monotonic
   bool no_projection_told_ = false;
+  service::LeftOut left_out_;
   uint64_t seq_ = 0;
   std::optional<msg::TrainState> latest_;  // of this fusion, sent or not
   std::optional<msg::TrainState> known_;   // of another one, to begin anew from

@@ -9,7 +9,6 @@
 namespace railfix::fusion {
 namespace {
 
-constexpr double kOldestS = 30.0;
 constexpr double kAccelerationMps2 = 3.0;  // a train neither speeds up nor brakes harder
 constexpr double kSpeedErrorShare = 0.02;
 constexpr double kSpeedErrorMps = 0.2;
@@ -19,7 +18,7 @@ constexpr double kSpeedErrorMps = 0.2;
 std::optional<FixInput> place_at(const std::shared_ptr<const track::Map>& map, const KnownPlace& known,
                                  int64_t stamp_ns, double interval_factor) {
   const double age_s = core::seconds(stamp_ns - known.stamp_ns);
-  if (std::abs(age_s) > kOldestS || !std::isfinite(known.speed_mps)) return std::nullopt;
+  if (std::abs(age_s) > kOldestPlaceS || !std::isfinite(known.speed_mps)) return std::nullopt;
   if (known.track_probability < kBeginProbability) return std::nullopt;
   const double moved_m = known.speed_mps * age_s;
   const double error_m = std::max(known.over_m, known.under_m) + kAccelerationMps2 / 2 * age_s * age_s +

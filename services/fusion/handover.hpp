@@ -10,6 +10,9 @@
 
 namespace railfix::fusion {
 
+/// What is known for longer than that says nothing of where the train is now.
+inline constexpr double kOldestPlaceS = 30.0;
+
 /// A train_state as far as it matters here.
 struct KnownPlace {
   int64_t stamp_ns = 0;

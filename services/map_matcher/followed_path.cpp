@@ -10,7 +10,6 @@ namespace {
 constexpr double kAheadM = 30000;
 constexpr double kBehindM = 5000;
 constexpr double kLeftM = 3000;  // the path is followed anew when less of it is left
-constexpr double kOldStateS = 2.0;
 
 }  // namespace
 

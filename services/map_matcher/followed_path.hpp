@@ -24,6 +24,9 @@ struct PlacedTrain {
 
 class FollowedPath {
  public:
+  /// A state says nothing of the train longer than that before or after its stamp.
+  static constexpr double kOldStateS = 2.0;
+
   FollowedPath(std::shared_ptr<const track::Map> map, std::shared_ptr<const track::Ways> ways)
       : map_(std::move(map)), ways_(std::move(ways)) {}
 

@@ -1,9 +1,7 @@
 #include "map_matcher/inputs.hpp"
 
 #include <cmath>
-#include <cstdlib>
 
-#include "core/time.hpp"
 #include "core/within.hpp"
 
 namespace railfix::map_matcher {
@@ -19,7 +17,6 @@ constexpr double kLongestM = 1e9;    // a count of metres, an offset, a coordina
 constexpr double kFastestMps = 300;
 constexpr double kMostTurnRad = 10;  // in one step, or in a second
 constexpr double kTightestPerM = 1;  // curvature
-constexpr double kToldS = 10;
 
 }  // namespace
 
@@ -53,18 +50,6 @@ bool has_sense(const StateInput& s) {
          (std::isnan(p.speed_mps) || up_to(p.speed_mps, kFastestMps)) && s.sigma_m >= 0 &&
          within(s.track_probability, 0, 1) && within(s.visual_scale, 0, 2) && up_to(s.easting_m, kLongestM) &&
          up_to(s.northing_m, kLongestM);
-}
-
-void LeftOut::add(const std::string& topic, int64_t data_ns) {
-  ++counts_[topic];
-  last_ = topic;
-  last_ns_ = data_ns;
-}
-
-std::string LeftOut::sentence(int64_t data_ns) const {
-  if (last_.empty() || std::abs(core::seconds(data_ns - last_ns_)) > kToldS) return "";
-  return std::to_string(counts_.at(last_)) + " of " + last_ +
-         " were left out: their values are no numbers, or such as no train has";
 }
 
 }  // namespace railfix::map_matcher

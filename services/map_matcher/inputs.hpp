@@ -1,10 +1,6 @@
 // What may come in: numbers that are numbers, and such as a train can have. One that is none would stay in every sum.
 #pragma once
 
-#include <cstdint>
-#include <map>
-#include <string>
-
 #include "map_matcher/followed_path.hpp"
 #include "map_matcher/match_types.hpp"
 #include "map_matcher/step_chain.hpp"
@@ -38,18 +34,5 @@ struct StateInput {
 [[nodiscard]] bool has_sense(const GyroInput& gyro);
 /// The speed may be unknown (NaN), and the interval without end.
 [[nodiscard]] bool has_sense(const StateInput& state);
-
-/// Counts what was left out, topic by topic.
-class LeftOut {
- public:
-  void add(const std::string& topic, int64_t data_ns);
-  /// Of the topic that was left out last, for some seconds; empty = none.
-  [[nodiscard]] std::string sentence(int64_t data_ns) const;
-
- private:
-  std::map<std::string, uint64_t> counts_;
-  std::string last_;
-  int64_t last_ns_ = 0;
-};
 
 }  // namespace railfix::map_matcher

@@ -12,7 +12,6 @@
 namespace railfix::map_matcher {
 namespace {
 
-constexpr double kOldStateS = 2.0;
 constexpr double kRailsFreshS = 0.5;
 constexpr double kShortestStepM = 0.05;
 constexpr double kLeastWayM = 1e-5;       // standing still turns nothing
@@ -77,7 +76,7 @@ void MapMatcherService::restart() {
 template <typename Input>
 bool MapMatcherService::takes(const char* topic, const Input& input) {
   if (has_sense(input)) return true;
-  left_out_.add(topic, state_ ? state_->stamp_ns() : 0);
+  left_out_.add(topic, service::LeftOut::kNoSense, state_ ? state_->stamp_ns() : 0);
   return false;
 }
 
@@ -184,7 +183,7 @@ std::optional<Turn> MapMatcherService::turn_of_camera() const {
 
 std::optional<Turn> MapMatcherService::turn_of_gyro(int64_t from_ns, int64_t to_ns) const {
   if (!state_ || !std::isfinite(state_->speed_mps())) return std::nullopt;
-  if (std::abs(core::seconds(to_ns - state_->stamp_ns())) > kOldStateS) return std::nullopt;
+  if (std::abs(core::seconds(to_ns - state_->stamp_ns())) > FollowedPath::kOldStateS) return std::nullopt;
   auto turn = gyro_.between(from_ns, to_ns);
   if (turn) turn->way_m = state_->speed_mps() * core::seconds(to_ns - from_ns);
   return turn;
@@ -200,7 +199,7 @@ void MapMatcherService::look_for_place(const msg::OdometryStep& step) {
     located_m_ = chain_.odometer_m();
   }
   auto turn = turn_of_camera();
-  if (!turn && step_ && core::seconds(step.stamp_ns() - step_->stamp_ns()) < kOldStateS)
+  if (!turn && step_ && core::seconds(step.stamp_ns() - step_->stamp_ns()) < FollowedPath::kOldStateS)
     turn = turn_of_gyro(step_->stamp_ns(), step.stamp_ns());
   if (!turn) {
     if (step_) locator_->forget();
@@ -257,7 +256,7 @@ void MapMatcherService::move(const Turn& turn, int64_t to_ns) {
 void MapMatcherService::move_without_camera(int64_t to_ns) {
   const double dt_s = core::seconds(to_ns - moved_ns_);
   // A clock that was set back leaves it in the future.
-  if (moved_ns_ == 0 || dt_s > kLostS || dt_s < -kOldStateS) {
+  if (moved_ns_ == 0 || dt_s > kLostS || dt_s < -FollowedPath::kOldStateS) {
     if (moved_ns_ != 0) chooser_.emplace(config_.track_parameters(), map_, ways_);
     moved_ns_ = to_ns;
     return;
@@ -309,7 +308,7 @@ void MapMatcherService::use(const msg::TrackView& view) {
   if (chooser_ && prior_at(view.stamp_ns())) chooser_->see(view.curvature_per_m(), std::sqrt(variance));
   if (!curvature_ || !config_.use_curvature || !step_ || step_->valid() == 0) return;
   const double dt_s = core::seconds(view.stamp_ns() - step_->stamp_ns());
-  if (std::abs(dt_s) > kOldStateS || std::abs(step_->speed_mps()) < config_.least_speed_mps) return;
+  if (std::abs(dt_s) > FollowedPath::kOldStateS || std::abs(step_->speed_mps()) < config_.least_speed_mps) return;
   // A short view does not tell how the curvature changes: it is that of the middle of what is seen, and at the foot it
   // is unsure by as much as the rate may make of that way. A long view tells both, and the curvature is that at the
   // foot.

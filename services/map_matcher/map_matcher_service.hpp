@@ -15,6 +15,7 @@
 #include "map_matcher/network_locator.hpp"
 #include "map_matcher/step_chain.hpp"
 #include "map_matcher/track_chooser.hpp"
+#include "service/left_out.hpp"
 #include "service/service.hpp"
 
 namespace railfix::map_matcher {
@@ -69,7 +70,7 @@ class MapMatcherService {
   std::optional<msg::TrainState> state_;
   std::optional<msg::OdometryStep> step_;
   StepChain chain_;  // of all steps so far
-  LeftOut left_out_;
+  service::LeftOut left_out_;
   int64_t rails_seen_ns_ = 0;
   std::optional<TrackChooser> chooser_;
   std::optional<NetworkLocator> locator_;  // only while the place is not known

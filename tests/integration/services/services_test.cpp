@@ -116,6 +116,16 @@ TEST_P(EveryService, GetsReadyWithNoOtherRightsThanItsOwn) {
   fs::remove_all(folder);
 }
 
+TEST(Services, KeysThatCannotWorkTogetherAreRefused) {
+  const auto refused = [](const std::string& setting) {
+    const auto checked = test::run_program(
+        {"railfix-map-matcher", "--check", "--set", setting, "--set", "map_matcher.locator.least_way_m=3000"}, 10);
+    return checked.exit_code == 2 ? checked.err : "accepted";
+  };
+  EXPECT_THAT(refused("map_matcher.locator.window_m=2000"), HasSubstr("window_m is less than least_way_m"));
+  EXPECT_THAT(refused("map_matcher.track.view_from_m=25"), HasSubstr("view_from_m must be less than view_to_m"));
+}
+
 INSTANTIATE_TEST_SUITE_P(Railfix, EveryService, ::testing::ValuesIn(service::service_names()),
                          [](const auto& name) { return name.param; });
 

@@ -111,17 +111,6 @@ TEST(Inputs, WhatDividesIsNotZeroAndProbabilitiesAreSuch) {
   EXPECT_TRUE(has_sense(step)) << "says nothing but that it was not measured";
 }
 
-TEST(Inputs, WhatIsLeftOutIsCountedAndToldForSomeSeconds) {
-  LeftOut left_out;
-  EXPECT_EQ(left_out.sentence(0), "");
-  left_out.add("track_view", 1'000'000'000);
-  left_out.add("odometry_step", 2'000'000'000);
-  left_out.add("odometry_step", 3'000'000'000);
-  EXPECT_EQ(left_out.sentence(4'000'000'000),
-            "2 of odometry_step were left out: their values are no numbers, or such as no train has");
-  EXPECT_EQ(left_out.sentence(60'000'000'000), "");
-}
-
 TEST(Inputs, TheTrackIsChosenWhateverOneInputWas) {
   const auto map = fork();
   const auto sight = [](TrackChooser& chooser, double Sighting::*field, double none) {

@@ -98,5 +98,22 @@ TEST_F(ConfigTest, DocumentationIsAValidConfigurationWithTheDefaults) {
   EXPECT_EQ(config.value().speed_mps, 10);
 }
 
+struct LargeNumbers {
+  int64_t nid = 0;
+  double way_m = 2e6;
+  void describe(Fields& fields) {
+    fields.integer("nid", nid, {0, 16777215}, "", "Identity.");
+    fields.number("way_m", way_m, {1e-5, 1e7}, "m", "Way.");
+  }
+};
+
+TEST_F(ConfigTest, WholeNumbersAreWrittenInFull) {
+  EXPECT_THAT(document_config<LargeNumbers>("odometry"),
+              HasSubstr("# Identity. [0 to 16777215]\n  nid: 0\n  # Way. [m, 1e-05 to 10000000]\n  way_m: 2000000\n"));
+  const auto config = read_config<LargeNumbers>("odometry", write("odometry: {nid: 16777216}\n"));
+  ASSERT_FALSE(config.ok());
+  EXPECT_THAT(config.error().message, HasSubstr("odometry.nid 16777216 is outside 0 to 16777215"));
+}
+
 }  // namespace
 }  // namespace railfix::service
