@@ -73,7 +73,8 @@ struct FusionConfig {
              "Accelerometer bias with the mount's tilt (1 degree is 0.17).");
     f.number("accel_bias_walk", p.accel_bias_walk, {0, 1}, "m/s^2/sqrt(s)", "How fast the bias may wander.");
     f.number("unknown_grade", p.unknown_grade, {0, 0.1}, "", "Grade to be expected where no map tells it ...");
-    f.number("unknown_grade_m", p.unknown_grade_m, {10, 1e5}, "m", "... and the way over which it becomes another one.");
+    f.number("unknown_grade_m", p.unknown_grade_m, {10, 1e5}, "m",
+             "... and the way over which it becomes another one.");
     f.number("gyro_period_s", p.gyro_period_s, {0.1, 10}, "s",
              "Turning is compared with the map's curvature as a mean over this time.");
     f.number("gyro_sigma_rps", p.gyro_sigma_rps, {1e-5, 1}, "rad/s", "Noise of such a mean, with the body's motion.");
@@ -111,7 +112,8 @@ struct FusionConfig {
     f.number("unusable_budgets", p.unusable_budgets, {1, 1000}, "", "An interval of so many budgets is no position.");
     f.number("sensor_timeout_s", p.sensor_timeout_s, {0.02, 60}, "s", "A sensor silent for longer is reported.");
     f.number("output_period_s", p.output_period_s, {0.01, 1}, "s", "Period of train_state without a camera.");
-    f.number("history_s", p.history_s, {0.1, 60}, "s", "A measurement that comes later than this is left out.");
+    f.number("history_s", p.history_s, {1.2, 60}, "s",
+             "A measurement that comes later than this is left out; slips are taken back over 1.2 s.");
     f.number("max_jump_s", p.max_jump_s, {0.1, 3600}, "s", "A stamp further ahead is not believed at once.");
   }
 };

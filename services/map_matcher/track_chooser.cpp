@@ -6,6 +6,7 @@
 
 #include "map_matcher/inputs.hpp"
 #include "map_matcher/picture_fits.hpp"
+#include "track/declared.hpp"
 
 namespace railfix::map_matcher {
 namespace {
@@ -367,7 +368,8 @@ void TrackChooser::see(double curvature_per_m, double sigma_per_m) {
 std::optional<TrackChoice> TrackChooser::choice() const {
   if (hypotheses_.empty()) return std::nullopt;
   if (hypotheses_.size() == 1) {
-    return TrackChoice{{{hypotheses_.front().route.position_at(place_m_), told_}}, told_ >= parameters_.declare};
+    return TrackChoice{{{hypotheses_.front().route.position_at(place_m_), told_}},
+                       told_ >= track::kDeclaredProbability};
   }
   struct Sum {
     track::EdgePosition place;
@@ -387,7 +389,7 @@ std::optional<TrackChoice> TrackChooser::choice() const {
   for (const auto& [edge, sum] : by_edge) choice.options.push_back({sum.place, told_ * std::exp(sum.log - all)});
   std::sort(choice.options.begin(), choice.options.end(),
             [](const TrackOption& a, const TrackOption& b) { return a.probability > b.probability; });
-  choice.known = choice.options.front().probability >= parameters_.declare;
+  choice.known = choice.options.front().probability >= track::kDeclaredProbability;
   return choice;
 }
 

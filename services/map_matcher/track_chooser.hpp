@@ -58,7 +58,6 @@ class TrackChooser {
   [[nodiscard]] std::optional<TrackChoice> choice() const;
   /// Whose turning was used last.
   [[nodiscard]] TurnSensor sensor() const { return sensor_; }
-  [[nodiscard]] size_t hypotheses() const { return hypotheses_.size(); }
 
  private:
   /// What the pictures showed: their errors are not independent, since a detector that follows the other leg goes on to
