@@ -12,9 +12,7 @@ constexpr double kAtWorkS = 0.3;
 constexpr double kRestM = 0.05;  // a train that moved less than this ...
 constexpr double kRestS = 1.0;   // ... for so long stands still
 constexpr double kRestSpeedSigmaMps = 0.3;
-constexpr double kLatelyS = 1.0;
-constexpr double kBridgeS = 10.0;  // as long as the IMU alone is good for a place
-constexpr double kRebaseS = 0.1;   // lost when the clock is set
+constexpr double kRebaseS = 0.1;  // lost when the clock is set
 constexpr double kRhythmS = 0.003;
 constexpr double kGapS = 0.05;
 constexpr int kRhythmSamples = 10;
@@ -66,7 +64,7 @@ void Estimator::apply(const Event& event) {
   fix_verdict_ = FixVerdict::none;
   fix_offer_ = {};
   fix_again_ = false;
-  notice_gap(std::visit([](const auto& input) { return input.stamp_ns; }, event));
+  notice_gap(stamp_of(event));
   std::visit(
       [this](const auto& input) {
         // Inertial samples are many and only their mean is used: they move the filter when it is complete.

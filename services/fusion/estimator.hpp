@@ -186,6 +186,9 @@ class Estimator {
     double ahead_m = 0;
   };
   static constexpr int kGnssProof = 30;
+  static constexpr int kRefusalsToIsolate = 3;  // in a row
+  static constexpr double kLatelyS = 1.0;
+  static constexpr double kBridgeS = 10.0;  // as long as the IMU alone is good for place and speed
   enum class FixVerdict : uint8_t { none, used, corrected, refused };
   struct RefusedFix {
     double residual_m = 0;
@@ -262,7 +265,7 @@ class Estimator {
   Offer fix_offer_;           // of the last fix
   int landmarks_agreed_ = 0;  // in a row
   std::optional<RefusedFix> refused_fix_;
-  int gnss_agreed_ = 0;     // in a row
+  int gnss_agreed_ = 0;     // fixes, since three in a row were refused
   bool corrected_ = false;  // the place was moved against the filter's word, not confirmed yet
   uint32_t reference_ = 0;
   std::array<uint32_t, 16> met_{};  // landmarks that were used last, newest first; 0 = none

@@ -10,7 +10,6 @@
 namespace railfix::fusion {
 namespace {
 
-constexpr int kRefusalsToIsolate = 3;
 constexpr int kRefusalsToDoubt = 10;
 constexpr int kAgreementsOfCamera = 10;
 constexpr int kAgreementsOfImu = 60;
@@ -28,8 +27,6 @@ constexpr double kScatterResolutions = 3.0;
 constexpr double kSilentS = 1.0;
 constexpr double kSilentSlip = 0.1;           // share of the way
 constexpr double kGyroPositionSigmaM = 30.0;  // within which the curvature may be taken as linear
-constexpr double kLatelyS = 1.0;
-constexpr double kBridgeS = 10.0;  // as long as the IMU alone is good for a speed
 constexpr double kTaughtS = 30.0;
 constexpr double kSleeperM = 0.7;  // one more or less: the odd error of a step
 constexpr double kBlindS = 0.3;

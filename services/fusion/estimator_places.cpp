@@ -9,7 +9,6 @@
 namespace railfix::fusion {
 namespace {
 
-constexpr int kRefusalsToIsolate = 3;
 constexpr int kAgreementsOfGnss = 5;  // in a row: where it scatters one agrees by chance
 constexpr double kForgotten = 2.0;    // of a landmark's sigmas is the place's when the way since has outgrown it
 constexpr double kOffTrackM = 15.0;   // a GNSS fix further beside the track is none
@@ -24,13 +23,13 @@ double gnss_sigma_m(const GnssInput& sample, const FusionParameters& p) {
   return p.gnss_single_sigma_m * hdop;
 }
 
-struct Projection {
+struct FootOnPath {
   double distance_m;
   double lateral_m;
 };
 
 // Newton steps along the path; converges in two or three because the start is near.
-Projection project(const track::Path& path, double start_m, double easting_m, double northing_m) {
+FootOnPath foot_on_path(const track::Path& path, double start_m, double easting_m, double northing_m) {
   double s = start_m;
   double lateral_m = 0;
   for (int k = 0; k < 6; ++k) {
@@ -57,7 +56,7 @@ void Estimator::use(const GnssInput& sample) {
     gnss_agreed_ = 0;
     return;
   }
-  const auto place = project(*path_, filter_.path_distance_m(), sample.easting_m, sample.northing_m);
+  const auto place = foot_on_path(*path_, filter_.path_distance_m(), sample.easting_m, sample.northing_m);
   const double once_m = std::hypot(gnss_sigma_m(sample, *parameters_), parameters_->gnss_map_sigma_m);
   const double foot_m = place.distance_m - parameters_->gnss_antenna_ahead_m;
   const bool beside = std::abs(place.lateral_m) > kOffTrackM + 3 * once_m;
@@ -95,8 +94,7 @@ void Estimator::use(const FixInput& fix) {
     if (path_) use_track(fix);
     return;
   }
-  auto& watch = watched(fix.kind == FixKind::curvature ? Source::curvature : Source::landmark);
-  watch.seen_ns = fix.stamp_ns;
+  watched(fix.kind == FixKind::curvature ? Source::curvature : Source::landmark).seen_ns = fix.stamp_ns;
   if (fix.new_path) {
     path_ = fix.new_path;
     filter_.set_origin(0, std::hypot(fix.sigma_m, parameters_->fix_sigma_floor_m));
@@ -122,7 +120,6 @@ void Estimator::use(const FixInput& fix) {
     accept(fix);
     if (fix_used() && fix.kind == FixKind::landmark && !fix_again_) ++landmarks_agreed_;
   } else {
-    ++watch.refused;
     refuse(fix, *path_distance_m, fix_offer_);
   }
 }

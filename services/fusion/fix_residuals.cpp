@@ -4,12 +4,12 @@
 #include <cmath>
 #include <utility>
 
+#include "core/median.hpp"
 #include "fusion/jump_evidence.hpp"
 
 namespace railfix::fusion {
 namespace {
 
-constexpr double kSigmaOfMedian = 1.483;  // of absolute values of a normal distribution
 constexpr size_t kLegs = 2;
 constexpr double kShortestLegM = 200.0;  // one that is shorter tells of the landmarks at its ends
 constexpr double kMostPerM = 0.03;
@@ -31,7 +31,7 @@ double FixResiduals::scatter_m() const {
   };
   // Three of five that keep their word are so far off in 2 of 100,000 cases.
   if (count_ < kFixes || median(&Residual::sigmas) < kUnlikelySigmas) return 0;
-  return kSigmaOfMedian * median(&Residual::metres);
+  return core::kSigmaOfMedian * median(&Residual::metres);
 }
 
 double FixResiduals::error_per_m() const {

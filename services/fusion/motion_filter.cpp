@@ -31,9 +31,8 @@ MotionFilter::MotionFilter(const FusionParameters& parameters, const OdometerSca
     : stamp_ns_(stamp_ns), known_before_(scales), x_(StateVector::Zero(kCore)) {
   StateVector sigma(kCore);
   sigma << 0.0, 0.0, origin_known ? parameters.start_sigma_m : kUnknownPositionM, kUnknownSpeedMps,
-      parameters.acceleration_sigma_mps2,
-      parameters.accel_bias_sigma_mps2,
-      scales.camera_sigma, scales.wheel_sigma, kUnknownPositionM, 0.01, parameters.shape_error_sigma_m, 1.0;
+      parameters.acceleration_sigma_mps2, parameters.accel_bias_sigma_mps2, scales.camera_sigma, scales.wheel_sigma,
+      kUnknownPositionM, 0.01, parameters.shape_error_sigma_m, 1.0;
   ud_ = estimation::UdFilter(StateVector(sigma.cwiseAbs2()));
 }
 

@@ -20,11 +20,10 @@ void SlipWatch::wheel(int64_t stamp_ns, double wheel_m) {
   wheel_last_ = {stamp_ns, wheel_m};
 }
 
-SlipWatch SlipWatch::with_wheel_only() const {
-  SlipWatch fresh;
-  fresh.wheel_before_ = wheel_before_;
-  fresh.wheel_last_ = wheel_last_;
-  return fresh;
+void SlipWatch::no_picture() {
+  pictures_.clear();
+  marks_.clear();
+  steps_ = 0;
 }
 
 // Extrapolated over less than one period with the wheel's own speed.

@@ -16,7 +16,7 @@ class SlipWatch {
  public:
   void wheel(int64_t stamp_ns, double wheel_m);
   /// The camera measured nothing or nothing credible: the comparison begins anew.
-  void no_picture() { *this = with_wheel_only(); }
+  void no_picture();
 
   /// Way over the comparison window, by both.
   struct Ways {
@@ -39,7 +39,6 @@ class SlipWatch {
     double wheel_m = 0;
     int steps = 0;
   };
-  [[nodiscard]] SlipWatch with_wheel_only() const;
   [[nodiscard]] std::optional<double> wheel_at(int64_t stamp_ns) const;
 
   Reading wheel_before_;

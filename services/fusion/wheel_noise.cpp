@@ -3,15 +3,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/median.hpp"
 #include "core/time.hpp"
 
 namespace railfix::fusion {
 namespace {
 
-constexpr double kPauseS = 0.5;           // readings further apart are not compared
-constexpr double kOrdinaryMps2 = 2.0;     // what driving does to the speed is no noise
-constexpr double kSigmaOfMedian = 1.483;  // of absolute values of a normal distribution
-constexpr double kSigmasOfJump = 2.449;   // a jump has three readings in it: 1 + 4 + 1
+constexpr double kPauseS = 0.5;          // readings further apart are not compared
+constexpr double kOrdinaryMps2 = 2.0;    // what driving does to the speed is no noise
+constexpr double kSigmasOfJump = 2.449;  // a jump has three readings in it: 1 + 4 + 1
 
 }  // namespace
 
@@ -35,7 +35,7 @@ double WheelNoise::sigma_m() const {
   if (count_ < kJumps) return 0;
   auto jumps_m = jumps_m_;
   std::nth_element(jumps_m.begin(), jumps_m.begin() + kJumps / 2, jumps_m.end());
-  return kSigmaOfMedian / kSigmasOfJump * jumps_m[kJumps / 2];
+  return core::kSigmaOfMedian / kSigmasOfJump * jumps_m[kJumps / 2];
 }
 
 }  // namespace railfix::fusion

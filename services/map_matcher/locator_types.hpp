@@ -93,6 +93,9 @@ struct TurnSum {
   double bias_error = 0;
 };
 
+/// Tracks within that of each other, in about the same direction, lie beside each other.
+inline constexpr double kBesideM = 40.0;
+
 /// How well turns and landmarks of a mapped way fit the measured ones.
 class TurnModel {
  public:

@@ -10,7 +10,6 @@
 namespace railfix::map_matcher {
 namespace {
 
-constexpr double kBesideM = 40.0;
 constexpr double kSettledM = 100.0;  // behind a switch
 constexpr double kLeastSigmaM = 3.0;
 constexpr size_t kAnewBins = 50;

@@ -21,7 +21,6 @@ constexpr WayFitter::Effort kFirst{3, 10, 4.0};
 constexpr WayFitter::Effort kFull{5, 120, 10.0};
 constexpr double kSamePlaceM = 60.0;
 constexpr double kRepeatedM = 45.0;
-constexpr double kBesideM = 40.0;
 
 bool same_way(const WayFit& a, const WayFit& b) {
   const auto at = place_on(a.runs, a.end_m);

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "core/median.hpp"
+
 namespace railfix::track_detector {
 namespace {
 
@@ -58,7 +60,7 @@ geometry::CameraPose median_pose(const std::vector<TrackObservation>& observatio
     for (const auto& o : observations) values.push_back(o.shape.camera.*member);
     middle.*member = median(values);
     for (auto& value : values) value = std::abs(value - middle.*member);
-    if (spread != nullptr) spread->*member = 1.4826 * median(values);
+    if (spread != nullptr) spread->*member = core::kSigmaOfMedian * median(values);
   }
   return middle;
 }

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "core/median.hpp"
 #include "estimation/robust_least_squares.hpp"
 
 namespace railfix::track_detector {
@@ -151,7 +152,7 @@ class Builder {
     return true;
   }
 
-  /// The points' sigmas from their scatter: 1.4826 times the median residual, made good for the unknowns. They only
+  /// The points' sigmas from their scatter: kSigmaOfMedian times the median residual, made good for the unknowns. They only
   /// become smaller: larger ones would let wild points in. Returns the factor that the scatter asks for.
   double scale_sigmas(double least) {
     if (points_.size() <= kShapeSize) return 1;
@@ -160,7 +161,7 @@ class Builder {
     const auto middle = ratios_.begin() + static_cast<std::ptrdiff_t>(ratios_.size() / 2);
     std::nth_element(ratios_.begin(), middle, ratios_.end());
     const auto count = static_cast<double>(points_.size());
-    const double factor = std::max(least, 1.4826 * *middle * std::sqrt(count / (count - kFixedByRails)));
+    const double factor = std::max(least, core::kSigmaOfMedian * *middle * std::sqrt(count / (count - kFixedByRails)));
     for (auto& point : points_) point.sigma_px *= std::min(1.0, factor);
     return factor;
   }

@@ -91,9 +91,6 @@ class TrainSimulation {
   TrainSimulation(const SimulationPlan& plan, uint64_t seed, std::shared_ptr<const track::Map> map,
                   const track::EdgePosition& start);
 
-  static int64_t stamp(const fusion::Event& event) {
-    return std::visit([](const auto& input) { return input.stamp_ns; }, event);
-  }
   /// What fusion is told of the start, if anything.
   [[nodiscard]] std::optional<track::EdgePosition> start() const;
   /// Truth at a stamp; arrival_s: when fusion said it (a clock that was set back gives every stamp twice).

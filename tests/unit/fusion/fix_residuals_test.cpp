@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "core/median.hpp"
+
 namespace railfix::fusion {
 namespace {
 
@@ -18,7 +20,7 @@ TEST(FixResiduals, MostOfFiveAreBeyondTheirSigmaTwoAreNot) {
   for (uint32_t landmark = 4; landmark < 6; ++landmark) residuals.add(landmark, -1.5, 10, 500);
   EXPECT_EQ(residuals.scatter_m(), 0);
   residuals.add(6, 1.0, 7, 500);
-  EXPECT_NEAR(residuals.scatter_m(), 1.483, 1e-9);
+  EXPECT_NEAR(residuals.scatter_m(), core::kSigmaOfMedian, 1e-9);
   for (uint32_t landmark = 7; landmark < 10; ++landmark) residuals.add(landmark, 0.1, 0.7, 500);
   EXPECT_EQ(residuals.scatter_m(), 0);
 }

@@ -110,7 +110,7 @@ void expect_the_same_in_any_order(const train::SimulationPlan& plan, uint64_t se
     if (std::holds_alternative<OdometryInput>(event)) delay_ns = 80'000'000;
     if (std::holds_alternative<FixInput>(event)) delay_ns = 900'000'000;
     if (std::holds_alternative<GnssInput>(event)) delay_ns = 300'000'000;
-    arrivals.emplace_back(train::TrainSimulation::stamp(event) + delay_ns, event);
+    arrivals.emplace_back(stamp_of(event) + delay_ns, event);
   }
   std::stable_sort(arrivals.begin(), arrivals.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   for (const auto& [when, event] : arrivals) mixed.add(event);
