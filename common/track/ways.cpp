@@ -81,7 +81,8 @@ EdgePosition Route::position_at(double distance_m) const {
 std::optional<double> Route::distance_of(const EdgePosition& place, double near_m) const {
   std::optional<double> best;
   for (const Leg& leg : legs_) {
-    if (leg.run.edge->id != place.edge || leg.run.forward != (place.direction != Direction::reverse)) continue;
+    if (leg.run.edge->id != place.edge) continue;
+    if (place.direction != Direction::unknown && leg.run.forward != (place.direction == Direction::forward)) continue;
     const double distance = leg.begin_m + (leg.run.forward ? place.offset_m : leg.run.length_m() - place.offset_m);
     if (!best || std::abs(distance - near_m) < std::abs(*best - near_m)) best = distance;
   }

@@ -3,12 +3,12 @@
 
 #include <string>
 
-#include "map_matcher/curvature_matcher.hpp"
-#include "map_matcher/curve_exit_matcher.hpp"
-#include "map_matcher/gyro_turn.hpp"
 #include "map_matcher/landmark_matcher.hpp"
-#include "map_matcher/network_locator.hpp"
-#include "map_matcher/track_chooser.hpp"
+#include "map_matcher/locate/network_locator.hpp"
+#include "map_matcher/shape/curvature_matcher.hpp"
+#include "map_matcher/shape/curve_exit_matcher.hpp"
+#include "map_matcher/track_choice/gyro_turn.hpp"
+#include "map_matcher/track_choice/track_chooser.hpp"
 #include "service/config.hpp"
 
 namespace railfix::map_matcher {

@@ -5,16 +5,16 @@
 #include <memory>
 #include <optional>
 
-#include "map_matcher/curvature_matcher.hpp"
-#include "map_matcher/curve_exit_matcher.hpp"
 #include "map_matcher/followed_path.hpp"
-#include "map_matcher/gyro_turn.hpp"
 #include "map_matcher/inputs.hpp"
 #include "map_matcher/landmark_matcher.hpp"
+#include "map_matcher/locate/network_locator.hpp"
 #include "map_matcher/map_matcher_config.hpp"
-#include "map_matcher/network_locator.hpp"
+#include "map_matcher/shape/curvature_matcher.hpp"
+#include "map_matcher/shape/curve_exit_matcher.hpp"
 #include "map_matcher/step_chain.hpp"
-#include "map_matcher/track_chooser.hpp"
+#include "map_matcher/track_choice/gyro_turn.hpp"
+#include "map_matcher/track_choice/track_chooser.hpp"
 #include "service/left_out.hpp"
 #include "service/service.hpp"
 

@@ -10,8 +10,8 @@
 
 #include "core/time.hpp"
 #include "core/units.hpp"
-#include "map_matcher/gyro_turn.hpp"
-#include "map_matcher/track_chooser.hpp"
+#include "map_matcher/track_choice/gyro_turn.hpp"
+#include "map_matcher/track_choice/track_chooser.hpp"
 #include "support/sensed_ride.hpp"
 
 namespace railfix::testing {

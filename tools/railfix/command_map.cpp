@@ -13,7 +13,7 @@
 #include "number_between.hpp"
 #include "output_file.hpp"
 #include "track/import/build.hpp"
-#include "track/import/made_network.hpp"
+#include "track/import/made/made_network.hpp"
 #include "track/import/scale.hpp"
 #include "whole_number.hpp"
 

@@ -6,7 +6,7 @@
 #include "commands.hpp"
 #include "core/csv_table.hpp"
 #include "core/result.hpp"
-#include "map_matcher/network_locator.hpp"
+#include "map_matcher/locate/network_locator.hpp"
 #include "number_between.hpp"
 
 namespace railfix::tool {

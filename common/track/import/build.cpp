@@ -5,15 +5,15 @@
 #include <fstream>
 
 #include "core/whole_file.hpp"
-#include "track/import/erju.hpp"
 #include "track/import/finish.hpp"
-#include "track/import/landxml.hpp"
 #include "track/import/local_crs.hpp"
 #include "track/import/network.hpp"
-#include "track/import/osm_network.hpp"
-#include "track/import/railml.hpp"
+#include "track/import/osm/osm_network.hpp"
 #include "track/import/scale.hpp"
-#include "track/import/xml_root.hpp"
+#include "track/import/xml/erju.hpp"
+#include "track/import/xml/landxml.hpp"
+#include "track/import/xml/railml.hpp"
+#include "track/import/xml/xml_root.hpp"
 
 namespace railfix::track {
 namespace {

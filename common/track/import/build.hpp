@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/result.hpp"
-#include "track/import/clothoid_fit.hpp"
+#include "track/import/fit/clothoid_fit.hpp"
 #include "track/import/tracks.hpp"
 #include "track/map.hpp"
 

@@ -10,11 +10,11 @@
 
 #include "core/random.hpp"
 #include "measuring_tool.hpp"
-#include "track/import/biarc.hpp"
-#include "track/import/clothoid_fit.hpp"
-#include "track/import/landxml.hpp"
-#include "track/import/made_lines.hpp"
-#include "track/import/smooth.hpp"
+#include "track/import/fit/biarc.hpp"
+#include "track/import/fit/clothoid_fit.hpp"
+#include "track/import/fit/smooth.hpp"
+#include "track/import/made/made_lines.hpp"
+#include "track/import/xml/landxml.hpp"
 #include "whole_number.hpp"
 
 namespace {

@@ -6,8 +6,8 @@
 #include <cstdio>
 
 #include "core/units.hpp"
-#include "map_matcher/curvature_matcher.hpp"
-#include "map_matcher/curve_exit_matcher.hpp"
+#include "map_matcher/shape/curvature_matcher.hpp"
+#include "map_matcher/shape/curve_exit_matcher.hpp"
 #include "matching.hpp"
 #include "support/sensed_ride.hpp"
 #include "track/import/build.hpp"

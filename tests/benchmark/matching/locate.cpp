@@ -7,7 +7,7 @@
 #include "locate_trip.hpp"
 #include "matching.hpp"
 #include "track/import/build.hpp"
-#include "track/import/made_network.hpp"
+#include "track/import/made/made_network.hpp"
 
 namespace railfix::measure {
 namespace {

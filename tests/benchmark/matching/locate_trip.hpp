@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/random.hpp"
-#include "map_matcher/network_locator.hpp"
+#include "map_matcher/locate/network_locator.hpp"
 #include "matching.hpp"
 
 namespace railfix::measure {

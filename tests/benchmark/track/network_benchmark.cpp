@@ -5,7 +5,7 @@
 #include <filesystem>
 
 #include "core/random.hpp"
-#include "track/import/made_network.hpp"
+#include "track/import/made/made_network.hpp"
 #include "track/track_finder.hpp"
 
 namespace {

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "fusion/fusion.hpp"
-#include "map_matcher/curvature_matcher.hpp"
 #include "map_matcher/followed_path.hpp"
 #include "map_matcher/landmark_matcher.hpp"
+#include "map_matcher/shape/curvature_matcher.hpp"
 #include "map_matcher/step_chain.hpp"
 #include "support/train/simulation.hpp"
 

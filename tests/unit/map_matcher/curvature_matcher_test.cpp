@@ -1,4 +1,4 @@
-#include "map_matcher/curvature_matcher.hpp"
+#include "map_matcher/shape/curvature_matcher.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 
 #include "core/random.hpp"
 #include "core/result.hpp"
-#include "map_matcher/curve_exit_matcher.hpp"
+#include "map_matcher/shape/curve_exit_matcher.hpp"
 
 namespace railfix::map_matcher {
 namespace {

@@ -1,4 +1,4 @@
-#include "map_matcher/gyro_turn.hpp"
+#include "map_matcher/track_choice/gyro_turn.hpp"
 
 #include <gtest/gtest.h>
 

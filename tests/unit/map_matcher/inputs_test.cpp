@@ -9,10 +9,10 @@
 #include <memory>
 #include <vector>
 
-#include "map_matcher/curvature_matcher.hpp"
-#include "map_matcher/gyro_turn.hpp"
 #include "map_matcher/landmark_matcher.hpp"
-#include "map_matcher/track_chooser.hpp"
+#include "map_matcher/shape/curvature_matcher.hpp"
+#include "map_matcher/track_choice/gyro_turn.hpp"
+#include "map_matcher/track_choice/track_chooser.hpp"
 #include "unit/map_matcher/fork_map.hpp"
 
 namespace railfix::map_matcher {

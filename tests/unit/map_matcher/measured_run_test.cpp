@@ -1,4 +1,4 @@
-#include "map_matcher/measured_run.hpp"
+#include "map_matcher/locate/measured_run.hpp"
 
 #include <gtest/gtest.h>
 

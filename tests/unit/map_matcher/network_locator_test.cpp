@@ -1,4 +1,4 @@
-#include "map_matcher/network_locator.hpp"
+#include "map_matcher/locate/network_locator.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "map_matcher/track_chooser.hpp"
+#include "map_matcher/track_choice/track_chooser.hpp"
 
 #include <gtest/gtest.h>
 

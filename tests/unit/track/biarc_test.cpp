@@ -1,4 +1,4 @@
-#include "track/import/biarc.hpp"
+#include "track/import/fit/biarc.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 
 #include "core/random.hpp"
 #include "core/units.hpp"
-#include "track/import/smooth.hpp"
+#include "track/import/fit/smooth.hpp"
 
 namespace railfix::track {
 namespace {

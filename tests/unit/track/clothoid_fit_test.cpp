@@ -1,12 +1,12 @@
-#include "track/import/clothoid_fit.hpp"
+#include "track/import/fit/clothoid_fit.hpp"
 
 #include <cmath>
 
 #include "core/random.hpp"
 #include "core/units.hpp"
 #include "import_fixture.hpp"
-#include "track/import/biarc.hpp"
-#include "track/import/landxml.hpp"
+#include "track/import/fit/biarc.hpp"
+#include "track/import/xml/landxml.hpp"
 
 namespace railfix::track {
 namespace {

@@ -1,4 +1,4 @@
-#include "track/import/landxml.hpp"
+#include "track/import/xml/landxml.hpp"
 
 #include <pugixml.hpp>
 #include <sstream>

@@ -1,4 +1,4 @@
-#include "track/import/made_network.hpp"
+#include "track/import/made/made_network.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 #include <set>
 
 #include "track/import/finish.hpp"
-#include "track/import/made_lines.hpp"
+#include "track/import/made/made_lines.hpp"
 #include "track/path.hpp"
 
 namespace railfix::track {

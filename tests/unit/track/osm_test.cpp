@@ -6,7 +6,7 @@
 #include "import_fixture.hpp"
 #include "track/import/build.hpp"
 #include "track/import/finish.hpp"
-#include "track/import/osm_network.hpp"
+#include "track/import/osm/osm_network.hpp"
 #include "track/import/scale.hpp"
 #include "track/path.hpp"
 

@@ -10,7 +10,7 @@
 #include "core/units.hpp"
 #include "import_fixture.hpp"
 #include "track/import/build.hpp"
-#include "track/import/osm_data.hpp"
+#include "track/import/osm/osm_data.hpp"
 
 namespace railfix::track {
 namespace {

@@ -7,8 +7,8 @@
 #include "core/units.hpp"
 #include "import_fixture.hpp"
 #include "track/import/build.hpp"
-#include "track/import/erju.hpp"
-#include "track/import/railml.hpp"
+#include "track/import/xml/erju.hpp"
+#include "track/import/xml/railml.hpp"
 #include "track/path.hpp"
 
 namespace railfix::track {

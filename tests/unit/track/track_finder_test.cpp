@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "core/random.hpp"
-#include "track/import/made_network.hpp"
+#include "track/import/made/made_network.hpp"
 
 namespace railfix::track {
 namespace {

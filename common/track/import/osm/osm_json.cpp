@@ -1,0 +1,300 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "core/json_text.hpp"
+#include "core/whole_file.hpp"
+#include "track/import/osm/osm_data.hpp"
+
+namespace railfix::track {
+namespace {
+
+using nlohmann::json;
+
+OsmTags tags_in(const json& object, const char* key) {
+  OsmTags tags;
+  const auto found = object.find(key);
+  if (found == object.end() || !found->is_object()) return tags;
+  for (const auto& [name, value] : found->items()) {
+    if (value.is_string()) tags.emplace(name, value.get<std::string>());
+  }
+  return tags;
+}
+
+bool plausible(const GeoPoint& place) {
+  return std::abs(place.lat_deg) <= 90.0 && std::abs(place.lon_deg) <= 180.0;
+}
+
+/// Beginning of a value, for a message; in ASCII, so that no letter is cut in two.
+std::string text_of(const json& value) {
+  constexpr size_t kMost = 60;
+  const std::string text = value.dump(-1, ' ', true);
+  return text.size() > kMost ? text.substr(0, kMost) + "..." : text;
+}
+
+const json& member(const json& object, const char* key) {
+  const auto found = object.find(key);
+  if (found == object.end()) throw core::BadInput("there is no \"" + std::string(key) + "\"");
+  return *found;
+}
+
+double degrees_in(const json& value) {
+  if (!value.is_number()) throw core::BadInput(text_of(value) + " is not a number of degrees");
+  return value.get<double>();
+}
+
+int64_t id_in(const json& value) {
+  if (!value.is_number_integer()) throw core::BadInput(text_of(value) + " is not an id; ids are whole numbers");
+  return value.get<int64_t>();
+}
+
+/// "way 7", or its number in the list where it does not say that; features too.
+std::string called(const json& element, size_t position) {
+  const auto as_text = [&](const char* key) {
+    const auto found = element.is_object() ? element.find(key) : element.end();
+    return found == element.end() ? "" : found->is_string() ? found->get<std::string>() : text_of(*found);
+  };
+  const std::string id = as_text("id");
+  const std::string type = as_text("type");
+  if (!id.empty() && !type.empty()) return type + " " + id;
+  return (type.empty() ? "element " : type + " ") + std::to_string(position + 1) + " of the file";
+}
+
+/// What is wrong within one element names it.
+template <class Read>
+void for_each_element(const json& elements, const Read& read) {
+  for (size_t i = 0; i < elements.size(); ++i) {
+    try {
+      read(elements[i]);
+    } catch (const std::exception& reason) {
+      throw core::BadInput(called(elements[i], i) + ": " + reason.what());
+    }
+  }
+}
+
+std::map<int64_t, OsmTags> platform_outlines(const json& elements, bool with_trams) {
+  std::map<int64_t, OsmTags> out;
+  for_each_element(elements, [&](const json& element) {
+    if (element.value("type", "") != "relation" || !element.contains("members")) return;
+    const OsmTags tags = tags_in(element, "tags");
+    if (!is_platform_relation(tags, with_trams)) return;
+    for (const json& part : element.at("members")) {
+      if (part.value("type", "") == "way" && is_outline(part.value("role", "")))
+        out.emplace(id_in(member(part, "ref")), tags);
+    }
+  });
+  return out;
+}
+
+GeoPoint place_of(const json& lat_lon) {
+  return {degrees_in(member(lat_lon, "lat")), degrees_in(member(lat_lon, "lon"))};
+}
+
+/// GeoJSON coordinates as a node identity: both to 1e-7 degree, as OpenStreetMap stores them.
+int64_t identity(const GeoPoint& place) {
+  const auto lat = static_cast<int64_t>(std::llround((place.lat_deg + 90.0) * 1e7));
+  const auto lon = static_cast<int64_t>(std::llround((place.lon_deg + 180.0) * 1e7));
+  return lat * 3'600'000'001 + lon;
+}
+
+/// Of a way; `out geom;` writes the places into it ("geometry", null where they were cut off) and the nodes may then be
+/// nowhere else.
+std::vector<int64_t> nodes_of(const json& way, OsmData& out) {
+  std::vector<int64_t> nodes;
+  const auto ids = way.find("nodes");
+  const bool has_ids = ids != way.end();
+  if (has_ids) {
+    for (const json& id : *ids) nodes.push_back(id_in(id));
+  }
+  const auto geometry = way.find("geometry");
+  if (geometry == way.end()) return nodes;
+  if (has_ids && geometry->size() != nodes.size())
+    throw core::BadInput("it has " + std::to_string(nodes.size()) + " nodes but " + std::to_string(geometry->size()) +
+                         " places in its geometry");
+  constexpr int64_t kNowhere = -1;  // breaks the line, as a node does that is missing
+  for (size_t i = 0; i < geometry->size(); ++i) {
+    const json& lat_lon = (*geometry)[i];
+    const std::optional<GeoPoint> place = lat_lon.is_null() ? std::nullopt : std::optional(place_of(lat_lon));
+    const bool is_there = place && plausible(*place);
+    if (!has_ids) nodes.push_back(is_there ? identity(*place) : kNowhere);
+    if (is_there) out.nodes.try_emplace(nodes[i], OsmNode{*place, {}});
+  }
+  return nodes;
+}
+
+void read_overpass(const json& elements, bool with_trams, OsmData& out) {
+  const std::map<int64_t, OsmTags> outlines = platform_outlines(elements, with_trams);
+  for_each_element(elements, [&](const json& element) {
+    const std::string type = element.value("type", "");
+    if (type == "node") {
+      const GeoPoint place = place_of(element);
+      if (plausible(place)) out.nodes[id_in(member(element, "id"))] = {place, tags_in(element, "tags")};
+    } else if (type == "way") {
+      OsmTags tags = tags_in(element, "tags");
+      const int64_t id = id_in(member(element, "id"));
+      std::vector<OsmWay>* ways = ways_for(out, tags, with_trams);
+      if (const auto outline = outlines.find(id); ways == nullptr && outline != outlines.end()) {
+        ways = &out.platforms;
+        tags = outline->second;
+      }
+      if (ways != nullptr) ways->push_back({id, nodes_of(element, out), std::move(tags)});
+    }
+  });
+}
+
+GeoPoint place_in(const json& coordinates) {
+  if (!coordinates.is_array() || coordinates.size() < 2)
+    throw core::BadInput(text_of(coordinates) + " is no pair of longitude and latitude");
+  return {degrees_in(coordinates[1]), degrees_in(coordinates[0])};
+}
+
+/// "way/123" -> 123; a number made up (negative) where there is none.
+int64_t number_in(const OsmTags& tags, size_t position) {
+  const auto id = tags.find("@id");
+  const size_t slash = id == tags.end() ? std::string::npos : id->second.find('/');
+  if (slash != std::string::npos) {
+    const int64_t number = std::strtoll(id->second.c_str() + slash + 1, nullptr, 10);
+    if (number > 0) return number;
+  }
+  return -static_cast<int64_t>(position) - 1;
+}
+
+/// Keys that say what a line is; with one of them it is no track, unless it is a train's route.
+constexpr std::array kOtherThings{"aerialway", "aeroway",          "amenity", "barrier",  "boundary", "building",
+                                  "highway",   "landuse",          "leisure", "man_made", "natural",  "pipeline",
+                                  "power",     "public_transport", "route",   "telecom",  "waterway"};
+
+/// The first of these keys; empty where the line says nothing of the kind.
+std::string other_thing(const OsmTags& tags) {
+  const auto* const found =
+      std::find_if(kOtherThings.begin(), kOtherThings.end(), [&](const char* key) { return tags.contains(key); });
+  return found == kOtherThings.end() ? "" : *found;
+}
+
+std::string features_named(size_t count) {
+  return std::to_string(count) + (count == 1 ? " line" : " lines");
+}
+
+class FeatureReader {
+ public:
+  FeatureReader(bool with_trams, OsmData& out) : with_trams_(with_trams), out_(out) {}
+
+  void read(const json& features) {
+    for_each_element(features, [&](const json& feature) {
+      ++number_;
+      const auto geometry = feature.find("geometry");
+      if (geometry == feature.end() || !geometry->is_object() || !geometry->contains("coordinates")) return;
+      add(tags_in(feature, "properties"), geometry->value("type", ""), geometry->at("coordinates"));
+    });
+    if (on_earth_ == 0 && !elsewhere_.empty()) {
+      throw core::BadInput(elsewhere_ +
+                           "; GeoJSON coordinates are longitude, latitude in degrees (WGS 84): convert them, for "
+                           "example by ogr2ogr -t_srs EPSG:4326");
+    }
+    for (const auto& [key, count] : others_)
+      out_.problems.push_back(features_named(count) + " with \"" + key + "\" and no railway: no track, left out");
+    if (silent_lines_ > 0)
+      out_.problems.push_back(features_named(silent_lines_) + " without a word of what it is: taken as track");
+  }
+
+ private:
+  void add(const OsmTags& tags, const std::string& type, const json& coordinates) {
+    if (type == "Point") {
+      const GeoPoint place = place_in(coordinates);
+      if (is_on_earth(place)) {
+        out_.nodes[identity(place)] = {place, tags};
+      } else {
+        tell_elsewhere(1, coordinates, "");
+      }
+    } else if (type == "Polygon" || type == "MultiPolygon") {
+      if (!is_platform(tags, with_trams_)) return;
+      const json parts = type == "Polygon" ? json::array({coordinates}) : coordinates;
+      for (const json& rings : parts) add_line(rings.at(0), tags, out_.platforms);  // the first is the outline
+    } else if (std::vector<OsmWay>* ways = ways_of_line(tags)) {
+      if (type == "LineString") add_line(coordinates, tags, *ways);
+      if (type == "MultiLineString") {
+        for (const json& line : coordinates) add_line(line, tags, *ways);
+      }
+    }
+  }
+
+  /// A line that does not say what it is, or is a train's route, is taken as track.
+  std::vector<OsmWay>* ways_of_line(const OsmTags& tags) {
+    const auto route = tags.find("route");
+    const bool train_route = route != tags.end() && (route->second == "train" || route->second == "railway");
+    const std::string other = other_thing(tags);
+    const bool silent = !tags.contains("railway") && !tags.contains("@id") && other.empty();
+    std::vector<OsmWay>* ways = ways_for(out_, tags, with_trams_);
+    if (ways == nullptr && (train_route || silent)) ways = &out_.ways;
+    if (ways == nullptr && !other.empty()) ++others_[other];
+    if (ways != nullptr && silent) ++silent_lines_;
+    return ways;
+  }
+
+  void add_line(const json& coordinates, const OsmTags& tags, std::vector<OsmWay>& ways) {
+    OsmWay way{number_in(tags, ways.size()), {}, tags};
+    size_t elsewhere = 0;
+    const json* first_elsewhere = nullptr;
+    for (const json& pair : coordinates) {
+      const GeoPoint place = place_in(pair);
+      if (is_on_earth(place)) {
+        way.nodes.push_back(identity(place));
+        out_.nodes[way.nodes.back()].place = place;
+      } else if (++elsewhere == 1) {
+        first_elsewhere = &pair;
+      }
+    }
+    if (elsewhere > 0) tell_elsewhere(elsewhere, *first_elsewhere, ", way/" + std::to_string(way.id));
+    ways.push_back(std::move(way));
+  }
+
+  bool is_on_earth(const GeoPoint& place) {
+    if (!plausible(place)) return false;
+    ++on_earth_;
+    return true;
+  }
+
+  void tell_elsewhere(size_t count, const json& first, const std::string& way) {
+    const std::string told = "feature " + std::to_string(number_) + way + ": the coordinates " + text_of(first) +
+                             (count > 1 ? " and " + std::to_string(count - 1) + " more" : "") + " are not degrees";
+    if (elsewhere_.empty()) elsewhere_ = told;
+    out_.problems.push_back(told + "; left out");
+  }
+
+  bool with_trams_;
+  OsmData& out_;
+  size_t number_ = 0;  // of the feature that is read, from 1
+  std::map<std::string, size_t> others_;
+  size_t silent_lines_ = 0;
+  size_t on_earth_ = 0;
+  std::string elsewhere_;  // the first time that a point was not
+};
+
+}  // namespace
+
+core::Result<OsmData> read_osm_json(const std::filesystem::path& file, bool with_trams) {
+  const auto wrong = [&](const std::string& why) {
+    return core::Error{"cannot read " + file.string() + " as JSON map data: " + why};
+  };
+  const auto text = core::read_whole(file);
+  if (!text.ok()) return text.error();
+  const auto parsed = core::parse_json(text.value());
+  if (!parsed.ok()) return wrong(parsed.error().message);
+  try {
+    const json& document = parsed.value();
+    OsmData out;
+    if (document.is_object() && document.contains("elements")) {
+      read_overpass(document.at("elements"), with_trams, out);
+    } else if (document.is_object() && document.contains("features")) {
+      FeatureReader(with_trams, out).read(document.at("features"));
+    } else {
+      return core::Error{file.string() + " is neither Overpass JSON (\"elements\") nor GeoJSON (\"features\")"};
+    }
+    return out;
+  } catch (const std::exception& reason) {
+    return wrong(reason.what());
+  }
+}
+
+}  // namespace railfix::track

@@ -1,0 +1,102 @@
+#include "track/import/osm/osm_marks.hpp"
+
+#include <charconv>
+#include <cmath>
+
+#include "core/units.hpp"
+
+namespace railfix::track {
+
+namespace {
+
+/// "80" (km/h) or "50 mph"; nothing where it says anything else.
+std::optional<double> speed_mps_of(const std::string& text) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc()) return std::nullopt;
+  const std::string_view unit(end, static_cast<size_t>(text.data() + text.size() - end));
+  if (unit == " mph" || unit == "mph") {
+    value *= 1.609344;
+  } else if (!unit.empty() && unit != " km/h") {
+    return std::nullopt;
+  }
+  const double speed = core::mps_from_kmh(value);
+  return speed > 0 && speed < SpeedLimit::kFastestMps ? std::optional(speed) : std::nullopt;
+}
+
+}  // namespace
+
+std::optional<TrackMark> point_mark(const OsmTags& tags, double offset_m) {
+  const std::string kind = value_of(tags, "railway");
+  if (kind == "balise" || is_set(tags, "railway:balise"))
+    return TrackMark{LandmarkKind::balise, offset_m, 0, kMappingSigmaM, value_of(tags, "ref")};
+  if (kind == "signal") return TrackMark{LandmarkKind::mast, offset_m, 0, kMappingSigmaM, value_of(tags, "ref")};
+  if (kind == "level_crossing" || kind == "crossing")  // of a road, of a footpath
+    return TrackMark{LandmarkKind::level_crossing, offset_m, 0, kMappingSigmaM, value_of(tags, "name")};
+  return std::nullopt;
+}
+
+void OsmMarks::add(ImportedTrack& track) const {
+  add_structures(track);
+  add_speeds(track);
+}
+
+void OsmMarks::add_structures(ImportedTrack& track) const {
+  const auto at = [&](size_t i) { return offset_of(i, track); };
+  const auto has = [&](size_t segment, const char* key) { return is_set(tags_of(segment), key); };
+  const size_t count = chain_.ways.size();
+  size_t bridge_begin = 0;
+  for (size_t i = 0; i < count; ++i) {
+    const std::string name = value_of(tags_of(i), "tunnel:name");
+    if (i > 0 && has(i, "tunnel") && !has(i - 1, "tunnel")) {
+      track.marks.push_back({LandmarkKind::portal_in, at(i), 0, kMappingSigmaM, name});
+    }
+    if (i + 1 < count && has(i, "tunnel") && !has(i + 1, "tunnel")) {
+      track.marks.push_back({LandmarkKind::portal_out, at(i + 1), 0, kMappingSigmaM, name});
+    }
+    if (!has(i, "bridge")) continue;
+    if (i == 0 || !has(i - 1, "bridge")) bridge_begin = i;
+    if (i + 1 == count || !has(i + 1, "bridge")) add_underbridge(at(bridge_begin), at(i + 1), chain_.ways[i], track);
+  }
+  for (size_t i = 1; i < count; ++i) {
+    if (auto mark = point_mark(data_.nodes.at(chain_.nodes[i]).tags, at(i))) track.marks.push_back(std::move(*mark));
+  }
+}
+
+/// maxspeed, and maxspeed:forward and :backward as the way is drawn; equal neighbours are one limit.
+void OsmMarks::add_speeds(ImportedTrack& track) const {
+  const auto speed_at = [&](size_t segment, bool forward) {
+    const OsmTags& tags = tags_of(segment);
+    const bool as_drawn = forward == chain_.along_way[segment];
+    const auto own = speed_mps_of(value_of(tags, as_drawn ? "maxspeed:forward" : "maxspeed:backward"));
+    return own ? own : speed_mps_of(value_of(tags, "maxspeed"));
+  };
+  for (const bool forward : {true, false}) {
+    std::optional<double> speed;
+    double begin_m = 0;
+    for (size_t i = 0; i <= chain_.ways.size(); ++i) {
+      const bool is_end = i == chain_.ways.size();
+      const auto next = is_end ? std::nullopt : speed_at(i, forward);
+      if (i > 0 && !is_end && next == speed) continue;
+      const double at_m = i == 0 ? 0.0 : is_end ? track.alignment.length_m() : offset_of(i, track);
+      if (speed && at_m > begin_m)
+        track.speed_limits.push_back({begin_m, at_m, *speed, forward ? Direction::forward : Direction::reverse});
+      speed = next;
+      begin_m = at_m;
+    }
+  }
+}
+
+double OsmMarks::offset_of(size_t point, const ImportedTrack& track) const {
+  return track.alignment.nearest(chain_.points[point].x(), chain_.points[point].y()).offset_m;
+}
+
+/// A bridge that carries the track, as one landmark in the middle; the uncertainty covers the bridge.
+void OsmMarks::add_underbridge(double from_m, double to_m, size_t way, ImportedTrack& track) const {
+  const double length = to_m - from_m;
+  track.marks.push_back({LandmarkKind::underbridge, from_m + 0.5 * length, 0,
+                         std::hypot(kMappingSigmaM, length / std::sqrt(12.0)),
+                         value_of(data_.ways[way].tags, "bridge:name")});
+}
+
+}  // namespace railfix::track

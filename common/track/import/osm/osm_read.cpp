@@ -1,0 +1,153 @@
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <osmium/io/any_input.hpp>
+#include <osmium/osm/node.hpp>
+#include <osmium/osm/relation.hpp>
+#include <osmium/osm/way.hpp>
+#include <osmium/visitor.hpp>
+#include <unordered_set>
+
+#include "track/import/osm/osm_data.hpp"
+
+namespace railfix::track {
+namespace {
+
+/// A text of a PBF file can hold a zero byte, behind which osmium's own iterator misses the end of the list.
+std::vector<const char*> texts_of(const osmium::TagList& list) {
+  std::vector<const char*> texts;
+  const char* const end = reinterpret_cast<const char*>(&list) + list.byte_size();
+  for (const char* at = reinterpret_cast<const char*>(&list) + sizeof(osmium::TagList); at < end;) {
+    texts.push_back(at);
+    at = static_cast<const char*>(std::memchr(at, 0, static_cast<size_t>(end - at)));
+    if (at == nullptr) throw std::runtime_error("a tag does not end");
+    ++at;
+  }
+  if (texts.size() % 2 != 0) throw std::runtime_error("a tag holds a zero byte");
+  return texts;
+}
+
+OsmTags tags_of(const osmium::OSMObject& object) {
+  OsmTags tags;
+  const auto texts = texts_of(object.tags());
+  for (size_t i = 0; i < texts.size(); i += 2) tags.emplace(texts[i], texts[i + 1]);
+  return tags;
+}
+
+/// The outlines of platforms with holes: their ways say nothing themselves.
+std::unordered_map<int64_t, OsmTags> platform_outlines(const std::string& file, bool with_trams) {
+  std::unordered_map<int64_t, OsmTags> out;
+  osmium::io::Reader relations(file, osmium::osm_entity_bits::relation);
+  while (const osmium::memory::Buffer buffer = relations.read()) {
+    for (const osmium::Relation& relation : buffer.select<osmium::Relation>()) {
+      const OsmTags tags = tags_of(relation);
+      if (!is_platform_relation(tags, with_trams)) continue;
+      for (const osmium::RelationMember& member : relation.members()) {
+        if (member.type() == osmium::item_type::way && is_outline(member.role())) out.emplace(member.ref(), tags);
+      }
+    }
+  }
+  relations.close();
+  return out;
+}
+
+/// What the ways are comes before the nodes, and of these only what they use: a country fits into memory.
+OsmData read_passes(const std::string& file, bool with_trams) {
+  OsmData out;
+  const std::unordered_map<int64_t, OsmTags> outlines = platform_outlines(file, with_trams);
+  std::unordered_set<int64_t> wanted;
+  osmium::io::Reader ways(file, osmium::osm_entity_bits::way);
+  while (const osmium::memory::Buffer buffer = ways.read()) {
+    for (const osmium::Way& way : buffer.select<osmium::Way>()) {
+      OsmTags tags = tags_of(way);
+      std::vector<OsmWay>* ways_like_it = ways_for(out, tags, with_trams);
+      if (const auto outline = outlines.find(way.id()); ways_like_it == nullptr && outline != outlines.end()) {
+        ways_like_it = &out.platforms;
+        tags = outline->second;
+      }
+      if (ways_like_it == nullptr) continue;
+      OsmWay& taken = ways_like_it->emplace_back(OsmWay{way.id(), {}, std::move(tags)});
+      for (const osmium::NodeRef& node : way.nodes()) taken.nodes.push_back(node.ref());
+      wanted.insert(taken.nodes.begin(), taken.nodes.end());
+    }
+  }
+  ways.close();
+  osmium::io::Reader nodes(file, osmium::osm_entity_bits::node);
+  while (const osmium::memory::Buffer buffer = nodes.read()) {
+    for (const osmium::Node& node : buffer.select<osmium::Node>()) {
+      if (!node.location().valid()) continue;
+      OsmTags tags = tags_of(node);
+      if (!wanted.contains(node.id()) && !is_mast(tags)) continue;
+      out.nodes[node.id()] = {{node.location().lat(), node.location().lon()}, std::move(tags)};
+    }
+  }
+  nodes.close();
+  return out;
+}
+
+}  // namespace
+
+bool is_track(const OsmTags& tags, bool with_trams) {
+  const auto railway = tags.find("railway");
+  if (railway == tags.end()) return false;
+  const std::string& kind = railway->second;
+  return kind == "rail" || kind == "light_rail" || kind == "narrow_gauge" || kind == "subway" ||
+         (with_trams && kind == "tram");
+}
+
+std::string value_of(const OsmTags& tags, const char* key) {
+  const auto found = tags.find(key);
+  return found == tags.end() ? std::string() : found->second;
+}
+
+bool is_set(const OsmTags& tags, const char* key) {
+  const std::string value = value_of(tags, key);
+  return !value.empty() && value != "no";
+}
+
+bool leads_over(const OsmTags& tags, bool with_trams) {
+  if (is_track(tags, with_trams) || !is_set(tags, "bridge")) return false;
+  // What was, or is not yet: nobody knows whether its bridge stands.
+  constexpr std::array kGone{"abandoned", "razed", "dismantled", "proposed", "construction"};
+  const auto stands = [&](const char* key) {
+    return is_set(tags, key) && std::find(kGone.begin(), kGone.end(), value_of(tags, key)) == kGone.end();
+  };
+  return stands("highway") || stands("railway") || stands("waterway");
+}
+
+bool is_platform(const OsmTags& tags, bool with_trams) {
+  if (is_set(tags, "disused") || is_set(tags, "abandoned")) return false;
+  const bool for_trains = is_set(tags, "train") || is_set(tags, "light_rail") || is_set(tags, "subway");
+  const bool for_trams = is_set(tags, "tram");
+  const std::string kind = value_of(tags, "railway");
+  if (kind == "platform" || kind == "platform_edge") return for_trains || with_trams || !for_trams;
+  return value_of(tags, "public_transport") == "platform" && (for_trains || (with_trams && for_trams));
+}
+
+bool is_platform_relation(const OsmTags& tags, bool with_trams) {
+  return value_of(tags, "type") == "multipolygon" && is_platform(tags, with_trams);
+}
+
+bool is_mast(const OsmTags& tags) {
+  return value_of(tags, "power") == "catenary_mast";
+}
+
+bool is_outline(const std::string& role) {
+  return role.empty() || role == "outer";
+}
+
+std::vector<OsmWay>* ways_for(OsmData& data, const OsmTags& tags, bool with_trams) {
+  if (is_track(tags, with_trams)) return &data.ways;
+  if (is_platform(tags, with_trams)) return &data.platforms;
+  return leads_over(tags, with_trams) ? &data.bridges : nullptr;
+}
+
+core::Result<OsmData> read_osm(const std::filesystem::path& file, bool with_trams) {
+  try {
+    return read_passes(file.string(), with_trams);
+  } catch (const std::exception& reason) {
+    return core::Error{"cannot read " + file.string() + " as OpenStreetMap data: " + reason.what()};
+  }
+}
+
+}  // namespace railfix::track

@@ -1,0 +1,68 @@
+// Tracks and how they are linked, as planning formats (railML, ERJU) give them: places count along each track, the
+// plan may be surveyed, described by radii, or missing.
+#pragma once
+
+#include <optional>
+
+#include "track/import/fit/clothoid_fit.hpp"
+#include "track/import/network.hpp"
+
+namespace railfix::track {
+
+/// A stretch of constant or steadily changing curvature; straight in between.
+struct NetBend {
+  double from_m = 0;
+  double to_m = 0;
+  double curvature_start_per_m = 0;
+  double curvature_end_per_m = 0;
+};
+
+/// The grade from here on.
+struct NetSlope {
+  double offset_m = 0;
+  double grade = 0;
+};
+
+struct NetTrack {
+  ImportedTrack track;                 // name, line, marks and groups; its alignment is made here
+  double length_m = 0;                 // as the source counts
+  std::vector<Eigen::Vector2d> shape;  // surveyed points in the plane of the map, from begin to end
+  std::vector<NetBend> bends;
+  std::vector<NetSlope> slopes;
+  std::vector<CantPoint> cant;
+};
+
+struct NetEnd {
+  size_t track = 0;
+  bool at_end = false;
+  auto operator<=>(const NetEnd&) const = default;
+};
+
+/// Two ends meet at one place; trains run from one to the other where `passable`.
+struct NetLink {
+  NetEnd a;
+  NetEnd b;
+  bool passable = true;
+  bool diverging = false;
+  double side = 0;  // of the diverging way, seen from the blades: left 1, right -1
+  std::string switch_name;
+};
+
+struct RailNet {
+  std::vector<NetTrack> tracks;
+  std::vector<NetLink> links;
+  std::string crs;  // of the shapes; empty where there are none
+  FitFigures figures;
+  FitReport fit;
+  std::vector<std::string> problems;
+};
+
+/// Makes the plan and joins it up. A track without a shape follows its bends, or runs straight, from where the tracks
+/// before it end: its lengths and links are right, its coordinates are not, and `problems` says so.
+Draft draft_of(RailNet& net);
+
+/// Cuts the track at an offset: the part from there on becomes the last track, of this name; ends of links are moved
+/// along. Returns the new track's index.
+size_t split(RailNet& net, size_t track, double offset_m, const std::string& name);
+
+}  // namespace railfix::track

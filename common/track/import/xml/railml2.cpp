@@ -1,0 +1,378 @@
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "core/units.hpp"
+#include "track/import/xml/railml2_coordinates.hpp"
+#include "track/import/xml/railml_readers.hpp"
+
+namespace railfix::track {
+namespace {
+
+constexpr double kAtEndM = 0.01;
+constexpr int kMostHops = 20;  // switches directly behind one another
+
+/// One <connection>: at a track's end, or at a switch on it.
+struct Connector {
+  std::string ref{};
+  size_t track = 0;     // first piece of its track
+  bool at_end = false;  // of the track
+  bool is_branch = false;
+  bool outgoing = false;  // the branch leaves where offsets grow
+  double offset_m = 0;
+  double side = 0;
+  bool is_crossing = false;
+  std::string switch_name{};
+  pugi::xml_node node{};
+};
+
+struct RadiusChange {
+  double offset_m = 0;
+  double curvature_per_m = 0;
+  std::optional<double> cant_m;
+};
+
+class Reader {
+ public:
+  explicit Reader(const XmlSource& source) : source_(source), coordinates_(source) {}
+
+  RailNet read() {
+    special_profiles_ = special_speed_profiles(source_);
+    for (const pugi::xml_node& track : descendants(source_.root(), "track")) {
+      if (std::string(track.parent().name()) == "tracks") read_track(track);
+    }
+    if (net_.tracks.empty()) throw core::BadInput(source_.file_name() + " holds no <track> with <trackTopology>");
+    cut_at_switches();
+    shape_pieces();
+    link();
+    return std::move(net_);
+  }
+
+ private:
+  [[nodiscard]] double pos(const pugi::xml_node& node) const { return source_.required(node, "pos"); }
+
+  void read_track(const pugi::xml_node& node) {
+    const pugi::xml_node topology = node.child("trackTopology");
+    const pugi::xml_node begin = topology.child("trackBegin");
+    const pugi::xml_node end = topology.child("trackEnd");
+    if (!begin || !end) throw source_.wrong(node, "track \"" + railml_name(node) + "\" needs trackBegin and trackEnd");
+    const size_t index = net_.tracks.size();
+    NetTrack& track = net_.tracks.emplace_back();
+    const std::string id = source_.required_text(node, "id");
+    const std::string name = railml_name(node);
+    track.track.name = name == id ? id : id + " " + name;
+    track.track.line = id;
+    origin_m_ = pos(begin);
+    track.length_m = pos(end) - origin_m_;
+    if (!(track.length_m > 0 && track.length_m < 1e6))
+      throw source_.wrong(end, "track \"" + railml_name(node) + "\" must be between 0 and 1000 km long");
+    read_connection(begin, {.track = index, .at_end = false});
+    read_connection(end, {.track = index, .at_end = true});
+    for (const pugi::xml_node& points : topology.child("connections").children()) read_switch(points, index);
+    read_plan(node.child("trackElements"), track);
+    read_speeds(node.child("trackElements"), track);
+    read_marks(node, track);
+    read_balises(node.child("ocsElements").child("balises"), track);
+    points_.push_back(coordinates_.points_of(node, origin_m_));
+  }
+
+  void read_connection(const pugi::xml_node& at, Connector connector) {
+    const pugi::xml_node connection = at.child("connection");
+    if (!connection) return;
+    connector.ref = source_.required_text(connection, "ref");
+    connector.node = connection;
+    connectors_[source_.required_text(connection, "id")] = connector;
+  }
+
+  void read_switch(const pugi::xml_node& points, size_t track) {
+    const std::string course = points.attribute("trackContinueCourse").value();
+    for (const pugi::xml_node& connection : points.children("connection")) {
+      const std::string orientation = connection.attribute("orientation").value();
+      if (orientation != "incoming" && orientation != "outgoing") continue;  // not known, or neither
+      Connector connector{.ref = source_.required_text(connection, "ref"), .track = track};
+      connector.is_branch = true;
+      connector.is_crossing = std::string(points.name()) == "crossing";
+      connector.outgoing = orientation == "outgoing";
+      connector.offset_m = pos(points) - origin_m_;
+      const double length = net_.tracks[track].length_m;
+      if (connector.offset_m < -kAtEndM || connector.offset_m > length + kAtEndM)
+        throw source_.wrong(points, "switch \"" + railml_name(points) + "\" is not on its track");
+      connector.offset_m = std::clamp(connector.offset_m, 0.0, length);
+      const std::string way = connection.attribute("course").value();
+      connector.side = way == "left" || (way == "straight" && course == "right") ? 1 : -1;
+      connector.switch_name = railml_name(points);
+      connector.node = connection;
+      connectors_[source_.required_text(connection, "id")] = connector;
+    }
+  }
+
+  void read_plan(const pugi::xml_node& elements, NetTrack& track) {
+    std::vector<RadiusChange> changes;
+    for (const pugi::xml_node& change : elements.child("radiusChanges").children("radiusChange")) {
+      const double radius = source_.required(change, "radius");
+      if (radius != 0 && std::abs(radius) < 10)
+        throw source_.wrong(change, "a radius of less than 10 m is no railway's");
+      changes.push_back({pos(change) - origin_m_, radius == 0 ? 0.0 : -1.0 / radius, {}});
+      if (const auto cant_mm = source_.number(change, "superelevation"))
+        changes.back().cant_m = std::copysign(1e-3 * *cant_mm, changes.back().curvature_per_m);
+    }
+    const auto by_offset = [](const auto& a, const auto& b) { return a.offset_m < b.offset_m; };
+    std::stable_sort(changes.begin(), changes.end(), by_offset);
+    for (size_t i = 0; i < changes.size(); ++i) {
+      const double from = changes[i].offset_m;
+      const double to = i + 1 < changes.size() ? changes[i + 1].offset_m : track.length_m;
+      const double curvature = changes[i].curvature_per_m;
+      if (curvature != 0 && to > from) track.bends.push_back({from, to, curvature, curvature});
+    }
+    add_cant(changes, track);
+    for (const pugi::xml_node& change : elements.child("gradientChanges").children("gradientChange"))
+      track.slopes.push_back({pos(change) - origin_m_, 1e-3 * source_.required(change, "slope")});
+    std::stable_sort(track.slopes.begin(), track.slopes.end(), by_offset);
+  }
+
+  /// Like the radius, the cant holds from a change on up to the next one, so that it steps there.
+  static void add_cant(const std::vector<RadiusChange>& changes, NetTrack& track) {
+    if (std::none_of(changes.begin(), changes.end(), [](const RadiusChange& c) { return c.cant_m.has_value(); }))
+      return;
+    track.cant = {{0, 0}};
+    for (const RadiusChange& change : changes) {
+      const double cant_m = change.cant_m.value_or(0);
+      if (change.offset_m <= 0) {
+        track.cant = {{0, cant_m}};
+        continue;
+      }
+      track.cant.push_back({change.offset_m, track.cant.back().cant_m});
+      track.cant.push_back({change.offset_m, cant_m});
+    }
+  }
+
+  /// Every profile for itself: the lowest holds. "end" as speed ends a limit. On its own track only.
+  void read_speeds(const pugi::xml_node& elements, NetTrack& track) const {
+    std::map<std::pair<std::string, std::string>, std::vector<std::pair<double, double>>>
+        changes;  // profile, direction
+    for (const pugi::xml_node& change : elements.child("speedChanges").children("speedChange")) {
+      const std::string profile = change.attribute("profileRef").value();
+      if (special_profiles_.contains(profile)) continue;
+      const bool is_end = std::string(change.attribute("vMax").value()) == "end";
+      const double speed_kmh = is_end ? 0 : source_.number(change, "vMax").value_or(0);
+      changes[{profile, change.attribute("dir").value()}].emplace_back(pos(change) - origin_m_,
+                                                                       core::mps_from_kmh(speed_kmh));
+    }
+    for (const auto& [of, list] : changes) {
+      if (of.second != "down") add_speeds(list, Direction::forward, track.length_m, track.track);
+      if (of.second != "up") add_speeds(list, Direction::reverse, track.length_m, track.track);
+    }
+  }
+
+  void read_marks(const pugi::xml_node& node, NetTrack& track) {
+    const pugi::xml_node elements = node.child("trackElements");
+    const auto add = [&](LandmarkKind kind, double offset_m, double lateral_m, const pugi::xml_node& of) {
+      if (offset_m < -kAtEndM || offset_m > track.length_m + kAtEndM) {
+        net_.problems.push_back("<" + std::string(of.name()) + "> \"" + railml_name(of) +
+                                "\" is not on its track; it is left out");
+        return;
+      }
+      track.track.marks.push_back(
+          {kind, std::clamp(offset_m, 0.0, track.length_m), lateral_m, kRailmlSigmaM, railml_name(of)});
+    };
+    const auto length = [this](const pugi::xml_node& of) { return source_.number(of, "length").value_or(0); };
+    for (const pugi::xml_node& of : elements.child("tunnels").children("tunnel")) {
+      add(LandmarkKind::portal_in, pos(of) - origin_m_, 0, of);
+      add(LandmarkKind::portal_out, pos(of) - origin_m_ + length(of), 0, of);
+    }
+    // The schema of railML 2 spells the element "brigde"; files by hand may not.
+    for (const char* spelling : {"brigde", "bridge"}) {
+      for (const pugi::xml_node& of : elements.child("bridges").children(spelling)) {
+        // Only what says that it crosses the track leads over it (kind as wiki2.railml.org, IS:brigde, suggests).
+        const bool is_over = std::string(of.attribute("kind").value()) == "crossing";
+        add(is_over ? LandmarkKind::bridge : LandmarkKind::underbridge, pos(of) - origin_m_ + 0.5 * length(of), 0, of);
+      }
+    }
+    for (const pugi::xml_node& of : elements.child("levelCrossings").children("levelCrossing"))
+      add(LandmarkKind::level_crossing, pos(of) - origin_m_, 0, of);
+    for (const pugi::xml_node& of : elements.child("platformEdges").children("platformEdge")) {
+      const double lateral = platform_lateral_m(of.attribute("side").value());
+      add(LandmarkKind::platform, pos(of) - origin_m_, lateral, of);
+      add(LandmarkKind::platform, pos(of) - origin_m_ + length(of), lateral, of);
+    }
+    for (const pugi::xml_node& of : node.child("ocsElements").child("signals").children("signal"))
+      add(LandmarkKind::mast, pos(of) - origin_m_, 0, of);
+  }
+
+  void read_balises(const pugi::xml_node& balises, NetTrack& track) {
+    std::map<std::string, TrackMark> by_id;
+    for (const pugi::xml_node& balise : balises.children("balise")) {
+      const double at = std::clamp(pos(balise) - origin_m_, 0.0, track.length_m);
+      const TrackMark mark{LandmarkKind::balise, at, 0, kRailmlSigmaM, railml_name(balise)};
+      // A second one of that id is told for the whole file; it belongs to no group.
+      if (!by_id.emplace(balise.attribute("id").value(), mark).second) track.track.marks.push_back(mark);
+    }
+    for (const pugi::xml_node& node : balises.children("baliseGroup")) {
+      const std::optional<EtcsIdentity> identity = etcs_identity(source_, node);
+      TrackGroup group;
+      std::vector<std::pair<double, std::string>> order;
+      for (const pugi::xml_node& ref : node.children("baliseRef"))
+        order.emplace_back(source_.number(ref, "sequence").value_or(0), ref.attribute("ref").value());
+      std::stable_sort(order.begin(), order.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+      for (const auto& [sequence, id] : order) {
+        const auto balise = by_id.find(id);
+        if (balise == by_id.end()) continue;
+        group.balises.push_back(balise->second);
+        by_id.erase(balise);
+      }
+      if (group.balises.empty()) {
+        net_.problems.push_back("balise group \"" + railml_name(node) + "\" has no balises on its track");
+      } else if (!identity) {
+        net_.problems.push_back("balise group \"" + railml_name(node) +
+                                "\" has no ETCS identity (countryID and groupID); its balises are kept as landmarks");
+        track.track.marks.insert(track.track.marks.end(), group.balises.begin(), group.balises.end());
+      } else {
+        group.nid_c = identity->nid_c;
+        group.nid_bg = identity->nid_bg;
+        group.offset_m = group.balises.front().offset_m;
+        group.nominal_is_forward = group.balises.size() < 2 || group.balises[1].offset_m >= group.offset_m;
+        group.q_locacc_m = kRailmlSigmaM;
+        track.track.groups.push_back(std::move(group));
+      }
+    }
+    for (auto& [id, mark] : by_id) track.track.marks.push_back(std::move(mark));  // in no group
+  }
+
+  /// Pieces of every track, by the offset of their begin.
+  void cut_at_switches() {
+    std::map<size_t, std::set<double>> cuts;
+    for (const auto& [id, connector] : connectors_) {
+      const double length = net_.tracks[connector.track].length_m;
+      if (connector.is_branch && connector.offset_m > kAtEndM && connector.offset_m < length - kAtEndM)
+        cuts[connector.track].insert(connector.offset_m);
+    }
+    const size_t count = net_.tracks.size();
+    for (size_t i = 0; i < count; ++i) {
+      pieces_[i][0.0] = i;
+      const std::string name = net_.tracks[i].track.name;
+      double begin = 0;
+      size_t piece = i;
+      for (const double cut : cuts[i]) {
+        if (cut - begin < kAtEndM) continue;
+        piece = split(net_, piece, cut - begin, name + "#" + std::to_string(pieces_[i].size() + 1));
+        pieces_[i][cut] = piece;
+        begin = cut;
+      }
+    }
+  }
+
+  /// A track whose coordinates do not fit its length, or end on the way, is laid out without them.
+  void shape_pieces() {
+    for (const auto& [track, pieces] : pieces_) {
+      const auto last = pieces.rbegin();
+      const double length_m = last->first + net_.tracks[last->second].length_m;
+      std::string why;
+      if (shape_between(points_[track], 0, length_m, why).empty()) {
+        if (!why.empty()) net_.problems.push_back("track " + net_.tracks[track].track.name + " " + why + "; not used");
+        continue;
+      }
+      net_.crs = coordinates_.crs();
+      for (const auto& [begin_m, piece] : pieces)
+        net_.tracks[piece].shape = shape_between(points_[track], begin_m, begin_m + net_.tracks[piece].length_m, why);
+    }
+  }
+
+  [[nodiscard]] std::optional<size_t> piece_after(const Connector& at) const {
+    for (const auto& [begin, piece] : pieces_.at(at.track)) {
+      if (std::abs(begin - at.offset_m) < kAtEndM) return piece;
+    }
+    return std::nullopt;
+  }
+  [[nodiscard]] std::optional<size_t> piece_before(const Connector& at) const {
+    std::optional<size_t> before;
+    for (const auto& [begin, piece] : pieces_.at(at.track)) {
+      if (begin < at.offset_m - kAtEndM) before = piece;
+    }
+    return before;
+  }
+  [[nodiscard]] NetEnd end_of(const Connector& at) const {
+    const auto& pieces = pieces_.at(at.track);
+    return at.at_end ? NetEnd{pieces.rbegin()->second, true} : NetEnd{pieces.begin()->second, false};
+  }
+
+  /// The end that a train comes from which runs over this connection out of its track.
+  [[nodiscard]] std::optional<NetEnd> facing(const Connector& at, int hops = 0) const {
+    if (!at.is_branch) return end_of(at);
+    if (at.outgoing) {
+      if (const auto before = piece_before(at)) return NetEnd{*before, true};
+    } else if (const auto after = piece_after(at)) {
+      return NetEnd{*after, false};
+    }
+    // The switch is the very end of its track: the train comes from the next one.
+    for (const auto& [id, other] : connectors_) {
+      if (other.is_branch || other.track != at.track || other.at_end == at.outgoing || hops > kMostHops) continue;
+      const auto next = connectors_.find(other.ref);
+      if (next != connectors_.end()) return facing(next->second, hops + 1);
+    }
+    return std::nullopt;
+  }
+
+  void link() {
+    std::map<std::string, std::vector<const Connector*>> crossings;
+    for (const auto& [id, connector] : connectors_) {
+      if (connector.is_crossing) crossings[connector.switch_name].push_back(&connector);
+      const auto other = connectors_.find(connector.ref);
+      if (other == connectors_.end()) {
+        net_.problems.push_back("connection \"" + id + "\" of track " + net_.tracks[connector.track].track.name +
+                                " leads to \"" + connector.ref + "\", which does not exist");
+        continue;
+      }
+      if (id < connector.ref) add_link(connector, other->second);
+    }
+    // Over a crossing straight through, from branch to branch.
+    for (const auto& [name, branches] : crossings) {
+      for (const Connector* in : branches) {
+        for (const Connector* out : branches) {
+          if (!in->outgoing && out->outgoing) add_crossing_link(*in, *out);
+        }
+      }
+    }
+  }
+
+  void add_link(const Connector& a, const Connector& b) {
+    const auto from = facing(a);
+    const auto to = facing(b);
+    if (!from || !to) return;
+    const Connector& branch = a.is_branch ? a : b;
+    net_.links.push_back({.a = *from,
+                          .b = *to,
+                          .passable = true,
+                          .diverging = branch.is_branch,
+                          .side = branch.side,
+                          .switch_name = branch.switch_name});
+  }
+
+  void add_crossing_link(const Connector& in, const Connector& out) {
+    const auto a = connectors_.find(in.ref);
+    const auto b = connectors_.find(out.ref);
+    if (a == connectors_.end() || b == connectors_.end()) return;
+    const auto from = facing(a->second);
+    const auto to = facing(b->second);
+    if (from && to)
+      net_.links.push_back(
+          {.a = *from, .b = *to, .passable = true, .diverging = false, .side = 0, .switch_name = in.switch_name});
+  }
+
+  const XmlSource& source_;
+  RailNet net_;
+  Railml2Coordinates coordinates_;
+  std::vector<std::vector<Railml2Coordinates::Point>> points_;  // of every track
+  double origin_m_ = 0;
+  std::set<std::string> special_profiles_;
+  std::map<std::string, Connector> connectors_;
+  std::map<size_t, std::map<double, size_t>> pieces_;
+};
+
+}  // namespace
+
+RailNet read_railml2(const XmlSource& source) {
+  return Reader(source).read();
+}
+
+}  // namespace railfix::track

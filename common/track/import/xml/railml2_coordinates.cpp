@@ -1,0 +1,124 @@
+#include "track/import/xml/railml2_coordinates.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "track/import/local_crs.hpp"
+
+namespace railfix::track {
+namespace {
+
+constexpr double kSamePlaceM = 0.05;
+constexpr double kNearEndM = 1.0;
+constexpr double kLengthShare = 0.02;  // points far apart cut curves short
+
+/// Digits at the end of "4326", "EPSG:4326", "urn:ogc:def:crs:EPSG::4326", ".../EPSG/0/4326"; empty when there are
+/// none.
+std::string epsg_number(const std::string& text) {
+  const auto last = text.find_last_not_of("0123456789");
+  return last == std::string::npos ? text : text.substr(last + 1);
+}
+
+bool is_geographic(const std::string& code) {
+  return code == "4326" || code == "4258";
+}
+
+/// Cubic through the four points around an offset, fewer where there are fewer.
+Eigen::Vector2d interpolated(const std::vector<Railml2Coordinates::Point>& points, double offset_m) {
+  const auto next = std::lower_bound(points.begin(), points.end(), offset_m,
+                                     [](const auto& point, double offset) { return point.offset_m < offset; });
+  const auto first = next - std::min<ptrdiff_t>(2, next - points.begin());
+  const auto last = next + std::min<ptrdiff_t>(2, points.end() - next);
+  Eigen::Vector2d at{0, 0};
+  for (auto i = first; i != last; ++i) {
+    double weight = 1;
+    for (auto k = first; k != last; ++k) {
+      if (k != i) weight *= (offset_m - k->offset_m) / (i->offset_m - k->offset_m);
+    }
+    at += weight * i->at;
+  }
+  return at;
+}
+
+}  // namespace
+
+Railml2Coordinates::Railml2Coordinates(const XmlSource& source) : source_(source) {
+  for (const pugi::xml_node& code : descendants(source.root(), "epsgCode")) {
+    const std::string number = epsg_number(code.attribute("default").value());
+    if (default_code_.empty()) default_code_ = number;
+  }
+  if (default_code_.empty()) default_code_ = "4326";
+}
+
+void Railml2Coordinates::choose_plane(const pugi::xml_node& coordinate, const std::string& code,
+                                      const std::vector<double>& values) {
+  code_ = code;
+  if (is_geographic(code)) {
+    crs_ = local_crs({values[0], values[1]});
+    projection_ = core::value_or_throw(Projection::open(crs_));
+    return;
+  }
+  crs_ = "EPSG:" + code;
+  const auto opened = Projection::open(crs_);
+  if (!opened.ok()) throw source_.wrong(coordinate, opened.error().message);
+}
+
+Eigen::Vector2d Railml2Coordinates::in_plane(const pugi::xml_node& coordinate) {
+  std::string code = epsg_number(coordinate.attribute("epsgCode").value());
+  if (code.empty()) code = default_code_;
+  const std::vector<double> values = numbers_of(coordinate.attribute("coord").value());
+  if (values.size() < 2) throw source_.wrong(coordinate, "<geoCoord> needs two numbers or three in \"coord\"");
+  if (is_geographic(code) && !(std::abs(values[0]) <= 90 && std::abs(values[1]) <= 180))
+    throw source_.wrong(coordinate,
+                        "<geoCoord> must be latitude (-90 to 90) and longitude (-180 to 180), in this order");
+  if (crs_.empty()) choose_plane(coordinate, code, values);
+  if (code != code_) {
+    throw source_.wrong(coordinate,
+                        "coordinates in both EPSG:" + code_ + " and EPSG:" + code + "; only one system can be read");
+  }
+  if (!projection_) return {values[0], values[1]};
+  const auto at = projection_->from_geo({values[0], values[1]});
+  if (!at) throw source_.wrong(coordinate, "<geoCoord> lies too far from the first one of the file");
+  return *at;
+}
+
+std::vector<Railml2Coordinates::Point> Railml2Coordinates::points_of(const pugi::xml_node& track, double origin_m) {
+  // Signals, platforms and the like stand beside the axis.
+  static const std::set<std::string> kOnAxis{"trackBegin",     "trackEnd",      "switch", "crossing",    "geoMapping",
+                                             "gradientChange", "mileageChange", "balise", "radiusChange"};
+  std::vector<Point> points;
+  for (const pugi::xml_node& coordinate : descendants(track, "geoCoord")) {
+    const pugi::xml_node of = coordinate.parent();
+    const auto pos = source_.number(of, "pos");
+    if (!pos || !kOnAxis.contains(of.name())) continue;
+    points.push_back({*pos - origin_m, in_plane(coordinate)});
+  }
+  std::stable_sort(points.begin(), points.end(),
+                   [](const Point& a, const Point& b) { return a.offset_m < b.offset_m; });
+  const auto same = [](const Point& a, const Point& b) { return b.offset_m - a.offset_m < kSamePlaceM; };
+  points.erase(std::unique(points.begin(), points.end(), same), points.end());
+  return points;
+}
+
+std::vector<Eigen::Vector2d> shape_between(const std::vector<Railml2Coordinates::Point>& points, double from_m,
+                                           double to_m, std::string& why) {
+  if (points.size() < 2 || points.front().offset_m > from_m + kNearEndM || points.back().offset_m < to_m - kNearEndM) {
+    if (!points.empty()) why = "has coordinates, but not from end to end";
+    return {};
+  }
+  std::vector<Eigen::Vector2d> shape{interpolated(points, from_m)};
+  for (const auto& point : points) {
+    if (point.offset_m > from_m + kNearEndM && point.offset_m < to_m - kNearEndM) shape.push_back(point.at);
+  }
+  shape.push_back(interpolated(points, to_m));
+  double length_m = 0;
+  for (size_t i = 1; i < shape.size(); ++i) length_m += (shape[i] - shape[i - 1]).norm();
+  if (std::abs(length_m - (to_m - from_m)) > kNearEndM + kLengthShare * (to_m - from_m)) {
+    why = "is " + std::to_string(to_m - from_m) + " m long, but " + std::to_string(length_m) + " m by its coordinates";
+    return {};
+  }
+  return shape;
+}
+
+}  // namespace railfix::track

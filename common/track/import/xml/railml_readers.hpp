@@ -1,0 +1,33 @@
+// The two generations of railML, one reader each.
+#pragma once
+
+#include <set>
+
+#include "track/import/xml/rail_net.hpp"
+#include "track/import/xml/xml_source.hpp"
+
+namespace railfix::track {
+
+/// Both throw core::BadInput.
+RailNet read_railml2(const XmlSource& source);
+RailNet read_railml3(const XmlSource& source);
+
+constexpr double kRailmlSigmaM = 1.0;
+
+/// Name of an element for a human: its name, else its code, else its id.
+std::string railml_name(const pugi::xml_node& node);
+
+/// Of a platform edge on the "left" or "right", else 0: the file does not say on which side.
+double platform_lateral_m(const std::string& side);
+
+/// Speed profiles for some trains only (tilting, temporary, ...), by id: what is not the basic profile, or, where the
+/// file marks none as that, what lowers it.
+std::set<std::string> special_speed_profiles(const XmlSource& source);
+
+/// The ETCS identity of a balise group, wherever the file has it; nothing when it has none.
+std::optional<EtcsIdentity> etcs_identity(const XmlSource& source, const pugi::xml_node& group);
+
+/// The id of the group that a balise of railML 3 says it belongs to; empty when it says none.
+std::string balise_group_of(const pugi::xml_node& balise);
+
+}  // namespace railfix::track

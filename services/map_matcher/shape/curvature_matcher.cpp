@@ -1,0 +1,161 @@
+#include "map_matcher/shape/curvature_matcher.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "map_matcher/inputs.hpp"
+
+namespace railfix::map_matcher {
+namespace {
+
+constexpr double kStepM = 1.0;
+constexpr double kGridM = 1.0;
+constexpr double kLagStepM = 2.5;
+constexpr double kLagKnownShare = 0.7;  // of the sigma of a lag that nothing tells
+constexpr size_t kFewestBins = 10;
+constexpr double kBetterBy = 0.97;  // a sigma that shrinks less than this is as good as it gets
+constexpr std::array<double, 5> kScales = {-1.5, -0.75, 0.0, 0.75, 1.5};  // in sigmas
+
+}  // namespace
+
+/// The map's curvature on a grid: the search asks for it some hundred thousand times.
+class CurvatureMatcher::MapCurvature {
+ public:
+  MapCurvature(const track::Path& path, double from_m, double to_m) : from_m_(from_m) {
+    for (double m = from_m; m <= to_m + 2 * kGridM; m += kGridM) values_.push_back(path.curvature_at(m));
+  }
+  [[nodiscard]] double at(double place_m) const {
+    const double cell = std::clamp((place_m - from_m_) / kGridM, 0.0, static_cast<double>(values_.size() - 2));
+    const auto i = static_cast<size_t>(cell);
+    return values_[i] + (cell - static_cast<double>(i)) * (values_[i + 1] - values_[i]);
+  }
+
+ private:
+  double from_m_;
+  std::vector<double> values_;
+};
+
+void CurvatureMatcher::add(double odometer_m, double curvature_per_m, double sigma_per_m, CurvatureOf of) {
+  if (!std::isfinite(odometer_m) || !has_sense(ViewInput{curvature_per_m, sigma_per_m * sigma_per_m})) return;
+  const double weight = 1 / (sigma_per_m * sigma_per_m);
+  const auto cell = [this](double m) { return std::floor(m / parameters_.bin_m); };
+  auto bin = std::find_if(bins_.rbegin(), bins_.rend(),
+                          [&](const Bin& b) { return b.of == of && cell(b.odometer_m) == cell(odometer_m); });
+  if (bin == bins_.rend()) {
+    bins_.push_back({odometer_m, curvature_per_m, weight, of});
+    // A train that runs to and fro does not leave its window: as many as that has, of rails and of the body, are
+    // enough.
+    const auto most_bins = static_cast<size_t>(2 * (parameters_.window_m / parameters_.bin_m + 1));
+    while (bins_.size() > most_bins ||
+           std::abs(bins_.back().odometer_m - bins_.front().odometer_m) > parameters_.window_m) {
+      bins_.pop_front();
+    }
+    return;
+  }
+  const double part = weight / (bin->weight + weight);
+  bin->odometer_m += part * (odometer_m - bin->odometer_m);
+  bin->curvature_per_m += part * (curvature_per_m - bin->curvature_per_m);
+  bin->weight += weight;
+}
+
+double CurvatureMatcher::misfit(const MapCurvature& map, double place_m, double scale, double lag_m,
+                                double odometer_m) const {
+  const double least = parameters_.noise_per_m * parameters_.noise_per_m;
+  double sum = 0;
+  double weighted = 0;
+  double weights = 1 / (parameters_.bias_per_m * parameters_.bias_per_m);
+  for (const auto& bin : bins_) {
+    const double of_m = place_m - (bin.of == CurvatureOf::body ? lag_m : 0.0);
+    const double error = bin.curvature_per_m - map.at(of_m + (1 + scale) * (bin.odometer_m - odometer_m));
+    const double weight = 1 / (1 / bin.weight + least);
+    sum += weight * error * error;
+    weighted += weight * error;
+    weights += weight;
+  }
+  // What is left when the bias takes the value that fits best.
+  return sum - weighted * weighted / weights;
+}
+
+bool CurvatureMatcher::any_of_body() const {
+  return std::any_of(bins_.begin(), bins_.end(), [](const Bin& bin) { return bin.of == CurvatureOf::body; });
+}
+
+// Posterior over the place with a flat prior in the window; the odometer's scale and the body's lag are summed over.
+CurvatureMatcher::Peak CurvatureMatcher::search(double odometer_m, const Prior& prior) const {
+  const double from_m = -prior.over_m - parameters_.search_margin_m;
+  const double to_m = prior.under_m + parameters_.search_margin_m;
+  const auto count = static_cast<size_t>((to_m - from_m) / kStepM) + 1;
+  const auto [nearest, farthest] = std::minmax_element(
+      bins_.begin(), bins_.end(), [](const Bin& a, const Bin& b) { return a.odometer_m < b.odometer_m; });
+  const double stretch = 1 + 2 * parameters_.scale_sigma;
+  const MapCurvature map(
+      *path_,
+      prior.path_distance_m + from_m - parameters_.lag_m + stretch * std::min(0.0, nearest->odometer_m - odometer_m),
+      prior.path_distance_m + to_m + stretch * std::max(0.0, farthest->odometer_m - odometer_m));
+  std::vector<double> likelihood(count);
+  double best = INFINITY;
+  const size_t lags = any_of_body() ? static_cast<size_t>(std::ceil(parameters_.lag_m / kLagStepM)) + 1 : 1;
+  const double lag_step_m = lags > 1 ? parameters_.lag_m / static_cast<double>(lags - 1) : 0.0;
+  std::vector<std::array<double, kScales.size()>> all(count * lags);
+  for (size_t i = 0; i < all.size(); ++i) {
+    const double place_m = prior.path_distance_m + from_m + kStepM * static_cast<double>(i / lags);
+    const double lag_m = lag_step_m * static_cast<double>(i % lags);
+    for (size_t k = 0; k < kScales.size(); ++k) {
+      all[i][k] = misfit(map, place_m, parameters_.scale_sigma * kScales[k], lag_m, odometer_m);
+      best = std::min(best, all[i][k]);
+    }
+  }
+  // A fit worse than the noise says that noise or map are worse than assumed.
+  const double worse = std::max(1.0, best / static_cast<double>(bins_.size()));
+  double sum = 0;
+  size_t top = 0;
+  for (size_t i = 0; i < count; ++i) {
+    for (size_t j = 0; j < lags * kScales.size(); ++j) {
+      const size_t k = j % kScales.size();
+      const double here = all[i * lags + j / kScales.size()][k];
+      likelihood[i] +=
+          std::exp(-0.5 * (here - best) / (worse * parameters_.correlated_bins) - 0.5 * kScales[k] * kScales[k]);
+    }
+    sum += likelihood[i];
+    if (likelihood[i] > likelihood[top]) top = i;
+  }
+  const double reach_m = 3 * parameters_.max_sigma_m;
+  const auto place = [&](size_t i) { return from_m + kStepM * static_cast<double>(i); };
+  double mass = 0;
+  double mean = 0;
+  double square = 0;
+  for (size_t i = 0; i < count; ++i) {
+    const double off_m = place(i) - place(top);
+    if (std::abs(off_m) > reach_m) continue;
+    mass += likelihood[i];
+    mean += likelihood[i] * off_m;
+    square += likelihood[i] * off_m * off_m;
+  }
+  mean /= mass;
+  const double variance = std::max(square / mass - mean * mean, 0.0) + kStepM * kStepM / 12;
+  const bool at_edge = place(top) - from_m < 2 * kStepM || to_m - place(top) < 2 * kStepM;
+  return {place(top) + mean, std::sqrt(variance), mass / sum, at_edge};
+}
+
+std::optional<Fix> CurvatureMatcher::match(int64_t stamp_ns, double odometer_m, const Prior& prior) {
+  if (bins_.size() < kFewestBins || !prior.usable()) return std::nullopt;
+  const Peak peak = search(odometer_m, prior);
+  const double sigma_m = std::hypot(peak.sigma_m, parameters_.sigma_floor_m);
+  if (peak.at_edge || sigma_m > parameters_.max_sigma_m || peak.probability < parameters_.min_probability) {
+    waiting_sigma_m_ = 0;
+    return std::nullopt;
+  }
+  // An unknown lag is the same error in every fix: more of them must not make the place surer than it.
+  const bool lag_unknown = any_of_body() && peak.sigma_m > kLagKnownShare * parameters_.lag_m / std::sqrt(12.0);
+  if (lag_unknown && std::min(prior.over_m, prior.under_m) < parameters_.lag_m) return std::nullopt;
+  if (waiting_sigma_m_ == 0 || sigma_m < kBetterBy * waiting_sigma_m_) {
+    waiting_sigma_m_ = sigma_m;
+    return std::nullopt;
+  }
+  waiting_sigma_m_ = 0;
+  forget();
+  return Fix{stamp_ns, prior.path_distance_m + peak.offset_m, sigma_m, peak.probability, 0};
+}
+
+}  // namespace railfix::map_matcher

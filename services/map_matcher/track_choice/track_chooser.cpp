@@ -1,0 +1,396 @@
+#include "map_matcher/track_choice/track_chooser.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "map_matcher/inputs.hpp"
+#include "map_matcher/track_choice/picture_fits.hpp"
+#include "track/declared.hpp"
+
+namespace railfix::map_matcher {
+namespace {
+
+constexpr double kLostM = 60.0;  // afterwards the window is right and the routes are not
+constexpr double kLeastProbability = 1e-7;
+constexpr double kTurnRoundM = 0.3;
+constexpr double kMapSigmas = 3;      // points are no further from where the map has them
+constexpr double kWheelsBehindM = 5;  // the foot: points may be thrown in front of the first wheels
+constexpr double kSameM = 5.0;        // two routes whose distances differ by less are one
+constexpr double kFarFromWindowM = 200;
+constexpr double kMostWindowM = 300;
+constexpr size_t kMostHypotheses = 24;
+constexpr double kNoLagShare = 0.3;   // of the cars
+constexpr double kWatched = 0.9;      // a track less probable lies behind a switch that nobody watched ...
+constexpr double kUnwatchedM = 3000;  // ... no further back
+
+double log_sum(double a, double b) {
+  const double most = std::max(a, b);
+  if (!std::isfinite(most)) return most;
+  return most + std::log1p(std::exp(std::min(a, b) - most));
+}
+
+}  // namespace
+
+void TrackChooser::start(const TrackWindow& window) {
+  hypotheses_.clear();
+  pending_ = {};
+  lost_m_ = moved_back_m_ = 0;
+  place_m_ = 0;
+  window_ = window;
+  const track::Run run{map_->edge(window.place.edge), window.place.direction != track::Direction::reverse};
+  hypotheses_.push_back({track::Route(run, window.place.offset_m, 0), 0, {0, std::log(parameters_.astray)}, {}});
+  forwards_ = window.forwards;
+  told_ = 1;
+  if (window.probability < kWatched) open_ways_behind();
+  cells_m_ = first_m();
+  for (auto& hypothesis : hypotheses_) extend_behind(hypothesis.route);
+  fit_cells();
+  extend();
+}
+
+// Who begins behind a switch that nobody watched does not know more than fusion: the train may be on any of the ways
+// from there, as far beyond the switch.
+void TrackChooser::open_ways_behind() {
+  track::Route back = hypotheses_.front().route;
+  std::vector<track::Route> others;
+  const auto behind_m = [&] { return forwards_ ? -back.begin_m() : back.end_m(); };
+  for (double even = 1; even > window_.probability + 0.01 && behind_m() < kUnwatchedM;) {
+    const track::Run here = forwards_ ? back.legs().front().run : back.legs().back().run;
+    const auto before = forwards_ ? ways_->before(here) : ways_->after(here);
+    if (before.empty()) break;
+    const track::Run& from = before.front();
+    const auto ways = forwards_ ? ways_->after(from) : ways_->before(from);
+    even /= static_cast<double>(ways.size());
+    for (const auto& way : ways) {
+      if (way == here) continue;
+      const double switch_m = from.forward == forwards_ ? from.length_m() : 0.0;  // on the edge before it
+      auto& other = others.emplace_back(from, switch_m, forwards_ ? back.begin_m() : back.end_m());
+      forwards_ ? other.push_ahead(way) : other.push_behind(way);
+    }
+    forwards_ ? back.push_behind(from) : back.push_ahead(from);
+  }
+  if (others.empty()) {
+    told_ = window_.probability;
+    return;
+  }
+  hypotheses_.front().log_prior = std::log(window_.probability);
+  for (auto& other : others) {
+    const double share = (1 - window_.probability) / static_cast<double>(others.size());
+    hypotheses_.push_back({std::move(other), std::log(share), {0, std::log(parameters_.astray)}, {}});
+  }
+}
+
+void TrackChooser::follow(const TrackWindow& window) {
+  TrackWindow wanted = window;
+  wanted.over_m = std::clamp(window.over_m, 0.0, kMostWindowM);
+  wanted.under_m = std::clamp(window.under_m, 0.0, kMostWindowM);
+  std::optional<double> found;
+  double best = -INFINITY;
+  for (const auto& hypothesis : hypotheses_) {
+    const auto place_m = hypothesis.route.distance_of(window.place, place_m_);
+    if (!place_m || std::abs(*place_m - place_m_) > kFarFromWindowM || hypothesis.log_prior <= best) continue;
+    found = place_m;
+    best = hypothesis.log_prior;
+  }
+  if (hypotheses_.empty() || (!found && lost_m_ > kLostM)) {
+    start(wanted);
+    return;
+  }
+  // A window on a track that was given up is followed on the one that is left.
+  if (found) {
+    place_m_ = *found;
+    lost_m_ = 0;
+  }
+  window_ = wanted;
+}
+
+void TrackChooser::move(const Turn& turn) {
+  if (hypotheses_.empty() || !has_sense(turn)) return;
+  if (turn.sensor != sensor_) {
+    sensor_ = turn.sensor;
+    for (auto& hypothesis : hypotheses_) {
+      for (auto& cell : hypothesis.cells) cell = {cell.log_weight, 0, 1};
+    }
+  }
+  place_m_ += turn.way_m;
+  lost_m_ += std::abs(turn.way_m);
+  moved_back_m_ = std::max(0.0, moved_back_m_ - (forwards_ ? turn.way_m : -turn.way_m));
+  if (moved_back_m_ > kTurnRoundM) turn_round();
+  run_pictures(turn.way_m);
+  pending_.way_m += turn.way_m;
+  pending_.turn_rad += turn.turn_rad;
+  pending_.variance += turn.sigma_rad * turn.sigma_rad;
+  pending_.bias_rad += turn.bias_rad;
+  if (std::abs(pending_.way_m) >= parameters_.bin_m) use_pending();
+}
+
+void TrackChooser::stand(const Turn& turn) {
+  if (turn.sensor != sensor_ || !has_sense(turn) || !(turn.sigma_rad > 0)) return;
+  const double noise = turn.sigma_rad * turn.sigma_rad;
+  for (auto& hypothesis : hypotheses_) {
+    for (auto& cell : hypothesis.cells)
+      learn_bias(cell, turn.turn_rad - turn.bias_rad * cell.bias, noise, turn.bias_rad);
+  }
+}
+
+void TrackChooser::move_blind(double way_m) {
+  if (hypotheses_.empty() || !has_sense(Turn{way_m})) return;
+  cells_m_ += pending_.way_m + way_m;
+  pending_ = {};
+  place_m_ += way_m;
+  lost_m_ += std::abs(way_m);
+  run_pictures(way_m);
+  for (auto& hypothesis : hypotheses_) spread(hypothesis.cells, way_m);
+  trim();
+  extend();
+  fit_cells();
+}
+
+void TrackChooser::use_pending() {
+  const BinTurn bin = pending_;
+  pending_ = {};
+  cells_m_ += bin.way_m;
+  trim();
+  extend();
+  fit_cells();
+  for (auto& hypothesis : hypotheses_) {
+    spread(hypothesis.cells, bin.way_m);
+    weigh_turn(hypothesis.cells, cells_m_, hypothesis.route, bin, parameters_);
+  }
+  merge();
+  prune();
+}
+
+// The cells cover where the train can be; new ones at the ends know no more than their neighbours.
+void TrackChooser::fit_cells() {
+  const auto ahead = static_cast<int>(std::floor((first_m() - cells_m_) / kCellM));
+  cells_m_ += kCellM * ahead;
+  const auto count = static_cast<size_t>(std::ceil((last_m() - cells_m_) / kCellM)) + 1;
+  for (auto& hypothesis : hypotheses_) {
+    auto& cells = hypothesis.cells;
+    if (cells.empty()) cells.emplace_back();
+    if (ahead > 0) {
+      cells.erase(cells.begin(), cells.begin() + std::min<std::ptrdiff_t>(ahead, std::ssize(cells) - 1));
+    } else if (ahead < 0) {
+      cells.insert(cells.begin(), static_cast<size_t>(-ahead), cells.front());
+    }
+    cells.resize(count, cells.back());
+  }
+}
+
+// What lies ahead may be set otherwise once the train has left it: only what its wheels certainly stand on is kept.
+void TrackChooser::turn_round() {
+  const double map_m = kMapSigmas * parameters_.map_sigma_m;
+  const double wheels_m = place_m_ - window_.over_m - map_m - kWheelsBehindM;
+  const double foot_m = place_m_ + window_.under_m + map_m;
+  forwards_ = !forwards_;
+  moved_back_m_ = 0;
+  cells_m_ += pending_.way_m;
+  pending_ = {};
+  for (auto& hypothesis : hypotheses_) {
+    auto& route = hypothesis.route;
+    if (forwards_) {
+      while (route.legs().size() > 1 && route.legs().back().begin_m > wheels_m) route.drop_ahead();
+    } else {
+      while (route.legs().size() > 1 && route.legs().front().end_m() < foot_m) route.drop_behind();
+    }
+  }
+  merge();
+  extend();
+  fit_cells();
+}
+
+// In the direction of travel every way is a hypothesis of its own.
+void TrackChooser::extend() {
+  for (size_t i = 0; i < hypotheses_.size();) {
+    auto& route = hypotheses_[i].route;
+    const bool enough =
+        forwards_ ? route.end_m() > last_m() + parameters_.reach_m : route.begin_m() < first_m() - parameters_.reach_m;
+    const auto ways = enough      ? std::vector<track::Run>()
+                      : forwards_ ? ways_->after(route.legs().back().run)
+                                  : ways_->before(route.legs().front().run);
+    if (ways.empty()) {
+      ++i;
+      continue;
+    }
+    hypotheses_[i].log_prior -= std::log(static_cast<double>(ways.size()));
+    const Hypothesis stem = hypotheses_[i];
+    for (size_t k = 0; k < ways.size(); ++k) {
+      if (k > 0) hypotheses_.push_back(stem);
+      auto& longer = k == 0 ? hypotheses_[i].route : hypotheses_.back().route;
+      forwards_ ? longer.push_ahead(ways[k]) : longer.push_behind(ways[k]);
+    }
+    if (hypotheses_.size() > kMostHypotheses) prune();
+  }
+  for (auto& hypothesis : hypotheses_) extend_behind(hypothesis.route);
+}
+
+// Where the train came from matters only for the cells that lie there: the straight way will do.
+void TrackChooser::extend_behind(track::Route& route) const {
+  while (forwards_ && route.begin_m() > first_m()) {
+    const auto ways = ways_->before(route.legs().front().run);
+    if (ways.empty()) return;
+    route.push_behind(ways.front());
+  }
+  while (!forwards_ && route.end_m() < last_m()) {
+    const auto& ways = ways_->after(route.legs().back().run);
+    if (ways.empty()) return;
+    route.push_ahead(ways.front());
+  }
+}
+
+void TrackChooser::trim() {
+  for (auto& hypothesis : hypotheses_) {
+    auto& route = hypothesis.route;
+    if (forwards_) {
+      while (route.legs().size() > 1 && route.legs().front().end_m() < first_m() - kCellM) route.drop_behind();
+    } else {
+      while (route.legs().size() > 1 && route.legs().back().begin_m > last_m() + kCellM) route.drop_ahead();
+    }
+  }
+}
+
+void TrackChooser::merge() {
+  const auto same = [](const track::Route& a, const track::Route& b) {
+    return std::equal(
+        a.legs().begin(), a.legs().end(), b.legs().begin(), b.legs().end(),
+        [](const auto& x, const auto& y) { return x.run == y.run && std::abs(x.begin_m - y.begin_m) < kSameM; });
+  };
+  for (size_t i = 0; i < hypotheses_.size(); ++i) {
+    for (size_t k = i + 1; k < hypotheses_.size();) {
+      auto& a = hypotheses_[i];
+      auto& b = hypotheses_[k];
+      if (!same(a.route, b.route)) {
+        ++k;
+        continue;
+      }
+      const double of_a = evidence(a);
+      const double of_b = evidence(b);
+      if (of_b > of_a) std::swap(a, b);
+      a.log_prior += log_sum(of_a, of_b) - std::max(of_a, of_b);
+      hypotheses_.erase(hypotheses_.begin() + static_cast<std::ptrdiff_t>(k));
+    }
+  }
+}
+
+void TrackChooser::prune() {
+  std::vector<double> logs;
+  for (const auto& hypothesis : hypotheses_) logs.push_back(evidence(hypothesis));
+  const double best = *std::max_element(logs.begin(), logs.end());
+  std::vector<double> sorted = logs;
+  std::sort(sorted.rbegin(), sorted.rend());
+  double least = best + std::log(kLeastProbability);
+  if (sorted.size() > kMostHypotheses) least = std::max(least, sorted[kMostHypotheses]);
+  std::vector<Hypothesis> kept;
+  for (size_t i = 0; i < logs.size(); ++i) {
+    if (logs[i] <= least && logs[i] < best) continue;
+    kept.push_back(std::move(hypotheses_[i]));
+    kept.back().log_prior -= best;
+  }
+  hypotheses_ = std::move(kept);
+}
+
+// Of the train at a place: as fusion says, and up to the lag further back for the turning. Many cars do not lag at all.
+double TrackChooser::log_of_place(double place_m) const {
+  const double off_m = place_m - place_m_;
+  const double beyond_m = off_m > 0 ? off_m : std::min(0.0, off_m + parameters_.lag_m);
+  const double sigma_m = std::hypot(window_.sigma_m, parameters_.map_sigma_m);
+  const auto bell = [&](double m) { return -0.5 * m * m / (sigma_m * sigma_m); };
+  const double at_once = kNoLagShare / (1 - kNoLagShare) * parameters_.lag_m / (2.5 * sigma_m);
+  return log_sum(bell(beyond_m), std::log(at_once + 1e-9) + bell(off_m));
+}
+
+double TrackChooser::evidence(const Hypothesis& hypothesis) const {
+  return hypothesis.log_prior + log_sum(hypothesis.pictures.own, hypothesis.pictures.astray) + of_turning(hypothesis);
+}
+
+double TrackChooser::of_turning(const Hypothesis& hypothesis) const {
+  std::vector<double> logs;
+  logs.reserve(hypothesis.cells.size());
+  double prior = 0;
+  for (size_t i = 0; i < hypothesis.cells.size(); ++i) {
+    const double of_place = log_of_place(cells_m_ + kCellM * static_cast<double>(i));
+    logs.push_back(hypothesis.cells[i].log_weight + of_place);
+    prior += std::exp(of_place);
+  }
+  const double most = *std::max_element(logs.begin(), logs.end());
+  double sum = 0;
+  for (const double log : logs) sum += std::exp(log - most);
+  return most + std::log(sum / std::max(prior, 1e-300));
+}
+
+// Astray, the pictures show one of the other ways.
+void TrackChooser::use_picture(const std::vector<double>& log_fits) {
+  for (size_t i = 0; i < hypotheses_.size(); ++i) {
+    double other = -INFINITY;
+    for (size_t k = 0; k < log_fits.size(); ++k) {
+      if (k != i) other = std::max(other, log_fits[k]);
+    }
+    hypotheses_[i].pictures.own += log_fits[i];
+    hypotheses_[i].pictures.astray += other;
+  }
+}
+
+// A detector goes astray and comes back, as often as `astray` and `astray_m` say.
+void TrackChooser::run_pictures(double way_m) {
+  seen_m_ += std::abs(way_m);
+  const double back = std::min(0.5, std::abs(way_m) / parameters_.astray_m);
+  const double away = back * parameters_.astray / (1 - parameters_.astray);
+  for (auto& [route, prior, pictures, cells] : hypotheses_) {
+    pictures = {log_sum(pictures.own + std::log(1 - away), pictures.astray + std::log(back)),
+                log_sum(pictures.own + std::log(away), pictures.astray + std::log(1 - back))};
+  }
+}
+
+void TrackChooser::sight(const Sighting& sighting) {
+  if (hypotheses_.size() < 2 || !has_sense(sighting)) return;
+  const SightedOnRoute seen{sighting, place_m_ + sighting.distance_ahead_m,
+                            std::hypot(sighting.sigma_m, window_.sigma_m, parameters_.map_sigma_m)};
+  std::vector<double> fits;
+  for (const auto& hypothesis : hypotheses_)
+    fits.push_back(std::log(sighting_fits(*map_, hypothesis.route, seen, parameters_)));
+  use_picture(fits);
+  prune();
+}
+
+void TrackChooser::see(double curvature_per_m, double sigma_per_m) {
+  if (hypotheses_.size() < 2 || seen_m_ < parameters_.bin_m) return;
+  if (!has_sense(ViewInput{curvature_per_m, sigma_per_m * sigma_per_m})) return;
+  seen_m_ = 0;
+  const double sigma = std::hypot(sigma_per_m, parameters_.noise_per_m);
+  std::vector<double> fits;
+  const ViewedCurvature view{curvature_per_m, sigma, place_m_ - window_.over_m - 2, last_m()};
+  for (const auto& hypothesis : hypotheses_) fits.push_back(view_fits(hypothesis.route, view, parameters_));
+  use_picture(fits);
+}
+
+std::optional<TrackChoice> TrackChooser::choice() const {
+  if (hypotheses_.empty()) return std::nullopt;
+  if (hypotheses_.size() == 1) {
+    return TrackChoice{{{hypotheses_.front().route.position_at(place_m_), told_}},
+                       told_ >= track::kDeclaredProbability};
+  }
+  struct Sum {
+    track::EdgePosition place;
+    double log = -INFINITY;
+  };
+  std::map<std::pair<uint32_t, track::Direction>, Sum> by_edge;
+  double all = -INFINITY;
+  for (const auto& hypothesis : hypotheses_) {
+    const double log = evidence(hypothesis);
+    const auto place = hypothesis.route.position_at(place_m_);
+    auto& sum = by_edge[{place.edge, place.direction}];
+    sum.place = place;
+    sum.log = log_sum(sum.log, log);
+    all = log_sum(all, log);
+  }
+  TrackChoice choice;
+  for (const auto& [edge, sum] : by_edge) choice.options.push_back({sum.place, told_ * std::exp(sum.log - all)});
+  std::sort(choice.options.begin(), choice.options.end(),
+            [](const TrackOption& a, const TrackOption& b) { return a.probability > b.probability; });
+  choice.known = choice.options.front().probability >= track::kDeclaredProbability;
+  return choice;
+}
+
+}  // namespace railfix::map_matcher

@@ -1,0 +1,110 @@
+// Which track? Every way through the switches around the train is a hypothesis with a probability. How the train turns
+// against the curvature of each way, how the rails in the picture bend, the side of the frogs and what was sighted tell
+// them apart; until one is clearly ahead the track is not yet known.
+#pragma once
+
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "map_matcher/match_types.hpp"
+#include "map_matcher/track_choice/track_parameters.hpp"
+#include "map_matcher/track_choice/turn_cells.hpp"
+#include "track/ways.hpp"
+
+namespace railfix::map_matcher {
+
+/// Where fusion thinks the train is: an edge, and how far it may be off along the track.
+struct TrackWindow {
+  track::EdgePosition place;
+  double over_m = 0;  // may be so far behind
+  double under_m = 0;
+  double sigma_m = 0;
+  double probability = 1;  // of this edge, as long as nothing is known here
+  bool forwards = true;    // the train moves the way that the cab looks
+};
+
+struct TrackOption {
+  track::EdgePosition place;
+  double probability = 0;
+};
+
+/// Best first; the probabilities add up to 1, or to less when the train may be on another track that is not looked
+/// into.
+struct TrackChoice {
+  std::vector<TrackOption> options;
+  bool known = false;
+};
+
+class TrackChooser {
+ public:
+  TrackChooser(const TrackParameters& parameters, std::shared_ptr<const track::Map> map,
+               std::shared_ptr<const track::Ways> ways)
+      : parameters_(parameters), map_(std::move(map)), ways_(std::move(ways)) {}
+
+  /// REQUIRES: the edge is on the map. The first window starts the hypotheses, later ones move them along.
+  void follow(const TrackWindow& window);
+  /// Moved and turned; the way in metres of the map as well as known, signed.
+  void move(const Turn& turn);
+  /// Stood, and the sensor says that it turned: its own error.
+  void stand(const Turn& turn);
+  /// Moved, but nobody knows how it turned.
+  void move_blind(double way_m);
+  void sight(const Sighting& sighting);
+  /// The curvature of the rails in a picture taken here (left positive).
+  void see(double curvature_per_m, double sigma_per_m);
+  /// Nothing before the first window.
+  [[nodiscard]] std::optional<TrackChoice> choice() const;
+  /// Whose turning was used last.
+  [[nodiscard]] TurnSensor sensor() const { return sensor_; }
+
+ private:
+  /// What the pictures showed: their errors are not independent, since a detector that follows the other leg goes on to
+  /// do so and sees that leg's frog. So a hidden state (own leg or astray) is carried along, as logarithms.
+  struct Pictures {
+    double own = 0;
+    double astray = 0;
+  };
+  struct Hypothesis {
+    track::Route route;
+    double log_prior = 0;  // ways taken
+    Pictures pictures;
+    std::vector<TurnCell> cells;
+  };
+  void start(const TrackWindow& window);
+  void open_ways_behind();
+  void use_pending();
+  void fit_cells();
+  void turn_round();
+  void extend();
+  void extend_behind(track::Route& route) const;
+  void trim();
+  void merge();
+  void prune();
+  void use_picture(const std::vector<double>& log_fits);
+  void run_pictures(double way_m);
+  /// Logarithm of prior and all evidence.
+  [[nodiscard]] double evidence(const Hypothesis& hypothesis) const;
+  [[nodiscard]] double of_turning(const Hypothesis& hypothesis) const;
+  [[nodiscard]] double log_of_place(double place_m) const;
+  [[nodiscard]] double first_m() const { return place_m_ - window_.over_m - parameters_.lag_m - 2; }
+  [[nodiscard]] double last_m() const { return place_m_ + window_.under_m + 2; }
+
+  TrackParameters parameters_;
+  std::shared_ptr<const track::Map> map_;
+  std::shared_ptr<const track::Ways> ways_;
+  std::vector<Hypothesis> hypotheses_;
+  TrackWindow window_;
+  double place_m_ = 0;  // of the window's middle on the routes
+  double cells_m_ = 0;  // of the first cell
+  double lost_m_ = 0;   // run since the window was on one of the routes
+  double moved_back_m_ = 0;
+  bool forwards_ = true;      // the way that the train moves, seen from the cab
+  double seen_m_ = INFINITY;  // run since a picture was used
+  double told_ = 1;           // probability of what was told at the start and cannot be looked into
+  TurnSensor sensor_ = TurnSensor::camera;
+  BinTurn pending_;
+};
+
+}  // namespace railfix::map_matcher
