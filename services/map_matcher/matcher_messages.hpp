@@ -4,16 +4,15 @@
 #include <algorithm>
 
 #include "map_matcher/inputs.hpp"
+#include "messaging/direction.hpp"
 #include "messaging/messaging.hpp"
 
 namespace railfix::map_matcher {
 
+using messaging::direction_of;
+
 inline track::EdgePosition place_of(const msg::TrainState& state) {
-  return {state.edge(), state.offset_m(),
-          state.direction() == msg::DIRECTION_REVERSE ? track::Direction::reverse : track::Direction::forward};
-}
-inline uint8_t direction_of(track::Direction direction) {
-  return direction == track::Direction::reverse ? msg::DIRECTION_REVERSE : msg::DIRECTION_FORWARD;
+  return {state.edge(), state.offset_m(), direction_of(state.direction())};
 }
 inline PlacedTrain placed(const msg::TrainState& m) {
   return {m.stamp_ns(), place_of(m), m.speed_mps(), m.distance_m(), m.over_m(), m.under_m()};

@@ -1,0 +1,20 @@
+// The direction along an edge in which a train looks, as position messages and as the map say it.
+#pragma once
+
+#include "idl/position.h"
+#include "track/map.hpp"
+
+namespace railfix::messaging {
+
+/// Of DIRECTION_*; any other value is unknown.
+constexpr track::Direction direction_of(uint8_t said) {
+  if (said == msg::DIRECTION_FORWARD) return track::Direction::forward;
+  return said == msg::DIRECTION_REVERSE ? track::Direction::reverse : track::Direction::unknown;
+}
+
+constexpr uint8_t direction_of(track::Direction direction) {
+  if (direction == track::Direction::forward) return msg::DIRECTION_FORWARD;
+  return direction == track::Direction::reverse ? msg::DIRECTION_REVERSE : msg::DIRECTION_UNKNOWN;
+}
+
+}  // namespace railfix::messaging
