@@ -9,15 +9,20 @@
 
 namespace railfix::tpr_publisher {
 
+namespace {
+
+// Of a cycle of 0: more would keep the link to the ground from everything else.
+constexpr int64_t kShortestCycleNs = core::kNsPerSecond;
+constexpr double kShortestCycleM = 1.0;
+
+}  // namespace
+
 ReportTrigger::ReportTrigger(const etcs::ReportParameters& parameters, double train_length_m)
     : train_length_m_(train_length_m) {
-  core::ok_or_throw(set_parameters(parameters));
+  set_parameters(parameters);
 }
 
-core::Status ReportTrigger::set_parameters(const etcs::ReportParameters& parameters, std::optional<uint32_t> origin) {
-  if (parameters.t_cycloc == 0 || parameters.d_cycloc == 0) {
-    return core::Error{"Packet 58 asks for reports without a pause (T_CYCLOC or D_CYCLOC is 0): use 1 or more."};
-  }
+void ReportTrigger::set_parameters(const etcs::ReportParameters& parameters, std::optional<uint32_t> origin) {
   parameters_ = parameters;
   origin_ = origin;
   origin_m_.reset();
@@ -31,7 +36,6 @@ core::Status ReportTrigger::set_parameters(const etcs::ReportParameters& paramet
   }
   location_passed_ = false;
   asked_ = parameters.m_loc == etcs::kReportNow;
-  return {};
 }
 
 void ReportTrigger::place_locations(const Moment& moment) {
@@ -84,16 +88,23 @@ void ReportTrigger::note_events(const Moment& moment) {
   }
 }
 
+// A clock that was set back by an hour does not silence the train for an hour.
+int64_t ReportTrigger::since_report_ns(const Moment& moment) const {
+  return std::abs(moment.now_ns - reported_->now_ns);
+}
+
 bool ReportTrigger::cycle_distance_over(const Moment& moment) const {
-  const double period_m = parameters_.d_cycloc * etcs::scale_m(parameters_.q_scale);
-  return parameters_.d_cycloc != etcs::kNoCycleDistance &&
-         (way_lost_ || std::abs(moment.front_m - reported_->front_m) >= period_m);
+  if (parameters_.d_cycloc == etcs::kNoCycleDistance) return false;
+  const bool as_often_as_possible = parameters_.d_cycloc == 0;
+  if (as_often_as_possible && since_report_ns(moment) < kShortestCycleNs) return false;
+  const double period_m =
+      as_often_as_possible ? kShortestCycleM : parameters_.d_cycloc * etcs::scale_m(parameters_.q_scale);
+  return way_lost_ || std::abs(moment.front_m - reported_->front_m) >= period_m;
 }
 
 bool ReportTrigger::cycle_time_over(const Moment& moment) const {
-  const int64_t period_ns = int64_t{parameters_.t_cycloc} * core::kNsPerSecond;
-  // A clock that was set back by an hour does not silence the train for an hour.
-  return parameters_.t_cycloc != etcs::kNoCycleTime && std::abs(moment.now_ns - reported_->now_ns) >= period_ns;
+  if (parameters_.t_cycloc == etcs::kNoCycleTime) return false;
+  return since_report_ns(moment) >= std::max(int64_t{parameters_.t_cycloc} * core::kNsPerSecond, kShortestCycleNs);
 }
 
 std::optional<Reason> ReportTrigger::onboard_reason(const Moment& moment) const {

@@ -12,7 +12,7 @@
 
 namespace railfix::tpr_publisher {
 
-/// Values as in REPORT_* of idl/position.idl.
+/// Values as in REPORT_* of idl/position.idl, from mode on of idl/onboard.idl.
 enum class Reason : uint8_t {
   cycle_time = 1,
   cycle_distance = 2,
@@ -30,7 +30,7 @@ enum class Reason : uint8_t {
   error = 14,
 };
 
-/// What the ETCS on-board unit says, as OnboardStatus of idl/position.idl.
+/// What the ETCS on-board unit says, as OnboardStatus of idl/onboard.idl.
 struct Onboard {
   int64_t stamp_ns = 0;
   int64_t integrity_ns = 0;
@@ -62,10 +62,11 @@ class ReportTrigger {
   /// train_length_m: 0 = not known; then nothing is reported where the rear end passes.
   ReportTrigger(const etcs::ReportParameters& parameters, double train_length_m);
 
-  /// A packet 58; one that asks for reports without a pause is refused. Its locations count
-  /// along the train from `origin`, the LRBG when it came; nothing = the next one that is known, because
-  /// it has only just come, kUnknownBaliseGroup = nobody knows any more, and locations are left out.
-  core::Status set_parameters(const etcs::ReportParameters& parameters, std::optional<uint32_t> origin = std::nullopt);
+  /// A packet 58. T_CYCLOC 0 and D_CYCLOC 0 ask for reports as often as possible: once a second at most, for D_CYCLOC
+  /// once a metre at most, too. Its locations count along the train from `origin`, the LRBG when it came; nothing = the
+  /// next one that is known, because it has only just come, kUnknownBaliseGroup = nobody knows any more, and locations
+  /// are left out.
+  void set_parameters(const etcs::ReportParameters& parameters, std::optional<uint32_t> origin = std::nullopt);
   /// The group that locations count from; nothing before it is known and when there are no locations.
   [[nodiscard]] std::optional<uint32_t> origin() const { return locations_.empty() ? std::nullopt : origin_; }
   /// The same, while moments must say where it is.
@@ -96,6 +97,7 @@ class ReportTrigger {
   void note_events(const Moment& moment);
   [[nodiscard]] double reached_m(const Moment& moment, bool rear_end) const;
   [[nodiscard]] std::optional<Reason> onboard_reason(const Moment& moment) const;
+  [[nodiscard]] int64_t since_report_ns(const Moment& moment) const;
   [[nodiscard]] bool cycle_distance_over(const Moment& moment) const;
   [[nodiscard]] bool cycle_time_over(const Moment& moment) const;
 

@@ -135,16 +135,20 @@ TrainIntegrity::Place TprPublisher::integrity_place() const {
   return {position.stamp_ns, position.distance_m, position.over_m + group_m()};
 }
 
+bool TprPublisher::direction_known() const {
+  const auto here = reference();
+  return here && orientation(*here) != etcs::kUnknownSide;
+}
+
 core::Status TprPublisher::set_parameters(const etcs::ReportParameters& parameters, std::optional<uint32_t> origin) {
   if (parameters.q_dir != etcs::kUnknownSide) {  // here the value 2 says "both"
-    const auto here = reference();
-    const uint32_t side = here ? orientation(*here) : uint32_t{etcs::kUnknownSide};
-    if (side == etcs::kUnknownSide)
+    if (!direction_known())
       return core::Error{"Packet 58 is for one direction only (Q_DIR), but the train's is not known yet."};
-    if (side != parameters.q_dir)
+    if (orientation(*reference()) != parameters.q_dir)
       return core::Error{"Packet 58 is for trains of the other direction (Q_DIR) than this one's."};
   }
-  return trigger_.set_parameters(parameters, origin);
+  trigger_.set_parameters(parameters, origin);
+  return {};
 }
 
 core::Status TprPublisher::set_onboard(const Onboard& onboard, int64_t now_ns) {
@@ -285,7 +289,8 @@ Moment TprPublisher::moment(int64_t now_ns) const {
   }
   if (onboard_) {
     moment.onboard = *onboard_;
-    moment.onboard.q_integrity = integrity_.q_integrity();
+    // As in fields(): what is said again after a silence is news for the trackside.
+    moment.onboard.q_integrity = onboard_silent(now_ns) ? kNoIntegrityInformation : integrity_.q_integrity();
     moment.onboard.integrity_ns = integrity_.integrity_ns();
   } else {  // no change when it is heard for the first time and says the same
     moment.onboard.m_mode = settings_.report.m_mode;

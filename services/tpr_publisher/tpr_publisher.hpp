@@ -53,6 +53,8 @@ class TprPublisher {
   /// A packet 58 from trackside. One for the other running direction than the train's (Q_DIR) is refused. `origin`: as
   /// for the trigger.
   core::Status set_parameters(const etcs::ReportParameters& parameters, std::optional<uint32_t> origin = std::nullopt);
+  /// Whether such a packet can be judged.
+  [[nodiscard]] bool direction_known() const;
   /// The group that its locations count from, when it has any and it is known.
   [[nodiscard]] std::optional<uint32_t> origin() const { return trigger_.origin(); }
   /// What the on-board unit says replaces mode and level of the settings. Refused when it cannot be encoded. Of one

@@ -2,14 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 
 #include "core/time.hpp"
+#include "messaging/direction.hpp"
 #include "track/same_map.hpp"
 
 namespace railfix::tpr_publisher {
 
 namespace {
+
+using messaging::direction_of;
 
 constexpr std::chrono::milliseconds kTickPeriod{500};
 constexpr int64_t kGapNs = 500'000'000;
@@ -28,11 +30,6 @@ static_assert(static_cast<uint8_t>(Reason::error) == msg::REPORT_ERROR);
 std::shared_ptr<const track::Map> load_map(const std::string& file) {
   if (file.empty()) return nullptr;
   return std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(file)));
-}
-
-track::Direction direction_of(uint8_t direction) {
-  if (direction == msg::DIRECTION_FORWARD) return track::Direction::forward;
-  return direction == msg::DIRECTION_REVERSE ? track::Direction::reverse : track::Direction::unknown;
 }
 
 bool of_another_map(const track::Map* map, const msg::TrainState& state) {
@@ -116,6 +113,7 @@ TprPublisherService::TprPublisherService(const Config& config, service::Context&
       map_(load_map(config.map)),
       settings_(config.settings()),
       publisher_(map_, settings_),
+      told_(publisher_),
       writer_(context.writer(messaging::topics::train_position_report)) {
   if (const auto link = config.ground_link.settings(context.common().train_id, context.common().host)) {
     if (const auto plain = ground_link::plain_password(link->mqtt); !plain.empty())
@@ -137,51 +135,25 @@ TprPublisherService::TprPublisherService(const Config& config, service::Context&
   remember_packet_58();
 }
 
-// It outlives a restart, also while the on-board unit is silent: "HEX LRBG", or "HEX" when there was no LRBG yet.
+// It outlives a restart, also while the on-board unit is silent.
 void TprPublisherService::remember_packet_58() {
-  const auto& notes = context_.kept();
-  if (notes.empty() || context_.common().lock_step) return;
-  const size_t blank = std::min(notes.find(' '), notes.size());
-  const auto kept = etcs::parse_hex(notes.substr(0, blank));
-  if (!kept.ok()) return;
-  const uint64_t lrbg = std::strtoull(notes.c_str() + blank, nullptr, 10);
-  origin_ = lrbg > 0 && lrbg < etcs::kUnknownBaliseGroup ? static_cast<uint32_t>(lrbg) : etcs::kUnknownBaliseGroup;
-  packet_58_ = kept.value();
-  const auto taken = take_packet_58(packet_58_);
-  packet_58_refusal_ = taken.ok() ? "" : "packet 58 of before is not used: " + taken.error().message;
-  if (taken.ok()) context_.log().info("position report parameters of packet 58 as before");
-}
-
-// Once it is known where its locations count from they are not moved to where a later process begins.
-void TprPublisherService::keep_packet_58() {
-  const auto origin = publisher_.origin();
-  if (!parameters_ || !origin || origin == origin_) return;
-  origin_ = origin;
-  context_.keep(etcs::to_hex(packet_58_) + ' ' + std::to_string(*origin));
-}
-
-core::Status TprPublisherService::take_packet_58(std::span<const uint8_t> packet) {
-  const auto parameters = etcs::decode_report_parameters(packet);
-  if (!parameters.ok()) return parameters.error();
-  if (auto status = publisher_.set_parameters(parameters.value(), origin_); !status.ok()) return status;
-  parameters_ = parameters.value();
-  return {};
+  if (context_.common().lock_step) return;
+  kept_ = context_.kept();
+  note_packet_58(told_.remember(kept_));
 }
 
 // It stands in every onboard_status: who was away, or is the second one of two, hears it all the same.
 void TprPublisherService::hear_packet_58(const msg::OnboardStatus& status, bool just_come) {
   const size_t bytes = std::min<size_t>(status.packet_58_bytes(), status.packet_58().size());
-  const std::span packet(status.packet_58().data(), bytes);
-  // One that was refused may fit when the train's direction is known.
-  if (packet.empty() || (packet_58_refusal_.empty() && std::ranges::equal(packet, packet_58_))) return;
-  if (!std::ranges::equal(packet, packet_58_))
-    origin_ = just_come ? std::nullopt : std::optional(etcs::kUnknownBaliseGroup);
-  packet_58_.assign(packet.begin(), packet.end());
-  const auto taken = take_packet_58(packet);
-  packet_58_refusal_ = taken.ok() ? "" : "packet 58 of onboard_status is not used: " + taken.error().message;
-  if (!taken.ok()) return;
-  context_.keep(etcs::to_hex(packet_58_));
-  context_.log().info("position report parameters taken over");
+  note_packet_58(told_.hear({status.packet_58().data(), bytes}, just_come));
+}
+
+void TprPublisherService::note_packet_58(bool taken) {
+  if (taken) context_.log().info("position report parameters of packet 58 taken over");
+  const auto notes = told_.notes();
+  if (notes.empty() || notes == kept_) return;
+  kept_ = notes;
+  context_.keep(notes);
 }
 
 void TprPublisherService::share_charge() {
@@ -205,14 +177,14 @@ int TprPublisherService::fitness() const {
 
 void TprPublisherService::stand_by(const msg::TrainState& state, int64_t now_ns) {
   publisher_.watch(position_of(map_.get(), state), now_ns);
-  keep_packet_58();
+  note_packet_58(told_.follow());
   report_trouble_.clear();
   context_.health().active();
 }
 
 void TprPublisherService::restart() {
   publisher_ = TprPublisher(map_, settings_);
-  if (parameters_) (void)publisher_.set_parameters(*parameters_, origin_);
+  told_.begin_anew();
   state_seen_ = false;
   reference_known_ = false;
 }
@@ -232,14 +204,14 @@ void TprPublisherService::on_state(const msg::TrainState& state) {
   }
   const auto position = position_of(map_.get(), state);
   const auto outcome = publisher_.update(position, now);
-  keep_packet_58();
+  note_packet_58(told_.follow());
   if (outcome.report) send(*outcome.report, state.grabbed_ns());
   if (!outcome.refusal.empty()) {
     report_trouble_ = outcome.refusal;
   } else if (!onboard_refusal_.empty()) {
     report_trouble_ = onboard_refusal_;
-  } else if (!packet_58_refusal_.empty()) {
-    report_trouble_ = packet_58_refusal_;
+  } else if (!told_.refusal().empty()) {
+    report_trouble_ = told_.refusal();
   } else if (const auto unknown = publisher_.front_unknown(); !unknown.empty()) {
     report_trouble_ = "Reports say LRBG unknown: " + unknown;
   } else if (auto left_out = publisher_.left_out(now); !left_out.empty()) {

@@ -3,13 +3,12 @@
 
 #include <memory>
 #include <optional>
-#include <span>
 #include <string>
-#include <vector>
 
 #include "messaging/onboard_topic.hpp"
 #include "service/data_time.hpp"
 #include "service/service.hpp"
+#include "tpr_publisher/told_parameters.hpp"
 #include "tpr_publisher/tpr_publisher_config.hpp"
 
 namespace railfix::tpr_publisher {
@@ -24,11 +23,11 @@ class TprPublisherService {
   void on_onboard(const msg::OnboardStatus& status);
   void on_tick();
   void notice_gap();
-  core::Status take_packet_58(std::span<const uint8_t> packet);
   /// `just_come`: it did not stand in an onboard_status of some seconds ago.
   void hear_packet_58(const msg::OnboardStatus& status, bool just_come);
   void remember_packet_58();
-  void keep_packet_58();
+  /// For a later process. `taken`: one is used from now on.
+  void note_packet_58(bool taken);
   void share_charge();
   [[nodiscard]] int fitness() const;
   /// Not in charge: works along and sends nothing.
@@ -47,9 +46,8 @@ class TprPublisherService {
   std::shared_ptr<const track::Map> map_;
   Settings settings_;
   TprPublisher publisher_;
-  std::optional<etcs::ReportParameters> parameters_;  // as told by trackside ...
-  std::vector<uint8_t> packet_58_;                    // ... in what was heard last, used or not
-  std::optional<uint32_t> origin_;                    // LRBG when it came, for its locations; nothing = the next one
+  ToldParameters told_;
+  std::string kept_;  // of told_, as a later process finds it
   messaging::Writer<msg::TrainPositionReport> writer_;
   std::optional<service::DataTime> data_time_;  // of played data
   bool state_seen_ = false;
@@ -60,9 +58,8 @@ class TprPublisherService {
   std::unique_ptr<GroundLink> ground_link_;  // nullptr = no broker
   std::string report_trouble_;
   std::string degraded_by_;
-  std::string remark_;             // of the ground link, as it was logged
-  std::string onboard_refusal_;    // empty = used
-  std::string packet_58_refusal_;  // the same
+  std::string remark_;           // of the ground link, as it was logged
+  std::string onboard_refusal_;  // empty = used
 };
 
 }  // namespace railfix::tpr_publisher

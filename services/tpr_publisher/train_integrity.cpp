@@ -83,7 +83,8 @@ TrainIntegrity::Said TrainIntegrity::said(double distance_m, double reported_ahe
   if (!rear_m_) return {};
   const double length_m = std::ceil(std::max(distance_m, *at_distance_m_) - *rear_m_ + reported_ahead_m);
   if (!(length_m <= kLongest)) return {};
-  return {q_integrity(), static_cast<uint32_t>(length_m)};
+  // A train shorter than the step of D_LRBG may lie in front of the front end that was reported.
+  return {q_integrity(), static_cast<uint32_t>(std::max(length_m, 0.0))};
 }
 
 }  // namespace railfix::tpr_publisher

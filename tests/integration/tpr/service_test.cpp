@@ -228,5 +228,50 @@ TEST_F(TprService, KeepsPacket58AndTheBaliseGroupThatItCountsFrom) {
   EXPECT_TRUE(says("No reports at the locations of packet 58"));
 }
 
+// The on-board unit says it once, before the train's direction is known, and is silent from then on.
+TEST_F(TprService, Packet58ForOneDirectionWaitsForItAndOutlivesTheService) {
+  messaging::Writer<msg::OnboardStatus> onboard(participant_, topics::onboard_status);
+  etcs::ReportParameters parameters;
+  parameters.q_dir = etcs::kReverse;  // of group B, which looks against the edge
+  parameters.locations = {{150, 1}};
+  auto program = std::make_unique<test::Program>(service());
+  ASSERT_TRUE(run_until([&] { return connected() && onboard.matched_readers() > 0; }, [] {}));
+  msg::OnboardStatus status;
+  const auto say = [&] {
+    status.m_level(etcs::kLevel2);
+    status.stamp_ns(core::wall_ns());
+    onboard.write(status);
+  };
+  double offset_m = 50;  // before the first group
+  const auto wait_there = [&] { write_state(offset_m); };
+  ASSERT_TRUE(run_until([&] { return !reports_.empty(); }, wait_there));
+  status.m_mode(1);
+  say();
+  ASSERT_TRUE(run_until([&] { return reports_.back().reason() == msg::REPORT_MODE; }, wait_there));
+  const auto packet = etcs::encode(parameters).value();
+  std::ranges::copy(packet, status.packet_58().begin());
+  status.packet_58_bytes(static_cast<uint32_t>(packet.size()));
+  say();  // it has just come
+  ASSERT_TRUE(
+      run_until([&] { return reason().find("the train's is not known yet") != std::string::npos; }, wait_there));
+  offset_m = 405;
+  ASSERT_TRUE(run_until([&] { return reason().find("packet 58") == std::string::npos; }, wait_there));
+  int more = 10;  // the LRBG that its locations count from is kept with the next state
+  ASSERT_TRUE(run_until([&] { return more == 0; },
+                        [&] {
+                          wait_there();
+                          --more;
+                        }));
+  program->end(SIGKILL);
+  ASSERT_TRUE(run_until([&] { return states_.matched_readers() == 0; }, [] {}));
+  reports_.clear();
+  program = std::make_unique<test::Program>(service());
+  offset_m = 450;
+  ASSERT_TRUE(run_until([&] { return !reports_.empty(); }, wait_there));
+  ASSERT_TRUE(run_until([&] { return reports_.back().reason() == msg::REPORT_LOCATION; },
+                        [&] { write_state(offset_m = std::min(offset_m + 2, 600.0)); }));
+  for (const auto& report : reports_) EXPECT_NE(report.reason(), msg::REPORT_CYCLE_TIME) << "that is the keys'";
+}
+
 }  // namespace
 }  // namespace railfix

@@ -32,6 +32,9 @@ inline std::shared_ptr<const track::Map> balise_map() {
                 {3, track::NodeKind::end, "", 2000, 0},
                 {4, track::NodeKind::end, "", far.easting_m, far.northing_m}};
   map->connections = {{2, 1, 2, false}, {2, 1, 3, true}};
+  map->landmarks = {{1, track::LandmarkKind::balise, 1, 100, 0, 0, ""},
+                    {2, track::LandmarkKind::balise, 1, 103, 0, 0, ""},
+                    {3, track::LandmarkKind::balise, 1, 700, 0, 0, ""}};
   map->balise_groups = {{85, 1, 1, 100, true, false, 5, {1, 2}},
                         {85, 2, 1, 400, false, true, 5, {}},
                         {85, 3, 1, 700, true, false, 5, {3}},

@@ -29,7 +29,7 @@ class Trigger : public ::testing::Test {
     parameters.t_cycloc = 6;
     return parameters;
   }
-  void ask(const etcs::ReportParameters& parameters) { core::ok_or_throw(trigger.set_parameters(parameters)); }
+  void ask(const etcs::ReportParameters& parameters) { trigger.set_parameters(parameters); }
 
   ReportTrigger trigger{parameters(), 100};
   Moment moment;
@@ -150,7 +150,7 @@ class TriggerWithLocation : public Trigger {
 };
 
 TEST_F(TriggerWithLocation, CountsFromTheGroupOfThePacketNotFromThePresentOne) {
-  core::ok_or_throw(trigger.set_parameters(wanted, 7));
+  trigger.set_parameters(wanted, 7);
   step();  // no LRBG yet
   EXPECT_EQ(trigger.wanted_origin(), 7U);
   moment.nid_lrbg = 8;
@@ -166,9 +166,9 @@ TEST_F(TriggerWithLocation, CountsFromTheGroupOfThePacketNotFromThePresentOne) {
 }
 
 TEST_F(TriggerWithLocation, IsLeftOutWhereNobodyKnowsIt) {
-  core::ok_or_throw(trigger.set_parameters(wanted, etcs::kUnknownBaliseGroup));
+  trigger.set_parameters(wanted, etcs::kUnknownBaliseGroup);
   EXPECT_TRUE(trigger.locations_left_out());
-  core::ok_or_throw(trigger.set_parameters(wanted, 7));
+  trigger.set_parameters(wanted, 7);
   EXPECT_FALSE(trigger.locations_left_out());
   step();
   moment.nid_lrbg = 8;  // group 7 is not behind the train
@@ -276,11 +276,50 @@ TEST_F(Trigger, StaysDueUntilSent) {
   EXPECT_EQ(trigger.due(moment), std::nullopt);
 }
 
-TEST(TriggerParameters, WhatCannotBeDoneIsRefused) {
-  etcs::ReportParameters wanted;
-  ReportTrigger trigger({}, 0);
+TEST_F(Trigger, ATCyclocOfZeroReportsEverySecond) {
+  auto wanted = parameters();
   wanted.t_cycloc = 0;
-  EXPECT_THAT(trigger.set_parameters(wanted).error().message, ::testing::HasSubstr("without a pause"));
+  ask(wanted);
+  step();
+  for (int cycle = 0; cycle < 3; ++cycle) {
+    run(0.99, 80);
+    EXPECT_EQ(step(), std::nullopt);
+    run(0.01, 0);
+    EXPECT_EQ(step(), Reason::cycle_time);
+  }
+}
+
+TEST_F(Trigger, ADCyclocOfZeroReportsEveryMetreButNotMoreThanOnceASecond) {
+  auto wanted = parameters();
+  wanted.t_cycloc = etcs::kNoCycleTime;
+  wanted.d_cycloc = 0;
+  ask(wanted);
+  step();
+  run(0.99, 80);
+  EXPECT_EQ(step(), std::nullopt);
+  run(0.01, 0);
+  EXPECT_EQ(step(), Reason::cycle_distance);
+  run(5, 0.9);  // creeps
+  EXPECT_EQ(step(), std::nullopt);
+  run(0.1, 0.1);
+  EXPECT_EQ(step(), Reason::cycle_distance);
+  run(1000, 0);  // at rest
+  EXPECT_EQ(step(), std::nullopt);
+  trigger.lose_way();
+  EXPECT_EQ(step(), Reason::cycle_distance);
+  run(0.5, 0);
+  trigger.lose_way();
+  EXPECT_EQ(step(), std::nullopt);
+}
+
+TEST_F(TriggerWithLocation, IsUsedWhateverTheCycles) {
+  wanted.t_cycloc = wanted.d_cycloc = 0;
+  trigger.set_parameters(wanted, 7);
+  moment.nid_lrbg = 7;
+  moment.beyond_lrbg_m = 480;
+  step();
+  run(0.1, 15);  // 495 m, max safe front end 505 m
+  EXPECT_EQ(step(), Reason::location);
 }
 
 }  // namespace

@@ -124,6 +124,15 @@ TEST(TrainIntegrity, BackingAndRoundingTogetherMakeNoShorterTrain) {
   EXPECT_EQ(integrity.said(25, 5).l_trainint, 210U);
 }
 
+TEST(TrainIntegrity, ATrainShorterThanTheStepOfTheReportHasALength) {
+  TrainIntegrity integrity;
+  integrity.follow({at(1), 10, 0});
+  integrity.hear(kByDevice, at(1), 2);
+  const auto said = integrity.said(10, -5);  // Q_SCALE 10 m: the front end that is reported lies 5 m behind
+  EXPECT_EQ(said.q_length, kByDevice);
+  EXPECT_EQ(said.l_trainint, 0U);
+}
+
 TEST(TrainIntegrity, BackingMakesNoShorterTrain) {
   auto integrity = running_until(5);
   integrity.hear(kByDevice, at(5), 200);

@@ -1,0 +1,68 @@
+#include "tpr_publisher/told_parameters.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <utility>
+
+namespace railfix::tpr_publisher {
+
+bool ToldParameters::remember(const std::string& notes) {
+  const size_t blank = std::min(notes.find(' '), notes.size());
+  const auto kept = etcs::parse_hex(notes.substr(0, blank));
+  if (!kept.ok()) return false;
+  const uint64_t lrbg = std::strtoull(notes.c_str() + blank, nullptr, 10);
+  const bool known = lrbg > 0 && lrbg < etcs::kUnknownBaliseGroup;
+  if (!etcs::decode_report_parameters(kept.value()).ok()) return false;
+  used_ = {kept.value(), known ? static_cast<uint32_t>(lrbg) : etcs::kUnknownBaliseGroup};
+  begin_anew();
+  return true;
+}
+
+bool ToldParameters::hear(std::span<const uint8_t> packet, bool just_come) {
+  if (packet.empty()) return false;
+  const auto& last = newer_ ? newer_ : used_;
+  if (last && std::ranges::equal(packet, last->bytes)) return false;
+  newer_ = {{packet.begin(), packet.end()},
+            just_come ? std::nullopt : std::optional<uint32_t>(etcs::kUnknownBaliseGroup)};
+  return try_newer();
+}
+
+// Once it is known where locations count from they are not moved to where a later process begins.
+bool ToldParameters::follow() {
+  const auto origin = publisher_.origin();
+  if (used_ && origin) used_->origin = origin;
+  return waits_ && publisher_.direction_known() && try_newer();
+}
+
+// It was for this train's direction when it came: Q_DIR is relative to the LRBG of that moment, not to the present one.
+void ToldParameters::begin_anew() {
+  if (!used_) return;
+  auto parameters = etcs::decode_report_parameters(used_->bytes).value();
+  parameters.q_dir = etcs::kUnknownSide;
+  core::ok_or_throw(publisher_.set_parameters(parameters, used_->origin));
+}
+
+core::Status ToldParameters::take_newer() {
+  waits_ = false;
+  const auto parameters = etcs::decode_report_parameters(newer_->bytes);
+  if (!parameters.ok()) return parameters.error();
+  waits_ = !publisher_.direction_known();
+  return publisher_.set_parameters(parameters.value(), newer_->origin);
+}
+
+bool ToldParameters::try_newer() {
+  const auto taken = take_newer();
+  refusal_ = taken.ok() ? "" : "packet 58 of onboard_status is not used: " + taken.error().message;
+  if (!taken.ok()) return false;
+  waits_ = false;
+  used_ = std::exchange(newer_, std::nullopt);
+  return true;
+}
+
+std::string ToldParameters::notes() const {
+  if (!used_) return "";
+  const bool known = used_->origin && *used_->origin != etcs::kUnknownBaliseGroup;
+  return etcs::to_hex(used_->bytes) + (known ? ' ' + std::to_string(*used_->origin) : "");
+}
+
+}  // namespace railfix::tpr_publisher

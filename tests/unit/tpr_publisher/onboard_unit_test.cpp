@@ -1,0 +1,235 @@
+// What the on-board unit says of mode, level and train integrity, and how long it is believed.
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "unit/tpr_publisher/publisher_fixture.hpp"
+
+namespace railfix::tpr_publisher {
+namespace {
+
+using namespace testing;
+using ::testing::HasSubstr;
+
+TEST(OnboardUnit, SetsModeLevelAndIntegrity) {
+  TprPublisher publisher(balise_map(), settings());
+  ASSERT_TRUE(publisher.update(at(forward(1, 450), 0, 20), kStart).report.has_value());
+  Onboard onboard;
+  onboard.stamp_ns = kStart + core::to_ns(0.5);
+  ASSERT_TRUE(publisher.set_onboard(onboard, onboard.stamp_ns).ok());
+  EXPECT_FALSE(publisher.update(at(forward(1, 460), 0.5, 20), onboard.stamp_ns).report.has_value());  // nothing new
+  onboard.m_mode = 1;
+  onboard.m_level = etcs::kLevelNtc;
+  onboard.nid_ntc = 9;
+  onboard.q_integrity = 1;
+  onboard.integrity_ns = kStart + core::to_ns(0.5);
+  onboard.train_length_m = 120;
+  ASSERT_TRUE(publisher.set_onboard(onboard, onboard.stamp_ns).ok());
+  auto position = at(forward(1, 470), 1, 20);
+  const auto report = publisher.update(position, position.stamp_ns).report;
+  ASSERT_TRUE(report.has_value());
+  EXPECT_EQ(report->reason, Reason::mode);
+  EXPECT_EQ(report->fields.m_mode, 1U);
+  EXPECT_EQ(report->fields.nid_ntc, 9U);
+  EXPECT_EQ(report->fields.q_length, 1U);
+  EXPECT_EQ(report->fields.l_trainint, 138U);  // 10 m since, 3 m of doubt, 5 m of Q_LOCACC, 120 m
+  EXPECT_EQ(etcs::decode(report->message, etcs::Baseline::b3).value(), report->fields);
+
+  EXPECT_FALSE(publisher.onboard_silent(onboard.stamp_ns + core::to_ns(3)));
+  position = at(forward(1, 600), 7, 20);
+  EXPECT_TRUE(publisher.onboard_silent(position.stamp_ns));
+  const auto silent = publisher.update(position, position.stamp_ns).report;
+  ASSERT_TRUE(silent.has_value());
+  EXPECT_EQ(silent->fields.m_mode, 1U);
+  EXPECT_EQ(silent->fields.q_length, 0U);
+
+  onboard.m_mode = 17;  // 4.0.0 only
+  EXPECT_THAT(publisher.set_onboard(onboard, onboard.stamp_ns).error().message, HasSubstr("M_MODE"));
+}
+
+/// Beyond group B; 60 positions a second, before each of which the on-board unit says the same again.
+class TrainWithOnboard : public ::testing::Test {
+ protected:
+  static constexpr double kPeriodS = 1 / 60.0;
+
+  void step(double run_s, double distance_m, bool track_known = true) {
+    auto position = at(forward(1, 450), run_s, 0);
+    position.distance_m = distance_m;
+    position.track_known = track_known;
+    now_ns = position.stamp_ns;
+    onboard.stamp_ns = now_ns + ahead_ns;
+    core::ok_or_throw(publisher.set_onboard(onboard, now_ns));
+    const auto outcome = publisher.update(position, now_ns);
+    if (outcome.report) reported = outcome.report->fields;
+  }
+  void confirm(double at_s) {
+    onboard.q_integrity = kByDriver;
+    onboard.integrity_ns = kStart + core::to_ns(at_s) + ahead_ns;
+    onboard.train_length_m = 200;
+  }
+  TprPublisher publisher{balise_map(), settings()};
+  Onboard onboard;
+  int64_t ahead_ns = 0;  // the on-board unit's clock
+  std::optional<etcs::TrainPositionReport> reported;
+  int64_t now_ns = kStart;
+};
+
+/// Stands 8700 m from where its distance began, confirmed after a second.
+class ConfirmedTrain : public TrainWithOnboard {
+ protected:
+  static constexpr double kNextS = 1 + kPeriodS;
+
+  ConfirmedTrain() {
+    for (int i = 0; i < 60; ++i) step(i * kPeriodS, 8700);
+    confirm(1);
+    step(1, 8700);
+  }
+  etcs::TrainPositionReport next_report(double run_s, double distance_m, bool track_known = true) {
+    reported.reset();
+    for (int i = 0; !reported && i < 420; ++i) step(run_s + i * kPeriodS, distance_m, track_known);
+    return reported.value();
+  }
+};
+
+TEST_F(ConfirmedTrain, SaysItsLength) {
+  EXPECT_EQ(reported->l_trainint, 208U);
+  const auto report = next_report(kNextS, 8700);
+  EXPECT_EQ(report.q_length, kByDriver);
+  EXPECT_EQ(report.l_trainint, 208U);
+  EXPECT_EQ(publisher.left_out(now_ns), "");
+}
+
+TEST_F(ConfirmedTrain, SaysNothingWhenTheDistanceBeganAgain) {
+  const auto report = next_report(45, 0);
+  EXPECT_EQ(report.q_length, 0U);
+  EXPECT_FALSE(report.l_trainint.has_value());
+  EXPECT_THAT(publisher.left_out(now_ns), HasSubstr("confirm it again"));
+}
+
+TEST_F(ConfirmedTrain, SaysNothingWhenTheDistanceJumpsWithoutAPause) {
+  EXPECT_EQ(next_report(kNextS, 8200).q_length, 0U);
+}
+
+TEST_F(ConfirmedTrain, SaysNothingWhenTheWayWasGuessed) {
+  // fusion goes on from its notes, with the distance that the train would have gone at an even speed
+  EXPECT_EQ(next_report(21, 8700).q_length, 0U);
+}
+
+TEST_F(ConfirmedTrain, SaysNothingWhenTheClockWasSetBack) {
+  EXPECT_EQ(next_report(-30, 8700).q_length, 0U);
+}
+
+TEST_F(ConfirmedTrain, SaysNothingWithoutABaliseGroup) {
+  const auto report = next_report(kNextS, 8700, false);
+  EXPECT_EQ(report.nid_lrbg, etcs::kUnknownBaliseGroup);
+  EXPECT_EQ(report.q_length, 0U);
+  EXPECT_FALSE(report.l_trainint.has_value());
+}
+
+/// At 40 m/s.
+class RunningTrain : public TrainWithOnboard {
+ protected:
+  /// The last report on the way.
+  etcs::TrainPositionReport run_until(double end_s) {
+    for (; run_s_ < end_s; run_s_ += kPeriodS) step(run_s_, 40 * run_s_);
+    return reported.value();
+  }
+
+ private:
+  double run_s_ = 0;
+};
+
+TEST_F(RunningTrain, TheClockOfTheOnboardUnitIsNotTakenForThePlaceOfALaterTime) {
+  ahead_ns = 30 * core::kNsPerSecond;
+  run_until(10);
+  EXPECT_THAT(publisher.left_out(now_ns), HasSubstr("30.0 s ahead"));
+  confirm(10);
+  EXPECT_EQ(run_until(45).q_length, 0U);
+  EXPECT_EQ(reported->m_mode, onboard.m_mode);
+  ahead_ns = 0;  // synchronised, but the confirmation is still of the other time
+  EXPECT_EQ(run_until(55).q_length, 0U);
+  EXPECT_THAT(publisher.left_out(now_ns), HasSubstr("confirm it again"));
+  confirm(55);
+  EXPECT_EQ(run_until(55.1).q_length, kByDriver);
+  EXPECT_LE(*reported->l_trainint, 215U);
+  EXPECT_EQ(publisher.left_out(now_ns), "");
+  onboard.q_integrity = kIntegrityLost;
+  ahead_ns = 30 * core::kNsPerSecond;
+  EXPECT_EQ(run_until(57).q_length, kIntegrityLost) << "a loss has no time";
+}
+
+TEST_F(RunningTrain, ALittleAheadIsTakenOut) {
+  ahead_ns = core::to_ns(0.8);
+  run_until(10);
+  confirm(10);
+  run_until(20);
+  const double since_m = 40 * core::seconds(static_cast<int64_t>(reported->t_train) * 10'000'000 -
+                                            (kStart + core::to_ns(10)) % (int64_t{etcs::kUnknownTime} * 10'000'000));
+  EXPECT_NEAR(*reported->l_trainint, since_m + 208, 2);
+}
+
+TEST_F(RunningTrain, OneWhoIsAheadAndDiesIsSilent) {
+  Onboard ahead;
+  ahead.stamp_ns = kStart + 30 * core::kNsPerSecond;
+  ASSERT_TRUE(publisher.set_onboard(ahead, kStart).ok());
+  EXPECT_FALSE(publisher.onboard_silent(kStart + core::to_ns(3)));
+  EXPECT_TRUE(publisher.onboard_silent(kStart + core::to_ns(3.1)));
+  EXPECT_TRUE(publisher.onboard_silent(kStart - core::to_ns(3.1))) << "this host's clock was set back";
+}
+
+TEST(OnboardUnit, WhatAnotherOneLeftBehindIsOvertaken) {
+  TprPublisher publisher(balise_map(), settings());
+  const auto after = [](double s) { return kStart + core::to_ns(s); };
+  EXPECT_FALSE(publisher.onboard_overtaken(kStart, after(0.1)));  // the first one, whatever it is
+  Onboard onboard;
+  onboard.stamp_ns = after(1);
+  ASSERT_TRUE(publisher.set_onboard(onboard, after(1.1)).ok());
+  EXPECT_TRUE(publisher.onboard_overtaken(kStart, after(1.2)));
+  EXPECT_FALSE(publisher.onboard_overtaken(after(2), after(2.1)));
+  EXPECT_FALSE(publisher.onboard_overtaken(kStart, after(4.1))) << "its clock was set back";
+  onboard.stamp_ns = after(30);  // ahead: the next one of another writer is not older than when it came
+  ASSERT_TRUE(publisher.set_onboard(onboard, after(5)).ok());
+  EXPECT_FALSE(publisher.onboard_overtaken(after(5.5), after(5.6)));
+}
+
+/// Stands beyond group B; T_CYCLOC is 6 s, and who says nothing for 3 s is silent.
+class SilentOnboard : public ::testing::Test {
+ protected:
+  void say_after(double run_s, uint32_t q_integrity) {
+    Onboard onboard;
+    onboard.stamp_ns = kStart + core::to_ns(run_s);
+    onboard.q_integrity = q_integrity;
+    onboard.integrity_ns = kStart;
+    onboard.train_length_m = 120;
+    core::ok_or_throw(publisher.set_onboard(onboard, onboard.stamp_ns));
+  }
+  std::optional<Report> report_after(double run_s) {
+    const auto position = at(forward(1, 450), run_s, 0);
+    return publisher.update(position, position.stamp_ns).report;
+  }
+  TprPublisher publisher{balise_map(), settings()};
+};
+
+TEST_F(SilentOnboard, ALossThatIsHeardAgainAfterASilenceIsReportedAgain) {
+  say_after(2.9, kIntegrityLost);
+  EXPECT_EQ(report_after(3).value().fields.q_length, kIntegrityLost);
+  const auto silent = report_after(9).value();
+  EXPECT_EQ(silent.reason, Reason::cycle_time);
+  EXPECT_EQ(silent.fields.q_length, kNoIntegrityInformation);
+  say_after(9.5, kIntegrityLost);
+  const auto heard = report_after(9.6);
+  ASSERT_TRUE(heard.has_value());
+  EXPECT_EQ(heard->reason, Reason::integrity_lost);
+  EXPECT_EQ(heard->fields.q_length, kIntegrityLost);
+}
+
+TEST_F(SilentOnboard, WhatWasNotTakenBackIsNotSaidAgain) {
+  say_after(2.9, kIntegrityLost);
+  EXPECT_EQ(report_after(3).value().fields.q_length, kIntegrityLost);
+  EXPECT_FALSE(report_after(8).has_value());
+  say_after(8.5, kIntegrityLost);
+  EXPECT_FALSE(report_after(8.6).has_value());
+}
+
+}  // namespace
+}  // namespace railfix::tpr_publisher

@@ -1,0 +1,145 @@
+#include "tpr_publisher/told_parameters.hpp"
+
+#include <gmock/gmock.h>
+
+#include "unit/tpr_publisher/publisher_fixture.hpp"
+
+namespace railfix::tpr_publisher {
+namespace {
+
+using namespace testing;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+/// A train between A and B, along A's nominal direction; the cycle of the keys is 6 s, that of packets 60 s.
+class ToldParametersTest : public ::testing::Test {
+ protected:
+  static std::vector<uint8_t> packet(uint32_t q_dir, std::vector<etcs::ReportLocation> locations = {}) {
+    etcs::ReportParameters parameters;
+    parameters.q_dir = q_dir;
+    parameters.t_cycloc = 60;
+    parameters.locations = std::move(locations);
+    return etcs::encode(parameters).value();
+  }
+  /// Whether a packet is used from now on.
+  bool follow_train() {
+    const auto position = at(forward(1, 150), run_s, 0);
+    reported = publisher.update(position, position.stamp_ns).report.has_value();
+    return told.follow();
+  }
+  /// Played data begins anew, or a process does.
+  void begin_anew() {
+    publisher = TprPublisher(balise_map(), settings());
+    told.begin_anew();
+  }
+  /// T_CYCLOC that is followed: does the one of the keys make a report?
+  bool follows_keys() {
+    for (int i = 0; i < 7; ++i) {
+      run_s += 0.9;
+      follow_train();
+      if (reported) return true;
+    }
+    return false;
+  }
+  TprPublisher publisher{balise_map(), settings()};
+  ToldParameters told{publisher};
+  double run_s = 0;
+  bool reported = false;
+};
+
+TEST_F(ToldParametersTest, OneForTheTrainsDirectionWaitsUntilThatIsKnown) {
+  const auto nominal = packet(etcs::kNominal);
+  EXPECT_FALSE(told.hear(nominal, true));
+  EXPECT_THAT(told.refusal(), HasSubstr("packet 58 of onboard_status is not used: Packet 58 is for one direction"));
+  EXPECT_EQ(told.notes(), "");
+  EXPECT_TRUE(follow_train()) << "also while the on-board unit is silent";
+  EXPECT_EQ(told.refusal(), "");
+  EXPECT_FALSE(told.hear(nominal, true)) << "it stands in every onboard_status";
+  EXPECT_FALSE(follows_keys());
+}
+
+TEST_F(ToldParametersTest, OneForOneDirectionIsUsedOnWhenDataBeginsAnew) {
+  follow_train();
+  EXPECT_TRUE(told.hear(packet(etcs::kNominal), true));
+  begin_anew();
+  EXPECT_EQ(told.refusal(), "");
+  EXPECT_FALSE(told.hear(packet(etcs::kNominal), true));
+  follow_train();
+  EXPECT_FALSE(follows_keys());
+}
+
+TEST_F(ToldParametersTest, OneForOneDirectionIsUsedOnByALaterProcess) {
+  EXPECT_TRUE(told.remember(etcs::to_hex(packet(etcs::kReverse)))) << "reverse to the LRBG that was; A is another one";
+  EXPECT_EQ(told.refusal(), "");
+  follow_train();
+  EXPECT_FALSE(follows_keys());
+}
+
+TEST_F(ToldParametersTest, OneForBothDirectionsIsUsedAtOnce) {
+  EXPECT_TRUE(told.hear(packet(etcs::kUnknownSide), true));
+  begin_anew();
+  EXPECT_EQ(told.refusal(), "");
+  follow_train();
+  EXPECT_FALSE(follows_keys());
+}
+
+TEST_F(ToldParametersTest, WhatDoesNotFitLeavesTheOneBeforeAndItsNotes) {
+  const auto first = packet(etcs::kNominal, {{5000, 1}});
+  follow_train();
+  EXPECT_TRUE(told.hear(first, true));
+  EXPECT_EQ(told.notes(), etcs::to_hex(first));
+  follow_train();
+  follow_train();
+  const auto notes = etcs::to_hex(first) + ' ' + std::to_string(kA);
+  EXPECT_EQ(told.notes(), notes);
+
+  EXPECT_FALSE(told.hear(packet(etcs::kReverse), true));
+  EXPECT_THAT(told.refusal(), HasSubstr("other direction"));
+  follow_train();
+  EXPECT_EQ(told.notes(), notes) << "of the one that is used, not of the one that was refused";
+  begin_anew();
+  follow_train();
+  EXPECT_THAT(told.refusal(), StartsWith("packet 58 of onboard_status is not used: ")) << "the newer one still waits";
+  EXPECT_EQ(told.notes(), notes);
+  EXPECT_FALSE(follows_keys());
+
+  EXPECT_TRUE(told.hear(packet(etcs::kUnknownSide), true));
+  EXPECT_EQ(told.refusal(), "");
+}
+
+TEST_F(ToldParametersTest, OneForTheOtherDirectionStaysRefusedAtAGroupThatLooksTheOtherWay) {
+  follow_train();
+  EXPECT_FALSE(told.hear(packet(etcs::kReverse), true));
+  run_s = 1;
+  const auto beyond_b = at(forward(1, 450), run_s, 0);
+  const auto report = publisher.update(beyond_b, beyond_b.stamp_ns).report;
+  ASSERT_TRUE(report.has_value());
+  EXPECT_EQ(report->fields.q_dirlrbg, etcs::kReverse);
+  EXPECT_FALSE(told.follow());
+  EXPECT_FALSE(told.hear(packet(etcs::kReverse), true));
+  EXPECT_THAT(told.refusal(), HasSubstr("other direction"));
+}
+
+TEST_F(ToldParametersTest, WhatCannotBeReadIsToldAndNotKept) {
+  const std::vector<uint8_t> cut{0x3A, 0x80};
+  EXPECT_FALSE(told.hear(cut, true));
+  EXPECT_THAT(told.refusal(), HasSubstr("ends inside"));
+  EXPECT_FALSE(follow_train());
+  EXPECT_THAT(told.refusal(), HasSubstr("ends inside"));
+  EXPECT_EQ(told.notes(), "");
+  for (const char* notes : {"", "nonsense", "3A8", "3A80"}) EXPECT_FALSE(told.remember(notes)) << notes;
+  EXPECT_EQ(told.notes(), "");
+  EXPECT_FALSE(told.hear({}, true)) << "an onboard_status without one takes nothing back";
+}
+
+TEST_F(ToldParametersTest, LocationsOfOneThatCameUnheardHaveNoPlace) {
+  const auto located = packet(etcs::kUnknownSide, {{50, 1}});
+  EXPECT_TRUE(told.hear(located, false));
+  follow_train();
+  EXPECT_EQ(publisher.origin(), std::nullopt);
+  EXPECT_EQ(told.notes(), etcs::to_hex(located));
+  EXPECT_THAT(publisher.left_out(kStart), HasSubstr("locations of packet 58"));
+}
+
+}  // namespace
+}  // namespace railfix::tpr_publisher
