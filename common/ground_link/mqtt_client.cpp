@@ -217,6 +217,14 @@ core::Status check_tls(const MqttOptions& options) {
   return {};
 }
 
+core::Status check_topic(const std::string& topic) {
+  const auto bytes = static_cast<int>(topic.size());
+  if (!topic.empty() && mosquitto_pub_topic_check(topic.c_str()) == MOSQ_ERR_SUCCESS &&
+      mosquitto_validate_utf8(topic.data(), bytes) == MOSQ_ERR_SUCCESS)
+    return {};
+  return core::Error{"\"" + topic + "\" is no topic to write to: give 1 to 65535 bytes of UTF-8 without + and #."};
+}
+
 std::string plain_password(const MqttOptions& options) {
   if (options.password.empty() || !options.ca_file.empty()) return "";
   return "the password goes in plain text to " + options.host + ":" + std::to_string(options.port) +

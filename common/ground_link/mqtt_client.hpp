@@ -61,6 +61,8 @@ class MqttClient {
 
 /// Whether authority, certificate and key go together: without the authority there is no TLS, whatever else is named.
 core::Status check_tls(const MqttOptions& options);
+/// Whether a broker lets anybody write there: one topic, not a filter of topics.
+core::Status check_topic(const std::string& topic);
 /// One sentence when whoever is on the way reads the password; otherwise empty.
 std::string plain_password(const MqttOptions& options);
 /// "HOST" or "HOST:PORT" into the options.

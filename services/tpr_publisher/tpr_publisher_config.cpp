@@ -21,8 +21,15 @@ void GroundLinkConfig::describe(service::Fields& fields) {
   fields.text("password_file", password_file, "File whose first line is the password.");
 }
 
+core::Status GroundLinkConfig::check_topic(const std::string& filled_in) {
+  if (const auto fits = ground_link::check_topic(filled_in); !fits.ok())
+    return core::Error{"tpr_publisher.ground_link.topic: " + fits.error().message};
+  return {};
+}
+
 core::Result<ground_link::MqttOptions> GroundLinkConfig::mqtt() const {
   if (store.empty()) return core::Error{"tpr_publisher.ground_link.store is not set: name a file on a lasting disk."};
+  if (const auto fits = check_topic(topic); !fits.ok()) return fits.error();
   ground_link::MqttOptions options;
   if (const auto address = ground_link::parse_broker(broker, options); !address.ok()) return address.error();
   options.ca_file = ca_file;
@@ -56,6 +63,7 @@ std::optional<GroundLinkSettings> GroundLinkConfig::settings(const std::string& 
   settings.mqtt.client_id = filled_in(client_id.empty() ? "railfix-{train}-{host}" : client_id);
   if (!password_file.empty()) settings.mqtt.password = core::value_or_throw(ground_link::read_password(password_file));
   settings.topic = filled_in(topic);
+  core::ok_or_throw(check_topic(settings.topic));
   settings.store = store;
   settings.store_limit = static_cast<size_t>(store_limit);
   return settings;

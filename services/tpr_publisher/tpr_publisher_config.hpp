@@ -32,6 +32,7 @@ struct GroundLinkConfig {
   [[nodiscard]] std::optional<GroundLinkSettings> settings(const std::string& train_id, const std::string& host) const;
 
  private:
+  [[nodiscard]] static core::Status check_topic(const std::string& filled_in);
   /// Without the password. An error where the keys do not go together.
   [[nodiscard]] core::Result<ground_link::MqttOptions> mqtt() const;
 };

@@ -8,7 +8,7 @@ namespace {
 
 constexpr size_t kMostUnderWay = 20;
 constexpr size_t kMostUnstored = 1000;
-constexpr std::chrono::seconds kRetryStore{1};
+constexpr std::chrono::seconds kRetrySoon{1};  // of the store, and of what the client did not take
 using Clock = std::chrono::steady_clock;
 
 }  // namespace
@@ -80,10 +80,11 @@ void GroundLink::push(Event event) {
 std::deque<GroundLink::Event> GroundLink::wait() {
   std::unique_lock lock(mutex_);
   const auto ready = [this] { return stop_ || !events_.empty(); };
-  const bool stores_again = !unstored_.empty() || !delivered_.empty() || !read_trouble_.empty();
-  auto until = Clock::now() + kRetryStore;
-  if (outbox_.held()) until = stores_again ? std::min(until, try_again_at_) : try_again_at_;
-  if (stores_again || outbox_.held()) {
+  const bool soon_again =
+      !unstored_.empty() || !delivered_.empty() || !read_trouble_.empty() || !publish_trouble_.empty();
+  auto until = Clock::now() + kRetrySoon;
+  if (outbox_.held()) until = soon_again ? std::min(until, try_again_at_) : try_again_at_;
+  if (soon_again || outbox_.held()) {
     wake_.wait_until(lock, until, ready);
   } else {
     wake_.wait(lock, ready);
@@ -186,6 +187,7 @@ void GroundLink::store_new() {
 }
 
 void GroundLink::publish() {
+  publish_trouble_.clear();  // unless it is met again
   publish_stored();
   publish_unstored();
 }
@@ -204,7 +206,7 @@ std::optional<int> GroundLink::give(ground_link::GroundReport report, uint64_t s
   report.sequence = sequence;
   const auto id = client_->publish(settings_.topic, ground_link::to_bytes(report));
   if (id.ok()) return id.value();
-  link_trouble_ = id.error().message;  // again next time something happens
+  publish_trouble_ = "a report cannot be given to " + broker() + " (" + id.error().message + ")";
   return std::nullopt;
 }
 
@@ -252,7 +254,8 @@ void GroundLink::publish_stored() {
 
 void GroundLink::say() {
   std::string sentence;
-  if (const auto& trouble = link_trouble_.empty() ? refusal_ : link_trouble_; !trouble.empty()) {
+  const auto& own_trouble = link_trouble_.empty() ? publish_trouble_ : link_trouble_;
+  if (const auto& trouble = own_trouble.empty() ? refusal_ : own_trouble; !trouble.empty()) {
     sentence = "Ground link: " + trouble + "; " + std::to_string(outbox_.size() + unstored_.size()) + " reports wait.";
   }
   if (dropped_ > 0)
@@ -267,7 +270,7 @@ void GroundLink::say() {
   }
   const std::lock_guard lock(mutex_);
   trouble_ = sentence;
-  connected_ = link_trouble_.empty() && refusal_.empty();
+  connected_ = own_trouble.empty() && refusal_.empty();
   stores_ = store_trouble_.empty();
 }
 

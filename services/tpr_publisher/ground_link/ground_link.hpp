@@ -94,8 +94,9 @@ class GroundLink {
   std::vector<uint64_t> delivered_;  // to be removed from the store
   uint64_t memory_stream_;           // of what was never stored
   uint64_t memory_sequence_ = 0;
-  std::string link_trouble_;
-  std::string refusal_;  // empty = the broker takes what it gets
+  std::string link_trouble_;     // why there is no connection
+  std::string publish_trouble_;  // why the client did not take a report over one that there is; tried again
+  std::string refusal_;          // empty = the broker takes what it gets
   std::chrono::steady_clock::time_point try_again_at_;
   std::string store_trouble_;
   std::string read_trouble_;  // why the next stored report cannot be read now; tried again

@@ -169,6 +169,16 @@ TEST_F(GroundLinkTest, APacket58ThatCannotBeReadIsRefusedBeforeTheServiceStarts)
   EXPECT_THAT(service.err, HasSubstr("tpr_publisher.packet_58: "));
 }
 
+TEST_F(GroundLinkTest, ATopicThatNobodyCanWriteToIsRefusedBeforeTheServiceStarts) {
+  for (const std::string topic : {"", "railfix/{train}/+", "railfix/#"}) {
+    auto command = linked_service("localhost:1", {"tpr_publisher.ground_link.topic=" + topic});
+    command.emplace_back("--check");
+    const auto service = test::run_program(command, 20);
+    EXPECT_EQ(service.exit_code, 2) << topic;
+    EXPECT_THAT(service.err, HasSubstr("tpr_publisher.ground_link.topic: \"" + topic + "\" is no topic to write to"));
+  }
+}
+
 // Own authority, a certificate for the broker and one for the train, as docs/configuration/reports.md asks for.
 class Certificates {
  public:

@@ -26,6 +26,15 @@ TEST(MqttOptions, ACertificateWithoutAnAuthorityWouldGoUnused) {
   EXPECT_THROW(MqttClient(tls("", "c", "k"), {}), core::BadInput) << "whoever makes it";
 }
 
+TEST(MqttOptions, ATopicToWriteToIsOneTopic) {
+  for (const std::string& topic :
+       {std::string("railfix/demo/position_report"), std::string("a"), std::string("zug/\u00e4")})
+    EXPECT_TRUE(check_topic(topic).ok()) << topic;
+  for (const std::string& topic : {std::string(), std::string("railfix/+/report"), std::string("railfix/#"),
+                                   std::string("a+b"), std::string("\xff"), std::string(65536, 'a')})
+    EXPECT_THAT(check_topic(topic).error().message, HasSubstr("is no topic to write to")) << topic.substr(0, 20);
+}
+
 TEST(MqttOptions, APasswordInPlainTextIsTold) {
   auto options = tls("", "", "");
   options.user = "train";
