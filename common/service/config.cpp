@@ -14,10 +14,20 @@
 namespace railfix::service {
 namespace {
 
-std::string range_text(Range range) {
+// 16777215, not 1.67772e+07.
+std::string number_text(double value) {
+  constexpr double kWholeBelow = 1e15;
   std::ostringstream text;
-  text << range.min << " to " << range.max;
+  if (std::abs(value) < kWholeBelow && value == std::trunc(value)) {
+    text << static_cast<int64_t>(value);
+  } else {
+    text << value;
+  }
   return text.str();
+}
+
+std::string range_text(Range range) {
+  return number_text(range.min) + " to " + number_text(range.max);
 }
 
 // Fills the fields of one YAML mapping; collects everything that is wrong instead of stopping at the first.
@@ -130,9 +140,7 @@ class Documenter final : public Fields {
  public:
   explicit Documenter(int indent) : indent_(indent) {}
   void number(const char* key, double& value, Range range, const char* unit, const char* what) override {
-    std::ostringstream text;
-    text << value;
-    line(key, text.str(),
+    line(key, number_text(value),
          std::string(what) + " [" + (*unit == '\0' ? "" : std::string(unit) + ", ") + range_text(range) + "]");
   }
   void integer(const char* key, int64_t& value, Range range, const char* unit, const char* what) override {
