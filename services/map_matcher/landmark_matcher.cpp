@@ -23,6 +23,7 @@ constexpr size_t kMostCandidates = 50;    // are searched in a quarter of a seco
 constexpr double kUnmappedReachM = 5000;  // over which a map lacks landmarks as it does here
 constexpr double kConfirmed = 1e-6;       // odds against the place behind three or four landmarks that fit, ...
 constexpr double kMostOdds = 1e3;         // ... and so many more bring it back when nothing has
+constexpr double kLost = 1.0;  // a place that was confirmed is in doubt again: the map may be wrong in between
 
 double gauss(double error, double sigma) {
   const double z = error / sigma;
@@ -33,9 +34,8 @@ bool before(const track::PathLandmark& landmark, double distance_m) {
   return landmark.distance_m < distance_m;
 }
 
-bool other_side(const Sighting& sighting, const track::PathLandmark& landmark) {
-  return std::abs(sighting.lateral_m) > kClearSideM && std::abs(landmark.lateral_m) > kClearSideM &&
-         (sighting.lateral_m > 0) != (landmark.lateral_m > 0);
+bool other_side(double lateral_m, double other_m) {
+  return std::abs(lateral_m) > kClearSideM && std::abs(other_m) > kClearSideM && (lateral_m > 0) != (other_m > 0);
 }
 
 }  // namespace
@@ -61,8 +61,10 @@ std::optional<Fix> LandmarkMatcher::add(const Sighting& sighting, const Prior& p
   const double from_m = expected_m - prior.over_m - margin_m;
   const double to_m = expected_m + prior.under_m + margin_m;
   std::erase_if(seen_, [&](const Seen& seen) { return std::abs(place_m - seen.place_m) > parameters_.history_m; });
+  // One that was met before says nothing new: what the map has wrong about it is the same each time.
+  const bool again = std::erase_if(seen_, [&](const Seen& seen) { return is_of(seen, sighting, place_m); }) > 0;
   std::vector<const track::PathLandmark*> candidates = near(sighting.kind, from_m, to_m);
-  std::erase_if(candidates, [&](const auto* landmark) { return other_side(sighting, *landmark); });
+  std::erase_if(candidates, [&](const auto* landmark) { return other_side(sighting.lateral_m, landmark->lateral_m); });
   if (candidates.size() > kMostCandidates) {
     remember(sighting, place_m);  // for when the window is smaller, or for those of a rarer kind
     return std::nullopt;
@@ -96,11 +98,11 @@ std::optional<Fix> LandmarkMatcher::add(const Sighting& sighting, const Prior& p
       unmapped_rate.per_m() + parameters_.detection * mapped_per_m(sighting.kind, expected_m);
   const double elsewhere = odds_elsewhere_ * earlier * (to_m - from_m) * by_chance_per_m;
   const double sum = here + elsewhere;
-  if (here > 0) {
+  if (here > 0 && !again) {
     odds_elsewhere_ = std::clamp(elsewhere / here, std::min(odds_elsewhere_, kConfirmed), kMostOdds);
     unmapped_rate.learn(place_m, nothing / here);
   }
-  confirmed_ = confirmed_ || odds_elsewhere_ <= kConfirmed;
+  confirmed_ = odds_elsewhere_ <= (confirmed_ ? kLost : kConfirmed);
   remember(sighting, place_m);
   if (best == nullptr || !(best_weight >= parameters_.min_probability * sum)) return std::nullopt;
   return Fix{sighting.stamp_ns, best->distance_m - sighting.distance_ahead_m,
@@ -164,7 +166,7 @@ double LandmarkMatcher::sighting_fits(const Seen& seen, double path_m, double no
   const double by_chance = seen.unmapped_per_m + (1 - seen.sighting.confidence) * per_m;
   double density = by_chance;
   for (const auto* landmark : mapped) {
-    if (other_side(seen.sighting, *landmark)) continue;
+    if (other_side(seen.sighting.lateral_m, landmark->lateral_m)) continue;
     const double off_m = landmark->distance_m - path_m;
     const double moved = std::abs(off_m) < parameters_.moved_m ? parameters_.moved / (2 * parameters_.moved_m) : 0.0;
     const double relative_m = relative_sigma_m(seen, landmark->landmark->sigma_m, now_m);
@@ -192,6 +194,11 @@ std::vector<const track::PathLandmark*> LandmarkMatcher::near(track::LandmarkKin
 
 bool LandmarkMatcher::sighted_before(track::LandmarkKind kind) const {
   return std::any_of(seen_.begin(), seen_.end(), [&](const Seen& seen) { return seen.sighting.kind == kind; });
+}
+
+bool LandmarkMatcher::is_of(const Seen& seen, const Sighting& sighting, double place_m) const {
+  return seen.sighting.kind == sighting.kind && !other_side(seen.sighting.lateral_m, sighting.lateral_m) &&
+         std::abs(seen.place_m - place_m) < 3 * relative_sigma_m(seen, sighting.sigma_m, place_m);
 }
 
 double LandmarkMatcher::relative_sigma_m(const Seen& seen, double map_sigma_m, double now_m) const {

@@ -56,7 +56,8 @@ class LandmarkMatcher {
   /// Nothing when no mapped landmark fits or it cannot be told which one, nor where the window has too many of its
   /// kind.
   std::optional<Fix> add(const Sighting& sighting, const Prior& prior);
-  /// How probable it is, by all sightings so far, that the train is not in the window; 0 from where they confirm it.
+  /// How probable it is, by all sightings so far, that the train is not in the window; 0 from where they confirm it
+  /// until they speak against it again.
   [[nodiscard]] double doubt() const { return confirmed_ ? 0 : odds_elsewhere_ / (1 + odds_elsewhere_); }
   /// The travelled distance does not go on from the one before: earlier sightings say nothing any more.
   void forget() {
@@ -77,6 +78,8 @@ class LandmarkMatcher {
   [[nodiscard]] double history_fits(double shift_m, double now_m) const;
   [[nodiscard]] double history_fits(double shift_m, double scale, double now_m) const;
   void remember(const Sighting& sighting, double place_m);
+  /// Both are probably of one object.
+  [[nodiscard]] bool is_of(const Seen& seen, const Sighting& sighting, double place_m) const;
   /// Mean of history_fits between two shifts.
   [[nodiscard]] double mean_fit(double from_m, double to_m, double now_m) const;
   [[nodiscard]] double sighting_fits(const Seen& seen, double path_m, double now_m) const;

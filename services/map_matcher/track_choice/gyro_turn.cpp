@@ -57,7 +57,9 @@ std::optional<Turn> GyroTurn::between(int64_t from_ns, int64_t to_ns) const {
   Turn turn;
   turn.turn_rad = *to - *from - bias_rps_ * dt_s;
   turn.sigma_rad = parameters_.noise_rad * std::sqrt(dt_s);
-  turn.bias_rad = std::sqrt(bias_variance_at(to_ns)) * dt_s;
+  const double bias_variance = bias_variance_at(to_ns);
+  turn.bias_rad = std::sqrt(bias_variance) * dt_s;
+  if (bias_variance > 0) turn.bias_walk = parameters_.bias_walk_rps * parameters_.bias_walk_rps * dt_s / bias_variance;
   turn.sensor = TurnSensor::gyro;
   return turn;
 }

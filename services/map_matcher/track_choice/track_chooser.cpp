@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 
 #include "map_matcher/inputs.hpp"
 #include "map_matcher/track_choice/picture_fits.hpp"
@@ -19,16 +20,10 @@ constexpr double kWheelsBehindM = 5;  // the foot: points may be thrown in front
 constexpr double kSameM = 5.0;        // two routes whose distances differ by less are one
 constexpr double kFarFromWindowM = 200;
 constexpr double kMostWindowM = 300;
-constexpr size_t kMostHypotheses = 24;
+constexpr size_t kMostHypotheses = 400;
 constexpr double kNoLagShare = 0.3;   // of the cars
 constexpr double kWatched = 0.9;      // a track less probable lies behind a switch that nobody watched ...
 constexpr double kUnwatchedM = 3000;  // ... no further back
-
-double log_sum(double a, double b) {
-  const double most = std::max(a, b);
-  if (!std::isfinite(most)) return most;
-  return most + std::log1p(std::exp(std::min(a, b) - most));
-}
 
 }  // namespace
 
@@ -93,6 +88,8 @@ void TrackChooser::follow(const TrackWindow& window) {
     found = place_m;
     best = hypothesis.log_prior;
   }
+  // While no leg is declared fusion goes on along the straight one, which may have been given up here.
+  if (!found && lost_m_ > kLostM && stands_near(window.place) && !choice()->known) lost_m_ = 0;
   if (hypotheses_.empty() || (!found && lost_m_ > kLostM)) {
     start(wanted);
     return;
@@ -103,6 +100,14 @@ void TrackChooser::follow(const TrackWindow& window) {
     lost_m_ = 0;
   }
   window_ = wanted;
+}
+
+bool TrackChooser::stands_near(const track::EdgePosition& place) const {
+  if (hypotheses_.empty()) return false;
+  const auto at = [&](const track::EdgePosition& p) { return map_->edge(p.edge)->alignment.at(p.offset_m).pose; };
+  const auto mine = at(hypotheses_.front().route.position_at(place_m_));
+  const auto its = at(place);
+  return std::hypot(mine.easting_m - its.easting_m, mine.northing_m - its.northing_m) < kFarFromWindowM;
 }
 
 void TrackChooser::move(const Turn& turn) {
@@ -122,6 +127,7 @@ void TrackChooser::move(const Turn& turn) {
   pending_.turn_rad += turn.turn_rad;
   pending_.variance += turn.sigma_rad * turn.sigma_rad;
   pending_.bias_rad += turn.bias_rad;
+  pending_.bias_walk += turn.bias_walk;
   if (std::abs(pending_.way_m) >= parameters_.bin_m) use_pending();
 }
 
@@ -129,8 +135,10 @@ void TrackChooser::stand(const Turn& turn) {
   if (turn.sensor != sensor_ || !has_sense(turn) || !(turn.sigma_rad > 0)) return;
   const double noise = turn.sigma_rad * turn.sigma_rad;
   for (auto& hypothesis : hypotheses_) {
-    for (auto& cell : hypothesis.cells)
+    for (auto& cell : hypothesis.cells) {
+      loosen_bias(cell, turn.bias_walk);
       learn_bias(cell, turn.turn_rad - turn.bias_rad * cell.bias, noise, turn.bias_rad);
+    }
   }
 }
 
@@ -251,6 +259,22 @@ void TrackChooser::trim() {
   }
 }
 
+// Both may be true: cell by cell, since the one with less evidence may know better where the train stands.
+void TrackChooser::join(Hypothesis& into, const Hypothesis& other) {
+  const auto log_before_turning = [](const Hypothesis& h) {
+    return h.log_prior + log_sum(h.pictures.own, h.pictures.astray);
+  };
+  const double log_into = log_before_turning(into);
+  const double log_other = log_before_turning(other);
+  for (size_t i = 0; i < into.cells.size(); ++i) join_cells(into.cells[i], log_into, other.cells[i], log_other);
+  const double log_prior = log_sum(into.log_prior, other.log_prior);
+  const auto joined = [&](double Pictures::*state) {
+    return log_sum(into.log_prior + into.pictures.*state, other.log_prior + other.pictures.*state) - log_prior;
+  };
+  into.pictures = {joined(&Pictures::own), joined(&Pictures::astray)};
+  into.log_prior = log_prior;
+}
+
 void TrackChooser::merge() {
   const auto same = [](const track::Route& a, const track::Route& b) {
     return std::equal(
@@ -259,16 +283,11 @@ void TrackChooser::merge() {
   };
   for (size_t i = 0; i < hypotheses_.size(); ++i) {
     for (size_t k = i + 1; k < hypotheses_.size();) {
-      auto& a = hypotheses_[i];
-      auto& b = hypotheses_[k];
-      if (!same(a.route, b.route)) {
+      if (!same(hypotheses_[i].route, hypotheses_[k].route)) {
         ++k;
         continue;
       }
-      const double of_a = evidence(a);
-      const double of_b = evidence(b);
-      if (of_b > of_a) std::swap(a, b);
-      a.log_prior += log_sum(of_a, of_b) - std::max(of_a, of_b);
+      join(hypotheses_[i], hypotheses_[k]);
       hypotheses_.erase(hypotheses_.begin() + static_cast<std::ptrdiff_t>(k));
     }
   }
@@ -281,7 +300,13 @@ void TrackChooser::prune() {
   std::vector<double> sorted = logs;
   std::sort(sorted.rbegin(), sorted.rend());
   double least = best + std::log(kLeastProbability);
-  if (sorted.size() > kMostHypotheses) least = std::max(least, sorted[kMostHypotheses]);
+  if (sorted.size() > kMostHypotheses && sorted[kMostHypotheses] > least) {
+    least = sorted[kMostHypotheses];
+    // What nobody has shown to be wrong is given up: so much is not known any more.
+    const double all = std::accumulate(sorted.begin(), sorted.end(), -INFINITY, log_sum);
+    const double rest = std::accumulate(sorted.begin() + kMostHypotheses, sorted.end(), -INFINITY, log_sum);
+    told_ *= 1 - std::exp(rest - all);
+  }
   std::vector<Hypothesis> kept;
   for (size_t i = 0; i < logs.size(); ++i) {
     if (logs[i] <= least && logs[i] < best) continue;

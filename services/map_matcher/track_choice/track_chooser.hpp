@@ -80,6 +80,9 @@ class TrackChooser {
   void extend();
   void extend_behind(track::Route& route) const;
   void trim();
+  /// False before the first window.
+  [[nodiscard]] bool stands_near(const track::EdgePosition& place) const;
+  static void join(Hypothesis& into, const Hypothesis& other);
   void merge();
   void prune();
   void use_picture(const std::vector<double>& log_fits);

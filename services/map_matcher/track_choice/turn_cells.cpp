@@ -56,8 +56,32 @@ void weigh_turn(std::vector<TurnCell>& cells, double first_m, const track::Route
     const double own = sensor + parameters.correlated_bins * (body + rough * rough);
     learn_bias(cell, measured - mapped - bias_to_curvature * cell.bias, own, bias_to_curvature);
     cell.log_weight += 0.5 * std::log(sensor + body);
-    cell.bias_variance = std::min(1.0, cell.bias_variance + kBiasForgetPerM * std::abs(bin.way_m));
+    loosen_bias(cell, kBiasForgetPerM * std::abs(bin.way_m) + bin.bias_walk);
   }
+}
+
+double log_sum(double a, double b) {
+  const double most = std::max(a, b);
+  if (!std::isfinite(most)) return most;
+  return most + std::log1p(std::exp(std::min(a, b) - most));
+}
+
+void loosen_bias(TurnCell& cell, double variance) {
+  cell.bias_variance = std::min(1.0, cell.bias_variance + variance);
+}
+
+// The mean and variance of a mixture.
+void join_cells(TurnCell& into, double log_into, const TurnCell& other, double log_other) {
+  const double mine = log_into + into.log_weight;
+  const double its = log_other + other.log_weight;
+  const double both = log_sum(mine, its);
+  const double share = std::isfinite(both) ? std::exp(mine - both) : 1;
+  const double bias = share * into.bias + (1 - share) * other.bias;
+  const auto about_mean = [&](const TurnCell& cell) {
+    return cell.bias_variance + (cell.bias - bias) * (cell.bias - bias);
+  };
+  const double variance = share * about_mean(into) + (1 - share) * about_mean(other);
+  into = {both - log_sum(log_into, log_other), bias, std::min(1.0, variance)};
 }
 
 // A Kalman filter of one state; how well the measurement fits weighs the cell.

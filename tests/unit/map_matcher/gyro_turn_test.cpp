@@ -22,6 +22,7 @@ TEST(GyroTurn, SumsTheRatesBetweenAnyTwoMoments) {
   EXPECT_EQ(turn->sensor, TurnSensor::gyro);
   EXPECT_NEAR(turn->sigma_rad, 1e-3 * std::sqrt(1.5), 1e-9);
   EXPECT_NEAR(turn->bias_rad, 0.002 * 1.5, 1e-9);
+  EXPECT_NEAR(turn->bias_walk, 1.5 * 1e-5 * 1e-5 / (0.002 * 0.002), 1e-12);
 }
 
 TEST(GyroTurn, SaysNothingWhereSamplesAreMissing) {

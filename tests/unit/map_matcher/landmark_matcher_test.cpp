@@ -127,6 +127,59 @@ TEST(LandmarkMatcher, AnOdometerThatIsOffByTwoPerCentDoesNotNameTheWrongOneOfAPa
   }
 }
 
+// The mast stands 4 m from where the map has it. A train that rocks to and fro sees it again and again: that says
+// nothing new, neither of the mast nor of the place.
+TEST(LandmarkMatcher, WhatIsSeenAgainAndAgainIsNoSurer) {
+  std::vector<std::pair<LandmarkKind, double>> masts;
+  for (double m = 300; m < 900; m += 55) masts.emplace_back(LandmarkKind::mast, m);
+  const double moved_m = masts[5].second + 4;
+  double first = 0;
+  for (const int times : {1, 6}) {
+    LandmarkMatcher matcher({}, line_with(masts));
+    for (int i = 0; i < 5; ++i) {
+      const double m = masts[static_cast<size_t>(i)].second;
+      (void)matcher.add(sighting_of(LandmarkKind::mast, 0.95), prior_at(m - 5, 20, m - 5));
+    }
+    double most = 0;
+    for (int i = 0; i < times; ++i) {
+      const auto fix = matcher.add(sighting_of(LandmarkKind::mast, 0.95), prior_at(moved_m - 5, 20, moved_m - 5));
+      if (fix && std::abs(fix->path_distance_m - (moved_m - 5)) > 1) most = std::max(most, fix->probability);
+    }
+    EXPECT_LT(most, 0.9) << "seen " << times << " times";
+    if (times == 1) first = most;
+    EXPECT_LE(most, first + 0.05) << "seen " << times << " times";
+  }
+}
+
+TEST(LandmarkMatcher, OneMastThatStandsThereByChanceConfirmsNoPlaceHoweverOftenItIsSeen) {
+  LandmarkMatcher matcher({}, line_with({{LandmarkKind::mast, 500}, {LandmarkKind::mast, 560}}));
+  for (int i = 0; i < 20; ++i) (void)matcher.add(sighting_of(LandmarkKind::mast, 0.95), prior_at(495, 5, 495));
+  EXPECT_GT(matcher.doubt(), 1e-5);
+}
+
+// An element of 40 m is missing on the map, behind twenty masts that have confirmed the place.
+TEST(LandmarkMatcher, APlaceThatWasConfirmedIsDoubtedWhereTheMapGoesOnOtherwise) {
+  std::vector<std::pair<LandmarkKind, double>> mapped;
+  std::vector<double> stand_m;
+  core::Random random(3);
+  for (double m = 300; m < 3000; m += random.uniform(40, 65)) {
+    stand_m.push_back(m);
+    mapped.emplace_back(LandmarkKind::mast, m < 1500 ? m : m - 40);
+  }
+  LandmarkMatcher matcher({}, line_with(mapped));
+  bool doubted = false;
+  for (const double m : stand_m) {
+    (void)matcher.add(sighting_of(LandmarkKind::mast, 0.95), prior_at(m - 5, 3, m - 5));
+    doubted = doubted || matcher.doubt() > 0.5;
+    if (m < 1500) {
+      EXPECT_FALSE(doubted) << m;
+    }
+    if (m > 2000) {
+      EXPECT_TRUE(doubted) << m;
+    }
+  }
+}
+
 TEST(LandmarkMatcher, UnsureSightingGivesUnsureFix) {
   LandmarkMatcher matcher({}, line_with({{LandmarkKind::frog, 500}}));
   const auto fix = matcher.add(sighting_of(LandmarkKind::frog, 0.6), prior_at(495, 10, 0));
