@@ -33,8 +33,8 @@ std::string range_text(Range range) {
 // Fills the fields of one YAML mapping; collects everything that is wrong instead of stopping at the first.
 class Reader final : public Fields {
  public:
-  Reader(YAML::Node node, std::string path, std::string file, std::vector<std::string>& problems)
-      : node_(std::move(node)), path_(std::move(path)), file_(std::move(file)), problems_(problems) {}
+  Reader(const YAML::Node& node, std::string path, std::string file, std::vector<std::string>& problems)
+      : node_(node), path_(std::move(path)), file_(std::move(file)), problems_(problems) {}
 
   void number(const char* key, double& value, Range range, const char* unit, const char*) override {
     const auto node = find(key);

@@ -57,7 +57,8 @@ class Route {
   [[nodiscard]] double end_m() const { return legs_.back().end_m(); }
   [[nodiscard]] const Leg& leg_at(double distance_m) const;
   [[nodiscard]] EdgePosition position_at(double distance_m) const;
-  /// The place nearest to `near_m`, run in its direction (unknown: in either); nothing when the route does not go there.
+  /// The place nearest to `near_m`, run in its direction (unknown: in either); nothing when the route does not go
+  /// there.
   [[nodiscard]] std::optional<double> distance_of(const EdgePosition& place, double near_m) const;
   [[nodiscard]] double curvature_at(double distance_m) const;
 

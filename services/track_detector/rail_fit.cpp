@@ -152,8 +152,8 @@ class Builder {
     return true;
   }
 
-  /// The points' sigmas from their scatter: kSigmaOfMedian times the median residual, made good for the unknowns. They only
-  /// become smaller: larger ones would let wild points in. Returns the factor that the scatter asks for.
+  /// The points' sigmas from their scatter: kSigmaOfMedian times the median residual, made good for the unknowns. They
+  /// only become smaller: larger ones would let wild points in. Returns the factor that the scatter asks for.
   double scale_sigmas(double least) {
     if (points_.size() <= kShapeSize) return 1;
     ratios_.resize(points_.size());
