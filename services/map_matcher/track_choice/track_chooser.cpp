@@ -88,8 +88,9 @@ void TrackChooser::follow(const TrackWindow& window) {
     found = place_m;
     best = hypothesis.log_prior;
   }
-  // While no leg is declared fusion goes on along the straight one, which may have been given up here.
-  if (!found && lost_m_ > kLostM && stands_near(window.place) && !choice()->known) lost_m_ = 0;
+  // While no leg is declared fusion goes on along the straight one, which may have been given up here. Where not even
+  // the begin is known nothing is lost.
+  if (!found && lost_m_ > kLostM && told_ >= kWatched && stands_near(window.place) && !choice()->known) lost_m_ = 0;
   if (hypotheses_.empty() || (!found && lost_m_ > kLostM)) {
     start(wanted);
     return;
