@@ -18,6 +18,8 @@ constexpr double kLongestStepM = 500.0;  // farther apart two places are no way 
 constexpr double kSameWayM = 1.0;        // a group passed again after another way than back is passed anew
 constexpr double kNearSwitchM = 50.0;    // a switch is doubted a little before the foot's estimate reaches it
 constexpr double kDecidedM = 3000.0;     // so far behind a switch its declaration may still be taken back
+constexpr double kTurnedM = 0.3;         // less is no other direction of running
+constexpr double kBeforeSwitchM = 0.01;  // on the stem
 
 double sign_of(Direction direction) {
   return direction == Direction::reverse ? -1.0 : 1.0;
@@ -48,11 +50,15 @@ void BaliseTracker::lose() {
   reference_.reset();
 }
 
-void BaliseTracker::update(const EdgePosition& place, bool declared) {
+void BaliseTracker::update(const EdgePosition& place, bool declared, bool heard) {
   const track::Edge* edge = map_->edge(place.edge);
   if (edge == nullptr || !std::isfinite(place.offset_m)) return lose();
   EdgePosition foot = place;
   foot.offset_m = std::clamp(foot.offset_m, 0.0, edge->alignment.length_m());
+  if (!heard && last_) {  // over which leg it went meanwhile nobody knows
+    const auto step = step_to(foot);
+    if (!step || step->divides) lose();
+  }
   if (!declared) {
     go_undeclared(foot);
   } else if (!go_declared(foot)) {
@@ -71,16 +77,53 @@ std::optional<double> BaliseTracker::undeclared_m() const {
 BaliseTracker::Undeclared BaliseTracker::undeclared_since(const EdgePosition& foot) {
   if (!last_) return {};
   const auto step = step_to(foot);
-  if (step && step->divides) return {last_, reference_, {}};
+  if (step && step->divides) return undeclared_from(*last_, 0, step->way_m > 0);
   if (decided_) return *decided_;
-  if (!divides_near()) return {};
-  return {last_, reference_, {}};
+  const auto path = track::Path::follow(map_, *last_, kNearSwitchM, kNearSwitchM);
+  if (!path.ok()) return {};
+  // To either side, because fusion and whoever declares the track do not place the train alike.
+  std::optional<double> nearest_m;
+  for (const auto& one : path.value().switches()) {
+    if (one.ahead == forwards_ && (!nearest_m || std::abs(one.distance_m) < std::abs(*nearest_m)))
+      nearest_m = one.distance_m;
+  }
+  if (!nearest_m) return {};
+  const bool passed = forwards_ ? *nearest_m <= 0 : *nearest_m >= 0;
+  if (!passed) return undeclared_from(*last_, 0, forwards_);
+  const double stem_m = *nearest_m + (forwards_ ? -kBeforeSwitchM : kBeforeSwitchM);
+  return undeclared_from(path.value().position_at(stem_m), -stem_m, forwards_);
+}
+
+// A group beyond the switch is on one of its legs, and nobody knows whether on this one.
+BaliseTracker::Undeclared BaliseTracker::undeclared_from(const EdgePosition& stem, double way_m, bool forwards) const {
+  Undeclared undeclared{stem, reference_, {}};
+  if (way_m != 0) undeclared.turns.run(way_m);
+  auto& reference = undeclared.reference;
+  if (!reference) return undeclared;
+  reference->foot_m -= way_m;
+  if (forwards ? reference->foot_m < 0 : reference->foot_m > 0)
+    reference = forwards ? nearest_behind(stem) : std::nullopt;
+  return undeclared;
+}
+
+// It has backed out over the switch, and goes on over another leg than the one on which its group lies.
+void BaliseTracker::leave_leg(const Step& step) {
+  if (!step.divides || !reference_) return;
+  const bool forwards = step.way_m > 0;
+  if (forwards ? reference_->foot_m >= 0 : reference_->foot_m <= 0) return;
+  const bool leads_there = std::ranges::any_of(step.groups, [&](const Passed& mark) {
+    return mark.group == reference_->group &&
+           std::abs(mark.way_m + reference_->foot_m) <= kSameWayM + reference_->doubt_m;
+  });
+  if (!leads_there) reference_ = forwards ? nearest_behind(*last_) : std::nullopt;
 }
 
 void BaliseTracker::go_back_to(Undeclared undeclared) {
   decided_.reset();
   undeclared_ = std::move(undeclared);
+  const auto* group = reference_ ? reference_->group : nullptr;
   reference_ = undeclared_->reference;
+  if (group != (reference_ ? reference_->group : nullptr)) ++taken_back_;
   if (reference_) reference_->foot_m += undeclared_->turns.way_m();
 }
 
@@ -89,6 +132,7 @@ void BaliseTracker::go_undeclared(const EdgePosition& foot) {
   if (!undeclared_->from) return;
   const double before_m = undeclared_->turns.way_m();
   if (const auto step = step_to(foot)) {
+    note_direction(step->way_m);
     undeclared_->turns.run(step->way_m);
   } else if (const auto ways = ways_between(*map_, ways_, *undeclared_->from, foot, before_m); !ways.empty()) {
     undeclared_->turns.run(ways.front().length_m - before_m);  // onto another leg, behind one more switch
@@ -99,17 +143,12 @@ void BaliseTracker::go_undeclared(const EdgePosition& foot) {
   if (reference_) reference_->foot_m += undeclared_->turns.way_m() - before_m;
 }
 
-/// To either side, because fusion and whoever declares the track do not place the train alike.
-bool BaliseTracker::divides_near() const {
-  const auto path = track::Path::follow(map_, *last_, kNearSwitchM, kNearSwitchM);
-  return path.ok() && !path.value().switches().empty();
-}
-
 bool BaliseTracker::go_declared(const EdgePosition& foot) {
   if (!last_) return false;
   if (!undeclared_) {
     if (auto step = step_to(foot)) {
       run_on(step->way_m);
+      leave_leg(*step);
       pass(std::move(step->groups), step->way_m);
       return true;
     }
@@ -142,9 +181,17 @@ bool BaliseTracker::go_declared(const EdgePosition& foot) {
 }
 
 void BaliseTracker::run_on(double way_m) {
+  note_direction(way_m);
   if (!decided_) return;
   decided_->turns.run(way_m);
   if (std::abs(decided_->turns.way_m()) > kDecidedM) decided_.reset();
+}
+
+void BaliseTracker::note_direction(double way_m) {
+  moved_back_m_ = std::max(0.0, moved_back_m_ + (forwards_ ? -way_m : way_m));
+  if (moved_back_m_ <= kTurnedM) return;
+  forwards_ = !forwards_;
+  moved_back_m_ = 0;
 }
 
 /// At their distances from where the ways end. Beyond both ends the train may have been as well, before it turned:
@@ -249,16 +296,22 @@ void BaliseTracker::pass(std::vector<Passed> passed, double step_m) {
     if (again && reference_->nominal_along == mark.nominal_along &&
         std::abs(reference_->foot_m - foot_m) <= kSameWayM + reference_->doubt_m)
       continue;
-    const auto* previous = reference_ && !again ? reference_->group : nullptr;
-    reference_ = Reference{mark.group, previous, mark.nominal_along, along, foot_m, mark.doubt_m};
+    const double from_previous_m = reference_ ? reference_->foot_m - foot_m : 0;
+    const bool tells = reference_ && !again && std::abs(from_previous_m) > reference_->doubt_m + mark.doubt_m;
+    const auto* previous = tells ? reference_->group : nullptr;
+    reference_ = Reference{mark.group, previous, mark.nominal_along, from_previous_m > 0, foot_m, mark.doubt_m};
   }
 }
 
 void BaliseTracker::acquire(const EdgePosition& foot) {
-  reference_.reset();
   decided_.reset();
+  reference_ = nearest_behind(foot);
+}
+
+std::optional<Reference> BaliseTracker::nearest_behind(const EdgePosition& foot) const {
+  std::optional<Reference> nearest;
   const auto path = track::Path::follow(map_, foot, 0, search_behind_m_);
-  if (!path.ok()) return;
+  if (!path.ok()) return nearest;
   // Where tracks have met behind the train nobody knows from which one it came.
   double from_m = -search_behind_m_;
   for (const auto& one : path.value().switches()) {
@@ -266,9 +319,10 @@ void BaliseTracker::acquire(const EdgePosition& foot) {
   }
   for (const auto& mark : path.value().balise_groups()) {  // by distance: the last one is the nearest
     if (mark.distance_m > 0 || mark.distance_m < from_m) continue;
-    const auto* previous = reference_ ? reference_->group : nullptr;
-    reference_ = Reference{mark.group, previous, mark.nominal_is_along_path, true, -mark.distance_m};
+    const auto* previous = nearest ? nearest->group : nullptr;
+    nearest = Reference{mark.group, previous, mark.nominal_is_along_path, true, -mark.distance_m};
   }
+  return nearest;
 }
 
 }  // namespace railfix::tpr_publisher

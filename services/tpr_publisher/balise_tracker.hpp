@@ -39,10 +39,13 @@ class BaliseTracker {
   /// taken, when only one way leads from there.
   BaliseTracker(std::shared_ptr<const track::Map> map, double search_behind_m);
 
-  /// REQUIRES: the direction is known. A place that is not on the map loses the reference.
-  void update(const track::EdgePosition& foot, bool declared);
+  /// REQUIRES: the direction is known. A place that is not on the map loses the reference. `heard`: the train was
+  /// followed from the place before to this one.
+  void update(const track::EdgePosition& foot, bool declared, bool heard = true);
   void lose();
   [[nodiscard]] const std::optional<Reference>& reference() const { return reference_; }
+  /// So many times a group that had been taken for passed counted no more.
+  [[nodiscard]] uint32_t taken_back() const { return taken_back_; }
   /// How far the train has come since its track was declared last; nothing while it is declared.
   [[nodiscard]] std::optional<double> undeclared_m() const;
   /// How far the foot is beyond this group, along, when it is the reference or lies behind the train, no farther than
@@ -71,7 +74,10 @@ class BaliseTracker {
   [[nodiscard]] std::optional<Step> step_on_edge(const track::EdgePosition& foot) const;
   [[nodiscard]] std::optional<Step> step_over_edges(const track::EdgePosition& foot) const;
   [[nodiscard]] Undeclared undeclared_since(const track::EdgePosition& foot);
-  [[nodiscard]] bool divides_near() const;
+  /// The stem lies `way_m` behind the last place (along; 0 = it is the last place).
+  [[nodiscard]] Undeclared undeclared_from(const track::EdgePosition& stem, double way_m, bool forwards) const;
+  void leave_leg(const Step& step);
+  void note_direction(double way_m);
   void go_back_to(Undeclared undeclared);
   void go_undeclared(const track::EdgePosition& foot);
   [[nodiscard]] bool go_declared(const track::EdgePosition& foot);
@@ -79,6 +85,8 @@ class BaliseTracker {
   [[nodiscard]] std::vector<Passed> groups_on(const std::vector<WayBetween>& ways) const;
   void pass(std::vector<Passed> passed, double step_m);
   void acquire(const track::EdgePosition& foot);
+  /// As at the start.
+  [[nodiscard]] std::optional<Reference> nearest_behind(const track::EdgePosition& foot) const;
 
   std::shared_ptr<const track::Map> map_;
   track::Ways ways_;
@@ -88,6 +96,9 @@ class BaliseTracker {
   std::optional<Undeclared> undeclared_;
   std::optional<Undeclared> decided_;  // the same after its track was declared, run on since then
   std::optional<Reference> reference_;
+  uint32_t taken_back_ = 0;
+  bool forwards_ = true;  // the way that the train runs, seen from the cab
+  double moved_back_m_ = 0;
 };
 
 }  // namespace railfix::tpr_publisher

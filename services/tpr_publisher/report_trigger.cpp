@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
 
 #include "core/time.hpp"
 #include "tpr_publisher/train_integrity.hpp"
@@ -14,6 +15,7 @@ namespace {
 // Of a cycle of 0: more would keep the link to the ground from everything else.
 constexpr int64_t kShortestCycleNs = core::kNsPerSecond;
 constexpr double kShortestCycleM = 1.0;
+constexpr int64_t kClockJitterNs = 100'000'000;  // no clock that was set back
 
 }  // namespace
 
@@ -90,7 +92,8 @@ void ReportTrigger::note_events(const Moment& moment) {
 
 // A clock that was set back by an hour does not silence the train for an hour.
 int64_t ReportTrigger::since_report_ns(const Moment& moment) const {
-  return std::abs(moment.now_ns - reported_->now_ns);
+  const int64_t since_ns = moment.now_ns - reported_->now_ns;
+  return since_ns > -kClockJitterNs ? since_ns : std::numeric_limits<int64_t>::max();
 }
 
 bool ReportTrigger::cycle_distance_over(const Moment& moment) const {
@@ -131,8 +134,8 @@ std::optional<Reason> ReportTrigger::due(const Moment& moment) {
   if (const auto reason = onboard_reason(moment)) return reason;
   if (group_passed_ && parameters_.m_loc == etcs::kReportAtGroups) return Reason::balise_group;
   // What was said is not known any more: trackside must not go on with it until the cycle is over.
-  const bool taken_back = moment.nid_lrbg == etcs::kUnknownBaliseGroup && reported_->nid_lrbg != moment.nid_lrbg;
-  if (taken_back) return Reason::balise_group;
+  const bool taken_back = moment.nid_lrbg == etcs::kUnknownBaliseGroup || moment.taken_back != reported_->taken_back;
+  if (taken_back && reported_->nid_lrbg != moment.nid_lrbg) return Reason::balise_group;
   if (location_passed_) return Reason::location;
   if (cycle_distance_over(moment)) return Reason::cycle_distance;
   if (cycle_time_over(moment)) return Reason::cycle_time;

@@ -52,6 +52,7 @@ struct Moment {
   double min_safe_front_m = 0;
   bool standstill = false;
   uint32_t nid_lrbg = etcs::kUnknownBaliseGroup;
+  uint32_t taken_back = 0;                // counts up whenever an LRBG that was told turns out to be none
   std::optional<double> beyond_lrbg_m;    // front end beyond the LRBG, along the train
   std::optional<double> beyond_origin_m;  // ... beyond the group that wanted_origin() names
   Onboard onboard;

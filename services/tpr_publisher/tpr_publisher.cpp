@@ -74,7 +74,8 @@ TprPublisher::TprPublisher(std::shared_ptr<const track::Map> map, const Settings
 }
 
 void TprPublisher::follow(const TrainPosition& position) {
-  if (position_ && !goes_on(*position_, position)) {
+  const bool heard = !position_ || goes_on(*position_, position);
+  if (!heard) {
     integrity_.lose_way();
     trigger_.lose_way();
     furthest_m_.reset();
@@ -84,7 +85,7 @@ void TprPublisher::follow(const TrainPosition& position) {
   const auto* group_before = reference_ ? reference_->group : nullptr;
   if (tracker_) {
     if (position.place_known()) {
-      tracker_->update(position.foot, position.track_declared());
+      tracker_->update(position.foot, position.track_declared(), heard);
     } else {
       tracker_->lose();
     }
@@ -105,6 +106,7 @@ void TprPublisher::follow_motion(const TrainPosition& position) {
     motion_ = Motion::unknown;
     furthest_m_ = position.distance_m;
   }
+  if (position.standstill && motion_ != Motion::unknown) return;  // what the distance is corrected by is no way
   const double moved_m = position.distance_m - *furthest_m_;
   const bool fast = !position.standstill && std::abs(position.speed_mps) >= kSurelyMovesMps;
   const Motion moves = (fast ? position.speed_mps : moved_m) > 0 ? Motion::forward : Motion::backward;
@@ -276,6 +278,7 @@ Moment TprPublisher::moment(int64_t now_ns) const {
       position.under_m >= 0 ? moment.front_m + position.under_m + group_m() + allowance.under_m : HUGE_VAL;
   moment.min_safe_front_m =
       position.over_m >= 0 ? moment.front_m - position.over_m - group_m() - allowance.over_m : -HUGE_VAL;
+  moment.taken_back = tracker_ ? tracker_->taken_back() : 0;
   if (const auto here = reference()) {
     moment.nid_lrbg = here->group->nid_lrbg();
     const auto origin = trigger_.wanted_origin();
