@@ -318,7 +318,7 @@ std::optional<Reference> BaliseTracker::nearest_behind(const EdgePosition& foot)
     if (!one.ahead && one.distance_m <= 0) from_m = std::max(from_m, one.distance_m);
   }
   for (const auto& mark : path.value().balise_groups()) {  // by distance: the last one is the nearest
-    if (mark.distance_m > 0 || mark.distance_m < from_m) continue;
+    if (mark.distance_m > 0 || mark.distance_m <= from_m) continue;
     const auto* previous = nearest ? nearest->group : nullptr;
     nearest = Reference{mark.group, previous, mark.nominal_is_along_path, true, -mark.distance_m};
   }

@@ -107,6 +107,14 @@ TEST_F(LeftLeg, OverWhichLegATrainWentThatWasNotHeardNobodyKnows) {
   expect(kOfLoop[0], 600);
 }
 
+TEST_F(LeftLeg, AGroupAtTheVeryEndOfALegIsOnThatLeg) {
+  auto map = std::make_shared<track::Map>(*loop(405));
+  map->balise_groups[1].offset_m = 400;
+  tracker = BaliseTracker(map, 5000);
+  tracker.update(forward(4, 50), true);
+  EXPECT_FALSE(tracker.reference());
+}
+
 TEST(TakenBack, IsReportedWhereverGroupsAreNotReported) {
   for (const uint32_t m_loc : {0U, 1U, 2U}) {
     auto silent = settings();
