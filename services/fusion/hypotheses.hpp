@@ -117,6 +117,7 @@ class Hypotheses {
   void begin_again(Rival& rival) const;
   void lose_sight(Rival& rival, int64_t now_ns) const;
   static void stray(Rival& rival, int64_t now_ns);
+  [[nodiscard]] bool is_in_dispute(const Rival& rival) const;
   [[nodiscard]] Excess most_excess() const;
   [[nodiscard]] Interval promised(const Interval& main) const;
 

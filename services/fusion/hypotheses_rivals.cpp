@@ -39,7 +39,7 @@ void Hypotheses::exclude_faulty() {
 void Hypotheses::adopt(Rival& rival) {
   Estimator next = *rival.estimator;
   next.exclude(rival.without, main_);
-  next.doubt_place(rival.unseen.behind_m, rival.unseen.ahead_m);
+  next.doubt_place(rival.carried.behind_m + rival.unseen.behind_m, rival.carried.ahead_m + rival.unseen.ahead_m);
   main_ = std::move(next);
   for (auto& other : rivals_) other.forget_excess();
 }
@@ -167,11 +167,17 @@ void Hypotheses::stray(Rival& rival, int64_t now_ns) {
   rival.excess.ahead_m += std::max(0.0, apart_m);
 }
 
+// While a sensor that the rival believes is isolated in the main one, nobody knows which of the two is right.
+bool Hypotheses::is_in_dispute(const Rival& rival) const {
+  return rival.asked && !main_.is_consistent(1U << static_cast<unsigned>(rival.without));
+}
+
 Hypotheses::Excess Hypotheses::most_excess() const {
   Excess most;
   for (const auto& rival : rivals_) {
-    most.behind_m = std::max(most.behind_m, rival.excess.behind_m);
-    most.ahead_m = std::max(most.ahead_m, rival.excess.ahead_m);
+    const Excess unseen = is_in_dispute(rival) ? rival.unseen : Excess{};
+    most.behind_m = std::max(most.behind_m, rival.excess.behind_m + unseen.behind_m);
+    most.ahead_m = std::max(most.ahead_m, rival.excess.ahead_m + unseen.ahead_m);
   }
   return most;
 }

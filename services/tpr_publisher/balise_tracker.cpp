@@ -128,7 +128,8 @@ void BaliseTracker::go_back_to(Undeclared undeclared) {
 }
 
 void BaliseTracker::go_undeclared(const EdgePosition& foot) {
-  if (!undeclared_) go_back_to(undeclared_since(foot));
+  const bool anew = !undeclared_;
+  if (anew) go_back_to(undeclared_since(foot));
   if (!undeclared_->from) return;
   const double before_m = undeclared_->turns.way_m();
   if (const auto step = step_to(foot)) {
@@ -140,7 +141,18 @@ void BaliseTracker::go_undeclared(const EdgePosition& foot) {
     undeclared_->from.reset();
     reference_.reset();
   }
-  if (reference_) reference_->foot_m += undeclared_->turns.way_m() - before_m;
+  if (!reference_) return;
+  reference_->foot_m += undeclared_->turns.way_m() - before_m;
+  if (anew || foot.edge != last_->edge)
+    doubt_legs(ways_between(*map_, ways_, *undeclared_->from, foot, undeclared_->turns.way_m()));
+}
+
+// Where legs have joined again nobody knows over which one the train came.
+void BaliseTracker::doubt_legs(const std::vector<WayBetween>& ways) {
+  const double counted_m = undeclared_->turns.way_m();
+  double doubt_m = undeclared_->reference->doubt_m;
+  for (const auto& way : ways) doubt_m = std::max(doubt_m, std::abs(way.length_m - counted_m));
+  reference_->doubt_m = doubt_m;
 }
 
 bool BaliseTracker::go_declared(const EdgePosition& foot) {
@@ -163,8 +175,8 @@ bool BaliseTracker::go_declared(const EdgePosition& foot) {
   const auto ways = ways_between(*map_, ways_, *undeclared.from, foot, about_m);
   if (ways.empty()) return false;
   const double length_m = ways.front().length_m;
+  reference_ = undeclared.reference;
   if (reference_) {
-    reference_->foot_m -= counted_m;
     for (const auto& way : ways) reference_->doubt_m = std::max(reference_->doubt_m, std::abs(way.length_m - length_m));
   }
   undeclared.turns.run(length_m - counted_m);
@@ -239,8 +251,10 @@ std::optional<double> BaliseTracker::foot_beyond_m(uint32_t nid_lrbg) const {
 }
 
 std::optional<BaliseTracker::Step> BaliseTracker::step_to(const EdgePosition& foot) const {
-  const auto step = step_on_edge(foot);
-  return step ? step : step_over_edges(foot);
+  // A group where edges meet may lie on the next one.
+  const bool inside = foot.offset_m > 0 && foot.offset_m < map_->edge(foot.edge)->alignment.length_m();
+  if (const auto step = inside ? step_on_edge(foot) : step_over_edges(foot)) return step;
+  return inside ? step_over_edges(foot) : step_on_edge(foot);
 }
 
 std::optional<BaliseTracker::Step> BaliseTracker::step_on_edge(const EdgePosition& foot) const {

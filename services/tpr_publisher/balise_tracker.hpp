@@ -80,6 +80,7 @@ class BaliseTracker {
   void note_direction(double way_m);
   void go_back_to(Undeclared undeclared);
   void go_undeclared(const track::EdgePosition& foot);
+  void doubt_legs(const std::vector<WayBetween>& ways);
   [[nodiscard]] bool go_declared(const track::EdgePosition& foot);
   void run_on(double way_m);
   [[nodiscard]] std::vector<Passed> groups_on(const std::vector<WayBetween>& ways) const;

@@ -8,7 +8,7 @@ namespace railfix::tpr_publisher {
 namespace {
 
 constexpr size_t kMostRoutes = 5000;      // looked at in a large station before giving up
-constexpr double kLegsDifferM = 50.0;     // ways of one train differ by so much at most, ...
+constexpr double kLegsDifferM = 200.0;    // ways of one train differ by so much at most, ...
 constexpr double kLegsDifferPerM = 0.05;  // ... and by this share of their length
 
 track::Run run_of(const track::Map& map, const track::EdgePosition& place) {

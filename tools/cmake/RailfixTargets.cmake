@@ -31,6 +31,11 @@ function(railfix_warnings target)
                                            $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict> $<$<NOT:$<BOOL:${RAILFIX_FUZZ}>>:-Werror>)
 endfunction()
 
+# Commands and tests ask, compare and print. At O1 a third less time goes into compiling them.
+function(railfix_made_quickly target)
+  target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
+endfunction()
+
 # railfix_library(core SOURCES a.cpp DEPENDS x y)  -> target railfix_core, headers as <folder>/<header>.hpp
 function(railfix_library name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
@@ -56,7 +61,8 @@ function(railfix_service name)
   set_property(GLOBAL APPEND PROPERTY RAILFIX_SERVICES railfix-${program})
 endfunction()
 
-# railfix_test(core SOURCES a_test.cpp DEPENDS railfix_core)  -> program railfix-test-core, run by CTest test by test
+# railfix_test(core SOURCES a_test.cpp DEPENDS railfix_core)  -> program railfix-test-core, run by CTest test by test.
+# Tests of a folder that sets RAILFIX_TESTS_RUN_ALONE start processes that have the machine for themselves.
 function(railfix_test name)
   cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;DEPENDS" ${ARGN})
   if(NOT ARG_TIMEOUT)
@@ -68,10 +74,11 @@ function(railfix_test name)
   target_compile_definitions(railfix-test-${name} PRIVATE RAILFIX_SOURCE_DIR="${CMAKE_SOURCE_DIR}"
                                                           RAILFIX_BIN_DIR="${CMAKE_RUNTIME_OUTPUT_DIRECTORY}")
   railfix_warnings(railfix-test-${name})
+  railfix_made_quickly(railfix-test-${name})
   # SIGABRT leaves a core of a program that hangs, which .ci/run prints: CTest's own end of it would leave nothing.
   math(EXPR last_second "${ARG_TIMEOUT} + 30")
   add_test(NAME ${name} COMMAND timeout --verbose --signal=ABRT ${ARG_TIMEOUT} $<TARGET_FILE:railfix-test-${name}>)
-  set_tests_properties(${name} PROPERTIES TIMEOUT ${last_second})
+  set_tests_properties(${name} PROPERTIES TIMEOUT ${last_second} RUN_SERIAL "$<BOOL:${RAILFIX_TESTS_RUN_ALONE}>")
 endfunction()
 
 # railfix_benchmark(odometry SOURCES a.cpp DEPENDS railfix_odometry)  -> program railfix-bench-odometry, run by ./dev bench

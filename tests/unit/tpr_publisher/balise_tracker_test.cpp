@@ -107,6 +107,16 @@ TEST_F(Tracker, StandsExactlyWhereEdgesMeet) {
   EXPECT_EQ(previous(), kB);
 }
 
+TEST_F(Tracker, PassesAGroupWhereTheNextEdgeBeginsThoughItStandsThere) {
+  auto map = std::make_shared<track::Map>(*balise_map());
+  map->balise_groups[3].offset_m = 0;  // D
+  tracker = BaliseTracker(map, 5000);
+  tracker.update(forward(1, 950), true);
+  tracker.update(forward(1, 1000), true);
+  tracker.update(forward(2, 10), true);
+  expect(kD, 10);
+}
+
 TEST_F(Tracker, AJumpToAnotherTrackStartsAnew) {
   tracker.update(forward(2, 250), true);
   tracker.update(forward(3, 450), true);

@@ -202,8 +202,8 @@ TEST_F(UndeclaredTrack, DoubtedALittleBeforeTheSwitchTheGroupStays) {
   expect(kE, 152);
 }
 
-/// A loop whose siding is 5 m longer than the straight track; groups A 100 on 1, D 200 on 2, E 200 on 3, B 100 on 4.
-std::shared_ptr<const track::Map> loop_map() {
+/// A loop whose siding is longer than the straight track; groups A 100 on 1, D 200 on 2, E 200 on 3, B 100 on 4.
+std::shared_ptr<const track::Map> loop_map(double longer_m = 5) {
   using track::Alignment;
   auto map = std::make_shared<track::Map>();
   const auto straight = [](double from_m, double length_m) {
@@ -211,7 +211,7 @@ std::shared_ptr<const track::Map> loop_map() {
   };
   map->edges = {{1, "stem", 1, 2, "", straight(0, 1000)},
                 {2, "straight", 2, 3, "", straight(1000, 400)},
-                {3, "siding", 2, 3, "", straight(1000, 405)},
+                {3, "siding", 2, 3, "", straight(1000, 400 + longer_m)},
                 {4, "on", 3, 4, "", straight(1400, 1000)}};
   map->connections = {{2, 1, 2, false}, {2, 1, 3, true}, {3, 2, 4, false}, {3, 3, 4, true}};
   map->balise_groups = {{85, 1, 1, 100, true, false, 5, {1, 2}},
@@ -246,6 +246,37 @@ TEST(UndeclaredLoop, AGroupBeyondTheLoopIsTakenWhicheverLegItWas) {
   EXPECT_NEAR(tracker.reference()->foot_m, 20, 1e-6);
   EXPECT_NEAR(tracker.reference()->doubt_m, 0, 1e-6);
   EXPECT_EQ(tracker.reference()->previous->nid_lrbg(), kA);
+}
+
+TEST(UndeclaredLoop, TakenBackBeyondTheLoopItsLegsAreDoubtAgain) {
+  for (const double longer_m : {5.0, 120.0}) {
+    BaliseTracker tracker(loop_map(longer_m), 5000);
+    tracker.update(forward(1, 900), true);
+    tracker.update(forward(2, 20), false);
+    for (double offset_m = 40; offset_m < 400; offset_m += 20) tracker.update(forward(2, offset_m), true);
+    tracker.update(forward(4, 20), true);
+    EXPECT_EQ(tracker.reference()->group->nid_lrbg(), kD);
+    tracker.update(forward(4, 40), false);
+    EXPECT_EQ(tracker.reference()->group->nid_lrbg(), kA);
+    EXPECT_NEAR(tracker.reference()->foot_m, 1340, 1e-6);
+    EXPECT_NEAR(tracker.reference()->doubt_m, longer_m, 1e-6);
+    tracker.update(forward(4, 60), false);
+    EXPECT_NEAR(tracker.reference()->doubt_m, longer_m, 1e-6);
+  }
+}
+
+TEST(UndeclaredLoop, BackInFrontOfTheJointTheLegThatIsFollowedIsTheOnlyOne) {
+  BaliseTracker tracker(loop_map(), 5000);
+  tracker.update(forward(1, 900), true);
+  for (double offset_m = 20; offset_m < 400; offset_m += 20) tracker.update(forward(2, offset_m), false);
+  EXPECT_EQ(tracker.reference()->doubt_m, 0);
+  tracker.update(forward(4, 20), false);
+  EXPECT_NEAR(tracker.reference()->doubt_m, 5, 1e-6);
+  tracker.update(forward(2, 380), false);
+  EXPECT_EQ(tracker.reference()->doubt_m, 0);
+  tracker.update(forward(2, 370), true);
+  EXPECT_EQ(tracker.reference()->group->nid_lrbg(), kD);
+  EXPECT_EQ(tracker.reference()->doubt_m, 0);
 }
 
 /// At 20 m/s from 990 m on the stem over the switch, five positions a second.
