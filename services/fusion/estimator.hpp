@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "fusion/felt_motion.hpp"
 #include "fusion/fusion_parameters.hpp"
 #include "fusion/fusion_types.hpp"
 #include "fusion/motion_filter.hpp"
@@ -184,6 +185,9 @@ class Estimator {
     double apart_m = 0;   // its way less the train's while it was isolated: who is wrong is not known for certain
     double behind_m = 0;  // the furthest that came to
     double ahead_m = 0;
+    double felt_m = 0;  // what an IMU feels that the wheel does not say
+    double felt_behind_m = 0;
+    double felt_ahead_m = 0;
   };
   static constexpr int kGnssProof = 30;
   static constexpr int kRefusalsToIsolate = 3;  // in a row
@@ -208,6 +212,7 @@ class Estimator {
   void use(const FixInput& fix);
   void use(const PictureInput& picture);
   void use_acceleration(double accel_mps2, int64_t stamp_ns);
+  void feel(double accel_mps2, double sigma_mps2, int64_t before_ns);
   void doubt_grade();
   void compare_with_wheel(const OdometryInput& step, double sigma_m);
   void isolate_wheel();
@@ -257,6 +262,7 @@ class Estimator {
   Mean yaw_;
   Wheel wheel_;
   WheelNoise wheel_noise_;
+  FeltMotion felt_;
   Unwatched unwatched_;
   SlipWatch slip_watch_;
   SuddenChange sudden_change_;

@@ -346,10 +346,26 @@ void Estimator::use_acceleration(double accel_mps2, int64_t stamp_ns) {
     return filter.offer_acceleration(force_mps2, sigma_mps2, parameters_->gate_imu);
   });
   if (offer.used) {
+    feel(force_mps2, sigma_mps2, imu.used_ns);
     imu.accept(stamp_ns);
   } else if (++imu.refused >= kRefusalsToIsolate) {
     imu.isolate(stamp_ns);
   }
+}
+
+// With a camera that is blind, and a wheel of which nobody else knows whether it is stuck or slides.
+void Estimator::feel(double accel_mps2, double sigma_mps2, int64_t before_ns) {
+  const double dt_s = core::seconds(filter_.stamp_ns() - before_ns);
+  const bool blind = watch(Source::camera).seen_ns != 0 && !used_within(Source::camera, kBlindS);
+  if (!blind || !measures(Source::wheel) || dt_s > kLatelyS) {
+    felt_ = {};
+    return;
+  }
+  felt_.add({dt_s, accel_mps2, sigma_mps2, filter_.value(StateIndex::accel_bias), filter_.sigma(StateIndex::accel_bias),
+             filter_.speed_mps(), filter_.sigma(StateIndex::speed)});
+  unwatched_.felt_m += felt_.faster_mps() * dt_s;
+  unwatched_.felt_behind_m = std::max(unwatched_.felt_behind_m, -unwatched_.felt_m);
+  unwatched_.felt_ahead_m = std::max(unwatched_.felt_ahead_m, unwatched_.felt_m);
 }
 
 // The mean belongs to the middle of its period, which lies v * period / 2 behind.

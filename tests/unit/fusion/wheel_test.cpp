@@ -203,6 +203,39 @@ TEST(Wheel, TheReturnOfASilentCameraDoesNotDoubtTheClock) {
   EXPECT_LT(train.state->over_m + train.state->under_m, width_m + 20);
 }
 
+// Gently: no single sample of the IMU contradicts.
+TEST(Wheel, ThatIsStuckWhileTheCameraIsBlindHidesNoStart) {
+  Train train;
+  train.run(25, 0.8);
+  train.run(25, -0.8);
+  train.slip = -1;
+  train.run(5);
+  train.blind = true;
+  train.run(12);
+  for (double acceleration_mps2 = 0.02; acceleration_mps2 < 0.6; acceleration_mps2 += 0.01)
+    train.run(0.05, acceleration_mps2);
+  train.run(10, 0.6);
+  EXPECT_NE(train.state->integrity, Integrity::ok);
+  train.blind = false;
+  train.run(30);
+}
+
+// The same with a wheel that is well: no reason to promise less than with a camera.
+TEST(Wheel, ThatTurnsWhileTheCameraIsBlindIsBelieved) {
+  double length_m[2]{};
+  for (const bool blind : {false, true}) {
+    Train train;
+    train.run(25, 0.8);
+    train.blind = blind;
+    for (int i = 0; i < 4; ++i) {
+      train.run(3, -0.9);
+      train.run(3, 0.9);
+    }
+    length_m[blind ? 1 : 0] = train.state->over_m + train.state->under_m;
+  }
+  EXPECT_LT(length_m[1], 1.05 * length_m[0]);
+}
+
 TEST(Wheel, AloneItAdmitsWhatASlipMayAdd) {
   Train train;
   train.camera = train.imu = false;
