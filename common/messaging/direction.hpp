@@ -1,4 +1,4 @@
-// The direction along an edge in which a train looks, as position messages and as the map say it.
+// Places and the direction along an edge in which a train looks, as position messages and as the map say it.
 #pragma once
 
 #include "idl/position.h"
@@ -15,6 +15,11 @@ constexpr track::Direction direction_of(uint8_t said) {
 constexpr uint8_t direction_of(track::Direction direction) {
   if (direction == track::Direction::forward) return msg::DIRECTION_FORWARD;
   return direction == track::Direction::reverse ? msg::DIRECTION_REVERSE : msg::DIRECTION_UNKNOWN;
+}
+
+/// Where a train is by its state. REQUIRES: track_known, for it to mean anything.
+inline track::EdgePosition place_of(const msg::TrainState& state) {
+  return {state.edge(), state.offset_m(), direction_of(state.direction())};
 }
 
 }  // namespace railfix::messaging

@@ -29,6 +29,9 @@
 
 namespace railfix::service {
 
+/// So long a program that has come to its end waits for its last samples to arrive.
+inline constexpr int64_t kLastWordsNs = 300'000'000;
+
 /// What all services of a train share: section `common` of the configuration file.
 struct CommonConfig {
   std::string train_id = "demo";

@@ -17,7 +17,6 @@ static_assert(kDark == msg::PICTURE_DARK && kSaturated == msg::PICTURE_SATURATED
               kOutOfOrder == msg::PICTURE_OUT_OF_ORDER && kCovered == msg::PICTURE_COVERED &&
               kBlurred == msg::PICTURE_BLURRED);
 
-constexpr int64_t kLastWordsNs = 300'000'000;  // for the last samples to arrive before the program ends
 constexpr int kBadBeforeDegraded = 10;
 constexpr int kPicturesTried = 100;
 constexpr double kGuessedHeightM = 2.5;
@@ -328,12 +327,12 @@ void FrameGrabberService::end() {
 }
 
 void FrameGrabberService::finish_after_last_words() {
-  if (!ended_ns_ || config_.at_end != "finish" || core::monotonic_ns() - *ended_ns_ < kLastWordsNs) return;
+  if (!ended_ns_ || config_.at_end != "finish" || core::monotonic_ns() - *ended_ns_ < service::kLastWordsNs) return;
   context_.finish("all pictures played");
 }
 
 void FrameGrabberService::check_wait() {
-  if (gave_up_ns_ && core::monotonic_ns() - *gave_up_ns_ > kLastWordsNs) throw std::runtime_error(gave_up_why_);
+  if (gave_up_ns_ && core::monotonic_ns() - *gave_up_ns_ > service::kLastWordsNs) throw std::runtime_error(gave_up_why_);
   if (gave_up_ns_ || !waiting_since_ns_) return;
   if (core::seconds(core::monotonic_ns() - *waiting_since_ns_) < config_.wait_s) return;
   gave_up_why_ = fmt::format(

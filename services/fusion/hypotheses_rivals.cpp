@@ -167,9 +167,12 @@ void Hypotheses::stray(Rival& rival, int64_t now_ns) {
   rival.excess.ahead_m += std::max(0.0, apart_m);
 }
 
-// While a sensor that the rival believes is isolated in the main one, nobody knows which of the two is right.
+// Of two odometers the main one has isolated, without proof, the one that the rival believes.
 bool Hypotheses::is_in_dispute(const Rival& rival) const {
-  return rival.asked && !main_.is_consistent(1U << static_cast<unsigned>(rival.without));
+  return rival.asked && std::ranges::any_of(std::array{Source::camera, Source::wheel}, [&](Source odometer) {
+           const auto& watch = main_.watch(odometer);
+           return odometer != rival.without && watch.isolated && !watch.convicted;
+         });
 }
 
 Hypotheses::Excess Hypotheses::most_excess() const {

@@ -48,38 +48,53 @@ void UnmappedRate::learn(double place_m, double probability) {
   last_m_ = place_m;
 }
 
-// Every mapped landmark of the kind in the window is one hypothesis, weighed by how well the earlier sightings fit it;
-// that it stands elsewhere than the map says is another; the last one is that this sighting is false, weighed by the
-// mean fit over the window. A confidence below the usual is a chance for the sighting, not for each landmark in the
-// window. The window itself only selects. That the train is not in it at all is weighed by what such a sighting would
-// be by chance; the odds of that go on from sighting to sighting.
+// The window only selects. An object that was met before says nothing new: what the map has wrong about it is the same
+// each time.
 std::optional<Fix> LandmarkMatcher::add(const Sighting& sighting, const Prior& prior) {
   if (!prior.usable() || !has_sense(sighting)) return std::nullopt;
   const double place_m = prior.travelled_m + sighting.distance_ahead_m;
   const double margin_m = parameters_.window_margin_m + 3 * sighting.sigma_m;
   const double expected_m = prior.path_distance_m + sighting.distance_ahead_m;
-  const double from_m = expected_m - prior.over_m - margin_m;
-  const double to_m = expected_m + prior.under_m + margin_m;
+  const Window window{expected_m, expected_m - prior.over_m - margin_m, expected_m + prior.under_m + margin_m};
   std::erase_if(seen_, [&](const Seen& seen) { return std::abs(place_m - seen.place_m) > parameters_.history_m; });
-  // One that was met before says nothing new: what the map has wrong about it is the same each time.
   const bool again = std::erase_if(seen_, [&](const Seen& seen) { return is_of(seen, sighting, place_m); }) > 0;
-  std::vector<const track::PathLandmark*> candidates = near(sighting.kind, from_m, to_m);
+  std::vector<const track::PathLandmark*> candidates = near(sighting.kind, window.from_m, window.to_m);
   std::erase_if(candidates, [&](const auto* landmark) { return other_side(sighting.lateral_m, landmark->lateral_m); });
   if (candidates.size() > kMostCandidates) {
     remember(sighting, place_m);  // for when the window is smaller, or for those of a rarer kind
     return std::nullopt;
   }
   for (Seen& seen : seen_) seen.unmapped_per_m = unmapped(seen.sighting.kind).per_m();
+  const Weights weights = weigh(sighting, place_m, window, candidates);
+  if (weights.here > 0 && !again) {
+    odds_elsewhere_ = std::clamp(weights.elsewhere / weights.here, std::min(odds_elsewhere_, kConfirmed), kMostOdds);
+    unmapped(sighting.kind).learn(place_m, weights.nothing / weights.here);
+  }
+  confirmed_ = odds_elsewhere_ <= (confirmed_ ? kLost : kConfirmed);
+  remember(sighting, place_m);
+  const double sum = weights.here + weights.elsewhere;
+  const auto* best = weights.best;
+  if (best == nullptr || !(weights.of_best >= parameters_.min_probability * sum)) return std::nullopt;
+  return Fix{sighting.stamp_ns, best->distance_m - sighting.distance_ahead_m,
+             std::hypot(sighting.sigma_m, best->landmark->sigma_m), weights.of_best / sum, best->landmark->id};
+}
 
+// Every mapped landmark of the kind in the window is one hypothesis, weighed by how well the earlier sightings fit it;
+// that it stands elsewhere than the map says is another; the last one is that this sighting is false, weighed by the
+// mean fit over the window. A confidence below the usual is a chance for the sighting, not for each landmark in the
+// window. That the train is not in the window at all is weighed by what such a sighting would be by chance; the odds of
+// that go on from sighting to sighting.
+LandmarkMatcher::Weights LandmarkMatcher::weigh(const Sighting& sighting, double place_m, const Window& window,
+                                                const std::vector<const track::PathLandmark*>& candidates) {
+  const double length_m = window.to_m - window.from_m;
   const double confidence = std::clamp(sighting.confidence, 0.01, 0.999);
   const double expected = std::max(1.0, parameters_.detection * static_cast<double>(candidates.size()));
   const double doubt = std::max(0.0, kUsualConfidence - confidence);
-  const double earlier = mean_fit(from_m - place_m, to_m - place_m, place_m);
-  UnmappedRate& unmapped_rate = unmapped(sighting.kind);
-  const double nothing = earlier * (doubt * expected + unmapped_rate.per_m() * (to_m - from_m));
-  double here = nothing;
-  const track::PathLandmark* best = nullptr;
-  double best_weight = 0;
+  const double earlier = mean_fit(window.from_m - place_m, window.to_m - place_m, place_m);
+  const double unmapped_per_m = unmapped(sighting.kind).per_m();
+  Weights weights;
+  weights.nothing = earlier * (doubt * expected + unmapped_per_m * length_m);
+  weights.here = weights.nothing;
   for (const auto* landmark : candidates) {
     const double shift_m = landmark->distance_m - place_m;
     const double chance = confidence * parameters_.detection;
@@ -88,25 +103,15 @@ std::optional<Fix> LandmarkMatcher::add(const Sighting& sighting, const Prior& p
         std::min(kMovedSigmas * std::hypot(sighting.sigma_m, landmark->landmark->sigma_m), 0.5 * parameters_.moved_m);
     const double moved = 0.5 * (mean_fit(shift_m - parameters_.moved_m, shift_m - still_m, place_m) +
                                 mean_fit(shift_m + still_m, shift_m + parameters_.moved_m, place_m));
-    here += weight + chance * parameters_.moved * moved;
-    if (weight > best_weight) {
-      best = landmark;
-      best_weight = weight;
-    }
+    weights.here += weight + chance * parameters_.moved * moved;
+    if (weight <= weights.of_best) continue;
+    weights.best = landmark;
+    weights.of_best = weight;
   }
   const double by_chance_per_m =
-      unmapped_rate.per_m() + parameters_.detection * mapped_per_m(sighting.kind, expected_m);
-  const double elsewhere = odds_elsewhere_ * earlier * (to_m - from_m) * by_chance_per_m;
-  const double sum = here + elsewhere;
-  if (here > 0 && !again) {
-    odds_elsewhere_ = std::clamp(elsewhere / here, std::min(odds_elsewhere_, kConfirmed), kMostOdds);
-    unmapped_rate.learn(place_m, nothing / here);
-  }
-  confirmed_ = odds_elsewhere_ <= (confirmed_ ? kLost : kConfirmed);
-  remember(sighting, place_m);
-  if (best == nullptr || !(best_weight >= parameters_.min_probability * sum)) return std::nullopt;
-  return Fix{sighting.stamp_ns, best->distance_m - sighting.distance_ahead_m,
-             std::hypot(sighting.sigma_m, best->landmark->sigma_m), best_weight / sum, best->landmark->id};
+      unmapped_per_m + parameters_.detection * mapped_per_m(sighting.kind, window.expected_m);
+  weights.elsewhere = odds_elsewhere_ * earlier * length_m * by_chance_per_m;
+  return weights;
 }
 
 void LandmarkMatcher::remember(const Sighting& sighting, double place_m) {

@@ -77,6 +77,22 @@ class LandmarkMatcher {
   /// the scales of the odometer, or at one.
   [[nodiscard]] double history_fits(double shift_m, double now_m) const;
   [[nodiscard]] double history_fits(double shift_m, double scale, double now_m) const;
+  /// Where the object may be on the path.
+  struct Window {
+    double expected_m = 0;
+    double from_m = 0;
+    double to_m = 0;
+  };
+  /// What the sighting may be of, not normalised.
+  struct Weights {
+    const track::PathLandmark* best = nullptr;
+    double of_best = 0;
+    double nothing = 0;    // on the map
+    double here = 0;       // all together while the train is in the window
+    double elsewhere = 0;  // it is not
+  };
+  [[nodiscard]] Weights weigh(const Sighting& sighting, double place_m, const Window& window,
+                              const std::vector<const track::PathLandmark*>& candidates);
   void remember(const Sighting& sighting, double place_m);
   /// Both are probably of one object.
   [[nodiscard]] bool is_of(const Seen& seen, const Sighting& sighting, double place_m) const;

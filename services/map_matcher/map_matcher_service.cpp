@@ -161,7 +161,7 @@ void MapMatcherService::use(const msg::OdometryStep& step) {
   if (!rails_seen && step.mode() == msg::ODOMETRY_TRACK && std::abs(step_m) > kShortestStepM &&
       std::abs(step.speed_mps()) > config_.least_speed_mps) {
     const double at_m = chain_.odometer_m() - 0.5 * step_m;
-    const double sigma_per_m = std::hypot(step.yaw_sigma_rad(), kYawNoise) / std::abs(step_m);
+    const double sigma_per_m = std::hypot(step.yaw_sigma_rad(), kYawNoiseRad) / std::abs(step_m);
     curvature_->add(at_m, step.yaw_rad() / step_m, sigma_per_m, CurvatureOf::body);
     if (exits_) exits_->add(at_m, step.yaw_rad() / step_m, CurvatureOf::body);
   }

@@ -6,14 +6,13 @@
 #include "map_matcher/inputs.hpp"
 #include "messaging/direction.hpp"
 #include "messaging/messaging.hpp"
+#include "messaging/track_view.hpp"
 
 namespace railfix::map_matcher {
 
 using messaging::direction_of;
+using messaging::place_of;
 
-inline track::EdgePosition place_of(const msg::TrainState& state) {
-  return {state.edge(), state.offset_m(), direction_of(state.direction())};
-}
 inline PlacedTrain placed(const msg::TrainState& m) {
   return {m.stamp_ns(), place_of(m), m.speed_mps(), m.distance_m(), m.over_m(), m.under_m()};
 }
@@ -33,8 +32,7 @@ inline StepInput input_of(const msg::OdometryStep& m) {
 }
 
 inline ViewInput input_of(const msg::TrackView& m) {
-  constexpr int kCurvatureVariance = 25;  // in the upper triangle, row by row
-  return {m.curvature_per_m(), m.covariance()[kCurvatureVariance]};
+  return {m.curvature_per_m(), m.covariance()[messaging::kCurvatureVariance]};
 }
 inline GyroInput input_of(const msg::ImuSample& m) {
   return {m.rate_z_rps()};

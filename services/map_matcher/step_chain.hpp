@@ -10,7 +10,7 @@
 namespace railfix::map_matcher {
 
 /// Turning of the car body within one step, rad.
-inline constexpr double kYawNoise = 3e-4;
+inline constexpr double kYawNoiseRad = 3e-4;
 
 /// One OdometryStep.
 struct StepInput {

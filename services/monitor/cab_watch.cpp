@@ -59,10 +59,10 @@ void CurvatureTrail::add(double distance_m, double per_m, double sigma_per_m) {
   if (!points_.empty()) {
     const double moved_m = std::abs(distance_m - points_.back().distance_m);
     if (moved_m < kPointEveryM) return;
-    if (moved_m > kLength_m) points_.clear();  // another run
+    if (moved_m > kLengthM) points_.clear();  // another run
   }
   points_.push_back({distance_m, per_m, sigma_per_m});
-  while (std::abs(distance_m - points_.front().distance_m) > kLength_m) points_.pop_front();
+  while (std::abs(distance_m - points_.front().distance_m) > kLengthM) points_.pop_front();
 }
 
 nlohmann::json CurvatureTrail::seen_from(double distance_m) const {

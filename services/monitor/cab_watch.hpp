@@ -55,7 +55,7 @@ class CurvatureTrail {
   void add(double distance_m, double per_m, double sigma_per_m);
   /// [[ahead_m, per_m, sigma], ...] as seen from `distance_m`: behind the train is negative.
   [[nodiscard]] nlohmann::json seen_from(double distance_m) const;
-  static constexpr double kLength_m = 400;
+  static constexpr double kLengthM = 400;
 
  private:
   struct Point {

@@ -4,16 +4,16 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "core/time.hpp"
+#include "etcs/train_position_report.hpp"
 #include "messaging/operation_words.hpp"
 
 namespace railfix::monitor {
 namespace {
 
 using nlohmann::json;
-
-constexpr uint32_t kLrbgUnknown = 0xFFFFFF;
 
 json known(double value) {
   return std::isfinite(value) ? json(value) : json(nullptr);
@@ -178,13 +178,9 @@ json state_message(const msg::TrainState& state, double age_s, const msg::TrainP
 }
 
 json report_message(const msg::TrainPositionReport& report) {
-  std::string hex;
-  constexpr const char* kDigits = "0123456789ABCDEF";
-  for (size_t i = 0; i < std::min<size_t>(report.message_bytes(), report.message().size()); ++i) {
-    hex += kDigits[report.message()[i] >> 4U];
-    hex += kDigits[report.message()[i] & 0xFU];
-  }
-  const bool placed = report.nid_lrbg() != kLrbgUnknown;
+  const auto bytes =
+      std::span(report.message()).first(std::min<size_t>(report.message_bytes(), report.message().size()));
+  const bool placed = report.nid_lrbg() != etcs::kUnknownBaliseGroup;
   return {{"kind", "report"},
           {"stamp_ns", report.stamp_ns()},
           {"sent_ns", report.sent_ns()},
@@ -199,7 +195,7 @@ json report_message(const msg::TrainPositionReport& report) {
           {"l_doubtover_m", known(report.l_doubtover_m())},
           {"l_doubtunder_m", known(report.l_doubtunder_m())},
           {"v_train_kmh", known(report.v_train_kmh())},
-          {"hex", hex}};
+          {"hex", etcs::to_hex(bytes)}};
 }
 
 json problems_message(const std::vector<Problem>& problems) {

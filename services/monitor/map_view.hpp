@@ -25,7 +25,7 @@ class MapView {
   explicit MapView(const track::Map& map);
 
   /// Longer maps are given in parts only.
-  static constexpr double kWholeMap_m = 300'000;
+  static constexpr double kWholeMapM = 300'000;
   [[nodiscard]] double length_m() const { return length_m_; }
   /// {edges, switches, landmarks}: all of it, or what lies within the radius of a place. Lines have a point at least
   /// every 20 m in curves and every 500 m on straights.

@@ -53,7 +53,7 @@ void add_latency(Families& families, const MetricTopic& topic) {
   uint64_t count = 0;
   for (size_t i = 0; i < topic.latency_counts.size(); ++i) {
     count += topic.latency_counts[i];
-    const double bound = i < kLatencyBounds_s.size() ? kLatencyBounds_s[i] : std::numeric_limits<double>::infinity();
+    const double bound = i < kLatencyBoundsS.size() ? kLatencyBoundsS[i] : std::numeric_limits<double>::infinity();
     metric.histogram.bucket.push_back({count, bound});
   }
   metric.histogram.sample_count = count;

@@ -16,7 +16,7 @@ struct MetricTopic {
   uint64_t dropped = 0;   // waited too long in front of the monitor itself
   uint64_t rejected = 0;  // the middleware had no room for them
   uint64_t deadlines_missed = 0;
-  std::array<uint64_t, kLatencyBounds_s.size() + 1> latency_counts{};
+  std::array<uint64_t, kLatencyBoundsS.size() + 1> latency_counts{};
   double latency_sum_s = 0;
 };
 

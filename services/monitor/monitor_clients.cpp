@@ -157,7 +157,7 @@ Response MonitorService::map_answer(const Request& request) const {
   const auto edge = number_of(request, "edge");
   if (edge && *edge >= 1 && *edge <= static_cast<double>(map_->edges.size())) {
     around = track::EdgePosition{static_cast<uint32_t>(*edge), number_of(request, "offset").value_or(0)};
-  } else if (map_view_->length_m() > MapView::kWholeMap_m) {
+  } else if (map_view_->length_m() > MapView::kWholeMapM) {
     around = place().value_or(track::EdgePosition{1, 0});
   }
   return json_response(map_view_->message(around, number_of(request, "radius").value_or(kMapRadiusM)));

@@ -8,6 +8,7 @@
 #include "cdr/types.hpp"
 #include "core/time.hpp"
 #include "messaging/security.hpp"
+#include "messaging/track_view.hpp"
 #include "monitor/foxglove_messages.hpp"
 
 namespace railfix::monitor {
@@ -194,10 +195,10 @@ void MonitorService::hand_to_foxglove(const Arrived& arrived) {
 
 // Curvature is the sixth of seven states in track_view's covariance (upper triangle, row by row).
 void MonitorService::on_track(const msg::TrackView& view) {
-  constexpr size_t kCurvatureVariance = 25;
   cab_.track(view);
   if (!state_.sample || view.seen_left() == 0 || view.seen_right() == 0) return;
-  trail_.add(state_.sample->distance_m(), view.curvature_per_m(), std::sqrt(view.covariance()[kCurvatureVariance]));
+  trail_.add(state_.sample->distance_m(), view.curvature_per_m(),
+             std::sqrt(view.covariance()[messaging::kCurvatureVariance]));
 }
 
 void MonitorService::on_log(const Arrived& arrived) {

@@ -3,6 +3,7 @@
 
 #include "cdr/decode.hpp"
 #include "core/time.hpp"
+#include "messaging/direction.hpp"
 #include "monitor/cab_view.hpp"
 #include "monitor/foxglove_messages.hpp"
 #include "monitor/monitor_service.hpp"
@@ -20,9 +21,7 @@ constexpr double kCurvatureAheadM = 300;
 
 std::optional<track::EdgePosition> MonitorService::place() const {
   if (!state_.sample || state_.sample->track_known() == 0) return std::nullopt;
-  const auto direction =
-      state_.sample->direction() == msg::DIRECTION_REVERSE ? track::Direction::reverse : track::Direction::forward;
-  return track::EdgePosition{state_.sample->edge(), state_.sample->offset_m(), direction};
+  return messaging::place_of(*state_.sample);
 }
 
 void MonitorService::publish_log() {

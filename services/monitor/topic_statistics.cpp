@@ -13,7 +13,7 @@ constexpr int64_t kLatencyNs = 10 * core::kNsPerSecond;
 constexpr size_t kLatencies = 512;
 constexpr double kUsualShare = 0.1;  // of a new gap in the usual one
 constexpr double kGapFactor = 3;
-constexpr double kShortestGap_s = 0.02;
+constexpr double kShortestGapS = 0.02;
 
 double percentile(std::vector<float>& values, double share) {
   if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
@@ -58,7 +58,7 @@ void TopicStatistics::thin(uint32_t one_in) {
 
 void TopicStatistics::note_gap(int64_t gap_ns) {
   const double gap_s = core::seconds(gap_ns);
-  if (samples_ >= kSamplesToKnow && gap_s > std::max(kGapFactor * usual_gap_s_, kShortestGap_s)) {
+  if (samples_ >= kSamplesToKnow && gap_s > std::max(kGapFactor * usual_gap_s_, kShortestGapS)) {
     ++gaps_;
   } else {
     usual_gap_s_ = samples_ == 1 ? gap_s : usual_gap_s_ + kUsualShare * (gap_s - usual_gap_s_);
@@ -69,8 +69,8 @@ void TopicStatistics::note_gap(int64_t gap_ns) {
 
 void TopicStatistics::note_latency(const SeenSample& sample) {
   const double latency_s = core::seconds(sample.received_ns - sample.source_ns);
-  const auto bound = std::lower_bound(kLatencyBounds_s.begin(), kLatencyBounds_s.end(), latency_s);
-  ++latency_counts_[static_cast<size_t>(bound - kLatencyBounds_s.begin())];
+  const auto bound = std::lower_bound(kLatencyBoundsS.begin(), kLatencyBoundsS.end(), latency_s);
+  ++latency_counts_[static_cast<size_t>(bound - kLatencyBoundsS.begin())];
   latency_sum_s_ += latency_s;
   if (latencies_.size() < kLatencies) latencies_.emplace_back();
   latencies_[next_latency_ % kLatencies] = {sample.received_ns, static_cast<float>(latency_s * 1e3)};

@@ -21,8 +21,8 @@ struct SeenSample {
 };
 
 /// Upper bounds in seconds of the latency histogram; everything longer falls beyond the last.
-inline constexpr std::array<double, 11> kLatencyBounds_s{0.0005, 0.001, 0.002, 0.005, 0.01, 0.02,
-                                                         0.05,   0.1,   0.2,   0.5,   1.0};
+inline constexpr std::array<double, 11> kLatencyBoundsS{0.0005, 0.001, 0.002, 0.005, 0.01, 0.02,
+                                                        0.05,   0.1,   0.2,   0.5,   1.0};
 
 struct TopicNumbers {
   uint64_t samples = 0;
@@ -48,7 +48,7 @@ class TopicStatistics {
   void thin(uint32_t one_in);
   [[nodiscard]] TopicNumbers numbers(int64_t now_ns) const;
   /// How many latencies lay at or below each bound and above the one before; the last one counts those beyond.
-  [[nodiscard]] const std::array<uint64_t, kLatencyBounds_s.size() + 1>& latency_counts() const {
+  [[nodiscard]] const std::array<uint64_t, kLatencyBoundsS.size() + 1>& latency_counts() const {
     return latency_counts_;
   }
   [[nodiscard]] double latency_sum_s() const { return latency_sum_s_; }
@@ -81,7 +81,7 @@ class TopicStatistics {
   std::array<Slice, 240> slices_;   // a minute, four a second
   std::vector<Latency> latencies_;  // a ring
   size_t next_latency_ = 0;
-  std::array<uint64_t, kLatencyBounds_s.size() + 1> latency_counts_{};
+  std::array<uint64_t, kLatencyBoundsS.size() + 1> latency_counts_{};
   double latency_sum_s_ = 0;
   uint32_t one_in_ = 1;
   bool exclusive_;

@@ -6,6 +6,7 @@
 #include "core/time.hpp"
 #include "core/units.hpp"
 #include "messaging/camera.hpp"
+#include "messaging/track_view.hpp"
 
 namespace railfix::odometry {
 namespace {
@@ -15,7 +16,6 @@ constexpr int64_t kLockStepWaitNs = 10 * core::kNsPerSecond;
 constexpr int64_t kPoseLifeNs = core::kNsPerSecond / 2;
 constexpr int64_t kBlindNs = core::kNsPerSecond;
 // Places in TrackView.covariance: upper triangle of 7x7, row by row.
-constexpr size_t kCurvatureVariance = 25;
 constexpr size_t kPoseCovariance[3][3] = {
     {7, 10, 12}, {10, 22, 24}, {12, 24, 27}};  // pitch, height, vertical curvature
 // A curvature known worse than this says less than the last one that was known better.
@@ -118,7 +118,7 @@ void OdometryService::take_pose(const Waiting& waiting, const msg::TrackView* vi
   }
   if (!trust.covariance.allFinite() || !std::isfinite(view->pitch_rad())) return;
   if (!(trust.pitch_sigma_rad() < config_.mouse.mount_pitch_sigma_rad)) return;
-  if (sigma(kCurvatureVariance) < kWorstCurvatureSigma) curvature_per_m_ = view->curvature_per_m();
+  if (sigma(messaging::kCurvatureVariance) < kWorstCurvatureSigma) curvature_per_m_ = view->curvature_per_m();
   vertical_curvature_per_m_ = view->vertical_curvature_per_m();
   last_pose_ = {view->roll_rad(), view->pitch_rad(), view->yaw_rad(), view->lateral_m(), view->height_m()};
   last_pose_ns_ = waiting.stamp_ns;

@@ -9,10 +9,10 @@ namespace railfix::odometry {
 namespace {
 
 constexpr double kShakeMarginRad = 0.02;
-constexpr double kCurveSmoothing_s = 0.3;
-constexpr double kVerticalSmoothing_s = 0.5;
-constexpr double kInertia_s = 0.3;      // after it the speed is not enough to choose among alike shifts
-constexpr double kWrongStamp_s = 0.03;  // searched again over so much way before the ground is given up
+constexpr double kCurveSmoothingS = 0.3;
+constexpr double kVerticalSmoothingS = 0.5;
+constexpr double kInertiaS = 0.3;      // after it the speed is not enough to choose among alike shifts
+constexpr double kWrongStampS = 0.03;  // searched again over so much way before the ground is given up
 constexpr double kSlowMps = 0.5;
 constexpr int kAlignments = 4;
 constexpr size_t kFewestPatches = 5;
@@ -40,8 +40,8 @@ TrainMouse::TrainMouse(const geometry::Intrinsics& camera, const TrainMouseOptio
 void TrainMouse::smooth_curves(const MousePicture& picture) {
   if (!picture.pose_measured) return;
   const double dt_s = curves_known_ ? core::seconds(picture.stamp_ns - last_stamp_ns_) : 1e9;
-  const double fast = 1.0 - std::exp(-dt_s / kCurveSmoothing_s);
-  const double slow = 1.0 - std::exp(-dt_s / kVerticalSmoothing_s);
+  const double fast = 1.0 - std::exp(-dt_s / kCurveSmoothingS);
+  const double slow = 1.0 - std::exp(-dt_s / kVerticalSmoothingS);
   curvature_per_m_ += fast * (picture.curvature_per_m - curvature_per_m_);
   vertical_curvature_per_m_ += slow * (picture.vertical_curvature_per_m - vertical_curvature_per_m_);
   curves_known_ = true;
@@ -312,9 +312,9 @@ MouseStep TrainMouse::process(const MousePicture& picture) {
   double band_m = options_.search_band_m + options_.max_acceleration_mps2 * since_m_s * (since_m_s + 0.1);
   if (!speed_known_) band_m = predicted ? band_m + 0.1 * std::abs(predicted_m) : options_.max_speed_mps * reference_s;
 
-  Rough rough = find_roughly(!predicted || since_m_s > kInertia_s, predicted_m, band_m);
+  Rough rough = find_roughly(!predicted || since_m_s > kInertiaS, predicted_m, band_m);
   if (!rough.found && speed_known_)
-    rough = find_roughly(true, predicted_m, 2.0 * band_m + kWrongStamp_s * std::abs(speed_mps));
+    rough = find_roughly(true, predicted_m, 2.0 * band_m + kWrongStampS * std::abs(speed_mps));
   step.score = rough.score;
   step.reference_stamp_ns = reference_->seen.stamp_ns;
   if (rough.found && align(rough, step)) {

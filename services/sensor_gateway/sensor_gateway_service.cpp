@@ -9,7 +9,6 @@ namespace railfix::sensor_gateway {
 namespace {
 
 constexpr std::chrono::milliseconds kTick{5};  // one IMU sample at 200 Hz
-constexpr int64_t kLastWordsNs = 300'000'000;  // for the last samples to arrive before the program ends
 
 dataset::Sensors read(const SensorGatewayConfig& config) {
   if (config.is_live()) return {};
@@ -117,7 +116,7 @@ void SensorGatewayService::end() {
   if (config_.at_end != "finish") return;
   const int64_t ended_ns = core::monotonic_ns();
   context_.every(kTick, [this, ended_ns] {
-    if (core::monotonic_ns() - ended_ns > kLastWordsNs) context_.finish("all samples played");
+    if (core::monotonic_ns() - ended_ns > service::kLastWordsNs) context_.finish("all samples played");
   });
 }
 

@@ -11,10 +11,9 @@ namespace {
 
 using etcs::kUnknownDistance;
 
-constexpr double kSpeedStepKmh = 5.0;
 constexpr uint32_t kCoarsestScale = 2;
-constexpr uint32_t kFastest = 120;  // 600 km/h
-constexpr uint32_t kStandBy = 6;    // M_MODE
+constexpr uint32_t kFastestSteps = 120;  // 600 km/h
+constexpr uint32_t kStandBy = 6;         // M_MODE
 constexpr uint32_t kSupervisedManoeuvre = 17;
 
 struct Distances {
@@ -111,8 +110,8 @@ double reported_ahead_m(uint32_t d_lrbg, double step_m, double front_m) {
 
 uint32_t v_train(double speed_mps, bool standstill, etcs::Baseline baseline) {
   if (standstill) return baseline == etcs::Baseline::b4 ? etcs::kStandstillSpeed : 0;
-  const double steps = std::round(core::kmh_from_mps(std::abs(speed_mps)) / kSpeedStepKmh);
-  return steps < kFastest ? static_cast<uint32_t>(steps) : kFastest;
+  const double steps = std::round(core::kmh_from_mps(std::abs(speed_mps)) / etcs::kSpeedStepKmh);
+  return steps < kFastestSteps ? static_cast<uint32_t>(steps) : kFastestSteps;
 }
 
 uint32_t t_train(int64_t now_ns) {

@@ -119,7 +119,7 @@ std::optional<Reason> ReportTrigger::onboard_reason(const Moment& moment) const 
   if (now.m_level != then.m_level || now.nid_ntc != then.nid_ntc) return Reason::level;
   if (now.q_integrity == kIntegrityLost && then.q_integrity != kIntegrityLost) return Reason::integrity_lost;
   const bool confirmed = now.q_integrity != then.q_integrity || now.integrity_ns != then.integrity_ns;
-  if (now.q_integrity == kByDriver && confirmed) return Reason::integrity_confirmed;
+  if (now.q_integrity == etcs::kConfirmedByDriver && confirmed) return Reason::integrity_confirmed;
   if (now.reports_wanted != wanted_before) return now.wanted_because;
   return std::nullopt;
 }

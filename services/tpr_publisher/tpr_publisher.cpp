@@ -17,7 +17,10 @@ constexpr int64_t kOnboardSilentNs = 3 * core::kNsPerSecond;
 constexpr int64_t kMostAheadNs = core::kNsPerSecond;
 constexpr double kFastestMps = 150;       // 540 km/h
 constexpr double kLongUndeclaredM = 500;  // a switch every few kilometres, declared soon, is no trouble
-constexpr double kCorrectionM = 20;       // a distance may be corrected by so much, and by what it was not sure of
+// Of a train that comes to rest the estimated speed may have any sign: its direction is that of its way.
+constexpr double kSurelyMovesMps = 1.0;
+constexpr double kMovesM = 0.05;     // what fusion takes for rest
+constexpr double kCorrectionM = 20;  // a distance may be corrected by so much, and by what it was not sure of
 
 /// Empty when the position is young enough.
 std::string age_refusal(int64_t stamp_ns, int64_t now_ns) {
@@ -53,10 +56,6 @@ bool goes_on(const TrainPosition& last, const TrainPosition& now) {
   const double most_m = kFastestMps * core::seconds(since_ns) + kCorrectionM + doubt_m(last) + doubt_m(now);
   return std::abs(now.distance_m - last.distance_m) <= most_m;
 }
-
-// Of a train that comes to rest the estimated speed may have any sign: its direction is that of its way.
-constexpr double kSurelyMovesMps = 1.0;
-constexpr double kMovesM = 0.05;  // what fusion takes for rest
 
 bool is_number(const TrainPosition& position) {
   return !std::isinf(position.speed_mps) && std::isfinite(position.distance_m);

@@ -4,104 +4,19 @@
 #include <cmath>
 
 #include "core/time.hpp"
-#include "messaging/direction.hpp"
-#include "track/same_map.hpp"
+#include "tpr_publisher/tpr_messages.hpp"
 
 namespace railfix::tpr_publisher {
 
 namespace {
 
-using messaging::direction_of;
-
 constexpr std::chrono::milliseconds kTickPeriod{500};
 constexpr int64_t kGapNs = 500'000'000;
 constexpr int64_t kListenNs = 150'000'000;  // others in charge say so forty times a second
 
-static_assert(static_cast<uint8_t>(Reason::cycle_time) == msg::REPORT_CYCLE_TIME);
-static_assert(static_cast<uint8_t>(Reason::cycle_distance) == msg::REPORT_CYCLE_DISTANCE);
-static_assert(static_cast<uint8_t>(Reason::standstill) == msg::REPORT_STANDSTILL);
-static_assert(static_cast<uint8_t>(Reason::moving) == msg::REPORT_MOVING);
-static_assert(static_cast<uint8_t>(Reason::balise_group) == msg::REPORT_BALISE_GROUP);
-static_assert(static_cast<uint8_t>(Reason::location) == msg::REPORT_LOCATION);
-static_assert(static_cast<uint8_t>(Reason::start) == msg::REPORT_START);
-static_assert(static_cast<uint8_t>(Reason::mode) == msg::REPORT_MODE);
-static_assert(static_cast<uint8_t>(Reason::error) == msg::REPORT_ERROR);
-
 std::shared_ptr<const track::Map> load_map(const std::string& file) {
   if (file.empty()) return nullptr;
   return std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(file)));
-}
-
-bool of_another_map(const track::Map* map, const msg::TrainState& state) {
-  const track::EdgePosition foot{state.edge(), state.offset_m(), direction_of(state.direction())};
-  return map != nullptr && state.track_known() != 0 &&
-         !track::lies_there(*map, foot, state.easting_m(), state.northing_m());
-}
-
-TrainPosition position_of(const track::Map* map, const msg::TrainState& state) {
-  TrainPosition position;
-  position.stamp_ns = state.stamp_ns();
-  position.foot = {state.edge(), state.offset_m(), direction_of(state.direction())};
-  position.track_known = state.track_known() != 0 && !of_another_map(map, state);
-  position.track_probability = state.track_probability();
-  position.usable = state.integrity() != msg::INTEGRITY_UNUSABLE;
-  position.distance_m = state.distance_m();
-  position.speed_mps = state.speed_mps();
-  position.over_m = state.over_m();
-  position.under_m = state.under_m();
-  position.standstill = state.standstill() != 0;
-  return position;
-}
-
-core::Result<Onboard> onboard_of(const msg::OnboardStatus& status) {
-  if (status.q_integrity() > 3)
-    return core::Error{"q_integrity is " + std::to_string(status.q_integrity()) + ", not 0 to 3."};
-  if (status.active_cab() > 2)
-    return core::Error{"active_cab is " + std::to_string(status.active_cab()) + ", not 0 to 2."};
-  if (status.reports_wanted() != 0 &&
-      (status.wanted_because() < msg::REPORT_BORDER || status.wanted_because() > msg::REPORT_ERROR))
-    return core::Error{"wanted_because is " + std::to_string(status.wanted_because()) +
-                       ", not border, session or error."};
-  Onboard onboard;
-  onboard.stamp_ns = status.stamp_ns();
-  onboard.integrity_ns = status.integrity_ns();
-  onboard.train_length_m = status.train_length_m();
-  onboard.m_mode = status.m_mode();
-  onboard.m_level = status.m_level();
-  onboard.nid_ntc = status.nid_ntc();
-  onboard.q_integrity = status.q_integrity();
-  onboard.active_cab = static_cast<ActiveCab>(status.active_cab());
-  onboard.reports_wanted = status.reports_wanted();
-  onboard.wanted_because = static_cast<Reason>(status.wanted_because());
-  return onboard;
-}
-
-double metres(uint32_t raw, uint32_t q_scale) {
-  return raw == etcs::kUnknownDistance ? std::nan("") : raw * etcs::scale_m(q_scale);
-}
-
-/// The values of the message, as it says them.
-msg::TrainPositionReport message_of(const Report& report, etcs::Baseline baseline) {
-  const auto& fields = report.fields;
-  msg::TrainPositionReport message;
-  message.stamp_ns(report.stamp_ns);
-  message.sent_ns(report.sent_ns);
-  message.d_lrbg_m(metres(fields.d_lrbg, fields.q_scale));
-  message.l_doubtover_m(metres(fields.l_doubtover, fields.q_scale));
-  message.l_doubtunder_m(metres(fields.l_doubtunder, fields.q_scale));
-  message.v_train_kmh(fields.v_train == etcs::kStandstillSpeed ? 0.0 : fields.v_train * 5.0);
-  message.nid_engine(fields.nid_engine);
-  message.nid_lrbg(fields.nid_lrbg);
-  message.nid_prvlrbg(fields.nid_prvlrbg.value_or(etcs::kUnknownBaliseGroup));
-  message.nid_packet(static_cast<uint8_t>(fields.nid_packet));
-  message.q_dirlrbg(static_cast<uint8_t>(fields.q_dirlrbg));
-  message.q_dlrbg(static_cast<uint8_t>(fields.q_dlrbg));
-  message.q_dirtrain(static_cast<uint8_t>(fields.q_dirtrain));
-  message.baseline(static_cast<uint8_t>(baseline));
-  message.reason(static_cast<uint8_t>(report.reason));
-  message.message_bytes(static_cast<uint32_t>(report.message.size()));
-  std::copy(report.message.begin(), report.message.end(), message.message().begin());
-  return message;
 }
 
 }  // namespace

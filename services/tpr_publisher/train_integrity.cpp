@@ -10,7 +10,7 @@ namespace railfix::tpr_publisher {
 namespace {
 
 constexpr int64_t kHistoryNs = 10 * core::kNsPerSecond;
-constexpr uint32_t kLongest = 32767;  // m, L_TRAININT
+constexpr uint32_t kLongestM = 32767;  // L_TRAININT
 
 }  // namespace
 
@@ -82,7 +82,7 @@ TrainIntegrity::Said TrainIntegrity::said(double distance_m, double reported_ahe
   if (!is_confirmed(q_integrity())) return {q_integrity(), std::nullopt};
   if (!rear_m_) return {};
   const double length_m = std::ceil(std::max(distance_m, *at_distance_m_) - *rear_m_ + reported_ahead_m);
-  if (!(length_m <= kLongest)) return {};
+  if (!(length_m <= kLongestM)) return {};
   // A train shorter than the step of D_LRBG may lie in front of the front end that was reported.
   return {q_integrity(), static_cast<uint32_t>(std::max(length_m, 0.0))};
 }

@@ -6,16 +6,16 @@
 #include <deque>
 #include <optional>
 
+#include "etcs/train_position_report.hpp"
+
 namespace railfix::tpr_publisher {
 
 constexpr uint32_t kNoIntegrityInformation = 0;
-constexpr uint32_t kByDevice = 1;
-constexpr uint32_t kByDriver = 2;
 constexpr uint32_t kIntegrityLost = 3;
 
 /// Q_LENGTH (Q_INTEGRITY) that says of the train that it is complete.
 constexpr bool is_confirmed(uint32_t q_integrity) {
-  return q_integrity == kByDevice || q_integrity == kByDriver;
+  return q_integrity == etcs::kConfirmedByDevice || q_integrity == etcs::kConfirmedByDriver;
 }
 
 class TrainIntegrity {

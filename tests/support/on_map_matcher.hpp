@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "messaging/direction.hpp"
 #include "support/lock_step.hpp"
 #include "track/map.hpp"
 
@@ -49,7 +50,7 @@ class OnMapMatcher : public InLockStep {
     state.stamp_ns(stamp_ns(tick_));
     state.edge(place.edge);
     state.offset_m(place.offset_m);
-    state.direction(place.direction == track::Direction::reverse ? msg::DIRECTION_REVERSE : msg::DIRECTION_FORWARD);
+    state.direction(messaging::direction_of(place.direction));
     state.distance_m(way_m());
     state.speed_mps(ride_.speed_mps);
     state.over_m(promised_m);

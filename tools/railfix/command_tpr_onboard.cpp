@@ -27,8 +27,6 @@ namespace {
 
 constexpr int64_t kPeriodNs = core::kNsPerSecond;
 constexpr int64_t kClockStepNs = core::kNsPerSecond / 2;
-constexpr uint8_t kByDevice = 1;
-constexpr uint8_t kByDriver = 2;
 
 using Names = std::vector<std::string>;
 // By their values in message 136 and in REPORT_* from REPORT_BORDER on.
@@ -79,8 +77,9 @@ class OnboardUnit {
   [[nodiscard]] msg::OnboardStatus status(int64_t ahead_ns) const {
     auto status = status_;
     status.stamp_ns(core::wall_ns() + ahead_ns);
-    if (status.q_integrity() == kByDevice) status.integrity_ns(status.stamp_ns());  // a device confirms all the time
-    if (status.q_integrity() == kByDriver) status.integrity_ns(status_.integrity_ns() + ahead_ns);
+    if (status.q_integrity() == etcs::kConfirmedByDevice)
+      status.integrity_ns(status.stamp_ns());  // a device confirms all the time
+    if (status.q_integrity() == etcs::kConfirmedByDriver) status.integrity_ns(status_.integrity_ns() + ahead_ns);
     return status;
   }
   [[nodiscard]] std::string text() const {
@@ -107,7 +106,7 @@ class OnboardUnit {
       status_.nid_ntc(static_cast<uint8_t>(number_of(word, value, 255)));
     } else if (name == "integrity") {
       status_.q_integrity(index_of(word, kIntegrities, value));
-      if (status_.q_integrity() == kByDriver) status_.integrity_ns(core::wall_ns());
+      if (status_.q_integrity() == etcs::kConfirmedByDriver) status_.integrity_ns(core::wall_ns());
     } else if (name == "cab") {
       status_.active_cab(index_of(word, kCabs, value));
     } else if (name == "length") {

@@ -11,7 +11,6 @@ namespace {
 
 constexpr double kTouchM = 0.05;
 constexpr double kTouchRad = 0.02;
-constexpr double kSharpestTurnRad = core::kPi / 3.0;
 constexpr double kNeighbourM = 50.0;
 constexpr double kLeavingM = 5.0;
 

@@ -5,10 +5,14 @@
 #include <string>
 #include <vector>
 
+#include "core/units.hpp"
 #include "track/import/tracks.hpp"
 #include "track/map.hpp"
 
 namespace railfix::track {
+
+/// No track turns more sharply at a node.
+inline constexpr double kSharpestTurnRad = core::kPi / 3.0;
 
 struct DraftNode {
   std::string name;

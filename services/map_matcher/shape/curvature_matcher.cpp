@@ -81,61 +81,74 @@ bool CurvatureMatcher::any_of_body() const {
   return std::any_of(bins_.begin(), bins_.end(), [](const Bin& bin) { return bin.of == CurvatureOf::body; });
 }
 
-// Posterior over the place with a flat prior in the window; the odometer's scale and the body's lag are summed over.
+size_t CurvatureMatcher::Window::places() const {
+  return static_cast<size_t>((to_m - from_m) / kStepM) + 1;
+}
+
+double CurvatureMatcher::Window::offset_m(size_t place) const {
+  return from_m + kStepM * static_cast<double>(place);
+}
+
 CurvatureMatcher::Peak CurvatureMatcher::search(double odometer_m, const Prior& prior) const {
-  const double from_m = -prior.over_m - parameters_.search_margin_m;
-  const double to_m = prior.under_m + parameters_.search_margin_m;
-  const auto count = static_cast<size_t>((to_m - from_m) / kStepM) + 1;
+  const Window window{-prior.over_m - parameters_.search_margin_m, prior.under_m + parameters_.search_margin_m};
+  return peak_of(likelihoods(misfits(window, odometer_m, prior.path_distance_m), window.places()), window);
+}
+
+std::vector<double> CurvatureMatcher::misfits(const Window& window, double odometer_m, double expected_m) const {
   const auto [nearest, farthest] = std::minmax_element(
       bins_.begin(), bins_.end(), [](const Bin& a, const Bin& b) { return a.odometer_m < b.odometer_m; });
   const double stretch = 1 + 2 * parameters_.scale_sigma;
   const MapCurvature map(
       *path_,
-      prior.path_distance_m + from_m - parameters_.lag_m + stretch * std::min(0.0, nearest->odometer_m - odometer_m),
-      prior.path_distance_m + to_m + stretch * std::max(0.0, farthest->odometer_m - odometer_m));
-  std::vector<double> likelihood(count);
-  double best = INFINITY;
+      expected_m + window.from_m - parameters_.lag_m + stretch * std::min(0.0, nearest->odometer_m - odometer_m),
+      expected_m + window.to_m + stretch * std::max(0.0, farthest->odometer_m - odometer_m));
   const size_t lags = any_of_body() ? static_cast<size_t>(std::ceil(parameters_.lag_m / kLagStepM)) + 1 : 1;
   const double lag_step_m = lags > 1 ? parameters_.lag_m / static_cast<double>(lags - 1) : 0.0;
-  std::vector<std::array<double, kScales.size()>> all(count * lags);
-  for (size_t i = 0; i < all.size(); ++i) {
-    const double place_m = prior.path_distance_m + from_m + kStepM * static_cast<double>(i / lags);
-    const double lag_m = lag_step_m * static_cast<double>(i % lags);
-    for (size_t k = 0; k < kScales.size(); ++k) {
-      all[i][k] = misfit(map, place_m, parameters_.scale_sigma * kScales[k], lag_m, odometer_m);
-      best = std::min(best, all[i][k]);
+  std::vector<double> all;
+  all.reserve(window.places() * lags * kScales.size());
+  for (size_t place = 0; place < window.places(); ++place) {
+    for (size_t lag = 0; lag < lags; ++lag) {
+      for (const double scale : kScales)
+        all.push_back(misfit(map, expected_m + window.offset_m(place), parameters_.scale_sigma * scale,
+                             lag_step_m * static_cast<double>(lag), odometer_m));
     }
   }
-  // A fit worse than the noise says that noise or map are worse than assumed.
+  return all;
+}
+
+// The odometer's scale and the body's lag are summed over. A fit worse than the noise says that noise or map are worse
+// than assumed.
+std::vector<double> CurvatureMatcher::likelihoods(const std::vector<double>& misfits, size_t places) const {
+  const double best = *std::min_element(misfits.begin(), misfits.end());
   const double worse = std::max(1.0, best / static_cast<double>(bins_.size()));
-  double sum = 0;
-  size_t top = 0;
-  for (size_t i = 0; i < count; ++i) {
-    for (size_t j = 0; j < lags * kScales.size(); ++j) {
-      const size_t k = j % kScales.size();
-      const double here = all[i * lags + j / kScales.size()][k];
-      likelihood[i] +=
-          std::exp(-0.5 * (here - best) / (worse * parameters_.correlated_bins) - 0.5 * kScales[k] * kScales[k]);
-    }
-    sum += likelihood[i];
-    if (likelihood[i] > likelihood[top]) top = i;
+  std::vector<double> likelihood(places);
+  for (size_t i = 0; i < misfits.size(); ++i) {
+    const double scale = kScales[i % kScales.size()];
+    likelihood[i / (misfits.size() / places)] +=
+        std::exp(-0.5 * (misfits[i] - best) / (worse * parameters_.correlated_bins) - 0.5 * scale * scale);
   }
-  const double reach_m = 3 * parameters_.max_sigma_m;
-  const auto place = [&](size_t i) { return from_m + kStepM * static_cast<double>(i); };
+  return likelihood;
+}
+
+CurvatureMatcher::Peak CurvatureMatcher::peak_of(const std::vector<double>& likelihood, const Window& window) const {
+  const auto top = static_cast<size_t>(std::max_element(likelihood.begin(), likelihood.end()) - likelihood.begin());
+  const double top_m = window.offset_m(top);
+  double sum = 0;
   double mass = 0;
   double mean = 0;
   double square = 0;
-  for (size_t i = 0; i < count; ++i) {
-    const double off_m = place(i) - place(top);
-    if (std::abs(off_m) > reach_m) continue;
+  for (size_t i = 0; i < likelihood.size(); ++i) {
+    sum += likelihood[i];
+    const double off_m = window.offset_m(i) - top_m;
+    if (std::abs(off_m) > 3 * parameters_.max_sigma_m) continue;
     mass += likelihood[i];
     mean += likelihood[i] * off_m;
     square += likelihood[i] * off_m * off_m;
   }
   mean /= mass;
   const double variance = std::max(square / mass - mean * mean, 0.0) + kStepM * kStepM / 12;
-  const bool at_edge = place(top) - from_m < 2 * kStepM || to_m - place(top) < 2 * kStepM;
-  return {place(top) + mean, std::sqrt(variance), mass / sum, at_edge};
+  const bool at_edge = top_m - window.from_m < 2 * kStepM || window.to_m - top_m < 2 * kStepM;
+  return {top_m + mean, std::sqrt(variance), mass / sum, at_edge};
 }
 
 std::optional<Fix> CurvatureMatcher::match(int64_t stamp_ns, double odometer_m, const Prior& prior) {

@@ -58,9 +58,21 @@ class CurvatureMatcher {
     double probability = 0;
     bool at_edge = false;
   };
-  [[nodiscard]] bool any_of_body() const;
-  [[nodiscard]] Peak search(double odometer_m, const Prior& prior) const;
+  /// Where the train may be, from the prior's place; it is looked for every metre.
+  struct Window {
+    double from_m = 0;
+    double to_m = 0;
+    [[nodiscard]] size_t places() const;
+    [[nodiscard]] double offset_m(size_t place) const;
+  };
   class MapCurvature;
+  [[nodiscard]] bool any_of_body() const;
+  /// The best place by a flat prior in the window.
+  [[nodiscard]] Peak search(double odometer_m, const Prior& prior) const;
+  /// Of every place, lag of the body and scale of the odometer, the scales innermost.
+  [[nodiscard]] std::vector<double> misfits(const Window& window, double odometer_m, double expected_m) const;
+  [[nodiscard]] std::vector<double> likelihoods(const std::vector<double>& misfits, size_t places) const;
+  [[nodiscard]] Peak peak_of(const std::vector<double>& likelihood, const Window& window) const;
   [[nodiscard]] double misfit(const MapCurvature& map, double place_m, double scale, double lag_m,
                               double odometer_m) const;
 

@@ -76,7 +76,7 @@ TEST(CurvatureTrail, KeepsTheLastMetresBehindTheTrain) {
   const auto seen = trail.seen_from(1000);
   ASSERT_FALSE(seen.empty());
   EXPECT_DOUBLE_EQ(seen.back()[0], 0);
-  EXPECT_DOUBLE_EQ(seen.front()[0], -CurvatureTrail::kLength_m);
+  EXPECT_DOUBLE_EQ(seen.front()[0], -CurvatureTrail::kLengthM);
   EXPECT_DOUBLE_EQ(seen.front()[1], 1e-3);
   trail.add(5000, 0, 0);
   EXPECT_EQ(trail.seen_from(5000).size(), 1U) << "another run";

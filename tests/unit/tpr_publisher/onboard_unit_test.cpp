@@ -63,7 +63,7 @@ class TrainWithOnboard : public ::testing::Test {
     if (outcome.report) reported = outcome.report->fields;
   }
   void confirm(double at_s) {
-    onboard.q_integrity = kByDriver;
+    onboard.q_integrity = etcs::kConfirmedByDriver;
     onboard.integrity_ns = kStart + core::to_ns(at_s) + ahead_ns;
     onboard.train_length_m = 200;
   }
@@ -94,7 +94,7 @@ class ConfirmedTrain : public TrainWithOnboard {
 TEST_F(ConfirmedTrain, SaysItsLength) {
   EXPECT_EQ(reported->l_trainint, 208U);
   const auto report = next_report(kNextS, 8700);
-  EXPECT_EQ(report.q_length, kByDriver);
+  EXPECT_EQ(report.q_length, etcs::kConfirmedByDriver);
   EXPECT_EQ(report.l_trainint, 208U);
   EXPECT_EQ(publisher.left_out(now_ns), "");
 }
@@ -150,7 +150,7 @@ TEST_F(RunningTrain, TheClockOfTheOnboardUnitIsNotTakenForThePlaceOfALaterTime) 
   EXPECT_EQ(run_until(55).q_length, 0U);
   EXPECT_THAT(publisher.left_out(now_ns), HasSubstr("confirm it again"));
   confirm(55);
-  EXPECT_EQ(run_until(55.1).q_length, kByDriver);
+  EXPECT_EQ(run_until(55.1).q_length, etcs::kConfirmedByDriver);
   EXPECT_LE(*reported->l_trainint, 215U);
   EXPECT_EQ(publisher.left_out(now_ns), "");
   onboard.q_integrity = kIntegrityLost;

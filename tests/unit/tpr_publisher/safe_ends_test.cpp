@@ -71,12 +71,12 @@ Ends told(const etcs::TrainPositionReport& report) {
 TEST_F(SafeEnds, WhatTheDriverConfirmsIsInTheReportThatItForces) {
   run_to(150);
   run_to(150);
-  hear(kByDriver);
+  hear(etcs::kConfirmedByDriver);
   EXPECT_FALSE(run_to(150).has_value());  // of a time before that
   const auto report = run_to(150);
   ASSERT_TRUE(report.has_value());
   EXPECT_EQ(report->reason, Reason::integrity_confirmed);
-  EXPECT_EQ(report->fields.q_length, kByDriver);
+  EXPECT_EQ(report->fields.q_length, etcs::kConfirmedByDriver);
   EXPECT_EQ(report->fields.l_trainint, 208U);  // Q_LOCACC 5 m, 3 m of doubt
 }
 
@@ -85,13 +85,13 @@ TEST_F(SafeEnds, AConfirmationStandsUntilTheNextOneHasAPlace) {
   settings.parameters.d_cycloc = 1;
   begin_with(settings);
   run_to(150);
-  hear(kByDevice);
+  hear(etcs::kConfirmedByDevice);
   run_to(150);
   run_to(150);
-  hear(kByDevice);
+  hear(etcs::kConfirmedByDevice);
   const auto report = run_to(160);
   ASSERT_TRUE(report.has_value());
-  EXPECT_EQ(report->fields.q_length, kByDevice);
+  EXPECT_EQ(report->fields.q_length, etcs::kConfirmedByDevice);
   EXPECT_EQ(report->fields.l_trainint, 218U);
   hear(kIntegrityLost);
   EXPECT_EQ(run_to(160)->fields.q_length, kIntegrityLost);  // at once
@@ -105,7 +105,7 @@ TEST_F(SafeEnds, TheRoundingOfDLrbgDoesNotMoveTheRearEndForward) {
     onboard_ = {};
     const double offset_m = kGroupM + 53.0;
     run_to(offset_m);
-    hear(kByDriver);
+    hear(etcs::kConfirmedByDriver);
     std::optional<Report> report;
     for (int i = 0; i < 3 && !report; ++i) report = run_to(offset_m);
     ASSERT_TRUE(report.has_value());

@@ -31,9 +31,9 @@ TEST(TrainIntegrity, SaysNothingBeforeItIsTold) {
 
 TEST(TrainIntegrity, CountsFromTheRearEndAtTheTimeOfTheConfirmation) {
   auto integrity = running_until(5);
-  integrity.hear(kByDevice, at(2), 200);  // at 20 m
+  integrity.hear(etcs::kConfirmedByDevice, at(2), 200);  // at 20 m
   const auto said = integrity.said(50);
-  EXPECT_EQ(said.q_length, kByDevice);
+  EXPECT_EQ(said.q_length, etcs::kConfirmedByDevice);
   EXPECT_EQ(said.l_trainint, 235U);  // 50 - (20 - 5 - 200)
   integrity.follow({at(6), 60.2, 5});
   EXPECT_EQ(integrity.said(60.2).l_trainint, 246U);  // rounded up
@@ -41,13 +41,13 @@ TEST(TrainIntegrity, CountsFromTheRearEndAtTheTimeOfTheConfirmation) {
 
 TEST(TrainIntegrity, TakesThePlaceBeforeATimeBetweenTwo) {
   auto integrity = running_until(5);
-  integrity.hear(kByDriver, at(2.07), 200);
+  integrity.hear(etcs::kConfirmedByDriver, at(2.07), 200);
   EXPECT_EQ(integrity.said(50).l_trainint, 235U);
 }
 
 TEST(TrainIntegrity, WaitsForThePlaceOfATimeThatIsStillToCome) {
   auto integrity = running_until(5);
-  integrity.hear(kByDriver, at(5.05), 200);
+  integrity.hear(etcs::kConfirmedByDriver, at(5.05), 200);
   expect_nothing(integrity.said(50));
   integrity.follow({at(5.1), 51, 5});
   EXPECT_EQ(integrity.said(51).l_trainint, 206U);
@@ -55,20 +55,20 @@ TEST(TrainIntegrity, WaitsForThePlaceOfATimeThatIsStillToCome) {
 
 TEST(TrainIntegrity, SaysNothingWhereItCannotKnow) {
   auto integrity = running_until(20);
-  integrity.hear(kByDevice, at(5), 200);  // longer ago than what is kept
+  integrity.hear(etcs::kConfirmedByDevice, at(5), 200);  // longer ago than what is kept
   expect_nothing(integrity.said(200));
-  integrity.hear(kByDevice, at(19), 0);  // no length
+  integrity.hear(etcs::kConfirmedByDevice, at(19), 0);  // no length
   expect_nothing(integrity.said(200));
-  integrity.hear(kByDevice, at(19), 40000);  // longer than the field can say
+  integrity.hear(etcs::kConfirmedByDevice, at(19), 40000);  // longer than the field can say
   expect_nothing(integrity.said(200));
   integrity.follow({at(21), 210, INFINITY});
-  integrity.hear(kByDevice, at(21), 200);  // no bound behind
+  integrity.hear(etcs::kConfirmedByDevice, at(21), 200);  // no bound behind
   expect_nothing(integrity.said(210));
 }
 
 TEST(TrainIntegrity, LossIsSaidWithoutALength) {
   auto integrity = running_until(5);
-  integrity.hear(kByDevice, at(2), 200);
+  integrity.hear(etcs::kConfirmedByDevice, at(2), 200);
   integrity.hear(3, at(2), 200);
   EXPECT_EQ(integrity.said(50).q_length, 3U);
   EXPECT_FALSE(integrity.said(50).l_trainint.has_value());
@@ -76,15 +76,15 @@ TEST(TrainIntegrity, LossIsSaidWithoutALength) {
 
 TEST(TrainIntegrity, AWayThatIsNotKnownForgetsTheConfirmation) {
   auto integrity = running_until(5);
-  integrity.hear(kByDriver, at(5), 200);
+  integrity.hear(etcs::kConfirmedByDriver, at(5), 200);
   ASSERT_EQ(integrity.said(50).l_trainint, 205U);
   integrity.lose_way();
   for (int i = 0; i < 10; ++i) integrity.follow({at(45 + i * 0.1), i * 1.0, 5});
   expect_nothing(integrity.said(9));  // not 205 m, which would be the whole train 45 m behind where it was complete
   EXPECT_TRUE(integrity.forgotten());
-  integrity.hear(kByDriver, at(5), 200);  // said every second: not a new confirmation
+  integrity.hear(etcs::kConfirmedByDriver, at(5), 200);  // said every second: not a new confirmation
   expect_nothing(integrity.said(9));
-  integrity.hear(kByDriver, at(45.9), 200);
+  integrity.hear(etcs::kConfirmedByDriver, at(45.9), 200);
   EXPECT_EQ(integrity.said(9).l_trainint, 205U);
   EXPECT_FALSE(integrity.forgotten());
 }
@@ -93,17 +93,17 @@ TEST(TrainIntegrity, AConfirmationFromBeforeTheWayWasLostHasNoPlace) {
   auto integrity = running_until(5);
   integrity.lose_way();
   integrity.follow({at(4), 0, 5});  // the clock was set back, too
-  integrity.hear(kByDevice, at(3.9), 200);
+  integrity.hear(etcs::kConfirmedByDevice, at(3.9), 200);
   expect_nothing(integrity.said(0));
   EXPECT_FALSE(integrity.forgotten());
 }
 
 TEST(TrainIntegrity, ALossStandsUntilALaterConfirmationHasAPlace) {
   auto integrity = running_until(5);
-  integrity.hear(kByDriver, at(5), 200);
+  integrity.hear(etcs::kConfirmedByDriver, at(5), 200);
   integrity.hear(kIntegrityLost, at(5.02), 200);
   EXPECT_EQ(integrity.said(50).q_length, kIntegrityLost);
-  integrity.hear(kByDriver, at(5.05), 200);
+  integrity.hear(etcs::kConfirmedByDriver, at(5.05), 200);
   EXPECT_EQ(integrity.said(50).q_length, kIntegrityLost);
   integrity.follow({at(5.1), 51, 5});
   EXPECT_EQ(integrity.said(51).l_trainint, 206U);
@@ -112,7 +112,7 @@ TEST(TrainIntegrity, ALossStandsUntilALaterConfirmationHasAPlace) {
 TEST(TrainIntegrity, ConfirmationsThatComeFasterThanPlacesDoNotKeepEachOtherWaiting) {
   auto integrity = running_until(5);
   for (int i = 0; i < 20; ++i) {
-    integrity.hear(kByDevice, at(5.15 + i * 0.1), 200);
+    integrity.hear(etcs::kConfirmedByDevice, at(5.15 + i * 0.1), 200);
     integrity.follow({at(5.05 + i * 0.1), 50.5 + i, 5});  // later than what is heard next
   }
   EXPECT_LE(integrity.said(69.5).l_trainint, 208U);
@@ -120,22 +120,22 @@ TEST(TrainIntegrity, ConfirmationsThatComeFasterThanPlacesDoNotKeepEachOtherWait
 
 TEST(TrainIntegrity, BackingAndRoundingTogetherMakeNoShorterTrain) {
   auto integrity = running_until(5);
-  integrity.hear(kByDevice, at(5), 200);  // at 50 m, rear end at -155 m
+  integrity.hear(etcs::kConfirmedByDevice, at(5), 200);  // at 50 m, rear end at -155 m
   EXPECT_EQ(integrity.said(25, 5).l_trainint, 210U);
 }
 
 TEST(TrainIntegrity, ATrainShorterThanTheStepOfTheReportHasALength) {
   TrainIntegrity integrity;
   integrity.follow({at(1), 10, 0});
-  integrity.hear(kByDevice, at(1), 2);
+  integrity.hear(etcs::kConfirmedByDevice, at(1), 2);
   const auto said = integrity.said(10, -5);  // Q_SCALE 10 m: the front end that is reported lies 5 m behind
-  EXPECT_EQ(said.q_length, kByDevice);
+  EXPECT_EQ(said.q_length, etcs::kConfirmedByDevice);
   EXPECT_EQ(said.l_trainint, 0U);
 }
 
 TEST(TrainIntegrity, BackingMakesNoShorterTrain) {
   auto integrity = running_until(5);
-  integrity.hear(kByDevice, at(5), 200);
+  integrity.hear(etcs::kConfirmedByDevice, at(5), 200);
   EXPECT_EQ(integrity.said(30).l_trainint, 205U);
 }
 

@@ -10,8 +10,6 @@ namespace railfix::compare {
 
 namespace {
 
-constexpr double kSpeedStepKmh = 5.0;
-
 double metres(uint32_t raw, uint32_t q_scale) {
   return raw == etcs::kUnknownDistance ? HUGE_VAL : raw * etcs::scale_m(q_scale);
 }
@@ -20,7 +18,7 @@ double metres(uint32_t raw, uint32_t q_scale) {
 double speed_mps(const etcs::TrainPositionReport& fields) {
   if (fields.v_train == etcs::kStandstillSpeed || fields.v_train == 0) return 0;
   if (fields.q_dirtrain == etcs::kUnknownSide) return std::numeric_limits<double>::quiet_NaN();
-  const double speed = core::mps_from_kmh(fields.v_train * kSpeedStepKmh);
+  const double speed = core::mps_from_kmh(fields.v_train * etcs::kSpeedStepKmh);
   return fields.q_dirtrain == etcs::kNominal ? speed : -speed;
 }
 

@@ -201,7 +201,7 @@ ViewResult judge_views(const Truth& truth, const std::vector<ViewRow>& rows) {
       errors[i].push_back(row.value[i] - should[i]);
       sigmas[i].push_back(row.sigma[i]);
     }
-    result.curvature.push_back({row.stamp_ns, real->distance_m, real->curvature_per_m, row.value[5]});
+    result.curvature.push_back({row.stamp_ns, real->distance_m, row.value[5]});
   }
   result.seen_percent = percent(seen, rows.size());
   if (result.visible > 0) result.seen_of_visible_percent = percent(seen_of_visible, result.visible);

@@ -33,7 +33,6 @@ struct FieldError {
 struct CurvatureSample {
   int64_t stamp_ns = 0;
   double true_distance_m = 0;
-  double true_per_m = 0;
   double measured_per_m = 0;
 };
 struct ViewResult {

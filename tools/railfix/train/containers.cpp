@@ -25,11 +25,6 @@ std::string user() {
   return std::to_string(kUserId) + ":" + std::to_string(kUserId);
 }
 
-std::string dashed(std::string name) {
-  std::replace(name.begin(), name.end(), '_', '-');
-  return name;
-}
-
 std::string last_line(const std::string& text) {
   return text.substr(text.rfind('\n') + 1);
 }
@@ -60,6 +55,11 @@ void check_topics(const std::string& engine, const std::vector<std::string>& ima
 }
 
 }  // namespace
+
+std::string dashed(std::string name) {
+  std::replace(name.begin(), name.end(), '_', '-');
+  return name;
+}
 
 std::string image_of(const HostedService& service) {
   return "railfix/" + dashed(service.name) + ":" + service.release;

@@ -35,6 +35,8 @@ struct Container {
   std::vector<std::string> groups;
 };
 
+/// `track-detector` of `track_detector`: of programs, images and packages.
+std::string dashed(std::string name);
 /// `railfix/fusion:1.2.0`.
 std::string image_of(const HostedService& service);
 

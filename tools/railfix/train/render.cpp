@@ -20,11 +20,6 @@ constexpr int kPrimaryStrength = 20;
 constexpr int kStandbyStrength = 10;
 constexpr const char* kMade = "Made by railfix train from train.yaml; edit that.";
 
-std::string dashed(std::string name) {
-  std::replace(name.begin(), name.end(), '_', '-');
-  return name;
-}
-
 void fill(YAML::Node section, const char* key, const std::string& value) {
   if (!value.empty() && !section[key]) section[key] = value;
 }

@@ -17,7 +17,6 @@ namespace {
 
 constexpr size_t kPointsForSigma = 12;
 constexpr double kLeastUsualSigmaM = 0.05;
-constexpr double kSharpestTurnRad = core::kPi / 3.0;
 constexpr double kTangentBranchRad = core::kPi / 6.0;
 
 struct Segment {
