@@ -82,8 +82,8 @@ bool Estimator::used_within(Source source, double time_s) const {
   return w.used_ns != 0 && !w.isolated && core::seconds(filter_.stamp_ns() - w.used_ns) < time_s;
 }
 
-bool Estimator::knows_motion() const {
-  const bool lately = used_within(Source::camera, kBridgeS) || used_within(Source::wheel, kBridgeS);
+bool Estimator::knows_motion(double bridge_s) const {
+  const bool lately = used_within(Source::camera, bridge_s) || used_within(Source::wheel, bridge_s);
   return used_within(Source::camera, kLatelyS) || used_within(Source::wheel, kLatelyS) ||
          (lately && used_within(Source::imu, kLatelyS));
 }

@@ -78,8 +78,9 @@ class Estimator {
   [[nodiscard]] double centre_m() const { return path_ ? filter_.path_distance_m() : distance_m(); }
   [[nodiscard]] double sigma_m() const { return path_ ? filter_.path_sigma_m() : filter_.sigma(StateIndex::distance); }
   [[nodiscard]] double distance_m() const { return filter_.value(StateIndex::distance); }
+  static constexpr double kBridgeS = 10.0;  // as long as the IMU alone is good for place and speed
   /// Camera or wheel measured lately and was believed, or the IMU bridges a short while without them.
-  [[nodiscard]] bool knows_motion() const;
+  [[nodiscard]] bool knows_motion(double bridge_s = kBridgeS) const;
   /// No odometer has measured in the last moments: the IMU alone is left, at best.
   [[nodiscard]] bool in_the_dark() const;
   /// No motion sensor is isolated but those of `excepted` (bits 1 << Source).
@@ -192,7 +193,6 @@ class Estimator {
   static constexpr int kGnssProof = 30;
   static constexpr int kRefusalsToIsolate = 3;  // in a row
   static constexpr double kLatelyS = 1.0;
-  static constexpr double kBridgeS = 10.0;  // as long as the IMU alone is good for place and speed
   enum class FixVerdict : uint8_t { none, used, corrected, refused };
   struct RefusedFix {
     double residual_m = 0;

@@ -78,7 +78,7 @@ void Estimator::use(const OdometryInput& step) {
       if (alone) doubt_m_ += std::abs(offer.residual);
     } else if (const auto offer = offer_motion(Source::camera, step.stamp_ns, offered_to); offer.used) {
       const bool nobody_before = camera.used_ns == 0 && watch(Source::wheel).used_ns == 0;
-      unchecked_m_ = nobody_before ? std::min(std::abs(step.step_m), kSleeperM) : 0;
+      unchecked_m_ = nobody_before ? kSleeperM : 0;
       camera.accept(step.stamp_ns);
       if (step.reference_stamp_ns <= gap_begin_ns_ && filter_.has_clone(step.reference_stamp_ns)) time_doubt_m_ = 0;
       compare_with_wheel(step, sigma_m);
@@ -357,7 +357,9 @@ void Estimator::use_acceleration(double accel_mps2, int64_t stamp_ns) {
 void Estimator::feel(double accel_mps2, double sigma_mps2, int64_t before_ns) {
   const double dt_s = core::seconds(filter_.stamp_ns() - before_ns);
   const bool blind = watch(Source::camera).seen_ns != 0 && !used_within(Source::camera, kBlindS);
-  if (!blind || !measures(Source::wheel) || dt_s > kLatelyS) {
+  // What was felt goes on when the wheel begins to turn and is found out.
+  const bool told = measures(Source::wheel) || (watch(Source::wheel).isolated && felt_.faster_mps() != 0);
+  if (!blind || !told || dt_s > kLatelyS) {
     felt_ = {};
     return;
   }

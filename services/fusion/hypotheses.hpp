@@ -107,6 +107,7 @@ class Hypotheses {
   void confirm_rivals(bool hardly);
   void exclude_faulty();
   void adopt(Rival& rival);
+  void take_along(Doubter& doubter, const Estimator& next) const;
   void begin_rival(Source source);
   void ask_rivals();
   void ask(Rival& rival);

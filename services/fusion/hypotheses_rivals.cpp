@@ -12,6 +12,7 @@ namespace {
 constexpr double kRivalGoneS = 1.0;
 constexpr double kProofS = 2.0;
 constexpr double kSameSpeedsS = 3.0;
+constexpr double kUnwatchedWheelS = 60.0;
 
 }  // namespace
 
@@ -39,9 +40,22 @@ void Hypotheses::exclude_faulty() {
 void Hypotheses::adopt(Rival& rival) {
   Estimator next = *rival.estimator;
   next.exclude(rival.without, main_);
+  for (auto& doubter : doubters_) {
+    if (!doubter.estimator.is_consistent()) take_along(doubter, next);
+  }
   next.doubt_place(rival.carried.behind_m + rival.unseen.behind_m, rival.carried.ahead_m + rival.unseen.ahead_m);
   main_ = std::move(next);
   for (auto& other : rivals_) other.forget_excess();
+}
+
+// A doubter that went by the sensor which is wrong goes by the others from now on, and what it held stays.
+void Hypotheses::take_along(Doubter& doubter, const Estimator& next) const {
+  Estimator own = doubter.estimator;
+  own.predict_to(main_.filter().stamp_ns());
+  const Interval mine = main_.interval();
+  const Interval its = own.interval();
+  doubter.estimator = next;
+  doubter.estimator.doubt_place(std::max(0.0, mine.behind_m - its.behind_m), std::max(0.0, its.ahead_m - mine.ahead_m));
 }
 
 void Hypotheses::confirm_rivals(bool hardly) {
@@ -96,6 +110,10 @@ void Hypotheses::ask(Rival& rival) {
   rival.contradicted = false;
   rival.asked = true;
   rival.asked_ns = now_ns;
+  if (is_in_dispute(rival)) {  // its end will say nothing about the way before it
+    rival.carried.behind_m += std::exchange(rival.unseen.behind_m, 0.0);
+    rival.carried.ahead_m += std::exchange(rival.unseen.ahead_m, 0.0);
+  }
   other.predict_to(now_ns);
   const Interval mine = main_.interval();
   Interval its = other.interval();
@@ -117,7 +135,9 @@ bool Hypotheses::can_say(const Rival& rival) const {
   // Nobody watches an IMU in the dark: what the train may do is known without it, too.
   if (rival.without == Source::imu && rival.estimator && main_.in_the_dark())
     return rival.estimator->is_consistent(main_.isolated());
-  return rival.estimator && main_.watch(rival.without).used_ns != 0 && rival.estimator->knows_motion() &&
+  // What the IMU alone leaves open beside a wheel is more and more, but all that a wheel may hide which nobody watches.
+  const double bridge_s = rival.without == Source::wheel ? kUnwatchedWheelS : Estimator::kBridgeS;
+  return rival.estimator && main_.watch(rival.without).used_ns != 0 && rival.estimator->knows_motion(bridge_s) &&
          !contradicts_itself(rival);
 }
 
@@ -178,9 +198,8 @@ bool Hypotheses::is_in_dispute(const Rival& rival) const {
 Hypotheses::Excess Hypotheses::most_excess() const {
   Excess most;
   for (const auto& rival : rivals_) {
-    const Excess unseen = is_in_dispute(rival) ? rival.unseen : Excess{};
-    most.behind_m = std::max(most.behind_m, rival.excess.behind_m + unseen.behind_m);
-    most.ahead_m = std::max(most.ahead_m, rival.excess.ahead_m + unseen.ahead_m);
+    most.behind_m = std::max(most.behind_m, rival.excess.behind_m);
+    most.ahead_m = std::max(most.ahead_m, rival.excess.ahead_m);
   }
   return most;
 }

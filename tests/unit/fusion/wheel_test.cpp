@@ -220,6 +220,42 @@ TEST(Wheel, ThatIsStuckWhileTheCameraIsBlindHidesNoStart) {
   train.run(30);
 }
 
+// It turns again before the camera is back, and everything agrees.
+TEST(Wheel, ThatWasLockedBetweenTwoHaltsInTheDarkIsNotForgotten) {
+  Train train;
+  train.run(25, 0.8);
+  for (int i = 0; i < 5; ++i) {
+    train.run(5, -0.8);
+    train.pass_landmark();
+  }
+  train.run(5);
+  train.blind = true;
+  train.slip = -1;
+  train.run(12);
+  train.run(12, 0.06);
+  train.run(8);
+  train.run(12, -0.06);
+  train.slip = 0;
+  train.run(2);
+  train.blind = false;
+  train.run(20);
+}
+
+// So gently that it passes for a grade.
+TEST(Wheel, ThatSlipsForAWhileInTheDarkIsNotForgotten) {
+  Train train;
+  train.run(20, 0.8);
+  train.pass_landmark();
+  train.blind = true;
+  train.run(3);
+  for (int i = 0; i < 40; ++i, train.slip += 0.005) train.run(0.3);
+  train.run(10);
+  for (int i = 0; i < 40; ++i, train.slip -= 0.005) train.run(0.3);
+  train.run(2);
+  train.blind = false;
+  train.run(20);
+}
+
 // The same with a wheel that is well: no reason to promise less than with a camera.
 TEST(Wheel, ThatTurnsWhileTheCameraIsBlindIsBelieved) {
   double length_m[2]{};
