@@ -6,10 +6,8 @@
 #include <functional>
 #include <limits>
 #include <map>
-#include <span>
 
 #include "core/csv.hpp"
-#include "etcs/train_position_report.hpp"
 #include "mcap/reader.hpp"
 #include "messaging/topics.hpp"
 
@@ -47,8 +45,13 @@ std::string cell(std::string text) {
 }
 
 std::string hex(const msg::TrainPositionReport& report) {
-  return etcs::to_hex(
-      std::span(report.message()).first(std::min<size_t>(report.message_bytes(), report.message().size())));
+  static constexpr char kDigits[] = "0123456789abcdef";
+  std::string text;
+  for (size_t i = 0; i < std::min<size_t>(report.message_bytes(), report.message().size()); ++i) {
+    text += kDigits[report.message()[i] >> 4U];
+    text += kDigits[report.message()[i] & 15U];
+  }
+  return text;
 }
 
 class Tables {
