@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
 
 #include "map_matcher/inputs.hpp"
 #include "map_matcher/track_choice/picture_fits.hpp"
@@ -13,17 +12,11 @@ namespace railfix::map_matcher {
 namespace {
 
 constexpr double kLostM = 60.0;  // afterwards the window is right and the routes are not
-constexpr double kLeastProbability = 1e-7;
 constexpr double kTurnRoundM = 0.3;
-constexpr double kMapSigmas = 3;      // points are no further from where the map has them
-constexpr double kWheelsBehindM = 5;  // the foot: points may be thrown in front of the first wheels
-constexpr double kSameM = 5.0;        // two routes whose distances differ by less are one
 constexpr double kFarFromWindowM = 200;
 constexpr double kMostWindowM = 300;
-constexpr size_t kMostHypotheses = 400;
-constexpr double kNoLagShare = 0.3;   // of the cars
-constexpr double kWatched = 0.9;      // a track less probable lies behind a switch that nobody watched ...
-constexpr double kUnwatchedM = 3000;  // ... no further back
+constexpr double kNoLagShare = 0.3;  // of the cars
+constexpr double kWatched = 0.9;     // a track less probable lies behind a switch that nobody watched
 
 }  // namespace
 
@@ -42,38 +35,6 @@ void TrackChooser::start(const TrackWindow& window) {
   for (auto& hypothesis : hypotheses_) extend_behind(hypothesis.route);
   fit_cells();
   extend();
-}
-
-// Who begins behind a switch that nobody watched does not know more than fusion: the train may be on any of the ways
-// from there, as far beyond the switch.
-void TrackChooser::open_ways_behind() {
-  track::Route back = hypotheses_.front().route;
-  std::vector<track::Route> others;
-  const auto behind_m = [&] { return forwards_ ? -back.begin_m() : back.end_m(); };
-  for (double even = 1; even > window_.probability + 0.01 && behind_m() < kUnwatchedM;) {
-    const track::Run here = forwards_ ? back.legs().front().run : back.legs().back().run;
-    const auto before = forwards_ ? ways_->before(here) : ways_->after(here);
-    if (before.empty()) break;
-    const track::Run& from = before.front();
-    const auto ways = forwards_ ? ways_->after(from) : ways_->before(from);
-    even /= static_cast<double>(ways.size());
-    for (const auto& way : ways) {
-      if (way == here) continue;
-      const double switch_m = from.forward == forwards_ ? from.length_m() : 0.0;  // on the edge before it
-      auto& other = others.emplace_back(from, switch_m, forwards_ ? back.begin_m() : back.end_m());
-      forwards_ ? other.push_ahead(way) : other.push_behind(way);
-    }
-    forwards_ ? back.push_behind(from) : back.push_ahead(from);
-  }
-  if (others.empty()) {
-    told_ = window_.probability;
-    return;
-  }
-  hypotheses_.front().log_prior = std::log(window_.probability);
-  for (auto& other : others) {
-    const double share = (1 - window_.probability) / static_cast<double>(others.size());
-    hypotheses_.push_back({std::move(other), std::log(share), {0, std::log(parameters_.astray)}, {}});
-  }
 }
 
 void TrackChooser::follow(const TrackWindow& window) {
@@ -186,135 +147,6 @@ void TrackChooser::fit_cells() {
     }
     cells.resize(count, cells.back());
   }
-}
-
-// What lies ahead may be set otherwise once the train has left it: only what its wheels certainly stand on is kept.
-void TrackChooser::turn_round() {
-  const double map_m = kMapSigmas * parameters_.map_sigma_m;
-  const double wheels_m = place_m_ - window_.over_m - map_m - kWheelsBehindM;
-  const double foot_m = place_m_ + window_.under_m + map_m;
-  forwards_ = !forwards_;
-  moved_back_m_ = 0;
-  cells_m_ += pending_.way_m;
-  pending_ = {};
-  for (auto& hypothesis : hypotheses_) {
-    auto& route = hypothesis.route;
-    if (forwards_) {
-      while (route.legs().size() > 1 && route.legs().back().begin_m > wheels_m) route.drop_ahead();
-    } else {
-      while (route.legs().size() > 1 && route.legs().front().end_m() < foot_m) route.drop_behind();
-    }
-  }
-  merge();
-  extend();
-  fit_cells();
-}
-
-// In the direction of travel every way is a hypothesis of its own.
-void TrackChooser::extend() {
-  for (size_t i = 0; i < hypotheses_.size();) {
-    auto& route = hypotheses_[i].route;
-    const bool enough =
-        forwards_ ? route.end_m() > last_m() + parameters_.reach_m : route.begin_m() < first_m() - parameters_.reach_m;
-    const auto ways = enough      ? std::vector<track::Run>()
-                      : forwards_ ? ways_->after(route.legs().back().run)
-                                  : ways_->before(route.legs().front().run);
-    if (ways.empty()) {
-      ++i;
-      continue;
-    }
-    hypotheses_[i].log_prior -= std::log(static_cast<double>(ways.size()));
-    const Hypothesis stem = hypotheses_[i];
-    for (size_t k = 0; k < ways.size(); ++k) {
-      if (k > 0) hypotheses_.push_back(stem);
-      auto& longer = k == 0 ? hypotheses_[i].route : hypotheses_.back().route;
-      forwards_ ? longer.push_ahead(ways[k]) : longer.push_behind(ways[k]);
-    }
-    if (hypotheses_.size() > kMostHypotheses) prune();
-  }
-  for (auto& hypothesis : hypotheses_) extend_behind(hypothesis.route);
-}
-
-// Where the train came from matters only for the cells that lie there: the straight way will do.
-void TrackChooser::extend_behind(track::Route& route) const {
-  while (forwards_ && route.begin_m() > first_m()) {
-    const auto ways = ways_->before(route.legs().front().run);
-    if (ways.empty()) return;
-    route.push_behind(ways.front());
-  }
-  while (!forwards_ && route.end_m() < last_m()) {
-    const auto& ways = ways_->after(route.legs().back().run);
-    if (ways.empty()) return;
-    route.push_ahead(ways.front());
-  }
-}
-
-void TrackChooser::trim() {
-  for (auto& hypothesis : hypotheses_) {
-    auto& route = hypothesis.route;
-    if (forwards_) {
-      while (route.legs().size() > 1 && route.legs().front().end_m() < first_m() - kCellM) route.drop_behind();
-    } else {
-      while (route.legs().size() > 1 && route.legs().back().begin_m > last_m() + kCellM) route.drop_ahead();
-    }
-  }
-}
-
-// Both may be true: cell by cell, since the one with less evidence may know better where the train stands.
-void TrackChooser::join(Hypothesis& into, const Hypothesis& other) {
-  const auto log_before_turning = [](const Hypothesis& h) {
-    return h.log_prior + log_sum(h.pictures.own, h.pictures.astray);
-  };
-  const double log_into = log_before_turning(into);
-  const double log_other = log_before_turning(other);
-  for (size_t i = 0; i < into.cells.size(); ++i) join_cells(into.cells[i], log_into, other.cells[i], log_other);
-  const double log_prior = log_sum(into.log_prior, other.log_prior);
-  const auto joined = [&](double Pictures::*state) {
-    return log_sum(into.log_prior + into.pictures.*state, other.log_prior + other.pictures.*state) - log_prior;
-  };
-  into.pictures = {joined(&Pictures::own), joined(&Pictures::astray)};
-  into.log_prior = log_prior;
-}
-
-void TrackChooser::merge() {
-  const auto same = [](const track::Route& a, const track::Route& b) {
-    return std::equal(
-        a.legs().begin(), a.legs().end(), b.legs().begin(), b.legs().end(),
-        [](const auto& x, const auto& y) { return x.run == y.run && std::abs(x.begin_m - y.begin_m) < kSameM; });
-  };
-  for (size_t i = 0; i < hypotheses_.size(); ++i) {
-    for (size_t k = i + 1; k < hypotheses_.size();) {
-      if (!same(hypotheses_[i].route, hypotheses_[k].route)) {
-        ++k;
-        continue;
-      }
-      join(hypotheses_[i], hypotheses_[k]);
-      hypotheses_.erase(hypotheses_.begin() + static_cast<std::ptrdiff_t>(k));
-    }
-  }
-}
-
-void TrackChooser::prune() {
-  std::vector<double> logs;
-  for (const auto& hypothesis : hypotheses_) logs.push_back(evidence(hypothesis));
-  const double best = *std::max_element(logs.begin(), logs.end());
-  std::vector<double> sorted = logs;
-  std::sort(sorted.rbegin(), sorted.rend());
-  double least = best + std::log(kLeastProbability);
-  if (sorted.size() > kMostHypotheses && sorted[kMostHypotheses] > least) {
-    least = sorted[kMostHypotheses];
-    // What nobody has shown to be wrong is given up: so much is not known any more.
-    const double all = std::accumulate(sorted.begin(), sorted.end(), -INFINITY, log_sum);
-    const double rest = std::accumulate(sorted.begin() + kMostHypotheses, sorted.end(), -INFINITY, log_sum);
-    told_ *= 1 - std::exp(rest - all);
-  }
-  std::vector<Hypothesis> kept;
-  for (size_t i = 0; i < logs.size(); ++i) {
-    if (logs[i] <= least && logs[i] < best) continue;
-    kept.push_back(std::move(hypotheses_[i]));
-    kept.back().log_prior -= best;
-  }
-  hypotheses_ = std::move(kept);
 }
 
 // Of the train at a place: as fusion says, and up to the lag further back for the turning. Many cars do not lag at all.
