@@ -18,9 +18,12 @@ constexpr uint32_t kUnknownBaliseGroup = 16777215;
 constexpr uint32_t kUnknownDistance = 32767;  // D_LRBG, L_DOUBTOVER, L_DOUBTUNDER; also farther than 327.66 km
 constexpr uint32_t kUnknownTime = 4294967295;
 constexpr uint32_t kStandstillSpeed = 127;  // V_TRAIN of 4.0.0
-constexpr double kSpeedStepKmh = 5.0;       // of V_TRAIN
-constexpr uint32_t kConfirmedByDevice = 1;  // Q_LENGTH, Q_INTEGRITY of 4.0.0: train integrity
+constexpr uint32_t kSpeedStepKmh = 5;       // of V_TRAIN
+// Q_LENGTH, Q_INTEGRITY of 4.0.0: train integrity.
+constexpr uint32_t kNoIntegrityInformation = 0;
+constexpr uint32_t kConfirmedByDevice = 1;
 constexpr uint32_t kConfirmedByDriver = 2;
+constexpr uint32_t kIntegrityLost = 3;
 
 enum Side : uint32_t { kReverse = 0, kNominal = 1, kUnknownSide = 2 };  // Q_DIRLRBG, Q_DLRBG, Q_DIRTRAIN
 enum Level : uint32_t { kLevel0 = 0, kLevelNtc = 1, kLevel1 = 2, kLevel2 = 3, kLevel3 = 4 };

@@ -58,8 +58,8 @@ Interval Estimator::widened(const Interval& interval) const {
   // A wheel that slides counts less than it is judged by.
   const double slide_m = slip_m / (1 - std::min(p.wheel_slip_share, 0.9));
   const auto& u = unwatched_;
-  return {interval.behind_m - std::min(slip_m + u.hidden_m + u.behind_m + u.felt_behind_m, most_m),
-          interval.ahead_m + std::min(slide_m + u.hidden_m + u.ahead_m + u.felt_ahead_m, most_m)};
+  return {interval.behind_m - std::min(slip_m + u.hidden_m + u.counted.behind_m + u.felt.behind_m, most_m),
+          interval.ahead_m + std::min(slide_m + u.hidden_m + u.counted.ahead_m + u.felt.ahead_m, most_m)};
 }
 
 double Estimator::gnss_bound_m() const {

@@ -1,6 +1,7 @@
 // One moment of fusion: the motion filter, what is known of each sensor's health, and the state that follows from both.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -32,6 +33,7 @@ struct SensorWatch {
   bool convicted = false;  // isolated because it is known to be the wrong one
   int64_t changed_ns = 0;  // when it was isolated, or taken back
 
+  [[nodiscard]] bool isolated_without_proof() const { return isolated && !convicted; }
   void accept(int64_t stamp_ns) {
     used_ns = stamp_ns;
     refused = 0;
@@ -177,18 +179,25 @@ class Estimator {
     int samples = 0;
     double pause_s = 0;  // the longest without a sample of any sensor since its last one
   };
+  /// How far one reckoning is from another, and the furthest that came to on either side.
+  struct Apart {
+    double now_m = 0;
+    double behind_m = 0;
+    double ahead_m = 0;
+    void add(double way_m) {
+      now_m += way_m;
+      behind_m = std::max(behind_m, -now_m);
+      ahead_m = std::max(ahead_m, now_m);
+    }
+  };
   /// What the wheel has counted since the reference without a camera beside it.
   struct Unwatched {
     double distance_m = 0;  // of the train at its last sample
     double way_m = 0;       // as far as nobody would have seen it slip
     double hidden_m = 0;    // what slips may have added that pass for a change of speed
     double fastest_mps = 0;
-    double apart_m = 0;   // its way less the train's while it was isolated: who is wrong is not known for certain
-    double behind_m = 0;  // the furthest that came to
-    double ahead_m = 0;
-    double felt_m = 0;  // what an IMU feels that the wheel does not say
-    double felt_behind_m = 0;
-    double felt_ahead_m = 0;
+    Apart counted{};  // its way less the train's while it was isolated: who is wrong is not known for certain
+    Apart felt{};     // what an IMU feels that the wheel does not say
   };
   static constexpr int kGnssProof = 30;
   static constexpr int kRefusalsToIsolate = 3;  // in a row

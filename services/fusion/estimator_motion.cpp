@@ -194,11 +194,8 @@ void Estimator::doubt_silent_wheel(int64_t silent_since_ns, double way_m) {
 void Estimator::watch_alone(double way_m, double dt_s) {
   const double run_m = filter_.value(StateIndex::distance) - unwatched_.distance_m;
   unwatched_.distance_m += run_m;
-  if (watch(Source::wheel).isolated && !is_watched()) {
-    unwatched_.apart_m += filter_.scale(Odometer::wheel) * way_m - run_m;
-    unwatched_.behind_m = std::max(unwatched_.behind_m, -unwatched_.apart_m);
-    unwatched_.ahead_m = std::max(unwatched_.ahead_m, unwatched_.apart_m);
-  }
+  if (watch(Source::wheel).isolated && !is_watched())
+    unwatched_.counted.add(filter_.scale(Odometer::wheel) * way_m - run_m);
   // Nobody else measures for a while, or the wheel came back in the dark, where an IMU alone had said that it is well
   // again: a slip may be no larger than what passes for a change of speed.
   const bool came_back = slipped_unseen() && !used_within(Source::camera, kBlindS);
@@ -365,9 +362,7 @@ void Estimator::feel(double accel_mps2, double sigma_mps2, int64_t before_ns) {
   }
   felt_.add({dt_s, accel_mps2, sigma_mps2, filter_.value(StateIndex::accel_bias), filter_.sigma(StateIndex::accel_bias),
              filter_.speed_mps(), filter_.sigma(StateIndex::speed)});
-  unwatched_.felt_m += felt_.faster_mps() * dt_s;
-  unwatched_.felt_behind_m = std::max(unwatched_.felt_behind_m, -unwatched_.felt_m);
-  unwatched_.felt_ahead_m = std::max(unwatched_.felt_ahead_m, unwatched_.felt_m);
+  unwatched_.felt.add(felt_.faster_mps() * dt_s);
 }
 
 // The mean belongs to the middle of its period, which lies v * period / 2 behind.

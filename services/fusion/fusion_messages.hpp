@@ -5,12 +5,12 @@
 #include "fusion/handover.hpp"
 #include "messaging/direction.hpp"
 #include "messaging/messaging.hpp"
+#include "messaging/samples.hpp"
 
 namespace railfix::fusion {
 
 inline OdometryInput input_of(const msg::OdometryStep& m) {
-  return {m.stamp_ns(), m.reference_stamp_ns(), m.step_m(), m.step_sigma_m(),
-          m.valid() != 0 && m.mode() != msg::ODOMETRY_BLIND};
+  return {m.stamp_ns(), m.reference_stamp_ns(), m.step_m(), m.step_sigma_m(), messaging::has_measured(m)};
 }
 inline FixInput input_of(const msg::PositionFix& m) {
   FixInput fix;

@@ -83,6 +83,7 @@ struct WheelBlock {
 enum class Source : uint8_t { camera, wheel, imu, gnss, landmark, curvature };
 constexpr int kSources = 6;
 inline constexpr std::array kMotionSources{Source::camera, Source::wheel, Source::imu};
+inline constexpr std::array kOdometers{Source::camera, Source::wheel};
 enum class Integrity : uint8_t { ok, degraded, unusable };
 
 /// State of the train at one stamp; fields as in msg::TrainState.

@@ -12,6 +12,7 @@
 // that agree, or fits a fix that the main one refuses, that rival becomes the main one.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <vector>
@@ -61,6 +62,14 @@ class Hypotheses {
   struct Excess {
     double behind_m = 0;
     double ahead_m = 0;
+    void add(const Excess& more) {
+      behind_m += more.behind_m;
+      ahead_m += more.ahead_m;
+    }
+    void hold(const Excess& other) {
+      behind_m = std::max(behind_m, other.behind_m);
+      ahead_m = std::max(ahead_m, other.ahead_m);
+    }
   };
   /// The main one without a fix that no later one has confirmed.
   struct Doubter {
@@ -119,6 +128,8 @@ class Hypotheses {
   void lose_sight(Rival& rival, int64_t now_ns) const;
   static void stray(Rival& rival, int64_t now_ns);
   [[nodiscard]] bool is_in_dispute(const Rival& rival) const;
+  /// So much further reaches that interval than mine; negative: less far.
+  [[nodiscard]] static Excess beyond(const Interval& mine, const Interval& its);
   [[nodiscard]] Excess most_excess() const;
   [[nodiscard]] Interval promised(const Interval& main) const;
 

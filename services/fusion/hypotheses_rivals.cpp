@@ -52,10 +52,9 @@ void Hypotheses::adopt(Rival& rival) {
 void Hypotheses::take_along(Doubter& doubter, const Estimator& next) const {
   Estimator own = doubter.estimator;
   own.predict_to(main_.filter().stamp_ns());
-  const Interval mine = main_.interval();
-  const Interval its = own.interval();
+  const Excess more = beyond(main_.interval(), own.interval());
   doubter.estimator = next;
-  doubter.estimator.doubt_place(std::max(0.0, mine.behind_m - its.behind_m), std::max(0.0, its.ahead_m - mine.ahead_m));
+  doubter.estimator.doubt_place(more.behind_m, more.ahead_m);
 }
 
 void Hypotheses::confirm_rivals(bool hardly) {
@@ -111,8 +110,7 @@ void Hypotheses::ask(Rival& rival) {
   rival.asked = true;
   rival.asked_ns = now_ns;
   if (is_in_dispute(rival)) {  // its end will say nothing about the way before it
-    rival.carried.behind_m += std::exchange(rival.unseen.behind_m, 0.0);
-    rival.carried.ahead_m += std::exchange(rival.unseen.ahead_m, 0.0);
+    rival.carried.add(std::exchange(rival.unseen, {}));
   }
   other.predict_to(now_ns);
   const Interval mine = main_.interval();
@@ -125,8 +123,9 @@ void Hypotheses::ask(Rival& rival) {
     its.ahead_m = std::min(its.ahead_m, mine.ahead_m + most_m);
   }
   // Since it came back both have gone on from one place: how far they come apart since adds to what it had said before.
-  rival.excess.behind_m = std::max(rival.carried.behind_m + std::max(0.0, -apart_m), mine.behind_m - its.behind_m);
-  rival.excess.ahead_m = std::max(rival.carried.ahead_m + std::max(0.0, apart_m), its.ahead_m - mine.ahead_m);
+  rival.excess = rival.carried;
+  rival.excess.add({std::max(0.0, -apart_m), std::max(0.0, apart_m)});
+  rival.excess.hold(beyond(mine, its));
   rival.faster_mps = other.filter().speed_mps() - main_.filter().speed_mps();
   rival.strayed_ns = now_ns;
 }
@@ -149,7 +148,7 @@ bool Hypotheses::contradicts_itself(const Rival& rival) const {
 // Nothing contradicts anything, and another odometer measures: a rival that has lost its way may begin again, so that
 // it knows its own when it is needed.
 bool Hypotheses::main_is_sound_without(Source source) const {
-  return main_.is_consistent() && std::ranges::any_of(std::array{Source::camera, Source::wheel}, [&](Source odometer) {
+  return main_.is_consistent() && std::ranges::any_of(kOdometers, [&](Source odometer) {
            return odometer != source && main_.measures(odometer);
          });
 }
@@ -158,7 +157,7 @@ bool Hypotheses::main_is_sound_without(Source source) const {
 // speak for that sensor.
 bool Hypotheses::stands_for_another(const Rival& rival) const {
   return rival.proven_since_ns != 0 && std::ranges::any_of(kMotionSources, [&](Source source) {
-           return source != rival.without && main_.watch(source).isolated && !main_.watch(source).convicted;
+           return source != rival.without && main_.watch(source).isolated_without_proof();
          });
 }
 
@@ -174,33 +173,29 @@ void Hypotheses::begin_again(Rival& rival) const {
 void Hypotheses::lose_sight(Rival& rival, int64_t now_ns) const {
   Estimator own = *rival.estimator;
   own.predict_to(now_ns);
-  const Interval mine = main_.widened(main_.interval());
-  const Interval its = own.interval();
-  rival.unseen.behind_m = std::max(rival.unseen.behind_m, mine.behind_m - its.behind_m);
-  rival.unseen.ahead_m = std::max(rival.unseen.ahead_m, its.ahead_m - mine.ahead_m);
+  rival.unseen.hold(beyond(main_.widened(main_.interval()), own.interval()));
 }
 
 // Nothing tells any more how far they come apart: for a while as fast as they did last.
 void Hypotheses::stray(Rival& rival, int64_t now_ns) {
   const double apart_m = rival.faster_mps * core::seconds(now_ns - std::exchange(rival.strayed_ns, now_ns));
-  rival.excess.behind_m += std::max(0.0, -apart_m);
-  rival.excess.ahead_m += std::max(0.0, apart_m);
+  rival.excess.add({std::max(0.0, -apart_m), std::max(0.0, apart_m)});
 }
 
 // Of two odometers the main one has isolated, without proof, the one that the rival believes.
 bool Hypotheses::is_in_dispute(const Rival& rival) const {
-  return rival.asked && std::ranges::any_of(std::array{Source::camera, Source::wheel}, [&](Source odometer) {
-           const auto& watch = main_.watch(odometer);
-           return odometer != rival.without && watch.isolated && !watch.convicted;
-         });
+  return std::ranges::any_of(kOdometers, [&](Source odometer) {
+    return odometer != rival.without && main_.watch(odometer).isolated_without_proof();
+  });
+}
+
+Hypotheses::Excess Hypotheses::beyond(const Interval& mine, const Interval& its) {
+  return {mine.behind_m - its.behind_m, its.ahead_m - mine.ahead_m};
 }
 
 Hypotheses::Excess Hypotheses::most_excess() const {
   Excess most;
-  for (const auto& rival : rivals_) {
-    most.behind_m = std::max(most.behind_m, rival.excess.behind_m);
-    most.ahead_m = std::max(most.ahead_m, rival.excess.ahead_m);
-  }
+  for (const auto& rival : rivals_) most.hold(rival.excess);
   return most;
 }
 

@@ -6,7 +6,7 @@
 #include "map_matcher/inputs.hpp"
 #include "messaging/direction.hpp"
 #include "messaging/messaging.hpp"
-#include "messaging/track_view.hpp"
+#include "messaging/samples.hpp"
 
 namespace railfix::map_matcher {
 
@@ -21,14 +21,9 @@ inline Sighting input_of(const msg::LandmarkSighting& m) {
           m.confidence()};
 }
 inline StepInput input_of(const msg::OdometryStep& m) {
-  return {m.stamp_ns(),
-          m.reference_stamp_ns(),
-          m.valid() != 0 && m.mode() != msg::ODOMETRY_BLIND,
-          m.step_m(),
-          m.yaw_rad(),
-          m.yaw_sigma_rad(),
-          m.distance_m(),
-          m.speed_mps()};
+  return {
+      m.stamp_ns(),   m.reference_stamp_ns(), messaging::has_measured(m), m.step_m(), m.yaw_rad(), m.yaw_sigma_rad(),
+      m.distance_m(), m.speed_mps()};
 }
 
 inline ViewInput input_of(const msg::TrackView& m) {

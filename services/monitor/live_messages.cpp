@@ -4,11 +4,11 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <span>
 
 #include "core/time.hpp"
 #include "etcs/train_position_report.hpp"
 #include "messaging/operation_words.hpp"
+#include "messaging/samples.hpp"
 
 namespace railfix::monitor {
 namespace {
@@ -178,8 +178,6 @@ json state_message(const msg::TrainState& state, double age_s, const msg::TrainP
 }
 
 json report_message(const msg::TrainPositionReport& report) {
-  const auto bytes =
-      std::span(report.message()).first(std::min<size_t>(report.message_bytes(), report.message().size()));
   const bool placed = report.nid_lrbg() != etcs::kUnknownBaliseGroup;
   return {{"kind", "report"},
           {"stamp_ns", report.stamp_ns()},
@@ -195,7 +193,7 @@ json report_message(const msg::TrainPositionReport& report) {
           {"l_doubtover_m", known(report.l_doubtover_m())},
           {"l_doubtunder_m", known(report.l_doubtunder_m())},
           {"v_train_kmh", known(report.v_train_kmh())},
-          {"hex", etcs::to_hex(bytes)}};
+          {"hex", etcs::to_hex(messaging::bytes_of(report))}};
 }
 
 json problems_message(const std::vector<Problem>& problems) {

@@ -7,8 +7,8 @@
 
 #include "cdr/types.hpp"
 #include "core/time.hpp"
+#include "messaging/samples.hpp"
 #include "messaging/security.hpp"
-#include "messaging/track_view.hpp"
 #include "monitor/foxglove_messages.hpp"
 
 namespace railfix::monitor {

@@ -6,7 +6,7 @@
 #include "core/time.hpp"
 #include "core/units.hpp"
 #include "messaging/camera.hpp"
-#include "messaging/track_view.hpp"
+#include "messaging/samples.hpp"
 
 namespace railfix::odometry {
 namespace {

@@ -36,6 +36,13 @@ std::optional<double> distance_on(const track::Path& path, const EdgePosition& f
   return std::nullopt;
 }
 
+/// The train may have come by any of the ways: their lengths differ by so much from this one at most.
+double most_apart_m(const std::vector<WayBetween>& ways, double length_m) {
+  double apart_m = 0;
+  for (const auto& way : ways) apart_m = std::max(apart_m, std::abs(way.length_m - length_m));
+  return apart_m;
+}
+
 }  // namespace
 
 BaliseTracker::BaliseTracker(std::shared_ptr<const track::Map> map, double search_behind_m)
@@ -149,10 +156,7 @@ void BaliseTracker::go_undeclared(const EdgePosition& foot) {
 
 // Where legs have joined again nobody knows over which one the train came.
 void BaliseTracker::doubt_legs(const std::vector<WayBetween>& ways) {
-  const double counted_m = undeclared_->turns.way_m();
-  double doubt_m = undeclared_->reference->doubt_m;
-  for (const auto& way : ways) doubt_m = std::max(doubt_m, std::abs(way.length_m - counted_m));
-  reference_->doubt_m = doubt_m;
+  reference_->doubt_m = std::max(undeclared_->reference->doubt_m, most_apart_m(ways, undeclared_->turns.way_m()));
 }
 
 bool BaliseTracker::go_declared(const EdgePosition& foot) {
@@ -176,9 +180,7 @@ bool BaliseTracker::go_declared(const EdgePosition& foot) {
   if (ways.empty()) return false;
   const double length_m = ways.front().length_m;
   reference_ = undeclared.reference;
-  if (reference_) {
-    for (const auto& way : ways) reference_->doubt_m = std::max(reference_->doubt_m, std::abs(way.length_m - length_m));
-  }
+  if (reference_) reference_->doubt_m = std::max(reference_->doubt_m, most_apart_m(ways, length_m));
   undeclared.turns.run(length_m - counted_m);
   const auto groups = groups_on(ways);
   const auto& points = undeclared.turns.points();

@@ -117,7 +117,8 @@ std::optional<Reason> ReportTrigger::onboard_reason(const Moment& moment) const 
   const uint32_t wanted_before = now.reports_wanted < then.reports_wanted ? 0 : then.reports_wanted;
   if (now.m_mode != then.m_mode) return Reason::mode;
   if (now.m_level != then.m_level || now.nid_ntc != then.nid_ntc) return Reason::level;
-  if (now.q_integrity == kIntegrityLost && then.q_integrity != kIntegrityLost) return Reason::integrity_lost;
+  if (now.q_integrity == etcs::kIntegrityLost && then.q_integrity != etcs::kIntegrityLost)
+    return Reason::integrity_lost;
   const bool confirmed = now.q_integrity != then.q_integrity || now.integrity_ns != then.integrity_ns;
   if (now.q_integrity == etcs::kConfirmedByDriver && confirmed) return Reason::integrity_confirmed;
   if (now.reports_wanted != wanted_before) return now.wanted_because;

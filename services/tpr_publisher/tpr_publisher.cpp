@@ -196,7 +196,7 @@ void TprPublisher::hear_integrity(const Onboard& onboard, int64_t now_ns) {
   }
   if (is_confirmed(onboard.q_integrity)) {
     onboard_ahead_ns_ = std::max(onboard_ahead_ns_, complete_ahead_ns_);
-    if (onboard_ahead_ns_ > kMostAheadNs) onboard_->q_integrity = kNoIntegrityInformation;
+    if (onboard_ahead_ns_ > kMostAheadNs) onboard_->q_integrity = etcs::kNoIntegrityInformation;
   }
   integrity_.hear(onboard_->q_integrity, complete_ns_, onboard.train_length_m);
 }
@@ -292,7 +292,7 @@ Moment TprPublisher::moment(int64_t now_ns) const {
   if (onboard_) {
     moment.onboard = *onboard_;
     // As in fields(): what is said again after a silence is news for the trackside.
-    moment.onboard.q_integrity = onboard_silent(now_ns) ? kNoIntegrityInformation : integrity_.q_integrity();
+    moment.onboard.q_integrity = onboard_silent(now_ns) ? etcs::kNoIntegrityInformation : integrity_.q_integrity();
     moment.onboard.integrity_ns = integrity_.integrity_ns();
   } else {  // no change when it is heard for the first time and says the same
     moment.onboard.m_mode = settings_.report.m_mode;

@@ -10,9 +10,6 @@
 
 namespace railfix::tpr_publisher {
 
-constexpr uint32_t kNoIntegrityInformation = 0;
-constexpr uint32_t kIntegrityLost = 3;
-
 /// Q_LENGTH (Q_INTEGRITY) that says of the train that it is complete.
 constexpr bool is_confirmed(uint32_t q_integrity) {
   return q_integrity == etcs::kConfirmedByDevice || q_integrity == etcs::kConfirmedByDriver;
@@ -50,7 +47,7 @@ class TrainIntegrity {
 
  private:
   struct Confirmation {
-    uint32_t q_integrity = kNoIntegrityInformation;
+    uint32_t q_integrity = etcs::kNoIntegrityInformation;
     int64_t integrity_ns = 0;
   };
   void settle();

@@ -66,7 +66,8 @@ std::string meaning(const std::string& name, uint32_t value, const etcs::TrainPo
         value);
   }
   if (name == "L_TRAININT") return std::to_string(value) + " m safe train length";
-  if (name == "V_TRAIN") return value == etcs::kStandstillSpeed ? "standstill" : std::to_string(value * 5) + " km/h";
+  if (name == "V_TRAIN")
+    return value == etcs::kStandstillSpeed ? "standstill" : std::to_string(value * etcs::kSpeedStepKmh) + " km/h";
   if (name == "M_MODE") {
     return one_of({"full supervision", "on sight", "staff responsible", "shunting", "unfitted", "sleeping", "stand by",
                    "trip", "post trip", "system failure", "isolation", "non leading", "limited supervision",

@@ -54,7 +54,7 @@ std::string sentence(const GroundReport& report) {
   if (!decoded.ok()) return decoded.error().message;
   const auto& f = decoded.value();
   if (f.nid_lrbg == etcs::kUnknownBaliseGroup) return "LRBG unknown";
-  const std::string speed = f.v_train == etcs::kStandstillSpeed ? "0" : std::to_string(f.v_train * 5);
+  const std::string speed = f.v_train == etcs::kStandstillSpeed ? "0" : std::to_string(f.v_train * etcs::kSpeedStepKmh);
   const char* side = f.q_dlrbg == etcs::kNominal   ? "the nominal"
                      : f.q_dlrbg == etcs::kReverse ? "the reverse"
                                                    : "an unknown";

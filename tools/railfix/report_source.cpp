@@ -4,6 +4,7 @@
 #include <iostream>
 
 #include "mcap/reader.hpp"
+#include "messaging/samples.hpp"
 
 namespace railfix::tool {
 
@@ -41,8 +42,7 @@ void ReportSource::read_recording(const std::string& file) {
 }
 
 void ReportSource::take(const msg::TrainPositionReport& report) {
-  const size_t bytes = std::min<size_t>(report.message_bytes(), report.message().size());
-  auto fields = etcs::decode({report.message().data(), bytes}, static_cast<etcs::Baseline>(report.baseline()));
+  auto fields = etcs::decode(messaging::bytes_of(report), static_cast<etcs::Baseline>(report.baseline()));
   if (!fields.ok()) {
     if (refusal_.empty()) std::cerr << "a report was left out: " << (refusal_ = fields.error().message) << '\n';
     return;

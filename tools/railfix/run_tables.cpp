@@ -9,6 +9,7 @@
 
 #include "core/csv.hpp"
 #include "mcap/reader.hpp"
+#include "messaging/samples.hpp"
 #include "messaging/topics.hpp"
 
 namespace railfix::tool {
@@ -47,9 +48,9 @@ std::string cell(std::string text) {
 std::string hex(const msg::TrainPositionReport& report) {
   static constexpr char kDigits[] = "0123456789abcdef";
   std::string text;
-  for (size_t i = 0; i < std::min<size_t>(report.message_bytes(), report.message().size()); ++i) {
-    text += kDigits[report.message()[i] >> 4U];
-    text += kDigits[report.message()[i] & 15U];
+  for (const uint8_t byte : messaging::bytes_of(report)) {
+    text += kDigits[byte >> 4U];
+    text += kDigits[byte & 15U];
   }
   return text;
 }
@@ -99,7 +100,7 @@ class Tables {
 
   void add(const msg::OdometryStep& step) {
     seen_data(step.stamp_ns());
-    const bool known = step.valid() != 0 && step.mode() != msg::ODOMETRY_BLIND;
+    const bool known = messaging::has_measured(step);
     odometry_ << step.stamp_ns() << (step.valid() != 0 ? 1 : 0) << step.distance_m();
     for (const double value : {step.speed_mps(), step.lateral_speed_mps(), step.yaw_rate_rps(), step.step_sigma_m()}) {
       odometry_ << (known ? value : kUnknown);

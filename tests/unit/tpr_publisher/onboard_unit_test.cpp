@@ -153,9 +153,9 @@ TEST_F(RunningTrain, TheClockOfTheOnboardUnitIsNotTakenForThePlaceOfALaterTime) 
   EXPECT_EQ(run_until(55.1).q_length, etcs::kConfirmedByDriver);
   EXPECT_LE(*reported->l_trainint, 215U);
   EXPECT_EQ(publisher.left_out(now_ns), "");
-  onboard.q_integrity = kIntegrityLost;
+  onboard.q_integrity = etcs::kIntegrityLost;
   ahead_ns = 30 * core::kNsPerSecond;
-  EXPECT_EQ(run_until(57).q_length, kIntegrityLost) << "a loss has no time";
+  EXPECT_EQ(run_until(57).q_length, etcs::kIntegrityLost) << "a loss has no time";
 }
 
 TEST_F(RunningTrain, ALittleAheadIsTakenOut) {
@@ -211,23 +211,23 @@ class SilentOnboard : public ::testing::Test {
 };
 
 TEST_F(SilentOnboard, ALossThatIsHeardAgainAfterASilenceIsReportedAgain) {
-  say_after(2.9, kIntegrityLost);
-  EXPECT_EQ(report_after(3).value().fields.q_length, kIntegrityLost);
+  say_after(2.9, etcs::kIntegrityLost);
+  EXPECT_EQ(report_after(3).value().fields.q_length, etcs::kIntegrityLost);
   const auto silent = report_after(9).value();
   EXPECT_EQ(silent.reason, Reason::cycle_time);
-  EXPECT_EQ(silent.fields.q_length, kNoIntegrityInformation);
-  say_after(9.5, kIntegrityLost);
+  EXPECT_EQ(silent.fields.q_length, etcs::kNoIntegrityInformation);
+  say_after(9.5, etcs::kIntegrityLost);
   const auto heard = report_after(9.6);
   ASSERT_TRUE(heard.has_value());
   EXPECT_EQ(heard->reason, Reason::integrity_lost);
-  EXPECT_EQ(heard->fields.q_length, kIntegrityLost);
+  EXPECT_EQ(heard->fields.q_length, etcs::kIntegrityLost);
 }
 
 TEST_F(SilentOnboard, WhatWasNotTakenBackIsNotSaidAgain) {
-  say_after(2.9, kIntegrityLost);
-  EXPECT_EQ(report_after(3).value().fields.q_length, kIntegrityLost);
+  say_after(2.9, etcs::kIntegrityLost);
+  EXPECT_EQ(report_after(3).value().fields.q_length, etcs::kIntegrityLost);
   EXPECT_FALSE(report_after(8).has_value());
-  say_after(8.5, kIntegrityLost);
+  say_after(8.5, etcs::kIntegrityLost);
   EXPECT_FALSE(report_after(8.6).has_value());
 }
 

@@ -93,8 +93,8 @@ TEST_F(SafeEnds, AConfirmationStandsUntilTheNextOneHasAPlace) {
   ASSERT_TRUE(report.has_value());
   EXPECT_EQ(report->fields.q_length, etcs::kConfirmedByDevice);
   EXPECT_EQ(report->fields.l_trainint, 218U);
-  hear(kIntegrityLost);
-  EXPECT_EQ(run_to(160)->fields.q_length, kIntegrityLost);  // at once
+  hear(etcs::kIntegrityLost);
+  EXPECT_EQ(run_to(160)->fields.q_length, etcs::kIntegrityLost);  // at once
 }
 
 TEST_F(SafeEnds, TheRoundingOfDLrbgDoesNotMoveTheRearEndForward) {
@@ -131,12 +131,12 @@ TEST_F(SafeEnds, ALocationIsPassedByTheMinSafeRearEndOfTheTrainAsTheOnboardUnitS
   wanted.locations = {{50, 0}};
   core::ok_or_throw(publisher_.set_parameters(wanted));
   EXPECT_NE(publisher_.left_out(now_ns_), "");  // nobody has said how long the train is
-  hear(kNoIntegrityInformation);
+  hear(etcs::kNoIntegrityInformation);
   EXPECT_EQ(publisher_.left_out(now_ns_), "");
   onboard_.train_length_m = 0;  // taken back, as while wagons are coupled
   core::ok_or_throw(publisher_.set_onboard(onboard_, now_ns_));
   EXPECT_NE(publisher_.left_out(now_ns_), "");
-  hear(kNoIntegrityInformation);
+  hear(etcs::kNoIntegrityInformation);
   std::optional<Report> report;
   for (double offset_m = 121; !report && offset_m < 400; offset_m += 0.1) report = run_to(offset_m);
   ASSERT_TRUE(report.has_value());

@@ -101,10 +101,10 @@ TEST(TrainIntegrity, AConfirmationFromBeforeTheWayWasLostHasNoPlace) {
 TEST(TrainIntegrity, ALossStandsUntilALaterConfirmationHasAPlace) {
   auto integrity = running_until(5);
   integrity.hear(etcs::kConfirmedByDriver, at(5), 200);
-  integrity.hear(kIntegrityLost, at(5.02), 200);
-  EXPECT_EQ(integrity.said(50).q_length, kIntegrityLost);
+  integrity.hear(etcs::kIntegrityLost, at(5.02), 200);
+  EXPECT_EQ(integrity.said(50).q_length, etcs::kIntegrityLost);
   integrity.hear(etcs::kConfirmedByDriver, at(5.05), 200);
-  EXPECT_EQ(integrity.said(50).q_length, kIntegrityLost);
+  EXPECT_EQ(integrity.said(50).q_length, etcs::kIntegrityLost);
   integrity.follow({at(5.1), 51, 5});
   EXPECT_EQ(integrity.said(51).l_trainint, 206U);
 }

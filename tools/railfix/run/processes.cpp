@@ -15,6 +15,7 @@
 
 #include "core/time.hpp"
 #include "service/service.hpp"
+#include "train/containers.hpp"
 
 namespace railfix::tool {
 namespace {
@@ -49,8 +50,7 @@ core::Result<std::vector<ServiceProgram>> find_service_programs() {
   std::vector<ServiceProgram> programs;
   // Against the way of the data: who listens is there before who speaks.
   for (const std::string& service : std::views::reverse(service::service_names())) {
-    std::string file = "railfix-" + service;
-    std::replace(file.begin(), file.end(), '_', '-');
+    const std::string file = "railfix-" + dashed(service);
     if (!std::filesystem::exists(folder / file)) {
       return core::Error{(folder / file).string() + " is missing; build it with ./dev build"};
     }
