@@ -1,5 +1,6 @@
 #include "dataset/calibration.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <sstream>
@@ -15,6 +16,9 @@ using core::Result;
 using core::Status;
 
 constexpr int kLargestSidePx = 100'000;
+// A focal length in picture widths: views from 157 to 0.6 degrees wide.
+constexpr double kShortestFocal = 0.1;
+constexpr double kLongestFocal = 100;
 
 Status read_lens(const YamlFile& yaml, geometry::Intrinsics& camera) {
   if (yaml.has("camera_model")) {
@@ -26,7 +30,11 @@ Status read_lens(const YamlFile& yaml, geometry::Intrinsics& camera) {
   const auto intrinsics = yaml.numbers("intrinsics", 4);
   if (!intrinsics.ok()) return intrinsics.error();
   const auto& i = intrinsics.value();
-  if (i[0] <= 0 || i[1] <= 0) return yaml.error("intrinsics", "fu and fv must be positive");
+  for (const double focal_px : {i[0], i[1]}) {
+    const double widths = focal_px / std::max(camera.width_px, 1);
+    if (!(widths >= kShortestFocal && widths <= kLongestFocal))
+      return yaml.error("intrinsics", "fu and fv are in pixels, and a tenth to a hundred times the picture's width");
+  }
   camera.fu_px = i[0];
   camera.fv_px = i[1];
   camera.cu_px = i[2];

@@ -70,6 +70,8 @@ TEST_F(CalibrationTest, ErrorsNameFileAndKey) {
   EXPECT_EQ(message(good), "no error");
   EXPECT_THAT(message("resolution: [8, 6]\n"), HasSubstr("sensor.yaml key 'intrinsics': is missing"));
   EXPECT_THAT(message("intrinsics: [5, 5, 4, 3]\n"), HasSubstr("key 'resolution': is missing"));
+  EXPECT_THAT(message("resolution: [8, 6]\nintrinsics: [5, 7550000000000002, 4, 3]\n"),
+              HasSubstr("key 'intrinsics': fu and fv are in pixels"));
   EXPECT_THAT(message("resolution: [8.5, 6]\nintrinsics: [5, 5, 4, 3]\n"), HasSubstr("key 'resolution'"));
   EXPECT_THAT(message(good + "camera_model: omni\n"), HasSubstr("key 'camera_model': is 'omni'"));
   EXPECT_THAT(message(good + "distortion_model: equidistant\n"), HasSubstr("key 'distortion_model'"));
