@@ -155,6 +155,7 @@ void Estimator::place_like(const Estimator& other) {
   track_doubt_ = other.track_doubt_;
   filter_.place_like(other.filter_);
   doubt_m_ = other.doubt_m_;
+  lost_ = other.lost_;
   time_doubt_m_ = std::max(time_doubt_m_, other.time_doubt_m_);
   unwatched_ = other.unwatched_;
   reference_ = other.reference_;

@@ -99,6 +99,8 @@ class Estimator {
   void do_without(Source source) { watched(source).isolated = watched(source).convicted = false; }
   /// GNSS has agreed with the motion for a while.
   [[nodiscard]] bool gnss_proven() const { return gnss_agreed_ >= kGnssProof; }
+  /// ... and does so now.
+  [[nodiscard]] bool held_by_gnss() const;
   /// What GNSS that agrees with the motion may still be wrong by.
   [[nodiscard]] double gnss_bound_m() const;
   /// Takes over place and speed, as independent knowledge.
@@ -242,6 +244,8 @@ class Estimator {
   [[nodiscard]] bool has_met(uint32_t landmark) const;
   /// What the interval reaches to either side where nothing is in doubt.
   [[nodiscard]] double known_to_m() const;
+  /// ... and where the train is lost.
+  [[nodiscard]] double lost_to_m() const;
   /// What the promised interval holds more.
   [[nodiscard]] double doubted_beyond_sigma_m() const;
   void refuse(const FixInput& fix, double path_distance_m, const Offer& offer);
@@ -282,6 +286,7 @@ class Estimator {
   std::optional<RefusedFix> refused_fix_;
   int gnss_agreed_ = 0;     // fixes, since three in a row were refused
   bool corrected_ = false;  // the place was moved against the filter's word, not confirmed yet
+  bool lost_ = false;       // what is sighted fits the map nowhere near, and no fix has been used since
   uint32_t reference_ = 0;
   std::array<uint32_t, 16> met_{};  // landmarks that were used last, newest first; 0 = none
   bool fix_again_ = false;

@@ -86,6 +86,7 @@ void Estimator::use_track(const FixInput& fix) {
   // What is said of another track is no more than its rest for this one.
   const double here_m = filter_.path_distance_m();
   const auto of_m = path_->distance_of({fix.edge, fix.offset_m, fix.direction}, here_m);
+  lost_ = lost_ || fix.fits_nowhere;
   track_doubt_.said(of_m ? fix.probability : std::min(fix.probability, 1 - fix.probability), of_m, here_m);
 }
 
@@ -174,6 +175,7 @@ void Estimator::accept(const FixInput& fix) {
   if (fix.kind != FixKind::landmark && fix.sigma_m > 2 * filter_.path_sigma_m()) return;
   fix_verdict_ = FixVerdict::used;
   refused_fix_.reset();
+  lost_ = false;
   doubt_m_ = doubt_behind_m_ = doubt_ahead_m_ = time_doubt_m_ = 0;
   unwatched_ = {.distance_m = unwatched_.distance_m};
   reference_ = fix.landmark;

@@ -25,6 +25,7 @@ inline FixInput input_of(const msg::PositionFix& m) {
              : m.kind() == msg::FIX_TRACK   ? FixKind::track
                                             : FixKind::landmark;
   fix.direction = messaging::direction_of(m.direction());
+  fix.fits_nowhere = m.fits_nowhere() != 0;
   return fix;
 }
 

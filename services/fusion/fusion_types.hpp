@@ -58,6 +58,7 @@ struct FixInput {
   track::Direction direction = track::Direction::unknown;
   std::shared_ptr<const track::Path> new_path;  // set by Fusion when the fix starts the position on the map, or
                                                 // says that the train is on another track
+  bool fits_nowhere = false;  // kind track: what is sighted fits the map nowhere near this place, on no track
 };
 
 /// The next picture will be measured against the one of this stamp: remember where the train was.

@@ -298,6 +298,7 @@ void MapMatcherService::say_track(double odometer_m, int64_t grabbed_ns) {
   message.stamp_ns(stamp_ns);
   message.kind(msg::FIX_TRACK);
   message.sigma_m(std::numeric_limits<double>::infinity());
+  message.fits_nowhere(there < 1 ? 1 : 0);
   send(message, grabbed_ns);
 }
 

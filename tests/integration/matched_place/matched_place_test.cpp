@@ -147,6 +147,7 @@ TEST_P(ToldStartWrongOrRight, IsDoubtedWhereTheMastsFitTheMapNowhereNearIt) {
   ASSERT_TRUE(last_of_track());
   if (wrong) {
     EXPECT_LT(last_of_track()->probability(), 0.5);
+    EXPECT_EQ(last_of_track()->fits_nowhere(), 1);
     EXPECT_LE(landmark_fixes().size(), 3U) << "of about eleven masts";
     EXPECT_THAT(reason(), HasSubstr("fit the map nowhere"));
     // And not in turns with "active": the dashboard would flicker.
@@ -159,6 +160,7 @@ TEST_P(ToldStartWrongOrRight, IsDoubtedWhereTheMastsFitTheMapNowhereNearIt) {
     EXPECT_THAT(said, ElementsAre(HasSubstr("fit the map nowhere")));
   } else {
     EXPECT_GT(last_of_track()->probability(), 0.999);
+    EXPECT_EQ(last_of_track()->fits_nowhere(), 0);
     EXPECT_GT(landmark_fixes().size(), 8U);
     EXPECT_EQ(reason(), "");
   }

@@ -17,6 +17,7 @@ constexpr double kWanderPerM = 5e-5;
 constexpr double kWanderLengthM = 20;
 constexpr double kBiasPerM = 2e-5;
 constexpr double kOutlierPerM = 2e-3;
+constexpr double kDoubted = 0.5;  // the place, by map_matcher
 
 map_matcher::PlacedTrain placed(const fusion::TrainEstimate& state) {
   return {state.stamp_ns, state.position, state.speed_mps, state.distance_m, state.over_m, state.under_m};
@@ -88,7 +89,18 @@ void MatcherLoop::match_sightings(const fusion::TrainEstimate& state, double arr
     const auto prior = state.track_known ? followed_.prior_at(sighting.stamp_ns, placed(state)) : std::nullopt;
     const auto fix = prior ? landmarks_->add(sighting, *prior) : std::nullopt;
     if (fix) found(*fix, fusion::FixKind::landmark, arrival_s);
+    if (prior) doubt_place(state, arrival_s);
   }
+}
+
+// As map_matcher says it, with a track of which only the rest is believed.
+void MatcherLoop::doubt_place(const fusion::TrainEstimate& state, double due_s) {
+  const bool gnss = (state.sources & 1U << static_cast<unsigned>(fusion::Source::gnss)) != 0;
+  const double elsewhere = landmarks_->doubt();
+  if (gnss || elsewhere <= kDoubted) return;
+  const auto& place = state.position;
+  found_.emplace_back(due_s, fusion::FixInput{state.stamp_ns, place.edge, place.offset_m, INFINITY, 1 - elsewhere, 0,
+                                              fusion::FixKind::track, place.direction, nullptr, true});
 }
 
 std::vector<fusion::FixInput> MatcherLoop::see(const fusion::OdometryInput& step, const fusion::TrainEstimate& state,

@@ -28,6 +28,7 @@ class MatcherLoop {
  private:
   void match_shape(int64_t stamp_ns, const fusion::TrainEstimate& state, double arrival_s);
   void match_sightings(const fusion::TrainEstimate& state, double arrival_s);
+  void doubt_place(const fusion::TrainEstimate& state, double due_s);
   void found(const map_matcher::Fix& fix, fusion::FixKind kind, double due_s);
   /// False while the place is not known.
   bool follow(const fusion::TrainEstimate& state);
