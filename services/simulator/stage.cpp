@@ -1,7 +1,9 @@
 #include "simulator/stage.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 
 namespace railfix::simulator {
 namespace {
@@ -72,72 +74,102 @@ class Lens {
   double offset_;
 };
 
-// Calls blend(pixel, share) for all pixels that a convex outline covers; at the edges by the share covered.
-template <class Blend>
-void fill(const Outline& outline, float grow_px, cv::Mat& radiance, Blend blend) {
-  struct Edge {
-    float a, b, c;  // distance inside = a u + b v + c
-  };
-  std::array<Edge, 6> edges;
-  size_t count = 0;
-  double area = 0.0;
-  double top = 1e9;
-  double bottom = -1e9;
-  for (size_t i = 0; i < outline.count; ++i) {
-    const auto& p = outline.corners[i];
-    const auto& q = outline.corners[(i + 1) % outline.count];
-    area += p.x() * q.y() - q.x() * p.y();
-    top = std::min(top, p.y());
-    bottom = std::max(bottom, p.y());
+struct RowRange {
+  int first = 0;
+  int end = 0;
+};
+
+// Of the pixels of one row: any part is covered, and the whole pixel.
+struct Span {
+  int begin, whole, whole_end, end;
+};
+
+// A convex outline by its edges, grown by so many pixels.
+class Shape {
+ public:
+  Shape(const Outline& outline, float grow_px) : grow_px_(grow_px) {
+    double area = 0.0;
+    for (size_t i = 0; i < outline.count; ++i) {
+      const auto& p = outline.corners[i];
+      const auto& q = outline.corners[(i + 1) % outline.count];
+      area += p.x() * q.y() - q.x() * p.y();
+      top_ = std::min(top_, p.y());
+      bottom_ = std::max(bottom_, p.y());
+    }
+    const double sign = area > 0.0 ? 1.0 : -1.0;
+    for (size_t i = 0; i < outline.count; ++i) {
+      const auto& p = outline.corners[i];
+      const Eigen::Vector2d along = outline.corners[(i + 1) % outline.count] - p;
+      const double length = along.norm();
+      if (length < 1e-9) continue;
+      const double a = -sign * along.y() / length;
+      const double b = sign * along.x() / length;
+      edges_[count_++] = {static_cast<float>(a), static_cast<float>(b), static_cast<float>(-a * p.x() - b * p.y())};
+    }
   }
-  const double sign = area > 0.0 ? 1.0 : -1.0;
-  for (size_t i = 0; i < outline.count; ++i) {
-    const auto& p = outline.corners[i];
-    const Eigen::Vector2d along = outline.corners[(i + 1) % outline.count] - p;
-    const double length = along.norm();
-    if (length < 1e-9) continue;
-    const double a = -sign * along.y() / length;
-    const double b = sign * along.x() / length;
-    edges[count++] = {static_cast<float>(a), static_cast<float>(b), static_cast<float>(-a * p.x() - b * p.y())};
+
+  [[nodiscard]] RowRange rows(int height_px) const {
+    if (count_ < 3) return {};
+    return {static_cast<int>(std::clamp(top_ - 1.0, 0.0, static_cast<double>(height_px))),
+            static_cast<int>(std::clamp(bottom_ + 2.0, 0.0, static_cast<double>(height_px)))};
   }
-  if (count < 3) return;
-  const int first_row = static_cast<int>(std::clamp(top - 1.0, 0.0, static_cast<double>(radiance.rows)));
-  const int end_row = static_cast<int>(std::clamp(bottom + 2.0, 0.0, static_cast<double>(radiance.rows)));
-  for (int v = first_row; v < end_row; ++v) {
+  [[nodiscard]] std::optional<Span> span(int v, int width_px) const {
     float some_left = 0.0F;
-    auto some_right = static_cast<float>(radiance.cols - 1);
+    auto some_right = static_cast<float>(width_px - 1);
     float all_left = some_left;
     float all_right = some_right;
-    bool any = true;
-    for (size_t i = 0; i < count; ++i) {
-      const float rest = edges[i].b * static_cast<float>(v) + edges[i].c + grow_px;
-      if (std::abs(edges[i].a) < 1e-6F) {
-        any = any && rest > 0.0F;
+    for (size_t i = 0; i < count_; ++i) {
+      const Edge& edge = edges_[i];
+      const float rest = edge.b * static_cast<float>(v) + edge.c + grow_px_;
+      if (std::abs(edge.a) < 1e-6F) {
+        if (rest <= 0.0F) return std::nullopt;
         if (rest < 1.0F) all_right = -1.0F;
-      } else if (edges[i].a > 0.0F) {
-        some_left = std::max(some_left, -rest / edges[i].a);
-        all_left = std::max(all_left, (1.0F - rest) / edges[i].a);
+      } else if (edge.a > 0.0F) {
+        some_left = std::max(some_left, -rest / edge.a);
+        all_left = std::max(all_left, (1.0F - rest) / edge.a);
       } else {
-        some_right = std::min(some_right, -rest / edges[i].a);
-        all_right = std::min(all_right, (1.0F - rest) / edges[i].a);
+        some_right = std::min(some_right, -rest / edge.a);
+        all_right = std::min(all_right, (1.0F - rest) / edge.a);
       }
     }
-    if (!any || some_left > some_right) continue;
-    float* row = radiance.ptr<float>(v);
+    if (some_left > some_right) return std::nullopt;
     const int begin = static_cast<int>(std::ceil(some_left));
     const int end = static_cast<int>(some_right) + 1;
     const int whole = std::clamp(static_cast<int>(std::ceil(all_left)), begin, end);
-    const int whole_end = std::clamp(static_cast<int>(all_right) + 1, whole, end);
-    const auto partly = [&](int u) {
-      float inside = 1.0F;
-      for (size_t i = 0; i < count; ++i)
-        inside = std::min(
-            inside, edges[i].a * static_cast<float>(u) + edges[i].b * static_cast<float>(v) + edges[i].c + grow_px);
-      blend(row[u], std::max(0.0F, inside));
-    };
-    for (int u = begin; u < whole; ++u) partly(u);
-    for (int u = whole; u < whole_end; ++u) blend(row[u], 1.0F);
-    for (int u = whole_end; u < end; ++u) partly(u);
+    return Span{begin, whole, std::clamp(static_cast<int>(all_right) + 1, whole, end), end};
+  }
+  [[nodiscard]] float covered(int u, int v) const {
+    float inside = 1.0F;
+    for (size_t i = 0; i < count_; ++i) {
+      const Edge& edge = edges_[i];
+      inside = std::min(inside, edge.a * static_cast<float>(u) + edge.b * static_cast<float>(v) + edge.c + grow_px_);
+    }
+    return std::max(0.0F, inside);
+  }
+
+ private:
+  struct Edge {
+    float a, b, c;  // distance inside = a u + b v + c
+  };
+  std::array<Edge, 6> edges_;
+  size_t count_ = 0;
+  float grow_px_;
+  double top_ = 1e9;
+  double bottom_ = -1e9;
+};
+
+// Calls blend(pixel, share) for all pixels that the outline covers; at the edges by the share covered.
+template <class Blend>
+void fill(const Outline& outline, float grow_px, cv::Mat& radiance, Blend blend) {
+  const Shape shape(outline, grow_px);
+  const RowRange rows = shape.rows(radiance.rows);
+  for (int v = rows.first; v < rows.end; ++v) {
+    const auto span = shape.span(v, radiance.cols);
+    if (!span) continue;
+    float* row = radiance.ptr<float>(v);
+    for (int u = span->begin; u < span->whole; ++u) blend(row[u], shape.covered(u, v));
+    for (int u = span->whole; u < span->whole_end; ++u) blend(row[u], 1.0F);
+    for (int u = span->whole_end; u < span->end; ++u) blend(row[u], shape.covered(u, v));
   }
 }
 

@@ -196,74 +196,84 @@ std::optional<double> EdgeTracker::measure(const Relative& relative, double bear
   return (best + part - middle_) * cell_;
 }
 
-// Gauss-Newton with Cauchy weights over all looks: place, lateral offset and what the curvature was wrong by.
-std::optional<SettledEdge> EdgeTracker::refine(Spot& spot, int sign) const {
-  const Look& now = looks_[newest_];
-  Eigen::Vector3d state(spot.x_m, spot.y_m, 0);
-  Eigen::Matrix3d normal;
-  SettledEdge edge;
-  double rms = 0;
+/// One pass of the fit: its normal equations and what it has measured.
+struct EdgeTracker::Pass {
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  double squared = 0;
+  double weights = 0;
+  size_t tried = 0;
+  size_t kept = 0;
   double narrowest = 1;
   double widest = 0;
-  for (int pass = 0; pass < kPasses; ++pass) {
-    normal.setZero();
-    normal(2, 2) = std::pow(kBearingSigma / kBendSigma, 2);
-    Eigen::Vector3d right(0, 0, -normal(2, 2) * state(2));
-    double squared = 0;
-    double weights = 0;
-    size_t tried = 0;
-    size_t kept = 0;
+  [[nodiscard]] double rms() const { return std::sqrt(squared / weights); }
+};
+
+void EdgeTracker::add(const Relative& relative, const Fit& fit, Pass& pass, SettledEdge& edge) const {
+  const auto& s = fit.state;
+  const double model = bearing_of(relative, s(0), s(1), s(2));
+  if (std::abs(model) < kFirstBearing || std::abs(model) > widest_) return;
+  const bool sure = relative.back_m <= fit.sure_back_m;
+  if (!sure && fit.only_sure) return;
+  const auto measured = measure(relative, model, fit.sign);
+  pass.tried += sure ? 1 : 0;
+  if (!measured) return;
+  const double residual = *measured - model;
+  const Eigen::Vector3d slope((bearing_of(relative, s(0) + 0.01, s(1), s(2)) - model) / 0.01,
+                              (bearing_of(relative, s(0), s(1) + 0.01, s(2)) - model) / 0.01, relative.back_m);
+  const double weight = 1 / (1 + std::pow(residual / (2 * kBearingSigma), 2));
+  pass.normal += weight * slope * slope.transpose();
+  pass.right += weight * slope * residual;
+  pass.squared += weight * residual * residual;
+  pass.weights += weight;
+  if (weight < 0.3 || edge.count == kMostMeasurements) return;
+  pass.kept += sure ? 1 : 0;
+  pass.narrowest = std::min(pass.narrowest, std::abs(*measured));
+  pass.widest = std::max(pass.widest, std::abs(*measured));
+  edge.measured[edge.count++] = {relative.look->way_m, *measured, relative.look->eye_lateral_m, residual};
+}
+
+// Gauss-Newton with Cauchy weights over all looks: place, lateral offset and what the curvature was wrong by.
+std::optional<SettledEdge> EdgeTracker::refine(Spot& spot, int sign) const {
+  Fit fit{{spot.x_m, spot.y_m, 0}, spot.back_m, true, sign};
+  SettledEdge edge;
+  Pass pass;
+  for (int i = 0; i < kPasses; ++i) {
+    pass = {};
+    pass.normal(2, 2) = std::pow(kBearingSigma / kBendSigma, 2);
+    pass.right(2) = -pass.normal(2, 2) * fit.state(2);
     edge.count = 0;
-    narrowest = 1;
-    widest = 0;
-    const auto add = [&](const Relative& relative) {
-      const double model = bearing_of(relative, state(0), state(1), state(2));
-      if (std::abs(model) < kFirstBearing || std::abs(model) > widest_) return;
-      const bool sure = relative.back_m <= spot.back_m;
-      if (!sure && 2 * pass < kPasses) return;
-      const auto measured = measure(relative, model, sign);
-      tried += sure ? 1 : 0;
-      if (!measured) return;
-      const double residual = *measured - model;
-      const Eigen::Vector3d slope((bearing_of(relative, state(0) + 0.01, state(1), state(2)) - model) / 0.01,
-                                  (bearing_of(relative, state(0), state(1) + 0.01, state(2)) - model) / 0.01,
-                                  relative.back_m);
-      const double weight = 1 / (1 + std::pow(residual / (2 * kBearingSigma), 2));
-      normal += weight * slope * slope.transpose();
-      right += weight * slope * residual;
-      squared += weight * residual * residual;
-      weights += weight;
-      if (weight < 0.3 || edge.count == kMostMeasurements) return;
-      kept += sure ? 1 : 0;
-      narrowest = std::min(narrowest, std::abs(*measured));
-      widest = std::max(widest, std::abs(*measured));
-      edge.measured[edge.count++] = {relative.look->way_m, *measured, relative.look->eye_lateral_m, residual};
-    };
-    for (size_t i = relatives_.size(); i-- > 0;) add(relatives_[i]);
-    add(itself(now));
-    if (kept < kFewestLooks || 2 * kept < tried) return std::nullopt;
-    const Eigen::Vector3d step = normal.ldlt().solve(right);
-    state(0) += std::clamp(step(0), -2.0, 2.0);
-    state(1) += std::clamp(step(1), -1.0, 1.0);
-    state(2) += step(2);
-    rms = std::sqrt(squared / weights);
-    spot.support = static_cast<double>(kept) / static_cast<double>(tried);
+    fit.only_sure = 2 * i < kPasses;
+    for (size_t k = relatives_.size(); k-- > 0;) add(relatives_[k], fit, pass, edge);
+    add(itself(looks_[newest_]), fit, pass, edge);
+    if (pass.kept < kFewestLooks || 2 * pass.kept < pass.tried) return std::nullopt;
+    const Eigen::Vector3d step = pass.normal.ldlt().solve(pass.right);
+    fit.state(0) += std::clamp(step(0), -2.0, 2.0);
+    fit.state(1) += std::clamp(step(1), -1.0, 1.0);
+    fit.state(2) += step(2);
+    spot.support = static_cast<double>(pass.kept) / static_cast<double>(pass.tried);
   }
-  if (rms > kWorstFit || widest < kGrowth * narrowest || !(state(0) > 1.0)) return std::nullopt;
-  spot.x_m = state(0);
-  spot.y_m = state(1);
-  const double sigma = std::max(rms, kLeastSigma);
-  const Eigen::Matrix3d covariance = normal.inverse() * (sigma * sigma * kCorrelated);
-  const double left_m = state(1) + now.eye_lateral_m;
+  if (pass.rms() > kWorstFit || pass.widest < kGrowth * pass.narrowest || !(fit.state(0) > 1.0)) return std::nullopt;
+  spot.x_m = fit.state(0);
+  spot.y_m = fit.state(1);
+  place(fit, pass, edge);
+  return edge;
+}
+
+// On the way, and beside the track.
+void EdgeTracker::place(const Fit& fit, const Pass& pass, SettledEdge& edge) const {
+  const Look& now = looks_[newest_];
+  const double sigma = std::max(pass.rms(), kLeastSigma);
+  const Eigen::Matrix3d covariance = pass.normal.inverse() * (sigma * sigma * kCorrelated);
+  const double left_m = fit.state(1) + now.eye_lateral_m;
   const double k = std::abs(now.curvature_per_m) < 1e-7 ? 1e-7 : now.curvature_per_m;
-  edge.place_m = now.way_m + std::atan2(k * state(0), 1 - k * left_m) / k;
-  edge.lateral_m = left_m - 0.5 * k * state(0) * state(0);
+  edge.place_m = now.way_m + std::atan2(k * fit.state(0), 1 - k * left_m) / k;
+  edge.lateral_m = left_m - 0.5 * k * fit.state(0) * fit.state(0);
   edge.sigma_m = std::sqrt(covariance(0, 0));
   edge.lateral_sigma_m = std::sqrt(covariance(1, 1));
   edge.pictures = static_cast<int>(edge.count);
   edge.cell = cell_;
   edge.curvature_per_m = now.curvature_per_m;
-  return edge;
 }
 
 void EdgeTracker::take(const UprightEdge& found) {

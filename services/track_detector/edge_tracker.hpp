@@ -3,6 +3,7 @@
 // otherwise (parallax), so that even a faint edge before a background like itself is found.
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <optional>
 #include <vector>
@@ -87,6 +88,14 @@ class EdgeTracker {
     double support = 0;
     size_t looks = 0;
   };
+  // Place, lateral offset from the newest look, and what the curvature was wrong by; which looks count.
+  struct Fit {
+    Eigen::Vector3d state;
+    double sure_back_m = 0;
+    bool only_sure = true;
+    int sign = 1;
+  };
+  struct Pass;
   void advance(const LandmarkPicture& picture, double way_m);
   void remember(const UprightProfile& profile, const LandmarkPicture& picture);
   void relate();
@@ -95,6 +104,8 @@ class EdgeTracker {
   [[nodiscard]] std::array<Spot, 2> locate(double bearing, int sign) const;
   [[nodiscard]] std::optional<double> measure(const Relative& relative, double bearing, int sign) const;
   [[nodiscard]] std::optional<SettledEdge> refine(Spot& spot, int sign) const;
+  void add(const Relative& relative, const Fit& fit, Pass& pass, SettledEdge& edge) const;
+  void place(const Fit& fit, const Pass& pass, SettledEdge& edge) const;
   [[nodiscard]] double brightening(double place_m, double wall_m) const;
   [[nodiscard]] static Relative itself(const Look& look) { return {&look, 0, 0, 0, 1, 0}; }
   void settle();
