@@ -81,6 +81,16 @@ function(railfix_test name)
   set_tests_properties(${name} PROPERTIES TIMEOUT ${last_second} RUN_SERIAL "$<BOOL:${RAILFIX_TESTS_RUN_ALONE}>")
 endfunction()
 
+# railfix_measuring_program(railfix-measure-survey SOURCES survey.cpp DEPENDS railfix_track)  -> that program: no timing
+# loop of its own, it measures what the libraries do.
+function(railfix_measuring_program program)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
+  add_executable(${program} ${ARG_SOURCES})
+  target_link_libraries(${program} PRIVATE ${ARG_DEPENDS} railfix_measuring_tool)
+  railfix_warnings(${program})
+  railfix_made_quickly(${program})
+endfunction()
+
 # railfix_benchmark(odometry SOURCES a.cpp DEPENDS railfix_odometry)  -> program railfix-bench-odometry, run by ./dev bench
 function(railfix_benchmark name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
