@@ -18,6 +18,7 @@
 #include "fusion/slip_watch.hpp"
 #include "fusion/sudden_change.hpp"
 #include "fusion/track_doubt.hpp"
+#include "fusion/turned_way.hpp"
 #include "fusion/wheel_noise.hpp"
 #include "track/path.hpp"
 
@@ -238,6 +239,8 @@ class Estimator {
   void take_wheel_back(int64_t stamp_ns, double wheel_m, double sigma_m);
   void recover_wheel(const WheelInput& sample, double wheel_m, double sigma_m);
   void use_yaw_rate(double rate_rps);
+  void remember_turn(double rate_rps, double speed_mps);
+  void compare_turns();
   void use_track(const FixInput& fix);
   Offer offer_place(const MeasuredPlace& place);
   Offer offer_place_again(double path_distance_m, double sigma_m);
@@ -302,6 +305,7 @@ class Estimator {
   int64_t rest_since_ns_ = 0;
   bool standstill_ = false;
   TrackDoubt track_doubt_;
+  TurnedWay turned_way_;
   int64_t start_ns_ = 0;
 };
 

@@ -27,6 +27,7 @@ constexpr double kScatterResolutions = 3.0;
 constexpr double kSilentS = 1.0;
 constexpr double kSilentSlip = 0.1;           // share of the way
 constexpr double kGyroPositionSigmaM = 30.0;  // within which the curvature may be taken as linear
+constexpr double kTurnSigmas = 4.0;
 constexpr double kTaughtS = 30.0;
 constexpr double kSleeperM = 0.7;  // one more or less: the odd error of a step
 constexpr double kBlindS = 0.3;
@@ -373,7 +374,11 @@ void Estimator::use_yaw_rate(double rate_rps) {
     filter_.offer_yaw_rate(rate_rps, 0, 0, parameters_->gyro_sigma_rps, parameters_->gate_gyro);
     return;
   }
-  if (!path_ || filter_.path_sigma_m() > kGyroPositionSigmaM || speed_sigma_mps > 1) return;
+  if (!path_ || filter_.path_sigma_m() > kGyroPositionSigmaM || speed_sigma_mps > 1) {
+    turned_way_.clear();
+    return;
+  }
+  remember_turn(rate_rps, speed_mps);
   const auto point = path_->at(filter_.path_distance_m() - 0.5 * speed_mps * parameters_->gyro_period_s);
   // A tenth of the curvature covers the map's error, which is the same for a whole curve.
   const double sigma_rps =
@@ -382,6 +387,19 @@ void Estimator::use_yaw_rate(double rate_rps) {
                                             parameters_->gate_gyro);
   const bool bends = std::abs(speed_mps * point.curvature_per_m) > parameters_->gate_gyro * sigma_rps;
   track_doubt_.turned(offer.used, bends);
+  compare_turns();
+}
+
+void Estimator::remember_turn(double rate_rps, double speed_mps) {
+  const double period_s = parameters_->gyro_period_s;
+  const double here_m = filter_.path_distance_m();
+  turned_way_.add({here_m - speed_mps * period_s, here_m, (rate_rps - filter_.value(StateIndex::gyro_bias)) * period_s,
+                   parameters_->gyro_sigma_rps * period_s, period_s});
+}
+
+void Estimator::compare_turns() {
+  const double strays = turned_way_.strays(*path_, {filter_.sigma(StateIndex::gyro_bias), filter_.path_sigma_m()});
+  if (strays > kTurnSigmas) track_doubt_.strayed();
 }
 
 }  // namespace railfix::fusion

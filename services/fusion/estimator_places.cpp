@@ -77,6 +77,7 @@ void Estimator::use_track(const FixInput& fix) {
   if (fix.new_path) {
     path_ = fix.new_path;
     track_doubt_.changed();
+    compare_turns();
     // What was seen beside the old way lies on the new one: it spoke for it.
     if (off_path_ && path_->distance_of(*off_path_, filter_.path_distance_m())) {
       off_path_.reset();

@@ -101,6 +101,27 @@ TEST_F(WrongLeg, ATrainThatTurnsOtherwiseDoubtsIt) {
   EXPECT_THAT(state.reason, Not(HasSubstr("turns otherwise")));
 }
 
+// On the turnout it has turned by 0.06 rad, or not, before anybody said which leg it took.
+TEST_F(WrongLeg, ADeclarationThatTheTurnoutBehindContradictsIsDoubtedAtOnce) {
+  go(0, 8, 0);
+  declare(8, kLeft, 60);
+  const auto state = go(8, 8.1, 0);
+  EXPECT_EQ(state.position.edge, kLeft);
+  EXPECT_EQ(state.track_probability, 0.5);
+  EXPECT_THAT(state.reason, HasSubstr("turns otherwise"));
+  declare(9, kStraight, 80);
+  EXPECT_EQ(go(8.1, 9.1, 0).track_probability, 0.9995);
+}
+
+TEST_F(WrongLeg, ThatItGoesStraightOnIsDoubtedWhereTheTrainHasTurned) {
+  go(0, 5, 0);
+  go(5, 7.5, 0.001);
+  declare(7.5, kStraight, 50);
+  EXPECT_EQ(go(7.5, 7.9, 0.001).track_probability, 0.5);
+  declare(7.9, kLeft, 58);
+  EXPECT_EQ(go(7.9, 9, 0.001).track_probability, 0.9995);
+}
+
 TEST_F(WrongLeg, ATrainThatTurnsAsTheTrackDoesDoubtsNothing) {
   go(0, 5, 0);
   go(5, 7, 0.001);
@@ -167,7 +188,8 @@ TEST(WrongLegDeclared, TheIntervalHoldsAlongTheTrackAndTheLegIsDoubted) {
             << sum.other_leg_sure << " of them declared and ok, for up to " << sum.other_leg_sure_s << " s\n";
   EXPECT_EQ(sum.outside, 0U);
   EXPECT_GT(sum.other_leg, 1000U);                   // it was injected
-  EXPECT_LT(2 * sum.other_leg_sure, sum.other_leg);  // parallel legs without a landmark: nobody can know
+  EXPECT_LT(5 * sum.other_leg_sure, sum.other_leg);  // legs that turn alike without a landmark: nobody can know
+  EXPECT_LT(sum.other_leg_sure_s, 5);
 }
 
 }  // namespace

@@ -1,0 +1,39 @@
+// How the train turned over the last seconds, by its gyro, to be held against a track: the one that is followed, or one
+// that is declared only now, behind the switch where it parted from another. A turnout is run over in two or three
+// seconds, and what it turns adds up: that says more than each second does alone.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "track/path.hpp"
+
+namespace railfix::fusion {
+
+/// A plain value.
+class TurnedWay {
+ public:
+  struct Piece {
+    double from_m = 0;  // place on the path
+    double to_m = 0;
+    double turn_rad = 0;  // left positive, without the gyro's bias
+    double sigma_rad = 0;
+    double time_s = 0;
+  };
+  /// One standard deviation of what is the same for all pieces.
+  struct Errors {
+    double bias_rps = 0;
+    double place_m = 0;
+  };
+  /// Forgets those before where it does not go on from them.
+  void add(Piece piece);
+  void clear() { pieces_.clear(); }
+  /// The most by which a part of the way turned otherwise than the path there, in standard deviations.
+  [[nodiscard]] double strays(const track::Path& path, const Errors& errors) const;
+
+ private:
+  static constexpr size_t kMost = 12;
+  std::vector<Piece> pieces_;  // oldest first
+};
+
+}  // namespace railfix::fusion
