@@ -28,10 +28,12 @@ class TurnedWay {
   /// Forgets those before where it does not go on from them.
   void add(Piece piece);
   void clear() { pieces_.clear(); }
-  /// The most by which a part of the way turned otherwise than the path there, in standard deviations.
+  /// The most by which a part of the way turned otherwise than the path there, in standard deviations. The body of a
+  /// car turns up to a bogie distance behind the camera's foot: as far behind as fits best.
   [[nodiscard]] double strays(const track::Path& path, const Errors& errors) const;
 
  private:
+  [[nodiscard]] double strays_of_body(const track::Path& path, const Errors& errors, double behind_m) const;
   static constexpr size_t kMost = 12;
   std::vector<Piece> pieces_;  // oldest first
 };

@@ -101,16 +101,16 @@ TEST_F(WrongLeg, ATrainThatTurnsOtherwiseDoubtsIt) {
   EXPECT_THAT(state.reason, Not(HasSubstr("turns otherwise")));
 }
 
-// On the turnout it has turned by 0.06 rad, or not, before anybody said which leg it took.
+// On the turnout it has turned, or not, before anybody said which leg it took.
 TEST_F(WrongLeg, ADeclarationThatTheTurnoutBehindContradictsIsDoubtedAtOnce) {
-  go(0, 8, 0);
-  declare(8, kLeft, 60);
-  const auto state = go(8, 8.1, 0);
+  go(0, 9, 0);
+  declare(9, kLeft, 80);
+  const auto state = go(9, 9.1, 0);
   EXPECT_EQ(state.position.edge, kLeft);
   EXPECT_EQ(state.track_probability, 0.5);
   EXPECT_THAT(state.reason, HasSubstr("turns otherwise"));
-  declare(9, kStraight, 80);
-  EXPECT_EQ(go(8.1, 9.1, 0).track_probability, 0.9995);
+  declare(9.2, kStraight, 84);
+  EXPECT_EQ(go(9.2, 10.2, 0).track_probability, 0.9995);
 }
 
 TEST_F(WrongLeg, ThatItGoesStraightOnIsDoubtedWhereTheTrainHasTurned) {

@@ -1,0 +1,65 @@
+#include "fusion/turned_way.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace railfix::fusion {
+namespace {
+
+constexpr double kPointsM = 500;
+constexpr double kSigmaRad = 0.004;
+constexpr TurnedWay::Errors kErrors{1e-4, 0.3};
+
+/// Straight on, or behind the points to the left on a turnout of this radius that is 35 m long.
+track::Path leg(double radius_m) {
+  auto map = std::make_shared<track::Map>();
+  const double curvature = std::isfinite(radius_m) ? 1 / radius_m : 0;
+  map->edges.push_back(
+      {1, "leg", 1, 2, "",
+       track::Alignment::chained({0, 0, 0}, {{kPointsM, 0, 0}, {35, curvature, curvature}, {1000, 0, 0}})});
+  return core::value_or_throw(track::Path::follow(map, {1, 0, track::Direction::forward}, 1500, 0));
+}
+
+/// What a perfect gyro feels in a body that turns so far behind the foot; backwards where the speed is negative.
+TurnedWay ridden(const track::Path& path, double from_m, double to_m, double speed_mps, double behind_m) {
+  TurnedWay way;
+  for (double m = from_m; (to_m - m) * speed_mps > 0; m += speed_mps) {
+    const double turn_rad = path.at(m - behind_m).pose.heading_rad - path.at(m + speed_mps - behind_m).pose.heading_rad;
+    way.add({m, m + speed_mps, turn_rad, kSigmaRad, 1});
+  }
+  return way;
+}
+
+TEST(TurnedWay, FitsTheLegThatWasTakenWhereverTheBogiesAreAndNoOther) {
+  const auto straight = leg(INFINITY);
+  for (const double radius_m : {190.0, 300.0, 500.0}) {
+    const auto turnout = leg(radius_m);
+    for (const double behind_m : {0.0, 5.0, 13.0, 20.0}) {
+      const auto way = ridden(turnout, kPointsM - 60, kPointsM + 70, 11, behind_m);
+      EXPECT_LT(way.strays(turnout, kErrors), 3) << radius_m << " m, " << behind_m << " m";
+      EXPECT_GT(way.strays(straight, kErrors), 4) << radius_m << " m, " << behind_m << " m";
+    }
+    const auto on = ridden(straight, kPointsM - 60, kPointsM + 70, 11, 0);
+    EXPECT_LT(on.strays(straight, kErrors), 0.01);
+    EXPECT_GT(on.strays(turnout, kErrors), 4) << radius_m;
+  }
+}
+
+TEST(TurnedWay, OfATrainThatBacksIsTheSameTheOtherWay) {
+  const auto turnout = leg(300);
+  const auto back = ridden(turnout, kPointsM + 70, kPointsM - 60, -8, 10);
+  EXPECT_LT(back.strays(turnout, kErrors), 3);
+  EXPECT_GT(back.strays(leg(INFINITY), kErrors), 4);
+}
+
+TEST(TurnedWay, BeginsAnewWhereThePlaceJumps) {
+  const auto turnout = leg(300);
+  auto way = ridden(turnout, kPointsM - 60, kPointsM + 70, 11, 0);
+  EXPECT_GT(way.strays(leg(INFINITY), kErrors), 4);
+  way.add({kPointsM + 200, kPointsM + 211, 0, kSigmaRad, 1});
+  EXPECT_LT(way.strays(leg(INFINITY), kErrors), 0.01);
+}
+
+}  // namespace
+}  // namespace railfix::fusion
