@@ -123,8 +123,8 @@ Result<CameraCalibration> read_kitti_calibration(const std::filesystem::path& fi
     for (double& value : p) {
       if (!(cells >> value)) return Error{file.string() + " line '" + name + "' must hold 12 numbers"};
     }
-    if (!(p[0] > 0) || !(p[5] > 0))
-      return Error{file.string() + " line '" + name + "' must hold positive focal lengths"};
+    if (!(std::min(p[0], p[5]) >= 1) || std::max(p[0], p[5]) > kLongestFocal * kLargestSidePx)
+      return Error{file.string() + " line '" + name + "' must hold focal lengths in pixels"};
     CameraCalibration calibration;
     calibration.intrinsics.fu_px = p[0];
     calibration.intrinsics.fv_px = p[5];

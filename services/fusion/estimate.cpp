@@ -15,6 +15,8 @@ constexpr double kFreshS = 0.12;
 constexpr double kRecentPositionS = 30.0;
 constexpr double kNoMotionUnusableS = 5.0;
 constexpr double kHeldByGnssS = 5.0;
+constexpr double kLostAtLeastM = 100.0;
+constexpr double kLostAtMostM = 500.0;
 
 // Operators ask since when a sensor is distrusted.
 std::string since(const SensorWatch& watch) {
@@ -48,13 +50,12 @@ double Estimator::known_to_m() const {
          parameters_->interval_drift * since_reference_m();
 }
 
-// Where a map lacks a piece of track the place is off by that from there on: so far that it is no position, and that
-// the matcher finds the train there.
+// Where a map lacks a piece of track the place is off by that from there on. So far that it is no position, and that
+// the matcher, which has few landmarks to choose from then, finds the train there.
 double Estimator::lost_to_m() const {
-  if (!lost_) return 0;
   const auto& p = *parameters_;
-  const double lost_m = p.unusable_budgets * (p.budget_m + p.budget_per_m * since_reference_m());
-  return held_by_gnss() ? std::min(lost_m, gnss_bound_m()) : lost_m;
+  const double budgets_m = p.unusable_budgets * (p.budget_m + p.budget_per_m * since_reference_m());
+  return lost_ ? std::clamp(budgets_m, kLostAtLeastM, kLostAtMostM) : 0.0;
 }
 
 // As an odometer's accuracy is stated: a share of the way, and one slip at the highest speed.
@@ -62,16 +63,13 @@ Interval Estimator::widened(const Interval& interval) const {
   const auto& p = *parameters_;
   const double once_m = p.wheel_slip_share * std::min(unwatched_.way_m, unwatched_.fastest_mps * p.wheel_slip_s);
   const double slip_m = std::min(once_m + p.wheel_slip_per_m * unwatched_.way_m, p.wheel_slip_share * unwatched_.way_m);
-  const double most_m = held_by_gnss() ? gnss_bound_m() : std::numeric_limits<double>::infinity();
+  const bool held = gnss_proven() && used_within(Source::gnss, kHeldByGnssS);
+  const double most_m = held ? gnss_bound_m() : std::numeric_limits<double>::infinity();
   // A wheel that slides counts less than it is judged by.
   const double slide_m = slip_m / (1 - std::min(p.wheel_slip_share, 0.9));
   const auto& u = unwatched_;
   return {interval.behind_m - std::min(slip_m + u.hidden_m + u.counted.behind_m + u.felt.behind_m, most_m),
           interval.ahead_m + std::min(slide_m + u.hidden_m + u.counted.ahead_m + u.felt.ahead_m, most_m)};
-}
-
-bool Estimator::held_by_gnss() const {
-  return gnss_proven() && used_within(Source::gnss, kHeldByGnssS);
 }
 
 double Estimator::gnss_bound_m() const {
@@ -180,9 +178,11 @@ void Estimator::judge_place(TrainEstimate& e) const {
   if (corrected_) e.degrade("position was corrected by two fixes against the filter");
   if (off_path_) e.degrade("a position fix lies on another track");
   if (track_doubt_.turns_otherwise()) e.degrade("the train turns otherwise than this track");
-  if (lost_) {
+  if (lost_ && fits_nowhere_) {
     e.degrade("what is sighted fits the map nowhere near this place");
-    if (!held_by_gnss()) e.integrity = Integrity::unusable;
+    e.integrity = Integrity::unusable;
+  } else if (lost_) {
+    e.degrade("what was sighted did not fit the map: waits for a landmark");
   } else if (track_doubt_.disbelieved()) {
     e.degrade("map_matcher finds some other place far more probable");
   }

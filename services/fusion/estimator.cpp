@@ -156,6 +156,7 @@ void Estimator::place_like(const Estimator& other) {
   filter_.place_like(other.filter_);
   doubt_m_ = other.doubt_m_;
   lost_ = other.lost_;
+  fits_nowhere_ = other.fits_nowhere_;
   time_doubt_m_ = std::max(time_doubt_m_, other.time_doubt_m_);
   unwatched_ = other.unwatched_;
   reference_ = other.reference_;

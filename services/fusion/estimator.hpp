@@ -100,8 +100,6 @@ class Estimator {
   void do_without(Source source) { watched(source).isolated = watched(source).convicted = false; }
   /// GNSS has agreed with the motion for a while.
   [[nodiscard]] bool gnss_proven() const { return gnss_agreed_ >= kGnssProof; }
-  /// ... and does so now.
-  [[nodiscard]] bool held_by_gnss() const;
   /// What GNSS that agrees with the motion may still be wrong by.
   [[nodiscard]] double gnss_bound_m() const;
   /// Takes over place and speed, as independent knowledge.
@@ -287,9 +285,10 @@ class Estimator {
   Offer fix_offer_;           // of the last fix
   int landmarks_agreed_ = 0;  // in a row
   std::optional<RefusedFix> refused_fix_;
-  int gnss_agreed_ = 0;     // fixes, since three in a row were refused
-  bool corrected_ = false;  // the place was moved against the filter's word, not confirmed yet
-  bool lost_ = false;       // what is sighted fits the map nowhere near, and no fix has been used since
+  int gnss_agreed_ = 0;        // fixes, since three in a row were refused
+  bool corrected_ = false;     // the place was moved against the filter's word, not confirmed yet
+  bool fits_nowhere_ = false;  // what is sighted, on the map near this place: map_matcher's last word
+  bool lost_ = false;          // it said so, and no landmark has been used since
   uint32_t reference_ = 0;
   std::array<uint32_t, 16> met_{};  // landmarks that were used last, newest first; 0 = none
   bool fix_again_ = false;

@@ -28,6 +28,7 @@ constexpr double kSilentS = 1.0;
 constexpr double kSilentSlip = 0.1;           // share of the way
 constexpr double kGyroPositionSigmaM = 30.0;  // within which the curvature may be taken as linear
 constexpr double kTurnSigmas = 4.0;
+constexpr double kTurnSigmasOfTwo = 2.0;  // without the worst second
 constexpr double kTaughtS = 30.0;
 constexpr double kSleeperM = 0.7;  // one more or less: the odd error of a step
 constexpr double kBlindS = 0.3;
@@ -397,9 +398,14 @@ void Estimator::remember_turn(double rate_rps, double speed_mps) {
                    parameters_->gyro_sigma_rps * period_s, period_s});
 }
 
+// Where the place is in doubt, the turns of this place say nothing.
 void Estimator::compare_turns() {
-  const double strays = turned_way_.strays(*path_, {filter_.sigma(StateIndex::gyro_bias), filter_.path_sigma_m()});
-  if (strays > kTurnSigmas) track_doubt_.strayed();
+  if (lost_) return;
+  const auto promised = widened(interval());
+  const double half_m = 0.5 * (promised.ahead_m - promised.behind_m);
+  const double place_m = std::max(filter_.path_sigma_m(), half_m / parameters_->interval_factor);
+  const auto strays = turned_way_.strays(*path_, {filter_.sigma(StateIndex::gyro_bias), place_m});
+  if (strays.most > kTurnSigmas && strays.without_worst > kTurnSigmasOfTwo) track_doubt_.strayed();
 }
 
 }  // namespace railfix::fusion

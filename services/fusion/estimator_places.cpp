@@ -11,7 +11,8 @@ namespace {
 
 constexpr int kAgreementsOfGnss = 5;  // in a row: where it scatters one agrees by chance
 constexpr double kForgotten = 2.0;    // of a landmark's sigmas is the place's when the way since has outgrown it
-constexpr double kOffTrackM = 15.0;   // a GNSS fix further beside the track is none
+constexpr double kBesideLandmarkS = 1.0;
+constexpr double kOffTrackM = 15.0;  // a GNSS fix further beside the track is none
 // Of the sigma of a GNSS fix; squares add up to the whole.
 constexpr double kGnssLastingShare = 0.866;
 constexpr double kGnssNewShare = 0.5;
@@ -67,6 +68,8 @@ void Estimator::use(const GnssInput& sample) {
   } else if (agrees && filter_.offer_position(measured, parameters_->gate_gnss).used) {
     gnss.accept(sample.stamp_ns);
     ++gnss_agreed_;
+    // The rival without GNSS stays lost: the interval holds what GNSS may be wrong by.
+    if (gnss_proven()) lost_ = false;
   } else if (++gnss.refused >= kRefusalsToIsolate) {
     gnss.isolate(sample.stamp_ns);
     gnss_agreed_ = 0;
@@ -87,7 +90,9 @@ void Estimator::use_track(const FixInput& fix) {
   // What is said of another track is no more than its rest for this one.
   const double here_m = filter_.path_distance_m();
   const auto of_m = path_->distance_of({fix.edge, fix.offset_m, fix.direction}, here_m);
-  lost_ = lost_ || fix.fits_nowhere;
+  // A word that comes beside a landmark is of before it.
+  fits_nowhere_ = fix.fits_nowhere && !used_within(Source::landmark, kBesideLandmarkS);
+  lost_ = lost_ || fits_nowhere_;
   track_doubt_.said(of_m ? fix.probability : std::min(fix.probability, 1 - fix.probability), of_m, here_m);
 }
 
@@ -105,6 +110,7 @@ void Estimator::use(const FixInput& fix) {
     return;
   }
   if (!path_ || fix.probability < parameters_->fix_min_probability) return;
+  if (lost_ && fix.kind == FixKind::curvature) return;  // some curve fits in every window so wide
   const track::EdgePosition place{fix.edge, fix.offset_m, fix.direction};
   const auto path_distance_m = path_->distance_of(place, filter_.path_distance_m());
   if (!path_distance_m) {

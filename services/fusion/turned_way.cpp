@@ -10,18 +10,22 @@ namespace {
 
 constexpr double kJumpM = 3.0;
 constexpr double kJumpShare = 0.1;        // of a piece: the speed changes in it
-constexpr double kMapTurnShare = 0.1;     // a map has its curves so wrong, ...
-constexpr double kMapHeadingRad = 0.005;  // ... and every heading
+constexpr double kMapTurnShare = 0.15;    // a map has its curves so wrong, ...
+constexpr double kMapHeadingRad = 0.005;  // ... every heading ...
+constexpr double kMapPlaceM = 1.5;        // ... and every place, ...
+constexpr double kPointsM = 10.0;         // ... but points, which may be drawn, so much
 constexpr double kBogiesM = 20.0;         // the rear one is up to so far behind the camera's foot
-constexpr double kBogiesStepM = 5.0;
+constexpr double kShiftStepM = 5.0;
 
 }  // namespace
 
 void TurnedWay::add(Piece piece) {
-  const double jump_m = kJumpM + kJumpShare * std::abs(piece.to_m - piece.from_m);
+  const double way_m = piece.to_m - piece.from_m;
   if (!pieces_.empty()) {
-    if (std::abs(piece.from_m - pieces_.back().to_m) < jump_m) {
-      piece.from_m = pieces_.back().to_m;
+    const Piece& last = pieces_.back();
+    const bool goes_on = std::abs(piece.from_m - last.to_m) < kJumpM + kJumpShare * std::abs(way_m);
+    if (goes_on && way_m * (last.to_m - last.from_m) > 0) {
+      piece.from_m = last.to_m;
     } else {
       pieces_.clear();
     }
@@ -30,21 +34,23 @@ void TurnedWay::add(Piece piece) {
   pieces_.push_back(piece);
 }
 
-double TurnedWay::strays(const track::Path& path, const Errors& errors) const {
-  double least = INFINITY;
-  for (double behind_m = 0; behind_m <= kBogiesM; behind_m += kBogiesStepM)
-    least = std::min(least, strays_of_body(path, errors, behind_m));
+TurnedWay::Strays TurnedWay::strays(const track::Path& path, const Errors& errors) const {
+  Strays least{INFINITY, INFINITY};
+  for (double behind_m = -kPointsM; behind_m <= kBogiesM + kPointsM; behind_m += kShiftStepM) {
+    const Strays shifted = strays_shifted(path, errors, behind_m);
+    if (shifted.most < least.most) least = shifted;
+  }
   return least;
 }
 
-double TurnedWay::strays_of_body(const track::Path& path, const Errors& errors, double behind_m) const {
+TurnedWay::Strays TurnedWay::strays_shifted(const track::Path& path, const Errors& errors, double behind_m) const {
   struct Sum {
     double off_rad = 0, variance = 0, bend_rad = 0, time_s = 0, curvature_per_m = 0;
   };
-  if (pieces_.empty()) return 0;
+  if (pieces_.empty()) return {};
   track::TrackPoint begin = path.at(pieces_.front().from_m - behind_m);
   std::vector<Sum> sums{{.curvature_per_m = begin.curvature_per_m}};
-  double most = 0;
+  Strays strays;
   for (const Piece& piece : pieces_) {
     const track::TrackPoint end = path.at(piece.to_m - behind_m);
     // Headings grow to the right.
@@ -53,16 +59,22 @@ double TurnedWay::strays_of_body(const track::Path& path, const Errors& errors, 
     const Sum& before = sums.back();
     const Sum sum{before.off_rad + piece.turn_rad - bend_rad, before.variance + piece.sigma_rad * piece.sigma_rad,
                   before.bend_rad + std::abs(bend_rad), before.time_s + piece.time_s, end.curvature_per_m};
-    for (const Sum& from : sums) {
+    sums.push_back(sum);
+    double worst_rad = 0;
+    for (size_t i = sums.size() - 1; i-- > 0;) {
+      const Sum& from = sums[i];
+      const double off_rad = sum.off_rad - from.off_rad;
+      worst_rad = std::max(worst_rad, std::abs(sums[i + 1].off_rad - from.off_rad));
       const double gyro_rad =
           std::hypot(std::sqrt(sum.variance - from.variance), errors.bias_rps * (sum.time_s - from.time_s));
       const double map_rad = std::hypot(kMapHeadingRad, kMapTurnShare * (sum.bend_rad - from.bend_rad));
-      const double place_rad = errors.place_m * (sum.curvature_per_m - from.curvature_per_m);
-      most = std::max(most, std::abs(sum.off_rad - from.off_rad) / std::hypot(gyro_rad, map_rad, place_rad));
+      const double place_rad = std::hypot(errors.place_m, kMapPlaceM) * (sum.curvature_per_m - from.curvature_per_m);
+      const double sigma_rad = std::hypot(gyro_rad, map_rad, place_rad);
+      if (std::abs(off_rad) <= strays.most * sigma_rad) continue;
+      strays = {std::abs(off_rad) / sigma_rad, std::max(0.0, std::abs(off_rad) - worst_rad) / sigma_rad};
     }
-    sums.push_back(sum);
   }
-  return most;
+  return strays;
 }
 
 }  // namespace railfix::fusion

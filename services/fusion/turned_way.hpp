@@ -25,15 +25,20 @@ class TurnedWay {
     double bias_rps = 0;
     double place_m = 0;
   };
-  /// Forgets those before where it does not go on from them.
+  /// Forgets those before where it does not go on from them, or back over them: the points may be thrown meanwhile.
   void add(Piece piece);
   void clear() { pieces_.clear(); }
-  /// The most by which a part of the way turned otherwise than the path there, in standard deviations. The body of a
-  /// car turns up to a bogie distance behind the camera's foot: as far behind as fits best.
-  [[nodiscard]] double strays(const track::Path& path, const Errors& errors) const;
+  /// By how much the part of the way that turned most otherwise than the path did so, in standard deviations.
+  struct Strays {
+    double most = 0;
+    double without_worst = 0;  // without its worst piece, which may be a bump
+  };
+  /// The body of a car turns up to a bogie distance behind the camera's foot, and a map has its points not quite where
+  /// they are: shifted by what fits best.
+  [[nodiscard]] Strays strays(const track::Path& path, const Errors& errors) const;
 
  private:
-  [[nodiscard]] double strays_of_body(const track::Path& path, const Errors& errors, double behind_m) const;
+  [[nodiscard]] Strays strays_shifted(const track::Path& path, const Errors& errors, double behind_m) const;
   static constexpr size_t kMost = 12;
   std::vector<Piece> pieces_;  // oldest first
 };

@@ -169,7 +169,7 @@ void MapMatcherService::use(const msg::OdometryStep& step) {
   if (!exits_ && std::abs(chain_.odometer_m() - matched_m_) < config_.match_every_m) return;
   matched_m_ = chain_.odometer_m();
   const auto prior = prior_at(step.stamp_ns());
-  if (!prior) return;
+  if (!prior || place_doubt() > 0) return;  // in the wide window of a place in doubt some curve always fits
   const auto fix = exits_ ? exits_->match(step.stamp_ns(), chain_.odometer_m(), *prior)
                           : curvature_->match(step.stamp_ns(), chain_.odometer_m(), *prior);
   if (fix) publish(*fix, msg::FIX_CURVATURE, step.grabbed_ns());

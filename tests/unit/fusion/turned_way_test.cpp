@@ -37,28 +37,61 @@ TEST(TurnedWay, FitsTheLegThatWasTakenWhereverTheBogiesAreAndNoOther) {
     const auto turnout = leg(radius_m);
     for (const double behind_m : {0.0, 5.0, 13.0, 20.0}) {
       const auto way = ridden(turnout, kPointsM - 60, kPointsM + 70, 11, behind_m);
-      EXPECT_LT(way.strays(turnout, kErrors), 3) << radius_m << " m, " << behind_m << " m";
-      EXPECT_GT(way.strays(straight, kErrors), 4) << radius_m << " m, " << behind_m << " m";
+      EXPECT_LT(way.strays(turnout, kErrors).most, 3) << radius_m << " m, " << behind_m << " m";
+      EXPECT_GT(way.strays(straight, kErrors).most, 4) << radius_m << " m, " << behind_m << " m";
     }
     const auto on = ridden(straight, kPointsM - 60, kPointsM + 70, 11, 0);
-    EXPECT_LT(on.strays(straight, kErrors), 0.01);
-    EXPECT_GT(on.strays(turnout, kErrors), 4) << radius_m;
+    EXPECT_LT(on.strays(straight, kErrors).most, 0.01);
+    EXPECT_GT(on.strays(turnout, kErrors).most, 4) << radius_m;
   }
 }
 
 TEST(TurnedWay, OfATrainThatBacksIsTheSameTheOtherWay) {
   const auto turnout = leg(300);
   const auto back = ridden(turnout, kPointsM + 70, kPointsM - 60, -8, 10);
-  EXPECT_LT(back.strays(turnout, kErrors), 3);
-  EXPECT_GT(back.strays(leg(INFINITY), kErrors), 4);
+  EXPECT_LT(back.strays(turnout, kErrors).most, 3);
+  EXPECT_GT(back.strays(leg(INFINITY), kErrors).most, 4);
 }
 
 TEST(TurnedWay, BeginsAnewWhereThePlaceJumps) {
   const auto turnout = leg(300);
   auto way = ridden(turnout, kPointsM - 60, kPointsM + 70, 11, 0);
-  EXPECT_GT(way.strays(leg(INFINITY), kErrors), 4);
+  EXPECT_GT(way.strays(leg(INFINITY), kErrors).most, 4);
   way.add({kPointsM + 200, kPointsM + 211, 0, kSigmaRad, 1});
-  EXPECT_LT(way.strays(leg(INFINITY), kErrors), 0.01);
+  EXPECT_LT(way.strays(leg(INFINITY), kErrors).most, 0.01);
+}
+
+// Over the points, back, and on over the other leg: what was felt on the first says nothing of the second.
+TEST(TurnedWay, BeginsAnewWhereTheTrainBacks) {
+  const auto straight = leg(INFINITY);
+  const auto turnout = leg(190);
+  auto way = ridden(straight, kPointsM - 20, kPointsM + 20, 3, 0);
+  for (double m = kPointsM + 20; m > kPointsM - 6; m -= 3) way.add({m, m - 3, 0, kSigmaRad, 1});
+  const double back_m = kPointsM - 7;
+  for (double m = back_m; m < kPointsM + 10; m += 3)
+    way.add({m, m + 3, turnout.at(m).pose.heading_rad - turnout.at(m + 3).pose.heading_rad, kSigmaRad, 1});
+  EXPECT_LT(way.strays(turnout, kErrors).most, 3);
+}
+
+TEST(TurnedWay, ABumpIsOneWorstPiece) {
+  const auto straight = leg(INFINITY);
+  auto way = ridden(straight, 0, 100, 20, 0);
+  way.add({100, 120, 0.05, kSigmaRad, 1});
+  const auto strays = way.strays(straight, kErrors);
+  EXPECT_GT(strays.most, 4);
+  EXPECT_LT(strays.without_worst, 1);
+}
+
+TEST(TurnedWay, PointsThatAreDrawnTenMetresElsewhereAreNoOtherLeg) {
+  const auto mapped = leg(190);
+  for (const double moved_m : {-10.0, 10.0}) {
+    TurnedWay way;
+    for (double m = kPointsM - 60; m < kPointsM + 70; m += 11)
+      way.add({m, m + 11, mapped.at(m - moved_m).pose.heading_rad - mapped.at(m + 11 - moved_m).pose.heading_rad,
+               kSigmaRad, 1});
+    EXPECT_LT(way.strays(mapped, kErrors).most, 3) << moved_m;
+    EXPECT_GT(way.strays(leg(INFINITY), kErrors).most, 4) << moved_m;
+  }
 }
 
 }  // namespace
