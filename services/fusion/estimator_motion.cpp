@@ -398,9 +398,9 @@ void Estimator::remember_turn(double rate_rps, double speed_mps) {
                    parameters_->gyro_sigma_rps * period_s, period_s});
 }
 
-// Where the place is in doubt, the turns of this place say nothing.
+// Where no switch was run over there is no other leg, and where the place is in doubt its turns say nothing.
 void Estimator::compare_turns() {
-  if (lost_) return;
+  if (lost_ || !track_doubt_.divided()) return;
   const auto promised = widened(interval());
   const double half_m = 0.5 * (promised.ahead_m - promised.behind_m);
   const double place_m = std::max(filter_.path_sigma_m(), half_m / parameters_->interval_factor);

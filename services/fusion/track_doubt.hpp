@@ -23,8 +23,10 @@ class TrackDoubt {
   void seen_here();
   /// The train turned as this track does, or not; bends: where that says something.
   void turned(bool fits, bool bends);
-  /// All its turns together are none of this track's.
-  void strayed() { turns_otherwise_ = turns_otherwise_ || divided_; }
+  /// A switch was run over since anything on this track was seen, or nothing was: only then another one is possible.
+  [[nodiscard]] bool divided() const { return divided_; }
+  /// There all its turns together are none of this track's.
+  void strayed() { turns_otherwise_ = true; }
   [[nodiscard]] bool turns_otherwise() const { return turns_otherwise_; }
   /// Who looked holds some other place to be far more probable.
   [[nodiscard]] bool disbelieved() const;

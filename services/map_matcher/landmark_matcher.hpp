@@ -59,6 +59,8 @@ class LandmarkMatcher {
   /// How probable it is, by all sightings so far, that the train is not in the window; 0 from where they confirm it
   /// until they speak against it again.
   [[nodiscard]] double doubt() const { return confirmed_ ? 0 : odds_elsewhere_ / (1 + odds_elsewhere_); }
+  /// The same where it is more probable than not, which is worth saying; else 0.
+  [[nodiscard]] double place_doubt() const { return doubt() > kDoubted ? doubt() : 0; }
   /// The travelled distance does not go on from the one before: earlier sightings say nothing any more.
   void forget() {
     seen_.clear();
@@ -68,6 +70,7 @@ class LandmarkMatcher {
   }
 
  private:
+  static constexpr double kDoubted = 0.5;
   struct Seen {
     Sighting sighting;
     double place_m = 0;         // of the object in distance run

@@ -18,7 +18,6 @@ constexpr double kLeastWayM = 1e-5;       // standing still turns nothing
 constexpr double kTrackEveryS = 1.0;      // the track is said again after this time ...
 constexpr double kOpenTrackEveryM = 2.0;  // ... or, while it is not known, this way
 constexpr double kNoCameraS = 0.5;        // without an odometry step
-constexpr double kDoubted = 0.5;          // the place is said to be in doubt from this probability on
 constexpr double kCountM = 20.0;
 constexpr double kLostS = 30.0;      // after so long unseen the track is chosen anew
 constexpr double kRateShare = 0.75;  // of the curvature's sigma comes from its unknown rate
@@ -273,7 +272,7 @@ void MapMatcherService::move_without_camera(int64_t to_ns) {
 // What GNSS holds is there: then the map or the sightings are wrong.
 double MapMatcherService::place_doubt() const {
   if (!landmarks_ || (state_->sources() & msg::SOURCE_GNSS) != 0) return 0;
-  return landmarks_->doubt() > kDoubted ? landmarks_->doubt() : 0;
+  return landmarks_->place_doubt();
 }
 
 // The chooser is where it was moved to: a step that comes late does not take it back.

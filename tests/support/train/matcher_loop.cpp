@@ -17,7 +17,6 @@ constexpr double kWanderPerM = 5e-5;
 constexpr double kWanderLengthM = 20;
 constexpr double kBiasPerM = 2e-5;
 constexpr double kOutlierPerM = 2e-3;
-constexpr double kDoubted = 0.5;  // the place, by map_matcher
 
 map_matcher::PlacedTrain placed(const fusion::TrainEstimate& state) {
   return {state.stamp_ns, state.position, state.speed_mps, state.distance_m, state.over_m, state.under_m};
@@ -96,8 +95,8 @@ void MatcherLoop::match_sightings(const fusion::TrainEstimate& state, double arr
 // As map_matcher says it, with a track of which only the rest is believed.
 void MatcherLoop::doubt_place(const fusion::TrainEstimate& state, double due_s) {
   const bool gnss = (state.sources & 1U << static_cast<unsigned>(fusion::Source::gnss)) != 0;
-  const double elsewhere = landmarks_->doubt();
-  if (gnss || elsewhere <= kDoubted) return;
+  const double elsewhere = landmarks_->place_doubt();
+  if (gnss || elsewhere == 0) return;
   const auto& place = state.position;
   found_.emplace_back(due_s, fusion::FixInput{state.stamp_ns, place.edge, place.offset_m, INFINITY, 1 - elsewhere, 0,
                                               fusion::FixKind::track, place.direction, nullptr, true});

@@ -13,7 +13,6 @@ constexpr double kPeriodS = 0.1;
 constexpr double kSpeedMps = 25;
 constexpr double kAheadM = 8;  // of the foot a mast is sighted
 constexpr double kLackM = 1500;
-constexpr double kDoubted = 0.5;
 
 /// Masts every 40 to 65 m, of which the camera sees four of five.
 class MastRide {
@@ -70,7 +69,7 @@ class MastRide {
   }
   // As map_matcher's service does it.
   void say_track() {
-    const double elsewhere = matcher_->doubt() > kDoubted ? matcher_->doubt() : 0;
+    const double elsewhere = matcher_->place_doubt();
     if (elsewhere > 0 && !doubted_at_m_) doubted_at_m_ = place_m_;
     fusion_->add(FixInput{at(t_s_), 1, state_.position.offset_m, INFINITY, 1 - elsewhere, 0, FixKind::track,
                           track::Direction::forward, nullptr, elsewhere > 0});

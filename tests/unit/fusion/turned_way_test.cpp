@@ -22,12 +22,14 @@ track::Path leg(double radius_m) {
 }
 
 /// What a perfect gyro feels in a body that turns so far behind the foot; backwards where the speed is negative.
+void ride(TurnedWay& way, const track::Path& path, double from_m, double to_m, double speed_mps, double behind_m) {
+  const auto heading_rad = [&](double m) { return path.at(m - behind_m).pose.heading_rad; };
+  for (double m = from_m; (to_m - m) * speed_mps > 0; m += speed_mps)
+    way.add({m, m + speed_mps, heading_rad(m) - heading_rad(m + speed_mps), kSigmaRad, 1});
+}
 TurnedWay ridden(const track::Path& path, double from_m, double to_m, double speed_mps, double behind_m) {
   TurnedWay way;
-  for (double m = from_m; (to_m - m) * speed_mps > 0; m += speed_mps) {
-    const double turn_rad = path.at(m - behind_m).pose.heading_rad - path.at(m + speed_mps - behind_m).pose.heading_rad;
-    way.add({m, m + speed_mps, turn_rad, kSigmaRad, 1});
-  }
+  ride(way, path, from_m, to_m, speed_mps, behind_m);
   return way;
 }
 
@@ -66,10 +68,8 @@ TEST(TurnedWay, BeginsAnewWhereTheTrainBacks) {
   const auto straight = leg(INFINITY);
   const auto turnout = leg(190);
   auto way = ridden(straight, kPointsM - 20, kPointsM + 20, 3, 0);
-  for (double m = kPointsM + 20; m > kPointsM - 6; m -= 3) way.add({m, m - 3, 0, kSigmaRad, 1});
-  const double back_m = kPointsM - 7;
-  for (double m = back_m; m < kPointsM + 10; m += 3)
-    way.add({m, m + 3, turnout.at(m).pose.heading_rad - turnout.at(m + 3).pose.heading_rad, kSigmaRad, 1});
+  ride(way, straight, kPointsM + 20, kPointsM - 6, -3, 0);
+  ride(way, turnout, kPointsM - 7, kPointsM + 10, 3, 0);
   EXPECT_LT(way.strays(turnout, kErrors).most, 3);
 }
 
@@ -85,10 +85,7 @@ TEST(TurnedWay, ABumpIsOneWorstPiece) {
 TEST(TurnedWay, PointsThatAreDrawnTenMetresElsewhereAreNoOtherLeg) {
   const auto mapped = leg(190);
   for (const double moved_m : {-10.0, 10.0}) {
-    TurnedWay way;
-    for (double m = kPointsM - 60; m < kPointsM + 70; m += 11)
-      way.add({m, m + 11, mapped.at(m - moved_m).pose.heading_rad - mapped.at(m + 11 - moved_m).pose.heading_rad,
-               kSigmaRad, 1});
+    const auto way = ridden(mapped, kPointsM - 60, kPointsM + 70, 11, moved_m);
     EXPECT_LT(way.strays(mapped, kErrors).most, 3) << moved_m;
     EXPECT_GT(way.strays(leg(INFINITY), kErrors).most, 4) << moved_m;
   }
