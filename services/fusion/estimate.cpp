@@ -27,7 +27,26 @@ std::string since(const SensorWatch& watch) {
   return text;
 }
 
+std::string why_given_up(Against because) {
+  switch (because) {
+    case Against::sightings:
+      return ": it was given up, what was sighted fitted the map nowhere near it";
+    case Against::turning:
+      return ": it was given up, the train turned otherwise than the track there";
+    default:
+      return ": it was given up, GNSS contradicted it";
+  }
+}
+
 }  // namespace
+
+bool Estimator::is_only_told() const {
+  return watch(Source::landmark).used_ns == 0 && watch(Source::gnss).used_ns == 0;
+}
+
+bool Estimator::gnss_denies_start() const {
+  return watch(Source::gnss).isolated && is_only_told();
+}
 
 // The sentences that people read on the dashboard.
 void TrainEstimate::degrade(const std::string& why) {
@@ -55,7 +74,7 @@ double Estimator::known_to_m() const {
 double Estimator::lost_to_m() const {
   const auto& p = *parameters_;
   const double budgets_m = p.unusable_budgets * (p.budget_m + p.budget_per_m * since_reference_m());
-  return lost_ ? std::clamp(budgets_m, kLostAtLeastM, kLostAtMostM) : 0.0;
+  return wrong_place_.lost() ? std::clamp(budgets_m, kLostAtLeastM, kLostAtMostM) : 0.0;
 }
 
 // As an odometer's accuracy is stated: a share of the way, and one slip at the highest speed.
@@ -170,23 +189,22 @@ void Estimator::judge_sensors(TrainEstimate& e) const {
 void Estimator::judge_place(TrainEstimate& e) const {
   const auto& gnss = watch(Source::gnss);
   if (gnss.isolated) e.degrade("GNSS contradicts the position" + since(gnss));
-  // Somebody said where the train begins, and the first that measures it says otherwise.
-  const bool only_told = watch(Source::landmark).used_ns == 0 && watch(Source::gnss).used_ns == 0;
-  if (gnss.isolated && only_told) e.integrity = Integrity::unusable;
+  if (gnss_denies_start()) e.integrity = Integrity::unusable;
   if (time_doubt_m_ > 0) e.degrade("a gap in time: the clock was set, or nothing measured");
   if (refused_fix_) e.degrade("a position fix was refused");
   if (corrected_) e.degrade("position was corrected by two fixes against the filter");
   if (off_path_) e.degrade("a position fix lies on another track");
   if (track_doubt_.turns_otherwise()) e.degrade("the train turns otherwise than this track");
-  if (lost_ && fits_nowhere_) {
+  if (track_doubt_.turns_otherwise() && wrong_place_.strays()) e.integrity = Integrity::unusable;
+  if (wrong_place_.fits_nowhere()) {
     e.degrade("what is sighted fits the map nowhere near this place");
     e.integrity = Integrity::unusable;
-  } else if (lost_) {
+  } else if (wrong_place_.lost()) {
     e.degrade("what was sighted did not fit the map: waits for a landmark");
   } else if (track_doubt_.disbelieved()) {
     e.degrade("map_matcher finds some other place far more probable");
   }
-  if (!path_) e.degrade("place on the map not known");
+  if (!path_) e.degrade("place on the map not known" + (given_up_ ? why_given_up(*given_up_) : ""));
   if (path_ && (filter_.path_distance_m() < path_->begin_m() || filter_.path_distance_m() > path_->end_m())) {
     e.degrade("beyond the end of the mapped track");
   }

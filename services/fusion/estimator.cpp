@@ -73,7 +73,10 @@ void Estimator::apply(const Event& event) {
         use(input);
       },
       event);
-  if (path_) track_doubt_.move(*path_, filter_.path_distance_m());
+  if (path_) {
+    track_doubt_.move(*path_, filter_.path_distance_m());
+    wrong_place_.move(distance_m(), {track_doubt_.turns_otherwise_now() && !gnss_proven(), gnss_denies_start()});
+  }
   watch_standstill();
 }
 
@@ -155,13 +158,32 @@ void Estimator::place_like(const Estimator& other) {
   track_doubt_ = other.track_doubt_;
   filter_.place_like(other.filter_);
   doubt_m_ = other.doubt_m_;
-  lost_ = other.lost_;
-  fits_nowhere_ = other.fits_nowhere_;
+  wrong_place_ = other.wrong_place_;
+  given_up_ = other.given_up_;
   time_doubt_m_ = std::max(time_doubt_m_, other.time_doubt_m_);
   unwatched_ = other.unwatched_;
   reference_ = other.reference_;
   met_ = other.met_;
   landmarks_agreed_ = other.landmarks_agreed_;
+}
+
+// Distance and speed run on. What a false place has taught of the scales is forgotten with it.
+void Estimator::give_place_up(Against because) {
+  path_.reset();
+  given_up_ = because;
+  wrong_place_ = {};
+  track_doubt_ = {};
+  turned_way_.clear();
+  for (const auto source : {Source::gnss, Source::landmark, Source::curvature}) watched(source) = {};
+  gnss_agreed_ = 0;
+  refused_fix_.reset();
+  off_path_.reset();
+  corrected_ = false;
+  doubt_behind_m_ = doubt_ahead_m_ = 0;
+  reference_ = 0;
+  met_ = {};
+  landmarks_agreed_ = 0;
+  filter_.forget_references(*parameters_);
 }
 
 // Nothing from any sensor for a while: the clock may have been set forward. What counts way over the gap tells.

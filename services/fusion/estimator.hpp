@@ -20,6 +20,7 @@
 #include "fusion/track_doubt.hpp"
 #include "fusion/turned_way.hpp"
 #include "fusion/wheel_noise.hpp"
+#include "fusion/wrong_place.hpp"
 #include "track/path.hpp"
 
 namespace railfix::fusion {
@@ -139,6 +140,11 @@ class Estimator {
   [[nodiscard]] const SensorWatch& watch(Source source) const { return watches_[static_cast<size_t>(source)]; }
   [[nodiscard]] bool knows_picture(int64_t stamp_ns) const { return filter_.has_clone(stamp_ns); }
   [[nodiscard]] const std::shared_ptr<const track::Path>& path() const { return path_; }
+  /// The place is to be given up: where the train is, nobody knows any more.
+  [[nodiscard]] std::optional<Against> place_is_wrong() const { return wrong_place_.proven(); }
+  void give_place_up(Against because);
+  /// Who spoke against the last place; nothing where there is one, or was none yet.
+  [[nodiscard]] std::optional<Against> given_up() const { return given_up_; }
 
  private:
   /// Samples until they are used as their mean.
@@ -239,6 +245,10 @@ class Estimator {
   void use_yaw_rate(double rate_rps);
   void remember_turn(double rate_rps, double speed_mps);
   void compare_turns();
+  /// Somebody said where the train begins, and nothing has confirmed it yet.
+  [[nodiscard]] bool is_only_told() const;
+  /// ... and GNSS, the first that measures it, says otherwise.
+  [[nodiscard]] bool gnss_denies_start() const;
   void use_track(const FixInput& fix);
   Offer offer_place(const MeasuredPlace& place);
   Offer offer_place_again(double path_distance_m, double sigma_m);
@@ -285,10 +295,8 @@ class Estimator {
   Offer fix_offer_;           // of the last fix
   int landmarks_agreed_ = 0;  // in a row
   std::optional<RefusedFix> refused_fix_;
-  int gnss_agreed_ = 0;        // fixes, since three in a row were refused
-  bool corrected_ = false;     // the place was moved against the filter's word, not confirmed yet
-  bool fits_nowhere_ = false;  // what is sighted, on the map near this place: map_matcher's last word
-  bool lost_ = false;          // it said so, and no landmark has been used since
+  int gnss_agreed_ = 0;     // fixes, since three in a row were refused
+  bool corrected_ = false;  // the place was moved against the filter's word, not confirmed yet
   uint32_t reference_ = 0;
   std::array<uint32_t, 16> met_{};  // landmarks that were used last, newest first; 0 = none
   bool fix_again_ = false;
@@ -305,6 +313,8 @@ class Estimator {
   bool standstill_ = false;
   TrackDoubt track_doubt_;
   TurnedWay turned_way_;
+  WrongPlace wrong_place_;
+  std::optional<Against> given_up_;  // the last place was, and there is none since
   int64_t start_ns_ = 0;
 };
 

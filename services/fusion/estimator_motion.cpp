@@ -400,7 +400,7 @@ void Estimator::remember_turn(double rate_rps, double speed_mps) {
 
 // Where no switch was run over there is no other leg, and where the place is in doubt its turns say nothing.
 void Estimator::compare_turns() {
-  if (lost_ || !track_doubt_.divided()) return;
+  if (wrong_place_.lost() || !track_doubt_.divided()) return;
   const auto promised = widened(interval());
   const double half_m = 0.5 * (promised.ahead_m - promised.behind_m);
   const double place_m = std::max(filter_.path_sigma_m(), half_m / parameters_->interval_factor);

@@ -69,7 +69,7 @@ void Estimator::use(const GnssInput& sample) {
     gnss.accept(sample.stamp_ns);
     ++gnss_agreed_;
     // The rival without GNSS stays lost: the interval holds what GNSS may be wrong by.
-    if (gnss_proven()) lost_ = false;
+    if (gnss_proven()) wrong_place_.found();
   } else if (++gnss.refused >= kRefusalsToIsolate) {
     gnss.isolate(sample.stamp_ns);
     gnss_agreed_ = 0;
@@ -91,8 +91,7 @@ void Estimator::use_track(const FixInput& fix) {
   const double here_m = filter_.path_distance_m();
   const auto of_m = path_->distance_of({fix.edge, fix.offset_m, fix.direction}, here_m);
   // A word that comes beside a landmark is of before it.
-  fits_nowhere_ = fix.fits_nowhere && !used_within(Source::landmark, kBesideLandmarkS);
-  lost_ = lost_ || fits_nowhere_;
+  wrong_place_.said(fix.fits_nowhere && !used_within(Source::landmark, kBesideLandmarkS));
   track_doubt_.said(of_m ? fix.probability : std::min(fix.probability, 1 - fix.probability), of_m, here_m);
 }
 
@@ -104,13 +103,14 @@ void Estimator::use(const FixInput& fix) {
   watched(fix.kind == FixKind::curvature ? Source::curvature : Source::landmark).seen_ns = fix.stamp_ns;
   if (fix.new_path) {
     path_ = fix.new_path;
+    given_up_.reset();
     filter_.set_origin(0, std::hypot(fix.sigma_m, parameters_->fix_sigma_floor_m));
     track_doubt_.said(fix.probability, std::nullopt, filter_.path_distance_m());
     accept(fix);
     return;
   }
   if (!path_ || fix.probability < parameters_->fix_min_probability) return;
-  if (lost_ && fix.kind == FixKind::curvature) return;  // some curve fits in every window so wide
+  if (wrong_place_.lost() && fix.kind == FixKind::curvature) return;  // some curve fits in every window so wide
   const track::EdgePosition place{fix.edge, fix.offset_m, fix.direction};
   const auto path_distance_m = path_->distance_of(place, filter_.path_distance_m());
   if (!path_distance_m) {
@@ -176,13 +176,15 @@ double Estimator::doubted_beyond_sigma_m() const {
 void Estimator::accept(const FixInput& fix) {
   watched(fix.kind == FixKind::curvature ? Source::curvature : Source::landmark).accept(fix.stamp_ns);
   off_path_.reset();
-  track_doubt_.seen_here();
+  // Some curve may fit at a place that nobody has confirmed, though the train turns otherwise than the track there.
+  const bool by_chance = fix.kind == FixKind::curvature && (is_only_told() || track_doubt_.turns_otherwise());
+  if (!by_chance) track_doubt_.seen_here();
   // A vague fix helps, but settles no doubt and is nothing to measure a distance from. Landmarks are sharp by
   // themselves.
   if (fix.kind != FixKind::landmark && fix.sigma_m > 2 * filter_.path_sigma_m()) return;
   fix_verdict_ = FixVerdict::used;
   refused_fix_.reset();
-  lost_ = false;
+  if (!by_chance) wrong_place_.found();
   doubt_m_ = doubt_behind_m_ = doubt_ahead_m_ = time_doubt_m_ = 0;
   unwatched_ = {.distance_m = unwatched_.distance_m};
   reference_ = fix.landmark;

@@ -140,7 +140,8 @@ bool FusionService::take_over_known(const TrainEstimate& first) {
       return !under_way;
     }
     seq_ = std::max(seq_, known_->seq() + kNumbersUnheard);
-    if (map_ && known_->track_known() != 0) {
+    // Where the one before had given its start up, too: nothing else makes a place unknown that was told.
+    if (map_ && (known_->track_known() != 0 || believes_start_)) {
       begin_anew();
       return false;
     }
@@ -297,6 +298,7 @@ void FusionService::publish(const TrainEstimate& estimate, int64_t grabbed_ns) {
   message.grabbed_ns(grabbed_ns);
   message.distance_m(message.distance_m() + distance_offset_m_);
   fitness_ = fitness_of(estimate, map_ != nullptr);
+  if (latest_ && latest_->track_known() != 0 && !estimate.track_known) context_.log().warn(estimate.reason);
   latest_ = message;
   if (context_.in_charge()) {
     send(message);

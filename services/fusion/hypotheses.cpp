@@ -48,8 +48,13 @@ void Hypotheses::apply(const Event& event) {
   const auto* fix = std::get_if<FixInput>(&event);
   if (fix != nullptr && fix->kind != FixKind::track) {
     apply_fix(*fix, event);
-    return;
+  } else {
+    apply_to_all(event);
   }
+  if (const auto against = main_.place_is_wrong()) give_place_up(*against);
+}
+
+void Hypotheses::apply_to_all(const Event& event) {
   const Source source = source_of(event);
   begin_rival(source);
   main_.apply(event);
@@ -60,6 +65,15 @@ void Hypotheses::apply(const Event& event) {
   if (source == Source::camera || source == Source::wheel || (source == Source::imu && main_.in_the_dark())) {
     exclude_faulty();
     ask_rivals();
+  }
+}
+
+void Hypotheses::give_place_up(Against because) {
+  doubters_.clear();
+  residuals_ = {};
+  main_.give_place_up(because);
+  for (auto& rival : rivals_) {
+    if (rival.estimator) rival.estimator->give_place_up(because);
   }
 }
 

@@ -47,6 +47,8 @@ class Hypotheses {
   [[nodiscard]] uint32_t slipping() const;
   /// Those do without the wheel for that time; what one has found says nothing of the others.
   void block_wheel(const WheelBlock& block, uint32_t slipping);
+  /// From now on none knows where on the map the train is.
+  void give_place_up(Against because);
   [[nodiscard]] Promise promise() const;
   [[nodiscard]] TrainEstimate estimate(const Promise& promise) const;
   /// The last event was a fix that the main one used as it was (true), or not without giving something up (false).
@@ -104,6 +106,7 @@ class Hypotheses {
     void forget_excess() { excess = carried = unseen = {}; }
   };
 
+  void apply_to_all(const Event& event);
   void apply_fix(const FixInput& fix, const Event& event);
   bool adopt_by_fix(const FixInput& fix, const Estimator& before, const std::vector<Doubter>& doubters);
   bool adopt_doubter(const FixInput& fix, std::vector<Doubter> before);

@@ -272,6 +272,13 @@ void MotionFilter::loosen_scale(const FusionParameters& parameters) {
               squared(camera ? parameters.visual_scale_sigma : parameters.wheel_scale_sigma));
 }
 
+void MotionFilter::forget_references(const FusionParameters& parameters) {
+  reference_m_ = 0;
+  const double scale_sigma = unit_ != Odometer::wheel ? parameters.visual_scale_sigma : parameters.wheel_scale_sigma;
+  ud_.inflate(index(StateIndex::distance), squared(scale_sigma * value(StateIndex::distance)));
+  loosen_scale(parameters);
+}
+
 void MotionFilter::set_origin(double path_distance_m, double sigma_m) {
   x_(index(StateIndex::origin)) = path_distance_m - value(StateIndex::distance);
   ud_.reset(index(StateIndex::origin), squared(sigma_m));

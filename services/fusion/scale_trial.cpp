@@ -36,6 +36,7 @@ void ScaleTrial::apply(const Event& event) {
   main_.apply(event);
   if (!unlearnt_) return;
   unlearnt_->apply(event);
+  give_place_up();
   if (contradicted(event)) {
     drop_saved();
   } else if ((std::holds_alternative<FixInput>(event) || std::holds_alternative<GnssInput>(event)) && confirmed()) {
@@ -45,6 +46,14 @@ void ScaleTrial::apply(const Event& event) {
     unlearnt_.reset();
     state_ = SavedScalesAre::confirmed;
   }
+}
+
+// A place that one of the two sets has given up the other one must not go on with.
+void ScaleTrial::give_place_up() {
+  const auto& mine = main();
+  const auto& free = unlearnt_->main();
+  if (!mine.path() && free.path()) unlearnt_->give_place_up(mine.given_up().value_or(Against::sightings));
+  if (mine.path() && !free.path()) main_.give_place_up(free.given_up().value_or(Against::sightings));
 }
 
 void ScaleTrial::drop_saved() {

@@ -41,6 +41,7 @@ class ScaleTrial {
   [[nodiscard]] std::optional<OdometerScales> learnt() const;
 
  private:
+  void give_place_up();
   [[nodiscard]] bool contradicted(const Event& event);
   [[nodiscard]] bool ratio_is_another() const;
   [[nodiscard]] bool was_saved(Odometer odometer) const;

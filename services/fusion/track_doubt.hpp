@@ -28,6 +28,8 @@ class TrackDoubt {
   /// There all its turns together are none of this track's.
   void strayed() { turns_otherwise_ = true; }
   [[nodiscard]] bool turns_otherwise() const { return turns_otherwise_; }
+  /// ... and did so when it was looked at last.
+  [[nodiscard]] bool turns_otherwise_now() const { return turns_otherwise_ && turned_otherwise_ > 0; }
   /// Who looked holds some other place to be far more probable.
   [[nodiscard]] bool disbelieved() const;
   /// The train is at `place_m` of its path now.

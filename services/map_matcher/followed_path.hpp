@@ -38,7 +38,9 @@ class FollowedPath {
   /// The train's next state. An error when it is nowhere on the map.
   core::Result<Way> follow(const PlacedTrain& train);
 
-  /// Nullptr before the first state.
+  /// The place is not known any more.
+  void forget() { path_.reset(); }
+  /// Nullptr while the place is not known.
   [[nodiscard]] const std::shared_ptr<const track::Path>& path() const { return path_; }
   /// The window at a stamp, extrapolated from a state; nothing when that is too old, not on the path or too vague to be
   /// searched.

@@ -53,13 +53,20 @@ MapMatcherService::MapMatcherService(const MapMatcherConfig& config, service::Co
   context_.health().ready();
 }
 
-void MapMatcherService::restart() {
-  if (followed_) followed_.emplace(map_, ways_);
+// What was matched so far is of another place.
+void MapMatcherService::forget_place() {
+  if (followed_) followed_->forget();
   landmarks_.reset();
   curvature_.reset();
   exits_.reset();
-  locator_.reset();
   if (chooser_) chooser_.emplace(config_.track_parameters(), map_, ways_);
+  moved_ns_ = 0;
+  said_track_ = {};
+}
+
+void MapMatcherService::restart() {
+  forget_place();
+  locator_.reset();
   gyro_ = GyroTurn(config_.gyro);
   state_.reset();
   step_.reset();
@@ -67,8 +74,6 @@ void MapMatcherService::restart() {
   rails_seen_ns_ = 0;
   located_m_ = 0;
   matched_m_ = 0;
-  moved_ns_ = 0;
-  said_track_ = {};
   left_out_ = {};
 }
 
@@ -88,6 +93,7 @@ void MapMatcherService::use(const msg::TrainState& state) {
   const auto before = std::exchange(state_, state);
   if (before && before->standstill() != 0 && state.standstill() != 0) stand(before->stamp_ns(), state.stamp_ns());
   if (!map_ || state.track_known() == 0) {
+    if (before && before->track_known() != 0) forget_place();
     const auto left_out = left_out_.sentence(state.stamp_ns());
     const auto* unknown = map_ ? "the place on the map is not known yet" : "no map is configured";
     context_.health().degraded(left_out.empty() ? unknown : unknown + ("; " + left_out));
@@ -188,13 +194,16 @@ std::optional<Turn> MapMatcherService::turn_of_gyro(int64_t from_ns, int64_t to_
   return turn;
 }
 
+// A place that is no position may soon be given up: the way is measured already, and searched for then.
 void MapMatcherService::look_for_place(const msg::OdometryStep& step) {
-  if (!state_ || state_->track_known() != 0) {
+  const bool placed = state_ && state_->track_known() != 0;
+  if (!state_ || (placed && state_->integrity() != msg::INTEGRITY_UNUSABLE)) {
     locator_.reset();
     return;
   }
   if (!locator_) {
-    locator_.emplace(config_.locator_parameters(), std::make_shared<const NetworkIndex>(map_));
+    if (!index_) index_ = std::make_shared<const NetworkIndex>(map_);
+    locator_.emplace(config_.locator_parameters(), index_);
     located_m_ = chain_.odometer_m();
   }
   auto turn = turn_of_camera();
@@ -205,7 +214,7 @@ void MapMatcherService::look_for_place(const msg::OdometryStep& step) {
     return;
   }
   if (std::abs(turn->way_m) > kLeastWayM) locator_->move(turn->way_m, turn->turn_rad, turn->sigma_rad);
-  if (std::abs(chain_.odometer_m() - located_m_) < config_.locate_every_m) return;
+  if (placed || std::abs(chain_.odometer_m() - located_m_) < config_.locate_every_m) return;
   located_m_ = chain_.odometer_m();
   const Location location = locator_->locate();
   if (location.certain()) publish_place(step, location);

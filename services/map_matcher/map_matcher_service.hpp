@@ -35,6 +35,7 @@ class MapMatcherService {
   void use(const msg::TrackView& view);
   void use(const msg::LandmarkSighting& sighting);
   core::Status follow(const msg::TrainState& state);
+  void forget_place();
   void stand(int64_t from_ns, int64_t to_ns);
   /// The window at a stamp, extrapolated from the last state; nothing when the place is not known or the state is too
   /// old.
@@ -73,10 +74,11 @@ class MapMatcherService {
   service::LeftOut left_out_;
   int64_t rails_seen_ns_ = 0;
   std::optional<TrackChooser> chooser_;
-  std::optional<NetworkLocator> locator_;  // only while the place is not known
-  double located_m_ = 0;                   // odometer at the last search
-  double matched_m_ = 0;                   // odometer at the last match
-  int64_t moved_ns_ = 0;                   // the chooser has come to this time
+  std::shared_ptr<const NetworkIndex> index_;  // from when it is first needed on
+  std::optional<NetworkLocator> locator_;      // only while the place is not known, or no position
+  double located_m_ = 0;                       // odometer at the last search
+  double matched_m_ = 0;                       // odometer at the last match
+  int64_t moved_ns_ = 0;                       // the chooser has come to this time
   /// What was said of the track last.
   struct SaidTrack {
     uint32_t edge = 0;

@@ -115,6 +115,9 @@ void print(const CampaignResult& result) {
   }
   std::printf("on a leg that the train did not take: %zu states, %zu of them declared and ok, for up to %.1f s\n",
               result.sum.other_leg, result.sum.other_leg_sure, result.sum.other_leg_sure_s);
+  std::printf("outside: %zu states, %zu of them usable, %zu ok, %zu since a place was given up; no place: %zu of %zu\n",
+              result.sum.outside, result.sum.outside_usable, result.sum.outside_ok, result.sum.outside_again,
+              result.sum.placeless, result.sum.states);
   auto wide = result.wide;
   std::ranges::sort(wide, std::ranges::greater{}, &BadRun::wider_share);
   for (size_t i = 0; i < std::min(wide.size(), kWideShown); ++i)
@@ -196,6 +199,9 @@ void add_options(CLI::App& app, Arguments& a) {
          "Every run begins with saved scales that are wrong by this share: the camera's, the wheel's and both in "
          "turn; 0: right")
       ->check(tool::number_between(0, 1));
+  app.add_option("--start-wrong-m", s.start_wrong_m,
+                 "Every start is told too far ahead, by a fifth of this at least: how long until fusion says so?")
+      ->check(tool::number_between(0, 100000));
   app.add_flag("--slip-always", a.plan.slip_always, "The wheel slips beside every fault: two faults at once");
   app.add_flag("--list", a.list, "Print the faults");
 }

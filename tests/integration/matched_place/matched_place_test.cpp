@@ -34,11 +34,22 @@ class MatchedPlace : public ::testing::Test, public test::OnMapMatcher {
   void tick(const track::Map& map, const EdgePosition& place, double promised_m = kPromisedM) {
     ++tick_;
     msg::TrainState here = state(place, promised_m);
-    if (const auto said = last_of_track()) here.track_probability(said->probability());  // as fusion believes it
+    const auto said = last_of_track();
+    if (said && said->stamp_ns() > placeless_ns_) here.track_probability(said->probability());  // as fusion believes it
     const auto pose = map.edge(place.edge)->alignment.at(place.offset_m).pose;
     here.easting_m(pose.easting_m);
     here.northing_m(pose.northing_m);
     states_.write(here);
+    steps_.write(step());
+    match();
+  }
+  /// Fusion has given the place up.
+  void tick_without_place() {
+    ++tick_;
+    msg::TrainState nowhere = state({0, 0, Direction::unknown}, kPromisedM);
+    nowhere.track_known(0);
+    placeless_ns_ = nowhere.stamp_ns();
+    states_.write(nowhere);
     steps_.write(step());
     match();
   }
@@ -63,6 +74,7 @@ class MatchedPlace : public ::testing::Test, public test::OnMapMatcher {
         std::find_if(said_.rbegin(), said_.rend(), [](const auto& fix) { return fix.kind() == msg::FIX_TRACK; });
     return last == said_.rend() ? std::nullopt : std::optional(*last);
   }
+  int64_t placeless_ns_ = 0;  // fusion knew no place then
   /// What it says of itself by now; a status is no data, no turn waits for it.
   [[nodiscard]] std::string reason() {
     const int64_t now_ns = core::wall_ns();
@@ -174,6 +186,18 @@ TEST_F(ToldStart, DoubtEndsWhereTheMastsFitThoughTheTrackIsChosenAnewMeanwhile) 
   ride(600, 0);  // the operator has mended his word
   ASSERT_TRUE(said_lately());
   EXPECT_GT(last_of_track()->probability(), 0.999);
+}
+
+TEST_F(ToldStart, IsForgottenWhereFusionGivesThePlaceUp) {
+  ride(600, 2200);
+  ASSERT_TRUE(last_of_track());
+  ASSERT_EQ(last_of_track()->fits_nowhere(), 1);
+  for (int i = 0; i < 10; ++i) tick_without_place();
+  EXPECT_THAT(reason(), HasSubstr("not known yet"));
+  ride(30, 0);  // found again
+  ASSERT_TRUE(said_lately());
+  EXPECT_EQ(last_of_track()->fits_nowhere(), 0);
+  EXPECT_GT(last_of_track()->probability(), 0.99);
 }
 
 INSTANTIATE_TEST_SUITE_P(Starts, ToldStartWrongOrRight, ::testing::Bool());

@@ -62,31 +62,47 @@ class MatcherInLockStep : public ::testing::Test, protected test::InLockStep {
   std::vector<msg::PositionFix> fixes_;
 };
 
-using NoStart = MatcherInLockStep;
-TEST_F(NoStart, ThePlaceIsFoundOnTheMapAndFusionStartsThere) {
-  const track::Map map = made_map();
-  ASSERT_TRUE(map.save(map_file_).ok());
-  messaging::Writer<msg::OdometryStep> steps(participant_, topics::odometry_step);
-  start("map_matcher", {"map_matcher.map=" + map_file_.string(), "map_matcher.locate_every_m=100"});
-  start("fusion", {"fusion.map=" + map_file_.string(), "fusion.start=unknown"});
-  ASSERT_TRUE(connected());
+/// A train on one of the lines, whose camera and gyro feel how it turns.
+class NoStart : public MatcherInLockStep {
+ protected:
+  void ride(const std::string& start_told, double to_m) {
+    const track::Map map = made_map();
+    ASSERT_TRUE(map.save(map_file_).ok());
+    messaging::Writer<msg::OdometryStep> steps(participant_, topics::odometry_step);
+    messaging::Writer<msg::ImuSample> inertial(participant_, topics::imu_sample);
+    start("map_matcher", {"map_matcher.map=" + map_file_.string(), "map_matcher.locate_every_m=100"});
+    start("fusion", {"fusion.map=" + map_file_.string(), "fusion.start=" + start_told});
+    ASSERT_TRUE(connected());
 
-  testing::RideErrors errors;
-  errors.odometer_scale = kScale - 1;
-  errors.turn_bias_rps = errors.turn_noise_rps = 0;
-  errors.step_turn_noise_rad = 3e-4;
-  errors.bogies_behind_m = errors.bogie_distance_m = 0;  // curvature fixes know nothing of a body that turns late
-  const auto& alignment = map.edge(kEdge)->alignment;
-  const testing::VehicleHeading heading([&](double m) { return alignment.curvature_at(m); }, 0, 3000, errors);
-  testing::RideSensors sensors(errors, 4);
-  double distance_m = 0;
-  std::map<int64_t, double> truth_m;
-  uint64_t seq = 0;
-  for (double at_m = kFromM; at_m < kToM; at_m += kStepM) {
-    const int64_t stamp_ns = kBeginNs + static_cast<int64_t>(++seq) * kStepNs;
-    const auto sensed = sensors.step(heading, 0, at_m, at_m + kStepM, core::seconds(kStepNs));
-    distance_m += sensed.way_m;
-    truth_m[stamp_ns] = at_m + kStepM;
+    testing::RideErrors errors;
+    errors.odometer_scale = kScale - 1;
+    errors.turn_bias_rps = errors.turn_noise_rps = 0;
+    errors.step_turn_noise_rad = 3e-4;
+    errors.bogies_behind_m = errors.bogie_distance_m = 0;  // curvature fixes know nothing of a body that turns late
+    const auto& alignment = map.edge(kEdge)->alignment;
+    const testing::VehicleHeading heading([&](double m) { return alignment.curvature_at(m); }, 0, 3000, errors);
+    testing::RideSensors sensors(errors, 4);
+    double distance_m = 0;
+    int64_t stamp_ns = kBeginNs;
+    for (double at_m = kFromM; at_m < to_m; at_m += kStepM) {
+      stamp_ns += kStepNs;
+      const auto sensed = sensors.step(heading, 0, at_m, at_m + kStepM, core::seconds(kStepNs));
+      distance_m += sensed.way_m;
+      truth_m_[stamp_ns] = at_m + kStepM;
+      ASSERT_TRUE(inertial.write(felt(stamp_ns, sensed.turn_rad)));
+      ASSERT_TRUE(steps.write(step(stamp_ns, sensed, distance_m)));
+      give_turns({"map_matcher", "fusion"}, stamp_ns);
+    }
+    hear_all("train_state", states_);
+  }
+  [[nodiscard]] static msg::ImuSample felt(int64_t stamp_ns, double turn_rad) {
+    msg::ImuSample sample;
+    sample.stamp_ns(stamp_ns);
+    sample.accel_x_mps2(1e-6 * static_cast<double>(stamp_ns / kStepNs % 7));  // no two alike, as from a real one
+    sample.rate_z_rps(turn_rad / core::seconds(kStepNs));
+    return sample;
+  }
+  [[nodiscard]] static msg::OdometryStep step(int64_t stamp_ns, const testing::SensedStep& sensed, double distance_m) {
     msg::OdometryStep step;
     step.stamp_ns(stamp_ns);
     step.reference_stamp_ns(stamp_ns - kStepNs);
@@ -98,11 +114,21 @@ TEST_F(NoStart, ThePlaceIsFoundOnTheMapAndFusionStartsThere) {
     step.speed_mps(sensed.way_m / core::seconds(kStepNs));
     step.mode(msg::ODOMETRY_TRACK);
     step.valid(1);
-    ASSERT_TRUE(steps.write(step));
-    give_turns({"map_matcher", "fusion"}, stamp_ns);
+    return step;
   }
-  hear_all("train_state", states_);
+  void expect_right(const msg::TrainState& state) const {
+    ASSERT_EQ(state.edge(), kEdge);
+    EXPECT_EQ(state.direction(), msg::DIRECTION_FORWARD);
+    const double error_m = truth_m_.at(state.stamp_ns()) - state.offset_m();
+    EXPECT_LE(error_m, state.under_m());
+    EXPECT_GE(error_m, -state.over_m());
+  }
 
+  std::map<int64_t, double> truth_m_;
+};
+
+TEST_F(NoStart, ThePlaceIsFoundOnTheMapAndFusionStartsThere) {
+  ride("unknown", kToM);
   size_t unknown = 0;
   size_t known = 0;
   for (const auto& state : states_) {
@@ -112,17 +138,30 @@ TEST_F(NoStart, ThePlaceIsFoundOnTheMapAndFusionStartsThere) {
       continue;
     }
     ++known;
-    ASSERT_EQ(state.edge(), kEdge);
-    EXPECT_EQ(state.direction(), msg::DIRECTION_FORWARD);
-    const double error_m = truth_m.at(state.stamp_ns()) - state.offset_m();
-    EXPECT_LE(error_m, state.under_m());
-    EXPECT_GE(error_m, -state.over_m());
+    expect_right(state);
   }
   EXPECT_GT(unknown, 400U) << "found sooner than anybody can know";
   EXPECT_GT(known, 100U) << "not found within " << kToM - kFromM << " m";
   ASSERT_FALSE(fixes_.empty());
   EXPECT_EQ(fixes_.front().kind(), msg::FIX_NETWORK);
   EXPECT_GT(fixes_.front().probability(), 0.999);
+}
+
+// The operator has chosen another line.
+TEST_F(NoStart, AStartThatWasToldWronglyIsGivenUpAndThePlaceIsFound) {
+  ride("9:500:+", 2900);
+  const auto told = [](const msg::TrainState& state) { return state.track_known() != 0; };
+  const auto given_up = std::ranges::find_if_not(states_, told);
+  ASSERT_NE(given_up, states_.end());
+  EXPECT_NEAR(given_up->distance_m(), 1500, 400);
+  const auto found = std::find_if(given_up, states_.end(), told);
+  ASSERT_NE(found, states_.end());
+  EXPECT_EQ((given_up - 1)->integrity(), msg::INTEGRITY_UNUSABLE);
+  EXPECT_GT(states_.end() - found, 100);
+  for (auto state = found; state != states_.end(); ++state) {
+    ASSERT_NE(state->track_known(), 0);
+    expect_right(*state);
+  }
 }
 
 // 300 m straight, then a switch: edge 2 goes straight on, edge 3 bends to the left.

@@ -10,6 +10,9 @@ using map_matcher::CurvatureOf;
 // As map_matcher has them by default.
 constexpr double kMatchEveryM = 5;
 constexpr double kLeastSpeedMps = 1;
+constexpr double kLocateEveryM = 250;
+constexpr double kTurnSigmaRad = 2e-4;  // of a step
+constexpr double kLostS = 5;
 // Curvature from pictures: 9e-5 1/m rms where a sigma of 1.4e-4 is said, over 26 km at 8 degrees.
 constexpr double kSigmaPerM = 1.4e-4;
 constexpr double kWhitePerM = 7e-5;
@@ -32,7 +35,10 @@ MatcherLoop::MatcherLoop(const TrainSimulation& simulation)
 
 bool MatcherLoop::follow(const fusion::TrainEstimate& state) {
   using Way = map_matcher::FollowedPath::Way;
-  if (!state.track_known) return false;
+  if (!state.track_known) {
+    followed_.forget();
+    return false;
+  }
   const Way way = core::value_or_throw(followed_.follow(placed(state)));
   if (way == Way::same) return true;
   const auto& path = followed_.path();
@@ -85,11 +91,43 @@ void MatcherLoop::match_sightings(const fusion::TrainEstimate& state, double arr
   const auto& all = simulation_.sightings;
   for (; next_sighting_ < all.size() && all[next_sighting_].arrival_s <= arrival_s; ++next_sighting_) {
     const auto& sighting = all[next_sighting_].sighting;
+    if (locator_) locator_->sight(sighting);
     const auto prior = state.track_known ? followed_.prior_at(sighting.stamp_ns, placed(state)) : std::nullopt;
     const auto fix = prior ? landmarks_->add(sighting, *prior) : std::nullopt;
     if (fix) found(*fix, fusion::FixKind::landmark, arrival_s);
     if (prior) doubt_place(state, arrival_s);
   }
+}
+
+// As map_matcher does it, with the turning of the camera or, where that is blind, of a gyro.
+void MatcherLoop::look_for_place(const fusion::OdometryInput& step, const fusion::TrainEstimate& state,
+                                 double arrival_s) {
+  const double since_s = core::seconds(step.stamp_ns - std::exchange(moved_ns_, step.stamp_ns));
+  const double way_m = chain_.odometer_m() - std::exchange(moved_m_, chain_.odometer_m());
+  const bool position = state.track_known && state.integrity != fusion::Integrity::unusable;
+  if (position || !simulation_.plan().start_told) {
+    locator_.reset();
+    return;
+  }
+  if (!locator_) {
+    locator_.emplace(map_matcher::LocatorParameters{},
+                     std::make_shared<const map_matcher::NetworkIndex>(simulation_.map));
+    located_m_ = chain_.odometer_m();
+    return;
+  }
+  if (!(since_s > 0 && since_s < kLostS) || !std::isfinite(state.speed_mps)) return locator_->forget();
+  const double moved_m = chain_.broken() ? state.speed_mps * since_s : way_m;
+  const auto truth = simulation_.truth_at(step.stamp_ns, arrival_s);
+  const double turn_rad = (simulation_.curvature_at(truth.distance_m, arrival_s) + bias_per_m_) * moved_m;
+  locator_->move(moved_m, turn_rad + kTurnSigmaRad * random_.normal(), kTurnSigmaRad);
+  if (state.track_known || std::abs(chain_.odometer_m() - located_m_) < kLocateEveryM) return;
+  located_m_ = chain_.odometer_m();
+  const auto location = locator_->locate();
+  if (!location.certain()) return;
+  const auto& best = location.places.front();
+  found_.emplace_back(
+      arrival_s, fusion::FixInput{step.stamp_ns, best.place.edge, best.place.offset_m, best.sigma_m, best.probability,
+                                  0, fusion::FixKind::network, best.place.direction, nullptr});
 }
 
 // As map_matcher says it, with a track of which only the rest is believed.
@@ -106,6 +144,7 @@ std::vector<fusion::FixInput> MatcherLoop::see(const fusion::OdometryInput& step
                                                double arrival_s) {
   chain_.add({step.stamp_ns, step.reference_stamp_ns, step.valid, step.step_m, 0, 0, std::nan(""), state.speed_mps});
   const bool placed = follow(state);
+  look_for_place(step, state, arrival_s);
   match_sightings(state, arrival_s);
   if (placed && !chain_.broken() && simulation_.plan().shape) {
     if (std::abs(state.speed_mps) > kLeastSpeedMps) look(arrival_s, simulation_.truth_at(step.stamp_ns, arrival_s));

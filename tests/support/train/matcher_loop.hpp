@@ -10,6 +10,7 @@
 #include "fusion/fusion.hpp"
 #include "map_matcher/followed_path.hpp"
 #include "map_matcher/landmark_matcher.hpp"
+#include "map_matcher/locate/network_locator.hpp"
 #include "map_matcher/shape/curvature_matcher.hpp"
 #include "map_matcher/step_chain.hpp"
 #include "support/train/simulation.hpp"
@@ -28,6 +29,7 @@ class MatcherLoop {
  private:
   void match_shape(int64_t stamp_ns, const fusion::TrainEstimate& state, double arrival_s);
   void match_sightings(const fusion::TrainEstimate& state, double arrival_s);
+  void look_for_place(const fusion::OdometryInput& step, const fusion::TrainEstimate& state, double arrival_s);
   void doubt_place(const fusion::TrainEstimate& state, double due_s);
   void found(const map_matcher::Fix& fix, fusion::FixKind kind, double due_s);
   /// False while the place is not known.
@@ -39,6 +41,10 @@ class MatcherLoop {
   map_matcher::StepChain chain_;
   std::optional<map_matcher::CurvatureMatcher> shape_;
   std::optional<map_matcher::LandmarkMatcher> landmarks_;
+  std::optional<map_matcher::NetworkLocator> locator_;  // while a place that was told has been given up
+  int64_t moved_ns_ = 0;
+  double moved_m_ = 0;
+  double located_m_ = 0;
   size_t next_sighting_ = 0;
   double matched_m_ = 0;
   std::deque<std::pair<double, fusion::FixInput>> found_;  // when they are due

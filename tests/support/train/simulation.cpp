@@ -29,8 +29,8 @@ Drive drive_on(uint64_t seed, const SimulationPlan& plan, double most_m) {
 
 RandomLine line_of(uint64_t seed, const SimulationPlan& plan) {
   auto random = stream(seed, 1);
-  auto line = random_line(random, TrainSimulation::kStartOffsetM + (plan.max_speed_mps + 3) * plan.duration_s + 1000,
-                          plan.switch_spacing_m);
+  const double way_m = (plan.max_speed_mps + 3) * plan.duration_s + plan.start_wrong_m;
+  auto line = random_line(random, TrainSimulation::kStartOffsetM + way_m + 1000, plan.switch_spacing_m);
   auto things = stream(seed, 19);
   if (plan.sightings) furnish(line, things);
   return line;
@@ -97,6 +97,7 @@ TrainSimulation::TrainSimulation(const SimulationPlan& plan, uint64_t seed, std:
 void TrainSimulation::measure() {
   auto random = stream(seed_, 3);
   start_error_m = plan_.start_sigma_m * random.normal();
+  if (plan_.start_wrong_m > 0) start_error_m += plan_.start_wrong_m * random.uniform(0.2, 1);
   if (plan_.shape) lay_track();
   if (plan_.camera) make_steps();
   if (plan_.wheel) make_pulses();
@@ -118,6 +119,7 @@ void TrainSimulation::measure() {
 
 std::optional<track::EdgePosition> TrainSimulation::start() const {
   if (!plan_.start_told) return std::nullopt;
+  if (plan_.start_wrong_m > 0) return path_->position_at(start_error_m);
   auto place = start_;
   place.offset_m += place.direction == track::Direction::reverse ? -start_error_m : start_error_m;
   return place;

@@ -52,7 +52,8 @@ struct SimulationPlan {
   bool blind_spells = true;     // 5 to 15 s without camera, now and then
   bool slip = true;             // wheel turns up to 30 % too fast or slow for some seconds
   double start_sigma_m = 0.3;
-  bool start_told = true;  // otherwise map_matcher finds the place after some way
+  double start_wrong_m = 0;  // the start is told up to so much too far ahead, and never less than a fifth of it
+  bool start_told = true;    // otherwise map_matcher finds the place after some way
   Fault fault;
 };
 

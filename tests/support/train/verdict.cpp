@@ -47,9 +47,15 @@ class Judge {
                                              : state.distance_m - truth.distance_m;
     const double excess_m = std::max(error_m - state.over_m, -error_m - state.under_m);
     ++verdict_.states;
-    if (!(excess_m <= 0)) ++verdict_.outside;
-    verdict_.worst_excess_m = std::max(verdict_.worst_excess_m, excess_m);
     const bool ok = state.integrity == fusion::Integrity::ok;
+    if (!(excess_m <= 0)) {
+      ++verdict_.outside;
+      verdict_.outside_ok += ok ? 1 : 0;
+      verdict_.outside_again += verdict_.placeless > 0 ? 1 : 0;
+      verdict_.outside_usable += state.integrity != fusion::Integrity::unusable ? 1 : 0;
+    }
+    verdict_.placeless += state.track_known ? 0 : 1;
+    verdict_.worst_excess_m = std::max(verdict_.worst_excess_m, excess_m);
     const bool wider = std::max(state.over_m, state.under_m) > 5 + 0.05 * state.since_sure_m;
     if (wider) judge_width(state, ok);
     verdict_.not_ok += ok ? 0 : 1;
@@ -96,6 +102,10 @@ void Verdict::add(const Verdict& other) {
   states += other.states;
   outside += other.outside;
   worst_excess_m = std::max(worst_excess_m, other.worst_excess_m);
+  outside_ok += other.outside_ok;
+  outside_usable += other.outside_usable;
+  outside_again += other.outside_again;
+  placeless += other.placeless;
   wider += other.wider;
   wider_unsaid += other.wider_unsaid;
   wider_placeless += other.wider_placeless;

@@ -13,6 +13,10 @@ struct Verdict {
   size_t states = 0;
   size_t outside = 0;           // true position not in [estimate - over, estimate + under]
   double worst_excess_m = 0;    // so far outside
+  size_t outside_ok = 0;        // ... while the state says ok
+  size_t outside_usable = 0;    // ... ok or degraded
+  size_t outside_again = 0;     // ... since it claimed no place on the map
+  size_t placeless = 0;         // claims none
   size_t wider = 0;             // interval beyond 5 m + 5 % of the way since the last sure reference ...
   size_t wider_unsaid = 0;      // ... while the state says ok
   size_t wider_placeless = 0;   // ... while it claims no place on the map

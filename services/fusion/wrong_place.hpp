@@ -1,0 +1,53 @@
+// Is the place on the map a wrong one altogether: a start that was told kilometres off, an element that the map lacks?
+// Whoever speaks against it says so for long enough until it is given up; then the train is searched for on the whole
+// map.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+namespace railfix::fusion {
+
+/// Who has spoken against a place until it was given up.
+enum class Against : uint8_t { sightings, turning, gnss };
+
+/// What speaks against the place at a moment.
+struct SpeaksAgainst {
+  bool turning = false;  // the train turns otherwise than its track
+  bool gnss = false;     // it contradicts a start that nothing has confirmed
+};
+
+/// A plain value.
+class WrongPlace {
+ public:
+  /// map_matcher's last word: what is sighted fits the map nowhere near the place, or it may fit.
+  void said(bool fits_nowhere) {
+    fits_nowhere_ = fits_nowhere;
+    lost_ = lost_ || fits_nowhere;
+  }
+  /// The place is right, by a landmark or by GNSS that has proven itself.
+  void found();
+  /// The train has come to `distance_m` of its way.
+  void move(double distance_m, SpeaksAgainst now);
+
+  [[nodiscard]] bool fits_nowhere() const { return fits_nowhere_; }
+  /// It did not fit, and nothing has shown since that the place is right.
+  [[nodiscard]] bool lost() const { return lost_; }
+  /// For longer than a wrong leg is followed or a gyro is out of order: it is no position any more.
+  [[nodiscard]] bool strays() const { return strayed_m_ > kNoPositionM; }
+  /// The place is to be given up.
+  [[nodiscard]] std::optional<Against> proven() const;
+
+ private:
+  static constexpr double kNoPositionM = 300;
+  double distance_m_ = 0;
+  std::optional<double> turned_at_m_;
+  bool fits_nowhere_ = false;
+  bool lost_ = false;
+  // Way so far against each.
+  double lost_m_ = 0;
+  double strayed_m_ = 0;
+  double denied_m_ = 0;
+};
+
+}  // namespace railfix::fusion

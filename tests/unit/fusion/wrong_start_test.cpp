@@ -1,0 +1,150 @@
+// A start that was told kilometres wrong: the place is no position as soon as something speaks against it, is given up
+// when nothing speaks for it, and the train is found where it is.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "straight_run.hpp"
+#include "support/train/verdict.hpp"
+
+namespace railfix::fusion {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr double kSpeedMps = 20;
+
+/// A train whose start was told to be at 900 m.
+class WrongStart : public testing::Test {
+ protected:
+  /// Every second `each` says what is measured beside the camera.
+  template <typename Each>
+  TrainEstimate go(double metres, const Each& each) {
+    TrainEstimate state;
+    for (double end_s = t_s_ + metres / kSpeedMps; t_s_ < end_s - 1e-9; t_s_ += 1) {
+      each();
+      state = run(fusion_, t_s_, t_s_ + 1, kSpeedMps);
+    }
+    return state;
+  }
+  void turn(double curvature_per_m) { feel(kSpeedMps * curvature_per_m); }
+  /// The gyro learns its bias.
+  void go_straight() {
+    go(200, [&] { turn(0); });
+  }
+  void find(double offset_m) {
+    fusion_.add(FixInput{at(t_s_), 1, offset_m, 5, 0.9999, 0, FixKind::network, track::Direction::forward, {}});
+  }
+
+  void feel(double rate_rps) {
+    for (int i = 0; i < 50; ++i) fusion_.add(ImuInput{at(t_s_ + 0.02 * i + 0.01), 0.01 * (i % 3), rate_rps});
+  }
+
+  Fusion fusion_ = fusion_at(900);
+  double t_s_ = 0;
+};
+
+TEST_F(WrongStart, IsNoPositionAfter300AndGivenUpAfter1000MetresOfTurningOtherwise) {
+  go_straight();
+  int second = 0;
+  const auto bends = [&] { turn(++second / 10 % 2 == 0 ? 0.001 : -0.001); };
+  EXPECT_EQ(go(200, bends).integrity, Integrity::degraded);
+  auto state = go(300, bends);
+  EXPECT_EQ(state.integrity, Integrity::unusable);
+  EXPECT_TRUE(state.track_known);
+  state = go(700, bends);
+  EXPECT_FALSE(state.track_known);
+  EXPECT_THAT(state.reason, HasSubstr("given up, the train turned otherwise"));
+  EXPECT_NEAR(state.distance_m, 1400, 1);
+  find(5000);
+  state = go(100, [&] { turn(0); });
+  EXPECT_TRUE(state.track_known);
+  EXPECT_NEAR(state.position.offset_m, 5100, 1);
+  EXPECT_EQ(state.reason.find("given up"), std::string::npos) << state.reason;
+}
+
+TEST_F(WrongStart, IsKeptWhereTheTrainTurnsAsTheTrackDoesButForSomeBumps) {
+  go_straight();
+  int second = 0;
+  const auto bumps = [&] { turn(++second % 100 < 4 ? 0.001 : 0); };
+  const auto state = go(9000, bumps);
+  EXPECT_TRUE(state.track_known);
+  EXPECT_EQ(state.integrity, Integrity::degraded);
+}
+
+TEST_F(WrongStart, IsGivenUpWhereGnssContradictsIt) {
+  const auto elsewhere = [&] { fusion_.add(GnssInput{at(t_s_), 0, 4000 + kSpeedMps * t_s_, 1, 1}); };
+  auto state = go(500, elsewhere);
+  EXPECT_EQ(state.integrity, Integrity::unusable);
+  EXPECT_TRUE(state.track_known);
+  state = go(700, elsewhere);
+  EXPECT_FALSE(state.track_known);
+  EXPECT_THAT(state.reason, HasSubstr("given up, GNSS contradicted it"));
+  find(4000 + kSpeedMps * t_s_);
+  state = go(1000, elsewhere);
+  EXPECT_NEAR(state.position.offset_m, 4000 + kSpeedMps * t_s_, 5);
+  EXPECT_NE(state.integrity, Integrity::unusable) << state.reason;
+  EXPECT_LT(state.over_m + state.under_m, 200);
+}
+
+TEST_F(WrongStart, IsKeptWhereGnssThatContradictsALandmarkIsTheOneThatIsWrong) {
+  fusion_.add(fix_at(t_s_, 900, 1));
+  const auto state = go(3000, [&] { fusion_.add(GnssInput{at(t_s_), 0, 4000 + kSpeedMps * t_s_, 1, 1}); });
+  EXPECT_TRUE(state.track_known);
+  EXPECT_EQ(state.integrity, Integrity::degraded);
+}
+
+TEST_F(WrongStart, IsGivenUpWhereNothingIsSightedThatFits) {
+  const auto nowhere = [&] {
+    fusion_.add(FixInput{at(t_s_), 1, 900 + kSpeedMps * t_s_, INFINITY, 0.01, 0, FixKind::track,
+                         track::Direction::forward, nullptr, true});
+  };
+  EXPECT_TRUE(go(1900, nowhere).track_known);
+  const auto state = go(200, nowhere);
+  EXPECT_FALSE(state.track_known);
+  EXPECT_THAT(state.reason, HasSubstr("given up, what was sighted fitted"));
+}
+
+/// Whole rides, with map_matcher's real matchers and its search of the whole map in the loop.
+struct Sensors {
+  std::string name;
+  bool gnss;
+  bool sightings;
+};
+class WrongStartRide : public testing::TestWithParam<Sensors> {};
+
+TEST_P(WrongStartRide, EndsWhereTheTrainIs) {
+  auto plan = train::campaign_plan();
+  plan.duration_s = 480;
+  plan.track_fixes = plan.shape = true;
+  plan.switch_spacing_m = 1500;
+  plan.landmark_spacing_m = 0;
+  plan.gnss = GetParam().gnss;
+  plan.sightings = GetParam().sightings;
+  plan.start_wrong_m = 4000;
+  constexpr int kRides = 4;
+  int found = 0;
+  for (int ride = 0; ride < kRides; ++ride) {
+    const train::TrainSimulation simulation(plan, train::seed_of_run(77, static_cast<uint64_t>(ride)));
+    auto fusion = core::value_or_throw(Fusion::create({}, simulation.map, simulation.start()));
+    double usable_outside_m = 0;
+    TrainEstimate last;
+    const auto verdict = train::judge(simulation, fusion, 0, [&](const TrainEstimate& state, double error_m) {
+      const bool outside = error_m > state.over_m || -error_m > state.under_m;
+      if (outside && state.integrity != Integrity::unusable) usable_outside_m = state.distance_m;
+      last = state;
+    });
+    EXPECT_GT(verdict.outside, 0U) << "nobody knows at first";
+    EXPECT_EQ(verdict.outside_again, 0U) << "ride " << ride;
+    EXPECT_LT(usable_outside_m, 3000) << "ride " << ride;
+    found += last.track_known && verdict.placeless > 0 ? 1 : 0;
+  }
+  EXPECT_GE(found, kRides / 2);
+}
+
+INSTANTIATE_TEST_SUITE_P(By, WrongStartRide,
+                         testing::Values(Sensors{"Gnss", true, false}, Sensors{"Sightings", false, true},
+                                         Sensors{"Turning", false, false}),
+                         [](const auto& one) { return one.param.name; });
+
+}  // namespace
+}  // namespace railfix::fusion
