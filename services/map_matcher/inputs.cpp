@@ -17,6 +17,7 @@ constexpr double kLongestM = 1e9;    // a count of metres, an offset, a coordina
 constexpr double kFastestMps = 300;
 constexpr double kMostTurnRad = 10;  // in one step, or in a second
 constexpr double kTightestPerM = 1;  // curvature
+constexpr double kMostHdop = 1e6;
 
 }  // namespace
 
@@ -42,6 +43,10 @@ bool has_sense(const ViewInput& v) {
 
 bool has_sense(const GyroInput& g) {
   return up_to(g.rate_rps, kMostTurnRad);
+}
+
+bool has_sense(const GnssInput& g) {
+  return up_to(g.easting_m, kLongestM) && up_to(g.northing_m, kLongestM) && within(g.hdop, 0, kMostHdop);
 }
 
 bool has_sense(const StateInput& s) {

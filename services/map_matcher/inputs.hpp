@@ -16,6 +16,12 @@ struct ViewInput {
 struct GyroInput {
   double rate_rps = 0;
 };
+/// What gnss_fix says, on the plane of the map.
+struct GnssInput {
+  double easting_m = 0;
+  double northing_m = 0;
+  double hdop = 0;
+};
 /// What train_state says of a train whose place is known.
 struct StateInput {
   PlacedTrain placed;
@@ -32,6 +38,7 @@ struct StateInput {
 [[nodiscard]] bool has_sense(const StepInput& step);
 [[nodiscard]] bool has_sense(const ViewInput& view);
 [[nodiscard]] bool has_sense(const GyroInput& gyro);
+[[nodiscard]] bool has_sense(const GnssInput& gnss);
 /// The speed may be unknown (NaN), and the interval without end.
 [[nodiscard]] bool has_sense(const StateInput& state);
 

@@ -20,6 +20,7 @@ struct MapMatcherConfig {
   std::string curve_method = "likelihood";
   bool choose_track = true;
   bool use_imu = true;
+  bool use_gnss = true;
   double camera_bias_per_m = 1e-4;
   GyroParameters gyro;
   bool locate = true;
@@ -70,6 +71,7 @@ struct MapMatcherConfig {
     fields.number("camera_bias_per_m", camera_bias_per_m, {0, 0.01}, "1/m",
                   "Constant error of the camera's turning for the choice of the track, one sigma.");
     fields.flag("locate", locate, "Look for the place on the whole map while nobody knows it.");
+    fields.flag("use_gnss", use_gnss, "... where GNSS says it, too: the one track within its reach.");
     fields.number("locate_every_m", locate_every_m, {20, 10000}, "m", "... once in this way.");
     fields.number("view_ahead_m", view_ahead_m, {0, 50}, "m",
                   "The curvature of track_view belongs to a point at most so far ahead of the camera's foot.");

@@ -44,6 +44,9 @@ MapMatcherService::MapMatcherService(const MapMatcherConfig& config, service::Co
       if (takes("imu_sample", input_of(m))) gyro_.add(m.stamp_ns(), m.rate_z_rps());
     });
   }
+  if (config.use_gnss && map_) {
+    context_.on<msg::GnssFix>(topics::gnss_fix, [this](const msg::GnssFix& m) { look_for_place(m); });
+  }
   context_.on<msg::TrainState>(topics::train_state, [this](const msg::TrainState& m) { use(m); });
   context_.on<msg::TrackView>(topics::track_view, [this](const msg::TrackView& m) { use(m); });
   context_.on<msg::LandmarkSighting>(topics::landmark_sighting, [this](const msg::LandmarkSighting& m) { use(m); });
@@ -67,6 +70,7 @@ void MapMatcherService::forget_place() {
 void MapMatcherService::restart() {
   forget_place();
   locator_.reset();
+  gnss_.reset();
   gyro_ = GyroTurn(config_.gyro);
   state_.reset();
   step_.reset();
@@ -95,10 +99,11 @@ void MapMatcherService::use(const msg::TrainState& state) {
   if (!map_ || state.track_known() == 0) {
     if (before && before->track_known() != 0) forget_place();
     const auto left_out = left_out_.sentence(state.stamp_ns());
-    const auto* unknown = map_ ? "the place on the map is not known yet" : "no map is configured";
-    context_.health().degraded(left_out.empty() ? unknown : unknown + ("; " + left_out));
+    const auto unknown = placeless();
+    context_.health().degraded(left_out.empty() ? unknown : unknown + "; " + left_out);
     return;
   }
+  gnss_.reset();
   if (!track::lies_there(*map_, place_of(state), state.easting_m(), state.northing_m())) {
     restart();  // what was matched so far is of another map as well
     context_.health().degraded("train_state is of another map than map_matcher.map: give both services the same file");
@@ -202,8 +207,7 @@ void MapMatcherService::look_for_place(const msg::OdometryStep& step) {
     return;
   }
   if (!locator_) {
-    if (!index_) index_ = std::make_shared<const NetworkIndex>(map_);
-    locator_.emplace(config_.locator_parameters(), index_);
+    locator_.emplace(config_.locator_parameters(), index());
     located_m_ = chain_.odometer_m();
   }
   auto turn = turn_of_camera();
@@ -217,15 +221,42 @@ void MapMatcherService::look_for_place(const msg::OdometryStep& step) {
   if (placed || std::abs(chain_.odometer_m() - located_m_) < config_.locate_every_m) return;
   located_m_ = chain_.odometer_m();
   const Location location = locator_->locate();
-  if (location.certain()) publish_place(step, location);
+  if (location.certain()) publish_place(location.places, step.stamp_ns(), step.grabbed_ns());
 }
 
-void MapMatcherService::publish_place(const msg::OdometryStep& step, const Location& location) {
-  auto message = message_of(location.places);
-  message.stamp_ns(step.stamp_ns());
+// The odometer is fusion's, which runs on by whatever sensor there is.
+void MapMatcherService::look_for_place(const msg::GnssFix& fix) {
+  if (!config_.locate || fix.fix() == 0 || !state_ || state_->track_known() != 0) return;
+  const double since_s = core::seconds(fix.stamp_ns() - state_->stamp_ns());
+  const auto plane = map_->from_geo({fix.lat_deg(), fix.lon_deg()});
+  if (!plane || !takes("gnss_fix", GnssInput{plane->x(), plane->y(), fix.hdop()})) return;
+  if (!std::isfinite(state_->speed_mps()) || std::abs(since_s) > FollowedPath::kOldStateS) return;
+  if (!gnss_) gnss_.emplace(index());
+  gnss_->add({fix.stamp_ns(), plane->x(), plane->y()}, state_->distance_m() + state_->speed_mps() * since_s);
+  const auto place = gnss_->place();
+  if (place) publish_place({{*place, config_.locator.certain, GnssSearch::kSigmaM}}, fix.stamp_ns(), fix.grabbed_ns());
+}
+
+void MapMatcherService::publish_place(const std::vector<LocatedPlace>& places, int64_t stamp_ns, int64_t grabbed_ns) {
+  auto message = message_of(places);
+  message.stamp_ns(stamp_ns);
   message.kind(msg::FIX_NETWORK);
-  message.sigma_m(location.places.front().sigma_m);
-  send(message, step.grabbed_ns());
+  message.sigma_m(places.front().sigma_m);
+  send(message, grabbed_ns);
+}
+
+std::string MapMatcherService::placeless() const {
+  if (!map_) return "no map is configured";
+  std::string said = "the place on the map is not known yet";
+  const auto tracks = gnss_ ? gnss_->tracks() : std::nullopt;
+  if (tracks == 0U) said += "; no track on the map where GNSS says the train is";
+  if (tracks > 1U) said += "; GNSS cannot tell which of " + std::to_string(*tracks) + " tracks it is on";
+  return said;
+}
+
+const std::shared_ptr<const NetworkIndex>& MapMatcherService::index() {
+  if (!index_) index_ = std::make_shared<const NetworkIndex>(map_);
+  return index_;
 }
 
 void MapMatcherService::follow_turning(const msg::OdometryStep& step) {

@@ -8,6 +8,7 @@
 #include "map_matcher/followed_path.hpp"
 #include "map_matcher/inputs.hpp"
 #include "map_matcher/landmark_matcher.hpp"
+#include "map_matcher/locate/gnss_search.hpp"
 #include "map_matcher/locate/network_locator.hpp"
 #include "map_matcher/map_matcher_config.hpp"
 #include "map_matcher/shape/curvature_matcher.hpp"
@@ -44,8 +45,12 @@ class MapMatcherService {
   [[nodiscard]] std::optional<Turn> turn_of_camera() const;
   /// The same from the gyro, for as long as the camera cannot say.
   [[nodiscard]] std::optional<Turn> turn_of_gyro(int64_t from_ns, int64_t to_ns) const;
+  const std::shared_ptr<const NetworkIndex>& index();
   void look_for_place(const msg::OdometryStep& step);
-  void publish_place(const msg::OdometryStep& step, const Location& location);
+  void look_for_place(const msg::GnssFix& fix);
+  void publish_place(const std::vector<LocatedPlace>& places, int64_t stamp_ns, int64_t grabbed_ns);
+  /// What is known of a place that is not known.
+  [[nodiscard]] std::string placeless() const;
   void follow_turning(const msg::OdometryStep& step);
   void follow_without_camera();
   [[nodiscard]] TrackWindow window_at(const Prior& prior) const;
@@ -76,6 +81,7 @@ class MapMatcherService {
   std::optional<TrackChooser> chooser_;
   std::shared_ptr<const NetworkIndex> index_;  // from when it is first needed on
   std::optional<NetworkLocator> locator_;      // only while the place is not known, or no position
+  std::optional<GnssSearch> gnss_;             // only while the place is not known
   double located_m_ = 0;                       // odometer at the last search
   double matched_m_ = 0;                       // odometer at the last match
   int64_t moved_ns_ = 0;                       // the chooser has come to this time

@@ -21,6 +21,10 @@ class NetworkIndex {
 
   [[nodiscard]] const track::Ways& ways() const { return ways_; }
   [[nodiscard]] const track::Map& map() const { return *map_; }
+  [[nodiscard]] const std::shared_ptr<const track::Map>& shared_map() const { return map_; }
+  [[nodiscard]] std::vector<track::NearTrack> near(double easting_m, double northing_m, double radius_m) const {
+    return finder_.near(easting_m, northing_m, radius_m);
+  }
   /// Runs beside a place in about the same direction, with the place beside it on each; its own run is among them.
   struct Beside {
     track::Run run;

@@ -199,6 +199,9 @@ void add_options(CLI::App& app, Arguments& a) {
          "Every run begins with saved scales that are wrong by this share: the camera's, the wheel's and both in "
          "turn; 0: right")
       ->check(tool::number_between(0, 1));
+  app.add_option("--unknown-start", a.plan.unknown_start_share, "Share of the runs that are not told where they begin")
+      ->check(tool::number_between(0, 1))
+      ->capture_default_str();
   app.add_option("--start-wrong-m", s.start_wrong_m,
                  "Every start is told too far ahead, by a fifth of this at least: how long until fusion says so?")
       ->check(tool::number_between(0, 100000));

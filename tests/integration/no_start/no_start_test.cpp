@@ -31,6 +31,7 @@ constexpr int64_t kBeginNs = 1'700'000'000'000'000'000;
 track::Map made_map() {
   core::Random random(8);
   track::Map map;
+  map.crs = "EPSG:2056";
   for (uint32_t id = 1; id <= 12; ++id) {
     std::vector<track::Element> elements;
     for (double sum_m = 0; sum_m < 3000;) {
@@ -44,7 +45,8 @@ track::Map made_map() {
     }
     map.nodes.push_back({2 * id - 1, track::NodeKind::end, "", 0, 0});
     map.nodes.push_back({2 * id, track::NodeKind::end, "", 0, 0});
-    map.edges.push_back({id, "line", 2 * id - 1, 2 * id, "", track::Alignment::chained({5000.0 * id, 0, 0}, elements)});
+    map.edges.push_back(
+        {id, "line", 2 * id - 1, 2 * id, "", track::Alignment::chained({2600000 + 5000.0 * id, 1200000, 0}, elements)});
   }
   return map;
 }
@@ -65,11 +67,12 @@ class MatcherInLockStep : public ::testing::Test, protected test::InLockStep {
 /// A train on one of the lines, whose camera and gyro feel how it turns.
 class NoStart : public MatcherInLockStep {
  protected:
-  void ride(const std::string& start_told, double to_m) {
+  void ride(const std::string& start_told, double to_m, bool gnss = false) {
     const track::Map map = made_map();
     ASSERT_TRUE(map.save(map_file_).ok());
     messaging::Writer<msg::OdometryStep> steps(participant_, topics::odometry_step);
     messaging::Writer<msg::ImuSample> inertial(participant_, topics::imu_sample);
+    messaging::Writer<msg::GnssFix> receiver(participant_, topics::gnss_fix);
     start("map_matcher", {"map_matcher.map=" + map_file_.string(), "map_matcher.locate_every_m=100"});
     start("fusion", {"fusion.map=" + map_file_.string(), "fusion.start=" + start_told});
     ASSERT_TRUE(connected());
@@ -90,6 +93,7 @@ class NoStart : public MatcherInLockStep {
       distance_m += sensed.way_m;
       truth_m_[stamp_ns] = at_m + kStepM;
       ASSERT_TRUE(inertial.write(felt(stamp_ns, sensed.turn_rad)));
+      if (gnss && stamp_ns % 1'000'000'000 == 0) receiver.write(received(map, stamp_ns));
       ASSERT_TRUE(steps.write(step(stamp_ns, sensed, distance_m)));
       give_turns({"map_matcher", "fusion"}, stamp_ns);
     }
@@ -101,6 +105,18 @@ class NoStart : public MatcherInLockStep {
     sample.accel_x_mps2(1e-6 * static_cast<double>(stamp_ns / kStepNs % 7));  // no two alike, as from a real one
     sample.rate_z_rps(turn_rad / core::seconds(kStepNs));
     return sample;
+  }
+  /// Some metres off.
+  [[nodiscard]] msg::GnssFix received(const track::Map& map, int64_t stamp_ns) const {
+    const auto pose = map.edge(kEdge)->alignment.at(truth_m_.at(stamp_ns)).pose;
+    const auto geo = map.to_geo(pose.easting_m + 3, pose.northing_m - 2).value();
+    msg::GnssFix fix;
+    fix.stamp_ns(stamp_ns);
+    fix.lat_deg(geo.lat_deg);
+    fix.lon_deg(geo.lon_deg);
+    fix.hdop(1);
+    fix.fix(msg::GNSS_SINGLE);
+    return fix;
   }
   [[nodiscard]] static msg::OdometryStep step(int64_t stamp_ns, const testing::SensedStep& sensed, double distance_m) {
     msg::OdometryStep step;
@@ -162,6 +178,18 @@ TEST_F(NoStart, AStartThatWasToldWronglyIsGivenUpAndThePlaceIsFound) {
     ASSERT_NE(state->track_known(), 0);
     expect_right(*state);
   }
+}
+
+TEST_F(NoStart, GnssSaysItWithinSomeHundredMetres) {
+  ride("unknown", kFromM + 600, true);
+  const auto known = std::ranges::find_if(states_, [](const auto& state) { return state.track_known() != 0; });
+  ASSERT_NE(known, states_.end());
+  EXPECT_LT(known->distance_m(), 350);
+  for (auto state = known; state != states_.end(); ++state) {
+    ASSERT_NE(state->track_known(), 0);
+    expect_right(*state);
+  }
+  EXPECT_GE(states_.back().track_probability(), 0.999);
 }
 
 // 300 m straight, then a switch: edge 2 goes straight on, edge 3 bends to the left.

@@ -110,8 +110,7 @@ void MatcherLoop::look_for_place(const fusion::OdometryInput& step, const fusion
     return;
   }
   if (!locator_) {
-    locator_.emplace(map_matcher::LocatorParameters{},
-                     std::make_shared<const map_matcher::NetworkIndex>(simulation_.map));
+    locator_.emplace(map_matcher::LocatorParameters{}, index());
     located_m_ = chain_.odometer_m();
     return;
   }
@@ -130,6 +129,27 @@ void MatcherLoop::look_for_place(const fusion::OdometryInput& step, const fusion
                                   0, fusion::FixKind::network, best.place.direction, nullptr});
 }
 
+std::shared_ptr<const map_matcher::NetworkIndex> MatcherLoop::index() {
+  if (!index_) index_ = std::make_shared<const map_matcher::NetworkIndex>(simulation_.map);
+  return index_;
+}
+
+void MatcherLoop::hear(const fusion::GnssInput& gnss, double arrival_s) {
+  if (!state_ || state_->track_known) {
+    gnss_.reset();
+    return;
+  }
+  if (gnss.fix == 0 || !std::isfinite(state_->speed_mps)) return;
+  if (!gnss_) gnss_.emplace(index());
+  const double since_s = core::seconds(gnss.stamp_ns - state_->stamp_ns);
+  gnss_->add({gnss.stamp_ns, gnss.easting_m, gnss.northing_m}, state_->distance_m + state_->speed_mps * since_s);
+  const auto place = gnss_->place();
+  if (!place) return;
+  found_.emplace_back(
+      arrival_s, fusion::FixInput{gnss.stamp_ns, place->edge, place->offset_m, map_matcher::GnssSearch::kSigmaM, 0.9999,
+                                  0, fusion::FixKind::network, place->direction, nullptr});
+}
+
 // As map_matcher says it, with a track of which only the rest is believed.
 void MatcherLoop::doubt_place(const fusion::TrainEstimate& state, double due_s) {
   const bool gnss = (state.sources & 1U << static_cast<unsigned>(fusion::Source::gnss)) != 0;
@@ -143,6 +163,7 @@ void MatcherLoop::doubt_place(const fusion::TrainEstimate& state, double due_s) 
 std::vector<fusion::FixInput> MatcherLoop::see(const fusion::OdometryInput& step, const fusion::TrainEstimate& state,
                                                double arrival_s) {
   chain_.add({step.stamp_ns, step.reference_stamp_ns, step.valid, step.step_m, 0, 0, std::nan(""), state.speed_mps});
+  state_ = state;
   const bool placed = follow(state);
   look_for_place(step, state, arrival_s);
   match_sightings(state, arrival_s);

@@ -129,6 +129,8 @@ Verdict judge(const TrainSimulation& simulation, fusion::Fusion& fusion, double 
     for (; tick_s < arrival.arrival_s; tick_s += kTickS) {
       if (const auto state = fusion.tick(simulation.stamp_ns(tick_s))) judge.see(*state, tick_s);
     }
+    const auto* gnss = std::get_if<fusion::GnssInput>(&arrival.event);
+    if (matcher && gnss != nullptr) matcher->hear(*gnss, arrival.arrival_s);
     const auto state = fusion.add(arrival.event);
     if (!state) continue;
     judge.see(*state, arrival.arrival_s);

@@ -53,6 +53,7 @@ TEST(Inputs, NoFieldMayBeWhatIsNoNumber) {
   expect_refused(kTurn, kOfTurn);
   expect_refused(ViewInput{0.001, 1e-8}, {&ViewInput::curvature_per_m, &ViewInput::variance});
   expect_refused(GyroInput{0.01}, {&GyroInput::rate_rps});
+  expect_refused(GnssInput{2.6e6, 1.2e6, 1}, {&GnssInput::easting_m, &GnssInput::northing_m, &GnssInput::hdop});
 }
 
 TEST(Inputs, NoFieldOfAStateMayBeWhatIsNoNumber) {

@@ -33,7 +33,7 @@ std::vector<std::string> topics_read_by(const std::string& service) {
       {"sensor_gateway", {}},
       {"track_detector", {"camera_frame/*", "camera_calibration", "imu_sample"}},
       {"odometry", {"camera_frame/*", "camera_calibration", "track_view"}},
-      {"map_matcher", {"landmark_sighting", "track_view", "odometry_step", "imu_sample", "train_state"}},
+      {"map_matcher", {"landmark_sighting", "track_view", "odometry_step", "imu_sample", "gnss_fix", "train_state"}},
       {"fusion", {"odometry_step", "camera_calibration", "imu_sample", "wheel_sample", "gnss_fix", "position_fix"}},
       {"tpr_publisher", {"train_state", "onboard_status"}},
       {"onboard", {}}};

@@ -1,0 +1,144 @@
+// Where GNSS alone says where the train is, and where it cannot.
+#include "map_matcher/locate/gnss_search.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/random.hpp"
+#include "fork_map.hpp"
+
+namespace railfix::map_matcher {
+namespace {
+
+constexpr double kSpeedMps = 15;
+
+/// A train on the straight track of a map northwards, seen once a second from `from_m` on.
+class Ride {
+ public:
+  explicit Ride(std::shared_ptr<const track::Map> map)
+      : search_(std::make_shared<const NetworkIndex>(std::move(map))) {}
+
+  /// Its camera looks north; with a negative speed it backs. What GNSS errs by at a time.
+  template <typename Error>
+  void run(double from_m, double to_m, const Error& east_and_north_m) {
+    const double sign = to_m > from_m ? 1 : -1;
+    for (double m = from_m; sign * (to_m - m) > -1e-9; m += sign * kSpeedMps) {
+      const auto [east_m, north_m] = east_and_north_m(m);
+      search_.add({++stamp_ns_, east_m, m + north_m}, m);
+      place_ = search_.place();
+    }
+  }
+  void run(double from_m, double to_m) {
+    run(from_m, to_m, [](double) { return std::pair{2.0, -3.0}; });
+  }
+
+  [[nodiscard]] const std::optional<track::EdgePosition>& place() const { return place_; }
+  [[nodiscard]] std::optional<size_t> tracks() const { return search_.tracks(); }
+
+ private:
+  GnssSearch search_;
+  int64_t stamp_ns_ = 0;
+  std::optional<track::EdgePosition> place_;
+};
+
+std::shared_ptr<track::Map> tracks_at(const std::vector<double>& eastings_m) {
+  auto map = std::make_shared<track::Map>();
+  for (const double east_m : eastings_m) {
+    const auto id = static_cast<uint32_t>(map->edges.size() + 1);
+    map->edges.push_back({id, "", 2 * id - 1, 2 * id, "", track::Alignment::chained({east_m, 0, 0}, {{3000, 0, 0}})});
+    map->nodes.push_back({2 * id - 1, track::NodeKind::end, "", east_m, 0});
+    map->nodes.push_back({2 * id, track::NodeKind::end, "", east_m, 3000});
+  }
+  return map;
+}
+
+TEST(GnssSearch, FindsTheOneTrackAndTheWayThatTheTrainLooks) {
+  Ride ahead(tracks_at({0}));
+  ahead.run(300, 420);
+  EXPECT_FALSE(ahead.place()) << "it has not agreed with the odometer for long";
+  ahead.run(435, 600);
+  ASSERT_TRUE(ahead.place());
+  EXPECT_EQ(ahead.place()->edge, 1U);
+  EXPECT_NEAR(ahead.place()->offset_m, 597, 1e-6);
+  EXPECT_EQ(ahead.place()->direction, track::Direction::forward);
+  EXPECT_EQ(ahead.tracks(), 1U);
+
+  Ride back(tracks_at({0}));
+  back.run(900, 600);
+  ASSERT_TRUE(back.place());
+  EXPECT_EQ(back.place()->direction, track::Direction::forward) << "its front still looks north";
+}
+
+TEST(GnssSearch, CannotTellTracksThatLieBesideEachOther) {
+  for (const double beside_m : {4.5, 12.0, 25.0}) {
+    Ride ride(tracks_at({0, beside_m}));
+    ride.run(300, 2400);
+    EXPECT_FALSE(ride.place()) << beside_m;
+    EXPECT_EQ(ride.tracks(), 2U) << beside_m;
+  }
+  Ride far(tracks_at({0, 40}));
+  far.run(300, 600);
+  ASSERT_TRUE(far.place());
+  EXPECT_EQ(far.place()->edge, 1U);
+}
+
+TEST(GnssSearch, WaitsBehindASwitchUntilTheLegsAreFarApart) {
+  Ride ride(fork());  // at 500 m; the left leg leaves at 7 degrees
+  ride.run(200, 470);
+  ASSERT_TRUE(ride.place());
+  EXPECT_EQ(ride.place()->edge, 1U);
+  ride.run(485, 700);
+  EXPECT_FALSE(ride.place());
+  ride.run(715, 985);
+  ASSERT_TRUE(ride.place());
+  EXPECT_EQ(ride.place()->edge, 2U);
+}
+
+TEST(GnssSearch, BelievesNoneThatMovesOtherwiseThanTheOdometer) {
+  const auto map = tracks_at({0});
+  Ride stuck(map);
+  stuck.run(300, 1500, [](double m) { return std::pair{0.0, 300 - m}; });
+  EXPECT_FALSE(stuck.place());
+  Ride jumping(map);
+  jumping.run(300, 1500, [](double m) { return std::pair{0.0, std::fmod(m, 90) < 15 ? 60.0 : 0.0}; });
+  EXPECT_FALSE(jumping.place());
+  Ride to_and_fro(map);
+  for (int i = 0; i < 10; ++i) {
+    to_and_fro.run(300, 360);
+    to_and_fro.run(360, 300);
+  }
+  EXPECT_FALSE(to_and_fro.place());
+}
+
+TEST(GnssSearch, SaysNothingWhereTheMapHasNoTrackThatGoesThere) {
+  Ride beside(tracks_at({200}));
+  beside.run(300, 900);
+  EXPECT_FALSE(beside.place());
+  EXPECT_EQ(beside.tracks(), 0U);
+  Ride beyond(tracks_at({0}));
+  beyond.run(2980, 3400);
+  EXPECT_FALSE(beyond.place());
+}
+
+// Single fixes as receivers give them, 1,000 rides; where one is wrong is no matter of chance.
+TEST(GnssSearch, HoldsTheTrainWithinFourSigma) {
+  core::Random random(7);
+  size_t found = 0;
+  for (int ride = 0; ride < 1000; ++ride) {
+    const double lasting_east_m = 3 * random.normal();
+    const double lasting_north_m = 3 * random.normal();
+    Ride one(tracks_at({0, 35}));
+    one.run(300, 900, [&](double) {
+      return std::pair{lasting_east_m + random.normal(), lasting_north_m + random.normal()};
+    });
+    if (!one.place()) continue;
+    ++found;
+    EXPECT_EQ(one.place()->edge, 1U);
+    EXPECT_NEAR(one.place()->offset_m, 900, 4 * GnssSearch::kSigmaM);
+  }
+  EXPECT_GT(found, 700U);
+}
+
+}  // namespace
+}  // namespace railfix::map_matcher
