@@ -93,6 +93,7 @@ CampaignResult run_campaign(const CampaignPlan& plan, const std::function<void(c
       const FaultName name{run.fault.sensor, run.fault.kind};
       result.by_fault[name].add(run.verdict);
       ++result.runs[name];
+      if (run.verdict.other_leg_sure_s > result.sum.other_leg_sure_s) result.longest_other_leg = first + i;
       result.sum.add(run.verdict);
       ++result.run_count;
       result.stanford.add(run.stanford);

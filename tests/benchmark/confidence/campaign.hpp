@@ -46,6 +46,7 @@ struct CampaignResult {
   std::map<FaultName, size_t> runs;
   Verdict sum;
   size_t run_count = 0;
+  uint64_t longest_other_leg = 0;  // the run with the longest state on a leg that the train did not take
   std::vector<BadRun> bad;
   std::vector<BadRun> wide;  // none of the bad ones
   StanfordCounts stanford;
