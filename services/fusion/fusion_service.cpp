@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <limits>
 
 #include "core/time.hpp"
 #include "fusion/fusion_messages.hpp"
@@ -231,13 +232,20 @@ void FusionService::listen(const FusionConfig& config) {
 
 void FusionService::use_gnss(const msg::GnssFix& sample) {
   if (!map_) return;
-  const auto place = map_->from_geo({sample.lat_deg(), sample.lon_deg()});
-  if (!place) {
+  if (map_->crs.empty()) {
     if (!no_projection_told_) context_.log().warn("GNSS is not used: the map has no coordinate system (crs)");
     no_projection_told_ = true;
     return;
   }
-  use(GnssInput{sample.stamp_ns(), place->x(), place->y(), sample.hdop(), sample.fix()}, sample.grabbed_ns());
+  GnssInput input{.stamp_ns = sample.stamp_ns(), .easting_m = 0, .northing_m = 0, .hdop = 0, .fix = sample.fix()};
+  if (input.fix != msg::GNSS_NONE) {
+    const auto place = map_->from_geo({sample.lat_deg(), sample.lon_deg()});
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    input.easting_m = place ? place->x() : nan;
+    input.northing_m = place ? place->y() : nan;
+    input.hdop = sample.hdop();
+  }
+  use(input, sample.grabbed_ns());
 }
 
 void FusionService::use(const Event& event, int64_t grabbed_ns) {

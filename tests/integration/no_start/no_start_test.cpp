@@ -106,12 +106,19 @@ class NoStart : public MatcherInLockStep {
     sample.rate_z_rps(turn_rad / core::seconds(kStepNs));
     return sample;
   }
-  /// Some metres off.
+  /// Some metres off; every fifth time the receiver has no position.
   [[nodiscard]] msg::GnssFix received(const track::Map& map, int64_t stamp_ns) const {
     const auto pose = map.edge(kEdge)->alignment.at(truth_m_.at(stamp_ns)).pose;
     const auto geo = map.to_geo(pose.easting_m + 3, pose.northing_m - 2).value();
     msg::GnssFix fix;
     fix.stamp_ns(stamp_ns);
+    if (stamp_ns / 1'000'000'000 % 5 == 0) {
+      fix.lat_deg(std::nan(""));
+      fix.lon_deg(std::nan(""));
+      fix.hdop(std::nan(""));
+      fix.fix(msg::GNSS_NONE);
+      return fix;
+    }
     fix.lat_deg(geo.lat_deg);
     fix.lon_deg(geo.lon_deg);
     fix.hdop(1);
@@ -190,6 +197,8 @@ TEST_F(NoStart, GnssSaysItWithinSomeHundredMetres) {
     expect_right(*state);
   }
   EXPECT_GE(states_.back().track_probability(), 0.999);
+  for (const auto* service : {"fusion", "map_matcher"})
+    EXPECT_EQ(std::string(status(service).reason().c_str()).find("gnss_fix"), std::string::npos) << service;
 }
 
 // 300 m straight, then a switch: edge 2 goes straight on, edge 3 bends to the left.
