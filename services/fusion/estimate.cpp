@@ -15,6 +15,7 @@ constexpr double kFreshS = 0.12;
 constexpr double kRecentPositionS = 30.0;
 constexpr double kNoMotionUnusableS = 5.0;
 constexpr double kHeldByGnssS = 5.0;
+constexpr int kLandmarksAgainstGnss = 5;  // in a row: so many outvote a receiver that has never agreed
 constexpr double kLostAtLeastM = 100.0;
 constexpr double kLostAtMostM = 500.0;
 
@@ -44,8 +45,10 @@ bool Estimator::is_only_told() const {
   return watch(Source::landmark).used_ns == 0 && watch(Source::gnss).used_ns == 0;
 }
 
-bool Estimator::gnss_denies_start() const {
-  return watch(Source::gnss).isolated && is_only_told();
+// Where masts stand everywhere, some are sighted by chance where the map has one.
+bool Estimator::gnss_denies_place() const {
+  const bool never_agreed = watch(Source::gnss).used_ns == 0 && landmarks_agreed_ < kLandmarksAgainstGnss;
+  return watch(Source::gnss).isolated && (never_agreed || wrong_place_.lost());
 }
 
 // The sentences that people read on the dashboard.
@@ -189,7 +192,7 @@ void Estimator::judge_sensors(TrainEstimate& e) const {
 void Estimator::judge_place(TrainEstimate& e) const {
   const auto& gnss = watch(Source::gnss);
   if (gnss.isolated) e.degrade("GNSS contradicts the position" + since(gnss));
-  if (gnss_denies_start()) e.integrity = Integrity::unusable;
+  if (gnss_denies_place()) e.integrity = Integrity::unusable;
   if (time_doubt_m_ > 0) e.degrade("a gap in time: the clock was set, or nothing measured");
   if (refused_fix_) e.degrade("a position fix was refused");
   if (corrected_) e.degrade("position was corrected by two fixes against the filter");

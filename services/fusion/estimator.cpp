@@ -75,7 +75,9 @@ void Estimator::apply(const Event& event) {
       event);
   if (path_) {
     track_doubt_.move(*path_, filter_.path_distance_m());
-    wrong_place_.move(distance_m(), {track_doubt_.turns_otherwise_now() && !gnss_proven(), gnss_denies_start()});
+    const bool turns_otherwise = track_doubt_.turns_otherwise_now() && !gnss_proven();
+    const bool gnss_alone = is_only_told() || wrong_place_.lost();  // nothing else that may be right speaks
+    wrong_place_.move(distance_m(), {turns_otherwise, gnss_denies_place() && gnss_alone});
   }
   watch_standstill();
 }

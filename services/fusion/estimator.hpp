@@ -247,8 +247,8 @@ class Estimator {
   void compare_turns();
   /// Somebody said where the train begins, and nothing has confirmed it yet.
   [[nodiscard]] bool is_only_told() const;
-  /// ... and GNSS, the first that measures it, says otherwise.
-  [[nodiscard]] bool gnss_denies_start() const;
+  /// GNSS, which has never agreed with it, says otherwise, and hardly anything speaks for it.
+  [[nodiscard]] bool gnss_denies_place() const;
   void use_track(const FixInput& fix);
   Offer offer_place(const MeasuredPlace& place);
   Offer offer_place_again(double path_distance_m, double sigma_m);

@@ -14,7 +14,7 @@ enum class Against : uint8_t { sightings, turning, gnss };
 /// What speaks against the place at a moment.
 struct SpeaksAgainst {
   bool turning = false;  // the train turns otherwise than its track
-  bool gnss = false;     // it contradicts a start that nothing has confirmed
+  bool gnss = false;     // it contradicts a place for which hardly anything speaks
 };
 
 /// A plain value.
