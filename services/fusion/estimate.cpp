@@ -29,20 +29,14 @@ std::string since(const SensorWatch& watch) {
 }
 
 std::string why_given_up(Against because) {
-  switch (because) {
-    case Against::sightings:
-      return ": it was given up, what was sighted fitted the map nowhere near it";
-    case Against::turning:
-      return ": it was given up, the train turned otherwise than the track there";
-    default:
-      return ": it was given up, GNSS contradicted it";
-  }
+  return because == Against::sightings ? ": it was given up, what was sighted fitted the map nowhere near it"
+                                       : ": it was given up, the train turned otherwise than the track there";
 }
 
 }  // namespace
 
 bool Estimator::is_only_told() const {
-  return watch(Source::landmark).used_ns == 0 && watch(Source::gnss).used_ns == 0;
+  return of_gnss_ || (watch(Source::landmark).used_ns == 0 && watch(Source::gnss).used_ns == 0);
 }
 
 // Where masts stand everywhere, some are sighted by chance where the map has one.
@@ -207,6 +201,7 @@ void Estimator::judge_place(TrainEstimate& e) const {
   } else if (track_doubt_.disbelieved()) {
     e.degrade("map_matcher finds some other place far more probable");
   }
+  if (of_gnss_) e.degrade("GNSS alone has told the place: waits for a landmark");
   if (!path_) e.degrade("place on the map not known" + (given_up_ ? why_given_up(*given_up_) : ""));
   if (path_ && (filter_.path_distance_m() < path_->begin_m() || filter_.path_distance_m() > path_->end_m())) {
     e.degrade("beyond the end of the mapped track");

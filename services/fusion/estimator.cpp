@@ -65,6 +65,7 @@ void Estimator::apply(const Event& event) {
   fix_offer_ = {};
   fix_again_ = false;
   notice_gap(stamp_of(event));
+  const double before_m = distance_m();
   std::visit(
       [this](const auto& input) {
         // Inertial samples are many and only their mean is used: they move the filter when it is complete.
@@ -75,9 +76,9 @@ void Estimator::apply(const Event& event) {
       event);
   if (path_) {
     track_doubt_.move(*path_, filter_.path_distance_m());
-    const bool turns_otherwise = track_doubt_.turns_otherwise_now() && !gnss_proven();
-    const bool gnss_alone = is_only_told() || wrong_place_.lost();  // nothing else that may be right speaks
-    wrong_place_.move(distance_m(), {turns_otherwise, gnss_denies_place() && gnss_alone});
+    const double way_m = standstill_ ? 0 : std::abs(distance_m() - before_m);
+    const bool turns_otherwise = track_doubt_.turns_otherwise() && !gnss_proven();
+    wrong_place_.move(way_m, {turns_otherwise, track_doubt_.turns_otherwise_now(), gnss_denies_place()});
   }
   watch_standstill();
 }
@@ -161,6 +162,7 @@ void Estimator::place_like(const Estimator& other) {
   filter_.place_like(other.filter_);
   doubt_m_ = other.doubt_m_;
   wrong_place_ = other.wrong_place_;
+  of_gnss_ = other.of_gnss_;
   given_up_ = other.given_up_;
   time_doubt_m_ = std::max(time_doubt_m_, other.time_doubt_m_);
   unwatched_ = other.unwatched_;
@@ -174,6 +176,7 @@ void Estimator::give_place_up(Against because) {
   path_.reset();
   given_up_ = because;
   wrong_place_ = {};
+  of_gnss_ = false;
   track_doubt_ = {};
   turned_way_.clear();
   for (const auto source : {Source::gnss, Source::landmark, Source::curvature}) watched(source) = {};
@@ -185,7 +188,7 @@ void Estimator::give_place_up(Against because) {
   reference_ = 0;
   met_ = {};
   landmarks_agreed_ = 0;
-  filter_.forget_references(*parameters_);
+  filter_.forget_references();
 }
 
 // Nothing from any sensor for a while: the clock may have been set forward. What counts way over the gap tells.

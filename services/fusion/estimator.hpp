@@ -99,8 +99,8 @@ class Estimator {
   void exclude(Source source, const Estimator& other);
   /// From now on that sensor's samples do not come here; that it is isolated is no contradiction.
   void do_without(Source source) { watched(source).isolated = watched(source).convicted = false; }
-  /// GNSS has agreed with the motion for a while.
-  [[nodiscard]] bool gnss_proven() const { return gnss_agreed_ >= kGnssProof; }
+  /// GNSS has agreed with the motion for a while, and with a place that it had not given itself.
+  [[nodiscard]] bool gnss_proven() const { return gnss_agreed_ >= kGnssProof && !of_gnss_; }
   /// What GNSS that agrees with the motion may still be wrong by.
   [[nodiscard]] double gnss_bound_m() const;
   /// Takes over place and speed, as independent knowledge.
@@ -314,6 +314,7 @@ class Estimator {
   TrackDoubt track_doubt_;
   TurnedWay turned_way_;
   WrongPlace wrong_place_;
+  bool of_gnss_ = false;             // GNSS alone has told the place, and no landmark has been used since
   std::optional<Against> given_up_;  // the last place was, and there is none since
   int64_t start_ns_ = 0;
 };

@@ -12,6 +12,7 @@ namespace {
 constexpr int kAgreementsOfGnss = 5;  // in a row: where it scatters one agrees by chance
 constexpr double kForgotten = 2.0;    // of a landmark's sigmas is the place's when the way since has outgrown it
 constexpr double kBesideLandmarkS = 1.0;
+constexpr double kBendsHereM = 3.0;  // in a window of some 50 m to either side that is rarely by chance
 constexpr double kOffTrackM = 15.0;  // a GNSS fix further beside the track is none
 // Of the sigma of a GNSS fix; squares add up to the whole.
 constexpr double kGnssLastingShare = 0.866;
@@ -104,12 +105,13 @@ void Estimator::use(const FixInput& fix) {
   if (fix.new_path) {
     path_ = fix.new_path;
     given_up_.reset();
+    of_gnss_ = fix.kind == FixKind::gnss;
     filter_.set_origin(0, std::hypot(fix.sigma_m, parameters_->fix_sigma_floor_m));
     track_doubt_.said(fix.probability, std::nullopt, filter_.path_distance_m());
     accept(fix);
     return;
   }
-  if (!path_ || fix.probability < parameters_->fix_min_probability) return;
+  if (!path_ || fix.kind == FixKind::gnss || fix.probability < parameters_->fix_min_probability) return;
   if (wrong_place_.lost() && fix.kind == FixKind::curvature) return;  // some curve fits in every window so wide
   const track::EdgePosition place{fix.edge, fix.offset_m, fix.direction};
   const auto path_distance_m = path_->distance_of(place, filter_.path_distance_m());
@@ -179,6 +181,8 @@ void Estimator::accept(const FixInput& fix) {
   // Some curve may fit at a place that nobody has confirmed, though the train turns otherwise than the track there.
   const bool by_chance = fix.kind == FixKind::curvature && (is_only_told() || track_doubt_.turns_otherwise());
   if (!by_chance) track_doubt_.seen_here();
+  if (by_chance && std::abs(fix_offer_.residual) < kBendsHereM) wrong_place_.bends_here();
+  if (fix.kind == FixKind::landmark) of_gnss_ = false;
   // A vague fix helps, but settles no doubt and is nothing to measure a distance from. Landmarks are sharp by
   // themselves.
   if (fix.kind != FixKind::landmark && fix.sigma_m > 2 * filter_.path_sigma_m()) return;

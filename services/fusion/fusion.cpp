@@ -168,7 +168,8 @@ const Estimator* Fusion::estimator() {
 }
 
 void Fusion::start_position(FixInput& fix) const {
-  if (now_->main().path() || !map_ || fix.kind != FixKind::network || fix.probability < kBeginProbability) return;
+  const bool of_begin = fix.kind == FixKind::network || fix.kind == FixKind::gnss;
+  if (now_->main().path() || !map_ || !of_begin || fix.probability < kBeginProbability) return;
   auto path = track::Path::follow(map_, {fix.edge, fix.offset_m, fix.direction}, kPathAheadM, kPathBehindM);
   if (path.ok()) fix.new_path = std::make_shared<const track::Path>(std::move(path).value());
 }

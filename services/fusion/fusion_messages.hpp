@@ -23,6 +23,7 @@ inline FixInput input_of(const msg::PositionFix& m) {
   fix.kind = m.kind() == msg::FIX_CURVATURE ? FixKind::curvature
              : m.kind() == msg::FIX_NETWORK ? FixKind::network
              : m.kind() == msg::FIX_TRACK   ? FixKind::track
+             : m.kind() == msg::FIX_GNSS    ? FixKind::gnss
                                             : FixKind::landmark;
   fix.direction = messaging::direction_of(m.direction());
   fix.fits_nowhere = m.fits_nowhere() != 0;

@@ -41,7 +41,7 @@ struct GnssInput {
   int fix = 0;  // 0 none, 1 single, 4 RTK fixed, 5 RTK float
 };
 
-enum class FixKind : uint8_t { curvature = 1, landmark = 2, network = 3, track = 4 };
+enum class FixKind : uint8_t { curvature = 1, landmark = 2, network = 3, track = 4, gnss = 5 };
 
 /// A network fix begins the position from this probability on.
 inline constexpr double kBeginProbability = 0.95;

@@ -272,16 +272,24 @@ void MotionFilter::loosen_scale(const FusionParameters& parameters) {
               squared(camera ? parameters.visual_scale_sigma : parameters.wheel_scale_sigma));
 }
 
-void MotionFilter::forget_references(const FusionParameters& parameters) {
+// The scale of the one odometer against the other is no matter of references.
+void MotionFilter::forget_references() {
+  const bool camera = unit_ != Odometer::wheel;
+  const int unit = index(StateIndex::unit_scale);
+  const double before = camera ? known_before_.camera : known_before_.wheel;
+  const double sigma = camera ? known_before_.camera_sigma : known_before_.wheel_sigma;
+  const double false_share = sigma + std::abs(x_(unit) - before);
+  ud_.inflate(index(StateIndex::distance), squared(false_share * value(StateIndex::distance)));
+  x_(unit) = before;
+  ud_.reset(unit, squared(sigma));
   reference_m_ = 0;
-  const double scale_sigma = unit_ != Odometer::wheel ? parameters.visual_scale_sigma : parameters.wheel_scale_sigma;
-  ud_.inflate(index(StateIndex::distance), squared(scale_sigma * value(StateIndex::distance)));
-  loosen_scale(parameters);
 }
 
 void MotionFilter::set_origin(double path_distance_m, double sigma_m) {
   x_(index(StateIndex::origin)) = path_distance_m - value(StateIndex::distance);
   ud_.reset(index(StateIndex::origin), squared(sigma_m));
+  // How far the train had run before does not make the place any vaguer.
+  ud_.reset(index(StateIndex::distance), 0);
 }
 
 void MotionFilter::doubt_time(double sigma_s) {

@@ -94,8 +94,8 @@ class MotionFilter {
   void doubt_wheel(double sigma_m);
   /// The accelerometer's bias may have become another one by sigma.
   void doubt_accel_bias(double sigma_mps2);
-  /// What references have told of the way from the begin may be false.
-  void forget_references(const FusionParameters& parameters);
+  /// What references have told of the way from the begin, and taught of the scale, may be false.
+  void forget_references();
   /// The place is not where it was thought: the origin becomes unknown within sigma and the next fix decides.
   void loosen_origin(double sigma_m);
   /// What a false fix taught of the scale of both odometers is forgotten.

@@ -1,6 +1,6 @@
 // Is the place on the map a wrong one altogether: a start that was told kilometres off, an element that the map lacks?
 // Whoever speaks against it says so for long enough until it is given up; then the train is searched for on the whole
-// map.
+// map. GNSS alone never does: the train would be found by the one that had accused it.
 #pragma once
 
 #include <cstdint>
@@ -9,12 +9,13 @@
 namespace railfix::fusion {
 
 /// Who has spoken against a place until it was given up.
-enum class Against : uint8_t { sightings, turning, gnss };
+enum class Against : uint8_t { sightings, turning };
 
 /// What speaks against the place at a moment.
 struct SpeaksAgainst {
-  bool turning = false;  // the train turns otherwise than its track
-  bool gnss = false;     // it contradicts a place for which hardly anything speaks
+  bool turning = false;      // the train turns otherwise than its track, by all that is known
+  bool turning_now = false;  // ... and has just done so
+  bool gnss = false;         // it contradicts the place
 };
 
 /// A plain value.
@@ -27,8 +28,10 @@ class WrongPlace {
   }
   /// The place is right, by a landmark or by GNSS that has proven itself.
   void found();
-  /// The train has come to `distance_m` of its way.
-  void move(double distance_m, SpeaksAgainst now);
+  /// The track bends where the train does, by the camera: it may be the gyro that is wrong.
+  void bends_here() { strayed_m_ = 0; }
+  /// The train has run so far.
+  void move(double way_m, SpeaksAgainst now);
 
   [[nodiscard]] bool fits_nowhere() const { return fits_nowhere_; }
   /// It did not fit, and nothing has shown since that the place is right.
@@ -40,14 +43,12 @@ class WrongPlace {
 
  private:
   static constexpr double kNoPositionM = 300;
-  double distance_m_ = 0;
-  std::optional<double> turned_at_m_;
   bool fits_nowhere_ = false;
   bool lost_ = false;
   // Way so far against each.
   double lost_m_ = 0;
   double strayed_m_ = 0;
-  double denied_m_ = 0;
+  double since_turned_m_ = 1e9;
 };
 
 }  // namespace railfix::fusion

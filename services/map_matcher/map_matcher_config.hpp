@@ -4,6 +4,7 @@
 #include <string>
 
 #include "map_matcher/landmark_matcher.hpp"
+#include "map_matcher/locate/gnss_search.hpp"
 #include "map_matcher/locate/network_locator.hpp"
 #include "map_matcher/shape/curvature_matcher.hpp"
 #include "map_matcher/shape/curve_exit_matcher.hpp"
@@ -21,6 +22,7 @@ struct MapMatcherConfig {
   bool choose_track = true;
   bool use_imu = true;
   bool use_gnss = true;
+  GnssSearchParameters gnss;
   double camera_bias_per_m = 1e-4;
   GyroParameters gyro;
   bool locate = true;
@@ -71,8 +73,10 @@ struct MapMatcherConfig {
     fields.number("camera_bias_per_m", camera_bias_per_m, {0, 0.01}, "1/m",
                   "Constant error of the camera's turning for the choice of the track, one sigma.");
     fields.flag("locate", locate, "Look for the place on the whole map while nobody knows it.");
-    fields.flag("use_gnss", use_gnss, "... where GNSS says it, too: the one track within its reach.");
     fields.number("locate_every_m", locate_every_m, {20, 10000}, "m", "... once in this way.");
+    fields.flag("use_gnss", use_gnss, "... where GNSS says it, too: the one track within its reach.");
+    fields.number("gnss_antenna_ahead_m", gnss.antenna_ahead_m, {-500, 500}, "m",
+                  "GNSS antenna ahead of the camera's foot: the same as fusion.gnss_antenna_ahead_m.");
     fields.number("view_ahead_m", view_ahead_m, {0, 50}, "m",
                   "The curvature of track_view belongs to a point at most so far ahead of the camera's foot.");
     fields.number("view_rate_sigma_per_m2", view_rate_sigma_per_m2, {1e-7, 1e-2}, "1/m^2",

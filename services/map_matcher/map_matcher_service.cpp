@@ -65,6 +65,7 @@ void MapMatcherService::forget_place() {
   if (chooser_) chooser_.emplace(config_.track_parameters(), map_, ways_);
   moved_ns_ = 0;
   said_track_ = {};
+  of_gnss_ = false;
 }
 
 void MapMatcherService::restart() {
@@ -221,7 +222,9 @@ void MapMatcherService::look_for_place(const msg::OdometryStep& step) {
   if (placed || std::abs(chain_.odometer_m() - located_m_) < config_.locate_every_m) return;
   located_m_ = chain_.odometer_m();
   const Location location = locator_->locate();
-  if (location.certain()) publish_place(location.places, step.stamp_ns(), step.grabbed_ns());
+  if (!location.certain()) return;
+  of_gnss_ = false;
+  publish_place(location.places, msg::FIX_NETWORK, step.stamp_ns(), step.grabbed_ns());
 }
 
 // The odometer is fusion's, which runs on by whatever sensor there is.
@@ -231,16 +234,22 @@ void MapMatcherService::look_for_place(const msg::GnssFix& fix) {
   const auto plane = map_->from_geo({fix.lat_deg(), fix.lon_deg()});
   if (!plane || !takes("gnss_fix", GnssInput{plane->x(), plane->y(), fix.hdop()})) return;
   if (!std::isfinite(state_->speed_mps()) || std::abs(since_s) > FollowedPath::kOldStateS) return;
-  if (!gnss_) gnss_.emplace(index());
-  gnss_->add({fix.stamp_ns(), plane->x(), plane->y()}, state_->distance_m() + state_->speed_mps() * since_s);
-  const auto place = gnss_->place();
-  if (place) publish_place({{*place, config_.locator.certain, GnssSearch::kSigmaM}}, fix.stamp_ns(), fix.grabbed_ns());
+  if (!gnss_) gnss_.emplace(config_.gnss, index());
+  const double speed_mps = state_->speed_mps();
+  gnss_->add({fix.stamp_ns(), plane->x(), plane->y(), fix.hdop()}, state_->distance_m() + speed_mps * since_s,
+             speed_mps);
+  const auto found = gnss_->place();
+  if (!found) return;
+  of_gnss_ = true;
+  publish_place({{found->place, config_.locator.certain, found->sigma_m}}, msg::FIX_GNSS, fix.stamp_ns(),
+                fix.grabbed_ns());
 }
 
-void MapMatcherService::publish_place(const std::vector<LocatedPlace>& places, int64_t stamp_ns, int64_t grabbed_ns) {
+void MapMatcherService::publish_place(const std::vector<LocatedPlace>& places, uint8_t kind, int64_t stamp_ns,
+                                      int64_t grabbed_ns) {
   auto message = message_of(places);
   message.stamp_ns(stamp_ns);
-  message.kind(msg::FIX_NETWORK);
+  message.kind(kind);
   message.sigma_m(places.front().sigma_m);
   send(message, grabbed_ns);
 }
@@ -309,9 +318,9 @@ void MapMatcherService::move_without_camera(int64_t to_ns) {
   moved_ns_ = to_ns;
 }
 
-// What GNSS holds is there: then the map or the sightings are wrong.
+// What GNSS holds is there, if it was not GNSS that had told it: then the map or the sightings are wrong.
 double MapMatcherService::place_doubt() const {
-  if (!landmarks_ || (state_->sources() & msg::SOURCE_GNSS) != 0) return 0;
+  if (!landmarks_ || (!of_gnss_ && (state_->sources() & msg::SOURCE_GNSS) != 0)) return 0;
   return landmarks_->place_doubt();
 }
 

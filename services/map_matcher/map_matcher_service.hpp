@@ -48,7 +48,7 @@ class MapMatcherService {
   const std::shared_ptr<const NetworkIndex>& index();
   void look_for_place(const msg::OdometryStep& step);
   void look_for_place(const msg::GnssFix& fix);
-  void publish_place(const std::vector<LocatedPlace>& places, int64_t stamp_ns, int64_t grabbed_ns);
+  void publish_place(const std::vector<LocatedPlace>& places, uint8_t kind, int64_t stamp_ns, int64_t grabbed_ns);
   /// What is known of a place that is not known.
   [[nodiscard]] std::string placeless() const;
   void follow_turning(const msg::OdometryStep& step);
@@ -82,6 +82,7 @@ class MapMatcherService {
   std::shared_ptr<const NetworkIndex> index_;  // from when it is first needed on
   std::optional<NetworkLocator> locator_;      // only while the place is not known, or no position
   std::optional<GnssSearch> gnss_;             // only while the place is not known
+  bool of_gnss_ = false;                       // it has told the place
   double located_m_ = 0;                       // odometer at the last search
   double matched_m_ = 0;                       // odometer at the last match
   int64_t moved_ns_ = 0;                       // the chooser has come to this time

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <iterator>
 
 #include "core/units.hpp"
 #include "track/path.hpp"
@@ -14,19 +16,33 @@ constexpr double kWayM = 100.0;  // over which GNSS and odometer must agree, ...
 constexpr double kOffM = 10.0;   // ... to this and
 constexpr double kOffShare = 0.05;
 constexpr double kRocksM = 2.0;    // a train that stands or begins to move
+constexpr double kStandsM = 1.0;   // since the last position: it takes that one's place
 constexpr double kAlongRad = 0.5;  // of a track that the train may be on: the way may be a bend
-constexpr double kAbeamM = 1.0;    // what is further ahead or behind lies beyond the track's end
+constexpr double kAbeamM = 0.1;    // what is further ahead or behind lies beyond the edge's end
+constexpr double kLookM = 10.0;    // from one place to the next on an edge that may come by again
 
 double heading_on(const track::Map& map, const track::EdgePosition& place) {
   const auto pose = map.edge(place.edge)->alignment.at(place.offset_m).pose;
   return pose.heading_rad + (place.direction == track::Direction::reverse ? core::kPi : 0);
 }
 
+double apart_m(const track::PlanPose& pose, const GnssPosition& position) {
+  return std::hypot(position.easting_m - pose.easting_m, position.northing_m - pose.northing_m);
+}
+
 }  // namespace
 
-void GnssSearch::add(const GnssPosition& position, double odometer_m) {
-  const double run_m = seen_.empty() ? 0 : seen_.back().run_m + std::abs(odometer_m - seen_.back().odometer_m);
-  seen_.push_back({position, odometer_m, run_m});
+void GnssSearch::add(const GnssPosition& position, double odometer_m, double speed_mps) {
+  const auto& p = parameters_;
+  if (!(position.hdop <= p.most_hdop)) return;
+  const double reach_m = std::max(p.bound_m, p.interval_factor * p.sigma_m * position.hdop);
+  Seen seen{position, odometer_m, 0, reach_m, p.lag_s * std::abs(speed_mps)};
+  if (!seen_.empty()) {
+    const double moved_m = std::abs(odometer_m - seen_.back().odometer_m);
+    seen.run_m = seen_.back().run_m + moved_m;
+    if (seen_.size() > 1 && moved_m < kStandsM) seen_.pop_back();
+  }
+  seen_.push_back(seen);
   while (seen_.size() > kLeastSeen && std::abs(odometer_m - seen_[1].odometer_m) >= kWayM) seen_.pop_front();
 }
 
@@ -52,42 +68,81 @@ std::optional<double> GnssSearch::heading_rad() const {
   return std::atan2(east_m, north_m) + (way_m < 0 ? core::kPi : 0);
 }
 
-std::vector<track::EdgePosition> GnssSearch::tracks_at(const GnssPosition& position, double heading_rad) const {
-  std::vector<track::EdgePosition> tracks;
-  for (const auto& near : index_->near(position.easting_m, position.northing_m, kReachM)) {
-    const auto pose = index_->map().edge(near.edge)->alignment.at(near.offset_m).pose;
-    const double ahead_m = (position.easting_m - pose.easting_m) * std::sin(pose.heading_rad) +
-                           (position.northing_m - pose.northing_m) * std::cos(pose.heading_rad);
-    if (std::abs(ahead_m) > kAbeamM) continue;
-    for (const auto direction : {track::Direction::forward, track::Direction::reverse}) {
-      const track::EdgePosition place{near.edge, near.offset_m, direction};
-      if (std::abs(core::wrap_pi(heading_on(index_->map(), place) - heading_rad)) < kAlongRad) tracks.push_back(place);
-    }
+// Where an edge ends and another goes on, only that one is abeam; where the track ends, the train may be just behind.
+void GnssSearch::add_track(const track::NearTrack& near, const Seen& seen, double heading_rad,
+                           std::vector<Near>& tracks) const {
+  const auto* edge = index_->map().edge(near.edge);
+  const auto pose = edge->alignment.at(near.offset_m).pose;
+  const double ahead_m = (seen.position.easting_m - pose.easting_m) * std::sin(pose.heading_rad) +
+                         (seen.position.northing_m - pose.northing_m) * std::cos(pose.heading_rad);
+  const bool abeam = std::abs(ahead_m) < kAbeamM;
+  if (!abeam && !index_->ways().after({edge, ahead_m > 0}).empty()) return;
+  for (const auto direction : {track::Direction::forward, track::Direction::reverse}) {
+    const track::EdgePosition place{near.edge, near.offset_m, direction};
+    if (std::abs(core::wrap_pi(heading_on(index_->map(), place) - heading_rad)) < kAlongRad)
+      tracks.push_back({place, abeam});
   }
-  return tracks;
 }
 
-// The same track, and no switch between that leads elsewhere.
-bool GnssSearch::comes_from(const track::EdgePosition& place, const Seen& before) const {
-  const double way_m = seen_.back().odometer_m - before.odometer_m;
-  const double reach_m = std::abs(way_m) + kReachM;
-  const auto path = track::Path::follow(index_->shared_map(), place, reach_m, reach_m);
-  if (!path.ok()) return false;
-  const auto pose = path.value().at(-way_m).pose;
-  return std::hypot(pose.easting_m - before.position.easting_m, pose.northing_m - before.position.northing_m) < kReachM;
+std::vector<GnssSearch::Near> GnssSearch::tracks_at(const Seen& seen, double heading_rad) const {
+  std::vector<Near> tracks;
+  for (const auto& near : index_->near(seen.position.easting_m, seen.position.northing_m, seen.reach_m))
+    add_track(near, seen, heading_rad, tracks);
+  const auto run_of = [&](const Near& one) {
+    return track::Run{index_->map().edge(one.place.edge), one.place.direction == track::Direction::forward};
+  };
+  const auto follows_another = [&](const Near& one) {
+    return std::ranges::any_of(tracks, [&](const Near& other) {
+      return std::ranges::find(index_->ways().after(run_of(other)), run_of(one)) !=
+             index_->ways().after(run_of(other)).end();
+    });
+  };
+  std::vector<Near> single;  // at a joint both edges are abeam
+  std::ranges::copy_if(tracks, std::back_inserter(single), std::not_fn(follows_another));
+  return single;
 }
 
-std::optional<track::EdgePosition> GnssSearch::place() const {
+// A balloon loop, or a line that winds up a valley: the same edge comes by once more.
+bool GnssSearch::is_passed_again(const track::EdgePosition& place, const Seen& seen) const {
+  const auto& alignment = index_->map().edge(place.edge)->alignment;
+  for (double m = 0; m < alignment.length_m(); m += kLookM) {
+    const bool elsewhere = std::abs(m - place.offset_m) > 3 * seen.reach_m;
+    if (elsewhere && apart_m(alignment.at(m).pose, seen.position) < seen.reach_m + kLookM) return true;
+  }
+  return false;
+}
+
+std::optional<track::EdgePosition> GnssSearch::foot_behind(const track::EdgePosition& antenna) const {
+  if (parameters_.antenna_ahead_m == 0) return antenna;
+  const double reach_m = std::abs(parameters_.antenna_ahead_m) + 1;
+  const auto path = track::Path::follow(index_->shared_map(), antenna, reach_m, reach_m);
+  if (!path.ok()) return std::nullopt;
+  const double foot_m = -parameters_.antenna_ahead_m;
+  if (foot_m < path.value().begin_m() || foot_m > path.value().end_m()) return std::nullopt;
+  return path.value().position_at(foot_m);
+}
+
+// It is the same track 100 m back, with no switch between that leads elsewhere.
+std::optional<GnssPlace> GnssSearch::place() const {
   const auto heading = heading_rad();
   if (!heading) return std::nullopt;
-  const auto here = tracks_at(seen_.back().position, *heading);
-  if (here.size() != 1 || tracks_at(seen_.front().position, *heading).size() != 1) return std::nullopt;
-  return comes_from(here.front(), seen_.front()) ? std::optional(here.front()) : std::nullopt;
+  const Seen& now = seen_.back();
+  const Seen& before = seen_.front();
+  const auto here = tracks_at(now, *heading);
+  if (here.size() != 1 || !here.front().abeam || tracks_at(before, *heading).size() != 1) return std::nullopt;
+  const auto& antenna = here.front().place;
+  const double way_m = now.odometer_m - before.odometer_m;
+  const auto path = track::Path::follow(index_->shared_map(), antenna, std::abs(way_m), std::abs(way_m));
+  if (!path.ok() || apart_m(path.value().at(-way_m).pose, before.position) > before.reach_m) return std::nullopt;
+  if (is_passed_again(antenna, now)) return std::nullopt;
+  const auto foot = foot_behind(antenna);
+  return foot ? std::optional(GnssPlace{*foot, (now.reach_m + now.late_m) / parameters_.interval_factor})
+              : std::nullopt;
 }
 
 std::optional<size_t> GnssSearch::tracks() const {
   const auto heading = heading_rad();
-  return heading ? std::optional(tracks_at(seen_.back().position, *heading).size()) : std::nullopt;
+  return heading ? std::optional(tracks_at(seen_.back(), *heading).size()) : std::nullopt;
 }
 
 }  // namespace railfix::map_matcher

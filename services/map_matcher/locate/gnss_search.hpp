@@ -12,27 +12,38 @@
 
 namespace railfix::map_matcher {
 
+struct GnssSearchParameters {
+  double bound_m = 30.0;         // GNSS that agrees with the odometer may be wrong by so much, ...
+  double lag_s = 1.0;            // ... and its stamp by that
+  double sigma_m = 3.0;          // at HDOP 1
+  double most_hdop = 3.0;        // a fix that is vaguer says nothing
+  double antenna_ahead_m = 0.0;  // of the camera's foot
+  double interval_factor = 4.0;  // so many sigmas must hold the train
+};
+
 /// On the plane of the map.
 struct GnssPosition {
   int64_t stamp_ns = 0;
   double easting_m = 0;
   double northing_m = 0;
+  double hdop = 1;
+};
+
+/// Of the camera's foot at the last position, in the direction that it looks.
+struct GnssPlace {
+  track::EdgePosition place;
+  double sigma_m = 0;
 };
 
 class GnssSearch {
  public:
-  /// So far from the track it may be at most; what lies further away is another track.
-  static constexpr double kReachM = 30.0;
-  /// One sigma along the track: four of them hold what GNSS may be wrong by unseen.
-  static constexpr double kSigmaM = 10.0;
+  GnssSearch(const GnssSearchParameters& parameters, std::shared_ptr<const NetworkIndex> index)
+      : parameters_(parameters), index_(std::move(index)) {}
 
-  explicit GnssSearch(std::shared_ptr<const NetworkIndex> index) : index_(std::move(index)) {}
-
-  /// odometer_m: of the train at the stamp, forward growing.
-  void add(const GnssPosition& position, double odometer_m);
-  /// Where the front was at the last position, in the direction that it looks. Nothing before GNSS and odometer have
-  /// agreed over some way, nor where no track or more than one is within reach.
-  [[nodiscard]] std::optional<track::EdgePosition> place() const;
+  /// odometer_m: of the train at the stamp, forward growing; speed_mps: by which a late stamp errs.
+  void add(const GnssPosition& position, double odometer_m, double speed_mps);
+  /// Nothing before GNSS and odometer have agreed over some way, nor where no track or more than one is within reach.
+  [[nodiscard]] std::optional<GnssPlace> place() const;
   /// So many tracks are within reach, as far as that is known.
   [[nodiscard]] std::optional<size_t> tracks() const;
 
@@ -40,15 +51,25 @@ class GnssSearch {
   struct Seen {
     GnssPosition position;
     double odometer_m = 0;
-    double run_m = 0;  // forward and back
+    double run_m = 0;    // forward and back
+    double reach_m = 0;  // so far from the track it may be at most
+    double late_m = 0;   // ... and so much more along it
+  };
+  /// A track within reach; it may end before it comes beside the position.
+  struct Near {
+    track::EdgePosition place;
+    bool abeam = false;
   };
   /// Every position since the first is as far from it as the odometer says.
   [[nodiscard]] bool agrees() const;
   /// The heading of the train's front; nothing where GNSS does not agree with the odometer.
   [[nodiscard]] std::optional<double> heading_rad() const;
-  [[nodiscard]] std::vector<track::EdgePosition> tracks_at(const GnssPosition& position, double heading_rad) const;
-  [[nodiscard]] bool comes_from(const track::EdgePosition& place, const Seen& before) const;
+  [[nodiscard]] std::vector<Near> tracks_at(const Seen& seen, double heading_rad) const;
+  void add_track(const track::NearTrack& near, const Seen& seen, double heading_rad, std::vector<Near>& tracks) const;
+  [[nodiscard]] bool is_passed_again(const track::EdgePosition& place, const Seen& seen) const;
+  [[nodiscard]] std::optional<track::EdgePosition> foot_behind(const track::EdgePosition& antenna) const;
 
+  GnssSearchParameters parameters_;
   std::shared_ptr<const NetworkIndex> index_;
   std::deque<Seen> seen_;  // the last way, oldest first
 };

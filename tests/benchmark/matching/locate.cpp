@@ -37,6 +37,19 @@ double quantile(const std::vector<double>& sorted, double share) {
   return sorted.empty() ? 0.0 : sorted[static_cast<size_t>(share * static_cast<double>(sorted.size() - 1))];
 }
 
+void print_gnss(const std::vector<Trip>& trips) {
+  std::vector<double> after_m;
+  for (const Trip& t : trips) {
+    if (t.by_gnss_after_m) after_m.push_back(*t.by_gnss_after_m);
+  }
+  if (after_m.empty()) return;
+  std::sort(after_m.begin(), after_m.end());
+  const auto either = std::ranges::count_if(trips, [](const Trip& t) { return t.found || t.by_gnss_after_m; });
+  std::printf("by GNSS alone: %zu, after %.0f m in the median, 90 %% within %.0f m; wrong %zu; either way %zu\n",
+              after_m.size(), quantile(after_m, 0.5), quantile(after_m, 0.9),
+              static_cast<size_t>(std::ranges::count_if(trips, &Trip::gnss_wrong)), static_cast<size_t>(either));
+}
+
 void print(const std::vector<Trip>& trips) {
   print_found("trips", trips);
   std::vector<Trip> informed;
@@ -59,6 +72,7 @@ void print(const std::vector<Trip>& trips) {
       "wrong although certain %d; largest error of a certain place %.1f sigma; track certain after %.0f m in the "
       "median\n",
       wrong, most_sigmas, quantile(after_m, 0.5));
+  print_gnss(trips);
   std::printf("search (processor time, %zu): p50 %.2f, p99 %.2f, max %.2f s\n", seconds.size(), quantile(seconds, 0.5),
               quantile(seconds, 0.99), quantile(seconds, 1));
 }

@@ -25,6 +25,10 @@ constexpr double kAheadM = 8;     // of the foot a landmark is sighted
 constexpr double kBeyondM = 150;  // a train that backs begins
 constexpr double kStepM = 1.0;
 
+constexpr double kGnssEveryM = 25;  // once a second
+constexpr double kGnssSigmaM = 3;   // most of it lasts for a minute
+constexpr double kGnssLastsM = 1500;
+
 /// On over any leg of a switch, the straight one more often; false where the track ends before.
 bool lengthen(track::Route& route, const track::Ways& ways, double to_m, core::Random& random) {
   while (route.end_m() < to_m) {
@@ -156,7 +160,9 @@ class TripRun {
         back_{&courses.back, heading_of(courses.back)},
         on_again_{&courses.on_again, heading_of(courses.on_again)},
         sensors_(errors_, random.next()),
-        locator_({}, networks.known) {}
+        locator_({}, networks.known),
+        gnss_({}, networks.known),
+        gnss_random_(static_cast<uint64_t>(1000 * first_m_) + options.seed) {}
 
   Trip run() {
     const double every_m = map_matcher::MapMatcherConfig{}.locate_every_m;
@@ -167,6 +173,7 @@ class TripRun {
     double looked_m = 0;
     for (double run_m = 0; run_m < way_m; run_m += kStepM) {
       step(course_at(run_m), place_at(run_m), place_at(run_m + kStepM));
+      if (options_.gnss) receive(course_at(run_m), run_m);
       const bool last = run_m + 1.5 * kStepM > way_m;
       if (!last && run_m - looked_m < every_m) continue;
       looked_m = run_m;
@@ -204,6 +211,7 @@ class TripRun {
   }
   void step(const Course& course, double from_m, double to_m);
   void look(const Course& course, double run_m, double here_m);
+  void receive(const Course& course, double run_m);
 
   const Networks& networks_;
   const MatchingOptions& options_;
@@ -217,12 +225,19 @@ class TripRun {
   Course on_again_;
   testing::RideSensors sensors_;
   map_matcher::NetworkLocator locator_;
+  map_matcher::GnssSearch gnss_;
+  core::Random gnss_random_;
+  double gnss_east_m_ = 0;  // its lasting error
+  double gnss_north_m_ = 0;
+  double gnss_run_m_ = -kGnssEveryM;
+  double odometer_m_ = 0;
   Trip trip_;
 };
 
 void TripRun::step(const Course& course, double from_m, double to_m) {
   const auto s = sensors_.step(course.heading, 0, from_m, to_m, kStepM / 20);
   locator_.move(s.way_m, s.turn_rad, s.turn_sigma_rad);
+  odometer_m_ += s.way_m;
   const double behind_m = std::min(from_m, to_m) + kAheadM;
   const double ahead_m = std::max(from_m, to_m) + kAheadM;
   const auto& leg = course.route->leg_at(ahead_m);
@@ -236,6 +251,23 @@ void TripRun::step(const Course& course, double from_m, double to_m) {
     const double side = random_.uniform() < 0.5 ? -1 : 1;
     locator_.sight({0, kind, kAheadM, kind == track::LandmarkKind::frog ? 0.72 * side : 0, 0.2, 0.95});
   }
+}
+
+void TripRun::receive(const Course& course, double run_m) {
+  if (trip_.by_gnss_after_m || run_m - gnss_run_m_ < kGnssEveryM) return;
+  const double keep = gnss_run_m_ < 0 ? 0 : std::exp(-kGnssEveryM / kGnssLastsM);
+  gnss_run_m_ = run_m;
+  const double fresh_m = kGnssSigmaM * std::sqrt(1 - keep * keep);
+  gnss_east_m_ = keep * gnss_east_m_ + fresh_m * gnss_random_.normal();
+  gnss_north_m_ = keep * gnss_north_m_ + fresh_m * gnss_random_.normal();
+  const auto truth = course.route->position_at(place_at(run_m + kStepM));
+  const auto pose = networks_.real->map().edge(truth.edge)->alignment.at(truth.offset_m).pose;
+  gnss_.add({0, pose.easting_m + gnss_east_m_, pose.northing_m + gnss_north_m_}, odometer_m_, kGnssEveryM);
+  const auto found = gnss_.place();
+  if (!found) return;
+  trip_.by_gnss_after_m = run_m;
+  const auto on_route = course.route->distance_of(found->place, place_at(run_m + kStepM));
+  trip_.gnss_wrong = !on_route || std::abs(*on_route - place_at(run_m + kStepM)) > 4 * found->sigma_m;
 }
 
 void TripRun::look(const Course& course, double run_m, double here_m) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/random.hpp"
+#include "map_matcher/locate/gnss_search.hpp"
 #include "map_matcher/locate/network_locator.hpp"
 #include "matching.hpp"
 
@@ -19,6 +20,8 @@ struct Trip {
   double found_after_m = 0;
   double place_after_m = 0;
   bool best_right = false;  // at the end, certain or not
+  std::optional<double> by_gnss_after_m;
+  bool gnss_wrong = false;  // GNSS found another track, the other direction, or a place that is more than 4 sigma off
   std::vector<double> searches_s;
   std::vector<map_matcher::Doubt> doubts;
   double turn_rad = 0;        // of the true track, over stretches of 20 m

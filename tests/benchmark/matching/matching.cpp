@@ -43,6 +43,7 @@ void add_options(CLI::App& app, measure::MatchingOptions& options) {
       ->check(tool::whole_number(1));
   app.add_option("--masts-mapped", options.masts_mapped, "landmarks: the map has only this share of the masts")
       ->check(tool::number_between(0, 1));
+  app.add_flag("--gnss", options.gnss, "locate: where GNSS alone finds the train, too");
   auto* astern = app.add_flag("--astern", options.astern, "locate: the trains back all the way");
   auto* back = app.add_option("--back-m", options.back_m, "locate: after 1.5 km the trains set back so far, and go on")
                    ->check(tool::number_between(0, 1500))

@@ -17,6 +17,7 @@ struct MatchingOptions {
   bool astern = false;       // the trains back all the way (locate)
   double back_m = 0;         // after 1.5 km the trains set back so far, and go on (locate)
   bool other_leg = false;    // ... over another leg of a switch that they set back over
+  bool gnss = false;         // where GNSS alone finds the train, too (locate)
   double masts_mapped = 1;   // share of the masts that the map has (landmarks)
   bool each = false;         // a line for each ride that went wrong
 };

@@ -36,6 +36,7 @@ MatcherLoop::MatcherLoop(const TrainSimulation& simulation)
 bool MatcherLoop::follow(const fusion::TrainEstimate& state) {
   using Way = map_matcher::FollowedPath::Way;
   if (!state.track_known) {
+    of_gnss_ = of_gnss_ && !followed_.path();
     followed_.forget();
     return false;
   }
@@ -140,19 +141,21 @@ void MatcherLoop::hear(const fusion::GnssInput& gnss, double arrival_s) {
     return;
   }
   if (gnss.fix == 0 || !std::isfinite(state_->speed_mps)) return;
-  if (!gnss_) gnss_.emplace(index());
+  if (!gnss_) gnss_.emplace(map_matcher::GnssSearchParameters{}, index());
   const double since_s = core::seconds(gnss.stamp_ns - state_->stamp_ns);
-  gnss_->add({gnss.stamp_ns, gnss.easting_m, gnss.northing_m}, state_->distance_m + state_->speed_mps * since_s);
-  const auto place = gnss_->place();
-  if (!place) return;
+  gnss_->add({gnss.stamp_ns, gnss.easting_m, gnss.northing_m, gnss.hdop},
+             state_->distance_m + state_->speed_mps * since_s, state_->speed_mps);
+  const auto found = gnss_->place();
+  if (!found) return;
+  of_gnss_ = true;
   found_.emplace_back(
-      arrival_s, fusion::FixInput{gnss.stamp_ns, place->edge, place->offset_m, map_matcher::GnssSearch::kSigmaM, 0.9999,
-                                  0, fusion::FixKind::network, place->direction, nullptr});
+      arrival_s, fusion::FixInput{gnss.stamp_ns, found->place.edge, found->place.offset_m, found->sigma_m, 0.9999, 0,
+                                  fusion::FixKind::gnss, found->place.direction, nullptr});
 }
 
 // As map_matcher says it, with a track of which only the rest is believed.
 void MatcherLoop::doubt_place(const fusion::TrainEstimate& state, double due_s) {
-  const bool gnss = (state.sources & 1U << static_cast<unsigned>(fusion::Source::gnss)) != 0;
+  const bool gnss = !of_gnss_ && (state.sources & 1U << static_cast<unsigned>(fusion::Source::gnss)) != 0;
   const double elsewhere = landmarks_->place_doubt();
   if (gnss || elsewhere == 0) return;
   const auto& place = state.position;

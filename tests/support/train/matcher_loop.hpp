@@ -47,6 +47,7 @@ class MatcherLoop {
   std::optional<map_matcher::LandmarkMatcher> landmarks_;
   std::shared_ptr<const map_matcher::NetworkIndex> index_;
   std::optional<map_matcher::NetworkLocator> locator_;  // while a place that was told has been given up
+  bool of_gnss_ = false;                                // it has told the place
   std::optional<map_matcher::GnssSearch> gnss_;         // while the place is not known
   std::optional<fusion::TrainEstimate> state_;          // the last one
   int64_t moved_ns_ = 0;
