@@ -32,7 +32,7 @@ const char* word(const std::array<const char*, N>& words, uint8_t value) {
 }
 constexpr std::array kModes{"search", "track", "keyframe", "blind"};
 constexpr std::array kSightings{"unknown", "frog", "balise", "portal_in", "portal_out", "mast", "bridge", "platform"};
-constexpr std::array kFixes{"unknown", "curvature", "landmark", "network", "track"};
+constexpr std::array kFixes{"unknown", "curvature", "landmark", "network", "track", "gnss"};
 constexpr std::array kDirections{"?", "+", "-"};
 constexpr std::array kIntegrities{"ok", "degraded", "unusable"};
 constexpr std::array kOrientations{"track", "imu"};
