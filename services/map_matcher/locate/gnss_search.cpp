@@ -15,11 +15,13 @@ constexpr size_t kLeastSeen = 10;
 constexpr double kWayM = 100.0;  // over which GNSS and odometer must agree, ...
 constexpr double kOffM = 10.0;   // ... to this and
 constexpr double kOffShare = 0.05;
-constexpr double kRocksM = 2.0;    // a train that stands or begins to move
-constexpr double kStandsM = 1.0;   // since the last position: it takes that one's place
-constexpr double kAlongRad = 0.5;  // of a track that the train may be on: the way may be a bend
-constexpr double kAbeamM = 0.1;    // what is further ahead or behind lies beyond the edge's end
-constexpr double kLookM = 10.0;    // from one place to the next on an edge that may come by again
+constexpr double kRocksM = 2.0;      // a train that stands or begins to move
+constexpr double kStandsM = 1.0;     // since the last position: it takes that one's place
+constexpr double kAlongRad = 0.5;    // of the track that is the train's: the way may be a bend
+constexpr double kCrossesRad = 1.2;  // ... and one that turns more off is no track that the train may be on
+constexpr double kAbeamM = 0.1;      // what is further ahead or behind lies beyond the edge's end
+constexpr int kNewtonSteps = 6;
+constexpr double kLookM = 10.0;  // from one place to the next on an edge that may come by again
 
 double heading_on(const track::Map& map, const track::EdgePosition& place) {
   const auto pose = map.edge(place.edge)->alignment.at(place.offset_m).pose;
@@ -72,15 +74,21 @@ std::optional<double> GnssSearch::heading_rad() const {
 void GnssSearch::add_track(const track::NearTrack& near, const Seen& seen, double heading_rad,
                            std::vector<Near>& tracks) const {
   const auto* edge = index_->map().edge(near.edge);
-  const auto pose = edge->alignment.at(near.offset_m).pose;
-  const double ahead_m = (seen.position.easting_m - pose.easting_m) * std::sin(pose.heading_rad) +
-                         (seen.position.northing_m - pose.northing_m) * std::cos(pose.heading_rad);
+  // The finder's foot is rough: a place that is not quite beside it must not seem to lie beyond the edge's end.
+  double foot_m = near.offset_m;
+  double ahead_m = INFINITY;
+  for (int k = 0; k < kNewtonSteps && std::abs(ahead_m) > 0.1 * kAbeamM; ++k) {
+    if (k > 0) foot_m = std::clamp(foot_m + ahead_m, 0.0, edge->alignment.length_m());
+    const auto pose = edge->alignment.at(foot_m).pose;
+    ahead_m = (seen.position.easting_m - pose.easting_m) * std::sin(pose.heading_rad) +
+              (seen.position.northing_m - pose.northing_m) * std::cos(pose.heading_rad);
+  }
   const bool abeam = std::abs(ahead_m) < kAbeamM;
   if (!abeam && !index_->ways().after({edge, ahead_m > 0}).empty()) return;
   for (const auto direction : {track::Direction::forward, track::Direction::reverse}) {
-    const track::EdgePosition place{near.edge, near.offset_m, direction};
-    if (std::abs(core::wrap_pi(heading_on(index_->map(), place) - heading_rad)) < kAlongRad)
-      tracks.push_back({place, abeam});
+    const track::EdgePosition place{near.edge, foot_m, direction};
+    const double turned_rad = std::abs(core::wrap_pi(heading_on(index_->map(), place) - heading_rad));
+    if (turned_rad < kCrossesRad) tracks.push_back({place, abeam && turned_rad < kAlongRad});
   }
 }
 
@@ -129,7 +137,7 @@ std::optional<GnssPlace> GnssSearch::place() const {
   const Seen& now = seen_.back();
   const Seen& before = seen_.front();
   const auto here = tracks_at(now, *heading);
-  if (here.size() != 1 || !here.front().abeam || tracks_at(before, *heading).size() != 1) return std::nullopt;
+  if (here.size() != 1 || !here.front().fits || tracks_at(before, *heading).size() != 1) return std::nullopt;
   const auto& antenna = here.front().place;
   const double way_m = now.odometer_m - before.odometer_m;
   const auto path = track::Path::follow(index_->shared_map(), antenna, std::abs(way_m), std::abs(way_m));

@@ -55,10 +55,10 @@ class GnssSearch {
     double reach_m = 0;  // so far from the track it may be at most
     double late_m = 0;   // ... and so much more along it
   };
-  /// A track within reach; it may end before it comes beside the position.
+  /// A track within reach on which the train may be; it fits where it lies beside the position and runs as the train.
   struct Near {
     track::EdgePosition place;
-    bool abeam = false;
+    bool fits = false;
   };
   /// Every position since the first is as far from it as the odometer says.
   [[nodiscard]] bool agrees() const;

@@ -268,6 +268,10 @@ void TripRun::receive(const Course& course, double run_m) {
   trip_.by_gnss_after_m = run_m;
   const auto on_route = course.route->distance_of(found->place, place_at(run_m + kStepM));
   trip_.gnss_wrong = !on_route || std::abs(*on_route - place_at(run_m + kStepM)) > 4 * found->sigma_m;
+  if (options_.each && trip_.gnss_wrong) {
+    std::printf("  GNSS wrong at %.0f m: %u:%.0f for %u:%.0f, sigma %.0f m\n", run_m, found->place.edge,
+                found->place.offset_m, truth.edge, truth.offset_m, found->sigma_m);
+  }
 }
 
 void TripRun::look(const Course& course, double run_m, double here_m) {

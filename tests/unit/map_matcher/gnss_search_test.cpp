@@ -155,6 +155,31 @@ TEST(GnssSearch, SaysWhereTheFootIsNotTheAntenna) {
   EXPECT_NEAR(ahead.place()->offset_m, 880, 1e-6);
 }
 
+// Where a finder's foot is only rough: real maps have short elements, and here every place of a bend is asked for.
+TEST(GnssSearch, SeesBothTracksInEveryPlaceOfABend) {
+  const auto map = std::make_shared<track::Map>();
+  const std::vector<track::Element> bend(50, {20, 1.0 / 290, 1.0 / 290});
+  map->edges.push_back({1, "", 1, 2, "", track::Alignment::chained({0, 0, 0}, bend)});
+  map->edges.push_back({2, "", 3, 4, "", track::Alignment::chained({6, 0, 0}, bend)});
+  map->nodes = {{1, track::NodeKind::end, "", 0, 0},
+                {2, track::NodeKind::end, "", 0, 0},
+                {3, track::NodeKind::end, "", 6, 0},
+                {4, track::NodeKind::end, "", 0, 0}};
+  map->connections = {};
+  const auto index = std::make_shared<const NetworkIndex>(map);
+  for (double first_m = 20; first_m < 40; first_m += 0.7) {
+    GnssSearch search({}, index);
+    for (double m = first_m; m < 600; m += 15 + first_m / 4) {
+      const auto pose = map->edge(1)->alignment.at(m).pose;
+      search.add({0, pose.easting_m, pose.northing_m, 1}, m, kSpeedMps);
+      ASSERT_FALSE(search.place()) << m;
+      if (search.tracks()) {
+        ASSERT_EQ(search.tracks(), 2U) << m;
+      }
+    }
+  }
+}
+
 // A balloon loop drawn as one edge: two straights 10 m apart.
 TEST(GnssSearch, CannotTellTheLegsOfOneEdgeThatComesBack) {
   auto map = std::make_shared<track::Map>();
