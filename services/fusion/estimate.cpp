@@ -191,8 +191,10 @@ void Estimator::judge_place(TrainEstimate& e) const {
   if (refused_fix_) e.degrade("a position fix was refused");
   if (corrected_) e.degrade("position was corrected by two fixes against the filter");
   if (off_path_) e.degrade("a position fix lies on another track");
-  if (track_doubt_.turns_otherwise()) e.degrade("the train turns otherwise than this track");
-  if (track_doubt_.turns_otherwise() && wrong_place_.strays()) e.integrity = Integrity::unusable;
+  if (track_doubt_.turns_otherwise()) {
+    e.degrade("the train turns otherwise than this track");
+    if (wrong_place_.strays()) e.integrity = Integrity::unusable;
+  }
   if (wrong_place_.fits_nowhere()) {
     e.degrade("what is sighted fits the map nowhere near this place");
     e.integrity = Integrity::unusable;

@@ -236,8 +236,7 @@ void MapMatcherService::look_for_place(const msg::GnssFix& fix) {
   if (!std::isfinite(state_->speed_mps()) || std::abs(since_s) > FollowedPath::kOldStateS) return;
   if (!gnss_) gnss_.emplace(config_.gnss, index());
   const double speed_mps = state_->speed_mps();
-  gnss_->add({fix.stamp_ns(), plane->x(), plane->y(), fix.hdop()}, state_->distance_m() + speed_mps * since_s,
-             speed_mps);
+  gnss_->add({plane->x(), plane->y(), fix.hdop()}, state_->distance_m() + speed_mps * since_s, speed_mps);
   const auto found = gnss_->place();
   if (!found) return;
   of_gnss_ = true;

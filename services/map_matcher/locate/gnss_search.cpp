@@ -28,8 +28,10 @@ double heading_on(const track::Map& map, const track::EdgePosition& place) {
   return pose.heading_rad + (place.direction == track::Direction::reverse ? core::kPi : 0);
 }
 
-double apart_m(const track::PlanPose& pose, const GnssPosition& position) {
-  return std::hypot(position.easting_m - pose.easting_m, position.northing_m - pose.northing_m);
+/// Of a pose, or of another position.
+template <typename Place>
+double apart_m(const Place& place, const GnssPosition& position) {
+  return std::hypot(position.easting_m - place.easting_m, position.northing_m - place.northing_m);
 }
 
 }  // namespace
@@ -52,9 +54,7 @@ bool GnssSearch::agrees() const {
   const auto& from = seen_.front();
   return std::ranges::all_of(seen_, [&](const Seen& to) {
     const double way_m = std::abs(to.odometer_m - from.odometer_m);
-    const double apart_m =
-        std::hypot(to.position.easting_m - from.position.easting_m, to.position.northing_m - from.position.northing_m);
-    return std::abs(apart_m - way_m) < kOffM + kOffShare * way_m;
+    return std::abs(apart_m(from.position, to.position) - way_m) < kOffM + kOffShare * way_m;
   });
 }
 

@@ -2,7 +2,6 @@
 // sees the train move. Where several do, GNSS cannot tell them apart, and nothing is said.
 #pragma once
 
-#include <cstdint>
 #include <deque>
 #include <memory>
 #include <optional>
@@ -23,7 +22,6 @@ struct GnssSearchParameters {
 
 /// On the plane of the map.
 struct GnssPosition {
-  int64_t stamp_ns = 0;
   double easting_m = 0;
   double northing_m = 0;
   double hdop = 1;
@@ -40,7 +38,7 @@ class GnssSearch {
   GnssSearch(const GnssSearchParameters& parameters, std::shared_ptr<const NetworkIndex> index)
       : parameters_(parameters), index_(std::move(index)) {}
 
-  /// odometer_m: of the train at the stamp, forward growing; speed_mps: by which a late stamp errs.
+  /// odometer_m: of the train then, forward growing; speed_mps: by which a late stamp errs.
   void add(const GnssPosition& position, double odometer_m, double speed_mps);
   /// Nothing before GNSS and odometer have agreed over some way, nor where no track or more than one is within reach.
   [[nodiscard]] std::optional<GnssPlace> place() const;

@@ -262,7 +262,7 @@ void TripRun::receive(const Course& course, double run_m) {
   gnss_north_m_ = keep * gnss_north_m_ + fresh_m * gnss_random_.normal();
   const auto truth = course.route->position_at(place_at(run_m + kStepM));
   const auto pose = networks_.real->map().edge(truth.edge)->alignment.at(truth.offset_m).pose;
-  gnss_.add({0, pose.easting_m + gnss_east_m_, pose.northing_m + gnss_north_m_}, odometer_m_, kGnssEveryM);
+  gnss_.add({pose.easting_m + gnss_east_m_, pose.northing_m + gnss_north_m_}, odometer_m_, kGnssEveryM);
   const auto found = gnss_.place();
   if (!found) return;
   trip_.by_gnss_after_m = run_m;

@@ -143,8 +143,8 @@ void MatcherLoop::hear(const fusion::GnssInput& gnss, double arrival_s) {
   if (gnss.fix == 0 || !std::isfinite(state_->speed_mps)) return;
   if (!gnss_) gnss_.emplace(map_matcher::GnssSearchParameters{}, index());
   const double since_s = core::seconds(gnss.stamp_ns - state_->stamp_ns);
-  gnss_->add({gnss.stamp_ns, gnss.easting_m, gnss.northing_m, gnss.hdop},
-             state_->distance_m + state_->speed_mps * since_s, state_->speed_mps);
+  gnss_->add({gnss.easting_m, gnss.northing_m, gnss.hdop}, state_->distance_m + state_->speed_mps * since_s,
+             state_->speed_mps);
   const auto found = gnss_->place();
   if (!found) return;
   of_gnss_ = true;

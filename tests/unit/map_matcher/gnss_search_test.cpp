@@ -27,7 +27,7 @@ class Ride {
     const double sign = to_m > from_m ? 1 : -1;
     for (double m = from_m; sign * (to_m - m) > -1e-9; m += sign * kSpeedMps) {
       const auto [east_m, north_m] = east_and_north_m(m);
-      search_.add({++stamp_ns_, east_m, m + north_m, hdop}, m, kSpeedMps);
+      search_.add({east_m, m + north_m, hdop}, m, kSpeedMps);
       const auto found = search_.place();
       place_ = found ? std::optional(found->place) : std::nullopt;
       sigma_m_ = found ? found->sigma_m : 0;
@@ -45,7 +45,6 @@ class Ride {
 
  private:
   GnssSearch search_;
-  int64_t stamp_ns_ = 0;
   std::optional<track::EdgePosition> place_;
   double sigma_m_ = 0;
 };
@@ -171,7 +170,7 @@ TEST(GnssSearch, SeesBothTracksInEveryPlaceOfABend) {
     GnssSearch search({}, index);
     for (double m = first_m; m < 600; m += 15 + first_m / 4) {
       const auto pose = map->edge(1)->alignment.at(m).pose;
-      search.add({0, pose.easting_m, pose.northing_m, 1}, m, kSpeedMps);
+      search.add({pose.easting_m, pose.northing_m, 1}, m, kSpeedMps);
       ASSERT_FALSE(search.place()) << m;
       if (search.tracks()) {
         ASSERT_EQ(search.tracks(), 2U) << m;
@@ -215,10 +214,10 @@ TEST(GnssSearch, GoesOverJointsAndMindsTracksThatEnd) {
 TEST(GnssSearch, KeepsNothingOfATrainThatStands) {
   GnssSearch search({}, std::make_shared<const NetworkIndex>(tracks_at({0, 5})));
   double m = 300;
-  for (; m < 600; m += 15) search.add({0, 0, m, 1}, m, kSpeedMps);
+  for (; m < 600; m += 15) search.add({0, m, 1}, m, kSpeedMps);
   EXPECT_EQ(search.tracks(), 2U);
   const auto begin = std::chrono::steady_clock::now();
-  for (int i = 0; i < 500'000; ++i) search.add({0, 0, m, 1}, m, 0);
+  for (int i = 0; i < 500'000; ++i) search.add({0, m, 1}, m, 0);
   for (int i = 0; i < 1000; ++i) (void)search.place();
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(2)) << "2 ms a call where all are kept";
 }
