@@ -199,7 +199,7 @@ void Estimator::judge_place(TrainEstimate& e) const {
     e.degrade("what is sighted fits the map nowhere near this place");
     e.integrity = Integrity::unusable;
   } else if (wrong_place_.lost()) {
-    e.degrade("what was sighted did not fit the map: waits for a landmark");
+    e.degrade("the place was doubted: waits for a landmark");
   } else if (track_doubt_.disbelieved()) {
     e.degrade("map_matcher finds some other place far more probable");
   }

@@ -109,6 +109,7 @@ void Estimator::use(const FixInput& fix) {
     filter_.set_origin(0, std::hypot(fix.sigma_m, parameters_->fix_sigma_floor_m));
     track_doubt_.said(fix.probability, std::nullopt, filter_.path_distance_m());
     accept(fix);
+    if (fix.in_doubt) wrong_place_.doubt();
     return;
   }
   if (!path_ || fix.kind == FixKind::gnss || fix.probability < parameters_->fix_min_probability) return;

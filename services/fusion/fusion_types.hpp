@@ -59,6 +59,7 @@ struct FixInput {
   std::shared_ptr<const track::Path> new_path;  // set by Fusion when the fix starts the position on the map, or
                                                 // says that the train is on another track
   bool fits_nowhere = false;  // kind track: what is sighted fits the map nowhere near this place, on no track
+  bool in_doubt = false;      // kind network: no position until landmarks or proven GNSS agree
 };
 
 /// The next picture will be measured against the one of this stamp: remember where the train was.

@@ -26,6 +26,8 @@ class WrongPlace {
     fits_nowhere_ = fits_nowhere;
     lost_ = lost_ || fits_nowhere;
   }
+  /// It comes from someone who did not trust it.
+  void doubt() { lost_ = true; }
   /// The place is right, by a landmark or by GNSS that has proven itself.
   void found();
   /// The track bends where the train does, by the camera: it may be the gyro that is wrong.
@@ -34,7 +36,7 @@ class WrongPlace {
   void move(double way_m, SpeaksAgainst now);
 
   [[nodiscard]] bool fits_nowhere() const { return fits_nowhere_; }
-  /// It did not fit, and nothing has shown since that the place is right.
+  /// It did not fit, or was doubted, and nothing has shown since that the place is right.
   [[nodiscard]] bool lost() const { return lost_; }
   /// For longer than a wrong leg is followed or a gyro is out of order: it is no position any more.
   [[nodiscard]] bool strays() const { return strayed_m_ > kNoPositionM; }

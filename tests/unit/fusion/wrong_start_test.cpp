@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "fusion/handover.hpp"
 #include "straight_run.hpp"
 #include "support/train/verdict.hpp"
 
@@ -120,6 +121,28 @@ TEST_F(WrongStart, IsGivenUpWhereNothingIsSightedThatFits) {
   const auto state = go(200, says);
   EXPECT_FALSE(state.track_known);
   EXPECT_THAT(state.reason, HasSubstr("given up, what was sighted fitted"));
+}
+
+// By a fusion that takes over from one whose place GNSS denied, or that was lost.
+TEST_F(WrongStart, APlaceThatIsHandedOverInDoubtIsNoneUntilTwoLandmarksAgree) {
+  fusion_ = fusion_without_start();
+  go(20, [] {});
+  KnownPlace denied{at(t_s_), {1, 500, track::Direction::forward}, kSpeedMps, 2, 2, 0.9999};
+  denied.usable = false;
+  const auto place = place_at(straight_line(), denied, at(t_s_), 4);
+  ASSERT_TRUE(place);
+  fusion_.add(*place);
+  auto state = go(200, [] {});
+  EXPECT_TRUE(state.track_known);
+  EXPECT_EQ(state.integrity, Integrity::unusable) << state.reason;
+  EXPECT_GE(std::min(state.over_m, state.under_m), 99);
+  fusion_.add(fix_at(t_s_, 702, 1));
+  state = go(20, [] {});
+  EXPECT_EQ(state.integrity, Integrity::unusable) << "one alone may be another one";
+  fusion_.add(fix_at(t_s_, 722, 2));
+  state = go(20, [] {});
+  EXPECT_EQ(state.integrity, Integrity::ok) << state.reason;
+  EXPECT_NEAR(state.position.offset_m, 742, 1);
 }
 
 /// Whole rides, with map_matcher's real matchers and its search of the whole map in the loop.
