@@ -69,12 +69,12 @@ struct MapMatcherConfig {
     fields.choice("curve_method", curve_method, {"likelihood", "exits"},
                   "How: likelihood over the place, or the exits of curves (paper 004, section 8).");
     fields.flag("choose_track", choose_track, "Say which track the train is on behind switches.");
-    fields.flag("use_imu", use_imu, "Take the turning from the gyro while the camera is blind.");
+    fields.flag("use_imu", use_imu, "Take the turning from the gyro while the camera is blind (or there is none).");
     fields.number("camera_bias_per_m", camera_bias_per_m, {0, 0.01}, "1/m",
                   "Constant error of the camera's turning for the choice of the track, one sigma.");
     fields.flag("locate", locate, "Look for the place on the whole map while nobody knows it.");
     fields.number("locate_every_m", locate_every_m, {20, 10000}, "m", "... once in this way.");
-    fields.flag("use_gnss", use_gnss, "... where GNSS says it, too: the one track within its reach.");
+    fields.flag("use_gnss", use_gnss, "... where GNSS says it, too: the one track within 30 m of it.");
     fields.number("gnss_antenna_ahead_m", gnss.antenna_ahead_m, {-500, 500}, "m",
                   "GNSS antenna ahead of the camera's foot: the same as fusion.gnss_antenna_ahead_m.");
     fields.number("view_ahead_m", view_ahead_m, {0, 50}, "m",
@@ -83,7 +83,8 @@ struct MapMatcherConfig {
                   "Where in front of that it lies follows from its sigma and this: the same as "
                   "track_detector.limits.curvature_rate_per_m2.");
     fields.number("least_speed_mps", least_speed_mps, {0, 50}, "m/s", "Slower, the turning says nothing of the track.");
-    fields.number("lag_m", lag_m, {0, 60}, "m", "The car body may turn so far behind the camera's foot.");
+    fields.number("lag_m", lag_m, {0, 60}, "m",
+                  "The car body may turn so far behind the camera's foot (distance of the bogies).");
     fields.number("match_every_m", match_every_m, {0.5, 1000}, "m", "The shape is matched anew after this way.");
     fields.group("landmarks", "Matching of sightings.", [this](service::Fields& f) { describe_landmarks(f); });
     fields.group("curvature", "Matching of the track's shape.", [this](service::Fields& f) { describe_curvature(f); });
@@ -96,7 +97,9 @@ struct MapMatcherConfig {
  private:
   void describe_landmarks(service::Fields& f) {
     auto& p = landmarks;
-    f.number("detection", p.detection, {0.01, 0.999}, "", "Chance that a mapped landmark is sighted.");
+    f.number(
+        "detection", p.detection, {0.01, 0.999}, "",
+        "Chance that a mapped landmark is sighted; also for the choice of the track and the search on the whole map.");
     f.number("false_per_m", p.false_per_m, {1e-7, 1}, "1/m",
              "False sightings of one kind per metre. What the map lacks is learnt on the way.");
     f.number("moved", p.moved, {0, 0.5}, "", "Chance that a landmark stands elsewhere than the map says ...");
@@ -114,7 +117,7 @@ struct MapMatcherConfig {
     f.number("window_m", p.window_m, {50, 5000}, "m", "Longest way that is matched.");
     f.number("noise_per_m", p.noise_per_m, {1e-6, 0.1}, "1/m", "Least sigma of one average.");
     f.number("correlated_bins", p.correlated_bins, {1, 100}, "", "So many neighbouring averages err together.");
-    f.number("bias_per_m", p.bias_per_m, {1e-9, 0.01}, "1/m", "Constant error of the curvature, one sigma.");
+    f.number("bias_per_m", p.bias_per_m, {1e-9, 0.01}, "1/m", "Constant error of the measured curvature, one sigma.");
     f.number("scale_sigma", p.scale_sigma, {1e-5, 0.2}, "", "Error of the odometer's scale.");
     f.number("search_margin_m", p.search_margin_m, {0, 1000}, "m", "Search beyond the interval of train_state.");
     f.number("max_sigma_m", p.max_sigma_m, {0.5, 100}, "m", "A vaguer fix is not sent.");
@@ -132,31 +135,37 @@ struct MapMatcherConfig {
     auto& p = track;
     f.number("bin_m", p.bin_m, {0.5, 20}, "m", "Turning is compared over this way.");
     f.number("noise_per_m", p.noise_per_m, {1e-6, 0.1}, "1/m", "Least sigma of the curvature of one bin.");
-    f.number("curvature_share", p.curvature_share, {0, 1}, "", "The map's curvature may be off by this share.");
+    f.number("curvature_share", p.curvature_share, {0, 1}, "",
+             "The map's curvature may be off by this share (switches are drawn roughly).");
     f.number("correlated_bins", p.correlated_bins, {1, 100}, "", "So many neighbouring bins err together.");
     f.number("map_sigma_m", p.map_sigma_m, {0.1, 50}, "m", "Switches are elsewhere than on the map, one sigma.");
     f.number("reach_m", p.reach_m, {5, 500}, "m", "Ways are told apart from this far ahead of the train.");
-    f.number("wrong_side", p.wrong_side, {0.001, 0.5}, "", "Chance that a sighting is on the wrong side.");
-    f.number("view_from_m", p.view_from_m, {0, 50}, "m", "track_view's curvature is that of the rails from here ...");
+    f.number("wrong_side", p.wrong_side, {0.001, 0.5}, "", "Chance that a frog or mast is reported on the wrong side.");
+    f.number("view_from_m", p.view_from_m, {0, 50}, "m",
+             "The curvature of track_view is that of the rails from here ...");
     f.number("view_to_m", p.view_to_m, {1, 100}, "m", "... to here ahead of the camera's foot.");
-    f.number("astray", p.astray, {0.001, 0.5}, "", "Chance that pictures show another leg than the own.");
+    f.number("astray", p.astray, {0.001, 0.5}, "",
+             "Chance that pictures show another leg of a switch than the own, rails and frog alike (2 of 14 real "
+             "pictures).");
     f.number("astray_m", p.astray_m, {5, 1000}, "m", "... which then lasts so far.");
   }
   void describe_locator(service::Fields& f) {
     auto& p = locator;
     f.number("window_m", p.window_m, {1000, 50000}, "m", "Longest way that is looked for.");
     f.number("least_way_m", p.least_way_m, {800, 50000}, "m", "A shorter way is not looked for.");
-    f.number("least_turn_rad", p.least_turn_rad, {0, 100}, "rad", "A way that bends less is not looked for.");
+    f.number("least_turn_rad", p.least_turn_rad, {0, 100}, "rad",
+             "A way that bends less is not looked for (sum of all turns, left and right).");
     f.number("scale_range", p.scale_range, {0.001, 0.05}, "", "The odometer's scale may be off by so much.");
     f.number("noise_per_m", p.noise_per_m, {1e-6, 0.01}, "1/m", "Least sigma of the measured curvature over 20 m.");
     f.number("bias_per_m", p.bias_per_m, {1e-7, 0.01}, "1/m", "Constant error of the measured curvature, one sigma.");
     f.number("heading_sigma_rad", p.heading_sigma_rad, {1e-4, 0.1}, "rad",
-             "The heading strays so far about the track's ...");
+             "The body's heading strays so far about the mapped track's (hunting, errors of the map) ...");
     f.number("heading_m", p.heading_m, {5, 1000}, "m", "... and changes over such a way.");
     f.number("curvature_share", p.curvature_share, {0, 0.5}, "", "The map's curvature may be off by this share.");
     f.number("correlated_bins", p.correlated_bins, {1, 100}, "", "So many neighbouring 20 m err together.");
     f.number("certain", p.certain, {0.5, 0.999999}, "", "From this probability on a place is certain ...");
-    f.number("certain_misfit", p.certain_misfit, {0.5, 100}, "", "... where the way fits to so many sigmas squared,");
+    f.number("certain_misfit", p.certain_misfit, {0.5, 100}, "",
+             "... where the way fits to so many sigmas squared in the mean,");
     f.number("certain_sigma_m", p.certain_sigma_m, {7, 1000}, "m", "... and its sigma along the track is less.");
   }
   template <typename Parameters>

@@ -35,7 +35,7 @@ struct SimulatorConfig {
   }
 
  private:
-  static constexpr const char* kWhen = "always, never, or stretches of time or way: '10..20 s, 300..450 m'.";
+  static constexpr const char* kWhen = "always, never, or stretches of time or way: 10..20 s, 300..450 m.";
 
   void describe_light(service::Fields& fields) {
     auto& light = scenario.light;

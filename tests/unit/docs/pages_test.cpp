@@ -1,5 +1,5 @@
-// The tables in docs/configuration say what the programs say: every key with its default, unit and range, and no other
-// key.
+// The tables in docs/configuration say what the programs say: every key with its default, unit, range and meaning, and
+// no other key.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -20,6 +20,7 @@ namespace fs = std::filesystem;
 struct Key {
   std::string value;  // default as in the YAML file
   std::string range;  // "[...]" at the end of the comment, without the brackets; empty where there is none
+  std::string meaning;
   std::string file;
 };
 
@@ -38,7 +39,7 @@ std::vector<fs::path> files_below(const fs::path& folder, const std::string& ext
 // "section.group.key" of everything in a file that `railfix-<service> --document` wrote.
 void read_keys(const fs::path& file, std::map<std::string, Key>& keys) {
   static const std::regex kLine(R"(( *)(\w+):(?: (.*))?)");
-  static const std::regex kRange(R"(.* \[([^\[\]]*)\])");
+  static const std::regex kComment(R"( *# (.*?)(?: \[([^\[\]]*)\])?)");
   std::ifstream stream(file);
   std::vector<std::string> groups;
   std::string comment;
@@ -52,10 +53,10 @@ void read_keys(const fs::path& file, std::map<std::string, Key>& keys) {
     groups.resize(static_cast<size_t>(part.length(1)) / 2);
     std::string path;
     for (const auto& group : groups) path += group + ".";
-    std::smatch range;
     if (part[3].matched) {
-      keys[path + part.str(2)] = {part[3], std::regex_match(comment, range, kRange) ? range.str(1) : "",
-                                  file.filename().string()};
+      std::smatch said;
+      ASSERT_TRUE(std::regex_match(comment, said, kComment)) << path + part.str(2);
+      keys[path + part.str(2)] = {part[3], said[2], said[1], file.filename().string()};
     } else {
       groups.push_back(part[2]);
     }
@@ -68,21 +69,30 @@ std::map<std::string, Key> keys_of_programs() {
   return keys;
 }
 
+// Without marks, of which a page has more.
+std::string plain(const std::string& cell) {
+  std::string text;
+  for (const char c : cell) {
+    if (c != '`' && c != '\\') text += c;
+  }
+  return text;
+}
+
 // Rows "| `section.key` | default | unit, range | meaning |" of all pages.
 std::map<std::string, Key> keys_of_pages() {
-  static const std::regex kRow(R"(\| `(\w+(?:\.\w+)+)` \| (?:`(.*)`|empty) \| (.*?) \| .* \|)");
+  static const std::regex kRow(R"(\| `(\w+(?:\.\w+)+)` \| (?:`(.*)`|empty) \| (.*?) \| (.*) \|)");
   std::map<std::string, Key> keys;
   for (const auto& file : files_below(kRoot / "docs" / "configuration", ".md")) {
     std::ifstream stream(file);
     for (std::string line; std::getline(stream, line);) {
       std::smatch part;
-      if (std::regex_match(line, part, kRow)) keys[part[1]] = {part[2], part[3], file.filename().string()};
+      if (std::regex_match(line, part, kRow)) keys[part[1]] = {part[2], part[3], part[4], file.filename().string()};
     }
   }
   return keys;
 }
 
-TEST(ConfigurationPages, SayEveryKeyWithItsDefaultAndRange) {
+TEST(ConfigurationPages, SayEveryKeyWithItsDefaultRangeAndMeaning) {
   const auto pages = keys_of_pages();
   const auto programs = keys_of_programs();
   ASSERT_GT(programs.size(), 100U);
@@ -94,6 +104,7 @@ TEST(ConfigurationPages, SayEveryKeyWithItsDefaultAndRange) {
     }
     const bool empty = program.value == "\"\"" || program.value == "[]";
     EXPECT_EQ(page->second.value, empty ? "" : program.value) << "default of " << key << " in " << page->second.file;
+    EXPECT_EQ(plain(page->second.meaning), plain(program.meaning)) << key << " in " << page->second.file;
     if (!program.range.empty()) {
       EXPECT_EQ(page->second.range, program.range) << "unit and range of " << key << " in " << page->second.file;
     }
