@@ -11,18 +11,21 @@ namespace railfix::map_matcher {
 struct ViewInput {
   double curvature_per_m = 0;
   double variance = 0;
+  int64_t stamp_ns = 0;
 };
 /// What imu_sample says of the turning.
 struct GyroInput {
   double rate_rps = 0;
+  int64_t stamp_ns = 0;
 };
 /// What gnss_fix says, on the plane of the map.
 struct GnssInput {
   double easting_m = 0;
   double northing_m = 0;
   double hdop = 0;
+  int64_t stamp_ns = 0;
 };
-/// What train_state says of a train whose place is known.
+/// What train_state says.
 struct StateInput {
   PlacedTrain placed;
   double sigma_m = 0;
@@ -30,6 +33,10 @@ struct StateInput {
   double visual_scale = 1;
   double easting_m = 0;
   double northing_m = 0;
+  bool track_known = true;  // otherwise it is nowhere on the map
+  bool usable = true;       // otherwise its place is no position
+  bool standstill = false;
+  bool gnss_agrees = false;
 };
 
 [[nodiscard]] bool has_sense(const Sighting& sighting);
@@ -39,7 +46,7 @@ struct StateInput {
 [[nodiscard]] bool has_sense(const ViewInput& view);
 [[nodiscard]] bool has_sense(const GyroInput& gyro);
 [[nodiscard]] bool has_sense(const GnssInput& gnss);
-/// The speed may be unknown (NaN), and the interval without end.
+/// Of a place that is known. The speed may be unknown (NaN), and the interval without end.
 [[nodiscard]] bool has_sense(const StateInput& state);
 
 }  // namespace railfix::map_matcher

@@ -3,89 +3,55 @@
 
 #include <string>
 
-#include "map_matcher/landmark_matcher.hpp"
-#include "map_matcher/locate/gnss_search.hpp"
-#include "map_matcher/locate/network_locator.hpp"
-#include "map_matcher/shape/curvature_matcher.hpp"
-#include "map_matcher/shape/curve_exit_matcher.hpp"
-#include "map_matcher/track_choice/gyro_turn.hpp"
-#include "map_matcher/track_choice/track_chooser.hpp"
+#include "map_matcher/map_matcher_parameters.hpp"
 #include "service/config.hpp"
 
 namespace railfix::map_matcher {
 
 struct MapMatcherConfig {
   std::string map;
-  bool use_landmarks = true;
-  bool use_curvature = true;
-  std::string curve_method = "likelihood";
-  bool choose_track = true;
   bool use_imu = true;
   bool use_gnss = true;
-  GnssSearchParameters gnss;
-  double camera_bias_per_m = 1e-4;
-  GyroParameters gyro;
-  bool locate = true;
-  double view_ahead_m = 8.0;
-  double view_rate_sigma_per_m2 = 3e-5;
-  double least_speed_mps = 1.0;
-  double lag_m = 20.0;
-  double match_every_m = 5.0;
-  double locate_every_m = 250.0;
-  LandmarkParameters landmarks;
-  CurvatureParameters curvature;
-  TrackParameters track;
-  LocatorParameters locator;
-
-  /// What several parts take is set once: the lag of the body, and the chances of sightings under `landmarks`.
-  [[nodiscard]] TrackParameters track_parameters() const { return shared(track); }
-  [[nodiscard]] LocatorParameters locator_parameters() const { return shared(locator); }
-  [[nodiscard]] CurvatureParameters curvature_parameters() const {
-    CurvatureParameters p = curvature;
-    p.lag_m = lag_m;
-    return p;
-  }
-  [[nodiscard]] CurveExitParameters exit_parameters() const {
-    CurveExitParameters p;
-    p.most_lag_m = lag_m;
-    return p;
-  }
+  MapMatcherParameters parameters;
 
   [[nodiscard]] core::Status check() const {
+    const auto& locator = parameters.search.locator;
     if (locator.window_m < locator.least_way_m) {
       return core::Error{
           "map_matcher.locator.window_m is less than least_way_m: no way would ever be long enough to be looked for"};
     }
-    if (track.view_from_m >= track.view_to_m) {
+    if (parameters.track.view_from_m >= parameters.track.view_to_m) {
       return core::Error{"map_matcher.track.view_from_m must be less than view_to_m"};
     }
     return {};
   }
 
   void describe(service::Fields& fields) {
+    auto& p = parameters;
     fields.text("map", map, "Compiled map (railfix map build); empty = nothing is matched.");
-    fields.flag("use_landmarks", use_landmarks, "Match landmark sightings.");
-    fields.flag("use_curvature", use_curvature, "Match the shape of the track.");
-    fields.choice("curve_method", curve_method, {"likelihood", "exits"},
+    fields.flag("use_landmarks", p.use_landmarks, "Match landmark sightings.");
+    fields.flag("use_curvature", p.use_curvature, "Match the shape of the track.");
+    fields.choice("curve_method", p.curve_method, {"likelihood", "exits"},
                   "How: likelihood over the place, or the exits of curves (paper 004, section 8).");
-    fields.flag("choose_track", choose_track, "Say which track the train is on behind switches.");
+    fields.flag("choose_track", p.choose_track, "Say which track the train is on behind switches.");
     fields.flag("use_imu", use_imu, "Take the turning from the gyro while the camera is blind (or there is none).");
-    fields.number("camera_bias_per_m", camera_bias_per_m, {0, 0.01}, "1/m",
+    fields.number("camera_bias_per_m", p.camera_bias_per_m, {0, 0.01}, "1/m",
                   "Constant error of the camera's turning for the choice of the track, one sigma.");
-    fields.flag("locate", locate, "Look for the place on the whole map while nobody knows it.");
-    fields.number("locate_every_m", locate_every_m, {20, 10000}, "m", "... once in this way.");
+    fields.flag("locate", p.locate, "Look for the place on the whole map while nobody knows it.");
+    fields.number("locate_every_m", p.search.every_m, {20, 10000}, "m", "... once in this way.");
     fields.flag("use_gnss", use_gnss, "... where GNSS says it, too: the one track within 30 m of it.");
-    fields.number("gnss_antenna_ahead_m", gnss.antenna_ahead_m, {-500, 500}, "m",
+    fields.number("gnss_antenna_ahead_m", p.search.gnss.antenna_ahead_m, {-500, 500}, "m",
                   "GNSS antenna ahead of the camera's foot: the same as fusion.gnss_antenna_ahead_m.");
-    fields.number("view_ahead_m", view_ahead_m, {0, 50}, "m",
+    fields.number("view_ahead_m", p.view_ahead_m, {0, 50}, "m",
                   "The curvature of track_view belongs to a point at most so far ahead of the camera's foot.");
-    fields.number("view_rate_sigma_per_m2", view_rate_sigma_per_m2, {1e-7, 1e-2}, "1/m^2",
+    fields.number("view_rate_sigma_per_m2", p.view_rate_sigma_per_m2, {1e-7, 1e-2}, "1/m^2",
                   "Where in front of that it lies follows from its sigma and this: the same as "
                   "track_detector.limits.curvature_rate_per_m2.");
-    fields.number("least_speed_mps", least_speed_mps, {0, 50}, "m/s", "Slower, the turning says nothing of the track.");
-    fields.number("lag_m", lag_m, {0, 60}, "m",
+    fields.number("least_speed_mps", p.least_speed_mps, {0, 50}, "m/s",
+                  "Slower, the turning says nothing of the track.");
+    fields.number("lag_m", p.lag_m, {0, 60}, "m",
                   "The car body may turn so far behind the camera's foot (distance of the bogies).");
-    fields.number("match_every_m", match_every_m, {0.5, 1000}, "m", "The shape is matched anew after this way.");
+    fields.number("match_every_m", p.match_every_m, {0.5, 1000}, "m", "The shape is matched anew after this way.");
     fields.group("landmarks", "Matching of sightings.", [this](service::Fields& f) { describe_landmarks(f); });
     fields.group("curvature", "Matching of the track's shape.", [this](service::Fields& f) { describe_curvature(f); });
     fields.group("gyro", "Turning from the IMU.", [this](service::Fields& f) { describe_gyro(f); });
@@ -96,7 +62,7 @@ struct MapMatcherConfig {
 
  private:
   void describe_landmarks(service::Fields& f) {
-    auto& p = landmarks;
+    auto& p = parameters.landmarks;
     f.number(
         "detection", p.detection, {0.01, 0.999}, "",
         "Chance that a mapped landmark is sighted; also for the choice of the track and the search on the whole map.");
@@ -112,7 +78,7 @@ struct MapMatcherConfig {
     f.number("min_probability", p.min_probability, {0, 1}, "", "A less probable fix is not sent.");
   }
   void describe_curvature(service::Fields& f) {
-    auto& p = curvature;
+    auto& p = parameters.curvature;
     f.number("bin_m", p.bin_m, {0.5, 50}, "m", "Measurements are averaged over this way.");
     f.number("window_m", p.window_m, {50, 5000}, "m", "Longest way that is matched.");
     f.number("noise_per_m", p.noise_per_m, {1e-6, 0.1}, "1/m", "Least sigma of one average.");
@@ -125,14 +91,14 @@ struct MapMatcherConfig {
     f.number("min_probability", p.min_probability, {0, 1}, "", "A less probable fix is not sent.");
   }
   void describe_gyro(service::Fields& f) {
-    auto& p = gyro;
+    auto& p = parameters.gyro;
     f.number("noise_rad", p.noise_rad, {1e-6, 0.1}, "rad", "Random walk of the heading in a second, one sigma.");
     f.number("bias_rps", p.bias_rps, {0, 0.1}, "rad/s", "Constant error before the train has stood, one sigma.");
     f.number("bias_walk_rps", p.bias_walk_rps, {0, 0.01}, "rad/s", "It wanders by so much in a second.");
     f.number("longest_gap_s", p.longest_gap_s, {0.01, 2}, "s", "Samples further apart do not belong together.");
   }
   void describe_track(service::Fields& f) {
-    auto& p = track;
+    auto& p = parameters.track;
     f.number("bin_m", p.bin_m, {0.5, 20}, "m", "Turning is compared over this way.");
     f.number("noise_per_m", p.noise_per_m, {1e-6, 0.1}, "1/m", "Least sigma of the curvature of one bin.");
     f.number("curvature_share", p.curvature_share, {0, 1}, "",
@@ -150,7 +116,7 @@ struct MapMatcherConfig {
     f.number("astray_m", p.astray_m, {5, 1000}, "m", "... which then lasts so far.");
   }
   void describe_locator(service::Fields& f) {
-    auto& p = locator;
+    auto& p = parameters.search.locator;
     f.number("window_m", p.window_m, {1000, 50000}, "m", "Longest way that is looked for.");
     f.number("least_way_m", p.least_way_m, {800, 50000}, "m", "A shorter way is not looked for.");
     f.number("least_turn_rad", p.least_turn_rad, {0, 100}, "rad",
@@ -167,13 +133,6 @@ struct MapMatcherConfig {
     f.number("certain_misfit", p.certain_misfit, {0.5, 100}, "",
              "... where the way fits to so many sigmas squared in the mean,");
     f.number("certain_sigma_m", p.certain_sigma_m, {7, 1000}, "m", "... and its sigma along the track is less.");
-  }
-  template <typename Parameters>
-  [[nodiscard]] Parameters shared(Parameters p) const {
-    p.lag_m = lag_m;
-    p.detection = landmarks.detection;
-    p.false_per_m = landmarks.false_per_m;
-    return p;
   }
 };
 

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 
 #include "map_matcher/inputs.hpp"
+#include "map_matcher/map_matcher.hpp"
 #include "messaging/direction.hpp"
 #include "messaging/messaging.hpp"
 #include "messaging/samples.hpp"
@@ -21,32 +23,66 @@ inline Sighting input_of(const msg::LandmarkSighting& m) {
           m.confidence()};
 }
 inline StepInput input_of(const msg::OdometryStep& m) {
-  return {
-      m.stamp_ns(),   m.reference_stamp_ns(), messaging::has_measured(m), m.step_m(), m.yaw_rad(), m.yaw_sigma_rad(),
-      m.distance_m(), m.speed_mps()};
+  return {.stamp_ns = m.stamp_ns(),
+          .reference_stamp_ns = m.reference_stamp_ns(),
+          .measured = messaging::has_measured(m),
+          .step_m = m.step_m(),
+          .yaw_rad = m.yaw_rad(),
+          .yaw_sigma_rad = m.yaw_sigma_rad(),
+          .distance_m = m.distance_m(),
+          .speed_mps = m.speed_mps(),
+          .frame_to_frame = m.mode() == msg::ODOMETRY_TRACK};
 }
-
 inline ViewInput input_of(const msg::TrackView& m) {
-  return {m.curvature_per_m(), m.covariance()[messaging::kCurvatureVariance]};
+  return {m.curvature_per_m(), m.covariance()[messaging::kCurvatureVariance], m.stamp_ns()};
 }
 inline GyroInput input_of(const msg::ImuSample& m) {
-  return {m.rate_z_rps()};
+  return {m.rate_z_rps(), m.stamp_ns()};
 }
 inline StateInput input_of(const msg::TrainState& m) {
-  return {placed(m), m.sigma_m(), m.track_probability(), m.visual_scale(), m.easting_m(), m.northing_m()};
+  return {.placed = placed(m),
+          .sigma_m = m.sigma_m(),
+          .track_probability = m.track_probability(),
+          .visual_scale = m.visual_scale(),
+          .easting_m = m.easting_m(),
+          .northing_m = m.northing_m(),
+          .track_known = m.track_known() != 0,
+          .usable = m.integrity() != msg::INTEGRITY_UNUSABLE,
+          .standstill = m.standstill() != 0,
+          .gnss_agrees = (m.sources() & msg::SOURCE_GNSS) != 0};
 }
 
-/// The first place, with the others as alternatives.
-template <typename Places>
-msg::PositionFix message_of(const Places& places) {
+inline uint8_t kind_of(FixKind kind) {
+  switch (kind) {
+    case FixKind::landmark:
+      return msg::FIX_LANDMARK;
+    case FixKind::curvature:
+      return msg::FIX_CURVATURE;
+    case FixKind::track:
+      return msg::FIX_TRACK;
+    case FixKind::network:
+      return msg::FIX_NETWORK;
+    case FixKind::gnss:
+      break;
+  }
+  return msg::FIX_GNSS;
+}
+
+inline msg::PositionFix message_of(const PlaceFix& fix) {
   msg::PositionFix message;
-  message.edge(places.front().place.edge);
-  message.offset_m(places.front().place.offset_m);
-  message.direction(direction_of(places.front().place.direction));
-  message.probability(places.front().probability);
-  const size_t others = std::min<size_t>(places.size() - 1, msg::FIX_ALTERNATIVES);
+  message.stamp_ns(fix.stamp_ns);
+  message.kind(kind_of(fix.kind));
+  message.sigma_m(fix.sigma_m);
+  message.landmark(fix.landmark);
+  message.fits_nowhere(fix.fits_nowhere ? 1 : 0);
+  const auto& best = fix.options.front();
+  message.edge(best.place.edge);
+  message.offset_m(best.place.offset_m);
+  message.direction(direction_of(best.place.direction));
+  message.probability(best.probability);
+  const size_t others = std::min<size_t>(fix.options.size() - 1, msg::FIX_ALTERNATIVES);
   for (size_t i = 0; i < others; ++i) {
-    const auto& other = places[i + 1];
+    const auto& other = fix.options[i + 1];
     message.alternative_edge()[i] = other.place.edge;
     message.alternative_offset_m()[i] = other.place.offset_m;
     message.alternative_probability()[i] = other.probability;

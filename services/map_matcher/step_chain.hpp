@@ -22,6 +22,7 @@ struct StepInput {
   double yaw_sigma_rad = 0;
   double distance_m = 0;  // of that process
   double speed_mps = 0;
+  bool frame_to_frame = true;  // otherwise against a key frame: such steps overlap
 };
 
 class StepChain {

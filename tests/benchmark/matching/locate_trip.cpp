@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <ctime>
 
-#include "map_matcher/map_matcher_config.hpp"
+#include "map_matcher/locate/place_search.hpp"
 #include "support/sensed_ride.hpp"
 
 namespace railfix::measure {
@@ -165,7 +165,7 @@ class TripRun {
         gnss_random_(static_cast<uint64_t>(1000 * first_m_) + options.seed) {}
 
   Trip run() {
-    const double every_m = map_matcher::MapMatcherConfig{}.locate_every_m;
+    const double every_m = map_matcher::PlaceSearchParameters{}.every_m;
     for (double m = first_m_; m < first_m_ + kTripM; m += 20) {
       trip_.turn_rad += std::abs(mapped_.at(m + 20) - mapped_.at(m));
     }

@@ -10,7 +10,6 @@ using map_matcher::CurvatureOf;
 // As map_matcher has them by default.
 constexpr double kMatchEveryM = 5;
 constexpr double kLeastSpeedMps = 1;
-constexpr double kLocateEveryM = 250;
 constexpr double kTurnSigmaRad = 2e-4;  // of a step
 constexpr double kLostS = 5;
 // Curvature from pictures: 9e-5 1/m rms where a sigma of 1.4e-4 is said, over 26 km at 8 degrees.
@@ -30,13 +29,13 @@ map_matcher::PlacedTrain placed(const fusion::TrainEstimate& state) {
 MatcherLoop::MatcherLoop(const TrainSimulation& simulation)
     : simulation_(simulation),
       followed_(simulation.map, std::make_shared<const track::Ways>(*simulation.map)),
+      search_({}, simulation.map),
       random_(simulation.stream_of(17)),
       bias_per_m_(kBiasPerM * random_.normal()) {}
 
 bool MatcherLoop::follow(const fusion::TrainEstimate& state) {
   using Way = map_matcher::FollowedPath::Way;
   if (!state.track_known) {
-    of_gnss_ = of_gnss_ && !followed_.path();
     followed_.forget();
     return false;
   }
@@ -92,7 +91,7 @@ void MatcherLoop::match_sightings(const fusion::TrainEstimate& state, double arr
   const auto& all = simulation_.sightings;
   for (; next_sighting_ < all.size() && all[next_sighting_].arrival_s <= arrival_s; ++next_sighting_) {
     const auto& sighting = all[next_sighting_].sighting;
-    if (locator_) locator_->sight(sighting);
+    search_.sight(sighting);
     const auto prior = state.track_known ? followed_.prior_at(sighting.stamp_ns, placed(state)) : std::nullopt;
     const auto fix = prior ? landmarks_->add(sighting, *prior) : std::nullopt;
     if (fix) found(*fix, fusion::FixKind::landmark, arrival_s);
@@ -100,62 +99,43 @@ void MatcherLoop::match_sightings(const fusion::TrainEstimate& state, double arr
   }
 }
 
-// As map_matcher does it, with the turning of the camera or, where that is blind, of a gyro.
+// As map_matcher does it, with the turning of the camera or, where that is blind, of a gyro. Where no start was told
+// the plan says when the place is found.
 void MatcherLoop::look_for_place(const fusion::OdometryInput& step, const fusion::TrainEstimate& state,
                                  double arrival_s) {
   const double since_s = core::seconds(step.stamp_ns - std::exchange(moved_ns_, step.stamp_ns));
   const double way_m = chain_.odometer_m() - std::exchange(moved_m_, chain_.odometer_m());
   const bool position = state.track_known && state.integrity != fusion::Integrity::unusable;
-  if (position || !simulation_.plan().start_told) {
-    locator_.reset();
-    return;
+  if (position || !simulation_.plan().start_told) return;
+  std::optional<map_matcher::Turn> turn;
+  if (since_s > 0 && since_s < kLostS && std::isfinite(state.speed_mps)) {
+    const double moved_m = chain_.broken() ? state.speed_mps * since_s : way_m;
+    const auto truth = simulation_.truth_at(step.stamp_ns, arrival_s);
+    const double turn_rad = (simulation_.curvature_at(truth.distance_m, arrival_s) + bias_per_m_) * moved_m;
+    turn = {moved_m, turn_rad + kTurnSigmaRad * random_.normal(), kTurnSigmaRad};
   }
-  if (!locator_) {
-    locator_.emplace(map_matcher::LocatorParameters{}, index());
-    located_m_ = chain_.odometer_m();
-    return;
-  }
-  if (!(since_s > 0 && since_s < kLostS) || !std::isfinite(state.speed_mps)) return locator_->forget();
-  const double moved_m = chain_.broken() ? state.speed_mps * since_s : way_m;
-  const auto truth = simulation_.truth_at(step.stamp_ns, arrival_s);
-  const double turn_rad = (simulation_.curvature_at(truth.distance_m, arrival_s) + bias_per_m_) * moved_m;
-  locator_->move(moved_m, turn_rad + kTurnSigmaRad * random_.normal(), kTurnSigmaRad);
-  if (state.track_known || std::abs(chain_.odometer_m() - located_m_) < kLocateEveryM) return;
-  located_m_ = chain_.odometer_m();
-  const auto location = locator_->locate();
-  if (!location.certain()) return;
-  const auto& best = location.places.front();
-  found_.emplace_back(
-      arrival_s, fusion::FixInput{step.stamp_ns, best.place.edge, best.place.offset_m, best.sigma_m, best.probability,
-                                  0, fusion::FixKind::network, best.place.direction, nullptr});
-}
-
-std::shared_ptr<const map_matcher::NetworkIndex> MatcherLoop::index() {
-  if (!index_) index_ = std::make_shared<const map_matcher::NetworkIndex>(simulation_.map);
-  return index_;
+  const auto places = search_.move(turn, chain_.odometer_m());
+  if (!places.empty()) found(places.front(), fusion::FixKind::network, step.stamp_ns, arrival_s);
 }
 
 void MatcherLoop::hear(const fusion::GnssInput& gnss, double arrival_s) {
-  if (!state_ || state_->track_known) {
-    gnss_.reset();
-    return;
-  }
-  if (gnss.fix == 0 || !std::isfinite(state_->speed_mps)) return;
-  if (!gnss_) gnss_.emplace(map_matcher::GnssSearchParameters{}, index());
+  if (!search_.searches() || gnss.fix == 0 || !std::isfinite(state_->speed_mps)) return;
   const double since_s = core::seconds(gnss.stamp_ns - state_->stamp_ns);
-  gnss_->add({gnss.easting_m, gnss.northing_m, gnss.hdop}, state_->distance_m + state_->speed_mps * since_s,
-             state_->speed_mps);
-  const auto found = gnss_->place();
-  if (!found) return;
-  of_gnss_ = true;
-  found_.emplace_back(
-      arrival_s, fusion::FixInput{gnss.stamp_ns, found->place.edge, found->place.offset_m, found->sigma_m, 0.9999, 0,
-                                  fusion::FixKind::gnss, found->place.direction, nullptr});
+  const double odometer_m = state_->distance_m + state_->speed_mps * since_s;
+  const auto place = search_.hear({gnss.easting_m, gnss.northing_m, gnss.hdop}, odometer_m, state_->speed_mps);
+  if (place) found(*place, fusion::FixKind::gnss, gnss.stamp_ns, arrival_s);
+}
+
+void MatcherLoop::found(const map_matcher::LocatedPlace& located, fusion::FixKind kind, int64_t stamp_ns,
+                        double due_s) {
+  const auto& place = located.place;
+  found_.emplace_back(due_s, fusion::FixInput{stamp_ns, place.edge, place.offset_m, located.sigma_m,
+                                              located.probability, 0, kind, place.direction, nullptr});
 }
 
 // As map_matcher says it, with a track of which only the rest is believed.
 void MatcherLoop::doubt_place(const fusion::TrainEstimate& state, double due_s) {
-  const bool gnss = !of_gnss_ && (state.sources & 1U << static_cast<unsigned>(fusion::Source::gnss)) != 0;
+  const bool gnss = !search_.of_gnss() && (state.sources & 1U << static_cast<unsigned>(fusion::Source::gnss)) != 0;
   const double elsewhere = landmarks_->place_doubt();
   if (gnss || elsewhere == 0) return;
   const auto& place = state.position;
@@ -167,6 +147,7 @@ std::vector<fusion::FixInput> MatcherLoop::see(const fusion::OdometryInput& step
                                                double arrival_s) {
   chain_.add({step.stamp_ns, step.reference_stamp_ns, step.valid, step.step_m, 0, 0, std::nan(""), state.speed_mps});
   state_ = state;
+  search_.follow(state.track_known, state.integrity != fusion::Integrity::unusable);
   const bool placed = follow(state);
   look_for_place(step, state, arrival_s);
   match_sightings(state, arrival_s);

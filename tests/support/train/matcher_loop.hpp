@@ -10,8 +10,7 @@
 #include "fusion/fusion.hpp"
 #include "map_matcher/followed_path.hpp"
 #include "map_matcher/landmark_matcher.hpp"
-#include "map_matcher/locate/gnss_search.hpp"
-#include "map_matcher/locate/network_locator.hpp"
+#include "map_matcher/locate/place_search.hpp"
 #include "map_matcher/shape/curvature_matcher.hpp"
 #include "map_matcher/step_chain.hpp"
 #include "support/train/simulation.hpp"
@@ -33,9 +32,9 @@ class MatcherLoop {
   void match_shape(int64_t stamp_ns, const fusion::TrainEstimate& state, double arrival_s);
   void match_sightings(const fusion::TrainEstimate& state, double arrival_s);
   void look_for_place(const fusion::OdometryInput& step, const fusion::TrainEstimate& state, double arrival_s);
-  [[nodiscard]] std::shared_ptr<const map_matcher::NetworkIndex> index();
   void doubt_place(const fusion::TrainEstimate& state, double due_s);
   void found(const map_matcher::Fix& fix, fusion::FixKind kind, double due_s);
+  void found(const map_matcher::LocatedPlace& located, fusion::FixKind kind, int64_t stamp_ns, double due_s);
   /// False while the place is not known.
   bool follow(const fusion::TrainEstimate& state);
   void look(double arrival_s, const Motion& truth);
@@ -45,14 +44,10 @@ class MatcherLoop {
   map_matcher::StepChain chain_;
   std::optional<map_matcher::CurvatureMatcher> shape_;
   std::optional<map_matcher::LandmarkMatcher> landmarks_;
-  std::shared_ptr<const map_matcher::NetworkIndex> index_;
-  std::optional<map_matcher::NetworkLocator> locator_;  // while a place that was told has been given up
-  bool of_gnss_ = false;                                // it has told the place
-  std::optional<map_matcher::GnssSearch> gnss_;         // while the place is not known
-  std::optional<fusion::TrainEstimate> state_;          // the last one
+  map_matcher::PlaceSearch search_;
+  std::optional<fusion::TrainEstimate> state_;  // the last one
   int64_t moved_ns_ = 0;
   double moved_m_ = 0;
-  double located_m_ = 0;
   size_t next_sighting_ = 0;
   double matched_m_ = 0;
   std::deque<std::pair<double, fusion::FixInput>> found_;  // when they are due

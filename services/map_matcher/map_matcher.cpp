@@ -1,0 +1,315 @@
+#include "map_matcher/map_matcher.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "core/time.hpp"
+#include "track/same_map.hpp"
+
+namespace railfix::map_matcher {
+namespace {
+
+constexpr double kRailsFreshS = 0.5;
+constexpr double kShortestStepM = 0.05;
+constexpr double kLeastWayM = 1e-5;       // standing still turns nothing
+constexpr double kTrackEveryS = 1.0;      // the track is said again after this time ...
+constexpr double kOpenTrackEveryM = 2.0;  // ... or, while it is not known, this way
+constexpr double kNoCameraS = 0.5;        // without an odometry step
+constexpr double kCountM = 20.0;
+constexpr double kLostS = 30.0;      // after so long unseen the track is chosen anew
+constexpr double kRateShare = 0.75;  // of the curvature's sigma comes from its unknown rate
+
+// A fusion that was started anew may count the travelled distance from elsewhere.
+bool counts_on(const PlacedTrain& before, const PlacedTrain& state) {
+  const double expected_m = state.speed_mps * core::seconds(state.stamp_ns - before.stamp_ns);
+  return std::abs(state.distance_m - before.distance_m - expected_m) <= kCountM + 0.5 * std::abs(expected_m);
+}
+
+PlaceFix fix_of(FixKind kind, int64_t stamp_ns, const std::vector<LocatedPlace>& places) {
+  PlaceFix fix{kind, stamp_ns, {}, places.front().sigma_m};
+  for (const auto& place : places) fix.options.push_back({place.place, place.probability});
+  return fix;
+}
+
+}  // namespace
+
+MapMatcher::MapMatcher(const MapMatcherParameters& parameters, std::shared_ptr<const track::Map> map)
+    : parameters_(parameters),
+      map_(std::move(map)),
+      search_(parameters.search_parameters(), map_),
+      gyro_(parameters.gyro) {
+  if (!map_) return;
+  ways_ = std::make_shared<const track::Ways>(*map_);
+  followed_.emplace(map_, ways_);
+  if (parameters.choose_track) chooser_.emplace(parameters.track_parameters(), map_, ways_);
+}
+
+// What was matched so far is of another place.
+void MapMatcher::forget_place() {
+  if (followed_) followed_->forget();
+  landmarks_.reset();
+  curvature_.reset();
+  exits_.reset();
+  if (chooser_) chooser_.emplace(parameters_.track_parameters(), map_, ways_);
+  moved_ns_ = 0;
+  said_track_ = {};
+}
+
+void MapMatcher::restart() {
+  forget_place();
+  search_.forget();
+  gyro_ = GyroTurn(parameters_.gyro);
+  state_.reset();
+  step_.reset();
+  chain_ = {};
+  rails_seen_ns_ = 0;
+  matched_m_ = 0;
+}
+
+PlaceFixes MapMatcher::add(const StateInput& state) {
+  const auto before = std::exchange(state_, state);
+  if (before && before->standstill && state.standstill) stand(before->placed.stamp_ns, state.placed.stamp_ns);
+  if (!state.track_known && before && before->track_known) forget_place();
+  search_.follow(state.track_known, state.usable);
+  if (landmarks_ && before && !counts_on(before->placed, state.placed)) landmarks_->forget();
+  trouble_ = trouble_at(state);
+  PlaceFixes fixes;
+  if (chooser_ && state_ && state.track_known) follow_without_camera(fixes);
+  return fixes;
+}
+
+std::string MapMatcher::trouble_at(const StateInput& state) {
+  if (!map_ || !state.track_known) return placeless();
+  if (!track::lies_there(*map_, state.placed.place, state.easting_m, state.northing_m)) {
+    restart();  // what was matched so far is of another map as well
+    return "train_state is of another map than map_matcher.map: give both services the same file";
+  }
+  if (const auto followed = follow(state); !followed.ok()) return followed.error().message;
+  return place_doubt() > 0 ? "the sightings fit the map nowhere near the place that train_state says" : "";
+}
+
+std::string MapMatcher::placeless() const {
+  if (!map_) return "no map is configured";
+  std::string said = "the place on the map is not known yet";
+  const auto tracks = search_.tracks();
+  if (tracks == 0U) said += "; no track on the map where GNSS says the train is";
+  if (tracks > 1U) said += "; GNSS cannot tell which of " + std::to_string(*tracks) + " tracks it is on";
+  return said;
+}
+
+// Whoever follows the gyro now must not have its constant error changed below it.
+void MapMatcher::stand(int64_t from_ns, int64_t to_ns) {
+  if (!chooser_ || chooser_->sensor() != TurnSensor::gyro) {
+    gyro_.stood(from_ns, to_ns);
+  } else if (const auto turn = gyro_.between(from_ns, to_ns)) {
+    chooser_->stand(*turn);
+  }
+}
+
+core::Status MapMatcher::follow(const StateInput& state) {
+  const auto way = followed_->follow(state.placed);
+  if (!way.ok()) return way.error();
+  if (way.value() == FollowedPath::Way::same) return {};
+  const auto& path = followed_->path();
+  if (way.value() == FollowedPath::Way::other_track) {
+    landmarks_->change_path(path);
+    curvature_->change_path(path);
+  } else {
+    landmarks_.emplace(parameters_.landmarks, path);
+    curvature_.emplace(parameters_.curvature_parameters(), path);
+  }
+  if (parameters_.curve_method == "exits") exits_.emplace(parameters_.exit_parameters(), path);
+  return {};
+}
+
+std::optional<Prior> MapMatcher::prior_at(int64_t stamp_ns) const {
+  if (!state_ || !followed_ || !state_->track_known) return std::nullopt;
+  return followed_->prior_at(stamp_ns, state_->placed);
+}
+
+PlaceFixes MapMatcher::add(const StepInput& step) {
+  PlaceFixes fixes;
+  chain_.add(step);
+  if (map_ && parameters_.locate) search(step, fixes);
+  if (chooser_) follow_turning(step, fixes);
+  step_ = step;
+  if (curvature_ && parameters_.use_curvature) match_shape(step, fixes);
+  return fixes;
+}
+
+void MapMatcher::match_shape(const StepInput& step, PlaceFixes& fixes) {
+  if (chain_.broken()) {
+    curvature_->forget();
+    if (exits_) exits_->forget();
+    return;
+  }
+  // Where the rails are seen they tell the shape: pictures turn as the track ahead does (by 10 to 13 m, measured), not
+  // as the body behind.
+  const bool rails_seen = std::abs(core::seconds(step.stamp_ns - rails_seen_ns_)) < kRailsFreshS;
+  if (!rails_seen && step.frame_to_frame && std::abs(step.step_m) > kShortestStepM &&
+      std::abs(step.speed_mps) > parameters_.least_speed_mps) {
+    const double at_m = chain_.odometer_m() - 0.5 * step.step_m;
+    const double sigma_per_m = std::hypot(step.yaw_sigma_rad, kYawNoiseRad) / std::abs(step.step_m);
+    curvature_->add(at_m, step.yaw_rad / step.step_m, sigma_per_m, CurvatureOf::body);
+    if (exits_) exits_->add(at_m, step.yaw_rad / step.step_m, CurvatureOf::body);
+  }
+  // The exit of a curve is a minimum, which would be missed between.
+  if (!exits_ && std::abs(chain_.odometer_m() - matched_m_) < parameters_.match_every_m) return;
+  matched_m_ = chain_.odometer_m();
+  const auto prior = prior_at(step.stamp_ns);
+  if (!prior || place_doubt() > 0) return;  // in the wide window of a place in doubt some curve always fits
+  const auto fix = exits_ ? exits_->match(step.stamp_ns, chain_.odometer_m(), *prior)
+                          : curvature_->match(step.stamp_ns, chain_.odometer_m(), *prior);
+  if (fix) say(*fix, FixKind::curvature, fixes);
+}
+
+std::optional<Turn> MapMatcher::turn_of_camera() const {
+  auto turn = chain_.turn();
+  if (turn) turn->bias_rad = parameters_.camera_bias_per_m * std::abs(turn->way_m);
+  return turn;
+}
+
+std::optional<Turn> MapMatcher::turn_of_gyro(int64_t from_ns, int64_t to_ns) const {
+  if (!state_ || !std::isfinite(state_->placed.speed_mps)) return std::nullopt;
+  if (std::abs(core::seconds(to_ns - state_->placed.stamp_ns)) > FollowedPath::kOldStateS) return std::nullopt;
+  auto turn = gyro_.between(from_ns, to_ns);
+  if (turn) turn->way_m = state_->placed.speed_mps * core::seconds(to_ns - from_ns);
+  return turn;
+}
+
+void MapMatcher::search(const StepInput& step, PlaceFixes& fixes) {
+  auto turn = turn_of_camera();
+  if (!turn && step_ && core::seconds(step.stamp_ns - step_->stamp_ns) < FollowedPath::kOldStateS)
+    turn = turn_of_gyro(step_->stamp_ns, step.stamp_ns);
+  const auto places = search_.move(turn, chain_.odometer_m());
+  if (!places.empty()) fixes.push_back(fix_of(FixKind::network, step.stamp_ns, places));
+}
+
+// The odometer is fusion's, which runs on by whatever sensor there is.
+PlaceFixes MapMatcher::add(const GnssInput& position) {
+  if (!wants_gnss()) return {};
+  const auto& train = state_->placed;
+  const double since_s = core::seconds(position.stamp_ns - train.stamp_ns);
+  if (!std::isfinite(train.speed_mps) || std::abs(since_s) > FollowedPath::kOldStateS) return {};
+  const double odometer_m = train.distance_m + train.speed_mps * since_s;
+  const auto place =
+      search_.hear({position.easting_m, position.northing_m, position.hdop}, odometer_m, train.speed_mps);
+  if (!place) return {};
+  return {fix_of(FixKind::gnss, position.stamp_ns, {*place})};
+}
+
+void MapMatcher::follow_turning(const StepInput& step, PlaceFixes& fixes) {
+  if (!step_ || !prior_at(step.stamp_ns)) return;
+  auto turn = moved_ns_ == step_->stamp_ns ? turn_of_camera() : std::nullopt;
+  if (turn) {
+    turn->way_m *= state_->visual_scale;
+    move(*turn, step.stamp_ns);
+  } else {
+    move_without_camera(step.stamp_ns);
+  }
+  say_track(chain_.odometer_m(), fixes);
+}
+
+// The doubt that was said comes back in the state; counted again it would never end.
+TrackWindow MapMatcher::window_at(const Prior& prior) const {
+  const auto place = followed_->path()->position_at(prior.path_distance_m);
+  const double probability = std::min(1.0, state_->track_probability / said_track_.there);
+  return {place, prior.over_m, prior.under_m, state_->sigma_m, probability, !(state_->placed.speed_mps < 0)};
+}
+
+// Without a camera fusion's states lead: they come ten times a second.
+void MapMatcher::follow_without_camera(PlaceFixes& fixes) {
+  const int64_t stamp_ns = state_->placed.stamp_ns;
+  if (step_ && core::seconds(stamp_ns - step_->stamp_ns) < kNoCameraS) return;
+  if (!prior_at(stamp_ns)) return;
+  move_without_camera(stamp_ns);
+  say_track(state_->placed.distance_m, fixes);
+}
+
+void MapMatcher::move(const Turn& turn, int64_t to_ns) {
+  if (std::abs(turn.way_m) > kLeastWayM) chooser_->move(turn);
+  moved_ns_ = to_ns;
+}
+
+// From where the chooser has come to, whoever had led it there.
+void MapMatcher::move_without_camera(int64_t to_ns) {
+  const double dt_s = core::seconds(to_ns - moved_ns_);
+  // A clock that was set back leaves it in the future.
+  if (moved_ns_ == 0 || dt_s > kLostS || dt_s < -FollowedPath::kOldStateS) {
+    if (moved_ns_ != 0) chooser_.emplace(parameters_.track_parameters(), map_, ways_);
+    moved_ns_ = to_ns;
+    return;
+  }
+  const double speed_mps = state_->placed.speed_mps;
+  if (dt_s <= 0 || !std::isfinite(speed_mps)) return;
+  if (const auto turn = turn_of_gyro(moved_ns_, to_ns)) {
+    move(*turn, to_ns);
+    return;
+  }
+  chooser_->move_blind(speed_mps * dt_s);
+  moved_ns_ = to_ns;
+}
+
+// What GNSS holds is there, if it was not GNSS that had told it: then the map or the sightings are wrong.
+double MapMatcher::place_doubt() const {
+  if (!landmarks_ || (!search_.of_gnss() && state_->gnss_agrees)) return 0;
+  return landmarks_->place_doubt();
+}
+
+// The chooser is where it was moved to: a step that comes late does not take it back.
+void MapMatcher::say_track(double odometer_m, PlaceFixes& fixes) {
+  const int64_t stamp_ns = moved_ns_;
+  const auto prior = prior_at(stamp_ns);
+  if (!prior) return;
+  chooser_->follow(window_at(*prior));
+  const auto choice = chooser_->choice();
+  if (!choice) return;
+  const auto& best = choice->options.front();
+  const double since_m = std::abs(odometer_m - said_track_.odometer_m);
+  const double there = 1 - place_doubt();  // and not elsewhere on the map
+  const bool known = choice->known && there == 1;
+  const bool changed = best.place.edge != said_track_.edge || known != said_track_.known;
+  const bool due = core::seconds(stamp_ns - said_track_.stamp_ns) > kTrackEveryS;
+  if (!changed && !due && (choice->known || since_m < kOpenTrackEveryM)) return;
+  said_track_ = {best.place.edge, known, stamp_ns, odometer_m, there};
+  PlaceFix fix{FixKind::track, stamp_ns, choice->options, std::numeric_limits<double>::infinity()};
+  for (auto& option : fix.options) option.probability *= there;
+  fix.fits_nowhere = there < 1;
+  fixes.push_back(std::move(fix));
+}
+
+void MapMatcher::add(const ViewInput& view) {
+  rails_seen_ns_ = view.stamp_ns;
+  const double sigma_per_m = std::sqrt(view.variance);
+  if (chooser_ && prior_at(view.stamp_ns)) chooser_->see(view.curvature_per_m, sigma_per_m);
+  if (!curvature_ || !parameters_.use_curvature || !step_ || !step_->measured) return;
+  const double dt_s = core::seconds(view.stamp_ns - step_->stamp_ns);
+  if (std::abs(dt_s) > FollowedPath::kOldStateS || std::abs(step_->speed_mps) < parameters_.least_speed_mps) return;
+  // A short view does not tell how the curvature changes: it is that of the middle of what is seen, and at the foot it
+  // is unsure by as much as the rate may make of that way. A long view tells both, and the curvature is that at the
+  // foot.
+  const double ahead_m =
+      std::min(parameters_.view_ahead_m, kRateShare * sigma_per_m / parameters_.view_rate_sigma_per_m2);
+  const double odometer_m = chain_.odometer_m() + step_->speed_mps * dt_s + ahead_m;
+  curvature_->add(odometer_m, view.curvature_per_m, sigma_per_m, CurvatureOf::rails);
+  if (exits_) exits_->add(odometer_m, view.curvature_per_m, CurvatureOf::rails);
+}
+
+PlaceFixes MapMatcher::add(const Sighting& sighting) {
+  search_.sight(sighting);
+  const auto prior = prior_at(sighting.stamp_ns);
+  if (!landmarks_ || !parameters_.use_landmarks || !prior) return {};
+  if (chooser_) chooser_->sight(sighting);
+  PlaceFixes fixes;
+  if (const auto fix = landmarks_->add(sighting, *prior)) say(*fix, FixKind::landmark, fixes);
+  return fixes;
+}
+
+void MapMatcher::say(const Fix& fix, FixKind kind, PlaceFixes& fixes) const {
+  const auto place = followed_->path()->position_at(fix.path_distance_m);
+  fixes.push_back({kind, fix.stamp_ns, {{place, fix.probability}}, fix.sigma_m, fix.landmark});
+}
+
+}  // namespace railfix::map_matcher

@@ -1,0 +1,120 @@
+// The map matcher as a whole, without DDS: a train runs over a switch.
+#include "map_matcher/map_matcher.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/time.hpp"
+#include "unit/map_matcher/fork_map.hpp"
+
+namespace railfix::map_matcher {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr double kSpeedMps = 20;
+constexpr double kPeriodS = 0.1;
+
+/// Straight on from 300 m on the stem.
+class MapMatcherRide : public testing::Test {
+ protected:
+  void run_to(double at_m) {
+    for (; at_m_ < at_m; at_m_ += kSpeedMps * kPeriodS) {
+      stamp_ns_ += core::to_ns(kPeriodS);
+      keep(matcher_.add(state()));
+      keep(matcher_.add(step()));
+    }
+  }
+  [[nodiscard]] StateInput state() const {
+    const double way_m = at_m_ - kFromM;
+    StateInput state;
+    state.placed = {stamp_ns_, place(at_m_), kSpeedMps, way_m, 3, 3};
+    state.sigma_m = 0.7;
+    state.track_probability = 1;
+    state.northing_m = at_m_;
+    state.track_known = known_;
+    return state;
+  }
+  [[nodiscard]] StepInput step() const {
+    const double step_m = kSpeedMps * kPeriodS;
+    return {stamp_ns_, stamp_ns_ - core::to_ns(kPeriodS), true, step_m, 0, 1e-4, at_m_ - kFromM, kSpeedMps};
+  }
+  /// By fusion, which goes on straight until it is told otherwise.
+  [[nodiscard]] static track::EdgePosition place(double at_m) {
+    const bool on_stem = at_m < 500;
+    return {on_stem ? 1U : 2U, on_stem ? at_m : at_m - 500, track::Direction::forward};
+  }
+  void keep(const PlaceFixes& fixes) { said_.insert(said_.end(), fixes.begin(), fixes.end()); }
+  [[nodiscard]] const PlaceFix* last(FixKind kind) const {
+    const auto found = std::find_if(said_.rbegin(), said_.rend(), [&](const auto& fix) { return fix.kind == kind; });
+    return found == said_.rend() ? nullptr : &*found;
+  }
+
+  static constexpr double kFromM = 300;
+  MapMatcher matcher_{{}, fork()};
+  double at_m_ = kFromM;
+  int64_t stamp_ns_ = core::kNsPerSecond;
+  bool known_ = true;
+  PlaceFixes said_;
+};
+
+TEST_F(MapMatcherRide, SaysTheTrackBehindTheSwitchAndTheFrogsPlace) {
+  run_to(510);
+  keep(matcher_.add(Sighting{stamp_ns_, track::LandmarkKind::frog, 20, 0.72, 0.1, 0.99}));
+  run_to(600);
+  const auto* track = last(FixKind::track);
+  ASSERT_NE(track, nullptr);
+  EXPECT_EQ(track->options.front().place.edge, 2U);
+  EXPECT_GT(track->options.front().probability, 0.999);
+  EXPECT_FALSE(track->fits_nowhere);
+  EXPECT_FALSE(std::isfinite(track->sigma_m));
+  const auto* frog = last(FixKind::landmark);
+  ASSERT_NE(frog, nullptr);
+  EXPECT_EQ(frog->landmark, 1U);
+  EXPECT_EQ(frog->options.front().place.edge, 2U);
+  EXPECT_NEAR(frog->options.front().place.offset_m, 10, 2);
+  EXPECT_EQ(matcher_.trouble(), "");
+}
+
+TEST_F(MapMatcherRide, ASearchedPlaceIsSaidByGnssOnTheOneTrackThereIs) {
+  known_ = false;
+  run_to(302);
+  EXPECT_THAT(matcher_.trouble(), HasSubstr("not known yet"));
+  ASSERT_TRUE(matcher_.wants_gnss());
+  while (at_m_ < 450) {
+    run_to(at_m_ + 10);
+    keep(matcher_.add(GnssInput{2, at_m_ - kSpeedMps * kPeriodS, 1, stamp_ns_}));
+  }
+  const auto* found = last(FixKind::gnss);
+  ASSERT_NE(found, nullptr);
+  EXPECT_EQ(found->options.front().place.edge, 1U);
+  EXPECT_NEAR(found->options.front().place.offset_m,
+              core::seconds(found->stamp_ns - core::kNsPerSecond) * kSpeedMps + 298, 1);
+  known_ = true;
+  run_to(460);
+  EXPECT_FALSE(matcher_.wants_gnss());
+  EXPECT_EQ(matcher_.trouble(), "");
+}
+
+TEST_F(MapMatcherRide, AStateOfAnotherMapIsNamedAndNothingIsMatchedThere) {
+  auto elsewhere = state();
+  elsewhere.easting_m = 7000;
+  EXPECT_TRUE(matcher_.add(elsewhere).empty());
+  EXPECT_THAT(matcher_.trouble(), HasSubstr("another map"));
+  EXPECT_TRUE(matcher_.add(step()).empty());
+  EXPECT_TRUE(matcher_.add(Sighting{stamp_ns_, track::LandmarkKind::frog, 20, 0.72, 0.1, 0.99}).empty());
+}
+
+TEST(MapMatcher, WithoutAMapSaysWhy) {
+  MapMatcher matcher({}, nullptr);
+  EXPECT_TRUE(matcher.add(StateInput{}).empty());
+  EXPECT_EQ(matcher.trouble(), "no map is configured");
+  EXPECT_TRUE(matcher.add(StepInput{}).empty());
+  EXPECT_FALSE(matcher.wants_gnss());
+}
+
+}  // namespace
+}  // namespace railfix::map_matcher
