@@ -100,16 +100,29 @@ struct Pair {
   size_t b = 0;
   double turn_rad = 0;
   bool same_line = false;
+  bool diverging = false;
 };
 
-std::vector<Pair> possible_pairs(const Draft& draft, const std::vector<EdgeEnd>& ends) {
+/// What the source says of the two ends; nothing where no train runs from one to the other.
+std::optional<ToldWay> told_way(const DraftNode& node, const EdgeEnd& a, const EdgeEnd& b) {
+  const std::pair from(a.edge, a.at_end);
+  const std::pair to(b.edge, b.at_end);
+  for (const ToldWay& way : node.ways) {
+    if ((way.a == from && way.b == to) || (way.a == to && way.b == from)) return way;
+  }
+  return std::nullopt;
+}
+
+std::vector<Pair> possible_pairs(const Draft& draft, const DraftNode& node, const std::vector<EdgeEnd>& ends) {
   std::vector<Pair> pairs;
   for (size_t a = 0; a < ends.size(); ++a) {
     for (size_t b = a + 1; b < ends.size(); ++b) {
       const double turn = std::abs(core::wrap_pi(ends[b].leaving_rad - ends[a].leaving_rad - core::kPi));
-      if (turn > kSharpestTurnRad) continue;
+      const auto way = told_way(node, ends[a], ends[b]);
+      if (node.ways_are_told ? !way : turn > kSharpestTurnRad) continue;
       const std::string& line = draft.edges[ends[a].edge].track.line;
-      pairs.push_back({a, b, turn, !line.empty() && line == draft.edges[ends[b].edge].track.line});
+      pairs.push_back(
+          {a, b, turn, !line.empty() && line == draft.edges[ends[b].edge].track.line, way && way->diverging});
     }
   }
   // A line's own pieces first where the turn does not tell them apart, else the smallest turn.
@@ -141,8 +154,8 @@ std::vector<WayOver> ways_over(const Draft& draft, size_t node, const std::vecto
   std::set<size_t> has_straight_way;
   std::vector<WayOver> straight;
   std::vector<WayOver> diverging;
-  for (const Pair& pair : possible_pairs(draft, ends)) {
-    if (!has_straight_way.contains(pair.a) && !has_straight_way.contains(pair.b)) {
+  for (const Pair& pair : possible_pairs(draft, draft.nodes[node], ends)) {
+    if (!pair.diverging && !has_straight_way.contains(pair.a) && !has_straight_way.contains(pair.b)) {
       has_straight_way.insert({pair.a, pair.b});
       straight.push_back({pair.a, pair.b, false});
     } else if (!draft.nodes[node].is_crossing) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/units.hpp"
@@ -14,12 +15,21 @@ namespace railfix::track {
 /// No track turns more sharply at a node.
 inline constexpr double kSharpestTurnRad = core::kPi / 3.0;
 
+/// The source says that trains run over a node from one edge's end to another's.
+struct ToldWay {
+  std::pair<size_t, bool> a;  // edge (index into Draft::edges), at its end
+  std::pair<size_t, bool> b;
+  bool diverging = false;
+};
+
 struct DraftNode {
   std::string name;
   double easting_m = 0;
   double northing_m = 0;
-  bool is_switch = false;    // the source says so, whatever meets here
-  bool is_crossing = false;  // tracks cross on the level, nobody can change track
+  bool is_switch = false;       // the source says so, whatever meets here
+  bool is_crossing = false;     // tracks cross on the level, nobody can change track
+  bool ways_are_told = false;   // `ways` are all there are
+  std::vector<ToldWay> ways{};  // else they follow from the directions of the edges
 };
 
 struct DraftEdge {
@@ -53,8 +63,8 @@ struct WayOver {
 /// Of every node of the draft.
 std::vector<std::vector<EdgeEnd>> ends_at_nodes(const Draft& draft);
 
-/// Straight ways first. Two ends are connected where the turn between them is less than 60 degrees; pieces of one line
-/// (else the smallest turn) are the straight way.
+/// Straight ways first. Two ends are connected where the source says so, or where it says nothing and the turn between
+/// them is less than 60 degrees; pieces of one line (else the smallest turn) are the straight way.
 std::vector<WayOver> ways_over(const Draft& draft, size_t node, const std::vector<EdgeEnd>& ends);
 
 /// A node that lies on a track.

@@ -5,6 +5,7 @@
 #include <deque>
 #include <map>
 #include <numeric>
+#include <set>
 
 #include "core/units.hpp"
 #include "track/import/fit/biarc.hpp"
@@ -272,7 +273,7 @@ class Planner {
     const auto node = [&](const NetEnd& end) {
       const auto [entry, is_new] = index.try_emplace(root(key(end)), draft.nodes.size());
       const PlanPose pose = leaving(end);
-      if (is_new) draft.nodes.push_back({"", pose.easting_m, pose.northing_m, false, false});
+      if (is_new) draft.nodes.push_back({"", pose.easting_m, pose.northing_m});
       return entry->second;
     };
     for (size_t i = 0; i < net_.tracks.size(); ++i) {
@@ -282,12 +283,25 @@ class Planner {
       add_pieces(track, {{0, from}, {track.alignment.length_m(), to}}, draft);
     }
     for (const NetLink& link : net_.links) {
-      if (link.switch_name.empty()) continue;
       DraftNode& at = draft.nodes[node(link.a)];
+      at.ways_are_told = true;
+      if (link.passable && !link.crosses)
+        at.ways.push_back({{link.a.track, link.a.at_end}, {link.b.track, link.b.at_end}, link.diverging});
+      if (link.switch_name.empty()) continue;
       at.name = link.switch_name;
       at.is_switch = true;
     }
+    for (DraftNode& at : draft.nodes) at.is_crossing = is_crossed(at);
     return draft;
+  }
+
+  /// Several ways lead over it, and no two of them meet.
+  static bool is_crossed(const DraftNode& node) {
+    std::set<std::pair<size_t, bool>> met;
+    for (const ToldWay& way : node.ways) {
+      if (!met.insert(way.a).second || !met.insert(way.b).second) return false;
+    }
+    return node.ways.size() > 1;
   }
 
   RailNet& net_;
@@ -356,8 +370,7 @@ size_t split(RailNet& net, size_t track, double offset_m, const std::string& nam
       if (end->track == track && end->at_end) end->track = added;
     }
   }
-  net.links.push_back(
-      {.a = {track, true}, .b = {added, false}, .passable = true, .diverging = false, .side = 0, .switch_name = ""});
+  net.links.push_back({.a = {track, true}, .b = {added, false}, .diverging = false, .side = 0, .switch_name = ""});
   return added;
 }
 

@@ -43,9 +43,10 @@ struct NetLink {
   NetEnd a;
   NetEnd b;
   bool passable = true;
+  bool crosses = false;  // the tracks only cross: laid out like a way, but none
   bool diverging = false;
   double side = 0;  // of the diverging way, seen from the blades: left 1, right -1
-  std::string switch_name;
+  std::string switch_name{};
 };
 
 struct RailNet {

@@ -23,6 +23,7 @@ struct Connector {
   double offset_m = 0;
   double side = 0;
   bool is_crossing = false;
+  bool only_crosses = false;  // ... without slips
   std::string switch_name{};
   pugi::xml_node node{};
 };
@@ -93,6 +94,8 @@ class Reader {
       Connector connector{.ref = source_.required_text(connection, "ref"), .track = track};
       connector.is_branch = true;
       connector.is_crossing = std::string(points.name()) == "crossing";
+      connector.only_crosses =
+          connector.is_crossing && std::string(points.attribute("type").value()) == "simpleCrossing";
       connector.outgoing = orientation == "outgoing";
       connector.offset_m = pos(points) - origin_m_;
       const double length = net_.tracks[track].length_m;
@@ -342,7 +345,7 @@ class Reader {
     const Connector& branch = a.is_branch ? a : b;
     net_.links.push_back({.a = *from,
                           .b = *to,
-                          .passable = true,
+                          .crosses = branch.only_crosses,
                           .diverging = branch.is_branch,
                           .side = branch.side,
                           .switch_name = branch.switch_name});
@@ -355,8 +358,7 @@ class Reader {
     const auto from = facing(a->second);
     const auto to = facing(b->second);
     if (from && to)
-      net_.links.push_back(
-          {.a = *from, .b = *to, .passable = true, .diverging = false, .side = 0, .switch_name = in.switch_name});
+      net_.links.push_back({.a = *from, .b = *to, .diverging = false, .side = 0, .switch_name = in.switch_name});
   }
 
   const XmlSource& source_;
