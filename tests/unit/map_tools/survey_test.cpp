@@ -134,6 +134,36 @@ TEST(Survey, TheMapGetsTheNewLandmarks) {
   EXPECT_THAT(survey_landmarks(passes.map, {}, {}).landmarks, testing::IsEmpty());
 }
 
+/// The map has a pair of balises at 900 and 903 m; three runs see it elsewhere.
+class ShiftedPair : public testing::TestWithParam<double> {
+ protected:
+  ShiftedPair() {
+    map_.landmarks.resize(1);
+    map_.landmarks.push_back({2, LandmarkKind::balise, 1, 903, 0, 0.1, "B2"});
+    map_.balise_groups = {{85, 100, 1, 900, true, false, 5, {1, 2}}};
+    for (size_t run = 0; run < 3; ++run) {
+      for (const double at : {900.0, 903.0})
+        sightings_.push_back({run, at, LandmarkKind::balise, 1, at + GetParam(), 0, 0.05, 0.1});
+    }
+  }
+  track::Map map_ = track::small_map();
+  std::vector<SurveySighting> sightings_;
+};
+
+TEST_P(ShiftedPair, IsMovedAsAPairAndItsGroupWithIt) {
+  const Survey survey = survey_landmarks(map_, sightings_, {.stretch_m = 2000});
+  ASSERT_EQ(survey.landmarks.size(), 2U);
+  for (const auto& found : survey.landmarks) EXPECT_EQ(found.sightings, 3U) << found.known_id;
+  apply_survey(survey, map_);
+  EXPECT_NEAR(map_.landmarks[1].offset_m - map_.landmarks[0].offset_m, 3, 0.1);
+  EXPECT_NEAR(map_.landmarks[0].offset_m, 900 + GetParam(), 0.5 * std::abs(GetParam()));
+  const auto& group = map_.balise_groups[0];
+  EXPECT_DOUBLE_EQ(group.offset_m, map_.landmarks[0].offset_m);
+  EXPECT_DOUBLE_EQ(group.q_locacc_m, 1);
+}
+
+INSTANTIATE_TEST_SUITE_P(By, ShiftedPair, testing::Values(-2.5, -1.2, 0.5, 1.2, 2.5));
+
 class RunTables : public testing::Test {
  protected:
   RunTables() { std::filesystem::create_directories(folder_); }

@@ -5,40 +5,14 @@
 #include <map>
 #include <set>
 
+#include "map/survey_known.hpp"
 #include "map/survey_solver.hpp"
 
 namespace railfix::tool {
 namespace {
 
 constexpr int kRounds = 3;
-constexpr double kOnePassM = 50;     // of a run: no thing is passed twice within it ...
-constexpr double kTwiceToldM = 0.5;  // ... but it may be told twice
-
-bool has_side(track::LandmarkKind kind) {
-  return kind == track::LandmarkKind::mast || kind == track::LandmarkKind::platform;
-}
-
-/// Same kind, same track, same side.
-bool alike(const SurveySighting& a, track::LandmarkKind kind, uint32_t edge, double lateral_m) {
-  return a.kind == kind && a.edge == edge && (!has_side(kind) || a.lateral_m * lateral_m >= 0);
-}
-
-/// Passed by one run one behind the other: two things, however near.
-bool told_apart(const SurveySighting& a, const SurveySighting& b) {
-  return a.run == b.run && std::abs(a.way_m - b.way_m) < kOnePassM &&
-         std::abs(a.unmoved_m() - b.unmoved_m()) > kTwiceToldM;
-}
-
-const track::Landmark* known_as(const SurveySighting& sighting, double place_m, const track::Map& map, double gate_m) {
-  const track::Landmark* nearest = nullptr;
-  for (const track::Landmark& mark : map.landmarks) {
-    if (!alike(sighting, mark.kind, mark.edge, mark.lateral_m)) continue;
-    const double off_m = std::abs(mark.offset_m - place_m);
-    const double reach_m = gate_m + 3.0 * std::hypot(mark.sigma_m, sighting.run_sigma_m);
-    if (off_m < reach_m && (nearest == nullptr || off_m < std::abs(nearest->offset_m - place_m))) nearest = &mark;
-  }
-  return nearest;
-}
+constexpr double kLocaccSigmas = 4;
 
 /// Sightings sorted by kind, side and place fall into things. Where a run tells one thing apart from the last one,
 /// those of other runs that lie nearer to the new one go with it.
@@ -74,13 +48,13 @@ std::vector<Thing> things_of(const track::Map& map, const std::vector<SurveySigh
                              const std::vector<double>& places, double gate_m) {
   std::map<const track::Landmark*, Thing> known;
   std::vector<size_t> rest;
+  const auto marks = known_marks(map, all, places, gate_m);
   for (size_t i = 0; i < all.size(); ++i) {
-    const track::Landmark* mark = known_as(all[i], places[i], map, gate_m);
-    if (mark == nullptr) {
+    if (marks[i] == nullptr) {
       rest.push_back(i);
     } else {
-      known[mark].known = mark;
-      known[mark].sightings.push_back(i);
+      known[marks[i]].known = marks[i];
+      known[marks[i]].sightings.push_back(i);
     }
   }
   std::vector<Thing> out;
@@ -146,6 +120,15 @@ SurveyedLandmark landmark_of(const track::Map& map, const Thing& thing, const st
   return found;
 }
 
+/// A group lies where its reference balise does, as surely as that is known.
+void move_group(const SurveyedLandmark& reference, track::Map& map) {
+  for (track::BaliseGroup& group : map.balise_groups) {
+    if (group.balises.empty() || group.balises.front() != reference.known_id) continue;
+    group.offset_m = reference.landmark.offset_m;
+    group.q_locacc_m = std::max(1.0, std::ceil(kLocaccSigmas * reference.landmark.sigma_m));
+  }
+}
+
 }  // namespace
 
 Survey survey_landmarks(const track::Map& map, const std::vector<SurveySighting>& sightings,
@@ -172,6 +155,7 @@ void apply_survey(const Survey& survey, track::Map& map) {
   for (const SurveyedLandmark& found : survey.landmarks) {
     if (found.known_id != 0) {
       map.landmarks[found.known_id - 1] = found.landmark;
+      move_group(found, map);
       continue;
     }
     track::Landmark added = found.landmark;
