@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <limits>
 #include <memory>
+#include <set>
 #include <string>
 
 #include "command_tpr.hpp"
@@ -154,6 +155,14 @@ Verdict print_ratio(const char* what, const compare::RatioResult& result) {
   return result.verdict;
 }
 
+size_t contradicted_legs(const compare::Pairing& pairing) {
+  std::set<size_t> legs;
+  for (const auto& pair : pairing.pairs) {
+    if (!pair.overlap()) legs.insert(pair.leg);
+  }
+  return legs.size();
+}
+
 void print_pairs(const compare::Pairing& pairing) {
   std::vector<double> differences;
   double carried_m = 0;
@@ -195,7 +204,31 @@ Verdict print_share(const std::vector<compare::Sample>& samples, const compare::
   return print_ratio("certified over ours:", result);
 }
 
-int verdict(const Columns& columns, const Options& options) {
+/// What the verdicts come to. Two intervals with nothing in common cannot both be right.
+Verdict print_sum(const std::vector<Verdict>& verdicts, size_t contradicted_legs, bool errors_known) {
+  const auto any = [&](Verdict one) { return std::ranges::count(verdicts, one) > 0; };
+  std::printf("verdict                  ");
+  if (any(Verdict::worse)) {
+    std::printf("WORSE\n");
+    return Verdict::worse;
+  }
+  if (contradicted_legs > 0 && !errors_known) {
+    std::printf(
+        "not shown: on %zu legs the intervals have nothing in common, so one side is wrong, and only --truth "
+        "says which\n",
+        contradicted_legs);
+    return Verdict::open;
+  }
+  if (any(Verdict::open)) {
+    std::printf("not shown\n");
+    return Verdict::open;
+  }
+  std::printf("%s\n",
+              errors_known ? "at least as good" : "intervals at least as good, and as often known; errors not known");
+  return Verdict::at_least_as_good;
+}
+
+int verdict(const Columns& columns, size_t contradicted_legs, const Options& options) {
   std::printf("\nGAMAB, %.0f %% confidence, margin %.0f %%, over legs (ours / certified)\n",
               100 * options.demand.confidence, 100 * options.demand.margin);
   std::vector<Verdict> verdicts{print_share(columns.available, options.demand)};
@@ -214,14 +247,7 @@ int verdict(const Columns& columns, const Options& options) {
         text_of(broken.verdict));
     verdicts.push_back(broken.verdict);
   }
-  const bool worse = std::count(verdicts.begin(), verdicts.end(), Verdict::worse) > 0;
-  const bool open = std::count(verdicts.begin(), verdicts.end(), Verdict::open) > 0;
-  std::printf("verdict                  %s\n", worse  ? "WORSE"
-                                               : open ? "not shown"
-                                               : columns.errors.empty()
-                                                   ? "intervals at least as good, and as often known; errors not known"
-                                                   : "at least as good");
-  return 0;
+  return print_sum(verdicts, contradicted_legs, !columns.errors.empty()) == Verdict::worse ? 1 : 0;
 }
 
 /// Reports that come now, until the other side's file is over, time is up, or Ctrl-C; each pair is told as it comes.
@@ -262,7 +288,7 @@ int print_comparison(const Options& options, const compare::Pairing& pairing, co
   };
   std::printf("interval not known       ours %td, certified %td of %zu: left out\n", unknown(&compare::Sample::ours),
               unknown(&compare::Sample::certified), columns.lengths.size());
-  return verdict(columns, options);
+  return verdict(columns, contradicted_legs(pairing), options);
 }
 
 void check(const Options& options) {
@@ -335,7 +361,8 @@ void add_tpr_compare(CLI::App& tpr, Action& chosen) {
       "  railfix tpr compare --ours OUT --certified rbc.csv --map line.map\n"
       "  railfix tpr compare --ours topic:demo --certified rbc.csv   what train demo sends now, until the file is "
       "over\n"
-      "  railfix tpr compare --ours topic:demo --certified topic:demo-evc --for-s 3600");
+      "  railfix tpr compare --ours topic:demo --certified topic:demo-evc --for-s 3600\n"
+      "Ends with 1 where the verdict is WORSE.");
   command
       ->add_option("--ours", options->ours,
                    "Folder of a run, a .csv or .jsonl file with stamp_ns and hex, a recording (.mcap), or topic:TRAIN: "

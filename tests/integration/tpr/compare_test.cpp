@@ -89,10 +89,15 @@ TEST(TprCompare, SaysWhatIsShownAndWhatIsNot) {
   EXPECT_THAT(outcome.out, HasSubstr("verdict                  not shown")) << "a silent leg among the next 12?";
   outcome = test::run_program({"railfix", "tpr", "compare", "--ours", certified, "--certified", ours}, kPatienceS);
   EXPECT_THAT(outcome.out, HasSubstr("verdict                  WORSE"));
+  EXPECT_EQ(outcome.exit_code, 1);
   std::ofstream(ours) << table(0.5, 5, 70);
   std::ofstream(certified) << table(-1.5, 20, 70);
   outcome = test::run_program({"railfix", "tpr", "compare", "--ours", ours, "--certified", certified}, kPatienceS);
   EXPECT_THAT(outcome.out, HasSubstr("intervals at least as good, and as often known; errors not known"));
+  std::ofstream(ours) << table(40, 5, 70);
+  outcome = test::run_program({"railfix", "tpr", "compare", "--ours", ours, "--certified", certified}, kPatienceS);
+  EXPECT_THAT(outcome.out, HasSubstr("overlap        0 of 350"));
+  EXPECT_THAT(outcome.out, HasSubstr("not shown: on 70 legs the intervals have nothing in common")) << "however short";
   std::ofstream(ours) << table(0.5, 5, 70, 1);
   outcome = test::run_program({"railfix", "tpr", "compare", "--ours", ours, "--certified", certified}, kPatienceS);
   EXPECT_THAT(outcome.out, HasSubstr("interval known           ours 20.0 %, certified 100.0 % of 350"));
