@@ -1,7 +1,8 @@
-// The layout of message 136, written down once and visited by encoder, decoder and printers.
+// The layouts of message 136 and packet 58, written down once and visited by encoder, decoder and printers.
 // A visitor has field(Field, value) and field_if(present, when, Field, optional value).
 #pragma once
 
+#include "etcs/report_parameters.hpp"
 #include "etcs/train_position_report.hpp"
 
 namespace railfix::etcs {
@@ -40,6 +41,24 @@ void visit_position(Report& report, Baseline baseline, Visitor& visitor) {
   visitor.field(b4 ? Field{"M_MODE", 5, 17} : full_field("M_MODE", 4), report.m_mode);
   visitor.field(Field{"M_LEVEL", 3, b4 ? kLevel2 : kLevel3}, report.m_level);
   visitor.field_if(report.m_level == kLevelNtc, "M_LEVEL 1", full_field("NID_NTC", 8), report.nid_ntc);
+}
+
+/// Packet 58: in front of L_PACKET, and behind it up to the locations.
+constexpr Field kQDir{"Q_DIR", 2, 2};
+constexpr Field kNIter = full_field("N_ITER", 5);
+
+template <class Parameters, class Visitor>
+void visit_cycles(Parameters& parameters, Visitor& visitor) {
+  visitor.field(kQScale, parameters.q_scale);
+  visitor.field(full_field("T_CYCLOC", 8), parameters.t_cycloc);
+  visitor.field(full_field("D_CYCLOC", 15), parameters.d_cycloc);
+  visitor.field(Field{"M_LOC", 3, kReportNotAtGroups}, parameters.m_loc);
+}
+
+template <class Location, class Visitor>
+void visit_location(Location& location, Visitor& visitor) {
+  visitor.field(full_field("D_LOC", 15), location.d_loc);
+  visitor.field(full_field("Q_LGTLOC", 1), location.q_lgtloc);
 }
 
 }  // namespace railfix::etcs

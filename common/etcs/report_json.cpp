@@ -156,6 +156,19 @@ core::Result<Json> with_lrbg(Json json) {
   return json;
 }
 
+void read_locations(const Json& json, JsonReader& reader, std::vector<ReportLocation>& locations) {
+  const auto list = json.find("locations");
+  if (list == json.end()) return;
+  reader.use("locations");
+  if (!list->is_array()) return reader.fail({"\"locations\" must be a list."});
+  for (const auto& entry : *list) {
+    if (!entry.is_object()) return reader.fail({"An entry of \"locations\" is not a JSON object."});
+    JsonReader fields(entry);
+    visit_location(locations.emplace_back(), fields);
+    if (const auto status = fields.finish(); !status.ok()) return reader.fail(status.error());
+  }
+}
+
 }  // namespace
 
 nlohmann::ordered_json to_json(const TrainPositionReport& report, Baseline baseline) {
@@ -194,6 +207,37 @@ core::Result<TrainPositionReport> report_from_json(const nlohmann::ordered_json&
   reader.expect(kLPacket, position_packet_bits(report, baseline));
   if (const auto status = reader.finish(); !status.ok()) return status.error();
   return report;
+}
+
+nlohmann::ordered_json to_json(const ReportParameters& parameters) {
+  Json json;
+  JsonWriter writer(json);
+  writer.field(kNidPacket, kNidPacketReportParameters);
+  writer.field(kQDir, parameters.q_dir);
+  writer.field(kLPacket, packet_bits(parameters));
+  visit_cycles(parameters, writer);
+  writer.field(kNIter, static_cast<uint32_t>(parameters.locations.size()));
+  json["locations"] = Json::array();
+  for (const auto& location : parameters.locations) {
+    JsonWriter fields(json["locations"].emplace_back());
+    visit_location(location, fields);
+  }
+  return json;
+}
+
+core::Result<ReportParameters> parameters_from_json(const nlohmann::ordered_json& json) {
+  if (!json.is_object()) return core::Error{"Position report parameters must be one JSON object."};
+  JsonReader reader(json);
+  ReportParameters parameters;
+  reader.expect(kNidPacket, kNidPacketReportParameters);
+  reader.field(kQDir, parameters.q_dir);
+  visit_cycles(parameters, reader);
+  read_locations(json, reader, parameters.locations);
+  reader.expect(kNIter, static_cast<uint32_t>(parameters.locations.size()));
+  reader.expect(kLPacket, packet_bits(parameters));
+  if (const auto status = reader.finish(); !status.ok()) return status.error();
+  if (const auto packet = encode(parameters); !packet.ok()) return packet.error();
+  return parameters;
 }
 
 }  // namespace railfix::etcs

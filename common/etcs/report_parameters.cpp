@@ -8,30 +8,17 @@ namespace railfix::etcs {
 
 namespace {
 
-constexpr Field kIterations = full_field("N_ITER", 5);
 constexpr uint32_t kBaseBits = 56;
 constexpr uint32_t kLocationBits = 16;
 
-template <class Parameters, class Visitor>
-void visit_cycles(Parameters& parameters, Visitor& visitor) {
-  visitor.field(kQScale, parameters.q_scale);
-  visitor.field(full_field("T_CYCLOC", 8), parameters.t_cycloc);
-  visitor.field(full_field("D_CYCLOC", 15), parameters.d_cycloc);
-  visitor.field(Field{"M_LOC", 3, kReportNotAtGroups}, parameters.m_loc);
-}
-
-template <class Location, class Visitor>
-void visit_location(Location& location, Visitor& visitor) {
-  visitor.field(full_field("D_LOC", 15), location.d_loc);
-  visitor.field(full_field("Q_LGTLOC", 1), location.q_lgtloc);
-}
-
-constexpr Field kQDir{"Q_DIR", 2, 2};
-
 }  // namespace
 
+uint32_t packet_bits(const ReportParameters& parameters) {
+  return kBaseBits + static_cast<uint32_t>(parameters.locations.size()) * kLocationBits;
+}
+
 core::Result<std::vector<uint8_t>> encode(const ReportParameters& parameters) {
-  if (parameters.locations.size() > kIterations.limit()) {
+  if (parameters.locations.size() > kNIter.limit()) {
     return core::Error{"Packet 58 holds at most 31 locations, not " + std::to_string(parameters.locations.size()) +
                        "."};
   }
@@ -40,9 +27,9 @@ core::Result<std::vector<uint8_t>> encode(const ReportParameters& parameters) {
   FieldWriter writer(bits);
   writer.field(kNidPacket, kNidPacketReportParameters);
   writer.field(kQDir, parameters.q_dir);
-  writer.field(kLPacket, kBaseBits + count * kLocationBits);
+  writer.field(kLPacket, packet_bits(parameters));
   visit_cycles(parameters, writer);
-  writer.field(kIterations, count);
+  writer.field(kNIter, count);
   for (const auto& location : parameters.locations) visit_location(location, writer);
   if (!writer.status().ok()) return writer.status().error();
   return bits.bytes();
@@ -63,7 +50,7 @@ core::Result<ReportParameters> decode_report_parameters(std::span<const uint8_t>
   reader.field(kQDir, parameters.q_dir);
   reader.field(kLPacket, l_packet);
   visit_cycles(parameters, reader);
-  reader.field(kIterations, count);
+  reader.field(kNIter, count);
   for (uint32_t i = 0; i < count && reader.status().ok(); ++i)
     visit_location(parameters.locations.emplace_back(), reader);
   if (!reader.status().ok()) return reader.status().error();

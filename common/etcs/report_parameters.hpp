@@ -32,6 +32,8 @@ struct ReportParameters {
   bool operator==(const ReportParameters&) const = default;
 };
 
+/// L_PACKET.
+uint32_t packet_bits(const ReportParameters& parameters);
 /// The packet alone, padded with zeros to whole bytes.
 core::Result<std::vector<uint8_t>> encode(const ReportParameters& parameters);
 core::Result<ReportParameters> decode_report_parameters(std::span<const uint8_t> packet);

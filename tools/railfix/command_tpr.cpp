@@ -99,20 +99,6 @@ std::string cycle_text(uint32_t value, uint32_t none, const std::string& every) 
   return value == none ? "not cyclic" : "a report every " + every;
 }
 
-nlohmann::ordered_json json_of(const etcs::ReportParameters& packet) {
-  auto locations = nlohmann::ordered_json::array();
-  for (const auto& location : packet.locations)
-    locations.push_back({{"D_LOC", location.d_loc}, {"Q_LGTLOC", location.q_lgtloc}});
-  return {{"NID_PACKET", etcs::kNidPacketReportParameters},
-          {"Q_DIR", packet.q_dir},
-          {"Q_SCALE", packet.q_scale},
-          {"T_CYCLOC", packet.t_cycloc},
-          {"D_CYCLOC", packet.d_cycloc},
-          {"M_LOC", packet.m_loc},
-          {"N_ITER", packet.locations.size()},
-          {"locations", std::move(locations)}};
-}
-
 void print_packet_58(const etcs::ReportParameters& packet) {
   struct Row {
     const char* name;
@@ -144,7 +130,7 @@ int decode(const std::string& hex, Baseline baseline, bool json_wanted) {
   if (!bytes.empty() && bytes.front() == etcs::kNidPacketReportParameters) {
     const auto packet = core::value_or_throw(etcs::decode_report_parameters(bytes));
     if (json_wanted) {
-      std::cout << json_of(packet).dump(2) << '\n';
+      std::cout << etcs::to_json(packet).dump(2) << '\n';
     } else {
       print_packet_58(packet);
     }
@@ -161,14 +147,31 @@ int decode(const std::string& hex, Baseline baseline, bool json_wanted) {
   return 0;
 }
 
+using Bytes = std::vector<uint8_t>;
+
+bool is_packet_58(const nlohmann::ordered_json& json) {
+  return json.is_object() && json.value("NID_PACKET", nlohmann::ordered_json()) == etcs::kNidPacketReportParameters &&
+         !json.contains("NID_MESSAGE");
+}
+
+core::Result<Bytes> packet_58_of(const nlohmann::ordered_json& json) {
+  const auto packet = etcs::parameters_from_json(json);
+  return packet.ok() ? etcs::encode(packet.value()) : packet.error();
+}
+
+core::Result<Bytes> message_of(const nlohmann::ordered_json& json, Baseline baseline) {
+  const auto report = etcs::report_from_json(json, baseline);
+  return report.ok() ? etcs::encode(report.value(), baseline) : report.error();
+}
+
 int encode(const std::string& file, Baseline baseline) {
   const std::string where = file == "-" ? "standard input" : file;
   const auto text = core::value_or_throw(file == "-" ? core::read_whole(std::cin, where) : core::read_whole(file));
   const auto json = core::parse_json<nlohmann::ordered_json>(text);
   if (!json.ok()) throw BadInput(where + ": " + json.error().message);
-  const auto report = etcs::report_from_json(json.value(), baseline);
-  if (!report.ok()) throw BadInput(where + ": " + report.error().message);
-  std::cout << etcs::to_hex(core::value_or_throw(etcs::encode(report.value(), baseline))) << '\n';
+  const auto packed = is_packet_58(json.value()) ? packet_58_of(json.value()) : message_of(json.value(), baseline);
+  if (!packed.ok()) throw BadInput(where + ": " + packed.error().message);
+  std::cout << etcs::to_hex(packed.value()) << '\n';
   return 0;
 }
 
@@ -200,7 +203,8 @@ void add_tpr(CLI::App& app, Action& chosen) {
     chosen = [options] { return decode(options->hex, static_cast<Baseline>(options->baseline), options->json); };
   });
 
-  auto* encoder = tpr->add_subcommand("encode", "Make a message, e.g. railfix tpr encode --json report.json");
+  auto* encoder =
+      tpr->add_subcommand("encode", "Make a message 136 or a packet 58, e.g. railfix tpr encode --json report.json");
   encoder
       ->add_option("--json", options->file, "File with the fields as `decode --json` prints them, - = standard input")
       ->required();

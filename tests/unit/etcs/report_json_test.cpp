@@ -85,5 +85,29 @@ TEST(ReportJson, WrongValuesAreNamed) {
   EXPECT_THAT(refusal(nlohmann::ordered_json::array()), HasSubstr("one JSON object"));
 }
 
+TEST(Packet58Json, RandomPacketsComeBack) {
+  core::Random random(59);
+  for (int i = 0; i < 200; ++i) {
+    const auto parameters = testing::random_parameters(random);
+    EXPECT_EQ(parameters_from_json(to_json(parameters)).value(), parameters);
+  }
+}
+
+TEST(Packet58Json, WrongValuesAreNamed) {
+  const auto with = [](const char* key, const nlohmann::ordered_json& value) {
+    ReportParameters parameters;
+    parameters.locations = {{500, 1}};
+    auto json = to_json(parameters);
+    json[key] = value;
+    return parameters_from_json(json).error().message;
+  };
+  EXPECT_THAT(with("Q_DIR", 3), HasSubstr("Q_DIR = 3 is a spare value"));
+  EXPECT_THAT(with("N_ITER", 2), HasSubstr("N_ITER = 2, but with these fields it must be 1"));
+  EXPECT_THAT(with("L_PACKET", 56), HasSubstr("it must be 72"));
+  EXPECT_THAT(with("locations", 1), HasSubstr("must be a list"));
+  EXPECT_THAT(with("locations", {{{"D_LOC", 1}}}), HasSubstr("Q_LGTLOC is missing"));
+  EXPECT_THAT(with("T_CYCLE", 1), HasSubstr("Key \"T_CYCLE\""));
+}
+
 }  // namespace
 }  // namespace railfix::etcs
