@@ -15,6 +15,14 @@ double arriving_heading(const Run& run) {
   return leaving_heading(run.reversed()) + core::kPi;
 }
 
+constexpr double kCornerM = 12.0;
+constexpr double kLeastCornerRad = 0.005;  // less is how points were rounded
+
+double corner_rad(const Run& run, const Run& next) {
+  const double left_rad = core::wrap_pi(arriving_heading(run) - leaving_heading(next));
+  return std::abs(left_rad) < kLeastCornerRad ? 0.0 : left_rad;
+}
+
 }  // namespace
 
 Ways::Ways(const Map& map) : after_(2 * map.edges.size()) {
@@ -57,6 +65,15 @@ Route::Route(const Run& run, double offset_m, double place_m) {
   legs_.push_back({run, place_m - (run.forward ? offset_m : run.length_m() - offset_m)});
 }
 
+void Route::push_ahead(const Run& run) {
+  legs_.push_back({run, end_m(), corner_rad(legs_.back().run, run)});
+}
+
+void Route::push_behind(const Run& run) {
+  legs_.front().corner_rad = corner_rad(run, legs_.front().run);
+  legs_.push_front({run, begin_m() - run.length_m()});
+}
+
 void Route::drop_ahead() {
   if (legs_.size() > 1) legs_.pop_back();
 }
@@ -65,10 +82,10 @@ void Route::drop_behind() {
   if (legs_.size() > 1) legs_.pop_front();
 }
 
-const Route::Leg& Route::leg_at(double distance_m) const {
+size_t Route::index_at(double distance_m) const {
   const auto after = std::upper_bound(legs_.begin(), legs_.end(), distance_m,
                                       [](double distance, const Leg& leg) { return distance < leg.begin_m; });
-  return after == legs_.begin() ? legs_.front() : *(after - 1);
+  return after == legs_.begin() ? 0 : static_cast<size_t>(after - legs_.begin()) - 1;
 }
 
 EdgePosition Route::position_at(double distance_m) const {
@@ -90,10 +107,13 @@ std::optional<double> Route::distance_of(const EdgePosition& place, double near_
 }
 
 double Route::curvature_at(double distance_m) const {
-  const Leg& leg = leg_at(distance_m);
+  const size_t i = index_at(distance_m);
+  const Leg& leg = legs_[i];
   const double into = distance_m - leg.begin_m;
   const double curvature = leg.run.edge->alignment.curvature_at(leg.run.forward ? into : leg.run.length_m() - into);
-  return leg.run.forward ? curvature : -curvature;
+  double corner = std::abs(into) < kCornerM ? leg.corner_rad : 0.0;
+  if (i + 1 < legs_.size() && leg.end_m() - distance_m < kCornerM) corner += legs_[i + 1].corner_rad;
+  return (leg.run.forward ? curvature : -curvature) + corner / (2 * kCornerM);
 }
 
 }  // namespace railfix::track

@@ -39,6 +39,7 @@ class Route {
   struct Leg {
     Run run;
     double begin_m = 0;
+    double corner_rad = 0;  // between the leg before and this one, left positive: a leg of a turnout that has no curve
     [[nodiscard]] double end_m() const { return begin_m + run.length_m(); }
     friend bool operator==(const Leg&, const Leg&) = default;
   };
@@ -46,8 +47,8 @@ class Route {
   /// The run of a place, which gets the distance `place_m`.
   Route(const Run& run, double offset_m, double place_m);
 
-  void push_ahead(const Run& run) { legs_.push_back({run, end_m()}); }
-  void push_behind(const Run& run) { legs_.push_front({run, begin_m() - run.length_m()}); }
+  void push_ahead(const Run& run);
+  void push_behind(const Run& run);
   /// One leg always stays.
   void drop_ahead();
   void drop_behind();
@@ -55,14 +56,17 @@ class Route {
   [[nodiscard]] const std::deque<Leg>& legs() const { return legs_; }
   [[nodiscard]] double begin_m() const { return legs_.front().begin_m; }
   [[nodiscard]] double end_m() const { return legs_.back().end_m(); }
-  [[nodiscard]] const Leg& leg_at(double distance_m) const;
+  [[nodiscard]] const Leg& leg_at(double distance_m) const { return legs_[index_at(distance_m)]; }
   [[nodiscard]] EdgePosition position_at(double distance_m) const;
   /// The place nearest to `near_m`, run in its direction (unknown: in either); nothing when the route does not go
   /// there.
   [[nodiscard]] std::optional<double> distance_of(const EdgePosition& place, double near_m) const;
+  /// A corner counts as a curve of 12 m to either side: where a plan has a leg from the middle of its turnout (1 in 9
+  /// of 190 m: 10.5 m, of 300 m: 16.6 m) the train turns as much.
   [[nodiscard]] double curvature_at(double distance_m) const;
 
  private:
+  [[nodiscard]] size_t index_at(double distance_m) const;
   std::deque<Leg> legs_;
 };
 

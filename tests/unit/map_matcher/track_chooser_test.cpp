@@ -163,5 +163,26 @@ TEST(TrackChooser, PicturesAloneNeverDeclareATrack) {
   EXPECT_FALSE(choice->known);
 }
 
+// As drawn from the middle of its turnout: the leg has no curve on the map.
+TEST(TrackChooser, ALegThatIsDrawnWithACornerIsToldByTheCorner) {
+  constexpr double kCornerRad = 0.11;  // 1 in 9
+  auto map = std::make_shared<track::Map>(*fork());
+  map->edges[2].alignment = track::Alignment::chained({0, 500, -kCornerRad}, {{500, 0, 0}});
+  const auto ways = std::make_shared<const track::Ways>(*map);
+  for (const bool left : {false, true}) {
+    TrackChooser chooser({}, map, ways);
+    const uint32_t edge = left ? 3 : 2;
+    for (double place_m = 400; place_m < 640; place_m += 0.5) {
+      const bool behind = place_m > 500;
+      chooser.follow({{behind ? edge : 1U, behind ? place_m - 500 : place_m, track::Direction::forward}, 3, 3, 0.5});
+      const bool turns = left && std::abs(place_m - 500) < 10.5;  // a radius of 190 m about the corner
+      chooser.move({0.5, turns ? kCornerRad / 42 : 0, 1e-4});
+    }
+    const auto choice = chooser.choice();
+    EXPECT_EQ(choice->options.front().place.edge, edge);
+    EXPECT_TRUE(choice->known) << edge;
+  }
+}
+
 }  // namespace
 }  // namespace railfix::map_matcher
