@@ -4,13 +4,13 @@
 #include <set>
 
 #include "core/units.hpp"
+#include "track/import/xml/railml2_balises.hpp"
 #include "track/import/xml/railml2_coordinates.hpp"
 #include "track/import/xml/railml_readers.hpp"
 
 namespace railfix::track {
 namespace {
 
-constexpr double kAtEndM = 0.01;
 constexpr int kMostHops = 20;  // switches directly behind one another
 
 /// One <connection>: at a track's end, or at a switch on it.
@@ -73,7 +73,7 @@ class Reader {
     read_plan(node.child("trackElements"), track);
     read_speeds(node.child("trackElements"), track);
     read_marks(node, track);
-    read_balises(node.child("ocsElements").child("balises"), track);
+    read_balises2(source_, node.child("ocsElements").child("balises"), origin_m_, track, net_.problems);
     points_.push_back(coordinates_.points_of(node, origin_m_));
   }
 
@@ -96,7 +96,7 @@ class Reader {
       connector.outgoing = orientation == "outgoing";
       connector.offset_m = pos(points) - origin_m_;
       const double length = net_.tracks[track].length_m;
-      if (connector.offset_m < -kAtEndM || connector.offset_m > length + kAtEndM)
+      if (!is_on_track(connector.offset_m, length))
         throw source_.wrong(points, "switch \"" + railml_name(points) + "\" is not on its track");
       connector.offset_m = std::clamp(connector.offset_m, 0.0, length);
       const std::string way = connection.attribute("course").value();
@@ -168,9 +168,8 @@ class Reader {
   void read_marks(const pugi::xml_node& node, NetTrack& track) {
     const pugi::xml_node elements = node.child("trackElements");
     const auto add = [&](LandmarkKind kind, double offset_m, double lateral_m, const pugi::xml_node& of) {
-      if (offset_m < -kAtEndM || offset_m > track.length_m + kAtEndM) {
-        net_.problems.push_back("<" + std::string(of.name()) + "> \"" + railml_name(of) +
-                                "\" is not on its track; it is left out");
+      if (!is_on_track(offset_m, track.length_m)) {
+        net_.problems.push_back(not_on_its_track(of));
         return;
       }
       track.track.marks.push_back(
@@ -198,45 +197,6 @@ class Reader {
     }
     for (const pugi::xml_node& of : node.child("ocsElements").child("signals").children("signal"))
       add(LandmarkKind::mast, pos(of) - origin_m_, 0, of);
-  }
-
-  void read_balises(const pugi::xml_node& balises, NetTrack& track) {
-    std::map<std::string, TrackMark> by_id;
-    for (const pugi::xml_node& balise : balises.children("balise")) {
-      const double at = std::clamp(pos(balise) - origin_m_, 0.0, track.length_m);
-      const TrackMark mark{LandmarkKind::balise, at, 0, kRailmlSigmaM, railml_name(balise)};
-      // A second one of that id is told for the whole file; it belongs to no group.
-      if (!by_id.emplace(balise.attribute("id").value(), mark).second) track.track.marks.push_back(mark);
-    }
-    for (const pugi::xml_node& node : balises.children("baliseGroup")) {
-      const std::optional<EtcsIdentity> identity = etcs_identity(source_, node);
-      TrackGroup group;
-      std::vector<std::pair<double, std::string>> order;
-      for (const pugi::xml_node& ref : node.children("baliseRef"))
-        order.emplace_back(source_.number(ref, "sequence").value_or(0), ref.attribute("ref").value());
-      std::stable_sort(order.begin(), order.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-      for (const auto& [sequence, id] : order) {
-        const auto balise = by_id.find(id);
-        if (balise == by_id.end()) continue;
-        group.balises.push_back(balise->second);
-        by_id.erase(balise);
-      }
-      if (group.balises.empty()) {
-        net_.problems.push_back("balise group \"" + railml_name(node) + "\" has no balises on its track");
-      } else if (!identity) {
-        net_.problems.push_back("balise group \"" + railml_name(node) +
-                                "\" has no ETCS identity (countryID and groupID); its balises are kept as landmarks");
-        track.track.marks.insert(track.track.marks.end(), group.balises.begin(), group.balises.end());
-      } else {
-        group.nid_c = identity->nid_c;
-        group.nid_bg = identity->nid_bg;
-        group.offset_m = group.balises.front().offset_m;
-        group.nominal_is_forward = group.balises.size() < 2 || group.balises[1].offset_m >= group.offset_m;
-        group.q_locacc_m = kRailmlSigmaM;
-        track.track.groups.push_back(std::move(group));
-      }
-    }
-    for (auto& [id, mark] : by_id) track.track.marks.push_back(std::move(mark));  // in no group
   }
 
   /// Pieces of every track, by the offset of their begin.
