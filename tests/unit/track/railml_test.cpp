@@ -168,6 +168,26 @@ TEST_F(RailmlTest, PlacesCountOnOverTheSwitchesOfATrack) {
   EXPECT_THAT(map.parse_position("t1:1001").error().message, HasSubstr("which is 1000.0"));
 }
 
+TEST_F(RailmlTest, SwitchesWithoutABranchAreTold) {
+  std::string text = railml2("500");
+  text.insert(text.find("</connections>"),
+              "<switch id=\"w2\" name=\"W2\" pos=\"700\"></switch><switch id=\"w3\" pos=\"1000\"><connection id=\"c9\" "
+              "ref=\"c8\" orientation=\"incoming\"/></switch>");
+  const std::string end = "<trackEnd id=\"e2\" pos=\"300\"/>";
+  text.replace(text.find(end), end.size(),
+               "<trackEnd id=\"e2\" pos=\"300\"><connection id=\"c8\" ref=\"c9\"/></trackEnd>");
+  const std::vector<std::string> problems = core::value_or_throw(build_map({write("a.railml", text)}, {})).map.problems;
+  const std::string no_switch = " connects its track with no other; it is no switch of the map";
+  EXPECT_THAT(problems, testing::IsSupersetOf({"<switch> \"W2\"" + no_switch, "<switch> \"w3\"" + no_switch,
+                                               std::string("connections \"c8\" and \"c9\" meet at a switch at the very "
+                                                           "end of its track, behind which there is none; they are "
+                                                           "left out")}));
+  EXPECT_THAT(problems, testing::Not(testing::Contains("<switch> \"w1\"" + no_switch)));
+  text = railml3("<switchIS id=\"w\" branchCourse=\"left\"><name name=\"W1\"/></switchIS>");
+  EXPECT_THAT(core::value_or_throw(build_map({write("b.railml", text)}, {})).map.problems,
+              testing::Contains("<switchIS> \"W1\" has no branch over a net relation; it is no switch of the map"));
+}
+
 TEST_F(RailmlTest, PlacesBeyondTheirNetElementAreTold) {
   const std::string text = railml3("<balise id=\"b\"><spotLocation netElementRef=\"n1\" pos=\"70000\"/></balise>");
   EXPECT_THAT(core::value_or_throw(build_map({write("a.railml", text)}, {})).map.problems,

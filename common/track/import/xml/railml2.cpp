@@ -69,7 +69,9 @@ class Reader {
       throw source_.wrong(end, "track \"" + railml_name(node) + "\" must be between 0 and 1000 km long");
     read_connection(begin, {.track = index, .at_end = false});
     read_connection(end, {.track = index, .at_end = true});
-    for (const pugi::xml_node& points : topology.child("connections").children()) read_switch(points, index);
+    for (const pugi::xml_node& points : topology.child("connections").children()) {
+      if (points.type() == pugi::node_element) read_switch(points, index);
+    }
     read_plan(node.child("trackElements"), track);
     read_speeds(node.child("trackElements"), track);
     read_marks(node, track);
@@ -86,6 +88,7 @@ class Reader {
   }
 
   void read_switch(const pugi::xml_node& points, size_t track) {
+    switches_.push_back(points);
     const std::string course = points.attribute("trackContinueCourse").value();
     for (const pugi::xml_node& connection : points.children("connection")) {
       const std::string orientation = connection.attribute("orientation").value();
@@ -293,12 +296,23 @@ class Reader {
         }
       }
     }
+    for (const pugi::xml_node& points : switches_) {
+      if (!linked_.contains(points))
+        net_.problems.push_back(railml_called(points) +
+                                " connects its track with no other; it is no switch of the map");
+    }
   }
 
   void add_link(const Connector& a, const Connector& b) {
     const auto from = facing(a);
     const auto to = facing(b);
-    if (!from || !to) return;
+    if (!from || !to) {
+      net_.problems.push_back("connections \"" + b.ref + "\" and \"" + a.ref +
+                              "\" meet at a switch at the very end of its track, behind which there is none; they are "
+                              "left out");
+      return;
+    }
+    for (const Connector* end : {&a, &b}) linked_.insert(end->node.parent());
     const Connector& branch = a.is_branch ? a : b;
     net_.links.push_back({.a = *from,
                           .b = *to,
@@ -326,6 +340,8 @@ class Reader {
   double origin_m_ = 0;
   std::set<std::string> special_profiles_;
   std::map<std::string, Connector> connectors_;
+  std::vector<pugi::xml_node> switches_;  // and crossings
+  std::set<pugi::xml_node> linked_;       // those that trains leave their track on
   std::map<size_t, std::map<double, size_t>> pieces_;
 };
 

@@ -110,6 +110,7 @@ class Reader {
     for (const pugi::xml_node& points : descendants(source_.root(), "switchIS")) {
       const std::string branch_course = points.attribute("branchCourse").value();
       const bool has_turning = points.child("turningBranch");
+      bool has_branch = false;
       for (const pugi::xml_node& branch : points.children()) {
         const std::string relation = branch.attribute("netRelationRef").value();
         const auto link = link_of_.find(relation);
@@ -121,6 +122,7 @@ class Reader {
         }
         NetLink& way = net_.links[link->second];
         way.switch_name = railml_name(points);
+        has_branch = true;
         const std::string kind = branch.name();
         if (has_turning) {
           way.diverging = way.diverging || kind == "turningBranch";
@@ -130,6 +132,9 @@ class Reader {
           way.side = kind == "leftBranch" ? 1 : -1;
         }
       }
+      if (!has_branch)
+        net_.problems.push_back(railml_called(points) +
+                                " has no branch over a net relation; it is no switch of the map");
     }
   }
 
