@@ -1,4 +1,5 @@
 // What railML says of cant and of places over several net elements, and what it says wrongly.
+#include <functional>
 #include <regex>
 
 #include "core/whole_file.hpp"
@@ -6,6 +7,7 @@
 #include "railml_text.hpp"
 #include "track/import/build.hpp"
 #include "track/path.hpp"
+#include "track/projection.hpp"
 
 namespace railfix::track {
 namespace {
@@ -204,6 +206,49 @@ TEST_F(RailmlTest, TheMiddleDoesNotDependOnTheOrderOfTheStretches) {
   const std::string far = "posBegin=\"60\" posEnd=\"100\"";
   EXPECT_EQ(bridge(near, far), bridge(far, near));
   EXPECT_THAT(bridge(far, near), testing::ElementsAre(HasSubstr(" at 70.0 on 1")));
+}
+
+/// 1000 m, points every 100 m as `point` writes them.
+std::string railml3_along(const std::string& system, const std::function<std::string(double)>& point) {
+  std::string coordinates;
+  for (int at = 0; at <= 1000; at += 100) {
+    coordinates += "<intrinsicCoordinate intrinsicCoord=\"" + std::to_string(1e-3 * at) +
+                   "\">\n<geometricCoordinate positioningSystemRef=\"s\" " + point(at) + "/></intrinsicCoordinate>";
+  }
+  return "<railML version=\"3.2\"><common><positioning><geometricPositioningSystems><geometricPositioningSystem "
+         "id=\"s\" "
+         "crsDefinition=\"" +
+         system +
+         "\"/></geometricPositioningSystems></positioning></common><infrastructure><topology><netElements><netElement "
+         "id=\"n\" length=\"1000\"><associatedPositioningSystem>" +
+         coordinates + "</associatedPositioningSystem></netElement></netElements></topology></infrastructure></railML>";
+}
+
+// As those of railML 2 are: in a plane around the first of them. x is the longitude.
+TEST_F(RailmlTest, DegreesOfRailml3ArePutIntoAPlane) {
+  const auto projection = core::value_or_throw(Projection::open("EPSG:25832"));
+  const auto degrees = [&](double at_m) {
+    const GeoPoint geo = projection.to_geo(500000 + 0.6 * at_m, 5300000 + 0.8 * at_m).value();
+    char text[80];
+    std::snprintf(text, sizeof text, "x=\"%.9f\" y=\"%.9f\"", geo.lon_deg, geo.lat_deg);
+    return std::string(text);
+  };
+  for (const char* system : {"EPSG:4326", "urn:ogc:def:crs:EPSG::4258"}) {
+    const Map map = core::value_or_throw(build_map({write("a.railml", railml3_along(system, degrees))}, {})).map;
+    EXPECT_NEAR(map.edges.at(0).alignment.length_m(), 1000.4, 0.05) << "on the ellipsoid, not in UTM";
+    const GeoPoint end = map.to_geo(map.nodes.at(1).easting_m, map.nodes.at(1).northing_m).value();
+    const GeoPoint wanted = projection.to_geo(500600, 5300800).value();
+    EXPECT_NEAR(end.lat_deg, wanted.lat_deg, 1e-7);
+    EXPECT_NEAR(end.lon_deg, wanted.lon_deg, 1e-7);
+  }
+  const auto message = [&](const std::string& text) {
+    return build_map({write("b.railml", text)}, {}).error().message;
+  };
+  EXPECT_THAT(
+      message(railml3_along("EPSG:4326", [](double at) { return "x=\"7\" y=\"" + std::to_string(91 + at) + "\""; })),
+      HasSubstr("line 2: <geometricCoordinate> says latitude 91.000000 and longitude 7.000000; they go from -90 to "
+                "90 and from -180 to 180"));
+  EXPECT_THAT(message(railml3_along("nowhere", degrees)), HasSubstr("is not a coordinate system in metres"));
 }
 
 // By its first element, wherever it stands and however it is written.
