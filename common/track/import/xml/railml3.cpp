@@ -5,6 +5,7 @@
 
 #include "core/units.hpp"
 #include "track/import/xml/railml3_balises.hpp"
+#include "track/import/xml/railml3_slopes.hpp"
 #include "track/import/xml/railml_plane.hpp"
 #include "track/import/xml/railml_readers.hpp"
 
@@ -151,17 +152,8 @@ class Reader {
       }
     }
     read_transitions();
-    for (const pugi::xml_node& curve : descendants(source_.root(), "gradientCurve")) {
-      const auto gradient = source_.number(curve, "gradient");
-      if (!gradient) continue;
-      for (const NetPlace& place : places_.of(curve)) {
-        const double grade = (place.same_direction ? 1e-3 : -1e-3) * *gradient;
-        net_.tracks[place.track].slopes.push_back({place.from_m, grade});
-      }
-    }
+    read_slopes3(source_, places_, net_);
     for (NetTrack& track : net_.tracks) {
-      std::stable_sort(track.slopes.begin(), track.slopes.end(),
-                       [](const NetSlope& a, const NetSlope& b) { return a.offset_m < b.offset_m; });
       std::sort(track.bends.begin(), track.bends.end(),
                 [](const NetBend& a, const NetBend& b) { return a.from_m < b.from_m; });
     }
