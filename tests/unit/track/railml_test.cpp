@@ -208,6 +208,34 @@ TEST_F(RailmlTest, TheMiddleDoesNotDependOnTheOrderOfTheStretches) {
   EXPECT_THAT(bridge(far, near), testing::ElementsAre(HasSubstr(" at 70.0 on 1")));
 }
 
+TEST_F(RailmlTest, ImpossibleValuesAreLeftOutAndTold) {
+  std::string text = railml2("500", "90000");
+  text.insert(
+      text.find("</trackElements>"),
+      "<tunnels><tunnel id=\"tu\" pos=\"700\" length=\"-300\"/></tunnels><bridges><brigde id=\"br\" pos=\"80\" "
+      "length=\"-20\"/></bridges><platformEdges><platformEdge id=\"pe\" pos=\"90\" length=\"-1\"/></platformEdges>"
+      "<speedChanges><speedChange id=\"v1\" pos=\"0\" dir=\"up\" vMax=\"120\"/><speedChange id=\"v2\" pos=\"100\" "
+      "dir=\"up\" vMax=\"12000\"/><speedChange id=\"v3\" pos=\"150\" dir=\"up\" vMax=\"-5\"/></speedChanges>");
+  const Map map = core::value_or_throw(build_map({write("a.railml", text)}, {})).map;
+  EXPECT_THAT(
+      map.problems,
+      testing::IsSupersetOf(
+          {"<radiusChange> \"r1\" of track t1 has superelevation 90000 mm, which no track has; no cant begins there",
+           "<tunnel> \"tu\" of track t1 has length -300 m; it is left out",
+           "<brigde> \"br\" of track t1 has length -20 m; it is left out",
+           "<platformEdge> \"pe\" of track t1 has length -1 m; it is left out",
+           "<speedChange> \"v2\" of track t1 has vMax 12000 km/h, which no train runs; no limit begins there",
+           "<speedChange> \"v3\" of track t1 has vMax -5 km/h, which no train runs; no limit begins there"}));
+  EXPECT_TRUE(map.landmarks.empty());
+  EXPECT_EQ(map.edges[0].alignment.at(400).cant_m, 0);
+  ASSERT_EQ(map.edges[0].speed_limits.size(), 1U);
+  EXPECT_NEAR(map.edges[0].speed_limits[0].to_m, 100, 1e-9) << "what holds behind is not known";
+  text = railml3("<speedSection id=\"v\" maxSpeed=\"12000\"><linearLocation>" + on("n1", "") +
+                 "</linearLocation></speedSection>");
+  EXPECT_THAT(core::value_or_throw(build_map({write("b.railml", text)}, {})).map.problems,
+              testing::Contains("<speedSection> \"v\" has maxSpeed 12000 km/h, which no train runs; it is left out"));
+}
+
 /// 1000 m, points every 100 m as `point` writes them.
 std::string railml3_along(const std::string& system, const std::function<std::string(double)>& point) {
   std::string coordinates;

@@ -11,6 +11,7 @@
 namespace railfix::track {
 namespace {
 
+constexpr double kMostCantMm = 250;
 constexpr int kMostHops = 20;  // switches directly behind one another
 
 /// One <connection>: at a track's end, or at a switch on it.
@@ -117,8 +118,12 @@ class Reader {
       if (radius != 0 && std::abs(radius) < 10)
         throw source_.wrong(change, "a radius of less than 10 m is no railway's");
       changes.push_back({pos(change) - origin_m_, radius == 0 ? 0.0 : -1.0 / radius, {}});
-      if (const auto cant_mm = source_.number(change, "superelevation"))
+      const auto cant_mm = source_.number(change, "superelevation");
+      if (cant_mm && std::abs(*cant_mm) > kMostCantMm) {
+        tell_impossible(change, "superelevation", "mm, which no track has; no cant begins there", track);
+      } else if (cant_mm) {
         changes.back().cant_m = std::copysign(1e-3 * *cant_mm, changes.back().curvature_per_m);
+      }
     }
     const auto by_offset = [](const auto& a, const auto& b) { return a.offset_m < b.offset_m; };
     std::stable_sort(changes.begin(), changes.end(), by_offset);
@@ -151,16 +156,17 @@ class Reader {
   }
 
   /// Every profile for itself: the lowest holds. "end" as speed ends a limit. On its own track only.
-  void read_speeds(const pugi::xml_node& elements, NetTrack& track) const {
+  void read_speeds(const pugi::xml_node& elements, NetTrack& track) {
     std::map<std::pair<std::string, std::string>, std::vector<std::pair<double, double>>>
         changes;  // profile, direction
     for (const pugi::xml_node& change : elements.child("speedChanges").children("speedChange")) {
       const std::string profile = change.attribute("profileRef").value();
       if (special_profiles_.contains(profile)) continue;
       const bool is_end = std::string(change.attribute("vMax").value()) == "end";
-      const double speed_kmh = is_end ? 0 : source_.number(change, "vMax").value_or(0);
-      changes[{profile, change.attribute("dir").value()}].emplace_back(pos(change) - origin_m_,
-                                                                       core::mps_from_kmh(speed_kmh));
+      const double speed_mps = core::mps_from_kmh(is_end ? 0 : source_.number(change, "vMax").value_or(0));
+      if (speed_mps < 0 || speed_mps >= SpeedLimit::kFastestMps)
+        tell_impossible(change, "vMax", "km/h, which no train runs; no limit begins there", track);
+      changes[{profile, change.attribute("dir").value()}].emplace_back(pos(change) - origin_m_, speed_mps);
     }
     for (const auto& [of, list] : changes) {
       if (of.second != "down") add_speeds(list, Direction::forward, track.length_m, track.track);
@@ -178,28 +184,43 @@ class Reader {
       track.track.marks.push_back(
           {kind, std::clamp(offset_m, 0.0, track.length_m), lateral_m, kRailmlSigmaM, railml_name(of)});
     };
-    const auto length = [this](const pugi::xml_node& of) { return source_.number(of, "length").value_or(0); };
+    const auto length = [&](const pugi::xml_node& of) -> std::optional<double> {
+      const double length_m = source_.number(of, "length").value_or(0);
+      if (length_m >= 0) return length_m;
+      tell_impossible(of, "length", "m; it is left out", track);
+      return std::nullopt;
+    };
     for (const pugi::xml_node& of : elements.child("tunnels").children("tunnel")) {
+      const auto length_m = length(of);
+      if (!length_m) continue;
       add(LandmarkKind::portal_in, pos(of) - origin_m_, 0, of);
-      add(LandmarkKind::portal_out, pos(of) - origin_m_ + length(of), 0, of);
+      add(LandmarkKind::portal_out, pos(of) - origin_m_ + *length_m, 0, of);
     }
     // The schema of railML 2 spells the element "brigde"; files by hand may not.
     for (const char* spelling : {"brigde", "bridge"}) {
       for (const pugi::xml_node& of : elements.child("bridges").children(spelling)) {
         // Only what says that it crosses the track leads over it (kind as wiki2.railml.org, IS:brigde, suggests).
         const bool is_over = std::string(of.attribute("kind").value()) == "crossing";
-        add(is_over ? LandmarkKind::bridge : LandmarkKind::underbridge, pos(of) - origin_m_ + 0.5 * length(of), 0, of);
+        const LandmarkKind kind = is_over ? LandmarkKind::bridge : LandmarkKind::underbridge;
+        if (const auto length_m = length(of)) add(kind, pos(of) - origin_m_ + 0.5 * *length_m, 0, of);
       }
     }
     for (const pugi::xml_node& of : elements.child("levelCrossings").children("levelCrossing"))
       add(LandmarkKind::level_crossing, pos(of) - origin_m_, 0, of);
     for (const pugi::xml_node& of : elements.child("platformEdges").children("platformEdge")) {
       const double lateral = platform_lateral_m(of.attribute("side").value());
+      const auto length_m = length(of);
+      if (!length_m) continue;
       add(LandmarkKind::platform, pos(of) - origin_m_, lateral, of);
-      add(LandmarkKind::platform, pos(of) - origin_m_ + length(of), lateral, of);
+      add(LandmarkKind::platform, pos(of) - origin_m_ + *length_m, lateral, of);
     }
     for (const pugi::xml_node& of : node.child("ocsElements").child("signals").children("signal"))
       add(LandmarkKind::mast, pos(of) - origin_m_, 0, of);
+  }
+
+  void tell_impossible(const pugi::xml_node& of, const char* attribute, const std::string& why, const NetTrack& track) {
+    net_.problems.push_back(railml_called(of) + " of track " + track.track.name + " has " + attribute + " " +
+                            of.attribute(attribute).value() + " " + why);
   }
 
   /// Pieces of every track, by the offset of their begin.

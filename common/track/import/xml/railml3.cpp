@@ -246,12 +246,17 @@ class Reader {
     const std::set<std::string> special = special_speed_profiles(source_);
     for (const pugi::xml_node& section : descendants(source_.root(), "speedSection")) {
       const auto speed = source_.number(section, "maxSpeed");
-      if (!speed || *speed <= 0 || core::mps_from_kmh(*speed) >= SpeedLimit::kFastestMps) continue;
+      if (!speed) continue;
       const auto profiles = section.children("validForSpeedProfile");
       const bool is_special = !profiles.empty() && std::all_of(profiles.begin(), profiles.end(), [&](const auto& of) {
         return special.contains(of.attribute("ref").value());
       });
       if (is_special || section.attribute("isTemporary").as_bool()) continue;
+      if (*speed <= 0 || core::mps_from_kmh(*speed) >= SpeedLimit::kFastestMps) {
+        net_.problems.push_back(railml_called(section) + " has maxSpeed " + section.attribute("maxSpeed").value() +
+                                " km/h, which no train runs; it is left out");
+        continue;
+      }
       const pugi::xml_node location = section.child("linearLocation");
       const std::string applies = location.attribute("applicationDirection").value();
       for (const NetPlace& place : places_.of(section)) {
