@@ -179,7 +179,7 @@ TEST_F(RailmlTest, SwitchesWithoutABranchAreTold) {
   text.replace(text.find(end), end.size(),
                "<trackEnd id=\"e2\" pos=\"300\"><connection id=\"c8\" ref=\"c9\"/></trackEnd>");
   const std::vector<std::string> problems = core::value_or_throw(build_map({write("a.railml", text)}, {})).map.problems;
-  const std::string no_switch = " connects its track with no other; it is no switch of the map";
+  const std::string no_switch = " connects its track with no other; it is left out";
   EXPECT_THAT(problems, testing::IsSupersetOf({"<switch> \"W2\"" + no_switch, "<switch> \"w3\"" + no_switch,
                                                std::string("connections \"c8\" and \"c9\" meet at a switch at the very "
                                                            "end of its track, behind which there is none; they are "
@@ -187,7 +187,7 @@ TEST_F(RailmlTest, SwitchesWithoutABranchAreTold) {
   EXPECT_THAT(problems, testing::Not(testing::Contains("<switch> \"w1\"" + no_switch)));
   text = railml3("<switchIS id=\"w\" branchCourse=\"left\"><name name=\"W1\"/></switchIS>");
   EXPECT_THAT(core::value_or_throw(build_map({write("b.railml", text)}, {})).map.problems,
-              testing::Contains("<switchIS> \"W1\" has no branch over a net relation; it is no switch of the map"));
+              testing::Contains("<switchIS> \"W1\" has no branch over a net relation; it is left out"));
 }
 
 TEST_F(RailmlTest, PlacesBeyondTheirNetElementAreTold) {

@@ -10,7 +10,7 @@
 namespace railfix::track {
 namespace {
 
-constexpr double kClimbToldM = 0.01;
+constexpr double kClimbToldM = 0.05;
 constexpr double kStepToldM = 1.0;
 constexpr double kSettledM = 1e-6;
 constexpr int kMostSweeps = 10'000;

@@ -319,8 +319,7 @@ class Reader {
     }
     for (const pugi::xml_node& points : switches_) {
       if (!linked_.contains(points))
-        net_.problems.push_back(railml_called(points) +
-                                " connects its track with no other; it is no switch of the map");
+        net_.problems.push_back(railml_called(points) + " connects its track with no other; it is left out");
     }
   }
 

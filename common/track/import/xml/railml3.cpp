@@ -134,8 +134,7 @@ class Reader {
         }
       }
       if (!has_branch)
-        net_.problems.push_back(railml_called(points) +
-                                " has no branch over a net relation; it is no switch of the map");
+        net_.problems.push_back(railml_called(points) + " has no branch over a net relation; it is left out");
     }
   }
 
