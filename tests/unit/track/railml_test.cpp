@@ -1,30 +1,19 @@
 // What railML says of cant and of places over several net elements, and what it says wrongly.
+#include <functional>
 #include <regex>
 
 #include "core/whole_file.hpp"
 #include "import_fixture.hpp"
+#include "railml_text.hpp"
 #include "track/import/build.hpp"
 #include "track/path.hpp"
+#include "track/projection.hpp"
 
 namespace railfix::track {
 namespace {
 
 using testing::HasSubstr;
 using RailmlTest = ImportTest;
-
-// 1000 m with a left curve from 300 m to 800 m; a branch leaves to the right at the place put in.
-std::string railml2(const std::string& switch_pos, const std::string& cant = "100") {
-  return R"(<railml version="2.4"><infrastructure><tracks>
-<track id="t1"><trackTopology><trackBegin id="b1" pos="0"/><trackEnd id="e1" pos="1000"/><connections>
-<switch id="w1" pos=")" +
-         switch_pos +
-         R"("><connection id="c1" ref="c2" orientation="outgoing" course="right"/></switch></connections></trackTopology>
-<trackElements><radiusChanges><radiusChange id="r1" pos="300" radius="-500" superelevation=")" +
-         cant + R"("/>
-<radiusChange id="r2" pos="800" radius="0"/></radiusChanges></trackElements></track>
-<track id="t2"><trackTopology><trackBegin id="b2" pos="0"><connection id="c2" ref="c1"/></trackBegin><trackEnd id="e2" pos="300"/>
-</trackTopology></track></tracks></infrastructure></railml>)";
-}
 
 TEST_F(RailmlTest, CantHoldsFromOneRadiusChangeToTheNextOverCutsToo) {
   for (const char* switch_pos : {"200", "300", "500", "800", "900"}) {
@@ -60,25 +49,6 @@ TEST_F(RailmlTest, ElementsMayHaveThePrefixOfTheFilesOwnNamespace) {
   const auto bad = build_map({write("a.xml", prefixed(railml2("500", "1,0")))}, {});
   ASSERT_FALSE(bad.ok());
   EXPECT_THAT(bad.error().message, HasSubstr("line 4: <radiusChange>"));
-}
-
-// n1 (1000 m) leads into n2 (800 m) or, over a switch, into n3 (500 m).
-std::string railml3(const std::string& infrastructure) {
-  return R"(<railML version="3.2"><infrastructure><topology><netElements>
-<netElement id="n1" length="1000"/><netElement id="n2" length="800"/><netElement id="n3" length="500"/></netElements><netRelations>
-<netRelation id="r12" navigability="Both" positionOnA="1" positionOnB="0"><elementA ref="n1"/><elementB ref="n2"/></netRelation>
-<netRelation id="r13" navigability="Both" positionOnA="1" positionOnB="0"><elementA ref="n1"/><elementB ref="n3"/></netRelation>
-<netRelation id="r23" navigability="None" positionOnA="0" positionOnB="0"><elementA ref="n2"/><elementB ref="n3"/></netRelation>
-</netRelations></topology><functionalInfrastructure>)" +
-         infrastructure + "</functionalInfrastructure></infrastructure></railML>";
-}
-
-std::string on(const std::string& net_element, const std::string& attributes) {
-  return "<associatedNetElement netElementRef=\"" + net_element + "\" " + attributes + "/>";
-}
-
-std::string crossing(const std::string& attributes, const std::string& places) {
-  return "<overCrossing " + attributes + "><linearLocation>" + places + "</linearLocation></overCrossing>";
 }
 
 TEST_F(RailmlTest, ThingsOverSeveralNetElementsHaveTwoEnds) {
@@ -200,6 +170,26 @@ TEST_F(RailmlTest, PlacesCountOnOverTheSwitchesOfATrack) {
   EXPECT_THAT(map.parse_position("t1:1001").error().message, HasSubstr("which is 1000.0"));
 }
 
+TEST_F(RailmlTest, SwitchesWithoutABranchAreTold) {
+  std::string text = railml2("500");
+  text.insert(text.find("</connections>"),
+              "<switch id=\"w2\" name=\"W2\" pos=\"700\"></switch><switch id=\"w3\" pos=\"1000\"><connection id=\"c9\" "
+              "ref=\"c8\" orientation=\"incoming\"/></switch>");
+  const std::string end = "<trackEnd id=\"e2\" pos=\"300\"/>";
+  text.replace(text.find(end), end.size(),
+               "<trackEnd id=\"e2\" pos=\"300\"><connection id=\"c8\" ref=\"c9\"/></trackEnd>");
+  const std::vector<std::string> problems = core::value_or_throw(build_map({write("a.railml", text)}, {})).map.problems;
+  const std::string no_switch = " connects its track with no other; it is left out";
+  EXPECT_THAT(problems, testing::IsSupersetOf({"<switch> \"W2\"" + no_switch, "<switch> \"w3\"" + no_switch,
+                                               std::string("connections \"c8\" and \"c9\" meet at a switch at the very "
+                                                           "end of its track, behind which there is none; they are "
+                                                           "left out")}));
+  EXPECT_THAT(problems, testing::Not(testing::Contains("<switch> \"w1\"" + no_switch)));
+  text = railml3("<switchIS id=\"w\" branchCourse=\"left\"><name name=\"W1\"/></switchIS>");
+  EXPECT_THAT(core::value_or_throw(build_map({write("b.railml", text)}, {})).map.problems,
+              testing::Contains("<switchIS> \"W1\" has no branch over a net relation; it is left out"));
+}
+
 TEST_F(RailmlTest, PlacesBeyondTheirNetElementAreTold) {
   const std::string text = railml3("<balise id=\"b\"><spotLocation netElementRef=\"n1\" pos=\"70000\"/></balise>");
   EXPECT_THAT(core::value_or_throw(build_map({write("a.railml", text)}, {})).map.problems,
@@ -216,6 +206,77 @@ TEST_F(RailmlTest, TheMiddleDoesNotDependOnTheOrderOfTheStretches) {
   const std::string far = "posBegin=\"60\" posEnd=\"100\"";
   EXPECT_EQ(bridge(near, far), bridge(far, near));
   EXPECT_THAT(bridge(far, near), testing::ElementsAre(HasSubstr(" at 70.0 on 1")));
+}
+
+TEST_F(RailmlTest, ImpossibleValuesAreLeftOutAndTold) {
+  std::string text = railml2("500", "90000");
+  text.insert(
+      text.find("</trackElements>"),
+      "<tunnels><tunnel id=\"tu\" pos=\"700\" length=\"-300\"/></tunnels><bridges><brigde id=\"br\" pos=\"80\" "
+      "length=\"-20\"/></bridges><platformEdges><platformEdge id=\"pe\" pos=\"90\" length=\"-1\"/></platformEdges>"
+      "<speedChanges><speedChange id=\"v1\" pos=\"0\" dir=\"up\" vMax=\"120\"/><speedChange id=\"v2\" pos=\"100\" "
+      "dir=\"up\" vMax=\"12000\"/><speedChange id=\"v3\" pos=\"150\" dir=\"up\" vMax=\"-5\"/></speedChanges>");
+  const Map map = core::value_or_throw(build_map({write("a.railml", text)}, {})).map;
+  EXPECT_THAT(
+      map.problems,
+      testing::IsSupersetOf(
+          {"<radiusChange> \"r1\" of track t1 has superelevation 90000 mm, which no track has; no cant begins there",
+           "<tunnel> \"tu\" of track t1 has length -300 m; it is left out",
+           "<brigde> \"br\" of track t1 has length -20 m; it is left out",
+           "<platformEdge> \"pe\" of track t1 has length -1 m; it is left out",
+           "<speedChange> \"v2\" of track t1 has vMax 12000 km/h, which no train runs; no limit begins there",
+           "<speedChange> \"v3\" of track t1 has vMax -5 km/h, which no train runs; no limit begins there"}));
+  EXPECT_TRUE(map.landmarks.empty());
+  EXPECT_EQ(map.edges[0].alignment.at(400).cant_m, 0);
+  ASSERT_EQ(map.edges[0].speed_limits.size(), 1U);
+  EXPECT_NEAR(map.edges[0].speed_limits[0].to_m, 100, 1e-9) << "what holds behind is not known";
+  text = railml3("<speedSection id=\"v\" maxSpeed=\"12000\"><linearLocation>" + on("n1", "") +
+                 "</linearLocation></speedSection>");
+  EXPECT_THAT(core::value_or_throw(build_map({write("b.railml", text)}, {})).map.problems,
+              testing::Contains("<speedSection> \"v\" has maxSpeed 12000 km/h, which no train runs; it is left out"));
+}
+
+/// 1000 m, points every 100 m as `point` writes them.
+std::string railml3_along(const std::string& system, const std::function<std::string(double)>& point) {
+  std::string coordinates;
+  for (int at = 0; at <= 1000; at += 100) {
+    coordinates += "<intrinsicCoordinate intrinsicCoord=\"" + std::to_string(1e-3 * at) +
+                   "\">\n<geometricCoordinate positioningSystemRef=\"s\" " + point(at) + "/></intrinsicCoordinate>";
+  }
+  return "<railML version=\"3.2\"><common><positioning><geometricPositioningSystems><geometricPositioningSystem "
+         "id=\"s\" "
+         "crsDefinition=\"" +
+         system +
+         "\"/></geometricPositioningSystems></positioning></common><infrastructure><topology><netElements><netElement "
+         "id=\"n\" length=\"1000\"><associatedPositioningSystem>" +
+         coordinates + "</associatedPositioningSystem></netElement></netElements></topology></infrastructure></railML>";
+}
+
+// As those of railML 2 are: in a plane around the first of them. x is the longitude.
+TEST_F(RailmlTest, DegreesOfRailml3ArePutIntoAPlane) {
+  const auto projection = core::value_or_throw(Projection::open("EPSG:25832"));
+  const auto degrees = [&](double at_m) {
+    const GeoPoint geo = projection.to_geo(500000 + 0.6 * at_m, 5300000 + 0.8 * at_m).value();
+    char text[80];
+    std::snprintf(text, sizeof text, "x=\"%.9f\" y=\"%.9f\"", geo.lon_deg, geo.lat_deg);
+    return std::string(text);
+  };
+  for (const char* system : {"EPSG:4326", "urn:ogc:def:crs:EPSG::4258"}) {
+    const Map map = core::value_or_throw(build_map({write("a.railml", railml3_along(system, degrees))}, {})).map;
+    EXPECT_NEAR(map.edges.at(0).alignment.length_m(), 1000.4, 0.05) << "on the ellipsoid, not in UTM";
+    const GeoPoint end = map.to_geo(map.nodes.at(1).easting_m, map.nodes.at(1).northing_m).value();
+    const GeoPoint wanted = projection.to_geo(500600, 5300800).value();
+    EXPECT_NEAR(end.lat_deg, wanted.lat_deg, 1e-7);
+    EXPECT_NEAR(end.lon_deg, wanted.lon_deg, 1e-7);
+  }
+  const auto message = [&](const std::string& text) {
+    return build_map({write("b.railml", text)}, {}).error().message;
+  };
+  EXPECT_THAT(
+      message(railml3_along("EPSG:4326", [](double at) { return "x=\"7\" y=\"" + std::to_string(91 + at) + "\""; })),
+      HasSubstr("line 2: <geometricCoordinate> says latitude 91.000000 and longitude 7.000000; they go from -90 to "
+                "90 and from -180 to 180"));
+  EXPECT_THAT(message(railml3_along("nowhere", degrees)), HasSubstr("is not a coordinate system in metres"));
 }
 
 // By its first element, wherever it stands and however it is written.

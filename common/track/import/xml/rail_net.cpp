@@ -10,6 +10,7 @@
 #include "core/units.hpp"
 #include "track/import/fit/biarc.hpp"
 #include "track/import/made/made_lines.hpp"
+#include "track/import/xml/net_heights.hpp"
 
 namespace railfix::track {
 namespace {
@@ -194,61 +195,20 @@ class Planner {
     return out;
   }
 
-  /// Profiles out of grades; heights run on over the links from one track to the next, 0 where they begin.
   void add_heights() {
-    const bool known = std::any_of(net_.tracks.begin(), net_.tracks.end(),
-                                   [](const NetTrack& track) { return !track.slopes.empty(); });
-    std::map<size_t, double> height_at;  // of nodes
-    std::vector<bool> done(net_.tracks.size(), false);
-    for (size_t first = 0; first < net_.tracks.size(); ++first) {
-      std::deque<size_t> waiting{first};
-      while (!waiting.empty()) {
-        const size_t index = waiting.front();
-        waiting.pop_front();
-        if (done[index]) continue;
-        done[index] = true;
-        finish_track(index, known, height_at);
-        for (const bool at_end : {false, true}) {
-          for (const Neighbour& next : links_at_[{index, at_end}]) waiting.push_back(next.other.track);
-        }
-      }
-    }
+    std::vector<std::pair<size_t, size_t>> nodes;
+    for (size_t i = 0; i < net_.tracks.size(); ++i) nodes.emplace_back(root(key({i, false})), root(key({i, true})));
+    std::vector<std::vector<GradePoint>> profiles = net_profiles(net_, nodes);
+    for (size_t i = 0; i < net_.tracks.size(); ++i) finish_track(net_.tracks[i], std::move(profiles[i]));
   }
 
-  void finish_track(size_t index, bool has_heights, std::map<size_t, double>& height_at) {
-    NetTrack& track = net_.tracks[index];
+  void finish_track(NetTrack& track, std::vector<GradePoint> profile) {
     const Alignment& plan = track.track.alignment;
     const double scale = plan.length_m() / track.length_m;
     if (std::abs(plan.length_m() - track.length_m) > std::max(kLengthToldM, kLengthToldPart * track.length_m)) {
       net_.problems.push_back("track " + track.track.name + " is " + std::to_string(plan.length_m()) +
                               " m long by its coordinates but " + std::to_string(track.length_m) +
                               " m by the source; places on it are spread evenly");
-    }
-    std::vector<GradePoint> profile;
-    if (has_heights) {
-      profile.push_back({0, 0, 0});
-      double grade = 0;
-      for (const NetSlope& slope : track.slopes) {
-        const double offset = std::clamp(slope.offset_m, 0.0, track.length_m) * scale;
-        GradePoint& last = profile.back();
-        const double height = last.elevation_m + grade * (offset - last.offset_m);
-        if (offset > last.offset_m) profile.push_back({offset, height, 0});
-        grade = slope.grade;
-      }
-      const GradePoint last = profile.back();
-      if (plan.length_m() > last.offset_m)
-        profile.push_back({plan.length_m(), last.elevation_m + grade * (plan.length_m() - last.offset_m), 0});
-      const size_t begin = root(key({index, false}));
-      const size_t end = root(key({index, true}));
-      double lift = 0;
-      if (height_at.contains(begin)) {
-        lift = height_at[begin];
-      } else if (height_at.contains(end)) {
-        lift = height_at[end] - profile.back().elevation_m;
-      }
-      for (GradePoint& point : profile) point.elevation_m += lift;
-      height_at.try_emplace(begin, profile.front().elevation_m);
-      height_at.try_emplace(end, profile.back().elevation_m);
     }
     for (CantPoint& point : track.cant) point.offset_m *= scale;
     track.track.alignment = Alignment(plan.elements(), plan.starts(), std::move(profile), std::move(track.cant));

@@ -21,6 +21,7 @@ struct NetBend {
 struct NetSlope {
   double offset_m = 0;
   double grade = 0;
+  double curve_length_m = 0;  // parabola centred at the place, 0 = sharp
 };
 
 struct NetTrack {

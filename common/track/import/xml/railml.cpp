@@ -1,5 +1,6 @@
 #include "track/import/xml/railml.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 
@@ -14,6 +15,18 @@ std::string railml_name(const pugi::xml_node& node) {
   }
   const std::string named = node.child("name").attribute("name").value();
   return named.empty() ? std::string(node.attribute("id").value()) : named;
+}
+
+std::string railml_called(const pugi::xml_node& node) {
+  return "<" + std::string(node.name()) + "> \"" + railml_name(node) + "\"";
+}
+
+bool is_on_track(double offset_m, double length_m) {
+  return offset_m >= -kAtEndM && offset_m <= length_m + kAtEndM;
+}
+
+std::string not_on_its_track(const pugi::xml_node& node) {
+  return railml_called(node) + " is not on its track; it is left out";
 }
 
 double platform_lateral_m(const std::string& side) {
@@ -57,6 +70,14 @@ std::string balise_group_of(const pugi::xml_node& balise) {
   return balise.child("belongsToBaliseGroup").attribute("ref").value();
 }
 
+std::optional<bool> nominal_by_order(const std::vector<TrackMark>& balises) {
+  const auto other = std::find_if(balises.begin(), balises.end(), [&](const TrackMark& balise) {
+    return std::abs(balise.offset_m - balises.front().offset_m) > kAtEndM;
+  });
+  if (other == balises.end()) return std::nullopt;
+  return other->offset_m > balises.front().offset_m;
+}
+
 namespace {
 
 /// An id names one element of a file; references to one that is there twice lead to either.
@@ -75,8 +96,7 @@ void tell_repeated_ids(const XmlSource& source, std::vector<std::string>& proble
     }
     static std::string called(const pugi::xml_node& node) {
       const std::string at = node.attribute("pos").value();
-      return "<" + std::string(node.name()) + "> \"" + railml_name(node) + "\"" +
-             (at.empty() ? "" : " at " + at + " m");
+      return railml_called(node) + (at.empty() ? "" : " at " + at + " m");
     }
   } ids;
   ids.problems = &problems;

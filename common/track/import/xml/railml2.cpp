@@ -4,13 +4,14 @@
 #include <set>
 
 #include "core/units.hpp"
+#include "track/import/xml/railml2_balises.hpp"
 #include "track/import/xml/railml2_coordinates.hpp"
 #include "track/import/xml/railml_readers.hpp"
 
 namespace railfix::track {
 namespace {
 
-constexpr double kAtEndM = 0.01;
+constexpr double kMostCantMm = 250;
 constexpr int kMostHops = 20;  // switches directly behind one another
 
 /// One <connection>: at a track's end, or at a switch on it.
@@ -70,11 +71,13 @@ class Reader {
       throw source_.wrong(end, "track \"" + railml_name(node) + "\" must be between 0 and 1000 km long");
     read_connection(begin, {.track = index, .at_end = false});
     read_connection(end, {.track = index, .at_end = true});
-    for (const pugi::xml_node& points : topology.child("connections").children()) read_switch(points, index);
+    for (const pugi::xml_node& points : topology.child("connections").children()) {
+      if (points.type() == pugi::node_element) read_switch(points, index);
+    }
     read_plan(node.child("trackElements"), track);
     read_speeds(node.child("trackElements"), track);
     read_marks(node, track);
-    read_balises(node.child("ocsElements").child("balises"), track);
+    read_balises2(source_, node.child("ocsElements").child("balises"), origin_m_, track, net_.problems);
     points_.push_back(coordinates_.points_of(node, origin_m_));
   }
 
@@ -87,6 +90,7 @@ class Reader {
   }
 
   void read_switch(const pugi::xml_node& points, size_t track) {
+    switches_.push_back(points);
     const std::string course = points.attribute("trackContinueCourse").value();
     for (const pugi::xml_node& connection : points.children("connection")) {
       const std::string orientation = connection.attribute("orientation").value();
@@ -99,7 +103,7 @@ class Reader {
       connector.outgoing = orientation == "outgoing";
       connector.offset_m = pos(points) - origin_m_;
       const double length = net_.tracks[track].length_m;
-      if (connector.offset_m < -kAtEndM || connector.offset_m > length + kAtEndM)
+      if (!is_on_track(connector.offset_m, length))
         throw source_.wrong(points, "switch \"" + railml_name(points) + "\" is not on its track");
       connector.offset_m = std::clamp(connector.offset_m, 0.0, length);
       const std::string way = connection.attribute("course").value();
@@ -117,8 +121,12 @@ class Reader {
       if (radius != 0 && std::abs(radius) < 10)
         throw source_.wrong(change, "a radius of less than 10 m is no railway's");
       changes.push_back({pos(change) - origin_m_, radius == 0 ? 0.0 : -1.0 / radius, {}});
-      if (const auto cant_mm = source_.number(change, "superelevation"))
+      const auto cant_mm = source_.number(change, "superelevation");
+      if (cant_mm && std::abs(*cant_mm) > kMostCantMm) {
+        tell_impossible(change, "superelevation", "mm, which no track has; no cant begins there", track);
+      } else if (cant_mm) {
         changes.back().cant_m = std::copysign(1e-3 * *cant_mm, changes.back().curvature_per_m);
+      }
     }
     const auto by_offset = [](const auto& a, const auto& b) { return a.offset_m < b.offset_m; };
     std::stable_sort(changes.begin(), changes.end(), by_offset);
@@ -151,16 +159,17 @@ class Reader {
   }
 
   /// Every profile for itself: the lowest holds. "end" as speed ends a limit. On its own track only.
-  void read_speeds(const pugi::xml_node& elements, NetTrack& track) const {
+  void read_speeds(const pugi::xml_node& elements, NetTrack& track) {
     std::map<std::pair<std::string, std::string>, std::vector<std::pair<double, double>>>
         changes;  // profile, direction
     for (const pugi::xml_node& change : elements.child("speedChanges").children("speedChange")) {
       const std::string profile = change.attribute("profileRef").value();
       if (special_profiles_.contains(profile)) continue;
       const bool is_end = std::string(change.attribute("vMax").value()) == "end";
-      const double speed_kmh = is_end ? 0 : source_.number(change, "vMax").value_or(0);
-      changes[{profile, change.attribute("dir").value()}].emplace_back(pos(change) - origin_m_,
-                                                                       core::mps_from_kmh(speed_kmh));
+      const double speed_mps = core::mps_from_kmh(is_end ? 0 : source_.number(change, "vMax").value_or(0));
+      if (speed_mps < 0 || speed_mps >= SpeedLimit::kFastestMps)
+        tell_impossible(change, "vMax", "km/h, which no train runs; no limit begins there", track);
+      changes[{profile, change.attribute("dir").value()}].emplace_back(pos(change) - origin_m_, speed_mps);
     }
     for (const auto& [of, list] : changes) {
       if (of.second != "down") add_speeds(list, Direction::forward, track.length_m, track.track);
@@ -171,75 +180,50 @@ class Reader {
   void read_marks(const pugi::xml_node& node, NetTrack& track) {
     const pugi::xml_node elements = node.child("trackElements");
     const auto add = [&](LandmarkKind kind, double offset_m, double lateral_m, const pugi::xml_node& of) {
-      if (offset_m < -kAtEndM || offset_m > track.length_m + kAtEndM) {
-        net_.problems.push_back("<" + std::string(of.name()) + "> \"" + railml_name(of) +
-                                "\" is not on its track; it is left out");
+      if (!is_on_track(offset_m, track.length_m)) {
+        net_.problems.push_back(not_on_its_track(of));
         return;
       }
       track.track.marks.push_back(
           {kind, std::clamp(offset_m, 0.0, track.length_m), lateral_m, kRailmlSigmaM, railml_name(of)});
     };
-    const auto length = [this](const pugi::xml_node& of) { return source_.number(of, "length").value_or(0); };
+    const auto length = [&](const pugi::xml_node& of) -> std::optional<double> {
+      const double length_m = source_.number(of, "length").value_or(0);
+      if (length_m >= 0) return length_m;
+      tell_impossible(of, "length", "m; it is left out", track);
+      return std::nullopt;
+    };
     for (const pugi::xml_node& of : elements.child("tunnels").children("tunnel")) {
+      const auto length_m = length(of);
+      if (!length_m) continue;
       add(LandmarkKind::portal_in, pos(of) - origin_m_, 0, of);
-      add(LandmarkKind::portal_out, pos(of) - origin_m_ + length(of), 0, of);
+      add(LandmarkKind::portal_out, pos(of) - origin_m_ + *length_m, 0, of);
     }
     // The schema of railML 2 spells the element "brigde"; files by hand may not.
     for (const char* spelling : {"brigde", "bridge"}) {
       for (const pugi::xml_node& of : elements.child("bridges").children(spelling)) {
         // Only what says that it crosses the track leads over it (kind as wiki2.railml.org, IS:brigde, suggests).
         const bool is_over = std::string(of.attribute("kind").value()) == "crossing";
-        add(is_over ? LandmarkKind::bridge : LandmarkKind::underbridge, pos(of) - origin_m_ + 0.5 * length(of), 0, of);
+        const LandmarkKind kind = is_over ? LandmarkKind::bridge : LandmarkKind::underbridge;
+        if (const auto length_m = length(of)) add(kind, pos(of) - origin_m_ + 0.5 * *length_m, 0, of);
       }
     }
     for (const pugi::xml_node& of : elements.child("levelCrossings").children("levelCrossing"))
       add(LandmarkKind::level_crossing, pos(of) - origin_m_, 0, of);
     for (const pugi::xml_node& of : elements.child("platformEdges").children("platformEdge")) {
       const double lateral = platform_lateral_m(of.attribute("side").value());
+      const auto length_m = length(of);
+      if (!length_m) continue;
       add(LandmarkKind::platform, pos(of) - origin_m_, lateral, of);
-      add(LandmarkKind::platform, pos(of) - origin_m_ + length(of), lateral, of);
+      add(LandmarkKind::platform, pos(of) - origin_m_ + *length_m, lateral, of);
     }
     for (const pugi::xml_node& of : node.child("ocsElements").child("signals").children("signal"))
       add(LandmarkKind::mast, pos(of) - origin_m_, 0, of);
   }
 
-  void read_balises(const pugi::xml_node& balises, NetTrack& track) {
-    std::map<std::string, TrackMark> by_id;
-    for (const pugi::xml_node& balise : balises.children("balise")) {
-      const double at = std::clamp(pos(balise) - origin_m_, 0.0, track.length_m);
-      const TrackMark mark{LandmarkKind::balise, at, 0, kRailmlSigmaM, railml_name(balise)};
-      // A second one of that id is told for the whole file; it belongs to no group.
-      if (!by_id.emplace(balise.attribute("id").value(), mark).second) track.track.marks.push_back(mark);
-    }
-    for (const pugi::xml_node& node : balises.children("baliseGroup")) {
-      const std::optional<EtcsIdentity> identity = etcs_identity(source_, node);
-      TrackGroup group;
-      std::vector<std::pair<double, std::string>> order;
-      for (const pugi::xml_node& ref : node.children("baliseRef"))
-        order.emplace_back(source_.number(ref, "sequence").value_or(0), ref.attribute("ref").value());
-      std::stable_sort(order.begin(), order.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-      for (const auto& [sequence, id] : order) {
-        const auto balise = by_id.find(id);
-        if (balise == by_id.end()) continue;
-        group.balises.push_back(balise->second);
-        by_id.erase(balise);
-      }
-      if (group.balises.empty()) {
-        net_.problems.push_back("balise group \"" + railml_name(node) + "\" has no balises on its track");
-      } else if (!identity) {
-        net_.problems.push_back("balise group \"" + railml_name(node) +
-                                "\" has no ETCS identity (countryID and groupID); its balises are kept as landmarks");
-        track.track.marks.insert(track.track.marks.end(), group.balises.begin(), group.balises.end());
-      } else {
-        group.nid_c = identity->nid_c;
-        group.nid_bg = identity->nid_bg;
-        group.offset_m = group.balises.front().offset_m;
-        group.nominal_is_forward = group.balises.size() < 2 || group.balises[1].offset_m >= group.offset_m;
-        group.q_locacc_m = kRailmlSigmaM;
-        track.track.groups.push_back(std::move(group));
-      }
-    }
-    for (auto& [id, mark] : by_id) track.track.marks.push_back(std::move(mark));  // in no group
+  void tell_impossible(const pugi::xml_node& of, const char* attribute, const std::string& why, const NetTrack& track) {
+    net_.problems.push_back(railml_called(of) + " of track " + track.track.name + " has " + attribute + " " +
+                            of.attribute(attribute).value() + " " + why);
   }
 
   /// Pieces of every track, by the offset of their begin.
@@ -336,12 +320,22 @@ class Reader {
         }
       }
     }
+    for (const pugi::xml_node& points : switches_) {
+      if (!linked_.contains(points))
+        net_.problems.push_back(railml_called(points) + " connects its track with no other; it is left out");
+    }
   }
 
   void add_link(const Connector& a, const Connector& b) {
     const auto from = facing(a);
     const auto to = facing(b);
-    if (!from || !to) return;
+    if (!from || !to) {
+      net_.problems.push_back("connections \"" + b.ref + "\" and \"" + a.ref +
+                              "\" meet at a switch at the very end of its track, behind which there is none; they are "
+                              "left out");
+      return;
+    }
+    for (const Connector* end : {&a, &b}) linked_.insert(end->node.parent());
     const Connector& branch = a.is_branch ? a : b;
     net_.links.push_back({.a = *from,
                           .b = *to,
@@ -368,6 +362,8 @@ class Reader {
   double origin_m_ = 0;
   std::set<std::string> special_profiles_;
   std::map<std::string, Connector> connectors_;
+  std::vector<pugi::xml_node> switches_;  // and crossings
+  std::set<pugi::xml_node> linked_;       // those that trains leave their track on
   std::map<size_t, std::map<double, size_t>> pieces_;
 };
 

@@ -4,25 +4,12 @@
 #include <cmath>
 #include <set>
 
-#include "track/import/local_crs.hpp"
-
 namespace railfix::track {
 namespace {
 
 constexpr double kSamePlaceM = 0.05;
 constexpr double kNearEndM = 1.0;
 constexpr double kLengthShare = 0.02;  // points far apart cut curves short
-
-/// Digits at the end of "4326", "EPSG:4326", "urn:ogc:def:crs:EPSG::4326", ".../EPSG/0/4326"; empty when there are
-/// none.
-std::string epsg_number(const std::string& text) {
-  const auto last = text.find_last_not_of("0123456789");
-  return last == std::string::npos ? text : text.substr(last + 1);
-}
-
-bool is_geographic(const std::string& code) {
-  return code == "4326" || code == "4258";
-}
 
 /// Cubic through the four points around an offset, fewer where there are fewer.
 Eigen::Vector2d interpolated(const std::vector<Railml2Coordinates::Point>& points, double offset_m) {
@@ -43,7 +30,7 @@ Eigen::Vector2d interpolated(const std::vector<Railml2Coordinates::Point>& point
 
 }  // namespace
 
-Railml2Coordinates::Railml2Coordinates(const XmlSource& source) : source_(source) {
+Railml2Coordinates::Railml2Coordinates(const XmlSource& source) : source_(source), plane_(source) {
   for (const pugi::xml_node& code : descendants(source.root(), "epsgCode")) {
     const std::string number = epsg_number(code.attribute("default").value());
     if (default_code_.empty()) default_code_ = number;
@@ -51,36 +38,11 @@ Railml2Coordinates::Railml2Coordinates(const XmlSource& source) : source_(source
   if (default_code_.empty()) default_code_ = "4326";
 }
 
-void Railml2Coordinates::choose_plane(const pugi::xml_node& coordinate, const std::string& code,
-                                      const std::vector<double>& values) {
-  code_ = code;
-  if (is_geographic(code)) {
-    crs_ = local_crs({values[0], values[1]});
-    projection_ = core::value_or_throw(Projection::open(crs_));
-    return;
-  }
-  crs_ = "EPSG:" + code;
-  const auto opened = Projection::open(crs_);
-  if (!opened.ok()) throw source_.wrong(coordinate, opened.error().message);
-}
-
 Eigen::Vector2d Railml2Coordinates::in_plane(const pugi::xml_node& coordinate) {
-  std::string code = epsg_number(coordinate.attribute("epsgCode").value());
-  if (code.empty()) code = default_code_;
+  const std::string code = epsg_number(coordinate.attribute("epsgCode").value());
   const std::vector<double> values = numbers_of(coordinate.attribute("coord").value());
   if (values.size() < 2) throw source_.wrong(coordinate, "<geoCoord> needs two numbers or three in \"coord\"");
-  if (is_geographic(code) && !(std::abs(values[0]) <= 90 && std::abs(values[1]) <= 180))
-    throw source_.wrong(coordinate,
-                        "<geoCoord> must be latitude (-90 to 90) and longitude (-180 to 180), in this order");
-  if (crs_.empty()) choose_plane(coordinate, code, values);
-  if (code != code_) {
-    throw source_.wrong(coordinate,
-                        "coordinates in both EPSG:" + code_ + " and EPSG:" + code + "; only one system can be read");
-  }
-  if (!projection_) return {values[0], values[1]};
-  const auto at = projection_->from_geo({values[0], values[1]});
-  if (!at) throw source_.wrong(coordinate, "<geoCoord> lies too far from the first one of the file");
-  return *at;
+  return plane_.at(coordinate, "EPSG:" + (code.empty() ? default_code_ : code), values[0], values[1]);
 }
 
 std::vector<Railml2Coordinates::Point> Railml2Coordinates::points_of(const pugi::xml_node& track, double origin_m) {

@@ -5,13 +5,11 @@
 #include <vector>
 
 #include "track/import/xml/rail_net.hpp"
-#include "track/import/xml/xml_source.hpp"
-#include "track/projection.hpp"
+#include "track/import/xml/railml_plane.hpp"
 
 namespace railfix::track {
 
-/// Geographic coordinates (EPSG:4326, the default, and EPSG:4258: latitude before longitude) are put into a plane that
-/// is true to scale around the first of them; projected ones (easting before northing) stay as they are.
+/// Latitude before longitude (EPSG:4326, the default, and EPSG:4258), easting before northing in all other systems.
 class Railml2Coordinates {
  public:
   struct Point {
@@ -23,17 +21,14 @@ class Railml2Coordinates {
   /// Of one <track>, by offset from its begin at mileage `origin_m`. Throws core::BadInput where a file mixes systems.
   std::vector<Point> points_of(const pugi::xml_node& track, double origin_m);
   /// Of the plane; empty without coordinates.
-  [[nodiscard]] const std::string& crs() const { return crs_; }
+  [[nodiscard]] const std::string& crs() const { return plane_.crs(); }
 
  private:
   [[nodiscard]] Eigen::Vector2d in_plane(const pugi::xml_node& coordinate);
-  void choose_plane(const pugi::xml_node& coordinate, const std::string& code, const std::vector<double>& values);
 
   const XmlSource& source_;
   std::string default_code_;
-  std::string code_;  // of the first coordinate
-  std::string crs_;
-  std::optional<Projection> projection_;  // of geographic ones
+  RailmlPlane plane_;
 };
 
 /// The points as the shape of a stretch of the track, its ends between points interpolated. Empty where the points do

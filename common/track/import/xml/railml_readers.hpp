@@ -17,6 +17,14 @@ constexpr double kRailmlSigmaM = 1.0;
 /// Name of an element for a human: its name, else its code, else its id.
 std::string railml_name(const pugi::xml_node& node);
 
+/// "<element> "name"", for the sentence that says what is wrong with it.
+std::string railml_called(const pugi::xml_node& node);
+
+/// Whether a place lies on a track of railML 2, to a centimetre, and the sentence for one that does not.
+bool is_on_track(double offset_m, double length_m);
+std::string not_on_its_track(const pugi::xml_node& node);
+constexpr double kAtEndM = 0.01;
+
 /// Of a platform edge on the "left" or "right", else 0: the file does not say on which side.
 double platform_lateral_m(const std::string& side);
 
@@ -29,5 +37,9 @@ std::optional<EtcsIdentity> etcs_identity(const XmlSource& source, const pugi::x
 
 /// The id of the group that a balise of railML 3 says it belongs to; empty when it says none.
 std::string balise_group_of(const pugi::xml_node& balise);
+
+/// Whether the nominal direction runs where offsets grow, by the order of the group's balises; nothing where all lie at
+/// one place.
+std::optional<bool> nominal_by_order(const std::vector<TrackMark>& balises);
 
 }  // namespace railfix::track

@@ -1,0 +1,170 @@
+#include "track/import/xml/railml3_balises.hpp"
+
+#include <algorithm>
+
+#include "track/import/xml/railml_readers.hpp"
+
+namespace railfix::track {
+namespace {
+
+constexpr double kLastReference = 1;  // numbers in a group count from 0 as in ETCS, or from 1
+
+struct PlacedBalise {
+  NetPlace place;
+  pugi::xml_node node;
+  std::optional<double> number;  // in its group
+
+  [[nodiscard]] TrackMark mark() const {
+    return {LandmarkKind::balise, place.from_m, 0, kRailmlSigmaM, railml_name(node)};
+  }
+};
+
+class Reader {
+ public:
+  Reader(const XmlSource& source, Railml3Places& places, RailNet& net) : source_(source), places_(places), net_(net) {}
+
+  void read() {
+    const std::vector<pugi::xml_node> groups = descendants(source_.root(), "baliseGroup");
+    for (const pugi::xml_node& group : groups) of_group_[group.attribute("id").value()];
+    for (const pugi::xml_node& balise : descendants(source_.root(), "balise")) read_balise(balise);
+    for (const pugi::xml_node& group : groups) read_group(group);
+  }
+
+ private:
+  void read_balise(const pugi::xml_node& balise) {
+    const std::vector<NetPlace> places = places_.of(balise);
+    if (places.empty()) return;
+    const std::string group = balise_group_of(balise);
+    const auto known = of_group_.find(group);
+    if (group.empty() || known == of_group_.end()) {
+      if (!group.empty()) places_.tell_missing(balise, "balise group", group, "it is kept as a landmark");
+      keep_as_landmark({places.front(), balise, {}});
+      return;
+    }
+    std::optional<double> number = source_.number(balise, "positionInGroup");
+    for (const pugi::xml_node& child : balise.children()) {
+      if (!number) number = source_.number(child, "positionInGroup");
+    }
+    known->second.push_back({places.front(), balise, number});
+  }
+
+  void read_group(const pugi::xml_node& node) {
+    const auto identity = etcs_identity(source_, node);
+    std::vector<PlacedBalise>& balises = of_group_[node.attribute("id").value()];
+    const std::vector<NetPlace> own = places_.of(node);
+    if (balises.empty() && !own.empty()) balises.push_back({own.front(), node, {}});
+    if (balises.empty()) {
+      tell(node, "has no place on a track, nor has a balise of it; it is left out");
+      return;
+    }
+    if (!identity) {
+      tell(node, "has no ETCS identity (countryID and groupID); its balises are kept as landmarks");
+      for (const PlacedBalise& balise : balises) keep_as_landmark(balise);
+      return;
+    }
+    std::stable_sort(balises.begin(), balises.end(), [](const PlacedBalise& a, const PlacedBalise& b) {
+      return a.number && (!b.number || *a.number < *b.number);
+    });
+    if (balises.front().number.value_or(0) > kLastReference) {
+      tell(node, "has no balise number 0 or 1, which its place counts from; its balises are kept as landmarks");
+      for (const PlacedBalise& balise : balises) keep_as_landmark(balise);
+      return;
+    }
+    const std::optional<bool> said = said_direction(node, balises);
+    if (said) sort_by_place(balises, *said);
+    add_group(node, *identity, balises, said);
+  }
+
+  /// Balises without numbers lie in the nominal direction, one after the other.
+  static void sort_by_place(std::vector<PlacedBalise>& balises, bool forward) {
+    const size_t track = balises.front().place.track;
+    if (std::any_of(balises.begin(), balises.end(),
+                    [&](const PlacedBalise& balise) { return balise.number || balise.place.track != track; }))
+      return;
+    std::stable_sort(balises.begin(), balises.end(), [&](const PlacedBalise& a, const PlacedBalise& b) {
+      return forward ? a.place.from_m < b.place.from_m : a.place.from_m > b.place.from_m;
+    });
+  }
+
+  /// A group lies on one track, that of its reference balise.
+  void add_group(const pugi::xml_node& of, const EtcsIdentity& identity, const std::vector<PlacedBalise>& balises,
+                 const std::optional<bool>& said) {
+    const NetPlace& first = balises.front().place;
+    ImportedTrack& track = net_.tracks[first.track].track;
+    TrackGroup group{identity.nid_c, identity.nid_bg, first.from_m, true, kRailmlSigmaM, {}};
+    for (const PlacedBalise& balise : balises) {
+      if (balise.place.track == first.track) {
+        group.balises.push_back(balise.mark());
+      } else {
+        keep_as_landmark(balise);
+      }
+    }
+    if (group.balises.size() < balises.size())
+      tell(of, "lies on two net elements; only its balises on \"" + track.name +
+                   "\" are kept in it, the others as landmarks");
+    group.nominal_is_forward = nominal_is_forward(of, group, balises, said);
+    track.groups.push_back(std::move(group));
+  }
+
+  /// By the file's word, else by the order of the balises, else by the direction that they apply to.
+  bool nominal_is_forward(const pugi::xml_node& of, const TrackGroup& group, const std::vector<PlacedBalise>& balises,
+                          const std::optional<bool>& said) {
+    const std::optional<bool> ordered = nominal_by_order(group.balises);
+    if (said) {
+      if (ordered && *ordered != *said)
+        tell(of, "has a mileageDirection against the numbers of its balises; the mileageDirection is taken");
+      return *said;
+    }
+    if (ordered) return *ordered;
+    if (const std::optional<bool> applied = applied_direction(of, balises)) return *applied;
+    tell(of,
+         "says no direction: it has no mileageDirection, nor balises at two places; its nominal direction is taken "
+         "as that of \"" +
+             net_.tracks[balises.front().place.track].track.name + "\"");
+    return true;
+  }
+
+  /// By mileageDirection, turned where the mileage falls along the track or the place is told against it.
+  std::optional<bool> said_direction(const pugi::xml_node& of, const std::vector<PlacedBalise>& balises) {
+    const std::string direction = of.attribute("mileageDirection").value();
+    if (direction != "nominal" && direction != "reverse") return std::nullopt;
+    const size_t track = balises.front().place.track;
+    bool turned = places_.mileage_falls(track);
+    for (const pugi::xml_node& part : descendants(of, "associatedNetElement")) {
+      const bool is_against = std::string(part.attribute("keepsOrientation").value()) == "false";
+      if (places_.track(part.attribute("netElementRef").value()) == track && is_against) turned = true;
+    }
+    return (direction == "nominal") != turned;
+  }
+
+  static std::optional<bool> applied_direction(const pugi::xml_node& of, const std::vector<PlacedBalise>& balises) {
+    for (const pugi::xml_node& node : {of, balises.front().node}) {
+      for (const pugi::xml_node& spot : descendants(node, "spotLocation")) {
+        const std::string applies = spot.attribute("applicationDirection").value();
+        if (applies == "normal" || applies == "reverse") return applies == "normal";
+      }
+    }
+    return std::nullopt;
+  }
+
+  void keep_as_landmark(const PlacedBalise& balise) {
+    net_.tracks[balise.place.track].track.marks.push_back(balise.mark());
+  }
+
+  void tell(const pugi::xml_node& group, const std::string& what) {
+    net_.problems.push_back("balise group \"" + railml_name(group) + "\" " + what);
+  }
+
+  const XmlSource& source_;
+  Railml3Places& places_;
+  RailNet& net_;
+  std::map<std::string, std::vector<PlacedBalise>> of_group_;
+};
+
+}  // namespace
+
+void read_balises3(const XmlSource& source, Railml3Places& places, RailNet& net) {
+  Reader(source, places, net).read();
+}
+
+}  // namespace railfix::track
