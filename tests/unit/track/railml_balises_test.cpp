@@ -81,8 +81,8 @@ TEST_F(RailmlBalises, WhatIsWrongWithAGroupOfRailml3IsTold) {
   };
   EXPECT_EQ(read(balise("b", "100") + group3(),
                  "balise group \"g\" says no direction: it has no mileageDirection, nor balises at two places; its "
-                 "nominal direction is taken as that of \"n1\""),
-            "b at 100.0, nominal forward");
+                 "balises are kept as landmarks"),
+            "0 groups");
   EXPECT_EQ(
       read(balise("b0", "100", "0") + balise("b1", "103", "1") + group3("mileageDirection=\"reverse\""),
            "balise group \"g\" has a mileageDirection against the numbers of its balises; the mileageDirection is "
@@ -126,12 +126,12 @@ TEST_F(RailmlBalises, BalisesOfRailml2ThatAreNotThereAreTold) {
   const std::string text =
       with_balises("<balise id=\"a\" pos=\"100\"/><balise id=\"b\" pos=\"97\"/>" + group2("a", "nope"));
   const Map map = core::value_or_throw(build_map({write("a.railml", text)}, {})).map;
-  EXPECT_EQ(group_of(map), "a at 100.0, nominal forward");
+  EXPECT_EQ(group_of(map), "0 groups");
   EXPECT_THAT(map.problems, testing::IsSupersetOf({"balise group \"g\" names the balise \"nope\", which is not on its "
                                                    "track or in another group; it goes without",
                                                    "balise group \"g\" says no direction: it has no balises at two "
-                                                   "places, nor one with \"dir\" up or down; its nominal direction is "
-                                                   "taken as that of track t1"}));
+                                                   "places, nor one with \"dir\" up or down; its balises are kept as "
+                                                   "landmarks"}));
 }
 
 TEST_F(RailmlBalises, GroupsOfRailml2HaveTheDirectionOfTheirBalises) {

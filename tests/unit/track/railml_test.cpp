@@ -194,7 +194,7 @@ TEST_F(RailmlTest, PlacesBeyondTheirNetElementAreTold) {
   const std::string text = railml3("<balise id=\"b\"><spotLocation netElementRef=\"n1\" pos=\"70000\"/></balise>");
   EXPECT_THAT(core::value_or_throw(build_map({write("a.railml", text)}, {})).map.problems,
               testing::Contains(testing::AllOf(testing::StartsWith("<balise> \"b\" lies at 70000"),
-                                               testing::EndsWith("it is put to its end"))));
+                                               testing::EndsWith("it is left out there"))));
 }
 
 TEST_F(RailmlTest, TheMiddleDoesNotDependOnTheOrderOfTheStretches) {

@@ -86,9 +86,9 @@ class Reader {
       group.nominal_is_forward = direction == "up";
     } else {
       tell(node,
-           "says no direction: it has no balises at two places, nor one with \"dir\" up or down; its nominal "
-           "direction is taken as that of track " +
-               track_.track.name);
+           "says no direction: it has no balises at two places, nor one with \"dir\" up or down; its balises are kept "
+           "as landmarks");
+      return keep_as_landmarks(balises);
     }
     track_.track.groups.push_back(std::move(group));
   }

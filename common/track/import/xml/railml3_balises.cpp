@@ -91,37 +91,37 @@ class Reader {
                  const std::optional<bool>& said) {
     const NetPlace& first = balises.front().place;
     ImportedTrack& track = net_.tracks[first.track].track;
-    TrackGroup group{identity.nid_c, identity.nid_bg, first.from_m, true, kRailmlSigmaM, {}};
+    std::vector<TrackMark> here;
     for (const PlacedBalise& balise : balises) {
-      if (balise.place.track == first.track) {
-        group.balises.push_back(balise.mark());
-      } else {
-        keep_as_landmark(balise);
-      }
+      if (balise.place.track == first.track) here.push_back(balise.mark());
     }
-    if (group.balises.size() < balises.size())
+    const std::optional<bool> forward = nominal_is_forward(of, here, balises, said);
+    if (!forward) {
+      tell(of,
+           "says no direction: it has no mileageDirection, nor balises at two places; its balises are kept as "
+           "landmarks");
+      for (const PlacedBalise& balise : balises) keep_as_landmark(balise);
+      return;
+    }
+    for (const PlacedBalise& balise : balises) {
+      if (balise.place.track != first.track) keep_as_landmark(balise);
+    }
+    if (here.size() < balises.size())
       tell(of, "lies on two net elements; only its balises on \"" + track.name +
                    "\" are kept in it, the others as landmarks");
-    group.nominal_is_forward = nominal_is_forward(of, group, balises, said);
-    track.groups.push_back(std::move(group));
+    track.groups.push_back({identity.nid_c, identity.nid_bg, first.from_m, *forward, kRailmlSigmaM, std::move(here)});
   }
 
   /// By the file's word, else by the order of the balises, else by the direction that they apply to.
-  bool nominal_is_forward(const pugi::xml_node& of, const TrackGroup& group, const std::vector<PlacedBalise>& balises,
-                          const std::optional<bool>& said) {
-    const std::optional<bool> ordered = nominal_by_order(group.balises);
+  std::optional<bool> nominal_is_forward(const pugi::xml_node& of, const std::vector<TrackMark>& here,
+                                         const std::vector<PlacedBalise>& balises, const std::optional<bool>& said) {
+    const std::optional<bool> ordered = nominal_by_order(here);
     if (said) {
       if (ordered && *ordered != *said)
         tell(of, "has a mileageDirection against the numbers of its balises; the mileageDirection is taken");
       return *said;
     }
-    if (ordered) return *ordered;
-    if (const std::optional<bool> applied = applied_direction(of, balises)) return *applied;
-    tell(of,
-         "says no direction: it has no mileageDirection, nor balises at two places; its nominal direction is taken "
-         "as that of \"" +
-             net_.tracks[balises.front().place.track].track.name + "\"");
-    return true;
+    return ordered ? ordered : applied_direction(of, balises);
   }
 
   /// By mileageDirection, turned where the mileage falls along the track or the place is told against it.

@@ -51,11 +51,19 @@ void Railml3Places::tell_missing(const pugi::xml_node& of, const std::string& ki
                           therefore);
 }
 
+bool Railml3Places::is_beyond(const pugi::xml_node& of, double from_m, double to_m, double length_m) {
+  const bool beyond = to_m < -kNetTouchM || from_m > length_m + kNetTouchM;
+  if (beyond) tell_beyond(of, from_m, length_m, "it is left out there");
+  return beyond;
+}
+
+void Railml3Places::tell_beyond(const pugi::xml_node& of, double at_m, double length_m, const std::string& therefore) {
+  net_.problems.push_back(railml_called(of) + " lies at " + std::to_string(at_m) + " m of a net element of " +
+                          std::to_string(length_m) + " m; " + therefore);
+}
+
 double Railml3Places::within(const pugi::xml_node& of, double at_m, double length_m) {
-  if (at_m < -kNetTouchM || at_m > length_m + kNetTouchM) {
-    net_.problems.push_back(railml_called(of) + " lies at " + std::to_string(at_m) + " m of a net element of " +
-                            std::to_string(length_m) + " m; it is put to its end");
-  }
+  if (at_m < -kNetTouchM || at_m > length_m + kNetTouchM) tell_beyond(of, at_m, length_m, "it is put to its end");
   return std::clamp(at_m, 0.0, length_m);
 }
 
@@ -71,9 +79,10 @@ std::vector<NetPlace> Railml3Places::of(const pugi::xml_node& node) {
     };
     const double from = along_m("posBegin", "intrinsicCoordBegin", 0);
     const double to = along_m("posEnd", "intrinsicCoordEnd", 1);
+    const auto [first, last] = std::minmax(from, to);
+    if (is_beyond(node, first, last, length)) continue;
     const bool turned = std::string(part.attribute("keepsOrientation").value()) == "false";
-    out.push_back({*track, within(node, std::min(from, to), length), within(node, std::max(from, to), length),
-                   from <= to && !turned});
+    out.push_back({*track, within(node, first, length), within(node, last, length), from <= to && !turned});
   }
   if (!out.empty()) return out;
   for (const pugi::xml_node& spot : descendants(node, "spotLocation")) {
@@ -81,7 +90,9 @@ std::vector<NetPlace> Railml3Places::of(const pugi::xml_node& node) {
     if (!track) continue;
     const double length = net_.tracks[*track].length_m;
     const auto along = source_.number(spot, "intrinsicCoord");
-    const double at = within(node, source_.number(spot, "pos").value_or(along.value_or(0) * length), length);
+    const double told_m = source_.number(spot, "pos").value_or(along.value_or(0) * length);
+    if (is_beyond(node, told_m, told_m, length)) continue;
+    const double at = std::clamp(told_m, 0.0, length);
     out.push_back({*track, at, at, std::string(spot.attribute("applicationDirection").value()) != "reverse"});
   }
   return out;

@@ -30,6 +30,9 @@ class Railml3Places {
 
  private:
   [[nodiscard]] std::optional<size_t> find_track(const pugi::xml_node& of, const pugi::xml_node& location);
+  /// Altogether, and told.
+  [[nodiscard]] bool is_beyond(const pugi::xml_node& of, double from_m, double to_m, double length_m);
+  void tell_beyond(const pugi::xml_node& of, double at_m, double length_m, const std::string& therefore);
   [[nodiscard]] double within(const pugi::xml_node& of, double at_m, double length_m);
 
   const XmlSource& source_;
