@@ -27,10 +27,9 @@ bool plausible(const GeoPoint& place) {
 }
 
 /// Beginning of a value, for a message; in ASCII, so that no letter is cut in two.
-std::string text_of(const json& value) {
-  constexpr size_t kMost = 60;
+std::string text_of(const json& value, size_t most = 60) {
   const std::string text = value.dump(-1, ' ', true);
-  return text.size() > kMost ? text.substr(0, kMost) + "..." : text;
+  return text.size() > most ? text.substr(0, most) + "..." : text;
 }
 
 const json& member(const json& object, const char* key) {
@@ -141,6 +140,14 @@ void read_overpass(const json& elements, bool with_trams, OsmData& out) {
       if (ways != nullptr) ways->push_back({id, nodes_of(element, out), std::move(tags)});
     }
   });
+}
+
+/// Overpass sends what it has when its time or memory is over, and says so in a remark.
+void tell_remark(const json& document, OsmData& out) {
+  const auto remark = document.find("remark");
+  if (remark == document.end()) return;
+  out.problems.push_back("the extract may not be whole, Overpass remarks " + text_of(*remark, 200) +
+                         ": ask for it again, with a longer [timeout:...] or for a smaller area");
 }
 
 GeoPoint place_in(const json& coordinates) {
@@ -285,6 +292,7 @@ core::Result<OsmData> read_osm_json(const std::filesystem::path& file, bool with
     const json& document = parsed.value();
     OsmData out;
     if (document.is_object() && document.contains("elements")) {
+      tell_remark(document, out);
       read_overpass(document.at("elements"), with_trams, out);
     } else if (document.is_object() && document.contains("features")) {
       FeatureReader(with_trams, out).read(document.at("features"));

@@ -85,6 +85,15 @@ OsmData read_passes(const std::string& file, bool with_trams) {
   return out;
 }
 
+/// What the library says, and what it means for the file.
+std::string told(const std::filesystem::path& file, const std::string& library) {
+  constexpr std::array kCutShort{"EOF", "end of", "no data", "read failed", "no element found", "unclosed token"};
+  const auto says = [&](const char* text) { return library.find(text) != std::string::npos; };
+  std::error_code failed;
+  if (std::filesystem::file_size(file, failed) == 0) return "the file is empty (" + library + ")";
+  return std::ranges::any_of(kCutShort, says) ? "the file is empty or cut short (" + library + ")" : library;
+}
+
 }  // namespace
 
 bool is_track(const OsmTags& tags, bool with_trams) {
@@ -146,7 +155,7 @@ core::Result<OsmData> read_osm(const std::filesystem::path& file, bool with_tram
   try {
     return read_passes(file.string(), with_trams);
   } catch (const std::exception& reason) {
-    return core::Error{"cannot read " + file.string() + " as OpenStreetMap data: " + reason.what()};
+    return core::Error{"cannot read " + file.string() + " as OpenStreetMap data: " + told(file, reason.what())};
   }
 }
 
