@@ -99,6 +99,14 @@ TEST_F(BuildTest, WhatOverpassRemarksIsTold) {
     EXPECT_LT(told.size(), 400U);
 }
 
+TEST_F(BuildTest, WhatOverpassRemarksInXmlIsTold) {
+  const auto file =
+      write("a.osm", R"(<osm version="0.6"><node id="1" lat="48.0" lon="15.0"/><node id="2" lat="48.0" lon="15.01"/>
+<way id="1"><nd ref="1"/><nd ref="2"/><tag k="railway" v="rail"/></way><remark> runtime error: Query timed out. </remark></osm>)");
+  EXPECT_THAT(core::value_or_throw(build_map({file}, {})).map.problems,
+              testing::Contains(HasSubstr("Overpass remarks \" runtime error: Query timed out. \"")));
+}
+
 TEST_F(BuildTest, OverpassSaysWhichElementIsWrong) {
   const auto with = [&](const std::string& element) { return write("a.json", R"({"elements":[)" + element + "]}"); };
   EXPECT_THAT(message({with(R"({"type":"node","id":"1","lat":48,"lon":15})")}),

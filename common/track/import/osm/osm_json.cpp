@@ -12,6 +12,8 @@ namespace {
 
 using nlohmann::json;
 
+constexpr size_t kMostOfRemark = 200;
+
 OsmTags tags_in(const json& object, const char* key) {
   OsmTags tags;
   const auto found = object.find(key);
@@ -140,14 +142,6 @@ void read_overpass(const json& elements, bool with_trams, OsmData& out) {
       if (ways != nullptr) ways->push_back({id, nodes_of(element, out), std::move(tags)});
     }
   });
-}
-
-/// Overpass sends what it has when its time or memory is over, and says so in a remark.
-void tell_remark(const json& document, OsmData& out) {
-  const auto remark = document.find("remark");
-  if (remark == document.end()) return;
-  out.problems.push_back("the extract may not be whole, Overpass remarks " + text_of(*remark, 200) +
-                         ": ask for it again, with a longer [timeout:...] or for a smaller area");
 }
 
 GeoPoint place_in(const json& coordinates) {
@@ -292,7 +286,8 @@ core::Result<OsmData> read_osm_json(const std::filesystem::path& file, bool with
     const json& document = parsed.value();
     OsmData out;
     if (document.is_object() && document.contains("elements")) {
-      tell_remark(document, out);
+      if (document.contains("remark"))
+        out.problems.push_back(problem_of_remark(text_of(document.at("remark"), kMostOfRemark)));
       read_overpass(document.at("elements"), with_trams, out);
     } else if (document.is_object() && document.contains("features")) {
       FeatureReader(with_trams, out).read(document.at("features"));

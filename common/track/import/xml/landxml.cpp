@@ -237,8 +237,8 @@ class Reader {
     for (size_t i = 1; i < points.size(); ++i) {
       const double used = 0.5 * (points[i - 1].curve_length_m + points[i].curve_length_m);
       if (used > points[i].offset_m - points[i - 1].offset_m + 0.01) {
-        problem(track + ": the vertical curves at " + std::to_string(points[i - 1].offset_m) + " m and " +
-                std::to_string(points[i].offset_m) + " m overlap");
+        problem(track + ": the vertical curves at " + told_m(points[i - 1].offset_m) + " and " +
+                told_m(points[i].offset_m) + " overlap");
       }
     }
     tell_outside(plan, stations, track, "profile");
