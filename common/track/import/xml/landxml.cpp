@@ -166,9 +166,9 @@ class Reader {
                  [&](double station) { return station < begin - kToldOutsideM || station > end + kToldOutsideM; });
     if (outside.empty()) return;
     problem(track + ": " + std::to_string(outside.size()) + " of " + std::to_string(stations.size()) + " " + what +
-            " stations lie outside the alignment, which reaches from " + std::to_string(begin) + " to " +
-            std::to_string(end) + ": " + std::to_string(outside.front()) +
-            (outside.size() > 1 ? " to " + std::to_string(outside.back()) : ""));
+            " stations lie outside the alignment, which reaches from " + told_number(begin, 3) + " to " +
+            told_number(end, 3) + ": " + told_number(outside.front(), 3) +
+            (outside.size() > 1 ? " to " + told_number(outside.back(), 3) : ""));
   }
 
   static bool is_profile_point(const pugi::xml_node& node) {
