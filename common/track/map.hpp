@@ -58,6 +58,7 @@ struct Edge {
   std::string line;
   Alignment alignment;
   std::vector<SpeedLimit> speed_limits{};
+  bool is_drawn = false;  // laid out as a drawing: length and links are the source's, coordinates are not
   /// The lowest limit there for a train running this way (REQUIRES: not unknown); nothing when the source says none.
   [[nodiscard]] std::optional<double> speed_limit_mps(double offset_m, Direction running) const;
 };

@@ -81,7 +81,8 @@ core::Result<Edge> edge_from(const map::Edge& in) {
            .to_node = in.to_node(),
            .line = in.line(),
            .alignment = {},
-           .speed_limits = std::move(limits)};
+           .speed_limits = std::move(limits),
+           .is_drawn = in.is_drawn()};
   out.alignment = Alignment(std::move(elements), std::move(starts), std::move(profile), std::move(cant));
   return out;
 }
@@ -230,6 +231,7 @@ void write_edge(const Edge& edge, map::Edge& out) {
   out.set_to_node(edge.to_node);
   out.set_line(as_utf8(edge.line));
   out.set_length_m(edge.alignment.length_m());
+  out.set_is_drawn(edge.is_drawn);
   for (size_t i = 0; i < edge.alignment.elements().size(); ++i) {
     const Element& element = edge.alignment.elements()[i];
     const PlanPose& start = edge.alignment.starts()[i];

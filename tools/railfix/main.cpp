@@ -30,6 +30,14 @@ std::string missing_command(const CLI::App& app) {
          railfix::core::did_you_mean(wanted, names);
 }
 
+/// The same where help is asked for something that is no command, and would be given for the one above it.
+std::string unknown_command(const CLI::App& app) {
+  const CLI::App* at = &app;
+  while (!at->get_subcommands().empty()) at = at->get_subcommands().front();
+  const auto typed = at->remaining();
+  return typed.empty() || typed.front().starts_with('-') ? "" : missing_command(app);
+}
+
 /// `railfix help tpr decode` is `railfix tpr decode --help`; a command that is not there is told as such.
 std::vector<std::string> words_of(const CLI::App& app, int argc, char** argv) {
   std::vector<std::string> words(argv + 1, argv + argc);
@@ -67,6 +75,11 @@ int main(int argc, char** argv) {
     const auto missing = missing_command(app);
     if (missing.empty()) return app.exit(error) == 0 ? 0 : kBadInput;
     std::cerr << missing << '\n';
+    return kBadInput;
+  } catch (const CLI::CallForHelp& help) {
+    const auto unknown = unknown_command(app);
+    if (unknown.empty()) return app.exit(help);
+    std::cerr << unknown << '\n';
     return kBadInput;
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kBadInput;

@@ -1,33 +1,26 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <map>
 #include <set>
 
 #include "core/units.hpp"
 #include "track/import/finish.hpp"
+#include "track/import/meeting.hpp"
+#include "track/import/told.hpp"
 
 namespace railfix::track {
 namespace {
 
 constexpr double kGapM = 0.05;
-constexpr double kKinkRad = 0.05;
 constexpr double kNearMissM = 1.5;
 constexpr double kSharpestPerM = 1.0 / 80.0;
 constexpr double kSteepest = 0.075;
+constexpr double kMostCantM = 0.3;
 constexpr double kStepM = 0.05;  // in height, from one profile point to the next
 constexpr double kSamePlaceM = 0.5;
-
-std::string metres(double value) {
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.2f m", value);
-  return text.data();
-}
-
-std::string called(const Edge& edge) {
-  return "edge " + std::to_string(edge.id) + " (" + edge.name + ")";
-}
+// A drawing of straights and right lengths does not close to the last metre, nor where curves are not known.
+constexpr double kDrawnGapM = 1.0;
+constexpr double kDrawnGapPart = 0.01;
 
 std::string identity(const BaliseGroup& group) {
   return std::to_string(group.nid_c) + "/" + std::to_string(group.nid_bg);
@@ -55,34 +48,39 @@ class Check {
     for (const Edge& edge : map_.edges) {
       check_shape(edge);
       check_grades(edge);
+      check_cant(edge);
       check_end(edge, edge.from_node, edge.alignment.at(0).pose);
       check_end(edge, edge.to_node, edge.alignment.at(edge.alignment.length_m()).pose);
     }
     for (const Node& node : map_.nodes) check_node(node);
+    take(facing_ends(map_));
+    take(kinks_at_nodes(map_));
     check_balises();
     check_parts();
     return std::move(problems_);
   }
 
  private:
+  void take(const std::vector<std::string>& found) { problems_.insert(problems_.end(), found.begin(), found.end()); }
+
   /// Within one edge: elements that do not meet, kinks, radii that no train runs.
   void check_shape(const Edge& edge) {
     const Alignment& track = edge.alignment;
     for (size_t i = 0; i < track.elements().size(); ++i) {
       const Element& element = track.elements()[i];
-      const std::string where = called(edge) + " at " + metres(track.element_offsets()[i]);
+      const std::string where = called(edge) + " at " + told_m(track.element_offsets()[i]);
       const double sharpest = std::max(std::abs(element.curvature_start_per_m), std::abs(element.curvature_end_per_m));
       if (sharpest > kSharpestPerM && !told_sharp_.contains(edge.id)) {
-        problems_.push_back(where + " has a radius of only " + metres(1.0 / sharpest));
+        problems_.push_back(where + " has a radius of only " + told_m(1.0 / sharpest));
         told_sharp_.insert(edge.id);
       }
       if (i == 0) continue;
       const PlanPose before = advance(track.starts()[i - 1], track.elements()[i - 1], track.elements()[i - 1].length_m);
       const PlanPose& start = track.starts()[i];
       const double gap = std::hypot(before.easting_m - start.easting_m, before.northing_m - start.northing_m);
-      if (gap > kGapM) problems_.push_back(where + " has a gap of " + metres(gap));
-      if (std::abs(core::wrap_pi(before.heading_rad - start.heading_rad)) > kKinkRad)
-        problems_.push_back(where + " has a kink");
+      if (gap > kGapM) problems_.push_back(where + " has a gap of " + told_m(gap));
+      const double kink = std::abs(core::wrap_pi(before.heading_rad - start.heading_rad));
+      if (kink > kKinkRad) problems_.push_back(where + " has a kink of " + told_deg(kink));
     }
   }
 
@@ -92,13 +90,28 @@ class Check {
       problems_.push_back(called(edge) + " ends at node " + std::to_string(node_id) + ", which does not exist");
       return;
     }
-    if (distance(pose, *node->second) > kGapM) {
-      problems_.push_back(called(edge) + " ends " + metres(distance(pose, *node->second)) + " from its node " +
-                          std::to_string(node_id));
+    const double gap = gap_m(edge, pose, *node->second);
+    if (edge.is_drawn && gap > kDrawnGapM + kDrawnGapPart * edge.alignment.length_m()) {
+      problems_.push_back(called(edge) + " is drawn to end " + told_m(gap) + " from its node " +
+                          std::to_string(node_id) + ": do the lengths of the tracks there agree?");
+    } else if (!edge.is_drawn && gap > kGapM) {
+      problems_.push_back(called(edge) + " ends " + told_m(gap) + " from its node " + std::to_string(node_id));
     }
     if (ends_[node_id].size() > 1 && !connected_.contains({node_id, edge.id})) {
       problems_.push_back(called(edge) + " is not connected to any other at node " + std::to_string(node_id));
     }
+  }
+
+  /// Between an end and its node. Where tracks of a drawing and others meet, only the others say where that is.
+  double gap_m(const Edge& edge, const PlanPose& pose, const Node& node) {
+    const std::vector<const Edge*>& meeting = ends_[node.id];
+    const auto drawn = [](const Edge* one) { return one->is_drawn; };
+    const auto surveyed = std::ranges::find_if_not(meeting, drawn);
+    if (surveyed == meeting.end() || std::ranges::none_of(meeting, drawn)) return distance(pose, node);
+    if (edge.is_drawn) return 0;
+    const Alignment& track = (*surveyed)->alignment;
+    const PlanPose at = track.at((*surveyed)->from_node == node.id ? 0.0 : track.length_m()).pose;
+    return std::hypot(pose.easting_m - at.easting_m, pose.northing_m - at.northing_m);
   }
 
   void check_node(const Node& node) {
@@ -114,26 +127,40 @@ class Check {
 
   /// A loose end beside another track is more likely a mistake than a buffer stop.
   void check_near_miss(const Node& node, const Edge& own) {
+    if (own.is_drawn) return;
     for (const Edge& other : map_.edges) {
-      if (other.id == own.id || other.from_node == node.id || other.to_node == node.id) continue;
+      if (other.is_drawn || other.id == own.id || other.from_node == node.id || other.to_node == node.id) continue;
       const PlanPose& start = other.alignment.starts().front();
       if (distance(start, node) > other.alignment.length_m() + kNearMissM) continue;
       const Alignment::Nearest nearest = other.alignment.nearest(node.easting_m, node.northing_m);
       if (std::abs(nearest.lateral_m) > kNearMissM) continue;
       problems_.push_back(called(own) + " ends loose at node " + std::to_string(node.id) + ", only " +
-                          metres(std::abs(nearest.lateral_m)) + " from " + called(other));
+                          told_m(std::abs(nearest.lateral_m)) + " from " + called(other));
     }
   }
 
-  /// Grades that no adhesion railway has.
+  /// Grades that no adhesion railway has. Points beyond the ends are of the edges next to it.
   void check_grades(const Edge& edge) {
     const std::vector<GradePoint>& profile = edge.alignment.profile();
     for (size_t i = 1; i < profile.size(); ++i) {
+      if (profile[i].offset_m <= 0 || profile[i - 1].offset_m >= edge.alignment.length_m()) continue;
       const double run = profile[i].offset_m - profile[i - 1].offset_m;
       const double rise = profile[i].elevation_m - profile[i - 1].elevation_m;
       if (std::abs(rise) <= kSteepest * run || std::abs(rise) < kStepM) continue;
-      problems_.push_back(called(edge) + " at " + metres(std::max(0.0, profile[i - 1].offset_m)) + " climbs " +
-                          metres(rise) + " over " + metres(run));
+      problems_.push_back(called(edge) + " at " + told_m(std::max(0.0, profile[i - 1].offset_m)) + " climbs " +
+                          told_m(rise) + " over " + told_m(run));
+      return;
+    }
+  }
+
+  /// Millimetres taken for metres, for example.
+  void check_cant(const Edge& edge) {
+    for (const CantPoint& point : edge.alignment.cant()) {
+      const double offset_m = std::clamp(point.offset_m, 0.0, edge.alignment.length_m());
+      const double cant_m = edge.alignment.at(offset_m).cant_m;
+      if (std::abs(cant_m) <= kMostCantM) continue;
+      problems_.push_back(called(edge) + " at " + told_m(offset_m) + " has a cant of " + told_m(cant_m) +
+                          ", more than any track has");
       return;
     }
   }
@@ -169,7 +196,7 @@ class Check {
       if (own == largest) continue;
       problems_.push_back(called(*own->second.first) +
                           (own->second.edges > 1 ? " and " + std::to_string(own->second.edges - 1) + " more" : "") +
-                          ", " + metres(own->second.length_m) + ", cannot be reached from the rest of the network");
+                          ", " + told_m(own->second.length_m) + ", cannot be reached from the rest of the network");
     }
   }
 
@@ -185,11 +212,18 @@ class Check {
     std::vector<const BaliseGroup*> groups;
     for (const BaliseGroup& group : map_.balise_groups) groups.push_back(&group);
     tell_same_places("balise groups", groups, [](const BaliseGroup& group) { return identity(group); });
-    std::set<uint32_t> seen;
+    std::map<uint32_t, const BaliseGroup*> seen;
     for (const BaliseGroup& group : map_.balise_groups) {
-      if (seen.insert(group.nid_lrbg()).second) continue;
-      problems_.push_back("balise group " + identity(group) + " is there twice");
+      const auto [first, is_new] = seen.emplace(group.nid_lrbg(), &group);
+      if (is_new) continue;
+      problems_.push_back("balise group " + identity(group) + " is there twice, " + place_of(*first->second) + " and " +
+                          place_of(group) + ": one of them has a wrong identity");
     }
+  }
+
+  [[nodiscard]] std::string place_of(const BaliseGroup& group) const {
+    const Edge* edge = map_.edge(group.edge);
+    return (edge != nullptr ? called(*edge) : "edge " + std::to_string(group.edge)) + " at " + told_m(group.offset_m);
   }
 
   template <class Thing, class Called>
@@ -200,7 +234,7 @@ class Check {
       const Thing& one = *things[i];
       if (one.edge != before.edge || one.offset_m - before.offset_m > kSamePlaceM) continue;
       problems_.push_back(what + " " + called(before) + " and " + called(one) + " are at the same place, edge " +
-                          std::to_string(one.edge) + " at " + metres(one.offset_m));
+                          std::to_string(one.edge) + " at " + told_m(one.offset_m));
     }
   }
 

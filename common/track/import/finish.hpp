@@ -24,8 +24,8 @@ core::Status add_virtual_balises(Map& map, double every_m, uint32_t nid_c, uint3
 core::Status keep_landmarks(Map& map, const std::vector<std::string>& kinds);
 
 /// What is wrong with the map, one sentence each, naming the element: gaps and kinks within edges and between connected
-/// ones, impossible radii and grades, switches that lead nowhere, track ends that just miss another, parts that are not
-/// connected, balise groups with one identity or at one place.
+/// ones, impossible radii, grades and cant, switches that lead nowhere, track ends that just miss another or face it
+/// over a gap, parts that are not connected, balise groups with one identity or at one place.
 std::vector<std::string> check_topology(const Map& map);
 
 }  // namespace railfix::track

@@ -76,5 +76,12 @@ TEST(Help, IsAWordToo) {
   EXPECT_THAT(unknown.err, HasSubstr("there is no command 'maps'"));
 }
 
+TEST(Help, OfACommandThatIsNotThereIsNoneOfTheOneAboveIt) {
+  const auto ran = test::run_program({"railfix", "map", "check", "--help"}, kPatienceS);
+  EXPECT_EQ(ran.exit_code, 2);
+  EXPECT_EQ(ran.out, "");
+  EXPECT_THAT(ran.err, HasSubstr("railfix map: there is no command 'check'; there are: build, info"));
+}
+
 }  // namespace
 }  // namespace railfix

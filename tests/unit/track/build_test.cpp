@@ -65,6 +65,48 @@ TEST_F(BuildTest, CoordinatesThatAreNoDegreesAreTold) {
               testing::Contains(HasSubstr("way/7: the coordinates [1e+300,48.0] are not degrees; left out")));
 }
 
+TEST_F(BuildTest, LinesOfOnePointAreToldAsSuch) {
+  EXPECT_THAT(
+      message({write(
+          "one.geojson",
+          R"({"features":[{"properties":{"railway":"rail"},"geometry":{"type":"LineString","coordinates":[[15.6,48.2]]}}]})")}),
+      HasSubstr("no railway track has two points (the first track has 1 on the earth)"));
+  EXPECT_THAT(message({write("huge.geojson", track_of("[15.0,48.0],[1e300,48.0]"))}),
+              HasSubstr("no railway track has two points (way 7 has 1 on the earth)"));
+}
+
+TEST_F(BuildTest, FilesCutShortAreToldAsSuch) {
+  EXPECT_THAT(message({write("a.pbf", "")}), HasSubstr("the file is empty ("));
+  EXPECT_THAT(message({write("a.osm.bz2", "")}), HasSubstr("the file is empty ("));
+  EXPECT_THAT(message({write("a.osm.bz2", "BZh91AY")}), HasSubstr("the file is empty or cut short (bzip2 error"));
+  EXPECT_THAT(message({write("a.pbf", std::string("\0\0\0\x0d\n\x09OSM", 9))}),
+              HasSubstr("the file is empty or cut short (PBF error"));
+  EXPECT_THAT(message({write("a.osm", "<osm version=\"0.6\"><node id=\"1\" lat=\"48\" lon=\"15\"/>")}),
+              HasSubstr("the file is empty or cut short (XML"));
+}
+
+TEST_F(BuildTest, WhatOverpassRemarksIsTold) {
+  const std::string track =
+      R"("elements":[{"type":"way","id":7,"tags":{"railway":"rail"},"geometry":[{"lat":48,"lon":15},{"lat":48,"lon":15.01}]}]})";
+  const auto problems = [&](const std::string& remark) {
+    return core::value_or_throw(build_map({write("a.json", "{" + remark + track)}, {})).map.problems;
+  };
+  EXPECT_THAT(problems(""), testing::IsEmpty());
+  EXPECT_THAT(problems(R"("remark":"runtime error: Query timed out after 25 seconds.",)"),
+              testing::Contains(HasSubstr("the extract may not be whole, Overpass remarks \"runtime error: Query timed "
+                                          "out after 25 seconds.\"")));
+  for (const std::string& told : problems(R"("remark":")" + std::string(5000, 'x') + R"(",)"))
+    EXPECT_LT(told.size(), 400U);
+}
+
+TEST_F(BuildTest, WhatOverpassRemarksInXmlIsTold) {
+  const auto file =
+      write("a.osm", R"(<osm version="0.6"><node id="1" lat="48.0" lon="15.0"/><node id="2" lat="48.0" lon="15.01"/>
+<way id="1"><nd ref="1"/><nd ref="2"/><tag k="railway" v="rail"/></way><remark> runtime error: Query timed out. </remark></osm>)");
+  EXPECT_THAT(core::value_or_throw(build_map({file}, {})).map.problems,
+              testing::Contains(HasSubstr("Overpass remarks \" runtime error: Query timed out. \"")));
+}
+
 TEST_F(BuildTest, OverpassSaysWhichElementIsWrong) {
   const auto with = [&](const std::string& element) { return write("a.json", R"({"elements":[)" + element + "]}"); };
   EXPECT_THAT(message({with(R"({"type":"node","id":"1","lat":48,"lon":15})")}),

@@ -166,7 +166,11 @@ TEST(Check, FindsNothingInASoundMap) {
 TEST(Check, NamesWhatIsWrong) {
   Map map = small_map();
   map.balise_groups.push_back(map.balise_groups[0]);
-  EXPECT_THAT(check_topology(map), testing::Contains(HasSubstr("balise group 85/100 is there twice")));
+  map.balise_groups.back().edge = 3;
+  map.balise_groups.back().offset_m = 70;
+  EXPECT_THAT(check_topology(map),
+              testing::Contains(HasSubstr(
+                  "balise group 85/100 is there twice, edge 1 (main) at 900.00 m and edge 3 (siding) at 70.00 m")));
   map = small_map();
   map.connections.pop_back();
   EXPECT_THAT(check_topology(map), testing::Contains(HasSubstr("edge 3 (siding) is not connected")));
@@ -179,10 +183,14 @@ TEST(Check, NamesWhatIsWrong) {
       Alignment({{500, 0, 0}, {500, 0, 0}},
                 {{2680000, 1250000, core::kPi / 2}, {2680500, 1250000.2, core::kPi / 2 + 0.1}}, {}, {});
   EXPECT_THAT(check_topology(map), testing::Contains(HasSubstr("a gap of 0.20 m")));
-  EXPECT_THAT(check_topology(map), testing::Contains(HasSubstr("has a kink")));
+  EXPECT_THAT(check_topology(map), testing::Contains(HasSubstr("has a kink of 5.7 degrees")));
   map = small_map();
   map.edges[2].from_node = 77;
   EXPECT_THAT(check_topology(map), testing::Contains(HasSubstr("node 77, which does not exist")));
+  map = small_map();
+  const auto& main = map.edges[0].alignment;
+  map.edges[0].alignment = Alignment(main.elements(), main.starts(), {}, {{0, 0}, {1000, -0.4}});
+  EXPECT_THAT(check_topology(map), testing::Contains(HasSubstr("edge 1 (main) at 1000.00 m has a cant of -0.40 m")));
 }
 
 }  // namespace

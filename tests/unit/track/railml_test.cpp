@@ -299,7 +299,8 @@ TEST_F(RailmlTest, XmlIsKnownByItsFirstElement) {
   EXPECT_EQ(message("<?xml version=\"1.0\" encoding=\"windows-1252\"?>\n<!-- \xfc -->" + railml2("500")), "was built");
   EXPECT_EQ(message(utf16(head + railml2("500"))), "was built");
   EXPECT_THAT(message(utf16(head + railml2("500", "1,0"))), HasSubstr("line 5: <radiusChange>"));
-  EXPECT_THAT(message("<svg/>"), HasSubstr("not LandXML"));
+  EXPECT_THAT(message("<svg/>"), HasSubstr("not LandXML, railML, OpenStreetMap nor an ERJU"));
+  EXPECT_THAT(message("<eng xmlns=\"https://erju.org/eng\"/>"), HasSubstr("its first element is <eng>"));
   EXPECT_THAT(message("no XML"), HasSubstr("not sound XML"));
 }
 

@@ -34,6 +34,10 @@ struct OsmData {
   std::vector<std::string> problems;
 };
 
+/// The problem of an extract with this remark, in quotation marks: Overpass sends what it has when its time or memory
+/// is over, and says so there.
+std::string problem_of_remark(const std::string& quoted);
+
 /// Is this way track that a train runs on? railway=rail, light_rail, narrow_gauge, subway, and tram where asked for.
 bool is_track(const OsmTags& tags, bool with_trams);
 

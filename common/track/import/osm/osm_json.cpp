@@ -12,6 +12,8 @@ namespace {
 
 using nlohmann::json;
 
+constexpr size_t kMostOfRemark = 200;
+
 OsmTags tags_in(const json& object, const char* key) {
   OsmTags tags;
   const auto found = object.find(key);
@@ -27,10 +29,9 @@ bool plausible(const GeoPoint& place) {
 }
 
 /// Beginning of a value, for a message; in ASCII, so that no letter is cut in two.
-std::string text_of(const json& value) {
-  constexpr size_t kMost = 60;
+std::string text_of(const json& value, size_t most = 60) {
   const std::string text = value.dump(-1, ' ', true);
-  return text.size() > kMost ? text.substr(0, kMost) + "..." : text;
+  return text.size() > most ? text.substr(0, most) + "..." : text;
 }
 
 const json& member(const json& object, const char* key) {
@@ -285,6 +286,8 @@ core::Result<OsmData> read_osm_json(const std::filesystem::path& file, bool with
     const json& document = parsed.value();
     OsmData out;
     if (document.is_object() && document.contains("elements")) {
+      if (document.contains("remark"))
+        out.problems.push_back(problem_of_remark(text_of(document.at("remark"), kMostOfRemark)));
       read_overpass(document.at("elements"), with_trams, out);
     } else if (document.is_object() && document.contains("features")) {
       FeatureReader(with_trams, out).read(document.at("features"));

@@ -341,6 +341,11 @@ std::string lack_of_nodes(const OsmData& data) {
   if (data.ways.empty() || std::any_of(data.ways.begin(), data.ways.end(), [&](const auto& w) { return held(w) > 1; }))
     return "";
   const OsmWay& first = data.ways.front();
+  if (std::ranges::all_of(data.ways, [](const OsmWay& way) { return way.nodes.size() < 2; })) {
+    return "no railway track has two points (" +
+           (first.id > 0 ? "way " + std::to_string(first.id) : std::string("the first track")) + " has " +
+           std::to_string(first.nodes.size()) + " on the earth); a line needs two or more";
+  }
   return "no railway track has two of its nodes in the data (of way " + std::to_string(first.id) + " they hold " +
          std::to_string(held(first)) + " of " + std::to_string(first.nodes.size()) +
          "); extract the ways together with their nodes, from Overpass by (._;>;); or by out geom;";

@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <fstream>
+#include <iterator>
 #include <osmium/io/any_input.hpp>
 #include <osmium/osm/node.hpp>
 #include <osmium/osm/relation.hpp>
@@ -85,7 +87,35 @@ OsmData read_passes(const std::string& file, bool with_trams) {
   return out;
 }
 
+/// What Overpass writes at the end of XML; osmium reads over it. Empty where there is none, or the file is compressed.
+std::string remark_in(const std::filesystem::path& file) {
+  constexpr std::streamoff kEnd = 4096;
+  constexpr size_t kMost = 200;
+  std::ifstream stream(file, std::ios::binary | std::ios::ate);
+  stream.seekg(std::max<std::streamoff>(0, stream.tellg() - kEnd));
+  const std::string end{std::istreambuf_iterator<char>(stream), {}};
+  const std::string tag = "<remark>";
+  const size_t begin = end.find(tag);
+  if (begin == std::string::npos) return "";
+  const std::string remark = end.substr(begin + tag.size(), end.find('<', begin + 1) - begin - tag.size());
+  return "\"" + (remark.size() > kMost ? remark.substr(0, kMost) + "..." : remark) + "\"";
+}
+
+/// What the library says, and what it means for the file.
+std::string told(const std::filesystem::path& file, const std::string& library) {
+  constexpr std::array kCutShort{"EOF", "end of", "no data", "read failed", "no element found", "unclosed token"};
+  const auto says = [&](const char* text) { return library.find(text) != std::string::npos; };
+  std::error_code failed;
+  if (std::filesystem::file_size(file, failed) == 0) return "the file is empty (" + library + ")";
+  return std::ranges::any_of(kCutShort, says) ? "the file is empty or cut short (" + library + ")" : library;
+}
+
 }  // namespace
+
+std::string problem_of_remark(const std::string& quoted) {
+  return "the extract may not be whole, Overpass remarks " + quoted +
+         ": ask for it again, with a longer [timeout:...] or for a smaller area";
+}
 
 bool is_track(const OsmTags& tags, bool with_trams) {
   const auto railway = tags.find("railway");
@@ -144,9 +174,11 @@ std::vector<OsmWay>* ways_for(OsmData& data, const OsmTags& tags, bool with_tram
 
 core::Result<OsmData> read_osm(const std::filesystem::path& file, bool with_trams) {
   try {
-    return read_passes(file.string(), with_trams);
+    OsmData out = read_passes(file.string(), with_trams);
+    if (const std::string remark = remark_in(file); !remark.empty()) out.problems.push_back(problem_of_remark(remark));
+    return out;
   } catch (const std::exception& reason) {
-    return core::Error{"cannot read " + file.string() + " as OpenStreetMap data: " + reason.what()};
+    return core::Error{"cannot read " + file.string() + " as OpenStreetMap data: " + told(file, reason.what())};
   }
 }
 

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "core/units.hpp"
+#include "track/import/told.hpp"
 #include "track/import/xml/xml_source.hpp"
 
 namespace railfix::track {
@@ -14,6 +15,7 @@ constexpr double kSurveyedM = 0.5;
 constexpr double kLongestEdgeM = 1e6;
 constexpr double kSlopePerUnit = 1e-4;  // slopes are tenths of a per mille
 constexpr double kNearCoordinateM = 0.1;
+constexpr double kSharpestRadiusM = 10.0;
 
 double metres(double millimetres) {
   return 1e-3 * millimetres;
@@ -126,12 +128,29 @@ class Reader {
       }
     }
     std::sort(stations.begin(), stations.end());
-    for (size_t i = 0; i + 1 < stations.size(); ++i) {
-      const double length = stations[i + 1].first - stations[i].first;
+    add_bends(stations, track);
+  }
+
+  /// A track measured to and fro turns back for a metre or two: such azimuths are left out.
+  void add_bends(const std::vector<std::pair<double, double>>& stations, NetTrack& track) {
+    std::vector<std::pair<double, double>> crooked;  // station, turn
+    for (size_t i = 1, before = 0; i < stations.size(); ++i) {
+      const double length = stations[i].first - stations[before].first;
       if (length < kNearCoordinateM) continue;
-      const double turn = core::wrap_pi(stations[i + 1].second - stations[i].second);
-      track.bends.push_back({stations[i].first, stations[i + 1].first, -turn / length, -turn / length});
+      const double turn = core::wrap_pi(stations[i].second - stations[before].second);
+      if (std::abs(turn) * kSharpestRadiusM > length) {
+        crooked.emplace_back(stations[i].first, std::abs(turn));
+        continue;
+      }
+      track.bends.push_back({stations[before].first, stations[i].first, -turn / length, -turn / length});
+      before = i;
     }
+    if (crooked.empty()) return;
+    const auto sharpest = std::ranges::max_element(crooked, {}, [](const auto& one) { return one.second; });
+    net_.problems.push_back("track edge \"" + track.track.name + "\" turns at once by up to " +
+                            told_deg(sharpest->second) + " at " + std::to_string(crooked.size()) +
+                            " of its azimuths, the first at " + told_m(crooked.front().first) +
+                            "; left out, as a track that was measured to and fro");
   }
 
   void read_links() {

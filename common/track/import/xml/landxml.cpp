@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "core/units.hpp"
+#include "track/import/told.hpp"
 #include "track/import/xml/xml_source.hpp"
 
 namespace railfix::track {
@@ -27,7 +28,10 @@ class Reader {
   LandXml read() {
     const pugi::xml_node root = source_.root();
     if (std::string_view(root.name()) != "LandXML") {
-      throw core::BadInput(source_.file_name() + " is XML but not LandXML: its first element must be <LandXML>");
+      throw core::BadInput(source_.file_name() + " is XML but not LandXML, railML, OpenStreetMap nor an ERJU " +
+                           "infrastructure or map: its first element is <" + root.name() +
+                           ">; give one that begins with <LandXML>, <railml>, <railML>, <osm> or one of "
+                           "https://erju.org/infra or /map");
     }
     check_units(root);
     for (const pugi::xml_node& group : root.children("Alignments")) {
@@ -119,8 +123,8 @@ class Reader {
             Plan& plan) {
     const double change = std::abs(closed.element.length_m - file_length);
     if (change > kToleratedLengthM) {
-      problem(where + " has points that are " + std::to_string(change) +
-              " m nearer or farther than its length and radius say");
+      problem(where + " has points that are " + told_m(change, 6) +
+              " nearer or farther than its length and radius say");
     }
     if (!plan.elements.empty()) {
       const PlanPose before = advance(plan.starts.back(), plan.elements.back(), plan.elements.back().length_m);
@@ -128,7 +132,7 @@ class Reader {
       const double gap =
           std::hypot(closed.start.easting_m - before.easting_m, closed.start.northing_m - before.northing_m);
       if (step > kToleratedStepRad) problem(where + " begins with a kink of " + std::to_string(step) + " rad");
-      if (gap > kToleratedGapM) problem(where + " begins " + std::to_string(gap) + " m from the end of the one before");
+      if (gap > kToleratedGapM) problem(where + " begins " + told_m(gap, 6) + " from the end of the one before");
       out_.figures.max_gap_m = std::max(out_.figures.max_gap_m, gap);
       out_.figures.max_heading_step_rad = std::max(out_.figures.max_heading_step_rad, step);
     }
@@ -162,9 +166,9 @@ class Reader {
                  [&](double station) { return station < begin - kToldOutsideM || station > end + kToldOutsideM; });
     if (outside.empty()) return;
     problem(track + ": " + std::to_string(outside.size()) + " of " + std::to_string(stations.size()) + " " + what +
-            " stations lie outside the alignment, which reaches from " + std::to_string(begin) + " to " +
-            std::to_string(end) + ": " + std::to_string(outside.front()) +
-            (outside.size() > 1 ? " to " + std::to_string(outside.back()) : ""));
+            " stations lie outside the alignment, which reaches from " + told_number(begin, 3) + " to " +
+            told_number(end, 3) + ": " + told_number(outside.front(), 3) +
+            (outside.size() > 1 ? " to " + told_number(outside.back(), 3) : ""));
   }
 
   static bool is_profile_point(const pugi::xml_node& node) {
@@ -233,8 +237,8 @@ class Reader {
     for (size_t i = 1; i < points.size(); ++i) {
       const double used = 0.5 * (points[i - 1].curve_length_m + points[i].curve_length_m);
       if (used > points[i].offset_m - points[i - 1].offset_m + 0.01) {
-        problem(track + ": the vertical curves at " + std::to_string(points[i - 1].offset_m) + " m and " +
-                std::to_string(points[i].offset_m) + " m overlap");
+        problem(track + ": the vertical curves at " + told_m(points[i - 1].offset_m) + " and " +
+                told_m(points[i].offset_m) + " overlap");
       }
     }
     tell_outside(plan, stations, track, "profile");
@@ -282,8 +286,7 @@ class Reader {
     if (plan.elements.empty()) throw source_.wrong(geometry, "the alignment " + name + " has no elements");
     const double plan_length = plan.stations.back().first - plan.stations.front().first;
     if (const double told = source_.number(node, "length").value_or(plan_length); std::abs(told - plan_length) > 0.01) {
-      problem(name + ": its elements cover " + std::to_string(plan_length) + " m of the " + std::to_string(told) +
-              " m that it claims");
+      problem(name + ": its elements cover " + told_m(plan_length) + " of the " + told_m(told) + " that it claims");
     }
     tell_unread(node, name);
     std::vector<GradePoint> profile = read_profile(node, name, plan);

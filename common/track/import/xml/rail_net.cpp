@@ -63,7 +63,7 @@ class Planner {
   Draft make() {
     size_t schematic = 0;
     for (NetTrack& track : net_.tracks) {
-      if (track.shape.size() >= 2) fit_shape(track);
+      if (track.has_shape()) fit_shape(track);
     }
     double begin_northing = 0;
     for (size_t i = 0; i < net_.tracks.size(); ++i) {

@@ -31,6 +31,7 @@ struct NetTrack {
   std::vector<NetBend> bends;
   std::vector<NetSlope> slopes;
   std::vector<CantPoint> cant;
+  [[nodiscard]] bool has_shape() const { return shape.size() >= 2; }  // else it is laid out as a drawing
 };
 
 struct NetEnd {

@@ -1,0 +1,143 @@
+#include "track/import/meeting.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/units.hpp"
+#include "track/import/told.hpp"
+
+namespace railfix::track {
+namespace {
+
+constexpr double kNearMissM = 1.5;  // nearer ends of two edges are told as such
+constexpr double kFacingM = 50.0;
+constexpr double kFacingRad = core::rad_from_deg(10.0);
+constexpr double kBesideM = 2.0;  // the next track is farther away
+constexpr size_t kMostKinks = 10;
+
+/// The pose of a train that leaves the edge over one of its ends.
+PlanPose leaving(const Edge& edge, bool at_end) {
+  return at_end ? edge.alignment.at(edge.alignment.length_m()).pose : turned_round(edge.alignment.at(0).pose);
+}
+
+struct LooseEnd {
+  const Edge* edge = nullptr;
+  uint32_t node = 0;
+  PlanPose pose;
+};
+
+/// From west to east.
+std::vector<LooseEnd> loose_ends(const Map& map) {
+  std::vector<size_t> meeting(map.nodes.size() + 1, 0);
+  for (const Edge& edge : map.edges) {
+    for (const uint32_t node : {edge.from_node, edge.to_node}) {
+      if (node < meeting.size()) ++meeting[node];
+    }
+  }
+  std::vector<LooseEnd> out;
+  for (const Edge& edge : map.edges) {
+    if (edge.is_drawn) continue;
+    for (const bool at_end : {false, true}) {
+      const uint32_t node = at_end ? edge.to_node : edge.from_node;
+      if (node >= meeting.size() || meeting[node] != 1) continue;
+      const PlanPose pose = leaving(edge, at_end);
+      if (std::isfinite(pose.easting_m + pose.northing_m)) out.push_back({&edge, node, pose});
+    }
+  }
+  std::ranges::stable_sort(out, {}, [](const LooseEnd& end) { return end.pose.easting_m; });
+  return out;
+}
+
+double distance_m(const LooseEnd& a, const LooseEnd& b) {
+  return std::hypot(b.pose.easting_m - a.pose.easting_m, b.pose.northing_m - a.pose.northing_m);
+}
+
+/// Does track run on from one to the other? Seen along the middle of their headings, so that a curve counts, too: both
+/// ends of an arc lie on one line there, those of two parallel tracks do not.
+bool face_each_other(const LooseEnd& a, const LooseEnd& b) {
+  const double turn = core::wrap_pi(b.pose.heading_rad + core::kPi - a.pose.heading_rad);
+  if (std::abs(turn) > kFacingRad) return false;
+  const double heading = a.pose.heading_rad + 0.5 * turn;
+  const double east = b.pose.easting_m - a.pose.easting_m;
+  const double north = b.pose.northing_m - a.pose.northing_m;
+  const double ahead = east * std::sin(heading) + north * std::cos(heading);
+  const double beside = east * std::cos(heading) - north * std::sin(heading);
+  return ahead > 0 && ahead < kFacingM && std::abs(beside) < kBesideM && std::abs(beside) < ahead;
+}
+
+/// The nearest of the ends that this one faces; nullptr = none.
+const LooseEnd* faced_by(const std::vector<LooseEnd>& ends, size_t own) {
+  const LooseEnd* nearest = nullptr;
+  const auto look_at = [&](const LooseEnd& other) {
+    if (!face_each_other(ends[own], other)) return;
+    if (nearest == nullptr || distance_m(ends[own], other) < distance_m(ends[own], *nearest)) nearest = &other;
+  };
+  const double easting_m = ends[own].pose.easting_m;
+  for (size_t i = own; i-- > 0 && easting_m - ends[i].pose.easting_m < kFacingM;) look_at(ends[i]);
+  for (size_t i = own + 1; i < ends.size() && ends[i].pose.easting_m - easting_m < kFacingM; ++i) look_at(ends[i]);
+  return nearest;
+}
+
+/// By how much a train turns at once on this way; the least of an edge that has both its ends there.
+double kink_rad(const Map& map, const Connection& way) {
+  const auto at_node = [&](uint32_t edge_id) {
+    const Edge& edge = *map.edge(edge_id);
+    std::vector<double> headings;
+    if (edge.from_node == way.node) headings.push_back(leaving(edge, false).heading_rad);
+    if (edge.to_node == way.node) headings.push_back(leaving(edge, true).heading_rad);
+    return headings;
+  };
+  double least = core::kPi;
+  for (const double a : at_node(way.edge_a)) {
+    for (const double b : at_node(way.edge_b)) least = std::min(least, std::abs(core::wrap_pi(a + core::kPi - b)));
+  }
+  return least;
+}
+
+}  // namespace
+
+std::vector<std::string> facing_ends(const Map& map) {
+  const std::vector<LooseEnd> ends = loose_ends(map);
+  std::vector<std::string> problems;
+  for (size_t i = 0; i < ends.size(); ++i) {
+    const LooseEnd& own = ends[i];
+    const LooseEnd* other = faced_by(ends, i);
+    // Each pair once; around a turntable many ends face one.
+    if (other == nullptr || other < &own || faced_by(ends, static_cast<size_t>(other - ends.data())) != &own) continue;
+    const double gap_m = distance_m(own, *other);
+    if (gap_m <= kNearMissM && own.edge != other->edge) continue;
+    problems.push_back(called(*own.edge) + " and " + called(*other->edge) + " end loose at nodes " +
+                       std::to_string(own.node) + " and " + std::to_string(other->node) + ", in line and " +
+                       told_m(gap_m) +
+                       " apart: draw the track between them, unless these are buffer stops or a turntable");
+  }
+  return problems;
+}
+
+std::vector<std::string> kinks_at_nodes(const Map& map) {
+  std::vector<std::pair<double, const Connection*>> kinks;
+  for (const Connection& way : map.connections) {
+    const Edge* a = map.edge(way.edge_a);
+    const Edge* b = map.edge(way.edge_b);
+    if (a == nullptr || b == nullptr || a->is_drawn || b->is_drawn) continue;
+    const double kink = kink_rad(map, way);
+    if (kink > kKinkRad) kinks.emplace_back(kink, &way);
+  }
+  std::ranges::stable_sort(kinks, std::greater{}, [](const auto& kink) { return kink.first; });
+  std::vector<std::string> problems;
+  for (size_t i = 0; i < std::min(kMostKinks, kinks.size()); ++i) {
+    const auto& [kink, way] = kinks[i];
+    problems.push_back(called(*map.edge(way->edge_a)) + " and " + called(*map.edge(way->edge_b)) + " meet at node " +
+                       std::to_string(way->node) + " with a kink of " + told_deg(kink) +
+                       ": look at their points next to it");
+  }
+  if (kinks.size() > kMostKinks) {
+    problems.push_back(std::to_string(kinks.size() - kMostKinks) + " more of " +
+                       std::to_string(map.connections.size()) + " ways over nodes have a kink of " +
+                       told_deg(kinks.back().first) + " to " + told_deg(kinks[kMostKinks].first) +
+                       ": look at the points next to switches in the source");
+  }
+  return problems;
+}
+
+}  // namespace railfix::track

@@ -1,0 +1,21 @@
+// What is wrong where edges meet, and where they should but do not.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/units.hpp"
+#include "track/map.hpp"
+
+namespace railfix::track {
+
+/// Straight blades turn by 1 in 40 (1.4 degrees) at the most: no track has more, on a switch or elsewhere.
+constexpr double kKinkRad = core::rad_from_deg(2.0);
+
+/// Loose ends that face each other over a gap in line: the track between them is missing.
+std::vector<std::string> facing_ends(const Map& map);
+
+/// Ways over nodes with a kink that no track has: the worst by name, the others counted.
+std::vector<std::string> kinks_at_nodes(const Map& map);
+
+}  // namespace railfix::track

@@ -1,0 +1,33 @@
+// How problems name an edge and write a number.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <string>
+
+#include "core/units.hpp"
+#include "track/map.hpp"
+
+namespace railfix::track {
+
+/// "12.34"; a number beyond any railway's is written short ("1e+308"), so that the sentence stays one.
+inline std::string told_number(double value, int places) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), std::abs(value) < 1e9 ? "%.*f" : "%.*g", places, value);
+  return text.data();
+}
+
+inline std::string told_m(double value, int places = 2) {
+  return told_number(value, places) + " m";
+}
+
+inline std::string told_deg(double rad) {
+  return told_number(core::deg_from_rad(rad), 1) + " degrees";
+}
+
+inline std::string called(const Edge& edge) {
+  return "edge " + std::to_string(edge.id) + " (" + edge.name + ")";
+}
+
+}  // namespace railfix::track
