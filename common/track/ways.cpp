@@ -17,10 +17,12 @@ double arriving_heading(const Run& run) {
 
 constexpr double kCornerM = 12.0;
 constexpr double kLeastCornerRad = 0.005;  // less is how points were rounded
+constexpr double kMostCornerRad = 0.2;     // more is no turnout's
 
 double corner_rad(const Run& run, const Run& next) {
+  if (run.edge->is_drawn || next.edge->is_drawn) return 0.0;
   const double left_rad = core::wrap_pi(arriving_heading(run) - leaving_heading(next));
-  return std::abs(left_rad) < kLeastCornerRad ? 0.0 : left_rad;
+  return std::abs(left_rad) < kLeastCornerRad || std::abs(left_rad) > kMostCornerRad ? 0.0 : left_rad;
 }
 
 }  // namespace
@@ -106,14 +108,21 @@ std::optional<double> Route::distance_of(const EdgePosition& place, double near_
   return best;
 }
 
+double Route::corners_at(size_t at, double distance_m) const {
+  double sum_rad = 0;
+  for (size_t i = at; i < legs_.size() && legs_[i].begin_m - distance_m < kCornerM; ++i) {
+    if (std::abs(legs_[i].begin_m - distance_m) < kCornerM) sum_rad += legs_[i].corner_rad;
+  }
+  for (size_t i = at; i-- > 0 && distance_m - legs_[i].begin_m < kCornerM;) sum_rad += legs_[i].corner_rad;
+  return sum_rad;
+}
+
 double Route::curvature_at(double distance_m) const {
-  const size_t i = index_at(distance_m);
-  const Leg& leg = legs_[i];
+  const size_t at = index_at(distance_m);
+  const Leg& leg = legs_[at];
   const double into = distance_m - leg.begin_m;
   const double curvature = leg.run.edge->alignment.curvature_at(leg.run.forward ? into : leg.run.length_m() - into);
-  double corner = std::abs(into) < kCornerM ? leg.corner_rad : 0.0;
-  if (i + 1 < legs_.size() && leg.end_m() - distance_m < kCornerM) corner += legs_[i + 1].corner_rad;
-  return (leg.run.forward ? curvature : -curvature) + corner / (2 * kCornerM);
+  return (leg.run.forward ? curvature : -curvature) + corners_at(at, distance_m) / (2 * kCornerM);
 }
 
 }  // namespace railfix::track

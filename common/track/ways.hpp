@@ -62,11 +62,13 @@ class Route {
   /// there.
   [[nodiscard]] std::optional<double> distance_of(const EdgePosition& place, double near_m) const;
   /// A corner counts as a curve of 12 m to either side: where a plan has a leg from the middle of its turnout (1 in 9
-  /// of 190 m: 10.5 m, of 300 m: 16.6 m) the train turns as much.
+  /// of 190 m: 10.5 m, of 300 m: 16.6 m) the train turns as much. Path and the search of the whole map know no corners.
   [[nodiscard]] double curvature_at(double distance_m) const;
 
  private:
   [[nodiscard]] size_t index_at(double distance_m) const;
+  /// Sum of the corners within 12 m; `at`: the leg of the distance.
+  [[nodiscard]] double corners_at(size_t at, double distance_m) const;
   std::deque<Leg> legs_;
 };
 

@@ -38,6 +38,7 @@ struct Options {
   double for_s = 0;
 };
 
+constexpr int kWorse = 3;  // exit code
 constexpr double kPathM = 1e6;
 constexpr double kTurnS = 0.1;
 constexpr const char* kSeconds = "a number of seconds";
@@ -155,10 +156,11 @@ Verdict print_ratio(const char* what, const compare::RatioResult& result) {
   return result.verdict;
 }
 
-size_t contradicted_legs(const compare::Pairing& pairing) {
+/// Legs on which the two have nothing in common, and no truth says who is wrong.
+size_t contradicted_legs(const compare::Pairing& pairing, const std::optional<Judge>& judge) {
   std::set<size_t> legs;
   for (const auto& pair : pairing.pairs) {
-    if (!pair.overlap()) legs.insert(pair.leg);
+    if (!pair.overlap() && !(judge && judge->covers(pair))) legs.insert(pair.leg);
   }
   return legs.size();
 }
@@ -212,7 +214,7 @@ Verdict print_sum(const std::vector<Verdict>& verdicts, size_t contradicted_legs
     std::printf("WORSE\n");
     return Verdict::worse;
   }
-  if (contradicted_legs > 0 && !errors_known) {
+  if (contradicted_legs > 0) {
     std::printf(
         "not shown: on %zu legs the intervals have nothing in common, so one side is wrong, and only --truth "
         "says which\n",
@@ -247,7 +249,7 @@ int verdict(const Columns& columns, size_t contradicted_legs, const Options& opt
         text_of(broken.verdict));
     verdicts.push_back(broken.verdict);
   }
-  return print_sum(verdicts, contradicted_legs, !columns.errors.empty()) == Verdict::worse ? 1 : 0;
+  return print_sum(verdicts, contradicted_legs, !columns.errors.empty()) == Verdict::worse ? kWorse : 0;
 }
 
 /// Reports that come now, until the other side's file is over, time is up, or Ctrl-C; each pair is told as it comes.
@@ -288,7 +290,7 @@ int print_comparison(const Options& options, const compare::Pairing& pairing, co
   };
   std::printf("interval not known       ours %td, certified %td of %zu: left out\n", unknown(&compare::Sample::ours),
               unknown(&compare::Sample::certified), columns.lengths.size());
-  return verdict(columns, contradicted_legs(pairing), options);
+  return verdict(columns, contradicted_legs(pairing, judge), options);
 }
 
 void check(const Options& options) {
@@ -362,7 +364,7 @@ void add_tpr_compare(CLI::App& tpr, Action& chosen) {
       "  railfix tpr compare --ours topic:demo --certified rbc.csv   what train demo sends now, until the file is "
       "over\n"
       "  railfix tpr compare --ours topic:demo --certified topic:demo-evc --for-s 3600\n"
-      "Ends with 1 where the verdict is WORSE.");
+      "Ends with 3 where the verdict is WORSE.");
   command
       ->add_option("--ours", options->ours,
                    "Folder of a run, a .csv or .jsonl file with stamp_ns and hex, a recording (.mcap), or topic:TRAIN: "

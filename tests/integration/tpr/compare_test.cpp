@@ -89,7 +89,7 @@ TEST(TprCompare, SaysWhatIsShownAndWhatIsNot) {
   EXPECT_THAT(outcome.out, HasSubstr("verdict                  not shown")) << "a silent leg among the next 12?";
   outcome = test::run_program({"railfix", "tpr", "compare", "--ours", certified, "--certified", ours}, kPatienceS);
   EXPECT_THAT(outcome.out, HasSubstr("verdict                  WORSE"));
-  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_EQ(outcome.exit_code, 3);
   std::ofstream(ours) << table(0.5, 5, 70);
   std::ofstream(certified) << table(-1.5, 20, 70);
   outcome = test::run_program({"railfix", "tpr", "compare", "--ours", ours, "--certified", certified}, kPatienceS);

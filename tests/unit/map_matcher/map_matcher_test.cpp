@@ -100,12 +100,15 @@ TEST_F(MapMatcherRide, ASearchedPlaceIsSaidByGnssOnTheOneTrackThereIs) {
 }
 
 TEST_F(MapMatcherRide, AStateOfAnotherMapIsNamedAndNothingIsMatchedThere) {
+  const auto frog = [&] { return matcher_.add(Sighting{stamp_ns_, track::LandmarkKind::frog, 20, 0.72, 0.1, 0.99}); };
+  run_to(510);
+  EXPECT_FALSE(frog().empty());
   auto elsewhere = state();
   elsewhere.easting_m = 7000;
   EXPECT_TRUE(matcher_.add(elsewhere).empty());
   EXPECT_THAT(matcher_.trouble(), HasSubstr("another map"));
   EXPECT_TRUE(matcher_.add(step()).empty());
-  EXPECT_TRUE(matcher_.add(Sighting{stamp_ns_, track::LandmarkKind::frog, 20, 0.72, 0.1, 0.99}).empty());
+  EXPECT_TRUE(frog().empty());
 }
 
 TEST(MapMatcher, WithoutAMapSaysWhy) {

@@ -159,5 +159,57 @@ TEST(Path, SaysWhereItCannotStart) {
   EXPECT_FALSE(Path::follow(shared_small_map(), {1, std::nan(""), Direction::forward}, 1, 1).ok());
 }
 
+/// Straights of 100, 5 and 100 m with corners between them.
+Map cornered(double first_rad, double second_rad) {
+  Map map;
+  PlanPose pose{0, 0, 0};
+  uint32_t id = 0;
+  for (const auto& [length_m, corner_rad] : {std::pair(100.0, first_rad), {5.0, second_rad}, {100.0, 0.0}}) {
+    const Alignment straight = Alignment::chained(pose, {{length_m, 0, 0}});
+    ++id;
+    map.edges.push_back({id, "e", id, id + 1, "", straight});
+    pose = straight.at(length_m).pose;
+    pose.heading_rad -= corner_rad;  // headings grow to the right
+  }
+  return map;
+}
+double turned_rad(const Route& route) {
+  double sum = 0;
+  for (double m = 0.005; m < 205; m += 0.01) sum += 0.01 * route.curvature_at(m);
+  return sum;
+}
+
+TEST(Route, TurnsByItsCornersHoweverItIsBuiltAndRun) {
+  for (const auto& [first, second] : {std::pair(0.11, 0.0), {0.11, -0.05}, {-0.08, -0.08}}) {
+    const Map map = cornered(first, second);
+    const auto run = [&](size_t i, bool forward) { return track::Run{&map.edges[i], forward}; };
+    Route ahead(run(0, true), 0, 0);
+    ahead.push_ahead(run(1, true));
+    ahead.push_ahead(run(2, true));
+    EXPECT_NEAR(turned_rad(ahead), first + second, 2e-4);
+    Route behind(run(2, true), 0, 105);
+    behind.push_behind(run(1, true));
+    behind.push_behind(run(0, true));
+    EXPECT_NEAR(turned_rad(behind), first + second, 2e-4);
+    behind.drop_behind();
+    behind.push_behind(run(0, true));
+    EXPECT_NEAR(turned_rad(behind), first + second, 2e-4);
+    Route back(run(2, false), 100, 0);
+    back.push_ahead(run(1, false));
+    back.push_ahead(run(0, false));
+    EXPECT_NEAR(turned_rad(back), -first - second, 2e-4) << "the other way it turns to the other side";
+  }
+}
+
+TEST(Route, HasNoCornersWhereItIsOnlyDrawnOrNoTurnoutIsSo) {
+  for (const bool drawn : {false, true}) {
+    Map map = cornered(drawn ? 0.11 : 0.6, 0);
+    map.edges[1].is_drawn = drawn;
+    Route route({&map.edges[0], true}, 0, 0);
+    route.push_ahead({&map.edges[1], true});
+    EXPECT_EQ(route.curvature_at(100), 0);
+  }
+}
+
 }  // namespace
 }  // namespace railfix::track

@@ -79,6 +79,25 @@ TEST(RailNet, WhatDivergesIsWhatTheSourceSays) {
   EXPECT_EQ(ways_of(map, true), (Ways{{1, 3}}));
 }
 
+// Beside one of 1000 m that climbs 5 per mille.
+TEST(RailNet, ManyTracksWithoutGradientsClimbEvenly) {
+  constexpr size_t kTracks = 400;
+  RailNet net;
+  for (size_t i = 0; i <= kTracks; ++i) {
+    NetTrack& track = net.tracks.emplace_back();
+    track.track.name = std::to_string(i);
+    track.length_m = i == 0 ? 1000 : 100;
+    if (i > 1) net.links.push_back({.a = {i - 1, true}, .b = {i, false}});
+  }
+  net.tracks[0].slopes = {{0, 0.005}};
+  net.links.push_back({.a = {0, false}, .b = {1, false}, .passable = false});
+  net.links.push_back({.a = {0, true}, .b = {kTracks, true}, .passable = false});
+  const Map map = map_of(net);
+  for (const size_t i : {1U, 100U, 200U, 400U}) {
+    EXPECT_NEAR(map.edges[i].alignment.at(0).elevation_m, 5.0 * static_cast<double>(i - 1) / kTracks, 1e-6) << i;
+  }
+}
+
 using RailmlCrossing = ImportTest;
 
 TEST_F(RailmlCrossing, OfRailml2HasSlipsOnlyWhereItSaysSo) {

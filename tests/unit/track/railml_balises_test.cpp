@@ -73,6 +73,15 @@ TEST_F(RailmlBalises, DirectionsTurnWithTheNetElement) {
   EXPECT_EQ(group_of(core::value_or_throw(build_map({write("b.railml", text)}, {})).map), "b at 90.0, nominal reverse");
 }
 
+// Two without numbers, in the order of the file against which they apply.
+TEST_F(RailmlBalises, WhatBalisesApplyToIsMoreThanTheOrderOfTheFile) {
+  const std::string reverse = " applicationDirection=\"reverse\"";
+  const std::string text = balise("a", "100", "", reverse) + balise("b", "103", "", reverse) + group3();
+  const Map map = core::value_or_throw(build_map({write("a.railml", railml3(text))}, {})).map;
+  ASSERT_EQ(map.balise_groups.size(), 1U);
+  EXPECT_FALSE(map.balise_groups[0].nominal_is_forward);
+}
+
 TEST_F(RailmlBalises, WhatIsWrongWithAGroupOfRailml3IsTold) {
   const auto read = [&](const std::string& text, const std::string& problem) {
     const Map map = core::value_or_throw(build_map({write("a.railml", railml3(text))}, {})).map;

@@ -155,7 +155,7 @@ void apply_survey(const Survey& survey, track::Map& map) {
   for (const SurveyedLandmark& found : survey.landmarks) {
     if (found.known_id != 0) {
       map.landmarks[found.known_id - 1] = found.landmark;
-      move_group(found, map);
+      if (found.landmark.kind == track::LandmarkKind::balise) move_group(found, map);
       continue;
     }
     track::Landmark added = found.landmark;

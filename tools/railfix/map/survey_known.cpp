@@ -1,6 +1,7 @@
 #include "map/survey_known.hpp"
 
 #include <algorithm>
+#include <map>
 #include <tuple>
 
 namespace railfix::tool {
@@ -18,16 +19,16 @@ class PassMarks {
       : marks_(marks), choices_(pass.size(), std::vector<Choice>(marks.size() + 1)) {
     for (size_t i = 0; i < pass.size(); ++i) {
       const auto& seen = all[pass[i]];
-      const bool again = i > 0 && !told_apart(seen, all[pass[i - 1]]);
       size_t before = 0;  // the mark up to which it costs least
       for (size_t last = 0; last <= marks.size(); ++last) {
         Choice& choice = choices_[i][last];
-        choice = {cost(i, last) + 1, last, false};  // a thing that the map does not have
-        if (last > 0) {
+        choice = {cost(i, last) + 1, last, first_of(i, last), false};  // a thing that the map does not have
+        if (last > 0 && alike(seen, marks[last - 1]->kind, marks[last - 1]->edge, marks[last - 1]->lateral_m)) {
           const double reach_m = gate_m + 3.0 * std::hypot(marks[last - 1]->sigma_m, seen.run_sigma_m);
           const double off = std::abs(marks[last - 1]->offset_m - places[pass[i]]) / reach_m;
-          if (off < 1) choice = std::min({choice, {cost(i, before) + off * off, before, true}});
-          if (off < 1 && again) choice = std::min({choice, {cost(i, last) + off * off, last, true}});
+          if (off < 1) choice = std::min(choice, Choice{cost(i, before) + off * off, before, pass[i], true});
+          if (off < 1 && std::isfinite(cost(i, last)) && !told_apart(seen, all[first_of(i, last)]))
+            choice = std::min(choice, Choice{cost(i, last) + off * off, last, first_of(i, last), true});
         }
         if (cost(i, last) < cost(i, before)) before = last;
       }
@@ -53,6 +54,7 @@ class PassMarks {
   struct Choice {
     double cost = INFINITY;
     size_t before = 0;  // the last mark of the sightings before
+    size_t first = 0;   // sighting of the last mark now
     bool is_mark = false;
     auto operator<=>(const Choice&) const = default;
   };
@@ -61,6 +63,7 @@ class PassMarks {
     if (i == 0) return last == 0 ? 0.0 : INFINITY;
     return choices_[i - 1][last].cost;
   }
+  [[nodiscard]] size_t first_of(size_t i, size_t last) const { return i == 0 ? 0 : choices_[i - 1][last].first; }
 
   const Marks& marks_;
   std::vector<std::vector<Choice>> choices_;  // by sighting and last mark
@@ -93,14 +96,13 @@ std::vector<std::vector<size_t>> passes_of(const std::vector<SurveySighting>& al
 
 std::vector<const track::Landmark*> known_marks(const track::Map& map, const std::vector<SurveySighting>& all,
                                                 const std::vector<double>& places, double gate_m) {
+  std::map<std::pair<uint32_t, track::LandmarkKind>, Marks> marks_on;  // edges, along them
+  for (const track::Landmark& mark : map.landmarks) marks_on[{mark.edge, mark.kind}].push_back(&mark);
+  for (auto& [key, marks] : marks_on) std::ranges::sort(marks, {}, &track::Landmark::offset_m);
   Marks known(all.size(), nullptr);
   for (const auto& pass : passes_of(all)) {
     const auto& first = all[pass.front()];
-    Marks marks;
-    for (const track::Landmark& mark : map.landmarks) {
-      if (alike(first, mark.kind, mark.edge, mark.lateral_m)) marks.push_back(&mark);
-    }
-    std::ranges::sort(marks, {}, &track::Landmark::offset_m);
+    const Marks& marks = marks_on[{first.edge, first.kind}];
     const auto best = PassMarks(all, places, pass, marks, gate_m).best();
     for (size_t i = 0; i < pass.size(); ++i) known[pass[i]] = best[i];
   }

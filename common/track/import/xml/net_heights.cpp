@@ -1,19 +1,21 @@
 #include "track/import/xml/net_heights.hpp"
 
+#include <Eigen/SparseCholesky>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <deque>
+#include <functional>
 #include <map>
+#include <string>
+
+#include "track/import/told.hpp"
 
 namespace railfix::track {
 namespace {
 
 constexpr double kClimbToldM = 0.05;
 constexpr double kStepToldM = 1.0;
-constexpr double kSettledM = 1e-6;
-constexpr int kMostSweeps = 10'000;
+constexpr size_t kMostTold = 10;
 
 /// Of one track by itself, from 0 on.
 std::vector<GradePoint> profile_of(const NetTrack& track) {
@@ -48,6 +50,7 @@ class Heights {
     spread();
     settle();
     for (size_t i = 0; i < profiles_.size(); ++i) lift(i);
+    tell_climbs();
     return std::move(profiles_);
   }
 
@@ -92,33 +95,37 @@ class Heights {
     height_at_.try_emplace(end, height_m + rise_m);
   }
 
-  /// Between tracks without slopes the height is the one that lets all of them climb evenly.
+  /// Between tracks without slopes the height is the one that lets all of them climb evenly: what comes to a node is
+  /// what leaves it, a sparse linear system. Where nothing holds a part it stays as it is.
   void settle() {
-    std::vector<size_t> open;
+    std::map<size_t, Eigen::Index> open;
     for (const auto& [node, tracks] : tracks_at_) {
       if (std::none_of(tracks.begin(), tracks.end(), [&](size_t track) { return has_slopes(track); }))
-        open.push_back(node);
+        open.emplace(node, std::ssize(open));
     }
-    double moved_m = 2 * kSettledM;
-    for (int sweep = 0; sweep < kMostSweeps && moved_m > kSettledM; ++sweep) {
-      moved_m = 0;
-      for (const size_t node : open) {
-        const double height_m = even_height(node);
-        moved_m = std::max(moved_m, std::abs(height_m - height_at_[node]));
-        height_at_[node] = height_m;
+    if (open.empty()) return;
+    constexpr double kStays = 1e-12;
+    std::vector<Eigen::Triplet<double>> terms;
+    Eigen::VectorXd sums = Eigen::VectorXd::Zero(std::ssize(open));
+    for (const auto& [node, row] : open) {
+      double weight = 0;
+      for (const size_t track : tracks_at_[node]) {
+        const auto [begin, end] = nodes_[track];
+        const size_t other = begin == node ? end : begin;
+        weight += 1 / length(track);
+        if (const auto column = open.find(other); column != open.end()) {
+          terms.emplace_back(row, column->second, -1 / length(track));
+        } else {
+          sums[row] += height_at_[other] / length(track);
+        }
       }
+      terms.emplace_back(row, row, weight * (1 + kStays));
+      sums[row] += kStays * weight * height_at_[node];
     }
-  }
-
-  [[nodiscard]] double even_height(size_t node) {
-    double sum = 0;
-    double weight = 0;
-    for (const size_t track : tracks_at_[node]) {
-      const auto [begin, end] = nodes_[track];
-      sum += height_at_[begin == node ? end : begin] / length(track);
-      weight += 1 / length(track);
-    }
-    return sum / weight;
+    Eigen::SparseMatrix<double> matrix(std::ssize(open), std::ssize(open));
+    matrix.setFromTriplets(terms.begin(), terms.end());
+    const Eigen::VectorXd heights = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>(matrix).solve(sums);
+    for (const auto& [node, row] : open) height_at_[node] = heights[row];
   }
 
   void lift(size_t track) {
@@ -131,18 +138,24 @@ class Heights {
     }
     profile.back().elevation_m += climb(track);
     if (std::abs(climb(track)) < kClimbToldM) return;
-    std::array<char, 64> heights{};
-    std::snprintf(heights.data(), heights.size(), "%.2f m to %.2f m", begin_m, profile.back().elevation_m);
-    net_.problems.push_back("track " + net_.tracks[track].track.name + " has no gradients; it climbs evenly from " +
-                            heights.data() + ", where others put its ends");
+    climbs_.emplace_back(std::abs(climb(track)), "track " + net_.tracks[track].track.name +
+                                                     " has no gradients; it climbs evenly from " + told_m(begin_m) +
+                                                     " to " + told_m(profile.back().elevation_m) +
+                                                     ", where others put its ends");
+  }
+
+  void tell_climbs() {
+    std::ranges::stable_sort(climbs_, std::greater{}, &std::pair<double, std::string>::first);
+    for (size_t i = 0; i < std::min(kMostTold, climbs_.size()); ++i) net_.problems.push_back(climbs_[i].second);
+    if (climbs_.size() > kMostTold)
+      net_.problems.push_back(std::to_string(climbs_.size() - kMostTold) +
+                              " more tracks have no gradients and climb evenly between others, by less");
   }
 
   void tell_step(size_t track) {
     const double step_m = profiles_[track].back().elevation_m - height_at_[nodes_[track].second];
     if (std::abs(step_m) < kStepToldM) return;
-    std::array<char, 32> step{};
-    std::snprintf(step.data(), step.size(), "%.2f m", step_m);
-    net_.problems.push_back("track " + net_.tracks[track].track.name + " ends " + step.data() +
+    net_.problems.push_back("track " + net_.tracks[track].track.name + " ends " + told_m(step_m) +
                             " above where others put its end, by its gradients; heights step there");
   }
 
@@ -151,6 +164,7 @@ class Heights {
   std::vector<std::vector<GradePoint>> profiles_;
   std::map<size_t, std::vector<size_t>> tracks_at_;  // nodes
   std::map<size_t, double> height_at_;               // nodes
+  std::vector<std::pair<double, std::string>> climbs_;
 };
 
 }  // namespace

@@ -61,6 +61,7 @@ class Reader {
     for (const pugi::xml_node& ref : group.children("baliseRef"))
       order.emplace_back(source_.number(ref, "sequence").value_or(0), ref.attribute("ref").value());
     std::stable_sort(order.begin(), order.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    has_reference = order.empty() || order.front().first <= kLastReferenceNumber;
     std::vector<PlacedBalise> balises;
     for (const auto& [sequence, id] : order) {
       const auto found = by_id_.find(id);

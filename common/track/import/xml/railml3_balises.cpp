@@ -7,8 +7,6 @@
 namespace railfix::track {
 namespace {
 
-constexpr double kLastReference = 1;  // numbers in a group count from 0 as in ETCS, or from 1
-
 struct PlacedBalise {
   NetPlace place;
   pugi::xml_node node;
@@ -65,14 +63,28 @@ class Reader {
     std::stable_sort(balises.begin(), balises.end(), [](const PlacedBalise& a, const PlacedBalise& b) {
       return a.number && (!b.number || *a.number < *b.number);
     });
-    if (balises.front().number.value_or(0) > kLastReference) {
+    if (balises.front().number.value_or(0) > kLastReferenceNumber) {
       tell(node, "has no balise number 0 or 1, which its place counts from; its balises are kept as landmarks");
+      for (const PlacedBalise& balise : balises) keep_as_landmark(balise);
+      return;
+    }
+    if (is_order_open(node, balises)) {
+      tell(node,
+           "is reversed and lies on two net elements, and no numbers say which balise is its first; they are kept "
+           "as landmarks");
       for (const PlacedBalise& balise : balises) keep_as_landmark(balise);
       return;
     }
     const std::optional<bool> said = said_direction(node, balises);
     if (said) sort_by_place(balises, *said);
     add_group(node, *identity, balises, said);
+  }
+
+  /// Without numbers the first one of the file is the first in nominal direction, unless that is said to be another.
+  static bool is_order_open(const pugi::xml_node& of, const std::vector<PlacedBalise>& balises) {
+    const PlacedBalise& first = balises.front();
+    return !first.number && std::string(of.attribute("mileageDirection").value()) == "reverse" &&
+           std::ranges::any_of(balises, [&](const PlacedBalise& b) { return b.place.track != first.place.track; });
   }
 
   /// Balises without numbers lie in the nominal direction, one after the other.
@@ -115,13 +127,18 @@ class Reader {
   /// By the file's word, else by the order of the balises, else by the direction that they apply to.
   std::optional<bool> nominal_is_forward(const pugi::xml_node& of, const std::vector<TrackMark>& here,
                                          const std::vector<PlacedBalise>& balises, const std::optional<bool>& said) {
+    // Numbers say the order for certain, that of the file only where nobody else says the direction.
+    const bool numbered =
+        std::ranges::all_of(balises, [](const PlacedBalise& balise) { return balise.number.has_value(); });
     const std::optional<bool> ordered = nominal_by_order(here);
     if (said) {
-      if (ordered && *ordered != *said)
+      if (numbered && ordered && *ordered != *said)
         tell(of, "has a mileageDirection against the numbers of its balises; the mileageDirection is taken");
       return *said;
     }
-    return ordered ? ordered : applied_direction(of, balises);
+    if (numbered && ordered) return ordered;
+    const std::optional<bool> applied = applied_direction(of, balises);
+    return applied ? applied : ordered;
   }
 
   /// By mileageDirection, turned where the mileage falls along the track or the place is told against it.
@@ -137,9 +154,11 @@ class Reader {
     return (direction == "nominal") != turned;
   }
 
-  static std::optional<bool> applied_direction(const pugi::xml_node& of, const std::vector<PlacedBalise>& balises) {
+  [[nodiscard]] std::optional<bool> applied_direction(const pugi::xml_node& of,
+                                                      const std::vector<PlacedBalise>& balises) const {
     for (const pugi::xml_node& node : {of, balises.front().node}) {
       for (const pugi::xml_node& spot : descendants(node, "spotLocation")) {
+        if (places_.track(spot.attribute("netElementRef").value()) != balises.front().place.track) continue;
         const std::string applies = spot.attribute("applicationDirection").value();
         if (applies == "normal" || applies == "reverse") return applies == "normal";
       }

@@ -13,6 +13,7 @@ RailNet read_railml2(const XmlSource& source);
 RailNet read_railml3(const XmlSource& source);
 
 constexpr double kRailmlSigmaM = 1.0;
+constexpr double kLastReferenceNumber = 1;  // balises of a group count from 0 as in ETCS, or from 1
 
 /// Name of an element for a human: its name, else its code, else its id.
 std::string railml_name(const pugi::xml_node& node);
