@@ -29,8 +29,15 @@ std::string since(const SensorWatch& watch) {
 }
 
 std::string why_given_up(Against because) {
-  return because == Against::sightings ? ": it was given up, what was sighted fitted the map nowhere near it"
-                                       : ": it was given up, the train turned otherwise than the track there";
+  switch (because) {
+    case Against::sightings:
+      return ": it was given up, what was sighted fitted the map nowhere near it";
+    case Against::turning:
+      return ": it was given up, the train turned otherwise than the track there";
+    case Against::fusion_before:
+      break;
+  }
+  return ": it was given up, the fusion before this one had doubted it, and nothing has agreed since";
 }
 
 }  // namespace
@@ -186,20 +193,20 @@ void Estimator::judge_sensors(TrainEstimate& e) const {
 void Estimator::judge_place(TrainEstimate& e) const {
   const auto& gnss = watch(Source::gnss);
   if (gnss.isolated) e.degrade("GNSS contradicts the position" + since(gnss));
-  if (gnss_denies_place()) e.integrity = Integrity::unusable;
+  const bool strays = track_doubt_.turns_otherwise() && wrong_place_.strays();
+  e.place_in_doubt = gnss_denies_place() || strays || wrong_place_.lost();
+  if (gnss_denies_place() || strays) e.integrity = Integrity::unusable;
   if (time_doubt_m_ > 0) e.degrade("a gap in time: the clock was set, or nothing measured");
   if (refused_fix_) e.degrade("a position fix was refused");
   if (corrected_) e.degrade("position was corrected by two fixes against the filter");
   if (off_path_) e.degrade("a position fix lies on another track");
-  if (track_doubt_.turns_otherwise()) {
-    e.degrade("the train turns otherwise than this track");
-    if (wrong_place_.strays()) e.integrity = Integrity::unusable;
-  }
+  if (track_doubt_.turns_otherwise()) e.degrade("the train turns otherwise than this track");
   if (wrong_place_.fits_nowhere()) {
     e.degrade("what is sighted fits the map nowhere near this place");
     e.integrity = Integrity::unusable;
   } else if (wrong_place_.lost()) {
-    e.degrade("the place was doubted: waits for a landmark");
+    e.degrade(wrong_place_.of_before() ? "the fusion before this one doubted the place: waits for landmarks or GNSS"
+                                       : "what was sighted did not fit the map: waits for a landmark or GNSS");
   } else if (track_doubt_.disbelieved()) {
     e.degrade("map_matcher finds some other place far more probable");
   }

@@ -85,13 +85,7 @@ inline msg::TrainPose message_of(const PoseEstimate& p) {
 }
 
 inline KnownPlace known_place_of(const msg::TrainState& m) {
-  return {m.stamp_ns(),
-          messaging::place_of(m),
-          m.speed_mps(),
-          m.over_m(),
-          m.under_m(),
-          m.track_probability(),
-          m.integrity() != msg::INTEGRITY_UNUSABLE};
+  return {m.stamp_ns(), messaging::place_of(m), m.speed_mps(), m.over_m(), m.under_m(), m.track_probability(), false};
 }
 
 inline const char* topic_of(const Event& event) {

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <string_view>
 
 #include "core/time.hpp"
 #include "fusion/fusion_messages.hpp"
@@ -28,6 +29,7 @@ constexpr double kSameBeginS = 0.5;        // a replay that is looped begins whe
 constexpr double kLiveDataS = 5.0;         // data stamps further from the host's clock are not live
 constexpr double kOutOfOrderS = 2.0;
 constexpr double kStandsMps = 1.0;
+constexpr const char* kInDoubt = " in doubt";  // in the notes
 
 Fusion make_fusion(const FusionConfig& config, const std::shared_ptr<const track::Map>& map,
                    const std::optional<SavedScales>& saved) {
@@ -101,6 +103,7 @@ void FusionService::hear(const msg::TrainState& state) {
   if (!place_at(map_, known_place_of(state), state.stamp_ns(), config_.parameters.interval_factor)) return;  // soon
   learnt_ = true;
   known_ = state;
+  known_in_doubt_ = false;
   begin_anew();
 }
 
@@ -115,13 +118,15 @@ void FusionService::remember() {
   if (!messaging::deserialize(cdr, state)) return;
   known_ = state;
   noted_ns_ = std::atoll(notes.c_str() + kept_for_.size());
+  known_in_doubt_ = std::string_view(notes).substr(0, line_end).ends_with(kInDoubt);
 }
 
 void FusionService::keep(const msg::TrainState& state) {
   if (context_.common().lock_step || std::abs(state.stamp_ns() - kept_ns_) < kKeepPeriodNs) return;
   kept_ns_ = state.stamp_ns();
   const auto cdr = messaging::serialize(state);
-  context_.keep(kept_for_ + std::to_string(core::monotonic_ns()) + '\n' + std::string(cdr.begin(), cdr.end()));
+  context_.keep(kept_for_ + std::to_string(core::monotonic_ns()) + (in_doubt_ ? kInDoubt : "") + '\n' +
+                std::string(cdr.begin(), cdr.end()));
 }
 
 // A known place is wanted at the time of the first state of the fusion that is to go on from it. False: that fusion has
@@ -150,8 +155,9 @@ bool FusionService::take_over_known(const TrainEstimate& first) {
   const double speed_mps = std::isfinite(known_->speed_mps()) ? known_->speed_mps() : 0;
   distance_offset_m_ = known_->distance_m() + speed_mps * age_s - first.distance_m;
   if (begun_anew_) {
-    if (const auto place =
-            place_at(map_, known_place_of(*known_), first.stamp_ns, config_.parameters.interval_factor)) {
+    KnownPlace known = known_place_of(*known_);
+    known.in_doubt = known_in_doubt_;
+    if (const auto place = place_at(map_, known, first.stamp_ns, config_.parameters.interval_factor)) {
       fusion_->add(*place);
     } else {
       learnt_ = false;
@@ -305,6 +311,7 @@ void FusionService::publish(const TrainEstimate& estimate, int64_t grabbed_ns) {
   msg::TrainState message = message_of(estimate);
   message.grabbed_ns(grabbed_ns);
   message.distance_m(message.distance_m() + distance_offset_m_);
+  in_doubt_ = estimate.place_in_doubt;
   fitness_ = fitness_of(estimate, map_ != nullptr);
   if (latest_ && latest_->track_known() != 0 && !estimate.track_known) context_.log().warn(estimate.reason);
   latest_ = message;

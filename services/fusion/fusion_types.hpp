@@ -114,7 +114,8 @@ struct TrainEstimate {
   uint32_t sources = 0;  // bit 1 << Source
   Integrity integrity = Integrity::unusable;
   bool standstill = false;
-  std::string reason;  // why it is not ok, one sentence
+  bool place_in_doubt = false;  // something speaks against it: it is no position, however narrow the interval
+  std::string reason;           // why it is not ok, one sentence
 
   void degrade(const std::string& why);
 };

@@ -45,7 +45,7 @@ std::optional<FixInput> place_at(const std::shared_ptr<const track::Map>& map, c
   fix.sigma_m = error_m / interval_factor;
   fix.probability = known.track_probability;
   fix.kind = FixKind::network;
-  fix.in_doubt = !known.usable;
+  fix.in_doubt = known.in_doubt;
   return fix;
 }
 

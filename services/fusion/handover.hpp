@@ -21,13 +21,13 @@ struct KnownPlace {
   double over_m = 0;
   double under_m = 0;
   double track_probability = 0;
-  bool usable = true;
+  bool in_doubt = false;
 };
 
 /// That place as a network fix at a later time: moved on with its speed, and as uncertain as that makes it, so that an
 /// interval of `interval_factor` sigma holds the train. Nothing when it is too old, speed or track are not known, or a
-/// switch may have led the train elsewhere meanwhile. One that was not usable stays in doubt: who spoke against it is
-/// not handed over.
+/// switch may have led the train elsewhere meanwhile. One that something spoke against stays in doubt: who that was
+/// is not handed over.
 std::optional<FixInput> place_at(const std::shared_ptr<const track::Map>& map, const KnownPlace& known,
                                  int64_t stamp_ns, double interval_factor);
 

@@ -27,7 +27,7 @@ void WrongPlace::move(double way_m, SpeaksAgainst now) {
 }
 
 std::optional<Against> WrongPlace::proven() const {
-  if (lost_m_ > kLostM) return Against::sightings;
+  if (lost_m_ > kLostM) return of_before_ ? Against::fusion_before : Against::sightings;
   if (strayed_m_ > kStrayedM) return Against::turning;
   return std::nullopt;
 }

@@ -9,7 +9,7 @@
 namespace railfix::fusion {
 
 /// Who has spoken against a place until it was given up.
-enum class Against : uint8_t { sightings, turning };
+enum class Against : uint8_t { sightings, turning, fusion_before };
 
 /// What speaks against the place at a moment.
 struct SpeaksAgainst {
@@ -25,9 +25,10 @@ class WrongPlace {
   void said(bool fits_nowhere) {
     fits_nowhere_ = fits_nowhere;
     lost_ = lost_ || fits_nowhere;
+    of_before_ = of_before_ && !fits_nowhere;
   }
-  /// It comes from someone who did not trust it.
-  void doubt() { lost_ = true; }
+  /// The fusion before this one has handed it over in doubt.
+  void doubt() { lost_ = of_before_ = true; }
   /// The place is right, by a landmark or by GNSS that has proven itself.
   void found();
   /// The track bends where the train does, by the camera: it may be the gyro that is wrong.
@@ -38,6 +39,8 @@ class WrongPlace {
   [[nodiscard]] bool fits_nowhere() const { return fits_nowhere_; }
   /// It did not fit, or was doubted, and nothing has shown since that the place is right.
   [[nodiscard]] bool lost() const { return lost_; }
+  /// Nobody but the fusion before has doubted it.
+  [[nodiscard]] bool of_before() const { return of_before_; }
   /// For longer than a wrong leg is followed or a gyro is out of order: it is no position any more.
   [[nodiscard]] bool strays() const { return strayed_m_ > kNoPositionM; }
   /// The place is to be given up.
@@ -47,6 +50,7 @@ class WrongPlace {
   static constexpr double kNoPositionM = 300;
   bool fits_nowhere_ = false;
   bool lost_ = false;
+  bool of_before_ = false;
   // Way so far against each.
   double lost_m_ = 0;
   double strayed_m_ = 0;

@@ -128,7 +128,7 @@ TEST_F(WrongStart, APlaceThatIsHandedOverInDoubtIsNoneUntilTwoLandmarksAgree) {
   fusion_ = fusion_without_start();
   go(20, [] {});
   KnownPlace denied{at(t_s_), {1, 500, track::Direction::forward}, kSpeedMps, 2, 2, 0.9999};
-  denied.usable = false;
+  denied.in_doubt = true;
   const auto place = place_at(straight_line(), denied, at(t_s_), 4);
   ASSERT_TRUE(place);
   fusion_.add(*place);
