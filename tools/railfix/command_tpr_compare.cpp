@@ -7,8 +7,8 @@
 #include <string>
 
 #include "command_tpr.hpp"
-#include "compare/gamab.hpp"
 #include "compare/pairing.hpp"
+#include "compare/verdict_text.hpp"
 #include "core/time.hpp"
 #include "evaluation/statistics.hpp"
 #include "evaluation/truth.hpp"
@@ -18,8 +18,6 @@
 namespace railfix::tool {
 
 namespace {
-
-using compare::Verdict;
 
 struct Options {
   std::string ours;
@@ -98,15 +96,8 @@ struct Judge {
   }
 };
 
-struct Columns {
-  std::vector<compare::Sample> lengths;
-  std::vector<compare::Sample> errors;
-  std::vector<compare::Sample> outside;
-  std::vector<compare::Sample> available;  // 1 = a report with a known interval
-};
-
-Columns columns_of(const compare::Pairing& pairing, const std::optional<Judge>& judge) {
-  Columns columns;
+compare::Columns columns_of(const compare::Pairing& pairing, const std::optional<Judge>& judge) {
+  compare::Columns columns;
   for (const auto& at : pairing.availability)
     columns.available.push_back({at.leg, at.ours ? 1.0 : 0.0, at.certified ? 1.0 : 0.0});
   for (const auto& pair : pairing.pairs) {
@@ -121,39 +112,11 @@ Columns columns_of(const compare::Pairing& pairing, const std::optional<Judge>& 
   return columns;
 }
 
-std::vector<double> values(const std::vector<compare::Sample>& samples, double compare::Sample::*side) {
-  std::vector<double> list;
-  for (const auto& sample : samples) list.push_back(std::abs(sample.*side));
-  return list;
-}
-
 void print_row(const char* what, const std::vector<compare::Sample>& samples) {
-  const auto ours = evaluation::summarise(values(samples, &compare::Sample::ours));
-  const auto other = evaluation::summarise(values(samples, &compare::Sample::certified));
+  const auto ours = evaluation::summarise(compare::sizes_of(samples, &compare::Sample::ours));
+  const auto other = evaluation::summarise(compare::sizes_of(samples, &compare::Sample::certified));
   std::printf("%-24s %9.2f %9.2f %9.2f   %9.2f %9.2f %9.2f\n", what, ours.mean, ours.p95, ours.max, other.mean,
               other.p95, other.max);
-}
-
-const char* text_of(Verdict verdict) {
-  return verdict == Verdict::at_least_as_good ? "at least as good" : verdict == Verdict::worse ? "WORSE" : "not shown";
-}
-
-std::string text_of_need(const compare::RatioResult& result) {
-  if (result.legs < compare::kFewestLegs)
-    return "needs " + std::to_string(compare::kFewestLegs) + " legs at least, how many is not known yet";
-  if (std::isnan(result.legs_needed)) return "how many legs it needs is not known yet";
-  if (std::isinf(result.legs_needed)) return "more legs would not show it at this ratio";
-  char text[64];
-  std::snprintf(text, sizeof text, "needs about %.0f legs if they go on like these", result.legs_needed);
-  return text;
-}
-
-Verdict print_ratio(const char* what, const compare::RatioResult& result) {
-  std::printf("%-24s ratio %.3f (%.3f to %.3f), %zu pairs in %zu legs: %s", what, result.ratio, result.low, result.high,
-              result.samples, result.legs, text_of(result.verdict));
-  if (result.verdict == Verdict::open && result.samples > 0) std::printf("; %s", text_of_need(result).c_str());
-  std::printf("\n");
-  return result.verdict;
 }
 
 /// Legs on which the two have nothing in common, and no truth says who is wrong.
@@ -196,62 +159,6 @@ void print_pairs(const compare::Pairing& pairing) {
   std::printf("intervals overlap        %zu of %zu\n", pairing.pairs.size() - disjoint, pairing.pairs.size());
 }
 
-Verdict print_share(const std::vector<compare::Sample>& samples, const compare::Demand& demand) {
-  const auto result = compare_share(samples, demand);
-  const auto share = [&](double compare::Sample::*side) {
-    return 100 * evaluation::summarise(values(samples, side)).mean;
-  };
-  std::printf("interval known           ours %.1f %%, certified %.1f %% of %zu certified reports; ",
-              share(&compare::Sample::ours), share(&compare::Sample::certified), samples.size());
-  return print_ratio("certified over ours:", result);
-}
-
-/// What the verdicts come to. Two intervals with nothing in common cannot both be right.
-Verdict print_sum(const std::vector<Verdict>& verdicts, size_t contradicted_legs, bool errors_known) {
-  const auto any = [&](Verdict one) { return std::ranges::count(verdicts, one) > 0; };
-  std::printf("verdict                  ");
-  if (any(Verdict::worse)) {
-    std::printf("WORSE\n");
-    return Verdict::worse;
-  }
-  if (contradicted_legs > 0) {
-    std::printf(
-        "not shown: on %zu legs the intervals have nothing in common, so one side is wrong, and only --truth "
-        "says which\n",
-        contradicted_legs);
-    return Verdict::open;
-  }
-  if (any(Verdict::open)) {
-    std::printf("not shown\n");
-    return Verdict::open;
-  }
-  std::printf("%s\n",
-              errors_known ? "at least as good" : "intervals at least as good, and as often known; errors not known");
-  return Verdict::at_least_as_good;
-}
-
-int verdict(const Columns& columns, size_t contradicted_legs, const Options& options) {
-  std::printf("\nGAMAB, %.0f %% confidence, margin %.0f %%, over legs (ours / certified)\n",
-              100 * options.demand.confidence, 100 * options.demand.margin);
-  std::vector<Verdict> verdicts{print_share(columns.available, options.demand)};
-  verdicts.push_back(
-      print_ratio("interval length, mean", compare_ratio(columns.lengths, compare::Figure::mean, options.demand)));
-  if (columns.errors.empty()) {
-    std::printf("error                    not known without --truth\n");
-  } else {
-    verdicts.push_back(
-        print_ratio("error, RMS", compare_ratio(columns.errors, compare::Figure::root_mean_square, options.demand)));
-    const auto broken = compare_broken(columns.outside, options.demand);
-    std::printf(
-        "outside the interval     ours on %zu, certified on %zu of %zu legs; ours at most %.2g of legs, demanded %.2g: "
-        "%s\n",
-        broken.ours, broken.certified, broken.legs, broken.ours_at_most, options.demand.broken_at_most,
-        text_of(broken.verdict));
-    verdicts.push_back(broken.verdict);
-  }
-  return print_sum(verdicts, contradicted_legs, !columns.errors.empty()) == Verdict::worse ? kWorse : 0;
-}
-
 /// Reports that come now, until the other side's file is over, time is up, or Ctrl-C; each pair is told as it comes.
 void listen(ReportSource& ours, ReportSource& certified, Line& line, const Options& options) {
   const int64_t end_ns =
@@ -290,7 +197,8 @@ int print_comparison(const Options& options, const compare::Pairing& pairing, co
   };
   std::printf("interval not known       ours %td, certified %td of %zu: left out\n", unknown(&compare::Sample::ours),
               unknown(&compare::Sample::certified), columns.lengths.size());
-  return verdict(columns, contradicted_legs(pairing, judge), options);
+  const auto verdict = compare::print_verdict(columns, contradicted_legs(pairing, judge), options.demand);
+  return verdict == compare::Verdict::worse ? kWorse : 0;
 }
 
 void check(const Options& options) {

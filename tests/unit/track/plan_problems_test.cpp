@@ -65,14 +65,22 @@ TEST_F(PlanProblems, ValuesThatNoTrackHasAreTold) {
 }
 
 /// An ERJU track of 60 m along these azimuths, a straight every 10 m, with one more for a metre at 29 m.
-std::string erju(const std::string& azimuth_at_29) {
+std::string erju(const std::string& azimuth_at_29, const std::string& azimuth_at_0 = "90") {
   std::string lines;
   for (int at = 0; at < 60; at += 10)
-    lines += "<horizontalSegmentLine trackGeometryPos=\"" + std::to_string(1000 * at) + "\" azimuth=\"90\"/>";
+    lines += "<horizontalSegmentLine trackGeometryPos=\"" + std::to_string(1000 * at) + "\" azimuth=\"" +
+             (at == 0 ? azimuth_at_0 : "90") + "\"/>";
   return R"(<infrastructure xmlns="https://erju.org/infra"><trackEdges><trackEdge id="T1" trackEdgeLength="60000"/></trackEdges>
 <trackEdgeGeometries><trackEdgeGeometry id="T1">)" +
          lines + "<horizontalSegmentLine trackGeometryPos=\"29000\" azimuth=\"" + azimuth_at_29 +
          "\"/></trackEdgeGeometry></trackEdgeGeometries></infrastructure>";
+}
+
+TEST_F(PlanProblems, AFirstAzimuthThatIsReversedIsTheOneLeftOut) {
+  const Map map = core::value_or_throw(build_map({write("first.xml", erju("90", "270"))}, {})).map;
+  EXPECT_THAT(map.problems, Contains(HasSubstr("at 1 of its azimuths, the first at 0.00 m; left out")));
+  const auto& track = map.edges[0].alignment;
+  EXPECT_NEAR(track.at(60).pose.heading_rad, track.at(0).pose.heading_rad, 1e-9);
 }
 
 TEST_F(PlanProblems, AzimuthsThatTurnBackAreLeftOut) {

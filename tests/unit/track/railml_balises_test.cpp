@@ -56,21 +56,30 @@ TEST_F(RailmlBalises, GroupsOfRailml3HaveTheDirectionThatTheFileSays) {
 
 // The mileage that mileageDirection speaks of may fall along the net element, and the place may be told against it.
 TEST_F(RailmlBalises, DirectionsTurnWithTheNetElement) {
-  std::string falling = railml3(balise("b", "100") + group3("mileageDirection=\"reverse\""));
-  const std::string element = "<netElement id=\"n1\" length=\"1000\"/>";
-  const auto coordinate = [](const std::string& along, const std::string& measure) {
-    return "<intrinsicCoordinate intrinsicCoord=\"" + along +
-           "\"><linearCoordinate positioningSystemRef=\"s\" measure=\"" + measure + "\"/></intrinsicCoordinate>";
+  const auto along_mileage = [](const std::string& things, const std::string& begin_m, const std::string& end_m) {
+    const std::string element = "<netElement id=\"n1\" length=\"1000\"/>";
+    const auto coordinate = [](const std::string& along, const std::string& measure) {
+      return "<intrinsicCoordinate intrinsicCoord=\"" + along +
+             "\"><linearCoordinate positioningSystemRef=\"s\" measure=\"" + measure + "\"/></intrinsicCoordinate>";
+    };
+    std::string text = railml3(things);
+    return text.replace(text.find(element), element.size(),
+                        element.substr(0, element.size() - 2) + "><associatedPositioningSystem>" +
+                            coordinate("0", begin_m) + coordinate("1", end_m) +
+                            "</associatedPositioningSystem></netElement>");
   };
-  falling.replace(falling.find(element), element.size(),
-                  element.substr(0, element.size() - 2) + "><associatedPositioningSystem>" + coordinate("0", "5000") +
-                      coordinate("1", "4000") + "</associatedPositioningSystem></netElement>");
+  const std::string falling =
+      along_mileage(balise("b", "100") + group3("mileageDirection=\"reverse\""), "5000", "4000");
   EXPECT_EQ(group_of(core::value_or_throw(build_map({write("a.railml", falling)}, {})).map),
             "b at 100.0, nominal forward");
   const std::string against =
       "<linearLocation>" + on("n1", "posBegin=\"90\" posEnd=\"90\" keepsOrientation=\"false\"") + "</linearLocation>";
   const std::string text = railml3(balise("b", "90") + group3("mileageDirection=\"nominal\"", against));
   EXPECT_EQ(group_of(core::value_or_throw(build_map({write("b.railml", text)}, {})).map), "b at 90.0, nominal reverse");
+  const std::string known =
+      along_mileage(balise("b", "90") + group3("mileageDirection=\"nominal\"", against), "4000", "5000");
+  EXPECT_EQ(group_of(core::value_or_throw(build_map({write("c.railml", known)}, {})).map), "b at 90.0, nominal forward")
+      << "it is the mileage that the direction is of";
 }
 
 // Two without numbers, in the order of the file against which they apply.

@@ -134,11 +134,20 @@ class Reader {
   /// A track measured to and fro turns back for a metre or two: such azimuths are left out.
   void add_bends(const std::vector<std::pair<double, double>>& stations, NetTrack& track) {
     std::vector<std::pair<double, double>> crooked;  // station, turn
-    for (size_t i = 1, before = 0; i < stations.size(); ++i) {
+    const auto turn_of = [&](size_t a, size_t b) { return core::wrap_pi(stations[b].second - stations[a].second); };
+    const auto is_crooked = [&](size_t a, size_t b) {
+      return std::abs(turn_of(a, b)) * kSharpestRadiusM > stations[b].first - stations[a].first;
+    };
+    size_t before = 0;
+    if (stations.size() > 2 && is_crooked(0, 1) && is_crooked(0, 2) && !is_crooked(1, 2)) {
+      crooked.emplace_back(stations[0].first, std::abs(turn_of(0, 1)));
+      before = 1;  // it is the first one that is wrong
+    }
+    for (size_t i = before + 1; i < stations.size(); ++i) {
       const double length = stations[i].first - stations[before].first;
       if (length < kNearCoordinateM) continue;
-      const double turn = core::wrap_pi(stations[i].second - stations[before].second);
-      if (std::abs(turn) * kSharpestRadiusM > length) {
+      const double turn = turn_of(before, i);
+      if (is_crooked(before, i)) {
         crooked.emplace_back(stations[i].first, std::abs(turn));
         continue;
       }

@@ -141,17 +141,21 @@ class Reader {
     return applied ? applied : ordered;
   }
 
-  /// By mileageDirection, turned where the mileage falls along the track or the place is told against it.
+  /// By mileageDirection, turned where the mileage falls along the track or, where it says none, the place is told
+  /// against it.
   std::optional<bool> said_direction(const pugi::xml_node& of, const std::vector<PlacedBalise>& balises) {
     const std::string direction = of.attribute("mileageDirection").value();
     if (direction != "nominal" && direction != "reverse") return std::nullopt;
     const size_t track = balises.front().place.track;
-    bool turned = places_.mileage_falls(track);
-    for (const pugi::xml_node& part : descendants(of, "associatedNetElement")) {
-      const bool is_against = std::string(part.attribute("keepsOrientation").value()) == "false";
-      if (places_.track(part.attribute("netElementRef").value()) == track && is_against) turned = true;
-    }
-    return (direction == "nominal") != turned;
+    const auto falls = places_.mileage_falls(track);
+    return (direction == "nominal") != (falls ? *falls : is_told_against(of, track));
+  }
+
+  [[nodiscard]] bool is_told_against(const pugi::xml_node& of, size_t track) const {
+    return std::ranges::any_of(descendants(of, "associatedNetElement"), [&](const pugi::xml_node& part) {
+      return places_.track(part.attribute("netElementRef").value()) == track &&
+             std::string(part.attribute("keepsOrientation").value()) == "false";
+    });
   }
 
   [[nodiscard]] std::optional<bool> applied_direction(const pugi::xml_node& of,

@@ -8,7 +8,7 @@ namespace railfix::track {
 namespace {
 
 /// By the first system that has two measures on the net element.
-bool mileage_falls_along(const XmlSource& source, const pugi::xml_node& element) {
+std::optional<bool> mileage_falls_along(const XmlSource& source, const pugi::xml_node& element) {
   std::map<std::string, std::pair<double, double>> first_of;  // system: place, measure
   for (const pugi::xml_node& place : descendants(element, "intrinsicCoordinate")) {
     const auto along = source.number(place, "intrinsicCoord");
@@ -22,7 +22,7 @@ bool mileage_falls_along(const XmlSource& source, const pugi::xml_node& element)
         return (*along > first_along) != (*measure > first_measure);
     }
   }
-  return false;
+  return std::nullopt;
 }
 
 }  // namespace
@@ -30,7 +30,7 @@ bool mileage_falls_along(const XmlSource& source, const pugi::xml_node& element)
 void Railml3Places::add_track(const pugi::xml_node& element, size_t track) {
   const std::string id = source_.required_text(element, "id");
   if (!track_of_.emplace(id, track).second) throw source_.wrong(element, "net element \"" + id + "\" is there twice");
-  if (mileage_falls_along(source_, element)) falling_.insert(track);
+  if (const auto falls = mileage_falls_along(source_, element)) mileage_falls_[track] = *falls;
 }
 
 std::optional<size_t> Railml3Places::track(const std::string& net_element) const {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <set>
 
 #include "track/import/xml/net_places.hpp"
@@ -21,8 +22,11 @@ class Railml3Places {
 
   /// Nothing where the net element is coarse or does not exist.
   [[nodiscard]] std::optional<size_t> track(const std::string& net_element) const;
-  /// Whether the file's mileage falls along the track.
-  [[nodiscard]] bool mileage_falls(size_t track) const { return falling_.contains(track); }
+  /// Whether the file's mileage falls along the track; nothing where it says none.
+  [[nodiscard]] std::optional<bool> mileage_falls(size_t track) const {
+    const auto found = mileage_falls_.find(track);
+    return found == mileage_falls_.end() ? std::nullopt : std::optional(found->second);
+  }
   /// Where an element lies; what lies on coarser net elements only is left out.
   [[nodiscard]] std::vector<NetPlace> of(const pugi::xml_node& node);
   void tell_missing(const pugi::xml_node& of, const std::string& kind, const std::string& id,
@@ -39,7 +43,7 @@ class Railml3Places {
   RailNet& net_;
   std::map<std::string, size_t> track_of_;  // net elements
   std::set<std::string> coarse_;
-  std::set<size_t> falling_;
+  std::map<size_t, bool> mileage_falls_;  // of tracks
 };
 
 }  // namespace railfix::track

@@ -1,0 +1,95 @@
+#include "compare/verdict_text.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <string>
+
+#include "evaluation/statistics.hpp"
+
+namespace railfix::compare {
+namespace {
+
+const char* text_of(Verdict verdict) {
+  return verdict == Verdict::at_least_as_good ? "at least as good" : verdict == Verdict::worse ? "WORSE" : "not shown";
+}
+
+std::string text_of_need(const RatioResult& result) {
+  if (result.legs < kFewestLegs)
+    return "needs " + std::to_string(kFewestLegs) + " legs at least, how many is not known yet";
+  if (std::isnan(result.legs_needed)) return "how many legs it needs is not known yet";
+  if (std::isinf(result.legs_needed)) return "more legs would not show it at this ratio";
+  char text[64];
+  std::snprintf(text, sizeof text, "needs about %.0f legs if they go on like these", result.legs_needed);
+  return text;
+}
+
+Verdict print_ratio(const char* what, const RatioResult& result) {
+  std::printf("%-24s ratio %.3f (%.3f to %.3f), %zu pairs in %zu legs: %s", what, result.ratio, result.low, result.high,
+              result.samples, result.legs, text_of(result.verdict));
+  if (result.verdict == Verdict::open && result.samples > 0) std::printf("; %s", text_of_need(result).c_str());
+  std::printf("\n");
+  return result.verdict;
+}
+
+Verdict print_share(const std::vector<Sample>& samples, const Demand& demand) {
+  const auto result = compare_share(samples, demand);
+  const auto share = [&](double Sample::*side) { return 100 * evaluation::summarise(sizes_of(samples, side)).mean; };
+  std::printf("interval known           ours %.1f %%, certified %.1f %% of %zu certified reports; ",
+              share(&Sample::ours), share(&Sample::certified), samples.size());
+  return print_ratio("certified over ours:", result);
+}
+
+/// What the verdicts come to. Two intervals with nothing in common cannot both be right.
+Verdict print_sum(const std::vector<Verdict>& verdicts, size_t contradicted_legs, bool errors_known) {
+  const auto any = [&](Verdict one) { return std::ranges::count(verdicts, one) > 0; };
+  std::printf("verdict                  ");
+  if (any(Verdict::worse)) {
+    std::printf("WORSE\n");
+    return Verdict::worse;
+  }
+  if (contradicted_legs > 0) {
+    std::printf(
+        "not shown: on %zu legs the intervals have nothing in common, so one side is wrong, and only --truth "
+        "says which\n",
+        contradicted_legs);
+    return Verdict::open;
+  }
+  if (any(Verdict::open)) {
+    std::printf("not shown\n");
+    return Verdict::open;
+  }
+  std::printf("%s\n",
+              errors_known ? "at least as good" : "intervals at least as good, and as often known; errors not known");
+  return Verdict::at_least_as_good;
+}
+
+}  // namespace
+
+std::vector<double> sizes_of(const std::vector<Sample>& samples, double Sample::*side) {
+  std::vector<double> list;
+  for (const auto& sample : samples) list.push_back(std::abs(sample.*side));
+  return list;
+}
+
+Verdict print_verdict(const Columns& columns, size_t contradicted_legs, const Demand& demand) {
+  std::printf("\nGAMAB, %.0f %% confidence, margin %.0f %%, over legs (ours / certified)\n", 100 * demand.confidence,
+              100 * demand.margin);
+  std::vector<Verdict> verdicts{print_share(columns.available, demand)};
+  verdicts.push_back(print_ratio("interval length, mean", compare_ratio(columns.lengths, Figure::mean, demand)));
+  if (columns.errors.empty()) {
+    std::printf("error                    not known without --truth\n");
+  } else {
+    verdicts.push_back(print_ratio("error, RMS", compare_ratio(columns.errors, Figure::root_mean_square, demand)));
+    const auto broken = compare_broken(columns.outside, demand);
+    std::printf(
+        "outside the interval     ours on %zu, certified on %zu of %zu legs; ours at most %.2g of legs, demanded %.2g: "
+        "%s\n",
+        broken.ours, broken.certified, broken.legs, broken.ours_at_most, demand.broken_at_most,
+        text_of(broken.verdict));
+    verdicts.push_back(broken.verdict);
+  }
+  return print_sum(verdicts, contradicted_legs, !columns.errors.empty());
+}
+
+}  // namespace railfix::compare
