@@ -41,7 +41,8 @@ Ways::Ways(const Map& map) : after_(2 * map.edges.size()) {
         const Run way{next, next_forward};
         if (way == run.reversed()) continue;
         const double turn = std::abs(core::wrap_pi(leaving_heading(way) - arriving_heading(run)));
-        if (turn > core::kPi / 2) continue;
+        // Directions of a drawing say nothing where it does not close.
+        if (turn > core::kPi / 2 && !edge->is_drawn && !next->is_drawn) continue;
         const double cost = turn + (connection.diverging ? 10.0 : 0.0);
         auto& found = after_[index(run)];
         auto& cost_of = costs[index(run)];

@@ -201,6 +201,16 @@ TEST(Route, TurnsByItsCornersHoweverItIsBuiltAndRun) {
   }
 }
 
+TEST(Ways, TurnAnyhowWhereTheTracksAreOnlyDrawn) {
+  for (const bool drawn : {false, true}) {
+    Map map = cornered(2.5, 0);
+    map.connections = {{2, 1, 2, false}};
+    map.edges[1].is_drawn = drawn;
+    const Ways ways(map);
+    EXPECT_EQ(ways.after({&map.edges[0], true}).size(), drawn ? 1U : 0U);
+  }
+}
+
 TEST(Route, HasNoCornersWhereItIsOnlyDrawnOrNoTurnoutIsSo) {
   for (const bool drawn : {false, true}) {
     Map map = cornered(drawn ? 0.11 : 0.6, 0);
