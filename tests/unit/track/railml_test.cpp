@@ -261,7 +261,7 @@ TEST_F(RailmlTest, DegreesOfRailml3ArePutIntoAPlane) {
     std::snprintf(text, sizeof text, "x=\"%.9f\" y=\"%.9f\"", geo.lon_deg, geo.lat_deg);
     return std::string(text);
   };
-  for (const char* system : {"EPSG:4326", "urn:ogc:def:crs:EPSG::4258"}) {
+  for (const char* system : {"EPSG:4326", "urn:ogc:def:crs:EPSG::4258", "WGS84"}) {
     const Map map = core::value_or_throw(build_map({write("a.railml", railml3_along(system, degrees))}, {})).map;
     EXPECT_NEAR(map.edges.at(0).alignment.length_m(), 1000.4, 0.05) << "on the ellipsoid, not in UTM";
     const GeoPoint end = map.to_geo(map.nodes.at(1).easting_m, map.nodes.at(1).northing_m).value();

@@ -1,5 +1,7 @@
 #include "track/import/xml/railml_plane.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "track/import/local_crs.hpp"
@@ -12,6 +14,8 @@ std::string epsg_number(const std::string& text) {
 }
 
 bool is_geographic(const std::string& system) {
+  constexpr std::array kNames = {"WGS84", "WGS 84", "ETRS89"};
+  if (std::ranges::find(kNames, system) != kNames.end()) return true;
   const std::string number = epsg_number(system);
   const bool is_epsg = system.find("EPSG") != std::string::npos || system.find("epsg") != std::string::npos;
   return is_epsg && (number == "4326" || number == "4258");

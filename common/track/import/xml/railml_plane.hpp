@@ -30,7 +30,8 @@ class RailmlPlane {
   std::optional<Projection> projection_;  // of geographic ones
 };
 
-/// "EPSG:4326", "urn:ogc:def:crs:EPSG::4326", "https://www.opengis.net/def/crs/EPSG/0/4326", and EPSG:4258 likewise.
+/// "EPSG:4326", "urn:ogc:def:crs:EPSG::4326", "https://www.opengis.net/def/crs/EPSG/0/4326", EPSG:4258 likewise, and
+/// the names WGS84 and ETRS89.
 bool is_geographic(const std::string& system);
 
 /// Digits at the end of "4326" and of every other spelling; empty when there are none.
