@@ -13,7 +13,6 @@ namespace {
 
 constexpr double kRailsFreshS = 0.5;
 constexpr double kShortestStepM = 0.05;
-constexpr double kLeastWayM = 1e-5;       // standing still turns nothing
 constexpr double kTrackEveryS = 1.0;      // the track is said again after this time ...
 constexpr double kOpenTrackEveryM = 2.0;  // ... or, while it is not known, this way
 constexpr double kNoCameraS = 0.5;        // without an odometry step

@@ -19,6 +19,8 @@ struct Sighting {
 
 enum class TurnSensor : uint8_t { camera, gyro };
 
+inline constexpr double kLeastWayM = 1e-5;  // a train that stands turns nothing
+
 /// How far the train ran and how it turned meanwhile (left positive).
 struct Turn {
   double way_m = 0;

@@ -12,7 +12,6 @@ namespace railfix::track {
 namespace {
 
 constexpr double kGapM = 0.05;
-constexpr double kNearMissM = 1.5;
 constexpr double kSharpestPerM = 1.0 / 80.0;
 constexpr double kSteepest = 0.075;
 constexpr double kMostCantM = 0.3;

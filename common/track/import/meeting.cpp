@@ -9,7 +9,6 @@
 namespace railfix::track {
 namespace {
 
-constexpr double kNearMissM = 1.5;  // nearer ends of two edges are told as such
 constexpr double kFacingM = 50.0;
 constexpr double kFacingRad = core::rad_from_deg(10.0);
 constexpr double kBesideM = 2.0;  // the next track is farther away

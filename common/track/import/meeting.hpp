@@ -12,6 +12,9 @@ namespace railfix::track {
 /// Straight blades turn by 1 in 40 (1.4 degrees) at the most: no track has more, on a switch or elsewhere.
 constexpr double kKinkRad = core::rad_from_deg(2.0);
 
+/// A loose end so near to a track should meet it; a gap in line is longer.
+constexpr double kNearMissM = 1.5;
+
 /// Loose ends that face each other over a gap in line: the track between them is missing.
 std::vector<std::string> facing_ends(const Map& map);
 

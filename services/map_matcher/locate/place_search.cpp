@@ -3,11 +3,6 @@
 #include <cmath>
 
 namespace railfix::map_matcher {
-namespace {
-
-constexpr double kLeastWayM = 1e-5;  // standing still turns nothing
-
-}  // namespace
 
 void PlaceSearch::follow(bool track_known, bool usable) {
   if (!track_known && stage_ != Stage::unknown) of_gnss_ = false;
