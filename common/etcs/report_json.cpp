@@ -124,12 +124,18 @@ core::Result<OtherPacket> packet_from_json(const Json& json) {
   return packet;
 }
 
+/// Empty where the key is not there.
+Json list_of(const Json& json, const std::string& key, JsonReader& reader) {
+  const auto list = json.find(key);
+  if (list == json.end()) return Json::array();
+  reader.use(key);
+  if (list->is_array()) return *list;
+  reader.fail({"\"" + key + "\" must be a list."});
+  return Json::array();
+}
+
 void read_packets(const Json& json, JsonReader& reader, std::vector<OtherPacket>& packets) {
-  const auto list = json.find("packets");
-  if (list == json.end()) return;
-  reader.use("packets");
-  if (!list->is_array()) return reader.fail({"\"packets\" must be a list."});
-  for (const auto& entry : *list) {
+  for (const auto& entry : list_of(json, "packets", reader)) {
     auto packet = packet_from_json(entry);
     if (!packet.ok()) return reader.fail(packet.error());
     packets.push_back(std::move(packet).value());
@@ -157,11 +163,7 @@ core::Result<Json> with_lrbg(Json json) {
 }
 
 void read_locations(const Json& json, JsonReader& reader, std::vector<ReportLocation>& locations) {
-  const auto list = json.find("locations");
-  if (list == json.end()) return;
-  reader.use("locations");
-  if (!list->is_array()) return reader.fail({"\"locations\" must be a list."});
-  for (const auto& entry : *list) {
+  for (const auto& entry : list_of(json, "locations", reader)) {
     if (!entry.is_object()) return reader.fail({"An entry of \"locations\" is not a JSON object."});
     JsonReader fields(entry);
     visit_location(locations.emplace_back(), fields);

@@ -84,8 +84,9 @@ inline msg::TrainPose message_of(const PoseEstimate& p) {
   return m;
 }
 
-inline KnownPlace known_place_of(const msg::TrainState& m) {
-  return {m.stamp_ns(), messaging::place_of(m), m.speed_mps(), m.over_m(), m.under_m(), m.track_probability(), false};
+inline KnownPlace known_place_of(const msg::TrainState& m, bool in_doubt) {
+  return {m.stamp_ns(), messaging::place_of(m), m.speed_mps(), m.over_m(),
+          m.under_m(),  m.track_probability(),  in_doubt};
 }
 
 inline const char* topic_of(const Event& event) {

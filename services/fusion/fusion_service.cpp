@@ -100,7 +100,8 @@ void FusionService::hear(const msg::TrainState& state) {
   const double since_s = core::seconds(state.stamp_ns() - latest_->stamp_ns());
   distance_offset_m_ += state.distance_m() - (latest_->distance_m() + speed_mps * since_s);
   if (learnt_ || !map_ || state.track_known() == 0 || state.integrity() == msg::INTEGRITY_UNUSABLE) return;
-  if (!place_at(map_, known_place_of(state), state.stamp_ns(), config_.parameters.interval_factor)) return;  // soon
+  if (!place_at(map_, known_place_of(state, false), state.stamp_ns(), config_.parameters.interval_factor))
+    return;  // soon
   learnt_ = true;
   known_ = state;
   known_in_doubt_ = false;
@@ -155,8 +156,7 @@ bool FusionService::take_over_known(const TrainEstimate& first) {
   const double speed_mps = std::isfinite(known_->speed_mps()) ? known_->speed_mps() : 0;
   distance_offset_m_ = known_->distance_m() + speed_mps * age_s - first.distance_m;
   if (begun_anew_) {
-    KnownPlace known = known_place_of(*known_);
-    known.in_doubt = known_in_doubt_;
+    const auto known = known_place_of(*known_, known_in_doubt_);
     if (const auto place = place_at(map_, known, first.stamp_ns, config_.parameters.interval_factor)) {
       fusion_->add(*place);
     } else {

@@ -31,7 +31,8 @@ void MapMatcherService::listen(const MapMatcherConfig& config) {
   namespace topics = messaging::topics;
   if (config.use_imu) {
     context_.on<msg::ImuSample>(topics::imu_sample, [this](const msg::ImuSample& m) {
-      if (takes("imu_sample", input_of(m))) matcher_.add(input_of(m));
+      const auto input = input_of(m);
+      if (takes("imu_sample", input)) matcher_.add(input);
     });
   }
   if (config.use_gnss) context_.on<msg::GnssFix>(topics::gnss_fix, [this](const msg::GnssFix& m) { use(m); });
@@ -49,13 +50,14 @@ bool MapMatcherService::takes(const char* topic, const Input& input) {
 }
 
 void MapMatcherService::use(const msg::TrainState& state) {
-  if (state.track_known() != 0 && !takes("train_state", input_of(state))) {
+  const auto input = input_of(state);
+  if (input.track_known && !takes("train_state", input)) {
     context_.health().degraded(left_out_.sentence(state_ns_));
     return;
   }
   context_.health().input();
   state_ns_ = state.stamp_ns();
-  say(matcher_.add(input_of(state)), 0);
+  say(matcher_.add(input), 0);
   std::string why = matcher_.trouble();
   if (const auto left_out = left_out_.sentence(state_ns_); !left_out.empty()) {
     why += (why.empty() ? "" : "; ") + left_out;
@@ -68,18 +70,21 @@ void MapMatcherService::use(const msg::TrainState& state) {
 }
 
 void MapMatcherService::use(const msg::OdometryStep& step) {
-  if (takes("odometry_step", input_of(step))) say(matcher_.add(input_of(step)), step.grabbed_ns());
+  const auto input = input_of(step);
+  if (takes("odometry_step", input)) say(matcher_.add(input), step.grabbed_ns());
 }
 
 void MapMatcherService::use(const msg::TrackView& view) {
-  if (view.seen_left() == 0 || view.seen_right() == 0 || !takes("track_view", input_of(view))) return;
-  matcher_.add(input_of(view));
+  if (view.seen_left() == 0 || view.seen_right() == 0) return;
+  const auto input = input_of(view);
+  if (takes("track_view", input)) matcher_.add(input);
 }
 
 void MapMatcherService::use(const msg::LandmarkSighting& sighting) {
-  if (!takes("landmark_sighting", input_of(sighting))) return;
+  const auto input = input_of(sighting);
+  if (!takes("landmark_sighting", input)) return;
   context_.health().input();
-  say(matcher_.add(input_of(sighting)), sighting.grabbed_ns());
+  say(matcher_.add(input), sighting.grabbed_ns());
 }
 
 void MapMatcherService::use(const msg::GnssFix& fix) {

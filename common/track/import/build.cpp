@@ -115,9 +115,7 @@ class Sources {
     choose_crs();
     for (RailNet& net : nets_) {
       const bool is_surveyed = !net.crs.empty();
-      const size_t first = map_.edges.size();
-      append(draft_of(net), map_);  // every track is one edge
-      for (size_t i = 0; i < net.tracks.size(); ++i) map_.edges[first + i].is_drawn = !net.tracks[i].has_shape();
+      append(draft_of(net), map_);
       if (is_surveyed) add_frogs(map_, kPlanFrogSigmaM);
       std::move(net.problems.begin(), net.problems.end(), std::back_inserter(map_.problems));
       out_.plans.include(net.figures);

@@ -191,6 +191,7 @@ void add_pieces(const ImportedTrack& track, const std::vector<TrackCut>& cuts, D
     DraftEdge edge;
     edge.track.name = i == 0 ? track.name : track.name + "#" + std::to_string(i + 1);
     edge.track.line = track.line;
+    edge.track.is_drawn = track.is_drawn;
     edge.track.alignment = slice(track.alignment, from, to);
     take_marks(track, from, to, i + 2 == cuts.size(), edge.track);
     edge.leaving_from_rad = leaving_rad(edge.track.alignment, false);
@@ -246,7 +247,8 @@ void append(const Draft& draft, Map& map) {
                          .to_node = first_node + static_cast<uint32_t>(in.to_node),
                          .line = in.track.line,
                          .alignment = in.track.alignment,
-                         .speed_limits = in.track.speed_limits});
+                         .speed_limits = in.track.speed_limits,
+                         .is_drawn = in.track.is_drawn});
     for (const TrackMark& mark : in.track.marks) add_landmark(id, mark);
     for (const TrackGroup& in_group : in.track.groups) {
       BaliseGroup group{.nid_c = in_group.nid_c,

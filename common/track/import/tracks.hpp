@@ -49,6 +49,7 @@ struct ImportedTrack {
   std::vector<TrackMark> marks{};
   std::vector<TrackGroup> groups{};
   std::vector<SpeedLimit> speed_limits{};
+  bool is_drawn = false;  // as Edge::is_drawn
 };
 
 /// Adds limits that hold from a place on, as the train runs, up to the next one or the end of the track. What is no

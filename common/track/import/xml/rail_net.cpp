@@ -165,6 +165,7 @@ class Planner {
   /// Lays a track entered at `from`. A branch steps aside onto a parallel, and back where its far end is one too.
   void lay_track(const NetEnd& from, const PlanPose& pose, double side) {
     NetTrack& track = net_.tracks[from.track];
+    track.track.is_drawn = true;
     std::vector<Element> elements = plan_of(track);
     if (from.at_end) {
       const std::vector<Element> forward = elements;

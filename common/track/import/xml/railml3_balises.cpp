@@ -56,24 +56,21 @@ class Reader {
       return;
     }
     if (!identity) {
-      tell(node, "has no ETCS identity (countryID and groupID); its balises are kept as landmarks");
-      for (const PlacedBalise& balise : balises) keep_as_landmark(balise);
-      return;
+      return keep_as_landmarks(node, balises,
+                               "has no ETCS identity (countryID and groupID); its balises are kept as landmarks");
     }
     std::stable_sort(balises.begin(), balises.end(), [](const PlacedBalise& a, const PlacedBalise& b) {
       return a.number && (!b.number || *a.number < *b.number);
     });
     if (balises.front().number.value_or(0) > kLastReferenceNumber) {
-      tell(node, "has no balise number 0 or 1, which its place counts from; its balises are kept as landmarks");
-      for (const PlacedBalise& balise : balises) keep_as_landmark(balise);
-      return;
+      return keep_as_landmarks(
+          node, balises, "has no balise number 0 or 1, which its place counts from; its balises are kept as landmarks");
     }
     if (is_order_open(node, balises)) {
-      tell(node,
-           "is reversed and lies on two net elements, and no numbers say which balise is its first; they are kept "
-           "as landmarks");
-      for (const PlacedBalise& balise : balises) keep_as_landmark(balise);
-      return;
+      return keep_as_landmarks(
+          node, balises,
+          "is reversed and lies on two net elements, and no numbers say which balise is its first; they are kept "
+          "as landmarks");
     }
     const std::optional<bool> said = said_direction(node, balises);
     if (said) sort_by_place(balises, *said);
@@ -109,11 +106,10 @@ class Reader {
     }
     const std::optional<bool> forward = nominal_is_forward(of, here, balises, said);
     if (!forward) {
-      tell(of,
-           "says no direction: it has no mileageDirection, nor balises at two places; its balises are kept as "
-           "landmarks");
-      for (const PlacedBalise& balise : balises) keep_as_landmark(balise);
-      return;
+      return keep_as_landmarks(
+          of, balises,
+          "says no direction: it has no mileageDirection, nor balises at two places; its balises are kept as "
+          "landmarks");
     }
     for (const PlacedBalise& balise : balises) {
       if (balise.place.track != first.track) keep_as_landmark(balise);
@@ -168,6 +164,12 @@ class Reader {
       }
     }
     return std::nullopt;
+  }
+
+  void keep_as_landmarks(const pugi::xml_node& group, const std::vector<PlacedBalise>& balises,
+                         const std::string& because) {
+    tell(group, because);
+    for (const PlacedBalise& balise : balises) keep_as_landmark(balise);
   }
 
   void keep_as_landmark(const PlacedBalise& balise) {
