@@ -398,9 +398,13 @@ void Estimator::remember_turn(double rate_rps, double speed_mps) {
                    parameters_->gyro_sigma_rps * period_s, period_s});
 }
 
-// Where no switch was run over there is no other leg, and where the place is in doubt its turns say nothing.
+// Where no switch was run over there is no other leg, and where the place is in doubt its turns say nothing. One mast
+// may stand beside both legs: as long as the points are among what is remembered, having seen it says less than the
+// turns.
 void Estimator::compare_turns() {
-  if (wrong_place_.lost() || !track_doubt_.divided()) return;
+  const auto points_m = track_doubt_.divided_at_m();
+  const bool passed = points_m && turned_way_.holds(*points_m);
+  if (wrong_place_.lost() || (!track_doubt_.divided() && !passed)) return;
   const auto promised = widened(interval());
   const double half_m = 0.5 * (promised.ahead_m - promised.behind_m);
   const double place_m = std::max(filter_.path_sigma_m(), half_m / parameters_->interval_factor);

@@ -181,7 +181,10 @@ void Estimator::accept(const FixInput& fix) {
   off_path_.reset();
   // Some curve may fit at a place that nobody has confirmed, though the train turns otherwise than the track there.
   const bool by_chance = fix.kind == FixKind::curvature && (is_only_told() || track_doubt_.turns_otherwise());
-  if (!by_chance) track_doubt_.seen_here();
+  if (!by_chance) {
+    track_doubt_.seen_here();
+    compare_turns();
+  }
   if (by_chance && std::abs(fix_offer_.residual) < kBendsHereM) wrong_place_.bends_here();
   if (fix.kind == FixKind::landmark) of_gnss_ = false;
   // A vague fix helps, but settles no doubt and is nothing to measure a distance from. Landmarks are sharp by

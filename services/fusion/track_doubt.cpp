@@ -66,7 +66,9 @@ void TrackDoubt::move(const track::Path& path, double place_m) {
       return s.ahead != ahead && std::abs(s.distance_m - one->distance_m) < kSameSwitchM;
     });
     if (one->ahead == ahead) open_.push_back(*one);
-    divided_ = divided_ || one->ahead == ahead;
+    if (one->ahead != ahead) continue;
+    divided_ = true;
+    divided_at_m_ = one->distance_m;
   }
 }
 

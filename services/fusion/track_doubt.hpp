@@ -25,6 +25,8 @@ class TrackDoubt {
   void turned(bool fits, bool bends);
   /// A switch was run over since anything on this track was seen, or nothing was: only then another one is possible.
   [[nodiscard]] bool divided() const { return divided_; }
+  /// Where on the path the last such switch was run over, ever; nothing: none was.
+  [[nodiscard]] std::optional<double> divided_at_m() const { return divided_at_m_; }
   /// There all its turns together are none of this track's.
   void strayed() { turns_otherwise_ = true; }
   [[nodiscard]] bool turns_otherwise() const { return turns_otherwise_; }
@@ -42,10 +44,11 @@ class TrackDoubt {
   double said_ = 1;
   std::optional<double> place_m_;
   std::vector<track::PathSwitch> open_;  // run over since somebody looked
-  bool divided_ = true;                  // a switch was run over since a place on this track was seen, or none was
-  double here_at_most_ = 1;              // by what was seen elsewhere
-  int turned_otherwise_ = 0;             // in a row
-  int turned_alike_ = 0;                 // in bends, in a row
+  std::optional<double> divided_at_m_;
+  bool divided_ = true;       // a switch was run over since a place on this track was seen, or none was
+  double here_at_most_ = 1;   // by what was seen elsewhere
+  int turned_otherwise_ = 0;  // in a row
+  int turned_alike_ = 0;      // in bends, in a row
   bool turns_otherwise_ = false;
 };
 

@@ -8,6 +8,8 @@
 namespace railfix::fusion {
 namespace {
 
+constexpr double kPieceM = 10.0;  // slower seconds are one piece: points are some 100 m long, at any speed
+constexpr double kFelt = 2.0;     // sigmas: a gyro that feels less has met no bump
 constexpr double kJumpM = 3.0;
 constexpr double kJumpShare = 0.1;        // of a piece: the speed changes in it
 constexpr double kMapTurnShare = 0.15;    // a map has its curves so wrong, ...
@@ -23,15 +25,24 @@ void TurnedWay::add(Piece piece) {
   const double way_m = piece.to_m - piece.from_m;
   if (!pieces_.empty()) {
     const Piece& last = pieces_.back();
-    const bool goes_on = std::abs(piece.from_m - last.to_m) < kJumpM + kJumpShare * std::abs(way_m);
-    if (goes_on && way_m * (last.to_m - last.from_m) > 0) {
-      piece.from_m = last.to_m;
-    } else {
+    const bool near = std::abs(piece.from_m - last.to_m) < kJumpM + kJumpShare * std::abs(way_m);
+    const double last_m = last.to_m - last.from_m;
+    if (!near || way_m * last_m <= 0) {
       pieces_.clear();
+    } else if (std::abs(last_m) < kPieceM) {
+      piece = {last.from_m, piece.to_m, last.turn_rad + piece.turn_rad, std::hypot(last.sigma_rad, piece.sigma_rad),
+               last.time_s + piece.time_s};
+      pieces_.pop_back();
+    } else {
+      piece.from_m = last.to_m;
     }
   }
   if (pieces_.size() == kMost) pieces_.erase(pieces_.begin());
   pieces_.push_back(piece);
+}
+
+bool TurnedWay::holds(double distance_m) const {
+  return !pieces_.empty() && (pieces_.front().from_m - distance_m) * (pieces_.back().to_m - distance_m) <= 0;
 }
 
 TurnedWay::Strays TurnedWay::strays(const track::Path& path, const Errors& errors) const {
@@ -46,6 +57,7 @@ TurnedWay::Strays TurnedWay::strays(const track::Path& path, const Errors& error
 TurnedWay::Strays TurnedWay::strays_shifted(const track::Path& path, const Errors& errors, double behind_m) const {
   struct Sum {
     double off_rad = 0, variance = 0, bend_rad = 0, time_s = 0, curvature_per_m = 0;
+    double bump_rad = 0;  // what the last piece alone may have brought
   };
   if (pieces_.empty()) return {};
   track::TrackPoint begin = path.at(pieces_.front().from_m - behind_m);
@@ -57,14 +69,20 @@ TurnedWay::Strays TurnedWay::strays_shifted(const track::Path& path, const Error
     const double bend_rad = core::wrap_pi(begin.pose.heading_rad - end.pose.heading_rad);
     begin = end;
     const Sum& before = sums.back();
-    const Sum sum{before.off_rad + piece.turn_rad - bend_rad, before.variance + piece.sigma_rad * piece.sigma_rad,
-                  before.bend_rad + std::abs(bend_rad), before.time_s + piece.time_s, end.curvature_per_m};
+    const double piece_off_rad = piece.turn_rad - bend_rad;
+    const bool felt = std::abs(piece.turn_rad) > kFelt * std::hypot(piece.sigma_rad, errors.bias_rps * piece.time_s);
+    const Sum sum{before.off_rad + piece_off_rad,
+                  before.variance + piece.sigma_rad * piece.sigma_rad,
+                  before.bend_rad + std::abs(bend_rad),
+                  before.time_s + piece.time_s,
+                  end.curvature_per_m,
+                  felt ? std::abs(piece_off_rad) : 0};
     sums.push_back(sum);
     double worst_rad = 0;
     for (size_t i = sums.size() - 1; i-- > 0;) {
       const Sum& from = sums[i];
       const double off_rad = sum.off_rad - from.off_rad;
-      worst_rad = std::max(worst_rad, std::abs(sums[i + 1].off_rad - from.off_rad));
+      worst_rad = std::max(worst_rad, sums[i + 1].bump_rad);
       const double gyro_rad =
           std::hypot(std::sqrt(sum.variance - from.variance), errors.bias_rps * (sum.time_s - from.time_s));
       const double map_rad = std::hypot(kMapHeadingRad, kMapTurnShare * (sum.bend_rad - from.bend_rad));

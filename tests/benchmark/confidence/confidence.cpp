@@ -114,9 +114,10 @@ void print(const CampaignResult& result) {
                 runs(fusion::SavedScalesAre::on_trial));
   }
   std::printf(
-      "on a leg that the train did not take: %zu states, %zu of them declared and ok, for up to %.1f s (run %llu)\n",
+      "on a leg that the train did not take: %zu states, %zu of them declared and ok, for up to %.1f s (run %llu), "
+      "%.0f m\n",
       result.sum.other_leg, result.sum.other_leg_sure, result.sum.other_leg_sure_s,
-      static_cast<unsigned long long>(result.longest_other_leg));
+      static_cast<unsigned long long>(result.longest_other_leg), result.sum.other_leg_sure_m);
   std::printf("outside: %zu states, %zu of them usable, %zu ok, %zu since a place was given up; no place: %zu of %zu\n",
               result.sum.outside, result.sum.outside_usable, result.sum.outside_ok, result.sum.outside_again,
               result.sum.placeless, result.sum.states);

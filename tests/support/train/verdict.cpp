@@ -60,7 +60,7 @@ class Judge {
     if (wider) judge_width(state, ok);
     verdict_.not_ok += ok ? 0 : 1;
     verdict_.width_sum_m += state.over_m + state.under_m;
-    judge_track(state, ok);
+    judge_track(state, ok, truth.distance_m);
     const auto& fault = simulation_.plan().fault;
     const bool named = state.reason.find(name_in_reason(fault.sensor)) != std::string::npos;
     if (fault.sensor != Sensor::none && fault.active(arrival_s) && named) ++verdict_.told;
@@ -78,21 +78,27 @@ class Judge {
     verdict_.wider_alone += state.reason == "interval wider than allowed" ? 1 : 0;
   }
 
-  void judge_track(const fusion::TrainEstimate& state, bool ok) {
+  void judge_track(const fusion::TrainEstimate& state, bool ok, double way_m) {
     const bool other = state.track_known && !simulation_.on_way(state.position);
     const bool sure = other && ok && state.track_probability >= track::kDeclaredProbability;
     verdict_.other_leg += other ? 1 : 0;
     verdict_.other_leg_sure += sure ? 1 : 0;
-    if (!sure || !sure_since_ns_) sure_since_ns_ = sure ? std::optional(state.stamp_ns) : std::nullopt;
-    if (sure)
-      verdict_.other_leg_sure_s = std::max(verdict_.other_leg_sure_s, core::seconds(state.stamp_ns - *sure_since_ns_));
+    if (!sure || !sure_since_) sure_since_ = sure ? std::optional(SureSince{state.stamp_ns, way_m}) : std::nullopt;
+    if (!sure) return;
+    verdict_.other_leg_sure_s =
+        std::max(verdict_.other_leg_sure_s, core::seconds(state.stamp_ns - sure_since_->stamp_ns));
+    verdict_.other_leg_sure_m = std::max(verdict_.other_leg_sure_m, std::abs(way_m - sure_since_->way_m));
   }
 
   const TrainSimulation& simulation_;
   double after_m_;
   const Watcher& watcher_;
   Verdict verdict_;
-  std::optional<int64_t> sure_since_ns_;  // a leg is declared that the train did not take
+  struct SureSince {
+    int64_t stamp_ns;
+    double way_m;
+  };
+  std::optional<SureSince> sure_since_;  // a leg is declared that the train did not take
 };
 
 }  // namespace
@@ -115,6 +121,7 @@ void Verdict::add(const Verdict& other) {
   other_leg += other.other_leg;
   other_leg_sure += other.other_leg_sure;
   other_leg_sure_s = std::max(other_leg_sure_s, other.other_leg_sure_s);
+  other_leg_sure_m = std::max(other_leg_sure_m, other.other_leg_sure_m);
   width_sum_m += other.width_sum_m;
   errors_m.insert(errors_m.end(), other.errors_m.begin(), other.errors_m.end());
 }

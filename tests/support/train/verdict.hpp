@@ -25,7 +25,8 @@ struct Verdict {
   size_t told = 0;              // states that name the faulty sensor while its fault lasts
   size_t other_leg = 0;         // states on a leg that the train did not take ...
   size_t other_leg_sure = 0;    // ... while they say ok and that the track is declared
-  double other_leg_sure_s = 0;  // so long at most, without a break
+  double other_leg_sure_s = 0;  // so long at most, without a break ...
+  double other_leg_sure_m = 0;  // ... and over so much of the way
   double width_sum_m = 0;       // over + under
   std::vector<float> errors_m;  // absolute, of every state after `after_m`
 

@@ -73,6 +73,17 @@ TEST(TurnedWay, BeginsAnewWhereTheTrainBacks) {
   EXPECT_LT(way.strays(turnout, kErrors).most, 3);
 }
 
+TEST(TurnedWay, HoldsTheLastTwelveSecondsOfTheWayInEitherDirection) {
+  const auto straight = leg(INFINITY);
+  EXPECT_FALSE(TurnedWay{}.holds(0));
+  const auto way = ridden(straight, 0, 300, 10, 0);
+  EXPECT_TRUE(way.holds(181) && way.holds(300));
+  EXPECT_FALSE(way.holds(179) || way.holds(301));
+  const auto back = ridden(straight, 300, 250, -10, 0);
+  EXPECT_TRUE(back.holds(251) && back.holds(300));
+  EXPECT_FALSE(back.holds(249));
+}
+
 TEST(TurnedWay, ABumpIsOneWorstPiece) {
   const auto straight = leg(INFINITY);
   auto way = ridden(straight, 0, 100, 20, 0);
@@ -80,6 +91,20 @@ TEST(TurnedWay, ABumpIsOneWorstPiece) {
   const auto strays = way.strays(straight, kErrors);
   EXPECT_GT(strays.most, 4);
   EXPECT_LT(strays.without_worst, 1);
+}
+
+TEST(TurnedWay, ATurnOfTheTrackThatWasNotFeltIsNoBump) {
+  const auto on = ridden(leg(INFINITY), kPointsM - 120, kPointsM + 120, 40, 0);  // over the points within a second
+  const auto strays = on.strays(leg(190), kErrors);
+  EXPECT_GT(strays.most, 4);
+  EXPECT_EQ(strays.without_worst, strays.most);
+}
+
+TEST(TurnedWay, ATrainAtWalkingPaceStillRemembersThePoints) {
+  const auto way = ridden(leg(500), kPointsM - 20, kPointsM + 80, 1.5, 0);
+  EXPECT_TRUE(way.holds(kPointsM));
+  EXPECT_LT(way.strays(leg(500), kErrors).most, 3);
+  EXPECT_GT(way.strays(leg(INFINITY), kErrors).without_worst, 2);
 }
 
 TEST(TurnedWay, PointsThatAreDrawnTenMetresElsewhereAreNoOtherLeg) {

@@ -101,6 +101,20 @@ TEST_F(WrongLeg, ATrainThatTurnsOtherwiseDoubtsIt) {
   EXPECT_THAT(state.reason, Not(HasSubstr("turns otherwise")));
 }
 
+// What is sighted is looked for on the leg that is believed, and masts stand beside both.
+TEST_F(WrongLeg, AMastBesideItDoesNotSettleWhatTheTurnoutContradicts) {
+  go(0, 7, 0);
+  declare(7, kLeft, 40);
+  go(7, 8, 0);
+  landmark(8, kLeft, 60);
+  EXPECT_EQ(go(8, 13, 0).track_probability, 0.5);
+  landmark(13, kLeft, 160);
+  EXPECT_EQ(go(13, 13.1, 0).track_probability, 0.5) << "the points are no 12 s behind it";
+  go(13.1, 25, 0.001);
+  landmark(25, kLeft, 400);
+  EXPECT_EQ(go(25, 25.1, 0.001).track_probability, 0.9995) << "nothing speaks against it any more";
+}
+
 // On the turnout it has turned, or not, before anybody said which leg it took.
 TEST_F(WrongLeg, ADeclarationThatTheTurnoutBehindContradictsIsDoubtedAtOnce) {
   go(0, 11, 0);
