@@ -10,7 +10,8 @@ namespace railfix::fusion {
 namespace {
 
 constexpr int kAgreementsOfGnss = 5;  // in a row: where it scatters one agrees by chance
-constexpr double kForgotten = 2.0;    // of a landmark's sigmas is the place's when the way since has outgrown it
+constexpr double kSurprisingSigmas = 3.0;
+constexpr double kForgotten = 2.0;  // of a landmark's sigmas is the place's when the way since has outgrown it
 constexpr double kBesideLandmarkS = 1.0;
 constexpr double kBendsHereM = 3.0;  // in a window of some 50 m to either side that is rarely by chance
 constexpr double kOffTrackM = 15.0;  // a GNSS fix further beside the track is none
@@ -129,7 +130,10 @@ void Estimator::use(const FixInput& fix) {
   if (fix_offer_.used) {
     corrected_ = false;
     accept(fix);
-    if (fix_used() && fix.kind == FixKind::landmark && !fix_again_) ++landmarks_agreed_;
+    if (fix_used() && fix.kind == FixKind::landmark && !fix_again_) {
+      ++landmarks_agreed_;
+      doubt_surprise(fix.sigma_m);
+    }
   } else {
     refuse(fix, *path_distance_m, fix_offer_);
   }
@@ -201,6 +205,13 @@ void Estimator::accept(const FixInput& fix) {
     met_.front() = fix.landmark;
   }
   filter_.mark_reference();
+}
+
+// It or the one before is wrong by more than it says, or both are: what makes one err makes its neighbour err alike.
+// Until the next one.
+void Estimator::doubt_surprise(double sigma_m) {
+  if (fix_sigmas_off(excess_m_) < kSurprisingSigmas) return;
+  doubt_behind_m_ = doubt_ahead_m_ = std::abs(fix_offer_.residual) + parameters_->interval_factor * sigma_m;
 }
 
 // One fix alone never moves the train against the filter; a second one elsewhere that says the same does.
