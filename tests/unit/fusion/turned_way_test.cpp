@@ -100,6 +100,18 @@ TEST(TurnedWay, ATurnOfTheTrackThatWasNotFeltIsNoBump) {
   EXPECT_EQ(strays.without_worst, strays.most);
 }
 
+TEST(TurnedWay, AHaltIsNoWayBack) {
+  auto way = ridden(leg(190), kPointsM - 60, kPointsM + 70, 11, 0);
+  const double here_m = kPointsM + 72;
+  for (int second = 0; second < 20; ++second) {
+    const double jitter_m = second % 2 == 0 ? -0.1 : 0.1;
+    way.add({here_m, here_m + jitter_m, 0, kSigmaRad, 1});
+  }
+  EXPECT_TRUE(way.holds(kPointsM));
+  EXPECT_LT(way.strays(leg(190), kErrors).most, 3);
+  EXPECT_GT(way.strays(leg(INFINITY), kErrors).most, 4);
+}
+
 TEST(TurnedWay, ATrainAtWalkingPaceStillRemembersThePoints) {
   const auto way = ridden(leg(500), kPointsM - 20, kPointsM + 80, 1.5, 0);
   EXPECT_TRUE(way.holds(kPointsM));
