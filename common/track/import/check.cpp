@@ -52,6 +52,7 @@ class Check {
       check_end(edge, edge.to_node, edge.alignment.at(edge.alignment.length_m()).pose);
     }
     for (const Node& node : map_.nodes) check_node(node);
+    take(near_misses(map_));
     take(facing_ends(map_));
     take(kinks_at_nodes(map_));
     check_balises();
@@ -120,21 +121,6 @@ class Check {
     if (node.kind == NodeKind::railway_switch && meeting < 3) {
       problems_.push_back(where + " is a switch but only " + std::to_string(meeting) + " track" +
                           (meeting == 1 ? " meets" : "s meet") + " there");
-    }
-    if (node.kind == NodeKind::end && meeting == 1) check_near_miss(node, *ends_[node.id].front());
-  }
-
-  /// A loose end beside another track is more likely a mistake than a buffer stop.
-  void check_near_miss(const Node& node, const Edge& own) {
-    if (own.is_drawn) return;
-    for (const Edge& other : map_.edges) {
-      if (other.is_drawn || other.id == own.id || other.from_node == node.id || other.to_node == node.id) continue;
-      const PlanPose& start = other.alignment.starts().front();
-      if (distance(start, node) > other.alignment.length_m() + kNearMissM) continue;
-      const Alignment::Nearest nearest = other.alignment.nearest(node.easting_m, node.northing_m);
-      if (std::abs(nearest.lateral_m) > kNearMissM) continue;
-      problems_.push_back(called(own) + " ends loose at node " + std::to_string(node.id) + ", only " +
-                          told_m(std::abs(nearest.lateral_m)) + " from " + called(other));
     }
   }
 
