@@ -167,7 +167,7 @@ core::Result<Bytes> message_of(const nlohmann::ordered_json& json, Baseline base
 int encode(const std::string& file, Baseline baseline) {
   const std::string where = file == "-" ? "standard input" : file;
   const auto text = core::value_or_throw(file == "-" ? core::read_whole(std::cin, where) : core::read_whole(file));
-  const auto json = core::parse_json<nlohmann::ordered_json>(text);
+  const auto json = core::parse_json_strictly<nlohmann::ordered_json>(text);
   if (!json.ok()) throw BadInput(where + ": " + json.error().message);
   const auto packed = is_packet_58(json.value()) ? packet_58_of(json.value()) : message_of(json.value(), baseline);
   if (!packed.ok()) throw BadInput(where + ": " + packed.error().message);

@@ -94,6 +94,12 @@ TEST_F(TprCommand, SaysWhatIsWrongWithAFile) {
             "railfix: " + file_ + ": its lists and objects nest more than 64 deep.\n");
 }
 
+TEST_F(TprCommand, SaysWhatContradictsItself) {
+  const auto said = [](const std::string& file) { return tpr({"encode", "--json", file}).err; };
+  EXPECT_EQ(said(file_with(R"({"T_TRAIN": 1, "NID_ENGINE": 2, "T_TRAIN": 3})")),
+            "railfix: " + file_ + ": the key \"T_TRAIN\" is there twice in one object.\n");
+}
+
 TEST_F(TprCommand, SaysWhichBaselineWouldFit) {
   EXPECT_THAT(tpr({"decode", kCheckVector, "--baseline", "4"}).err, HasSubstr("--baseline 3"));
 }
