@@ -161,7 +161,9 @@ core::Result<Bytes> packet_58_of(const nlohmann::ordered_json& json) {
 
 core::Result<Bytes> message_of(const nlohmann::ordered_json& json, Baseline baseline) {
   const auto report = etcs::report_from_json(json, baseline);
-  return report.ok() ? etcs::encode(report.value(), baseline) : report.error();
+  if (!report.ok()) return report.error();
+  if (const auto status = etcs::check_reference(report.value()); !status.ok()) return status.error();
+  return etcs::encode(report.value(), baseline);
 }
 
 int encode(const std::string& file, Baseline baseline) {
