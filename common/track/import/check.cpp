@@ -7,6 +7,7 @@
 #include "track/import/finish.hpp"
 #include "track/import/meeting.hpp"
 #include "track/import/told.hpp"
+#include "track/import/tracks.hpp"
 
 namespace railfix::track {
 namespace {
@@ -14,7 +15,6 @@ namespace {
 constexpr double kGapM = 0.05;
 constexpr double kSharpestPerM = 1.0 / 80.0;
 constexpr double kSteepest = 0.075;
-constexpr double kMostCantM = 0.3;
 constexpr double kStepM = 0.05;  // in height, from one profile point to the next
 constexpr double kSamePlaceM = 0.5;
 // A drawing of straights and right lengths does not close to the last metre, nor where curves are not known.
@@ -143,7 +143,7 @@ class Check {
     for (const CantPoint& point : edge.alignment.cant()) {
       const double offset_m = std::clamp(point.offset_m, 0.0, edge.alignment.length_m());
       const double cant_m = edge.alignment.at(offset_m).cant_m;
-      if (std::abs(cant_m) <= kMostCantM) continue;
+      if (is_cant(cant_m)) continue;
       problems_.push_back(called(edge) + " at " + told_m(offset_m) + " has a cant of " + told_m(cant_m) +
                           ", more than any track has");
       return;

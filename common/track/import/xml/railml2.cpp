@@ -11,7 +11,6 @@
 namespace railfix::track {
 namespace {
 
-constexpr double kMostCantMm = 250;
 constexpr int kMostHops = 20;  // switches directly behind one another
 
 /// One <connection>: at a track's end, or at a switch on it.
@@ -122,8 +121,8 @@ class Reader {
         throw source_.wrong(change, "a radius of less than 10 m is no railway's");
       changes.push_back({pos(change) - origin_m_, radius == 0 ? 0.0 : -1.0 / radius, {}});
       const auto cant_mm = source_.number(change, "superelevation");
-      if (cant_mm && std::abs(*cant_mm) > kMostCantMm) {
-        tell_impossible(change, "superelevation", "mm, which no track has; no cant begins there", track);
+      if (cant_mm && !is_cant(1e-3 * *cant_mm)) {
+        tell_impossible(change, "superelevation", std::string("mm, ") + kNoTrackHas + "; no cant begins there", track);
       } else if (cant_mm) {
         changes.back().cant_m = std::copysign(1e-3 * *cant_mm, changes.back().curvature_per_m);
       }
@@ -166,10 +165,11 @@ class Reader {
       const std::string profile = change.attribute("profileRef").value();
       if (special_profiles_.contains(profile)) continue;
       const bool is_end = std::string(change.attribute("vMax").value()) == "end";
-      const double speed_mps = core::mps_from_kmh(is_end ? 0 : source_.number(change, "vMax").value_or(0));
-      if (speed_mps < 0 || speed_mps >= SpeedLimit::kFastestMps)
-        tell_impossible(change, "vMax", "km/h, which no train runs; no limit begins there", track);
-      changes[{profile, change.attribute("dir").value()}].emplace_back(pos(change) - origin_m_, speed_mps);
+      const double kmh = is_end ? 0 : source_.number(change, "vMax").value_or(0);
+      if (!is_speed(kmh))
+        tell_impossible(change, "vMax", std::string("km/h, ") + kNoTrainRuns + "; no limit begins there", track);
+      changes[{profile, change.attribute("dir").value()}].emplace_back(pos(change) - origin_m_,
+                                                                       core::mps_from_kmh(is_speed(kmh) ? kmh : 0));
     }
     for (const auto& [of, list] : changes) {
       if (of.second != "down") add_speeds(list, Direction::forward, track.length_m, track.track);

@@ -251,9 +251,9 @@ class Reader {
         return special.contains(of.attribute("ref").value());
       });
       if (is_special || section.attribute("isTemporary").as_bool()) continue;
-      if (*speed <= 0 || core::mps_from_kmh(*speed) >= SpeedLimit::kFastestMps) {
+      if (*speed <= 0 || !is_speed(*speed)) {
         net_.problems.push_back(railml_called(section) + " has maxSpeed " + section.attribute("maxSpeed").value() +
-                                " km/h, which no train runs; it is left out");
+                                " km/h, " + kNoTrainRuns + "; it is left out");
         continue;
       }
       const pugi::xml_node location = section.child("linearLocation");
