@@ -22,6 +22,7 @@ class Reader {
     read_relations();
     read_switches();
     read_plan();
+    tell_cant();
     read_marks();
     read_speeds();
     read_balises3(source_, places_, net_);
@@ -239,6 +240,17 @@ class Reader {
     for (const pugi::xml_node& of : descendants(source_.root(), "signalIS")) {
       for (const NetPlace& place : places_.of(of)) add(LandmarkKind::mast, place, place.from_m, 0, of);
     }
+  }
+
+  /// No file and no schema at hand says which unit and sign cant has in railML 3: it is not guessed at.
+  void tell_cant() {
+    const pugi::xml_node first = source_.root().find_node([](const pugi::xml_node& node) {
+      return std::string_view(node.name()) == "superelevationCurve" || node.attribute("superelevation");
+    });
+    if (!first) return;
+    net_.problems.push_back(railml_called(first) +
+                            " says something of cant, perhaps as others do: cant of railML 3 is " +
+                            "not read, all of it is left out");
   }
 
   void read_speeds() {
