@@ -3,6 +3,7 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -18,6 +19,9 @@ size_t json_depth(std::string_view text);
 /// "not JSON at line 3, column 7.", or "not JSON at byte 7." of a text that is one line; `byte` counts from 1.
 Error not_json_at(std::string_view text, size_t byte);
 
+/// The first key that an object has twice: of two values the parser keeps the last, silently. REQUIRES: JSON.
+std::optional<std::string> repeated_key(std::string_view text);
+
 template <class Json = nlohmann::json>
 Result<Json> parse_json(std::string_view text) {
   if (json_depth(text) > kDeepestJson)
@@ -29,6 +33,15 @@ Result<Json> parse_json(std::string_view text) {
   } catch (const nlohmann::json::out_of_range&) {
     return Error{"a number in it is too large."};
   }
+}
+
+/// For what people write, where a key that is there twice is a mistake; it takes a second pass over the text.
+template <class Json = nlohmann::json>
+Result<Json> parse_json_strictly(std::string_view text) {
+  auto json = parse_json<Json>(text);
+  if (!json.ok()) return json;
+  if (const auto key = repeated_key(text)) return Error{"the key \"" + *key + "\" is there twice in one object."};
+  return json;
 }
 
 }  // namespace railfix::core

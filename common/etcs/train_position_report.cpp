@@ -175,6 +175,24 @@ core::Result<TrainPositionReport> decode_or_advise(std::span<const uint8_t> mess
                      "."};
 }
 
+core::Status check_reference(const TrainPositionReport& report) {
+  if (report.nid_lrbg != kUnknownBaliseGroup) return {};
+  struct Related {
+    const char* field;
+    uint32_t value;
+    uint32_t unknown;
+  };
+  for (const auto& [field, value, unknown] :
+       {Related{"D_LRBG", report.d_lrbg, kUnknownDistance}, Related{"Q_DIRLRBG", report.q_dirlrbg, kUnknownSide},
+        Related{"Q_DLRBG", report.q_dlrbg, kUnknownSide}, Related{"Q_DIRTRAIN", report.q_dirtrain, kUnknownSide}}) {
+    if (value == unknown) continue;
+    return core::Error{std::string(field) + " = " + number(value) + " is said of the LRBG, but NID_LRBG = " +
+                       number(kUnknownBaliseGroup) + " says that it is unknown: give the group, or " + number(unknown) +
+                       " (unknown) for " + field + "."};
+  }
+  return {};
+}
+
 double scale_m(uint32_t q_scale) {
   constexpr std::array<double, 3> kScales{0.1, 1.0, 10.0};
   return kScales.at(q_scale);

@@ -70,6 +70,10 @@ core::Result<TrainPositionReport> decode(std::span<const uint8_t> message, Basel
 core::Result<TrainPositionReport> decode_or_advise(std::span<const uint8_t> message, Baseline baseline,
                                                    const std::string& option);
 
+/// What stands in relation to the LRBG (D_LRBG, Q_DIRLRBG, Q_DLRBG, Q_DIRTRAIN) says nothing where that is unknown; the
+/// error names the field. For who makes a message: encode() and decode() carry what any train says.
+core::Status check_reference(const TrainPositionReport& report);
+
 /// L_PACKET of packet 0 or 1 of this report in bits. REQUIRES: encode() accepts the report.
 uint32_t position_packet_bits(const TrainPositionReport& report, Baseline baseline);
 

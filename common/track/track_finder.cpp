@@ -9,6 +9,7 @@ namespace {
 constexpr double kCellM = 400.0;
 constexpr double kStepM = 200.0;
 constexpr double kStepRad = 0.5;
+constexpr double kFarthestM = 1e9;  // no projection leads there
 
 int64_t cell_of(double coordinate_m) {
   return static_cast<int64_t>(std::floor(coordinate_m / kCellM));
@@ -36,13 +37,15 @@ TrackFinder::TrackFinder(std::shared_ptr<const Map> map) : map_(std::move(map)) 
 void TrackFinder::enter(const Edge& edge, uint32_t element_index) {
   const Alignment& track = edge.alignment;
   const Element& element = track.elements()[element_index];
+  const PlanPose& start = track.starts()[element_index];
+  if (!(std::abs(start.easting_m) < kFarthestM && std::abs(start.northing_m) < kFarthestM)) return;
   const double sharpest = std::max(std::abs(element.curvature_start_per_m), std::abs(element.curvature_end_per_m));
   const double count = std::max(1.0, std::ceil(element.length_m * std::max(1.0 / kStepM, sharpest / kStepRad)));
   const double step = element.length_m / count;
   const double bulge = 0.125 * sharpest * step * step;  // an arc beside its chord
-  PlanPose from = track.starts()[element_index];
+  PlanPose from = start;
   for (double i = 1; i <= count; ++i) {
-    const PlanPose to = advance(track.starts()[element_index], element, i * step);
+    const PlanPose to = advance(start, element, i * step);
     const auto [west, east] = std::minmax(from.easting_m, to.easting_m);
     const auto [south, north] = std::minmax(from.northing_m, to.northing_m);
     for (int64_t column = cell_of(west - bulge); column <= cell_of(east + bulge); ++column) {

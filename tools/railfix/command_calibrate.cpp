@@ -4,7 +4,6 @@
 #include <filesystem>
 #include <iostream>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "commands.hpp"
@@ -13,6 +12,7 @@
 #include "dataset/dataset.hpp"
 #include "number_between.hpp"
 #include "output_file.hpp"
+#include "picture_file.hpp"
 #include "progress.hpp"
 #include "track_detector/draw.hpp"
 #include "track_detector/mount_calibration.hpp"
@@ -163,7 +163,7 @@ void draw(const std::string& file, cv::Mat colour, const dataset::Picture& pictu
   track_detector::TrackDetector detector(lens, mount, options);
   track_detector::draw_track(colour, lens, detector.detect(picture.grey), gauge_m);
   draw_mount(colour, geometry::View(lens, mount), gauge_m);
-  if (!cv::imwrite(file, colour))
+  if (!write_picture(file, colour))
     throw core::BadInput("cannot write " + file + ": give a .png in a folder that exists");
 }
 

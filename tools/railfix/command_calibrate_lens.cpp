@@ -3,7 +3,6 @@
 #include <filesystem>
 #include <iostream>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 
 #include "commands.hpp"
 #include "core/time.hpp"
@@ -13,6 +12,7 @@
 #include "lens/lens_drawing.hpp"
 #include "number_between.hpp"
 #include "output_file.hpp"
+#include "picture_file.hpp"
 #include "progress.hpp"
 
 namespace railfix::tool {
@@ -154,7 +154,7 @@ int calibrate(LensArguments arguments) {
   const std::string drawn = arguments.draw.empty()
                                 ? std::filesystem::path(arguments.out).replace_extension(".lens.png").string()
                                 : arguments.draw;
-  if (!cv::imwrite(drawn, draw_lens(found.value(), boards.picture, boards.views[boards.pictured]))) {
+  if (!write_picture(drawn, draw_lens(found.value(), boards.picture, boards.views[boards.pictured]))) {
     throw core::BadInput("cannot write " + drawn + ": give --draw a .png in a folder that exists");
   }
   if (arguments.json) {

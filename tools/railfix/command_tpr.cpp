@@ -161,13 +161,15 @@ core::Result<Bytes> packet_58_of(const nlohmann::ordered_json& json) {
 
 core::Result<Bytes> message_of(const nlohmann::ordered_json& json, Baseline baseline) {
   const auto report = etcs::report_from_json(json, baseline);
-  return report.ok() ? etcs::encode(report.value(), baseline) : report.error();
+  if (!report.ok()) return report.error();
+  if (const auto status = etcs::check_reference(report.value()); !status.ok()) return status.error();
+  return etcs::encode(report.value(), baseline);
 }
 
 int encode(const std::string& file, Baseline baseline) {
   const std::string where = file == "-" ? "standard input" : file;
   const auto text = core::value_or_throw(file == "-" ? core::read_whole(std::cin, where) : core::read_whole(file));
-  const auto json = core::parse_json<nlohmann::ordered_json>(text);
+  const auto json = core::parse_json_strictly<nlohmann::ordered_json>(text);
   if (!json.ok()) throw BadInput(where + ": " + json.error().message);
   const auto packed = is_packet_58(json.value()) ? packet_58_of(json.value()) : message_of(json.value(), baseline);
   if (!packed.ok()) throw BadInput(where + ": " + packed.error().message);

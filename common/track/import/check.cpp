@@ -7,6 +7,7 @@
 #include "track/import/finish.hpp"
 #include "track/import/meeting.hpp"
 #include "track/import/told.hpp"
+#include "track/import/tracks.hpp"
 
 namespace railfix::track {
 namespace {
@@ -14,7 +15,6 @@ namespace {
 constexpr double kGapM = 0.05;
 constexpr double kSharpestPerM = 1.0 / 80.0;
 constexpr double kSteepest = 0.075;
-constexpr double kMostCantM = 0.3;
 constexpr double kStepM = 0.05;  // in height, from one profile point to the next
 constexpr double kSamePlaceM = 0.5;
 // A drawing of straights and right lengths does not close to the last metre, nor where curves are not known.
@@ -52,6 +52,7 @@ class Check {
       check_end(edge, edge.to_node, edge.alignment.at(edge.alignment.length_m()).pose);
     }
     for (const Node& node : map_.nodes) check_node(node);
+    take(near_misses(map_));
     take(facing_ends(map_));
     take(kinks_at_nodes(map_));
     check_balises();
@@ -121,21 +122,6 @@ class Check {
       problems_.push_back(where + " is a switch but only " + std::to_string(meeting) + " track" +
                           (meeting == 1 ? " meets" : "s meet") + " there");
     }
-    if (node.kind == NodeKind::end && meeting == 1) check_near_miss(node, *ends_[node.id].front());
-  }
-
-  /// A loose end beside another track is more likely a mistake than a buffer stop.
-  void check_near_miss(const Node& node, const Edge& own) {
-    if (own.is_drawn) return;
-    for (const Edge& other : map_.edges) {
-      if (other.is_drawn || other.id == own.id || other.from_node == node.id || other.to_node == node.id) continue;
-      const PlanPose& start = other.alignment.starts().front();
-      if (distance(start, node) > other.alignment.length_m() + kNearMissM) continue;
-      const Alignment::Nearest nearest = other.alignment.nearest(node.easting_m, node.northing_m);
-      if (std::abs(nearest.lateral_m) > kNearMissM) continue;
-      problems_.push_back(called(own) + " ends loose at node " + std::to_string(node.id) + ", only " +
-                          told_m(std::abs(nearest.lateral_m)) + " from " + called(other));
-    }
   }
 
   /// Grades that no adhesion railway has. Points beyond the ends are of the edges next to it.
@@ -157,7 +143,7 @@ class Check {
     for (const CantPoint& point : edge.alignment.cant()) {
       const double offset_m = std::clamp(point.offset_m, 0.0, edge.alignment.length_m());
       const double cant_m = edge.alignment.at(offset_m).cant_m;
-      if (std::abs(cant_m) <= kMostCantM) continue;
+      if (is_cant(cant_m)) continue;
       problems_.push_back(called(edge) + " at " + told_m(offset_m) + " has a cant of " + told_m(cant_m) +
                           ", more than any track has");
       return;

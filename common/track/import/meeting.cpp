@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
+#include <optional>
 
 #include "core/units.hpp"
 #include "track/import/told.hpp"
+#include "track/track_finder.hpp"
 
 namespace railfix::track {
 namespace {
@@ -12,6 +15,12 @@ namespace {
 constexpr double kFacingM = 50.0;
 constexpr double kFacingRad = core::rad_from_deg(10.0);
 constexpr double kBesideM = 2.0;  // the next track is farther away
+// A branch that stops short of its switch, see turned_towards(). Nothing can stand so near to another track; farther
+// away, yards have many buffer stops before the track that all others come together in.
+constexpr double kShortBranchM = 3.0;
+constexpr double kPointingM = 40.0;
+constexpr double kSmallestBranchRad = core::rad_from_deg(1.0);
+constexpr double kLargestBranchRad = core::rad_from_deg(15.0);
 constexpr size_t kMostKinks = 10;
 
 /// The pose of a train that leaves the edge over one of its ends.
@@ -77,6 +86,34 @@ const LooseEnd* faced_by(const std::vector<LooseEnd>& ends, size_t own) {
   return nearest;
 }
 
+/// By how much an end is turned towards a track beside it, as a branch is that stops short of its switch: straight on
+/// it would soon meet that track, at an angle that switches have. Nothing for any other end: two tracks that run side
+/// by side lead nowhere, and one that ends across another is a buffer stop.
+std::optional<double> turned_towards(const LooseEnd& end, const Alignment& other, const NearTrack& near) {
+  if (near.offset_m <= 0 || near.offset_m >= other.length_m()) return std::nullopt;  // beside its end, not beside it
+  const double across = std::sin(end.pose.heading_rad - other.at(near.offset_m).pose.heading_rad);
+  const double turn = std::asin(near.lateral_m > 0 ? across : -across);
+  if (turn < kSmallestBranchRad || turn > kLargestBranchRad) return std::nullopt;
+  if (std::abs(near.lateral_m) > kPointingM * std::sin(turn)) return std::nullopt;
+  return turn;
+}
+
+/// The sentence for an end that should meet another track; empty where none is like that.
+std::string near_miss(const Map& map, const TrackFinder& tracks, const LooseEnd& end) {
+  for (const NearTrack& near : tracks.near(end.pose.easting_m, end.pose.northing_m, kShortBranchM)) {
+    const Edge& other = *map.edge(near.edge);
+    if (other.is_drawn || &other == end.edge || other.from_node == end.node || other.to_node == end.node) continue;
+    const double apart_m = std::abs(near.lateral_m);
+    const std::string where = called(*end.edge) + " ends loose at node " + std::to_string(end.node) + ", only " +
+                              told_m(apart_m) + " from " + called(other);
+    if (apart_m <= kNearMissM) return where;
+    if (const auto turn = turned_towards(end, other.alignment, near))
+      return where + " and turned towards it by " + told_deg(*turn) +
+             ": draw the switch between them, unless it is a buffer stop";
+  }
+  return "";
+}
+
 /// By how much a train turns at once on this way; the least of an edge that has both its ends there.
 double kink_rad(const Map& map, const Connection& way) {
   const auto at_node = [&](uint32_t edge_id) {
@@ -94,6 +131,15 @@ double kink_rad(const Map& map, const Connection& way) {
 }
 
 }  // namespace
+
+std::vector<std::string> near_misses(const Map& map) {
+  const TrackFinder tracks(std::shared_ptr<const Map>(std::shared_ptr<void>(), &map));  // the map outlives it
+  std::vector<std::string> problems;
+  for (const LooseEnd& end : loose_ends(map)) {
+    if (std::string problem = near_miss(map, tracks, end); !problem.empty()) problems.push_back(std::move(problem));
+  }
+  return problems;
+}
 
 std::vector<std::string> facing_ends(const Map& map) {
   const std::vector<LooseEnd> ends = loose_ends(map);

@@ -15,6 +15,10 @@ constexpr double kKinkRad = core::rad_from_deg(2.0);
 /// A loose end so near to a track should meet it; a gap in line is longer.
 constexpr double kNearMissM = 1.5;
 
+/// Loose ends that should meet a track and do not, each with the nearest one: so near to it, or turned towards it as
+/// the branch of a switch is. A buffer stop beside the next track is neither.
+std::vector<std::string> near_misses(const Map& map);
+
 /// Loose ends that face each other over a gap in line: the track between them is missing.
 std::vector<std::string> facing_ends(const Map& map);
 

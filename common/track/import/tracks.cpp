@@ -33,8 +33,7 @@ void add_speeds(std::vector<std::pair<double, double>> changes, Direction runnin
     const double after = i + 1 < changes.size() ? changes[i + 1].first : length_m;
     const double from = std::clamp(forward ? at : before, 0.0, length_m);
     const double to = std::clamp(forward ? after : at, 0.0, length_m);
-    if (speed_mps > 0 && speed_mps < SpeedLimit::kFastestMps && to > from)
-      track.speed_limits.push_back({from, to, speed_mps, running});
+    if (speed_mps > 0 && to > from) track.speed_limits.push_back({from, to, speed_mps, running});
   }
 }
 

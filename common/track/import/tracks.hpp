@@ -12,6 +12,19 @@ namespace railfix::track {
 /// From the track's middle to the edge of a platform, where the source does not say.
 constexpr double kPlatformEdgeM = 1.7;
 
+/// What no track has and no train runs (ETCS carries speeds up to 600 km/h), whatever a source says.
+constexpr double kMostCantM = 0.3;
+constexpr double kFastestKmh = 600.0;
+constexpr bool is_cant(double cant_m) {
+  return cant_m >= -kMostCantM && cant_m <= kMostCantM;
+}
+/// 0 is one: it ends a limit.
+constexpr bool is_speed(double kmh) {
+  return kmh >= 0 && kmh <= kFastestKmh;
+}
+constexpr const char* kNoTrackHas = "which no track has";
+constexpr const char* kNoTrainRuns = "which no train runs";
+
 /// A landmark on one track, not yet numbered.
 struct TrackMark {
   LandmarkKind kind = LandmarkKind::unknown;
@@ -52,8 +65,8 @@ struct ImportedTrack {
   bool is_drawn = false;  // as Edge::is_drawn
 };
 
-/// Adds limits that hold from a place on, as the train runs, up to the next one or the end of the track. What is no
-/// speed (0, or more than a train runs) ends a limit. `changes`: offset in metres, speed in m/s.
+/// Adds limits that hold from a place on, as the train runs, up to the next one or the end of the track; 0 ends one.
+/// `changes`: offset in metres, speed in m/s. REQUIRES: each is_speed().
 void add_speeds(std::vector<std::pair<double, double>> changes, Direction running, double length_m,
                 ImportedTrack& track);
 

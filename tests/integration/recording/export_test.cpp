@@ -156,6 +156,12 @@ TEST_F(Export, MapsGetTheTrackWithItsConfidence) {
   const auto& ends = interval["geometry"]["coordinates"];
   EXPECT_NEAR((ends[1][1].get<double>() - ends[0][1].get<double>()) * 111195, 10, 0.01);
 
+  const auto kept = folder_ / "kept.gpx";
+  fs::create_hard_link(gpx, kept);
+  std::ofstream(gpx) << "old";
+  ASSERT_EQ(recording({"export", file().string(), "--gpx", gpx.string()}).exit_code, 0);
+  EXPECT_EQ(test::slurp(kept), "old") << "the new file took its place as a whole";
+
   const auto nowhere = recording({"export", file().string(), "--gpx", gpx.string(), "--to", "0.1"});
   EXPECT_EQ(nowhere.exit_code, 2);
   EXPECT_THAT(nowhere.err, HasSubstr("says nowhere where on the Earth the train was"));

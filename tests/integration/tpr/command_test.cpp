@@ -94,6 +94,23 @@ TEST_F(TprCommand, SaysWhatIsWrongWithAFile) {
             "railfix: " + file_ + ": its lists and objects nest more than 64 deep.\n");
 }
 
+TEST_F(TprCommand, SaysWhatContradictsItself) {
+  const auto said = [](const std::string& file) { return tpr({"encode", "--json", file}).err; };
+  EXPECT_EQ(said(file_with(R"({"T_TRAIN": 1, "NID_ENGINE": 2, "T_TRAIN": 3})")),
+            "railfix: " + file_ + ": the key \"T_TRAIN\" is there twice in one object.\n");
+  const auto json = [](const std::string& d_lrbg) {
+    return R"({"T_TRAIN":1,"NID_ENGINE":2,"NID_PACKET":0,"Q_SCALE":1,"NID_LRBG":16777215,"D_LRBG":)" + d_lrbg +
+           R"(,"Q_DIRLRBG":2,"Q_DLRBG":2,"L_DOUBTOVER":32767,"L_DOUBTUNDER":32767,"Q_LENGTH":0,"V_TRAIN":0,)"
+           R"("Q_DIRTRAIN":2,"M_MODE":6,"M_LEVEL":3})";
+  };
+  EXPECT_EQ(said(file_with(json("32767"))), "");
+  EXPECT_EQ(
+      said(file_with(json("1234"))),
+      "railfix: " + file_ +
+          ": D_LRBG = 1234 is said of the LRBG, but NID_LRBG = 16777215 says that it is unknown: give the group, or "
+          "32767 (unknown) for D_LRBG.\n");
+}
+
 TEST_F(TprCommand, SaysWhichBaselineWouldFit) {
   EXPECT_THAT(tpr({"decode", kCheckVector, "--baseline", "4"}).err, HasSubstr("--baseline 3"));
 }

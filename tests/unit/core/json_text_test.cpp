@@ -38,5 +38,15 @@ TEST(JsonText, SaysWhereItBreaks) {
   EXPECT_EQ(refusal("[1e999]"), "a number in it is too large.");
 }
 
+TEST(JsonText, NamesAKeyThatIsThereTwice) {
+  EXPECT_EQ(repeated_key(R"({"a": 1, "b": {"a": 2}, "c": [{"a": 3}, {"a": 4}]})"), std::nullopt);
+  EXPECT_EQ(repeated_key(R"([{"a": "b"}, {"b": {"x": {}, "y": 1, "x": 2}}])"), "x");
+  EXPECT_EQ(repeated_key(R"({"\u0061": 1, "a": 1})"), "a") << "as the parser reads it";
+  EXPECT_TRUE(parse_json(R"({"a": 1, "a": 2})").ok()) << "what devices and networks say is taken as it is";
+  EXPECT_EQ(parse_json_strictly(R"({"a": 1, "a": 2})").error().message, "the key \"a\" is there twice in one object.");
+  EXPECT_EQ(parse_json_strictly(R"({"a": 1, "a": 2)").error().message, "not JSON at byte 16.");
+  EXPECT_EQ(parse_json_strictly(R"({"a": 1})").value()["a"], 1);
+}
+
 }  // namespace
 }  // namespace railfix::core

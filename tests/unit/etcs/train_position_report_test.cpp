@@ -234,5 +234,23 @@ TEST(Hex, IsReadStrictly) {
   EXPECT_THAT(parse_hex("").error().message, HasSubstr("empty"));
 }
 
+TEST(TrainPositionReport, NothingIsSaidOfAnUnknownGroup) {
+  TrainPositionReport report;
+  EXPECT_TRUE(check_reference(report).ok());
+  const auto refusal = [&](uint32_t TrainPositionReport::*field) {
+    TrainPositionReport known = report;
+    known.*field = 1;
+    EXPECT_TRUE(encode(known, Baseline::b3).ok()) << "another train may say so";
+    const std::string message = check_reference(known).error().message;
+    known.nid_lrbg = 7;
+    EXPECT_TRUE(check_reference(known).ok());
+    return message.substr(0, message.find(" = "));
+  };
+  EXPECT_EQ(refusal(&TrainPositionReport::d_lrbg), "D_LRBG");
+  EXPECT_EQ(refusal(&TrainPositionReport::q_dirlrbg), "Q_DIRLRBG");
+  EXPECT_EQ(refusal(&TrainPositionReport::q_dlrbg), "Q_DLRBG");
+  EXPECT_EQ(refusal(&TrainPositionReport::q_dirtrain), "Q_DIRTRAIN");
+}
+
 }  // namespace
 }  // namespace railfix::etcs

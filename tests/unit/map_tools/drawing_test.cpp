@@ -50,6 +50,21 @@ TEST(Drawing, PngHasInkOnTheTrackAndNotBesideIt) {
   std::filesystem::remove(file);
 }
 
+TEST(Drawing, TakesThePlaceOfTheOldOneAsAWhole) {
+  const Drawing drawing = draw_map(track::small_map(), {});
+  const std::filesystem::path folder = file_named("");
+  std::filesystem::create_directories(folder);
+  for (const char* name : {"a.svg", "a.png"}) {
+    std::ofstream(folder / name) << "old";
+    std::filesystem::create_hard_link(folder / name, folder / (std::string("kept") + name));
+    ASSERT_TRUE(write_drawing(drawing, folder / name).ok());
+    EXPECT_GT(std::filesystem::file_size(folder / name), 1000U);
+    EXPECT_EQ(std::filesystem::file_size(folder / (std::string("kept") + name)), 3U) << "never half of the new one";
+  }
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder), {}), 4) << "no draft is left";
+  std::filesystem::remove_all(folder);
+}
+
 TEST(Drawing, NamesWhatIsWrong) {
   const Drawing drawing = draw_map(track::small_map(), {});
   EXPECT_THAT(write_drawing(drawing, "a.gif").error().message, HasSubstr(".svg or .png"));

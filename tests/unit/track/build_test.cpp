@@ -1,5 +1,8 @@
 #include "track/import/build.hpp"
 
+#include <bzlib.h>
+#include <zlib.h>
+
 #include "import_fixture.hpp"
 #include "small_map.hpp"
 
@@ -99,12 +102,26 @@ TEST_F(BuildTest, WhatOverpassRemarksIsTold) {
     EXPECT_LT(told.size(), 400U);
 }
 
-TEST_F(BuildTest, WhatOverpassRemarksInXmlIsTold) {
-  const auto file =
-      write("a.osm", R"(<osm version="0.6"><node id="1" lat="48.0" lon="15.0"/><node id="2" lat="48.0" lon="15.01"/>
-<way id="1"><nd ref="1"/><nd ref="2"/><tag k="railway" v="rail"/></way><remark> runtime error: Query timed out. </remark></osm>)");
-  EXPECT_THAT(core::value_or_throw(build_map({file}, {})).map.problems,
-              testing::Contains(HasSubstr("Overpass remarks \" runtime error: Query timed out. \"")));
+TEST_F(BuildTest, WhatOverpassRemarksInXmlIsToldOfCompressedOnesToo) {
+  const std::string xml =
+      R"(<osm version="0.6"><node id="1" lat="48.0" lon="15.0"/><node id="2" lat="48.0" lon="15.01"/>
+<way id="1"><nd ref="1"/><nd ref="2"/><tag k="railway" v="rail"/></way><!--)" +
+      std::string(3'000'000, 'x') + "--><remark> runtime error: Query timed out. </remark></osm>";
+  for (const char* name : {"a.osm", "a.osm.gz", "a.osm.bz2"}) {
+    const std::string file = in_folder(name).string();
+    if (gzFile zipped = file.ends_with(".gz") ? gzopen(file.c_str(), "wb") : nullptr; zipped != nullptr) {
+      gzwrite(zipped, xml.data(), static_cast<unsigned>(xml.size()));
+      gzclose(zipped);
+    } else if (BZFILE* packed = file.ends_with(".bz2") ? BZ2_bzopen(file.c_str(), "wb") : nullptr; packed != nullptr) {
+      BZ2_bzwrite(packed, const_cast<char*>(xml.data()), static_cast<int>(xml.size()));
+      BZ2_bzclose(packed);
+    } else {
+      static_cast<void>(write(name, xml));
+    }
+    EXPECT_THAT(core::value_or_throw(build_map({file}, {})).map.problems,
+                testing::Contains(HasSubstr("Overpass remarks \" runtime error: Query timed out. \"")))
+        << name;
+  }
 }
 
 TEST_F(BuildTest, OverpassSaysWhichElementIsWrong) {

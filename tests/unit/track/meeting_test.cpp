@@ -82,6 +82,69 @@ TEST(FacingEnds, OtherEndsAreNot) {
   EXPECT_THAT(facing_ends(small_map()), IsEmpty());
 }
 
+/// Beside a long track that runs north on easting 0: one of 100 m that ends `apart_m` east of it, turned towards it by
+/// so much.
+Map beside(double apart_m, double turn_deg) {
+  const double heading = core::rad_from_deg(-turn_deg);
+  const PlanPose end{apart_m, 500, heading};
+  const PlanPose start = advance(end, {100, 0, 0}, -100);
+  return apart({Alignment::chained({0, 0, 0}, {{1000, 0, 0}}), Alignment::chained(start, {{100, 0, 0}})});
+}
+
+TEST(NearMisses, AnEndSoNearToATrackIsToldWhateverItsDirection) {
+  for (const double turn_deg : {-90.0, 0.0, 5.0, 90.0}) {
+    EXPECT_THAT(near_misses(beside(0.3, turn_deg)),
+                Contains("edge 2 (t2) ends loose at node 4, only 0.30 m from edge 1 (t1)"))
+        << turn_deg;
+  }
+}
+
+TEST(NearMisses, ABranchThatStopsShortOfItsSwitchIsTold) {
+  EXPECT_THAT(near_misses(beside(2.4, 6)),
+              ElementsAre("edge 2 (t2) ends loose at node 4, only 2.40 m from edge 1 (t1) and turned towards it by 6.0 "
+                          "degrees: draw the switch between them, unless it is a buffer stop"));
+  for (const double apart_m : {-2.4, 2.4}) {  // on either side, and whichever way the tracks are drawn
+    Map map = beside(apart_m, std::copysign(6, apart_m));
+    EXPECT_EQ(near_misses(map).size(), 1U);
+    map.edges[0].alignment = Alignment::chained({0, 1000, core::kPi}, {{1000, 0, 0}});
+    EXPECT_EQ(near_misses(map).size(), 1U);
+    const PlanPose end = turned_round(map.edges[1].alignment.at(100).pose);
+    map.edges[1].alignment = Alignment::chained(end, {{100, 0, 0}});
+    std::swap(map.edges[1].from_node, map.edges[1].to_node);
+    EXPECT_EQ(near_misses(map).size(), 1U);
+  }
+}
+
+TEST(NearMisses, AnEndAtASwitchOfTheSourceIsOneToo) {
+  Map map = beside(2.4, 6);
+  map.nodes[3].kind = NodeKind::railway_switch;
+  EXPECT_EQ(near_misses(map).size(), 1U);
+}
+
+TEST(NearMisses, BufferStopsAreNot) {
+  for (const double apart_m : {3.5, 4.0, 4.7, 9.0})
+    for (const double turn_deg : {0.0, 0.5, 2.0})
+      EXPECT_THAT(near_misses(beside(apart_m, turn_deg)), IsEmpty()) << apart_m << " m, " << turn_deg << " degrees";
+  EXPECT_THAT(near_misses(beside(2.4, -6)), testing::Not(Contains(HasSubstr("node 4")))) << "turned away";
+  EXPECT_THAT(near_misses(beside(5, 90)), IsEmpty()) << "before a track that lies across";
+  for (const double turn_deg : {6, 9, 14})
+    EXPECT_THAT(near_misses(beside(3.5, turn_deg)), IsEmpty()) << "in a yard, before the track of the switches";
+  EXPECT_THAT(near_misses(small_map()), IsEmpty());
+}
+
+TEST(NearMisses, TheNearestIsToldOnce) {
+  const Map map = apart({straight(0, 0), straight(0.5, 0), straight(1.2, 50)});
+  EXPECT_THAT(near_misses(map),
+              testing::Contains(HasSubstr("edge 3 (t3) ends loose at node 5, only 0.70 m from edge 2")));
+  EXPECT_EQ(near_misses(map).size(), 5U) << "every end but the one that has left the others behind";
+}
+
+TEST(NearMisses, ADrawingHasNone) {
+  Map map = beside(0.3, 5);
+  map.edges[0].is_drawn = true;
+  EXPECT_THAT(near_misses(map), IsEmpty());
+}
+
 /// Pairs of tracks that meet, the second turned by so much.
 Map bent(const std::vector<double>& turns_deg) {
   std::vector<Alignment> tracks;

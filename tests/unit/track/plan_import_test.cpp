@@ -401,6 +401,32 @@ TEST_F(PlanImport, PlatformsStandWhereTheFileSaysOrOnNeitherSide) {
   EXPECT_EQ(lateral_m(kRailml3, of_3, with_side("both")), 0);
 }
 
+TEST_F(PlanImport, ErjuValuesThatAreNoneAreLeftOutAndTold) {
+  std::string text = kInfra;
+  const auto instead = [&](const std::string& old, const std::string& now) {
+    text.replace(text.find(old), old.size(), now);
+  };
+  instead(
+      "</cantPoints>",
+      R"(<cantPoint trackGeometryPos="150000" appliedCant="301"/><cantPoint trackGeometryPos="200000" appliedCant="-50000"/></cantPoints>)");
+  instead(R"(pos="200000" speed="40")", R"(pos="200000" speed="601")");
+  instead(R"(pos="300000" speed="50")", R"(pos="300000" speed="-1")");
+  const Map map = core::value_or_throw(build_map({write("infra.xml", text)}, {})).map;
+  EXPECT_THAT(
+      map.problems,
+      testing::IsSupersetOf(
+          {"track edge \"T1\" has appliedCant 301 mm at 150.00 m and 1 more like it, which no track has; left "
+           "out",
+           "track edge \"T1\" has sameDirProfile speed 601 km/h at 200.00 m, which no train runs; no limit begins "
+           "there",
+           "track edge \"T1\" has oppositeDirProfile speed -1 km/h at 300.00 m, which no train runs; no limit "
+           "begins there"}));
+  EXPECT_NEAR(map.edges[0].alignment.at(300).cant_m, 0.05, 1e-12) << "as the last point that is one says";
+  ASSERT_EQ(map.edges[0].speed_limits.size(), 2U);
+  EXPECT_NEAR(map.edges[0].speed_limits[0].to_m, 200, 1e-9);
+  EXPECT_NEAR(map.edges[0].speed_limits[1].speed_mps, 70 / 3.6, 1e-9);
+}
+
 TEST_F(PlanImport, ErjuWithoutCoordinatesIsADrawing) {
   const Map map = core::value_or_throw(build_map({write("infra.xml", kInfra)}, {})).map;
   ASSERT_EQ(map.edges.size(), 2U);

@@ -208,6 +208,38 @@ TEST_F(RailmlTest, TheMiddleDoesNotDependOnTheOrderOfTheStretches) {
   EXPECT_THAT(bridge(far, near), testing::ElementsAre(HasSubstr(" at 70.0 on 1")));
 }
 
+TEST_F(RailmlTest, CantOfNoKnownSideIsTold) {
+  const auto built = [&](const std::string& changes) {
+    std::string text = railml2("500");
+    const size_t from = text.find("<radiusChanges>");
+    text.replace(from, text.find("</radiusChanges>") - from, "<radiusChanges>" + changes);
+    return core::value_or_throw(build_map({write("a.railml", text)}, {})).map;
+  };
+  const Map map = built(
+      R"(<radiusChange id="r1" pos="100" radius="0" superelevation="30"/><radiusChange id="r2" pos="200" radius="-500" superelevation="-60"/>
+<radiusChange id="r3" pos="300" radius="500" superelevation="-70"/><radiusChange id="r4" pos="400" radius="0" superelevation="0"/>)");
+  EXPECT_THAT(
+      map.problems,
+      testing::IsSupersetOf(
+          {"<radiusChange> \"r2\" of track t1 has superelevation -60 mm, as 1 more, below 0: the schema does not say "
+           "what the sign means, so the outer rail is taken as the higher one",
+           "<radiusChange> \"r1\" of track t1 has superelevation 30 mm on a straight: which rail is higher is not "
+           "said; no cant begins there"}));
+  EXPECT_EQ(map.edges[0].alignment.at(150).cant_m, 0);
+  EXPECT_NEAR(map.edges[0].alignment.at(250).cant_m, 0.06, 1e-12);
+  EXPECT_NEAR(map.edges[0].alignment.at(350).cant_m, -0.07, 1e-12);
+  EXPECT_THAT(built(R"(<radiusChange id="r" pos="200" radius="-500" superelevation="60"/>)").problems,
+              testing::Not(testing::Contains(HasSubstr("superelevation"))));
+}
+
+TEST_F(RailmlTest, CantOfRailml3IsLeftOutAndTold) {
+  const std::string text =
+      railml3(R"(<superelevationCurves><superelevationCurve id="sc1" superelevation="60"/></superelevationCurves>)");
+  EXPECT_THAT(core::value_or_throw(build_map({write("b.railml", text)}, {})).map.problems,
+              testing::Contains("<superelevationCurve> \"sc1\" says something of cant, perhaps as others do: cant of "
+                                "railML 3 is not read, all of it is left out"));
+}
+
 TEST_F(RailmlTest, ImpossibleValuesAreLeftOutAndTold) {
   std::string text = railml2("500", "90000");
   text.insert(

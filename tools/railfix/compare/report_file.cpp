@@ -44,7 +44,7 @@ core::Result<std::vector<TimedReport>> read_table(const fs::path& file, etcs::Ba
 }
 
 core::Result<TimedReport> read_line(const std::string& line, etcs::Baseline baseline) {
-  const auto parsed = core::parse_json(line);
+  const auto parsed = core::parse_json_strictly(line);
   if (!parsed.ok()) return parsed.error();
   const auto& json = parsed.value();
   if (!json.is_object()) return core::Error{"not a JSON object."};

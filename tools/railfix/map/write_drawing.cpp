@@ -1,11 +1,12 @@
 #include <algorithm>
 #include <cstdio>
-#include <fstream>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <sstream>
 
+#include "core/whole_file.hpp"
 #include "escape_html.hpp"
 #include "map/drawing.hpp"
+#include "picture_file.hpp"
 
 namespace railfix::tool {
 namespace {
@@ -109,15 +110,11 @@ core::Status write_drawing(const Drawing& drawing, const std::filesystem::path& 
   const std::string ending = file.extension().string();
   bool written = false;
   if (ending == ".svg") {
-    std::ofstream stream(file, std::ios::binary);
-    write_svg(drawing, stream);
-    written = static_cast<bool>(stream.flush());
+    std::ostringstream text;
+    write_svg(drawing, text);
+    written = core::write_whole(file, text.str());
   } else if (ending == ".png") {
-    try {
-      written = cv::imwrite(file.string(), picture_of(drawing));
-    } catch (const cv::Exception&) {
-      written = false;
-    }
+    written = write_picture(file, picture_of(drawing));
   } else {
     return core::Error{file.string() + " must end in .svg or .png"};
   }

@@ -1,13 +1,14 @@
 #include "recording/export_track.hpp"
 
 #include <cmath>
-#include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "cdr/decode.hpp"
 #include "core/time.hpp"
 #include "core/units.hpp"
+#include "core/whole_file.hpp"
 #include "messaging/topics.hpp"
 #include "recording/sample_types.hpp"
 #include "recording/utc_text.hpp"
@@ -56,13 +57,12 @@ void take_fix(const ordered_json& fix, RecordedTrack& track) {
       kGnssBreakNs);
 }
 
-core::Status finish(std::ofstream& stream, const std::filesystem::path& file) {
-  stream.close();
-  if (!stream) return core::Error{file.string() + " cannot be written; see the folder, and whether the disk is full"};
-  return {};
+core::Status write(const std::ostringstream& text, const std::filesystem::path& file) {
+  if (core::write_whole(file, text.str())) return {};
+  return core::Error{file.string() + " cannot be written; see the folder, and whether the disk is full"};
 }
 
-void write_gpx_track(std::ofstream& gpx, const char* name, const std::vector<std::vector<TrackPoint>>& lines) {
+void write_gpx_track(std::ostringstream& gpx, const char* name, const std::vector<std::vector<TrackPoint>>& lines) {
   if (lines.empty()) return;
   gpx << "  <trk>\n    <name>" << name << "</name>\n";
   for (const auto& line : lines) {
@@ -162,13 +162,13 @@ core::Result<RecordedTrack> read_track(mcap::Reader& reader, const mcap::Selecti
 }
 
 core::Status write_gpx(const RecordedTrack& track, const std::filesystem::path& file) {
-  std::ofstream gpx(file);
+  std::ostringstream gpx;
   gpx << R"(<?xml version="1.0" encoding="UTF-8"?>)" << '\n'
       << R"(<gpx version="1.1" creator="Railfix" xmlns="http://www.topografix.com/GPX/1/1">)" << '\n';
   write_gpx_track(gpx, "train", track.train);
   write_gpx_track(gpx, "GNSS", track.gnss);
   gpx << "</gpx>\n";
-  return finish(gpx, file);
+  return write(gpx, file);
 }
 
 core::Status write_geojson(const RecordedTrack& track, const std::filesystem::path& file) {
@@ -183,9 +183,9 @@ core::Status write_geojson(const RecordedTrack& track, const std::filesystem::pa
       due_ns = point.stamp_ns + kIntervalEveryNs;
     }
   }
-  std::ofstream stream(file);
-  stream << ordered_json{{"type", "FeatureCollection"}, {"features", features}}.dump(1) << '\n';
-  return finish(stream, file);
+  std::ostringstream text;
+  text << ordered_json{{"type", "FeatureCollection"}, {"features", features}}.dump(1) << '\n';
+  return write(text, file);
 }
 
 }  // namespace railfix::tool

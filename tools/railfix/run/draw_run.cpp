@@ -3,13 +3,13 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <map>
-#include <opencv2/imgcodecs.hpp>
 #include <set>
 
 #include "dataset/dataset.hpp"
 #include "mcap/reader.hpp"
 #include "messaging/camera.hpp"
 #include "messaging/topics.hpp"
+#include "picture_file.hpp"
 #include "progress.hpp"
 #include "run/seen_rails.hpp"
 #include "track_detector/draw.hpp"
@@ -77,7 +77,7 @@ std::string draw_run(const RunOptions& options, const std::filesystem::path& rec
       if (observation.seen()) ++both;
     }
     const auto file = folder / drawing_name(next.value()->name, names);
-    if (!cv::imwrite(file.string(), picture)) throw core::BadInput(file.string() + " cannot be written");
+    if (!write_picture(file, picture)) throw core::BadInput(file.string() + " cannot be written");
     progress.update(names.size());
   }
   progress.finish();

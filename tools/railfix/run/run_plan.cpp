@@ -3,9 +3,10 @@
 #include <unistd.h>
 #include <yaml-cpp/yaml.h>
 
-#include <fstream>
 #include <map>
+#include <sstream>
 
+#include "core/whole_file.hpp"
 #include "dataset/dataset.hpp"
 #include "track/import/build.hpp"
 #include "track/map.hpp"
@@ -167,10 +168,10 @@ core::Result<RunPlan> plan_run(const RunOptions& options) {
   plan.config = std::filesystem::absolute(options.out / "run.yaml");
   fill_settings(settings.value(), options, plan);
   add_overrides(settings.value(), options.sets);
-  std::ofstream file(plan.config);
-  file << settings.value() << '\n';
-  file.close();
-  if (!file) return core::Error{plan.config.string() + " cannot be written; is the disk full?"};
+  std::ostringstream text;
+  text << settings.value() << '\n';
+  if (!core::write_whole(plan.config, text.str()))
+    return core::Error{plan.config.string() + " cannot be written; is the disk full?"};
   return plan;
 }
 

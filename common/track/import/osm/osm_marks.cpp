@@ -20,8 +20,7 @@ std::optional<double> speed_mps_of(const std::string& text) {
   } else if (!unit.empty() && unit != " km/h") {
     return std::nullopt;
   }
-  const double speed = core::mps_from_kmh(value);
-  return speed > 0 && speed < SpeedLimit::kFastestMps ? std::optional(speed) : std::nullopt;
+  return value > 0 && is_speed(value) ? std::optional(core::mps_from_kmh(value)) : std::nullopt;
 }
 
 }  // namespace

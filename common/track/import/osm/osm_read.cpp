@@ -1,9 +1,13 @@
+#include <fcntl.h>
+
 #include <algorithm>
 #include <array>
 #include <cstring>
 #include <fstream>
 #include <iterator>
 #include <osmium/io/any_input.hpp>
+#include <osmium/io/compression.hpp>
+#include <osmium/io/file.hpp>
 #include <osmium/osm/node.hpp>
 #include <osmium/osm/relation.hpp>
 #include <osmium/osm/way.hpp>
@@ -87,13 +91,30 @@ OsmData read_passes(const std::string& file, bool with_trams) {
   return out;
 }
 
-/// What Overpass writes at the end of XML; osmium reads over it. Empty where there is none, or the file is compressed.
+/// The last bytes of a file, of what is in it where that is compressed: the whole file has to be unpacked for that.
+std::string end_of(const std::filesystem::path& file, size_t bytes) {
+  const osmium::io::file_compression compression = osmium::io::File(file.string()).compression();
+  if (compression == osmium::io::file_compression::none) {
+    std::ifstream stream(file, std::ios::binary | std::ios::ate);
+    stream.seekg(std::max<std::streamoff>(0, stream.tellg() - static_cast<std::streamoff>(bytes)));
+    return {std::istreambuf_iterator<char>(stream), {}};
+  }
+  const int open_file = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);  // the decompressor closes it
+  const auto unpacked = osmium::io::CompressionFactory::instance().create_decompressor(compression, open_file);
+  std::string end;
+  for (std::string part = unpacked->read(); !part.empty(); part = unpacked->read()) {
+    end += part;
+    if (end.size() > bytes) end.erase(0, end.size() - bytes);
+  }
+  unpacked->close();
+  return end;
+}
+
+/// What Overpass writes at the end of XML; osmium reads over it. Empty where there is none.
 std::string remark_in(const std::filesystem::path& file) {
-  constexpr std::streamoff kEnd = 4096;
+  constexpr size_t kEnd = 4096;
   constexpr size_t kMost = 200;
-  std::ifstream stream(file, std::ios::binary | std::ios::ate);
-  stream.seekg(std::max<std::streamoff>(0, stream.tellg() - kEnd));
-  const std::string end{std::istreambuf_iterator<char>(stream), {}};
+  const std::string end = end_of(file, kEnd);
   const std::string tag = "<remark>";
   const size_t begin = end.find(tag);
   if (begin == std::string::npos) return "";

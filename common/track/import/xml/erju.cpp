@@ -21,6 +21,15 @@ double metres(double millimetres) {
   return 1e-3 * millimetres;
 }
 
+/// Values that are none.
+struct LeftOut {
+  size_t count = 0;
+  std::string first{};  // "VALUE at 12.00 m"
+  void add(const std::string& value, double at_m) {
+    if (count++ == 0) first = value + " at " + told_m(at_m);
+  }
+};
+
 class Reader {
  public:
   Reader(const std::filesystem::path& infra, const std::filesystem::path* map) : infra_(infra) {
@@ -98,10 +107,7 @@ class Reader {
   void read_plan() {
     for (const pugi::xml_node& geometry : descendants(infra_.root(), "trackEdgeGeometry")) {
       NetTrack& track = net_.tracks[track_of(infra_, geometry, "id")];
-      for (const pugi::xml_node& point : descendants(geometry, "cantPoint")) {
-        track.cant.push_back(
-            {metres(infra_.required(point, "trackGeometryPos")), metres(infra_.required(point, "appliedCant"))});
-      }
+      read_cant(geometry, track);
       if (track.shape.size() < 2) read_azimuths(geometry, track);
     }
     for (const pugi::xml_node& sampled : descendants(infra_.root(), "sampledTrackEdgeGeometry")) {
@@ -116,6 +122,20 @@ class Reader {
       std::stable_sort(track.cant.begin(), track.cant.end(), by_offset);
       std::stable_sort(track.slopes.begin(), track.slopes.end(), by_offset);
     }
+  }
+
+  void read_cant(const pugi::xml_node& geometry, NetTrack& track) {
+    LeftOut left_out;
+    for (const pugi::xml_node& point : descendants(geometry, "cantPoint")) {
+      const CantPoint cant{metres(infra_.required(point, "trackGeometryPos")),
+                           metres(infra_.required(point, "appliedCant"))};
+      if (is_cant(cant.cant_m)) {
+        track.cant.push_back(cant);
+      } else {
+        left_out.add(std::string("appliedCant ") + point.attribute("appliedCant").value() + " mm", cant.offset_m);
+      }
+    }
+    tell(left_out, std::string(kNoTrackHas) + "; left out", track);
   }
 
   /// Headings of short straights, walked from the origin.
@@ -284,13 +304,25 @@ class Reader {
       for (const Direction running : {Direction::forward, Direction::reverse}) {
         const char* way = running == Direction::forward ? "sameDirProfile" : "oppositeDirProfile";
         std::vector<std::pair<double, double>> changes;  // metres, m/s
+        LeftOut left_out;
         for (const pugi::xml_node& item : descendants(profile.child(way), "staticSpeedProfileItem")) {
-          changes.emplace_back(metres(infra_.required(item, "pos")),
-                               core::mps_from_kmh(infra_.required(item, "speed")));
+          const double at_m = metres(infra_.required(item, "pos"));
+          const double kmh = infra_.required(item, "speed");
+          if (!is_speed(kmh))
+            left_out.add(std::string(way) + " speed " + item.attribute("speed").value() + " km/h", at_m);
+          changes.emplace_back(at_m, core::mps_from_kmh(is_speed(kmh) ? kmh : 0));
         }
+        tell(left_out, std::string(kNoTrainRuns) + "; no limit begins there", track);
         add_speeds(changes, running, track.length_m, track.track);
       }
     }
+  }
+
+  /// One sentence for all of a kind on one track edge: where one value is in the wrong unit, they all are.
+  void tell(const LeftOut& left_out, const std::string& why, const NetTrack& track) {
+    if (left_out.count == 0) return;
+    const std::string more = left_out.count > 1 ? " and " + std::to_string(left_out.count - 1) + " more like it" : "";
+    net_.problems.push_back("track edge \"" + track.track.name + "\" has " + left_out.first + more + ", " + why);
   }
 
   XmlSource infra_;

@@ -21,6 +21,12 @@ std::string railml_called(const pugi::xml_node& node) {
   return "<" + std::string(node.name()) + "> \"" + railml_name(node) + "\"";
 }
 
+std::string railml_has(const pugi::xml_node& node, const NetTrack& track, const char* attribute,
+                       const std::string& why) {
+  return railml_called(node) + " of track " + track.track.name + " has " + attribute + " " +
+         node.attribute(attribute).value() + " " + why;
+}
+
 bool is_on_track(double offset_m, double length_m) {
   return offset_m >= -kAtEndM && offset_m <= length_m + kAtEndM;
 }

@@ -6,12 +6,12 @@
 #include "core/units.hpp"
 #include "track/import/xml/railml2_balises.hpp"
 #include "track/import/xml/railml2_coordinates.hpp"
+#include "track/import/xml/railml2_radii.hpp"
 #include "track/import/xml/railml_readers.hpp"
 
 namespace railfix::track {
 namespace {
 
-constexpr double kMostCantMm = 250;
 constexpr int kMostHops = 20;  // switches directly behind one another
 
 /// One <connection>: at a track's end, or at a switch on it.
@@ -27,12 +27,6 @@ struct Connector {
   bool only_crosses = false;  // ... without slips
   std::string switch_name{};
   pugi::xml_node node{};
-};
-
-struct RadiusChange {
-  double offset_m = 0;
-  double curvature_per_m = 0;
-  std::optional<double> cant_m;
 };
 
 class Reader {
@@ -115,47 +109,10 @@ class Reader {
   }
 
   void read_plan(const pugi::xml_node& elements, NetTrack& track) {
-    std::vector<RadiusChange> changes;
-    for (const pugi::xml_node& change : elements.child("radiusChanges").children("radiusChange")) {
-      const double radius = source_.required(change, "radius");
-      if (radius != 0 && std::abs(radius) < 10)
-        throw source_.wrong(change, "a radius of less than 10 m is no railway's");
-      changes.push_back({pos(change) - origin_m_, radius == 0 ? 0.0 : -1.0 / radius, {}});
-      const auto cant_mm = source_.number(change, "superelevation");
-      if (cant_mm && std::abs(*cant_mm) > kMostCantMm) {
-        tell_impossible(change, "superelevation", "mm, which no track has; no cant begins there", track);
-      } else if (cant_mm) {
-        changes.back().cant_m = std::copysign(1e-3 * *cant_mm, changes.back().curvature_per_m);
-      }
-    }
-    const auto by_offset = [](const auto& a, const auto& b) { return a.offset_m < b.offset_m; };
-    std::stable_sort(changes.begin(), changes.end(), by_offset);
-    for (size_t i = 0; i < changes.size(); ++i) {
-      const double from = changes[i].offset_m;
-      const double to = i + 1 < changes.size() ? changes[i + 1].offset_m : track.length_m;
-      const double curvature = changes[i].curvature_per_m;
-      if (curvature != 0 && to > from) track.bends.push_back({from, to, curvature, curvature});
-    }
-    add_cant(changes, track);
+    read_radii2(source_, elements.child("radiusChanges"), origin_m_, track, net_.problems);
     for (const pugi::xml_node& change : elements.child("gradientChanges").children("gradientChange"))
       track.slopes.push_back({pos(change) - origin_m_, 1e-3 * source_.required(change, "slope")});
-    std::stable_sort(track.slopes.begin(), track.slopes.end(), by_offset);
-  }
-
-  /// Like the radius, the cant holds from a change on up to the next one, so that it steps there.
-  static void add_cant(const std::vector<RadiusChange>& changes, NetTrack& track) {
-    if (std::none_of(changes.begin(), changes.end(), [](const RadiusChange& c) { return c.cant_m.has_value(); }))
-      return;
-    track.cant = {{0, 0}};
-    for (const RadiusChange& change : changes) {
-      const double cant_m = change.cant_m.value_or(0);
-      if (change.offset_m <= 0) {
-        track.cant = {{0, cant_m}};
-        continue;
-      }
-      track.cant.push_back({change.offset_m, track.cant.back().cant_m});
-      track.cant.push_back({change.offset_m, cant_m});
-    }
+    std::ranges::stable_sort(track.slopes, {}, &NetSlope::offset_m);
   }
 
   /// Every profile for itself: the lowest holds. "end" as speed ends a limit. On its own track only.
@@ -166,10 +123,11 @@ class Reader {
       const std::string profile = change.attribute("profileRef").value();
       if (special_profiles_.contains(profile)) continue;
       const bool is_end = std::string(change.attribute("vMax").value()) == "end";
-      const double speed_mps = core::mps_from_kmh(is_end ? 0 : source_.number(change, "vMax").value_or(0));
-      if (speed_mps < 0 || speed_mps >= SpeedLimit::kFastestMps)
-        tell_impossible(change, "vMax", "km/h, which no train runs; no limit begins there", track);
-      changes[{profile, change.attribute("dir").value()}].emplace_back(pos(change) - origin_m_, speed_mps);
+      const double kmh = is_end ? 0 : source_.number(change, "vMax").value_or(0);
+      if (!is_speed(kmh))
+        tell_impossible(change, "vMax", std::string("km/h, ") + kNoTrainRuns + "; no limit begins there", track);
+      changes[{profile, change.attribute("dir").value()}].emplace_back(pos(change) - origin_m_,
+                                                                       core::mps_from_kmh(is_speed(kmh) ? kmh : 0));
     }
     for (const auto& [of, list] : changes) {
       if (of.second != "down") add_speeds(list, Direction::forward, track.length_m, track.track);
@@ -222,8 +180,7 @@ class Reader {
   }
 
   void tell_impossible(const pugi::xml_node& of, const char* attribute, const std::string& why, const NetTrack& track) {
-    net_.problems.push_back(railml_called(of) + " of track " + track.track.name + " has " + attribute + " " +
-                            of.attribute(attribute).value() + " " + why);
+    net_.problems.push_back(railml_has(of, track, attribute, why));
   }
 
   /// Pieces of every track, by the offset of their begin.

@@ -22,6 +22,7 @@ class Reader {
     read_relations();
     read_switches();
     read_plan();
+    tell_cant();
     read_marks();
     read_speeds();
     read_balises3(source_, places_, net_);
@@ -241,6 +242,17 @@ class Reader {
     }
   }
 
+  /// No file and no schema at hand says which unit and sign cant has in railML 3: it is not guessed at.
+  void tell_cant() {
+    const pugi::xml_node first = source_.root().find_node([](const pugi::xml_node& node) {
+      return std::string_view(node.name()) == "superelevationCurve" || node.attribute("superelevation");
+    });
+    if (!first) return;
+    net_.problems.push_back(railml_called(first) +
+                            " says something of cant, perhaps as others do: cant of railML 3 is " +
+                            "not read, all of it is left out");
+  }
+
   void read_speeds() {
     const std::set<std::string> special = special_speed_profiles(source_);
     for (const pugi::xml_node& section : descendants(source_.root(), "speedSection")) {
@@ -251,9 +263,9 @@ class Reader {
         return special.contains(of.attribute("ref").value());
       });
       if (is_special || section.attribute("isTemporary").as_bool()) continue;
-      if (*speed <= 0 || core::mps_from_kmh(*speed) >= SpeedLimit::kFastestMps) {
+      if (*speed <= 0 || !is_speed(*speed)) {
         net_.problems.push_back(railml_called(section) + " has maxSpeed " + section.attribute("maxSpeed").value() +
-                                " km/h, which no train runs; it is left out");
+                                " km/h, " + kNoTrainRuns + "; it is left out");
         continue;
       }
       const pugi::xml_node location = section.child("linearLocation");

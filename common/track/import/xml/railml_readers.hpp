@@ -21,6 +21,10 @@ std::string railml_name(const pugi::xml_node& node);
 /// "<element> "name"", for the sentence that says what is wrong with it.
 std::string railml_called(const pugi::xml_node& node);
 
+/// "<element> "name" of track T has ATTRIBUTE value ...", for the sentence about a value that is left out.
+std::string railml_has(const pugi::xml_node& node, const NetTrack& track, const char* attribute,
+                       const std::string& why);
+
 /// Whether a place lies on a track of railML 2, to a centimetre, and the sentence for one that does not.
 bool is_on_track(double offset_m, double length_m);
 std::string not_on_its_track(const pugi::xml_node& node);
