@@ -67,6 +67,13 @@ std::optional<LandmarkKind> landmark_kind_from(const std::string& text) {
   return static_cast<LandmarkKind>(found - kLandmarkKinds.begin());
 }
 
+std::string landmark_kinds() {
+  std::string all;
+  for (size_t i = 1; i < kLandmarkKinds.size(); ++i)  // the first one is no kind
+    all += (i > 1 ? ", " : "") + std::string(kLandmarkKinds[i]);
+  return all;
+}
+
 LandmarkKind seen_along(LandmarkKind kind, bool forward) {
   if (forward) return kind;
   if (kind == LandmarkKind::portal_in) return LandmarkKind::portal_out;

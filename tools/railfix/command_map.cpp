@@ -20,6 +20,8 @@
 namespace railfix::tool {
 namespace {
 
+constexpr double kNearestMastsM = 10;  // as many as that would need more memory than there is
+
 using nlohmann::ordered_json;
 
 struct BuildRequest {
@@ -84,7 +86,8 @@ void add_build(CLI::App& map, Action& chosen) {
       ->add_option(
           "INPUT", request->inputs,
           "LandXML (.xml, .landxml), railML 2 and 3 (.xml, .railml), ERJU infrastructure and map (.xml, both), "
-          "OpenStreetMap (.osm, .pbf), Overpass JSON (.json), GeoJSON (.geojson), compiled map (.map)")
+          "OpenStreetMap (.osm, .osm.gz, .osm.bz2, .pbf), Overpass JSON (.json), GeoJSON (.geojson), compiled map "
+          "(.map)")
       ->required();
   command->add_option("--out", request->out, "The map file to write")->required();
   command->add_option(
@@ -115,6 +118,7 @@ void add_build(CLI::App& map, Action& chosen) {
   command
       ->add_option("--landmarks", request->options.landmarks,
                    "Keep landmarks of these kinds alone, for example frog,portal_in,portal_out (default: all)")
+      ->transform([](std::string kind) { return CLI::detail::trim(kind); })
       ->delimiter(',');
   command->add_flag("--json", request->as_json, "The figures and problems as JSON on standard output");
   command->footer(
@@ -154,6 +158,10 @@ void add_make(CLI::App& map, Action& chosen) {
       ->capture_default_str();
   command->add_option("--masts", request->options.mast_spacing_m, "Masts about every so many metres; 0 = none")
       ->check(number_between(0.0, 1000.0))
+      ->check([](const std::string& spacing) {
+        const double spacing_m = std::strtod(spacing.c_str(), nullptr);
+        return spacing_m > 0 && spacing_m < kNearestMastsM ? "masts nearer than 10 m stand on no line; 0 = none" : "";
+      })
       ->capture_default_str();
   command->footer("Example:\n  railfix map make --track-km 20000 --seed 1 --out national.map");
   command->callback([request, &chosen] {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <charconv>
 #include <cstdint>
 #include <limits>
 #include <string>
@@ -14,8 +15,9 @@ inline CLI::Validator whole_number(uint64_t least = 0, uint64_t most = std::nume
   const std::string range = "from " + std::to_string(least) + (open ? " on" : " to " + std::to_string(most));
   return {[least, most, range](std::string& text) {
             uint64_t value = 0;
-            const bool good = text.find_first_not_of("0123456789") == std::string::npos &&
-                              CLI::detail::lexical_cast(text, value) && value >= least && value <= most;
+            const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+            const bool good =
+                error == std::errc() && end == text.data() + text.size() && value >= least && value <= most;
             return good ? std::string() : text + " is not a whole number " + range;
           },
           range};

@@ -59,15 +59,27 @@ core::Result<Kind> kind_of(const std::filesystem::path& file) {
     if (holds("erju.org/map")) return Kind::erju_map;
     return Kind::landxml;
   }
-  return core::Error{file.string() +
-                     " is of no kind that can be read; give LandXML, railML or ERJU maps (.xml, .landxml, .railml), "
-                     "OpenStreetMap (.osm, .pbf), Overpass JSON, GeoJSON or a compiled map (.map)"};
+  return core::Error{
+      file.string() +
+      " is of no kind that can be read; give LandXML, railML or ERJU maps (.xml, .landxml, .railml), "
+      "OpenStreetMap (.osm, .osm.gz, .osm.bz2, .pbf), Overpass JSON, GeoJSON (.json, .geojson) or a compiled map "
+      "(.map)"};
 }
 
 std::vector<std::string> problems_of(const Map& map) {
   std::vector<std::string> found = check_topology(map);
   if (std::string of_scale = scale_problem(map); !of_scale.empty()) found.push_back(std::move(of_scale));
   return found;
+}
+
+void refuse_twice(const std::vector<std::filesystem::path>& inputs) {
+  for (size_t i = 0; i < inputs.size(); ++i) {
+    for (size_t j = 0; j < i; ++j) {
+      std::error_code failed;
+      if (!std::filesystem::equivalent(inputs[i], inputs[j], failed)) continue;
+      throw core::BadInput(inputs[i].string() + " is given twice: its tracks would lie on each other");
+    }
+  }
 }
 
 /// Everything that was read, before it becomes one map. Errors are thrown as BadInput and become a value at the door.
@@ -249,6 +261,7 @@ class Sources {
 core::Result<BuiltMap> build_map(const std::vector<std::filesystem::path>& inputs, const BuildOptions& options) {
   try {
     Sources sources(options);
+    refuse_twice(inputs);
     for (const std::filesystem::path& input : inputs) sources.read(input);
     BuiltMap built = sources.finish();
     built.map.name = inputs.empty() ? "" : inputs.front().stem().string();

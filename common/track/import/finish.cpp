@@ -124,7 +124,8 @@ core::Status add_virtual_balises(Map& map, double every_m, uint32_t nid_c, uint3
 
 core::Status keep_landmarks(Map& map, const std::vector<std::string>& kinds) {
   for (const auto& kind : kinds) {
-    if (!landmark_kind_from(kind)) return core::Error{"there are no landmarks of kind \"" + kind + "\""};
+    if (landmark_kind_from(kind)) continue;
+    return core::Error{"there are no landmarks of kind \"" + kind + "\", only " + landmark_kinds()};
   }
   std::unordered_map<uint32_t, uint32_t> new_ids;
   std::vector<Landmark> kept;

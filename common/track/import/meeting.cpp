@@ -135,8 +135,15 @@ double kink_rad(const Map& map, const Connection& way) {
 std::vector<std::string> near_misses(const Map& map) {
   const TrackFinder tracks(std::shared_ptr<const Map>(std::shared_ptr<void>(), &map));  // the map outlives it
   std::vector<std::string> problems;
+  std::vector<LooseEnd> told;
   for (const LooseEnd& end : loose_ends(map)) {
-    if (std::string problem = near_miss(map, tracks, end); !problem.empty()) problems.push_back(std::move(problem));
+    // Of two ends that miss each other one is enough.
+    const auto beside = [&](const LooseEnd& other) { return distance_m(end, other) <= kNearMissM; };
+    if (std::ranges::any_of(told.rbegin(), told.rend(), beside)) continue;
+    std::string problem = near_miss(map, tracks, end);
+    if (problem.empty()) continue;
+    problems.push_back(std::move(problem));
+    told.push_back(end);
   }
   return problems;
 }

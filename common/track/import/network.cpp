@@ -5,6 +5,7 @@
 #include <set>
 
 #include "core/units.hpp"
+#include "track/import/told.hpp"
 
 namespace railfix::track {
 namespace {
@@ -51,7 +52,7 @@ std::string told(const End& end, const std::vector<ImportedTrack>& tracks) {
   std::string sentence =
       std::string("the ") + (end.is_end ? "end" : "start") + " of " + tracks[end.track].name + " is not connected";
   if (!neighbour.empty()) {
-    sentence += "; the nearest track, " + neighbour + ", is " + std::to_string(nearest_m) + " m away";
+    sentence += "; the nearest track, " + neighbour + ", is " + told_m(nearest_m) + " away";
   }
   return sentence;
 }
@@ -133,8 +134,10 @@ std::vector<Pair> possible_pairs(const Draft& draft, const DraftNode& node, cons
   return pairs;
 }
 
-NodeKind kind_of(const DraftNode& node, size_t ends) {
-  if (node.is_crossing) return NodeKind::crossing;
+NodeKind kind_of(const DraftNode& node, size_t ends, const std::vector<WayOver>& ways) {
+  // Where each of four ends leads straight on to one other, and nowhere else, two tracks only cross.
+  const bool crosses = ends == 4 && ways.size() == 2 && !ways[0].diverging && !ways[1].diverging;
+  if (node.is_crossing || (crosses && !node.is_switch)) return NodeKind::crossing;
   if (node.is_switch || ends > 2) return NodeKind::railway_switch;
   return ends == 2 ? NodeKind::joint : NodeKind::end;
 }
@@ -267,8 +270,9 @@ void append(const Draft& draft, Map& map) {
   for (size_t i = 0; i < draft.nodes.size(); ++i) {
     const DraftNode& node = draft.nodes[i];
     const uint32_t id = first_node + static_cast<uint32_t>(i);
-    map.nodes.push_back({id, kind_of(node, ends[i].size()), node.name, node.easting_m, node.northing_m});
-    for (const WayOver& way : ways_over(draft, i, ends[i])) {
+    const std::vector<WayOver> ways = ways_over(draft, i, ends[i]);
+    map.nodes.push_back({id, kind_of(node, ends[i].size(), ways), node.name, node.easting_m, node.northing_m});
+    for (const WayOver& way : ways) {
       map.connections.push_back({id, first_edge + static_cast<uint32_t>(ends[i][way.a].edge),
                                  first_edge + static_cast<uint32_t>(ends[i][way.b].edge), way.diverging});
     }

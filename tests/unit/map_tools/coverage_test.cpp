@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/units.hpp"
 #include "unit/track/small_map.hpp"
 
 namespace railfix::tool {
@@ -94,6 +95,20 @@ TEST(Coverage, CountsEveryMetreOnceHoweverManyReferencesDoNotHelp) {
   const Coverage all = coverage_of(path, options);
   EXPECT_LE(all.covered_m, path.end_m());
   EXPECT_NEAR(all.covered_m + (all.gaps.empty() ? 0 : all.gaps[0].to_m - all.gaps[0].from_m), path.end_m(), 1e-6);
+}
+
+TEST(Coverage, ARingIsOneLap) {
+  track::Map map;
+  const double around_m = 2 * core::kPi * 500;
+  map.nodes.push_back({1, track::NodeKind::joint, "", 0, 0});
+  map.edges.push_back({1, "ring", 1, 1, "", track::Alignment::chained({0, 0, 0}, {{around_m, 0.002, 0.002}})});
+  map.connections.push_back({1, 1, 1, false});
+  const auto ring = std::make_shared<const track::Map>(std::move(map));
+  for (const double start_m : {0.0, 1000.0}) {
+    const auto way = core::value_or_throw(way_from(ring, {1, start_m, Direction::forward}, 1e7));
+    EXPECT_NEAR(way.end_m() - way.begin_m(), around_m, 1e-6) << start_m;
+  }
+  EXPECT_NEAR(core::value_or_throw(way_from(ring, {1, 0, Direction::forward}, 700)).end_m(), 700, 1e-9);
 }
 
 TEST(Coverage, AWayHasALength) {

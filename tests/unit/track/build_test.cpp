@@ -195,6 +195,29 @@ TEST_F(BuildTest, ARingIsOneEdgeJoinedToItself) {
   EXPECT_EQ(map.connections.size(), 1U);
 }
 
+// Four tracks at one node that nobody calls anything: where each leads straight on to one other, two tracks cross.
+TEST_F(BuildTest, TwoTracksThatCrossAtANodeAreNoSwitch) {
+  const auto built = [&](const char* node_of_the_branch) {
+    const auto file = write("cross.json", std::string(R"({"elements":[
+{"type":"node","id":1,"lat":47.0,"lon":8.0},{"type":"node","id":2,"lat":47.001,"lon":8.0},
+{"type":"node","id":3,"lat":47.002,"lon":8.0},{"type":"node","id":4,"lat":47.001,"lon":7.998},
+{"type":"node","id":5,"lat":47.001,"lon":8.002},{"type":"node","id":6,"lat":47.0021,"lon":8.0002},
+{"type":"way","id":11,"nodes":[1,2,3],"tags":{"railway":"rail","maxspeed":"fast"}},
+{"type":"way","id":12,"nodes":[4,2,)") + node_of_the_branch +
+                                              R"(],"tags":{"railway":"rail","maxspeed":"signals"}}]})");
+    return core::value_or_throw(build_map({file}, {.crs = "local"})).map;
+  };
+  const auto of_kind = [](const Map& map, NodeKind kind) { return std::ranges::count(map.nodes, kind, &Node::kind); };
+  const Map crossing = built("5");
+  EXPECT_EQ(of_kind(crossing, NodeKind::crossing), 1);
+  EXPECT_EQ(of_kind(crossing, NodeKind::railway_switch), 0);
+  EXPECT_EQ(crossing.connections.size(), 2U);
+  EXPECT_THAT(
+      crossing.problems,
+      testing::Contains("1 speed limits are no number of km/h or mph, the first one is \"fast\" of way 11; left out"));
+  EXPECT_EQ(of_kind(built("6"), NodeKind::railway_switch), 1);
+}
+
 TEST_F(BuildTest, BuildsUponACompiledMap) {
   const auto file = in_folder("small.map");
   Map small = small_map();
@@ -205,7 +228,10 @@ TEST_F(BuildTest, BuildsUponACompiledMap) {
   EXPECT_EQ(map.crs, "EPSG:2056");
   EXPECT_EQ(map.balise_groups.size(), 9U);
   EXPECT_THAT(map.problems, testing::IsEmpty());
-  EXPECT_THAT(message({file, file}), HasSubstr("only one compiled map"));
+  const auto copy = in_folder("copy.map");
+  std::filesystem::copy_file(file, copy);
+  EXPECT_THAT(message({file, copy}), HasSubstr("only one compiled map"));
+  EXPECT_THAT(message({file, file}), HasSubstr("small.map is given twice"));
   EXPECT_THAT(message({file}, {.crs = "EPSG:32633"}), HasSubstr("not reprojected"));
 }
 

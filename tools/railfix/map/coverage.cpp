@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 namespace railfix::tool {
 namespace {
@@ -47,6 +48,18 @@ void propose_references(const CoverageOptions& options, CoverageGap& gap) {
   for (double at = gap.from_m; step > 1.0 && at < gap.to_m; at += step) gap.references_m.push_back(at);
 }
 
+/// Where a way runs over a track for the second time, as on a ring; nothing where it does not.
+std::optional<double> until_it_comes_again(const track::Path& path) {
+  const track::Route route = path.route();
+  std::set<std::pair<uint32_t, bool>> run;
+  for (const track::Route::Leg& leg : route.legs()) {
+    if (run.emplace(leg.run.edge->id, leg.run.forward).second) continue;
+    const bool is_first = leg.run == route.legs().front().run;  // the start lies on it
+    return is_first ? leg.begin_m - route.begin_m() : leg.begin_m;
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 double half_interval_m(const CoverageOptions& options, double locacc_m, double way_m) {
@@ -56,7 +69,10 @@ double half_interval_m(const CoverageOptions& options, double locacc_m, double w
 core::Result<track::Path> way_from(std::shared_ptr<const track::Map> map, const track::EdgePosition& start,
                                    double length_m) {
   if (!(length_m > 0)) return core::Error{"--length must be more than 0 m"};
-  return track::Path::follow(std::move(map), start, length_m, 0);
+  const auto path = track::Path::follow(map, start, length_m, 0);
+  if (!path.ok()) return path;
+  const auto lap_m = until_it_comes_again(path.value());
+  return lap_m ? track::Path::follow(std::move(map), start, *lap_m, 0) : path;
 }
 
 Coverage coverage_of(const track::Path& path, const CoverageOptions& options, bool backwards) {

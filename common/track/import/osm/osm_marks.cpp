@@ -7,9 +7,6 @@
 
 namespace railfix::track {
 
-namespace {
-
-/// "80" (km/h) or "50 mph"; nothing where it says anything else.
 std::optional<double> speed_mps_of(const std::string& text) {
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -22,8 +19,6 @@ std::optional<double> speed_mps_of(const std::string& text) {
   }
   return value > 0 && is_speed(value) ? std::optional(core::mps_from_kmh(value)) : std::nullopt;
 }
-
-}  // namespace
 
 std::optional<TrackMark> point_mark(const OsmTags& tags, double offset_m) {
   const std::string kind = value_of(tags, "railway");

@@ -19,6 +19,9 @@ struct OsmChain {
   std::optional<double> heading_at_end;
 };
 
+/// maxspeed: "80" (km/h) or "50 mph"; nothing where it says anything else.
+std::optional<double> speed_mps_of(const std::string& text);
+
 /// What a node says that stands there, if anything.
 std::optional<TrackMark> point_mark(const OsmTags& tags, double offset_m);
 

@@ -11,6 +11,7 @@
 #include "track/import/osm/osm_node_marks.hpp"
 #include "track/import/osm/osm_overbridges.hpp"
 #include "track/import/osm/osm_trackside.hpp"
+#include "track/import/told.hpp"
 
 namespace railfix::track {
 namespace {
@@ -52,6 +53,7 @@ class Builder {
     for (OsmChain& chain : chains_) add_edge(chain);
     add_marks_at_nodes(data_, chains_, out_.draft);
     add_trackside();
+    tell_speeds();
     return std::move(out_);
   }
 
@@ -286,11 +288,27 @@ class Builder {
     }
   }
 
+  /// A limit that is not read is none: trains would seem to be allowed more than they are.
+  void tell_speeds() {
+    size_t count = 0;
+    std::string first;
+    for (const OsmWay& way : data_.ways) {
+      for (const char* key : {"maxspeed", "maxspeed:forward", "maxspeed:backward"}) {
+        const std::string value = value_of(way.tags, key);
+        if (value.empty() || value == "none" || value == "signals" || speed_mps_of(value)) continue;
+        if (count++ == 0) first = "the first one is \"" + value + "\" of way " + std::to_string(way.id);
+      }
+    }
+    if (count > 0)
+      out_.problems.push_back(std::to_string(count) + " speed limits are no number of km/h or mph, " + first +
+                              "; left out");
+  }
+
   void tell_left_out(const std::string& track, const ClothoidFit& fit) {
     if (fit.left_out == 0) return;
     out_.problems.push_back("edge " + track + " has " + std::to_string(fit.left_out) + " point" +
-                            (fit.left_out > 1 ? "s" : "") + " up to " + std::to_string(fit.left_out_max_m) +
-                            " m beside the track that the others make; left out");
+                            (fit.left_out > 1 ? "s" : "") + " up to " + told_m(fit.left_out_max_m) +
+                            " beside the track that the others make; left out");
   }
 
   /// The name (else the number) of the way with most segments of the chain.
@@ -328,6 +346,10 @@ core::Result<OsmNetwork> build_osm_network(const OsmData& data, const Projection
                                            bool with_clothoids) {
   OsmNetwork network = Builder(data, projection, smooth_m, with_clothoids).build();
   if (network.draft.edges.empty()) {
+    if (!data.ways.empty())
+      return core::Error{"none of the " + std::to_string(data.ways.size()) +
+                         " railway tracks has a length: the points of each are at one place, or where the map's "
+                         "coordinates do not reach"};
     return core::Error{
         "the data hold no railway tracks (railway=rail, light_rail, narrow_gauge or subway; --trams adds trams)"};
   }

@@ -124,7 +124,8 @@ std::string remark_in(const std::filesystem::path& file) {
 
 /// What the library says, and what it means for the file.
 std::string told(const std::filesystem::path& file, const std::string& library) {
-  constexpr std::array kCutShort{"EOF", "end of", "no data", "read failed", "no element found", "unclosed token"};
+  constexpr std::array kCutShort{
+      "EOF", "end of", "no data", "read failed", "no element found", "unclosed token", "read close failed"};
   const auto says = [&](const char* text) { return library.find(text) != std::string::npos; };
   std::error_code failed;
   if (std::filesystem::file_size(file, failed) == 0) return "the file is empty (" + library + ")";

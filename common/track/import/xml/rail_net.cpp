@@ -10,6 +10,7 @@
 #include "core/units.hpp"
 #include "track/import/fit/biarc.hpp"
 #include "track/import/made/made_lines.hpp"
+#include "track/import/told.hpp"
 #include "track/import/xml/net_heights.hpp"
 
 namespace railfix::track {
@@ -98,8 +99,8 @@ class Planner {
       net_.fit.add(track.track.name, *smooth, track.shape.size());
       if (smooth->left_out > 0) {
         net_.problems.push_back("track " + track.track.name + " has " + std::to_string(smooth->left_out) +
-                                " points up to " + std::to_string(smooth->left_out_max_m) +
-                                " m beside the track that the others make; left out");
+                                " points up to " + told_m(smooth->left_out_max_m) +
+                                " beside the track that the others make; left out");
       }
       track.track.alignment = std::move(smooth->alignment);
       return;
@@ -207,9 +208,9 @@ class Planner {
     const Alignment& plan = track.track.alignment;
     const double scale = plan.length_m() / track.length_m;
     if (std::abs(plan.length_m() - track.length_m) > std::max(kLengthToldM, kLengthToldPart * track.length_m)) {
-      net_.problems.push_back("track " + track.track.name + " is " + std::to_string(plan.length_m()) +
-                              " m long by its coordinates but " + std::to_string(track.length_m) +
-                              " m by the source; places on it are spread evenly");
+      net_.problems.push_back("track " + track.track.name + " is " + told_m(plan.length_m()) +
+                              " long by its coordinates but " + told_m(track.length_m) +
+                              " by the source; places on it are spread evenly");
     }
     for (CantPoint& point : track.cant) point.offset_m *= scale;
     track.track.alignment = Alignment(plan.elements(), plan.starts(), std::move(profile), std::move(track.cant));

@@ -1,4 +1,5 @@
 #include "track/import/xml/railml2_coordinates.hpp"
+#include "track/import/told.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -77,7 +78,7 @@ std::vector<Eigen::Vector2d> shape_between(const std::vector<Railml2Coordinates:
   double length_m = 0;
   for (size_t i = 1; i < shape.size(); ++i) length_m += (shape[i] - shape[i - 1]).norm();
   if (std::abs(length_m - (to_m - from_m)) > kNearEndM + kLengthShare * (to_m - from_m)) {
-    why = "is " + std::to_string(to_m - from_m) + " m long, but " + std::to_string(length_m) + " m by its coordinates";
+    why = "is " + told_m(to_m - from_m) + " long, but " + told_m(length_m) + " by its coordinates";
     return {};
   }
   return shape;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "track/import/told.hpp"
 #include "track/import/xml/railml_readers.hpp"
 
 namespace railfix::track {
@@ -58,8 +59,8 @@ bool Railml3Places::is_beyond(const pugi::xml_node& of, double from_m, double to
 }
 
 void Railml3Places::tell_beyond(const pugi::xml_node& of, double at_m, double length_m, const std::string& therefore) {
-  net_.problems.push_back(railml_called(of) + " lies at " + std::to_string(at_m) + " m of a net element of " +
-                          std::to_string(length_m) + " m; " + therefore);
+  net_.problems.push_back(railml_called(of) + " lies at " + told_m(at_m) + " of a net element of " + told_m(length_m) +
+                          "; " + therefore);
 }
 
 double Railml3Places::within(const pugi::xml_node& of, double at_m, double length_m) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "track/import/told.hpp"
 #include "track/import/xml/railml_readers.hpp"
 
 namespace railfix::track {
@@ -47,8 +48,8 @@ class Slopes {
     }
     level_up_to(track_.length_m);
     if (level_m_ > kNetTouchM)
-      problems_.push_back("track " + track_.track.name + " has no gradient on " + std::to_string(level_m_) +
-                          " m of its " + std::to_string(track_.length_m) + " m; it is level there");
+      problems_.push_back("track " + track_.track.name + " has no gradient on " + told_m(level_m_) + " of its " +
+                          told_m(track_.length_m) + "; it is level there");
   }
 
  private:
