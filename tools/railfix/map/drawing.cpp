@@ -18,6 +18,7 @@ constexpr Colour kBalise{0, 140, 60};
 constexpr Colour kInk{0, 0, 0};
 constexpr double kMarginPx = 40;
 constexpr double kFootPx = 60;
+constexpr double kLetter = 0.75;  // how wide one is, of the size
 constexpr double kLeastPx = 1.0;  // between drawn points
 constexpr size_t kMostLabels = 150;
 
@@ -172,11 +173,13 @@ class Painter {
   /// Labels that would lie on others are left out.
   void add_label(const Eigen::Vector2d& at, const std::string& text, double size) {
     if (out_.labels.size() >= kMostLabels) return;
-    const Eigen::Vector2d place = at + Eigen::Vector2d(6, -5);
+    const double length_px = kLetter * size * static_cast<double>(text.size());
+    const bool fits = at.x() + 6 + length_px < out_.width;
+    const Eigen::Vector2d place = at + Eigen::Vector2d(fits ? 6 : -6 - length_px, -5);
     for (const Drawing::Label& other : out_.labels) {
       const bool beside = std::abs(other.at.y() - place.y()) > size ||
-                          other.at.x() + 0.6 * other.size * static_cast<double>(other.text.size()) < place.x() ||
-                          place.x() + 0.6 * size * static_cast<double>(text.size()) < other.at.x();
+                          other.at.x() + kLetter * other.size * static_cast<double>(other.text.size()) < place.x() ||
+                          place.x() + length_px < other.at.x();
       if (!beside) return;
     }
     out_.labels.push_back({place, text, size});
@@ -200,11 +203,17 @@ class Painter {
          std::to_string(static_cast<int>(std::lround(in_km ? length_m / 1000 : length_m))) + (in_km ? " km" : " m"),
          12});
     double x = right + 40;
+    double row_y = y - 10;
     const auto entry = [&](const Colour& colour, const std::string& text, bool is_line) {
-      if (is_line) out_.lines.push_back({{{x, y}, {x + 24, y}}, colour, 3});
-      if (!is_line) out_.dots.push_back({{x + 12, y}, colour, 4, true});
-      out_.labels.push_back({{x + 30, y + 4}, text, 12});
-      x += 42 + 7.5 * static_cast<double>(text.size());
+      const double length_px = 42 + 7.5 * static_cast<double>(text.size());
+      if (x + length_px > out_.width) {
+        x = right + 40;
+        row_y += 18;
+      }
+      if (is_line) out_.lines.push_back({{{x, row_y}, {x + 24, row_y}}, colour, 3});
+      if (!is_line) out_.dots.push_back({{x + 12, row_y}, colour, 4, true});
+      out_.labels.push_back({{x + 30, row_y + 4}, text, 12});
+      x += length_px;
     };
     entry(kStraight, "straight", true);
     entry(kClothoid, "clothoid", true);

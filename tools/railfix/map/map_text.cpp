@@ -129,11 +129,33 @@ void print_info(const track::Map& map, size_t most_edges) {
   print_problems(map.problems, 20);
 }
 
+namespace {
+
+/// Seen the other way twist stays: the cant and the way change their signs together.
+void print_height_and_cant(const track::Alignment& alignment, const track::TrackPoint& point, double sign) {
+  if (!alignment.cant().empty()) {
+    std::printf("cant, twist      %.1f mm, %.3f mm per m\n", sign * point.cant_m * 1e3 + 0.0, point.twist * 1e3 + 0.0);
+  } else {
+    std::puts("cant, twist      not on the map");
+  }
+  if (!alignment.profile().empty()) {
+    std::printf("elevation, grade %.3f m, %.2f per mille\n", point.elevation_m, sign * point.grade * 1e3);
+  } else {
+    std::puts("elevation, grade not on the map");
+  }
+}
+
+}  // namespace
+
 void print_place(const track::Map& map, const track::EdgePosition& place, bool as_json) {
   // Seen along growing offset, or against it where the place says so; + 0.0 makes -0 a plain 0.
   const bool reverse = place.direction == track::Direction::reverse;
   const double sign = reverse ? -1.0 : 1.0;
-  const track::TrackPoint point = map.edge(place.edge)->alignment.at(place.offset_m);
+  const track::Alignment& alignment = map.edge(place.edge)->alignment;
+  const track::TrackPoint point = alignment.at(place.offset_m);
+  const bool has_heights = !alignment.profile().empty();
+  const bool has_cant = !alignment.cant().empty();
+  const auto if_known = [](bool known, double value) { return known ? ordered_json(value + 0.0) : ordered_json(); };
   const double heading = core::wrap_pi(point.pose.heading_rad + (reverse ? core::kPi : 0.0));
   const auto geo = map.to_geo(point.pose.easting_m, point.pose.northing_m);
   const auto limit =
@@ -147,10 +169,10 @@ void print_place(const track::Map& map, const track::EdgePosition& place, bool a
                 {"heading_rad", heading},
                 {"curvature_per_m", sign * point.curvature_per_m + 0.0},
                 {"curvature_rate_per_m2", point.curvature_rate_per_m2},
-                {"cant_m", sign * point.cant_m + 0.0},
-                {"twist", point.twist},
-                {"elevation_m", point.elevation_m},
-                {"grade", sign * point.grade + 0.0},
+                {"cant_m", if_known(has_cant, sign * point.cant_m)},
+                {"twist", if_known(has_cant, point.twist)},
+                {"elevation_m", if_known(has_heights, point.elevation_m)},
+                {"grade", if_known(has_heights, sign * point.grade)},
                 {"speed_limit_mps", limit ? ordered_json(*limit) : ordered_json()},
                 {"lat_deg", geo ? ordered_json(geo->lat_deg) : ordered_json()},
                 {"lon_deg", geo ? ordered_json(geo->lon_deg) : ordered_json()}});
@@ -167,10 +189,9 @@ void print_place(const track::Map& map, const track::EdgePosition& place, bool a
     std::printf("curvature        %.3e per m (radius %.1f m to the %s)\n", curvature, 1.0 / std::abs(curvature),
                 curvature > 0 ? "left" : "right");
   }
-  // Seen the other way both stay: the value and the way change their signs together.
+  // Seen the other way it stays: the curvature and the way change their signs together.
   std::printf("its rate         %.3e per m2\n", point.curvature_rate_per_m2 + 0.0);
-  std::printf("cant, twist      %.1f mm, %.3f mm per m\n", sign * point.cant_m * 1e3 + 0.0, point.twist * 1e3 + 0.0);
-  std::printf("elevation, grade %.3f m, %.2f per mille\n", point.elevation_m, sign * point.grade * 1e3);
+  print_height_and_cant(alignment, point, sign);
   if (limit) std::printf("speed limit      %.0f km/h\n", core::kmh_from_mps(*limit));
   if (geo) std::printf("latitude         %.8f\nlongitude        %.8f\n", geo->lat_deg, geo->lon_deg);
 }
