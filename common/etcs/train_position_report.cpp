@@ -2,6 +2,7 @@
 
 #include <array>
 
+#include "core/joined.hpp"
 #include "etcs/layout.hpp"
 
 namespace railfix::etcs {
@@ -175,22 +176,25 @@ core::Result<TrainPositionReport> decode_or_advise(std::span<const uint8_t> mess
                      "."};
 }
 
-core::Status check_reference(const TrainPositionReport& report) {
-  if (report.nid_lrbg != kUnknownBaliseGroup) return {};
+std::string said_of_no_group(const TrainPositionReport& report) {
+  if (names_group(report.nid_lrbg)) return "";
   struct Related {
     const char* field;
     uint32_t value;
     uint32_t unknown;
   };
+  std::vector<std::string> said;
   for (const auto& [field, value, unknown] :
        {Related{"D_LRBG", report.d_lrbg, kUnknownDistance}, Related{"Q_DIRLRBG", report.q_dirlrbg, kUnknownSide},
-        Related{"Q_DLRBG", report.q_dlrbg, kUnknownSide}, Related{"Q_DIRTRAIN", report.q_dirtrain, kUnknownSide}}) {
-    if (value == unknown) continue;
-    return core::Error{std::string(field) + " = " + number(value) + " is said of the LRBG, but NID_LRBG = " +
-                       number(kUnknownBaliseGroup) + " says that it is unknown: give the group, or " + number(unknown) +
-                       " (unknown) for " + field + "."};
+        Related{"Q_DLRBG", report.q_dlrbg, kUnknownSide}, Related{"L_DOUBTOVER", report.l_doubtover, kUnknownDistance},
+        Related{"L_DOUBTUNDER", report.l_doubtunder, kUnknownDistance},
+        Related{"Q_DIRTRAIN", report.q_dirtrain, kUnknownSide}}) {
+    if (value != unknown) said.push_back(std::string(field) + " = " + number(value));
   }
-  return {};
+  if (said.empty()) return "";
+  return core::joined(said) +
+         " would be in relation to the LRBG and says nothing, because NID_LRBG = " + number(report.nid_lrbg) +
+         " says that the LRBG is unknown.";
 }
 
 double scale_m(uint32_t q_scale) {

@@ -106,7 +106,7 @@ Pairing pair_up(const std::vector<TimedReport>& ours, const std::vector<TimedRep
   std::optional<uint32_t> group_before;
   for (const auto& timed : certified) {
     const uint32_t group = timed.fields.nid_lrbg;
-    if (group != etcs::kUnknownBaliseGroup) {
+    if (etcs::names_group(group)) {
       leg += group_before && group != *group_before;
       group_before = group;
     }

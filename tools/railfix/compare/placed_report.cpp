@@ -37,8 +37,8 @@ uint64_t co_ordinate_system(const etcs::TrainPositionReport& fields) {
 }  // namespace
 
 bool position_known(const etcs::TrainPositionReport& fields) {
-  return fields.nid_lrbg != etcs::kUnknownBaliseGroup && fields.d_lrbg != etcs::kUnknownDistance &&
-         fields.q_dlrbg != etcs::kUnknownSide && fields.nid_prvlrbg != etcs::kUnknownBaliseGroup;
+  return etcs::names_group(fields.nid_lrbg) && fields.d_lrbg != etcs::kUnknownDistance &&
+         fields.q_dlrbg != etcs::kUnknownSide && (!fields.nid_prvlrbg || etcs::names_group(*fields.nid_prvlrbg));
 }
 
 bool interval_known(const etcs::TrainPositionReport& fields) {
