@@ -22,6 +22,11 @@ double speed_mps(const etcs::TrainPositionReport& fields) {
   return fields.q_dirtrain == etcs::kNominal ? speed : -speed;
 }
 
+/// Along the group's nominal direction: 1 or -1, 0 = not known.
+double facing(const etcs::TrainPositionReport& fields) {
+  return fields.q_dirlrbg == etcs::kUnknownSide ? 0 : fields.q_dirlrbg == etcs::kReverse ? -1 : 1;
+}
+
 /// Along the group's nominal direction: 1 or -1.
 double running(const etcs::TrainPositionReport& fields) {
   const uint32_t way = fields.q_dirtrain == etcs::kUnknownSide ? fields.q_dirlrbg : fields.q_dirtrain;
@@ -71,7 +76,8 @@ std::optional<PlacedReport> Axes::place(const TimedReport& report) const {
   if (fields.q_dirlrbg == etcs::kUnknownSide) behind_m = ahead_m = std::max(behind_m, ahead_m);
   if (fields.q_dirlrbg == etcs::kReverse) std::swap(behind_m, ahead_m);
   PlacedReport placed{report.stamp_ns,    co_ordinate_system(fields), fields.nid_lrbg,   front_m,
-                      front_m - behind_m, front_m + ahead_m,          speed_mps(fields), running(fields)};
+                      front_m - behind_m, front_m + ahead_m,          speed_mps(fields), facing(fields),
+                      running(fields)};
   if (!line_) return placed;
   const auto group = on_line(fields);
   if (!group) return std::nullopt;
@@ -79,6 +85,7 @@ std::optional<PlacedReport> Axes::place(const TimedReport& report) const {
   placed.axis = 0;
   placed.front_m = group->at_m + sign * placed.front_m;
   placed.speed_mps *= sign;
+  placed.facing *= sign;
   placed.running *= sign;
   if (sign < 0) std::swap(behind_m, ahead_m);
   placed.low_m = placed.front_m - behind_m;
