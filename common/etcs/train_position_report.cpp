@@ -1,6 +1,7 @@
 #include "etcs/train_position_report.hpp"
 
 #include <array>
+#include <cmath>
 
 #include "core/joined.hpp"
 #include "etcs/layout.hpp"
@@ -200,6 +201,10 @@ std::string said_of_no_group(const TrainPositionReport& report) {
 double scale_m(uint32_t q_scale) {
   constexpr std::array<double, 3> kScales{0.1, 1.0, 10.0};
   return kScales.at(q_scale);
+}
+
+double metres(uint32_t raw, uint32_t q_scale) {
+  return std::round(raw * scale_m(q_scale) * 10) / 10;
 }
 
 core::Result<std::vector<uint8_t>> parse_hex(const std::string& text) {

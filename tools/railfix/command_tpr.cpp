@@ -27,7 +27,7 @@ std::string format(const char* pattern, double value) {
 }
 
 std::string metres_text(uint32_t raw, uint32_t q_scale) {
-  return format(q_scale == 0 ? "%.1f m" : "%.0f m", raw * etcs::scale_m(q_scale));
+  return format(q_scale == 0 ? "%.1f m" : "%.0f m", etcs::metres(raw, q_scale));
 }
 
 /// Of the distances that may be unknown; those of packet 58 may not.

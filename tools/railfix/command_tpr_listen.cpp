@@ -45,7 +45,7 @@ const char* text_of(Arrival arrival) {
 std::string metres(uint32_t raw, uint32_t q_scale) {
   if (raw == etcs::kUnknownDistance) return "?";
   char text[32];
-  std::snprintf(text, sizeof text, "%.1f", raw * etcs::scale_m(q_scale));
+  std::snprintf(text, sizeof text, "%.1f", etcs::metres(raw, q_scale));
   return text;
 }
 

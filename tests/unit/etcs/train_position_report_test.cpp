@@ -256,6 +256,14 @@ TEST(TrainPositionReport, WhatIsSaidOfAnUnknownGroupIsTold) {
   EXPECT_EQ(said(&TrainPositionReport::q_dirtrain), "Q_DIRTRAIN");
 }
 
+TEST(TrainPositionReport, MetresAreThoseThatTheFieldSays) {
+  EXPECT_EQ(metres(3, 0), 0.3);
+  EXPECT_EQ(metres(12, 0), 1.2);
+  EXPECT_EQ(metres(32766, 0), 3276.6);
+  EXPECT_EQ(metres(12, 1), 12);
+  EXPECT_EQ(metres(32766, 2), 327660);
+}
+
 TEST(TrainPositionReport, AGroupIsNamedByItsOwnNumber) {
   EXPECT_TRUE(names_group(0));
   EXPECT_TRUE(names_group(1023U << kNidBgBits | 16382U));

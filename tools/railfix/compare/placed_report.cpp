@@ -11,7 +11,7 @@ namespace railfix::compare {
 namespace {
 
 double metres(uint32_t raw, uint32_t q_scale) {
-  return raw == etcs::kUnknownDistance ? HUGE_VAL : raw * etcs::scale_m(q_scale);
+  return raw == etcs::kUnknownDistance ? HUGE_VAL : etcs::metres(raw, q_scale);
 }
 
 /// Along the group's nominal direction.
