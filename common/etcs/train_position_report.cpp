@@ -193,9 +193,8 @@ std::string said_of_no_group(const TrainPositionReport& report) {
     if (value != unknown) said.push_back(std::string(field) + " = " + number(value));
   }
   if (said.empty()) return "";
-  return core::joined(said) +
-         " would be in relation to the LRBG and says nothing, because NID_LRBG = " + number(report.nid_lrbg) +
-         " says that the LRBG is unknown.";
+  return "nothing is said by " + core::joined(said) +
+         ", in relation to an LRBG that is unknown (NID_LRBG = " + number(report.nid_lrbg) + ").";
 }
 
 double scale_m(uint32_t q_scale) {

@@ -106,8 +106,8 @@ TEST_F(TprCommand, WhatIsSaidOfAnUnknownGroupGoesBothWaysAndIsTold) {
   const std::string hex = "880601D6F345402AF34000E4FFFFFF84D250014010C38830";
   const auto json = tpr({"decode", hex, "--json"});
   EXPECT_EQ(json.exit_code, 0);
-  EXPECT_THAT(json.err, StartsWith("remark: D_LRBG = 1234, Q_DIRLRBG = 1, Q_DLRBG = 1, L_DOUBTOVER = "));
-  EXPECT_THAT(json.err, HasSubstr("says nothing, because NID_LRBG = 16777215 says that the LRBG is unknown.\n"));
+  EXPECT_THAT(json.err, StartsWith("remark: nothing is said by D_LRBG = 1234, Q_DIRLRBG = 1, Q_DLRBG = 1, "));
+  EXPECT_THAT(json.err, HasSubstr("in relation to an LRBG that is unknown (NID_LRBG = 16777215).\n"));
   const auto back = tpr({"encode", "--json", file_with(json.out)});
   EXPECT_EQ(back.exit_code, 0);
   EXPECT_EQ(back.out, hex + "\n");

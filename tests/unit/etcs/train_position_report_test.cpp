@@ -246,7 +246,9 @@ TEST(TrainPositionReport, WhatIsSaidOfAnUnknownGroupIsTold) {
     EXPECT_EQ(said_of_no_group(known), "");
     known.nid_lrbg = 123U << kNidBgBits | kUnknownNidBg;
     EXPECT_NE(said_of_no_group(known), "");
-    return message.substr(0, message.find(" = "));
+    const std::string before = "nothing is said by ";
+    EXPECT_THAT(message, ::testing::StartsWith(before));
+    return message.substr(before.size(), message.find(" = ") - before.size());
   };
   EXPECT_EQ(said(&TrainPositionReport::d_lrbg), "D_LRBG");
   EXPECT_EQ(said(&TrainPositionReport::q_dirlrbg), "Q_DIRLRBG");
