@@ -1,7 +1,9 @@
 #include "core/csv.hpp"
 
+#include <array>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
 
 namespace railfix::core {
 namespace {
@@ -37,6 +39,10 @@ std::string column_name(std::string_view cell) {
 }  // namespace
 
 Result<CsvReader> CsvReader::open(const std::filesystem::path& file) {
+  std::error_code unreadable;  // told below
+  if (std::filesystem::is_directory(file, unreadable)) return Error{file.string() + " is a folder, not a file"};
+  if (std::filesystem::is_regular_file(file.parent_path(), unreadable))
+    return Error{file.parent_path().string() + " is a file; give the folder that holds " + file.filename().string()};
   CsvReader reader;
   reader.file_ = file;
   reader.stream_.open(file);
@@ -89,13 +95,19 @@ Result<int64_t> CsvReader::integer(size_t column) const {
   return value;
 }
 
-Result<double> CsvReader::number(size_t column) const {
+Result<double> CsvReader::number(size_t column, double most) const {
   const std::string_view cell = cells_.at(column);
   if (cell.empty()) return std::nan("");
   double value = 0;
   const auto [end, code] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
   if (code != std::errc{} || end != cell.data() + cell.size()) {
     return error("'" + std::string(cell) + "' in column " + header_.at(column) + " is not a number");
+  }
+  if (std::abs(value) > most) {
+    std::array<char, 32> limit{};
+    std::snprintf(limit.data(), limit.size(), "%g", most);
+    return error("'" + std::string(cell) + "' in column " + header_.at(column) + " is beyond " + limit.data() +
+                 ", the most that it can be; correct the cell");
   }
   return value;
 }

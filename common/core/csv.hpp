@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -33,7 +34,9 @@ class CsvReader {
   [[nodiscard]] size_t cells() const { return cells_.size(); }
   [[nodiscard]] std::string_view text(size_t column) const { return cells_.at(column); }
   [[nodiscard]] Result<int64_t> integer(size_t column) const;
-  [[nodiscard]] Result<double> number(size_t column) const;  // an empty cell is NaN
+  /// An empty cell is NaN; a number beyond +-`most` is an error.
+  [[nodiscard]] Result<double> number(size_t column, double most = kUnlimited) const;
+  static constexpr double kUnlimited = std::numeric_limits<double>::infinity();
   /// "FILE line N: WHAT"
   [[nodiscard]] Error error(const std::string& what) const;
 

@@ -48,12 +48,12 @@ int64_t CsvTable::integer(size_t column) {
   return keep(reader_->integer(column));
 }
 
-double CsvTable::number_or_nan(std::optional<size_t> column) {
-  return column ? keep(reader_->number(*column)) : std::numeric_limits<double>::quiet_NaN();
+double CsvTable::number_or_nan(std::optional<size_t> column, double most) {
+  return column ? keep(reader_->number(*column, most)) : std::numeric_limits<double>::quiet_NaN();
 }
 
-double CsvTable::finite(size_t column) {
-  const double value = keep(reader_->number(column));
+double CsvTable::finite(size_t column, double most) {
+  const double value = keep(reader_->number(column, most));
   if (!std::isfinite(value)) refuse("has no finite number in column " + reader_->header()[column]);
   return value;
 }

@@ -30,10 +30,10 @@ class CsvTable {
   [[nodiscard]] int64_t stamp_ns() const { return stamp_ns_; }
 
   int64_t integer(size_t column);
-  /// NaN where there is no such column or nothing in it.
-  double number_or_nan(std::optional<size_t> column);
-  /// An empty cell, NaN or infinity is a problem.
-  double finite(size_t column);
+  /// NaN where there is no such column or nothing in it; beyond +-`most` is a problem.
+  double number_or_nan(std::optional<size_t> column, double most = CsvReader::kUnlimited);
+  /// An empty cell, NaN or infinity is a problem, and what is beyond +-`most`.
+  double finite(size_t column, double most = CsvReader::kUnlimited);
   [[nodiscard]] std::string text(size_t column) const { return std::string(reader_->text(column)); }
   /// This row is wrong for a reason of the caller's.
   void refuse(const std::string& what);

@@ -3,6 +3,7 @@
 #include <functional>
 
 #include "core/csv_table.hpp"
+#include "core/train_limits.hpp"
 #include "dataset/dataset.hpp"
 #include "dataset/yaml_file.hpp"
 
@@ -76,6 +77,12 @@ Status read_gnss(const fs::path& file, std::vector<GnssRow>& rows) {
   return table.status();
 }
 
+bool could_run(const TruthRow& from, const TruthRow& to) {
+  constexpr double kRoundingM = 10;  // of the table: some hold few digits, or places of GNSS
+  const double took_s = (static_cast<double>(to.stamp_ns) - static_cast<double>(from.stamp_ns)) * 1e-9;
+  return std::abs(to.distance_m - from.distance_m) <= core::kFastestTrainMps * took_s + kRoundingM;
+}
+
 }  // namespace
 
 Result<Sensors> read_sensors(const fs::path& sequence) {
@@ -119,8 +126,10 @@ Result<std::vector<TruthRow>> read_truth(const fs::path& track_csv) {
   while (table.next(stamp)) {
     TruthRow row;
     row.stamp_ns = table.stamp_ns();
-    row.distance_m = table.finite(distance);
-    for (const auto& [column, field] : columns) field(row) = table.number_or_nan(column);
+    row.distance_m = table.finite(distance, core::kFarthestM);
+    for (const auto& [column, field] : columns) field(row) = table.number_or_nan(column, core::kFarthestM);
+    if (!rows.empty() && !could_run(rows.back(), row))
+      table.refuse("has a distance that no train reaches from the one of the row above in this time; correct the row");
     rows.push_back(row);
   }
   if (!table.status().ok()) return table.status().error();

@@ -12,7 +12,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr Field kNidC = full_field("NID_C", 10);
-constexpr Field kNidBg = full_field("NID_BG", 14);
+constexpr Field kNidBg = full_field("NID_BG", kNidBgBits);
 
 class JsonWriter {
  public:

@@ -1,7 +1,9 @@
 #include "etcs/train_position_report.hpp"
 
 #include <array>
+#include <cmath>
 
+#include "core/joined.hpp"
 #include "etcs/layout.hpp"
 
 namespace railfix::etcs {
@@ -175,27 +177,33 @@ core::Result<TrainPositionReport> decode_or_advise(std::span<const uint8_t> mess
                      "."};
 }
 
-core::Status check_reference(const TrainPositionReport& report) {
-  if (report.nid_lrbg != kUnknownBaliseGroup) return {};
+std::string said_of_no_group(const TrainPositionReport& report) {
+  if (names_group(report.nid_lrbg)) return "";
   struct Related {
     const char* field;
     uint32_t value;
     uint32_t unknown;
   };
+  std::vector<std::string> said;
   for (const auto& [field, value, unknown] :
        {Related{"D_LRBG", report.d_lrbg, kUnknownDistance}, Related{"Q_DIRLRBG", report.q_dirlrbg, kUnknownSide},
-        Related{"Q_DLRBG", report.q_dlrbg, kUnknownSide}, Related{"Q_DIRTRAIN", report.q_dirtrain, kUnknownSide}}) {
-    if (value == unknown) continue;
-    return core::Error{std::string(field) + " = " + number(value) + " is said of the LRBG, but NID_LRBG = " +
-                       number(kUnknownBaliseGroup) + " says that it is unknown: give the group, or " + number(unknown) +
-                       " (unknown) for " + field + "."};
+        Related{"Q_DLRBG", report.q_dlrbg, kUnknownSide}, Related{"L_DOUBTOVER", report.l_doubtover, kUnknownDistance},
+        Related{"L_DOUBTUNDER", report.l_doubtunder, kUnknownDistance},
+        Related{"Q_DIRTRAIN", report.q_dirtrain, kUnknownSide}}) {
+    if (value != unknown) said.push_back(std::string(field) + " = " + number(value));
   }
-  return {};
+  if (said.empty()) return "";
+  return "nothing is said by " + core::joined(said) +
+         ", in relation to an LRBG that is unknown (NID_LRBG = " + number(report.nid_lrbg) + ").";
 }
 
 double scale_m(uint32_t q_scale) {
   constexpr std::array<double, 3> kScales{0.1, 1.0, 10.0};
   return kScales.at(q_scale);
+}
+
+double metres(uint32_t raw, uint32_t q_scale) {
+  return std::round(raw * scale_m(q_scale) * 10) / 10;
 }
 
 core::Result<std::vector<uint8_t>> parse_hex(const std::string& text) {

@@ -15,6 +15,9 @@ namespace railfix::etcs {
 
 constexpr uint32_t kNidMessagePositionReport = 136;
 constexpr uint32_t kUnknownBaliseGroup = 16777215;
+constexpr unsigned kNidBgBits = 14;  // of NID_LRBG, below NID_C
+constexpr uint32_t kUnknownNidBg =
+    16383;  // "unknown", whatever NID_C stands beside it; kUnknownBaliseGroup has it, too
 constexpr uint32_t kUnknownDistance = 32767;  // D_LRBG, L_DOUBTOVER, L_DOUBTUNDER; also farther than 327.66 km
 constexpr uint32_t kUnknownTime = 4294967295;
 constexpr uint32_t kStandstillSpeed = 127;  // V_TRAIN of 4.0.0
@@ -70,15 +73,22 @@ core::Result<TrainPositionReport> decode(std::span<const uint8_t> message, Basel
 core::Result<TrainPositionReport> decode_or_advise(std::span<const uint8_t> message, Baseline baseline,
                                                    const std::string& option);
 
-/// What stands in relation to the LRBG (D_LRBG, Q_DIRLRBG, Q_DLRBG, Q_DIRTRAIN) says nothing where that is unknown; the
-/// error names the field. For who makes a message: encode() and decode() carry what any train says.
-core::Status check_reference(const TrainPositionReport& report);
+/// NID_LRBG or NID_PRVLRBG is of a group.
+constexpr bool names_group(uint32_t nid_lrbg) {
+  return (nid_lrbg & kUnknownNidBg) != kUnknownNidBg;
+}
+
+/// What stands in relation to the LRBG (its distance, sides and doubts) says nothing where that is unknown: a sentence
+/// that names such fields, empty without any. encode() and decode() carry them, because any train may say so.
+std::string said_of_no_group(const TrainPositionReport& report);
 
 /// L_PACKET of packet 0 or 1 of this report in bits. REQUIRES: encode() accepts the report.
 uint32_t position_packet_bits(const TrainPositionReport& report, Baseline baseline);
 
 /// Metres per step of a distance, by Q_SCALE (0 to 2).
 double scale_m(uint32_t q_scale);
+/// What a distance of the message says: 3 of 10 cm are 0.3, which 3 * scale_m(0) is not.
+double metres(uint32_t raw, uint32_t q_scale);
 /// "A5 0F" -> bytes; digits in pairs, spaces between pairs allowed.
 core::Result<std::vector<uint8_t>> parse_hex(const std::string& text);
 std::string to_hex(std::span<const uint8_t> bytes);

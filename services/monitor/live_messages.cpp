@@ -178,7 +178,7 @@ json state_message(const msg::TrainState& state, double age_s, const msg::TrainP
 }
 
 json report_message(const msg::TrainPositionReport& report) {
-  const bool placed = report.nid_lrbg() != etcs::kUnknownBaliseGroup;
+  const bool placed = etcs::names_group(report.nid_lrbg());
   return {{"kind", "report"},
           {"stamp_ns", report.stamp_ns()},
           {"sent_ns", report.sent_ns()},

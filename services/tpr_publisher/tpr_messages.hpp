@@ -66,7 +66,7 @@ inline core::Result<Onboard> onboard_of(const msg::OnboardStatus& status) {
 }
 
 inline double metres(uint32_t raw, uint32_t q_scale) {
-  return raw == etcs::kUnknownDistance ? std::nan("") : raw * etcs::scale_m(q_scale);
+  return raw == etcs::kUnknownDistance ? std::nan("") : etcs::metres(raw, q_scale);
 }
 
 /// The values of the message, as it says them.

@@ -27,7 +27,7 @@ std::string format(const char* pattern, double value) {
 }
 
 std::string metres_text(uint32_t raw, uint32_t q_scale) {
-  return format(q_scale == 0 ? "%.1f m" : "%.0f m", raw * etcs::scale_m(q_scale));
+  return format(q_scale == 0 ? "%.1f m" : "%.0f m", etcs::metres(raw, q_scale));
 }
 
 /// Of the distances that may be unknown; those of packet 58 may not.
@@ -37,7 +37,9 @@ std::string distance_text(uint32_t raw, uint32_t q_scale) {
 
 std::string group_text(uint32_t nid_lrbg) {
   if (nid_lrbg == etcs::kUnknownBaliseGroup) return "unknown";
-  return "country/region " + std::to_string(nid_lrbg >> 14U) + ", balise group " + std::to_string(nid_lrbg & 16383U);
+  const std::string region = "country/region " + std::to_string(nid_lrbg >> etcs::kNidBgBits);
+  if (!etcs::names_group(nid_lrbg)) return region + ", balise group unknown";
+  return region + ", balise group " + std::to_string(nid_lrbg & etcs::kUnknownNidBg);
 }
 
 template <size_t N>
@@ -96,7 +98,14 @@ void print_table(const nlohmann::ordered_json& json, const etcs::TrainPositionRe
 }
 
 std::string cycle_text(uint32_t value, uint32_t none, const std::string& every) {
-  return value == none ? "not cyclic" : "a report every " + every;
+  if (value == none) return "not cyclic";
+  return value == 0 ? "a report as often as possible" : "a report every " + every;
+}
+
+/// On standard error: the message itself goes on as it is.
+void remark(const etcs::TrainPositionReport& report) {
+  const std::string said = etcs::said_of_no_group(report);
+  if (!said.empty()) std::cerr << "remark: " << said << '\n';
 }
 
 void print_packet_58(const etcs::ReportParameters& packet) {
@@ -144,6 +153,7 @@ int decode(const std::string& hex, Baseline baseline, bool json_wanted) {
   } else {
     print_table(json, report.value());
   }
+  remark(report.value());
   return 0;
 }
 
@@ -162,7 +172,7 @@ core::Result<Bytes> packet_58_of(const nlohmann::ordered_json& json) {
 core::Result<Bytes> message_of(const nlohmann::ordered_json& json, Baseline baseline) {
   const auto report = etcs::report_from_json(json, baseline);
   if (!report.ok()) return report.error();
-  if (const auto status = etcs::check_reference(report.value()); !status.ok()) return status.error();
+  remark(report.value());
   return etcs::encode(report.value(), baseline);
 }
 

@@ -115,28 +115,40 @@ compare::Columns columns_of(const compare::Pairing& pairing, const std::optional
 void print_row(const char* what, const std::vector<compare::Sample>& samples) {
   const auto ours = evaluation::summarise(compare::sizes_of(samples, &compare::Sample::ours));
   const auto other = evaluation::summarise(compare::sizes_of(samples, &compare::Sample::certified));
-  std::printf("%-24s %9.2f %9.2f %9.2f   %9.2f %9.2f %9.2f\n", what, ours.mean, ours.p95, ours.max, other.mean,
-              other.p95, other.max);
+  const auto columns = [](const evaluation::Summary& side) {
+    char text[64];
+    std::snprintf(text, sizeof text, "%9s %9s %9s", compare::figure("%.2f", side.mean).c_str(),
+                  compare::figure("%.2f", side.p95).c_str(), compare::figure("%.2f", side.max).c_str());
+    return std::string(text);
+  };
+  std::printf("%-24s %s   %s\n", what, columns(ours).c_str(), columns(other).c_str());
 }
 
-/// Legs on which the two have nothing in common, and no truth says who is wrong.
-size_t contradicted_legs(const compare::Pairing& pairing, const std::optional<Judge>& judge) {
-  std::set<size_t> legs;
+compare::Contradicted contradicted(const compare::Pairing& pairing, const std::optional<Judge>& judge) {
+  std::set<size_t> apart;
+  std::set<size_t> turned;
   for (const auto& pair : pairing.pairs) {
-    if (!pair.overlap() && !(judge && judge->covers(pair))) legs.insert(pair.leg);
+    if (!pair.overlap() && !(judge && judge->covers(pair))) apart.insert(pair.leg);
+    if (pair.turned()) turned.insert(pair.leg);
   }
-  return legs.size();
+  return {apart.size(), turned.size()};
 }
 
 void print_pairs(const compare::Pairing& pairing) {
+  constexpr size_t kMostTold = 5;
   std::vector<double> differences;
   double carried_m = 0;
   size_t disjoint = 0;
+  size_t turned = 0;
   for (const auto& pair : pairing.pairs) {
     differences.push_back(pair.difference_m());
     carried_m = std::max(carried_m, pair.carried_m);
+    if (pair.turned() && ++turned <= kMostTold) {
+      std::printf("  at %.3f s the train looks the other way in ours (Q_DIRLRBG) than in the certified report\n",
+                  core::seconds(pair.stamp_ns));
+    }
     if (pair.overlap()) continue;
-    if (++disjoint <= 5) {
+    if (++disjoint <= kMostTold) {
       std::printf("  at %.3f s the intervals have nothing in common: ours %+.2f m from the certified position\n",
                   core::seconds(pair.stamp_ns), pair.difference_m());
     }
@@ -157,6 +169,7 @@ void print_pairs(const compare::Pairing& pairing) {
         shift.shift_s, shift.sigma_s, late ? "late" : "early", late ? "early" : "late");
   }
   std::printf("intervals overlap        %zu of %zu\n", pairing.pairs.size() - disjoint, pairing.pairs.size());
+  if (turned > 0) std::printf("train turned round       in %zu of %zu\n", turned, pairing.pairs.size());
 }
 
 /// Reports that come now, until the other side's file is over, time is up, or Ctrl-C; each pair is told as it comes.
@@ -177,8 +190,9 @@ void listen(ReportSource& ours, ReportSource& certified, Line& line, const Optio
     const auto pairs =
         compare::pair_up(ours.reports(), certified.reports(), *axes, core::to_ns(options.longest_gap_s)).pairs;
     for (; told < pairs.size(); ++told) {
-      std::printf("at %.3f s ours - certified %+.2f m, intervals %s\n", core::seconds(pairs[told].stamp_ns),
-                  pairs[told].difference_m(), pairs[told].overlap() ? "overlap" : "have nothing in common");
+      std::printf("at %.3f s ours - certified %+.2f m, intervals %s%s\n", core::seconds(pairs[told].stamp_ns),
+                  pairs[told].difference_m(), pairs[told].overlap() ? "overlap" : "have nothing in common",
+                  pairs[told].turned() ? ", the train looks the other way (Q_DIRLRBG)" : "");
       std::fflush(stdout);
     }
     goes_on &= !over(ours, certified) && !over(certified, ours);
@@ -197,7 +211,7 @@ int print_comparison(const Options& options, const compare::Pairing& pairing, co
   };
   std::printf("interval not known       ours %td, certified %td of %zu: left out\n", unknown(&compare::Sample::ours),
               unknown(&compare::Sample::certified), columns.lengths.size());
-  const auto verdict = compare::print_verdict(columns, contradicted_legs(pairing, judge), options.demand);
+  const auto verdict = compare::print_verdict(columns, contradicted(pairing, judge), options.demand);
   return verdict == compare::Verdict::worse ? kWorse : 0;
 }
 
@@ -213,6 +227,15 @@ void check_reports(const char* side, const std::string& where, const ReportSourc
   throw core::BadInput(std::string(side) + " " + where +
                        (source.live() ? ": no position report has come; is the train's tpr_publisher running?"
                                       : ": it holds no position report; is it the right file?"));
+}
+
+void check_places(const char* side, const std::string& where, const ReportSource& source) {
+  const auto& reports = source.reports();
+  if (std::ranges::any_of(reports, [](const auto& report) { return compare::position_known(report.fields); })) return;
+  throw core::BadInput(
+      std::string(side) + " " + where + ": none of its " + std::to_string(reports.size()) +
+      " reports has a place, for the LRBG, D_LRBG or Q_DLRBG of each is unknown; record a run on which "
+      "the train has passed a balise group.");
 }
 
 std::string span_text(int64_t from_ns, int64_t to_ns) {
@@ -242,6 +265,8 @@ int compare_reports(const Options& options) {
   if (ours.live() || certified.live()) listen(ours, certified, line, options);
   check_reports("--ours", options.ours, ours);
   check_reports("--certified", options.certified, certified);
+  check_places("--ours", options.ours, ours);
+  check_places("--certified", options.certified, certified);
   const auto* axes = line.axes(certified.reports());
   if (axes == nullptr) throw core::BadInput(options.map + ": has none of the reported balise groups.");
   const auto pairing = compare::pair_up(ours.reports(), certified.reports(), *axes, core::to_ns(options.longest_gap_s));
@@ -249,6 +274,10 @@ int compare_reports(const Options& options) {
   if (truth) judge = Judge{&*truth, options.foot_to_front_m};
   std::printf("reports                  ours %zu, %zu with a place; certified %zu, %zu with a place\n",
               ours.reports().size(), pairing.ours.placed, certified.reports().size(), pairing.certified.placed);
+  if (ours.repeated() + certified.repeated() > 0) {
+    std::printf("delivered once more      ours %zu, certified %zu reports: alike with the same stamp, counted once\n",
+                ours.repeated(), certified.repeated());
+  }
   if (pairing.ours.off_line + pairing.certified.off_line > 0) {
     std::printf("group not on the line    ours %zu, certified %zu reports: not paired, but \"known\" as they say\n",
                 pairing.ours.off_line, pairing.certified.off_line);

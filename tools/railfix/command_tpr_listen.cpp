@@ -45,7 +45,7 @@ const char* text_of(Arrival arrival) {
 std::string metres(uint32_t raw, uint32_t q_scale) {
   if (raw == etcs::kUnknownDistance) return "?";
   char text[32];
-  std::snprintf(text, sizeof text, "%.1f", raw * etcs::scale_m(q_scale));
+  std::snprintf(text, sizeof text, "%.1f", etcs::metres(raw, q_scale));
   return text;
 }
 
@@ -53,14 +53,14 @@ std::string sentence(const GroundReport& report) {
   const auto decoded = etcs::decode(report.message, static_cast<etcs::Baseline>(report.baseline));
   if (!decoded.ok()) return decoded.error().message;
   const auto& f = decoded.value();
-  if (f.nid_lrbg == etcs::kUnknownBaliseGroup) return "LRBG unknown";
+  if (!etcs::names_group(f.nid_lrbg)) return "LRBG unknown";
   const std::string speed = f.v_train == etcs::kStandstillSpeed ? "0" : std::to_string(f.v_train * etcs::kSpeedStepKmh);
   const char* side = f.q_dlrbg == etcs::kNominal   ? "the nominal"
                      : f.q_dlrbg == etcs::kReverse ? "the reverse"
                                                    : "an unknown";
-  return metres(f.d_lrbg, f.q_scale) + " m on " + side + " side of LRBG " + std::to_string(f.nid_lrbg >> 14U) + "/" +
-         std::to_string(f.nid_lrbg & 16383U) + "  -" + metres(f.l_doubtover, f.q_scale) + "/+" +
-         metres(f.l_doubtunder, f.q_scale) + " m  " + speed + " km/h";
+  return metres(f.d_lrbg, f.q_scale) + " m on " + side + " side of LRBG " +
+         std::to_string(f.nid_lrbg >> etcs::kNidBgBits) + "/" + std::to_string(f.nid_lrbg & etcs::kUnknownNidBg) +
+         "  -" + metres(f.l_doubtover, f.q_scale) + "/+" + metres(f.l_doubtunder, f.q_scale) + " m  " + speed + " km/h";
 }
 
 void print(const GroundReport& report, Arrival arrival, bool as_json) {

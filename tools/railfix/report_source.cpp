@@ -26,7 +26,7 @@ ReportSource::ReportSource(const std::string& where, etcs::Baseline baseline, Tr
   } else if (where.ends_with(".mcap")) {
     read_recording(where);
   } else {
-    reports_ = core::value_or_throw(compare::read_reports(where, baseline));
+    for (auto& report : core::value_or_throw(compare::read_reports(where, baseline))) add(std::move(report));
   }
 }
 
@@ -42,15 +42,29 @@ void ReportSource::read_recording(const std::string& file) {
 }
 
 void ReportSource::take(const msg::TrainPositionReport& report) {
+  const auto in_time = compare::check_stamp(report.stamp_ns());
   auto fields = etcs::decode(messaging::bytes_of(report), static_cast<etcs::Baseline>(report.baseline()));
-  if (!fields.ok()) {
-    if (refusal_.empty()) std::cerr << "a report was left out: " << (refusal_ = fields.error().message) << '\n';
+  if (!in_time.ok() || !fields.ok()) {
+    if (refusal_.empty()) {
+      refusal_ = in_time.ok() ? fields.error().message : in_time.error().message;
+      std::cerr << "a report was left out: " << refusal_ << '\n';
+    }
     return;
   }
-  const int64_t stamp_ns = report.stamp_ns() + offset_ns_;
-  const auto later = std::upper_bound(reports_.begin(), reports_.end(), stamp_ns,
+  add({report.stamp_ns() + offset_ns_, std::move(fields).value()});
+}
+
+void ReportSource::add(compare::TimedReport report) {
+  const auto later = std::upper_bound(reports_.begin(), reports_.end(), report.stamp_ns,
                                       [](int64_t stamp, const auto& other) { return stamp < other.stamp_ns; });
-  reports_.insert(later, {stamp_ns, std::move(fields).value()});
+  for (auto before = later; before != reports_.begin();) {
+    if ((--before)->stamp_ns != report.stamp_ns) break;
+    if (*before == report) {
+      ++repeated_;
+      return;
+    }
+  }
+  reports_.insert(later, std::move(report));
 }
 
 bool ReportSource::listen(double for_s) {

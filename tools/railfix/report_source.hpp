@@ -22,14 +22,18 @@ class ReportSource {
   bool listen(double for_s);
   /// Sorted by time.
   [[nodiscard]] const std::vector<compare::TimedReport>& reports() const { return reports_; }
+  /// Reports that came once more, alike with the same stamp, and count once: MQTT may deliver twice.
+  [[nodiscard]] size_t repeated() const { return repeated_; }
   /// The other end's clock is put forward by this.
   void shift(int64_t offset_ns);
 
  private:
   void read_recording(const std::string& file);
   void take(const msg::TrainPositionReport& report);
+  void add(compare::TimedReport report);
 
   std::vector<compare::TimedReport> reports_;
+  size_t repeated_ = 0;
   int64_t offset_ns_ = 0;
   std::string refusal_;  // why reports were left out, told once
   std::unique_ptr<TopicListener> listener_;

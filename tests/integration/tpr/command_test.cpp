@@ -51,6 +51,8 @@ TEST_F(TprCommand, DecodesAPacket58) {
   EXPECT_THAT(json.out, HasSubstr("\"D_CYCLOC\": 1000"));
   EXPECT_THAT(json.out, HasSubstr("\"Q_LGTLOC\": 1"));
   EXPECT_EQ(tpr({"decode", "3A80908303E821"}).exit_code, 2) << "cut";
+  const auto often = tpr({"decode", "3A80908000002103E9"}).out;
+  EXPECT_THAT(often, HasSubstr("a report as often as possible"));
 }
 
 TEST_F(TprCommand, TheLargestDistanceOfAPacket58IsADistance) {
@@ -98,17 +100,19 @@ TEST_F(TprCommand, SaysWhatContradictsItself) {
   const auto said = [](const std::string& file) { return tpr({"encode", "--json", file}).err; };
   EXPECT_EQ(said(file_with(R"({"T_TRAIN": 1, "NID_ENGINE": 2, "T_TRAIN": 3})")),
             "railfix: " + file_ + ": the key \"T_TRAIN\" is there twice in one object.\n");
-  const auto json = [](const std::string& d_lrbg) {
-    return R"({"T_TRAIN":1,"NID_ENGINE":2,"NID_PACKET":0,"Q_SCALE":1,"NID_LRBG":16777215,"D_LRBG":)" + d_lrbg +
-           R"(,"Q_DIRLRBG":2,"Q_DLRBG":2,"L_DOUBTOVER":32767,"L_DOUBTUNDER":32767,"Q_LENGTH":0,"V_TRAIN":0,)"
-           R"("Q_DIRTRAIN":2,"M_MODE":6,"M_LEVEL":3})";
-  };
-  EXPECT_EQ(said(file_with(json("32767"))), "");
-  EXPECT_EQ(
-      said(file_with(json("1234"))),
-      "railfix: " + file_ +
-          ": D_LRBG = 1234 is said of the LRBG, but NID_LRBG = 16777215 says that it is unknown: give the group, or "
-          "32767 (unknown) for D_LRBG.\n");
+}
+
+TEST_F(TprCommand, WhatIsSaidOfAnUnknownGroupGoesBothWaysAndIsTold) {
+  const std::string hex = "880601D6F345402AF34000E4FFFFFF84D250014010C38830";
+  const auto json = tpr({"decode", hex, "--json"});
+  EXPECT_EQ(json.exit_code, 0);
+  EXPECT_THAT(json.err, StartsWith("remark: nothing is said by D_LRBG = 1234, Q_DIRLRBG = 1, Q_DLRBG = 1, "));
+  EXPECT_THAT(json.err, HasSubstr("in relation to an LRBG that is unknown (NID_LRBG = 16777215).\n"));
+  const auto back = tpr({"encode", "--json", file_with(json.out)});
+  EXPECT_EQ(back.exit_code, 0);
+  EXPECT_EQ(back.out, hex + "\n");
+  EXPECT_EQ(back.err, json.err);
+  EXPECT_EQ(tpr({"decode", hex}).err, json.err);
 }
 
 TEST_F(TprCommand, SaysWhichBaselineWouldFit) {

@@ -197,6 +197,33 @@ TEST_F(TprCompareFiles, GroupsThatTheMapDoesNotHaveAreCounted) {
   EXPECT_THAT(outcome.out, HasSubstr("ours 100.0 %, certified 100.0 % of 20 certified reports"));
 }
 
+TEST_F(TprCompareFiles, WhatContradictsOrComesTwiceIsTold) {
+  const auto write = [&](const char* name, uint32_t q_dirlrbg, bool placed, int times = 1) {
+    std::ofstream out(file(name));
+    out << "stamp_ns,hex\n";
+    for (int i = 0; i < 20; ++i) {
+      auto report = beyond(tpr_publisher::testing::kA, 400 + 20 * i, 10);
+      report.q_dirlrbg = q_dirlrbg;
+      if (!placed) report.d_lrbg = etcs::kUnknownDistance;
+      for (int n = 0; n < times; ++n) out << i * core::kNsPerSecond << ',' << hex_of(report) << '\n';
+    }
+  };
+  write("ours.csv", etcs::kNominal, true);
+  write("certified.csv", etcs::kReverse, true, 2);
+  auto outcome = compare({});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("reports                  ours 20, 20 with a place; certified 20, 20"));
+  EXPECT_THAT(outcome.out, HasSubstr("delivered once more      ours 0, certified 20 reports"));
+  EXPECT_THAT(outcome.out, HasSubstr("train turned round       in 20 of 20"));
+  EXPECT_THAT(outcome.out, HasSubstr("not shown: on 1 legs the train looks the other way in ours"));
+  EXPECT_THAT(outcome.out, HasSubstr("ratio 1.000 (too few legs for bounds)"));
+  EXPECT_THAT(outcome.out, ::testing::Not(HasSubstr("nan")));
+  write("certified.csv", etcs::kNominal, false);
+  outcome = compare({});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr(file("certified.csv") + ": none of its 20 reports has a place"));
+}
+
 TEST_F(TprCompareFiles, ASideWithoutReportsIsNamed) {
   const auto refusal = [&](const std::vector<std::string>& more) {
     const auto outcome = compare(more);

@@ -60,6 +60,7 @@ TEST(Axes, PlaceAReportOnItsGroup) {
 TEST(Axes, WhatIsUnknownHasNoPlaceOrNoBound) {
   auto unknown = report(1, etcs::kUnknownBaliseGroup, 50);
   EXPECT_FALSE(Axes().place(unknown).has_value());
+  EXPECT_FALSE(Axes().place(report(1, kA | etcs::kUnknownNidBg, 50)).has_value()) << "NID_BG 16383 of its country";
   unknown = report(1, kA, 50);
   unknown.fields.q_dlrbg = etcs::kUnknownSide;
   EXPECT_FALSE(Axes().place(unknown).has_value());
@@ -179,6 +180,21 @@ TEST(Pairing, AHoleInTheMapIsNoFaultOfTheReports) {
   EXPECT_EQ(pairing.certified.off_line, 2U);
   EXPECT_EQ(pairing.certified.placed, 2U);
   EXPECT_EQ(pairing.legs, 1U);
+}
+
+TEST(Pairing, ATrainTurnedRoundIsSeenWhereBothSayHowItLooks) {
+  const auto turned = [](etcs::Side ours, etcs::Side certified) {
+    auto own = report(0, kA, 50);
+    auto other = own;
+    own.fields.q_dirlrbg = ours;
+    other.fields.q_dirlrbg = certified;
+    return pair_up({own}, {other}, Axes(), kGapNs).pairs.at(0).turned();
+  };
+  EXPECT_TRUE(turned(etcs::kNominal, etcs::kReverse));
+  EXPECT_FALSE(turned(etcs::kReverse, etcs::kReverse));
+  EXPECT_FALSE(turned(etcs::kUnknownSide, etcs::kReverse));
+  const Axes line(track::Path::follow(balise_map(), forward(1, 0), 900, 0).value());
+  EXPECT_EQ(line.place(report(1, kB, -50, 72, false))->facing, 1) << "B's nominal direction runs back";
 }
 
 TEST(Pairing, DifferencesAreInRunningDirection) {

@@ -41,6 +41,16 @@ TEST_F(ReportFile, TheOtherBaselineIsNamedWhereItFits) {
   EXPECT_THAT(refusal, HasSubstr("It reads well as baseline 3."));
 }
 
+TEST_F(ReportFile, AStampThatIsNoTimeIsRefused) {
+  for (const char* stamp : {"-5", "9223372036854775807"}) {
+    const auto said = HasSubstr("line 3: the stamp " + std::string(stamp) + " is no time");
+    EXPECT_THAT(read("a.csv", "stamp_ns,hex\n1," + kHex + "\n" + stamp + "," + kHex + "\n").error().message, said);
+    EXPECT_THAT(
+        read("a.jsonl", "\n\n{\"stamp_ns\": " + std::string(stamp) + ", \"hex\": \"" + kHex + "\"}\n").error().message,
+        said);
+  }
+}
+
 TEST_F(ReportFile, ErrorsNameTheLine) {
   EXPECT_THAT(read("a.csv", "stamp_ns,hex\n1," + kHex + "\n2,88\n").error().message, HasSubstr("line 3"));
   EXPECT_THAT(read("a.csv", "stamp_ns\n1\n").error().message, HasSubstr("hex"));

@@ -56,10 +56,25 @@ TEST_F(CsvTest, ErrorsNameFileLineAndColumn) {
   EXPECT_THAT(table.status().error().message, HasSubstr(" line 3: has 1 values where the header names 2"));
 }
 
+TEST_F(CsvTest, ANumberBeyondTheMostThatItCanBeIsAnError) {
+  auto table = reader("a,b\n-200,\n200.1,-inf\n");
+  ASSERT_TRUE(table.next());
+  EXPECT_EQ(table.number(0, 200).value(), -200);
+  EXPECT_TRUE(std::isnan(table.number(1, 200).value()));
+  ASSERT_TRUE(table.next());
+  EXPECT_THAT(table.number(0, 200).error().message, HasSubstr(" line 3: '200.1' in column a is beyond 200, the most"));
+  EXPECT_FALSE(table.number(1, 200).ok());
+  EXPECT_TRUE(std::isinf(table.number(1).value()));
+}
+
 TEST_F(CsvTest, MissingAndEmptyFilesAreErrors) {
   EXPECT_THAT(CsvReader::open(file_).error().message, HasSubstr("cannot be opened"));
   std::ofstream(file_).close();
   EXPECT_THAT(CsvReader::open(file_).error().message, HasSubstr("is empty"));
+  EXPECT_EQ(CsvReader::open(file_ / "track.csv").error().message,
+            file_.string() + " is a file; give the folder that holds track.csv");
+  EXPECT_EQ(CsvReader::open(file_.parent_path()).error().message,
+            file_.parent_path().string() + " is a folder, not a file");
 }
 
 TEST_F(CsvTest, WhatIsWrittenReadsBackTheSame) {

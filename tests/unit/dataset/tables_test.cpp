@@ -98,6 +98,15 @@ TEST_F(TablesTest, TruthByNameInAnyOrderAndSpelling) {
   EXPECT_THAT(read_truth(write("t.csv", "timestamp,distance\n1,\n")).error().message, HasSubstr("t.csv line 2"));
 }
 
+TEST_F(TablesTest, TruthThatNoTrainRunsIsRefused) {
+  const auto second_row = [&](const std::string& cells) {
+    return read_truth(write("t.csv", "timestamp,distance,speed\n0,50,20\n1000000000," + cells + "\n2000000000,0,20\n"));
+  };
+  EXPECT_TRUE(second_row("-150,20").ok());
+  for (const char* cells : {"1e6,20", "-1e6,20", "1e308,20", "60,1e308"})
+    EXPECT_THAT(second_row(cells).error().message, HasSubstr("t.csv line 3: ")) << cells;
+}
+
 TEST_F(TablesTest, TruthLandmarks) {
   const auto read =
       read_truth_landmarks(write("l.csv", "kind,distance [m],lateral [m]\nbalise,12.5,0\nmast,30,-3.2\n"));

@@ -234,22 +234,43 @@ TEST(Hex, IsReadStrictly) {
   EXPECT_THAT(parse_hex("").error().message, HasSubstr("empty"));
 }
 
-TEST(TrainPositionReport, NothingIsSaidOfAnUnknownGroup) {
+TEST(TrainPositionReport, WhatIsSaidOfAnUnknownGroupIsTold) {
   TrainPositionReport report;
-  EXPECT_TRUE(check_reference(report).ok());
-  const auto refusal = [&](uint32_t TrainPositionReport::*field) {
+  EXPECT_EQ(said_of_no_group(report), "");
+  const auto said = [&](uint32_t TrainPositionReport::*field) {
     TrainPositionReport known = report;
     known.*field = 1;
-    EXPECT_TRUE(encode(known, Baseline::b3).ok()) << "another train may say so";
-    const std::string message = check_reference(known).error().message;
+    EXPECT_EQ(decode(encode(known, Baseline::b3).value(), Baseline::b3).value(), known);
+    const std::string message = said_of_no_group(known);
     known.nid_lrbg = 7;
-    EXPECT_TRUE(check_reference(known).ok());
-    return message.substr(0, message.find(" = "));
+    EXPECT_EQ(said_of_no_group(known), "");
+    known.nid_lrbg = 123U << kNidBgBits | kUnknownNidBg;
+    EXPECT_NE(said_of_no_group(known), "");
+    const std::string before = "nothing is said by ";
+    EXPECT_THAT(message, ::testing::StartsWith(before));
+    return message.substr(before.size(), message.find(" = ") - before.size());
   };
-  EXPECT_EQ(refusal(&TrainPositionReport::d_lrbg), "D_LRBG");
-  EXPECT_EQ(refusal(&TrainPositionReport::q_dirlrbg), "Q_DIRLRBG");
-  EXPECT_EQ(refusal(&TrainPositionReport::q_dlrbg), "Q_DLRBG");
-  EXPECT_EQ(refusal(&TrainPositionReport::q_dirtrain), "Q_DIRTRAIN");
+  EXPECT_EQ(said(&TrainPositionReport::d_lrbg), "D_LRBG");
+  EXPECT_EQ(said(&TrainPositionReport::q_dirlrbg), "Q_DIRLRBG");
+  EXPECT_EQ(said(&TrainPositionReport::q_dlrbg), "Q_DLRBG");
+  EXPECT_EQ(said(&TrainPositionReport::l_doubtover), "L_DOUBTOVER");
+  EXPECT_EQ(said(&TrainPositionReport::l_doubtunder), "L_DOUBTUNDER");
+  EXPECT_EQ(said(&TrainPositionReport::q_dirtrain), "Q_DIRTRAIN");
+}
+
+TEST(TrainPositionReport, MetresAreThoseThatTheFieldSays) {
+  EXPECT_EQ(metres(3, 0), 0.3);
+  EXPECT_EQ(metres(12, 0), 1.2);
+  EXPECT_EQ(metres(32766, 0), 3276.6);
+  EXPECT_EQ(metres(12, 1), 12);
+  EXPECT_EQ(metres(32766, 2), 327660);
+}
+
+TEST(TrainPositionReport, AGroupIsNamedByItsOwnNumber) {
+  EXPECT_TRUE(names_group(0));
+  EXPECT_TRUE(names_group(1023U << kNidBgBits | 16382U));
+  EXPECT_FALSE(names_group(kUnknownNidBg));
+  EXPECT_FALSE(names_group(kUnknownBaliseGroup));
 }
 
 }  // namespace

@@ -55,6 +55,13 @@ TEST(Drift, CountsMetresBackAndForthAndStandstill) {
   EXPECT_EQ(drift.window_percent.count, 3U);  // from 0, 10 and 20 m
 }
 
+// A window for each sample, not one for every 10 m of a way that nobody has looked at.
+TEST(Drift, SamplesFarApartTakeNoTime) {
+  std::vector<MotionSample> samples;
+  for (const double real : {0.0, 5.0, 200.0, 1e12, 1e12 + 200}) samples.push_back({0, real, real, 0, 0});
+  EXPECT_EQ(drift_of(samples).window_percent.count, 3U);
+}
+
 TEST(Drift, NothingToCompareIsNotKnown) {
   EXPECT_TRUE(std::isnan(drift_of({}).percent));
   const MadeTruth made;

@@ -106,7 +106,12 @@ TEST_F(RunFolder, EmptyTablesGiveNoFiguresAndNoCrash) {
   EXPECT_TRUE(to_json(evaluation)["odometry"]["drift_percent"].dump() == "null");
   std::ostringstream out;
   print(evaluation, out);
-  EXPECT_THAT(html_report(truth, evaluation, "empty"), Not(HasSubstr("nan")));
+  EXPECT_THAT(out.str(), HasSubstr("train_state.csv: has a header and no row, not judged"));
+  EXPECT_THAT(out.str(), Not(HasSubstr("no map coordinates")));
+  EXPECT_THAT(to_json(evaluation)["empty"], ElementsAre("odometry.csv", "train_state.csv", "track_view.csv"));
+  const std::string html = html_report(truth, evaluation, "empty");
+  EXPECT_THAT(html, HasSubstr("Without a row: odometry.csv"));
+  EXPECT_THAT(html, Not(HasSubstr("nan")));
 }
 
 TEST_F(RunFolder, RowsOutOfOrderAreTold) {
@@ -134,6 +139,9 @@ TEST_F(RunFolder, OfAnotherTimeThanTheTruthCannotBeJudged) {
   EXPECT_TRUE(rows("50").ok());
   EXPECT_THAT(rows("51").error().message,
               HasSubstr("the run is from 51.000 to 90.000 s and the truth from 0.000 to 50.000 s"));
+  write("later/sightings.csv", "stamp_ns,kind,distance_ahead_m\n1,mast,5\n");
+  EXPECT_THAT(rows("51").error().message,
+              HasSubstr("odometry.csv is from 51.000 to 90.000 s and the truth from 0.000 to 50.000 s, with no time"));
 }
 
 TEST_F(RunFolder, BrokenInputIsASentence) {
@@ -143,6 +151,11 @@ TEST_F(RunFolder, BrokenInputIsASentence) {
   EXPECT_THAT(read_run(root_ / "out").error().message, HasSubstr("rails.csv line 3: has the rail 'X'"));
   write("out/rails.csv", "stamp_ns,rail,u_px\n");
   EXPECT_THAT(read_run(root_ / "out").error().message, HasSubstr("rails.csv line 1: has no column 'v_px'"));
+  write("out/rails.csv", "stamp_ns,rail,u_px,v_px\n");
+  write_run();
+  write("out/tpr.csv", "stamp_ns,d_lrbg_m,l_doubtover_m,l_doubtunder_m\n1,5,1,1\n2,5,1,1e308\n");
+  EXPECT_THAT(read_run(root_ / "out").error().message,
+              HasSubstr("tpr.csv line 3: '1e308' in column l_doubtunder_m is beyond"));
   write("seq/truth/track.csv", "timestamp,distance\n1,1\n");
   EXPECT_THAT(Truth::read(root_ / "seq/truth").error().message, HasSubstr("at least two rows"));
 }

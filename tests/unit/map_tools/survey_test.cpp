@@ -246,6 +246,22 @@ TEST_F(RunTables, ASightingThatWeighsNothingOrAllIsRefused) {
   EXPECT_THAT(reading("5", "0.1").error().message, HasSubstr("train_state.csv line 2"));
 }
 
+TEST_F(RunTables, WhatNoTrainDoesOrSeesIsRefused) {
+  const auto refusal = [&](const std::string& speed, const std::string& ahead, const std::string& confidence) {
+    write("train_state.csv", "stamp_ns,edge,offset_m,direction,track_known,speed_mps,sigma_m\n1000000000,1,980,+,1," +
+                                 speed + ",0.4\n2000000000,2,0,+,1,20,0.5\n");
+    write("sightings.csv", "stamp_ns,kind,distance_ahead_m,lateral_m,sigma_m,confidence\n1500000000,mast," + ahead +
+                               ",-3,0.1," + confidence + "\n");
+    const auto read = read_sightings(map_, folder_, 0);
+    return read.ok() ? "" : read.error().message;
+  };
+  EXPECT_EQ(refusal("20", "5", "1"), "");
+  EXPECT_EQ(refusal("", "5", "1"), "") << "a train that is not known to move";
+  EXPECT_THAT(refusal("1e308", "5", "1"), HasSubstr("train_state.csv line 2: '1e308' in column speed_mps"));
+  EXPECT_THAT(refusal("20", "1e308", "1"), HasSubstr("sightings.csv line 2: '1e308' in column distance_ahead_m"));
+  EXPECT_THAT(refusal("20", "5", "7"), HasSubstr("sightings.csv line 2: '7' in column confidence"));
+}
+
 TEST_F(RunTables, OneRunGivenTwiceIsRefused) {
   write("train_state.csv",
         "stamp_ns,edge,offset_m,direction,track_known,speed_mps,sigma_m\n1000000000,1,980,+,1,20,0.4\n");

@@ -96,6 +96,10 @@ bool Pair::overlap() const {
   return ours.low_m - carried_m <= certified.high_m && certified.low_m <= ours.high_m + carried_m;
 }
 
+bool Pair::turned() const {
+  return ours.facing * certified.facing < 0;
+}
+
 Pairing pair_up(const std::vector<TimedReport>& ours, const std::vector<TimedReport>& certified, const Axes& axes,
                 int64_t longest_gap_ns) {
   Pairing pairing;
@@ -106,7 +110,7 @@ Pairing pair_up(const std::vector<TimedReport>& ours, const std::vector<TimedRep
   std::optional<uint32_t> group_before;
   for (const auto& timed : certified) {
     const uint32_t group = timed.fields.nid_lrbg;
-    if (group != etcs::kUnknownBaliseGroup) {
+    if (etcs::names_group(group)) {
       leg += group_before && group != *group_before;
       group_before = group;
     }

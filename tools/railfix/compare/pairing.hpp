@@ -19,6 +19,8 @@ struct Pair {
   [[nodiscard]] double difference_m() const;
   /// The two intervals, ours wider by carried_m, have a place in common.
   [[nodiscard]] bool overlap() const;
+  /// Both say which way the train looks (Q_DIRLRBG), and not the same.
+  [[nodiscard]] bool turned() const;
 };
 
 /// Who had a position with a known interval at the time of a certified report. By the messages alone: what is missing

@@ -11,7 +11,7 @@ namespace railfix::compare {
 namespace {
 
 double metres(uint32_t raw, uint32_t q_scale) {
-  return raw == etcs::kUnknownDistance ? HUGE_VAL : raw * etcs::scale_m(q_scale);
+  return raw == etcs::kUnknownDistance ? HUGE_VAL : etcs::metres(raw, q_scale);
 }
 
 /// Along the group's nominal direction.
@@ -20,6 +20,11 @@ double speed_mps(const etcs::TrainPositionReport& fields) {
   if (fields.q_dirtrain == etcs::kUnknownSide) return std::numeric_limits<double>::quiet_NaN();
   const double speed = core::mps_from_kmh(fields.v_train * etcs::kSpeedStepKmh);
   return fields.q_dirtrain == etcs::kNominal ? speed : -speed;
+}
+
+/// Along the group's nominal direction: 1 or -1, 0 = not known.
+double facing(const etcs::TrainPositionReport& fields) {
+  return fields.q_dirlrbg == etcs::kUnknownSide ? 0 : fields.q_dirlrbg == etcs::kReverse ? -1 : 1;
 }
 
 /// Along the group's nominal direction: 1 or -1.
@@ -37,8 +42,8 @@ uint64_t co_ordinate_system(const etcs::TrainPositionReport& fields) {
 }  // namespace
 
 bool position_known(const etcs::TrainPositionReport& fields) {
-  return fields.nid_lrbg != etcs::kUnknownBaliseGroup && fields.d_lrbg != etcs::kUnknownDistance &&
-         fields.q_dlrbg != etcs::kUnknownSide && fields.nid_prvlrbg != etcs::kUnknownBaliseGroup;
+  return etcs::names_group(fields.nid_lrbg) && fields.d_lrbg != etcs::kUnknownDistance &&
+         fields.q_dlrbg != etcs::kUnknownSide && (!fields.nid_prvlrbg || etcs::names_group(*fields.nid_prvlrbg));
 }
 
 bool interval_known(const etcs::TrainPositionReport& fields) {
@@ -71,7 +76,8 @@ std::optional<PlacedReport> Axes::place(const TimedReport& report) const {
   if (fields.q_dirlrbg == etcs::kUnknownSide) behind_m = ahead_m = std::max(behind_m, ahead_m);
   if (fields.q_dirlrbg == etcs::kReverse) std::swap(behind_m, ahead_m);
   PlacedReport placed{report.stamp_ns,    co_ordinate_system(fields), fields.nid_lrbg,   front_m,
-                      front_m - behind_m, front_m + ahead_m,          speed_mps(fields), running(fields)};
+                      front_m - behind_m, front_m + ahead_m,          speed_mps(fields), facing(fields),
+                      running(fields)};
   if (!line_) return placed;
   const auto group = on_line(fields);
   if (!group) return std::nullopt;
@@ -79,6 +85,7 @@ std::optional<PlacedReport> Axes::place(const TimedReport& report) const {
   placed.axis = 0;
   placed.front_m = group->at_m + sign * placed.front_m;
   placed.speed_mps *= sign;
+  placed.facing *= sign;
   placed.running *= sign;
   if (sign < 0) std::swap(behind_m, ahead_m);
   placed.low_m = placed.front_m - behind_m;

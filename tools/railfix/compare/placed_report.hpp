@@ -17,6 +17,7 @@ struct PlacedReport {
   double low_m = 0;    // the front end lies between these two; infinite where a doubt is unknown
   double high_m = 0;
   double speed_mps = 0;  // along the axis, signed; NaN = its sign is not known
+  double facing = 0;     // 1 or -1: the way its front end looks along the axis; 0 = it does not say
   double running = 1;  // 1 or -1: the way it runs or, where it does not say, looks, along the axis; also at standstill
 };
 

@@ -17,6 +17,7 @@ namespace fs = std::filesystem;
 core::Result<TimedReport> report_of(int64_t stamp_ns, const std::string& hex, int64_t baseline) {
   if (baseline != 3 && baseline != 4)
     return core::Error{"baseline must be 3 or 4, not " + std::to_string(baseline) + "."};
+  if (const auto status = check_stamp(stamp_ns); !status.ok()) return status.error();
   const auto bytes = etcs::parse_hex(hex);
   if (!bytes.ok()) return bytes.error();
   auto fields = etcs::decode_or_advise(bytes.value(), static_cast<etcs::Baseline>(baseline), "baseline");
@@ -74,6 +75,13 @@ core::Result<std::vector<TimedReport>> read_lines(const fs::path& file, etcs::Ba
 }
 
 }  // namespace
+
+core::Status check_stamp(int64_t stamp_ns) {
+  constexpr int64_t kLastNs = 5'000'000'000'000'000'000;  // in the year 2128
+  if (stamp_ns >= 0 && stamp_ns <= kLastNs) return {};
+  return core::Error{"the stamp " + std::to_string(stamp_ns) + " is no time: nanoseconds since 1970 are from 0 to " +
+                     std::to_string(kLastNs) + "."};
+}
 
 core::Result<std::vector<TimedReport>> read_reports(const fs::path& file, etcs::Baseline baseline) {
   const fs::path table = fs::is_directory(file) ? file / "tpr.csv" : file;

@@ -13,7 +13,11 @@ namespace railfix::compare {
 struct TimedReport {
   int64_t stamp_ns = 0;  // of the position, in the time that both systems share
   etcs::TrainPositionReport fields;
+  bool operator==(const TimedReport&) const = default;
 };
+
+/// A stamp must be from 1970 on, and so early that an offset between two clocks may be added.
+core::Status check_stamp(int64_t stamp_ns);
 
 /// A table with `stamp_ns` and `hex` (tpr.csv of a run; `time_ns` and `message` are understood too), a run's folder, or
 /// .jsonl: one object a line with the same keys, as `railfix tpr listen --json` prints them. A `baseline` given in the

@@ -25,8 +25,10 @@ std::string text_of_need(const RatioResult& result) {
 }
 
 Verdict print_ratio(const char* what, const RatioResult& result) {
-  std::printf("%-24s ratio %.3f (%.3f to %.3f), %zu pairs in %zu legs: %s", what, result.ratio, result.low, result.high,
-              result.samples, result.legs, text_of(result.verdict));
+  const std::string bounds = std::isnan(result.low) ? "too few legs for bounds"
+                                                    : figure("%.3f", result.low) + " to " + figure("%.3f", result.high);
+  std::printf("%-24s ratio %s (%s), %zu pairs in %zu legs: %s", what, figure("%.3f", result.ratio).c_str(),
+              bounds.c_str(), result.samples, result.legs, text_of(result.verdict));
   if (result.verdict == Verdict::open && result.samples > 0) std::printf("; %s", text_of_need(result).c_str());
   std::printf("\n");
   return result.verdict;
@@ -40,19 +42,24 @@ Verdict print_share(const std::vector<Sample>& samples, const Demand& demand) {
   return print_ratio("certified over ours:", result);
 }
 
-/// What the verdicts come to. Two intervals with nothing in common cannot both be right.
-Verdict print_sum(const std::vector<Verdict>& verdicts, size_t contradicted_legs, bool errors_known) {
+/// What the verdicts come to.
+Verdict print_sum(const std::vector<Verdict>& verdicts, const Contradicted& legs, bool errors_known) {
   const auto any = [&](Verdict one) { return std::ranges::count(verdicts, one) > 0; };
   std::printf("verdict                  ");
   if (any(Verdict::worse)) {
     std::printf("WORSE\n");
     return Verdict::worse;
   }
-  if (contradicted_legs > 0) {
+  if (legs.turned > 0) {
+    std::printf("not shown: on %zu legs the train looks the other way in ours (Q_DIRLRBG), so one side is wrong\n",
+                legs.turned);
+    return Verdict::open;
+  }
+  if (legs.apart > 0) {
     std::printf(
         "not shown: on %zu legs the intervals have nothing in common, so one side is wrong, and only --truth "
         "says which\n",
-        contradicted_legs);
+        legs.apart);
     return Verdict::open;
   }
   if (any(Verdict::open)) {
@@ -72,7 +79,14 @@ std::vector<double> sizes_of(const std::vector<Sample>& samples, double Sample::
   return list;
 }
 
-Verdict print_verdict(const Columns& columns, size_t contradicted_legs, const Demand& demand) {
+std::string figure(const char* format, double value) {
+  if (std::isnan(value)) return "-";
+  char text[64];
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
+
+Verdict print_verdict(const Columns& columns, const Contradicted& legs, const Demand& demand) {
   std::printf("\nGAMAB, %.0f %% confidence, margin %.0f %%, over legs (ours / certified)\n", 100 * demand.confidence,
               100 * demand.margin);
   std::vector<Verdict> verdicts{print_share(columns.available, demand)};
@@ -89,7 +103,7 @@ Verdict print_verdict(const Columns& columns, size_t contradicted_legs, const De
         text_of(broken.verdict));
     verdicts.push_back(broken.verdict);
   }
-  return print_sum(verdicts, contradicted_legs, !columns.errors.empty());
+  return print_sum(verdicts, legs, !columns.errors.empty());
 }
 
 }  // namespace railfix::compare

@@ -1,6 +1,7 @@
 // What a comparison comes to, as text: the GAMAB verdicts over legs.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "compare/gamab.hpp"
@@ -15,11 +16,20 @@ struct Columns {
   std::vector<Sample> available;  // 1 = a report with a known interval
 };
 
+/// Legs on which both cannot be right.
+struct Contradicted {
+  size_t apart = 0;   // their intervals have nothing in common, and no truth says who is wrong
+  size_t turned = 0;  // the train looks the one way in ours and the other way in theirs
+};
+
 /// Of one side, without signs.
 std::vector<double> sizes_of(const std::vector<Sample>& samples, double Sample::*side);
 
-/// Prints every ratio, its bounds and the verdict. contradicted_legs: on which the intervals have nothing in common and
-/// no truth says who is wrong; such a comparison is never "at least as good".
-Verdict print_verdict(const Columns& columns, size_t contradicted_legs, const Demand& demand);
+/// "-" where it is not known.
+std::string figure(const char* format, double value);
+
+/// Prints every ratio, its bounds and the verdict. A comparison with legs that contradict each other is never "at least
+/// as good".
+Verdict print_verdict(const Columns& columns, const Contradicted& legs, const Demand& demand);
 
 }  // namespace railfix::compare

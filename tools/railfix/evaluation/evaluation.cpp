@@ -48,17 +48,31 @@ ReportResult judge_reports(const std::vector<ReportRow>& rows) {
 }
 
 core::Status check_times(const Truth& truth, const RunTables& run) {
-  const auto said = run.span();
-  const RunTables::Span real{truth.rows().front().stamp_ns, truth.rows().back().stamp_ns};
-  if (!said || (said->from_ns <= real.to_ns && said->to_ns >= real.from_ns)) return {};
-  const auto text = [](const RunTables::Span& span) {
+  using Span = RunTables::Span;
+  const Span real{truth.rows().front().stamp_ns, truth.rows().back().stamp_ns};
+  const auto apart = [&real](const Span& span) { return span.from_ns > real.to_ns || span.to_ns < real.from_ns; };
+  const auto text = [](const Span& span) {
     std::array<char, 80> seconds{};
     std::snprintf(seconds.data(), seconds.size(), "from %.3f to %.3f s", core::seconds(span.from_ns),
                   core::seconds(span.to_ns));
     return std::string(seconds.data());
   };
-  return core::Error{"the run is " + text(*said) + " and the truth " + text(real) +
-                     ", with no time in common; give the truth of the dataset that was run"};
+  const auto refusal = [&](const std::string& what, const Span& span, const char* advice) {
+    return core::Error{what + " is " + text(span) + " and the truth " + text(real) + ", with no time in common; " +
+                       advice};
+  };
+  if (run.spans.empty()) return {};
+  Span all = run.spans.begin()->second;
+  for (const auto& [name, span] : run.spans)
+    all = {std::min(all.from_ns, span.from_ns), std::max(all.to_ns, span.to_ns)};
+  if (apart(all)) return refusal("the run", all, "give the truth of the dataset that was run");
+  // Tables of single events may well begin after a truth that is short.
+  for (const char* name : {"odometry.csv", "train_state.csv", "track_view.csv"}) {
+    const auto table = run.spans.find(name);
+    if (table != run.spans.end() && apart(table->second))
+      return refusal(name, table->second, "put all tables of one run into the folder");
+  }
+  return {};
 }
 
 Evaluation evaluate(const Truth& truth, const RunTables& run) {
@@ -66,6 +80,7 @@ Evaluation evaluate(const Truth& truth, const RunTables& run) {
   result.duration_s = core::seconds(truth.rows().back().stamp_ns - truth.rows().front().stamp_ns);
   result.travelled_m = truth.travelled_m();
   result.missing = run.missing;
+  result.empty = run.empty;
   result.out_of_order = run.out_of_order;
   if (run.odometry) result.odometry = judge_odometry(truth, *run.odometry);
   if (run.states) result.position = judge_position(truth, *run.states);

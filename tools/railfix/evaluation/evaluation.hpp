@@ -46,9 +46,10 @@ struct Evaluation {
   std::optional<ReportResult> reports;
   std::optional<std::vector<ServiceResult>> services;
   std::vector<std::string> missing;
+  std::vector<std::string> empty;              // tables with a header alone, not judged
   std::map<std::string, size_t> out_of_order;  // rows that stood below a newer one, by table
 };
-/// An error names both times where run and truth have none in common: nothing could be judged.
+/// An error names both times where the truth has none in common with the run, or with a table of every step.
 core::Status check_times(const Truth& truth, const RunTables& run);
 Evaluation evaluate(const Truth& truth, const RunTables& run);
 

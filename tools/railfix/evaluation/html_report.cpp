@@ -194,11 +194,14 @@ std::string html_report(const Truth& truth, const Evaluation& evaluation, const 
   Html html(truth);
   html.raw(std::string(kHead) + "<title>Railfix: " + tool::escape_html(run_name) + "</title></head><body>\n<h1>" +
            tool::escape_html(run_name) + "</h1>\n<p>railfix evaluate: this run beside the truth of its dataset.");
-  if (!evaluation.missing.empty()) {
-    html.raw(" Not in this run:");
-    for (const std::string& name : evaluation.missing) html.raw(" " + tool::escape_html(name));
+  const auto tables = [&html](const char* what, const std::vector<std::string>& names) {
+    if (names.empty()) return;
+    html.raw(what);
+    for (const std::string& name : names) html.raw(" " + tool::escape_html(name));
     html.raw(".");
-  }
+  };
+  tables(" Not in this run:", evaluation.missing);
+  tables(" Without a row:", evaluation.empty);
   for (const auto& [name, rows] : evaluation.out_of_order)
     html.raw(" Out of order: " + std::to_string(rows) + " rows of " + tool::escape_html(name) + ".");
   html.raw("</p>\n");

@@ -169,12 +169,14 @@ Drift drift_of(const std::vector<MotionSample>& samples) {
   const auto first_behind = [&](double metres) {
     return static_cast<size_t>(std::lower_bound(travelled.begin(), travelled.end(), metres) - travelled.begin());
   };
-  for (size_t step = 0;; ++step) {
-    const size_t begin = first_behind(static_cast<double>(step) * kWindowStepM);
+  // From each step of the way that a sample lies in: rows may lie far apart.
+  for (double from_m = 0;;) {
+    const size_t begin = first_behind(from_m);
     if (begin >= samples.size()) break;
     const size_t end = first_behind(travelled[begin] + kWindowM);
     if (end >= samples.size()) break;
     windows.push_back(100.0 * std::abs(error_at(end) - error_at(begin)) / (travelled[end] - travelled[begin]));
+    from_m = kWindowStepM * (std::floor(travelled[begin] / kWindowStepM) + 1);
   }
   drift.window_percent = summarise(std::move(windows));
   return drift;

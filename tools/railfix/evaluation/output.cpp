@@ -15,7 +15,8 @@ using nlohmann::ordered_json;
 std::string figure(double value, const char* format, const char* unit) {
   if (!std::isfinite(value)) return "-";
   std::array<char, 64> text{};
-  std::snprintf(text.data(), text.size(), format, value);
+  constexpr double kLongest = 1e15;  // written out; longer ones would not fit
+  std::snprintf(text.data(), text.size(), std::abs(value) < kLongest ? format : "%.3g", value);
   return std::string(text.data()) + unit;
 }
 std::string metres(double value) {
@@ -250,6 +251,7 @@ void print(const Evaluation& evaluation, std::ostream& out) {
   }
   if (evaluation.services) print_services(out, *evaluation.services);
   for (const std::string& name : evaluation.missing) out << name << ": not in this run\n";
+  for (const std::string& name : evaluation.empty) out << name << ": has a header and no row, not judged\n";
   for (const auto& [name, rows] : evaluation.out_of_order)
     out << name << ": OUT OF ORDER, " << rows << " rows are older than one above them\n";
 }
@@ -257,6 +259,7 @@ void print(const Evaluation& evaluation, std::ostream& out) {
 ordered_json to_json(const Evaluation& evaluation) {
   ordered_json json = {
       {"duration_s", evaluation.duration_s}, {"travelled_m", evaluation.travelled_m}, {"missing", evaluation.missing}};
+  json["empty"] = evaluation.empty;
   json["out_of_order"] = evaluation.out_of_order;
   json["odometry"] = or_null(evaluation.odometry, odometry_json);
   json["position"] = or_null(evaluation.position, position_json);

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 #include "core/csv_table.hpp"
+#include "core/train_limits.hpp"
 
 namespace railfix::evaluation {
 namespace {
@@ -21,8 +23,8 @@ Status read(const fs::path& file, std::vector<OdometryRow>& rows) {
   const size_t speed = table.required({"speed_mps"});
   const size_t mode = table.required({"mode"});
   while (table.next()) {
-    rows.push_back({table.integer(stamp), table.integer(valid) != 0, table.number_or_nan(distance),
-                    table.number_or_nan(speed), table.text(mode)});
+    rows.push_back({table.integer(stamp), table.integer(valid) != 0, table.number_or_nan(distance, core::kFarthestM),
+                    table.number_or_nan(speed, core::kFastestTrainMps), table.text(mode)});
   }
   return table.status();
 }
@@ -44,13 +46,13 @@ Status read(const fs::path& file, std::vector<StateRow>& rows) {
     if (track) row.track_probability = table.number_or_nan(*track);
     row.stamp_ns = table.integer(stamp);
     row.track_known = table.integer(known) != 0;
-    row.distance_m = table.number_or_nan(distance);
-    row.speed_mps = table.number_or_nan(speed);
-    row.over_m = table.number_or_nan(over);
-    row.under_m = table.number_or_nan(under);
+    row.distance_m = table.number_or_nan(distance, core::kFarthestM);
+    row.speed_mps = table.number_or_nan(speed, core::kFastestTrainMps);
+    row.over_m = table.number_or_nan(over, core::kFarthestM);
+    row.under_m = table.number_or_nan(under, core::kFarthestM);
     row.integrity = table.text(integrity);
-    row.easting_m = table.number_or_nan(easting);
-    row.northing_m = table.number_or_nan(northing);
+    row.easting_m = table.number_or_nan(easting, core::kFarthestM);
+    row.northing_m = table.number_or_nan(northing, core::kFarthestM);
     rows.push_back(row);
   }
   return table.status();
@@ -71,8 +73,8 @@ Status read(const fs::path& file, std::vector<ViewRow>& rows) {
     row.stamp_ns = table.integer(stamp);
     row.seen = table.integer(seen) != 0;
     for (size_t i = 0; i < kViewFields; ++i) {
-      row.value[i] = table.number_or_nan(values[i]);
-      row.sigma[i] = table.number_or_nan(sigmas[i]);
+      row.value[i] = table.number_or_nan(values[i], core::kFarthestM);
+      row.sigma[i] = table.number_or_nan(sigmas[i], core::kFarthestM);
     }
     rows.push_back(row);
   }
@@ -88,7 +90,8 @@ Status read(const fs::path& file, std::vector<RailPoint>& rows) {
   while (table.next()) {
     const std::string side = table.text(rail);
     if (side != "L" && side != "R") table.refuse("has the rail '" + side + "', which must be L or R");
-    rows.push_back({table.integer(stamp), side == "L", table.finite(u), table.finite(v)});
+    rows.push_back(
+        {table.integer(stamp), side == "L", table.finite(u, core::kFarthestM), table.finite(v, core::kFarthestM)});
   }
   return table.status();
 }
@@ -98,7 +101,8 @@ Status read(const fs::path& file, std::vector<SightingRow>& rows) {
   const size_t stamp = table.required({"stamp_ns"});
   const size_t kind = table.required({"kind"});
   const size_t ahead = table.required({"distance_ahead_m"});
-  while (table.next()) rows.push_back({table.integer(stamp), table.text(kind), table.finite(ahead)});
+  while (table.next())
+    rows.push_back({table.integer(stamp), table.text(kind), table.finite(ahead, core::kFarthestSeenM)});
   return table.status();
 }
 
@@ -116,8 +120,8 @@ Status read(const fs::path& file, std::vector<ReportRow>& rows) {
   const size_t over = table.required({"l_doubtover_m"});
   const size_t under = table.required({"l_doubtunder_m"});
   while (table.next()) {
-    rows.push_back({table.integer(stamp), std::isfinite(table.number_or_nan(distance)), table.number_or_nan(over),
-                    table.number_or_nan(under)});
+    rows.push_back({table.integer(stamp), std::isfinite(table.number_or_nan(distance, core::kFarthestM)),
+                    table.number_or_nan(over, core::kFarthestM), table.number_or_nan(under, core::kFarthestM)});
   }
   return table.status();
 }
@@ -156,6 +160,11 @@ size_t put_in_order(std::vector<Row>& rows) {
   return older;
 }
 
+/// Its service writes a row at every step: without any there is nothing to judge. In other tables none is a result.
+template <class Row>
+constexpr bool kEveryStep =
+    std::is_same_v<Row, OdometryRow> || std::is_same_v<Row, StateRow> || std::is_same_v<Row, ViewRow>;
+
 template <class Row>
 Status read_if_there(const fs::path& folder, const std::string& name, std::optional<std::vector<Row>>& rows,
                      RunTables& run) {
@@ -167,27 +176,18 @@ Status read_if_there(const fs::path& folder, const std::string& name, std::optio
   const Status status = read(folder / name, *rows);
   if constexpr (requires(Row row) { row.stamp_ns; }) {
     if (const size_t older = put_in_order(*rows)) run.out_of_order[name] = older;
+    if (!rows->empty()) run.spans[name] = {rows->front().stamp_ns, rows->back().stamp_ns};
+  }
+  if constexpr (kEveryStep<Row>) {
+    if (status.ok() && rows->empty()) {
+      run.empty.push_back(name);
+      rows.reset();
+    }
   }
   return status;
 }
 
 }  // namespace
-
-std::optional<RunTables::Span> RunTables::span() const {
-  std::optional<Span> span;
-  const auto add = [&span](const auto& rows) {
-    if (!rows || rows->empty()) return;
-    const Span its{rows->front().stamp_ns, rows->back().stamp_ns};
-    span = span ? Span{std::min(span->from_ns, its.from_ns), std::max(span->to_ns, its.to_ns)} : its;
-  };
-  add(odometry);
-  add(states);
-  add(views);
-  add(rails);
-  add(sightings);
-  add(reports);
-  return span;
-}
 
 core::Result<RunTables> read_run(const fs::path& folder) {
   if (!fs::is_directory(folder)) return Error{folder.string() + " is not a folder; give the --out folder of a run"};

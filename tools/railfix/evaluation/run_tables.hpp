@@ -93,6 +93,7 @@ struct RunTables {
   std::optional<std::vector<ReportRow>> reports;
   std::optional<std::vector<StatusRow>> status;
   std::vector<std::string> missing;  // names of the tables that are not in this run
+  std::vector<std::string> empty{};  // ... that hold a header alone where every step has a row; as if not there
   /// By the table's name: rows that stood below a newer one.
   std::map<std::string, size_t> out_of_order{};
 
@@ -100,8 +101,8 @@ struct RunTables {
     int64_t from_ns = 0;
     int64_t to_ns = 0;
   };
-  /// Of all stamps; nothing when no table has any.
-  [[nodiscard]] std::optional<Span> span() const;
+  /// Of the stamps, by the name of the table that has any.
+  std::map<std::string, Span> spans{};
 };
 
 /// A folder that does not exist, or that holds none of the tables, is an error; so is a broken row (file and line).

@@ -1,5 +1,6 @@
 #include "map/map_commands.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <iostream>
@@ -125,6 +126,10 @@ int learn(const LearnRequest& request) {
   std::printf("sightings        %zu of %zu runs, %zu used, %zu outliers, %zu of things seen by fewer than %zu runs\n",
               sightings.size(), request.runs.size(), survey.sightings, survey.outliers, survey.left_alone,
               request.options.least_runs);
+  for (size_t run = 0; run < request.runs.size(); ++run) {
+    if (std::ranges::none_of(sightings, [run](const SurveySighting& sighting) { return sighting.run == run; }))
+      std::printf("nothing seen     %s has no sighting with a place on the map\n", request.runs[run].c_str());
+  }
   std::printf("errors           %.2f of their sigmas (rms)\n\n", survey.spread);
   std::printf("%-10s %6s %12s %9s %9s %5s %9s  %s\n", "kind", "edge", "offset [m]", "sigma [m]", "moved [m]", "runs",
               "sightings", "on the map as");

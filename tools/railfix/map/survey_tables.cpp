@@ -5,6 +5,7 @@
 
 #include "core/csv.hpp"
 #include "core/time.hpp"
+#include "core/train_limits.hpp"
 #include "map/survey.hpp"
 #include "track/path.hpp"
 #include "track/same_map.hpp"
@@ -53,15 +54,21 @@ core::BadInput bad_cell(const core::CsvReader& table, size_t column, const std::
 
 /// An infinite sigma counts for nothing, one of 0 for everything.
 double sigma_in(const core::CsvReader& table, size_t column) {
-  const double sigma_m = read_or_throw(table.number(column));
+  const double sigma_m = read_or_throw(table.number(column, core::kFarthestM));
   if (!std::isfinite(sigma_m) || sigma_m <= 0) throw bad_cell(table, column, " is not a length of more than 0 m");
   return sigma_m;
 }
 
-double finite_in(const core::CsvReader& table, size_t column) {
-  const double value = read_or_throw(table.number(column));
+double ahead_in(const core::CsvReader& table, size_t column) {
+  const double value = read_or_throw(table.number(column, core::kFarthestSeenM));
   if (!std::isfinite(value)) throw bad_cell(table, column, " is not a finite number");
   return value;
+}
+
+void check_confidence(const core::CsvReader& table, std::optional<size_t> column) {
+  if (!column) return;
+  const double confidence = read_or_throw(table.number(*column));
+  if (confidence < 0 || confidence > 1) throw bad_cell(table, *column, " is not a probability from 0 to 1");
 }
 
 /// The stamps of a table, in the order of its rows.
@@ -119,13 +126,14 @@ class PlaceColumns {
     const int64_t edge = read_or_throw(table.integer(edge_));
     const bool possible = edge >= 0 && edge <= std::numeric_limits<uint32_t>::max();
     const track::EdgePosition place{
-        possible ? static_cast<uint32_t>(edge) : 0, read_or_throw(table.number(offset_)),
+        possible ? static_cast<uint32_t>(edge) : 0, read_or_throw(table.number(offset_, core::kFarthestM)),
         table.text(direction_) == "-" ? track::Direction::reverse : track::Direction::forward};
     if (!possible || map.edge(place.edge) == nullptr) {
       throw core::BadInput(table.error("edge " + std::to_string(edge) + " is not on the map; was the run made on it?"));
     }
     if (!easting_ || !northing_) return place;
-    if (!track::lies_there(map, place, read_or_throw(table.number(*easting_)), read_or_throw(table.number(*northing_))))
+    if (!track::lies_there(map, place, read_or_throw(table.number(*easting_, core::kFarthestM)),
+                           read_or_throw(table.number(*northing_, core::kFarthestM))))
       throw core::BadInput(table.error("this map has edge " + std::to_string(edge) +
                                        " elsewhere than at the row's easting_m and northing_m; give the map that the "
                                        "run was made on"));
@@ -149,11 +157,11 @@ std::vector<State> read_states(const std::shared_ptr<const track::Map>& map, con
     State state;
     state.stamp_ns = stamps.next(table, stamp);
     if (stamps.late()) continue;
-    state.way_m = way.at(state.stamp_ns, read_or_throw(table.number(speed)));
+    state.way_m = way.at(state.stamp_ns, read_or_throw(table.number(speed, core::kFastestTrainMps)));
     const std::string_view is_known = table.text(known);
     if (place.empty(table) || is_known == "0" || is_known == "false") continue;
     state.place = place.read(table, *map);
-    state.sigma_m = read_or_throw(table.number(sigma));
+    state.sigma_m = read_or_throw(table.number(sigma, core::kFarthestM));
     if (!std::isfinite(state.place.offset_m) || !std::isfinite(state.sigma_m)) continue;
     if (state.sigma_m < 0) throw bad_cell(table, sigma, " is less than 0 m");
     if (!out.empty()) {
@@ -190,14 +198,17 @@ core::Result<std::vector<SurveySighting>> read_sightings(const std::shared_ptr<c
     const auto at = [&](std::string_view name) { return column_of(table, file, name); };
     const size_t stamp = at("stamp_ns"), kind = at("kind"), ahead = at("distance_ahead_m"), lateral = at("lateral_m");
     const size_t sigma = at("sigma_m");
+    const std::optional<size_t> confidence = table.column({"confidence"});
     std::vector<SurveySighting> out;
     Stamps stamps;
     while (table.next()) {
       const int64_t when = stamps.next(table, stamp);
       const auto what = track::landmark_kind_from(std::string(table.text(kind)));
       if (!what) return table.error("\"" + std::string(table.text(kind)) + "\" is no kind of landmark");
-      const double ahead_m = finite_in(table, ahead);
+      const double ahead_m = ahead_in(table, ahead);
       const double sigma_m = sigma_in(table, sigma);
+      const double side = read_or_throw(table.number(lateral, core::kFarthestSeenM));
+      check_confidence(table, confidence);
       const auto after = std::lower_bound(states.begin(), states.end(), when,
                                           [](const State& state, int64_t ns) { return state.stamp_ns < ns; });
       if (after == states.begin() || after == states.end()) continue;
@@ -205,7 +216,6 @@ core::Result<std::vector<SurveySighting>> read_sightings(const std::shared_ptr<c
       const auto place = place_at(map, before, *after, when, ahead_m);
       if (!place) continue;
       const bool is_reverse = place->direction == track::Direction::reverse;
-      const double side = read_or_throw(table.number(lateral));
       out.push_back({run, before.way_m, track::seen_along(*what, !is_reverse), place->edge, place->offset_m,
                      std::isfinite(side) ? (is_reverse ? -side : side) : 0.0, sigma_m, before.sigma_m,
                      before.place_ahead_m, is_reverse});
