@@ -6,5 +6,6 @@ namespace railfix::core {
 constexpr double kFastestTrainMps = 200;
 constexpr double kFarthestM = 1e8;  // co-ordinates, ways of a run, lengths
 constexpr double kFarthestSeenM = 1e4;
+constexpr double kWidestM = 1e12;  // an interval, a sigma: nothing bounds them where nothing measures
 
 }  // namespace railfix::core

@@ -48,8 +48,8 @@ Status read(const fs::path& file, std::vector<StateRow>& rows) {
     row.track_known = table.integer(known) != 0;
     row.distance_m = table.number_or_nan(distance, core::kFarthestM);
     row.speed_mps = table.number_or_nan(speed, core::kFastestTrainMps);
-    row.over_m = table.number_or_nan(over, core::kFarthestM);
-    row.under_m = table.number_or_nan(under, core::kFarthestM);
+    row.over_m = table.number_or_nan(over, core::kWidestM);
+    row.under_m = table.number_or_nan(under, core::kWidestM);
     row.integrity = table.text(integrity);
     row.easting_m = table.number_or_nan(easting, core::kFarthestM);
     row.northing_m = table.number_or_nan(northing, core::kFarthestM);
@@ -74,7 +74,7 @@ Status read(const fs::path& file, std::vector<ViewRow>& rows) {
     row.seen = table.integer(seen) != 0;
     for (size_t i = 0; i < kViewFields; ++i) {
       row.value[i] = table.number_or_nan(values[i], core::kFarthestM);
-      row.sigma[i] = table.number_or_nan(sigmas[i], core::kFarthestM);
+      row.sigma[i] = table.number_or_nan(sigmas[i], core::kWidestM);
     }
     rows.push_back(row);
   }
@@ -121,7 +121,7 @@ Status read(const fs::path& file, std::vector<ReportRow>& rows) {
   const size_t under = table.required({"l_doubtunder_m"});
   while (table.next()) {
     rows.push_back({table.integer(stamp), std::isfinite(table.number_or_nan(distance, core::kFarthestM)),
-                    table.number_or_nan(over, core::kFarthestM), table.number_or_nan(under, core::kFarthestM)});
+                    table.number_or_nan(over, core::kWidestM), table.number_or_nan(under, core::kWidestM)});
   }
   return table.status();
 }

@@ -54,7 +54,7 @@ core::BadInput bad_cell(const core::CsvReader& table, size_t column, const std::
 
 /// An infinite sigma counts for nothing, one of 0 for everything.
 double sigma_in(const core::CsvReader& table, size_t column) {
-  const double sigma_m = read_or_throw(table.number(column, core::kFarthestM));
+  const double sigma_m = read_or_throw(table.number(column, core::kWidestM));
   if (!std::isfinite(sigma_m) || sigma_m <= 0) throw bad_cell(table, column, " is not a length of more than 0 m");
   return sigma_m;
 }
@@ -161,7 +161,7 @@ std::vector<State> read_states(const std::shared_ptr<const track::Map>& map, con
     const std::string_view is_known = table.text(known);
     if (place.empty(table) || is_known == "0" || is_known == "false") continue;
     state.place = place.read(table, *map);
-    state.sigma_m = read_or_throw(table.number(sigma, core::kFarthestM));
+    state.sigma_m = read_or_throw(table.number(sigma, core::kWidestM));
     if (!std::isfinite(state.place.offset_m) || !std::isfinite(state.sigma_m)) continue;
     if (state.sigma_m < 0) throw bad_cell(table, sigma, " is less than 0 m");
     if (!out.empty()) {
