@@ -3,6 +3,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "core/whole_file.hpp"
+
 namespace railfix::core {
 namespace {
 
@@ -105,7 +107,7 @@ Error CsvReader::error(const std::string& what) const {
 }
 
 CsvWriter::CsvWriter(const std::filesystem::path& file, const std::string& header) : file_(file), stream_(file) {
-  if (!stream_) throw BadInput(file.string() + " cannot be written; check the folder and its permissions");
+  if (!stream_) throw BadInput(cannot_write(file.string()));
   stream_ << header << '\n';
 }
 

@@ -163,8 +163,7 @@ void draw(const std::string& file, cv::Mat colour, const dataset::Picture& pictu
   track_detector::TrackDetector detector(lens, mount, options);
   track_detector::draw_track(colour, lens, detector.detect(picture.grey), gauge_m);
   draw_mount(colour, geometry::View(lens, mount), gauge_m);
-  if (!write_picture(file, colour))
-    throw core::BadInput("cannot write " + file + ": give a .png in a folder that exists");
+  core::ok_or_throw(write_picture(file, colour));
 }
 
 void print_roll(const geometry::CameraPose& mount, const Roll& roll) {

@@ -154,9 +154,7 @@ int calibrate(LensArguments arguments) {
   const std::string drawn = arguments.draw.empty()
                                 ? std::filesystem::path(arguments.out).replace_extension(".lens.png").string()
                                 : arguments.draw;
-  if (!write_picture(drawn, draw_lens(found.value(), boards.picture, boards.views[boards.pictured]))) {
-    throw core::BadInput("cannot write " + drawn + ": give --draw a .png in a folder that exists");
-  }
+  core::ok_or_throw(write_picture(drawn, draw_lens(found.value(), boards.picture, boards.views[boards.pictured])));
   if (arguments.json) {
     std::cout << to_json(found.value(), boards).dump(2) << '\n';
     return 0;

@@ -19,11 +19,6 @@ struct Options {
   std::string report;
 };
 
-void write_file(const std::string& name, const std::string& content) {
-  if (!core::write_whole(name, content))
-    throw core::BadInput(name + " cannot be written; check its folder, the permissions and the space on the disk");
-}
-
 int evaluate(const Options& options) {
   if (options.json != "-") check_output("--json", options.json, {options.truth, options.run});
   check_output("--report", options.report, {options.truth, options.run});
@@ -33,14 +28,14 @@ int evaluate(const Options& options) {
   const auto result = evaluation::evaluate(truth, run);
   if (!options.report.empty()) {
     const auto name = std::filesystem::absolute(options.run + "/").parent_path().filename().string();
-    write_file(options.report, evaluation::html_report(truth, result, name));
+    core::ok_or_throw(core::write_whole(options.report, evaluation::html_report(truth, result, name)));
   }
   const std::string json = evaluation::to_json(result).dump(2) + "\n";
   if (options.json == "-") {
     std::cout << json;
   } else {
     evaluation::print(result, std::cout);
-    if (!options.json.empty()) write_file(options.json, json);
+    if (!options.json.empty()) core::ok_or_throw(core::write_whole(options.json, json));
   }
   return 0;
 }
