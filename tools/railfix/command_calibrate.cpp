@@ -222,7 +222,8 @@ int calibrate_mount(const MountArguments& arguments) {
   const std::string& path = arguments.pictures.empty() ? arguments.video : arguments.pictures;
   // It may be that of --camera, to whose lens the mount is added, or that of an earlier time beside the pictures.
   check_output("--out", arguments.out, {arguments.video});
-  check_output("--draw", arguments.draw, {path, arguments.camera, arguments.out});
+  check_output("--draw", arguments.draw, {path, arguments.camera});
+  check_different({{"--out", arguments.out}, {"--draw", arguments.draw}});
   const auto pictures = load_pictures(path, arguments.json);
   const Roll roll = arguments.roll_from_imu ? roll_from_gravity(path) : Roll{};
   std::string remark;

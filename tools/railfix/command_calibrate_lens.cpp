@@ -141,7 +141,8 @@ int calibrate(LensArguments arguments) {
   }
   parse_board(arguments, arguments.board);
   check_output("--out", arguments.out, {});  // what an older file knows of the mount stays
-  check_output("--draw", arguments.draw, {arguments.pictures, arguments.out});
+  check_output("--draw", arguments.draw, {arguments.pictures});
+  check_different({{"--out", arguments.out}, {"--draw", arguments.draw}});
   const auto finder = core::value_or_throw(BoardFinder::make(arguments.board));
   const Boards boards = arguments.live.empty() ? from_recording(arguments, finder) : from_camera(arguments, finder);
   const auto found = calibrate_lens(boards.views, boards.size);

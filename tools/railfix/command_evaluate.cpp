@@ -22,6 +22,7 @@ struct Options {
 int evaluate(const Options& options) {
   if (options.json != "-") check_output("--json", options.json, {options.truth, options.run});
   check_output("--report", options.report, {options.truth, options.run});
+  check_different({{"--json", options.json}, {"--report", options.report}});
   const auto truth = core::value_or_throw(evaluation::Truth::read(options.truth));
   const auto run = core::value_or_throw(evaluation::read_run(options.run));
   core::ok_or_throw(evaluation::check_times(truth, run));
@@ -33,10 +34,11 @@ int evaluate(const Options& options) {
   const std::string json = evaluation::to_json(result).dump(2) + "\n";
   if (options.json == "-") {
     std::cout << json;
-  } else {
-    evaluation::print(result, std::cout);
-    if (!options.json.empty()) core::ok_or_throw(core::write_whole(options.json, json));
+    return 0;
   }
+  if (!options.json.empty()) core::ok_or_throw(core::write_whole(options.json, json));
+  say_beside({options.report, options.json});
+  evaluation::print(result, std::cout);
   return 0;
 }
 

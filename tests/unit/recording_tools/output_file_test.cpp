@@ -50,5 +50,18 @@ TEST_F(OutputFile, HasAFolderAndIsNone) {
   EXPECT_THAT(refusal(root_, {}), HasSubstr("is a folder"));
 }
 
+TEST_F(OutputFile, OfAnotherKindHasAnotherName) {
+  fs::create_symlink(write("there", ""), root_ / "link");
+  for (const auto& [a, b] : {std::pair("new", "./new"), {"there", "link"}}) {
+    try {
+      check_different({{"--json", root_ / a}, {"--csv", ""}, {"--report", root_ / b}});
+      ADD_FAILURE() << a;
+    } catch (const core::BadInput& bad) {
+      EXPECT_EQ(bad.what(), "--json and --report are both " + (root_ / b).string() + "; give each a file of its own");
+    }
+  }
+  check_different({{"--json", root_ / "new"}, {"--report", root_ / "other"}, {"--csv", ""}, {"--mp4", ""}});
+}
+
 }  // namespace
 }  // namespace railfix::tool

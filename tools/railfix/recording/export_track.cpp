@@ -150,10 +150,10 @@ core::Result<RecordedTrack> read_track(mcap::Reader& reader, const mcap::Selecti
   });
   if (!status.ok()) return status.error();
   if (!track.train.empty() || !track.gnss.empty()) return track;
-  return core::Error{
-      reader.file().string() +
-      " says nowhere where on the Earth the train was: no train_state with latitude and longitude (has the "
-      "map a coordinate system?) and no GNSS fix"};
+  const bool whole = part.from_ns.value_or(0) <= reader.statistics().start_ns && !part.to_ns;
+  return core::Error{reader.file().string() + (whole ? " says nowhere" : " does not say in this part") +
+                     " where on the Earth the train was: no train_state with latitude and longitude (has the "
+                     "map a coordinate system?) and no GNSS fix"};
 }
 
 core::Status write_gpx(const RecordedTrack& track, const std::filesystem::path& file) {
