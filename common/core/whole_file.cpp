@@ -46,23 +46,6 @@ std::optional<int> own_descriptor(const fs::path& file) {
   return code == std::errc{} && end == name.data() + name.size() ? std::optional(descriptor) : std::nullopt;
 }
 
-/// False: errno says why.
-bool write_all(int out, const std::string& bytes) {
-  size_t done = 0;
-  while (done < bytes.size()) {
-    const ssize_t count = write(out, bytes.data() + done, bytes.size() - done);
-    if (count >= 0) {
-      done += static_cast<size_t>(count);
-    } else if (errno == EAGAIN) {
-      pollfd room{out, POLLOUT, 0};
-      poll(&room, 1, -1);
-    } else if (errno != EINTR) {
-      return false;
-    }
-  }
-  return true;
-}
-
 /// Closes it also where writing failed, and keeps errno of the first failure.
 bool close_written(int out, bool written) {
   const int reason = errno;
@@ -76,10 +59,10 @@ bool write_into(const fs::path& file, const std::string& bytes) {
   // Opened once more it would begin at its front and forget that the shell appends.
   if (const auto ours = own_descriptor(file)) {
     const bool in_order = *ours != STDOUT_FILENO || std::fflush(stdout) == 0;
-    return in_order && write_all(*ours, bytes);
+    return in_order && write_all(*ours, std::as_bytes(std::span(bytes)));
   }
   const int out = open(file.c_str(), O_WRONLY | O_APPEND | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
-  return out >= 0 && close_written(out, write_all(out, bytes));
+  return out >= 0 && close_written(out, write_all(out, std::as_bytes(std::span(bytes))));
 }
 
 /// Its owner as far as we may give files away, and its rights.
@@ -99,7 +82,8 @@ bool replace(const fs::path& file, const struct stat* old, const std::string& by
       open(draft.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, old != nullptr ? old->st_mode & 0777U : 0666U);
   if (out < 0) return false;
   if (old != nullptr) take_after(*old, out);
-  if (close_written(out, write_all(out, bytes)) && rename(draft.c_str(), file.c_str()) == 0) return true;
+  if (close_written(out, write_all(out, std::as_bytes(std::span(bytes)))) && rename(draft.c_str(), file.c_str()) == 0)
+    return true;
   const int reason = errno;
   unlink(draft.c_str());
   errno = reason;
@@ -152,6 +136,21 @@ Result<std::string> read_whole(std::istream& stream, const std::string& name) {
     text.append(part.data(), static_cast<size_t>(stream.gcount()));
   if (stream.bad()) return cannot_read(name);
   return text;
+}
+
+bool write_all(int descriptor, std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t count = write(descriptor, bytes.data(), bytes.size());
+    if (count >= 0) {
+      bytes = bytes.subspan(static_cast<size_t>(count));
+    } else if (errno == EAGAIN) {
+      pollfd room{descriptor, POLLOUT, 0};
+      poll(&room, 1, -1);
+    } else if (errno != EINTR) {
+      return false;
+    }
+  }
+  return true;
 }
 
 Status write_whole(const std::filesystem::path& file, const std::string& bytes) {
