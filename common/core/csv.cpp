@@ -156,9 +156,8 @@ void CsvWriter::end_row() {
 }
 
 Status CsvWriter::close() {
-  stream_.close();
-  if (!stream_) return Error{file_.string() + " could not be written completely; is the disk full?"};
-  return {};
+  stream_.close();  // tries once more where writing failed, and so gives the reason
+  return stream_ ? Status() : cannot_write(file_.string() + " to its end");
 }
 
 }  // namespace railfix::core

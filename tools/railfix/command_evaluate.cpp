@@ -51,7 +51,8 @@ void add_evaluate(CLI::App& app, Action& chosen) {
   command->add_option("--truth", options->truth, "Folder with track.csv and landmarks.csv (SEQ/truth)")->required();
   command->add_option("--run", options->run, "Folder that `railfix run --out` wrote")->required();
   command->add_option("--json", options->json, "Write all figures as JSON to this file, - = standard output alone");
-  command->add_option("--report", options->report, "Write a report with plots to this file (HTML)");
+  command->add_option("--report", options->report,
+                      "Write a report with plots to this file (HTML), another than that of --json");
   command->callback([options, &chosen] { chosen = [options] { return evaluate(*options); }; });
 }
 

@@ -109,15 +109,16 @@ void add_recording_export(CLI::App& recording, Action& chosen) {
       "run.mcap --gpx run.gpx --mp4 run.mp4");
   command->add_option("file", options->file, "The recording")->required();
   command->add_option("--csv", options->csv, "Folder for a table of each topic");
-  command->add_option("--gpx", options->gpx, "File for the track as GPX");
-  command->add_option("--geojson", options->geojson, "File for the track with its confidence intervals as GeoJSON");
+  command->add_option("--gpx", options->gpx, "File for the track as GPX; /dev/stdout = standard output");
+  command->add_option("--geojson", options->geojson,
+                      "File for the track with its confidence intervals as GeoJSON, as --gpx");
   command->add_option("--mp4", options->mp4, "File for the film");
   command->add_option("--topics", options->topics, "Only tables of these, separated by commas")->delimiter(',');
   command->add_option("--camera", options->video.camera, "Camera of the film; the first one that has pictures");
   command->add_option("--fps", options->video.fps, "Frames a second of the film; as the pictures come")
       ->check(number_between(1.0, 120.0));
   command->add_option("--from", options->from_s, "Seconds into the recording")->check(not_negative());
-  command->add_option("--to", options->to_s, "Seconds into the recording")->check(not_negative());
+  command->add_option("--to", options->to_s, "Seconds into the recording, behind --from")->check(not_negative());
   command->callback([options, &chosen] { chosen = [options] { return run(*options); }; });
 }
 

@@ -140,6 +140,17 @@ TEST_F(Export, TablesHaveAColumnForEachMember) {
   EXPECT_TRUE(fs::exists(folder_ / "csv" / "camera_frame_cam0.csv"));
 }
 
+TEST_F(Export, TablesThatAreCutAreNamed) {
+  const auto folder = folder_ / "csv";
+  fs::create_directories(folder);
+  fs::create_symlink("/dev/full", folder / "train_state.csv");
+  const auto exported = recording({"export", file().string(), "--csv", folder.string()});
+  EXPECT_EQ(exported.exit_code, 2) << exported.out;
+  EXPECT_THAT(exported.err, HasSubstr("the tables in " + folder.string() + " are cut: cannot write " +
+                                      (folder / "train_state.csv").string() +
+                                      " to its end (No space left on device); make space there"));
+}
+
 TEST_F(Export, MapsGetTheTrackWithItsConfidence) {
   const auto gpx = folder_ / "ride.gpx";
   const auto geojson = folder_ / "ride.geojson";
