@@ -22,7 +22,7 @@ struct Options {
 int evaluate(const Options& options) {
   if (options.json != "-") check_output("--json", options.json, {options.truth, options.run});
   check_output("--report", options.report, {options.truth, options.run});
-  check_different({{"--json", options.json}, {"--report", options.report}});
+  check_different({{"--json", options.json == "-" ? "/dev/stdout" : options.json}, {"--report", options.report}});
   const auto truth = core::value_or_throw(evaluation::Truth::read(options.truth));
   const auto run = core::value_or_throw(evaluation::read_run(options.run));
   core::ok_or_throw(evaluation::check_times(truth, run));

@@ -57,6 +57,7 @@ TEST_F(EvaluateCommand, LooksForTheFoldersBeforeItWorks) {
 TEST_F(EvaluateCommand, RefusesOneNameForTwoFiles) {
   refuses({"--report", root_ / "same", "--json", root_ / "same"}, "--json and --report are both ");
   EXPECT_FALSE(fs::exists(root_ / "same"));
+  refuses({"--report", "/dev/stdout", "--json", "-"}, "--json and --report are both ");
 }
 
 TEST_F(EvaluateCommand, TellsBesideWhatItWritesToStandardOutput) {
