@@ -30,8 +30,9 @@ bool lies_in(const fs::path& file, const fs::path& folder) {
 bool is_same(const fs::path& a, const fs::path& b) {
   std::error_code failed;
   if (fs::equivalent(a, b, failed)) return true;
-  const auto place = fs::weakly_canonical(a, failed);
-  return !failed && place == fs::weakly_canonical(b, failed);
+  // Of a relative name that is not there weakly_canonical() leaves the folder out.
+  const auto place = fs::weakly_canonical(fs::absolute(a), failed);
+  return !failed && place == fs::weakly_canonical(fs::absolute(b), failed);
 }
 
 bool is_standard_output(const fs::path& file) {
