@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "core/whole_file.hpp"
+
 namespace railfix::core {
 namespace {
 
@@ -117,7 +119,7 @@ Error CsvReader::error(const std::string& what) const {
 }
 
 CsvWriter::CsvWriter(const std::filesystem::path& file, const std::string& header) : file_(file), stream_(file) {
-  if (!stream_) throw BadInput(file.string() + " cannot be written; check the folder and its permissions");
+  if (!stream_) throw BadInput(cannot_write(file.string()));
   stream_ << header << '\n';
 }
 
@@ -166,9 +168,8 @@ void CsvWriter::end_row() {
 }
 
 Status CsvWriter::close() {
-  stream_.close();
-  if (!stream_) return Error{file_.string() + " could not be written completely; is the disk full?"};
-  return {};
+  stream_.close();  // tries once more where writing failed, and so gives the reason
+  return stream_ ? Status() : cannot_write(file_.string() + " to its end");
 }
 
 }  // namespace railfix::core

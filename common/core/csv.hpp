@@ -69,6 +69,8 @@ class CsvWriter {
   CsvWriter& operator<<(const char* value) { return *this << std::string_view(value); }
   CsvWriter& empty();
   void end_row();
+  /// False: something was lost already, as close() will say.
+  [[nodiscard]] bool whole() const { return stream_.good(); }
   /// Flushes; an error (disk full) is a sentence.
   Status close();
 

@@ -1,9 +1,16 @@
 #include "core/whole_file.hpp"
 
+#include <fcntl.h>
+#include <linux/magic.h>
+#include <poll.h>
+#include <sys/stat.h>
+#include <sys/vfs.h>
 #include <unistd.h>
 
 #include <array>
 #include <cerrno>
+#include <charconv>
+#include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <optional>
@@ -12,25 +19,108 @@ namespace railfix::core {
 
 namespace {
 
-/// Where the links at this place lead, whether or not there is something yet; nothing where no file may be put.
-std::optional<std::filesystem::path> place_of(std::filesystem::path file) {
-  namespace fs = std::filesystem;
-  // The kernel follows the links first: it knows of circles, and refuses another user's link in a folder for everybody.
+namespace fs = std::filesystem;
+
+/// The links in /proc/PID/fd, where /dev/stdout and /dev/fd lead: what is read there is the name that an open file once
+/// had, which may be another file's by now, or be none.
+bool is_open_file(const fs::path& file) {
+  const auto folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
+  struct statfs system {};
+  return statfs(folder.c_str(), &system) == 0 && system.f_type == PROC_SUPER_MAGIC;
+}
+
+/// Where the links at this place lead, whether or not there is something yet. REQUIRES: they lead in no circle.
+fs::path place_of(fs::path file) {
   std::error_code failed;
-  const auto there = fs::status(file, failed).type();
-  if (there != fs::file_type::not_found && there != fs::file_type::regular) return std::nullopt;
-  while (fs::is_symlink(fs::symlink_status(file, failed))) {
-    const auto target = fs::read_symlink(file, failed);
-    if (failed) return std::nullopt;
-    file = file.parent_path() / target;
-  }
+  while (!is_open_file(file) && fs::is_symlink(fs::symlink_status(file, failed)))
+    file = file.parent_path() / fs::read_symlink(file, failed);
   return file;
+}
+
+std::optional<int> own_descriptor(const fs::path& file) {
+  std::error_code failed;
+  if (!is_open_file(file) || !fs::equivalent(file.parent_path(), "/proc/self/fd", failed)) return std::nullopt;
+  const auto name = file.filename().string();
+  int descriptor = -1;
+  const auto [end, code] = std::from_chars(name.data(), name.data() + name.size(), descriptor);
+  return code == std::errc{} && end == name.data() + name.size() ? std::optional(descriptor) : std::nullopt;
+}
+
+/// Closes it also where writing failed, and keeps errno of the first failure.
+bool close_written(int out, bool written) {
+  const int reason = errno;
+  if (close(out) != 0 && written) return false;
+  errno = reason;
+  return written;
+}
+
+/// False: errno says why.
+bool write_into(const fs::path& file, const std::string& bytes) {
+  // Opened once more it would begin at its front and forget that the shell appends.
+  if (const auto ours = own_descriptor(file)) {
+    const bool in_order = *ours != STDOUT_FILENO || std::fflush(stdout) == 0;
+    return in_order && write_all(*ours, std::as_bytes(std::span(bytes)));
+  }
+  const int out = open(file.c_str(), O_WRONLY | O_APPEND | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+  return out >= 0 && close_written(out, write_all(out, std::as_bytes(std::span(bytes))));
+}
+
+/// Its owner as far as we may give files away, and its rights.
+void take_after(const struct stat& old, int out) {
+  // Of another user's file the group at least, which may be one of ours.
+  [[maybe_unused]] const bool given =
+      fchown(out, old.st_uid, old.st_gid) == 0 || fchown(out, static_cast<uid_t>(-1), old.st_gid) == 0;
+  fchmod(out, old.st_mode & 0777U);
+}
+
+/// False: errno says why. `old` is what is there.
+bool replace(const fs::path& file, const struct stat* old, const std::string& bytes) {
+  if (old != nullptr && access(file.c_str(), W_OK) != 0) return false;  // rename() would not mind
+  const std::string draft = file.string() + "." + std::to_string(getpid());
+  unlink(draft.c_str());  // of a process with our number that was killed
+  const int out =
+      open(draft.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, old != nullptr ? old->st_mode & 0777U : 0666U);
+  if (out < 0) return false;
+  if (old != nullptr) take_after(*old, out);
+  if (close_written(out, write_all(out, std::as_bytes(std::span(bytes)))) && rename(draft.c_str(), file.c_str()) == 0)
+    return true;
+  const int reason = errno;
+  unlink(draft.c_str());
+  errno = reason;
+  return false;
+}
+
+const char* remedy(int reason) {
+  switch (reason) {
+    case ENOENT:
+    case ENOTDIR:
+      return "does its folder exist?";
+    case EACCES:
+    case EPERM:
+      return "give a place where you may write";
+    case ENOSPC:
+    case EDQUOT:
+      return "make space there";
+    case EISDIR:
+      return "give the name of a file";
+    case ENAMETOOLONG:
+      return "give a shorter name";
+    case ENXIO:
+      return "does anybody read there?";
+    default:
+      return "give another place";
+  }
 }
 
 }  // namespace
 
 Error cannot_read(const std::string& name) {
   return {"cannot read " + name + " (" + std::strerror(errno) + "); is the path right?"};
+}
+
+Error cannot_write(const std::string& name) {
+  const int reason = errno;
+  return {"cannot write " + name + " (" + std::strerror(reason) + "); " + remedy(reason)};
 }
 
 Result<std::string> read_whole(const std::filesystem::path& file) {
@@ -48,18 +138,32 @@ Result<std::string> read_whole(std::istream& stream, const std::string& name) {
   return text;
 }
 
-bool write_whole(const std::filesystem::path& file, const std::string& bytes) {
+bool write_all(int descriptor, std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t count = write(descriptor, bytes.data(), bytes.size());
+    if (count >= 0) {
+      bytes = bytes.subspan(static_cast<size_t>(count));
+    } else if (errno == EAGAIN) {
+      pollfd room{descriptor, POLLOUT, 0};
+      poll(&room, 1, -1);
+    } else if (errno != EINTR) {
+      return false;
+    }
+  }
+  return true;
+}
+
+Status write_whole(const std::filesystem::path& file, const std::string& bytes) {
+  struct stat old {};
+  // The kernel follows the links first: it knows of circles, and refuses another user's link in a folder for everybody.
+  const bool there = stat(file.c_str(), &old) == 0;
+  if (!there && errno != ENOENT) return cannot_write(file.string());
   const auto place = place_of(file);
-  if (!place) return false;
-  const std::string draft = place->string() + "." + std::to_string(getpid());
-  std::ofstream out(draft, std::ios::binary);
-  const bool written = out && out.write(bytes.data(), static_cast<std::streamsize>(bytes.size())).flush();
-  out.close();
-  std::error_code failed;
-  if (written) std::filesystem::rename(draft, *place, failed);
-  if (written && !failed) return true;
-  std::filesystem::remove(draft, failed);
-  return false;
+  const bool written = is_open_file(place) || (there && !S_ISREG(old.st_mode))
+                           ? write_into(place, bytes)
+                           : replace(place, there ? &old : nullptr, bytes);
+  if (!written) return cannot_write(file.string());
+  return {};
 }
 
 }  // namespace railfix::core

@@ -1,8 +1,10 @@
 // A file as one text: read whole, or written so that others may read it at any time.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <istream>
+#include <span>
 #include <string>
 
 #include "core/result.hpp"
@@ -17,9 +19,15 @@ Result<std::string> read_whole(const std::filesystem::path& file);
 /// What is left of it; an error calls it `name`.
 Result<std::string> read_whole(std::istream& stream, const std::string& name);
 
+/// The same for one that cannot be written, with what to do about that reason.
+Error cannot_write(const std::string& name);
+/// Waits for a reader. False: errno says why it is not all there.
+[[nodiscard]] bool write_all(int descriptor, std::span<const std::byte> bytes);
+
 /// Writes beside the file's place and moves it there, so that nobody ever reads half of it, and of two processes that
-/// write it at once one wins. A link stays and its target is written. False: what was there is as it was, and always so
-/// where that is no regular file. Does not wait for the disk: it is for run loops, too.
-[[nodiscard]] bool write_whole(const std::filesystem::path& file, const std::string& bytes);
+/// write it at once one wins; owner and rights stay. A link stays and its target is written. An error names the file,
+/// and what was there is as it was. What is no regular file (a pipe, a device) or is open already (/dev/stdout,
+/// /dev/fd/N) is written into as it is, and waited for. Does not wait for the disk: it is for run loops, too.
+Status write_whole(const std::filesystem::path& file, const std::string& bytes);
 
 }  // namespace railfix::core

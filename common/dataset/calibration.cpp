@@ -184,9 +184,7 @@ Status write_calibration(const std::filesystem::path& file, const CameraCalibrat
   }
   if (calibration.mount) write_pose(stream, "mount", *calibration.mount);
   if (calibration.mount_sigma) write_pose(stream, "mount_sigma", *calibration.mount_sigma);
-  if (core::write_whole(file, stream.str())) return {};
-  return Error{file.string() +
-               " cannot be written; what was there is as it was. Is the folder there, writable, not full?"};
+  return core::write_whole(file, stream.str());
 }
 
 Result<std::optional<CameraCalibration>> find_calibration(const std::filesystem::path& pictures) {

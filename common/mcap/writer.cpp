@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "core/time.hpp"
+#include "core/whole_file.hpp"
 
 namespace railfix::mcap {
 
@@ -19,17 +20,6 @@ constexpr size_t kMostIds = 65535;
 
 core::Error io_error(const std::string& what, const std::filesystem::path& file) {
   return core::Error{file.string() + ": " + what + " (" + std::strerror(errno) + ")"};
-}
-
-/// All bytes or an error.
-bool write_all(int descriptor, ByteView bytes) {
-  while (!bytes.empty()) {
-    const ssize_t written = ::write(descriptor, bytes.data(), bytes.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) return false;
-    bytes = bytes.subspan(static_cast<size_t>(written));
-  }
-  return true;
 }
 
 /// The folder's entry of a new or renamed file reaches the disk only with the folder.
@@ -83,7 +73,7 @@ Writer::~Writer() {
 
 core::Status Writer::put(ByteView bytes) {
   if (descriptor_ < 0) return core::Error{file_.string() + " is closed already"};
-  if (!write_all(descriptor_, bytes)) {
+  if (!core::write_all(descriptor_, std::as_bytes(bytes))) {
     const core::Error error = io_error("cannot be written; is the disk full?", active_);
     (void)wait_for_sync();
     // Half a record would hide everything behind it.

@@ -339,9 +339,7 @@ core::Status Map::save(const std::filesystem::path& file) const {
     return core::Error{"the map " + file.string() + " cannot be stored: " + status.error().message +
                        "; is a coordinate of its source wrong?"};
 
-  if (core::write_whole(file, out.SerializeAsString())) return {};
-  return core::Error{"cannot write the map " + file.string() +
-                     "; does the folder exist, is there space, and is it no folder or device itself?"};
+  return core::write_whole(file, out.SerializeAsString());
 }
 
 }  // namespace railfix::track

@@ -91,8 +91,9 @@ void ScaleFile::write(const OdometerScales& learnt, int64_t stamp_ns) {
   written_ns_ = stamp_ns;
   SavedScales saved{learnt, stamp_ns, "", pulses_per_metre_};
   for (const auto& [name, numbers] : cameras_) saved.camera_id += (saved.camera_id.empty() ? "" : " ") + name + numbers;
-  if (core::write_whole(path_, to_text(saved)) || failure_told_) return;
-  log_.warn("fusion.scales_file: {} cannot be written; name a file in a folder that there is", path_.string());
+  const auto status = core::write_whole(path_, to_text(saved));
+  if (status.ok() || failure_told_) return;
+  log_.warn("fusion.scales_file: {}", status.error().message);
   failure_told_ = true;
 }
 

@@ -163,8 +163,7 @@ void draw(const std::string& file, cv::Mat colour, const dataset::Picture& pictu
   track_detector::TrackDetector detector(lens, mount, options);
   track_detector::draw_track(colour, lens, detector.detect(picture.grey), gauge_m);
   draw_mount(colour, geometry::View(lens, mount), gauge_m);
-  if (!write_picture(file, colour))
-    throw core::BadInput("cannot write " + file + ": give a .png in a folder that exists");
+  core::ok_or_throw(write_picture(file, colour));
 }
 
 void print_roll(const geometry::CameraPose& mount, const Roll& roll) {
@@ -223,7 +222,8 @@ int calibrate_mount(const MountArguments& arguments) {
   const std::string& path = arguments.pictures.empty() ? arguments.video : arguments.pictures;
   // It may be that of --camera, to whose lens the mount is added, or that of an earlier time beside the pictures.
   check_output("--out", arguments.out, {arguments.video});
-  check_output("--draw", arguments.draw, {path, arguments.camera, arguments.out});
+  check_output("--draw", arguments.draw, {path, arguments.camera});
+  check_different({{"--out", arguments.out}, {"--draw", arguments.draw}});
   const auto pictures = load_pictures(path, arguments.json);
   const Roll roll = arguments.roll_from_imu ? roll_from_gravity(path) : Roll{};
   std::string remark;

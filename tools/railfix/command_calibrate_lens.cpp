@@ -141,7 +141,8 @@ int calibrate(LensArguments arguments) {
   }
   parse_board(arguments, arguments.board);
   check_output("--out", arguments.out, {});  // what an older file knows of the mount stays
-  check_output("--draw", arguments.draw, {arguments.pictures, arguments.out});
+  check_output("--draw", arguments.draw, {arguments.pictures});
+  check_different({{"--out", arguments.out}, {"--draw", arguments.draw}});
   const auto finder = core::value_or_throw(BoardFinder::make(arguments.board));
   const Boards boards = arguments.live.empty() ? from_recording(arguments, finder) : from_camera(arguments, finder);
   const auto found = calibrate_lens(boards.views, boards.size);
@@ -154,9 +155,7 @@ int calibrate(LensArguments arguments) {
   const std::string drawn = arguments.draw.empty()
                                 ? std::filesystem::path(arguments.out).replace_extension(".lens.png").string()
                                 : arguments.draw;
-  if (!write_picture(drawn, draw_lens(found.value(), boards.picture, boards.views[boards.pictured]))) {
-    throw core::BadInput("cannot write " + drawn + ": give --draw a .png in a folder that exists");
-  }
+  core::ok_or_throw(write_picture(drawn, draw_lens(found.value(), boards.picture, boards.views[boards.pictured])));
   if (arguments.json) {
     std::cout << to_json(found.value(), boards).dump(2) << '\n';
     return 0;

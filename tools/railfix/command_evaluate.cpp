@@ -19,29 +19,26 @@ struct Options {
   std::string report;
 };
 
-void write_file(const std::string& name, const std::string& content) {
-  if (!core::write_whole(name, content))
-    throw core::BadInput(name + " cannot be written; check its folder, the permissions and the space on the disk");
-}
-
 int evaluate(const Options& options) {
   if (options.json != "-") check_output("--json", options.json, {options.truth, options.run});
   check_output("--report", options.report, {options.truth, options.run});
+  check_different({{"--json", options.json == "-" ? "/dev/stdout" : options.json}, {"--report", options.report}});
   const auto truth = core::value_or_throw(evaluation::Truth::read(options.truth));
   const auto run = core::value_or_throw(evaluation::read_run(options.run));
   core::ok_or_throw(evaluation::check_times(truth, run));
   const auto result = evaluation::evaluate(truth, run);
   if (!options.report.empty()) {
     const auto name = std::filesystem::absolute(options.run + "/").parent_path().filename().string();
-    write_file(options.report, evaluation::html_report(truth, result, name));
+    core::ok_or_throw(core::write_whole(options.report, evaluation::html_report(truth, result, name)));
   }
   const std::string json = evaluation::to_json(result).dump(2) + "\n";
   if (options.json == "-") {
     std::cout << json;
-  } else {
-    evaluation::print(result, std::cout);
-    if (!options.json.empty()) write_file(options.json, json);
+    return 0;
   }
+  if (!options.json.empty()) core::ok_or_throw(core::write_whole(options.json, json));
+  say_beside({options.report, options.json});
+  evaluation::print(result, std::cout);
   return 0;
 }
 
@@ -54,7 +51,8 @@ void add_evaluate(CLI::App& app, Action& chosen) {
   command->add_option("--truth", options->truth, "Folder with track.csv and landmarks.csv (SEQ/truth)")->required();
   command->add_option("--run", options->run, "Folder that `railfix run --out` wrote")->required();
   command->add_option("--json", options->json, "Write all figures as JSON to this file, - = standard output alone");
-  command->add_option("--report", options->report, "Write a report with plots to this file (HTML)");
+  command->add_option("--report", options->report,
+                      "Write a report with plots to this file (HTML), another than that of --json");
   command->callback([options, &chosen] { chosen = [options] { return evaluate(*options); }; });
 }
 

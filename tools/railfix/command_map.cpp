@@ -36,6 +36,7 @@ int build(const BuildRequest& request) {
   check_output("--out", request.out, inputs);
   const track::BuiltMap built = core::value_or_throw(track::build_map(inputs, request.options));
   core::ok_or_throw(built.map.save(request.out));
+  say_beside({request.out});
   if (request.as_json) {
     ordered_json json{{"out", request.out},
                       {"edges", built.map.edges.size()},
@@ -169,6 +170,7 @@ void add_make(CLI::App& map, Action& chosen) {
       check_output("--out", request->out, {});
       const track::Map made = track::made_network(request->options);
       core::ok_or_throw(made.save(request->out));
+      say_beside({request->out});
       print_summary(made);
       std::printf("written          %s\n", request->out.c_str());
       return 0;

@@ -1,17 +1,16 @@
 // `railfix recording export`.
-#include <cmath>
 #include <iostream>
 #include <limits>
 #include <memory>
 
 #include "command_recording.hpp"
-#include "core/time.hpp"
 #include "not_negative.hpp"
 #include "number_between.hpp"
 #include "output_file.hpp"
 #include "recording/export_csv.hpp"
 #include "recording/export_track.hpp"
 #include "recording/export_video.hpp"
+#include "recording/part_in_time.hpp"
 
 namespace railfix::tool {
 
@@ -32,10 +31,7 @@ struct Options {
 };
 
 mcap::Selection part_of(const mcap::Reader& reader, const Options& options) {
-  mcap::Selection part;
-  const int64_t start_ns = reader.statistics().start_ns;
-  part.from_ns = start_ns + core::to_ns(options.from_s);
-  if (std::isfinite(options.to_s)) part.to_ns = start_ns + core::to_ns(options.to_s);
+  auto part = core::value_or_throw(part_in_time(reader, options.from_s, options.to_s));
   for (const auto& [id, channel] : reader.channels()) {
     for (const auto& name : options.topics) {
       if (channel.topic == name || channel.topic.starts_with(name + "/")) part.topics.insert(channel.topic);
@@ -62,6 +58,7 @@ void write_tracks(mcap::Reader& reader, const mcap::Selection& part, const Optio
   };
   if (!options.gpx.empty()) core::ok_or_throw(write_gpx(track, options.gpx));
   if (!options.geojson.empty()) core::ok_or_throw(write_geojson(track, options.geojson));
+  say_beside({options.gpx, options.geojson});
   for (const auto& file : {options.gpx, options.geojson}) {
     if (!file.empty())
       std::cout << file.string() << ": " << points(track.train) << " places of the train, " << points(track.gnss)
@@ -81,6 +78,7 @@ void check_outputs(const Options& options) {
   check_output("--gpx", options.gpx, {options.file});
   check_output("--geojson", options.geojson, {options.file});
   check_output("--mp4", options.mp4, {options.file});
+  check_different({{"--gpx", options.gpx}, {"--geojson", options.geojson}, {"--mp4", options.mp4}});
   if (!options.csv.empty() && fs::exists(options.csv / "run.yaml")) {
     throw core::BadInput("--csv " + options.csv.string() +
                          " is the folder of a run, whose tables have the same names; give another folder");
@@ -94,8 +92,8 @@ int run(const Options& options) {
   check_outputs(options);
   const auto reader = core::value_or_throw(mcap::Reader::open(options.file));
   const auto part = part_of(*reader, options);
+  if (!options.gpx.empty() || !options.geojson.empty()) write_tracks(*reader, part, options);  // may be all of stdout
   if (!options.csv.empty()) write_tables(*reader, part, options.csv);
-  if (!options.gpx.empty() || !options.geojson.empty()) write_tracks(*reader, part, options);
   if (!options.mp4.empty()) write_film(*reader, part, options);
   for (const auto& problem : reader->problems()) std::cerr << problem << '\n';
   return 0;
@@ -111,15 +109,16 @@ void add_recording_export(CLI::App& recording, Action& chosen) {
       "run.mcap --gpx run.gpx --mp4 run.mp4");
   command->add_option("file", options->file, "The recording")->required();
   command->add_option("--csv", options->csv, "Folder for a table of each topic");
-  command->add_option("--gpx", options->gpx, "File for the track as GPX");
-  command->add_option("--geojson", options->geojson, "File for the track with its confidence intervals as GeoJSON");
+  command->add_option("--gpx", options->gpx, "File for the track as GPX; /dev/stdout = standard output");
+  command->add_option("--geojson", options->geojson,
+                      "File for the track with its confidence intervals as GeoJSON, as --gpx");
   command->add_option("--mp4", options->mp4, "File for the film");
   command->add_option("--topics", options->topics, "Only tables of these, separated by commas")->delimiter(',');
   command->add_option("--camera", options->video.camera, "Camera of the film; the first one that has pictures");
   command->add_option("--fps", options->video.fps, "Frames a second of the film; as the pictures come")
       ->check(number_between(1.0, 120.0));
   command->add_option("--from", options->from_s, "Seconds into the recording")->check(not_negative());
-  command->add_option("--to", options->to_s, "Seconds into the recording")->check(not_negative());
+  command->add_option("--to", options->to_s, "Seconds into the recording, behind --from")->check(not_negative());
   command->callback([options, &chosen] { chosen = [options] { return run(*options); }; });
 }
 

@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <cerrno>
+#include <cstdio>
 #include <exception>
 #include <iostream>
 #include <string>
@@ -7,6 +9,7 @@
 #include "commands.hpp"
 #include "core/result.hpp"
 #include "core/similar_names.hpp"
+#include "core/whole_file.hpp"
 
 namespace {
 
@@ -53,9 +56,7 @@ std::vector<std::string> words_of(const CLI::App& app, int argc, char** argv) {
   return words;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run(int argc, char** argv) {
   using namespace railfix::tool;
   CLI::App app{
       "Railfix: where the train is, from a camera. `railfix COMMAND --help` explains a command with an example.",
@@ -93,4 +94,23 @@ int main(int argc, char** argv) {
     std::cerr << "railfix: the work failed: " << error.what() << '\n';
     return kWorkFailed;
   }
+}
+
+/// The exit code, and a sentence where standard output did not take everything: what is written there waits in buffers,
+/// so that no command sees a full disk.
+int with_all_told(int exit_code) {
+  const bool lost = std::ferror(stdout) != 0;
+  if (lost) std::putchar('\n');  // nobody kept the reason: the system gives it again to the next who writes
+  errno = 0;
+  if (std::fflush(stdout) == 0 && !lost) return exit_code;
+  if (errno == EPIPE) return exit_code;  // who read has seen enough
+  if (errno == 0) errno = EIO;
+  std::cerr << "railfix: " << railfix::core::cannot_write("to standard output").message << '\n';
+  return exit_code == 0 ? kWorkFailed : exit_code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return with_all_told(run(argc, argv));
 }

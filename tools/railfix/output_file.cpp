@@ -1,7 +1,11 @@
 #include "output_file.hpp"
 
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
+#include <cstdio>
 
 #include "core/result.hpp"
 
@@ -22,6 +26,22 @@ bool lies_in(const fs::path& file, const fs::path& folder) {
   return !failed && !from_there.empty() && *from_there.begin() != "..";
 }
 
+/// Also where neither is there yet.
+bool is_same(const fs::path& a, const fs::path& b) {
+  std::error_code failed;
+  if (fs::equivalent(a, b, failed)) return true;
+  // Of a relative name that is not there weakly_canonical() leaves the folder out.
+  const auto place = fs::weakly_canonical(fs::absolute(a), failed);
+  return !failed && place == fs::weakly_canonical(fs::absolute(b), failed);
+}
+
+bool is_standard_output(const fs::path& file) {
+  struct stat one {};
+  struct stat other {};
+  return stat(file.c_str(), &one) == 0 && fstat(STDOUT_FILENO, &other) == 0 && one.st_dev == other.st_dev &&
+         one.st_ino == other.st_ino;
+}
+
 }  // namespace
 
 void check_output(const std::string& option, const fs::path& out, const std::vector<fs::path>& inputs) {
@@ -39,6 +59,22 @@ void check_output(const std::string& option, const fs::path& out, const std::vec
     if (is_data(out) && fs::is_directory(input, failed) && lies_in(out, input))
       throw core::BadInput(what + " belongs to " + input.string() + ", which is read; give another name");
   }
+}
+
+void check_different(const std::vector<Output>& outputs) {
+  for (auto second = outputs.begin(); second != outputs.end(); ++second) {
+    for (auto first = outputs.begin(); first != second; ++first) {
+      if (!first->file.empty() && !second->file.empty() && is_same(first->file, second->file))
+        throw core::BadInput(first->option + " and " + second->option + " are both " + second->file.string() +
+                             "; give each a file of its own");
+    }
+  }
+}
+
+void say_beside(const std::vector<fs::path>& outputs) {
+  if (std::ranges::none_of(outputs, is_standard_output)) return;
+  std::fflush(stdout);
+  dup2(STDERR_FILENO, STDOUT_FILENO);
 }
 
 }  // namespace railfix::tool

@@ -12,4 +12,15 @@ namespace railfix::tool {
 void check_output(const std::string& option, const std::filesystem::path& out,
                   const std::vector<std::filesystem::path>& inputs);
 
+struct Output {
+  std::string option;
+  std::filesystem::path file;
+};
+/// Throws BadInput where two of them are one file, and the second would take the first one's place.
+void check_different(const std::vector<Output>& outputs);
+
+/// Once the files are written: where one of them was standard output itself (/dev/stdout), what the command has to say
+/// from now on goes to standard error, so that who reads has the file alone.
+void say_beside(const std::vector<std::filesystem::path>& outputs);
+
 }  // namespace railfix::tool

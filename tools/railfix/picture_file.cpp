@@ -8,13 +8,14 @@
 
 namespace railfix::tool {
 
-bool write_picture(const std::filesystem::path& file, const cv::Mat& picture) {
+core::Status write_picture(const std::filesystem::path& file, const cv::Mat& picture) {
   std::vector<uchar> bytes;
+  bool known = false;
   try {
-    if (!cv::imencode(file.extension().string(), picture, bytes)) return false;
+    known = cv::imencode(file.extension().string(), picture, bytes);
   } catch (const cv::Exception&) {
-    return false;
   }
+  if (!known) return core::Error{"cannot write " + file.string() + " as a picture; end its name in .png"};
   return core::write_whole(file, {bytes.begin(), bytes.end()});
 }
 

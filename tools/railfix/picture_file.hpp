@@ -4,9 +4,11 @@
 #include <filesystem>
 #include <opencv2/core.hpp>
 
+#include "core/result.hpp"
+
 namespace railfix::tool {
 
-/// As core::write_whole(), in the format of the name's ending (.png, .jpg, ...). False also where there is none of it.
-[[nodiscard]] bool write_picture(const std::filesystem::path& file, const cv::Mat& picture);
+/// As core::write_whole(), in the format of the name's ending (.png, .jpg, ...). Error also where there is none of it.
+core::Status write_picture(const std::filesystem::path& file, const cv::Mat& picture);
 
 }  // namespace railfix::tool

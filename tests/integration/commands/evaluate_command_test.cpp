@@ -54,5 +54,18 @@ TEST_F(EvaluateCommand, LooksForTheFoldersBeforeItWorks) {
   EXPECT_FALSE(fs::exists(root_ / "report.html"));
 }
 
+TEST_F(EvaluateCommand, RefusesOneNameForTwoFiles) {
+  refuses({"--report", root_ / "same", "--json", root_ / "same"}, "--json and --report are both ");
+  EXPECT_FALSE(fs::exists(root_ / "same"));
+  refuses({"--report", "/dev/stdout", "--json", "-"}, "--json and --report are both ");
+}
+
+TEST_F(EvaluateCommand, TellsBesideWhatItWritesToStandardOutput) {
+  const auto piped = evaluate({"--json", "/dev/stdout"});
+  EXPECT_EQ(piped.exit_code, 0) << piped.err;
+  EXPECT_EQ(piped.out, evaluate({"--json", "-"}).out);
+  EXPECT_EQ(piped.err, evaluate({}).out);
+}
+
 }  // namespace
 }  // namespace railfix

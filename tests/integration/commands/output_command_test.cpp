@@ -1,4 +1,6 @@
 // Commands that read pictures or recordings never write over them.
+#include <csignal>
+
 #include "core/whole_file.hpp"
 #include "integration/commands/refusal.hpp"
 #include "unit/dataset/temporary_folder.hpp"
@@ -42,6 +44,20 @@ TEST_F(OutputCommand, RunDrawsIntoNoFolderOfPictures) {
   }
   EXPECT_EQ(text_of("seq/mav0/cam0/data/0001.jpg"), "a picture");
   EXPECT_FALSE(std::filesystem::exists(path("out")));
+}
+
+TEST(StandardOutput, IsMissedWhereItIsFullAndNotWhereNobodyReadsOn) {
+  const auto shell = [](const std::string& command) {
+    return test::run_program({"/bin/bash", "-c", std::string(RAILFIX_BIN_DIR) + "/railfix " + command}, kPatienceS);
+  };
+  for (const char* command : {"--version", "map --help", "tpr encode --help"}) {
+    const auto full = shell(std::string(command) + " > /dev/full");
+    EXPECT_EQ(full.exit_code, 1) << command;
+    EXPECT_EQ(full.err, "railfix: cannot write to standard output (No space left on device); make space there\n");
+    const auto ignored = shell(std::string(command) + " | true; exit ${PIPESTATUS[0]}");
+    EXPECT_THAT(ignored.exit_code, ::testing::AnyOf(0, 128 + SIGPIPE));
+    EXPECT_EQ(ignored.err, "");
+  }
 }
 
 }  // namespace

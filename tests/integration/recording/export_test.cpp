@@ -140,6 +140,17 @@ TEST_F(Export, TablesHaveAColumnForEachMember) {
   EXPECT_TRUE(fs::exists(folder_ / "csv" / "camera_frame_cam0.csv"));
 }
 
+TEST_F(Export, TablesThatAreCutAreNamed) {
+  const auto folder = folder_ / "csv";
+  fs::create_directories(folder);
+  fs::create_symlink("/dev/full", folder / "train_state.csv");
+  const auto exported = recording({"export", file().string(), "--csv", folder.string()});
+  EXPECT_EQ(exported.exit_code, 2) << exported.out;
+  EXPECT_THAT(exported.err, HasSubstr("the tables in " + folder.string() + " are cut: cannot write " +
+                                      (folder / "train_state.csv").string() +
+                                      " to its end (No space left on device); make space there"));
+}
+
 TEST_F(Export, MapsGetTheTrackWithItsConfidence) {
   const auto gpx = folder_ / "ride.gpx";
   const auto geojson = folder_ / "ride.geojson";
@@ -164,7 +175,43 @@ TEST_F(Export, MapsGetTheTrackWithItsConfidence) {
 
   const auto nowhere = recording({"export", file().string(), "--gpx", gpx.string(), "--to", "0.1"});
   EXPECT_EQ(nowhere.exit_code, 2);
-  EXPECT_THAT(nowhere.err, HasSubstr("says nowhere where on the Earth the train was"));
+  EXPECT_THAT(nowhere.err, HasSubstr("does not say in this part where on the Earth the train was"));
+}
+
+TEST_F(Export, APartIsNamedThatTheRecordingHas) {
+  const auto refusal = [&](const std::vector<std::string>& part) {
+    std::vector<std::string> arguments{"export", file().string(), "--gpx", (folder_ / "part.gpx").string()};
+    arguments.insert(arguments.end(), part.begin(), part.end());
+    const auto refused = recording(arguments);
+    EXPECT_EQ(refused.exit_code, 2) << refused.out;
+    return refused.err;
+  };
+  EXPECT_THAT(refusal({"--from", "500"}), HasSubstr("there is nothing from 500 s to the end: "));
+  EXPECT_THAT(refusal({"--from", "50", "--to", "10"}), HasSubstr("--to 10 must lie behind --from 50"));
+}
+
+TEST_F(Export, StandardOutputHasTheTrackAlone) {
+  const auto to_stdout = recording({"export", file().string(), "--gpx", "/dev/stdout"});
+  EXPECT_EQ(to_stdout.exit_code, 0) << to_stdout.err;
+  EXPECT_THAT(to_stdout.out, ::testing::StartsWith("<?xml"));
+  EXPECT_THAT(to_stdout.out, ::testing::EndsWith("</gpx>\n"));
+  EXPECT_THAT(to_stdout.err, HasSubstr("/dev/stdout: 45 places of the train"));
+  const auto log = folder_ / "log";
+  std::ofstream(log) << "precious\n";
+  const std::string command = std::string(RAILFIX_BIN_DIR) + "/railfix recording export " + file().string();
+  const auto appended = test::run_program({"/bin/sh", "-c", command + " --gpx /dev/stdout >> " + log.string()}, 120);
+  EXPECT_EQ(appended.exit_code, 0) << appended.err;
+  EXPECT_EQ(test::slurp(log), "precious\n" + to_stdout.out);
+  const auto piped = test::run_program({"/bin/sh", "-c", command + " --gpx /dev/stdout | cat"}, 120);
+  EXPECT_EQ(piped.out, to_stdout.out);
+}
+
+TEST_F(Export, TwoFilesHaveTwoNames) {
+  const auto one = (folder_ / "one").string();
+  const auto refused = recording({"export", file().string(), "--gpx", one, "--geojson", (folder_ / "./one").string()});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("--gpx and --geojson are both "));
+  EXPECT_FALSE(fs::exists(one));
 }
 
 TEST_F(Export, NothingIsWrittenOverARecordingOrTheTablesOfARun) {

@@ -68,8 +68,10 @@ TEST(Drawing, TakesThePlaceOfTheOldOneAsAWhole) {
 TEST(Drawing, NamesWhatIsWrong) {
   const Drawing drawing = draw_map(track::small_map(), {});
   EXPECT_THAT(write_drawing(drawing, "a.gif").error().message, HasSubstr(".svg or .png"));
-  EXPECT_THAT(write_drawing(drawing, "/no/such/folder/a.png").error().message, HasSubstr("does the folder exist"));
-  EXPECT_THAT(write_drawing(drawing, "/no/such/folder/a.svg").error().message, HasSubstr("does the folder exist"));
+  EXPECT_THAT(write_drawing(drawing, "/no/such/folder/a.png").error().message,
+              HasSubstr("(No such file or directory); does its folder exist?"));
+  EXPECT_THAT(write_drawing(drawing, "/no/such/folder/a.svg").error().message,
+              HasSubstr("(No such file or directory); does its folder exist?"));
 }
 
 }  // namespace

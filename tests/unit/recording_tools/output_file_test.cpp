@@ -50,5 +50,20 @@ TEST_F(OutputFile, HasAFolderAndIsNone) {
   EXPECT_THAT(refusal(root_, {}), HasSubstr("is a folder"));
 }
 
+TEST_F(OutputFile, OfAnotherKindHasAnotherName) {
+  fs::create_symlink(write("there", ""), root_ / "link");
+  for (const auto& [a, b] : {std::pair(root_ / "new", root_ / "./new"),
+                             {root_ / "there", root_ / "link"},
+                             {fs::path("none.gpx"), fs::path("./none.gpx")}}) {
+    try {
+      check_different({{"--json", a}, {"--csv", ""}, {"--report", b}});
+      ADD_FAILURE() << a;
+    } catch (const core::BadInput& bad) {
+      EXPECT_EQ(bad.what(), "--json and --report are both " + b.string() + "; give each a file of its own");
+    }
+  }
+  check_different({{"--json", root_ / "new"}, {"--report", root_ / "other"}, {"--csv", ""}, {"--mp4", ""}});
+}
+
 }  // namespace
 }  // namespace railfix::tool

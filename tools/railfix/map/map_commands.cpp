@@ -32,6 +32,7 @@ int draw(DrawRequest request) {
   const track::Map map = core::value_or_throw(track::Map::load(request.map));
   if (request.at) request.options.around = core::value_or_throw(map.parse_position(*request.at));
   core::ok_or_throw(write_drawing(draw_map(map, request.options), request.out));
+  say_beside({request.out});
   std::printf("written          %s\n", request.out.c_str());
   return 0;
 }
@@ -123,6 +124,10 @@ int learn(const LearnRequest& request) {
   const auto map = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(request.map)));
   const auto sightings = core::value_or_throw(read_runs(map, {request.runs.begin(), request.runs.end()}));
   const Survey survey = survey_landmarks(*map, sightings, request.options);
+  track::Map updated = *map;
+  apply_survey(survey, updated);
+  core::ok_or_throw(updated.save(request.out));
+  say_beside({request.out});
   std::printf("sightings        %zu of %zu runs, %zu used, %zu outliers, %zu of things seen by fewer than %zu runs\n",
               sightings.size(), request.runs.size(), survey.sightings, survey.outliers, survey.left_alone,
               request.options.least_runs);
@@ -139,9 +144,6 @@ int learn(const LearnRequest& request) {
                 mark.offset_m, mark.sigma_m, found.moved_m, found.runs, found.sightings,
                 found.known_id != 0 ? (std::to_string(found.known_id) + " " + mark.name).c_str() : "new");
   }
-  track::Map updated = *map;
-  apply_survey(survey, updated);
-  core::ok_or_throw(updated.save(request.out));
   std::printf("written          %s\n", request.out.c_str());
   return 0;
 }

@@ -108,18 +108,11 @@ cv::Mat picture_of(const Drawing& drawing) {
 
 core::Status write_drawing(const Drawing& drawing, const std::filesystem::path& file) {
   const std::string ending = file.extension().string();
-  bool written = false;
-  if (ending == ".svg") {
-    std::ostringstream text;
-    write_svg(drawing, text);
-    written = core::write_whole(file, text.str());
-  } else if (ending == ".png") {
-    written = write_picture(file, picture_of(drawing));
-  } else {
-    return core::Error{file.string() + " must end in .svg or .png"};
-  }
-  if (written) return {};
-  return core::Error{"cannot write " + file.string() + "; does the folder exist and is there space?"};
+  if (ending == ".png") return write_picture(file, picture_of(drawing));
+  if (ending != ".svg") return core::Error{file.string() + " must end in .svg or .png"};
+  std::ostringstream text;
+  write_svg(drawing, text);
+  return core::write_whole(file, text.str());
 }
 
 }  // namespace railfix::tool

@@ -1,14 +1,11 @@
 #include "recording/copy.hpp"
 
-#include <spdlog/fmt/fmt.h>
-
 #include <algorithm>
-#include <cmath>
 #include <memory>
 #include <unordered_set>
 
-#include "core/time.hpp"
 #include "mcap/writer.hpp"
+#include "recording/part_in_time.hpp"
 #include "recording/standing_values.hpp"
 
 namespace railfix::tool {
@@ -96,21 +93,11 @@ void note_problems(const mcap::Reader& reader, CopyReport& report) {
 }
 
 core::Result<mcap::Selection> part_of(const mcap::Reader& reader, const CutOptions& options) {
-  const auto& statistics = reader.statistics();
-  const double length_s = core::seconds(statistics.end_ns - statistics.start_ns);
-  if (options.to_s <= options.from_s)
-    return core::Error{fmt::format("--to {:g} must lie behind --from {:g}", options.to_s, options.from_s)};
-  if (options.from_s > length_s) {
-    const std::string end = std::isfinite(options.to_s) ? fmt::format("{:g} s", options.to_s) : "the end";
-    return core::Error{fmt::format("there is nothing from {:g} s to {}: {} is {:.1f} s long", options.from_s, end,
-                                   reader.file().string(), length_s)};
-  }
+  auto part = part_in_time(reader, options.from_s, options.to_s);
+  if (!part.ok()) return part;
   auto topics = chosen_topics(reader, options);
   if (!topics.ok()) return topics.error();
-  mcap::Selection part;
-  part.topics = topics.value();
-  part.from_ns = statistics.start_ns + core::to_ns(options.from_s);
-  if (options.to_s <= length_s) part.to_ns = statistics.start_ns + core::to_ns(options.to_s);
+  part.value().topics = topics.value();
   return part;
 }
 

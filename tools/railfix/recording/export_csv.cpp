@@ -46,6 +46,7 @@ class Table {
     for (const auto& [name, value] : sample.items()) csv_ << cell_of(value);
     csv_.end_row();
   }
+  [[nodiscard]] bool whole() const { return csv_.whole(); }
   core::Status close() { return csv_.close(); }
 
  private:
@@ -88,9 +89,13 @@ core::Result<CsvReport> export_csv(mcap::Reader& reader, const mcap::Selection& 
       if (!table) table = std::make_unique<Table>(file_of(folder, channel.topic), *type);
       table->add(message, sample.value());
       ++report.rows;
-      return true;
+      return table->whole();  // on a full disk it would read on for hours
     });
-    for (const auto& [topic, table] : tables) core::ok_or_throw(table->close());
+    core::Status status;
+    for (const auto& [topic, table] : tables) {
+      if (const auto closed = table->close(); status.ok()) status = closed;
+    }
+    if (!status.ok()) return core::Error{"the tables in " + folder.string() + " are cut: " + status.error().message};
   } catch (const core::BadInput& error) {
     return core::Error{error.what()};
   }

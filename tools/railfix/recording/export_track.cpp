@@ -57,11 +57,6 @@ void take_fix(const ordered_json& fix, RecordedTrack& track) {
       kGnssBreakNs);
 }
 
-core::Status write(const std::ostringstream& text, const std::filesystem::path& file) {
-  if (core::write_whole(file, text.str())) return {};
-  return core::Error{file.string() + " cannot be written; see the folder, and whether the disk is full"};
-}
-
 void write_gpx_track(std::ostringstream& gpx, const char* name, const std::vector<std::vector<TrackPoint>>& lines) {
   if (lines.empty()) return;
   gpx << "  <trk>\n    <name>" << name << "</name>\n";
@@ -155,10 +150,10 @@ core::Result<RecordedTrack> read_track(mcap::Reader& reader, const mcap::Selecti
   });
   if (!status.ok()) return status.error();
   if (!track.train.empty() || !track.gnss.empty()) return track;
-  return core::Error{
-      reader.file().string() +
-      " says nowhere where on the Earth the train was: no train_state with latitude and longitude (has the "
-      "map a coordinate system?) and no GNSS fix"};
+  const bool whole = part.from_ns.value_or(0) <= reader.statistics().start_ns && !part.to_ns;
+  return core::Error{reader.file().string() + (whole ? " says nowhere" : " does not say in this part") +
+                     " where on the Earth the train was: no train_state with latitude and longitude (has the "
+                     "map a coordinate system?) and no GNSS fix"};
 }
 
 core::Status write_gpx(const RecordedTrack& track, const std::filesystem::path& file) {
@@ -168,7 +163,7 @@ core::Status write_gpx(const RecordedTrack& track, const std::filesystem::path& 
   write_gpx_track(gpx, "train", track.train);
   write_gpx_track(gpx, "GNSS", track.gnss);
   gpx << "</gpx>\n";
-  return write(gpx, file);
+  return core::write_whole(file, gpx.str());
 }
 
 core::Status write_geojson(const RecordedTrack& track, const std::filesystem::path& file) {
@@ -185,7 +180,7 @@ core::Status write_geojson(const RecordedTrack& track, const std::filesystem::pa
   }
   std::ostringstream text;
   text << ordered_json{{"type", "FeatureCollection"}, {"features", features}}.dump(1) << '\n';
-  return write(text, file);
+  return core::write_whole(file, text.str());
 }
 
 }  // namespace railfix::tool

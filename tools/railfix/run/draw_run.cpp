@@ -77,7 +77,7 @@ std::string draw_run(const RunOptions& options, const std::filesystem::path& rec
       if (observation.seen()) ++both;
     }
     const auto file = folder / drawing_name(next.value()->name, names);
-    if (!write_picture(file, picture)) throw core::BadInput(file.string() + " cannot be written");
+    core::ok_or_throw(write_picture(file, picture));
     progress.update(names.size());
   }
   progress.finish();

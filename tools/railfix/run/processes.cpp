@@ -14,6 +14,7 @@
 #include <ranges>
 
 #include "core/time.hpp"
+#include "core/whole_file.hpp"
 #include "service/service.hpp"
 #include "train/containers.hpp"
 
@@ -71,7 +72,7 @@ Processes::~Processes() {
 core::Status Processes::start(const ServiceProgram& program, const std::vector<std::string>& arguments) {
   const auto log_file = log_dir_ / (program.service + ".log");
   const int log = open(log_file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (log < 0) return core::Error{log_file.string() + " cannot be written: " + std::strerror(errno)};
+  if (log < 0) return core::cannot_write(log_file.string());
   const pid_t pid = fork();
   if (pid == 0) become(program.program, arguments, log);
   close(log);

@@ -170,8 +170,7 @@ core::Result<RunPlan> plan_run(const RunOptions& options) {
   add_overrides(settings.value(), options.sets);
   std::ostringstream text;
   text << settings.value() << '\n';
-  if (!core::write_whole(plan.config, text.str()))
-    return core::Error{plan.config.string() + " cannot be written; is the disk full?"};
+  if (const auto written = core::write_whole(plan.config, text.str()); !written.ok()) return written.error();
   return plan;
 }
 

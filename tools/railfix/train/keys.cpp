@@ -51,14 +51,6 @@ std::string xml_time(std::time_t time) {
   return text;
 }
 
-core::Status write_text(const fs::path& file, const std::string& text) {
-  std::ofstream out(file);
-  out << text;
-  out.close();
-  if (!out) return core::Error{file.string() + " cannot be written"};
-  return {};
-}
-
 /// Where the authority lives, and what is done with it. While it is exchanged there is a second one beside it: `next`,
 /// which signs nothing yet, or `former`, which signs nothing any more; every host trusts both.
 class Authority {
@@ -116,7 +108,7 @@ class Authority {
     if (!status.ok()) return status;
     // By name alone nobody could tell which of two authorities has signed.
     const auto extensions = folder_ / "extensions";
-    status = write_text(extensions, "authorityKeyIdentifier=keyid:always\n");
+    status = core::write_whole(extensions, "authorityKeyIdentifier=keyid:always\n");
     if (!status.ok()) return status;
     status = openssl({"x509", "-req", "-in", request.string(), "-CA", certificate("ca").string(), "-CAkey",
                       key("ca").string(), "-set_serial", "0x" + serial(), "-days", std::to_string(valid_days),
@@ -128,7 +120,7 @@ class Authority {
 
   core::Status sign(const std::string& text, const fs::path& signed_file) const {
     const auto draft = folder_ / "draft.xml";
-    auto status = write_text(draft, text);
+    auto status = core::write_whole(draft, text);
     if (!status.ok()) return status;
     status = openssl({"smime", "-sign", "-in", draft.string(), "-text", "-out", signed_file.string(), "-signer",
                       certificate("ca").string(), "-inkey", key("ca").string()});
@@ -319,7 +311,7 @@ core::Result<std::vector<fs::path>> make_keys(const Manifest& manifest, const Ke
   for (const auto& host : manifest.hosts) {
     const auto here = folder / host.name;
     fs::create_directories(here);
-    status = write_text(here / "ca.pem", authority.trusted());
+    status = core::write_whole(here / "ca.pem", authority.trusted());
     if (!status.ok()) return status.error();
     made.push_back(here);
     if (!authority.can_sign()) continue;  // what it has signed stays valid

@@ -34,8 +34,7 @@ auto load(const fs::path& file, Read read) -> std::optional<decltype(read(YAML::
 core::Status replace(const fs::path& file, const std::string& text) {
   std::error_code failed;
   fs::create_directories(file.parent_path(), failed);
-  if (core::write_whole(file, text)) return {};
-  return core::Error{file.string() + " cannot be written; is the disk full, or are you not root?"};
+  return core::write_whole(file, text);
 }
 
 void require(bool holds, const YAML::Node& node, const char* what) {

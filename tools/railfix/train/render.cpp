@@ -3,7 +3,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <fstream>
 #include <sstream>
 
 #include "core/fnv.hpp"
@@ -68,11 +67,7 @@ YAML::Node settings_on(const Manifest& manifest, const TrainHost& host, const st
 core::Status write(const fs::path& file, const std::string& text) {
   std::error_code failed;
   fs::create_directories(file.parent_path(), failed);
-  std::ofstream out(file);
-  out << text;
-  out.close();
-  if (!out) return core::Error{file.string() + " cannot be written; is the disk full, or are you not root?"};
-  return {};
+  return core::write_whole(file, text);
 }
 
 // The keys of this host: the owner and the services' group may read them.

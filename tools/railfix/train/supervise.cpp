@@ -11,6 +11,7 @@
 #include <ranges>
 
 #include "core/time.hpp"
+#include "core/whole_file.hpp"
 #include "train/left_behind.hpp"
 #include "train/running.hpp"
 #include "train/stands_still.hpp"
@@ -227,7 +228,7 @@ void supervise(const HostFolder& folder) {
   }
   const std::string pid = std::to_string(getpid()) + "\n";
   if (ftruncate(lock, 0) != 0 || pwrite(lock, pid.data(), pid.size(), 0) < 0)
-    throw core::BadInput(folder.lock().string() + " cannot be written; is the disk full?");
+    throw core::BadInput(core::cannot_write(folder.lock().string()));
   for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { asked_to_stop = 1; });
   Supervision supervision(folder);
   // Once in any case: who is told to end at once ends what the one before has left.
