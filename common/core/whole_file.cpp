@@ -158,6 +158,7 @@ Status write_whole(const std::filesystem::path& file, const std::string& bytes) 
   // The kernel follows the links first: it knows of circles, and refuses another user's link in a folder for everybody.
   const bool there = stat(file.c_str(), &old) == 0;
   if (!there && errno != ENOENT) return cannot_write(file.string());
+  if (there && S_ISBLK(old.st_mode)) return Error{"cannot write " + file.string() + ": it is a disk, not a file"};
   const auto place = place_of(file);
   const bool written = is_open_file(place) || (there && !S_ISREG(old.st_mode))
                            ? write_into(place, bytes)
