@@ -1,6 +1,7 @@
 #include "core/csv.hpp"
 
 #include <array>
+#include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
@@ -168,8 +169,11 @@ void CsvWriter::end_row() {
 }
 
 Status CsvWriter::close() {
-  stream_.close();  // tries once more where writing failed, and so gives the reason
-  return stream_ ? Status() : cannot_write(file_.string() + " to its end");
+  errno = 0;
+  stream_.close();  // tries once more where writing failed, and so gives the reason, unless there is room again
+  if (stream_) return {};
+  if (errno == 0) errno = EIO;
+  return cannot_write(file_.string() + " to its end");
 }
 
 }  // namespace railfix::core

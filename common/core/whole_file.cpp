@@ -14,6 +14,7 @@
 #include <cstring>
 #include <fstream>
 #include <optional>
+#include <random>
 
 namespace railfix::core {
 
@@ -54,6 +55,17 @@ bool close_written(int out, bool written) {
   return written;
 }
 
+/// Who reads a named pipe may be started in the same line as we: so long it is waited for.
+int open_for_reader(const fs::path& file) {
+  constexpr int kTries = 50;
+  constexpr useconds_t kTryUs = 100'000;
+  for (int i = 0;; ++i) {
+    const int out = open(file.c_str(), O_WRONLY | O_APPEND | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+    if (out >= 0 || errno != ENXIO || i == kTries) return out;
+    usleep(kTryUs);
+  }
+}
+
 /// False: errno says why.
 bool write_into(const fs::path& file, const std::string& bytes) {
   // Opened once more it would begin at its front and forget that the shell appends.
@@ -61,7 +73,7 @@ bool write_into(const fs::path& file, const std::string& bytes) {
     const bool in_order = *ours != STDOUT_FILENO || std::fflush(stdout) == 0;
     return in_order && write_all(*ours, std::as_bytes(std::span(bytes)));
   }
-  const int out = open(file.c_str(), O_WRONLY | O_APPEND | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+  const int out = open_for_reader(file);
   return out >= 0 && close_written(out, write_all(out, std::as_bytes(std::span(bytes))));
 }
 
@@ -73,21 +85,47 @@ void take_after(const struct stat& old, int out) {
   fchmod(out, old.st_mode & 0777U);
 }
 
+/// A new file beside that place; its name is in `draft`. Other processes with our number may write there, too: those in
+/// other containers.
+int open_draft(const fs::path& file, mode_t mode, std::string& draft) {
+  std::random_device random;
+  int out = -1;
+  do {
+    std::array<char, 16> suffix{};
+    std::snprintf(suffix.data(), suffix.size(), ".%08x", random());
+    draft = file.string() + suffix.data();
+    out = open(draft.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
+  } while (out < 0 && errno == EEXIST);
+  return out;
+}
+
+/// The folder takes no other file, or not in this one's place: a single file that is mounted into a container.
+bool only_in_place(int reason) {
+  return reason == EACCES || reason == EPERM || reason == EROFS || reason == EBUSY;
+}
+
+bool rewrite(const fs::path& file, const std::string& bytes) {
+  const int out = open(file.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC);
+  return out >= 0 && close_written(out, write_all(out, std::as_bytes(std::span(bytes))));
+}
+
 /// False: errno says why. `old` is what is there.
 bool replace(const fs::path& file, const struct stat* old, const std::string& bytes) {
-  if (old != nullptr && access(file.c_str(), W_OK) != 0) return false;  // rename() would not mind
-  const std::string draft = file.string() + "." + std::to_string(getpid());
-  unlink(draft.c_str());  // of a process with our number that was killed
-  const int out =
-      open(draft.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, old != nullptr ? old->st_mode & 0777U : 0666U);
-  if (out < 0) return false;
+  constexpr mode_t kSomebodyWrites = 0222;
+  if (old != nullptr && (old->st_mode & kSomebodyWrites) == 0) {  // rename() would not mind
+    errno = EACCES;
+    return false;
+  }
+  std::string draft;
+  const int out = open_draft(file, old != nullptr ? old->st_mode & 0777U : 0666U, draft);
+  if (out < 0) return old != nullptr && only_in_place(errno) && rewrite(file, bytes);
   if (old != nullptr) take_after(*old, out);
   if (close_written(out, write_all(out, std::as_bytes(std::span(bytes)))) && rename(draft.c_str(), file.c_str()) == 0)
     return true;
   const int reason = errno;
   unlink(draft.c_str());
   errno = reason;
-  return false;
+  return old != nullptr && only_in_place(reason) && rewrite(file, bytes);
 }
 
 const char* remedy(int reason) {
@@ -141,8 +179,11 @@ Result<std::string> read_whole(std::istream& stream, const std::string& name) {
 bool write_all(int descriptor, std::span<const std::byte> bytes) {
   while (!bytes.empty()) {
     const ssize_t count = write(descriptor, bytes.data(), bytes.size());
-    if (count >= 0) {
+    if (count > 0) {
       bytes = bytes.subspan(static_cast<size_t>(count));
+    } else if (count == 0) {
+      errno = EIO;
+      return false;
     } else if (errno == EAGAIN) {
       pollfd room{descriptor, POLLOUT, 0};
       poll(&room, 1, -1);

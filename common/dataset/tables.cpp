@@ -78,7 +78,7 @@ Status read_gnss(const fs::path& file, std::vector<GnssRow>& rows) {
 }
 
 bool could_run(const TruthRow& from, const TruthRow& to) {
-  constexpr double kRoundingM = 10;  // of the table: some hold few digits, or places of GNSS
+  constexpr double kRoundingM = 100;  // of the table: some hold few digits, or places of GNSS behind a bridge
   const double took_s = (static_cast<double>(to.stamp_ns) - static_cast<double>(from.stamp_ns)) * 1e-9;
   return std::abs(to.distance_m - from.distance_m) <= core::kFastestTrainMps * took_s + kRoundingM;
 }

@@ -159,6 +159,7 @@ void Estimator::doubt_place(double behind_m, double ahead_m) {
 void Estimator::place_like(const Estimator& other) {
   path_ = other.path_;
   track_doubt_ = other.track_doubt_;
+  turned_way_ = other.turned_way_;
   filter_.place_like(other.filter_);
   doubt_m_ = other.doubt_m_;
   wrong_place_ = other.wrong_place_;

@@ -11,7 +11,8 @@ namespace {
 
 constexpr int kAgreementsOfGnss = 5;  // in a row: where it scatters one agrees by chance
 constexpr double kSurprisingSigmas = 3.0;
-constexpr double kForgotten = 2.0;  // of a landmark's sigmas is the place's when the way since has outgrown it
+constexpr double kElsewhereM = 3.0;  // what was felt before belongs to another place of the map
+constexpr double kForgotten = 2.0;   // of a landmark's sigmas is the place's when the way since has outgrown it
 constexpr double kBesideLandmarkS = 1.0;
 constexpr double kBendsHereM = 3.0;  // in a window of some 50 m to either side that is rarely by chance
 constexpr double kOffTrackM = 15.0;  // a GNSS fix further beside the track is none
@@ -187,6 +188,7 @@ void Estimator::accept(const FixInput& fix) {
   const bool by_chance = fix.kind == FixKind::curvature && (is_only_told() || track_doubt_.turns_otherwise());
   if (!by_chance) {
     track_doubt_.seen_here();
+    if (std::abs(fix_offer_.residual) > kElsewhereM) turned_way_.clear();
     compare_turns();
   }
   if (by_chance && std::abs(fix_offer_.residual) < kBendsHereM) wrong_place_.bends_here();

@@ -92,8 +92,11 @@ int run(const Options& options) {
   check_outputs(options);
   const auto reader = core::value_or_throw(mcap::Reader::open(options.file));
   const auto part = part_of(*reader, options);
-  if (!options.gpx.empty() || !options.geojson.empty()) write_tracks(*reader, part, options);  // may be all of stdout
+  const bool tracks = !options.gpx.empty() || !options.geojson.empty();
+  const bool alone = is_standard_output(options.gpx) || is_standard_output(options.geojson);
+  if (tracks && alone) write_tracks(*reader, part, options);  // before anything is said there
   if (!options.csv.empty()) write_tables(*reader, part, options.csv);
+  if (tracks && !alone) write_tracks(*reader, part, options);
   if (!options.mp4.empty()) write_film(*reader, part, options);
   for (const auto& problem : reader->problems()) std::cerr << problem << '\n';
   return 0;

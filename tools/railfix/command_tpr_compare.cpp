@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <map>
 #include <memory>
 #include <set>
 #include <string>
@@ -126,12 +127,14 @@ void print_row(const char* what, const std::vector<compare::Sample>& samples) {
 
 compare::Contradicted contradicted(const compare::Pairing& pairing, const std::optional<Judge>& judge) {
   std::set<size_t> apart;
-  std::set<size_t> turned;
+  std::map<size_t, int> turned;  // pairs of the leg that are, less those that are not
   for (const auto& pair : pairing.pairs) {
     if (!pair.overlap() && !(judge && judge->covers(pair))) apart.insert(pair.leg);
-    if (pair.turned()) turned.insert(pair.leg);
+    turned[pair.leg] += pair.turned() ? 1 : -1;
   }
-  return {apart.size(), turned.size()};
+  // Where the driver changes the cab the two may say so one report apart.
+  const auto most_are = [](const auto& leg) { return leg.second >= 0; };
+  return {apart.size(), static_cast<size_t>(std::ranges::count_if(turned, most_are))};
 }
 
 void print_pairs(const compare::Pairing& pairing) {

@@ -104,8 +104,11 @@ int with_all_told(int exit_code) {
   errno = 0;
   if (std::fflush(stdout) == 0 && !lost) return exit_code;
   if (errno == EPIPE) return exit_code;  // who read has seen enough
-  if (errno == 0) errno = EIO;
-  std::cerr << "railfix: " << railfix::core::cannot_write("to standard output").message << '\n';
+  if (errno == 0) {
+    std::cerr << "railfix: standard output did not take everything, what it holds is cut\n";  // there is room again
+  } else {
+    std::cerr << "railfix: " << railfix::core::cannot_write("to standard output").message << '\n';
+  }
   return exit_code == 0 ? kWorkFailed : exit_code;
 }
 

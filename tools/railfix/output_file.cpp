@@ -1,6 +1,7 @@
 #include "output_file.hpp"
 
 #include <sys/stat.h>
+#include <sys/sysmacros.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -26,23 +27,33 @@ bool lies_in(const fs::path& file, const fs::path& folder) {
   return !failed && !from_there.empty() && *from_there.begin() != "..";
 }
 
+bool is_same(const struct stat& one, const struct stat& other) {
+  return one.st_dev == other.st_dev && one.st_ino == other.st_ino;
+}
+
+bool takes_all(const struct stat& file) {
+  constexpr unsigned kMemory = 1;
+  constexpr unsigned kNull = 3;
+  return S_ISCHR(file.st_mode) && file.st_rdev == makedev(kMemory, kNull);
+}
+
 /// Also where neither is there yet.
 bool is_same(const fs::path& a, const fs::path& b) {
+  struct stat one {};
+  struct stat other {};
+  if (stat(a.c_str(), &one) == 0 && stat(b.c_str(), &other) == 0) return is_same(one, other) && !takes_all(one);
   std::error_code failed;
-  if (fs::equivalent(a, b, failed)) return true;
-  // Of a relative name that is not there weakly_canonical() leaves the folder out.
-  const auto place = fs::weakly_canonical(fs::absolute(a), failed);
-  return !failed && place == fs::weakly_canonical(fs::absolute(b), failed);
+  const auto place = fs::weakly_canonical(a, failed);
+  return !failed && place == fs::weakly_canonical(b, failed);
 }
+
+}  // namespace
 
 bool is_standard_output(const fs::path& file) {
   struct stat one {};
   struct stat other {};
-  return stat(file.c_str(), &one) == 0 && fstat(STDOUT_FILENO, &other) == 0 && one.st_dev == other.st_dev &&
-         one.st_ino == other.st_ino;
+  return stat(file.c_str(), &one) == 0 && fstat(STDOUT_FILENO, &other) == 0 && is_same(one, other) && !takes_all(one);
 }
-
-}  // namespace
 
 void check_output(const std::string& option, const fs::path& out, const std::vector<fs::path>& inputs) {
   if (out.empty()) return;
@@ -74,7 +85,8 @@ void check_different(const std::vector<Output>& outputs) {
 void say_beside(const std::vector<fs::path>& outputs) {
   if (std::ranges::none_of(outputs, is_standard_output)) return;
   std::fflush(stdout);
-  dup2(STDERR_FILENO, STDOUT_FILENO);
+  // Where standard error is closed nobody hears it.
+  if (dup2(STDERR_FILENO, STDOUT_FILENO) < 0 && std::freopen("/dev/null", "w", stdout) == nullptr) std::fclose(stdout);
 }
 
 }  // namespace railfix::tool

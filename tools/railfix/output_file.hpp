@@ -19,6 +19,8 @@ struct Output {
 /// Throws BadInput where two of them are one file, and the second would take the first one's place.
 void check_different(const std::vector<Output>& outputs);
 
+bool is_standard_output(const std::filesystem::path& file);
+
 /// Once the files are written: where one of them was standard output itself (/dev/stdout), what the command has to say
 /// from now on goes to standard error, so that who reads has the file alone.
 void say_beside(const std::vector<std::filesystem::path>& outputs);

@@ -10,12 +10,13 @@ namespace railfix::tool {
 
 core::Status write_picture(const std::filesystem::path& file, const cv::Mat& picture) {
   std::vector<uchar> bytes;
-  bool known = false;
+  if (!cv::haveImageWriter(file.string()))
+    return core::Error{"cannot write " + file.string() + " as a picture; end its name in .png"};
   try {
-    known = cv::imencode(file.extension().string(), picture, bytes);
-  } catch (const cv::Exception&) {
+    cv::imencode(file.extension().string(), picture, bytes);
+  } catch (const cv::Exception& error) {
+    return core::Error{"cannot write " + file.string() + " as a picture (" + error.err + ")"};
   }
-  if (!known) return core::Error{"cannot write " + file.string() + " as a picture; end its name in .png"};
   return core::write_whole(file, {bytes.begin(), bytes.end()});
 }
 

@@ -98,20 +98,25 @@ std::optional<double> turned_towards(const LooseEnd& end, const Alignment& other
   return turn;
 }
 
-/// The sentence for an end that should meet another track; empty where none is like that.
-std::string near_miss(const Map& map, const TrackFinder& tracks, const LooseEnd& end) {
+/// An end that should meet another track.
+struct NearMiss {
+  const Edge* other = nullptr;
+  std::string told;
+};
+
+std::optional<NearMiss> near_miss(const Map& map, const TrackFinder& tracks, const LooseEnd& end) {
   for (const NearTrack& near : tracks.near(end.pose.easting_m, end.pose.northing_m, kShortBranchM)) {
     const Edge& other = *map.edge(near.edge);
     if (other.is_drawn || &other == end.edge || other.from_node == end.node || other.to_node == end.node) continue;
     const double apart_m = std::abs(near.lateral_m);
     const std::string where = called(*end.edge) + " ends loose at node " + std::to_string(end.node) + ", only " +
                               told_m(apart_m) + " from " + called(other);
-    if (apart_m <= kNearMissM) return where;
+    if (apart_m <= kNearMissM) return NearMiss{&other, where};
     if (const auto turn = turned_towards(end, other.alignment, near))
-      return where + " and turned towards it by " + told_deg(*turn) +
-             ": draw the switch between them, unless it is a buffer stop";
+      return NearMiss{&other, where + " and turned towards it by " + told_deg(*turn) +
+                                  ": draw the switch between them, unless it is a buffer stop"};
   }
-  return "";
+  return std::nullopt;
 }
 
 /// By how much a train turns at once on this way; the least of an edge that has both its ends there.
@@ -135,15 +140,17 @@ double kink_rad(const Map& map, const Connection& way) {
 std::vector<std::string> near_misses(const Map& map) {
   const TrackFinder tracks(std::shared_ptr<const Map>(std::shared_ptr<void>(), &map));  // the map outlives it
   std::vector<std::string> problems;
-  std::vector<LooseEnd> told;
+  std::vector<std::pair<LooseEnd, const Edge*>> told;  // and the track that it misses
   for (const LooseEnd& end : loose_ends(map)) {
+    std::optional<NearMiss> miss = near_miss(map, tracks, end);
+    if (!miss) continue;
     // Of two ends that miss each other one is enough.
-    const auto beside = [&](const LooseEnd& other) { return distance_m(end, other) <= kNearMissM; };
-    if (std::ranges::any_of(told.rbegin(), told.rend(), beside)) continue;
-    std::string problem = near_miss(map, tracks, end);
-    if (problem.empty()) continue;
-    problems.push_back(std::move(problem));
-    told.push_back(end);
+    const auto is_told = [&](const auto& one) {
+      return one.second == end.edge && miss->other == one.first.edge && distance_m(end, one.first) <= kNearMissM;
+    };
+    if (std::any_of(told.rbegin(), told.rend(), is_told)) continue;
+    problems.push_back(std::move(miss->told));
+    told.emplace_back(end, miss->other);
   }
   return problems;
 }

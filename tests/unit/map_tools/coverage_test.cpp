@@ -109,6 +109,7 @@ TEST(Coverage, ARingIsOneLap) {
     EXPECT_NEAR(way.end_m() - way.begin_m(), around_m, 1e-6) << start_m;
   }
   EXPECT_NEAR(core::value_or_throw(way_from(ring, {1, 0, Direction::forward}, 700)).end_m(), 700, 1e-9);
+  EXPECT_NEAR(core::value_or_throw(way_from(ring, {1, 3000, Direction::forward}, 700)).end_m(), 700, 1e-9);
 }
 
 TEST(Coverage, AWayHasALength) {

@@ -19,7 +19,7 @@ struct Columns {
 /// Legs on which both cannot be right.
 struct Contradicted {
   size_t apart = 0;   // their intervals have nothing in common, and no truth says who is wrong
-  size_t turned = 0;  // the train looks the one way in ours and the other way in theirs
+  size_t turned = 0;  // in half of their pairs the train looks the one way in ours and the other way in theirs
 };
 
 /// Of one side, without signs.

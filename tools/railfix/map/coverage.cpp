@@ -72,7 +72,7 @@ core::Result<track::Path> way_from(std::shared_ptr<const track::Map> map, const 
   const auto path = track::Path::follow(map, start, length_m, 0);
   if (!path.ok()) return path;
   const auto lap_m = until_it_comes_again(path.value());
-  return lap_m ? track::Path::follow(std::move(map), start, *lap_m, 0) : path;
+  return lap_m ? track::Path::follow(std::move(map), start, std::min(*lap_m, length_m), 0) : path;
 }
 
 Coverage coverage_of(const track::Path& path, const CoverageOptions& options, bool backwards) {

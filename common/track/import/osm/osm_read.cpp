@@ -99,6 +99,8 @@ std::string end_of(const std::filesystem::path& file, size_t bytes) {
     stream.seekg(std::max<std::streamoff>(0, stream.tellg() - static_cast<std::streamoff>(bytes)));
     return {std::istreambuf_iterator<char>(stream), {}};
   }
+  constexpr uintmax_t kExtract = 100'000'000;  // larger ones are whole countries, which Overpass does not give
+  if (std::filesystem::file_size(file) > kExtract) return "";
   const int open_file = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);  // the decompressor closes it
   const auto unpacked = osmium::io::CompressionFactory::instance().create_decompressor(compression, open_file);
   std::string end;
