@@ -8,9 +8,10 @@
 namespace railfix::fusion {
 namespace {
 
-constexpr double kPieceM = 10.0;    // slower seconds are one piece: points are some 100 m long, at any speed
-constexpr double kStandsMps = 0.5;  // a train that stands seems to move so fast, either way
-constexpr double kFelt = 2.0;       // sigmas: a gyro that feels less has met no bump
+constexpr double kPieceM = 10.0;          // slower seconds are one piece: points are some 100 m long, at any speed
+constexpr double kStandingPieceM = 20.0;  // what seems to move belongs to the last one, unless it creeps on and on
+constexpr double kStandsMps = 0.5;        // a train that stands seems to move so fast, either way
+constexpr double kFelt = 2.0;             // sigmas: a gyro that feels less has met no bump
 constexpr double kJumpM = 3.0;
 constexpr double kJumpShare = 0.1;        // of a piece: the speed changes in it
 constexpr double kMapTurnShare = 0.15;    // a map has its curves so wrong, ...
@@ -32,7 +33,7 @@ void TurnedWay::add(Piece piece) {
     const bool stands = std::abs(way_m) < kStandsMps * piece.time_s && (piece.to_m - last.from_m) * last_m > 0;
     if (!near || (backs && !stands)) {
       pieces_.clear();
-    } else if (backs || std::abs(last_m) < kPieceM) {
+    } else if (backs || std::abs(last_m) < (stands ? kStandingPieceM : kPieceM)) {
       piece = {last.from_m, piece.to_m, last.turn_rad + piece.turn_rad, std::hypot(last.sigma_rad, piece.sigma_rad),
                last.time_s + piece.time_s};
       pieces_.pop_back();

@@ -43,8 +43,8 @@ bool is_same(const fs::path& a, const fs::path& b) {
   struct stat other {};
   if (stat(a.c_str(), &one) == 0 && stat(b.c_str(), &other) == 0) return is_same(one, other) && !takes_all(one);
   std::error_code failed;
-  const auto place = fs::weakly_canonical(a, failed);
-  return !failed && place == fs::weakly_canonical(b, failed);
+  const auto place = fs::weakly_canonical(fs::absolute(a), failed);
+  return !failed && place == fs::weakly_canonical(fs::absolute(b), failed);
 }
 
 }  // namespace

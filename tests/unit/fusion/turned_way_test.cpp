@@ -100,6 +100,23 @@ TEST(TurnedWay, ATurnOfTheTrackThatWasNotFeltIsNoBump) {
   EXPECT_EQ(strays.without_worst, strays.most);
 }
 
+// An S over a crossover turns by nothing in all: it must not become one piece.
+TEST(TurnedWay, ATrainThatCreepsFeelsACrossover) {
+  auto map = std::make_shared<track::Map>();
+  map->edges.push_back({1, "leg", 1, 2, "",
+                        track::Alignment::chained(
+                            {0, 0, 0}, {{kPointsM, 0, 0}, {25, 0.005, 0.005}, {25, -0.005, -0.005}, {500, 0, 0}})});
+  const auto crossover = core::value_or_throw(track::Path::follow(map, {1, 0, track::Direction::forward}, 1000, 0));
+  TurnedWay way;
+  for (double m = kPointsM - 20; m < kPointsM + 70; m += 0.4) {
+    const double turn_rad = crossover.at(m).pose.heading_rad - crossover.at(m + 0.4).pose.heading_rad;
+    way.add({m, m + 0.4, turn_rad, 1e-4, 1});
+  }
+  EXPECT_TRUE(way.holds(kPointsM));
+  EXPECT_LT(way.strays(crossover, {1e-5, 0.3}).most, 3);
+  EXPECT_GT(way.strays(leg(INFINITY), {1e-5, 0.3}).most, 4);
+}
+
 TEST(TurnedWay, AHaltIsNoWayBack) {
   auto way = ridden(leg(190), kPointsM - 60, kPointsM + 70, 11, 0);
   const double here_m = kPointsM + 72;
