@@ -47,8 +47,9 @@ std::optional<int> own_descriptor(const fs::path& file) {
   return code == std::errc{} && end == name.data() + name.size() ? std::optional(descriptor) : std::nullopt;
 }
 
-/// Closes it also where writing failed, and keeps errno of the first failure.
-bool close_written(int out, bool written) {
+/// False: errno is of the first failure.
+bool write_and_close(int out, const std::string& bytes) {
+  const bool written = write_all(out, std::as_bytes(std::span(bytes)));
   const int reason = errno;
   if (close(out) != 0 && written) return false;
   errno = reason;
@@ -74,7 +75,7 @@ bool write_into(const fs::path& file, const std::string& bytes) {
     return in_order && write_all(*ours, std::as_bytes(std::span(bytes)));
   }
   const int out = open_for_reader(file);
-  return out >= 0 && close_written(out, write_all(out, std::as_bytes(std::span(bytes))));
+  return out >= 0 && write_and_close(out, bytes);
 }
 
 /// Its owner as far as we may give files away, and its rights.
@@ -106,7 +107,7 @@ bool only_in_place(int reason) {
 
 bool rewrite(const fs::path& file, const std::string& bytes) {
   const int out = open(file.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC);
-  return out >= 0 && close_written(out, write_all(out, std::as_bytes(std::span(bytes))));
+  return out >= 0 && write_and_close(out, bytes);
 }
 
 /// False: errno says why. `old` is what is there.
@@ -120,8 +121,7 @@ bool replace(const fs::path& file, const struct stat* old, const std::string& by
   const int out = open_draft(file, old != nullptr ? old->st_mode & 0777U : 0666U, draft);
   if (out < 0) return old != nullptr && only_in_place(errno) && rewrite(file, bytes);
   if (old != nullptr) take_after(*old, out);
-  if (close_written(out, write_all(out, std::as_bytes(std::span(bytes)))) && rename(draft.c_str(), file.c_str()) == 0)
-    return true;
+  if (write_and_close(out, bytes) && rename(draft.c_str(), file.c_str()) == 0) return true;
   const int reason = errno;
   unlink(draft.c_str());
   errno = reason;

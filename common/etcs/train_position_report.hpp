@@ -73,9 +73,15 @@ core::Result<TrainPositionReport> decode(std::span<const uint8_t> message, Basel
 core::Result<TrainPositionReport> decode_or_advise(std::span<const uint8_t> message, Baseline baseline,
                                                    const std::string& option);
 
+constexpr uint32_t nid_c_of(uint32_t nid_lrbg) {
+  return nid_lrbg >> kNidBgBits;
+}
+constexpr uint32_t nid_bg_of(uint32_t nid_lrbg) {
+  return nid_lrbg & ((1U << kNidBgBits) - 1);
+}
 /// NID_LRBG or NID_PRVLRBG is of a group.
 constexpr bool names_group(uint32_t nid_lrbg) {
-  return (nid_lrbg & kUnknownNidBg) != kUnknownNidBg;
+  return nid_bg_of(nid_lrbg) != kUnknownNidBg;
 }
 
 /// What stands in relation to the LRBG (its distance, sides and doubts) says nothing where that is unknown: a sentence

@@ -259,6 +259,8 @@ class Estimator {
   [[nodiscard]] double lost_to_m() const;
   /// What the promised interval holds more.
   [[nodiscard]] double doubted_beyond_sigma_m() const;
+  /// So far away may the train be by a fix.
+  [[nodiscard]] double reach_m(const Offer& offer, double sigma_m) const;
   void doubt_surprise(double sigma_m);
   void refuse(const FixInput& fix, double path_distance_m, const Offer& offer);
   void accept(const FixInput& fix);

@@ -11,8 +11,7 @@ namespace {
 
 constexpr int kAgreementsOfGnss = 5;  // in a row: where it scatters one agrees by chance
 constexpr double kSurprisingSigmas = 3.0;
-constexpr double kElsewhereM = 3.0;  // what was felt before belongs to another place of the map
-constexpr double kForgotten = 2.0;   // of a landmark's sigmas is the place's when the way since has outgrown it
+constexpr double kForgotten = 2.0;  // of a landmark's sigmas is the place's when the way since has outgrown it
 constexpr double kBesideLandmarkS = 1.0;
 constexpr double kBendsHereM = 3.0;  // in a window of some 50 m to either side that is rarely by chance
 constexpr double kOffTrackM = 15.0;  // a GNSS fix further beside the track is none
@@ -188,7 +187,7 @@ void Estimator::accept(const FixInput& fix) {
   const bool by_chance = fix.kind == FixKind::curvature && (is_only_told() || track_doubt_.turns_otherwise());
   if (!by_chance) {
     track_doubt_.seen_here();
-    if (std::abs(fix_offer_.residual) > kElsewhereM) turned_way_.clear();
+    turned_way_.corrected(fix_offer_.residual);
     compare_turns();
   }
   if (by_chance && std::abs(fix_offer_.residual) < kBendsHereM) wrong_place_.bends_here();
@@ -209,11 +208,15 @@ void Estimator::accept(const FixInput& fix) {
   filter_.mark_reference();
 }
 
+double Estimator::reach_m(const Offer& offer, double sigma_m) const {
+  return std::abs(offer.residual) + parameters_->interval_factor * sigma_m;
+}
+
 // It or the one before is wrong by more than it says, or both are: what makes one err makes its neighbour err alike.
 // Until the next one.
 void Estimator::doubt_surprise(double sigma_m) {
   if (fix_sigmas_off(excess_m_) < kSurprisingSigmas) return;
-  doubt_behind_m_ = doubt_ahead_m_ = std::abs(fix_offer_.residual) + parameters_->interval_factor * sigma_m;
+  doubt_behind_m_ = doubt_ahead_m_ = reach_m(fix_offer_, sigma_m);
 }
 
 // One fix alone never moves the train against the filter; a second one elsewhere that says the same does.
@@ -231,7 +234,7 @@ void Estimator::refuse(const FixInput& fix, double path_distance_m, const Offer&
       corrected_ = true;
       accept(fix);
       // Either side: what told where to look for these two was wrong by as much. Until a third one agrees.
-      doubt_behind_m_ = doubt_ahead_m_ = std::abs(offer.residual) + parameters_->interval_factor * fix.sigma_m;
+      doubt_behind_m_ = doubt_ahead_m_ = reach_m(offer, fix.sigma_m);
       fix_verdict_ = FixVerdict::corrected;
       landmarks_agreed_ = 2;
       return;
@@ -239,9 +242,8 @@ void Estimator::refuse(const FixInput& fix, double path_distance_m, const Offer&
   }
   fix_verdict_ = FixVerdict::refused;
   refused_fix_ = RefusedFix{offer.residual, fix.sigma_m, distance_m};
-  const double reach_m = std::abs(offer.residual) + parameters_->interval_factor * fix.sigma_m;
   auto& doubt_m = offer.residual < 0 ? doubt_behind_m_ : doubt_ahead_m_;
-  doubt_m = std::max(doubt_m, reach_m);
+  doubt_m = std::max(doubt_m, reach_m(offer, fix.sigma_m));
 }
 
 }  // namespace railfix::fusion

@@ -65,8 +65,8 @@ void TrackDoubt::move(const track::Path& path, double place_m) {
     std::erase_if(open_, [&](const track::PathSwitch& s) {
       return s.ahead != ahead && std::abs(s.distance_m - one->distance_m) < kSameSwitchM;
     });
-    if (one->ahead == ahead) open_.push_back(*one);
     if (one->ahead != ahead) continue;
+    open_.push_back(*one);
     divided_ = true;
     divided_at_m_ = one->distance_m;
   }

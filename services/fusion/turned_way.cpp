@@ -45,6 +45,10 @@ void TurnedWay::add(Piece piece) {
   pieces_.push_back(piece);
 }
 
+void TurnedWay::corrected(double by_m) {
+  if (std::abs(by_m) > kJumpM) clear();
+}
+
 bool TurnedWay::holds(double distance_m) const {
   return !pieces_.empty() && (pieces_.front().from_m - distance_m) * (pieces_.back().to_m - distance_m) <= 0;
 }

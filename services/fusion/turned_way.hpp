@@ -28,6 +28,8 @@ class TurnedWay {
   /// Forgets those before where it does not go on from them, or back over them: the points may be thrown meanwhile.
   void add(Piece piece);
   void clear() { pieces_.clear(); }
+  /// The train is found to be so far from where it was taken to be: forgets what it felt at another place of the map.
+  void corrected(double by_m);
   /// That place of the path is on the way that is remembered.
   [[nodiscard]] bool holds(double distance_m) const;
   /// By how much the part of the way that turned most otherwise than the path did so, in standard deviations.

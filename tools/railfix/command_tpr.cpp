@@ -37,9 +37,9 @@ std::string distance_text(uint32_t raw, uint32_t q_scale) {
 
 std::string group_text(uint32_t nid_lrbg) {
   if (nid_lrbg == etcs::kUnknownBaliseGroup) return "unknown";
-  const std::string region = "country/region " + std::to_string(nid_lrbg >> etcs::kNidBgBits);
+  const std::string region = "country/region " + std::to_string(etcs::nid_c_of(nid_lrbg));
   if (!etcs::names_group(nid_lrbg)) return region + ", balise group unknown";
-  return region + ", balise group " + std::to_string(nid_lrbg & etcs::kUnknownNidBg);
+  return region + ", balise group " + std::to_string(etcs::nid_bg_of(nid_lrbg));
 }
 
 template <size_t N>

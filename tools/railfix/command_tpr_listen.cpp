@@ -58,9 +58,9 @@ std::string sentence(const GroundReport& report) {
   const char* side = f.q_dlrbg == etcs::kNominal   ? "the nominal"
                      : f.q_dlrbg == etcs::kReverse ? "the reverse"
                                                    : "an unknown";
-  return metres(f.d_lrbg, f.q_scale) + " m on " + side + " side of LRBG " +
-         std::to_string(f.nid_lrbg >> etcs::kNidBgBits) + "/" + std::to_string(f.nid_lrbg & etcs::kUnknownNidBg) +
-         "  -" + metres(f.l_doubtover, f.q_scale) + "/+" + metres(f.l_doubtunder, f.q_scale) + " m  " + speed + " km/h";
+  return metres(f.d_lrbg, f.q_scale) + " m on " + side + " side of LRBG " + std::to_string(etcs::nid_c_of(f.nid_lrbg)) +
+         "/" + std::to_string(etcs::nid_bg_of(f.nid_lrbg)) + "  -" + metres(f.l_doubtover, f.q_scale) + "/+" +
+         metres(f.l_doubtunder, f.q_scale) + " m  " + speed + " km/h";
 }
 
 void print(const GroundReport& report, Arrival arrival, bool as_json) {

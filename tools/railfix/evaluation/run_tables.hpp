@@ -100,6 +100,7 @@ struct RunTables {
   struct Span {
     int64_t from_ns = 0;
     int64_t to_ns = 0;
+    bool every_step = false;  // of a table that has a row for every step of its service
   };
   /// Of the stamps, by the name of the table that has any.
   std::map<std::string, Span> spans{};

@@ -8,6 +8,7 @@
 
 #include "core/time.hpp"
 #include "core/units.hpp"
+#include "etcs/train_position_report.hpp"
 #include "service_table.hpp"
 
 namespace railfix::tool {
@@ -37,9 +38,9 @@ std::string counts_line(const TrainPicture& picture) {
       picture.views == 0 ? 0 : 100.0 * static_cast<double>(picture.views_seen) / static_cast<double>(picture.views);
   std::string line = fmt::format("rails seen {:.1f} % of {} pictures  sightings {}  position reports {}", seen,
                                  picture.views, picture.sightings, picture.reports);
-  if (picture.report && picture.report->nid_lrbg() != 0xFFFFFF) {
-    line += fmt::format("  last: LRBG {}/{} + {:.1f} m", picture.report->nid_lrbg() >> 14U,
-                        picture.report->nid_lrbg() & 0x3FFFU, picture.report->d_lrbg_m());
+  if (picture.report && etcs::names_group(picture.report->nid_lrbg())) {
+    line += fmt::format("  last: LRBG {}/{} + {:.1f} m", etcs::nid_c_of(picture.report->nid_lrbg()),
+                        etcs::nid_bg_of(picture.report->nid_lrbg()), picture.report->d_lrbg_m());
   }
   return line;
 }
