@@ -208,4 +208,10 @@ Status write_whole(const std::filesystem::path& file, const std::string& bytes) 
   return {};
 }
 
+Status write_whole_with_folders(const std::filesystem::path& file, const std::string& bytes) {
+  std::error_code failed;  // write_whole() then says what is missing
+  std::filesystem::create_directories(file.parent_path(), failed);
+  return write_whole(file, bytes);
+}
+
 }  // namespace railfix::core

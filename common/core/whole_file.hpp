@@ -26,9 +26,11 @@ Error cannot_write(const std::string& name);
 
 /// Writes beside the file's place and moves it there, so that nobody ever reads half of it, and of two processes that
 /// write it at once one wins; owner and rights stay. A link stays and its target is written. An error names the file,
-/// and what was there is as it was; but where the folder takes no other file beside it, it is written in its place. What
-/// is no regular file (a pipe, a device) or is open already (/dev/stdout, /dev/fd/N) is written into as it is, and
+/// and what was there is as it was; but where the folder takes no other file beside it, it is written in its place.
+/// What is no regular file (a pipe, a device) or is open already (/dev/stdout, /dev/fd/N) is written into as it is, and
 /// waited for; who reads a named pipe must come within 5 s. Does not wait for the disk: it is for run loops, too.
 Status write_whole(const std::filesystem::path& file, const std::string& bytes);
+/// The same, with the folders that it lies in.
+Status write_whole_with_folders(const std::filesystem::path& file, const std::string& bytes);
 
 }  // namespace railfix::core

@@ -206,6 +206,10 @@ double metres(uint32_t raw, uint32_t q_scale) {
   return std::round(raw * scale_m(q_scale) * 10) / 10;
 }
 
+std::optional<double> metres_if_known(uint32_t raw, uint32_t q_scale) {
+  return raw == kUnknownDistance ? std::nullopt : std::optional(metres(raw, q_scale));
+}
+
 core::Result<std::vector<uint8_t>> parse_hex(const std::string& text) {
   const auto digit = [](char c) -> int {
     if (c >= '0' && c <= '9') return c - '0';

@@ -95,6 +95,8 @@ uint32_t position_packet_bits(const TrainPositionReport& report, Baseline baseli
 double scale_m(uint32_t q_scale);
 /// What a distance of the message says: 3 of 10 cm are 0.3, which 3 * scale_m(0) is not.
 double metres(uint32_t raw, uint32_t q_scale);
+/// The same of a distance that may be unknown.
+std::optional<double> metres_if_known(uint32_t raw, uint32_t q_scale);
 /// "A5 0F" -> bytes; digits in pairs, spaces between pairs allowed.
 core::Result<std::vector<uint8_t>> parse_hex(const std::string& text);
 std::string to_hex(std::span<const uint8_t> bytes);

@@ -45,7 +45,6 @@ enum class Direction : uint8_t { unknown, forward, reverse };
 
 /// What trains may run on a stretch of an edge; direction unknown = both ways.
 struct SpeedLimit {
-  static constexpr double kFastestMps = 200;  // no train is faster
   double from_m = 0;
   double to_m = 0;
   double speed_mps = 0;

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <string_view>
 
+#include "core/train_limits.hpp"
 #include "core/whole_file.hpp"
 #include "idl/map.pb.h"
 #include "track/map.hpp"
@@ -69,7 +70,7 @@ core::Result<Edge> edge_from(const map::Edge& in) {
   }
   std::vector<SpeedLimit> limits;
   for (const map::SpeedLimit& l : in.speed_limits()) {
-    if (!finite({l.from_m(), l.to_m()}) || !(l.speed_mps() > 0 && l.speed_mps() < SpeedLimit::kFastestMps) ||
+    if (!finite({l.from_m(), l.to_m()}) || !(l.speed_mps() > 0 && l.speed_mps() < core::kFastestTrainMps) ||
         !map::SpeedLimit::Direction_IsValid(l.direction())) {
       return core::Error{"edge " + std::to_string(in.id()) + " has a speed limit that is none"};
     }

@@ -65,19 +65,16 @@ inline core::Result<Onboard> onboard_of(const msg::OnboardStatus& status) {
   return onboard;
 }
 
-inline double metres(uint32_t raw, uint32_t q_scale) {
-  return raw == etcs::kUnknownDistance ? std::nan("") : etcs::metres(raw, q_scale);
-}
-
 /// The values of the message, as it says them.
 inline msg::TrainPositionReport message_of(const Report& report, etcs::Baseline baseline) {
   const auto& fields = report.fields;
+  const auto metres = [&](uint32_t raw) { return etcs::metres_if_known(raw, fields.q_scale).value_or(std::nan("")); };
   msg::TrainPositionReport message;
   message.stamp_ns(report.stamp_ns);
   message.sent_ns(report.sent_ns);
-  message.d_lrbg_m(metres(fields.d_lrbg, fields.q_scale));
-  message.l_doubtover_m(metres(fields.l_doubtover, fields.q_scale));
-  message.l_doubtunder_m(metres(fields.l_doubtunder, fields.q_scale));
+  message.d_lrbg_m(metres(fields.d_lrbg));
+  message.l_doubtover_m(metres(fields.l_doubtover));
+  message.l_doubtunder_m(metres(fields.l_doubtunder));
   message.v_train_kmh(fields.v_train == etcs::kStandstillSpeed ? 0.0 : fields.v_train * etcs::kSpeedStepKmh);
   message.nid_engine(fields.nid_engine);
   message.nid_lrbg(fields.nid_lrbg);

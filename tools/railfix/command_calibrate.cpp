@@ -243,6 +243,7 @@ int calibrate_mount(const MountArguments& arguments) {
   calibration.mount_sigma->lateral_m =
       std::hypot(found.value().sigma.lateral_m, roll.sigma_rad * calibration.mount->height_m);
   core::ok_or_throw(dataset::write_calibration(arguments.out, calibration));
+  say_beside({arguments.out});
   const std::string drawn = arguments.draw.empty()
                                 ? std::filesystem::path(arguments.out).replace_extension(".mount.png").string()
                                 : arguments.draw;

@@ -152,6 +152,7 @@ int calibrate(LensArguments arguments) {
   }
   bool mount_kept = false;
   core::ok_or_throw(dataset::write_calibration(arguments.out, merged(arguments, found.value(), mount_kept)));
+  say_beside({arguments.out});
   const std::string drawn = arguments.draw.empty()
                                 ? std::filesystem::path(arguments.out).replace_extension(".lens.png").string()
                                 : arguments.draw;

@@ -43,9 +43,10 @@ const char* text_of(Arrival arrival) {
 }
 
 std::string metres(uint32_t raw, uint32_t q_scale) {
-  if (raw == etcs::kUnknownDistance) return "?";
+  const auto known = etcs::metres_if_known(raw, q_scale);
+  if (!known) return "?";
   char text[32];
-  std::snprintf(text, sizeof text, "%.1f", etcs::metres(raw, q_scale));
+  std::snprintf(text, sizeof text, "%.1f", *known);
   return text;
 }
 

@@ -26,6 +26,12 @@ inline std::string told_deg(double rad) {
   return told_number(core::deg_from_rad(rad), 1) + " degrees";
 }
 
+/// What a fit has left out of a drawing.
+inline std::string told_left_out(size_t points, double most_m) {
+  return std::to_string(points) + " point" + (points > 1 ? "s" : "") + " up to " + told_m(most_m) +
+         " beside the track that the others make; left out";
+}
+
 inline std::string called(const Edge& edge) {
   return "edge " + std::to_string(edge.id) + " (" + edge.name + ")";
 }

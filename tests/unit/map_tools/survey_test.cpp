@@ -181,8 +181,9 @@ TEST_F(RunTables, SightingsArePutOnTheMap) {
   write("sightings.csv",
         "stamp_ns,kind,distance_ahead_m,lateral_m,sigma_m,confidence\n"
         "1500000000,mast,5,-3,0.1,0.9\n1500000000,mast,30,3,0.2,0.9\n9000000000,mast,5,3,0.2,0.9\n");
-  const auto read = core::value_or_throw(read_sightings(map_, folder_, 7));
-  ASSERT_EQ(read.size(), 2U);  // the third is after the last state
+  const auto [read, placeless] = core::value_or_throw(read_sightings(map_, folder_, 7));
+  ASSERT_EQ(read.size(), 2U);
+  EXPECT_EQ(placeless, 1U) << "the third is after the last state";
   EXPECT_EQ(read[0].edge, 1U);
   EXPECT_NEAR(read[0].offset_m, 995, 1e-6);
   EXPECT_EQ(read[0].run, 7U);
@@ -194,7 +195,7 @@ TEST_F(RunTables, SightingsArePutOnTheMap) {
   write("train_state.csv",
         "stamp_ns,edge,offset_m,direction,track_known,speed_mps,sigma_m\n"
         "1000000000,1,980,+,1,20,0.4\n2000000000,2,3,+,1,20,0.5\n4000000000,2,43,+,1,20,0.1\n");
-  const auto moved = core::value_or_throw(read_sightings(map_, folder_, 7));
+  const auto moved = core::value_or_throw(read_sightings(map_, folder_, 7)).placed;
   ASSERT_EQ(moved.size(), 1U);
   EXPECT_NEAR(moved[0].way_m, 20, 1e-9);
   EXPECT_NEAR(moved[0].place_ahead_m, 3, 1e-9) << "a fix moved the place by 3 m, beyond the switch";
@@ -206,7 +207,7 @@ TEST_F(RunTables, ATrainThatBacksSeesFromWhereItIs) {
     write("train_state.csv", "stamp_ns,edge,offset_m,direction,track_known,speed_mps,sigma_m\n" + states);
     write("sightings.csv", "stamp_ns,kind,distance_ahead_m,lateral_m,sigma_m,confidence\n1500000000,portal_in," +
                                ahead + ",-3,0.1,0.9\n");
-    return core::value_or_throw(read_sightings(map_, folder_, 0)).at(0);
+    return core::value_or_throw(read_sightings(map_, folder_, 0)).placed.at(0);
   };
   const std::string forward = "1000000000,1,500,+,1,-20,0.4\n2000000000,1,480,+,1,-20,0.4\n";
   EXPECT_NEAR(seen_from(forward, "5").offset_m, 495, 1e-6);
@@ -316,7 +317,7 @@ TEST_F(RunTables, StampsThatGoFarBackAreRefused) {
                                sighting_s + "500000000,mast,5,3,0.1,1\n");
     return read_sightings(map_, folder_, 0);
   };
-  const auto read = core::value_or_throw(reading("10", "10"));
+  const auto read = core::value_or_throw(reading("10", "10")).placed;
   ASSERT_EQ(read.size(), 2U) << "a standby's late state does not count, two cameras take turns";
   EXPECT_NEAR(read[0].offset_m, 135, 1e-6);
   EXPECT_NEAR(read[1].offset_m, 115, 1e-6);

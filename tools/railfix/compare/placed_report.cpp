@@ -10,10 +10,6 @@ namespace railfix::compare {
 
 namespace {
 
-double metres(uint32_t raw, uint32_t q_scale) {
-  return raw == etcs::kUnknownDistance ? HUGE_VAL : etcs::metres(raw, q_scale);
-}
-
 /// Along the group's nominal direction.
 double speed_mps(const etcs::TrainPositionReport& fields) {
   if (fields.v_train == etcs::kStandstillSpeed || fields.v_train == 0) return 0;
@@ -70,9 +66,10 @@ std::optional<Axes::Group> Axes::on_line(const etcs::TrainPositionReport& fields
 std::optional<PlacedReport> Axes::place(const TimedReport& report) const {
   const auto& fields = report.fields;
   if (!position_known(fields)) return std::nullopt;
-  const double front_m = metres(fields.d_lrbg, fields.q_scale) * (fields.q_dlrbg == etcs::kNominal ? 1 : -1);
-  double behind_m = metres(fields.l_doubtover, fields.q_scale);  // in rear of the train's front end
-  double ahead_m = metres(fields.l_doubtunder, fields.q_scale);
+  const double front_m = etcs::metres(fields.d_lrbg, fields.q_scale) * (fields.q_dlrbg == etcs::kNominal ? 1 : -1);
+  // Behind and ahead of the train's front end; not known = it may be anywhere there.
+  double behind_m = etcs::metres_if_known(fields.l_doubtover, fields.q_scale).value_or(HUGE_VAL);
+  double ahead_m = etcs::metres_if_known(fields.l_doubtunder, fields.q_scale).value_or(HUGE_VAL);
   if (fields.q_dirlrbg == etcs::kUnknownSide) behind_m = ahead_m = std::max(behind_m, ahead_m);
   if (fields.q_dirlrbg == etcs::kReverse) std::swap(behind_m, ahead_m);
   PlacedReport placed{report.stamp_ns,    co_ordinate_system(fields), fields.nid_lrbg,   front_m,

@@ -122,7 +122,7 @@ int learn(const LearnRequest& request) {
   inputs.emplace_back(request.map);
   check_output("--out", request.out, inputs);
   const auto map = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(request.map)));
-  const auto sightings = core::value_or_throw(read_runs(map, {request.runs.begin(), request.runs.end()}));
+  const auto [sightings, placeless] = core::value_or_throw(read_runs(map, {request.runs.begin(), request.runs.end()}));
   const Survey survey = survey_landmarks(*map, sightings, request.options);
   track::Map updated = *map;
   apply_survey(survey, updated);
@@ -131,6 +131,8 @@ int learn(const LearnRequest& request) {
   std::printf("sightings        %zu of %zu runs, %zu used, %zu outliers, %zu of things seen by fewer than %zu runs\n",
               sightings.size(), request.runs.size(), survey.sightings, survey.outliers, survey.left_alone,
               request.options.least_runs);
+  if (placeless > 0)
+    std::printf("without a place  %zu more, where the track was not known or is not on the map\n", placeless);
   for (size_t run = 0; run < request.runs.size(); ++run) {
     if (std::ranges::none_of(sightings, [run](const SurveySighting& sighting) { return sighting.run == run; }))
       std::printf("nothing seen     %s has no sighting with a place on the map\n", request.runs[run].c_str());

@@ -60,12 +60,17 @@ Survey survey_landmarks(const track::Map& map, const std::vector<SurveySighting>
 /// Moves the known landmarks and adds the new ones.
 void apply_survey(const Survey& survey, track::Map& map);
 
-/// Sightings of a run's tables (sightings.csv, train_state.csv); those without a known track are left out.
-core::Result<std::vector<SurveySighting>> read_sightings(const std::shared_ptr<const track::Map>& map,
-                                                         const std::filesystem::path& run_folder, size_t run);
+struct ReadSightings {
+  std::vector<SurveySighting> placed;
+  size_t placeless = 0;  // left out: the track was not known there, or nothing of the map lies there
+};
+
+/// Sightings of a run's tables (sightings.csv, train_state.csv).
+core::Result<ReadSightings> read_sightings(const std::shared_ptr<const track::Map>& map,
+                                           const std::filesystem::path& run_folder, size_t run);
 
 /// Those of several runs; a folder given twice, however its path is spelled, is no second run and an error.
-core::Result<std::vector<SurveySighting>> read_runs(const std::shared_ptr<const track::Map>& map,
-                                                    const std::vector<std::filesystem::path>& run_folders);
+core::Result<ReadSightings> read_runs(const std::shared_ptr<const track::Map>& map,
+                                      const std::vector<std::filesystem::path>& run_folders);
 
 }  // namespace railfix::tool

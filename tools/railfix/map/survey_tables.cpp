@@ -189,8 +189,8 @@ std::optional<track::EdgePosition> place_at(const std::shared_ptr<const track::M
 
 }  // namespace
 
-core::Result<std::vector<SurveySighting>> read_sightings(const std::shared_ptr<const track::Map>& map,
-                                                         const std::filesystem::path& run_folder, size_t run) {
+core::Result<ReadSightings> read_sightings(const std::shared_ptr<const track::Map>& map,
+                                           const std::filesystem::path& run_folder, size_t run) {
   try {
     const std::vector<State> states = read_states(map, run_folder / "train_state.csv");
     const std::filesystem::path file = run_folder / "sightings.csv";
@@ -199,7 +199,7 @@ core::Result<std::vector<SurveySighting>> read_sightings(const std::shared_ptr<c
     const size_t stamp = at("stamp_ns"), kind = at("kind"), ahead = at("distance_ahead_m"), lateral = at("lateral_m");
     const size_t sigma = at("sigma_m");
     const std::optional<size_t> confidence = table.column({"confidence"});
-    std::vector<SurveySighting> out;
+    ReadSightings out;
     Stamps stamps;
     while (table.next()) {
       const int64_t when = stamps.next(table, stamp);
@@ -211,14 +211,17 @@ core::Result<std::vector<SurveySighting>> read_sightings(const std::shared_ptr<c
       check_confidence(table, confidence);
       const auto after = std::lower_bound(states.begin(), states.end(), when,
                                           [](const State& state, int64_t ns) { return state.stamp_ns < ns; });
-      if (after == states.begin() || after == states.end()) continue;
+      const bool between_states = after != states.begin() && after != states.end();
+      const auto place = between_states ? place_at(map, *(after - 1), *after, when, ahead_m) : std::nullopt;
+      if (!place) {
+        ++out.placeless;
+        continue;
+      }
       const State& before = *(after - 1);
-      const auto place = place_at(map, before, *after, when, ahead_m);
-      if (!place) continue;
       const bool is_reverse = place->direction == track::Direction::reverse;
-      out.push_back({run, before.way_m, track::seen_along(*what, !is_reverse), place->edge, place->offset_m,
-                     std::isfinite(side) ? (is_reverse ? -side : side) : 0.0, sigma_m, before.sigma_m,
-                     before.place_ahead_m, is_reverse});
+      out.placed.push_back({run, before.way_m, track::seen_along(*what, !is_reverse), place->edge, place->offset_m,
+                            std::isfinite(side) ? (is_reverse ? -side : side) : 0.0, sigma_m, before.sigma_m,
+                            before.place_ahead_m, is_reverse});
     }
     core::ok_or_throw(table.status());
     return out;
@@ -227,9 +230,9 @@ core::Result<std::vector<SurveySighting>> read_sightings(const std::shared_ptr<c
   }
 }
 
-core::Result<std::vector<SurveySighting>> read_runs(const std::shared_ptr<const track::Map>& map,
-                                                    const std::vector<std::filesystem::path>& run_folders) {
-  std::vector<SurveySighting> out;
+core::Result<ReadSightings> read_runs(const std::shared_ptr<const track::Map>& map,
+                                      const std::vector<std::filesystem::path>& run_folders) {
+  ReadSightings out;
   for (size_t i = 0; i < run_folders.size(); ++i) {
     for (size_t before = 0; before < i; ++before) {
       std::error_code unreadable;  // told below
@@ -239,7 +242,9 @@ core::Result<std::vector<SurveySighting>> read_runs(const std::shared_ptr<const 
     }
     auto read = read_sightings(map, run_folders[i], i);
     if (!read.ok()) return read.error();
-    out.insert(out.end(), read.value().begin(), read.value().end());
+    const auto& [placed, placeless] = read.value();
+    out.placed.insert(out.placed.end(), placed.begin(), placed.end());
+    out.placeless += placeless;
   }
   return out;
 }

@@ -31,12 +31,6 @@ auto load(const fs::path& file, Read read) -> std::optional<decltype(read(YAML::
   }
 }
 
-core::Status replace(const fs::path& file, const std::string& text) {
-  std::error_code failed;
-  fs::create_directories(file.parent_path(), failed);
-  return core::write_whole(file, text);
-}
-
 void require(bool holds, const YAML::Node& node, const char* what) {
   if (!holds) throw YAML::RepresentationException(node.Mark(), what);
 }
@@ -148,7 +142,7 @@ core::Status HostFolder::write_to(const fs::path& folder, const HostPlan& plan) 
     node["made_of"] = service.made_of;
     root["services"].push_back(node);
   }
-  return replace(folder / "plan.yaml", YAML::Dump(root) + "\n");
+  return core::write_whole_with_folders(folder / "plan.yaml", YAML::Dump(root) + "\n");
 }
 
 bool RunningService::runs() const {
@@ -169,7 +163,7 @@ core::Status HostFolder::write(const HostState& state) const {
     root[name]["beside"] = service.beside;
     root[name]["born"] = service.born;
   }
-  return replace(folder_ / "state.yaml", YAML::Dump(root) + "\n");
+  return core::write_whole_with_folders(folder_ / "state.yaml", YAML::Dump(root) + "\n");
 }
 
 }  // namespace railfix::tool

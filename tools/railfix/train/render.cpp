@@ -64,12 +64,6 @@ YAML::Node settings_on(const Manifest& manifest, const TrainHost& host, const st
   return settings;
 }
 
-core::Status write(const fs::path& file, const std::string& text) {
-  std::error_code failed;
-  fs::create_directories(file.parent_path(), failed);
-  return core::write_whole(file, text);
-}
-
 // The keys of this host: the owner and the services' group may read them.
 core::Status copy_files(const Manifest& manifest, const TrainHost& host, const fs::path& folder) {
   const auto options = fs::copy_options::overwrite_existing | fs::copy_options::recursive;
@@ -221,7 +215,7 @@ core::Status render_host(const Manifest& manifest, const TrainHost& host, const 
                                           {"compose.yaml", render_compose(manifest, host, at)},
                                           {"systemd/railfix.service", kSystemdUnit},
                                           {"systemd/60-railfix.conf", kSysctl}}) {
-    if (const auto written = write(folder / name, text); !written.ok()) return written;
+    if (const auto written = core::write_whole_with_folders(folder / name, text); !written.ok()) return written;
   }
   if (!manifest.containers || geteuid() != 0) return {};
   for (const char* secrets : {"security", "files"}) {

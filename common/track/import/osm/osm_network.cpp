@@ -306,9 +306,7 @@ class Builder {
 
   void tell_left_out(const std::string& track, const ClothoidFit& fit) {
     if (fit.left_out == 0) return;
-    out_.problems.push_back("edge " + track + " has " + std::to_string(fit.left_out) + " point" +
-                            (fit.left_out > 1 ? "s" : "") + " up to " + told_m(fit.left_out_max_m) +
-                            " beside the track that the others make; left out");
+    out_.problems.push_back("edge " + track + " has " + told_left_out(fit.left_out, fit.left_out_max_m));
   }
 
   /// The name (else the number) of the way with most segments of the chain.

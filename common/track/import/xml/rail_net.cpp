@@ -98,9 +98,8 @@ class Planner {
     if (std::optional<ClothoidFit> smooth = fit_drawing(track.shape, {})) {
       net_.fit.add(track.track.name, *smooth, track.shape.size());
       if (smooth->left_out > 0) {
-        net_.problems.push_back("track " + track.track.name + " has " + std::to_string(smooth->left_out) +
-                                " points up to " + told_m(smooth->left_out_max_m) +
-                                " beside the track that the others make; left out");
+        net_.problems.push_back("track " + track.track.name + " has " +
+                                told_left_out(smooth->left_out, smooth->left_out_max_m));
       }
       track.track.alignment = std::move(smooth->alignment);
       return;
