@@ -2,9 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-
-#include "core/time.hpp"
 
 namespace railfix::core {
 namespace {
@@ -13,23 +10,31 @@ constexpr int64_t kWindowNs = 2 * kNsPerSecond;
 constexpr size_t kMostWindows = 16;
 constexpr size_t kWindowsForDrift = 5;
 constexpr double kWorstDrift = 3e-4;
-constexpr int64_t kSetAnewNs = kNsPerSecond;
+constexpr int64_t kLateNs = kNsPerSecond;
+constexpr int64_t kNotLateNs = 3 * kNsPerSecond;  // who comes so late for so long has another clock
 
 }  // namespace
 
-int64_t DeviceClock::host_ns(int64_t device_ns, int64_t arrival_ns) {
-  const int64_t offset = arrival_ns - device_ns;
-  const bool set_back = last_device_ns_ && device_ns <= *last_device_ns_;
-  const bool jumped = !lowest_.empty() && std::abs(offset - offset_ns(device_ns)) > kSetAnewNs;
-  if (set_back || jumped) {
+int64_t DeviceClock::host_ns(int64_t device_ns, const HostTime& arrival) {
+  if (is_set_anew(device_ns, arrival.monotonic_ns)) {
     lowest_.clear();
     drift_ = 0;
-    if (jumped) last_host_ns_ = INT64_MIN;
+    late_since_ns_.reset();
   }
   last_device_ns_ = device_ns;
-  add(device_ns, offset);
+  if (!late_since_ns_) add(device_ns, arrival.monotonic_ns - device_ns);
   last_host_ns_ = std::max(last_host_ns_ + 1, device_ns + offset_ns(device_ns));
-  return last_host_ns_;
+  return last_host_ns_ + arrival.wall_ns - arrival.monotonic_ns;
+}
+
+// No message comes before its least time; late ones come one behind the other until the link has caught up.
+bool DeviceClock::is_set_anew(int64_t device_ns, int64_t arrival_ns) {
+  if (!last_device_ns_) return false;
+  const int64_t late_ns = arrival_ns - device_ns - offset_ns(device_ns);
+  if (late_ns <= kLateNs) late_since_ns_.reset();
+  if (late_ns > kLateNs && !late_since_ns_) late_since_ns_ = arrival_ns;
+  return device_ns <= *last_device_ns_ || late_ns < -kLateNs ||
+         (late_since_ns_ && arrival_ns - *late_since_ns_ > kNotLateNs);
 }
 
 void DeviceClock::add(int64_t device_ns, int64_t offset) {

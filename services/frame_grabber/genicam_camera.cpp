@@ -231,7 +231,11 @@ int64_t GenicamCamera::mid_exposure_ns(ArvBuffer* buffer) {
   const auto arrival_ns = static_cast<int64_t>(arv_buffer_get_system_timestamp(buffer));
   const int64_t half_ns = core::to_ns(exposure_s_ / 2);
   if (host_time_ && std::abs(camera_ns - arrival_ns) < core::kNsPerSecond) return camera_ns + half_ns;
-  return clock_.host_ns(camera_ns, arrival_ns) - half_ns - core::to_ns(config_.latency_ms * 1e-3);
+  const core::HostTime now = core::host_time();
+  const int64_t waited_ns =
+      std::clamp<int64_t>(now.wall_ns - arrival_ns, 0, core::kNsPerSecond);  // the clock may be set
+  return clock_.host_ns(camera_ns, {now.wall_ns - waited_ns, now.monotonic_ns - waited_ns}) - half_ns -
+         core::to_ns(config_.latency_ms * 1e-3);
 }
 
 uint64_t GenicamCamera::lost_before(uint64_t frame_id) {

@@ -13,13 +13,13 @@ constexpr int64_t kLatestNs = core::kNsPerSecond;    // slow receivers need most
 constexpr int64_t kGapNs = 30 * core::kNsPerSecond;  // what was learnt before may not be true any more
 }  // namespace
 
-std::optional<int64_t> GnssClock::stamp_ns(int64_t utc_ns, int64_t arrival_ns, bool clock_is_kept) {
+std::optional<int64_t> GnssClock::stamp_ns(int64_t utc_ns, const core::HostTime& arrival, bool clock_is_kept) {
   if (last_utc_ns_ && std::abs(utc_ns - *last_utc_ns_) > kGapNs) {
     clock_ = core::DeviceClock();
     learnt_from_ = 0;
   }
   last_utc_ns_ = utc_ns;
-  const int64_t host_ns = clock_.host_ns(utc_ns, arrival_ns);
+  const int64_t host_ns = clock_.host_ns(utc_ns, arrival);
   const bool learnt = ++learnt_from_ >= kReportsToLearn;
   contradiction_s_.reset();
   if (!clock_is_kept) return learnt ? std::optional(host_ns - latency_ns_) : std::nullopt;

@@ -63,10 +63,10 @@ class GpsdReceiver final : public LiveSensor {
       return core::Error{name() + " has closed the connection (" + got.error().message +
                          "); check gpsd, it is tried again"};
     }
-    const int64_t arrival_ns = core::wall_ns();
+    const core::HostTime arrival = core::host_time();
     std::vector<Sample> samples;
-    for (const auto& report : reports_.read(std::span(bytes_).first(got.value()), arrival_ns)) {
-      if (const auto stamp_ns = stamp_of(report, arrival_ns)) {
+    for (const auto& report : reports_.read(std::span(bytes_).first(got.value()), arrival.wall_ns)) {
+      if (const auto stamp_ns = stamp_of(report, arrival)) {
         samples.emplace_back(report.row);
         std::get<dataset::GnssRow>(samples.back()).stamp_ns = *stamp_ns;
       }
@@ -84,9 +84,9 @@ class GpsdReceiver final : public LiveSensor {
 
  private:
   /// A receiver that has not yet heard of the time can still tell that it has no position.
-  std::optional<int64_t> stamp_of(const GpsdReport& report, int64_t arrival_ns) {
-    if (!report.utc_ns) return arrival_ns - latency_ns_;
-    return clock_.stamp_ns(*report.utc_ns, arrival_ns, core::clock_error_ns().has_value());
+  std::optional<int64_t> stamp_of(const GpsdReport& report, const core::HostTime& arrival) {
+    if (!report.utc_ns) return arrival.wall_ns - latency_ns_;
+    return clock_.stamp_ns(*report.utc_ns, arrival, core::clock_error_ns().has_value());
   }
   [[nodiscard]] std::string contradiction(double ahead_s) const {
     return fmt::format(

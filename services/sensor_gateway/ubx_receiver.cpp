@@ -36,10 +36,10 @@ class UbxReceiver final : public LiveSensor {
     const auto got = line_.read(bytes_, patience);
     if (!got.ok())
       return core::Error{name() + " was unplugged (" + got.error().message + "); check the cable, it is tried again"};
-    const int64_t arrival_ns = core::wall_ns();
+    const core::HostTime arrival = core::host_time();
     std::vector<Sample> samples;
-    for (const auto& sample : readings_.read(std::span(bytes_).first(got.value()), arrival_ns)) {
-      if (wanted(sample)) samples.push_back(in_train(sample, arrival_ns));
+    for (const auto& sample : readings_.read(std::span(bytes_).first(got.value()), arrival.wall_ns)) {
+      if (wanted(sample)) samples.push_back(in_train(sample, arrival));
     }
     return samples;
   }
@@ -54,9 +54,9 @@ class UbxReceiver final : public LiveSensor {
   [[nodiscard]] bool wanted(const Sample& sample) const {
     return (std::holds_alternative<dataset::ImuRow>(sample) ? config_.imu : config_.wheel) == source_;
   }
-  Sample in_train(Sample sample, int64_t arrival_ns) {
+  Sample in_train(Sample sample, const core::HostTime& arrival) {
     auto& clock = clocks_[sample.index()];
-    std::visit([&](auto& row) { row.stamp_ns = clock.host_ns(row.stamp_ns, arrival_ns) - latency_ns_; }, sample);
+    std::visit([&](auto& row) { row.stamp_ns = clock.host_ns(row.stamp_ns, arrival) - latency_ns_; }, sample);
     if (auto* imu = std::get_if<dataset::ImuRow>(&sample)) axes_.turn(*imu);
     if (auto* wheel = std::get_if<dataset::WheelRow>(&sample); wheel != nullptr && config_.wheel_reversed)
       wheel->pulses = -wheel->pulses;

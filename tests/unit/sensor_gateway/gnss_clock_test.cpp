@@ -18,7 +18,7 @@ std::optional<double> stamp_off_s(GnssClock& clock, double ahead_s, bool kept, i
   for (int i = 0; i < reports; ++i) {
     const int64_t utc_ns = to_ns(kUtcS) + to_ns(from_s + i);
     const int64_t arrival_ns = utc_ns + to_ns(ahead_s) + kLatencyNs + to_ns(i % 3 * 0.1);
-    const auto stamp_ns = clock.stamp_ns(utc_ns, arrival_ns, kept);
+    const auto stamp_ns = clock.stamp_ns(utc_ns, {arrival_ns, arrival_ns - to_ns(ahead_s)}, kept);
     off_s = stamp_ns ? std::optional(core::seconds(*stamp_ns - utc_ns)) : std::nullopt;
   }
   return off_s;
@@ -38,6 +38,19 @@ TEST(GnssClock, TheArrivalWhereNobodyKeepsIt) {
     const auto off_s = stamp_off_s(clock, ahead_s, false, 60, 3);
     ASSERT_TRUE(off_s);
     EXPECT_NEAR(*off_s, ahead_s, 0.02);
+  }
+}
+
+// A link that is cut for three seconds brings their reports together.
+TEST(GnssClock, ReportsThatWereHeldBackHaveTheTimeOfTheirPosition) {
+  GnssClock clock(kLatencyNs);
+  (void)stamp_off_s(clock, 0.4, false, 60);
+  const int64_t together_ns = to_ns(kUtcS) + to_ns(63.4) + kLatencyNs;
+  for (int i = 60; i < 64; ++i) {
+    const int64_t utc_ns = to_ns(kUtcS) + to_ns(i);
+    const auto stamp_ns = clock.stamp_ns(utc_ns, {together_ns, together_ns - to_ns(0.4)}, false);
+    ASSERT_TRUE(stamp_ns);
+    EXPECT_NEAR(core::seconds(*stamp_ns - utc_ns), 0.4, 0.02) << i;
   }
 }
 
