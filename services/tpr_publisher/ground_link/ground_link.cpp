@@ -102,7 +102,7 @@ void GroundLink::run() {
     for (auto& event : events) take(event);
     if (!unstored_.empty() || !delivered_.empty()) store_trouble_.clear();  // unless it is met again
     remove_delivered();
-    store_new();
+    store_new(last);
     try_again();
     publish();
     say();
@@ -149,7 +149,9 @@ void GroundLink::take(const Refused& report) {
 void GroundLink::wait_again(int id) {
   auto unstored = unstored_under_way_.extract(id);
   if (!unstored) return;
-  const auto later = [&](const auto& one) { return one.sequence == 0 || one.sequence > unstored.mapped().sequence; };
+  const auto later = [&](const auto& one) {
+    return !one.has_number() || one.report.sequence > unstored.mapped().report.sequence;
+  };
   unstored_.insert(std::ranges::find_if(unstored_, later), std::move(unstored.mapped()));
 }
 
@@ -167,9 +169,13 @@ void GroundLink::remove_delivered() {
   }
 }
 
-void GroundLink::store_new() {
-  while (!unstored_.empty()) {
-    const auto sequence = store_.append(ground_link::to_bytes(unstored_.front()));
+// One that has a number of the memory's stream keeps it, stored at the end at most: the broker may have it already, and
+// the ground would miss that number.
+void GroundLink::store_new(bool all) {
+  const auto has_none = [](const Unstored& one) { return !one.has_number(); };
+  auto next = all ? unstored_.begin() : std::ranges::find_if(unstored_, has_none);
+  while (next != unstored_.end()) {
+    const auto sequence = store_.append(ground_link::to_bytes(next->report));
     if (!sequence.ok()) {
       store_trouble_ = sequence.error().message;
       while (unstored_.size() > kMostUnstored) {
@@ -179,7 +185,7 @@ void GroundLink::store_new() {
       return;
     }
     outbox_.stored(sequence.value());
-    unstored_.pop_front();
+    next = unstored_.erase(next);
   }
   const auto dropped = outbox_.limit(settings_.store_limit);
   dropped_ += dropped.size();
@@ -187,9 +193,11 @@ void GroundLink::store_new() {
 }
 
 void GroundLink::publish() {
-  publish_trouble_.clear();  // unless it is met again
-  publish_stored();
-  publish_unstored();
+  publish_trouble_.clear();               // unless it is met again
+  for (int part = 0; part < 2; ++part) {  // up to what has a number in memory, and beyond
+    publish_stored();
+    publish_unstored();
+  }
 }
 
 std::string GroundLink::broker() const {
@@ -211,15 +219,16 @@ std::optional<int> GroundLink::give(ground_link::GroundReport report, uint64_t s
 }
 
 void GroundLink::publish_unstored() {
-  while (!unstored_.empty() && outbox_.takes_unstored()) {
-    auto& report = unstored_.front();
+  while (!unstored_.empty() && outbox_.takes_unstored(unstored_.front().behind)) {
+    auto& [report, behind] = unstored_.front();
     const uint64_t sequence = report.sequence != 0 ? report.sequence : memory_sequence_ + 1;
     const auto id = give(report, memory_stream_, sequence);
     if (!id) return;
     memory_sequence_ = std::max(memory_sequence_, sequence);
     report.sequence = sequence;
+    behind = std::min(behind, outbox_.newest());
     outbox_.published_unstored(*id);
-    unstored_under_way_.insert_or_assign(*id, std::move(report));
+    unstored_under_way_.insert_or_assign(*id, std::move(unstored_.front()));
     unstored_.pop_front();
   }
 }
@@ -235,7 +244,8 @@ bool GroundLink::waits_to_read(const core::Error& error) {
 
 void GroundLink::publish_stored() {
   read_trouble_.clear();
-  while (const auto sequence = outbox_.next()) {
+  const uint64_t last = unstored_.empty() ? UINT64_MAX : unstored_.front().behind;
+  for (auto sequence = outbox_.next(); sequence && *sequence <= last; sequence = outbox_.next()) {
     const auto bytes = store_.read(*sequence);
     if (!bytes.ok() && waits_to_read(bytes.error())) return;
     if (bytes.ok()) unreadable_since_.reset();
@@ -260,9 +270,15 @@ void GroundLink::say() {
   }
   if (dropped_ > 0)
     sentence += (sentence.empty() ? "" : " ") + std::to_string(dropped_) + " reports for the ground are lost.";
-  const std::string storing =
-      store_trouble_.empty() ? ""
-                             : store_trouble_ + " Reports go from memory, and a power cut would lose those that wait.";
+  const size_t in_memory = unstored_.size() + unstored_under_way_.size();
+  std::string storing;
+  if (!store_trouble_.empty()) {
+    storing = store_trouble_ + " Reports go from memory: " + std::to_string(in_memory) +
+              " wait there, and a power cut would lose them.";
+  } else if (in_memory > 0) {
+    storing = "The store works again; " + std::to_string(in_memory) +
+              " reports of before wait in memory, and a power cut would lose them.";
+  }
   const std::string reading =
       read_trouble_.empty() ? "" : read_trouble_ + " Stored reports wait until they can be read again.";
   for (const auto& trouble : {storing, reading, store_.problem()}) {
@@ -271,7 +287,7 @@ void GroundLink::say() {
   const std::lock_guard lock(mutex_);
   trouble_ = sentence;
   connected_ = own_trouble.empty() && refusal_.empty();
-  stores_ = store_trouble_.empty();
+  stores_ = storing.empty();
 }
 
 }  // namespace railfix::tpr_publisher

@@ -61,12 +61,17 @@ class GroundLink {
     int id;
     std::string why;
   };
+  struct Unstored {
+    ground_link::GroundReport report;  // has its number from when it was first under way
+    uint64_t behind = UINT64_MAX;      // the newest in the store at that time
+    [[nodiscard]] bool has_number() const { return report.sequence != 0; }
+  };
   using Event = std::variant<ground_link::GroundReport, Connected, Disconnected, Delivered, Refused>;
   void push(Event event);
   [[nodiscard]] std::deque<Event> wait();
   void run();
   void take(Event& event);
-  void take(ground_link::GroundReport& report) { unstored_.push_back(std::move(report)); }
+  void take(ground_link::GroundReport& report) { unstored_.push_back({std::move(report)}); }
   void take(const Connected& now);
   void take(const Disconnected& lost);
   void take(const Delivered& report);
@@ -74,7 +79,7 @@ class GroundLink {
   void wait_again(int id);
   void try_again();
   void remove_delivered();
-  void store_new();
+  void store_new(bool all);
   void publish();
   void publish_stored();
   [[nodiscard]] bool waits_to_read(const core::Error& error);
@@ -89,8 +94,8 @@ class GroundLink {
   GroundLinkSettings settings_;
   ReportStore store_;  // from here on the worker's own, until mutex_
   Outbox outbox_;
-  std::deque<ground_link::GroundReport> unstored_;  // one that was under way has its number
-  std::map<int, ground_link::GroundReport> unstored_under_way_;
+  std::deque<Unstored> unstored_;
+  std::map<int, Unstored> unstored_under_way_;
   std::vector<uint64_t> delivered_;  // to be removed from the store
   uint64_t memory_stream_;           // of what was never stored
   uint64_t memory_sequence_ = 0;

@@ -1,7 +1,7 @@
 // Which report goes to the broker next: in order, a few under way at a time, each until the broker has confirmed it.
 // On a new connection, and after a report that the broker refused, one goes alone until it is confirmed: of several the
 // broker could take a later one first, or end the connection before its refusal of the first is heard.
-// What could not be stored is newer than everything stored, and goes behind it.
+// What could not be stored goes behind what was stored until then, and before what was stored since.
 #pragma once
 
 #include <cstdint>
@@ -17,14 +17,21 @@ class Outbox {
   explicit Outbox(size_t most_under_way) : most_under_way_(most_under_way) {}
 
   /// A report is in the store. REQUIRES: numbers grow.
-  void stored(uint64_t sequence) { waiting_.push_back(sequence); }
+  void stored(uint64_t sequence) {
+    waiting_.push_back(sequence);
+    newest_ = sequence;
+  }
   void connected();
   /// Whether the broker has what was under way is not known: it waits in its place again.
   void disconnected();
   /// The report to publish now.
   [[nodiscard]] std::optional<uint64_t> next() const;
-  /// All that is stored is under way, and one more may be.
-  [[nodiscard]] bool takes_unstored() const { return may_publish() && waiting_.empty(); }
+  /// The newest one that is or was in the store, 0 = none yet.
+  [[nodiscard]] uint64_t newest() const { return newest_; }
+  /// All that is stored up to this number is under way, and one more may be.
+  [[nodiscard]] bool takes_unstored(uint64_t behind) const {
+    return may_publish() && (waiting_.empty() || waiting_.front() > behind);
+  }
   void published_unstored(int id) { under_way_[id] = std::nullopt; }
   /// next() was given to the client under this id.
   void published(int id);
@@ -52,6 +59,7 @@ class Outbox {
   bool alone_ = true;
   bool held_ = false;
   std::deque<uint64_t> waiting_;
+  uint64_t newest_ = 0;
   UnderWay under_way_;  // by the client's id; nothing = not stored
 };
 

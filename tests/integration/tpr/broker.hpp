@@ -42,6 +42,9 @@ class Broker {
     was_up_ = true;
     program_->end(SIGTERM);
   }
+  /// It does not read what comes, as one that is overloaded, until it goes on.
+  void pause() { program_->send(SIGSTOP); }
+  void go_on() { program_->send(SIGCONT); }
   /// Reads its files of passwords and rights again.
   void reload() { program_->send(SIGHUP); }
   [[nodiscard]] std::string address() const { return "localhost:" + std::to_string(port_); }

@@ -50,6 +50,10 @@ class Ground {
     const std::lock_guard lock(mutex_);
     return twice_;
   }
+  [[nodiscard]] size_t missing() const {
+    const std::lock_guard lock(mutex_);
+    return watch_.missing();
+  }
 
  private:
   void receive(std::span<const uint8_t> payload) {

@@ -91,6 +91,45 @@ TEST_F(GroundLinkTest, WhatCannotBeStoredGoesFromMemoryUntilThereIsRoomAgain) {
   EXPECT_EQ(arrived[8].stream, arrived[0].stream);
 }
 
+// The broker may have taken it before the connection broke: under another number the ground would have it as two.
+TEST_F(GroundLinkTest, WhatWasUnderWayFromMemoryKeepsItsNumberWhenThereIsRoomAgain) {
+  test::Broker broker(file("broker"));
+  ASSERT_TRUE(broker.start());
+  Ground ground(broker.address(), train_);
+  ASSERT_TRUE(ground.subscribed());
+  auto settings = link_settings(broker.address());
+  settings.mqtt.keep_alive_s = 5;
+  tpr_publisher::GroundLink link(settings);
+  const auto usual = std::signal(SIGXFSZ, SIG_IGN);
+  const auto limit_files = [](rlim_t bytes) {
+    const rlimit limit{bytes, RLIM_INFINITY};
+    return setrlimit(RLIMIT_FSIZE, &limit);
+  };
+  const auto says = [&](const char* text) { return link.trouble().find(text) != std::string::npos; };
+  link.send(report(1));
+  ASSERT_TRUE(wait_for([&] { return ground.count() == 1; })) << link.trouble();
+  ASSERT_EQ(limit_files(1024), 0);
+  link.send(report(2));
+  const bool from_memory = wait_for([&] { return ground.count() == 2 && says("from memory: 0 wait"); });
+  broker.pause();
+  link.send(report(3));
+  const bool under_way = wait_for([&] { return says("from memory: 1 wait"); });
+  ASSERT_EQ(limit_files(RLIM_INFINITY), 0);
+  std::signal(SIGXFSZ, usual);
+  ASSERT_TRUE(from_memory && under_way) << link.trouble();
+  link.send(report(4));
+  EXPECT_TRUE(wait_for([&] { return says("The store works again; 1 reports"); })) << link.trouble();
+  ASSERT_TRUE(wait_for([&] { return !link.connected(); }));
+  link.send(report(5));
+  broker.go_on();
+  ASSERT_TRUE(wait_for([&] { return ground.count() >= 5 && link.connected() && link.trouble().empty(); }))
+      << link.trouble();
+  const auto arrived = ground.reports();
+  ASSERT_EQ(arrived.size(), 5U);
+  for (size_t i = 0; i < arrived.size(); ++i) EXPECT_EQ(arrived[i].stamp_ns, static_cast<int64_t>(i + 1));
+  EXPECT_EQ(ground.missing(), 0U);
+}
+
 TEST_F(GroundLinkTest, ListenPrintsEachReportOnce) {
   test::Broker broker(file("broker"));
   ASSERT_TRUE(broker.start());

@@ -58,21 +58,38 @@ TEST(Outbox, WhatALostConnectionHadUnderWayWaitsInItsPlaceAgain) {
 
 TEST(Outbox, WhatIsNotStoredGoesBehindWhatIs) {
   Outbox outbox(2);
-  EXPECT_FALSE(outbox.takes_unstored());  // not connected
+  EXPECT_FALSE(outbox.takes_unstored(UINT64_MAX));  // not connected
   outbox.stored(7);
   outbox.connected();
-  EXPECT_FALSE(outbox.takes_unstored());
+  EXPECT_FALSE(outbox.takes_unstored(UINT64_MAX));
   outbox.published(101);
-  EXPECT_FALSE(outbox.takes_unstored()) << "7 goes alone";
+  EXPECT_FALSE(outbox.takes_unstored(UINT64_MAX)) << "7 goes alone";
   EXPECT_EQ(outbox.delivered(101), 7U);
   outbox.published_unstored(102);
-  EXPECT_TRUE(outbox.takes_unstored());
+  EXPECT_TRUE(outbox.takes_unstored(UINT64_MAX));
   outbox.published_unstored(103);
-  EXPECT_FALSE(outbox.takes_unstored()) << "two are under way";
+  EXPECT_FALSE(outbox.takes_unstored(UINT64_MAX)) << "two are under way";
   outbox.disconnected();
   EXPECT_EQ(outbox.size(), 0U) << "its owner keeps it";
   outbox.connected();
-  EXPECT_TRUE(outbox.takes_unstored());
+  EXPECT_TRUE(outbox.takes_unstored(UINT64_MAX));
+}
+
+TEST(Outbox, WhatIsNotStoredGoesBeforeWhatIsStoredSince) {
+  Outbox outbox(1);
+  outbox.connected();
+  outbox.stored(7);
+  outbox.published(101);
+  EXPECT_EQ(outbox.delivered(101), 7U);
+  EXPECT_TRUE(outbox.takes_unstored(outbox.newest()));
+  outbox.published_unstored(102);
+  const uint64_t behind = outbox.newest();
+  outbox.stored(8);
+  outbox.disconnected();
+  outbox.connected();
+  EXPECT_EQ(behind, 7U);
+  EXPECT_TRUE(outbox.takes_unstored(behind));
+  EXPECT_FALSE(outbox.takes_unstored(outbox.newest())) << "8 waits";
 }
 
 TEST(Outbox, WhatIsRefusedWaitsInItsPlaceAndGoesAloneUntilItIsTaken) {
