@@ -14,6 +14,8 @@
 #include <mutex>
 #include <thread>
 
+#include "ground_link/name_lookup.hpp"
+
 namespace railfix::ground_link {
 
 namespace {
@@ -167,6 +169,10 @@ class MqttClient::Connection {
     } catch (const core::BadInput& error) {  // the certificates were there when this began
       return error.what();
     }
+    // Mosquitto asks for the name, too, and its certificate is checked against it; but it waits however long that
+    // takes.
+    if (const auto known = look_up(options_.host, [this] { return stopped(); }); !known.ok())
+      return options_.host + ": " + known.error().message;
     mosquitto_int_option(client_.get(), MOSQ_OPT_PROTOCOL_VERSION, static_cast<int>(version_));
     int code = mosquitto_connect_async(client_.get(), options_.host.c_str(), options_.port, options_.keep_alive_s);
     while (code == MOSQ_ERR_SUCCESS && !stopped()) code = mosquitto_loop(client_.get(), kLoopMs, 1);
