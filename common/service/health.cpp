@@ -66,7 +66,7 @@ void PublishedHealth::output(int64_t grabbed_ns) {
   traffic_.last_output_ns = core::monotonic_ns();
   status_.frames_out(status_.frames_out() + 1);
   if (grabbed_ns > 0 && latencies_ms_.size() < kMostLatencies) {
-    latencies_ms_.push_back(core::seconds(core::wall_ns() - grabbed_ns) * 1e3);
+    latencies_ms_.push_back(static_cast<double>(core::wall_ns() - grabbed_ns) / 1e6);
   }
 }
 
