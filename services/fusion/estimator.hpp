@@ -209,6 +209,7 @@ class Estimator {
   static constexpr int kGnssProof = 30;
   static constexpr int kRefusalsToIsolate = 3;  // in a row
   static constexpr double kLatelyS = 1.0;
+  static constexpr double kBlindS = 0.3;  // the camera
   enum class FixVerdict : uint8_t { none, used, corrected, refused };
   struct RefusedFix {
     double residual_m = 0;

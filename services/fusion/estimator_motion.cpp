@@ -1,10 +1,9 @@
-// Camera, wheel and IMU: what measures the motion.
+// Camera and wheel: what measures the motion, and who is believed where they contradict each other.
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "core/time.hpp"
-#include "core/units.hpp"
 #include "fusion/estimator.hpp"
 
 namespace railfix::fusion {
@@ -12,9 +11,6 @@ namespace {
 
 constexpr int kRefusalsToDoubt = 10;
 constexpr int kAgreementsOfCamera = 10;
-constexpr int kAgreementsOfImu = 60;
-constexpr int kRepeatedSamples = 10;   // and for ...
-constexpr double kRepeatedS = 0.15;    // ... so long
 constexpr double kRecoveryWayM = 1.0;  // a wheel shows by turning that it is well again
 constexpr double kRecoveryS = 0.9;     // beside a camera ...
 constexpr double kTurnsM = 0.3;
@@ -25,13 +21,9 @@ constexpr double kSlipTestSigmas = 3.0;
 constexpr double kSlipSigmas = 4.5;
 constexpr double kScatterResolutions = 3.0;
 constexpr double kSilentS = 1.0;
-constexpr double kSilentSlip = 0.1;           // share of the way
-constexpr double kGyroPositionSigmaM = 30.0;  // within which the curvature may be taken as linear
-constexpr double kTurnSigmas = 4.0;
-constexpr double kTurnSigmasOfTwo = 2.0;  // without the worst second
+constexpr double kSilentSlip = 0.1;  // share of the way
 constexpr double kTaughtS = 30.0;
 constexpr double kSleeperM = 0.7;  // one more or less: the odd error of a step
-constexpr double kBlindS = 0.3;
 constexpr double kHiddenSlipMps = 0.7;
 constexpr double kHiddenSlipShare = 0.07;  // of the speed
 constexpr double kUnseenBiasSigmas = 4.0;
@@ -283,133 +275,6 @@ void Estimator::recover_wheel(const WheelInput& sample, double wheel_m, double s
   wheel_.on_trial = !used_within(Source::camera, kBlindS);
   // It tells how fast the train is from now on, not how far the IMU was out before.
   if (wheel_.on_trial) filter_.loosen_speed(filter_.sigma(StateIndex::speed));
-}
-
-std::optional<double> Estimator::Mean::add(int64_t stamp_ns, double value, double period_s) {
-  if (count == 0 || core::seconds(stamp_ns - last_ns) > 0.5) *this = {stamp_ns, stamp_ns, 0, 0};
-  last_ns = stamp_ns;
-  sum += value;
-  ++count;
-  if (core::seconds(stamp_ns - since_ns) < period_s) return std::nullopt;
-  const double mean = sum / count;
-  *this = {};
-  return mean;
-}
-
-void Estimator::use(const ImuInput& sample) {
-  auto& imu = watched(Source::imu);
-  imu.seen_ns = sample.stamp_ns;
-  accel_repeated_.add(sample.accel_x_mps2, sample.stamp_ns);
-  const auto accel_mps2 = accel_.add(sample.stamp_ns, sample.accel_x_mps2, parameters_->imu_period_s);
-  const auto rate_rps = yaw_.add(sample.stamp_ns, sample.rate_z_rps, parameters_->gyro_period_s);
-  if (accel_mps2 || rate_rps) predict_to(sample.stamp_ns);
-  if (accel_mps2) use_acceleration(*accel_mps2, sample.stamp_ns);
-  if (rate_rps) use_yaw_rate(*rate_rps);
-}
-
-// Where no map tells the grade it hides in the bias, and changes along the way.
-void Estimator::doubt_grade() {
-  const bool known = path_ && path_->grade_known_at(filter_.path_distance_m());
-  const double way_m = std::abs(distance_m() - std::exchange(graded_m_, distance_m()));
-  const double sigma_mps2 = core::kGravityMps2 * parameters_->unknown_grade;
-  if (std::exchange(grade_known_, known) != known) {
-    filter_.doubt_accel_bias(sigma_mps2);
-  } else if (!known) {
-    filter_.doubt_accel_bias(sigma_mps2 * std::sqrt(way_m / parameters_->unknown_grade_m));
-  }
-}
-
-void Estimator::use_acceleration(double accel_mps2, int64_t stamp_ns) {
-  auto& imu = watched(Source::imu);
-  const bool stuck =
-      accel_repeated_.count >= kRepeatedSamples && core::seconds(stamp_ns - accel_repeated_.since_ns) >= kRepeatedS;
-  if (stuck) {
-    imu.isolate(stamp_ns);
-    imu.convicted = true;
-    imu.agreed = 0;
-    return;
-  }
-  doubt_grade();
-  const double grade = grade_known_ ? path_->at(filter_.path_distance_m()).grade : 0.0;
-  const double force_mps2 = accel_mps2 - core::kGravityMps2 * grade / std::hypot(1.0, grade);
-  const double sigma_mps2 = parameters_->accel_sigma_mps2;
-  // Nobody could contradict it in the dark: with whom it did not agree before is asked for longer.
-  imu.convicted = imu.convicted || (imu.isolated && in_the_dark());
-  if (imu.convicted) {
-    if (in_the_dark()) return;
-    MotionFilter trial = filter_;
-    imu.hear(trial.offer_acceleration(force_mps2, sigma_mps2, parameters_->gate_imu).used, kAgreementsOfImu, stamp_ns);
-    return;
-  }
-  const auto offer = offer_motion(Source::imu, stamp_ns, [&](MotionFilter& filter) {
-    return filter.offer_acceleration(force_mps2, sigma_mps2, parameters_->gate_imu);
-  });
-  if (offer.used) {
-    feel(force_mps2, sigma_mps2, imu.used_ns);
-    imu.accept(stamp_ns);
-  } else if (++imu.refused >= kRefusalsToIsolate) {
-    imu.isolate(stamp_ns);
-  }
-}
-
-// With a camera that is blind, and a wheel of which nobody else knows whether it is stuck or slides.
-void Estimator::feel(double accel_mps2, double sigma_mps2, int64_t before_ns) {
-  const double dt_s = core::seconds(filter_.stamp_ns() - before_ns);
-  const bool blind = watch(Source::camera).seen_ns != 0 && !used_within(Source::camera, kBlindS);
-  // What was felt goes on when the wheel begins to turn and is found out.
-  const bool told = measures(Source::wheel) || (watch(Source::wheel).isolated && felt_.faster_mps() != 0);
-  if (!blind || !told || dt_s > kLatelyS) {
-    felt_ = {};
-    return;
-  }
-  felt_.add({dt_s, accel_mps2, sigma_mps2, filter_.value(StateIndex::accel_bias), filter_.sigma(StateIndex::accel_bias),
-             filter_.speed_mps(), filter_.sigma(StateIndex::speed)});
-  unwatched_.felt.add(felt_.faster_mps() * dt_s);
-}
-
-// The mean belongs to the middle of its period, which lies v * period / 2 behind.
-void Estimator::use_yaw_rate(double rate_rps) {
-  const double speed_mps = filter_.speed_mps();
-  const double speed_sigma_mps = filter_.sigma(StateIndex::speed);
-  if (standstill_) {
-    filter_.offer_yaw_rate(rate_rps, 0, 0, parameters_->gyro_sigma_rps, parameters_->gate_gyro);
-    return;
-  }
-  if (!path_ || filter_.path_sigma_m() > kGyroPositionSigmaM || speed_sigma_mps > 1) {
-    turned_way_.clear();
-    return;
-  }
-  remember_turn(rate_rps, speed_mps);
-  const auto point = path_->at(filter_.path_distance_m() - 0.5 * speed_mps * parameters_->gyro_period_s);
-  // A tenth of the curvature covers the map's error, which is the same for a whole curve.
-  const double sigma_rps =
-      parameters_->gyro_sigma_rps + std::abs(point.curvature_per_m) * (0.1 * std::abs(speed_mps) + speed_sigma_mps);
-  const auto offer = filter_.offer_yaw_rate(rate_rps, point.curvature_per_m, point.curvature_rate_per_m2, sigma_rps,
-                                            parameters_->gate_gyro);
-  const bool bends = std::abs(speed_mps * point.curvature_per_m) > parameters_->gate_gyro * sigma_rps;
-  track_doubt_.turned(offer.used, bends);
-  compare_turns();
-}
-
-void Estimator::remember_turn(double rate_rps, double speed_mps) {
-  const double period_s = parameters_->gyro_period_s;
-  const double here_m = filter_.path_distance_m();
-  turned_way_.add({here_m - speed_mps * period_s, here_m, (rate_rps - filter_.value(StateIndex::gyro_bias)) * period_s,
-                   parameters_->gyro_sigma_rps * period_s, period_s});
-}
-
-// Where no switch was run over there is no other leg, and where the place is in doubt its turns say nothing. One mast
-// may stand beside both legs: as long as the points are among what is remembered, having seen it says less than the
-// turns.
-void Estimator::compare_turns() {
-  const auto points_m = track_doubt_.divided_at_m();
-  const bool passed = points_m && turned_way_.holds(*points_m);
-  if (wrong_place_.lost() || (!track_doubt_.divided() && !passed)) return;
-  const auto promised = widened(interval());
-  const double half_m = 0.5 * (promised.ahead_m - promised.behind_m);
-  const double place_m = std::max(filter_.path_sigma_m(), half_m / parameters_->interval_factor);
-  const auto strays = turned_way_.strays(*path_, {filter_.sigma(StateIndex::gyro_bias), place_m});
-  if (strays.most > kTurnSigmas && strays.without_worst > kTurnSigmasOfTwo) track_doubt_.strayed();
 }
 
 }  // namespace railfix::fusion
