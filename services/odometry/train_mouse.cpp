@@ -194,18 +194,32 @@ void TrainMouse::accept(MouseStep& step) {
 // of the ground in sight and, where rails are not seen, the slow pitching of the body about the mount's pose.
 double TrainMouse::scale_sigma() const {
   const double height_m = now_.pose.height_m();
-  double ahead_m = 0;
-  for (const PatchMotion& patch : votes_) ahead_m += patch.place_m.x() / static_cast<double>(votes_.size());
   const double relief = kReliefSigmaM / height_m;
   if (now_.pose_measured && reference_->seen.pose_measured) return relief;
-  return std::hypot(relief, 2.0 * ahead_m / height_m * kUnseenPitchShare * options_.mount_pitch_sigma_rad);
+  return std::hypot(relief, 2.0 * patches_ahead_m() / height_m * kUnseenPitchShare * options_.mount_pitch_sigma_rad);
+}
+
+// The sheets follow the rails that are seen, metres ahead and perhaps those of another leg; the camera turns with the
+// car body, whatever the sheets follow. What the two sheets make of it is taken off again: their yaw at the foot, their
+// curve over the step, and how differently they bend where the patches lie.
+double TrainMouse::turn_of_camera() const {
+  const auto& then = reference_->seen.pose;
+  const double bends_less_per_m = then.curvature_per_m - now_.pose.curvature_per_m;
+  return motion_.turn_rad + now_.pose.camera.yaw_rad - then.camera.yaw_rad + then.curvature_per_m * motion_.along_m +
+         bends_less_per_m * (patches_ahead_m() - motion_.along_m);
+}
+
+double TrainMouse::patches_ahead_m() const {
+  double ahead_m = 0;
+  for (const PatchMotion& patch : votes_) ahead_m += patch.place_m.x() / static_cast<double>(votes_.size());
+  return ahead_m;
 }
 
 void TrainMouse::fill(MouseStep& step, double distance_m) const {
   // With what this picture says of the reference's own distance, so that steps add up to the distance.
   step.step_m = distance_m - reference_->distance_m;
   step.lateral_m = motion_.lateral_m + 0.5 * now_.pose.curvature_per_m * motion_.along_m * motion_.along_m;
-  step.yaw_rad = motion_.turn_rad + now_.pose.curvature_per_m * motion_.along_m;
+  step.yaw_rad = turn_of_camera();
   // What standstill holds back is an error of the step that is known to be there.
   step.step_sigma_m = std::hypot(motion_.along_sigma_m, scale_sigma() * motion_.along_m, step.step_m - motion_.along_m);
   step.yaw_sigma_rad = motion_.turn_sigma_rad;

@@ -118,6 +118,9 @@ class TrainMouse {
   [[nodiscard]] PoseTie tie(double along_m) const;
   void accept(MouseStep& step);
   [[nodiscard]] double scale_sigma() const;
+  [[nodiscard]] double turn_of_camera() const;
+  /// Of the foot, in the reference picture.
+  [[nodiscard]] double patches_ahead_m() const;
   void fill(MouseStep& step, double distance_m) const;
   void renew_reference(const MouseStep& step, double dt_s);
   double bridge(double speed_after_mps);
