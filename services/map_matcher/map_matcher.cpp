@@ -144,8 +144,7 @@ void MapMatcher::match_shape(const StepInput& step, PlaceFixes& fixes) {
     if (exits_) exits_->forget();
     return;
   }
-  // Where the rails are seen they tell the shape: pictures turn as the track ahead does (by 10 to 13 m, measured), not
-  // as the body behind.
+  // Where the rails are seen they tell the shape: the body turns some way behind the foot, how far depends on the car.
   const bool rails_seen = std::abs(core::seconds(step.stamp_ns - rails_seen_ns_)) < kRailsFreshS;
   if (!rails_seen && step.frame_to_frame && std::abs(step.step_m) > kShortestStepM &&
       std::abs(step.speed_mps) > parameters_.least_speed_mps) {

@@ -318,6 +318,42 @@ TEST(TrainMouse, UnknownCurveShowsAsTurn) {
   EXPECT_NEAR(turn_rad / (18 * 0.6), 1.0 / 600.0, 2e-4);
 }
 
+TEST(TrainMouse, TurnsWithTheCamera) {
+  Ride ride;
+  const auto yaw_rad = [](int i) { return 0.003 * std::sin(0.5 * i); };
+  double turn_rad = 0;
+  for (int i = 0; i <= 20; ++i) {
+    ride.shaken.yaw_rad = yaw_rad(i);
+    const MouseStep step = ride.at(i / kRate, 0.6 * i);
+    if (i > 2) turn_rad += step.yaw_rad;
+    EXPECT_NEAR(turn_rad, i > 2 ? yaw_rad(i) - yaw_rad(2) : 0, 5e-4) << i;
+  }
+}
+
+// Behind points the rails that are seen may be those of the other leg: the train runs on straight.
+TEST(TrainMouse, TurnsWithTheCameraAndNotWithTheRailsThatItSees) {
+  constexpr double kOtherLegPerM = 1.0 / 300.0;
+  SyntheticGround scene(7, {});
+  TrainMouse mouse(test::small_camera(), {});
+  double turn_rad = 0;
+  MouseStep step;
+  for (int i = 0; i <= 15; ++i) {
+    const double at_m = 0.6 * i;
+    MousePicture picture;
+    picture.grey = scene.picture(test::small_camera(), test::cab_mount(), at_m, {});
+    picture.stamp_ns = core::to_ns(1 + i / kRate);
+    picture.pose = test::cab_mount();
+    picture.pose.yaw_rad -= kOtherLegPerM * at_m;
+    picture.pose.lateral_m -= 0.5 * kOtherLegPerM * at_m * at_m;
+    picture.pose_measured = true;
+    picture.curvature_per_m = kOtherLegPerM;
+    step = mouse.process(picture);
+    if (step.valid && i > 2) turn_rad += step.yaw_rad;
+  }
+  EXPECT_TRUE(step.valid);
+  EXPECT_NEAR(turn_rad / (13 * 0.6), 0, 3e-4);
+}
+
 TEST(TrainMouse, LastingPitchErrorIsFoundFromTheGround) {
   Ride ride;
   ride.trust = PoseTrust::independent(0.0003, 0.002);
