@@ -85,8 +85,8 @@ inline msg::TrainPose message_of(const PoseEstimate& p) {
 }
 
 inline KnownPlace known_place_of(const msg::TrainState& m, bool in_doubt) {
-  return {m.stamp_ns(), messaging::place_of(m), m.speed_mps(), m.over_m(),
-          m.under_m(),  m.track_probability(),  in_doubt};
+  return {m.stamp_ns(), messaging::place_of(m), m.speed_mps(), m.over_m(), m.under_m(), m.track_probability(),
+          in_doubt,     m.easting_m(),          m.northing_m()};
 }
 
 inline const char* topic_of(const Event& event) {

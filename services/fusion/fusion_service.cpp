@@ -4,9 +4,11 @@
 #include <cmath>
 #include <limits>
 #include <string_view>
+#include <utility>
 
 #include "core/time.hpp"
 #include "fusion/fusion_messages.hpp"
+#include "track/same_map.hpp"
 
 namespace railfix::fusion {
 namespace {
@@ -26,7 +28,6 @@ constexpr int64_t kKeepPeriodNs = 250'000'000;
 constexpr uint64_t kNumbersUnheard = 100;  // at least as many as the one before may have used since it was heard last
 constexpr double kSameRideS = 0.5;         // data and the host's clock go on alike
 constexpr double kSameBeginS = 0.5;        // a replay that is looped begins where it began before
-constexpr double kLiveDataS = 5.0;         // data stamps further from the host's clock are not live
 constexpr double kOutOfOrderS = 2.0;
 constexpr double kStandsMps = 1.0;
 constexpr const char* kInDoubt = " in doubt";  // in the notes
@@ -100,12 +101,22 @@ void FusionService::hear(const msg::TrainState& state) {
   const double since_s = core::seconds(state.stamp_ns() - latest_->stamp_ns());
   distance_offset_m_ += state.distance_m() - (latest_->distance_m() + speed_mps * since_s);
   if (learnt_ || !map_ || state.track_known() == 0 || state.integrity() == msg::INTEGRITY_UNUSABLE) return;
+  if (tell_other_map(state)) return;
   if (!place_at(map_, known_place_of(state, false), state.stamp_ns(), config_.parameters.interval_factor))
     return;  // soon
   learnt_ = true;
   known_ = state;
   known_in_doubt_ = false;
   begin_anew();
+}
+
+bool FusionService::tell_other_map(const msg::TrainState& state) {
+  if (track::lies_there(*map_, messaging::place_of(state), state.easting_m(), state.northing_m())) return false;
+  if (!std::exchange(other_map_told_, true)) {
+    context_.log().warn(
+        "the fusion in charge has another map than fusion.map: its place is not taken over; give both the same file");
+  }
+  return true;
 }
 
 // Notes of the process before, if they are of this train's present ride.
@@ -142,7 +153,7 @@ bool FusionService::take_over_known(const TrainEstimate& first) {
     if (!same_time || age_s > kOldestPlaceS) {
       known_.reset();
       // Only what is played begins where it began before: a train has gone on, and its clock was set.
-      const bool under_way = believes_start_ && (same_time || !is_played(first.stamp_ns));
+      const bool under_way = believes_start_ && (same_time || !is_played());
       if (under_way) forget_start();
       return !under_way;
     }
@@ -183,11 +194,23 @@ void FusionService::forget_start() {
 bool FusionService::stands_at_start(const TrainEstimate& estimate) {
   if (start_seen_ || !std::isfinite(estimate.speed_mps)) return true;
   start_seen_ = true;
-  return is_played(estimate.stamp_ns) || std::abs(estimate.speed_mps) < kStandsMps;
+  return is_played() || std::abs(estimate.speed_mps) < kStandsMps;
 }
 
-bool FusionService::is_played(int64_t stamp_ns) const {
-  return data_time_ || std::abs(core::seconds(core::wall_ns() - stamp_ns)) > kLiveDataS;
+// Until a speed is known it may be a train that already runs.
+TrainEstimate FusionService::said_of(const TrainEstimate& measured) const {
+  if (!believes_start_ || start_seen_ || is_played()) return measured;
+  TrainEstimate said = measured;
+  said.track_known = false;
+  said.track_probability = said.lat_deg = said.lon_deg = said.easting_m = said.northing_m = said.heading_rad = 0;
+  said.integrity = Integrity::unusable;
+  said.reason = "whether the train stands at fusion.start is not known before its speed is";
+  return said;
+}
+
+// Whatever the stamps say: the sensors' host may have another clock than this one.
+bool FusionService::is_played() const {
+  return data_time_ || context_.common().lock_step;
 }
 
 // The train stood at the configured start when the data began, and nowhere else in it.
@@ -206,7 +229,6 @@ void FusionService::restart(int64_t data_ns) {
   left_out_ = {};
   pose_ = TrainPose(config.parameters.gnss_map_sigma_m);
   data_time_.reset();
-  live_ = false;
 }
 
 void FusionService::listen(const FusionConfig& config) {
@@ -286,7 +308,7 @@ void FusionService::keep_time(const msg::DataClock& clock) {
 
 // When nothing comes any more the interval must still grow.
 void FusionService::tick() {
-  if (data_time_ && data_time_->stands()) return;
+  if (data_time_ ? data_time_->stands() : context_.common().lock_step) return;
   const auto latest_ns = fusion_->latest_stamp_ns();
   if (!latest_ns) return;
   const int64_t monotonic_ns = core::monotonic_ns();
@@ -294,20 +316,19 @@ void FusionService::tick() {
     newest_stamp_ns_ = *latest_ns;
     newest_came_ns_ = monotonic_ns;
   }
-  live_ = live_ || data_time_ || std::abs(core::seconds(core::wall_ns() - *latest_ns)) < kLiveDataS;
-  if (!live_) return;
   // In the clock of the sensors' host, whatever this one's says.
   const int64_t now_ns = data_time_ ? data_time_->at(monotonic_ns) : newest_stamp_ns_ + monotonic_ns - newest_came_ns_;
   if (const auto estimate = fusion_->tick(now_ns)) publish(*estimate, 0);
 }
 
-void FusionService::publish(const TrainEstimate& estimate, int64_t grabbed_ns) {
-  if (believes_start_ && !stands_at_start(estimate)) {
+void FusionService::publish(const TrainEstimate& measured, int64_t grabbed_ns) {
+  if (believes_start_ && !stands_at_start(measured)) {
     forget_start();
     return;
   }
-  if (known_ && !take_over_known(estimate)) return;
-  scale_file_.follow(*fusion_, estimate);
+  if (known_ && !take_over_known(measured)) return;
+  scale_file_.follow(*fusion_, measured);
+  const TrainEstimate estimate = said_of(measured);
   msg::TrainState message = message_of(estimate);
   message.grabbed_ns(grabbed_ns);
   message.distance_m(message.distance_m() + distance_offset_m_);

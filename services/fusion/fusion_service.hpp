@@ -29,20 +29,22 @@ class FusionService {
   void use_gnss(const msg::GnssFix& sample);
   void keep_time(const msg::DataClock& clock);
   void tick();
-  void publish(const TrainEstimate& estimate, int64_t grabbed_ns);
+  void publish(const TrainEstimate& measured, int64_t grabbed_ns);
   void send(const msg::TrainState& state);
   void publish_pose(const TrainEstimate& estimate);
   void share_charge();
   void charge_changed(bool taken);
   /// From the one in charge, while this one stands by.
   void hear(const msg::TrainState& state);
+  bool tell_other_map(const msg::TrainState& state);
   void keep(const msg::TrainState& state);
   void remember();
   void begin_anew();
   /// Of a train that was under way when this one began: nobody knows where it is.
   void forget_start();
   [[nodiscard]] bool stands_at_start(const TrainEstimate& estimate);
-  [[nodiscard]] bool is_played(int64_t stamp_ns) const;
+  [[nodiscard]] TrainEstimate said_of(const TrainEstimate& measured) const;
+  [[nodiscard]] bool is_played() const;
   bool take_over_known(const TrainEstimate& first);
 
   FusionConfig config_;
@@ -56,10 +58,10 @@ class FusionService {
   std::string kept_for_;                        // map and start that the notes are for
   std::optional<service::DataTime> data_time_;  // of played data
   std::optional<int64_t> begun_ns_;  // stamp of the first measurement, when the train stood at the configured start
-  bool live_ = false;
-  int64_t newest_stamp_ns_ = 0;  // of the data ...
-  int64_t newest_came_ns_ = 0;   // ... and when it was seen, monotonic
+  int64_t newest_stamp_ns_ = 0;      // of the data ...
+  int64_t newest_came_ns_ = 0;       // ... and when it was seen, monotonic
   bool no_projection_told_ = false;
+  bool other_map_told_ = false;
   service::LeftOut left_out_;
   uint64_t seq_ = 0;
   std::optional<msg::TrainState> latest_;  // of this fusion, sent or not

@@ -22,12 +22,14 @@ struct KnownPlace {
   double under_m = 0;
   double track_probability = 0;
   bool in_doubt = false;
+  double easting_m = 0;  // on the map of who says it; 0, 0 = not told
+  double northing_m = 0;
 };
 
 /// That place as a network fix at a later time: moved on with its speed, and as uncertain as that makes it, so that an
-/// interval of `interval_factor` sigma holds the train. Nothing when it is too old, speed or track are not known, or a
-/// switch may have led the train elsewhere meanwhile. One that something spoke against stays in doubt: who that was
-/// is not handed over.
+/// interval of `interval_factor` sigma holds the train. Nothing when it is too old, speed or track are not known, it is
+/// of another map, or a switch may have led the train elsewhere meanwhile. One that something spoke against stays in
+/// doubt: who that was is not handed over.
 std::optional<FixInput> place_at(const std::shared_ptr<const track::Map>& map, const KnownPlace& known,
                                  int64_t stamp_ns, double interval_factor);
 

@@ -64,6 +64,17 @@ TEST(Handover, NotWhereASwitchMayHaveLedTheTrainElsewhere) {
   EXPECT_TRUE(place_at(balise_map(), at(900, -20), after(4.7), kFactor)) << "it runs away from it";
 }
 
+// After an update of its map one fusion may number the edges otherwise than the other.
+TEST(Handover, NotWhereItIsOfAnotherMap) {
+  const auto pose = balise_map()->edge(1)->alignment.at(300).pose;
+  KnownPlace known = at(300, 20);
+  known.easting_m = pose.easting_m;
+  known.northing_m = pose.northing_m + 0.5;
+  EXPECT_TRUE(place_at(balise_map(), known, after(1), kFactor));
+  known.northing_m += 3900;
+  EXPECT_FALSE(place_at(balise_map(), known, after(1), kFactor));
+}
+
 TEST(Handover, NotWhenItIsOldOrTheSpeedIsNotKnown) {
   EXPECT_FALSE(place_at(balise_map(), at(300, 0), after(31), kFactor));
   EXPECT_FALSE(place_at(balise_map(), at(300, std::nan("")), after(1), kFactor));
