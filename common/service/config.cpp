@@ -186,6 +186,12 @@ core::Result<YAML::Node> load(const std::filesystem::path& file) {
   if (!std::filesystem::exists(file)) return core::Error{file.string() + " does not exist; --config needs a YAML file"};
   try {
     YAML::Node node = YAML::LoadFile(file.string());
+    std::error_code unknown;
+    if (node.IsNull() && std::filesystem::file_size(file, unknown) == 0)
+      return core::Error{
+          file.string() +
+          " is empty, as a power cut leaves a file; write it anew (on a train: railfix train upgrade), or "
+          "leave --config out for the defaults"};
     if (node.IsNull()) return YAML::Node(YAML::NodeType::Map);
     if (!node.IsMap()) return core::Error{file.string() + " must consist of sections, one for each service"};
     return node;

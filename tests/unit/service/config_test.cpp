@@ -88,6 +88,9 @@ TEST_F(ConfigTest, MissingAndBrokenFilesAreSentences) {
   EXPECT_THAT(error_of(read_config<Config>("odometry", "/no/such.yaml")), HasSubstr("/no/such.yaml does not exist"));
   EXPECT_THAT(error_of(read_config<Config>("odometry", write("odometry: {a: [\n"))), HasSubstr("not valid YAML"));
   EXPECT_THAT(error_of(read_config<Config>("odometry", write("just text\n"))), HasSubstr("sections"));
+  EXPECT_THAT(error_of(read_config<Config>("odometry", write(""))),
+              HasSubstr("is empty, as a power cut leaves a file"));
+  EXPECT_EQ(error_of(read_config<Config>("odometry", write("# the defaults\n"))), "no error");
 }
 
 TEST_F(ConfigTest, DocumentationIsAValidConfigurationWithTheDefaults) {
