@@ -105,12 +105,16 @@ void TprPublisher::follow_motion(const TrainPosition& position) {
     motion_ = Motion::unknown;
     furthest_m_ = position.distance_m;
   }
+  rested_ = rested_ || position.standstill;
   if (position.standstill && motion_ != Motion::unknown) return;  // what the distance is corrected by is no way
   const double moved_m = position.distance_m - *furthest_m_;
   const bool fast = !position.standstill && std::abs(position.speed_mps) >= kSurelyMovesMps;
   const Motion moves = (fast ? position.speed_mps : moved_m) > 0 ? Motion::forward : Motion::backward;
   const bool agree = std::abs(moved_m) >= kMovesM && (moved_m > 0) == (position.speed_mps > 0);
-  if (!fast && moves != motion_ && !agree) return;
+  // No train turns round without coming to rest; an estimate that is corrected while it brakes does.
+  const bool turns = agree && (rested_ || motion_ == Motion::unknown);
+  if (moves != motion_ && !fast && !turns) return;
+  rested_ = rested_ && !fast && !agree;
   motion_ = moves;
   furthest_m_ = position.distance_m;
 }

@@ -105,6 +105,7 @@ class TprPublisher {
   std::optional<TrainPosition> position_;
   Motion motion_ = Motion::unknown;   // the last one; kept at standstill
   std::optional<double> furthest_m_;  // travelled distance that it has come to
+  bool rested_ = false;               // since it last moved for sure
 };
 
 }  // namespace railfix::tpr_publisher

@@ -94,6 +94,26 @@ TEST(TprPublisher, TheSpeedsNoiseAtRestIsNoMovement) {
   EXPECT_EQ(direction(150.13, -0.12, false), etcs::kReverse);
 }
 
+// As with a dark camera and a wheel that has slipped: the estimate goes back, the train does not.
+TEST(TprPublisher, ACorrectionWhileItBrakesIsNoMovementBack) {
+  TprPublisher publisher(balise_map(), settings());
+  double run_s = 0;
+  const auto direction = [&](double offset_m, double speed_mps, bool standstill) {
+    auto position = at(forward(1, offset_m), run_s, speed_mps);
+    position.standstill = standstill;
+    const auto outcome = publisher.update(position, position.stamp_ns);
+    run_s += 0.1;
+    return outcome.report ? outcome.report->fields.q_dirtrain : 99;
+  };
+  direction(150, 2, false);
+  direction(150.2, 0.5, false);
+  direction(150.13, -0.4, false);
+  direction(150.05, -0.3, false);
+  EXPECT_EQ(direction(150.05, 0, true), etcs::kNominal);
+  for (int i = 1; i <= 5; ++i) direction(150.05 - 0.02 * i, -0.2, false);
+  EXPECT_EQ(direction(149.95, 0, true), etcs::kReverse) << "it rested before";
+}
+
 TEST(TprPublisher, ADirectionOfBeforeAGapIsNotKnownAtStandstill) {
   TprPublisher publisher(balise_map(), settings());
   publisher.update(at(forward(1, 150), 0, 20), kStart);
