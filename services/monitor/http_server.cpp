@@ -79,6 +79,10 @@ Request request_of(const HttpRequest& from, const tcp::endpoint& peer) {
   return request;
 }
 
+Response said(unsigned status, const std::string& sentence) {
+  return {status, "text/plain; charset=utf-8", sentence + "\n", "", "no-store"};
+}
+
 http::response<http::string_body> message_of(const Response& response, bool head, bool keep_alive) {
   http::response<http::string_body> message{static_cast<http::status>(response.status), 11};
   message.set(http::field::content_type, response.type);
@@ -122,6 +126,7 @@ class HttpSession final : public Session, public std::enable_shared_from_this<Ht
     });
   }
   void stop() override {
+    patience_.cancel();
     beast::error_code ignored;
     tcp().socket().close(ignored);
   }
@@ -135,6 +140,8 @@ class HttpSession final : public Session, public std::enable_shared_from_this<Ht
     const auto peer = tcp().socket().remote_endpoint(failed);
     if (failed) return stop();
     const auto& message = parser_->get();
+    // The other forms of a target are for proxies (RFC 9112, 3.2).
+    if (!message.target().starts_with('/')) return refuse(said(400, "the target of a request must begin with /"));
     request_ = request_of(message, peer);
     if (beast::websocket::is_upgrade(message)) return upgrade();
     const bool keep_alive = message.keep_alive();
@@ -143,16 +150,19 @@ class HttpSession final : public Session, public std::enable_shared_from_this<Ht
     tcp().expires_never();
     patience_.expires_after(kAnswerTime);
     patience_.async_wait([self = shared_from_this(), number, keep_alive](beast::error_code error) {
-      if (!error)
-        self->answer(number, keep_alive,
-                     {503, "text/plain; charset=utf-8", "the monitor is too busy\n", "", "no-store"});
+      if (!error) self->answer(number, keep_alive, said(503, "the monitor is too busy"));
     });
-    shared_->handlers.request(request_, [self = shared_from_this(), number, keep_alive](Response response) {
+    const auto answered = [self = shared_from_this(), number, keep_alive](Response response) {
       asio::post(self->shared_->io, [self, number, keep_alive, response = std::move(response)] {
         self->answer(number, keep_alive, response);
       });
-    });
+    };
+    if (!shared_->guarded([&] { shared_->handlers.request(request_, answered); })) {
+      answer(number, keep_alive, said(500, "the monitor failed at this request"));
+    }
   }
+
+  void refuse(const Response& refusal) { answer(++requests_, false, refusal); }
 
   void answer(uint64_t number, bool keep_alive, const Response& response) {
     if (number != requests_ || answered_ == number) return;
@@ -167,14 +177,11 @@ class HttpSession final : public Session, public std::enable_shared_from_this<Ht
   }
 
   void upgrade() {
-    auto decision = shared_->handlers.upgrade(request_);
-    if (decision.accepted && shared_->clients >= shared_->options.most_clients) {
-      decision = {
-          false, "", {503, "text/plain; charset=utf-8", "there are too many viewers already\n", "", "no-store"}};
-    }
-    if (!decision.accepted) {
-      ++requests_;
-      return answer(requests_, false, decision.refusal);
+    Handlers::Upgrade decision{false, "", said(500, "the monitor failed at this request")};
+    shared_->guarded([&] { decision = shared_->handlers.upgrade(request_); });
+    if (!decision.accepted) return refuse(decision.refusal);
+    if (shared_->clients >= shared_->options.most_clients) {
+      return refuse(said(503, "there are too many viewers already"));
     }
     const auto socket =
         std::make_shared<WebSocket<Stream>>(shared_, std::move(stream_), request_, decision.subprotocol);
@@ -221,6 +228,19 @@ struct HttpServer::Impl {
     const auto session = std::make_shared<HttpSession<Stream>>(shared, std::move(stream));
     shared->sessions.emplace_back(session);
     session->begin();
+  }
+
+  // A failure is told, which ends the service; until then, and for the goodbyes, it goes on.
+  void run() {
+    for (bool done = false; !done;) {
+      try {
+        shared->io.run();
+        done = true;
+      } catch (const std::exception& error) {
+        if (shared->handlers.server_failed) shared->handlers.server_failed(error.what());
+      }
+    }
+    ended.set_value();
   }
 
   void stop() {
@@ -291,10 +311,7 @@ uint16_t HttpServer::listen(uint16_t port, int search) {
 
 void HttpServer::start() {
   for (const auto& acceptor : impl_->acceptors) impl_->accept(acceptor);
-  impl_->thread = std::thread([this] {
-    impl_->shared->io.run();
-    impl_->ended.set_value();
-  });
+  impl_->thread = std::thread([this] { impl_->run(); });
 }
 
 size_t HttpServer::clients() const {

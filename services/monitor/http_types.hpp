@@ -68,6 +68,10 @@ struct Handlers {
   std::function<void(const ClientPtr&, const std::string& why)> closed;
   /// Droppable frames were left out; at most once a second.
   std::function<void(const ClientPtr&)> slow;
+  /// One of those above has thrown: its client gets 500 or is closed with 1011, all others go on.
+  std::function<void(const std::string& why)> handler_failed;
+  /// The server itself has thrown, and is not to be relied on any more.
+  std::function<void(const std::string& why)> server_failed;
 };
 
 }  // namespace railfix::monitor

@@ -1,5 +1,6 @@
 // How the monitor service answers HTTP, lets WebSockets in, and passes on what they ask for.
 #include <cmath>
+#include <stdexcept>
 
 #include "core/time.hpp"
 #include "messaging/reader_troubles.hpp"
@@ -65,6 +66,13 @@ Handlers MonitorService::handlers() {
     });
   };
   handlers.slow = [this](const ClientPtr& client) { context_.post([this, client] { foxglove_.slow(client); }); };
+  handlers.handler_failed = [this](const std::string& why) {
+    context_.post([this, why] { context_.log().error("the request of a viewer failed: {}", why); });
+  };
+  // Thrown in the service's thread it ends the service.
+  handlers.server_failed = [this](const std::string& why) {
+    context_.post([why] { throw std::runtime_error("the page cannot be served any more: " + why); });
+  };
   return handlers;
 }
 

@@ -44,11 +44,10 @@ Response StaticFiles::get(const Request& request) const {
     return {405, "text/plain; charset=utf-8", "only GET and HEAD\n", "", "no-store"};
   }
   const bool front = request.path == "/" || request.path == "/index.html";
-  const fs::path inside = fs::path(front ? "index.html" : request.path.substr(1)).lexically_normal();
+  const fs::path inside = fs::path(front ? "index.html" : request.path).relative_path().lexically_normal();
   const fs::path file = folder_ / inside;
   std::error_code failed;
-  const bool outside =
-      request.path.find('\0') != std::string::npos || inside.empty() || inside.is_absolute() || *inside.begin() == "..";
+  const bool outside = request.path.find('\0') != std::string::npos || inside.empty() || *inside.begin() == "..";
   if (outside || !fs::is_regular_file(file, failed)) {
     if (front) return without_page();
     return {404, "text/plain; charset=utf-8", "there is nothing here\n", "", "no-store"};

@@ -51,7 +51,7 @@ void WebSocket<Stream>::accept(const HttpRequest& upgrade) {
   stream_.async_accept(upgrade, [self = shared_from_this()](beast::error_code error) {
     if (error) return;
     self->open_ = self->told_ = true;
-    self->shared_->handlers.opened(self);
+    self->guarded([&] { self->shared_->handlers.opened(self); });
     self->watch();
     self->read();
   });
@@ -64,7 +64,7 @@ void WebSocket<Stream>::read() {
     if (error) return self->end("");
     std::string message = beast::buffers_to_string(self->buffer_.data());
     self->buffer_.consume(self->buffer_.size());
-    self->shared_->handlers.message(self, std::move(message), self->stream_.got_binary());
+    self->guarded([&] { self->shared_->handlers.message(self, std::move(message), self->stream_.got_binary()); });
   });
 }
 
@@ -91,7 +91,9 @@ void WebSocket<Stream>::queue(Frame frame) {
   }
   waiting_bytes_ += frame.bytes->size();
   waiting_.push_back(std::move(frame));
-  if (waiting_bytes_ > shared_->options.client_queue_bytes && !make_room()) return say_goodbye("too slow");
+  if (waiting_bytes_ > shared_->options.client_queue_bytes && !make_room()) {
+    return say_goodbye("too slow", websocket::close_code::policy_error);
+  }
   if (!writing_) write();
 }
 
@@ -140,7 +142,7 @@ void WebSocket<Stream>::watch() {
     }
     if (self->dropped_ > self->dropped_told_) {
       self->dropped_told_ = self->dropped_;
-      self->shared_->handlers.slow(self);
+      self->guarded([&] { self->shared_->handlers.slow(self); });
     }
     self->watch();
   });
@@ -148,18 +150,25 @@ void WebSocket<Stream>::watch() {
 
 template <class Stream>
 void WebSocket<Stream>::close(const std::string& why) {
-  asio::post(shared_->io, [self = shared_from_this(), why] { self->say_goodbye(why); });
+  asio::post(shared_->io,
+             [self = shared_from_this(), why] { self->say_goodbye(why, websocket::close_code::policy_error); });
 }
 
 template <class Stream>
-void WebSocket<Stream>::say_goodbye(const std::string& why) {
+template <class Call>
+void WebSocket<Stream>::guarded(const Call& call) {
+  if (!shared_->guarded(call)) say_goodbye("the monitor failed", websocket::close_code::internal_error);
+}
+
+template <class Stream>
+void WebSocket<Stream>::say_goodbye(const std::string& why, websocket::close_code code) {
   if (ended_) return;
   waiting_.clear();
   waiting_bytes_ = 0;
   if (!open_) return end(why);
   open_ = false;
   why_ = why;
-  const websocket::close_reason reason(websocket::close_code::policy_error, why.substr(0, kLongestReason));
+  const websocket::close_reason reason(code, why.substr(0, kLongestReason));
   stream_.async_close(reason, [self = shared_from_this(), why](beast::error_code) { self->end(why); });
 }
 
@@ -171,7 +180,7 @@ void WebSocket<Stream>::end(const std::string& why) {
   watch_.cancel();
   beast::error_code ignored;
   beast::get_lowest_layer(stream_).socket().close(ignored);
-  if (told_) shared_->handlers.closed(shared_from_this(), why.empty() ? why_ : why);
+  if (told_) shared_->guarded([&] { shared_->handlers.closed(shared_from_this(), why.empty() ? why_ : why); });
 }
 
 template class WebSocket<PlainStream>;

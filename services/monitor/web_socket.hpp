@@ -36,6 +36,18 @@ struct Shared {
   std::atomic<size_t> clients = 0;
   uint64_t next_id = 1;
   std::vector<std::weak_ptr<Session>> sessions;
+
+  /// False when the call of a handler has thrown, which is told.
+  template <class Call>
+  bool guarded(const Call& call) {
+    try {
+      call();
+      return true;
+    } catch (const std::exception& error) {
+      if (handlers.handler_failed) handlers.handler_failed(error.what());
+      return false;
+    }
+  }
 };
 
 /// `Stream` is PlainStream or TlsStream.
@@ -52,7 +64,7 @@ class WebSocket final : public Client, public Session, public std::enable_shared
   void send(Frame frame) override;
   void resume() override;
   void close(const std::string& why) override;
-  void stop() override { say_goodbye("the monitor stops"); }
+  void stop() override { say_goodbye("the monitor stops", boost::beast::websocket::close_code::policy_error); }
 
  private:
   using std::enable_shared_from_this<WebSocket>::shared_from_this;
@@ -62,7 +74,9 @@ class WebSocket final : public Client, public Session, public std::enable_shared
   void write();
   void watch();
   void end(const std::string& why);
-  void say_goodbye(const std::string& why);
+  void say_goodbye(const std::string& why, boost::beast::websocket::close_code code);
+  template <class Call>
+  void guarded(const Call& call);
 
   std::shared_ptr<Shared> shared_;  // goes last
   boost::beast::websocket::stream<Stream> stream_;
