@@ -75,7 +75,8 @@ Request request_of(const HttpRequest& from, const tcp::endpoint& peer) {
   request.if_none_match = text_of(from[http::field::if_none_match]);
   request.subprotocols = words_of(from, http::field::sec_websocket_protocol);
   const bool proxied = from.count("X-Forwarded-For") + from.count("Forwarded") + from.count("Via") > 0;
-  request.local = peer.address().is_loopback() && !proxied && names_this_computer(request.host);
+  const bool own_page = request.origin.empty() || names_this_computer(host_of(request.origin));
+  request.local = peer.address().is_loopback() && !proxied && names_this_computer(request.host) && own_page;
   return request;
 }
 
@@ -319,8 +320,20 @@ size_t HttpServer::clients() const {
 }
 
 bool names_this_computer(const std::string& host) {
-  const std::string name = host.substr(0, host.starts_with('[') ? host.find(']') + 1 : host.find(':'));
-  return name == "localhost" || name == "[::1]" || host == "::1" || name.starts_with("127.");
+  const bool bracketed = host.starts_with('[');
+  const bool bare_v6 = !bracketed && host.find(':') != host.rfind(':');
+  const std::string name = bracketed ? host.substr(1, host.find(']') - 1)
+                           : bare_v6 ? host
+                                     : host.substr(0, host.find(':'));
+  // Only an address itself: a name such as 127.example.org is somebody's, and may point here (DNS rebinding).
+  beast::error_code no_address;
+  const auto address = asio::ip::make_address(name, no_address);
+  return name == "localhost" || (!no_address && address.is_loopback());
+}
+
+std::string host_of(const std::string& origin) {
+  const size_t scheme = origin.find("://");
+  return scheme == std::string::npos ? origin : origin.substr(scheme + 3);
 }
 
 std::string url_decoded(const std::string& text) {

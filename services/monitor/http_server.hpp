@@ -41,6 +41,9 @@ class HttpServer {
 /// whose name points here has another.
 bool names_this_computer(const std::string& host);
 
+/// Of the page that opens a WebSocket, with its port: "http://localhost:8080" is of "localhost:8080".
+std::string host_of(const std::string& origin);
+
 /// "%41" and "+" of a URL.
 std::string url_decoded(const std::string& text);
 

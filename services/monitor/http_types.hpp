@@ -18,7 +18,7 @@ struct Request {
   std::string origin;                        // of the page that opened a WebSocket, empty = no browser
   std::string if_none_match;
   std::vector<std::string> subprotocols;
-  bool local = false;  // from this computer, not through a proxy, and addressed as such
+  bool local = false;  // from this computer, not through a proxy, and addressed as such, by a page that was too
 };
 
 struct Response {

@@ -86,9 +86,8 @@ Handlers::Upgrade MonitorService::upgrade(const Request& request) const {
     return refuse(400, "this WebSocket speaks foxglove.sdk.v1 and foxglove.websocket.v1; the page's is /api/live\n");
   }
   // Any page of the internet may try to open a WebSocket to this address from the viewer's browser.
-  const size_t scheme = request.origin.find("://");
-  const std::string origin = scheme == std::string::npos ? request.origin : request.origin.substr(scheme + 3);
-  if (!origin.empty() && origin != request.host) return refuse(403, "only the monitor's own page may connect\n");
+  if (!request.origin.empty() && host_of(request.origin) != request.host)
+    return refuse(403, "only the monitor's own page may connect\n");
   return {true, "", {}};
 }
 

@@ -135,6 +135,23 @@ TEST_F(HttpConnectionsTest, AViewerWhoseHandlerThrowsIsClosedWith1011) {
   expect_health();
 }
 
+TEST_F(HttpConnectionsTest, ARequestIsLocalWhenItsHostAndItsPageAreThisComputer) {
+  handlers_.request = [](const Request& request, const std::function<void(Response)>& answer) {
+    answer({200, "text/plain", request.local ? "local\n" : "foreign\n", "", "no-store"});
+  };
+  start();
+  const auto who = [this](const std::string& host, const std::string& origin) {
+    const std::string page = origin.empty() ? "" : "Origin: http://" + origin + "\r\n";
+    const std::string answer =
+        Connection(port_).asked("GET / HTTP/1.1\r\nConnection: close\r\nHost: " + host + "\r\n" + page + "\r\n", "");
+    return answer.substr(answer.rfind("\r\n") + 2);
+  };
+  EXPECT_EQ(who("localhost:8080", ""), "local\n");
+  EXPECT_EQ(who("localhost:8080", "127.0.0.1:8080"), "local\n");
+  EXPECT_EQ(who("localhost:8080", "127.evil.example:8080"), "foreign\n");
+  EXPECT_EQ(who("127.evil.example:8080", ""), "foreign\n");
+}
+
 TEST_F(HttpConnectionsTest, WhatNoHandlerAnswersForIsToldAndDoesNotEndTheProcess) {
   handlers_.request = [](const Request&, const std::function<void(Response)>&) { throw std::out_of_range("once"); };
   handlers_.handler_failed = [](const std::string& why) { throw std::runtime_error("twice after " + why); };

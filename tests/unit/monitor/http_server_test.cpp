@@ -71,6 +71,21 @@ TEST(Url, IsDecoded) {
   EXPECT_EQ(url_decoded("/a%20b+c%2F%zz%4"), "/a b c/%zz%4");
 }
 
+// A page whose own name points to this computer is called by that name (DNS rebinding).
+TEST(ThisComputer, IsLocalhostOrALoopbackAddressAndNoNameThatLooksLikeOne) {
+  for (const std::string host :
+       {"localhost", "localhost:8080", "127.0.0.1", "127.0.0.1:8080", "127.8.9.10:1", "[::1]", "[::1]:8080", "::1"}) {
+    EXPECT_TRUE(names_this_computer(host)) << host;
+  }
+  for (const std::string host :
+       {"", "127.evil.example", "127.evil.example:8080", "127.0.0.1.evil.example:8080", "127.1",
+        "localhost.evil.example", "[::2]:8080", "::1.evil.example", "192.0.2.1:8080", "[", "null", ":8080"}) {
+    EXPECT_FALSE(names_this_computer(host)) << host;
+  }
+  EXPECT_EQ(host_of("http://127.0.0.1:8080"), "127.0.0.1:8080");
+  EXPECT_EQ(host_of("null"), "null");
+}
+
 TEST(Ports, AreSearchedAndRefusedWithASentence) {
   HttpServer first({}, {});
   const uint16_t taken = first.listen(0, 0);
