@@ -18,11 +18,14 @@ namespace http = beast::http;
 using asio::ip::tcp;
 using HttpRequest = http::request<http::string_body>;
 
-constexpr std::chrono::seconds kRequestTime{30};
 constexpr std::chrono::seconds kAnswerTime{10};
 constexpr uint32_t kLongestHeader = 16 * 1024;
 constexpr uint64_t kLongestBody = 64 * 1024;
 constexpr std::chrono::seconds kStopTime{3};
+constexpr std::chrono::milliseconds kAcceptPause{100};
+// A browser opens several for a page; the least is for those who ask while others hold theirs.
+constexpr size_t kConnectionsPerClient = 4;
+constexpr size_t kLeastConnections = 64;
 
 int hex_digit(char c) {
   if (c >= '0' && c <= '9') return c - '0';
@@ -108,7 +111,7 @@ class HttpSession final : public Session, public std::enable_shared_from_this<Ht
     if constexpr (std::is_same_v<Stream, PlainStream>) {
       read();
     } else {
-      tcp().expires_after(kRequestTime);
+      tcp().expires_after(shared_->options.request_time);
       stream_.async_handshake(asio::ssl::stream_base::server, [self = shared_from_this()](beast::error_code error) {
         if (error) return self->stop();
         self->read();
@@ -120,17 +123,19 @@ class HttpSession final : public Session, public std::enable_shared_from_this<Ht
     parser_.emplace();
     parser_->header_limit(kLongestHeader);
     parser_->body_limit(kLongestBody);
-    tcp().expires_after(kRequestTime);
+    tcp().expires_after(shared_->options.request_time);
     http::async_read(stream_, buffer_, *parser_, [self = shared_from_this()](beast::error_code error, size_t) {
       if (error) return self->stop();
       self->handle();
     });
   }
   void stop() override {
+    if (upgraded_) return;
     patience_.cancel();
     beast::error_code ignored;
     tcp().socket().close(ignored);
   }
+  [[nodiscard]] bool gives_way() const override { return !upgraded_; }
 
  private:
   using std::enable_shared_from_this<HttpSession>::shared_from_this;
@@ -170,7 +175,7 @@ class HttpSession final : public Session, public std::enable_shared_from_this<Ht
     answered_ = number;
     patience_.cancel();
     response_ = message_of(response, request_.method == "HEAD", keep_alive);
-    tcp().expires_after(kRequestTime);
+    tcp().expires_after(shared_->options.taken_time);
     http::async_write(stream_, response_, [self = shared_from_this()](beast::error_code error, size_t) {
       if (error || self->response_.need_eof()) return self->stop();
       self->read();
@@ -184,6 +189,7 @@ class HttpSession final : public Session, public std::enable_shared_from_this<Ht
     if (shared_->clients >= shared_->options.most_clients) {
       return refuse(said(503, "there are too many viewers already"));
     }
+    upgraded_ = true;
     const auto socket =
         std::make_shared<WebSocket<Stream>>(shared_, std::move(stream_), request_, decision.subprotocol);
     shared_->sessions.emplace_back(socket);
@@ -199,6 +205,7 @@ class HttpSession final : public Session, public std::enable_shared_from_this<Ht
   http::response<http::string_body> response_;
   uint64_t requests_ = 0;
   uint64_t answered_ = 0;
+  bool upgraded_ = false;  // the stream is a WebSocket's
 };
 
 }  // namespace
@@ -212,16 +219,44 @@ struct HttpServer::Impl {
   void accept(const std::shared_ptr<tcp::acceptor>& acceptor) {
     acceptor->async_accept([this, acceptor](beast::error_code error, tcp::socket socket) {
       if (error == asio::error::operation_aborted || !acceptor->is_open()) return;
-      if (!error) {
-        std::erase_if(shared->sessions, [](const auto& session) { return session.expired(); });
-        if (shared->tls) {
-          open<TlsStream>(TlsStream(PlainStream(std::move(socket)), *shared->tls));
-        } else {
-          open<PlainStream>(PlainStream(std::move(socket)));
-        }
+      if (error) return accept_later(acceptor);
+      make_way();
+      if (shared->tls) {
+        open<TlsStream>(TlsStream(PlainStream(std::move(socket)), *shared->tls));
+      } else {
+        open<PlainStream>(PlainStream(std::move(socket)));
       }
       accept(acceptor);
     });
+  }
+
+  // Descriptors have run out; the next try would fail at once, too.
+  void accept_later(const std::shared_ptr<tcp::acceptor>& acceptor) {
+    close_oldest();
+    const auto pause = std::make_shared<asio::steady_timer>(shared->io, kAcceptPause);
+    pause->async_wait([this, acceptor, pause](beast::error_code) { accept(acceptor); });
+  }
+
+  void make_way() {
+    auto& sessions = shared->sessions;
+    std::erase_if(sessions, [](const auto& session) { return session.expired(); });
+    const size_t most = std::max(kConnectionsPerClient * shared->options.most_clients, kLeastConnections);
+    while (sessions.size() >= most && close_oldest()) {
+    }
+  }
+
+  // Who has just come is answered long before it is the oldest, so a flood shuts nobody out; a limit for each address
+  // would, as all behind a proxy have the same.
+  bool close_oldest() {
+    auto& sessions = shared->sessions;
+    for (auto oldest = sessions.begin(); oldest != sessions.end(); ++oldest) {
+      const auto session = oldest->lock();
+      if (!session || !session->gives_way()) continue;
+      sessions.erase(oldest);
+      session->stop();
+      return true;
+    }
+    return false;
   }
 
   template <class Stream>

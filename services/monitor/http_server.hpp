@@ -2,6 +2,7 @@
 // topic and no page.
 #pragma once
 
+#include <chrono>
 #include <memory>
 #include <string>
 
@@ -16,6 +17,8 @@ struct HttpOptions {
   size_t most_clients = 64;
   std::string certificate;  // PEM files for TLS 1.2 and above; both or none
   std::string key;
+  std::chrono::milliseconds request_time{10'000};  // in which a request must have come, all of it
+  std::chrono::milliseconds taken_time{30'000};    // in which an answer must have been taken, all of it
 };
 
 class HttpServer {

@@ -25,6 +25,8 @@ class Session {
  public:
   virtual ~Session() = default;
   virtual void stop() = 0;
+  /// To others, when there are too many connections: viewers have a limit of their own.
+  [[nodiscard]] virtual bool gives_way() const = 0;
 };
 
 /// What all sessions share. It outlives each of them, because a socket must not outlive its io_context.
@@ -35,7 +37,7 @@ struct Shared {
   boost::asio::io_context io{1};
   std::atomic<size_t> clients = 0;
   uint64_t next_id = 1;
-  std::vector<std::weak_ptr<Session>> sessions;
+  std::vector<std::weak_ptr<Session>> sessions;  // the oldest first
 
   /// False when the call of a handler has thrown, which is told.
   template <class Call>
@@ -65,6 +67,7 @@ class WebSocket final : public Client, public Session, public std::enable_shared
   void resume() override;
   void close(const std::string& why) override;
   void stop() override { say_goodbye("the monitor stops", boost::beast::websocket::close_code::policy_error); }
+  [[nodiscard]] bool gives_way() const override { return false; }
 
  private:
   using std::enable_shared_from_this<WebSocket>::shared_from_this;

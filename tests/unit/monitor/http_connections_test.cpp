@@ -1,8 +1,11 @@
 // What the server does with its connections, and that none of them ends it: real sockets, handlers of the test.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <chrono>
+#include <ctime>
+#include <deque>
 #include <mutex>
 #include <thread>
 
@@ -46,6 +49,14 @@ class Connection {
     }
     return heard;
   }
+  /// By the server, at once or soon.
+  [[nodiscard]] bool is_closed() const {
+    char part[4096];
+    ssize_t got = 0;
+    while ((got = recv(socket_, part, sizeof part, 0)) > 0) {
+    }
+    return got == 0 || errno == ECONNRESET;
+  }
   [[nodiscard]] std::string asked(const std::string& request, const std::string& until = "\n") const {
     say(request);
     return hear(until);
@@ -53,6 +64,25 @@ class Connection {
 
  private:
   int socket_ = test::tcp_socket();
+};
+
+/// Leaves the process one more descriptor, for as long as it lives.
+class OneMoreDescriptor {
+ public:
+  OneMoreDescriptor() {
+    getrlimit(RLIMIT_NOFILE, &before_);
+    const int lowest_free = dup(STDERR_FILENO);
+    close(lowest_free);
+    rlimit few = before_;
+    few.rlim_cur = static_cast<rlim_t>(lowest_free) + 1;
+    setrlimit(RLIMIT_NOFILE, &few);
+  }
+  ~OneMoreDescriptor() { setrlimit(RLIMIT_NOFILE, &before_); }
+  OneMoreDescriptor(const OneMoreDescriptor&) = delete;
+  OneMoreDescriptor& operator=(const OneMoreDescriptor&) = delete;
+
+ private:
+  rlimit before_{};
 };
 
 class HttpConnectionsTest : public ::testing::Test {
@@ -65,6 +95,7 @@ class HttpConnectionsTest : public ::testing::Test {
     handlers_.opened = [](const ClientPtr&) {};
     handlers_.message = [](const ClientPtr&, const std::string&, bool) {};
     handlers_.closed = [](const ClientPtr&, const std::string&) {};
+    options_.request_time = options_.taken_time = std::chrono::hours(1);
     handlers_.handler_failed = [this](const std::string& why) { note(why); };
     handlers_.server_failed = [this](const std::string& why) { note("server: " + why); };
   }
@@ -162,6 +193,51 @@ TEST_F(HttpConnectionsTest, WhatNoHandlerAnswersForIsToldAndDoesNotEndTheProcess
   EXPECT_THAT(failures(), ElementsAre("server: twice after once"));
   server_.reset();
   EXPECT_EQ(client.hear(""), "") << "the server could be taken down in order";
+}
+
+const std::string kHalfARequest = "GET / HTTP/1.1\r\nX: ";
+
+TEST_F(HttpConnectionsTest, TheOldestOfTooManyGoesAndTheNextIsAnswered) {
+  options_.most_clients = 4;
+  start();
+  const Connection viewer(port_);
+  ASSERT_THAT(viewer.asked(kUpgrade, "\r\n\r\n"), StartsWith("HTTP/1.1 101"));
+  std::deque<Connection> others;
+  for (int i = 0; i < 200; ++i) others.emplace_back(port_).say(kHalfARequest);
+  expect_health();
+  EXPECT_TRUE(others.front().is_closed());
+  EXPECT_THAT(others.back().asked("y\r\n\r\n", "ok\n"), EndsWith("ok\n"));
+  EXPECT_EQ(server_->clients(), 1U) << "a viewer does not give way";
+}
+
+TEST_F(HttpConnectionsTest, HalfARequestIsNotWaitedForForEver) {
+  options_.request_time = std::chrono::milliseconds(100);
+  start();
+  const Connection slow(port_);
+  slow.say(kHalfARequest);
+  EXPECT_TRUE(slow.is_closed());
+}
+
+TEST_F(HttpConnectionsTest, WithoutDescriptorsItWaitsInsteadOfTryingAllTheTime) {
+  start();
+  std::optional<OneMoreDescriptor> few(std::in_place);
+  const Connection waiting(port_);
+  const std::clock_t before = std::clock();
+  std::this_thread::sleep_for(std::chrono::milliseconds(400));
+  EXPECT_LT(std::clock() - before, CLOCKS_PER_SEC / 20);
+  few.reset();
+  EXPECT_THAT(waiting.asked(kHealth, "ok\n"), EndsWith("ok\n"));
+}
+
+// Accepting wants a descriptor before it looks whether somebody waits: one is kept free beside the last client's.
+TEST_F(HttpConnectionsTest, WithoutDescriptorsTheOldestGivesItsOwn) {
+  start();
+  const Connection oldest(port_);
+  const Connection next(port_);
+  for (const Connection* client : {&oldest, &next}) EXPECT_THAT(client->asked(kHealth, "ok\n"), EndsWith("ok\n"));
+  const OneMoreDescriptor few;
+  EXPECT_THAT(Connection(port_).asked(kHealth, "ok\n"), EndsWith("ok\n"));
+  EXPECT_TRUE(oldest.is_closed());
 }
 
 }  // namespace
