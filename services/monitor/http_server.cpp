@@ -1,6 +1,7 @@
 #include "monitor/http_server.hpp"
 
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/beast/http/span_body.hpp>
 #include <future>
 #include <optional>
 #include <thread>
@@ -17,6 +18,7 @@ namespace beast = boost::beast;
 namespace http = beast::http;
 using asio::ip::tcp;
 using HttpRequest = http::request<http::string_body>;
+using AnswerMessage = http::response<http::span_body<const char>>;
 
 constexpr std::chrono::seconds kAnswerTime{10};
 constexpr uint32_t kLongestHeader = 16 * 1024;
@@ -87,16 +89,17 @@ Response said(unsigned status, const std::string& sentence) {
   return {status, "text/plain; charset=utf-8", sentence + "\n", "", "no-store"};
 }
 
-http::response<http::string_body> message_of(const Response& response, bool head, bool keep_alive) {
-  http::response<http::string_body> message{static_cast<http::status>(response.status), 11};
+// Of the body it has no copy.
+AnswerMessage message_of(const Response& response, const std::string& body, bool head, bool keep_alive) {
+  AnswerMessage message{static_cast<http::status>(response.status), 11};
   message.set(http::field::content_type, response.type);
   message.set(http::field::cache_control, response.cache_control);
   message.set("X-Content-Type-Options", "nosniff");
   if (!response.etag.empty()) message.set(http::field::etag, response.etag);
   message.keep_alive(keep_alive);
   if (response.status == 304) return message;
-  message.content_length(response.body.size());
-  if (!head) message.body() = response.body;
+  message.content_length(body.size());
+  if (!head) message.body() = {body.data(), body.size()};
   return message;
 }
 
@@ -159,8 +162,8 @@ class HttpSession final : public Session, public std::enable_shared_from_this<Ht
       if (!error) self->answer(number, keep_alive, said(503, "the monitor is too busy"));
     });
     const auto answered = [self = shared_from_this(), number, keep_alive](Response response) {
-      asio::post(self->shared_->io, [self, number, keep_alive, response = std::move(response)] {
-        self->answer(number, keep_alive, response);
+      asio::post(self->shared_->io, [self, number, keep_alive, response = std::move(response)]() mutable {
+        self->answer(number, keep_alive, std::move(response));
       });
     };
     if (!shared_->guarded([&] { shared_->handlers.request(request_, answered); })) {
@@ -170,13 +173,15 @@ class HttpSession final : public Session, public std::enable_shared_from_this<Ht
 
   void refuse(const Response& refusal) { answer(++requests_, false, refusal); }
 
-  void answer(uint64_t number, bool keep_alive, const Response& response) {
+  void answer(uint64_t number, bool keep_alive, Response response) {
     if (number != requests_ || answered_ == number) return;
     answered_ = number;
     patience_.cancel();
-    response_ = message_of(response, request_.method == "HEAD", keep_alive);
+    body_ = response.shared ? response.shared : std::make_shared<const std::string>(std::move(response.body));
+    response_ = message_of(response, *body_, request_.method == "HEAD", keep_alive);
     tcp().expires_after(shared_->options.taken_time);
     http::async_write(stream_, response_, [self = shared_from_this()](beast::error_code error, size_t) {
+      self->body_.reset();
       if (error || self->response_.need_eof()) return self->stop();
       self->read();
     });
@@ -202,7 +207,8 @@ class HttpSession final : public Session, public std::enable_shared_from_this<Ht
   beast::flat_buffer buffer_;
   std::optional<http::request_parser<http::string_body>> parser_;
   Request request_;
-  http::response<http::string_body> response_;
+  std::shared_ptr<const std::string> body_;
+  AnswerMessage response_;
   uint64_t requests_ = 0;
   uint64_t answered_ = 0;
   bool upgraded_ = false;  // the stream is a WebSocket's

@@ -27,6 +27,7 @@ struct Response {
   std::string body;
   std::string etag;  // with its quotes, empty = none
   std::string cache_control = "no-store";
+  std::shared_ptr<const std::string> shared = nullptr;  // in place of the body: one that many are given
 };
 
 /// One WebSocket message to a client.

@@ -1,5 +1,4 @@
 // How the monitor service answers HTTP, lets WebSockets in, and passes on what they ask for.
-#include <cmath>
 #include <stdexcept>
 
 #include "core/time.hpp"
@@ -14,19 +13,10 @@ namespace {
 using nlohmann::json;
 
 constexpr int64_t kAnswerNs = 10 * core::kNsPerSecond;
-constexpr double kMapRadiusM = 20'000;
 constexpr const char* kText = "text/plain; charset=utf-8";
 
 Response json_response(const json& body) {
   return {200, "application/json", text_of(body) + "\n", "", "no-store"};
-}
-
-std::optional<double> number_of(const Request& request, const char* key) {
-  const auto found = request.query.find(key);
-  if (found == request.query.end()) return std::nullopt;
-  char* end = nullptr;
-  const double value = std::strtod(found->second.c_str(), &end);
-  return end != found->second.c_str() && *end == '\0' && std::isfinite(value) ? std::optional(value) : std::nullopt;
 }
 
 bool speaks_foxglove(const Request& request) {
@@ -157,17 +147,9 @@ json MonitorService::about(const Request& request) const {
           {"map", map}};
 }
 
-// All of a short map; of a long one what lies around a place, the train's when none is named.
-Response MonitorService::map_answer(const Request& request) const {
-  if (!map_view_) return {404, kText, "no map is in use; set monitor.map\n", "", "no-store"};
-  std::optional<track::EdgePosition> around;
-  const auto edge = number_of(request, "edge");
-  if (edge && *edge >= 1 && *edge <= static_cast<double>(map_->edges.size())) {
-    around = track::EdgePosition{static_cast<uint32_t>(*edge), number_of(request, "offset").value_or(0)};
-  } else if (map_view_->length_m() > MapView::kWholeMapM) {
-    around = place().value_or(track::EdgePosition{1, 0});
-  }
-  return json_response(map_view_->message(around, number_of(request, "radius").value_or(kMapRadiusM)));
+Response MonitorService::map_answer(const Request& request) {
+  if (!map_api_) return {404, kText, "no map is in use; set monitor.map\n", "", "no-store"};
+  return map_api_->get(request, place());
 }
 
 Response MonitorService::metrics_answer() {

@@ -58,6 +58,7 @@ MonitorService::MonitorService(const Config& config, service::Context& context)
       context_(context),
       map_(load_map(config.map)),
       map_view_(map_ ? std::make_unique<MapView>(*map_) : nullptr),
+      map_api_(map_ ? std::make_unique<MapApi>(*map_, *map_view_) : nullptr),
       files_(page_folder(config.page_folder)),
       control_(context.writer(topics::service_control)),
       begun_ns_(core::wall_ns()),

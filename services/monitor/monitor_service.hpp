@@ -9,6 +9,7 @@
 #include "monitor/http_server.hpp"
 #include "monitor/live_api.hpp"
 #include "monitor/live_messages.hpp"
+#include "monitor/map_api.hpp"
 #include "monitor/map_view.hpp"
 #include "monitor/monitor_config.hpp"
 #include "monitor/problems.hpp"
@@ -90,7 +91,7 @@ class MonitorService {
   [[nodiscard]] FoxgloveApi::Actions foxglove_actions();
   [[nodiscard]] Handlers::Upgrade upgrade(const Request& request) const;
   [[nodiscard]] Response answer(const Request& request);
-  [[nodiscard]] Response map_answer(const Request& request) const;
+  [[nodiscard]] Response map_answer(const Request& request);
   [[nodiscard]] Response metrics_answer();
   [[nodiscard]] Response health_answer();
   [[nodiscard]] nlohmann::json about(const Request& request) const;
@@ -103,7 +104,8 @@ class MonitorService {
   Config config_;
   service::Context& context_;
   std::optional<track::Map> map_;
-  std::unique_ptr<MapView> map_view_;  // null without a map
+  std::unique_ptr<MapView> map_view_;  // null without a map, as the next
+  std::unique_ptr<MapApi> map_api_;
   StaticFiles files_;
   messaging::Writer<msg::ControlRequest> control_;
   std::map<std::string, std::function<void(const Arrived&)>> on_topic_;

@@ -3,6 +3,7 @@
 
 #include "monitor/cab_view.hpp"
 #include "monitor/cab_watch.hpp"
+#include "monitor/map_api.hpp"
 
 namespace railfix::monitor {
 namespace {
@@ -108,6 +109,40 @@ TEST_F(OnALine, TheMapHasPointsWhereTheLineBends) {
   EXPECT_DOUBLE_EQ(message["landmarks"][0]["easting_m"], -3) << "3 m left of a track to the north";
   EXPECT_EQ(message["switches"][0]["offset_m"], 500);
   EXPECT_EQ(MapView(map_).message(EdgePosition{1, 0}, 100)["edges"].size(), 1U) << "the second begins 500 m away";
+}
+
+Request part(const std::map<std::string, std::string>& query) {
+  Request request;
+  request.query = query;
+  return request;
+}
+
+TEST_F(OnALine, TheMapIsMadeOnceForAllWhoAskForTheSamePart) {
+  const MapView view(map_);
+  MapApi api(map_, view);
+  const auto all = api.get(part({}), std::nullopt).shared;
+  EXPECT_EQ(nlohmann::json::parse(*all)["edges"].size(), 2U);
+  EXPECT_EQ(api.get(part({}), EdgePosition{1, 7}).shared, all) << "a short map is given as a whole";
+  const auto near = api.get(part({{"edge", "1"}, {"radius", "100"}}), std::nullopt).shared;
+  EXPECT_EQ(nlohmann::json::parse(*near)["edges"].size(), 1U);
+  EXPECT_EQ(api.get(part({{"edge", "1"}, {"radius", "100"}}), std::nullopt).shared, near);
+  EXPECT_NE(api.get(part({{"edge", "2"}, {"radius", "100"}}), std::nullopt).shared, near);
+  EXPECT_EQ(*api.get(part({}), std::nullopt).shared, *all);
+}
+
+TEST_F(OnALine, NoMoreOfTheMapIsGivenThanAPageCanUse) {
+  const MapView view(map_);
+  MapApi api(map_, view);
+  const auto refused = api.get(part({{"edge", "1"}, {"radius", "1e9"}}), std::nullopt);
+  EXPECT_EQ(refused.status, 400U);
+  EXPECT_EQ(refused.body, "radius must be 50000 m or less; without it 20000 m are given\n");
+  for (const std::string odd : {"-1e300", "1e300", "nan", "inf", "x", "-1", "0", "3"}) {
+    for (const std::string key : {"edge", "offset"}) {
+      auto request = part({{"edge", "1"}, {"radius", "50000"}});
+      request.query[key] = odd;
+      EXPECT_EQ(api.get(request, std::nullopt).status, 200U) << key << "=" << odd;
+    }
+  }
 }
 
 TEST_F(OnALine, CurvatureAndLandmarksAreThoseOfTheWayAhead) {

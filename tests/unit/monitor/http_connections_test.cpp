@@ -218,6 +218,27 @@ TEST_F(HttpConnectionsTest, HalfARequestIsNotWaitedForForEver) {
   EXPECT_TRUE(slow.is_closed());
 }
 
+TEST_F(HttpConnectionsTest, AnAnswerThatNobodyTakesIsKeptOnceAndNotForEver) {
+  const auto large = std::make_shared<const std::string>(30'000'000, 'a');
+  handlers_.request = [large](const Request&, const std::function<void(Response)>& answer) {
+    answer({200, "text/plain", "", "", "no-store", large});
+  };
+  options_.taken_time = std::chrono::seconds(2);
+  start();
+  const auto used_before = large.use_count();
+  std::deque<Connection> others;
+  for (int i = 0; i < 10; ++i) others.emplace_back(port_).say(kHealth);
+  const auto wait_for_uses = [&](long more) {
+    for (int i = 0; i < 2000 && large.use_count() != used_before + more; ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    return large.use_count() - used_before;
+  };
+  EXPECT_EQ(wait_for_uses(10), 10) << "each waits for its client";
+  EXPECT_EQ(wait_for_uses(0), 0);
+  for (const auto& other : others) EXPECT_TRUE(other.is_closed());
+}
+
 TEST_F(HttpConnectionsTest, WithoutDescriptorsItWaitsInsteadOfTryingAllTheTime) {
   start();
   std::optional<OneMoreDescriptor> few(std::in_place);
