@@ -20,12 +20,13 @@
 
 namespace railfix::messaging {
 
-/// When a sample was sent and when it came, in the hosts' clocks.
+/// When a sample was sent and when it came, in the hosts' clocks; these may be set.
 struct SampleInfo {
   int64_t source_ns = 0;
   int64_t received_ns = 0;
-  uint64_t sequence = 0;  // counts the writer's samples; a step other than 1 means that some never came
-  uint64_t writer = 0;    // tells one writer from another
+  int64_t arrived_ns = 0;  // the same as received_ns by this host's monotonic clock
+  uint64_t sequence = 0;   // counts the writer's samples; a step other than 1 means that some never came
+  uint64_t writer = 0;     // tells one writer from another
 };
 
 /// What the middleware needs to know of a message type, behind a wall.

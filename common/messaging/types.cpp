@@ -4,6 +4,7 @@
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <mutex>
 
+#include "core/time.hpp"
 #include "idl/cameraPubSubTypes.h"
 #include "idl/chargePubSubTypes.h"
 #include "idl/odometryPubSubTypes.h"
@@ -124,6 +125,7 @@ class TypeOf final : public FastDdsType {
         SampleInfo info;
         info.source_ns = infos[i].source_timestamp.to_ns();
         info.received_ns = infos[i].reception_timestamp.to_ns();
+        info.arrived_ns = core::monotonic_ns();
         info.sequence = infos[i].sample_identity.sequence_number().to64long();
         info.writer = number_of(infos[i].sample_identity.writer_guid());
         auto copy = pool_->get();

@@ -27,11 +27,11 @@ void CabWatch::track(const msg::TrackView& view) {
   if (tracks_.size() > kTracks) tracks_.pop_front();
 }
 
-void CabWatch::picture(const std::string& camera, Preview preview, int64_t now_ns) {
-  const auto [taken, first] = taken_ns_.try_emplace(camera, now_ns);
-  if (!first && now_ns - taken->second < period_ns_) return;
-  taken->second = now_ns;
-  waiting_[camera] = {std::move(preview), now_ns};
+void CabWatch::picture(const std::string& camera, Preview preview, const messaging::SampleInfo& info) {
+  const auto [taken, first] = taken_ns_.try_emplace(camera, info.arrived_ns);
+  if (!first && info.arrived_ns - taken->second < period_ns_) return;
+  taken->second = info.arrived_ns;
+  waiting_[camera] = {std::move(preview), info.arrived_ns};
 }
 
 std::vector<CabWatch::Due> CabWatch::due(int64_t now_ns) {

@@ -1,5 +1,6 @@
 // Brings together what belongs to one picture: the preview, and what the track detector saw in it, which comes a little
-// later. Also the curvature that was seen on the last metres. Knows no DDS reader; times are the host's.
+// later. Also the curvature that was seen on the last metres. Knows no DDS reader. Times are monotonic: a clock that is
+// set must not stop the pictures.
 #pragma once
 
 #include <deque>
@@ -13,6 +14,7 @@
 #include "geometry/camera.hpp"
 #include "idl/camera.h"
 #include "idl/track.h"
+#include "messaging/messaging.hpp"
 
 namespace railfix::monitor {
 
@@ -24,7 +26,7 @@ class CabWatch {
   void calibration(const msg::CameraCalibration& calibration);
   void track(const msg::TrackView& view);
   /// Kept until due, unless one of the same camera was due too short a time ago.
-  void picture(const std::string& camera, Preview preview, int64_t now_ns);
+  void picture(const std::string& camera, Preview preview, const messaging::SampleInfo& info);
 
   struct Due {
     std::string camera;

@@ -82,7 +82,7 @@ json alternatives_of(const msg::PositionFix* choice) {
 
 }  // namespace
 
-json services_message(const messaging::ServiceBoard& board, int64_t now_ns) {
+json services_message(const messaging::ServiceBoard& board, int64_t now_ns, int64_t wall_ns) {
   json services = json::array();
   for (const auto& [key, seen] : board.services()) {
     const auto& status = seen.status;
@@ -90,7 +90,7 @@ json services_message(const messaging::ServiceBoard& board, int64_t now_ns) {
                         {"host", key.first},
                         {"state", messaging::name_of_state(status.state())},
                         {"reason", status.reason().c_str()},
-                        {"since_ns", seen.since_ns},
+                        {"since_ns", wall_ns - (now_ns - seen.since_ns)},
                         {"age_s", core::seconds(now_ns - seen.received_ns)},
                         {"alive", seen.alive && !seen.stopped()},
                         {"version", status.version().c_str()},

@@ -14,7 +14,8 @@
 
 namespace railfix::monitor {
 
-nlohmann::json services_message(const messaging::ServiceBoard& board, int64_t now_ns);
+/// `now_ns` by the clock that the services were noted by; since when is told by the wall clock.
+nlohmann::json services_message(const messaging::ServiceBoard& board, int64_t now_ns, int64_t wall_ns);
 
 struct TopicShown {
   std::string name;

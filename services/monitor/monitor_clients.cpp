@@ -102,7 +102,7 @@ FoxgloveApi::Actions MonitorService::foxglove_actions() {
   actions.metadata = {{"train", context_.common().train_id},
                       {"version", service::release()},
                       {"host", context_.common().host},
-                      {"session", context_.common().train_id + "-" + std::to_string(begun_ns_)}};
+                      {"session", context_.common().train_id + "-" + std::to_string(core::wall_ns())}};
   actions.watch_changed = [this] { choose_topics(); };
   actions.first = [this](const std::string& topic) {
     const auto standing = standing_.find(topic);
@@ -153,7 +153,7 @@ Response MonitorService::map_answer(const Request& request) {
 }
 
 Response MonitorService::metrics_answer() {
-  scraped_ns_ = core::wall_ns();
+  scraped_ns_ = core::monotonic_ns();
   const TrainSeen seen = train_seen();
   MetricsInput input{context_.common().train_id, service::release(), context_.common().host, &seen,        {},
                      &problems_.problems(),      reports_sent_,      server_.clients(),      slow_viewers_};

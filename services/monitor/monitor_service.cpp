@@ -61,7 +61,7 @@ MonitorService::MonitorService(const Config& config, service::Context& context)
       map_api_(map_ ? std::make_unique<MapApi>(*map_, *map_view_) : nullptr),
       files_(page_folder(config.page_folder)),
       control_(context.writer(topics::service_control)),
-      begun_ns_(core::wall_ns()),
+      begun_ns_(core::monotonic_ns()),
       // Others count their requests too; replies go to everyone.
       next_request_((std::random_device()() & 0xFFFFFFFULL) << 24U),
       watch_(context.participant(), [this](const Arrived& arrived) { this->arrived(arrived); }),
@@ -120,7 +120,7 @@ void MonitorService::start_timers() {
     publish_topics();
     give_up_waiting();
     context_.health().dropped(watch_.take_dropped());
-    if (core::wall_ns() - state_.received_ns > core::kNsPerSecond) publish_state();
+    if (state_.age_s(core::monotonic_ns()) > 1) publish_state();
   });
 }
 
@@ -130,7 +130,7 @@ void MonitorService::beat() {
   ++beats_;
   watch_.drain();
   publish_pictures();
-  if (each(2) && state_.received_ns != state_sent_ns_) publish_state();
+  if (each(2) && state_.arrived_ns != state_sent_ns_) publish_state();
   if (each(4)) publish_curvature();
   if (each(5)) publish_log();
   if (each(10)) publish_services();
@@ -138,7 +138,7 @@ void MonitorService::beat() {
 
 void MonitorService::set_up_topics() {
   on_topic_["service_status"] = [this](const Arrived& arrived) {
-    services_.note(arrived.as<msg::ServiceStatus>(), core::wall_ns(), arrived.info.writer);
+    services_.note(arrived.as<msg::ServiceStatus>(), arrived.info.arrived_ns, arrived.info.writer);
   };
   const auto keep = [this]<class T>(const messaging::Topic<T>& topic, Newest<T>& newest) {
     on_topic_[topic.name] = [&newest](const Arrived& arrived) { newest.take(arrived); };
@@ -161,7 +161,7 @@ void MonitorService::set_up_topics() {
   on_topic_["track_view"] = [this](const Arrived& arrived) { on_track(arrived.as<msg::TrackView>()); };
   on_topic_["camera_preview"] = [this](const Arrived& arrived) {
     cab_.picture(arrived.name.substr(arrived.name.find('/') + 1),
-                 std::static_pointer_cast<const msg::CameraPreview>(arrived.sample), core::wall_ns());
+                 std::static_pointer_cast<const msg::CameraPreview>(arrived.sample), arrived.info);
   };
   on_topic_["position_fix"] = [this](const Arrived& arrived) {
     if (arrived.as<msg::PositionFix>().kind() == msg::FIX_TRACK) choice_.take(arrived);
@@ -253,7 +253,7 @@ std::set<std::string> MonitorService::wanted_topics() const {
 }
 
 bool MonitorService::scraped() const {
-  return scraped_ns_ != 0 && core::wall_ns() - scraped_ns_ < kScrapeNs;
+  return scraped_ns_ != 0 && core::monotonic_ns() - scraped_ns_ < kScrapeNs;
 }
 
 // A page in the background asks for the problems alone, and those are looked for once a second.
@@ -296,7 +296,7 @@ void MonitorService::show_channels() {
 
 TrainSeen MonitorService::train_seen() {
   TrainSeen train;
-  train.now_ns = core::wall_ns();
+  train.now_ns = core::monotonic_ns();
   train.watched_since_ns = begun_ns_;
   train.services = &services_;
   train.expected = config_.expected;
@@ -306,7 +306,7 @@ TrainSeen MonitorService::train_seen() {
                             std::ranges::binary_search(written_, name)});
   }
   train.state = state_.sample;
-  train.state_age_s = core::seconds(train.now_ns - state_.received_ns);
+  train.state_age_s = state_.age_s(train.now_ns);
   if (recent(recorder_)) train.recorder = recorder_.sample;
   if (recent(gnss_)) train.gnss = gnss_.sample;
   train.played = recent(player_);
@@ -327,15 +327,17 @@ TrainSeen MonitorService::train_seen() {
 }
 
 void MonitorService::look_for_silence() {
-  if (recent(player_)) services_.note_player(player_.received_ns);
-  const bool sparse = core::monotonic_ns() - idle_ns_ < kIdleStatuses * core::kNsPerSecond;
-  if (!services_.note_silence(core::wall_ns(), sparse ? kIdleStatuses : 1)) return;
+  if (recent(player_)) services_.note_player(player_.arrived_ns);
+  const int64_t now_ns = core::monotonic_ns();
+  const bool sparse = now_ns - idle_ns_ < kIdleStatuses * core::kNsPerSecond;
+  if (!services_.note_silence(now_ns, sparse ? kIdleStatuses : 1)) return;
   publish_services();
   look_for_problems();
 }
 
 void MonitorService::publish_services() {
-  if (live_.watched("services")) live_.publish("services", services_message(services_, core::wall_ns()));
+  if (!live_.watched("services")) return;
+  for (const auto& message : first("services")) live_.publish("services", message);
 }
 
 void MonitorService::look_for_problems() {

@@ -12,10 +12,10 @@
 #include "monitor/map_api.hpp"
 #include "monitor/map_view.hpp"
 #include "monitor/monitor_config.hpp"
+#include "monitor/newest.hpp"
 #include "monitor/problems.hpp"
 #include "monitor/report_list.hpp"
 #include "monitor/static_files.hpp"
-#include "monitor/train_watch.hpp"
 #include "service/service.hpp"
 
 namespace railfix::monitor {
@@ -33,22 +33,11 @@ class MonitorService {
     std::string service;
     int64_t asked_ns = 0;
   };
-  /// A sample's place in the page: the newest one of its topic, and when it came.
-  template <class T>
-  struct Newest {
-    std::optional<T> sample;
-    int64_t received_ns = 0;
-    void take(const Arrived& arrived) {
-      sample = arrived.as<T>();
-      received_ns = arrived.info.received_ns;
-    }
-  };
-
   /// Whose samples come at least once a second is gone when none came for this long.
-  static constexpr int64_t kAbsentNs = 5 * core::kNsPerSecond;
+  static constexpr double kAbsentS = 5;
   template <class T>
   static bool recent(const Newest<T>& newest) {
-    return newest.sample && core::wall_ns() - newest.received_ns < kAbsentNs;
+    return newest.sample && newest.age_s(core::monotonic_ns()) < kAbsentS;
   }
 
   // monitor_service.cpp: samples, and what is wrong
@@ -110,9 +99,9 @@ class MonitorService {
   messaging::Writer<msg::ControlRequest> control_;
   std::map<std::string, std::function<void(const Arrived&)>> on_topic_;
 
-  messaging::ServiceBoard services_;
+  messaging::ServiceBoard services_;  // by the monotonic clock, as all times here
   Newest<msg::TrainState> state_;
-  int64_t state_sent_ns_ = 0;  // receipt of the one last published
+  int64_t state_sent_ns_ = 0;  // arrival of the one last published
   Newest<msg::TrainPose> pose_;
   Newest<msg::PositionFix> choice_;
   Newest<msg::GnssFix> gnss_;

@@ -45,7 +45,7 @@ json MonitorService::curvature_message() const {
 }
 
 void MonitorService::publish_pictures() {
-  for (const auto& due : cab_.due(core::wall_ns())) {
+  for (const auto& due : cab_.due(core::monotonic_ns())) {
     const auto& preview = *due.preview;
     const auto message =
         view_message({due.camera, preview.stamp_ns(), preview.width_px(), preview.height_px(), preview.health(),
@@ -65,7 +65,7 @@ void MonitorService::publish_pictures() {
 
 void MonitorService::publish_state() {
   if (!live_.watched("state")) return;
-  state_sent_ns_ = state_.received_ns;
+  state_sent_ns_ = state_.arrived_ns;
   for (const auto& message : first("state")) live_.publish("state", message);
 }
 
@@ -106,7 +106,7 @@ std::vector<TopicShown> MonitorService::topics_shown() const {
     TopicShown one{name, info == nullptr ? "unknown" : info->type->name(), 1, measured, {}};
     if (measured) {
       one.writers = read->second.reader->matched_writers();
-      one.numbers = read->second.statistics.numbers(core::wall_ns());
+      one.numbers = read->second.statistics.numbers(core::monotonic_ns());
     }
     shown.push_back(std::move(one));
   }
@@ -114,16 +114,16 @@ std::vector<TopicShown> MonitorService::topics_shown() const {
 }
 
 std::vector<json> MonitorService::first(const std::string& kind) {
-  const int64_t now_ns = core::wall_ns();
+  const int64_t now_ns = core::monotonic_ns();
   if (kind == "state") {
     if (!state_.sample) return {{{"kind", "state"}, {"age_s", nullptr}}};
-    const double age_s = core::seconds(now_ns - state_.received_ns);
+    const double age_s = state_.age_s(now_ns);
     if (age_s > 1) return {{{"kind", "state"}, {"age_s", age_s}}};
     return {state_message(*state_.sample, age_s, recent(pose_) ? &*pose_.sample : nullptr,
                           recent(choice_) ? &*choice_.sample : nullptr, map_ ? &*map_ : nullptr)};
   }
   if (kind == "curvature") return state_.sample ? std::vector{curvature_message()} : std::vector<json>{};
-  if (kind == "services") return {services_message(services_, now_ns)};
+  if (kind == "services") return {services_message(services_, now_ns, core::wall_ns())};
   if (kind == "topics") return {topics_message(topics_shown())};
   if (kind == "log") return {log_message(json(log_))};
   if (kind == "reports") return reports_.messages();

@@ -28,7 +28,7 @@ struct Problem {
 
 /// The train as it is seen at one moment.
 struct TrainSeen {
-  int64_t now_ns = 0;
+  int64_t now_ns = 0;  // of the clock that the services were noted by
   int64_t watched_since_ns = 0;
   const messaging::ServiceBoard* services = nullptr;
   std::vector<std::string> expected;

@@ -34,14 +34,14 @@ TopicStatistics::Slice& TopicStatistics::slice(int64_t at_ns) {
 void TopicStatistics::add(const SeenSample& sample) {
   lost_ += sequences_.before(sample.writer, sample.sequence / one_in_, exclusive_);
   if (samples_ == 0) {
-    first_ns_ = sample.received_ns;
+    first_ns_ = sample.arrived_ns;
   } else {
-    note_gap(std::max<int64_t>(sample.received_ns - last_ns_, 0));
+    note_gap(std::max<int64_t>(sample.arrived_ns - last_ns_, 0));
   }
-  last_ns_ = std::max(last_ns_, sample.received_ns);
+  last_ns_ = std::max(last_ns_, sample.arrived_ns);
   ++samples_;
   bytes_ += sample.bytes;
-  Slice& now = slice(sample.received_ns);
+  Slice& now = slice(sample.arrived_ns);
   ++now.samples;
   now.bytes += sample.bytes;
   if (sample.source_ns > 0) note_latency(sample);
@@ -73,7 +73,7 @@ void TopicStatistics::note_latency(const SeenSample& sample) {
   ++latency_counts_[static_cast<size_t>(bound - kLatencyBoundsS.begin())];
   latency_sum_s_ += latency_s;
   if (latencies_.size() < kLatencies) latencies_.emplace_back();
-  latencies_[next_latency_ % kLatencies] = {sample.received_ns, static_cast<float>(latency_s * 1e3)};
+  latencies_[next_latency_ % kLatencies] = {sample.arrived_ns, static_cast<float>(latency_s * 1e3)};
   ++next_latency_;
 }
 
@@ -106,7 +106,7 @@ TopicNumbers TopicStatistics::numbers(int64_t now_ns) const {
 
   std::vector<float> latencies_ms;
   for (const Latency& latency : latencies_) {
-    if (now_ns - latency.received_ns <= kLatencyNs) latencies_ms.push_back(latency.ms);
+    if (now_ns - latency.arrived_ns <= kLatencyNs) latencies_ms.push_back(latency.ms);
   }
   numbers.latency_p50_ms = percentile(latencies_ms, 0.50);
   numbers.latency_p95_ms = percentile(latencies_ms, 0.95);

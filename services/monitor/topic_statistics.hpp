@@ -1,5 +1,5 @@
-// What one topic does, from the samples that come: rate, bandwidth, age, latency, losses and gaps. Knows no DDS; times
-// are the host's wall clock.
+// What one topic does, from the samples that come: rate, bandwidth, age, latency, losses and gaps. Knows no DDS. Only
+// latency is by the hosts' wall clocks; all else by the monotonic one, so that no clock that is set can hide a silence.
 #pragma once
 
 #include <array>
@@ -13,11 +13,14 @@
 namespace railfix::monitor {
 
 struct SeenSample {
-  int64_t received_ns = 0;
-  int64_t source_ns = 0;  // 0 = not known
-  uint64_t sequence = 0;  // counts the writer's samples
+  int64_t arrived_ns = 0;   // monotonic
+  int64_t received_ns = 0;  // the same moment of the wall clock
+  int64_t source_ns = 0;    // 0 = not known
+  uint64_t sequence = 0;    // counts the writer's samples
   uint64_t writer = 0;
   size_t bytes = 0;
+  /// Monotonic, as far as the hosts' clocks agree.
+  [[nodiscard]] int64_t sent_ns() const { return arrived_ns - (received_ns - source_ns); }
 };
 
 /// Upper bounds in seconds of the latency histogram; everything longer falls beyond the last.
@@ -46,7 +49,7 @@ class TopicStatistics {
   void add(const SeenSample& sample);
   /// From now on one in n samples is asked for.
   void thin(uint32_t one_in);
-  [[nodiscard]] TopicNumbers numbers(int64_t now_ns) const;
+  [[nodiscard]] TopicNumbers numbers(int64_t now_ns) const;  // monotonic
   /// How many latencies lay at or below each bound and above the one before; the last one counts those beyond.
   [[nodiscard]] const std::array<uint64_t, kLatencyBoundsS.size() + 1>& latency_counts() const {
     return latency_counts_;
@@ -58,13 +61,13 @@ class TopicStatistics {
  private:
   static constexpr uint64_t kSamplesToKnow = 10;
   struct Slice {
-    int64_t number = -1;  // since the epoch
+    int64_t number = -1;  // since the clock's zero
     uint64_t samples = 0;
     uint64_t bytes = 0;
     int64_t longest_gap_ns = 0;
   };
   struct Latency {
-    int64_t received_ns = 0;
+    int64_t arrived_ns = 0;
     float ms = 0;
   };
   void note_latency(const SeenSample& sample);

@@ -34,7 +34,7 @@ void TrainWatch::read(const std::map<std::string, uint32_t>& one_in_by_name) {
     topic.reader.reset();
     topic.info = info;
     topic.one_in = one_in;
-    topic.read_since_ns = core::wall_ns();
+    topic.read_since_ns = core::monotonic_ns();
     messaging::TopicInfo lenient = *info;
     // Statuses come again before anyone has missed one; asking for one again would cost an answer to each.
     if (info->name == messaging::topics::service_status.name) lenient.qos.transient_local = false;
@@ -59,14 +59,14 @@ void TrainWatch::drain() {
 void TrainWatch::arrived(const std::string& name, Topic& topic, const std::shared_ptr<const void>& sample,
                          const messaging::SampleInfo& info) {
   // What was sent before we listened says nothing about the way here.
-  if (info.source_ns >= topic.read_since_ns) {
-    size_t bytes = topic.fixed_bytes;
-    if (bytes == 0) {
-      bytes = topic.info->type->serialize(sample.get()).size();
+  SeenSample seen{info.arrived_ns, info.received_ns, info.source_ns, info.sequence, info.writer, topic.fixed_bytes};
+  if (seen.sent_ns() >= topic.read_since_ns) {
+    if (seen.bytes == 0) {
+      seen.bytes = topic.info->type->serialize(sample.get()).size();
       const auto* structure = cdr::own_types().find(topic.info->type->name());
-      if (structure != nullptr && of_fixed_size(*structure)) topic.fixed_bytes = bytes;
+      if (structure != nullptr && of_fixed_size(*structure)) topic.fixed_bytes = seen.bytes;
     }
-    topic.statistics.add({info.received_ns, info.source_ns, info.sequence, info.writer, bytes});
+    topic.statistics.add(seen);
   }
   handler_({name, *topic.info, sample, info});
 }

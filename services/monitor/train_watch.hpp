@@ -42,7 +42,7 @@ class TrainWatch {
     const messaging::TopicInfo* info = nullptr;
     TopicStatistics statistics;
     std::unique_ptr<messaging::AnyReader> reader;
-    int64_t read_since_ns = 0;
+    int64_t read_since_ns = 0;  // monotonic
     uint32_t one_in = 1;
     size_t fixed_bytes = 0;  // of every sample, 0 = not fixed
   };

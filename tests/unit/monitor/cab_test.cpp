@@ -20,6 +20,12 @@ CabWatch::Preview preview(int64_t stamp_ns) {
   return made;
 }
 
+messaging::SampleInfo at(int64_t arrived_ns) {
+  messaging::SampleInfo info;
+  info.arrived_ns = arrived_ns;
+  return info;
+}
+
 msg::TrackView view(int64_t stamp_ns) {
   msg::TrackView made;
   made.stamp_ns(stamp_ns);
@@ -35,7 +41,7 @@ msg::TrackView view(int64_t stamp_ns) {
 
 TEST(CabWatch, WaitsForWhatWasSeenInThePicture) {
   CabWatch cab(5);
-  cab.picture("cam0", preview(1000), 0);
+  cab.picture("cam0", preview(1000), at(0));
   EXPECT_TRUE(cab.due(10 * kMs).empty());
   cab.track(view(900));
   EXPECT_TRUE(cab.due(20 * kMs).empty());
@@ -49,10 +55,10 @@ TEST(CabWatch, WaitsForWhatWasSeenInThePicture) {
 
 TEST(CabWatch, ShowsThePictureWithoutWhenNothingWasSeenInIt) {
   CabWatch cab(5);
-  cab.picture("cam0", preview(1000), 0);
+  cab.picture("cam0", preview(1000), at(0));
   cab.track(view(1100));
   ASSERT_EQ(cab.due(1).size(), 1U) << "the detector is beyond it";
-  cab.picture("cam0", preview(2000), 1000 * kMs);
+  cab.picture("cam0", preview(2000), at(1000 * kMs));
   EXPECT_TRUE(cab.due(1100 * kMs).empty());
   const auto due = cab.due(1500 * kMs);
   ASSERT_EQ(due.size(), 1U);
@@ -63,7 +69,7 @@ TEST(CabWatch, TakesNoMorePicturesThanTheRate) {
   CabWatch cab(5);
   int taken = 0;
   for (int i = 0; i < 100; ++i) {
-    cab.picture("cam0", preview(i), i * 10 * kMs);
+    cab.picture("cam0", preview(i), at(i * 10 * kMs));
     cab.track(view(i));
     taken += static_cast<int>(cab.due(i * 10 * kMs).size());
   }

@@ -13,8 +13,8 @@ constexpr int64_t kBegin_ns = 1'700'000'000 * core::kNsPerSecond;
 constexpr int64_t kMs = 1'000'000;
 
 SeenSample sample(int64_t at_ms, uint64_t sequence, int64_t latency_ms = 2) {
-  const int64_t received_ns = kBegin_ns + at_ms * kMs;
-  return {received_ns, received_ns - latency_ms * kMs, sequence, 7, 100};
+  const int64_t at_ns = kBegin_ns + at_ms * kMs;
+  return {at_ns, at_ns, at_ns - latency_ms * kMs, sequence, 7, 100};
 }
 
 TEST(TopicStatistics, SaysNothingBeforeTheFirstSample) {
@@ -42,7 +42,9 @@ TEST(TopicStatistics, CountsWhatIsMissingAndTheGap) {
   TopicStatistics topic;
   for (int i = 0; i < 20; ++i) topic.add(sample(10 * i, static_cast<uint64_t>(i)));
   for (int i = 25; i < 40; ++i) topic.add(sample(10 * i, static_cast<uint64_t>(i)));
-  topic.add({kBegin_ns + 400 * kMs, kBegin_ns + 399 * kMs, 1000, 8, 100});  // another writer counts for itself
+  auto of_another_writer = sample(400, 1000);  // which counts for itself
+  of_another_writer.writer = 8;
+  topic.add(of_another_writer);
   const auto numbers = topic.numbers(kBegin_ns + 410 * kMs);
   EXPECT_EQ(numbers.lost, 5U);
   EXPECT_EQ(numbers.gaps, 1U);
@@ -72,11 +74,11 @@ TEST(TopicStatistics, ThinnedOutIsNotLost) {
 TEST(TopicStatistics, NothingIsLostWhenAStandbyTakesOver) {
   for (const bool exclusive : {true, false}) {
     TopicStatistics topic(exclusive);
-    topic.add({kBegin_ns, kBegin_ns, 10, 1, 100});
-    topic.add({kBegin_ns + kMs, kBegin_ns, 20, 2, 100});
-    topic.add({kBegin_ns + 2 * kMs, kBegin_ns, 500, 1, 100});
+    topic.add({kBegin_ns, kBegin_ns, kBegin_ns, 10, 1, 100});
+    topic.add({kBegin_ns + kMs, kBegin_ns + kMs, kBegin_ns, 20, 2, 100});
+    topic.add({kBegin_ns + 2 * kMs, kBegin_ns + 2 * kMs, kBegin_ns, 500, 1, 100});
     EXPECT_EQ(topic.numbers(kBegin_ns + 3 * kMs).lost, exclusive ? 0U : 489U);
-    topic.add({kBegin_ns + 4 * kMs, kBegin_ns, 503, 1, 100});
+    topic.add({kBegin_ns + 4 * kMs, kBegin_ns + 4 * kMs, kBegin_ns, 503, 1, 100});
     EXPECT_EQ(topic.numbers(kBegin_ns + 5 * kMs).lost, exclusive ? 2U : 491U);
   }
 }
