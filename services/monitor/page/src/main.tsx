@@ -16,7 +16,7 @@ import { Recorder } from "./panels/recorder";
 import { Reports } from "./panels/reports";
 import { Services } from "./panels/services";
 import { Topics } from "./panels/topics";
-import { about, connection, map, map_failed, now_ms, remember_moment, state } from "./store";
+import { about, connection, map, map_failed, remember_moment, state, tick } from "./store";
 import { page_visible, wanted } from "./visible";
 import type { About, MapData } from "./wire";
 
@@ -103,7 +103,7 @@ effect(() => {
   document.title = `${connection.value.up ? "" : "not connected – "}${count > 0 ? `(${count}) ` : ""}${train} Railfix`.trim();
 });
 setInterval(() => {
-  if (page_visible.value) now_ms.value = Date.now();
+  if (page_visible.value) tick();
 }, 500);
 setInterval(() => {
   remember_moment(Date.now());

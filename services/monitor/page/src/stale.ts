@@ -2,7 +2,7 @@
 
 export interface Held<T> {
   value: T | null;
-  at_ms: number; // when it came, by this browser's clock
+  at_ms: number; // when it came, by performance.now()
 }
 
 export const nothing = <T>(): Held<T> => ({ value: null, at_ms: 0 });
@@ -11,9 +11,9 @@ export const nothing = <T>(): Held<T> => ({ value: null, at_ms: 0 });
 export const FRESH_S = { state: 1.5, curvature: 1.5, view: 1.5, services: 2, topics: 3.5, recorder: 3.5, player: 1.5 } as const;
 
 /// Seconds since the train made the value: what the server said plus what passed here. Infinite when there is none.
-export function age_s<T>(held: Held<T>, now_ms: number, age_at_arrival_s = 0): number {
+export function age_s<T>(held: Held<T>, passed_ms: number, age_at_arrival_s = 0): number {
   if (held.value === null) return Infinity;
-  return Math.max(0, (now_ms - held.at_ms) / 1000) + Math.max(0, age_at_arrival_s);
+  return Math.max(0, (passed_ms - held.at_ms) / 1000) + Math.max(0, age_at_arrival_s);
 }
 
 export type Freshness = "live" | "stale" | "none";

@@ -45,8 +45,14 @@ export const history = signal<Moment[]>([]);
 export const connection = signal<{ up: boolean; since_ms: number; ever: boolean }>({ up: false, since_ms: Date.now(), ever: false });
 /// This browser's clock minus the monitor's, so that "since" means the same on both.
 export const clock_offset_ms = signal(0);
-/// Moves twice a second while the page can be seen; every age hangs on it.
+/// Both move twice a second while the page can be seen: the time to show, and the one that every age hangs on, which no
+/// clock that is set can stop.
 export const now_ms = signal(Date.now());
+export const passed_ms = signal(performance.now());
+export function tick(): void {
+  now_ms.value = Date.now();
+  passed_ms.value = performance.now();
+}
 
 export const host_now_ms = computed(() => now_ms.value - clock_offset_ms.value);
 export const host_ms = (ns: number) => ns / 1e6 + clock_offset_ms.value;
@@ -56,15 +62,15 @@ const held: Record<Kind, { value: Held<unknown> }> = { state, curvature, view, s
 
 export function age_of(kind: Kind): number {
   const one = held[kind].value;
-  return age_s(one, now_ms.value, kind === "state" ? ((one.value as TrainState | null)?.age_s ?? 0) : 0);
+  return age_s(one, passed_ms.value, kind === "state" ? ((one.value as TrainState | null)?.age_s ?? 0) : 0);
 }
 export const fresh = (kind: Kind): Freshness => freshness(age_of(kind), FRESH_S[kind], connection.value.up);
 
 function take_state(message: Partial<TrainState>): void {
   if (message.edge !== undefined) {
-    state.value = { value: message as TrainState, at_ms: Date.now() };
+    state.value = { value: message as TrainState, at_ms: performance.now() };
   } else if (state.value.value !== null && typeof message.age_s === "number") {
-    state.value = { value: { ...state.value.value, age_s: message.age_s }, at_ms: Date.now() };
+    state.value = { value: { ...state.value.value, age_s: message.age_s }, at_ms: performance.now() };
   } // null: a monitor that has just begun knows of none; what we hold grows old
 }
 
@@ -87,10 +93,10 @@ const log_key = (record: LogRecord) => `${record.stamp_ns} ${record.host} ${reco
 
 /// Everything but replies, which belong to whoever asked.
 export function take(message: Message): void {
-  const at_ms = Date.now();
+  const at_ms = performance.now();
   switch (message.kind) {
     case "hello":
-      clock_offset_ms.value = at_ms - message.now_ns / 1e6;
+      clock_offset_ms.value = Date.now() - message.now_ns / 1e6;
       problems.value = null; // of the connection before
       break;
     case "state":

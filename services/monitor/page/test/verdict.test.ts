@@ -1,5 +1,5 @@
-import { beforeEach, describe, expect, it } from "vitest";
-import { age_of, connection, fresh, now_ms, problems, state, take } from "../src/store";
+import { beforeEach, describe, expect, it, vi } from "vitest";
+import { age_of, connection, fresh, passed_ms, problems, state, take, tick } from "../src/store";
 import { nothing } from "../src/stale";
 import { verdict } from "../src/verdict";
 import type { Message } from "../src/wire";
@@ -8,14 +8,14 @@ const said = () => verdict(problems.value !== null, fresh("state"), age_of("stat
 const hello = () => take({ kind: "hello", now_ns: Date.now() * 1e6 } as Message);
 const well = () => take({ kind: "problems", problems: [] } as Message);
 const position = (more: object) => take({ kind: "state", ...more } as Message);
-const later = (seconds: number) => (now_ms.value = Date.now() + seconds * 1000);
+const later = (seconds: number) => (passed_ms.value = performance.now() + seconds * 1000);
 
 describe("all is well", () => {
   beforeEach(() => {
     state.value = nothing();
     problems.value = null;
     connection.value = { up: true, since_ms: Date.now(), ever: true };
-    now_ms.value = Date.now();
+    tick();
     hello();
   });
 
@@ -37,12 +37,21 @@ describe("all is well", () => {
     position({ age_s: 12 });
     expect(said()).toEqual({ level: "old", text: expect.stringMatching(/^Nothing has been heard of the train's position for 12\ss/) });
   });
+  it("is not said any more when the train falls silent and this browser's clock is set back", () => {
+    well();
+    position({ edge: 1, age_s: 0.1 });
+    vi.spyOn(performance, "now").mockReturnValue(performance.now() + 3e3);
+    vi.spyOn(Date, "now").mockReturnValue(Date.now() - 3.6e6);
+    tick();
+    vi.restoreAllMocks();
+    expect(said().level).toBe("old");
+  });
   it("is not said any more when nobody answers", () => {
     well();
     position({ edge: 1, age_s: 0.1 });
     later(3);
     expect(said().level).toBe("old");
-    now_ms.value = Date.now();
+    tick();
     connection.value = { up: false, since_ms: Date.now(), ever: true };
     expect(said().level).toBe("old");
   });
