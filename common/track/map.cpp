@@ -129,11 +129,13 @@ core::Result<EdgePosition> Map::parse_position(const std::string& text) const {
   }
   if (!is_number) found = piece_at(*this, *found, out.offset_m);
   out.edge = found->id;
-  if (out.offset_m < 0 || out.offset_m > found->alignment.length_m() + 1e-6) {
+  constexpr double kWrittenM = 1e-3;  // `railfix map info` writes lengths so finely
+  if (out.offset_m < 0 || out.offset_m > found->alignment.length_m() + kWrittenM) {
     return core::Error{"offset " + std::string(rest.substr(colon + 1)) + " is not on edge " + std::string(wanted) +
                        ", which is " + std::to_string(*offset - out.offset_m + found->alignment.length_m()) +
                        " m long"};
   }
+  out.offset_m = std::min(out.offset_m, found->alignment.length_m());
   return out;
 }
 

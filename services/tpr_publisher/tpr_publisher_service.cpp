@@ -135,6 +135,7 @@ void TprPublisherService::on_state(const msg::TrainState& state) {
     report_trouble_ =
         !has_map_                    ? "Reports say LRBG unknown: tpr_publisher.map is not set."
         : state.track_known() == 0   ? "Reports say LRBG unknown: the track is not known."
+        : !position.usable           ? "Reports say LRBG unknown: the position is unusable; fusion's status says why."
         : !position.track_known      ? "Reports say LRBG unknown: train_state is of another map than tpr_publisher.map."
         : !position.track_declared() ? "Reports say LRBG unknown: which track it is has not been declared yet."
                                      : "Reports say LRBG unknown: no balise group behind the train yet.";

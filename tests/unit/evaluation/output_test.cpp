@@ -34,6 +34,25 @@ class RunFolder : public railfix::testing::TemporaryFolder {
   }
 };
 
+// It must not look as if the whole ride had been driven, nor be blamed for what it never came to.
+TEST_F(RunFolder, ARunThatWasBrokenOffIsAPartOfTheRide) {
+  write_run();  // 20 s
+  write("out/sightings.csv",
+        "stamp_ns,kind,distance_ahead_m,lateral_m,sigma_m,confidence\n10000000000,mast,10,3,0.1,1\n");
+  MadeTruth made;  // 50 s, 1000 m to 2000 m
+  made.landmarks = {{{"mast", 1210, 3}, {"mast", 1700, 3}}};
+  const auto evaluation = evaluate(made.make(), core::value_or_throw(read_run(root_ / "out")));
+  EXPECT_TRUE(is_part(evaluation));
+  EXPECT_DOUBLE_EQ(evaluation.duration_s, 20);
+  EXPECT_NEAR(evaluation.travelled_m, 400, 1e-6);
+  EXPECT_EQ(evaluation.sightings->all.real, 1U);
+  std::ostringstream text;
+  print(evaluation, text);
+  EXPECT_THAT(text.str(), HasSubstr("run of 400.000 m in 20.0 s, a part of the ride of 1000.000 m in 50.0 s\n"));
+  made.seconds = 20;
+  EXPECT_FALSE(is_part(evaluate(made.make(), core::value_or_throw(read_run(root_ / "out")))));
+}
+
 TEST_F(RunFolder, FiguresOfTheTablesThatAreThere) {
   write_run();
   const auto run = read_run(root_ / "out");

@@ -134,7 +134,7 @@ TEST(Sightings, PrecisionRecallAndPositionError) {
   say("mast", 1201.9);
   say("mast", 1262.5);  // more than 2 m off
   say("bridge", 1500);
-  const auto result = judge_sightings(made.make(), rows);
+  const auto result = judge_sightings(made.make(), rows, made.make().whole());
   ASSERT_TRUE(result);
   EXPECT_EQ(result->all.real, 4U);  // 1004 m was passed before the run began, 2100 m lies behind its end
   EXPECT_EQ(result->all.said, 6U);
@@ -167,7 +167,7 @@ TEST(Sightings, EveryKindHasItsOwnReferencePoint) {
   for (const double at_m : {1010.0, 1500.0, 2003.0}) say("balise", at_m, 8);
   for (const double at_m : {1500.0, 1600.0, 2020.0}) say("mast", at_m, 25);
   say("mast", 1024, 20);  // nearer than masts usually are
-  const auto result = judge_sightings(made.make(), rows);
+  const auto result = judge_sightings(made.make(), rows, made.make().whole());
   ASSERT_TRUE(result);
   EXPECT_EQ(result->kinds.at("balise").real, 3U);
   EXPECT_EQ(result->kinds.at("balise").right, 3U);
@@ -180,10 +180,10 @@ TEST(Sightings, EveryKindHasItsOwnReferencePoint) {
 TEST(Sightings, KindsThatWereNeverReportedHaveARecall) {
   MadeTruth made;
   made.landmarks = {{{"frog", 1500, 0}}};
-  const auto result = judge_sightings(made.make(), {});
+  const auto result = judge_sightings(made.make(), {}, made.make().whole());
   EXPECT_EQ(result->kinds.at("frog").recall_percent(), 0);
   made.landmarks.reset();
-  EXPECT_FALSE(judge_sightings(made.make(), {}).has_value());
+  EXPECT_FALSE(judge_sightings(made.make(), {}, made.make().whole()).has_value());
 }
 
 }  // namespace

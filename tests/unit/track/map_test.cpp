@@ -186,6 +186,10 @@ TEST(Map, ParsesPositions) {
   EXPECT_EQ(map.parse_position("siding:20.5:-").value().edge, 3U);
   EXPECT_EQ(map.parse_position("siding:20.5:-").value().direction, Direction::reverse);
   EXPECT_DOUBLE_EQ(map.parse_position("siding:20.5:+").value().offset_m, 20.5);
+  const double end_m = map.edge(3)->alignment.length_m();
+  const auto as_written = map.parse_position("3:" + std::to_string(end_m + 0.0005));
+  ASSERT_TRUE(as_written.ok()) << "a length is written to the millimetre";
+  EXPECT_EQ(as_written.value().offset_m, end_m);
   for (const char* bad :
        {"", ":", "1", "1:", ":5", "1:x", "1:5:", "1:5:*", "1:-5", "1:1001", "4:0", "0:0", "1:nan", "1:5 "}) {
     EXPECT_FALSE(map.parse_position(bad).ok()) << bad;

@@ -73,10 +73,31 @@ core::Status check_times(const Truth& truth, const RunTables& run) {
   return {};
 }
 
+namespace {
+
+/// What the tables cover that have a row for every step, the whole truth but for what a start and an end take.
+Stretch covered(const Truth& truth, const RunTables& run) {
+  const Stretch whole = truth.whole();
+  Stretch stretch{INT64_MAX, INT64_MIN};
+  for (const auto& [name, span] : run.spans) {
+    if (!span.every_step) continue;
+    stretch = {std::min(stretch.from_ns, span.from_ns), std::max(stretch.to_ns, span.to_ns)};
+  }
+  if (stretch.from_ns > stretch.to_ns) return whole;
+  if (stretch.from_ns < whole.from_ns + core::kNsPerSecond) stretch.from_ns = whole.from_ns;
+  if (stretch.to_ns > whole.to_ns - core::kNsPerSecond) stretch.to_ns = whole.to_ns;
+  return stretch;
+}
+
+}  // namespace
+
 Evaluation evaluate(const Truth& truth, const RunTables& run) {
   Evaluation result;
-  result.duration_s = core::seconds(truth.rows().back().stamp_ns - truth.rows().front().stamp_ns);
-  result.travelled_m = truth.travelled_m();
+  const Stretch stretch = covered(truth, run);
+  result.duration_s = core::seconds(stretch.to_ns - stretch.from_ns);
+  result.travelled_m = truth.travelled_m(stretch);
+  result.ride_s = core::seconds(truth.whole().to_ns - truth.whole().from_ns);
+  result.ride_m = truth.travelled_m(truth.whole());
   result.missing = run.missing;
   result.empty = run.empty;
   result.out_of_order = run.out_of_order;
@@ -84,7 +105,7 @@ Evaluation evaluate(const Truth& truth, const RunTables& run) {
   if (run.states) result.position = judge_position(truth, *run.states);
   if (run.views) result.views = judge_views(truth, *run.views);
   if (run.rails) result.edges = judge_edges(truth, *run.rails);
-  if (run.sightings) result.sightings = judge_sightings(truth, *run.sightings);
+  if (run.sightings) result.sightings = judge_sightings(truth, *run.sightings, stretch);
   if (run.fixes) {
     result.fixes.emplace();
     for (const FixRow& fix : *run.fixes) ++(*result.fixes)[fix.kind];

@@ -35,8 +35,10 @@ ReportResult judge_reports(const std::vector<ReportRow>& rows);
 
 /// What is not in the run is nothing.
 struct Evaluation {
-  double duration_s = 0;
+  double duration_s = 0;  // of the run ...
   double travelled_m = 0;
+  double ride_s = 0;  // ... and of the truth: a run that was broken off is shorter
+  double ride_m = 0;
   std::optional<OdometryResult> odometry;
   std::optional<PositionResult> position;
   std::optional<ViewResult> views;
@@ -52,6 +54,11 @@ struct Evaluation {
 /// An error names both times where the truth has none in common with the run, or with a table of every step.
 core::Status check_times(const Truth& truth, const RunTables& run);
 Evaluation evaluate(const Truth& truth, const RunTables& run);
+
+/// Of a ride that goes on without the run, or began before it.
+inline bool is_part(const Evaluation& evaluation) {
+  return evaluation.duration_s < evaluation.ride_s;
+}
 
 void print(const Evaluation& evaluation, std::ostream& out);
 nlohmann::ordered_json to_json(const Evaluation& evaluation);

@@ -61,7 +61,8 @@ class Html {
 
 void headline_figures(Html& html, const Evaluation& e) {
   html.raw("<div class=\"figures\">\n");
-  html.figure("run", number(e.travelled_m / 1000, "%.3f km") + ", " + number(e.duration_s, "%.0f s"));
+  html.figure(is_part(e) ? "run, a part of the ride" : "run",
+              number(e.travelled_m / 1000, "%.3f km") + ", " + number(e.duration_s, "%.0f s"));
   if (e.odometry) {
     html.figure("odometry drift", number(e.odometry->drift.percent, "%.4f %%"));
     html.figure("drift per 100 m, p95", number(e.odometry->drift.window_percent.p95, "%.4f %%"));

@@ -229,7 +229,10 @@ ordered_json or_null(const std::optional<T>& part, Write write) {
 }  // namespace
 
 void print(const Evaluation& evaluation, std::ostream& out) {
-  out << "run of " << metres(evaluation.travelled_m) << " in " << figure(evaluation.duration_s, "%.1f", " s") << '\n';
+  out << "run of " << metres(evaluation.travelled_m) << " in " << figure(evaluation.duration_s, "%.1f", " s");
+  if (is_part(evaluation))
+    out << ", a part of the ride of " << metres(evaluation.ride_m) << " in " << figure(evaluation.ride_s, "%.1f", " s");
+  out << '\n';
   if (evaluation.odometry) print_odometry(out, *evaluation.odometry);
   if (evaluation.position) print_position(out, *evaluation.position);
   if (evaluation.views) print_views(out, *evaluation.views);
@@ -257,8 +260,11 @@ void print(const Evaluation& evaluation, std::ostream& out) {
 }
 
 ordered_json to_json(const Evaluation& evaluation) {
-  ordered_json json = {
-      {"duration_s", evaluation.duration_s}, {"travelled_m", evaluation.travelled_m}, {"missing", evaluation.missing}};
+  ordered_json json = {{"duration_s", evaluation.duration_s},
+                       {"travelled_m", evaluation.travelled_m},
+                       {"ride_s", evaluation.ride_s},
+                       {"ride_m", evaluation.ride_m},
+                       {"missing", evaluation.missing}};
   json["empty"] = evaluation.empty;
   json["out_of_order"] = evaluation.out_of_order;
   json["odometry"] = or_null(evaluation.odometry, odometry_json);

@@ -209,7 +209,8 @@ ViewResult judge_views(const Truth& truth, const std::vector<ViewRow>& rows) {
   return result;
 }
 
-std::optional<SightingResult> judge_sightings(const Truth& truth, const std::vector<SightingRow>& rows) {
+std::optional<SightingResult> judge_sightings(const Truth& truth, const std::vector<SightingRow>& rows,
+                                              const Stretch& run) {
   if (!truth.landmarks()) return std::nullopt;
   std::map<std::string, Kind> kinds;
   std::vector<double> ahead;
@@ -224,17 +225,21 @@ std::optional<SightingResult> judge_sightings(const Truth& truth, const std::vec
   for (const dataset::TruthLandmark& landmark : *truth.landmarks())
     kinds[landmark.kind].real_m.push_back(landmark.distance_m);
   const Summary usual = summarise(ahead);
-  const auto [nearest, farthest] =
-      std::minmax_element(truth.rows().begin(), truth.rows().end(),
-                          [](const auto& a, const auto& b) { return a.distance_m < b.distance_m; });
+  double nearest_m = HUGE_VAL;
+  double farthest_m = -HUGE_VAL;
+  for (const auto& row : truth.rows()) {
+    if (!run.holds(row.stamp_ns)) continue;
+    nearest_m = std::min(nearest_m, row.distance_m);
+    farthest_m = std::max(farthest_m, row.distance_m);
+  }
   SightingResult result;
   std::vector<double> all_errors;
   for (const auto& [name, kind] : kinds) {
     // Only what passed the reference point could be reported; the run itself says how far ahead it is for this kind.
     const Summary own = summarise(kind.ahead_m);
     const double reference_m = own.count > 0 ? own.p50 : (usual.count > 0 ? usual.p50 : 0.0);
-    const auto passed = [&, nearest = nearest, farthest = farthest](double place_m) {
-      return place_m >= nearest->distance_m + reference_m && place_m <= farthest->distance_m + reference_m;
+    const auto passed = [&](double place_m) {
+      return place_m >= nearest_m + reference_m && place_m <= farthest_m + reference_m;
     };
     const auto matches = match(kind.real_m, kind.said_m);
     std::vector<double> errors;

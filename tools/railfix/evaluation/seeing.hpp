@@ -59,6 +59,7 @@ struct SightingResult {
   std::map<std::string, KindResult> kinds;
 };
 /// Nothing when the truth has no landmarks.
-std::optional<SightingResult> judge_sightings(const Truth& truth, const std::vector<SightingRow>& rows);
+std::optional<SightingResult> judge_sightings(const Truth& truth, const std::vector<SightingRow>& rows,
+                                              const Stretch& run);
 
 }  // namespace railfix::evaluation

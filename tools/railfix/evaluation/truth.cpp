@@ -112,9 +112,12 @@ std::vector<Truth::Offset> Truth::track_ahead(const TruthRow& train, const std::
   return offsets;
 }
 
-double Truth::travelled_m() const {
+double Truth::travelled_m(const Stretch& stretch) const {
   double sum = 0;
-  for (size_t i = 1; i < rows_.size(); ++i) sum += std::abs(rows_[i].distance_m - rows_[i - 1].distance_m);
+  for (size_t i = 1; i < rows_.size(); ++i) {
+    if (stretch.holds(rows_[i - 1].stamp_ns) && stretch.holds(rows_[i].stamp_ns))
+      sum += std::abs(rows_[i].distance_m - rows_[i - 1].distance_m);
+  }
   return sum;
 }
 

@@ -11,6 +11,13 @@
 
 namespace railfix::evaluation {
 
+/// Of time, both ends included.
+struct Stretch {
+  int64_t from_ns = 0;
+  int64_t to_ns = 0;
+  [[nodiscard]] bool holds(int64_t stamp_ns) const { return stamp_ns >= from_ns && stamp_ns <= to_ns; }
+};
+
 class Truth {
  public:
   /// `folder` is SEQ/truth: track.csv, and when there are any landmarks.csv, visibility.csv and the camera's
@@ -39,8 +46,9 @@ class Truth {
   [[nodiscard]] const std::vector<dataset::TruthRow>& rows() const { return rows_; }
   [[nodiscard]] const std::optional<std::vector<dataset::TruthLandmark>>& landmarks() const { return landmarks_; }
   [[nodiscard]] const std::optional<dataset::CameraCalibration>& calibration() const { return calibration_; }
+  [[nodiscard]] Stretch whole() const { return {rows_.front().stamp_ns, rows_.back().stamp_ns}; }
   /// Metres run, forward and back.
-  [[nodiscard]] double travelled_m() const;
+  [[nodiscard]] double travelled_m(const Stretch& stretch) const;
 
  private:
   struct Bend {

@@ -128,9 +128,10 @@ int learn(const LearnRequest& request) {
   apply_survey(survey, updated);
   core::ok_or_throw(updated.save(request.out));
   say_beside({request.out});
-  std::printf("sightings        %zu of %zu runs, %zu used, %zu outliers, %zu of things seen by fewer than %zu runs\n",
-              sightings.size(), request.runs.size(), survey.sightings, survey.outliers, survey.left_alone,
-              request.options.least_runs);
+  std::printf(
+      "sightings        %zu of %zu runs, %zu used, %zu outliers, %zu of new things seen by fewer than %zu runs\n",
+      sightings.size(), request.runs.size(), survey.sightings, survey.outliers, survey.left_alone,
+      request.options.least_runs);
   if (placeless > 0)
     std::printf("without a place  %zu more, where the track was not known or is not on the map\n", placeless);
   for (size_t run = 0; run < request.runs.size(); ++run) {
