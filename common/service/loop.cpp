@@ -24,6 +24,16 @@ constexpr std::chrono::seconds kKeeperPeriod{10};
 constexpr std::chrono::hours kCertificatePeriod{6};
 constexpr int64_t kIdleNs = core::kNsPerSecond;
 
+// Anybody may ask anything: what a handler did not think of must not end the service.
+core::Result<std::string> answered(const std::function<core::Result<std::string>(const std::string&)>& handler,
+                                   const std::string& argument) {
+  try {
+    return handler(argument);
+  } catch (const std::exception& error) {
+    return core::Error{error.what()};
+  }
+}
+
 // Standing values and the words of operation are never held back.
 bool waits_for_turn(const messaging::TopicInfo& topic) {
   return topic.idl != "operation" && !topic.qos.transient_local;
@@ -185,7 +195,7 @@ void Loop::answer(const msg::ControlRequest& request) {
     reply.done(false);
     reply.text(service_ + " does not know the command " + command + (names.empty() ? "" : "; it knows: " + names));
   } else {
-    const auto result = known->second(request.argument().c_str());
+    const auto result = answered(known->second, request.argument().c_str());
     reply.done(result.ok());
     reply.text(result.ok() ? result.value() : result.error().message.substr(0, 255));
   }
