@@ -36,9 +36,11 @@ void sync_folder(const std::filesystem::path& file) {
 core::Result<std::unique_ptr<Writer>> Writer::create(const std::filesystem::path& file, const WriterOptions& options) {
   std::unique_ptr<Writer> writer(new Writer(file, options));
   writer->active_ = file.string() + ".active";
-  if (!options.overwrite && std::filesystem::exists(file)) {
+  std::error_code failed;
+  if (!options.overwrite && std::filesystem::exists(file, failed)) {
     return core::Error{file.string() + " exists already; choose another name or remove it"};
   }
+  if (failed) return core::Error{file.string() + " cannot be created (" + failed.message() + "); choose another name"};
   const int flags = O_WRONLY | O_CREAT | O_CLOEXEC | (options.overwrite ? 0 : O_EXCL);
   writer->descriptor_ = ::open(writer->active_.c_str(), flags, 0644);
   if (writer->descriptor_ < 0) {
@@ -68,7 +70,10 @@ core::Result<std::unique_ptr<Writer>> Writer::create(const std::filesystem::path
 }
 
 Writer::~Writer() {
-  (void)close();
+  try {
+    (void)close();
+  } catch (const std::exception&) {  // no memory for the tail; the chunks are there
+  }
 }
 
 core::Status Writer::put(ByteView bytes) {

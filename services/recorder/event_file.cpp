@@ -102,14 +102,18 @@ void EventFile::run() {
   const auto keep = [this](const core::Status& status) {
     if (!status.ok()) status_ = status;
   };
-  for (bool finished = false; !finished;) {
-    for (const Item& item : take(finished)) {
-      keep(item.sample ? recording_->write(*item.sample, item.log_time_ns) : recording_->write_event(item.note));
+  try {
+    for (bool finished = false; !finished;) {
+      for (const Item& item : take(finished)) {
+        keep(item.sample ? recording_->write(*item.sample, item.log_time_ns) : recording_->write_event(item.note));
+      }
+      keep(recording_->tick(core::monotonic_ns()));
     }
-    keep(recording_->tick(core::monotonic_ns()));
+    for (const auto& [topic, count] : dropped_) recording_->add_dropped(topic, Loss::queue, count);
+    keep(recording_->close());
+  } catch (const std::exception& error) {
+    keep(core::Error{file().string() + " is not whole: " + error.what()});
   }
-  for (const auto& [topic, count] : dropped_) recording_->add_dropped(topic, Loss::queue, count);
-  keep(recording_->close());
   done_ = true;
 }
 

@@ -16,7 +16,11 @@ Housekeeper::Housekeeper(std::filesystem::path folder, uint64_t quota_bytes)
     std::unique_lock lock(mutex_);
     while (!ending_) {
       lock.unlock();
-      look();
+      try {
+        look();
+      } catch (const std::exception& error) {
+        say(folder_.string() + " cannot be looked after: " + error.what());
+      }
       lock.lock();
       woken_.wait_for(lock, kPeriod, [this] { return ending_; });
     }

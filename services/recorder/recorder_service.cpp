@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <stdexcept>
 
 #include "core/time.hpp"
 #include "recorder/recorder_status.hpp"
@@ -103,6 +104,7 @@ core::Result<std::string> RecorderService::stop() {
 
 void RecorderService::show_state() {
   const RecorderState now = thread_.take_state();
+  if (!now.failure.empty()) throw std::runtime_error(now.failure);
   for (; received_ < now.received; ++received_) context_.health().input();
   for (; written_ < now.written; ++written_) context_.health().output(0);
   note_losses(now);

@@ -42,20 +42,29 @@ RecorderThread::RecorderThread(const RecorderConfig& config, messaging::Particip
   if (config_.ring_s > 0) ring_.emplace(config_.ring_s, static_cast<uint64_t>(config_.ring_mb * kBytesPerMb));
   writer_thread_ = std::thread([this] { turn(); });
   if (!ring_) return;
-  (void)in_thread([this]() -> core::Result<std::string> {
-    inlet_->open();
+  const auto opened = in_thread([this]() -> core::Result<std::string> {
+    const auto status = inlet_->open();
+    if (!status.ok()) return status.error();
     return std::string();
   });
+  if (opened.ok()) return;
+  close_all();
+  throw core::BadInput(opened.error());
 }
 
 RecorderThread::~RecorderThread() {
-  (void)in_thread([this]() -> core::Result<std::string> {
-    if (recording_) (void)end();
+  close_all();
+}
+
+void RecorderThread::close_all() {
+  (void)in_thread([this] { return recording_ ? end() : std::string(); });
+  (void)in_thread([this] {
     inlet_->close();
     tend_event_files(true);
-    ending_ = true;
     return std::string();
   });
+  ending_ = true;
+  queue_.push(nullptr, [] {});
   writer_thread_.join();
 }
 
@@ -63,9 +72,13 @@ core::Result<std::string> RecorderThread::in_thread(const std::function<core::Re
   std::promise<core::Result<std::string>> promise;
   auto result = promise.get_future();
   queue_.push(nullptr, [&] {
-    auto done = work();
-    publish_state();
-    promise.set_value(std::move(done));
+    try {
+      auto done = work();
+      publish_state();
+      promise.set_value(std::move(done));
+    } catch (const std::exception& error) {
+      promise.set_value(core::Error{error.what()});
+    }
   });
   return result.get();
 }
@@ -114,7 +127,7 @@ fs::path RecorderThread::next_name() {
   const fs::path first(config_.file);
   if (!std::exchange(file_begun_, true)) return first;
   fs::path next;
-  for (int i = 2; next.empty() || fs::exists(next) || fs::exists(next.string() + ".active"); ++i) {
+  for (int i = 2; next.empty() || is_taken(next); ++i) {
     next = first.parent_path() / (first.stem().string() + "-" + std::to_string(i) + first.extension().string());
   }
   return next;
@@ -138,7 +151,12 @@ core::Result<std::string> RecorderThread::begin(const fs::path& file) {
   } else {
     standing_.clear();
     dropped_.clear();
-    inlet_->open();
+    const auto opened = inlet_->open();
+    if (!opened.ok()) {
+      (void)end();
+      problem_ = opened.error().message;
+      return opened.error();
+    }
   }
   return name.string();
 }
@@ -265,14 +283,34 @@ void RecorderThread::count_dropped() {
 
 void RecorderThread::turn() {
   while (!ending_) {
-    queue_.run_one(core::monotonic_ns() + kTickNs);
-    if (core::monotonic_ns() - ticked_ns_ >= kTickNs) tick();
+    try {
+      queue_.run_one(core::monotonic_ns() + kTickNs);
+      if (core::monotonic_ns() - ticked_ns_ >= kTickNs) tick();
+    } catch (const std::exception& error) {
+      fail(error.what());
+    }
+  }
+}
+
+// Nobody knows what is still right here: the service ends, and whoever started it starts it again.
+void RecorderThread::fail(const std::string& why) {
+  try {
+    if (failure_.empty()) failure_ = "the recorder's thread cannot go on: " + why;
+    (void)wait_for_closing();
+    if (recording_) (void)recording_->close();
+    stopped_by_disk_ = false;
+    recording_.reset();
+    publish_state();
+  } catch (const std::exception&) {
+    const std::lock_guard lock(state_mutex_);
+    state_.failure = failure_;
   }
 }
 
 void RecorderThread::tick() {
   ticked_ns_ = core::monotonic_ns();
   if (inlet_->is_open()) inlet_->find_cameras();
+  for (const auto& sentence : inlet_->take_refused()) say(sentence, true);
   count_dropped();
   if (recording_) {
     const auto status = recording_->tick(ticked_ns_);
@@ -348,6 +386,7 @@ void RecorderThread::publish_state() {
   now.received = received_;
   now.written = written_;
   now.problem = problem_.empty() ? split_problem_ : problem_;
+  now.failure = failure_;
   now.event = event_;
   now.waiting_bytes = inlet_->waiting_bytes();
   if (event_file_) now.waiting_bytes += event_file_->waiting_bytes();

@@ -34,6 +34,7 @@ struct RecorderState {
   std::string losses;  // of the present recording, by topic and cause
   std::vector<TopicLosses> losses_by_topic;
   std::string problem;             // why nothing can be written, empty = all well
+  std::string failure;             // why the recorder cannot go on at all
   std::optional<EventNote> event;  // the last one
   struct News {
     std::string sentence;
@@ -45,7 +46,7 @@ struct RecorderState {
 class RecorderThread {
  public:
   /// `on_picture` is called from the recorder's thread with the stamp of each picture that was dealt with. Throws
-  /// BadInput for an event rule that cannot be meant.
+  /// BadInput for an event rule that cannot be meant, or a topic that cannot be read.
   RecorderThread(const RecorderConfig& config, messaging::Participant& participant,
                  std::map<std::string, std::string> about, std::function<void(int64_t stamp_ns)> on_picture);
   /// Closes all files.
@@ -65,6 +66,7 @@ class RecorderThread {
   Housekeeper& housekeeper() { return *housekeeper_; }
 
  private:
+  void close_all();
   core::Result<std::string> in_thread(const std::function<core::Result<std::string>()>& work);
   [[nodiscard]] std::filesystem::path next_name();
   core::Result<std::string> begin(const std::filesystem::path& file);
@@ -76,6 +78,7 @@ class RecorderThread {
   core::Status wait_for_closing();
   void write_standing();
   void turn();
+  void fail(const std::string& why);
   void tick();
   void count_dropped();
   void guard_disk();
@@ -118,6 +121,7 @@ class RecorderThread {
   std::vector<std::unique_ptr<EventFile>> closing_events_;
   std::optional<EventNote> event_;
   std::string problem_;
+  std::string failure_;
   std::string split_problem_;  // why the next file could not be begun
   int64_t split_again_ns_ = 0;
   uint64_t received_ = 0;

@@ -30,12 +30,15 @@ struct Found {
 std::vector<Found> recordings_in(const fs::path& folder) {
   std::vector<Found> all;
   std::error_code failed;
-  for (const auto& entry : fs::directory_iterator(folder, failed)) {
-    Found found{entry.path(), entry.path(), entry.last_write_time(failed), entry.file_size(failed), false};
+  for (fs::directory_iterator entry(folder, failed); !failed && entry != fs::directory_iterator();
+       entry.increment(failed)) {
+    // A file may go away while it is looked at.
+    std::error_code gone;
+    Found found{entry->path(), entry->path(), entry->last_write_time(gone), 0, false};
+    if (!gone) found.bytes = entry->file_size(gone);
     found.active = found.recording.extension() == kActive;
     if (found.active) found.recording.replace_extension();
-    // A file may go away while it is looked at.
-    if (!failed && found.recording.extension() == kEnding) all.push_back(std::move(found));
+    if (!gone && found.recording.extension() == kEnding) all.push_back(std::move(found));
   }
   return all;
 }
@@ -45,6 +48,11 @@ fs::path marker_of(const fs::path& recording) {
 }
 
 }  // namespace
+
+bool is_taken(const fs::path& recording) {
+  std::error_code failed;
+  return fs::exists(recording, failed) || fs::exists(recording.string() + kActive, failed);
+}
 
 fs::path new_name(const fs::path& folder, const std::string& train_id, int64_t now_ns, const std::string& kind) {
   const auto now_s = static_cast<time_t>(now_ns / core::kNsPerSecond);
@@ -56,7 +64,7 @@ fs::path new_name(const fs::path& folder, const std::string& train_id, int64_t n
   std::ranges::replace(train, '/', '_');
   const std::string base = train + "-" + stamp.data();
   fs::path file = folder / (base + kind + kEnding);
-  for (int i = 2; fs::exists(file) || fs::exists(file.string() + kActive); ++i) {
+  for (int i = 2; is_taken(file); ++i) {
     file = folder / (base + "-" + std::to_string(i) + kind + kEnding);
   }
   return file;
@@ -88,9 +96,7 @@ core::Result<fs::path> find_recording(const fs::path& folder, const std::string&
   fs::path recording = folder / given.filename();
   if (recording.extension() == kActive) recording.replace_extension();
   if (recording.extension() != kEnding) recording += kEnding;
-  if (!fs::exists(recording) && !fs::exists(recording.string() + kActive)) {
-    return core::Error{"there is no recording " + recording.string()};
-  }
+  if (!is_taken(recording)) return core::Error{"there is no recording " + recording.string()};
   return recording;
 }
 

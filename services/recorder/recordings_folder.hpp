@@ -13,6 +13,10 @@
 
 namespace railfix::recorder {
 
+/// This recording exists, closed or open. Of a place that cannot be looked at the answer is no: who creates a file
+/// there says why.
+bool is_taken(const std::filesystem::path& recording);
+
 /// FOLDER/TRAIN-YYYYMMDD-HHMMSS.mcap for this time (UTC), with a number behind it when that exists. `kind` stands
 /// before the ending ("-event").
 std::filesystem::path new_name(const std::filesystem::path& folder, const std::string& train_id, int64_t now_ns,

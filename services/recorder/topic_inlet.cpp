@@ -42,7 +42,13 @@ TopicInlet::TopicInlet(const RecorderConfig& config, messaging::Participant& par
       queue_(queue),
       use_(std::move(use)) {
   encoder_ = std::thread([this] {
-    while (!ending_) encode_queue_.run_one(core::monotonic_ns() + kPatienceNs);
+    while (!ending_) {
+      try {
+        encode_queue_.run_one(core::monotonic_ns() + kPatienceNs);
+      } catch (const std::exception&) {  // who drains the queue deals with it
+        queue_.push(nullptr, [error = std::current_exception()] { std::rethrow_exception(error); });
+      }
+    }
   });
 }
 
@@ -53,42 +59,51 @@ TopicInlet::~TopicInlet() {
   encoder_.join();
 }
 
-void TopicInlet::open() {
-  if (open_) return;
+core::Status TopicInlet::open() {
+  if (open_) return {};
   open_ = true;
   listening_.clear();
-  for (const auto& topic : messaging::all_topics()) {
-    if (!per_camera(topic.name)) {
-      listen(topic, "");
-      continue;
+  try {
+    for (const auto& topic : messaging::all_topics()) {
+      if (!per_camera(topic.name)) {
+        listen(topic, "");
+        continue;
+      }
+      for (const auto& camera : config_.cameras) listen(topic, camera);
     }
-    for (const auto& camera : config_.cameras) listen(topic, camera);
+  } catch (const core::BadInput& error) {
+    close();
+    return core::Error{error.what()};
   }
   find_cameras();
+  return {};
 }
 
 void TopicInlet::find_cameras() {
   for (const auto& name : participant_.written_topics()) {
     const size_t slash = name.find('/');
     const auto* topic = messaging::find_topic(name);
-    if (topic != nullptr && slash != std::string::npos) listen(*topic, name.substr(slash + 1));
+    if (topic == nullptr || slash == std::string::npos) continue;
+    try {
+      listen(*topic, name.substr(slash + 1));
+    } catch (const core::BadInput& error) {  // anybody may write any name
+      refused_.emplace_back(error.what());
+    }
   }
 }
 
 void TopicInlet::in_encoder(const std::function<void()>& work) {
-  std::promise<void> done;
-  encode_queue_.push(nullptr, [&] {
-    work();
-    done.set_value();
-  });
-  done.get_future().wait();
+  const auto task = std::make_shared<std::packaged_task<void()>>(work);
+  auto done = task->get_future();
+  encode_queue_.push(nullptr, [task] { (*task)(); });
+  done.get();
 }
 
 void TopicInlet::drain() {
   in_encoder([] {});
-  bool drained = false;
-  queue_.push(nullptr, [&] { drained = true; });
-  while (!drained) queue_.run_one(core::monotonic_ns() + kPatienceNs);
+  const auto drained = std::make_shared<bool>(false);  // outlives us when what is run throws
+  queue_.push(nullptr, [drained] { *drained = true; });
+  while (!*drained) queue_.run_one(core::monotonic_ns() + kPatienceNs);
 }
 
 void TopicInlet::close() {
@@ -96,7 +111,7 @@ void TopicInlet::close() {
   // Pictures' readers go away in the encoder's thread, where none of their handlers can be running.
   in_encoder([this] {
     for (auto& [name, listening] : listening_) {
-      if (!listening.pictures) continue;
+      if (!listening.pictures || !listening.reader) continue;
       listening.dropped_at_close = listening.reader->dropped();
       listening.reader.reset();
     }

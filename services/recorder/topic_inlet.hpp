@@ -7,6 +7,7 @@
 #include <optional>
 #include <string_view>
 #include <thread>
+#include <utility>
 
 #include "messaging/topics.hpp"
 #include "recorder/recorder_config.hpp"
@@ -35,12 +36,15 @@ class TopicInlet {
   TopicInlet& operator=(const TopicInlet&) = delete;
 
   [[nodiscard]] bool is_open() const { return open_; }
-  void open();
+  /// Error: a topic cannot be read; then none is.
+  core::Status open();
   /// Everything that was received until now has been used when this returns.
   void drain();
   /// drain(), and no more after it. dropped() keeps its numbers.
   void close();
   void find_cameras();
+  /// Of cameras that cannot be listened to, since the last call.
+  std::vector<std::string> take_refused() { return std::exchange(refused_, {}); }
   /// Pictures are encoded for the recording only while there is one.
   void want_recorded(bool wanted) { recorded_wanted_ = wanted; }
 
@@ -84,6 +88,7 @@ class TopicInlet {
   std::function<void(const Arrival&)> use_;
   bool open_ = false;
   std::map<std::string, Listening> listening_;
+  std::vector<std::string> refused_;
   std::atomic<bool> recorded_wanted_ = false;
   std::atomic<uint64_t> waiting_bytes_ = 0;
   messaging::Queue encode_queue_;

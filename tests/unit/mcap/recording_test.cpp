@@ -122,6 +122,15 @@ TEST_F(RecordingTest, LargeMessageGetsItsOwnChunk) {
   EXPECT_EQ(reader->statistics().chunks, 3U);
 }
 
+TEST_F(RecordingTest, APlaceThatCannotBeLookedAtIsRefusedWithASentence) {
+  std::filesystem::create_symlink("loop", folder_ / "loop");
+  for (const auto& file : {folder_ / "loop", folder_ / std::string(300, 'x')}) {
+    const auto created = Writer::create(file, {});
+    ASSERT_FALSE(created.ok());
+    EXPECT_THAT(created.error().message, HasSubstr("cannot be created ("));
+  }
+}
+
 TEST_F(RecordingTest, OpenFileIsCalledActiveAndReadable) {
   const auto file = folder_ / "live.mcap";
   WriterOptions options;

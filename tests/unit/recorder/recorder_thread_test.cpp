@@ -233,6 +233,54 @@ TEST_F(RecorderThreadTest, ASecondStartKeepsWhatTheFirstRecorded) {
   EXPECT_TRUE(fs::exists(folder_ / "run.mcap"));
 }
 
+TEST_F(RecorderThreadTest, AFileThatCannotBeLookedAtIsRefusedAndItGoesOn) {
+  fs::create_directories(folder_);
+  fs::create_symlink("loop", folder_ / "loop");
+  auto recorder = this->recorder();
+  for (const auto& file : {folder_ / "loop", folder_ / "loop" / "x.mcap", folder_ / std::string(300, 'x')}) {
+    EXPECT_FALSE(recorder->start(file).ok());
+  }
+  EXPECT_TRUE(recorder->start("").ok());
+  EXPECT_EQ(recorder->state().failure, "");
+}
+
+TEST_F(RecorderThreadTest, WhatIsThrownInItsThreadClosesTheFileAndIsSaid) {
+  messaging::Writer<msg::CameraFrame> camera(participant_, topics::camera_frame, "cam0");
+  RecorderThread recorder(config_, participant_, {{"train_id", "demo"}, {"version", "test"}},
+                          [](int64_t) { throw std::runtime_error("no such thing"); });
+  const auto started = recorder.start("");
+  ASSERT_TRUE(started.ok());
+  ASSERT_TRUE(wait_until([&] { return camera.matched_readers() == 1; }));
+  auto frame = std::make_unique<msg::CameraFrame>();
+  fill(*frame, 1);
+  ASSERT_TRUE(camera.write(*frame));
+  ASSERT_TRUE(wait_until([&] { return !recorder.state().failure.empty(); }));
+  EXPECT_THAT(recorder.state().failure, HasSubstr("cannot go on: no such thing"));
+  ASSERT_TRUE(wait_until([&] { return !recorder.state().recording; }));
+  EXPECT_EQ(mcap::Reader::open(started.value()).value()->statistics().messages, 1U);
+}
+
+TEST_F(RecorderThreadTest, ATopicThatCannotBeReadIsAnError) {
+  fs::create_directories(folder_);
+  const fs::path profiles = folder_ / "profiles.xml";
+  std::ofstream(profiles) << R"(<dds xmlns="http://www.eprosima.com"><profiles>
+    <data_reader profile_name="imu_sample"><qos><durability><kind>PERSISTENT</kind></durability></qos>
+    </data_reader></profiles></dds>)";
+  auto with_profiles = options();
+  with_profiles.qos_profiles = profiles.string();
+  messaging::Participant participant(with_profiles);
+  const std::map<std::string, std::string> about{{"train_id", "demo"}, {"version", "test"}};
+  {
+    RecorderThread recorder(config_, participant, about, [](int64_t) {});
+    const auto started = recorder.start("");
+    ASSERT_FALSE(started.ok());
+    EXPECT_THAT(started.error().message, HasSubstr("imu_sample cannot be read"));
+    EXPECT_FALSE(recorder.state().recording);
+  }
+  config_.ring_s = 1;
+  EXPECT_THROW(RecorderThread(config_, participant, about, [](int64_t) {}), core::BadInput);
+}
+
 TEST_F(RecorderThreadTest, DestructionClosesTheFile) {
   (void)recorder()->start((folder_ / "gone.mcap").string());
   EXPECT_TRUE(mcap::Reader::open(folder_ / "gone.mcap").value()->indexed());

@@ -118,6 +118,20 @@ TEST_F(RecordingsFolder, RecordingsAreFoundByWhatPeopleCallThem) {
   for (const char* wrong : {"", "c", "../a.mcap", "/etc/passwd"}) EXPECT_FALSE(find_recording(folder_, wrong).ok());
 }
 
+TEST_F(RecordingsFolder, WhatCannotBeLookedAtThrowsNothing) {
+  make("a.mcap", 1);
+  const auto found = find_recording(folder_, std::string(252, 'x'));
+  ASSERT_FALSE(found.ok());
+  EXPECT_THAT(found.error().message, HasSubstr("there is no recording"));
+  const fs::path loop = folder_ / "loop";
+  fs::create_symlink("loop", loop);
+  EXPECT_EQ(new_name(loop, "t", 0).filename(), "t-19700101-000000.mcap");
+  EXPECT_FALSE(find_recording(loop, "a").ok());
+  EXPECT_FALSE(find_recording(folder_, (loop / "a").string()).ok());
+  EXPECT_EQ(survey(loop).files, 0U);
+  EXPECT_THAT(keep_quota(loop, 1), IsEmpty());
+}
+
 TEST_F(RecordingsFolder, TheHousekeeperKeepsTheQuotaByItself) {
   make("old.mcap", 5);
   make("kept.mcap", 9);
