@@ -11,14 +11,20 @@ namespace {
 
 constexpr uint64_t kTailBytes = kRecordHeadBytes + kFooterBytes + kMagic.size();
 constexpr size_t kMostProblems = 100;
+// Gigabytes forced to the disk at once would hold up who else writes there.
+constexpr double kRecoverySyncS = 1;
 
 bool has_magic(const std::optional<Bytes>& bytes) {
   return bytes && std::ranges::equal(*bytes, kMagic);
 }
 
+core::Error stopped(const std::filesystem::path& file) {
+  return core::Error{"reading " + file.string() + " was stopped"};
+}
+
 }  // namespace
 
-core::Result<std::unique_ptr<Reader>> Reader::open(const std::filesystem::path& file) {
+core::Result<std::unique_ptr<Reader>> Reader::open(const std::filesystem::path& file, const GoesOn& goes_on) {
   auto bytes = FileBytes::open(file);
   if (!bytes.ok()) return bytes.error();
   std::unique_ptr<Reader> reader(new Reader(file, bytes.value()));
@@ -33,7 +39,7 @@ core::Result<std::unique_ptr<Reader>> Reader::open(const std::filesystem::path& 
     reader->metadata_.clear();
     reader->places_.clear();
     reader->statistics_ = {};
-    reader->scan();
+    if (!reader->scan(goes_on)) return stopped(file);
   }
   return reader;
 }
@@ -131,12 +137,13 @@ bool Reader::read_summary() {
   return true;
 }
 
-void Reader::scan() {
+bool Reader::scan(const GoesOn& goes_on) {
   uint64_t offset = kMagic.size();
   const uint64_t size = bytes_->size();
   while (offset < size) {
+    if (goes_on && !goes_on()) return false;
     const auto head = bytes_->read(offset, std::min<uint64_t>(kRecordHeadBytes, size - offset));
-    if (offset + kMagic.size() == size && has_magic(bytes_->read(offset, kMagic.size()))) return;
+    if (offset + kMagic.size() == size && has_magic(bytes_->read(offset, kMagic.size()))) return true;
     Decoder decoder(head ? ByteView(*head) : ByteView());
     const uint8_t opcode = decoder.u8();
     const uint64_t length = decoder.u64();
@@ -144,14 +151,15 @@ void Reader::scan() {
     const auto content = whole ? bytes_->read(offset + kRecordHeadBytes, length) : std::nullopt;
     if (!content || opcode == 0) {
       problem("ends in the middle of a record at byte " + std::to_string(offset) + " of " + std::to_string(size));
-      return;
+      return true;
     }
     if (!scan_record(opcode, offset, *content)) {
       problem("the record at byte " + std::to_string(offset) + " is damaged and left out");
     }
-    if (opcode == static_cast<uint8_t>(Opcode::data_end)) return;
+    if (opcode == static_cast<uint8_t>(Opcode::data_end)) return true;
     offset += kRecordHeadBytes + length;
   }
+  return true;
 }
 
 bool Reader::scan_record(uint8_t opcode, uint64_t offset, ByteView content) {
@@ -251,16 +259,9 @@ std::filesystem::path recovered_name(const std::filesystem::path& damaged) {
   return name.string() + "-recovered.mcap";
 }
 
-core::Result<std::vector<std::string>> recover(const std::filesystem::path& damaged, const std::filesystem::path& out) {
-  auto reader = Reader::open(damaged);
-  if (!reader.ok()) return reader.error();
-  WriterOptions options;
-  options.sync_period_s = 0;
-  options.overwrite = true;
-  auto writer = Writer::create(out, options);
-  if (!writer.ok()) return writer.error();
-  Reader& in = *reader.value();
-  Writer& to = *writer.value();
+namespace {
+
+core::Status copy(Reader& in, Writer& to, const std::filesystem::path& damaged, const GoesOn& goes_on) {
   std::map<uint16_t, uint16_t> schema_ids{{0, 0}};
   std::map<uint16_t, uint16_t> channel_ids;
   for (const auto& [id, schema] : in.schemas()) {
@@ -277,16 +278,35 @@ core::Result<std::vector<std::string>> recover(const std::filesystem::path& dama
   core::Status status;
   for (const Metadata& metadata : in.metadata()) {
     status = to.write_metadata(metadata);
-    if (!status.ok()) return status.error();
+    if (!status.ok()) return status;
   }
   in.for_each({}, [&](const Channel& channel, Message message) {
     message.channel_id = channel_ids.at(channel.id);
-    status = to.write(message);
+    status = goes_on && !goes_on() ? core::Status(stopped(damaged)) : to.write(message);
     return status.ok();
   });
-  if (status.ok()) status = to.close();
-  if (!status.ok()) return status.error();
-  return in.problems();
+  return status;
+}
+
+}  // namespace
+
+core::Result<std::vector<std::string>> recover(const std::filesystem::path& damaged, const std::filesystem::path& out,
+                                               const GoesOn& goes_on) {
+  auto reader = Reader::open(damaged, goes_on);
+  if (!reader.ok()) return reader.error();
+  WriterOptions options;
+  options.sync_period_s = kRecoverySyncS;
+  options.overwrite = true;
+  auto writer = Writer::create(out, options);
+  if (!writer.ok()) return writer.error();
+  auto status = copy(*reader.value(), *writer.value(), damaged, goes_on);
+  if (status.ok()) status = writer.value()->close();
+  if (!status.ok()) {
+    // Half a copy is of no use and takes the room of the next one.
+    writer.value()->discard();
+    return status.error();
+  }
+  return reader.value()->problems();
 }
 
 }  // namespace railfix::mcap

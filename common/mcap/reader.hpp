@@ -55,10 +55,14 @@ struct Selection {
 
 class Messages;
 
+/// Asked again and again during work that takes minutes; empty = it goes on.
+using GoesOn = std::function<bool()>;
+
 class Reader {
  public:
-  /// Error: the file cannot be opened or does not begin like an MCAP file. A damaged one opens, with problems().
-  static core::Result<std::unique_ptr<Reader>> open(const std::filesystem::path& file);
+  /// Error: the file cannot be opened or does not begin like an MCAP file, or `goes_on` says no while a damaged one is
+  /// scanned. A damaged one opens, with problems().
+  static core::Result<std::unique_ptr<Reader>> open(const std::filesystem::path& file, const GoesOn& goes_on = {});
 
   /// False: the file was not closed properly (cut off, or still being written), or its index is damaged.
   [[nodiscard]] bool indexed() const { return indexed_; }
@@ -84,7 +88,8 @@ class Reader {
       : file_(std::move(file)), bytes_(std::move(bytes)) {}
   bool read_summary();
   bool read_summary_record(uint8_t opcode, ByteView content, std::vector<MetadataIndex>& metadata);
-  void scan();
+  /// False: `goes_on` says no.
+  bool scan(const GoesOn& goes_on);
   bool scan_record(uint8_t opcode, uint64_t offset, ByteView content);
   bool learn(uint8_t opcode, ByteView content);
   std::optional<Bytes> load(const ChunkPlace& place);
@@ -148,7 +153,8 @@ bool being_written(const std::filesystem::path& file);
 std::filesystem::path recovered_name(const std::filesystem::path& damaged);
 
 /// Copies everything readable of a damaged or unfinished recording into a proper one, replacing what has that name.
-/// Gives what could not be kept.
-core::Result<std::vector<std::string>> recover(const std::filesystem::path& damaged, const std::filesystem::path& out);
+/// Gives what could not be kept. Error: nothing of it is left; so, too, when `goes_on` says no.
+core::Result<std::vector<std::string>> recover(const std::filesystem::path& damaged, const std::filesystem::path& out,
+                                               const GoesOn& goes_on = {});
 
 }  // namespace railfix::mcap

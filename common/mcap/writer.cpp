@@ -63,7 +63,10 @@ core::Result<std::unique_ptr<Writer>> Writer::create(const std::filesystem::path
   encoder.text(options.library);
   encoder.end_record(record);
   const auto status = writer->put(head);
-  if (!status.ok()) return status.error();
+  if (!status.ok()) {
+    writer->discard();
+    return status.error();
+  }
   writer->synced_ns_ = core::monotonic_ns();
   sync_folder(writer->active_);
   return writer;
@@ -74,6 +77,13 @@ Writer::~Writer() {
     (void)close();
   } catch (const std::exception&) {  // no memory for the tail; the chunks are there
   }
+}
+
+void Writer::discard() {
+  (void)wait_for_sync();
+  if (descriptor_ >= 0) ::close(std::exchange(descriptor_, -1));
+  std::error_code failed;
+  std::filesystem::remove(active_, failed);
 }
 
 core::Status Writer::put(ByteView bytes) {

@@ -58,6 +58,8 @@ class Writer {
   core::Status tick();
   /// Writes summary and footer, syncs, and gives the file its final name.
   core::Status close();
+  /// Closes the file, unless close() has given it its name, and removes it.
+  void discard();
 
   [[nodiscard]] const std::filesystem::path& file() const { return file_; }
   [[nodiscard]] const Statistics& statistics() const { return statistics_; }

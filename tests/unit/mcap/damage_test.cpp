@@ -1,4 +1,5 @@
 #include <gmock/gmock.h>
+#include <sys/mount.h>
 
 #include "core/random.hpp"
 #include "recordings.hpp"
@@ -149,6 +150,37 @@ TEST_F(DamageTest, RecoverMakesAProperFile) {
   EXPECT_THAT(reader->problems(), IsEmpty());
   EXPECT_EQ(read(*reader).size(), ends[3].second);
   EXPECT_EQ(reader->channels().size(), 2U);
+}
+
+TEST_F(DamageTest, ARecoveryThatIsStoppedLeavesNothingOfItself) {
+  Bytes bytes = content(record(samples(40), small_chunks()));
+  bytes.resize(chunk_ends(bytes)[3].first + 5);
+  const auto damaged = store(bytes);
+  const auto out = folder_ / "recovered.mcap";
+  int asked = 0;
+  ASSERT_TRUE(recover(damaged, out, [&] { return ++asked > 0; }).ok());
+  std::filesystem::remove(out);
+  for (int most = 0; most < asked; ++most) {
+    int left = most;
+    const auto stopped = recover(damaged, out, [&] { return left-- > 0; });
+    ASSERT_FALSE(stopped.ok());
+    EXPECT_THAT(stopped.error().message, HasSubstr("was stopped"));
+    EXPECT_FALSE(std::filesystem::exists(out));
+    EXPECT_FALSE(std::filesystem::exists(out.string() + ".active"));
+  }
+}
+
+TEST_F(DamageTest, ARecoveryOnAFullDiskLeavesNothingOfItself) {
+  Bytes bytes = content(record(samples(2000), small_chunks()));
+  bytes.resize(bytes.size() - 20);
+  const auto damaged = store(bytes);
+  const auto disk = folder_ / "disk";
+  std::filesystem::create_directories(disk);
+  if (mount("tmpfs", disk.c_str(), "tmpfs", 0, "size=20k") != 0) GTEST_SKIP() << "a disk can be made by root only";
+  const auto lost = recover(damaged, disk / "recovered.mcap");
+  EXPECT_FALSE(lost.ok());
+  EXPECT_TRUE(std::filesystem::is_empty(disk));
+  umount2(disk.c_str(), MNT_DETACH);
 }
 
 }  // namespace
