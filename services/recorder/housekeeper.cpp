@@ -1,30 +1,34 @@
 #include "recorder/housekeeper.hpp"
 
+#include <sys/resource.h>
+
+#include <algorithm>
 #include <utility>
+
+#include "core/time.hpp"
+#include "mcap/reader.hpp"
 
 namespace railfix::recorder {
 
 namespace {
 
+namespace fs = std::filesystem;
+
 constexpr std::chrono::seconds kPeriod{2};
+// The disk fills faster while a file is recovered.
+constexpr int64_t kPeriodRecoveringNs = core::kNsPerSecond / 4;
+// Times keep_free_mb, at which recording would stop: recording goes on while a file is recovered.
+constexpr uint64_t kRoomToBegin = 2;
+constexpr double kRoomToGoOn = 1.5;
+// The train's other work comes first.
+constexpr int kNice = 10;
+constexpr uint64_t kBytesPerMb = 1'000'000;
 
 }  // namespace
 
-Housekeeper::Housekeeper(std::filesystem::path folder, uint64_t quota_bytes)
-    : folder_(std::move(folder)), quota_bytes_(quota_bytes) {
-  thread_ = std::thread([this] {
-    std::unique_lock lock(mutex_);
-    while (!ending_) {
-      lock.unlock();
-      try {
-        look();
-      } catch (const std::exception& error) {
-        say(folder_.string() + " cannot be looked after: " + error.what());
-      }
-      lock.lock();
-      woken_.wait_for(lock, kPeriod, [this] { return ending_; });
-    }
-  });
+Housekeeper::Housekeeper(fs::path folder, const FolderRules& rules) : folder_(std::move(folder)), rules_(rules) {
+  if (rules_.recovers) cut_off_ = cut_off_in(folder_);
+  thread_ = std::thread([this] { run(); });
 }
 
 Housekeeper::~Housekeeper() {
@@ -36,16 +40,34 @@ Housekeeper::~Housekeeper() {
   thread_.join();
 }
 
+void Housekeeper::run() {
+  (void)setpriority(PRIO_PROCESS, 0, kNice);  // of this thread
+  while (!ending_) {
+    try {
+      look();
+      if (recovers_) recover_next();
+    } catch (const std::exception& error) {
+      warn(folder_.string() + " cannot be looked after: " + error.what());
+    }
+    std::unique_lock lock(mutex_);
+    recovering_.clear();
+    woken_.wait_for(lock, kPeriod, [this] { return ending_ || (recovers_ && !cut_off_.empty()); });
+  }
+}
+
 void Housekeeper::look() {
+  looked_ns_ = core::monotonic_ns();
   Survey seen;
   {
     const std::lock_guard files(files_mutex_);
-    if (quota_bytes_ > 0) {
-      for (const auto& sentence : keep_quota(folder_, quota_bytes_)) say(sentence);
+    if (rules_.quota_bytes > 0) {
+      std::vector<fs::path> removable = cut_off_;
+      removable.insert(removable.end(), left_.begin(), left_.end());
+      for (const auto& sentence : keep_quota(folder_, rules_.quota_bytes, removable)) say(sentence);
     }
     seen = recorder::survey(folder_);
   }
-  const bool over = quota_bytes_ > 0 && seen.protected_bytes > quota_bytes_;
+  const bool over = rules_.quota_bytes > 0 && seen.protected_bytes > rules_.quota_bytes;
   if (over && !over_quota_said_) {
     say("the protected recordings in " + folder_.string() +
         " alone take more than the quota; nothing else is kept for long: end the protection of some");
@@ -55,9 +77,80 @@ void Housekeeper::look() {
   survey_ = seen;
 }
 
+void Housekeeper::recover() {
+  {
+    const std::lock_guard lock(mutex_);
+    recovers_ = true;
+  }
+  woken_.notify_all();
+}
+
+void Housekeeper::recover_next() {
+  if (cut_off_.empty()) return;
+  const fs::path file = cut_off_.front();
+  cut_off_.erase(cut_off_.begin());
+  std::error_code failed;
+  // Somebody may have taken it away meanwhile, or be repairing it.
+  if (!fs::exists(file, failed) || mcap::being_written(mcap::recovered_name(file).string() + ".active")) return;
+  left_.push_back(file);
+  if (!has_room_for(file)) return;
+  left_.pop_back();
+  {
+    const std::lock_guard lock(mutex_);
+    recovering_ = file.string();
+  }
+  const fs::path name = mcap::recovered_name(file);
+  const auto lost = mcap::recover(file, name, [this] { return goes_on(); });
+  if (lost.ok()) {
+    const std::lock_guard files(files_mutex_);
+    take_place(file, name);
+    warn(file.string() + " was left by a crash; what it held is now in " + name.string());
+  } else if (!ending_) {
+    left_.push_back(file);
+    warn(file.string() + " was left by a crash, cannot be recovered now and stays as it is: " + lost.error().message);
+  }
+}
+
+bool Housekeeper::has_room_for(const fs::path& cut_off) {
+  std::error_code failed;
+  const uint64_t bytes = fs::file_size(cut_off, failed);
+  if (failed) return true;  // recovering it says why
+  const uint64_t need = bytes + kRoomToBegin * rules_.keep_free_bytes;
+  if (rules_.quota_bytes > 0) {
+    const std::lock_guard files(files_mutex_);
+    for (const auto& sentence : make_room(folder_, need, cut_off)) warn(sentence);
+  }
+  if (free_bytes(folder_) >= need) return true;
+  warn(cut_off.string() + " was left by a crash and stays as it is: to recover it " +
+       std::to_string(need / kBytesPerMb + 1) + " MB of the disk must be free when the recorder starts");
+  return false;
+}
+
+bool Housekeeper::goes_on() {
+  if (core::monotonic_ns() - looked_ns_ < kPeriodRecoveringNs) return !ending_;
+  look();
+  const auto least = static_cast<uint64_t>(kRoomToGoOn * static_cast<double>(rules_.keep_free_bytes));
+  return !ending_ && free_bytes(folder_) >= least;
+}
+
 void Housekeeper::say(const std::string& sentence) {
   const std::lock_guard lock(mutex_);
   sentences_.push_back(sentence);
+}
+
+void Housekeeper::warn(const std::string& sentence) {
+  const std::lock_guard lock(mutex_);
+  warnings_.push_back(sentence);
+}
+
+std::string Housekeeper::recovering() const {
+  const std::lock_guard lock(mutex_);
+  return recovering_;
+}
+
+std::vector<std::string> Housekeeper::take_warnings() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(warnings_, {});
 }
 
 Survey Housekeeper::survey() const {

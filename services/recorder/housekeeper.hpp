@@ -1,7 +1,8 @@
-// Looks after the folder of the recordings in a thread of its own: the quota, and what the folder holds. Removing a
-// large file takes a while, and no sample must wait for it.
+// Looks after the folder of the recordings in a thread of its own: the quota, what a crash left, and what the folder
+// holds. Removing a large file takes a while, recovering one minutes, and no sample must wait for it.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
@@ -11,10 +12,16 @@
 
 namespace railfix::recorder {
 
+struct FolderRules {
+  uint64_t quota_bytes = 0;      // 0: nothing is ever removed
+  uint64_t keep_free_bytes = 0;  // below it recording stops, so recovering stops before
+  bool recovers = false;         // what a crash left in the folder is ours
+};
+
 class Housekeeper {
  public:
-  /// `quota_bytes` 0: nothing is ever removed.
-  Housekeeper(std::filesystem::path folder, uint64_t quota_bytes);
+  /// Only what is cut off now is ever recovered, so to be made before anything is recorded.
+  Housekeeper(std::filesystem::path folder, const FolderRules& rules);
   ~Housekeeper();
   Housekeeper(const Housekeeper&) = delete;
   Housekeeper& operator=(const Housekeeper&) = delete;
@@ -23,23 +30,40 @@ class Housekeeper {
   [[nodiscard]] Survey survey() const;
   /// What was removed or could not be kept, since the last call.
   std::vector<std::string> take_sentences();
+  /// What somebody should know: of what a crash left, and of what cannot be done.
+  std::vector<std::string> take_warnings();
+  /// Begins to recover what a crash left, one file after the other, the newest first.
+  void recover();
+  /// The file that is being recovered; empty = none.
+  [[nodiscard]] std::string recovering() const;
   core::Result<std::string> protect(const std::string& name, const std::string& why);
   core::Result<std::string> unprotect(const std::string& name);
 
  private:
+  void run();
   void look();
+  void recover_next();
+  [[nodiscard]] bool has_room_for(const std::filesystem::path& cut_off);
+  bool goes_on();
   void say(const std::string& sentence);
+  void warn(const std::string& sentence);
 
   std::filesystem::path folder_;
-  uint64_t quota_bytes_;
+  FolderRules rules_;
+  std::vector<std::filesystem::path> cut_off_;  // to be recovered
+  std::vector<std::filesystem::path> left_;     // could not be
+  int64_t looked_ns_ = 0;
   std::mutex files_mutex_;  // held while files are removed or protected
   bool over_quota_said_ = false;
 
   mutable std::mutex mutex_;
   std::condition_variable woken_;
-  bool ending_ = false;
+  std::atomic<bool> ending_ = false;
+  std::atomic<bool> recovers_ = false;
+  std::string recovering_;
   Survey survey_;
   std::vector<std::string> sentences_;
+  std::vector<std::string> warnings_;
   std::thread thread_;
 };
 

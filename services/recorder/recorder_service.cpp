@@ -38,9 +38,6 @@ RecorderService::RecorderService(const Config& config, service::Context& context
         }
       }) {
   context_.turn_ends_when([this](int64_t data_ns) { return recorded_ns_ >= data_ns || !thread_.state().recording; });
-  if (config_.file.empty()) {
-    for (const auto& sentence : recover_folder(config_.folder)) context_.log().warn("{}", sentence);
-  }
   add_commands();
   context_.every(kStatePeriod, [this] { show_state(); });
   context_.at_stop([this] {
@@ -48,6 +45,7 @@ RecorderService::RecorderService(const Config& config, service::Context& context
     show_state();
   });
   if (config_.autostart) core::value_or_throw(start(""));
+  thread_.housekeeper().recover();  // takes minutes for a large file: what is recorded now comes first
 }
 
 void RecorderService::add_commands() {
@@ -112,6 +110,7 @@ void RecorderService::show_state() {
     context_.log().log(news.bad ? spdlog::level::err : spdlog::level::info, "{}", news.sentence);
   }
   for (const auto& sentence : thread_.housekeeper().take_sentences()) context_.log().info("{}", sentence);
+  for (const auto& sentence : thread_.housekeeper().take_warnings()) context_.log().warn("{}", sentence);
   if (now.problem != problem_ && !now.problem.empty()) context_.log().error("{}", now.problem);
   problem_ = now.problem;
   show_health(now);
@@ -137,10 +136,13 @@ void RecorderService::note_losses(const RecorderState& now) {
 
 void RecorderService::show_health(const RecorderState& now) {
   const bool loses = core::monotonic_ns() < loses_until_ns_;
+  const std::string recovering = thread_.housekeeper().recovering();
   if (!now.problem.empty()) {
     context_.health().degraded(now.problem);
   } else if (now.recording && loses) {
     context_.health().degraded("samples are lost: " + losses_);
+  } else if (!recovering.empty()) {
+    context_.health().degraded("recovers what a crash left, beside its work: " + recovering);
   } else if (now.recording && now.written > 0) {
     context_.health().active();
   } else {

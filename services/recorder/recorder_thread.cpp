@@ -35,8 +35,11 @@ RecorderThread::RecorderThread(const RecorderConfig& config, messaging::Particip
     rules_.push_back(core::value_or_throw(EventRule::parse(rule, type_of_topic)));
   }
   // With `file` the folder belongs to somebody else.
-  const double quota_mb = config_.file.empty() ? config_.quota_mb : 0;
-  housekeeper_ = std::make_unique<Housekeeper>(folder(), static_cast<uint64_t>(quota_mb * kBytesPerMb));
+  const bool ours = config_.file.empty();
+  const double quota_mb = ours ? config_.quota_mb : 0;
+  housekeeper_ = std::make_unique<Housekeeper>(
+      folder(), FolderRules{static_cast<uint64_t>(quota_mb * kBytesPerMb),
+                            static_cast<uint64_t>(config_.keep_free_mb * kBytesPerMb), ours});
   inlet_ = std::make_unique<TopicInlet>(config_, participant, about_.at("train_id"), queue_,
                                         [this](const Arrival& arrival) { use(arrival); });
   if (config_.ring_s > 0) ring_.emplace(config_.ring_s, static_cast<uint64_t>(config_.ring_mb * kBytesPerMb));

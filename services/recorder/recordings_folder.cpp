@@ -4,6 +4,9 @@
 #include <array>
 #include <ctime>
 #include <fstream>
+#include <limits>
+#include <string_view>
+#include <tuple>
 
 #include "core/time.hpp"
 #include "mcap/reader.hpp"
@@ -27,6 +30,11 @@ struct Found {
   bool active = false;
 };
 
+fs::path recording_of(const fs::path& active) {
+  fs::path recording = active;
+  return recording.replace_extension();
+}
+
 std::vector<Found> recordings_in(const fs::path& folder) {
   std::vector<Found> all;
   std::error_code failed;
@@ -37,10 +45,26 @@ std::vector<Found> recordings_in(const fs::path& folder) {
     Found found{entry->path(), entry->path(), entry->last_write_time(gone), 0, false};
     if (!gone) found.bytes = entry->file_size(gone);
     found.active = found.recording.extension() == kActive;
-    if (found.active) found.recording.replace_extension();
+    if (found.active) found.recording = recording_of(found.file);
     if (!gone && found.recording.extension() == kEnding) all.push_back(std::move(found));
   }
   return all;
+}
+
+/// What a recovery writes, or left when it was cut off itself.
+bool is_draft(const Found& found) {
+  const std::string stem = found.recording.stem().string();
+  if (!found.active || !stem.ends_with(kRecovered)) return false;
+  const std::string source = stem.substr(0, stem.size() - std::string_view(kRecovered).size());
+  std::error_code failed;
+  return fs::exists(found.file.parent_path() / (source + kEnding + kActive), failed);
+}
+
+/// The oldest first.
+void sort_by_age(std::vector<Found>& all) {
+  std::ranges::sort(all, [](const Found& a, const Found& b) {
+    return std::tie(a.time, a.recording) < std::tie(b.time, b.recording);
+  });
 }
 
 fs::path marker_of(const fs::path& recording) {
@@ -120,45 +144,75 @@ bool is_protected(const fs::path& recording) {
   return fs::exists(marker_of(recording), failed);
 }
 
-std::vector<std::string> recover_folder(const fs::path& folder) {
-  std::vector<std::string> sentences;
+std::vector<fs::path> cut_off_in(const fs::path& folder) {
+  std::vector<Found> all = recordings_in(folder);
+  sort_by_age(all);
+  std::vector<fs::path> files;
   std::error_code failed;
-  for (const Found& found : recordings_in(folder)) {
+  for (const Found& found : all) {
     if (!found.active || mcap::being_written(found.file)) continue;
-    // A recovery that was itself cut off: its source is still there and is recovered again.
-    if (found.recording.stem().string().ends_with(kRecovered)) continue;
-    const fs::path name = mcap::recovered_name(found.file);
-    const bool kept = is_protected(found.recording);
-    if (kept) fs::copy_file(marker_of(found.recording), marker_of(name), fs::copy_options::overwrite_existing, failed);
-    const auto lost = mcap::recover(found.file, name);
-    if (!lost.ok()) {
-      sentences.push_back(found.file.string() +
-                          " was left by a crash and cannot be recovered: " + lost.error().message);
-      continue;
+    if (is_draft(found)) {
+      fs::remove(found.file, failed);
+    } else {
+      files.insert(files.begin(), found.file);
     }
-    fs::remove(found.file, failed);
-    if (kept) fs::remove(marker_of(found.recording), failed);
-    sentences.push_back(found.file.string() + " was left by a crash; what it held is now in " + name.string());
   }
-  return sentences;
+  return files;
 }
 
-std::vector<std::string> keep_quota(const fs::path& folder, uint64_t most_bytes) {
+void take_place(const fs::path& cut_off, const fs::path& recovered) {
+  std::error_code failed;
+  const fs::path marker = marker_of(recording_of(cut_off));
+  if (fs::exists(marker, failed)) {
+    fs::copy_file(marker, marker_of(recovered), fs::copy_options::overwrite_existing, failed);
+    if (failed) (void)protect(recovered, "protected before the crash");
+  }
+  // Its marker last: a crash between the two leaves nothing unprotected.
+  if (fs::remove(cut_off, failed)) fs::remove(marker, failed);
+}
+
+std::vector<std::string> keep_quota(const fs::path& folder, uint64_t most_bytes, const std::vector<fs::path>& cut_off) {
   std::vector<Found> all = recordings_in(folder);
+  std::erase_if(all, is_draft);
   uint64_t sum = 0;
   for (const Found& found : all) sum += found.bytes;
-  std::ranges::sort(all, [](const Found& a, const Found& b) {
-    return std::tie(a.time, a.recording) < std::tie(b.time, b.recording);
-  });
   std::vector<std::string> removed;
+  if (sum <= most_bytes) return removed;
+  sort_by_age(all);
   std::error_code failed;
   for (const Found& found : all) {
     if (sum <= most_bytes) break;
-    if (found.active || is_protected(found.recording) || !fs::remove(found.file, failed)) continue;
+    const bool open = found.active && std::ranges::find(cut_off, found.file) == cut_off.end();
+    if (open || is_protected(found.recording) || !fs::remove(found.file, failed)) continue;
     sum -= found.bytes;
-    removed.push_back(found.file.string() + " was removed to keep the quota");
+    removed.push_back(found.file.string() + (found.active ? ", which a crash left and which was not recovered," : "") +
+                      " was removed to keep the quota");
   }
   return removed;
+}
+
+std::vector<std::string> make_room(const fs::path& folder, uint64_t bytes, const fs::path& for_cut_off) {
+  std::vector<Found> older = recordings_in(folder);
+  sort_by_age(older);
+  older.erase(std::ranges::find(older, for_cut_off, &Found::file), older.end());
+  std::erase_if(older, [](const Found& found) { return found.active || is_protected(found.recording); });
+  uint64_t room = free_bytes(folder);
+  for (const Found& found : older) room += std::min(found.bytes, bytes);
+  std::vector<std::string> removed;
+  if (room < bytes) return removed;
+  std::error_code failed;
+  for (const Found& found : older) {
+    if (free_bytes(folder) >= bytes) break;
+    if (!fs::remove(found.file, failed)) continue;
+    removed.push_back(found.file.string() + " was removed to make room for recovering " + for_cut_off.string());
+  }
+  return removed;
+}
+
+uint64_t free_bytes(const fs::path& folder) {
+  std::error_code failed;
+  const auto space = fs::space(folder, failed);
+  return failed ? std::numeric_limits<uint64_t>::max() / 2 : space.available;
 }
 
 }  // namespace railfix::recorder

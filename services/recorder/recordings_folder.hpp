@@ -44,12 +44,24 @@ core::Status protect(const std::filesystem::path& recording, const std::string& 
 core::Status unprotect(const std::filesystem::path& recording);
 [[nodiscard]] bool is_protected(const std::filesystem::path& recording);
 
-/// Makes proper recordings of those in the folder that a crash left behind (NAME.mcap.active that nobody writes), and
-/// says a sentence for each. They stay protected if they were.
-std::vector<std::string> recover_folder(const std::filesystem::path& folder);
+/// Recordings that a crash left behind (NAME.mcap.active that nobody writes), the newest first. Removes what recoveries
+/// left that were cut off themselves. To be asked before a recording is begun, so that none of ours is among them.
+std::vector<std::filesystem::path> cut_off_in(const std::filesystem::path& folder);
 
-/// Removes the oldest closed recordings that are not protected until the folder's recordings take no more than this;
-/// says which.
-std::vector<std::string> keep_quota(const std::filesystem::path& folder, uint64_t most_bytes);
+/// What was recovered takes the place of the cut-off file, and is protected if that was.
+void take_place(const std::filesystem::path& cut_off, const std::filesystem::path& recovered);
+
+/// Removes the oldest recordings that are closed, or among those `cut_off`, and not protected until the folder's
+/// recordings take no more than this; says which. A recovery's draft does not count: it takes its source's place.
+std::vector<std::string> keep_quota(const std::filesystem::path& folder, uint64_t most_bytes,
+                                    const std::vector<std::filesystem::path>& cut_off = {});
+
+/// The same until so much of the disk is free, or nothing when it would not be enough; none goes that is newer than
+/// this cut-off one.
+std::vector<std::string> make_room(const std::filesystem::path& folder, uint64_t bytes,
+                                   const std::filesystem::path& for_cut_off);
+
+/// Of the disk, for this user; much when it cannot be told.
+uint64_t free_bytes(const std::filesystem::path& folder);
 
 }  // namespace railfix::recorder

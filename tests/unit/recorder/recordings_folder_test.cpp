@@ -1,10 +1,12 @@
 #include "recorder/recordings_folder.hpp"
 
 #include <gmock/gmock.h>
+#include <sys/mount.h>
 #include <unistd.h>
 
 #include <fstream>
 
+#include "core/random.hpp"
 #include "core/time.hpp"
 #include "mcap/reader.hpp"
 #include "recorder/housekeeper.hpp"
@@ -41,6 +43,19 @@ class RecordingsFolder : public ::testing::Test {
     fs::rename(folder_ / "whole.mcap", crashed);
     fs::resize_file(crashed, fs::file_size(crashed) - 20);
   }
+  /// What the housekeeper says when it has dealt with all that a crash left.
+  [[nodiscard]] std::vector<std::string> recover(FolderRules rules) const {
+    rules.recovers = true;
+    Housekeeper housekeeper(folder_, rules);
+    housekeeper.recover();
+    const int64_t deadline_ns = core::monotonic_ns() + 30 * core::kNsPerSecond;
+    std::vector<std::string> said;
+    while (said.empty() && core::monotonic_ns() < deadline_ns) {
+      ::usleep(10'000);
+      said = housekeeper.take_warnings();
+    }
+    return said;
+  }
   fs::path folder_;
 };
 
@@ -56,20 +71,103 @@ TEST_F(RecordingsFolder, NamesAreUniqueAndInUtc) {
 TEST_F(RecordingsFolder, CrashedRecordingsAreRecoveredAndRunningOnesLeftAlone) {
   auto running = Recording::create(folder_ / "running.mcap", {}, {}).value();
   make_crashed("crashed.mcap");
-  EXPECT_THAT(recover_folder(folder_), ElementsAre(HasSubstr("was left by a crash; what it held is now in")));
+  EXPECT_THAT(recover({}), ElementsAre(HasSubstr("was left by a crash; what it held is now in")));
   EXPECT_EQ(mcap::Reader::open(folder_ / "crashed-recovered.mcap").value()->statistics().messages, 1U);
   EXPECT_FALSE(fs::exists(folder_ / "crashed.mcap.active"));
   EXPECT_TRUE(fs::exists(folder_ / "running.mcap.active"));
-  EXPECT_THAT(recover_folder(folder_ / "nowhere"), IsEmpty());
+  EXPECT_THAT(cut_off_in(folder_ / "nowhere"), IsEmpty());
+}
+
+TEST_F(RecordingsFolder, WhatIsBegunLaterIsNeverTakenForCutOff) {
+  Housekeeper housekeeper(folder_, {0, 0, true});
+  make_crashed("begun.mcap");
+  housekeeper.recover();
+  ::usleep(300'000);
+  EXPECT_TRUE(fs::exists(folder_ / "begun.mcap.active"));
+  EXPECT_THAT(housekeeper.take_warnings(), IsEmpty());
 }
 
 TEST_F(RecordingsFolder, ProtectionOutlivesACrash) {
   make_crashed("event.mcap");
   ASSERT_TRUE(protect(folder_ / "event.mcap", "why").ok());
-  (void)recover_folder(folder_);
+  (void)recover({});
   EXPECT_TRUE(is_protected(folder_ / "event-recovered.mcap"));
   EXPECT_FALSE(is_protected(folder_ / "event.mcap")) << "its file is gone";
   EXPECT_THAT(keep_quota(folder_, 1), IsEmpty());
+}
+
+TEST_F(RecordingsFolder, WithoutRoomACutOffRecordingStaysAndIsSaid) {
+  make("old.mcap", 5);
+  make_crashed("crashed.mcap");
+  const uint64_t more_than_there_is = free_bytes(folder_);
+  EXPECT_THAT(recover({0, more_than_there_is, true}), ElementsAre(HasSubstr("crashed.mcap.active was left by a crash "
+                                                                            "and stays as it is: to recover it")));
+  EXPECT_TRUE(fs::exists(folder_ / "crashed.mcap.active"));
+  EXPECT_FALSE(fs::exists(folder_ / "crashed-recovered.mcap.active"));
+  EXPECT_TRUE(fs::exists(folder_ / "old.mcap")) << "without a quota nothing is removed";
+}
+
+// On a disk of its own.
+TEST_F(RecordingsFolder, WithAQuotaOlderRecordingsMakeRoomForACutOffOne) {
+  if (mount("tmpfs", folder_.c_str(), "tmpfs", 0, "size=1m") != 0) GTEST_SKIP() << "a disk can be made by root only";
+  make("older.mcap", 5);
+  make("kept.mcap", 9);
+  make_crashed("crashed.mcap");
+  ASSERT_TRUE(protect(folder_ / "kept.mcap", "why").ok());
+  make("newer.mcap", -1);
+  const fs::path crashed = folder_ / "crashed.mcap.active";
+  EXPECT_THAT(make_room(folder_, free_bytes(folder_), crashed), IsEmpty()) << "there is room";
+  EXPECT_THAT(make_room(folder_, free_bytes(folder_) + 2000, crashed), IsEmpty()) << "would not be enough";
+  EXPECT_THAT(make_room(folder_, free_bytes(folder_) + 1000, crashed),
+              ElementsAre(HasSubstr("older.mcap was removed to make room")));
+  for (const char* kept : {"kept.mcap", "newer.mcap", "crashed.mcap.active"}) EXPECT_TRUE(fs::exists(folder_ / kept));
+  umount2(folder_.c_str(), MNT_DETACH);
+}
+
+TEST_F(RecordingsFolder, WhatACutOffRecoveryLeftIsRemoved) {
+  make_crashed("crashed.mcap");
+  make("crashed-recovered.mcap.active", 1);
+  EXPECT_THAT(keep_quota(folder_, 1000), IsEmpty()) << "takes its source's place, does not count";
+  EXPECT_THAT(cut_off_in(folder_), ElementsAre(folder_ / "crashed.mcap.active"));
+  EXPECT_FALSE(fs::exists(folder_ / "crashed-recovered.mcap.active"));
+  fs::rename(folder_ / "crashed.mcap.active", folder_ / "x-recovered.mcap.active");
+  EXPECT_THAT(cut_off_in(folder_), ElementsAre(folder_ / "x-recovered.mcap.active")) << "has no source: is one";
+}
+
+TEST_F(RecordingsFolder, TheQuotaRemovesWhatCouldNotBeRecoveredWhenItIsTheOldest) {
+  make("a.mcap.active", 9);
+  make("b.mcap", 5);
+  EXPECT_THAT(keep_quota(folder_, 1500, {folder_ / "a.mcap.active"}),
+              ElementsAre(HasSubstr("a.mcap.active, which a crash left and which was not recovered, was removed")));
+  EXPECT_TRUE(fs::exists(folder_ / "b.mcap"));
+}
+
+TEST_F(RecordingsFolder, ARecoveryStopsWhenTheServiceEnds) {
+  auto recording = Recording::create(folder_ / "large.mcap", {}, {}).value();
+  const auto channel = std::make_shared<const ChannelOf>(ChannelOf{"topic", "m::T", "struct T { octet x; };", {}});
+  core::Random random(1);
+  std::vector<uint8_t> noise(1'000'000);
+  for (auto& byte : noise) byte = static_cast<uint8_t>(random.next());
+  for (uint32_t i = 0; i < 500; ++i) {
+    ASSERT_TRUE(recording->write(StoredSample{channel, i, 1000 + i, 900, noise, ""}).ok());
+  }
+  ASSERT_TRUE(recording->close().ok());
+  fs::rename(folder_ / "large.mcap", folder_ / "large.mcap.active");
+  fs::resize_file(folder_ / "large.mcap.active", fs::file_size(folder_ / "large.mcap.active") - 20);
+  {
+    Housekeeper housekeeper(folder_, {0, 0, true});
+    EXPECT_EQ(housekeeper.recovering(), "") << "not before it is told to";
+    housekeeper.recover();
+    const int64_t deadline_ns = core::monotonic_ns() + 30 * core::kNsPerSecond;
+    while (housekeeper.recovering().empty()) {
+      ASSERT_LT(core::monotonic_ns(), deadline_ns);
+      ::usleep(1000);
+    }
+    EXPECT_EQ(housekeeper.recovering(), folder_ / "large.mcap.active");
+  }
+  EXPECT_TRUE(fs::exists(folder_ / "large.mcap.active"));
+  EXPECT_FALSE(fs::exists(folder_ / "large-recovered.mcap"));
+  EXPECT_FALSE(fs::exists(folder_ / "large-recovered.mcap.active"));
 }
 
 TEST_F(RecordingsFolder, QuotaRemovesTheOldestButNothingProtectedOrOpen) {
@@ -136,7 +234,7 @@ TEST_F(RecordingsFolder, TheHousekeeperKeepsTheQuotaByItself) {
   make("old.mcap", 5);
   make("kept.mcap", 9);
   ASSERT_TRUE(protect(folder_ / "kept.mcap", "why").ok());
-  Housekeeper housekeeper(folder_, 1500);
+  Housekeeper housekeeper(folder_, {1500, 0, false});
   const int64_t deadline_ns = core::monotonic_ns() + 30 * core::kNsPerSecond;
   while (fs::exists(folder_ / "old.mcap") || housekeeper.survey().files != 1) {
     ASSERT_LT(core::monotonic_ns(), deadline_ns);
