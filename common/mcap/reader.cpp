@@ -11,6 +11,7 @@ namespace {
 
 constexpr uint64_t kTailBytes = kRecordHeadBytes + kFooterBytes + kMagic.size();
 constexpr size_t kMostProblems = 100;
+constexpr uint64_t kMostMetadataBytes = uint64_t{1} << 24U;
 // Gigabytes forced to the disk at once would hold up who else writes there.
 constexpr double kRecoverySyncS = 1;
 
@@ -249,6 +250,29 @@ void Reader::for_each(const Selection& selection,
   while (const auto message = all.next()) {
     if (!use(channels_.at(message->channel_id), *message)) return;
   }
+}
+
+std::optional<Metadata> metadata_in_front(const std::filesystem::path& file, const std::string& name) {
+  const auto opened = FileBytes::open(file);
+  if (!opened.ok() || !has_magic(opened.value()->read(0, kMagic.size()))) return std::nullopt;
+  const FileBytes& bytes = *opened.value();
+  uint64_t offset = kMagic.size();
+  while (const auto head = bytes.read(offset, kRecordHeadBytes)) {
+    Decoder decoder(*head);
+    const auto opcode = static_cast<Opcode>(decoder.u8());
+    const uint64_t length = decoder.u64();
+    offset += kRecordHeadBytes;
+    const bool in_front =
+        opcode == Opcode::header || opcode == Opcode::schema || opcode == Opcode::channel || opcode == Opcode::metadata;
+    if (!in_front || length > bytes.size() - offset) break;
+    if (opcode == Opcode::metadata && length <= kMostMetadataBytes) {
+      const auto content = bytes.read(offset, length);
+      Metadata metadata;
+      if (content && parse(*content, metadata) && metadata.name == name) return metadata;
+    }
+    offset += length;
+  }
+  return std::nullopt;
 }
 
 std::filesystem::path recovered_name(const std::filesystem::path& damaged) {

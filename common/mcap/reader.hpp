@@ -149,6 +149,9 @@ class Messages {
 /// A writer has this file open now (NAME.mcap.active of a running recorder).
 bool being_written(const std::filesystem::path& file);
 
+/// The metadata record of this name that stands before all messages; reads little of the file, also of an open one.
+std::optional<Metadata> metadata_in_front(const std::filesystem::path& file, const std::string& name);
+
 /// NAME-recovered.mcap beside NAME.mcap or NAME.mcap.active.
 std::filesystem::path recovered_name(const std::filesystem::path& damaged);
 

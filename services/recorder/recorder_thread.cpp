@@ -40,6 +40,7 @@ RecorderThread::RecorderThread(const RecorderConfig& config, messaging::Particip
   housekeeper_ = std::make_unique<Housekeeper>(
       folder(), FolderRules{static_cast<uint64_t>(quota_mb * kBytesPerMb),
                             static_cast<uint64_t>(config_.keep_free_mb * kBytesPerMb), ours});
+  if (ours) number_ = next_number(folder());
   inlet_ = std::make_unique<TopicInlet>(config_, participant, about_.at("train_id"), queue_,
                                         [this](const Arrival& arrival) { use(arrival); });
   if (config_.ring_s > 0) ring_.emplace(config_.ring_s, static_cast<uint64_t>(config_.ring_mb * kBytesPerMb));
@@ -174,11 +175,16 @@ mcap::WriterOptions RecorderThread::writer_options() const {
   return options;
 }
 
+const std::map<std::string, std::string>& RecorderThread::about_next() {
+  if (number_ > 0) about_[kNumberKey] = std::to_string(number_++);
+  return about_;
+}
+
 core::Result<std::unique_ptr<Recording>> RecorderThread::create(const fs::path& file) {
   mcap::WriterOptions options = writer_options();
   options.overwrite = !config_.file.empty() && file == config_.file;
   about_["started_ns"] = std::to_string(core::wall_ns());
-  auto recording = Recording::create(file, options, about_);
+  auto recording = Recording::create(file, options, about_next());
   const auto text = core::read_whole(config_.train_file);
   if (!recording.ok() || !text.ok()) return recording;
   const auto status = recording.value()->write_metadata(

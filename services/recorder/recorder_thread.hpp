@@ -70,6 +70,8 @@ class RecorderThread {
   core::Result<std::string> in_thread(const std::function<core::Result<std::string>()>& work);
   [[nodiscard]] std::filesystem::path next_name();
   core::Result<std::string> begin(const std::filesystem::path& file);
+  /// What is known of the recording that is made next.
+  const std::map<std::string, std::string>& about_next();
   core::Result<std::unique_ptr<Recording>> create(const std::filesystem::path& file);
   void record_into(std::unique_ptr<Recording> recording);
   core::Result<std::string> end();
@@ -98,6 +100,7 @@ class RecorderThread {
 
   RecorderConfig config_;
   std::map<std::string, std::string> about_;
+  uint64_t number_ = 0;  // of the next recording; 0 = the folder is not ours
   std::function<void(int64_t)> on_picture_;
   std::vector<EventRule> rules_;
   std::map<const EventRule*, int64_t> rule_happened_ns_;

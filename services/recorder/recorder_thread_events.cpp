@@ -72,7 +72,7 @@ core::Result<std::string> RecorderThread::keep_event(const EventNote& note, bool
   }
   auto made =
       EventFile::create(new_name(folder(), about_.at("train_id"), core::wall_ns(), kEventKind), writer_options(),
-                        about_, note, ring_->snapshot(), static_cast<uint64_t>(config_.ring_mb * kBytesPerMb));
+                        about_next(), note, ring_->snapshot(), static_cast<uint64_t>(config_.ring_mb * kBytesPerMb));
   if (!made.ok()) return made.error();
   event_file_ = std::move(made).value();
   event_begun_ns_ = now_ns;

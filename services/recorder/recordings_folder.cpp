@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <ctime>
 #include <fstream>
 #include <limits>
@@ -28,6 +29,7 @@ struct Found {
   fs::file_time_type time;
   uint64_t bytes = 0;
   bool active = false;
+  uint64_t number = 0;  // 0: not looked for, or none
 };
 
 fs::path recording_of(const fs::path& active) {
@@ -60,10 +62,20 @@ bool is_draft(const Found& found) {
   return fs::exists(found.file.parent_path() / (source + kEnding + kActive), failed);
 }
 
+uint64_t number_of(const fs::path& file) {
+  const auto about = mcap::metadata_in_front(file, "railfix");
+  if (!about || !about->entries.contains(kNumberKey)) return 0;
+  const std::string& text = about->entries.at(kNumberKey);
+  uint64_t number = 0;
+  (void)std::from_chars(text.data(), text.data() + text.size(), number);
+  return number;
+}
+
 /// The oldest first.
 void sort_by_age(std::vector<Found>& all) {
+  for (Found& found : all) found.number = number_of(found.file);
   std::ranges::sort(all, [](const Found& a, const Found& b) {
-    return std::tie(a.time, a.recording) < std::tie(b.time, b.recording);
+    return std::tie(a.number, a.time, a.recording) < std::tie(b.number, b.time, b.recording);
   });
 }
 
@@ -76,6 +88,12 @@ fs::path marker_of(const fs::path& recording) {
 bool is_taken(const fs::path& recording) {
   std::error_code failed;
   return fs::exists(recording, failed) || fs::exists(recording.string() + kActive, failed);
+}
+
+uint64_t next_number(const fs::path& folder) {
+  uint64_t highest = 0;
+  for (const Found& found : recordings_in(folder)) highest = std::max(highest, number_of(found.file));
+  return highest + 1;
 }
 
 fs::path new_name(const fs::path& folder, const std::string& train_id, int64_t now_ns, const std::string& kind) {

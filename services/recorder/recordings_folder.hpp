@@ -2,6 +2,10 @@
 //
 // A recording NAME.mcap is protected while a file NAME.mcap.protected stands beside it; its text says why. So
 // protection survives a restart, and a person sees it, makes it (touch) and ends it (rm) without Railfix.
+//
+// Which recording is the older one does not depend on the clock, which a computer without a battery has wrong at each
+// start: each has a number in its metadata `railfix`. Those of before, without one, are older, in the order of their
+// time.
 #pragma once
 
 #include <cstdint>
@@ -16,6 +20,11 @@ namespace railfix::recorder {
 /// This recording exists, closed or open. Of a place that cannot be looked at the answer is no: who creates a file
 /// there says why.
 bool is_taken(const std::filesystem::path& recording);
+
+/// Of a recording's number, in its metadata record `railfix`.
+inline constexpr const char* kNumberKey = "number";
+/// Above the numbers of all recordings in the folder.
+uint64_t next_number(const std::filesystem::path& folder);
 
 /// FOLDER/TRAIN-YYYYMMDD-HHMMSS.mcap for this time (UTC), with a number behind it when that exists. `kind` stands
 /// before the ending ("-event").

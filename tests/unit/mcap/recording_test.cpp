@@ -131,6 +131,24 @@ TEST_F(RecordingTest, APlaceThatCannotBeLookedAtIsRefusedWithASentence) {
   }
 }
 
+TEST_F(RecordingTest, MetadataInFrontIsFoundWithoutReadingTheRest) {
+  const auto file = folder_ / "front.mcap";
+  auto writer = Writer::create(file, {}).value();
+  const uint16_t channel = writer->add_channel(0, "log_record", "json", {}).value();
+  ASSERT_TRUE(writer->write_metadata({"railfix", {{"number", "7"}}}).ok());
+  EXPECT_EQ(metadata_in_front(file.string() + ".active", "railfix").value().entries.at("number"), "7");
+  ASSERT_TRUE(writer->write({channel, 1, 1, 1, bytes_of("{}")}).ok());
+  ASSERT_TRUE(writer->close().ok());
+  EXPECT_EQ(metadata_in_front(file, "railfix").value().entries.at("number"), "7");
+  EXPECT_FALSE(metadata_in_front(file, "other").has_value());
+  WriterOptions small_chunks;
+  small_chunks.chunk_bytes = 300;
+  const auto behind = metadata_in_front(record(samples(40), small_chunks), "railfix");
+  EXPECT_FALSE(behind.has_value()) << "stands behind the messages";
+  EXPECT_FALSE(metadata_in_front(store(Bytes(1000, 'x')), "railfix").has_value());
+  EXPECT_FALSE(metadata_in_front(folder_ / "none", "railfix").has_value());
+}
+
 TEST_F(RecordingTest, OpenFileIsCalledActiveAndReadable) {
   const auto file = folder_ / "live.mcap";
   WriterOptions options;

@@ -221,6 +221,19 @@ TEST_F(RecorderThreadTest, GoesOnByItselfWhenThereIsRoomAgain) {
   umount2(folder_.c_str(), MNT_DETACH);
 }
 
+TEST_F(RecorderThreadTest, RecordingsAreNumberedAlsoAfterARestart) {
+  for (int i = 0; i < 2; ++i) {
+    auto recorder = this->recorder();
+    for (int k = 0; k < 2; ++k) {
+      const auto started = recorder->start("");
+      ASSERT_TRUE(started.ok()) << started.error().message;
+      ASSERT_TRUE(recorder->stop().ok());
+      const auto about = mcap::metadata_in_front(started.value(), "railfix");
+      EXPECT_EQ(about.value().entries.at("number"), std::to_string(2 * i + k + 1));
+    }
+  }
+}
+
 TEST_F(RecorderThreadTest, ASecondStartKeepsWhatTheFirstRecorded) {
   config_.file = (folder_ / "run.mcap").string();
   auto recorder = this->recorder();

@@ -188,6 +188,24 @@ TEST_F(RecordingsFolder, QuotaRemovesTheOldestButNothingProtectedOrOpen) {
   EXPECT_FALSE(unprotect(folder_ / "oldest.mcap").ok()) << "is not protected any more";
 }
 
+TEST_F(RecordingsFolder, TheOldestDoesNotDependOnTheClock) {
+  EXPECT_EQ(next_number(folder_), 1U);
+  const auto make_numbered = [&](const std::string& name, int age_h) {
+    auto recording =
+        Recording::create(folder_ / name, {}, {{kNumberKey, std::to_string(next_number(folder_))}}).value();
+    ASSERT_TRUE(recording->close().ok());
+    fs::last_write_time(folder_ / name, fs::file_time_type::clock::now() - std::chrono::hours(age_h));
+  };
+  make("of-before.mcap", 1);
+  make("of-long-before.mcap", 2);
+  make_numbered("first.mcap", 5);
+  make_numbered("clock-behind.mcap", 500'000);
+  auto open = Recording::create(folder_ / "open.mcap", {}, {{kNumberKey, "7"}}).value();
+  EXPECT_EQ(next_number(folder_), 8U) << "open ones count";
+  EXPECT_THAT(keep_quota(folder_, 0), ElementsAre(HasSubstr("of-long-before.mcap"), HasSubstr("of-before.mcap"),
+                                                  HasSubstr("first.mcap"), HasSubstr("clock-behind.mcap")));
+}
+
 TEST_F(RecordingsFolder, SurveyCountsWhatIsThere) {
   make("a.mcap", 1);
   make("b-event.mcap", 1);
