@@ -1,10 +1,11 @@
 #include "recorder/recording.hpp"
 
+#include <yaml-cpp/yaml.h>
+
 #include <algorithm>
 #include <array>
 #include <cstdio>
 #include <fstream>
-#include <regex>
 #include <utility>
 
 #include "core/time.hpp"
@@ -145,9 +146,41 @@ core::Status Recording::close() {
   return status.ok() ? closed : status;
 }
 
+namespace {
+
+// Anchors can make a circle.
+constexpr int kMostDepth = 50;
+
+bool is_secret(const YAML::Node& key) {
+  return key.IsScalar() && (key.Scalar().ends_with("token") || key.Scalar().ends_with("password"));
+}
+
+/// False: nested too deeply.
+bool hide_secrets(YAML::Node node, int depth) {
+  if (depth > kMostDepth) return false;
+  if (node.IsSequence()) {
+    return std::all_of(node.begin(), node.end(), [&](const YAML::Node& one) { return hide_secrets(one, depth + 1); });
+  }
+  if (!node.IsMap()) return true;
+  for (auto entry : node) {
+    if (is_secret(entry.first)) {
+      entry.second = "not recorded";
+    } else if (!hide_secrets(entry.first, depth + 1) || !hide_secrets(entry.second, depth + 1)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
 std::string without_secrets(const std::string& yaml) {
-  static const std::regex secret(R"(((?:token|password)["']?\s*:)[^\n}]*)");
-  return std::regex_replace(yaml, secret, "$1 not recorded");
+  try {
+    const YAML::Node root = YAML::Load(yaml);
+    if (root.IsMap() && hide_secrets(root, 0)) return YAML::Dump(root) + "\n";
+  } catch (const YAML::Exception&) {  // its sentence may show the text
+  }
+  return "not recorded: it cannot be read as YAML, so nobody knows which words in it are secret\n";
 }
 
 std::string fingerprint(const fs::path& file) {

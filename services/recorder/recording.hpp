@@ -85,7 +85,8 @@ class Recording {
   int64_t losses_written_ns_ = 0;
 };
 
-/// A configuration's YAML without the values of tokens and passwords: recordings are given away.
+/// A configuration's YAML without the values of tokens and passwords, and without comments: recordings are given away.
+/// Of a text that is no YAML only that is said.
 std::string without_secrets(const std::string& yaml);
 
 /// Name and CRC-32 of a file for the metadata; empty for an empty name, "not readable" when it is so.

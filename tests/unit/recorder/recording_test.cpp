@@ -13,6 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 class RecordingFolder : public ::testing::Test {
  protected:
@@ -111,7 +112,24 @@ TEST_F(RecordingFolder, APauseIsNoLoss) {
 TEST(Configuration, IsRecordedWithoutItsSecrets) {
   EXPECT_EQ(without_secrets("monitor:\n  token: abc def\n  port: 8080\ntpr_publisher:\n  mqtt_password: \"x: y\"\n"),
             "monitor:\n  token: not recorded\n  port: 8080\ntpr_publisher:\n  mqtt_password: not recorded\n");
-  EXPECT_EQ(without_secrets("monitor: {token: abc, port: 1}"), "monitor: {token: not recorded}");
+  EXPECT_EQ(without_secrets("monitor: {token: abc, port: 1}"), "monitor: {token: not recorded, port: 1}\n");
+}
+
+TEST(Configuration, IsRecordedWithoutItsSecretsHoweverTheyAreWritten) {
+  for (const char* yaml :
+       {"monitor:\n  token:\n    s3cret\n", "monitor:\n  token: >-\n    s3cret\n    s3cret\n",
+        "monitor: {token: \"a}s3cret\", port: 1}", "monitor:\n  ? token\n  : s3cret\n", "list: [{password: s3cret}]",
+        "token: [s3cret, s3cret]", "monitor: &m\n  \"token\": 's3cret'\nother: *m\n", "# token: s3cret\na: 1",
+        "a: &a s3cret\ntoken: *a", "token: s3cret\n  broken: [", "s3cret", "a: &a {token: s3cret, b: *a}"}) {
+    EXPECT_THAT(without_secrets(yaml), Not(HasSubstr("s3cret"))) << yaml;
+  }
+  EXPECT_THAT(without_secrets("token: s3cret\n broken: ["), HasSubstr("not recorded: it cannot be read as YAML"));
+}
+
+TEST(Configuration, WhatIsNoSecretStaysAsItMeans) {
+  const std::string kept =
+      "common:\n  train_id: \"x: y\"\n  interfaces: []\nrecorder:\n  events:\n    - a.b == \"c: d\"\n  ring_s: 5";
+  EXPECT_EQ(without_secrets(kept), kept + "\n");
 }
 
 }  // namespace
