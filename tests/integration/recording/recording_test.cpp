@@ -90,6 +90,15 @@ class RecordingTest : public ::testing::Test {
     EXPECT_EQ(nlohmann::json::parse(status.out)["service"], "recorder");
   }
 
+  /// It records meanwhile.
+  void wait_for_recovery() const {
+    const int64_t deadline_ns = core::monotonic_ns() + 60 * core::kNsPerSecond;
+    while (test::slurp(folder_ / "recorder.log").find("what it held is now in") == std::string::npos) {
+      ASSERT_LT(core::monotonic_ns(), deadline_ns) << test::slurp(folder_ / "recorder.log");
+      usleep(10'000);
+    }
+  }
+
   static constexpr int64_t kBegin = 1'700'000'000 * core::kNsPerSecond;
   std::string train_;
   fs::path folder_;
@@ -156,6 +165,7 @@ TEST_F(RecordingTest, AKilledRecorderLosesNoWrittenChunk) {
 
   test::Program next(recorder(settings), log());
   wait_for_recorder();
+  wait_for_recovery();
   EXPECT_EQ(next.end(SIGTERM), 0);
   fs::path recovered;
   for (const auto& entry : fs::directory_iterator(folder_)) {
@@ -207,6 +217,7 @@ TEST_F(RecordingTest, KilledWhileItWritesItKeepsEveryWholeChunk) {
 
   test::Program next(recorder(settings), log());
   wait_for_recorder();
+  wait_for_recovery();
   const fs::path recovered = mcap::recovered_name(active);
   ASSERT_TRUE(fs::exists(recovered)) << test::slurp(folder_ / "recorder.log");
   EXPECT_EQ(mcap::Reader::open(recovered).value()->statistics().messages, whole);
