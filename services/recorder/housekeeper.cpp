@@ -100,6 +100,7 @@ void Housekeeper::recover_next() {
     recovering_ = file.string();
   }
   const fs::path name = mcap::recovered_name(file);
+  disk_filled_ = false;
   const auto lost = mcap::recover(file, name, [this] { return goes_on(); });
   if (lost.ok()) {
     const std::lock_guard files(files_mutex_);
@@ -107,7 +108,8 @@ void Housekeeper::recover_next() {
     warn(file.string() + " was left by a crash; what it held is now in " + name.string());
   } else if (!ending_) {
     left_.push_back(file);
-    warn(file.string() + " was left by a crash, cannot be recovered now and stays as it is: " + lost.error().message);
+    warn(file.string() + " was left by a crash, cannot be recovered now and stays as it is: " +
+         (disk_filled_ ? "the disk has become too full meanwhile" : lost.error().message));
   }
 }
 
@@ -130,7 +132,8 @@ bool Housekeeper::goes_on() {
   if (core::monotonic_ns() - looked_ns_ < kPeriodRecoveringNs) return !ending_;
   look();
   const auto least = static_cast<uint64_t>(kRoomToGoOn * static_cast<double>(rules_.keep_free_bytes));
-  return !ending_ && free_bytes(folder_) >= least;
+  disk_filled_ = free_bytes(folder_) < least;
+  return !ending_ && !disk_filled_;
 }
 
 void Housekeeper::say(const std::string& sentence) {

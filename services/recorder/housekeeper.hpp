@@ -53,7 +53,8 @@ class Housekeeper {
   std::vector<std::filesystem::path> cut_off_;  // to be recovered
   std::vector<std::filesystem::path> left_;     // could not be
   int64_t looked_ns_ = 0;
-  std::mutex files_mutex_;  // held while files are removed or protected
+  bool disk_filled_ = false;  // while a file was recovered
+  std::mutex files_mutex_;    // held while files are removed or protected
   bool over_quota_said_ = false;
 
   mutable std::mutex mutex_;
