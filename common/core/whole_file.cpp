@@ -86,15 +86,15 @@ void take_after(const struct stat& old, int out) {
   fchmod(out, old.st_mode & 0777U);
 }
 
-/// A new file beside that place; its name is in `draft`. Other processes with our number may write there, too: those in
-/// other containers.
-int open_draft(const fs::path& file, mode_t mode, std::string& draft) {
+/// A new file beside that place; its name is in `draft` and ends in `ending`. Other processes with our number may write
+/// there, too: those in other containers.
+int open_draft(const fs::path& file, const std::string& ending, mode_t mode, std::string& draft) {
   std::random_device random;
   int out = -1;
   do {
     std::array<char, 16> suffix{};
     std::snprintf(suffix.data(), suffix.size(), ".%08x", random());
-    draft = file.string() + suffix.data();
+    draft = file.string() + suffix.data() + ending;
     out = open(draft.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
   } while (out < 0 && errno == EEXIST);
   return out;
@@ -110,17 +110,27 @@ bool rewrite(const fs::path& file, const std::string& bytes) {
   return out >= 0 && write_and_close(out, bytes);
 }
 
+/// The draft of a file that takes the place of `old`, where that is there. Negative: errno says why.
+int draft_for(const fs::path& file, const std::string& ending, const struct stat* old, std::string& draft) {
+  const int out = open_draft(file, ending, old != nullptr ? old->st_mode & 0777U : 0666U, draft);
+  if (out >= 0 && old != nullptr) take_after(*old, out);
+  return out;
+}
+
+/// rename() would not mind.
+bool nobody_writes(const struct stat* old) {
+  constexpr mode_t kSomebodyWrites = 0222;
+  if (old == nullptr || (old->st_mode & kSomebodyWrites) != 0) return false;
+  errno = EACCES;
+  return true;
+}
+
 /// False: errno says why. `old` is what is there.
 bool replace(const fs::path& file, const struct stat* old, const std::string& bytes) {
-  constexpr mode_t kSomebodyWrites = 0222;
-  if (old != nullptr && (old->st_mode & kSomebodyWrites) == 0) {  // rename() would not mind
-    errno = EACCES;
-    return false;
-  }
+  if (nobody_writes(old)) return false;
   std::string draft;
-  const int out = open_draft(file, old != nullptr ? old->st_mode & 0777U : 0666U, draft);
+  const int out = draft_for(file, "", old, draft);
   if (out < 0) return old != nullptr && only_in_place(errno) && rewrite(file, bytes);
-  if (old != nullptr) take_after(*old, out);
   if (write_and_close(out, bytes) && rename(draft.c_str(), file.c_str()) == 0) return true;
   const int reason = errno;
   unlink(draft.c_str());
@@ -212,6 +222,25 @@ Status write_whole_with_folders(const std::filesystem::path& file, const std::st
   std::error_code failed;  // write_whole() then says what is missing
   std::filesystem::create_directories(file.parent_path(), failed);
   return write_whole(file, bytes);
+}
+
+Result<fs::path> draft_beside(const fs::path& file, const std::string& ending) {
+  struct stat old {};
+  const bool there = stat(file.c_str(), &old) == 0;
+  if (!there && errno != ENOENT) return cannot_write(file.string());
+  if (there && !S_ISREG(old.st_mode))
+    return Error{"cannot write " + file.string() + ": it is no regular file; give the name of one"};
+  const auto* replaced = there ? &old : nullptr;
+  std::string draft;
+  const int out = nobody_writes(replaced) ? -1 : draft_for(place_of(file), ending, replaced, draft);
+  if (out < 0) return cannot_write(file.string());
+  close(out);
+  return fs::path(draft);
+}
+
+Status move_draft(const fs::path& draft, const fs::path& file) {
+  if (rename(draft.c_str(), place_of(file).c_str()) != 0) return cannot_write(file.string());
+  return {};
 }
 
 }  // namespace railfix::core

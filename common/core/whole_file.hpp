@@ -33,4 +33,11 @@ Status write_whole(const std::filesystem::path& file, const std::string& bytes);
 /// The same, with the folders that it lies in.
 Status write_whole_with_folders(const std::filesystem::path& file, const std::string& bytes);
 
+/// For a library that writes a file by its name and piece by piece: an empty one beside that place, with the owner and
+/// rights of what is there; its name ends in `ending`. Error: as above, and where it is no regular file or the folder
+/// takes no other one.
+Result<std::filesystem::path> draft_beside(const std::filesystem::path& file, const std::string& ending);
+/// Moves it to that place. An error names the file, and both are as they were.
+Status move_draft(const std::filesystem::path& draft, const std::filesystem::path& file);
+
 }  // namespace railfix::core

@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 #include <opencv2/videoio.hpp>
+#include <set>
 
 #include "cdr/types.hpp"
 #include "core/time.hpp"
@@ -90,6 +91,18 @@ class Export : public ::testing::Test {
   [[nodiscard]] test::Outcome recording(std::vector<std::string> arguments) const {
     arguments.insert(arguments.begin(), {"railfix", "recording"});
     return test::run_program(arguments, 120);
+  }
+
+  /// Where no file may grow beyond this: it fails in the middle, as on a full disk.
+  [[nodiscard]] static test::Outcome recording_in(int most_kb, const std::string& arguments) {
+    const std::string command = std::string(RAILFIX_BIN_DIR) + "/railfix recording " + arguments;
+    return test::run_program(
+        {"/bin/bash", "-c", "trap '' XFSZ; ulimit -f " + std::to_string(most_kb) + "; exec " + command}, 120);
+  }
+  [[nodiscard]] std::set<std::string> files() const {
+    std::set<std::string> names;
+    for (const auto& entry : fs::directory_iterator(folder_)) names.insert(entry.path().filename());
+    return names;
   }
 
   fs::path folder_ = fs::temp_directory_path() / ("railfix-export-" + std::to_string(::getpid()));
@@ -250,6 +263,18 @@ TEST_F(Export, AFilmRunsAsFastAsTheTrain) {
   const auto none = recording({"export", file().string(), "--mp4", mp4.string(), "--camera", "cam7"});
   EXPECT_EQ(none.exit_code, 2);
   EXPECT_THAT(none.err, HasSubstr("has no pictures of camera cam7"));
+}
+
+TEST_F(Export, AFilmThatIsCutIsToldAndTakesNoPlace) {
+  const auto mp4 = folder_ / "ride.mp4";
+  std::ofstream(mp4) << "old";
+  const auto cut = recording_in(4, "export " + file().string() + " --mp4 " + mp4.string());
+  EXPECT_EQ(cut.exit_code, 2) << cut.out;
+  EXPECT_THAT(cut.err, ::testing::EndsWith("railfix: cannot write " + mp4.string() +
+                                           " to its end (File too large); give another place\n"));
+  EXPECT_EQ(cut.out, "");
+  EXPECT_EQ(test::slurp(mp4), "old");
+  EXPECT_EQ(files(), (std::set<std::string>{"ride.mcap", "ride.mp4"}));
 }
 
 }  // namespace

@@ -121,6 +121,41 @@ TEST(WholeFile, KeepsOwnerAndRightsOfTheOldOne) {
   fs::remove_all(folder);
 }
 
+TEST(Draft, TakesOwnerAndRightsAndThenThePlace) {
+  const fs::path folder = fs::path(::testing::TempDir()) / ("railfix-whole-file-" + std::to_string(getpid()));
+  fs::create_directories(folder / "there");
+  ASSERT_TRUE(write_whole(folder / "there/film.mp4", "old").ok());
+  fs::permissions(folder / "there/film.mp4", fs::perms::owner_read | fs::perms::owner_write | fs::perms::group_read);
+  fs::create_symlink("there/film.mp4", folder / "link");
+  const auto draft = draft_beside(folder / "link", ".mp4");
+  ASSERT_TRUE(draft.ok()) << draft.error().message;
+  EXPECT_EQ(draft.value().parent_path().filename(), "there") << "so that it can be moved";
+  EXPECT_EQ(draft.value().extension(), ".mp4");
+  EXPECT_EQ(test::slurp(folder / "link"), "old");
+  ASSERT_TRUE(write_whole(draft.value(), "new").ok());
+  ASSERT_TRUE(move_draft(draft.value(), folder / "link").ok());
+  EXPECT_TRUE(fs::is_symlink(folder / "link"));
+  EXPECT_EQ(test::slurp(folder / "there/film.mp4"), "new");
+  EXPECT_EQ(fs::status(folder / "there/film.mp4").permissions(),
+            fs::perms::owner_read | fs::perms::owner_write | fs::perms::group_read);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder / "there"), fs::directory_iterator()), 1);
+  fs::remove_all(folder);
+}
+
+TEST(Draft, IsOfARegularFileThatMayBeWritten) {
+  const fs::path folder = fs::path(::testing::TempDir()) / ("railfix-whole-file-" + std::to_string(getpid()));
+  fs::create_directories(folder);
+  EXPECT_EQ(draft_beside("/dev/null", ".mp4").error().message,
+            "cannot write /dev/null: it is no regular file; give the name of one");
+  EXPECT_EQ(draft_beside(folder / "none/film", "").error().message,
+            "cannot write " + (folder / "none/film").string() + " (No such file or directory); does its folder exist?");
+  ASSERT_TRUE(write_whole(folder / "precious", "text").ok());
+  fs::permissions(folder / "precious", fs::perms::owner_read);
+  EXPECT_FALSE(draft_beside(folder / "precious", "").ok());
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 1);
+  fs::remove_all(folder);
+}
+
 TEST(WholeFile, SaysWhyItCannotBeWritten) {
   EXPECT_EQ(failure("/dev/full"), "(No space left on device); make space there");
   EXPECT_EQ(failure(fs::path(::testing::TempDir()) / std::string(300, 'x')),

@@ -11,9 +11,12 @@
 
 #include "core/time.hpp"
 #include "core/units.hpp"
+#include "core/whole_file.hpp"
+#include "draft.hpp"
 #include "messaging/camera.hpp"
 #include "messaging/topics.hpp"
 #include "progress.hpp"
+#include "recording/mp4_file.hpp"
 #include "recording/utc_text.hpp"
 #include "run/seen_rails.hpp"
 
@@ -159,8 +162,9 @@ class Film {
       report_.codec = name;
       if (video_.open(file_.string(), cv::CAP_FFMPEG, code, report_.fps, size_)) return {};
     }
-    return core::Error{file_.string() +
-                       " cannot be written as a film; end its name in .mp4, and see that its folder exists"};
+    return core::Error{
+        fmt::format("no film of {} x {} pixels can be made: OpenCV's FFmpeg has neither H.264 nor MPEG-4", size_.width,
+                    size_.height)};
   }
   void show_until(int64_t stamp_ns) {
     if (shown_.empty()) return;
@@ -221,18 +225,14 @@ double usual_fps(mcap::Reader& reader, const mcap::Selection& part, const std::s
   return std::clamp(std::round(fps * 100) / 100, kLeastFps, kMostFps);
 }
 
-}  // namespace
-
-core::Result<VideoReport> export_video(mcap::Reader& reader, const mcap::Selection& part, const VideoOptions& options,
-                                       const std::filesystem::path& file) {
-  const auto channel = picture_channel(reader, options);
-  if (!channel.ok()) return channel.error();
-  const std::string type = reader.schemas().at(channel.value().schema_id).name;
-  const Drawn drawn = read_drawn(reader, part, camera_of(channel.value().topic));
+core::Result<VideoReport> make_film(mcap::Reader& reader, const mcap::Selection& part, const VideoOptions& options,
+                                    const mcap::Channel& channel, const std::filesystem::path& file) {
+  const std::string type = reader.schemas().at(channel.schema_id).name;
+  const Drawn drawn = read_drawn(reader, part, camera_of(channel.topic));
   mcap::Selection pictures = part;
-  pictures.topics = {channel.value().topic};
+  pictures.topics = {channel.topic};
   Film film(drawn, options.fps > 0 ? options.fps : usual_fps(reader, pictures, type), file);
-  Progress progress("film", reader.statistics().channel_messages.at(channel.value().id));
+  Progress progress("film", reader.statistics().channel_messages.at(channel.id));
   core::Status status;
   uint64_t done = 0;
   reader.for_each(pictures, [&](const mcap::Channel&, const mcap::Message& message) {
@@ -248,6 +248,23 @@ core::Result<VideoReport> export_video(mcap::Reader& reader, const mcap::Selecti
                               " samples are not of this version's type and are not drawn");
   }
   if (report.pictures == 0) return core::Error{reader.file().string() + ": no picture of the part can be read"};
+  return report;
+}
+
+}  // namespace
+
+core::Result<VideoReport> export_video(mcap::Reader& reader, const mcap::Selection& part, const VideoOptions& options,
+                                       const std::filesystem::path& file) {
+  const auto channel = picture_channel(reader, options);
+  if (!channel.ok()) return channel.error();
+  const auto beside = core::draft_beside(file, ".mp4");  // FFmpeg makes what the name ends in
+  if (!beside.ok()) return beside.error();
+  const Draft draft(beside.value());
+  auto report = make_film(reader, part, options, channel.value(), draft.file());
+  if (!report.ok()) return report;
+  auto status = whole_mp4(draft.file(), file.string());
+  if (status.ok()) status = core::move_draft(draft.file(), file);
+  if (!status.ok()) return status.error();
   return report;
 }
 

@@ -25,7 +25,8 @@ struct VideoReport {
 };
 
 /// H.264 where OpenCV's FFmpeg has it, else MPEG-4. Runs as fast as the train did: a picture stands until the next one
-/// was taken. Error: no pictures, or the file cannot be written.
+/// was taken. Takes the file's place when it is whole, as MP4 whatever the name. Error: no pictures, or the file cannot
+/// be written; an older one is then as it was.
 core::Result<VideoReport> export_video(mcap::Reader& reader, const mcap::Selection& part, const VideoOptions& options,
                                        const std::filesystem::path& file);
 
