@@ -1,10 +1,55 @@
 #include "draft.hpp"
 
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <climits>
+#include <csignal>
+
 namespace railfix::tool {
+
+namespace {
+
+// For the handler, which may come in any thread and must not meet a text that is just being freed.
+std::array<char, PATH_MAX> living_name{};
+std::atomic<bool> lives{false};
+static_assert(std::atomic<bool>::is_always_lock_free);
+
+/// Ends the program as the signal does without us.
+void remove_and_end(int signal) {
+  if (lives) unlink(living_name.data());
+  std::signal(signal, SIG_DFL);
+  std::raise(signal);
+}
+
+/// Signals that somebody ignores for us (nohup) stay ignored.
+void handle_ends() {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    if (std::signal(signal, remove_and_end) == SIG_IGN) std::signal(signal, SIG_IGN);
+  }
+}
+
+}  // namespace
+
+Draft::Draft(std::filesystem::path file) : file_(std::move(file)) {
+  const auto& name = file_.native();
+  if (name.size() >= living_name.size()) return;  // no system call takes it
+  *std::ranges::copy(name, living_name.begin()).out = '\0';
+  lives = true;
+  handle_ends();
+}
 
 Draft::~Draft() {
   std::error_code failed;
   if (!kept_) std::filesystem::remove(file_, failed);
+  lives = false;
+}
+
+void Draft::keep() {
+  kept_ = true;
+  lives = false;
 }
 
 }  // namespace railfix::tool

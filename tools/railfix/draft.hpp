@@ -1,4 +1,4 @@
-// A file on its way to be one: it is gone again when the command fails before it is whole.
+// A file on its way to be one: gone again when the command fails or is ended (Ctrl-C, SIGTERM) before it is whole.
 #pragma once
 
 #include <filesystem>
@@ -7,13 +7,14 @@ namespace railfix::tool {
 
 class Draft {
  public:
-  explicit Draft(std::filesystem::path file) : file_(std::move(file)) {}
+  /// It need not be there yet. REQUIRES: no other one lives.
+  explicit Draft(std::filesystem::path file);
   /// Removes it, unless it was kept or moved.
   ~Draft();
   Draft(const Draft&) = delete;
   Draft& operator=(const Draft&) = delete;
 
-  void keep() { kept_ = true; }
+  void keep();
   [[nodiscard]] const std::filesystem::path& file() const { return file_; }
 
  private:

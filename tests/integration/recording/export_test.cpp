@@ -277,5 +277,23 @@ TEST_F(Export, AFilmThatIsCutIsToldAndTakesNoPlace) {
   EXPECT_EQ(files(), (std::set<std::string>{"ride.mcap", "ride.mp4"}));
 }
 
+TEST_F(Export, AFilmThatIsInterruptedLeavesTheOlderOneAlone) {
+  const auto mp4 = folder_ / "ride.mp4";
+  std::ofstream(mp4) << "old";
+  // A picture that stands for ten minutes: there is time to interrupt.
+  writer_ = mcap::Writer::create(folder_ / "long.mcap", {}).value();
+  for (const int i : {0, 15'000}) ride(i);
+  ASSERT_TRUE(writer_->close().ok());
+  for (const int signal : {SIGINT, SIGTERM}) {
+    test::Program film(
+        {"railfix", "recording", "export", (folder_ / "long.mcap").string(), "--mp4", mp4.string(), "--fps", "120"},
+        {folder_ / "log", {}, {}});
+    while (files().size() == 4 && !film.exit_code()) poll(nullptr, 0, 1);
+    EXPECT_EQ(film.end(signal), 128 + signal) << test::slurp(folder_ / "log");
+    EXPECT_EQ(test::slurp(mp4), "old");
+    EXPECT_EQ(files(), (std::set<std::string>{"log", "long.mcap", "ride.mcap", "ride.mp4"}));
+  }
+}
+
 }  // namespace
 }  // namespace railfix
