@@ -1,4 +1,6 @@
 // `railfix recording info`.
+#include <spdlog/fmt/fmt.h>
+
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -7,6 +9,7 @@
 #include "core/time.hpp"
 #include "mcap/check.hpp"
 #include "recording/sample_types.hpp"
+#include "recording/topic_summary.hpp"
 #include "recording/utc_text.hpp"
 
 namespace railfix::tool {
@@ -49,8 +52,28 @@ std::map<std::string, std::string> losses_of(const mcap::Reader& reader) {
   return losses;
 }
 
-double rate_hz(uint64_t messages, int64_t duration_ns) {
-  return messages < 2 || duration_ns <= 0 ? 0 : static_cast<double>(messages - 1) / core::seconds(duration_ns);
+/// By the index alone: when the topic was heard is not known.
+double rate_hz(const mcap::Channel& channel, uint64_t messages, const mcap::Statistics& statistics) {
+  const double length_s = core::seconds(statistics.end_ns - statistics.start_ns);
+  const uint64_t counted = periodic(channel) && messages > 1 ? messages - 1 : messages;
+  return length_s > 0 ? static_cast<double>(counted) / length_s : 0;
+}
+
+void add_content(ordered_json& topic, const Info& info, const mcap::Channel& channel) {
+  const auto found = info.check->channels.find(channel.id);
+  const bool heard = found != info.check->channels.end() && found->second.messages > 0;
+  const auto content = heard ? found->second : mcap::ChannelContent{};
+  const auto& statistics = info.reader->statistics();
+  const auto summary = heard ? summary_of(channel, content, {statistics.start_ns, statistics.end_ns}) : TopicSummary{};
+  topic["samples"] = content.messages;
+  topic["rate_hz"] = summary.rate_hz;
+  topic["bytes"] = content.bytes;
+  topic["longest_gap_s"] = summary.longest_gap_s;
+  topic["periodic"] = periodic(channel);
+  topic["begins_s"] = heard ? ordered_json(summary.begins_s) : ordered_json();
+  topic["ends_s"] = heard ? ordered_json(summary.ends_s) : ordered_json();
+  topic["begins_late"] = summary.begins_late;
+  topic["ends_early"] = summary.ends_early;
 }
 
 ordered_json topic_json(const Info& info, const mcap::Channel& channel) {
@@ -62,15 +85,8 @@ ordered_json topic_json(const Info& info, const mcap::Channel& channel) {
                      {"type", schema == info.reader->schemas().end() ? "" : schema->second.name},
                      {"latched", latched(channel)},
                      {"samples", messages},
-                     {"rate_hz", rate_hz(messages, statistics.end_ns - statistics.start_ns)}};
-  if (!info.check) return topic;
-  const auto content = info.check->channels.find(channel.id);
-  const mcap::ChannelContent none;
-  const auto& checked = content == info.check->channels.end() ? none : content->second;
-  topic["samples"] = checked.messages;
-  topic["rate_hz"] = rate_hz(checked.messages, checked.last_ns - checked.first_ns);
-  topic["bytes"] = checked.bytes;
-  topic["longest_gap_s"] = core::seconds(checked.longest_gap_ns);
+                     {"rate_hz", rate_hz(channel, messages, statistics)}};
+  if (info.check) add_content(topic, info, channel);
   return topic;
 }
 
@@ -101,13 +117,21 @@ ordered_json to_json(const Options& options, const Info& info) {
   return json;
 }
 
+std::string seconds_if(bool told, const ordered_json& value) {
+  return told ? fmt::format("{:.1f}", value.get<double>()) : "";
+}
+
+/// When a topic begins and ends stands there only where it is not with the recording.
 void print_topics(const ordered_json& topics, bool checked) {
-  std::printf("%-28s %9s %9s %s  %s\n", "topic", "samples", "rate Hz", checked ? "     MB    gap s" : "", "type");
+  std::printf("%-28s %9s %9s %s  %s\n", "topic", "samples", "rate Hz",
+              checked ? "     MB    gap s   from s     to s" : "", "type");
   for (const auto& topic : topics) {
     std::printf("%-28s %9llu %9.2f ", topic["topic"].get<std::string>().c_str(),
                 static_cast<unsigned long long>(topic["samples"].get<uint64_t>()), topic["rate_hz"].get<double>());
     if (checked) {
-      std::printf("%8.2f %8.2f", topic["bytes"].get<double>() / kBytesPerMb, topic["longest_gap_s"].get<double>());
+      std::printf("%8.2f %8.2f %8s %8s", topic["bytes"].get<double>() / kBytesPerMb,
+                  topic["longest_gap_s"].get<double>(), seconds_if(topic["begins_late"], topic["begins_s"]).c_str(),
+                  seconds_if(topic["ends_early"], topic["ends_s"]).c_str());
     }
     std::printf("  %s%s\n", topic["type"].get<std::string>().c_str(), topic["latched"].get<bool>() ? ", latched" : "");
   }

@@ -123,11 +123,25 @@ TEST_F(Export, InfoTellsWhatIsThereAndWhetherItIsWhole) {
   ASSERT_NE(pictures, topics.end());
   EXPECT_EQ((*pictures)["samples"], kPictures - 1);
   EXPECT_NEAR((*pictures)["longest_gap_s"].get<double>(), 0.08, 1e-6);
+  EXPECT_FALSE((*pictures)["ends_early"]);
 
   std::fstream(file(), std::ios::binary | std::ios::in | std::ios::out).seekp(3000).write("XXXX", 4);
   const auto damaged = recording({"info", file().string()});
   EXPECT_EQ(damaged.exit_code, 1);
   EXPECT_THAT(damaged.out, HasSubstr("check: PROBLEMS"));
+}
+
+TEST_F(Export, InfoTellsOfASensorThatDiedAndOneThatCameLate) {
+  writer_ = mcap::Writer::create(folder_ / "dead.mcap", {}).value();
+  msg::ImuSample imu;
+  for (int i = 0; i < 2000; ++i) write(topics::imu_sample, imu, "imu_sample", i * 10'000'000);
+  msg::WheelSample wheel;
+  for (int i = 0; i <= 3000; ++i) write(topics::wheel_sample, wheel, "wheel_sample", 30'000'000'000 + i * 10'000'000);
+  ASSERT_TRUE(writer_->close().ok());
+  const auto info = recording({"info", (folder_ / "dead.mcap").string()});
+  ASSERT_EQ(info.exit_code, 0) << info.err;
+  EXPECT_THAT(info.out, ::testing::ContainsRegex("imu_sample +2000 +100.00 +[0-9.]+ +40.01 +20.0 +railfix"));
+  EXPECT_THAT(info.out, ::testing::ContainsRegex("wheel_sample +3001 +100.00 +[0-9.]+ +30.00 +30.0 +railfix"));
 }
 
 TEST_F(Export, ARecordingWithoutSamplesHasNoBeginning) {
