@@ -45,8 +45,10 @@ core::Result<std::unique_ptr<Writer>> Writer::create(const std::filesystem::path
   writer->descriptor_ = ::open(writer->active_.c_str(), flags, 0644);
   if (writer->descriptor_ < 0) {
     if (errno == EEXIST) {
-      return core::Error{writer->active_.string() +
-                         " exists: another recorder writes it or an earlier one was cut off; recover or remove it"};
+      return core::Error{
+          writer->active_.string() +
+          " exists: another process writes it or an earlier one was cut off; `railfix recording repair` makes a proper "
+          "file of that, or remove it"};
     }
     return io_error("cannot be created; does the folder exist and may this user write there?", writer->active_);
   }

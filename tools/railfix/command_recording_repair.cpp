@@ -5,6 +5,9 @@
 #include "command_recording.hpp"
 #include "core/result.hpp"
 #include "mcap/reader.hpp"
+#include "output_file.hpp"
+#include "recording/copier.hpp"
+#include "recording/repair.hpp"
 
 namespace railfix::tool {
 
@@ -35,11 +38,16 @@ int repair(const Options& options) {
     return 0;
   }
   const fs::path out = options.out.empty() ? mcap::recovered_name(options.file) : options.out;
+  check_output("--out", out, {options.file});
   if (fs::exists(out)) throw BadInput(out.string() + " exists already; give another name with --out, or remove it");
-  for (const auto& problem : core::value_or_throw(mcap::recover(options.file, out))) std::cerr << problem << '\n';
-  const auto repaired = core::value_or_throw(mcap::Reader::open(out));
-  std::cout << out.string() << ": " << repaired->statistics().messages << " samples of " << repaired->channels().size()
-            << " topics\n";
+  std::error_code failed;
+  if (fs::equivalent(draft_of(out), options.file, failed)) {
+    throw BadInput("the draft of " + out.string() + " would be " + options.file.string() +
+                   ", which is read; give another name with --out");
+  }
+  const auto report = core::value_or_throw(repair_recording(options.file, out));
+  for (const auto& problem : report.problems) std::cerr << problem << '\n';
+  std::cout << out.string() << ": " << report.samples << " samples of " << report.topics << " topics\n";
   return 0;
 }
 

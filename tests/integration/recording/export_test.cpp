@@ -309,5 +309,63 @@ TEST_F(Export, AFilmThatIsInterruptedLeavesTheOlderOneAlone) {
   }
 }
 
+/// A long recording, and the same cut off.
+class LongRecording : public Export {
+ protected:
+  void SetUp() override {
+    Export::SetUp();
+    writer_ = mcap::Writer::create(long_, {}).value();
+    const msg::ImuSample imu;
+    for (int i = 0; i < 300'000; ++i) write(topics::imu_sample, imu, "imu_sample", i * 10'000'000L);
+    ASSERT_TRUE(writer_->close().ok());
+    fs::copy_file(long_, damaged_);
+    fs::resize_file(damaged_, fs::file_size(damaged_) - 100);
+    here_ = files();
+  }
+  [[nodiscard]] std::vector<std::vector<std::string>> commands() const {
+    return {{"cut", long_, "--to", "10000", "--out", out_},
+            {"merge", long_, file(), "--out", out_},
+            {"repair", damaged_, "--out", out_}};
+  }
+
+  fs::path long_ = folder_ / "long.mcap";
+  fs::path damaged_ = folder_ / "damaged.mcap";
+  fs::path out_ = folder_ / "out.mcap";
+  std::set<std::string> here_;
+};
+
+TEST_F(LongRecording, NothingIsLeftOfACopyThatFindsNoRoom) {
+  for (const auto& command : commands()) {
+    std::string line;
+    for (const auto& word : command) line += word + " ";
+    const auto full = recording_in(100, line);
+    EXPECT_EQ(full.exit_code, 2) << full.out;
+    EXPECT_THAT(full.err, HasSubstr("out.mcap.active: cannot be written; is the disk full? (File too large)"));
+    EXPECT_EQ(files(), here_) << line;
+  }
+}
+
+TEST_F(LongRecording, NothingIsLeftOfACopyThatIsInterrupted) {
+  for (auto command : commands()) {
+    for (const int signal : {SIGINT, SIGTERM}) {
+      auto arguments = command;
+      arguments.insert(arguments.begin(), {"railfix", "recording"});
+      test::Program copy(arguments);
+      while (!fs::exists(folder_ / "out.mcap.active") && !copy.exit_code()) poll(nullptr, 0, 1);
+      EXPECT_EQ(copy.end(signal), 128 + signal) << command.front();
+      EXPECT_EQ(files(), here_) << command.front();
+    }
+  }
+}
+
+TEST_F(LongRecording, RepairDoesNotWriteOverWhatItReads) {
+  const fs::path active = folder_ / "run.mcap.active";
+  fs::copy_file(damaged_, active);
+  const auto refused = recording({"repair", active, "--out", folder_ / "run.mcap"});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("would be " + active.string() + ", which is read; give another name with --out"));
+  EXPECT_EQ(fs::file_size(active), fs::file_size(damaged_));
+}
+
 }  // namespace
 }  // namespace railfix

@@ -8,6 +8,7 @@
 #include "mcap/check.hpp"
 #include "mcap/writer.hpp"
 #include "messaging/topics.hpp"
+#include "recording/repair.hpp"
 #include "recording/standing_values.hpp"
 
 namespace railfix::tool {
@@ -163,6 +164,35 @@ TEST_F(Copy, LossesAddUp) {
   ASSERT_TRUE(merge_recordings({a_, b_}, out_).ok());
   const auto reader = mcap::Reader::open(out_).value();
   EXPECT_THAT(reader->metadata(), ::testing::Contains(mcap::Metadata{"railfix_losses", {{"imu_sample queue", "7"}}}));
+}
+
+TEST_F(Copy, WhatAKilledOneLeftIsNamedAndStays) {
+  Recorded(a_, "t").step(1);
+  Recorded(b_, "t").step(2);
+  const fs::path left = out_.string() + ".active";
+  fs::copy_file(a_, left);
+  constexpr double kAll = std::numeric_limits<double>::infinity();
+  for (const auto& error : {cut_recording(a_, out_, {0, kAll, {}, {}}).error(),
+                            merge_recordings({a_, b_}, out_).error(), repair_recording(a_, out_).error()}) {
+    EXPECT_THAT(error.message, HasSubstr(left.string() +
+                                         " was left by a recorder, cut, merge or repair that was killed; "
+                                         "remove it, or save what is in it with `railfix recording repair " +
+                                         left.string() + "` before"));
+  }
+  EXPECT_EQ(fs::file_size(left), fs::file_size(a_));
+  EXPECT_FALSE(fs::exists(out_));
+  ASSERT_TRUE(repair_recording(left, folder_ / "saved.mcap").ok());
+  EXPECT_THAT(content(folder_ / "saved.mcap"), ElementsAre("odometry_step@1"));
+}
+
+TEST_F(Copy, WhatIsBeingWrittenIsLeftToItsWriter) {
+  Recorded(a_, "t").step(1);
+  const auto writer = mcap::Writer::create(out_, {}).value();
+  const auto refused = cut_recording(a_, out_, {0, 1, {}, {}});
+  ASSERT_FALSE(refused.ok());
+  EXPECT_THAT(refused.error().message, HasSubstr(out_.string() + ".active is being written by another process"));
+  EXPECT_TRUE(writer->close().ok());
+  EXPECT_TRUE(fs::exists(out_));
 }
 
 TEST_F(Copy, OneRecordingIsOneTrains) {

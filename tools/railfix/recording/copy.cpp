@@ -1,10 +1,9 @@
 #include "recording/copy.hpp"
 
 #include <algorithm>
-#include <memory>
 #include <unordered_set>
 
-#include "mcap/writer.hpp"
+#include "recording/copier.hpp"
 #include "recording/part_in_time.hpp"
 #include "recording/standing_values.hpp"
 
@@ -16,52 +15,6 @@ namespace fs = std::filesystem;
 
 constexpr const char* kAbout = "railfix";
 constexpr const char* kLosses = "railfix_losses";
-
-/// Writes messages of other recordings under new ids.
-class Copier {
- public:
-  static core::Result<std::unique_ptr<Copier>> create(const fs::path& out) {
-    mcap::WriterOptions options;
-    options.library = "railfix recording";
-    options.sync_period_s = 0;
-    options.chunk_age_s = 0;
-    auto writer = mcap::Writer::create(out, options);
-    if (!writer.ok()) return writer.error();
-    return std::unique_ptr<Copier>(new Copier(std::move(writer).value()));
-  }
-  core::Status write(const mcap::Reader& from, const mcap::Channel& channel, mcap::Message message) {
-    const auto id = id_of(from, channel);
-    if (!id.ok()) return id.error();
-    message.channel_id = id.value();
-    return writer_->write(message);
-  }
-  core::Status write(const mcap::Metadata& metadata) { return writer_->write_metadata(metadata); }
-  core::Status close() { return writer_->close(); }
-  [[nodiscard]] size_t topics() const { return topics_.size(); }
-
- private:
-  explicit Copier(std::unique_ptr<mcap::Writer> writer) : writer_(std::move(writer)) {}
-
-  core::Result<uint16_t> id_of(const mcap::Reader& from, const mcap::Channel& channel) {
-    const auto known = ids_.find({&from, channel.id});
-    if (known != ids_.end()) return known->second;
-    uint16_t schema_id = 0;
-    if (const auto schema = from.schemas().find(channel.schema_id); schema != from.schemas().end()) {
-      const auto added = writer_->add_schema(schema->second.name, schema->second.encoding, schema->second.data);
-      if (!added.ok()) return added.error();
-      schema_id = added.value();
-    }
-    auto added = writer_->add_channel(schema_id, channel.topic, channel.message_encoding, channel.metadata);
-    if (!added.ok()) return added;
-    topics_.insert(channel.topic);
-    ids_[{&from, channel.id}] = added.value();
-    return added;
-  }
-
-  std::unique_ptr<mcap::Writer> writer_;
-  std::map<std::pair<const mcap::Reader*, uint16_t>, uint16_t> ids_;
-  std::set<std::string> topics_;
-};
 
 bool named(const std::vector<std::string>& names, const std::string& topic) {
   return std::ranges::any_of(names,
@@ -85,11 +38,8 @@ core::Result<std::set<std::string>> chosen_topics(const mcap::Reader& reader, co
 }
 
 void note_problems(const mcap::Reader& reader, CopyReport& report) {
-  report.problems.insert(report.problems.end(), reader.problems().begin(), reader.problems().end());
-  if (reader.statistics().attachments > 0) {
-    report.problems.push_back(reader.file().string() + ": its " + std::to_string(reader.statistics().attachments) +
-                              " attachments are left out");
-  }
+  const auto problems = problems_of(reader);
+  report.problems.insert(report.problems.end(), problems.begin(), problems.end());
 }
 
 core::Result<mcap::Selection> part_of(const mcap::Reader& reader, const CutOptions& options) {
