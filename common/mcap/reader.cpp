@@ -150,11 +150,13 @@ bool Reader::scan(const GoesOn& goes_on) {
     const uint64_t length = decoder.u64();
     const bool whole = decoder.ok() && length <= size - offset - kRecordHeadBytes;
     const auto content = whole ? bytes_->read(offset + kRecordHeadBytes, length) : std::nullopt;
+    if (!content || opcode == 0) unread_bytes_ += size - offset;
     if (!content || opcode == 0) {
       problem("ends in the middle of a record at byte " + std::to_string(offset) + " of " + std::to_string(size));
       return true;
     }
     if (!scan_record(opcode, offset, *content)) {
+      unread_bytes_ += kRecordHeadBytes + length;
       problem("the record at byte " + std::to_string(offset) + " is damaged and left out");
     }
     if (opcode == static_cast<uint8_t>(Opcode::data_end)) return true;
@@ -218,25 +220,22 @@ bool Reader::scan_record(uint8_t opcode, uint64_t offset, ByteView content) {
 }
 
 std::optional<Bytes> Reader::load(const ChunkPlace& place) {
-  const std::string what = "the chunk at byte " + std::to_string(place.offset);
-  auto record = bytes_->read(place.offset, place.length);
-  if (!record || record->size() < kRecordHeadBytes) {
-    problem(what + " is not in the file; its messages are missing");
+  const auto lost = [&](const std::string& why) {
+    problem("the chunk at byte " + std::to_string(place.offset) + " " + why + "; its messages are missing");
+    lost_chunks_[place.offset] = place.length;
     return std::nullopt;
-  }
+  };
+  auto record = bytes_->read(place.offset, place.length);
+  if (!record || record->size() < kRecordHeadBytes) return lost("is not in the file");
   if (place.loose) return record;
   ChunkHead head;
   ByteView stored;
   if (record->front() != static_cast<uint8_t>(Opcode::chunk) ||
       !parse(ByteView(*record).subspan(kRecordHeadBytes), head, stored)) {
-    problem(what + " is damaged; its messages are missing");
-    return std::nullopt;
+    return lost("is damaged");
   }
   auto records = chunk_records(head, stored);
-  if (!records.ok()) {
-    problem(what + " cannot be used, " + records.error().message + "; its messages are missing");
-    return std::nullopt;
-  }
+  if (!records.ok()) return lost("cannot be used, " + records.error().message);
   return std::move(records).value();
 }
 

@@ -69,6 +69,9 @@ class Reader {
   /// A sentence for everything that is missing or damaged, as far as it was met. Messages add to it while they are
   /// read.
   [[nodiscard]] const std::vector<std::string>& problems() const { return problems_; }
+  /// Chunks that were wanted and cannot be used (their bytes by their place), and bytes that are no whole record.
+  [[nodiscard]] const std::map<uint64_t, uint64_t>& lost_chunks() const { return lost_chunks_; }
+  [[nodiscard]] uint64_t unread_bytes() const { return unread_bytes_; }
   [[nodiscard]] const std::map<uint16_t, Schema>& schemas() const { return schemas_; }
   [[nodiscard]] const std::map<uint16_t, Channel>& channels() const { return channels_; }
   [[nodiscard]] const std::vector<Metadata>& metadata() const { return metadata_; }
@@ -104,6 +107,8 @@ class Reader {
   std::vector<Metadata> metadata_;
   std::vector<ChunkPlace> places_;
   Statistics statistics_;
+  std::map<uint64_t, uint64_t> lost_chunks_;
+  uint64_t unread_bytes_ = 0;
 };
 
 /// Goes through a recording; holds only the chunks that overlap the present time in memory.

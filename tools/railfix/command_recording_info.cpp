@@ -90,17 +90,29 @@ ordered_json topic_json(const Info& info, const mcap::Channel& channel) {
   return topic;
 }
 
+/// Those that are there, so that the topics' add up to them.
+uint64_t samples_of(const Info& info) {
+  if (!info.check) return info.reader->statistics().messages;
+  uint64_t samples = 0;
+  for (const auto& [id, channel] : info.reader->channels()) {
+    const auto content = info.check->channels.find(id);
+    if (content != info.check->channels.end()) samples += content->second.messages;
+  }
+  return samples;
+}
+
 ordered_json to_json(const Options& options, const Info& info) {
   const auto& statistics = info.reader->statistics();
   const auto when = [&](int64_t ns) { return statistics.messages > 0 ? ordered_json(utc_text(ns)) : ordered_json(); };
+  const auto by_index = info.reader->indexed() ? ordered_json(statistics.messages) : ordered_json();
   ordered_json json{
       {"file", options.file.string()},    {"bytes", fs::file_size(options.file)},
       {"closed", info.reader->indexed()}, {"from", when(statistics.start_ns)},
       {"to", when(statistics.end_ns)},    {"from_ns", statistics.start_ns},
       {"to_ns", statistics.end_ns},       {"duration_s", core::seconds(statistics.end_ns - statistics.start_ns)},
-      {"samples", statistics.messages},   {"chunks", statistics.chunks},
-      {"topics", ordered_json::array()},  {"lost", losses_of(*info.reader)},
-      {"metadata", ordered_json::array()}};
+      {"samples", samples_of(info)},      {"samples_by_index", by_index},
+      {"chunks", statistics.chunks},      {"topics", ordered_json::array()},
+      {"lost", losses_of(*info.reader)},  {"metadata", ordered_json::array()}};
   std::multimap<std::string, ordered_json> by_name;
   for (const auto& [id, channel] : info.reader->channels()) by_name.emplace(channel.topic, topic_json(info, channel));
   for (const auto& [name, topic] : by_name) json["topics"].push_back(topic);
@@ -137,15 +149,23 @@ void print_topics(const ordered_json& topics, bool checked) {
   }
 }
 
+std::string amount_of(const ordered_json& json) {
+  const auto samples = json["samples"].get<uint64_t>();
+  const auto chunks = json["chunks"].get<uint64_t>();
+  const auto& by_index = json["samples_by_index"];
+  if (by_index.is_null() || by_index == samples) return fmt::format("{} samples in {} chunks", samples, chunks);
+  return fmt::format("{} samples can be counted; by its index there were {} in {} chunks", samples,
+                     by_index.get<uint64_t>(), chunks);
+}
+
 void print(const ordered_json& json) {
   std::printf("%s: %.1f MB, %s\n", json["file"].get<std::string>().c_str(), json["bytes"].get<double>() / kBytesPerMb,
               json["closed"].get<bool>() ? "closed properly" : "NOT closed properly");
   if (json["from"].is_null()) {
     std::printf("no samples\n\n");
   } else {
-    std::printf("from %s, %.1f s, %llu samples in %llu chunks\n\n", json["from"].get<std::string>().c_str(),
-                json["duration_s"].get<double>(), static_cast<unsigned long long>(json["samples"].get<uint64_t>()),
-                static_cast<unsigned long long>(json["chunks"].get<uint64_t>()));
+    std::printf("from %s, %.1f s, %s\n\n", json["from"].get<std::string>().c_str(), json["duration_s"].get<double>(),
+                amount_of(json).c_str());
   }
   print_topics(json["topics"], json.contains("check"));
   std::printf("\n");

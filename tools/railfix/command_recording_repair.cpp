@@ -28,6 +28,16 @@ bool sound(mcap::Reader& reader) {
   return reader.problems().empty();
 }
 
+std::string counted(uint64_t count, const std::string& what) {
+  return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
+}
+
+std::string missing(const RepairReport& report) {
+  const auto samples = report.lost_samples ? counted(*report.lost_samples, "sample") : "nobody knows how many samples";
+  return samples + ", " + counted(report.lost_chunks, "chunk") + ", " + counted(report.skipped_bytes, "byte") +
+         " that cannot be read";
+}
+
 int repair(const Options& options) {
   const auto reader = core::value_or_throw(mcap::Reader::open(options.file));
   if (mcap::being_written(options.file)) {
@@ -47,7 +57,8 @@ int repair(const Options& options) {
   }
   const auto report = core::value_or_throw(repair_recording(options.file, out));
   for (const auto& problem : report.problems) std::cerr << problem << '\n';
-  std::cout << out.string() << ": " << report.samples << " samples of " << report.topics << " topics\n";
+  std::cout << out.string() << ": " << report.samples << " samples of " << report.topics
+            << " topics; missing: " << missing(report) << '\n';
   return 0;
 }
 

@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 #include <opencv2/videoio.hpp>
+#include <random>
 #include <set>
 
 #include "cdr/types.hpp"
@@ -315,8 +316,12 @@ class LongRecording : public Export {
   void SetUp() override {
     Export::SetUp();
     writer_ = mcap::Writer::create(long_, {}).value();
-    const msg::ImuSample imu;
-    for (int i = 0; i < 300'000; ++i) write(topics::imu_sample, imu, "imu_sample", i * 10'000'000L);
+    const auto channel = writer_->add_channel(0, "imu_sample", "cdr", {}).value();
+    mcap::Bytes noise(60);
+    for (int64_t i = 0; i < 300'000; ++i) {
+      for (auto& byte : noise) byte = static_cast<uint8_t>(random_());
+      ASSERT_TRUE(writer_->write({channel, 1, kBegin + i * 10'000'000, kBegin + i * 10'000'000, noise}).ok());
+    }
     ASSERT_TRUE(writer_->close().ok());
     fs::copy_file(long_, damaged_);
     fs::resize_file(damaged_, fs::file_size(damaged_) - 100);
@@ -332,6 +337,7 @@ class LongRecording : public Export {
   fs::path damaged_ = folder_ / "damaged.mcap";
   fs::path out_ = folder_ / "out.mcap";
   std::set<std::string> here_;
+  std::minstd_rand random_;
 };
 
 TEST_F(LongRecording, NothingIsLeftOfACopyThatFindsNoRoom) {
@@ -356,6 +362,26 @@ TEST_F(LongRecording, NothingIsLeftOfACopyThatIsInterrupted) {
       EXPECT_EQ(files(), here_) << command.front();
     }
   }
+}
+
+TEST_F(LongRecording, WhatIsMissingIsToldAndAddsUp) {
+  std::fstream(long_, std::ios::binary | std::ios::in | std::ios::out)
+      .seekp(static_cast<std::streamoff>(fs::file_size(long_) / 2))
+      .write("XXXXXXXX", 8);
+  const auto info = recording({"info", long_, "--json"});
+  EXPECT_EQ(info.exit_code, 1);
+  const auto json = nlohmann::json::parse(info.out);
+  EXPECT_EQ(json["samples_by_index"], 300'000);
+  EXPECT_LT(json["samples"], 300'000);
+  EXPECT_EQ(json["samples"], json["topics"][0]["samples"]);
+  EXPECT_THAT(recording({"info", long_}).out, HasSubstr(" samples can be counted; by its index there were 300000 in "));
+
+  const auto repaired = recording({"repair", long_, "--out", out_});
+  ASSERT_EQ(repaired.exit_code, 0) << repaired.err;
+  const auto lost = 300'000 - json["samples"].get<int>();
+  EXPECT_THAT(repaired.out, HasSubstr("; missing: " + std::to_string(lost) + " samples, 1 chunk, "));
+  EXPECT_THAT(recording({"info", out_}).out, HasSubstr("railfix_repair: file=long.mcap lost_chunks=1 lost_samples=" +
+                                                       std::to_string(lost) + " skipped_bytes="));
 }
 
 TEST_F(LongRecording, RepairDoesNotWriteOverWhatItReads) {

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <unistd.h>
 
+#include <fstream>
 #include <limits>
 
 #include "mcap/check.hpp"
@@ -193,6 +194,50 @@ TEST_F(Copy, WhatIsBeingWrittenIsLeftToItsWriter) {
   EXPECT_THAT(refused.error().message, HasSubstr(out_.string() + ".active is being written by another process"));
   EXPECT_TRUE(writer->close().ok());
   EXPECT_TRUE(fs::exists(out_));
+}
+
+std::map<std::string, std::string> trace_in(const fs::path& file) {
+  const auto reader = mcap::Reader::open(file).value();
+  for (const auto& metadata : reader->metadata()) {
+    if (metadata.name == "railfix_repair") return metadata.entries;
+  }
+  return {};
+}
+
+TEST_F(Copy, ARepairedOneSaysWhatIsMissing) {
+  // One chunk for each step.
+  mcap::WriterOptions options;
+  options.chunk_bytes = 1;
+  auto writer = mcap::Writer::create(a_, options).value();
+  const auto id = writer->add_channel(0, "odometry_step", "cdr", {}).value();
+  std::vector<uint64_t> ends;
+  for (int i = 0; i < 4; ++i) {
+    ASSERT_TRUE(writer->write({id, 1, i * kSecond, i * kSecond, mcap::Bytes(100, 7)}).ok());
+    ends.push_back(writer->bytes_written());
+  }
+  ASSERT_TRUE(writer->close().ok());
+
+  fs::copy_file(a_, b_);
+  std::fstream(b_, std::ios::binary | std::ios::in | std::ios::out)
+      .seekp(static_cast<std::streamoff>(ends[1]) + 30)
+      .write("XXXXXXXX", 8);
+  const auto repaired = repair_recording(b_, out_);
+  ASSERT_TRUE(repaired.ok()) << repaired.error().message;
+  EXPECT_EQ(repaired.value().lost_samples, 1U);
+  EXPECT_THAT(content(out_), ElementsAre("odometry_step@0", "odometry_step@1", "odometry_step@3"));
+  auto trace = trace_in(out_);
+  EXPECT_EQ(trace["file"], "b.mcap");
+  EXPECT_EQ(trace["lost_chunks"], "1");
+  EXPECT_EQ(trace["lost_samples"], "1");
+  EXPECT_EQ(trace["skipped_bytes"], std::to_string(repaired.value().skipped_bytes));
+  EXPECT_GT(repaired.value().skipped_bytes, 50U);
+
+  fs::resize_file(b_, ends[2] + 20);
+  ASSERT_TRUE(repair_recording(b_, folder_ / "cut.mcap").ok());
+  trace = trace_in(folder_ / "cut.mcap");
+  EXPECT_EQ(trace["lost_chunks"], "1");
+  EXPECT_FALSE(trace.contains("lost_samples")) << "the index is gone";
+  EXPECT_EQ(std::stoull(trace["skipped_bytes"]), repaired.value().skipped_bytes + 20);
 }
 
 TEST_F(Copy, OneRecordingIsOneTrains) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,10 +13,13 @@ namespace railfix::tool {
 struct RepairReport {
   uint64_t samples = 0;
   size_t topics = 0;
-  std::vector<std::string> problems;  // a sentence each
+  size_t lost_chunks = 0;
+  uint64_t skipped_bytes = 0;            // those of the lost chunks, too
+  std::optional<uint64_t> lost_samples;  // nothing: the index that counted them is gone
+  std::vector<std::string> problems;     // a sentence each
 };
 
-/// The damaged one is left as it is.
+/// The damaged one is left as it is. The new file says in its metadata (railfix_repair) what of it is missing.
 core::Result<RepairReport> repair_recording(const std::filesystem::path& damaged, const std::filesystem::path& out);
 
 }  // namespace railfix::tool
