@@ -73,7 +73,18 @@ void write_film(mcap::Reader& reader, const mcap::Selection& part, const Options
             << " Hz of " << report.pictures << " pictures, both rails drawn in " << report.with_rails << '\n';
 }
 
-/// The tables of a topic have the names that those of a run have, and other columns.
+/// Tables of a run have the names that ours have, and other columns; of what is left of another recording or another
+/// part nobody could tell that it belongs to that.
+void check_tables(const fs::path& folder, const fs::path& recording) {
+  std::error_code none;  // it is made then
+  for (const auto& entry : fs::directory_iterator(folder, none)) {
+    if (entry.path().extension() != ".csv") continue;
+    throw core::BadInput("--csv " + folder.string() + " holds " + entry.path().filename().string() +
+                         " already, which would be mixed with the tables of " + recording.string() +
+                         "; give an empty folder, or remove the tables there");
+  }
+}
+
 void check_outputs(const Options& options) {
   check_output("--gpx", options.gpx, {options.file});
   check_output("--geojson", options.geojson, {options.file});
@@ -83,6 +94,7 @@ void check_outputs(const Options& options) {
     throw core::BadInput("--csv " + options.csv.string() +
                          " is the folder of a run, whose tables have the same names; give another folder");
   }
+  if (!options.csv.empty()) check_tables(options.csv, options.file);
 }
 
 int run(const Options& options) {
@@ -111,7 +123,7 @@ void add_recording_export(CLI::App& recording, Action& chosen) {
       "A recording as tables, as a track for maps, or as a film with the rails drawn, e.g. railfix recording export "
       "run.mcap --gpx run.gpx --mp4 run.mp4");
   command->add_option("file", options->file, "The recording")->required();
-  command->add_option("--csv", options->csv, "Folder for a table of each topic");
+  command->add_option("--csv", options->csv, "Folder for a table of each topic, without tables yet");
   command->add_option("--gpx", options->gpx, "File for the track as GPX; /dev/stdout = standard output");
   command->add_option("--geojson", options->geojson,
                       "File for the track with its confidence intervals as GeoJSON, as --gpx");

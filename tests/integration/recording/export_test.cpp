@@ -170,13 +170,27 @@ TEST_F(Export, TablesHaveAColumnForEachMember) {
 
 TEST_F(Export, TablesThatAreCutAreNamed) {
   const auto folder = folder_ / "csv";
-  fs::create_directories(folder);
-  fs::create_symlink("/dev/full", folder / "train_state.csv");
-  const auto exported = recording({"export", file().string(), "--csv", folder.string()});
+  const auto exported = recording_in(1, "export " + file().string() + " --topics train_state --csv " + folder.string());
   EXPECT_EQ(exported.exit_code, 2) << exported.out;
-  EXPECT_THAT(exported.err, HasSubstr("the tables in " + folder.string() + " are cut: cannot write " +
-                                      (folder / "train_state.csv").string() +
-                                      " to its end (No space left on device); make space there"));
+  EXPECT_THAT(exported.err,
+              HasSubstr("the tables in " + folder.string() + " are cut: cannot write " +
+                        (folder / "train_state.csv").string() + " to its end (File too large); give another place"));
+}
+
+TEST_F(Export, TablesOfTwoRecordingsAreNotMixed) {
+  const auto folder = folder_ / "csv";
+  fs::create_directories(folder);
+  std::ofstream(folder / "notes.txt") << "mine";
+  ASSERT_EQ(recording({"export", file().string(), "--topics", "train_state", "--csv", folder.string()}).exit_code, 0)
+      << "files of other kinds may be there";
+  const auto other = folder_ / "other.mcap";
+  fs::copy_file(file(), other);
+  const auto refused = recording({"export", other.string(), "--topics", "track_view", "--csv", folder.string()});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_EQ(refused.err, "railfix: --csv " + folder.string() +
+                             " holds train_state.csv already, which would be mixed with the tables of " +
+                             other.string() + "; give an empty folder, or remove the tables there\n");
+  EXPECT_FALSE(fs::exists(folder / "track_view.csv"));
 }
 
 TEST_F(Export, MapsGetTheTrackWithItsConfidence) {
