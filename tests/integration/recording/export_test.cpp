@@ -74,6 +74,8 @@ class Export : public ::testing::Test {
     state.speed_mps(20);
     state.over_m(6);
     state.under_m(4);
+    state.integrity(integrity_);
+    state.sources(msg::SOURCE_CAMERA | msg::SOURCE_WHEEL);
     state.lat_deg(47 + 0.8 * i / 111195);
     state.lon_deg(8);
     write(topics::train_state, state, "train_state", time_ns);
@@ -108,6 +110,7 @@ class Export : public ::testing::Test {
 
   fs::path folder_ = fs::temp_directory_path() / ("railfix-export-" + std::to_string(::getpid()));
   std::unique_ptr<mcap::Writer> writer_;
+  uint8_t integrity_ = msg::INTEGRITY_OK;
 };
 
 TEST_F(Export, InfoTellsWhatIsThereAndWhetherItIsWhole) {
@@ -218,6 +221,40 @@ TEST_F(Export, MapsGetTheTrackWithItsConfidence) {
   const auto nowhere = recording({"export", file().string(), "--gpx", gpx.string(), "--to", "0.1"});
   EXPECT_EQ(nowhere.exit_code, 2);
   EXPECT_THAT(nowhere.err, HasSubstr("does not say in this part where on the Earth the train was"));
+}
+
+TEST_F(Export, MapsTellPlacesThatMustNotBeUsed) {
+  writer_ = mcap::Writer::create(folder_ / "lost.mcap", {}).value();
+  for (int i = 5; i < 35; ++i) {
+    integrity_ = i < 15 ? msg::INTEGRITY_OK : i < 25 ? msg::INTEGRITY_UNUSABLE : msg::INTEGRITY_DEGRADED;
+    ride(i);
+  }
+  ASSERT_TRUE(writer_->close().ok());
+  const auto gpx = folder_ / "ride.gpx";
+  const auto geojson = folder_ / "ride.geojson";
+  ASSERT_EQ(recording({"export", folder_ / "lost.mcap", "--gpx", gpx, "--geojson", geojson}).exit_code, 0);
+  const auto text = test::slurp(gpx);
+  const auto unusable = text.find("<name>train, unusable</name>");
+  ASSERT_NE(unusable, std::string::npos);
+  const auto places = [](const std::string& part) {
+    size_t count = 0;
+    for (auto at = part.find("<trkpt"); at != std::string::npos; at = part.find("<trkpt", at + 1)) ++count;
+    return count;
+  };
+  EXPECT_EQ(places(text.substr(0, unusable)), 20U);
+  EXPECT_EQ(places(text.substr(unusable)), 10U);
+  const auto usable = text.substr(0, unusable);
+  EXPECT_NE(usable.find("<trkseg>"), usable.rfind("<trkseg>")) << "no line over the unusable part";
+
+  const auto features = nlohmann::json::parse(test::slurp(geojson))["features"];
+  std::vector<std::pair<std::string, size_t>> lines;
+  for (const auto& feature : features) {
+    if (feature["properties"]["name"] != "train") continue;
+    lines.emplace_back(feature["properties"]["integrity"], feature["geometry"]["coordinates"][0].size());
+  }
+  const std::vector<std::pair<std::string, size_t>> expected{{"ok", 10}, {"degraded", 10}, {"unusable", 12}};
+  EXPECT_EQ(lines, expected) << "the unusable line reaches from the last usable place to the next";
+  EXPECT_EQ(features.back()["properties"]["integrity"], "degraded");
 }
 
 TEST_F(Export, APartIsNamedThatTheRecordingHas) {

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -27,8 +28,11 @@ constexpr int64_t kIntervalEveryNs = core::kNsPerSecond;
 constexpr double kMetresPerDegree = 111'195;   // of latitude, on a sphere of 6371 km
 constexpr double kLongestIntervalM = 100'000;  // what is longer says nothing on a map
 
-void add(std::vector<std::vector<TrackPoint>>& lines, const TrackPoint& point, int64_t break_ns) {
-  const bool begins = lines.empty() || std::abs(point.stamp_ns - lines.back().back().stamp_ns) > break_ns;
+using Lines = std::vector<std::vector<TrackPoint>>;
+
+void add(Lines& lines, const TrackPoint& point, int64_t break_ns) {
+  const bool begins = lines.empty() || std::abs(point.stamp_ns - lines.back().back().stamp_ns) > break_ns ||
+                      point.integrity != lines.back().back().integrity;
   if (begins) lines.emplace_back();
   if (!begins && point.stamp_ns == lines.back().back().stamp_ns) {
     lines.back().back() = point;
@@ -43,8 +47,7 @@ void take_state(const ordered_json& state, RecordedTrack& track) {
   if (state.at("track_known") == 0 || !std::isfinite(value("lat_deg")) || !std::isfinite(value("lon_deg"))) return;
   add(track.train,
       {state.at("stamp_ns"), value("lat_deg"), value("lon_deg"), kUnknown, value("heading_rad"), value("speed_mps"),
-       value("over_m"), value("under_m"), state.at("edge"), value("offset_m"),
-       state.at("integrity") != msg::INTEGRITY_OK},
+       value("over_m"), value("under_m"), state.at("edge"), value("offset_m"), state.at("integrity")},
       kBreakNs);
 }
 
@@ -53,11 +56,19 @@ void take_fix(const ordered_json& fix, RecordedTrack& track) {
   if (fix.at("fix") == msg::GNSS_NONE || !std::isfinite(value("lat_deg")) || !std::isfinite(value("lon_deg"))) return;
   add(track.gnss,
       {fix.at("stamp_ns"), value("lat_deg"), value("lon_deg"), value("alt_m"), kUnknown, kUnknown, kUnknown, kUnknown,
-       0, 0, false},
+       0, 0, msg::INTEGRITY_OK},
       kGnssBreakNs);
 }
 
-void write_gpx_track(std::ostringstream& gpx, const char* name, const std::vector<std::vector<TrackPoint>>& lines) {
+Lines lines_of(const Lines& all, bool usable) {
+  Lines lines;
+  for (const auto& line : all) {
+    if ((line.front().integrity < msg::INTEGRITY_UNUSABLE) == usable) lines.push_back(line);
+  }
+  return lines;
+}
+
+void write_gpx_track(std::ostringstream& gpx, const char* name, const Lines& lines) {
   if (lines.empty()) return;
   gpx << "  <trk>\n    <name>" << name << "</name>\n";
   for (const auto& line : lines) {
@@ -87,7 +98,40 @@ ordered_json place(const TrackPoint& point, double ahead_m = 0) {
   return {rounded(point.lon_deg + east_deg), rounded(point.lat_deg + north_deg)};
 }
 
-ordered_json lines_feature(const char* name, const std::vector<std::vector<TrackPoint>>& lines) {
+const char* integrity_word(uint8_t integrity) {
+  return integrity == msg::INTEGRITY_OK ? "ok" : integrity == msg::INTEGRITY_DEGRADED ? "degraded" : "unusable";
+}
+
+TrackPoint with_integrity(TrackPoint point, uint8_t integrity) {
+  point.integrity = integrity;
+  return point;
+}
+
+/// As geojson.io and others draw it.
+const char* integrity_colour(uint8_t integrity) {
+  return integrity == msg::INTEGRITY_OK ? "#2e7d32" : integrity == msg::INTEGRITY_DEGRADED ? "#f9a825" : "#c62828";
+}
+
+/// A change of integrity is no gap on a map: from the one place to the next the worse holds.
+std::map<uint8_t, Lines> by_integrity(Lines lines) {
+  for (size_t i = 1; i < lines.size(); ++i) {
+    auto& before = lines[i - 1];
+    auto& after = lines[i];
+    if (std::abs(after.front().stamp_ns - before.back().stamp_ns) > kBreakNs) continue;
+    const uint8_t was = before.front().integrity;
+    const uint8_t is = after.front().integrity;
+    if (was > is) {
+      before.push_back(with_integrity(after.front(), was));
+    } else {
+      after.insert(after.begin(), with_integrity(before.back(), is));
+    }
+  }
+  std::map<uint8_t, Lines> sorted;
+  for (auto& line : lines) sorted[line.front().integrity].push_back(std::move(line));
+  return sorted;
+}
+
+ordered_json lines_feature(const char* name, const Lines& lines) {
   ordered_json coordinates = ordered_json::array();
   for (const auto& line : lines) {
     if (line.size() < 2) continue;  // a line has two points at least
@@ -101,6 +145,13 @@ ordered_json lines_feature(const char* name, const std::vector<std::vector<Track
            {{"name", name},
             {"from", utc_text(lines.front().front().stamp_ns)},
             {"to", utc_text(lines.back().back().stamp_ns)}}}};
+}
+
+ordered_json train_feature(uint8_t integrity, const Lines& lines) {
+  auto feature = lines_feature("train", lines);
+  feature["properties"]["integrity"] = integrity_word(integrity);
+  feature["properties"]["stroke"] = integrity_colour(integrity);
+  return feature;
 }
 
 ordered_json number(double value) {
@@ -119,7 +170,8 @@ ordered_json interval_feature(const TrackPoint& point) {
             {"over_m", point.over_m},
             {"under_m", point.under_m},
             {"speed_kmh", number(core::kmh_from_mps(point.speed_mps))},
-            {"degraded", point.degraded}}}};
+            {"integrity", integrity_word(point.integrity)},
+            {"degraded", point.integrity != msg::INTEGRITY_OK}}}};
 }
 
 bool drawable(const TrackPoint& point) {
@@ -160,7 +212,8 @@ core::Status write_gpx(const RecordedTrack& track, const std::filesystem::path& 
   std::ostringstream gpx;
   gpx << R"(<?xml version="1.0" encoding="UTF-8"?>)" << '\n'
       << R"(<gpx version="1.1" creator="Railfix" xmlns="http://www.topografix.com/GPX/1/1">)" << '\n';
-  write_gpx_track(gpx, "train", track.train);
+  write_gpx_track(gpx, "train", lines_of(track.train, true));
+  write_gpx_track(gpx, "train, unusable", lines_of(track.train, false));
   write_gpx_track(gpx, "GNSS", track.gnss);
   gpx << "</gpx>\n";
   return core::write_whole(file, gpx.str());
@@ -168,7 +221,9 @@ core::Status write_gpx(const RecordedTrack& track, const std::filesystem::path& 
 
 core::Status write_geojson(const RecordedTrack& track, const std::filesystem::path& file) {
   ordered_json features = ordered_json::array();
-  if (!track.train.empty()) features.push_back(lines_feature("train", track.train));
+  for (const auto& [integrity, lines] : by_integrity(track.train)) {
+    features.push_back(train_feature(integrity, lines));
+  }
   if (!track.gnss.empty()) features.push_back(lines_feature("GNSS", track.gnss));
   int64_t due_ns = std::numeric_limits<int64_t>::min();
   for (const auto& line : track.train) {

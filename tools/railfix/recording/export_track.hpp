@@ -21,20 +21,22 @@ struct TrackPoint {
   double under_m = 0;      // ... and so far in front; NaN = not known
   uint32_t edge = 0;
   double offset_m = 0;
-  bool degraded = false;
+  uint8_t integrity = 0;  // INTEGRITY_*
 };
 
 struct RecordedTrack {
-  std::vector<std::vector<TrackPoint>> train;  // broken where the place was not known for a second
+  // Broken where the place was not known for a second, and where its integrity changes.
+  std::vector<std::vector<TrackPoint>> train;
   std::vector<std::vector<TrackPoint>> gnss;
 };
 
 /// Error: neither a train_state with latitude and longitude nor a GNSS fix is in the part.
 core::Result<RecordedTrack> read_track(mcap::Reader& reader, const mcap::Selection& part);
 
+/// Places that must not be used are a track of their own, "train, unusable".
 core::Status write_gpx(const RecordedTrack& track, const std::filesystem::path& file);
-/// The line of the train, and once a second its confidence interval as a line of its own, laid straight along the
-/// heading.
+/// The lines of the train, one feature for each integrity, and once a second its confidence interval as a line of its
+/// own, laid straight along the heading.
 core::Status write_geojson(const RecordedTrack& track, const std::filesystem::path& file);
 
 }  // namespace railfix::tool
