@@ -171,6 +171,26 @@ TEST_F(Export, TablesHaveAColumnForEachMember) {
   EXPECT_TRUE(fs::exists(folder_ / "csv" / "camera_frame_cam0.csv"));
 }
 
+TEST_F(Export, TablesHaveNamesWhereTheIdlHasThem) {
+  ASSERT_EQ(recording({"export", file().string(), "--csv", (folder_ / "csv").string()}).exit_code, 0);
+  std::ifstream table(folder_ / "csv" / "train_state.csv");
+  std::string header;
+  std::string row;
+  std::getline(table, header);
+  std::getline(table, row);
+  const auto cell = [&](const std::string& column) {
+    const auto at = header.find("," + column + ",");
+    const auto before = std::count(header.begin(), header.begin() + static_cast<std::ptrdiff_t>(at) + 1, ',');
+    std::stringstream cells(row);
+    std::string one;
+    for (auto i = before; i >= 0; --i) std::getline(cells, one, ',');
+    return one;
+  };
+  EXPECT_EQ(cell("integrity"), "OK");
+  EXPECT_EQ(cell("sources"), "CAMERA|WHEEL");
+  EXPECT_EQ(cell("edge"), "3");
+}
+
 TEST_F(Export, TablesThatAreCutAreNamed) {
   const auto folder = folder_ / "csv";
   const auto exported = recording_in(1, "export " + file().string() + " --topics train_state --csv " + folder.string());

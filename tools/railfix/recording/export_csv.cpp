@@ -73,6 +73,7 @@ core::Result<CsvReport> export_csv(mcap::Reader& reader, const mcap::Selection& 
   std::filesystem::create_directories(folder, failed);
   if (failed) return core::Error{folder.string() + " cannot be made (" + failed.message() + ")"};
   SampleTypes types(reader);
+  const cdr::DecodeOptions options{.name_constants = true};
   std::map<std::string, std::unique_ptr<Table>> tables;
   std::map<std::string, uint64_t> unreadable;
   CsvReport report;
@@ -80,7 +81,7 @@ core::Result<CsvReport> export_csv(mcap::Reader& reader, const mcap::Selection& 
     reader.for_each(part, [&](const mcap::Channel& channel, const mcap::Message& message) {
       const auto* type = types.structure(channel);
       const auto sample = type == nullptr ? core::Result<ordered_json>(core::Error{})
-                                          : cdr::decode(*types.types(channel), type->name, message.data);
+                                          : cdr::decode(*types.types(channel), type->name, message.data, options);
       if (!sample.ok()) {
         ++unreadable[channel.topic];
         return true;

@@ -18,7 +18,8 @@ struct CsvReport {
 
 /// Writes TOPIC.csv (a slash becomes an underscore) into the folder: log_time_ns, publish_time_ns, sequence, then the
 /// members as the recording's own IDL has them. Arrays are one cell, their elements with semicolons between them; long
-/// octet arrays (pictures) are cut short; unknown is an empty cell; text with a comma stands in double quotes (RFC
+/// octet arrays (pictures) are cut short; values that the IDL has names for are these names, bits with | between them;
+/// unknown is an empty cell; text with a comma stands in double quotes (RFC
 /// 4180).
 core::Result<CsvReport> export_csv(mcap::Reader& reader, const mcap::Selection& part,
                                    const std::filesystem::path& folder);
