@@ -1,3 +1,5 @@
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <iostream>
@@ -60,6 +62,7 @@ int list(const Options& options) {
   TopicListener listener(options.network, "railfix-topics");
   std::map<std::string, TopicStatistics> all;
   const int64_t since_ns = core::wall_ns();
+  const int64_t begun_ns = core::monotonic_ns();
   const auto watch = [&](const std::string& name) {
     listener.listen(name, [&all, since_ns](const std::string& topic, const messaging::TopicInfo& type, const auto&,
                                            const messaging::SampleInfo& info) {
@@ -70,6 +73,7 @@ int list(const Options& options) {
     for (const auto& name : listener.participant().written_topics()) watch(name);
     return false;
   });
+  const double listened_s = core::seconds(core::monotonic_ns() - begun_ns);
   const auto names = listener.participant().written_topics();
   ordered_json json = ordered_json::array();
   if (!options.json)
@@ -83,11 +87,11 @@ int list(const Options& options) {
       json.push_back({{"topic", name},
                       {"type", type},
                       {"writers", writers},
-                      {"rate_hz", statistics.rate_hz()},
+                      {"rate_hz", statistics.rate_hz(listened_s)},
                       {"samples", statistics.samples()},
                       {"lost", statistics.lost()}});
     } else {
-      std::printf("%-26s %7d %9.2f %8llu %6llu  %s\n", name.c_str(), writers, statistics.rate_hz(),
+      std::printf("%-26s %7d %9.2f %8llu %6llu  %s\n", name.c_str(), writers, statistics.rate_hz(listened_s),
                   static_cast<unsigned long long>(statistics.samples()),
                   static_cast<unsigned long long>(statistics.lost()), type.c_str());
     }
@@ -151,7 +155,14 @@ int watch(const Options& options) {
   return whole.samples() > 0 ? 0 : 1;
 }
 
-void print_sample(const ordered_json& sample) {
+/// Of a latched topic the first ones may be hours old: the text says so, and so does JSON with a member of its own.
+void print_sample(ordered_json sample, double before_s, bool as_json) {
+  if (as_json) {
+    if (before_s > 0) sample["sent_before_listening_s"] = before_s;
+    std::cout << sample.dump() << std::endl;
+    return;
+  }
+  if (before_s > 0) std::cout << fmt::format("sent {:.1f} s before listening:\n", before_s);
   for (const auto& [key, value] : sample.items()) {
     std::cout << key << ": " << (value.is_string() ? value.get<std::string>() : value.dump()) << '\n';
   }
@@ -164,18 +175,16 @@ int echo(const Options& options) {
   uint64_t shown = 0;
   cdr::DecodeOptions decode_options;
   decode_options.name_constants = !options.json;
+  const int64_t since_ns = core::wall_ns();
   listener.listen(topic, [&](const auto&, const messaging::TopicInfo& info, const std::shared_ptr<const void>& sample,
-                             const auto&) {
+                             const messaging::SampleInfo& sample_info) {
     if (options.count > 0 && shown >= options.count) return;
     const auto decoded =
         cdr::decode(cdr::own_types(), info.type->name(), info.type->serialize(sample.get()), decode_options);
     if (!decoded.ok()) throw std::runtime_error(decoded.error().message);
     ++shown;
-    if (options.json) {
-      std::cout << decoded.value().dump() << std::endl;
-    } else {
-      print_sample(decoded.value());
-    }
+    const int64_t before_ns = info.qos.transient_local ? since_ns - sample_info.source_ns : 0;
+    print_sample(decoded.value(), core::seconds(before_ns), options.json);
   });
   Hint hint;
   listener.run(options.for_s, [&] {
@@ -220,8 +229,10 @@ void add_topics(CLI::App& app, Action& chosen) {
       "railfix "
       "topics delay train_state --for 10",
       watch<DelayStatistics>, true);
-  add("echo", "Samples of one topic as they come.  Example: railfix topics echo train_state --count 1 --json", echo,
-      true);
+  add("echo",
+      "Samples of one topic as they come; what a latched topic said before comes first, marked so.  Example: railfix "
+      "topics echo train_state --count 1 --json",
+      echo, true);
   topics->add_subcommand("qos", "Quality of service of every topic as Fast DDS XML, to edit for common.qos_profiles")
       ->callback([&chosen] {
         chosen = [] {

@@ -33,6 +33,10 @@ double TopicStatistics::rate_hz() const {
              ? 0
              : static_cast<double>(samples_ - 1) / core::seconds(last_ns_ - first_ns_);
 }
+double TopicStatistics::rate_hz(double listened_s) const {
+  if (samples_ > 1 && 2 * core::seconds(last_ns_ - first_ns_) >= listened_s) return rate_hz();
+  return listened_s > 0 ? static_cast<double>(samples_) / listened_s : 0;
+}
 double TopicStatistics::shortest_gap_ms() const {
   return core::seconds(shortest_ns_) * 1e3;
 }

@@ -21,6 +21,9 @@ class TopicStatistics {
   [[nodiscard]] uint64_t samples() const { return samples_ + standing_; }
   /// From the first to the last sample; 0 with less than two.
   [[nodiscard]] double rate_hz() const;
+  /// The same where they fill half of the time that was listened; else samples over that time, since two in a
+  /// row say nothing of a rate.
+  [[nodiscard]] double rate_hz(double listened_s) const;
   [[nodiscard]] double shortest_gap_ms() const;
   [[nodiscard]] double longest_gap_ms() const;
   /// Samples that a writer sent and that never came.

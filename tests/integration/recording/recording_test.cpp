@@ -321,6 +321,26 @@ TEST_F(RecordingTest, TopicsHelpWithNames) {
   EXPECT_EQ(json[0]["writers"], 1);
 }
 
+TEST_F(RecordingTest, EchoTellsWhatWasSaidBeforeItListened) {
+  messaging::Participant running(test::network(train_, std::stoi(kDomain)));
+  messaging::Writer<msg::TrainPositionReport> writer(running, messaging::topics::train_position_report);
+  ASSERT_TRUE(writer.write({}));
+  const auto old = railfix({"topics", "echo", "train_position_report", "--count", "1", "--for", "30"});
+  ASSERT_EQ(old.exit_code, 0) << old.err;
+  EXPECT_THAT(old.out, ::testing::ContainsRegex("^sent [0-9.]+ s before listening:\n"));
+  const auto json = railfix({"topics", "echo", "train_position_report", "--count", "1", "--for", "30", "--json"});
+  EXPECT_GT(nlohmann::json::parse(json.out)["sent_before_listening_s"].get<double>(), 0);
+
+  test::Program echo({"railfix", "topics", "echo", "train_position_report", "--count", "2", "--for", "60", "--train",
+                      train_, "--domain", kDomain},
+                     {folder_ / "echo", {}, {}});
+  while (!echo.exit_code() && !test::slurp(folder_ / "echo").ends_with("---\n")) usleep(10'000);
+  ASSERT_TRUE(writer.write({}));
+  EXPECT_EQ(echo.wait_for_end(), 0);
+  const auto both = test::slurp(folder_ / "echo");
+  EXPECT_EQ(both.find("before listening"), both.rfind("before listening")) << "the second is new";
+}
+
 }  // namespace
 
 }  // namespace railfix

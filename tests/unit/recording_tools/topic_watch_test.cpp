@@ -33,6 +33,17 @@ TEST(TopicStatistics, RateAndGaps) {
   EXPECT_DOUBLE_EQ(statistics.latency_ms(), 2.0);
 }
 
+TEST(TopicStatistics, WhatIsSaidNowAndThenIsCountedOverTheListening) {
+  TopicStatistics statistics;
+  EXPECT_EQ(statistics.rate_hz(3), 0);
+  statistics.add(kOpen, at(1000, 1));
+  EXPECT_DOUBLE_EQ(statistics.rate_hz(4), 0.25);
+  statistics.add(kOpen, at(1010, 2));
+  EXPECT_DOUBLE_EQ(statistics.rate_hz(4), 0.5);
+  statistics.add(kOpen, at(3000, 3));
+  EXPECT_DOUBLE_EQ(statistics.rate_hz(4), 1) << "these fill the time: from the first to the last";
+}
+
 TEST(TopicStatistics, LossesAreCountedForEachWriter) {
   TopicStatistics statistics;
   statistics.add(kOpen, at(10, 10, 1));
