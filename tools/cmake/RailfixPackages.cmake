@@ -1,13 +1,15 @@
 # Debian packages for the computers of a train (`./dev package`): `railfix`, the tool with the unit that keeps services
 # running, and `railfix-RELEASE`, all services where `run_as: programs` looks for them; releases lie side by side.
-set(release_folder opt/railfix/${PROJECT_VERSION}/bin)
+set(release_folder opt/railfix/${PROJECT_VERSION})
 install(TARGETS railfix RUNTIME DESTINATION usr/bin COMPONENT tool)
 install(FILES deploy/host/railfix.service DESTINATION lib/systemd/system COMPONENT tool)
 install(FILES deploy/host/60-railfix.conf DESTINATION usr/lib/sysctl.d COMPONENT tool)
 install(DIRECTORY deploy/scenarios DESTINATION usr/share/railfix COMPONENT tool)
 install(DIRECTORY deploy/trains DESTINATION usr/share/doc/railfix/examples COMPONENT tool)
 get_property(programs GLOBAL PROPERTY RAILFIX_SERVICES)
-install(TARGETS ${programs} RUNTIME DESTINATION ${release_folder} COMPONENT release)
+install(TARGETS ${programs} RUNTIME DESTINATION ${release_folder}/bin COMPONENT release)
+# The monitor's page, from its program ../share/monitor/page. Where npm could not build it `./dev package` refuses.
+install(DIRECTORY ${CMAKE_BINARY_DIR}/share/monitor/page DESTINATION ${release_folder}/share/monitor COMPONENT release OPTIONAL)
 
 set(CPACK_GENERATOR DEB)
 set(CPACK_COMPONENTS_ALL tool release)

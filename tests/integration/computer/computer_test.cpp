@@ -12,6 +12,7 @@ namespace railfix::test {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 constexpr double kPatienceS = 60;
@@ -34,7 +35,7 @@ class Computer : public ::testing::Test {
         << "train:\n  id: vt612-004\n  domain: 94\n  release: " RAILFIX_VERSION
            "\n  run_as: programs\n  security: true\n"
         << "  hosts:\n    cab: { address: 127.0.0.1 }\n"
-        << "  services: { fusion: cab, tpr_publisher: cab, recorder: cab }\n"
+        << "  services: { fusion: cab, tpr_publisher: cab, recorder: cab, monitor: cab }\n"
         << "settings:\n  recorder: { folder: recordings }\n  tpr_publisher: { nid_engine: 612004 }\n";
     ASSERT_EQ(run_program({"railfix", "train", "keys", (work_ / "train").string()}, 60).exit_code, 0);
   }
@@ -87,8 +88,12 @@ TEST_F(Computer, IsSetUpWithPackagesAndComesBackByItself) {
   const auto up = on_it("railfix train up /root/train --healthy-for 1");
   ASSERT_EQ(up.exit_code, 0) << up.out << up.err << journal();
   std::map<std::string, int64_t> first;
-  ASSERT_TRUE(comes([&] { return (first = healthy_services()).size() == 3; }))
+  ASSERT_TRUE(comes([&] { return (first = healthy_services()).size() == 4; }))
       << on_it("railfix train status").out << journal();
+  if (fs::exists(RAILFIX_BUILD_DIR "/share/monitor/page/index.html")) {  // npm was there
+    const auto page = on_it(ask_for_page("127.0.0.1"));
+    EXPECT_THAT(page.out, AllOf(HasSubstr("200 OK"), HasSubstr(kBuiltPage))) << page.err;
+  }
 
   // A supervisor that dies: systemd starts the next one, the services do not notice.
   const pid_t before = supervisor();
@@ -105,7 +110,7 @@ TEST_F(Computer, IsSetUpWithPackagesAndComesBackByItself) {
 
   // The computer is switched off and on.
   ASSERT_EQ(shell("podman restart --time 60 " + name_).exit_code, 0);
-  ASSERT_TRUE(comes([&] { return healthy_services().size() == 3; })) << journal();
+  ASSERT_TRUE(comes([&] { return healthy_services().size() == 4; })) << journal();
   EXPECT_THAT(answer("systemctl is-system-running"), ::testing::AnyOf("running", "starting"));
 
   // Down is down, also for systemd, until it is brought up again.
@@ -125,7 +130,7 @@ TEST_F(Computer, IsSetUpWithPackagesAndComesBackByItself) {
   EXPECT_EQ(services_running(), "");
   EXPECT_EQ(answer("systemctl is-failed railfix"), "inactive") << journal();
   ASSERT_EQ(on_it("systemctl start railfix").exit_code, 0);
-  ASSERT_TRUE(comes([&] { return healthy_services().size() == 3; })) << journal();
+  ASSERT_TRUE(comes([&] { return healthy_services().size() == 4; })) << journal();
 
   const auto removed = on_it("apt-get remove -y -qq railfix");
   ASSERT_EQ(removed.exit_code, 0) << removed.out << removed.err;

@@ -23,7 +23,8 @@ using ::testing::StartsWith;
 
 constexpr int kDomain = 23;
 
-/// fusion in the cab, tpr_publisher in the coach; this process is in the cab. The parameter is the engine.
+/// fusion and the monitor in the cab, tpr_publisher in the coach; this process is in the cab. The parameter is the
+/// engine.
 class ContainerTrain : public Images, public ::testing::WithParamInterface<const char*> {
  protected:
   void SetUp() override {
@@ -46,15 +47,18 @@ class ContainerTrain : public Images, public ::testing::WithParamInterface<const
   static bool docker() { return std::string(GetParam()) == "docker"; }
   void start_engines() {
     if (!DockerEngine::is_installed()) GTEST_SKIP() << "skipped: dockerd is not here (apt-get install docker.io)";
-    const std::map<TwoHosts::Host, std::string> images{{TwoHosts::cab, "railfix/fusion:test"},
-                                                       {TwoHosts::coach, "railfix/tpr-publisher:test"}};
-    for (const auto& [host, image] : images) {
+    const std::map<TwoHosts::Host, std::vector<std::string>> all{
+        {TwoHosts::cab, {"railfix/fusion:test", "railfix/monitor:test"}},
+        {TwoHosts::coach, {"railfix/tpr-publisher:test"}}};
+    for (const auto& [host, images] : all) {
       auto& engine = engines_[host];
       engine = hosts_.on(host, [&] { return std::make_unique<DockerEngine>(folder_ / kNames[host] / "docker"); });
       if (!engine->answers())
         GTEST_SKIP() << "skipped: dockerd does not work here: " << slurp(folder_ / kNames[host] / "docker" / "log");
-      const auto taken = engine->take(image);
-      ASSERT_EQ(taken.exit_code, 0) << taken.err;
+      for (const auto& image : images) {
+        const auto taken = engine->take(image);
+        ASSERT_EQ(taken.exit_code, 0) << taken.err;
+      }
     }
   }
   void write_manifest(const std::string& fusion, const std::string& reports, const std::string& settings = "") const {
@@ -64,7 +68,7 @@ class ContainerTrain : public Images, public ::testing::WithParamInterface<const
         << "    cab: { address: " << TwoHosts::kAddress[TwoHosts::cab] << " }\n"
         << "    coach: { address: " << TwoHosts::kAddress[TwoHosts::coach] << " }\n"
         << "  services:\n    fusion: { host: cab, release: " << fusion << " }\n"
-        << "    tpr_publisher: { host: coach, release: " << reports << " }\n"
+        << "    tpr_publisher: { host: coach, release: " << reports << " }\n    monitor: cab\n"
         << "settings:\n  common: { log_level: warning }\n"
         << settings;
   }
@@ -149,6 +153,8 @@ TEST_P(ContainerTrain, ComesUpOnTwoHostsIsUpgradedComesBackAndGoesDown) {
   }
   Ride ride(*cab_, queue_);
   ASSERT_TRUE(ride.reported()) << "no report has come back over the cable";
+  const auto page = here(TwoHosts::cab, [] { return shell(ask_for_page(TwoHosts::kAddress[TwoHosts::cab])); });
+  EXPECT_THAT(page.out, AllOf(HasSubstr("200 OK"), HasSubstr(kBuiltPage))) << page.err;
   const auto locked =
       engine(TwoHosts::coach, "inspect --format '{{.HostConfig.ReadonlyRootfs}} {{.Config.User}} {{.State.Pid}}' " +
                                   container(TwoHosts::coach, "tpr-publisher"));

@@ -7,7 +7,7 @@
 
 namespace railfix::test {
 
-/// Images railfix/SERVICE:test of this build's frame_grabber, fusion and tpr_publisher, with Podman.
+/// Images railfix/SERVICE:test of this build's frame_grabber, fusion, tpr_publisher and monitor, with Podman.
 class Images : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -25,11 +25,15 @@ class Images : public ::testing::Test {
   static void make() {
     skipped_ = why_no_podman();
     if (!skipped_.empty()) return;
+    if (!std::filesystem::exists(RAILFIX_BUILD_DIR "/share/monitor/page/index.html")) {
+      skipped_ = "the monitor's page is not built, which npm does";
+      return;
+    }
     std::filesystem::create_directories(kWork);
     const auto programs = "'" + (kWork / "programs").string() + "'";
     const auto built = shell("cd '" + kSource.string() + "' && docker/collect '" RAILFIX_BUILD_DIR "' " + programs +
                              " && docker/build --engine podman --release test --programs " + programs +
-                             " frame-grabber fusion tpr-publisher");
+                             " frame-grabber fusion tpr-publisher monitor");
     if (built.exit_code == 0) return;
     const bool no_network = is_no_network(built);
     (no_network ? skipped_ : failed_) =

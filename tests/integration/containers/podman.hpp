@@ -28,4 +28,12 @@ inline std::string why_no_podman() {
   return trial.exit_code == 0 ? "" : "podman cannot run containers here: " + trial.err;
 }
 
+/// Asks a monitor for its page, as a browser does; for a shell.
+inline std::string ask_for_page(const std::string& address) {
+  return "bash -c 'exec 3<>/dev/tcp/" + address +
+         "/8080; printf \"GET / HTTP/1.0\\r\\nHost: train\\r\\n\\r\\n\" >&3; cat <&3'";
+}
+/// In its answer: what Vite has built, and not the sentence of a monitor without a page.
+inline constexpr const char* kBuiltPage = "src=\"./assets/";
+
 }  // namespace railfix::test
