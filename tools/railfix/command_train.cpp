@@ -63,6 +63,10 @@ HostPlan plan_here(const Options& options) {
   return *plan;
 }
 
+void refuse_another_train(const Options& options, const Manifest& manifest) {
+  if (const auto why = runs_another_train(options.root, manifest)) throw core::BadInput(*why);
+}
+
 HostPlan running_plan_here(const Options& options) {
   auto plan = plan_here(options);
   if (plan.down) throw core::BadInput("the train is down; railfix train up starts it as the manifest says");
@@ -84,6 +88,7 @@ int check(const Options& options) {
   const auto* here = options.host.empty() ? manifest.host_here() : &chosen_host(manifest, options);
   if (here != nullptr) {
     for (auto& finding : check_computer(&manifest, here, options.root)) findings.push_back(std::move(finding));
+    if (const auto why = runs_another_train(options.root, manifest)) findings.push_back({true, *why});
   }
   const bool good = say(findings);
   say_not_asked(manifest, here);
@@ -161,6 +166,7 @@ int status(const Options& options) {
 
 int up(const Options& options) {
   const auto manifest = core::value_or_throw(read_manifest(options.train));
+  refuse_another_train(options, manifest);
   const auto& host = chosen_host(manifest, options);
   auto [findings, made_of] = checked(manifest, options);
   for (auto& finding : check_computer(&manifest, &host, options.root)) findings.push_back(std::move(finding));
@@ -190,8 +196,12 @@ int down(const Options& options) {
 
 int diff(const Options& options) {
   const auto manifest = core::value_or_throw(read_manifest(options.train));
+  refuse_another_train(options, manifest);
   const auto& host = chosen_host(manifest, options);
   const auto now = plan_here(options);
+  if (now.train_id != manifest.train_id)
+    throw core::BadInput("train " + now.train_id + " was here before, and is down; railfix train up " +
+                         manifest.folder.string() + at_root(options.root) + " starts " + manifest.train_id);
   size_t changes = 0;
   for (const auto& service : services_on(manifest, host.name)) {
     const auto* runs = now.service(service.name);
@@ -221,6 +231,7 @@ int diff(const Options& options) {
 
 int upgrade(const Options& options) {
   const auto manifest = core::value_or_throw(read_manifest(options.train));
+  refuse_another_train(options, manifest);
   const auto& host = chosen_host(manifest, options);
   running_plan_here(options);
   auto [findings, made_of] = checked(manifest, options);
@@ -313,7 +324,7 @@ void add_train(CLI::App& app, Action& chosen) {
     command->callback([&chosen, options, work] { chosen = [options, work] { return work(*options); }; });
     return command;
   };
-  add("check", "Say everything that would go wrong, before anything starts", check, kManifest | kHost);
+  add("check", "Say everything that would go wrong, before anything starts", check, kManifest | kHost | kRoot);
   add("render", "Write configuration, compose file and systemd unit for each host", render, kManifest)
       ->add_option("--out", options->out, "Folder to write into")
       ->required();

@@ -250,6 +250,34 @@ TEST_F(Fleet, AfterAnUpgradeDownLeavesNothingBehind) {
   EXPECT_THAT(in_memory("health"), ::testing::IsEmpty());
 }
 
+TEST_F(Fleet, TheFolderOfAnotherTrainChangesNothing) {
+  ASSERT_EQ(up().exit_code, 0);
+  const auto before = status();
+  const auto other = folder_ / "other";
+  fs::create_directories(other);
+  auto text = test::slurp(folder_ / "train/train.yaml");
+  text.replace(text.find("id: " + id_), 4 + id_.size(), "id: " + id_ + "-other");
+  std::ofstream(other / "train.yaml") << text;
+  const auto refusal = "this computer runs train " + id_ + "; " + other.string() + " is of train " + id_ +
+                       "-other: railfix train down --root " + root() + " first, then railfix train up " +
+                       other.string() + " --root " + root();
+  for (const char* verb : {"diff", "up", "upgrade"}) {
+    const auto refused = train({verb, other.string(), "--root", root()});
+    EXPECT_EQ(refused.exit_code, 2) << verb;
+    EXPECT_EQ(refused.err, "railfix: " + refusal + "\n");
+    EXPECT_EQ(refused.out, "");
+  }
+  const auto checked = train({"check", other.string(), "--root", root()});
+  EXPECT_EQ(checked.exit_code, 1);
+  EXPECT_THAT(checked.out, HasSubstr("error: " + refusal));
+  EXPECT_EQ(status("fusion")["pid"], before["services"][0]["pid"]);
+  ASSERT_EQ(train({"down", "--root", root()}).exit_code, 0);
+  EXPECT_THAT(train({"diff", other.string(), "--root", root()}).err, HasSubstr("was here before, and is down"));
+  const auto started = train({"up", other.string(), "--root", root(), "--healthy-for", "1", "--patience", "60"});
+  EXPECT_EQ(started.exit_code, 0) << started.out << started.err;
+  EXPECT_THAT(train({"rollback", "--root", root()}).err, HasSubstr("there is no generation before 2"));
+}
+
 TEST_F(Fleet, AMistakeInTheManifestStartsNothing) {
   write_manifest("0.0.7");
   const auto missing = up();

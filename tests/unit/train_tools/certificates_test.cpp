@@ -115,9 +115,11 @@ TEST_F(TrainFolder, PermissionsThatDoNotFitAreTold) {
     return check_certificates(train, *train.host("coach"));
   };
   EXPECT_THAT(told("12"), IsEmpty());
-  EXPECT_THAT(told("13"), Contains(AllOf(Field(&Finding::error, true),
-                                         Field(&Finding::text, HasSubstr("fusion.permissions.p7s does not allow "
-                                                                         "domain 13; railfix train keys --renew")))));
+  EXPECT_THAT(told("13"),
+              Contains(AllOf(Field(&Finding::error, true),
+                             Field(&Finding::text, HasSubstr("fusion.permissions.p7s does not allow "
+                                                             "domain 13; railfix train keys --renew, then railfix "
+                                                             "train down on every host, then up")))));
   // As the release before would have made them.
   const auto permissions = folder_ / "security/coach/fusion.permissions.p7s";
   auto before = test::slurp(permissions);

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 
 #include "train/disk_need.hpp"
+#include "train/roll_out.hpp"
 #include "unit/train_tools/train_folder.hpp"
 
 namespace railfix::tool {
@@ -128,6 +129,26 @@ TEST_F(TrainFolder, SourcesThatAreNotGivenAreTold) {
                     HasSubstr("settings.sensor_gateway.source is not given")));
   EXPECT_THAT(told("{ frame_grabber: { source: genicam:any }, sensor_gateway: { source: /data/ride } }"),
               Not(HasSubstr("is not given")));
+}
+
+TEST_F(TrainFolder, AnotherTrainThanTheOneThatRunsHereIsTold) {
+  const auto train = manifest(kTrain).value();
+  const HostFolder here(folder_);
+  EXPECT_FALSE(runs_another_train(folder_, train)) << "nothing is here";
+  HostPlan plan{"re460-042", "cab", 1, 0, false, {}};
+  ASSERT_TRUE(here.write(plan).ok());
+  EXPECT_FALSE(runs_another_train(folder_, train));
+  plan.train_id = "re460-007";
+  ASSERT_TRUE(here.write(plan).ok());
+  const auto told = runs_another_train(folder_, train);
+  ASSERT_TRUE(told);
+  const auto folder = folder_.string();
+  EXPECT_EQ(*told, "this computer runs train re460-007; " + folder +
+                       " is of train re460-042: railfix train down --root " + folder +
+                       " first, then railfix train up " + folder + " --root " + folder);
+  plan.down = true;
+  ASSERT_TRUE(here.write(plan).ok());
+  EXPECT_FALSE(runs_another_train(folder_, train));
 }
 
 // An operator begins with a copy of one.

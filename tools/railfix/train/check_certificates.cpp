@@ -17,6 +17,7 @@ constexpr const char* kRenewAuthority = "; exchange the authority, beginning wit
 constexpr const char* kRenewElsewhere = "; get a new one, put it there, then railfix train upgrade on each host";
 constexpr const char* kOtherKey = "; put there the one that the certificate was made with";
 constexpr const char* kOneMaking = "; copy the whole folder anew from where the train's keys were made";
+constexpr const char* kRenewTrain = "; railfix train keys --renew, then railfix train down on every host, then up";
 constexpr const char* kRenew = "; railfix train keys --renew, then railfix train upgrade on each host";
 
 int64_t warning_days(const YAML::Node& settings) {
@@ -94,13 +95,14 @@ void check_named_files(const YAML::Node& settings, const fs::path& folder, const
   check_named_keys(settings, folder, service, findings);
 }
 
-/// Permissions that were made before the train got another domain or name let nobody in; those of a release whose
-/// service used fewer topics leave a topic silent.
+/// Permissions that were made before the train got another domain or name let nobody in (and no upgrade would bring it
+/// there, because old and new services do not hear each other); those of a release whose service used fewer topics
+/// leave a topic silent.
 void check_permissions(const Manifest& manifest, const std::string& host, const std::string& service,
                        const fs::path& file, Findings& findings) {
   const auto missing = missing_rights(manifest, service, host, file);
   if (!missing.train.empty()) {
-    add_once(findings, {true, file.string() + " does not allow " + core::joined(missing.train) + kRenew});
+    add_once(findings, {true, file.string() + " does not allow " + core::joined(missing.train) + kRenewTrain});
   } else if (!missing.topics.empty()) {
     add_once(findings, {false, file.string() + " does not allow what " + service +
                                    " of release " RAILFIX_VERSION " does: " + core::joined(missing.topics) + kRenew});

@@ -93,6 +93,10 @@ const PlannedService* HostPlan::service(const std::string& name) const {
   return found == services.end() ? nullptr : &*found;
 }
 
+std::string at_root(const fs::path& root) {
+  return root == "/" ? "" : " --root " + root.string();
+}
+
 fs::path HostFolder::generation(int number) const {
   return folder_ / "generations" / std::to_string(number);
 }

@@ -41,7 +41,7 @@ struct HostPlan {
   std::string train_id;
   std::string host;
   int generation = 0;  // the newest one whose roll-out succeeded or is under way
-  int previous = 0;    // the one before, 0 = none
+  int previous = 0;    // the one before of this train, 0 = none
   bool down = false;   // nothing is to run until the train is brought up again, after a restart of the computer neither
   std::vector<PlannedService> services;
 
@@ -62,6 +62,9 @@ struct RunningService {
 /// By name; one that is being replaced stands there with kBefore behind its name.
 using HostState = std::map<std::string, RunningService>;
 inline constexpr const char* kBefore = " before";
+
+/// As an operator types it behind a command; empty for "/".
+std::string at_root(const std::filesystem::path& root);
 
 /// The folder of all this. Services that run in containers do not see it, but for their own files of their generation.
 class HostFolder {

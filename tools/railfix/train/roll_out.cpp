@@ -176,6 +176,14 @@ std::vector<std::string> changed_services(const HostPlan& from, const HostPlan& 
 
 }  // namespace
 
+std::optional<std::string> runs_another_train(const fs::path& root, const Manifest& manifest) {
+  const auto plan = HostFolder(root).plan();
+  if (!plan || plan->down || plan->train_id == manifest.train_id) return std::nullopt;
+  return "this computer runs train " + plan->train_id + "; " + manifest.folder.string() + " is of train " +
+         manifest.train_id + ": railfix train down" + at_root(root) + " first, then railfix train up " +
+         manifest.folder.string() + at_root(root);
+}
+
 bool any_runs(const HostFolder& folder) {
   return !running_on(folder, folder.state()).empty();
 }
@@ -221,7 +229,7 @@ core::Result<HostPlan> install(const Manifest& manifest, const TrainHost& host, 
   plan.train_id = manifest.train_id;
   plan.host = host.name;
   plan.generation = folder.newest_generation() + 1;
-  plan.previous = now ? now->generation : 0;
+  plan.previous = now && now->train_id == plan.train_id ? now->generation : 0;  // another train's is no way back
   const auto files = folder.generation(plan.generation);
   if (const auto rendered = render_host(manifest, host, files); !rendered.ok()) return rendered.error();
   for (const auto& service : services_on(manifest, host.name)) {

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <functional>
+#include <optional>
+#include <string>
 
 #include "service/health_file.hpp"
 #include "train/manifest.hpp"
@@ -30,6 +32,10 @@ core::Status bring_down(const std::filesystem::path& root);
 /// does not pass the gate all of them go back to what ran before; then the error says which, why, and whether that
 /// worked.
 core::Status roll_out(const std::filesystem::path& root, const HostPlan& plan, const HealthGate& gate, const Say& say);
+
+/// What runs on this computer is of another train than the manifest, and what to do: a sentence. Nothing when it is
+/// not, or when nothing is up.
+std::optional<std::string> runs_another_train(const std::filesystem::path& root, const Manifest& manifest);
 
 /// A service of this host runs, with or without a supervisor.
 bool any_runs(const HostFolder& folder);
