@@ -39,6 +39,10 @@ bool say(const std::vector<Finding>& findings) {
   return good;
 }
 
+void say_at_once(const std::string& text) {
+  std::cout << text << std::endl;
+}
+
 TrainCheck checked(const Manifest& manifest, const Options& options) {
   return check_train(manifest, [&](const HostedService& service) { return program_of(service, options.root); });
 }
@@ -181,7 +185,7 @@ int up(const Options& options) {
     if (supervised) return status(options);
   }
   const auto plan = runs ? *installed : core::value_or_throw(install(manifest, host, options.root, made_of));
-  const auto healthy = bring_up(options.root, plan, options.gate);
+  const auto healthy = bring_up(options.root, plan, options.gate, say_at_once);
   if (!healthy.ok()) std::cerr << "railfix: not healthy: " << healthy.error().message << '\n';
   const int shown = status(options);
   return healthy.ok() ? shown : 1;
@@ -238,8 +242,7 @@ int upgrade(const Options& options) {
   for (auto& finding : check_computer(&manifest, &host, options.root)) findings.push_back(std::move(finding));
   if (!say(findings)) return 1;
   const auto plan = core::value_or_throw(install(manifest, host, options.root, made_of));
-  const auto done =
-      roll_out(options.root, plan, options.gate, [](const std::string& text) { std::cout << text << std::endl; });
+  const auto done = roll_out(options.root, plan, options.gate, say_at_once);
   if (!done.ok()) throw std::runtime_error(done.error().message);
   std::cout << "generation " << plan.generation << " runs\n";
   return 0;
@@ -251,8 +254,7 @@ int rollback(const Options& options) {
   const auto before = folder.plan(now.previous);
   if (now.previous == 0 || !before)
     throw core::BadInput("there is no generation before " + std::to_string(now.generation));
-  const auto done =
-      roll_out(options.root, *before, options.gate, [](const std::string& text) { std::cout << text << std::endl; });
+  const auto done = roll_out(options.root, *before, options.gate, say_at_once);
   if (!done.ok()) throw std::runtime_error(done.error().message);
   std::cout << "generation " << before->generation << " runs again\n";
   return 0;

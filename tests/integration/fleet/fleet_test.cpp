@@ -239,6 +239,48 @@ TEST_F(Fleet, AnUpgradeRestartsWhatChangedAndRollsBackByItselfWhenItIsBad) {
   EXPECT_EQ(status("tpr_publisher")["generation"], reports["generation"]);
 }
 
+// What no check can know, such as a camera that another program has: the service ends with exit code 2, again and
+// again.
+TEST_F(Fleet, AServiceThatRefusesItsConfigurationIsNotWaitedFor) {
+  const auto bin = folder_ / "root/opt/railfix/9.9.9/bin";
+  fs::create_directories(bin);
+  const auto script = [&](const std::string& program, const std::string& does) {
+    std::ofstream(bin / program) << "#!/bin/sh\ncase \"$*\" in *--check*) exit 0 ;; esac\n" << does;
+    fs::permissions(bin / program, fs::perms::owner_all);
+  };
+  fs::create_symlink(fs::path(RAILFIX_BIN_DIR) / "railfix-tpr-publisher", bin / "railfix-tpr-publisher");
+  const auto seconds = [](const auto& work) {
+    const int64_t begun_ns = core::monotonic_ns();
+    work();
+    return core::seconds(core::monotonic_ns() - begun_ns);
+  };
+  script("railfix-fusion", "echo 'fusion: the wheel has no pulses' >&2\nexit 2\n");
+  write_manifest("9.9.9");
+  test::Outcome refused;
+  EXPECT_LT(seconds([&] { refused = up(); }), 30);
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_EQ(refused.err,
+            "railfix: not healthy: fusion does not run: ended with exit code 2: fusion: the wheel has no pulses\n");
+
+  // One that is only slow is told while it is waited for.
+  ASSERT_EQ(train({"down", "--root", root()}).exit_code, 0);
+  script("railfix-fusion", "exec sleep 100\n");
+  const auto slow = train({"up", manifest(), "--root", root(), "--healthy-for", "1", "--patience", "8"});
+  EXPECT_EQ(slow.exit_code, 1);
+  EXPECT_THAT(slow.out, HasSubstr("waiting: fusion does not run here"));
+
+  // An upgrade to it goes back at once.
+  ASSERT_EQ(train({"down", "--root", root()}).exit_code, 0);
+  write_manifest(RAILFIX_TEST_RELEASE);
+  ASSERT_EQ(up().exit_code, 0);
+  script("railfix-fusion", "echo 'fusion: the wheel has no pulses' >&2\nexit 2\n");
+  write_manifest("9.9.9");
+  EXPECT_LT(seconds([&] { refused = upgrade(); }), 30);
+  EXPECT_THAT(refused.err,
+              HasSubstr("did not pass: fusion does not run: ended with exit code 2: fusion: the wheel has"));
+  EXPECT_THAT(refused.err, HasSubstr("runs again"));
+}
+
 // A fusion that was started beside another one has taken its place, and its file in the host's memory another name.
 TEST_F(Fleet, AfterAnUpgradeDownLeavesNothingBehind) {
   ASSERT_EQ(up().exit_code, 0);

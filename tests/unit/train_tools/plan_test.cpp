@@ -46,8 +46,9 @@ TEST_F(HostFiles, AreReadAsTheyWereWritten) {
   plan.services.clear();  // a host that every service has left
   ASSERT_TRUE(folder_.write(plan).ok());
   EXPECT_TRUE(folder_.plan()->services.empty());
-  ASSERT_TRUE(folder_.write(HostState{{"fusion", {7, 3, 1, "ended", false, 9}}}).ok());
+  ASSERT_TRUE(folder_.write(HostState{{"fusion", {7, 3, 1, "ended", false, 9, true}}}).ok());
   EXPECT_EQ(folder_.state().at("fusion").pid, 7);
+  EXPECT_TRUE(folder_.state().at("fusion").refused);
 }
 
 TEST_F(HostFiles, ThatAreDamagedAreTold) {

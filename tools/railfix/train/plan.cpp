@@ -76,7 +76,8 @@ HostState state_of(const YAML::Node& root) {
     const auto& one = entry.second;
     state[entry.first.as<std::string>()] = {one["pid"].as<int64_t>(),      one["generation"].as<int>(),
                                             one["restarts"].as<int>(),     one["last_end"].as<std::string>(),
-                                            one["beside"].as<bool>(false), one["born"].as<int64_t>(0)};
+                                            one["beside"].as<bool>(false), one["born"].as<int64_t>(0),
+                                            one["refused"].as<bool>(false)};
   }
   return state;
 }
@@ -180,6 +181,7 @@ core::Status HostFolder::write(const HostState& state) const {
     root[name]["last_end"] = service.last_end;
     root[name]["beside"] = service.beside;
     root[name]["born"] = service.born;
+    root[name]["refused"] = service.refused;
   }
   return core::write_whole_with_folders(folder_ / "state.yaml", YAML::Dump(root) + "\n");
 }

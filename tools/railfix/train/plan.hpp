@@ -53,8 +53,9 @@ struct RunningService {
   int generation = 0;
   int restarts = 0;  // since it was started with this generation
   std::string last_end;
-  bool beside = false;  // the one before still runs, and sends
-  int64_t born = 0;     // born_of(pid)
+  bool beside = false;   // the one before still runs, and sends
+  int64_t born = 0;      // born_of(pid)
+  bool refused = false;  // the process before has ended with exit code 2: what it is to work with is wrong
 
   /// It, and no later process of the same number.
   [[nodiscard]] bool runs() const;

@@ -24,6 +24,7 @@ namespace fs = std::filesystem;
 constexpr int kTurnMs = 50;
 constexpr double kStopS = 40;
 constexpr double kBackS = 60;
+constexpr int64_t kSayNs = 5 * core::kNsPerSecond;
 constexpr const char* kNotTogether =
     ", which runs here: they would not hear each other; railfix train down on every host, then up";
 
@@ -51,8 +52,9 @@ class Gate {
     const auto state = folder_.state();
     const auto found = state.find(service_);
     const int generation = plan_.service(service_)->generation;
-    const bool ours = found != state.end() && found->second.generation == generation && found->second.pid > 0 &&
-                      !found->second.beside;
+    const bool there = found != state.end() && found->second.generation == generation;
+    const bool ours = there && found->second.pid > 0 && !found->second.beside;
+    refuses_ = there && found->second.pid == 0 && found->second.refused;
     health_ = health_of(plan_, state, service_);
     const int64_t now_ns = core::monotonic_ns();
     if (!ours || !health_.healthy || is_mute() || found->second.pid != pid_) {
@@ -62,6 +64,8 @@ class Gate {
     }
     return now_ns - healthy_since_ns_ >= healthy_ns_;
   }
+  /// Nothing that it waits for would help: its configuration is wrong.
+  [[nodiscard]] bool refuses() const { return refuses_; }
   [[nodiscard]] std::string why_not() const {
     return service_ + (health_.healthy && is_mute() ? " sends nothing, and did before: " : " ") + health_.text;
   }
@@ -73,26 +77,40 @@ class Gate {
   std::string service_;
   int64_t healthy_ns_;
   bool must_send_;
+  bool refuses_ = false;
   int64_t healthy_since_ns_ = 0;
   int64_t pid_ = 0;
   service::HealthAnswer health_;
 };
 
+std::string problems_of(const std::vector<const Gate*>& gates) {
+  std::string problems;
+  for (const auto* gate : gates) problems += (problems.empty() ? "" : "; ") + gate->why_not();
+  return problems;
+}
+
 core::Status wait_healthy(const HostFolder& folder, const HostPlan& plan, const std::vector<std::string>& services,
-                          const HealthGate& gate, bool must_send = false) {
+                          const HealthGate& gate, const Say& say, bool must_send = false) {
   std::vector<Gate> gates;
   for (const auto& service : services) gates.emplace_back(folder, plan, service, gate.healthy_s, must_send);
-  const bool healthy = wait_until(gate.patience_s, [&] {
-    bool all = true;
-    for (auto& one : gates) all = one.passed() && all;
-    return all;
+  std::vector<const Gate*> closed;
+  bool refused = false;
+  int64_t say_ns = core::monotonic_ns() + kSayNs;
+  const bool ended = wait_until(gate.patience_s, [&] {
+    closed.clear();
+    for (auto& one : gates) {
+      if (!one.passed()) closed.push_back(&one);
+    }
+    refused = std::ranges::any_of(closed, &Gate::refuses);
+    if (core::monotonic_ns() > say_ns && !closed.empty() && !refused) {
+      say("waiting: " + problems_of(closed));
+      say_ns += kSayNs;
+    }
+    return closed.empty() || refused;
   });
-  if (healthy) return {};
-  std::string problems;
-  for (auto& one : gates) {
-    if (!one.passed()) problems += (problems.empty() ? "" : "; ") + one.why_not();
-  }
-  return core::Error{problems};
+  if (ended && !refused) return {};
+  if (refused) std::erase_if(closed, [](const Gate* one) { return !one->refuses(); });
+  return core::Error{problems_of(closed)};
 }
 
 // A process of its own session, so that it stays when the terminal goes.
@@ -250,13 +268,13 @@ core::Result<HostPlan> install(const Manifest& manifest, const TrainHost& host, 
   return plan;
 }
 
-core::Status bring_up(const fs::path& root, const HostPlan& plan, const HealthGate& gate) {
+core::Status bring_up(const fs::path& root, const HostPlan& plan, const HealthGate& gate, const Say& say) {
   const HostFolder folder(root);
   if (const auto written = folder.write(plan); !written.ok()) return written;
   if (!supervisor_of(folder)) {
     if (const auto started = start_supervisor(root); !started.ok()) return started;
   }
-  return wait_healthy(folder, plan, names_of(plan), gate);
+  return wait_healthy(folder, plan, names_of(plan), gate, say);
 }
 
 core::Status bring_down(const fs::path& root) {
@@ -298,12 +316,12 @@ core::Status roll_out(const fs::path& root, const HostPlan& plan, const HealthGa
     say(target != nullptr ? name + ": release " + target->release + ", generation " + std::to_string(target->generation)
                           : name + ": leaves this host");
     if (target == nullptr) continue;
-    const auto healthy = wait_healthy(folder, now, {name}, gate, sent);
+    const auto healthy = wait_healthy(folder, now, {name}, gate, say, sent);
     if (healthy.ok()) continue;
     say(healthy.error().message + "; back to generation " + std::to_string(before->generation));
     if (const auto written = folder.write(*before); !written.ok()) return written;
     const HealthGate patient{gate.healthy_s, std::max(gate.patience_s, kBackS)};
-    const auto again = wait_healthy(folder, *before, names_of(*before), patient);
+    const auto again = wait_healthy(folder, *before, names_of(*before), patient, say);
     return core::Error{"generation " + std::to_string(plan.generation) + " did not pass: " + healthy.error().message +
                        (again.ok() ? "; generation " + std::to_string(before->generation) + " runs again"
                                    : "; AND the old generation is not healthy: " + again.error().message)};

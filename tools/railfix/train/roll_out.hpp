@@ -22,15 +22,15 @@ struct HealthGate {
 };
 using Say = std::function<void(const std::string&)>;
 
-/// Starts a supervisor that outlives this process, if there is none, and waits until every service is healthy.
-core::Status bring_up(const std::filesystem::path& root, const HostPlan& plan, const HealthGate& gate);
+/// Starts a supervisor that outlives this process, if there is none, and waits until every service is healthy. Does not
+/// wait for one that ends with exit code 2, which it would do again. Says what is waited for.
+core::Status bring_up(const std::filesystem::path& root, const HostPlan& plan, const HealthGate& gate, const Say& say);
 /// Ends the supervisor and its services.
 core::Status bring_down(const std::filesystem::path& root);
 
 /// Service by service in the order of the data's way: restarts those whose entry differs from what runs now; none when
-/// they were made of other topics (IDL). When one
-/// does not pass the gate all of them go back to what ran before; then the error says which, why, and whether that
-/// worked.
+/// they were made of other topics (IDL). When one does not pass the gate all of them go back to what ran before; then
+/// the error says which, why, and whether that worked.
 core::Status roll_out(const std::filesystem::path& root, const HostPlan& plan, const HealthGate& gate, const Say& say);
 
 /// What runs on this computer is of another train than the manifest, and what to do: a sentence. Nothing when it is

@@ -34,6 +34,7 @@ constexpr int kFrozenLooks = 3;  // after a computer that stood still everybody 
 // DDS finds everybody within a second, and one that stands by counts as fit after two more (service/charge.hpp).
 constexpr int64_t kFoundNs = 3'500'000'000;
 constexpr size_t kLastWords = 300;
+constexpr int kRefuses = 2;  // exit code of a service whose configuration is wrong (service/run.cpp)
 
 std::string said_of(int wait_status) {
   if (WIFSIGNALED(wait_status)) return std::string("ended by ") + strsignal(WTERMSIG(wait_status));
@@ -102,6 +103,7 @@ void SupervisedService::adopt(const RunningService& running) {
   born_ = running.born;
   restarts_ = running.restarts;
   last_end_ = running.last_end;
+  refused_ = running.refused;
   adopted_ = true;
   well_since_ns_ = core::monotonic_ns();
   std::error_code none;
@@ -209,6 +211,7 @@ bool SupervisedService::note_end(int64_t now_ns) {
   if (!has_ended(wait_status)) return false;
   pid_ = 0;
   ++restarts_;
+  refused_ = WIFEXITED(wait_status) && WEXITSTATUS(wait_status) == kRefuses;
   last_end_ = (frozen_looks_ >= kFrozenLooks ? "was frozen, " : "") +
               (adopted_ ? "ended, how only the supervisor before knew" : said_of(wait_status));
   frozen_looks_ = 0;

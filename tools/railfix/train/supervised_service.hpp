@@ -17,7 +17,7 @@ class SupervisedService {
   SupervisedService(PlannedService service, const HostFolder& folder, const service::CommonConfig& common, bool beside);
   [[nodiscard]] const PlannedService& service() const { return service_; }
   [[nodiscard]] RunningService state() const {
-    return {pid_, service_.generation, restarts_, last_end_, beside_, born_};
+    return {pid_, service_.generation, restarts_, last_end_, beside_, born_, refused_};
   }
   /// It runs already: the supervisor before has started it, and has died.
   void adopt(const RunningService& running);
@@ -54,6 +54,7 @@ class SupervisedService {
   int64_t born_ = 0;
   bool adopted_ = false;  // another process's child
   int restarts_ = 0;
+  bool refused_ = false;
   std::string last_end_;  // told to the next process; empty = it is the first one
   std::streamoff log_began_ = 0;
   int64_t started_ns_ = 0;
