@@ -323,8 +323,11 @@ TEST_F(Fleet, TheFolderOfAnotherTrainChangesNothing) {
 TEST_F(Fleet, AMistakeInTheManifestStartsNothing) {
   write_manifest("0.0.7");
   const auto missing = up();
-  EXPECT_EQ(missing.exit_code, 2);
-  EXPECT_THAT(missing.err, HasSubstr("release 0.0.7 of fusion is not installed on this computer"));
+  EXPECT_EQ(missing.exit_code, 1);
+  EXPECT_THAT(missing.out, HasSubstr("error: release 0.0.7 of fusion is not installed on this computer"));
+  const auto checked = train({"check", manifest(), "--root", root()});
+  EXPECT_EQ(checked.exit_code, 1);
+  EXPECT_THAT(checked.out, HasSubstr("error: release 0.0.7 of fusion is not installed on this computer"));
   write_manifest(RAILFIX_TEST_RELEASE, ", fusion: { no_such_key: 1 }");
   const auto wrong = up();
   EXPECT_EQ(wrong.exit_code, 1);

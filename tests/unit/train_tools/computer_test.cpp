@@ -51,6 +51,36 @@ TEST_F(TrainFolder, AnAddressThatThisComputerHasNotIsTold) {
   EXPECT_THAT(told("127.0.0.1"), Not(Contains(HasSubstr("host cab: "))));
 }
 
+TEST_F(TrainFolder, APageThatCannotBeServedOnThisComputerIsTold) {
+  const auto told = [&](const std::string& address) {
+    auto train = manifest(kTrain).value();
+    train.settings["monitor"]["address"] = address;
+    EXPECT_THAT(check_page(train, *train.host("cab")), IsEmpty()) << "it stands in the coach";
+    const auto findings = check_page(train, *train.host("coach"));
+    return findings.empty() ? "" : (findings[0].error ? "error: " : "warning: ") + findings[0].text;
+  };
+  for (const char* right : {"", "127.0.0.1", "0.0.0.0", "::"}) EXPECT_EQ(told(right), "") << right;
+  EXPECT_THAT(told("203.0.113.7"), HasSubstr("error: settings.monitor.address: 203.0.113.7 is not an address of this"));
+  EXPECT_THAT(told("localhost"), HasSubstr("error: settings.monitor.address: localhost is no IP address"));
+}
+
+TEST_F(TrainFolder, AReleaseThatIsNotOnTheComputerIsAnError) {
+  const auto told = [&](const char* host) {
+    const auto train = manifest(kTrain).value();
+    std::vector<std::string> texts;
+    for (const auto& finding : check_computer(&train, train.host(host), folder_)) {
+      if (finding.error) texts.push_back(finding.text);
+    }
+    return texts;
+  };
+  const auto missing = HasSubstr("release 1.3.0 of fusion is not installed on this computer: " + folder_.string());
+  EXPECT_THAT(told("coach"), Contains(missing));
+  const auto bin = folder_ / "opt/railfix/1.3.0/bin";
+  fs::create_directories(bin);
+  std::ofstream(bin / "railfix-fusion") << "a program";
+  EXPECT_THAT(told("coach"), Not(Contains(missing)));
+}
+
 TEST_F(TrainFolder, SharedMemoryThatIsTooSmallForPicturesIsTold) {
   if (geteuid() != 0) GTEST_SKIP() << "needs root, for a /dev/shm of its own";
   const auto train = manifest(kTrain).value();

@@ -70,6 +70,24 @@ TEST_F(TrainFolder, TheCheckSaysWhatWouldGoWrong) {
   EXPECT_THAT(findings(), Contains(HasSubstr("line.map is missing or cannot be read; put it beside train.yaml")));
 }
 
+TEST_F(TrainFolder, AStartThatIsNotOnTheMapIsAnError) {
+  write_map();  // edge 1 of 1,000 m
+  const auto told = [&](const std::string& start, const char* map = "map: line.map") {
+    auto train = manifest(kTrain, "map: line.map", map).value();
+    train.settings["fusion"]["start"] = start;
+    std::string text;
+    for (const auto& finding : check_train(train, kNoPrograms).findings) {
+      if (finding.error && finding.text.starts_with("settings.fusion.start")) text += finding.text;
+    }
+    return text;
+  };
+  for (const char* right : {"1:100:+", "line:1000", "unknown"}) EXPECT_EQ(told(right), "");
+  EXPECT_THAT(told("9999:100"), HasSubstr("settings.fusion.start: the map has no edge \"9999\""));
+  EXPECT_THAT(told("1;100"), HasSubstr("\"1;100\" is not a place on the map; write EDGE:OFFSET"));
+  EXPECT_THAT(told("1:1000.5:+"), HasSubstr("offset 1000.5 is not on edge 1, which is 1000.0"));
+  EXPECT_THAT(told("1:100", "calibration: \"\""), HasSubstr("a place on a map, but train.map is empty"));
+}
+
 TEST_F(TrainFolder, FilesThatNoServiceCouldReadAreTold) {
   for (const char* file : {"line.map", "camera.yaml"}) std::ofstream(folder_ / file) << "what a broken copy has left";
   EXPECT_THAT(findings("map: line.map", "map: line.map\n  calibration: camera.yaml"),

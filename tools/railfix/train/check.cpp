@@ -41,15 +41,32 @@ void check_placement(const Manifest& manifest, Findings& findings) {
   needs("map_matcher", "odometry");
 }
 
+// A place that fusion does not find on its map ends it at every start.
+void check_start(const Manifest& manifest, const track::Map* map, Findings& findings) {
+  const auto start = setting_of(manifest.settings, "fusion", "start");
+  const bool other_map = !setting_of(manifest.settings, "fusion", "map").empty();  // which only the hosts have
+  if (manifest.service("fusion") == nullptr || start.empty() || start == "unknown" || other_map) return;
+  if (manifest.map.empty())
+    return error(findings, "settings.fusion.start is " + start +
+                               ", a place on a map, but train.map is empty; name a map there, or leave start out");
+  if (map == nullptr) return;  // told already
+  if (const auto place = map->parse_position(start); !place.ok())
+    error(findings,
+          "settings.fusion.start: " + place.error().message + "; leave it out, and map_matcher finds the place");
+}
+
 // A copy that was cut short would end every service that reads it.
 void check_contents(const Manifest& manifest, Findings& findings) {
   const auto is_there = [&](const std::string& name) {
     return !name.empty() && access((manifest.folder / name).c_str(), R_OK) == 0;
   };
+  std::optional<track::Map> map;
   if (is_there(manifest.map)) {
-    if (const auto map = track::Map::load(manifest.folder / manifest.map); !map.ok())
-      error(findings, "train.map: " + map.error().message);
+    auto loaded = track::Map::load(manifest.folder / manifest.map);
+    if (!loaded.ok()) error(findings, "train.map: " + loaded.error().message);
+    if (loaded.ok()) map = std::move(loaded).value();
   }
+  check_start(manifest, map ? &*map : nullptr, findings);
   if (is_there(manifest.calibration)) {
     if (const auto camera = dataset::read_calibration(manifest.folder / manifest.calibration); !camera.ok())
       error(findings, "train.calibration: " + camera.error().message);

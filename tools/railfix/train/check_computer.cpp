@@ -126,6 +126,14 @@ void check_interface(const TrainHost& host, Findings& findings) {
   }
 }
 
+// As container_problems() of their images.
+void check_programs(const Manifest& manifest, const TrainHost& host, const fs::path& root, Findings& findings) {
+  for (const auto& service : services_on(manifest, host.name)) {
+    if (const auto command = program_command(service, root, root); !command.ok())
+      error(findings, command.error().message);
+  }
+}
+
 }  // namespace
 
 std::vector<Finding> check_kernel(const fs::path& proc_sys) {
@@ -190,8 +198,11 @@ std::vector<Finding> check_computer(const Manifest* manifest, const TrainHost* h
                                                      : disk_needs(*manifest, *host, fs::absolute(root)),
               findings);
   if (host != nullptr) check_interface(*host, findings);
-  if (manifest != nullptr && host != nullptr) check_sources(*manifest, *host, root, findings);
-  if (manifest != nullptr && host != nullptr && manifest->containers) {
+  if (manifest == nullptr || host == nullptr) return findings;
+  check_sources(*manifest, *host, root, findings);
+  add(check_page(*manifest, *host));
+  if (!manifest->containers) check_programs(*manifest, *host, root, findings);
+  if (manifest->containers) {
     for (const auto& problem : container_problems(*manifest, *host)) error(findings, problem);
   }
   return findings;
