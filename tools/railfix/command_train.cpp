@@ -169,6 +169,7 @@ int status(const Options& options) {
 }
 
 int up(const Options& options) {
+  core::ok_or_throw(HostFolder(options.root).may_be_changed());
   const auto manifest = core::value_or_throw(read_manifest(options.train));
   refuse_another_train(options, manifest);
   const auto& host = chosen_host(manifest, options);
@@ -192,6 +193,7 @@ int up(const Options& options) {
 }
 
 int down(const Options& options) {
+  core::ok_or_throw(HostFolder(options.root).may_be_changed());
   const auto plan = plan_here(options);
   core::ok_or_throw(bring_down(options.root));
   std::cout << "train " << plan.train_id << ", host " << plan.host << ": stopped\n";
@@ -234,6 +236,7 @@ int diff(const Options& options) {
 }
 
 int upgrade(const Options& options) {
+  core::ok_or_throw(HostFolder(options.root).may_be_changed());
   const auto manifest = core::value_or_throw(read_manifest(options.train));
   refuse_another_train(options, manifest);
   const auto& host = chosen_host(manifest, options);
@@ -249,6 +252,7 @@ int upgrade(const Options& options) {
 }
 
 int rollback(const Options& options) {
+  core::ok_or_throw(HostFolder(options.root).may_be_changed());
   const HostFolder folder(options.root);
   const auto now = running_plan_here(options);
   const auto before = folder.plan(now.previous);

@@ -292,6 +292,30 @@ TEST_F(Fleet, AfterAnUpgradeDownLeavesNothingBehind) {
   EXPECT_THAT(in_memory("health"), ::testing::IsEmpty());
 }
 
+TEST_F(Fleet, AUserWithoutRightsIsToldHowItIsAndChangesNothing) {
+  if (geteuid() != 0) GTEST_SKIP() << "needs root, to be somebody else";
+  ASSERT_EQ(up().exit_code, 0);
+  const auto as_nobody = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {"/usr/bin/setpriv", "--reuid=65534", "--regid=65534", "--clear-groups",
+                                         RAILFIX_BIN_DIR "/railfix", "train"});
+    arguments.insert(arguments.end(), {"--root", root()});
+    return test::run_program(arguments, 60);
+  };
+  if (as_nobody({"status", "--help"}).exit_code != 0) GTEST_SKIP() << "this build's folder is not for everybody";
+  const auto told = as_nobody({"status"});
+  EXPECT_EQ(told.exit_code, 0) << told.out << told.err;
+  EXPECT_THAT(told.out, Not(HasSubstr("without supervisor")));
+  const auto refusal = "railfix: only root, or who may write to " + root() +
+                       "/var/lib/railfix-train, changes what runs here; use sudo\n";
+  for (const auto& change :
+       {std::vector<std::string>{"up", manifest()}, {"upgrade", manifest()}, {"rollback"}, {"down"}}) {
+    const auto refused = as_nobody(change);
+    EXPECT_EQ(refused.exit_code, 2);
+    EXPECT_EQ(refused.err, refusal);
+    EXPECT_EQ(refused.out, "");
+  }
+}
+
 TEST_F(Fleet, TheFolderOfAnotherTrainChangesNothing) {
   ASSERT_EQ(up().exit_code, 0);
   const auto before = status();

@@ -102,6 +102,14 @@ fs::path HostFolder::generation(int number) const {
   return folder_ / "generations" / std::to_string(number);
 }
 
+core::Status HostFolder::may_be_changed() const {
+  std::error_code none;
+  fs::path there = folder_;
+  while (!fs::exists(there, none) && there.has_relative_path()) there = there.parent_path();
+  if (there.empty() || access(there.c_str(), W_OK) == 0) return {};
+  return core::Error{"only root, or who may write to " + there.string() + ", changes what runs here; use sudo"};
+}
+
 int HostFolder::newest_generation() const {
   int newest = 0;
   std::error_code none;

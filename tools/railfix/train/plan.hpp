@@ -81,6 +81,8 @@ class HostFolder {
   [[nodiscard]] std::filesystem::path plan_file() const { return folder_ / "plan.yaml"; }
   [[nodiscard]] std::filesystem::path lock() const { return folder_ / "supervisor.lock"; }
   [[nodiscard]] int newest_generation() const;
+  /// Error: this user may not change what runs here.
+  [[nodiscard]] core::Status may_be_changed() const;
 
   /// Nothing when no train was brought up here. Of all these and state(): throws BadInput, a sentence with the file and
   /// the way out, when the file is damaged.

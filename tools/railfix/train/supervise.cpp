@@ -23,6 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kTurnMs = 20;
+constexpr int kLockTries = 10;
 // A participant that died is forgotten after 5 s, and then nobody has its pictures mapped.
 constexpr int64_t kForgottenNs = 10 * core::kNsPerSecond;
 constexpr int64_t kStopNs = 10 * core::kNsPerSecond;
@@ -219,10 +220,23 @@ class Supervision {
 
 }  // namespace
 
+namespace {
+
+// Who asks whether there is a supervisor holds the lock for a moment, too.
+bool is_ours(int lock) {
+  for (int tries = 0; tries < kLockTries; ++tries) {
+    if (flock(lock, LOCK_EX | LOCK_NB) == 0) return true;
+    poll(nullptr, 0, kTurnMs);
+  }
+  return false;
+}
+
+}  // namespace
+
 void supervise(const HostFolder& folder) {
   fs::create_directories(folder.lock().parent_path());
   const int lock = open(folder.lock().c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
-  if (lock < 0 || flock(lock, LOCK_EX | LOCK_NB) != 0) {
+  if (lock < 0 || !is_ours(lock)) {
     throw core::BadInput(folder.lock().string() +
                          " is held: a supervisor runs here already, or this user may not write there");
   }
@@ -241,9 +255,9 @@ void supervise(const HostFolder& folder) {
 }
 
 std::optional<int64_t> supervisor_of(const HostFolder& folder) {
-  const int lock = open(folder.lock().c_str(), O_RDWR | O_CLOEXEC);
+  const int lock = open(folder.lock().c_str(), O_RDONLY | O_CLOEXEC);  // anybody may ask
   if (lock < 0) return std::nullopt;
-  const bool free = flock(lock, LOCK_EX | LOCK_NB) == 0;
+  const bool free = flock(lock, LOCK_SH | LOCK_NB) == 0;
   char text[32] = {};
   const auto bytes = pread(lock, text, sizeof(text) - 1, 0);
   close(lock);
