@@ -257,7 +257,8 @@ int rollback(const Options& options) {
   const auto now = running_plan_here(options);
   const auto before = folder.plan(now.previous);
   if (now.previous == 0 || !before)
-    throw core::BadInput("there is no generation before " + std::to_string(now.generation));
+    throw core::BadInput("there is no generation before " + std::to_string(now.generation) +
+                         "; railfix train upgrade brings what train.yaml says");
   const auto done = roll_out(options.root, *before, options.gate, say_at_once);
   if (!done.ok()) throw std::runtime_error(done.error().message);
   std::cout << "generation " << before->generation << " runs again\n";
@@ -355,7 +356,7 @@ void add_train(CLI::App& app, Action& chosen) {
   add("upgrade",
       "Bring this computer to the manifest, service by service; back by itself when one does not get healthy", upgrade,
       kManifest | kHost | kRoot | kGate);
-  add("rollback", "Back to the generation before the last upgrade", rollback, kRoot | kGate);
+  add("rollback", "Back to the generation before; once more: further back", rollback, kRoot | kGate);
   add("supervise", "Keep this computer's services running; what systemd starts", supervise_here, kRoot);
 
   auto* computer = app.add_subcommand("doctor", "Say what is wrong with this computer as a host of a train");

@@ -281,6 +281,22 @@ TEST_F(Fleet, AServiceThatRefusesItsConfigurationIsNotWaitedFor) {
   EXPECT_THAT(refused.err, HasSubstr("runs again"));
 }
 
+TEST_F(Fleet, ARollbackGoesFurtherBackAndNeverToWhatItCameFrom) {
+  ASSERT_EQ(up().exit_code, 0);
+  for (const char* engine : {"4711", "4712"}) {
+    write_manifest(RAILFIX_TEST_RELEASE, std::string(", tpr_publisher: { nid_engine: ") + engine + " }");
+    ASSERT_EQ(upgrade().exit_code, 0);
+  }
+  const auto back = [&] { return train({"rollback", "--root", root(), "--healthy-for", "1", "--patience", "60"}); };
+  EXPECT_THAT(back().out, HasSubstr("generation 2 runs again"));
+  EXPECT_THAT(back().out, HasSubstr("generation 1 runs again"));
+  const auto end = back();
+  EXPECT_EQ(end.exit_code, 2);
+  EXPECT_THAT(end.err, HasSubstr("there is no generation before 1; railfix train upgrade "));
+  ASSERT_EQ(upgrade().exit_code, 0);
+  EXPECT_THAT(back().out, HasSubstr("generation 1 runs again"));
+}
+
 // A fusion that was started beside another one has taken its place, and its file in the host's memory another name.
 TEST_F(Fleet, AfterAnUpgradeDownLeavesNothingBehind) {
   ASSERT_EQ(up().exit_code, 0);

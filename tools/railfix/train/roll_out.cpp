@@ -307,7 +307,7 @@ core::Status roll_out(const fs::path& root, const HostPlan& plan, const HealthGa
   if (const auto found = misfit(plan.services, before->services)) return core::Error{*found + kNotTogether};
   auto now = *before;
   now.generation = plan.generation;
-  now.previous = before->generation;
+  now.previous = plan.previous;  // after a rollback the one before that one, and not what was rolled back from
   for (const auto& name : changed_services(*before, plan)) {
     const bool sent = health_of(now, folder.state(), name).sends;
     now = with_service(now, plan, name);
