@@ -105,6 +105,8 @@ int check(const Options& options) {
 int render(const Options& options) {
   const auto manifest = core::value_or_throw(read_manifest(options.train));
   if (!say(checked(manifest, options).findings)) return 1;
+  for (const auto& other : remove_secrets_of_others(manifest, options.out))
+    std::cout << other.string() << ": is of no host of train " << manifest.train_id << "; its keys are removed\n";
   for (const auto& host : manifest.hosts) {
     core::ok_or_throw(render_host(manifest, host, options.out / host.name));
     std::cout << host.name << " (" << host.address << "): " << (options.out / host.name).string() << '\n';

@@ -70,6 +70,38 @@ TEST_F(TrainFolder, CertificatesAndPasswordsOfTheGroundLinkComeAlong) {
   }));
 }
 
+TEST_F(TrainFolder, KeysThatWereRenderedBeforeDoNotStay) {
+  write_map();
+  std::ofstream(folder_ / "word") << "secret";
+  auto train = manifest(kTrain, "settings:\n", "settings:\n  monitor: { token_file: word }\n").value();
+  const auto out = folder_ / "out";
+  const auto security = out / "coach/security";
+  train.security = true;
+  for (const char* host : {"cab", "coach"}) {
+    fs::create_directories(folder_ / "security" / host);
+    std::ofstream(folder_ / "security" / host / "fusion.key.pem") << "new";
+    ASSERT_TRUE(render_host(train, *train.host(host), out / host).ok());
+  }
+  for (const char* file : {"fusion.key.pem", "odometry.key.pem", "odometry.permissions.p7s", "notes.txt"})
+    std::ofstream(security / file) << "old";
+  fs::create_directories(out / "other/security");
+  std::ofstream(out / "other/security/mine.key.pem") << "foreign";
+  ASSERT_TRUE(render_host(train, *train.host("coach"), out / "coach").ok());
+  EXPECT_EQ(test::slurp(security / "fusion.key.pem"), "new");
+  for (const char* file : {"odometry.key.pem", "odometry.permissions.p7s"}) EXPECT_FALSE(fs::exists(security / file));
+  EXPECT_TRUE(fs::exists(security / "notes.txt")) << "somebody else's";
+
+  // A train without certificates and without that host.
+  train = manifest(kTrain).value();
+  ASSERT_TRUE(render_host(train, *train.host("coach"), out / "coach").ok());
+  EXPECT_FALSE(fs::exists(security / "fusion.key.pem"));
+  EXPECT_FALSE(fs::exists(out / "coach/files/monitor.token_file"));
+  train.hosts.erase(train.hosts.begin());
+  EXPECT_THAT(remove_secrets_of_others(train, out), ElementsAre(out / "cab"));
+  EXPECT_FALSE(fs::exists(out / "cab/security/fusion.key.pem"));
+  EXPECT_TRUE(fs::exists(out / "other/security/mine.key.pem")) << "nothing was rendered there";
+}
+
 TEST_F(TrainFolder, ThePageIsOnTheTrainNetworkOnly) {
   write_map();
   const auto train = manifest(kTrain).value();

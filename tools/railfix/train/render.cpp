@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <fstream>
 #include <sstream>
 
 #include "core/fnv.hpp"
@@ -64,6 +65,26 @@ YAML::Node settings_on(const Manifest& manifest, const TrainHost& host, const st
   return settings;
 }
 
+bool is_secret(const fs::path& file) {
+  const auto place = file.parent_path().filename();
+  if (place == "files") return is_file_on_host(file);
+  return place == "security" && (file.extension() == ".pem" || file.extension() == ".p7s");
+}
+
+// Of what was rendered into this folder before. Files of others stay.
+bool remove_secrets(const fs::path& folder) {
+  bool removed = false;
+  std::error_code none;
+  for (const char* name : {"security", "files"}) {
+    std::vector<fs::path> secrets;
+    for (const auto& entry : fs::directory_iterator(folder / name, none)) {
+      if (is_secret(entry.path())) secrets.push_back(entry.path());
+    }
+    for (const auto& secret : secrets) removed = fs::remove(secret, none) || removed;
+  }
+  return removed;
+}
+
 // The keys of this host: the owner and the services' group may read them.
 core::Status copy_files(const Manifest& manifest, const TrainHost& host, const fs::path& folder) {
   const auto options = fs::copy_options::overwrite_existing | fs::copy_options::recursive;
@@ -112,6 +133,18 @@ std::string fingerprint(const fs::path& path) {
 }
 
 }  // namespace
+
+std::vector<fs::path> remove_secrets_of_others(const Manifest& manifest, const fs::path& out) {
+  std::vector<fs::path> others;
+  std::error_code none;
+  for (const auto& entry : fs::directory_iterator(out, none)) {
+    if (manifest.host(entry.path().filename().string()) != nullptr) continue;
+    std::string first;
+    std::getline(std::ifstream(entry.path() / "config.yaml"), first);
+    if (first == std::string("# ") + kMade && remove_secrets(entry.path())) others.push_back(entry.path());
+  }
+  return others;
+}
 
 std::vector<std::string> service_arguments(const HostedService& service) {
   if (service.strength == 0) return {};
@@ -209,6 +242,7 @@ core::Status render_host(const Manifest& manifest, const TrainHost& host, const 
   std::error_code failed;
   fs::create_directories(folder, failed);
   if (failed) return core::Error{folder.string() + " cannot be made: " + failed.message()};
+  remove_secrets(folder);  // another train's, or of a service that has gone
   if (const auto copied = copy_files(manifest, host, folder); !copied.ok()) return copied;
   for (const auto& [name, text] :
        std::map<std::string, std::string>{{"config.yaml", render_config(manifest, host, at)},

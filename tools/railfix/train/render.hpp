@@ -17,8 +17,11 @@ std::vector<HostedService> services_on(const Manifest& manifest, const std::stri
 std::vector<std::string> service_arguments(const HostedService& service);
 
 /// Fills `folder` with everything that this host needs: config.yaml, map, calibration, qos profiles, security/,
-/// compose.yaml, systemd/railfix.service, systemd/60-railfix.conf. Error: a file that cannot be copied or written.
+/// compose.yaml, systemd/railfix.service, systemd/60-railfix.conf. Keys and passwords that were rendered there before
+/// go. Error: a file that cannot be copied or written.
 core::Status render_host(const Manifest& manifest, const TrainHost& host, const std::filesystem::path& folder);
+/// Removes them from what was rendered into other folders of `out`, for hosts that this train has not. Gives these.
+std::vector<std::filesystem::path> remove_secrets_of_others(const Manifest& manifest, const std::filesystem::path& out);
 
 /// The configuration of all services on this host, for files that lie in `folder` there.
 std::string render_config(const Manifest& manifest, const TrainHost& host, const std::string& folder);

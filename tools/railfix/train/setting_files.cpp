@@ -1,5 +1,7 @@
 #include "train/setting_files.hpp"
 
+#include <algorithm>
+
 namespace railfix::tool {
 namespace {
 
@@ -46,6 +48,14 @@ std::vector<SettingFile> files_named(const YAML::Node& settings) {
 }
 
 }  // namespace
+
+bool is_file_on_host(const std::filesystem::path& file) {
+  const auto name = file.filename().string();
+  return std::ranges::any_of(kPlaces, [&](const Place& place) {
+    const auto usual = std::string(place.service) + "." + key_of(place);
+    return name == usual || name.starts_with(usual + ".");
+  });
+}
 
 YAML::Node installed_settings(const std::filesystem::path& generation) {
   try {

@@ -19,6 +19,9 @@ struct SettingFile {
   }
 };
 
+/// Named as one of them is on a host.
+bool is_file_on_host(const std::filesystem::path& file);
+
 /// The settings of a generation; empty when they cannot be read, which others say.
 YAML::Node installed_settings(const std::filesystem::path& generation);
 /// The text of "key" or "group.key" in a service's section; empty when it is not given.
