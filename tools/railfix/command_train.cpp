@@ -116,10 +116,8 @@ int render(const Options& options) {
 
 int keys(const Options& options) {
   const auto manifest = core::value_or_throw(read_manifest(options.train));
-  for (const auto& folder : core::value_or_throw(make_keys(manifest, options.keys)))
-    std::cout << "keys of one host: " << folder.string() << '\n';
-  std::cout << "the authority's key stays with you: " << (manifest.folder / "security" / "authority").string()
-            << "; never copy it to the train\n";
+  const auto done = core::value_or_throw(make_keys(manifest, options.keys));
+  for (const auto& line : told_of_keys(manifest, options.keys, done)) std::cout << line << '\n';
   return 0;
 }
 

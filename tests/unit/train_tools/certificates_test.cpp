@@ -13,6 +13,7 @@ namespace {
 using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::ElementsAre;
+using ::testing::EndsWith;
 using ::testing::Field;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -94,14 +95,44 @@ TEST_F(TrainFolder, NoOtherAuthorityIsMadeWhereTheOneOfTheCertificatesIsNot) {
   for (const bool renew : {false, true}) {
     const auto refused = make_keys(secured, {.renew = renew});
     ASSERT_FALSE(refused.ok());
-    EXPECT_THAT(refused.error().message, AllOf(HasSubstr("authority/ca.key.pem is not here, and "),
-                                               HasSubstr("has certificates by that authority"),
-                                               HasSubstr("If it is lost: railfix train keys --next-authority")));
+    EXPECT_THAT(
+        refused.error().message,
+        AllOf(HasSubstr("authority/ca.key.pem is not here, and "), HasSubstr("has certificates by that authority"),
+              HasSubstr("If it is lost: railfix train keys " + folder_.string() + " --next-authority")));
   }
   EXPECT_EQ(test::slurp(folder_ / "security/cab/ca.pem"), trusted);
   EXPECT_FALSE(fs::exists(folder_ / "security/authority"));
   fs::rename(folder_ / "aside", folder_ / "security/authority");
   EXPECT_TRUE(make_keys(secured, {.renew = true}).ok());
+}
+
+TEST_F(TrainFolder, KeysSayWhatWasDoneAndWhatComesNext) {
+  const auto secured = manifest(kTrain, "run_as: programs", "security: true").value();
+  const auto keys = "railfix train keys " + folder_.string();
+  const auto told = [&](const KeysOptions& options) {
+    const auto done = make_keys(secured, options);
+    if (!done.ok()) return std::vector<std::string>{"refused: " + done.error().message};
+    return told_of_keys(secured, options, done.value());
+  };
+  const auto to_hosts = [](const std::string& verb) {
+    return AllOf(HasSubstr("next: copy "), EndsWith("railfix train " + verb));
+  };
+  EXPECT_THAT(told({}), ElementsAre(HasSubstr("made: the train's authority; its key stays with you"),
+                                    HasSubstr("made: 14 certificates for cab, coach, in " + folder_.string()),
+                                    to_hosts("up, or upgrade where it runs")));
+  EXPECT_THAT(told({}), ElementsAre("nothing to do: all certificates are there; --renew makes new ones"));
+  EXPECT_THAT(told({.renew = true}), ElementsAre(HasSubstr("renewed: 14 certificates"), to_hosts("upgrade")));
+  EXPECT_THAT(told({.drop_authority = true}), ElementsAre(HasSubstr("begin an exchange with " + keys + " --next-a")));
+  EXPECT_THAT(told({.next_authority = true}),
+              ElementsAre(HasSubstr("made: a second authority"),
+                          to_hosts("upgrade; when every host has done it: " + keys + " --renew")));
+  EXPECT_THAT(told({.drop_authority = true}),
+              ElementsAre(AllOf(HasSubstr("refused: the next authority of "), HasSubstr("has signed nothing yet"),
+                                HasSubstr(keys + " --renew, then railfix train upgrade on every host, come first"))));
+  EXPECT_THAT(told({.renew = true}),
+              ElementsAre(EndsWith(", by the next authority"),
+                          to_hosts("upgrade; when every host has done it: " + keys + " --drop-authority")));
+  EXPECT_THAT(told({.drop_authority = true}), ElementsAre(HasSubstr("dropped: the former"), to_hosts("upgrade")));
 }
 
 TEST_F(TrainFolder, PermissionsThatDoNotFitAreTold) {

@@ -9,6 +9,7 @@
 #include <optional>
 #include <set>
 
+#include "core/joined.hpp"
 #include "core/whole_file.hpp"
 #include "train/render.hpp"
 #include "train/topic_rights.hpp"
@@ -78,26 +79,32 @@ class Authority {
     return core::Error{certificate("ca").string() + " cannot be made of " + trusted_by_host.string()};
   }
   [[nodiscard]] bool has_next() const { return fs::exists(key("next")); }
+  [[nodiscard]] bool has_former() const { return fs::exists(certificate("former")); }
   core::Status make_next(const std::string& train_id) const {
     if (fs::exists(certificate("next")))
-      return core::Error{certificate("next").string() + " is there already; go on with railfix train keys --renew"};
+      return core::Error{certificate("next").string() + " is there already; go on with " + keys_command() + " --renew"};
     if (fs::exists(certificate("former")))
-      return core::Error{certificate("former").string() +
-                         " is still trusted; end that exchange with railfix train keys --drop-authority"};
+      return core::Error{certificate("former").string() + " is still trusted; end that exchange with " +
+                         keys_command() + " --drop-authority"};
     return make("next", train_id);
   }
-  /// From now on the next one signs, if there is one.
-  void take_over() const {
-    if (!fs::exists(certificate("next"))) return;
+  /// From now on the next one signs; false when there is none.
+  [[nodiscard]] bool take_over() const {
+    if (!fs::exists(certificate("next"))) return false;
     fs::rename(certificate("ca"), certificate("former"));
     fs::remove(key("ca"));
     fs::rename(key("next"), key("ca"));
     fs::rename(certificate("next"), certificate("ca"));
+    return true;
   }
   core::Status drop() const {
     if (fs::remove(certificate("former"))) return {};
-    return core::Error{"there is no former authority of " + folder_.string() +
-                       "; begin an exchange with railfix train keys --next-authority"};
+    if (has_next())
+      return core::Error{"the next authority of " + folder_.string() +
+                         " has signed nothing yet, so the former one is still needed: " + keys_command() +
+                         " --renew, then railfix train upgrade on every host, come first"};
+    return core::Error{"there is no former authority of " + folder_.string() + "; begin an exchange with " +
+                       keys_command() + " --next-authority"};
   }
 
   core::Status issue(const std::string& name, const fs::path& certificate_file, const fs::path& key_file,
@@ -130,6 +137,10 @@ class Authority {
 
  private:
   [[nodiscard]] fs::path certificate(const std::string& name) const { return folder_ / (name + ".pem"); }
+  // FOLDER/security/authority is ours.
+  [[nodiscard]] std::string keys_command() const {
+    return "railfix train keys " + folder_.parent_path().parent_path().string();
+  }
   [[nodiscard]] fs::path key(const std::string& name) const { return folder_ / (name + ".key.pem"); }
   // All authorities of a train have one name: Fast DDS 2.9.1 refuses who got his permissions from one of another name.
   core::Status make(const std::string& name, const std::string& train_id) const {
@@ -153,20 +164,22 @@ class Authority {
   fs::path folder_;
 };
 
-// A service's certificate, key and permissions in the folder of its host.
-core::Status make_identity(const Manifest& manifest, const Authority& authority, const fs::path& folder,
-                           const std::string& service, const std::string& host, const KeysOptions& options) {
+// A service's certificate, key and permissions in the folder of its host; false when they are there.
+core::Result<bool> make_identity(const Manifest& manifest, const Authority& authority, const fs::path& folder,
+                                 const std::string& service, const std::string& host, const KeysOptions& options) {
   const auto certificate = folder / (service + ".cert.pem");
   const auto key = folder / (service + ".key.pem");
   const auto permissions = folder / (service + ".permissions.p7s");
-  if (fs::exists(certificate) && fs::exists(key) && fs::exists(permissions) && !options.renew) return {};
+  if (fs::exists(certificate) && fs::exists(key) && fs::exists(permissions) && !options.renew) return false;
   auto status = authority.issue(service + "@" + host, certificate, key, options.valid_days);
-  if (!status.ok()) return status;
+  if (!status.ok()) return status.error();
   fs::permissions(key, fs::perms::owner_read | fs::perms::owner_write | fs::perms::group_read);
   const std::time_t now = std::time(nullptr);
-  return authority.sign(
+  status = authority.sign(
       permissions_xml(manifest, service, host, xml_time(now - 86400), xml_time(now + options.valid_days * 86400)),
       permissions);
+  if (!status.ok()) return status.error();
+  return true;
 }
 
 std::string topic_rule(const std::string& expression, bool protect) {
@@ -236,8 +249,8 @@ core::Status have_authority(const Authority& authority, const Manifest& manifest
   return core::Error{(folder / "authority/ca.key.pem").string() + " is not here, and " +
                      trusted->parent_path().string() +
                      " has certificates by that authority; run this where the train's keys were made, or copy " +
-                     (folder / "authority").string() +
-                     " from there. If it is lost: railfix train keys --next-authority, which begins its exchange"};
+                     (folder / "authority").string() + " from there. If it is lost: railfix train keys " +
+                     manifest.folder.string() + " --next-authority, which begins its exchange"};
 }
 
 }  // namespace
@@ -299,32 +312,62 @@ MissingRights missing_rights(const Manifest& manifest, const std::string& servic
   return missing;
 }
 
-core::Result<std::vector<fs::path>> make_keys(const Manifest& manifest, const KeysOptions& options) {
+core::Result<KeysDone> make_keys(const Manifest& manifest, const KeysOptions& options) {
   const fs::path folder = manifest.folder / "security";
   Authority authority(folder / "authority");
+  KeysDone done;
+  done.first = !authority.can_sign() && !trusted_by_a_host(folder);
   auto status = have_authority(authority, manifest, folder, options);
   if (status.ok() && options.next_authority) status = authority.make_next(manifest.train_id);
   if (status.ok() && options.drop_authority) status = authority.drop();
   if (!status.ok()) return status.error();
-  if (options.renew) authority.take_over();
-  std::vector<fs::path> made;
+  if (options.renew) done.next_signs = authority.take_over();
+  done.is_exchanging = authority.has_next() || authority.has_former();
   for (const auto& host : manifest.hosts) {
     const auto here = folder / host.name;
     fs::create_directories(here);
     status = core::write_whole(here / "ca.pem", authority.trusted());
     if (!status.ok()) return status.error();
-    made.push_back(here);
     if (!authority.can_sign()) continue;  // what it has signed stays valid
     status = authority.sign(governance_xml(manifest), here / "governance.p7s");
     if (!status.ok()) return status.error();
     std::vector<std::string> services{kOperator, "onboard"};
     for (const auto& service : services_on(manifest, host.name)) services.push_back(service.name);
     for (const auto& service : services) {
-      status = make_identity(manifest, authority, here, service, host.name, options);
-      if (!status.ok()) return status.error();
+      const auto made = make_identity(manifest, authority, here, service, host.name, options);
+      if (!made.ok()) return made.error();
+      done.certificates += made.value() ? 1 : 0;
     }
   }
-  return made;
+  return done;
+}
+
+std::vector<std::string> told_of_keys(const Manifest& manifest, const KeysOptions& options, const KeysDone& done) {
+  const std::string folder = manifest.folder.string();
+  const std::string keys = "railfix train keys " + folder;
+  const std::string count = std::to_string(done.certificates) + " certificates for " +
+                            core::joined(manifest.hosts, &TrainHost::name) + ", in " + folder + "/security";
+  std::vector<std::string> lines;
+  if (done.first)
+    lines.push_back("made: the train's authority; its key stays with you, in " + folder +
+                    "/security/authority, and never goes to the train");
+  if (options.next_authority) lines.emplace_back("made: a second authority, which every host is to trust from now on");
+  if (options.drop_authority) lines.emplace_back("dropped: the former authority, which no host is to trust any more");
+  if (options.renew) {
+    lines.push_back("renewed: " + count + (done.next_signs ? ", by the next authority" : ""));
+  } else if (done.certificates > 0) {
+    lines.push_back("made: " + count);
+  }
+  if (lines.empty()) return {"nothing to do: all certificates are there; --renew makes new ones"};
+  const std::string copy = "next: copy " + folder + " to each host (without security/authority), there railfix train ";
+  if (options.next_authority) {
+    lines.push_back(copy + "upgrade; when every host has done it: " + keys + " --renew");
+  } else if (options.renew && done.is_exchanging) {
+    lines.push_back(copy + "upgrade; when every host has done it: " + keys + " --drop-authority");
+  } else {
+    lines.push_back(copy + (options.renew || options.drop_authority ? "upgrade" : "up, or upgrade where it runs"));
+  }
+  return lines;
 }
 
 }  // namespace railfix::tool

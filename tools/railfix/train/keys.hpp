@@ -30,9 +30,19 @@ struct MissingRights {
 MissingRights missing_rights(const Manifest& manifest, const std::string& service, const std::string& host,
                              const std::filesystem::path& signed_file);
 
+/// What make_keys() has done.
+struct KeysDone {
+  size_t certificates = 0;     // made, or made anew
+  bool first = false;          // with a new authority
+  bool next_signs = false;     // the next authority has taken over; the former one is still trusted
+  bool is_exchanging = false;  // two authorities are trusted
+};
+
 /// Fills FOLDER/security/<host>/ for every host and FOLDER/security/authority/ with the authority, whose key stays with
-/// the operator. What is there stays unless it is renewed. Gives the folders of the hosts. Error: openssl is missing or
-/// refuses; an exchange of the authority out of turn.
-core::Result<std::vector<std::filesystem::path>> make_keys(const Manifest& manifest, const KeysOptions& options);
+/// the operator. What is there stays unless it is renewed. Error: openssl is missing or refuses; an exchange of the
+/// authority out of turn.
+core::Result<KeysDone> make_keys(const Manifest& manifest, const KeysOptions& options);
+/// What was done and what comes next, for the operator: a line each.
+std::vector<std::string> told_of_keys(const Manifest& manifest, const KeysOptions& options, const KeysDone& done);
 
 }  // namespace railfix::tool
