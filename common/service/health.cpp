@@ -106,7 +106,7 @@ void PublishedHealth::publish() {
   published_ = said();
   writer_.write(published_);
   traffic_.stands_by = !stands_by_.empty();
-  file_.write(published_, traffic_);
+  file_.write(published_, traffic_, serves_);
 }
 
 msg::ServiceStatus PublishedHealth::said() const {

@@ -25,6 +25,7 @@ class PublishedHealth final : public Health {
   void output(int64_t grabbed_ns) override;
   void dropped(uint64_t count) override { status_.dropped(status_.dropped() + count); }
   void flows(Flow flow) override { traffic_.flow = flow; }
+  void serves(const std::string& address) override { serves_ = address; }
 
   /// Empty = it is in charge.
   void stands_by(const std::string& sentence);
@@ -49,6 +50,7 @@ class PublishedHealth final : public Health {
   msg::ServiceStatus published_;
   std::string stands_by_;
   Traffic traffic_;
+  std::string serves_;
   std::array<std::string, 3> troubles_;
   std::vector<double> latencies_ms_;  // since the last measurement
   int64_t measured_ns_ = 0;

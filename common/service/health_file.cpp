@@ -70,12 +70,13 @@ HealthFile::~HealthFile() {
   unlink(path_.c_str());
 }
 
-void HealthFile::write(const msg::ServiceStatus& status, const Traffic& traffic) {
+void HealthFile::write(const msg::ServiceStatus& status, const Traffic& traffic, const std::string& serves) {
   std::ostringstream words;
   words << static_cast<int>(status.state()) << '\n'
         << status.reason().c_str() << '\n'
         << static_cast<int>(traffic.flow) << ' ' << traffic.stands_by << ' ' << traffic.input_since_ns << ' '
-        << traffic.last_input_ns << ' ' << traffic.last_output_ns;
+        << traffic.last_input_ns << ' ' << traffic.last_output_ns << '\n'
+        << serves;
   words_ = words.str();
   beat();
 }
@@ -119,6 +120,7 @@ HealthAnswer ask_health(const std::filesystem::path& path) {
                       .degraded = state == msg::STATE_DEGRADED,
                       .text = text};
   judge_traffic(in, said_ns, answer);
+  in >> answer.serves;
   return answer;
 }
 

@@ -36,7 +36,7 @@ class HealthFile {
 
   /// Over what stood there; takes memory at the first call only, so that a full /dev/shm later does not silence it.
   /// What cannot be written is left out: the check says so.
-  void write(const msg::ServiceStatus& status, const Traffic& traffic = {});
+  void write(const msg::ServiceStatus& status, const Traffic& traffic = {}, const std::string& serves = "");
   /// The same words are true now; nothing before the first ones.
   void beat();
 
@@ -54,9 +54,10 @@ struct HealthAnswer {
   bool starting = false;  // it does not wait for input yet
   bool degraded = false;
   bool stands_by = false;
-  bool sends = false;  // one that sends steadily has done so within the last two seconds
-  bool stuck = false;  // one that answers every input has had input for two seconds and answered none of it
-  std::string text;    // one sentence
+  bool sends = false;       // one that sends steadily has done so within the last two seconds
+  bool stuck = false;       // one that answers every input has had input for two seconds and answered none of it
+  std::string text;         // one sentence
+  std::string serves = {};  // address of its page; empty = it has none, or does not say it
 };
 /// Healthy: its run loop turned within the last two seconds and it has not failed. Degraded is healthy: a restart would
 /// not help; so is stuck: a camera may lack its calibration still.

@@ -67,7 +67,8 @@ class Health {
   virtual void input() = 0;                     // one input sample used
   virtual void output(int64_t grabbed_ns) = 0;  // one output sent; grabbed_ns of the input behind it, 0 = none
   virtual void dropped(uint64_t count) = 0;
-  virtual void flows(Flow flow) = 0;  // sporadic until said
+  virtual void flows(Flow flow) = 0;                    // sporadic until said
+  virtual void serves(const std::string& address) = 0;  // a page, for who asks on this host
 };
 
 /// What a service that may have a standby says and hears of it.

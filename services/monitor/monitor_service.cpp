@@ -88,6 +88,7 @@ MonitorService::MonitorService(const Config& config, service::Context& context)
     context_.log().info("the page is at {}", address_);
   }
   if (const std::string said = exposure(); !said.empty()) context_.log().warn("{}", said);
+  context_.health().serves(address_);
   context_.on_command("address", [this](const std::string&) { return core::Result<std::string>(address_); });
   context_.at_restart([this](int64_t) { restart(); });
   start_timers();

@@ -135,11 +135,13 @@ int status(const Options& options) {
                               {"down", plan.down},
                               {"services", nlohmann::ordered_json::array()}};
   std::string table;
+  std::string page;  // another port than the configured one, when that was taken
   for (const auto& service : plan.services) {
     const auto found = state.find(service.name);
     const RunningService process = found == state.end() || !runs ? RunningService{} : found->second;
     const auto health = health_of(plan, runs ? state : HostState{}, service.name);
     healthy = healthy && health.healthy;
+    page += health.serves;
     json["services"].push_back({{"service", service.name},
                                 {"release", service.release},
                                 {"generation", service.generation},
@@ -153,6 +155,7 @@ int status(const Options& options) {
                   service.generation, static_cast<long long>(process.pid), process.restarts);
     table += line + health.text + (service.standby ? " (configured as standby)" : "") + "\n";
   }
+  if (!page.empty()) json["page"] = page;
   if (options.json) {
     std::cout << json.dump(2) << '\n';
   } else {
@@ -163,7 +166,7 @@ int status(const Options& options) {
                                : ", not running: railfix train up")
               << "\n"
               << "service         release    generation      pid restarts  health\n"
-              << table;
+              << table << (page.empty() ? "" : "the page is at " + page + "\n");
   }
   return healthy ? 0 : 1;
 }

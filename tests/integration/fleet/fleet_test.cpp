@@ -1,7 +1,9 @@
 // A train comes up, goes down, is changed, and survives its supervisor.
+#include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/socket.h>
 
 #include <algorithm>
 #include <atomic>
@@ -373,6 +375,36 @@ TEST_F(Fleet, AMistakeInTheManifestStartsNothing) {
   EXPECT_EQ(wrong.exit_code, 1);
   EXPECT_THAT(wrong.out, HasSubstr("fusion.no_such_key is not a key of this section"));
   EXPECT_EQ(train({"status", "--root", root()}).exit_code, 2) << "something was started";
+}
+
+TEST_F(Fleet, ThePageIsSaidWhereItIsAndNotWhereItWasToBe) {
+  const int other = socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in at{};
+  at.sin_family = AF_INET;
+  at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t bytes = sizeof(at);
+  ASSERT_EQ(bind(other, reinterpret_cast<const sockaddr*>(&at), bytes), 0);
+  ASSERT_EQ(listen(other, 1), 0);
+  ASSERT_EQ(getsockname(other, reinterpret_cast<sockaddr*>(&at), &bytes), 0);
+  const auto port = std::to_string(ntohs(at.sin_port));
+  std::ofstream(folder_ / "train" / "train.yaml")
+      << "train:\n  id: " << id_ << "\n  domain: 95\n  release: " RAILFIX_TEST_RELEASE
+      << "\n  run_as: programs\n  hosts: { cab: { address: 127.0.0.1 } }\n  services: { monitor: cab }\n"
+         "settings: { common: { log_level: error }, monitor: { foxglove_port: 0, port: "
+      << port << " } }\n";
+  const auto started = up();
+  EXPECT_EQ(started.exit_code, 0) << started.out << started.err;
+  EXPECT_THAT(started.out, HasSubstr("warning: settings.monitor.port: " + port + " is taken on this computer"));
+  EXPECT_THAT(started.out, HasSubstr("the page is at http://127.0.0.1:"));
+  EXPECT_THAT(started.out, Not(HasSubstr("the page is at http://127.0.0.1:" + port + "/")));
+  const auto page = status()["page"].get<std::string>();
+  EXPECT_THAT(train({"status", "--root", root()}).out, HasSubstr("the page is at " + page + "\n"));
+  const auto own = page.substr(page.rfind(':') + 1);
+  auto text = test::slurp(folder_ / "train/train.yaml");
+  text.replace(text.rfind(port), port.size(), own.substr(0, own.size() - 1));
+  std::ofstream(folder_ / "train/train.yaml") << text;
+  EXPECT_THAT(train({"check", manifest(), "--root", root()}).out, Not(HasSubstr("is taken on this computer")));
+  close(other);
 }
 
 TEST_F(Fleet, CheckSaysWhichComputersItHasNotAsked) {

@@ -27,6 +27,9 @@ TEST(HealthFile, StandsThereAgainWhenTheBuildBeforeTakesItAway) {
   const auto silent = silent_ns(path);
   EXPECT_LE(silent, core::monotonic_ns() - asked_ns);
   EXPECT_EQ(ask_health(path).text, "active: as it should be (no input yet, no output yet)");
+  EXPECT_EQ(ask_health(path).serves, "");
+  now->write(status, {}, "http://127.0.0.1:8081/");
+  EXPECT_EQ(ask_health(path).serves, "http://127.0.0.1:8081/");
   now.reset();
   EXPECT_FALSE(std::filesystem::exists(path));
 }

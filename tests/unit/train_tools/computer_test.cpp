@@ -1,7 +1,9 @@
 // What a computer of the train lacks: said before anything is installed.
+#include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <sched.h>
 #include <sys/mount.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -55,13 +57,37 @@ TEST_F(TrainFolder, APageThatCannotBeServedOnThisComputerIsTold) {
   const auto told = [&](const std::string& address) {
     auto train = manifest(kTrain).value();
     train.settings["monitor"]["address"] = address;
-    EXPECT_THAT(check_page(train, *train.host("cab")), IsEmpty()) << "it stands in the coach";
-    const auto findings = check_page(train, *train.host("coach"));
+    EXPECT_THAT(check_page(train, *train.host("cab"), folder_), IsEmpty()) << "it stands in the coach";
+    const auto findings = check_page(train, *train.host("coach"), folder_);
     return findings.empty() ? "" : (findings[0].error ? "error: " : "warning: ") + findings[0].text;
   };
-  for (const char* right : {"", "127.0.0.1", "0.0.0.0", "::"}) EXPECT_EQ(told(right), "") << right;
+  for (const char* right : {"", "127.0.0.1", "0.0.0.0", "::"})
+    EXPECT_THAT(told(right), Not(HasSubstr("address"))) << right;
   EXPECT_THAT(told("203.0.113.7"), HasSubstr("error: settings.monitor.address: 203.0.113.7 is not an address of this"));
   EXPECT_THAT(told("localhost"), HasSubstr("error: settings.monitor.address: localhost is no IP address"));
+}
+
+TEST_F(TrainFolder, APortThatAnotherProgramHasIsTold) {
+  const int other = socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in at{};
+  at.sin_family = AF_INET;
+  at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t bytes = sizeof(at);
+  ASSERT_EQ(bind(other, reinterpret_cast<const sockaddr*>(&at), bytes), 0);
+  ASSERT_EQ(listen(other, 1), 0);
+  ASSERT_EQ(getsockname(other, reinterpret_cast<sockaddr*>(&at), &bytes), 0);
+  const auto port = std::to_string(ntohs(at.sin_port));
+  const auto told = [&](const char* search) {
+    auto train = manifest(kTrain, "10.42.1.12", "127.0.0.1").value();
+    train.settings["monitor"]["port"] = port;
+    train.settings["monitor"]["port_search"] = search;
+    const auto findings = check_page(train, *train.host("coach"), folder_);
+    return findings.empty() ? "" : (findings[0].error ? "error: " : "warning: ") + findings[0].text;
+  };
+  EXPECT_THAT(told("20"), HasSubstr("warning: settings.monitor.port: " + port + " is taken on this computer"));
+  EXPECT_THAT(told("0"), AllOf(HasSubstr("error: "), HasSubstr("the monitor would not start")));
+  close(other);
+  EXPECT_EQ(told("20"), "");
 }
 
 TEST_F(TrainFolder, AReleaseThatIsNotOnTheComputerIsAnError) {

@@ -39,8 +39,8 @@ std::vector<Finding> check_installed_certificates(const HostFolder& folder);
 /// This computer as a host: shared memory, kernel, clock, disks, interface. With a manifest, for what `host` runs, with
 /// its files and programs below `root`.
 std::vector<Finding> check_computer(const Manifest* manifest, const TrainHost* host, const std::filesystem::path& root);
-/// Where the monitor is to serve its page on this computer.
-std::vector<Finding> check_page(const Manifest& manifest, const TrainHost& host);
+/// Address and port where the monitor is to serve its page on this computer. The port may be that of the one that runs.
+std::vector<Finding> check_page(const Manifest& manifest, const TrainHost& host, const std::filesystem::path& root);
 /// A clock that says less than the time when one of these files was made is wrong, whoever keeps it: the one that a
 /// computer begins with when its battery is empty, with nobody to set it.
 std::vector<Finding> check_clock_date(const std::vector<std::filesystem::path>& files, int64_t now_s);

@@ -200,7 +200,7 @@ std::vector<Finding> check_computer(const Manifest* manifest, const TrainHost* h
   if (host != nullptr) check_interface(*host, findings);
   if (manifest == nullptr || host == nullptr) return findings;
   check_sources(*manifest, *host, root, findings);
-  add(check_page(*manifest, *host));
+  add(check_page(*manifest, *host, fs::absolute(root)));
   if (!manifest->containers) check_programs(*manifest, *host, root, findings);
   if (manifest->containers) {
     for (const auto& problem : container_problems(*manifest, *host)) error(findings, problem);
