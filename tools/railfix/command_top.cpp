@@ -197,8 +197,7 @@ int top(const Options& options) {
     } else {
       std::cout << watch.table(colours);
     }
-    if (watch.nobody())
-      std::cerr << "nobody writes a topic on " << where(options.network) << "; is a train running there?\n";
+    if (watch.nobody()) std::cerr << nobody_writes(options.network) << '\n';
     return watch.nobody() ? 1 : 0;
   }
   const Screen screen;

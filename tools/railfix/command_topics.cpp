@@ -97,8 +97,7 @@ int list(const Options& options) {
     }
   }
   if (options.json) std::cout << json.dump(2) << '\n';
-  if (names.empty())
-    std::cerr << "nobody writes a topic on " << where(options.network) << "; is a train running there?\n";
+  if (names.empty()) std::cerr << nobody_writes(options.network) << '\n';
   return names.empty() ? 1 : 0;
 }
 

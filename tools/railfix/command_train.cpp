@@ -63,7 +63,7 @@ const TrainHost& chosen_host(const Manifest& manifest, const Options& options) {
 
 HostPlan plan_here(const Options& options) {
   auto plan = HostFolder(options.root).plan();
-  if (!plan) throw core::BadInput("no train was brought up on this computer; begin with railfix train up");
+  if (!plan) throw core::BadInput("no train was brought up on this computer; begin with railfix train up TRAIN");
   return *plan;
 }
 
@@ -73,7 +73,7 @@ void refuse_another_train(const Options& options, const Manifest& manifest) {
 
 HostPlan running_plan_here(const Options& options) {
   auto plan = plan_here(options);
-  if (plan.down) throw core::BadInput("the train is down; railfix train up starts it as the manifest says");
+  if (plan.down) throw core::BadInput("the train is down; railfix train up TRAIN starts it as the manifest says");
   return plan;
 }
 
@@ -160,10 +160,10 @@ int status(const Options& options) {
     std::cout << json.dump(2) << '\n';
   } else {
     std::cout << "train " << plan.train_id << ", host " << plan.host << ", generation " << plan.generation
-              << (plan.down    ? ", down: railfix train up"
+              << (plan.down    ? ", down: railfix train up TRAIN"
                   : supervisor ? ""
-                  : runs       ? ", without supervisor: railfix train up"
-                               : ", not running: railfix train up")
+                  : runs       ? ", without supervisor: railfix train up TRAIN"
+                               : ", not running: railfix train up TRAIN")
               << "\n"
               << "service         release    generation      pid restarts  health\n"
               << table << (page.empty() ? "" : "the page is at " + page + "\n");
@@ -185,7 +185,8 @@ int up(const Options& options) {
   const bool runs = installed && !installed->down && (supervised || any_runs(folder));
   if (runs) {
     std::cout << "services run here already" << (supervised ? "" : ", without a supervisor: it is started")
-              << "; railfix train diff says what the manifest would change, upgrade does it\n";
+              << "; railfix train diff " << manifest.folder.string()
+              << " says what the manifest would change, upgrade does it\n";
     if (supervised) return status(options);
   }
   const auto plan = runs ? *installed : core::value_or_throw(install(manifest, host, options.root, made_of));
@@ -234,7 +235,10 @@ int diff(const Options& options) {
     ++changes;
     std::cout << service.name << ": leaves this host\n";
   }
-  std::cout << (changes == 0 ? "nothing to be done\n" : "railfix train upgrade does it, service by service\n");
+  std::cout << (changes == 0 ? "nothing to be done"
+                             : "railfix train upgrade " + manifest.folder.string() + at_root(options.root) +
+                                   " does it, service by service")
+            << '\n';
   return 0;
 }
 
@@ -261,7 +265,7 @@ int rollback(const Options& options) {
   const auto before = folder.plan(now.previous);
   if (now.previous == 0 || !before)
     throw core::BadInput("there is no generation before " + std::to_string(now.generation) +
-                         "; railfix train upgrade brings what train.yaml says");
+                         "; railfix train upgrade TRAIN brings what train.yaml says");
   const auto done = roll_out(options.root, *before, options.gate, say_at_once);
   if (!done.ok()) throw std::runtime_error(done.error().message);
   std::cout << "generation " << before->generation << " runs again\n";
@@ -279,7 +283,8 @@ std::vector<Finding> check_services(const HostFolder& folder) {
   const auto plan = folder.plan();
   if (!plan || plan->down) return findings;
   if (!supervisor_of(folder)) {
-    if (any_runs(folder)) findings.push_back({true, "services run without a supervisor: railfix train up starts it"});
+    if (any_runs(folder))
+      findings.push_back({true, "services run without a supervisor: railfix train up TRAIN starts it"});
     return findings;
   }
   for (const auto& service : plan->services) {

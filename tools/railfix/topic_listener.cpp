@@ -24,12 +24,13 @@ void take(const std::filesystem::path& config, TrainNetwork& network) {
   network.domain = network.host.domain;
 }
 
-/// Of the train that is up on this computer; empty when there is none.
-std::filesystem::path running_config(const std::filesystem::path& root) {
+/// Of the train that is up on this computer; empty when there is none, or one of another name than that which is asked
+/// for.
+std::filesystem::path running_config(const std::filesystem::path& root, const std::optional<std::string>& train) {
   try {
     const HostFolder folder(root);
     const auto plan = folder.plan();
-    if (!plan || plan->down) return {};
+    if (!plan || plan->down || (train && *train != plan->train_id)) return {};
     const auto file = folder.generation(plan->generation) / "config.yaml";
     return std::filesystem::exists(file) ? file : std::filesystem::path();
   } catch (const core::BadInput& damaged) {
@@ -66,16 +67,24 @@ void find_running_train(CLI::App& command, TrainNetwork& network) {
   command.add_option("--root", network.root, "Where var/lib/railfix-train of the train that runs here is")
       ->capture_default_str();
   command.parse_complete_callback([&command, &network] {
-    for (const char* given : {"--train", "--domain", "--config"}) {
-      const auto* option = command.get_option_no_throw(given);
-      if (option != nullptr && option->count() > 0) return;
-    }
-    if (const auto file = running_config(network.root); !file.empty()) take(file, network);
+    const auto is_given = [&](const char* name) {
+      const auto* option = command.get_option_no_throw(name);
+      return option != nullptr && option->count() > 0;
+    };
+    if (is_given("--domain") || is_given("--config")) return;
+    const auto train = is_given("--train") ? std::optional(network.train) : std::nullopt;
+    if (const auto file = running_config(network.root, train); !file.empty()) take(file, network);
   });
 }
 
 std::string where(const TrainNetwork& network) {
   return "train " + network.train + ", domain " + std::to_string(network.domain);
+}
+
+std::string nobody_writes(const TrainNetwork& network) {
+  return "nobody writes a topic on " + where(network) +
+         (network.host.security.empty() ? ", without certificates" : ", with those in " + network.host.security) +
+         "; is a train running there? Another domain: --domain; a train with certificates: --config";
 }
 
 TopicListener::TopicListener(const TrainNetwork& network, const std::string& command)

@@ -24,13 +24,15 @@ struct TrainNetwork {
 void add_network(CLI::App& command, TrainNetwork& network);
 /// The same without --train.
 void add_domain(CLI::App& command, TrainNetwork& network);
-/// When none of these is given: the train that runs on this computer (railfix train up), if there is one. Not for who
-/// plays data.
+/// When none of these is given, or its name alone: the train that runs on this computer (railfix train up), if there is
+/// one. Not for who plays data.
 void find_running_train(CLI::App& command, TrainNetwork& network);
 /// As a tool of this name (it begins with "railfix-").
 messaging::ParticipantOptions participant_options(const TrainNetwork& network, const std::string& command);
 /// "train demo, domain 0"
 std::string where(const TrainNetwork& network);
+/// A sentence for who has heard of nobody there.
+std::string nobody_writes(const TrainNetwork& network);
 
 class TopicListener {
  public:

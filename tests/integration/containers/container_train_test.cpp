@@ -218,8 +218,8 @@ TEST_P(ContainerTrain, AWrongKeyIsToldByTheImageAndStartsNothing) {
   write_manifest("test", "test", "  fusion: { no_such_key: 1 }\n");
   const auto up = train(TwoHosts::cab, {"up"});
   EXPECT_EQ(up.exit_code, 1);
-  EXPECT_THAT(up.out, HasSubstr("error: fusion: settings for cab line "));
-  EXPECT_THAT(up.out, HasSubstr("fusion.no_such_key is not a key of this section"));
+  EXPECT_THAT(up.out, HasSubstr("error: fusion: " + (folder_ / "train/train.yaml").string() +
+                                " line 15: fusion.no_such_key is not a key of this section"));
   EXPECT_THAT(up.out, Not(HasSubstr("settings of fusion are not checked")));
   EXPECT_EQ(train(TwoHosts::cab, {"status"}).exit_code, 2) << "something was started";
   EXPECT_THAT(engine(TwoHosts::cab, "ps --all --format '{{.Names}}'").out, Not(HasSubstr(id_)));

@@ -30,6 +30,9 @@ TEST_F(Doctor, SaysWhatIsWrongWithTheTrainThatRunsHere) {
   const auto started = up();
   ASSERT_EQ(started.exit_code, 0) << started.out << started.err;
   const auto well = doctor();
+  const auto top = test::run_program({"railfix", "top", "--once", "--train", id_, "--root", root()}, 60);
+  EXPECT_EQ(top.exit_code, 0) << "this computer knows its own train's domain and certificates: " << top.err;
+  EXPECT_THAT(top.out, HasSubstr("fusion"));
   EXPECT_THAT(well.out, AllOf(Not(HasSubstr("error: fusion")), Not(HasSubstr(".pem")), Not(HasSubstr("supervisor"))));
 
   // A key that somebody has exchanged on this host.
@@ -55,7 +58,7 @@ TEST_F(Doctor, SaysWhatIsWrongWithTheTrainThatRunsHere) {
   EXPECT_EQ(doctor().exit_code, 1);
   ASSERT_EQ(kill(fusion, SIGCONT), 0);
   ASSERT_EQ(kill(supervisor, SIGKILL), 0);
-  EXPECT_TRUE(is_told("error: services run without a supervisor: railfix train up starts it")) << doctor().out;
+  EXPECT_TRUE(is_told("error: services run without a supervisor: railfix train up TRAIN starts it")) << doctor().out;
 }
 
 }  // namespace

@@ -373,7 +373,8 @@ TEST_F(Fleet, AMistakeInTheManifestStartsNothing) {
   write_manifest(RAILFIX_TEST_RELEASE, ", fusion: { no_such_key: 1 }");
   const auto wrong = up();
   EXPECT_EQ(wrong.exit_code, 1);
-  EXPECT_THAT(wrong.out, HasSubstr("fusion.no_such_key is not a key of this section"));
+  EXPECT_THAT(wrong.out, HasSubstr((folder_ / "train/train.yaml").string() +
+                                   " line 8: fusion.no_such_key is not a key of this section"));
   EXPECT_EQ(train({"status", "--root", root()}).exit_code, 2) << "something was started";
 }
 

@@ -16,6 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 namespace topics = messaging::topics;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -165,7 +166,7 @@ TEST_F(Terminal, SaysWhatIsWrongWithATime) {
 TEST_F(Terminal, TopSaysWhenNobodyIsThere) {
   const auto top = railfix({"top", "--once", "--for", "1"});
   EXPECT_EQ(top.exit_code, 1);
-  EXPECT_THAT(top.err, HasSubstr("is a train running there?"));
+  EXPECT_THAT(top.err, AllOf(HasSubstr(", without certificates; is a train running there?"), HasSubstr("--config")));
 }
 
 TEST_F(Terminal, BandwidthAndDelayOfATopic) {

@@ -146,11 +146,12 @@ TEST_F(TrainFolder, PermissionsThatDoNotFitAreTold) {
     return check_certificates(train, *train.host("coach"));
   };
   EXPECT_THAT(told("12"), IsEmpty());
-  EXPECT_THAT(told("13"),
-              Contains(AllOf(Field(&Finding::error, true),
-                             Field(&Finding::text, HasSubstr("fusion.permissions.p7s does not allow "
-                                                             "domain 13; railfix train keys --renew, then railfix "
-                                                             "train down on every host, then up")))));
+  EXPECT_THAT(told("13"), Contains(AllOf(Field(&Finding::error, true),
+                                         Field(&Finding::text, HasSubstr("fusion.permissions.p7s does not allow "
+                                                                         "domain 13; railfix train keys " +
+                                                                         folder_.string() +
+                                                                         " --renew, then railfix "
+                                                                         "train down on every host, then up")))));
   // As the release before would have made them.
   const auto permissions = folder_ / "security/coach/fusion.permissions.p7s";
   auto before = test::slurp(permissions);
@@ -217,7 +218,8 @@ TEST_F(TrainFolder, APrivateKeyOfAnotherCertificateIsTold) {
   fs::copy_file(security / "odometry.key.pem", security / "fusion.key.pem", fs::copy_options::overwrite_existing);
   EXPECT_THAT(findings("run_as: programs", "security: true"),
               ElementsAre(HasSubstr("security/cab/fusion.key.pem is not the private key of " +
-                                    (security / "fusion.cert.pem").string() + "; railfix train keys --renew")));
+                                    (security / "fusion.cert.pem").string() + "; railfix train keys " +
+                                    folder_.string() + " --renew")));
 
   // Those of the broker and of the page, as the manifest names them and as a host runs with them.
   const auto tool = [&](const char* what) { return (security / (std::string("tool.") + what)).string(); };

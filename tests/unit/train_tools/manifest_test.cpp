@@ -56,6 +56,20 @@ TEST_F(TrainFolder, MistakesAreToldWithLineKeyAndWayOut) {
   EXPECT_THAT(told("train:", "train: ["), HasSubstr("not valid YAML"));
 }
 
+TEST_F(TrainFolder, MistakesInSettingsAreToldWithTheLineOfTheManifest) {
+  const auto train = manifest(kTrain).value();
+  const auto told = [&](const std::string& said) {
+    return with_own_lines(train, said, "/tmp/r.yaml", "settings for cab");
+  };
+  const auto file = (folder_ / "train.yaml").string();
+  EXPECT_EQ(told("tpr_publisher: /tmp/r.yaml line 3: tpr_publisher.nid_engine 1 is outside 2 to 3\n"
+                 "/tmp/r.yaml line 9: common.host must be a text"),
+            "tpr_publisher: " + file +
+                " line 21: tpr_publisher.nid_engine 1 is outside 2 to 3\n"
+                "settings for cab: common.host must be a text");
+  EXPECT_EQ(told("/tmp/r.yaml cannot be read"), "settings for cab cannot be read");
+}
+
 TEST_F(TrainFolder, TheCheckSaysWhatWouldGoWrong) {
   write_map();
   EXPECT_THAT(findings(), IsEmpty());

@@ -220,8 +220,7 @@ Answer ask_service(const Manifest& manifest, const TrainHost& host, const Hosted
   if (manifest.containers && is_engine_failure(exit_code))
     return answer(not_checked(service, "a container of " + image_of(service) + " cannot be run here: " + text));
   // The rendered file is ours; the operator knows train.yaml.
-  for (size_t at = 0; (at = text.find(config)) != std::string::npos;)
-    text.replace(at, config.size(), "settings for " + host.name);
+  text = with_own_lines(manifest, std::move(text), config, "settings for " + host.name);
   if (text.empty()) text = service.name + " does not accept its settings, and does not say why: " + command->front();
   return answer({true, text});
 }

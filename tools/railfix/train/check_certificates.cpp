@@ -13,12 +13,20 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kRenewAuthority = "; exchange the authority, beginning with railfix train keys --next-authority";
 constexpr const char* kRenewElsewhere = "; get a new one, put it there, then railfix train upgrade on each host";
 constexpr const char* kOtherKey = "; put there the one that the certificate was made with";
 constexpr const char* kOneMaking = "; copy the whole folder anew from where the train's keys were made";
-constexpr const char* kRenewTrain = "; railfix train keys --renew, then railfix train down on every host, then up";
-constexpr const char* kRenew = "; railfix train keys --renew, then railfix train upgrade on each host";
+
+/// What is to be done with the train's own certificates, as it is to be typed.
+struct Remedies {
+  explicit Remedies(const std::string& train)
+      : authority("; exchange the authority, beginning with railfix train keys " + train + " --next-authority"),
+        renew("; railfix train keys " + train + " --renew, then railfix train upgrade on each host"),
+        renew_train("; railfix train keys " + train + " --renew, then railfix train down on every host, then up") {}
+  std::string authority;
+  std::string renew;
+  std::string renew_train;
+};
 
 int64_t warning_days(const YAML::Node& settings) {
   int64_t days = messaging::kCertificateWarningDays;
@@ -29,7 +37,7 @@ int64_t warning_days(const YAML::Node& settings) {
   return days;
 }
 
-void check_end(const fs::path& certificate, int64_t soon_days, const char* remedy, Findings& findings) {
+void check_end(const fs::path& certificate, int64_t soon_days, const std::string& remedy, Findings& findings) {
   const auto left = messaging::days_left(certificate);
   if (!left.ok()) {
     add_once(findings, {true, left.error().message});
@@ -38,7 +46,7 @@ void check_end(const fs::path& certificate, int64_t soon_days, const char* remed
   }
 }
 
-void check_key(const fs::path& key, const fs::path& certificate, const std::string& setting, const char* remedy,
+void check_key(const fs::path& key, const fs::path& certificate, const std::string& setting, const std::string& remedy,
                Findings& findings) {
   if (!messaging::days_left(certificate).ok()) return;  // told already
   if (const auto fits = messaging::key_fits(key, certificate); !fits.ok())
@@ -46,15 +54,16 @@ void check_key(const fs::path& key, const fs::path& certificate, const std::stri
 }
 
 /// Everything that DDS asks for when this service joins. False when a file is missing.
-bool check_identity(const fs::path& folder, const std::string& service, int64_t soon_days, Findings& findings) {
+bool check_identity(const fs::path& folder, const std::string& service, int64_t soon_days, const Remedies& remedies,
+                    Findings& findings) {
   if (const auto files = messaging::security_properties(folder, service); !files.ok()) {
     add_once(findings, {true, files.error().message});
     return false;
   }
-  check_end(folder / "ca.pem", soon_days, kRenewAuthority, findings);
+  check_end(folder / "ca.pem", soon_days, remedies.authority, findings);
   const auto certificate = messaging::certificate_of(folder, service);
-  check_end(certificate, soon_days, kRenew, findings);
-  check_key(folder / (service + ".key.pem"), certificate, "", kRenew, findings);
+  check_end(certificate, soon_days, remedies.renew, findings);
+  check_key(folder / (service + ".key.pem"), certificate, "", remedies.renew, findings);
   if (messaging::days_left(certificate).ok() && messaging::days_left(folder / "ca.pem").ok()) {
     if (const auto issued = messaging::signed_by(folder / "ca.pem", certificate); !issued.ok())
       add_once(findings, {true, issued.error().message + kOneMaking});
@@ -99,13 +108,14 @@ void check_named_files(const YAML::Node& settings, const fs::path& folder, const
 /// there, because old and new services do not hear each other); those of a release whose service used fewer topics
 /// leave a topic silent.
 void check_permissions(const Manifest& manifest, const std::string& host, const std::string& service,
-                       const fs::path& file, Findings& findings) {
+                       const fs::path& file, const Remedies& remedies, Findings& findings) {
   const auto missing = missing_rights(manifest, service, host, file);
   if (!missing.train.empty()) {
-    add_once(findings, {true, file.string() + " does not allow " + core::joined(missing.train) + kRenewTrain});
+    add_once(findings, {true, file.string() + " does not allow " + core::joined(missing.train) + remedies.renew_train});
   } else if (!missing.topics.empty()) {
-    add_once(findings, {false, file.string() + " does not allow what " + service +
-                                   " of release " RAILFIX_VERSION " does: " + core::joined(missing.topics) + kRenew});
+    add_once(findings,
+             {false, file.string() + " does not allow what " + service +
+                         " of release " RAILFIX_VERSION " does: " + core::joined(missing.topics) + remedies.renew});
   }
 }
 
@@ -117,9 +127,10 @@ void check_keys(const Manifest& manifest, const TrainHost& host, Findings& findi
                                          manifest.folder.string()});
   std::vector<std::string> services{kOperator};
   for (const auto& service : services_on(manifest, host.name)) services.push_back(service.name);
+  const Remedies remedies(manifest.folder.string());
   for (const auto& service : services) {
-    if (check_identity(folder, service, warning_days(manifest.settings), findings))
-      check_permissions(manifest, host.name, service, folder / (service + ".permissions.p7s"), findings);
+    if (check_identity(folder, service, warning_days(manifest.settings), remedies, findings))
+      check_permissions(manifest, host.name, service, folder / (service + ".permissions.p7s"), remedies, findings);
   }
 }
 
@@ -141,7 +152,7 @@ std::vector<Finding> check_installed_certificates(const HostFolder& folder) {
     const auto generation = folder.generation(service.generation);
     const auto settings = installed_settings(generation);
     if (fs::exists(generation / "security"))
-      check_identity(generation / "security", service.name, warning_days(settings), findings);
+      check_identity(generation / "security", service.name, warning_days(settings), Remedies("TRAIN"), findings);
     check_named_files(settings, generation, service.name, findings);
   }
   return findings;

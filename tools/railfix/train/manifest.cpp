@@ -21,6 +21,17 @@ bool is_name(const std::string& text) {
          text.front() != '.' && text.front() != '-';
 }
 
+// Of "fusion.use_wheel"; 0 = it is not there.
+int line_of(const YAML::Node& section, const std::string& key) {
+  if (!section || !section.IsMap()) return 0;
+  const size_t dot = key.find('.');
+  for (const auto& entry : section) {
+    if (entry.first.Scalar() != key.substr(0, dot)) continue;
+    return dot == std::string::npos ? entry.first.Mark().line + 1 : line_of(entry.second, key.substr(dot + 1));
+  }
+  return 0;
+}
+
 class ManifestReader {
  public:
   ManifestReader(std::filesystem::path file, Manifest& manifest) : file_(std::move(file)), manifest_(manifest) {}
@@ -209,6 +220,24 @@ const TrainHost* Manifest::host_here() const {
 const TrainService* Manifest::service(const std::string& name) const {
   const auto found = std::find_if(services.begin(), services.end(), [&](const auto& one) { return one.name == name; });
   return found == services.end() ? nullptr : &*found;
+}
+
+std::string with_own_lines(const Manifest& manifest, std::string said, const std::string& rendered,
+                           const std::string& otherwise) {
+  constexpr std::string_view kLine = " line ";
+  for (size_t at = 0; (at = said.find(rendered, at)) != std::string::npos;) {
+    size_t end = at + rendered.size();
+    std::string place = otherwise;
+    if (said.compare(end, kLine.size(), kLine) == 0) {
+      end = std::min(said.find(": ", end), said.size());
+      const auto key = said.substr(std::min(end + 2, said.size()));
+      if (const auto line = line_of(manifest.settings, key.substr(0, key.find(' '))); line > 0)
+        place = (manifest.folder / "train.yaml").string() + std::string(kLine) + std::to_string(line);
+    }
+    said.replace(at, end - at, place);
+    at += place.size();
+  }
+  return said;
 }
 
 std::string Manifest::release_of(const TrainService& service) const {

@@ -51,6 +51,11 @@ struct Manifest {
 /// Services of which two may run, one waiting to take over.
 bool may_stand_by(const std::string& service);
 
+/// What is said of the settings in the file `rendered`, with the lines of train.yaml: "FILE line 3: fusion.key is
+/// wrong". A setting that train.yaml has not is told of the file that `otherwise` names.
+std::string with_own_lines(const Manifest& manifest, std::string said, const std::string& rendered,
+                           const std::string& otherwise);
+
 /// Reads FOLDER/train.yaml (or the file itself). Error: everything that is wrong with the text, a line each with file,
 /// line, key and the way out.
 core::Result<Manifest> read_manifest(const std::filesystem::path& train);

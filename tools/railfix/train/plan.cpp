@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 constexpr int kGenerationsKept = 5;
 
 core::BadInput damaged(const fs::path& file, const std::string& how) {
-  return core::BadInput(file.string() + " is damaged (" + how + "); remove it, then railfix train up");
+  return core::BadInput(file.string() + " is damaged (" + how + "); remove it, then railfix train up TRAIN");
 }
 
 // What `read` makes of a file of ours; nothing when it is not there.

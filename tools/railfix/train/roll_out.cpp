@@ -302,7 +302,7 @@ core::Status bring_down(const fs::path& root) {
 core::Status roll_out(const fs::path& root, const HostPlan& plan, const HealthGate& gate, const Say& say) {
   const HostFolder folder(root);
   const auto before = folder.plan();
-  if (!before) return core::Error{"no train was brought up here; begin with railfix train up"};
+  if (!before) return core::Error{"no train was brought up here; begin with railfix train up TRAIN"};
   // While one after the other is swapped they have to hear each other.
   if (const auto found = misfit(plan.services, before->services)) return core::Error{*found + kNotTogether};
   auto now = *before;
