@@ -23,6 +23,14 @@ class FleetTest : public ::testing::Test {
   }
   [[nodiscard]] std::string root() const { return (folder_ / "root").string(); }
   [[nodiscard]] std::string manifest() const { return (folder_ / "train").string(); }
+  void write_manifest(const std::string& release, const std::string& more = "") {
+    std::ofstream(folder_ / "train" / "train.yaml")
+        << "train:\n  id: " << id_ << "\n  domain: 95\n  release: " << release
+        << "\n  run_as: programs\n  hosts: { cab: { address: 127.0.0.1 } }\n"
+           "  services: { fusion: cab, tpr_publisher: cab }\n"
+           "settings: { common: { log_level: warning }"
+        << more << " }\n";
+  }
   static test::Outcome train(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), {"railfix", "train"});
     return test::run_program(arguments, 180);
