@@ -138,9 +138,10 @@ TEST_F(Export, InfoTellsWhatIsThereAndWhetherItIsWhole) {
 TEST_F(Export, InfoTellsOfASensorThatDiedAndOneThatCameLate) {
   writer_ = mcap::Writer::create(folder_ / "dead.mcap", {}).value();
   msg::ImuSample imu;
-  for (int i = 0; i < 2000; ++i) write(topics::imu_sample, imu, "imu_sample", i * 10'000'000);
+  for (int64_t i = 0; i < 2000; ++i) write(topics::imu_sample, imu, "imu_sample", i * 10'000'000);
   msg::WheelSample wheel;
-  for (int i = 0; i <= 3000; ++i) write(topics::wheel_sample, wheel, "wheel_sample", 30'000'000'000 + i * 10'000'000);
+  for (int64_t i = 0; i <= 3000; ++i)
+    write(topics::wheel_sample, wheel, "wheel_sample", 30'000'000'000 + i * 10'000'000);
   ASSERT_TRUE(writer_->close().ok());
   const auto info = recording({"info", (folder_ / "dead.mcap").string()});
   ASSERT_EQ(info.exit_code, 0) << info.err;
