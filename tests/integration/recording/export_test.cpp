@@ -360,6 +360,13 @@ TEST_F(Export, AFilmThatIsCutIsToldAndTakesNoPlace) {
   EXPECT_THAT(cut.err, ::testing::EndsWith("railfix: cannot write " + mp4.string() +
                                            " to its end (File too large); give another place\n"));
   EXPECT_EQ(cut.out, "");
+  const std::string command = std::string(RAILFIX_BIN_DIR) + "/railfix recording export " + file().string();
+  const auto full = test::run_program({"/bin/bash", "-c",
+                                       "(trap '' XFSZ; ulimit -f 0; exec " + command + " --mp4 " + mp4.string() +
+                                           " 2>&1) | cat; exit ${PIPESTATUS[0]}"},
+                                      120);
+  EXPECT_EQ(full.exit_code, 2);
+  EXPECT_THAT(full.out, HasSubstr("railfix: cannot write " + mp4.string() + " to its end (File too large)"));
   EXPECT_EQ(test::slurp(mp4), "old");
   EXPECT_EQ(files(), (std::set<std::string>{"ride.mcap", "ride.mp4"}));
 }

@@ -261,8 +261,8 @@ core::Result<VideoReport> export_video(mcap::Reader& reader, const mcap::Selecti
   if (!beside.ok()) return beside.error();
   const Draft draft(beside.value());
   auto report = make_film(reader, part, options, channel.value(), draft.file());
-  if (!report.ok()) return report;
-  auto status = whole_mp4(draft.file(), file.string());
+  auto status = report.ok() ? whole_mp4(draft.file(), file.string()) : takes_more(draft.file(), file.string());
+  if (status.ok() && !report.ok()) return report;
   if (status.ok()) status = core::move_draft(draft.file(), file);
   if (!status.ok()) return status.error();
   return report;

@@ -46,16 +46,22 @@ bool is_whole(const std::filesystem::path& film) {
 
 }  // namespace
 
+core::Status takes_more(const std::filesystem::path& film, const std::string& name) {
+  const std::vector<std::byte> block(size_t{1} << 16U);
+  const int out =
+      open(film.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, 0666);  // OpenCV removes what it cannot begin
+  core::Status status;
+  if (out < 0 || !core::write_all(out, block)) status = core::cannot_write(name + " to its end");
+  if (out >= 0) close(out);
+  return status;
+}
+
 core::Status whole_mp4(const std::filesystem::path& film, const std::string& name) {
   if (is_whole(film)) return {};
-  // What stopped FFmpeg stops us, too, and gives us the reason.
-  const std::vector<std::byte> block(size_t{1} << 16U);
-  const int out = open(film.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
-  const bool room_again = out >= 0 && core::write_all(out, block);
-  if (room_again) errno = EIO;
-  const auto error = core::cannot_write(name + " to its end");
-  if (out >= 0) close(out);
-  return error;
+  auto status = takes_more(film, name);
+  if (!status.ok()) return status;
+  errno = EIO;  // there is room again
+  return core::cannot_write(name + " to its end");
 }
 
 }  // namespace railfix::tool
