@@ -69,6 +69,7 @@ void add_content(ordered_json& topic, const Info& info, const mcap::Channel& cha
   topic["rate_hz"] = summary.rate_hz;
   topic["bytes"] = content.bytes;
   topic["longest_gap_s"] = summary.longest_gap_s;
+  topic["longest_gap_between_samples_s"] = summary.between_s;
   topic["periodic"] = periodic(channel);
   topic["begins_s"] = heard ? ordered_json(summary.begins_s) : ordered_json();
   topic["ends_s"] = heard ? ordered_json(summary.ends_s) : ordered_json();

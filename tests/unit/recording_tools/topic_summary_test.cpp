@@ -24,6 +24,7 @@ TEST(TopicSummary, ASensorThatDiedHasItsRateAndTheSilenceThatFollowed) {
   const auto summary = summary_of(topic("imu_sample"), content(2001, 0, 20), kMinute);
   EXPECT_DOUBLE_EQ(summary.rate_hz, 100);
   EXPECT_DOUBLE_EQ(summary.longest_gap_s, 40);
+  EXPECT_DOUBLE_EQ(summary.between_s, 0.01);
   EXPECT_FALSE(summary.begins_late);
   EXPECT_TRUE(summary.ends_early);
   EXPECT_DOUBLE_EQ(summary.ends_s, 20);

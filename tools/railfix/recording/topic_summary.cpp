@@ -36,7 +36,7 @@ TopicSummary summary_of(const mcap::Channel& channel, const mcap::ChannelContent
   summary.periodic = periodic(channel);
   summary.begins_s = core::seconds(content.first_ns - whole.start_ns);
   summary.ends_s = core::seconds(content.last_ns - whole.start_ns);
-  summary.longest_gap_s = core::seconds(content.longest_gap_ns);
+  summary.between_s = summary.longest_gap_s = core::seconds(content.longest_gap_ns);
   const double length_s = core::seconds(whole.end_ns - whole.start_ns);
   const double silent_s = length_s - summary.ends_s;
   const double apart_s = mean_gap_s(content);

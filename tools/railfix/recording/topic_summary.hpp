@@ -15,6 +15,7 @@ struct TopicSummary {
   bool periodic = false;     // else it speaks when something happens, and silence says nothing
   double rate_hz = 0;        // periodic: while it was heard; else over the whole recording
   double longest_gap_s = 0;  // periodic: begin and end of the recording are ends of gaps, too
+  double between_s = 0;      // the longest gap between its samples alone
   double begins_s = 0;       // into the recording
   double ends_s = 0;
   bool begins_late = false;  // by more than a start takes ...
