@@ -3,115 +3,16 @@
 
 #include <nlohmann/json.hpp>
 #include <opencv2/videoio.hpp>
-#include <random>
 #include <set>
 
-#include "cdr/types.hpp"
-#include "core/time.hpp"
-#include "mcap/writer.hpp"
-#include "messaging/topics.hpp"
-#include "pictures/encode.hpp"
-#include "support/program.hpp"
+#include "integration/recording/recorded_ride.hpp"
 
 namespace railfix {
 namespace {
 
-namespace fs = std::filesystem;
-namespace topics = messaging::topics;
 using ::testing::HasSubstr;
 
-constexpr int64_t kBegin = 1'700'000'000 * core::kNsPerSecond;
-constexpr int kPictures = 50;
-constexpr int64_t kPictureNs = 40'000'000;
-
-class Export : public ::testing::Test {
- protected:
-  void SetUp() override {
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-    writer_ = mcap::Writer::create(file(), {}).value();
-    EXPECT_TRUE(writer_->write_metadata({"railfix", {{"train_id", "t7"}}}).ok());
-    EXPECT_TRUE(writer_->write_metadata({"railfix_losses", {{"imu_sample queue", "12"}}}).ok());
-    msg::CameraCalibration calibration;
-    calibration.camera("cam0");
-    calibration.fu_px(300);
-    calibration.fv_px(300);
-    calibration.cu_px(159.5);
-    calibration.cv_px(119.5);
-    calibration.width_px(320);
-    calibration.height_px(240);
-    write(topics::camera_calibration, calibration, "camera_calibration", 0);
-    for (int i = 0; i < kPictures; ++i) ride(i);
-    msg::LogRecord log;
-    log.service("fusion");
-    log.text("wheel, \"left\", slides");
-    write(topics::log_record, log, "log_record", 1);
-    const auto closed = writer_->close();
-    ASSERT_TRUE(closed.ok());
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  // 20 m/s to the north; the picture of 0.4 s is missing; no place before 0.2 s.
-  void ride(int i) {
-    const int64_t time_ns = i * kPictureNs;
-    const std::vector<uint8_t> pixels(320 * 240, static_cast<uint8_t>(4 * i));
-    msg::CameraPreview picture;
-    picture.stamp_ns(kBegin + time_ns);
-    picture.jpeg(pictures::encode_jpeg(pixels.data(), 320, 240, 90).value());
-    if (i != 10) write(topics::camera_preview, picture, "camera_frame/cam0", time_ns);
-    msg::TrackView view;
-    view.stamp_ns(kBegin + time_ns);
-    view.pitch_rad(0.2);
-    view.height_m(2.5);
-    view.seen_left(1);
-    view.seen_right(1);
-    write(topics::track_view, view, "track_view", time_ns);
-    msg::TrainState state;
-    state.stamp_ns(kBegin + time_ns);
-    state.track_known(i >= 5 ? 1 : 0);
-    state.edge(3);
-    state.offset_m(100 + 0.8 * i);
-    state.speed_mps(20);
-    state.over_m(6);
-    state.under_m(4);
-    state.integrity(integrity_);
-    state.sources(msg::SOURCE_CAMERA | msg::SOURCE_WHEEL);
-    state.lat_deg(47 + 0.8 * i / 111195);
-    state.lon_deg(8);
-    write(topics::train_state, state, "train_state", time_ns);
-  }
-  template <class T>
-  void write(const messaging::Topic<T>& /*topic*/, const T& sample, const std::string& name, int64_t time_ns) {
-    const auto schema = writer_
-                            ->add_schema(messaging::type_of<T>().name(), "omgidl",
-                                         std::string(cdr::own_idl_of(messaging::type_of<T>().name())))
-                            .value();
-    const auto channel = writer_->add_channel(schema, name, "cdr", {}).value();
-    const auto bytes = messaging::serialize(sample);
-    EXPECT_TRUE(writer_->write({channel, 1, kBegin + time_ns, kBegin + time_ns, bytes}).ok());
-  }
-  [[nodiscard]] fs::path file() const { return folder_ / "ride.mcap"; }
-  [[nodiscard]] test::Outcome recording(std::vector<std::string> arguments) const {
-    arguments.insert(arguments.begin(), {"railfix", "recording"});
-    return test::run_program(arguments, 120);
-  }
-
-  /// Where no file may grow beyond this: it fails in the middle, as on a full disk.
-  [[nodiscard]] static test::Outcome recording_in(int most_kb, const std::string& arguments) {
-    const std::string command = std::string(RAILFIX_BIN_DIR) + "/railfix recording " + arguments;
-    return test::run_program(
-        {"/bin/bash", "-c", "trap '' XFSZ; ulimit -f " + std::to_string(most_kb) + "; exec " + command}, 120);
-  }
-  [[nodiscard]] std::set<std::string> files() const {
-    std::set<std::string> names;
-    for (const auto& entry : fs::directory_iterator(folder_)) names.insert(entry.path().filename());
-    return names;
-  }
-
-  fs::path folder_ = fs::temp_directory_path() / ("railfix-export-" + std::to_string(::getpid()));
-  std::unique_ptr<mcap::Writer> writer_;
-  uint8_t integrity_ = msg::INTEGRITY_OK;
-};
+using Export = RecordedRide;
 
 TEST_F(Export, InfoTellsWhatIsThereAndWhetherItIsWhole) {
   const auto info = recording({"info", file().string(), "--json"});
@@ -387,89 +288,6 @@ TEST_F(Export, AFilmThatIsInterruptedLeavesTheOlderOneAlone) {
     EXPECT_EQ(test::slurp(mp4), "old");
     EXPECT_EQ(files(), (std::set<std::string>{"log", "long.mcap", "ride.mcap", "ride.mp4"}));
   }
-}
-
-/// A long recording, and the same cut off.
-class LongRecording : public Export {
- protected:
-  void SetUp() override {
-    Export::SetUp();
-    writer_ = mcap::Writer::create(long_, {}).value();
-    const auto channel = writer_->add_channel(0, "imu_sample", "cdr", {}).value();
-    mcap::Bytes noise(60);
-    for (int64_t i = 0; i < 300'000; ++i) {
-      for (auto& byte : noise) byte = static_cast<uint8_t>(random_());
-      ASSERT_TRUE(writer_->write({channel, 1, kBegin + i * 10'000'000, kBegin + i * 10'000'000, noise}).ok());
-    }
-    ASSERT_TRUE(writer_->close().ok());
-    fs::copy_file(long_, damaged_);
-    fs::resize_file(damaged_, fs::file_size(damaged_) - 100);
-    here_ = files();
-  }
-  [[nodiscard]] std::vector<std::vector<std::string>> commands() const {
-    return {{"cut", long_, "--to", "10000", "--out", out_},
-            {"merge", long_, file(), "--out", out_},
-            {"repair", damaged_, "--out", out_}};
-  }
-
-  fs::path long_ = folder_ / "long.mcap";
-  fs::path damaged_ = folder_ / "damaged.mcap";
-  fs::path out_ = folder_ / "out.mcap";
-  std::set<std::string> here_;
-  std::minstd_rand random_;
-};
-
-TEST_F(LongRecording, NothingIsLeftOfACopyThatFindsNoRoom) {
-  for (const auto& command : commands()) {
-    std::string line;
-    for (const auto& word : command) line += word + " ";
-    const auto full = recording_in(100, line);
-    EXPECT_EQ(full.exit_code, 2) << full.out;
-    EXPECT_THAT(full.err, HasSubstr("out.mcap.active: cannot be written; is the disk full? (File too large)"));
-    EXPECT_EQ(files(), here_) << line;
-  }
-}
-
-TEST_F(LongRecording, NothingIsLeftOfACopyThatIsInterrupted) {
-  for (auto command : commands()) {
-    for (const int signal : {SIGINT, SIGTERM}) {
-      auto arguments = command;
-      arguments.insert(arguments.begin(), {"railfix", "recording"});
-      test::Program copy(arguments);
-      while (!fs::exists(folder_ / "out.mcap.active") && !copy.exit_code()) poll(nullptr, 0, 1);
-      EXPECT_EQ(copy.end(signal), 128 + signal) << command.front();
-      EXPECT_EQ(files(), here_) << command.front();
-    }
-  }
-}
-
-TEST_F(LongRecording, WhatIsMissingIsToldAndAddsUp) {
-  std::fstream(long_, std::ios::binary | std::ios::in | std::ios::out)
-      .seekp(static_cast<std::streamoff>(fs::file_size(long_) / 2))
-      .write("XXXXXXXX", 8);
-  const auto info = recording({"info", long_, "--json"});
-  EXPECT_EQ(info.exit_code, 1);
-  const auto json = nlohmann::json::parse(info.out);
-  EXPECT_EQ(json["samples_by_index"], 300'000);
-  EXPECT_LT(json["samples"], 300'000);
-  EXPECT_EQ(json["samples"], json["topics"][0]["samples"]);
-  EXPECT_THAT(recording({"info", long_}).out, HasSubstr(" samples can be counted; by its index there were 300000 in "));
-
-  const auto repaired = recording({"repair", long_, "--out", out_});
-  ASSERT_EQ(repaired.exit_code, 0) << repaired.err;
-  const auto lost = 300'000 - json["samples"].get<int>();
-  EXPECT_THAT(repaired.out, HasSubstr("; missing: " + std::to_string(lost) + " samples, 1 chunk, "));
-  EXPECT_THAT(recording({"info", out_}).out, HasSubstr("railfix_repair: file=long.mcap lost_chunks=1 lost_samples=" +
-                                                       std::to_string(lost) + " skipped_bytes="));
-}
-
-TEST_F(LongRecording, RepairDoesNotWriteOverWhatItReads) {
-  const fs::path active = folder_ / "run.mcap.active";
-  fs::copy_file(damaged_, active);
-  const auto refused = recording({"repair", active, "--out", folder_ / "run.mcap"});
-  EXPECT_EQ(refused.exit_code, 2);
-  EXPECT_THAT(refused.err, HasSubstr("would be " + active.string() + ", which is read; give another name with --out"));
-  EXPECT_EQ(fs::file_size(active), fs::file_size(damaged_));
 }
 
 }  // namespace
