@@ -19,9 +19,10 @@ class Operator : public FleetTest {
 TEST_F(Operator, AUserWithoutRightsIsToldHowItIsAndChangesNothing) {
   if (geteuid() != 0) GTEST_SKIP() << "needs root, to be somebody else";
   ASSERT_EQ(up().exit_code, 0);
+  const std::string program = RAILFIX_BIN_DIR "/railfix";
   const auto as_nobody = [&](std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), {"/usr/bin/setpriv", "--reuid=65534", "--regid=65534", "--clear-groups",
-                                         RAILFIX_BIN_DIR "/railfix", "train"});
+    arguments.insert(arguments.begin(),
+                     {"/usr/bin/setpriv", "--reuid=65534", "--regid=65534", "--clear-groups", program, "train"});
     arguments.insert(arguments.end(), {"--root", root()});
     return test::run_program(arguments, 60);
   };
