@@ -27,6 +27,14 @@ bool removed(int file) {
   return fstat(file, &now) == 0 && now.st_nlink == 0;
 }
 
+/// Another build of the service may have its file there by now.
+bool is_at(int file, const std::filesystem::path& path) {
+  struct stat ours {};
+  struct stat there {};
+  return fstat(file, &ours) == 0 && stat(path.c_str(), &there) == 0 && ours.st_dev == there.st_dev &&
+         ours.st_ino == there.st_ino;
+}
+
 std::string ago(const char* what, int64_t at_ns, int64_t now_ns) {
   if (at_ns == 0) return std::string("no ") + what + " yet";
   char text[48];
@@ -63,11 +71,10 @@ std::filesystem::path health_path_beside(const CommonConfig& common, const std::
 
 HealthFile::HealthFile(std::filesystem::path path) : path_(std::move(path)), file_(opened(path_)) {}
 
-// Another build of this service may have taken over the file; it makes a new one with its next words.
 HealthFile::~HealthFile() {
   if (file_ < 0) return;
+  if (is_at(file_, path_)) unlink(path_.c_str());
   close(file_);
-  unlink(path_.c_str());
 }
 
 void HealthFile::write(const msg::ServiceStatus& status, const Traffic& traffic, const std::string& serves) {

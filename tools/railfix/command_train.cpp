@@ -1,4 +1,5 @@
 // `railfix train` and `railfix doctor`: a train from its manifest (docs/fleet.md).
+#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -252,6 +253,7 @@ int upgrade(const Options& options) {
   for (auto& finding : check_computer(&manifest, &host, options.root)) findings.push_back(std::move(finding));
   if (!say(findings)) return 1;
   const auto plan = core::value_or_throw(install(manifest, host, options.root, made_of));
+  std::signal(SIGHUP, SIG_IGN);  // a connection that drops must not leave it half done
   const auto done = roll_out(options.root, plan, options.gate, say_at_once);
   if (!done.ok()) throw std::runtime_error(done.error().message);
   std::cout << "generation " << plan.generation << " runs\n";
@@ -266,6 +268,7 @@ int rollback(const Options& options) {
   if (now.previous == 0 || !before)
     throw core::BadInput("there is no generation before " + std::to_string(now.generation) +
                          "; railfix train upgrade TRAIN brings what train.yaml says");
+  std::signal(SIGHUP, SIG_IGN);
   const auto done = roll_out(options.root, *before, options.gate, say_at_once);
   if (!done.ok()) throw std::runtime_error(done.error().message);
   std::cout << "generation " << before->generation << " runs again\n";

@@ -247,6 +247,36 @@ TEST_F(Fleet, ARollbackGoesFurtherBackAndNeverToWhatItCameFrom) {
   EXPECT_THAT(back().out, HasSubstr("generation 1 runs again"));
 }
 
+TEST_F(Fleet, DownAndUpKeepTheWayBack) {
+  ASSERT_EQ(up().exit_code, 0);
+  write_manifest(RAILFIX_TEST_RELEASE, ", tpr_publisher: { nid_engine: 4711 }");
+  ASSERT_EQ(upgrade().exit_code, 0);
+  ASSERT_EQ(train({"down", "--root", root()}).exit_code, 0);
+  ASSERT_EQ(up().exit_code, 0);
+  const auto back = train({"rollback", "--root", root(), "--healthy-for", "1", "--patience", "60"});
+  EXPECT_THAT(back.out, HasSubstr("generation 1 runs again")) << back.err;
+}
+
+TEST_F(Fleet, WhatIsTakenDownWhileAnUpgradeWaitsStaysDown) {
+  ASSERT_EQ(up().exit_code, 0);
+  const auto bin = folder_ / "root/opt/railfix/9.9.9/bin";
+  fs::create_directories(bin);
+  std::ofstream(bin / "railfix-fusion") << "#!/bin/sh\ncase \"$*\" in *--check*) exit 0 ;; esac\nexit 3\n";
+  fs::permissions(bin / "railfix-fusion", fs::perms::owner_all);
+  fs::create_symlink(fs::path(RAILFIX_BIN_DIR) / "railfix-tpr-publisher", bin / "railfix-tpr-publisher");
+  write_manifest("9.9.9");
+  const auto said = folder_ / "upgrade.log";
+  test::Program upgrade(
+      {"railfix", "train", "upgrade", manifest(), "--root", root(), "--healthy-for", "1", "--patience", "15"},
+      test::Program::Options{said, {}, {}});
+  ASSERT_TRUE(wait_until([&] { return status("fusion")["release"] == "9.9.9"; }));
+  EXPECT_EQ(train({"down", "--root", root()}).exit_code, 0);
+  ASSERT_TRUE(wait_until([&] { return upgrade.exit_code().has_value(); }));
+  EXPECT_EQ(upgrade.exit_code(), 1);
+  EXPECT_THAT(test::slurp(said), HasSubstr("another command has changed what runs here meanwhile"));
+  EXPECT_THAT(test::slurp(fs::path(root()) / "var/lib/railfix-train/plan.yaml"), HasSubstr("down: true"));
+}
+
 // A fusion that was started beside another one has taken its place, and its file in the host's memory another name.
 TEST_F(Fleet, AfterAnUpgradeDownLeavesNothingBehind) {
   ASSERT_EQ(up().exit_code, 0);

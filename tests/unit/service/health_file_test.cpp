@@ -34,6 +34,22 @@ TEST(HealthFile, StandsThereAgainWhenTheBuildBeforeTakesItAway) {
   EXPECT_FALSE(std::filesystem::exists(path));
 }
 
+// It has taken the place of the one before; the next one has its name by now.
+TEST(HealthFile, OneThatWasRenamedLeavesItsSuccessorsAlone) {
+  const auto beside = std::filesystem::temp_directory_path() / ("railfix-health-beside-" + std::to_string(getpid()));
+  msg::ServiceStatus status;
+  status.state(msg::STATE_ACTIVE);
+  std::optional<HealthFile> before(beside);
+  before->write(status);
+  const std::filesystem::path place = beside.string() + "-place";
+  std::filesystem::rename(beside, place);
+  HealthFile now(beside);
+  now.write(status);
+  before.reset();
+  EXPECT_TRUE(ask_health(beside).healthy);
+  std::filesystem::remove(place);
+}
+
 class HealthFileFlow : public ::testing::Test {
  protected:
   HealthAnswer ask(Flow flow, double input_since_s, double last_input_s, double last_output_s, bool stands_by = false) {

@@ -51,6 +51,17 @@ TEST_F(HostFiles, AreReadAsTheyWereWritten) {
   EXPECT_TRUE(folder_.state().at("fusion").refused);
 }
 
+// Another process may have the number, and even the start time, of one of before.
+TEST_F(HostFiles, ProcessesOfBeforeTheComputersStartAreForgotten) {
+  ASSERT_TRUE(folder_.write(HostState{{"fusion", {7, 3, 1, "ended", false, 9, false}}}).ok());
+  std::ifstream in(root_ / "var/lib/railfix-train/state.yaml");
+  std::string text{std::istreambuf_iterator<char>(in), {}};
+  const size_t id = text.find("boot_id: ") + 9;
+  text.replace(id, 8, "00000000");
+  write("state.yaml", text);
+  EXPECT_TRUE(folder_.state().empty());
+}
+
 TEST_F(HostFiles, ThatAreDamagedAreTold) {
   const auto plan = [&](const std::string& text) {
     write("plan.yaml", text);

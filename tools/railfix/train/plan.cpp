@@ -5,6 +5,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
+#include <fstream>
 #include <set>
 
 #include "core/whole_file.hpp"
@@ -16,6 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kGenerationsKept = 5;
+constexpr const char* kBoot = "boot_id";  // in state.yaml, beside the services
 
 core::BadInput damaged(const fs::path& file, const std::string& how) {
   return core::BadInput(file.string() + " is damaged (" + how + "); remove it, then railfix train up TRAIN");
@@ -70,9 +72,20 @@ HostPlan plan_of(const YAML::Node& root) {
   return plan;
 }
 
+/// Another one after every start of the computer.
+std::string boot_id() {
+  std::ifstream in("/proc/sys/kernel/random/boot_id");
+  std::string id;
+  in >> id;
+  return id;
+}
+
+// After a start of the computer its processes are gone, and others have their numbers.
 HostState state_of(const YAML::Node& root) {
   HostState state;
+  if (root[kBoot] && root[kBoot].as<std::string>() != boot_id()) return state;
   for (const auto& entry : root) {
+    if (entry.first.as<std::string>() == kBoot) continue;
     const auto& one = entry.second;
     state[entry.first.as<std::string>()] = {one["pid"].as<int64_t>(),      one["generation"].as<int>(),
                                             one["restarts"].as<int>(),     one["last_end"].as<std::string>(),
@@ -182,6 +195,7 @@ HostState HostFolder::state() const {
 
 core::Status HostFolder::write(const HostState& state) const {
   YAML::Node root(YAML::NodeType::Map);
+  root[kBoot] = boot_id();
   for (const auto& [name, service] : state) {
     root[name]["pid"] = service.pid;
     root[name]["generation"] = service.generation;

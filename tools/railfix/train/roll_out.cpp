@@ -250,6 +250,7 @@ core::Result<HostPlan> install(const Manifest& manifest, const TrainHost& host, 
   plan.previous = now && now->train_id == plan.train_id ? now->generation : 0;  // another train's is no way back
   const auto files = folder.generation(plan.generation);
   if (const auto rendered = render_host(manifest, host, files); !rendered.ok()) return rendered.error();
+  bool all_same = true;
   for (const auto& service : services_on(manifest, host.name)) {
     PlannedService planned{service.name, service.release, plan.generation, service.standby, {}, {}, {}};
     planned.settings = settings_of(manifest, host, service.name);
@@ -259,7 +260,16 @@ core::Result<HostPlan> install(const Manifest& manifest, const TrainHost& host, 
     const auto* runs = now ? now->service(service.name) : nullptr;
     const bool same = runs != nullptr && runs->release == planned.release && runs->standby == planned.standby &&
                       runs->settings == planned.settings;
+    all_same = all_same && same;
     plan.services.push_back(same ? *runs : planned);
+  }
+  // Brought down and up again it is the same generation, and the way back is the same one.
+  if (all_same && now && now->down && now->train_id == plan.train_id && now->services.size() == plan.services.size()) {
+    std::error_code failed;
+    fs::remove_all(files, failed);
+    plan = *now;
+    plan.down = false;
+    return plan;
   }
   if (manifest.containers) {
     if (const auto handed = hand_over(folder.home()); !handed.ok()) return handed.error();
@@ -274,7 +284,9 @@ core::Status bring_up(const fs::path& root, const HostPlan& plan, const HealthGa
   if (!supervisor_of(folder)) {
     if (const auto started = start_supervisor(root); !started.ok()) return started;
   }
-  return wait_healthy(folder, plan, names_of(plan), gate, say);
+  const auto healthy = wait_healthy(folder, plan, names_of(plan), gate, say);
+  if (healthy.ok()) folder.prune();
+  return healthy;
 }
 
 core::Status bring_down(const fs::path& root) {
@@ -299,6 +311,15 @@ core::Status bring_down(const fs::path& root) {
   return {};
 }
 
+// What another command has written meanwhile stays: `down` above all.
+core::Status write_after(const HostFolder& folder, int last_generation, const HostPlan& next) {
+  const auto there = folder.plan();
+  if (there && there->down == next.down && there->generation == last_generation) return folder.write(next);
+  return core::Error{
+      "another command has changed what runs here meanwhile (railfix train down, upgrade or rollback); this one has "
+      "stopped, railfix train status says what runs"};
+}
+
 core::Status roll_out(const fs::path& root, const HostPlan& plan, const HealthGate& gate, const Say& say) {
   const HostFolder folder(root);
   const auto before = folder.plan();
@@ -308,10 +329,13 @@ core::Status roll_out(const fs::path& root, const HostPlan& plan, const HealthGa
   auto now = *before;
   now.generation = plan.generation;
   now.previous = plan.previous;  // after a rollback the one before that one, and not what was rolled back from
-  for (const auto& name : changed_services(*before, plan)) {
+  int there = before->generation;
+  const auto changed = changed_services(*before, plan);
+  for (const auto& name : changed) {
     const bool sent = health_of(now, folder.state(), name).sends;
     now = with_service(now, plan, name);
-    if (const auto written = folder.write(now); !written.ok()) return written;
+    if (const auto written = write_after(folder, there, now); !written.ok()) return written;
+    there = now.generation;
     const auto* target = plan.service(name);
     say(target != nullptr ? name + ": release " + target->release + ", generation " + std::to_string(target->generation)
                           : name + ": leaves this host");
@@ -319,16 +343,21 @@ core::Status roll_out(const fs::path& root, const HostPlan& plan, const HealthGa
     const auto healthy = wait_healthy(folder, now, {name}, gate, say, sent);
     if (healthy.ok()) continue;
     say(healthy.error().message + "; back to generation " + std::to_string(before->generation));
-    if (const auto written = folder.write(*before); !written.ok()) return written;
+    if (const auto written = write_after(folder, there, *before); !written.ok()) return written;
     const HealthGate patient{gate.healthy_s, std::max(gate.patience_s, kBackS)};
     const auto again = wait_healthy(folder, *before, names_of(*before), patient, say);
     return core::Error{"generation " + std::to_string(plan.generation) + " did not pass: " + healthy.error().message +
                        (again.ok() ? "; generation " + std::to_string(before->generation) + " runs again"
                                    : "; AND the old generation is not healthy: " + again.error().message)};
   }
-  const auto written = folder.write(now);
+  if (const auto written = write_after(folder, there, now); !written.ok()) return written;
   folder.prune();
-  return written;
+  // An upgrade that was broken off may have left one that does not run.
+  auto others = names_of(now);
+  std::erase_if(others, [&](const auto& name) { return std::ranges::find(changed, name) != changed.end(); });
+  if (const auto healthy = wait_healthy(folder, now, others, gate, say); !healthy.ok())
+    return core::Error{"generation " + std::to_string(now.generation) + " runs, but " + healthy.error().message};
+  return {};
 }
 
 }  // namespace railfix::tool
