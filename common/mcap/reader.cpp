@@ -150,8 +150,8 @@ bool Reader::scan(const GoesOn& goes_on) {
     const uint64_t length = decoder.u64();
     const bool whole = decoder.ok() && length <= size - offset - kRecordHeadBytes;
     const auto content = whole ? bytes_->read(offset + kRecordHeadBytes, length) : std::nullopt;
-    if (!content || opcode == 0) unread_bytes_ += size - offset;
     if (!content || opcode == 0) {
+      unread_bytes_ += size - offset;
       problem("ends in the middle of a record at byte " + std::to_string(offset) + " of " + std::to_string(size));
       return true;
     }

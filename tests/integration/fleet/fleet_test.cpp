@@ -211,12 +211,7 @@ TEST_F(Fleet, AnUpgradeRestartsWhatChangedAndRollsBackByItselfWhenItIsBad) {
   const auto changed = status("tpr_publisher");
   EXPECT_NE(changed["pid"], reports["pid"]);
 
-  // A release whose fusion does not live.
-  const auto bin = folder_ / "root/opt/railfix/9.9.9/bin";
-  fs::create_directories(bin);
-  std::ofstream(bin / "railfix-fusion") << "#!/bin/sh\ncase \"$*\" in *--check*) exit 0 ;; esac\nexit 3\n";
-  fs::permissions(bin / "railfix-fusion", fs::perms::owner_all);
-  fs::create_symlink(fs::path(RAILFIX_BIN_DIR) / "railfix-tpr-publisher", bin / "railfix-tpr-publisher");
+  install_dead_release();
   write_manifest("9.9.9", ", tpr_publisher: { nid_engine: 4711 }");
   const auto failed = upgrade("6");
   EXPECT_EQ(failed.exit_code, 1);
@@ -259,11 +254,7 @@ TEST_F(Fleet, DownAndUpKeepTheWayBack) {
 
 TEST_F(Fleet, WhatIsTakenDownWhileAnUpgradeWaitsStaysDown) {
   ASSERT_EQ(up().exit_code, 0);
-  const auto bin = folder_ / "root/opt/railfix/9.9.9/bin";
-  fs::create_directories(bin);
-  std::ofstream(bin / "railfix-fusion") << "#!/bin/sh\ncase \"$*\" in *--check*) exit 0 ;; esac\nexit 3\n";
-  fs::permissions(bin / "railfix-fusion", fs::perms::owner_all);
-  fs::create_symlink(fs::path(RAILFIX_BIN_DIR) / "railfix-tpr-publisher", bin / "railfix-tpr-publisher");
+  install_dead_release();
   write_manifest("9.9.9");
   const auto said = folder_ / "upgrade.log";
   test::Program upgrade(

@@ -31,6 +31,14 @@ class FleetTest : public ::testing::Test {
            "settings: { common: { log_level: warning }"
         << more << " }\n";
   }
+  /// 9.9.9, whose fusion does not live.
+  void install_dead_release() const {
+    const auto bin = folder_ / "root/opt/railfix/9.9.9/bin";
+    fs::create_directories(bin);
+    std::ofstream(bin / "railfix-fusion") << "#!/bin/sh\ncase \"$*\" in *--check*) exit 0 ;; esac\nexit 3\n";
+    fs::permissions(bin / "railfix-fusion", fs::perms::owner_all);
+    fs::create_symlink(fs::path(RAILFIX_BIN_DIR) / "railfix-tpr-publisher", bin / "railfix-tpr-publisher");
+  }
   static test::Outcome train(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), {"railfix", "train"});
     return test::run_program(arguments, 180);

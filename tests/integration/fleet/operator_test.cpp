@@ -1,9 +1,8 @@
 // What an operator is told who has made a mistake, and that nothing is changed by it.
-#include <arpa/inet.h>
 #include <gmock/gmock.h>
-#include <sys/socket.h>
 
 #include "integration/fleet/fleet_train.hpp"
+#include "support/loopback.hpp"
 
 namespace railfix {
 namespace {
@@ -86,15 +85,9 @@ TEST_F(Operator, AMistakeInTheManifestStartsNothing) {
 }
 
 TEST_F(Operator, ThePageIsSaidWhereItIsAndNotWhereItWasToBe) {
-  const int other = socket(AF_INET, SOCK_STREAM, 0);
-  sockaddr_in at{};
-  at.sin_family = AF_INET;
-  at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t bytes = sizeof(at);
-  ASSERT_EQ(bind(other, reinterpret_cast<const sockaddr*>(&at), bytes), 0);
+  const int other = test::tcp_socket();
+  const auto port = std::to_string(test::bind_to_loopback(other));
   ASSERT_EQ(listen(other, 1), 0);
-  ASSERT_EQ(getsockname(other, reinterpret_cast<sockaddr*>(&at), &bytes), 0);
-  const auto port = std::to_string(ntohs(at.sin_port));
   std::ofstream(folder_ / "train" / "train.yaml")
       << "train:\n  id: " << id_ << "\n  domain: 95\n  release: " RAILFIX_TEST_RELEASE
       << "\n  run_as: programs\n  hosts: { cab: { address: 127.0.0.1 } }\n  services: { monitor: cab }\n"

@@ -77,16 +77,24 @@ TEST(TprPublisher, DirectionOfMovementIsKeptAtStandstill) {
   EXPECT_EQ(publisher.update(position, position.stamp_ns).report->fields.q_dirtrain, etcs::kReverse);
 }
 
-TEST(TprPublisher, TheSpeedsNoiseAtRestIsNoMovement) {
-  TprPublisher publisher(balise_map(), settings());
-  double run_s = 0;
-  const auto direction = [&](double offset_m, double speed_mps, bool standstill) {
-    auto position = at(forward(1, offset_m), run_s, speed_mps);
+/// Q_DIRTRAIN of the report that a state causes, ten a second; 99 where it causes none.
+class SaidDirection {
+ public:
+  uint32_t operator()(double offset_m, double speed_mps, bool standstill) {
+    auto position = at(forward(1, offset_m), run_s_, speed_mps);
     position.standstill = standstill;
-    const auto outcome = publisher.update(position, position.stamp_ns);
-    run_s += 0.1;
+    const auto outcome = publisher_.update(position, position.stamp_ns);
+    run_s_ += 0.1;
     return outcome.report ? outcome.report->fields.q_dirtrain : 99;
-  };
+  }
+
+ private:
+  TprPublisher publisher_{balise_map(), settings()};
+  double run_s_ = 0;
+};
+
+TEST(TprPublisher, TheSpeedsNoiseAtRestIsNoMovement) {
+  SaidDirection direction;
   direction(150, 2, false);
   for (int i = 0; i < 10; ++i) direction(150.2 + (i % 2) * 0.01, i % 2 == 0 ? -0.03 : 0.03, false);
   EXPECT_EQ(direction(150.2, 0, true), etcs::kNominal);
@@ -96,15 +104,7 @@ TEST(TprPublisher, TheSpeedsNoiseAtRestIsNoMovement) {
 
 // As with a dark camera and a wheel that has slipped: the estimate goes back, the train does not.
 TEST(TprPublisher, ACorrectionWhileItBrakesIsNoMovementBack) {
-  TprPublisher publisher(balise_map(), settings());
-  double run_s = 0;
-  const auto direction = [&](double offset_m, double speed_mps, bool standstill) {
-    auto position = at(forward(1, offset_m), run_s, speed_mps);
-    position.standstill = standstill;
-    const auto outcome = publisher.update(position, position.stamp_ns);
-    run_s += 0.1;
-    return outcome.report ? outcome.report->fields.q_dirtrain : 99;
-  };
+  SaidDirection direction;
   direction(150, 2, false);
   direction(150.2, 0.5, false);
   direction(150.13, -0.4, false);

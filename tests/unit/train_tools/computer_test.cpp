@@ -1,13 +1,12 @@
 // What a computer of the train lacks: said before anything is installed.
-#include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <sched.h>
 #include <sys/mount.h>
-#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include "recorder/recorder_config.hpp"
+#include "support/loopback.hpp"
 #include "tpr_publisher/tpr_publisher_config.hpp"
 #include "train/disk_need.hpp"
 #include "unit/train_tools/train_folder.hpp"
@@ -68,15 +67,9 @@ TEST_F(TrainFolder, APageThatCannotBeServedOnThisComputerIsTold) {
 }
 
 TEST_F(TrainFolder, APortThatAnotherProgramHasIsTold) {
-  const int other = socket(AF_INET, SOCK_STREAM, 0);
-  sockaddr_in at{};
-  at.sin_family = AF_INET;
-  at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t bytes = sizeof(at);
-  ASSERT_EQ(bind(other, reinterpret_cast<const sockaddr*>(&at), bytes), 0);
+  const int other = test::tcp_socket();
+  const auto port = std::to_string(test::bind_to_loopback(other));
   ASSERT_EQ(listen(other, 1), 0);
-  ASSERT_EQ(getsockname(other, reinterpret_cast<sockaddr*>(&at), &bytes), 0);
-  const auto port = std::to_string(ntohs(at.sin_port));
   const auto told = [&](const char* search) {
     auto train = manifest(kTrain, "10.42.1.12", "127.0.0.1").value();
     train.settings["monitor"]["port"] = port;
