@@ -8,6 +8,8 @@
 #include <climits>
 #include <csignal>
 
+#include "core/whole_file.hpp"
+
 namespace railfix::tool {
 
 namespace {
@@ -16,6 +18,8 @@ namespace {
 std::array<char, PATH_MAX> living_name{};
 std::atomic<bool> lives{false};
 static_assert(std::atomic<bool>::is_always_lock_free);
+
+constexpr std::array kEnds{SIGINT, SIGTERM, SIGHUP};
 
 /// Ends the program as the signal does without us.
 void remove_and_end(int signal) {
@@ -26,7 +30,7 @@ void remove_and_end(int signal) {
 
 /// Signals that somebody ignores for us (nohup) stay ignored.
 void handle_ends() {
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+  for (const int signal : kEnds) {
     if (std::signal(signal, remove_and_end) == SIG_IGN) std::signal(signal, SIG_IGN);
   }
 }
@@ -39,6 +43,19 @@ Draft::Draft(std::filesystem::path file) : file_(std::move(file)) {
   *std::ranges::copy(name, living_name.begin()).out = '\0';
   lives = true;
   handle_ends();
+}
+
+core::Result<std::unique_ptr<Draft>> Draft::beside(const std::filesystem::path& file, const std::string& ending) {
+  sigset_t ends;
+  sigemptyset(&ends);
+  for (const int signal : kEnds) sigaddset(&ends, signal);
+  sigset_t before;
+  pthread_sigmask(SIG_BLOCK, &ends, &before);
+  const auto made = core::draft_beside(file, ending);
+  auto draft = made.ok() ? std::make_unique<Draft>(made.value()) : nullptr;
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  if (!made.ok()) return made.error();
+  return draft;
 }
 
 Draft::~Draft() {

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <sys/wait.h>
+#include <unistd.h>
+
 #include <csignal>
 
 #include "unit/dataset/temporary_folder.hpp"
@@ -32,6 +35,24 @@ TEST_F(DraftTest, IsGoneWhenTheProgramIsEnded) {
         },
         ::testing::KilledBySignal(signal), "");
     EXPECT_FALSE(fs::exists(file));
+  }
+}
+
+TEST_F(DraftTest, IsGoneWheneverTheProgramIsEnded) {
+  fs::create_directories(root_ / "films");
+  for (useconds_t after_us = 0; after_us < 200; ++after_us) {
+    const pid_t child = fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      while (Draft::beside(root_ / "films/ride", ".mp4").ok()) continue;
+      _exit(1);
+    }
+    usleep(after_us);
+    kill(child, SIGTERM);
+    int status = 0;
+    ASSERT_EQ(waitpid(child, &status, 0), child);
+    EXPECT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == SIGTERM);
+    ASSERT_TRUE(fs::is_empty(root_ / "films")) << after_us;
   }
 }
 

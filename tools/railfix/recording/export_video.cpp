@@ -257,13 +257,13 @@ core::Result<VideoReport> export_video(mcap::Reader& reader, const mcap::Selecti
                                        const std::filesystem::path& file) {
   const auto channel = picture_channel(reader, options);
   if (!channel.ok()) return channel.error();
-  const auto beside = core::draft_beside(file, ".mp4");  // FFmpeg makes what the name ends in
-  if (!beside.ok()) return beside.error();
-  const Draft draft(beside.value());
-  auto report = make_film(reader, part, options, channel.value(), draft.file());
-  auto status = report.ok() ? whole_mp4(draft.file(), file.string()) : takes_more(draft.file(), file.string());
+  const auto draft = Draft::beside(file, ".mp4");  // FFmpeg makes what the name ends in
+  if (!draft.ok()) return draft.error();
+  const auto& film = draft.value()->file();
+  auto report = make_film(reader, part, options, channel.value(), film);
+  auto status = report.ok() ? whole_mp4(film, file.string()) : takes_more(film, file.string());
   if (status.ok() && !report.ok()) return report;
-  if (status.ok()) status = core::move_draft(draft.file(), file);
+  if (status.ok()) status = core::move_draft(film, file);
   if (!status.ok()) return status.error();
   return report;
 }
