@@ -38,6 +38,8 @@ constexpr double kMedianChiSquared2 = 1.386;  // two degrees of freedom
 constexpr int kReweightings = 4;
 
 // Displacement (ahead, left) of a place that shows at `place` in the reference and `now` in the new view, per unknown.
+// A turn moves the ground on the left ahead of that on the right, too; where a transition curve twists the track that
+// moves it by many times as much, so only the sideways motion tells the turn.
 Rows rows_at(const Eigen::Vector2d& place, const Eigen::Vector2d& now, double height_m, bool ballast) {
   const double x = place.x();
   const double xn = now.x();
@@ -52,7 +54,6 @@ Rows rows_at(const Eigen::Vector2d& place, const Eigen::Vector2d& now, double he
   rows(0, kHeightN) = xn * per_m;
   rows(0, kVerticalR) = 0.5 * x * x * x * per_m;
   rows(0, kVerticalN) = -0.5 * xn * xn * xn * per_m;
-  rows(0, kTurn) = n;
   if (ballast) rows(0, kBallast) = (x - xn) * per_m;  // farther away than the sheet, so it seems slower
   rows(1, kPitchR) = n * x * per_m;
   rows(1, kPitchN) = -n * xn * per_m;
@@ -63,6 +64,11 @@ Rows rows_at(const Eigen::Vector2d& place, const Eigen::Vector2d& now, double he
   rows(1, kLateral) = -1.0;
   rows(1, kTurn) = -xn;
   return rows;
+}
+
+// A sheet that bends more to the left shows the same ground further to the right.
+double left_by_bend_m(double now_ahead_m, double bends_more_per_m) {
+  return -0.5 * bends_more_per_m * now_ahead_m * now_ahead_m;
 }
 
 }  // namespace
@@ -144,11 +150,13 @@ Eigen::Matrix2d MotionFilter::information_of(const PatchMotion& patch, double he
   return patch.information - along * along.transpose() * (variance / (1.0 + variance * along.x()));
 }
 
-void MotionFilter::set_votes(double height_m, const std::vector<PatchMotion>& patches) {
+void MotionFilter::set_votes(double height_m, double bends_more_per_m, const std::vector<PatchMotion>& patches) {
   votes_.resize(patches.size());
   for (size_t i = 0; i < patches.size(); ++i) {
     const PatchMotion& patch = patches[i];
-    const Rows rows = rows_at(patch.place_m, patch.place_m + patch.displacement_m, height_m, patch.ballast);
+    const Eigen::Vector2d now = patch.place_m + patch.displacement_m;
+    const Rows rows = rows_at(patch.place_m, now, height_m, patch.ballast);
+    const double left_m = patch.displacement_m.y() - left_by_bend_m(now.x(), bends_more_per_m);
     const Eigen::Matrix2d known = information_of(patch, height_m);
     // Root of the information: its Cholesky factor, transposed.
     const double l00 = std::sqrt(known(0, 0));
@@ -157,8 +165,8 @@ void MotionFilter::set_votes(double height_m, const std::vector<PatchMotion>& pa
     Vote& vote = votes_[i];
     vote.rows[0] = l00 * rows.row(0).transpose() + l10 * rows.row(1).transpose();
     vote.rows[1] = l11 * rows.row(1).transpose();
-    vote.values[0] = l00 * patch.displacement_m.x() + l10 * patch.displacement_m.y();
-    vote.values[1] = l11 * patch.displacement_m.y();
+    vote.values[0] = l00 * patch.displacement_m.x() + l10 * left_m;
+    vote.values[1] = l11 * left_m;
     vote.weight = 1.0;
   }
 }
@@ -199,7 +207,7 @@ void MotionFilter::solve(const PoseErrors& reference, const PosePrior& prior, co
   set_prior(reference, prior);
   tie(kHeightN, kHeightR, pose_tie.height_used_m, pose_tie.height_sigma_m);
   tie(kVerticalN, kVerticalR, pose_tie.vertical_used_per_m, pose_tie.vertical_sigma_per_m);
-  set_votes(height_m, patches);
+  set_votes(height_m, pose_tie.curvature_used_per_m, patches);
   double scale = 1.0;
   Vector right;
   Eigen::LDLT<Matrix> solver(information(scale, right));
@@ -214,6 +222,7 @@ void MotionFilter::solve(const PoseErrors& reference, const PosePrior& prior, co
   motion.along_m = solution(kDistanceN) - solution(kDistanceR);
   motion.lateral_m = solution(kLateral);
   motion.turn_rad = solution(kTurn);
+  motion.bends_more_per_m = pose_tie.curvature_used_per_m;
   motion.along_sigma_m = std::sqrt(
       std::max(0.0, all(kDistanceN, kDistanceN) + all(kDistanceR, kDistanceR) - 2.0 * all(kDistanceN, kDistanceR)));
   motion.lateral_sigma_m = sigma(kLateral);
@@ -255,9 +264,11 @@ Eigen::Vector2d MotionFilter::displacement(const Motion& motion, double height_m
   unknowns(kDistanceN) = motion.along_m;
   unknowns(kLateral) = motion.lateral_m;
   unknowns(kTurn) = motion.turn_rad;
-  const Eigen::Vector2d now = place_m - Eigen::Vector2d(motion.along_m, 0);
-  const Eigen::Vector2d first = rows_at(place_m, now, height_m, ballast).lazyProduct(unknowns);
-  return rows_at(place_m, place_m + first, height_m, ballast).lazyProduct(unknowns);
+  const auto moved_m = [&](const Eigen::Vector2d& now_m) -> Eigen::Vector2d {
+    return rows_at(place_m, now_m, height_m, ballast).lazyProduct(unknowns) +
+           Eigen::Vector2d(0, left_by_bend_m(now_m.x(), motion.bends_more_per_m));
+  };
+  return moved_m(place_m + moved_m(place_m - Eigen::Vector2d(motion.along_m, 0)));
 }
 
 }  // namespace railfix::odometry

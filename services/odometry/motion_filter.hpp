@@ -33,9 +33,10 @@ struct PoseErrors {
 };
 
 struct Motion {
-  double along_m = 0;    // of the camera's foot between the pictures
-  double lateral_m = 0;  // left positive, beside the sheet's own curve
-  double turn_rad = 0;   // left positive, beside the sheet's own curve
+  double along_m = 0;           // of the camera's foot between the pictures
+  double lateral_m = 0;         // left positive, beside the sheet's own curve
+  double turn_rad = 0;          // left positive, beside the sheet's own curve
+  double bends_more_per_m = 0;  // the new picture's sheet than the reference's, left positive
   double along_sigma_m = 0;
   double lateral_sigma_m = 0;
   double turn_sigma_rad = 0;
@@ -55,10 +56,11 @@ struct PosePrior {
 };
 
 /// What two pictures share: the suspension moves the camera only so fast, and the track bends only so fast. Poses used,
-/// new less reference, and how far their errors may differ.
+/// new less reference, and how far their errors may differ. The sheets' curves (left positive) are what they are.
 struct PoseTie {
   double height_used_m = 0;
   double vertical_used_per_m = 0;
+  double curvature_used_per_m = 0;
   double height_sigma_m = 0.05;
   double vertical_sigma_per_m = 1e-3;
 };
@@ -98,7 +100,7 @@ class MotionFilter {
   void set_prior(const PoseErrors& reference, const PosePrior& prior);
   void tie(int now, int reference, double used, double sigma);
   [[nodiscard]] Eigen::Matrix2d information_of(const PatchMotion& patch, double height_m) const;
-  void set_votes(double height_m, const std::vector<PatchMotion>& patches);
+  void set_votes(double height_m, double bends_more_per_m, const std::vector<PatchMotion>& patches);
   [[nodiscard]] Matrix information(double scale, Vector& right) const;
   double weigh(const Vector& solution);
   void walk(Motion& motion) const;

@@ -140,6 +140,7 @@ PoseTie TrainMouse::tie(double along_m) const {
   PoseTie tie;
   tie.height_used_m = now_.pose.camera.height_m - then.pose.camera.height_m;
   tie.vertical_used_per_m = now_.pose.vertical_curvature_per_m - then.pose.vertical_curvature_per_m;
+  tie.curvature_used_per_m = now_.pose.curvature_per_m - then.pose.curvature_per_m;
   tie.height_sigma_m = kHeightShakeM + (kBouncePerM * std::abs(along_m) + kSettlingMps * dt_s);
   tie.vertical_sigma_per_m = kVerticalChangePerM2 * (kVerticalChangeM + std::abs(along_m));
   return tie;
@@ -200,13 +201,11 @@ double TrainMouse::scale_sigma() const {
 }
 
 // The sheets follow the rails that are seen, metres ahead and perhaps those of another leg; the camera turns with the
-// car body, whatever the sheets follow. What the two sheets make of it is taken off again: their yaw at the foot, their
-// curve over the step, and how differently they bend where the patches lie.
+// car body, whatever the sheets follow. What the two sheets make of it is taken off again: their yaw at the foot and
+// their curve over the step.
 double TrainMouse::turn_of_camera() const {
   const auto& then = reference_->seen.pose;
-  const double bends_less_per_m = then.curvature_per_m - now_.pose.curvature_per_m;
-  return motion_.turn_rad + now_.pose.camera.yaw_rad - then.camera.yaw_rad + then.curvature_per_m * motion_.along_m +
-         bends_less_per_m * (patches_ahead_m() - motion_.along_m);
+  return motion_.turn_rad + now_.pose.camera.yaw_rad - then.camera.yaw_rad + then.curvature_per_m * motion_.along_m;
 }
 
 double TrainMouse::patches_ahead_m() const {
