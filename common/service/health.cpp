@@ -41,8 +41,9 @@ double percentile(std::vector<double>& values, double share) {
 }  // namespace
 
 PublishedHealth::PublishedHealth(messaging::Participant& participant, const std::string& service,
-                                 const CommonConfig& common, bool beside)
+                                 const CommonConfig& common, bool beside, spdlog::logger& log)
     : participant_(participant),
+      log_(log),
       writer_(participant, messaging::topics::service_status),
       file_(beside ? health_path_beside(common, service) : health_path(common, service)),
       measured_ns_(core::monotonic_ns()),
@@ -107,6 +108,12 @@ void PublishedHealth::publish() {
   writer_.write(published_);
   traffic_.stands_by = !stands_by_.empty();
   file_.write(published_, traffic_, serves_);
+  log_news();
+}
+
+void PublishedHealth::log_news() {
+  const auto line = state_log_.follow(published_.state(), published_.reason().c_str(), core::monotonic_ns());
+  if (line) log_.log(line->trouble ? spdlog::level::warn : spdlog::level::info, "{}", line->text);
 }
 
 msg::ServiceStatus PublishedHealth::said() const {

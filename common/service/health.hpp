@@ -6,6 +6,7 @@
 
 #include "service/health_file.hpp"
 #include "service/service.hpp"
+#include "service/state_log.hpp"
 
 namespace railfix::service {
 
@@ -15,7 +16,7 @@ enum class Trouble { clock, writers, certificates };
 class PublishedHealth final : public Health {
  public:
   PublishedHealth(messaging::Participant& participant, const std::string& service, const CommonConfig& common,
-                  bool beside);
+                  bool beside, spdlog::logger& log);
 
   void ready() override { change(msg::STATE_READY, ""); }
   void active() override { change(msg::STATE_ACTIVE, ""); }
@@ -43,7 +44,10 @@ class PublishedHealth final : public Health {
   /// When what it says is not what was published last.
   void publish_news();
   [[nodiscard]] msg::ServiceStatus said() const;
+  void log_news();
   messaging::Participant& participant_;
+  spdlog::logger& log_;
+  StateLog state_log_;
   messaging::Writer<msg::ServiceStatus> writer_;
   HealthFile file_;
   msg::ServiceStatus status_;  // as the service says

@@ -54,7 +54,7 @@ Loop::Loop(std::string service, const CommonConfig& common, bool beside)
       participant_({common.train_id, common.host, service_, common.domain, common.qos_profiles, common.interfaces,
                     common.peers, common.security}),
       log_(make_logger(participant_, service_, common)),
-      health_(std::make_unique<PublishedHealth>(participant_, service_, common, beside)),
+      health_(std::make_unique<PublishedHealth>(participant_, service_, common, beside, *log_)),
       reply_(std::make_unique<messaging::Writer<msg::ControlReply>>(participant_, messaging::topics::service_reply)),
       notes_(notes_path(common, service_)),
       clocks_(common.host),

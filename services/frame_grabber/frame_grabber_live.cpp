@@ -18,12 +18,7 @@ void FrameGrabberService::prepare_live() {
       bad_packets_ = 0;
     });
   };
-  events.gone = [this](const std::string& why) {
-    context_.post([this, why] {
-      context_.health().degraded(why);
-      context_.log().warn("{}", why);
-    });
-  };
+  events.gone = [this](const std::string& why) { context_.post([this, why] { context_.health().degraded(why); }); };
   events.picture = [this](RawPicture picture) {
     context_.post([this, picture = std::move(picture)] { shoot(picture); });
   };

@@ -111,8 +111,6 @@ void RecorderService::show_state() {
   }
   for (const auto& sentence : thread_.housekeeper().take_sentences()) context_.log().info("{}", sentence);
   for (const auto& sentence : thread_.housekeeper().take_warnings()) context_.log().warn("{}", sentence);
-  if (now.problem != problem_ && !now.problem.empty()) context_.log().error("{}", now.problem);
-  problem_ = now.problem;
   show_health(now);
   publish(now);
 }

@@ -35,7 +35,6 @@ class RecorderService {
   int64_t loses_until_ns_ = 0;  // shown so long
   int64_t lost_on_way_told_ns_ = 0;
   std::string losses_;  // as they were then: a new file begins at none
-  std::string problem_;
   msg::RecorderStatus published_;
   int64_t published_ns_ = 0;
 };

@@ -32,7 +32,6 @@ void SensorGatewayService::feed_from(std::unique_ptr<LiveSensor> sensor) {
   };
   events.gone = [this, source](const std::string& why) {
     context_.post([this, source, why] {
-      context_.log().warn("{}", why);
       troubles_[source] = why;
       say_live();
     });

@@ -214,11 +214,6 @@ void TprPublisherService::show() {
     remark_ = remark;
     if (!remark.empty()) context_.log().warn("{}", remark);
   }
-  // Figures in the sentence change all the time; the kind of it is worth one line in the log.
-  const auto kind = degraded_by.substr(0, degraded_by.find_first_of("0123456789"));
-  if (kind == degraded_by_) return;
-  degraded_by_ = kind;
-  if (!degraded_by.empty()) context_.log().warn("{}", degraded_by);
 }
 
 }  // namespace railfix::tpr_publisher

@@ -57,7 +57,6 @@ class TprPublisherService {
   uint64_t seq_ = 0;
   std::unique_ptr<GroundLink> ground_link_;  // nullptr = no broker
   std::string report_trouble_;
-  std::string degraded_by_;
   std::string remark_;           // of the ground link, as it was logged
   std::string onboard_refusal_;  // empty = used
 };
