@@ -66,6 +66,7 @@ void headline_figures(Html& html, const Evaluation& e) {
   if (e.odometry) {
     html.figure("odometry drift", number(e.odometry->drift.percent, "%.4f %%"));
     html.figure("drift per 100 m, p95", number(e.odometry->drift.window_percent.p95, "%.4f %%"));
+    html.figure("turn leads the foot", number(e.odometry->turn.lead_m, "%.1f m"));
   }
   if (e.position) {
     html.figure("position error, p95", number(e.position->error_m.p95, "%.3f m"));

@@ -187,6 +187,7 @@ OdometryResult judge_odometry(const Truth& truth, const std::vector<OdometryRow>
   result.samples = beside_truth(truth, rows);
   result.drift = drift_of(result.samples);
   result.speed_rms_mps = speed_rms(result.samples);
+  result.turn = judge_turn(truth, rows);
   const auto valid = std::count_if(rows.begin(), rows.end(), [](const OdometryRow& row) { return row.valid; });
   const auto blind =
       std::count_if(rows.begin(), rows.end(), [](const OdometryRow& row) { return row.mode == "blind"; });

@@ -7,6 +7,7 @@
 #include "evaluation/run_tables.hpp"
 #include "evaluation/statistics.hpp"
 #include "evaluation/truth.hpp"
+#include "evaluation/turn.hpp"
 
 namespace railfix::evaluation {
 
@@ -33,6 +34,7 @@ struct OdometryResult {
   double valid_percent = kUnknown;
   double blind_percent = kUnknown;
   double speed_rms_mps = kUnknown;
+  TurnResult turn;
 };
 OdometryResult judge_odometry(const Truth& truth, const std::vector<OdometryRow>& rows);
 

@@ -53,6 +53,10 @@ void print_odometry(std::ostream& out, const OdometryResult& odometry) {
   print_drift(out, odometry.drift);
   line(out, "valid, blind", share(odometry.valid_percent) + ", " + share(odometry.blind_percent) + " of the steps");
   line(out, "speed error", figure(odometry.speed_rms_mps, "%.4f", " m/s") + " rms");
+  if (odometry.turn.stretches == 0) return;
+  line(out, "turn",
+       figure(1e3 * odometry.turn.error_rad, "%.2f", " mrad") + " rms in " + std::to_string(odometry.turn.stretches) +
+           " stretches of 300 m, leads the foot by " + figure(odometry.turn.lead_m, "%.1f", " m"));
 }
 
 void print_position(std::ostream& out, const PositionResult& position) {
@@ -140,6 +144,9 @@ ordered_json odometry_json(const OdometryResult& odometry) {
   json["valid_percent"] = odometry.valid_percent;
   json["blind_percent"] = odometry.blind_percent;
   json["speed_rms_mps"] = odometry.speed_rms_mps;
+  json["turn_stretches"] = odometry.turn.stretches;
+  json["turn_error_rad"] = odometry.turn.error_rad;
+  json["turn_lead_m"] = odometry.turn.lead_m;
   return json;
 }
 

@@ -22,9 +22,11 @@ Status read(const fs::path& file, std::vector<OdometryRow>& rows) {
   const size_t distance = table.required({"distance_m"});
   const size_t speed = table.required({"speed_mps"});
   const size_t mode = table.required({"mode"});
+  const std::optional<size_t> yaw_rate = table.optional({"yaw_rate_rps"});
   while (table.next()) {
     rows.push_back({table.integer(stamp), table.integer(valid) != 0, table.number_or_nan(distance, core::kFarthestM),
-                    table.number_or_nan(speed, core::kFastestTrainMps), table.text(mode)});
+                    table.number_or_nan(speed, core::kFastestTrainMps), table.text(mode),
+                    table.number_or_nan(yaw_rate)});
   }
   return table.status();
 }

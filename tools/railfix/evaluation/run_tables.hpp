@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/result.hpp"
+#include "evaluation/statistics.hpp"
 
 namespace railfix::evaluation {
 
@@ -19,6 +20,7 @@ struct OdometryRow {
   double distance_m = 0;
   double speed_mps = 0;
   std::string mode;
+  double yaw_rate_rps = kUnknown;  // left positive
 };
 
 struct StateRow {
