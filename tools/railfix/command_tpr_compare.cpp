@@ -128,13 +128,17 @@ void print_row(const char* what, const std::vector<compare::Sample>& samples) {
 compare::Contradicted contradicted(const compare::Pairing& pairing, const std::optional<Judge>& judge) {
   std::set<size_t> apart;
   std::map<size_t, int> turned;  // pairs of the leg that are, less those that are not
+  std::map<size_t, int> runs_apart;
   for (const auto& pair : pairing.pairs) {
     if (!pair.overlap() && !(judge && judge->covers(pair))) apart.insert(pair.leg);
     turned[pair.leg] += pair.turned() ? 1 : -1;
+    runs_apart[pair.leg] += pair.runs_apart() ? 1 : -1;
   }
-  // Where the driver changes the cab the two may say so one report apart.
-  const auto most_are = [](const auto& leg) { return leg.second >= 0; };
-  return {apart.size(), static_cast<size_t>(std::ranges::count_if(turned, most_are))};
+  // Where the driver changes the cab or the train sets back the two may say so one report apart.
+  const auto most_are = [](const std::map<size_t, int>& legs) {
+    return static_cast<size_t>(std::ranges::count_if(legs, [](const auto& leg) { return leg.second >= 0; }));
+  };
+  return {apart.size(), most_are(turned), most_are(runs_apart)};
 }
 
 void print_pairs(const compare::Pairing& pairing) {
@@ -143,11 +147,16 @@ void print_pairs(const compare::Pairing& pairing) {
   double carried_m = 0;
   size_t disjoint = 0;
   size_t turned = 0;
+  size_t runs_apart = 0;
   for (const auto& pair : pairing.pairs) {
     differences.push_back(pair.difference_m());
     carried_m = std::max(carried_m, pair.carried_m);
     if (pair.turned() && ++turned <= kMostTold) {
       std::printf("  at %.3f s the train looks the other way in ours (Q_DIRLRBG) than in the certified report\n",
+                  core::seconds(pair.stamp_ns));
+    }
+    if (pair.runs_apart() && ++runs_apart <= kMostTold) {
+      std::printf("  at %.3f s the train runs the other way in ours (Q_DIRTRAIN) than in the certified report\n",
                   core::seconds(pair.stamp_ns));
     }
     if (pair.overlap()) continue;
@@ -173,6 +182,7 @@ void print_pairs(const compare::Pairing& pairing) {
   }
   std::printf("intervals overlap        %zu of %zu\n", pairing.pairs.size() - disjoint, pairing.pairs.size());
   if (turned > 0) std::printf("train turned round       in %zu of %zu\n", turned, pairing.pairs.size());
+  if (runs_apart > 0) std::printf("train runs the other way in %zu of %zu\n", runs_apart, pairing.pairs.size());
 }
 
 /// Reports that come now, until the other side's file is over, time is up, or Ctrl-C; each pair is told as it comes.
@@ -193,9 +203,10 @@ void listen(ReportSource& ours, ReportSource& certified, Line& line, const Optio
     const auto pairs =
         compare::pair_up(ours.reports(), certified.reports(), *axes, core::to_ns(options.longest_gap_s)).pairs;
     for (; told < pairs.size(); ++told) {
-      std::printf("at %.3f s ours - certified %+.2f m, intervals %s%s\n", core::seconds(pairs[told].stamp_ns),
+      std::printf("at %.3f s ours - certified %+.2f m, intervals %s%s%s\n", core::seconds(pairs[told].stamp_ns),
                   pairs[told].difference_m(), pairs[told].overlap() ? "overlap" : "have nothing in common",
-                  pairs[told].turned() ? ", the train looks the other way (Q_DIRLRBG)" : "");
+                  pairs[told].turned() ? ", the train looks the other way (Q_DIRLRBG)" : "",
+                  pairs[told].runs_apart() ? ", the train runs the other way (Q_DIRTRAIN)" : "");
       std::fflush(stdout);
     }
     goes_on &= !over(ours, certified) && !over(certified, ours);

@@ -198,12 +198,14 @@ TEST_F(TprCompareFiles, GroupsThatTheMapDoesNotHaveAreCounted) {
 }
 
 TEST_F(TprCompareFiles, WhatContradictsOrComesTwiceIsTold) {
-  const auto write = [&](const char* name, uint32_t q_dirlrbg, bool placed, int times = 1) {
+  const auto write = [&](const char* name, uint32_t q_dirlrbg, bool placed, int times = 1,
+                         uint32_t q_dirtrain = etcs::kNominal) {
     std::ofstream out(file(name));
     out << "stamp_ns,hex\n";
     for (int i = 0; i < 20; ++i) {
       auto report = beyond(tpr_publisher::testing::kA, 400 + 20 * i, 10);
       report.q_dirlrbg = q_dirlrbg;
+      report.q_dirtrain = q_dirtrain;
       if (!placed) report.d_lrbg = etcs::kUnknownDistance;
       for (int n = 0; n < times; ++n) out << i * core::kNsPerSecond << ',' << hex_of(report) << '\n';
     }
@@ -218,6 +220,10 @@ TEST_F(TprCompareFiles, WhatContradictsOrComesTwiceIsTold) {
   EXPECT_THAT(outcome.out, HasSubstr("not shown: on 1 legs the train looks the other way in ours"));
   EXPECT_THAT(outcome.out, HasSubstr("ratio 1.000 (too few legs for bounds)"));
   EXPECT_THAT(outcome.out, ::testing::Not(HasSubstr("nan")));
+  write("certified.csv", etcs::kNominal, true, 1, etcs::kReverse);
+  outcome = compare({});
+  EXPECT_THAT(outcome.out, HasSubstr("train runs the other way in 20 of 20"));
+  EXPECT_THAT(outcome.out, HasSubstr("not shown: on 1 legs the train runs the other way in ours (Q_DIRTRAIN)"));
   write("certified.csv", etcs::kNominal, false);
   outcome = compare({});
   EXPECT_EQ(outcome.exit_code, 2);

@@ -197,6 +197,21 @@ TEST(Pairing, ATrainTurnedRoundIsSeenWhereBothSayHowItLooks) {
   EXPECT_EQ(line.place(report(1, kB, -50, 72, false))->facing, 1) << "B's nominal direction runs back";
 }
 
+TEST(Pairing, ATrainThatRunsTheOtherWayIsSeenWhereBothSayThatItRuns) {
+  const auto apart = [](etcs::Side ours, etcs::Side certified, double certified_kmh) {
+    auto own = report(0, kA, 50, 72);
+    auto other = report(0, kA, 50, certified_kmh);
+    own.fields.q_dirtrain = ours;
+    other.fields.q_dirtrain = certified;
+    return pair_up({own}, {other}, Axes(), kGapNs).pairs.at(0).runs_apart();
+  };
+  EXPECT_TRUE(apart(etcs::kNominal, etcs::kReverse, 70));
+  EXPECT_TRUE(apart(etcs::kReverse, etcs::kNominal, 5));
+  EXPECT_FALSE(apart(etcs::kReverse, etcs::kReverse, 70));
+  EXPECT_FALSE(apart(etcs::kUnknownSide, etcs::kReverse, 70));
+  EXPECT_FALSE(apart(etcs::kNominal, etcs::kReverse, 0)) << "one that stands runs no way";
+}
+
 TEST(Pairing, DifferencesAreInRunningDirection) {
   const auto pairing = pair_up({report(0, kA, -100, 72, false)}, {report(0, kA, -103, 72, false)}, Axes(), kGapNs);
   EXPECT_NEAR(pairing.pairs.at(0).difference_m(), -3, 1e-9);  // the certified one is farther on

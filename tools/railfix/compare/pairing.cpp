@@ -100,6 +100,10 @@ bool Pair::turned() const {
   return ours.facing * certified.facing < 0;
 }
 
+bool Pair::runs_apart() const {
+  return ours.speed_mps * certified.speed_mps < 0;
+}
+
 Pairing pair_up(const std::vector<TimedReport>& ours, const std::vector<TimedReport>& certified, const Axes& axes,
                 int64_t longest_gap_ns) {
   Pairing pairing;

@@ -21,6 +21,8 @@ struct Pair {
   [[nodiscard]] bool overlap() const;
   /// Both say which way the train looks (Q_DIRLRBG), and not the same.
   [[nodiscard]] bool turned() const;
+  /// Both say which way it runs (Q_DIRTRAIN, and V_TRAIN at least 5 km/h), and not the same.
+  [[nodiscard]] bool runs_apart() const;
 };
 
 /// Who had a position with a known interval at the time of a certified report. By the messages alone: what is missing

@@ -55,6 +55,11 @@ Verdict print_sum(const std::vector<Verdict>& verdicts, const Contradicted& legs
                 legs.turned);
     return Verdict::open;
   }
+  if (legs.runs_apart > 0) {
+    std::printf("not shown: on %zu legs the train runs the other way in ours (Q_DIRTRAIN), so one side is wrong\n",
+                legs.runs_apart);
+    return Verdict::open;
+  }
   if (legs.apart > 0) {
     std::printf(
         "not shown: on %zu legs the intervals have nothing in common, so one side is wrong, and only --truth "

@@ -18,8 +18,9 @@ struct Columns {
 
 /// Legs on which both cannot be right.
 struct Contradicted {
-  size_t apart = 0;   // their intervals have nothing in common, and no truth says who is wrong
-  size_t turned = 0;  // in half of their pairs the train looks the one way in ours and the other way in theirs
+  size_t apart = 0;       // their intervals have nothing in common, and no truth says who is wrong
+  size_t turned = 0;      // in half of their pairs the train looks the one way in ours and the other way in theirs
+  size_t runs_apart = 0;  // the same of the way that it runs
 };
 
 /// Of one side, without signs.
