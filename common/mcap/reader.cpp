@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "mcap/compression.hpp"
+#include "mcap/losses.hpp"
 #include "mcap/writer.hpp"
 
 namespace railfix::mcap {
@@ -303,12 +304,14 @@ core::Status copy(Reader& in, Writer& to, const std::filesystem::path& damaged, 
     status = to.write_metadata(metadata);
     if (!status.ok()) return status;
   }
+  uint64_t messages = 0;
   in.for_each({}, [&](const Channel& channel, Message message) {
     message.channel_id = channel_ids.at(channel.id);
     status = goes_on && !goes_on() ? core::Status(stopped(damaged)) : to.write(message);
+    messages += status.ok() ? 1 : 0;
     return status.ok();
   });
-  return status;
+  return status.ok() ? to.write_metadata(repair_trace(losses_of(in, messages), damaged)) : status;
 }
 
 }  // namespace

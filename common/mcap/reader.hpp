@@ -160,8 +160,9 @@ std::optional<Metadata> metadata_in_front(const std::filesystem::path& file, con
 /// NAME-recovered.mcap beside NAME.mcap or NAME.mcap.active.
 std::filesystem::path recovered_name(const std::filesystem::path& damaged);
 
-/// Copies everything readable of a damaged or unfinished recording into a proper one, replacing what has that name.
-/// Gives what could not be kept. Error: nothing of it is left; so, too, when `goes_on` says no.
+/// Copies everything readable of a damaged or unfinished recording into a proper one, replacing what has that name; it
+/// says in its metadata (railfix_repair) what is missing. Gives what could not be kept. Error: nothing of it is left;
+/// so, too, when `goes_on` says no.
 core::Result<std::vector<std::string>> recover(const std::filesystem::path& damaged, const std::filesystem::path& out,
                                                const GoesOn& goes_on = {});
 

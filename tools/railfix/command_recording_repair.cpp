@@ -33,8 +33,8 @@ std::string counted(uint64_t count, const std::string& what) {
 }
 
 std::string missing(const RepairReport& report) {
-  const auto samples = report.lost_samples ? counted(*report.lost_samples, "sample") : "nobody knows how many samples";
-  return samples + ", " + counted(report.lost_chunks, "chunk") + ", " + counted(report.skipped_bytes, "byte") +
+  const auto samples = report.lost.samples ? counted(*report.lost.samples, "sample") : "nobody knows how many samples";
+  return samples + ", " + counted(report.lost.chunks, "chunk") + ", " + counted(report.lost.bytes, "byte") +
          " that cannot be read";
 }
 

@@ -150,6 +150,11 @@ TEST_F(DamageTest, RecoverMakesAProperFile) {
   EXPECT_THAT(reader->problems(), IsEmpty());
   EXPECT_EQ(read(*reader).size(), ends[3].second);
   EXPECT_EQ(reader->channels().size(), 2U);
+  const auto trace = std::ranges::find(reader->metadata(), std::string("railfix_repair"), &Metadata::name);
+  ASSERT_NE(trace, reader->metadata().end()) << "nobody sees later that something is missing";
+  const std::map<std::string, std::string> missing{
+      {"file", "changed.mcap"}, {"lost_chunks", "0"}, {"skipped_bytes", "5"}};
+  EXPECT_EQ(trace->entries, missing);
 }
 
 TEST_F(DamageTest, ARecoveryThatIsStoppedLeavesNothingOfItself) {

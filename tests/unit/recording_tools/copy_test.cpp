@@ -223,21 +223,21 @@ TEST_F(Copy, ARepairedOneSaysWhatIsMissing) {
       .write("XXXXXXXX", 8);
   const auto repaired = repair_recording(b_, out_);
   ASSERT_TRUE(repaired.ok()) << repaired.error().message;
-  EXPECT_EQ(repaired.value().lost_samples, 1U);
+  EXPECT_EQ(repaired.value().lost.samples, 1U);
   EXPECT_THAT(content(out_), ElementsAre("odometry_step@0", "odometry_step@1", "odometry_step@3"));
   auto trace = trace_in(out_);
   EXPECT_EQ(trace["file"], "b.mcap");
   EXPECT_EQ(trace["lost_chunks"], "1");
   EXPECT_EQ(trace["lost_samples"], "1");
-  EXPECT_EQ(trace["skipped_bytes"], std::to_string(repaired.value().skipped_bytes));
-  EXPECT_GT(repaired.value().skipped_bytes, 50U);
+  EXPECT_EQ(trace["skipped_bytes"], std::to_string(repaired.value().lost.bytes));
+  EXPECT_GT(repaired.value().lost.bytes, 50U);
 
   fs::resize_file(b_, ends[2] + 20);
   ASSERT_TRUE(repair_recording(b_, folder_ / "cut.mcap").ok());
   trace = trace_in(folder_ / "cut.mcap");
   EXPECT_EQ(trace["lost_chunks"], "1");
   EXPECT_FALSE(trace.contains("lost_samples")) << "the index is gone";
-  EXPECT_EQ(std::stoull(trace["skipped_bytes"]), repaired.value().skipped_bytes + 20);
+  EXPECT_EQ(std::stoull(trace["skipped_bytes"]), repaired.value().lost.bytes + 20);
 }
 
 TEST_F(Copy, OneRecordingIsOneTrains) {

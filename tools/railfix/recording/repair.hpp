@@ -2,21 +2,19 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/result.hpp"
+#include "mcap/losses.hpp"
 
 namespace railfix::tool {
 
 struct RepairReport {
   uint64_t samples = 0;
   size_t topics = 0;
-  size_t lost_chunks = 0;
-  uint64_t skipped_bytes = 0;            // those of the lost chunks, too
-  std::optional<uint64_t> lost_samples;  // nothing: the index that counted them is gone
-  std::vector<std::string> problems;     // a sentence each
+  mcap::Losses lost;
+  std::vector<std::string> problems;  // a sentence each
 };
 
 /// The damaged one is left as it is. The new file says in its metadata (railfix_repair) what of it is missing.

@@ -1,0 +1,26 @@
+#include "mcap/losses.hpp"
+
+#include <algorithm>
+
+namespace railfix::mcap {
+
+Losses losses_of(const Reader& damaged, uint64_t messages) {
+  Losses losses;
+  losses.chunks = damaged.lost_chunks().size();
+  losses.bytes = damaged.unread_bytes();
+  for (const auto& [place, bytes] : damaged.lost_chunks()) losses.bytes += bytes;
+  const uint64_t counted = damaged.statistics().messages;
+  if (damaged.indexed()) losses.samples = counted - std::min(counted, messages);
+  return losses;
+}
+
+Metadata repair_trace(const Losses& losses, const std::filesystem::path& damaged) {
+  Metadata trace{"railfix_repair",
+                 {{"file", damaged.filename().string()},
+                  {"lost_chunks", std::to_string(losses.chunks)},
+                  {"skipped_bytes", std::to_string(losses.bytes)}}};
+  if (losses.samples) trace.entries["lost_samples"] = std::to_string(*losses.samples);
+  return trace;
+}
+
+}  // namespace railfix::mcap
