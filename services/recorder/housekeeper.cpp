@@ -24,10 +24,16 @@ constexpr double kRoomToGoOn = 1.5;
 constexpr int kNice = 10;
 constexpr uint64_t kBytesPerMb = 1'000'000;
 
+std::string mb_text(uint64_t bytes) {
+  return std::to_string(bytes / kBytesPerMb + 1) + " MB";
+}
+
 }  // namespace
 
 Housekeeper::Housekeeper(fs::path folder, const FolderRules& rules) : folder_(std::move(folder)), rules_(rules) {
-  if (rules_.recovers) cut_off_ = cut_off_in(folder_);
+  if (rules_.recovers) {
+    for (const auto& file : cut_off_in(folder_)) cut_off_.push_back({file});
+  }
   thread_ = std::thread([this] { run(); });
 }
 
@@ -51,7 +57,7 @@ void Housekeeper::run() {
     }
     std::unique_lock lock(mutex_);
     recovering_.clear();
-    woken_.wait_for(lock, kPeriod, [this] { return ending_ || (recovers_ && !cut_off_.empty()); });
+    woken_.wait_for(lock, kPeriod, [this] { return ending_ || (recovers_ && next_to_recover() != cut_off_.end()); });
   }
 }
 
@@ -61,8 +67,8 @@ void Housekeeper::look() {
   {
     const std::lock_guard files(files_mutex_);
     if (rules_.quota_bytes > 0) {
-      std::vector<fs::path> removable = cut_off_;
-      removable.insert(removable.end(), left_.begin(), left_.end());
+      std::vector<fs::path> removable;
+      for (const CutOff& one : cut_off_) removable.push_back(one.file);
       for (const auto& sentence : keep_quota(folder_, rules_.quota_bytes, removable)) say(sentence);
     }
     seen = recorder::survey(folder_);
@@ -85,16 +91,25 @@ void Housekeeper::recover() {
   woken_.notify_all();
 }
 
+std::vector<Housekeeper::CutOff>::iterator Housekeeper::next_to_recover() {
+  return std::ranges::find_if(cut_off_, [this](const CutOff& one) {
+    return one.state == CutOff::State::new_to_us ||
+           (one.state == CutOff::State::without_room && free_bytes(folder_) >= room_for(one.file));
+  });
+}
+
 void Housekeeper::recover_next() {
-  if (cut_off_.empty()) return;
-  const fs::path file = cut_off_.front();
-  cut_off_.erase(cut_off_.begin());
+  const auto next = next_to_recover();
+  if (next == cut_off_.end()) return;
+  const auto [file, state] = *next;
+  cut_off_.erase(next);
   std::error_code failed;
   // Somebody may have taken it away meanwhile, or be repairing it.
   if (!fs::exists(file, failed) || mcap::being_written(mcap::recovered_name(file).string() + ".active")) return;
-  left_.push_back(file);
-  if (!has_room_for(file)) return;
-  left_.pop_back();
+  if (state == CutOff::State::new_to_us && !makes_room_for(file)) {
+    cut_off_.push_back({file, CutOff::State::without_room});
+    return;
+  }
   {
     const std::lock_guard lock(mutex_);
     recovering_ = file.string();
@@ -107,24 +122,36 @@ void Housekeeper::recover_next() {
     take_place(file, name);
     warn(file.string() + " was left by a crash; what it held is now in " + name.string());
   } else if (!ending_) {
-    left_.push_back(file);
-    warn(file.string() + " was left by a crash, cannot be recovered now and stays as it is: " +
-         (disk_filled_ ? "the disk has become too full meanwhile" : lost.error().message));
+    cut_off_.push_back({file, recovery_ended(file, lost.error())});
   }
 }
 
-bool Housekeeper::has_room_for(const fs::path& cut_off) {
+Housekeeper::CutOff::State Housekeeper::recovery_ended(const fs::path& file, const core::Error& why) {
+  const std::string what = file.string() + " was left by a crash, cannot be recovered now and stays as it is: ";
+  if (!disk_filled_) {
+    warn(what + why.message);
+    return CutOff::State::beyond_recovery;
+  }
+  warn(what + "the disk has become too full meanwhile; it is tried again when " + mb_text(room_for(file)) +
+       " of it are free");
+  return CutOff::State::without_room;
+}
+
+uint64_t Housekeeper::room_for(const fs::path& cut_off) const {
   std::error_code failed;
   const uint64_t bytes = fs::file_size(cut_off, failed);
-  if (failed) return true;  // recovering it says why
-  const uint64_t need = bytes + kRoomToBegin * rules_.keep_free_bytes;
+  return failed ? 0 : bytes + kRoomToBegin * rules_.keep_free_bytes;  // recovering it says why
+}
+
+bool Housekeeper::makes_room_for(const fs::path& cut_off) {
+  const uint64_t need = room_for(cut_off);
   if (rules_.quota_bytes > 0) {
     const std::lock_guard files(files_mutex_);
     for (const auto& sentence : make_room(folder_, need, cut_off)) warn(sentence);
   }
   if (free_bytes(folder_) >= need) return true;
-  warn(cut_off.string() + " was left by a crash and stays as it is: to recover it " +
-       std::to_string(need / kBytesPerMb + 1) + " MB of the disk must be free when the recorder starts");
+  warn(cut_off.string() + " was left by a crash and stays as it is until " + mb_text(need) +
+       " of the disk are free to recover it");
   return false;
 }
 

@@ -32,7 +32,8 @@ class Housekeeper {
   std::vector<std::string> take_sentences();
   /// What somebody should know: of what a crash left, and of what cannot be done.
   std::vector<std::string> take_warnings();
-  /// Begins to recover what a crash left, one file after the other, the newest first.
+  /// Begins to recover what a crash left, one file after the other, the newest first. One without room is tried again
+  /// when there is.
   void recover();
   /// The file that is being recovered; empty = none.
   [[nodiscard]] std::string recovering() const;
@@ -42,16 +43,23 @@ class Housekeeper {
  private:
   void run();
   void look();
+  struct CutOff {
+    enum class State { new_to_us, without_room, beyond_recovery };
+    std::filesystem::path file;
+    State state = State::new_to_us;
+  };
+  [[nodiscard]] std::vector<CutOff>::iterator next_to_recover();
   void recover_next();
-  [[nodiscard]] bool has_room_for(const std::filesystem::path& cut_off);
+  [[nodiscard]] CutOff::State recovery_ended(const std::filesystem::path& file, const core::Error& why);
+  [[nodiscard]] uint64_t room_for(const std::filesystem::path& cut_off) const;
+  [[nodiscard]] bool makes_room_for(const std::filesystem::path& cut_off);
   bool goes_on();
   void say(const std::string& sentence);
   void warn(const std::string& sentence);
 
   std::filesystem::path folder_;
   FolderRules rules_;
-  std::vector<std::filesystem::path> cut_off_;  // to be recovered
-  std::vector<std::filesystem::path> left_;     // could not be
+  std::vector<CutOff> cut_off_;  // without the one that is being recovered
   int64_t looked_ns_ = 0;
   bool disk_filled_ = false;  // while a file was recovered
   std::mutex files_mutex_;    // held while files are removed or protected

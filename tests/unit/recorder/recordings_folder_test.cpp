@@ -48,6 +48,10 @@ class RecordingsFolder : public ::testing::Test {
     rules.recovers = true;
     Housekeeper housekeeper(folder_, rules);
     housekeeper.recover();
+    return warnings(housekeeper);
+  }
+  /// Waits for some.
+  static std::vector<std::string> warnings(Housekeeper& housekeeper) {
     const int64_t deadline_ns = core::monotonic_ns() + 30 * core::kNsPerSecond;
     std::vector<std::string> said;
     while (said.empty() && core::monotonic_ns() < deadline_ns) {
@@ -101,10 +105,28 @@ TEST_F(RecordingsFolder, WithoutRoomACutOffRecordingStaysAndIsSaid) {
   make_crashed("crashed.mcap");
   const uint64_t more_than_there_is = free_bytes(folder_);
   EXPECT_THAT(recover({0, more_than_there_is, true}), ElementsAre(HasSubstr("crashed.mcap.active was left by a crash "
-                                                                            "and stays as it is: to recover it")));
+                                                                            "and stays as it is until ")));
   EXPECT_TRUE(fs::exists(folder_ / "crashed.mcap.active"));
   EXPECT_FALSE(fs::exists(folder_ / "crashed-recovered.mcap.active"));
   EXPECT_TRUE(fs::exists(folder_ / "old.mcap")) << "without a quota nothing is removed";
+}
+
+// On a disk of its own.
+TEST_F(RecordingsFolder, ACutOffRecordingIsTriedAgainWhenThereIsRoom) {
+  if (mount("tmpfs", folder_.c_str(), "tmpfs", 0, "size=1m") != 0) GTEST_SKIP() << "a disk can be made by root only";
+  make_crashed("crashed.mcap");
+  const fs::path filler = folder_ / "notes.txt";
+  std::ofstream(filler) << std::string(700'000, 'x');
+  {
+    Housekeeper housekeeper(folder_, {0, 300'000, true});
+    housekeeper.recover();
+    EXPECT_THAT(warnings(housekeeper), ElementsAre(HasSubstr("stays as it is until 1 MB of the disk are free")));
+    fs::remove(filler);
+    EXPECT_THAT(warnings(housekeeper), ElementsAre(HasSubstr("was left by a crash; what it held is now in")));
+  }
+  EXPECT_TRUE(fs::exists(folder_ / "crashed-recovered.mcap"));
+  EXPECT_FALSE(fs::exists(folder_ / "crashed.mcap.active"));
+  umount2(folder_.c_str(), MNT_DETACH);
 }
 
 // On a disk of its own.
