@@ -156,6 +156,9 @@ core::Result<RunPlan> plan_run(const RunOptions& options) {
   }
 
   RunPlan plan;
+  auto lock = FolderLock::take(options.out);
+  if (!lock.ok()) return core::Error{"--out: " + lock.error().message};
+  plan.lock = std::move(lock).value();
   plan.pictures = pictures.value()->count();
   plan.train_id = "run-" + std::to_string(getpid());
   const auto map = prepare_map(options);

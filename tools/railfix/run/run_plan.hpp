@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/result.hpp"
+#include "run/folder_lock.hpp"
 
 namespace railfix::tool {
 
@@ -32,9 +33,10 @@ struct RunPlan {
   std::filesystem::path config;      // written into OUT
   std::filesystem::path map;         // compiled, empty = none
   std::optional<uint64_t> pictures;  // how many there will be
+  std::unique_ptr<FolderLock> lock;  // of OUT: it is this run's alone
 };
 
-/// Makes OUT, builds the map into it, writes OUT/run.yaml. Every problem is one sentence.
+/// Makes OUT and locks it, builds the map into it, writes OUT/run.yaml. Every problem is one sentence.
 core::Result<RunPlan> plan_run(const RunOptions& options);
 
 }  // namespace railfix::tool

@@ -1,0 +1,45 @@
+// Which folders `railfix run` takes, and which it refuses before it begins.
+#include <csignal>
+#include <thread>
+
+#include "integration/commands/refusal.hpp"
+#include "unit/dataset/temporary_folder.hpp"
+
+namespace railfix {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kDomain = "92";
+
+class RunCommand : public testing::TemporaryFolder {
+ protected:
+  [[nodiscard]] std::string path(const std::string& name) const { return (root_ / name).string(); }
+  [[nodiscard]] std::vector<std::string> run(const std::string& source, std::vector<std::string> more = {}) const {
+    more.insert(more.begin(), {"railfix", "run", "--dataset", path(source), "--out", path("out"), "--domain", kDomain});
+    return more;
+  }
+};
+
+TEST_F(RunCommand, TwoAtOnceIntoOneFolderAreNotTaken) {
+  for (int second = 0; second < 300; ++second)
+    write_picture("pictures/" + std::to_string(1000 + second) + ".png", second % 256);
+  test::Program first(run("pictures", {"--fps", "1", "--pace", "real"}), {root_ / "said", {}, {}});
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(kPatienceS);
+  while (!fs::exists(root_ / "out/log")) {
+    ASSERT_FALSE(first.exit_code()) << test::slurp(root_ / "said");
+    ASSERT_LT(std::chrono::steady_clock::now(), deadline);
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  const auto settings = test::slurp(root_ / "out/run.yaml");
+  expect_refusal(test::run_program(run("pictures"), kPatienceS),
+                 "--out: another railfix run writes into " + path("out") + " now; wait until it has ended");
+  EXPECT_EQ(test::slurp(root_ / "out/run.yaml"), settings) << "which the first one's services read";
+  EXPECT_FALSE(first.exit_code()) << test::slurp(root_ / "said");
+
+  first.end(SIGKILL);
+  expect_refusal(test::run_program(run("pictures", {"--start", "1:1"}), kPatienceS), "--start 1:1 needs a map");
+}
+
+}  // namespace
+}  // namespace railfix
