@@ -72,6 +72,8 @@ struct Sensors {
   std::vector<GnssRow> gnss;
 };
 core::Result<Sensors> read_sensors(const std::filesystem::path& sequence);
+/// Such tables and no pictures, as `railfix simulate --no-pictures` writes them.
+bool has_sensors_alone(const std::filesystem::path& sequence);
 
 struct TruthRow {
   int64_t stamp_ns = 0;

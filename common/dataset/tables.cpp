@@ -100,6 +100,16 @@ Result<Sensors> read_sensors(const fs::path& sequence) {
   return sensors;
 }
 
+bool has_sensors_alone(const fs::path& sequence) {
+  const fs::path root = sequence / "mav0";
+  const auto has_table = [&](const char* sensor) { return fs::is_regular_file(root / sensor / "data.csv"); };
+  if (has_table("cam0")) {
+    auto pictures = core::CsvReader::open(root / "cam0/data.csv");
+    if (!pictures.ok() || pictures.value().next() || !pictures.value().status().ok()) return false;
+  }
+  return has_table("imu0") || has_table("wheel0") || has_table("gnss0");
+}
+
 Result<std::vector<TruthRow>> read_truth(const fs::path& track_csv) {
   CsvTable table(track_csv);
   const size_t stamp = table.required(kStampNames);

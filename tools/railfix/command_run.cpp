@@ -30,6 +30,16 @@ std::vector<std::string> needed_of(const std::vector<ServiceProgram>& programs) 
   return names;
 }
 
+// Without the camera's where there is none: then the sensors give the time, at the recorded rate.
+std::vector<ServiceProgram> programs_for(const RunPlan& plan, const RunOptions& options) {
+  auto programs = core::value_or_throw(find_service_programs());
+  if (plan.has_camera) return programs;
+  std::erase_if(programs, [](const ServiceProgram& program) { return is_of_camera(program.service); });
+  std::cerr << "railfix: " << options.source.string()
+            << " has no pictures: its sensors are played at the recorded rate, and no service of the camera runs\n";
+  return programs;
+}
+
 void start_services(Processes& processes, const std::vector<ServiceProgram>& programs, const RunPlan& plan,
                     const std::vector<std::string>& sets) {
   std::vector<std::string> arguments{"--config", plan.config.string()};
@@ -53,13 +63,13 @@ void say_where_to_watch(Supervisor& supervisor, Processes& processes, const RunO
 }
 
 // Until the data has ended, was interrupted, or a service has died.
-void watch(Supervisor& supervisor, Processes& processes, const RunOptions& options, const RunPlan& plan) {
+void watch(Supervisor& supervisor, Processes& processes, const RunPlan& plan) {
   LiveTable table;
-  Progress progress("run", plan.pictures.value_or(0), options.pace == "real");
+  Progress progress("run", plan.pictures.value_or(0), !plan.lossless);
   while (!supervisor.drained() && interrupted == 0) {
     supervisor.turn(kTurnS);
     if (const auto ended = processes.unexpected_end()) throw std::runtime_error(*ended);
-    if (options.pace == "real") table.update(supervisor.picture());
+    if (!plan.lossless) table.update(supervisor.picture());
     progress.update(supervisor.picture().views);
   }
   progress.finish();
@@ -78,7 +88,7 @@ void stop_services(Processes& processes) {
 
 int run(const RunOptions& options) {
   const auto plan = core::value_or_throw(plan_run(options));
-  const auto programs = core::value_or_throw(find_service_programs());
+  const auto programs = programs_for(plan, options);
   std::signal(SIGINT, [](int) { interrupted = 1; });
   std::signal(SIGTERM, [](int) { interrupted = 1; });
 
@@ -92,9 +102,10 @@ int run(const RunOptions& options) {
   const auto connected = supervisor.wait_connected(processes, kConnectS);
   if (!connected.ok()) throw std::runtime_error(connected.error().message);
   say_where_to_watch(supervisor, processes, options);
-  const auto started = supervisor.command(processes, "frame_grabber", "start", "", kAnswerS);
+  const auto started =
+      supervisor.command(processes, plan.has_camera ? "frame_grabber" : "sensor_gateway", "start", "", kAnswerS);
   if (!started.ok()) throw std::runtime_error(started.error().message);
-  watch(supervisor, processes, options, plan);
+  watch(supervisor, processes, plan);
   stop_services(processes);
 
   const auto tables = core::value_or_throw(export_tables(options.out / "recording.mcap", options.out));
@@ -130,7 +141,9 @@ void add_run(CLI::App& app, Action& chosen) {
   command->add_option("--map", options->map, "Map (compiled, LandXML or OSM); the dataset's own when not given");
   command->add_option("--start", options->start, "EDGE:OFFSET[:+|-] where the train stands, or unknown");
   command
-      ->add_option("--pace", options->pace, "lossless: next picture when all have used the last; real: recorded rate")
+      ->add_option(
+          "--pace", options->pace,
+          "lossless: next picture when all have used the last; real: recorded rate, as always without pictures")
       ->check(CLI::IsMember({"real", "lossless"}))
       ->capture_default_str();
   command->add_option("--out", options->out, "Folder for the results")->required();

@@ -41,5 +41,23 @@ TEST_F(RunCommand, TwoAtOnceIntoOneFolderAreNotTaken) {
   expect_refusal(test::run_program(run("pictures", {"--start", "1:1"}), kPatienceS), "--start 1:1 needs a map");
 }
 
+TEST_F(RunCommand, ADatasetOfSensorsAloneIsRunWithoutTheCamerasServices) {
+  const auto simulated = test::run_program({"railfix", "simulate", "--no-pictures", "--out", path("seq"), "--start",
+                                            "1:250", "--duration-s", "8", "--dwell-s", "1", "--quiet"},
+                                           kPatienceS);
+  ASSERT_EQ(simulated.exit_code, 0) << simulated.err;
+  expect_refusal(test::run_program(run("seq", {"--camera-only"}), kPatienceS), "nothing is left with --camera-only");
+  expect_refusal(test::run_program(run("seq", {"--draw", path("drawn")}), kPatienceS),
+                 "nothing that --draw could draw on");
+  EXPECT_FALSE(fs::exists(root_ / "out"));
+
+  const auto ran = test::run_program(run("seq", {"--start", "1:250:+"}), 4 * kPatienceS);
+  ASSERT_EQ(ran.exit_code, 0) << ran.err;
+  EXPECT_THAT(ran.err, ::testing::HasSubstr("has no pictures: its sensors are played at the recorded rate"));
+  EXPECT_FALSE(fs::exists(root_ / "out/log/track_detector.log"));
+  const auto states = test::slurp(root_ / "out/train_state.csv");
+  EXPECT_GT(std::count(states.begin(), states.end(), '\n'), 40) << "ten a second, on a busy machine fewer";
+}
+
 }  // namespace
 }  // namespace railfix

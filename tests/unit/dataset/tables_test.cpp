@@ -54,6 +54,18 @@ TEST_F(TablesTest, MissingTablesAreEmpty) {
   EXPECT_TRUE(sensors.value().imu.empty() && sensors.value().wheel.empty() && sensors.value().gnss.empty());
 }
 
+TEST_F(TablesTest, SensorsAloneAreToldFromMissingOrBrokenPictures) {
+  EXPECT_FALSE(has_sensors_alone(root_)) << "nothing is there";
+  write("mav0/wheel0/data.csv", "#timestamp [ns],pulses\n5,-3\n");
+  EXPECT_TRUE(has_sensors_alone(root_));
+  write("mav0/cam0/data.csv", "#timestamp [ns],filename\n");
+  EXPECT_TRUE(has_sensors_alone(root_)) << "as railfix simulate --no-pictures leaves it";
+  write("mav0/cam0/data.csv", "#timestamp [ns],filename\n1\n");
+  EXPECT_FALSE(has_sensors_alone(root_)) << "a broken list is not none";
+  write("mav0/cam0/data.csv", "#timestamp [ns],filename\n1,a.png\n");
+  EXPECT_FALSE(has_sensors_alone(root_));
+}
+
 TEST_F(TablesTest, BrokenRowsNameFileAndLine) {
   const std::string imu = "#timestamp [ns],w_x,w_y,w_z,a_x,a_y,a_z\n1,0,0,0,0,0,9\n";
   write("mav0/imu0/data.csv", imu + "2,0,0,nan,0,0,9\n");

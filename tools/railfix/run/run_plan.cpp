@@ -58,30 +58,31 @@ core::Result<YAML::Node> load_settings(const std::filesystem::path& file) {
   }
 }
 
-// What only the run knows; the rest of each section stays as the user or the default has it.
-void fill_settings(YAML::Node& settings, const RunOptions& options, const RunPlan& plan) {
-  const bool lossless = options.pace == "lossless";
-  settings["common"]["train_id"] = plan.train_id;
-  settings["common"]["domain"] = options.domain;
-  settings["common"]["lock_step"] = lossless;
-
-  YAML::Node grabber = settings["frame_grabber"];
+void fill_grabber(YAML::Node grabber, const RunOptions& options) {
   grabber["source"] = std::filesystem::absolute(options.source).string();
   grabber["calibration"] = options.camera.empty() ? "" : std::filesystem::absolute(options.camera).string();
   grabber["fps"] = options.fps;
   grabber["pace"] = options.pace;
   grabber["start"] = "command";
-  if (lossless) {
-    for (const char* service :
-         {"sensor_gateway", "track_detector", "odometry", "map_matcher", "fusion", "tpr_publisher"}) {
-      grabber["wait_for"].push_back(service);
-    }
-    if (options.record_pictures) grabber["wait_for"].push_back("recorder");
+  if (options.pace != "lossless") return;
+  for (const char* service :
+       {"sensor_gateway", "track_detector", "odometry", "map_matcher", "fusion", "tpr_publisher"}) {
+    grabber["wait_for"].push_back(service);
   }
+  if (options.record_pictures) grabber["wait_for"].push_back("recorder");
+}
+
+// What only the run knows; the rest of each section stays as the user or the default has it.
+void fill_settings(YAML::Node& settings, const RunOptions& options, const RunPlan& plan) {
+  settings["common"]["train_id"] = plan.train_id;
+  settings["common"]["domain"] = options.domain;
+  settings["common"]["lock_step"] = plan.lossless;
+  if (plan.has_camera) fill_grabber(settings["frame_grabber"], options);
 
   YAML::Node gateway = settings["sensor_gateway"];
   gateway["source"] = std::filesystem::absolute(options.source).string();
-  gateway["clock"] = "follow";
+  gateway["clock"] = plan.has_camera ? "follow" : "own";
+  if (!plan.has_camera) gateway["start"] = "command";
   if (options.camera_only) {
     for (const char* sensor : {"imu", "wheel", "gnss"}) gateway[sensor] = false;
   }
@@ -139,15 +140,32 @@ core::Status check_drawing(const RunOptions& options) {
   return {};
 }
 
+core::Status check_without_camera(const RunOptions& options) {
+  const std::string why = options.source.string() + " has no pictures: ";
+  if (!options.draw.empty()) return core::Error{why + "there is nothing that --draw could draw on; leave it out"};
+  if (options.camera_only) return core::Error{why + "nothing is left with --camera-only; leave it out"};
+  return {};
+}
+
 }  // namespace
+
+bool is_of_camera(const std::string& service) {
+  return service == "frame_grabber" || service == "track_detector" || service == "odometry";
+}
 
 core::Result<RunPlan> plan_run(const RunOptions& options) {
   if (const auto checked = check_overrides(options.sets); !checked.ok()) return checked.error();
   if (const auto checked = check_drawing(options); !checked.ok()) return checked.error();
-  dataset::PictureOptions picture_options;
-  picture_options.fps = options.fps;
-  const auto pictures = dataset::open_pictures(options.source, picture_options);
-  if (!pictures.ok()) return pictures.error();
+  RunPlan plan;
+  plan.has_camera = !dataset::has_sensors_alone(options.source);
+  plan.lossless = plan.has_camera && options.pace == "lossless";
+  if (plan.has_camera) {
+    const auto pictures = dataset::open_pictures(options.source, {options.fps});
+    if (!pictures.ok()) return pictures.error();
+    plan.pictures = pictures.value()->count();
+  } else if (const auto checked = check_without_camera(options); !checked.ok()) {
+    return checked.error();
+  }
 
   std::error_code failed;
   for (const auto& folder : {options.out, options.state}) {
@@ -155,11 +173,9 @@ core::Result<RunPlan> plan_run(const RunOptions& options) {
     if (failed) return core::Error{folder.string() + " cannot be made: " + failed.message()};
   }
 
-  RunPlan plan;
   auto lock = FolderLock::take(options.out);
   if (!lock.ok()) return core::Error{"--out: " + lock.error().message};
   plan.lock = std::move(lock).value();
-  plan.pictures = pictures.value()->count();
   plan.train_id = "run-" + std::to_string(getpid());
   const auto map = prepare_map(options);
   if (!map.ok()) return map.error();

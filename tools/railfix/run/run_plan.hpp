@@ -28,11 +28,16 @@ struct RunOptions {
   int64_t domain = 0;
 };
 
+/// Which services have nothing to do without a camera.
+bool is_of_camera(const std::string& service);
+
 struct RunPlan {
   std::string train_id;
   std::filesystem::path config;      // written into OUT
   std::filesystem::path map;         // compiled, empty = none
   std::optional<uint64_t> pictures;  // how many there will be
+  bool has_camera = true;            // false: the dataset has sensors alone
+  bool lossless = true;
   std::unique_ptr<FolderLock> lock;  // of OUT: it is this run's alone
 };
 

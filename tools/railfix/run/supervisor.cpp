@@ -28,7 +28,10 @@ Supervisor::Supervisor(const messaging::ParticipantOptions& options, std::vector
          std::function([this](const msg::ControlReply& reply) { replies_[reply.request_id()] = reply; }));
   listen(topics::data_clock,
          std::function([this](const msg::DataClock& clock) { ended_ = ended_ || clock.ended() != 0; }));
-  listen(topics::train_state, std::function([this](const msg::TrainState& state) { picture_.state = state; }));
+  listen(topics::train_state, std::function([this](const msg::TrainState& state) {
+           picture_.state = state;
+           picture_.note_time(state.stamp_ns());
+         }));
   listen(topics::train_position_report, std::function([this](const msg::TrainPositionReport& report) {
            picture_.report = report;
            ++picture_.reports;
@@ -38,15 +41,18 @@ Supervisor::Supervisor(const messaging::ParticipantOptions& options, std::vector
            ++picture_.views;
            if (view.seen_left() != 0 && view.seen_right() != 0) ++picture_.views_seen;
          }));
-  listen(topics::odometry_step, std::function([this](const msg::OdometryStep& step) {
-           if (picture_.data_begin_ns == 0) picture_.data_begin_ns = step.stamp_ns();
-           picture_.data_ns = std::max(picture_.data_ns, step.stamp_ns());
-         }));
+  listen(topics::odometry_step,
+         std::function([this](const msg::OdometryStep& step) { picture_.note_time(step.stamp_ns()); }));
   listen(topics::log_record, std::function([this](const msg::LogRecord& record) {
            if (record.level() < kWarningLevel) return;
            picture_.log.push_back(std::string(record.service().c_str()) + ": " + record.text().c_str());
            if (picture_.log.size() > kLogLines) picture_.log.erase(picture_.log.begin());
          }));
+}
+
+void TrainPicture::note_time(int64_t stamp_ns) {
+  if (data_begin_ns == 0) data_begin_ns = stamp_ns;
+  data_ns = std::max(data_ns, stamp_ns);
 }
 
 bool TrainPicture::gone(const std::string& service) const {

@@ -22,9 +22,10 @@ struct TrainPicture {
   uint64_t views = 0;
   uint64_t views_seen = 0;
   int64_t data_begin_ns = 0;
-  int64_t data_ns = 0;           // of the newest odometry step
+  int64_t data_ns = 0;           // of the newest odometry step or, without a camera, state
   std::vector<std::string> log;  // the last warnings and errors
 
+  void note_time(int64_t stamp_ns);
   /// Never seen, failed, stopped, or silent.
   [[nodiscard]] bool gone(const std::string& service) const;
 };
