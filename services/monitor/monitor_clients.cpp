@@ -132,7 +132,7 @@ std::string MonitorService::exposure() const {
 std::string MonitorService::control_of(const Request& request) const {
   if (!config_.control) return "off";
   if (!config_.token.empty()) return "token";
-  return request.local ? "open" : "off";
+  return request.local ? "open" : "no_token";
 }
 
 json MonitorService::about(const Request& request) const {
@@ -190,10 +190,9 @@ Response MonitorService::answer(const Request& request) {
 void MonitorService::control(const ClientPtr& client, const ControlAsk& ask) {
   const std::string allowed = control_of(client->request());
   const auto refuse = [&](const std::string& why) { live_.reply(ask.client, ask.id, false, why); };
-  if (allowed == "off") {
-    return refuse(config_.control ? "control is only allowed from this computer itself; set monitor.token for others"
-                                  : "control is switched off (monitor.control)");
-  }
+  if (allowed == "off") return refuse("control is switched off (monitor.control)");
+  if (allowed == "no_token")
+    return refuse("control is only allowed from this computer itself; set monitor.token for others");
   if (allowed == "token" && ask.token != config_.token) return refuse("the token is wrong");
   if (ask.service != "recorder" && ask.service != "player") {
     return refuse("only recorder and player can be controlled from here, not '" + ask.service + "'");

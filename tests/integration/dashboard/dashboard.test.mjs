@@ -4,7 +4,7 @@ import { mkdirSync, readdirSync, readFileSync } from "node:fs";
 import { join } from "node:path";
 import { after, before, describe, it } from "node:test";
 import { gzipSync } from "node:zlib";
-import { browser, build, packages, railfix, Train, until } from "./train.mjs";
+import { browser, build, ELSEWHERE, packages, railfix, Train, until } from "./train.mjs";
 
 const SERVICES = ["frame_grabber", "fusion", "map_matcher", "monitor", "odometry", "recorder", "sensor_gateway", "tpr_publisher", "track_detector"];
 const DESK = { width: 1440, height: 900 };
@@ -271,6 +271,19 @@ describe("the page", { timeout: 600000 }, () => {
     await page.emulateMedia({ colorScheme: "light" });
     train.signal("tpr_publisher", "SIGCONT");
     await problem.waitFor({ state: "detached" });
+  });
+
+  it("tells a missing token from control that is switched off", async () => {
+    const said = { "": "Control from here needs a token, and none is set", "monitor.control=false": "Control is switched off" };
+    for (const [setting, words] of Object.entries(said)) {
+      const { address, start } = await train.start_lonely_monitor(...(setting === "" ? [] : [setting]));
+      start("recorder", `recorder.folder=${train.path("lonely")}`);
+      const one = await open(DESK, "light", address.replace("127.0.0.1", ELSEWHERE));
+      await one.locator("#recorder").scrollIntoViewIfNeeded();
+      await one.locator("#recorder .nothing", { hasText: words }).waitFor();
+      assert.ok(await one.locator("#recorder").getByRole("button", { name: "Stop", exact: true }).isDisabled());
+      await one.close();
+    }
   });
 
   it("does not call a train well of which nothing, or no position, was heard", async () => {

@@ -11,6 +11,7 @@ import { fileURLToPath } from "node:url";
 export const build = process.env.RAILFIX_BUILD ?? fileURLToPath(new URL("../../../build/release", import.meta.url));
 export const packages = createRequire(join(build, "services/monitor/page/work/package.json"));
 const program = (name) => join(build, "bin", name);
+export const ELSEWHERE = "train.example"; // a name of this computer that a monitor takes for another one's
 const CHROMIUM = "/usr/bin/chromium";
 const START_MS = 120000;
 const DEFAULT_LINE_S = 500; // how long the drive takes over the shorter line
@@ -45,6 +46,7 @@ export function simulate(folder, seconds) {
 
 export class Train {
   lonely = [];
+  nobodies = 0;
 
   static async start(seconds, settings = [], draw = simulate) {
     const train = new Train();
@@ -93,11 +95,12 @@ export class Train {
   }
 
   /// A monitor of a train that nobody has heard; returns where its page is, and what starts a service beside it.
-  async start_lonely_monitor() {
+  async start_lonely_monitor(...settings) {
     const port = await free_port();
+    const name = `nobody-${process.pid}-${++this.nobodies}`;
     const start = (service, ...settings) =>
-      this.lonely.push(spawn(program(`railfix-${service}`), [`common.train_id=nobody-${process.pid}`, ...settings].flatMap((one) => ["--set", one]), { stdio: "ignore" }));
-    start("monitor", `monitor.port=${port}`, "monitor.expected=[]", "monitor.foxglove_port=-1");
+      this.lonely.push(spawn(program(`railfix-${service}`), [`common.train_id=${name}`, ...settings].flatMap((one) => ["--set", one]), { stdio: "ignore" }));
+    start("monitor", `monitor.port=${port}`, "monitor.expected=[]", "monitor.foxglove_port=-1", ...settings);
     const address = `http://127.0.0.1:${port}/`;
     await until("the lonely monitor answers", () => fetch(address).then((answer) => answer.ok, () => false), START_MS);
     return { address, start };
@@ -130,6 +133,6 @@ export function browser() {
   if (!existsSync(CHROMIUM)) throw new Error(`${CHROMIUM} is missing: ./dev setup installs it`);
   return packages("playwright-core").chromium.launch({
     executablePath: CHROMIUM,
-    args: ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"],
+    args: [`--host-resolver-rules=MAP ${ELSEWHERE} 127.0.0.1`, "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"],
   });
 }

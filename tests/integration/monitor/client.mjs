@@ -33,6 +33,13 @@ const actions = {
     process.exit(0);
   },
 
+  // As somebody at another computer, behind a proxy.
+  async get_from_elsewhere() {
+    const answer = await fetch(http + argument, { headers: { "x-forwarded-for": "192.0.2.1" } });
+    console.log(await answer.text());
+    process.exit(0);
+  },
+
   // Whether the monitor is there under another address.
   async reach() {
     console.log(await fetch(`http://${argument}:${port}/healthz`).then(() => "reached", () => "not reached"));

@@ -254,6 +254,14 @@ TEST_F(MonitorLiveTest, SaysWhoMayControlWithoutAToken) {
   start({"monitor.address=0.0.0.0"}, "localhost");
   EXPECT_THAT(test::slurp(kWork / "monitor.log"), HasSubstr("control only from this computer at localhost, because "
                                                             "neither monitor.token nor monitor.token_file is set"));
+  EXPECT_THAT(client("get", "/api/about"), HasSubstr("\"control\":\"open\""));
+  EXPECT_THAT(client("get_from_elsewhere", "/api/about"), HasSubstr("\"control\":\"no_token\""));
+}
+
+TEST_F(MonitorLiveTest, SaysThatNobodyMayControl) {
+  start({"monitor.control=false", "monitor.token=secret"});
+  EXPECT_THAT(client("get", "/api/about"), HasSubstr("\"control\":\"off\""));
+  EXPECT_THAT(client("get_from_elsewhere", "/api/about"), HasSubstr("\"control\":\"off\""));
 }
 
 TEST_F(MonitorLiveTest, TakesTheWordForControlFromAFile) {

@@ -10,7 +10,7 @@ export interface About {
   host: string;
   now_ns: number;
   cameras: string[];
-  control: "open" | "token" | "off";
+  control: "open" | "token" | "no_token" | "off"; // no_token: from here it would need one, and none is set
   map: { name: string; edges: number; length_m: number } | null;
 }
 

@@ -37,6 +37,7 @@ export function AnswerLine({ answer }: { answer: Signal<Answer> }) {
 /// Stands in one panel at a time: a train that replays has no recorder to control.
 export function TokenField() {
   if (about.value?.control === "off") return <p class="nothing">Control is switched off (monitor.control).</p>;
+  if (about.value?.control === "no_token") return <p class="nothing">Control from here needs a token, and none is set (monitor.token).</p>;
   if (about.value?.control !== "token") return null;
   return (
     <span class="field">

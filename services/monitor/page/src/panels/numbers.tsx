@@ -1,7 +1,8 @@
 // The figures a dispatcher reads first.
 import type { ComponentChildren } from "preact";
-import { capital, duration, kmh, metres, number, probability, words } from "../format";
+import { capital, duration, kmh, metres, number, words } from "../format";
 import { age_of, fresh, map, state } from "../store";
+import { is_sure, track_note } from "../track_note";
 import type { TrainState } from "../wire";
 
 function Figure({ id, name, value, unit, note, level = "" }: {
@@ -85,15 +86,12 @@ function Where({ one }: { one: TrainState }) {
 }
 
 function Trust({ one }: { one: TrainState }) {
-  const others = one.alternatives.map((other) => `${edge_name(other.edge)} ${probability(other.probability)}`).join(", ");
   const level = { ok: "ok", degraded: "warn", unusable: "bad" } as const;
   const known = one.track_known;
-  const sure = known && (one.track_probability ?? 0) >= 0.999;
-  const track_note = others === "" ? (known ? "no other possible" : "no place found") : `${known ? "or " : ""}${others}`;
   return (
     <>
       <Figure id="track" name="Track" value={known ? capital(edge_name(one.edge)) : "Not yet known"}
-        note={known ? `${sure ? "certain" : "not certain"}, ${probability(one.track_probability)}; ${track_note}` : track_note} level={sure ? "ok" : "warn"} />
+        note={track_note(one, edge_name)} level={is_sure(one) ? "ok" : "warn"} />
       <Figure id="integrity" name="Integrity" value={capital(one.integrity === "ok" ? "good" : one.integrity)} note={<Sources used={one.sources} />}
         level={level[one.integrity]} />
     </>
