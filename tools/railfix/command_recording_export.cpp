@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "command_recording.hpp"
+#include "late_end.hpp"
 #include "not_negative.hpp"
 #include "number_between.hpp"
 #include "output_file.hpp"
@@ -44,7 +45,8 @@ mcap::Selection part_of(const mcap::Reader& reader, const Options& options) {
 }
 
 void write_tables(mcap::Reader& reader, const mcap::Selection& part, const fs::path& folder) {
-  const auto report = core::value_or_throw(export_csv(reader, part, folder));
+  const LateEnd end;
+  const auto report = core::value_or_throw(export_csv(reader, part, folder, [&] { return !end.asked(); }));
   for (const auto& problem : report.problems) std::cerr << problem << '\n';
   std::cout << folder.string() << ": " << report.tables << " tables, " << report.rows << " rows\n";
 }

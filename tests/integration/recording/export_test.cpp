@@ -93,13 +93,34 @@ TEST_F(Export, TablesHaveNamesWhereTheIdlHasThem) {
   EXPECT_EQ(cell("edge"), "3");
 }
 
-TEST_F(Export, TablesThatAreCutAreNamed) {
+TEST_F(Export, NothingIsLeftOfTablesThatFindNoRoom) {
   const auto folder = folder_ / "csv";
   const auto exported = recording_in(1, "export " + file().string() + " --topics train_state --csv " + folder.string());
   EXPECT_EQ(exported.exit_code, 2) << exported.out;
-  EXPECT_THAT(exported.err,
-              HasSubstr("the tables in " + folder.string() + " are cut: cannot write " +
-                        (folder / "train_state.csv").string() + " to its end (File too large); give another place"));
+  EXPECT_THAT(exported.err, HasSubstr("there are no tables in " + folder.string() + ": cannot write " +
+                                      (folder / "train_state.csv.draft").string() +
+                                      " to its end (File too large); give another place"));
+  EXPECT_FALSE(fs::exists(folder));
+}
+
+TEST_F(Export, NothingIsLeftOfTablesThatAreInterrupted) {
+  const auto csv = folder_ / "csv";
+  fs::create_directories(csv);
+  std::ofstream(csv / "notes.txt") << "mine";
+  writer_ = mcap::Writer::create(folder_ / "long.mcap", {}).value();
+  for (int i = 0; i < 300; ++i) ride(i);
+  msg::ImuSample imu;
+  for (int64_t i = 0; i < 300'000; ++i) write(topics::imu_sample, imu, "imu_sample", i * 1'000'000);
+  ASSERT_TRUE(writer_->close().ok());
+  const auto left = [&] { return std::distance(fs::directory_iterator(csv), fs::directory_iterator()); };
+  for (const int signal : {SIGINT, SIGTERM}) {
+    test::Program tables({"railfix", "recording", "export", (folder_ / "long.mcap").string(), "--csv", csv.string()},
+                         {folder_ / "log", {}, {}});
+    while (left() < 3 && !tables.exit_code()) poll(nullptr, 0, 1);
+    EXPECT_EQ(tables.end(signal), 128 + signal) << test::slurp(folder_ / "log");
+    EXPECT_EQ(left(), 1) << "notes.txt only";
+  }
+  EXPECT_EQ(test::slurp(csv / "notes.txt"), "mine");
 }
 
 TEST_F(Export, TablesOfTwoRecordingsAreNotMixed) {

@@ -4,12 +4,14 @@
 
 #include "cdr/decode.hpp"
 #include "core/csv.hpp"
+#include "core/whole_file.hpp"
 #include "recording/sample_types.hpp"
 
 namespace railfix::tool {
 
 namespace {
 
+namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
 std::string csv_text(const std::string& text) {
@@ -40,7 +42,7 @@ std::string cell_of(const ordered_json& value) {
 /// One topic's file.
 class Table {
  public:
-  Table(const std::filesystem::path& file, const cdr::Structure& type) : csv_(file, header(type)) {}
+  Table(const fs::path& file, const cdr::Structure& type) : csv_(file, header(type)) {}
   void add(const mcap::Message& message, const ordered_json& sample) {
     csv_ << message.log_time_ns << message.publish_time_ns << message.sequence;
     for (const auto& [name, value] : sample.items()) csv_ << cell_of(value);
@@ -60,25 +62,73 @@ class Table {
   core::CsvWriter csv_;
 };
 
-std::filesystem::path file_of(const std::filesystem::path& folder, std::string topic) {
-  std::ranges::replace(topic, '/', '_');
-  return folder / (topic + ".csv");
-}
+/// All tables of one export, in their places or none: each has a name of its own until all are whole.
+class Tables {
+ public:
+  explicit Tables(fs::path folder) : folder_(std::move(folder)) {}
+  ~Tables() {
+    if (kept_) return;
+    std::error_code failed;
+    for (const auto& [topic, table] : tables_) {
+      fs::remove(draft_of(topic), failed);
+      fs::remove(file_of(topic), failed);
+    }
+    if (made_) fs::remove(folder_, failed);  // only if nothing else is in it
+  }
+  Tables(const Tables&) = delete;
+  Tables& operator=(const Tables&) = delete;
+
+  core::Status make_folder() {
+    std::error_code failed;
+    made_ = fs::create_directories(folder_, failed);
+    return failed ? core::Status(core::Error{folder_.string() + " cannot be made (" + failed.message() + ")"})
+                  : core::Status();
+  }
+  Table& of(const std::string& topic, const cdr::Structure& type) {
+    const auto [place, is_new] = tables_.try_emplace(topic);
+    if (is_new) place->second = std::make_unique<Table>(draft_of(topic), type);
+    return *place->second;
+  }
+  core::Status keep() {
+    for (const auto& [topic, table] : tables_) {
+      if (auto closed = table->close(); !closed.ok()) return closed;
+    }
+    for (const auto& [topic, table] : tables_) {
+      if (auto moved = core::move_draft(draft_of(topic), file_of(topic)); !moved.ok()) return moved;
+    }
+    kept_ = true;
+    return {};
+  }
+  [[nodiscard]] size_t size() const { return tables_.size(); }
+
+ private:
+  [[nodiscard]] fs::path file_of(std::string topic) const {
+    std::ranges::replace(topic, '/', '_');
+    return folder_ / (topic + ".csv");
+  }
+  [[nodiscard]] fs::path draft_of(const std::string& topic) const { return file_of(topic).string() + ".draft"; }
+
+  fs::path folder_;
+  bool made_ = false;
+  bool kept_ = false;
+  std::map<std::string, std::unique_ptr<Table>> tables_;
+};
 
 }  // namespace
 
-core::Result<CsvReport> export_csv(mcap::Reader& reader, const mcap::Selection& part,
-                                   const std::filesystem::path& folder) {
-  std::error_code failed;
-  std::filesystem::create_directories(folder, failed);
-  if (failed) return core::Error{folder.string() + " cannot be made (" + failed.message() + ")"};
+core::Result<CsvReport> export_csv(mcap::Reader& reader, const mcap::Selection& part, const fs::path& folder,
+                                   const mcap::GoesOn& goes_on) {
+  Tables tables(folder);
+  if (const auto made = tables.make_folder(); !made.ok()) return made.error();
   SampleTypes types(reader);
   const cdr::DecodeOptions options{.name_constants = true};
-  std::map<std::string, std::unique_ptr<Table>> tables;
   std::map<std::string, uint64_t> unreadable;
+  bool stopped = false;
   CsvReport report;
   try {
     reader.for_each(part, [&](const mcap::Channel& channel, const mcap::Message& message) {
+      stopped = goes_on && !goes_on();
+      if (stopped) return false;
       const auto* type = types.structure(channel);
       const auto sample = type == nullptr ? core::Result<ordered_json>(core::Error{})
                                           : cdr::decode(*types.types(channel), type->name, message.data, options);
@@ -86,17 +136,14 @@ core::Result<CsvReport> export_csv(mcap::Reader& reader, const mcap::Selection& 
         ++unreadable[channel.topic];
         return true;
       }
-      auto& table = tables[channel.topic];
-      if (!table) table = std::make_unique<Table>(file_of(folder, channel.topic), *type);
-      table->add(message, sample.value());
+      Table& table = tables.of(channel.topic, *type);
+      table.add(message, sample.value());
       ++report.rows;
-      return table->whole();  // on a full disk it would read on for hours
+      return table.whole();  // on a full disk it would read on for hours
     });
-    core::Status status;
-    for (const auto& [topic, table] : tables) {
-      if (const auto closed = table->close(); status.ok()) status = closed;
-    }
-    if (!status.ok()) return core::Error{"the tables in " + folder.string() + " are cut: " + status.error().message};
+    if (stopped) return core::Error{"writing tables into " + folder.string() + " was stopped"};
+    if (const auto kept = tables.keep(); !kept.ok())
+      return core::Error{"there are no tables in " + folder.string() + ": " + kept.error().message};
   } catch (const core::BadInput& error) {
     return core::Error{error.what()};
   }

@@ -20,8 +20,8 @@ struct CsvReport {
 /// members as the recording's own IDL has them. Arrays are one cell, their elements with semicolons between them; long
 /// octet arrays (pictures) are cut short; values that the IDL has names for are these names, bits with | between them;
 /// unknown is an empty cell; text with a comma stands in double quotes (RFC
-/// 4180).
+/// 4180). Error: no table is there; so, too, when `goes_on` says no.
 core::Result<CsvReport> export_csv(mcap::Reader& reader, const mcap::Selection& part,
-                                   const std::filesystem::path& folder);
+                                   const std::filesystem::path& folder, const mcap::GoesOn& goes_on = {});
 
 }  // namespace railfix::tool
