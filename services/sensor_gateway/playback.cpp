@@ -1,5 +1,7 @@
 #include "sensor_gateway/playback.hpp"
 
+#include <algorithm>
+
 namespace railfix::sensor_gateway {
 namespace {
 
@@ -9,8 +11,9 @@ bool is_next(const std::vector<Row>& rows, size_t index, int64_t stamp_ns) {
 }
 
 template <class Row>
-void skip(const std::vector<Row>& rows, size_t& index, int64_t data_ns) {
-  while (index < rows.size() && rows[index].stamp_ns < data_ns) ++index;
+size_t first_from(const std::vector<Row>& rows, int64_t data_ns) {
+  const auto first = std::ranges::find_if(rows, [=](const Row& row) { return row.stamp_ns >= data_ns; });
+  return static_cast<size_t>(first - rows.begin());
 }
 
 }  // namespace
@@ -38,10 +41,10 @@ void Playback::play_until(int64_t data_ns, const Sinks& sinks) {
   }
 }
 
-void Playback::skip_to(int64_t data_ns) {
-  skip(sensors_.imu, imu_, data_ns);
-  skip(sensors_.wheel, wheel_, data_ns);
-  skip(sensors_.gnss, gnss_, data_ns);
+void Playback::go_to(int64_t data_ns) {
+  imu_ = first_from(sensors_.imu, data_ns);
+  wheel_ = first_from(sensors_.wheel, data_ns);
+  gnss_ = first_from(sensors_.gnss, data_ns);
 }
 
 }  // namespace railfix::sensor_gateway

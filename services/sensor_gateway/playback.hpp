@@ -20,8 +20,8 @@ class Playback {
   /// Gives everything with stamp <= data_ns that was not given yet, oldest first; equal stamps in the order IMU, wheel,
   /// GNSS.
   void play_until(int64_t data_ns, const Sinks& sinks);
-  /// Leaves out everything before data_ns.
-  void skip_to(int64_t data_ns);
+  /// Goes on, or back, to here: everything before data_ns is left out.
+  void go_to(int64_t data_ns);
   /// Stamp of the next sample; nothing at the end.
   [[nodiscard]] std::optional<int64_t> next_ns() const;
   [[nodiscard]] const dataset::Sensors& sensors() const { return sensors_; }

@@ -48,6 +48,8 @@ void SensorGatewayService::prepare_played() {
   context_.every(kTick, [this] { play_by_wall_clock(); });
   if (config_.clock == "follow") {
     context_.on<msg::DataClock>(messaging::topics::data_clock, [this](const msg::DataClock& clock) { follow(clock); });
+    // A frame_grabber that is started anew plays from the front: sensors of another time would belong to no picture.
+    context_.at_restart([this](int64_t) { begun_ = false; });
     return;
   }
   clock_.emplace(context_.writer(messaging::topics::data_clock));
@@ -60,7 +62,7 @@ void SensorGatewayService::prepare_played() {
 void SensorGatewayService::begin(int64_t from_ns) {
   if (begun_) return;
   begun_ = true;
-  playback_.skip_to(from_ns);
+  playback_.go_to(from_ns);
   context_.health().active();
 }
 

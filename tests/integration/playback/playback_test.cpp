@@ -45,22 +45,26 @@ class Playback : public railfix::testing::TemporaryFolder, protected test::OnTra
 
   void SetUp() override {
     TemporaryFolder::SetUp();
+    write_ride(kPictureNs);
+    write("mav0/cam0/sensor.yaml",
+          "resolution: [8, 6]\nintrinsics: [9, 9, 4, 3]\n"
+          "mount: {height_m: 2.2, pitch_rad: 0.1, yaw_rad: 0, roll_rad: 0, lateral_m: 0}\n");
+    write("mav0/wheel0/data.csv", "#timestamp [ns],pulses\n" + std::to_string(kBeginNs + 1) + ",7\n");
+    write("mav0/wheel0/sensor.yaml", "pulses_per_metre: 10\n");
+  }
+
+  void write_ride(int64_t picture_ns) const {
     std::string pictures = "#timestamp [ns],filename\n";
     for (int i = 0; i < kPictures; ++i) {
       const std::string name = std::to_string(i) + ".png";
       write_picture("mav0/cam0/data/" + name, 50 + i);
-      pictures += std::to_string(kBeginNs + i * kPictureNs) + "," + name + "\n";
+      pictures += std::to_string(kBeginNs + i * picture_ns) + "," + name + "\n";
     }
     write("mav0/cam0/data.csv", pictures);
-    write("mav0/cam0/sensor.yaml",
-          "resolution: [8, 6]\nintrinsics: [9, 9, 4, 3]\n"
-          "mount: {height_m: 2.2, pitch_rad: 0.1, yaw_rad: 0, roll_rad: 0, lateral_m: 0}\n");
     std::string imu = "#timestamp [ns],w_x,w_y,w_z,a_x,a_y,a_z\n";
-    for (int64_t t = 0; t <= kPictures * kPictureNs; t += kImuNs)
+    for (int64_t t = 0; t <= kPictures * picture_ns; t += kImuNs)
       imu += std::to_string(kBeginNs + t) + ",0,0,0,0,0,9.81\n";
     write("mav0/imu0/data.csv", imu);
-    write("mav0/wheel0/data.csv", "#timestamp [ns],pulses\n" + std::to_string(kBeginNs + 1) + ",7\n");
-    write("mav0/wheel0/sensor.yaml", "pulses_per_metre: 10\n");
   }
 
   [[nodiscard]] std::vector<std::string> common(const std::string& service) const {
@@ -210,6 +214,32 @@ TEST_F(Playback, RealPaceTakesAtLeastAsLongAsTheRecordingAndCountsEveryPicture) 
   EXPECT_LE(frames_.size(), status.frames_out());
   ASSERT_TRUE(run_until([&] { return sensors->exit_code().has_value(); }));
   EXPECT_TRUE(run_until([&] { return imu_.size() >= kImuSamples; })) << imu_.size();
+}
+
+TEST_F(Playback, WhoIsStartedAnewAndTheOtherPlayTheSameTime) {
+  constexpr int64_t kSecondNs = core::kNsPerSecond;
+  write_ride(25 * kPictureNs);
+  const std::vector<std::string> real{"frame_grabber.pace=real", "frame_grabber.start=immediately"};
+  auto sensors = gateway(false);
+  auto pictures = grabber(real);
+  ASSERT_TRUE(run_until([&] { return !imu_.empty() && imu_.back() > kBeginNs + 3 * kSecondNs; }));
+
+  const int64_t before_ns = imu_.back();
+  sensors->end(SIGKILL);
+  imu_.clear();
+  sensors = gateway(false);
+  ASSERT_TRUE(run_until([&] { return !imu_.empty(); }));
+  EXPECT_GT(imu_.front(), before_ns) << "a device delivers nothing from before it is asked";
+
+  pictures->end(SIGKILL);
+  frames_.clear();
+  pictures = grabber(real);
+  ASSERT_TRUE(run_until([&] { return !frames_.empty() && frames_.back().stamp_ns > kBeginNs + kSecondNs; }));
+  EXPECT_LT(frames_.back().stamp_ns, before_ns) << "it begins at the front";
+  const auto anew = std::ranges::adjacent_find(imu_, std::greater());
+  ASSERT_NE(anew, imu_.end()) << "the sensors go on at another time than the pictures";
+  EXPECT_EQ(*std::next(anew), kBeginNs);
+  EXPECT_LT(std::abs(imu_.back() - frames_.back().stamp_ns), kSecondNs);
 }
 
 TEST_F(Playback, WhatCannotBePlayedIsExitCodeTwo) {

@@ -67,7 +67,7 @@ class Restarts : public ::testing::Test, protected test::OnTrain {
   }
 
   [[nodiscard]] std::string ride() const { return (folder_ / "ride").string(); }
-  void start(const std::string& service) {
+  void start(const std::string& service, const std::vector<std::string>& more = {}) {
     const std::string map = (folder_ / "ride/map/line.map").string();
     std::map<std::string, std::vector<std::string>> own{
         {"frame-grabber", {"frame_grabber.source=" + ride(), "frame_grabber.preview_hz=0"}},
@@ -79,13 +79,14 @@ class Restarts : public ::testing::Test, protected test::OnTrain {
           "fusion.use_gnss=false"}},
         {"recorder", {"recorder.folder=" + recordings().string(), "recorder.pictures=none"}}};
     auto settings = own[service];
+    settings.insert(settings.end(), more.begin(), more.end());
     settings.insert(settings.end(), {"common.train_id=" + train_, "common.domain=" + std::to_string(kDomain),
                                      "common.log_level=error"});
     programs_[service] = std::make_unique<test::Program>(test::with_settings("railfix-" + service, settings));
   }
-  void kill_and_start(const std::string& service) {
+  void kill_and_start(const std::string& service, const std::vector<std::string>& more = {}) {
     programs_.at(service)->end(SIGKILL);
-    start(service);
+    start(service, more);
   }
   [[nodiscard]] fs::path recordings() const { return folder_ / "recordings"; }
   /// So many more than now, and of what comes from now on.
@@ -136,6 +137,14 @@ TEST_F(Restarts, WhatComesAfterAKillIsTrue) {
   control_.write(request);
   ASSERT_TRUE(comes(landmark_fixes_, 1));
   ASSERT_TRUE(knows_its_place());
+
+  // The pictures begin at the front again: sensors and place go back with them.
+  const int64_t before_ns = state_->stamp_ns();
+  kill_and_start("frame-grabber", {"frame_grabber.start=immediately"});
+  ASSERT_TRUE(run_until([&] { return state_->stamp_ns() < before_ns - core::kNsPerSecond; }));
+  ASSERT_TRUE(comes(landmark_fixes_, 1));
+  ASSERT_TRUE(knows_its_place());
+  EXPECT_EQ(outside_, 0U) << "of " << states_;
 
   const double before_m = error_m_;
   pause_s_ = 0;

@@ -43,9 +43,13 @@ TEST_F(PlaybackTest, EverySampleOnceInTheOrderOfTime) {
   EXPECT_EQ(playback_.next_ns(), std::nullopt);
 }
 
-TEST_F(PlaybackTest, SkipLeavesOutWhatIsOlder) {
-  playback_.skip_to(30);
+TEST_F(PlaybackTest, GoesOnAndBack) {
+  playback_.go_to(30);
   EXPECT_THAT(until(40), ElementsAre("i30", "i40", "w40", "g40"));
+  playback_.go_to(20);
+  EXPECT_THAT(until(30), ElementsAre("i20", "w20", "i30"));
+  playback_.go_to(1000);
+  EXPECT_EQ(playback_.next_ns(), std::nullopt);
 }
 
 TEST_F(PlaybackTest, NoTablesIsTheEndAtOnce) {
