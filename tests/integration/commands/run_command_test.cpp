@@ -2,6 +2,8 @@
 #include <csignal>
 #include <thread>
 
+#include "core/csv.hpp"
+#include "core/time.hpp"
 #include "integration/commands/refusal.hpp"
 #include "unit/dataset/temporary_folder.hpp"
 
@@ -55,8 +57,15 @@ TEST_F(RunCommand, ADatasetOfSensorsAloneIsRunWithoutTheCamerasServices) {
   ASSERT_EQ(ran.exit_code, 0) << ran.err;
   EXPECT_THAT(ran.err, ::testing::HasSubstr("has no pictures: its sensors are played at the recorded rate"));
   EXPECT_FALSE(fs::exists(root_ / "out/log/track_detector.log"));
-  const auto states = test::slurp(root_ / "out/train_state.csv");
-  EXPECT_GT(std::count(states.begin(), states.end(), '\n'), 40) << "ten a second, on a busy machine fewer";
+  // How many states there are is up to the machine; that they go from the beginning to the end is not.
+  auto states = core::value_or_throw(core::CsvReader::open(root_ / "out/train_state.csv"));
+  int64_t first_ns = 0;
+  int64_t last_ns = 0;
+  while (states.next()) {
+    last_ns = states.integer(*states.column({"stamp_ns"})).value();
+    if (first_ns == 0) first_ns = last_ns;
+  }
+  EXPECT_GT(last_ns - first_ns, 6 * core::kNsPerSecond);
 }
 
 }  // namespace
