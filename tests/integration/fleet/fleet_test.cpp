@@ -134,6 +134,7 @@ TEST_F(Fleet, ANewSupervisorFindsTheServicesWithoutTheNotesOfTheOneBefore) {
     test::Program systemds({"railfix", "train", "supervise", "--root", root()}, {folder_ / "supervisor.log", {}, {}});
     EXPECT_TRUE(wait_until([&] { return test::slurp(home / "state.yaml").find("born") != std::string::npos; }));
     EXPECT_THAT(test::slurp(folder_ / "supervisor.log"), HasSubstr("ends a second fusion"));
+    EXPECT_TRUE(wait_until([&] { return processes_of("fusion") == 1; }));
     expect_same("of another supervisor, with a damaged file");
   }
   fs::remove(home / "state.yaml");

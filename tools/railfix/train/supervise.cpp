@@ -26,31 +26,17 @@ constexpr int kTurnMs = 20;
 constexpr int kLockTries = 10;
 // A participant that died is forgotten after 5 s, and then nobody has its pictures mapped.
 constexpr int64_t kForgottenNs = 10 * core::kNsPerSecond;
-constexpr int64_t kStopNs = 10 * core::kNsPerSecond;
 
 volatile std::sig_atomic_t asked_to_stop = 0;
-
-// Those who listen go last, so that the recorder and the monitor hear everyone's last words.
-void stop(std::vector<SupervisedService*> children) {
-  for (auto* child : children) child->ask_to_stop();
-  const int64_t deadline_ns = core::monotonic_ns() + kStopNs;
-  const auto all_ended = [&] {
-    bool ended = true;
-    for (auto* child : children) ended = child->ended() && ended;
-    return ended;
-  };
-  while (!all_ended() && core::monotonic_ns() < deadline_ns) poll(nullptr, 0, kTurnMs);
-  for (auto* child : children) child->kill_it();
-}
 
 class Supervision {
  public:
   explicit Supervision(const HostFolder& folder) : folder_(folder) {}
   void turn() {
     follow_plan();
-    bool changed = false;
+    bool changed = turn_leaving();
     for (auto* children : {&children_, &successors_}) {
-      for (auto& child : *children) changed = child.turn() || changed;
+      for (auto& child : *children) changed = (may_turn(child) && child.turn()) || changed;
     }
     changed = hand_over() || changed;
     if (changed) {
@@ -59,19 +45,23 @@ class Supervision {
     }
     clean();
   }
+  // Those who listen go last, so that the recorder and the monitor hear everyone's last words.
   void end() {
-    std::vector<SupervisedService*> speakers;
-    std::vector<SupervisedService*> listeners;
-    for (auto& child : successors_) speakers.push_back(&child);
-    for (auto& child : children_) {
-      const bool listens = child.service().name == "recorder" || child.service().name == "monitor";
-      (listens ? listeners : speakers).push_back(&child);
-    }
-    stop(speakers);
-    stop(listeners);
-    children_.clear();
-    successors_.clear();
+    leave_if(successors_, [](const auto&) { return true; });
+    leave_if(children_,
+             [](const auto& child) { return child.service().name != "recorder" && child.service().name != "monitor"; });
+    wait_for_leaving();
+    leave_if(children_, [](const auto&) { return true; });
+    wait_for_leaving();
     say();
+  }
+  /// Those that not even a kill has ended.
+  void say_left() const {
+    for (const auto& child : leaving_) {
+      std::cerr << "railfix: " << child.service().name << ", process " << child.state().pid
+                << ", was killed and does not end: the kernel waits for a disk or a device; free that, or restart the "
+                << "computer" << std::endl;
+    }
   }
 
  private:
@@ -103,16 +93,8 @@ class Supervision {
     planned_ = plan->services;
     const auto goes = [this](const SupervisedService& child) { return !is_planned(child) && !is_succeeded(child); };
     const auto falls_out = [this](const SupervisedService& successor) { return !is_planned(successor); };
-    std::vector<SupervisedService*> leaving;
-    for (auto& child : children_) {
-      if (goes(child)) leaving.push_back(&child);
-    }
-    for (auto& successor : successors_) {
-      if (falls_out(successor)) leaving.push_back(&successor);
-    }
-    stop(leaving);
-    std::erase_if(children_, goes);
-    std::erase_if(successors_, falls_out);
+    leave_if(children_, goes);
+    leave_if(successors_, falls_out);
     start_new(*plan);
     say();
   }
@@ -144,9 +126,41 @@ class Supervision {
       std::cerr << "railfix: " << (too_many ? "ends a second " : "goes on with ") << service.name << ", process "
                 << running.pid << std::endl;
       if (!too_many) continue;
-      stop({&children.back()});
+      leave(std::move(children.back()));
       children.pop_back();
     }
+  }
+  // Nobody waits for its end: the others are looked after meanwhile.
+  void leave(SupervisedService child) {
+    child.ask_to_end();
+    leaving_.push_back(std::move(child));
+  }
+  template <class Leaves>
+  void leave_if(std::vector<SupervisedService>& children, Leaves leaves) {
+    for (auto& child : children) {
+      if (leaves(child)) leave(child);
+    }
+    std::erase_if(children, leaves);
+  }
+  bool turn_leaving() {
+    return std::erase_if(leaving_, [](SupervisedService& child) { return child.turn_to_end(); }) > 0;
+  }
+  void wait_for_leaving() {
+    const auto in_the_way = [](const SupervisedService& child) { return child.is_in_the_way(); };
+    for (turn_leaving(); std::ranges::any_of(leaving_, in_the_way); turn_leaving()) poll(nullptr, 0, kTurnMs);
+  }
+  [[nodiscard]] bool is_free(const std::string& name) const {
+    return std::ranges::none_of(leaving_, [&](const SupervisedService& child) {
+      return child.service().name == name && child.is_in_the_way();
+    });
+  }
+  /// Another one of its name has to end first, or to give the files free that stand for one that runs beside.
+  [[nodiscard]] bool may_turn(const SupervisedService& child) const {
+    if (child.runs()) return true;
+    const bool second = std::ranges::any_of(children_, [&](const SupervisedService& other) {
+      return &other != &child && other.service().name == child.service().name && other.is_beside();
+    });
+    return is_free(child.service().name) && !second;
   }
   [[nodiscard]] static service::CommonConfig common_of(const HostPlan& plan) {
     service::CommonConfig common;
@@ -177,7 +191,7 @@ class Supervision {
       (beside ? successors_ : children_).emplace_back(service, folder_, common, beside);
     }
   }
-  /// True when a successor has taken the place of the one before.
+  /// True when a successor has taken the place of the one before, or the files of that one.
   bool hand_over() {
     const auto before_of = [this](const SupervisedService& successor) {
       return std::find_if(children_.begin(), children_.end(), [&](const SupervisedService& child) {
@@ -189,15 +203,21 @@ class Supervision {
       return before == children_.end() || (before->runs() ? successor.has_found_all() : successor.runs());
     };
     const auto due = std::find_if(successors_.begin(), successors_.end(), is_due);
-    if (due == successors_.end()) return false;
-    if (const auto before = before_of(*due); before != children_.end()) {
-      stop({&*before});
-      children_.erase(before);
+    bool changed = due != successors_.end();
+    if (changed) {
+      if (const auto before = before_of(*due); before != children_.end()) {
+        leave(std::move(*before));
+        children_.erase(before);
+      }
+      children_.push_back(std::move(*due));
+      successors_.erase(due);
     }
-    children_.push_back(std::move(*due));
-    successors_.erase(due);
-    children_.back().take_its_place();
-    return true;
+    for (auto& child : children_) {
+      if (!child.is_beside() || !is_free(child.service().name)) continue;
+      child.take_its_place();
+      changed = true;
+    }
+    return changed;
   }
   void say() const {
     HostState state;
@@ -207,7 +227,18 @@ class Supervision {
       if (const auto before = state.extract(name)) state[name + kBefore] = before.mapped();
       state[name] = successor.state();
     }
+    for (const auto& child : leaving_) add_leaving(child, state);
     static_cast<void>(folder_.write(state));  // a full disk must not end the train
+  }
+  static void add_leaving(const SupervisedService& child, HostState& state) {
+    const auto& name = child.service().name;
+    const auto process = child.state();
+    if (child.runs())
+      state[name + (state.contains(name + kBefore) ? kTooMany + std::to_string(process.pid) : kBefore)] = process;
+    const auto next = state.find(name);
+    if (next == state.end() || next->second.pid > 0 || !child.is_in_the_way()) return;
+    next->second.last_end = "waits for process " + std::to_string(process.pid) + " of generation " +
+                            std::to_string(process.generation) + ", which was told to end";
   }
   const HostFolder& folder_;
   fs::file_time_type plan_written_{};
@@ -216,6 +247,7 @@ class Supervision {
   std::vector<PlannedService> planned_;
   std::vector<SupervisedService> children_;
   std::vector<SupervisedService> successors_;  // each runs beside the child of its name
+  std::vector<SupervisedService> leaving_;     // were asked to end
 };
 
 }  // namespace
@@ -251,6 +283,7 @@ void supervise(const HostFolder& folder) {
     poll(nullptr, 0, kTurnMs);
   } while (asked_to_stop == 0);
   supervision.end();
+  supervision.say_left();
   close(lock);
 }
 

@@ -1,7 +1,6 @@
 #include "train/supervised_service.hpp"
 
 #include <fcntl.h>
-#include <poll.h>
 #include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -20,7 +19,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kTurnMs = 20;
 constexpr int64_t kFirstPauseNs = 200'000'000;  // of one that does not live long
 constexpr int64_t kLongestPauseNs = 5 * core::kNsPerSecond;
 constexpr int64_t kLivesNs = 10 * core::kNsPerSecond;
@@ -33,6 +31,10 @@ constexpr int64_t kLookNs = core::kNsPerSecond / 20;
 constexpr int kFrozenLooks = 3;  // after a computer that stood still everybody may speak first
 // DDS finds everybody within a second, and one that stands by counts as fit after two more (service/charge.hpp).
 constexpr int64_t kFoundNs = 3'500'000'000;
+// For the end of the data's way and of its ears one after the other, within the 40 s that `down` and systemd wait.
+constexpr int64_t kStopNs = 10 * core::kNsPerSecond;
+constexpr int64_t kCleanNs = 6 * core::kNsPerSecond;
+constexpr int64_t kDeadNs = core::kNsPerSecond;
 constexpr size_t kLastWords = 300;
 constexpr int kRefuses = 2;  // exit code of a service whose configuration is wrong (service/run.cpp)
 
@@ -49,23 +51,24 @@ std::string said_of(int wait_status) {
   _exit(127);
 }
 
-// To its end, without a word.
-void run_quietly(const std::vector<std::string>& command) {
-  if (command.empty()) return;
+// Without a word. 0: there is nothing to be run, or it cannot be.
+pid_t start_quietly(const std::vector<std::string>& command) {
+  if (command.empty()) return 0;
   const pid_t pid = fork();
   if (pid == 0) {
     const int nothing = open("/dev/null", O_RDWR);
     for (const int file : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) dup2(nothing, file);
     execute(command);
   }
-  if (pid > 0) waitpid(pid, nullptr, 0);
+  return std::max(pid, 0);
 }
 
 [[noreturn]] void become(const PlannedService& service, bool beside, const std::string& ended_before,
                          const fs::path& home, int log) {
   setpgid(0, 0);
   for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, SIG_DFL);
-  run_quietly(service.clean_up);
+  // In this process, so that nobody else waits for an engine that hangs.
+  if (const pid_t cleaner = start_quietly(service.clean_up); cleaner > 0) waitpid(cleaner, nullptr, 0);
   dup2(log, STDOUT_FILENO);
   dup2(log, STDERR_FILENO);
   setenv(service::kEndedBefore, ended_before.c_str(), 1);
@@ -133,25 +136,44 @@ bool SupervisedService::turn() {
   return true;
 }
 
-void SupervisedService::ask_to_stop() const {
+void SupervisedService::ask_to_end() {
+  asked_ns_ = core::monotonic_ns();
   if (pid_ > 0) kill(pid_, SIGTERM);
 }
 
-void SupervisedService::kill_it() {
-  if (pid_ <= 0) return;
-  run_quietly(service_.clean_up);
-  kill(pid_, SIGKILL);
-  while (!ended()) poll(nullptr, 0, kTurnMs);
-  forget_health();
-}
-
-bool SupervisedService::ended() {
+bool SupervisedService::turn_to_end() {
   int ignored = 0;
   if (pid_ > 0 && has_ended(ignored)) {
+    // One that was started beside another one does not know its file under the usual name; where it was in nobody's way
+    // any more, the file may be the next one's.
+    if (is_in_the_way()) forget_health();
     pid_ = 0;
-    forget_health();  // one that was started beside another one does not know its file under the usual name
   }
-  return pid_ == 0;
+  if (cleaner_ > 0 && waitpid(cleaner_, nullptr, WNOHANG) == cleaner_) cleaner_ = 0;
+  if (pid_ == 0 && cleaner_ == 0) return true;
+  insist(core::monotonic_ns());
+  return false;
+}
+
+void SupervisedService::insist(int64_t now_ns) {
+  const int64_t waited_ns = now_ns - asked_ns_;
+  if (waited_ns < kStopNs || killed_ns_ != 0) return;
+  if (!insisted_ && service_.in_container()) {
+    insisted_ = true;
+    // With its process the container ends, and the engine has less to do.
+    if (const pid_t process = holder_of(health_); process > 0) kill(process, SIGKILL);
+    cleaner_ = start_quietly(service_.clean_up);
+  }
+  if (cleaner_ > 0 && waited_ns < kStopNs + kCleanNs) return;
+  for (const pid_t process : {pid_, cleaner_}) {
+    if (process > 0) kill(process, SIGKILL);
+  }
+  killed_ns_ = now_ns;
+}
+
+bool SupervisedService::is_in_the_way() const {
+  const bool is_dead = killed_ns_ != 0 && core::monotonic_ns() - killed_ns_ > kDeadNs;
+  return (pid_ > 0 || cleaner_ > 0) && !is_dead;
 }
 
 // One that was adopted is another process's child.

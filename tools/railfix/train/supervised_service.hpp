@@ -29,12 +29,20 @@ class SupervisedService {
 
   /// Starts it when it is time, notes its end. True when something has changed.
   bool turn();
-  void ask_to_stop() const;
-  void kill_it();
-  bool ended();
+
+  /// From now on turn_to_end() takes the place of turn().
+  void ask_to_end();
+  /// Kills it when it takes its time, and lets the engine remove what is left; waits for nothing. True when nothing is
+  /// left.
+  bool turn_to_end();
+  /// Was asked to end and may still do something: nothing of its name is to be started. A process that was killed and
+  /// is held by the kernel (a disk or a device does not answer) will do nothing any more.
+  [[nodiscard]] bool is_in_the_way() const;
+  [[nodiscard]] bool is_beside() const { return beside_; }
 
  private:
   bool has_ended(int& wait_status) const;
+  void insist(int64_t now_ns);
   void forget_health() const;
   void look(int64_t now_ns);
   void kill_when_frozen(int64_t now_ns);
@@ -60,6 +68,10 @@ class SupervisedService {
   int64_t started_ns_ = 0;
   int64_t next_start_ns_ = 0;
   int64_t pause_ns_;
+  int64_t asked_ns_ = 0;   // to end
+  bool insisted_ = false;  // on that
+  int64_t killed_ns_ = 0;  // it and its clean-up: nothing more can be done
+  pid_t cleaner_ = 0;
 };
 
 }  // namespace railfix::tool
