@@ -36,11 +36,13 @@ struct KeysDone {
   bool first = false;          // with a new authority
   bool next_signs = false;     // the next authority has taken over; the former one is still trusted
   bool is_exchanging = false;  // two authorities are trusted
+  bool resumed = false;        // one that was broken off before is done now
 };
 
 /// Fills FOLDER/security/<host>/ for every host and FOLDER/security/authority/ with the authority, whose key stays with
-/// the operator. What is there stays unless it is renewed. Error: openssl is missing or refuses; an exchange of the
-/// authority out of turn.
+/// the operator. What is there stays unless it is renewed. Broken off at any moment (a kill, a power cut) it leaves
+/// every host with all of its old files or all of its new ones, and the same again does the rest. Error: openssl is
+/// missing or refuses; an exchange of the authority out of turn; another one that was broken off comes first.
 core::Result<KeysDone> make_keys(const Manifest& manifest, const KeysOptions& options);
 /// What was done and what comes next, for the operator: a line each.
 std::vector<std::string> told_of_keys(const Manifest& manifest, const KeysOptions& options, const KeysDone& done);

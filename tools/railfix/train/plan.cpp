@@ -1,6 +1,5 @@
 #include "train/plan.hpp"
 
-#include <fcntl.h>
 #include <unistd.h>
 #include <yaml-cpp/yaml.h>
 
@@ -10,6 +9,7 @@
 
 #include "core/whole_file.hpp"
 #include "train/stands_still.hpp"
+#include "train/whole_folder.hpp"
 
 namespace railfix::tool {
 namespace {
@@ -33,15 +33,6 @@ auto load(const fs::path& file, Read read) -> std::optional<decltype(read(YAML::
   } catch (const YAML::Exception& error) {
     throw damaged(file, error.what());
   }
-}
-
-// What a plan names is on the disk before the plan, and the plan before anything is done by it: a power cut leaves the
-// old one or the whole new one.
-void to_disk(const fs::path& folder) {
-  const int opened = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (opened < 0) return;
-  static_cast<void>(::syncfs(opened));
-  ::close(opened);
 }
 
 void require(bool holds, const YAML::Node& node, const char* what) {
@@ -179,6 +170,8 @@ core::Status HostFolder::write_to(const fs::path& folder, const HostPlan& plan) 
     node["made_of"] = service.made_of;
     root["services"].push_back(node);
   }
+  // What a plan names is on the disk before the plan, and the plan before anything is done by it: a power cut leaves
+  // the old one or the whole new one.
   to_disk(folder);
   auto written = core::write_whole_with_folders(folder / "plan.yaml", YAML::Dump(root) + "\n");
   to_disk(folder);
