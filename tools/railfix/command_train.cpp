@@ -1,34 +1,21 @@
 // `railfix train` and `railfix doctor`: a train from its manifest (docs/fleet.md).
-#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
 #include <nlohmann/json.hpp>
 
+#include "command_train.hpp"
 #include "commands.hpp"
 #include "core/joined.hpp"
 #include "core/result.hpp"
 #include "number_between.hpp"
 #include "train/check.hpp"
-#include "train/keys.hpp"
 #include "train/render.hpp"
-#include "train/roll_out.hpp"
 #include "train/supervise.hpp"
 
 namespace railfix::tool {
-namespace {
 
 namespace fs = std::filesystem;
-
-struct Options {
-  fs::path train;
-  fs::path out;
-  fs::path root = "/";
-  std::string host;
-  KeysOptions keys;
-  HealthGate gate;
-  bool json = false;
-};
 
 /// Prints what was found; false when one of it is an error.
 bool say(const std::vector<Finding>& findings) {
@@ -40,11 +27,7 @@ bool say(const std::vector<Finding>& findings) {
   return good;
 }
 
-void say_at_once(const std::string& text) {
-  std::cout << text << std::endl;
-}
-
-TrainCheck checked(const Manifest& manifest, const Options& options) {
+TrainCheck checked(const Manifest& manifest, const TrainOptions& options) {
   return check_train(manifest, [&](const HostedService& service) { return program_of(service, options.root); });
 }
 
@@ -52,7 +35,7 @@ std::string names_of(const Manifest& manifest) {
   return core::joined(manifest.hosts, &TrainHost::name);
 }
 
-const TrainHost& chosen_host(const Manifest& manifest, const Options& options) {
+const TrainHost& chosen_host(const Manifest& manifest, const TrainOptions& options) {
   const auto* host = options.host.empty() ? manifest.host_here() : manifest.host(options.host);
   if (host != nullptr) return *host;
   if (!options.host.empty())
@@ -62,67 +45,17 @@ const TrainHost& chosen_host(const Manifest& manifest, const Options& options) {
                        "; say which one it is with --host: " + names_of(manifest));
 }
 
-HostPlan plan_here(const Options& options) {
+HostPlan plan_here(const TrainOptions& options) {
   auto plan = HostFolder(options.root).plan();
   if (!plan) throw core::BadInput("no train was brought up on this computer; begin with railfix train up TRAIN");
   return *plan;
 }
 
-void refuse_another_train(const Options& options, const Manifest& manifest) {
+void refuse_another_train(const TrainOptions& options, const Manifest& manifest) {
   if (const auto why = runs_another_train(options.root, manifest)) throw core::BadInput(*why);
 }
 
-HostPlan running_plan_here(const Options& options) {
-  auto plan = plan_here(options);
-  if (plan.down) throw core::BadInput("the train is down; railfix train up TRAIN starts it as the manifest says");
-  return plan;
-}
-
-// Nothing is asked over the network: each computer knows its own clock, disks, memory and images best.
-void say_not_asked(const Manifest& manifest, const TrainHost* here) {
-  for (const auto& host : manifest.hosts) {
-    if (here != nullptr && host.name == here->name) continue;
-    std::cout << "not asked: the computer " << host.name << " (clock, memory, disks, network, releases); type railfix "
-              << "train check there, too: ssh " << host.address << " railfix train check TRAIN\n";
-  }
-}
-
-int check(const Options& options) {
-  const auto manifest = core::value_or_throw(read_manifest(options.train));
-  auto findings = checked(manifest, options).findings;
-  const auto* here = options.host.empty() ? manifest.host_here() : &chosen_host(manifest, options);
-  if (here != nullptr) {
-    for (auto& finding : check_computer(&manifest, here, options.root)) findings.push_back(std::move(finding));
-    if (const auto why = runs_another_train(options.root, manifest)) findings.push_back({true, *why});
-  }
-  const bool good = say(findings);
-  say_not_asked(manifest, here);
-  std::cout << "train " << manifest.train_id << ": " << manifest.services.size() << " services on "
-            << manifest.hosts.size() << (manifest.hosts.size() == 1 ? " host" : " hosts") << ", release "
-            << manifest.release << (good ? ", can start" : ", must not start like this") << '\n';
-  return good ? 0 : 1;
-}
-
-int render(const Options& options) {
-  const auto manifest = core::value_or_throw(read_manifest(options.train));
-  if (!say(checked(manifest, options).findings)) return 1;
-  for (const auto& other : remove_secrets_of_others(manifest, options.out))
-    std::cout << other.string() << ": is of no host of train " << manifest.train_id << "; its keys are removed\n";
-  for (const auto& host : manifest.hosts) {
-    core::ok_or_throw(render_host(manifest, host, options.out / host.name));
-    std::cout << host.name << " (" << host.address << "): " << (options.out / host.name).string() << '\n';
-  }
-  return 0;
-}
-
-int keys(const Options& options) {
-  const auto manifest = core::value_or_throw(read_manifest(options.train));
-  const auto done = core::value_or_throw(make_keys(manifest, options.keys));
-  for (const auto& line : told_of_keys(manifest, options.keys, done)) std::cout << line << '\n';
-  return 0;
-}
-
-int status(const Options& options) {
+int say_status(const TrainOptions& options) {
   const HostFolder folder(options.root);
   const auto plan = plan_here(options);
   const auto state = folder.state();
@@ -172,40 +105,53 @@ int status(const Options& options) {
   return healthy ? 0 : 1;
 }
 
-int up(const Options& options) {
-  core::ok_or_throw(HostFolder(options.root).may_be_changed());
-  const auto manifest = core::value_or_throw(read_manifest(options.train));
-  refuse_another_train(options, manifest);
-  const auto& host = chosen_host(manifest, options);
-  auto [findings, made_of] = checked(manifest, options);
-  for (auto& finding : check_computer(&manifest, &host, options.root)) findings.push_back(std::move(finding));
-  if (!say(findings)) return 1;
-  const HostFolder folder(options.root);
-  const auto installed = folder.plan();
-  const bool supervised = supervisor_of(folder).has_value();
-  const bool runs = installed && !installed->down && (supervised || any_runs(folder));
-  if (runs) {
-    std::cout << "services run here already" << (supervised ? "" : ", without a supervisor: it is started")
-              << "; railfix train diff " << manifest.folder.string()
-              << " says what the manifest would change, upgrade does it\n";
-    if (supervised) return status(options);
+namespace {
+
+// Nothing is asked over the network: each computer knows its own clock, disks, memory and images best.
+void say_not_asked(const Manifest& manifest, const TrainHost* here) {
+  for (const auto& host : manifest.hosts) {
+    if (here != nullptr && host.name == here->name) continue;
+    std::cout << "not asked: the computer " << host.name << " (clock, memory, disks, network, releases); type railfix "
+              << "train check there, too: ssh " << host.address << " railfix train check TRAIN\n";
   }
-  const auto plan = runs ? *installed : core::value_or_throw(install(manifest, host, options.root, made_of));
-  const auto healthy = bring_up(options.root, plan, options.gate, say_at_once);
-  if (!healthy.ok()) std::cerr << "railfix: not healthy: " << healthy.error().message << '\n';
-  const int shown = status(options);
-  return healthy.ok() ? shown : 1;
 }
 
-int down(const Options& options) {
-  core::ok_or_throw(HostFolder(options.root).may_be_changed());
-  const auto plan = plan_here(options);
-  core::ok_or_throw(bring_down(options.root));
-  std::cout << "train " << plan.train_id << ", host " << plan.host << ": stopped\n";
+int check(const TrainOptions& options) {
+  const auto manifest = core::value_or_throw(read_manifest(options.train));
+  auto findings = checked(manifest, options).findings;
+  const auto* here = options.host.empty() ? manifest.host_here() : &chosen_host(manifest, options);
+  if (here != nullptr) {
+    for (auto& finding : check_computer(&manifest, here, options.root)) findings.push_back(std::move(finding));
+    if (const auto why = runs_another_train(options.root, manifest)) findings.push_back({true, *why});
+  }
+  const bool good = say(findings);
+  say_not_asked(manifest, here);
+  std::cout << "train " << manifest.train_id << ": " << manifest.services.size() << " services on "
+            << manifest.hosts.size() << (manifest.hosts.size() == 1 ? " host" : " hosts") << ", release "
+            << manifest.release << (good ? ", can start" : ", must not start like this") << '\n';
+  return good ? 0 : 1;
+}
+
+int render(const TrainOptions& options) {
+  const auto manifest = core::value_or_throw(read_manifest(options.train));
+  if (!say(checked(manifest, options).findings)) return 1;
+  for (const auto& other : remove_secrets_of_others(manifest, options.out))
+    std::cout << other.string() << ": is of no host of train " << manifest.train_id << "; its keys are removed\n";
+  for (const auto& host : manifest.hosts) {
+    core::ok_or_throw(render_host(manifest, host, options.out / host.name));
+    std::cout << host.name << " (" << host.address << "): " << (options.out / host.name).string() << '\n';
+  }
   return 0;
 }
 
-int diff(const Options& options) {
+int keys(const TrainOptions& options) {
+  const auto manifest = core::value_or_throw(read_manifest(options.train));
+  const auto done = core::value_or_throw(make_keys(manifest, options.keys));
+  for (const auto& line : told_of_keys(manifest, options.keys, done)) std::cout << line << '\n';
+  return 0;
+}
+
+int diff(const TrainOptions& options) {
   const auto manifest = core::value_or_throw(read_manifest(options.train));
   refuse_another_train(options, manifest);
   const auto& host = chosen_host(manifest, options);
@@ -243,39 +189,7 @@ int diff(const Options& options) {
   return 0;
 }
 
-int upgrade(const Options& options) {
-  core::ok_or_throw(HostFolder(options.root).may_be_changed());
-  const auto manifest = core::value_or_throw(read_manifest(options.train));
-  refuse_another_train(options, manifest);
-  const auto& host = chosen_host(manifest, options);
-  running_plan_here(options);
-  auto [findings, made_of] = checked(manifest, options);
-  for (auto& finding : check_computer(&manifest, &host, options.root)) findings.push_back(std::move(finding));
-  if (!say(findings)) return 1;
-  const auto plan = core::value_or_throw(install(manifest, host, options.root, made_of));
-  std::signal(SIGHUP, SIG_IGN);  // a connection that drops must not leave it half done
-  const auto done = roll_out(options.root, plan, options.gate, say_at_once);
-  if (!done.ok()) throw std::runtime_error(done.error().message);
-  std::cout << "generation " << plan.generation << " runs\n";
-  return 0;
-}
-
-int rollback(const Options& options) {
-  core::ok_or_throw(HostFolder(options.root).may_be_changed());
-  const HostFolder folder(options.root);
-  const auto now = running_plan_here(options);
-  const auto before = folder.plan(now.previous);
-  if (now.previous == 0 || !before)
-    throw core::BadInput("there is no generation before " + std::to_string(now.generation) +
-                         "; railfix train upgrade TRAIN brings what train.yaml says");
-  std::signal(SIGHUP, SIG_IGN);
-  const auto done = roll_out(options.root, *before, options.gate, say_at_once);
-  if (!done.ok()) throw std::runtime_error(done.error().message);
-  std::cout << "generation " << before->generation << " runs again\n";
-  return 0;
-}
-
-int supervise_here(const Options& options) {
+int supervise_here(const TrainOptions& options) {
   supervise(HostFolder(options.root));
   return 0;
 }
@@ -297,7 +211,7 @@ std::vector<Finding> check_services(const HostFolder& folder) {
   return findings;
 }
 
-int doctor(const Options& options) {
+int doctor(const TrainOptions& options) {
   const TrainHost* host = nullptr;
   Manifest manifest;
   if (!options.train.empty()) {
@@ -318,12 +232,12 @@ int doctor(const Options& options) {
 }  // namespace
 
 void add_train(CLI::App& app, Action& chosen) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<TrainOptions>();
   auto* train = app.add_subcommand(
       "train", "A train as a whole, from its manifest.  Example: railfix train check deploy/trains/re460-042");
   train->require_subcommand(1);
   enum { kManifest = 1, kHost = 2, kRoot = 4, kGate = 8 };
-  const auto add = [&](const char* name, const char* what, int (*work)(const Options&), int takes) {
+  const auto add = [&](const char* name, const char* what, int (*work)(const TrainOptions&), int takes) {
     auto* command = train->add_subcommand(name, what);
     if ((takes & kManifest) != 0) command->add_option("train", options->train, "Folder of train.yaml")->required();
     if ((takes & kHost) != 0)
@@ -358,16 +272,16 @@ void add_train(CLI::App& app, Action& chosen) {
   auto* drop = make->add_flag("--drop-authority", options->keys.drop_authority, "Trust the former authority no more");
   next->excludes(renew)->excludes(drop);
   drop->excludes(renew);
-  add("up", "Check, then start this computer's services and a supervisor that keeps them running", up,
+  add("up", "Check, then start this computer's services and a supervisor that keeps them running", train_up,
       kManifest | kHost | kRoot | kGate);
-  add("down", "Stop this computer's services and their supervisor", down, kRoot);
-  add("status", "How this computer's services are: exit code 0 when all are healthy", status, kRoot)
+  add("down", "Stop this computer's services and their supervisor", train_down, kRoot);
+  add("status", "How this computer's services are: exit code 0 when all are healthy", say_status, kRoot)
       ->add_flag("--json", options->json, "JSON on standard output");
   add("diff", "What upgrade would change on this computer", diff, kManifest | kHost | kRoot);
   add("upgrade",
-      "Bring this computer to the manifest, service by service; back by itself when one does not get healthy", upgrade,
-      kManifest | kHost | kRoot | kGate);
-  add("rollback", "Back to the generation before; once more: further back", rollback, kRoot | kGate);
+      "Bring this computer to the manifest, service by service; back by itself when one does not get healthy",
+      train_upgrade, kManifest | kHost | kRoot | kGate);
+  add("rollback", "Back to the generation before; once more: further back", train_rollback, kRoot | kGate);
   add("supervise", "Keep this computer's services running; what systemd starts", supervise_here, kRoot);
 
   auto* computer = app.add_subcommand("doctor", "Say what is wrong with this computer as a host of a train");

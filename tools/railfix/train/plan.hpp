@@ -80,6 +80,10 @@ class HostFolder {
   }
   [[nodiscard]] std::filesystem::path plan_file() const { return folder_ / "plan.yaml"; }
   [[nodiscard]] std::filesystem::path lock() const { return folder_ / "supervisor.lock"; }
+  /// Of the command that changes what runs here, of `down`, and of who reads the plan to write it anew.
+  [[nodiscard]] std::filesystem::path command_lock() const { return folder_ / "command.lock"; }
+  [[nodiscard]] std::filesystem::path down_lock() const { return folder_ / "down.lock"; }
+  [[nodiscard]] std::filesystem::path plan_lock() const { return folder_ / "plan.lock"; }
   [[nodiscard]] int newest_generation() const;
   /// Error: this user may not change what runs here.
   [[nodiscard]] core::Status may_be_changed() const;

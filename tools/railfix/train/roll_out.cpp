@@ -10,7 +10,7 @@
 #include <sstream>
 
 #include "core/time.hpp"
-#include "service/health_file.hpp"
+#include "train/command_lock.hpp"
 #include "train/made_of.hpp"
 #include "train/render.hpp"
 #include "train/running.hpp"
@@ -21,97 +21,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kTurnMs = 50;
 constexpr double kStopS = 40;
+constexpr double kPlanLockS = 5;  // then without: a command that was stopped with Ctrl-Z must not keep `down` off
 constexpr double kBackS = 60;
-constexpr int64_t kSayNs = 5 * core::kNsPerSecond;
 constexpr const char* kNotTogether =
     ", which runs here: they would not hear each other; railfix train down on every host, then up";
-
-template <class Condition>
-bool wait_until(double patience_s, Condition condition) {
-  const int64_t deadline_ns = core::monotonic_ns() + core::to_ns(patience_s);
-  while (!condition()) {
-    if (core::monotonic_ns() > deadline_ns) return false;
-    poll(nullptr, 0, kTurnMs);
-  }
-  return true;
-}
-
-/// Watches one service until it has been healthy for long enough.
-class Gate {
- public:
-  /// `must_send`: it did before.
-  Gate(const HostFolder& folder, const HostPlan& plan, std::string service, double healthy_s, bool must_send)
-      : folder_(folder),
-        plan_(plan),
-        service_(std::move(service)),
-        healthy_ns_(core::to_ns(healthy_s)),
-        must_send_(must_send) {}
-  bool passed() {
-    const auto state = folder_.state();
-    const auto found = state.find(service_);
-    const int generation = plan_.service(service_)->generation;
-    const bool there = found != state.end() && found->second.generation == generation;
-    const bool ours = there && found->second.pid > 0 && !found->second.beside;
-    refuses_ = there && found->second.pid == 0 && found->second.refused;
-    health_ = health_of(plan_, state, service_);
-    const int64_t now_ns = core::monotonic_ns();
-    if (!ours || !health_.healthy || is_mute() || found->second.pid != pid_) {
-      healthy_since_ns_ = now_ns;
-      pid_ = ours ? found->second.pid : 0;
-      return false;
-    }
-    return now_ns - healthy_since_ns_ >= healthy_ns_;
-  }
-  /// Nothing that it waits for would help: its configuration is wrong.
-  [[nodiscard]] bool refuses() const { return refuses_; }
-  [[nodiscard]] std::string why_not() const {
-    return service_ + (health_.healthy && is_mute() ? " sends nothing, and did before: " : " ") + health_.text;
-  }
-
- private:
-  [[nodiscard]] bool is_mute() const { return must_send_ && !health_.sends && !health_.stands_by; }
-  const HostFolder& folder_;
-  const HostPlan& plan_;
-  std::string service_;
-  int64_t healthy_ns_;
-  bool must_send_;
-  bool refuses_ = false;
-  int64_t healthy_since_ns_ = 0;
-  int64_t pid_ = 0;
-  service::HealthAnswer health_;
-};
-
-std::string problems_of(const std::vector<const Gate*>& gates) {
-  std::string problems;
-  for (const auto* gate : gates) problems += (problems.empty() ? "" : "; ") + gate->why_not();
-  return problems;
-}
-
-core::Status wait_healthy(const HostFolder& folder, const HostPlan& plan, const std::vector<std::string>& services,
-                          const HealthGate& gate, const Say& say, bool must_send = false) {
-  std::vector<Gate> gates;
-  for (const auto& service : services) gates.emplace_back(folder, plan, service, gate.healthy_s, must_send);
-  std::vector<const Gate*> closed;
-  bool refused = false;
-  int64_t say_ns = core::monotonic_ns() + kSayNs;
-  const bool ended = wait_until(gate.patience_s, [&] {
-    closed.clear();
-    for (auto& one : gates) {
-      if (!one.passed()) closed.push_back(&one);
-    }
-    refused = std::ranges::any_of(closed, &Gate::refuses);
-    if (core::monotonic_ns() > say_ns && !closed.empty() && !refused) {
-      say("waiting: " + problems_of(closed));
-      say_ns += kSayNs;
-    }
-    return closed.empty() || refused;
-  });
-  if (ended && !refused) return {};
-  if (refused) std::erase_if(closed, [](const Gate* one) { return !one->refuses(); });
-  return core::Error{problems_of(closed)};
-}
 
 // A process of its own session, so that it stays when the terminal goes.
 core::Status start_supervisor(const fs::path& root) {
@@ -206,20 +120,6 @@ bool any_runs(const HostFolder& folder) {
   return !running_on(folder, folder.state()).empty();
 }
 
-service::HealthAnswer health_of(const HostPlan& plan, const HostState& state, const std::string& service) {
-  const auto process = state.find(service);
-  if (process == state.end()) return {.text = "is not started"};
-  if (process->second.pid == 0) {
-    return {.text =
-                "does not run: " + (process->second.last_end.empty() ? "not started yet" : process->second.last_end)};
-  }
-  service::CommonConfig common;
-  common.train_id = plan.train_id;
-  common.host = plan.host;
-  return service::ask_health(process->second.beside ? service::health_path_beside(common, service)
-                                                    : service::health_path(common, service));
-}
-
 std::string difference(const std::string& before, const std::string& after) {
   const auto lines = [](const std::string& text) {
     std::vector<std::string> list;
@@ -239,6 +139,40 @@ std::string difference(const std::string& before, const std::string& after) {
   return text;
 }
 
+Unfinished unfinished(const HostFolder& folder, const HostPlan& now) {
+  const auto whole = folder.plan(now.generation);
+  if (!whole || changed_services(now, *whole).empty()) return Unfinished::nothing;
+  const bool goes_back =
+      std::ranges::any_of(now.services, [&](const auto& service) { return service.generation > now.generation; });
+  return goes_back ? Unfinished::rollback : Unfinished::upgrade;
+}
+
+std::optional<std::string> half_done(const HostFolder& folder, const HostPlan& before, const HostPlan& target) {
+  const auto now = folder.plan().value_or(before);
+  const auto state = folder.state();
+  std::string done;
+  std::string not_done;
+  for (const auto& name : changed_services(before, target)) {
+    const auto* service = now.service(name);
+    const auto* wanted = target.service(name);
+    const bool is_done = wanted == nullptr ? service == nullptr : service != nullptr && *service == *wanted;
+    auto& list = is_done ? done : not_done;
+    list += (list.empty() ? "" : ", ") + name;
+    if (service == nullptr) {
+      list += is_done ? " (has left this host)" : " (not here yet)";
+      continue;
+    }
+    list += " (release " + service->release;
+    const auto runs = state.find(name);
+    const bool is_up = runs != state.end() && runs->second.generation == service->generation && !runs->second.beside &&
+                       health_of(now, state, name).healthy;
+    list += is_up ? ")" : ", not up yet)";
+  }
+  if (done.empty()) return std::nullopt;
+  const std::string still = "\n  still generation " + std::to_string(before.generation) + ": " + not_done;
+  return "already generation " + std::to_string(target.generation) + ": " + done + (not_done.empty() ? "" : still);
+}
+
 core::Result<HostPlan> install(const Manifest& manifest, const TrainHost& host, const fs::path& root,
                                const std::map<std::string, TopicLayouts>& made_of) {
   const HostFolder folder(root);
@@ -247,7 +181,9 @@ core::Result<HostPlan> install(const Manifest& manifest, const TrainHost& host, 
   plan.train_id = manifest.train_id;
   plan.host = host.name;
   plan.generation = folder.newest_generation() + 1;
-  plan.previous = now && now->train_id == plan.train_id ? now->generation : 0;  // another train's is no way back
+  // Another train's is no way back, and nothing is one that never ran whole.
+  if (now && now->train_id == plan.train_id)
+    plan.previous = unfinished(folder, *now) == Unfinished::upgrade ? now->previous : now->generation;
   const auto files = folder.generation(plan.generation);
   if (const auto rendered = render_host(manifest, host, files); !rendered.ok()) return rendered.error();
   bool all_same = true;
@@ -278,23 +214,32 @@ core::Result<HostPlan> install(const Manifest& manifest, const TrainHost& host, 
   return plan;
 }
 
-core::Status bring_up(const fs::path& root, const HostPlan& plan, const HealthGate& gate, const Say& say) {
+core::Status bring_up(const fs::path& root, const HostPlan& plan, fs::file_time_type as_of, const HealthGate& gate,
+                      const Say& say) {
   const HostFolder folder(root);
-  if (const auto written = folder.write(plan); !written.ok()) return written;
+  {
+    const FileLock alone(folder.plan_lock(), kPlanLockS);
+    if (folder.plan_written() != as_of) return core::Error{kChangedMeanwhile};
+    if (const auto written = folder.write(plan); !written.ok()) return written;
+  }
   if (!supervisor_of(folder)) {
     if (const auto started = start_supervisor(root); !started.ok()) return started;
   }
-  const auto healthy = wait_healthy(folder, plan, names_of(plan), gate, say);
-  if (healthy.ok()) folder.prune();
-  return healthy;
+  const auto waited = wait_healthy(folder, plan, names_of(plan), gate, say);
+  if (waited.healthy.ok()) folder.prune();
+  return waited.healthy;
 }
 
 core::Status bring_down(const fs::path& root) {
   const HostFolder folder(root);
-  // First of all, so that a supervisor that systemd starts again keeps still.
-  if (auto plan = folder.plan(); plan && !plan->down) {
-    plan->down = true;
-    if (const auto written = folder.write(*plan); !written.ok()) return written;
+  // First of all, so that a supervisor that systemd starts again keeps still. Written in any case: who is about to
+  // bring the train up sees by it that it was taken down meanwhile.
+  {
+    const FileLock alone(folder.plan_lock(), kPlanLockS);
+    if (auto plan = folder.plan()) {
+      plan->down = true;
+      if (const auto written = folder.write(*plan); !written.ok()) return written;
+    }
   }
   if (!supervisor_of(folder)) {
     if (!any_runs(folder)) return {};
@@ -313,11 +258,10 @@ core::Status bring_down(const fs::path& root) {
 
 // What another command has written meanwhile stays: `down` above all.
 core::Status write_after(const HostFolder& folder, int last_generation, const HostPlan& next) {
+  const FileLock alone(folder.plan_lock(), kPlanLockS);
   const auto there = folder.plan();
   if (there && there->down == next.down && there->generation == last_generation) return folder.write(next);
-  return core::Error{
-      "another command has changed what runs here meanwhile (railfix train down, upgrade or rollback); this one has "
-      "stopped, railfix train status says what runs"};
+  return core::Error{kChangedMeanwhile};
 }
 
 core::Status roll_out(const fs::path& root, const HostPlan& plan, const HealthGate& gate, const Say& say) {
@@ -332,6 +276,7 @@ core::Status roll_out(const fs::path& root, const HostPlan& plan, const HealthGa
   int there = before->generation;
   const auto changed = changed_services(*before, plan);
   for (const auto& name : changed) {
+    if (gate.is_interrupted()) return core::Error{"interrupted"};
     const bool sent = health_of(now, folder.state(), name).sends;
     now = with_service(now, plan, name);
     if (const auto written = write_after(folder, there, now); !written.ok()) return written;
@@ -340,12 +285,13 @@ core::Status roll_out(const fs::path& root, const HostPlan& plan, const HealthGa
     say(target != nullptr ? name + ": release " + target->release + ", generation " + std::to_string(target->generation)
                           : name + ": leaves this host");
     if (target == nullptr) continue;
-    const auto healthy = wait_healthy(folder, now, {name}, gate, say, sent);
+    const auto [healthy, broken_off] = wait_healthy(folder, now, {name}, gate, say, sent);
     if (healthy.ok()) continue;
+    if (broken_off) return healthy;
     say(healthy.error().message + "; back to generation " + std::to_string(before->generation));
     if (const auto written = write_after(folder, there, *before); !written.ok()) return written;
-    const HealthGate patient{gate.healthy_s, std::max(gate.patience_s, kBackS)};
-    const auto again = wait_healthy(folder, *before, names_of(*before), patient, say);
+    const HealthGate patient{gate.healthy_s, std::max(gate.patience_s, kBackS), gate.is_interrupted};
+    const auto again = wait_healthy(folder, *before, names_of(*before), patient, say).healthy;
     return core::Error{"generation " + std::to_string(plan.generation) + " did not pass: " + healthy.error().message +
                        (again.ok() ? "; generation " + std::to_string(before->generation) + " runs again"
                                    : "; AND the old generation is not healthy: " + again.error().message)};
@@ -355,7 +301,7 @@ core::Status roll_out(const fs::path& root, const HostPlan& plan, const HealthGa
   // An upgrade that was broken off may have left one that does not run.
   auto others = names_of(now);
   std::erase_if(others, [&](const auto& name) { return std::ranges::find(changed, name) != changed.end(); });
-  if (const auto healthy = wait_healthy(folder, now, others, gate, say); !healthy.ok())
+  if (const auto healthy = wait_healthy(folder, now, others, gate, say).healthy; !healthy.ok())
     return core::Error{"generation " + std::to_string(now.generation) + " runs, but " + healthy.error().message};
   return {};
 }
