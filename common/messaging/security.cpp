@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <ctime>
 #include <memory>
 
@@ -44,6 +45,15 @@ PrivateKey read_key(const std::filesystem::path& path) {
 
 }  // namespace
 
+std::string keys_command(const std::filesystem::path& folder) {
+  const auto train = folder.parent_path().parent_path();  // TRAIN/security/HOST
+  std::error_code none;
+  const char* told = std::getenv(kTrainFolder);
+  const bool is_told = told != nullptr && *told != '\0';
+  const bool is_in_it = !train.empty() && std::filesystem::exists(train / "train.yaml", none);
+  return "railfix train keys " + (is_in_it ? train.string() : is_told ? told : "TRAIN");
+}
+
 core::Result<std::vector<std::pair<std::string, std::string>>> security_properties(const std::filesystem::path& folder,
                                                                                    const std::string& service) {
   std::vector<std::pair<std::string, std::string>> properties;
@@ -62,7 +72,7 @@ core::Result<std::vector<std::pair<std::string, std::string>>> security_properti
     const auto file = std::filesystem::absolute(folder / file_name);
     if (access(file.c_str(), R_OK) != 0) {
       return core::Error{file.string() + " is missing or cannot be read by this user; make the train's keys with " +
-                         "`railfix train keys` and copy this host's part here"};
+                         keys_command(folder) + " and copy this host's part here"};
     }
     properties.emplace_back(property, "file://" + file.string());
   }
@@ -75,10 +85,11 @@ std::filesystem::path certificate_of(const std::filesystem::path& folder, const 
 
 core::Result<int64_t> certificate_ends_ns(const std::filesystem::path& certificate) {
   if (access(certificate.c_str(), R_OK) != 0)
-    return core::Error{certificate.string() + " is missing; make it with railfix train keys"};
+    return core::Error{certificate.string() + " is missing; make it with " + keys_command(certificate.parent_path())};
   const auto read = read_certificate(certificate);
   if (!read)
-    return core::Error{certificate.string() + " is not a certificate; make it again with railfix train keys --renew"};
+    return core::Error{certificate.string() + " is not a certificate; make it again with " +
+                       keys_command(certificate.parent_path()) + " --renew"};
   std::tm ends{};
   if (ASN1_TIME_to_tm(X509_get0_notAfter(read.get()), &ends) != 1)
     return core::Error{certificate.string() + " has no readable end of validity"};

@@ -11,6 +11,12 @@
 
 namespace railfix::messaging {
 
+/// Environment variable with the folder of train.yaml on this computer, which a supervisor sets for its services.
+inline constexpr const char* kTrainFolder = "RAILFIX_TRAIN_FOLDER";
+/// `railfix train keys FOLDER` for the certificates in this folder, as an operator types it; TRAIN where nobody has
+/// told this process which folder it is.
+std::string keys_command(const std::filesystem::path& folder);
+
 /// Fast DDS properties for the identity of `service` in this folder, which `railfix train keys` fills:
 ///   ca.pem, governance.p7s, <service>.cert.pem, <service>.key.pem, <service>.permissions.p7s
 /// Tools, whose names begin with "railfix-", have the operator's identity `tool`.

@@ -115,8 +115,8 @@ void Loop::watch_own_certificate() {
   const auto look = [this] {
     const auto end = end_of(messaging::certificate_of(common_.security, service_));
     if (!end.empty())
-      log_->warn("this service's certificate {}; railfix train keys --renew, then railfix train upgrade on each host",
-                 end);
+      log_->warn("this service's certificate {}; {} --renew, then railfix train upgrade on each host", end,
+                 messaging::keys_command(common_.security));
   };
   look();
   every(kCertificatePeriod, look);

@@ -322,6 +322,7 @@ TrainSeen MonitorService::train_seen() {
         {one.process.substr(0, at), one.process.substr(at + 1), messaging::days_until(one.ends_ns)});
   }
   train.certificate_days = config_.certificate_days;
+  train.keys_command = messaging::keys_command({});
   train.interval_wide_m = config_.interval_wide_m;
   train.disk_low_mb = config_.disk_low_mb;
   return train;

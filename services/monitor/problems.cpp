@@ -136,7 +136,7 @@ void judge_certificates(const TrainSeen& train, Problems& problems) {
     problems.push_back({"certificate " + whose, over ? Level::error : Level::warning,
                         over ? fmt::format("The certificate of {} has run out", whose)
                              : fmt::format("The certificate of {} runs out in {} days", whose, one.days_left),
-                        "railfix train keys --renew, then railfix train upgrade on each host."});
+                        train.keys_command + " --renew, then railfix train upgrade on each host."});
   }
 }
 

@@ -53,6 +53,7 @@ struct TrainSeen {
   };
   std::vector<Certificate> certificates;  // of every service that is there
   int64_t certificate_days = 0;
+  std::string keys_command = "railfix train keys TRAIN";
   double interval_wide_m = 100;
   double disk_low_mb = 1000;
 };

@@ -90,14 +90,15 @@ int say_status(const TrainOptions& options) {
     table += line + health.text + (service.standby ? " (configured as standby)" : "") + "\n";
   }
   if (!page.empty()) json["page"] = page;
+  const auto again = "railfix train up " + plan.train() + at_root(options.root);
   if (options.json) {
     std::cout << json.dump(2) << '\n';
   } else {
     std::cout << "train " << plan.train_id << ", host " << plan.host << ", generation " << plan.generation
-              << (plan.down    ? ", down: railfix train up TRAIN"
-                  : supervisor ? ""
-                  : runs       ? ", without supervisor: railfix train up TRAIN"
-                               : ", not running: railfix train up TRAIN")
+              << (plan.down    ? ", down: " + again
+                  : supervisor ? std::string()
+                  : runs       ? ", without supervisor: " + again
+                               : ", not running: " + again)
               << "\n"
               << "service         release    generation      pid restarts  health\n"
               << table << (page.empty() ? "" : "the page is at " + page + "\n");
@@ -195,13 +196,15 @@ int supervise_here(const TrainOptions& options) {
 }
 
 /// What the services that run on this computer complain of.
-std::vector<Finding> check_services(const HostFolder& folder) {
+std::vector<Finding> check_services(const TrainOptions& options) {
+  const HostFolder folder(options.root);
   std::vector<Finding> findings;
   const auto plan = folder.plan();
   if (!plan || plan->down) return findings;
   if (!supervisor_of(folder)) {
     if (any_runs(folder))
-      findings.push_back({true, "services run without a supervisor: railfix train up TRAIN starts it"});
+      findings.push_back({true, "services run without a supervisor: railfix train up " + plan->train() +
+                                    at_root(options.root) + " starts it"});
     return findings;
   }
   for (const auto& service : plan->services) {
@@ -223,7 +226,7 @@ int doctor(const TrainOptions& options) {
     for (auto& finding : check_certificates(manifest, *host)) findings.push_back(std::move(finding));
   }
   for (auto& finding : check_installed_certificates(HostFolder(options.root))) findings.push_back(std::move(finding));
-  for (auto& finding : check_services(HostFolder(options.root))) findings.push_back(std::move(finding));
+  for (auto& finding : check_services(options)) findings.push_back(std::move(finding));
   const bool good = say(findings);
   std::cout << (good ? "this computer can run Railfix\n" : "this computer must not run Railfix like this\n");
   return good ? 0 : 1;

@@ -12,7 +12,9 @@ namespace {
 
 HostPlan running_plan_here(const TrainOptions& options) {
   auto plan = plan_here(options);
-  if (plan.down) throw core::BadInput("the train is down; railfix train up TRAIN starts it as the manifest says");
+  if (plan.down)
+    throw core::BadInput("the train is down; railfix train up " + plan.train() + at_root(options.root) +
+                         " starts it as the manifest says");
   return plan;
 }
 
@@ -125,14 +127,15 @@ int train_rollback(const TrainOptions& options) {
   const auto before = folder.plan(number);
   if (number == 0 || !before)
     throw core::BadInput("there is no generation before " + std::to_string(now.generation) +
-                         "; railfix train upgrade TRAIN brings what train.yaml says");
+                         "; railfix train upgrade " + now.train() + at_root(options.root) +
+                         " brings what train.yaml says");
   auto gate = options.gate;
   heed_signals(gate);
   const auto done = roll_out(options.root, *before, gate, say_at_once);
   if (!done.ok() && ended_by != 0)
-    return say_interrupted(
-        options, now, *before,
-        {"railfix train rollback" + at_root(options.root), "railfix train upgrade TRAIN" + at_root(options.root)});
+    return say_interrupted(options, now, *before,
+                           {"railfix train rollback" + at_root(options.root),
+                            "railfix train upgrade " + now.train() + at_root(options.root)});
   if (!done.ok()) throw std::runtime_error(done.error().message);
   std::cout << "generation " << before->generation << " runs again\n";
   return 0;

@@ -58,7 +58,9 @@ TEST_F(Doctor, SaysWhatIsWrongWithTheTrainThatRunsHere) {
   EXPECT_EQ(doctor().exit_code, 1);
   ASSERT_EQ(kill(fusion, SIGCONT), 0);
   ASSERT_EQ(kill(supervisor, SIGKILL), 0);
-  EXPECT_TRUE(is_told("error: services run without a supervisor: railfix train up TRAIN starts it")) << doctor().out;
+  EXPECT_TRUE(is_told("error: services run without a supervisor: railfix train up " + manifest() + " --root " + root() +
+                      " starts it"))
+      << doctor().out;
 }
 
 }  // namespace

@@ -46,6 +46,9 @@ TEST_F(Fleet, ServicesComeUpComeBackAfterAKillAndGoDown) {
   const auto before = status("fusion");
   EXPECT_TRUE(before["healthy"]);
   ASSERT_GT(before["pid"].get<pid_t>(), 1);  // kill(0) would end this test
+  EXPECT_THAT(test::slurp("/proc/" + std::to_string(before["pid"].get<pid_t>()) + "/environ"),
+              HasSubstr("RAILFIX_TRAIN_FOLDER=" + manifest()))
+      << "its advice would lack the folder";
   ASSERT_EQ(kill(before["pid"].get<pid_t>(), SIGKILL), 0);
   EXPECT_TRUE(wait_until([&] {
     const auto now = status("fusion");
@@ -67,7 +70,7 @@ TEST_F(Fleet, ServicesComeUpComeBackAfterAKillAndGoDown) {
   EXPECT_THAT(in_memory("health"), ::testing::IsEmpty()) << "left behind";
   const auto after = train({"status", "--root", root()});
   EXPECT_EQ(after.exit_code, 1);
-  EXPECT_THAT(after.out, HasSubstr("down: railfix train up"));
+  EXPECT_THAT(after.out, HasSubstr("down: railfix train up " + manifest() + " --root " + root()));
 }
 
 // The kernel may take the supervisor when memory is short: the train goes on, and the next one looks after it.

@@ -121,6 +121,9 @@ TEST_F(ProblemsTest, TellsOfCertificatesBeforeTheyRunOut) {
   EXPECT_EQ(only().level, Level::warning);
   train_.certificates = {{"fusion", "coach", -1}};
   EXPECT_EQ(only().what, "The certificate of fusion on coach has run out");
+  train_.keys_command = "railfix train keys /home/max/re460-042";
+  EXPECT_THAT(only().what_to_do,
+              HasSubstr("railfix train keys /home/max/re460-042 --renew, then railfix train upgrade"));
   EXPECT_EQ(only().level, Level::error);
 }
 

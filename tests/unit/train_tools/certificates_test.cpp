@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "messaging/security.hpp"
 #include "support/program.hpp"
 #include "train/keys.hpp"
 #include "unit/train_tools/train_folder.hpp"
@@ -245,6 +246,30 @@ TEST_F(TrainFolder, APrivateKeyOfAnotherCertificateIsTold) {
   fs::create_directories(installed.generation(1));
   std::ofstream(installed.generation(1) / "config.yaml") << "tpr_publisher:\n  " << link(other);
   EXPECT_THAT(check_installed_certificates(installed), is(other + " is not the private key of"));
+}
+
+// As it is to be typed, wherever the folder is known.
+TEST_F(TrainFolder, TheAdviceNamesTheFolderOfTheTrain) {
+  const auto secured = manifest(kTrain, "run_as: programs", "security: true").value();
+  ASSERT_TRUE(make_keys(secured, {.valid_days = 20}).ok());
+  const auto keys = folder_ / "security/cab";
+  EXPECT_EQ(messaging::keys_command(keys), "railfix train keys " + folder_.string());
+  const auto missing = messaging::security_properties(keys, "monitor");
+  ASSERT_FALSE(missing.ok());
+  EXPECT_THAT(missing.error().message, HasSubstr("make the train's keys with railfix train keys " + folder_.string()));
+
+  const HostFolder installed(folder_ / "host");
+  fs::create_directories(installed.generation(1));
+  fs::copy(keys, installed.generation(1) / "security");
+  HostPlan plan{"re460-042", "cab", 1, 0, false, {{"fusion", "1.2.0", 1, false, {"x"}, {}, ""}}, "/home/max/train"};
+  ASSERT_TRUE(installed.write(plan).ok());
+  EXPECT_THAT(check_installed_certificates(installed),
+              ElementsAre(Field(&Finding::text, HasSubstr("railfix train keys /home/max/train --renew, then"))));
+  // A service has its part only, and its supervisor tells it.
+  EXPECT_EQ(messaging::keys_command(installed.generation(1) / "security"), "railfix train keys TRAIN");
+  setenv(messaging::kTrainFolder, "/home/max/train", 1);
+  EXPECT_EQ(messaging::keys_command(installed.generation(1) / "security"), "railfix train keys /home/max/train");
+  unsetenv(messaging::kTrainFolder);
 }
 
 TEST_F(TrainFolder, ReportsThatLeaveASecuredTrainInTheOpenAreTold) {

@@ -152,7 +152,7 @@ std::vector<Finding> check_installed_certificates(const HostFolder& folder) {
     const auto generation = folder.generation(service.generation);
     const auto settings = installed_settings(generation);
     if (fs::exists(generation / "security"))
-      check_identity(generation / "security", service.name, warning_days(settings), Remedies("TRAIN"), findings);
+      check_identity(generation / "security", service.name, warning_days(settings), Remedies(plan->train()), findings);
     check_named_files(settings, generation, service.name, findings);
   }
   return findings;

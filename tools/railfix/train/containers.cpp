@@ -6,6 +6,7 @@
 #include <map>
 #include <sstream>
 
+#include "messaging/security.hpp"
 #include "service/service.hpp"
 #include "train/render.hpp"
 #include "train/run.hpp"
@@ -117,6 +118,7 @@ std::vector<std::string> run_command(const Container& container, const std::stri
                                    "--ulimit=core=0:0",
                                    "--env=RAILFIX_CONFIG=" + container.config,
                                    std::string("--env=") + service::kEndedBefore,
+                                   std::string("--env=") + messaging::kTrainFolder,
                                    "--workdir=" + std::string(kContainerHome),
                                    "--tmpfs=/tmp"};
   for (const auto& volume : container.volumes) command.push_back("--volume=" + volume);

@@ -58,6 +58,7 @@ HostPlan plan_of(const YAML::Node& root) {
   plan.generation = root["generation"].as<int>();
   plan.previous = root["previous"].as<int>();
   plan.down = root["down"].as<bool>(false);
+  plan.train_folder = root["train_folder"].as<std::string>("");
   require(root["services"].IsSequence(), root, "no list of services");
   for (const auto& node : root["services"]) plan.services.push_back(service_of(node));
   return plan;
@@ -157,6 +158,7 @@ core::Status HostFolder::write_to(const fs::path& folder, const HostPlan& plan) 
   root["generation"] = plan.generation;
   root["previous"] = plan.previous;
   root["down"] = plan.down;
+  root["train_folder"] = plan.train_folder;
   root["services"] = YAML::Node(YAML::NodeType::Sequence);
   for (const auto& service : plan.services) {
     YAML::Node node;

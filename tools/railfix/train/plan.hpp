@@ -44,7 +44,10 @@ struct HostPlan {
   int previous = 0;    // the one before of this train, 0 = none
   bool down = false;   // nothing is to run until the train is brought up again, after a restart of the computer neither
   std::vector<PlannedService> services;
+  std::string train_folder = {};  // of the train.yaml that was last brought here, absolute; empty = not noted
 
+  /// As an operator types it.
+  [[nodiscard]] std::string train() const { return train_folder.empty() ? "TRAIN" : train_folder; }
   [[nodiscard]] const PlannedService* service(const std::string& name) const;
 };
 

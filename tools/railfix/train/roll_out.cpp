@@ -106,6 +106,14 @@ std::vector<std::string> changed_services(const HostPlan& from, const HostPlan& 
   return changed;
 }
 
+std::string still_there(const HostFolder& folder) {
+  std::string text;
+  for (const auto& [key, running] : running_on(folder, folder.state()))
+    text +=
+        (text.empty() ? "; still there: " : ", ") + service_of(key) + " (process " + std::to_string(running.pid) + ")";
+  return text;
+}
+
 }  // namespace
 
 std::optional<std::string> runs_another_train(const fs::path& root, const Manifest& manifest) {
@@ -180,6 +188,7 @@ core::Result<HostPlan> install(const Manifest& manifest, const TrainHost& host, 
   HostPlan plan;
   plan.train_id = manifest.train_id;
   plan.host = host.name;
+  plan.train_folder = (fs::absolute(manifest.folder) / "").lexically_normal().parent_path().string();
   plan.generation = folder.newest_generation() + 1;
   // Another train's is no way back, and nothing is one that never ran whole.
   if (now && now->train_id == plan.train_id)
@@ -203,8 +212,10 @@ core::Result<HostPlan> install(const Manifest& manifest, const TrainHost& host, 
   if (all_same && now && now->down && now->train_id == plan.train_id && now->services.size() == plan.services.size()) {
     std::error_code failed;
     fs::remove_all(files, failed);
+    const auto from = plan.train_folder;
     plan = *now;
     plan.down = false;
+    plan.train_folder = from;
     return plan;
   }
   if (manifest.containers) {
@@ -252,7 +263,8 @@ core::Status bring_down(const fs::path& root) {
     return core::Error{"the supervisor " + std::to_string(*pid) + " cannot be told to end: " + std::strerror(errno)};
   if (!wait_until(kStopS, [&] { return supervisor_of(folder) != pid && !any_runs(folder); }))
     return core::Error{"the supervisor " + std::to_string(*pid) + " has not ended its services within " +
-                       std::to_string(static_cast<int>(kStopS)) + " s"};
+                       std::to_string(static_cast<int>(kStopS)) + " s" + still_there(folder) + "; why stands in " +
+                       folder.log("supervisor").string() + ", or in systemd's journal"};
   return {};
 }
 
@@ -272,6 +284,7 @@ core::Status roll_out(const fs::path& root, const HostPlan& plan, const HealthGa
   if (const auto found = misfit(plan.services, before->services)) return core::Error{*found + kNotTogether};
   auto now = *before;
   now.generation = plan.generation;
+  now.train_folder = plan.train_folder;
   now.previous = plan.previous;  // after a rollback the one before that one, and not what was rolled back from
   int there = before->generation;
   const auto changed = changed_services(*before, plan);

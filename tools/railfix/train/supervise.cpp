@@ -12,6 +12,7 @@
 
 #include "core/time.hpp"
 #include "core/whole_file.hpp"
+#include "messaging/security.hpp"
 #include "train/left_behind.hpp"
 #include "train/running.hpp"
 #include "train/stands_still.hpp"
@@ -58,6 +59,7 @@ class Supervision {
   /// Those that not even a kill has ended.
   void say_left() const {
     for (const auto& child : leaving_) {
+      if (!child.runs()) continue;
       std::cerr << "railfix: " << child.service().name << ", process " << child.state().pid
                 << ", was killed and does not end: the kernel waits for a disk or a device; free that, or restart the "
                 << "computer" << std::endl;
@@ -83,6 +85,7 @@ class Supervision {
     if (written == plan_written_) return;
     plan_written_ = written;
     const auto plan = or_nothing([this] { return folder_.plan(); });
+    if (plan) setenv(messaging::kTrainFolder, plan->train_folder.c_str(), 1);  // for what is started from now on
     if (!plan || (!plan->down && plan->services == planned_)) return;
     if (planned_.empty()) adopt_running(*plan);
     if (plan->down) {
