@@ -93,6 +93,7 @@ class SwitchPassage {
     errors_.bogies_behind_m = tram ? 0 : random_.uniform(0, 4);
     errors_.bogie_distance_m = tram ? 0 : random_.uniform(6, 17);
     if (plan.camera) errors_.bogies_behind_m += random_.uniform(-1, 1);  // odometry's turn is that of here +- 0.5 m
+    errors_.sway_rad = 0.0015;
     sensors_.emplace(errors_, seed * 7 + 1);
     gyro_.emplace(map_matcher::GyroParameters{errors_.turn_noise_rps / std::sqrt(kTicksPerS), 0.002, 1e-5, 0.2});
     result_.astray = plan.camera && random_.uniform() < 0.02;
