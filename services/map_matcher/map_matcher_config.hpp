@@ -83,6 +83,8 @@ struct MapMatcherConfig {
     f.number("window_m", p.window_m, {50, 5000}, "m", "Longest way that is matched.");
     f.number("noise_per_m", p.noise_per_m, {1e-6, 0.1}, "1/m", "Least sigma of one average.");
     f.number("correlated_bins", p.correlated_bins, {1, 100}, "", "So many neighbouring averages err together.");
+    f.number("sway_rad", p.sway_rad, {0, 0.1}, "rad", "The body turns to and fro on its springs, one sigma ...");
+    f.number("sway_m", p.sway_m, {0.1, 1000}, "m", "... and forgets it over about this way.");
     f.number("bias_per_m", p.bias_per_m, {1e-9, 0.01}, "1/m", "Constant error of the measured curvature, one sigma.");
     f.number("scale_sigma", p.scale_sigma, {1e-5, 0.2}, "", "Error of the odometer's scale.");
     f.number("search_margin_m", p.search_margin_m, {0, 1000}, "m", "Search beyond the interval of train_state.");

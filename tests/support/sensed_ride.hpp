@@ -91,7 +91,8 @@ class RideSensors {
     s.turn_sigma_rad = std::hypot(errors_.turn_noise_rps * duration_s, share * errors_.step_turn_noise_rad);
     s.turn_rad = heading.at(to_m) - heading.at(from_m) + hunting(to_m) - hunting(from_m) +
                  errors_.turn_bias_rps * duration_s + s.turn_sigma_rad * random_.normal();
-    const double swayed_before_rad = std::exchange(swayed_rad_, sway(time_s, s.speed_mps));
+    run_s_ += duration_s;
+    const double swayed_before_rad = std::exchange(swayed_rad_, sway(run_s_, s.speed_mps));
     s.turn_rad += swayed_rad_ - swayed_before_rad;
     return s;
   }
@@ -123,6 +124,7 @@ class RideSensors {
   }
   std::vector<Wave> sway_;
   double swayed_rad_ = 0;
+  double run_s_ = 0;
   RideErrors errors_;
   core::Random random_;
   double phase_ = 0;

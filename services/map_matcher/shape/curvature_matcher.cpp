@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "map_matcher/inputs.hpp"
 
@@ -14,6 +15,7 @@ constexpr double kGridM = 1.0;
 constexpr double kLagStepM = 2.5;
 constexpr double kLagKnownShare = 0.7;  // of the sigma of a lag that nothing tells
 constexpr size_t kFewestBins = 10;
+constexpr double kNextBin = 1.6;    // bins that lie no further apart have a place in common
 constexpr double kBetterBy = 0.97;  // a sigma that shrinks less than this is as good as it gets
 constexpr std::array<double, 5> kScales = {-1.5, -0.75, 0.0, 0.75, 1.5};  // in sigmas
 
@@ -59,19 +61,64 @@ void CurvatureMatcher::add(double odometer_m, double curvature_per_m, double sig
   bin->weight += weight;
 }
 
-double CurvatureMatcher::misfit(const MapCurvature& map, double place_m, double scale, double lag_m,
-                                double odometer_m) const {
+std::vector<CurvatureMatcher::Weighing> CurvatureMatcher::weighings() const {
   const double least = parameters_.noise_per_m * parameters_.noise_per_m;
+  const double keeps = std::exp(-parameters_.bin_m / parameters_.sway_m);
+  const double sway = std::pow(parameters_.sway_rad / parameters_.bin_m, 2);
+  std::vector<Weighing> all;
+  const Bin* before = nullptr;  // of the body
+  double way = 1;
+  double variance = 0;  // of the sway at its end
+  double bias = 0;      // what a constant error makes of the sway
+  for (const Bin& bin : bins_) {
+    Weighing one;
+    double expected = 1 / bin.weight + least;
+    one.of_bias = 1;
+    if (bin.of == CurvatureOf::body) {
+      const double apart_m = before == nullptr ? 0 : bin.odometer_m - before->odometer_m;
+      const double way_before = std::exchange(way, apart_m < 0 ? -1.0 : 1.0);
+      one.begins = before == nullptr || std::abs(apart_m) > kNextBin * parameters_.bin_m || way != way_before;
+      if (one.begins) {
+        variance = sway;
+        bias = 0;
+      }
+      const double fresh = sway * (1 - keeps * keeps);
+      one.way = way;
+      one.of_sway = keeps - 1;
+      one.keeps = keeps;
+      expected += one.of_sway * one.of_sway * variance + fresh;
+      const double together = keeps * one.of_sway * variance + fresh;
+      one.gain = together / expected;
+      variance = keeps * keeps * variance + fresh - one.gain * together;
+      one.of_bias = way - one.of_sway * bias;
+      bias = keeps * bias + one.gain * one.of_bias;
+      before = &bin;
+    }
+    one.weight = 1 / expected;
+    all.push_back(one);
+  }
+  return all;
+}
+
+double CurvatureMatcher::misfit(const MapCurvature& map, const std::vector<Weighing>& weighings, double place_m,
+                                double scale, double lag_m, double odometer_m) const {
   double sum = 0;
   double weighted = 0;
   double weights = 1 / (parameters_.bias_per_m * parameters_.bias_per_m);
-  for (const auto& bin : bins_) {
+  double sway = 0;
+  for (size_t i = 0; i < bins_.size(); ++i) {
+    const Bin& bin = bins_[i];
+    const Weighing& as = weighings[i];
     const double of_m = place_m - (bin.of == CurvatureOf::body ? lag_m : 0.0);
-    const double error = bin.curvature_per_m - map.at(of_m + (1 + scale) * (bin.odometer_m - odometer_m));
-    const double weight = 1 / (1 / bin.weight + least);
-    sum += weight * error * error;
-    weighted += weight * error;
-    weights += weight;
+    double error = as.way * (bin.curvature_per_m - map.at(of_m + (1 + scale) * (bin.odometer_m - odometer_m)));
+    if (bin.of == CurvatureOf::body) {
+      if (as.begins) sway = 0;
+      error -= as.of_sway * sway;
+      sway = as.keeps * sway + as.gain * error;
+    }
+    sum += as.weight * error * error;
+    weighted += as.weight * as.of_bias * error;
+    weights += as.weight * as.of_bias * as.of_bias;
   }
   // What is left when the bias takes the value that fits best.
   return sum - weighted * weighted / weights;
@@ -104,12 +151,13 @@ std::vector<double> CurvatureMatcher::misfits(const Window& window, double odome
       expected_m + window.to_m + stretch * std::max(0.0, farthest->odometer_m - odometer_m));
   const size_t lags = any_of_body() ? static_cast<size_t>(std::ceil(parameters_.lag_m / kLagStepM)) + 1 : 1;
   const double lag_step_m = lags > 1 ? parameters_.lag_m / static_cast<double>(lags - 1) : 0.0;
+  const auto weighed = weighings();
   std::vector<double> all;
   all.reserve(window.places() * lags * kScales.size());
   for (size_t place = 0; place < window.places(); ++place) {
     for (size_t lag = 0; lag < lags; ++lag) {
       for (const double scale : kScales)
-        all.push_back(misfit(map, expected_m + window.offset_m(place), parameters_.scale_sigma * scale,
+        all.push_back(misfit(map, weighed, expected_m + window.offset_m(place), parameters_.scale_sigma * scale,
                              lag_step_m * static_cast<double>(lag), odometer_m));
     }
   }

@@ -18,6 +18,8 @@ struct CurvatureParameters {
   double window_m = 400;         // longest way that is matched
   double noise_per_m = 2e-4;     // least sigma of one bin: car body, sleepers, map
   double correlated_bins = 1.5;  // neighbouring bins err together
+  double sway_rad = 0.002;       // the body turns to and fro on its springs, one sigma, ...
+  double sway_m = 6;             // ... and forgets it over about this way
   double bias_per_m = 3e-5;      // constant error of the curvature, one sigma
   double scale_sigma = 0.01;     // of the odometer
   double search_margin_m = 10;   // beyond the promised interval of train_state
@@ -52,6 +54,18 @@ class CurvatureMatcher {
     double weight = 0;
     CurvatureOf of = CurvatureOf::rails;
   };
+  /// How a bin's error is weighed, given those of the bins before: what the body swayed to the one side within a bin it
+  /// sways back in the next ones. A Kalman filter of the sway at the bin's end (in 1/m, over bin_m), whose gains depend
+  /// on no candidate.
+  struct Weighing {
+    double way = 1;       // 1 or -1: the odometer's from bin to bin
+    double of_sway = 0;   // of the last sway in what is expected, ...
+    double keeps = 0;     // ... and in the next one
+    double gain = 0;      // of the next sway
+    double weight = 0;    // of what is not expected
+    double of_bias = 0;   // a constant error in it
+    bool begins = false;  // nothing is known of the sway before
+  };
   struct Peak {
     double offset_m = 0;  // of the place from the prior's
     double sigma_m = 0;
@@ -67,14 +81,15 @@ class CurvatureMatcher {
   };
   class MapCurvature;
   [[nodiscard]] bool any_of_body() const;
+  [[nodiscard]] std::vector<Weighing> weighings() const;
   /// The best place by a flat prior in the window.
   [[nodiscard]] Peak search(double odometer_m, const Prior& prior) const;
   /// Of every place, lag of the body and scale of the odometer, the scales innermost.
   [[nodiscard]] std::vector<double> misfits(const Window& window, double odometer_m, double expected_m) const;
   [[nodiscard]] std::vector<double> likelihoods(const std::vector<double>& misfits, size_t places) const;
   [[nodiscard]] Peak peak_of(const std::vector<double>& likelihood, const Window& window) const;
-  [[nodiscard]] double misfit(const MapCurvature& map, double place_m, double scale, double lag_m,
-                              double odometer_m) const;
+  [[nodiscard]] double misfit(const MapCurvature& map, const std::vector<Weighing>& weighings, double place_m,
+                              double scale, double lag_m, double odometer_m) const;
 
   CurvatureParameters parameters_;
   std::shared_ptr<const track::Path> path_;

@@ -7,6 +7,7 @@
 #include "core/random.hpp"
 #include "core/result.hpp"
 #include "map_matcher/shape/curve_exit_matcher.hpp"
+#include "support/sensed_ride.hpp"
 
 namespace railfix::map_matcher {
 namespace {
@@ -62,26 +63,85 @@ TEST(CurvatureMatcher, SaysNothingWhenThePlaceIsNoNumberOrTheIntervalHasNoEnd) {
   }
 }
 
+std::shared_ptr<const track::Path> line_of_curves(uint64_t seed) {
+  core::Random random(seed);
+  std::vector<track::Element> elements;
+  for (int k = 0; k < 4; ++k) {
+    const double curvature = (random.uniform() < 0.5 ? -1 : 1) / random.uniform(400, 1200);
+    for (const auto& e :
+         {track::Element{random.uniform(150, 500), 0, 0}, track::Element{80, 0, curvature},
+          track::Element{random.uniform(80, 300), curvature, curvature}, track::Element{80, curvature, 0}}) {
+      elements.push_back(e);
+    }
+  }
+  elements.push_back({300, 0, 0});
+  return line_of(elements);
+}
+
 TEST(CurvatureMatcher, EntriesAndExitsOfCurvesGiveHonestFixes) {
   int fixes = 0;
   for (uint64_t seed = 1; seed <= 8; ++seed) {
-    core::Random random(seed);
-    std::vector<track::Element> elements;
-    for (int k = 0; k < 4; ++k) {
-      const double curvature = (random.uniform() < 0.5 ? -1 : 1) / random.uniform(400, 1200);
-      for (const auto& e :
-           {track::Element{random.uniform(150, 500), 0, 0}, track::Element{80, 0, curvature},
-            track::Element{random.uniform(80, 300), curvature, curvature}, track::Element{80, curvature, 0}}) {
-        elements.push_back(e);
-      }
-    }
-    elements.push_back({300, 0, 0});
-    const auto result = run(line_of(elements), seed, 25, 5e-4);
+    const auto result = run(line_of_curves(seed), seed, 25, 5e-4);
     fixes += result.fixes;
     EXPECT_LT(result.worst_sigmas, 4) << "seed " << seed;
     EXPECT_LT(result.worst_m, 20) << "seed " << seed;
   }
   EXPECT_GE(fixes, 8 * 2);
+}
+
+/// Errors of the fixes in metres and in sigmas, as a cheap gyro feels a body that sways.
+struct Swayed {
+  std::vector<double> errors_m;
+  std::vector<double> errors_sigmas;
+  [[nodiscard]] static double rms(const std::vector<double>& values) {
+    double sum = 0;
+    for (const double value : values) sum += value * value;
+    return std::sqrt(sum / static_cast<double>(values.size()));
+  }
+};
+
+void ride_swaying(uint64_t seed, bool backwards, const CurvatureParameters& parameters, Swayed& sum) {
+  constexpr double kStepM = 0.5;
+  constexpr double kSpeedMps = 25;
+  const auto path = line_of_curves(seed);
+  testing::RideErrors errors;
+  errors.odometer_scale = errors.turn_bias_rps = errors.bogies_behind_m = errors.bogie_distance_m = 0;
+  const testing::VehicleHeading heading([&](double m) { return path->curvature_at(m); }, 0, path->end_m(), errors);
+  testing::RideSensors sensors(errors, seed);
+  CurvatureMatcher matcher(parameters, path);
+  const double duration_s = kStepM / kSpeedMps;
+  double s = backwards ? path->end_m() - 10 : 10;
+  for (double run_m = 0; run_m < path->end_m() - 20; run_m += kStepM) {
+    const double next = s + (backwards ? -kStepM : kStepM);
+    const auto sensed = sensors.step(heading, run_m / kSpeedMps, s, next, duration_s);
+    matcher.add(0.5 * (s + next), sensed.turn_rad / sensed.way_m, sensed.turn_sigma_rad / kStepM, CurvatureOf::body);
+    s = next;
+    if (std::fmod(run_m, 5.0) != 0) continue;
+    const auto fix = matcher.match(1, s, {s + 8, 25, 25, s});
+    if (!fix) continue;
+    sum.errors_m.push_back(fix->path_distance_m - s);
+    sum.errors_sigmas.push_back(sum.errors_m.back() / fix->sigma_m);
+  }
+}
+
+// What sways to the one side sways back.
+TEST(CurvatureMatcher, ABodyThatSwaysTellsThePlaceAllTheSame) {
+  CurvatureParameters unaware;
+  unaware.sway_rad = 0;
+  Swayed with;
+  Swayed without;
+  for (uint64_t seed = 1; seed <= 20; ++seed) {
+    for (const bool backwards : {false, true}) {
+      ride_swaying(seed, backwards, {}, with);
+      ride_swaying(seed, backwards, unaware, without);
+    }
+  }
+  const auto told = [](const Swayed& rides) {
+    return static_cast<double>(rides.errors_m.size()) / std::pow(Swayed::rms(rides.errors_m), 2);
+  };
+  EXPECT_GT(told(with), 1.2 * told(without)) << told(with) << " and " << told(without);
+  EXPECT_LT(Swayed::rms(with.errors_sigmas), 1.0);
+  for (const double sigmas : with.errors_sigmas) EXPECT_LT(std::abs(sigmas), 4);
 }
 
 // Readings further apart than the bins, at an odd distance: each bin counts all the same.
