@@ -61,41 +61,52 @@ void CurvatureMatcher::add(double odometer_m, double curvature_per_m, double sig
   bin->weight += weight;
 }
 
-std::vector<CurvatureMatcher::Weighing> CurvatureMatcher::weighings() const {
-  const double least = parameters_.noise_per_m * parameters_.noise_per_m;
-  const double keeps = std::exp(-parameters_.bin_m / parameters_.sway_m);
-  const double sway = std::pow(parameters_.sway_rad / parameters_.bin_m, 2);
-  std::vector<Weighing> all;
-  const Bin* before = nullptr;  // of the body
-  double way = 1;
-  double variance = 0;  // of the sway at its end
-  double bias = 0;      // what a constant error makes of the sway
-  for (const Bin& bin : bins_) {
-    Weighing one;
-    double expected = 1 / bin.weight + least;
-    one.of_bias = 1;
-    if (bin.of == CurvatureOf::body) {
-      const double apart_m = before == nullptr ? 0 : bin.odometer_m - before->odometer_m;
-      const double way_before = std::exchange(way, apart_m < 0 ? -1.0 : 1.0);
-      one.begins = before == nullptr || std::abs(apart_m) > kNextBin * parameters_.bin_m || way != way_before;
-      if (one.begins) {
-        variance = sway;
-        bias = 0;
-      }
-      const double fresh = sway * (1 - keeps * keeps);
-      one.way = way;
-      one.of_sway = keeps - 1;
-      one.keeps = keeps;
-      expected += one.of_sway * one.of_sway * variance + fresh;
-      const double together = keeps * one.of_sway * variance + fresh;
-      one.gain = together / expected;
-      variance = keeps * keeps * variance + fresh - one.gain * together;
-      one.of_bias = way - one.of_sway * bias;
-      bias = keeps * bias + one.gain * one.of_bias;
-      before = &bin;
+/// Of the sway at the end of each bin of the body.
+class CurvatureMatcher::SwayFilter {
+ public:
+  explicit SwayFilter(const CurvatureParameters& parameters)
+      : bin_m_(parameters.bin_m),
+        keeps_(std::exp(-parameters.bin_m / parameters.sway_m)),
+        sway_(std::pow(parameters.sway_rad / parameters.bin_m, 2)) {}
+
+  /// `noise`: variance of its curvature without any sway.
+  Weighing weigh(const Bin& bin, double noise) {
+    const double apart_m = before_ == nullptr ? 0 : bin.odometer_m - before_->odometer_m;
+    const double way_before = std::exchange(way_, apart_m < 0 ? -1.0 : 1.0);
+    const bool begins = before_ == nullptr || std::abs(apart_m) > kNextBin * bin_m_ || way_ != way_before;
+    before_ = &bin;
+    if (begins) {
+      variance_ = sway_;
+      bias_ = 0;
     }
-    one.weight = 1 / expected;
-    all.push_back(one);
+    const double of_sway = keeps_ - 1;
+    const double fresh = sway_ * (1 - keeps_ * keeps_);
+    const double unexpected = noise + of_sway * of_sway * variance_ + fresh;
+    const double together = keeps_ * of_sway * variance_ + fresh;
+    const double gain = together / unexpected;
+    const double of_bias = way_ - of_sway * bias_;
+    variance_ = keeps_ * keeps_ * variance_ + fresh - gain * together;
+    bias_ = keeps_ * bias_ + gain * of_bias;
+    return {way_, of_sway, keeps_, gain, 1 / unexpected, of_bias, begins};
+  }
+
+ private:
+  double bin_m_;
+  double keeps_;
+  double sway_;  // its variance, in bins' curvature
+  const Bin* before_ = nullptr;
+  double way_ = 1;
+  double variance_ = 0;  // of the sway that is estimated
+  double bias_ = 0;      // what a constant error of 1 makes of that
+};
+
+std::vector<CurvatureMatcher::Weighing> CurvatureMatcher::weighings() const {
+  SwayFilter filter(parameters_);
+  std::vector<Weighing> all;
+  all.reserve(bins_.size());
+  for (const Bin& bin : bins_) {
+    const double noise = 1 / bin.weight + parameters_.noise_per_m * parameters_.noise_per_m;
+    all.push_back(bin.of == CurvatureOf::body ? filter.weigh(bin, noise) : Weighing{.weight = 1 / noise});
   }
   return all;
 }
@@ -111,11 +122,9 @@ double CurvatureMatcher::misfit(const MapCurvature& map, const std::vector<Weigh
     const Weighing& as = weighings[i];
     const double of_m = place_m - (bin.of == CurvatureOf::body ? lag_m : 0.0);
     double error = as.way * (bin.curvature_per_m - map.at(of_m + (1 + scale) * (bin.odometer_m - odometer_m)));
-    if (bin.of == CurvatureOf::body) {
-      if (as.begins) sway = 0;
-      error -= as.of_sway * sway;
-      sway = as.keeps * sway + as.gain * error;
-    }
+    if (as.begins) sway = 0;
+    error -= as.of_sway * sway;
+    sway = as.keeps * sway + as.gain * error;
     sum += as.weight * error * error;
     weighted += as.weight * as.of_bias * error;
     weights += as.weight * as.of_bias * as.of_bias;

@@ -60,12 +60,13 @@ class CurvatureMatcher {
   struct Weighing {
     double way = 1;       // 1 or -1: the odometer's from bin to bin
     double of_sway = 0;   // of the last sway in what is expected, ...
-    double keeps = 0;     // ... and in the next one
+    double keeps = 1;     // ... and in the next one
     double gain = 0;      // of the next sway
     double weight = 0;    // of what is not expected
-    double of_bias = 0;   // a constant error in it
+    double of_bias = 1;   // a constant error in it
     bool begins = false;  // nothing is known of the sway before
   };
+  class SwayFilter;
   struct Peak {
     double offset_m = 0;  // of the place from the prior's
     double sigma_m = 0;
