@@ -7,7 +7,7 @@ struct TrackParameters {
   double bin_m = 2.0;             // turning is compared over this way
   double noise_per_m = 3e-4;      // least sigma of the curvature of one bin: car body, sleepers
   double curvature_share = 0.15;  // of the map's curvature: switches are drawn roughly
-  double correlated_bins = 2.0;   // neighbouring bins err together, but for the sensor's noise
+  double correlated_bins = 3.0;   // neighbouring bins err together (the body sways), but for the sensor's noise
   double lag_m = 20.0;            // the car body turns up to so far behind the camera's foot (distance of the bogies)
   double map_sigma_m = 1.5;       // the map's switches are somewhere else by so much
   double reach_m = 30.0;          // ways are told apart from this far ahead
