@@ -19,7 +19,7 @@ struct RideErrors {
   double step_turn_noise_rad = 0;  // of one step, whatever its length (a camera)
   double hunting_rad = 3e-4;       // the body turns to and fro on straight track, ...
   double hunting_m = 12;           // ... once in so many metres
-  double sway_rad = 0.0015;           // the body sways as the simulator's (trajectory.hpp): 1 sigma at 20 m/s
+  double sway_rad = 0.0015;        // the body sways as the simulator's (trajectory.hpp): 1 sigma at 20 m/s
   double bogies_behind_m = 3;      // the front bogie is so far behind the foot ...
   double bogie_distance_m = 17;    // ... and the second behind it; 0 and 0: the foot turns with the track below it
 };
