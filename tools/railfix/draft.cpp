@@ -6,9 +6,9 @@
 #include <array>
 #include <atomic>
 #include <climits>
-#include <csignal>
 
 #include "core/whole_file.hpp"
+#include "end_signals.hpp"
 
 namespace railfix::tool {
 
@@ -19,20 +19,11 @@ std::array<char, PATH_MAX> living_name{};
 std::atomic<bool> lives{false};
 static_assert(std::atomic<bool>::is_always_lock_free);
 
-constexpr std::array kEnds{SIGINT, SIGTERM, SIGHUP};
-
 /// Ends the program as the signal does without us.
 void remove_and_end(int signal) {
   if (lives) unlink(living_name.data());
   std::signal(signal, SIG_DFL);
   std::raise(signal);
-}
-
-/// Signals that somebody ignores for us (nohup) stay ignored.
-void handle_ends() {
-  for (const int signal : kEnds) {
-    if (std::signal(signal, remove_and_end) == SIG_IGN) std::signal(signal, SIG_IGN);
-  }
 }
 
 }  // namespace
@@ -42,13 +33,13 @@ Draft::Draft(std::filesystem::path file) : file_(std::move(file)) {
   if (name.size() >= living_name.size()) return;  // no system call takes it
   *std::ranges::copy(name, living_name.begin()).out = '\0';
   lives = true;
-  handle_ends();
+  on_end(remove_and_end);
 }
 
 core::Result<std::unique_ptr<Draft>> Draft::beside(const std::filesystem::path& file, const std::string& ending) {
   sigset_t ends;
   sigemptyset(&ends);
-  for (const int signal : kEnds) sigaddset(&ends, signal);
+  for (const int signal : kEndSignals) sigaddset(&ends, signal);
   sigset_t before;
   pthread_sigmask(SIG_BLOCK, &ends, &before);
   const auto made = core::draft_beside(file, ending);

@@ -106,10 +106,11 @@ core::Status Authority::remember(const fs::path& trusted_by_host) const {
 
 core::Status Authority::may_make_next() const {
   if (fs::exists(certificate("next")))
-    return core::Error{certificate("next").string() + " is there already; go on with " + keys_command() + " --renew"};
+    return core::Error{certificate("next").string() + " is there already; go on with " +
+                       messaging::keys_command(folder_) + " --renew"};
   if (has_former())
-    return core::Error{certificate("former").string() + " is still trusted; end that exchange with " + keys_command() +
-                       " --drop-authority"};
+    return core::Error{certificate("former").string() + " is still trusted; end that exchange with " +
+                       messaging::keys_command(folder_) + " --drop-authority"};
   return {};
 }
 
@@ -133,11 +134,11 @@ core::Status Authority::finish_take_over() const {
 core::Status Authority::may_drop() const {
   if (has_former()) return {};
   if (has_next())
-    return core::Error{"the next authority of " + folder_.string() +
-                       " has signed nothing yet, so the former one is still needed: " + keys_command() +
-                       " --renew, then railfix train upgrade on every host, come first"};
+    return core::Error{
+        "the next authority of " + folder_.string() + " has signed nothing yet, so the former one is still needed: " +
+        messaging::keys_command(folder_) + " --renew, then railfix train upgrade on every host, come first"};
   return core::Error{"there is no former authority of " + folder_.string() + "; begin an exchange with " +
-                     keys_command() + " --next-authority"};
+                     messaging::keys_command(folder_) + " --next-authority"};
 }
 
 core::Status Authority::drop() const {
@@ -173,11 +174,6 @@ core::Status Authority::sign(const std::string& text, const fs::path& signed_fil
                     certificate("ca").string(), "-inkey", key("ca").string()});
   fs::remove(draft);
   return status;
-}
-
-// FOLDER/security/authority is ours.
-std::string Authority::keys_command() const {
-  return "railfix train keys " + folder_.parent_path().parent_path().string();
 }
 
 // All authorities of a train have one name: Fast DDS 2.9.1 refuses who got his permissions from one of another name.

@@ -45,7 +45,6 @@ class Authority {
  private:
   [[nodiscard]] std::filesystem::path certificate(const std::string& name) const { return folder_ / (name + ".pem"); }
   [[nodiscard]] std::filesystem::path key(const std::string& name) const { return folder_ / (name + ".key.pem"); }
-  [[nodiscard]] std::string keys_command() const;
   core::Status make(const std::string& name, const std::string& train_id) const;
   std::filesystem::path folder_;
 };

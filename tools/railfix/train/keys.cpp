@@ -111,7 +111,7 @@ std::string flag_of(const KeysOptions& options) {
 }
 
 std::string keys_command(const Manifest& manifest, const std::string& flag) {
-  return "railfix train keys " + manifest.folder.string() + (flag.empty() ? "" : " " + flag);
+  return messaging::keys_command(manifest.folder / "security/authority") + (flag.empty() ? "" : " " + flag);
 }
 
 /// Error: an exchange of the authority out of turn; or there is no authority that can sign, nor one that is about to be

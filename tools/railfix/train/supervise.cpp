@@ -13,6 +13,7 @@
 #include "core/time.hpp"
 #include "core/whole_file.hpp"
 #include "messaging/security.hpp"
+#include "train/file_lock.hpp"
 #include "train/left_behind.hpp"
 #include "train/running.hpp"
 #include "train/stands_still.hpp"
@@ -24,7 +25,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kTurnMs = 20;
-constexpr int kLockTries = 10;
+constexpr double kLockPatienceS = 0.2;  // who asks whether there is a supervisor holds the lock for a moment, too
 // A participant that died is forgotten after 5 s, and then nobody has its pictures mapped.
 constexpr int64_t kForgottenNs = 10 * core::kNsPerSecond;
 
@@ -255,29 +256,13 @@ class Supervision {
 
 }  // namespace
 
-namespace {
-
-// Who asks whether there is a supervisor holds the lock for a moment, too.
-bool is_ours(int lock) {
-  for (int tries = 0; tries < kLockTries; ++tries) {
-    if (flock(lock, LOCK_EX | LOCK_NB) == 0) return true;
-    poll(nullptr, 0, kTurnMs);
-  }
-  return false;
-}
-
-}  // namespace
-
 void supervise(const HostFolder& folder) {
-  fs::create_directories(folder.lock().parent_path());
-  const int lock = open(folder.lock().c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
-  if (lock < 0 || !is_ours(lock)) {
+  const FileLock lock(folder.lock(), kLockPatienceS);
+  if (!lock.is_held()) {
     throw core::BadInput(folder.lock().string() +
                          " is held: a supervisor runs here already, or this user may not write there");
   }
-  const std::string pid = std::to_string(getpid()) + "\n";
-  if (ftruncate(lock, 0) != 0 || pwrite(lock, pid.data(), pid.size(), 0) < 0)
-    throw core::BadInput(core::cannot_write(folder.lock().string()));
+  if (!lock.sign(std::to_string(getpid()) + "\n")) throw core::BadInput(core::cannot_write(folder.lock().string()));
   for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { asked_to_stop = 1; });
   Supervision supervision(folder);
   // Once in any case: who is told to end at once ends what the one before has left.
@@ -287,7 +272,6 @@ void supervise(const HostFolder& folder) {
   } while (asked_to_stop == 0);
   supervision.end();
   supervision.say_left();
-  close(lock);
 }
 
 std::optional<int64_t> supervisor_of(const HostFolder& folder) {
