@@ -10,11 +10,6 @@
 namespace railfix::simulator {
 namespace {
 
-constexpr int kWavesPerAxis = 8;
-constexpr double kSlowestHz = 0.4;
-constexpr double kFastestHz = 6.0;
-constexpr double kShakeSpeedMps = 20.0;  // speed at which ShakeOptions hold
-
 // Longest run with these rates that ends at this time; the speed stays below the cruise when the time is short.
 double length_for(const RunOptions& run) {
   const double moving_s = std::max(0.0, run.duration_s - 2.0 * run.dwell_s - (run.stop_at_m > 0.0 ? run.stop_s : 0.0));
@@ -47,16 +42,7 @@ Trajectory::Trajectory(std::shared_ptr<const Line> line, const RunOptions& run, 
       {{2.0 * core::kPi * shake.rattle_hz, 0.3, rattle}, {2.0 * core::kPi * 1.37 * shake.rattle_hz, 1.9, rattle}}};
   core::Random random(seed ^ 0x5A5A5A5AULL);
   const double sigmas[5] = {shake.roll_rad, shake.pitch_rad, shake.yaw_rad, shake.lateral_m, shake.height_m};
-  for (int axis = 0; axis < 5; ++axis) {
-    for (int i = 0; i < kWavesPerAxis; ++i) {
-      const double hz = kSlowestHz * std::pow(kFastestHz / kSlowestHz, (i + random.uniform()) / kWavesPerAxis);
-      // Coloured: slower is larger; the squares of all amplitudes add up to the wanted variance.
-      waves_[axis].push_back({2.0 * core::kPi * hz, random.uniform(0.0, 2.0 * core::kPi), 1.0 / hz});
-    }
-    double power = 0.0;
-    for (const auto& wave : waves_[axis]) power += 0.5 * wave.amplitude * wave.amplitude;
-    for (auto& wave : waves_[axis]) wave.amplitude *= shake.scale * sigmas[axis] / std::sqrt(power);
-  }
+  for (int axis = 0; axis < 5; ++axis) waves_[axis] = ShakeWaves(shake.scale * sigmas[axis], random);
 }
 
 void Trajectory::phase(double duration_s, double acceleration_mps2) {
@@ -87,13 +73,10 @@ Motion Trajectory::motion(double time_s) const {
 }
 
 geometry::CameraPose Trajectory::shake(double time_s) const {
-  const double envelope = motion(time_s).speed_mps / kShakeSpeedMps;
+  const double speed_mps = motion(time_s).speed_mps;
+  const double envelope = speed_mps / kShakeSpeedMps;
   double values[5];
-  for (int axis = 0; axis < 5; ++axis) {
-    values[axis] = 0.0;
-    for (const auto& wave : waves_[axis])
-      values[axis] += envelope * wave.amplitude * std::sin(wave.rate_rps * time_s + wave.phase_rad);
-  }
+  for (int axis = 0; axis < 5; ++axis) values[axis] = waves_[axis].at(time_s, speed_mps);
   for (const auto& wave : rattle_)
     values[1] += envelope * wave.amplitude * std::sin(wave.rate_rps * time_s + wave.phase_rad);
   return {values[0], values[1], values[2], values[3], values[4]};

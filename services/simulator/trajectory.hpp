@@ -7,6 +7,7 @@
 
 #include "dataset/dataset.hpp"
 #include "simulator/line.hpp"
+#include "simulator/shake_waves.hpp"
 
 namespace railfix::simulator {
 
@@ -65,9 +66,6 @@ class Trajectory {
   struct Phase {
     double begin_s, distance_m, speed_mps, acceleration_mps2;
   };
-  struct Wave {
-    double rate_rps, phase_rad, amplitude;
-  };
   void leg(double length_m, double cruise_mps);
   void phase(double duration_s, double acceleration_mps2);
   std::shared_ptr<const Line> line_;
@@ -75,8 +73,8 @@ class Trajectory {
   geometry::CameraPose mount_;
   ShakeOptions shake_;
   std::vector<Phase> phases_;
-  std::array<Wave, 2> rattle_{};
-  std::vector<Wave> waves_[5];  // roll, pitch, yaw, lateral, height
+  std::array<ShakeWave, 2> rattle_{};
+  ShakeWaves waves_[5];  // roll, pitch, yaw, lateral, height
   double duration_s_ = 0;
 };
 

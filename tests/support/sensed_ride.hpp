@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/random.hpp"
+#include "simulator/shake_waves.hpp"
 
 namespace railfix::testing {
 
@@ -19,7 +20,7 @@ struct RideErrors {
   double step_turn_noise_rad = 0;  // of one step, whatever its length (a camera)
   double hunting_rad = 3e-4;       // the body turns to and fro on straight track, ...
   double hunting_m = 12;           // ... once in so many metres
-  double sway_rad = 0.0015;        // the body sways as the simulator's (trajectory.hpp): 1 sigma at 20 m/s
+  double sway_rad = 0.0015;        // the body sways as the simulator's: 1 sigma at 20 m/s
   double bogies_behind_m = 3;      // the front bogie is so far behind the foot ...
   double bogie_distance_m = 17;    // ... and the second behind it; 0 and 0: the foot turns with the track below it
 };
@@ -79,7 +80,7 @@ class RideSensors {
  public:
   RideSensors(const RideErrors& errors, uint64_t seed) : errors_(errors), random_(seed) {
     phase_ = random_.uniform(0, 6.28);
-    if (errors.sway_rad > 0) make_sway();
+    if (errors.sway_rad > 0) sway_ = simulator::ShakeWaves(errors.sway_rad, random_);
   }
   SensedStep step(const VehicleHeading& heading, double time_s, double from_m, double to_m, double duration_s) {
     SensedStep s{time_s, to_m,      (to_m - from_m) / duration_s, (to_m - from_m) * (1 + errors_.odometer_scale), 0,
@@ -92,37 +93,14 @@ class RideSensors {
     s.turn_rad = heading.at(to_m) - heading.at(from_m) + hunting(to_m) - hunting(from_m) +
                  errors_.turn_bias_rps * duration_s + s.turn_sigma_rad * random_.normal();
     run_s_ += duration_s;
-    const double swayed_before_rad = std::exchange(swayed_rad_, sway(run_s_, s.speed_mps));
+    const double swayed_before_rad = std::exchange(swayed_rad_, sway_.at(run_s_, std::abs(s.speed_mps)));
     s.turn_rad += swayed_rad_ - swayed_before_rad;
     return s;
   }
 
  private:
   static constexpr double kKeyFrameM = 0.15;
-  struct Wave {
-    double rps;
-    double phase;
-    double rad;
-  };
-  // Slower waves are larger; together they have one sigma.
-  void make_sway() {
-    constexpr int kWaves = 8;
-    constexpr double kSlowestHz = 0.4;
-    constexpr double kFastestHz = 6.0;
-    double power = 0;
-    for (int i = 0; i < kWaves; ++i) {
-      const double hz = kSlowestHz * std::pow(kFastestHz / kSlowestHz, (i + random_.uniform()) / kWaves);
-      sway_.push_back({6.283 * hz, random_.uniform(0, 6.283), 1 / hz});
-      power += 0.5 / (hz * hz);
-    }
-    for (Wave& wave : sway_) wave.rad *= errors_.sway_rad / std::sqrt(power);
-  }
-  [[nodiscard]] double sway(double time_s, double speed_mps) const {
-    double sum = 0;
-    for (const Wave& wave : sway_) sum += wave.rad * std::sin(wave.phase + wave.rps * time_s);
-    return sum * std::abs(speed_mps) / 20;
-  }
-  std::vector<Wave> sway_;
+  simulator::ShakeWaves sway_;
   double swayed_rad_ = 0;
   double run_s_ = 0;
   RideErrors errors_;
