@@ -10,6 +10,7 @@
 #include <cerrno>
 
 #include "core/time.hpp"
+#include "service/health_file.hpp"
 #include "support/program.hpp"
 #include "train/stands_still.hpp"
 #include "unit/train_tools/train_folder.hpp"
@@ -132,6 +133,27 @@ TEST_F(Supervise, AnEngineThatHangsKeepsOnlyItsOwnServiceWaiting) {
   expect_watched("while the engine removes a container");
   EXPECT_TRUE(within_s(15, [&] { return runs("tpr_publisher", 2); }));
   EXPECT_FALSE(supervisor_has(contained.clean_up)) << "it would remove the next one";
+}
+
+// It may die before the new one has said a word: that must not be looked for under the wrong name for ever.
+TEST_F(Supervise, ASuccessorTakesThePlaceOfOneThatDiesHoweverLongItTakesToSpeak) {
+  service::CommonConfig common;
+  common.train_id = folder_.filename();
+  common.host = "cab";
+  const auto said = service::health_path(common, "fusion").string();
+  const std::string speaks_late = "sleep 2; echo 1 2 > " + said + "-beside; " + kEnds;
+  plan({service("fusion", 1, kEnds)});
+  start();
+  ASSERT_TRUE(within_s(10, [&] { return runs("fusion", 1); }));
+  const auto before = static_cast<pid_t>(of("fusion").pid);
+  plan({service("fusion", 2, speaks_late.c_str())});
+  ASSERT_TRUE(within_s(5, [&] { return runs("fusion", 2); }));
+  const auto successor = of("fusion").pid;
+  ASSERT_EQ(kill(before, SIGKILL), 0);
+  EXPECT_TRUE(within_s(10, [&] { return fs::exists(said); }));
+  EXPECT_FALSE(fs::exists(said + "-beside"));
+  EXPECT_EQ(of("fusion").pid, successor);
+  fs::remove(said);
 }
 
 }  // namespace

@@ -217,9 +217,7 @@ class Supervision {
       successors_.erase(due);
     }
     for (auto& child : children_) {
-      if (!child.is_beside() || !is_free(child.service().name)) continue;
-      child.take_its_place();
-      changed = true;
+      if (child.is_beside() && is_free(child.service().name)) changed = child.take_its_place() || changed;
     }
     return changed;
   }

@@ -118,11 +118,13 @@ bool SupervisedService::has_found_all() const {
   return pid_ > 0 && core::monotonic_ns() - well_since_ns_ > kFoundNs;
 }
 
-void SupervisedService::take_its_place() {
-  std::error_code none;
-  fs::rename(health_, usual_health_, none);
+bool SupervisedService::take_its_place() {
+  std::error_code failed;
+  fs::rename(health_, usual_health_, failed);
+  if (failed) return false;
   health_ = usual_health_;
   beside_ = false;
+  return true;
 }
 
 bool SupervisedService::turn() {

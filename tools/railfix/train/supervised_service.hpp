@@ -24,8 +24,8 @@ class SupervisedService {
   [[nodiscard]] bool runs() const { return pid_ > 0; }
   /// Runs well for so long that it has found everybody.
   [[nodiscard]] bool has_found_all() const;
-  /// The one that it ran beside has gone.
-  void take_its_place();
+  /// The one that it ran beside has gone. False: it has not said a word yet, and would say it under its present name.
+  bool take_its_place();
 
   /// Starts it when it is time, notes its end. True when something has changed.
   bool turn();
