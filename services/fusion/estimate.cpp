@@ -15,7 +15,6 @@ constexpr double kFreshS = 0.12;
 constexpr double kRecentPositionS = 30.0;
 constexpr double kNoMotionUnusableS = 5.0;
 constexpr double kHeldByGnssS = 5.0;
-constexpr int kLandmarksAgainstGnss = 5;  // in a row: so many outvote a receiver that has never agreed
 constexpr double kLostAtLeastM = 100.0;
 constexpr double kLostAtMostM = 500.0;
 
@@ -42,13 +41,9 @@ std::string why_given_up(Against because) {
 
 }  // namespace
 
-bool Estimator::is_only_told() const {
-  return of_gnss_ || (watch(Source::landmark).used_ns == 0 && watch(Source::gnss).used_ns == 0);
-}
-
 // Where masts stand everywhere, some are sighted by chance where the map has one.
 bool Estimator::gnss_denies_place() const {
-  const bool never_agreed = watch(Source::gnss).used_ns == 0 && landmarks_agreed_ < kLandmarksAgainstGnss;
+  const bool never_agreed = watch(Source::gnss).used_ns == 0 && landmarks_agreed_ < kLandmarksBelieved;
   return watch(Source::gnss).isolated && (never_agreed || wrong_place_.lost());
 }
 
@@ -210,7 +205,10 @@ void Estimator::judge_place(TrainEstimate& e) const {
   } else if (track_doubt_.disbelieved()) {
     e.degrade("map_matcher finds some other place far more probable");
   }
-  if (of_gnss_) e.degrade("GNSS alone has told the place: waits for a landmark");
+  if (told_by_ == ToldBy::gnss) e.degrade("GNSS alone has told the place: waits for a landmark");
+  if (told_by_ == ToldBy::start && !wrong_place_.lost()) {
+    e.degrade("the place was only told: waits for a landmark, GNSS or curves");
+  }
   if (!path_) e.degrade("place on the map not known" + (given_up_ ? why_given_up(*given_up_) : ""));
   if (path_ && (filter_.path_distance_m() < path_->begin_m() || filter_.path_distance_m() > path_->end_m())) {
     e.degrade("beyond the end of the mapped track");

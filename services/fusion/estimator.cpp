@@ -29,6 +29,7 @@ Estimator::Estimator(const FusionParameters* parameters, const OdometerScales& s
       rest_since_ns_(stamp_ns),
       start_ns_(stamp_ns) {
   if (!path_) return;
+  told_by_ = ToldBy::start;
   // It may stand in front of points that the place which was told lies behind.
   track_doubt_.move(*path_, -known_to_m() - kPointsOffM);
   track_doubt_.move(*path_, 0);
@@ -163,7 +164,8 @@ void Estimator::place_like(const Estimator& other) {
   filter_.place_like(other.filter_);
   doubt_m_ = other.doubt_m_;
   wrong_place_ = other.wrong_place_;
-  of_gnss_ = other.of_gnss_;
+  told_by_ = other.told_by_;
+  bends_agreed_ = other.bends_agreed_;
   given_up_ = other.given_up_;
   time_doubt_m_ = std::max(time_doubt_m_, other.time_doubt_m_);
   unwatched_ = other.unwatched_;
@@ -177,7 +179,7 @@ void Estimator::give_place_up(Against because) {
   path_.reset();
   given_up_ = because;
   wrong_place_ = {};
-  of_gnss_ = false;
+  told_by_ = ToldBy::nobody;
   track_doubt_ = {};
   turned_way_.clear();
   for (const auto source : {Source::gnss, Source::landmark, Source::curvature}) watched(source) = {};

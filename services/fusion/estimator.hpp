@@ -60,6 +60,10 @@ struct Interval {
   double ahead_m = 0;
 };
 
+/// Who has told the place, as long as nothing has confirmed it: the start is somebody's word, and GNSS may be on the
+/// track beside it.
+enum class ToldBy : uint8_t { nobody, start, gnss };
+
 /// A plain value; events are applied in the order of their stamps (Fusion sees to that).
 class Estimator {
  public:
@@ -100,7 +104,7 @@ class Estimator {
   /// From now on that sensor's samples do not come here; that it is isolated is no contradiction.
   void do_without(Source source) { watched(source).isolated = watched(source).convicted = false; }
   /// GNSS has agreed with the motion for a while, and with a place that it had not given itself.
-  [[nodiscard]] bool gnss_proven() const { return gnss_agreed_ >= kGnssProof && !of_gnss_; }
+  [[nodiscard]] bool gnss_proven() const { return gnss_agreed_ >= kGnssProof && told_by_ != ToldBy::gnss; }
   /// What GNSS that agrees with the motion may still be wrong by.
   [[nodiscard]] double gnss_bound_m() const;
   /// Takes over place and speed, as independent knowledge.
@@ -246,8 +250,8 @@ class Estimator {
   void use_yaw_rate(double rate_rps);
   void remember_turn(double rate_rps, double speed_mps);
   void compare_turns();
-  /// Somebody said where the train begins, and nothing has confirmed it yet.
-  [[nodiscard]] bool is_only_told() const;
+  void confirm_by(const FixInput& landmark);
+  void confirm_by_curve();
   /// GNSS, which has never agreed with it, says otherwise, and hardly anything speaks for it.
   [[nodiscard]] bool gnss_denies_place() const;
   void use_track(const FixInput& fix);
@@ -274,6 +278,8 @@ class Estimator {
   void judge_place(TrainEstimate& estimate) const;
   void judge_bounds(TrainEstimate& estimate, double since_sure_m) const;
   void locate(TrainEstimate& estimate) const;
+
+  static constexpr int kLandmarksBelieved = 5;  // in a row, whoever says otherwise
 
   const FusionParameters* parameters_;
   std::shared_ptr<const track::Path> path_;
@@ -318,7 +324,8 @@ class Estimator {
   TrackDoubt track_doubt_;
   TurnedWay turned_way_;
   WrongPlace wrong_place_;
-  bool of_gnss_ = false;             // GNSS alone has told the place, and no landmark has been used since
+  ToldBy told_by_ = ToldBy::nobody;
+  int bends_agreed_ = 0;             // curves that fitted a place that was only told
   std::optional<Against> given_up_;  // the last place was, and there is none since
   int64_t start_ns_ = 0;
 };

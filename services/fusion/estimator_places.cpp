@@ -14,6 +14,7 @@ constexpr double kSurprisingSigmas = 3.0;
 constexpr double kForgotten = 2.0;  // of a landmark's sigmas is the place's when the way since has outgrown it
 constexpr double kBesideLandmarkS = 1.0;
 constexpr double kBendsHereM = 3.0;  // in a window of some 50 m to either side that is rarely by chance
+constexpr int kCurvesConfirm = 3;    // a place that was only told, ...
 constexpr double kOffTrackM = 15.0;  // a GNSS fix further beside the track is none
 // Of the sigma of a GNSS fix; squares add up to the whole.
 constexpr double kGnssLastingShare = 0.866;
@@ -70,6 +71,7 @@ void Estimator::use(const GnssInput& sample) {
   } else if (agrees && filter_.offer_position(measured, parameters_->gate_gnss).used) {
     gnss.accept(sample.stamp_ns);
     ++gnss_agreed_;
+    if (told_by_ == ToldBy::start) told_by_ = ToldBy::nobody;
     // The rival without GNSS stays lost: the interval holds what GNSS may be wrong by.
     if (gnss_proven()) wrong_place_.found();
   } else if (++gnss.refused >= kRefusalsToIsolate) {
@@ -93,7 +95,7 @@ void Estimator::use_track(const FixInput& fix) {
   const double here_m = filter_.path_distance_m();
   const auto of_m = path_->distance_of({fix.edge, fix.offset_m, fix.direction}, here_m);
   // A word that comes beside a landmark is of before it.
-  wrong_place_.said(fix.fits_nowhere && !used_within(Source::landmark, kBesideLandmarkS));
+  wrong_place_.said(fix.sightings_fit == SightingsFit::nowhere && !used_within(Source::landmark, kBesideLandmarkS));
   track_doubt_.said(of_m ? fix.probability : std::min(fix.probability, 1 - fix.probability), of_m, here_m);
 }
 
@@ -106,10 +108,11 @@ void Estimator::use(const FixInput& fix) {
   if (fix.new_path) {
     path_ = fix.new_path;
     given_up_.reset();
-    of_gnss_ = fix.kind == FixKind::gnss;
     filter_.set_origin(0, std::hypot(fix.sigma_m, parameters_->fix_sigma_floor_m));
     track_doubt_.said(fix.probability, std::nullopt, filter_.path_distance_m());
     accept(fix);
+    told_by_ = fix.kind == FixKind::gnss ? ToldBy::gnss : fix.only_told ? ToldBy::start : ToldBy::nobody;
+    bends_agreed_ = 0;
     if (fix.in_doubt) wrong_place_.doubt();
     return;
   }
@@ -132,6 +135,7 @@ void Estimator::use(const FixInput& fix) {
     accept(fix);
     if (fix_used() && fix.kind == FixKind::landmark && !fix_again_) {
       ++landmarks_agreed_;
+      confirm_by(fix);
       doubt_surprise(fix.sigma_m);
     }
   } else {
@@ -184,14 +188,15 @@ void Estimator::accept(const FixInput& fix) {
   watched(fix.kind == FixKind::curvature ? Source::curvature : Source::landmark).accept(fix.stamp_ns);
   off_path_.reset();
   // Some curve may fit at a place that nobody has confirmed, though the train turns otherwise than the track there.
-  const bool by_chance = fix.kind == FixKind::curvature && (is_only_told() || track_doubt_.turns_otherwise());
+  const bool by_chance =
+      fix.kind == FixKind::curvature && (told_by_ != ToldBy::nobody || track_doubt_.turns_otherwise());
   if (!by_chance) {
     track_doubt_.seen_here();
     turned_way_.corrected(fix_offer_.residual);
     compare_turns();
   }
-  if (by_chance && std::abs(fix_offer_.residual) < kBendsHereM) wrong_place_.bends_here();
-  if (fix.kind == FixKind::landmark) of_gnss_ = false;
+  if (by_chance && std::abs(fix_offer_.residual) < kBendsHereM) confirm_by_curve();
+  if (fix.kind == FixKind::network) told_by_ = ToldBy::nobody;
   // A vague fix helps, but settles no doubt and is nothing to measure a distance from. Landmarks are sharp by
   // themselves.
   if (fix.kind != FixKind::landmark && fix.sigma_m > 2 * filter_.path_sigma_m()) return;
@@ -206,6 +211,21 @@ void Estimator::accept(const FixInput& fix) {
     met_.front() = fix.landmark;
   }
   filter_.mark_reference();
+}
+
+// Where masts stand everywhere some stand by chance where the map has them: map_matcher knows how many; GNSS is never
+// so far off.
+void Estimator::confirm_by(const FixInput& landmark) {
+  const bool confirms = landmark.sightings_fit == SightingsFit::here || landmarks_agreed_ >= kLandmarksBelieved;
+  if (told_by_ == ToldBy::gnss || confirms) told_by_ = ToldBy::nobody;
+}
+
+// One may fit by chance, and there is none on a straight line that lies elsewhere.
+void Estimator::confirm_by_curve() {
+  wrong_place_.bends_here();
+  if (told_by_ != ToldBy::start) return;
+  bends_agreed_ = track_doubt_.turns_otherwise() ? 0 : bends_agreed_ + 1;
+  if (bends_agreed_ >= kCurvesConfirm) told_by_ = ToldBy::nobody;
 }
 
 double Estimator::reach_m(const Offer& offer, double sigma_m) const {

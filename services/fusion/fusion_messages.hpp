@@ -26,7 +26,9 @@ inline FixInput input_of(const msg::PositionFix& m) {
              : m.kind() == msg::FIX_GNSS    ? FixKind::gnss
                                             : FixKind::landmark;
   fix.direction = messaging::direction_of(m.direction());
-  fix.fits_nowhere = m.fits_nowhere() != 0;
+  fix.sightings_fit = m.sightings_fit() == msg::SIGHTINGS_FIT_HERE      ? SightingsFit::here
+                      : m.sightings_fit() == msg::SIGHTINGS_FIT_NOWHERE ? SightingsFit::nowhere
+                                                                        : SightingsFit::not_told;
   return fix;
 }
 
@@ -85,8 +87,16 @@ inline msg::TrainPose message_of(const PoseEstimate& p) {
 }
 
 inline KnownPlace known_place_of(const msg::TrainState& m, bool in_doubt) {
-  return {m.stamp_ns(), messaging::place_of(m), m.speed_mps(), m.over_m(), m.under_m(), m.track_probability(),
-          in_doubt,     m.easting_m(),          m.northing_m()};
+  return {m.stamp_ns(),
+          messaging::place_of(m),
+          m.speed_mps(),
+          m.over_m(),
+          m.under_m(),
+          m.track_probability(),
+          m.integrity() != msg::INTEGRITY_OK,
+          in_doubt,
+          m.easting_m(),
+          m.northing_m()};
 }
 
 inline const char* topic_of(const Event& event) {

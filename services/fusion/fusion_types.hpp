@@ -43,6 +43,9 @@ struct GnssInput {
 
 enum class FixKind : uint8_t { curvature = 1, landmark = 2, network = 3, track = 4, gnss = 5 };
 
+/// How all that is sighted fits the map near the place: SIGHTINGS_FIT_* of idl/position.idl.
+enum class SightingsFit : uint8_t { not_told, nowhere, here };
+
 /// A network fix begins the position from this probability on.
 inline constexpr double kBeginProbability = 0.95;
 
@@ -58,8 +61,9 @@ struct FixInput {
   track::Direction direction = track::Direction::unknown;
   std::shared_ptr<const track::Path> new_path;  // set by Fusion when the fix starts the position on the map, or
                                                 // says that the train is on another track
-  bool fits_nowhere = false;  // kind track: what is sighted fits the map nowhere near this place, on no track
-  bool in_doubt = false;      // kind network: no position until landmarks or proven GNSS agree
+  SightingsFit sightings_fit = SightingsFit::not_told;
+  bool only_told = false;  // kind network: nothing has confirmed it
+  bool in_doubt = false;   // kind network: no position until landmarks or proven GNSS agree
 };
 
 /// The next picture will be measured against the one of this stamp: remember where the train was.

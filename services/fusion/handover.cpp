@@ -47,6 +47,7 @@ std::optional<FixInput> place_at(const std::shared_ptr<const track::Map>& map, c
   fix.sigma_m = error_m / interval_factor;
   fix.probability = known.track_probability;
   fix.kind = FixKind::network;
+  fix.only_told = known.only_told;
   fix.in_doubt = known.in_doubt;
   return fix;
 }

@@ -21,6 +21,7 @@ struct KnownPlace {
   double over_m = 0;
   double under_m = 0;
   double track_probability = 0;
+  bool only_told = false;
   bool in_doubt = false;
   double easting_m = 0;  // on the map of who says it; 0, 0 = not told
   double northing_m = 0;

@@ -75,8 +75,12 @@ std::optional<Fix> LandmarkMatcher::add(const Sighting& sighting, const Prior& p
   const double sum = weights.here + weights.elsewhere;
   const auto* best = weights.best;
   if (best == nullptr || !(weights.of_best >= parameters_.min_probability * sum)) return std::nullopt;
-  return Fix{sighting.stamp_ns, best->distance_m - sighting.distance_ahead_m,
-             std::hypot(sighting.sigma_m, best->landmark->sigma_m), weights.of_best / sum, best->landmark->id};
+  return Fix{sighting.stamp_ns,
+             best->distance_m - sighting.distance_ahead_m,
+             std::hypot(sighting.sigma_m, best->landmark->sigma_m),
+             weights.of_best / sum,
+             best->landmark->id,
+             confirmed_ ? SightingsFit::here : SightingsFit::not_told};
 }
 
 // Every mapped landmark of the kind in the window is one hypothesis, weighed by how well the earlier sightings fit it;

@@ -274,7 +274,7 @@ void MapMatcher::say_track(double odometer_m, PlaceFixes& fixes) {
   said_track_ = {best.place.edge, known, stamp_ns, odometer_m, there};
   PlaceFix fix{FixKind::track, stamp_ns, choice->options, std::numeric_limits<double>::infinity()};
   for (auto& option : fix.options) option.probability *= there;
-  fix.fits_nowhere = there < 1;
+  if (there < 1) fix.sightings_fit = SightingsFit::nowhere;
   fixes.push_back(std::move(fix));
 }
 
@@ -307,7 +307,7 @@ PlaceFixes MapMatcher::add(const Sighting& sighting) {
 
 void MapMatcher::say(const Fix& fix, FixKind kind, PlaceFixes& fixes) const {
   const auto place = followed_->path()->position_at(fix.path_distance_m);
-  fixes.push_back({kind, fix.stamp_ns, {{place, fix.probability}}, fix.sigma_m, fix.landmark});
+  fixes.push_back({kind, fix.stamp_ns, {{place, fix.probability}}, fix.sigma_m, fix.landmark, fix.sightings_fit});
 }
 
 }  // namespace railfix::map_matcher

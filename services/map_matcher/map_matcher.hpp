@@ -29,7 +29,7 @@ struct PlaceFix {
   std::vector<TrackOption> options;  // one at least, best first
   double sigma_m = 0;                // along the track; infinite for a track
   uint32_t landmark = 0;
-  bool fits_nowhere = false;  // what is sighted fits the map nowhere near
+  SightingsFit sightings_fit = SightingsFit::not_told;
 };
 using PlaceFixes = std::vector<PlaceFix>;
 

@@ -46,6 +46,9 @@ struct Prior {
   static constexpr double kWidestM = 10000;
 };
 
+/// How all that is sighted fits the map near the place.
+enum class SightingsFit : uint8_t { not_told, nowhere, here };
+
 /// A place of the camera's foot, from map and measurement alone.
 struct Fix {
   int64_t stamp_ns = 0;
@@ -53,6 +56,7 @@ struct Fix {
   double sigma_m = 0;
   double probability = 0;
   uint32_t landmark = 0;  // 0 = from curvature
+  SightingsFit sightings_fit = SightingsFit::not_told;
 };
 
 }  // namespace railfix::map_matcher

@@ -74,7 +74,7 @@ inline msg::PositionFix message_of(const PlaceFix& fix) {
   message.kind(kind_of(fix.kind));
   message.sigma_m(fix.sigma_m);
   message.landmark(fix.landmark);
-  message.fits_nowhere(fix.fits_nowhere ? 1 : 0);
+  message.sightings_fit(static_cast<uint8_t>(fix.sightings_fit));
   const auto& best = fix.options.front();
   message.edge(best.place.edge);
   message.offset_m(best.place.offset_m);

@@ -159,7 +159,7 @@ TEST_P(ToldStartWrongOrRight, IsDoubtedWhereTheMastsFitTheMapNowhereNearIt) {
   ASSERT_TRUE(last_of_track());
   if (wrong) {
     EXPECT_LT(last_of_track()->probability(), 0.5);
-    EXPECT_EQ(last_of_track()->fits_nowhere(), 1);
+    EXPECT_EQ(last_of_track()->sightings_fit(), msg::SIGHTINGS_FIT_NOWHERE);
     EXPECT_LE(landmark_fixes().size(), 3U) << "of about eleven masts";
     EXPECT_THAT(reason(), HasSubstr("fit the map nowhere"));
     // And not in turns with "active": the dashboard would flicker.
@@ -172,7 +172,7 @@ TEST_P(ToldStartWrongOrRight, IsDoubtedWhereTheMastsFitTheMapNowhereNearIt) {
     EXPECT_THAT(said, ElementsAre(HasSubstr("fit the map nowhere")));
   } else {
     EXPECT_GT(last_of_track()->probability(), 0.999);
-    EXPECT_EQ(last_of_track()->fits_nowhere(), 0);
+    EXPECT_EQ(last_of_track()->sightings_fit(), msg::SIGHTINGS_FIT_NOT_TOLD);
     EXPECT_GT(landmark_fixes().size(), 8U);
     EXPECT_EQ(reason(), "");
   }
@@ -191,12 +191,12 @@ TEST_F(ToldStart, DoubtEndsWhereTheMastsFitThoughTheTrackIsChosenAnewMeanwhile) 
 TEST_F(ToldStart, IsForgottenWhereFusionGivesThePlaceUp) {
   ride(600, 2200);
   ASSERT_TRUE(last_of_track());
-  ASSERT_EQ(last_of_track()->fits_nowhere(), 1);
+  ASSERT_EQ(last_of_track()->sightings_fit(), msg::SIGHTINGS_FIT_NOWHERE);
   for (int i = 0; i < 10; ++i) tick_without_place();
   EXPECT_THAT(reason(), HasSubstr("not known yet"));
   ride(30, 0);  // found again
   ASSERT_TRUE(said_lately());
-  EXPECT_EQ(last_of_track()->fits_nowhere(), 0);
+  EXPECT_EQ(last_of_track()->sightings_fit(), msg::SIGHTINGS_FIT_NOT_TOLD);
   EXPECT_GT(last_of_track()->probability(), 0.99);
 }
 

@@ -72,8 +72,9 @@ void MatcherLoop::look(double arrival_s, const Motion& truth) {
 
 void MatcherLoop::found(const map_matcher::Fix& fix, fusion::FixKind kind, double due_s) {
   const auto place = followed_.path()->position_at(fix.path_distance_m);
-  found_.emplace_back(due_s, fusion::FixInput{fix.stamp_ns, place.edge, place.offset_m, fix.sigma_m, fix.probability,
-                                              fix.landmark, kind, place.direction, nullptr});
+  found_.emplace_back(
+      due_s, fusion::FixInput{fix.stamp_ns, place.edge, place.offset_m, fix.sigma_m, fix.probability, fix.landmark,
+                              kind, place.direction, nullptr, static_cast<fusion::SightingsFit>(fix.sightings_fit)});
 }
 
 void MatcherLoop::match_shape(int64_t stamp_ns, const fusion::TrainEstimate& state, double arrival_s) {
@@ -139,8 +140,9 @@ void MatcherLoop::doubt_place(const fusion::TrainEstimate& state, double due_s) 
   const double elsewhere = landmarks_->place_doubt();
   if (gnss || elsewhere == 0) return;
   const auto& place = state.position;
-  found_.emplace_back(due_s, fusion::FixInput{state.stamp_ns, place.edge, place.offset_m, INFINITY, 1 - elsewhere, 0,
-                                              fusion::FixKind::track, place.direction, nullptr, true});
+  found_.emplace_back(
+      due_s, fusion::FixInput{state.stamp_ns, place.edge, place.offset_m, INFINITY, 1 - elsewhere, 0,
+                              fusion::FixKind::track, place.direction, nullptr, fusion::SightingsFit::nowhere});
 }
 
 std::vector<fusion::FixInput> MatcherLoop::see(const fusion::OdometryInput& step, const fusion::TrainEstimate& state,

@@ -92,7 +92,9 @@ TEST(FarPlaces, OnARingALandmarkIsThatOfThisRound) {
   auto fusion = core::value_or_throw(Fusion::create({}, map, track::EdgePosition{1, 0, track::Direction::forward}));
   for (int i = 1; i <= 12; ++i) {  // half a round each, with a landmark at 1000 m and one at 0
     run(fusion, 50 * (i - 1), 50 * i - 10, 20);
-    fusion.add(fix_at(50 * i - 10, i % 2 == 0 ? 1800 : 800, static_cast<uint32_t>(1 + i % 2)));
+    auto fix = fix_at(50 * i - 10, i % 2 == 0 ? 1800 : 800, static_cast<uint32_t>(1 + i % 2));
+    fix.sightings_fit = SightingsFit::here;
+    fusion.add(fix);
     const auto state = run(fusion, 50 * i - 10, 50 * i, 20);
     EXPECT_EQ(state.integrity, Integrity::ok) << state.reason;
     EXPECT_EQ(state.reference, static_cast<uint32_t>(1 + i % 2));

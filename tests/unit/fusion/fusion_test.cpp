@@ -23,7 +23,7 @@ TEST(Fusion, CameraAloneGivesPlaceSpeedAndInterval) {
   EXPECT_NEAR(state.northing_m, 700, 0.01);
   EXPECT_NEAR(state.speed_mps, 10, 0.05);
   EXPECT_TRUE(state.track_known);
-  EXPECT_EQ(state.integrity, Integrity::ok) << state.reason;
+  EXPECT_EQ(state.reason, kOnlyTold);
   EXPECT_NEAR(state.since_reference_m, 200, 0.01);
   EXPECT_TRUE(std::isnan(state.lat_deg));
   EXPECT_EQ(state.sources, 1U << static_cast<int>(Source::camera));
@@ -250,7 +250,7 @@ TEST(Fusion, SlippingWheelIsIsolatedAndTakenBackLater) {
     }
   }
   EXPECT_TRUE(isolated);
-  EXPECT_EQ(state->integrity, Integrity::ok) << state->reason;
+  EXPECT_EQ(state->reason, kOnlyTold);
   EXPECT_NEAR(state->distance_m, 600, 0.15);
   EXPECT_NEAR(state->visual_scale, 1, 1e-3);
   EXPECT_NEAR(state->wheel_scale, 1, 1e-3);

@@ -65,14 +65,18 @@ class MastRide {
     const double ahead_m = mast_m - place_m_ + 0.1 * random_.normal();
     const auto fix = matcher_->add({at(t_s_), track::LandmarkKind::mast, ahead_m, 3, 0.15, 0.95},
                                    {state_.path_distance_m, state_.over_m, state_.under_m, state_.distance_m});
-    if (fix) fusion_->add(fix_at(t_s_, fix->path_distance_m, fix->landmark, fix->probability));
+    if (!fix) return;
+    auto input = fix_at(t_s_, fix->path_distance_m, fix->landmark, fix->probability);
+    input.sightings_fit = static_cast<SightingsFit>(fix->sightings_fit);
+    fusion_->add(input);
   }
   // As map_matcher's service does it.
   void say_track() {
     const double elsewhere = matcher_->place_doubt();
     if (elsewhere > 0 && !doubted_at_m_) doubted_at_m_ = place_m_;
     fusion_->add(FixInput{at(t_s_), 1, state_.position.offset_m, INFINITY, 1 - elsewhere, 0, FixKind::track,
-                          track::Direction::forward, nullptr, elsewhere > 0});
+                          track::Direction::forward, nullptr,
+                          elsewhere > 0 ? SightingsFit::nowhere : SightingsFit::not_told});
   }
 
   double lacks_m_;
@@ -114,12 +118,13 @@ TEST(LostPlace, IsOverWithLandmarksOnlyHoweverLittleIsDoubtedAnyMore) {
   double t_s = 1;
   const auto say = [&](bool fits_nowhere) {
     fusion.add(FixInput{at(t_s), 1, 900 + 20 * t_s, INFINITY, fits_nowhere ? 0.1 : 0.9999, 0, FixKind::track,
-                        track::Direction::forward, nullptr, fits_nowhere});
+                        track::Direction::forward, nullptr,
+                        fits_nowhere ? SightingsFit::nowhere : SightingsFit::not_told});
     t_s += 1;
     return run(fusion, t_s - 1, t_s, 20);
   };
   run(fusion, 0, 1, 20);
-  EXPECT_EQ(say(false).integrity, Integrity::ok);
+  EXPECT_EQ(say(false).reason, kOnlyTold);
   auto state = say(true);
   EXPECT_EQ(state.integrity, Integrity::unusable);
   EXPECT_NE(state.reason.find("fits the map nowhere near"), std::string::npos) << state.reason;
@@ -128,7 +133,7 @@ TEST(LostPlace, IsOverWithLandmarksOnlyHoweverLittleIsDoubtedAnyMore) {
   EXPECT_EQ(state.reason.find("nowhere"), std::string::npos) << state.reason;
   EXPECT_NE(state.reason.find("waits for a landmark"), std::string::npos) << state.reason;
   EXPECT_GE(std::min(state.over_m, state.under_m), 100);
-  for (uint32_t landmark = 1; landmark <= 4; ++landmark, t_s += 3) {
+  for (uint32_t landmark = 1; landmark <= 5; ++landmark, t_s += 3) {
     fusion.add(fix_at(t_s, 900 + 20 * t_s, landmark));
     state = run(fusion, t_s, t_s + 3, 20);
   }
@@ -147,7 +152,8 @@ TEST(LostPlace, IsNoneWhereGnssHoldsThePlaceAndTheIntervalHoldsWhatGnssMayBeWron
   };
   ride(0, 60);
   EXPECT_EQ(state.integrity, Integrity::ok) << state.reason;
-  fusion.add(FixInput{at(60), 1, 2100, INFINITY, 0.1, 0, FixKind::track, track::Direction::forward, nullptr, true});
+  fusion.add(FixInput{at(60), 1, 2100, INFINITY, 0.1, 0, FixKind::track, track::Direction::forward, nullptr,
+                      SightingsFit::nowhere});
   EXPECT_EQ(run(fusion, 60, 61, 20).integrity, Integrity::unusable);
   ride(61, 63);
   EXPECT_NE(state.integrity, Integrity::unusable) << state.reason;

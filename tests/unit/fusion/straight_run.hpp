@@ -17,6 +17,9 @@ inline int64_t at(double t_s) {
   return kBeginNs + core::to_ns(t_s);
 }
 
+/// Nothing else is wrong.
+inline constexpr const char* kOnlyTold = "the place was only told: waits for a landmark, GNSS or curves";
+
 inline std::shared_ptr<const track::Map> straight_line() {
   auto map = std::make_shared<track::Map>();
   map->edges.push_back({1, "line", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{20000, 0, 0}})});

@@ -34,7 +34,7 @@ class WrongStart : public testing::Test {
   }
   void nowhere() {
     fusion_.add(FixInput{at(t_s_), 1, 900 + kSpeedMps * t_s_, INFINITY, 0.01, 0, FixKind::track,
-                         track::Direction::forward, nullptr, true});
+                         track::Direction::forward, nullptr, SightingsFit::nowhere});
   }
   void find(double offset_m) {
     fusion_.add(FixInput{at(t_s_), 1, offset_m, 5, 0.9999, 0, FixKind::network, track::Direction::forward, {}});
@@ -45,6 +45,7 @@ class WrongStart : public testing::Test {
   }
 
   Fusion fusion_ = fusion_at(900);
+  [[nodiscard]] double told_m() const { return 900 + kSpeedMps * t_s_; }
   double t_s_ = 0;
 };
 
@@ -145,6 +146,58 @@ TEST_F(WrongStart, APlaceThatIsHandedOverInDoubtIsNoneUntilTwoLandmarksAgree) {
   EXPECT_NEAR(state.position.offset_m, 742, 1);
 }
 
+// On a straight line nothing speaks against it.
+TEST_F(WrongStart, IsNeverOkAsLongAsNothingHasConfirmedIt) {
+  for (int i = 0; i < 20; ++i) EXPECT_EQ(go(100, [] {}).reason, kOnlyTold);
+}
+
+TEST_F(WrongStart, ThatIsRightIsOkFromTheLandmarkOnByWhichTheMatcherIsSureOrTheFifth) {
+  for (const uint32_t sure_at : {2, 9}) {
+    fusion_ = fusion_at(900);
+    t_s_ = 0;
+    for (uint32_t landmark = 1; landmark < std::min(sure_at, 5U); ++landmark) {
+      fusion_.add(fix_at(t_s_, told_m(), landmark));
+      EXPECT_EQ(go(40, [] {}).reason, kOnlyTold) << landmark;
+    }
+    auto last = fix_at(t_s_, told_m(), 5);
+    if (sure_at < 5) last.sightings_fit = SightingsFit::here;
+    fusion_.add(last);
+    EXPECT_EQ(go(40, [] {}).reason, "");
+  }
+}
+
+TEST_F(WrongStart, ThatIsRightIsOkFromTheFirstGnssFixOn) {
+  go(100, [] {});
+  fusion_.add(GnssInput{at(t_s_), 0, told_m(), 1, 1});
+  EXPECT_EQ(go(20, [] {}).reason, "");
+}
+
+TEST_F(WrongStart, ThatIsRightIsOkFromTheThirdCurveOnThatFitsToThreeMetres) {
+  const auto bend = [&](double off_m) {
+    fusion_.add(
+        FixInput{at(t_s_), 1, told_m() + off_m, 1, 0.9999, 0, FixKind::curvature, track::Direction::forward, {}});
+    return go(100, [] {}).reason;
+  };
+  EXPECT_EQ(bend(0), kOnlyTold);
+  EXPECT_EQ(bend(4), kOnlyTold);
+  EXPECT_EQ(bend(1), kOnlyTold);
+  EXPECT_EQ(bend(1), "");
+}
+
+TEST_F(WrongStart, OfAFusionThatWasNotOkIsToldTheNextOneOnly) {
+  for (const bool only_told : {false, true}) {
+    fusion_ = fusion_without_start();
+    t_s_ = 0;
+    go(20, [] {});
+    KnownPlace known{at(t_s_), {1, 920, track::Direction::forward}, kSpeedMps, 2, 2, 0.9999};
+    known.only_told = only_told;
+    const auto place = place_at(straight_line(), known, at(t_s_), 4);
+    ASSERT_TRUE(place);
+    fusion_.add(*place);
+    EXPECT_EQ(go(40, [] {}).reason, only_told ? kOnlyTold : "");
+  }
+}
+
 /// Whole rides, with map_matcher's real matchers and its search of the whole map in the loop.
 struct Sensors {
   std::string name;
@@ -168,14 +221,17 @@ TEST_P(WrongStartRide, EndsWhereTheTrainIs) {
     const train::TrainSimulation simulation(plan, train::seed_of_run(77, static_cast<uint64_t>(ride)));
     auto fusion = core::value_or_throw(Fusion::create({}, simulation.map, simulation.start()));
     double usable_outside_m = 0;
+    int ok_outside = 0;
     TrainEstimate last;
     const auto verdict = train::judge(simulation, fusion, 0, [&](const TrainEstimate& state, double error_m) {
       const bool outside = error_m > state.over_m || -error_m > state.under_m;
       if (outside && state.integrity != Integrity::unusable) usable_outside_m = state.distance_m;
+      if (outside && state.integrity == Integrity::ok) ++ok_outside;
       last = state;
     });
     EXPECT_GT(verdict.outside, 0U) << "nobody knows at first";
     EXPECT_EQ(verdict.outside_again, 0U) << "ride " << ride;
+    EXPECT_EQ(ok_outside, 0) << "ride " << ride;
     EXPECT_LT(usable_outside_m, 3000) << "ride " << ride;
     found += last.track_known && verdict.placeless > 0 ? 1 : 0;
   }

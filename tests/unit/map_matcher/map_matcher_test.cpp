@@ -69,7 +69,7 @@ TEST_F(MapMatcherRide, SaysTheTrackBehindTheSwitchAndTheFrogsPlace) {
   ASSERT_NE(track, nullptr);
   EXPECT_EQ(track->options.front().place.edge, 2U);
   EXPECT_GT(track->options.front().probability, 0.999);
-  EXPECT_FALSE(track->fits_nowhere);
+  EXPECT_EQ(track->sightings_fit, SightingsFit::not_told);
   EXPECT_FALSE(std::isfinite(track->sigma_m));
   const auto* frog = last(FixKind::landmark);
   ASSERT_NE(frog, nullptr);
