@@ -126,6 +126,9 @@ constexpr const char* kInfra = R"(<?xml version="1.0"?>
 <levelCrossings><levelCrossing id="LX"><trackArea><trackEdgeSection trackEdge="T2" skipFromStart="100000" skipFromEnd="190000"/></trackArea></levelCrossing></levelCrossings>
 <baliseGroups><baliseGroup id="G" nid_c="97" nid_bg="5050" linkOrientationDirection="dirReverse"><balises>
 <balise id="G0"><spotLocation trackEdge="T2" pos="13000"/></balise><balise id="G1"><spotLocation trackEdge="T2" pos="10000"/></balise></balises></baliseGroup></baliseGroups>
+<etcsMarkers><etcsMarker id="12" markerFunctionStop="false"><dirSpotLocation trackEdge="T1" pos="92073" sameDir="false"/></etcsMarker>
+<etcsMarker id="13" markerFunctionStop="true"><dirSpotLocation trackEdge="T2" pos="300001" sameDir="true"/></etcsMarker></etcsMarkers>
+<timingPoints><timingPoint id="TP"><activeObject><etcsMarker ref="12"/></activeObject></timingPoint></timingPoints>
 </infrastructure>)";
 
 class PlanImport : public ImportTest {
@@ -447,6 +450,8 @@ TEST_F(PlanImport, ErjuWithoutCoordinatesIsADrawing) {
               testing::ElementsAre("platform P1 at 420.0 on 1", "platform P1 at 40.0 on 2", "platform P2 at 50.0 on 2",
                                    "platform P2 at 100.0 on 2"));
   EXPECT_THAT(map.problems, Contains("platform edge \"P3\" is not on its track edges; it is left out"));
+  EXPECT_THAT(marks_of(map, {Kind::mast}), testing::ElementsAre("mast 12 at 92.1 on 1"));
+  EXPECT_THAT(map.problems, Contains("ETCS marker board \"13\" is not on its track edge; it is left out"));
   EXPECT_NEAR(limit_kmh(map, 1, 100, Direction::forward), 60, 1e-9);
   EXPECT_NEAR(limit_kmh(map, 1, 250, Direction::forward), 40, 1e-9);
   EXPECT_NEAR(limit_kmh(map, 1, 100, Direction::reverse), 50, 1e-9);
@@ -463,9 +468,8 @@ TEST_F(PlanImport, ScheibenbergIsReadWhole) {
   EXPECT_EQ(map.crs, "EPSG:31468");  // the file names the zone by a number that PROJ has not
   EXPECT_EQ(map.edges.size(), 11U);
   EXPECT_EQ(map.balise_groups.size(), 115U);
-  EXPECT_EQ(std::count_if(map.landmarks.begin(), map.landmarks.end(),
-                          [](const Landmark& mark) { return mark.kind == LandmarkKind::balise; }),
-            163);
+  EXPECT_EQ(std::ranges::count(map.landmarks, LandmarkKind::balise, &Landmark::kind), 163);
+  EXPECT_EQ(std::ranges::count(map.landmarks, LandmarkKind::mast, &Landmark::kind), 56) << "marker boards";
   EXPECT_EQ(std::count_if(map.nodes.begin(), map.nodes.end(),
                           [](const Node& node) { return node.kind == NodeKind::railway_switch; }),
             6);

@@ -45,6 +45,7 @@ class Reader {
     read_marks("tunnel", LandmarkKind::portal_in);
     read_marks("bridge", LandmarkKind::underbridge);
     read_marks("levelCrossing", LandmarkKind::level_crossing);
+    read_marker_boards();
     read_platforms();
     read_speeds();
     return std::move(net_);
@@ -255,6 +256,22 @@ class Reader {
       for (const pugi::xml_node& spot : descendants(node, "spotLocation")) {
         NetTrack& track = net_.tracks[track_of(infra_, spot, "trackEdge")];
         track.track.marks.push_back({kind, metres(infra_.required(spot, "pos")), 0, kSurveyedM, id});
+      }
+    }
+  }
+
+  /// Boards of ETCS stand on masts, as signals do. Which side they stand on is not said.
+  void read_marker_boards() {
+    for (const pugi::xml_node& board : descendants(infra_.root(), "etcsMarker")) {
+      const pugi::xml_node spot = board.child("dirSpotLocation");
+      if (!spot) continue;  // elsewhere the element only names one
+      NetTrack& track = net_.tracks[track_of(infra_, spot, "trackEdge")];
+      const double at_m = metres(infra_.required(spot, "pos"));
+      const std::string id = board.attribute("id").value();
+      if (at_m >= 0 && at_m <= track.length_m) {
+        track.track.marks.push_back({LandmarkKind::mast, at_m, 0, kSurveyedM, id});
+      } else {
+        net_.problems.push_back("ETCS marker board \"" + id + "\" is not on its track edge; it is left out");
       }
     }
   }

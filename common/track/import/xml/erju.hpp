@@ -1,6 +1,6 @@
 // The digital map of ERJU's System Pillar (erju.org/infra and erju.org/map, version 1.0): track edges, links, switch
-// points, balise groups with their ETCS identity, slopes and cant from the infrastructure file; coordinates from the
-// map file.
+// points, balise groups with their ETCS identity, marker boards, slopes and cant from the infrastructure file;
+// coordinates from the map file.
 #pragma once
 
 #include <filesystem>
