@@ -6,12 +6,17 @@
 #include <set>
 #include <unordered_map>
 
+#include "track/import/told.hpp"
+
 namespace railfix::track {
 namespace {
 
 constexpr double kGaugeM = 1.435;
 constexpr double kLongestSwitchM = 150.0;
 constexpr double kStepM = 0.5;
+// A reference so near to another one adds nothing, and says less well where it is than a real group does.
+constexpr double kNearGroupM = 10.0;
+constexpr double kToldStepM = 10.0;  // of the least distance that a refusal names
 
 /// An edge as seen when leaving a node.
 struct Branch {
@@ -75,6 +80,55 @@ void add_frogs_of(Map& map, const Node& node, const Connection& straight, const 
   }
 }
 
+struct VirtualPlace {
+  uint32_t edge = 0;
+  double offset_m = 0;
+};
+
+/// Evenly along every edge, but for places that have a group already.
+std::vector<VirtualPlace> virtual_places(const Map& map, double every_m) {
+  std::set<std::pair<uint32_t, double>> taken;
+  for (const BaliseGroup& group : map.balise_groups) taken.emplace(group.edge, group.offset_m);
+  const auto is_taken = [&](uint32_t edge, double offset_m) {
+    const auto next = taken.lower_bound({edge, offset_m - kNearGroupM});
+    return next != taken.end() && next->first == edge && next->second <= offset_m + kNearGroupM;
+  };
+  std::vector<VirtualPlace> out;
+  for (const Edge& edge : map.edges) {
+    const double length_m = edge.alignment.length_m();
+    const auto count = static_cast<uint32_t>(std::lround(length_m / every_m));
+    for (uint32_t i = 0; i < count; ++i) {
+      const double offset_m = length_m * (i + 0.5) / count;
+      if (!is_taken(edge.id, offset_m)) out.push_back({edge.id, offset_m});
+    }
+  }
+  return out;
+}
+
+/// Numbers of this country that groups have already are left to them.
+std::vector<uint32_t> free_numbers(const Map& map, uint32_t nid_c, uint32_t first_nid_bg) {
+  std::set<uint32_t> taken;
+  for (const BaliseGroup& group : map.balise_groups) {
+    if (group.nid_c == nid_c) taken.insert(group.nid_bg);
+  }
+  std::vector<uint32_t> out;
+  for (uint32_t number = first_nid_bg; number <= BaliseGroup::kLastNidBg; ++number) {
+    if (!taken.contains(number)) out.push_back(number);
+  }
+  return out;
+}
+
+core::Error too_few_numbers(const Map& map, size_t places, size_t numbers, uint32_t nid_c, uint32_t first_nid_bg) {
+  const std::string lack = std::to_string(places) + " virtual balise groups are more than NID_C " +
+                           std::to_string(nid_c) + " has numbers for: " + std::to_string(numbers) + " are free from " +
+                           std::to_string(first_nid_bg) + " on; ";
+  const std::string in_parts = "build the map in parts, each with an NID_C of its own";
+  if (numbers == 0) return {lack + "begin at a lower NID_BG or " + in_parts};
+  double every_m = kToldStepM;
+  while (virtual_places(map, every_m).size() > numbers) every_m += kToldStepM;
+  return {lack + "place them at least " + told_m(every_m, 0) + " apart on this map or " + in_parts};
+}
+
 }  // namespace
 
 void add_frogs(Map& map, double sigma_m) {
@@ -93,31 +147,18 @@ void add_frogs(Map& map, double sigma_m) {
 core::Status add_virtual_balises(Map& map, double every_m, uint32_t nid_c, uint32_t first_nid_bg, double q_locacc_m) {
   if (!(every_m >= 1.0)) return core::Error{"virtual balise groups must be at least 1 m apart"};
   if (nid_c > BaliseGroup::kLastNidC) return core::Error{"NID_C must be between 0 and 1023"};
-  // Numbers of this country that groups have already are left to them.
-  std::set<uint32_t> taken;
-  for (const BaliseGroup& group : map.balise_groups) {
-    if (group.nid_c == nid_c) taken.insert(group.nid_bg);
-  }
-  uint32_t next = first_nid_bg;
-  for (const Edge& edge : map.edges) {
-    const double length = edge.alignment.length_m();
-    const auto count = static_cast<uint32_t>(std::lround(length / every_m));
-    for (uint32_t i = 0; i < count; ++i) {
-      while (taken.contains(next)) ++next;
-      if (next > BaliseGroup::kLastNidBg) {
-        return core::Error{
-            "there are no more numbers for virtual balise groups of this NID_C (16382 at most); place "
-            "them farther apart"};
-      }
-      map.balise_groups.push_back({.nid_c = nid_c,
-                                   .nid_bg = next++,
-                                   .edge = edge.id,
-                                   .offset_m = length * (i + 0.5) / count,
-                                   .nominal_is_forward = true,
-                                   .is_virtual = true,
-                                   .q_locacc_m = q_locacc_m,
-                                   .balises = {}});
-    }
+  const std::vector<VirtualPlace> places = virtual_places(map, every_m);
+  const std::vector<uint32_t> numbers = free_numbers(map, nid_c, first_nid_bg);
+  if (places.size() > numbers.size()) return too_few_numbers(map, places.size(), numbers.size(), nid_c, first_nid_bg);
+  for (size_t i = 0; i < places.size(); ++i) {
+    map.balise_groups.push_back({.nid_c = nid_c,
+                                 .nid_bg = numbers[i],
+                                 .edge = places[i].edge,
+                                 .offset_m = places[i].offset_m,
+                                 .nominal_is_forward = true,
+                                 .is_virtual = true,
+                                 .q_locacc_m = q_locacc_m,
+                                 .balises = {}});
   }
   return {};
 }

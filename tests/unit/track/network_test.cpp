@@ -130,15 +130,41 @@ TEST(VirtualBalises, AreSpreadAlongTheEdges) {
   // A second time they go on behind the first; another country counts for itself.
   const size_t once = map.balise_groups.size();
   ASSERT_TRUE(add_virtual_balises(map, 200, 7, 20, 5).ok());
-  ASSERT_TRUE(add_virtual_balises(map, 200, 8, 20, 5).ok());
+  ASSERT_TRUE(add_virtual_balises(map, 140, 8, 20, 5).ok());
   EXPECT_EQ(map.balise_groups[once].nid_bg, map.balise_groups[once - 1].nid_bg + 1);
   std::set<uint32_t> identities;
   for (const BaliseGroup& group : map.balise_groups) identities.insert(group.nid_lrbg());
   EXPECT_EQ(identities.size(), map.balise_groups.size());
   EXPECT_TRUE(identities.contains(8U << 14U | 20U));
-  EXPECT_FALSE(add_virtual_balises(map, 1, 7, 16000, 5).ok());
   EXPECT_FALSE(add_virtual_balises(map, 0, 7, 1, 5).ok());
   EXPECT_FALSE(add_virtual_balises(map, 300, 1024, 1, 5).ok());
+}
+
+TEST(VirtualBalises, StandNotWhereAGroupIs) {
+  Map map = small_map();
+  map.balise_groups[0].offset_m = 492;  // 500 is one of the places
+  map.balise_groups[1].offset_m = 120;  // 125 is
+  ASSERT_TRUE(add_virtual_balises(map, 250, 77, 1, 5).ok());
+  EXPECT_EQ(map.balise_groups.size(), 2U + 4 + 3 + 1);
+  map = small_map();
+  map.balise_groups[0].offset_m = 489;
+  ASSERT_TRUE(add_virtual_balises(map, 1000, 77, 1, 5).ok());
+  EXPECT_EQ(map.balise_groups.back().edge, 3U);
+  EXPECT_THAT(check_topology(map), IsEmpty());
+}
+
+TEST(VirtualBalises, TooManySayHowFarApartTheyMustBe) {
+  Map map = small_map();
+  const auto refusal = [&](double every_m, uint32_t first) {
+    return add_virtual_balises(map, every_m, 85, first, 5).error().message;
+  };
+  EXPECT_EQ(refusal(100, 16373),
+            "22 virtual balise groups are more than NID_C 85 has numbers for: 10 are free from 16373 on; place them at "
+            "least 210 m apart on this map or build the map in parts, each with an NID_C of its own");
+  EXPECT_EQ(map.balise_groups.size(), 2U) << "none is added";
+  ASSERT_TRUE(add_virtual_balises(map, 210, 85, 16373, 5).ok());
+  map.balise_groups[0].nid_bg = BaliseGroup::kLastNidBg;
+  EXPECT_THAT(refusal(100, BaliseGroup::kLastNidBg), HasSubstr("0 are free from 16382 on; begin at a lower NID_BG or"));
 }
 
 TEST(Landmarks, AreKeptByTheirKind) {
