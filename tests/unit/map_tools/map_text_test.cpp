@@ -20,10 +20,15 @@ std::string printed(const std::function<void()>& print) {
 TEST(MapText, APlaceIsToldWhole) {
   track::Map map = track::small_map();
   const std::string text = printed([&] { print_place(map, {1, 500}, false); });
-  EXPECT_THAT(text, HasSubstr("cant, twist      50.0 mm, 0.100 mm per m"));
+  EXPECT_THAT(text, HasSubstr("cant, twist      50.0 mm (right rail higher), 0.100 mm per m"));
   EXPECT_THAT(text, HasSubstr("its rate         0.000e+00 per m2"));
   EXPECT_THAT(text, HasSubstr("heading"));
   EXPECT_THAT(text, HasSubstr("latitude"));
+  EXPECT_THAT(printed([&] {
+                print_place(map, {1, 500, track::Direction::reverse}, false);
+              }),
+              HasSubstr("cant, twist      -50.0 mm (left rail higher), 0.100 mm per m"));
+  EXPECT_THAT(printed([&] { print_place(map, {1, 0}, false); }), HasSubstr("cant, twist      0.0 mm, "));
   map.edges[1].alignment = track::Alignment::chained({}, {{100, 0, 1.0 / 500}});
   for (const auto direction : {track::Direction::forward, track::Direction::reverse}) {
     EXPECT_THAT(printed([&] {

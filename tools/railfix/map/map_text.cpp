@@ -134,7 +134,9 @@ namespace {
 /// Seen the other way twist stays: the cant and the way change their signs together.
 void print_height_and_cant(const track::Alignment& alignment, const track::TrackPoint& point, double sign) {
   if (!alignment.cant().empty()) {
-    std::printf("cant, twist      %.1f mm, %.3f mm per m\n", sign * point.cant_m * 1e3 + 0.0, point.twist * 1e3 + 0.0);
+    const double cant_mm = sign * point.cant_m * 1e3;
+    const char* higher = std::abs(cant_mm) < 0.05 ? "" : cant_mm > 0 ? " (right rail higher)" : " (left rail higher)";
+    std::printf("cant, twist      %.1f mm%s, %.3f mm per m\n", cant_mm + 0.0, higher, point.twist * 1e3 + 0.0);
   } else {
     std::puts("cant, twist      not on the map");
   }
