@@ -134,7 +134,7 @@ class Sources {
       take(std::move(net.fit));
     }
     if (!tracks_.empty()) {
-      append(cut_tracks(std::move(tracks_), map_.problems), map_);
+      append(cut_tracks(std::move(tracks_), cuts_), map_);
       add_frogs(map_, kSurveyFrogSigmaM);
     }
     const size_t surveyed_edges = map_.edges.size();
@@ -146,7 +146,9 @@ class Sources {
                                             all_surveyed ? kSurveyLocationM : kMappingLocationM));
     }
     if (!options_.landmarks.empty()) core::ok_or_throw(keep_landmarks(map_, options_.landmarks));
-    for (std::string& problem : problems_of(map_)) map_.problems.push_back(std::move(problem));
+    std::ranges::move(problems_of(map_), std::back_inserter(cuts_));
+    std::ranges::move(map_.problems, std::back_inserter(cuts_));
+    map_.problems = std::move(cuts_);
     out_.map = std::move(map_);
     return std::move(out_);
   }
@@ -182,7 +184,7 @@ class Sources {
     std::move(read.ways.begin(), read.ways.end(), std::back_inserter(osm_.ways));
     std::move(read.bridges.begin(), read.bridges.end(), std::back_inserter(osm_.bridges));
     std::move(read.platforms.begin(), read.platforms.end(), std::back_inserter(osm_.platforms));
-    std::move(read.problems.begin(), read.problems.end(), std::back_inserter(map_.problems));
+    std::move(read.problems.begin(), read.problems.end(), std::back_inserter(cuts_));
   }
 
   void take(Map read, const std::filesystem::path& file) {
@@ -253,6 +255,7 @@ class Sources {
   OsmData osm_;
   std::string source_crs_;
   bool has_plane_source_ = false;
+  std::vector<std::string> cuts_;  // of what was read: what extracts lack and ends that meet no other; told first
   BuiltMap out_;
 };
 

@@ -34,7 +34,8 @@ struct BuiltMap {
 
 /// LandXML (.xml, .landxml), railML 2 and 3 (.xml, .railml), ERJU infrastructure and map (.xml, both together), OSM
 /// (.osm, .pbf, also .gz/.bz2), Overpass JSON (.json), GeoJSON (.geojson) and compiled maps (.map). The problems found
-/// are in the map.
+/// are in the map: what cuts the network, then what has shapes that no track has, then what else was left out or
+/// changed.
 core::Result<BuiltMap> build_map(const std::vector<std::filesystem::path>& inputs, const BuildOptions& options);
 
 }  // namespace railfix::track

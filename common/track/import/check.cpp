@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
+#include <optional>
 #include <set>
 
 #include "core/units.hpp"
@@ -17,6 +19,7 @@ constexpr double kSharpestPerM = 1.0 / 80.0;
 constexpr double kSteepest = 0.075;
 constexpr double kStepM = 0.05;  // in height, from one profile point to the next
 constexpr double kSamePlaceM = 0.5;
+constexpr size_t kMostBends = 3;
 // A drawing of straights and right lengths does not close to the last metre, nor where curves are not known.
 constexpr double kDrawnGapM = 1.0;
 constexpr double kDrawnGapPart = 0.01;
@@ -52,53 +55,87 @@ class Check {
       check_end(edge, edge.to_node, edge.alignment.at(edge.alignment.length_m()).pose);
     }
     for (const Node& node : map_.nodes) check_node(node);
-    take(near_misses(map_));
-    take(facing_ends(map_));
-    take(kinks_at_nodes(map_));
+    take(near_misses(map_), cuts_);
+    take(facing_ends(map_), cuts_);
     check_balises();
     check_parts();
-    return std::move(problems_);
+    tell_sharpest();
+    take(kinks_at_nodes(map_), shapes_);
+    take(shapes_, cuts_);
+    return std::move(cuts_);
   }
 
  private:
-  void take(const std::vector<std::string>& found) { problems_.insert(problems_.end(), found.begin(), found.end()); }
+  /// The sharpest radius of an edge.
+  struct Bend {
+    double curvature_per_m = 0;
+    const Edge* edge = nullptr;
+    double offset_m = 0;
+  };
+
+  static void take(const std::vector<std::string>& found, std::vector<std::string>& into) {
+    into.insert(into.end(), found.begin(), found.end());
+  }
 
   /// Within one edge: elements that do not meet, kinks, radii that no train runs.
   void check_shape(const Edge& edge) {
     const Alignment& track = edge.alignment;
+    Bend bend;
     for (size_t i = 0; i < track.elements().size(); ++i) {
       const Element& element = track.elements()[i];
       const std::string where = called(edge) + " at " + told_m(track.element_offsets()[i]);
       const double sharpest = std::max(std::abs(element.curvature_start_per_m), std::abs(element.curvature_end_per_m));
-      if (sharpest > kSharpestPerM && !told_sharp_.contains(edge.id)) {
-        problems_.push_back(where + " has a radius of only " + told_m(1.0 / sharpest));
-        told_sharp_.insert(edge.id);
-      }
+      if (sharpest > bend.curvature_per_m) bend = {sharpest, &edge, track.element_offsets()[i]};
       if (i == 0) continue;
       const PlanPose before = advance(track.starts()[i - 1], track.elements()[i - 1], track.elements()[i - 1].length_m);
       const PlanPose& start = track.starts()[i];
       const double gap = std::hypot(before.easting_m - start.easting_m, before.northing_m - start.northing_m);
-      if (gap > kGapM) problems_.push_back(where + " has a gap of " + told_m(gap));
+      if (gap > kGapM) cuts_.push_back(where + " has a gap of " + told_m(gap));
       const double kink = std::abs(core::wrap_pi(before.heading_rad - start.heading_rad));
-      if (kink > kKinkRad) problems_.push_back(where + " has a kink of " + told_deg(kink));
+      if (kink > kKinkRad) shapes_.push_back(where + " has a kink of " + told_deg(kink));
     }
+    if (bend.curvature_per_m > kSharpestPerM) bends_.push_back(bend);
+  }
+
+  /// The worst by name, the others counted: one yard has more than all the rest that is wrong.
+  void tell_sharpest() {
+    std::ranges::stable_sort(bends_, std::greater{}, &Bend::curvature_per_m);
+    const auto radius = [](const Bend& bend) { return told_m(1.0 / bend.curvature_per_m); };
+    const size_t named = std::min(kMostBends, bends_.size());
+    for (size_t i = 0; i < named; ++i) {
+      shapes_.push_back(called(*bends_[i].edge) + " at " + told_m(bends_[i].offset_m) + " has a radius of only " +
+                        radius(bends_[i]));
+    }
+    if (bends_.size() > named) {
+      shapes_.push_back(std::to_string(bends_.size() - named) + " more of " + std::to_string(map_.edges.size()) +
+                        " edges have a radius of " + radius(bends_[named]) + " to " + radius(bends_.back()));
+    }
+  }
+
+  /// A node as its source knows it: by its name and the tracks that share it. Its number is of this map alone.
+  [[nodiscard]] std::string node_of(const Edge& edge, const Node& node) const {
+    std::string others;
+    for (const Edge* one : ends_.at(node.id)) {
+      if (one != &edge) others += (others.empty() ? ", which it shares with " : " and ") + called(*one);
+    }
+    return "node " + std::to_string(node.id) + (node.name.empty() ? "" : " (" + node.name + ")") + others;
   }
 
   void check_end(const Edge& edge, uint32_t node_id, const PlanPose& pose) {
     const auto node = nodes_.find(node_id);
     if (node == nodes_.end()) {
-      problems_.push_back(called(edge) + " ends at node " + std::to_string(node_id) + ", which does not exist");
+      cuts_.push_back(called(edge) + " ends at node " + std::to_string(node_id) + ", which does not exist");
       return;
     }
     const double gap = gap_m(edge, pose, *node->second);
     if (edge.is_drawn && gap > kDrawnGapM + kDrawnGapPart * edge.alignment.length_m()) {
-      problems_.push_back(called(edge) + " is drawn to end " + told_m(gap) + " from its node " +
-                          std::to_string(node_id) + ": do the lengths of the tracks there agree?");
+      cuts_.push_back(called(edge) + " is drawn to end " + told_m(gap) + " from its " + node_of(edge, *node->second) +
+                      ": do the lengths of the tracks there agree?");
     } else if (!edge.is_drawn && gap > kGapM) {
-      problems_.push_back(called(edge) + " ends " + told_m(gap) + " from its node " + std::to_string(node_id));
+      cuts_.push_back(called(edge) + " ends " + told_m(gap) + " from its " + node_of(edge, *node->second));
     }
     if (ends_[node_id].size() > 1 && !connected_.contains({node_id, edge.id})) {
-      problems_.push_back(called(edge) + " is not connected to any other at node " + std::to_string(node_id));
+      cuts_.push_back(called(edge) + " is not connected to any other at its " + node_of(edge, *node->second));
     }
   }
 
@@ -115,13 +152,29 @@ class Check {
   }
 
   void check_node(const Node& node) {
-    const size_t meeting = ends_[node.id].size();
-    const std::string where = "node " + std::to_string(node.id) + (node.name.empty() ? "" : " (" + node.name + ")");
-    if (meeting == 0) problems_.push_back(where + " belongs to no edge");
-    if (node.kind == NodeKind::railway_switch && meeting < 3) {
-      problems_.push_back(where + " is a switch but only " + std::to_string(meeting) + " track" +
-                          (meeting == 1 ? " meets" : "s meet") + " there");
+    const std::vector<const Edge*>& meeting = ends_[node.id];
+    if (meeting.empty()) {
+      cuts_.push_back("node " + std::to_string(node.id) + (node.name.empty() ? "" : " (" + node.name + ")") +
+                      " belongs to no edge");
+    } else if (node.kind == NodeKind::railway_switch && meeting.size() < 3) {
+      cuts_.push_back((node.name.empty() ? "a switch without a name" : "switch \"" + node.name + "\"") +
+                      place_of(node) + " has only " + (meeting.size() == 1 ? "one track, " : "two tracks, ") +
+                      end_at(*meeting.front(), node) +
+                      (meeting.size() == 1 ? "" : " and " + end_at(*meeting.back(), node)));
     }
+  }
+
+  static std::string end_at(const Edge& edge, const Node& node) {
+    const char* end = edge.from_node == edge.to_node ? "an end" : edge.to_node == node.id ? "the end" : "the start";
+    return std::string(end) + " of " + called(edge);
+  }
+
+  /// Where to look for it in the source; a drawing is at no place.
+  [[nodiscard]] std::string place_of(const Node& node) const {
+    if (std::ranges::all_of(ends_.at(node.id), &Edge::is_drawn)) return "";
+    const std::optional<GeoPoint> geo = map_.to_geo(node.easting_m, node.northing_m);
+    if (!geo) return " at easting " + told_m(node.easting_m) + ", northing " + told_m(node.northing_m);
+    return " at latitude " + told_number(geo->lat_deg, 6) + ", longitude " + told_number(geo->lon_deg, 6);
   }
 
   /// Grades that no adhesion railway has. Points beyond the ends are of the edges next to it.
@@ -132,8 +185,8 @@ class Check {
       const double run = profile[i].offset_m - profile[i - 1].offset_m;
       const double rise = profile[i].elevation_m - profile[i - 1].elevation_m;
       if (std::abs(rise) <= kSteepest * run || std::abs(rise) < kStepM) continue;
-      problems_.push_back(called(edge) + " at " + told_m(std::max(0.0, profile[i - 1].offset_m)) + " climbs " +
-                          told_m(rise) + " over " + told_m(run));
+      shapes_.push_back(called(edge) + " at " + told_m(std::max(0.0, profile[i - 1].offset_m)) + " climbs " +
+                        told_m(rise) + " over " + told_m(run));
       return;
     }
   }
@@ -144,13 +197,13 @@ class Check {
       const double offset_m = std::clamp(point.offset_m, 0.0, edge.alignment.length_m());
       const double cant_m = edge.alignment.at(offset_m).cant_m;
       if (is_cant(cant_m)) continue;
-      problems_.push_back(called(edge) + " at " + told_m(offset_m) + " has a cant of " + told_m(cant_m) +
-                          ", more than any track has");
+      shapes_.push_back(called(edge) + " at " + told_m(offset_m) + " has a cant of " + told_m(cant_m) +
+                        ", more than any track has");
       return;
     }
   }
 
-  /// Tracks that no train can reach from the largest part of the network, told once for each part.
+  /// Tracks that no train can reach from the largest part of the network, told once for each part, the longest first.
   void check_parts() {
     std::vector<size_t> part(map_.edges.size());
     for (size_t i = 0; i < part.size(); ++i) part[i] = i;
@@ -167,21 +220,20 @@ class Check {
       double length_m = 0;
       const Edge* first = nullptr;
     };
-    std::map<size_t, Part> parts;
+    std::map<size_t, Part> by_root;
     for (size_t i = 0; i < part.size(); ++i) {
-      Part& own = parts[root(i)];
+      Part& own = by_root[root(i)];
       ++own.edges;
       own.length_m += map_.edges[i].alignment.length_m();
       if (own.first == nullptr) own.first = &map_.edges[i];
     }
-    if (parts.size() < 2) return;
-    const auto largest = std::max_element(
-        parts.begin(), parts.end(), [](const auto& a, const auto& b) { return a.second.length_m < b.second.length_m; });
-    for (auto own = parts.begin(); own != parts.end(); ++own) {
-      if (own == largest) continue;
-      problems_.push_back(called(*own->second.first) +
-                          (own->second.edges > 1 ? " and " + std::to_string(own->second.edges - 1) + " more" : "") +
-                          ", " + told_m(own->second.length_m) + ", cannot be reached from the rest of the network");
+    std::vector<Part> parts;
+    for (const auto& [first, own] : by_root) parts.push_back(own);
+    std::ranges::stable_sort(parts, std::greater{}, &Part::length_m);
+    for (size_t i = 1; i < parts.size(); ++i) {
+      const Part& lost = parts[i];
+      cuts_.push_back(called(*lost.first) + (lost.edges > 1 ? " and " + std::to_string(lost.edges - 1) + " more" : "") +
+                      ", " + told_m(lost.length_m) + ", cannot be reached from the rest of the network");
     }
   }
 
@@ -191,9 +243,8 @@ class Check {
       if (mark.kind == LandmarkKind::balise) balises.push_back(&mark);
     }
     // Of groups or alone: two at one place are one that is there twice.
-    tell_same_places("balises", balises, [](const Landmark& mark) {
-      return mark.name.empty() ? std::to_string(mark.id) : "\"" + mark.name + "\"";
-    });
+    tell_same_places("balises", balises,
+                     [](const Landmark& mark) { return mark.name.empty() ? "(no name)" : "\"" + mark.name + "\""; });
     std::vector<const BaliseGroup*> groups;
     for (const BaliseGroup& group : map_.balise_groups) groups.push_back(&group);
     tell_same_places("balise groups", groups, [](const BaliseGroup& group) { return identity(group); });
@@ -201,14 +252,15 @@ class Check {
     for (const BaliseGroup& group : map_.balise_groups) {
       const auto [first, is_new] = seen.emplace(group.nid_lrbg(), &group);
       if (is_new) continue;
-      problems_.push_back("balise group " + identity(group) + " is there twice, " + place_of(*first->second) + " and " +
-                          place_of(group) + ": one of them has a wrong identity");
+      cuts_.push_back("balise group " + identity(group) + " is there twice, " +
+                      place_on(first->second->edge, first->second->offset_m) + " and " +
+                      place_on(group.edge, group.offset_m) + ": one of them has a wrong identity");
     }
   }
 
-  [[nodiscard]] std::string place_of(const BaliseGroup& group) const {
-    const Edge* edge = map_.edge(group.edge);
-    return (edge != nullptr ? called(*edge) : "edge " + std::to_string(group.edge)) + " at " + told_m(group.offset_m);
+  [[nodiscard]] std::string place_on(uint32_t id, double offset_m) const {
+    const Edge* edge = map_.edge(id);
+    return (edge != nullptr ? called(*edge) : "edge " + std::to_string(id)) + " at " + told_m(offset_m);
   }
 
   template <class Thing, class Called>
@@ -218,8 +270,8 @@ class Check {
       const Thing& before = *things[i - 1];
       const Thing& one = *things[i];
       if (one.edge != before.edge || one.offset_m - before.offset_m > kSamePlaceM) continue;
-      problems_.push_back(what + " " + called(before) + " and " + called(one) + " are at the same place, edge " +
-                          std::to_string(one.edge) + " at " + told_m(one.offset_m));
+      cuts_.push_back(what + " " + called(before) + " and " + called(one) + " are at the same place, " +
+                      place_on(one.edge, one.offset_m));
     }
   }
 
@@ -227,8 +279,9 @@ class Check {
   std::map<uint32_t, const Node*> nodes_;
   std::map<uint32_t, std::vector<const Edge*>> ends_;
   std::set<std::pair<uint32_t, uint32_t>> connected_;  // node, edge
-  std::set<uint32_t> told_sharp_;
-  std::vector<std::string> problems_;
+  std::vector<Bend> bends_;
+  std::vector<std::string> cuts_;    // what a train cannot use or a reference cannot be trusted for
+  std::vector<std::string> shapes_;  // told after them: often many, and trains can run there all the same
 };
 
 }  // namespace

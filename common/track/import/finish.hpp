@@ -24,9 +24,10 @@ core::Status add_virtual_balises(Map& map, double every_m, uint32_t nid_c, uint3
 /// kind.
 core::Status keep_landmarks(Map& map, const std::vector<std::string>& kinds);
 
-/// What is wrong with the map, one sentence each, naming the element: gaps and kinks within edges and between connected
-/// ones, impossible radii, grades and cant, switches that lead nowhere, track ends that just miss another or face it
-/// over a gap, parts that are not connected, balise groups with one identity or at one place.
+/// What is wrong with the map, one sentence each, naming the element. First what cuts the network: gaps, switches that
+/// lead nowhere, track ends that just miss another or face it over a gap, balise groups with one identity or at one
+/// place, parts that are not connected. Then kinks and impossible radii, grades and cant; of many radii and kinks the
+/// worst by name, the others counted.
 std::vector<std::string> check_topology(const Map& map);
 
 }  // namespace railfix::track

@@ -48,5 +48,13 @@ TEST(MapText, TheSummaryCountsTheKinds) {
   EXPECT_THAT(text, HasSubstr("  bridge         2\n"));
 }
 
+TEST(MapText, InfoListsAllProblems) {
+  track::Map map = track::small_map();
+  for (int i = 1; i <= 60; ++i) map.problems.push_back("problem " + std::to_string(i) + ".");
+  EXPECT_THAT(printed([&] { print_info(map, 1); }), HasSubstr("  - problem 60.\n"));
+  const std::string cut = printed([&] { print_problems(map.problems, 20); });
+  EXPECT_THAT(cut, testing::EndsWith("  - problem 20.\n  ... and 40 more; `railfix map info MAP` lists all\n"));
+}
+
 }  // namespace
 }  // namespace railfix::tool

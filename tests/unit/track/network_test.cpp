@@ -202,8 +202,9 @@ TEST(Check, NamesWhatIsWrong) {
   EXPECT_THAT(check_topology(map), testing::Contains(HasSubstr("edge 3 (siding) is not connected")));
   map = small_map();
   map.edges[1].from_node = 4;
-  EXPECT_THAT(check_topology(map), testing::Contains(HasSubstr("edge 2 (on) ends")));
-  EXPECT_THAT(check_topology(map), testing::Contains(HasSubstr("is a switch but only 2 tracks meet")));
+  EXPECT_THAT(check_topology(map),
+              testing::Contains(testing::ContainsRegex(
+                  "edge 2 .on. ends [0-9.]+ m from its node 4, which it shares with edge 3 .siding.$")));
   map = small_map();
   map.edges[0].alignment =
       Alignment({{500, 0, 0}, {500, 0, 0}},
@@ -217,6 +218,82 @@ TEST(Check, NamesWhatIsWrong) {
   const auto& main = map.edges[0].alignment;
   map.edges[0].alignment = Alignment(main.elements(), main.starts(), {}, {{0, 0}, {1000, -0.4}});
   EXPECT_THAT(check_topology(map), testing::Contains(HasSubstr("edge 1 (main) at 1000.00 m has a cant of -0.40 m")));
+}
+
+TEST(Check, NamesBalisesThatAreThereTwice) {
+  Map map = small_map();
+  map.landmarks.push_back({4, LandmarkKind::balise, 1, 900.3, 0, 0.1, ""});
+  EXPECT_THAT(check_topology(map),
+              testing::ElementsAre("balises \"B1\" and (no name) are at the same place, edge 1 (main) at 900.30 m"));
+}
+
+TEST(Check, NamesADanglingSwitchAsItsSourceDoes) {
+  Map map = small_map();
+  map.edges.pop_back();
+  map.connections.pop_back();
+  map.balise_groups.clear();
+  map.nodes.pop_back();
+  const auto dangling = [&] { return check_topology(map).front(); };
+  EXPECT_EQ(dangling(),
+            "switch \"W1\" at latitude 47.395843, longitude 8.511572 has only two tracks, the end of edge 1 (main) and "
+            "the start of edge 2 (on)");
+  map.nodes[1].name.clear();
+  map.crs.clear();
+  EXPECT_EQ(dangling(),
+            "a switch without a name at easting 2681000.00 m, northing 1250000.00 m has only two tracks, the end of "
+            "edge 1 (main) and the start of edge 2 (on)");
+  map.edges[0].is_drawn = map.edges[1].is_drawn = true;
+  EXPECT_THAT(dangling(), testing::StartsWith("a switch without a name has only two tracks"));
+  map.edges.pop_back();
+  map.connections.clear();
+  map.nodes.pop_back();
+  EXPECT_THAT(dangling(), testing::EndsWith("has only one track, the end of edge 1 (main)"));
+}
+
+/// Tracks of 60 m beside each other, the last 10 m of each a curve of this radius.
+Map with_radii(const std::vector<double>& radii_m) {
+  Map map;
+  for (uint32_t i = 0; i < radii_m.size(); ++i) {
+    const PlanPose begin{100.0 * i, 0, 0};
+    const Alignment track = Alignment::chained(begin, {{50, 0, 0}, {10, 1 / radii_m[i], 1 / radii_m[i]}});
+    const PlanPose end = track.at(60).pose;
+    map.edges.push_back({i + 1, "t" + std::to_string(i + 1), 2 * i + 1, 2 * i + 2, "", track});
+    map.nodes.push_back({2 * i + 1, NodeKind::end, "", begin.easting_m, begin.northing_m});
+    map.nodes.push_back({2 * i + 2, NodeKind::end, "", end.easting_m, end.northing_m});
+  }
+  return map;
+}
+
+TEST(Check, WhatCutsTheNetworkComesFirstAndManyRadiiAreCounted) {
+  Map map = with_radii({70, 500, 40, 50, 60, 30, 79});
+  map.edges.back().name = "long";
+  map.edges.back().alignment = Alignment::chained({600, 0, 0}, {{150, 0, 0}, {10, 1.0 / 79, 1.0 / 79}});
+  const PlanPose end = map.edges.back().alignment.at(160).pose;
+  map.nodes.back() = {14, NodeKind::end, "", end.easting_m, end.northing_m};
+  const std::vector<std::string> told = check_topology(map);
+  ASSERT_EQ(told.size(), 10U);
+  EXPECT_EQ(told[0], "edge 1 (t1), 60.00 m, cannot be reached from the rest of the network")
+      << "the longest is the rest";
+  EXPECT_EQ(told[6], "edge 6 (t6) at 50.00 m has a radius of only 30.00 m");
+  EXPECT_EQ(told[8], "edge 4 (t4) at 50.00 m has a radius of only 50.00 m");
+  EXPECT_EQ(told[9], "3 more of 7 edges have a radius of 60.00 m to 79.00 m");
+  EXPECT_THAT(check_topology(with_radii({70, 40})),
+              testing::IsSupersetOf({"edge 2 (t2) at 50.00 m has a radius of only 40.00 m",
+                                     "edge 1 (t1) at 50.00 m has a radius of only 70.00 m"}));
+}
+
+TEST(Check, TheLongestLostPartComesFirst) {
+  Map map = with_radii({500, 500, 500});
+  const auto lengthen = [&](size_t edge, double by_m) {
+    const PlanPose begin = map.edges[edge].alignment.at(0).pose;
+    map.edges[edge].alignment = Alignment::chained(begin, {{by_m, 0, 0}});
+    map.nodes[2 * edge + 1].easting_m = begin.easting_m;
+    map.nodes[2 * edge + 1].northing_m = by_m;
+  };
+  lengthen(1, 900);
+  lengthen(2, 200);
+  EXPECT_THAT(check_topology(map), testing::ElementsAre(HasSubstr("edge 3 (t3), 200.00 m, cannot"),
+                                                        HasSubstr("edge 1 (t1), 60.00 m, cannot")));
 }
 
 }  // namespace

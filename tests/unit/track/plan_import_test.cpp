@@ -213,7 +213,7 @@ TEST_F(PlanImport, WhatIsThereTwiceIsTold) {
   text.replace(text.find(second), second.size(),
                second + "<balise id=\"x3\" pos=\"250\"/><balise id=\"x4\" pos=\"250.2\"/>");
   EXPECT_THAT(core::value_or_throw(build_map({write("b.railml", text)}, {})).map.problems,
-              Contains("balises \"x3\" and \"x4\" are at the same place, edge 1 at 250.20 m"));
+              Contains(HasSubstr("balises \"x3\" and \"x4\" are at the same place, edge 1 (")));
   // In railML 3 too.
   text = kRailml3;
   text.replace(text.find("id=\"b3\""), 7, "id=\"b1\"");

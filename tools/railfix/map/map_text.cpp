@@ -56,7 +56,7 @@ void print_problems(const std::vector<std::string>& problems, size_t most) {
   std::printf("problems         %zu\n", problems.size());
   for (size_t i = 0; i < std::min(most, problems.size()); ++i) std::printf("  - %s\n", problems[i].c_str());
   if (problems.size() > most)
-    std::printf("  ... and %zu more; `railfix map info MAP --json` lists all\n", problems.size() - most);
+    std::printf("  ... and %zu more; `railfix map info MAP` lists all\n", problems.size() - most);
 }
 
 void print_summary(const track::Map& map) {
@@ -126,7 +126,7 @@ void print_info(const track::Map& map, size_t most_edges) {
   if (map.edges.size() > most_edges)
     std::printf("  ... and %zu more; --json lists all\n", map.edges.size() - most_edges);
   std::puts("");
-  print_problems(map.problems, 20);
+  print_problems(map.problems, map.problems.size());
 }
 
 namespace {
