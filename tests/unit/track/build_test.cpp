@@ -177,6 +177,16 @@ TEST_F(BuildTest, NodesThatAreMissingAreTold) {
   EXPECT_THAT(map.problems, testing::Contains(HasSubstr("way 5 names 1 node")));
 }
 
+TEST_F(BuildTest, WhatCutsTheNetworkIsToldFirst) {
+  const auto file =
+      write("cut.json", R"({"remark":"timed out","elements":[{"type":"way","id":7,"tags":{"railway":"rail",
+"incline":"up"},"geometry":[{"lat":48,"lon":15},{"lat":48,"lon":15.01}]},{"type":"way","id":8,"tags":{"railway":"rail"},
+"geometry":[{"lat":48,"lon":15.0103},{"lat":48,"lon":15.02}]}]})");
+  EXPECT_THAT(core::value_or_throw(build_map({file}, {})).map.problems,
+              testing::ElementsAre(HasSubstr("the extract may not be whole"), HasSubstr("end loose at nodes"),
+                                   HasSubstr("cannot be reached"), HasSubstr("incline")));
+}
+
 TEST_F(BuildTest, ARingIsOneEdgeJoinedToItself) {
   std::string nodes;
   std::string refs;

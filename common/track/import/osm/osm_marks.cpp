@@ -1,11 +1,45 @@
 #include "track/import/osm/osm_marks.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 
 #include "core/units.hpp"
 
 namespace railfix::track {
+namespace {
+
+/// A limit that is not read is none: trains would seem to be allowed more than they are.
+std::string unread_speeds(const OsmData& data) {
+  size_t count = 0;
+  std::string first;
+  for (const OsmWay& way : data.ways) {
+    for (const char* key : {"maxspeed", "maxspeed:forward", "maxspeed:backward"}) {
+      const std::string value = value_of(way.tags, key);
+      if (value.empty() || value == "none" || value == "signals" || speed_mps_of(value)) continue;
+      if (count++ == 0) first = "the first one is \"" + value + "\" of way " + std::to_string(way.id);
+    }
+  }
+  if (count == 0) return "";
+  return std::to_string(count) + " speed limits are no number of km/h or mph, " + first + "; left out";
+}
+
+std::string unread_grades(const OsmData& data) {
+  const auto has_grade = [](const OsmWay& way) { return is_set(way.tags, "incline"); };
+  const auto first = std::ranges::find_if(data.ways, has_grade);
+  if (first == data.ways.end()) return "";
+  return "grades of OpenStreetMap are not read; tracks with incline: " +
+         std::to_string(std::ranges::count_if(data.ways, has_grade)) + ", the first one way " +
+         std::to_string(first->id);
+}
+
+}  // namespace
+
+std::vector<std::string> unread_tags(const OsmData& data) {
+  std::vector<std::string> told{unread_speeds(data), unread_grades(data)};
+  std::erase(told, "");
+  return told;
+}
 
 std::optional<double> speed_mps_of(const std::string& text) {
   double value = 0;

@@ -22,6 +22,9 @@ struct OsmChain {
 /// maxspeed: "80" (km/h) or "50 mph"; nothing where it says anything else.
 std::optional<double> speed_mps_of(const std::string& text);
 
+/// What ways say of speeds and grades that is not read, one sentence each.
+std::vector<std::string> unread_tags(const OsmData& data);
+
 /// What a node says that stands there, if anything.
 std::optional<TrackMark> point_mark(const OsmTags& tags, double offset_m);
 

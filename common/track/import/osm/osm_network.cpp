@@ -53,7 +53,7 @@ class Builder {
     for (OsmChain& chain : chains_) add_edge(chain);
     add_marks_at_nodes(data_, chains_, out_.draft);
     add_trackside();
-    tell_speeds();
+    for (std::string& problem : unread_tags(data_)) out_.problems.push_back(std::move(problem));
     return std::move(out_);
   }
 
@@ -286,22 +286,6 @@ class Builder {
                               " stop positions and no platform; an extract with railway=platform and platform_edge "
                               "would have their ends as references");
     }
-  }
-
-  /// A limit that is not read is none: trains would seem to be allowed more than they are.
-  void tell_speeds() {
-    size_t count = 0;
-    std::string first;
-    for (const OsmWay& way : data_.ways) {
-      for (const char* key : {"maxspeed", "maxspeed:forward", "maxspeed:backward"}) {
-        const std::string value = value_of(way.tags, key);
-        if (value.empty() || value == "none" || value == "signals" || speed_mps_of(value)) continue;
-        if (count++ == 0) first = "the first one is \"" + value + "\" of way " + std::to_string(way.id);
-      }
-    }
-    if (count > 0)
-      out_.problems.push_back(std::to_string(count) + " speed limits are no number of km/h or mph, " + first +
-                              "; left out");
   }
 
   void tell_left_out(const std::string& track, const ClothoidFit& fit) {
