@@ -220,15 +220,14 @@ class Check {
       double length_m = 0;
       const Edge* first = nullptr;
     };
-    std::map<size_t, Part> by_root;
+    std::vector<Part> parts(part.size());  // by their roots
     for (size_t i = 0; i < part.size(); ++i) {
-      Part& own = by_root[root(i)];
+      Part& own = parts[root(i)];
       ++own.edges;
       own.length_m += map_.edges[i].alignment.length_m();
       if (own.first == nullptr) own.first = &map_.edges[i];
     }
-    std::vector<Part> parts;
-    for (const auto& [first, own] : by_root) parts.push_back(own);
+    std::erase_if(parts, [](const Part& own) { return own.edges == 0; });
     std::ranges::stable_sort(parts, std::greater{}, &Part::length_m);
     for (size_t i = 1; i < parts.size(); ++i) {
       const Part& lost = parts[i];
