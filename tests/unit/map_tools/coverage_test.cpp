@@ -10,91 +10,130 @@ namespace {
 
 using track::Direction;
 
-/// The small map's main line: 1800 m, one group at 900 m with Q_LOCACC 5 m.
-track::Path main_line(Direction direction = Direction::forward) {
-  const auto map = std::make_shared<const track::Map>(track::small_map());
-  const bool forward = direction == Direction::forward;
-  return core::value_or_throw(track::Path::follow(map, {forward ? 1U : 2U, forward ? 0.0 : 800.0, direction}, 5000, 0));
+/// 1800 m with a balise at 900 m, a mast at 300 m and a group for the balise.
+track::Path main_line(const track::Map& map) {
+  return core::value_or_throw(
+      track::Path::follow(std::make_shared<const track::Map>(map), {1, 0, track::Direction::forward}, 5000, 0));
+}
+track::Path main_line() {
+  return main_line(track::small_map());
 }
 
-TEST(Coverage, SaysWhereTheIntervalOutgrowsTheLimit) {
-  // 1 % of the way on top of 5 m: 10 m after 500 m.
-  const CoverageOptions options{.scale_sigma = 0.0025, .sigmas = 4, .limit_m = 10, .virtual_locacc_m = 5};
-  const Coverage found = coverage_of(main_line(), options);
-  EXPECT_EQ(found.references, 1U);
-  ASSERT_EQ(found.gaps.size(), 2U);
-  EXPECT_NEAR(found.gaps[0].from_m, 500, 1e-9);
-  EXPECT_NEAR(found.gaps[0].to_m, 900, 1e-9);
-  EXPECT_NEAR(found.gaps[0].largest_m, 14, 1e-9);
-  EXPECT_FALSE(found.gaps[0].outside_budget);
-  ASSERT_EQ(found.gaps[0].references_m.size(), 1U);
-  EXPECT_NEAR(found.gaps[0].references_m[0], 500, 1e-9);
-  EXPECT_NEAR(found.gaps[1].from_m, 1400, 1e-6);
-  EXPECT_NEAR(found.covered_m, 1000, 1e-6);
+/// A straight line of 1500 m with these landmarks.
+constexpr double kLineM = 1500;
+track::Path line_with(std::vector<track::Landmark> landmarks) {
+  track::Map map;
+  map.nodes = {{1, track::NodeKind::end, "", 0, 0}, {2, track::NodeKind::end, "", 0, kLineM}};
+  map.edges.push_back({1, "line", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{kLineM, 0, 0}})});
+  map.landmarks = std::move(landmarks);
+  return main_line(map);
+}
+track::Landmark frog_at(double offset_m) {
+  return {static_cast<uint32_t>(offset_m), track::LandmarkKind::frog, 1, offset_m, 0.7, 0.1, "frog"};
 }
 
-TEST(Coverage, IsOtherTheOtherWay) {
-  const CoverageOptions options{.scale_sigma = 0.0025, .sigmas = 4, .limit_m = 10, .virtual_locacc_m = 5};
-  const Coverage found = coverage_of(main_line(Direction::reverse), options);
-  ASSERT_EQ(found.gaps.size(), 2U);
-  EXPECT_NEAR(found.gaps[0].to_m, 900, 1e-6);  // 800 + 100 back to the group
-
-  // The same way run backwards, in its own distances.
-  const track::Path there = main_line();
-  const Coverage back = coverage_of(there, options, true);
-  ASSERT_EQ(back.gaps.size(), 2U);
-  EXPECT_NEAR(back.covered_m, found.covered_m, 1e-6);
-  for (size_t i = 0; i < 2; ++i) {
-    EXPECT_NEAR(back.gaps[i].from_m, there.end_m() - found.gaps[i].from_m, 1e-6);
-    EXPECT_NEAR(back.gaps[i].to_m, there.end_m() - found.gaps[i].to_m, 1e-6);
-    EXPECT_NEAR(back.gaps[i].references_m[0], there.end_m() - found.gaps[i].references_m[0], 1e-6);
+double half_at(const std::vector<PromisedPlace>& promised, double at_m) {
+  for (const PromisedPlace& place : promised) {
+    if (place.at_m >= at_m) return place.half_m;
   }
+  return std::nan("");
+}
+double largest(const std::vector<PromisedPlace>& promised) {
+  double largest_m = 0;
+  for (const PromisedPlace& place : promised) largest_m = std::max(largest_m, place.half_m);
+  return largest_m;
 }
 
-TEST(Coverage, GoodOdometryNeedsNoMore) {
-  EXPECT_TRUE(coverage_of(main_line(), {.scale_sigma = 0.0005, .sigmas = 4.5, .limit_m = 10}).gaps.empty());
+TEST(Coverage, AVirtualGroupIsOnlyAName) {
+  track::Map map = track::small_map();
+  const auto without = promised_on(main_line(map), {});
+  for (uint32_t i = 0; i < 8; ++i) map.balise_groups.push_back({85, 200 + i, 1, 100.0 + 100 * i, true, true, 1, {}});
+  const track::Path named = main_line(map);
+  const auto with = promised_on(named, {});
+  EXPECT_EQ(references_on(named, {}).virtual_groups, 8U);
+  ASSERT_EQ(with.size(), without.size());
+  for (size_t i = 0; i < with.size(); ++i) ASSERT_EQ(with[i].half_m, without[i].half_m) << with[i].at_m;
 }
 
-TEST(Coverage, TellsWhatIsBeyondTheBudgetAndWhatNothingHelps) {
-  const Coverage found =
-      coverage_of(main_line(), {.scale_sigma = 0.02, .sigmas = 4, .limit_m = 4, .virtual_locacc_m = 5});
-  ASSERT_FALSE(found.gaps.empty());
-  EXPECT_TRUE(found.gaps[0].outside_budget);
-  EXPECT_TRUE(found.gaps[0].references_m.empty());
+TEST(Coverage, CountsWhatTheCameraSights) {
+  track::Map map = track::small_map();
+  map.landmarks.push_back({4, track::LandmarkKind::underbridge, 1, 500, 0, 3, "viaduct"});
+  map.landmarks.push_back({5, track::LandmarkKind::level_crossing, 1, 600, 0, 3, "lane"});
+  const track::Path path = main_line(map);
+  const References all = references_on(path, {});
+  EXPECT_EQ(all.counted,
+            (std::map<track::LandmarkKind, size_t>{{track::LandmarkKind::balise, 1}, {track::LandmarkKind::mast, 1}}));
+  EXPECT_EQ(all.unsighted_groups, 0U);
+  CoverageOptions masts;
+  masts.sighted = {track::LandmarkKind::mast};
+  EXPECT_EQ(references_on(path, masts).counted.size(), 1U);
+  EXPECT_EQ(references_on(path, masts).unsighted_groups, 1U);
+  const auto frogs = {frog_at(300), frog_at(600), frog_at(700)};
+  EXPECT_EQ(largest(promised_on(line_with(frogs), masts)), largest(promised_on(line_with({}), {})));
 }
 
-TEST(Coverage, NaturalReferencesCountWhereAskedFor) {
-  CoverageOptions options{.scale_sigma = 0.0025, .sigmas = 4, .limit_m = 10, .virtual_locacc_m = 5, .natural = true};
-  const Coverage found = coverage_of(main_line(), options);
-  EXPECT_EQ(found.references, 2U);  // the mast at 300 m
-  EXPECT_NEAR(found.gaps[0].from_m, 900 + (10 - 5) / 0.01, 1e-6);
+TEST(Coverage, OneLandmarkAloneIsHardlyBelieved) {
+  const auto none = promised_on(line_with({}), {});
+  const auto one = promised_on(line_with({frog_at(600)}), {});
+  const auto three = promised_on(line_with({frog_at(600), frog_at(800), frog_at(1000)}), {});
+  EXPECT_NEAR(half_at(one, 550), half_at(none, 550), 0.01);
+  EXPECT_GT(half_at(one, 1100), 0.7 * half_at(none, 1100));  // the place without it is held, too
+  EXPECT_LT(half_at(three, 1100), 0.3 * half_at(none, 1100));
 }
 
-/// A mast every 50 m on the first 1000 m, so roughly known that none brings the train under 12 m.
-track::Path line_of_rough_masts() {
-  auto map = std::make_shared<track::Map>(track::small_map());
-  map->balise_groups.clear();
-  map->landmarks.clear();
-  for (uint32_t id = 1; id <= 20; ++id)
-    map->landmarks.push_back({id, track::LandmarkKind::mast, 1, 50.0 * id - 25, -3, 3, "mast"});
-  return core::value_or_throw(track::Path::follow(map, {1, 0, Direction::forward}, 5000, 0));
-}
-
-TEST(Coverage, CountsEveryMetreOnceHoweverManyReferencesDoNotHelp) {
-  const track::Path path = line_of_rough_masts();
-  CoverageOptions options{.scale_sigma = 0.01, .sigmas = 4.5, .limit_m = 12, .virtual_locacc_m = 5, .natural = true};
+TEST(Coverage, GapsAndWhatIsCoveredAreTheWholeWay) {
   for (const bool backwards : {false, true}) {
-    const Coverage found = coverage_of(path, options, backwards);
-    EXPECT_NEAR(found.covered_m, 7 / 0.045, 1e-6);  // masts of 13.5 m, each of which helps a train that knows less
-    ASSERT_EQ(found.gaps.size(), 1U);
-    EXPECT_NEAR(std::abs(found.gaps[0].to_m - found.gaps[0].from_m), 1800 - 7 / 0.045, 1e-6);
-    EXPECT_EQ(found.gaps[0].references_m.size(), 11U);  // every 155.6 m of it
-    EXPECT_NEAR(std::abs(found.gaps[0].references_m[1] - found.gaps[0].references_m[0]), 7 / 0.045, 1e-6);
+    CoverageOptions options;
+    options.limit_m = 20;
+    const Coverage found = coverage_of(main_line(), options, backwards);
+    double gaps_m = 0;
+    for (const CoverageGap& gap : found.now.gaps) {
+      EXPECT_GT(gap.largest_m, 20);
+      EXPECT_EQ(gap.to_m > gap.from_m, !backwards);
+      gaps_m += std::abs(gap.to_m - gap.from_m);
+    }
+    EXPECT_GT(gaps_m, 100);
+    EXPECT_NEAR(gaps_m + found.now.covered_m, 1800, 1e-6);
   }
-  options.limit_m = 30;
-  const Coverage all = coverage_of(path, options);
-  EXPECT_LE(all.covered_m, path.end_m());
-  EXPECT_NEAR(all.covered_m + (all.gaps.empty() ? 0 : all.gaps[0].to_m - all.gaps[0].from_m), path.end_m(), 1e-6);
+}
+
+TEST(Coverage, IsTheSameForATrainThatMeetsTheSame) {
+  CoverageOptions options;
+  options.limit_m = 20;
+  const Coverage there = coverage_of(line_with({frog_at(300), frog_at(600), frog_at(700)}), options);
+  const Coverage back = coverage_of(line_with({frog_at(800), frog_at(900), frog_at(1200)}), options, true);
+  EXPECT_NEAR(back.now.covered_m, there.now.covered_m, 1e-6);
+  ASSERT_EQ(back.now.gaps.size(), there.now.gaps.size());
+  for (size_t i = 0; i < there.now.gaps.size(); ++i)
+    EXPECT_NEAR(back.now.gaps[i].from_m, kLineM - there.now.gaps[i].from_m, 1e-6);
+  ASSERT_EQ(back.markers_m.size(), there.markers_m.size());
+  for (size_t i = 0; i < there.markers_m.size(); ++i) EXPECT_NEAR(back.markers_m[i], kLineM - there.markers_m[i], 1e-6);
+}
+
+TEST(Coverage, WhatItProposesHelps) {
+  const Coverage found = coverage_of(line_with({}), {});
+  ASSERT_FALSE(found.markers_m.empty());
+  EXPECT_LT(found.now.covered_m, 400);
+  EXPECT_TRUE(found.with_markers.gaps.empty());
+  EXPECT_LE(found.with_markers.largest_m, 10);
+  std::vector<track::Landmark> masts;
+  for (const double at_m : found.markers_m)
+    masts.push_back({static_cast<uint32_t>(masts.size() + 1), track::LandmarkKind::mast, 1, at_m, -3, 0.1, ""});
+  EXPECT_LE(largest(promised_on(line_with(masts), {})), 10);
+}
+
+TEST(Coverage, NothingHelpsAgainstALimitThatFusionNeverPromises) {
+  CoverageOptions options;
+  options.limit_m = 0.4;
+  const Coverage found = coverage_of(line_with({}), options);
+  EXPECT_NEAR(found.now.covered_m, 0, 1e-6);
+  EXPECT_TRUE(found.markers_m.empty());
+}
+
+TEST(Coverage, GoesByFusionsParameters) {
+  CoverageOptions options;
+  options.fusion.visual_scale_sigma = options.fusion.wheel_scale_sigma = 0.002;
+  EXPECT_LT(largest(promised_on(line_with({}), options)), 0.5 * largest(promised_on(line_with({}), {})));
 }
 
 TEST(Coverage, ARingIsOneLap) {
@@ -117,17 +156,6 @@ TEST(Coverage, AWayHasALength) {
   EXPECT_NEAR(core::value_or_throw(way_from(map, {1, 0, Direction::forward}, 500)).end_m(), 500, 1e-9);
   for (const double length_m : {0.0, -5.0, std::nan("")})
     EXPECT_FALSE(way_from(map, {1, 0, Direction::forward}, length_m).ok()) << length_m;
-}
-
-TEST(Coverage, WhatNobodySightsIsNoReference) {
-  auto map = std::make_shared<track::Map>(track::small_map());
-  map->landmarks.push_back({4, track::LandmarkKind::underbridge, 1, 500, 0, 3, "viaduct"});
-  map->landmarks.push_back({5, track::LandmarkKind::level_crossing, 1, 600, 0, 3, "lane"});
-  const auto path = core::value_or_throw(track::Path::follow(map, {1, 0, Direction::forward}, 5000, 0));
-  EXPECT_EQ(coverage_of(path, {.natural = true}).references, 2U);
-  map->landmarks[3].kind = track::LandmarkKind::bridge;
-  const auto over = core::value_or_throw(track::Path::follow(map, {1, 0, Direction::forward}, 5000, 0));
-  EXPECT_EQ(coverage_of(over, {.natural = true}).references, 3U);
 }
 
 }  // namespace

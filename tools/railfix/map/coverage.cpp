@@ -2,50 +2,24 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <set>
+#include <utility>
 
 namespace railfix::tool {
 namespace {
 
-struct Reference {
-  double at_m = 0;
-  double accuracy_m = 0;
-};
+// In runs with pictures odometers and landmarks are off by something, and rivals a little elsewhere
+// (docs/figures/map.md).
+constexpr double kOfRealRuns = 1.07;
+constexpr double kWidestRowM = 1000;
+constexpr double kNarrowestRowM = 60;
+constexpr double kSightedFromM = 20;   // a train that begins there has passed what is nearer
+constexpr double kMarkerBesideM = -3;  // right
 
-std::vector<Reference> references_on(const track::Path& path, const CoverageOptions& options) {
-  std::vector<Reference> out;
-  for (const track::PathBaliseGroup& group : path.balise_groups())
-    out.push_back({group.distance_m, group.group->q_locacc_m});
-  for (const track::PathLandmark& mark : path.landmarks()) {
-    // Balises come with their groups.
-    const bool is_natural = track::can_be_sighted(mark.kind) && mark.kind != track::LandmarkKind::balise;
-    if (options.natural && is_natural) out.push_back({mark.distance_m, options.sigmas * mark.landmark->sigma_m});
-  }
-  std::sort(out.begin(), out.end(), [](const Reference& a, const Reference& b) { return a.at_m < b.at_m; });
-  return out;
-}
-
-/// How far a train gets behind a reference before the limit.
-double reach_m(const CoverageOptions& options, double accuracy_m) {
-  return std::max(0.0, (options.limit_m - accuracy_m) / (options.sigmas * options.scale_sigma));
-}
-
-/// Gaps that touch are one.
-void add_gap(const CoverageGap& gap, std::vector<CoverageGap>& gaps) {
-  if (gaps.empty() || gaps.back().to_m < gap.from_m) {
-    gaps.push_back(gap);
-    return;
-  }
-  CoverageGap& last = gaps.back();
-  last.to_m = gap.to_m;
-  last.largest_m = std::max(last.largest_m, gap.largest_m);
-  last.outside_budget = last.outside_budget || gap.outside_budget;
-}
-
-void propose_references(const CoverageOptions& options, CoverageGap& gap) {
-  const double step = reach_m(options, options.virtual_locacc_m);
-  // With no reach at all no virtual reference helps.
-  for (double at = gap.from_m; step > 1.0 && at < gap.to_m; at += step) gap.references_m.push_back(at);
+bool counts(track::LandmarkKind kind, const CoverageOptions& options) {
+  const auto& kinds = options.sighted;
+  return track::can_be_sighted(kind) && (kinds.empty() || std::ranges::find(kinds, kind) != kinds.end());
 }
 
 /// Where a way runs over a track for the second time, as on a ring; nothing where it does not.
@@ -60,11 +34,116 @@ std::optional<double> until_it_comes_again(const track::Path& path) {
   return std::nullopt;
 }
 
-}  // namespace
+/// Distances of a path as the train meets them, from 0 on; and back.
+class Running {
+ public:
+  Running(const track::Path& path, bool backwards) : path_(path), backwards_(backwards) {}
 
-double half_interval_m(const CoverageOptions& options, double locacc_m, double way_m) {
-  return locacc_m + options.sigmas * options.scale_sigma * way_m;
+  [[nodiscard]] double run_m(double path_m) const {
+    return backwards_ ? path_.end_m() - path_m : path_m - path_.begin_m();
+  }
+  [[nodiscard]] double path_m(double run_m) const {
+    return backwards_ ? path_.end_m() - run_m : path_.begin_m() + run_m;
+  }
+  [[nodiscard]] double length_m() const { return path_.end_m() - path_.begin_m(); }
+
+  [[nodiscard]] RideWay way(const CoverageOptions& options) const {
+    RideWay way{.length_m = length_m()};
+    const double sign = backwards_ ? -1 : 1;
+    const bool has_heights = path_.grade_known_at(path_m(0));
+    double elevation_m = 0;
+    for (double at_m = 0; at_m < way.length_m + 2 * RideWay::kSampledEveryM; at_m += RideWay::kSampledEveryM) {
+      way.curvature_per_m.push_back(sign * path_.curvature_at(path_m(at_m)));
+      if (!has_heights) continue;
+      way.elevation_m.push_back(elevation_m);
+      const double grade = sign * path_.at(path_m(at_m + 0.5 * RideWay::kSampledEveryM)).grade;
+      elevation_m += grade * RideWay::kSampledEveryM;
+    }
+    for (const track::PathLandmark& mark : path_.landmarks()) {
+      if (!counts(mark.kind, options)) continue;
+      track::Landmark seen = *mark.landmark;
+      seen.kind = track::seen_along(mark.kind, !backwards_);
+      seen.offset_m = run_m(mark.distance_m);
+      seen.lateral_m = sign * mark.lateral_m;
+      way.landmarks.push_back(std::move(seen));
+    }
+    if (backwards_) std::ranges::reverse(way.landmarks);
+    return way;
+  }
+
+ private:
+  const track::Path& path_;
+  bool backwards_;
+};
+
+std::vector<PromisedPlace> promised_on(const RideWay& way, const CoverageOptions& options) {
+  std::vector<PromisedPlace> promised = nominal_ride(way, options.fusion, options.speed_mps);
+  for (PromisedPlace& place : promised) place.half_m *= kOfRealRuns;
+  return promised;
 }
+
+Extent extent_of(const RideWay& way, const CoverageOptions& options) {
+  Extent out{.covered_m = way.length_m};
+  double before_m = 0;
+  bool is_open = false;
+  for (const PromisedPlace& place : promised_on(way, options)) {
+    out.largest_m = std::max(out.largest_m, place.half_m);
+    const bool was_open = std::exchange(is_open, place.half_m > options.limit_m);
+    if (is_open) {
+      if (!was_open) out.gaps.push_back({.from_m = before_m});
+      CoverageGap& gap = out.gaps.back();
+      gap.to_m = place.at_m;
+      gap.largest_m = std::max(gap.largest_m, place.half_m);
+      gap.outside_budget = gap.outside_budget || place.outside_budget;
+      out.covered_m -= place.at_m - before_m;
+    }
+    before_m = place.at_m;
+  }
+  if (is_open) {  // less than a picture is left
+    out.gaps.back().to_m = way.length_m;
+    out.covered_m -= way.length_m - before_m;
+  }
+  return out;
+}
+
+// Fusion believes none of the last two: the third of a row lies where the interval would be too long.
+void add_row(const CoverageGap& gap, double every_m, double sigma_m, RideWay& way, std::vector<double>& markers_m) {
+  const auto by_place = [](const track::Landmark& a, const track::Landmark& b) { return a.offset_m < b.offset_m; };
+  for (double at_m = gap.from_m - 2 * every_m; at_m < gap.to_m; at_m += every_m) {
+    const auto is_near = [&](const track::Landmark& mark) { return std::abs(mark.offset_m - at_m) < 0.5 * every_m; };
+    if (at_m < kSightedFromM || std::ranges::any_of(way.landmarks, is_near)) continue;
+    const track::Landmark marker{.kind = track::LandmarkKind::mast,
+                                 .offset_m = at_m,
+                                 .lateral_m = kMarkerBesideM,
+                                 .sigma_m = sigma_m,
+                                 .name = {}};
+    way.landmarks.insert(std::ranges::upper_bound(way.landmarks, marker, by_place), marker);
+    markers_m.push_back(at_m);
+  }
+}
+
+// Rows are made closer only where the wider ones do not help.
+void propose_markers(RideWay way, const CoverageOptions& options, Coverage& out) {
+  out.with_markers = out.now;
+  for (double every_m = kWidestRowM; every_m > kNarrowestRowM && !out.with_markers.gaps.empty(); every_m /= 2) {
+    for (const CoverageGap& gap : out.with_markers.gaps)
+      add_row(gap, every_m, options.marker_sigma_m, way, out.markers_m);
+    out.with_markers = extent_of(way, options);
+  }
+  std::ranges::sort(out.markers_m);
+  if (out.with_markers.covered_m > out.now.covered_m) return;
+  out.markers_m.clear();
+  out.with_markers = out.now;
+}
+
+void put_on_path(const Running& running, Extent& extent) {
+  for (CoverageGap& gap : extent.gaps) {
+    gap.from_m = running.path_m(gap.from_m);
+    gap.to_m = running.path_m(gap.to_m);
+  }
+}
+
+}  // namespace
 
 core::Result<track::Path> way_from(std::shared_ptr<const track::Map> map, const track::EdgePosition& start,
                                    double length_m) {
@@ -75,36 +154,36 @@ core::Result<track::Path> way_from(std::shared_ptr<const track::Map> map, const 
   return lap_m ? track::Path::follow(std::move(map), start, std::min(*lap_m, length_m), 0) : path;
 }
 
-Coverage coverage_of(const track::Path& path, const CoverageOptions& options, bool backwards) {
-  Coverage out;
-  std::vector<Reference> references = references_on(path, options);
-  out.references = references.size();
-  if (backwards) {  // along an axis that runs the other way
-    std::reverse(references.begin(), references.end());
-    for (Reference& reference : references) reference.at_m = -reference.at_m;
+References references_on(const track::Path& path, const CoverageOptions& options) {
+  References out;
+  for (const track::PathLandmark& mark : path.landmarks()) {
+    if (counts(mark.kind, options)) ++out.counted[mark.kind];
   }
-  // Nothing is reset at the end, it only ends the last stretch.
-  references.push_back({backwards ? -path.begin_m() : path.end_m(), 0});
-  Reference last{backwards ? -path.end_m() : path.begin_m(), options.virtual_locacc_m};
-  for (const Reference& next : references) {
-    const double way = next.at_m - last.at_m;
-    const double half = half_interval_m(options, last.accuracy_m, way);
-    // A reference that knows less than the train does not help it: the stretch goes on.
-    if (next.accuracy_m >= half) continue;
-    out.largest_m = std::max(out.largest_m, half);
-    const double reach = reach_m(options, last.accuracy_m);
-    out.covered_m += std::min(way, reach);
-    if (way > reach) add_gap({last.at_m + reach, next.at_m, half, {}, half > 5.0 + 0.05 * way}, out.gaps);
-    last = next;
-  }
-  for (CoverageGap& gap : out.gaps) propose_references(options, gap);
-  if (backwards) {
-    for (CoverageGap& gap : out.gaps) {
-      gap.from_m = -gap.from_m;
-      gap.to_m = -gap.to_m;
-      for (double& at : gap.references_m) at = -at;
+  const bool balises_count = counts(track::LandmarkKind::balise, options);
+  for (const track::PathBaliseGroup& group : path.balise_groups()) {
+    const bool on_map = std::ranges::any_of(group.group->balises, [](uint32_t id) { return id != 0; });
+    if (group.group->is_virtual) {
+      ++out.virtual_groups;
+    } else if (!balises_count || !on_map) {
+      ++out.unsighted_groups;
     }
   }
+  return out;
+}
+
+std::vector<PromisedPlace> promised_on(const track::Path& path, const CoverageOptions& options, bool backwards) {
+  return promised_on(Running(path, backwards).way(options), options);
+}
+
+Coverage coverage_of(const track::Path& path, const CoverageOptions& options, bool backwards) {
+  const Running running(path, backwards);
+  RideWay way = running.way(options);
+  Coverage out;
+  out.now = extent_of(way, options);
+  propose_markers(std::move(way), options, out);
+  put_on_path(running, out.now);
+  put_on_path(running, out.with_markers);
+  for (double& at_m : out.markers_m) at_m = running.path_m(at_m);
   return out;
 }
 

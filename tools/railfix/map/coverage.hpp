@@ -1,46 +1,64 @@
-// Where on a way the confidence interval outgrows a limit, from how odometry drifts between references.
+// Where on a way the promised interval would outgrow a limit, and what would help: a nominal ride with what the camera
+// can sight there. Balise groups are only names to the services.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <vector>
 
 #include "core/result.hpp"
+#include "fusion/fusion_parameters.hpp"
+#include "map/nominal_ride.hpp"
 #include "track/path.hpp"
 
 namespace railfix::tool {
 
 struct CoverageOptions {
-  double scale_sigma = 0.002;   // of odometry, 1 sigma, as a part of the way
-  double sigmas = 4.5;          // the interval on either side, in sigmas
+  fusion::FusionParameters fusion;
+  std::vector<track::LandmarkKind> sighted;  // only these; empty = all that can be
+  double speed_mps = 80 / 3.6;
   double limit_m = 10;          // half the interval must not be longer
-  double virtual_locacc_m = 5;  // Q_LOCACC of virtual groups that are proposed
-  bool natural = false;         // frogs, portals, bridges, masts and platforms of the map count as references too
+  double marker_sigma_m = 0.1;  // of the place of a marker that is proposed, on the map
+};
+
+/// What of a way's map tells fusion where the train is, and what does not.
+struct References {
+  std::map<track::LandmarkKind, size_t> counted;
+  size_t virtual_groups = 0;
+  size_t unsighted_groups = 0;  // real ones of which no balise is among the landmarks that count
 };
 
 struct CoverageGap {
   double from_m = 0;  // distances on the path
   double to_m = 0;
-  double largest_m = 0;              // half the interval at its end
-  std::vector<double> references_m;  // places for virtual references that keep the limit, as few as can be
-  bool outside_budget = false;       // beyond 5 m + 5 % of the way since the last reference (SUBSET-041)
+  double largest_m = 0;         // half the interval
+  bool outside_budget = false;  // somewhere more than 5 m + 5 % of the way since the last sure reference (SUBSET-041)
+};
+
+struct Extent {
+  double covered_m = 0;
+  double largest_m = 0;
+  std::vector<CoverageGap> gaps{};  // as the train meets them
 };
 
 struct Coverage {
-  size_t references = 0;
-  double covered_m = 0;
-  double largest_m = 0;
-  std::vector<CoverageGap> gaps;
+  Extent now;
+  std::vector<double> markers_m;  // places on the path for what would help, as the train meets them
+  Extent with_markers;
 };
-
-/// Half the interval behind a reference of this location accuracy.
-double half_interval_m(const CoverageOptions& options, double locacc_m, double way_m);
 
 /// The straight way from a place, as long as asked for or to the end of the track; a length must be more than 0 m.
 core::Result<track::Path> way_from(std::shared_ptr<const track::Map> map, const track::EdgePosition& start,
                                    double length_m);
 
-/// The path is run from its begin (backwards: from its end), where the place is known as at a virtual reference. Gaps
-/// come as the train meets them, in distances on the path; where references do not help within one, it stays one.
+References references_on(const track::Path& path, const CoverageOptions& options);
+
+/// What a train is promised on the way, in metres run: as in a nominal ride, and a little more, because in real ones
+/// sensors err by something.
+std::vector<PromisedPlace> promised_on(const track::Path& path, const CoverageOptions& options, bool backwards = false);
+
+/// The path is run from its begin (backwards: from its end), where fusion is told to be. Markers are proposed where
+/// they make the interval hold the limit on more of the way.
 Coverage coverage_of(const track::Path& path, const CoverageOptions& options, bool backwards = false);
 
 }  // namespace railfix::tool

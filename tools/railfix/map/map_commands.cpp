@@ -1,15 +1,10 @@
 #include "map/map_commands.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
-#include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 
-#include "core/units.hpp"
-#include "map/coverage.hpp"
 #include "map/drawing.hpp"
 #include "map/survey.hpp"
 #include "number_between.hpp"
@@ -17,8 +12,6 @@
 
 namespace railfix::tool {
 namespace {
-
-using nlohmann::ordered_json;
 
 struct DrawRequest {
   std::string map;
@@ -34,79 +27,6 @@ int draw(DrawRequest request) {
   core::ok_or_throw(write_drawing(draw_map(map, request.options), request.out));
   say_beside({request.out});
   std::printf("written          %s\n", request.out.c_str());
-  return 0;
-}
-
-struct CoverageRequest {
-  std::string map;
-  std::string start = "1:0";
-  double length_m = 1e7;
-  bool as_json = false;
-  CoverageOptions options;
-};
-
-std::string place_text(const track::Path& path, double distance_m) {
-  const track::EdgePosition place = path.position_at(distance_m);
-  char text[64];
-  std::snprintf(text, sizeof text, "%u:%.0f%s", place.edge, place.offset_m,
-                place.direction == track::Direction::reverse ? ":-" : "");
-  return text;
-}
-
-ordered_json coverage_json(const track::Path& path, const Coverage& found) {
-  ordered_json gaps = ordered_json::array();
-  for (const CoverageGap& gap : found.gaps) {
-    ordered_json places = ordered_json::array();
-    for (const double at : gap.references_m) places.push_back(place_text(path, at));
-    gaps.push_back({{"from", place_text(path, gap.from_m)},
-                    {"to", place_text(path, gap.to_m)},
-                    {"length_m", std::abs(gap.to_m - gap.from_m)},
-                    {"largest_half_interval_m", gap.largest_m},
-                    {"outside_subset_041", gap.outside_budget},
-                    {"virtual_references", places}});
-  }
-  return {{"way_m", path.end_m() - path.begin_m()},
-          {"references", found.references},
-          {"covered_m", found.covered_m},
-          {"largest_half_interval_m", found.largest_m},
-          {"gaps", gaps}};
-}
-
-void print_coverage(const char* way_name, const track::Path& path, const Coverage& found) {
-  const double way = path.end_m() - path.begin_m();
-  std::printf("within, %-8s %.1f km (%.1f %%), largest %.1f m\n", way_name, found.covered_m / 1e3,
-              100 * found.covered_m / std::max(way, 1.0), found.largest_m);
-  for (const CoverageGap& gap : found.gaps) {
-    std::printf("  too wide       %s to %s (%.0f m), up to %.1f m%s\n", place_text(path, gap.from_m).c_str(),
-                place_text(path, gap.to_m).c_str(), std::abs(gap.to_m - gap.from_m), gap.largest_m,
-                gap.outside_budget ? ", beyond 5 m + 5 %" : "");
-    std::printf("    reference at");
-    if (gap.references_m.empty()) std::printf(" no place helps: a virtual one is not better than the limit");
-    for (const double at : gap.references_m) std::printf(" %s", place_text(path, at).c_str());
-    std::printf("\n");
-  }
-}
-
-int coverage(const CoverageRequest& request) {
-  const auto map = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(request.map)));
-  const track::EdgePosition start = core::value_or_throw(map->parse_position(request.start));
-  const track::Path path = core::value_or_throw(way_from(map, start, request.length_m));
-  const Coverage found = coverage_of(path, request.options);
-  const Coverage back = coverage_of(path, request.options, true);
-  if (request.as_json) {
-    ordered_json json = coverage_json(path, found);
-    json["back"] = coverage_json(path, back);
-    std::cout << json.dump(2) << '\n';
-    return 0;
-  }
-  const double way = path.end_m() - path.begin_m();
-  std::printf("way              %.1f km from %s over the straight way of every switch\n", way / 1e3,
-              request.start.c_str());
-  std::printf("references       %zu\n", found.references);
-  std::printf("limit            %.1f m on either side, %.2f %% drift (1 sigma), %.1f sigma\n", request.options.limit_m,
-              100 * request.options.scale_sigma, request.options.sigmas);
-  print_coverage("there", path, found);
-  print_coverage("back", path, back);
   return 0;
 }
 
@@ -169,32 +89,6 @@ void add_map_draw(CLI::App& map, Action& chosen) {
       "Examples:\n  railfix map draw line.map --out line.svg\n"
       "  railfix map draw line.map --at 1:1250 --radius 300 --out switch.png");
   command->callback([request, &chosen] { chosen = [request] { return draw(*request); }; });
-}
-
-void add_map_coverage(CLI::App& map, Action& chosen) {
-  const auto request = std::make_shared<CoverageRequest>();
-  CLI::App* command =
-      map.add_subcommand("coverage", "Where the confidence interval outgrows a limit for lack of references");
-  command->add_option("MAP", request->map, "A map made by `railfix map build`")->required();
-  command->add_option("--start", request->start, "EDGE:OFFSET[:+|-] where the way begins")->capture_default_str();
-  command->add_option("--length", request->length_m, "Metres of way; the whole line without");
-  command->add_option("--limit", request->options.limit_m, "Metres that half the interval may be long")
-      ->check(number_between(0.1, 1e5))
-      ->capture_default_str();
-  command
-      ->add_option("--scale-sigma", request->options.scale_sigma, "Drift of the odometry as a part of the way, 1 sigma")
-      ->check(number_between(1e-6, 0.1))
-      ->capture_default_str();
-  command->add_option("--sigmas", request->options.sigmas, "Half the interval in sigmas of the drift")
-      ->check(number_between(0.1, 10.0))
-      ->capture_default_str();
-  command->add_option("--virtual-locacc", request->options.virtual_locacc_m, "Q_LOCACC of proposed references, metres")
-      ->check(number_between(0.0, 63.0))
-      ->capture_default_str();
-  command->add_flag("--natural", request->options.natural, "Count frogs, portals, bridges, masts and platforms too");
-  command->add_flag("--json", request->as_json, "JSON on standard output");
-  command->footer("Example:\n  railfix map coverage line.map --start 1:0 --limit 15 --scale-sigma 0.001");
-  command->callback([request, &chosen] { chosen = [request] { return coverage(*request); }; });
 }
 
 void add_map_learn(CLI::App& map, Action& chosen) {
