@@ -13,7 +13,7 @@ constexpr double kNearly = 1.05;
 constexpr double kSightedAheadM = 8;
 constexpr double kSightingSigmaM = 0.07;
 
-/// 6 km, straight with frogs, or three curves without.
+/// 6 km, straight with frogs, or three curves with frogs at the beginning alone.
 std::shared_ptr<const track::Map> line(bool bends) {
   auto map = std::make_shared<track::Map>();
   std::vector<track::Element> elements;
@@ -28,7 +28,8 @@ std::shared_ptr<const track::Map> line(bool bends) {
   map->nodes = {{1, track::NodeKind::end, "", 0, 0}, {2, track::NodeKind::end, "", 0, 6000}};
   uint32_t id = 0;
   for (const double offset_m : {100.0, 220.0, 500.0, 1100.0, 1250.0, 2600.0, 3100.0, 3300.0, 3400.0, 5600.0}) {
-    if (!bends) map->landmarks.push_back({++id, track::LandmarkKind::frog, 1, offset_m, 0.7, 0.05, ""});
+    if (!bends || offset_m < 2000)
+      map->landmarks.push_back({++id, track::LandmarkKind::frog, 1, offset_m, 0.7, 0.05, ""});
   }
   return map;
 }
@@ -52,7 +53,6 @@ struct Compared {
   double way_m = 0;
   double held_m = 0;   // to a twentieth: these sensors err by more than those of runs with pictures
   double ratio_m = 0;  // of what coverage says, metre by metre
-  void print() const { std::cout << way_m << " m, held " << held_m / way_m << ", ratio " << ratio_m / way_m << "\n"; }
 };
 
 // As the camera sights them, for the matcher in the loop.
@@ -89,22 +89,21 @@ void compare(bool bends, uint64_t seed, Compared& sum) {
   EXPECT_EQ(verdict.outside, 0U);
 }
 
-TEST(CoverageRide, HoldsWhatFusionPromisesAndNotMuchMore) {
+void expect_to_hold(bool bends) {
   Compared sum;
-  for (const uint64_t seed : {1, 2, 3, 4}) compare(false, seed, sum);
-  sum.print();
+  for (const uint64_t seed : {1, 2, 3, 4}) compare(bends, seed, sum);
+  std::cout << sum.way_m << " m, held " << sum.held_m / sum.way_m << ", ratio " << sum.ratio_m / sum.way_m << "\n";
   EXPECT_GT(sum.way_m, 8000);
   EXPECT_GE(sum.held_m, 0.95 * sum.way_m);
   EXPECT_LE(sum.ratio_m, 1.5 * sum.way_m);
 }
 
-// Where a curve is found depends on what the sensors err by: in the middle.
-TEST(CoverageRide, CurvesAreWorthAsMuchAsToFusion) {
-  Compared sum;
-  for (const uint64_t seed : {1, 2, 3, 4}) compare(true, seed, sum);
-  sum.print();
-  EXPECT_GE(sum.ratio_m, 0.8 * sum.way_m);
-  EXPECT_LE(sum.ratio_m, 1.25 * sum.way_m);
+TEST(CoverageRide, HoldsWhatFusionPromisesAndNotMuchMore) {
+  expect_to_hold(false);
+}
+
+TEST(CoverageRide, DoesSoInCurvesToo) {
+  expect_to_hold(true);
 }
 
 }  // namespace
