@@ -52,7 +52,9 @@ class Running {
     const double sign = backwards_ ? -1 : 1;
     const bool has_heights = path_.grade_known_at(path_m(0));
     double elevation_m = 0;
-    for (double at_m = 0; at_m < way.length_m + 2 * RideWay::kSampledEveryM; at_m += RideWay::kSampledEveryM) {
+    const int samples = static_cast<int>(way.length_m / RideWay::kSampledEveryM) + 3;
+    for (int i = 0; i < samples; ++i) {
+      const double at_m = RideWay::kSampledEveryM * i;
       way.curvature_per_m.push_back(sign * path_.curvature_at(path_m(at_m)));
       if (!has_heights) continue;
       way.elevation_m.push_back(elevation_m);
@@ -109,7 +111,9 @@ Extent extent_of(const RideWay& way, const CoverageOptions& options) {
 // Fusion believes none of the last two: the third of a row lies where the interval would be too long.
 void add_row(const CoverageGap& gap, double every_m, double sigma_m, RideWay& way, std::vector<double>& markers_m) {
   const auto by_place = [](const track::Landmark& a, const track::Landmark& b) { return a.offset_m < b.offset_m; };
-  for (double at_m = gap.from_m - 2 * every_m; at_m < gap.to_m; at_m += every_m) {
+  const int places = 2 + static_cast<int>(std::ceil((gap.to_m - gap.from_m) / every_m));
+  for (int i = 0; i < places; ++i) {
+    const double at_m = gap.from_m + (i - 2) * every_m;
     const auto is_near = [&](const track::Landmark& mark) { return std::abs(mark.offset_m - at_m) < 0.5 * every_m; };
     if (at_m < kSightedFromM || std::ranges::any_of(way.landmarks, is_near)) continue;
     const track::Landmark marker{.kind = track::LandmarkKind::mast,
