@@ -91,7 +91,8 @@ fusion::FixInput input_of(const map_matcher::PlaceFix& fix) {
           fix.landmark,
           of_landmark ? fusion::FixKind::landmark : fusion::FixKind::curvature,
           place.direction,
-          nullptr};
+          nullptr,
+          static_cast<fusion::SightingsFit>(fix.sightings_fit)};
 }
 
 // As train_state carries it.
