@@ -16,7 +16,11 @@ constexpr double kLowestMatch = 0.35;  // correlation
 constexpr double kFirstMatch = 0.5;    // ... of a step that is believed without a prediction
 constexpr double kAgreeMps2 = 4.0;
 constexpr double kAgreeM = 0.03;
+constexpr double kSpeedHoldsS = 0.15;  // one bad match, as over points, must not lead to the next sleeper
 constexpr int64_t kPatienceNs = core::kNsPerSecond;
+constexpr int64_t kLookElsewhereNs = core::kNsPerSecond / 2;
+constexpr double kBetterBy = 0.05;  // in correlation (0.97, and 0.7 to 0.88 at the next sleeper), ...
+constexpr int kBetterLooks = 2;     // ... so often
 constexpr int kFewestRows = 40;
 
 }  // namespace
@@ -92,6 +96,23 @@ GroundMotion::Match GroundMotion::match(int first_shift, int last_shift, double 
   return {(best + part) * cell_m, highest};
 }
 
+GroundMotion::Match GroundMotion::match_anywhere(double dt_s, double cell_m) const {
+  const auto cells = [&](double metres) { return static_cast<int>(std::lround(metres / cell_m)); };
+  return match(cells(-kWindowM), cells(max_speed_mps_ * dt_s), cell_m);
+}
+
+// A step that is wrong by the distance of sleepers fits for ever, but the ballast between them does not.
+bool GroundMotion::fits_better_elsewhere(const Match& found, double dt_s, double cell_m) {
+  if (stamp_ns_ - looked_elsewhere_ns_ < kLookElsewhereNs) return false;
+  looked_elsewhere_ns_ = stamp_ns_;
+  const Match any = match_anywhere(dt_s, cell_m);
+  const bool better = any.correlation > std::max(found.correlation + kBetterBy, kFirstMatch);
+  better_elsewhere_ = better ? better_elsewhere_ + 1 : 0;
+  if (better_elsewhere_ < kBetterLooks) return false;
+  better_elsewhere_ = 0;
+  return true;
+}
+
 std::optional<double> GroundMotion::step(const vision::TopView& view, const vision::Sheet& sheet, int64_t stamp_ns) {
   std::swap(now_, before_);
   const bool first = rows_ == 0;
@@ -109,17 +130,18 @@ std::optional<double> GroundMotion::step(const vision::TopView& view, const visi
   if (locked_) {
     const double expected_m = *speed_mps_ * dt_s;
     const Match found = match(cells(expected_m - kWindowM), cells(expected_m + kWindowM), cell_m);
-    if (found.correlation > kLowestMatch) {
-      speed_mps_ = found.metres / dt_s;
+    const bool lost = fits_better_elsewhere(found, dt_s, cell_m);
+    if (!lost && found.correlation > kLowestMatch) {
+      *speed_mps_ += (1 - std::exp(-dt_s / kSpeedHoldsS)) * (found.metres / dt_s - *speed_mps_);
       measured_ns_ = stamp_ns;
       return found.metres;
     }
-    if (stamp_ns - measured_ns_ < kPatienceNs) return expected_m;
+    if (!lost && stamp_ns - measured_ns_ < kPatienceNs) return expected_m;
     locked_ = false;
     speed_mps_.reset();
     return std::nullopt;
   }
-  const Match found = match(cells(-kWindowM), cells(max_speed_mps_ * dt_s), cell_m);
+  const Match found = match_anywhere(dt_s, cell_m);
   if (found.correlation < kFirstMatch) {
     speed_mps_.reset();
     return std::nullopt;
@@ -127,7 +149,7 @@ std::optional<double> GroundMotion::step(const vision::TopView& view, const visi
   const double speed_mps = found.metres / dt_s;
   locked_ = speed_mps_ && std::abs(speed_mps - *speed_mps_) * dt_s < kAgreeM + kAgreeMps2 * dt_s * dt_s;
   speed_mps_ = speed_mps;
-  measured_ns_ = stamp_ns;
+  measured_ns_ = looked_elsewhere_ns_ = stamp_ns;
   return locked_ ? std::optional<double>(found.metres) : std::nullopt;
 }
 

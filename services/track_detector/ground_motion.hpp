@@ -27,6 +27,8 @@ class GroundMotion {
   void take_profile(const vision::TopView& view, const vision::Sheet& sheet);
   [[nodiscard]] Match match(int first_shift, int last_shift, double cell_m) const;
   [[nodiscard]] double correlation(int shift) const;
+  [[nodiscard]] Match match_anywhere(double dt_s, double cell_m) const;
+  bool fits_better_elsewhere(const Match& found, double dt_s, double cell_m);
 
   double max_speed_mps_;
   int rows_ = 0;
@@ -36,6 +38,8 @@ class GroundMotion {
   int64_t measured_ns_ = 0;
   std::optional<double> speed_mps_;
   bool locked_ = false;
+  int64_t looked_elsewhere_ns_ = 0;
+  int better_elsewhere_ = 0;  // looks in a row
 };
 
 }  // namespace railfix::track_detector
