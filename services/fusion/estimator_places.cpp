@@ -257,6 +257,7 @@ void Estimator::refuse(const FixInput& fix, double path_distance_m, const Offer&
       doubt_behind_m_ = doubt_ahead_m_ = reach_m(offer, fix.sigma_m);
       fix_verdict_ = FixVerdict::corrected;
       landmarks_agreed_ = 2;
+      if (fix.kind == FixKind::landmark) confirm_by(fix);
       return;
     }
   }

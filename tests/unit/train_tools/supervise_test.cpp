@@ -7,6 +7,7 @@
 #include <sys/ptrace.h>
 #include <sys/wait.h>
 
+#include <algorithm>
 #include <cerrno>
 
 #include "core/time.hpp"
@@ -39,7 +40,7 @@ class Supervise : public TrainFolder {
     waitpid(supervisor_, nullptr, 0);
     for (const pid_t pid : processes()) {  // services outlive their supervisor
       const auto command = command_of(pid);
-      if (!command.empty() && command.back() == folder_.string()) kill(pid, SIGKILL);
+      if (std::ranges::find(command, folder_.string()) != command.end()) kill(pid, SIGKILL);
     }
   }
   PlannedService service(const std::string& name, int generation, const char* script) const {
