@@ -14,7 +14,7 @@ constexpr double kSurprisingSigmas = 3.0;
 constexpr double kForgotten = 2.0;  // of a landmark's sigmas is the place's when the way since has outgrown it
 constexpr double kBesideLandmarkS = 1.0;
 constexpr double kBendsHereM = 3.0;  // in a window of some 50 m to either side that is rarely by chance
-constexpr int kCurvesConfirm = 3;    // a place that was only told, ...
+constexpr int kCurvesConfirm = 3;    // ... a place that was only told
 constexpr double kOffTrackM = 15.0;  // a GNSS fix further beside the track is none
 // Of the sigma of a GNSS fix; squares add up to the whole.
 constexpr double kGnssLastingShare = 0.866;

@@ -79,7 +79,9 @@ double GroundMotion::correlation(int shift) const {
   return static_cast<double>(product) / std::sqrt(static_cast<double>(now2) * static_cast<double>(before2));
 }
 
-GroundMotion::Match GroundMotion::match(int first_shift, int last_shift, double cell_m) const {
+GroundMotion::Match GroundMotion::match(double from_m, double to_m, double cell_m) const {
+  const auto first_shift = static_cast<int>(std::lround(from_m / cell_m));
+  const auto last_shift = static_cast<int>(std::lround(to_m / cell_m));
   int best = first_shift;
   double highest = -1;
   for (int shift = first_shift; shift <= last_shift; ++shift) {
@@ -97,8 +99,7 @@ GroundMotion::Match GroundMotion::match(int first_shift, int last_shift, double 
 }
 
 GroundMotion::Match GroundMotion::match_anywhere(double dt_s, double cell_m) const {
-  const auto cells = [&](double metres) { return static_cast<int>(std::lround(metres / cell_m)); };
-  return match(cells(-kWindowM), cells(max_speed_mps_ * dt_s), cell_m);
+  return match(-kWindowM, max_speed_mps_ * dt_s, cell_m);
 }
 
 // A step that is wrong by the distance of sleepers fits for ever, but the ballast between them does not.
@@ -126,10 +127,9 @@ std::optional<double> GroundMotion::step(const vision::TopView& view, const visi
     return std::nullopt;
   }
   const double cell_m = kRowsPerCell * sheet.cell_m;
-  const auto cells = [&](double metres) { return static_cast<int>(std::lround(metres / cell_m)); };
   if (locked_) {
     const double expected_m = *speed_mps_ * dt_s;
-    const Match found = match(cells(expected_m - kWindowM), cells(expected_m + kWindowM), cell_m);
+    const Match found = match(expected_m - kWindowM, expected_m + kWindowM, cell_m);
     const bool lost = fits_better_elsewhere(found, dt_s, cell_m);
     if (!lost && found.correlation > kLowestMatch) {
       *speed_mps_ += (1 - std::exp(-dt_s / kSpeedHoldsS)) * (found.metres / dt_s - *speed_mps_);

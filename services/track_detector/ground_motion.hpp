@@ -25,7 +25,7 @@ class GroundMotion {
     double correlation = -1;
   };
   void take_profile(const vision::TopView& view, const vision::Sheet& sheet);
-  [[nodiscard]] Match match(int first_shift, int last_shift, double cell_m) const;
+  [[nodiscard]] Match match(double from_m, double to_m, double cell_m) const;
   [[nodiscard]] double correlation(int shift) const;
   [[nodiscard]] Match match_anywhere(double dt_s, double cell_m) const;
   bool fits_better_elsewhere(const Match& found, double dt_s, double cell_m);

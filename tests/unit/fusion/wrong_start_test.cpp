@@ -40,6 +40,15 @@ class WrongStart : public testing::Test {
     fusion_.add(FixInput{at(t_s_), 1, offset_m, 5, 0.9999, 0, FixKind::network, track::Direction::forward, {}});
   }
 
+  /// What another fusion says now.
+  [[nodiscard]] KnownPlace known_at(double offset_m) const {
+    return {at(t_s_), {1, offset_m, track::Direction::forward}, kSpeedMps, 2, 2, 0.9999};
+  }
+  void take_over(const KnownPlace& known) {
+    const auto place = place_at(straight_line(), known, at(t_s_), 4);
+    ASSERT_TRUE(place);
+    fusion_.add(*place);
+  }
   void feel(double rate_rps) {
     for (int i = 0; i < 50; ++i) fusion_.add(ImuInput{at(t_s_ + 0.02 * i + 0.01), 0.01 * (i % 3), rate_rps});
   }
@@ -128,11 +137,9 @@ TEST_F(WrongStart, IsGivenUpWhereNothingIsSightedThatFits) {
 TEST_F(WrongStart, APlaceThatIsHandedOverInDoubtIsNoneUntilTwoLandmarksAgree) {
   fusion_ = fusion_without_start();
   go(20, [] {});
-  KnownPlace denied{at(t_s_), {1, 500, track::Direction::forward}, kSpeedMps, 2, 2, 0.9999};
+  KnownPlace denied = known_at(500);
   denied.in_doubt = true;
-  const auto place = place_at(straight_line(), denied, at(t_s_), 4);
-  ASSERT_TRUE(place);
-  fusion_.add(*place);
+  take_over(denied);
   auto state = go(200, [] {});
   EXPECT_TRUE(state.track_known);
   EXPECT_EQ(state.integrity, Integrity::unusable) << state.reason;
@@ -189,11 +196,9 @@ TEST_F(WrongStart, OfAFusionThatWasNotOkIsToldTheNextOneOnly) {
     fusion_ = fusion_without_start();
     t_s_ = 0;
     go(20, [] {});
-    KnownPlace known{at(t_s_), {1, 920, track::Direction::forward}, kSpeedMps, 2, 2, 0.9999};
+    KnownPlace known = known_at(920);
     known.only_told = only_told;
-    const auto place = place_at(straight_line(), known, at(t_s_), 4);
-    ASSERT_TRUE(place);
-    fusion_.add(*place);
+    take_over(known);
     EXPECT_EQ(go(40, [] {}).reason, only_told ? kOnlyTold : "");
   }
 }
