@@ -118,7 +118,10 @@ class Check {
     for (const Edge* one : ends_.at(node.id)) {
       if (one != &edge) others += (others.empty() ? ", which it shares with " : " and ") + called(*one);
     }
-    return "node " + std::to_string(node.id) + (node.name.empty() ? "" : " (" + node.name + ")") + others;
+    return numbered(node) + others;
+  }
+  static std::string numbered(const Node& node) {
+    return "node " + std::to_string(node.id) + (node.name.empty() ? "" : " (" + node.name + ")");
   }
 
   void check_end(const Edge& edge, uint32_t node_id, const PlanPose& pose) {
@@ -154,8 +157,7 @@ class Check {
   void check_node(const Node& node) {
     const std::vector<const Edge*>& meeting = ends_[node.id];
     if (meeting.empty()) {
-      cuts_.push_back("node " + std::to_string(node.id) + (node.name.empty() ? "" : " (" + node.name + ")") +
-                      " belongs to no edge");
+      cuts_.push_back(numbered(node) + " belongs to no edge");
     } else if (node.kind == NodeKind::railway_switch && meeting.size() < 3) {
       cuts_.push_back((node.name.empty() ? "a switch without a name" : "switch \"" + node.name + "\"") +
                       place_of(node) + " has only " + (meeting.size() == 1 ? "one track, " : "two tracks, ") +
