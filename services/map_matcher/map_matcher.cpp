@@ -49,6 +49,7 @@ MapMatcher::MapMatcher(const MapMatcherParameters& parameters, std::shared_ptr<c
 void MapMatcher::forget_place() {
   if (followed_) followed_->forget();
   landmarks_.reset();
+  silence_ = {};
   curvature_.reset();
   exits_.reset();
   if (chooser_) chooser_.emplace(parameters_.track_parameters(), map_, ways_);
@@ -86,7 +87,16 @@ std::string MapMatcher::trouble_at(const StateInput& state) {
     return "train_state is of another map than map_matcher.map: give both services the same file";
   }
   if (const auto followed = follow(state); !followed.ok()) return followed.error().message;
-  return place_doubt() > 0 ? "the sightings fit the map nowhere near the place that train_state says" : "";
+  listen_for_silence(state);
+  return place_doubt() > 0 ? "the sightings fit the map nowhere near the place that train_state says"
+                           : silence_.trouble();
+}
+
+void MapMatcher::listen_for_silence(const StateInput& state) {
+  const auto prior = prior_at(state.placed.stamp_ns);
+  if (!prior || !parameters_.use_landmarks) return;
+  const bool rails_in_sight = std::abs(core::seconds(state.placed.stamp_ns - rails_seen_ns_)) < kRailsFreshS;
+  silence_.run_on(*followed_->path(), prior->path_distance_m, rails_in_sight);
 }
 
 std::string MapMatcher::placeless() const {
@@ -117,6 +127,7 @@ core::Status MapMatcher::follow(const StateInput& state) {
     curvature_->change_path(path);
   } else {
     landmarks_.emplace(parameters_.landmarks, path);
+    silence_.begin_path();
     curvature_.emplace(parameters_.curvature_parameters(), path);
   }
   if (parameters_.curve_method == "exits") exits_.emplace(parameters_.exit_parameters(), path);
@@ -300,6 +311,7 @@ PlaceFixes MapMatcher::add(const Sighting& sighting) {
   const auto prior = prior_at(sighting.stamp_ns);
   if (!landmarks_ || !parameters_.use_landmarks || !prior) return {};
   if (chooser_) chooser_->sight(sighting);
+  silence_.sight(*followed_->path(), sighting, *prior);
   PlaceFixes fixes;
   if (const auto fix = landmarks_->add(sighting, *prior)) say(*fix, FixKind::landmark, fixes);
   return fixes;

@@ -10,6 +10,7 @@
 #include "map_matcher/followed_path.hpp"
 #include "map_matcher/inputs.hpp"
 #include "map_matcher/landmark_matcher.hpp"
+#include "map_matcher/landmark_silence.hpp"
 #include "map_matcher/locate/place_search.hpp"
 #include "map_matcher/map_matcher_parameters.hpp"
 #include "map_matcher/shape/curvature_matcher.hpp"
@@ -58,6 +59,8 @@ class MapMatcher {
   [[nodiscard]] std::string trouble_at(const StateInput& state);
   [[nodiscard]] std::string placeless() const;
   core::Status follow(const StateInput& state);
+  /// Of landmarks that are not sighted.
+  void listen_for_silence(const StateInput& state);
   void stand(int64_t from_ns, int64_t to_ns);
   /// The window at a stamp, extrapolated from the last state; nothing when the place is not known or the state is too
   /// old.
@@ -84,6 +87,7 @@ class MapMatcher {
   PlaceSearch search_;
   std::optional<FollowedPath> followed_;
   std::optional<LandmarkMatcher> landmarks_;
+  LandmarkSilence silence_;
   std::optional<CurvatureMatcher> curvature_;
   std::optional<CurveExitMatcher> exits_;  // instead of it, where the parameters say so
   GyroTurn gyro_;
