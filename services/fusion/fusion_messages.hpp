@@ -3,9 +3,11 @@
 
 #include "fusion/fusion.hpp"
 #include "fusion/handover.hpp"
+#include "fusion/train_pose.hpp"
 #include "messaging/direction.hpp"
 #include "messaging/messaging.hpp"
 #include "messaging/samples.hpp"
+#include "messaging/topics.hpp"
 
 namespace railfix::fusion {
 

@@ -9,6 +9,7 @@
 #include "messaging/direction.hpp"
 #include "messaging/messaging.hpp"
 #include "messaging/samples.hpp"
+#include "messaging/topics.hpp"
 
 namespace railfix::map_matcher {
 

@@ -8,8 +8,8 @@
 #include "core/random.hpp"
 #include "core/time.hpp"
 #include "core/units.hpp"
-#include "fusion/fusion.hpp"
-#include "map_matcher/map_matcher.hpp"
+#include "fusion/fusion_messages.hpp"
+#include "map_matcher/matcher_messages.hpp"
 
 namespace railfix::tool {
 namespace {
@@ -79,35 +79,6 @@ map_matcher::MapMatcherParameters matcher_parameters() {
   return parameters;
 }
 
-// As position_fix carries it.
-fusion::FixInput input_of(const map_matcher::PlaceFix& fix) {
-  const track::EdgePosition& place = fix.options.front().place;
-  const bool of_landmark = fix.kind == map_matcher::FixKind::landmark;
-  return {fix.stamp_ns,
-          place.edge,
-          place.offset_m,
-          fix.sigma_m,
-          fix.options.front().probability,
-          fix.landmark,
-          of_landmark ? fusion::FixKind::landmark : fusion::FixKind::curvature,
-          place.direction,
-          nullptr,
-          static_cast<fusion::SightingsFit>(fix.sightings_fit)};
-}
-
-// As train_state carries it.
-map_matcher::StateInput input_of(const fusion::TrainEstimate& state) {
-  return {.placed = {state.stamp_ns, state.position, state.speed_mps, state.distance_m, state.over_m, state.under_m},
-          .sigma_m = state.sigma_m,
-          .track_probability = state.track_probability,
-          .visual_scale = state.visual_scale,
-          .easting_m = state.easting_m,
-          .northing_m = state.northing_m,
-          .track_known = state.track_known,
-          .usable = state.integrity != fusion::Integrity::unusable,
-          .standstill = state.standstill};
-}
-
 class NominalRide {
  public:
   NominalRide(const RideWay& way, const fusion::FusionParameters& parameters, double speed_mps, double vagueness)
@@ -160,7 +131,7 @@ class NominalRide {
 
   void match(const fusion::TrainEstimate& state) {
     const double step_m = at_m_ - was_m_;
-    use(matcher_.add(input_of(state)));
+    use(matcher_.add(map_matcher::input_of(fusion::message_of(state))));
     use(matcher_.add(map_matcher::StepInput{now_ns_, before_ns_, true, step_m, track_.curvature_at(at_m_) * step_m,
                                             kYawSigmaRad, at_m_, speed_mps_}));
     matcher_.add(map_matcher::ViewInput{track_.curvature_at(at_m_ + kCurvatureAheadM),
@@ -175,7 +146,7 @@ class NominalRide {
   }
 
   void use(const map_matcher::PlaceFixes& fixes) {
-    for (const map_matcher::PlaceFix& fix : fixes) fusion_.add(input_of(fix));
+    for (const map_matcher::PlaceFix& fix : fixes) fusion_.add(fusion::input_of(map_matcher::message_of(fix)));
   }
 
   const fusion::FusionParameters& parameters_;
