@@ -29,16 +29,13 @@ ProfilePoint vault(const Span& tunnel, int i) {
   return {middle + half * std::cos(angle), kTunnelWallM + (kTunnelCrownM - kTunnelWallM) * std::sin(angle)};
 }
 
-// The wall around the opening, and the hill over it.
+// The wall around the opening, and the hill over it. It ends exactly where the inside begins, whose panels are drawn
+// before it.
 void add_portal(Stage& stage, const Span& tunnel) {
   const double s = tunnel.begin_m;
   const double left = tunnel.left_m + 4.0;
   const double right = tunnel.right_m - 4.0;
   const double top = kTunnelCrownM + 1.8;
-  const auto wall = [&](double a, double b, double bottom, double over, float grey, double order) {
-    stage.panel({stage.at(s, a, bottom), stage.at(s, b, bottom), stage.at(s, b, over), stage.at(s, a, over)}, grey,
-                order);
-  };
   // Hill: slopes at the sides, flat above.
   const double back = s + 0.02;
   for (const auto& [inner, outer] : {std::pair{left, left + 30.0}, std::pair{right, right - 30.0}}) {
@@ -49,16 +46,21 @@ void add_portal(Stage& stage, const Span& tunnel) {
   stage.panel({stage.at(back, right, top - 0.5), stage.at(back, left, top - 0.5), stage.at(back, left, 13.0),
                stage.at(back, right, 13.0)},
               0.33F, back);
-  wall(left, tunnel.left_m, -0.8, top, 0.55F, s);
-  wall(right, tunnel.right_m, -0.8, top, 0.55F, s);
+  const double front = s - 0.005;
+  for (const auto& [inner, outer] : {std::pair{tunnel.left_m, left}, std::pair{tunnel.right_m, right}}) {
+    stage.face({stage.at(s, inner, -0.8), stage.at(s, outer, -0.8), stage.at(s, outer, top), stage.at(s, inner, top)},
+               0.55F, front);
+  }
   for (int i = 0; i < kVaultPieces; ++i) {
     const auto a = vault(tunnel, i);
     const auto b = vault(tunnel, i + 1);
     stage.panel({stage.at(s, a.lateral_m, a.up_m), stage.at(s, b.lateral_m, b.up_m), stage.at(s, b.lateral_m, top),
                  stage.at(s, a.lateral_m, top)},
-                0.55F, s);
+                0.55F, front);
   }
-  wall(left, right, top, top + 0.35, 0.62F, s - 0.01);
+  stage.panel(
+      {stage.at(s, left, top), stage.at(s, right, top), stage.at(s, right, top + 0.35), stage.at(s, left, top + 0.35)},
+      0.62F, s - 0.01);
 }
 
 void add_lamps(Stage& stage, const Span& tunnel) {
@@ -79,9 +81,13 @@ void add_tunnel_inside(Stage& stage, const Span& tunnel) {
     const double to_lamp = std::remainder(middle - tunnel.begin_m - 0.5 * kLampSpacingM, kLampSpacingM);
     const auto lamp = static_cast<float>(0.10 * std::exp(-to_lamp * to_lamp / 8.0));
     const auto side = [&](double d, float glow) {
-      stage.panel(
-          {stage.at(a, d, -0.8), stage.at(b, d, -0.8), stage.at(b, d, kTunnelWallM), stage.at(a, d, kTunnelWallM)},
-          0.42F * shade, a, glow);
+      const Quad wall{stage.at(a, d, -0.8), stage.at(b, d, -0.8), stage.at(b, d, kTunnelWallM),
+                      stage.at(a, d, kTunnelWallM)};
+      if (b == tunnel.end_m) {
+        stage.face(wall, 0.42F * shade, a, glow);  // the way out is where it ends
+      } else {
+        stage.panel(wall, 0.42F * shade, a, glow);
+      }
     };
     side(tunnel.left_m, lamp);
     side(tunnel.right_m, 0.3F * lamp);
@@ -173,9 +179,9 @@ void add_bridge(Stage& stage, const Bridge& bridge) {
                  stage.at(s, wall, kBridgeUnderM)},
                 0.24F, s + 0.05);
     if (!stage.seen(s)) continue;
-    stage.panel({stage.ground(s, wall), stage.ground(s, wall + outward * 2.0),
-                 stage.at(s, wall + outward * 2.0, kBridgeOverM), stage.at(s, wall, kBridgeOverM)},
-                0.50F, s);
+    stage.face({stage.ground(s, wall), stage.ground(s, wall + outward * 2.0),
+                stage.at(s, wall + outward * 2.0, kBridgeOverM), stage.at(s, wall, kBridgeOverM)},
+               0.50F, s);
     stage.panel({stage.ground(s, wall + outward * 2.0), stage.ground(s, wall + outward * 26.0),
                  stage.ground(s, wall + outward * 26.0), stage.at(s, wall + outward * 2.0, kBridgeOverM)},
                 0.31F, s);

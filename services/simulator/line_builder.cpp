@@ -13,6 +13,7 @@ constexpr double kFrogRatio = 1.0 / 9.0;
 constexpr double kFrogWithinM = 60.0;
 constexpr uint32_t kNidC = 384;
 constexpr double kSurveySigmaM = 0.05;
+constexpr double kFrogSurveySigmaM = 0.02;  // two edges that cross, and no wear since
 constexpr double kBesideStepM = 10.0;
 
 // Where two tracks' inner rails cross near one end of the main track: the mathematical point of the frog.
@@ -75,7 +76,8 @@ uint32_t LineBuilder::edge(const std::string& name, uint32_t from, uint32_t to, 
 uint32_t LineBuilder::landmark(LandmarkKind kind, uint32_t edge, double offset_m, double lateral_m,
                                const std::string& name) {
   const auto id = static_cast<uint32_t>(map.landmarks.size() + 1);
-  map.landmarks.push_back({id, kind, edge, offset_m, lateral_m, kSurveySigmaM, name});
+  const double sigma_m = kind == LandmarkKind::frog ? kFrogSurveySigmaM : kSurveySigmaM;
+  map.landmarks.push_back({id, kind, edge, offset_m, lateral_m, sigma_m, name});
   return id;
 }
 

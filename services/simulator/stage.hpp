@@ -40,9 +40,12 @@ class Stage {
     return static_cast<double>(main_.locate(static_cast<float>(corner.x()), static_cast<float>(corner.y())).d_m);
   }
 
-  /// A face of its own, edges exact. Painted before all that have a smaller order_m (metres of the path).
-  void face(const Quad& corners, float albedo, double order_m) { add(corners, lit(corners, albedo, order_m), order_m); }
-  /// A face that joins others: a little larger, which closes the seams. extra: light of lamps near by.
+  /// A face of its own, edges exact. Painted before all that have a smaller order_m (metres of the path). extra: light
+  /// of lamps near by.
+  void face(const Quad& corners, float albedo, double order_m, float extra = 0.0F) {
+    add(corners, lit(corners, albedo, order_m) + albedo * extra, order_m);
+  }
+  /// A face that joins others: a little larger, which closes the seams, and no edge that anything is measured at.
   void panel(const Quad& corners, float albedo, double order_m, float extra = 0.0F) {
     add(corners, lit(corners, albedo, order_m) + albedo * extra, order_m, 0.9F);
   }
