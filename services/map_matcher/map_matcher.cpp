@@ -20,6 +20,15 @@ constexpr double kCountM = 20.0;
 constexpr double kLostS = 30.0;      // after so long unseen the track is chosen anew
 constexpr double kRateShare = 0.75;  // of the curvature's sigma comes from its unknown rate
 
+// What was nearest a while ago, from where the train is at that stamp: search and chooser know no earlier places.
+Sighting sighted_at(int64_t stamp_ns, double speed_mps, Sighting sighting) {
+  const double since_s = core::seconds(stamp_ns - sighting.stamp_ns);
+  if (!std::isfinite(speed_mps) || std::abs(since_s) > FollowedPath::kOldStateS) return sighting;
+  sighting.stamp_ns = stamp_ns;
+  sighting.distance_ahead_m -= speed_mps * since_s;
+  return sighting;
+}
+
 // A fusion that was started anew may count the travelled distance from elsewhere.
 bool counts_on(const PlacedTrain& before, const PlacedTrain& state) {
   const double expected_m = state.speed_mps * core::seconds(state.stamp_ns - before.stamp_ns);
@@ -307,10 +316,10 @@ void MapMatcher::add(const ViewInput& view) {
 }
 
 PlaceFixes MapMatcher::add(const Sighting& sighting) {
-  search_.sight(sighting);
+  search_.sight(step_ ? sighted_at(step_->stamp_ns, step_->speed_mps, sighting) : sighting);
   const auto prior = prior_at(sighting.stamp_ns);
   if (!landmarks_ || !parameters_.use_landmarks || !prior) return {};
-  if (chooser_) chooser_->sight(sighting);
+  if (chooser_) chooser_->sight(sighted_at(moved_ns_, state_->placed.speed_mps, sighting));
   silence_.sight(*followed_->path(), sighting, *prior);
   PlaceFixes fixes;
   if (const auto fix = landmarks_->add(sighting, *prior)) say(*fix, FixKind::landmark, fixes);

@@ -36,7 +36,7 @@ constexpr double kSameM = 0.35;
 // Of the widest bearing: looks from farther away show the end of a wall too narrow.
 constexpr double kStepWideShare = 0.65;
 constexpr int kFewestStepLooks = 3;
-constexpr double kStepM = 0.03;
+constexpr double kStepM = 0.015;
 constexpr double kStepTopM = 0.06;
 constexpr double kBesideStep = 0.8;  // of a step is beside it
 constexpr double kClearStep = 3.5;   // grey levels; noise alone comes to 1
@@ -96,6 +96,7 @@ void EdgeTracker::remember(const UprightProfile& profile, const LandmarkPicture&
     }
   }
   look.way_m = way_m_;
+  look.stamp_ns = picture.stamp_ns;
   look.x_m = x_m_ - picture.pose.lateral_m * std::sin(heading_rad_);
   look.y_m = y_m_ + picture.pose.lateral_m * std::cos(heading_rad_);
   look.heading_rad = heading_rad_;
@@ -230,7 +231,8 @@ void EdgeTracker::add(const Relative& relative, const Fit& fit, Pass& pass, Sett
   pass.kept += sure ? 1 : 0;
   pass.narrowest = std::min(pass.narrowest, std::abs(*measured));
   pass.widest = std::max(pass.widest, std::abs(*measured));
-  edge.measured[edge.count++] = {relative.look->way_m, *measured, relative.look->eye_lateral_m, residual};
+  const Look& look = *relative.look;
+  edge.measured[edge.count++] = {look.way_m, *measured, look.eye_lateral_m, residual, look.stamp_ns};
 }
 
 // Gauss-Newton with Cauchy weights over all looks: place, lateral offset and what the curvature was wrong by.
@@ -351,6 +353,15 @@ double EdgeTracker::leaves_ahead_m(double lateral_m) const {
   return widest_ > 0 ? std::abs(lateral_m) / widest_ : 0.0;
 }
 
+std::optional<LookAt> EdgeTracker::last_look_at(double place_m, double lateral_m) const {
+  const double leaves_m = leaves_ahead_m(lateral_m);
+  for (size_t i = 0; i < count_; ++i) {
+    const Look& look = looks_[(newest_ + kMostLooks - i) % kMostLooks];
+    if (place_m - look.way_m >= leaves_m) return LookAt{look.way_m, look.stamp_ns};
+  }
+  return std::nullopt;
+}
+
 // Mean over the near looks, in grey levels, of how much brighter it is beyond a place on a wall than before it.
 double EdgeTracker::brightening(double place_m, double wall_m) const {
   const Look& now = looks_[newest_];
@@ -376,23 +387,31 @@ double EdgeTracker::brightening(double place_m, double wall_m) const {
   return n < kFewestStepLooks ? 0.0 : (wall_m > 0 ? -sum : sum) / n;
 }
 
-std::optional<double> EdgeTracker::last_step(double wall_m, double from_m, double to_m) const {
-  if (count_ == 0) return std::nullopt;
-  // From the far end: the first clear one, at its top.
+WallSteps EdgeTracker::steps(double wall_m, double from_m, double to_m) const {
+  WallSteps found;
+  if (count_ == 0) return found;
+  const auto keep = [&](double top_m) {
+    if (top_m > from_m + kStepTopM && top_m < to_m - kStepTopM && found.count < found.place_m.size())
+      found.place_m[found.count++] = top_m;
+  };
   double best = 0;
   double best_m = 0;
+  double least = 0;  // since the last top
   for (double place_m = to_m; place_m > from_m; place_m -= kStepM) {
     const double step = std::abs(brightening(place_m, wall_m));
-    if (step > std::max(best, kClearStep)) {
+    if (step > std::max(best, kClearStep) && kBesideStep * step > least) {
       best = step;
       best_m = place_m;
     } else if (step < kBesideStep * best) {
-      if (best_m < to_m - kStepTopM) break;
-      best = 0;  // the near side of something farther away
+      keep(best_m);
+      best = 0;
+      least = step;
+    } else if (best == 0) {
+      least = std::min(least, step);
     }
   }
-  if (best_m < from_m + kStepTopM || best_m > to_m - kStepTopM) return std::nullopt;
-  return best_m;
+  if (best > 0) keep(best_m);
+  return found;
 }
 
 }  // namespace railfix::track_detector

@@ -18,6 +18,13 @@ constexpr size_t kMostStripes = 12;
 struct EdgeMeasurement {
   double way_m, bearing, eye_lateral_m;
   double residual;  // of the bearing: measured less the settled edge's
+  int64_t stamp_ns = 0;
+};
+
+/// Where the train was on the way when a picture was taken.
+struct LookAt {
+  double way_m = 0;
+  int64_t stamp_ns = 0;
 };
 
 /// How far from an edge the brightness stepped back, in one look.
@@ -41,8 +48,16 @@ struct SettledEdge {
   int pictures = 0;
   size_t count = 0;                                           // of the measurements
   std::array<EdgeMeasurement, kMostMeasurements> measured{};  // far to near
+  [[nodiscard]] LookAt last_look() const { return {measured[count - 1].way_m, measured[count - 1].stamp_ns}; }
   size_t stripe_count = 0;
   std::array<StripeMeasurement, kMostStripes> stripe{};
+};
+
+/// Where the brightness steps along a wall, the last place first.
+struct WallSteps {
+  std::array<double, 4> place_m{};
+  size_t count = 0;
+  [[nodiscard]] std::optional<double> last() const { return count > 0 ? std::optional(place_m[0]) : std::nullopt; }
 };
 
 class EdgeTracker {
@@ -52,15 +67,18 @@ class EdgeTracker {
   const std::vector<SettledEdge>& follow(const std::vector<UprightEdge>& found, const UprightProfile& profile,
                                          const LandmarkPicture& picture, double way_m);
   void forget();
-  /// Along the wall at that lateral offset: the last place in the range where the brightness steps, seen over the near
+  /// Along the wall at that lateral offset: places in the range where the brightness steps clearly, seen over the near
   /// looks together.
-  [[nodiscard]] std::optional<double> last_step(double wall_m, double from_m, double to_m) const;
+  [[nodiscard]] WallSteps steps(double wall_m, double from_m, double to_m) const;
   /// What stands so far beside the eye leaves the picture so far ahead.
   [[nodiscard]] double leaves_ahead_m(double lateral_m) const;
+  /// The newest look that shows what stands there; nothing before any has.
+  [[nodiscard]] std::optional<LookAt> last_look_at(double place_m, double lateral_m) const;
 
  private:
   // Where the eye was in the plan, and what it saw.
   struct Look {
+    int64_t stamp_ns = 0;
     double way_m = 0, x_m = 0, y_m = 0, heading_rad = 0;
     double curvature_per_m = 0, eye_lateral_m = 0;
     std::vector<float> step;

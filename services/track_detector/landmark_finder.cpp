@@ -17,9 +17,10 @@ constexpr double kFrogScore = 0.36;  // a frog is false with half of exp(-(its s
 constexpr double kPlateEvenOdds = -3.5;
 constexpr double kPlateTrustALook = 0.8;
 constexpr int kFewestPlatePictures = 3;
-constexpr double kShutterS = 0.002;  // open about so long
-constexpr double kFrogSigmaM =
-    0.06;  // what does not average out: 3 to 4 mm of wear between two edges that cross at 1:14
+constexpr double kShutterS = 0.002;     // open about so long
+constexpr double kLateS = 1.0;          // fusion knows by then where the train was
+constexpr double kOutOfPictureM = 6.0;  // what stands beside the track leaves it so far ahead
+constexpr double kFrogSigmaM = 0.03;    // light and dirt on it, the same in all looks; its wear is the map's to say
 
 GroundTracking frog_tracking(const LandmarkOptions& options) {
   GroundTracking tracking;
@@ -140,10 +141,12 @@ void LandmarkFinder::find_uprights(const LandmarkPicture& picture) {
   const auto& found = upright_search_.find(picture);
   const auto& settled = edges_.follow(found, upright_search_.profile(), picture, way_m_);
   for (const UprightObject& object : uprights_.add(settled, edges_, way_m_, upright_search_.profile().beside_grey)) {
-    const double ahead_m = object.place_m - way_m_;
-    report({object.type, picture.stamp_ns, ahead_m, object.lateral_m,
-            std::hypot(object.sigma_m, options_.way_sigma * (std::abs(ahead_m) + 6.0)),
-            1.0 - std::exp(-0.5 * object.pictures)},
+    // When it was nearest and still in the picture it was known best: the way since then adds what it errs by.
+    const bool then = core::seconds(picture.stamp_ns - object.seen_ns) < kLateS;
+    const double ahead_m = then ? object.seen_ahead_m : object.place_m - way_m_;
+    const double way_m = then ? object.seen_ahead_m : std::abs(ahead_m) + kOutOfPictureM;
+    report({object.type, then ? object.seen_ns : picture.stamp_ns, ahead_m, object.lateral_m,
+            std::hypot(object.sigma_m, options_.way_sigma * way_m), 1.0 - std::exp(-0.5 * object.pictures)},
            picture);
   }
 }

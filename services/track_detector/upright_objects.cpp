@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "track_detector/opening_fit.hpp"
+
 namespace railfix::track_detector {
 namespace {
 
@@ -16,14 +18,17 @@ constexpr double kSidesM = 1.3;      // both sides stand at one place
 constexpr double kDarkShare = 0.93;  // of the outer brightness
 constexpr double kWallShare = 0.85;  // of the outer brightness
 constexpr double kDeepShare = 0.5;
-constexpr double kPairShare = 0.5;  // of one side's sigma
 constexpr double kSameWallM = 0.3;
 constexpr double kMouthM = 8;
-constexpr double kWallSigmaM = 0.03;    // of its lateral offset at the portal in
+constexpr double kOpeningOffM = 0.5;  // both sides together from the mean of each its own
+constexpr double kWallSigmaM = 0.03;  // of its lateral offset at the portal in
+constexpr double kOpeningWallSigmaM = 0.01;
+constexpr double kNearerAloneM = 2.0;   // way on which only one side shows, which tells more than both before
 constexpr double kWallStray_m2 = 4e-5;  // ... and more from one edge on it to the next
 constexpr double kExitSigmaM = 0.2;     // the last piece of wall may be as bright as the land in the glare
 constexpr double kEndSigmaM = 0.08;     // of an end that was measured on both walls
 constexpr double kEndsAgreeM = 0.3;     // of the two walls; they did within 0.15 m
+constexpr double kOneEndM = 0.12;       // between steps of both that are of one end
 constexpr double kExitAgreesM = 0.15;   // both ways to measure it
 constexpr double kSettlesM = 2.1;       // after it has left the picture, an edge is given
 constexpr double kAlikeShare = 0.7;     // of the farther wall's lateral offset
@@ -67,6 +72,17 @@ bool is_inner(const SettledEdge& a, const SettledEdge& b) {
   const double way_m = std::min(a.place_m, b.place_m) - kUsualAheadM;
   return a.lateral_m * b.lateral_m > 0 &&
          std::abs(a.lateral_m) / (a.place_m - way_m) < std::abs(b.lateral_m) / (b.place_m - way_m);
+}
+
+// Weight of one of two walls: that beside another track is seen from farther away, where an error of its bearing counts
+// by that much more.
+double near_share(double lateral_m, double other_m) {
+  return other_m * other_m / (lateral_m * lateral_m + other_m * other_m);
+}
+
+void seen_at(const LookAt& look, UprightObject& object) {
+  object.seen_ns = look.stamp_ns;
+  object.seen_ahead_m = object.place_m - look.way_m;
 }
 
 bool between(double value, const double (&range)[2]) {
@@ -197,6 +213,7 @@ void UprightObjects::tell_mast(const SettledEdge& inner, const MastPlace& at) {
   }
   masts_.push_back(
       {LandmarkType::mast, at.place_m, at.lateral_m, std::hypot(at.sigma_m, kObjectSigmaM), inner.pictures});
+  seen_at(inner.last_look(), masts_.back());
   objects_.push_back(masts_.back());
 }
 
@@ -204,6 +221,32 @@ bool UprightObjects::belongs_to_mast(const SettledEdge& edge) const {
   return std::any_of(masts_.begin(), masts_.end(), [&edge](const UprightObject& mast) {
     return std::abs(mast.place_m - edge.place_m) < kSameMastM && std::abs(mast.lateral_m - edge.lateral_m) < kSameMastM;
   });
+}
+
+// In a curve that was followed wrongly both sides are off by the same, one forwards and one backwards. Of two that are
+// equally near both together tell place and width better than each its own; a wall beside another track leaves the
+// picture long before the near one, which is seen best alone.
+UprightObject UprightObjects::between_sides(const SettledEdge& left, const SettledEdge& right) {
+  const double left_share = near_share(left.lateral_m, right.lateral_m);
+  const double right_share = 1 - left_share;
+  UprightObject object{LandmarkType::bridge, left_share * left.place_m + right_share * right.place_m, 0,
+                       std::hypot(left_share * left.sigma_m, right_share * right.sigma_m, kObjectSigmaM),
+                       std::min(left.pictures, right.pictures)};
+  object.wall_m = {right.lateral_m, left.lateral_m};
+  object.wall_sigma_m = kWallSigmaM;
+  const LookAt nearest = left.last_look().way_m > right.last_look().way_m ? left.last_look() : right.last_look();
+  seen_at(nearest, object);
+  const auto opening = opening_between(left, right);
+  if (!opening || std::abs(opening->place_m - object.place_m) > kOpeningOffM) return object;
+  const double wider_m = opening->width_m - (left.lateral_m - right.lateral_m);
+  object.wall_m = {right.lateral_m - left_share * wider_m, left.lateral_m + right_share * wider_m};
+  object.wall_sigma_m = std::max(0.5 * opening->width_sigma_m, kOpeningWallSigmaM);
+  if (opening->last.way_m + kNearerAloneM < nearest.way_m) return object;
+  object.place_m = opening->place_m;
+  object.sigma_m = std::hypot(opening->sigma_m, kObjectSigmaM);
+  object.seen_ns = opening->last.stamp_ns;
+  object.seen_ahead_m = opening->last_ahead_m;
+  return object;
 }
 
 void UprightObjects::pair_sides(double way_m) {
@@ -219,20 +262,15 @@ void UprightObjects::pair_sides(double way_m) {
       if (!dark(left.edge) || !dark(right.edge)) continue;
       if (belongs_to_mast(left.edge) || belongs_to_mast(right.edge)) continue;
       const double width_m = left.edge.lateral_m - right.edge.lateral_m;
-      // In a curve that was followed wrongly both sides are off by the same, one forwards and one backwards.
-      UprightObject object{LandmarkType::bridge, 0.5 * (left.edge.place_m + right.edge.place_m), 0,
-                           std::hypot(kPairShare * std::max(left.edge.sigma_m, right.edge.sigma_m), kObjectSigmaM),
-                           std::min(left.edge.pictures, right.edge.pictures)};
       // Behind a bridge there is daylight again; in the dark it looks like a portal.
-      const bool into_the_dark = deep(left.edge) || deep(right.edge);
-      if (!daylight() && into_the_dark) continue;
-      if (between(width_m, kTunnelWidthM) && deep(left.edge) && deep(right.edge)) {
+      if (!daylight() && (deep(left.edge) || deep(right.edge))) continue;
+      const bool portal = between(width_m, kTunnelWidthM) && deep(left.edge) && deep(right.edge);
+      if (!portal && !between(width_m, kBridgeWidthM)) continue;
+      UprightObject object = between_sides(left.edge, right.edge);
+      if (portal) {
         object.type = LandmarkType::portal_in;
         object.outer_grey = std::min(left.edge.outer_grey, right.edge.outer_grey);
-        object.wall_m = {right.edge.lateral_m, left.edge.lateral_m};
         move_to_mouth(object, left.edge, right.edge);
-      } else if (!between(width_m, kBridgeWidthM)) {
-        continue;
       }
       left.used = right.used = true;
       hold(object);
@@ -253,6 +291,7 @@ void UprightObjects::move_to_mouth(UprightObject& portal, const SettledEdge& lef
     portal.place_m = e.edge.place_m;
     portal.outer_grey = e.edge.outer_grey;
     portal.sigma_m = std::hypot(e.edge.sigma_m, kOneSideSigmaM);
+    seen_at(e.edge.last_look(), portal);
   }
 }
 
@@ -310,7 +349,7 @@ void UprightObjects::release(double way_m) {
   for (const UprightObject& held : held_) {
     if (held.place_m > way_m + kHoldM || in_tunnel(held.place_m + kForgetM)) continue;
     if (held.type == LandmarkType::portal_in) {
-      tunnel_ = {held.place_m, held.outer_grey, held.wall_m, {kWallSigmaM, kWallSigmaM}};
+      tunnel_ = {held.place_m, held.outer_grey, held.wall_m, {held.wall_sigma_m, held.wall_sigma_m}};
       exits_ = {};
     }
     if (held.type == LandmarkType::bridge) {
@@ -322,11 +361,9 @@ void UprightObjects::release(double way_m) {
   std::erase_if(held_, [way_m](const UprightObject& held) { return held.place_m <= way_m + kHoldM; });
 }
 
-// The wall beside another track is seen from farther away: an error of its bearing counts by that much more.
 double UprightObjects::mean_of_walls_m(double right_m, double left_m) const {
-  const double right_weight = 1 / std::pow(tunnel_.wall_m[0], 2);
-  const double left_weight = 1 / std::pow(tunnel_.wall_m[1], 2);
-  return (right_weight * right_m + left_weight * left_m) / (right_weight + left_weight);
+  const double left_share = near_share(tunnel_.wall_m[1], tunnel_.wall_m[0]);
+  return left_share * left_m + (1 - left_share) * right_m;
 }
 
 size_t UprightObjects::near_wall() const {
@@ -344,13 +381,14 @@ bool UprightObjects::walls_alike() const {
 // that.
 std::optional<UprightObjects::End> UprightObjects::end_of_walls(const EdgeTracker& tracker, double place_m) const {
   const size_t near = near_wall();
-  std::array<std::optional<double>, 2> ends_m;
+  std::array<WallSteps, 2> steps;
   for (size_t side = 0; side < 2; ++side) {
-    ends_m[side] = tracker.last_step(tunnel_.wall_m[side], place_m - kExitOffM, place_m + kPanelM);
+    steps[side] = tracker.steps(tunnel_.wall_m[side], place_m - kExitOffM, place_m + kPanelM);
   }
+  const std::array<std::optional<double>, 2> ends_m{steps[0].last(), steps[1].last()};
   const bool both = ends_m[0] && ends_m[1];
   const double apart_m = both ? std::abs(*ends_m[0] - *ends_m[1]) : 0.0;
-  if (both && apart_m < kEndsAgreeM) return End{mean_of_walls_m(*ends_m[0], *ends_m[1]), kEndSigmaM};
+  if (both && apart_m < kEndsAgreeM) return End{end_of_both_m(steps), kEndSigmaM};
   if (!walls_alike()) {
     const auto& end_m = ends_m[near] ? ends_m[near] : ends_m[1 - near];
     return end_m ? std::optional(End{*end_m, kOneEndSigmaM}) : std::nullopt;
@@ -359,6 +397,21 @@ std::optional<UprightObjects::End> UprightObjects::end_of_walls(const EdgeTracke
   const size_t side = off_m(0) < off_m(1) ? 0 : 1;
   if (off_m(side) >= kSidesM) return std::nullopt;
   return End{*ends_m[side], std::hypot(kOneEndSigmaM, 0.5 * std::max(apart_m, off_m(side)))};
+}
+
+// Of walls whose last steps are near one another, but not at one place, the one may show something that stands close
+// behind the end: then the step before is where the other wall ends.
+double UprightObjects::end_of_both_m(const std::array<WallSteps, 2>& steps) const {
+  const double last_m = mean_of_walls_m(steps[0].place_m[0], steps[1].place_m[0]);
+  for (size_t i = 0; i < steps[0].count; ++i) {
+    for (size_t k = 0; k < steps[1].count; ++k) {
+      const double right_m = steps[0].place_m[i];
+      const double left_m = steps[1].place_m[k];
+      const bool at_one_end = std::max(std::abs(right_m - last_m), std::abs(left_m - last_m)) < kEndsAgreeM;
+      if (at_one_end && std::abs(right_m - left_m) < kOneEndM) return mean_of_walls_m(right_m, left_m);
+    }
+  }
+  return last_m;
 }
 
 // From so far ahead on an end and the panel that may follow it show no more, even on the wall that is nearer. What the
@@ -392,6 +445,7 @@ void UprightObjects::release_exit(const EdgeTracker& tracker, double way_m, doub
   }
   if (hidden) sigma_m = std::hypot(sigma_m, kHiddenSigmaM);
   objects_.push_back({LandmarkType::portal_out, place_m, 0, sigma_m, first.pictures});
+  if (const auto look = tracker.last_look_at(place_m, tunnel_.wall_m[near_wall()])) seen_at(*look, objects_.back());
   tunnel_ = {};
   exits_ = {};
 }

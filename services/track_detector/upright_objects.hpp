@@ -16,8 +16,12 @@ struct UprightObject {
   double lateral_m = 0;
   double sigma_m = 0;
   int pictures = 0;
-  double outer_grey = 0;  // of a portal
-  std::array<double, 2> wall_m{0, 0};
+  double outer_grey = 0;               // of a portal
+  std::array<double, 2> wall_m{0, 0};  // right and left
+  double wall_sigma_m = 0;
+  /// When it was measured last, nearest to the train, and how far ahead it was then.
+  int64_t seen_ns = 0;
+  double seen_ahead_m = 0;
 };
 
 class UprightObjects {
@@ -45,6 +49,7 @@ class UprightObjects {
   void find_stripes(double way_m);
   void tell_mast(const SettledEdge& inner, const MastPlace& at);
   void pair_sides(double way_m);
+  [[nodiscard]] static UprightObject between_sides(const SettledEdge& left, const SettledEdge& right);
   [[nodiscard]] bool belongs_to_mast(const SettledEdge& edge) const;
   void move_to_mouth(UprightObject& portal, const SettledEdge& left, const SettledEdge& right) const;
   void follow_wall(const SettledEdge& edge);
@@ -59,6 +64,7 @@ class UprightObjects {
     double place_m = 0, sigma_m = 0;
   };
   [[nodiscard]] std::optional<End> end_of_walls(const EdgeTracker& tracker, double place_m) const;
+  [[nodiscard]] double end_of_both_m(const std::array<WallSteps, 2>& steps) const;
   void hold(const UprightObject& object);
 
   struct Tunnel {
