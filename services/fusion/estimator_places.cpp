@@ -108,7 +108,7 @@ void Estimator::use(const FixInput& fix) {
   if (fix.new_path) {
     path_ = fix.new_path;
     given_up_.reset();
-    filter_.set_origin(0, std::hypot(fix.sigma_m, parameters_->fix_sigma_floor_m));
+    filter_.set_origin(0, std::max(fix.sigma_m, parameters_->fix_sigma_floor_m));
     track_doubt_.said(fix.probability, std::nullopt, filter_.path_distance_m());
     accept(fix);
     told_by_ = fix.kind == FixKind::gnss ? ToldBy::gnss : fix.only_told ? ToldBy::start : ToldBy::nobody;
@@ -125,7 +125,7 @@ void Estimator::use(const FixInput& fix) {
     track_doubt_.seen_elsewhere(fix.probability);
     return;
   }
-  const double sigma_m = std::hypot(fix.sigma_m, parameters_->fix_sigma_floor_m);
+  const double sigma_m = std::max(fix.sigma_m, parameters_->fix_sigma_floor_m);
   const auto lasting = fix.kind == FixKind::curvature ? std::optional(StateIndex::shape_error) : std::nullopt;
   fix_again_ = has_met(fix.landmark) && filter_.path_sigma_m() < kForgotten * sigma_m;
   fix_offer_ =
@@ -249,7 +249,7 @@ void Estimator::refuse(const FixInput& fix, double path_distance_m, const Offer&
       // What was wrong may have taught a wrong scale, too.
       filter_.loosen_origin(std::abs(offer.residual) + fix.sigma_m);
       filter_.loosen_scale(*parameters_);
-      filter_.offer_position({path_distance_m, std::hypot(fix.sigma_m, parameters_->fix_sigma_floor_m)},
+      filter_.offer_position({path_distance_m, std::max(fix.sigma_m, parameters_->fix_sigma_floor_m)},
                              parameters_->gate_fix);
       corrected_ = true;
       accept(fix);
