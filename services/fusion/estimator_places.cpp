@@ -207,7 +207,7 @@ void Estimator::accept(const FixInput& fix) {
   unwatched_ = {.distance_m = unwatched_.distance_m};
   reference_ = fix.landmark;
   if (fix.landmark != 0 && !has_met(fix.landmark)) {
-    std::ranges::rotate(met_, met_.end() - 1);
+    std::rotate(met_.begin(), met_.end() - 1, met_.end());
     met_.front() = fix.landmark;
   }
   filter_.mark_reference();
