@@ -20,4 +20,10 @@ struct Opening {
 /// Nothing where too few pictures show both edges, or hardly nearer than at first, or not as one opening's sides would.
 [[nodiscard]] std::optional<Opening> opening_between(const SettledEdge& left, const SettledEdge& right);
 
+/// Weight of one of two walls, both together 1: that beside another track is seen from farther away, where an error of
+/// its bearing counts by that much more.
+[[nodiscard]] inline double near_share(double lateral_m, double other_m) {
+  return other_m * other_m / (lateral_m * lateral_m + other_m * other_m);
+}
+
 }  // namespace railfix::track_detector

@@ -22,6 +22,10 @@ struct UprightObject {
   /// When it was measured last, nearest to the train, and how far ahead it was then.
   int64_t seen_ns = 0;
   double seen_ahead_m = 0;
+  void seen_at(const LookAt& look) {
+    seen_ns = look.stamp_ns;
+    seen_ahead_m = place_m - look.way_m;
+  }
 };
 
 class UprightObjects {
@@ -38,6 +42,14 @@ class UprightObjects {
   [[nodiscard]] bool lit_walls() const;
 
  private:
+  // What finding sides and finding a tunnel's end have in common.
+  static constexpr double kSidesM = 1.3;      // both sides stand at one place
+  static constexpr double kDarkShare = 0.93;  // of the outer brightness
+  static constexpr double kSameWallM = 0.3;
+  static constexpr double kOneSideSigmaM = 0.2;
+  static constexpr double kOutShare = 0.7;  // of the daylight before the tunnel
+  static constexpr double kHoldM = 1.0;
+
   struct Edge {
     SettledEdge edge;
     double way_m = 0;  // when it was settled
