@@ -79,6 +79,28 @@ TEST_F(MapMatcherRide, SaysTheTrackBehindTheSwitchAndTheFrogsPlace) {
   EXPECT_EQ(matcher_.trouble(), "");
 }
 
+// What stands beside the track is told after it has left the picture, as of the picture that showed it nearest.
+TEST_F(MapMatcherRide, WhatWasSightedAWhileAgoCountsFromWhereTheTrainWasThen) {
+  std::vector<double> probabilities;
+  for (const double late_s : {0.0, 0.4}) {
+    matcher_ = MapMatcher({}, fork());
+    at_m_ = kFromM;
+    said_.clear();
+    run_to(510);
+    const int64_t then_ns = stamp_ns_ - core::to_ns(late_s);
+    keep(matcher_.add(Sighting{then_ns, track::LandmarkKind::frog, 20 + kSpeedMps * late_s, 0.72, 0.1, 0.99}));
+    const auto* frog = last(FixKind::landmark);
+    ASSERT_NE(frog, nullptr) << late_s;
+    EXPECT_EQ(frog->stamp_ns, then_ns);
+    EXPECT_EQ(frog->options.front().place.edge, 2U);
+    EXPECT_NEAR(frog->options.front().place.offset_m, 10 - kSpeedMps * late_s, 2);
+    run_to(514);
+    ASSERT_NE(last(FixKind::track), nullptr);
+    probabilities.push_back(last(FixKind::track)->options.front().probability);
+  }
+  EXPECT_NEAR(probabilities[0], probabilities[1], 1e-9);
+}
+
 TEST_F(MapMatcherRide, ASearchedPlaceIsSaidByGnssOnTheOneTrackThereIs) {
   known_ = false;
   run_to(302);
