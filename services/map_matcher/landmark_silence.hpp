@@ -2,6 +2,7 @@
 // the interval grows without a reference, although every service seems well.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 
@@ -12,20 +13,25 @@ namespace railfix::map_matcher {
 
 class LandmarkSilence {
  public:
-  /// The train is here on the path. Passed is only what it runs over forwards with the rails in sight: in darkness
+  /// The train is here on the path. Passed is what it runs over forwards, once, with the rails in sight: in darkness
   /// nobody expects a sighting.
   void run_on(const track::Path& path, double path_distance_m, bool rails_in_sight);
   /// Ends the silence where the map has a landmark of the kind in the window.
   void sight(const track::Path& path, const Sighting& sighting, const Prior& prior);
-  /// Distances do not go on from those before.
-  void begin_path() { here_m_.reset(); }
+  /// Distances do not go on from those before, or nobody saw what was passed.
+  void begin_way();
   /// What an operator should know; empty = nothing.
   [[nodiscard]] std::string trouble() const;
 
  private:
-  std::optional<double> here_m_;
-  int passed_ = 0;
-  double way_m_ = 0;
+  void pass(const track::PathLandmark& landmark, double way_m);
+
+  std::optional<double> reached_m_;  // on the path: what lies before it was passed
+  std::optional<double> sighted_m_;  // on the path: what stands there was sighted, what is before it may have been
+  std::map<track::LandmarkKind, double> last_of_kind_m_;  // on the path, of those that were passed
+  double way_m_ = 0;                                      // forwards, since the last sighting
+  int unsighted_ = 0;
+  double first_m_ = 0, last_m_ = 0;  // of them, on that way
 };
 
 }  // namespace railfix::map_matcher

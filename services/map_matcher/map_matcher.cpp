@@ -83,6 +83,8 @@ PlaceFixes MapMatcher::add(const StateInput& state) {
   if (!state.track_known && before && before->track_known) forget_place();
   search_.follow(state.track_known, state.usable);
   if (landmarks_ && before && !counts_on(before->placed, state.placed)) landmarks_->forget();
+  if (before && core::seconds(state.placed.stamp_ns - before->placed.stamp_ns) > FollowedPath::kOldStateS)
+    silence_.begin_way();
   trouble_ = trouble_at(state);
   PlaceFixes fixes;
   if (chooser_ && state_ && state.track_known) follow_without_camera(fixes);
@@ -102,8 +104,9 @@ std::string MapMatcher::trouble_at(const StateInput& state) {
 }
 
 void MapMatcher::listen_for_silence(const StateInput& state) {
+  if (!parameters_.use_landmarks) return;
   const auto prior = prior_at(state.placed.stamp_ns);
-  if (!prior || !parameters_.use_landmarks) return;
+  if (!prior) return silence_.begin_way();
   const bool rails_in_sight = std::abs(core::seconds(state.placed.stamp_ns - rails_seen_ns_)) < kRailsFreshS;
   silence_.run_on(*followed_->path(), prior->path_distance_m, rails_in_sight);
 }
@@ -136,7 +139,7 @@ core::Status MapMatcher::follow(const StateInput& state) {
     curvature_->change_path(path);
   } else {
     landmarks_.emplace(parameters_.landmarks, path);
-    silence_.begin_path();
+    silence_.begin_way();
     curvature_.emplace(parameters_.curvature_parameters(), path);
   }
   if (parameters_.curve_method == "exits") exits_.emplace(parameters_.exit_parameters(), path);

@@ -83,7 +83,7 @@ void add_tunnel_inside(Stage& stage, const Span& tunnel) {
     const auto side = [&](double d, float glow) {
       const Quad wall{stage.at(a, d, -0.8), stage.at(b, d, -0.8), stage.at(b, d, kTunnelWallM),
                       stage.at(a, d, kTunnelWallM)};
-      if (b == tunnel.end_m) {
+      if (b > tunnel.end_m - 0.01) {
         stage.face(wall, 0.42F * shade, a, glow);  // the way out is where it ends
       } else {
         stage.panel(wall, 0.42F * shade, a, glow);

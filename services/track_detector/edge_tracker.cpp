@@ -104,8 +104,8 @@ void EdgeTracker::remember(const UprightProfile& profile, const LandmarkPicture&
       const float value = std::min(1.0F, static_cast<float>(sign) * profile.score[static_cast<size_t>(c)] / kFullScore);
       if (value <= 0) continue;
       for (int k = -reach; k <= reach; ++k) {
-        const int near = c + k;
-        float& at = evidence[static_cast<size_t>(near)];
+        const int beside = c + k;
+        float& at = evidence[static_cast<size_t>(beside)];
         at = std::max(at, value);
       }
     }
@@ -141,7 +141,7 @@ double EdgeTracker::bearing_of(const Relative& relative, double x_m, double y_m,
 std::array<EdgeTracker::Spot, 2> EdgeTracker::locate(double bearing, int sign) const {
   const double width = std::abs(bearing);
   const auto columns = static_cast<int>(looks_[newest_].step.size());
-  const double rounded = middle_ + 0.5;
+  const double nearest = middle_ + 0.5;  // column, cut off
   Spot longest;
   Spot best;
   double inverse_m = width / kLateralsM[1];
@@ -153,7 +153,7 @@ std::array<EdgeTracker::Spot, 2> EdgeTracker::locate(double bearing, int sign) c
     for (const Relative& relative : relatives_) {
       const double at = bearing_of(relative, x_m, y_m, 0);
       if (std::abs(at) < kFirstBearing) break;
-      const int column = static_cast<int>(at / cell_ + rounded);
+      const int column = static_cast<int>(at / cell_ + nearest);
       if (column < 0 || column >= columns) continue;
       sum += relative.look->evidence[sign > 0 ? 1 : 0][static_cast<size_t>(column)] - kUsualEvidence;
       if (++n < kFewestLooks || kGrowth * std::abs(at) > width || static_cast<double>(sum) < longest.support) continue;

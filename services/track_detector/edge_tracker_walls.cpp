@@ -10,7 +10,7 @@ namespace {
 // Of the widest bearing: looks from farther away show the end of a wall too narrow.
 constexpr double kStepWideShare = 0.65;
 constexpr int kFewestStepLooks = 3;
-constexpr double kStepM = 0.015;
+constexpr double kStepM = 0.008;  // half a column of a look at 5 m
 constexpr double kStepTopM = 0.06;
 constexpr double kBesideStep = 0.8;  // of a step is beside it
 constexpr double kClearStep = 3.5;   // grey levels; noise alone comes to 1

@@ -18,7 +18,7 @@ constexpr double kPlateEvenOdds = -3.5;
 constexpr double kPlateTrustALook = 0.8;
 constexpr int kFewestPlatePictures = 3;
 constexpr double kShutterS = 0.002;     // open about so long
-constexpr double kLateS = 1.0;          // fusion knows by then where the train was
+constexpr double kLateS = 0.5;          // for so long the speed tells where the train was
 constexpr double kOutOfPictureM = 6.0;  // what stands beside the track leaves it so far ahead
 constexpr double kFrogSigmaM = 0.03;    // light and dirt on it, the same in all looks; its wear is the map's to say
 
@@ -46,6 +46,20 @@ GroundTracking plate_tracking(const LandmarkOptions& options) {
 }
 
 }  // namespace
+
+// When it was nearest and still in the picture it was known best: the way since then adds what it errs by.
+Sighting sighting_of(const UprightObject& object, double way_m, int64_t now_ns, double way_sigma) {
+  Sighting sighting{object.type, now_ns, object.place_m - way_m, object.lateral_m};
+  double on_way_m = std::abs(sighting.distance_ahead_m) + kOutOfPictureM;
+  if (core::seconds(now_ns - object.seen_ns) < kLateS) {
+    sighting.stamp_ns = object.seen_ns;
+    sighting.distance_ahead_m = object.seen_ahead_m;
+    on_way_m = std::max(on_way_m, object.seen_ahead_m);
+  }
+  sighting.sigma_m = std::hypot(object.sigma_m, way_sigma * on_way_m);
+  sighting.confidence = 1.0 - std::exp(-0.5 * object.pictures);
+  return sighting;
+}
 
 LandmarkFinder::LandmarkFinder(const geometry::Intrinsics& camera, const LandmarkOptions& options)
     : camera_(camera),
@@ -141,13 +155,7 @@ void LandmarkFinder::find_uprights(const LandmarkPicture& picture) {
   const auto& found = upright_search_.find(picture);
   const auto& settled = edges_.follow(found, upright_search_.profile(), picture, way_m_);
   for (const UprightObject& object : uprights_.add(settled, edges_, way_m_, upright_search_.profile().beside_grey)) {
-    // When it was nearest and still in the picture it was known best: the way since then adds what it errs by.
-    const bool then = core::seconds(picture.stamp_ns - object.seen_ns) < kLateS;
-    const double ahead_m = then ? object.seen_ahead_m : object.place_m - way_m_;
-    const double way_m = then ? object.seen_ahead_m : std::abs(ahead_m) + kOutOfPictureM;
-    report({object.type, then ? object.seen_ns : picture.stamp_ns, ahead_m, object.lateral_m,
-            std::hypot(object.sigma_m, options_.way_sigma * way_m), 1.0 - std::exp(-0.5 * object.pictures)},
-           picture);
+    report(sighting_of(object, way_m_, picture.stamp_ns, options_.way_sigma), picture);
   }
 }
 

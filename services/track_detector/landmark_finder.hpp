@@ -20,6 +20,10 @@
 
 namespace railfix::track_detector {
 
+/// What stands beside the track, told at way_m as of the picture that showed it nearest, if that is not long ago.
+/// way_sigma: error of the way, share of it.
+[[nodiscard]] Sighting sighting_of(const UprightObject& object, double way_m, int64_t now_ns, double way_sigma);
+
 class LandmarkFinder {
  public:
   LandmarkFinder(const geometry::Intrinsics& camera, const LandmarkOptions& options);

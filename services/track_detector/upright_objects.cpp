@@ -17,9 +17,8 @@ constexpr double kBridgeWidthM[] = {6.0, 28.0};
 constexpr double kWallShare = 0.85;  // of the outer brightness
 constexpr double kDeepShare = 0.5;
 constexpr double kMouthM = 8;
-constexpr double kOpeningOffM = 0.5;  // both sides together from the mean of each its own
-constexpr double kWallSigmaM = 0.03;  // of its lateral offset at the portal in
-constexpr double kOpeningWallSigmaM = 0.01;
+constexpr double kOpeningOffM = 0.5;   // both sides together from the mean of each its own
+constexpr double kWallSigmaM = 0.03;   // of its lateral offset at the portal in
 constexpr double kNearerAloneM = 2.0;  // way on which only one side shows, which tells more than both before
 constexpr double kStripeRmsM = 0.03;
 constexpr double kObjectSigmaM = 0.05;  // of where the surveyor's point of an object is
@@ -190,17 +189,15 @@ UprightObject UprightObjects::between_sides(const SettledEdge& left, const Settl
                        std::hypot(left_share * left.sigma_m, right_share * right.sigma_m, kObjectSigmaM),
                        std::min(left.pictures, right.pictures)};
   object.wall_m = {right.lateral_m, left.lateral_m};
-  object.wall_sigma_m = kWallSigmaM;
   const LookAt nearest = left.last_look().way_m > right.last_look().way_m ? left.last_look() : right.last_look();
   object.seen_at(nearest);
   const auto opening = opening_between(left, right);
   if (!opening || std::abs(opening->place_m - object.place_m) > kOpeningOffM) return object;
   const double wider_m = opening->width_m - (left.lateral_m - right.lateral_m);
   object.wall_m = {right.lateral_m - left_share * wider_m, left.lateral_m + right_share * wider_m};
-  object.wall_sigma_m = std::max(0.5 * opening->width_sigma_m, kOpeningWallSigmaM);
   if (opening->last.way_m + kNearerAloneM < nearest.way_m) return object;
+  object.sigma_m = std::hypot(opening->sigma_m, kObjectSigmaM, 0.5 * (opening->place_m - object.place_m));
   object.place_m = opening->place_m;
-  object.sigma_m = std::hypot(opening->sigma_m, kObjectSigmaM);
   object.seen_ns = opening->last.stamp_ns;
   object.seen_ahead_m = opening->last_ahead_m;
   return object;
@@ -270,7 +267,7 @@ void UprightObjects::release(double way_m) {
   for (const UprightObject& held : held_) {
     if (held.place_m > way_m + kHoldM || in_tunnel(held.place_m + kForgetM)) continue;
     if (held.type == LandmarkType::portal_in) {
-      tunnel_ = {held.place_m, held.outer_grey, held.wall_m, {held.wall_sigma_m, held.wall_sigma_m}};
+      tunnel_ = {held.place_m, held.outer_grey, held.wall_m, {kWallSigmaM, kWallSigmaM}};
       exits_ = {};
     }
     if (held.type == LandmarkType::bridge) {

@@ -18,7 +18,6 @@ struct UprightObject {
   int pictures = 0;
   double outer_grey = 0;               // of a portal
   std::array<double, 2> wall_m{0, 0};  // right and left
-  double wall_sigma_m = 0;
   /// When it was measured last, nearest to the train, and how far ahead it was then.
   int64_t seen_ns = 0;
   double seen_ahead_m = 0;
@@ -75,8 +74,8 @@ class UprightObjects {
   struct End {
     double place_m = 0, sigma_m = 0;
   };
+  [[nodiscard]] End end_of_both(const std::array<WallSteps, 2>& steps) const;
   [[nodiscard]] std::optional<End> end_of_walls(const EdgeTracker& tracker, double place_m) const;
-  [[nodiscard]] double end_of_both_m(const std::array<WallSteps, 2>& steps) const;
   void hold(const UprightObject& object);
 
   struct Tunnel {

@@ -100,7 +100,7 @@ std::optional<UprightObjects::End> UprightObjects::end_of_walls(const EdgeTracke
   const std::array<std::optional<double>, 2> ends_m{steps[0].last(), steps[1].last()};
   const bool both = ends_m[0] && ends_m[1];
   const double apart_m = both ? std::abs(*ends_m[0] - *ends_m[1]) : 0.0;
-  if (both && apart_m < kEndsAgreeM) return End{end_of_both_m(steps), kEndSigmaM};
+  if (both && apart_m < kEndsAgreeM) return end_of_both(steps);
   if (!walls_alike()) {
     const auto& end_m = ends_m[near] ? ends_m[near] : ends_m[1 - near];
     return end_m ? std::optional(End{*end_m, kOneEndSigmaM}) : std::nullopt;
@@ -112,18 +112,22 @@ std::optional<UprightObjects::End> UprightObjects::end_of_walls(const EdgeTracke
 }
 
 // Of walls whose last steps are near one another, but not at one place, the one may show something that stands close
-// behind the end: then the step before is where the other wall ends.
-double UprightObjects::end_of_both_m(const std::array<WallSteps, 2>& steps) const {
+// behind the end: then the step before is where the other wall ends. What they are apart stays in doubt by half.
+UprightObjects::End UprightObjects::end_of_both(const std::array<WallSteps, 2>& steps) const {
   const double last_m = mean_of_walls_m(steps[0].place_m[0], steps[1].place_m[0]);
+  const double apart_m = std::abs(steps[0].place_m[0] - steps[1].place_m[0]);
+  End end{last_m, apart_m < kOneEndM ? kEndSigmaM : std::hypot(kEndSigmaM, 0.5 * apart_m)};
   for (size_t i = 0; i < steps[0].count; ++i) {
     for (size_t k = 0; k < steps[1].count; ++k) {
       const double right_m = steps[0].place_m[i];
       const double left_m = steps[1].place_m[k];
       const bool at_one_end = std::max(std::abs(right_m - last_m), std::abs(left_m - last_m)) < kEndsAgreeM;
-      if (at_one_end && std::abs(right_m - left_m) < kOneEndM) return mean_of_walls_m(right_m, left_m);
+      if (!at_one_end || std::abs(right_m - left_m) > kOneEndM) continue;
+      end.place_m = mean_of_walls_m(right_m, left_m);
+      return end;
     }
   }
-  return last_m;
+  return end;
 }
 
 // From so far ahead on an end and the panel that may follow it show no more, even on the wall that is nearer. What the

@@ -222,7 +222,9 @@ int measure(const Settings& settings) {
     ++pictures;
     for (const auto& sighting : sightings) {
       found.push_back({distance_at(truth, sighting.stamp_ns) + sighting.distance_ahead_m, sighting});
-      draw(settings, next->grey, geometry::View(calibration.intrinsics, picture.pose), sighting, pictures);
+      auto now = sighting;
+      now.distance_ahead_m = found.back().distance_m - row->distance_m;
+      draw(settings, next->grey, geometry::View(calibration.intrinsics, picture.pose), now, pictures);
     }
   }
   for (const auto& [kind, type] : kKinds) {

@@ -135,10 +135,13 @@ TEST_F(RunFolder, EmptyTablesGiveNoFiguresAndNoCrash) {
 
 TEST_F(RunFolder, RowsOutOfOrderAreTold) {
   write_run();
-  write("out/sightings.csv", "stamp_ns,kind,distance_ahead_m\n5,frog,1\n9,frog,1\n4,frog,1\n9,frog,1\n8,frog,1\n");
+  write("out/sightings.csv",
+        "stamp_ns,kind,distance_ahead_m\n5000000000,frog,1\n9000000000,frog,1\n4000000000,frog,1\n9000000000,frog,1\n"
+        "8500000000,mast,1\n7000000000,frog,1\n");  // the mast left the picture before it was told
   const auto run = read_run(root_ / "out").value();
   EXPECT_THAT(run.out_of_order, ElementsAre(::testing::Pair("sightings.csv", 2U)));
-  EXPECT_EQ(run.sightings->front().stamp_ns, 4);
+  EXPECT_EQ(run.sightings->front().stamp_ns, 4'000'000'000);
+  EXPECT_EQ(run.sightings->at(3).kind, "mast");
   const auto evaluation = evaluate(MadeTruth().make(), run);
   EXPECT_EQ(to_json(evaluation)["out_of_order"].dump(), "{\"sightings.csv\":2}");
   std::ostringstream out;

@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "core/random.hpp"
+#include "core/time.hpp"
+#include "track_detector/landmark_finder.hpp"
 #include "track_detector/platform_tracker.hpp"
 #include "track_detector/upright_objects.hpp"
 
@@ -11,6 +13,7 @@ namespace railfix::track_detector {
 namespace {
 
 constexpr double kStepM = 0.7;
+constexpr double kSpeedMps = 30;
 constexpr double kWidest = 0.55;
 
 /// An upright line beside straight track; `wall` and `deep` is what lies behind it towards the track.
@@ -78,9 +81,15 @@ std::vector<UprightObject> pass(const std::vector<Corner>& corners, double to_m,
   LandmarkPicture picture;
   picture.curvature_per_m = curvature_per_m;
   for (double way_m = 0; way_m < to_m; way_m += kStepM) {
+    picture.stamp_ns = core::to_ns(way_m / kSpeedMps);
     const auto profile = see(corners, way_m, edges, score_share, curvature_per_m);
     const auto& settled = tracker.follow(edges, profile, picture, way_m);
-    for (const auto& object : objects.add(settled, tracker, way_m, beside_grey)) told.push_back(object);
+    for (const auto& object : objects.add(settled, tracker, way_m, beside_grey)) {
+      told.push_back(object);
+      EXPECT_NEAR(kSpeedMps * core::seconds(object.seen_ns) + object.seen_ahead_m, object.place_m, 0.12);
+      EXPECT_LE(object.seen_ns, picture.stamp_ns);
+      EXPECT_GT(object.seen_ahead_m, 2.5 / kWidest) << "it had left the picture";
+    }
   }
   return told;
 }
@@ -110,6 +119,20 @@ TEST(Uprights, AMastFarBesideTheTrackStandsInTheMiddleOfItsOutlines) {
   const auto told = pass({{40.13, 6.87, 100, 60}, {39.87, 6.87, 60, 80}, {39.87, 7.13, 80, 100}}, 45);
   ASSERT_EQ(told.size(), 1U);
   EXPECT_NEAR(told[0].place_m, 40, 0.08);
+}
+
+TEST(Uprights, AreToldAsOfThePictureThatShowedThemNearestIfThatIsNotLongAgo) {
+  UprightObject mast{LandmarkType::mast, 100, 3.2, 0.05, 20};
+  mast.seen_ns = core::to_ns(3.7);
+  mast.seen_ahead_m = 7.5;
+  const auto soon = sighting_of(mast, 99.4, core::to_ns(4.0), 0.01);
+  EXPECT_EQ(soon.stamp_ns, core::to_ns(3.7));
+  EXPECT_EQ(soon.distance_ahead_m, 7.5);
+  EXPECT_NEAR(soon.sigma_m, std::hypot(0.05, 0.075), 1e-9);
+  const auto after_a_stop = sighting_of(mast, 99.4, core::to_ns(30), 0.01);
+  EXPECT_EQ(after_a_stop.stamp_ns, core::to_ns(30));
+  EXPECT_NEAR(after_a_stop.distance_ahead_m, 0.6, 1e-9);
+  EXPECT_NEAR(after_a_stop.sigma_m, std::hypot(0.05, 0.066), 1e-9);
 }
 
 TEST(Uprights, APostIsNoMast) {
@@ -227,7 +250,6 @@ TEST(Uprights, WhatOneOfTwoLikeWallsShowsBehindTheEndIsNotTheEnd) {
   EXPECT_NEAR(told[1].place_m, 70, 0.08);
 }
 
-// The same a metre behind the end: once that was taken for one end of two that agree, and their mean for the place.
 // On the right the picture gets a little brighter once more 0.25 m behind the end, too little to be followed.
 TEST(Uprights, WhatStandsCloseBehindTheEndIsNotTheEndOfBothWalls) {
   auto corners = on_both_walls({{40, 2.7, 70, 120, 60, 15}, {72.5, 2.7, 240, 150, 240, 240}});
@@ -238,6 +260,7 @@ TEST(Uprights, WhatStandsCloseBehindTheEndIsNotTheEndOfBothWalls) {
   EXPECT_NEAR(told[1].place_m, 72.5, 0.06);
 }
 
+// The same a metre behind the end: once that was taken for one end of two that agree, and their mean for the place.
 TEST(Uprights, WallsThatEndAtTwoPlacesSaySo) {
   for (const double behind_m : {0.6, 0.8, 1.0, 1.2}) {
     auto corners = on_both_walls({{40, 2.7, 70, 120, 60, 15}, {70, 2.7, 236, 150, 236, 238}});

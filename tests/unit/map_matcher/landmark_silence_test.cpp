@@ -44,14 +44,39 @@ TEST_F(Silence, IsSaidBehindSixLandmarksAndTwoKilometres) {
   run_to(5400);
   EXPECT_THAT(silence_.trouble(), IsEmpty());
   run_to(5600);
-  EXPECT_THAT(silence_.trouble(), HasSubstr("of the 6 landmarks that the map has on the last 5.6 km none was sighted"));
-  map(LandmarkKind::mast, 50);
+  EXPECT_THAT(silence_.trouble(), HasSubstr("of 6 landmarks that the map has on the last 5.1 km none was sighted"));
   silence_ = {};
-  run_to(0);
-  run_to(1900);
+  map(LandmarkKind::mast, 50);
+  run_to(2000);
   EXPECT_THAT(silence_.trouble(), IsEmpty());
   run_to(2100);
-  EXPECT_THAT(silence_.trouble(), HasSubstr("of the 42 landmarks"));
+  EXPECT_THAT(silence_.trouble(), HasSubstr("of 42 landmarks"));
+}
+
+// Nothing stands on the 2 km before a station: that is no silence of 2 km.
+TEST_F(Silence, IsNotOfOneStationNorOfOneGroup) {
+  map(LandmarkKind::frog, 200);
+  run_to(0, false);
+  run_to(5050, false);
+  silence_.begin_way();
+  run_to(5050);
+  run_to(6300);
+  EXPECT_THAT(silence_.trouble(), IsEmpty());
+  silence_ = {};
+  map(LandmarkKind::balise, 3);  // one after the other is one thing
+  run_to(9000);
+  EXPECT_THAT(silence_.trouble(), IsEmpty());
+}
+
+TEST_F(Silence, CountsWhatIsPassedOnceHoweverOftenThePlaceIsCorrected) {
+  map(LandmarkKind::frog, 1000);
+  for (double place_m = 10; place_m < 5400; place_m += 10) {
+    run_to(place_m);
+    run_to(place_m - 15);
+  }
+  EXPECT_THAT(silence_.trouble(), IsEmpty());
+  run_to(5600);
+  EXPECT_THAT(silence_.trouble(), HasSubstr("of 6 landmarks that the map has on the last 5.1 km"));
 }
 
 TEST_F(Silence, EndsWithASightingOfWhatTheMapHasThere) {
@@ -59,13 +84,13 @@ TEST_F(Silence, EndsWithASightingOfWhatTheMapHasThere) {
   run_to(7000);
   sight(LandmarkKind::balise, 7500);
   sight(LandmarkKind::frog, 7100);
-  EXPECT_THAT(silence_.trouble(), HasSubstr("of the 7 landmarks"));
+  EXPECT_THAT(silence_.trouble(), HasSubstr("of 7 landmarks"));
   sight(LandmarkKind::frog, 7505);
   EXPECT_THAT(silence_.trouble(), IsEmpty());
-  run_to(12000);
+  run_to(13400);  // 7,500 was sighted, before it was passed
   EXPECT_THAT(silence_.trouble(), IsEmpty());
-  run_to(13000);
-  EXPECT_THAT(silence_.trouble(), HasSubstr("of the 6 landmarks that the map has on the last 6.0 km"));
+  run_to(13600);
+  EXPECT_THAT(silence_.trouble(), HasSubstr("of 6 landmarks"));
 }
 
 TEST_F(Silence, IsNotOfDarknessNorOfAWayBackNorOfAnotherPath) {
@@ -74,7 +99,7 @@ TEST_F(Silence, IsNotOfDarknessNorOfAWayBackNorOfAnotherPath) {
   EXPECT_THAT(silence_.trouble(), IsEmpty());
   run_to(0);
   EXPECT_THAT(silence_.trouble(), IsEmpty());
-  silence_.begin_path();
+  silence_.begin_way();
   run_to(5000);
   EXPECT_THAT(silence_.trouble(), IsEmpty());
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <type_traits>
 
 #include "core/csv_table.hpp"
@@ -146,19 +147,19 @@ Status read(const fs::path& file, std::vector<StatusRow>& rows) {
   return table.status();
 }
 
+/// What stands beside the track is told up to half a second after the picture that showed it nearest.
+template <class Row>
+constexpr int64_t kToldLateNs = std::is_same_v<Row, SightingRow> ? 1'000'000'000 : 0;
+
 template <class Row>
 size_t put_in_order(std::vector<Row>& rows) {
   size_t older = 0;
-  const Row* newest = nullptr;
+  int64_t newest_ns = std::numeric_limits<int64_t>::min() + kToldLateNs<Row>;
   for (const Row& row : rows) {
-    if (newest != nullptr && row.stamp_ns < newest->stamp_ns) {
-      ++older;
-    } else {
-      newest = &row;
-    }
+    if (row.stamp_ns < newest_ns - kToldLateNs<Row>) ++older;
+    newest_ns = std::max(newest_ns, row.stamp_ns);
   }
-  if (older > 0)
-    std::stable_sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.stamp_ns < b.stamp_ns; });
+  std::stable_sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.stamp_ns < b.stamp_ns; });
   return older;
 }
 
