@@ -15,16 +15,16 @@ constexpr double kApartSigma = 3e-4;    // bearing
 constexpr double kWaySigmaM = 0.015;    // of the way to one look: the pitch of the pose
 constexpr double kOutlierSigmas = 3.0;  // of the scatter is another edge
 constexpr double kWorstFit = 4.0;       // sigmas: what is worse are two things
-constexpr int kPasses = 2;
-constexpr double kCorrelated = 4.0;  // so many neighbouring looks err together
-constexpr double kNoTurn = 1e-6;     // rad
+constexpr size_t kMostStrayed = 4;      // looks in a row that do not fit: the sides are lost
+constexpr double kCorrelated = 4.0;     // so many neighbouring looks err together
+constexpr double kNoTurn = 1e-6;        // rad
 
 struct Look {
   LookAt at;
   double apart = 0;  // bearing
 };
 
-/// That show both sides, far to near.
+/// That show both sides.
 struct Looks {
   std::array<Look, kMostMeasurements> of{};
   size_t count = 0;
@@ -105,24 +105,27 @@ class ApartFit {
 
 }  // namespace
 
-// The near half first: far away another edge beside a side may have been followed for it.
+// From near to far, and no farther than both sides are followed: what shows close beside one of them far away (a board,
+// the next panel) runs together with it and moves it.
 std::optional<Opening> opening_between(const SettledEdge& left, const SettledEdge& right) {
   const Looks all = looks_at_both(left, right);
   if (all.count < kFewestTogether) return std::nullopt;
   ApartFit fit(left, right);
-  fit.solve(all.all().last(std::max(all.count / 2, kFewestTogether)));
   Looks good;
-  for (int i = 0; i < kPasses; ++i) {
-    const double limit = kOutlierSigmas * std::max(fit.rms(), 1.0);
-    good.count = 0;
-    for (const Look& look : all.all()) {
-      if (std::abs(fit.off(look)) < limit) good.of[good.count++] = look;
+  size_t strayed = 0;
+  for (size_t i = all.count; i-- > 0 && strayed < kMostStrayed;) {
+    const Look& look = all.of[i];
+    const bool first = good.count < kFewestTogether;
+    if (!first && std::abs(fit.off(look)) > kOutlierSigmas * std::max(fit.rms(), 1.0)) {
+      ++strayed;
+      continue;
     }
-    if (good.count < kFewestTogether) return std::nullopt;
-    fit.solve(good.all());
+    strayed = 0;
+    good.of[good.count++] = look;
+    if (good.count >= kFewestTogether) fit.solve(good.all());
   }
-  const Look& last = good.all().back();
-  if (last.apart < kGrowth * good.all().front().apart || fit.rms() > kWorstFit || !fit.nearing()) return std::nullopt;
+  const Look& last = good.of[0];
+  if (last.apart < kGrowth * good.all().back().apart || fit.rms() > kWorstFit || !fit.nearing()) return std::nullopt;
   return fit.opening(last);
 }
 
