@@ -343,6 +343,16 @@ double Path::curvature_at(double distance_m) const {
   return leg.forward ? curvature : -curvature;
 }
 
+std::span<const PathLandmark> Path::landmarks_between(double from_m, double to_m) const {
+  const auto first = std::lower_bound(
+      landmarks_.begin(), landmarks_.end(), from_m,
+      [](const PathLandmark& landmark, double distance_m) { return landmark.distance_m < distance_m; });
+  const auto end = std::upper_bound(first, landmarks_.end(), to_m, [](double distance_m, const PathLandmark& landmark) {
+    return distance_m < landmark.distance_m;
+  });
+  return {first, end};
+}
+
 bool Path::grade_known_at(double distance_m) const {
   return distance_m >= begin_m() && distance_m <= end_m() && !leg_at(distance_m).edge->alignment.profile().empty();
 }

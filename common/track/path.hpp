@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "core/result.hpp"
@@ -63,6 +64,8 @@ class Path {
   /// For a train that runs along the path; nothing where the map says none.
   [[nodiscard]] std::optional<double> speed_limit_at(double distance_m) const;
   [[nodiscard]] const std::vector<PathLandmark>& landmarks() const { return landmarks_; }  // by distance
+  /// With those that lie at either end.
+  [[nodiscard]] std::span<const PathLandmark> landmarks_between(double from_m, double to_m) const;
   [[nodiscard]] const std::vector<PathBaliseGroup>& balise_groups() const { return groups_; }
   [[nodiscard]] const std::vector<PathSwitch>& switches() const { return switches_; }  // by distance
   [[nodiscard]] const Map& map() const { return *map_; }

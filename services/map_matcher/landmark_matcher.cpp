@@ -30,10 +30,6 @@ double gauss(double error, double sigma) {
   return std::exp(-0.5 * z * z) / (sigma * std::sqrt(2 * std::numbers::pi));
 }
 
-bool before(const track::PathLandmark& landmark, double distance_m) {
-  return landmark.distance_m < distance_m;
-}
-
 bool other_side(double lateral_m, double other_m) {
   return std::abs(lateral_m) > kClearSideM && std::abs(other_m) > kClearSideM && (lateral_m > 0) != (other_m > 0);
 }
@@ -153,10 +149,7 @@ double LandmarkMatcher::history_fits(double shift_m, double scale, double now_m)
   // Landmarks between the sightings that nobody reported.
   const auto [first, last] = std::minmax(seen_.front().place_m, now_m);
   const double reach_m = 1 + std::abs(scale) * (last - first);
-  const auto& all = path_->landmarks();
-  auto it = std::lower_bound(all.begin(), all.end(), first + shift_m - reach_m, before);
-  for (; it != all.end() && it->distance_m < last + shift_m + reach_m; ++it) {
-    const auto& landmark = *it;
+  for (const auto& landmark : path_->landmarks_between(first + shift_m - reach_m, last + shift_m + reach_m)) {
     const double nearly_m = landmark.distance_m - shift_m;
     const double place_m = nearly_m + scale * (now_m - nearly_m);
     if (place_m < first + 1 || place_m > last - 0.5 || !sighted_before(landmark.kind)) continue;
@@ -192,11 +185,9 @@ double LandmarkMatcher::mapped_per_m(track::LandmarkKind kind, double path_m) co
 
 std::vector<const track::PathLandmark*> LandmarkMatcher::near(track::LandmarkKind kind, double from_m,
                                                               double to_m) const {
-  const auto& all = path_->landmarks();
-  auto it = std::lower_bound(all.begin(), all.end(), from_m, before);
   std::vector<const track::PathLandmark*> found;
-  for (; it != all.end() && it->distance_m <= to_m; ++it) {
-    if (it->kind == kind) found.push_back(&*it);
+  for (const auto& landmark : path_->landmarks_between(from_m, to_m)) {
+    if (landmark.kind == kind) found.push_back(&landmark);
   }
   return found;
 }

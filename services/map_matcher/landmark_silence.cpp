@@ -13,10 +13,6 @@ constexpr double kOneThingM = 30;     // landmarks of a kind so near together, b
 constexpr double kSightedNearM = 10;  // of the window
 constexpr double kWayBackM = 50;      // is one; less may be the place that was corrected
 
-bool before(const track::PathLandmark& landmark, double distance_m) {
-  return landmark.distance_m < distance_m;
-}
-
 }  // namespace
 
 void LandmarkSilence::begin_way() {
@@ -32,10 +28,8 @@ void LandmarkSilence::run_on(const track::Path& path, double path_distance_m, bo
   if (path_distance_m <= from_m) return;
   reached_m_ = path_distance_m;
   if (!rails_in_sight) return;
-  const auto& all = path.landmarks();
-  for (auto it = std::lower_bound(all.begin(), all.end(), from_m, before);
-       it != all.end() && it->distance_m < path_distance_m; ++it) {
-    if (track::can_be_sighted(it->kind)) pass(*it, way_m_ + it->distance_m - from_m);
+  for (const auto& landmark : path.landmarks_between(from_m, path_distance_m)) {
+    if (track::can_be_sighted(landmark.kind)) pass(landmark, way_m_ + landmark.distance_m - from_m);
   }
   way_m_ += path_distance_m - from_m;
 }
@@ -52,14 +46,12 @@ void LandmarkSilence::pass(const track::PathLandmark& landmark, double way_m) {
 void LandmarkSilence::sight(const track::Path& path, const Sighting& sighting, const Prior& prior) {
   if (!prior.usable()) return;
   const double place_m = prior.path_distance_m + sighting.distance_ahead_m;
-  const double to_m = place_m + prior.under_m + kSightedNearM;
   const track::PathLandmark* nearest = nullptr;
-  const auto& all = path.landmarks();
-  for (auto it = std::lower_bound(all.begin(), all.end(), place_m - prior.over_m - kSightedNearM, before);
-       it != all.end() && it->distance_m <= to_m; ++it) {
-    if (it->kind != sighting.kind) continue;
-    if (nearest == nullptr || std::abs(it->distance_m - place_m) < std::abs(nearest->distance_m - place_m))
-      nearest = &*it;
+  for (const auto& landmark :
+       path.landmarks_between(place_m - prior.over_m - kSightedNearM, place_m + prior.under_m + kSightedNearM)) {
+    if (landmark.kind != sighting.kind) continue;
+    if (nearest == nullptr || std::abs(landmark.distance_m - place_m) < std::abs(nearest->distance_m - place_m))
+      nearest = &landmark;
   }
   if (nearest == nullptr) return;
   sighted_m_ = std::max(sighted_m_.value_or(nearest->distance_m), nearest->distance_m);

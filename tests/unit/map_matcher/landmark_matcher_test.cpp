@@ -7,6 +7,7 @@
 
 #include "core/random.hpp"
 #include "core/result.hpp"
+#include "unit/map_matcher/marked_line.hpp"
 
 namespace railfix::map_matcher {
 namespace {
@@ -14,13 +15,7 @@ namespace {
 using track::LandmarkKind;
 
 std::shared_ptr<const track::Path> line_with(const std::vector<std::pair<LandmarkKind, double>>& landmarks) {
-  auto map = std::make_shared<track::Map>();
-  map->edges.push_back({1, "line", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{20000, 0, 0}})});
-  map->nodes = {{1, track::NodeKind::end, "", 0, 0}, {2, track::NodeKind::end, "", 0, 20000}};
-  uint32_t id = 0;
-  for (const auto& [kind, offset_m] : landmarks) map->landmarks.push_back({++id, kind, 1, offset_m, 0, 0.1, ""});
-  return std::make_shared<const track::Path>(
-      core::value_or_throw(track::Path::follow(map, {1, 0, track::Direction::forward}, 20000, 0)));
+  return path_along(marked_line(landmarks));
 }
 
 Sighting sighting_of(LandmarkKind kind, double confidence = 0.98) {

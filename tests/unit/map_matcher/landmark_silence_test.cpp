@@ -3,9 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/result.hpp"
 #include "core/time.hpp"
 #include "map_matcher/map_matcher.hpp"
+#include "unit/map_matcher/marked_line.hpp"
 
 namespace railfix::map_matcher {
 namespace {
@@ -15,27 +15,22 @@ using ::testing::IsEmpty;
 using track::LandmarkKind;
 
 std::shared_ptr<const track::Map> line_with(LandmarkKind kind, double every_m) {
-  auto map = std::make_shared<track::Map>();
-  map->edges.push_back({1, "line", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{20000, 0, 0}})});
-  map->nodes = {{1, track::NodeKind::end, "", 0, 0}, {2, track::NodeKind::end, "", 0, 20000}};
-  for (double offset_m = 0.5 * every_m; offset_m < 20000; offset_m += every_m) {
-    map->landmarks.push_back({static_cast<uint32_t>(map->landmarks.size() + 1), kind, 1, offset_m, 0, 0.1, ""});
-  }
-  return map;
+  std::vector<std::pair<LandmarkKind, double>> landmarks;
+  for (double offset_m = 0.5 * every_m; offset_m < 20000; offset_m += every_m) landmarks.emplace_back(kind, offset_m);
+  return marked_line(landmarks);
 }
 
 class Silence : public ::testing::Test {
  protected:
   void map(LandmarkKind kind, double every_m) {
-    path_.emplace(core::value_or_throw(
-        track::Path::follow(line_with(kind, every_m), {1, 0, track::Direction::forward}, 20000, 0)));
+    path_ = path_along(line_with(kind, every_m));
     run_to(0);
   }
   void run_to(double place_m, bool rails_in_sight = true) { silence_.run_on(*path_, place_m, rails_in_sight); }
   void sight(LandmarkKind kind, double place_m) {
     silence_.sight(*path_, {1, kind, 5, 0, 0.1, 0.98}, {place_m - 5, 3, 3, place_m});
   }
-  std::optional<track::Path> path_;
+  std::shared_ptr<const track::Path> path_;
   LandmarkSilence silence_;
 };
 
@@ -56,7 +51,6 @@ TEST_F(Silence, IsSaidBehindSixLandmarksAndTwoKilometres) {
 // Nothing stands on the 2 km before a station: that is no silence of 2 km.
 TEST_F(Silence, IsNotOfOneStationNorOfOneGroup) {
   map(LandmarkKind::frog, 200);
-  run_to(0, false);
   run_to(5050, false);
   silence_.begin_way();
   run_to(5050);
