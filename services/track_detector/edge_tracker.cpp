@@ -118,7 +118,7 @@ void EdgeTracker::relate() {
   const double cosine = std::cos(now.heading_rad);
   const double sine = std::sin(now.heading_rad);
   for (size_t i = 1; i < count_; ++i) {
-    const Look& look = looks_[(newest_ + kMostLooks - i) % kMostLooks];
+    const Look& look = look_back(i);
     const double dx = look.x_m - now.x_m;
     const double dy = look.y_m - now.y_m;
     const double turn = look.heading_rad - now.heading_rad;

@@ -53,6 +53,16 @@ struct SettledEdge {
   std::array<StripeMeasurement, kMostStripes> stripe{};
 };
 
+/// use(of one, of the other): every look in which both edges were measured, far to near.
+template <class Use>
+void together(const SettledEdge& one, const SettledEdge& other, const Use& use) {
+  for (size_t i = 0, k = 0; i < one.count; ++i) {
+    while (k < other.count && other.measured[k].way_m < one.measured[i].way_m) ++k;
+    if (k == other.count) return;
+    if (other.measured[k].way_m == one.measured[i].way_m) use(one.measured[i], other.measured[k]);
+  }
+}
+
 /// Where the brightness steps along a wall, the last place first.
 struct WallSteps {
   std::array<double, 4> place_m{};
@@ -117,6 +127,8 @@ class EdgeTracker {
   void advance(const LandmarkPicture& picture, double way_m);
   void remember(const UprightProfile& profile, const LandmarkPicture& picture);
   void relate();
+  /// The newest for 0.
+  [[nodiscard]] const Look& look_back(size_t i) const { return looks_[(newest_ + looks_.size() - i) % looks_.size()]; }
   void take(const UprightEdge& edge);
   [[nodiscard]] double bearing_of(const Relative& relative, double x_m, double y_m, double bend) const;
   [[nodiscard]] std::array<Spot, 2> locate(double bearing, int sign) const;

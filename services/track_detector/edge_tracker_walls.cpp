@@ -24,7 +24,7 @@ double EdgeTracker::leaves_ahead_m(double lateral_m) const {
 std::optional<LookAt> EdgeTracker::last_look_at(double place_m, double lateral_m) const {
   const double leaves_m = leaves_ahead_m(lateral_m);
   for (size_t i = 0; i < count_; ++i) {
-    const Look& look = looks_[(newest_ + looks_.size() - i) % looks_.size()];
+    const Look& look = look_back(i);
     if (place_m - look.way_m >= leaves_m) return LookAt{look.way_m, look.stamp_ns};
   }
   return std::nullopt;

@@ -144,10 +144,10 @@ void LandmarkFinder::find_platforms(const LandmarkPicture& picture) {
   for (const SettledPlatform& end : platforms_.follow(platform_search_.find(picture), way_m_)) {
     if (uprights_.in_tunnel(way_m_) || uprights_.lit_walls()) continue;  // walls, ducts and lamps look like platforms
     const double ahead_m = end.place_m - way_m_;
-    report(
-        {LandmarkType::platform, picture.stamp_ns, ahead_m, end.lateral_m,
-         std::hypot(end.sigma_m, options_.way_sigma * (std::abs(ahead_m) + 6.0)), 1.0 - std::exp(-0.5 * end.pictures)},
-        picture);
+    report({LandmarkType::platform, picture.stamp_ns, ahead_m, end.lateral_m,
+            std::hypot(end.sigma_m, options_.way_sigma * (std::abs(ahead_m) + kOutOfPictureM)),
+            1.0 - std::exp(-0.5 * end.pictures)},
+           picture);
   }
 }
 

@@ -62,15 +62,9 @@ class SizeFit {
   int looks_ = 0;
 };
 
-// Every look in which both edges were measured, and how far apart they show in it (bearing).
-template <typename Use>
-void together(const SettledEdge& inner, const SettledEdge& outer, const Use& use) {
-  for (size_t i = 0, k = 0; i < inner.count; ++i) {
-    while (k < outer.count && outer.measured[k].way_m < inner.measured[i].way_m) ++k;
-    if (k == outer.count) return;
-    if (outer.measured[k].way_m > inner.measured[i].way_m) continue;
-    use(inner.measured[i], std::abs(outer.measured[k].bearing - inner.measured[i].bearing));
-  }
+// How far apart they show in one look (bearing).
+double apart(const EdgeMeasurement& inner, const EdgeMeasurement& outer) {
+  return std::abs(outer.bearing - inner.bearing);
 }
 
 // Far away two edges push each other off where they are, equally far, so that their middle stays. Where it stands, as a
@@ -82,15 +76,16 @@ std::optional<MastPlace> middle_of(const SettledEdge& inner, const SettledEdge& 
   const double side = inner.lateral_m > 0 ? 1 : -1;
   const double nearest_way_m = inner.measured[inner.count - 1].way_m;
   int looks = 0;
-  together(inner, outer, [&](const EdgeMeasurement& look, double apart) {
+  together(inner, outer, [&](const EdgeMeasurement& look, const EdgeMeasurement& other) {
+    const double apart_there = apart(look, other);
     const double per_ahead = 1 / std::max(1.0, inner.place_m - look.way_m);
     const double per_place = std::abs(inner.lateral_m) * per_ahead * per_ahead;
     const double expected = size.front_m * per_ahead + size.side_m * per_place;
     if (expected < kNarrowestCells * inner.cell) return;
-    if (std::abs(apart - std::max(expected, kBlurredCells * inner.cell)) > kGateCells * inner.cell) return;
+    if (std::abs(apart_there - std::max(expected, kBlurredCells * inner.cell)) > kGateCells * inner.cell) return;
     const Eigen::Vector3d slope(-per_place, per_ahead, nearest_way_m - look.way_m);
     normal += slope * slope.transpose();
-    right += slope * (side * look.residual + 0.5 * apart);
+    right += slope * (side * look.residual + 0.5 * apart_there);
     ++looks;
   });
   if (looks < kFewestMiddles) return std::nullopt;
@@ -103,8 +98,9 @@ std::optional<MastPlace> middle_of(const SettledEdge& inner, const SettledEdge& 
 
 std::optional<MastSize> size_between(const SettledEdge& inner, const SettledEdge& outer) {
   SizeFit fit(inner, 0.5 * (inner.place_m + outer.place_m), 0.5 * (inner.lateral_m + outer.lateral_m));
-  together(inner, outer,
-           [&fit](const EdgeMeasurement& look, double apart) { fit.add(look.way_m, look.bearing, apart); });
+  together(inner, outer, [&fit](const EdgeMeasurement& look, const EdgeMeasurement& other) {
+    fit.add(look.way_m, look.bearing, apart(look, other));
+  });
   return fit.solve();
 }
 

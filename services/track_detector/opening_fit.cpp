@@ -33,13 +33,9 @@ struct Looks {
 
 Looks looks_at_both(const SettledEdge& left, const SettledEdge& right) {
   Looks looks;
-  for (size_t i = 0, k = 0; i < left.count; ++i) {
-    const EdgeMeasurement& one = left.measured[i];
-    while (k < right.count && right.measured[k].way_m < one.way_m) ++k;
-    if (k == right.count) break;
-    if (right.measured[k].way_m > one.way_m) continue;
-    looks.of[looks.count++] = {{one.way_m, one.stamp_ns}, one.bearing - right.measured[k].bearing};
-  }
+  together(left, right, [&looks](const EdgeMeasurement& one, const EdgeMeasurement& other) {
+    looks.of[looks.count++] = {{one.way_m, one.stamp_ns}, one.bearing - other.bearing};
+  });
   return looks;
 }
 

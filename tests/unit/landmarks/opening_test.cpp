@@ -4,6 +4,7 @@
 
 #include "core/random.hpp"
 #include "track_detector/opening_fit.hpp"
+#include "unit/landmarks/seen_along_track.hpp"
 
 namespace railfix::track_detector {
 namespace {
@@ -34,12 +35,6 @@ struct Approach {
         edge->measured[edge->count++] = {kPlaceM - ahead_m, bearing, 0, 0, static_cast<int64_t>(i)};
       }
     }
-  }
-  static double bearing_of(double along_m, double lateral_m, double curvature_per_m) {
-    if (curvature_per_m == 0) return lateral_m / along_m;
-    const double radius_m = 1 / curvature_per_m;
-    const double turn = curvature_per_m * along_m;
-    return (radius_m - (radius_m - lateral_m) * std::cos(turn)) / ((radius_m - lateral_m) * std::sin(turn));
   }
 };
 

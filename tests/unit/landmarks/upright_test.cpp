@@ -8,6 +8,7 @@
 #include "track_detector/landmark_finder.hpp"
 #include "track_detector/platform_tracker.hpp"
 #include "track_detector/upright_objects.hpp"
+#include "unit/landmarks/seen_along_track.hpp"
 
 namespace railfix::track_detector {
 namespace {
@@ -22,14 +23,6 @@ struct Corner {
   double shows_m = 40;  // from nearer than this: it is burnt out until the camera has got used to the light
   double fades_m = 2;   // until nearer than this: the land behind it is as bright
 };
-
-// Of a place so far on along the track and beside it, from a camera that looks along the track.
-double bearing_of(double along_m, double lateral_m, double curvature_per_m) {
-  if (curvature_per_m == 0) return lateral_m / along_m;
-  const double radius_m = 1 / curvature_per_m;
-  const double turn = curvature_per_m * along_m;
-  return (radius_m - (radius_m - lateral_m) * std::cos(turn)) / ((radius_m - lateral_m) * std::sin(turn));
-}
 
 // The corners as seen from way_m: edges as a picture of 640 columns would show them. score_share: less where the ground
 // behind them is uneven in brightness.
