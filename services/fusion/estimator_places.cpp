@@ -27,6 +27,10 @@ double gnss_sigma_m(const GnssInput& sample, const FusionParameters& p) {
   return p.gnss_single_sigma_m * hdop;
 }
 
+double fix_sigma_m(const FixInput& fix, const FusionParameters& p) {
+  return std::max(fix.sigma_m, p.fix_sigma_floor_m);
+}
+
 struct FootOnPath {
   double distance_m;
   double lateral_m;
@@ -108,7 +112,7 @@ void Estimator::use(const FixInput& fix) {
   if (fix.new_path) {
     path_ = fix.new_path;
     given_up_.reset();
-    filter_.set_origin(0, std::max(fix.sigma_m, parameters_->fix_sigma_floor_m));
+    filter_.set_origin(0, fix_sigma_m(fix, *parameters_));
     track_doubt_.said(fix.probability, std::nullopt, filter_.path_distance_m());
     accept(fix);
     told_by_ = fix.kind == FixKind::gnss ? ToldBy::gnss : fix.only_told ? ToldBy::start : ToldBy::nobody;
@@ -125,7 +129,7 @@ void Estimator::use(const FixInput& fix) {
     track_doubt_.seen_elsewhere(fix.probability);
     return;
   }
-  const double sigma_m = std::max(fix.sigma_m, parameters_->fix_sigma_floor_m);
+  const double sigma_m = fix_sigma_m(fix, *parameters_);
   const auto lasting = fix.kind == FixKind::curvature ? std::optional(StateIndex::shape_error) : std::nullopt;
   fix_again_ = has_met(fix.landmark) && filter_.path_sigma_m() < kForgotten * sigma_m;
   fix_offer_ =
@@ -249,8 +253,7 @@ void Estimator::refuse(const FixInput& fix, double path_distance_m, const Offer&
       // What was wrong may have taught a wrong scale, too.
       filter_.loosen_origin(std::abs(offer.residual) + fix.sigma_m);
       filter_.loosen_scale(*parameters_);
-      filter_.offer_position({path_distance_m, std::max(fix.sigma_m, parameters_->fix_sigma_floor_m)},
-                             parameters_->gate_fix);
+      filter_.offer_position({path_distance_m, fix_sigma_m(fix, *parameters_)}, parameters_->gate_fix);
       corrected_ = true;
       accept(fix);
       // Either side: what told where to look for these two was wrong by as much. Until a third one agrees.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <type_traits>
 
 #include "core/csv_table.hpp"
@@ -154,12 +153,13 @@ constexpr int64_t kToldLateNs = std::is_same_v<Row, SightingRow> ? 1'000'000'000
 template <class Row>
 size_t put_in_order(std::vector<Row>& rows) {
   size_t older = 0;
-  int64_t newest_ns = std::numeric_limits<int64_t>::min() + kToldLateNs<Row>;
+  int64_t newest_ns = rows.empty() ? 0 : rows.front().stamp_ns;
   for (const Row& row : rows) {
     if (row.stamp_ns < newest_ns - kToldLateNs<Row>) ++older;
     newest_ns = std::max(newest_ns, row.stamp_ns);
   }
-  std::stable_sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.stamp_ns < b.stamp_ns; });
+  const auto earlier = [](const Row& a, const Row& b) { return a.stamp_ns < b.stamp_ns; };
+  if (!std::is_sorted(rows.begin(), rows.end(), earlier)) std::stable_sort(rows.begin(), rows.end(), earlier);
   return older;
 }
 
