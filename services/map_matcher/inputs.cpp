@@ -28,7 +28,7 @@ bool has_sense(const Sighting& s) {
 
 bool has_sense(const Turn& t) {
   return up_to(t.way_m, kFarthestM) && up_to(t.turn_rad, kMostTurnRad) && within(t.sigma_rad, 0, kMostTurnRad) &&
-         within(t.bias_rad, 0, kMostTurnRad) && t.bias_walk >= 0;
+         within(t.bias_rad, 0, kMostTurnRad) && t.bias_walk >= 0 && t.duration_s >= 0;
 }
 
 bool has_sense(const StepInput& s) {

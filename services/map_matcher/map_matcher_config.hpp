@@ -103,9 +103,13 @@ struct MapMatcherConfig {
     auto& p = parameters.track;
     f.number("bin_m", p.bin_m, {0.5, 20}, "m", "Turning is compared over this way.");
     f.number("noise_per_m", p.noise_per_m, {1e-6, 0.1}, "1/m", "Least sigma of the curvature of one bin.");
+    f.number("sway_rad", p.sway_rad, {0, 0.1}, "rad",
+             "The body turns to and fro on its springs, one sigma at 72 km/h ...");
+    f.number("sway_s", p.sway_s, {0.01, 10}, "s", "... and forgets it in about this time.");
     f.number("curvature_share", p.curvature_share, {0, 1}, "",
              "The map's curvature may be off by this share (switches are drawn roughly).");
-    f.number("correlated_bins", p.correlated_bins, {1, 100}, "", "So many neighbouring bins err together.");
+    f.number("correlated_bins", p.correlated_bins, {1, 100}, "",
+             "The map's error, and that of pictures, is the same in so many neighbouring bins.");
     f.number("map_sigma_m", p.map_sigma_m, {0.1, 50}, "m", "Switches are elsewhere than on the map, one sigma.");
     f.number("reach_m", p.reach_m, {5, 500}, "m", "Ways are told apart from this far ahead of the train.");
     f.number("wrong_side", p.wrong_side, {0.001, 0.5}, "", "Chance that a frog or mast is reported on the wrong side.");

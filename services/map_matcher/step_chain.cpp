@@ -49,6 +49,7 @@ std::optional<double> StepChain::way_to(const StepInput& step) const {
 Turn StepChain::turn_to(const StepInput& step, double way_m) const {
   Turn turn;
   turn.way_m = way_m;
+  turn.duration_s = core::seconds(step.stamp_ns - last_->stamp_ns);
   turn.sigma_rad = std::hypot(step.yaw_sigma_rad, kYawNoiseRad);
   const double part = step.step_m == 0 ? 1.0 : std::clamp(way_m / step.step_m, -1.0, 1.0);
   if (step.reference_stamp_ns != last_->reference_stamp_ns) {

@@ -31,7 +31,8 @@ struct PassagePlan {
   double switch_sigma_m = 0.5;  // of the switch on the map
   bool camera = true;           // else a cheap gyro
   bool frog_seen = true;
-  bool views = true;  // the rails' curvature in the pictures, with a camera
+  bool views = true;         // the rails' curvature in the pictures, with a camera
+  double sway_rad = 0.0015;  // of the body, 1 sigma at 72 km/h
   std::string text() const {
     return std::string(facing ? "facing" : "trailing") + (diverging ? " diverging" : " straight") + " layout " +
            std::to_string(layout) + " manoeuvre " + std::to_string(static_cast<int>(manoeuvre)) + " R " +
@@ -93,7 +94,7 @@ class SwitchPassage {
     errors_.bogies_behind_m = tram ? 0 : random_.uniform(0, 4);
     errors_.bogie_distance_m = tram ? 0 : random_.uniform(6, 17);
     if (plan.camera) errors_.bogies_behind_m += random_.uniform(-1, 1);  // odometry's turn is that of here +- 0.5 m
-    errors_.sway_rad = 0.0015;
+    errors_.sway_rad = plan.sway_rad;
     sensors_.emplace(errors_, seed * 7 + 1);
     gyro_.emplace(map_matcher::GyroParameters{errors_.turn_noise_rps / std::sqrt(kTicksPerS), 0.002, 1e-5, 0.2});
     result_.astray = plan.camera && random_.uniform() < 0.02;
@@ -234,8 +235,11 @@ class SwitchPassage {
 
   std::optional<map_matcher::Turn> turn_of(const SensedStep& sensed) {
     if (plan_.camera) {
-      return map_matcher::Turn{sensed.way_m, sensed.turn_rad, sensed.turn_sigma_rad,
-                               kCameraBiasPerM * std::abs(sensed.way_m), map_matcher::TurnSensor::camera};
+      return map_matcher::Turn{.way_m = sensed.way_m,
+                               .turn_rad = sensed.turn_rad,
+                               .sigma_rad = sensed.turn_sigma_rad,
+                               .bias_rad = kCameraBiasPerM * std::abs(sensed.way_m),
+                               .duration_s = sensed.duration_s};
     }
     const int64_t from_ns = core::to_ns(time_s_ - 1 / kTicksPerS);
     const int64_t to_ns = core::to_ns(time_s_);

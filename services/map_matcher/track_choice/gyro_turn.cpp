@@ -61,6 +61,7 @@ std::optional<Turn> GyroTurn::between(int64_t from_ns, int64_t to_ns) const {
   turn.bias_rad = std::sqrt(bias_variance) * dt_s;
   if (bias_variance > 0) turn.bias_walk = parameters_.bias_walk_rps * parameters_.bias_walk_rps * dt_s / bias_variance;
   turn.sensor = TurnSensor::gyro;
+  turn.duration_s = dt_s;
   return turn;
 }
 

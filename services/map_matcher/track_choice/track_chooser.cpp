@@ -29,6 +29,7 @@ void TrackChooser::start(const TrackWindow& window) {
   const track::Run run{map_->edge(window.place.edge), window.place.direction != track::Direction::reverse};
   hypotheses_.push_back({track::Route(run, window.place.offset_m, 0), 0, {0, std::log(parameters_.astray)}, {}});
   forwards_ = window.forwards;
+  guess_nothing();
   told_ = 1;
   if (window.probability < kWatched) open_ways_behind();
   cells_m_ = first_m();
@@ -77,30 +78,35 @@ void TrackChooser::move(const Turn& turn) {
   if (turn.sensor != sensor_) {
     sensor_ = turn.sensor;
     for (auto& hypothesis : hypotheses_) {
-      for (auto& cell : hypothesis.cells) cell = {cell.log_weight, 0, 1};
+      for (auto& cell : hypothesis.cells) cell.errors.forget(TurnErrors::bias);
     }
   }
-  place_m_ += turn.way_m;
-  lost_m_ += std::abs(turn.way_m);
-  moved_back_m_ = std::max(0.0, moved_back_m_ - (forwards_ ? turn.way_m : -turn.way_m));
-  if (moved_back_m_ > kTurnRoundM) turn_round();
-  run_pictures(turn.way_m);
+  run(turn.way_m);
   pending_.way_m += turn.way_m;
   pending_.turn_rad += turn.turn_rad;
   pending_.variance += turn.sigma_rad * turn.sigma_rad;
   pending_.bias_rad += turn.bias_rad;
   pending_.bias_walk += turn.bias_walk;
+  pending_.duration_s += turn.duration_s;
   if (std::abs(pending_.way_m) >= parameters_.bin_m) use_pending();
+}
+
+// A train that rocks a little has not turned round, unless over points.
+void TrackChooser::run(double way_m) {
+  place_m_ += way_m;
+  lost_m_ += std::abs(way_m);
+  moved_back_m_ = std::max(0.0, moved_back_m_ - (forwards_ ? way_m : -way_m));
+  const bool on_guess = forwards_ ? place_m_ < guessed_m_ : place_m_ > guessed_m_;
+  if (moved_back_m_ > kTurnRoundM || (moved_back_m_ > 0 && on_guess)) turn_round();
+  run_pictures(way_m);
 }
 
 void TrackChooser::stand(const Turn& turn) {
   if (turn.sensor != sensor_ || !has_sense(turn) || !(turn.sigma_rad > 0)) return;
-  const double noise = turn.sigma_rad * turn.sigma_rad;
+  const BinTurn stood{
+      0, turn.turn_rad, turn.sigma_rad * turn.sigma_rad, turn.bias_rad, turn.bias_walk, turn.duration_s};
   for (auto& hypothesis : hypotheses_) {
-    for (auto& cell : hypothesis.cells) {
-      loosen_bias(cell, turn.bias_walk);
-      learn_bias(cell, turn.turn_rad - turn.bias_rad * cell.bias, noise, turn.bias_rad);
-    }
+    for (auto& cell : hypothesis.cells) weigh_stand(cell, stood);
   }
 }
 
@@ -108,10 +114,11 @@ void TrackChooser::move_blind(double way_m) {
   if (hypotheses_.empty() || !has_sense(Turn{way_m})) return;
   cells_m_ += pending_.way_m + way_m;
   pending_ = {};
-  place_m_ += way_m;
-  lost_m_ += std::abs(way_m);
-  run_pictures(way_m);
-  for (auto& hypothesis : hypotheses_) spread(hypothesis.cells, way_m);
+  run(way_m);
+  for (auto& hypothesis : hypotheses_) {
+    spread(hypothesis.cells, way_m);
+    for (auto& cell : hypothesis.cells) cell.errors.forget(TurnErrors::sway);
+  }
   trim();
   extend();
   fit_cells();

@@ -74,11 +74,13 @@ class TrackChooser {
   };
   void start(const TrackWindow& window);
   void open_ways_behind();
+  void run(double way_m);
   void use_pending();
   void fit_cells();
   void turn_round();
   void extend();
-  void extend_behind(track::Route& route) const;
+  void extend_behind(track::Route& route);
+  void guess_nothing();
   void trim();
   /// False before the first window.
   [[nodiscard]] bool stands_near(const track::EdgePosition& place) const;
@@ -103,9 +105,10 @@ class TrackChooser {
   double cells_m_ = 0;  // of the first cell
   double lost_m_ = 0;   // run since the window was on one of the routes
   double moved_back_m_ = 0;
-  bool forwards_ = true;      // the way that the train moves, seen from the cab
-  double seen_m_ = INFINITY;  // run since a picture was used
-  double told_ = 1;           // probability of what was told at the start and cannot be looked into
+  double guessed_m_ = -INFINITY;  // behind this place the routes are the straight ones, whatever the train came by
+  bool forwards_ = true;          // the way that the train moves, seen from the cab
+  double seen_m_ = INFINITY;      // run since a picture was used
+  double told_ = 1;               // probability of what was told at the start and cannot be looked into
   TurnSensor sensor_ = TurnSensor::camera;
   BinTurn pending_;
 };

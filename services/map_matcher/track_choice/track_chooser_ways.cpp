@@ -57,6 +57,7 @@ void TrackChooser::turn_round() {
   const double wheels_m = place_m_ - window_.over_m - map_m - kWheelsBehindM;
   const double foot_m = place_m_ + window_.under_m + map_m;
   forwards_ = !forwards_;
+  guess_nothing();
   moved_back_m_ = 0;
   cells_m_ += pending_.way_m;
   pending_ = {};
@@ -98,18 +99,24 @@ void TrackChooser::extend() {
   for (auto& hypothesis : hypotheses_) extend_behind(hypothesis.route);
 }
 
-// Where the train came from matters only for the cells that lie there: the straight way will do.
-void TrackChooser::extend_behind(track::Route& route) const {
+// Where the train came from matters only for the cells that lie there: the straight way will do, until it backs there.
+void TrackChooser::extend_behind(track::Route& route) {
   while (forwards_ && route.begin_m() > first_m()) {
     const auto ways = ways_->before(route.legs().front().run);
     if (ways.empty()) return;
+    if (ways.size() > 1) guessed_m_ = std::max(guessed_m_, route.begin_m());
     route.push_behind(ways.front());
   }
   while (!forwards_ && route.end_m() < last_m()) {
     const auto& ways = ways_->after(route.legs().back().run);
     if (ways.empty()) return;
+    if (ways.size() > 1) guessed_m_ = std::min(guessed_m_, route.end_m());
     route.push_ahead(ways.front());
   }
+}
+
+void TrackChooser::guess_nothing() {
+  guessed_m_ = forwards_ ? -INFINITY : INFINITY;
 }
 
 void TrackChooser::trim() {

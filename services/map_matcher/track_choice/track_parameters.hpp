@@ -5,9 +5,11 @@ namespace railfix::map_matcher {
 
 struct TrackParameters {
   double bin_m = 2.0;             // turning is compared over this way
-  double noise_per_m = 3e-4;      // least sigma of the curvature of one bin: car body, sleepers
+  double noise_per_m = 2e-4;      // least sigma of the curvature of one bin: sleepers, hunting
+  double sway_rad = 3e-3;         // the body turns to and fro on its springs, one sigma at 72 km/h, ...
+  double sway_s = 0.3;            // ... and forgets it in about this time
   double curvature_share = 0.15;  // of the map's curvature: switches are drawn roughly
-  double correlated_bins = 3.0;   // neighbouring bins err together (the body sways), but for the sensor's noise
+  double correlated_bins = 3.0;   // the map's error, and that of pictures, is the same in so many bins
   double lag_m = 20.0;            // the car body turns up to so far behind the camera's foot (distance of the bogies)
   double map_sigma_m = 1.5;       // the map's switches are somewhere else by so much
   double reach_m = 30.0;          // ways are told apart from this far ahead

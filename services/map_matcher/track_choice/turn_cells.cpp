@@ -11,6 +11,7 @@ constexpr double kMostSquared = 12.0;     // a bin that fits worse than this is 
 constexpr double kNoiseShare = 1.5;       // no sensor knows its own noise better
 constexpr double kHalfBodyM = 8.0;        // a long car turns with the mean of the track below it
 constexpr double kBiasForgetPerM = 5e-4;  // the sensor's bias may be another one after some kilometres
+constexpr double kSwaySpeedMps = 20.0;    // the sway grows with the speed
 
 /// Sums of a route's curvature every metre, so that means over any stretch are cheap.
 class CurvatureSums {
@@ -32,31 +33,68 @@ class CurvatureSums {
   std::vector<double> sums_;
 };
 
+/// A Kalman filter of the errors of turning: what the body has swayed to the one side within a bin it sways back in the
+/// next ones, so that little of it is left over a longer way.
+class TurnErrorModel {
+ public:
+  TurnErrorModel(const BinTurn& bin, const TrackParameters& parameters)
+      : forgotten_(kBiasForgetPerM * std::abs(bin.way_m) + bin.bias_walk) {
+    const double speed_mps = bin.duration_s > 0 ? std::abs(bin.way_m) / bin.duration_s : 0;
+    const double sway_rad = parameters.sway_rad * speed_mps / kSwaySpeedMps;
+    keeps_ << 1, std::exp(-bin.duration_s / parameters.sway_s);
+    fresh_ = sway_rad * sway_rad * (1 - keeps_[1] * keeps_[1]);
+    seen_ << bin.bias_rad, keeps_[1] - 1;
+  }
+  /// `turned_rad`: more than the track. How well it fits weighs the cell.
+  void weigh(TurnCell& cell, double turned_rad, double noise) const {
+    auto& [mean, covariance] = cell.errors;
+    const double error = turned_rad - seen_.dot(mean);
+    const Eigen::Vector2d together = covariance * seen_;
+    const double variance = noise + fresh_ + seen_.dot(together);
+    const double squared = error * error / variance;
+    cell.log_weight -= 0.5 * (std::min(squared, kMostSquared) + std::log(variance));
+    Eigen::Vector2d of_errors = keeps_.cwiseProduct(together);
+    of_errors[TurnErrors::sway] += fresh_;
+    mean = keeps_.cwiseProduct(mean);
+    covariance = keeps_.asDiagonal() * covariance * keeps_.asDiagonal();
+    covariance(TurnErrors::sway, TurnErrors::sway) += fresh_;
+    if (squared <= kMostSquared) {
+      mean += error / variance * of_errors;
+      covariance -= of_errors * of_errors.transpose() / variance;
+    }
+    double& bias = covariance(TurnErrors::bias, TurnErrors::bias);
+    bias = std::min(1.0, bias + forgotten_);
+  }
+
+ private:
+  Eigen::Vector2d keeps_;  // of the errors, over the bin
+  Eigen::Vector2d seen_;   // what is measured of the errors that the bin begins with
+  double fresh_;           // variance of the sway that is new
+  double forgotten_;       // variance of the bias
+};
+
 }  // namespace
 
-// Every cell is one place of the train and carries the bias that fits best there.
+// Every cell is one place of the train and carries the errors that fit best there.
 void weigh_turn(std::vector<TurnCell>& cells, double first_m, const track::Route& route, const BinTurn& bin,
                 const TrackParameters& parameters) {
-  const double measured = bin.turn_rad / bin.way_m;
-  const double sensor = kNoiseShare * bin.variance / (bin.way_m * bin.way_m);
-  const double body = parameters.noise_per_m * parameters.noise_per_m;
-  const double bias_to_curvature = bin.bias_rad / bin.way_m;
+  const double sensor = kNoiseShare * bin.variance;
+  const double body = std::pow(parameters.noise_per_m * bin.way_m, 2);
+  const TurnErrorModel model(bin, parameters);
   const double end_m = first_m + kCellM * static_cast<double>(cells.size());
   const CurvatureSums track(route, first_m - kHalfBodyM - 3 - std::abs(bin.way_m),
                             end_m + kHalfBodyM + 3 + std::abs(bin.way_m));
   for (size_t i = 0; i < cells.size(); ++i) {
-    TurnCell& cell = cells[i];
     const double middle_m = first_m + kCellM * static_cast<double>(i) - 0.5 * bin.way_m;
     // A short car turns with the track below it, a long one with the mean below its body.
     const double below = track.mean(middle_m - 1, middle_m + 1);
     const double of_body = track.mean(middle_m - kHalfBodyM, middle_m + kHalfBodyM);
     const double mapped = 0.5 * (below + of_body);
-    const double rough = std::hypot(parameters.curvature_share * mapped, 0.5 * (below - of_body));
-    // Body and map err over several bins alike: as much less is to be learnt from one.
-    const double own = sensor + parameters.correlated_bins * (body + rough * rough);
-    learn_bias(cell, measured - mapped - bias_to_curvature * cell.bias, own, bias_to_curvature);
-    cell.log_weight += 0.5 * std::log(sensor + body);
-    loosen_bias(cell, kBiasForgetPerM * std::abs(bin.way_m) + bin.bias_walk);
+    const double rough = bin.way_m * std::hypot(parameters.curvature_share * mapped, 0.5 * (below - of_body));
+    // The map errs over several bins alike: as much less is to be learnt from one.
+    const double noise = sensor + body + parameters.correlated_bins * rough * rough;
+    model.weigh(cells[i], bin.turn_rad - bin.way_m * mapped, noise);
+    cells[i].log_weight += 0.5 * std::log(sensor + body);
   }
 }
 
@@ -66,33 +104,29 @@ double log_sum(double a, double b) {
   return most + std::log1p(std::exp(std::min(a, b) - most));
 }
 
-void loosen_bias(TurnCell& cell, double variance) {
-  cell.bias_variance = std::min(1.0, cell.bias_variance + variance);
+void weigh_stand(TurnCell& cell, const BinTurn& stood) {
+  TurnErrorModel(stood, {}).weigh(cell, stood.turn_rad, stood.variance);
 }
 
-// The mean and variance of a mixture.
+// The mean and covariance of a mixture.
 void join_cells(TurnCell& into, double log_into, const TurnCell& other, double log_other) {
   const double mine = log_into + into.log_weight;
   const double its = log_other + other.log_weight;
   const double both = log_sum(mine, its);
   const double share = std::isfinite(both) ? std::exp(mine - both) : 1;
-  const double bias = share * into.bias + (1 - share) * other.bias;
-  const auto about_mean = [&](const TurnCell& cell) {
-    return cell.bias_variance + (cell.bias - bias) * (cell.bias - bias);
+  const Eigen::Vector2d mean = share * into.errors.mean + (1 - share) * other.errors.mean;
+  const auto about_mean = [&](const TurnErrors& errors) -> Eigen::Matrix2d {
+    return errors.covariance + (errors.mean - mean) * (errors.mean - mean).transpose();
   };
-  const double variance = share * about_mean(into) + (1 - share) * about_mean(other);
-  into = {both - log_sum(log_into, log_other), bias, std::min(1.0, variance)};
+  const Eigen::Matrix2d covariance = share * about_mean(into.errors) + (1 - share) * about_mean(other.errors);
+  into = {both - log_sum(log_into, log_other), {mean, covariance}};
 }
 
-// A Kalman filter of one state; how well the measurement fits weighs the cell.
-void learn_bias(TurnCell& cell, double error, double own_variance, double bias_gain) {
-  const double variance = own_variance + bias_gain * bias_gain * cell.bias_variance;
-  const double squared = error * error / variance;
-  cell.log_weight -= 0.5 * (std::min(squared, kMostSquared) + std::log(variance));
-  if (squared > kMostSquared) return;
-  const double gain = cell.bias_variance * bias_gain / variance;
-  cell.bias += gain * error;
-  cell.bias_variance *= std::max(0.0, 1 - gain * bias_gain);
+void TurnErrors::forget(Index error) {
+  mean[error] = 0;
+  covariance.row(error).setZero();
+  covariance.col(error).setZero();
+  covariance(error, error) = TurnErrors().covariance(error, error);
 }
 
 void spread(std::vector<TurnCell>& cells, double way_m) {

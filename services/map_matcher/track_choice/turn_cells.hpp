@@ -1,7 +1,9 @@
 // The places on a route where the train can be, one every metre: how well the turning fits there, with the sensor's
-// bias that fits best.
+// bias and the sway of the body that fit best.
 #pragma once
 
+#include <Eigen/Core>
+#include <cstdint>
 #include <vector>
 
 #include "map_matcher/track_choice/track_parameters.hpp"
@@ -11,10 +13,19 @@ namespace railfix::map_matcher {
 
 constexpr double kCellM = 1.0;
 
+/// What is not of the track in the turning: the sensor's bias (in its sigmas) and how far the body has turned on its
+/// springs (rad).
+struct TurnErrors {
+  enum Index : uint8_t { bias, sway };
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d covariance = Eigen::Vector2d(1, 4e-6).asDiagonal();
+  /// As nothing were known of it.
+  void forget(Index error);
+};
+
 struct TurnCell {
   double log_weight = 0;
-  double bias = 0;  // of the sensor, in its sigmas
-  double bias_variance = 1;
+  TurnErrors errors;
 };
 
 /// Turned over some way.
@@ -24,6 +35,7 @@ struct BinTurn {
   double variance = 0;
   double bias_rad = 0;   // one sigma of the sensor's bias
   double bias_walk = 0;  // as in Turn
+  double duration_s = 0;
 };
 
 /// Logarithm of the sum of what two logarithms stand for.
@@ -34,11 +46,9 @@ void weigh_turn(std::vector<TurnCell>& cells, double first_m, const track::Route
                 const TrackParameters& parameters);
 /// The way run is not known exactly: what is believed of a cell goes over to its neighbours.
 void spread(std::vector<TurnCell>& cells, double way_m);
-/// The bias may have changed by so much (variance, in its sigmas).
-void loosen_bias(TurnCell& cell, double variance);
+/// The train stood: all that the sensor turned is its own error.
+void weigh_stand(TurnCell& cell, const BinTurn& stood);
 /// Both cells are one place: `into` gets what is known of it when they have these weights beside their own.
 void join_cells(TurnCell& into, double log_into, const TurnCell& other, double log_other);
-/// Weighs a cell with the error of a measurement, and corrects its bias.
-void learn_bias(TurnCell& cell, double error, double own_variance, double bias_gain);
 
 }  // namespace railfix::map_matcher

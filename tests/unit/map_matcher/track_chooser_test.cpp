@@ -35,6 +35,37 @@ TEST(TrackChooser, OverRandomSwitchesNothingDeclaredIsWrong) {
   EXPECT_LE(late, facing / 10);
 }
 
+// Fast over the flattest turnouts, which turn the train as little as its body sways.
+TEST(TrackChooser, ABodyThatSwaysTwiceAsMuchMakesNothingThatIsDeclaredWrong) {
+  for (uint64_t seed = 1; seed <= 120; ++seed) {
+    PassagePlan plan;
+    plan.diverging = seed % 2 == 0;
+    plan.radius_m = 1200;
+    plan.speed_mps = 28;
+    plan.sway_rad = 0.003;
+    plan.views = false;
+    const auto result = SwitchPassage(plan, seed).run();
+    EXPECT_FALSE(result.wrong) << seed << ", " << result.wrong_at_m << " m behind the points";
+    EXPECT_TRUE(result.known_at_end) << seed;
+  }
+}
+
+TEST(TrackChooser, ASlowTrainKnowsTheLegOfAFlatTurnoutInTime) {
+  int late = 0;
+  for (uint64_t seed = 1; seed <= 100; ++seed) {
+    PassagePlan plan;
+    plan.diverging = seed % 2 == 0;
+    plan.radius_m = 1200;
+    plan.speed_mps = 4;
+    plan.views = false;
+    plan.frog_seen = seed % 4 < 2;
+    const auto result = SwitchPassage(plan, seed).run();
+    EXPECT_FALSE(result.wrong) << seed << ", " << result.wrong_at_m << " m behind the points";
+    late += result.behind_frog_m > 30 ? 1 : 0;
+  }
+  EXPECT_LE(late, 4);
+}
+
 TEST(TrackChooser, AThrownSwitchIsFollowedAfterGoingBack) {
   for (uint64_t seed = 1; seed <= 12; ++seed) {
     PassagePlan plan;
@@ -77,6 +108,25 @@ TEST(TrackChooser, WithoutAnyTurningMeasuredItSaysNotYetKnown) {
     if (!choice->known) {
       ASSERT_EQ(choice->options.size(), 2U);
       EXPECT_NEAR(choice->options[0].probability, 0.5, 1e-6);
+    }
+  }
+}
+
+// The way behind the begin is not known, although the train has not been seen to turn round yet.
+TEST(TrackChooser, WhoBeginsToBackOverPointsDoesNotKnowTheLeg) {
+  const auto map = fork();
+  for (const bool blind : {false, true}) {
+    TrackChooser chooser({}, map, std::make_shared<const track::Ways>(*map));
+    chooser.follow({{1, 499.8, track::Direction::reverse}, 0.1, 0.1, 0.05});
+    for (double way_m = 0; way_m < 1; way_m += 0.05) {
+      if (blind) {
+        chooser.move_blind(-0.05);
+      } else {
+        chooser.move({-0.05, 0, 1e-4});
+      }
+      const auto choice = chooser.choice();
+      EXPECT_EQ(choice->known, way_m < 0.14) << way_m;
+      EXPECT_EQ(choice->options.size(), choice->known ? 1U : 2U);
     }
   }
 }
