@@ -28,8 +28,8 @@ struct Turn {
   double sigma_rad = 0;  // noise of this piece alone
   double bias_rad = 0;   // what one sigma of the sensor's constant error has turned meanwhile
   TurnSensor sensor = TurnSensor::camera;
-  double bias_walk = 0;  // by so much may that error have changed meanwhile (variance, in its sigmas)
-  double duration_s = 0;
+  double bias_walk = 0;   // by so much may that error have changed meanwhile (variance, in its sigmas)
+  double duration_s = 0;  // 0: not known
 };
 
 /// Where fusion thinks the train is: only a window to search in.

@@ -15,8 +15,9 @@ constexpr double kLostM = 60.0;  // afterwards the window is right and the route
 constexpr double kTurnRoundM = 0.3;
 constexpr double kFarFromWindowM = 200;
 constexpr double kMostWindowM = 300;
-constexpr double kNoLagShare = 0.3;  // of the cars
-constexpr double kWatched = 0.9;     // a track less probable lies behind a switch that nobody watched
+constexpr double kNoLagShare = 0.3;      // of the cars
+constexpr double kViewNoisePerM = 3e-4;  // least sigma of a picture's curvature
+constexpr double kWatched = 0.9;         // a track less probable lies behind a switch that nobody watched
 
 }  // namespace
 
@@ -63,6 +64,11 @@ void TrackChooser::follow(const TrackWindow& window) {
     lost_m_ = 0;
   }
   window_ = wanted;
+  if (on_guess()) turn_round();
+}
+
+bool TrackChooser::on_guess() const {
+  return forwards_ ? place_m_ < guessed_m_ : place_m_ > guessed_m_;
 }
 
 bool TrackChooser::stands_near(const track::EdgePosition& place) const {
@@ -91,13 +97,12 @@ void TrackChooser::move(const Turn& turn) {
   if (std::abs(pending_.way_m) >= parameters_.bin_m) use_pending();
 }
 
-// A train that rocks a little has not turned round, unless over points.
+// A train that rocks a little has not turned round, but what was guessed of its way must not be told.
 void TrackChooser::run(double way_m) {
   place_m_ += way_m;
   lost_m_ += std::abs(way_m);
   moved_back_m_ = std::max(0.0, moved_back_m_ - (forwards_ ? way_m : -way_m));
-  const bool on_guess = forwards_ ? place_m_ < guessed_m_ : place_m_ > guessed_m_;
-  if (moved_back_m_ > kTurnRoundM || (moved_back_m_ > 0 && on_guess)) turn_round();
+  if (moved_back_m_ > kTurnRoundM || on_guess()) turn_round();
   run_pictures(way_m);
 }
 
@@ -106,7 +111,7 @@ void TrackChooser::stand(const Turn& turn) {
   const BinTurn stood{
       0, turn.turn_rad, turn.sigma_rad * turn.sigma_rad, turn.bias_rad, turn.bias_walk, turn.duration_s};
   for (auto& hypothesis : hypotheses_) {
-    for (auto& cell : hypothesis.cells) weigh_stand(cell, stood);
+    for (auto& cell : hypothesis.cells) weigh_stand(cell, stood, parameters_);
   }
 }
 
@@ -223,7 +228,7 @@ void TrackChooser::see(double curvature_per_m, double sigma_per_m) {
   if (hypotheses_.size() < 2 || seen_m_ < parameters_.bin_m) return;
   if (!has_sense(ViewInput{curvature_per_m, sigma_per_m * sigma_per_m})) return;
   seen_m_ = 0;
-  const double sigma = std::hypot(sigma_per_m, parameters_.noise_per_m);
+  const double sigma = std::hypot(sigma_per_m, kViewNoisePerM);
   std::vector<double> fits;
   const ViewedCurvature view{curvature_per_m, sigma, place_m_ - window_.over_m - 2, last_m()};
   for (const auto& hypothesis : hypotheses_) fits.push_back(view_fits(hypothesis.route, view, parameters_));

@@ -81,6 +81,7 @@ class TrackChooser {
   void extend();
   void extend_behind(track::Route& route);
   void guess_nothing();
+  [[nodiscard]] bool on_guess() const;
   void trim();
   /// False before the first window.
   [[nodiscard]] bool stands_near(const track::EdgePosition& place) const;

@@ -54,8 +54,14 @@ void TrackChooser::open_ways_behind() {
 // What lies ahead may be set otherwise once the train has left it: only what its wheels certainly stand on is kept.
 void TrackChooser::turn_round() {
   const double map_m = kMapSigmas * parameters_.map_sigma_m;
-  const double wheels_m = place_m_ - window_.over_m - map_m - kWheelsBehindM;
-  const double foot_m = place_m_ + window_.under_m + map_m;
+  double wheels_m = place_m_ - window_.over_m - map_m - kWheelsBehindM;
+  double foot_m = place_m_ + window_.under_m + map_m;
+  // Nor what was only guessed, however far the train has come back before anyone saw it.
+  if (forwards_) {
+    foot_m = std::max(foot_m, std::nextafter(guessed_m_, INFINITY));
+  } else {
+    wheels_m = std::min(wheels_m, std::nextafter(guessed_m_, -INFINITY));
+  }
   forwards_ = !forwards_;
   guess_nothing();
   moved_back_m_ = 0;

@@ -39,9 +39,10 @@ class TurnErrorModel {
  public:
   TurnErrorModel(const BinTurn& bin, const TrackParameters& parameters)
       : forgotten_(kBiasForgetPerM * std::abs(bin.way_m) + bin.bias_walk) {
-    const double speed_mps = bin.duration_s > 0 ? std::abs(bin.way_m) / bin.duration_s : 0;
-    const double sway_rad = parameters.sway_rad * speed_mps / kSwaySpeedMps;
-    keeps_ << 1, std::exp(-bin.duration_s / parameters.sway_s);
+    const bool timed = bin.duration_s > 0;
+    const double speed_mps = timed ? std::abs(bin.way_m) / bin.duration_s : kSwaySpeedMps;
+    const double sway_rad = bin.way_m == 0 ? 0 : parameters.sway_rad * speed_mps / kSwaySpeedMps;
+    keeps_ << 1, (timed ? std::exp(-bin.duration_s / parameters.sway_s) : 0.0);
     fresh_ = sway_rad * sway_rad * (1 - keeps_[1] * keeps_[1]);
     seen_ << bin.bias_rad, keeps_[1] - 1;
   }
@@ -62,8 +63,9 @@ class TurnErrorModel {
       mean += error / variance * of_errors;
       covariance -= of_errors * of_errors.transpose() / variance;
     }
+    // Joined cells may know less than 1; less alone would contradict what goes with it.
     double& bias = covariance(TurnErrors::bias, TurnErrors::bias);
-    bias = std::min(1.0, bias + forgotten_);
+    if (bias < 1) bias = std::min(1.0, bias + forgotten_);
   }
 
  private:
@@ -104,8 +106,8 @@ double log_sum(double a, double b) {
   return most + std::log1p(std::exp(std::min(a, b) - most));
 }
 
-void weigh_stand(TurnCell& cell, const BinTurn& stood) {
-  TurnErrorModel(stood, {}).weigh(cell, stood.turn_rad, stood.variance);
+void weigh_stand(TurnCell& cell, const BinTurn& stood, const TrackParameters& parameters) {
+  TurnErrorModel(stood, parameters).weigh(cell, stood.turn_rad, stood.variance);
 }
 
 // The mean and covariance of a mixture.

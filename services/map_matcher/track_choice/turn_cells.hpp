@@ -19,7 +19,7 @@ struct TurnErrors {
   enum Index : uint8_t { bias, sway };
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   Eigen::Matrix2d covariance = Eigen::Vector2d(1, 4e-6).asDiagonal();
-  /// As nothing were known of it.
+  /// Nothing is known of it any more: as before the first measurement.
   void forget(Index error);
 };
 
@@ -33,9 +33,9 @@ struct BinTurn {
   double way_m = 0;
   double turn_rad = 0;
   double variance = 0;
-  double bias_rad = 0;   // one sigma of the sensor's bias
-  double bias_walk = 0;  // as in Turn
-  double duration_s = 0;
+  double bias_rad = 0;    // one sigma of the sensor's bias
+  double bias_walk = 0;   // as in Turn
+  double duration_s = 0;  // 0: not known
 };
 
 /// Logarithm of the sum of what two logarithms stand for.
@@ -47,7 +47,7 @@ void weigh_turn(std::vector<TurnCell>& cells, double first_m, const track::Route
 /// The way run is not known exactly: what is believed of a cell goes over to its neighbours.
 void spread(std::vector<TurnCell>& cells, double way_m);
 /// The train stood: all that the sensor turned is its own error.
-void weigh_stand(TurnCell& cell, const BinTurn& stood);
+void weigh_stand(TurnCell& cell, const BinTurn& stood, const TrackParameters& parameters);
 /// Both cells are one place: `into` gets what is known of it when they have these weights beside their own.
 void join_cells(TurnCell& into, double log_into, const TurnCell& other, double log_other);
 

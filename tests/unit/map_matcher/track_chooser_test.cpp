@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
+
 #include "support/switch_passage.hpp"
 #include "unit/map_matcher/fork_map.hpp"
 
@@ -61,6 +63,7 @@ TEST(TrackChooser, ASlowTrainKnowsTheLegOfAFlatTurnoutInTime) {
     plan.frog_seen = seed % 4 < 2;
     const auto result = SwitchPassage(plan, seed).run();
     EXPECT_FALSE(result.wrong) << seed << ", " << result.wrong_at_m << " m behind the points";
+    EXPECT_TRUE(result.known_at_end) << seed;
     late += result.behind_frog_m > 30 ? 1 : 0;
   }
   EXPECT_LE(late, 4);
@@ -115,18 +118,54 @@ TEST(TrackChooser, WithoutAnyTurningMeasuredItSaysNotYetKnown) {
 // The way behind the begin is not known, although the train has not been seen to turn round yet.
 TEST(TrackChooser, WhoBeginsToBackOverPointsDoesNotKnowTheLeg) {
   const auto map = fork();
-  for (const bool blind : {false, true}) {
-    TrackChooser chooser({}, map, std::make_shared<const track::Ways>(*map));
-    chooser.follow({{1, 499.8, track::Direction::reverse}, 0.1, 0.1, 0.05});
-    for (double way_m = 0; way_m < 1; way_m += 0.05) {
-      if (blind) {
-        chooser.move_blind(-0.05);
-      } else {
-        chooser.move({-0.05, 0, 1e-4});
+  for (const double step_m : {0.05, 0.5, 10.0, 30.0}) {
+    for (const bool blind : {false, true}) {
+      TrackChooser chooser({}, map, std::make_shared<const track::Ways>(*map));
+      chooser.follow({{1, 499.78, track::Direction::reverse}, 0.1, 0.1, 0.05});
+      for (double way_m = step_m; way_m <= std::max(step_m, 1.0); way_m += step_m) {
+        if (blind) {
+          chooser.move_blind(-step_m);
+        } else {
+          chooser.move({.way_m = -step_m, .sigma_rad = 0.1, .duration_s = step_m});
+        }
+        const auto choice = chooser.choice();
+        EXPECT_EQ(choice->known, way_m < 0.22) << way_m;
+        EXPECT_EQ(choice->options.size(), choice->known ? 1U : 2U) << way_m;
       }
-      const auto choice = chooser.choice();
-      EXPECT_EQ(choice->known, way_m < 0.14) << way_m;
-      EXPECT_EQ(choice->options.size(), choice->known ? 1U : 2U);
+    }
+  }
+}
+
+TEST(TrackChooser, ATrainThatIsMovedBackOverPointsByFusionIsOnNoLegThatWasGuessed) {
+  const auto map = fork();
+  for (const double back_m : {0.5, 20.0}) {
+    TrackChooser chooser({}, map, std::make_shared<const track::Ways>(*map));
+    chooser.follow({{1, 499.78, track::Direction::reverse}, 0.1, 0.1, 0.05});
+    EXPECT_TRUE(chooser.choice()->known);
+    chooser.follow({{2, back_m, track::Direction::reverse}, 0.1, 0.1, 0.05});
+    EXPECT_FALSE(chooser.choice()->known) << back_m;
+    chooser.move({.way_m = back_m + 1, .sigma_rad = 0.1, .duration_s = 1});
+    chooser.follow({{1, 499, track::Direction::reverse}, 0.1, 0.1, 0.05});
+    EXPECT_TRUE(chooser.choice()->known) << "before the points again";
+  }
+}
+
+// Two ways that meet know the bias otherwise: together they may know less than at first.
+TEST(TurnCells, JoinedOnesKnowSomethingThatCanBe) {
+  TurnCell cell{0, {{3, 0.002}, Eigen::Vector2d(0.01, 1e-7).asDiagonal()}};
+  const TurnCell other{0, {{-3, -0.002}, Eigen::Vector2d(0.01, 1e-7).asDiagonal()}};
+  join_cells(cell, 0, other, 0);
+  std::vector<TurnCell> cells(10, cell);
+  const auto map = fork();
+  const track::Route route({map->edge(1), true}, 100, 0);
+  const BinTurn bin{
+      .way_m = 2, .turn_rad = 1e-4, .variance = 1e-8, .bias_rad = 2e-4, .bias_walk = 1e-6, .duration_s = 0.1};
+  for (int i = 0; i < 30; ++i) {
+    weigh_turn(cells, 2.0 * i, route, bin, {});
+    for (const TurnCell& of : cells) {
+      EXPECT_TRUE(std::isfinite(of.log_weight));
+      ASSERT_GT(of.errors.covariance.determinant(), 0) << i;
+      ASSERT_GT(of.errors.covariance(0, 0), 0) << i;
     }
   }
 }
