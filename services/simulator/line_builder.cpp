@@ -1,37 +1,21 @@
 #include "simulator/line_builder.hpp"
 
 #include <cmath>
+#include <stdexcept>
+
+#include "track/frog.hpp"
 
 namespace railfix::simulator {
 namespace {
 
 using track::LandmarkKind;
 
-constexpr double kHalfGauge = 0.7175;
 constexpr double kLoopRadiusM = 300.0;  // of its turnouts
 constexpr double kFrogRatio = 1.0 / 9.0;
-constexpr double kFrogWithinM = 60.0;
 constexpr uint32_t kNidC = 384;
 constexpr double kSurveySigmaM = 0.05;
 constexpr double kFrogSurveySigmaM = 0.02;  // two edges that cross, and no wear since
 constexpr double kBesideStepM = 10.0;
-
-// Where two tracks' inner rails cross near one end of the main track: the mathematical point of the frog.
-double frog_offset(const track::Alignment& main, const track::Alignment& branch, double side, double from_m,
-                   double to_m) {
-  const auto gap = [&](double s) {
-    const auto pose = main.at(s).pose;
-    const double e = pose.easting_m - side * kHalfGauge * std::cos(pose.heading_rad);
-    const double n = pose.northing_m + side * kHalfGauge * std::sin(pose.heading_rad);
-    return side * branch.nearest(e, n).lateral_m + kHalfGauge;
-  };
-  const bool begins_above = gap(from_m) > 0.0;
-  for (int i = 0; i < 60; ++i) {
-    const double middle = 0.5 * (from_m + to_m);
-    ((gap(middle) > 0.0) == begins_above ? from_m : to_m) = middle;
-  }
-  return 0.5 * (from_m + to_m);
-}
 
 track::Alignment loop_beside(const track::Alignment& main, double side) {
   const double angle = std::atan(kFrogRatio);
@@ -135,19 +119,13 @@ uint32_t LineBuilder::loop(const std::string& name, uint32_t beside, double side
   const auto id = edge(name, first, second, loop_beside(of.alignment, side));
   const auto& main = map.edges[beside - 1].alignment;
   const auto& branch = map.edges[id - 1].alignment;
-  const double length_m = main.length_m();
   for (const bool near : {true, false}) {
     const auto at_node = near ? first : second;
-    const double s = near ? frog_offset(main, branch, side, 10.0, kFrogWithinM)
-                          : frog_offset(main, branch, side, length_m - kFrogWithinM, length_m - 10.0);
-    const auto pose = main.at(s).pose;
-    const double on_branch = branch
-                                 .nearest(pose.easting_m - side * kHalfGauge * std::cos(pose.heading_rad),
-                                          pose.northing_m + side * kHalfGauge * std::sin(pose.heading_rad))
-                                 .offset_m;
+    const auto frog = track::frog_place({&main, near}, {&branch, near});
+    if (!frog) throw std::logic_error("the rails of a loop's switch do not cross");
     const std::string& switch_name = map.nodes[at_node - 1].name;
-    landmark(LandmarkKind::frog, beside, s, side * kHalfGauge, switch_name);
-    landmark(LandmarkKind::frog, id, on_branch, -side * kHalfGauge, switch_name + " from the loop");
+    landmark(LandmarkKind::frog, beside, frog->on_straight_m, side * 0.5 * track::kGaugeM, switch_name);
+    landmark(LandmarkKind::frog, id, frog->on_branch_m, -side * 0.5 * track::kGaugeM, switch_name + " from the loop");
   }
   return id;
 }

@@ -20,7 +20,10 @@ constexpr double kApartM = 0.22;  // outside, from here on its head stands clear
 constexpr double kSlopes[] = {0.04, 0.05, 0.06, 0.07, 0.08, 0.09, 0.10, 0.11, 0.12, 0.135, 0.15, 0.17};
 constexpr double kStepM = 0.2;  // between crossings that are tried
 constexpr double kCrossingM[] = {5.0, 16.0};
-constexpr double kPartSeen = 0.6;  // of a part's rows
+constexpr double kPartSeen = 0.6;         // of a part's rows ...
+constexpr double kPartSeenM = 2;          // ... or so much of it
+constexpr double kFlatSlope = 0.105;      // its rail lies between ours from so far before a flatter crossing ...
+constexpr double kFlatReferenceM = 12.0;  // ... that it is below the picture when the crossing comes near
 constexpr double kCoarseScore = 0.45;
 constexpr double kLowestScore = 0.55;
 constexpr float kLowestContrast = 5.0F;  // grey levels of our own rails
@@ -29,6 +32,7 @@ constexpr double kEdgeReachM = 0.03;
 constexpr double kNextM = 0.1;
 constexpr size_t kFewestPoints = 16;
 constexpr double kWorstFitM = 0.012;
+constexpr double kEdgeSigmaM = 0.004;  // light and dirt on the rails, the same in all looks; wear is the map's to say
 
 double lateral_of(int column) {
   return (column - 0.5 * (kColumns - 1)) * kColumnM;
@@ -123,7 +127,7 @@ void FrogSearch::rate(Crossing& crossing) const {
     const int end = static_cast<int>((std::max(a, b) - kNearM) / kRowM);
     const int first = std::max(begin, first_row_);
     const int last = std::min(end, rows_ - 1);
-    if (last - first < kPartSeen * (end - begin)) return 0.0;
+    if (last - first < std::min(kPartSeen * (end - begin), kPartSeenM / kRowM)) return 0.0;
     // The column where the other rail is in a row, for rounding down; the parts never reach the view's sides.
     const auto column = [&](int row) {
       const double out = (kNearM + row * kRowM - crossing.at_m) * crossing.slope;
@@ -248,7 +252,8 @@ bool FrogSearch::refine(const LandmarkPicture& picture, Crossing& crossing, Grou
   if (rms_m > kWorstFitM || fit(1) * crossing.slope <= 0) return false;
   const double shift_m = (own_off_m - fit(0)) / fit(1);
   if (std::abs(shift_m) > 1.0 || crossing.score() < kLowestScore) return false;
-  candidate = {crossing.at_m + shift_m, crossing.side * 0.5 * options_.gauge_m, crossing.score()};
+  candidate = {crossing.at_m + shift_m, crossing.side * 0.5 * options_.gauge_m, crossing.score(),
+               std::abs(crossing.slope) < kFlatSlope ? kFlatReferenceM : 0, kEdgeSigmaM / std::abs(fit(1))};
   return true;
 }
 

@@ -44,6 +44,7 @@ const std::vector<SettledThing>& GroundTracker::follow(const std::vector<GroundC
       owner = &things_.back();
       owner->first_m = way_m + candidate.ahead_m;
       owner->first_ahead_m = candidate.ahead_m;
+      owner->reference_m = candidate.reference_m > 0 ? candidate.reference_m : tracking_.reference_m;
     }
     add(*owner, candidate, way_m);
   }
@@ -64,15 +65,16 @@ void GroundTracker::add(Thing& thing, const GroundCandidate& candidate, double w
   thing.last_m = way_m + candidate.ahead_m;
   thing.last_ahead_m = candidate.ahead_m;
   thing.last_lateral_m = candidate.lateral_m;
+  thing.lasting_sigma_m = candidate.lasting_sigma_m;
   thing.hit = true;
   thing.missed = 0;
   ++thing.seen;
   const double clearness = 1 / (candidate.ahead_m * candidate.ahead_m);
   thing.clearness += clearness;
   thing.score += clearness * candidate.score;
-  if (std::abs(candidate.ahead_m - tracking_.reference_m) > tracking_.reach_m) return;
+  if (std::abs(candidate.ahead_m - thing.reference_m) > tracking_.reach_m) return;
   // Near the reference a place counts most: the way to there is short.
-  const double way_sigma_m = 2 * way_sigma_ * std::abs(candidate.ahead_m - tracking_.reference_m);
+  const double way_sigma_m = 2 * way_sigma_ * std::abs(candidate.ahead_m - thing.reference_m);
   const double spot_sigma_m = tracking_.spot_sigma_m + kSpotPerM * candidate.ahead_m;
   const double weight = 1 / (way_sigma_m * way_sigma_m + spot_sigma_m * spot_sigma_m);
   if (thing.used == kMostLooks) {  // a slow train: every second one is enough
@@ -86,8 +88,8 @@ void GroundTracker::add(Thing& thing, const GroundCandidate& candidate, double w
 // standing train settles nothing.
 std::optional<SettledThing> GroundTracker::settle(const Thing& thing) const {
   if (thing.seen < tracking_.fewest_pictures || thing.used < kFewestUsed) return std::nullopt;
-  if (thing.last_ahead_m > tracking_.reference_m - kSeenM) return std::nullopt;
-  if (thing.first_ahead_m < tracking_.reference_m + kSeenM) return std::nullopt;
+  if (thing.last_ahead_m > thing.reference_m - kSeenM) return std::nullopt;
+  if (thing.first_ahead_m < thing.reference_m + kSeenM) return std::nullopt;
   if (thing.seen < kSeenShare * (thing.seen + thing.gaps)) return std::nullopt;
   const Mean mean = mean_of(thing);
   if (mean.rms_m > tracking_.worst_fit_m || mean.agreeing < kAgreeShare * static_cast<double>(thing.used))
@@ -95,7 +97,8 @@ std::optional<SettledThing> GroundTracker::settle(const Thing& thing) const {
   const double noise_m = std::hypot(tracking_.spot_sigma_m, mean.rms_m) / std::sqrt(mean.agreeing);
   const double sure = confidence(thing);
   if (sure < tracking_.lowest_confidence) return std::nullopt;
-  return SettledThing{thing.first_m + mean.place_m, mean.lateral_m, noise_m, sure};
+  return SettledThing{thing.first_m + mean.place_m, mean.lateral_m, noise_m, sure, thing.reference_m,
+                      thing.lasting_sigma_m};
 }
 
 // Cauchy weights: a look that took a shadow for an edge does not count.

@@ -29,6 +29,8 @@ struct SettledThing {
   double lateral_m = 0;
   double sigma_m = 0;  // of the measurements alone
   double confidence = 0;
+  double reference_m = 0;      // ahead, where it was settled
+  double lasting_sigma_m = 0;  // as the last candidate's
 };
 
 class GroundTracker {
@@ -50,6 +52,8 @@ class GroundTracker {
     double clearness = 0, score = 0;       // weighted sums: near looks show most
     double first_m = 0;                    // place as first seen
     double first_ahead_m = 0;
+    double reference_m = 0;
+    double lasting_sigma_m = 0;
     double last_m = 0;
     double last_ahead_m = 0;
     double last_lateral_m = 0;

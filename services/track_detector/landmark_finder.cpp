@@ -20,7 +20,6 @@ constexpr int kFewestPlatePictures = 3;
 constexpr double kShutterS = 0.002;     // open about so long
 constexpr double kLateS = 0.5;          // for so long the speed tells where the train was
 constexpr double kOutOfPictureM = 6.0;  // what stands beside the track leaves it so far ahead
-constexpr double kFrogSigmaM = 0.03;    // light and dirt on it, the same in all looks; its wear is the map's to say
 
 GroundTracking frog_tracking(const LandmarkOptions& options) {
   GroundTracking tracking;
@@ -130,9 +129,9 @@ void LandmarkFinder::find_in_track(const LandmarkPicture& picture) {
   if (!options_.frogs || way_m_ - frog_look_m_ < kLookM) return;
   frog_look_m_ = way_m_;
   for (const SettledThing& frog : frogs_.follow(frog_search_.find(picture), way_m_)) {
-    const double pitch_m = pitch_error_m(picture, kFrogReferenceM, 0);
+    const double pitch_m = pitch_error_m(picture, frog.reference_m, 0);
     report({LandmarkType::frog, picture.stamp_ns, frog.place_m - way_m_, frog.lateral_m,
-            std::hypot(frog.sigma_m, kFrogSigmaM, pitch_m), frog.confidence},
+            std::hypot(frog.sigma_m, frog.lasting_sigma_m, pitch_m), frog.confidence},
            picture);
   }
 }

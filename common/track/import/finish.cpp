@@ -6,14 +6,12 @@
 #include <set>
 #include <unordered_map>
 
+#include "track/frog.hpp"
 #include "track/import/told.hpp"
 
 namespace railfix::track {
 namespace {
 
-constexpr double kGaugeM = 1.435;
-constexpr double kLongestSwitchM = 150.0;
-constexpr double kStepM = 0.5;
 // A reference so near to another one adds nothing, and says less well where it is than a real group does.
 constexpr double kNearGroupM = 10.0;
 constexpr double kToldStepM = 10.0;  // of the least distance that a refusal names
@@ -23,9 +21,7 @@ struct Branch {
   const Edge* edge = nullptr;
   bool forward = true;
 
-  [[nodiscard]] double offset(double from_node_m) const {
-    return forward ? from_node_m : edge->alignment.length_m() - from_node_m;
-  }
+  [[nodiscard]] SwitchLeg leg() const { return {&edge->alignment, forward}; }
 };
 
 Branch branch_from(const Map& map, uint32_t edge_id, uint32_t node) {
@@ -33,41 +29,17 @@ Branch branch_from(const Map& map, uint32_t edge_id, uint32_t node) {
   return {edge, edge->from_node == node};
 }
 
-/// How far `branch` is left of `straight` (looking away from the node), at a distance along the branch.
-double separation(const Branch& straight, const Branch& branch, double distance_m) {
-  const PlanPose pose = branch.edge->alignment.at(branch.offset(distance_m)).pose;
-  const double lateral = straight.edge->alignment.nearest(pose.easting_m, pose.northing_m).lateral_m;
-  return straight.forward ? lateral : -lateral;
-}
-
-/// Distance from the node at which the branches are one gauge apart.
-std::optional<double> frog_distance(const Branch& straight, const Branch& branch) {
-  const double reach =
-      std::min({kLongestSwitchM, straight.edge->alignment.length_m(), branch.edge->alignment.length_m()});
-  for (double far = kStepM; far <= reach; far += kStepM) {
-    const double after = std::abs(separation(straight, branch, far));
-    if (after < kGaugeM) continue;
-    const double before = std::abs(separation(straight, branch, far - kStepM));
-    return far - kStepM * (after - kGaugeM) / std::max(after - before, 1e-9);
-  }
-  return std::nullopt;
-}
-
 void add_frog(Map& map, const Node& node, const Branch& straight, const Branch& branch, double sigma_m) {
-  const std::optional<double> distance = frog_distance(straight, branch);
-  if (!distance) return;
-  const PlanPose pose = branch.edge->alignment.at(branch.offset(*distance)).pose;
-  const double on_straight = straight.edge->alignment.nearest(pose.easting_m, pose.northing_m).offset_m;
-  // The frog lies where the two inner rails cross, half a gauge from either centre line.
-  const double left = std::copysign(0.5 * kGaugeM, separation(straight, branch, *distance));
+  const auto place = frog_place(straight.leg(), branch.leg());
+  if (!place) return;
   const std::string name = "frog of " + (node.name.empty() ? "node " + std::to_string(node.id) : node.name);
-  const auto add = [&](const Branch& on, double offset_m, double lateral_m) {
+  const auto add = [&](const Branch& on, double offset_m, double left_m) {
     const auto id = static_cast<uint32_t>(map.landmarks.size() + 1);
     map.landmarks.push_back(
-        {id, LandmarkKind::frog, on.edge->id, offset_m, on.forward ? lateral_m : -lateral_m, sigma_m, name});
+        {id, LandmarkKind::frog, on.edge->id, offset_m, on.forward ? left_m : -left_m, sigma_m, name});
   };
-  add(straight, on_straight, left);
-  add(branch, branch.offset(*distance), -left);
+  add(straight, place->on_straight_m, 0.5 * kGaugeM * place->side);
+  add(branch, place->on_branch_m, -0.5 * kGaugeM * place->side);
 }
 
 /// The stem is the edge that both ways share; without one there is no frog between them.

@@ -10,7 +10,7 @@
 
 namespace railfix::track {
 
-/// Puts a frog on both branches of every switch, where their centre lines are one gauge (1.435 m) apart; sigma_m says
+/// Puts a frog on both branches of every switch, where the gauge faces of the inner rails cross; sigma_m says
 /// how well the source knows the place.
 void add_frogs(Map& map, double sigma_m);
 

@@ -8,6 +8,7 @@
 
 #include "core/random.hpp"
 #include "core/units.hpp"
+#include "track/frog.hpp"
 #include "track/map.hpp"
 
 namespace railfix {
@@ -16,7 +17,6 @@ namespace {
 using track::Element;
 using track::LandmarkKind;
 
-constexpr double kHalfGaugeM = 0.7175;
 constexpr double kStationM = 130;  // from a switch to the next one
 constexpr double kPlainM = 110;
 constexpr double kBranchM = 60;
@@ -140,22 +140,9 @@ class LandmarkLine {
         track::Alignment::chained(pose, {{arc_m, curvature, curvature}, {kBranchM - arc_m + 1, 0, 0}}, {}, {});
     const uint32_t end = node(track::NodeKind::end, alignment.at(alignment.length_m()).pose);
     const uint32_t id = edge(at, end, alignment);
-    // The branch's rail on the inner side meets the main rail on the branch's side.
+    const auto frog = track::frog_place({&main, !joins}, {&alignment, true}).value();
     const double seen_side = joins ? -branch_side : branch_side;  // along the main track
-    const auto gap = [&](double s) {
-      const auto place = main.at(s).pose;
-      const double e = place.easting_m - seen_side * kHalfGaugeM * std::cos(place.heading_rad);
-      const double n = place.northing_m + seen_side * kHalfGaugeM * std::sin(place.heading_rad);
-      return branch_side * alignment.nearest(e, n).lateral_m + kHalfGaugeM;
-    };
-    double low_m = joins ? kStationM - kBranchM : 10;
-    double high_m = joins ? kStationM - 10 : kBranchM;
-    const bool low_above = gap(low_m) > 0;
-    for (int i = 0; i < 60; ++i) {
-      const double middle_m = 0.5 * (low_m + high_m);
-      ((gap(middle_m) > 0) == low_above ? low_m : high_m) = middle_m;
-    }
-    landmark(LandmarkKind::frog, main_edge, low_m, seen_side * kHalfGaugeM);
+    landmark(LandmarkKind::frog, main_edge, frog.on_straight_m, seen_side * 0.5 * track::kGaugeM);
     return id;
   }
 

@@ -104,16 +104,17 @@ TEST(Slice, HasTheSameGeometry) {
   }
 }
 
-TEST(Frogs, LieWhereTheBranchesAreOneGaugeApart) {
+TEST(Frogs, LieWhereTheGaugeFacesOfTheInnerRailsCross) {
   std::vector<std::string> problems;
   Map map = built(main_and_branch(), problems);
   add_frogs(map, 0.3);
   ASSERT_EQ(map.landmarks.size(), 3U);
-  const double angle = std::acos(1.0 - 1.435 / 500);
-  EXPECT_NEAR(map.landmarks[1].offset_m, 500 * std::sin(angle), 0.02);  // on the main line
-  EXPECT_NEAR(map.landmarks[1].lateral_m, -1.435 / 2, 1e-9);            // towards the branch, to the right
+  const double half_m = 1.435 / 2;
+  const double angle = std::acos((500 - half_m) / (500 + half_m));
+  EXPECT_NEAR(map.landmarks[1].offset_m, (500 + half_m) * std::sin(angle), 1e-6);  // on the main line
+  EXPECT_NEAR(map.landmarks[1].lateral_m, -1.435 / 2, 1e-9);                       // towards the branch, to the right
   EXPECT_EQ(map.landmarks[1].edge, 2U);
-  EXPECT_NEAR(map.landmarks[2].offset_m, 500 * angle, 0.02);
+  EXPECT_NEAR(map.landmarks[2].offset_m, 500 * angle, 1e-6);
   EXPECT_NEAR(map.landmarks[2].lateral_m, 1.435 / 2, 1e-9);
   EXPECT_EQ(map.landmarks[2].edge, 3U);
 }
