@@ -8,8 +8,8 @@ namespace {
 
 constexpr double kLongestSwitchM = 150.0;
 constexpr double kStepM = 0.5;
-constexpr int kHalvings = 40;
-constexpr double kSideKnownM = 0.5;  // the legs are apart
+constexpr int kHalvings = 20;        // to less than 1e-6 m
+constexpr double kSideKnownM = 1.2;  // where the rails cross the middles are 1.4 m apart
 
 /// How far a place beside the straight leg, left_m of its middle, is left of the branch, looking away from the switch.
 Alignment::Nearest beside(const SwitchLeg& straight, const SwitchLeg& branch, double from_switch_m, double left_m) {
@@ -34,6 +34,7 @@ std::optional<FrogPlace> frog_place(const SwitchLeg& straight, const SwitchLeg& 
       return side * beside(straight, branch, m, face_m).lateral_m < -0.5 * kGaugeM;
     };
     if (!crossed(far_m)) continue;
+    if (far_m < 1.5 * kStepM) return std::nullopt;  // they begin apart: no switch
     double before_m = far_m - kStepM;
     double behind_m = far_m;
     for (int i = 0; i < kHalvings; ++i) {

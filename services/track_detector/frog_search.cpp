@@ -22,15 +22,17 @@ constexpr double kStepM = 0.2;  // between crossings that are tried
 constexpr double kCrossingM[] = {5.0, 16.0};
 constexpr double kPartSeen = 0.6;         // of a part's rows ...
 constexpr double kPartSeenM = 2;          // ... or so much of it
-constexpr double kFlatSlope = 0.105;      // its rail lies between ours from so far before a flatter crossing ...
+constexpr double kFlatSlope = 0.075;      // the rail of a flatter crossing lies between ours from so far before it ...
 constexpr double kFlatReferenceM = 12.0;  // ... that it is below the picture when the crossing comes near
 constexpr double kCoarseScore = 0.45;
 constexpr double kLowestScore = 0.55;
-constexpr float kLowestContrast = 5.0F;  // grey levels of our own rails
+constexpr double kLowestFlatScore = 0.65;  // two rails along ours, one inside, one outside, have up to 0.58
+constexpr float kLowestContrast = 5.0F;    // grey levels of our own rails
 constexpr double kPeakReachM = 0.05;
 constexpr double kEdgeReachM = 0.03;
 constexpr double kNextM = 0.1;
 constexpr size_t kFewestPoints = 16;
+constexpr double kSlopeShare = 0.5;  // the fit's slope is that of the search, give or take
 constexpr double kWorstFitM = 0.012;
 constexpr double kEdgeSigmaM = 0.004;  // light and dirt on the rails, the same in all looks; wear is the map's to say
 
@@ -229,7 +231,8 @@ bool FrogSearch::refine(const LandmarkPicture& picture, Crossing& crossing, Grou
   }
   if (points_.size() < kFewestPoints || own_count < static_cast<int>(kFewestPoints)) return false;
   own_off_m /= own_count;
-  // A parabola, because the other rail is curved; crossing where it is own_off_m outward.
+  // A parabola, because the other rail is curved; crossing where it is own_off_m outward. Behind a flat crossing its
+  // rail is too far and thin for edges: what is between ours tells alone.
   Eigen::Vector3d fit = Eigen::Vector3d::Zero();
   double rms_m = 0;
   for (int pass = 0; pass < 3; ++pass) {
@@ -249,11 +252,12 @@ bool FrogSearch::refine(const LandmarkPicture& picture, Crossing& crossing, Grou
     rms_m = std::sqrt(sum / weights);
     fit = normal.ldlt().solve(right);
   }
-  if (rms_m > kWorstFitM || fit(1) * crossing.slope <= 0) return false;
+  const double lowest_score = std::abs(crossing.slope) < kFlatSlope ? kLowestFlatScore : kLowestScore;
+  if (rms_m > kWorstFitM || std::abs(fit(1) - crossing.slope) > kSlopeShare * std::abs(crossing.slope)) return false;
   const double shift_m = (own_off_m - fit(0)) / fit(1);
-  if (std::abs(shift_m) > 1.0 || crossing.score() < kLowestScore) return false;
-  candidate = {crossing.at_m + shift_m, crossing.side * 0.5 * options_.gauge_m, crossing.score(),
-               std::abs(crossing.slope) < kFlatSlope ? kFlatReferenceM : 0, kEdgeSigmaM / std::abs(fit(1))};
+  if (std::abs(shift_m) > 1.0 || crossing.score() < lowest_score) return false;
+  candidate = {crossing.at_m + shift_m, crossing.side * half_gauge_m, crossing.score(),
+               std::abs(crossing.slope) < kFlatSlope ? kFlatReferenceM : 0, kEdgeSigmaM / std::abs(crossing.slope)};
   return true;
 }
 

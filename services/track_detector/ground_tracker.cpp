@@ -44,7 +44,9 @@ const std::vector<SettledThing>& GroundTracker::follow(const std::vector<GroundC
       owner = &things_.back();
       owner->first_m = way_m + candidate.ahead_m;
       owner->first_ahead_m = candidate.ahead_m;
-      owner->reference_m = candidate.reference_m > 0 ? candidate.reference_m : tracking_.reference_m;
+      // Seen so late it would be settled nowhere else.
+      const bool in_time = candidate.ahead_m >= candidate.reference_m + kSeenM;
+      owner->reference_m = candidate.reference_m > 0 && in_time ? candidate.reference_m : tracking_.reference_m;
     }
     add(*owner, candidate, way_m);
   }

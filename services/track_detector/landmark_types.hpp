@@ -59,7 +59,7 @@ struct GroundCandidate {
   double ahead_m = 0;
   double lateral_m = 0;
   double score = 0;            // plate: log of a likelihood ratio (PlateEvidence); frog: share of its rails seen
-  double reference_m = 0;      // ahead, where it is settled; 0: where all are
+  double reference_m = 0;      // ahead, where it is settled; 0: where the tracker settles the others
   double lasting_sigma_m = 0;  // what errs alike in all looks
 };
 

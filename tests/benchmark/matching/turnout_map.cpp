@@ -1,7 +1,9 @@
 // railfix-make-turnout --radius-m R --out line.map: one turnout from a straight track, with its frogs, for
 // `railfix simulate --map`. Edge 1 is the stem, edge 2 goes straight on, edge 3 to the left.
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <cstdio>
+#include <string>
 
 #include "number_between.hpp"
 #include "track/import/finish.hpp"
