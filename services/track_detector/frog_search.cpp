@@ -252,12 +252,13 @@ bool FrogSearch::refine(const LandmarkPicture& picture, Crossing& crossing, Grou
     rms_m = std::sqrt(sum / weights);
     fit = normal.ldlt().solve(right);
   }
-  const double lowest_score = std::abs(crossing.slope) < kFlatSlope ? kLowestFlatScore : kLowestScore;
-  if (rms_m > kWorstFitM || std::abs(fit(1) - crossing.slope) > kSlopeShare * std::abs(crossing.slope)) return false;
+  const double slope = std::abs(crossing.slope);
+  const bool is_flat = slope < kFlatSlope;
+  if (rms_m > kWorstFitM || std::abs(fit(1) - crossing.slope) > kSlopeShare * slope) return false;
   const double shift_m = (own_off_m - fit(0)) / fit(1);
-  if (std::abs(shift_m) > 1.0 || crossing.score() < lowest_score) return false;
-  candidate = {crossing.at_m + shift_m, crossing.side * half_gauge_m, crossing.score(),
-               std::abs(crossing.slope) < kFlatSlope ? kFlatReferenceM : 0, kEdgeSigmaM / std::abs(crossing.slope)};
+  if (std::abs(shift_m) > 1.0 || crossing.score() < (is_flat ? kLowestFlatScore : kLowestScore)) return false;
+  candidate = {crossing.at_m + shift_m, crossing.side * half_gauge_m, crossing.score(), is_flat ? kFlatReferenceM : 0,
+               kEdgeSigmaM / slope};
   return true;
 }
 

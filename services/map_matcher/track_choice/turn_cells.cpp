@@ -82,6 +82,7 @@ void weigh_turn(std::vector<TurnCell>& cells, double first_m, const track::Route
                 const TrackParameters& parameters) {
   const double sensor = kNoiseShare * bin.variance;
   const double body = std::pow(parameters.noise_per_m * bin.way_m, 2);
+  const double usual_log = 0.5 * std::log(sensor + body);
   const TurnErrorModel model(bin, parameters);
   const double end_m = first_m + kCellM * static_cast<double>(cells.size());
   const CurvatureSums track(route, first_m - kHalfBodyM - 3 - std::abs(bin.way_m),
@@ -96,7 +97,7 @@ void weigh_turn(std::vector<TurnCell>& cells, double first_m, const track::Route
     // The map errs over several bins alike: as much less is to be learnt from one.
     const double noise = sensor + body + parameters.correlated_bins * rough * rough;
     model.weigh(cells[i], bin.turn_rad - bin.way_m * mapped, noise);
-    cells[i].log_weight += 0.5 * std::log(sensor + body);
+    cells[i].log_weight += usual_log;
   }
 }
 

@@ -6,7 +6,7 @@
 #include "core/time.hpp"
 #include "simulator/builtin_line.hpp"
 #include "simulator/renderer.hpp"
-#include "track/import/finish.hpp"
+#include "support/turnout.hpp"
 #include "track_detector/landmark_finder.hpp"
 
 namespace railfix::track_detector {
@@ -16,23 +16,6 @@ struct Seen {
   double error_m = 0;
   Sighting sighting;
 };
-
-/// A turnout of a main line at 300 m, straight on or to the left, and nothing else.
-track::Map flat_turnout(double radius_m) {
-  track::Map map;
-  const auto edge = [&](uint32_t id, const track::PlanPose& from, const std::vector<track::Element>& elements) {
-    map.edges.push_back({id, "", id == 1 ? 1U : 2U, id + 1, "", track::Alignment::chained(from, elements)});
-    map.nodes.push_back({id + 1, track::NodeKind::end, "", 0, 0});
-    return map.edges.back().alignment.at(map.edges.back().alignment.length_m()).pose;
-  };
-  map.nodes.push_back({1, track::NodeKind::end, "", 0, 0});
-  const auto points = edge(1, {0, 0, 0.4}, {{300, 0, 0}});
-  edge(2, points, {{200, 0, 0}});
-  edge(3, points, {{90, 1 / radius_m, 1 / radius_m}, {110, 0, 0}});
-  map.connections = {{2, 1, 2, false}, {2, 1, 3, true}};
-  track::add_frogs(map, 0.02);
-  return map;
-}
 
 // Drives over the first frog behind `start`.
 std::vector<Seen> frogs_from(const track::Map& on, const track::EdgePosition& start, double pitch_rad = 0.21) {
@@ -90,10 +73,11 @@ TEST(Frogs, OneThatIsMetFromBehindLiesWhereItLies) {
 // The other rail runs between ours for 9 m before the crossing, which a camera that looks far ahead does not see whole.
 TEST(Frogs, ThoseOfFlatTurnoutsAreReportedByACameraThatLooksFarAhead) {
   for (const double radius_m : {760, 1200}) {
-    const track::Map map = flat_turnout(radius_m);
+    const track::Map map = testing::turnout(radius_m);
     const double frog_m = map.landmarks.front().offset_m;
-    for (const track::EdgePosition& start : {track::EdgePosition{1, 280, track::Direction::forward},
-                                             track::EdgePosition{2, frog_m + 30, track::Direction::reverse}}) {
+    for (const track::EdgePosition& start :
+         {track::EdgePosition{1, testing::kTurnoutStemM - 20, track::Direction::forward},
+          track::EdgePosition{2, frog_m + 30, track::Direction::reverse}}) {
       const auto seen = frogs_from(map, start, 0.14);
       ASSERT_EQ(seen.size(), 1U) << radius_m << ", edge " << start.edge;
       EXPECT_LT(std::abs(seen[0].error_m), 2 * seen[0].sighting.sigma_m) << radius_m;
