@@ -70,10 +70,19 @@ class Transport final : public rtps::ChainingTransport {
 
   void receive(rtps::TransportReceiverInterface* next, const eprosima::fastrtps::rtps::octet* bytes, uint32_t size,
                const Locator_t& local, const Locator_t& remote) override {
-    if (*descriptor_.open) next->OnDataReceived(bytes, size, local, remote);
+    if (!*descriptor_.open) return;
+    std::unique_lock one_at_a_time(discovery_mutex_, std::defer_lock);
+    if (is_of_discovery(local)) one_at_a_time.lock();
+    next->OnDataReceived(bytes, size, local, remote);
   }
 
  private:
+  // Ports of discovery and of samples alternate (DDSI-RTPS 2.2, 9.6.1).
+  static bool is_of_discovery(const Locator_t& local) {
+    const eprosima::fastrtps::rtps::PortParameters ports;
+    return (IPLocator::getPhysicalPort(local) - ports.portBase) % ports.participantIDGain == ports.offsetd0;
+  }
+
   // A socket tells its address by a call to the kernel and with memory taken, so it is asked once.
   Reach reach_of(const SenderResource& socket) {
     const std::lock_guard lock(mutex_);
@@ -90,6 +99,7 @@ class Transport final : public rtps::ChainingTransport {
   TrainTransport descriptor_;
   std::mutex mutex_;
   std::map<const SenderResource*, Reach> reach_;  // sockets live as long as this
+  std::mutex discovery_mutex_;
 };
 
 }  // namespace

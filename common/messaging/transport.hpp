@@ -1,11 +1,14 @@
-// Private to this folder: Fast DDS's UDP, with two habits of 2.9.1 mended that cost a train of many participants time.
+// Private to this folder: Fast DDS's UDP, with three habits of 2.9.1 mended that cost a train of many participants
+// time, or a connection.
 //
 // - A participant announces itself before its own sockets are listened to (RTPSParticipantImpl::enable), and everybody
 //   answers an announcement once: the fastest answers were lost, and their senders found only with their next regular
 //   announcement, up to a period later. Here nothing is said and nothing heard before the participant is whole.
 // - With an interface whitelist every datagram is sent by the socket of every interface: twice to each neighbour in
-// this
-//   host. Here the loopback's socket serves loopback addresses, and the others the rest.
+//   this host. Here the loopback's socket serves loopback addresses, and the others the rest.
+// - Each socket is listened to by a thread of its own, and participants that are discovered by two of them at once
+//   share one record (SecurityManager::match_builtin_endpoints): with certificates, one of them was never let in. Here
+//   what comes for the discovery is handed on by one thread at a time.
 #pragma once
 
 #include <fastdds/rtps/transport/ChainingTransportDescriptor.h>

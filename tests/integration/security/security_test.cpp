@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <fstream>
+#include <thread>
 
 #include "messaging/security.hpp"
 #include "messaging/topics.hpp"
@@ -175,6 +176,29 @@ TEST_F(Security, EverybodySaysWhenHisCertificateEnds) {
   EXPECT_EQ(ends[1].process, "monitor@cab") << "its own, too";
   EXPECT_EQ(messaging::days_until(ends[0].ends_ns), messaging::days_left(keys / "fusion.cert.pem").value());
   EXPECT_TRUE(rogue.participant.certificates().empty()) << "it has none, and nobody is known to it";
+}
+
+// All are discovered by all in the same moment, on more than one thread of the library.
+TEST_F(Security, ATrainWhoseServicesStartTogetherIsWhole) {
+  constexpr size_t kServices = 12;
+  const auto keys = keys_of("train");
+  struct Service {
+    explicit Service(const messaging::ParticipantOptions& options) : participant(options) {}
+    messaging::Participant participant;
+    messaging::Writer<msg::OdometryStep> writer{participant, topics::odometry_step};
+  };
+  std::vector<std::unique_ptr<Service>> services(kServices);
+  {
+    std::vector<std::jthread> starts;
+    for (auto& service : services)
+      starts.emplace_back([&] { service = std::make_unique<Service>(options("odometry", keys)); });
+  }
+  messaging::Queue queue;
+  EXPECT_TRUE(test::run_until(queue, [&] {
+    return std::ranges::all_of(
+        services, [](const auto& service) { return service->participant.certificates().size() == kServices; });
+  }));
+  for (const auto& service : services) EXPECT_EQ(service->participant.certificates().size(), kServices);
 }
 
 TEST_F(Security, WithoutACertificateNothingIsHeardAndNothingSaid) {
