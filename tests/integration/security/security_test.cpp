@@ -180,25 +180,28 @@ TEST_F(Security, EverybodySaysWhenHisCertificateEnds) {
 
 // All are discovered by all in the same moment, on more than one thread of the library.
 TEST_F(Security, ATrainWhoseServicesStartTogetherIsWhole) {
-  constexpr size_t kServices = 12;
   const auto keys = keys_of("train");
   struct Service {
     explicit Service(const messaging::ParticipantOptions& options) : participant(options) {}
     messaging::Participant participant;
     messaging::Writer<msg::OdometryStep> writer{participant, topics::odometry_step};
   };
-  std::vector<std::unique_ptr<Service>> services(kServices);
+  std::vector<std::unique_ptr<Service>> services(12);
+  const auto start = [&](auto& service) { service = std::make_unique<Service>(options("odometry", keys)); };
+  const auto knows_all = [&](const auto& service) {
+    return service->participant.certificates().size() == services.size();
+  };
+  messaging::Queue queue;
   {
     std::vector<std::jthread> starts;
-    for (auto& service : services)
-      starts.emplace_back([&] { service = std::make_unique<Service>(options("odometry", keys)); });
+    for (auto& service : services) starts.emplace_back([&] { start(service); });
   }
-  messaging::Queue queue;
-  EXPECT_TRUE(test::run_until(queue, [&] {
-    return std::ranges::all_of(
-        services, [](const auto& service) { return service->participant.certificates().size() == kServices; });
-  }));
-  for (const auto& service : services) EXPECT_EQ(service->participant.certificates().size(), kServices);
+  EXPECT_TRUE(test::run_until(queue, [&] { return std::ranges::all_of(services, knows_all); }));
+  EXPECT_EQ(std::ranges::count_if(services, knows_all), 12) << "know everybody";
+  services.front().reset();
+  start(services.front());
+  EXPECT_TRUE(test::run_until(queue, [&] { return std::ranges::all_of(services, knows_all); }))
+      << "one that came back is known to " << std::ranges::count_if(services, knows_all);
 }
 
 TEST_F(Security, WithoutACertificateNothingIsHeardAndNothingSaid) {
