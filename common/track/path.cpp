@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <map>
 #include <unordered_map>
 
 #include "core/units.hpp"
@@ -10,7 +12,7 @@ namespace railfix::track {
 namespace {
 
 constexpr int kMostLegs = 100000;  // ends a path round a ring of tiny edges
-constexpr size_t kMostJoinSteps = 200;
+constexpr size_t kMostJoinSteps = 1000;
 constexpr double kLongestJoinM = 30000;  // a wrong leg may have been followed for so long
 
 double end_heading(const Run& run) {
@@ -73,45 +75,59 @@ std::vector<Run> runs_after(const Map& map, const Meetings& meetings, const Run&
   return runs;
 }
 
-/// The old route up to where it leads to `run` (behind it, or in front), and the chain between: breadth first, so that
-/// the shortest chain of edges is taken.
-std::optional<Route> join(const Route& old, const Ways& ways, const Run& run, bool behind, double near_m) {
+/// A chain of runs by which an old route leads to a place behind or in front of it.
+struct Join {
+  bool behind = true;
+  size_t leg = 0;          // of the old route: the one beside the chain
+  std::vector<Run> chain;  // from that leg to the place's run
+  double place_m = 0;      // on the old route's distances
+};
+
+/// All chains, those of few edges first, as far as they can be looked at. On a ring, which is run over several times,
+/// each meets the leg that puts the place nearest to `near_m`.
+std::vector<Join> joins_of(const Route& old, const Ways& ways, const Run& run, double into_m, bool behind,
+                           double near_m) {
   struct Step {
     Run run;
-    int next;  // towards `run`, -1 = it is `run`
+    int next;         // towards `run`, -1 = it is `run`
+    double length_m;  // from this run's far end to the place
   };
-  std::vector<Step> steps{{run, -1}};
+  std::map<std::pair<uint32_t, bool>, std::vector<size_t>> legs_on;
+  for (size_t k = 0; k < old.legs().size(); ++k)
+    legs_on[{old.legs()[k].run.edge->id, old.legs()[k].run.forward}].push_back(k);
+  const auto place_m = [&](size_t leg, double length_m) {
+    return behind ? old.legs()[leg].end_m() + length_m : old.legs()[leg].begin_m - length_m;
+  };
+  std::vector<Join> joins;
+  std::vector<Step> steps{{run, -1, behind ? into_m : run.length_m() - into_m}};
   for (size_t i = 0; i < steps.size() && steps.size() < kMostJoinSteps; ++i) {
-    const std::vector<Run> further = behind ? ways.before(steps[i].run) : ways.after(steps[i].run);
-    for (const Run& next : further) {
-      const auto& legs = old.legs();
-      // The nearest one: a ring is run over several times.
-      std::optional<size_t> met;
-      double met_off_m = kLongestJoinM;
-      for (size_t k = 0; k < legs.size(); ++k) {
-        const double off_m = std::abs((behind ? legs[k].end_m() : legs[k].begin_m) - near_m);
-        if (legs[k].run != next || off_m >= met_off_m) continue;
-        met = k;
-        met_off_m = off_m;
-      }
-      if (!met) {
-        steps.push_back({next, static_cast<int>(i)});
+    const Step here = steps[i];
+    if (here.length_m > kLongestJoinM) continue;
+    for (const Run& next : behind ? ways.before(here.run) : ways.after(here.run)) {
+      const auto met = legs_on.find({next.edge->id, next.forward});
+      if (met == legs_on.end()) {
+        steps.push_back({next, static_cast<int>(i), here.length_m + next.length_m()});
         continue;
       }
-      Route route = old;
-      if (behind) {
-        while (route.legs().size() > *met + 1) route.drop_ahead();
-      } else {
-        for (size_t k = 0; k < *met; ++k) route.drop_behind();
-      }
-      for (int k = static_cast<int>(i); k >= 0; k = steps[static_cast<size_t>(k)].next) {
-        const Run& on_the_way = steps[static_cast<size_t>(k)].run;
-        behind ? route.push_ahead(on_the_way) : route.push_behind(on_the_way);
-      }
-      return route;
+      const auto off_m = [&](size_t leg) { return std::abs(place_m(leg, here.length_m) - near_m); };
+      const size_t leg = *std::ranges::min_element(met->second, {}, off_m);
+      Join join{behind, leg, {}, place_m(leg, here.length_m)};
+      for (int k = static_cast<int>(i); k >= 0; k = steps[static_cast<size_t>(k)].next)
+        join.chain.push_back(steps[static_cast<size_t>(k)].run);
+      joins.push_back(std::move(join));
     }
   }
-  return std::nullopt;
+  return joins;
+}
+
+Route joined(Route route, const Join& join) {
+  if (join.behind) {
+    while (route.legs().size() > join.leg + 1) route.drop_ahead();
+  } else {
+    for (size_t k = 0; k < join.leg; ++k) route.drop_behind();
+  }
+  for (const Run& run : join.chain) join.behind ? route.push_ahead(run) : route.push_behind(run);
+  return route;
 }
 
 /// The straight way up to `ahead_m` and `behind_m` from `near_m`, or until the track ends.
@@ -198,24 +214,23 @@ std::optional<Path> followed_on(const Path& old, const Ways& ways, double near_m
   return Path::along(old.shared_map(), route);
 }
 
-std::optional<Path> rerouted(const Path& old, const Ways& ways, const EdgePosition& place, double near_m,
-                             double ahead_m, double behind_m) {
+std::optional<Rerouted> rerouted(const Path& old, const Ways& ways, const EdgePosition& place, double near_m,
+                                 double ahead_m, double behind_m) {
   const Route old_route = old.route();
   const Run run{old.map().edge(place.edge), place.direction != Direction::reverse};
-  const auto distance_on = [&](const Route& route) { return route.distance_of(place, near_m); };
-  std::optional<Route> best;
-  double best_off_m = INFINITY;
-  for (const bool behind : {true, false}) {
-    const auto joined = join(old_route, ways, run, behind, near_m);
-    const auto distance = joined ? distance_on(*joined) : std::nullopt;
-    if (!distance || std::abs(*distance - near_m) >= best_off_m) continue;
-    best = joined;
-    best_off_m = std::abs(*distance - near_m);
-  }
-  if (!best || best_off_m > kLongestJoinM) return std::nullopt;
-  Route route = *std::move(best);
+  const double into_m = run.forward ? place.offset_m : run.length_m() - place.offset_m;
+  const auto off_m = [&](const Join& join) { return std::abs(join.place_m - near_m); };
+  std::vector<Join> joins = joins_of(old_route, ways, run, into_m, true, near_m);
+  std::ranges::move(joins_of(old_route, ways, run, into_m, false, near_m), std::back_inserter(joins));
+  const auto best = std::ranges::min_element(joins, {}, off_m);
+  if (best == joins.end() || off_m(*best) > kLongestJoinM) return std::nullopt;
+  Route route = joined(old_route, *best);
   follow_on(route, ways, near_m, ahead_m, behind_m);
-  return Path::along(old.shared_map(), route);
+  Rerouted found{Path::along(old.shared_map(), route), {}};
+  for (const Join& join : joins) {
+    if (join.behind == best->behind && &join != &*best) found.otherwise_m.push_back(join.place_m);
+  }
+  return found;
 }
 
 void Path::collect_marks() {
@@ -264,8 +279,7 @@ void Path::collect_switches() {
       for (const bool forward : {true, false}) {
         const Run next{other, forward};
         if ((forward ? other->from_node : other->to_node) != node || next == run.reversed()) continue;
-        const double turn = std::abs(core::wrap_pi(begin_heading(next) - end_heading(run)));
-        ways += turn < core::kPi / 2 ? 1 : 0;
+        ways += leads_on(run, next) ? 1 : 0;
       }
     }
     return ways;

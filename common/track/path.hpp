@@ -83,8 +83,8 @@ class Path {
   [[nodiscard]] const std::shared_ptr<const Map>& shared_map() const { return map_; }
   friend std::optional<Path> followed_on(const Path& old, const Ways& ways, double near_m, double ahead_m,
                                          double behind_m);
-  friend std::optional<Path> rerouted(const Path& old, const Ways& ways, const EdgePosition& place, double near_m,
-                                      double ahead_m, double behind_m);
+  friend std::optional<struct Rerouted> rerouted(const Path& old, const Ways& ways, const EdgePosition& place,
+                                                 double near_m, double ahead_m, double behind_m);
   void collect_marks();
   void collect_switches();
   std::shared_ptr<const Map> map_;
@@ -98,10 +98,17 @@ class Path {
 /// `behind_m` from `near_m`. Nothing when the track ends before, or it reaches so far.
 std::optional<Path> followed_on(const Path& old, const Ways& ways, double near_m, double ahead_m, double behind_m);
 
+/// A way that was joined to an old one, and where on its distances the place lies over other ways that lead there.
+struct Rerouted {
+  Path path;
+  std::vector<double> otherwise_m;
+};
+
 /// The way of a train that is on another track than `old` says: through `place`, joined to the old way where that leads
 /// there (behind or in front), with distances that go on from it, and the straight way up to `ahead_m` and `behind_m`
-/// from there. Nothing when they do not join near `near_m`, where the train is. REQUIRES: the edge is on the map.
-std::optional<Path> rerouted(const Path& old, const Ways& ways, const EdgePosition& place, double near_m,
-                             double ahead_m, double behind_m);
+/// from there. Of several ways that lead there the one on which the place is nearest to `near_m`, where the train is.
+/// Nothing when none joins near it. REQUIRES: the edge is on the map.
+std::optional<Rerouted> rerouted(const Path& old, const Ways& ways, const EdgePosition& place, double near_m,
+                                 double ahead_m, double behind_m);
 
 }  // namespace railfix::track

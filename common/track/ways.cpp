@@ -15,6 +15,10 @@ double arriving_heading(const Run& run) {
   return leaving_heading(run.reversed()) + core::kPi;
 }
 
+double turn_rad(const Run& run, const Run& next) {
+  return std::abs(core::wrap_pi(leaving_heading(next) - arriving_heading(run)));
+}
+
 constexpr double kCornerM = 12.0;
 constexpr double kLeastCornerRad = 0.005;  // less is how points were rounded
 constexpr double kMostCornerRad = 0.2;     // more is no turnout's
@@ -26,6 +30,10 @@ double corner_rad(const Run& run, const Run& next) {
 }
 
 }  // namespace
+
+bool leads_on(const Run& run, const Run& next) {
+  return turn_rad(run, next) <= core::kPi / 2 || run.edge->is_drawn || next.edge->is_drawn;
+}
 
 Ways::Ways(const Map& map) : after_(2 * map.edges.size()) {
   std::vector<std::vector<double>> costs(after_.size());
@@ -40,10 +48,8 @@ Ways::Ways(const Map& map) : after_(2 * map.edges.size()) {
         const Run run{edge, forward};
         const Run way{next, next_forward};
         if (way == run.reversed()) continue;
-        const double turn = std::abs(core::wrap_pi(leaving_heading(way) - arriving_heading(run)));
-        // Directions of a drawing say nothing where it does not close.
-        if (turn > core::kPi / 2 && !edge->is_drawn && !next->is_drawn) continue;
-        const double cost = turn + (connection.diverging ? 10.0 : 0.0);
+        if (!leads_on(run, way)) continue;
+        const double cost = turn_rad(run, way) + (connection.diverging ? 10.0 : 0.0);
         auto& found = after_[index(run)];
         auto& cost_of = costs[index(run)];
         const auto place = std::upper_bound(cost_of.begin(), cost_of.end(), cost) - cost_of.begin();

@@ -19,6 +19,10 @@ struct Run {
   friend bool operator==(const Run&, const Run&) = default;
 };
 
+/// Whether a train may run on from one onto the next where they meet: it turns no corner. Directions of a drawing say
+/// nothing where it does not close.
+[[nodiscard]] bool leads_on(const Run& run, const Run& next);
+
 /// Made once for a map, which must outlive it.
 class Ways {
  public:

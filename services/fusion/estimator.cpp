@@ -30,9 +30,14 @@ Estimator::Estimator(const FusionParameters* parameters, const OdometerScales& s
       start_ns_(stamp_ns) {
   if (!path_) return;
   told_by_ = ToldBy::start;
-  // It may stand in front of points that the place which was told lies behind.
-  track_doubt_.move(*path_, -known_to_m() - kPointsOffM);
-  track_doubt_.move(*path_, 0);
+  doubt_points_behind();
+}
+
+// The train may stand in front of points that the place which was told lies behind.
+void Estimator::doubt_points_behind() {
+  const double here_m = filter_.path_distance_m();
+  track_doubt_.begin_at(here_m - known_to_m() - kPointsOffM);
+  track_doubt_.move(*path_, here_m);
 }
 
 void Estimator::predict_to(int64_t stamp_ns) {
@@ -163,6 +168,8 @@ void Estimator::place_like(const Estimator& other) {
   turned_way_ = other.turned_way_;
   filter_.place_like(other.filter_);
   doubt_m_ = other.doubt_m_;
+  joined_ = other.joined_;
+  other_ways_ = other.other_ways_;
   wrong_place_ = other.wrong_place_;
   told_by_ = other.told_by_;
   bends_agreed_ = other.bends_agreed_;
@@ -188,6 +195,7 @@ void Estimator::give_place_up(Against because) {
   off_path_.reset();
   corrected_ = false;
   doubt_behind_m_ = doubt_ahead_m_ = 0;
+  joined_ = other_ways_ = {};
   reference_ = 0;
   met_ = {};
   landmarks_agreed_ = 0;

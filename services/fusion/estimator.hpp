@@ -221,6 +221,15 @@ class Estimator {
     double distance_m = 0;
   };
 
+  struct Sides {
+    double behind_m = 0;
+    double ahead_m = 0;
+    void hold(const Sides& other) {
+      behind_m = std::max(behind_m, other.behind_m);
+      ahead_m = std::max(ahead_m, other.ahead_m);
+    }
+  };
+
   [[nodiscard]] bool used_within(Source source, double time_s) const;
   void doubt_time(const SensorWatch& watch, Rhythm& rhythm, int64_t stamp_ns);
   void notice_gap(int64_t stamp_ns);
@@ -255,6 +264,8 @@ class Estimator {
   /// GNSS, which has never agreed with it, says otherwise, and hardly anything speaks for it.
   [[nodiscard]] bool gnss_denies_place() const;
   void use_track(const FixInput& fix);
+  void doubt_points_behind();
+  void hold_other_ways(const FixInput& fix, double place_m, double here_m);
   Offer offer_place(const MeasuredPlace& place);
   Offer offer_place_again(double path_distance_m, double sigma_m);
   [[nodiscard]] bool has_met(uint32_t landmark) const;
@@ -318,6 +329,8 @@ class Estimator {
   int64_t gap_begin_ns_ = 0;
   double doubt_behind_m_ = 0;  // a refused fix says that the train is so far behind
   double doubt_ahead_m_ = 0;
+  Sides joined_;      // ways of other lengths lead to the track that was declared last
+  Sides other_ways_;  // ... and who looks at the switches has not ruled them out
   double rest_distance_m_ = 0;
   int64_t rest_since_ns_ = 0;
   bool standstill_ = false;

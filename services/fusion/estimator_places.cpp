@@ -15,6 +15,7 @@ constexpr double kForgotten = 2.0;  // of a landmark's sigmas is the place's whe
 constexpr double kBesideLandmarkS = 1.0;
 constexpr double kBendsHereM = 3.0;  // in a window of some 50 m to either side that is rarely by chance
 constexpr int kCurvesConfirm = 3;    // ... a place that was only told
+constexpr double kCorrectedM = 5.0;
 constexpr double kOffTrackM = 15.0;  // a GNSS fix further beside the track is none
 // Of the sigma of a GNSS fix; squares add up to the whole.
 constexpr double kGnssLastingShare = 0.866;
@@ -89,6 +90,7 @@ void Estimator::use_track(const FixInput& fix) {
     path_ = fix.new_path;
     track_doubt_.changed();
     compare_turns();
+    joined_ = {fix.behind_m, fix.ahead_m};
     // What was seen beside the old way lies on the new one: it spoke for it.
     if (off_path_ && path_->distance_of(*off_path_, filter_.path_distance_m())) {
       off_path_.reset();
@@ -101,6 +103,14 @@ void Estimator::use_track(const FixInput& fix) {
   // A word that comes beside a landmark is of before it.
   wrong_place_.said(fix.sightings_fit == SightingsFit::nowhere && !used_within(Source::landmark, kBesideLandmarkS));
   track_doubt_.said(of_m ? fix.probability : std::min(fix.probability, 1 - fix.probability), of_m, here_m);
+  if (of_m) hold_other_ways(fix, *of_m, here_m);
+}
+
+// Who says it follows the place that fusion has told: what it is off by is a correction of a moment ago, or more than
+// that, and then nobody knows who is right.
+void Estimator::hold_other_ways(const FixInput& fix, double place_m, double here_m) {
+  const double off_m = std::abs(place_m - here_m) > kCorrectedM ? place_m - here_m : 0;
+  other_ways_ = {std::max(0.0, fix.behind_m - off_m), std::max(0.0, fix.ahead_m + off_m)};
 }
 
 void Estimator::use(const FixInput& fix) {
@@ -113,8 +123,10 @@ void Estimator::use(const FixInput& fix) {
     path_ = fix.new_path;
     given_up_.reset();
     filter_.set_origin(0, fix_sigma_m(fix, *parameters_));
+    track_doubt_ = {};
     track_doubt_.said(fix.probability, std::nullopt, filter_.path_distance_m());
     accept(fix);
+    if (fix.of_before) doubt_points_behind();
     told_by_ = fix.kind == FixKind::gnss ? ToldBy::gnss : fix.only_told ? ToldBy::start : ToldBy::nobody;
     bends_agreed_ = 0;
     if (fix.in_doubt) wrong_place_.doubt();
@@ -208,6 +220,7 @@ void Estimator::accept(const FixInput& fix) {
   refused_fix_.reset();
   if (!by_chance) wrong_place_.found();
   doubt_m_ = doubt_behind_m_ = doubt_ahead_m_ = time_doubt_m_ = 0;
+  joined_ = other_ways_ = {};
   unwatched_ = {.distance_m = unwatched_.distance_m};
   reference_ = fix.landmark;
   if (fix.landmark != 0 && !has_met(fix.landmark)) {

@@ -44,7 +44,8 @@ bool has_sense(const GnssInput& e) {
   return up_to(e.easting_m, 1e9) && up_to(e.northing_m, 1e9) && up_to(e.hdop, 1e6);
 }
 bool has_sense(const FixInput& e) {
-  return (e.kind == FixKind::track || up_to(e.sigma_m, 1e7)) && up_to(e.offset_m, 1e9) && within(e.probability, 0, 1);
+  return (e.kind == FixKind::track || up_to(e.sigma_m, 1e7)) && up_to(e.offset_m, 1e9) && within(e.probability, 0, 1) &&
+         up_to(e.behind_m, 1e7) && up_to(e.ahead_m, 1e7);
 }
 
 // Two fixes may have one stamp; everything else has one measurement for each stamp.
@@ -174,8 +175,9 @@ void Fusion::start_position(FixInput& fix) const {
   if (path.ok()) fix.new_path = std::make_shared<const track::Path>(std::move(path).value());
 }
 
-// The place along the track stays; only the edges below it become others. False: that track is not beside the train,
-// but elsewhere on its way or on the map, and who says so is lost.
+// The place along the track stays; only the edges below it become others. Over which ones the train came is not said:
+// where several lead there the place may be another by what their lengths differ. False: that track is not beside the
+// train, but elsewhere on its way or on the map, and who says so is lost.
 bool Fusion::change_track(FixInput& fix) {
   const auto& path = now_->main().path();
   if (fix.kind != FixKind::track || !path) return true;
@@ -189,12 +191,21 @@ bool Fusion::change_track(FixInput& fix) {
     const auto place_m = way.route().distance_of(place, here_m);
     return place_m && std::abs(*place_m - here_m) < reach_m;
   };
-  if (path->distance_of(fix.edge, fix.offset_m)) return runs_here(*path);
+  if (path->distance_of(place, here_m)) return runs_here(*path);
+  // Round a loop the path may run over it the other way, elsewhere; a train does not turn round where it is.
+  const auto turned_m = path->distance_of({fix.edge, fix.offset_m, track::Direction::unknown}, here_m);
+  if (turned_m && std::abs(*turned_m - here_m) < reach_m) return false;
   if (fix.probability < track::kDeclaredProbability) return true;
   if (!ways_) ways_.emplace(*map_);
   auto way = track::rerouted(*path, *ways_, place, here_m, kPathAheadM, kPathBehindM);
-  if (!way || !runs_here(*way)) return false;
-  fix.new_path = std::make_shared<const track::Path>(std::move(*way));
+  if (!way || !runs_here(way->path)) return false;
+  const double place_m = *way->path.route().distance_of(place, here_m);
+  for (const double otherwise_m : way->otherwise_m) {
+    if (std::abs(otherwise_m - here_m) > reach_m) continue;
+    fix.behind_m = std::max(fix.behind_m, otherwise_m - place_m);
+    fix.ahead_m = std::max(fix.ahead_m, place_m - otherwise_m);
+  }
+  fix.new_path = std::make_shared<const track::Path>(std::move(way->path));
   return true;
 }
 

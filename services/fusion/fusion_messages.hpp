@@ -1,6 +1,8 @@
 // From messages to what fusion takes, and back.
 #pragma once
 
+#include <algorithm>
+
 #include "fusion/fusion.hpp"
 #include "fusion/handover.hpp"
 #include "fusion/train_pose.hpp"
@@ -8,12 +10,26 @@
 #include "messaging/messaging.hpp"
 #include "messaging/samples.hpp"
 #include "messaging/topics.hpp"
+#include "track/declared.hpp"
 
 namespace railfix::fusion {
 
 inline OdometryInput input_of(const msg::OdometryStep& m) {
   return {m.stamp_ns(), m.reference_stamp_ns(), m.step_m(), m.step_sigma_m(), messaging::has_measured(m)};
 }
+/// Other places on the track that a fix says: ways of another length have led there.
+inline void hold_other_places(const msg::PositionFix& m, FixInput& fix) {
+  const double along = fix.direction == track::Direction::reverse ? -1.0 : 1.0;
+  const size_t count = std::min<size_t>(m.alternatives(), msg::FIX_ALTERNATIVES);
+  for (size_t i = 0; i < count; ++i) {
+    const bool here = m.alternative_edge()[i] == m.edge() && m.alternative_direction()[i] == m.direction();
+    if (!here || m.alternative_probability()[i] <= 1 - track::kDeclaredProbability) continue;
+    const double further_m = along * (m.alternative_offset_m()[i] - m.offset_m());
+    fix.behind_m = std::max(fix.behind_m, -further_m);
+    fix.ahead_m = std::max(fix.ahead_m, further_m);
+  }
+}
+
 inline FixInput input_of(const msg::PositionFix& m) {
   FixInput fix;
   fix.stamp_ns = m.stamp_ns();
@@ -31,6 +47,7 @@ inline FixInput input_of(const msg::PositionFix& m) {
   fix.sightings_fit = m.sightings_fit() == msg::SIGHTINGS_FIT_HERE      ? SightingsFit::here
                       : m.sightings_fit() == msg::SIGHTINGS_FIT_NOWHERE ? SightingsFit::nowhere
                                                                         : SightingsFit::not_told;
+  if (fix.kind == FixKind::track) hold_other_places(m, fix);
   return fix;
 }
 

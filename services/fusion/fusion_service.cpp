@@ -142,7 +142,7 @@ void FusionService::keep(const msg::TrainState& state) {
 }
 
 // A known place is wanted at the time of the first state of the fusion that is to go on from it. False: that fusion has
-// only just been made, and this state is of the one that did not know.
+// only just been made, or has been told its place, and this state is of the one that did not know.
 bool FusionService::take_over_known(const TrainEstimate& first) {
   const double age_s = core::seconds(first.stamp_ns - known_->stamp_ns());
   if (noted_ns_) {
@@ -166,17 +166,19 @@ bool FusionService::take_over_known(const TrainEstimate& first) {
   }
   const double speed_mps = std::isfinite(known_->speed_mps()) ? known_->speed_mps() : 0;
   distance_offset_m_ = known_->distance_m() + speed_mps * age_s - first.distance_m;
+  bool placed = false;
   if (begun_anew_) {
     const auto known = known_place_of(*known_, known_in_doubt_);
     if (const auto place = place_at(map_, known, first.stamp_ns, config_.parameters.interval_factor)) {
       fusion_->add(*place);
+      placed = true;
     } else {
       learnt_ = false;
     }
   }
   begun_anew_ = false;
   known_.reset();
-  return true;
+  return !placed;
 }
 
 // What is known of the place comes from another fusion: what this one believes of it is forgotten.

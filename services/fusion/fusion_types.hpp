@@ -62,7 +62,11 @@ struct FixInput {
   std::shared_ptr<const track::Path> new_path;  // set by Fusion when the fix starts the position on the map, or
                                                 // says that the train is on another track
   SightingsFit sightings_fit = SightingsFit::not_told;
+  // Kind track: over ways of another length that have led here it may be so much further behind, or ahead.
+  double behind_m = 0;
+  double ahead_m = 0;
   bool only_told = false;  // kind network: nothing has confirmed it
+  bool of_before = false;  // kind network: what the fusion before this one knew
   bool in_doubt = false;   // kind network: no position until landmarks or proven GNSS agree
 };
 

@@ -48,6 +48,7 @@ std::optional<FixInput> place_at(const std::shared_ptr<const track::Map>& map, c
   fix.probability = known.track_probability;
   fix.kind = FixKind::network;
   fix.only_told = known.only_told;
+  fix.of_before = true;
   fix.in_doubt = known.in_doubt;
   return fix;
 }

@@ -16,6 +16,8 @@ class TrackDoubt {
   /// Somebody says that the track is right with this probability, for a train at `of_m` (nothing: not on this path)
   /// while it is at `place_m`. Switches between the two stay open.
   void said(double probability, std::optional<double> of_m, double place_m);
+  /// It begins there, without a word of how it came.
+  void begin_at(double place_m) { place_m_ = place_m; }
   /// Another track is followed from now on.
   void changed();
   /// A place on another track was seen with this probability; a place on this one.

@@ -25,7 +25,7 @@ core::Result<FollowedPath::Way> FollowedPath::follow(const PlacedTrain& train) {
     const bool other_track = !place_m && !path_->distance_of(train.place.edge, train.place.offset_m);
     auto way = other_track ? track::rerouted(*path_, *ways_, train.place, place_m_, kAheadM, kBehindM) : std::nullopt;
     if (way) {
-      path_ = std::make_shared<const track::Path>(std::move(*way));
+      path_ = std::make_shared<const track::Path>(std::move(way->path));
       place_m_ = path_->distance_of(train.place, place_m_).value_or(place_m_);
       return Way::other_track;
     }

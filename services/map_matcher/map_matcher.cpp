@@ -296,6 +296,7 @@ void MapMatcher::say_track(double odometer_m, PlaceFixes& fixes) {
   if (!changed && !due && (choice->known || since_m < kOpenTrackEveryM)) return;
   said_track_ = {best.place.edge, known, stamp_ns, odometer_m, there};
   PlaceFix fix{FixKind::track, stamp_ns, choice->options, std::numeric_limits<double>::infinity()};
+  fix.options.insert(fix.options.begin() + 1, choice->elsewhere.begin(), choice->elsewhere.end());
   for (auto& option : fix.options) option.probability *= there;
   if (there < 1) fix.sightings_fit = SightingsFit::nowhere;
   fixes.push_back(std::move(fix));

@@ -16,7 +16,8 @@ using track::EdgePosition;
 constexpr double kAsideM = 0.001;
 constexpr double kLongestStepM = 500.0;  // farther apart two places are no way but a jump
 constexpr double kSameWayM = 1.0;        // a group passed again after another way than back is passed anew
-constexpr double kNearSwitchM = 50.0;    // a switch is doubted a little before the foot's estimate reaches it
+constexpr double kAtSwitchM = 10.0;      // a switch is doubted a little before the foot's estimate reaches it, ...
+constexpr double kNearSwitchM = 50.0;    // ... and where there is none behind even further
 constexpr double kDecidedM = 3000.0;     // so far behind a switch its declaration may still be taken back
 constexpr double kTurnedM = 0.3;         // less is no other direction of running
 constexpr double kBeforeSwitchM = 0.01;  // on the stem
@@ -86,18 +87,25 @@ BaliseTracker::Undeclared BaliseTracker::undeclared_since(const EdgePosition& fo
   const auto step = step_to(foot);
   if (step && step->divides) return undeclared_from(*last_, 0, step->way_m > 0);
   if (decided_) return *decided_;
-  const auto path = track::Path::follow(map_, *last_, kNearSwitchM, kNearSwitchM);
+  const auto path = track::Path::follow(map_, *last_, kDecidedM, kDecidedM);
   if (!path.ok()) return {};
-  // To either side, because fusion and whoever declares the track do not place the train alike.
-  std::optional<double> nearest_m;
+  const double sign = forwards_ ? 1.0 : -1.0;
+  std::optional<double> next_m;  // in the running direction
+  std::optional<double> passed_m;
+  double met_m = -kDecidedM;  // it may have come from elsewhere
   for (const auto& one : path.value().switches()) {
-    if (one.ahead == forwards_ && (!nearest_m || std::abs(one.distance_m) < std::abs(*nearest_m)))
-      nearest_m = one.distance_m;
+    const double further_m = sign * one.distance_m;
+    if (one.ahead != forwards_ && further_m <= 0) met_m = std::max(met_m, further_m);
+    if (one.ahead != forwards_) continue;
+    auto& nearest_m = further_m > 0 ? next_m : passed_m;
+    if (!nearest_m || std::abs(further_m) < std::abs(*nearest_m)) nearest_m = further_m;
   }
-  if (!nearest_m) return {};
-  const bool passed = forwards_ ? *nearest_m <= 0 : *nearest_m >= 0;
-  if (!passed) return undeclared_from(*last_, 0, forwards_);
-  const double stem_m = *nearest_m + (forwards_ ? -kBeforeSwitchM : kBeforeSwitchM);
+  if (passed_m && *passed_m < met_m) passed_m.reset();
+  // A little before it already, because fusion and whoever declares the track do not place the train alike.
+  const bool at_next = next_m && *next_m < kAtSwitchM && !(passed_m && -*passed_m < *next_m);
+  if (at_next || (!passed_m && next_m && *next_m < kNearSwitchM)) return undeclared_from(*last_, 0, forwards_);
+  if (!passed_m) return {};
+  const double stem_m = sign * (*passed_m - kBeforeSwitchM);
   return undeclared_from(path.value().position_at(stem_m), -stem_m, forwards_);
 }
 
@@ -142,6 +150,7 @@ void BaliseTracker::go_undeclared(const EdgePosition& foot) {
   if (const auto step = step_to(foot)) {
     note_direction(step->way_m);
     undeclared_->turns.run(step->way_m);
+    leave_doubted(*step);
   } else if (const auto ways = ways_between(*map_, ways_, *undeclared_->from, foot, before_m); !ways.empty()) {
     undeclared_->turns.run(ways.front().length_m - before_m);  // onto another leg, behind one more switch
   } else {
@@ -152,6 +161,17 @@ void BaliseTracker::go_undeclared(const EdgePosition& foot) {
   reference_->foot_m += undeclared_->turns.way_m() - before_m;
   if (anew || foot.edge != last_->edge)
     doubt_legs(ways_between(*map_, ways_, *undeclared_->from, foot, undeclared_->turns.way_m()));
+}
+
+// The group that it runs back to may lie beyond this switch on one of its legs.
+void BaliseTracker::leave_doubted(const Step& step) {
+  if (!step.divides || !reference_) return;
+  const bool forwards = step.way_m > 0;
+  if (forwards ? reference_->foot_m >= 0 : reference_->foot_m <= 0) return;
+  const double most_m = std::abs(reference_->foot_m) + kLongestStepM;
+  if (every_way_leads_to(*map_, ways_, *last_, forwards, reference_->group->edge, most_m)) return;
+  reference_.reset();
+  undeclared_->reference.reset();
 }
 
 // Where legs have joined again nobody knows over which one the train came.
@@ -335,7 +355,8 @@ std::optional<Reference> BaliseTracker::nearest_behind(const EdgePosition& foot)
   }
   for (const auto& mark : path.value().balise_groups()) {  // by distance: the last one is the nearest
     if (mark.distance_m > 0 || mark.distance_m <= from_m) continue;
-    const auto* previous = nearest ? nearest->group : nullptr;
+    // Round a ring it may be the group itself.
+    const auto* previous = nearest && nearest->group != mark.group ? nearest->group : nullptr;
     nearest = Reference{mark.group, previous, mark.nominal_is_along_path, true, -mark.distance_m};
   }
   return nearest;

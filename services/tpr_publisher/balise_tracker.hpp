@@ -79,6 +79,7 @@ class BaliseTracker {
   void leave_leg(const Step& step);
   void note_direction(double way_m);
   void go_back_to(Undeclared undeclared);
+  void leave_doubted(const Step& step);
   void go_undeclared(const track::EdgePosition& foot);
   void doubt_legs(const std::vector<WayBetween>& ways);
   [[nodiscard]] bool go_declared(const track::EdgePosition& foot);

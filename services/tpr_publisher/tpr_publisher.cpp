@@ -19,6 +19,7 @@ constexpr double kFastestMps = 150;       // 540 km/h
 constexpr double kLongUndeclaredM = 500;  // a switch every few kilometres, declared soon, is no trouble
 // Of a train that comes to rest the estimated speed may have any sign: its direction is that of its way.
 constexpr double kSurelyMovesMps = 1.0;
+constexpr double kNoCorrectionM = 2.0;
 constexpr double kMovesM = 0.05;     // what fusion takes for rest
 constexpr double kCorrectionM = 20;  // a distance may be corrected by so much, and by what it was not sure of
 
@@ -112,7 +113,8 @@ void TprPublisher::follow_motion(const TrainPosition& position) {
   const Motion moves = (fast ? position.speed_mps : moved_m) > 0 ? Motion::forward : Motion::backward;
   const bool agree = std::abs(moved_m) >= kMovesM && (moved_m > 0) == (position.speed_mps > 0);
   // No train turns round without coming to rest; an estimate that is corrected while it brakes does.
-  const bool turns = agree && (rested_ || motion_ == Motion::unknown);
+  // Nor may a rest have been seen where it rolls back at once.
+  const bool turns = agree && (rested_ || motion_ == Motion::unknown || std::abs(moved_m) >= kNoCorrectionM);
   if (moves != motion_ && !fast && !turns) return;
   rested_ = rested_ && !fast && !agree;
   motion_ = moves;

@@ -61,4 +61,22 @@ std::vector<WayBetween> ways_between(const track::Map& map, const track::Ways& w
   return found;
 }
 
+bool every_way_leads_to(const track::Map& map, const track::Ways& ways, const track::EdgePosition& from, bool along,
+                        uint32_t edge, double most_m) {
+  struct Open {
+    track::Run run;
+    double length_m;  // from the edge of `from` on
+  };
+  std::vector<Open> open{{run_of(map, from), 0}};
+  for (size_t i = 0; i < open.size(); ++i) {
+    const auto further = along ? ways.after(open[i].run) : ways.before(open[i].run);
+    if (further.empty() || open[i].length_m > most_m || open.size() > kMostRoutes) return false;
+    const double length_m = open[i].length_m;
+    for (const auto& next : further) {
+      if (next.edge->id != edge) open.push_back({next, length_m + next.length_m()});
+    }
+  }
+  return true;
+}
+
 }  // namespace railfix::tpr_publisher

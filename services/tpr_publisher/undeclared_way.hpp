@@ -32,4 +32,9 @@ struct WayBetween {
 std::vector<WayBetween> ways_between(const track::Map& map, const track::Ways& ways, const track::EdgePosition& from,
                                      const track::EdgePosition& to, double way_m);
 
+/// Whether a train that runs on from a place, along its direction or against it, comes to that edge within `most_m`
+/// whichever way it takes. False when there are too many to look at. REQUIRES: the edge is on the map.
+bool every_way_leads_to(const track::Map& map, const track::Ways& ways, const track::EdgePosition& from, bool along,
+                        uint32_t edge, double most_m);
+
 }  // namespace railfix::tpr_publisher

@@ -15,9 +15,10 @@ constexpr double kLostM = 60.0;  // afterwards the window is right and the route
 constexpr double kTurnRoundM = 0.3;
 constexpr double kFarFromWindowM = 200;
 constexpr double kMostWindowM = 300;
+constexpr double kSamePlaceM = 1.0;
 constexpr double kNoLagShare = 0.3;      // of the cars
 constexpr double kViewNoisePerM = 3e-4;  // least sigma of a picture's curvature
-constexpr double kWatched = 0.9;         // a track less probable lies behind a switch that nobody watched
+constexpr double kWatched = 0.9;         // a begin less probable lies behind a switch that nobody watched
 
 }  // namespace
 
@@ -31,8 +32,7 @@ void TrackChooser::start(const TrackWindow& window) {
   hypotheses_.push_back({track::Route(run, window.place.offset_m, 0), 0, {0, std::log(parameters_.astray)}, {}});
   forwards_ = window.forwards;
   guess_nothing();
-  told_ = 1;
-  if (window.probability < kWatched) open_ways_behind();
+  open_ways_behind();
   cells_m_ = first_m();
   for (auto& hypothesis : hypotheses_) extend_behind(hypothesis.route);
   fit_cells();
@@ -43,13 +43,12 @@ void TrackChooser::follow(const TrackWindow& window) {
   TrackWindow wanted = window;
   wanted.over_m = std::clamp(window.over_m, 0.0, kMostWindowM);
   wanted.under_m = std::clamp(window.under_m, 0.0, kMostWindowM);
+  // Where ways of different length lead there fusion is on the one that it was on before.
   std::optional<double> found;
-  double best = -INFINITY;
   for (const auto& hypothesis : hypotheses_) {
     const auto place_m = hypothesis.route.distance_of(window.place, place_m_);
-    if (!place_m || std::abs(*place_m - place_m_) > kFarFromWindowM || hypothesis.log_prior <= best) continue;
-    found = place_m;
-    best = hypothesis.log_prior;
+    if (!place_m || std::abs(*place_m - place_m_) > kFarFromWindowM) continue;
+    if (!found || std::abs(*place_m - place_m_) < std::abs(*found - place_m_)) found = place_m;
   }
   // While no leg is declared fusion goes on along the straight one, which may have been given up here. Where not even
   // the begin is known nothing is lost.
@@ -238,27 +237,46 @@ void TrackChooser::see(double curvature_per_m, double sigma_per_m) {
 std::optional<TrackChoice> TrackChooser::choice() const {
   if (hypotheses_.empty()) return std::nullopt;
   if (hypotheses_.size() == 1) {
-    return TrackChoice{{{hypotheses_.front().route.position_at(place_m_), told_}},
-                       told_ >= track::kDeclaredProbability};
+    return TrackChoice{
+        {{hypotheses_.front().route.position_at(place_m_), told_}}, {}, told_ >= track::kDeclaredProbability};
   }
-  struct Sum {
+  struct Place {
     track::EdgePosition place;
     double log = -INFINITY;
   };
-  std::map<std::pair<uint32_t, track::Direction>, Sum> by_edge;
+  struct Track {
+    std::vector<Place> places;
+    double log = -INFINITY;
+  };
+  std::map<std::pair<uint32_t, track::Direction>, Track> tracks;
   double all = -INFINITY;
   for (const auto& hypothesis : hypotheses_) {
     const double log = evidence(hypothesis);
     const auto place = hypothesis.route.position_at(place_m_);
-    auto& sum = by_edge[{place.edge, place.direction}];
-    sum.place = place;
-    sum.log = log_sum(sum.log, log);
+    auto& [places, sum] = tracks[{place.edge, place.direction}];
+    const auto known = std::ranges::find_if(
+        places, [&](const Place& other) { return std::abs(other.place.offset_m - place.offset_m) < kSamePlaceM; });
+    auto& mine = known == places.end() ? places.emplace_back(Place{place}) : *known;
+    mine.log = log_sum(mine.log, log);
+    sum = log_sum(sum, log);
     all = log_sum(all, log);
   }
+  std::vector<Track> sorted;
+  for (auto& [edge, track] : tracks) {
+    std::ranges::sort(track.places, std::ranges::greater{}, &Place::log);
+    sorted.push_back(std::move(track));
+  }
+  std::ranges::stable_sort(sorted, std::ranges::greater{}, &Track::log);
+  const auto option = [&](const Place& place, double log) {
+    return TrackOption{place.place, told_ * std::exp(log - all)};
+  };
   TrackChoice choice;
-  for (const auto& [edge, sum] : by_edge) choice.options.push_back({sum.place, told_ * std::exp(sum.log - all)});
-  std::sort(choice.options.begin(), choice.options.end(),
-            [](const TrackOption& a, const TrackOption& b) { return a.probability > b.probability; });
+  for (const auto& track : sorted) choice.options.push_back(option(track.places.front(), track.log));
+  for (const auto& place : sorted.front().places) {
+    const auto other = option(place, place.log);
+    if (&place != &sorted.front().places.front() && other.probability > 1 - track::kDeclaredProbability)
+      choice.elsewhere.push_back(other);
+  }
   choice.known = choice.options.front().probability >= track::kDeclaredProbability;
   return choice;
 }

@@ -30,10 +30,11 @@ struct TrackOption {
   double probability = 0;
 };
 
-/// Best first; the probabilities add up to 1, or to less when the train may be on another track that is not looked
-/// into.
+/// Tracks best first; their probabilities add up to 1, or to less when the train may be on another track that is not
+/// looked into.
 struct TrackChoice {
   std::vector<TrackOption> options;
+  std::vector<TrackOption> elsewhere;  // on the best track: ways of another length have led there
   bool known = false;
 };
 

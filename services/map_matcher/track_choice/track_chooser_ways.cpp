@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "map_matcher/track_choice/picture_fits.hpp"
+#include "track/declared.hpp"
 
 namespace railfix::map_matcher {
 namespace {
@@ -13,40 +14,43 @@ namespace {
 constexpr double kLeastProbability = 1e-7;
 constexpr double kMapSigmas = 3;      // points are no further from where the map has them
 constexpr double kWheelsBehindM = 5;  // the foot: points may be thrown in front of the first wheels
-constexpr double kSameM = 5.0;        // two routes whose distances differ by less are one
+constexpr double kSameM = 1.0;        // two routes whose distances differ by less are one
 constexpr size_t kMostHypotheses = 400;
 constexpr double kUnwatchedM = 3000;  // behind a switch that nobody watched, at most
 
 }  // namespace
 
-// Who begins behind a switch that nobody watched does not know more than fusion: the train may be on any of the ways
-// from there, as far beyond the switch.
+// Who begins does not know more than fusion. Where that has not declared the track the train may be on any leg of the
+// switches behind it, as far beyond them; else of those that it may stand in front of.
 void TrackChooser::open_ways_behind() {
+  const bool declared = window_.probability >= track::kDeclaredProbability;
+  const double behind_m = forwards_ ? window_.over_m : window_.under_m;
+  const double in_front_m = behind_m + kMapSigmas * parameters_.map_sigma_m + kWheelsBehindM;
   track::Route back = hypotheses_.front().route;
   std::vector<track::Route> others;
-  const auto behind_m = [&] { return forwards_ ? -back.begin_m() : back.end_m(); };
-  for (double even = 1; even > window_.probability + 0.01 && behind_m() < kUnwatchedM;) {
+  double probability = window_.probability;
+  while (back.legs().size() < kMostHypotheses) {
+    const double node_m = forwards_ ? -back.begin_m() : back.end_m();
+    if (node_m > (declared ? in_front_m : kUnwatchedM) || others.size() > kMostHypotheses) break;
     const track::Run here = forwards_ ? back.legs().front().run : back.legs().back().run;
     const auto before = forwards_ ? ways_->before(here) : ways_->after(here);
     if (before.empty()) break;
     const track::Run& from = before.front();
     const auto ways = forwards_ ? ways_->after(from) : ways_->before(from);
-    even /= static_cast<double>(ways.size());
     for (const auto& way : ways) {
       if (way == here) continue;
       const double switch_m = from.forward == forwards_ ? from.length_m() : 0.0;  // on the edge before it
       auto& other = others.emplace_back(from, switch_m, forwards_ ? back.begin_m() : back.end_m());
       forwards_ ? other.push_ahead(way) : other.push_behind(way);
     }
+    if (node_m <= in_front_m) probability = std::min(probability, 1.0 / static_cast<double>(ways.size()));
     forwards_ ? back.push_behind(from) : back.push_ahead(from);
   }
-  if (others.empty()) {
-    told_ = window_.probability;
-    return;
-  }
-  hypotheses_.front().log_prior = std::log(window_.probability);
+  told_ = others.empty() && !declared ? window_.probability : 1;
+  if (others.empty()) return;
+  hypotheses_.front().log_prior = std::log(probability);
   for (auto& other : others) {
-    const double share = (1 - window_.probability) / static_cast<double>(others.size());
+    const double share = (1 - probability) / static_cast<double>(others.size());
     hypotheses_.push_back({std::move(other), std::log(share), {0, std::log(parameters_.astray)}, {}});
   }
 }

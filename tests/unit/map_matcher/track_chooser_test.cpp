@@ -176,8 +176,15 @@ TEST(TrackChooser, WhoBeginsBehindASwitchThatNobodyWatchedDoesNotKnowTheTrack) {
   const auto ways = std::make_shared<const track::Ways>(*map);
   const auto forward = track::Direction::forward;
   TrackChooser sure({}, map, ways);
-  sure.follow({{2, 100, forward}, 3, 3, 0.5, 0.99});
+  sure.follow({{2, 100, forward}, 3, 3, 0.5, 0.9995});
   EXPECT_TRUE(sure.choice()->known) << "fusion knows why";
+  TrackChooser less_sure({}, map, ways);
+  less_sure.follow({{2, 100, forward}, 3, 3, 0.5, 0.99});
+  EXPECT_FALSE(less_sure.choice()->known) << "nobody has declared it";
+  EXPECT_NEAR(less_sure.choice()->options.front().probability, 0.99, 1e-6);
+  TrackChooser at_points({}, map, ways);
+  at_points.follow({{2, 2, forward}, 9, 9, 0.5, 1});
+  EXPECT_NEAR(at_points.choice()->options.front().probability, 0.5, 1e-6) << "it may stand in front of them";
 
   TrackChooser chooser({}, map, ways);
   chooser.follow({{2, 15, forward}, 3, 3, 0.5, 0.5});

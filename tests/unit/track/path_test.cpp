@@ -140,14 +140,14 @@ TEST(Path, GoesOnWithItsDistancesOnAnotherTrackBehindASwitch) {
   EXPECT_EQ(ways.after({map->edge(1), true}).front().edge->id, 2U);
   EXPECT_EQ(ways.before({map->edge(2), true}).front().edge->id, 1U);
   const Path straight = core::value_or_throw(Path::follow(map, {1, 400, Direction::forward}, 1200, 300));
-  const Path other = rerouted(straight, ways, {3, 450, Direction::reverse}, 660, 1000, 1000).value();
+  const Path other = rerouted(straight, ways, {3, 450, Direction::reverse}, 660, 1000, 1000).value().path;
   EXPECT_NEAR(other.distance_of(1, 100).value(), -300, 1e-9);
   EXPECT_NEAR(other.distance_of(3, 450).value(), 650, 1e-9);
   EXPECT_FALSE(other.distance_of(2, 10));
   EXPECT_NEAR(other.end_m(), 1100, 1e-9);
   // The other way round: from the siding's side the train was really on the main line; distances meet at the switch.
   const Path reverse = core::value_or_throw(Path::follow(map, {2, 300, Direction::reverse}, 1200, 300));
-  const Path from_siding = rerouted(reverse, ways, {3, 300, Direction::forward}, 100, 1000, 300).value();
+  const Path from_siding = rerouted(reverse, ways, {3, 300, Direction::forward}, 100, 1000, 300).value().path;
   EXPECT_NEAR(from_siding.distance_of(3, 300).value(), 100, 1e-9);
   EXPECT_NEAR(from_siding.distance_of(1, 900).value(), 400, 1e-9);
   EXPECT_FALSE(rerouted(straight, ways, {3, 450, Direction::forward}, 77, 10, 10)) << "nothing joins them";
