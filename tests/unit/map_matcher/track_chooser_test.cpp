@@ -203,6 +203,56 @@ TEST(TrackChooser, WhoBeginsBehindASwitchThatNobodyWatchedDoesNotKnowTheTrack) {
   EXPECT_TRUE(chooser.choice()->known);
 }
 
+// The doubt may be of a switch further back than the last one.
+TEST(TrackChooser, WhoBeginsInDoubtLooksAtEverySwitchBehind) {
+  auto made = std::make_shared<track::Map>(*fork());
+  made->edges.push_back({4, "of the second", 3, 5, "", track::Alignment::chained({0, 1000, 0}, {{800, 0, 0}})});
+  made->edges.push_back(
+      {5, "left of it", 3, 6, "", track::Alignment::chained({0, 1000, 0}, {{40, 0.003, 0.003}, {760, 0, 0}})});
+  made->connections.push_back({3, 2, 4, false});
+  made->connections.push_back({3, 2, 5, true});
+  const std::shared_ptr<const track::Map> map = made;
+  TrackChooser chooser({}, map, std::make_shared<const track::Ways>(*map));
+  const auto window = [](double place_m) {
+    return TrackWindow{{4, place_m, track::Direction::forward}, 3, 3, 0.5, 0.5};
+  };
+  chooser.follow(window(12));
+  for (double place_m = 12; place_m < 140; place_m += 1) {
+    chooser.move({1, 0, 1e-4});  // straight on: not over the second one's leg
+    chooser.follow(window(place_m + 1));
+  }
+  const auto choice = chooser.choice();
+  EXPECT_FALSE(choice->known) << "the left leg of the first one is as straight there";
+  EXPECT_LT(choice->options.front().probability, 0.7);
+}
+
+TEST(TrackChooser, OverWhichOfTwoLengthsItCameIsSaidBeyondTheJoint) {
+  auto made = std::make_shared<track::Map>(*fork());
+  made->edges[1].to_node = made->edges[2].to_node = 5;
+  made->edges[2].alignment = track::Alignment::chained({0, 500, 0}, {{560, 0, 0}});
+  made->edges.push_back({4, "on", 5, 6, "", track::Alignment::chained({0, 1000, 0}, {{1000, 0, 0}})});
+  made->connections.push_back({5, 2, 4, false});
+  made->connections.push_back({5, 3, 4, true});
+  made->landmarks.clear();
+  const std::shared_ptr<const track::Map> map = made;
+  TrackChooser chooser({}, map, std::make_shared<const track::Ways>(*map));
+  const auto follow = [&](uint32_t edge, double place_m) {
+    chooser.follow({{edge, place_m, track::Direction::forward}, 3, 3, 0.5, 1});
+  };
+  follow(1, 400);
+  for (double way_m = 402; way_m <= 1200; way_m += 2) {
+    chooser.move_blind(2);
+    way_m <= 500 ? follow(1, way_m) : way_m <= 1000 ? follow(2, way_m - 500) : follow(4, way_m - 1000);
+  }
+  const auto choice = chooser.choice();
+  EXPECT_TRUE(choice->known);
+  EXPECT_EQ(choice->options.front().place.edge, 4U);
+  ASSERT_EQ(choice->elsewhere.size(), 1U);
+  EXPECT_EQ(choice->elsewhere.front().place.edge, 4U);
+  EXPECT_NEAR(choice->elsewhere.front().probability, 0.5, 0.01);
+  EXPECT_NEAR(std::abs(choice->elsewhere.front().place.offset_m - choice->options.front().place.offset_m), 60, 0.1);
+}
+
 TEST(TrackChooser, WaysThatMeetAgainNeedNotBeToldApart) {
   auto made = std::make_shared<track::Map>(*fork());
   made->edges.push_back({4, "together", 5, 6, "", track::Alignment::chained({0, 1000, 0}, {{900, 0, 0}})});

@@ -116,6 +116,68 @@ TEST_F(LeftLeg, AGroupAtTheVeryEndOfALegIsOnThatLeg) {
   EXPECT_FALSE(tracker.reference());
 }
 
+/// In from the left over points, and over those of a third track out to the right.
+std::shared_ptr<const track::Map> junction() {
+  auto map = std::make_shared<track::Map>();
+  const auto straight = [](double from_m, double length_m) {
+    return track::Alignment::chained({from_m, 0, core::kPi / 2}, {{length_m, 0, 0}});
+  };
+  map->edges = {{1, "in", 1, 2, "", straight(0, 300)},
+                {2, "middle", 2, 3, "", straight(300, 200)},
+                {3, "out", 3, 4, "", straight(500, 300)},
+                {4, "turned off", 2, 5, "", straight(300, 200)},
+                {5, "third", 6, 3, "", straight(400, 100)}};
+  map->connections = {{2, 1, 2, false}, {2, 1, 4, true}, {3, 2, 3, false}, {3, 5, 3, true}};
+  map->balise_groups = {{85, 1, 1, 280, true, true, 0, {}}, {85, 2, 3, 50, true, true, 0, {}}};
+  return map;
+}
+
+TEST_F(LeftLeg, BackedOverPointsInDoubtTheGroupOnOneOfTheirLegsIsNone) {
+  tracker = BaliseTracker(junction(), 5000);
+  run(1, 200, 298, 2, true);
+  run(2, 2, 20, 2, false);
+  run(2, 22, 198, 2, true);
+  run(3, 2, 60, 2, true);
+  expect(kOfLoop[2], 10);
+  run(3, 60, 6, -2, true);
+  run(3, 4, 2, -2, false);
+  run(2, 198, 100, -2, false);
+  EXPECT_FALSE(tracker.reference()) << "it may have backed onto the third track";
+}
+
+TEST_F(LeftLeg, ADoubtBeforeTheNextPointsIsOfTheOnesPassed) {
+  for (const double doubted_m : {140.0, 160.0}) {
+    auto map = std::make_shared<track::Map>(*junction());
+    map->connections.push_back({3, 2, 5, true});  // facing as well
+    map->balise_groups.push_back({85, 4, 2, 20, true, true, 0, {}});
+    tracker = BaliseTracker(map, 5000);
+    run(2, 10, doubted_m, 2, true);  // begun there
+    EXPECT_EQ(tracker.reference()->group->nid_lrbg(), kOfLoop[1]);
+    run(2, doubted_m + 2, 180, 2, false);
+    expect(kOfLoop[0], 200);
+  }
+}
+
+TEST_F(LeftLeg, ADoubtBehindAJointIsOfNoPointsBeyondIt) {
+  auto map = std::make_shared<track::Map>(*junction());
+  map->balise_groups[1].offset_m = 100;
+  tracker = BaliseTracker(map, 5000);
+  run(3, 80, 150, 2, true);  // nobody knows by which track it came
+  run(3, 152, 170, 2, false);
+  EXPECT_FALSE(tracker.reference());
+}
+
+TEST_F(LeftLeg, RoundARingAGroupHasNotItselfBefore) {
+  auto map = std::make_shared<track::Map>();
+  map->edges = {{1, "ring", 1, 1, "", track::Alignment::chained({0, 0, 0}, {{1000, 0.006283, 0.006283}})}};
+  map->connections = {{1, 1, 1, false}};
+  map->balise_groups = {{85, 1, 1, 100, true, true, 0, {}}};
+  tracker = BaliseTracker(map, 5000);
+  tracker.update(forward(1, 200), true);
+  expect(kOfLoop[0], 100);
+  EXPECT_EQ(previous(), 0U);
+}
+
 TEST(TakenBack, IsReportedWhereverGroupsAreNotReported) {
   for (const uint32_t m_loc : {0U, 1U, 2U}) {
     auto silent = settings();
@@ -161,6 +223,24 @@ TEST(DirectionOfMovement, IsNotThatOfACorrectionAtRest) {
   for (int i = 0; i < 10; ++i) run(240, 0.001, true);
   for (int i = 0; i < 60; ++i) run(239.9, -0.001, true);
   EXPECT_EQ(said, etcs::kNominal);
+}
+
+// Slower than surely moving, and no second of rest between.
+TEST(DirectionOfMovement, IsThatOfARollBackWithoutARest) {
+  TprPublisher publisher(balise_map(), settings());
+  double run_s = 0;
+  double offset_m = 920;
+  uint32_t said = 99;
+  const auto run = [&](double speed_mps) {
+    auto position = at(forward(1, offset_m += 0.2 * speed_mps), run_s += 0.2, speed_mps);
+    position.distance_m = offset_m;
+    if (const auto outcome = publisher.update(position, position.stamp_ns); outcome.report)
+      said = outcome.report->fields.q_dirtrain;
+  };
+  for (int i = 0; i < 40; ++i) run(0.5);
+  EXPECT_EQ(said, etcs::kNominal);
+  for (int i = 0; i < 60; ++i) run(-0.5);
+  EXPECT_EQ(said, etcs::kReverse);
 }
 
 }  // namespace

@@ -153,6 +153,43 @@ TEST(Path, GoesOnWithItsDistancesOnAnotherTrackBehindASwitch) {
   EXPECT_FALSE(rerouted(straight, ways, {3, 450, Direction::forward}, 77, 10, 10)) << "nothing joins them";
 }
 
+TEST(Path, IsJoinedToAnotherTrackByTheWayOfTheLengthThatWasRun) {
+  auto made = std::make_shared<Map>();
+  const auto straight = [](double from_m, double length_m) {
+    return Alignment::chained({0, from_m, 0}, {{length_m, 0, 0}});
+  };
+  made->edges = {{1, "stem", 1, 2, "", straight(0, 500)},     {2, "main", 2, 3, "", straight(500, 2000)},
+                 {3, "by two", 2, 4, "", straight(500, 100)}, {4, "of them", 4, 5, "", straight(600, 100)},
+                 {5, "by one", 2, 5, "", straight(500, 240)}, {6, "there", 5, 6, "", straight(700, 900)}};
+  made->connections = {{2, 1, 2, false}, {2, 1, 3, true},  {2, 1, 5, true},
+                       {4, 3, 4, false}, {5, 4, 6, false}, {5, 5, 6, true}};
+  const std::shared_ptr<const Map> map = made;
+  const Ways ways(*map);
+  const Path main = core::value_or_throw(Path::follow(map, {1, 0, Direction::forward}, 2000, 0));
+  for (const double run_m : {760.0, 800.0}) {
+    const auto found = rerouted(main, ways, {6, 60, Direction::forward}, run_m, 1000, 1000);
+    ASSERT_TRUE(found);
+    EXPECT_NEAR(found->path.distance_of(6, 60).value(), run_m, 1e-9);
+    ASSERT_EQ(found->otherwise_m.size(), 1U);
+    EXPECT_NEAR(found->otherwise_m.front(), run_m == 760 ? 800 : 760, 1e-9);
+  }
+}
+
+// Directions of a drawing say nothing: a leg that leaves it sharply is one.
+TEST(Path, DividesWhereTheWaysDo) {
+  for (const bool drawn : {false, true}) {
+    auto map = std::make_shared<Map>();
+    map->edges = {{1, "stem", 1, 2, "", Alignment::chained({0, 0, 0}, {{500, 0, 0}})},
+                  {2, "on", 2, 3, "", Alignment::chained({0, 500, 0}, {{500, 0, 0}})},
+                  {3, "leg", 2, 4, "", Alignment::chained({0, 500, 2.2}, {{500, 0, 0}})}};
+    for (auto& edge : map->edges) edge.is_drawn = drawn;
+    map->connections = {{2, 1, 2, false}, {2, 1, 3, true}};
+    const auto path = core::value_or_throw(Path::follow(map, {1, 400, Direction::forward}, 400, 300));
+    EXPECT_EQ(Ways(*map).after({map->edge(1), true}).size(), drawn ? 2U : 1U);
+    EXPECT_EQ(path.switches().size(), drawn ? 1U : 0U);
+  }
+}
+
 TEST(Path, SaysWhereItCannotStart) {
   EXPECT_FALSE(Path::follow(shared_small_map(), {9, 0, Direction::forward}, 1, 1).ok());
   EXPECT_FALSE(Path::follow(shared_small_map(), {1, 1001, Direction::forward}, 1, 1).ok());
