@@ -30,8 +30,9 @@ Fusion at_a_loop() {
 
 TEST(OtherWays, WhereLegsHaveMetTheIntervalHoldsBothUntilLandmarksAgree) {
   auto fusion = at_a_loop();
+  run(fusion, 0, 0.5, 20);
   fusion.add(landmark_fix(0.5, 1, 910, 1));
-  const auto before = run(fusion, 0, 29.9, 20);
+  const auto before = run(fusion, 0.5, 29.9, 20);
   EXPECT_NEAR(before.over_m, before.under_m, 1);
   auto both = track_fix(29.9, 4, 98);
   both.behind_m = 60;
