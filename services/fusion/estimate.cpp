@@ -135,6 +135,7 @@ void Estimator::locate(TrainEstimate& e) const {
   e.easting_m = pose.easting_m;
   e.northing_m = pose.northing_m;
   e.heading_rad = pose.heading_rad;
+  if (path_->map().edge(e.position.edge)->is_drawn) return;  // a drawing lies nowhere on the Earth
   if (const auto geo = path_->map().to_geo(pose.easting_m, pose.northing_m)) {
     e.lat_deg = geo->lat_deg;
     e.lon_deg = geo->lon_deg;

@@ -115,11 +115,26 @@ void SensorGatewayService::publish_clock(int64_t data_ns, int64_t wall_ns, bool 
 
 void SensorGatewayService::end() {
   context_.log().info("played {} IMU, {} wheel and {} GNSS samples", imu_seq_, wheel_seq_, gnss_seq_);
+  tell_unplayed();
   if (config_.at_end != "finish") return;
   const int64_t ended_ns = core::monotonic_ns();
   context_.every(kTick, [this, ended_ns] {
     if (core::monotonic_ns() - ended_ns > service::kLastWordsNs) context_.finish("all samples played");
   });
+}
+
+void SensorGatewayService::tell_unplayed() {
+  const auto& sensors = playback_.sensors();
+  const auto tell = [this](const char* sensor, size_t samples, uint64_t played) {
+    if (samples == 0 || played != 0) return;
+    context_.log().warn(
+        "{}: none of the {} samples lies in the time of the pictures; stamps are Unix nanoseconds, in one "
+        "clock for all",
+        sensor, samples);
+  };
+  tell("IMU", sensors.imu.size(), imu_seq_);
+  tell("wheel", sensors.wheel.size(), wheel_seq_);
+  tell("GNSS", sensors.gnss.size(), gnss_seq_);
 }
 
 void SensorGatewayService::publish(const dataset::ImuRow& row) {

@@ -33,6 +33,7 @@ class SensorGatewayService {
   void play_by_wall_clock();
   void publish_clock(int64_t data_ns, int64_t wall_ns, bool ended);
   void end();
+  void tell_unplayed();
   void publish(const dataset::ImuRow& row);
   void publish(const dataset::WheelRow& row);
   void publish(const dataset::GnssRow& row);

@@ -118,6 +118,8 @@ int simulate(Settings& settings) {
   if (bar) bar->finish();
   std::fprintf(stderr, "%s: %.1f m in %.1f s, %zu pictures (%.1f ms each to render)\n", simulation.out.c_str(),
                report.length_m, report.duration_s, report.pictures, report.render_ms);
+  if (report.length_m < simulation.run.length_m - 1)
+    std::fprintf(stderr, "railfix: the line ends there: not the %.0f m of --length-m\n", simulation.run.length_m);
   return 0;
 }
 

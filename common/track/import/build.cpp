@@ -139,6 +139,7 @@ class Sources {
     }
     const size_t surveyed_edges = map_.edges.size();
     if (!osm_.ways.empty() || map_.edges.empty()) add_osm();
+    check_crs();
     const bool all_surveyed = surveyed_edges == map_.edges.size();
     if (options_.virtual_balises_every_m > 0) {
       core::ok_or_throw(add_virtual_balises(map_, options_.virtual_balises_every_m, options_.nid_c,
@@ -219,8 +220,6 @@ class Sources {
                              " out");
       }
       if (map_.crs.empty()) map_.crs = source_crs_;
-      if (map_.crs.empty())
-        map_.problems.push_back("the coordinate system is not known; give --crs to get latitudes and longitudes");
     } else if (const std::optional<GeoPoint> middle = middle_of(osm_)) {
       if (map_.crs.empty()) map_.crs = utm_crs(*middle);
       if (map_.crs == "local") map_.crs = local_crs(*middle);
@@ -228,10 +227,23 @@ class Sources {
     if (!map_.crs.empty() && map_.crs != "local") static_cast<void>(core::value_or_throw(Projection::open(map_.crs)));
   }
 
+  // A drawing lies nowhere on the Earth.
+  void check_crs() {
+    const bool drawn = !map_.edges.empty() && std::ranges::all_of(map_.edges, &Edge::is_drawn);
+    if (drawn && !map_.crs.empty())
+      throw core::BadInput("no track has coordinates: the map is a drawing and lies nowhere in " + map_.crs +
+                           "; leave --crs out");
+    if (!map_.crs.empty() || !has_plane_source_) return;
+    map_.problems.push_back(
+        drawn ? "the map is a drawing: it has no latitudes and longitudes, and GNSS says nothing on it"
+              : "the coordinate system is not known; give --crs to get latitudes and longitudes");
+  }
+
   void add_osm() {
     if (osm_.ways.empty())
       throw core::BadInput(
-          "the inputs hold no railway tracks (railway=rail, light_rail, narrow_gauge or subway; --trams adds trams)");
+          "the inputs hold no railway tracks (railway=rail, light_rail, narrow_gauge or subway; --trams adds trams)" +
+          (cuts_.empty() ? "" : "; " + cuts_.front()));
     if (const std::string lack = lack_of_nodes(osm_); !lack.empty()) throw core::BadInput(lack);
     if (map_.crs.empty() || map_.crs == "local")
       throw core::BadInput("OpenStreetMap data need a coordinate system; give --crs");

@@ -43,6 +43,13 @@ TEST_F(RunCommand, TwoAtOnceIntoOneFolderAreNotTaken) {
   expect_refusal(test::run_program(run("pictures", {"--start", "1:1"}), kPatienceS), "--start 1:1 needs a map");
 }
 
+TEST_F(RunCommand, WithoutRoomForItsRecordingItDoesNotBegin) {
+  write_picture("pictures/1000.png", 100);
+  expect_refusal(
+      test::run_program(run("pictures", {"--fps", "1", "--set", "recorder.keep_free_mb=10000000"}), kPatienceS),
+      path("out") + ": nothing would be recorded, its disk has only ");
+}
+
 TEST_F(RunCommand, ADatasetOfSensorsAloneIsRunWithoutTheCamerasServices) {
   const auto simulated = test::run_program({"railfix", "simulate", "--no-pictures", "--out", path("seq"), "--start",
                                             "1:250", "--duration-s", "8", "--dwell-s", "1", "--quiet"},

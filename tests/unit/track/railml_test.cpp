@@ -34,6 +34,30 @@ TEST_F(RailmlTest, CantHoldsFromOneRadiusChangeToTheNextOverCutsToo) {
   }
 }
 
+TEST_F(RailmlTest, ADrawingIsPutNowhereOnTheEarth) {
+  const auto file = write("a.railml", railml2("500"));
+  BuildOptions somewhere;
+  somewhere.crs = "EPSG:32632";
+  const auto refused = build_map({file}, somewhere);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_THAT(refused.error().message, HasSubstr("lies nowhere in EPSG:32632; leave --crs out"));
+  const auto drawn = core::value_or_throw(build_map({file}, {}));
+  EXPECT_THAT(drawn.map.problems, testing::Contains(HasSubstr("the map is a drawing")));
+  EXPECT_THAT(drawn.map.problems, testing::Not(testing::Contains(HasSubstr("give --crs"))));
+}
+
+TEST_F(RailmlTest, ChangesBeyondTheirTrackAreLeftOutAndTold) {
+  std::string text = railml2("500");
+  const size_t end = text.find("<trackElements>");
+  ASSERT_NE(end, std::string::npos);
+  text.insert(end + std::string("<trackElements>").size(),
+              "<speedChanges><speedChange id=\"far\" pos=\"14500\" dir=\"up\" vMax=\"20\"/></speedChanges>"
+              "<gradientChanges><gradientChange id=\"steep\" pos=\"282100\" slope=\"5\"/></gradientChanges>");
+  const auto map = core::value_or_throw(build_map({write("a.railml", text)}, {})).map;
+  EXPECT_THAT(map.problems, testing::IsSupersetOf({"<speedChange> \"far\" is not on its track; it is left out",
+                                                   "<gradientChange> \"steep\" is not on its track; it is left out"}));
+}
+
 // As exporters write it that know several namespaces.
 TEST_F(RailmlTest, ElementsMayHaveThePrefixOfTheFilesOwnNamespace) {
   const auto prefixed = [](const std::string& text) {

@@ -14,6 +14,9 @@
 namespace railfix::tool {
 namespace {
 
+constexpr double kKeepFreeMb = 50;
+constexpr double kBytesPerMb = 1e6;
+
 core::Result<std::filesystem::path> prepare_map(const RunOptions& options) {
   std::filesystem::path source = options.map;
   if (source.empty()) {
@@ -96,6 +99,20 @@ void fill_settings(YAML::Node& settings, const RunOptions& options, const RunPla
   settings["recorder"]["train_file"] = plan.config.string();
   settings["recorder"]["file"] = std::filesystem::absolute(options.out / "recording.mcap").string();
   settings["recorder"]["pictures"] = options.record_pictures ? "jpeg" : "none";
+  // A folder that somebody has chosen, not the disk of a train.
+  if (!settings["recorder"]["keep_free_mb"]) settings["recorder"]["keep_free_mb"] = kKeepFreeMb;
+}
+
+// The recorder leaves so much free, and a run that records nothing is none.
+core::Status check_room(const YAML::Node& settings, const std::filesystem::path& folder) {
+  std::error_code failed;
+  const auto space = std::filesystem::space(folder, failed);
+  const double keep_mb = settings["recorder"]["keep_free_mb"].as<double>(kKeepFreeMb);
+  if (failed || static_cast<double>(space.available) >= keep_mb * kBytesPerMb) return {};
+  return core::Error{folder.string() + ": nothing would be recorded, its disk has only " +
+                     std::to_string(space.available / static_cast<uintmax_t>(kBytesPerMb)) +
+                     " MB free; give another folder, or a smaller recorder.keep_free_mb than " +
+                     std::to_string(static_cast<int64_t>(keep_mb))};
 }
 
 // What is set on the command line is part of the run's configuration. What cannot be meant the services refuse.
@@ -187,6 +204,7 @@ core::Result<RunPlan> plan_run(const RunOptions& options) {
   plan.config = std::filesystem::absolute(options.out / "run.yaml");
   fill_settings(settings.value(), options, plan);
   add_overrides(settings.value(), options.sets);
+  if (const auto room = check_room(settings.value(), options.out); !room.ok()) return room.error();
   std::ostringstream text;
   text << settings.value() << '\n';
   if (const auto written = core::write_whole(plan.config, text.str()); !written.ok()) return written.error();

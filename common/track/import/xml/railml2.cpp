@@ -110,8 +110,10 @@ class Reader {
 
   void read_plan(const pugi::xml_node& elements, NetTrack& track) {
     read_radii2(source_, elements.child("radiusChanges"), origin_m_, track, net_.problems);
-    for (const pugi::xml_node& change : elements.child("gradientChanges").children("gradientChange"))
-      track.slopes.push_back({pos(change) - origin_m_, 1e-3 * source_.required(change, "slope")});
+    for (const pugi::xml_node& change : elements.child("gradientChanges").children("gradientChange")) {
+      if (lies_on(change, track))
+        track.slopes.push_back({pos(change) - origin_m_, 1e-3 * source_.required(change, "slope")});
+    }
     std::ranges::stable_sort(track.slopes, {}, &NetSlope::offset_m);
   }
 
@@ -121,7 +123,7 @@ class Reader {
         changes;  // profile, direction
     for (const pugi::xml_node& change : elements.child("speedChanges").children("speedChange")) {
       const std::string profile = change.attribute("profileRef").value();
-      if (special_profiles_.contains(profile)) continue;
+      if (special_profiles_.contains(profile) || !lies_on(change, track)) continue;
       const bool is_end = std::string(change.attribute("vMax").value()) == "end";
       const double kmh = is_end ? 0 : source_.number(change, "vMax").value_or(0);
       if (!is_speed(kmh))
@@ -177,6 +179,12 @@ class Reader {
     }
     for (const pugi::xml_node& of : node.child("ocsElements").child("signals").children("signal"))
       add(LandmarkKind::mast, pos(of) - origin_m_, 0, of);
+  }
+
+  bool lies_on(const pugi::xml_node& of, const NetTrack& track) {
+    const bool lies = is_on_track(pos(of) - origin_m_, track.length_m);
+    if (!lies) net_.problems.push_back(not_on_its_track(of));
+    return lies;
   }
 
   void tell_impossible(const pugi::xml_node& of, const char* attribute, const std::string& why, const NetTrack& track) {

@@ -40,8 +40,12 @@ class Reader {
     for (const pugi::xml_node& element : descendants(source_.root(), "netElement")) {
       const auto length = source_.number(element, "length");
       // Elements made of others are the same tracks once more, coarser.
-      if (element.child("elementCollectionUnordered") || element.child("elementCollectionOrdered") || !length) {
-        places_.add_coarse(element.attribute("id").value());
+      const bool made_of_others =
+          element.child("elementCollectionUnordered") || element.child("elementCollectionOrdered");
+      if (made_of_others || !length) {
+        const std::string coarse = element.attribute("id").value();
+        places_.add_coarse(coarse);
+        if (!made_of_others) net_.problems.push_back("net element " + coarse + " has no length and is left out");
         continue;
       }
       const std::string id = source_.required_text(element, "id");
