@@ -15,10 +15,13 @@ class GravityWatch {
  public:
   void add(const dataset::ImuRow& row);
   /// Empty while up is up or it is not known yet; otherwise what is wrong and what to do. Its samples are then no
-  /// motion of the train.
+  /// motion of the train: of a live IMU they are not used.
   [[nodiscard]] std::string trouble() const;
+  /// The same of a recording, whose samples are played as they are.
+  [[nodiscard]] std::string trouble_of_recording() const;
 
  private:
+  [[nodiscard]] std::string cause() const;
   std::array<double, 3> mean_mps2_{};  // forward, left, up
   std::optional<int64_t> since_ns_;
   int64_t last_ns_ = 0;

@@ -30,7 +30,10 @@ SensorGatewayService::SensorGatewayService(const Config& config, service::Contex
       wheel_(context.writer(messaging::topics::wheel_sample)),
       gnss_(context.writer(messaging::topics::gnss_fix)),
       playback_(read(config)),
-      sinks_{[this](const dataset::ImuRow& row) { publish(row); },
+      sinks_{[this](const dataset::ImuRow& row) {
+               publish(row);
+               if (!config_.is_live()) watch_gravity(row);
+             },
              [this](const dataset::WheelRow& row) { publish(row); },
              [this](const dataset::GnssRow& row) { publish(row); }} {
   context_.health().flows(service::Flow::steady);
@@ -121,6 +124,14 @@ void SensorGatewayService::end() {
   context_.every(kTick, [this, ended_ns] {
     if (core::monotonic_ns() - ended_ns > service::kLastWordsNs) context_.finish("all samples played");
   });
+}
+
+void SensorGatewayService::watch_gravity(const dataset::ImuRow& row) {
+  gravity_watch_.add(row);
+  if (gravity_told_) return;
+  const std::string trouble = gravity_watch_.trouble_of_recording();
+  gravity_told_ = !trouble.empty();
+  if (gravity_told_) context_.log().warn(trouble);
 }
 
 void SensorGatewayService::tell_unplayed() {

@@ -34,6 +34,7 @@ class SensorGatewayService {
   void publish_clock(int64_t data_ns, int64_t wall_ns, bool ended);
   void end();
   void tell_unplayed();
+  void watch_gravity(const dataset::ImuRow& row);
   void publish(const dataset::ImuRow& row);
   void publish(const dataset::WheelRow& row);
   void publish(const dataset::GnssRow& row);
@@ -65,6 +66,7 @@ class SensorGatewayService {
   };
   std::array<Wanted, std::variant_size_v<Sample>> wanted_;  // in the order of Sample
   GravityWatch gravity_watch_;
+  bool gravity_told_ = false;
   std::map<std::string, std::string> troubles_;     // of each source, since its last sample
   std::vector<std::unique_ptr<SensorFeed>> feeds_;  // last: their threads call the context
 };

@@ -29,10 +29,18 @@ TEST(GravityWatch, ATrainMayTilt) {
 }
 
 TEST(GravityWatch, AnImuThatSitsOtherwiseIsToldWithTheAxis) {
-  EXPECT_THAT(after(9.81, 0.2, 0.1), HasSubstr("calls forward, so its samples are not used; correct live.imu_axes"));
-  EXPECT_THAT(after(0.3, -9.81, 0.1), HasSubstr("calls left, the other way round"));
-  EXPECT_THAT(after(0, 0, -9.81), HasSubstr("calls up, the other way round"));
+  EXPECT_THAT(after(9.81, 0.2, 0.1), HasSubstr("called forward, so its samples are not used; correct live.imu_axes"));
+  EXPECT_THAT(after(0.3, -9.81, 0.1), HasSubstr("called left, the other way round"));
+  EXPECT_THAT(after(0, 0, -9.81), HasSubstr("called up, the other way round"));
   EXPECT_THAT(after(0.01, 0.01, 0.02), HasSubstr("feels no gravity"));
+}
+
+TEST(GravityWatch, OtherUnitsAreTold) {
+  EXPECT_THAT(after(0, 0.02, 1.0), HasSubstr("feels gravity as 1.0 and not as 9.8 m/s2"));
+  EXPECT_THAT(after(0, 0.2, 32.2), HasSubstr("feels gravity as 32.2 and not as 9.8 m/s2"));
+  GravityWatch recorded;
+  static_cast<void>(after(recorded, 0, 60, 0, 0, -9.81));
+  EXPECT_THAT(recorded.trouble_of_recording(), HasSubstr("called up, the other way round; the recording's IMU must"));
 }
 
 TEST(GravityWatch, NothingIsSaidBeforeTenSecondsAndAShockIsNone) {
