@@ -44,6 +44,36 @@ TEST_F(LandXmlTest, ReadsPlanProfileAndCant) {
   EXPECT_LT(read.figures.max_heading_step_rad, 1e-6);
 }
 
+// A length that is wrong moves neither profile nor cant: every element says its own station.
+TEST_F(LandXmlTest, StationsOfTheElementsHoldWhereLengthsDoNotAddUp) {
+  const auto sample = [](const std::string& length_of_line, const std::string& length_of_arc) {
+    std::string text = kSample;
+    const auto replace = [&](const std::string& from, const std::string& to) {
+      const size_t at = text.find(from);
+      ASSERT_NE(at, std::string::npos) << from;
+      text.replace(at, from.size(), to);
+    };
+    replace("<Line length=\"100\"", "<Line length=\"" + length_of_line + "\" staStart=\"1000\"");
+    replace("<Spiral length=\"60\"", "<Spiral length=\"60\" staStart=\"1100\"");
+    replace("radius=\"300\" length=\"100\"", "radius=\"300\" length=\"" + length_of_arc + "\" staStart=\"1160\"");
+    return text;
+  };
+  const auto right = core::value_or_throw(read_landxml(write("r.xml", sample("100", "100"))));
+  EXPECT_THAT(right.problems, testing::IsEmpty());
+  for (const auto& [line, arc, told] : {std::tuple("118", "100", "line 5 begins at 1100.00 m, 18.00 m before the end"),
+                                        {"82", "100", "line 5 begins at 1100.00 m, 18.00 m behind the end"},
+                                        {"100", "-100", "has the length -100.00 m; it gets that of the arc"}}) {
+    const auto read = core::value_or_throw(read_landxml(write("w.xml", sample(line, arc))));
+    EXPECT_THAT(read.problems, testing::Contains(HasSubstr(told))) << line << arc;
+    const Alignment& track = read.tracks[0].alignment;
+    EXPECT_NEAR(track.length_m(), 260, 1e-3);
+    for (const double at_m : {110.0, 130.0, 150.0, 170.0, 250.0}) {
+      EXPECT_NEAR(track.at(at_m).elevation_m, right.tracks[0].alignment.at(at_m).elevation_m, 1e-4) << line << arc;
+      EXPECT_NEAR(track.at(at_m).cant_m, right.tracks[0].alignment.at(at_m).cant_m, 1e-5) << line << arc;
+    }
+  }
+}
+
 TEST_F(LandXmlTest, ClosesElementsOntoTheirEndsAndKeepsTheCurvature) {
   core::Random random(5);
   for (int i = 0; i < 200; ++i) {

@@ -14,6 +14,7 @@
 namespace railfix::track {
 namespace {
 
+constexpr double kToleratedStationM = 0.01;
 constexpr double kToleratedLengthM = 1e-3;
 constexpr double kToleratedStepRad = 1e-3;
 constexpr double kToleratedGapM = 1e-4;
@@ -80,7 +81,7 @@ class Reader {
     std::vector<Element> elements;
     std::vector<PlanPose> starts;
     std::vector<std::pair<double, double>>
-        stations;  // the file's station and our offset at each element's start, and at the end
+        stations;  // the file's station and our offset where elements begin and end, in order
   };
 
   void add_element(const pugi::xml_node& node, const std::string& track, Plan& plan) {
@@ -104,19 +105,39 @@ class Reader {
     }
     const Eigen::Vector2d from = point(node, "Start");
     const Eigen::Vector2d to = point(node, "End");
+    const std::string where = track + ": the element in line " + source_.line_of(node);
     const double chord = (to - from).norm();
-    const double length = kind == "Line" ? chord : source_.required(node, "length");
+    double length = kind == "Line" ? chord : source_.required(node, "length");
+    if (kind == "Curve" && chord > 1e-4 && !(length > 1e-4) && chord * std::abs(start) < 2) {
+      problem(where + " has the length " + told_m(length) + "; it gets that of the arc between its points");
+      length = 2 * std::asin(0.5 * chord * std::abs(start)) / std::abs(start);
+    }
     if (!(chord > 1e-4) || !(length > 1e-4)) {
-      problem(track + ": the element in line " + source_.line_of(node) + " has no length and is left out");
+      problem(where + " has no length and is left out");
       return;
     }
     if (length > 1e6 || !(chord < 1e6) || std::max(std::abs(start), std::abs(end)) * length > core::kPi) {
       throw source_.wrong(node, "the element turns by more than half a circle or is longer than 1000 km");
     }
-    const double told_m = source_.number(node, "length").value_or(chord);
-    if (!(told_m > 0)) throw source_.wrong(node, "the element's points are apart, but its length is not above 0");
-    take(close_element(from, to, start, end, length), to, told_m,
-         track + ": the element in line " + source_.line_of(node), plan);
+    const double length_in_file = kind == "Line" ? source_.number(node, "length").value_or(chord) : length;
+    if (!(length_in_file > 0))
+      throw source_.wrong(node, "the element's points are apart, but its length is not above 0");
+    if (const auto station = source_.number(node, "staStart")) begin_at(*station, where, plan);
+    take(close_element(from, to, start, end, length), to, length_in_file, where, plan);
+  }
+
+  /// Profile and cant are told by the file's stations, and where its lengths do not add up to them, these hold.
+  void begin_at(double station, const std::string& where, Plan& plan) {
+    auto& [counted, offset_m] = plan.stations.back();
+    const double off_m = station - counted;
+    if (std::abs(off_m) <= kToleratedStationM) return;
+    problem(where + " begins at " + told_m(station) + ", " + told_m(std::abs(off_m)) +
+            (off_m > 0 ? " behind" : " before") + " the end of the one before");
+    if (off_m > 0) {
+      plan.stations.emplace_back(station, offset_m);
+    } else if (plan.stations.size() < 2 || plan.stations[plan.stations.size() - 2].first < station) {
+      counted = station;
+    }
   }
 
   void take(const ClosedElement& closed, const Eigen::Vector2d& to, double file_length, const std::string& where,
