@@ -98,6 +98,21 @@ TEST_F(OsmTest, XmlAndPbfGiveTheSameNetwork) {
   }
 }
 
+TEST_F(OsmTest, NodesNowhereOnTheEarthAreTold) {
+  std::string nodes;
+  std::string refs;
+  for (int id = 1; id <= 6; ++id) {
+    nodes += "<node id=\"" + std::to_string(id) + "\" lat=\"" + (id == 3 ? "148.2" : "48.2") + "\" lon=\"15.60" +
+             std::to_string(id) + "\"/>";
+    refs += "<nd ref=\"" + std::to_string(id) + "\"/>";
+  }
+  const auto built = build_map({write("a.osm", "<osm version=\"0.6\">" + nodes + "<way id=\"10\">" + refs +
+                                                   "<tag k=\"railway\" v=\"rail\"/></way></osm>")},
+                               {});
+  ASSERT_TRUE(built.ok()) << built.error().message;
+  EXPECT_THAT(built.value().map.problems, testing::Contains(HasSubstr("1 nodes of tracks have a latitude beyond 90")));
+}
+
 TEST_F(OsmTest, TunnelsAndSignalsBecomeLandmarks) {
   const Map map = core::value_or_throw(build_map({write_osm("a.osm")}, {})).map;
   const auto of = [&](LandmarkKind kind) {

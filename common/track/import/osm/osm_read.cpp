@@ -78,16 +78,24 @@ OsmData read_passes(const std::string& file, bool with_trams) {
     }
   }
   ways.close();
+  size_t nowhere = 0;
   osmium::io::Reader nodes(file, osmium::osm_entity_bits::node);
   while (const osmium::memory::Buffer buffer = nodes.read()) {
     for (const osmium::Node& node : buffer.select<osmium::Node>()) {
-      if (!node.location().valid()) continue;
+      if (!node.location().valid()) {
+        nowhere += wanted.contains(node.id()) ? 1 : 0;
+        continue;
+      }
       OsmTags tags = tags_of(node);
       if (!wanted.contains(node.id()) && !is_mast(tags)) continue;
       out.nodes[node.id()] = {{node.location().lat(), node.location().lon()}, std::move(tags)};
     }
   }
   nodes.close();
+  if (nowhere > 0)
+    out.problems.push_back(std::to_string(nowhere) +
+                           " nodes of tracks have a latitude beyond 90 or a longitude beyond 180 degrees, or none; "
+                           "their tracks lack them");
   return out;
 }
 
