@@ -59,8 +59,7 @@ Interval Estimator::interval() const {
   // Since the last sample the train may have stopped counting, or the clock may have run ahead.
   const double silent_s = core::seconds(filter_.stamp_ns() - stamp_ns_);
   const double silent_m = silent_s > kFreshS ? std::abs(filter_.speed_mps()) * silent_s : 0;
-  Sides ways = joined_;
-  ways.hold(other_ways_);
+  const Sides ways = held_ways();
   const double behind_m = std::max(bound_m + ways.behind_m, doubt_behind_m_) + time_doubt_m_ + silent_m;
   return {centre_m() - behind_m, centre_m() + std::max(bound_m + ways.ahead_m, doubt_ahead_m_)};
 }

@@ -170,6 +170,7 @@ void Estimator::place_like(const Estimator& other) {
   doubt_m_ = other.doubt_m_;
   joined_ = other.joined_;
   other_ways_ = other.other_ways_;
+  said_elsewhere_ = other.said_elsewhere_;
   wrong_place_ = other.wrong_place_;
   told_by_ = other.told_by_;
   bends_agreed_ = other.bends_agreed_;
@@ -195,7 +196,7 @@ void Estimator::give_place_up(Against because) {
   off_path_.reset();
   corrected_ = false;
   doubt_behind_m_ = doubt_ahead_m_ = 0;
-  joined_ = other_ways_ = {};
+  joined_ = other_ways_ = said_elsewhere_ = {};
   reference_ = 0;
   met_ = {};
   landmarks_agreed_ = 0;

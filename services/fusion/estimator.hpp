@@ -265,6 +265,8 @@ class Estimator {
   [[nodiscard]] bool gnss_denies_place() const;
   void use_track(const FixInput& fix);
   void doubt_points_behind();
+  [[nodiscard]] Sides held_ways() const;
+  [[nodiscard]] bool tells_ways_apart(const FixInput& fix) const;
   void hold_other_ways(const FixInput& fix, double place_m, double here_m);
   Offer offer_place(const MeasuredPlace& place);
   Offer offer_place_again(double path_distance_m, double sigma_m);
@@ -329,8 +331,11 @@ class Estimator {
   int64_t gap_begin_ns_ = 0;
   double doubt_behind_m_ = 0;  // a refused fix says that the train is so far behind
   double doubt_ahead_m_ = 0;
-  Sides joined_;      // ways of other lengths lead to the track that was declared last
-  Sides other_ways_;  // ... and who looks at the switches has not ruled them out
+  // Until a landmark tells them apart: over other ways that lead to tracks that were declared, or that map_matcher has
+  // named, and as far as it now says another place without naming one.
+  Sides joined_;
+  Sides other_ways_;
+  Sides said_elsewhere_;
   double rest_distance_m_ = 0;
   int64_t rest_since_ns_ = 0;
   bool standstill_ = false;

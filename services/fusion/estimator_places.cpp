@@ -16,6 +16,7 @@ constexpr double kBesideLandmarkS = 1.0;
 constexpr double kBendsHereM = 3.0;  // in a window of some 50 m to either side that is rarely by chance
 constexpr int kCurvesConfirm = 3;    // ... a place that was only told
 constexpr double kCorrectedM = 5.0;
+constexpr double kAsFarM = 3.0;
 constexpr double kOffTrackM = 15.0;  // a GNSS fix further beside the track is none
 // Of the sigma of a GNSS fix; squares add up to the whole.
 constexpr double kGnssLastingShare = 0.866;
@@ -90,7 +91,7 @@ void Estimator::use_track(const FixInput& fix) {
     path_ = fix.new_path;
     track_doubt_.changed();
     compare_turns();
-    joined_ = {fix.behind_m, fix.ahead_m};
+    joined_ = {joined_.behind_m + fix.behind_m, joined_.ahead_m + fix.ahead_m};
     // What was seen beside the old way lies on the new one: it spoke for it.
     if (off_path_ && path_->distance_of(*off_path_, filter_.path_distance_m())) {
       off_path_.reset();
@@ -107,10 +108,38 @@ void Estimator::use_track(const FixInput& fix) {
 }
 
 // Who says it follows the place that fusion has told: what it is off by is a correction of a moment ago, or more than
-// that, and then nobody knows who is right.
+// that, and then nobody knows who is right. Ways that were named once stay: who does not name them any more may have
+// been started anew.
 void Estimator::hold_other_ways(const FixInput& fix, double place_m, double here_m) {
   const double off_m = std::abs(place_m - here_m) > kCorrectedM ? place_m - here_m : 0;
-  other_ways_ = {std::max(0.0, fix.behind_m - off_m), std::max(0.0, fix.ahead_m + off_m)};
+  const Sides said{std::max(0.0, fix.behind_m - off_m), std::max(0.0, fix.ahead_m + off_m)};
+  const bool named = fix.behind_m > 0 || fix.ahead_m > 0;
+  if (named) other_ways_.hold(said);
+  said_elsewhere_ = named ? Sides{} : said;
+}
+
+Estimator::Sides Estimator::held_ways() const {
+  Sides ways = joined_;
+  ways.hold(other_ways_);
+  ways.hold(said_elsewhere_);
+  return ways;
+}
+
+// Where another one of its kind stands just where it would be over the other way, it was that one as well.
+bool Estimator::tells_ways_apart(const FixInput& fix) const {
+  const Sides ways = held_ways();
+  if (fix.kind != FixKind::landmark || ways.behind_m + ways.ahead_m == 0) return true;
+  const auto place_m = path_->distance_of({fix.edge, fix.offset_m, fix.direction}, filter_.path_distance_m());
+  if (!place_m) return true;
+  const auto& all = path_->map().landmarks;
+  const auto seen = std::ranges::find(all, fix.landmark, &track::Landmark::id);
+  if (seen == all.end()) return true;
+  const auto stands_at = [&](double m) {
+    return std::ranges::any_of(path_->landmarks_between(m - kAsFarM, m + kAsFarM),
+                               [&](const track::PathLandmark& other) { return other.landmark->kind == seen->kind; });
+  };
+  return !(ways.behind_m > 0 && stands_at(*place_m - ways.behind_m)) &&
+         !(ways.ahead_m > 0 && stands_at(*place_m + ways.ahead_m));
 }
 
 void Estimator::use(const FixInput& fix) {
@@ -220,7 +249,7 @@ void Estimator::accept(const FixInput& fix) {
   refused_fix_.reset();
   if (!by_chance) wrong_place_.found();
   doubt_m_ = doubt_behind_m_ = doubt_ahead_m_ = time_doubt_m_ = 0;
-  joined_ = other_ways_ = {};
+  if (tells_ways_apart(fix)) joined_ = other_ways_ = said_elsewhere_ = {};
   unwatched_ = {.distance_m = unwatched_.distance_m};
   reference_ = fix.landmark;
   if (fix.landmark != 0 && !has_met(fix.landmark)) {

@@ -10,7 +10,6 @@
 #include "messaging/messaging.hpp"
 #include "messaging/samples.hpp"
 #include "messaging/topics.hpp"
-#include "track/declared.hpp"
 
 namespace railfix::fusion {
 
@@ -23,7 +22,7 @@ inline void hold_other_places(const msg::PositionFix& m, FixInput& fix) {
   const size_t count = std::min<size_t>(m.alternatives(), msg::FIX_ALTERNATIVES);
   for (size_t i = 0; i < count; ++i) {
     const bool here = m.alternative_edge()[i] == m.edge() && m.alternative_direction()[i] == m.direction();
-    if (!here || m.alternative_probability()[i] <= 1 - track::kDeclaredProbability) continue;
+    if (!here) continue;
     const double further_m = along * (m.alternative_offset_m()[i] - m.offset_m());
     fix.behind_m = std::max(fix.behind_m, -further_m);
     fix.ahead_m = std::max(fix.ahead_m, further_m);

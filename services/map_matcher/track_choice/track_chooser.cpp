@@ -272,10 +272,15 @@ std::optional<TrackChoice> TrackChooser::choice() const {
   };
   TrackChoice choice;
   for (const auto& track : sorted) choice.options.push_back(option(track.places.front(), track.log));
-  for (const auto& place : sorted.front().places) {
-    const auto other = option(place, place.log);
-    if (&place != &sorted.front().places.front() && other.probability > 1 - track::kDeclaredProbability)
-      choice.elsewhere.push_back(other);
+  // The furthest ones to either side of all that together are not to be neglected.
+  auto& places = sorted.front().places;
+  double neglected = 0;
+  while (places.size() > 1 &&
+         (neglected += option(places.back(), places.back().log).probability) < 1 - track::kDeclaredProbability)
+    places.pop_back();
+  const auto [least, most] = std::ranges::minmax_element(places, {}, [](const Place& p) { return p.place.offset_m; });
+  for (const auto& furthest : {least, most}) {
+    if (furthest != places.begin()) choice.elsewhere.push_back(option(*furthest, furthest->log));
   }
   choice.known = choice.options.front().probability >= track::kDeclaredProbability;
   return choice;

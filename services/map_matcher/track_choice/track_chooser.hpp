@@ -34,7 +34,7 @@ struct TrackOption {
 /// looked into.
 struct TrackChoice {
   std::vector<TrackOption> options;
-  std::vector<TrackOption> elsewhere;  // on the best track: ways of another length have led there
+  std::vector<TrackOption> elsewhere;  // on the best track, furthest to either side: ways of another length led there
   bool known = false;
 };
 

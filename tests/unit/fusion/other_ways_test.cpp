@@ -18,13 +18,14 @@ FixInput landmark_fix(double t_s, uint32_t edge, double offset_m, uint32_t landm
 }
 
 /// A stem of 1000 m, a straight leg of 400 m, a siding of 460 m, and on from where they meet.
-Fusion at_a_loop() {
+Fusion at_a_loop(std::vector<track::Landmark> landmarks = {}) {
   auto map = std::make_shared<track::Map>();
   map->edges = {{1, "stem", 1, 2, "", northwards(0, 1000)},
                 {2, "straight", 2, 3, "", northwards(1000, 400)},
                 {3, "siding", 2, 3, "", northwards(1000, 460)},
                 {4, "on", 3, 4, "", northwards(1400, 3000)}};
   map->connections = {{2, 1, 2, false}, {2, 1, 3, true}, {3, 2, 4, false}, {3, 3, 4, true}};
+  map->landmarks = std::move(landmarks);
   return core::value_or_throw(Fusion::create({}, map, track::EdgePosition{1, 900, track::Direction::forward}));
 }
 
@@ -41,11 +42,54 @@ TEST(OtherWays, WhereLegsHaveMetTheIntervalHoldsBothUntilLandmarksAgree) {
   EXPECT_EQ(state.position.edge, 4U);
   EXPECT_EQ(state.track_probability, 1) << "there is only this one";
   EXPECT_NEAR(state.over_m, state.under_m + 60, 1);
-  fusion.add(landmark_fix(30.5, 4, 110, 2));
-  state = run(fusion, 30.5, 31.5, 20);
+  fusion.add(track_fix(30.5, 4, 110));
+  state = run(fusion, 30.5, 30.6, 20);
+  EXPECT_NEAR(state.over_m, state.under_m + 60, 1) << "who does not name the other way may have begun anew";
+  fusion.add(landmark_fix(30.6, 4, 112, 2));
+  state = run(fusion, 30.6, 31.5, 20);
   fusion.add(landmark_fix(31.5, 4, 130, 3));
   state = run(fusion, 31.5, 32, 20);
   EXPECT_LT(state.over_m, 5) << "came over the straight leg";
+}
+
+TEST(OtherWays, ALandmarkThatHasATwinAsFarAsTheWaysDifferTellsNothing) {
+  const auto balise = track::LandmarkKind::balise;
+  auto fusion = at_a_loop({{1, balise, 4, 50, 0, 0.1, ""},
+                           {2, balise, 4, 110, 0, 0.1, ""},
+                           {3, balise, 4, 150, 0, 0.1, ""},
+                           {4, balise, 4, 200, 0, 0.1, ""}});
+  run(fusion, 0, 29.9, 20);
+  auto both = track_fix(29.9, 4, 98);
+  both.behind_m = 60;
+  fusion.add(both);
+  run(fusion, 29.9, 30.5, 20);
+  fusion.add(landmark_fix(30.5, 4, 110, 2));
+  EXPECT_GT(run(fusion, 30.5, 31.5, 20).over_m, 60) << "it may have been the first one";
+  run(fusion, 31.5, 32.5, 20);
+  fusion.add(landmark_fix(32.5, 4, 150, 3));
+  run(fusion, 32.5, 35, 20);
+  fusion.add(landmark_fix(35, 4, 200, 4));
+  EXPECT_LT(run(fusion, 35, 36, 20).over_m, 20) << "none stands there over the siding";
+}
+
+// The second leg is beyond another one that was declared as late.
+TEST(OtherWays, WhatOneTrackWasJoinedByStaysWhenTheNextOneIs) {
+  auto map = std::make_shared<track::Map>();
+  map->edges = {{1, "stem", 1, 2, "", northwards(0, 1000)},           {2, "main", 2, 3, "", northwards(1000, 9000)},
+                {3, "first", 2, 4, "", northwards(1000, 300)},        {4, "bypass", 2, 5, "", northwards(1000, 430)},
+                {5, "of the first", 4, 5, "", northwards(1300, 100)}, {6, "yard", 5, 6, "", northwards(1400, 500)},
+                {7, "on", 6, 7, "", northwards(1900, 3000)},          {8, "left", 6, 8, "", northwards(1900, 3000)}};
+  map->connections = {{2, 1, 2, false}, {2, 1, 3, true}, {2, 1, 4, true},  {4, 3, 5, false},
+                      {5, 5, 6, false}, {5, 4, 6, true}, {6, 6, 7, false}, {6, 6, 8, true}};
+  auto fusion = core::value_or_throw(Fusion::create({}, map, track::EdgePosition{1, 900, track::Direction::forward}));
+  run(fusion, 0, 40, 20);
+  fusion.add(track_fix(40, 6, 300));
+  auto state = run(fusion, 40, 55, 20);
+  EXPECT_NEAR(state.over_m, state.under_m + 30, 1);
+  fusion.add(track_fix(55, 8, 100));
+  state = run(fusion, 55, 56, 20);
+  EXPECT_EQ(state.position.edge, 8U);
+  EXPECT_NEAR(state.over_m, state.under_m + 30, 1);
 }
 
 TEST(OtherWays, WhoSaysAnotherPlaceOnTheSameTrackMayBeRight) {
