@@ -16,6 +16,7 @@ constexpr double kTurnRoundM = 0.3;
 constexpr double kFarFromWindowM = 200;
 constexpr double kMostWindowM = 300;
 constexpr double kSamePlaceM = 1.0;
+constexpr double kAtEndM = 0.5;
 constexpr double kNoLagShare = 0.3;      // of the cars
 constexpr double kViewNoisePerM = 3e-4;  // least sigma of a picture's curvature
 constexpr double kWatched = 0.9;         // a begin less probable lies behind a switch that nobody watched
@@ -46,13 +47,21 @@ void TrackChooser::follow(const TrackWindow& window) {
   // Where ways of different length lead there fusion is on the one that it was on before.
   std::optional<double> found;
   for (const auto& hypothesis : hypotheses_) {
-    const auto place_m = hypothesis.route.distance_of(window.place, place_m_);
-    if (!place_m || std::abs(*place_m - place_m_) > kFarFromWindowM) continue;
+    auto place_m = hypothesis.route.distance_of(window.place, place_m_);
+    if (!place_m) continue;
+    // At the end of its track fusion stays; the train may be on another one, and has gone on.
+    const double end_m = forwards_ ? hypothesis.route.end_m() : hypothesis.route.begin_m();
+    if (std::abs(*place_m - end_m) < kAtEndM && (forwards_ ? place_m_ > end_m : place_m_ < end_m)) place_m = place_m_;
+    if (std::abs(*place_m - place_m_) > kFarFromWindowM) continue;
     if (!found || std::abs(*place_m - place_m_) < std::abs(*found - place_m_)) found = place_m;
   }
   // While no leg is declared fusion goes on along the straight one, which may have been given up here. Where not even
   // the begin is known nothing is lost.
-  if (!found && lost_m_ > kLostM && told_ >= kWatched && stands_near(window.place) && !choice()->known) lost_m_ = 0;
+  const auto is_known = [&] {
+    const auto chosen = choice();
+    return chosen && chosen->known;
+  };
+  if (!found && lost_m_ > kLostM && told_ >= kWatched && stands_near(window.place) && !is_known()) lost_m_ = 0;
   if (hypotheses_.empty() || (!found && lost_m_ > kLostM)) {
     start(wanted);
     return;
@@ -252,6 +261,9 @@ std::optional<TrackChoice> TrackChooser::choice() const {
   double all = -INFINITY;
   for (const auto& hypothesis : hypotheses_) {
     const double log = evidence(hypothesis);
+    all = log_sum(all, log);
+    // On a track that has ended the train is nowhere on the map.
+    if (forwards_ ? hypothesis.route.end_m() < first_m() : hypothesis.route.begin_m() > last_m()) continue;
     const auto place = hypothesis.route.position_at(place_m_);
     auto& [places, sum] = tracks[{place.edge, place.direction}];
     const auto known = std::ranges::find_if(
@@ -259,8 +271,8 @@ std::optional<TrackChoice> TrackChooser::choice() const {
     auto& mine = known == places.end() ? places.emplace_back(Place{place}) : *known;
     mine.log = log_sum(mine.log, log);
     sum = log_sum(sum, log);
-    all = log_sum(all, log);
   }
+  if (tracks.empty()) return std::nullopt;
   std::vector<Track> sorted;
   for (auto& [edge, track] : tracks) {
     std::ranges::sort(track.places, std::ranges::greater{}, &Place::log);

@@ -55,7 +55,7 @@ class TrackChooser {
   void sight(const Sighting& sighting);
   /// The curvature of the rails in a picture taken here (left positive).
   void see(double curvature_per_m, double sigma_per_m);
-  /// Nothing before the first window.
+  /// Nothing before the first window, and where every way has ended.
   [[nodiscard]] std::optional<TrackChoice> choice() const;
   /// Whose turning was used last.
   [[nodiscard]] TurnSensor sensor() const { return sensor_; }
