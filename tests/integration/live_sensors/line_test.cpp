@@ -132,7 +132,7 @@ TEST_F(Line, AnImuThatSitsOtherwiseIsNotUsedAndTheWheelGoesOn) {
       gateway({"sensor_gateway.live.imu=ubx:" + device(), "sensor_gateway.live.wheel=ubx:" + device(),
                "sensor_gateway.live.wheel_pulses_per_metre=100", "sensor_gateway.live.imu_axes=z x y"});
   const Receiver receiver(device(), core::wall_ns());
-  ASSERT_TRUE(told("the one that live.imu_axes calls forward")) << reason();
+  ASSERT_TRUE(told("axis that points up is called forward")) << reason();
   const size_t imu = imu_.size();
   const size_t wheel = wheel_.size();
   ASSERT_TRUE(run_until([&] { return wheel_.size() > wheel + 50; }));
