@@ -15,14 +15,6 @@ constexpr int kMostLegs = 100000;  // ends a path round a ring of tiny edges
 constexpr size_t kMostJoinSteps = 1000;
 constexpr double kLongestJoinM = 30000;  // a wrong leg may have been followed for so long
 
-double end_heading(const Run& run) {
-  return run.edge->alignment.at(run.forward ? run.edge->alignment.length_m() : 0.0).pose.heading_rad +
-         (run.forward ? 0.0 : core::kPi);
-}
-double begin_heading(const Run& run) {
-  return end_heading({run.edge, !run.forward}) + core::kPi;
-}
-
 /// The map's connections by their node.
 using Meetings = std::unordered_map<uint32_t, std::vector<const Connection*>>;
 
@@ -36,7 +28,6 @@ Meetings meetings_of(const Map& map) {
 std::optional<Run> next_run(const Map& map, const Meetings& meetings, const Run& run,
                             const std::vector<uint32_t>& via) {
   const uint32_t node = run.forward ? run.edge->to_node : run.edge->from_node;
-  const double heading = end_heading(run);
   std::optional<Run> best;
   double best_cost = 0;
   const auto here = meetings.find(node);
@@ -48,9 +39,8 @@ std::optional<Run> next_run(const Map& map, const Meetings& meetings, const Run&
     for (const bool forward : {true, false}) {
       const Run candidate{other, forward};
       if ((forward ? other->from_node : other->to_node) != node) continue;
-      const double turn = std::abs(core::wrap_pi(begin_heading(candidate) - heading));
       const bool wanted = std::find(via.begin(), via.end(), other->id) != via.end();
-      const double cost = turn + (connection.diverging ? 10.0 : 0.0) - (wanted ? 100.0 : 0.0);
+      const double cost = turn_rad(run, candidate) + (connection.diverging ? 10.0 : 0.0) - (wanted ? 100.0 : 0.0);
       if (!best || cost < best_cost) {
         best = candidate;
         best_cost = cost;

@@ -15,10 +15,6 @@ double arriving_heading(const Run& run) {
   return leaving_heading(run.reversed()) + core::kPi;
 }
 
-double turn_rad(const Run& run, const Run& next) {
-  return std::abs(core::wrap_pi(leaving_heading(next) - arriving_heading(run)));
-}
-
 constexpr double kCornerM = 12.0;
 constexpr double kLeastCornerRad = 0.005;  // less is how points were rounded
 constexpr double kMostCornerRad = 0.2;     // more is no turnout's
@@ -30,6 +26,10 @@ double corner_rad(const Run& run, const Run& next) {
 }
 
 }  // namespace
+
+double turn_rad(const Run& run, const Run& next) {
+  return std::abs(core::wrap_pi(leaving_heading(next) - arriving_heading(run)));
+}
 
 bool leads_on(const Run& run, const Run& next) {
   return turn_rad(run, next) <= core::kPi / 2 || run.edge->is_drawn || next.edge->is_drawn;

@@ -19,6 +19,9 @@ struct Run {
   friend bool operator==(const Run&, const Run&) = default;
 };
 
+/// By how much a train turns where it runs on from one onto the next, 0 to pi.
+[[nodiscard]] double turn_rad(const Run& run, const Run& next);
+
 /// Whether a train may run on from one onto the next where they meet: it turns no corner. Directions of a drawing say
 /// nothing where it does not close.
 [[nodiscard]] bool leads_on(const Run& run, const Run& next);

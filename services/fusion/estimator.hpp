@@ -60,6 +60,20 @@ struct Interval {
   double ahead_m = 0;
 };
 
+/// So far behind and ahead of a place, or beyond an interval's ends.
+struct Sides {
+  double behind_m = 0;
+  double ahead_m = 0;
+  void add(const Sides& more) {
+    behind_m += more.behind_m;
+    ahead_m += more.ahead_m;
+  }
+  void hold(const Sides& other) {
+    behind_m = std::max(behind_m, other.behind_m);
+    ahead_m = std::max(ahead_m, other.ahead_m);
+  }
+};
+
 /// Who has told the place, as long as nothing has confirmed it: the start is somebody's word, and GNSS may be on the
 /// track beside it.
 enum class ToldBy : uint8_t { nobody, start, gnss };
@@ -219,15 +233,6 @@ class Estimator {
     double residual_m = 0;
     double sigma_m = 0;
     double distance_m = 0;
-  };
-
-  struct Sides {
-    double behind_m = 0;
-    double ahead_m = 0;
-    void hold(const Sides& other) {
-      behind_m = std::max(behind_m, other.behind_m);
-      ahead_m = std::max(ahead_m, other.ahead_m);
-    }
   };
 
   [[nodiscard]] bool used_within(Source source, double time_s) const;

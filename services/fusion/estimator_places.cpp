@@ -91,7 +91,7 @@ void Estimator::use_track(const FixInput& fix) {
     path_ = fix.new_path;
     track_doubt_.changed();
     compare_turns();
-    joined_ = {joined_.behind_m + fix.behind_m, joined_.ahead_m + fix.ahead_m};
+    joined_.add({fix.behind_m, fix.ahead_m});
     // What was seen beside the old way lies on the new one: it spoke for it.
     if (off_path_ && path_->distance_of(*off_path_, filter_.path_distance_m())) {
       off_path_.reset();
@@ -118,7 +118,7 @@ void Estimator::hold_other_ways(const FixInput& fix, double place_m, double here
   said_elsewhere_ = named ? Sides{} : said;
 }
 
-Estimator::Sides Estimator::held_ways() const {
+Sides Estimator::held_ways() const {
   Sides ways = joined_;
   ways.hold(other_ways_);
   ways.hold(said_elsewhere_);

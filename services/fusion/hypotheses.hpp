@@ -61,18 +61,7 @@ class Hypotheses {
 
  private:
   /// How far the interval must reach beyond the main one's ends.
-  struct Excess {
-    double behind_m = 0;
-    double ahead_m = 0;
-    void add(const Excess& more) {
-      behind_m += more.behind_m;
-      ahead_m += more.ahead_m;
-    }
-    void hold(const Excess& other) {
-      behind_m = std::max(behind_m, other.behind_m);
-      ahead_m = std::max(ahead_m, other.ahead_m);
-    }
-  };
+  using Excess = Sides;
   /// The main one without a fix that no later one has confirmed.
   struct Doubter {
     Estimator estimator;

@@ -127,8 +127,8 @@ void SensorGatewayService::end() {
 }
 
 void SensorGatewayService::watch_gravity(const dataset::ImuRow& row) {
-  gravity_watch_.add(row);
   if (gravity_told_) return;
+  gravity_watch_.add(row);
   const std::string trouble = gravity_watch_.trouble_of_recording();
   gravity_told_ = !trouble.empty();
   if (gravity_told_) context_.log().warn(trouble);

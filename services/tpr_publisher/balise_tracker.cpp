@@ -44,6 +44,11 @@ double most_apart_m(const std::vector<WayBetween>& ways, double length_m) {
   return apart_m;
 }
 
+/// A train that runs on that way comes to the group.
+bool lies_further(const Reference& reference, bool forwards) {
+  return forwards ? reference.foot_m < 0 : reference.foot_m > 0;
+}
+
 }  // namespace
 
 BaliseTracker::BaliseTracker(std::shared_ptr<const track::Map> map, double search_behind_m)
@@ -116,8 +121,7 @@ BaliseTracker::Undeclared BaliseTracker::undeclared_from(const EdgePosition& ste
   auto& reference = undeclared.reference;
   if (!reference) return undeclared;
   reference->foot_m -= way_m;
-  if (forwards ? reference->foot_m < 0 : reference->foot_m > 0)
-    reference = forwards ? nearest_behind(stem) : std::nullopt;
+  if (lies_further(*reference, forwards)) reference = forwards ? nearest_behind(stem) : std::nullopt;
   return undeclared;
 }
 
@@ -125,7 +129,7 @@ BaliseTracker::Undeclared BaliseTracker::undeclared_from(const EdgePosition& ste
 void BaliseTracker::leave_leg(const Step& step) {
   if (!step.divides || !reference_) return;
   const bool forwards = step.way_m > 0;
-  if (forwards ? reference_->foot_m >= 0 : reference_->foot_m <= 0) return;
+  if (!lies_further(*reference_, forwards)) return;
   const bool leads_there = std::ranges::any_of(step.groups, [&](const Passed& mark) {
     return mark.group == reference_->group &&
            std::abs(mark.way_m + reference_->foot_m) <= kSameWayM + reference_->doubt_m;
@@ -167,7 +171,7 @@ void BaliseTracker::go_undeclared(const EdgePosition& foot) {
 void BaliseTracker::leave_doubted(const Step& step) {
   if (!step.divides || !reference_) return;
   const bool forwards = step.way_m > 0;
-  if (forwards ? reference_->foot_m >= 0 : reference_->foot_m <= 0) return;
+  if (!lies_further(*reference_, forwards)) return;
   const double most_m = std::abs(reference_->foot_m) + kLongestStepM;
   if (every_way_leads_to(*map_, ways_, *last_, forwards, reference_->group->edge, most_m)) return;
   reference_.reset();

@@ -226,19 +226,21 @@ TEST(TrackChooser, WhoBeginsInDoubtLooksAtEverySwitchBehind) {
   EXPECT_LT(choice->options.front().probability, 0.7);
 }
 
+/// Fusion has declared the track, and is 3 m sure of the place.
+void follow(TrackChooser& chooser, uint32_t edge, double place_m) {
+  chooser.follow({{edge, place_m, track::Direction::forward}, 3, 3, 0.5, 1});
+}
+
 // Fusion follows the straight leg, which ends, and stands at its end; the train may have gone on over the other one.
 TEST(TrackChooser, ATrackThatHasEndedHoldsNobodyBackAndIsNotDeclared) {
   auto made = std::make_shared<track::Map>(*fork());
   made->edges[1].alignment = track::Alignment::chained({0, 500, 0}, {{100, 0, 0}});
   const std::shared_ptr<const track::Map> map = made;
   TrackChooser chooser({}, map, std::make_shared<const track::Ways>(*map));
-  const auto follow = [&](uint32_t edge, double place_m) {
-    chooser.follow({{edge, place_m, track::Direction::forward}, 3, 3, 0.5, 1});
-  };
-  follow(1, 400);
+  follow(chooser, 1, 400);
   for (double way_m = 402; way_m <= 900; way_m += 2) {
     chooser.move_blind(2);
-    way_m <= 500 ? follow(1, way_m) : follow(2, std::min(way_m - 500, 100.0));
+    way_m <= 500 ? follow(chooser, 1, way_m) : follow(chooser, 2, std::min(way_m - 500, 100.0));
   }
   const auto choice = chooser.choice();
   EXPECT_FALSE(choice->known);
@@ -258,13 +260,12 @@ TEST(TrackChooser, OverWhichOfTwoLengthsItCameIsSaidBeyondTheJoint) {
   made->landmarks.clear();
   const std::shared_ptr<const track::Map> map = made;
   TrackChooser chooser({}, map, std::make_shared<const track::Ways>(*map));
-  const auto follow = [&](uint32_t edge, double place_m) {
-    chooser.follow({{edge, place_m, track::Direction::forward}, 3, 3, 0.5, 1});
-  };
-  follow(1, 400);
+  follow(chooser, 1, 400);
   for (double way_m = 402; way_m <= 1200; way_m += 2) {
     chooser.move_blind(2);
-    way_m <= 500 ? follow(1, way_m) : way_m <= 1000 ? follow(2, way_m - 500) : follow(4, way_m - 1000);
+    way_m <= 500    ? follow(chooser, 1, way_m)
+    : way_m <= 1000 ? follow(chooser, 2, way_m - 500)
+                    : follow(chooser, 4, way_m - 1000);
   }
   const auto choice = chooser.choice();
   EXPECT_TRUE(choice->known);
