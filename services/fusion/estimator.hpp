@@ -273,6 +273,7 @@ class Estimator {
   [[nodiscard]] Sides held_ways() const;
   [[nodiscard]] bool tells_ways_apart(const FixInput& fix) const;
   void hold_other_ways(const FixInput& fix, double place_m, double here_m);
+  [[nodiscard]] bool fits_a_held_way(const MeasuredPlace& place) const;
   Offer offer_place(const MeasuredPlace& place);
   Offer offer_place_again(double path_distance_m, double sigma_m);
   [[nodiscard]] bool has_met(uint32_t landmark) const;

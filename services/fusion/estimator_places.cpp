@@ -17,6 +17,7 @@ constexpr double kBendsHereM = 3.0;  // in a window of some 50 m to either side 
 constexpr int kCurvesConfirm = 3;    // ... a place that was only told
 constexpr double kCorrectedM = 5.0;
 constexpr double kAsFarM = 3.0;
+constexpr double kLoose = 3.0;       // times by what ways differ: then a fix moves the place and hardly a scale
 constexpr double kOffTrackM = 15.0;  // a GNSS fix further beside the track is none
 // Of the sigma of a GNSS fix; squares add up to the whole.
 constexpr double kGnssLastingShare = 0.866;
@@ -201,9 +202,23 @@ double Estimator::fix_sigmas_off(double excused_m) const {
   return off_m > excused_m ? std::sqrt(fix_offer_.nis) * (1 - excused_m / off_m) : 0;
 }
 
-// Where more is in doubt than a vague fix leaves open, it says where the train is and not the filter, which is too
-// sure: else it would end the doubt and move nothing. What a sharp one leaves open is little anyway.
+// No further off than the train would be over the way that is followed, over one that is held or between them.
+bool Estimator::fits_a_held_way(const MeasuredPlace& place) const {
+  const Sides ways = held_ways();
+  const auto offer = filter_.test_position(place.path_distance_m, place.sigma_m, parameters_->gate_fix);
+  const double way_m = offer.residual < 0 ? ways.behind_m : ways.ahead_m;
+  return offer.used || std::abs(offer.residual) * (1 - parameters_->gate_fix / std::sqrt(offer.nis)) < way_m;
+}
+
+// While other ways are held, a fix that fits one of them says where the train is and not the filter, and says nothing
+// of the scales. So it does where more is in doubt than a vague fix leaves open: else it would end the doubt and move
+// nothing. What a sharp one leaves open is little anyway.
 Offer Estimator::offer_place(const MeasuredPlace& place) {
+  const Sides ways = held_ways();
+  if (ways.behind_m + ways.ahead_m > 0 && fits_a_held_way(place)) {
+    filter_.loosen_origin(kLoose * std::max(ways.behind_m, ways.ahead_m));
+    return filter_.offer_position(place, parameters_->gate_fix);
+  }
   const double doubted_m = place.lasting ? doubted_beyond_sigma_m() : 0;
   if (doubted_m <= parameters_->interval_factor * place.sigma_m) {
     return filter_.offer_position(place, parameters_->gate_fix);

@@ -17,13 +17,13 @@ FixInput landmark_fix(double t_s, uint32_t edge, double offset_m, uint32_t landm
   return {at(t_s), edge, offset_m, 0.1, 0.9999, landmark, FixKind::landmark, track::Direction::forward, nullptr};
 }
 
-/// A stem of 1000 m, a straight leg of 400 m, a siding of 460 m, and on from where they meet.
-Fusion at_a_loop(std::vector<track::Landmark> landmarks = {}) {
+/// A stem of 1000 m, a straight leg of 400 m, a siding that is longer, and on from where they meet.
+Fusion at_a_loop(std::vector<track::Landmark> landmarks = {}, double longer_m = 60) {
   auto map = std::make_shared<track::Map>();
   map->edges = {{1, "stem", 1, 2, "", northwards(0, 1000)},
                 {2, "straight", 2, 3, "", northwards(1000, 400)},
-                {3, "siding", 2, 3, "", northwards(1000, 460)},
-                {4, "on", 3, 4, "", northwards(1400, 3000)}};
+                {3, "siding", 2, 3, "", northwards(1000, 400 + longer_m)},
+                {4, "on", 3, 4, "", northwards(1400, 4000)}};
   map->connections = {{2, 1, 2, false}, {2, 1, 3, true}, {3, 2, 4, false}, {3, 3, 4, true}};
   map->landmarks = std::move(landmarks);
   return core::value_or_throw(Fusion::create({}, map, track::EdgePosition{1, 900, track::Direction::forward}));
@@ -70,6 +70,45 @@ TEST(OtherWays, ALandmarkThatHasATwinAsFarAsTheWaysDifferTellsNothing) {
   run(fusion, 32.5, 35, 20);
   fusion.add(landmark_fix(35, 4, 200, 4));
   EXPECT_LT(run(fusion, 35, 36, 20).over_m, 20) << "none stands there over the siding";
+}
+
+// It is no contradiction: neither a place that was wrong nor a scale. Landmarks lie `apart_m` from each other.
+void expect_found_over(double longer_m, bool over_siding, double apart_m) {
+  std::vector<track::Landmark> landmarks;
+  for (uint32_t i = 1; i <= 8; ++i)
+    landmarks.push_back({i, track::LandmarkKind::balise, 4, 100 + i * apart_m, 0, 0, ""});
+  auto fusion = at_a_loop(landmarks, longer_m);
+  run(fusion, 0, 0.5, 20);
+  fusion.add(landmark_fix(0.5, 1, 910, 100));
+  run(fusion, 0.5, 29.9, 20);
+  auto both = track_fix(29.9, 4, 98);  // over the straight leg
+  both.behind_m = longer_m;
+  fusion.add(both);
+  double t_s = 29.9;
+  TrainEstimate state;
+  for (const auto& landmark : landmarks) {
+    const double there_s = 29.9 + (landmark.offset_m - 98 + (over_siding ? longer_m : 0)) / 20;
+    state = run(fusion, t_s, there_s, 20);
+    EXPECT_LT(state.position.offset_m - landmark.offset_m, state.over_m + 0.4) << landmark.id;  // a step's way
+    EXPECT_LT(landmark.offset_m - state.position.offset_m, state.under_m + 0.4) << landmark.id;
+    fusion.add(landmark_fix(there_s, 4, landmark.offset_m, landmark.id));
+    t_s = there_s;
+  }
+  EXPECT_EQ(state.integrity, Integrity::ok) << state.reason;
+  EXPECT_LT(state.over_m + state.under_m, 10);
+  EXPECT_NEAR(state.visual_scale, 1, 1e-3);
+}
+
+TEST(OtherWays, ALandmarkSaysWhichWayTheTrainCameAndNothingAgainstTheScales) {
+  for (const double longer_m : {4.0, 30.0, 60.0}) {
+    for (const double apart_m : {70.0, 230.0, 400.0}) {
+      for (const bool over_siding : {false, true}) {
+        SCOPED_TRACE(testing::Message() << longer_m << " m longer, landmarks every " << apart_m << " m, siding "
+                                        << over_siding);
+        expect_found_over(longer_m, over_siding, apart_m);
+      }
+    }
+  }
 }
 
 // The second leg is beyond another one that was declared as late.
