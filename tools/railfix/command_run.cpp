@@ -110,9 +110,15 @@ int run(const RunOptions& options) {
 
   const auto tables = core::value_or_throw(export_tables(options.out / "recording.mcap", options.out));
   for (const auto& problem : tables.problems) std::cerr << "railfix: " << problem << '\n';
+  const bool whole = !supervisor.picture().recording_broke_off;
+  if (!whole) {
+    std::cerr << "railfix: the recorder stopped before the data ended, so that tables and recording.mcap are not of "
+                 "the whole run; why stands in "
+              << (options.out / "log" / "recorder.log").string() << '\n';
+  }
   std::cout << "tables and recording.mcap are in " << options.out.string() << '\n';
   if (!options.draw.empty()) std::cout << draw_run(options, options.out / "recording.mcap", options.draw) << '\n';
-  return interrupted == 0 ? 0 : 1;
+  return interrupted == 0 && whole ? 0 : 1;
 }
 
 }  // namespace

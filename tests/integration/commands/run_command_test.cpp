@@ -75,5 +75,21 @@ TEST_F(RunCommand, ADatasetOfSensorsAloneIsRunWithoutTheCamerasServices) {
   EXPECT_GT(last_ns - first_ns, 6 * core::kNsPerSecond);
 }
 
+TEST_F(RunCommand, WhereTheRecorderStopsInTheMiddleItIsNoWholeRun) {
+  const auto simulated = test::run_program({"railfix", "simulate", "--no-pictures", "--out", path("seq"), "--start",
+                                            "1:250", "--duration-s", "20", "--quiet"},
+                                           kPatienceS);
+  ASSERT_EQ(simulated.exit_code, 0) << simulated.err;
+  test::Program ran(run("seq", {"--start", "1:250:+"}), {root_ / "said", root_ / "warned", {}});
+  const auto stop = [&] {
+    return test::run_program({"railfix", "tell", "recorder", "stop", "--config", path("out/run.yaml")}, kPatienceS);
+  };
+  auto told = stop();
+  for (int again = 0; told.exit_code != 0 && again < 20 && !ran.exit_code(); ++again) told = stop();
+  ASSERT_EQ(told.exit_code, 0) << told.err;
+  EXPECT_EQ(ran.wait_for_end(), 1) << test::slurp(root_ / "said");
+  EXPECT_THAT(test::slurp(root_ / "warned"), ::testing::HasSubstr("the recorder stopped before the data ended"));
+}
+
 }  // namespace
 }  // namespace railfix

@@ -43,6 +43,11 @@ Supervisor::Supervisor(const messaging::ParticipantOptions& options, std::vector
          }));
   listen(topics::odometry_step,
          std::function([this](const msg::OdometryStep& step) { picture_.note_time(step.stamp_ns()); }));
+  listen(topics::recorder_status, std::function([this](const msg::RecorderStatus& status) {
+           const bool records = status.state() == msg::RECORDER_RECORDING || status.state() == msg::RECORDER_PAUSED;
+           picture_.recorded = picture_.recorded || records;
+           picture_.recording_broke_off = picture_.recording_broke_off || (picture_.recorded && !records);
+         }));
   listen(topics::log_record, std::function([this](const msg::LogRecord& record) {
            if (record.level() < kWarningLevel) return;
            picture_.log.push_back(std::string(record.service().c_str()) + ": " + record.text().c_str());

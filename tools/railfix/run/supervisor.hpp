@@ -24,6 +24,8 @@ struct TrainPicture {
   int64_t data_begin_ns = 0;
   int64_t data_ns = 0;           // of the newest odometry step or, without a camera, state
   std::vector<std::string> log;  // the last warnings and errors
+  bool recorded = false;
+  bool recording_broke_off = false;  // and the train ran on without it, for a while at least
 
   void note_time(int64_t stamp_ns);
   /// Never seen, failed, stopped, or silent.
