@@ -11,56 +11,24 @@
 namespace railfix::track {
 namespace {
 
-constexpr int kMostLegs = 100000;  // ends a path round a ring of tiny edges
+constexpr size_t kMostLegs = 100000;  // ends a path round a ring of tiny edges
 constexpr size_t kMostJoinSteps = 1000;
 constexpr double kLongestJoinM = 30000;  // a wrong leg may have been followed for so long
 
-/// The map's connections by their node.
-using Meetings = std::unordered_map<uint32_t, std::vector<const Connection*>>;
-
-Meetings meetings_of(const Map& map) {
-  Meetings out;
-  for (const Connection& connection : map.connections) out[connection.node].push_back(&connection);
-  return out;
-}
-
-/// What follows at the end of a run: an edge of `via`, else the straight way, among several the one that turns least.
-std::optional<Run> next_run(const Map& map, const Meetings& meetings, const Run& run,
-                            const std::vector<uint32_t>& via) {
-  const uint32_t node = run.forward ? run.edge->to_node : run.edge->from_node;
-  std::optional<Run> best;
-  double best_cost = 0;
-  const auto here = meetings.find(node);
-  if (here == meetings.end()) return best;
-  for (const Connection* met : here->second) {
-    const Connection& connection = *met;
-    if (connection.edge_a != run.edge->id && connection.edge_b != run.edge->id) continue;
-    const Edge* other = map.edge(connection.edge_a == run.edge->id ? connection.edge_b : connection.edge_a);
-    for (const bool forward : {true, false}) {
-      const Run candidate{other, forward};
-      if ((forward ? other->from_node : other->to_node) != node) continue;
-      const bool wanted = std::find(via.begin(), via.end(), other->id) != via.end();
-      const double cost = turn_rad(run, candidate) + (connection.diverging ? 10.0 : 0.0) - (wanted ? 100.0 : 0.0);
-      if (!best || cost < best_cost) {
-        best = candidate;
-        best_cost = cost;
-      }
-    }
-  }
-  return best;
-}
-
-/// Runs after the first until `distance_m` beyond the end of the first is covered or the track ends.
-std::vector<Run> runs_after(const Map& map, const Meetings& meetings, const Run& first, double distance_m,
+/// Runs after the first until `distance_m` beyond the end of the first is covered or the track ends: over an edge of
+/// `via` where one follows, else the straight way.
+std::vector<Run> runs_after(const Junctions& junctions, const Run& first, double distance_m,
                             const std::vector<uint32_t>& via) {
   std::vector<Run> runs;
   Run run = first;
   while (distance_m > 0 && runs.size() < kMostLegs) {
-    const std::optional<Run> next = next_run(map, meetings, run, via);
-    if (!next) break;
-    run = *next;
+    const std::vector<Run> next = junctions.after(run);
+    if (next.empty()) break;
+    const auto wanted =
+        std::ranges::find_if(next, [&](const Run& way) { return std::ranges::find(via, way.edge->id) != via.end(); });
+    run = wanted == next.end() ? next.front() : *wanted;
     runs.push_back(run);
-    distance_m -= run.edge->alignment.length_m();
+    distance_m -= run.length_m();
   }
   return runs;
 }
@@ -120,20 +88,6 @@ Route joined(Route route, const Join& join) {
   return route;
 }
 
-/// The straight way up to `ahead_m` and `behind_m` from `near_m`, or until the track ends.
-void follow_on(Route& route, const Ways& ways, double near_m, double ahead_m, double behind_m) {
-  while (route.end_m() < near_m + ahead_m && route.legs().size() < kMostLegs) {
-    const auto& next = ways.after(route.legs().back().run);
-    if (next.empty()) break;
-    route.push_ahead(next.front());
-  }
-  while (route.begin_m() > near_m - behind_m && route.legs().size() < kMostLegs) {
-    const auto before = ways.before(route.legs().front().run);
-    if (before.empty()) break;
-    route.push_behind(before.front());
-  }
-}
-
 }  // namespace
 
 core::Result<Path> Path::follow(std::shared_ptr<const Map> map, const EdgePosition& start, double ahead_m,
@@ -143,55 +97,50 @@ core::Result<Path> Path::follow(std::shared_ptr<const Map> map, const EdgePositi
   if (!(start.offset_m >= -1e-6 && start.offset_m <= edge->alignment.length_m() + 1e-6)) {
     return core::Error{"offset " + std::to_string(start.offset_m) + " m is not on edge " + std::to_string(start.edge)};
   }
-  const bool forward = start.direction != Direction::reverse;
-  const double length = edge->alignment.length_m();
-  const double before =
-      std::clamp(forward ? start.offset_m : length - start.offset_m, 0.0, length);  // of the edge behind the start
+  const Run started = run_of(*map, start);
+  const double length = started.length_m();
+  const double before = std::clamp(started.into_m(start.offset_m), 0.0, length);  // of the edge behind the start
 
-  const Meetings meetings = meetings_of(*map);
-  std::vector<Run> runs = runs_after(*map, meetings, {edge, !forward}, behind_m - before, via);
-  std::reverse(runs.begin(), runs.end());
+  const Junctions junctions(*map);
+  std::vector<Run> runs = runs_after(junctions, started.reversed(), behind_m - before, via);
+  std::ranges::reverse(runs);
   double distance = -before;
   for (Run& run : runs) {
-    run.forward = !run.forward;
-    distance -= run.edge->alignment.length_m();
+    run = run.reversed();
+    distance -= run.length_m();
   }
-  runs.push_back({edge, forward});
-  const std::vector<Run> ahead = runs_after(*map, meetings, {edge, forward}, ahead_m - (length - before), via);
-  runs.insert(runs.end(), ahead.begin(), ahead.end());
+  runs.push_back(started);
+  std::ranges::copy(runs_after(junctions, started, ahead_m - (length - before), via), std::back_inserter(runs));
 
   Path path;
   path.map_ = std::move(map);
   const double begin = -std::max(behind_m, 0.0);
   const double end = std::max(ahead_m, 0.0);
   for (const Run& run : runs) {
-    const double run_length = run.edge->alignment.length_m();
-    const double from = std::clamp(begin - distance, 0.0, run_length);  // into the run
-    const double to = std::clamp(end - distance, 0.0, run_length);
-    if (to > from || run.edge == edge) {
-      path.legs_.push_back({run.edge, run.forward, distance + from, to - from, run.forward ? from : run_length - from});
-    }
-    distance += run_length;
+    const double from = std::clamp(begin - distance, 0.0, run.length_m());  // into the run
+    const double to = std::clamp(end - distance, 0.0, run.length_m());
+    if (to > from || run.edge == edge) path.legs_.push_back({run, distance + from, to - from, run.offset_m(from)});
+    distance += run.length_m();
   }
   path.collect_marks();
+  path.collect_switches(junctions);
   return path;
 }
 
-Path Path::along(std::shared_ptr<const Map> map, const Route& route) {
+Path Path::along(std::shared_ptr<const Map> map, const Route& route, const Ways& ways) {
   Path path;
   path.map_ = std::move(map);
-  for (const auto& leg : route.legs()) {
-    const double length_m = leg.run.length_m();
-    path.legs_.push_back({leg.run.edge, leg.run.forward, leg.begin_m, length_m, leg.run.forward ? 0.0 : length_m});
-  }
+  for (const auto& leg : route.legs())
+    path.legs_.push_back({leg.run, leg.begin_m, leg.run.length_m(), leg.run.offset_m(0)});
   path.collect_marks();
+  path.collect_switches(ways);
   return path;
 }
 
 Route Path::route() const {
   const Leg& first = legs_.front();
-  Route route({first.edge, first.forward}, first.offset_begin_m, first.begin_m);
-  for (size_t i = 1; i < legs_.size(); ++i) route.push_ahead({legs_[i].edge, legs_[i].forward});
+  Route route(first.run, first.offset_begin_m, first.begin_m);
+  for (size_t i = 1; i < legs_.size(); ++i) route.push_ahead(legs_[i].run);
   return route;
 }
 
@@ -201,14 +150,14 @@ std::optional<Path> followed_on(const Path& old, const Ways& ways, double near_m
   const bool cut = route.end_m() > old.end_m() + 1e-6 || route.begin_m() < old.begin_m() - 1e-6;
   follow_on(route, ways, near_m, ahead_m, behind_m);
   if (route.legs().size() == legs && !cut) return std::nullopt;
-  return Path::along(old.shared_map(), route);
+  return Path::along(old.shared_map(), route, ways);
 }
 
 std::optional<Rerouted> rerouted(const Path& old, const Ways& ways, const EdgePosition& place, double near_m,
                                  double ahead_m, double behind_m) {
   const Route old_route = old.route();
-  const Run run{old.map().edge(place.edge), place.direction != Direction::reverse};
-  const double into_m = run.forward ? place.offset_m : run.length_m() - place.offset_m;
+  const Run run = run_of(old.map(), place);
+  const double into_m = run.into_m(place.offset_m);
   const auto off_m = [&](const Join& join) { return std::abs(join.place_m - near_m); };
   std::vector<Join> joins = joins_of(old_route, ways, run, into_m, true, near_m);
   std::ranges::move(joins_of(old_route, ways, run, into_m, false, near_m), std::back_inserter(joins));
@@ -216,7 +165,7 @@ std::optional<Rerouted> rerouted(const Path& old, const Ways& ways, const EdgePo
   if (best == joins.end() || off_m(*best) > kLongestJoinM) return std::nullopt;
   Route route = joined(old_route, *best);
   follow_on(route, ways, near_m, ahead_m, behind_m);
-  Rerouted found{Path::along(old.shared_map(), route), {}};
+  Rerouted found{Path::along(old.shared_map(), route, ways), {}};
   for (const Join& join : joins) {
     if (join.behind == best->behind && &join != &*best) found.otherwise_m.push_back(join.place_m);
   }
@@ -225,61 +174,39 @@ std::optional<Rerouted> rerouted(const Path& old, const Ways& ways, const EdgePo
 
 void Path::collect_marks() {
   std::unordered_map<uint32_t, std::vector<const Leg*>> legs_on;
-  for (const Leg& leg : legs_) legs_on[leg.edge->id].push_back(&leg);
+  for (const Leg& leg : legs_) legs_on[leg.run.edge->id].push_back(&leg);
   // Calls `take` with every leg that runs over the place, and its distance there.
   const auto each_pass = [&](uint32_t edge, double offset_m, const auto& take) {
     const auto found = legs_on.find(edge);
     if (found == legs_on.end()) return;
     for (const Leg* leg : found->second) {
-      const double into = (leg->forward ? 1.0 : -1.0) * (offset_m - leg->offset_begin_m);
+      const double into = leg->into_m(offset_m);
       if (into >= -1e-6 && into <= leg->length_m + 1e-6) take(*leg, leg->begin_m + into);
     }
   };
   for (const Landmark& landmark : map_->landmarks) {
     each_pass(landmark.edge, landmark.offset_m, [&](const Leg& leg, double distance_m) {
-      const double lateral_m = leg.forward ? landmark.lateral_m : -landmark.lateral_m;
-      landmarks_.push_back({&landmark, distance_m, lateral_m, seen_along(landmark.kind, leg.forward)});
+      const double lateral_m = leg.run.forward ? landmark.lateral_m : -landmark.lateral_m;
+      landmarks_.push_back({&landmark, distance_m, lateral_m, seen_along(landmark.kind, leg.run.forward)});
     });
   }
   for (const BaliseGroup& group : map_->balise_groups) {
     each_pass(group.edge, group.offset_m, [&](const Leg& leg, double distance_m) {
-      groups_.push_back({&group, distance_m, group.nominal_is_forward == leg.forward});
+      groups_.push_back({&group, distance_m, group.nominal_is_forward == leg.run.forward});
     });
   }
   const auto by_distance = [](const auto& a, const auto& b) { return a.distance_m < b.distance_m; };
   std::stable_sort(landmarks_.begin(), landmarks_.end(), by_distance);
   std::stable_sort(groups_.begin(), groups_.end(), by_distance);
-  collect_switches();
 }
 
-void Path::collect_switches() {
-  std::unordered_map<uint32_t, std::vector<const Connection*>> at_node;
-  const auto node_before = [](const Leg& leg) { return leg.forward ? leg.edge->from_node : leg.edge->to_node; };
-  for (size_t i = 1; i < legs_.size(); ++i) at_node[node_before(legs_[i])];
-  for (const Connection& connection : map_->connections) {
-    const auto found = at_node.find(connection.node);
-    if (found != at_node.end()) found->second.push_back(&connection);
-  }
-  const auto ways_after = [&](const Run& run, uint32_t node) {
-    int ways = 0;
-    for (const Connection* connection : at_node[node]) {
-      if (connection->edge_a != run.edge->id && connection->edge_b != run.edge->id) continue;
-      const Edge* other = map_->edge(connection->edge_a == run.edge->id ? connection->edge_b : connection->edge_a);
-      if (other == nullptr) continue;
-      for (const bool forward : {true, false}) {
-        const Run next{other, forward};
-        if ((forward ? other->from_node : other->to_node) != node || next == run.reversed()) continue;
-        ways += leads_on(run, next) ? 1 : 0;
-      }
-    }
-    return ways;
-  };
+template <class Following>
+void Path::collect_switches(const Following& following) {
   for (size_t i = 1; i < legs_.size(); ++i) {
-    const uint32_t node = node_before(legs_[i]);
-    const int ahead = ways_after({legs_[i - 1].edge, legs_[i - 1].forward}, node);
-    const int behind = ways_after({legs_[i].edge, !legs_[i].forward}, node);
-    if (ahead > 1) switches_.push_back({legs_[i].begin_m, true, ahead});
-    if (behind > 1) switches_.push_back({legs_[i].begin_m, false, behind});
+    const auto ahead = following.after(legs_[i - 1].run).size();
+    const auto behind = following.after(legs_[i].run.reversed()).size();
+    if (ahead > 1) switches_.push_back({legs_[i].begin_m, true, static_cast<int>(ahead)});
+    if (behind > 1) switches_.push_back({legs_[i].begin_m, false, static_cast<int>(behind)});
   }
 }
 
@@ -296,15 +223,10 @@ const Path::Leg& Path::leg_at(double distance_m) const {
   return after == legs_.begin() ? legs_.front() : *(after - 1);
 }
 
-double Path::offset_on(const Leg& leg, double distance_m) {
-  return leg.offset_begin_m + (leg.forward ? 1.0 : -1.0) * (distance_m - leg.begin_m);
-}
-
 EdgePosition Path::position_at(double distance_m) const {
   const double distance = std::clamp(distance_m, begin_m(), end_m());
   const Leg& leg = leg_at(distance);
-  const double offset = std::clamp(offset_on(leg, distance), 0.0, leg.edge->alignment.length_m());
-  return {leg.edge->id, offset, leg.forward ? Direction::forward : Direction::reverse};
+  return {leg.run.edge->id, std::clamp(leg.offset_at(distance), 0.0, leg.run.length_m()), leg.run.direction()};
 }
 
 std::optional<double> Path::distance_of(uint32_t edge, double offset_m) const {
@@ -314,9 +236,9 @@ std::optional<double> Path::distance_of(uint32_t edge, double offset_m) const {
 std::optional<double> Path::distance_of(const EdgePosition& place, double near_m) const {
   std::optional<double> best;
   for (const Leg& leg : legs_) {
-    if (leg.edge->id != place.edge) continue;
-    if (place.direction != Direction::unknown && leg.forward != (place.direction == Direction::forward)) continue;
-    const double into = (leg.forward ? 1.0 : -1.0) * (place.offset_m - leg.offset_begin_m);
+    if (leg.run.edge->id != place.edge) continue;
+    if (place.direction != Direction::unknown && place.direction != leg.run.direction()) continue;
+    const double into = leg.into_m(place.offset_m);
     if (into < -1e-6 || into > leg.length_m + 1e-6) continue;
     const double distance = leg.begin_m + into;
     if (!best || std::abs(distance - near_m) < std::abs(*best - near_m)) best = distance;
@@ -326,10 +248,10 @@ std::optional<double> Path::distance_of(const EdgePosition& place, double near_m
 
 TrackPoint Path::at(double distance_m) const {
   const Leg& leg = leg_at(distance_m);
-  TrackPoint point = leg.edge->alignment.at(offset_on(leg, distance_m));
-  if (leg.forward) return point;
+  TrackPoint point = leg.run.edge->alignment.at(leg.offset_at(distance_m));
+  if (leg.run.forward) return point;
   // The rates keep their sign: quantity and direction both turn round.
-  point.pose.heading_rad = core::wrap_pi(point.pose.heading_rad + core::kPi);
+  point.pose = turned_round(point.pose);
   point.curvature_per_m = -point.curvature_per_m;
   point.cant_m = -point.cant_m;
   point.grade = -point.grade;
@@ -338,13 +260,13 @@ TrackPoint Path::at(double distance_m) const {
 
 std::optional<double> Path::speed_limit_at(double distance_m) const {
   const Leg& leg = leg_at(distance_m);
-  return leg.edge->speed_limit_mps(offset_on(leg, distance_m), leg.forward ? Direction::forward : Direction::reverse);
+  return leg.run.edge->speed_limit_mps(leg.offset_at(distance_m), leg.run.direction());
 }
 
 double Path::curvature_at(double distance_m) const {
   const Leg& leg = leg_at(distance_m);
-  const double curvature = leg.edge->alignment.curvature_at(offset_on(leg, distance_m));
-  return leg.forward ? curvature : -curvature;
+  const double curvature = leg.run.edge->alignment.curvature_at(leg.offset_at(distance_m));
+  return leg.run.forward ? curvature : -curvature;
 }
 
 std::span<const PathLandmark> Path::landmarks_between(double from_m, double to_m) const {
@@ -358,7 +280,7 @@ std::span<const PathLandmark> Path::landmarks_between(double from_m, double to_m
 }
 
 bool Path::grade_known_at(double distance_m) const {
-  return distance_m >= begin_m() && distance_m <= end_m() && !leg_at(distance_m).edge->alignment.profile().empty();
+  return distance_m >= begin_m() && distance_m <= end_m() && !leg_at(distance_m).run.edge->alignment.profile().empty();
 }
 
 }  // namespace railfix::track

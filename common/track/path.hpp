@@ -44,7 +44,7 @@ class Path {
                                    double behind_m, const std::vector<uint32_t>& via = {});
 
   /// The way of a route with the route's distances.
-  static Path along(std::shared_ptr<const Map> map, const Route& route);
+  static Path along(std::shared_ptr<const Map> map, const Route& route, const Ways& ways);
   /// This way as whole edges, with the same distances.
   [[nodiscard]] Route route() const;
 
@@ -72,21 +72,24 @@ class Path {
 
  private:
   struct Leg {
-    const Edge* edge = nullptr;
-    bool forward = true;
+    Run run;
     double begin_m = 0;  // path distance where the leg begins
     double length_m = 0;
     double offset_begin_m = 0;  // edge offset at begin_m
+    [[nodiscard]] double into_m(double offset_m) const { return sign() * (offset_m - offset_begin_m); }
+    [[nodiscard]] double offset_at(double distance_m) const { return offset_begin_m + sign() * (distance_m - begin_m); }
+    [[nodiscard]] double sign() const { return run.forward ? 1.0 : -1.0; }
   };
   [[nodiscard]] const Leg& leg_at(double distance_m) const;
-  static double offset_on(const Leg& leg, double distance_m);
   [[nodiscard]] const std::shared_ptr<const Map>& shared_map() const { return map_; }
   friend std::optional<Path> followed_on(const Path& old, const Ways& ways, double near_m, double ahead_m,
                                          double behind_m);
   friend std::optional<struct Rerouted> rerouted(const Path& old, const Ways& ways, const EdgePosition& place,
                                                  double near_m, double ahead_m, double behind_m);
   void collect_marks();
-  void collect_switches();
+  /// Of Ways or Junctions.
+  template <class Following>
+  void collect_switches(const Following& following);
   std::shared_ptr<const Map> map_;
   std::vector<Leg> legs_;
   std::vector<PathLandmark> landmarks_;

@@ -2,65 +2,73 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/units.hpp"
 
 namespace railfix::track {
 namespace {
 
-double leaving_heading(const Run& run) {
-  return run.edge->alignment.at(run.forward ? 0.0 : run.length_m()).pose.heading_rad + (run.forward ? 0.0 : core::kPi);
-}
-double arriving_heading(const Run& run) {
-  return leaving_heading(run.reversed()) + core::kPi;
-}
-
+constexpr size_t kMostLegs = 100000;  // ends a way round a ring of tiny edges
 constexpr double kCornerM = 12.0;
 constexpr double kLeastCornerRad = 0.005;  // less is how points were rounded
 constexpr double kMostCornerRad = 0.2;     // more is no turnout's
+constexpr double kDivergesRad = 10.0;      // beyond every turn
 
 double corner_rad(const Run& run, const Run& next) {
   if (run.edge->is_drawn || next.edge->is_drawn) return 0.0;
-  const double left_rad = core::wrap_pi(arriving_heading(run) - leaving_heading(next));
+  const double left_rad = core::wrap_pi(run.pose_at(run.length_m()).heading_rad - next.pose_at(0).heading_rad);
   return std::abs(left_rad) < kLeastCornerRad || std::abs(left_rad) > kMostCornerRad ? 0.0 : left_rad;
 }
 
 }  // namespace
 
+PlanPose Run::pose_at(double into_m) const {
+  const PlanPose pose = edge->alignment.at(offset_m(into_m)).pose;
+  return forward ? pose : turned_round(pose);
+}
+
+Run run_of(const Map& map, const EdgePosition& place) {
+  return {map.edge(place.edge), place.direction != Direction::reverse};
+}
+
 double turn_rad(const Run& run, const Run& next) {
-  return std::abs(core::wrap_pi(leaving_heading(next) - arriving_heading(run)));
+  return std::abs(core::wrap_pi(next.pose_at(0).heading_rad - run.pose_at(run.length_m()).heading_rad));
 }
 
 bool leads_on(const Run& run, const Run& next) {
   return turn_rad(run, next) <= core::kPi / 2 || run.edge->is_drawn || next.edge->is_drawn;
 }
 
-Ways::Ways(const Map& map) : after_(2 * map.edges.size()) {
-  std::vector<std::vector<double>> costs(after_.size());
-  const auto connect = [&](const Connection& connection, uint32_t from, uint32_t to) {
-    const Edge* edge = map.edge(from);
-    const Edge* next = map.edge(to);
-    if (edge == nullptr || next == nullptr) return;
+Junctions::Junctions(const Map& map) : map_(&map) {
+  for (const Connection& connection : map.connections) by_node_.push_back(&connection);
+  std::ranges::stable_sort(by_node_, {}, &Connection::node);
+}
+
+std::vector<Run> Junctions::after(const Run& run) const {
+  const uint32_t node = run.forward ? run.edge->to_node : run.edge->from_node;
+  std::vector<std::pair<double, Run>> found;
+  for (const Connection* met : std::ranges::equal_range(by_node_, node, {}, &Connection::node)) {
+    if (met->edge_a != run.edge->id && met->edge_b != run.edge->id) continue;
+    const Edge* other = map_->edge(met->edge_a == run.edge->id ? met->edge_b : met->edge_a);
+    if (other == nullptr) continue;
     for (const bool forward : {true, false}) {
-      if ((forward ? edge->to_node : edge->from_node) != connection.node) continue;
-      for (const bool next_forward : {true, false}) {
-        if ((next_forward ? next->from_node : next->to_node) != connection.node) continue;
-        const Run run{edge, forward};
-        const Run way{next, next_forward};
-        if (way == run.reversed()) continue;
-        if (!leads_on(run, way)) continue;
-        const double cost = turn_rad(run, way) + (connection.diverging ? 10.0 : 0.0);
-        auto& found = after_[index(run)];
-        auto& cost_of = costs[index(run)];
-        const auto place = std::upper_bound(cost_of.begin(), cost_of.end(), cost) - cost_of.begin();
-        found.insert(found.begin() + place, way);
-        cost_of.insert(cost_of.begin() + place, cost);
-      }
+      const Run next{other, forward};
+      if ((forward ? other->from_node : other->to_node) != node || next == run.reversed()) continue;
+      if (leads_on(run, next)) found.emplace_back(turn_rad(run, next) + (met->diverging ? kDivergesRad : 0.0), next);
     }
-  };
-  for (const Connection& connection : map.connections) {
-    connect(connection, connection.edge_a, connection.edge_b);
-    if (connection.edge_a != connection.edge_b) connect(connection, connection.edge_b, connection.edge_a);
+  }
+  std::ranges::stable_sort(found, {}, &std::pair<double, Run>::first);
+  std::vector<Run> runs;
+  for (const auto& [cost, next] : found) runs.push_back(next);
+  return runs;
+}
+
+Ways::Ways(const Map& map) {
+  const Junctions junctions(map);
+  after_.reserve(2 * map.edges.size());
+  for (const Edge& edge : map.edges) {
+    for (const bool forward : {true, false}) after_.push_back(junctions.after({&edge, forward}));
   }
 }
 
@@ -71,7 +79,7 @@ std::vector<Run> Ways::before(const Run& run) const {
 }
 
 Route::Route(const Run& run, double offset_m, double place_m) {
-  legs_.push_back({run, place_m - (run.forward ? offset_m : run.length_m() - offset_m)});
+  legs_.push_back({run, place_m - run.into_m(offset_m)});
 }
 
 void Route::push_ahead(const Run& run) {
@@ -99,17 +107,15 @@ size_t Route::index_at(double distance_m) const {
 
 EdgePosition Route::position_at(double distance_m) const {
   const Leg& leg = leg_at(distance_m);
-  const double into = std::clamp(distance_m - leg.begin_m, 0.0, leg.run.length_m());
-  return {leg.run.edge->id, leg.run.forward ? into : leg.run.length_m() - into,
-          leg.run.forward ? Direction::forward : Direction::reverse};
+  return leg.run.at(std::clamp(distance_m - leg.begin_m, 0.0, leg.run.length_m()));
 }
 
 std::optional<double> Route::distance_of(const EdgePosition& place, double near_m) const {
   std::optional<double> best;
   for (const Leg& leg : legs_) {
     if (leg.run.edge->id != place.edge) continue;
-    if (place.direction != Direction::unknown && leg.run.forward != (place.direction == Direction::forward)) continue;
-    const double distance = leg.begin_m + (leg.run.forward ? place.offset_m : leg.run.length_m() - place.offset_m);
+    if (place.direction != Direction::unknown && place.direction != leg.run.direction()) continue;
+    const double distance = leg.begin_m + leg.run.into_m(place.offset_m);
     if (!best || std::abs(distance - near_m) < std::abs(*best - near_m)) best = distance;
   }
   return best;
@@ -127,9 +133,21 @@ double Route::corners_at(size_t at, double distance_m) const {
 double Route::curvature_at(double distance_m) const {
   const size_t at = index_at(distance_m);
   const Leg& leg = legs_[at];
-  const double into = distance_m - leg.begin_m;
-  const double curvature = leg.run.edge->alignment.curvature_at(leg.run.forward ? into : leg.run.length_m() - into);
+  const double curvature = leg.run.edge->alignment.curvature_at(leg.run.offset_m(distance_m - leg.begin_m));
   return (leg.run.forward ? curvature : -curvature) + corners_at(at, distance_m) / (2 * kCornerM);
+}
+
+void follow_on(Route& route, const Ways& ways, double near_m, double ahead_m, double behind_m) {
+  while (route.end_m() < near_m + ahead_m && route.legs().size() < kMostLegs) {
+    const auto& next = ways.after(route.legs().back().run);
+    if (next.empty()) break;
+    route.push_ahead(next.front());
+  }
+  while (route.begin_m() > near_m - behind_m && route.legs().size() < kMostLegs) {
+    const auto before = ways.before(route.legs().front().run);
+    if (before.empty()) break;
+    route.push_behind(before.front());
+  }
 }
 
 }  // namespace railfix::track

@@ -16,8 +16,18 @@ struct Run {
   bool forward = true;
   [[nodiscard]] Run reversed() const { return {edge, !forward}; }
   [[nodiscard]] double length_m() const { return edge->alignment.length_m(); }
+  [[nodiscard]] Direction direction() const { return forward ? Direction::forward : Direction::reverse; }
+  /// Metres run on the edge up to an offset, and the offset so many metres into it.
+  [[nodiscard]] double into_m(double offset_m) const { return forward ? offset_m : length_m() - offset_m; }
+  [[nodiscard]] double offset_m(double into_m) const { return forward ? into_m : length_m() - into_m; }
+  [[nodiscard]] EdgePosition at(double into_m) const { return {edge->id, offset_m(into_m), direction()}; }
+  /// Looking as it is run.
+  [[nodiscard]] PlanPose pose_at(double into_m) const;
   friend bool operator==(const Run&, const Run&) = default;
 };
+
+/// Of a train there, unknown direction = forward. REQUIRES: the edge is on the map.
+[[nodiscard]] Run run_of(const Map& map, const EdgePosition& place);
 
 /// By how much a train turns where it runs on from one onto the next, 0 to pi.
 [[nodiscard]] double turn_rad(const Run& run, const Run& next);
@@ -26,11 +36,23 @@ struct Run {
 /// nothing where it does not close.
 [[nodiscard]] bool leads_on(const Run& run, const Run& next);
 
-/// Made once for a map, which must outlive it.
+/// What a train can do at the end of one edge, found when it is asked for. The map must outlive it.
+class Junctions {
+ public:
+  explicit Junctions(const Map& map);
+  /// Runs that may follow, the straight way first (the one that the map calls straight, else the smallest turn).
+  [[nodiscard]] std::vector<Run> after(const Run& run) const;
+
+ private:
+  const Map* map_;
+  std::vector<const Connection*> by_node_;
+};
+
+/// The same of all edges, found once. The map must outlive it.
 class Ways {
  public:
   explicit Ways(const Map& map);
-  /// Runs that may follow, the straight way first (the one that the map calls straight, else the smallest turn).
+  /// Runs that may follow, the straight way first.
   [[nodiscard]] const std::vector<Run>& after(const Run& run) const { return after_[index(run)]; }
   /// Runs that may come before, the straight way first.
   [[nodiscard]] std::vector<Run> before(const Run& run) const;
@@ -78,5 +100,8 @@ class Route {
   [[nodiscard]] double corners_at(size_t at, double distance_m) const;
   std::deque<Leg> legs_;
 };
+
+/// The straight way of every switch up to `ahead_m` and `behind_m` from `near_m`, or until the track ends.
+void follow_on(Route& route, const Ways& ways, double near_m, double ahead_m, double behind_m);
 
 }  // namespace railfix::track

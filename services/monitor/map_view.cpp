@@ -15,7 +15,6 @@ constexpr double kStraightStepM = 500;
 constexpr double kStraightPerM = 1e-7;
 constexpr double kProfileStepM = 5;
 constexpr double kBendStepM = 2;
-constexpr int kMostLegs = 200;
 
 double rounded(double value, double unit) {
   return std::round(value / unit) * unit;
@@ -117,19 +116,9 @@ json MapView::message(const std::optional<track::EdgePosition>& around, double r
 }
 
 std::optional<track::Route> MapView::route(const track::EdgePosition& train, double behind_m, double ahead_m) const {
-  const auto* edge = map_.edge(train.edge);
-  if (edge == nullptr) return std::nullopt;
-  track::Route route({edge, train.direction != track::Direction::reverse}, train.offset_m, 0);
-  for (int leg = 0; leg < kMostLegs && route.end_m() < ahead_m; ++leg) {
-    const auto& next = ways_.after(route.legs().back().run);
-    if (next.empty()) break;
-    route.push_ahead(next.front());
-  }
-  for (int leg = 0; leg < kMostLegs && route.begin_m() > -behind_m; ++leg) {
-    const auto before = ways_.before(route.legs().front().run);
-    if (before.empty()) break;
-    route.push_behind(before.front());
-  }
+  if (map_.edge(train.edge) == nullptr) return std::nullopt;
+  track::Route route(track::run_of(map_, train), train.offset_m, 0);
+  track::follow_on(route, ways_, 0, ahead_m, behind_m);
   return route;
 }
 
@@ -151,11 +140,10 @@ std::vector<LandmarkAhead> MapView::landmarks_ahead(const track::EdgePosition& t
   if (!way) return ahead;
   for (const auto& leg : way->legs()) {
     for (const auto* landmark : map_.landmarks_on(leg.run.edge->id)) {
-      const double along_m = leg.run.forward ? landmark->offset_m : leg.run.length_m() - landmark->offset_m;
-      const double at_m = leg.begin_m + along_m;
+      const double at_m = leg.begin_m + leg.run.into_m(landmark->offset_m);
       if (at_m < 0 || at_m > ahead_m) continue;
-      ahead.push_back(
-          {landmark->kind, landmark->name, at_m, leg.run.forward ? landmark->lateral_m : -landmark->lateral_m});
+      ahead.push_back({track::seen_along(landmark->kind, leg.run.forward), landmark->name, at_m,
+                       leg.run.forward ? landmark->lateral_m : -landmark->lateral_m});
     }
   }
   std::ranges::sort(ahead, {}, &LandmarkAhead::ahead_m);

@@ -11,10 +11,6 @@ constexpr size_t kMostRoutes = 5000;      // looked at in a large station before
 constexpr double kLegsDifferM = 200.0;    // ways of one train differ by so much at most, ...
 constexpr double kLegsDifferPerM = 0.05;  // ... and by this share of their length
 
-track::Run run_of(const track::Map& map, const track::EdgePosition& place) {
-  return {map.edge(place.edge), place.direction != track::Direction::reverse};
-}
-
 }  // namespace
 
 void Turns::run(double step_m) {
@@ -36,16 +32,15 @@ void Turns::run(double step_m) {
 std::vector<WayBetween> ways_between(const track::Map& map, const track::Ways& ways, const track::EdgePosition& from,
                                      const track::EdgePosition& to, double way_m) {
   const bool along = way_m >= 0;
-  const auto begin = run_of(map, from);
+  const auto begin = track::run_of(map, from);
   const double differ_m = kLegsDifferM + kLegsDifferPerM * std::abs(way_m);
   std::vector<WayBetween> found;
-  std::vector<track::Route> open{track::Route(run_of(map, to), to.offset_m, 0)};
+  std::vector<track::Route> open{track::Route(track::run_of(map, to), to.offset_m, 0)};
   for (size_t i = 0; i < open.size(); ++i) {
     if (open.size() > kMostRoutes) return {};
     const auto& end = along ? open[i].legs().front() : open[i].legs().back();
     if (end.run == begin) {
-      const double into_m = begin.forward ? from.offset_m : begin.length_m() - from.offset_m;
-      const double length_m = -(end.begin_m + into_m);
+      const double length_m = -(end.begin_m + begin.into_m(from.offset_m));
       if (std::abs(length_m - way_m) <= differ_m) found.push_back({open[i], length_m});
     }
     if (along ? -end.begin_m > way_m + differ_m : end.end_m() > -way_m + differ_m) continue;
@@ -67,7 +62,7 @@ bool every_way_leads_to(const track::Map& map, const track::Ways& ways, const tr
     track::Run run;
     double length_m;  // from the edge of `from` on
   };
-  std::vector<Open> open{{run_of(map, from), 0}};
+  std::vector<Open> open{{track::run_of(map, from), 0}};
   for (size_t i = 0; i < open.size(); ++i) {
     const auto further = along ? ways.after(open[i].run) : ways.before(open[i].run);
     if (further.empty() || open[i].length_m > most_m || open.size() > kMostRoutes) return false;

@@ -23,11 +23,6 @@ constexpr double kAbeamM = 0.1;      // what is further ahead or behind lies bey
 constexpr int kNewtonSteps = 6;
 constexpr double kLookM = 10.0;  // from one place to the next on an edge that may come by again
 
-double heading_on(const track::Map& map, const track::EdgePosition& place) {
-  const auto pose = map.edge(place.edge)->alignment.at(place.offset_m).pose;
-  return pose.heading_rad + (place.direction == track::Direction::reverse ? core::kPi : 0);
-}
-
 /// Of a pose, or of another position.
 template <typename Place>
 double apart_m(const Place& place, const GnssPosition& position) {
@@ -85,10 +80,11 @@ void GnssSearch::add_track(const track::NearTrack& near, const Seen& seen, doubl
   }
   const bool abeam = std::abs(ahead_m) < kAbeamM;
   if (!abeam && !index_->ways().after({edge, ahead_m > 0}).empty()) return;
-  for (const auto direction : {track::Direction::forward, track::Direction::reverse}) {
-    const track::EdgePosition place{near.edge, foot_m, direction};
-    const double turned_rad = std::abs(core::wrap_pi(heading_on(index_->map(), place) - heading_rad));
-    if (turned_rad < kCrossesRad) tracks.push_back({place, abeam && turned_rad < kAlongRad});
+  for (const bool forward : {true, false}) {
+    const track::Run run{edge, forward};
+    const double into_m = run.into_m(foot_m);
+    const double turned_rad = std::abs(core::wrap_pi(run.pose_at(into_m).heading_rad - heading_rad));
+    if (turned_rad < kCrossesRad) tracks.push_back({run.at(into_m), abeam && turned_rad < kAlongRad});
   }
 }
 
@@ -96,13 +92,11 @@ std::vector<GnssSearch::Near> GnssSearch::tracks_at(const Seen& seen, double hea
   std::vector<Near> tracks;
   for (const auto& near : index_->near(seen.position.easting_m, seen.position.northing_m, seen.reach_m))
     add_track(near, seen, heading_rad, tracks);
-  const auto run_of = [&](const Near& one) {
-    return track::Run{index_->map().edge(one.place.edge), one.place.direction == track::Direction::forward};
-  };
   const auto follows_another = [&](const Near& one) {
+    const auto run = track::run_of(index_->map(), one.place);
     return std::ranges::any_of(tracks, [&](const Near& other) {
-      return std::ranges::find(index_->ways().after(run_of(other)), run_of(one)) !=
-             index_->ways().after(run_of(other)).end();
+      const auto& after = index_->ways().after(track::run_of(index_->map(), other.place));
+      return std::ranges::find(after, run) != after.end();
     });
   };
   std::vector<Near> single;  // at a joint both edges are abeam

@@ -47,18 +47,14 @@ NetworkIndex::NetworkIndex(std::shared_ptr<const track::Map> map)
 }
 
 std::vector<NetworkIndex::Beside> NetworkIndex::beside(const track::Run& run, double into_m, double within_m) const {
-  const auto heading = [](const track::Run& r, double into) {
-    const auto pose = r.edge->alignment.at(r.forward ? into : r.length_m() - into).pose;
-    return pose.heading_rad + (r.forward ? 0.0 : core::kPi);
-  };
-  const auto pose = run.edge->alignment.at(run.forward ? into_m : run.length_m() - into_m).pose;
+  const auto pose = run.pose_at(into_m);
   std::vector<Beside> found;
   for (const auto& near : finder_.near(pose.easting_m, pose.northing_m, within_m)) {
     for (const bool forward : {true, false}) {
       const track::Run other{map_->edge(near.edge), forward};
-      const double into = forward ? near.offset_m : other.length_m() - near.offset_m;
-      const double turn = core::wrap_pi(heading(other, into) - heading(run, into_m));
-      if (std::abs(turn) < kParallelRad) found.push_back({other, into});
+      const double into = other.into_m(near.offset_m);
+      const double turn_rad = core::wrap_pi(other.pose_at(into).heading_rad - pose.heading_rad);
+      if (std::abs(turn_rad) < kParallelRad) found.push_back({other, into});
     }
   }
   return found;

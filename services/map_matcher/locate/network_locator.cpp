@@ -17,10 +17,6 @@ constexpr double kWorstMisfit = 7.0;     // over 200 m
 constexpr double kMostOfRange = 1.1;     // of the odometer's scale
 constexpr double kLeastEvidence = 20.0;  // that the track is on the map at all, a log
 
-track::Direction turned_round(track::Direction direction) {
-  return direction == track::Direction::reverse ? track::Direction::forward : track::Direction::reverse;
-}
-
 }  // namespace
 
 std::string to_string(Doubt doubt) {
@@ -97,7 +93,9 @@ Location NetworkLocator::locate() {
   location.doubt = doubt_of(location, !filter.overflowed() && compared.complete, filter.evidence());
   if (run.ahead()) return location;
   // Found in the direction of the run: its front looks the other way.
-  for (auto& place : location.places) place.place.direction = turned_round(place.place.direction);
+  for (auto& found : location.places) {
+    found.place.direction = track::run_of(index_->map(), found.place).reversed().direction();
+  }
   return location;
 }
 
@@ -116,8 +114,7 @@ Doubt NetworkLocator::doubt_of(const Location& location, bool complete, double e
 // On from the last whole bin.
 LocatedPlace NetworkLocator::place_of(const WayFit& fit, const MeasuredRun& run) const {
   const auto here = place_on(fit.runs, fit.end_m + fit.scale * run.open_m());
-  const double offset_m = here.run.forward ? here.into_m : here.run.length_m() - here.into_m;
-  return {{here.run.edge->id, offset_m, here.run.forward ? track::Direction::forward : track::Direction::reverse},
+  return {here.run.at(here.into_m),
           0,
           std::hypot(fit.sigma_m, kLeastSigmaM, parameters_.lag_m / std::sqrt(12.0)),
           fit.scale,
@@ -127,8 +124,8 @@ LocatedPlace NetworkLocator::place_of(const WayFit& fit, const MeasuredRun& run)
 
 // The body of a car turns up to a bogie distance behind the foot: which leg was taken shows only further on.
 bool NetworkLocator::just_behind_switch(const LocatedPlace& place) const {
-  track::Run run{index_->map().edge(place.place.edge), place.place.direction != track::Direction::reverse};
-  double into_m = run.forward ? place.place.offset_m : run.length_m() - place.place.offset_m;
+  track::Run run = track::run_of(index_->map(), place.place);
+  double into_m = run.into_m(place.place.offset_m);
   while (into_m < kSettledM + 3 * place.sigma_m) {
     const auto before = index_->ways().before(run);
     if (before.empty()) return false;
@@ -163,9 +160,8 @@ Location NetworkLocator::sum_up(const std::vector<WayFit>& fits, const MeasuredR
 // Of the best place and those on tracks beside it.
 double NetworkLocator::beside_probability(const std::vector<LocatedPlace>& places) const {
   const auto pose_of = [&](const LocatedPlace& p) {
-    auto pose = index_->map().edge(p.place.edge)->alignment.at(p.place.offset_m).pose;
-    if (p.place.direction == track::Direction::reverse) pose.heading_rad += core::kPi;
-    return pose;
+    const auto run = track::run_of(index_->map(), p.place);
+    return run.pose_at(run.into_m(p.place.offset_m));
   };
   const auto at = pose_of(places.front());
   double sum = 0;

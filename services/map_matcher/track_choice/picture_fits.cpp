@@ -39,11 +39,10 @@ double sighting_fits(const track::Map& map, const track::Route& route, const Sig
   for (const auto& leg : route.legs()) {
     if (leg.begin_m > seen_m + 5 * sigma_m || leg.end_m() < seen_m - 5 * sigma_m) continue;
     for (const auto* landmark : map.landmarks_on(leg.run.edge->id)) {
-      const bool turned = !leg.run.forward;
       if (track::seen_along(landmark->kind, leg.run.forward) != sighting.kind) continue;
-      const double at_m = leg.begin_m + (turned ? leg.run.length_m() - landmark->offset_m : landmark->offset_m);
+      const double at_m = leg.begin_m + leg.run.into_m(landmark->offset_m);
       const double z = (at_m - seen_m) / sigma_m;
-      const double lateral_m = turned ? -landmark->lateral_m : landmark->lateral_m;
+      const double lateral_m = leg.run.forward ? landmark->lateral_m : -landmark->lateral_m;
       double side = 1;
       if (sided && std::abs(lateral_m) > kSideM) {
         side = (lateral_m > 0) == (sighting.lateral_m > 0) ? 1 - parameters.wrong_side : parameters.wrong_side;

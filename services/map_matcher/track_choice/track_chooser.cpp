@@ -29,8 +29,10 @@ void TrackChooser::start(const TrackWindow& window) {
   lost_m_ = moved_back_m_ = 0;
   place_m_ = 0;
   window_ = window;
-  const track::Run run{map_->edge(window.place.edge), window.place.direction != track::Direction::reverse};
-  hypotheses_.push_back({track::Route(run, window.place.offset_m, 0), 0, {0, std::log(parameters_.astray)}, {}});
+  hypotheses_.push_back({track::Route(track::run_of(*map_, window.place), window.place.offset_m, 0),
+                         0,
+                         {0, std::log(parameters_.astray)},
+                         {}});
   forwards_ = window.forwards;
   guess_nothing();
   open_ways_behind();

@@ -174,6 +174,13 @@ TEST_F(OnALine, CurvatureAndLandmarksAreThoseOfTheWayAhead) {
   EXPECT_DOUBLE_EQ(back[0].across_m, -3) << "on the right of who looks back";
 }
 
+TEST_F(OnALine, APortalThatLeadsInIsOneThatLeadsOutTheOtherWay) {
+  map_.landmarks.push_back({9, track::LandmarkKind::portal_in, 1, 300, 0, 0.1, ""});
+  const MapView view(map_);
+  EXPECT_EQ(view.landmarks_ahead({1, 250, track::Direction::forward}, 100).at(0).kind, track::LandmarkKind::portal_in);
+  EXPECT_EQ(view.landmarks_ahead({1, 350, track::Direction::reverse}, 100).at(0).kind, track::LandmarkKind::portal_out);
+}
+
 TEST_F(OnALine, DrawsInPixelsOfThePreview) {
   const MapView map(map_);
   const geometry::Intrinsics camera{800, 800, 320, 256, 0, 0, 0, 0, 640, 512};
