@@ -18,7 +18,7 @@ constexpr double kLongestStepM = 500.0;  // farther apart two places are no way 
 constexpr double kSameWayM = 1.0;        // a group passed again after another way than back is passed anew
 constexpr double kAtSwitchM = 10.0;      // a switch is doubted a little before the foot's estimate reaches it, ...
 constexpr double kNearSwitchM = 50.0;    // ... and where there is none behind even further
-constexpr double kDecidedM = 3000.0;     // so far behind a switch its declaration may still be taken back
+constexpr double kDeclaredM = 3000.0;    // so far behind a switch its declaration may still be taken back
 constexpr double kTurnedM = 0.3;         // less is no other direction of running
 constexpr double kBeforeSwitchM = 0.01;  // on the stem
 
@@ -58,8 +58,7 @@ BaliseTracker::BaliseTracker(std::shared_ptr<const track::Map> map, double searc
 
 void BaliseTracker::lose() {
   last_.reset();
-  undeclared_.reset();
-  decided_.reset();
+  leg_.reset();
   reference_.reset();
 }
 
@@ -81,23 +80,23 @@ void BaliseTracker::update(const EdgePosition& place, bool declared, bool heard)
 }
 
 std::optional<double> BaliseTracker::undeclared_m() const {
-  if (!undeclared_) return std::nullopt;
-  return std::abs(undeclared_->turns.way_m());
+  if (!leg_is_guess()) return std::nullopt;
+  return std::abs(leg_->turns.way_m());
 }
 
 // Where the track divides on this step the last place is the stem. Doubted elsewhere, it is an earlier declaration that
 // is taken back.
-BaliseTracker::Undeclared BaliseTracker::undeclared_since(const EdgePosition& foot) {
+BaliseTracker::LegSinceSwitch BaliseTracker::leg_since(const EdgePosition& foot) {
   if (!last_) return {};
   const auto step = step_to(foot);
-  if (step && step->divides) return undeclared_from(*last_, 0, step->way_m > 0);
-  if (decided_) return *decided_;
-  const auto path = track::Path::follow(map_, *last_, kDecidedM, kDecidedM);
+  if (step && step->divides) return leg_from(*last_, 0, step->way_m > 0);
+  if (leg_) return *leg_;
+  const auto path = track::Path::follow(map_, *last_, kDeclaredM, kDeclaredM);
   if (!path.ok()) return {};
   const double sign = forwards_ ? 1.0 : -1.0;
   std::optional<double> next_m;  // in the running direction
   std::optional<double> passed_m;
-  double met_m = -kDecidedM;  // it may have come from elsewhere
+  double met_m = -kDeclaredM;  // it may have come from elsewhere
   for (const auto& one : path.value().switches()) {
     const double further_m = sign * one.distance_m;
     if (one.ahead != forwards_ && further_m <= 0) met_m = std::max(met_m, further_m);
@@ -108,21 +107,21 @@ BaliseTracker::Undeclared BaliseTracker::undeclared_since(const EdgePosition& fo
   if (passed_m && *passed_m < met_m) passed_m.reset();
   // A little before it already, because fusion and whoever declares the track do not place the train alike.
   const bool at_next = next_m && *next_m < kAtSwitchM && !(passed_m && -*passed_m < *next_m);
-  if (at_next || (!passed_m && next_m && *next_m < kNearSwitchM)) return undeclared_from(*last_, 0, forwards_);
+  if (at_next || (!passed_m && next_m && *next_m < kNearSwitchM)) return leg_from(*last_, 0, forwards_);
   if (!passed_m) return {};
   const double stem_m = sign * (*passed_m - kBeforeSwitchM);
-  return undeclared_from(path.value().position_at(stem_m), -stem_m, forwards_);
+  return leg_from(path.value().position_at(stem_m), -stem_m, forwards_);
 }
 
 // A group beyond the switch is on one of its legs, and nobody knows whether on this one.
-BaliseTracker::Undeclared BaliseTracker::undeclared_from(const EdgePosition& stem, double way_m, bool forwards) const {
-  Undeclared undeclared{stem, reference_, {}};
-  if (way_m != 0) undeclared.turns.run(way_m);
-  auto& reference = undeclared.reference;
-  if (!reference) return undeclared;
+BaliseTracker::LegSinceSwitch BaliseTracker::leg_from(const EdgePosition& stem, double way_m, bool forwards) const {
+  LegSinceSwitch leg{stem, reference_, {}};
+  if (way_m != 0) leg.turns.run(way_m);
+  auto& reference = leg.reference;
+  if (!reference) return leg;
   reference->foot_m -= way_m;
   if (lies_further(*reference, forwards)) reference = forwards ? nearest_behind(stem) : std::nullopt;
-  return undeclared;
+  return leg;
 }
 
 // It has backed out over the switch, and goes on over another leg than the one on which its group lies.
@@ -137,34 +136,33 @@ void BaliseTracker::leave_leg(const Step& step) {
   if (!leads_there) reference_ = forwards ? nearest_behind(*last_) : std::nullopt;
 }
 
-void BaliseTracker::go_back_to(Undeclared undeclared) {
-  decided_.reset();
-  undeclared_ = std::move(undeclared);
+void BaliseTracker::go_back_to(LegSinceSwitch leg) {
+  leg_ = std::move(leg);
+  leg_declared_ = false;
   const auto* group = reference_ ? reference_->group : nullptr;
-  reference_ = undeclared_->reference;
+  reference_ = leg_->reference;
   if (group != (reference_ ? reference_->group : nullptr)) ++taken_back_;
-  if (reference_) reference_->foot_m += undeclared_->turns.way_m();
+  if (reference_) reference_->foot_m += leg_->turns.way_m();
 }
 
 void BaliseTracker::go_undeclared(const EdgePosition& foot) {
-  const bool anew = !undeclared_;
-  if (anew) go_back_to(undeclared_since(foot));
-  if (!undeclared_->from) return;
-  const double before_m = undeclared_->turns.way_m();
+  const bool anew = !leg_is_guess();
+  if (anew) go_back_to(leg_since(foot));
+  if (!leg_->from) return;
+  const double before_m = leg_->turns.way_m();
   if (const auto step = step_to(foot)) {
     note_direction(step->way_m);
-    undeclared_->turns.run(step->way_m);
+    leg_->turns.run(step->way_m);
     leave_doubted(*step);
-  } else if (const auto ways = ways_between(*map_, ways_, *undeclared_->from, foot, before_m); !ways.empty()) {
-    undeclared_->turns.run(ways.front().length_m - before_m);  // onto another leg, behind one more switch
+  } else if (const auto ways = ways_between(*map_, ways_, *leg_->from, foot, before_m); !ways.empty()) {
+    leg_->turns.run(ways.front().length_m - before_m);  // onto another leg, behind one more switch
   } else {
-    undeclared_->from.reset();
+    leg_->from.reset();
     reference_.reset();
   }
   if (!reference_) return;
-  reference_->foot_m += undeclared_->turns.way_m() - before_m;
-  if (anew || foot.edge != last_->edge)
-    doubt_legs(ways_between(*map_, ways_, *undeclared_->from, foot, undeclared_->turns.way_m()));
+  reference_->foot_m += leg_->turns.way_m() - before_m;
+  if (anew || foot.edge != last_->edge) doubt_legs(ways_between(*map_, ways_, *leg_->from, foot, leg_->turns.way_m()));
 }
 
 // The group that it runs back to may lie beyond this switch on one of its legs.
@@ -175,54 +173,55 @@ void BaliseTracker::leave_doubted(const Step& step) {
   const double most_m = std::abs(reference_->foot_m) + kLongestStepM;
   if (every_way_leads_to(*map_, ways_, *last_, forwards, reference_->group->edge, most_m)) return;
   reference_.reset();
-  undeclared_->reference.reset();
+  leg_->reference.reset();
 }
 
 // Where legs have joined again nobody knows over which one the train came.
 void BaliseTracker::doubt_legs(const std::vector<WayBetween>& ways) {
-  reference_->doubt_m = std::max(undeclared_->reference->doubt_m, most_apart_m(ways, undeclared_->turns.way_m()));
+  reference_->doubt_m = std::max(leg_->reference->doubt_m, most_apart_m(ways, leg_->turns.way_m()));
 }
 
 bool BaliseTracker::go_declared(const EdgePosition& foot) {
   if (!last_) return false;
-  if (!undeclared_) {
+  if (!leg_is_guess()) {
     if (auto step = step_to(foot)) {
       run_on(step->way_m);
       leave_leg(*step);
       pass(std::move(step->groups), step->way_m);
       return true;
     }
-    if (!decided_) return false;
-    go_back_to(*std::exchange(decided_, std::nullopt));  // another leg than was declared before
+    if (!leg_) return false;
+    go_back_to(*std::exchange(leg_, std::nullopt));  // another leg than was declared before
   }
-  auto undeclared = *std::exchange(undeclared_, std::nullopt);
-  if (!undeclared.from) return false;
+  auto leg = *std::exchange(leg_, std::nullopt);
+  if (!leg.from) return false;
   const auto step = step_to(foot);
-  const double counted_m = undeclared.turns.way_m();
+  const double counted_m = leg.turns.way_m();
   const double about_m = counted_m + (step ? step->way_m : 0.0);
-  const auto ways = ways_between(*map_, ways_, *undeclared.from, foot, about_m);
+  const auto ways = ways_between(*map_, ways_, *leg.from, foot, about_m);
   if (ways.empty()) return false;
   const double length_m = ways.front().length_m;
-  reference_ = undeclared.reference;
+  reference_ = leg.reference;
   if (reference_) reference_->doubt_m = std::max(reference_->doubt_m, most_apart_m(ways, length_m));
-  undeclared.turns.run(length_m - counted_m);
+  leg.turns.run(length_m - counted_m);
   const auto groups = groups_on(ways);
-  const auto& points = undeclared.turns.points();
+  const auto& points = leg.turns.points();
   for (size_t i = 1; i < points.size(); ++i) {
     auto passed = groups;
     for (auto& mark : passed)
       mark.way_m += length_m - points[i - 1];  // from the last place to where this stretch began
     pass(std::move(passed), points[i] - points[i - 1]);
   }
-  decided_ = std::move(undeclared);
+  leg_ = std::move(leg);
+  leg_declared_ = true;
   return true;
 }
 
 void BaliseTracker::run_on(double way_m) {
   note_direction(way_m);
-  if (!decided_) return;
-  decided_->turns.run(way_m);
-  if (std::abs(decided_->turns.way_m()) > kDecidedM) decided_.reset();
+  if (!leg_) return;
+  leg_->turns.run(way_m);
+  if (std::abs(leg_->turns.way_m()) > kDeclaredM) leg_.reset();
 }
 
 void BaliseTracker::note_direction(double way_m) {
@@ -245,7 +244,7 @@ std::vector<BaliseTracker::Passed> BaliseTracker::groups_on(const std::vector<Wa
     for (auto next = ways_.before(route.legs().front().run); next.size() == 1 && route.begin_m() > -reach_m;
          next = ways_.before(next.front()))
       route.push_behind(next.front());
-    const auto path = track::Path::along(map_, route);
+    const auto path = track::Path::along(map_, route, ways_);
     if (&way == &ways.front()) {
       for (const auto& mark : path.balise_groups())
         common.push_back({mark.group, mark.distance_m, mark.nominal_is_along_path});
@@ -266,7 +265,7 @@ std::vector<BaliseTracker::Passed> BaliseTracker::groups_on(const std::vector<Wa
 
 std::optional<double> BaliseTracker::foot_beyond_m(uint32_t nid_lrbg) const {
   if (reference_ && reference_->group->nid_lrbg() == nid_lrbg) return reference_->foot_m;
-  if (!last_ || undeclared_) return std::nullopt;
+  if (!last_ || leg_is_guess()) return std::nullopt;
   const auto path = track::Path::follow(map_, *last_, 0, search_behind_m_);
   if (!path.ok()) return std::nullopt;
   std::optional<double> beyond_m;
@@ -344,7 +343,7 @@ void BaliseTracker::pass(std::vector<Passed> passed, double step_m) {
 }
 
 void BaliseTracker::acquire(const EdgePosition& foot) {
-  decided_.reset();
+  leg_.reset();
   reference_ = nearest_behind(foot);
 }
 
