@@ -22,7 +22,6 @@ constexpr uint64_t kRoomToBegin = 2;
 constexpr double kRoomToGoOn = 1.5;
 // The train's other work comes first.
 constexpr int kNice = 10;
-constexpr uint64_t kBytesPerMb = 1'000'000;
 
 std::string mb_text(uint64_t bytes) {
   return std::to_string(bytes / kBytesPerMb + 1) + " MB";
@@ -105,7 +104,7 @@ void Housekeeper::recover_next() {
   cut_off_.erase(next);
   std::error_code failed;
   // Somebody may have taken it away meanwhile, or be repairing it.
-  if (!fs::exists(file, failed) || mcap::being_written(mcap::recovered_name(file).string() + ".active")) return;
+  if (!fs::exists(file, failed) || mcap::being_written(mcap::recovered_name(file).string() + kActive)) return;
   if (state == CutOff::State::new_to_us && !makes_room_for(file)) {
     cut_off_.push_back({file, CutOff::State::without_room});
     return;

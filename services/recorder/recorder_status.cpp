@@ -6,7 +6,6 @@ namespace railfix::recorder {
 
 namespace {
 
-constexpr double kBytesPerMb = 1e6;
 // Of the strings and the list in recorder.idl.
 constexpr size_t kMostText = 255;
 constexpr size_t kMostTopic = 63;

@@ -3,7 +3,6 @@
 #include <utility>
 
 #include "core/time.hpp"
-#include "core/whole_file.hpp"
 
 namespace railfix::recorder {
 
@@ -13,13 +12,7 @@ namespace fs = std::filesystem;
 
 constexpr int64_t kTickNs = core::kNsPerSecond / 4;
 constexpr int64_t kSplitAgainNs = core::kNsPerSecond;
-constexpr double kBytesPerMb = 1e6;
 constexpr double kRoomAgain = 2;  // times keep_free_mb: enough to record for some time
-
-mcap::Compression compression_of(const std::string& name) {
-  if (name == "none") return mcap::Compression::none;
-  return name == "lz4" ? mcap::Compression::lz4 : mcap::Compression::zstd;
-}
 
 std::string type_of_topic(const std::string& name) {
   const auto* topic = messaging::find_topic(name);
@@ -29,8 +22,8 @@ std::string type_of_topic(const std::string& name) {
 }  // namespace
 
 RecorderThread::RecorderThread(const RecorderConfig& config, messaging::Participant& participant,
-                               std::map<std::string, std::string> about, std::function<void(int64_t)> on_picture)
-    : config_(config), about_(std::move(about)), on_picture_(std::move(on_picture)) {
+                               const std::map<std::string, std::string>& about, std::function<void(int64_t)> on_picture)
+    : config_(config), maker_(config, about), on_picture_(std::move(on_picture)) {
   for (const auto& rule : config_.events) {
     rules_.push_back(core::value_or_throw(EventRule::parse(rule, type_of_topic)));
   }
@@ -38,13 +31,12 @@ RecorderThread::RecorderThread(const RecorderConfig& config, messaging::Particip
   const bool ours = config_.file.empty();
   const double quota_mb = ours ? config_.quota_mb : 0;
   housekeeper_ = std::make_unique<Housekeeper>(
-      folder(), FolderRules{static_cast<uint64_t>(quota_mb * kBytesPerMb),
-                            static_cast<uint64_t>(config_.keep_free_mb * kBytesPerMb), ours});
-  if (ours) number_ = next_number(folder());
-  inlet_ = std::make_unique<TopicInlet>(config_, participant, about_.at("train_id"), queue_,
+      maker_.folder(), FolderRules{static_cast<uint64_t>(quota_mb * kBytesPerMb),
+                                   static_cast<uint64_t>(config_.keep_free_mb * kBytesPerMb), ours});
+  inlet_ = std::make_unique<TopicInlet>(config_, participant, about.at("train_id"), queue_,
                                         [this](const Arrival& arrival) { use(arrival); });
   if (config_.ring_s > 0) ring_.emplace(config_.ring_s, static_cast<uint64_t>(config_.ring_mb * kBytesPerMb));
-  writer_thread_ = std::thread([this] { turn(); });
+  writer_thread_ = std::thread([this] { run(); });
   if (!ring_) return;
   const auto opened = in_thread([this]() -> core::Result<std::string> {
     const auto status = inlet_->open();
@@ -119,29 +111,11 @@ RecorderState RecorderThread::take_state() {
   return taken;
 }
 
-fs::path RecorderThread::folder() const {
-  if (config_.file.empty()) return config_.folder;
-  const fs::path file(config_.file);
-  return file.has_parent_path() ? file.parent_path() : fs::path(".");
-}
-
-// With `file` that one first, then others beside it: a second start must not take away what the first one recorded.
-fs::path RecorderThread::next_name() {
-  if (config_.file.empty()) return new_name(config_.folder, about_.at("train_id"), core::wall_ns());
-  const fs::path first(config_.file);
-  if (!std::exchange(file_begun_, true)) return first;
-  fs::path next;
-  for (int i = 2; next.empty() || is_taken(next); ++i) {
-    next = first.parent_path() / (first.stem().string() + "-" + std::to_string(i) + first.extension().string());
-  }
-  return next;
-}
-
 core::Result<std::string> RecorderThread::begin(const fs::path& file) {
   if (recording_) return core::Error{recording_->file().string() + " is being recorded already; stop it first"};
-  const fs::path name = file.empty() ? next_name() : file;
+  const fs::path name = file.empty() ? maker_.next_name() : file;
   count_dropped();  // not of this file
-  auto created = create(name);
+  auto created = maker_.create(name);
   if (!created.ok()) {
     problem_ = created.error().message;
     return created.error();
@@ -165,39 +139,11 @@ core::Result<std::string> RecorderThread::begin(const fs::path& file) {
   return name.string();
 }
 
-mcap::WriterOptions RecorderThread::writer_options() const {
-  mcap::WriterOptions options;
-  options.chunk_bytes = static_cast<uint64_t>(config_.chunk_mb * kBytesPerMb);
-  options.chunk_age_s = config_.chunk_age_s;
-  options.sync_period_s = config_.sync_period_s;
-  options.compression = compression_of(config_.compression);
-  options.library = "railfix recorder " + about_.at("version");
-  return options;
-}
-
-const std::map<std::string, std::string>& RecorderThread::about_next() {
-  if (number_ > 0) about_[kNumberKey] = std::to_string(number_++);
-  return about_;
-}
-
-core::Result<std::unique_ptr<Recording>> RecorderThread::create(const fs::path& file) {
-  mcap::WriterOptions options = writer_options();
-  options.overwrite = !config_.file.empty() && file == config_.file;
-  about_["started_ns"] = std::to_string(core::wall_ns());
-  auto recording = Recording::create(file, options, about_next());
-  const auto text = core::read_whole(config_.train_file);
-  if (!recording.ok() || !text.ok()) return recording;
-  const auto status = recording.value()->write_metadata(
-      {"railfix_configuration", {{"file", config_.train_file}, {"text", without_secrets(text.value())}}});
-  if (!status.ok()) return status.error();
-  return recording;
-}
-
 void RecorderThread::record_into(std::unique_ptr<Recording> recording) {
   recording_ = std::move(recording);
-  recording_started_ns_ = core::wall_ns();
-  recording_begun_ns_ = core::monotonic_ns();
-  rated_ns_ = recording_begun_ns_;
+  opened_wall_ns_ = core::wall_ns();
+  opened_monotonic_ns_ = core::monotonic_ns();
+  rated_ns_ = opened_monotonic_ns_;
   rated_bytes_ = 0;
   problem_.clear();
   split_problem_.clear();
@@ -208,14 +154,14 @@ void RecorderThread::record_into(std::unique_ptr<Recording> recording) {
 void RecorderThread::split_if_due() {
   if (!config_.file.empty()) return;
   const bool large = config_.split_mb > 0 && static_cast<double>(recording_->bytes()) >= config_.split_mb * kBytesPerMb;
-  const double age_s = core::seconds(core::monotonic_ns() - recording_begun_ns_);
+  const double age_s = core::seconds(core::monotonic_ns() - opened_monotonic_ns_);
   if (!large && (config_.split_min <= 0 || age_s < config_.split_min * 60)) return;
   if (!split_problem_.empty() && core::monotonic_ns() < split_again_ns_) return;
-  const fs::path name = new_name(config_.folder, about_.at("train_id"), core::wall_ns());
-  auto next = create(name);
+  const fs::path name = maker_.timed_name();
+  auto next = maker_.create(name);
   if (!next.ok()) {
     std::error_code failed;
-    for (const auto& begun : {name, fs::path(name.string() + ".active")}) fs::remove(begun, failed);
+    for (const auto& begun : {name, fs::path(name.string() + kActive)}) fs::remove(begun, failed);
     split_problem_ = "no new file can be begun, " + recording_->file().string() + " goes on: " + next.error().message;
     split_again_ns_ = core::monotonic_ns() + kSplitAgainNs;
     return;
@@ -290,7 +236,7 @@ void RecorderThread::count_dropped() {
   }
 }
 
-void RecorderThread::turn() {
+void RecorderThread::run() {
   while (!ending_) {
     try {
       queue_.run_one(core::monotonic_ns() + kTickNs);
@@ -333,10 +279,9 @@ void RecorderThread::tick() {
 }
 
 bool RecorderThread::disk_has_less_than(double times) const {
-  std::error_code failed;
-  const fs::path file = recording_ ? recording_->file() : folder() / "";
-  const auto space = fs::space(file.has_parent_path() ? file.parent_path() : fs::path("."), failed);
-  return !failed && static_cast<double>(space.available) < times * config_.keep_free_mb * kBytesPerMb;
+  const fs::path file = recording_ ? recording_->file() : maker_.folder() / "";
+  const uint64_t free = free_bytes(file.has_parent_path() ? file.parent_path() : fs::path("."));
+  return static_cast<double>(free) < times * config_.keep_free_mb * kBytesPerMb;
 }
 
 void RecorderThread::guard_disk() {
@@ -402,7 +347,7 @@ void RecorderThread::publish_state() {
   for (const auto& closing : closing_events_) now.waiting_bytes += closing->waiting_bytes();
   if (recording_) {
     now.file = recording_->file().string();
-    now.started_ns = recording_started_ns_;
+    now.started_ns = opened_wall_ns_;
     now.messages = recording_->samples();
     now.bytes = recording_->bytes();
     now.lost = recording_->lost_samples();

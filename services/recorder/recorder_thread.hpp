@@ -1,6 +1,4 @@
-// The recorder's own threads: one that takes samples from the topics and writes them, one that encodes pictures
-// (TopicInlet), one for each event's file (EventFile), one that looks after the folder (Housekeeper). The disk may
-// stall there without the service looking frozen.
+// The recorder beside the service: the disk may stall in its threads without the service looking frozen.
 #pragma once
 
 #include <future>
@@ -11,6 +9,7 @@
 #include "recorder/event_file.hpp"
 #include "recorder/event_rule.hpp"
 #include "recorder/housekeeper.hpp"
+#include "recorder/recording_maker.hpp"
 #include "recorder/ring.hpp"
 #include "recorder/topic_inlet.hpp"
 
@@ -43,12 +42,17 @@ struct RecorderState {
   std::vector<News> news;  // since the last call of take_state()
 };
 
+/// `writer_thread_` takes samples from the topics and writes them; the members are its own, but for `queue_`,
+/// `housekeeper_` and `state_`, which any thread may use. The other threads belong to what it owns: the inlet has one
+/// that encodes pictures, the housekeeper one that looks after the folder, each event's file one that writes it, and
+/// after a split `closing_` is one that closes the file before. They touch no member: what they have to say comes
+/// through `queue_` or is asked for.
 class RecorderThread {
  public:
   /// `on_picture` is called from the recorder's thread with the stamp of each picture that was dealt with. Throws
   /// BadInput for an event rule that cannot be meant, or a topic that cannot be read.
   RecorderThread(const RecorderConfig& config, messaging::Participant& participant,
-                 std::map<std::string, std::string> about, std::function<void(int64_t stamp_ns)> on_picture);
+                 const std::map<std::string, std::string>& about, std::function<void(int64_t stamp_ns)> on_picture);
   /// Closes all files.
   ~RecorderThread();
   RecorderThread(const RecorderThread&) = delete;
@@ -68,18 +72,14 @@ class RecorderThread {
  private:
   void close_all();
   core::Result<std::string> in_thread(const std::function<core::Result<std::string>()>& work);
-  [[nodiscard]] std::filesystem::path next_name();
   core::Result<std::string> begin(const std::filesystem::path& file);
-  /// What is known of the recording that is made next.
-  const std::map<std::string, std::string>& about_next();
-  core::Result<std::unique_ptr<Recording>> create(const std::filesystem::path& file);
   void record_into(std::unique_ptr<Recording> recording);
   core::Result<std::string> end();
   core::Result<std::string> set_paused(bool paused);
   void split_if_due();
   core::Status wait_for_closing();
   void write_standing();
-  void turn();
+  void run();
   void fail(const std::string& why);
   void tick();
   void count_dropped();
@@ -95,12 +95,9 @@ class RecorderThread {
   core::Result<std::string> keep_event(const EventNote& note, bool by_hand);
   void tend_event_files(bool all);
   void say(const std::string& sentence, bool bad);
-  [[nodiscard]] mcap::WriterOptions writer_options() const;
-  [[nodiscard]] std::filesystem::path folder() const;
 
   RecorderConfig config_;
-  std::map<std::string, std::string> about_;
-  uint64_t number_ = 0;  // of the next recording; 0 = the folder is not ours
+  RecordingMaker maker_;
   std::function<void(int64_t)> on_picture_;
   std::vector<EventRule> rules_;
   std::map<const EventRule*, int64_t> rule_happened_ns_;
@@ -111,10 +108,9 @@ class RecorderThread {
   std::unique_ptr<Recording> recording_;
   bool paused_ = false;
   bool stopped_by_disk_ = false;       // begins again by itself
-  bool file_begun_ = false;            // the one that is configured
   std::future<core::Status> closing_;  // the file before
-  int64_t recording_begun_ns_ = 0;
-  int64_t recording_started_ns_ = 0;  // host clock
+  int64_t opened_monotonic_ns_ = 0;    // `recording_`
+  int64_t opened_wall_ns_ = 0;
   std::map<std::string, SamplePtr> standing_;
   std::map<std::pair<std::string, Loss>, uint64_t> dropped_;  // seen so far
   std::optional<Ring> ring_;

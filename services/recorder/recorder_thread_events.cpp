@@ -8,7 +8,6 @@ namespace railfix::recorder {
 
 namespace {
 
-constexpr double kBytesPerMb = 1e6;
 // One rule may make so many events: a rule that flickers must not fill the disk and the log.
 constexpr int64_t kRulePeriodNs = core::kNsPerSecond;
 // Events that follow each other share a file of at most so many times the length of one.
@@ -70,9 +69,7 @@ core::Result<std::string> RecorderThread::keep_event(const EventNote& note, bool
   if (!by_hand && static_cast<double>(housekeeper_->survey().event_bytes) >= config_.events_mb * kBytesPerMb) {
     return core::Error{"no file for it: the files of events take more than events_mb; remove some"};
   }
-  auto made =
-      EventFile::create(new_name(folder(), about_.at("train_id"), core::wall_ns(), kEventKind), writer_options(),
-                        about_next(), note, ring_->snapshot(), static_cast<uint64_t>(config_.ring_mb * kBytesPerMb));
+  auto made = maker_.create_event_file(note, ring_->snapshot());
   if (!made.ok()) return made.error();
   event_file_ = std::move(made).value();
   event_begun_ns_ = now_ns;

@@ -6,6 +6,7 @@
 #include <ctime>
 #include <fstream>
 #include <limits>
+#include <optional>
 #include <string_view>
 #include <tuple>
 
@@ -18,7 +19,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kActive = ".active";
 constexpr const char* kEnding = ".mcap";
 constexpr const char* kRecovered = "-recovered";
 constexpr const char* kProtected = ".protected";
@@ -83,6 +83,13 @@ fs::path marker_of(const fs::path& recording) {
   return recording.string() + kProtected;
 }
 
+/// Nothing when it cannot be told.
+std::optional<uint64_t> disk_free(const fs::path& folder) {
+  std::error_code failed;
+  const auto space = fs::space(folder, failed);
+  return failed ? std::nullopt : std::optional<uint64_t>(space.available);
+}
+
 }  // namespace
 
 bool is_taken(const fs::path& recording) {
@@ -122,9 +129,7 @@ Survey survey(const fs::path& folder) {
     ++all.protected_files;
     all.protected_bytes += found.bytes;
   }
-  std::error_code failed;
-  const auto space = fs::space(folder, failed);
-  if (!failed) all.disk_free_bytes = space.available;
+  all.disk_free_bytes = disk_free(folder).value_or(0);
   return all;
 }
 
@@ -228,9 +233,7 @@ std::vector<std::string> make_room(const fs::path& folder, uint64_t bytes, const
 }
 
 uint64_t free_bytes(const fs::path& folder) {
-  std::error_code failed;
-  const auto space = fs::space(folder, failed);
-  return failed ? std::numeric_limits<uint64_t>::max() / 2 : space.available;
+  return disk_free(folder).value_or(std::numeric_limits<uint64_t>::max() / 2);
 }
 
 }  // namespace railfix::recorder

@@ -17,6 +17,12 @@
 
 namespace railfix::recorder {
 
+/// As "MB" is meant in the configuration, in recorder_status and in sentences.
+inline constexpr uint64_t kBytesPerMb = 1'000'000;
+
+/// Behind the name of a recording that is being written.
+inline constexpr const char* kActive = ".active";
+
 /// This recording exists, closed or open. Of a place that cannot be looked at the answer is no: who creates a file
 /// there says why.
 bool is_taken(const std::filesystem::path& recording);
@@ -41,7 +47,7 @@ struct Survey {
   uint64_t bytes = 0;
   uint64_t protected_bytes = 0;
   uint64_t event_bytes = 0;      // of recordings around events
-  uint64_t disk_free_bytes = 0;  // for this user
+  uint64_t disk_free_bytes = 0;  // for this user; 0 when it cannot be told
 };
 Survey survey(const std::filesystem::path& folder);
 

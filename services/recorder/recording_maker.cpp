@@ -1,0 +1,84 @@
+#include "recorder/recording_maker.hpp"
+
+#include <utility>
+
+#include "core/time.hpp"
+#include "core/whole_file.hpp"
+#include "recorder/recordings_folder.hpp"
+
+namespace railfix::recorder {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+mcap::Compression compression_of(const std::string& name) {
+  if (name == "none") return mcap::Compression::none;
+  return name == "lz4" ? mcap::Compression::lz4 : mcap::Compression::zstd;
+}
+
+}  // namespace
+
+RecordingMaker::RecordingMaker(const RecorderConfig& config, std::map<std::string, std::string> about)
+    : config_(config), about_(std::move(about)) {
+  if (config_.file.empty()) number_ = next_number(folder());
+}
+
+fs::path RecordingMaker::folder() const {
+  if (config_.file.empty()) return config_.folder;
+  const fs::path file(config_.file);
+  return file.has_parent_path() ? file.parent_path() : fs::path(".");
+}
+
+// A second start must not take away what the first one recorded.
+fs::path RecordingMaker::next_name() {
+  if (config_.file.empty()) return timed_name();
+  const fs::path first(config_.file);
+  if (!std::exchange(file_begun_, true)) return first;
+  fs::path next;
+  for (int i = 2; next.empty() || is_taken(next); ++i) {
+    next = first.parent_path() / (first.stem().string() + "-" + std::to_string(i) + first.extension().string());
+  }
+  return next;
+}
+
+fs::path RecordingMaker::timed_name() const {
+  return new_name(config_.folder, about_.at("train_id"), core::wall_ns());
+}
+
+mcap::WriterOptions RecordingMaker::writer_options() const {
+  mcap::WriterOptions options;
+  options.chunk_bytes = static_cast<uint64_t>(config_.chunk_mb * kBytesPerMb);
+  options.chunk_age_s = config_.chunk_age_s;
+  options.sync_period_s = config_.sync_period_s;
+  options.compression = compression_of(config_.compression);
+  options.library = "railfix recorder " + about_.at("version");
+  return options;
+}
+
+const std::map<std::string, std::string>& RecordingMaker::about_next() {
+  if (number_ > 0) about_[kNumberKey] = std::to_string(number_++);
+  return about_;
+}
+
+core::Result<std::unique_ptr<Recording>> RecordingMaker::create(const fs::path& file) {
+  mcap::WriterOptions options = writer_options();
+  options.overwrite = !config_.file.empty() && file == config_.file;
+  about_["started_ns"] = std::to_string(core::wall_ns());
+  auto recording = Recording::create(file, options, about_next());
+  const auto text = core::read_whole(config_.train_file);
+  if (!recording.ok() || !text.ok()) return recording;
+  const auto status = recording.value()->write_metadata(
+      {"railfix_configuration", {{"file", config_.train_file}, {"text", without_secrets(text.value())}}});
+  if (!status.ok()) return status.error();
+  return recording;
+}
+
+core::Result<std::unique_ptr<EventFile>> RecordingMaker::create_event_file(const EventNote& note,
+                                                                           const Ring::Snapshot& before) {
+  const fs::path file = new_name(folder(), about_.at("train_id"), core::wall_ns(), kEventKind);
+  return EventFile::create(file, writer_options(), about_next(), note, before,
+                           static_cast<uint64_t>(config_.ring_mb * kBytesPerMb));
+}
+
+}  // namespace railfix::recorder

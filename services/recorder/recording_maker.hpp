@@ -1,0 +1,42 @@
+// The files that the recorder begins: their names and numbers, how they are written, and what they say of the train.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "recorder/event_file.hpp"
+#include "recorder/recorder_config.hpp"
+
+namespace railfix::recorder {
+
+/// Not thread safe.
+class RecordingMaker {
+ public:
+  /// `about`: what the metadata record `railfix` says, with "train_id" and "version". To be made before anything is
+  /// recorded: the highest number in the folder is looked for.
+  RecordingMaker(const RecorderConfig& config, std::map<std::string, std::string> about);
+
+  /// With `recorder.file` that file's: it belongs to somebody else.
+  [[nodiscard]] std::filesystem::path folder() const;
+  /// With `recorder.file` that one first, then others beside it.
+  [[nodiscard]] std::filesystem::path next_name();
+  /// In the folder of the recordings, for this moment.
+  [[nodiscard]] std::filesystem::path timed_name() const;
+
+  core::Result<std::unique_ptr<Recording>> create(const std::filesystem::path& file);
+  core::Result<std::unique_ptr<EventFile>> create_event_file(const EventNote& note, const Ring::Snapshot& before);
+
+ private:
+  [[nodiscard]] mcap::WriterOptions writer_options() const;
+  /// With the number of the next one.
+  const std::map<std::string, std::string>& about_next();
+
+  RecorderConfig config_;
+  std::map<std::string, std::string> about_;
+  uint64_t number_ = 0;      // of the next recording; 0 = the folder is not ours
+  bool file_begun_ = false;  // the one that is configured
+};
+
+}  // namespace railfix::recorder
