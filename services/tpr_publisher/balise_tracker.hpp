@@ -33,6 +33,12 @@ struct Reference {
 ///
 /// A declaration may be taken back, or another leg be declared: then the groups taken on the leg count no more, and the
 /// one before the switch is the reference again. Doubted without a switch to go back to, no group is known.
+///
+/// So it is in one of three states. No switch is open: groups count as they are passed. The leg is a guess: groups
+/// wait. The leg was declared, and the switch is less than 3 km away: groups count, and may be taken back. From the
+/// first and the third go_undeclared() leads to the second. From the second go_declared() leads to the third, or, where
+/// no way is known that the train may have come, with acquire() to the first; from the third, where the place lies on
+/// another leg, the same way. run_on() leads from the third to the first at 3 km, lose() from any to the first.
 class BaliseTracker {
  public:
   /// At the start, and after a jump to another track, the nearest group up to `search_behind_m` behind the train is
@@ -65,20 +71,21 @@ class BaliseTracker {
     std::vector<Passed> groups{};  // near it, passed or not
     bool divides = false;          // over a switch that could have led elsewhere
   };
-  struct Undeclared {
-    std::optional<track::EdgePosition> from;  // the last declared place; nothing = there was none
+  struct LegSinceSwitch {
+    std::optional<track::EdgePosition> from;  // before the switch; nothing = no place is known to go back to
     std::optional<Reference> reference;       // there
     Turns turns;
   };
+  [[nodiscard]] bool leg_is_guess() const { return leg_ && !leg_declared_; }
   [[nodiscard]] std::optional<Step> step_to(const track::EdgePosition& foot) const;
   [[nodiscard]] std::optional<Step> step_on_edge(const track::EdgePosition& foot) const;
   [[nodiscard]] std::optional<Step> step_over_edges(const track::EdgePosition& foot) const;
-  [[nodiscard]] Undeclared undeclared_since(const track::EdgePosition& foot);
+  [[nodiscard]] LegSinceSwitch leg_since(const track::EdgePosition& foot);
   /// The stem lies `way_m` behind the last place (along; 0 = it is the last place).
-  [[nodiscard]] Undeclared undeclared_from(const track::EdgePosition& stem, double way_m, bool forwards) const;
+  [[nodiscard]] LegSinceSwitch leg_from(const track::EdgePosition& stem, double way_m, bool forwards) const;
   void leave_leg(const Step& step);
   void note_direction(double way_m);
-  void go_back_to(Undeclared undeclared);
+  void go_back_to(LegSinceSwitch leg);
   void leave_doubted(const Step& step);
   void go_undeclared(const track::EdgePosition& foot);
   void doubt_legs(const std::vector<WayBetween>& ways);
@@ -95,8 +102,8 @@ class BaliseTracker {
   std::unordered_map<uint32_t, std::vector<const track::BaliseGroup*>> groups_on_;  // edge id
   double search_behind_m_;
   std::optional<track::EdgePosition> last_;
-  std::optional<Undeclared> undeclared_;
-  std::optional<Undeclared> decided_;  // the same after its track was declared, run on since then
+  std::optional<LegSinceSwitch> leg_;
+  bool leg_declared_ = false;  // of `leg_`, when there is one
   std::optional<Reference> reference_;
   uint32_t taken_back_ = 0;
   bool forwards_ = true;  // the way that the train runs, seen from the cab
