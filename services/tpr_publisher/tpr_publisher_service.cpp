@@ -23,10 +23,8 @@ std::shared_ptr<const track::Map> load_map(const std::string& file) {
 
 TprPublisherService::TprPublisherService(const Config& config, service::Context& context)
     : context_(context),
-      has_map_(!config.map.empty()),
-      baseline_(config.settings().report.baseline),
-      map_(load_map(config.map)),
       settings_(config.settings()),
+      map_(load_map(config.map)),
       publisher_(map_, settings_),
       told_(publisher_),
       writer_(context.writer(messaging::topics::train_position_report)) {
@@ -133,7 +131,7 @@ void TprPublisherService::on_state(const msg::TrainState& state) {
     report_trouble_ = std::move(left_out);
   } else if (!reference_known_) {
     report_trouble_ =
-        !has_map_                    ? "Reports say LRBG unknown: tpr_publisher.map is not set."
+        !map_                        ? "Reports say LRBG unknown: tpr_publisher.map is not set."
         : state.track_known() == 0   ? "Reports say LRBG unknown: the track is not known."
         : !position.usable           ? "Reports say LRBG unknown: the position is unusable; fusion's status says why."
         : !position.track_known      ? "Reports say LRBG unknown: train_state is of another map than tpr_publisher.map."
@@ -176,7 +174,7 @@ void TprPublisherService::on_tick() {
 
 void TprPublisherService::send(const Report& report, int64_t grabbed_ns) {
   to_ground(report);  // the store's thread begins with it at once, whatever becomes of the sample on the train
-  auto message = message_of(report, baseline_);
+  auto message = message_of(report, settings_.report.baseline);
   message.seq(seq_);
   if (!writer_.write(message)) {
     context_.log().error("A position report could not be sent.");
@@ -195,7 +193,7 @@ void TprPublisherService::to_ground(const Report& report) {
   ground.host = context_.common().host;
   ground.stamp_ns = report.stamp_ns;
   ground.sent_ns = report.sent_ns;
-  ground.baseline = static_cast<uint32_t>(baseline_);
+  ground.baseline = static_cast<uint32_t>(settings_.report.baseline);
   ground.reason = static_cast<uint32_t>(report.reason);
   ground.message = report.message;
   ground_link_->send(std::move(ground));

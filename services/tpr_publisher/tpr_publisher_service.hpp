@@ -41,10 +41,8 @@ class TprPublisherService {
   void show();
 
   service::Context& context_;
-  bool has_map_;
-  etcs::Baseline baseline_;
-  std::shared_ptr<const track::Map> map_;
   Settings settings_;
+  std::shared_ptr<const track::Map> map_;  // nullptr = none is set
   TprPublisher publisher_;
   ToldParameters told_;
   std::string kept_;  // of told_, as a later process finds it

@@ -39,11 +39,12 @@ bool move_aside(const fs::path& file) {
 struct ReportStore::Database {
   std::unique_ptr<sqlite3, Close> handle;
   std::string file;
+  bool check_failed = false;  // SQLite itself calls that no error
 
   [[nodiscard]] core::Error error() const { return {file + ": " + sqlite3_errmsg(handle.get()) + "."}; }
   [[nodiscard]] bool damaged() const {
     const int code = sqlite3_errcode(handle.get());
-    return code == SQLITE_CORRUPT || code == SQLITE_NOTADB;
+    return check_failed || code == SQLITE_CORRUPT || code == SQLITE_NOTADB;
   }
 
   core::Status run(const char* sql) const {
@@ -74,8 +75,10 @@ core::Status ReportStore::begin(const fs::path& file) {
   if (!ready.ok()) return ready;
   const auto check = database_->prepare("PRAGMA quick_check(1)");
   if (!check || sqlite3_step(check.get()) != SQLITE_ROW) return database_->error();
-  if (std::string(reinterpret_cast<const char*>(sqlite3_column_text(check.get(), 0))) != "ok")
+  if (std::string(reinterpret_cast<const char*>(sqlite3_column_text(check.get(), 0))) != "ok") {
+    database_->check_failed = true;
     return core::Error{file.string() + ": damaged."};
+  }
   const auto stream = database_->prepare("SELECT id FROM stream");
   if (!stream) return database_->error();
   if (sqlite3_step(stream.get()) == SQLITE_ROW) {
@@ -98,7 +101,7 @@ core::Result<ReportStore> ReportStore::open(const fs::path& file) {
   ReportStore store;
   const auto begun = store.begin(file);
   if (begun.ok()) return store;
-  const bool damaged = store.database_->damaged() || begun.error().message.ends_with(": damaged.");
+  const bool damaged = store.database_->damaged();
   store.database_.reset();
   if (!damaged) return begun.error();
   // SQLite calls it damage when the disk gives EIO, too: it may be whole.
