@@ -32,36 +32,36 @@ RecorderService::RecorderService(const Config& config, service::Context& context
     : config_(config),
       context_(context),
       status_(context.writer(messaging::topics::recorder_status)),
-      thread_(config, context.participant(), about(), [this, &context](int64_t stamp_ns) {
+      recorder_(config, context.participant(), about(), [this, &context](int64_t stamp_ns) {
         if (context.common().lock_step) {
           context.post([this, stamp_ns] { recorded_ns_ = std::max(recorded_ns_, stamp_ns); });
         }
       }) {
-  context_.turn_ends_when([this](int64_t data_ns) { return recorded_ns_ >= data_ns || !thread_.state().recording; });
+  context_.turn_ends_when([this](int64_t data_ns) { return recorded_ns_ >= data_ns || !recorder_.state().recording; });
   add_commands();
   context_.every(kStatePeriod, [this] { show_state(); });
   context_.at_stop([this] {
-    if (thread_.state().recording) (void)stop();
+    if (recorder_.state().recording) (void)stop();
     show_state();
   });
   if (config_.autostart) core::value_or_throw(start(""));
-  thread_.housekeeper().recover();  // takes minutes for a large file: what is recorded now comes first
+  recorder_.housekeeper().recover();  // takes minutes for a large file: what is recorded now comes first
 }
 
 void RecorderService::add_commands() {
   context_.on_command("start", [this](const std::string& file) { return start(file); });
   context_.on_command("stop", [this](const std::string&) { return stop(); });
-  context_.on_command("pause", [this](const std::string&) { return logged(thread_.pause()); });
-  context_.on_command("resume", [this](const std::string&) { return logged(thread_.resume()); });
+  context_.on_command("pause", [this](const std::string&) { return logged(recorder_.pause()); });
+  context_.on_command("resume", [this](const std::string&) { return logged(recorder_.resume()); });
   context_.on_command("event", [this](const std::string& text) {
     context_.log().info("event by hand: {}", text);
-    return logged(thread_.event(text));
+    return logged(recorder_.event(text));
   });
   context_.on_command("protect", [this](const std::string& file) {
-    return logged(thread_.housekeeper().protect(file, "protected by hand"));
+    return logged(recorder_.housekeeper().protect(file, "protected by hand"));
   });
   context_.on_command("unprotect",
-                      [this](const std::string& file) { return logged(thread_.housekeeper().unprotect(file)); });
+                      [this](const std::string& file) { return logged(recorder_.housekeeper().unprotect(file)); });
 }
 
 core::Result<std::string> RecorderService::logged(core::Result<std::string> done) {
@@ -82,7 +82,7 @@ std::map<std::string, std::string> RecorderService::about() const {
 }
 
 core::Result<std::string> RecorderService::start(const std::string& file) {
-  auto started = thread_.start(file);
+  auto started = recorder_.start(file);
   if (started.ok()) {
     lost_ = lost_here_ = 0;
     context_.log().info("recording {}", started.value());
@@ -91,7 +91,7 @@ core::Result<std::string> RecorderService::start(const std::string& file) {
 }
 
 core::Result<std::string> RecorderService::stop() {
-  auto stopped = thread_.stop();
+  auto stopped = recorder_.stop();
   if (stopped.ok()) {
     context_.log().info("closed {}", stopped.value());
   } else {
@@ -101,7 +101,7 @@ core::Result<std::string> RecorderService::stop() {
 }
 
 void RecorderService::show_state() {
-  const RecorderState now = thread_.take_state();
+  const RecorderState now = recorder_.take_state();
   if (!now.failure.empty()) throw std::runtime_error(now.failure);
   for (; received_ < now.received; ++received_) context_.health().input();
   for (; written_ < now.written; ++written_) context_.health().output(0);
@@ -109,8 +109,8 @@ void RecorderService::show_state() {
   for (const auto& news : now.news) {
     context_.log().log(news.bad ? spdlog::level::err : spdlog::level::info, "{}", news.sentence);
   }
-  for (const auto& sentence : thread_.housekeeper().take_sentences()) context_.log().info("{}", sentence);
-  for (const auto& sentence : thread_.housekeeper().take_warnings()) context_.log().warn("{}", sentence);
+  for (const auto& sentence : recorder_.housekeeper().take_sentences()) context_.log().info("{}", sentence);
+  for (const auto& sentence : recorder_.housekeeper().take_warnings()) context_.log().warn("{}", sentence);
   show_health(now);
   publish(now);
 }
@@ -134,7 +134,7 @@ void RecorderService::note_losses(const RecorderState& now) {
 
 void RecorderService::show_health(const RecorderState& now) {
   const bool loses = core::monotonic_ns() < loses_until_ns_;
-  const std::string recovering = thread_.housekeeper().recovering();
+  const std::string recovering = recorder_.housekeeper().recovering();
   if (!now.problem.empty()) {
     context_.health().degraded(now.problem);
   } else if (now.recording && loses) {
@@ -149,7 +149,7 @@ void RecorderService::show_health(const RecorderState& now) {
 }
 
 void RecorderService::publish(const RecorderState& state) {
-  const auto now = status_of(state, thread_.housekeeper().survey(), config_.file.empty() ? config_.quota_mb : 0);
+  const auto now = status_of(state, recorder_.housekeeper().survey(), config_.file.empty() ? config_.quota_mb : 0);
   const int64_t now_ns = core::monotonic_ns();
   if (!changed(published_, now) && now_ns - published_ns_ < core::kNsPerSecond) return;
   published_ = now;

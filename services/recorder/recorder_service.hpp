@@ -1,8 +1,8 @@
-// The recorder as a service: commands, status and log around the recorder's threads.
+// The recorder as a service: commands, status and log around the recorder.
 #pragma once
 
+#include "recorder/recorder.hpp"
 #include "recorder/recorder_config.hpp"
-#include "recorder/recorder_thread.hpp"
 #include "service/service.hpp"
 
 namespace railfix::recorder {
@@ -27,7 +27,7 @@ class RecorderService {
   service::Context& context_;
   messaging::Writer<msg::RecorderStatus> status_;
   int64_t recorded_ns_ = INT64_MIN;  // pictures up to here are in the file (lock step)
-  RecorderThread thread_;
+  Recorder recorder_;
   uint64_t received_ = 0;
   uint64_t written_ = 0;
   uint64_t lost_ = 0;

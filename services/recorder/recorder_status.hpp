@@ -1,7 +1,7 @@
 // What the recorder says of itself on recorder_status.
 #pragma once
 
-#include "recorder/recorder_thread.hpp"
+#include "recorder/recorder.hpp"
 
 namespace railfix::recorder {
 

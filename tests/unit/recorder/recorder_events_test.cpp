@@ -14,7 +14,7 @@ using ::testing::HasSubstr;
 constexpr const char* kAtHundred = "odometry_step.stamp_ns >= 100";
 constexpr const char* kAtEnd = "odometry_step.stamp_ns >= 149";
 
-class RecorderEventsTest : public RecorderThreadTest {
+class RecorderEventsTest : public RecorderTest {
  protected:
   static void write_steps(messaging::Writer<msg::OdometryStep>& writer, int64_t from, int64_t to) {
     for (int64_t i = from; i < to; ++i) {
@@ -44,7 +44,7 @@ class RecorderEventsTest : public RecorderThreadTest {
     }
     return files;
   }
-  static bool happened(const RecorderThread& recorder, const std::string& trigger) {
+  static bool happened(const Recorder& recorder, const std::string& trigger) {
     const auto state = recorder.state();
     return state.event && state.event->trigger == trigger;
   }
@@ -52,14 +52,14 @@ class RecorderEventsTest : public RecorderThreadTest {
 
 enum class Phase { stopped, recording, paused };
 
-Phase phase_of(const RecorderThread& recorder) {
+Phase phase_of(const Recorder& recorder) {
   const auto state = recorder.state();
   return state.paused ? Phase::paused : state.recording ? Phase::recording : Phase::stopped;
 }
 
 struct Command {
   const char* name;
-  std::function<core::Result<std::string>(RecorderThread&)> give;
+  std::function<core::Result<std::string>(Recorder&)> give;
   // Where it leads from stopped, recording and paused; nothing: refused.
   std::array<std::optional<Phase>, 3> leads_to;
 };
@@ -67,11 +67,11 @@ struct Command {
 TEST_F(RecorderEventsTest, EveryCommandInEveryState) {
   const std::optional<Phase> refused;
   const std::vector<Command> commands{
-      {"start", [](RecorderThread& thread) { return thread.start(""); }, {Phase::recording, refused, refused}},
-      {"stop", [](RecorderThread& thread) { return thread.stop(); }, {refused, Phase::stopped, Phase::stopped}},
-      {"pause", [](RecorderThread& thread) { return thread.pause(); }, {refused, Phase::paused, refused}},
-      {"resume", [](RecorderThread& thread) { return thread.resume(); }, {refused, refused, Phase::recording}},
-      {"event", [](RecorderThread& thread) { return thread.event("x"); }, {refused, Phase::recording, Phase::paused}},
+      {"start", [](Recorder& thread) { return thread.start(""); }, {Phase::recording, refused, refused}},
+      {"stop", [](Recorder& thread) { return thread.stop(); }, {refused, Phase::stopped, Phase::stopped}},
+      {"pause", [](Recorder& thread) { return thread.pause(); }, {refused, Phase::paused, refused}},
+      {"resume", [](Recorder& thread) { return thread.resume(); }, {refused, refused, Phase::recording}},
+      {"event", [](Recorder& thread) { return thread.event("x"); }, {refused, Phase::recording, Phase::paused}},
   };
   for (const bool ring : {false, true}) {
     config_.ring_s = ring ? 1 : 0;

@@ -1,4 +1,4 @@
-// A recorder's threads on a train of their own, for the tests.
+// A recorder on a train of its own, for the tests.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <filesystem>
 
 #include "core/time.hpp"
-#include "recorder/recorder_thread.hpp"
+#include "recorder/recorder.hpp"
 
 namespace railfix::recorder {
 
@@ -29,16 +29,16 @@ bool wait_until(const Condition& condition) {
   return true;
 }
 
-class RecorderThreadTest : public ::testing::Test {
+class RecorderTest : public ::testing::Test {
  protected:
-  RecorderThreadTest()
+  RecorderTest()
       : folder_(fs::temp_directory_path() / ("railfix-recorder-thread-" + std::to_string(::getpid()))),
         participant_(options()) {
     fs::remove_all(folder_);
     config_.folder = folder_.string();
     config_.keep_free_mb = 0;
   }
-  ~RecorderThreadTest() override { fs::remove_all(folder_); }
+  ~RecorderTest() override { fs::remove_all(folder_); }
 
   /// Another participant of the same train.
   static messaging::ParticipantOptions options() {
@@ -47,10 +47,10 @@ class RecorderThreadTest : public ::testing::Test {
     options.domain = 78;
     return options;
   }
-  std::unique_ptr<RecorderThread> recorder() {
-    return std::make_unique<RecorderThread>(
-        config_, participant_, std::map<std::string, std::string>{{"train_id", "demo"}, {"version", "test"}},
-        [this](int64_t stamp_ns) { last_picture_ns_ = stamp_ns; });
+  std::unique_ptr<Recorder> recorder() {
+    return std::make_unique<Recorder>(config_, participant_,
+                                      std::map<std::string, std::string>{{"train_id", "demo"}, {"version", "test"}},
+                                      [this](int64_t stamp_ns) { last_picture_ns_ = stamp_ns; });
   }
   static void fill(msg::CameraFrame& frame, uint64_t seq) {
     frame.stamp_ns(1000 + static_cast<int64_t>(seq));

@@ -16,7 +16,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-TEST_F(RecorderThreadTest, RecordsSamplesAndPicturesOfEveryTopic) {
+TEST_F(RecorderTest, RecordsSamplesAndPicturesOfEveryTopic) {
   messaging::Writer<msg::OdometryStep> odometry(participant_, topics::odometry_step);
   messaging::Writer<msg::CameraFrame> camera(participant_, topics::camera_frame, "cam0");
   auto recorder = this->recorder();
@@ -76,7 +76,7 @@ TEST_F(RecorderThreadTest, RecordsSamplesAndPicturesOfEveryTopic) {
   EXPECT_EQ(reader->metadata().size(), 1U) << "nothing was lost: " << stopped.value();
 }
 
-TEST_F(RecorderThreadTest, CamerasThatAppearLaterAreFound) {
+TEST_F(RecorderTest, CamerasThatAppearLaterAreFound) {
   config_.cameras = {};
   config_.picture_every = 2;
   auto recorder = this->recorder();
@@ -97,7 +97,7 @@ TEST_F(RecorderThreadTest, CamerasThatAppearLaterAreFound) {
   EXPECT_EQ(reader->channels().begin()->second.topic, "camera_frame/rear");
 }
 
-TEST_F(RecorderThreadTest, ANewFileRepeatsStandingValues) {
+TEST_F(RecorderTest, ANewFileRepeatsStandingValues) {
   config_.split_mb = 0.03;
   config_.compression = "none";
   config_.chunk_age_s = 0.05;
@@ -134,7 +134,7 @@ TEST_F(RecorderThreadTest, ANewFileRepeatsStandingValues) {
   }
 }
 
-TEST_F(RecorderThreadTest, GoesOnInTheOldFileWhenANewOneCannotBeBegunAndTriesAgain) {
+TEST_F(RecorderTest, GoesOnInTheOldFileWhenANewOneCannotBeBegunAndTriesAgain) {
   config_.split_mb = 0.03;
   config_.compression = "none";
   config_.chunk_age_s = 0.05;
@@ -172,7 +172,7 @@ TEST_F(RecorderThreadTest, GoesOnInTheOldFileWhenANewOneCannotBeBegunAndTriesAga
   EXPECT_EQ(messages, sent);
 }
 
-TEST_F(RecorderThreadTest, WhatWasSaidBeforeItListenedIsNotLost) {
+TEST_F(RecorderTest, WhatWasSaidBeforeItListenedIsNotLost) {
   messaging::Writer<msg::ServiceStatus> status(participant_, topics::service_status);
   const auto say = [&](const std::string& service) {
     msg::ServiceStatus sample;
@@ -189,7 +189,7 @@ TEST_F(RecorderThreadTest, WhatWasSaidBeforeItListenedIsNotLost) {
   EXPECT_EQ(recorder->state().losses, "");
 }
 
-TEST_F(RecorderThreadTest, FullDiskEndsTheRecordingProperly) {
+TEST_F(RecorderTest, FullDiskEndsTheRecordingProperly) {
   config_.keep_free_mb = 1e12;
   auto recorder = this->recorder();
   const auto started = recorder->start((folder_ / "full.mcap").string());
@@ -200,7 +200,7 @@ TEST_F(RecorderThreadTest, FullDiskEndsTheRecordingProperly) {
 }
 
 // On a small disk of its own.
-TEST_F(RecorderThreadTest, GoesOnByItselfWhenThereIsRoomAgain) {
+TEST_F(RecorderTest, GoesOnByItselfWhenThereIsRoomAgain) {
   fs::create_directories(folder_);
   if (mount("tmpfs", folder_.c_str(), "tmpfs", 0, "size=20m") != 0) GTEST_SKIP() << "a disk can be made by root only";
   config_.keep_free_mb = 5;
@@ -221,7 +221,7 @@ TEST_F(RecorderThreadTest, GoesOnByItselfWhenThereIsRoomAgain) {
   umount2(folder_.c_str(), MNT_DETACH);
 }
 
-TEST_F(RecorderThreadTest, RecordingsAreNumberedAlsoAfterARestart) {
+TEST_F(RecorderTest, RecordingsAreNumberedAlsoAfterARestart) {
   for (int i = 0; i < 2; ++i) {
     auto recorder = this->recorder();
     for (int k = 0; k < 2; ++k) {
@@ -234,7 +234,7 @@ TEST_F(RecorderThreadTest, RecordingsAreNumberedAlsoAfterARestart) {
   }
 }
 
-TEST_F(RecorderThreadTest, ASecondStartKeepsWhatTheFirstRecorded) {
+TEST_F(RecorderTest, ASecondStartKeepsWhatTheFirstRecorded) {
   config_.file = (folder_ / "run.mcap").string();
   auto recorder = this->recorder();
   for (const char* name : {"run.mcap", "run-2.mcap", "run-3.mcap"}) {
@@ -246,7 +246,7 @@ TEST_F(RecorderThreadTest, ASecondStartKeepsWhatTheFirstRecorded) {
   EXPECT_TRUE(fs::exists(folder_ / "run.mcap"));
 }
 
-TEST_F(RecorderThreadTest, AFileThatCannotBeLookedAtIsRefusedAndItGoesOn) {
+TEST_F(RecorderTest, AFileThatCannotBeLookedAtIsRefusedAndItGoesOn) {
   fs::create_directories(folder_);
   fs::create_symlink("loop", folder_ / "loop");
   auto recorder = this->recorder();
@@ -257,10 +257,10 @@ TEST_F(RecorderThreadTest, AFileThatCannotBeLookedAtIsRefusedAndItGoesOn) {
   EXPECT_EQ(recorder->state().failure, "");
 }
 
-TEST_F(RecorderThreadTest, WhatIsThrownInItsThreadClosesTheFileAndIsSaid) {
+TEST_F(RecorderTest, WhatIsThrownInItsThreadClosesTheFileAndIsSaid) {
   messaging::Writer<msg::CameraFrame> camera(participant_, topics::camera_frame, "cam0");
-  RecorderThread recorder(config_, participant_, {{"train_id", "demo"}, {"version", "test"}},
-                          [](int64_t) { throw std::runtime_error("no such thing"); });
+  Recorder recorder(config_, participant_, {{"train_id", "demo"}, {"version", "test"}},
+                    [](int64_t) { throw std::runtime_error("no such thing"); });
   const auto started = recorder.start("");
   ASSERT_TRUE(started.ok());
   ASSERT_TRUE(wait_until([&] { return camera.matched_readers() == 1; }));
@@ -273,7 +273,7 @@ TEST_F(RecorderThreadTest, WhatIsThrownInItsThreadClosesTheFileAndIsSaid) {
   EXPECT_EQ(mcap::Reader::open(started.value()).value()->statistics().messages, 1U);
 }
 
-TEST_F(RecorderThreadTest, ATopicThatCannotBeReadIsAnError) {
+TEST_F(RecorderTest, ATopicThatCannotBeReadIsAnError) {
   fs::create_directories(folder_);
   const fs::path profiles = folder_ / "profiles.xml";
   std::ofstream(profiles) << R"(<dds xmlns="http://www.eprosima.com"><profiles>
@@ -284,17 +284,17 @@ TEST_F(RecorderThreadTest, ATopicThatCannotBeReadIsAnError) {
   messaging::Participant participant(with_profiles);
   const std::map<std::string, std::string> about{{"train_id", "demo"}, {"version", "test"}};
   {
-    RecorderThread recorder(config_, participant, about, [](int64_t) {});
+    Recorder recorder(config_, participant, about, [](int64_t) {});
     const auto started = recorder.start("");
     ASSERT_FALSE(started.ok());
     EXPECT_THAT(started.error().message, HasSubstr("imu_sample cannot be read"));
     EXPECT_FALSE(recorder.state().recording);
   }
   config_.ring_s = 1;
-  EXPECT_THROW(RecorderThread(config_, participant, about, [](int64_t) {}), core::BadInput);
+  EXPECT_THROW(Recorder(config_, participant, about, [](int64_t) {}), core::BadInput);
 }
 
-TEST_F(RecorderThreadTest, DestructionClosesTheFile) {
+TEST_F(RecorderTest, DestructionClosesTheFile) {
   (void)recorder()->start((folder_ / "gone.mcap").string());
   EXPECT_TRUE(mcap::Reader::open(folder_ / "gone.mcap").value()->indexed());
 }

@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "core/time.hpp"
-#include "recorder/recorder_thread.hpp"
+#include "recorder/recorder.hpp"
 
 namespace railfix::recorder {
 
@@ -15,13 +15,13 @@ constexpr int64_t kMostWindows = 5;
 
 }  // namespace
 
-core::Result<std::string> RecorderThread::event(const std::string& text) {
+core::Result<std::string> Recorder::event(const std::string& text) {
   return in_thread([this, text] {
     return happened({core::wall_ns(), text.empty() ? "by hand" : text, "by hand"}, true);
   });
 }
 
-void RecorderThread::look_for_events(const StoredSample& sample) {
+void Recorder::look_for_events(const StoredSample& sample) {
   for (EventRule& rule : rules_) {
     if (!rule.concerns(sample.channel->topic) || !rule.begins(sample)) continue;
     int64_t& last_ns = rule_happened_ns_[&rule];
@@ -38,7 +38,7 @@ void RecorderThread::look_for_events(const StoredSample& sample) {
   }
 }
 
-core::Result<std::string> RecorderThread::happened(const EventNote& note, bool by_hand) {
+core::Result<std::string> Recorder::happened(const EventNote& note, bool by_hand) {
   if (!recording_ && !ring_) {
     return core::Error{"nothing is being recorded and no ring is kept (recorder.ring_s)"};
   }
@@ -55,7 +55,7 @@ core::Result<std::string> RecorderThread::happened(const EventNote& note, bool b
   return "marked in " + status.value();
 }
 
-core::Result<std::string> RecorderThread::keep_event(const EventNote& note, bool by_hand) {
+core::Result<std::string> Recorder::keep_event(const EventNote& note, bool by_hand) {
   const int64_t now_ns = core::monotonic_ns();
   const int64_t longest_ns = kMostWindows * core::to_ns(config_.ring_s + config_.after_s);
   if (event_file_ && now_ns < event_begun_ns_ + longest_ns) {
@@ -78,7 +78,7 @@ core::Result<std::string> RecorderThread::keep_event(const EventNote& note, bool
          " s before";
 }
 
-void RecorderThread::tend_event_files(bool all) {
+void Recorder::tend_event_files(bool all) {
   if (event_file_ && (all || core::monotonic_ns() >= event_ends_ns_)) {
     event_file_->finish();
     closing_events_.push_back(std::move(event_file_));

@@ -47,16 +47,16 @@ struct RecorderState {
 /// that encodes pictures, the housekeeper one that looks after the folder, each event's file one that writes it, and
 /// after a split `closing_` is one that closes the file before. They touch no member: what they have to say comes
 /// through `queue_` or is asked for.
-class RecorderThread {
+class Recorder {
  public:
   /// `on_picture` is called from the recorder's thread with the stamp of each picture that was dealt with. Throws
   /// BadInput for an event rule that cannot be meant, or a topic that cannot be read.
-  RecorderThread(const RecorderConfig& config, messaging::Participant& participant,
-                 const std::map<std::string, std::string>& about, std::function<void(int64_t stamp_ns)> on_picture);
+  Recorder(const RecorderConfig& config, messaging::Participant& participant,
+           const std::map<std::string, std::string>& about, std::function<void(int64_t stamp_ns)> on_picture);
   /// Closes all files.
-  ~RecorderThread();
-  RecorderThread(const RecorderThread&) = delete;
-  RecorderThread& operator=(const RecorderThread&) = delete;
+  ~Recorder();
+  Recorder(const Recorder&) = delete;
+  Recorder& operator=(const Recorder&) = delete;
 
   // Any thread, one after the other. They give the file's name or a sentence.
   core::Result<std::string> start(const std::filesystem::path& file);

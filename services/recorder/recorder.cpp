@@ -1,4 +1,4 @@
-#include "recorder/recorder_thread.hpp"
+#include "recorder/recorder.hpp"
 
 #include <utility>
 
@@ -21,8 +21,8 @@ std::string type_of_topic(const std::string& name) {
 
 }  // namespace
 
-RecorderThread::RecorderThread(const RecorderConfig& config, messaging::Participant& participant,
-                               const std::map<std::string, std::string>& about, std::function<void(int64_t)> on_picture)
+Recorder::Recorder(const RecorderConfig& config, messaging::Participant& participant,
+                   const std::map<std::string, std::string>& about, std::function<void(int64_t)> on_picture)
     : config_(config), maker_(config, about), on_picture_(std::move(on_picture)) {
   for (const auto& rule : config_.events) {
     rules_.push_back(core::value_or_throw(EventRule::parse(rule, type_of_topic)));
@@ -48,11 +48,11 @@ RecorderThread::RecorderThread(const RecorderConfig& config, messaging::Particip
   throw core::BadInput(opened.error());
 }
 
-RecorderThread::~RecorderThread() {
+Recorder::~Recorder() {
   close_all();
 }
 
-void RecorderThread::close_all() {
+void Recorder::close_all() {
   (void)in_thread([this] { return recording_ ? end() : std::string(); });
   (void)in_thread([this] {
     inlet_->close();
@@ -64,7 +64,7 @@ void RecorderThread::close_all() {
   writer_thread_.join();
 }
 
-core::Result<std::string> RecorderThread::in_thread(const std::function<core::Result<std::string>()>& work) {
+core::Result<std::string> Recorder::in_thread(const std::function<core::Result<std::string>()>& work) {
   std::promise<core::Result<std::string>> promise;
   auto result = promise.get_future();
   queue_.push(nullptr, [&] {
@@ -79,11 +79,11 @@ core::Result<std::string> RecorderThread::in_thread(const std::function<core::Re
   return result.get();
 }
 
-core::Result<std::string> RecorderThread::start(const fs::path& file) {
+core::Result<std::string> Recorder::start(const fs::path& file) {
   return in_thread([this, file] { return begin(file); });
 }
 
-core::Result<std::string> RecorderThread::stop() {
+core::Result<std::string> Recorder::stop() {
   return in_thread([this]() -> core::Result<std::string> {
     if (!std::exchange(stopped_by_disk_, false)) return end();
     problem_.clear();
@@ -91,27 +91,27 @@ core::Result<std::string> RecorderThread::stop() {
   });
 }
 
-core::Result<std::string> RecorderThread::pause() {
+core::Result<std::string> Recorder::pause() {
   return in_thread([this] { return set_paused(true); });
 }
 
-core::Result<std::string> RecorderThread::resume() {
+core::Result<std::string> Recorder::resume() {
   return in_thread([this] { return set_paused(false); });
 }
 
-RecorderState RecorderThread::state() const {
+RecorderState Recorder::state() const {
   const std::lock_guard lock(state_mutex_);
   return state_;
 }
 
-RecorderState RecorderThread::take_state() {
+RecorderState Recorder::take_state() {
   const std::lock_guard lock(state_mutex_);
   RecorderState taken = state_;
   state_.news.clear();
   return taken;
 }
 
-core::Result<std::string> RecorderThread::begin(const fs::path& file) {
+core::Result<std::string> Recorder::begin(const fs::path& file) {
   if (recording_) return core::Error{recording_->file().string() + " is being recorded already; stop it first"};
   const fs::path name = file.empty() ? maker_.next_name() : file;
   count_dropped();  // not of this file
@@ -139,7 +139,7 @@ core::Result<std::string> RecorderThread::begin(const fs::path& file) {
   return name.string();
 }
 
-void RecorderThread::record_into(std::unique_ptr<Recording> recording) {
+void Recorder::record_into(std::unique_ptr<Recording> recording) {
   recording_ = std::move(recording);
   opened_wall_ns_ = core::wall_ns();
   opened_monotonic_ns_ = core::monotonic_ns();
@@ -151,7 +151,7 @@ void RecorderThread::record_into(std::unique_ptr<Recording> recording) {
 
 // The next file is there before the old one is closed: if it cannot be made, the old one goes on, and it is tried
 // again.
-void RecorderThread::split_if_due() {
+void Recorder::split_if_due() {
   if (!config_.file.empty()) return;
   const bool large = config_.split_mb > 0 && static_cast<double>(recording_->bytes()) >= config_.split_mb * kBytesPerMb;
   const double age_s = core::seconds(core::monotonic_ns() - opened_monotonic_ns_);
@@ -175,21 +175,21 @@ void RecorderThread::split_if_due() {
   write_standing();
 }
 
-core::Status RecorderThread::wait_for_closing() {
+core::Status Recorder::wait_for_closing() {
   if (!closing_.valid()) return {};
   auto status = closing_.get();
   if (!status.ok()) say(status.error().message, true);
   return status;
 }
 
-void RecorderThread::write_standing() {
+void Recorder::write_standing() {
   for (const auto& [key, sample] : standing_) {
     const auto status = recording_->write(*sample, core::wall_ns());
     if (!status.ok()) problem_ = status.error().message;
   }
 }
 
-core::Result<std::string> RecorderThread::end() {
+core::Result<std::string> Recorder::end() {
   if (!recording_) return core::Error{"nothing is being recorded"};
   // What waits for the encoder and then for the disk still belongs to the recording.
   if (ring_) {
@@ -214,7 +214,7 @@ core::Result<std::string> RecorderThread::end() {
   return summary + (losses.empty() ? "" : ", lost " + losses);
 }
 
-core::Result<std::string> RecorderThread::set_paused(bool paused) {
+core::Result<std::string> Recorder::set_paused(bool paused) {
   if (!recording_) return core::Error{"nothing is being recorded"};
   const std::string file = recording_->file().string();
   if (paused == paused_) return core::Error{file + (paused ? " is paused already" : " is not paused")};
@@ -228,7 +228,7 @@ core::Result<std::string> RecorderThread::set_paused(bool paused) {
   return file + " goes on";
 }
 
-void RecorderThread::count_dropped() {
+void Recorder::count_dropped() {
   for (const auto& [topic, cause, total] : inlet_->dropped()) {
     uint64_t& seen = dropped_[{topic, cause}];
     if (recording_ && !paused_) recording_->add_dropped(topic, cause, total - seen);
@@ -236,7 +236,7 @@ void RecorderThread::count_dropped() {
   }
 }
 
-void RecorderThread::run() {
+void Recorder::run() {
   while (!ending_) {
     try {
       queue_.run_one(core::monotonic_ns() + kTickNs);
@@ -248,7 +248,7 @@ void RecorderThread::run() {
 }
 
 // Nobody knows what is still right here: the service ends, and whoever started it starts it again.
-void RecorderThread::fail(const std::string& why) {
+void Recorder::fail(const std::string& why) {
   try {
     if (failure_.empty()) failure_ = "the recorder's thread cannot go on: " + why;
     (void)wait_for_closing();
@@ -262,7 +262,7 @@ void RecorderThread::fail(const std::string& why) {
   }
 }
 
-void RecorderThread::tick() {
+void Recorder::tick() {
   ticked_ns_ = core::monotonic_ns();
   if (inlet_->is_open()) inlet_->find_cameras();
   for (const auto& sentence : inlet_->take_refused()) say(sentence, true);
@@ -278,13 +278,13 @@ void RecorderThread::tick() {
   publish_state();
 }
 
-bool RecorderThread::disk_has_less_than(double times) const {
+bool Recorder::disk_has_less_than(double times) const {
   const fs::path file = recording_ ? recording_->file() : maker_.folder() / "";
   const uint64_t free = free_bytes(file.has_parent_path() ? file.parent_path() : fs::path("."));
   return static_cast<double>(free) < times * config_.keep_free_mb * kBytesPerMb;
 }
 
-void RecorderThread::guard_disk() {
+void Recorder::guard_disk() {
   event_ends_ns_ = 0;
   if (!recording_) return;
   const std::string file = recording_->file().string();
@@ -296,13 +296,13 @@ void RecorderThread::guard_disk() {
              std::to_string(static_cast<int64_t>(kRoomAgain * config_.keep_free_mb)) + " MB are free";
 }
 
-void RecorderThread::resume_when_there_is_room() {
+void Recorder::resume_when_there_is_room() {
   if (!stopped_by_disk_ || disk_has_less_than(kRoomAgain)) return;
   if (const auto begun = begin(""); begun.ok())
     say("there is room on the disk again: recording " + begun.value(), false);
 }
 
-void RecorderThread::use(const Arrival& arrival) {
+void Recorder::use(const Arrival& arrival) {
   if (recording_ && !paused_) record(arrival);
   const SamplePtr& sample = arrival.recorded ? arrival.recorded : arrival.ringed;
   if (sample && !sample->standing.empty()) standing_[sample->standing] = sample;
@@ -314,7 +314,7 @@ void RecorderThread::use(const Arrival& arrival) {
   if (arrival.picture_stamp_ns) on_picture_(*arrival.picture_stamp_ns);
 }
 
-void RecorderThread::record(const Arrival& arrival) {
+void Recorder::record(const Arrival& arrival) {
   const std::string topic(arrival.topic);
   const auto* known = messaging::find_topic(topic);
   // Of a topic that is one sample deep only the newest is promised.
@@ -331,7 +331,7 @@ void RecorderThread::record(const Arrival& arrival) {
   }
 }
 
-void RecorderThread::publish_state() {
+void Recorder::publish_state() {
   RecorderState now;
   now.recording = recording_ != nullptr;
   now.paused = paused_;
@@ -366,7 +366,7 @@ void RecorderThread::publish_state() {
   state_ = std::move(now);
 }
 
-void RecorderThread::say(const std::string& sentence, bool bad) {
+void Recorder::say(const std::string& sentence, bool bad) {
   const std::lock_guard lock(state_mutex_);
   state_.news.push_back({sentence, bad});
 }
