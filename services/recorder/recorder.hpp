@@ -43,10 +43,11 @@ struct RecorderState {
 };
 
 /// `writer_thread_` takes samples from the topics and writes them; the members are its own, but for `queue_`,
-/// `housekeeper_` and `state_`, which any thread may use. The other threads belong to what it owns: the inlet has one
-/// that encodes pictures, the housekeeper one that looks after the folder, each event's file one that writes it, and
-/// after a split `closing_` is one that closes the file before. They touch no member: what they have to say comes
-/// through `queue_` or is asked for.
+/// `housekeeper_`, `state_` and `ending_`, which any thread may use. The other threads belong to what it owns: the
+/// inlet has one that encodes pictures, the housekeeper one that looks after the folder, each event's file one that
+/// writes it, each open file now and then one that forces it to the disk (mcap::Writer), and after a split `closing_`
+/// is one that closes the file before. They touch no member: what they have to say comes through `queue_` or is asked
+/// for.
 class Recorder {
  public:
   /// `on_picture` is called from the recorder's thread with the stamp of each picture that was dealt with. Throws
