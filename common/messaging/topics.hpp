@@ -1,4 +1,5 @@
 // Every topic of Railfix, once: name, type, quality of service, and how many samples may wait in front of a handler.
+// Two that few need stand in onboard_topic.hpp and charge_topic.hpp.
 #pragma once
 
 #include <string>
@@ -61,7 +62,7 @@ inline constexpr Topic<msg::DataProgress> data_progress{"data_progress", "operat
 
 }  // namespace topics
 
-/// All of the above, type erased, for tools that handle every topic (recorder, replay, `railfix topics`).
+/// All but in_charge, type erased, for tools that handle every topic (recorder, replay, `railfix topics`).
 const std::vector<TopicInfo>& all_topics();
 /// Nullptr when there is none of this name; an instance ("camera_frame/cam0") finds its topic.
 const TopicInfo* find_topic(const std::string& name);

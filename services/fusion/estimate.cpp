@@ -43,8 +43,8 @@ std::string why_given_up(Against because) {
 
 // Where masts stand everywhere, some are sighted by chance where the map has one.
 bool Estimator::gnss_denies_place() const {
-  const bool never_agreed = watch(Source::gnss).used_ns == 0 && landmarks_agreed_ < kLandmarksBelieved;
-  return watch(Source::gnss).isolated && (never_agreed || wrong_place_.lost());
+  const bool never_agreed = watch(Source::gnss).used_ns == 0 && place_.landmarks_agreed < kLandmarksBelieved;
+  return watch(Source::gnss).isolated && (never_agreed || place_.wrong_place.lost());
 }
 
 // The sentences that people read on the dashboard.
@@ -55,13 +55,13 @@ void TrainEstimate::degrade(const std::string& why) {
 }
 
 Interval Estimator::interval() const {
-  const double bound_m = std::max(known_to_m() + doubt_m_ + unchecked_m_, lost_to_m());
+  const double bound_m = std::max(known_to_m() + doubts_.odometers_m + unchecked_m_, lost_to_m());
   // Since the last sample the train may have stopped counting, or the clock may have run ahead.
   const double silent_s = core::seconds(filter_.stamp_ns() - stamp_ns_);
   const double silent_m = silent_s > kFreshS ? std::abs(filter_.speed_mps()) * silent_s : 0;
   const Sides ways = held_ways();
-  const double behind_m = std::max(bound_m + ways.behind_m, doubt_behind_m_) + time_doubt_m_ + silent_m;
-  return {centre_m() - behind_m, centre_m() + std::max(bound_m + ways.ahead_m, doubt_ahead_m_)};
+  const double behind_m = std::max(bound_m + ways.behind_m, doubts_.refused.behind_m) + doubts_.time_m + silent_m;
+  return {centre_m() - behind_m, centre_m() + std::max(bound_m + ways.ahead_m, doubts_.refused.ahead_m)};
 }
 
 double Estimator::known_to_m() const {
@@ -74,7 +74,7 @@ double Estimator::known_to_m() const {
 double Estimator::lost_to_m() const {
   const auto& p = *parameters_;
   const double budgets_m = p.unusable_budgets * (p.budget_m + p.budget_per_m * since_reference_m());
-  return wrong_place_.lost() ? std::clamp(budgets_m, kLostAtLeastM, kLostAtMostM) : 0.0;
+  return place_.wrong_place.lost() ? std::clamp(budgets_m, kLostAtLeastM, kLostAtMostM) : 0.0;
 }
 
 // As an odometer's accuracy is stated: a share of the way, and one slip at the highest speed.
@@ -87,8 +87,8 @@ Interval Estimator::widened(const Interval& interval) const {
   // A wheel that slides counts less than it is judged by.
   const double slide_m = slip_m / (1 - std::min(p.wheel_slip_share, 0.9));
   const auto& u = unwatched_;
-  return {interval.behind_m - std::min(slip_m + u.hidden_m + u.counted.behind_m + u.felt.behind_m, most_m),
-          interval.ahead_m + std::min(slide_m + u.hidden_m + u.counted.ahead_m + u.felt.ahead_m, most_m)};
+  return {interval.rear_m - std::min(slip_m + u.hidden_m + u.counted.most.behind_m + u.felt.most.behind_m, most_m),
+          interval.front_m + std::min(slide_m + u.hidden_m + u.counted.most.ahead_m + u.felt.most.ahead_m, most_m)};
 }
 
 double Estimator::gnss_bound_m() const {
@@ -106,17 +106,17 @@ TrainEstimate Estimator::estimate(const Interval& promised, double since_sure_m)
   e.wheel_scale = filter_.scale(Odometer::wheel);
   e.since_reference_m = since_reference_m();
   e.since_sure_m = since_sure_m;
-  e.reference = reference_;
+  e.reference = place_.reference;
   e.standstill = standstill_;
-  e.track_known = path_ != nullptr;
-  e.track_probability = path_ ? track_doubt_.probability_at(*path_, filter_.path_distance_m()) : 0;
+  e.track_known = place_.path != nullptr;
+  e.track_probability = place_.path ? place_.track_doubt.probability_at(*place_.path, filter_.path_distance_m()) : 0;
   e.sigma_m = sigma_m();
   locate(e);
   // The place is one on the map, the ends are where the train is: beyond the end of the map one reaches further.
-  const double centre_m = path_ ? e.path_distance_m : e.distance_m;
-  e.over_m = std::max(0.0, centre_m - promised.behind_m);
-  e.under_m = std::max(0.0, promised.ahead_m - centre_m);
-  if (!std::isfinite(centre_m + e.sigma_m + promised.behind_m + promised.ahead_m)) {
+  const double centre_m = place_.path ? e.path_distance_m : e.distance_m;
+  e.over_m = std::max(0.0, centre_m - promised.rear_m);
+  e.under_m = std::max(0.0, promised.front_m - centre_m);
+  if (!std::isfinite(centre_m + e.sigma_m + promised.rear_m + promised.front_m)) {
     e.over_m = e.under_m = std::numeric_limits<double>::infinity();
     e.degrade("the filter's numbers ran over");
   }
@@ -127,15 +127,15 @@ TrainEstimate Estimator::estimate(const Interval& promised, double since_sure_m)
 void Estimator::locate(TrainEstimate& e) const {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   e.lat_deg = e.lon_deg = e.easting_m = e.northing_m = e.heading_rad = nan;
-  if (!path_) return;
-  e.path_distance_m = std::clamp(filter_.path_distance_m(), path_->begin_m(), path_->end_m());
-  e.position = path_->position_at(e.path_distance_m);
-  const auto pose = path_->at(e.path_distance_m).pose;
+  if (!place_.path) return;
+  e.path_distance_m = std::clamp(filter_.path_distance_m(), place_.path->begin_m(), place_.path->end_m());
+  e.position = place_.path->position_at(e.path_distance_m);
+  const auto pose = place_.path->at(e.path_distance_m).pose;
   e.easting_m = pose.easting_m;
   e.northing_m = pose.northing_m;
   e.heading_rad = pose.heading_rad;
-  if (path_->map().edge(e.position.edge)->is_drawn) return;  // a drawing lies nowhere on the Earth
-  if (const auto geo = path_->map().to_geo(pose.easting_m, pose.northing_m)) {
+  if (place_.path->map().edge(e.position.edge)->is_drawn) return;  // a drawing lies nowhere on the Earth
+  if (const auto geo = place_.path->map().to_geo(pose.easting_m, pose.northing_m)) {
     e.lat_deg = geo->lat_deg;
     e.lon_deg = geo->lon_deg;
   }
@@ -190,29 +190,31 @@ void Estimator::judge_sensors(TrainEstimate& e) const {
 void Estimator::judge_place(TrainEstimate& e) const {
   const auto& gnss = watch(Source::gnss);
   if (gnss.isolated) e.degrade("GNSS contradicts the position" + since(gnss));
-  const bool strays = track_doubt_.turns_otherwise() && wrong_place_.strays();
-  e.place_in_doubt = gnss_denies_place() || strays || wrong_place_.lost();
-  if (gnss_denies_place() || strays) e.integrity = Integrity::unusable;
-  if (time_doubt_m_ > 0) e.degrade("a gap in time: the clock was set, or nothing measured");
+  const bool turned_away = place_.track_doubt.turns_otherwise() && place_.wrong_place.is_no_position();
+  e.place_in_doubt = gnss_denies_place() || turned_away || place_.wrong_place.lost();
+  if (gnss_denies_place() || turned_away) e.integrity = Integrity::unusable;
+  if (doubts_.time_m > 0) e.degrade("a gap in time: the clock was set, or nothing measured");
   if (refused_fix_) e.degrade("a position fix was refused");
   if (corrected_) e.degrade("position was corrected by two fixes against the filter");
   if (off_path_) e.degrade("a position fix lies on another track");
-  if (track_doubt_.turns_otherwise()) e.degrade("the train turns otherwise than this track");
-  if (wrong_place_.fits_nowhere()) {
+  if (place_.track_doubt.turns_otherwise()) e.degrade("the train turns otherwise than this track");
+  if (place_.wrong_place.fits_nowhere()) {
     e.degrade("what is sighted fits the map nowhere near this place");
     e.integrity = Integrity::unusable;
-  } else if (wrong_place_.lost()) {
-    e.degrade(wrong_place_.of_before() ? "the fusion before this one doubted the place: waits for landmarks or GNSS"
-                                       : "what was sighted did not fit the map: waits for a landmark or GNSS");
-  } else if (track_doubt_.disbelieved()) {
+  } else if (place_.wrong_place.lost()) {
+    e.degrade(place_.wrong_place.of_before()
+                  ? "the fusion before this one doubted the place: waits for landmarks or GNSS"
+                  : "what was sighted did not fit the map: waits for a landmark or GNSS");
+  } else if (place_.track_doubt.disbelieved()) {
     e.degrade("map_matcher finds some other place far more probable");
   }
-  if (told_by_ == ToldBy::gnss) e.degrade("GNSS alone has told the place: waits for a landmark");
-  if (told_by_ == ToldBy::start && !wrong_place_.lost()) {
+  if (place_.told_by == ToldBy::gnss) e.degrade("GNSS alone has told the place: waits for a landmark");
+  if (place_.told_by == ToldBy::start && !place_.wrong_place.lost()) {
     e.degrade("the place was only told: waits for a landmark, GNSS or curves");
   }
-  if (!path_) e.degrade("place on the map not known" + (given_up_ ? why_given_up(*given_up_) : ""));
-  if (path_ && (filter_.path_distance_m() < path_->begin_m() || filter_.path_distance_m() > path_->end_m())) {
+  if (!place_.path) e.degrade("place on the map not known" + (place_.given_up ? why_given_up(*place_.given_up) : ""));
+  if (place_.path &&
+      (filter_.path_distance_m() < place_.path->begin_m() || filter_.path_distance_m() > place_.path->end_m())) {
     e.degrade("beyond the end of the mapped track");
   }
 }

@@ -23,21 +23,21 @@ constexpr double kPointsOffM = 5.0;  // from where the map has them, or the whee
 Estimator::Estimator(const FusionParameters* parameters, const OdometerScales& scales,
                      std::shared_ptr<const track::Path> path, int64_t stamp_ns)
     : parameters_(parameters),
-      path_(std::move(path)),
-      filter_(*parameters, scales, stamp_ns, path_ != nullptr),
+      filter_(*parameters, scales, stamp_ns, path != nullptr),
       stamp_ns_(stamp_ns),
-      rest_since_ns_(stamp_ns),
-      start_ns_(stamp_ns) {
-  if (!path_) return;
-  told_by_ = ToldBy::start;
+      start_ns_(stamp_ns),
+      rest_since_ns_(stamp_ns) {
+  if (!path) return;
+  place_.path = std::move(path);
+  place_.told_by = ToldBy::start;
   doubt_points_behind();
 }
 
 // The train may stand in front of points that the place which was told lies behind.
 void Estimator::doubt_points_behind() {
   const double here_m = filter_.path_distance_m();
-  track_doubt_.begin_at(here_m - known_to_m() - kPointsOffM);
-  track_doubt_.move(*path_, here_m);
+  place_.track_doubt.begin_at(here_m - known_to_m() - kPointsOffM);
+  place_.track_doubt.move(*place_.path, here_m);
 }
 
 void Estimator::predict_to(int64_t stamp_ns) {
@@ -80,11 +80,11 @@ void Estimator::apply(const Event& event) {
         use(input);
       },
       event);
-  if (path_) {
-    track_doubt_.move(*path_, filter_.path_distance_m());
+  if (place_.path) {
+    place_.track_doubt.move(*place_.path, filter_.path_distance_m());
     const double way_m = standstill_ ? 0 : std::abs(distance_m() - before_m);
-    const bool turns_otherwise = track_doubt_.turns_otherwise() && !gnss_proven();
-    wrong_place_.move(way_m, {turns_otherwise, track_doubt_.turns_otherwise_now(), gnss_denies_place()});
+    const bool turns_otherwise = place_.track_doubt.turns_otherwise() && !gnss_proven();
+    place_.wrong_place.move(way_m, {turns_otherwise, place_.track_doubt.turns_otherwise_now(), gnss_denies_place()});
   }
   watch_standstill();
 }
@@ -156,51 +156,32 @@ void Estimator::exclude(Source source, const Estimator& other) {
   wheel_.window_m.reset();
 }
 
-void Estimator::doubt_place(double behind_m, double ahead_m) {
+void Estimator::doubt_place(const Sides& beyond) {
   const auto known = interval();
-  if (behind_m > 0) doubt_behind_m_ = centre_m() - known.behind_m + behind_m;
-  if (ahead_m > 0) doubt_ahead_m_ = known.ahead_m - centre_m() + ahead_m;
+  if (beyond.behind_m > 0) doubts_.refused.behind_m = centre_m() - known.rear_m + beyond.behind_m;
+  if (beyond.ahead_m > 0) doubts_.refused.ahead_m = known.front_m - centre_m() + beyond.ahead_m;
 }
 
+// Who has refused what stays its own: fixes are told to all of them.
 void Estimator::place_like(const Estimator& other) {
-  path_ = other.path_;
-  track_doubt_ = other.track_doubt_;
-  turned_way_ = other.turned_way_;
   filter_.place_like(other.filter_);
-  doubt_m_ = other.doubt_m_;
-  joined_ = other.joined_;
-  other_ways_ = other.other_ways_;
-  said_elsewhere_ = other.said_elsewhere_;
-  wrong_place_ = other.wrong_place_;
-  told_by_ = other.told_by_;
-  bends_agreed_ = other.bends_agreed_;
-  given_up_ = other.given_up_;
-  time_doubt_m_ = std::max(time_doubt_m_, other.time_doubt_m_);
+  place_ = other.place_;
+  doubts_.odometers_m = other.doubts_.odometers_m;
+  doubts_.time_m = std::max(doubts_.time_m, other.doubts_.time_m);
   unwatched_ = other.unwatched_;
-  reference_ = other.reference_;
-  met_ = other.met_;
-  landmarks_agreed_ = other.landmarks_agreed_;
 }
 
 // Distance and speed run on. What a false place has taught of the scales is forgotten with it.
 void Estimator::give_place_up(Against because) {
-  path_.reset();
-  given_up_ = because;
-  wrong_place_ = {};
-  told_by_ = ToldBy::nobody;
-  track_doubt_ = {};
-  turned_way_.clear();
+  filter_.forget_references();
+  place_ = {};
+  place_.given_up = because;
+  doubts_.refused = {};
   for (const auto source : {Source::gnss, Source::landmark, Source::curvature}) watched(source) = {};
   gnss_agreed_ = 0;
   refused_fix_.reset();
   off_path_.reset();
   corrected_ = false;
-  doubt_behind_m_ = doubt_ahead_m_ = 0;
-  joined_ = other_ways_ = said_elsewhere_ = {};
-  reference_ = 0;
-  met_ = {};
-  landmarks_agreed_ = 0;
-  filter_.forget_references();
 }
 
 // Nothing from any sensor for a while: the clock may have been set forward. What counts way over the gap tells.
@@ -209,8 +190,8 @@ void Estimator::notice_gap(int64_t stamp_ns) {
   if (gap_s <= 0) return;
   for (auto* rhythm : {&pictures_, &pulses_}) rhythm->pause_s = std::max(rhythm->pause_s, gap_s);
   if (events_.samples >= kRhythmSamples && gap_s > std::max(kGapS, 5 * events_.period_s)) {
-    if (time_doubt_m_ == 0) gap_begin_ns_ = stamp_ns_;
-    time_doubt_m_ += std::abs(filter_.speed_mps()) * gap_s;
+    if (doubts_.time_m == 0) gap_begin_ns_ = stamp_ns_;
+    doubts_.time_m += std::abs(filter_.speed_mps()) * gap_s;
   } else {
     events_.period_s += (gap_s - events_.period_s) / std::min(++events_.samples, 50);
   }

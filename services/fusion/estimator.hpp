@@ -56,22 +56,8 @@ struct SensorWatch {
 
 /// Where the train is for certain: the two ends on the path (on the distance run when the place is not known).
 struct Interval {
-  double behind_m = 0;
-  double ahead_m = 0;
-};
-
-/// So far behind and ahead of a place, or beyond an interval's ends.
-struct Sides {
-  double behind_m = 0;
-  double ahead_m = 0;
-  void add(const Sides& more) {
-    behind_m += more.behind_m;
-    ahead_m += more.ahead_m;
-  }
-  void hold(const Sides& other) {
-    behind_m = std::max(behind_m, other.behind_m);
-    ahead_m = std::max(ahead_m, other.ahead_m);
-  }
+  double rear_m = 0;
+  double front_m = 0;
 };
 
 /// Who has told the place, as long as nothing has confirmed it: the start is somebody's word, and GNSS may be on the
@@ -91,14 +77,16 @@ class Estimator {
   void rebase_clock(int64_t stamp_ns);
   /// The same way, which goes on beyond the ends of `path`: nothing else changes.
   void follow_on(const std::shared_ptr<const track::Path>& path, const std::shared_ptr<const track::Path>& longer) {
-    if (path_ == path) path_ = longer;
+    if (place_.path == path) place_.path = longer;
   }
   /// Of the sensors that work, without widened().
   [[nodiscard]] Interval interval() const;
   /// With what slips may have added since the reference that no camera watched.
   [[nodiscard]] Interval widened(const Interval& interval) const;
-  [[nodiscard]] double centre_m() const { return path_ ? filter_.path_distance_m() : distance_m(); }
-  [[nodiscard]] double sigma_m() const { return path_ ? filter_.path_sigma_m() : filter_.sigma(StateIndex::distance); }
+  [[nodiscard]] double centre_m() const { return place_.path ? filter_.path_distance_m() : distance_m(); }
+  [[nodiscard]] double sigma_m() const {
+    return place_.path ? filter_.path_sigma_m() : filter_.sigma(StateIndex::distance);
+  }
   [[nodiscard]] double distance_m() const { return filter_.value(StateIndex::distance); }
   static constexpr double kBridgeS = 10.0;  // as long as the IMU alone is good for place and speed
   /// Camera or wheel measured lately and was believed, or the IMU bridges a short while without them.
@@ -111,6 +99,7 @@ class Estimator {
   [[nodiscard]] uint32_t isolated() const;
   /// It measured in the last moments and was believed.
   [[nodiscard]] bool measures(Source source) const;
+  [[nodiscard]] bool has_ever_measured(Source source) const { return watch(source).used_ns != 0; }
   /// So many motion sensors measured in the last moments and were believed.
   [[nodiscard]] int sensors_at_work() const;
   /// That sensor is found to be wrong: it is isolated, with what `other` knows of it.
@@ -118,13 +107,13 @@ class Estimator {
   /// From now on that sensor's samples do not come here; that it is isolated is no contradiction.
   void do_without(Source source) { watched(source).isolated = watched(source).convicted = false; }
   /// GNSS has agreed with the motion for a while, and with a place that it had not given itself.
-  [[nodiscard]] bool gnss_proven() const { return gnss_agreed_ >= kGnssProof && told_by_ != ToldBy::gnss; }
+  [[nodiscard]] bool gnss_proven() const { return gnss_agreed_ >= kGnssProof && place_.told_by != ToldBy::gnss; }
   /// What GNSS that agrees with the motion may still be wrong by.
   [[nodiscard]] double gnss_bound_m() const;
   /// Takes over place and speed, as independent knowledge.
   void place_like(const Estimator& other);
   /// The train may be so far beyond the interval's ends, until a fix says where it is.
-  void doubt_place(double behind_m, double ahead_m);
+  void doubt_place(const Sides& beyond);
   /// Others promise so much more than this one: a fix that it uses must not be weighed against its sigma alone.
   void contradicted_by(double excess_m) { excess_m_ = excess_m; }
   /// The state with this promised interval; since_sure_m: way since the last place that is beyond doubt.
@@ -145,7 +134,7 @@ class Estimator {
   /// It was hardly to be believed where it was expected.
   [[nodiscard]] bool fix_unexpected() const;
   /// So many landmarks in a row say that it is here.
-  [[nodiscard]] int landmarks_agreed() const { return landmarks_agreed_; }
+  [[nodiscard]] int landmarks_agreed() const { return place_.landmarks_agreed; }
 
   /// When the last event showed that the wheel slips: what it said since a little before is best taken back.
   [[nodiscard]] bool slip_began() const { return slip_began_; }
@@ -157,12 +146,12 @@ class Estimator {
   [[nodiscard]] const MotionFilter& filter() const { return filter_; }
   [[nodiscard]] const SensorWatch& watch(Source source) const { return watches_[static_cast<size_t>(source)]; }
   [[nodiscard]] bool knows_picture(int64_t stamp_ns) const { return filter_.has_clone(stamp_ns); }
-  [[nodiscard]] const std::shared_ptr<const track::Path>& path() const { return path_; }
+  [[nodiscard]] const std::shared_ptr<const track::Path>& path() const { return place_.path; }
   /// The place is to be given up: where the train is, nobody knows any more.
-  [[nodiscard]] std::optional<Against> place_is_wrong() const { return wrong_place_.proven(); }
+  [[nodiscard]] std::optional<Against> place_is_wrong() const { return place_.wrong_place.proven(); }
   void give_place_up(Against because);
   /// Who spoke against the last place; nothing where there is one, or was none yet.
-  [[nodiscard]] std::optional<Against> given_up() const { return given_up_; }
+  [[nodiscard]] std::optional<Against> given_up() const { return place_.given_up; }
 
  private:
   /// Samples until they are used as their mean.
@@ -207,12 +196,10 @@ class Estimator {
   /// How far one reckoning is from another, and the furthest that came to on either side.
   struct Apart {
     double now_m = 0;
-    double behind_m = 0;
-    double ahead_m = 0;
+    Sides most;
     void add(double way_m) {
       now_m += way_m;
-      behind_m = std::max(behind_m, -now_m);
-      ahead_m = std::max(ahead_m, now_m);
+      most.hold({-now_m, now_m});
     }
   };
   /// What the wheel has counted since the reference without a camera beside it.
@@ -233,6 +220,30 @@ class Estimator {
     double residual_m = 0;
     double sigma_m = 0;
     double distance_m = 0;
+  };
+  /// What is known of the place on the map, beside the filter's numbers.
+  struct Place {
+    std::shared_ptr<const track::Path> path;  // nullptr = the place is not known
+    std::optional<Against> given_up;          // the last place was, and there is none since
+    ToldBy told_by = ToldBy::nobody;
+    int bends_agreed = 0;  // curves that fitted a place that was only told
+    TrackDoubt track_doubt;
+    TurnedWay turned_way;
+    WrongPlace wrong_place;
+    uint32_t reference = 0;
+    std::array<uint32_t, 16> met{};  // landmarks that were used last, newest first; 0 = none
+    int landmarks_agreed = 0;        // in a row
+    // Until a landmark tells them apart: over other ways that lead to tracks that were declared, or that map_matcher
+    // has named, and as far as it now says another place without naming one.
+    Sides joined;
+    Sides other_ways;
+    Sides said_elsewhere;
+  };
+  /// What is in doubt until a fix is used.
+  struct Doubts {
+    double odometers_m = 0;  // camera and the rest contradict each other by so much
+    double time_m = 0;       // so far behind: time without data may be no time but a clock that was set
+    Sides refused;           // a fix that was refused, or a surprising one, says that the train is so far away
   };
 
   [[nodiscard]] bool used_within(Source source, double time_s) const;
@@ -301,13 +312,16 @@ class Estimator {
   static constexpr int kLandmarksBelieved = 5;  // in a row, whoever says otherwise
 
   const FusionParameters* parameters_;
-  std::shared_ptr<const track::Path> path_;
   MotionFilter filter_;
   int64_t stamp_ns_;
+  int64_t start_ns_ = 0;
+
+  // Motion, and who is believed about it.
   std::array<SensorWatch, kSources> watches_;
   Rhythm events_;
   Rhythm pictures_;
   Rhythm pulses_;
+  int64_t gap_begin_ns_ = 0;
   Mean accel_;
   Repeated accel_repeated_;
   bool grade_known_ = true;
@@ -316,42 +330,28 @@ class Estimator {
   Wheel wheel_;
   WheelNoise wheel_noise_;
   FeltMotion felt_;
-  Unwatched unwatched_;
   SlipWatch slip_watch_;
   SuddenChange sudden_change_;
   bool slip_began_ = false;
-  FixVerdict fix_verdict_ = FixVerdict::none;
-  Offer fix_offer_;           // of the last fix
-  int landmarks_agreed_ = 0;  // in a row
-  std::optional<RefusedFix> refused_fix_;
-  int gnss_agreed_ = 0;     // fixes, since three in a row were refused
-  bool corrected_ = false;  // the place was moved against the filter's word, not confirmed yet
-  uint32_t reference_ = 0;
-  std::array<uint32_t, 16> met_{};  // landmarks that were used last, newest first; 0 = none
-  bool fix_again_ = false;
-  std::optional<track::EdgePosition> off_path_;  // a fix was there since the last one that was used
-  double excess_m_ = 0;                          // that others promise beyond this one's interval
-  double doubt_m_ = 0;       // camera and the rest contradict each other by so much since the reference
-  double unchecked_m_ = 0;   // of the first step, until a second one or the wheel agrees
-  double time_doubt_m_ = 0;  // so far behind, because time without data may be no time but a clock that was set
-  int64_t gap_begin_ns_ = 0;
-  double doubt_behind_m_ = 0;  // a refused fix says that the train is so far behind
-  double doubt_ahead_m_ = 0;
-  // Until a landmark tells them apart: over other ways that lead to tracks that were declared, or that map_matcher has
-  // named, and as far as it now says another place without naming one.
-  Sides joined_;
-  Sides other_ways_;
-  Sides said_elsewhere_;
   double rest_distance_m_ = 0;
   int64_t rest_since_ns_ = 0;
   bool standstill_ = false;
-  TrackDoubt track_doubt_;
-  TurnedWay turned_way_;
-  WrongPlace wrong_place_;
-  ToldBy told_by_ = ToldBy::nobody;
-  int bends_agreed_ = 0;             // curves that fitted a place that was only told
-  std::optional<Against> given_up_;  // the last place was, and there is none since
-  int64_t start_ns_ = 0;
+
+  // The place, and the fixes that told it.
+  Place place_;
+  FixVerdict fix_verdict_ = FixVerdict::none;
+  Offer fix_offer_;  // of the last fix
+  bool fix_again_ = false;
+  std::optional<RefusedFix> refused_fix_;
+  std::optional<track::EdgePosition> off_path_;  // a fix was there since the last one that was used
+  bool corrected_ = false;                       // the place was moved against the filter's word, not confirmed yet
+  int gnss_agreed_ = 0;                          // fixes, since three in a row were refused
+
+  // What the interval holds beyond the filter's sigma.
+  Doubts doubts_;
+  Unwatched unwatched_;
+  double unchecked_m_ = 0;  // of the first step, until a second one or the wheel agrees
+  double excess_m_ = 0;     // that others promise beyond this one's interval
 };
 
 }  // namespace railfix::fusion

@@ -44,7 +44,7 @@ void Estimator::use(const ImuInput& sample) {
 
 // Where no map tells the grade it hides in the bias, and changes along the way.
 void Estimator::doubt_grade() {
-  const bool known = path_ && path_->grade_known_at(filter_.path_distance_m());
+  const bool known = place_.path && place_.path->grade_known_at(filter_.path_distance_m());
   const double way_m = std::abs(distance_m() - std::exchange(graded_m_, distance_m()));
   const double sigma_mps2 = core::kGravityMps2 * parameters_->unknown_grade;
   if (std::exchange(grade_known_, known) != known) {
@@ -65,7 +65,7 @@ void Estimator::use_acceleration(double accel_mps2, int64_t stamp_ns) {
     return;
   }
   doubt_grade();
-  const double grade = grade_known_ ? path_->at(filter_.path_distance_m()).grade : 0.0;
+  const double grade = grade_known_ ? place_.path->at(filter_.path_distance_m()).grade : 0.0;
   const double force_mps2 = accel_mps2 - core::kGravityMps2 * grade / std::hypot(1.0, grade);
   const double sigma_mps2 = parameters_->accel_sigma_mps2;
   // Nobody could contradict it in the dark: with whom it did not agree before is asked for longer.
@@ -110,41 +110,42 @@ void Estimator::use_yaw_rate(double rate_rps) {
     filter_.offer_yaw_rate(rate_rps, 0, 0, parameters_->gyro_sigma_rps, parameters_->gate_gyro);
     return;
   }
-  if (!path_ || filter_.path_sigma_m() > kGyroPositionSigmaM || speed_sigma_mps > 1) {
-    turned_way_.clear();
+  if (!place_.path || filter_.path_sigma_m() > kGyroPositionSigmaM || speed_sigma_mps > 1) {
+    place_.turned_way.clear();
     return;
   }
   remember_turn(rate_rps, speed_mps);
-  const auto point = path_->at(filter_.path_distance_m() - 0.5 * speed_mps * parameters_->gyro_period_s);
+  const auto point = place_.path->at(filter_.path_distance_m() - 0.5 * speed_mps * parameters_->gyro_period_s);
   // A tenth of the curvature covers the map's error, which is the same for a whole curve.
   const double sigma_rps =
       parameters_->gyro_sigma_rps + std::abs(point.curvature_per_m) * (0.1 * std::abs(speed_mps) + speed_sigma_mps);
   const auto offer = filter_.offer_yaw_rate(rate_rps, point.curvature_per_m, point.curvature_rate_per_m2, sigma_rps,
                                             parameters_->gate_gyro);
   const bool bends = std::abs(speed_mps * point.curvature_per_m) > parameters_->gate_gyro * sigma_rps;
-  track_doubt_.turned(offer.used, bends);
+  place_.track_doubt.turned(offer.used, bends);
   compare_turns();
 }
 
 void Estimator::remember_turn(double rate_rps, double speed_mps) {
   const double period_s = parameters_->gyro_period_s;
   const double here_m = filter_.path_distance_m();
-  turned_way_.add({here_m - speed_mps * period_s, here_m, (rate_rps - filter_.value(StateIndex::gyro_bias)) * period_s,
-                   parameters_->gyro_sigma_rps * period_s, period_s});
+  place_.turned_way.add({here_m - speed_mps * period_s, here_m,
+                         (rate_rps - filter_.value(StateIndex::gyro_bias)) * period_s,
+                         parameters_->gyro_sigma_rps * period_s, period_s});
 }
 
 // Where no switch was run over there is no other leg, and where the place is in doubt its turns say nothing. One mast
 // may stand beside both legs: as long as the points are among what is remembered, having seen it says less than the
 // turns.
 void Estimator::compare_turns() {
-  const auto points_m = track_doubt_.divided_at_m();
-  const bool passed = points_m && turned_way_.holds(*points_m);
-  if (wrong_place_.lost() || (!track_doubt_.divided() && !passed)) return;
-  const auto promised = widened(interval());
-  const double half_m = 0.5 * (promised.ahead_m - promised.behind_m);
+  const auto points_m = place_.track_doubt.divided_at_m();
+  const bool passed = points_m && place_.turned_way.holds(*points_m);
+  if (place_.wrong_place.lost() || (!place_.track_doubt.divided() && !passed)) return;
+  const auto known = widened(interval());
+  const double half_m = 0.5 * (known.front_m - known.rear_m);
   const double place_m = std::max(filter_.path_sigma_m(), half_m / parameters_->interval_factor);
-  const auto strays = turned_way_.strays(*path_, {filter_.sigma(StateIndex::gyro_bias), place_m});
-  if (strays.most > kTurnSigmas && strays.without_worst > kTurnSigmasOfTwo) track_doubt_.strayed();
+  const auto misfit = place_.turned_way.misfit(*place_.path, {filter_.sigma(StateIndex::gyro_bias), place_m});
+  if (misfit.most > kTurnSigmas && misfit.without_worst > kTurnSigmasOfTwo) place_.track_doubt.turned_elsewhere();
 }
 
 }  // namespace railfix::fusion

@@ -69,21 +69,21 @@ void Estimator::use(const OdometryInput& step) {
       MotionFilter trial = filter_;
       const auto offer = offered_to(trial);
       camera.hear(offer.used, kAgreementsOfCamera, step.stamp_ns);
-      if (alone) doubt_m_ += std::abs(offer.residual);
+      if (alone) doubts_.odometers_m += std::abs(offer.residual);
     } else if (const auto offer = offer_motion(Source::camera, step.stamp_ns, offered_to); offer.used) {
       const bool nobody_before = camera.used_ns == 0 && watch(Source::wheel).used_ns == 0;
       unchecked_m_ = nobody_before ? kSleeperM : 0;
       camera.accept(step.stamp_ns);
-      if (step.reference_stamp_ns <= gap_begin_ns_ && filter_.has_clone(step.reference_stamp_ns)) time_doubt_m_ = 0;
+      if (step.reference_stamp_ns <= gap_begin_ns_ && filter_.has_clone(step.reference_stamp_ns)) doubts_.time_m = 0;
       compare_with_wheel(step, sigma_m);
     } else {
       slip_watch_.no_picture();
       if (++camera.refused >= kRefusalsToIsolate && !blame_wheel_on_trial()) {
-        if (alone && !camera.isolated) doubt_m_ += camera.refused * std::abs(offer.residual);
+        if (alone && !camera.isolated) doubts_.odometers_m += camera.refused * std::abs(offer.residual);
         camera.isolate(step.stamp_ns);
       }
       // With the wheel the rivals' ends are wide enough; without it nobody knows who is right.
-      if (camera.refused >= kRefusalsToDoubt && alone) doubt_m_ += std::abs(offer.residual);
+      if (camera.refused >= kRefusalsToDoubt && alone) doubts_.odometers_m += std::abs(offer.residual);
     }
   }
   if (!step.valid) slip_watch_.no_picture();
@@ -168,7 +168,7 @@ void Estimator::use(const WheelInput& sample) {
              }).used) {
     watch.accept(sample.stamp_ns);
     unchecked_m_ = 0;
-    if (wheel_.counts_since_ns <= gap_begin_ns_) time_doubt_m_ = 0;
+    if (wheel_.counts_since_ns <= gap_begin_ns_) doubts_.time_m = 0;
   } else if (++watch.refused >= kRefusalsToIsolate) {
     isolate_wheel();
   }

@@ -63,11 +63,11 @@ FootOnPath foot_on_path(const track::Path& path, double start_m, double easting_
 void Estimator::use(const GnssInput& sample) {
   auto& gnss = watched(Source::gnss);
   gnss.seen_ns = sample.stamp_ns;
-  if (sample.fix == 0 || !path_) {
+  if (sample.fix == 0 || !place_.path) {
     gnss_agreed_ = 0;
     return;
   }
-  const auto place = foot_on_path(*path_, filter_.path_distance_m(), sample.easting_m, sample.northing_m);
+  const auto place = foot_on_path(*place_.path, filter_.path_distance_m(), sample.easting_m, sample.northing_m);
   const double once_m = std::hypot(gnss_sigma_m(sample, *parameters_), parameters_->gnss_map_sigma_m);
   const double foot_m = place.distance_m - parameters_->gnss_antenna_ahead_m;
   const bool beside = std::abs(place.lateral_m) > kOffTrackM + 3 * once_m;
@@ -78,9 +78,9 @@ void Estimator::use(const GnssInput& sample) {
   } else if (agrees && filter_.offer_position(measured, parameters_->gate_gnss).used) {
     gnss.accept(sample.stamp_ns);
     ++gnss_agreed_;
-    if (told_by_ == ToldBy::start) told_by_ = ToldBy::nobody;
+    if (place_.told_by == ToldBy::start) place_.told_by = ToldBy::nobody;
     // The rival without GNSS stays lost: the interval holds what GNSS may be wrong by.
-    if (gnss_proven()) wrong_place_.found();
+    if (gnss_proven()) place_.wrong_place.found();
   } else if (++gnss.refused >= kRefusalsToIsolate) {
     gnss.isolate(sample.stamp_ns);
     gnss_agreed_ = 0;
@@ -89,22 +89,23 @@ void Estimator::use(const GnssInput& sample) {
 
 void Estimator::use_track(const FixInput& fix) {
   if (fix.new_path) {
-    path_ = fix.new_path;
-    track_doubt_.changed();
+    place_.path = fix.new_path;
+    place_.track_doubt.changed();
     compare_turns();
-    joined_.add({fix.behind_m, fix.ahead_m});
+    place_.joined.add(fix.otherwise);
     // What was seen beside the old way lies on the new one: it spoke for it.
-    if (off_path_ && path_->distance_of(*off_path_, filter_.path_distance_m())) {
+    if (off_path_ && place_.path->distance_of(*off_path_, filter_.path_distance_m())) {
       off_path_.reset();
-      track_doubt_.seen_here();
+      place_.track_doubt.seen_here();
     }
   }
   // What is said of another track is no more than its rest for this one.
   const double here_m = filter_.path_distance_m();
-  const auto of_m = path_->distance_of({fix.edge, fix.offset_m, fix.direction}, here_m);
+  const auto of_m = place_.path->distance_of({fix.edge, fix.offset_m, fix.direction}, here_m);
   // A word that comes beside a landmark is of before it.
-  wrong_place_.said(fix.sightings_fit == SightingsFit::nowhere && !used_within(Source::landmark, kBesideLandmarkS));
-  track_doubt_.said(of_m ? fix.probability : std::min(fix.probability, 1 - fix.probability), of_m, here_m);
+  place_.wrong_place.said(fix.sightings_fit == SightingsFit::nowhere &&
+                          !used_within(Source::landmark, kBesideLandmarkS));
+  place_.track_doubt.said(of_m ? fix.probability : std::min(fix.probability, 1 - fix.probability), of_m, here_m);
   if (of_m) hold_other_ways(fix, *of_m, here_m);
 }
 
@@ -113,16 +114,16 @@ void Estimator::use_track(const FixInput& fix) {
 // been started anew.
 void Estimator::hold_other_ways(const FixInput& fix, double place_m, double here_m) {
   const double off_m = std::abs(place_m - here_m) > kCorrectedM ? place_m - here_m : 0;
-  const Sides said{std::max(0.0, fix.behind_m - off_m), std::max(0.0, fix.ahead_m + off_m)};
-  const bool named = fix.behind_m > 0 || fix.ahead_m > 0;
-  if (named) other_ways_.hold(said);
-  said_elsewhere_ = named ? Sides{} : said;
+  const Sides said{std::max(0.0, fix.otherwise.behind_m - off_m), std::max(0.0, fix.otherwise.ahead_m + off_m)};
+  const bool named = fix.otherwise.behind_m > 0 || fix.otherwise.ahead_m > 0;
+  if (named) place_.other_ways.hold(said);
+  place_.said_elsewhere = named ? Sides{} : said;
 }
 
 Sides Estimator::held_ways() const {
-  Sides ways = joined_;
-  ways.hold(other_ways_);
-  ways.hold(said_elsewhere_);
+  Sides ways = place_.joined;
+  ways.hold(place_.other_ways);
+  ways.hold(place_.said_elsewhere);
   return ways;
 }
 
@@ -130,13 +131,12 @@ Sides Estimator::held_ways() const {
 bool Estimator::tells_ways_apart(const FixInput& fix) const {
   const Sides ways = held_ways();
   if (fix.kind != FixKind::landmark || ways.behind_m + ways.ahead_m == 0) return true;
-  const auto place_m = path_->distance_of({fix.edge, fix.offset_m, fix.direction}, filter_.path_distance_m());
+  const auto place_m = place_.path->distance_of({fix.edge, fix.offset_m, fix.direction}, filter_.path_distance_m());
   if (!place_m) return true;
-  const auto& all = path_->map().landmarks;
-  const auto seen = std::ranges::find(all, fix.landmark, &track::Landmark::id);
-  if (seen == all.end()) return true;
+  const auto* seen = place_.path->map().landmark(fix.landmark);
+  if (seen == nullptr) return true;
   const auto stands_at = [&](double m) {
-    return std::ranges::any_of(path_->landmarks_between(m - kAsFarM, m + kAsFarM),
+    return std::ranges::any_of(place_.path->landmarks_between(m - kAsFarM, m + kAsFarM),
                                [&](const track::PathLandmark& other) { return other.landmark->kind == seen->kind; });
   };
   return !(ways.behind_m > 0 && stands_at(*place_m - ways.behind_m)) &&
@@ -145,30 +145,30 @@ bool Estimator::tells_ways_apart(const FixInput& fix) const {
 
 void Estimator::use(const FixInput& fix) {
   if (fix.kind == FixKind::track) {
-    if (path_) use_track(fix);
+    if (place_.path) use_track(fix);
     return;
   }
   watched(fix.kind == FixKind::curvature ? Source::curvature : Source::landmark).seen_ns = fix.stamp_ns;
   if (fix.new_path) {
-    path_ = fix.new_path;
-    given_up_.reset();
+    place_.path = fix.new_path;
+    place_.given_up.reset();
     filter_.set_origin(0, fix_sigma_m(fix, *parameters_));
-    track_doubt_ = {};
-    track_doubt_.said(fix.probability, std::nullopt, filter_.path_distance_m());
+    place_.track_doubt = {};
+    place_.track_doubt.said(fix.probability, std::nullopt, filter_.path_distance_m());
     accept(fix);
     if (fix.of_before) doubt_points_behind();
-    told_by_ = fix.kind == FixKind::gnss ? ToldBy::gnss : fix.only_told ? ToldBy::start : ToldBy::nobody;
-    bends_agreed_ = 0;
-    if (fix.in_doubt) wrong_place_.doubt();
+    place_.told_by = fix.kind == FixKind::gnss ? ToldBy::gnss : fix.only_told ? ToldBy::start : ToldBy::nobody;
+    place_.bends_agreed = 0;
+    if (fix.in_doubt) place_.wrong_place.doubt();
     return;
   }
-  if (!path_ || fix.kind == FixKind::gnss || fix.probability < parameters_->fix_min_probability) return;
-  if (wrong_place_.lost() && fix.kind == FixKind::curvature) return;  // some curve fits in every window so wide
+  if (!place_.path || fix.kind == FixKind::gnss || fix.probability < parameters_->fix_min_probability) return;
+  if (place_.wrong_place.lost() && fix.kind == FixKind::curvature) return;  // some curve fits in every window so wide
   const track::EdgePosition place{fix.edge, fix.offset_m, fix.direction};
-  const auto path_distance_m = path_->distance_of(place, filter_.path_distance_m());
+  const auto path_distance_m = place_.path->distance_of(place, filter_.path_distance_m());
   if (!path_distance_m) {
     off_path_ = place;
-    track_doubt_.seen_elsewhere(fix.probability);
+    place_.track_doubt.seen_elsewhere(fix.probability);
     return;
   }
   const double sigma_m = fix_sigma_m(fix, *parameters_);
@@ -180,7 +180,7 @@ void Estimator::use(const FixInput& fix) {
     corrected_ = false;
     accept(fix);
     if (fix_used() && fix.kind == FixKind::landmark && !fix_again_) {
-      ++landmarks_agreed_;
+      ++place_.landmarks_agreed;
       confirm_by(fix);
       doubt_surprise(fix.sigma_m);
     }
@@ -190,7 +190,7 @@ void Estimator::use(const FixInput& fix) {
 }
 
 bool Estimator::has_met(uint32_t landmark) const {
-  return landmark != 0 && std::ranges::find(met_, landmark) != met_.end();
+  return landmark != 0 && std::ranges::find(place_.met, landmark) != place_.met.end();
 }
 
 bool Estimator::fix_unexpected() const {
@@ -241,7 +241,7 @@ Offer Estimator::offer_place_again(double path_distance_m, double sigma_m) {
 
 double Estimator::doubted_beyond_sigma_m() const {
   const auto promised = widened(interval());
-  return std::max(centre_m() - promised.behind_m, promised.ahead_m - centre_m()) - known_to_m() + excess_m_;
+  return std::max(centre_m() - promised.rear_m, promised.front_m - centre_m()) - known_to_m() + excess_m_;
 }
 
 void Estimator::accept(const FixInput& fix) {
@@ -249,27 +249,27 @@ void Estimator::accept(const FixInput& fix) {
   off_path_.reset();
   // Some curve may fit at a place that nobody has confirmed, though the train turns otherwise than the track there.
   const bool by_chance =
-      fix.kind == FixKind::curvature && (told_by_ != ToldBy::nobody || track_doubt_.turns_otherwise());
+      fix.kind == FixKind::curvature && (place_.told_by != ToldBy::nobody || place_.track_doubt.turns_otherwise());
   if (!by_chance) {
-    track_doubt_.seen_here();
-    turned_way_.corrected(fix_offer_.residual);
+    place_.track_doubt.seen_here();
+    place_.turned_way.corrected(fix_offer_.residual);
     compare_turns();
   }
   if (by_chance && std::abs(fix_offer_.residual) < kBendsHereM) confirm_by_curve();
-  if (fix.kind == FixKind::network) told_by_ = ToldBy::nobody;
+  if (fix.kind == FixKind::network) place_.told_by = ToldBy::nobody;
   // A vague fix helps, but settles no doubt and is nothing to measure a distance from. Landmarks are sharp by
   // themselves.
   if (fix.kind != FixKind::landmark && fix.sigma_m > 2 * filter_.path_sigma_m()) return;
   fix_verdict_ = FixVerdict::used;
   refused_fix_.reset();
-  if (!by_chance) wrong_place_.found();
-  doubt_m_ = doubt_behind_m_ = doubt_ahead_m_ = time_doubt_m_ = 0;
-  if (tells_ways_apart(fix)) joined_ = other_ways_ = said_elsewhere_ = {};
+  if (!by_chance) place_.wrong_place.found();
+  doubts_ = {};
+  if (tells_ways_apart(fix)) place_.joined = place_.other_ways = place_.said_elsewhere = {};
   unwatched_ = {.distance_m = unwatched_.distance_m};
-  reference_ = fix.landmark;
+  place_.reference = fix.landmark;
   if (fix.landmark != 0 && !has_met(fix.landmark)) {
-    std::rotate(met_.begin(), met_.end() - 1, met_.end());
-    met_.front() = fix.landmark;
+    std::rotate(place_.met.begin(), place_.met.end() - 1, place_.met.end());
+    place_.met.front() = fix.landmark;
   }
   filter_.mark_reference();
 }
@@ -277,16 +277,16 @@ void Estimator::accept(const FixInput& fix) {
 // Where masts stand everywhere some stand by chance where the map has them: map_matcher knows how many; GNSS is never
 // so far off.
 void Estimator::confirm_by(const FixInput& landmark) {
-  const bool confirms = landmark.sightings_fit == SightingsFit::here || landmarks_agreed_ >= kLandmarksBelieved;
-  if (told_by_ == ToldBy::gnss || confirms) told_by_ = ToldBy::nobody;
+  const bool confirms = landmark.sightings_fit == SightingsFit::here || place_.landmarks_agreed >= kLandmarksBelieved;
+  if (place_.told_by == ToldBy::gnss || confirms) place_.told_by = ToldBy::nobody;
 }
 
 // One may fit by chance, and there is none on a straight line that lies elsewhere.
 void Estimator::confirm_by_curve() {
-  wrong_place_.bends_here();
-  if (told_by_ != ToldBy::start) return;
-  bends_agreed_ = track_doubt_.turns_otherwise() ? 0 : bends_agreed_ + 1;
-  if (bends_agreed_ >= kCurvesConfirm) told_by_ = ToldBy::nobody;
+  place_.wrong_place.bends_here();
+  if (place_.told_by != ToldBy::start) return;
+  place_.bends_agreed = place_.track_doubt.turns_otherwise() ? 0 : place_.bends_agreed + 1;
+  if (place_.bends_agreed >= kCurvesConfirm) place_.told_by = ToldBy::nobody;
 }
 
 double Estimator::reach_m(const Offer& offer, double sigma_m) const {
@@ -297,7 +297,7 @@ double Estimator::reach_m(const Offer& offer, double sigma_m) const {
 // Until the next one.
 void Estimator::doubt_surprise(double sigma_m) {
   if (fix_sigmas_off(excess_m_) < kSurprisingSigmas) return;
-  doubt_behind_m_ = doubt_ahead_m_ = reach_m(fix_offer_, sigma_m);
+  doubts_.refused = {reach_m(fix_offer_, sigma_m), reach_m(fix_offer_, sigma_m)};
 }
 
 // One fix alone never moves the train against the filter; a second one elsewhere that says the same does.
@@ -314,16 +314,16 @@ void Estimator::refuse(const FixInput& fix, double path_distance_m, const Offer&
       corrected_ = true;
       accept(fix);
       // Either side: what told where to look for these two was wrong by as much. Until a third one agrees.
-      doubt_behind_m_ = doubt_ahead_m_ = reach_m(offer, fix.sigma_m);
+      doubts_.refused = {reach_m(offer, fix.sigma_m), reach_m(offer, fix.sigma_m)};
       fix_verdict_ = FixVerdict::corrected;
-      landmarks_agreed_ = 2;
+      place_.landmarks_agreed = 2;
       if (fix.kind == FixKind::landmark) confirm_by(fix);
       return;
     }
   }
   fix_verdict_ = FixVerdict::refused;
   refused_fix_ = RefusedFix{offer.residual, fix.sigma_m, distance_m};
-  auto& doubt_m = offer.residual < 0 ? doubt_behind_m_ : doubt_ahead_m_;
+  auto& doubt_m = offer.residual < 0 ? doubts_.refused.behind_m : doubts_.refused.ahead_m;
   doubt_m = std::max(doubt_m, reach_m(offer, fix.sigma_m));
 }
 

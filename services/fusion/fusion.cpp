@@ -44,8 +44,9 @@ bool has_sense(const GnssInput& e) {
   return up_to(e.easting_m, 1e9) && up_to(e.northing_m, 1e9) && up_to(e.hdop, 1e6);
 }
 bool has_sense(const FixInput& e) {
-  return (e.kind == FixKind::track || up_to(e.sigma_m, 1e7)) && up_to(e.offset_m, 1e9) && within(e.probability, 0, 1) &&
-         up_to(e.behind_m, 1e7) && up_to(e.ahead_m, 1e7);
+  const bool known = e.kind >= FixKind::curvature && e.kind <= FixKind::gnss;
+  return known && (e.kind == FixKind::track || up_to(e.sigma_m, 1e7)) && up_to(e.offset_m, 1e9) &&
+         within(e.probability, 0, 1) && up_to(e.otherwise.behind_m, 1e7) && up_to(e.otherwise.ahead_m, 1e7);
 }
 
 // Two fixes may have one stamp; everything else has one measurement for each stamp.
@@ -147,8 +148,7 @@ std::optional<TrainEstimate> Fusion::use(Event event) {
 std::optional<TrainEstimate> Fusion::tick(int64_t now_ns) {
   if (!now_) return std::nullopt;
   // Before an odometer has measured there is nothing to go on with, and its first measurements may be late.
-  const auto measures = [this](Source source) { return now_->main().watch(source).used_ns != 0; };
-  const bool moved = measures(Source::camera) || measures(Source::wheel);
+  const bool moved = std::ranges::any_of(kOdometers, [&](Source one) { return now_->main().has_ever_measured(one); });
   const double patience_s = moved ? parameters_->output_period_s : parameters_->sensor_timeout_s;
   if (core::seconds(now_ns - last_output_ns_) < patience_s) return std::nullopt;
   if (now_ns <= now_->stamp_ns()) return std::nullopt;
@@ -184,8 +184,8 @@ bool Fusion::change_track(FixInput& fix) {
   if (map_->edge(fix.edge) == nullptr) return false;
   const auto& filter = now_->main().filter();
   const double here_m = filter.path_distance_m() - filter.speed_mps() * core::seconds(filter.stamp_ns() - fix.stamp_ns);
-  const auto promised = now_->main().interval();
-  const double reach_m = kBesideM + promised.ahead_m - promised.behind_m;
+  const auto known = now_->main().interval();
+  const double reach_m = kBesideM + known.front_m - known.rear_m;  // who says it may be at the other end
   const track::EdgePosition place{fix.edge, fix.offset_m, fix.direction};
   const auto runs_here = [&](const track::Path& way) {
     const auto place_m = way.route().distance_of(place, here_m);
@@ -202,8 +202,7 @@ bool Fusion::change_track(FixInput& fix) {
   const double place_m = *way->path.route().distance_of(place, here_m);
   for (const double otherwise_m : way->otherwise_m) {
     if (std::abs(otherwise_m - here_m) > reach_m) continue;
-    fix.behind_m = std::max(fix.behind_m, otherwise_m - place_m);
-    fix.ahead_m = std::max(fix.ahead_m, place_m - otherwise_m);
+    fix.otherwise.hold({otherwise_m - place_m, place_m - otherwise_m});
   }
   fix.new_path = std::make_shared<const track::Path>(std::move(way->path));
   return true;

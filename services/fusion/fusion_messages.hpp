@@ -13,6 +13,12 @@
 
 namespace railfix::fusion {
 
+static_assert(static_cast<uint8_t>(FixKind::curvature) == msg::FIX_CURVATURE);
+static_assert(static_cast<uint8_t>(FixKind::landmark) == msg::FIX_LANDMARK);
+static_assert(static_cast<uint8_t>(FixKind::network) == msg::FIX_NETWORK);
+static_assert(static_cast<uint8_t>(FixKind::track) == msg::FIX_TRACK);
+static_assert(static_cast<uint8_t>(FixKind::gnss) == msg::FIX_GNSS);
+
 inline OdometryInput input_of(const msg::OdometryStep& m) {
   return {m.stamp_ns(), m.reference_stamp_ns(), m.step_m(), m.step_sigma_m(), messaging::has_measured(m)};
 }
@@ -24,8 +30,7 @@ inline void hold_other_places(const msg::PositionFix& m, FixInput& fix) {
     const bool here = m.alternative_edge()[i] == m.edge() && m.alternative_direction()[i] == m.direction();
     if (!here) continue;
     const double further_m = along * (m.alternative_offset_m()[i] - m.offset_m());
-    fix.behind_m = std::max(fix.behind_m, -further_m);
-    fix.ahead_m = std::max(fix.ahead_m, further_m);
+    fix.otherwise.hold({-further_m, further_m});
   }
 }
 
@@ -37,11 +42,7 @@ inline FixInput input_of(const msg::PositionFix& m) {
   fix.sigma_m = m.sigma_m();
   fix.probability = m.probability();
   fix.landmark = m.landmark();
-  fix.kind = m.kind() == msg::FIX_CURVATURE ? FixKind::curvature
-             : m.kind() == msg::FIX_NETWORK ? FixKind::network
-             : m.kind() == msg::FIX_TRACK   ? FixKind::track
-             : m.kind() == msg::FIX_GNSS    ? FixKind::gnss
-                                            : FixKind::landmark;
+  fix.kind = static_cast<FixKind>(m.kind());
   fix.direction = messaging::direction_of(m.direction());
   fix.sightings_fit = m.sightings_fit() == msg::SIGHTINGS_FIT_HERE      ? SightingsFit::here
                       : m.sightings_fit() == msg::SIGHTINGS_FIT_NOWHERE ? SightingsFit::nowhere

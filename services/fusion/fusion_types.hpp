@@ -2,6 +2,7 @@
 // its arrival.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -41,6 +42,20 @@ struct GnssInput {
   int fix = 0;  // 0 none, 1 single, 4 RTK fixed, 5 RTK float
 };
 
+/// So far behind and ahead of a place, or beyond an interval's ends.
+struct Sides {
+  double behind_m = 0;
+  double ahead_m = 0;
+  void add(const Sides& more) {
+    behind_m += more.behind_m;
+    ahead_m += more.ahead_m;
+  }
+  void hold(const Sides& other) {
+    behind_m = std::max(behind_m, other.behind_m);
+    ahead_m = std::max(ahead_m, other.ahead_m);
+  }
+};
+
 enum class FixKind : uint8_t { curvature = 1, landmark = 2, network = 3, track = 4, gnss = 5 };
 
 /// How all that is sighted fits the map near the place: SIGHTINGS_FIT_* of idl/position.idl.
@@ -62,9 +77,7 @@ struct FixInput {
   std::shared_ptr<const track::Path> new_path;  // set by Fusion when the fix starts the position on the map, or
                                                 // says that the train is on another track
   SightingsFit sightings_fit = SightingsFit::not_told;
-  // Kind track: over ways of another length that have led here it may be so much further behind, or ahead.
-  double behind_m = 0;
-  double ahead_m = 0;
+  Sides otherwise{};       // kind track: over ways of another length that have led here it is up to so far away
   bool only_told = false;  // kind network: nothing has confirmed it
   bool of_before = false;  // kind network: what the fusion before this one knew
   bool in_doubt = false;   // kind network: no position until landmarks or proven GNSS agree

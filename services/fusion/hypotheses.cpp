@@ -31,8 +31,8 @@ bool told_by_others(const FixInput& fix) {
 }  // namespace
 
 void Promise::hold(const Promise& other) {
-  interval.behind_m = std::min(interval.behind_m, other.interval.behind_m);
-  interval.ahead_m = std::max(interval.ahead_m, other.interval.ahead_m);
+  interval.rear_m = std::min(interval.rear_m, other.interval.rear_m);
+  interval.front_m = std::max(interval.front_m, other.interval.front_m);
   since_sure_m = std::max(since_sure_m, other.since_sure_m);
 }
 
@@ -80,13 +80,13 @@ void Hypotheses::give_place_up(Against because) {
 void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
   predict_to(fix.stamp_ns);
   Estimator before = main_;
-  const Excess most = most_excess();
+  const Sides most = most_excess();
   main_.contradicted_by(std::max(most.behind_m, most.ahead_m));
   main_.apply(event);
   main_.contradicted_by(0);
-  const bool told = main_.fix_used() || main_.fix_refused();
-  const bool hardly = main_.fix_unexpected();
-  if (told && fix.kind == FixKind::landmark && !main_.fix_again())
+  const bool judged = main_.fix_used() || main_.fix_refused();
+  const bool unexpected = main_.fix_unexpected();
+  if (judged && fix.kind == FixKind::landmark && !main_.fix_again())
     residuals_.add(fix.landmark, main_.fix_residual_m(), main_.fix_sigmas_off(0), before.since_reference_m());
   std::vector<Doubter> doubters_before = doubters_;
   for (auto& doubter : doubters_) {
@@ -95,7 +95,7 @@ void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
   for (auto& rival : rivals_) {
     if (rival.estimator) rival.estimator->apply(event);
   }
-  if (told) fix_fitted_ = main_.fix_used() && !main_.fix_corrected();
+  if (judged) fix_fitted_ = main_.fix_used() && !main_.fix_corrected();
   if (main_.fix_refused()) {
     if (adopt_by_fix(fix, before, doubters_before) || !adopt_doubter(fix, std::move(doubters_before))) return;
   } else if (main_.fix_used()) {
@@ -109,7 +109,7 @@ void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
   } else {
     return;
   }
-  confirm_rivals(hardly);
+  confirm_rivals(unexpected);
 }
 
 // The fix contradicts an earlier one and agrees with what is known without that one. Without that one less is known, so
@@ -129,10 +129,10 @@ bool Hypotheses::adopt_doubter(const FixInput& fix, std::vector<Doubter> before)
   return true;
 }
 
-Hypotheses::Doubter Hypotheses::without_one(const FixInput& fix, Estimator before, const Excess& most) const {
+Hypotheses::Doubter Hypotheses::without_one(const FixInput& fix, Estimator before, const Sides& most) const {
   Doubter doubter{.estimator = std::move(before), .landmark = fix.landmark, .of_shape = fix.kind == FixKind::curvature};
   const Interval slip = doubter.estimator.widened({});
-  doubter.excused_m = std::max({most.behind_m, most.ahead_m, -slip.behind_m, slip.ahead_m});
+  doubter.excused_m = std::max({most.behind_m, most.ahead_m, -slip.rear_m, slip.front_m});
   doubter.surprising = doubter.of_shape && main_.fix_unexpected();
   doubter.confirmed_by = doubter.estimator.landmarks_agreed();
   doubter.against = main_.fix_corrected() ? kFixesOfAClaim : 1;
@@ -223,7 +223,7 @@ void Hypotheses::rebase_clock(int64_t stamp_ns) {
   for (auto& rival : rivals_) {
     if (rival.estimator) rival.estimator->rebase_clock(stamp_ns);
     rival.asked_ns = std::min(rival.asked_ns, stamp_ns);
-    rival.strayed_ns = std::min(rival.strayed_ns, stamp_ns);
+    rival.excess_ns = std::min(rival.excess_ns, stamp_ns);
     rival.proven_since_ns = 0;
   }
 }
@@ -269,7 +269,7 @@ Promise Hypotheses::promise() const {
   }
   const double doubt_m =
       parameters_->interval_factor * residuals_.scatter_m() + residuals_.error_per_m() * main.since_reference_m();
-  const Interval doubted = main.widened({mine.behind_m - doubt_m, mine.ahead_m + doubt_m});
+  const Interval doubted = main.widened({mine.rear_m - doubt_m, mine.front_m + doubt_m});
   all.hold({doubted, all.since_sure_m});
   return all;
 }

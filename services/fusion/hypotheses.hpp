@@ -60,8 +60,6 @@ class Hypotheses {
   [[nodiscard]] const Estimator& main() const { return main_; }
 
  private:
-  /// How far the interval must reach beyond the main one's ends.
-  using Excess = Sides;
   /// The main one without a fix that no later one has confirmed.
   struct Doubter {
     Estimator estimator;
@@ -82,15 +80,15 @@ class Hypotheses {
   struct Rival {
     Source without;
     std::optional<Estimator> estimator;  // from the source's first sample on; until then it is the main one
-    Excess excess;
-    Excess carried;               // when it came back
-    Excess unseen;                // so far it may have been from the main one while it was away
-    bool asked = false;           // its word counts at present
-    int64_t asked_ns = 0;         // ... and counted last
-    bool contradicted = false;    // itself, while it was not asked
-    int64_t proven_since_ns = 0;  // two sensors have agreed in it since then; 0 = they do not
-    double faster_mps = 0;        // than the main one, when it was asked last
-    int64_t strayed_ns = 0;
+    Sides excess;                        // so far the interval must reach beyond the main one's ends for it
+    Sides carried;                       // when it came back
+    Sides unseen;                        // so far it may have been from the main one while it was away
+    bool asked = false;                  // its word counts at present
+    int64_t asked_ns = 0;                // ... and counted last
+    bool contradicted = false;           // itself, while it was not asked
+    int64_t proven_since_ns = 0;         // two sensors have agreed in it since then; 0 = they do not
+    double faster_mps = 0;               // than the main one, when it was asked last
+    int64_t excess_ns = 0;               // its excess is of then
 
     void forget_excess() { excess = carried = unseen = {}; }
   };
@@ -100,12 +98,12 @@ class Hypotheses {
   bool adopt_by_fix(const FixInput& fix, const Estimator& before, const std::vector<Doubter>& doubters);
   bool adopt_doubter(const FixInput& fix, std::vector<Doubter> before);
   [[nodiscard]] std::vector<Doubter> without_two(const FixInput& fix, const std::vector<Doubter>& before) const;
-  [[nodiscard]] Doubter without_one(const FixInput& fix, Estimator before, const Excess& most) const;
+  [[nodiscard]] Doubter without_one(const FixInput& fix, Estimator before, const Sides& most) const;
   void settle_doubters(const FixInput& fix, const std::vector<Doubter>& before);
   bool settle(Doubter& doubter, const Estimator& before, const FixInput& fix) const;
   [[nodiscard]] bool differs_in_scale(const Doubter& doubter) const;
-  /// The main one is confirmed; `hardly`: the fix was no small way from where it had been expected.
-  void confirm_rivals(bool hardly);
+  /// The main one is confirmed; `unexpected`: by a fix that was no small way from where it had been expected.
+  void confirm_rivals(bool unexpected);
   void exclude_faulty();
   void adopt(Rival& rival);
   void take_along(Doubter& doubter, const Estimator& next) const;
@@ -118,11 +116,11 @@ class Hypotheses {
   [[nodiscard]] bool stands_for_another(const Rival& rival) const;
   void begin_again(Rival& rival) const;
   void lose_sight(Rival& rival, int64_t now_ns) const;
-  static void stray(Rival& rival, int64_t now_ns);
+  static void extrapolate(Rival& rival, int64_t now_ns);
   [[nodiscard]] bool is_in_dispute(const Rival& rival) const;
   /// So much further reaches that interval than mine; negative: less far.
-  [[nodiscard]] static Excess beyond(const Interval& mine, const Interval& its);
-  [[nodiscard]] Excess most_excess() const;
+  [[nodiscard]] static Sides beyond(const Interval& mine, const Interval& its);
+  [[nodiscard]] Sides most_excess() const;
   [[nodiscard]] Interval promised(const Interval& main) const;
 
   const FusionParameters* parameters_;

@@ -43,7 +43,9 @@ void Hypotheses::adopt(Rival& rival) {
   for (auto& doubter : doubters_) {
     if (!doubter.estimator.is_consistent()) take_along(doubter, next);
   }
-  next.doubt_place(rival.carried.behind_m + rival.unseen.behind_m, rival.carried.ahead_m + rival.unseen.ahead_m);
+  Sides said = rival.carried;
+  said.add(rival.unseen);
+  next.doubt_place(said);
   main_ = std::move(next);
   for (auto& other : rivals_) other.forget_excess();
 }
@@ -52,17 +54,17 @@ void Hypotheses::adopt(Rival& rival) {
 void Hypotheses::take_along(Doubter& doubter, const Estimator& next) const {
   Estimator own = doubter.estimator;
   own.predict_to(main_.filter().stamp_ns());
-  const Excess more = beyond(main_.interval(), own.interval());
+  const Sides more = beyond(main_.interval(), own.interval());
   doubter.estimator = next;
-  doubter.estimator.doubt_place(more.behind_m, more.ahead_m);
+  doubter.estimator.doubt_place(more);
 }
 
-void Hypotheses::confirm_rivals(bool hardly) {
+void Hypotheses::confirm_rivals(bool unexpected) {
   for (auto& rival : rivals_) {
     rival.forget_excess();
     // Confirmed is the main one: a rival that is elsewhere was wrong.
     if (!rival.estimator || !rival.estimator->fix_refused()) continue;
-    if (hardly && stands_for_another(rival)) {
+    if (unexpected && stands_for_another(rival)) {
       rival.estimator->place_like(main_);
     } else {
       begin_again(rival);
@@ -89,7 +91,7 @@ void Hypotheses::ask(Rival& rival) {
     const bool consistent = !contradicts_itself(rival);
     // What the main one has not used yet the rival does not lack: it is not away.
     if (main_.watch(rival.without).used_ns == 0 && rival.estimator->knows_motion()) rival.asked_ns = now_ns;
-    if (consistent && core::seconds(now_ns - rival.asked_ns) < kSameSpeedsS) stray(rival, now_ns);
+    if (consistent && core::seconds(now_ns - rival.asked_ns) < kSameSpeedsS) extrapolate(rival, now_ns);
     rival.contradicted = rival.contradicted || !consistent;
     if (rival.contradicted && main_is_sound_without(rival.without)) begin_again(rival);
     return;
@@ -119,15 +121,15 @@ void Hypotheses::ask(Rival& rival) {
   if (rival.without == Source::gnss && main_.gnss_proven()) {
     const double most_m = main_.gnss_bound_m();
     apart_m = std::clamp(apart_m, -most_m, most_m);
-    its.behind_m = std::max(its.behind_m, mine.behind_m - most_m);
-    its.ahead_m = std::min(its.ahead_m, mine.ahead_m + most_m);
+    its.rear_m = std::max(its.rear_m, mine.rear_m - most_m);
+    its.front_m = std::min(its.front_m, mine.front_m + most_m);
   }
   // Since it came back both have gone on from one place: how far they come apart since adds to what it had said before.
   rival.excess = rival.carried;
   rival.excess.add({std::max(0.0, -apart_m), std::max(0.0, apart_m)});
   rival.excess.hold(beyond(mine, its));
   rival.faster_mps = other.filter().speed_mps() - main_.filter().speed_mps();
-  rival.strayed_ns = now_ns;
+  rival.excess_ns = now_ns;
 }
 
 bool Hypotheses::can_say(const Rival& rival) const {
@@ -177,8 +179,8 @@ void Hypotheses::lose_sight(Rival& rival, int64_t now_ns) const {
 }
 
 // Nothing tells any more how far they come apart: for a while as fast as they did last.
-void Hypotheses::stray(Rival& rival, int64_t now_ns) {
-  const double apart_m = rival.faster_mps * core::seconds(now_ns - std::exchange(rival.strayed_ns, now_ns));
+void Hypotheses::extrapolate(Rival& rival, int64_t now_ns) {
+  const double apart_m = rival.faster_mps * core::seconds(now_ns - std::exchange(rival.excess_ns, now_ns));
   rival.excess.add({std::max(0.0, -apart_m), std::max(0.0, apart_m)});
 }
 
@@ -189,19 +191,19 @@ bool Hypotheses::is_in_dispute(const Rival& rival) const {
   });
 }
 
-Hypotheses::Excess Hypotheses::beyond(const Interval& mine, const Interval& its) {
-  return {mine.behind_m - its.behind_m, its.ahead_m - mine.ahead_m};
+Sides Hypotheses::beyond(const Interval& mine, const Interval& its) {
+  return {mine.rear_m - its.rear_m, its.front_m - mine.front_m};
 }
 
-Hypotheses::Excess Hypotheses::most_excess() const {
-  Excess most;
+Sides Hypotheses::most_excess() const {
+  Sides most;
   for (const auto& rival : rivals_) most.hold(rival.excess);
   return most;
 }
 
 Interval Hypotheses::promised(const Interval& main) const {
-  const Excess most = most_excess();
-  return {main.behind_m - most.behind_m, main.ahead_m + most.ahead_m};
+  const Sides most = most_excess();
+  return {main.rear_m - most.behind_m, main.front_m + most.ahead_m};
 }
 
 }  // namespace railfix::fusion

@@ -17,10 +17,6 @@ OdometerScales prior(const FusionParameters& parameters, const std::optional<Odo
   return saved.value_or(unlearnt_scales(parameters));
 }
 
-bool measures(const Estimator& estimator, Source source) {
-  return estimator.watch(source).used_ns != 0;
-}
-
 }  // namespace
 
 ScaleTrial::ScaleTrial(const FusionParameters* parameters, const std::optional<OdometerScales>& saved,
@@ -82,7 +78,8 @@ bool ScaleTrial::contradicted(const Event& event) {
 
 bool ScaleTrial::ratio_is_another() const {
   const auto& free = unlearnt_->main();
-  if (!measures(free, Source::camera) || !measures(free, Source::wheel) || !free.is_consistent()) return false;
+  if (!free.has_ever_measured(Source::camera) || !free.has_ever_measured(Source::wheel) || !free.is_consistent())
+    return false;
   const auto& p = *parameters_;
   const auto& filter = free.filter();
   const double saved_sigma = std::sqrt(std::max(

@@ -30,7 +30,7 @@ class TrackDoubt {
   /// Where on the path the last such switch was run over, ever; nothing: none was.
   [[nodiscard]] std::optional<double> divided_at_m() const { return divided_at_m_; }
   /// There all its turns together are none of this track's.
-  void strayed() { turns_otherwise_ = true; }
+  void turned_elsewhere() { turns_otherwise_ = true; }
   [[nodiscard]] bool turns_otherwise() const { return turns_otherwise_; }
   /// ... and did so when it was looked at last.
   [[nodiscard]] bool turns_otherwise_now() const { return turns_otherwise_ && turned_otherwise_ > 0; }

@@ -53,16 +53,16 @@ bool TurnedWay::holds(double distance_m) const {
   return !pieces_.empty() && (pieces_.front().from_m - distance_m) * (pieces_.back().to_m - distance_m) <= 0;
 }
 
-TurnedWay::Strays TurnedWay::strays(const track::Path& path, const Errors& errors) const {
-  Strays least{INFINITY, INFINITY};
+TurnedWay::Misfit TurnedWay::misfit(const track::Path& path, const Errors& errors) const {
+  Misfit least{INFINITY, INFINITY};
   for (double behind_m = -kPointsM; behind_m <= kBogiesM + kPointsM; behind_m += kShiftStepM) {
-    const Strays shifted = strays_shifted(path, errors, behind_m);
+    const Misfit shifted = misfit_shifted(path, errors, behind_m);
     if (shifted.most < least.most) least = shifted;
   }
   return least;
 }
 
-TurnedWay::Strays TurnedWay::strays_shifted(const track::Path& path, const Errors& errors, double behind_m) const {
+TurnedWay::Misfit TurnedWay::misfit_shifted(const track::Path& path, const Errors& errors, double behind_m) const {
   struct Sum {
     double off_rad = 0, variance = 0, bend_rad = 0, time_s = 0, curvature_per_m = 0;
     double bump_rad = 0;  // what the last piece alone may have brought
@@ -70,7 +70,7 @@ TurnedWay::Strays TurnedWay::strays_shifted(const track::Path& path, const Error
   if (pieces_.empty()) return {};
   track::TrackPoint begin = path.at(pieces_.front().from_m - behind_m);
   std::vector<Sum> sums{{.curvature_per_m = begin.curvature_per_m}};
-  Strays strays;
+  Misfit misfit;
   for (const Piece& piece : pieces_) {
     const track::TrackPoint end = path.at(piece.to_m - behind_m);
     // Headings grow to the right.
@@ -96,11 +96,11 @@ TurnedWay::Strays TurnedWay::strays_shifted(const track::Path& path, const Error
       const double map_rad = std::hypot(kMapHeadingRad, kMapTurnShare * (sum.bend_rad - from.bend_rad));
       const double place_rad = std::hypot(errors.place_m, kMapPlaceM) * (sum.curvature_per_m - from.curvature_per_m);
       const double sigma_rad = std::hypot(gyro_rad, map_rad, place_rad);
-      if (std::abs(off_rad) <= strays.most * sigma_rad) continue;
-      strays = {std::abs(off_rad) / sigma_rad, std::max(0.0, std::abs(off_rad) - worst_rad) / sigma_rad};
+      if (std::abs(off_rad) <= misfit.most * sigma_rad) continue;
+      misfit = {std::abs(off_rad) / sigma_rad, std::max(0.0, std::abs(off_rad) - worst_rad) / sigma_rad};
     }
   }
-  return strays;
+  return misfit;
 }
 
 }  // namespace railfix::fusion

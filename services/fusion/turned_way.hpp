@@ -33,16 +33,16 @@ class TurnedWay {
   /// That place of the path is on the way that is remembered.
   [[nodiscard]] bool holds(double distance_m) const;
   /// By how much the part of the way that turned most otherwise than the path did so, in standard deviations.
-  struct Strays {
+  struct Misfit {
     double most = 0;
     double without_worst = 0;  // without the worst piece in which a turn was felt, which may be a bump
   };
   /// The body of a car turns up to a bogie distance behind the camera's foot, and a map has its points not quite where
   /// they are: shifted by what fits best.
-  [[nodiscard]] Strays strays(const track::Path& path, const Errors& errors) const;
+  [[nodiscard]] Misfit misfit(const track::Path& path, const Errors& errors) const;
 
  private:
-  [[nodiscard]] Strays strays_shifted(const track::Path& path, const Errors& errors, double behind_m) const;
+  [[nodiscard]] Misfit misfit_shifted(const track::Path& path, const Errors& errors, double behind_m) const;
   static constexpr size_t kMost = 12;  // seconds, or 10 m where that takes longer
   std::vector<Piece> pieces_;          // oldest first
 };

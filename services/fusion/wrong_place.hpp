@@ -32,7 +32,7 @@ class WrongPlace {
   /// The place is right, by a landmark or by GNSS that has proven itself.
   void found();
   /// The track bends where the train does, by the camera: it may be the gyro that is wrong.
-  void bends_here() { strayed_m_ = 0; }
+  void bends_here() { turning_m_ = 0; }
   /// The train has run so far.
   void move(double way_m, SpeaksAgainst now);
 
@@ -41,8 +41,8 @@ class WrongPlace {
   [[nodiscard]] bool lost() const { return lost_; }
   /// Nobody but the fusion before has doubted it.
   [[nodiscard]] bool of_before() const { return of_before_; }
-  /// For longer than a wrong leg is followed or a gyro is out of order: it is no position any more.
-  [[nodiscard]] bool strays() const { return strayed_m_ > kNoPositionM; }
+  /// It turned otherwise for longer than a wrong leg is followed or a gyro is out of order: it is no position any more.
+  [[nodiscard]] bool is_no_position() const { return turning_m_ > kNoPositionM; }
   /// The place is to be given up.
   [[nodiscard]] std::optional<Against> proven() const;
 
@@ -53,7 +53,7 @@ class WrongPlace {
   bool of_before_ = false;
   // Way so far against each.
   double lost_m_ = 0;
-  double strayed_m_ = 0;
+  double turning_m_ = 0;
   double since_turned_m_ = 1e9;
 };
 

@@ -13,6 +13,16 @@
 
 namespace railfix::map_matcher {
 
+static_assert(static_cast<uint8_t>(track::LandmarkKind::frog) == msg::SIGHTING_FROG);
+static_assert(static_cast<uint8_t>(track::LandmarkKind::balise) == msg::SIGHTING_BALISE);
+static_assert(static_cast<uint8_t>(track::LandmarkKind::portal_in) == msg::SIGHTING_PORTAL_IN);
+static_assert(static_cast<uint8_t>(track::LandmarkKind::portal_out) == msg::SIGHTING_PORTAL_OUT);
+static_assert(static_cast<uint8_t>(track::LandmarkKind::mast) == msg::SIGHTING_MAST);
+static_assert(static_cast<uint8_t>(track::LandmarkKind::bridge) == msg::SIGHTING_BRIDGE);
+static_assert(static_cast<uint8_t>(track::LandmarkKind::platform) == msg::SIGHTING_PLATFORM);
+static_assert(static_cast<uint8_t>(SightingsFit::nowhere) == msg::SIGHTINGS_FIT_NOWHERE);
+static_assert(static_cast<uint8_t>(SightingsFit::here) == msg::SIGHTINGS_FIT_HERE);
+
 using messaging::direction_of;
 using messaging::place_of;
 

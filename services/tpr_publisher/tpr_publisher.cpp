@@ -6,6 +6,7 @@
 #include <cstdlib>
 
 #include "core/time.hpp"
+#include "core/train_limits.hpp"
 
 namespace railfix::tpr_publisher {
 
@@ -15,7 +16,6 @@ constexpr int64_t kOldestNs = core::kNsPerSecond;
 constexpr int64_t kOtherTimeNs = 3600 * core::kNsPerSecond;
 constexpr int64_t kOnboardSilentNs = 3 * core::kNsPerSecond;
 constexpr int64_t kMostAheadNs = core::kNsPerSecond;
-constexpr double kFastestMps = 150;       // 540 km/h
 constexpr double kLongUndeclaredM = 500;  // a switch every few kilometres, declared soon, is no trouble
 // Of a train that comes to rest the estimated speed may have any sign: its direction is that of its way.
 constexpr double kSurelyMovesMps = 1.0;
@@ -54,7 +54,7 @@ double doubt_m(const TrainPosition& position) {
 bool goes_on(const TrainPosition& last, const TrainPosition& now) {
   const int64_t since_ns = now.stamp_ns - last.stamp_ns;
   if (since_ns < 0 || since_ns > kOldestNs) return false;
-  const double most_m = kFastestMps * core::seconds(since_ns) + kCorrectionM + doubt_m(last) + doubt_m(now);
+  const double most_m = core::kFastestTrainMps * core::seconds(since_ns) + kCorrectionM + doubt_m(last) + doubt_m(now);
   return std::abs(now.distance_m - last.distance_m) <= most_m;
 }
 

@@ -11,6 +11,7 @@
 
 namespace railfix::map_matcher {
 
+/// As fusion's parameters of the same names, which its interval is made of.
 struct GnssSearchParameters {
   double bound_m = 30.0;         // GNSS that agrees with the odometer may be wrong by so much, ...
   double lag_s = 1.0;            // ... and its stamp by that

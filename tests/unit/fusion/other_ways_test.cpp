@@ -36,7 +36,7 @@ TEST(OtherWays, WhereLegsHaveMetTheIntervalHoldsBothUntilLandmarksAgree) {
   const auto before = run(fusion, 0.5, 29.9, 20);
   EXPECT_NEAR(before.over_m, before.under_m, 1);
   auto both = track_fix(29.9, 4, 98);
-  both.behind_m = 60;
+  both.otherwise.behind_m = 60;
   fusion.add(both);
   auto state = run(fusion, 29.9, 30.5, 20);
   EXPECT_EQ(state.position.edge, 4U);
@@ -60,7 +60,7 @@ TEST(OtherWays, ALandmarkThatHasATwinAsFarAsTheWaysDifferTellsNothing) {
                            {4, balise, 4, 200, 0, 0.1, ""}});
   run(fusion, 0, 29.9, 20);
   auto both = track_fix(29.9, 4, 98);
-  both.behind_m = 60;
+  both.otherwise.behind_m = 60;
   fusion.add(both);
   run(fusion, 29.9, 30.5, 20);
   fusion.add(landmark_fix(30.5, 4, 110, 2));
@@ -82,7 +82,7 @@ void expect_found_over(double longer_m, bool over_siding, double apart_m) {
   fusion.add(landmark_fix(0.5, 1, 910, 100));
   run(fusion, 0.5, 29.9, 20);
   auto both = track_fix(29.9, 4, 98);  // over the straight leg
-  both.behind_m = longer_m;
+  both.otherwise.behind_m = longer_m;
   fusion.add(both);
   double t_s = 29.9;
   TrainEstimate state;

@@ -39,28 +39,28 @@ TEST(TurnedWay, FitsTheLegThatWasTakenWhereverTheBogiesAreAndNoOther) {
     const auto turnout = leg(radius_m);
     for (const double behind_m : {0.0, 5.0, 13.0, 20.0}) {
       const auto way = ridden(turnout, kPointsM - 60, kPointsM + 70, 11, behind_m);
-      EXPECT_LT(way.strays(turnout, kErrors).most, 3) << radius_m << " m, " << behind_m << " m";
-      EXPECT_GT(way.strays(straight, kErrors).most, 4) << radius_m << " m, " << behind_m << " m";
+      EXPECT_LT(way.misfit(turnout, kErrors).most, 3) << radius_m << " m, " << behind_m << " m";
+      EXPECT_GT(way.misfit(straight, kErrors).most, 4) << radius_m << " m, " << behind_m << " m";
     }
     const auto on = ridden(straight, kPointsM - 60, kPointsM + 70, 11, 0);
-    EXPECT_LT(on.strays(straight, kErrors).most, 0.01);
-    EXPECT_GT(on.strays(turnout, kErrors).most, 4) << radius_m;
+    EXPECT_LT(on.misfit(straight, kErrors).most, 0.01);
+    EXPECT_GT(on.misfit(turnout, kErrors).most, 4) << radius_m;
   }
 }
 
 TEST(TurnedWay, OfATrainThatBacksIsTheSameTheOtherWay) {
   const auto turnout = leg(300);
   const auto back = ridden(turnout, kPointsM + 70, kPointsM - 60, -8, 10);
-  EXPECT_LT(back.strays(turnout, kErrors).most, 3);
-  EXPECT_GT(back.strays(leg(INFINITY), kErrors).most, 4);
+  EXPECT_LT(back.misfit(turnout, kErrors).most, 3);
+  EXPECT_GT(back.misfit(leg(INFINITY), kErrors).most, 4);
 }
 
 TEST(TurnedWay, BeginsAnewWhereThePlaceJumps) {
   const auto turnout = leg(300);
   auto way = ridden(turnout, kPointsM - 60, kPointsM + 70, 11, 0);
-  EXPECT_GT(way.strays(leg(INFINITY), kErrors).most, 4);
+  EXPECT_GT(way.misfit(leg(INFINITY), kErrors).most, 4);
   way.add({kPointsM + 200, kPointsM + 211, 0, kSigmaRad, 1});
-  EXPECT_LT(way.strays(leg(INFINITY), kErrors).most, 0.01);
+  EXPECT_LT(way.misfit(leg(INFINITY), kErrors).most, 0.01);
 }
 
 // Over the points, back, and on over the other leg: what was felt on the first says nothing of the second.
@@ -70,7 +70,7 @@ TEST(TurnedWay, BeginsAnewWhereTheTrainBacks) {
   auto way = ridden(straight, kPointsM - 20, kPointsM + 20, 3, 0);
   ride(way, straight, kPointsM + 20, kPointsM - 6, -3, 0);
   ride(way, turnout, kPointsM - 7, kPointsM + 10, 3, 0);
-  EXPECT_LT(way.strays(turnout, kErrors).most, 3);
+  EXPECT_LT(way.misfit(turnout, kErrors).most, 3);
 }
 
 TEST(TurnedWay, HoldsTheLastTwelveSecondsOfTheWayInEitherDirection) {
@@ -88,16 +88,16 @@ TEST(TurnedWay, ABumpIsOneWorstPiece) {
   const auto straight = leg(INFINITY);
   auto way = ridden(straight, 0, 100, 20, 0);
   way.add({100, 120, 0.05, kSigmaRad, 1});
-  const auto strays = way.strays(straight, kErrors);
-  EXPECT_GT(strays.most, 4);
-  EXPECT_LT(strays.without_worst, 1);
+  const auto misfit = way.misfit(straight, kErrors);
+  EXPECT_GT(misfit.most, 4);
+  EXPECT_LT(misfit.without_worst, 1);
 }
 
 TEST(TurnedWay, ATurnOfTheTrackThatWasNotFeltIsNoBump) {
   const auto on = ridden(leg(INFINITY), kPointsM - 120, kPointsM + 120, 40, 0);  // over the points within a second
-  const auto strays = on.strays(leg(190), kErrors);
-  EXPECT_GT(strays.most, 4);
-  EXPECT_EQ(strays.without_worst, strays.most);
+  const auto misfit = on.misfit(leg(190), kErrors);
+  EXPECT_GT(misfit.most, 4);
+  EXPECT_EQ(misfit.without_worst, misfit.most);
 }
 
 // An S over a crossover turns by nothing in all: it must not become one piece.
@@ -113,8 +113,8 @@ TEST(TurnedWay, ATrainThatCreepsFeelsACrossover) {
     way.add({m, m + 0.4, turn_rad, 1e-4, 1});
   }
   EXPECT_TRUE(way.holds(kPointsM));
-  EXPECT_LT(way.strays(crossover, {1e-5, 0.3}).most, 3);
-  EXPECT_GT(way.strays(leg(INFINITY), {1e-5, 0.3}).most, 4);
+  EXPECT_LT(way.misfit(crossover, {1e-5, 0.3}).most, 3);
+  EXPECT_GT(way.misfit(leg(INFINITY), {1e-5, 0.3}).most, 4);
 }
 
 TEST(TurnedWay, AHaltIsNoWayBack) {
@@ -125,23 +125,23 @@ TEST(TurnedWay, AHaltIsNoWayBack) {
     way.add({here_m, here_m + jitter_m, 0, kSigmaRad, 1});
   }
   EXPECT_TRUE(way.holds(kPointsM));
-  EXPECT_LT(way.strays(leg(190), kErrors).most, 3);
-  EXPECT_GT(way.strays(leg(INFINITY), kErrors).most, 4);
+  EXPECT_LT(way.misfit(leg(190), kErrors).most, 3);
+  EXPECT_GT(way.misfit(leg(INFINITY), kErrors).most, 4);
 }
 
 TEST(TurnedWay, ATrainAtWalkingPaceStillRemembersThePoints) {
   const auto way = ridden(leg(500), kPointsM - 20, kPointsM + 80, 1.5, 0);
   EXPECT_TRUE(way.holds(kPointsM));
-  EXPECT_LT(way.strays(leg(500), kErrors).most, 3);
-  EXPECT_GT(way.strays(leg(INFINITY), kErrors).without_worst, 2);
+  EXPECT_LT(way.misfit(leg(500), kErrors).most, 3);
+  EXPECT_GT(way.misfit(leg(INFINITY), kErrors).without_worst, 2);
 }
 
 TEST(TurnedWay, PointsThatAreDrawnTenMetresElsewhereAreNoOtherLeg) {
   const auto mapped = leg(190);
   for (const double moved_m : {-10.0, 10.0}) {
     const auto way = ridden(mapped, kPointsM - 60, kPointsM + 70, 11, moved_m);
-    EXPECT_LT(way.strays(mapped, kErrors).most, 3) << moved_m;
-    EXPECT_GT(way.strays(leg(INFINITY), kErrors).most, 4) << moved_m;
+    EXPECT_LT(way.misfit(mapped, kErrors).most, 3) << moved_m;
+    EXPECT_GT(way.misfit(leg(INFINITY), kErrors).most, 4) << moved_m;
   }
 }
 

@@ -9,6 +9,7 @@
 #include "core/random.hpp"
 #include "core/units.hpp"
 #include "fork_map.hpp"
+#include "fusion/fusion_parameters.hpp"
 
 namespace railfix::map_matcher {
 namespace {
@@ -130,14 +131,17 @@ TEST(GnssSearch, SaysNothingWhereTheMapHasNoTrackThatGoesThere) {
 
 TEST(GnssSearch, ItsSigmaHoldsWhatFusionAllowsForAndVagueFixesSayNothing) {
   const auto map = tracks_at({0});
+  const fusion::FusionParameters fusion;
+  const double late_m = fusion.gnss_lag_s * kSpeedMps;
   Ride ride(map);
   ride.run(300, 900);
   ASSERT_TRUE(ride.place());
-  EXPECT_NEAR(4 * ride.sigma_m(), 30 + kSpeedMps, 1e-9);
+  EXPECT_NEAR(fusion.interval_factor * ride.sigma_m(), fusion.gnss_bound_m + late_m, 1e-9);
   ride.hdop = 3;
   ride.run(915, 1200);
   ASSERT_TRUE(ride.place());
-  EXPECT_NEAR(4 * ride.sigma_m(), 36 + kSpeedMps, 1e-9);
+  EXPECT_NEAR(fusion.interval_factor * ride.sigma_m(),
+              fusion.interval_factor * fusion.gnss_single_sigma_m * ride.hdop + late_m, 1e-9);
   Ride vague(map);
   vague.hdop = 3.1;
   vague.run(300, 900);
