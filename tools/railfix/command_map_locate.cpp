@@ -8,6 +8,7 @@
 #include "core/result.hpp"
 #include "map_matcher/locate/network_locator.hpp"
 #include "number_between.hpp"
+#include "recording/utc_text.hpp"
 
 namespace railfix::tool {
 namespace {
@@ -21,8 +22,18 @@ struct LocateRequest {
   double until_m = 1e9;
 };
 
+/// Where odometry.csv of a run could not be used.
+struct Breaks {
+  int count = 0;
+  int64_t last_ns = 0;
+  void add(int64_t stamp_ns) {
+    ++count;
+    last_ns = stamp_ns;
+  }
+};
+
 /// Feeds odometry.csv of a run; what lies before a gap or a blind spell is forgotten.
-core::Status feed(const std::filesystem::path& file, double until_m, map_matcher::NetworkLocator& locator) {
+core::Result<Breaks> feed(const std::filesystem::path& file, double until_m, map_matcher::NetworkLocator& locator) {
   core::CsvTable table(file);
   const size_t stamp = table.required({"stamp_ns"});
   const size_t valid = table.required({"valid"});
@@ -31,30 +42,43 @@ core::Status feed(const std::filesystem::path& file, double until_m, map_matcher
   bool started = false;
   double last_m = 0;
   int64_t last_ns = 0;
+  Breaks breaks;
   while (table.next(stamp)) {
     const double at_m = table.number_or_nan(distance);
     const double rate_rps = table.number_or_nan(rate);
     const double dt_s = 1e-9 * static_cast<double>(table.stamp_ns() - last_ns);
     if (started && std::abs(at_m) > until_m) break;
     if (table.integer(valid) == 0 || !std::isfinite(at_m) || !std::isfinite(rate_rps)) {
+      if (started) breaks.add(table.stamp_ns());
       locator.forget();
       started = false;
       continue;
     }
-    if (started && dt_s < kLongestGapS && at_m != last_m) locator.move(at_m - last_m, rate_rps * dt_s, kTurnNoiseRad);
+    if (started && dt_s >= kLongestGapS) {
+      breaks.add(table.stamp_ns());
+      locator.forget();
+    } else if (started && at_m != last_m) {
+      locator.move(at_m - last_m, rate_rps * dt_s, kTurnNoiseRad);
+    }
     started = true;
     last_m = at_m;
     last_ns = table.stamp_ns();
   }
-  return table.status();
+  if (const auto read = table.status(); !read.ok()) return read.error();
+  return breaks;
 }
 
 int locate(const LocateRequest& request) {
   const auto map = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(request.map)));
   map_matcher::NetworkLocator locator({}, std::make_shared<const map_matcher::NetworkIndex>(map));
-  core::ok_or_throw(feed(std::filesystem::path(request.run) / "odometry.csv", request.until_m, locator));
+  const auto breaks =
+      core::value_or_throw(feed(std::filesystem::path(request.run) / "odometry.csv", request.until_m, locator));
   const auto location = locator.locate();
   std::printf("way              %.0f m, compared with %zu places\n", locator.way_m(), location.candidates);
+  if (breaks.count > 0) {
+    std::printf("                 since %s, when odometry broke off last (%d in all): what lies before is of no use\n",
+                utc_text(breaks.last_ns).c_str(), breaks.count);
+  }
   if (location.places.empty()) {
     std::printf("place            not yet known: the way is too short or bends too little\n");
     return 0;

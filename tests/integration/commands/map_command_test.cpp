@@ -83,5 +83,20 @@ TEST(Help, OfACommandThatIsNotThereIsNoneOfTheOneAboveIt) {
   EXPECT_THAT(ran.err, HasSubstr("railfix map: there is no command 'check'; there are: build, info"));
 }
 
+TEST_F(MapCommand, LocateSaysSinceWhenOdometryWasOfUse) {
+  // A row every 0.1 s; none from 20 s to 22 s.
+  const auto located = [&](int blind_row) {
+    std::string table = "stamp_ns,valid,distance_m,yaw_rate_rps\n";
+    for (int row = 0; row < 300; ++row) {
+      if (row >= 200 && row < 220) continue;
+      table += std::to_string(row * 100'000'000LL) + (row == blind_row ? ",0," : ",1,") + std::to_string(row) + ",0\n";
+    }
+    write("run/odometry.csv", table);
+    return map({"locate", map_, "--run", root_ / "run"}).out;
+  };
+  EXPECT_THAT(located(100), HasSubstr("since 1970-01-01T00:00:22.000Z, when odometry broke off last (2 in all)"));
+  EXPECT_THAT(located(250), HasSubstr("since 1970-01-01T00:00:25.000Z, when odometry broke off last (2 in all)"));
+}
+
 }  // namespace
 }  // namespace railfix

@@ -48,6 +48,7 @@ TEST_F(RunCommand, WithoutRoomForItsRecordingItDoesNotBegin) {
   expect_refusal(
       test::run_program(run("pictures", {"--fps", "1", "--set", "recorder.keep_free_mb=10000000"}), kPatienceS),
       path("out") + ": nothing would be recorded, its disk has only ");
+  EXPECT_FALSE(fs::exists(root_ / "out"));
 }
 
 TEST_F(RunCommand, ADatasetOfSensorsAloneIsRunWithoutTheCamerasServices) {

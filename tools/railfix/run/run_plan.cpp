@@ -164,6 +164,28 @@ core::Status check_without_camera(const RunOptions& options) {
   return {};
 }
 
+/// The rest of the plan, in folders that are there.
+core::Status plan_in_folder(const RunOptions& options, RunPlan& plan) {
+  auto lock = FolderLock::take(options.out);
+  if (!lock.ok()) return core::Error{"--out: " + lock.error().message};
+  plan.lock = std::move(lock).value();
+  plan.train_id = "run-" + std::to_string(getpid());
+  const auto map = prepare_map(options);
+  if (!map.ok()) return map.error();
+  plan.map = map.value();
+  if (const auto start = check_start(options, plan.map); !start.ok()) return start.error();
+
+  auto settings = load_settings(options.config);
+  if (!settings.ok()) return settings.error();
+  plan.config = std::filesystem::absolute(options.out / "run.yaml");
+  fill_settings(settings.value(), options, plan);
+  add_overrides(settings.value(), options.sets);
+  if (const auto room = check_room(settings.value(), options.out); !room.ok()) return room.error();
+  std::ostringstream text;
+  text << settings.value() << '\n';
+  return core::write_whole(plan.config, text.str());
+}
+
 }  // namespace
 
 bool is_of_camera(const std::string& service) {
@@ -184,31 +206,19 @@ core::Result<RunPlan> plan_run(const RunOptions& options) {
     return checked.error();
   }
 
-  std::error_code failed;
+  std::vector<std::filesystem::path> made;
   for (const auto& folder : {options.out, options.state}) {
-    if (!folder.empty()) std::filesystem::create_directories(folder, failed);
+    std::error_code failed;
+    if (!folder.empty() && std::filesystem::create_directories(folder, failed)) made.push_back(folder);
     if (failed) return core::Error{folder.string() + " cannot be made: " + failed.message()};
   }
-
-  auto lock = FolderLock::take(options.out);
-  if (!lock.ok()) return core::Error{"--out: " + lock.error().message};
-  plan.lock = std::move(lock).value();
-  plan.train_id = "run-" + std::to_string(getpid());
-  const auto map = prepare_map(options);
-  if (!map.ok()) return map.error();
-  plan.map = map.value();
-  if (const auto start = check_start(options, plan.map); !start.ok()) return start.error();
-
-  auto settings = load_settings(options.config);
-  if (!settings.ok()) return settings.error();
-  plan.config = std::filesystem::absolute(options.out / "run.yaml");
-  fill_settings(settings.value(), options, plan);
-  add_overrides(settings.value(), options.sets);
-  if (const auto room = check_room(settings.value(), options.out); !room.ok()) return room.error();
-  std::ostringstream text;
-  text << settings.value() << '\n';
-  if (const auto written = core::write_whole(plan.config, text.str()); !written.ok()) return written.error();
-  return plan;
+  const auto planned = plan_in_folder(options, plan);
+  if (planned.ok()) return plan;
+  for (const auto& folder : made) {
+    std::error_code ignored;  // one that stays does no harm
+    std::filesystem::remove_all(folder, ignored);
+  }
+  return planned.error();
 }
 
 }  // namespace railfix::tool
