@@ -135,6 +135,7 @@ void TrackChooser::move_blind(double way_m) {
     for (auto& cell : hypothesis.cells) cell.errors.forget(TurnErrors::sway);
   }
   trim();
+  merge();
   extend();
   fit_cells();
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numeric>
 
 #include "map_matcher/track_choice/picture_fits.hpp"
@@ -15,7 +16,7 @@ constexpr double kLeastProbability = 1e-7;
 constexpr double kMapSigmas = 3;      // points are no further from where the map has them
 constexpr double kWheelsBehindM = 5;  // the foot: points may be thrown in front of the first wheels
 constexpr double kSameM = 1.0;        // two routes whose distances differ by less are one
-constexpr size_t kMostHypotheses = 400;
+constexpr size_t kMostHypotheses = 200;  // the stations of our maps have 47 at most
 constexpr double kUnwatchedM = 3000;  // behind a switch that nobody watched, at most
 
 }  // namespace
@@ -174,23 +175,29 @@ void TrackChooser::merge() {
   }
 }
 
+// What nobody has shown to be wrong and is given up for lack of room is not known any more; in the dark many are alike.
 void TrackChooser::prune() {
   std::vector<double> logs;
   for (const auto& hypothesis : hypotheses_) logs.push_back(evidence(hypothesis));
-  const double best = *std::max_element(logs.begin(), logs.end());
-  std::vector<double> sorted = logs;
-  std::sort(sorted.rbegin(), sorted.rend());
-  double least = best + std::log(kLeastProbability);
-  if (sorted.size() > kMostHypotheses && sorted[kMostHypotheses] > least) {
-    least = sorted[kMostHypotheses];
-    // What nobody has shown to be wrong is given up: so much is not known any more.
-    const double all = std::accumulate(sorted.begin(), sorted.end(), -INFINITY, log_sum);
-    const double rest = std::accumulate(sorted.begin() + kMostHypotheses, sorted.end(), -INFINITY, log_sum);
-    told_ *= 1 - std::exp(rest - all);
+  std::vector<size_t> by_evidence(logs.size());
+  std::iota(by_evidence.begin(), by_evidence.end(), size_t{0});
+  std::ranges::stable_sort(by_evidence, std::ranges::greater{}, [&](size_t i) { return logs[i]; });
+  const double best = logs[by_evidence.front()];
+  const double least = best + std::log(kLeastProbability);
+  std::vector<bool> keeps(logs.size(), false);
+  double kept_log = -INFINITY;
+  double given_up_log = -INFINITY;
+  for (size_t rank = 0; rank < by_evidence.size(); ++rank) {
+    const double log = logs[by_evidence[rank]];
+    if (log <= least) break;
+    keeps[by_evidence[rank]] = rank < kMostHypotheses;
+    auto& sum_log = rank < kMostHypotheses ? kept_log : given_up_log;
+    sum_log = log_sum(sum_log, log);
   }
+  told_ *= std::exp(kept_log - log_sum(kept_log, given_up_log));
   std::vector<Hypothesis> kept;
   for (size_t i = 0; i < logs.size(); ++i) {
-    if (logs[i] <= least && logs[i] < best) continue;
+    if (!keeps[i]) continue;
     kept.push_back(std::move(hypotheses_[i]));
     kept.back().log_prior -= best;
   }

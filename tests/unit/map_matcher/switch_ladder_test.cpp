@@ -5,6 +5,7 @@
 
 #include "map_matcher/track_choice/track_chooser.hpp"
 #include "track/declared.hpp"
+#include "track/path.hpp"
 
 namespace railfix::map_matcher {
 namespace {
@@ -50,6 +51,66 @@ TEST(SwitchLadder, WhatIsGivenUpForLackOfRoomIsNotKnown) {
     least = std::min(least, chooser.choice()->options.front().probability);
   }
   EXPECT_LT(least, track::kDeclaredProbability);
+}
+
+// In the dark all ways of a fan are alike: none of them is given up without being told, and those that are left are no
+// more probable for it.
+TEST(SwitchLadder, OfWaysThatAreAlikeNoneGoesUntold) {
+  auto made = std::make_shared<track::Map>(*tree(9));
+  const auto straight = static_cast<uint32_t>(made->edges.size() + 1);  // 1 of 3 ways at the end of the stem
+  made->edges.push_back(
+      {straight, "straight", 2, straight + 1, "", track::Alignment::chained({0, kStemM, 0}, {{9000, 0, 0}})});
+  made->connections.push_back({2, 1, straight, false});
+  const std::shared_ptr<const track::Map> map = made;
+  TrackChooser chooser({}, map, std::make_shared<const track::Ways>(*map));
+  for (double place_m = 450; place_m < 720; place_m += 2) {
+    const uint32_t edge = place_m < kStemM ? 1 : straight;
+    chooser.follow({{edge, edge == 1 ? place_m : place_m - kStemM, kForward}, 4, 4, 1});
+    chooser.move_blind(2);
+  }
+  const auto choice = chooser.choice();
+  ASSERT_TRUE(choice);
+  double kept = 0;
+  for (const auto& option : choice->options) {
+    kept += option.probability;
+    if (option.place.edge == straight) {
+      EXPECT_NEAR(option.probability, 1.0 / 3, 0.01);
+    }
+  }
+  EXPECT_NEAR(kept, 1.0 / 3 + 2.0 / 3 * 199 / 512, 0.02) << "200 of 513 ways";
+}
+
+// Twelve loops, one behind the other, of legs that are alike: 4096 ways, but never more than two at once.
+TEST(SwitchLadder, WaysThatHaveMetInTheDarkAreOne) {
+  auto made = std::make_shared<track::Map>();
+  const auto straight = [](double from_m, double length_m) {
+    return track::Alignment::chained({0, from_m, 0}, {{length_m, 0, 0}});
+  };
+  made->edges.push_back({1, "stem", 1, 2, "", straight(0, kStemM)});
+  constexpr double kLoopM = 50;
+  for (uint32_t loop = 0; loop < 12; ++loop) {
+    const uint32_t on = 1 + 3 * loop;
+    const uint32_t node = 2 + 2 * loop;
+    const double from_m = kStemM + 2 * kLoopM * loop;
+    made->edges.push_back({on + 1, "right", node, node + 1, "", straight(from_m, kLoopM)});
+    made->edges.push_back({on + 2, "left", node, node + 1, "", straight(from_m, kLoopM)});
+    made->edges.push_back({on + 3, "on", node + 1, node + 2, "", straight(from_m + kLoopM, loop < 11 ? kLoopM : 2000)});
+    made->connections.insert(made->connections.end(), {{node, on, on + 1, false},
+                                                       {node, on, on + 2, true},
+                                                       {node + 1, on + 1, on + 3, false},
+                                                       {node + 1, on + 2, on + 3, true}});
+  }
+  const std::shared_ptr<const track::Map> map = made;
+  TrackChooser chooser({}, map, std::make_shared<const track::Ways>(*map));
+  const auto way = track::Path::follow(map, {1, 0, kForward}, 3000, 0);
+  ASSERT_TRUE(way.ok());
+  for (double place_m = 450; place_m < 1900; place_m += 2) {
+    chooser.follow({way.value().position_at(place_m), 4, 4, 1});
+    chooser.move_blind(2);
+    ASSERT_TRUE(chooser.choice());
+    EXPECT_LE(chooser.choice()->options.size(), 2U) << place_m;
+  }
+  EXPECT_GT(chooser.choice()->options.front().probability, track::kDeclaredProbability);
 }
 
 // Behind the points the train turns left, and then nobody can tell which of two legs it is on. Fusion goes on along the
