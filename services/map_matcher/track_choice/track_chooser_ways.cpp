@@ -189,7 +189,7 @@ void TrackChooser::prune() {
   double given_up_log = -INFINITY;
   for (size_t rank = 0; rank < by_evidence.size(); ++rank) {
     const double log = logs[by_evidence[rank]];
-    if (log <= least) break;
+    if (rank > 0 && log <= least) break;
     keeps[by_evidence[rank]] = rank < kMostHypotheses;
     auto& sum_log = rank < kMostHypotheses ? kept_log : given_up_log;
     sum_log = log_sum(sum_log, log);

@@ -50,6 +50,19 @@ TEST(Drawing, PngHasInkOnTheTrackAndNotBesideIt) {
   std::filesystem::remove(file);
 }
 
+TEST(Drawing, AFrogIsSeenFromNearBy) {
+  track::Map map = track::small_map();
+  map.landmarks = {{1, track::LandmarkKind::frog, 1, 500, 0, 0.1, ""}};
+  const auto dots_of = [&](double radius_m) {
+    return draw_map(map, {.width_px = 800, .around = track::EdgePosition{1, 500}, .radius_m = radius_m}).dots.size();
+  };
+  const size_t near = dots_of(100);
+  const size_t far = dots_of(5000);
+  map.landmarks.clear();
+  EXPECT_EQ(near, dots_of(100) + 1);
+  EXPECT_EQ(far, dots_of(5000));
+}
+
 TEST(Drawing, TakesThePlaceOfTheOldOneAsAWhole) {
   const Drawing drawing = draw_map(track::small_map(), {});
   const std::filesystem::path folder = file_named("");

@@ -39,6 +39,8 @@ Colour colour_of(track::LandmarkKind kind) {
       return kBalise;
     case track::LandmarkKind::level_crossing:
       return {240, 100, 100};
+    case track::LandmarkKind::frog:
+      return {200, 160, 0};
     default:
       return {110, 110, 0};
   }
@@ -134,8 +136,10 @@ class Painter {
   [[nodiscard]] double mark_radius() const { return std::clamp(8.0 * scale_, 1.2, 4.0); }
 
   void paint_landmark(const track::Landmark& mark) {
-    if (mark.kind == track::LandmarkKind::frog || map_.edge(mark.edge) == nullptr) return;
+    if (map_.edge(mark.edge) == nullptr) return;
     if (mark.kind == track::LandmarkKind::mast && scale_ < 0.05) return;
+    // From further away it lies under its switch.
+    if (mark.kind == track::LandmarkKind::frog && scale_ < 0.3) return;
     const Eigen::Vector2d at = pixel_on(mark.edge, mark.offset_m, mark.lateral_m);
     if (is_inside(at)) out_.dots.push_back({at, colour_of(mark.kind), 0.7 * mark_radius(), true});
   }
@@ -219,6 +223,7 @@ class Painter {
     entry(kClothoid, "clothoid", true);
     entry(kArc, "arc", true);
     entry(kSwitch, "switch", false);
+    entry(colour_of(track::LandmarkKind::frog), "frog", false);
     entry(kBalise, "balise group", false);
     entry(colour_of(track::LandmarkKind::portal_in), "portal", false);
     entry(colour_of(track::LandmarkKind::bridge), "bridge over", false);
