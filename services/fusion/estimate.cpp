@@ -210,7 +210,9 @@ void Estimator::judge_place(TrainEstimate& e) const {
   }
   if (place_.told_by == ToldBy::gnss) e.degrade("GNSS alone has told the place: waits for a landmark");
   if (place_.told_by == ToldBy::start && !place_.wrong_place.lost()) {
-    e.degrade("the place was only told: waits for a landmark, GNSS or curves");
+    e.degrade(place_.alike_beside ? "the place was only told, and what agrees is the same on a track beside it: waits "
+                                    "for a balise or a frog"
+                                  : "the place was only told: waits for a landmark, GNSS or curves");
   }
   if (!place_.path) e.degrade("place on the map not known" + (place_.given_up ? why_given_up(*place_.given_up) : ""));
   if (place_.path &&

@@ -133,6 +133,8 @@ class Estimator {
   [[nodiscard]] double fix_sigmas_off(double excused_m) const;
   /// It was hardly to be believed where it was expected.
   [[nodiscard]] bool fix_unexpected() const;
+  /// Nothing has confirmed yet the start that somebody has told.
+  [[nodiscard]] bool is_only_told() const { return place_.told_by == ToldBy::start; }
   /// So many landmarks in a row say that it is here.
   [[nodiscard]] int landmarks_agreed() const { return place_.landmarks_agreed; }
 
@@ -226,7 +228,8 @@ class Estimator {
     std::shared_ptr<const track::Path> path;  // nullptr = the place is not known
     std::optional<Against> given_up;          // the last place was, and there is none since
     ToldBy told_by = ToldBy::nobody;
-    int bends_agreed = 0;  // curves that fitted a place that was only told
+    int bends_agreed = 0;       // curves that fitted a place that was only told
+    bool alike_beside = false;  // what has agreed with it agrees with a track beside it as well
     TrackDoubt track_doubt;
     TurnedWay turned_way;
     WrongPlace wrong_place;
@@ -275,8 +278,10 @@ class Estimator {
   void use_yaw_rate(double rate_rps);
   void remember_turn(double rate_rps, double speed_mps);
   void compare_turns();
+  /// What agrees with the place says whether it is the right track, too.
+  [[nodiscard]] bool confirms_start(bool tells_track);
   void confirm_by(const FixInput& landmark);
-  void confirm_by_curve();
+  void confirm_by_curve(bool tells_track);
   /// GNSS, which has never agreed with it, says otherwise, and hardly anything speaks for it.
   [[nodiscard]] bool gnss_denies_place() const;
   void use_track(const FixInput& fix);

@@ -78,7 +78,7 @@ void Estimator::use(const GnssInput& sample) {
   } else if (agrees && filter_.offer_position(measured, parameters_->gate_gnss).used) {
     gnss.accept(sample.stamp_ns);
     ++gnss_agreed_;
-    if (place_.told_by == ToldBy::start) place_.told_by = ToldBy::nobody;
+    if (confirms_start(sample.tells_track)) place_.told_by = ToldBy::nobody;
     // The rival without GNSS stays lost: the interval holds what GNSS may be wrong by.
     if (gnss_proven()) place_.wrong_place.found();
   } else if (++gnss.refused >= kRefusalsToIsolate) {
@@ -255,7 +255,7 @@ void Estimator::accept(const FixInput& fix) {
     place_.turned_way.corrected(fix_offer_.residual);
     compare_turns();
   }
-  if (by_chance && std::abs(fix_offer_.residual) < kBendsHereM) confirm_by_curve();
+  if (by_chance && std::abs(fix_offer_.residual) < kBendsHereM) confirm_by_curve(fix.tells_track);
   if (fix.kind == FixKind::network) place_.told_by = ToldBy::nobody;
   // A vague fix helps, but settles no doubt and is nothing to measure a distance from. Landmarks are sharp by
   // themselves.
@@ -274,17 +274,24 @@ void Estimator::accept(const FixInput& fix) {
   filter_.mark_reference();
 }
 
+bool Estimator::confirms_start(bool tells_track) {
+  if (!is_only_told()) return false;
+  place_.alike_beside = place_.alike_beside || !tells_track;
+  return tells_track;
+}
+
 // Where masts stand everywhere some stand by chance where the map has them: map_matcher knows how many; GNSS is never
 // so far off.
 void Estimator::confirm_by(const FixInput& landmark) {
+  if (is_only_told() && !confirms_start(landmark.tells_track)) return;
   const bool confirms = landmark.sightings_fit == SightingsFit::here || place_.landmarks_agreed >= kLandmarksBelieved;
   if (place_.told_by == ToldBy::gnss || confirms) place_.told_by = ToldBy::nobody;
 }
 
 // One may fit by chance, and there is none on a straight line that lies elsewhere.
-void Estimator::confirm_by_curve() {
+void Estimator::confirm_by_curve(bool tells_track) {
   place_.wrong_place.bends_here();
-  if (place_.told_by != ToldBy::start) return;
+  if (!confirms_start(tells_track)) return;
   place_.bends_agreed = place_.track_doubt.turns_otherwise() ? 0 : place_.bends_agreed + 1;
   if (place_.bends_agreed >= kCurvesConfirm) place_.told_by = ToldBy::nobody;
 }

@@ -136,6 +136,7 @@ std::optional<TrainEstimate> Fusion::use(Event event) {
       return std::nullopt;
     }
   }
+  look_beside(event);
   if (const auto* wheel = std::get_if<WheelInput>(&event)) last_wheel_ = *wheel;
   if (auto* step = std::get_if<OdometryInput>(&event)) {
     anchor(*step);
@@ -173,6 +174,19 @@ void Fusion::start_position(FixInput& fix) const {
   if (now_->main().path() || !map_ || !of_begin || fix.probability < kBeginProbability) return;
   auto path = track::Path::follow(map_, {fix.edge, fix.offset_m, fix.direction}, kPathAheadM, kPathBehindM);
   if (path.ok()) fix.new_path = std::make_shared<const track::Path>(std::move(path).value());
+}
+
+// Of every fix, whoever needs it: one that comes late is used at its own time.
+void Fusion::look_beside(Event& event) {
+  if (!map_) return;
+  if (!beside_) beside_.emplace(map_);
+  if (auto* gnss = std::get_if<GnssInput>(&event)) {
+    gnss->tells_track = !beside_->many_at(gnss->easting_m, gnss->northing_m);
+  } else if (auto* fix = std::get_if<FixInput>(&event); fix != nullptr && map_->edge(fix->edge) != nullptr) {
+    const auto* landmark = fix->kind == FixKind::landmark ? map_->landmark(fix->landmark) : nullptr;
+    fix->tells_track = landmark != nullptr ? !beside_->has_alike(*landmark)
+                                           : !beside_->any_at({fix->edge, fix->offset_m, fix->direction});
+  }
 }
 
 // The place along the track stays; only the edges below it become others. Over which ones the train came is not said:

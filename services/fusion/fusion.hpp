@@ -15,6 +15,7 @@
 #include "fusion/odometer_scales.hpp"
 #include "fusion/scale_trial.hpp"
 #include "fusion/stamp_watch.hpp"
+#include "fusion/tracks_beside.hpp"
 #include "track/path.hpp"
 
 namespace railfix::fusion {
@@ -76,6 +77,7 @@ class Fusion {
   void anchor(OdometryInput& step);
   void start_position(FixInput& fix) const;
   bool change_track(FixInput& fix);
+  void look_beside(Event& event);
   void follow_path_on();
   void remember_reference(const OdometryInput& step);
   std::optional<TrainEstimate> insert(const Event& event);
@@ -93,6 +95,7 @@ class Fusion {
   std::shared_ptr<const track::Map> map_;
   std::shared_ptr<const track::Path> path_;
   std::optional<track::Ways> ways_;         // made when they are first asked for
+  std::optional<TracksBeside> beside_;      // likewise
   std::optional<double> followed_on_at_m_;  // where the path was followed on last, or could not be
   std::optional<SavedScales> saved_;
   std::optional<ScaleTrial> now_;

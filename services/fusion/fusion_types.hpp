@@ -39,7 +39,8 @@ struct GnssInput {
   double easting_m = 0;  // in the map's coordinates
   double northing_m = 0;
   double hdop = 0;
-  int fix = 0;  // 0 none, 1 single, 4 RTK fixed, 5 RTK float
+  int fix = 0;              // 0 none, 1 single, 4 RTK fixed, 5 RTK float
+  bool tells_track = true;  // set by Fusion: there is no track beside the one
 };
 
 /// So far behind and ahead of a place, or beyond an interval's ends.
@@ -77,10 +78,11 @@ struct FixInput {
   std::shared_ptr<const track::Path> new_path;  // set by Fusion when the fix starts the position on the map, or
                                                 // says that the train is on another track
   SightingsFit sightings_fit = SightingsFit::not_told;
-  Sides otherwise{};       // kind track: over ways of another length that have led here it is up to so far away
-  bool only_told = false;  // kind network: nothing has confirmed it
-  bool of_before = false;  // kind network: what the fusion before this one knew
-  bool in_doubt = false;   // kind network: no position until landmarks or proven GNSS agree
+  Sides otherwise{};        // kind track: over ways of another length that have led here it is up to so far away
+  bool tells_track = true;  // set by Fusion: no track beside it would give the same
+  bool only_told = false;   // kind network: nothing has confirmed it
+  bool of_before = false;   // kind network: what the fusion before this one knew
+  bool in_doubt = false;    // kind network: no position until landmarks or proven GNSS agree
 };
 
 /// The next picture will be measured against the one of this stamp: remember where the train was.

@@ -1,0 +1,53 @@
+#include "fusion/tracks_beside.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace railfix::fusion {
+namespace {
+
+constexpr double kBesideM = 15.0;  // GNSS is not believed to tell tracks that are nearer
+constexpr double kEndM = 0.1;
+constexpr double kAlongAlikeM = 3.0;
+constexpr double kAcrossAlikeM = 1.5;
+
+}  // namespace
+
+std::vector<track::NearTrack> TracksBeside::abeam(double easting_m, double northing_m) const {
+  auto near = finder_.near(easting_m, northing_m, kBesideM);
+  std::erase_if(near, [&](const track::NearTrack& one) {
+    const auto* edge = map_->edge(one.edge);
+    return edge->is_drawn || one.offset_m < kEndM || one.offset_m > edge->alignment.length_m() - kEndM;
+  });
+  return near;
+}
+
+bool TracksBeside::any_at(const track::EdgePosition& place) const {
+  const auto* edge = map_->edge(place.edge);
+  if (edge->is_drawn) return false;
+  const auto pose = edge->alignment.at(place.offset_m).pose;
+  return std::ranges::any_of(abeam(pose.easting_m, pose.northing_m),
+                             [&](const track::NearTrack& other) { return other.edge != place.edge; });
+}
+
+bool TracksBeside::many_at(double easting_m, double northing_m) const {
+  return abeam(easting_m, northing_m).size() > 1;
+}
+
+bool TracksBeside::has_alike(const track::Landmark& landmark) const {
+  const auto* edge = map_->edge(landmark.edge);
+  if (edge->is_drawn) return false;
+  const auto pose = edge->alignment.at(landmark.offset_m).pose;
+  return std::ranges::any_of(abeam(pose.easting_m, pose.northing_m), [&](const track::NearTrack& beside) {
+    if (beside.edge == landmark.edge) return false;
+    const double there_rad = map_->edge(beside.edge)->alignment.at(beside.offset_m).pose.heading_rad;
+    const double side = std::cos(there_rad - pose.heading_rad) < 0 ? -1.0 : 1.0;
+    return std::ranges::any_of(map_->landmarks_on(beside.edge), [&](const track::Landmark* other) {
+      return track::seen_along(other->kind, side > 0) == landmark.kind &&
+             std::abs(other->offset_m - beside.offset_m) < kAlongAlikeM &&
+             std::abs(side * other->lateral_m - landmark.lateral_m) < kAcrossAlikeM;
+    });
+  });
+}
+
+}  // namespace railfix::fusion

@@ -1,0 +1,90 @@
+// A start that was told on the neighbour of the right track is not confirmed by what both would have seen.
+#include <gtest/gtest.h>
+
+#include "core/units.hpp"
+#include "straight_run.hpp"
+
+namespace railfix::fusion {
+namespace {
+
+constexpr double kApartM = 4;
+
+/// Two tracks of 5 km side by side, the second one drawn the other way when `against`; masts to the right of each every
+/// 100 m, a balise on the first one at 1500 m.
+std::shared_ptr<const track::Map> double_track(bool against) {
+  auto map = std::make_shared<track::Map>();
+  const auto first = track::Alignment::chained({0, 0, 0}, {{5000, 0, 0}});
+  const auto second = against ? track::Alignment::chained({kApartM, 5000, core::kPi}, {{5000, 0, 0}})
+                              : track::Alignment::chained({kApartM, 0, 0}, {{5000, 0, 0}});
+  map->edges = {{1, "first", 1, 2, "", first}, {2, "second", 3, 4, "", second}};
+  uint32_t id = 0;
+  for (double m = 100; m < 5000; m += 100) {
+    map->landmarks.push_back({++id, track::LandmarkKind::mast, 1, m, -3, 0.1, ""});
+    map->landmarks.push_back(
+        {++id, track::LandmarkKind::mast, 2, against ? 5000 - m : m, against ? 3.0 : -3.0, 0.1, ""});
+  }
+  map->landmarks.push_back({++id, track::LandmarkKind::balise, 1, 1500, 0, 0.1, ""});
+  return map;
+}
+
+FixInput fix_of(const track::Landmark& landmark, double t_s) {
+  return {at(t_s),     landmark.edge,     landmark.offset_m,         0.1,    0.9999,
+          landmark.id, FixKind::landmark, track::Direction::forward, nullptr};
+}
+
+constexpr const char* kAlikeBeside =
+    "the place was only told, and what agrees is the same on a track beside it: waits for a balise or a frog";
+
+TEST(TracksBeside, WhatStandsBesideBothConfirmsNoStartThatWasTold) {
+  for (const bool against : {false, true}) {
+    const auto map = double_track(against);
+    auto fusion = core::value_or_throw(Fusion::create({}, map, track::EdgePosition{1, 50, track::Direction::forward}));
+    double t_s = 0;
+    TrainEstimate state;
+    for (const auto& landmark : map->landmarks) {
+      if (landmark.edge != 1 || landmark.kind != track::LandmarkKind::mast || landmark.offset_m > 1450) continue;
+      const double there_s = (landmark.offset_m - 50) / 20;
+      state = run(fusion, t_s, there_s, 20);
+      t_s = there_s;
+      fusion.add(fix_of(landmark, t_s));
+    }
+    state = run(fusion, t_s, 72, 20);
+    EXPECT_EQ(state.reason, kAlikeBeside) << "after 14 masts, against " << against;
+    state = run(fusion, 72, 72.5, 20);
+    fusion.add(fix_of(map->landmarks.back(), 72.5));
+    state = run(fusion, 72.5, 73, 20);
+    EXPECT_EQ(state.integrity, Integrity::ok) << state.reason;
+  }
+}
+
+TEST(TracksBeside, GnssConfirmsNoStartBesideAnotherTrack) {
+  for (const bool alone : {false, true}) {
+    auto map = std::make_shared<track::Map>(*double_track(false));
+    if (alone) map->edges.pop_back();
+    std::erase_if(map->landmarks, [](const track::Landmark&) { return true; });
+    auto fusion = core::value_or_throw(Fusion::create({}, map, track::EdgePosition{1, 50, track::Direction::forward}));
+    for (int i = 0; i < 40; ++i) {
+      run(fusion, i, i + 1, 20);
+      fusion.add(GnssInput{at(i + 1), 0, 50 + 20.0 * (i + 1), 1.0, 1});
+    }
+    const auto state = run(fusion, 40, 40.5, 20);
+    EXPECT_EQ(state.reason, alone ? "" : kAlikeBeside);
+  }
+}
+
+TEST(TracksBeside, APlaceNearTheEndOfAnEdgeIsNotBesideTheNextOne) {
+  auto map = std::make_shared<track::Map>();
+  map->edges = {{1, "a", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{1000, 0, 0}})},
+                {2, "b", 2, 3, "", track::Alignment::chained({0, 1000, 0}, {{1000, 0, 0}})},
+                {3, "beside", 4, 5, "", track::Alignment::chained({20, 0, 0}, {{2000, 0, 0}})}};
+  map->landmarks = {{1, track::LandmarkKind::mast, 1, 999, 3, 0.1, ""},
+                    {2, track::LandmarkKind::mast, 2, 1, 3, 0.1, ""}};
+  const TracksBeside beside(map);
+  EXPECT_FALSE(beside.any_at({1, 995, track::Direction::forward}));
+  EXPECT_FALSE(beside.has_alike(map->landmarks[0]));
+  EXPECT_FALSE(beside.many_at(2, 500));
+  EXPECT_TRUE(beside.many_at(10, 500)) << "10 m from either";
+}
+
+}  // namespace
+}  // namespace railfix::fusion
