@@ -205,6 +205,7 @@ double Estimator::fix_sigmas_off(double excused_m) const {
 // No further off than the train would be over the way that is followed, over one that is held or between them.
 bool Estimator::fits_a_held_way(const MeasuredPlace& place) const {
   const Sides ways = held_ways();
+  if (ways.behind_m + ways.ahead_m == 0) return false;
   const auto offer = filter_.test_position(place.path_distance_m, place.sigma_m, parameters_->gate_fix);
   const double way_m = offer.residual < 0 ? ways.behind_m : ways.ahead_m;
   return offer.used || std::abs(offer.residual) * (1 - parameters_->gate_fix / std::sqrt(offer.nis)) < way_m;
@@ -214,8 +215,8 @@ bool Estimator::fits_a_held_way(const MeasuredPlace& place) const {
 // of the scales. So it does where more is in doubt than a vague fix leaves open: else it would end the doubt and move
 // nothing. What a sharp one leaves open is little anyway.
 Offer Estimator::offer_place(const MeasuredPlace& place) {
-  const Sides ways = held_ways();
-  if (ways.behind_m + ways.ahead_m > 0 && fits_a_held_way(place)) {
+  if (fits_a_held_way(place)) {
+    const Sides ways = held_ways();
     filter_.loosen_origin(kLoose * std::max(ways.behind_m, ways.ahead_m));
     return filter_.offer_position(place, parameters_->gate_fix);
   }
@@ -304,7 +305,8 @@ double Estimator::reach_m(const Offer& offer, double sigma_m) const {
 // Until the next one.
 void Estimator::doubt_surprise(double sigma_m) {
   if (fix_sigmas_off(excess_m_) < kSurprisingSigmas) return;
-  doubts_.refused = {reach_m(fix_offer_, sigma_m), reach_m(fix_offer_, sigma_m)};
+  const double reach_m = this->reach_m(fix_offer_, sigma_m);
+  doubts_.refused = {reach_m, reach_m};
 }
 
 // One fix alone never moves the train against the filter; a second one elsewhere that says the same does.
@@ -321,7 +323,8 @@ void Estimator::refuse(const FixInput& fix, double path_distance_m, const Offer&
       corrected_ = true;
       accept(fix);
       // Either side: what told where to look for these two was wrong by as much. Until a third one agrees.
-      doubts_.refused = {reach_m(offer, fix.sigma_m), reach_m(offer, fix.sigma_m)};
+      const double reach_m = this->reach_m(offer, fix.sigma_m);
+      doubts_.refused = {reach_m, reach_m};
       fix_verdict_ = FixVerdict::corrected;
       place_.landmarks_agreed = 2;
       if (fix.kind == FixKind::landmark) confirm_by(fix);

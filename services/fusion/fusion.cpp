@@ -176,13 +176,16 @@ void Fusion::start_position(FixInput& fix) const {
   if (path.ok()) fix.new_path = std::make_shared<const track::Path>(std::move(path).value());
 }
 
-// Of every fix, whoever needs it: one that comes late is used at its own time.
+// Of every fix that could confirm a start, whoever needs it: one that comes late is used at its own time.
 void Fusion::look_beside(Event& event) {
-  if (!map_) return;
+  auto* gnss = std::get_if<GnssInput>(&event);
+  auto* fix = std::get_if<FixInput>(&event);
+  const bool confirms = gnss != nullptr || (fix != nullptr && fix->kind != FixKind::track);
+  if (!map_ || !confirms) return;
   if (!beside_) beside_.emplace(map_);
-  if (auto* gnss = std::get_if<GnssInput>(&event)) {
+  if (gnss != nullptr) {
     gnss->tells_track = !beside_->many_at(gnss->easting_m, gnss->northing_m);
-  } else if (auto* fix = std::get_if<FixInput>(&event); fix != nullptr && map_->edge(fix->edge) != nullptr) {
+  } else if (map_->edge(fix->edge) != nullptr) {
     const auto* landmark = fix->kind == FixKind::landmark ? map_->landmark(fix->landmark) : nullptr;
     fix->tells_track = landmark != nullptr ? !beside_->has_alike(*landmark)
                                            : !beside_->any_at({fix->edge, fix->offset_m, fix->direction});

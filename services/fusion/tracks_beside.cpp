@@ -22,12 +22,17 @@ std::vector<track::NearTrack> TracksBeside::abeam(double easting_m, double north
   return near;
 }
 
-bool TracksBeside::any_at(const track::EdgePosition& place) const {
+std::vector<track::NearTrack> TracksBeside::beside(const track::EdgePosition& place) const {
   const auto* edge = map_->edge(place.edge);
-  if (edge->is_drawn) return false;
+  if (edge->is_drawn) return {};
   const auto pose = edge->alignment.at(place.offset_m).pose;
-  return std::ranges::any_of(abeam(pose.easting_m, pose.northing_m),
-                             [&](const track::NearTrack& other) { return other.edge != place.edge; });
+  auto near = abeam(pose.easting_m, pose.northing_m);
+  std::erase_if(near, [&](const track::NearTrack& one) { return one.edge == place.edge; });
+  return near;
+}
+
+bool TracksBeside::any_at(const track::EdgePosition& place) const {
+  return !beside(place).empty();
 }
 
 bool TracksBeside::many_at(double easting_m, double northing_m) const {
@@ -35,16 +40,13 @@ bool TracksBeside::many_at(double easting_m, double northing_m) const {
 }
 
 bool TracksBeside::has_alike(const track::Landmark& landmark) const {
-  const auto* edge = map_->edge(landmark.edge);
-  if (edge->is_drawn) return false;
-  const auto pose = edge->alignment.at(landmark.offset_m).pose;
-  return std::ranges::any_of(abeam(pose.easting_m, pose.northing_m), [&](const track::NearTrack& beside) {
-    if (beside.edge == landmark.edge) return false;
-    const double there_rad = map_->edge(beside.edge)->alignment.at(beside.offset_m).pose.heading_rad;
-    const double side = std::cos(there_rad - pose.heading_rad) < 0 ? -1.0 : 1.0;
-    return std::ranges::any_of(map_->landmarks_on(beside.edge), [&](const track::Landmark* other) {
+  const double here_rad = map_->edge(landmark.edge)->alignment.at(landmark.offset_m).pose.heading_rad;
+  return std::ranges::any_of(beside({landmark.edge, landmark.offset_m}), [&](const track::NearTrack& near) {
+    const double there_rad = map_->edge(near.edge)->alignment.at(near.offset_m).pose.heading_rad;
+    const double side = std::cos(there_rad - here_rad) < 0 ? -1.0 : 1.0;
+    return std::ranges::any_of(map_->landmarks_on(near.edge), [&](const track::Landmark* other) {
       return track::seen_along(other->kind, side > 0) == landmark.kind &&
-             std::abs(other->offset_m - beside.offset_m) < kAlongAlikeM &&
+             std::abs(other->offset_m - near.offset_m) < kAlongAlikeM &&
              std::abs(side * other->lateral_m - landmark.lateral_m) < kAcrossAlikeM;
     });
   });

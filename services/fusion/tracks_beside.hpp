@@ -26,6 +26,7 @@ class TracksBeside {
  private:
   /// Tracks abeam of a point; what lies beyond an edge's end is not.
   [[nodiscard]] std::vector<track::NearTrack> abeam(double easting_m, double northing_m) const;
+  [[nodiscard]] std::vector<track::NearTrack> beside(const track::EdgePosition& place) const;
 
   std::shared_ptr<const track::Map> map_;
   track::TrackFinder finder_;

@@ -48,18 +48,14 @@ core::Result<Breaks> feed(const std::filesystem::path& file, double until_m, map
     const double rate_rps = table.number_or_nan(rate);
     const double dt_s = 1e-9 * static_cast<double>(table.stamp_ns() - last_ns);
     if (started && std::abs(at_m) > until_m) break;
-    if (table.integer(valid) == 0 || !std::isfinite(at_m) || !std::isfinite(rate_rps)) {
-      if (started) breaks.add(table.stamp_ns());
-      locator.forget();
-      started = false;
-      continue;
-    }
-    if (started && dt_s >= kLongestGapS) {
+    const bool measured = table.integer(valid) != 0 && std::isfinite(at_m) && std::isfinite(rate_rps);
+    if (started && (!measured || dt_s >= kLongestGapS)) {
       breaks.add(table.stamp_ns());
       locator.forget();
-    } else if (started && at_m != last_m) {
-      locator.move(at_m - last_m, rate_rps * dt_s, kTurnNoiseRad);
+      started = false;
     }
+    if (!measured) continue;
+    if (started && at_m != last_m) locator.move(at_m - last_m, rate_rps * dt_s, kTurnNoiseRad);
     started = true;
     last_m = at_m;
     last_ns = table.stamp_ns();
