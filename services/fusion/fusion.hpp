@@ -15,8 +15,8 @@
 #include "fusion/odometer_scales.hpp"
 #include "fusion/scale_trial.hpp"
 #include "fusion/stamp_watch.hpp"
-#include "fusion/tracks_beside.hpp"
 #include "track/path.hpp"
+#include "track/tracks_beside.hpp"
 
 namespace railfix::fusion {
 
@@ -94,9 +94,9 @@ class Fusion {
   std::shared_ptr<const FusionParameters> parameters_;
   std::shared_ptr<const track::Map> map_;
   std::shared_ptr<const track::Path> path_;
-  std::optional<track::Ways> ways_;         // made when they are first asked for
-  std::optional<TracksBeside> beside_;      // likewise
-  std::optional<double> followed_on_at_m_;  // where the path was followed on last, or could not be
+  std::optional<track::Ways> ways_;            // made when they are first asked for
+  std::optional<track::TracksBeside> beside_;  // likewise
+  std::optional<double> followed_on_at_m_;     // where the path was followed on last, or could not be
   std::optional<SavedScales> saved_;
   std::optional<ScaleTrial> now_;
   std::deque<Event> events_;               // by stamp, then kind

@@ -17,8 +17,9 @@ constexpr double kTrackEveryS = 1.0;      // the track is said again after this 
 constexpr double kOpenTrackEveryM = 2.0;  // ... or, while it is not known, this way
 constexpr double kNoCameraS = 0.5;        // without an odometry step
 constexpr double kCountM = 20.0;
-constexpr double kLostS = 30.0;      // after so long unseen the track is chosen anew
-constexpr double kRateShare = 0.75;  // of the curvature's sigma comes from its unknown rate
+constexpr double kLostS = 30.0;       // after so long unseen the track is chosen anew
+constexpr double kWorthSaying = 0.5;  // probability of the track beside
+constexpr double kRateShare = 0.75;   // of the curvature's sigma comes from its unknown rate
 
 // What was nearest a while ago, from where the train is at that stamp: search and chooser know no earlier places.
 Sighting sighted_at(int64_t stamp_ns, double speed_mps, Sighting sighting) {
@@ -51,7 +52,10 @@ MapMatcher::MapMatcher(const MapMatcherParameters& parameters, std::shared_ptr<c
   if (!map_) return;
   ways_ = std::make_shared<const track::Ways>(*map_);
   followed_.emplace(map_, ways_);
-  if (parameters.choose_track) chooser_.emplace(parameters.track_parameters(), map_, ways_);
+  if (!parameters.choose_track) return;
+  chooser_.emplace(parameters.track_parameters(), map_, ways_);
+  tracks_beside_ = std::make_shared<const track::TracksBeside>(map_);
+  beside_.emplace(parameters.landmarks, tracks_beside_);
 }
 
 // What was matched so far is of another place.
@@ -62,6 +66,7 @@ void MapMatcher::forget_place() {
   curvature_.reset();
   exits_.reset();
   if (chooser_) chooser_.emplace(parameters_.track_parameters(), map_, ways_);
+  if (beside_) beside_->begin_anew();
   moved_ns_ = 0;
   said_track_ = {};
 }
@@ -99,8 +104,12 @@ std::string MapMatcher::trouble_at(const StateInput& state) {
   }
   if (const auto followed = follow(state); !followed.ok()) return followed.error().message;
   listen_for_silence(state);
-  return place_doubt() > 0 ? "the sightings fit the map nowhere near the place that train_state says"
-                           : silence_.trouble();
+  if (place_doubt() > 0) return "the sightings fit the map nowhere near the place that train_state says";
+  if (beside_ && beside_->probability() > kWorthSaying) {
+    return "balises or frogs are sighted where a track beside has them and the one that train_state says has none: the "
+           "train was told on the wrong track, or the map lacks them";
+  }
+  return silence_.trouble();
 }
 
 void MapMatcher::listen_for_silence(const StateInput& state) {
@@ -134,6 +143,7 @@ core::Status MapMatcher::follow(const StateInput& state) {
   if (!way.ok()) return way.error();
   if (way.value() == FollowedPath::Way::same) return {};
   const auto& path = followed_->path();
+  if (beside_) beside_->begin_anew();
   if (way.value() == FollowedPath::Way::other_track) {
     landmarks_->change_path(path);
     curvature_->change_path(path);
@@ -279,6 +289,27 @@ double MapMatcher::place_doubt() const {
   return landmarks_->place_doubt();
 }
 
+// Where the track is open, or another one is to be followed, the chooser has weighed them.
+void MapMatcher::compare_with_beside(const Sighting& sighting, const Prior& prior) {
+  const auto choice = chooser_ ? chooser_->choice() : std::nullopt;
+  if (choice && choice->known && is_followed(choice->options.front().place))
+    beside_->sight(*followed_->path(), sighting, prior);
+}
+
+// It was matched on the followed track alone: taken for that one's, what lies on another track would move the place.
+double MapMatcher::share_of_followed(uint32_t landmark) const {
+  const auto choice = chooser_ ? chooser_->choice() : std::nullopt;
+  const auto* seen = map_->landmark(landmark);
+  if (!choice || seen == nullptr || tracks_beside_->has_alike(*seen)) return 1;
+  double followed = 0;
+  for (const auto& option : choice->options) followed += is_followed(option.place) ? option.probability : 0;
+  return followed * (1 - beside_->probability());
+}
+
+bool MapMatcher::is_followed(const track::EdgePosition& place) const {
+  return followed_->path()->distance_of(place.edge, place.offset_m).has_value();
+}
+
 // The chooser is where it was moved to: a step that comes late does not take it back.
 void MapMatcher::say_track(double odometer_m, PlaceFixes& fixes) {
   const int64_t stamp_ns = moved_ns_;
@@ -289,7 +320,8 @@ void MapMatcher::say_track(double odometer_m, PlaceFixes& fixes) {
   if (!choice) return;
   const auto& best = choice->options.front();
   const double since_m = std::abs(odometer_m - said_track_.odometer_m);
-  const double there = 1 - place_doubt();  // and not elsewhere on the map
+  const double doubt = place_doubt();
+  const double there = (1 - doubt) * (is_followed(best.place) ? 1 - beside_->probability() : 1.0);
   const bool known = choice->known && there == 1;
   const bool changed = best.place.edge != said_track_.edge || known != said_track_.known;
   const bool due = core::seconds(stamp_ns - said_track_.stamp_ns) > kTrackEveryS;
@@ -298,7 +330,7 @@ void MapMatcher::say_track(double odometer_m, PlaceFixes& fixes) {
   PlaceFix fix{FixKind::track, stamp_ns, choice->options, std::numeric_limits<double>::infinity()};
   fix.options.insert(fix.options.begin() + 1, choice->elsewhere.begin(), choice->elsewhere.end());
   for (auto& option : fix.options) option.probability *= there;
-  if (there < 1) fix.sightings_fit = SightingsFit::nowhere;
+  if (doubt > 0) fix.sightings_fit = SightingsFit::nowhere;
   fixes.push_back(std::move(fix));
 }
 
@@ -325,8 +357,12 @@ PlaceFixes MapMatcher::add(const Sighting& sighting) {
   if (!landmarks_ || !parameters_.use_landmarks || !prior) return {};
   if (chooser_) chooser_->sight(sighted_at(moved_ns_, state_->placed.speed_mps, sighting));
   silence_.sight(*followed_->path(), sighting, *prior);
+  compare_with_beside(sighting, *prior);
   PlaceFixes fixes;
-  if (const auto fix = landmarks_->add(sighting, *prior)) say(*fix, FixKind::landmark, fixes);
+  if (auto fix = landmarks_->add(sighting, *prior)) {
+    fix->probability *= share_of_followed(fix->landmark);
+    say(*fix, FixKind::landmark, fixes);
+  }
   return fixes;
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "map_matcher/beside_doubt.hpp"
 #include "map_matcher/followed_path.hpp"
 #include "map_matcher/inputs.hpp"
 #include "map_matcher/landmark_matcher.hpp"
@@ -78,6 +79,11 @@ class MapMatcher {
   void move_without_camera(int64_t to_ns);
   /// How probable it is that the train is somewhere else on the map; 0 where that is less probable than not.
   [[nodiscard]] double place_doubt() const;
+  [[nodiscard]] bool is_followed(const track::EdgePosition& place) const;
+  /// How probable it is that the landmark is that of the followed track, by what is known of the track.
+  [[nodiscard]] double share_of_followed(uint32_t landmark) const;
+  /// Of a train on a declared track: is it the one beside?
+  void compare_with_beside(const Sighting& sighting, const Prior& prior);
   void say_track(double odometer_m, PlaceFixes& fixes);
   void say(const Fix& fix, FixKind kind, PlaceFixes& fixes) const;
 
@@ -88,6 +94,8 @@ class MapMatcher {
   std::optional<FollowedPath> followed_;
   std::optional<LandmarkMatcher> landmarks_;
   LandmarkSilence silence_;
+  std::shared_ptr<const track::TracksBeside> tracks_beside_;
+  std::optional<BesideDoubt> beside_;
   std::optional<CurvatureMatcher> curvature_;
   std::optional<CurveExitMatcher> exits_;  // instead of it, where the parameters say so
   GyroTurn gyro_;
@@ -105,7 +113,7 @@ class MapMatcher {
     bool known = false;
     int64_t stamp_ns = 0;
     double odometer_m = 0;
-    double there = 1;  // the share of place_doubt() in the probability
+    double there = 1;  // and not elsewhere on the map or on the track beside
   };
   SaidTrack said_track_;
 };

@@ -19,6 +19,9 @@ constexpr double kSamePlaceM = 1.0;
 constexpr double kAtEndM = 0.5;
 constexpr double kNoLagShare = 0.3;      // of the cars
 constexpr double kViewNoisePerM = 3e-4;  // least sigma of a picture's curvature
+constexpr double kOwnRailsM = 1.0;       // a balise is in the middle of them
+constexpr double kApartM = 2.5;          // tracks further apart than that share no rails
+constexpr double kOthersBalise = 0.01;   // chance that it is another track's all the same
 constexpr double kWatched = 0.9;         // a begin less probable lies behind a switch that nobody watched
 
 }  // namespace
@@ -231,8 +234,34 @@ void TrackChooser::sight(const Sighting& sighting) {
   std::vector<double> fits;
   for (const auto& hypothesis : hypotheses_)
     fits.push_back(std::log(sighting_fits(*map_, hypothesis.route, seen, parameters_)));
-  use_picture(fits);
+  const bool below_train = sighting.kind == track::LandmarkKind::balise && std::abs(sighting.lateral_m) < kOwnRailsM;
+  below_train&& are_apart_at(seen.at_m) ? use_own(fits) : use_picture(fits);
   prune();
+}
+
+bool TrackChooser::are_apart_at(double at_m) const {
+  std::map<uint32_t, track::PlanPose> tracks;
+  for (const auto& hypothesis : hypotheses_) {
+    const auto place = hypothesis.route.position_at(at_m);
+    tracks.try_emplace(place.edge, map_->edge(place.edge)->alignment.at(place.offset_m).pose);
+  }
+  for (auto one = tracks.begin(); one != tracks.end(); ++one) {
+    for (auto other = std::next(one); other != tracks.end(); ++other) {
+      const auto& [a, b] = std::pair(one->second, other->second);
+      if (std::hypot(a.easting_m - b.easting_m, a.northing_m - b.northing_m) < kApartM) return false;
+    }
+  }
+  return true;
+}
+
+// Whether the detector is astray or not.
+void TrackChooser::use_own(const std::vector<double>& log_fits) {
+  const double most = *std::ranges::max_element(log_fits);
+  for (size_t i = 0; i < hypotheses_.size(); ++i) {
+    const double fit = log_sum(log_fits[i] + std::log(1 - kOthersBalise), most + std::log(kOthersBalise));
+    hypotheses_[i].pictures.own += fit;
+    hypotheses_[i].pictures.astray += fit;
+  }
 }
 
 void TrackChooser::see(double curvature_per_m, double sigma_per_m) {

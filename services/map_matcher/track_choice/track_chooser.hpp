@@ -90,6 +90,10 @@ class TrackChooser {
   void merge();
   void prune();
   void use_picture(const std::vector<double>& log_fits);
+  /// No two ways have rails in common there.
+  [[nodiscard]] bool are_apart_at(double at_m) const;
+  /// Of what lies between the rails that the train runs on.
+  void use_own(const std::vector<double>& log_fits);
   void run_pictures(double way_m);
   /// Logarithm of prior and all evidence.
   [[nodiscard]] double evidence(const Hypothesis& hypothesis) const;

@@ -3,6 +3,7 @@
 
 #include "core/units.hpp"
 #include "straight_run.hpp"
+#include "track/tracks_beside.hpp"
 
 namespace railfix::fusion {
 namespace {
@@ -79,7 +80,7 @@ TEST(TracksBeside, APlaceNearTheEndOfAnEdgeIsNotBesideTheNextOne) {
                 {3, "beside", 4, 5, "", track::Alignment::chained({20, 0, 0}, {{2000, 0, 0}})}};
   map->landmarks = {{1, track::LandmarkKind::mast, 1, 999, 3, 0.1, ""},
                     {2, track::LandmarkKind::mast, 2, 1, 3, 0.1, ""}};
-  const TracksBeside beside(map);
+  const track::TracksBeside beside(map);
   EXPECT_FALSE(beside.any_at({1, 995, track::Direction::forward}));
   EXPECT_FALSE(beside.has_alike(map->landmarks[0]));
   EXPECT_FALSE(beside.many_at(2, 500));

@@ -101,6 +101,29 @@ TEST_F(MapMatcherRide, WhatWasSightedAWhileAgoCountsFromWhereTheTrainWasThen) {
   EXPECT_NEAR(probabilities[0], probabilities[1], 1e-9);
 }
 
+// Its place is where it lies if the train is on that leg, and nobody knows that.
+TEST_F(MapMatcherRide, WhatOneLegAloneHasIsNoFixWhileTheLegIsNotKnown) {
+  for (const bool both : {false, true}) {
+    auto map = std::make_shared<track::Map>(*fork());
+    map->landmarks = {{1, track::LandmarkKind::mast, 2, 200, 3, 0.1, ""}};
+    // Beside a parallel leg as well.
+    map->edges[2].alignment = track::Alignment::chained({-4, 500, 0}, {{500, 0, 0}});
+    if (both) map->landmarks.push_back({2, track::LandmarkKind::mast, 3, 200, 3, 0.1, ""});
+    matcher_ = MapMatcher({}, map);
+    at_m_ = kFromM;
+    said_.clear();
+    run_to(480);
+    for (; at_m_ < 690; at_m_ += kSpeedMps * kPeriodS) {  // in the dark
+      stamp_ns_ += core::to_ns(kPeriodS);
+      keep(matcher_.add(state()));
+    }
+    keep(matcher_.add(Sighting{stamp_ns_, track::LandmarkKind::mast, 700 - at_m_, 3, 0.1, 0.95}));
+    const auto* mast = last(FixKind::landmark);
+    ASSERT_NE(mast, nullptr);
+    EXPECT_EQ(mast->options.front().probability > 0.9, both) << mast->options.front().probability;
+  }
+}
+
 TEST_F(MapMatcherRide, ASearchedPlaceIsSaidByGnssOnTheOneTrackThereIs) {
   known_ = false;
   run_to(302);

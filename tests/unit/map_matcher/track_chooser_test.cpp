@@ -316,6 +316,29 @@ TEST(TrackChooser, TheSideOfTheFrogCounts) {
   EXPECT_FALSE(choice->known);
 }
 
+// Where the legs share no rails a balise below the train is its own; beside the points a detector may still be astray.
+TEST(TrackChooser, ABaliseBelowTheTrainTellsTheLegWhereTheyAreApart) {
+  auto made = std::make_shared<track::Map>(*fork());
+  made->landmarks = {{1, track::LandmarkKind::balise, 2, 25, 0, 0.1, ""},
+                     {2, track::LandmarkKind::balise, 2, 250, 0, 0.1, ""},
+                     {3, track::LandmarkKind::balise, 2, 400, 0, 0.1, ""}};
+  const std::shared_ptr<const track::Map> map = made;
+  TrackChooser chooser({}, map, std::make_shared<const track::Ways>(*map));
+  chooser.follow({{1, 490, track::Direction::forward}, 3, 3, 0.5});
+  double at_m = 490;
+  const auto sight_at = [&](double leg_m) {
+    for (; at_m < 500 + leg_m - 8; at_m += 1) chooser.move_blind(1);
+    chooser.sight({0, track::LandmarkKind::balise, 8, 0, 0.2, 0.95});
+    return *chooser.choice();
+  };
+  EXPECT_LT(sight_at(25).options.front().probability, 0.95) << "2 m apart";
+  const auto one = sight_at(250);
+  EXPECT_EQ(one.options.front().place.edge, 2U);
+  EXPECT_GT(one.options.front().probability, 0.99);
+  EXPECT_FALSE(one.known && one.options.front().probability > 0.9999);
+  EXPECT_TRUE(sight_at(400).known);
+}
+
 // A detector that follows the other leg shows it in every picture: many of them say little more than one.
 TEST(TrackChooser, PicturesAloneNeverDeclareATrack) {
   const auto map = fork();

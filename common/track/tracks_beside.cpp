@@ -1,9 +1,9 @@
-#include "fusion/tracks_beside.hpp"
+#include "track/tracks_beside.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-namespace railfix::fusion {
+namespace railfix::track {
 namespace {
 
 constexpr double kBesideM = 15.0;  // GNSS is not believed to tell tracks that are nearer
@@ -13,43 +13,39 @@ constexpr double kAcrossAlikeM = 1.5;
 
 }  // namespace
 
-std::vector<track::NearTrack> TracksBeside::abeam(double easting_m, double northing_m) const {
+std::vector<NearTrack> TracksBeside::abeam(double easting_m, double northing_m) const {
   auto near = finder_.near(easting_m, northing_m, kBesideM);
-  std::erase_if(near, [&](const track::NearTrack& one) {
+  std::erase_if(near, [&](const NearTrack& one) {
     const auto* edge = map_->edge(one.edge);
     return edge->is_drawn || one.offset_m < kEndM || one.offset_m > edge->alignment.length_m() - kEndM;
   });
   return near;
 }
 
-std::vector<track::NearTrack> TracksBeside::beside(const track::EdgePosition& place) const {
+std::vector<NearTrack> TracksBeside::beside(const EdgePosition& place) const {
   const auto* edge = map_->edge(place.edge);
   if (edge->is_drawn) return {};
   const auto pose = edge->alignment.at(place.offset_m).pose;
   auto near = abeam(pose.easting_m, pose.northing_m);
-  std::erase_if(near, [&](const track::NearTrack& one) { return one.edge == place.edge; });
+  std::erase_if(near, [&](const NearTrack& one) { return one.edge == place.edge; });
   return near;
-}
-
-bool TracksBeside::any_at(const track::EdgePosition& place) const {
-  return !beside(place).empty();
 }
 
 bool TracksBeside::many_at(double easting_m, double northing_m) const {
   return abeam(easting_m, northing_m).size() > 1;
 }
 
-bool TracksBeside::has_alike(const track::Landmark& landmark) const {
+bool TracksBeside::has_alike(const Landmark& landmark) const {
   const double here_rad = map_->edge(landmark.edge)->alignment.at(landmark.offset_m).pose.heading_rad;
-  return std::ranges::any_of(beside({landmark.edge, landmark.offset_m}), [&](const track::NearTrack& near) {
+  return std::ranges::any_of(beside({landmark.edge, landmark.offset_m}), [&](const NearTrack& near) {
     const double there_rad = map_->edge(near.edge)->alignment.at(near.offset_m).pose.heading_rad;
     const double side = std::cos(there_rad - here_rad) < 0 ? -1.0 : 1.0;
-    return std::ranges::any_of(map_->landmarks_on(near.edge), [&](const track::Landmark* other) {
-      return track::seen_along(other->kind, side > 0) == landmark.kind &&
+    return std::ranges::any_of(map_->landmarks_on(near.edge), [&](const Landmark* other) {
+      return seen_along(other->kind, side > 0) == landmark.kind &&
              std::abs(other->offset_m - near.offset_m) < kAlongAlikeM &&
              std::abs(side * other->lateral_m - landmark.lateral_m) < kAcrossAlikeM;
     });
   });
 }
 
-}  // namespace railfix::fusion
+}  // namespace railfix::track

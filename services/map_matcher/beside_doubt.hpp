@@ -1,0 +1,37 @@
+// Does the train run on the track beside the one that fusion follows? Somebody may have told its start one track off,
+// and masts, bridges, curves and GNSS are much the same there. Balises and frogs are not: they lie between the train's
+// own rails.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "map_matcher/landmark_matcher.hpp"
+#include "track/tracks_beside.hpp"
+
+namespace railfix::map_matcher {
+
+class BesideDoubt {
+ public:
+  BesideDoubt(const LandmarkParameters& parameters, std::shared_ptr<const track::TracksBeside> tracks)
+      : parameters_(parameters), tracks_(std::move(tracks)) {}
+
+  /// Only balises and frogs say something. REQUIRES: the prior is usable, and its track is declared.
+  void sight(const track::Path& followed, const Sighting& sighting, const Prior& prior);
+  /// Another track is followed.
+  void begin_anew();
+  /// How probable it is that the train runs on a track beside the one that is followed; 0 until something has spoken
+  /// for that.
+  [[nodiscard]] double probability() const { return odds_ > kTold ? odds_ / (1 + odds_) : 0; }
+
+ private:
+  static constexpr double kTold = 5e-4;  // chance that somebody told the neighbour of the right track
+
+  LandmarkParameters parameters_;
+  std::shared_ptr<const track::TracksBeside> tracks_;
+  double odds_ = kTold;
+  std::optional<double> weighed_m_;  // of the distance run, the last one that was
+};
+
+}  // namespace railfix::map_matcher
