@@ -69,9 +69,10 @@ function(railfix_service name)
 endfunction()
 
 # railfix_test(core SOURCES a_test.cpp DEPENDS railfix_core)  -> program railfix-test-core, run by CTest test by test.
-# Tests of a folder that sets RAILFIX_TESTS_RUN_ALONE start processes that have the machine for themselves.
+# Tests of a folder that sets RAILFIX_TESTS_RUN_ALONE start processes that have the machine for themselves, but for
+# those that wait most of their time: WAITS, they run beside others.
 function(railfix_test name)
-  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;DEPENDS" ${ARGN})
+  cmake_parse_arguments(ARG "WAITS" "TIMEOUT" "SOURCES;DEPENDS" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 120)
   endif()
@@ -91,7 +92,11 @@ function(railfix_test name)
   # SIGABRT leaves a core of a program that hangs, which .ci/run prints: CTest's own end of it would leave nothing.
   math(EXPR last_second "${ARG_TIMEOUT} + 30")
   add_test(NAME ${name} COMMAND timeout --verbose --signal=ABRT ${ARG_TIMEOUT} $<TARGET_FILE:railfix-test-${name}>)
-  set_tests_properties(${name} PROPERTIES TIMEOUT ${last_second} RUN_SERIAL "$<BOOL:${RAILFIX_TESTS_RUN_ALONE}>")
+  set(alone OFF)
+  if(RAILFIX_TESTS_RUN_ALONE AND NOT ARG_WAITS)
+    set(alone ON)
+  endif()
+  set_tests_properties(${name} PROPERTIES TIMEOUT ${last_second} RUN_SERIAL ${alone})
 endfunction()
 
 # railfix_measuring_program(railfix-measure-survey SOURCES survey.cpp DEPENDS railfix_track)  -> that program: no timing
