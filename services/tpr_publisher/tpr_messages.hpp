@@ -6,7 +6,9 @@
 #include <string>
 
 #include "messaging/direction.hpp"
-#include "messaging/messaging.hpp"
+#include "messaging/onboard_topic.hpp"
+#include "messaging/samples.hpp"
+#include "messaging/topics.hpp"
 #include "tpr_publisher/tpr_publisher.hpp"
 #include "track/same_map.hpp"
 
