@@ -201,7 +201,7 @@ core::Status Writer::flush_chunk() {
   const ByteView stored = packed.empty() ? ByteView(chunk_) : ByteView(packed);
 
   Bytes out;
-  out.reserve(stored.size() + 64 + statistics_.channels * 32);
+  out.reserve(stored.size() + 64 + size_t{32} * statistics_.channels);
   append(out, chunk_head_, stored);
   ChunkIndex index{chunk_head_.start_ns,    chunk_head_.end_ns, offset_,      out.size(), {}, 0,
                    chunk_head_.compression, stored.size(),      chunk_.size()};

@@ -329,7 +329,8 @@ void FrameGrabberService::finish_after_last_words() {
 }
 
 void FrameGrabberService::check_wait() {
-  if (gave_up_ns_ && core::monotonic_ns() - *gave_up_ns_ > service::kLastWordsNs) throw std::runtime_error(gave_up_why_);
+  if (gave_up_ns_ && core::monotonic_ns() - *gave_up_ns_ > service::kLastWordsNs)
+    throw std::runtime_error(gave_up_why_);
   if (gave_up_ns_ || !waiting_since_ns_) return;
   if (core::seconds(core::monotonic_ns() - *waiting_since_ns_) < config_.wait_s) return;
   gave_up_why_ = fmt::format(

@@ -32,8 +32,7 @@ TEST_F(RailmlHeights, ASlopeEndsWhereTheFileSays) {
       map_of(railml3(gradient_curve("id=\"g\" gradient=\"5\"", on("n1", "posBegin=\"100\" posEnd=\"300\""))));
   for (const auto& [at_m, height_m] : {std::pair(0.0, 0.0), {100.0, 0.0}, {200.0, 0.5}, {300.0, 1.0}, {900.0, 1.0}})
     EXPECT_NEAR(height(map, 0, at_m), height_m, 1e-9) << at_m;
-  EXPECT_THAT(map.problems,
-              Contains("track n1 has no gradient on 800.00 m of its 1000.00 m; it is level there"));
+  EXPECT_THAT(map.problems, Contains("track n1 has no gradient on 800.00 m of its 1000.00 m; it is level there"));
   EXPECT_NEAR(height(map, 1, 400), 1.0, 1e-9) << "heights run on";
 }
 
