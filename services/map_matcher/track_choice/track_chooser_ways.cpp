@@ -13,11 +13,11 @@ namespace railfix::map_matcher {
 namespace {
 
 constexpr double kLeastProbability = 1e-7;
-constexpr double kMapSigmas = 3;      // points are no further from where the map has them
-constexpr double kWheelsBehindM = 5;  // the foot: points may be thrown in front of the first wheels
-constexpr double kSameM = 1.0;        // two routes whose distances differ by less are one
+constexpr double kMapSigmas = 3;         // points are no further from where the map has them
+constexpr double kWheelsBehindM = 5;     // the foot: points may be thrown in front of the first wheels
+constexpr double kSameM = 1.0;           // two routes whose distances differ by less are one
 constexpr size_t kMostHypotheses = 200;  // the stations of our maps have 47 at most
-constexpr double kUnwatchedM = 3000;  // behind a switch that nobody watched, at most
+constexpr double kUnwatchedM = 3000;     // behind a switch that nobody watched, at most
 
 }  // namespace
 
