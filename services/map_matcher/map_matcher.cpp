@@ -87,7 +87,10 @@ PlaceFixes MapMatcher::add(const StateInput& state) {
   if (before && before->standstill && state.standstill) stand(before->placed.stamp_ns, state.placed.stamp_ns);
   if (!state.track_known && before && before->track_known) forget_place();
   search_.follow(state.track_known, state.usable);
-  if (landmarks_ && before && !counts_on(before->placed, state.placed)) landmarks_->forget();
+  if (landmarks_ && before && !counts_on(before->placed, state.placed)) {
+    landmarks_->forget();
+    if (beside_) beside_->begin_anew();
+  }
   if (before && core::seconds(state.placed.stamp_ns - before->placed.stamp_ns) > FollowedPath::kOldStateS)
     silence_.begin_way();
   trouble_ = trouble_at(state);
@@ -143,7 +146,6 @@ core::Status MapMatcher::follow(const StateInput& state) {
   if (!way.ok()) return way.error();
   if (way.value() == FollowedPath::Way::same) return {};
   const auto& path = followed_->path();
-  if (beside_) beside_->begin_anew();
   if (way.value() == FollowedPath::Way::other_track) {
     landmarks_->change_path(path);
     curvature_->change_path(path);
@@ -289,21 +291,20 @@ double MapMatcher::place_doubt() const {
   return landmarks_->place_doubt();
 }
 
-// Where the track is open, or another one is to be followed, the chooser has weighed them.
+// Where the track is open, or another one is to be followed, the chooser has weighed them; where the place is in doubt
+// the window is elsewhere.
 void MapMatcher::compare_with_beside(const Sighting& sighting, const Prior& prior) {
   const auto choice = chooser_ ? chooser_->choice() : std::nullopt;
-  if (choice && choice->known && is_followed(choice->options.front().place))
+  if (choice && choice->known && place_doubt() == 0 && is_followed(choice->options.front().place))
     beside_->sight(*followed_->path(), sighting, prior);
 }
 
 // It was matched on the followed track alone: taken for that one's, what lies on another track would move the place.
 double MapMatcher::share_of_followed(uint32_t landmark) const {
-  const auto choice = chooser_ ? chooser_->choice() : std::nullopt;
   const auto* seen = map_->landmark(landmark);
-  if (!choice || seen == nullptr || tracks_beside_->has_alike(*seen)) return 1;
-  double followed = 0;
-  for (const auto& option : choice->options) followed += is_followed(option.place) ? option.probability : 0;
-  return followed * (1 - beside_->probability());
+  if (!chooser_ || seen == nullptr) return 1;
+  const double doubt = tracks_beside_->has_alike(*seen) ? 0 : beside_->probability();
+  return chooser_->share_of(*seen) * (1 - doubt);
 }
 
 bool MapMatcher::is_followed(const track::EdgePosition& place) const {
@@ -321,7 +322,7 @@ void MapMatcher::say_track(double odometer_m, PlaceFixes& fixes) {
   const auto& best = choice->options.front();
   const double since_m = std::abs(odometer_m - said_track_.odometer_m);
   const double doubt = place_doubt();
-  const double there = (1 - doubt) * (is_followed(best.place) ? 1 - beside_->probability() : 1.0);
+  const double there = (1 - doubt) * (1 - beside_->probability());
   const bool known = choice->known && there == 1;
   const bool changed = best.place.edge != said_track_.edge || known != said_track_.known;
   const bool due = core::seconds(stamp_ns - said_track_.stamp_ns) > kTrackEveryS;

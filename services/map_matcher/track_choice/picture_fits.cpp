@@ -54,4 +54,14 @@ double sighting_fits(const track::Map& map, const track::Route& route, const Sig
   return density;
 }
 
+bool has_one_at(const track::Map& map, const track::Route& route, track::LandmarkKind kind, double at_m,
+                double within_m) {
+  return std::ranges::any_of(route.legs(), [&](const track::Route::Leg& leg) {
+    if (leg.begin_m > at_m + within_m || leg.end_m() < at_m - within_m) return false;
+    return std::ranges::any_of(map.landmarks_on(leg.run.edge->id), [&](const track::Landmark* landmark) {
+      return landmark->kind == kind && std::abs(leg.begin_m + leg.run.into_m(landmark->offset_m) - at_m) < within_m;
+    });
+  });
+}
+
 }  // namespace railfix::map_matcher

@@ -27,4 +27,8 @@ struct SightedOnRoute {
 double sighting_fits(const track::Map& map, const track::Route& route, const SightedOnRoute& seen,
                      const TrackParameters& parameters);
 
+/// The route has a landmark of that kind, as the map has it, near the place.
+bool has_one_at(const track::Map& map, const track::Route& route, track::LandmarkKind kind, double at_m,
+                double within_m);
+
 }  // namespace railfix::map_matcher

@@ -21,6 +21,8 @@ constexpr double kNoLagShare = 0.3;      // of the cars
 constexpr double kViewNoisePerM = 3e-4;  // least sigma of a picture's curvature
 constexpr double kOwnRailsM = 1.0;       // a balise is in the middle of them
 constexpr double kApartM = 2.5;          // tracks further apart than that share no rails
+constexpr double kOneGroupM = 30;        // the map has the balises of a group wrong together
+constexpr double kAlikeM = 3;            // along the track
 constexpr double kOthersBalise = 0.01;   // chance that it is another track's all the same
 constexpr double kWatched = 0.9;         // a begin less probable lies behind a switch that nobody watched
 
@@ -31,6 +33,7 @@ void TrackChooser::start(const TrackWindow& window) {
   pending_ = {};
   lost_m_ = moved_back_m_ = 0;
   place_m_ = 0;
+  sure_m_.reset();
   window_ = window;
   hypotheses_.push_back({track::Route(track::run_of(*map_, window.place), window.place.offset_m, 0),
                          0,
@@ -235,8 +238,29 @@ void TrackChooser::sight(const Sighting& sighting) {
   for (const auto& hypothesis : hypotheses_)
     fits.push_back(std::log(sighting_fits(*map_, hypothesis.route, seen, parameters_)));
   const bool below_train = sighting.kind == track::LandmarkKind::balise && std::abs(sighting.lateral_m) < kOwnRailsM;
-  below_train&& are_apart_at(seen.at_m) ? use_own(fits) : use_picture(fits);
+  if (!below_train || !are_apart_at(seen.at_m)) {
+    use_picture(fits);
+  } else if (!sure_m_ || std::abs(seen.at_m - *sure_m_) > kOneGroupM) {
+    sure_m_ = seen.at_m;
+    use_sure(fits);
+  }
   prune();
+}
+
+double TrackChooser::share_of(const track::Landmark& landmark) const {
+  std::optional<double> at_m;
+  for (const auto& hypothesis : hypotheses_) {
+    if (!at_m) at_m = hypothesis.route.distance_of({landmark.edge, landmark.offset_m}, place_m_);
+  }
+  if (!at_m || hypotheses_.size() < 2) return 1;
+  double with = -INFINITY;
+  double all = -INFINITY;
+  for (const auto& hypothesis : hypotheses_) {
+    const double log = evidence(hypothesis);
+    all = log_sum(all, log);
+    if (has_one_at(*map_, hypothesis.route, landmark.kind, *at_m, kAlikeM)) with = log_sum(with, log);
+  }
+  return std::exp(with - all);
 }
 
 bool TrackChooser::are_apart_at(double at_m) const {
@@ -255,7 +279,7 @@ bool TrackChooser::are_apart_at(double at_m) const {
 }
 
 // Whether the detector is astray or not.
-void TrackChooser::use_own(const std::vector<double>& log_fits) {
+void TrackChooser::use_sure(const std::vector<double>& log_fits) {
   const double most = *std::ranges::max_element(log_fits);
   for (size_t i = 0; i < hypotheses_.size(); ++i) {
     const double fit = log_sum(log_fits[i] + std::log(1 - kOthersBalise), most + std::log(kOthersBalise));

@@ -57,6 +57,9 @@ class TrackChooser {
   void see(double curvature_per_m, double sigma_per_m);
   /// Nothing before the first window, and where every way has ended.
   [[nodiscard]] std::optional<TrackChoice> choice() const;
+  /// How probable it is that the train runs over this landmark, or over one that is alike at the same place of another
+  /// way; 1 where no way has it, or there is but one.
+  [[nodiscard]] double share_of(const track::Landmark& landmark) const;
   /// Whose turning was used last.
   [[nodiscard]] TurnSensor sensor() const { return sensor_; }
 
@@ -93,7 +96,7 @@ class TrackChooser {
   /// No two ways have rails in common there.
   [[nodiscard]] bool are_apart_at(double at_m) const;
   /// Of what lies between the rails that the train runs on.
-  void use_own(const std::vector<double>& log_fits);
+  void use_sure(const std::vector<double>& log_fits);
   void run_pictures(double way_m);
   /// Logarithm of prior and all evidence.
   [[nodiscard]] double evidence(const Hypothesis& hypothesis) const;
@@ -115,6 +118,7 @@ class TrackChooser {
   bool forwards_ = true;          // the way that the train moves, seen from the cab
   double seen_m_ = INFINITY;      // run since a picture was used
   double told_ = 1;               // probability of what was told at the start and cannot be looked into
+  std::optional<double> sure_m_;  // on the routes, what was sighted below the train last
   TurnSensor sensor_ = TurnSensor::camera;
   BinTurn pending_;
 };

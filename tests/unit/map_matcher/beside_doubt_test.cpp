@@ -66,7 +66,8 @@ class Beside : public testing::TestWithParam<bool> {
                           against ? track::Direction::reverse : track::Direction::forward};
     state.placed.speed_mps = kSpeedMps;
     state.placed.distance_m = at_m_;
-    state.placed.over_m = state.placed.under_m = 5;
+    state.placed.over_m = behind_m_;
+    state.placed.under_m = ahead_m_;
     state.sigma_m = 1;
     state.track_probability = probability_;
     state.easting_m = kApartM;
@@ -89,6 +90,8 @@ class Beside : public testing::TestWithParam<bool> {
   std::optional<MapMatcher> matcher_{std::in_place, MapMatcherParameters{}, map_};
   double at_m_ = 100;
   int64_t stamp_ns_ = core::kNsPerSecond;
+  double behind_m_ = 5;
+  double ahead_m_ = 5;
   double probability_ = 1;
   SightingsFit fits_ = SightingsFit::not_told;
 };
@@ -108,6 +111,39 @@ TEST_P(Beside, BalisesOfTheNeighbourTakeTheToldTrackAwayAndOnesOfItsOwnGiveItBac
   for (const double at_m : {4200.0, 5700.0, 7200.0, 8700.0}) sight(LandmarkKind::balise, at_m);
   EXPECT_GE(probability_, 0.999);
   EXPECT_EQ(matcher_->trouble(), "");
+}
+
+// Who begins with what was said would take the rest for that of another leg.
+TEST_P(Beside, HoweverManyThereAreNoOtherTrackIsDeclaredByWhatIsLeft) {
+  for (double at_m = 500; at_m < kLengthM - 200; at_m += 1500) sight(LandmarkKind::balise, at_m);
+  EXPECT_LT(probability_, 0.1);
+  EXPECT_GT(probability_, 0.002);
+}
+
+// The train may be 20 m further on than it thinks, and hardly further back.
+TEST_P(Beside, TheWindowIsThatOfATrainThatLooksAhead) {
+  behind_m_ = 2;
+  ahead_m_ = 40;
+  sight(LandmarkKind::balise, 500 - 30);
+  EXPECT_LT(probability_, 0.999);
+  probability_ = 1;
+  matcher_.emplace(MapMatcherParameters{}, map_);
+  sight(LandmarkKind::balise, 2000 + 30);
+  EXPECT_GE(probability_, 0.999);
+}
+
+// In a station the neighbour may have more of them.
+TEST_P(Beside, WhereBothTracksHaveOneItSaysNothing) {
+  for (const double m : {495.0, 500.0, 505.0}) {
+    const double at_m = GetParam() ? kLengthM - m : m;
+    map_->landmarks.push_back(
+        {static_cast<uint32_t>(map_->landmarks.size() + 1), LandmarkKind::balise, kTold, at_m, 0, 0.1, ""});
+    map_->landmarks.push_back(
+        {static_cast<uint32_t>(map_->landmarks.size() + 1), LandmarkKind::balise, 1, m + 2, 0, 0.1, ""});
+  }
+  matcher_.emplace(MapMatcherParameters{}, map_);
+  sight(LandmarkKind::balise, 500);
+  EXPECT_GE(probability_, 0.9999);
 }
 
 TEST_P(Beside, WhatNeitherTrackHasAndAllOfOneGroupAreLittle) {

@@ -321,7 +321,8 @@ TEST(TrackChooser, ABaliseBelowTheTrainTellsTheLegWhereTheyAreApart) {
   auto made = std::make_shared<track::Map>(*fork());
   made->landmarks = {{1, track::LandmarkKind::balise, 2, 25, 0, 0.1, ""},
                      {2, track::LandmarkKind::balise, 2, 250, 0, 0.1, ""},
-                     {3, track::LandmarkKind::balise, 2, 400, 0, 0.1, ""}};
+                     {3, track::LandmarkKind::balise, 2, 253, 0, 0.1, ""},
+                     {4, track::LandmarkKind::balise, 2, 400, 0, 0.1, ""}};
   const std::shared_ptr<const track::Map> map = made;
   TrackChooser chooser({}, map, std::make_shared<const track::Ways>(*map));
   chooser.follow({{1, 490, track::Direction::forward}, 3, 3, 0.5});
@@ -332,10 +333,11 @@ TEST(TrackChooser, ABaliseBelowTheTrainTellsTheLegWhereTheyAreApart) {
     return *chooser.choice();
   };
   EXPECT_LT(sight_at(25).options.front().probability, 0.95) << "2 m apart";
-  const auto one = sight_at(250);
-  EXPECT_EQ(one.options.front().place.edge, 2U);
-  EXPECT_GT(one.options.front().probability, 0.99);
-  EXPECT_FALSE(one.known && one.options.front().probability > 0.9999);
+  sight_at(250);
+  const auto group = sight_at(253);
+  EXPECT_EQ(group.options.front().place.edge, 2U);
+  EXPECT_GT(group.options.front().probability, 0.97);
+  EXPECT_FALSE(group.known) << "the map may have one group on the wrong track";
   EXPECT_TRUE(sight_at(400).known);
 }
 
