@@ -65,6 +65,10 @@ void MapMatcher::forget_place() {
   silence_ = {};
   curvature_.reset();
   exits_.reset();
+  forget_track();
+}
+
+void MapMatcher::forget_track() {
   if (chooser_) chooser_.emplace(parameters_.track_parameters(), map_, ways_);
   if (beside_) beside_->begin_anew();
   moved_ns_ = 0;
@@ -87,13 +91,13 @@ PlaceFixes MapMatcher::add(const StateInput& state) {
   if (before && before->standstill && state.standstill) stand(before->placed.stamp_ns, state.placed.stamp_ns);
   if (!state.track_known && before && before->track_known) forget_place();
   search_.follow(state.track_known, state.usable);
-  if (landmarks_ && before && !counts_on(before->placed, state.placed)) {
-    landmarks_->forget();
-    if (beside_) beside_->begin_anew();
-  }
+  const bool anew = before && !counts_on(before->placed, state.placed);
+  if (landmarks_ && anew) landmarks_->forget();
   if (before && core::seconds(state.placed.stamp_ns - before->placed.stamp_ns) > FollowedPath::kOldStateS)
     silence_.begin_way();
+  const auto path = followed_ ? followed_->path() : nullptr;
   trouble_ = trouble_at(state);
+  if (anew && followed_ && followed_->path() != path) forget_track();  // somebody has told another one
   PlaceFixes fixes;
   if (chooser_ && state_ && state.track_known) follow_without_camera(fixes);
   return fixes;

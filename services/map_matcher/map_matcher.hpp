@@ -57,6 +57,7 @@ class MapMatcher {
 
  private:
   void forget_place();
+  void forget_track();
   [[nodiscard]] std::string trouble_at(const StateInput& state);
   [[nodiscard]] std::string placeless() const;
   core::Status follow(const StateInput& state);

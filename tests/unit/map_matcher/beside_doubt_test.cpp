@@ -60,17 +60,17 @@ class Beside : public testing::TestWithParam<bool> {
   }
   [[nodiscard]] StateInput state() const {
     StateInput state;
-    const bool against = GetParam();
+    const bool against = GetParam() && edge_ == kTold;
     state.placed.stamp_ns = stamp_ns_;
-    state.placed.place = {kTold, against ? kLengthM - at_m_ : at_m_,
+    state.placed.place = {edge_, against ? kLengthM - at_m_ : at_m_,
                           against ? track::Direction::reverse : track::Direction::forward};
     state.placed.speed_mps = kSpeedMps;
-    state.placed.distance_m = at_m_;
+    state.placed.distance_m = at_m_ - count_from_m_;
     state.placed.over_m = behind_m_;
     state.placed.under_m = ahead_m_;
     state.sigma_m = 1;
     state.track_probability = probability_;
-    state.easting_m = kApartM;
+    state.easting_m = edge_ == kTold ? kApartM : 0;
     state.northing_m = at_m_;
     state.track_known = state.usable = true;
     state.gnss_agrees = true;
@@ -82,7 +82,7 @@ class Beside : public testing::TestWithParam<bool> {
       if (fix.kind != FixKind::track) continue;
       probability_ = fix.options.front().probability;
       fits_ = fix.sightings_fit;
-      EXPECT_EQ(fix.options.front().place.edge, kTold);
+      EXPECT_EQ(fix.options.front().place.edge, edge_);
     }
   }
 
@@ -90,6 +90,8 @@ class Beside : public testing::TestWithParam<bool> {
   std::optional<MapMatcher> matcher_{std::in_place, MapMatcherParameters{}, map_};
   double at_m_ = 100;
   int64_t stamp_ns_ = core::kNsPerSecond;
+  uint32_t edge_ = kTold;
+  double count_from_m_ = 0;
   double behind_m_ = 5;
   double ahead_m_ = 5;
   double probability_ = 1;
@@ -109,6 +111,20 @@ TEST_P(Beside, BalisesOfTheNeighbourTakeTheToldTrackAwayAndOnesOfItsOwnGiveItBac
   EXPECT_EQ(fits_, SightingsFit::not_told) << "the place along the track is right";
   EXPECT_THAT(matcher_->trouble(), HasSubstr("told on the wrong track"));
   for (const double at_m : {4200.0, 5700.0, 7200.0, 8700.0}) sight(LandmarkKind::balise, at_m);
+  EXPECT_GE(probability_, 0.999);
+  EXPECT_EQ(matcher_->trouble(), "");
+}
+
+// A fusion that is started anew counts from 0 and is handed the place; an operator tells another track.
+TEST_P(Beside, AFusionThatIsStartedAnewKeepsTheDoubtAndAnotherTrackThatIsToldEndsIt) {
+  for (const double at_m : {500.0, 2000.0, 3500.0}) sight(LandmarkKind::balise, at_m);
+  count_from_m_ = at_m_;
+  run_to(at_m_ + 200);
+  EXPECT_LT(probability_, 0.5);
+  edge_ = 1;
+  probability_ = 1;
+  count_from_m_ = at_m_;
+  run_to(at_m_ + 200);
   EXPECT_GE(probability_, 0.999);
   EXPECT_EQ(matcher_->trouble(), "");
 }
