@@ -22,13 +22,17 @@ std::vector<NearTrack> TracksBeside::abeam(double easting_m, double northing_m) 
   return near;
 }
 
-std::vector<NearTrack> TracksBeside::beside(const EdgePosition& place) const {
+std::vector<TrackBeside> TracksBeside::beside(const EdgePosition& place) const {
   const auto* edge = map_->edge(place.edge);
   if (edge->is_drawn) return {};
   const auto pose = edge->alignment.at(place.offset_m).pose;
-  auto near = abeam(pose.easting_m, pose.northing_m);
-  std::erase_if(near, [&](const NearTrack& one) { return one.edge == place.edge; });
-  return near;
+  std::vector<TrackBeside> tracks;
+  for (const NearTrack& near : abeam(pose.easting_m, pose.northing_m)) {
+    if (near.edge == place.edge) continue;
+    const auto there = map_->edge(near.edge)->alignment.at(near.offset_m).pose;
+    tracks.push_back({near, there.heading_rad - pose.heading_rad});
+  }
+  return tracks;
 }
 
 bool TracksBeside::many_at(double easting_m, double northing_m) const {
@@ -36,13 +40,11 @@ bool TracksBeside::many_at(double easting_m, double northing_m) const {
 }
 
 bool TracksBeside::has_alike(const Landmark& landmark) const {
-  const double here_rad = map_->edge(landmark.edge)->alignment.at(landmark.offset_m).pose.heading_rad;
-  return std::ranges::any_of(beside({landmark.edge, landmark.offset_m}), [&](const NearTrack& near) {
-    const double there_rad = map_->edge(near.edge)->alignment.at(near.offset_m).pose.heading_rad;
-    const double side = std::cos(there_rad - here_rad) < 0 ? -1.0 : 1.0;
-    return std::ranges::any_of(map_->landmarks_on(near.edge), [&](const Landmark* other) {
+  return std::ranges::any_of(beside({landmark.edge, landmark.offset_m}), [&](const TrackBeside& track) {
+    const double side = std::cos(track.turned_rad) < 0 ? -1.0 : 1.0;
+    return std::ranges::any_of(map_->landmarks_on(track.edge), [&](const Landmark* other) {
       return seen_along(other->kind, side > 0) == landmark.kind &&
-             std::abs(other->offset_m - near.offset_m) < kAlongAlikeM &&
+             std::abs(other->offset_m - track.offset_m) < kAlongAlikeM &&
              std::abs(side * other->lateral_m - landmark.lateral_m) < kAcrossAlikeM;
     });
   });

@@ -9,6 +9,11 @@
 
 namespace railfix::track {
 
+/// Abeam of a place on another track.
+struct TrackBeside : NearTrack {
+  double turned_rad = 0;  // of growing offsets there, against those at the place
+};
+
 /// Read from one thread.
 class TracksBeside {
  public:
@@ -17,7 +22,7 @@ class TracksBeside {
 
   /// The other tracks within 15 m of the place, abeam of it. Drawings (edges that lie nowhere) say nothing of that:
   /// none. REQUIRES: the edge is on the map.
-  [[nodiscard]] std::vector<NearTrack> beside(const EdgePosition& place) const;
+  [[nodiscard]] std::vector<TrackBeside> beside(const EdgePosition& place) const;
   [[nodiscard]] bool any_at(const EdgePosition& place) const { return !beside(place).empty(); }
   /// More than one track runs within 15 m of the point (metres of the map).
   [[nodiscard]] bool many_at(double easting_m, double northing_m) const;

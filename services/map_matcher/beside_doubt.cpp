@@ -6,18 +6,10 @@
 namespace railfix::map_matcher {
 namespace {
 
-using track::LandmarkKind;
-
-constexpr double kOneThingM = 30;   // what is so near together, balises of a group, the map has wrong together
-constexpr double kOwnRailsM = 1.0;  // further to the side it is no train's own
-constexpr double kMostOfOne = 20;   // maps err about single ones: three speak louder than any one
+constexpr double kMostOfOne = 20;  // maps err about single ones: three speak louder than any one
 constexpr double kLeastOdds = 5e-5;
 constexpr double kMostOdds = 99;          // less than would declare another leg for who begins with the rest
 constexpr double kAlongsideCosine = 0.9;  // lines that cross are not beside
-
-bool lies_in_track(LandmarkKind kind, double lateral_m) {
-  return (kind == LandmarkKind::balise || kind == LandmarkKind::frog) && std::abs(lateral_m) < kOwnRailsM;
-}
 
 }  // namespace
 
@@ -29,7 +21,6 @@ void BesideDoubt::begin_anew() {
 // Where both tracks have one it says nothing, nor where neither has.
 void BesideDoubt::sight(const track::Path& followed, const Sighting& sighting, const Prior& prior) {
   const double run_m = prior.travelled_m + sighting.distance_ahead_m;
-  if (!lies_in_track(sighting.kind, sighting.lateral_m)) return;
   if (weighed_m_ && std::abs(run_m - *weighed_m_) < kOneThingM) return;
   const double place_m = prior.path_distance_m + sighting.distance_ahead_m;
   const double margin_m = parameters_.window_margin_m + parameters_.moved_m + 3 * sighting.sigma_m;
@@ -47,11 +38,10 @@ void BesideDoubt::sight(const track::Path& followed, const Sighting& sighting, c
 }
 
 bool BesideDoubt::is_beside(const track::Map& map, const track::EdgePosition& place, const Window& window) const {
-  const double heading_rad = map.edge(place.edge)->alignment.at(place.offset_m).pose.heading_rad;
-  return std::ranges::any_of(tracks_->beside(place), [&](const track::NearTrack& track) {
-    const double turned_rad = map.edge(track.edge)->alignment.at(track.offset_m).pose.heading_rad - heading_rad;
-    if (std::abs(std::cos(turned_rad)) < kAlongsideCosine) return false;
-    const bool forward = (std::cos(turned_rad) > 0) == (place.direction != track::Direction::reverse);
+  return std::ranges::any_of(tracks_->beside(place), [&](const track::TrackBeside& track) {
+    const double along = std::cos(track.turned_rad);
+    if (std::abs(along) < kAlongsideCosine) return false;
+    const bool forward = (along > 0) == (place.direction != track::Direction::reverse);
     const double from_m = track.offset_m - (forward ? window.behind_m : window.ahead_m);
     const double to_m = track.offset_m + (forward ? window.ahead_m : window.behind_m);
     return std::ranges::any_of(map.landmarks_on(track.edge), [&](const track::Landmark* mark) {

@@ -17,7 +17,7 @@ class BesideDoubt {
   BesideDoubt(const LandmarkParameters& parameters, std::shared_ptr<const track::TracksBeside> tracks)
       : parameters_(parameters), tracks_(std::move(tracks)) {}
 
-  /// Only balises and frogs say something. REQUIRES: the prior is usable and not in doubt, and its track is declared.
+  /// REQUIRES: it lies_in_track(); the prior is usable and not in doubt, and its track is declared.
   void sight(const track::Path& followed, const Sighting& sighting, const Prior& prior);
   /// What was sighted is of another ride.
   void begin_anew();

@@ -9,7 +9,6 @@ namespace {
 
 constexpr int kFewest = 6;            // unsighted in a row: with one in five missed once in 15,000
 constexpr double kShortestM = 2000;   // from the first to the last: more than one station, or masts in one dark stretch
-constexpr double kOneThingM = 30;     // landmarks of a kind so near together, balises of a group, are missed together
 constexpr double kSightedNearM = 10;  // of the window
 constexpr double kWayBackM = 50;      // is one; less may be the place that was corrected
 

@@ -298,7 +298,8 @@ double MapMatcher::place_doubt() const {
 // Where the track is open, or another one is to be followed, the chooser has weighed them; where the place is in doubt
 // the window is elsewhere.
 void MapMatcher::compare_with_beside(const Sighting& sighting, const Prior& prior) {
-  const auto choice = chooser_ ? chooser_->choice() : std::nullopt;
+  if (!chooser_ || !lies_in_track(sighting.kind, sighting.lateral_m)) return;
+  const auto choice = chooser_->choice();
   if (choice && choice->known && place_doubt() == 0 && is_followed(choice->options.front().place))
     beside_->sight(*followed_->path(), sighting, prior);
 }
@@ -307,8 +308,9 @@ void MapMatcher::compare_with_beside(const Sighting& sighting, const Prior& prio
 double MapMatcher::share_of_followed(uint32_t landmark) const {
   const auto* seen = map_->landmark(landmark);
   if (!chooser_ || seen == nullptr) return 1;
-  const double doubt = tracks_beside_->has_alike(*seen) ? 0 : beside_->probability();
-  return chooser_->share_of(*seen) * (1 - doubt);
+  const double beside = beside_->probability();
+  const bool doubted = beside > 0 && !tracks_beside_->has_alike(*seen);
+  return chooser_->share_of(*seen) * (doubted ? 1 - beside : 1);
 }
 
 bool MapMatcher::is_followed(const track::EdgePosition& place) const {

@@ -17,6 +17,15 @@ struct Sighting {
   double confidence = 0;
 };
 
+/// Landmarks of a kind so near together, balises of a group, are missed together, and the map has them wrong together.
+inline constexpr double kOneThingM = 30;
+/// Between a train's own rails: nobody sees it there from the track beside.
+constexpr bool lies_in_track(track::LandmarkKind kind, double lateral_m) {
+  constexpr double kOwnRailsM = 1.0;
+  const bool in_track = kind == track::LandmarkKind::balise || kind == track::LandmarkKind::frog;
+  return in_track && lateral_m > -kOwnRailsM && lateral_m < kOwnRailsM;
+}
+
 enum class TurnSensor : uint8_t { camera, gyro };
 
 inline constexpr double kLeastWayM = 1e-5;  // a train that stands turns nothing

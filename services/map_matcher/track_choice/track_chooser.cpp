@@ -19,12 +19,15 @@ constexpr double kSamePlaceM = 1.0;
 constexpr double kAtEndM = 0.5;
 constexpr double kNoLagShare = 0.3;      // of the cars
 constexpr double kViewNoisePerM = 3e-4;  // least sigma of a picture's curvature
-constexpr double kOwnRailsM = 1.0;       // a balise is in the middle of them
 constexpr double kApartM = 2.5;          // tracks further apart than that share no rails
-constexpr double kOneGroupM = 30;        // the map has the balises of a group wrong together
 constexpr double kAlikeM = 3;            // along the track
 constexpr double kOthersBalise = 0.01;   // chance that it is another track's all the same
 constexpr double kWatched = 0.9;         // a begin less probable lies behind a switch that nobody watched
+
+double apart_m(const track::Map& map, const track::EdgePosition& a, const track::EdgePosition& b) {
+  const auto at = [&](const track::EdgePosition& p) { return map.edge(p.edge)->alignment.at(p.offset_m).pose; };
+  return std::hypot(at(a).easting_m - at(b).easting_m, at(a).northing_m - at(b).northing_m);
+}
 
 }  // namespace
 
@@ -89,10 +92,7 @@ bool TrackChooser::on_guess() const {
 
 bool TrackChooser::stands_near(const track::EdgePosition& place) const {
   if (hypotheses_.empty()) return false;
-  const auto at = [&](const track::EdgePosition& p) { return map_->edge(p.edge)->alignment.at(p.offset_m).pose; };
-  const auto mine = at(hypotheses_.front().route.position_at(place_m_));
-  const auto its = at(place);
-  return std::hypot(mine.easting_m - its.easting_m, mine.northing_m - its.northing_m) < kFarFromWindowM;
+  return apart_m(*map_, hypotheses_.front().route.position_at(place_m_), place) < kFarFromWindowM;
 }
 
 void TrackChooser::move(const Turn& turn) {
@@ -237,10 +237,11 @@ void TrackChooser::sight(const Sighting& sighting) {
   std::vector<double> fits;
   for (const auto& hypothesis : hypotheses_)
     fits.push_back(std::log(sighting_fits(*map_, hypothesis.route, seen, parameters_)));
-  const bool below_train = sighting.kind == track::LandmarkKind::balise && std::abs(sighting.lateral_m) < kOwnRailsM;
+  const bool below_train =
+      sighting.kind == track::LandmarkKind::balise && lies_in_track(sighting.kind, sighting.lateral_m);
   if (!below_train || !are_apart_at(seen.at_m)) {
     use_picture(fits);
-  } else if (!sure_m_ || std::abs(seen.at_m - *sure_m_) > kOneGroupM) {
+  } else if (!sure_m_ || std::abs(seen.at_m - *sure_m_) > kOneThingM) {
     sure_m_ = seen.at_m;
     use_sure(fits);
   }
@@ -264,15 +265,14 @@ double TrackChooser::share_of(const track::Landmark& landmark) const {
 }
 
 bool TrackChooser::are_apart_at(double at_m) const {
-  std::map<uint32_t, track::PlanPose> tracks;
+  std::map<uint32_t, track::EdgePosition> tracks;
   for (const auto& hypothesis : hypotheses_) {
     const auto place = hypothesis.route.position_at(at_m);
-    tracks.try_emplace(place.edge, map_->edge(place.edge)->alignment.at(place.offset_m).pose);
+    tracks.try_emplace(place.edge, place);
   }
   for (auto one = tracks.begin(); one != tracks.end(); ++one) {
     for (auto other = std::next(one); other != tracks.end(); ++other) {
-      const auto& [a, b] = std::pair(one->second, other->second);
-      if (std::hypot(a.easting_m - b.easting_m, a.northing_m - b.northing_m) < kApartM) return false;
+      if (apart_m(*map_, one->second, other->second) < kApartM) return false;
     }
   }
   return true;

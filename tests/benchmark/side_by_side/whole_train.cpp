@@ -52,8 +52,9 @@ class WholeTrain {
       match_sightings();
       use_fixes();
       if (!estimate_) continue;
-      judge_state();
-      judge_report();
+      const auto position = tpr_publisher::position_of(ride_.map.get(), state_);
+      judge_state(position.place_known() && position.track_declared());
+      judge_report(position);
     }
     return tally_;
   }
@@ -139,10 +140,8 @@ class WholeTrain {
     }
   }
 
-  void judge_state() {
+  void judge_state(bool declared) {
     const auto& e = *estimate_;
-    const bool declared = e.track_known && e.track_probability >= track::kDeclaredProbability &&
-                          e.integrity != fusion::Integrity::unusable;
     ++tally_.states;
     tally_.ok += e.integrity == fusion::Integrity::ok ? 1 : 0;
     if (!declared) {
@@ -164,8 +163,8 @@ class WholeTrain {
     const double length_m = ride_.map->edge(e.position.edge)->alignment.length_m();
     return std::min(e.position.offset_m, length_m - e.position.offset_m) < e.over_m + e.under_m + 1;
   }
-  void judge_report() {
-    const auto outcome = reports_.update(tpr_publisher::position_of(ride_.map.get(), state_), stamp_ns_);
+  void judge_report(const tpr_publisher::TrainPosition& position) {
+    const auto outcome = reports_.update(position, stamp_ns_);
     if (!outcome.report) return;
     const auto& fields = outcome.report->fields;
     const auto distance_m = etcs::metres_if_known(fields.d_lrbg, fields.q_scale);
