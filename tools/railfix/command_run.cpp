@@ -152,7 +152,7 @@ void add_run(CLI::App& app, Action& chosen) {
           "lossless: next picture when all have used the last; real: recorded rate, as always without pictures")
       ->check(CLI::IsMember({"real", "lossless"}))
       ->capture_default_str();
-  command->add_option("--out", options->out, "Folder for the results")->required();
+  command->add_option("--out", options->out, "Folder for the results, without a run in it")->required();
   command->add_option("--state", options->state,
                       "Folder of what a train keeps from trip to trip: this run begins with it and adds to it");
   command->add_flag("--camera-only", options->camera_only, "Leave out wheel, IMU and GNSS");

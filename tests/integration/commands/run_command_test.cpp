@@ -23,7 +23,7 @@ class RunCommand : public testing::TemporaryFolder {
   }
 };
 
-TEST_F(RunCommand, TwoAtOnceIntoOneFolderAreNotTaken) {
+TEST_F(RunCommand, TwoIntoOneFolderAreNotTaken) {
   for (int second = 0; second < 300; ++second)
     write_picture("pictures/" + std::to_string(1000 + second) + ".png", second % 256);
   test::Program first(run("pictures", {"--fps", "1", "--pace", "real"}), {root_ / "said", {}, {}});
@@ -40,6 +40,10 @@ TEST_F(RunCommand, TwoAtOnceIntoOneFolderAreNotTaken) {
   EXPECT_FALSE(first.exit_code()) << test::slurp(root_ / "said");
 
   first.end(SIGKILL);
+  expect_refusal(test::run_program(run("pictures"), kPatienceS),
+                 path("out") + " holds a run already; remove it, or give another --out");
+  EXPECT_EQ(test::slurp(root_ / "out/run.yaml"), settings);
+  fs::remove_all(root_ / "out");
   expect_refusal(test::run_program(run("pictures", {"--start", "1:1"}), kPatienceS), "--start 1:1 needs a map");
 }
 

@@ -14,6 +14,7 @@
 namespace railfix::tool {
 namespace {
 
+constexpr const char* kConfigFile = "run.yaml";
 constexpr double kKeepFreeMb = 50;
 constexpr double kBytesPerMb = 1e6;
 
@@ -164,11 +165,18 @@ core::Status check_without_camera(const RunOptions& options) {
   return {};
 }
 
+// Its recording would be lost, and what a broken run leaves would be judged with its tables.
+core::Status check_unused(const std::filesystem::path& folder) {
+  if (!std::filesystem::exists(folder / kConfigFile)) return {};
+  return core::Error{folder.string() + " holds a run already; remove it, or give another --out"};
+}
+
 /// The rest of the plan, in folders that are there.
 core::Status plan_in_folder(const RunOptions& options, RunPlan& plan) {
   auto lock = FolderLock::take(options.out);
   if (!lock.ok()) return core::Error{"--out: " + lock.error().message};
   plan.lock = std::move(lock).value();
+  if (const auto unused = check_unused(options.out); !unused.ok()) return unused.error();
   plan.train_id = "run-" + std::to_string(getpid());
   const auto map = prepare_map(options);
   if (!map.ok()) return map.error();
@@ -177,7 +185,7 @@ core::Status plan_in_folder(const RunOptions& options, RunPlan& plan) {
 
   auto settings = load_settings(options.config);
   if (!settings.ok()) return settings.error();
-  plan.config = std::filesystem::absolute(options.out / "run.yaml");
+  plan.config = std::filesystem::absolute(options.out / kConfigFile);
   fill_settings(settings.value(), options, plan);
   add_overrides(settings.value(), options.sets);
   if (const auto room = check_room(settings.value(), options.out); !room.ok()) return room.error();
