@@ -34,6 +34,11 @@ const char* name_in_reason(Sensor sensor) {
   }
 }
 
+bool only_told(const std::string& reason) {
+  return reason.find("GNSS alone has told the place") != std::string::npos ||
+         reason.find("the place was only told") != std::string::npos;
+}
+
 class Judge {
  public:
   Judge(const TrainSimulation& simulation, double after_m, const Watcher& watcher)
@@ -75,6 +80,7 @@ class Judge {
     ++verdict_.wider;
     verdict_.wider_unsaid += ok ? 1 : 0;
     verdict_.wider_placeless += state.track_known ? 0 : 1;
+    verdict_.wider_first += state.track_known && only_told(state.reason) ? 1 : 0;
     verdict_.wider_alone += state.reason == "interval wider than allowed" ? 1 : 0;
   }
 
@@ -115,6 +121,7 @@ void Verdict::add(const Verdict& other) {
   wider += other.wider;
   wider_unsaid += other.wider_unsaid;
   wider_placeless += other.wider_placeless;
+  wider_first += other.wider_first;
   wider_alone += other.wider_alone;
   not_ok += other.not_ok;
   told += other.told;

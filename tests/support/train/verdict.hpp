@@ -20,6 +20,7 @@ struct Verdict {
   size_t wider = 0;             // interval beyond 5 m + 5 % of the way since the last sure reference ...
   size_t wider_unsaid = 0;      // ... while the state says ok
   size_t wider_placeless = 0;   // ... while it claims no place on the map
+  size_t wider_first = 0;       // ... before the first reference: no landmark has confirmed the place that was told
   size_t wider_alone = 0;       // ... while it names nothing else that is wrong
   size_t not_ok = 0;            // degraded or unusable
   size_t told = 0;              // states that name the faulty sensor while its fault lasts
