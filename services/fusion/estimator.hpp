@@ -114,6 +114,8 @@ class Estimator {
   void place_like(const Estimator& other);
   /// The train may be so far beyond the interval's ends, until a fix says where it is.
   void doubt_place(const Sides& beyond);
+  /// Its last reference lies so far back.
+  void refer_back(double since_reference_m) { filter_.mark_reference(since_reference_m); }
   /// Others promise so much more than this one: a fix that it uses must not be weighed against its sigma alone.
   void contradicted_by(double excess_m) { excess_m_ = excess_m; }
   /// The state with this promised interval; since_sure_m: way since the last place that is beyond doubt.

@@ -50,13 +50,15 @@ void Hypotheses::adopt(Rival& rival) {
   for (auto& other : rivals_) other.forget_excess();
 }
 
-// A doubter that went by the sensor which is wrong goes by the others from now on, and what it held stays.
+// A doubter that went by the sensor which is wrong goes by the others from now on, and what it held stays, and what it
+// did without is no surer now.
 void Hypotheses::take_along(Doubter& doubter, const Estimator& next) const {
   Estimator own = doubter.estimator;
   own.predict_to(main_.filter().stamp_ns());
   const Sides more = beyond(main_.interval(), own.interval());
   doubter.estimator = next;
   doubter.estimator.doubt_place(more);
+  doubter.estimator.refer_back(own.since_reference_m());
 }
 
 void Hypotheses::confirm_rivals(bool unexpected) {

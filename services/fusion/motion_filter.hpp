@@ -73,8 +73,8 @@ class MotionFilter {
   /// Remembers the odometer at the current stamp; forgets clones of older pictures but `keep_ns`.
   void clone_now(int64_t keep_ns);
   [[nodiscard]] bool has_clone(int64_t stamp_ns) const { return clone_index(stamp_ns).has_value(); }
-  /// Makes the current place the reference: since_reference counts from here.
-  void mark_reference() { reference_m_ = value(StateIndex::distance); }
+  /// Makes the current place the reference: since_reference counts from here, or from so far before it.
+  void mark_reference(double before_m = 0) { reference_m_ = value(StateIndex::distance) - before_m; }
 
   Offer offer_step(int64_t reference_stamp_ns, double step_m, double sigma_m, double gate);
   /// A speed in camera metres.
