@@ -1,4 +1,5 @@
-// Runs of railfix-measure-confidence in which the train was once outside the promised interval, and why.
+// Runs of railfix-measure-confidence in which the train was once outside the promised interval, or that was wider than
+// allowed, and why.
 #include <gtest/gtest.h>
 
 #include "support/train/verdict.hpp"
@@ -22,6 +23,7 @@ struct CampaignRun {
   bool start_told = true;
   bool wheel = true;
   double mean_length_m = 1e9;  // of the interval, at most
+  double wider_share = 1;      // of the states whose interval is wider than allowed, at most
 };
 
 void PrintTo(const CampaignRun& run, std::ostream* out) {
@@ -49,7 +51,9 @@ TEST_P(OnceOutside, HoldsTheTruth) {
   auto fusion = core::value_or_throw(Fusion::create({}, simulation.map, simulation.start()));
   const auto verdict = train::judge(simulation, fusion);
   EXPECT_EQ(verdict.outside, 0U);
-  EXPECT_LT(verdict.width_sum_m / static_cast<double>(verdict.states), run.mean_length_m);
+  const auto states = static_cast<double>(verdict.states);
+  EXPECT_LT(verdict.width_sum_m / states, run.mean_length_m);
+  EXPECT_LE(static_cast<double>(verdict.wider) / states, run.wider_share);
 }
 
 const std::vector<CampaignRun> kRuns{
@@ -246,6 +250,15 @@ const std::vector<CampaignRun> kRuns{
      .number = 1214,
      .sensor = Sensor::fix,
      .kind = FaultKind::noise},
+    // A wheel is found to slip right behind a landmark that nothing has confirmed. What did without the landmark lost
+    // its last reference over that, so that the interval, which holds it, was compared with the budget of the landmark:
+    // wider than allowed in 27 % of the states.
+    {.name = "ALandmarkThatIsNotSureYetBeginsNoBudget",
+     .seed = 3661,
+     .number = 28,
+     .sensor = Sensor::none,
+     .kind = FaultKind::none,
+     .wider_share = 0},
 };
 
 INSTANTIATE_TEST_SUITE_P(Runs, OnceOutside, ::testing::ValuesIn(kRuns), [](const auto& run) { return run.param.name; });
