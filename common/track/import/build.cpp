@@ -253,7 +253,8 @@ class Sources {
     const bool alone = map_.edges.empty();
     append(network.draft, map_);
     if (alone) add_frogs(map_, kMappingFrogSigmaM);
-    std::move(network.problems.begin(), network.problems.end(), std::back_inserter(map_.problems));
+    std::ranges::move(network.cuts, std::back_inserter(cuts_));
+    std::ranges::move(network.problems, std::back_inserter(map_.problems));
     out_.osm.include(network.figures);
     take(std::move(network.fit));
   }

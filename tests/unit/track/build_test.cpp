@@ -167,14 +167,23 @@ TEST_F(BuildTest, TramsOnlyWhereAskedFor) {
   EXPECT_EQ(core::value_or_throw(build_map({file}, {.with_trams = true})).map.edges.size(), 1U);
 }
 
-TEST_F(BuildTest, NodesThatAreMissingAreTold) {
-  const auto file =
-      write("m.json",
-            R"({"elements":[{"type":"node","id":1,"lat":48.2,"lon":15.6},{"type":"node","id":2,"lat":48.2,"lon":15.61},
-    {"type":"way","id":5,"nodes":[1,2,3],"tags":{"railway":"rail"}}]})");
-  const Map map = core::value_or_throw(build_map({file}, {})).map;
-  EXPECT_EQ(map.edges.size(), 1U);
-  EXPECT_THAT(map.problems, testing::Contains(HasSubstr("way 5 names 1 node")));
+TEST_F(BuildTest, NodesThatAreMissingAreToldInOneSentence) {
+  const auto problems = [&](int ways) {
+    std::string text = R"({"elements":[{"type":"node","id":1,"lat":48.2,"lon":15.6})";
+    for (int id = 5; id < 5 + ways; ++id) {
+      text += R"(,{"type":"node","id":)" + std::to_string(id) + R"(,"lat":48.2,"lon":15.6)" + std::to_string(id) +
+              R"(},{"type":"way","id":)" + std::to_string(id) + R"(,"nodes":[1,)" + std::to_string(id) +
+              R"(,3],"tags":{"railway":"rail"}})";
+    }
+    return core::value_or_throw(build_map({write("m.json", text + "]}")}, {})).map.problems;
+  };
+  EXPECT_THAT(problems(1),
+              testing::ElementsAre("way 5 names 1 node that the data do not hold; the tracks have gaps there: extract "
+                                   "the ways together with their nodes, from Overpass by (._;>;); or by out geom;"));
+  const std::vector<std::string> told = problems(7);
+  EXPECT_THAT(told.front(),
+              HasSubstr("way 5, way 6, way 7, way 8, way 9 and 2 more ways name 7 nodes that the data do not hold"));
+  EXPECT_EQ(std::ranges::count_if(told, [](const auto& one) { return one.find("do not hold") != one.npos; }), 1);
 }
 
 TEST_F(BuildTest, WhatCutsTheNetworkIsToldFirst) {

@@ -19,6 +19,9 @@ namespace {
 constexpr size_t kPointsForSigma = 12;
 constexpr double kLeastUsualSigmaM = 0.05;
 constexpr double kTangentBranchRad = core::kPi / 6.0;
+constexpr size_t kMostNamed = 5;
+constexpr const char* kAskForNodes =
+    "extract the ways together with their nodes, from Overpass by (._;>;); or by out geom;";
 
 struct Segment {
   int64_t a = 0;
@@ -62,8 +65,10 @@ class Builder {
 
   void collect_segments() {
     std::set<std::pair<int64_t, int64_t>> seen;
+    size_t missing = 0;
+    std::vector<int64_t> lacking;  // ways
     for (size_t way = 0; way < data_.ways.size(); ++way) {
-      size_t missing = 0;
+      const size_t missing_before = missing;
       int64_t before = 0;
       bool has_before = false;
       for (const int64_t node : data_.ways[way].nodes) {
@@ -81,11 +86,20 @@ class Builder {
         before = node;
         has_before = true;
       }
-      if (missing > 0) {
-        out_.problems.push_back("way " + std::to_string(data_.ways[way].id) + " names " + std::to_string(missing) +
-                                " nodes that the data do not hold");
-      }
+      if (missing > missing_before) lacking.push_back(data_.ways[way].id);
     }
+    if (missing > 0) out_.cuts.push_back(told_missing(lacking, missing));
+  }
+
+  /// One sentence for all: of a region that is cut out, every way over its border lacks nodes.
+  static std::string told_missing(const std::vector<int64_t>& ways, size_t nodes) {
+    std::string names;
+    const size_t named = std::min(kMostNamed, ways.size());
+    for (size_t i = 0; i < named; ++i) names += (i == 0 ? "way " : ", way ") + std::to_string(ways[i]);
+    if (ways.size() > named) names += " and " + std::to_string(ways.size() - named) + " more ways";
+    return names + (ways.size() == 1 ? " names " : " name ") + std::to_string(nodes) +
+           (nodes == 1 ? " node" : " nodes") +
+           " that the data do not hold; the tracks have gaps there: " + kAskForNodes;
   }
 
   bool place(int64_t node) {
@@ -351,8 +365,7 @@ std::string lack_of_nodes(const OsmData& data) {
            std::to_string(first.nodes.size()) + " on the earth); a line needs two or more";
   }
   return "no railway track has two of its nodes in the data (of way " + std::to_string(first.id) + " they hold " +
-         std::to_string(held(first)) + " of " + std::to_string(first.nodes.size()) +
-         "); extract the ways together with their nodes, from Overpass by (._;>;); or by out geom;";
+         std::to_string(held(first)) + " of " + std::to_string(first.nodes.size()) + "); " + kAskForNodes;
 }
 
 std::optional<GeoPoint> middle_of(const OsmData& data) {
