@@ -63,6 +63,9 @@ std::vector<OsmWay>* ways_for(OsmData& data, const OsmTags& tags, bool with_tram
 /// file only.
 core::Result<OsmData> read_osm(const std::filesystem::path& file, bool with_trams);
 
+/// The id of a node that its source gives none: both coordinates to 1e-7 degree, as OpenStreetMap stores them.
+int64_t id_of_place(const GeoPoint& place);
+
 /// Overpass JSON ("elements", the places of nodes in their own or by `out geom;` in the ways) or GeoJSON ("features").
 /// GeoJSON has no nodes: equal coordinates (1e-7 degree) are one node.
 core::Result<OsmData> read_osm_json(const std::filesystem::path& file, bool with_trams);

@@ -92,13 +92,6 @@ GeoPoint place_of(const json& lat_lon) {
   return {degrees_in(member(lat_lon, "lat")), degrees_in(member(lat_lon, "lon"))};
 }
 
-/// GeoJSON coordinates as a node identity: both to 1e-7 degree, as OpenStreetMap stores them.
-int64_t identity(const GeoPoint& place) {
-  const auto lat = static_cast<int64_t>(std::llround((place.lat_deg + 90.0) * 1e7));
-  const auto lon = static_cast<int64_t>(std::llround((place.lon_deg + 180.0) * 1e7));
-  return lat * 3'600'000'001 + lon;
-}
-
 /// Of a way; `out geom;` writes the places into it ("geometry", null where they were cut off) and the nodes may then be
 /// nowhere else.
 std::vector<int64_t> nodes_of(const json& way, OsmData& out) {
@@ -118,7 +111,7 @@ std::vector<int64_t> nodes_of(const json& way, OsmData& out) {
     const json& lat_lon = (*geometry)[i];
     const std::optional<GeoPoint> place = lat_lon.is_null() ? std::nullopt : std::optional(place_of(lat_lon));
     const bool is_there = place && plausible(*place);
-    if (!has_ids) nodes.push_back(is_there ? identity(*place) : kNowhere);
+    if (!has_ids) nodes.push_back(is_there ? id_of_place(*place) : kNowhere);
     if (is_there) out.nodes.try_emplace(nodes[i], OsmNode{*place, {}});
   }
   return nodes;
@@ -204,7 +197,7 @@ class FeatureReader {
     if (type == "Point") {
       const GeoPoint place = place_in(coordinates);
       if (is_on_earth(place)) {
-        out_.nodes[identity(place)] = {place, tags};
+        out_.nodes[id_of_place(place)] = {place, tags};
       } else {
         tell_elsewhere(1, coordinates, "");
       }
@@ -240,7 +233,7 @@ class FeatureReader {
     for (const json& pair : coordinates) {
       const GeoPoint place = place_in(pair);
       if (is_on_earth(place)) {
-        way.nodes.push_back(identity(place));
+        way.nodes.push_back(id_of_place(place));
         out_.nodes[way.nodes.back()].place = place;
       } else if (++elsewhere == 1) {
         first_elsewhere = &pair;
@@ -273,6 +266,12 @@ class FeatureReader {
 };
 
 }  // namespace
+
+int64_t id_of_place(const GeoPoint& place) {
+  const auto lat = static_cast<int64_t>(std::llround((place.lat_deg + 90.0) * 1e7));
+  const auto lon = static_cast<int64_t>(std::llround((place.lon_deg + 180.0) * 1e7));
+  return lat * 3'600'000'001 + lon;
+}
 
 core::Result<OsmData> read_osm_json(const std::filesystem::path& file, bool with_trams) {
   const auto wrong = [&](const std::string& why) {

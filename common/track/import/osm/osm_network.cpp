@@ -10,6 +10,7 @@
 #include "track/import/fit/smooth.hpp"
 #include "track/import/osm/osm_node_marks.hpp"
 #include "track/import/osm/osm_overbridges.hpp"
+#include "track/import/osm/osm_stray_nodes.hpp"
 #include "track/import/osm/osm_trackside.hpp"
 #include "track/import/told.hpp"
 
@@ -49,6 +50,7 @@ class Builder {
 
   OsmNetwork build() {
     collect_segments();
+    tell_stray_nodes();
     trace_chains();
     find_usual_sigma();
     gather_ends();
@@ -100,6 +102,28 @@ class Builder {
     return names + (ways.size() == 1 ? " names " : " name ") + std::to_string(nodes) +
            (nodes == 1 ? " node" : " nodes") +
            " that the data do not hold; the tracks have gaps there: " + kAskForNodes;
+  }
+
+  /// They stay where they are: nobody but the source knows where they belong.
+  void tell_stray_nodes() {
+    OsmNeighbours neighbours;
+    for (const auto& [node, segments] : at_node_) {
+      for (const size_t segment : segments) neighbours[node].push_back(other_end(segment, node));
+    }
+    const std::vector<StrayNode> stray = stray_nodes(places_, neighbours);
+    for (size_t i = 0; i < std::min(kMostNamed, stray.size()); ++i) {
+      const auto& [node, off_m] = stray[i];
+      const GeoPoint& at = data_.nodes.at(node).place;
+      out_.cuts.push_back((node == id_of_place(at) ? "the point" : "node " + std::to_string(node)) + " of way/" +
+                          std::to_string(data_.ways[segments_[at_node_.at(node).front()].way].id) + " at latitude " +
+                          told_number(at.lat_deg, 6) + ", longitude " + told_number(at.lon_deg, 6) + " lies " +
+                          told_m(off_m) +
+                          " off the line between its neighbours, as no track runs: correct its place in the source, or "
+                          "take it out of the way");
+    }
+    if (stray.size() > kMostNamed)
+      out_.cuts.push_back(std::to_string(stray.size() - kMostNamed) + " more nodes lie up to " +
+                          told_m(stray[kMostNamed].off_m) + " off the line between their neighbours");
   }
 
   bool place(int64_t node) {
@@ -328,7 +352,7 @@ class Builder {
   double usual_sigma_m_ = 0.3;
   std::vector<Segment> segments_;
   std::unordered_map<int64_t, std::vector<size_t>> at_node_;
-  std::unordered_map<int64_t, Eigen::Vector2d> places_;
+  OsmPlaces places_;
   std::vector<OsmChain> chains_;
   std::map<int64_t, std::vector<ChainEnd>> ends_;
   std::unordered_map<int64_t, size_t> node_index_;
