@@ -68,6 +68,37 @@ TEST_F(BuildTest, CoordinatesThatAreNoDegreesAreTold) {
               testing::Contains(HasSubstr("way/7: the coordinates [1e+300,48.0] are not degrees; left out")));
 }
 
+TEST_F(BuildTest, LatitudesThatAreLongitudesAreTold) {
+  constexpr const char* kTold = "latitude and longitude may be swapped";
+  EXPECT_THAT(message({write("a.geojson", track_of("[35.6,139.7],[35.61,139.7]"))}),
+              testing::EndsWith(std::string("way/7: the coordinates [35.6,139.7] and 1 more have a latitude beyond 90 "
+                                            "degrees, ") +
+                                kTold + "; GeoJSON coordinates are longitude, latitude in degrees (WGS 84)"));
+  for (const auto& file :
+       {write("a.osm", R"(<osm version="0.6"><node id="1" lat="139.7" lon="35.6"/><node id="2" lat="139.7" lon="35.61"/>
+<way id="7"><nd ref="1"/><nd ref="2"/><tag k="railway" v="rail"/></way></osm>)"),
+        write("a.json", R"({"elements":[{"type":"node","id":1,"lat":139.7,"lon":35.6},
+{"type":"node","id":2,"lat":139.7,"lon":35.61},{"type":"way","id":7,"nodes":[1,2],"tags":{"railway":"rail"}}]})"),
+        write("b.json", R"({"elements":[{"type":"way","id":7,"tags":{"railway":"rail"},
+"geometry":[{"lat":139.7,"lon":35.6},{"lat":139.7,"lon":35.61}]}]})")})
+    EXPECT_THAT(message({file}), HasSubstr(std::string("their tracks lack them: ") + kTold)) << file;
+}
+
+// Where a latitude can be a longitude too, only the system that was asked for can tell.
+TEST_F(BuildTest, TracksThatWouldLieInTheSystemTheOtherWayRoundAreTold) {
+  const auto problems = [&](const std::string& coordinates, const std::string& crs) {
+    return core::value_or_throw(build_map({write("a.geojson", track_of(coordinates))}, {.crs = crs})).map.problems;
+  };
+  const auto told = testing::Contains(
+      "the tracks lie around latitude 15.600, longitude 48.205, for which EPSG:32633 is not made, and would lie right "
+      "the other way round: latitude and longitude may be swapped");
+  EXPECT_THAT(problems("[48.2,15.6],[48.21,15.6]", "EPSG:32633"), told);
+  for (const char* crs : {"", "local", "EPSG:32632"})
+    EXPECT_THAT(problems("[48.2,15.6],[48.21,15.6]", crs), testing::Not(testing::Contains(HasSubstr("swapped"))));
+  for (const char* crs : {"EPSG:32633", "EPSG:32632"})
+    EXPECT_THAT(problems("[15.6,48.2],[15.6,48.21]", crs), testing::Not(testing::Contains(HasSubstr("swapped"))));
+}
+
 TEST_F(BuildTest, LinesOfOnePointAreToldAsSuch) {
   EXPECT_THAT(
       message({write(

@@ -38,6 +38,18 @@ struct OsmData {
 /// is over, and says so there.
 std::string problem_of_remark(const std::string& quoted);
 
+/// Nodes that are nowhere on the Earth, and what may be wrong with them.
+class NodesNowhere {
+ public:
+  void add(const GeoPoint& place);
+  /// Adds a sentence, where there are any.
+  void tell(std::vector<std::string>& problems) const;
+
+ private:
+  size_t count_ = 0;
+  size_t swapped_ = 0;
+};
+
 /// Is this way track that a train runs on? railway=rail, light_rail, narrow_gauge, subway, and tram where asked for.
 bool is_track(const OsmTags& tags, bool with_trams);
 
