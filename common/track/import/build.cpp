@@ -144,9 +144,9 @@ class Sources {
     check_crs();
     const bool all_surveyed = surveyed_edges == map_.edges.size();
     if (options_.virtual_balises_every_m > 0) {
-      core::ok_or_throw(add_virtual_balises(map_, options_.virtual_balises_every_m, options_.nid_c,
-                                            options_.first_nid_bg,
-                                            all_surveyed ? kSurveyLocationM : kMappingLocationM));
+      out_.virtual_balises = core::value_or_throw(
+          add_virtual_balises(map_, options_.virtual_balises_every_m, options_.nid_c, options_.first_nid_bg,
+                              all_surveyed ? kSurveyLocationM : kMappingLocationM));
     }
     if (!options_.landmarks.empty()) core::ok_or_throw(keep_landmarks(map_, options_.landmarks));
     std::ranges::move(problems_of(map_), std::back_inserter(cuts_));

@@ -48,6 +48,16 @@ TEST(MapText, TheSummaryCountsTheKinds) {
   EXPECT_THAT(text, HasSubstr("  bridge         2\n"));
 }
 
+TEST(MapText, EdgesWithoutVirtualGroupsAreTold) {
+  const track::VirtualBalises some{.every_m = 500, .groups = 12, .short_edges = 7, .short_m = 1234};
+  EXPECT_EQ(
+      printed([&] { print_virtual_balises(some); }),
+      "virtual groups   12\n  none           on 7 edges shorter than 250.0 m, half the distance: 1.234 km of track; "
+      "a smaller distance puts some there\n");
+  EXPECT_EQ(printed([] { print_virtual_balises({.every_m = 500, .groups = 12}); }), "virtual groups   12\n");
+  EXPECT_EQ(printed([] { print_virtual_balises({}); }), "");
+}
+
 TEST(MapText, InfoListsAllProblems) {
   track::Map map = track::small_map();
   for (int i = 1; i <= 60; ++i) map.problems.push_back("problem " + std::to_string(i) + ".");
