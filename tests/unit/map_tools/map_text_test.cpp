@@ -22,6 +22,7 @@ TEST(MapText, APlaceIsToldWhole) {
   const std::string text = printed([&] { print_place(map, {1, 500}, false); });
   EXPECT_THAT(text, HasSubstr("cant, twist      50.0 mm (right rail higher), 0.100 mm per m"));
   EXPECT_THAT(text, HasSubstr("its rate         0.000e+00 per m2"));
+  EXPECT_THAT(text, HasSubstr("height, grade    "));
   EXPECT_THAT(text, HasSubstr("heading"));
   EXPECT_THAT(text, HasSubstr("latitude"));
   EXPECT_THAT(printed([&] {

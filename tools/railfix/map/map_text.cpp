@@ -151,9 +151,9 @@ void print_height_and_cant(const track::Alignment& alignment, const track::Track
     std::puts("cant, twist      not on the map");
   }
   if (!alignment.profile().empty()) {
-    std::printf("elevation, grade %.3f m, %.2f per mille\n", point.elevation_m, sign * point.grade * 1e3);
+    std::printf("height, grade    %.3f m, %.2f per mille\n", point.elevation_m, sign * point.grade * 1e3);
   } else {
-    std::puts("elevation, grade not on the map");
+    std::puts("height, grade    not on the map");
   }
 }
 
