@@ -70,7 +70,9 @@ Status read_gnss(const fs::path& file, std::vector<GnssRow>& rows) {
     row.alt_m = table.number_or_nan(alt);
     row.hdop = table.number_or_nan(hdop);
     if (row.fix != 0 && (std::abs(row.lat_deg) > 90 || std::abs(row.lon_deg) > 180)) {
-      table.refuse("has a latitude or longitude that is no place on Earth");
+      const bool swapped = std::abs(row.lat_deg) <= 180 && std::abs(row.lon_deg) <= 90;
+      table.refuse(std::string("has a latitude or longitude that is no place on Earth") +
+                   (swapped ? ": they may be swapped" : ""));
     }
     rows.push_back(row);
   }

@@ -46,6 +46,9 @@ bool is_plane_in_metres(PJ_CONTEXT* context, const char* crs) {
 struct Projection::Handle {
   PJ_CONTEXT* context = proj_context_create();
   PJ* map_from_geo = nullptr;
+  bool has_area = false;
+  GeoPoint south_west;
+  GeoPoint north_east;
 
   Handle() { proj_log_level(context, PJ_LOG_NONE); }
   ~Handle() {
@@ -63,6 +66,11 @@ core::Result<Projection> Projection::open(const std::string& crs) {
   if (!is_plane_in_metres(handle->context, crs.c_str())) return unknown;
   PJ* raw = proj_create_crs_to_crs(handle->context, "EPSG:4326", crs.c_str(), nullptr);
   if (raw == nullptr) return unknown;
+  const Owned system = horizontal(handle->context, crs.c_str());
+  handle->has_area =
+      proj_get_area_of_use(handle->context, system.get(), &handle->south_west.lon_deg, &handle->south_west.lat_deg,
+                           &handle->north_east.lon_deg, &handle->north_east.lat_deg, nullptr) != 0 &&
+      handle->south_west.lon_deg <= handle->north_east.lon_deg;  // else over the date line, or unknown
   // Easting before northing and longitude before latitude, whatever order the authority of the system wrote down.
   handle->map_from_geo = proj_normalize_for_visualization(handle->context, raw);
   proj_destroy(raw);
@@ -80,6 +88,13 @@ std::optional<Eigen::Vector2d> Projection::from_geo(const GeoPoint& point) const
   const PJ_COORD out = proj_trans(handle_->map_from_geo, PJ_FWD, proj_coord(point.lon_deg, point.lat_deg, 0, 0));
   if (!std::isfinite(out.xy.x) || !std::isfinite(out.xy.y)) return std::nullopt;
   return Eigen::Vector2d(out.xy.x, out.xy.y);
+}
+
+bool Projection::is_made_for(const GeoPoint& point) const {
+  const auto is_within = [&](double GeoPoint::*degrees) {
+    return point.*degrees >= handle_->south_west.*degrees && point.*degrees <= handle_->north_east.*degrees;
+  };
+  return !handle_->has_area || (is_within(&GeoPoint::lat_deg) && is_within(&GeoPoint::lon_deg));
 }
 
 std::string utm_crs(const GeoPoint& point) {

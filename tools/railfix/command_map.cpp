@@ -48,11 +48,13 @@ int build(const BuildRequest& request) {
     if (built.fit.tracks > 0) json["fit"] = to_json(built.fit);
     if (built.plans.elements > 0) json["plans"] = to_json(built.plans);
     if (built.osm.elements > 0) json["osm"] = to_json(built.osm);
+    if (built.virtual_balises.every_m > 0) json["virtual_balises"] = to_json(built.virtual_balises);
     json["problems"] = built.map.problems;
     print_json(json);
     return 0;
   }
   print_summary(built.map);
+  print_virtual_balises(built.virtual_balises);
   print_figures("LandXML, element by element", built.landxml);
   print_figures("Coordinates of a plan, arcs through the points", built.plans);
   print_figures("OpenStreetMap, arcs through the points", built.osm);
@@ -107,8 +109,9 @@ void add_build(CLI::App& map, Action& chosen) {
                    "Let the points of OpenStreetMap move by up to so many metres, so that the curvature is even")
       ->check(number_between(0.0, 10.0));
   command
-      ->add_option("--virtual-balises", request->options.virtual_balises_every_m,
-                   "Virtual balise groups about every so many metres along every edge")
+      ->add_option(
+          "--virtual-balises", request->options.virtual_balises_every_m,
+          "Virtual balise groups about every so many metres along every edge, none on edges shorter than half of it")
       ->check(number_between(1.0, 1e6));
   command->add_option("--nid-c", request->options.nid_c, "NID_C of the virtual balise groups")
       ->check(CLI::Range(0, 1023))

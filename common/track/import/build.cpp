@@ -10,6 +10,8 @@
 #include "track/import/network.hpp"
 #include "track/import/osm/osm_network.hpp"
 #include "track/import/scale.hpp"
+#include "track/import/swapped.hpp"
+#include "track/import/told.hpp"
 #include "track/import/xml/erju.hpp"
 #include "track/import/xml/landxml.hpp"
 #include "track/import/xml/railml.hpp"
@@ -142,9 +144,9 @@ class Sources {
     check_crs();
     const bool all_surveyed = surveyed_edges == map_.edges.size();
     if (options_.virtual_balises_every_m > 0) {
-      core::ok_or_throw(add_virtual_balises(map_, options_.virtual_balises_every_m, options_.nid_c,
-                                            options_.first_nid_bg,
-                                            all_surveyed ? kSurveyLocationM : kMappingLocationM));
+      out_.virtual_balises = core::value_or_throw(
+          add_virtual_balises(map_, options_.virtual_balises_every_m, options_.nid_c, options_.first_nid_bg,
+                              all_surveyed ? kSurveyLocationM : kMappingLocationM));
     }
     if (!options_.landmarks.empty()) core::ok_or_throw(keep_landmarks(map_, options_.landmarks));
     std::ranges::move(problems_of(map_), std::back_inserter(cuts_));
@@ -239,21 +241,35 @@ class Sources {
               : "the coordinate system is not known; give --crs to get latitudes and longitudes");
   }
 
+  /// Only where the map's own system says that the tracks are in the wrong place and would be in the right one.
+  [[nodiscard]] std::string told_elsewhere(const Projection& projection) const {
+    const std::optional<GeoPoint> middle = middle_of(osm_);
+    if (!middle || projection.is_made_for(*middle) || !projection.is_made_for(swapped(*middle))) return "";
+    return "the tracks lie around latitude " + told_number(middle->lat_deg, 3) + ", longitude " +
+           told_number(middle->lon_deg, 3) + ", for which " + map_.crs +
+           " is not made, and would lie right the other way round: " + kMayBeSwapped;
+  }
+
   void add_osm() {
     if (osm_.ways.empty())
       throw core::BadInput(
           "the inputs hold no railway tracks (railway=rail, light_rail, narrow_gauge or subway; --trams adds trams)" +
           (cuts_.empty() ? "" : "; " + cuts_.front()));
-    if (const std::string lack = lack_of_nodes(osm_); !lack.empty()) throw core::BadInput(lack);
+    if (const std::string lack = lack_of_nodes(osm_); !lack.empty())
+      throw core::BadInput(lack + (cuts_.empty() ? "" : "; " + cuts_.front()));
     if (map_.crs.empty() || map_.crs == "local")
       throw core::BadInput("OpenStreetMap data need a coordinate system; give --crs");
     const Projection projection = core::value_or_throw(Projection::open(map_.crs));
-    OsmNetwork network =
-        core::value_or_throw(build_osm_network(osm_, projection, options_.smooth_m, options_.with_clothoids));
+    const std::string elsewhere = told_elsewhere(projection);
+    auto built = build_osm_network(osm_, projection, options_.smooth_m, options_.with_clothoids);
+    if (!built.ok() && !elsewhere.empty()) throw core::BadInput(built.error().message + "; " + elsewhere);
+    if (!elsewhere.empty()) cuts_.push_back(elsewhere);
+    OsmNetwork network = core::value_or_throw(std::move(built));
     const bool alone = map_.edges.empty();
     append(network.draft, map_);
     if (alone) add_frogs(map_, kMappingFrogSigmaM);
-    std::move(network.problems.begin(), network.problems.end(), std::back_inserter(map_.problems));
+    std::ranges::move(network.cuts, std::back_inserter(cuts_));
+    std::ranges::move(network.problems, std::back_inserter(map_.problems));
     out_.osm.include(network.figures);
     take(std::move(network.fit));
   }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/result.hpp"
+#include "track/import/finish.hpp"
 #include "track/import/fit/clothoid_fit.hpp"
 #include "track/import/tracks.hpp"
 #include "track/map.hpp"
@@ -30,6 +31,7 @@ struct BuiltMap {
   FitFigures osm;
   FitFigures plans;  // railML and ERJU with coordinates
   FitReport fit;     // of all polylines
+  VirtualBalises virtual_balises;
 };
 
 /// LandXML (.xml, .landxml), railML 2 and 3 (.xml, .railml), ERJU infrastructure and map (.xml, both together), OSM

@@ -57,6 +57,10 @@ struct VirtualPlace {
   double offset_m = 0;
 };
 
+uint32_t groups_along(double length_m, double every_m) {
+  return static_cast<uint32_t>(std::lround(length_m / every_m));
+}
+
 /// Evenly along every edge, but for places that have a group already.
 std::vector<VirtualPlace> virtual_places(const Map& map, double every_m) {
   std::set<std::pair<uint32_t, double>> taken;
@@ -68,7 +72,7 @@ std::vector<VirtualPlace> virtual_places(const Map& map, double every_m) {
   std::vector<VirtualPlace> out;
   for (const Edge& edge : map.edges) {
     const double length_m = edge.alignment.length_m();
-    const auto count = static_cast<uint32_t>(std::lround(length_m / every_m));
+    const uint32_t count = groups_along(length_m, every_m);
     for (uint32_t i = 0; i < count; ++i) {
       const double offset_m = length_m * (i + 0.5) / count;
       if (!is_taken(edge.id, offset_m)) out.push_back({edge.id, offset_m});
@@ -116,7 +120,8 @@ void add_frogs(Map& map, double sigma_m) {
   }
 }
 
-core::Status add_virtual_balises(Map& map, double every_m, uint32_t nid_c, uint32_t first_nid_bg, double q_locacc_m) {
+core::Result<VirtualBalises> add_virtual_balises(Map& map, double every_m, uint32_t nid_c, uint32_t first_nid_bg,
+                                                 double q_locacc_m) {
   if (!(every_m >= 1.0)) return core::Error{"virtual balise groups must be at least 1 m apart"};
   if (nid_c > BaliseGroup::kLastNidC) return core::Error{"NID_C must be between 0 and 1023"};
   const std::vector<VirtualPlace> places = virtual_places(map, every_m);
@@ -132,7 +137,13 @@ core::Status add_virtual_balises(Map& map, double every_m, uint32_t nid_c, uint3
                                  .q_locacc_m = q_locacc_m,
                                  .balises = {}});
   }
-  return {};
+  VirtualBalises out{.every_m = every_m, .groups = places.size()};
+  for (const Edge& edge : map.edges) {
+    if (groups_along(edge.alignment.length_m(), every_m) > 0) continue;
+    ++out.short_edges;
+    out.short_m += edge.alignment.length_m();
+  }
+  return out;
 }
 
 core::Status keep_landmarks(Map& map, const std::vector<std::string>& kinds) {

@@ -14,10 +14,18 @@ namespace railfix::track {
 /// how well the source knows the place.
 void add_frogs(Map& map, double sigma_m);
 
+struct VirtualBalises {
+  double every_m = 0;  // 0 = none were asked for
+  size_t groups = 0;
+  size_t short_edges = 0;  // than half of that: they have none
+  double short_m = 0;      // together
+};
+
 /// Virtual balise groups about every `every_m` along every edge (none on edges shorter than half of it, none within 10
 /// m of a group that is there already), numbered from `first_nid_bg` on with what no group of that country has. Fails
 /// when ETCS runs out of numbers, and adds none then.
-core::Status add_virtual_balises(Map& map, double every_m, uint32_t nid_c, uint32_t first_nid_bg, double q_locacc_m);
+core::Result<VirtualBalises> add_virtual_balises(Map& map, double every_m, uint32_t nid_c, uint32_t first_nid_bg,
+                                                 double q_locacc_m);
 
 /// Leaves out landmarks of other kinds than these; the others get new numbers. Balise groups keep the number of
 /// their balises, because one of a single balise is reported otherwise (ETCS packet 1). Fails when there is no such

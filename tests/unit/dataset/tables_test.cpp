@@ -84,7 +84,11 @@ TEST_F(TablesTest, BrokenRowsNameFileAndLine) {
   EXPECT_THAT(sensors_error(), HasSubstr("key 'pulses_per_metre': must be positive"));
   write("mav0/wheel0/sensor.yaml", "pulses_per_metre: 10\n");
   write("mav0/gnss0/data.csv", "#timestamp [ns],lat_deg,lon_deg,alt_m,hdop,fix\n7,146.7,9.4,900,1.2,4\n");
-  EXPECT_THAT(sensors_error(), HasSubstr("gnss0/data.csv line 2: has a latitude"));
+  EXPECT_THAT(
+      sensors_error(),
+      HasSubstr("gnss0/data.csv line 2: has a latitude or longitude that is no place on Earth: they may be swapped"));
+  write("mav0/gnss0/data.csv", "#timestamp [ns],lat_deg,lon_deg,alt_m,hdop,fix\n7,146.7,99.4,900,1.2,4\n");
+  EXPECT_THAT(sensors_error(), ::testing::Not(HasSubstr("swapped")));
 }
 
 TEST_F(TablesTest, TruthByNameInAnyOrderAndSpelling) {

@@ -22,6 +22,7 @@ TEST(MapText, APlaceIsToldWhole) {
   const std::string text = printed([&] { print_place(map, {1, 500}, false); });
   EXPECT_THAT(text, HasSubstr("cant, twist      50.0 mm (right rail higher), 0.100 mm per m"));
   EXPECT_THAT(text, HasSubstr("its rate         0.000e+00 per m2"));
+  EXPECT_THAT(text, HasSubstr("height, grade    "));
   EXPECT_THAT(text, HasSubstr("heading"));
   EXPECT_THAT(text, HasSubstr("latitude"));
   EXPECT_THAT(printed([&] {
@@ -46,6 +47,16 @@ TEST(MapText, TheSummaryCountsTheKinds) {
   const std::string text = printed([&] { print_summary(map); });
   EXPECT_THAT(text, HasSubstr("  underbridge    1\n"));
   EXPECT_THAT(text, HasSubstr("  bridge         2\n"));
+}
+
+TEST(MapText, EdgesWithoutVirtualGroupsAreTold) {
+  const track::VirtualBalises some{.every_m = 500, .groups = 12, .short_edges = 7, .short_m = 1234};
+  EXPECT_EQ(
+      printed([&] { print_virtual_balises(some); }),
+      "virtual groups   12\n  none           on 7 edges shorter than 250.0 m, half the distance: 1.234 km of track; "
+      "a smaller distance puts some there\n");
+  EXPECT_EQ(printed([] { print_virtual_balises({.every_m = 500, .groups = 12}); }), "virtual groups   12\n");
+  EXPECT_EQ(printed([] { print_virtual_balises({}); }), "");
 }
 
 TEST(MapText, InfoListsAllProblems) {

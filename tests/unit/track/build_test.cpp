@@ -68,6 +68,37 @@ TEST_F(BuildTest, CoordinatesThatAreNoDegreesAreTold) {
               testing::Contains(HasSubstr("way/7: the coordinates [1e+300,48.0] are not degrees; left out")));
 }
 
+TEST_F(BuildTest, LatitudesThatAreLongitudesAreTold) {
+  constexpr const char* kTold = "latitude and longitude may be swapped";
+  EXPECT_THAT(message({write("a.geojson", track_of("[35.6,139.7],[35.61,139.7]"))}),
+              testing::EndsWith(std::string("way/7: the coordinates [35.6,139.7] and 1 more have a latitude beyond 90 "
+                                            "degrees, ") +
+                                kTold + "; GeoJSON coordinates are longitude, latitude in degrees (WGS 84)"));
+  for (const auto& file :
+       {write("a.osm", R"(<osm version="0.6"><node id="1" lat="139.7" lon="35.6"/><node id="2" lat="139.7" lon="35.61"/>
+<way id="7"><nd ref="1"/><nd ref="2"/><tag k="railway" v="rail"/></way></osm>)"),
+        write("a.json", R"({"elements":[{"type":"node","id":1,"lat":139.7,"lon":35.6},
+{"type":"node","id":2,"lat":139.7,"lon":35.61},{"type":"way","id":7,"nodes":[1,2],"tags":{"railway":"rail"}}]})"),
+        write("b.json", R"({"elements":[{"type":"way","id":7,"tags":{"railway":"rail"},
+"geometry":[{"lat":139.7,"lon":35.6},{"lat":139.7,"lon":35.61}]}]})")})
+    EXPECT_THAT(message({file}), HasSubstr(std::string("their tracks lack them: ") + kTold)) << file;
+}
+
+// Where a latitude can be a longitude too, only the system that was asked for can tell.
+TEST_F(BuildTest, TracksThatWouldLieInTheSystemTheOtherWayRoundAreTold) {
+  const auto problems = [&](const std::string& coordinates, const std::string& crs) {
+    return core::value_or_throw(build_map({write("a.geojson", track_of(coordinates))}, {.crs = crs})).map.problems;
+  };
+  const auto told = testing::Contains(
+      "the tracks lie around latitude 15.600, longitude 48.205, for which EPSG:32633 is not made, and would lie right "
+      "the other way round: latitude and longitude may be swapped");
+  EXPECT_THAT(problems("[48.2,15.6],[48.21,15.6]", "EPSG:32633"), told);
+  for (const char* crs : {"", "local", "EPSG:32632"})
+    EXPECT_THAT(problems("[48.2,15.6],[48.21,15.6]", crs), testing::Not(testing::Contains(HasSubstr("swapped"))));
+  for (const char* crs : {"EPSG:32633", "EPSG:32632"})
+    EXPECT_THAT(problems("[15.6,48.2],[15.6,48.21]", crs), testing::Not(testing::Contains(HasSubstr("swapped"))));
+}
+
 TEST_F(BuildTest, LinesOfOnePointAreToldAsSuch) {
   EXPECT_THAT(
       message({write(
@@ -167,14 +198,23 @@ TEST_F(BuildTest, TramsOnlyWhereAskedFor) {
   EXPECT_EQ(core::value_or_throw(build_map({file}, {.with_trams = true})).map.edges.size(), 1U);
 }
 
-TEST_F(BuildTest, NodesThatAreMissingAreTold) {
-  const auto file =
-      write("m.json",
-            R"({"elements":[{"type":"node","id":1,"lat":48.2,"lon":15.6},{"type":"node","id":2,"lat":48.2,"lon":15.61},
-    {"type":"way","id":5,"nodes":[1,2,3],"tags":{"railway":"rail"}}]})");
-  const Map map = core::value_or_throw(build_map({file}, {})).map;
-  EXPECT_EQ(map.edges.size(), 1U);
-  EXPECT_THAT(map.problems, testing::Contains(HasSubstr("way 5 names 1 node")));
+TEST_F(BuildTest, NodesThatAreMissingAreToldInOneSentence) {
+  const auto problems = [&](int ways) {
+    std::string text = R"({"elements":[{"type":"node","id":1,"lat":48.2,"lon":15.6})";
+    for (int id = 5; id < 5 + ways; ++id) {
+      text += R"(,{"type":"node","id":)" + std::to_string(id) + R"(,"lat":48.2,"lon":15.6)" + std::to_string(id) +
+              R"(},{"type":"way","id":)" + std::to_string(id) + R"(,"nodes":[1,)" + std::to_string(id) +
+              R"(,3],"tags":{"railway":"rail"}})";
+    }
+    return core::value_or_throw(build_map({write("m.json", text + "]}")}, {})).map.problems;
+  };
+  EXPECT_THAT(problems(1),
+              testing::ElementsAre("way 5 names 1 node that the data do not hold; the tracks have gaps there: extract "
+                                   "the ways together with their nodes, from Overpass by (._;>;); or by out geom;"));
+  const std::vector<std::string> told = problems(7);
+  EXPECT_THAT(told.front(),
+              HasSubstr("way 5, way 6, way 7, way 8, way 9 and 2 more ways name 7 nodes that the data do not hold"));
+  EXPECT_EQ(std::ranges::count_if(told, [](const auto& one) { return one.find("do not hold") != one.npos; }), 1);
 }
 
 TEST_F(BuildTest, WhatCutsTheNetworkIsToldFirst) {

@@ -154,6 +154,16 @@ TEST(VirtualBalises, StandNotWhereAGroupIs) {
   EXPECT_THAT(check_topology(map), IsEmpty());
 }
 
+TEST(VirtualBalises, EdgesTooShortForThemAreCounted) {
+  Map map = small_map();
+  const VirtualBalises all = core::value_or_throw(add_virtual_balises(map, 300, 77, 1, 5));
+  EXPECT_EQ(all.groups, map.balise_groups.size() - 2);
+  EXPECT_EQ(all.short_edges, 0U);
+  const VirtualBalises some = core::value_or_throw(add_virtual_balises(map, 1900, 77, 1, 5));
+  EXPECT_EQ(some.short_edges, 2U);
+  EXPECT_NEAR(some.short_m, map.edges[1].alignment.length_m() + map.edges[2].alignment.length_m(), 1e-9);
+}
+
 TEST(VirtualBalises, TooManySayHowFarApartTheyMustBe) {
   Map map = small_map();
   const auto refusal = [&](double every_m, uint32_t first) {

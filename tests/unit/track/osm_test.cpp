@@ -352,6 +352,72 @@ TEST_F(OsmTest, NoDamageToAFileCrashesIt) {
   }
 }
 
+class StrayNodes : public ImportTest {
+ protected:
+  struct Displaced {
+    int number = 0;
+    double north_m = 0;
+    double east_m = 0;
+  };
+  /// Nodes 101 to 112 on a curve of 500 m radius, every 60 m, one of them displaced, and a siding from the sixth on.
+  static std::string curve(const Displaced& displaced, bool as_geojson = false) {
+    std::string nodes;
+    std::string line;
+    std::string siding;
+    for (int i = 1; i <= 15; ++i) {
+      const int along = i <= 12 ? i : i - 6;  // 13, 14, 15 beside 7, 8, 9
+      const double radius_m = i <= 12 ? 500 : 500 + 4.0 * (i - 12);
+      const double north_m = radius_m * std::sin(0.12 * along) + (i == displaced.number ? displaced.north_m : 0);
+      const double east_m = radius_m * (1 - std::cos(0.12 * along)) + (i == displaced.number ? displaced.east_m : 0);
+      char lat[20];
+      char lon[20];
+      std::snprintf(lat, sizeof lat, "%.7f", 48 + north_m / 111200);
+      std::snprintf(lon, sizeof lon, "%.7f", 15 + east_m / 74500);
+      std::string& refs = i <= 12 ? line : siding;
+      const std::string id = std::to_string(100 + i);
+      nodes += R"({"type":"node","id":)" + id + R"(,"lat":)" + lat + R"(,"lon":)" + lon + "},";
+      refs += (refs.empty() ? "" : ",") + (as_geojson ? std::string("[") + lon + "," + lat + "]" : id);
+    }
+    if (as_geojson)
+      return R"({"features":[{"properties":{"railway":"rail"},"geometry":{"type":"LineString","coordinates":[)" + line +
+             "]}}]}";
+    return R"({"elements":[)" + nodes + R"({"type":"way","id":10,"nodes":[)" + line +
+           R"(],"tags":{"railway":"rail"}},{"type":"way","id":11,"nodes":[106,)" + siding +
+           R"(],"tags":{"railway":"rail"}}]})";
+  }
+  [[nodiscard]] std::vector<std::string> told(const std::string& text) const {
+    std::vector<std::string> problems =
+        core::value_or_throw(build_map({write("a.json", text)}, {.crs = "local"})).map.problems;
+    std::erase_if(problems, [](const auto& one) { return one.find("off the line between") == one.npos; });
+    return problems;
+  }
+};
+
+TEST_F(StrayNodes, AreNamedWithWhatToDo) {
+  EXPECT_THAT(told(curve({.number = 4, .north_m = 100})),
+              testing::ElementsAre(testing::AllOf(
+                  HasSubstr("node 104 of way/10 at latitude 48.002976, longitude 15.000758 lies "),
+                  HasSubstr(" off the line between its neighbours, as no track runs: correct its place in the source, "
+                            "or take it out of the way"))));
+  // Across, along, by little, by a digit of the degrees; at the switch, and next to the end.
+  for (const Displaced& one : {Displaced{4, 0, 30}, {4, -40, 0}, {9, -200, 0}, {9, 0, 74500}, {6, 150, 0}, {2, 0, 90}})
+    EXPECT_THAT(told(curve(one)),
+                testing::ElementsAre(HasSubstr("node 10" + std::to_string(one.number) + " of way/10")))
+        << one.number << " by " << one.north_m << ", " << one.east_m;
+  EXPECT_THAT(told(curve({.number = 4, .north_m = 100}, true)),
+              testing::ElementsAre(HasSubstr("the point of way/-1 at")));
+}
+
+TEST_F(StrayNodes, AreNoneInARealDrawing) {
+  EXPECT_THAT(told(curve({})), testing::IsEmpty());
+  for (const char* name : {"network/osm/sankt_poelten.json", "network/osm/Ventimiglia_Albenga.geojson",
+                           "line_gnss/osm_thusis_filisur.geojson"}) {
+    const std::filesystem::path file = shared_data(name);
+    if (!std::filesystem::exists(file)) GTEST_SKIP() << "skipped: no " << file;
+    EXPECT_THAT(told(content(file)), testing::IsEmpty()) << name;
+  }
+}
+
 TEST_F(OsmTest, SanktPoeltenRunsThroughItsNodes) {
   const std::filesystem::path file = shared_data("network/osm/sankt_poelten.json");
   if (!std::filesystem::exists(file)) GTEST_SKIP() << "skipped: no " << file;

@@ -331,7 +331,7 @@ TEST_F(RailmlTest, DegreesOfRailml3ArePutIntoAPlane) {
   EXPECT_THAT(
       message(railml3_along("EPSG:4326", [](double at) { return "x=\"7\" y=\"" + std::to_string(91 + at) + "\""; })),
       HasSubstr("line 2: <geometricCoordinate> says latitude 91.000000 and longitude 7.000000; they go from -90 to "
-                "90 and from -180 to 180"));
+                "90 and from -180 to 180: latitude and longitude may be swapped"));
   EXPECT_THAT(message(railml3_along("nowhere", degrees)), HasSubstr("is not a coordinate system in metres"));
 }
 

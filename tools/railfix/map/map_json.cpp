@@ -111,6 +111,10 @@ ordered_json to_json(const track::FitFigures& figures) {
           {"max_chord_deviation_m", figures.max_chord_deviation_m}};
 }
 
+ordered_json to_json(const track::VirtualBalises& groups) {
+  return {{"groups", groups.groups}, {"short_edges", groups.short_edges}, {"short_m", groups.short_m}};
+}
+
 ordered_json map_json(const track::Map& map) {
   return {{"name", map.name},
           {"source", map.source},

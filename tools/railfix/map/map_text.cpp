@@ -92,6 +92,16 @@ void print_figures(const char* source, const track::FitFigures& figures) {
   }
 }
 
+void print_virtual_balises(const track::VirtualBalises& groups) {
+  if (groups.every_m <= 0) return;
+  std::printf("virtual groups   %zu\n", groups.groups);
+  if (groups.short_edges == 0) return;
+  std::printf(
+      "  none           on %zu edges shorter than %.1f m, half the distance: %.3f km of track; a smaller "
+      "distance puts some there\n",
+      groups.short_edges, 0.5 * groups.every_m, groups.short_m / 1000.0);
+}
+
 /// Straights, clothoids and arcs, and the elements that fit worst.
 void print_fit(const track::FitReport& fit) {
   if (fit.tracks + fit.left_as_arcs + fit.two_points == 0) return;
@@ -141,9 +151,9 @@ void print_height_and_cant(const track::Alignment& alignment, const track::Track
     std::puts("cant, twist      not on the map");
   }
   if (!alignment.profile().empty()) {
-    std::printf("elevation, grade %.3f m, %.2f per mille\n", point.elevation_m, sign * point.grade * 1e3);
+    std::printf("height, grade    %.3f m, %.2f per mille\n", point.elevation_m, sign * point.grade * 1e3);
   } else {
-    std::puts("elevation, grade not on the map");
+    std::puts("height, grade    not on the map");
   }
 }
 

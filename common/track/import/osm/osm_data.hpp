@@ -38,6 +38,18 @@ struct OsmData {
 /// is over, and says so there.
 std::string problem_of_remark(const std::string& quoted);
 
+/// Nodes that are nowhere on the Earth, and what may be wrong with them.
+class NodesNowhere {
+ public:
+  void add(const GeoPoint& place);
+  /// Adds a sentence, where there are any.
+  void tell(std::vector<std::string>& problems) const;
+
+ private:
+  size_t count_ = 0;
+  size_t swapped_ = 0;
+};
+
 /// Is this way track that a train runs on? railway=rail, light_rail, narrow_gauge, subway, and tram where asked for.
 bool is_track(const OsmTags& tags, bool with_trams);
 
@@ -62,6 +74,9 @@ std::vector<OsmWay>* ways_for(OsmData& data, const OsmTags& tags, bool with_tram
 /// OSM XML or PBF, also compressed (.osm, .pbf, .osm.gz, .osm.bz2). Memory grows with the railways and bridges in the
 /// file only.
 core::Result<OsmData> read_osm(const std::filesystem::path& file, bool with_trams);
+
+/// The id of a node that its source gives none: both coordinates to 1e-7 degree, as OpenStreetMap stores them.
+int64_t id_of_place(const GeoPoint& place);
 
 /// Overpass JSON ("elements", the places of nodes in their own or by `out geom;` in the ways) or GeoJSON ("features").
 /// GeoJSON has no nodes: equal coordinates (1e-7 degree) are one node.

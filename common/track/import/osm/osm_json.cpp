@@ -6,6 +6,7 @@
 #include "core/json_text.hpp"
 #include "core/whole_file.hpp"
 #include "track/import/osm/osm_data.hpp"
+#include "track/import/swapped.hpp"
 
 namespace railfix::track {
 namespace {
@@ -22,10 +23,6 @@ OsmTags tags_in(const json& object, const char* key) {
     if (value.is_string()) tags.emplace(name, value.get<std::string>());
   }
   return tags;
-}
-
-bool plausible(const GeoPoint& place) {
-  return std::abs(place.lat_deg) <= 90.0 && std::abs(place.lon_deg) <= 180.0;
 }
 
 /// Beginning of a value, for a message; in ASCII, so that no letter is cut in two.
@@ -92,16 +89,9 @@ GeoPoint place_of(const json& lat_lon) {
   return {degrees_in(member(lat_lon, "lat")), degrees_in(member(lat_lon, "lon"))};
 }
 
-/// GeoJSON coordinates as a node identity: both to 1e-7 degree, as OpenStreetMap stores them.
-int64_t identity(const GeoPoint& place) {
-  const auto lat = static_cast<int64_t>(std::llround((place.lat_deg + 90.0) * 1e7));
-  const auto lon = static_cast<int64_t>(std::llround((place.lon_deg + 180.0) * 1e7));
-  return lat * 3'600'000'001 + lon;
-}
-
 /// Of a way; `out geom;` writes the places into it ("geometry", null where they were cut off) and the nodes may then be
 /// nowhere else.
-std::vector<int64_t> nodes_of(const json& way, OsmData& out) {
+std::vector<int64_t> nodes_of(const json& way, OsmData& out, NodesNowhere& nowhere) {
   std::vector<int64_t> nodes;
   const auto ids = way.find("nodes");
   const bool has_ids = ids != way.end();
@@ -117,8 +107,9 @@ std::vector<int64_t> nodes_of(const json& way, OsmData& out) {
   for (size_t i = 0; i < geometry->size(); ++i) {
     const json& lat_lon = (*geometry)[i];
     const std::optional<GeoPoint> place = lat_lon.is_null() ? std::nullopt : std::optional(place_of(lat_lon));
-    const bool is_there = place && plausible(*place);
-    if (!has_ids) nodes.push_back(is_there ? identity(*place) : kNowhere);
+    const bool is_there = place && is_on_earth(*place);
+    if (place && !is_there) nowhere.add(*place);
+    if (!has_ids) nodes.push_back(is_there ? id_of_place(*place) : kNowhere);
     if (is_there) out.nodes.try_emplace(nodes[i], OsmNode{*place, {}});
   }
   return nodes;
@@ -126,11 +117,17 @@ std::vector<int64_t> nodes_of(const json& way, OsmData& out) {
 
 void read_overpass(const json& elements, bool with_trams, OsmData& out) {
   const std::map<int64_t, OsmTags> outlines = platform_outlines(elements, with_trams);
+  std::unordered_map<int64_t, GeoPoint> elsewhere;  // nodes of anything
+  NodesNowhere nowhere;
   for_each_element(elements, [&](const json& element) {
     const std::string type = element.value("type", "");
     if (type == "node") {
       const GeoPoint place = place_of(element);
-      if (plausible(place)) out.nodes[id_in(member(element, "id"))] = {place, tags_in(element, "tags")};
+      if (is_on_earth(place)) {
+        out.nodes[id_in(member(element, "id"))] = {place, tags_in(element, "tags")};
+      } else {
+        elsewhere[id_in(member(element, "id"))] = place;
+      }
     } else if (type == "way") {
       OsmTags tags = tags_in(element, "tags");
       const int64_t id = id_in(member(element, "id"));
@@ -139,9 +136,15 @@ void read_overpass(const json& elements, bool with_trams, OsmData& out) {
         ways = &out.platforms;
         tags = outline->second;
       }
-      if (ways != nullptr) ways->push_back({id, nodes_of(element, out), std::move(tags)});
+      if (ways != nullptr) ways->push_back({id, nodes_of(element, out, nowhere), std::move(tags)});
     }
   });
+  for (const OsmWay& way : out.ways) {
+    for (const int64_t node : way.nodes) {
+      if (const auto place = elsewhere.find(node); place != elsewhere.end()) nowhere.add(place->second);
+    }
+  }
+  nowhere.tell(out.problems);
 }
 
 GeoPoint place_in(const json& coordinates) {
@@ -189,9 +192,8 @@ class FeatureReader {
       add(tags_in(feature, "properties"), geometry->value("type", ""), geometry->at("coordinates"));
     });
     if (on_earth_ == 0 && !elsewhere_.empty()) {
-      throw core::BadInput(elsewhere_ +
-                           "; GeoJSON coordinates are longitude, latitude in degrees (WGS 84): convert them, for "
-                           "example by ogr2ogr -t_srs EPSG:4326");
+      throw core::BadInput(elsewhere_ + "; GeoJSON coordinates are longitude, latitude in degrees (WGS 84)" +
+                           (swapped_ ? "" : ": convert them, for example by ogr2ogr -t_srs EPSG:4326"));
     }
     for (const auto& [key, count] : others_)
       out_.problems.push_back(features_named(count) + " with \"" + key + "\" and no railway: no track, left out");
@@ -203,8 +205,8 @@ class FeatureReader {
   void add(const OsmTags& tags, const std::string& type, const json& coordinates) {
     if (type == "Point") {
       const GeoPoint place = place_in(coordinates);
-      if (is_on_earth(place)) {
-        out_.nodes[identity(place)] = {place, tags};
+      if (takes(place)) {
+        out_.nodes[id_of_place(place)] = {place, tags};
       } else {
         tell_elsewhere(1, coordinates, "");
       }
@@ -239,8 +241,8 @@ class FeatureReader {
     const json* first_elsewhere = nullptr;
     for (const json& pair : coordinates) {
       const GeoPoint place = place_in(pair);
-      if (is_on_earth(place)) {
-        way.nodes.push_back(identity(place));
+      if (takes(place)) {
+        way.nodes.push_back(id_of_place(place));
         out_.nodes[way.nodes.back()].place = place;
       } else if (++elsewhere == 1) {
         first_elsewhere = &pair;
@@ -250,16 +252,22 @@ class FeatureReader {
     ways.push_back(std::move(way));
   }
 
-  bool is_on_earth(const GeoPoint& place) {
-    if (!plausible(place)) return false;
+  bool takes(const GeoPoint& place) {
+    if (!is_on_earth(place)) return false;
     ++on_earth_;
     return true;
   }
 
   void tell_elsewhere(size_t count, const json& first, const std::string& way) {
-    const std::string told = "feature " + std::to_string(number_) + way + ": the coordinates " + text_of(first) +
-                             (count > 1 ? " and " + std::to_string(count - 1) + " more" : "") + " are not degrees";
-    if (elsewhere_.empty()) elsewhere_ = told;
+    const bool is_swapped = may_be_swapped(place_in(first));
+    const std::string told =
+        "feature " + std::to_string(number_) + way + ": the coordinates " + text_of(first) +
+        (count > 1 ? " and " + std::to_string(count - 1) + " more" : "") +
+        (is_swapped ? std::string(" have a latitude beyond 90 degrees, ") + kMayBeSwapped : " are not degrees");
+    if (elsewhere_.empty()) {
+      elsewhere_ = told;
+      swapped_ = is_swapped;
+    }
     out_.problems.push_back(told + "; left out");
   }
 
@@ -270,9 +278,16 @@ class FeatureReader {
   size_t silent_lines_ = 0;
   size_t on_earth_ = 0;
   std::string elsewhere_;  // the first time that a point was not
+  bool swapped_ = false;   // it would be, the other way round
 };
 
 }  // namespace
+
+int64_t id_of_place(const GeoPoint& place) {
+  const auto lat = static_cast<int64_t>(std::llround((place.lat_deg + 90.0) * 1e7));
+  const auto lon = static_cast<int64_t>(std::llround((place.lon_deg + 180.0) * 1e7));
+  return lat * 3'600'000'001 + lon;
+}
 
 core::Result<OsmData> read_osm_json(const std::filesystem::path& file, bool with_trams) {
   const auto wrong = [&](const std::string& why) {

@@ -10,6 +10,7 @@
 #include "track/import/fit/smooth.hpp"
 #include "track/import/osm/osm_node_marks.hpp"
 #include "track/import/osm/osm_overbridges.hpp"
+#include "track/import/osm/osm_stray_nodes.hpp"
 #include "track/import/osm/osm_trackside.hpp"
 #include "track/import/told.hpp"
 
@@ -19,6 +20,9 @@ namespace {
 constexpr size_t kPointsForSigma = 12;
 constexpr double kLeastUsualSigmaM = 0.05;
 constexpr double kTangentBranchRad = core::kPi / 6.0;
+constexpr size_t kMostNamed = 5;
+constexpr const char* kAskForNodes =
+    "extract the ways together with their nodes, from Overpass by (._;>;); or by out geom;";
 
 struct Segment {
   int64_t a = 0;
@@ -46,6 +50,7 @@ class Builder {
 
   OsmNetwork build() {
     collect_segments();
+    tell_stray_nodes();
     trace_chains();
     find_usual_sigma();
     gather_ends();
@@ -62,8 +67,10 @@ class Builder {
 
   void collect_segments() {
     std::set<std::pair<int64_t, int64_t>> seen;
+    size_t missing = 0;
+    std::vector<int64_t> lacking;  // ways
     for (size_t way = 0; way < data_.ways.size(); ++way) {
-      size_t missing = 0;
+      const size_t missing_before = missing;
       int64_t before = 0;
       bool has_before = false;
       for (const int64_t node : data_.ways[way].nodes) {
@@ -81,11 +88,42 @@ class Builder {
         before = node;
         has_before = true;
       }
-      if (missing > 0) {
-        out_.problems.push_back("way " + std::to_string(data_.ways[way].id) + " names " + std::to_string(missing) +
-                                " nodes that the data do not hold");
-      }
+      if (missing > missing_before) lacking.push_back(data_.ways[way].id);
     }
+    if (missing > 0) out_.cuts.push_back(told_missing(lacking, missing));
+  }
+
+  /// One sentence for all: of a region that is cut out, every way over its border lacks nodes.
+  static std::string told_missing(const std::vector<int64_t>& ways, size_t nodes) {
+    std::string names;
+    const size_t named = std::min(kMostNamed, ways.size());
+    for (size_t i = 0; i < named; ++i) names += (i == 0 ? "way " : ", way ") + std::to_string(ways[i]);
+    if (ways.size() > named) names += " and " + std::to_string(ways.size() - named) + " more ways";
+    return names + (ways.size() == 1 ? " names " : " name ") + std::to_string(nodes) +
+           (nodes == 1 ? " node" : " nodes") +
+           " that the data do not hold; the tracks have gaps there: " + kAskForNodes;
+  }
+
+  /// They stay where they are: nobody but the source knows where they belong.
+  void tell_stray_nodes() {
+    OsmNeighbours neighbours;
+    for (const auto& [node, segments] : at_node_) {
+      for (const size_t segment : segments) neighbours[node].push_back(other_end(segment, node));
+    }
+    const std::vector<StrayNode> stray = stray_nodes(places_, neighbours);
+    for (size_t i = 0; i < std::min(kMostNamed, stray.size()); ++i) {
+      const auto& [node, off_m] = stray[i];
+      const GeoPoint& at = data_.nodes.at(node).place;
+      out_.cuts.push_back((node == id_of_place(at) ? "the point" : "node " + std::to_string(node)) + " of way/" +
+                          std::to_string(data_.ways[segments_[at_node_.at(node).front()].way].id) + " at latitude " +
+                          told_number(at.lat_deg, 6) + ", longitude " + told_number(at.lon_deg, 6) + " lies " +
+                          told_m(off_m) +
+                          " off the line between its neighbours, as no track runs: correct its place in the source, or "
+                          "take it out of the way");
+    }
+    if (stray.size() > kMostNamed)
+      out_.cuts.push_back(std::to_string(stray.size() - kMostNamed) + " more nodes lie up to " +
+                          told_m(stray[kMostNamed].off_m) + " off the line between their neighbours");
   }
 
   bool place(int64_t node) {
@@ -314,7 +352,7 @@ class Builder {
   double usual_sigma_m_ = 0.3;
   std::vector<Segment> segments_;
   std::unordered_map<int64_t, std::vector<size_t>> at_node_;
-  std::unordered_map<int64_t, Eigen::Vector2d> places_;
+  OsmPlaces places_;
   std::vector<OsmChain> chains_;
   std::map<int64_t, std::vector<ChainEnd>> ends_;
   std::unordered_map<int64_t, size_t> node_index_;
@@ -351,8 +389,7 @@ std::string lack_of_nodes(const OsmData& data) {
            std::to_string(first.nodes.size()) + " on the earth); a line needs two or more";
   }
   return "no railway track has two of its nodes in the data (of way " + std::to_string(first.id) + " they hold " +
-         std::to_string(held(first)) + " of " + std::to_string(first.nodes.size()) +
-         "); extract the ways together with their nodes, from Overpass by (._;>;); or by out geom;";
+         std::to_string(held(first)) + " of " + std::to_string(first.nodes.size()) + "); " + kAskForNodes;
 }
 
 std::optional<GeoPoint> middle_of(const OsmData& data) {

@@ -11,6 +11,7 @@ struct OsmNetwork {
   Draft draft;
   FitFigures figures;
   FitReport fit;
+  std::vector<std::string> cuts;  // problems that cut the network
   std::vector<std::string> problems;
 };
 

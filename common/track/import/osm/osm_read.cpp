@@ -15,6 +15,7 @@
 #include <unordered_set>
 
 #include "track/import/osm/osm_data.hpp"
+#include "track/import/swapped.hpp"
 
 namespace railfix::track {
 namespace {
@@ -78,12 +79,13 @@ OsmData read_passes(const std::string& file, bool with_trams) {
     }
   }
   ways.close();
-  size_t nowhere = 0;
+  NodesNowhere nowhere;
   osmium::io::Reader nodes(file, osmium::osm_entity_bits::node);
   while (const osmium::memory::Buffer buffer = nodes.read()) {
     for (const osmium::Node& node : buffer.select<osmium::Node>()) {
       if (!node.location().valid()) {
-        nowhere += wanted.contains(node.id()) ? 1 : 0;
+        if (wanted.contains(node.id()))
+          nowhere.add({node.location().lat_without_check(), node.location().lon_without_check()});
         continue;
       }
       OsmTags tags = tags_of(node);
@@ -92,10 +94,7 @@ OsmData read_passes(const std::string& file, bool with_trams) {
     }
   }
   nodes.close();
-  if (nowhere > 0)
-    out.problems.push_back(std::to_string(nowhere) +
-                           " nodes of tracks have a latitude beyond 90 or a longitude beyond 180 degrees, or none; "
-                           "their tracks lack them");
+  nowhere.tell(out.problems);
   return out;
 }
 
@@ -143,6 +142,19 @@ std::string told(const std::filesystem::path& file, const std::string& library) 
 }
 
 }  // namespace
+
+void NodesNowhere::add(const GeoPoint& place) {
+  ++count_;
+  if (may_be_swapped(place)) ++swapped_;
+}
+
+void NodesNowhere::tell(std::vector<std::string>& problems) const {
+  if (count_ == 0) return;
+  problems.push_back(std::to_string(count_) +
+                     " nodes of tracks have a latitude beyond 90 or a longitude beyond 180 degrees, or none; "
+                     "their tracks lack them" +
+                     (swapped_ > 0 ? std::string(": ") + kMayBeSwapped : ""));
+}
 
 std::string problem_of_remark(const std::string& quoted) {
   return "the extract may not be whole, Overpass remarks " + quoted +

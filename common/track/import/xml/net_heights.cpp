@@ -172,6 +172,8 @@ class Heights {
 std::vector<std::vector<GradePoint>> net_profiles(RailNet& net, const std::vector<std::pair<size_t, size_t>>& nodes) {
   if (std::all_of(net.tracks.begin(), net.tracks.end(), [](const NetTrack& track) { return track.slopes.empty(); }))
     return std::vector<std::vector<GradePoint>>(net.tracks.size());
+  net.problems.emplace_back(
+      "heights are summed from the slopes, from 0 m where the tracks begin: they are no heights above the sea");
   return Heights(net, nodes).make();
 }
 

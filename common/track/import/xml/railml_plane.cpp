@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "track/import/local_crs.hpp"
+#include "track/import/swapped.hpp"
 
 namespace railfix::track {
 
@@ -32,9 +33,10 @@ void RailmlPlane::choose(const pugi::xml_node& coordinate, const std::string& sy
 Eigen::Vector2d RailmlPlane::at(const pugi::xml_node& coordinate, const std::string& system, double first,
                                 double second) {
   const std::string element = "<" + std::string(coordinate.name()) + ">";
-  if (is_geographic(system) && !(std::abs(first) <= 90 && std::abs(second) <= 180)) {
+  if (is_geographic(system) && !is_on_earth({first, second})) {
     throw source_.wrong(coordinate, element + " says latitude " + std::to_string(first) + " and longitude " +
-                                        std::to_string(second) + "; they go from -90 to 90 and from -180 to 180");
+                                        std::to_string(second) + "; they go from -90 to 90 and from -180 to 180" +
+                                        (may_be_swapped({first, second}) ? std::string(": ") + kMayBeSwapped : ""));
   }
   if (crs_.empty()) choose(coordinate, system, {first, second});
   if (system != system_) {
