@@ -6,6 +6,8 @@
 #include <fstream>
 #include <iostream>
 #include <limits>
+#include <map>
+#include <sstream>
 
 #include "campaign.hpp"
 #include "core/units.hpp"
@@ -49,14 +51,35 @@ std::vector<FaultName> faults_named(const std::string& text) {
   return chosen;
 }
 
+/// What --without leaves out: sensors, and what is no fault of the campaign's but wrong at times in every run.
+const std::map<std::string, void (*)(SimulationPlan&)>& left_out() {
+  static const std::map<std::string, void (*)(SimulationPlan&)> all{
+      {"camera", [](SimulationPlan& plan) { plan.camera = false; }},
+      {"wheel", [](SimulationPlan& plan) { plan.wheel = false; }},
+      {"imu", [](SimulationPlan& plan) { plan.imu = false; }},
+      {"gnss", [](SimulationPlan& plan) { plan.gnss = false; }},
+      {"landmarks", [](SimulationPlan& plan) { plan.landmark_spacing_m = 0; }},
+      {"shape", [](SimulationPlan& plan) { plan.shape = false; }},
+      {"tunnels", [](SimulationPlan& plan) { plan.blind_spells = false; }},
+      {"slip", [](SimulationPlan& plan) { plan.slip = false; }},
+      {"false-fixes", [](SimulationPlan& plan) { plan.false_fix_share = 0; }}};
+  return all;
+}
+
+std::string names_left_out() {
+  std::string names;
+  for (const auto& [name, leave_out] : left_out()) names += (names.empty() ? "" : ", ") + name;
+  return names;
+}
+
 void leave_out(SimulationPlan& plan, const std::string& names) {
-  const auto has = [&](const char* name) { return names.find(name) != std::string::npos; };
-  plan.camera = plan.camera && !has("camera");
-  plan.wheel = plan.wheel && !has("wheel");
-  plan.imu = plan.imu && !has("imu");
-  plan.gnss = plan.gnss && !has("gnss");
-  plan.shape = plan.shape && !has("shape");
-  if (has("landmarks")) plan.landmark_spacing_m = 0;
+  std::istringstream list(names);
+  for (std::string name; std::getline(list, name, ',');) {
+    const auto found = left_out().find(name);
+    if (found == left_out().end())
+      throw core::BadInput("--without " + name + ": no such thing; there are " + names_left_out());
+    found->second(plan);
+  }
 }
 
 void load_map(Arguments& a) {
@@ -181,7 +204,7 @@ void add_options(CLI::App& app, Arguments& a) {
       ->check(tool::number_between(0, 1e6))
       ->capture_default_str();
   app.add_option("--fault", a.fault, "all, none, SENSOR or SENSOR:KIND")->capture_default_str();
-  app.add_option("--without", a.without, "Leave out any of camera, wheel, imu, gnss, landmarks, shape (comma between)");
+  app.add_option("--without", a.without, "Leave out any of " + names_left_out() + " (comma between)");
   app.add_option("--map", a.map, "Compiled map instead of random lines");
   app.add_option("--start", a.start, "EDGE:OFFSET[:+|-] on the map");
   app.add_option("--stanford", a.stanford, "Write the Stanford diagram (SVG)");
