@@ -66,7 +66,7 @@ Interval Estimator::interval() const {
 
 double Estimator::known_to_m() const {
   return parameters_->interval_factor * sigma_m() + parameters_->interval_floor_m +
-         parameters_->interval_drift * since_reference_m();
+         parameters_->interval_drift * since_fix_m();
 }
 
 // Where a map lacks a piece of track the place is off by that from there on. So far that it is no position, and that

@@ -72,6 +72,9 @@ class Estimator {
             int64_t stamp_ns);
 
   void apply(const Event& event);
+  /// The same for one whose interval is asked without widened(): a vague fix leaves what slips may have added as it is,
+  /// instead of making it part of what the interval holds.
+  void apply_unwidened(const Event& event);
   /// Moves on without a measurement.
   void predict_to(int64_t stamp_ns);
   void rebase_clock(int64_t stamp_ns);
@@ -115,13 +118,16 @@ class Estimator {
   /// The train may be so far beyond the interval's ends, until a fix says where it is.
   void doubt_place(const Sides& beyond);
   /// Its last reference lies so far back.
-  void refer_back(double since_reference_m) { filter_.mark_reference(since_reference_m); }
+  void refer_back(double since_reference_m);
   /// Others promise so much more than this one: a fix that it uses must not be weighed against its sigma alone.
   void contradicted_by(double excess_m) { excess_m_ = excess_m; }
   /// The state with this promised interval; since_sure_m: way since the last place that is beyond doubt.
   /// REQUIRES: predict_to(stamp_ns()) was the last call (as for interval()).
   [[nodiscard]] TrainEstimate estimate(const Interval& promised, double since_sure_m) const;
-  [[nodiscard]] double since_reference_m() const { return std::abs(filter_.since_reference_m()); }
+  /// Way since the last fix that settled what was in doubt.
+  [[nodiscard]] double since_fix_m() const { return std::abs(filter_.since_fix_m()); }
+  /// ... and since the last one that was sharp enough for the budget to count from.
+  [[nodiscard]] double since_reference_m() const { return std::abs(distance_m() - place_.reference_m); }
   /// What became of the last event, when it was a fix.
   [[nodiscard]] bool fix_used() const { return fix_verdict_ == FixVerdict::used || fix_corrected(); }
   /// Used against the filter's word, because the one before, which was refused, says the same.
@@ -236,6 +242,7 @@ class Estimator {
     TurnedWay turned_way;
     WrongPlace wrong_place;
     uint32_t reference = 0;
+    double reference_m = 0;          // the distance run there
     std::array<uint32_t, 16> met{};  // landmarks that were used last, newest first; 0 = none
     int landmarks_agreed = 0;        // in a row
     // Until a landmark tells them apart: over other ways that lead to tracks that were declared, or that map_matcher
@@ -268,6 +275,9 @@ class Estimator {
   void compare_with_wheel(const OdometryInput& step, double sigma_m);
   void isolate_wheel();
   bool blame_wheel_on_trial();
+  [[nodiscard]] bool nobody_measured() const {
+    return !has_ever_measured(Source::camera) && !has_ever_measured(Source::wheel);
+  }
   void doubt_silent_wheel(int64_t silent_since_ns, double way_m);
   void watch_alone(double way_m, double dt_s);
   [[nodiscard]] bool is_watched() const;
@@ -306,6 +316,7 @@ class Estimator {
   void doubt_surprise(double sigma_m);
   void refuse(const FixInput& fix, double path_distance_m, const Offer& offer);
   void accept(const FixInput& fix);
+  void mark_reference(const FixInput& fix);
   void watch_standstill();
   SensorWatch& watched(Source source) { return watches_[static_cast<size_t>(source)]; }
   [[nodiscard]] bool silent(Source source) const;
@@ -359,6 +370,7 @@ class Estimator {
   Unwatched unwatched_;
   double unchecked_m_ = 0;  // of the first step, until a second one or the wheel agrees
   double excess_m_ = 0;     // that others promise beyond this one's interval
+  bool unwidened_ = false;  // for the present event
 };
 
 }  // namespace railfix::fusion

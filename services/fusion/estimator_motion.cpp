@@ -71,8 +71,8 @@ void Estimator::use(const OdometryInput& step) {
       camera.hear(offer.used, kAgreementsOfCamera, step.stamp_ns);
       if (alone) doubts_.odometers_m += std::abs(offer.residual);
     } else if (const auto offer = offer_motion(Source::camera, step.stamp_ns, offered_to); offer.used) {
-      const bool nobody_before = camera.used_ns == 0 && watch(Source::wheel).used_ns == 0;
-      unchecked_m_ = nobody_before ? kSleeperM : 0;
+      unchecked_m_ = nobody_measured() ? kSleeperM : 0;
+      if (nobody_measured()) filter_.doubt_first_speed(Odometer::camera, dt_s);
       camera.accept(step.stamp_ns);
       if (step.reference_stamp_ns <= gap_begin_ns_ && filter_.has_clone(step.reference_stamp_ns)) doubts_.time_m = 0;
       compare_with_wheel(step, sigma_m);
@@ -166,6 +166,7 @@ void Estimator::use(const WheelInput& sample) {
   } else if (offer_motion(Source::wheel, sample.stamp_ns, [&](MotionFilter& filter) {
                return filter.offer_wheel(wheel_m, sigma_m, parameters_->gate_wheel);
              }).used) {
+    if (nobody_measured()) filter_.doubt_first_speed(Odometer::wheel, core::seconds(sample.stamp_ns - before_ns));
     watch.accept(sample.stamp_ns);
     unchecked_m_ = 0;
     if (wheel_.counts_since_ns <= gap_begin_ns_) doubts_.time_m = 0;

@@ -241,7 +241,7 @@ Offer Estimator::offer_place_again(double path_distance_m, double sigma_m) {
 }
 
 double Estimator::doubted_beyond_sigma_m() const {
-  const auto promised = widened(interval());
+  const auto promised = unwidened_ ? interval() : widened(interval());
   return std::max(centre_m() - promised.rear_m, promised.front_m - centre_m()) - known_to_m() + excess_m_;
 }
 
@@ -266,13 +266,28 @@ void Estimator::accept(const FixInput& fix) {
   if (!by_chance) place_.wrong_place.found();
   doubts_ = {};
   if (tells_ways_apart(fix)) place_.joined = place_.other_ways = place_.said_elsewhere = {};
-  unwatched_ = {.distance_m = unwatched_.distance_m};
-  place_.reference = fix.landmark;
+  if (!unwidened_ || fix.kind != FixKind::curvature) unwatched_ = {.distance_m = unwatched_.distance_m};
+  filter_.mark_fix();
+  mark_reference(fix);
   if (fix.landmark != 0 && !has_met(fix.landmark)) {
     std::rotate(place_.met.begin(), place_.met.end() - 1, place_.met.end());
     place_.met.front() = fix.landmark;
   }
-  filter_.mark_reference();
+}
+
+// What the track's shape tells may be good for the place and still vaguer than the budget is where it begins: such a
+// place is none to count it from.
+void Estimator::mark_reference(const FixInput& fix) {
+  const auto& p = *parameters_;
+  const bool sharp = p.interval_factor * filter_.path_sigma_m() + p.interval_floor_m <= p.budget_m;
+  if (fix.kind == FixKind::curvature && !sharp) return;
+  place_.reference = fix.landmark;
+  place_.reference_m = distance_m();
+}
+
+void Estimator::refer_back(double since_reference_m) {
+  filter_.mark_fix(since_reference_m);
+  place_.reference_m = distance_m() - since_reference_m;
 }
 
 bool Estimator::confirms_start(bool tells_track) {

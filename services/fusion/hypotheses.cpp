@@ -87,13 +87,13 @@ void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
   const bool judged = main_.fix_used() || main_.fix_refused();
   const bool unexpected = main_.fix_unexpected();
   if (judged && fix.kind == FixKind::landmark && !main_.fix_again())
-    residuals_.add(fix.landmark, main_.fix_residual_m(), main_.fix_sigmas_off(0), before.since_reference_m());
+    residuals_.add(fix.landmark, main_.fix_residual_m(), main_.fix_sigmas_off(0), before.since_fix_m());
   std::vector<Doubter> doubters_before = doubters_;
   for (auto& doubter : doubters_) {
     if (!doubter.leaves_out(fix)) doubter.estimator.apply(event);
   }
   for (auto& rival : rivals_) {
-    if (rival.estimator) rival.estimator->apply(event);
+    if (rival.estimator) rival.estimator->apply_unwidened(event);
   }
   if (judged) fix_fitted_ = main_.fix_used() && !main_.fix_corrected();
   if (main_.fix_refused()) {
@@ -268,7 +268,7 @@ Promise Hypotheses::promise() const {
     all.hold({other.widened(other.interval()), other.since_reference_m()});
   }
   const double doubt_m =
-      parameters_->interval_factor * residuals_.scatter_m() + residuals_.error_per_m() * main.since_reference_m();
+      parameters_->interval_factor * residuals_.scatter_m() + residuals_.error_per_m() * main.since_fix_m();
   const Interval doubted = main.widened({mine.rear_m - doubt_m, mine.front_m + doubt_m});
   all.hold({doubted, all.since_sure_m});
   return all;

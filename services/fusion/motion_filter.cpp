@@ -282,7 +282,7 @@ void MotionFilter::forget_references() {
   ud_.inflate(index(StateIndex::distance), squared(false_share * value(StateIndex::distance)));
   x_(unit) = before;
   ud_.reset(unit, squared(sigma));
-  reference_m_ = 0;
+  fix_m_ = 0;
 }
 
 void MotionFilter::set_origin(double path_distance_m, double sigma_m) {
@@ -308,6 +308,20 @@ void MotionFilter::loosen_speed(double sigma_mps) {
   ud_.reset(index(StateIndex::speed), squared(sigma_mps));
 }
 
+void MotionFilter::doubt_first_speed(Odometer measured, double since_s) {
+  const auto n = x_.size();
+  StateMatrix g = StateMatrix::Zero(n, 1);
+  const bool camera = measured == Odometer::camera;
+  const auto other = camera ? StateIndex::wheel_odometer : StateIndex::camera_odometer;
+  g(index(other), 0) = since_s / to_unit(camera ? Odometer::wheel : Odometer::camera);
+  if (measured != unit_) {
+    g(index(StateIndex::speed), 0) = 1;
+    g(index(StateIndex::distance), 0) = unit_scale() * since_s;
+  }
+  const double scale_mps = sigma(StateIndex::other_scale) * value(StateIndex::speed);
+  ud_.propagate(StateMatrix::Identity(n, n), g, StateVector::Constant(1, squared(scale_mps)));
+}
+
 // One change at the begin of that time, and one now for all the changes between.
 void MotionFilter::doubt_acceleration(double since_s, double sigma_mps2) {
   const auto n = x_.size();
@@ -329,7 +343,7 @@ void MotionFilter::place_like(const MotionFilter& other) {
   x_(index(StateIndex::origin)) = other.value(StateIndex::origin);
   ud_.reset(index(StateIndex::distance), squared(std::min(distance_sigma_m, path_sigma_m)));
   ud_.reset(index(StateIndex::origin), squared(path_sigma_m));
-  reference_m_ = other.reference_m_;
+  fix_m_ = other.fix_m_;
 }
 
 double MotionFilter::sigma(StateIndex state) const {

@@ -95,6 +95,27 @@ TEST(Coverage, BlindCameraWithImuOnly) {
   EXPECT_EQ(campaign.sum.outside, 0U);
 }
 
+// SUBSET-041 asks for 5 m + 5 % of the way since the reference where nothing malfunctions and the wheels hold: with
+// sleepers counted wrong, GNSS outages, a camera that is blind at times and curves that lie elsewhere than on the map.
+// These runs were the widest of 50; what is left are starts in the dark (0.3 %; 0.9 % before vague curves began budgets
+// no more).
+TEST(Coverage, WithoutFaultAndSlipTheIntervalIsWithinTheBudget) {
+  train::Verdict sum;
+  for (const uint64_t number : {4, 9, 17, 20, 22, 28, 30, 32, 35, 47}) {
+    SimulationPlan plan = train::campaign_plan();
+    plan.track_fixes = plan.shape = true;
+    plan.switch_spacing_m = 1500;
+    plan.slip = false;
+    plan.false_fix_share = 0;
+    const train::TrainSimulation simulation(plan, train::seed_of_run(3671, number));
+    auto fusion = core::value_or_throw(Fusion::create({}, simulation.map, simulation.start()));
+    const auto verdict = train::judge(simulation, fusion);
+    EXPECT_EQ(verdict.outside, 0U) << number;
+    sum.add(verdict);
+  }
+  EXPECT_LT(static_cast<double>(sum.wider) / static_cast<double>(sum.states), 0.005);
+}
+
 // Emergency brakes and starts that bite at once: the motion is another one, no sensor is faulty.
 TEST(Coverage, SuddenAccelerationIsFollowed) {
   for (const double mps2 : {2.0, 3.0}) {

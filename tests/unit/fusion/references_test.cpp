@@ -8,6 +8,7 @@ namespace railfix::fusion {
 namespace {
 
 using testing::HasSubstr;
+using testing::Not;
 
 /// Known, and sighted, to a metre.
 FixInput mast_at(double t_s, double offset_m, uint32_t landmark) {
@@ -114,6 +115,24 @@ TEST(References, TwoLandmarksCalibrateTheCamerasScale) {
   EXPECT_EQ(state.reference, 5U);
   EXPECT_NEAR(state.since_reference_m, 404, 1.0);
   EXPECT_EQ(state.integrity, Integrity::ok) << state.reason;
+}
+
+// The interval is as wide as the budget at its begin already: counted from there it would be exceeded.
+TEST(References, ACurveThatTellsThePlaceVaguelyIsNoReference) {
+  for (const double sigma_m : {0.5, 3.0}) {
+    auto fusion = fusion_at(0);
+    run(fusion, 0, 10, 20);
+    fusion.add(fix_at(10, 200, 1));
+    run(fusion, 10, 40, 20);
+    FixInput curve = fix_at(40, 800, 0);
+    curve.kind = FixKind::curvature;
+    curve.sigma_m = sigma_m;
+    fusion.add(curve);
+    const auto state = run(fusion, 40, 41, 20);
+    EXPECT_NEAR(state.since_reference_m, sigma_m < 1 ? 20 : 620, 1.0) << sigma_m;
+    EXPECT_EQ(state.reference, sigma_m < 1 ? 0U : 1U) << sigma_m;
+    EXPECT_THAT(state.reason, Not(HasSubstr("wider"))) << sigma_m;
+  }
 }
 
 TEST(References, OneFalseFixNeverMovesTheTrain) {

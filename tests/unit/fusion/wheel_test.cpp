@@ -311,6 +311,20 @@ TEST(Wheel, ASlipThatWasNoneIsUndone) {
   EXPECT_NEAR(error_m(), before_m, 0.05);
 }
 
+// The first reading tells the speed; that the scale adds to it nobody could know while none was known.
+TEST(Wheel, AFusionThatBeginsAtSpeedTakesNoScaleForASlip) {
+  for (const double stray : {-0.02, -0.012, 0.012, 0.02}) {
+    Train train;
+    train.speed_mps = 25;
+    train.stray = stray;
+    train.run(0.5);
+    for (int i = 0; i < 10; ++i) {
+      train.run(0.5);
+      EXPECT_EQ(train.state->reason, kOnlyTold) << stray << " after " << i << " halves of a second";
+    }
+  }
+}
+
 TEST(Wheel, TheReasonSaysSinceWhenItIsDistrusted) {
   Train train;
   train.run(40, 0.5);  // the clock began at 12:26:40
