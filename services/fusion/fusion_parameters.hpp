@@ -68,11 +68,11 @@ struct FusionParameters {
   double gate_gnss = 4.0;
   double gate_fix = 4.0;
 
-  // The interval that is promised: factor * sigma + floor + drift * distance since the reference.
+  // The interval that is promised: factor * sigma + floor + drift * distance since the last fix.
   double interval_factor = 4.0;
   double interval_floor_m = 0.5;
   double interval_drift = 0.003;
-  // What is still good: SUBSET-041.
+  // What is still good, counted from the reference: SUBSET-041.
   double budget_m = 5.0;
   double budget_per_m = 0.05;
   double unusable_budgets = 4.0;  // an interval of so many budgets is no position
