@@ -298,10 +298,13 @@ class Estimator {
   [[nodiscard]] bool gnss_denies_place() const;
   void use_track(const FixInput& fix);
   void doubt_points_behind();
+  /// Other ways that the train may have come over, to either side.
+  [[nodiscard]] Sides named_ways() const;
+  /// ... with what map_matcher says otherwise and does not name.
   [[nodiscard]] Sides held_ways() const;
   [[nodiscard]] bool tells_ways_apart(const FixInput& fix) const;
   void hold_other_ways(const FixInput& fix, double place_m, double here_m);
-  [[nodiscard]] bool fits_a_held_way(const MeasuredPlace& place) const;
+  [[nodiscard]] bool fits_a_named_way(const MeasuredPlace& place) const;
   Offer offer_place(const MeasuredPlace& place);
   Offer offer_place_again(double path_distance_m, double sigma_m);
   [[nodiscard]] bool has_met(uint32_t landmark) const;

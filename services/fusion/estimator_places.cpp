@@ -120,9 +120,14 @@ void Estimator::hold_other_ways(const FixInput& fix, double place_m, double here
   place_.said_elsewhere = named ? Sides{} : said;
 }
 
-Sides Estimator::held_ways() const {
+Sides Estimator::named_ways() const {
   Sides ways = place_.joined;
   ways.hold(place_.other_ways);
+  return ways;
+}
+
+Sides Estimator::held_ways() const {
+  Sides ways = named_ways();
   ways.hold(place_.said_elsewhere);
   return ways;
 }
@@ -202,21 +207,23 @@ double Estimator::fix_sigmas_off(double excused_m) const {
   return off_m > excused_m ? std::sqrt(fix_offer_.nis) * (1 - excused_m / off_m) : 0;
 }
 
-// No further off than the train would be over the way that is followed, over one that is held or between them.
-bool Estimator::fits_a_held_way(const MeasuredPlace& place) const {
-  const Sides ways = held_ways();
+// No further off than the train would be over the way that is followed, over one that was named or between them. A
+// place that map_matcher says without naming a way to it is none: its landmarks say the same, and who is wrong is not
+// known.
+bool Estimator::fits_a_named_way(const MeasuredPlace& place) const {
+  const Sides ways = named_ways();
   if (ways.behind_m + ways.ahead_m == 0) return false;
   const auto offer = filter_.test_position(place.path_distance_m, place.sigma_m, parameters_->gate_fix);
   const double way_m = offer.residual < 0 ? ways.behind_m : ways.ahead_m;
   return offer.used || std::abs(offer.residual) * (1 - parameters_->gate_fix / std::sqrt(offer.nis)) < way_m;
 }
 
-// While other ways are held, a fix that fits one of them says where the train is and not the filter, and says nothing
+// While other ways are named, a fix that fits one of them says where the train is and not the filter, and says nothing
 // of the scales. So it does where more is in doubt than a vague fix leaves open: else it would end the doubt and move
 // nothing. What a sharp one leaves open is little anyway.
 Offer Estimator::offer_place(const MeasuredPlace& place) {
-  if (fits_a_held_way(place)) {
-    const Sides ways = held_ways();
+  if (fits_a_named_way(place)) {
+    const Sides ways = named_ways();
     filter_.loosen_origin(kLoose * std::max(ways.behind_m, ways.ahead_m));
     return filter_.offer_position(place, parameters_->gate_fix);
   }

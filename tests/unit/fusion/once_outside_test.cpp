@@ -259,6 +259,13 @@ const std::vector<CampaignRun> kRuns{
      .sensor = Sensor::none,
      .kind = FaultKind::none,
      .wider_share = 0},
+    // map_matcher stuck: it says one place for the track and for every landmark. Each landmark lay where it said the
+    // train was, so that fusion took it for one on another way and followed it twice. 350 states were outside.
+    {.name = "WhoSaysOnePlaceAgainAndAgainNamesNoOtherWay",
+     .seed = 3680,
+     .number = 485,
+     .sensor = Sensor::fix,
+     .kind = FaultKind::stuck},
 };
 
 INSTANTIATE_TEST_SUITE_P(Runs, OnceOutside, ::testing::ValuesIn(kRuns), [](const auto& run) { return run.param.name; });
