@@ -331,6 +331,11 @@ void BaliseTracker::pass(std::vector<Passed> passed, double step_m) {
   for (const auto& mark : passed) {
     const double foot_m = step_m - mark.way_m;
     const bool again = reference_ && reference_->group == mark.group;
+    // A foot that trembles above a group at a halt passes nothing.
+    if (again && reference_->furthest_m > kSameWayM) {
+      ++passed_again_;
+      reference_->furthest_m = 0;
+    }
     // Over and back it stays as it is. Round a loop it is passed anew, and no group lies before it.
     if (again && reference_->nominal_along == mark.nominal_along &&
         std::abs(reference_->foot_m - foot_m) <= kSameWayM + reference_->doubt_m)
@@ -340,6 +345,7 @@ void BaliseTracker::pass(std::vector<Passed> passed, double step_m) {
     const auto* previous = tells ? reference_->group : nullptr;
     reference_ = Reference{mark.group, previous, mark.nominal_along, from_previous_m > 0, foot_m, mark.doubt_m};
   }
+  if (reference_) reference_->furthest_m = std::max(reference_->furthest_m, std::abs(reference_->foot_m));
 }
 
 void BaliseTracker::acquire(const EdgePosition& foot) {

@@ -21,6 +21,7 @@ struct Reference {
   bool from_previous_along = true;               // the way from `previous` to `group` runs along
   double foot_m = 0;                             // camera's foot beyond the group, along; negative = in front of it
   double doubt_m = 0;                            // the way from the group may be longer or shorter by so much
+  double furthest_m = 0;                         // the foot was so far from it since it was passed
 };
 
 /// Follows the camera's foot over the map. A group counts as passed when the foot's estimate passes it, in either
@@ -52,6 +53,8 @@ class BaliseTracker {
   [[nodiscard]] const std::optional<Reference>& reference() const { return reference_; }
   /// So many times a group that had been taken for passed counted no more.
   [[nodiscard]] uint32_t taken_back() const { return taken_back_; }
+  /// So many times the train went over its LRBG once more: round a ring, or back over it.
+  [[nodiscard]] uint32_t passed_again() const { return passed_again_; }
   /// How far the train has come since its track was declared last; nothing while it is declared.
   [[nodiscard]] std::optional<double> undeclared_m() const;
   /// How far the foot is beyond this group, along, when it is the reference or lies behind the train, no farther than
@@ -106,6 +109,7 @@ class BaliseTracker {
   bool leg_declared_ = false;  // of `leg_`, when there is one
   std::optional<Reference> reference_;
   uint32_t taken_back_ = 0;
+  uint32_t passed_again_ = 0;
   bool forwards_ = true;  // the way that the train runs, seen from the cab
   double moved_back_m_ = 0;
 };

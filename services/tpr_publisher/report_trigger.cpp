@@ -83,6 +83,8 @@ void ReportTrigger::note_events(const Moment& moment) {
     last_group_ = moment.nid_lrbg;
     group_passed_ = true;
   }
+  if (moment.passed_again > passed_again_) group_passed_ = true;
+  passed_again_ = moment.passed_again;
   for (auto& location : locations_) {
     if (!origin_m_ || location.passed || reached_m(moment, location.rear_end) - *origin_m_ < location.at_m) continue;
     location.passed = true;

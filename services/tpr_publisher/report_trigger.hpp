@@ -53,6 +53,7 @@ struct Moment {
   bool standstill = false;
   uint32_t nid_lrbg = etcs::kUnknownBaliseGroup;
   uint32_t taken_back = 0;                // counts up whenever an LRBG that was told turns out to be none
+  uint32_t passed_again = 0;              // counts up whenever the train goes over its LRBG once more
   std::optional<double> beyond_lrbg_m;    // front end beyond the LRBG, along the train
   std::optional<double> beyond_origin_m;  // ... beyond the group that wanted_origin() names
   Onboard onboard;
@@ -110,7 +111,8 @@ class ReportTrigger {
   bool passed_before_ = true;       // locations that lie behind when the origin is found were passed long ago
   std::optional<Moment> reported_;  // last moment that was sent
   uint32_t last_group_ = etcs::kUnknownBaliseGroup;
-  bool asked_ = false;  // "now"
+  uint32_t passed_again_ = 0;  // when it was looked at last
+  bool asked_ = false;         // "now"
   bool group_passed_ = false;
   bool location_passed_ = false;
   bool way_lost_ = false;  // since the last report

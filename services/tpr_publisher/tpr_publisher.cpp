@@ -284,6 +284,7 @@ Moment TprPublisher::moment(int64_t now_ns) const {
   moment.min_safe_front_m =
       position.over_m >= 0 ? moment.front_m - position.over_m - group_m() - allowance.over_m : -HUGE_VAL;
   moment.taken_back = tracker_ ? tracker_->taken_back() : 0;
+  moment.passed_again = tracker_ ? tracker_->passed_again() : 0;
   if (const auto here = reference()) {
     moment.nid_lrbg = here->group->nid_lrbg();
     const auto origin = trigger_.wanted_origin();

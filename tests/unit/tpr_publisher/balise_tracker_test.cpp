@@ -1,4 +1,5 @@
 #include <cmath>
+#include <vector>
 
 #include "unit/tpr_publisher/tracker_fixture.hpp"
 
@@ -176,6 +177,19 @@ TEST(Ring, AGroupPassedAgainRoundARingIsPassedAnew) {
     EXPECT_EQ(tracker.reference()->group->nid_lrbg(), kD);
     EXPECT_NEAR(tracker.reference()->foot_m, std::fmod(10.0 * i - 100, kRoundM), 1e-6);
   }
+  EXPECT_EQ(tracker.passed_again(), 2U);
+}
+
+TEST(Ring, AGroupIsPassedAgainByATrainThatSetsBackAndNotByOneThatTrembles) {
+  BaliseTracker tracker(ring_map(), 5000);
+  const auto run = [&](const std::vector<double>& offsets_m) {
+    for (const double offset_m : offsets_m) tracker.update(forward(1, offset_m), true);
+    return tracker.passed_again();
+  };
+  const auto before = run({150, 120, 105, 99.5});
+  EXPECT_EQ(run({100.2, 99.8, 100.1, 99.9, 100.3}), before);
+  EXPECT_EQ(run({110, 120, 108, 95}), before + 1);
+  EXPECT_EQ(run({92, 99, 105}), before + 2);
 }
 
 }  // namespace

@@ -91,6 +91,15 @@ TEST_F(Trigger, StandstillReachedAndLeft) {
   EXPECT_EQ(step(), Reason::moving);
 }
 
+TEST_F(Trigger, TheSameBaliseGroupPassedOnceMore) {
+  step();
+  moment.nid_lrbg = 7;
+  EXPECT_EQ(step(), Reason::balise_group);
+  ++moment.passed_again;
+  EXPECT_EQ(step(), Reason::balise_group);
+  EXPECT_EQ(step(), std::nullopt);
+}
+
 TEST_F(Trigger, EveryNewBaliseGroupUnlessNotWanted) {
   step();
   moment.nid_lrbg = 7;
