@@ -103,11 +103,14 @@ void print_widths(const Verdict& sum) {
     return 100 * static_cast<double>(states) / static_cast<double>(std::max<size_t>(sum.states, 1));
   };
   const size_t named = sum.wider - sum.wider_placeless - sum.wider_first - sum.wider_alone;
-  std::printf("wider than 5 m + 5 %%: %.2f %% of the states\n", percent(sum.wider));
+  std::printf("wider than 5 m + 5 %% of the way since the last sure reference: %.2f %% of the states\n",
+              percent(sum.wider));
   std::printf(
       "  %.2f %% without a place on the map, %.2f %% before the first reference, %.2f %% with a sensor, a fix or "
       "the track in doubt, %.2f %% with nothing else wrong any more\n",
       percent(sum.wider_placeless), percent(sum.wider_first), percent(named), percent(sum.wider_alone));
+  std::printf("  counted from the last landmark, before another has confirmed it: %.2f %%\n",
+              percent(sum.wider_of_last));
 }
 
 std::string to_string(const BadRun& run) {

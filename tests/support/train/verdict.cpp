@@ -61,8 +61,9 @@ class Judge {
     }
     verdict_.placeless += state.track_known ? 0 : 1;
     verdict_.worst_excess_m = std::max(verdict_.worst_excess_m, excess_m);
-    const bool wider = std::max(state.over_m, state.under_m) > 5 + 0.05 * state.since_sure_m;
-    if (wider) judge_width(state, ok);
+    const double length_m = std::max(state.over_m, state.under_m);
+    verdict_.wider_of_last += length_m > 5 + 0.05 * state.since_reference_m ? 1 : 0;
+    if (length_m > 5 + 0.05 * state.since_sure_m) judge_width(state, ok);
     verdict_.not_ok += ok ? 0 : 1;
     verdict_.width_sum_m += state.over_m + state.under_m;
     judge_track(state, ok, truth.distance_m);
@@ -118,6 +119,7 @@ void Verdict::add(const Verdict& other) {
   outside_usable += other.outside_usable;
   outside_again += other.outside_again;
   placeless += other.placeless;
+  wider_of_last += other.wider_of_last;
   wider += other.wider;
   wider_unsaid += other.wider_unsaid;
   wider_placeless += other.wider_placeless;

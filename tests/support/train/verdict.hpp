@@ -17,7 +17,8 @@ struct Verdict {
   size_t outside_usable = 0;    // ... ok or degraded
   size_t outside_again = 0;     // ... since it claimed no place on the map
   size_t placeless = 0;         // claims none
-  size_t wider = 0;             // interval beyond 5 m + 5 % of the way since the last sure reference ...
+  size_t wider_of_last = 0;     // interval beyond 5 m + 5 % of the way since the last reference, sure or not
+  size_t wider = 0;             // ... since the last sure one, as fusion judges itself ...
   size_t wider_unsaid = 0;      // ... while the state says ok
   size_t wider_placeless = 0;   // ... while it claims no place on the map
   size_t wider_first = 0;       // ... before the first reference: no landmark has confirmed the place that was told
