@@ -1,11 +1,13 @@
-// The ERJU digital map: where things lie on its track edges.
+// The ERJU digital map: where things lie on its track edges, and what of it is not read.
 #include "import_fixture.hpp"
 #include "track/import/build.hpp"
 
 namespace railfix::track {
 namespace {
 
+using testing::Contains;
 using testing::ElementsAre;
+using testing::HasSubstr;
 using testing::IsEmpty;
 
 class ErjuTest : public ImportTest {
@@ -59,6 +61,26 @@ TEST_F(ErjuTest, WhatIsNotOnItsTrackEdgeIsLeftOutAndTold) {
     EXPECT_THAT(map.problems, testing::IsSupersetOf({"<tunnel> \"TU\"" + told, "<bridge> \"BR\"" + told,
                                                      "<levelCrossing> \"LX\"" + told}));
   }
+}
+
+TEST_F(ErjuTest, WhatIsNotReadIsTold) {
+  const auto alignment = [](const std::string& edge, const std::string& items) {
+    return "<trackEdgeGeometry id=\"" + edge + "\"><verticalAlignment>" + items +
+           "</verticalAlignment></trackEdgeGeometry>";
+  };
+  const std::string line =
+      "<verticalAlignmentItem><verticalSegmentLine trackGeometryPos=\"0\" slope=\"12.5\"/></verticalAlignmentItem>";
+  const std::string cants =
+      "<sampledTrackEdgeGeometry id=\"T2\"><slopes><slope pos=\"0\" samplePointSlope=\"10\"/></slopes><cants>"
+      "<cant pos=\"0\" samplePointCant=\"60\"/></cants></sampledTrackEdgeGeometry>";
+  EXPECT_THAT(
+      map_of(alignment("T1", line) + alignment("T2", "") + alignment("T3", line) + cants).problems,
+      testing::IsSupersetOf(
+          {"track edge \"T1\", as 1 more, has gradients in its vertical alignment, whose units no schema at hand "
+           "gives; they are left out, only sampled slopes are read",
+           "track edge \"T2\" has sampled cants, whose unit and sign no schema at hand gives; they are left out, "
+           "only cant points are read"}));
+  EXPECT_THAT(map_of(alignment("T1", "")).problems, testing::Not(Contains(HasSubstr("no schema at hand"))));
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include "core/units.hpp"
 #include "track/import/told.hpp"
+#include "track/import/xml/erju_unread.hpp"
 #include "track/import/xml/net_places.hpp"
 #include "track/import/xml/xml_source.hpp"
 
@@ -42,6 +43,7 @@ class Reader {
     read_edges();
     if (map_) read_coordinates();
     read_plan();
+    tell_unread(infra_, net_.problems);
     read_links();
     read_balises();
     read_tunnels();
