@@ -176,8 +176,12 @@ class Reader {
       add(LandmarkKind::level_crossing, pos(of) - origin_m_, of);
     for (const pugi::xml_node& of : elements.child("platformEdges").children("platformEdge"))
       add_stretch(platforms_, of, platform_lateral_m(of.attribute("side").value()));
-    for (const pugi::xml_node& of : node.child("ocsElements").child("signals").children("signal"))
+    const pugi::xml_node control = node.child("ocsElements");
+    for (const pugi::xml_node& of : control.child("signals").children("signal"))
       add(LandmarkKind::mast, pos(of) - origin_m_, of);
+    for (const pugi::xml_node& of : control.child("stopPosts").children("stopPost")) {
+      if (!of.attribute("virtual").as_bool()) add(LandmarkKind::mast, pos(of) - origin_m_, of);
+    }
   }
 
   bool lies_on(const pugi::xml_node& of, const NetTrack& track) {
