@@ -274,6 +274,38 @@ class Check {
       cuts_.push_back(what + " " + called(before) + " and " + called(one) + " are at the same place, " +
                       place_on(one.edge, one.offset_m));
     }
+    tell_same_joints(what, things, called);
+  }
+
+  /// One at the end of an edge, the other where the next one begins. By place on each edge.
+  template <class Thing, class Called>
+  void tell_same_joints(const std::string& what, const std::vector<const Thing*>& things, const Called& called) {
+    std::map<uint32_t, std::vector<std::pair<const Thing*, double>>> near;  // nodes: metres from there
+    for (size_t i = 0; i < things.size(); ++i) {
+      const Thing* one = things[i];
+      const Edge* edge = map_.edge(one->edge);
+      if (edge == nullptr) continue;
+      const bool is_first = i == 0 || things[i - 1]->edge != one->edge;
+      const bool is_last = i + 1 == things.size() || things[i + 1]->edge != one->edge;
+      if (is_first) near[edge->from_node].emplace_back(one, one->offset_m);
+      if (is_last) near[edge->to_node].emplace_back(one, edge->alignment.length_m() - one->offset_m);
+    }
+    for (const auto& [node, there] : near) {
+      for (size_t i = 1; i < there.size(); ++i) {
+        for (size_t before = 0; before < i; ++before) {
+          const auto& [a, a_m] = there[before];
+          const auto& [b, b_m] = there[i];
+          if (a_m + b_m > kSamePlaceM || is_told_on_edge(*a, *b)) continue;
+          cuts_.push_back(what + " " + called(*a) + " and " + called(*b) + " are at the same place, " +
+                          place_on(a->edge, a->offset_m) + " and " + place_on(b->edge, b->offset_m));
+        }
+      }
+    }
+  }
+
+  template <class Thing>
+  static bool is_told_on_edge(const Thing& a, const Thing& b) {
+    return a.edge == b.edge && std::abs(a.offset_m - b.offset_m) <= kSamePlaceM;
   }
 
   const Map& map_;

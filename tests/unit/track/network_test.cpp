@@ -238,6 +238,23 @@ TEST(Check, NamesBalisesThatAreThereTwice) {
               testing::ElementsAre("balises \"B1\" and (no name) are at the same place, edge 1 (main) at 900.30 m"));
 }
 
+TEST(Check, NamesBalisesThatAreThereTwiceAcrossAJoint) {
+  Map map = small_map();
+  map.balise_groups.clear();
+  map.landmarks = {{1, LandmarkKind::balise, 1, 999.9, 0, 0.1, "B1"}, {2, LandmarkKind::balise, 2, 0.1, 0, 0.1, "B2"}};
+  EXPECT_THAT(check_topology(map),
+              testing::ElementsAre("balises \"B1\" and \"B2\" are at the same place, edge 1 (main) at 999.90 m and "
+                                   "edge 2 (on) at 0.10 m"));
+  map.landmarks[1].edge = 3;  // runs towards the switch
+  EXPECT_THAT(check_topology(map), testing::IsEmpty());
+  map.landmarks[1].offset_m = 499.9;
+  EXPECT_EQ(check_topology(map).size(), 1U);
+  map.landmarks[1].offset_m = 499.4;
+  EXPECT_THAT(check_topology(map), testing::IsEmpty());
+  map.balise_groups = {{85, 100, 1, 1000, true, false, 5, {}}, {85, 101, 2, 0, true, true, 5, {}}};
+  EXPECT_THAT(check_topology(map), testing::ElementsAre(HasSubstr("balise groups 85/100 and 85/101 are at the same")));
+}
+
 TEST(Check, NamesADanglingSwitchAsItsSourceDoes) {
   Map map = small_map();
   map.edges.pop_back();

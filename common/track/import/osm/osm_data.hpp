@@ -63,7 +63,7 @@ bool is_platform_relation(const OsmTags& tags, bool with_trams);
 bool is_outline(const std::string& role);
 /// A node that is one of the masts that carry the wire. They stand beside the tracks, and no way leads there.
 bool is_mast(const OsmTags& tags);
-/// There, and not "no".
+/// There, and not "no", nor what converters write for that.
 bool is_set(const OsmTags& tags, const char* key);
 /// Empty where there is no such key.
 std::string value_of(const OsmTags& tags, const char* key);

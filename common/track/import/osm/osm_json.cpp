@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "core/json_text.hpp"
 #include "core/whole_file.hpp"
@@ -15,12 +16,23 @@ using nlohmann::json;
 
 constexpr size_t kMostOfRemark = 200;
 
+/// As OpenStreetMap says it: converters make numbers and booleans of what are strings there, and 1.0 of 1.
+std::optional<std::string> tag_of(const json& value) {
+  constexpr double kMostWhole = 1e15;
+  if (value.is_string()) return value.get<std::string>();
+  if (value.is_boolean()) return value.get<bool>() ? "yes" : "no";
+  if (!value.is_number()) return std::nullopt;
+  const double number = value.get<double>();
+  const bool is_whole = value.is_number_float() && std::abs(number) < kMostWhole && number == std::floor(number);
+  return is_whole ? std::to_string(static_cast<int64_t>(number)) : value.dump();
+}
+
 OsmTags tags_in(const json& object, const char* key) {
   OsmTags tags;
   const auto found = object.find(key);
   if (found == object.end() || !found->is_object()) return tags;
   for (const auto& [name, value] : found->items()) {
-    if (value.is_string()) tags.emplace(name, value.get<std::string>());
+    if (auto tag = tag_of(value)) tags.emplace(name, std::move(*tag));
   }
   return tags;
 }

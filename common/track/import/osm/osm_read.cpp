@@ -176,7 +176,7 @@ std::string value_of(const OsmTags& tags, const char* key) {
 
 bool is_set(const OsmTags& tags, const char* key) {
   const std::string value = value_of(tags, key);
-  return !value.empty() && value != "no";
+  return !value.empty() && value != "no" && value != "0" && value != "false";
 }
 
 bool leads_over(const OsmTags& tags, bool with_trams) {

@@ -6,6 +6,8 @@
 
 #include "core/units.hpp"
 #include "track/import/told.hpp"
+#include "track/import/xml/erju_unread.hpp"
+#include "track/import/xml/net_places.hpp"
 #include "track/import/xml/xml_source.hpp"
 
 namespace railfix::track {
@@ -16,6 +18,7 @@ constexpr double kLongestEdgeM = 1e6;
 constexpr double kSlopePerUnit = 1e-4;  // slopes are tenths of a per mille
 constexpr double kNearCoordinateM = 0.1;
 constexpr double kSharpestRadiusM = 10.0;
+constexpr double kOnEdgeM = 0.01;
 
 double metres(double millimetres) {
   return 1e-3 * millimetres;
@@ -40,9 +43,10 @@ class Reader {
     read_edges();
     if (map_) read_coordinates();
     read_plan();
+    tell_unread(infra_, net_.problems);
     read_links();
     read_balises();
-    read_marks("tunnel", LandmarkKind::portal_in);
+    read_tunnels();
     read_marks("bridge", LandmarkKind::underbridge);
     read_marks("levelCrossing", LandmarkKind::level_crossing);
     read_marker_boards();
@@ -224,7 +228,7 @@ class Reader {
         }
         on = track;
         const double at = metres(infra_.required(spot, "pos"));
-        if (at > net_.tracks[track].length_m + 0.01)
+        if (at > net_.tracks[track].length_m + kOnEdgeM)
           net_.problems.push_back("balise \"" + std::string(balise.attribute("id").value()) +
                                   "\" lies beyond the end of its track edge");
         group.balises.push_back({LandmarkKind::balise, at, 0, kSurveyedM, balise.attribute("id").value()});
@@ -238,26 +242,51 @@ class Reader {
     }
   }
 
-  /// Things with a section (tunnel, bridge) or a spot (level crossing) of a track edge.
+  static std::string id_of(const pugi::xml_node& node) {
+    const std::string id = node.attribute("id").value();
+    return id.empty() ? node.attribute("tunnelIdentification").value() : id;  // all that a tunnel has by the schema
+  }
+
+  void read_tunnels() {
+    for (const pugi::xml_node& node : descendants(infra_.root(), "tunnel")) {
+      for (const NetSpot& spot : portals_of(net_, places_of(node)))
+        net_.tracks[spot.track].track.marks.push_back(portal(spot, kSurveyedM, id_of(node)));
+    }
+  }
+
+  /// Things in the middle of a section of a track edge (bridge), or at a spot of it (level crossing).
   void read_marks(const char* name, LandmarkKind kind) {
     for (const pugi::xml_node& node : descendants(infra_.root(), name)) {
-      const std::string id = node.attribute("id").value();
-      for (const pugi::xml_node& section : descendants(node, "trackEdgeSection")) {
-        NetTrack& track = net_.tracks[track_of(infra_, section, "trackEdge")];
-        const double from = metres(infra_.number(section, "skipFromStart").value_or(0));
-        const double to = track.length_m - metres(infra_.number(section, "skipFromEnd").value_or(0));
-        if (kind == LandmarkKind::portal_in) {
-          if (from > 0) track.track.marks.push_back({LandmarkKind::portal_in, from, 0, kSurveyedM, id});
-          if (to < track.length_m) track.track.marks.push_back({LandmarkKind::portal_out, to, 0, kSurveyedM, id});
-        } else {
-          track.track.marks.push_back({kind, 0.5 * (from + to), 0, kSurveyedM, id});
-        }
-      }
-      for (const pugi::xml_node& spot : descendants(node, "spotLocation")) {
-        NetTrack& track = net_.tracks[track_of(infra_, spot, "trackEdge")];
-        track.track.marks.push_back({kind, metres(infra_.required(spot, "pos")), 0, kSurveyedM, id});
+      for (const NetPlace& place : places_of(node)) {
+        net_.tracks[place.track].track.marks.push_back(
+            {kind, 0.5 * (place.from_m + place.to_m), 0, kSurveyedM, id_of(node)});
       }
     }
+  }
+
+  /// Sections and spots; those that are not on their track edge are told.
+  std::vector<NetPlace> places_of(const pugi::xml_node& node) {
+    std::vector<NetPlace> out;
+    const auto add = [&](size_t track, double from_m, double to_m) {
+      const double length_m = net_.tracks[track].length_m;
+      if (from_m < 0 || to_m > length_m + kOnEdgeM || from_m > to_m + kOnEdgeM) {
+        net_.problems.push_back("<" + std::string(node.name()) + "> \"" + id_of(node) +
+                                "\" is not on its track edge \"" + net_.tracks[track].track.name +
+                                "\"; it is left out there");
+      } else {
+        out.push_back({track, from_m, std::max(from_m, to_m)});
+      }
+    };
+    for (const pugi::xml_node& section : descendants(node, "trackEdgeSection")) {
+      const size_t track = track_of(infra_, section, "trackEdge");
+      const double skipped_m = metres(infra_.number(section, "skipFromEnd").value_or(0));
+      add(track, metres(infra_.number(section, "skipFromStart").value_or(0)), net_.tracks[track].length_m - skipped_m);
+    }
+    for (const pugi::xml_node& spot : descendants(node, "spotLocation")) {
+      const double at_m = metres(infra_.required(spot, "pos"));
+      add(track_of(infra_, spot, "trackEdge"), at_m, at_m);
+    }
+    return out;
   }
 
   /// Boards of ETCS stand on masts, as signals do. Which side they stand on is not said.

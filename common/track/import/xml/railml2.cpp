@@ -7,6 +7,7 @@
 #include "track/import/xml/railml2_balises.hpp"
 #include "track/import/xml/railml2_coordinates.hpp"
 #include "track/import/xml/railml2_radii.hpp"
+#include "track/import/xml/railml2_stretches.hpp"
 #include "track/import/xml/railml_readers.hpp"
 
 namespace railfix::track {
@@ -42,6 +43,8 @@ class Reader {
     cut_at_switches();
     shape_pieces();
     link();
+    tunnels_.add_portals(pieces_, net_);
+    platforms_.add_ends(pieces_, net_);
     return std::move(net_);
   }
 
@@ -139,13 +142,12 @@ class Reader {
 
   void read_marks(const pugi::xml_node& node, NetTrack& track) {
     const pugi::xml_node elements = node.child("trackElements");
-    const auto add = [&](LandmarkKind kind, double offset_m, double lateral_m, const pugi::xml_node& of) {
+    const auto add = [&](LandmarkKind kind, double offset_m, const pugi::xml_node& of) {
       if (!is_on_track(offset_m, track.length_m)) {
         net_.problems.push_back(not_on_its_track(of));
         return;
       }
-      track.track.marks.push_back(
-          {kind, std::clamp(offset_m, 0.0, track.length_m), lateral_m, kRailmlSigmaM, railml_name(of)});
+      track.track.marks.push_back({kind, std::clamp(offset_m, 0.0, track.length_m), 0, kRailmlSigmaM, railml_name(of)});
     };
     const auto length = [&](const pugi::xml_node& of) -> std::optional<double> {
       const double length_m = source_.number(of, "length").value_or(0);
@@ -153,32 +155,33 @@ class Reader {
       tell_impossible(of, "length", "m; it is left out", track);
       return std::nullopt;
     };
-    for (const pugi::xml_node& of : elements.child("tunnels").children("tunnel")) {
+    const size_t index = net_.tracks.size() - 1;
+    const auto add_stretch = [&](Railml2Stretches& stretches, const pugi::xml_node& of, double lateral_m) {
       const auto length_m = length(of);
-      if (!length_m) continue;
-      add(LandmarkKind::portal_in, pos(of) - origin_m_, 0, of);
-      add(LandmarkKind::portal_out, pos(of) - origin_m_ + *length_m, 0, of);
-    }
+      if (!length_m) return;
+      const double from_m = pos(of) - origin_m_;
+      stretches.add({index, from_m, from_m + *length_m, true, lateral_m}, of, net_);
+    };
+    for (const pugi::xml_node& of : elements.child("tunnels").children("tunnel")) add_stretch(tunnels_, of, 0);
     // The schema of railML 2 spells the element "brigde"; files by hand may not.
     for (const char* spelling : {"brigde", "bridge"}) {
       for (const pugi::xml_node& of : elements.child("bridges").children(spelling)) {
         // Only what says that it crosses the track leads over it (kind as wiki2.railml.org, IS:brigde, suggests).
         const bool is_over = std::string(of.attribute("kind").value()) == "crossing";
         const LandmarkKind kind = is_over ? LandmarkKind::bridge : LandmarkKind::underbridge;
-        if (const auto length_m = length(of)) add(kind, pos(of) - origin_m_ + 0.5 * *length_m, 0, of);
+        if (const auto length_m = length(of)) add(kind, pos(of) - origin_m_ + 0.5 * *length_m, of);
       }
     }
     for (const pugi::xml_node& of : elements.child("levelCrossings").children("levelCrossing"))
-      add(LandmarkKind::level_crossing, pos(of) - origin_m_, 0, of);
-    for (const pugi::xml_node& of : elements.child("platformEdges").children("platformEdge")) {
-      const double lateral = platform_lateral_m(of.attribute("side").value());
-      const auto length_m = length(of);
-      if (!length_m) continue;
-      add(LandmarkKind::platform, pos(of) - origin_m_, lateral, of);
-      add(LandmarkKind::platform, pos(of) - origin_m_ + *length_m, lateral, of);
+      add(LandmarkKind::level_crossing, pos(of) - origin_m_, of);
+    for (const pugi::xml_node& of : elements.child("platformEdges").children("platformEdge"))
+      add_stretch(platforms_, of, platform_lateral_m(of.attribute("side").value()));
+    const pugi::xml_node control = node.child("ocsElements");
+    for (const pugi::xml_node& of : control.child("signals").children("signal"))
+      add(LandmarkKind::mast, pos(of) - origin_m_, of);
+    for (const pugi::xml_node& of : control.child("stopPosts").children("stopPost")) {
+      if (!of.attribute("virtual").as_bool()) add(LandmarkKind::mast, pos(of) - origin_m_, of);
     }
-    for (const pugi::xml_node& of : node.child("ocsElements").child("signals").children("signal"))
-      add(LandmarkKind::mast, pos(of) - origin_m_, 0, of);
   }
 
   bool lies_on(const pugi::xml_node& of, const NetTrack& track) {
@@ -329,7 +332,9 @@ class Reader {
   std::map<std::string, Connector> connectors_;
   std::vector<pugi::xml_node> switches_;  // and crossings
   std::set<pugi::xml_node> linked_;       // those that trains leave their track on
-  std::map<size_t, std::map<double, size_t>> pieces_;
+  Railml2Pieces pieces_;
+  Railml2Stretches tunnels_;
+  Railml2Stretches platforms_;
 };
 
 }  // namespace

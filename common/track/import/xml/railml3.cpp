@@ -192,30 +192,16 @@ class Reader {
         {kind, offset_m, place.same_direction ? lateral_m : -lateral_m, kRailmlSigmaM, railml_name(of)});
   }
 
-  /// Where the whole thing begins and ends, not every net element's part of it.
-  void add_ends(const std::vector<NetPlace>& places, LandmarkKind begin, LandmarkKind end, double lateral_m,
-                const pugi::xml_node& of) {
-    for (const NetPlace& place : places) {
-      if (!goes_on(net_, places, place, false)) add(begin, place, place.from_m, lateral_m, of);
-      if (!goes_on(net_, places, place, true)) add(end, place, place.to_m, lateral_m, of);
-    }
+  void add_portals(const pugi::xml_node& of) {
+    for (const NetSpot& spot : portals_of(net_, places_.of(of)))
+      net_.tracks[spot.track].track.marks.push_back(portal(spot, kRailmlSigmaM, railml_name(of)));
   }
 
-  /// A tunnel that goes on over one leg of a switch has its portal on the leg that leaves it: every way meets one.
-  void add_portals(const pugi::xml_node& of) {
+  /// Where the whole platform begins and ends, not every net element's part of it.
+  void add_platform(double lateral_m, const pugi::xml_node& of) {
     const std::vector<NetPlace> places = places_.of(of);
-    add_ends(places, LandmarkKind::portal_in, LandmarkKind::portal_out, 0, of);
-    std::set<NetEnd> legs;
-    for (const NetPlace& place : places) {
-      for (const bool at_end : {false, true}) {
-        for (const NetEnd& leg : legs_outside(net_, places, place, at_end)) legs.insert(leg);
-      }
-    }
-    for (const NetEnd& leg : legs) {
-      NetTrack& outside = net_.tracks[leg.track];
-      outside.track.marks.push_back({leg.at_end ? LandmarkKind::portal_in : LandmarkKind::portal_out,
-                                     leg.at_end ? outside.length_m : 0.0, 0, kRailmlSigmaM, railml_name(of)});
-    }
+    for (const NetSpot& spot : ends_of(net_, places))
+      add(LandmarkKind::platform, places[spot.place], spot.offset_m, lateral_m, of);
   }
 
   void add_middles(LandmarkKind kind, const pugi::xml_node& of) {
@@ -238,8 +224,7 @@ class Reader {
     for (const pugi::xml_node& of : descendants(source_.root(), "platformEdge")) {
       const pugi::xml_node sided =
           of.find_node([](const pugi::xml_node& node) { return node.attribute("lateralSide"); });
-      const double lateral_m = platform_lateral_m(sided.attribute("lateralSide").value());
-      add_ends(places_.of(of), LandmarkKind::platform, LandmarkKind::platform, lateral_m, of);
+      add_platform(platform_lateral_m(sided.attribute("lateralSide").value()), of);
     }
     for (const pugi::xml_node& of : descendants(source_.root(), "signalIS")) {
       for (const NetPlace& place : places_.of(of)) add(LandmarkKind::mast, place, place.from_m, 0, of);

@@ -1,0 +1,31 @@
+#include "track/import/xml/erju_unread.hpp"
+
+namespace railfix::track {
+namespace {
+
+void tell(const XmlSource& infra, const char* geometry, const char* item, const std::string& what,
+          std::vector<std::string>& problems) {
+  size_t count = 0;
+  std::string first;
+  for (const pugi::xml_node& of : descendants(infra.root(), geometry)) {
+    if (descendants(of, item).empty()) continue;
+    if (count++ == 0) first = of.attribute("id").value();
+  }
+  if (count == 0) return;
+  const std::string more = count > 1 ? ", as " + std::to_string(count - 1) + " more," : "";
+  problems.push_back("track edge \"" + first + "\"" + more + " has " + what);
+}
+
+}  // namespace
+
+void tell_unread(const XmlSource& infra, std::vector<std::string>& problems) {
+  tell(infra, "trackEdgeGeometry", "verticalAlignmentItem",
+       "gradients in its vertical alignment, whose units no schema at hand gives; they are left out, only sampled "
+       "slopes are read",
+       problems);
+  tell(infra, "sampledTrackEdgeGeometry", "cant",
+       "sampled cants, whose unit and sign no schema at hand gives; they are left out, only cant points are read",
+       problems);
+}
+
+}  // namespace railfix::track
