@@ -41,7 +41,8 @@ struct RunPlan {
   std::unique_ptr<FolderLock> lock;  // of OUT: it is this run's alone
 };
 
-/// Makes OUT and locks it, refuses one that holds a run, builds the map into it, writes OUT/run.yaml. Every problem is one sentence.
+/// Makes OUT and locks it, refuses one that holds a run, builds the map into it, writes OUT/run.yaml. Every problem is
+/// one sentence.
 core::Result<RunPlan> plan_run(const RunOptions& options);
 
 }  // namespace railfix::tool
