@@ -177,11 +177,14 @@ class Reader {
     for (const pugi::xml_node& of : elements.child("platformEdges").children("platformEdge"))
       add_stretch(platforms_, of, platform_lateral_m(of.attribute("side").value()));
     const pugi::xml_node control = node.child("ocsElements");
-    for (const pugi::xml_node& of : control.child("signals").children("signal"))
-      add(LandmarkKind::mast, pos(of) - origin_m_, of);
-    for (const pugi::xml_node& of : control.child("stopPosts").children("stopPost")) {
-      if (!of.attribute("virtual").as_bool()) add(LandmarkKind::mast, pos(of) - origin_m_, of);
-    }
+    const auto add_masts = [&](const char* all, const char* one) {
+      for (const pugi::xml_node& of : control.child(all).children(one)) {
+        const bool nothing_stands_there = of.attribute("virtual").as_bool();
+        if (!nothing_stands_there) add(LandmarkKind::mast, pos(of) - origin_m_, of);
+      }
+    };
+    add_masts("signals", "signal");
+    add_masts("stopPosts", "stopPost");
   }
 
   bool lies_on(const pugi::xml_node& of, const NetTrack& track) {

@@ -192,6 +192,14 @@ class Reader {
         {kind, offset_m, place.same_direction ? lateral_m : -lateral_m, kRailmlSigmaM, railml_name(of)});
   }
 
+  /// Nothing stands there.
+  static bool is_virtual(const pugi::xml_node& signal) {
+    const auto constructions = descendants(signal, "signalConstruction");
+    return std::ranges::any_of(constructions, [](const pugi::xml_node& of) {
+      return std::string_view(of.attribute("type").value()) == "virtual";
+    });
+  }
+
   void add_portals(const pugi::xml_node& of) {
     for (const NetSpot& spot : portals_of(net_, places_.of(of)))
       net_.tracks[spot.track].track.marks.push_back(portal(spot, kRailmlSigmaM, railml_name(of)));
@@ -227,6 +235,7 @@ class Reader {
       add_platform(platform_lateral_m(sided.attribute("lateralSide").value()), of);
     }
     for (const pugi::xml_node& of : descendants(source_.root(), "signalIS")) {
+      if (is_virtual(of)) continue;
       for (const NetPlace& place : places_.of(of)) add(LandmarkKind::mast, place, place.from_m, 0, of);
     }
   }
