@@ -125,7 +125,7 @@ class Estimator {
   /// REQUIRES: predict_to(stamp_ns()) was the last call (as for interval()).
   [[nodiscard]] TrainEstimate estimate(const Interval& promised, double since_sure_m) const;
   /// Way since the last fix that settled what was in doubt.
-  [[nodiscard]] double since_fix_m() const { return std::abs(filter_.since_fix_m()); }
+  [[nodiscard]] double since_fix_m() const { return std::abs(distance_m() - place_.fix_m); }
   /// ... and since the last one that was sharp enough for the budget to count from.
   [[nodiscard]] double since_reference_m() const { return std::abs(distance_m() - place_.reference_m); }
   /// What became of the last event, when it was a fix.
@@ -242,7 +242,8 @@ class Estimator {
     TurnedWay turned_way;
     WrongPlace wrong_place;
     uint32_t reference = 0;
-    double reference_m = 0;          // the distance run there
+    double fix_m = 0;                // the distance run at the last fix that settled what was in doubt ...
+    double reference_m = 0;          // ... and at the reference
     std::array<uint32_t, 16> met{};  // landmarks that were used last, newest first; 0 = none
     int landmarks_agreed = 0;        // in a row
     // Until a landmark tells them apart: over other ways that lead to tracks that were declared, or that map_matcher

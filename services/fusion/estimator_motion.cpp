@@ -71,8 +71,9 @@ void Estimator::use(const OdometryInput& step) {
       camera.hear(offer.used, kAgreementsOfCamera, step.stamp_ns);
       if (alone) doubts_.odometers_m += std::abs(offer.residual);
     } else if (const auto offer = offer_motion(Source::camera, step.stamp_ns, offered_to); offer.used) {
-      unchecked_m_ = nobody_measured() ? kSleeperM : 0;
-      if (nobody_measured()) filter_.doubt_first_speed(Odometer::camera, dt_s);
+      const bool is_first = nobody_measured();
+      unchecked_m_ = is_first ? kSleeperM : 0;
+      if (is_first) filter_.doubt_first_speed(Odometer::camera, dt_s);
       camera.accept(step.stamp_ns);
       if (step.reference_stamp_ns <= gap_begin_ns_ && filter_.has_clone(step.reference_stamp_ns)) doubts_.time_m = 0;
       compare_with_wheel(step, sigma_m);

@@ -274,7 +274,7 @@ void Estimator::accept(const FixInput& fix) {
   doubts_ = {};
   if (tells_ways_apart(fix)) place_.joined = place_.other_ways = place_.said_elsewhere = {};
   if (!unwidened_ || fix.kind != FixKind::curvature) unwatched_ = {.distance_m = unwatched_.distance_m};
-  filter_.mark_fix();
+  place_.fix_m = distance_m();
   mark_reference(fix);
   if (fix.landmark != 0 && !has_met(fix.landmark)) {
     std::rotate(place_.met.begin(), place_.met.end() - 1, place_.met.end());
@@ -293,8 +293,7 @@ void Estimator::mark_reference(const FixInput& fix) {
 }
 
 void Estimator::refer_back(double since_reference_m) {
-  filter_.mark_fix(since_reference_m);
-  place_.reference_m = distance_m() - since_reference_m;
+  place_.fix_m = place_.reference_m = distance_m() - since_reference_m;
 }
 
 bool Estimator::confirms_start(bool tells_track) {

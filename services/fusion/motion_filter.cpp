@@ -282,7 +282,6 @@ void MotionFilter::forget_references() {
   ud_.inflate(index(StateIndex::distance), squared(false_share * value(StateIndex::distance)));
   x_(unit) = before;
   ud_.reset(unit, squared(sigma));
-  fix_m_ = 0;
 }
 
 void MotionFilter::set_origin(double path_distance_m, double sigma_m) {
@@ -343,7 +342,6 @@ void MotionFilter::place_like(const MotionFilter& other) {
   x_(index(StateIndex::origin)) = other.value(StateIndex::origin);
   ud_.reset(index(StateIndex::distance), squared(std::min(distance_sigma_m, path_sigma_m)));
   ud_.reset(index(StateIndex::origin), squared(path_sigma_m));
-  fix_m_ = other.fix_m_;
 }
 
 double MotionFilter::sigma(StateIndex state) const {

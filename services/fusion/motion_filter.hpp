@@ -76,8 +76,6 @@ class MotionFilter {
   /// That odometer was the first to measure, over so long. Until then the filter knew no speed, and so not what the
   /// scales make of one: speed and the other odometer's way are less sure by that.
   void doubt_first_speed(Odometer measured, double since_s);
-  /// A fix has told the current place: since_fix_m counts from here, or from so far before it.
-  void mark_fix(double before_m = 0) { fix_m_ = value(StateIndex::distance) - before_m; }
 
   Offer offer_step(int64_t reference_stamp_ns, double step_m, double sigma_m, double gate);
   /// A speed in camera metres.
@@ -128,7 +126,6 @@ class MotionFilter {
   [[nodiscard]] double scale_sigma(Odometer odometer) const;
   [[nodiscard]] OdometerScales scales() const;
   /// Way since the reference.
-  [[nodiscard]] double since_fix_m() const { return value(StateIndex::distance) - fix_m_; }
 
  private:
   [[nodiscard]] int index(StateIndex state) const { return static_cast<int>(clones_.size()) + static_cast<int>(state); }
@@ -162,7 +159,6 @@ class MotionFilter {
 
   int64_t stamp_ns_ = 0;
   Odometer unit_ = Odometer::none;
-  double fix_m_ = 0;
   OdometerScales known_before_;
   std::vector<int64_t> clones_;  // their stamps in the order of the states: newest first
   estimation::StateVector x_;

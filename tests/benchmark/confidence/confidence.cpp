@@ -295,11 +295,7 @@ int measure_all(Arguments& a) {
 
 Arguments defaults() {
   Arguments a;
-  auto& s = a.plan.simulation;
-  s = campaign_plan();
-  s.track_fixes = true;
-  s.switch_spacing_m = 1500;
-  s.shape = true;
+  a.plan.simulation = campaign_plan();
   a.plan.unknown_start_share = 0.1;
   return a;
 }

@@ -47,6 +47,8 @@ SimulationPlan campaign_plan() {
   plan.landmark_spread = 0.7;
   plan.false_fix_share = 0.005;
   plan.fix_probability = 0.995;
+  plan.track_fixes = plan.shape = true;
+  plan.switch_spacing_m = 1500;
   return plan;
 }
 

@@ -103,8 +103,6 @@ TEST(Coverage, WithoutFaultAndSlipTheIntervalIsWithinTheBudget) {
   train::Verdict sum;
   for (const uint64_t number : {4, 9, 17, 20, 22, 28, 30, 32, 35, 47}) {
     SimulationPlan plan = train::campaign_plan();
-    plan.track_fixes = plan.shape = true;
-    plan.switch_spacing_m = 1500;
     plan.slip = false;
     plan.false_fix_share = 0;
     const train::TrainSimulation simulation(plan, train::seed_of_run(3671, number));
@@ -162,6 +160,8 @@ TEST(Coverage, OneFaultySensorStaysInsideTheInterval) {
 // one.
 TEST(Coverage, TheSensorThatIsWrongIsFoundOut) {
   SimulationPlan plan = train::campaign_plan();
+  plan.track_fixes = plan.shape = false;
+  plan.switch_spacing_m = 0;
   for (const auto& [seed, fault] :
        {std::pair<uint64_t, train::Fault>{11'000'009, {Sensor::wheel, FaultKind::stuck, 109.5, 169.5, 1}},
         {12'000'016, {Sensor::accelerometer, FaultKind::stuck, 111.1, 140.8, 1}},

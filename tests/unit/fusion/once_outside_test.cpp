@@ -35,8 +35,6 @@ class OnceOutside : public ::testing::TestWithParam<CampaignRun> {};
 TEST_P(OnceOutside, HoldsTheTruth) {
   const auto& run = GetParam();
   train::SimulationPlan plan = train::campaign_plan();
-  plan.track_fixes = true;
-  plan.switch_spacing_m = 1500;
   plan.shape = run.shape;
   plan.sightings = run.sightings;
   plan.landmark_spacing_m = run.sightings ? 0 : run.landmarks_m;

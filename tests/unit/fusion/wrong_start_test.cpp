@@ -214,8 +214,6 @@ class WrongStartRide : public testing::TestWithParam<Sensors> {};
 TEST_P(WrongStartRide, EndsWhereTheTrainIs) {
   auto plan = train::campaign_plan();
   plan.duration_s = 480;
-  plan.track_fixes = plan.shape = true;
-  plan.switch_spacing_m = 1500;
   plan.landmark_spacing_m = 0;
   plan.gnss = GetParam().gnss;
   plan.sightings = GetParam().sightings;
