@@ -125,6 +125,7 @@ class Map {
   std::vector<Landmark> landmarks;  // landmarks[i].id == i + 1
   std::vector<BaliseGroup> balise_groups;
   std::vector<std::string> problems;
+  double q_locacc_m = 0;  // of virtual groups: how far off its places may be, 0 = not known
 
   /// Nullptr when there is no such edge or landmark.
   [[nodiscard]] const Edge* edge(uint32_t id) const;

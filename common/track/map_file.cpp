@@ -195,6 +195,9 @@ core::Status read_map(const map::Map& in, Map& out) {
   out.source = in.source();
   out.crs = in.crs();
   out.problems.assign(in.problems().begin(), in.problems().end());
+  out.q_locacc_m = in.q_locacc_m();
+  if (!std::isfinite(out.q_locacc_m) || out.q_locacc_m < 0)
+    return core::Error{"its location accuracy is not a length of 0 m or more"};
   for (const auto& read : {read_nodes, read_edges, read_connections, read_landmarks, read_groups}) {
     if (core::Status status = read(in, out); !status) return status;
   }
@@ -333,6 +336,7 @@ core::Status Map::save(const std::filesystem::path& file) const {
   out.set_source(as_utf8(source));
   out.set_crs(as_utf8(crs));
   for (const std::string& problem : problems) out.add_problems(as_utf8(problem));
+  out.set_q_locacc_m(q_locacc_m);
   write_network(*this, out);
   write_marks(*this, out);
   Map read_back;

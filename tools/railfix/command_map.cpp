@@ -48,7 +48,7 @@ int build(const BuildRequest& request) {
     if (built.fit.tracks > 0) json["fit"] = to_json(built.fit);
     if (built.plans.elements > 0) json["plans"] = to_json(built.plans);
     if (built.osm.elements > 0) json["osm"] = to_json(built.osm);
-    if (built.virtual_balises.every_m > 0) json["virtual_balises"] = to_json(built.virtual_balises);
+    if (built.virtual_balises.was_asked_for()) json["virtual_balises"] = to_json(built.virtual_balises);
     json["problems"] = built.map.problems;
     print_json(json);
     return 0;
@@ -113,10 +113,21 @@ void add_build(CLI::App& map, Action& chosen) {
           "--virtual-balises", request->options.virtual_balises_every_m,
           "Virtual balise groups about every so many metres along every edge, none on edges shorter than half of it")
       ->check(number_between(1.0, 1e6));
-  command->add_option("--nid-c", request->options.nid_c, "NID_C of the virtual balise groups")
+  command
+      ->add_option("--virtual-balises-at", request->options.virtual_balises_at,
+                   "Virtual balise groups at these places, EDGE:OFFSET, as `railfix map coverage` proposes them")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  command
+      ->add_option("--nid-c", request->options.virtual_numbers.nid_c,
+                   "NID_C of the virtual balise groups, or several as in 85,86: one has 16,382 numbers")
       ->check(CLI::Range(0, 1023))
+      ->delimiter(',')
+      ->allow_extra_args(false)
       ->capture_default_str();
-  command->add_option("--first-nid-bg", request->options.first_nid_bg, "NID_BG of the first virtual balise group")
+  command
+      ->add_option("--first-nid-bg", request->options.virtual_numbers.first_nid_bg,
+                   "NID_BG of the first virtual balise group")
       ->check(CLI::Range(0, 16382))
       ->capture_default_str();
   command

@@ -143,11 +143,8 @@ class Sources {
     if (!osm_.ways.empty() || map_.edges.empty()) add_osm();
     check_crs();
     const bool all_surveyed = surveyed_edges == map_.edges.size();
-    if (options_.virtual_balises_every_m > 0) {
-      out_.virtual_balises = core::value_or_throw(
-          add_virtual_balises(map_, options_.virtual_balises_every_m, options_.nid_c, options_.first_nid_bg,
-                              all_surveyed ? kSurveyLocationM : kMappingLocationM));
-    }
+    map_.q_locacc_m = std::max(map_.q_locacc_m, all_surveyed ? kSurveyLocationM : kMappingLocationM);
+    add_virtual_groups();
     if (!options_.landmarks.empty()) core::ok_or_throw(keep_landmarks(map_, options_.landmarks));
     std::ranges::move(problems_of(map_), std::back_inserter(cuts_));
     std::ranges::move(map_.problems, std::back_inserter(cuts_));
@@ -195,6 +192,7 @@ class Sources {
       throw core::BadInput("only one compiled map can be built upon; " + file.string() + " is the second");
     want_crs(read.crs, file);
     read.source = map_.source;
+    if (!(read.q_locacc_m > 0)) read.q_locacc_m = kMappingLocationM;
     std::move(map_.problems.begin(), map_.problems.end(), std::back_inserter(read.problems));
     map_ = std::move(read);
     // What the check finds is found anew.
@@ -230,6 +228,16 @@ class Sources {
   }
 
   // A drawing lies nowhere on the Earth.
+  void add_virtual_groups() {
+    core::ok_or_throw(
+        add_virtual_balises_at(map_, options_.virtual_balises_at, options_.virtual_numbers, map_.q_locacc_m));
+    if (options_.virtual_balises_every_m > 0) {
+      out_.virtual_balises = core::value_or_throw(
+          add_virtual_balises(map_, options_.virtual_balises_every_m, options_.virtual_numbers, map_.q_locacc_m));
+    }
+    out_.virtual_balises.groups += options_.virtual_balises_at.size();
+  }
+
   void check_crs() {
     const bool drawn = !map_.edges.empty() && std::ranges::all_of(map_.edges, &Edge::is_drawn);
     if (drawn && !map_.crs.empty())

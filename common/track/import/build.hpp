@@ -17,11 +17,11 @@ struct BuildOptions {
   std::string crs{};  // "" = the LandXML's own, else the UTM zone of the data; "local" = true to scale around the
                       // middle of the data
   bool with_trams = false;
-  bool with_clothoids = false;         // polylines of OpenStreetMap become straights, clothoids and arcs
-  double smooth_m = 0;                 // how far points of OpenStreetMap may move to even out the curvature
-  double virtual_balises_every_m = 0;  // 0 = none
-  uint32_t nid_c = 1;
-  uint32_t first_nid_bg = 1;
+  bool with_clothoids = false;                    // polylines of OpenStreetMap become straights, clothoids and arcs
+  double smooth_m = 0;                            // how far points of OpenStreetMap may move to even out the curvature
+  double virtual_balises_every_m = 0;             // 0 = none
+  std::vector<std::string> virtual_balises_at{};  // "EDGE:OFFSET", besides these
+  GroupNumbers virtual_numbers{};
   std::vector<std::string> landmarks{};  // kinds that are kept; empty = all
 };
 

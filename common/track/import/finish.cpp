@@ -14,7 +14,6 @@ namespace {
 
 // A reference so near to another one adds nothing, and says less well where it is than a real group does.
 constexpr double kNearGroupM = 10.0;
-constexpr double kToldStepM = 10.0;  // of the least distance that a refusal names
 
 /// An edge as seen when leaving a node.
 struct Branch {
@@ -61,48 +60,84 @@ uint32_t groups_along(double length_m, double every_m) {
   return static_cast<uint32_t>(std::lround(length_m / every_m));
 }
 
+/// Where groups are already.
+class TakenPlaces {
+ public:
+  explicit TakenPlaces(const Map& map) {
+    for (const BaliseGroup& group : map.balise_groups) taken_.emplace(group.edge, group.offset_m);
+  }
+  void take(const VirtualPlace& place) { taken_.emplace(place.edge, place.offset_m); }
+  [[nodiscard]] bool is_near(const VirtualPlace& place) const {
+    const auto next = taken_.lower_bound({place.edge, place.offset_m - kNearGroupM});
+    return next != taken_.end() && next->first == place.edge && next->second <= place.offset_m + kNearGroupM;
+  }
+
+ private:
+  std::set<std::pair<uint32_t, double>> taken_;
+};
+
 /// Evenly along every edge, but for places that have a group already.
 std::vector<VirtualPlace> virtual_places(const Map& map, double every_m) {
-  std::set<std::pair<uint32_t, double>> taken;
-  for (const BaliseGroup& group : map.balise_groups) taken.emplace(group.edge, group.offset_m);
-  const auto is_taken = [&](uint32_t edge, double offset_m) {
-    const auto next = taken.lower_bound({edge, offset_m - kNearGroupM});
-    return next != taken.end() && next->first == edge && next->second <= offset_m + kNearGroupM;
-  };
+  const TakenPlaces taken(map);
   std::vector<VirtualPlace> out;
   for (const Edge& edge : map.edges) {
     const double length_m = edge.alignment.length_m();
     const uint32_t count = groups_along(length_m, every_m);
     for (uint32_t i = 0; i < count; ++i) {
-      const double offset_m = length_m * (i + 0.5) / count;
-      if (!is_taken(edge.id, offset_m)) out.push_back({edge.id, offset_m});
+      const VirtualPlace place{edge.id, length_m * (i + 0.5) / count};
+      if (!taken.is_near(place)) out.push_back(place);
     }
   }
   return out;
 }
 
-/// Numbers of this country that groups have already are left to them.
-std::vector<uint32_t> free_numbers(const Map& map, uint32_t nid_c, uint32_t first_nid_bg) {
-  std::set<uint32_t> taken;
-  for (const BaliseGroup& group : map.balise_groups) {
-    if (group.nid_c == nid_c) taken.insert(group.nid_bg);
-  }
-  std::vector<uint32_t> out;
-  for (uint32_t number = first_nid_bg; number <= BaliseGroup::kLastNidBg; ++number) {
-    if (!taken.contains(number)) out.push_back(number);
+struct GroupName {
+  uint32_t nid_c = 0;
+  uint32_t nid_bg = 0;
+  auto operator<=>(const GroupName&) const = default;
+};
+
+/// Those that a group of the map has already are left to it.
+std::vector<GroupName> free_names(const Map& map, const GroupNumbers& numbers) {
+  std::set<GroupName> taken;
+  for (const BaliseGroup& group : map.balise_groups) taken.insert({group.nid_c, group.nid_bg});
+  std::vector<GroupName> out;
+  for (const uint32_t nid_c : numbers.nid_c) {
+    const bool is_first = nid_c == numbers.nid_c.front();
+    for (uint32_t nid_bg = is_first ? numbers.first_nid_bg : 1; nid_bg <= BaliseGroup::kLastNidBg; ++nid_bg) {
+      if (taken.insert({nid_c, nid_bg}).second) out.push_back({nid_c, nid_bg});
+    }
   }
   return out;
 }
 
-core::Error too_few_numbers(const Map& map, size_t places, size_t numbers, uint32_t nid_c, uint32_t first_nid_bg) {
-  const std::string lack = std::to_string(places) + " virtual balise groups are more than NID_C " +
-                           std::to_string(nid_c) + " has numbers for: " + std::to_string(numbers) + " are free from " +
-                           std::to_string(first_nid_bg) + " on; ";
-  const std::string in_parts = "build the map in parts, each with an NID_C of its own";
-  if (numbers == 0) return {lack + "begin at a lower NID_BG or " + in_parts};
-  double every_m = kToldStepM;
-  while (virtual_places(map, every_m).size() > numbers) every_m += kToldStepM;
-  return {lack + "place them at least " + told_m(every_m, 0) + " apart on this map or " + in_parts};
+core::Error too_few_names(size_t places, size_t names, const GroupNumbers& numbers) {
+  std::string list;
+  for (const uint32_t nid_c : numbers.nid_c) list += (list.empty() ? "" : ", ") + std::to_string(nid_c);
+  return {std::to_string(places) + " virtual balise groups are more than NID_C " + list +
+          " has numbers for: " + std::to_string(names) + " are free from " + std::to_string(numbers.first_nid_bg) +
+          " on; begin at a lower NID_BG, give one more NID_C (as in --nid-c 85,86) or place fewer"};
+}
+
+/// None where they are more than there are names.
+core::Status put_groups(Map& map, const std::vector<VirtualPlace>& places, const GroupNumbers& numbers,
+                        double q_locacc_m) {
+  const auto is_none = [](uint32_t nid_c) { return nid_c > BaliseGroup::kLastNidC; };
+  if (numbers.nid_c.empty() || std::ranges::any_of(numbers.nid_c, is_none))
+    return core::Error{"NID_C must be between 0 and 1023"};
+  const std::vector<GroupName> names = free_names(map, numbers);
+  if (names.size() < places.size()) return too_few_names(places.size(), names.size(), numbers);
+  for (size_t i = 0; i < places.size(); ++i) {
+    map.balise_groups.push_back({.nid_c = names[i].nid_c,
+                                 .nid_bg = names[i].nid_bg,
+                                 .edge = places[i].edge,
+                                 .offset_m = places[i].offset_m,
+                                 .nominal_is_forward = true,
+                                 .is_virtual = true,
+                                 .q_locacc_m = q_locacc_m,
+                                 .balises = {}});
+  }
+  return {};
 }
 
 }  // namespace
@@ -120,23 +155,12 @@ void add_frogs(Map& map, double sigma_m) {
   }
 }
 
-core::Result<VirtualBalises> add_virtual_balises(Map& map, double every_m, uint32_t nid_c, uint32_t first_nid_bg,
+core::Result<VirtualBalises> add_virtual_balises(Map& map, double every_m, const GroupNumbers& numbers,
                                                  double q_locacc_m) {
   if (!(every_m >= 1.0)) return core::Error{"virtual balise groups must be at least 1 m apart"};
-  if (nid_c > BaliseGroup::kLastNidC) return core::Error{"NID_C must be between 0 and 1023"};
   const std::vector<VirtualPlace> places = virtual_places(map, every_m);
-  const std::vector<uint32_t> numbers = free_numbers(map, nid_c, first_nid_bg);
-  if (places.size() > numbers.size()) return too_few_numbers(map, places.size(), numbers.size(), nid_c, first_nid_bg);
-  for (size_t i = 0; i < places.size(); ++i) {
-    map.balise_groups.push_back({.nid_c = nid_c,
-                                 .nid_bg = numbers[i],
-                                 .edge = places[i].edge,
-                                 .offset_m = places[i].offset_m,
-                                 .nominal_is_forward = true,
-                                 .is_virtual = true,
-                                 .q_locacc_m = q_locacc_m,
-                                 .balises = {}});
-  }
+  const core::Status put = put_groups(map, places, numbers, q_locacc_m);
+  if (!put.ok()) return put.error();
   VirtualBalises out{.every_m = every_m, .groups = places.size()};
   for (const Edge& edge : map.edges) {
     if (groups_along(edge.alignment.length_m(), every_m) > 0) continue;
@@ -144,6 +168,21 @@ core::Result<VirtualBalises> add_virtual_balises(Map& map, double every_m, uint3
     out.short_m += edge.alignment.length_m();
   }
   return out;
+}
+
+core::Status add_virtual_balises_at(Map& map, const std::vector<std::string>& places, const GroupNumbers& numbers,
+                                    double q_locacc_m) {
+  TakenPlaces taken(map);
+  std::vector<VirtualPlace> put;
+  for (const std::string& text : places) {
+    const auto position = map.parse_position(text);
+    if (!position.ok()) return position.error();
+    put.push_back({position.value().edge, position.value().offset_m});
+    if (taken.is_near(put.back()))
+      return core::Error{"a balise group is within " + told_m(kNearGroupM, 0) + " of " + text + " already"};
+    taken.take(put.back());
+  }
+  return put_groups(map, put, numbers, q_locacc_m);
 }
 
 core::Status keep_landmarks(Map& map, const std::vector<std::string>& kinds) {

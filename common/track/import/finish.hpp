@@ -14,18 +14,30 @@ namespace railfix::track {
 /// how well the source knows the place.
 void add_frogs(Map& map, double sigma_m);
 
+/// What virtual balise groups are called: by one NID_C after the other, as one has 16,382 of them at most.
+struct GroupNumbers {
+  std::vector<uint32_t> nid_c{1};
+  uint32_t first_nid_bg = 1;  // of the first NID_C; the others begin at 1
+};
+
 struct VirtualBalises {
   double every_m = 0;  // 0 = none were asked for
   size_t groups = 0;
   size_t short_edges = 0;  // than half of that: they have none
   double short_m = 0;      // together
+  [[nodiscard]] bool was_asked_for() const { return every_m > 0 || groups > 0; }
 };
 
 /// Virtual balise groups about every `every_m` along every edge (none on edges shorter than half of it, none within 10
-/// m of a group that is there already), numbered from `first_nid_bg` on with what no group of that country has. Fails
-/// when ETCS runs out of numbers, and adds none then.
-core::Result<VirtualBalises> add_virtual_balises(Map& map, double every_m, uint32_t nid_c, uint32_t first_nid_bg,
+/// m of a group that is there already), with the numbers that no group of the map has. Fails when these run out, and
+/// adds none then.
+core::Result<VirtualBalises> add_virtual_balises(Map& map, double every_m, const GroupNumbers& numbers,
                                                  double q_locacc_m);
+
+/// Virtual balise groups at these places ("EDGE:OFFSET"), nominal as growing offsets. Fails where one is none of the
+/// map, has a group within 10 m, or when numbers run out, and adds none then.
+core::Status add_virtual_balises_at(Map& map, const std::vector<std::string>& places, const GroupNumbers& numbers,
+                                    double q_locacc_m);
 
 /// Leaves out landmarks of other kinds than these; the others get new numbers. Balise groups keep the number of
 /// their balises, because one of a single balise is reported otherwise (ETCS packet 1). Fails when there is no such

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "core/units.hpp"
+#include "map/group_gaps.hpp"
+#include "track/import/finish.hpp"
 #include "unit/track/small_map.hpp"
 
 namespace railfix::tool {
@@ -128,6 +130,29 @@ TEST(Coverage, NothingHelpsAgainstALimitThatFusionNeverPromises) {
   const Coverage found = coverage_of(line_with({}), options);
   EXPECT_NEAR(found.now.covered_m, 0, 1e-6);
   EXPECT_TRUE(found.markers_m.empty());
+}
+
+TEST(Coverage, SaysWhereBaliseGroupsAreMissing) {
+  CoverageOptions options;
+  options.group_limit_m = 500;
+  const auto missing = [&](const track::Path& path) {
+    std::vector<double> out;
+    for (const GroupGap& gap : group_gaps(path, options))
+      out.insert(out.end(), gap.missing_m.begin(), gap.missing_m.end());
+    return out;
+  };
+  EXPECT_EQ(missing(line_with({})), (std::vector<double>{500, 1000})) << "a train at the end has one within the limit";
+  EXPECT_EQ(missing(line_with({frog_at(200), frog_at(300), frog_at(450)})), (std::vector<double>{450, 950, 1450}))
+      << "the last one that the train sights on the way there";
+  track::Map map = track::small_map();  // a real group at 900 m of 1800
+  map.balise_groups.push_back({85, 200, 2, 390, true, true, 1, {}});
+  const auto gaps = group_gaps(main_line(map), options);
+  ASSERT_EQ(gaps.size(), 1U);
+  EXPECT_EQ(gaps[0].from_m, 0);
+  EXPECT_NEAR(gaps[0].to_m, 900, 1e-6);
+  EXPECT_EQ(gaps[0].missing_m, (std::vector<double>{300, 800})) << "beside the mast, and none beyond";
+  ASSERT_TRUE(track::add_virtual_balises_at(map, {"1:300"}, {{85}, 300}, 1).ok());
+  EXPECT_EQ(group_gaps(main_line(map), options).size(), 1U) << "300 to 900";
 }
 
 TEST(Coverage, GoesByFusionsParameters) {

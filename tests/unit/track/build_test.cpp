@@ -49,6 +49,16 @@ TEST_F(BuildTest, SaysWhatIsWrongInOneSentence) {
   EXPECT_THAT(message({}), HasSubstr("no railway tracks"));
 }
 
+TEST_F(BuildTest, VirtualGroupsOfAMappedLineStayAsVagueAsItIs) {
+  const auto line = write("line.geojson", line_of_kind("rail"));
+  const BuiltMap mapped = core::value_or_throw(build_map({line}, {.virtual_balises_at = {"1:100"}}));
+  EXPECT_EQ(mapped.virtual_balises.groups, 1U);
+  ASSERT_TRUE(mapped.map.save(in_folder("mapped.map")).ok());
+  const BuiltMap upon = core::value_or_throw(build_map({in_folder("mapped.map")}, {.virtual_balises_every_m = 300}));
+  ASSERT_GT(upon.map.balise_groups.size(), 3U);
+  for (const BaliseGroup& group : upon.map.balise_groups) EXPECT_EQ(group.q_locacc_m, 5) << group.nid_bg;
+}
+
 /// A track of these coordinates in GeoJSON.
 std::string track_of(const std::string& coordinates) {
   return R"({"features":[{"type":"Feature","id":"way/7","properties":{"railway":"rail","@id":"way/7"},

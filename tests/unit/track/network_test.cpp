@@ -122,7 +122,7 @@ TEST(Frogs, LieWhereTheGaugeFacesOfTheInnerRailsCross) {
 TEST(VirtualBalises, AreSpreadAlongTheEdges) {
   Map map = small_map();
   map.balise_groups.clear();
-  ASSERT_TRUE(add_virtual_balises(map, 300, 7, 20, 5).ok());
+  ASSERT_TRUE(add_virtual_balises(map, 300, {{7}, 20}, 5).ok());
   ASSERT_EQ(map.balise_groups.size(), 8U);  // 3 + 3 + 2
   EXPECT_EQ(map.balise_groups[0].nid_bg, 20U);
   EXPECT_EQ(map.balise_groups[7].nid_bg, 27U);
@@ -130,52 +130,71 @@ TEST(VirtualBalises, AreSpreadAlongTheEdges) {
   EXPECT_TRUE(map.balise_groups[0].is_virtual);
   // A second time they go on behind the first; another country counts for itself.
   const size_t once = map.balise_groups.size();
-  ASSERT_TRUE(add_virtual_balises(map, 200, 7, 20, 5).ok());
-  ASSERT_TRUE(add_virtual_balises(map, 140, 8, 20, 5).ok());
+  ASSERT_TRUE(add_virtual_balises(map, 200, {{7}, 20}, 5).ok());
+  ASSERT_TRUE(add_virtual_balises(map, 140, {{8}, 20}, 5).ok());
   EXPECT_EQ(map.balise_groups[once].nid_bg, map.balise_groups[once - 1].nid_bg + 1);
   std::set<uint32_t> identities;
   for (const BaliseGroup& group : map.balise_groups) identities.insert(group.nid_lrbg());
   EXPECT_EQ(identities.size(), map.balise_groups.size());
   EXPECT_TRUE(identities.contains(8U << 14U | 20U));
-  EXPECT_FALSE(add_virtual_balises(map, 0, 7, 1, 5).ok());
-  EXPECT_FALSE(add_virtual_balises(map, 300, 1024, 1, 5).ok());
+  EXPECT_FALSE(add_virtual_balises(map, 0, {{7}, 1}, 5).ok());
+  EXPECT_FALSE(add_virtual_balises(map, 300, {{1024}, 1}, 5).ok());
 }
 
 TEST(VirtualBalises, StandNotWhereAGroupIs) {
   Map map = small_map();
   map.balise_groups[0].offset_m = 492;  // 500 is one of the places
   map.balise_groups[1].offset_m = 120;  // 125 is
-  ASSERT_TRUE(add_virtual_balises(map, 250, 77, 1, 5).ok());
+  ASSERT_TRUE(add_virtual_balises(map, 250, {{77}, 1}, 5).ok());
   EXPECT_EQ(map.balise_groups.size(), 2U + 4 + 3 + 1);
   map = small_map();
   map.balise_groups[0].offset_m = 489;
-  ASSERT_TRUE(add_virtual_balises(map, 1000, 77, 1, 5).ok());
+  ASSERT_TRUE(add_virtual_balises(map, 1000, {{77}, 1}, 5).ok());
   EXPECT_EQ(map.balise_groups.back().edge, 3U);
   EXPECT_THAT(check_topology(map), IsEmpty());
 }
 
 TEST(VirtualBalises, EdgesTooShortForThemAreCounted) {
   Map map = small_map();
-  const VirtualBalises all = core::value_or_throw(add_virtual_balises(map, 300, 77, 1, 5));
+  const VirtualBalises all = core::value_or_throw(add_virtual_balises(map, 300, {{77}, 1}, 5));
   EXPECT_EQ(all.groups, map.balise_groups.size() - 2);
   EXPECT_EQ(all.short_edges, 0U);
-  const VirtualBalises some = core::value_or_throw(add_virtual_balises(map, 1900, 77, 1, 5));
+  const VirtualBalises some = core::value_or_throw(add_virtual_balises(map, 1900, {{77}, 1}, 5));
   EXPECT_EQ(some.short_edges, 2U);
   EXPECT_NEAR(some.short_m, map.edges[1].alignment.length_m() + map.edges[2].alignment.length_m(), 1e-9);
 }
 
-TEST(VirtualBalises, TooManySayHowFarApartTheyMustBe) {
+TEST(VirtualBalises, TooManyNeedOneMoreCountry) {
   Map map = small_map();
-  const auto refusal = [&](double every_m, uint32_t first) {
-    return add_virtual_balises(map, every_m, 85, first, 5).error().message;
+  const auto refusal = [&](double every_m, const GroupNumbers& numbers) {
+    return add_virtual_balises(map, every_m, numbers, 5).error().message;
   };
-  EXPECT_EQ(refusal(100, 16373),
-            "22 virtual balise groups are more than NID_C 85 has numbers for: 10 are free from 16373 on; place them at "
-            "least 210 m apart on this map or build the map in parts, each with an NID_C of its own");
+  EXPECT_EQ(refusal(100, {{85}, 16373}),
+            "22 virtual balise groups are more than NID_C 85 has numbers for: 10 are free from 16373 on; begin at a "
+            "lower NID_BG, give one more NID_C (as in --nid-c 85,86) or place fewer");
+  EXPECT_THAT(refusal(100, {{85, 85}, 16373}), HasSubstr("10 are free")) << "a country given twice is one";
   EXPECT_EQ(map.balise_groups.size(), 2U) << "none is added";
-  ASSERT_TRUE(add_virtual_balises(map, 210, 85, 16373, 5).ok());
-  map.balise_groups[0].nid_bg = BaliseGroup::kLastNidBg;
-  EXPECT_THAT(refusal(100, BaliseGroup::kLastNidBg), HasSubstr("0 are free from 16382 on; begin at a lower NID_BG or"));
+  ASSERT_TRUE(add_virtual_balises(map, 100, {{85, 86}, 16373}, 5).ok());
+  EXPECT_EQ(map.balise_groups[2].nid_lrbg(), 85U << 14U | 16373U);
+  EXPECT_EQ(map.balise_groups[11].nid_lrbg(), 85U << 14U | 16382U);
+  EXPECT_EQ(map.balise_groups[12].nid_lrbg(), 86U << 14U | 1U);
+  EXPECT_THAT(check_topology(map), IsEmpty());
+}
+
+TEST(VirtualBalises, StandWhereTheyAreWanted) {
+  Map map = small_map();
+  const auto at = [&](const std::vector<std::string>& places) {
+    return add_virtual_balises_at(map, places, {{77}, 5}, 3);
+  };
+  ASSERT_TRUE(at({"1:400", "2:100.5:-"}).ok());
+  ASSERT_EQ(map.balise_groups.size(), 4U);
+  EXPECT_EQ(map.balise_groups[2].nid_lrbg(), 77U << 14U | 5U);
+  EXPECT_EQ(map.balise_groups[3].edge, 2U);
+  EXPECT_NEAR(map.balise_groups[3].offset_m, 100.5, 1e-9);
+  EXPECT_TRUE(map.balise_groups[3].is_virtual);
+  EXPECT_EQ(at({"1:300", "1:405"}).error().message, "a balise group is within 10 m of 1:405 already");
+  EXPECT_THAT(at({"1:300", "99:5"}).error().message, HasSubstr("99"));
+  EXPECT_EQ(map.balise_groups.size(), 4U) << "none is added";
 }
 
 TEST(Landmarks, AreKeptByTheirKind) {

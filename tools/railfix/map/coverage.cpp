@@ -17,11 +17,6 @@ constexpr double kNarrowestRowM = 60;
 constexpr double kSightedFromM = 20;   // a train that begins there has passed what is nearer
 constexpr double kMarkerBesideM = -3;  // right
 
-bool counts(track::LandmarkKind kind, const CoverageOptions& options) {
-  const auto& kinds = options.sighted;
-  return track::can_be_sighted(kind) && (kinds.empty() || std::ranges::find(kinds, kind) != kinds.end());
-}
-
 /// Where a way runs over a track for the second time, as on a ring; nothing where it does not.
 std::optional<double> until_it_comes_again(const track::Path& path) {
   const track::Route route = path.route();
@@ -148,6 +143,11 @@ void put_on_path(const Running& running, Extent& extent) {
 }
 
 }  // namespace
+
+bool counts(track::LandmarkKind kind, const CoverageOptions& options) {
+  const auto& kinds = options.sighted;
+  return track::can_be_sighted(kind) && (kinds.empty() || std::ranges::find(kinds, kind) != kinds.end());
+}
 
 core::Result<track::Path> way_from(std::shared_ptr<const track::Map> map, const track::EdgePosition& start,
                                    double length_m) {

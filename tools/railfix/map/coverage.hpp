@@ -1,5 +1,5 @@
 // Where on a way the promised interval would outgrow a limit, and what would help: a nominal ride with what the camera
-// can sight there. Balise groups are only names to the services.
+// can sight there.
 #pragma once
 
 #include <map>
@@ -19,7 +19,11 @@ struct CoverageOptions {
   double speed_mps = 80 / 3.6;
   double limit_m = 10;          // half the interval must not be longer
   double marker_sigma_m = 0.1;  // of the place of a marker that is proposed, on the map
+  double group_limit_m = 2500;  // balise groups, real or virtual, must not be further apart
 };
+
+/// Is a landmark of this kind a reference?
+bool counts(track::LandmarkKind kind, const CoverageOptions& options);
 
 /// What of a way's map tells fusion where the train is, and what does not.
 struct References {

@@ -9,6 +9,7 @@
 
 #include "fusion/fusion_config.hpp"
 #include "map/coverage.hpp"
+#include "map/group_gaps.hpp"
 #include "map/map_commands.hpp"
 #include "number_between.hpp"
 #include "service/service.hpp"
@@ -80,6 +81,41 @@ ordered_json coverage_json(const track::Path& path, const Coverage& found) {
   return json;
 }
 
+/// As --virtual-balises-at takes it: on the edge, whatever is rounded.
+std::string group_place_text(const track::Path& path, double distance_m) {
+  const track::EdgePosition place = path.position_at(distance_m);
+  char text[64];
+  std::snprintf(text, sizeof text, "%u:%.1f", place.edge, std::floor(10 * place.offset_m) / 10);
+  return text;
+}
+
+ordered_json groups_json(const track::Path& path, const std::vector<GroupGap>& gaps) {
+  ordered_json json = ordered_json::array();
+  for (const GroupGap& gap : gaps) {
+    ordered_json missing = ordered_json::array();
+    for (const double at_m : gap.missing_m) missing.push_back(group_place_text(path, at_m));
+    json.push_back({{"from", place_text(path, gap.from_m)},
+                    {"to", place_text(path, gap.to_m)},
+                    {"length_m", gap.to_m - gap.from_m},
+                    {"missing", missing}});
+  }
+  return json;
+}
+
+void print_groups(const track::Path& path, const std::vector<GroupGap>& gaps, const CoverageRequest& request) {
+  std::printf("balise groups    at most %.0f m apart: %s\n", request.options.group_limit_m,
+              gaps.empty() ? "yes, real and virtual ones" : "no");
+  std::string missing;
+  for (const GroupGap& gap : gaps) {
+    std::printf("  none           %s to %s (%.0f m)\n", place_text(path, gap.from_m).c_str(),
+                place_text(path, gap.to_m).c_str(), gap.to_m - gap.from_m);
+    for (const double at_m : gap.missing_m) missing += (missing.empty() ? "" : ",") + group_place_text(path, at_m);
+  }
+  if (missing.empty()) return;
+  std::printf("  virtual ones   railfix map build %s --nid-c NID_C --virtual-balises-at %s --out MAP\n",
+              request.map.c_str(), missing.c_str());
+}
+
 ordered_json references_json(const References& references) {
   ordered_json counted = ordered_json::object();
   for (const auto& [kind, number] : references.counted) counted[track::to_string(kind)] = number;
@@ -95,8 +131,8 @@ void print_references(const References& references) {
   std::printf("references       %s\n", counted.c_str());
   if (references.virtual_groups + references.unsighted_groups == 0) return;
   std::printf(
-      "not counted      %zu virtual balise groups and %zu whose balises are not sighted: to the services they are "
-      "names\n",
+      "not counted      %zu virtual balise groups and %zu whose balises are not sighted: reports refer to them, they "
+      "tell no place\n",
       references.virtual_groups, references.unsighted_groups);
 }
 
@@ -137,6 +173,7 @@ int coverage(const CoverageRequest& request) {
     ordered_json json{{"way_m", way_m}, {"references", references_json(references)}};
     json.update(coverage_json(path, found));
     json["back"] = coverage_json(path, back);
+    json["without_balise_group"] = groups_json(path, group_gaps(path, options));
     std::cout << json.dump(2) << '\n';
     return 0;
   }
@@ -147,6 +184,7 @@ int coverage(const CoverageRequest& request) {
               request.speed_kmh, options.fusion.interval_factor);
   print_coverage("there", path, found);
   print_coverage("back", path, back);
+  print_groups(path, group_gaps(path, options), request);
   return 0;
 }
 
@@ -154,8 +192,9 @@ int coverage(const CoverageRequest& request) {
 
 void add_map_coverage(CLI::App& map, Action& chosen) {
   const auto request = std::make_shared<CoverageRequest>();
-  CLI::App* command =
-      map.add_subcommand("coverage", "Where the confidence interval outgrows a limit for lack of references");
+  CLI::App* command = map.add_subcommand(
+      "coverage",
+      "Where references are missing: the confidence interval outgrows a limit, or balise groups are far apart");
   command->add_option("MAP", request->map, "A map made by `railfix map build`")->required();
   command->add_option("--start", request->start, "EDGE:OFFSET[:+|-] where the way begins")->capture_default_str();
   command->add_option("--length", request->length_m, "Metres of way; the whole line without");
@@ -182,6 +221,11 @@ void add_map_coverage(CLI::App& map, Action& chosen) {
       ->add_option("--marker-sigma", request->options.marker_sigma_m,
                    "How exactly the map knows a proposed marker, metres (one sigma)")
       ->check(number_between(0.0, 10.0))
+      ->capture_default_str();
+  command
+      ->add_option("--group-limit", request->options.group_limit_m,
+                   "Metres that balise groups, real or virtual, may be apart: reports refer to the last one")
+      ->check(number_between(100.0, 1e5))
       ->capture_default_str();
   command->add_flag("--json", request->as_json, "JSON on standard output");
   command->footer(

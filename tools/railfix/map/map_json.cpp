@@ -119,6 +119,7 @@ ordered_json map_json(const track::Map& map) {
   return {{"name", map.name},
           {"source", map.source},
           {"crs", map.crs},
+          {"q_locacc_m", map.q_locacc_m},
           {"length_m", total_length_m(map)},
           {"edges", edges_json(map)},
           {"switches", switches_json(map)},

@@ -93,7 +93,7 @@ void print_figures(const char* source, const track::FitFigures& figures) {
 }
 
 void print_virtual_balises(const track::VirtualBalises& groups) {
-  if (groups.every_m <= 0) return;
+  if (!groups.was_asked_for()) return;
   std::printf("virtual groups   %zu\n", groups.groups);
   if (groups.short_edges == 0) return;
   std::printf(

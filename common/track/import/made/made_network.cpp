@@ -50,6 +50,7 @@ class Assembler {
     Map map;
     map.name = "made network, seed " + std::to_string(options_.seed);
     map.source = "made up";
+    map.q_locacc_m = 1;
     map.crs = "EPSG:32632";
     append(draft_, map);
     add_frogs(map, 0.1);
