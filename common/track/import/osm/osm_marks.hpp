@@ -2,27 +2,16 @@
 #pragma once
 
 #include "track/import/network.hpp"
-#include "track/import/osm/osm_data.hpp"
+#include "track/import/osm/osm_chains.hpp"
 
 namespace railfix::track {
 
 constexpr double kMappingSigmaM = 3.0;
 
-/// Segments from one break to the next.
-struct OsmChain {
-  std::vector<int64_t> nodes;
-  std::vector<size_t> ways;     // of each segment
-  std::vector<bool> along_way;  // the segment runs as its way is drawn
-  std::vector<Eigen::Vector2d> points;
-  std::vector<Eigen::Vector2d> shape;  // the points as the track is to run through them
-  std::optional<double> heading_at_start;
-  std::optional<double> heading_at_end;
-};
-
 /// maxspeed: "80" (km/h) or "50 mph"; nothing where it says anything else.
 std::optional<double> speed_mps_of(const std::string& text);
 
-/// What ways say of speeds and grades that is not read, one sentence each.
+/// What ways say of speeds and grades and is no number, one sentence each.
 std::vector<std::string> unread_tags(const OsmData& data);
 
 /// What a node says that stands there, if anything.
