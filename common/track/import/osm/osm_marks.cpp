@@ -61,18 +61,9 @@ std::optional<double> speed_mps_of(const std::string& text) {
   return value > 0 && is_speed(value) ? std::optional(core::mps_from_kmh(value)) : std::nullopt;
 }
 
-std::optional<TrackMark> point_mark(const OsmTags& tags, double offset_m) {
-  const std::string kind = value_of(tags, "railway");
-  if (kind == "balise" || is_set(tags, "railway:balise"))
-    return TrackMark{LandmarkKind::balise, offset_m, 0, kMappingSigmaM, value_of(tags, "ref")};
-  if (kind == "signal") return TrackMark{LandmarkKind::mast, offset_m, 0, kMappingSigmaM, value_of(tags, "ref")};
-  if (kind == "level_crossing" || kind == "crossing")  // of a road, of a footpath
-    return TrackMark{LandmarkKind::level_crossing, offset_m, 0, kMappingSigmaM, value_of(tags, "name")};
-  return std::nullopt;
-}
-
 void OsmMarks::add(ImportedTrack& track) const {
   add_structures(track);
+  add_points(track);
   add_speeds(track);
 }
 
@@ -93,8 +84,14 @@ void OsmMarks::add_structures(ImportedTrack& track) const {
     if (i == 0 || !has(i - 1, "bridge")) bridge_begin = i;
     if (i + 1 == count || !has(i + 1, "bridge")) add_underbridge(at(bridge_begin), at(i + 1), chain_.ways[i], track);
   }
-  for (size_t i = 1; i < count; ++i) {
-    if (auto mark = point_mark(data_.nodes.at(chain_.nodes[i]).tags, at(i))) track.marks.push_back(std::move(*mark));
+}
+
+void OsmMarks::add_points(ImportedTrack& track) const {
+  for (size_t i = 1; i < chain_.ways.size(); ++i) {
+    const bool along = chain_.along_way[i];
+    const std::optional<bool> along_way = along == chain_.along_way[i - 1] ? std::optional(along) : std::nullopt;
+    auto mark = points_.mark(chain_.nodes[i], data_.ways[chain_.ways[i - 1]].id, offset_of(i, track), along_way);
+    if (mark) track.marks.push_back(std::move(*mark));
   }
 }
 

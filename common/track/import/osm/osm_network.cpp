@@ -31,7 +31,11 @@ struct ChainEnd {
 class Builder {
  public:
   Builder(const OsmData& data, const Projection& projection, double smooth_m, bool with_clothoids)
-      : data_(data), projection_(projection), overbridges_(data, projection), with_clothoids_(with_clothoids) {
+      : data_(data),
+        projection_(projection),
+        overbridges_(data, projection),
+        points_(data),
+        with_clothoids_(with_clothoids) {
     OsmChains traced = chains_of(data, projection, smooth_m);
     chains_ = std::move(traced.chains);
     places_ = std::move(traced.places);
@@ -45,8 +49,9 @@ class Builder {
     for (const auto& [node, ends] : ends_) agree_on_tangents(ends);
     for (OsmChain& chain : chains_) add_edge(chain);
     add_heights(data_, chains_, out_.draft, out_.problems);
-    add_marks_at_nodes(data_, chains_, out_.draft);
+    add_marks_at_nodes(data_, chains_, out_.draft, points_);
     add_trackside();
+    points_.tell(out_.problems);
     for (std::string& problem : unread_tags(data_)) out_.problems.push_back(std::move(problem));
     return std::move(out_);
   }
@@ -157,7 +162,7 @@ class Builder {
       tell_left_out(edge.track.name, *smooth);
     }
     edge.track.alignment = std::move(fit.alignment);
-    OsmMarks(data_, chain).add(edge.track);
+    OsmMarks(data_, chain, points_).add(edge.track);
     overbridges_.add(data_, chain, edge.track);
     if (fit.straightened > 0) {
       out_.problems.push_back("edge " + edge.track.name + " has " + std::to_string(fit.straightened) +
@@ -216,6 +221,7 @@ class Builder {
   const OsmData& data_;
   const Projection& projection_;
   OsmOverbridges overbridges_;
+  OsmPoints points_;
   bool with_clothoids_;
   double usual_sigma_m_ = 0.3;
   OsmPlaces places_;
