@@ -223,6 +223,11 @@ TrackPoint Alignment::at(double offset_m) const {
   return out;
 }
 
+bool Alignment::grade_known_at(double offset_m) const {
+  if (profile_.size() < 2) return !profile_.empty();
+  return !profile_[span_index(profile_, offset_m)].is_guess;
+}
+
 double Alignment::curvature_at(double offset_m) const {
   if (elements_.empty()) return 0.0;
   const size_t index = element_index(offset_m);

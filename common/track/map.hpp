@@ -84,7 +84,7 @@ struct Landmark {
   LandmarkKind kind = LandmarkKind::unknown;
   uint32_t edge = 0;
   double offset_m = 0;
-  double lateral_m = 0;
+  double lateral_m = 0;  // left of the track's middle, looking along growing offset; 0 = in it, or not known
   double sigma_m = 0;
   std::string name;
 };

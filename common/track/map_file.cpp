@@ -55,7 +55,8 @@ core::Result<Edge> edge_from(const map::Edge& in) {
     starts.push_back({e.easting_m(), e.northing_m(), e.heading_rad()});
   }
   std::vector<GradePoint> profile;
-  for (const map::GradePoint& p : in.profile()) profile.push_back({p.offset_m(), p.elevation_m(), p.curve_length_m()});
+  for (const map::GradePoint& p : in.profile())
+    profile.push_back({p.offset_m(), p.elevation_m(), p.curve_length_m(), p.is_guess()});
   std::vector<CantPoint> cant;
   for (const map::CantPoint& p : in.cant()) cant.push_back({p.offset_m(), p.cant_m()});
   const bool numbers = std::all_of(profile.begin(), profile.end(),
@@ -252,6 +253,7 @@ void write_edge(const Edge& edge, map::Edge& out) {
     p.set_offset_m(point.offset_m);
     p.set_elevation_m(point.elevation_m);
     p.set_curve_length_m(point.curve_length_m);
+    p.set_is_guess(point.is_guess);
   }
   for (const CantPoint& point : edge.alignment.cant()) {
     map::CantPoint& p = *out.add_cant();

@@ -280,7 +280,9 @@ std::span<const PathLandmark> Path::landmarks_between(double from_m, double to_m
 }
 
 bool Path::grade_known_at(double distance_m) const {
-  return distance_m >= begin_m() && distance_m <= end_m() && !leg_at(distance_m).run.edge->alignment.profile().empty();
+  if (distance_m < begin_m() || distance_m > end_m()) return false;
+  const Leg& leg = leg_at(distance_m);
+  return leg.run.edge->alignment.grade_known_at(leg.offset_at(distance_m));
 }
 
 }  // namespace railfix::track

@@ -59,7 +59,7 @@ class Path {
   /// Geometry seen along the path: heading, curvature, grade and cant have the sign of the path's direction.
   [[nodiscard]] TrackPoint at(double distance_m) const;
   [[nodiscard]] double curvature_at(double distance_m) const;
-  /// False where the map has no heights, and beyond its end.
+  /// False where the map has no heights or guesses them, and beyond its end.
   [[nodiscard]] bool grade_known_at(double distance_m) const;
   /// For a train that runs along the path; nothing where the map says none.
   [[nodiscard]] std::optional<double> speed_limit_at(double distance_m) const;

@@ -11,6 +11,11 @@ constexpr double kEndM = 0.1;
 constexpr double kAlongAlikeM = 3.0;
 constexpr double kAcrossAlikeM = 1.5;
 
+/// Where either does not say its side (0) it may be the same one.
+bool alike_across(double lateral_m, double other_m) {
+  return lateral_m == 0 || other_m == 0 || std::abs(lateral_m - other_m) < kAcrossAlikeM;
+}
+
 }  // namespace
 
 std::vector<NearTrack> TracksBeside::abeam(double easting_m, double northing_m) const {
@@ -45,7 +50,7 @@ bool TracksBeside::has_alike(const Landmark& landmark) const {
     return std::ranges::any_of(map_->landmarks_on(track.edge), [&](const Landmark* other) {
       return seen_along(other->kind, side > 0) == landmark.kind &&
              std::abs(other->offset_m - track.offset_m) < kAlongAlikeM &&
-             std::abs(side * other->lateral_m - landmark.lateral_m) < kAcrossAlikeM;
+             alike_across(side * other->lateral_m, landmark.lateral_m);
     });
   });
 }

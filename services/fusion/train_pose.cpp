@@ -44,7 +44,7 @@ double unbalanced_mps2(const track::TrackPoint& point, double speed_mps) {
 PoseEstimate on_track(const TrainEstimate& state, const track::TrackPoint& point, const track::Alignment& alignment,
                       double map_sigma_m) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  const bool heights = !alignment.profile().empty();
+  const bool heights = alignment.grade_known_at(state.position.offset_m);
   const bool cant = !alignment.cant().empty();
   PoseEstimate pose;
   pose.stamp_ns = state.stamp_ns;

@@ -27,7 +27,7 @@ json number(double value, double parts) {
 json point_of(const track::Edge& edge, double offset_m) {
   const auto point = edge.alignment.at(offset_m);
   return {number(offset_m, 100), number(point.pose.easting_m, 100), number(point.pose.northing_m, 100),
-          edge.alignment.profile().empty() ? json(nullptr) : number(point.elevation_m, 100),
+          edge.alignment.grade_known_at(offset_m) ? number(point.elevation_m, 100) : json(nullptr),
           number(point.curvature_per_m, 1e7)};
 }
 

@@ -8,6 +8,7 @@
 #include "track/import/finish.hpp"
 #include "track/import/local_crs.hpp"
 #include "track/import/network.hpp"
+#include "track/import/osm/osm_chains.hpp"
 #include "track/import/osm/osm_network.hpp"
 #include "track/import/scale.hpp"
 #include "track/import/swapped.hpp"

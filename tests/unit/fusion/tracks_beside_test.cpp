@@ -87,5 +87,16 @@ TEST(TracksBeside, APlaceNearTheEndOfAnEdgeIsNotBesideTheNextOne) {
   EXPECT_TRUE(beside.many_at(10, 500)) << "10 m from either";
 }
 
+TEST(TracksBeside, AMastWithoutASideMayBeTheSameOne) {
+  auto map = std::make_shared<track::Map>();
+  map->edges = {{1, "a", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{1000, 0, 0}})},
+                {2, "b", 3, 4, "", track::Alignment::chained({4, 0, 0}, {{1000, 0, 0}})}};
+  for (const auto& [other_m, is_alike] : {std::pair(3.0, true), {0.0, true}, {-3.0, false}}) {
+    map->landmarks = {{1, track::LandmarkKind::mast, 1, 500, 3, 3, ""},
+                      {2, track::LandmarkKind::mast, 2, 500, other_m, 3, ""}};
+    EXPECT_EQ(track::TracksBeside(map).has_alike(map->landmarks[0]), is_alike) << other_m;
+  }
+}
+
 }  // namespace
 }  // namespace railfix::fusion

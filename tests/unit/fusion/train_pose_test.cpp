@@ -184,5 +184,24 @@ TEST(TrainPose, AnIsolatedOrSilentImuIsNotAskedAndAMapWithoutHeightsHasNone) {
   EXPECT_FALSE(pose.at(state_at(60.5), path, true).from_imu);
 }
 
+TEST(TrainPose, HeightsThatAreAGuessAreNone) {
+  auto map = std::make_shared<track::Map>();
+  map->edges.push_back(
+      {1, "line", 1, 2, "",
+       track::Alignment::chained({0, 0, 0}, {{2000, 0, 0}}, {{0, 0, 0, true}, {1000, 20, 0}, {2000, 30, 0}})});
+  map->nodes = {{1, track::NodeKind::end, "", 0, 0}, {2, track::NodeKind::end, "", 0, 2000}};
+  const auto path = track::Path::follow(map, {1, 0, track::Direction::forward}, 2000, 0).value();
+  const auto said = [&](double distance_m) {
+    TrainEstimate state;
+    state.track_known = true;
+    state.path_distance_m = distance_m;
+    state.position = path.position_at(distance_m);
+    return TrainPose(0.3).at(state, path, false);
+  };
+  EXPECT_TRUE(std::isnan(said(500).height_m));
+  EXPECT_NEAR(said(1500).height_m, 25, 1e-9);
+  EXPECT_GT(said(500).pitch_sigma_rad, 2 * said(1500).pitch_sigma_rad);
+}
+
 }  // namespace
 }  // namespace railfix::fusion

@@ -109,6 +109,44 @@ TEST_F(BuildTest, TracksThatWouldLieInTheSystemTheOtherWayRoundAreTold) {
     EXPECT_THAT(problems("[15.6,48.2],[15.6,48.21]", crs), testing::Not(testing::Contains(HasSubstr("swapped"))));
 }
 
+// Nor can the file itself, unless it says where it lies.
+TEST_F(BuildTest, TracksBesideTheBoundsThatTheFileDeclaresAreTold) {
+  const auto problems = [&](const std::string& name, const std::string& text) {
+    return core::value_or_throw(build_map({write(name, text)}, {.crs = "local"})).map.problems;
+  };
+  const auto osm = [&](const std::string& bounds, double lat, double lon) {
+    const auto node = [&](int id, double further) {
+      return "<node id=\"" + std::to_string(id) + "\" lat=\"" + std::to_string(lat + further) + "\" lon=\"" +
+             std::to_string(lon) + "\"/>";
+    };
+    return problems(
+        "a.osm", "<osm version=\"0.6\">" + bounds + node(1, 0) + node(2, 0.01) + node(3, 0.02) +
+                     R"(<way id="7"><nd ref="1"/><nd ref="2"/><nd ref="3"/><tag k="railway" v="rail"/></way></osm>)");
+  };
+  const std::string bounds = R"(<bounds minlat="48.19" minlon="15.5" maxlat="48.215" maxlon="15.7"/>)";
+  const std::string declared =
+      "the file declares bounds of latitude 48.1900 to 48.2150, longitude 15.5000 to 15.7000, and ";
+  EXPECT_THAT(
+      osm(bounds, 15.6, 48.2),
+      testing::Contains(declared + "0 of the 3 points of its tracks lie within; the other way round they would: "
+                                   "latitude and longitude may be swapped"));
+  EXPECT_THAT(osm(bounds, 49.2, 15.6),
+              testing::Contains(declared + "0 of the 3 points of its tracks lie within: the bounds "
+                                           "or the coordinates are wrong"));
+  const auto told = testing::Contains(HasSubstr("declares bounds"));
+  EXPECT_THAT(osm(bounds, 48.2, 15.6), testing::Not(told)) << "tracks may reach beyond them";
+  EXPECT_THAT(osm("", 15.6, 48.2), testing::Not(told));
+  const auto geojson = [&](const std::string& bbox) {
+    return problems("a.geojson", R"({"bbox":)" + bbox + "," + track_of("[48.2,15.6],[48.21,15.6]").substr(1));
+  };
+  for (const char* bbox : {"[15.5,48.1,15.7,48.3]", "[15.5,48.1,200,15.7,48.3,900]"})
+    EXPECT_THAT(geojson(bbox),
+                testing::Contains(HasSubstr("0 of the 2 points of its tracks lie within; the other way")))
+        << bbox;
+  for (const char* bbox : {"[48.1,15.5,48.3,15.7]", "[]", "null", "[1,2,3,\"4\"]"})
+    EXPECT_THAT(geojson(bbox), testing::Not(told)) << bbox;
+}
+
 TEST_F(BuildTest, LinesOfOnePointAreToldAsSuch) {
   EXPECT_THAT(
       message({write(

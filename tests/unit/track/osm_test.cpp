@@ -207,13 +207,7 @@ TEST_F(OsmTest, ARoadAndItsFootwayAreOneBridge) {
             1);
 }
 
-TEST_F(OsmTest, GradesThatAreNotReadAreToldOnce) {
-  std::string text = kOverpass;
-  const std::string key = R"("railway":"rail")";
-  for (size_t at = text.find(key); at != std::string::npos; at = text.find(key, at + key.size()))
-    text.insert(at + key.size(), R"(,"incline":"1.2%")");
-  EXPECT_THAT(core::value_or_throw(build_map({write("a.json", text)}, {})).map.problems,
-              testing::Contains("grades of OpenStreetMap are not read; tracks with incline: 2, the first one way 10"));
+TEST_F(OsmTest, WhatIsWrongInASoundExtractIsAllThatIsTold) {
   EXPECT_THAT(core::value_or_throw(build_map({write("b.json", kOverpass)}, {})).map.problems,
               testing::ElementsAre("switch \"W1\" at latitude 48.200090, longitude 15.603000 has only two tracks, the "
                                    "end of edge 1 (way/10) and the start of edge 2 (way/10#2)"));

@@ -34,6 +34,8 @@ TEST_F(RailmlHeights, ASlopeEndsWhereTheFileSays) {
     EXPECT_NEAR(height(map, 0, at_m), height_m, 1e-9) << at_m;
   EXPECT_THAT(map.problems, Contains("track n1 has no gradient on 800.00 m of its 1000.00 m; it is level there"));
   EXPECT_NEAR(height(map, 1, 400), 1.0, 1e-9) << "heights run on";
+  EXPECT_TRUE(map.edges[0].alignment.grade_known_at(200));
+  EXPECT_FALSE(map.edges[1].alignment.grade_known_at(400)) << "no source says that it is level";
   const auto relative = Contains(HasSubstr("they are no heights above the sea"));
   EXPECT_THAT(map.problems, relative);
   EXPECT_THAT(map_of(railml3("")).problems, Not(relative));

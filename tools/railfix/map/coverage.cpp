@@ -45,15 +45,14 @@ class Running {
   [[nodiscard]] RideWay way(const CoverageOptions& options) const {
     RideWay way{.length_m = length_m()};
     const double sign = backwards_ ? -1 : 1;
-    const bool has_heights = path_.grade_known_at(path_m(0));
     double elevation_m = 0;
     const int samples = static_cast<int>(way.length_m / RideWay::kSampledEveryM) + 3;
     for (int i = 0; i < samples; ++i) {
       const double at_m = RideWay::kSampledEveryM * i;
       way.curvature_per_m.push_back(sign * path_.curvature_at(path_m(at_m)));
-      if (!has_heights) continue;
-      way.elevation_m.push_back(elevation_m);
-      const double grade = sign * path_.at(path_m(at_m + 0.5 * RideWay::kSampledEveryM)).grade;
+      const double middle_m = path_m(at_m + 0.5 * RideWay::kSampledEveryM);
+      way.profile.push_back({at_m, elevation_m, 0, !path_.grade_known_at(middle_m)});
+      const double grade = sign * path_.at(middle_m).grade;
       elevation_m += grade * RideWay::kSampledEveryM;
     }
     for (const track::PathLandmark& mark : path_.landmarks()) {

@@ -142,7 +142,8 @@ void print_info(const track::Map& map, size_t most_edges) {
 namespace {
 
 /// Seen the other way twist stays: the cant and the way change their signs together.
-void print_height_and_cant(const track::Alignment& alignment, const track::TrackPoint& point, double sign) {
+void print_height_and_cant(const track::Alignment& alignment, double offset_m, const track::TrackPoint& point,
+                           double sign) {
   if (!alignment.cant().empty()) {
     const double cant_mm = sign * point.cant_m * 1e3;
     const char* higher = std::abs(cant_mm) < 0.05 ? "" : cant_mm > 0 ? " (right rail higher)" : " (left rail higher)";
@@ -151,7 +152,8 @@ void print_height_and_cant(const track::Alignment& alignment, const track::Track
     std::puts("cant, twist      not on the map");
   }
   if (!alignment.profile().empty()) {
-    std::printf("height, grade    %.3f m, %.2f per mille\n", point.elevation_m, sign * point.grade * 1e3);
+    std::printf("height, grade    %.3f m, %.2f per mille%s\n", point.elevation_m, sign * point.grade * 1e3 + 0.0,
+                alignment.grade_known_at(offset_m) ? "" : " (a guess: no source says it)");
   } else {
     std::puts("height, grade    not on the map");
   }
@@ -165,7 +167,7 @@ void print_place(const track::Map& map, const track::EdgePosition& place, bool a
   const double sign = reverse ? -1.0 : 1.0;
   const track::Alignment& alignment = map.edge(place.edge)->alignment;
   const track::TrackPoint point = alignment.at(place.offset_m);
-  const bool has_heights = !alignment.profile().empty();
+  const bool has_heights = alignment.grade_known_at(place.offset_m);
   const bool has_cant = !alignment.cant().empty();
   const auto if_known = [](bool known, double value) { return known ? ordered_json(value + 0.0) : ordered_json(); };
   const double heading = core::wrap_pi(point.pose.heading_rad + (reverse ? core::kPi : 0.0));
@@ -203,7 +205,7 @@ void print_place(const track::Map& map, const track::EdgePosition& place, bool a
   }
   // Seen the other way it stays: the curvature and the way change their signs together.
   std::printf("its rate         %.3e per m2\n", point.curvature_rate_per_m2 + 0.0);
-  print_height_and_cant(alignment, point, sign);
+  print_height_and_cant(alignment, place.offset_m, point, sign);
   if (limit) std::printf("speed limit      %.0f km/h\n", core::kmh_from_mps(*limit));
   if (geo) std::printf("latitude         %.8f\nlongitude        %.8f\n", geo->lat_deg, geo->lon_deg);
 }

@@ -52,17 +52,13 @@ double usual_sigma_m(LandmarkKind kind) {
 std::shared_ptr<const track::Map> map_of(const RideWay& way) {
   auto map = std::make_shared<track::Map>();
   std::vector<track::Element> elements;
-  std::vector<track::GradePoint> profile;
   for (size_t i = 0; RideWay::kSampledEveryM * static_cast<double>(i) < way.length_m; ++i) {
     const double begin_m = RideWay::kSampledEveryM * static_cast<double>(i);
     elements.push_back({std::min(RideWay::kSampledEveryM, way.length_m - begin_m), way.curvature_per_m.at(i),
                         way.curvature_per_m.at(i + 1)});
   }
-  for (size_t i = 0; i < way.elevation_m.size(); ++i)
-    profile.push_back({RideWay::kSampledEveryM * static_cast<double>(i), way.elevation_m[i]});
   map->nodes = {{1, track::NodeKind::end, "", 0, 0}, {2, track::NodeKind::end, "", 0, 0}};
-  map->edges.push_back(
-      {1, "way", 1, 2, "", track::Alignment::chained({0, 0, 0}, std::move(elements), std::move(profile))});
+  map->edges.push_back({1, "way", 1, 2, "", track::Alignment::chained({0, 0, 0}, std::move(elements), way.profile)});
   map->landmarks = way.landmarks;
   uint32_t id = 0;
   for (track::Landmark& mark : map->landmarks) {

@@ -13,8 +13,8 @@ namespace railfix::tool {
 struct RideWay {
   static constexpr double kSampledEveryM = 5;
   double length_m = 0;
-  std::vector<double> curvature_per_m{};     // left positive, every so many metres and beyond the end
-  std::vector<double> elevation_m{};         // likewise; empty where the map has none
+  std::vector<double> curvature_per_m{};  // left positive, every so many metres and beyond the end
+  std::vector<track::GradePoint> profile{};
   std::vector<track::Landmark> landmarks{};  // sighted, each of them; offset = place on the way, in that order
 };
 

@@ -6,6 +6,7 @@
 
 #include "core/json_text.hpp"
 #include "core/whole_file.hpp"
+#include "track/import/osm/osm_bounds.hpp"
 #include "track/import/osm/osm_data.hpp"
 #include "track/import/swapped.hpp"
 
@@ -192,6 +193,14 @@ std::string features_named(size_t count) {
   return std::to_string(count) + (count == 1 ? " line" : " lines");
 }
 
+/// A GeoJSON "bbox": west, south, east, north, with a height behind each pair or none. Nothing where it is none.
+std::optional<OsmBounds> bounds_in(const json& document) {
+  const auto box = document.find("bbox");
+  if (box == document.end() || !box->is_array() || (box->size() != 4 && box->size() != 6)) return std::nullopt;
+  if (!std::all_of(box->begin(), box->end(), [](const json& value) { return value.is_number(); })) return std::nullopt;
+  return OsmBounds{place_in(*box), place_in(json::array({box->at(box->size() / 2), box->at(box->size() / 2 + 1)}))};
+}
+
 class FeatureReader {
  public:
   FeatureReader(bool with_trams, OsmData& out) : with_trams_(with_trams), out_(out) {}
@@ -318,6 +327,9 @@ core::Result<OsmData> read_osm_json(const std::filesystem::path& file, bool with
       read_overpass(document.at("elements"), with_trams, out);
     } else if (document.is_object() && document.contains("features")) {
       FeatureReader(with_trams, out).read(document.at("features"));
+      const std::optional<OsmBounds> declared = bounds_in(document);
+      if (std::string told = declared ? contradiction(*declared, out) : ""; !told.empty())
+        out.problems.push_back(std::move(told));
     } else {
       return core::Error{file.string() + " is neither Overpass JSON (\"elements\") nor GeoJSON (\"features\")"};
     }

@@ -5,38 +5,45 @@
 #include <cmath>
 
 #include "core/units.hpp"
+#include "track/import/osm/osm_heights.hpp"
 
 namespace railfix::track {
 namespace {
 
-/// A limit that is not read is none: trains would seem to be allowed more than they are.
-std::string unread_speeds(const OsmData& data) {
+/// All values of these keys that `is_read` refuses, in one sentence; empty where there are none.
+template <class IsRead>
+std::string unread(const OsmData& data, std::initializer_list<const char*> keys, const IsRead& is_read,
+                   const std::string& are) {
   size_t count = 0;
   std::string first;
   for (const OsmWay& way : data.ways) {
-    for (const char* key : {"maxspeed", "maxspeed:forward", "maxspeed:backward"}) {
+    for (const char* key : keys) {
       const std::string value = value_of(way.tags, key);
-      if (value.empty() || value == "none" || value == "signals" || speed_mps_of(value)) continue;
+      if (value.empty() || is_read(value)) continue;
       if (count++ == 0) first = "the first one is \"" + value + "\" of way " + std::to_string(way.id);
     }
   }
-  if (count == 0) return "";
-  return std::to_string(count) + " speed limits are no number of km/h or mph, " + first + "; left out";
+  return count == 0 ? "" : std::to_string(count) + are + ", " + first + "; left out";
 }
 
-std::string unread_grades(const OsmData& data) {
-  const auto has_grade = [](const OsmWay& way) { return is_set(way.tags, "incline"); };
-  const auto first = std::ranges::find_if(data.ways, has_grade);
-  if (first == data.ways.end()) return "";
-  return "grades of OpenStreetMap are not read; tracks with incline: " +
-         std::to_string(std::ranges::count_if(data.ways, has_grade)) + ", the first one way " +
-         std::to_string(first->id);
+/// A limit that is not read is none: trains would seem to be allowed more than they are.
+bool is_read_speed(const std::string& value) {
+  return value == "none" || value == "signals" || speed_mps_of(value);
 }
 
 }  // namespace
 
 std::vector<std::string> unread_tags(const OsmData& data) {
-  std::vector<std::string> told{unread_speeds(data), unread_grades(data)};
+  const auto says_which_way = [](const std::string& value) { return value == "up" || value == "down"; };
+  std::vector<std::string> told{
+      unread(data, {"maxspeed", "maxspeed:forward", "maxspeed:backward"}, is_read_speed,
+             " speed limits are no number of km/h or mph"),
+      unread(
+          data, {"incline"}, [&](const std::string& value) { return says_which_way(value) || grade_of(value); },
+          " inclines are no number of %, per mille or degrees that a track can have"),
+      unread(
+          data, {"incline"}, [&](const std::string& value) { return !says_which_way(value); },
+          " inclines say only which way the track climbs, not how much")};
   std::erase(told, "");
   return told;
 }
@@ -54,18 +61,9 @@ std::optional<double> speed_mps_of(const std::string& text) {
   return value > 0 && is_speed(value) ? std::optional(core::mps_from_kmh(value)) : std::nullopt;
 }
 
-std::optional<TrackMark> point_mark(const OsmTags& tags, double offset_m) {
-  const std::string kind = value_of(tags, "railway");
-  if (kind == "balise" || is_set(tags, "railway:balise"))
-    return TrackMark{LandmarkKind::balise, offset_m, 0, kMappingSigmaM, value_of(tags, "ref")};
-  if (kind == "signal") return TrackMark{LandmarkKind::mast, offset_m, 0, kMappingSigmaM, value_of(tags, "ref")};
-  if (kind == "level_crossing" || kind == "crossing")  // of a road, of a footpath
-    return TrackMark{LandmarkKind::level_crossing, offset_m, 0, kMappingSigmaM, value_of(tags, "name")};
-  return std::nullopt;
-}
-
 void OsmMarks::add(ImportedTrack& track) const {
   add_structures(track);
+  add_points(track);
   add_speeds(track);
 }
 
@@ -86,8 +84,14 @@ void OsmMarks::add_structures(ImportedTrack& track) const {
     if (i == 0 || !has(i - 1, "bridge")) bridge_begin = i;
     if (i + 1 == count || !has(i + 1, "bridge")) add_underbridge(at(bridge_begin), at(i + 1), chain_.ways[i], track);
   }
-  for (size_t i = 1; i < count; ++i) {
-    if (auto mark = point_mark(data_.nodes.at(chain_.nodes[i]).tags, at(i))) track.marks.push_back(std::move(*mark));
+}
+
+void OsmMarks::add_points(ImportedTrack& track) const {
+  for (size_t i = 1; i < chain_.ways.size(); ++i) {
+    const bool along = chain_.along_way[i];
+    const std::optional<bool> along_way = along == chain_.along_way[i - 1] ? std::optional(along) : std::nullopt;
+    auto mark = points_.mark(chain_.nodes[i], data_.ways[chain_.ways[i - 1]].id, offset_of(i, track), along_way);
+    if (mark) track.marks.push_back(std::move(*mark));
   }
 }
 

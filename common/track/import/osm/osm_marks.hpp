@@ -2,41 +2,28 @@
 #pragma once
 
 #include "track/import/network.hpp"
-#include "track/import/osm/osm_data.hpp"
+#include "track/import/osm/osm_chains.hpp"
+#include "track/import/osm/osm_points.hpp"
 
 namespace railfix::track {
-
-constexpr double kMappingSigmaM = 3.0;
-
-/// Segments from one break to the next.
-struct OsmChain {
-  std::vector<int64_t> nodes;
-  std::vector<size_t> ways;     // of each segment
-  std::vector<bool> along_way;  // the segment runs as its way is drawn
-  std::vector<Eigen::Vector2d> points;
-  std::vector<Eigen::Vector2d> shape;  // the points as the track is to run through them
-  std::optional<double> heading_at_start;
-  std::optional<double> heading_at_end;
-};
 
 /// maxspeed: "80" (km/h) or "50 mph"; nothing where it says anything else.
 std::optional<double> speed_mps_of(const std::string& text);
 
-/// What ways say of speeds and grades that is not read, one sentence each.
+/// What ways say of speeds and grades and is no number, one sentence each.
 std::vector<std::string> unread_tags(const OsmData& data);
-
-/// What a node says that stands there, if anything.
-std::optional<TrackMark> point_mark(const OsmTags& tags, double offset_m);
 
 /// Between the ends of the chain; add_marks_at_nodes() does those.
 class OsmMarks {
  public:
-  OsmMarks(const OsmData& data, const OsmChain& chain) : data_(data), chain_(chain) {}
+  OsmMarks(const OsmData& data, const OsmChain& chain, OsmPoints& points)
+      : data_(data), chain_(chain), points_(points) {}
   /// REQUIRES: the track's alignment was made from the chain.
   void add(ImportedTrack& track) const;
 
  private:
   void add_structures(ImportedTrack& track) const;
+  void add_points(ImportedTrack& track) const;
   void add_speeds(ImportedTrack& track) const;
   void add_underbridge(double from_m, double to_m, size_t way, ImportedTrack& track) const;
   [[nodiscard]] double offset_of(size_t point, const ImportedTrack& track) const;
@@ -44,6 +31,7 @@ class OsmMarks {
 
   const OsmData& data_;
   const OsmChain& chain_;
+  OsmPoints& points_;
 };
 
 }  // namespace railfix::track

@@ -2,15 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 #include "core/units.hpp"
 #include "track/import/fit/biarc.hpp"
 #include "track/import/fit/plane.hpp"
-#include "track/import/fit/smooth.hpp"
+#include "track/import/osm/osm_chains.hpp"
+#include "track/import/osm/osm_heights.hpp"
 #include "track/import/osm/osm_node_marks.hpp"
 #include "track/import/osm/osm_overbridges.hpp"
-#include "track/import/osm/osm_stray_nodes.hpp"
 #include "track/import/osm/osm_trackside.hpp"
 #include "track/import/told.hpp"
 
@@ -20,16 +19,6 @@ namespace {
 constexpr size_t kPointsForSigma = 12;
 constexpr double kLeastUsualSigmaM = 0.05;
 constexpr double kTangentBranchRad = core::kPi / 6.0;
-constexpr size_t kMostNamed = 5;
-constexpr const char* kAskForNodes =
-    "extract the ways together with their nodes, from Overpass by (._;>;); or by out geom;";
-
-struct Segment {
-  int64_t a = 0;
-  int64_t b = 0;
-  size_t way = 0;
-  bool used = false;
-};
 
 /// One end of a chain at its node, seen leaving the node.
 struct ChainEnd {
@@ -45,145 +34,30 @@ class Builder {
       : data_(data),
         projection_(projection),
         overbridges_(data, projection),
-        smooth_m_(smooth_m),
-        with_clothoids_(with_clothoids) {}
+        points_(data),
+        with_clothoids_(with_clothoids) {
+    OsmChains traced = chains_of(data, projection, smooth_m);
+    chains_ = std::move(traced.chains);
+    places_ = std::move(traced.places);
+    out_.cuts = std::move(traced.cuts);
+    out_.problems = std::move(traced.problems);
+  }
 
   OsmNetwork build() {
-    collect_segments();
-    tell_stray_nodes();
-    trace_chains();
     find_usual_sigma();
     gather_ends();
     for (const auto& [node, ends] : ends_) agree_on_tangents(ends);
     for (OsmChain& chain : chains_) add_edge(chain);
-    add_marks_at_nodes(data_, chains_, out_.draft);
+    add_heights(data_, chains_, out_.draft, out_.problems);
+    add_marks_at_nodes(data_, chains_, out_.draft, points_);
     add_trackside();
+    points_.tell(out_.problems);
     for (std::string& problem : unread_tags(data_)) out_.problems.push_back(std::move(problem));
     return std::move(out_);
   }
 
  private:
   [[nodiscard]] const OsmTags& tags_at(int64_t node) const { return data_.nodes.at(node).tags; }
-
-  void collect_segments() {
-    std::set<std::pair<int64_t, int64_t>> seen;
-    size_t missing = 0;
-    std::vector<int64_t> lacking;  // ways
-    for (size_t way = 0; way < data_.ways.size(); ++way) {
-      const size_t missing_before = missing;
-      int64_t before = 0;
-      bool has_before = false;
-      for (const int64_t node : data_.ways[way].nodes) {
-        if (!place(node)) {
-          ++missing;
-          has_before = false;
-          continue;
-        }
-        if (has_before && before != node && seen.insert(std::minmax(before, node)).second &&
-            (places_.at(before) - places_.at(node)).norm() > 0.01) {
-          at_node_[before].push_back(segments_.size());
-          at_node_[node].push_back(segments_.size());
-          segments_.push_back({before, node, way});
-        }
-        before = node;
-        has_before = true;
-      }
-      if (missing > missing_before) lacking.push_back(data_.ways[way].id);
-    }
-    if (missing > 0) out_.cuts.push_back(told_missing(lacking, missing));
-  }
-
-  /// One sentence for all: of a region that is cut out, every way over its border lacks nodes.
-  static std::string told_missing(const std::vector<int64_t>& ways, size_t nodes) {
-    std::string names;
-    const size_t named = std::min(kMostNamed, ways.size());
-    for (size_t i = 0; i < named; ++i) names += (i == 0 ? "way " : ", way ") + std::to_string(ways[i]);
-    if (ways.size() > named) names += " and " + std::to_string(ways.size() - named) + " more ways";
-    return names + (ways.size() == 1 ? " names " : " name ") + std::to_string(nodes) +
-           (nodes == 1 ? " node" : " nodes") +
-           " that the data do not hold; the tracks have gaps there: " + kAskForNodes;
-  }
-
-  /// They stay where they are: nobody but the source knows where they belong.
-  void tell_stray_nodes() {
-    OsmNeighbours neighbours;
-    for (const auto& [node, segments] : at_node_) {
-      for (const size_t segment : segments) neighbours[node].push_back(other_end(segment, node));
-    }
-    const std::vector<StrayNode> stray = stray_nodes(places_, neighbours);
-    for (size_t i = 0; i < std::min(kMostNamed, stray.size()); ++i) {
-      const auto& [node, off_m] = stray[i];
-      const GeoPoint& at = data_.nodes.at(node).place;
-      out_.cuts.push_back((node == id_of_place(at) ? "the point" : "node " + std::to_string(node)) + " of way/" +
-                          std::to_string(data_.ways[segments_[at_node_.at(node).front()].way].id) + " at latitude " +
-                          told_number(at.lat_deg, 6) + ", longitude " + told_number(at.lon_deg, 6) + " lies " +
-                          told_m(off_m) +
-                          " off the line between its neighbours, as no track runs: correct its place in the source, or "
-                          "take it out of the way");
-    }
-    if (stray.size() > kMostNamed)
-      out_.cuts.push_back(std::to_string(stray.size() - kMostNamed) + " more nodes lie up to " +
-                          told_m(stray[kMostNamed].off_m) + " off the line between their neighbours");
-  }
-
-  bool place(int64_t node) {
-    if (places_.contains(node)) return true;
-    const auto found = data_.nodes.find(node);
-    if (found == data_.nodes.end()) return false;
-    const auto point = projection_.from_geo(found->second.place);
-    if (!point) return false;
-    places_[node] = *point;
-    return true;
-  }
-
-  [[nodiscard]] bool is_break(int64_t node) const {
-    const std::vector<size_t>& segments = at_node_.at(node);
-    if (segments.size() != 2) return true;
-    const std::string kind = value_of(tags_at(node), "railway");
-    if (kind == "switch" || kind == "railway_crossing") return true;
-    const double turn = heading_from(node, segments[0]) - heading_from(node, segments[1]) - core::kPi;
-    return std::abs(core::wrap_pi(turn)) > kSharpestTurnRad;
-  }
-  [[nodiscard]] int64_t other_end(size_t segment, int64_t node) const {
-    return segments_[segment].a == node ? segments_[segment].b : segments_[segment].a;
-  }
-  [[nodiscard]] double heading_from(int64_t node, size_t segment) const {
-    return heading_of(places_.at(other_end(segment, node)) - places_.at(node));
-  }
-
-  void trace_chains() {
-    for (const bool rings : {false, true}) {
-      // In the order of the file, so that the same file always gives the same map.
-      for (size_t i = 0; i < segments_.size(); ++i) {
-        for (const int64_t begin : {segments_[i].a, segments_[i].b}) {
-          if (!segments_[i].used && (rings || is_break(begin))) trace(begin, i);
-        }
-      }
-    }
-  }
-
-  void trace(int64_t begin, size_t segment) {
-    OsmChain chain;
-    chain.nodes.push_back(begin);
-    while (true) {
-      segments_[segment].used = true;
-      chain.ways.push_back(segments_[segment].way);
-      chain.along_way.push_back(segments_[segment].a == chain.nodes.back());
-      chain.nodes.push_back(other_end(segment, chain.nodes.back()));
-      const int64_t here = chain.nodes.back();
-      if (here == begin || is_break(here)) break;
-      const std::vector<size_t>& next = at_node_.at(here);
-      segment = next[0] == segment ? next[1] : next[0];
-    }
-    for (const int64_t node : chain.nodes) chain.points.push_back(places_.at(node));
-    chain.shape = smoothed(thinned(chain.points), smooth_m_);
-    if (chain.shape.size() == 2 && (chain.shape[1] - chain.shape[0]).norm() < 0.1) {
-      out_.problems.push_back("way " + std::to_string(data_.ways[chain.ways.front()].id) +
-                              " has a piece without length; it is left out");
-      return;
-    }
-    chains_.push_back(std::move(chain));
-  }
 
   /// Tracks of many points tell how well this region is drawn.
   void find_usual_sigma() {
@@ -288,7 +162,7 @@ class Builder {
       tell_left_out(edge.track.name, *smooth);
     }
     edge.track.alignment = std::move(fit.alignment);
-    OsmMarks(data_, chain).add(edge.track);
+    OsmMarks(data_, chain, points_).add(edge.track);
     overbridges_.add(data_, chain, edge.track);
     if (fit.straightened > 0) {
       out_.problems.push_back("edge " + edge.track.name + " has " + std::to_string(fit.straightened) +
@@ -347,11 +221,9 @@ class Builder {
   const OsmData& data_;
   const Projection& projection_;
   OsmOverbridges overbridges_;
-  double smooth_m_;
+  OsmPoints points_;
   bool with_clothoids_;
   double usual_sigma_m_ = 0.3;
-  std::vector<Segment> segments_;
-  std::unordered_map<int64_t, std::vector<size_t>> at_node_;
   OsmPlaces places_;
   std::vector<OsmChain> chains_;
   std::map<int64_t, std::vector<ChainEnd>> ends_;
@@ -374,22 +246,6 @@ core::Result<OsmNetwork> build_osm_network(const OsmData& data, const Projection
         "the data hold no railway tracks (railway=rail, light_rail, narrow_gauge or subway; --trams adds trams)"};
   }
   return network;
-}
-
-std::string lack_of_nodes(const OsmData& data) {
-  const auto held = [&](const OsmWay& way) {
-    return std::count_if(way.nodes.begin(), way.nodes.end(), [&](int64_t id) { return data.nodes.contains(id); });
-  };
-  if (data.ways.empty() || std::any_of(data.ways.begin(), data.ways.end(), [&](const auto& w) { return held(w) > 1; }))
-    return "";
-  const OsmWay& first = data.ways.front();
-  if (std::ranges::all_of(data.ways, [](const OsmWay& way) { return way.nodes.size() < 2; })) {
-    return "no railway track has two points (" +
-           (first.id > 0 ? "way " + std::to_string(first.id) : std::string("the first track")) + " has " +
-           std::to_string(first.nodes.size()) + " on the earth); a line needs two or more";
-  }
-  return "no railway track has two of its nodes in the data (of way " + std::to_string(first.id) + " they hold " +
-         std::to_string(held(first)) + " of " + std::to_string(first.nodes.size()) + "); " + kAskForNodes;
 }
 
 std::optional<GeoPoint> middle_of(const OsmData& data) {

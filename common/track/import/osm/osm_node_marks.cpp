@@ -8,8 +8,8 @@ namespace {
 
 class NodeMarks {
  public:
-  NodeMarks(const OsmData& data, const std::vector<OsmChain>& chains, Draft& draft)
-      : data_(data), chains_(chains), draft_(draft) {}
+  NodeMarks(const OsmData& data, const std::vector<OsmChain>& chains, Draft& draft, OsmPoints& points)
+      : data_(data), chains_(chains), draft_(draft), points_(points) {}
 
   void add(size_t node, const std::vector<EdgeEnd>& ends) {
     const std::vector<WayOver> ways = ways_over(draft_, node, ends);
@@ -58,22 +58,40 @@ class NodeMarks {
       ++shared[way.a];
       ++shared[way.b];
     }
-    const EdgeEnd& end = ends[static_cast<size_t>(std::max_element(shared.begin(), shared.end()) - shared.begin())];
-    const std::vector<int64_t>& nodes = chains_[end.edge].nodes;
-    const OsmTags& tags = data_.nodes.at(end.at_end ? nodes.back() : nodes.front()).tags;
-    if (auto mark = point_mark(tags, offset_of(end))) draft_.edges[end.edge].track.marks.push_back(std::move(*mark));
+    const auto on = static_cast<size_t>(std::max_element(shared.begin(), shared.end()) - shared.begin());
+    const EdgeEnd& end = ends[on];
+    const OsmChain& chain = chains_[end.edge];
+    auto mark = points_.mark(end.at_end ? chain.nodes.back() : chain.nodes.front(),
+                             data_.ways[end.at_end ? chain.ways.back() : chain.ways.front()].id, offset_of(end),
+                             along_way(on, ends, ways));
+    if (mark) draft_.edges[end.edge].track.marks.push_back(std::move(*mark));
+  }
+
+  /// Whether the edge runs as its way is drawn there, where all that a train runs on to are drawn in one direction.
+  [[nodiscard]] std::optional<bool> along_way(size_t on, const std::vector<EdgeEnd>& ends,
+                                              const std::vector<WayOver>& ways) const {
+    const bool is_turned = std::any_of(ways.begin(), ways.end(), [&](const WayOver& way) {
+      return (way.a == on || way.b == on) && leads_here(ends[way.a]) == leads_here(ends[way.b]);
+    });
+    return is_turned ? std::nullopt : std::optional(leads_here(ends[on]) == ends[on].at_end);
+  }
+  /// Is the way drawn towards the node?
+  [[nodiscard]] bool leads_here(const EdgeEnd& end) const {
+    const std::vector<bool>& along = chains_[end.edge].along_way;
+    return (end.at_end ? along.back() : along.front()) == end.at_end;
   }
 
   const OsmData& data_;
   const std::vector<OsmChain>& chains_;
   Draft& draft_;
+  OsmPoints& points_;
 };
 
 }  // namespace
 
-void add_marks_at_nodes(const OsmData& data, const std::vector<OsmChain>& chains, Draft& draft) {
+void add_marks_at_nodes(const OsmData& data, const std::vector<OsmChain>& chains, Draft& draft, OsmPoints& points) {
   const std::vector<std::vector<EdgeEnd>> ends = ends_at_nodes(draft);
-  NodeMarks marks(data, chains, draft);
+  NodeMarks marks(data, chains, draft, points);
   for (size_t node = 0; node < ends.size(); ++node) marks.add(node, ends[node]);
 }
 

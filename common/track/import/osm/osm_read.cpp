@@ -8,12 +8,14 @@
 #include <osmium/io/any_input.hpp>
 #include <osmium/io/compression.hpp>
 #include <osmium/io/file.hpp>
+#include <osmium/osm/box.hpp>
 #include <osmium/osm/node.hpp>
 #include <osmium/osm/relation.hpp>
 #include <osmium/osm/way.hpp>
 #include <osmium/visitor.hpp>
 #include <unordered_set>
 
+#include "track/import/osm/osm_bounds.hpp"
 #include "track/import/osm/osm_data.hpp"
 #include "track/import/swapped.hpp"
 
@@ -93,8 +95,14 @@ OsmData read_passes(const std::string& file, bool with_trams) {
       out.nodes[node.id()] = {{node.location().lat(), node.location().lon()}, std::move(tags)};
     }
   }
+  const osmium::Box bounds = nodes.header().joined_boxes();
   nodes.close();
   nowhere.tell(out.problems);
+  if (bounds.valid()) {
+    const OsmBounds declared{{bounds.bottom_left().lat(), bounds.bottom_left().lon()},
+                             {bounds.top_right().lat(), bounds.top_right().lon()}};
+    if (std::string told = contradiction(declared, out); !told.empty()) out.problems.push_back(std::move(told));
+  }
   return out;
 }
 

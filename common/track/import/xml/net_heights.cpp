@@ -38,7 +38,8 @@ std::vector<GradePoint> profile_of(const NetTrack& track) {
 
 class Heights {
  public:
-  Heights(RailNet& net, const std::vector<std::pair<size_t, size_t>>& nodes) : net_(net), nodes_(nodes) {
+  Heights(RailNet& net, const std::vector<std::pair<size_t, size_t>>& nodes, const std::map<size_t, double>& told)
+      : net_(net), nodes_(nodes), told_(told), height_at_(told) {
     for (size_t i = 0; i < nodes.size(); ++i) {
       profiles_.push_back(profile_of(net.tracks[i]));
       tracks_at_[nodes[i].first].push_back(i);
@@ -61,10 +62,14 @@ class Heights {
     return height_at_.at(nodes_[track].second) - height_at_.at(nodes_[track].first);
   }
 
-  /// Tracks with slopes first: what is level for want of them must not set a height that slopes say.
+  /// From the nodes whose height is told, and tracks with slopes first: what is level for want of them must not set a
+  /// height that slopes say.
   void spread() {
     std::deque<size_t> waiting;
     std::vector<bool> done(profiles_.size(), false);
+    const auto wait_at = [&](size_t node) {
+      for (const size_t next : tracks_at_[node]) has_slopes(next) ? waiting.push_front(next) : waiting.push_back(next);
+    };
     const auto go = [&] {
       while (!waiting.empty()) {
         const size_t track = waiting.front();
@@ -72,12 +77,11 @@ class Heights {
         if (done[track]) continue;
         done[track] = true;
         set_heights(track);
-        for (const size_t node : {nodes_[track].first, nodes_[track].second}) {
-          for (const size_t next : tracks_at_[node])
-            has_slopes(next) ? waiting.push_front(next) : waiting.push_back(next);
-        }
+        for (const size_t node : {nodes_[track].first, nodes_[track].second}) wait_at(node);
       }
     };
+    for (const auto& [node, height_m] : told_) wait_at(node);
+    go();
     for (const bool with_slopes : {true, false}) {
       for (size_t first = 0; first < profiles_.size(); ++first) {
         if (has_slopes(first) != with_slopes) continue;
@@ -100,7 +104,8 @@ class Heights {
   void settle() {
     std::map<size_t, Eigen::Index> open;
     for (const auto& [node, tracks] : tracks_at_) {
-      if (std::none_of(tracks.begin(), tracks.end(), [&](size_t track) { return has_slopes(track); }))
+      if (!told_.contains(node) &&
+          std::none_of(tracks.begin(), tracks.end(), [&](size_t track) { return has_slopes(track); }))
         open.emplace(node, std::ssize(open));
     }
     if (open.empty()) return;
@@ -136,6 +141,7 @@ class Heights {
       tell_step(track);
       return;
     }
+    profile.front().is_guess = true;
     profile.back().elevation_m += climb(track);
     if (std::abs(climb(track)) < kClimbToldM) return;
     climbs_.emplace_back(std::abs(climb(track)), "track " + net_.tracks[track].track.name +
@@ -161,6 +167,7 @@ class Heights {
 
   RailNet& net_;
   const std::vector<std::pair<size_t, size_t>>& nodes_;
+  const std::map<size_t, double>& told_;  // nodes
   std::vector<std::vector<GradePoint>> profiles_;
   std::map<size_t, std::vector<size_t>> tracks_at_;  // nodes
   std::map<size_t, double> height_at_;               // nodes
@@ -169,12 +176,14 @@ class Heights {
 
 }  // namespace
 
-std::vector<std::vector<GradePoint>> net_profiles(RailNet& net, const std::vector<std::pair<size_t, size_t>>& nodes) {
-  if (std::all_of(net.tracks.begin(), net.tracks.end(), [](const NetTrack& track) { return track.slopes.empty(); }))
-    return std::vector<std::vector<GradePoint>>(net.tracks.size());
-  net.problems.emplace_back(
-      "heights are summed from the slopes, from 0 m where the tracks begin: they are no heights above the sea");
-  return Heights(net, nodes).make();
+std::vector<std::vector<GradePoint>> net_profiles(RailNet& net, const std::vector<std::pair<size_t, size_t>>& nodes,
+                                                  const std::map<size_t, double>& heights) {
+  const bool without_slopes = std::ranges::all_of(net.tracks, &std::vector<NetSlope>::empty, &NetTrack::slopes);
+  if (without_slopes && heights.empty()) return std::vector<std::vector<GradePoint>>(net.tracks.size());
+  if (heights.empty())
+    net.problems.emplace_back(
+        "heights are summed from the slopes, from 0 m where the tracks begin: they are no heights above the sea");
+  return Heights(net, nodes, heights).make();
 }
 
 }  // namespace railfix::track

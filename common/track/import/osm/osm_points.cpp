@@ -1,0 +1,80 @@
+#include "track/import/osm/osm_points.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "track/import/osm/osm_chains.hpp"
+
+namespace railfix::track {
+namespace {
+
+/// From the track's middle to the post: usual are 3.1 m to its near side along main lines, 2.2 m in stations and
+/// between two tracks. OpenStreetMap says the side and no distance; give or take a metre, it is this.
+constexpr double kSignalM = 3.0;
+
+/// Knee-high, as for shunting, and nothing else at the node.
+bool is_dwarf(const OsmTags& tags) {
+  bool has_dwarf = false;
+  for (const auto& [key, value] : tags) {
+    if (!key.starts_with("railway:signal:") || !key.ends_with(":height")) continue;
+    if (value != "dwarf") return false;
+    has_dwarf = true;
+  }
+  return has_dwarf;
+}
+
+/// Over the track (a gantry, the wire), between the rails, or on the ground: no post beside the track, which a camera
+/// would tell as a mast. The posts of a gantry may stand several tracks away.
+bool is_no_mast(const std::string& position) {
+  constexpr std::array kNoMasts{"bridge", "overhead", "in_track", "ground"};
+  return std::ranges::find(kNoMasts, position) != kNoMasts.end();
+}
+
+}  // namespace
+
+std::optional<TrackMark> OsmPoints::mark(int64_t node, int64_t way, double offset_m, std::optional<bool> along_way) {
+  const OsmTags& tags = data_.nodes.at(node).tags;
+  const std::string kind = value_of(tags, "railway");
+  if (kind == "balise" || is_set(tags, "railway:balise"))
+    return TrackMark{LandmarkKind::balise, offset_m, 0, kMappingSigmaM, value_of(tags, "ref")};
+  if (kind == "signal") return signal(node, way, offset_m, along_way);
+  if (kind == "level_crossing" || kind == "crossing")  // of a road, of a footpath
+    return TrackMark{LandmarkKind::level_crossing, offset_m, 0, kMappingSigmaM, value_of(tags, "name")};
+  return std::nullopt;
+}
+
+/// Left and right are those of the way as it is drawn, whichever direction the signal is for
+/// (wiki.openstreetmap.org, Key:railway:signal:position and OpenRailwayMap/Tagging/Signal): with
+/// railway:signal:direction=backward "left" is on the driver's right. Where it is not said countries differ.
+std::optional<TrackMark> OsmPoints::signal(int64_t node, int64_t way, double offset_m, std::optional<bool> along_way) {
+  const OsmNode& at = data_.nodes.at(node);
+  const std::string position = value_of(at.tags, "railway:signal:position");
+  if (is_no_mast(position) || is_dwarf(at.tags)) {
+    no_masts_.add(called(node, at.place, way));
+    return std::nullopt;
+  }
+  TrackMark mast{LandmarkKind::mast, offset_m, 0, kMappingSigmaM, value_of(at.tags, "ref")};
+  const bool is_left = position == "left";
+  if (!is_left && position != "right") {
+    if (!position.empty()) no_sides_.add("\"" + position + "\" of " + called(node, at.place, way));
+  } else if (along_way) {
+    mast.lateral_m = is_left == *along_way ? kSignalM : -kSignalM;
+  } else {
+    turned_.add(called(node, at.place, way));
+  }
+  return mast;
+}
+
+void OsmPoints::tell(std::vector<std::string>& problems) const {
+  const auto tell = [&](const Told& told, const std::string& are, const std::string& what_then) {
+    if (told.count > 0)
+      problems.push_back(std::to_string(told.count) + " signals " + are + ", the first one is " + told.first + "; " +
+                         what_then);
+  };
+  tell(no_masts_, "hang over the track, stand in it or are dwarfs", "no masts, left out");
+  tell(no_sides_, "have a position that is neither left nor right", "their side is not known");
+  tell(turned_, "stand where ways meet that are drawn against each other",
+       "their side is not known: draw both in one direction");
+}
+
+}  // namespace railfix::track
