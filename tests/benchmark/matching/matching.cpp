@@ -50,6 +50,8 @@ void add_options(CLI::App& app, measure::MatchingOptions& options) {
                    ->excludes(astern);
   app.add_flag("--other-leg", options.other_leg, "... over another leg of a switch that they set back over")
       ->needs(back);
+  app.add_flag("--just-clear", options.just_clear,
+               "switches: all trains set back to a metre before the points, which are thrown then, and go on");
   app.add_flag("--each", options.each, "A line for each ride that went wrong; locate: for every trip as it ends");
 }
 

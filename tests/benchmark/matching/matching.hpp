@@ -19,6 +19,7 @@ struct MatchingOptions {
   bool other_leg = false;    // ... over another leg of a switch that they set back over
   bool gnss = false;         // where GNSS alone finds the train, too (locate)
   double masts_mapped = 1;   // share of the masts that the map has (landmarks)
+  bool just_clear = false;   // all trains set back to a metre before the points, which are thrown (switches)
   bool each = false;         // a line for each ride that went wrong
 };
 

@@ -68,6 +68,15 @@ void tell(int number, const testing::PassagePlan& plan, const testing::PassageRe
             << result.apart_sigmas << " sigmas, declared " << result.behind_frog_m << " m behind the frog\n";
 }
 
+testing::PassagePlan passage_of(core::Random& random, const MatchingOptions& options) {
+  testing::PassagePlan plan = testing::random_passage(random);
+  if (!options.just_clear) return plan;
+  plan.facing = true;
+  plan.manoeuvre = testing::Manoeuvre::just_clear;
+  plan.speed_mps = std::min(plan.speed_mps, core::mps_from_kmh(40));
+  return plan;
+}
+
 }  // namespace
 
 int measure_switches(const MatchingOptions& options) {
@@ -77,7 +86,7 @@ int measure_switches(const MatchingOptions& options) {
   Class gyro("gyro only");
   const auto begin = std::chrono::steady_clock::now();
   for (int i = 0; i < count; ++i) {
-    const testing::PassagePlan plan = testing::random_passage(random);
+    const testing::PassagePlan plan = passage_of(random, options);
     const auto result = testing::SwitchPassage(plan, options.seed * 100000 + static_cast<uint64_t>(i)).run();
     (plan.camera ? camera : gyro).add(plan, result);
     const bool late = plan.facing && Class::is_late(result);
