@@ -260,8 +260,9 @@ TEST_F(RailmlTest, CantOfRailml3IsLeftOutAndTold) {
   const std::string text =
       railml3(R"(<superelevationCurves><superelevationCurve id="sc1" superelevation="60"/></superelevationCurves>)");
   EXPECT_THAT(core::value_or_throw(build_map({write("b.railml", text)}, {})).map.problems,
-              testing::Contains("<superelevationCurve> \"sc1\" says something of cant, perhaps as others do: cant of "
-                                "railML 3 is not read, all of it is left out"));
+              testing::Contains("<superelevationCurve> \"sc1\" says something of cant, perhaps as others do: railML 3 "
+                                "has no word for it and does not say its unit and sign; all of it is left out, cant is "
+                                "read from railML 2, ERJU and LandXML"));
 }
 
 TEST_F(RailmlTest, ImpossibleValuesAreLeftOutAndTold) {

@@ -240,15 +240,17 @@ class Reader {
     }
   }
 
-  /// No file and no schema at hand says which unit and sign cant has in railML 3: it is not guessed at.
+  /// The schemas of railML 3.1 to 3.3 have no word for cant (wiki3.railml.org, IS:geometryPoint and its neighbours):
+  /// what says it is someone's extension, and its unit and sign are not guessed at.
   void tell_cant() {
     const pugi::xml_node first = source_.root().find_node([](const pugi::xml_node& node) {
       return std::string_view(node.name()) == "superelevationCurve" || node.attribute("superelevation");
     });
     if (!first) return;
-    net_.problems.push_back(railml_called(first) +
-                            " says something of cant, perhaps as others do: cant of railML 3 is " +
-                            "not read, all of it is left out");
+    net_.problems.push_back(
+        railml_called(first) +
+        " says something of cant, perhaps as others do: railML 3 has no word for it and does not "
+        "say its unit and sign; all of it is left out, cant is read from railML 2, ERJU and LandXML");
   }
 
   void read_speeds() {
