@@ -477,6 +477,10 @@ TEST_F(PlanImport, ScheibenbergIsReadWhole) {
   // As the files count, but for one edge whose coordinates are 20.5 m shorter than its length.
   EXPECT_NEAR(length_of(map), 26258.83 - 20.5, 1);
   EXPECT_THAT(map.problems, Contains(HasSubstr("T11")));
+  // The file says this one as a straight, an arc and a straight, and its points lie on them.
+  const auto t6 = std::ranges::find_if(map.edges, [](const Edge& edge) { return edge.name.starts_with("T6 "); });
+  ASSERT_EQ(t6->alignment.elements().size(), 3U);
+  EXPECT_NEAR(1 / t6->alignment.elements()[1].curvature_start_per_m, -190.1, 0.01);
   EXPECT_TRUE(
       std::none_of(map.edges.begin(), map.edges.end(), [](const Edge& edge) { return edge.speed_limits.empty(); }));
   EXPECT_LT(built.fit.max_m, 0.5);

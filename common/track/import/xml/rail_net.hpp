@@ -28,6 +28,7 @@ struct NetTrack {
   ImportedTrack track;                 // name, line, marks and groups; its alignment is made here
   double length_m = 0;                 // as the source counts
   std::vector<Eigen::Vector2d> shape;  // surveyed points in the plane of the map, from begin to end
+  std::vector<Element> plan{};         // where the source says it beside the points: the whole track, without a gap
   std::vector<NetBend> bends;
   std::vector<NetSlope> slopes;
   std::vector<CantPoint> cant;
