@@ -265,6 +265,26 @@ TEST_F(RailmlTest, CantOfRailml3IsLeftOutAndTold) {
                                 "read from railML 2, ERJU and LandXML"));
 }
 
+TEST_F(RailmlTest, CoordinatesThatNoMapHasAreRefused) {
+  const auto at = [](const std::string& share, const std::string& x) {
+    return "<intrinsicCoordinate intrinsicCoord=\"" + share +
+           "\"><geometricCoordinate positioningSystemRef=\"g\" x=\"" + x + "\" y=\"5500000\"/></intrinsicCoordinate>";
+  };
+  std::string text = railml3("");
+  const std::string plain = "<netElement id=\"n1\" length=\"1000\"/>";
+  text.replace(text.find(plain), plain.size(),
+               "<netElement id=\"n1\" length=\"1000\"><associatedPositioningSystem>" + at("0", "500000") +
+                   at("1", "1e308") + "</associatedPositioningSystem></netElement>");
+  text.insert(text.find("<infrastructure>"),
+              "<common><positioning><geometricPositioningSystem id=\"g\" crsDefinition=\"EPSG:25832\"/></positioning>"
+              "</common>");
+  const auto built = build_map({write("far.railml", text)}, {});
+  ASSERT_FALSE(built.ok());
+  EXPECT_THAT(built.error().message,
+              HasSubstr("<geometricCoordinate> has coordinates that no map has; they are metres, "
+                        "and below 100,000,000"));
+}
+
 TEST_F(RailmlTest, ImpossibleValuesAreLeftOutAndTold) {
   std::string text = railml2("500", "90000");
   text.insert(

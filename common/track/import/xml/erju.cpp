@@ -48,6 +48,7 @@ class Reader {
       NetTrack& track = net_.tracks[edges_.track_of(*map_, edge, "id")];
       for (const pugi::xml_node& point : descendants(edge, "coordinate")) {
         const Eigen::Vector2d at(map_->required(point, "x"), map_->required(point, "y"));
+        if (!is_place(at)) throw map_->wrong(point, "<coordinate> has " + std::string(kNoPlace));
         if (track.shape.empty() || (track.shape.back() - at).norm() > kNearCoordinateM) track.shape.push_back(at);
       }
       if (track.shape.size() < 2)

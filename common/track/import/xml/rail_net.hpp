@@ -2,6 +2,7 @@
 // plan may be surveyed, described by radii, or missing.
 #pragma once
 
+#include <cmath>
 #include <optional>
 
 #include "track/import/fit/clothoid_fit.hpp"
@@ -23,6 +24,14 @@ struct NetSlope {
   double grade = 0;
   double curve_length_m = 0;  // parabola centred at the place, 0 = sharp
 };
+
+/// No projection leads farther, with the number of a zone before the easting. Points beyond are none: no fit of them
+/// ends.
+constexpr double kFarthestM = 1e8;
+inline bool is_place(const Eigen::Vector2d& at) {
+  return std::abs(at.x()) < kFarthestM && std::abs(at.y()) < kFarthestM;
+}
+constexpr const char* kNoPlace = "coordinates that no map has; they are metres, and below 100,000,000";
 
 struct NetTrack {
   ImportedTrack track;                 // name, line, marks and groups; its alignment is made here
