@@ -23,6 +23,21 @@ std::optional<EtcsIdentity> etcs_identity(double nid_c, double nid_bg) {
   return EtcsIdentity{static_cast<uint32_t>(nid_c), static_cast<uint32_t>(nid_bg)};
 }
 
+std::vector<CantPoint> held(std::vector<CantPoint> changes) {
+  if (changes.empty()) return {};
+  std::ranges::stable_sort(changes, {}, &CantPoint::offset_m);
+  std::vector<CantPoint> out{{0, 0}};
+  for (const CantPoint& change : changes) {
+    if (change.offset_m <= 0) {
+      out = {{0, change.cant_m}};
+      continue;
+    }
+    out.push_back({change.offset_m, out.back().cant_m});
+    out.push_back(change);
+  }
+  return out;
+}
+
 void add_speeds(std::vector<std::pair<double, double>> changes, Direction running, double length_m,
                 ImportedTrack& track) {
   std::stable_sort(changes.begin(), changes.end(), [](const auto& a, const auto& b) { return a.first < b.first; });

@@ -70,6 +70,10 @@ struct ImportedTrack {
 void add_speeds(std::vector<std::pair<double, double>> changes, Direction running, double length_m,
                 ImportedTrack& track);
 
+/// Cant that holds from each place on up to the next one and steps there; 0 before the first. None where there are
+/// none.
+std::vector<CantPoint> held(std::vector<CantPoint> changes);
+
 /// How well what was read closes: worst cases over all elements, in metres and radians.
 struct FitFigures {
   size_t elements = 0;

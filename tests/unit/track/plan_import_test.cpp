@@ -348,11 +348,13 @@ TEST_F(PlanImport, TheExamplesOfBothGenerationsAgree) {
     double length_m;
     int switches;
     size_t platform_ends;
-    std::vector<size_t> balises;  // of 2.4 and 3.2, which has none
-    size_t masts;                 // signals and stop posts, without the virtual ones
+    std::vector<size_t> balises;   // of 2.4 and 3.2, which has none
+    size_t masts;                  // signals and stop posts, without the virtual ones
+    std::vector<ptrdiff_t> right;  // of those, in 2.4 and 3.2, which says it of stop posts too
+    ptrdiff_t left;                // V2, which trains in reverse heed, to their right
   };
-  for (const Example& example : {Example{"Simplest Example-2.4.zip", 1630, 2, 2, {5, 0}, 4},
-                                 {"Simple Example+RTC.zip", 6900, 3, 8, {7, 0}, 26}}) {
+  for (const Example& example : {Example{"Simplest Example-2.4.zip", 1630, 2, 2, {5, 0}, 4, {2, 2}, 0},
+                                 {"Simple Example+RTC.zip", 6900, 3, 8, {7, 0}, 26, {2, 4}, 1}}) {
     SCOPED_TRACE(example.zip);
     const std::vector<std::filesystem::path> files = unzipped(example.zip);
     if (files.empty()) GTEST_SKIP() << "skipped: no " << example.zip << ", or no unzip";
@@ -373,6 +375,13 @@ TEST_F(PlanImport, TheExamplesOfBothGenerationsAgree) {
       EXPECT_EQ(count_of(map, LandmarkKind::platform), example.platform_ends);
       EXPECT_EQ(count_of(map, LandmarkKind::balise), example.balises[i]);
       EXPECT_EQ(count_of(map, LandmarkKind::mast), example.masts);
+      const auto beside = [&](double left) {
+        return std::ranges::count_if(map.landmarks, [&](const Landmark& mark) {
+          return mark.kind == LandmarkKind::mast && mark.lateral_m * left > 0;
+        });
+      };
+      EXPECT_EQ(beside(-1), example.right[i]);
+      EXPECT_EQ(beside(1), example.left);
       EXPECT_TRUE(std::none_of(map.problems.begin(), map.problems.end(), [](const std::string& problem) {
         return problem.find("cannot be reached") != std::string::npos;
       }));
@@ -477,6 +486,10 @@ TEST_F(PlanImport, ScheibenbergIsReadWhole) {
   // As the files count, but for one edge whose coordinates are 20.5 m shorter than its length.
   EXPECT_NEAR(length_of(map), 26258.83 - 20.5, 1);
   EXPECT_THAT(map.problems, Contains(HasSubstr("T11")));
+  // The file says this one as a straight, an arc and a straight, and its points lie on them.
+  const auto t6 = std::ranges::find_if(map.edges, [](const Edge& edge) { return edge.name.starts_with("T6 "); });
+  ASSERT_EQ(t6->alignment.elements().size(), 3U);
+  EXPECT_NEAR(1 / t6->alignment.elements()[1].curvature_start_per_m, -190.1, 0.01);
   EXPECT_TRUE(
       std::none_of(map.edges.begin(), map.edges.end(), [](const Edge& edge) { return edge.speed_limits.empty(); }));
   EXPECT_LT(built.fit.max_m, 0.5);

@@ -260,8 +260,29 @@ TEST_F(RailmlTest, CantOfRailml3IsLeftOutAndTold) {
   const std::string text =
       railml3(R"(<superelevationCurves><superelevationCurve id="sc1" superelevation="60"/></superelevationCurves>)");
   EXPECT_THAT(core::value_or_throw(build_map({write("b.railml", text)}, {})).map.problems,
-              testing::Contains("<superelevationCurve> \"sc1\" says something of cant, perhaps as others do: cant of "
-                                "railML 3 is not read, all of it is left out"));
+              testing::Contains("<superelevationCurve> \"sc1\" says something of cant, perhaps as others do: railML 3 "
+                                "has no word for it and does not say its unit and sign; all of it is left out, cant is "
+                                "read from railML 2, ERJU and LandXML"));
+}
+
+TEST_F(RailmlTest, CoordinatesThatNoMapHasAreRefused) {
+  const auto at = [](const std::string& share, const std::string& x) {
+    return "<intrinsicCoordinate intrinsicCoord=\"" + share +
+           "\"><geometricCoordinate positioningSystemRef=\"g\" x=\"" + x + "\" y=\"5500000\"/></intrinsicCoordinate>";
+  };
+  std::string text = railml3("");
+  const std::string plain = "<netElement id=\"n1\" length=\"1000\"/>";
+  text.replace(text.find(plain), plain.size(),
+               "<netElement id=\"n1\" length=\"1000\"><associatedPositioningSystem>" + at("0", "500000") +
+                   at("1", "1e308") + "</associatedPositioningSystem></netElement>");
+  text.insert(text.find("<infrastructure>"),
+              "<common><positioning><geometricPositioningSystem id=\"g\" crsDefinition=\"EPSG:25832\"/></positioning>"
+              "</common>");
+  const auto built = build_map({write("far.railml", text)}, {});
+  ASSERT_FALSE(built.ok());
+  EXPECT_THAT(built.error().message,
+              HasSubstr("<geometricCoordinate> has coordinates that no map has; they are metres, "
+                        "and below 100,000,000"));
 }
 
 TEST_F(RailmlTest, ImpossibleValuesAreLeftOutAndTold) {

@@ -23,8 +23,9 @@ void tell_unread(const XmlSource& infra, std::vector<std::string>& problems) {
        "gradients in its vertical alignment, whose units no schema at hand gives; they are left out, only sampled "
        "slopes are read",
        problems);
-  tell(infra, "sampledTrackEdgeGeometry", "cant",
-       "sampled cants, whose unit and sign no schema at hand gives; they are left out, only cant points are read",
+  tell(infra, "sampledTrackEdgeGeometry", "curve",
+       "sampled curve radii, whose unit and sign no schema at hand gives; they are left out, curves come from "
+       "coordinates or azimuths",
        problems);
 }
 

@@ -12,6 +12,7 @@
 #include "track/import/made/made_lines.hpp"
 #include "track/import/told.hpp"
 #include "track/import/xml/net_heights.hpp"
+#include "track/import/xml/net_plan.hpp"
 
 namespace railfix::track {
 namespace {
@@ -95,7 +96,9 @@ class Planner {
   [[nodiscard]] bool is_laid(size_t track) const { return !net_.tracks[track].track.alignment.elements().empty(); }
 
   void fit_shape(NetTrack& track) {
-    if (std::optional<ClothoidFit> smooth = fit_drawing(track.shape, {})) {
+    std::optional<ClothoidFit> smooth = own_plan(track, net_.problems);
+    if (!smooth) smooth = fit_drawing(track.shape, {});
+    if (smooth) {
       net_.fit.add(track.track.name, *smooth, track.shape.size());
       if (smooth->left_out > 0) {
         net_.problems.push_back("track " + track.track.name + " has " +

@@ -2,6 +2,7 @@
 // plan may be surveyed, described by radii, or missing.
 #pragma once
 
+#include <cmath>
 #include <optional>
 
 #include "track/import/fit/clothoid_fit.hpp"
@@ -24,10 +25,19 @@ struct NetSlope {
   double curve_length_m = 0;  // parabola centred at the place, 0 = sharp
 };
 
+/// No projection leads farther, with the number of a zone before the easting. Points beyond are none: no fit of them
+/// ends.
+constexpr double kFarthestM = 1e8;
+inline bool is_place(const Eigen::Vector2d& at) {
+  return std::abs(at.x()) < kFarthestM && std::abs(at.y()) < kFarthestM;
+}
+constexpr const char* kNoPlace = "coordinates that no map has; they are metres, and below 100,000,000";
+
 struct NetTrack {
   ImportedTrack track;                 // name, line, marks and groups; its alignment is made here
   double length_m = 0;                 // as the source counts
   std::vector<Eigen::Vector2d> shape;  // surveyed points in the plane of the map, from begin to end
+  std::vector<Element> plan{};         // where the source says it beside the points: the whole track, without a gap
   std::vector<NetBend> bends;
   std::vector<NetSlope> slopes;
   std::vector<CantPoint> cant;

@@ -35,9 +35,9 @@ std::string not_on_its_track(const pugi::xml_node& node) {
   return railml_called(node) + " is not on its track; it is left out";
 }
 
-double platform_lateral_m(const std::string& side) {
+double left_of(const std::string& side) {
   if (side != "left" && side != "right") return 0;
-  return side == "left" ? kPlatformEdgeM : -kPlatformEdgeM;
+  return side == "left" ? 1 : -1;
 }
 
 std::set<std::string> special_speed_profiles(const XmlSource& source) {

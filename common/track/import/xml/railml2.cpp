@@ -7,6 +7,7 @@
 #include "track/import/xml/railml2_balises.hpp"
 #include "track/import/xml/railml2_coordinates.hpp"
 #include "track/import/xml/railml2_radii.hpp"
+#include "track/import/xml/railml2_signals.hpp"
 #include "track/import/xml/railml2_stretches.hpp"
 #include "track/import/xml/railml_readers.hpp"
 
@@ -175,16 +176,8 @@ class Reader {
     for (const pugi::xml_node& of : elements.child("levelCrossings").children("levelCrossing"))
       add(LandmarkKind::level_crossing, pos(of) - origin_m_, of);
     for (const pugi::xml_node& of : elements.child("platformEdges").children("platformEdge"))
-      add_stretch(platforms_, of, platform_lateral_m(of.attribute("side").value()));
-    const pugi::xml_node control = node.child("ocsElements");
-    const auto add_masts = [&](const char* all, const char* one) {
-      for (const pugi::xml_node& of : control.child(all).children(one)) {
-        const bool nothing_stands_there = of.attribute("virtual").as_bool();
-        if (!nothing_stands_there) add(LandmarkKind::mast, pos(of) - origin_m_, of);
-      }
-    };
-    add_masts("signals", "signal");
-    add_masts("stopPosts", "stopPost");
+      add_stretch(platforms_, of, kPlatformEdgeM * left_of(of.attribute("side").value()));
+    read_signals2(source_, node.child("ocsElements"), origin_m_, track, net_.problems);
   }
 
   bool lies_on(const pugi::xml_node& of, const NetTrack& track) {

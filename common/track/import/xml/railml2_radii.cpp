@@ -58,19 +58,13 @@ class CantReader {
   std::vector<pugi::xml_node> on_straights_;
 };
 
-/// Like the radius, the cant holds from a change on up to the next one, so that it steps there.
-void add_cant(const std::vector<RadiusChange>& changes, NetTrack& track) {
-  if (std::none_of(changes.begin(), changes.end(), [](const RadiusChange& c) { return c.cant_m.has_value(); })) return;
-  track.cant = {{0, 0}};
-  for (const RadiusChange& change : changes) {
-    const double cant_m = change.cant_m.value_or(0);
-    if (change.offset_m <= 0) {
-      track.cant = {{0, cant_m}};
-      continue;
-    }
-    track.cant.push_back({change.offset_m, track.cant.back().cant_m});
-    track.cant.push_back({change.offset_m, cant_m});
-  }
+/// Like the radius, the cant holds from a change on up to the next one.
+std::vector<CantPoint> cant_of(const std::vector<RadiusChange>& changes) {
+  if (std::none_of(changes.begin(), changes.end(), [](const RadiusChange& c) { return c.cant_m.has_value(); }))
+    return {};
+  std::vector<CantPoint> out;
+  for (const RadiusChange& change : changes) out.push_back({change.offset_m, change.cant_m.value_or(0)});
+  return held(std::move(out));
 }
 
 }  // namespace
@@ -94,7 +88,7 @@ void read_radii2(const XmlSource& source, const pugi::xml_node& radius_changes, 
     const double curvature = changes[i].curvature_per_m;
     if (curvature != 0 && to > from) track.bends.push_back({from, to, curvature, curvature});
   }
-  add_cant(changes, track);
+  track.cant = cant_of(changes);
 }
 
 }  // namespace railfix::track

@@ -5,6 +5,7 @@
 
 #include "core/units.hpp"
 #include "track/import/xml/railml3_balises.hpp"
+#include "track/import/xml/railml3_signals.hpp"
 #include "track/import/xml/railml3_slopes.hpp"
 #include "track/import/xml/railml_plane.hpp"
 #include "track/import/xml/railml_readers.hpp"
@@ -192,14 +193,6 @@ class Reader {
         {kind, offset_m, place.same_direction ? lateral_m : -lateral_m, kRailmlSigmaM, railml_name(of)});
   }
 
-  /// Nothing stands there.
-  static bool is_virtual(const pugi::xml_node& signal) {
-    const auto constructions = descendants(signal, "signalConstruction");
-    return std::ranges::any_of(constructions, [](const pugi::xml_node& of) {
-      return std::string_view(of.attribute("type").value()) == "virtual";
-    });
-  }
-
   void add_portals(const pugi::xml_node& of) {
     for (const NetSpot& spot : portals_of(net_, places_.of(of)))
       net_.tracks[spot.track].track.marks.push_back(portal(spot, kRailmlSigmaM, railml_name(of)));
@@ -232,23 +225,22 @@ class Reader {
     for (const pugi::xml_node& of : descendants(source_.root(), "platformEdge")) {
       const pugi::xml_node sided =
           of.find_node([](const pugi::xml_node& node) { return node.attribute("lateralSide"); });
-      add_platform(platform_lateral_m(sided.attribute("lateralSide").value()), of);
+      add_platform(kPlatformEdgeM * left_of(sided.attribute("lateralSide").value()), of);
     }
-    for (const pugi::xml_node& of : descendants(source_.root(), "signalIS")) {
-      if (is_virtual(of)) continue;
-      for (const NetPlace& place : places_.of(of)) add(LandmarkKind::mast, place, place.from_m, 0, of);
-    }
+    read_signals3(source_, places_, net_);
   }
 
-  /// No file and no schema at hand says which unit and sign cant has in railML 3: it is not guessed at.
+  /// The schemas of railML 3.1 to 3.3 have no word for cant (wiki3.railml.org, IS:geometryPoint and its neighbours):
+  /// what says it is someone's extension, and its unit and sign are not guessed at.
   void tell_cant() {
     const pugi::xml_node first = source_.root().find_node([](const pugi::xml_node& node) {
       return std::string_view(node.name()) == "superelevationCurve" || node.attribute("superelevation");
     });
     if (!first) return;
-    net_.problems.push_back(railml_called(first) +
-                            " says something of cant, perhaps as others do: cant of railML 3 is " +
-                            "not read, all of it is left out");
+    net_.problems.push_back(
+        railml_called(first) +
+        " says something of cant, perhaps as others do: railML 3 has no word for it and does not "
+        "say its unit and sign; all of it is left out, cant is read from railML 2, ERJU and LandXML");
   }
 
   void read_speeds() {

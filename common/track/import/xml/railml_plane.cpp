@@ -6,6 +6,7 @@
 
 #include "track/import/local_crs.hpp"
 #include "track/import/swapped.hpp"
+#include "track/import/xml/rail_net.hpp"
 
 namespace railfix::track {
 
@@ -43,7 +44,10 @@ Eigen::Vector2d RailmlPlane::at(const pugi::xml_node& coordinate, const std::str
     throw source_.wrong(coordinate,
                         "coordinates in both " + system_ + " and " + system + "; only one system can be read");
   }
-  if (!projection_) return {first, second};
+  if (!projection_) {
+    if (!is_place({first, second})) throw source_.wrong(coordinate, element + " has " + kNoPlace);
+    return {first, second};
+  }
   const auto at = projection_->from_geo({first, second});
   if (!at) throw source_.wrong(coordinate, element + " lies too far from the first one of the file");
   return *at;

@@ -30,8 +30,12 @@ bool is_on_track(double offset_m, double length_m);
 std::string not_on_its_track(const pugi::xml_node& node);
 constexpr double kAtEndM = 0.01;
 
-/// Of a platform edge on the "left" or "right", else 0: the file does not say on which side.
-double platform_lateral_m(const std::string& side);
+/// 1 on the "left", -1 on the "right", else 0: the file does not say on which side.
+double left_of(const std::string& side);
+
+/// From the track's middle to a signal's mast, where the source says its side alone: they stand just outside the
+/// clearance of 2.5 m. Who compares what a camera sees with the map looks at the side.
+constexpr double kMastBesideM = 2.75;
 
 /// Speed profiles for some trains only (tilting, temporary, ...), by id: what is not the basic profile, or, where the
 /// file marks none as that, what lowers it.

@@ -1,0 +1,140 @@
+#include "track/import/xml/erju_cants.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "track/import/told.hpp"
+
+namespace railfix::track {
+namespace {
+
+constexpr double kCurvePerM = 1.0 / 3000;  // wider ones have little cant, and azimuths scatter as much
+constexpr double kCantM = 0.005;           // of what says which rail is higher
+constexpr size_t kFewAgainst = 10;         // one in so many may lie against the curve, as on the branch of a switch
+
+CantPoint cant_of(const XmlSource& infra, const pugi::xml_node& node, const char* pos, const char* value) {
+  return {metres(infra.required(node, pos)), metres(infra.required(node, value))};
+}
+
+}  // namespace
+
+ErjuCants::ErjuCants(const XmlSource& infra, const ErjuEdges& edges, RailNet& net)
+    : infra_(infra), edges_(edges), net_(net) {
+  for (const pugi::xml_node& geometry : descendants(infra.root(), "trackEdgeGeometry")) read_points(geometry);
+  for (NetTrack& track : net.tracks) std::ranges::stable_sort(track.cant, {}, &CantPoint::offset_m);
+  size_t with_samples = 0;
+  for (const pugi::xml_node& sampled : descendants(infra.root(), "sampledTrackEdgeGeometry"))
+    with_samples += read_samples(sampled) ? 1 : 0;
+  if (with_samples == 0) return;
+  net.problems.push_back(std::to_string(with_samples) +
+                         " track edges have their cant from samples, taken as millimetres that hold up to the next "
+                         "one, as sampled slopes do; the schema does not say it");
+}
+
+void ErjuCants::read_points(const pugi::xml_node& geometry) {
+  NetTrack& track = net_.tracks[edges_.track_of(infra_, geometry, "id")];
+  ErjuLeftOut left_out;
+  for (const pugi::xml_node& point : descendants(geometry, "cantPoint")) {
+    const CantPoint cant = cant_of(infra_, point, "trackGeometryPos", "appliedCant");
+    if (is_cant(cant.cant_m)) {
+      track.cant.push_back(cant);
+    } else {
+      left_out.add(std::string("appliedCant ") + point.attribute("appliedCant").value() + " mm", cant.offset_m);
+    }
+  }
+  left_out.tell(std::string(kNoTrackHas) + "; left out", track, net_.problems);
+}
+
+/// Nothing where the plan has points.
+bool ErjuCants::read_samples(const pugi::xml_node& sampled) {
+  NetTrack& track = net_.tracks[edges_.track_of(infra_, sampled, "id")];
+  if (!track.cant.empty()) return false;
+  ErjuLeftOut left_out;
+  std::vector<CantPoint> samples;
+  for (const pugi::xml_node& sample : sampled.child("cants").children("cant")) {
+    const CantPoint cant = cant_of(infra_, sample, "pos", "samplePointCant");
+    if (is_cant(cant.cant_m)) {
+      samples.push_back(cant);
+    } else {
+      left_out.add(std::string("samplePointCant ") + sample.attribute("samplePointCant").value() + " mm",
+                   cant.offset_m);
+    }
+  }
+  left_out.tell(std::string(kNoTrackHas) + "; left out", track, net_.problems);
+  track.cant = held(std::move(samples));
+  return !track.cant.empty();
+}
+
+/// How the track curves there: 0 where it is nearly straight.
+double ErjuCants::bend(size_t track, double offset_m) const {
+  const auto found = azimuths_.find(track);
+  const double curvature_per_m = found == azimuths_.end() ? 0 : curvature_about(found->second, offset_m);
+  return std::abs(curvature_per_m) < kCurvePerM ? 0 : curvature_per_m;
+}
+
+ErjuCants::Votes ErjuCants::votes() const {
+  Votes out;
+  for (size_t track = 0; track < net_.tracks.size(); ++track) {
+    for (const CantPoint& point : net_.tracks[track].cant) {
+      if (std::abs(point.cant_m) < kCantM) continue;
+      out.any = true;
+      out.below_0 = out.below_0 || point.cant_m < 0;
+      const double curvature_per_m = bend(track, point.offset_m);
+      if (curvature_per_m == 0) continue;
+      ++(point.cant_m * curvature_per_m > 0 ? out.as_map : out.turned);
+    }
+  }
+  return out;
+}
+
+ErjuCants::Sign ErjuCants::sign_of(const Votes& votes) const {
+  const size_t all = votes.as_map + votes.turned;
+  if (all == 0) {
+    net_.problems.push_back(
+        "no azimuths show the curves that cant is on, and the schema does not say which rail is higher where it is "
+        "positive: it is taken as the right one, as in a left curve");
+    return Sign::as_map;
+  }
+  const size_t against = std::min(votes.as_map, votes.turned);
+  if (!votes.below_0 && against > 0) return Sign::amount;
+  if (against * kFewAgainst > all) {
+    net_.problems.push_back("cant makes the inner rail of a curve the higher one at " + std::to_string(against) +
+                            " of " + std::to_string(all) +
+                            " places in curves, whatever its sign means: look at the "
+                            "source");
+  }
+  return votes.turned > votes.as_map ? Sign::turned : Sign::as_map;
+}
+
+/// Never below 0, in left curves and right ones: which rail it is only the curve says; beside one, the nearest.
+void ErjuCants::take_as_amounts(NetTrack& on, size_t track) {
+  std::vector<CantPoint>& cant = on.cant;
+  std::vector<std::pair<double, double>> curves;  // offset, curvature
+  for (const CantPoint& point : cant) {
+    if (const double curvature_per_m = bend(track, point.offset_m); curvature_per_m != 0)
+      curves.emplace_back(point.offset_m, curvature_per_m);
+  }
+  if (curves.empty() && std::ranges::any_of(cant, [](const CantPoint& point) { return point.cant_m != 0; })) {
+    net_.problems.push_back("track edge \"" + on.track.name +
+                            "\" has cant and no curve that says which rail is higher; left out");
+    cant.clear();
+  }
+  for (CantPoint& point : cant) {
+    const auto nearest =
+        std::ranges::min_element(curves, {}, [&](const auto& curve) { return std::abs(curve.first - point.offset_m); });
+    if (nearest != curves.end()) point.cant_m = std::copysign(point.cant_m, nearest->second);
+  }
+}
+
+void ErjuCants::settle() {
+  const Votes all = votes();
+  if (!all.any) return;
+  const Sign sign = sign_of(all);
+  for (size_t track = 0; track < net_.tracks.size(); ++track) {
+    if (sign == Sign::amount) take_as_amounts(net_.tracks[track], track);
+    if (sign != Sign::turned) continue;
+    for (CantPoint& point : net_.tracks[track].cant) point.cant_m = -point.cant_m;
+  }
+}
+
+}  // namespace railfix::track
