@@ -53,7 +53,7 @@ TEST_F(RailmlSignals, OfRailml3StandWhereTrainsThatHeedThemSeeThem) {
                            {"", reverse, "", 0}}) {
     SCOPED_TRACE(said.at_track + " " + said.spot + " " + said.beside);
     const Map map = map_of(railml3(signal3(said.at_track, said.spot, said.beside)));
-    EXPECT_EQ(lateral_m(map, "s"), 2.75 * said.side);
+    EXPECT_EQ(lateral_m(map, "s"), 3.0 * said.side);
     EXPECT_THAT(map.problems, testing::Not(Contains(HasSubstr("left open"))));
   }
 }
@@ -80,10 +80,10 @@ TEST_F(RailmlSignals, OfRailml2StandOnTheSideThatAnExtensionSays) {
   // Cut at the switch at 500 m, and seen along the track whoever heeds them.
   const Map map = map_of(signals2(R"(<signal id="a" pos="100" dir="up" nor:side="right"/>
 <signal id="b" pos="700" dir="down" nor:side="left"/><signal id="c" pos="800"/><signal id="d" pos="820" virtual="true" nor:side="left"/>)"));
-  EXPECT_EQ(lateral_m(map, "a"), -2.75);
-  EXPECT_EQ(lateral_m(map, "b"), 2.75);
+  EXPECT_EQ(lateral_m(map, "a"), -3.0);
+  EXPECT_EQ(lateral_m(map, "b"), 3.0);
   EXPECT_EQ(lateral_m(map, "c"), 0);
-  EXPECT_EQ(lateral_m(map, "p"), -2.75);
+  EXPECT_EQ(lateral_m(map, "p"), -3.0);
   EXPECT_TRUE(std::isnan(lateral_m(map, "d"))) << "nothing stands there";
   EXPECT_THAT(map.problems, testing::Not(Contains(HasSubstr("left open"))));
 }

@@ -8,10 +8,6 @@
 namespace railfix::track {
 namespace {
 
-/// From the track's middle to the post: usual are 3.1 m to its near side along main lines, 2.2 m in stations and
-/// between two tracks. OpenStreetMap says the side and no distance; give or take a metre, it is this.
-constexpr double kSignalM = 3.0;
-
 /// Knee-high, as for shunting, and nothing else at the node.
 bool is_dwarf(const OsmTags& tags) {
   bool has_dwarf = false;
@@ -58,7 +54,7 @@ std::optional<TrackMark> OsmPoints::signal(int64_t node, int64_t way, double off
   if (!is_left && position != "right") {
     if (!position.empty()) no_sides_.add("\"" + position + "\" of " + called(node, at.place, way));
   } else if (along_way) {
-    mast.lateral_m = is_left == *along_way ? kSignalM : -kSignalM;
+    mast.lateral_m = is_left == *along_way ? kMastBesideM : -kMastBesideM;
   } else {
     turned_.add(called(node, at.place, way));
   }

@@ -33,10 +33,6 @@ constexpr double kAtEndM = 0.01;
 /// 1 on the "left", -1 on the "right", else 0: the file does not say on which side.
 double left_of(const std::string& side);
 
-/// From the track's middle to a signal's mast, where the source says its side alone: they stand just outside the
-/// clearance of 2.5 m. Who compares what a camera sees with the map looks at the side.
-constexpr double kMastBesideM = 2.75;
-
 /// Speed profiles for some trains only (tilting, temporary, ...), by id: what is not the basic profile, or, where the
 /// file marks none as that, what lowers it.
 std::set<std::string> special_speed_profiles(const XmlSource& source);
