@@ -119,6 +119,13 @@ TEST_F(OsmHeightsTest, HeightsOfNodesPutGradesAboveTheSea) {
   EXPECT_THAT(map.problems, Not(Contains(HasSubstr("inclines from other nodes"))));
 }
 
+TEST_F(OsmHeightsTest, GradesWithoutAHeightLieWhereWhatIsNotKnownClimbsEvenly) {
+  const Map map = map_of({{}, {"10‰"}, {}}, {{1, "400"}, {10, "410"}});
+  EXPECT_THAT(seen(map, {100, 400, 800}), ElementsAre("401.2 11.7?", "404.5 10.0", "408.8 11.7?"));
+  EXPECT_THAT(map.problems,
+              Contains("1 stretches with incline hold no node with a height (ele): how high they lie is a guess"));
+}
+
 TEST_F(OsmHeightsTest, WhereTheyContradictInclinesCount) {
   const Map map = map_of({{"10‰"}}, {{1, "412"}, {2, "413"}, {4, "425"}});
   EXPECT_THAT(seen(map, {0, 150, 299}), ElementsAre("412.0 10.0", "413.5 10.0", "415.0 10.0"));

@@ -99,38 +99,61 @@ class Heights {
     height_at_.try_emplace(end, height_m + rise_m);
   }
 
-  /// Between tracks without slopes the height is the one that lets all of them climb evenly: what comes to a node is
-  /// what leaves it, a sparse linear system. Where nothing holds a part it stays as it is.
-  void settle() {
-    std::map<size_t, Eigen::Index> open;
-    for (const auto& [node, tracks] : tracks_at_) {
-      if (!told_.contains(node) &&
-          std::none_of(tracks.begin(), tracks.end(), [&](size_t track) { return has_slopes(track); }))
-        open.emplace(node, std::ssize(open));
+  /// Nodes that tracks with slopes join rise and fall together.
+  size_t run_of(size_t node) {
+    while (runs_[node] != node) node = runs_[node] = runs_[runs_[node]];
+    return node;
+  }
+
+  /// Runs whose height nothing says: nodes without slopes, and where some heights are told all others too.
+  std::map<size_t, Eigen::Index> open_runs() {
+    for (const auto& [node, tracks] : tracks_at_) runs_[node] = node;
+    for (size_t track = 0; track < nodes_.size(); ++track) {
+      if (has_slopes(track)) runs_[run_of(nodes_[track].first)] = run_of(nodes_[track].second);
     }
+    std::map<size_t, bool> held;
+    for (const auto& [node, tracks] : tracks_at_) {
+      const bool has_own = std::any_of(tracks.begin(), tracks.end(), [&](size_t track) { return has_slopes(track); });
+      held[run_of(node)] |= told_.contains(node) || (told_.empty() && has_own);
+    }
+    std::map<size_t, Eigen::Index> open;
+    for (const auto& [run, is_held] : held) {
+      if (!is_held) open.emplace(run, std::ssize(open));
+    }
+    return open;
+  }
+
+  /// An open run lies where all tracks without slopes that leave it climb evenly: what comes to it is what leaves it, a
+  /// sparse linear system. Where nothing holds a part it stays as it is.
+  void settle() {
+    const std::map<size_t, Eigen::Index> open = open_runs();
     if (open.empty()) return;
     constexpr double kStays = 1e-12;
     std::vector<Eigen::Triplet<double>> terms;
+    Eigen::VectorXd weights = Eigen::VectorXd::Zero(std::ssize(open));
     Eigen::VectorXd sums = Eigen::VectorXd::Zero(std::ssize(open));
-    for (const auto& [node, row] : open) {
-      double weight = 0;
-      for (const size_t track : tracks_at_[node]) {
-        const auto [begin, end] = nodes_[track];
-        const size_t other = begin == node ? end : begin;
-        weight += 1 / length(track);
-        if (const auto column = open.find(other); column != open.end()) {
-          terms.emplace_back(row, column->second, -1 / length(track));
-        } else {
-          sums[row] += height_at_[other] / length(track);
-        }
-      }
-      terms.emplace_back(row, row, weight * (1 + kStays));
-      sums[row] += kStays * weight * height_at_[node];
+    const auto balance = [&](size_t node, size_t other, double length_m) {
+      const auto own = open.find(run_of(node));
+      if (own == open.end()) return;
+      const Eigen::Index row = own->second;
+      weights[row] += 1 / length_m;
+      sums[row] += (height_at_[other] - height_at_[node]) / length_m;
+      if (const auto column = open.find(run_of(other)); column != open.end())
+        terms.emplace_back(row, column->second, -1 / length_m);
+    };
+    for (size_t track = 0; track < nodes_.size(); ++track) {
+      if (has_slopes(track)) continue;
+      balance(nodes_[track].first, nodes_[track].second, length(track));
+      balance(nodes_[track].second, nodes_[track].first, length(track));
     }
+    for (Eigen::Index row = 0; row < weights.size(); ++row)
+      terms.emplace_back(row, row, weights[row] > 0 ? weights[row] * (1 + kStays) : 1.0);
     Eigen::SparseMatrix<double> matrix(std::ssize(open), std::ssize(open));
     matrix.setFromTriplets(terms.begin(), terms.end());
-    const Eigen::VectorXd heights = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>(matrix).solve(sums);
-    for (const auto& [node, row] : open) height_at_[node] = heights[row];
+    const Eigen::VectorXd lifts = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>(matrix).solve(sums);
+    for (auto& [node, height_m] : height_at_) {
+      if (const auto run = open.find(run_of(node)); run != open.end()) height_m += lifts[run->second];
+    }
   }
 
   void lift(size_t track) {
@@ -171,6 +194,7 @@ class Heights {
   std::vector<std::vector<GradePoint>> profiles_;
   std::map<size_t, std::vector<size_t>> tracks_at_;  // nodes
   std::map<size_t, double> height_at_;               // nodes
+  std::map<size_t, size_t> runs_;                    // nodes: another one of the same run, or itself
   std::vector<std::pair<double, std::string>> climbs_;
 };
 
