@@ -32,7 +32,7 @@ struct GradePoint {
   double offset_m = 0;
   double elevation_m = 0;
   double curve_length_m = 0;  // parabola centred at the point, 0 = sharp
-  bool is_guess = false;      // from here to the next point: no source says the grade
+  bool is_guess = false;      // from here to the next point: the grade is for people, no source says it well
 };
 
 struct CantPoint {
@@ -67,7 +67,7 @@ class Alignment {
   [[nodiscard]] double length_m() const { return length_m_; }
   /// Offsets outside [0, length] continue the first or last element.
   [[nodiscard]] TrackPoint at(double offset_m) const;
-  /// Does a source say the grade there? False where it is a guess or there are no heights.
+  /// Can a train believe the grade there? Not where it is a guess, or there are no heights.
   [[nodiscard]] bool grade_known_at(double offset_m) const;
   /// Curvature alone (fast, for matching).
   [[nodiscard]] double curvature_at(double offset_m) const;

@@ -47,15 +47,14 @@ class OsmHeightsTest : public ImportTest {
         .map;
   }
 
-  /// Height and grade (per mille) along the first edge, "?" where no source says the grade.
+  /// Height and grade (per mille) along the first edge.
   static std::vector<std::string> seen(const Map& map, std::initializer_list<double> offsets_m) {
     std::vector<std::string> out;
     const Alignment& track = map.edges.at(0).alignment;
     for (const double offset_m : offsets_m) {
       const TrackPoint at = track.at(offset_m);
       char text[40];
-      std::snprintf(text, sizeof text, "%.1f %.1f%s", at.elevation_m + 1e-6, 1e3 * at.grade + 1e-6,
-                    track.grade_known_at(offset_m) ? "" : "?");
+      std::snprintf(text, sizeof text, "%.1f %.1f", at.elevation_m + 1e-6, 1e3 * at.grade + 1e-6);
       out.emplace_back(text);
     }
     return out;
@@ -85,17 +84,18 @@ TEST_F(OsmHeightsTest, InclinesHaveUnits) {
 TEST_F(OsmHeightsTest, InclinesAreGradesOfTheEdgeWhicheverWayItsWaysAreDrawn) {
   const Map map = map_of({{"12‰"}, {}, {"-0.5 %", true}});
   ASSERT_EQ(map.edges.size(), 1U);
-  EXPECT_THAT(seen(map, {100, 450, 740}), ElementsAre("1.2 12.0", "3.6 0.0?", "4.3 5.0")) << "no source says level";
-  EXPECT_THAT(map.problems,
-              Contains("the grade (incline) is known on 0.60 of 0.90 km of track; heights elsewhere are a "
-                       "guess, even between those that are known"));
+  EXPECT_THAT(seen(map, {100, 450, 740}), ElementsAre("1.2 12.0", "3.6 0.0", "4.3 5.0"));
+  EXPECT_THAT(
+      map.problems,
+      Contains("a grade (incline) is on 0.60 of 0.90 km of track; elsewhere the track is taken to climb evenly, "
+               "and all of it is a guess that no service uses"));
   EXPECT_THAT(map.problems, Contains(HasSubstr("they are no heights above the sea")));
   EXPECT_THAT(map.problems, Not(Contains(HasSubstr("climbs evenly"))));
   ASSERT_TRUE(map.save(in_folder("a.map")).ok());
   const auto loaded = std::make_shared<const Map>(core::value_or_throw(Map::load(in_folder("a.map"))));
-  EXPECT_THAT(seen(*loaded, {100, 450, 740}), ElementsAre("1.2 12.0", "3.6 0.0?", "4.3 5.0"));
+  EXPECT_THAT(seen(*loaded, {100, 450, 740}), ElementsAre("1.2 12.0", "3.6 0.0", "4.3 5.0"));
   const Path path = core::value_or_throw(Path::follow(loaded, {1, 900, Direction::reverse}, 900, 0));
-  EXPECT_TRUE(path.grade_known_at(100));
+  EXPECT_FALSE(path.grade_known_at(100)) << "the steepest part of a way, as somebody wrote it down";
   EXPECT_FALSE(path.grade_known_at(450));
   EXPECT_NEAR(path.at(100).grade, -0.005, 1e-9);
 }
@@ -112,7 +112,7 @@ TEST_F(OsmHeightsTest, TracksWithoutBothHaveNoProfile) {
 
 TEST_F(OsmHeightsTest, HeightsOfNodesPutGradesAboveTheSea) {
   const Map map = map_of({{"10‰"}, {}, {"-10‰"}}, {{1, "412"}, {8, "418"}});
-  EXPECT_THAT(seen(map, {0, 150, 450, 750}), ElementsAre("412.0 10.0", "413.5 10.0", "417.0 13.3?", "417.5 -10.0"));
+  EXPECT_THAT(seen(map, {0, 150, 450, 750}), ElementsAre("412.0 10.0", "413.5 10.0", "417.0 13.3", "417.5 -10.0"));
   EXPECT_THAT(map.problems, Not(Contains(HasSubstr("above the sea"))));
   EXPECT_THAT(map.problems,
               Contains(HasSubstr("track way/2 has no gradients; it climbs evenly from 415.00 m to 419.00 m")));
@@ -121,7 +121,7 @@ TEST_F(OsmHeightsTest, HeightsOfNodesPutGradesAboveTheSea) {
 
 TEST_F(OsmHeightsTest, GradesWithoutAHeightLieWhereWhatIsNotKnownClimbsEvenly) {
   const Map map = map_of({{}, {"10‰"}, {}}, {{1, "400"}, {10, "410"}});
-  EXPECT_THAT(seen(map, {100, 400, 800}), ElementsAre("401.2 11.7?", "404.5 10.0", "408.8 11.7?"));
+  EXPECT_THAT(seen(map, {100, 400, 800}), ElementsAre("401.2 11.7", "404.5 10.0", "408.8 11.7"));
   EXPECT_THAT(map.problems,
               Contains("1 stretches with incline hold no node with a height (ele): how high they lie is a guess"));
 }
@@ -137,7 +137,7 @@ TEST_F(OsmHeightsTest, WhereTheyContradictInclinesCount) {
 
 TEST_F(OsmHeightsTest, HeightsAloneAreNoGrades) {
   const Map map = map_of({{}, {}}, {{1, "400"}, {7, "406"}});
-  EXPECT_THAT(seen(map, {300}), ElementsAre("403.0 10.0?"));
+  EXPECT_THAT(seen(map, {300}), ElementsAre("403.0 10.0"));
 }
 
 TEST_F(OsmHeightsTest, WhatIsNotReadIsTold) {

@@ -153,7 +153,7 @@ void print_height_and_cant(const track::Alignment& alignment, double offset_m, c
   }
   if (!alignment.profile().empty()) {
     std::printf("height, grade    %.3f m, %.2f per mille%s\n", point.elevation_m, sign * point.grade * 1e3 + 0.0,
-                alignment.grade_known_at(offset_m) ? "" : " (a guess: no source says it)");
+                alignment.grade_known_at(offset_m) ? "" : " (a guess, which no service uses)");
   } else {
     std::puts("height, grade    not on the map");
   }
@@ -167,7 +167,7 @@ void print_place(const track::Map& map, const track::EdgePosition& place, bool a
   const double sign = reverse ? -1.0 : 1.0;
   const track::Alignment& alignment = map.edge(place.edge)->alignment;
   const track::TrackPoint point = alignment.at(place.offset_m);
-  const bool has_heights = alignment.grade_known_at(place.offset_m);
+  const bool has_heights = !alignment.profile().empty();
   const bool has_cant = !alignment.cant().empty();
   const auto if_known = [](bool known, double value) { return known ? ordered_json(value + 0.0) : ordered_json(); };
   const double heading = core::wrap_pi(point.pose.heading_rad + (reverse ? core::kPi : 0.0));
@@ -187,6 +187,7 @@ void print_place(const track::Map& map, const track::EdgePosition& place, bool a
                 {"twist", if_known(has_cant, point.twist)},
                 {"elevation_m", if_known(has_heights, point.elevation_m)},
                 {"grade", if_known(has_heights, sign * point.grade)},
+                {"grade_is_guess", has_heights && !alignment.grade_known_at(place.offset_m)},
                 {"speed_limit_mps", limit ? ordered_json(*limit) : ordered_json()},
                 {"lat_deg", geo ? ordered_json(geo->lat_deg) : ordered_json()},
                 {"lon_deg", geo ? ordered_json(geo->lon_deg) : ordered_json()}});

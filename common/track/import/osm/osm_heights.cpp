@@ -194,8 +194,9 @@ class OsmHeights {
   void tell_known() {
     const auto km = [](double length_m) { return told_number(length_m / 1000, 2); };
     if (known_m_ < all_m_)
-      problems_.push_back("the grade (incline) is known on " + km(known_m_) + " of " + km(all_m_) +
-                          " km of track; heights elsewhere are a guess, even between those that are known");
+      problems_.push_back(
+          "a grade (incline) is on " + km(known_m_) + " of " + km(all_m_) +
+          " km of track; elsewhere the track is taken to climb evenly, and all of it is a guess that no service uses");
     if (!heights_.empty() && loose_runs_ > 0)
       problems_.push_back(std::to_string(loose_runs_) +
                           " stretches with incline hold no node with a height (ele): how high they lie is a guess");
@@ -211,6 +212,7 @@ class OsmHeights {
                 std::abs(own.back().elevation_m - own.front().elevation_m) > kLevelM;
       for (GradePoint point : own) {
         point.offset_m += stretches_[i].from_m;
+        point.is_guess = true;
         const bool goes_on = !joined.empty() && point.offset_m - joined.back().offset_m < kSamePointM;
         if (goes_on) point.offset_m = joined.back().offset_m;
         if (goes_on && std::abs(point.elevation_m - joined.back().elevation_m) < kLevelM) joined.pop_back();

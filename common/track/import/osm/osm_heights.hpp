@@ -14,7 +14,8 @@ std::optional<double> grade_of(const std::string& text);
 std::optional<double> elevation_of(const std::string& text);
 
 /// The profile of every edge. Grades are those of `incline` alone: heights of nodes are whole metres, often of the
-/// ground beside the track. `ele` says how high such stretches lie; the others climb evenly in between, as a guess.
+/// ground beside the track. `ele` says how high such stretches lie; the others climb evenly in between. All of it is a
+/// guess: mappers are asked for the steepest part of a way, and an IMU believes the grade it is given.
 /// `problems` tells how much is known, and what contradicts. REQUIRES: the draft's edges were made from the chains, in
 /// their order.
 void add_heights(const OsmData& data, const std::vector<OsmChain>& chains, Draft& draft,
