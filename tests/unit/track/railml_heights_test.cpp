@@ -32,9 +32,11 @@ TEST_F(RailmlHeights, ASlopeEndsWhereTheFileSays) {
       map_of(railml3(gradient_curve("id=\"g\" gradient=\"5\"", on("n1", "posBegin=\"100\" posEnd=\"300\""))));
   for (const auto& [at_m, height_m] : {std::pair(0.0, 0.0), {100.0, 0.0}, {200.0, 0.5}, {300.0, 1.0}, {900.0, 1.0}})
     EXPECT_NEAR(height(map, 0, at_m), height_m, 1e-9) << at_m;
-  EXPECT_THAT(map.problems, Contains("track n1 has no gradient on 800.00 m of its 1000.00 m; it is level there"));
+  EXPECT_THAT(map.problems,
+              Contains("track n1 has no gradient on 800.00 m of its 1000.00 m; it is level there: a guess"));
   EXPECT_NEAR(height(map, 1, 400), 1.0, 1e-9) << "heights run on";
-  EXPECT_TRUE(map.edges[0].alignment.grade_known_at(200));
+  for (const auto& [at_m, is_known] : {std::pair(50.0, false), {200.0, true}, {400.0, false}})
+    EXPECT_EQ(map.edges[0].alignment.grade_known_at(at_m), is_known) << at_m;
   EXPECT_FALSE(map.edges[1].alignment.grade_known_at(400)) << "no source says that it is level";
   const auto relative = Contains(HasSubstr("they are no heights above the sea"));
   EXPECT_THAT(map.problems, relative);
@@ -71,7 +73,7 @@ TEST_F(RailmlHeights, AnArcLeadsFromOneSlopeToTheNext) {
   }
   EXPECT_THAT(map_of(railml3(arc("") + after)).problems,
               Contains("<gradientCurve> \"arc\" has no gradient, and no slopes that it lies between; track n1 is level "
-                       "there"));
+                       "there: a guess"));
 }
 
 /// t1 climbs at 5 per mille up to 1500 m and falls at 12.5 from there on; t2 leaves it at 1000 m and comes back at

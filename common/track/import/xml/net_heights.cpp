@@ -21,7 +21,7 @@ constexpr size_t kMostTold = 10;
 std::vector<GradePoint> profile_of(const NetTrack& track) {
   const double length_m = track.track.alignment.length_m();
   const double scale = length_m / track.length_m;
-  std::vector<GradePoint> profile{{0, 0, 0}};
+  std::vector<GradePoint> profile{{0, 0, 0, true}};
   double grade = 0;
   const auto reach = [&](double offset_m, double curve_length_m) {
     const GradePoint last = profile.back();
@@ -31,6 +31,7 @@ std::vector<GradePoint> profile_of(const NetTrack& track) {
   for (const NetSlope& slope : track.slopes) {
     reach(std::clamp(slope.offset_m, 0.0, track.length_m) * scale, slope.curve_length_m * scale);
     grade = slope.grade;
+    profile.back().is_guess = slope.is_guess;
   }
   reach(length_m, 0);
   return profile;
@@ -164,7 +165,6 @@ class Heights {
       tell_step(track);
       return;
     }
-    profile.front().is_guess = true;
     profile.back().elevation_m += climb(track);
     if (std::abs(climb(track)) < kClimbToldM) return;
     climbs_.emplace_back(std::abs(climb(track)), "track " + net_.tracks[track].track.name +

@@ -23,6 +23,7 @@ struct NetSlope {
   double offset_m = 0;
   double grade = 0;
   double curve_length_m = 0;  // parabola centred at the place, 0 = sharp
+  bool is_guess = false;      // the source says none; so is what lies before the first one
 };
 
 /// No projection leads farther, with the number of a zone before the easting. Points beyond are none: no fit of them

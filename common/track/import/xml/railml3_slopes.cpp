@@ -49,15 +49,14 @@ class Slopes {
     level_up_to(track_.length_m);
     if (level_m_ > kNetTouchM)
       problems_.push_back("track " + track_.track.name + " has no gradient on " + told_m(level_m_) + " of its " +
-                          told_m(track_.length_m) + "; it is level there");
+                          told_m(track_.length_m) + "; it is level there: a guess");
   }
 
  private:
   void level_up_to(double offset_m) {
     if (offset_m - reached_m_ < kNetTouchM) return;
     level_m_ += offset_m - reached_m_;
-    go_on(reached_m_, 0, 0);
-    grade_.reset();
+    guess_level(reached_m_);
   }
 
   void add_arc(const Piece& arc, std::optional<double> after) {
@@ -66,9 +65,8 @@ class Slopes {
     if (!before && after && arc.change) before = *after - *arc.change;
     if (!before || !after) {
       problems_.push_back(railml_called(arc.node) + " has no gradient, and no slopes that it lies between; track " +
-                          track_.track.name + " is level there");
-      go_on(arc.from_m, 0, 0);
-      grade_.reset();
+                          track_.track.name + " is level there: a guess");
+      guess_level(arc.from_m);
       return;
     }
     if (!grade_) go_on(arc.from_m, *before, 0);
@@ -76,9 +74,14 @@ class Slopes {
   }
 
   void go_on(double offset_m, double grade, double curve_length_m) {
-    if (track_.slopes.empty() || track_.slopes.back().grade != grade)
+    if (track_.slopes.empty() || track_.slopes.back().grade != grade || track_.slopes.back().is_guess)
       track_.slopes.push_back({offset_m, grade, curve_length_m});
     grade_ = grade;
+  }
+
+  void guess_level(double offset_m) {
+    track_.slopes.push_back({offset_m, 0, 0, true});
+    grade_.reset();
   }
 
   NetTrack& track_;
