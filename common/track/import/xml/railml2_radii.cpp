@@ -63,6 +63,7 @@ std::vector<CantPoint> cant_of(const std::vector<RadiusChange>& changes) {
   if (std::none_of(changes.begin(), changes.end(), [](const RadiusChange& c) { return c.cant_m.has_value(); }))
     return {};
   std::vector<CantPoint> out;
+  out.reserve(changes.size());
   for (const RadiusChange& change : changes) out.push_back({change.offset_m, change.cant_m.value_or(0)});
   return held(std::move(out));
 }

@@ -89,6 +89,10 @@ class Reader {
     }
   }
 
+  static std::string names_no_element(const std::string& relation, const std::string& element) {
+    return "net relation \"" + relation + "\" names the net element \"" + element + "\", which does not exist";
+  }
+
   void read_relations() {
     for (const pugi::xml_node& relation : descendants(source_.root(), "netRelation")) {
       const std::string id = relation.attribute("id").value();
@@ -96,8 +100,7 @@ class Reader {
       const std::string b = relation.child("elementB").attribute("ref").value();
       for (const std::string& end : {a, b}) {
         if (!places_.track(end) && !places_.is_coarse(end)) {
-          throw source_.wrong(
-              relation, "net relation \"" + id + "\" names the net element \"" + end + "\", which does not exist");
+          throw source_.wrong(relation, names_no_element(id, end));
         }
       }
       if (!places_.track(a) || !places_.track(b)) {
