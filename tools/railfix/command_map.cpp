@@ -116,6 +116,7 @@ void add_build(CLI::App& map, Action& chosen) {
   command
       ->add_option("--virtual-balises-at", request->options.virtual_balises_at,
                    "Virtual balise groups at these places, EDGE:OFFSET, as `railfix map coverage` proposes them")
+      ->transform([](std::string place) { return CLI::detail::trim(place); })
       ->delimiter(',')
       ->allow_extra_args(false);
   command

@@ -141,18 +141,18 @@ TEST(Coverage, SaysWhereBaliseGroupsAreMissing) {
       out.insert(out.end(), gap.missing_m.begin(), gap.missing_m.end());
     return out;
   };
-  EXPECT_EQ(missing(line_with({})), (std::vector<double>{500, 1000})) << "a train at the end has one within the limit";
-  EXPECT_EQ(missing(line_with({frog_at(200), frog_at(300), frog_at(450)})), (std::vector<double>{450, 950, 1450}))
-      << "the last one that the train sights on the way there";
+  EXPECT_EQ(missing(line_with({})), (std::vector<double>{375, 750, 1125})) << "a train at the end has one, too";
+  EXPECT_EQ(missing(line_with({frog_at(200), frog_at(300), frog_at(450)})), (std::vector<double>{450, 800, 1150}))
+      << "the last one that the train sights on the way there, the others evenly";
   track::Map map = track::small_map();  // a real group at 900 m of 1800
   map.balise_groups.push_back({85, 200, 2, 390, true, true, 1, {}});
   const auto gaps = group_gaps(main_line(map), options);
   ASSERT_EQ(gaps.size(), 1U);
   EXPECT_EQ(gaps[0].from_m, 0);
   EXPECT_NEAR(gaps[0].to_m, 900, 1e-6);
-  EXPECT_EQ(gaps[0].missing_m, (std::vector<double>{300, 800})) << "beside the mast, and none beyond";
-  ASSERT_TRUE(track::add_virtual_balises_at(map, {"1:300"}, {{85}, 300}, 1).ok());
-  EXPECT_EQ(group_gaps(main_line(map), options).size(), 1U) << "300 to 900";
+  EXPECT_EQ(gaps[0].missing_m, std::vector<double>{450}) << "at the mast, 300 m, one more would be needed";
+  ASSERT_TRUE(track::add_virtual_balises_at(map, {"1:450"}, {{85}, 300}, 1).ok());
+  EXPECT_TRUE(group_gaps(main_line(map), options).empty());
 }
 
 TEST(Coverage, GoesByFusionsParameters) {

@@ -116,7 +116,7 @@ TEST_F(OsmHeightsTest, HeightsOfNodesPutGradesAboveTheSea) {
   EXPECT_THAT(map.problems, Not(Contains(HasSubstr("above the sea"))));
   EXPECT_THAT(map.problems,
               Contains(HasSubstr("track way/2 has no gradients; it climbs evenly from 415.00 m to 419.00 m")));
-  EXPECT_THAT(map.problems, Not(Contains(HasSubstr("inclines from other nodes"))));
+  EXPECT_THAT(map.problems, Not(Contains(HasSubstr("where the inclines put it"))));
 }
 
 TEST_F(OsmHeightsTest, GradesWithoutAHeightLieWhereWhatIsNotKnownClimbsEvenly) {
@@ -132,12 +132,19 @@ TEST_F(OsmHeightsTest, WhereTheyContradictInclinesCount) {
   EXPECT_THAT(
       map.problems,
       Contains("node 4 of way/1 at latitude 0.000000, longitude 15.002695 has a height (ele) of 425.00 m, 10.00 "
-               "m above where the inclines from other nodes with one put it; the inclines count"));
+               "m above where the inclines put it, in the middle of what all nodes with one say; the inclines count"));
 }
 
 TEST_F(OsmHeightsTest, HeightsAloneAreNoGrades) {
   const Map map = map_of({{}, {}}, {{1, "400"}, {7, "406"}});
   EXPECT_THAT(seen(map, {300}), ElementsAre("403.0 10.0"));
+  EXPECT_THAT(seen(map_of({{}, {}}, {{1, "400"}, {7, "400"}}), {300}), ElementsAre("400.0 0.0"));
+}
+
+TEST_F(OsmHeightsTest, AnInclineOfAWayWhoseNodesAreNotThereIsNone) {
+  const Map map = map_of({{}}, {}, R"(,{"type":"way","id":9,"tags":{"railway":"rail","incline":"5‰"},"nodes":[4,99]})");
+  EXPECT_TRUE(map.edges.at(0).alignment.profile().empty());
+  EXPECT_THAT(map.problems, Contains(HasSubstr("way 9 names 1 node that the data do not hold")));
 }
 
 TEST_F(OsmHeightsTest, WhatIsNotReadIsTold) {

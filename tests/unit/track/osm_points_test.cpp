@@ -105,6 +105,7 @@ TEST_F(OsmPointsTest, WhatHangsOverTheTrackOrLiesLowIsNoMast) {
               Contains(HasSubstr("1 signals hang over the track, stand in it or are dwarfs, the first one is "
                                  "node 2 of way/1")));
   EXPECT_EQ(map_of(dwarf + R"(,"railway:signal:main:height":"normal")", {}).landmarks.size(), 1U);
+  EXPECT_EQ(map_of(dwarf + R"(,"railway:signal:main":"DE-ESO:ks")", {}).landmarks.size(), 1U);
 }
 
 }  // namespace

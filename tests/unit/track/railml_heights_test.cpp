@@ -43,6 +43,14 @@ TEST_F(RailmlHeights, ASlopeEndsWhereTheFileSays) {
   EXPECT_THAT(map_of(railml3("")).problems, Not(relative));
 }
 
+TEST_F(RailmlHeights, AGradientOnAnotherIsLeftOutAndTold) {
+  const Map map =
+      map_of(railml3(gradient_curve("id=\"g\" gradient=\"5\"", on("n1", "")) +
+                     gradient_curve("id=\"h\" gradient=\"10\"", on("n1", "posBegin=\"200\" posEnd=\"300\""))));
+  EXPECT_NEAR(height(map, 0, 1000), 5, 1e-9);
+  EXPECT_THAT(map.problems, Contains("<gradientCurve> \"h\" begins on another gradient of track n1; left out"));
+}
+
 TEST_F(RailmlHeights, SlopesHoldOverSeveralNetElementsAndAgainstThem) {
   const Map map = map_of(railml3(gradient_curve("id=\"g\" gradient=\"5\"", on("n1", "") + on("n2", "")) +
                                  gradient_curve("id=\"h\" gradient=\"4\"", on("n3", "keepsOrientation=\"false\""))));

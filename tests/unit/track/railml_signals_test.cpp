@@ -31,6 +31,16 @@ class RailmlSignals : public ImportTest {
   }
 };
 
+TEST_F(RailmlSignals, OneForBothDirectionsHasItsSideInEach) {
+  const Map map = map_of(
+      railml3("<signalIS id=\"s\"><spotLocation netElementRef=\"n1\" pos=\"100\" applicationDirection=\"normal\"/>"
+              "<spotLocation netElementRef=\"n1\" pos=\"300\" applicationDirection=\"reverse\"/>"
+              "<signalConstruction/><signalConstruction positionAtTrack=\"right\"/></signalIS>"));
+  ASSERT_EQ(map.landmarks.size(), 2U);
+  EXPECT_EQ(map.landmarks[0].lateral_m, -3);
+  EXPECT_EQ(map.landmarks[1].lateral_m, 3);
+}
+
 TEST_F(RailmlSignals, OfRailml3StandWhereTrainsThatHeedThemSeeThem) {
   const std::string normal = "applicationDirection=\"normal\"";
   const std::string reverse = "applicationDirection=\"reverse\"";

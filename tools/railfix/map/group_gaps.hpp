@@ -14,8 +14,8 @@ struct GroupGap {
 };
 
 /// Stretches without a group, real or virtual, that are longer than `group_limit_m`. The groups that are proposed leave
-/// none: beside a landmark that the camera sights, by which the train knows where it passes them, if there is one in
-/// the further half of what is allowed.
+/// none: evenly, or beside a landmark that the camera sights, by which the train knows where it passes them, if there
+/// is one in the further half of what is allowed.
 std::vector<GroupGap> group_gaps(const track::Path& path, const CoverageOptions& options);
 
 }  // namespace railfix::tool

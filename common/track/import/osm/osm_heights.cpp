@@ -38,9 +38,9 @@ class OsmHeights {
 
   void add() {
     read_elevations();
-    const auto has_grade = [](const OsmWay& way) { return grade_of(value_of(way.tags, "incline")).has_value(); };
-    if (elevations_.empty() && std::ranges::none_of(data_.ways, has_grade)) return;
     for (size_t chain = 0; chain < chains_.size(); ++chain) cut(chain);
+    const auto has_grade = [](const NetTrack& stretch) { return !stretch.slopes.empty(); };
+    if (elevations_.empty() && std::ranges::none_of(net_.tracks, has_grade)) return;
     for (size_t node = 0; node < nodes_.size(); ++node) {
       if (!relative_m_.contains(node)) place_run(node);
     }
@@ -182,9 +182,10 @@ class OsmHeights {
     std::ranges::stable_sort(off_m_, std::greater{}, [](const auto& off) { return std::abs(off.first); });
     for (size_t i = 0; i < std::min(kMostNamed, off_m_.size()); ++i) {
       const auto& [off, told] = off_m_[i];
-      problems_.push_back(called(told->node, data_.nodes.at(told->node).place, told->way) + " has a height (ele) of " +
-                          told_m(told->height_m) + ", " + told_m(std::abs(off)) + (off > 0 ? " above" : " below") +
-                          " where the inclines from other nodes with one put it; the inclines count");
+      problems_.push_back(
+          called(told->node, data_.nodes.at(told->node).place, told->way) + " has a height (ele) of " +
+          told_m(told->height_m) + ", " + told_m(std::abs(off)) + (off > 0 ? " above" : " below") +
+          " where the inclines put it, in the middle of what all nodes with one say; the inclines count");
     }
     if (off_m_.size() > kMostNamed)
       problems_.push_back(std::to_string(off_m_.size() - kMostNamed) +
@@ -209,7 +210,8 @@ class OsmHeights {
     for (size_t i = first; i < next; ++i) {
       const std::vector<GradePoint>& own = profiles[i];
       is_told = is_told || !net_.tracks[i].slopes.empty() ||
-                std::abs(own.back().elevation_m - own.front().elevation_m) > kLevelM;
+                std::abs(own.back().elevation_m - own.front().elevation_m) > kLevelM ||
+                (heights_.contains(ends_[i].first) && heights_.contains(ends_[i].second));
       for (GradePoint point : own) {
         point.offset_m += stretches_[i].from_m;
         point.is_guess = true;

@@ -8,13 +8,17 @@
 namespace railfix::track {
 namespace {
 
-/// Knee-high, as for shunting, and nothing else at the node.
+/// Knee-high, as for shunting, and no other signal ("railway:signal:main=...") at the node.
 bool is_dwarf(const OsmTags& tags) {
+  constexpr std::string_view kSignal = "railway:signal:";
   bool has_dwarf = false;
   for (const auto& [key, value] : tags) {
-    if (!key.starts_with("railway:signal:") || !key.ends_with(":height")) continue;
-    if (value != "dwarf") return false;
-    has_dwarf = true;
+    if (!key.starts_with(kSignal) || key == "railway:signal:position" || key == "railway:signal:direction") continue;
+    const bool is_height = key.ends_with(":height");
+    const bool is_kind = key.find(':', kSignal.size()) == std::string::npos;
+    const std::string height = is_kind ? value_of(tags, (key + ":height").c_str()) : value;
+    if ((is_height || is_kind) && height != "dwarf") return false;
+    has_dwarf = has_dwarf || is_height;
   }
   return has_dwarf;
 }

@@ -34,26 +34,34 @@ ErjuCants::ErjuCants(const XmlSource& infra, const ErjuEdges& edges, RailNet& ne
 void ErjuCants::read_points(const pugi::xml_node& geometry) {
   NetTrack& track = net_.tracks[edges_.track_of(infra_, geometry, "id")];
   ErjuLeftOut left_out;
+  ErjuLeftOut outside;
   for (const pugi::xml_node& point : descendants(geometry, "cantPoint")) {
     const CantPoint cant = cant_of(infra_, point, "trackGeometryPos", "appliedCant");
-    if (is_cant(cant.cant_m)) {
+    if (!is_on(track, cant.offset_m)) {
+      outside.add("a cantPoint", cant.offset_m);
+    } else if (is_cant(cant.cant_m)) {
       track.cant.push_back(cant);
     } else {
       left_out.add(std::string("appliedCant ") + point.attribute("appliedCant").value() + " mm", cant.offset_m);
     }
   }
   left_out.tell(std::string(kNoTrackHas) + "; left out", track, net_.problems);
+  outside.tell("outside its " + told_m(track.length_m) + "; left out", track, net_.problems);
 }
 
 /// Nothing where the plan has points.
 bool ErjuCants::read_samples(const pugi::xml_node& sampled) {
-  NetTrack& track = net_.tracks[edges_.track_of(infra_, sampled, "id")];
+  const size_t number = edges_.track_of(infra_, sampled, "id");
+  NetTrack& track = net_.tracks[number];
   if (!track.cant.empty()) return false;
   ErjuLeftOut left_out;
+  ErjuLeftOut outside;
   std::vector<CantPoint> samples;
   for (const pugi::xml_node& sample : sampled.child("cants").children("cant")) {
     const CantPoint cant = cant_of(infra_, sample, "pos", "samplePointCant");
-    if (is_cant(cant.cant_m)) {
+    if (!is_on(track, cant.offset_m)) {
+      outside.add("a sampled cant", cant.offset_m);
+    } else if (is_cant(cant.cant_m)) {
       samples.push_back(cant);
     } else {
       left_out.add(std::string("samplePointCant ") + sample.attribute("samplePointCant").value() + " mm",
@@ -61,7 +69,10 @@ bool ErjuCants::read_samples(const pugi::xml_node& sampled) {
     }
   }
   left_out.tell(std::string(kNoTrackHas) + "; left out", track, net_.problems);
-  track.cant = held(std::move(samples));
+  outside.tell("outside its " + told_m(track.length_m) + "; left out", track, net_.problems);
+  std::ranges::stable_sort(samples, {}, &CantPoint::offset_m);
+  track.cant = std::move(samples);
+  if (!track.cant.empty()) sampled_.insert(number);
   return !track.cant.empty();
 }
 
@@ -95,8 +106,8 @@ ErjuCants::Sign ErjuCants::sign_of(const Votes& votes) const {
         "positive: it is taken as the right one, as in a left curve");
     return Sign::as_map;
   }
+  if (!votes.below_0) return Sign::amount;
   const size_t against = std::min(votes.as_map, votes.turned);
-  if (!votes.below_0 && against > 0) return Sign::amount;
   if (against * kFewAgainst > all) {
     net_.problems.push_back("cant makes the inner rail of a curve the higher one at " + std::to_string(against) +
                             " of " + std::to_string(all) +
@@ -128,13 +139,13 @@ void ErjuCants::take_as_amounts(NetTrack& on, size_t track) {
 
 void ErjuCants::settle() {
   const Votes all = votes();
-  if (!all.any) return;
-  const Sign sign = sign_of(all);
+  const Sign sign = all.any ? sign_of(all) : Sign::as_map;
   for (size_t track = 0; track < net_.tracks.size(); ++track) {
     if (sign == Sign::amount) take_as_amounts(net_.tracks[track], track);
     if (sign != Sign::turned) continue;
     for (CantPoint& point : net_.tracks[track].cant) point.cant_m = -point.cant_m;
   }
+  for (const size_t track : sampled_) net_.tracks[track].cant = held(std::move(net_.tracks[track].cant));
 }
 
 }  // namespace railfix::track

@@ -1,6 +1,8 @@
 // Cant of an ERJU map's track edges.
 #pragma once
 
+#include <set>
+
 #include "track/import/xml/erju_azimuths.hpp"
 
 namespace railfix::track {
@@ -35,6 +37,7 @@ class ErjuCants {
   const ErjuEdges& edges_;
   RailNet& net_;
   std::map<size_t, std::vector<ErjuAzimuth>> azimuths_;  // tracks
+  std::set<size_t> sampled_;                             // tracks
 };
 
 }  // namespace railfix::track

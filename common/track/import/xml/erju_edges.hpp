@@ -25,6 +25,12 @@ class ErjuEdges {
   std::map<std::string, size_t> index_;
 };
 
+/// To half a metre.
+inline bool is_on(const NetTrack& edge, double offset_m) {
+  constexpr double kRoundedM = 0.5;
+  return offset_m > -kRoundedM && offset_m < edge.length_m + kRoundedM;
+}
+
 /// Values that are none; told in one sentence on each track edge: where one is in the wrong unit, they all are.
 class ErjuLeftOut {
  public:

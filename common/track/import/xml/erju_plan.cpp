@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "track/import/told.hpp"
 #include "track/import/xml/erju_cants.hpp"
 
 namespace railfix::track {
@@ -12,10 +13,17 @@ constexpr double kSlopePerUnit = 1e-4;  // slopes are tenths of a per mille
 void read_slopes(const XmlSource& infra, const ErjuEdges& edges, RailNet& net) {
   for (const pugi::xml_node& sampled : descendants(infra.root(), "sampledTrackEdgeGeometry")) {
     NetTrack& track = net.tracks[edges.track_of(infra, sampled, "id")];
+    ErjuLeftOut outside;
     for (const pugi::xml_node& slope : descendants(sampled, "slope")) {
-      track.slopes.push_back(
-          {metres(infra.required(slope, "pos")), kSlopePerUnit * infra.required(slope, "samplePointSlope")});
+      const NetSlope read{metres(infra.required(slope, "pos")),
+                          kSlopePerUnit * infra.required(slope, "samplePointSlope")};
+      if (is_on(track, read.offset_m)) {
+        track.slopes.push_back(read);
+      } else {
+        outside.add("a sampled slope", read.offset_m);
+      }
     }
+    outside.tell("outside its " + told_m(track.length_m) + "; left out", track, net.problems);
   }
   for (NetTrack& track : net.tracks) std::ranges::stable_sort(track.slopes, {}, &NetSlope::offset_m);
 }

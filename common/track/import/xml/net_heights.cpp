@@ -184,8 +184,9 @@ class Heights {
   void tell_step(size_t track) {
     const double step_m = profiles_[track].back().elevation_m - height_at_[nodes_[track].second];
     if (std::abs(step_m) < kStepToldM) return;
-    net_.problems.push_back("track " + net_.tracks[track].track.name + " ends " + told_m(step_m) +
-                            " above where others put its end, by its gradients; heights step there");
+    net_.problems.push_back("track " + net_.tracks[track].track.name + " ends " + told_m(std::abs(step_m)) +
+                            (step_m > 0 ? " above" : " below") +
+                            " where others put its end, by its gradients; heights step there");
   }
 
   RailNet& net_;

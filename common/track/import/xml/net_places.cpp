@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 
 namespace railfix::track {
 namespace {
@@ -68,6 +69,51 @@ std::vector<NetEnd> legs_outside(const RailNet& net, const std::vector<NetPlace>
   return legs;
 }
 
+/// Those of one track that overlap or meet are one.
+std::vector<NetPlace> merged(const std::vector<NetPlace>& places) {
+  std::vector<NetPlace> out;
+  for (NetPlace place : places) {
+    std::erase_if(out, [&](const NetPlace& other) {
+      if (other.track != place.track || !sides_agree(place, other, false) || other.from_m > place.to_m + kNetTouchM ||
+          place.from_m > other.to_m + kNetTouchM)
+        return false;
+      place.from_m = std::min(place.from_m, other.from_m);
+      place.to_m = std::max(place.to_m, other.to_m);
+      return true;
+    });
+    out.push_back(place);
+  }
+  return out;
+}
+
+struct Stretch {
+  NetPlace place;
+  bool forward = true;  // as the way runs
+  [[nodiscard]] double length_m() const { return place.to_m - place.from_m; }
+};
+
+/// Takes the one that goes on where the stretch leads out of the places; nothing where none does.
+std::optional<Stretch> take_next(const RailNet& net, const Stretch& stretch, std::vector<NetPlace>& places) {
+  for (auto next = places.begin(); next != places.end(); ++next) {
+    if (!meets(net, stretch.place, stretch.forward, *next)) continue;
+    const Stretch found{*next, meets(net, *next, false, stretch.place)};
+    places.erase(next);
+    return found;
+  }
+  return std::nullopt;
+}
+
+/// Takes the first place with all that follow one another on either side of it, in the order of the way.
+std::vector<Stretch> way_over(const RailNet& net, std::vector<NetPlace>& places) {
+  std::vector<Stretch> way{{places.front(), false}};
+  places.erase(places.begin());
+  while (const auto next = take_next(net, way.back(), places)) way.push_back(*next);
+  std::ranges::reverse(way);
+  for (Stretch& stretch : way) stretch.forward = !stretch.forward;
+  while (const auto next = take_next(net, way.back(), places)) way.push_back(*next);
+  return way;
+}
+
 }  // namespace
 
 std::vector<NetSpot> ends_of(const RailNet& net, const std::vector<NetPlace>& places) {
@@ -99,19 +145,14 @@ TrackMark portal(const NetSpot& spot, double sigma_m, const std::string& name) {
 
 std::vector<std::pair<size_t, double>> middles(const RailNet& net, const std::vector<NetPlace>& places) {
   std::vector<std::pair<size_t, double>> out;
-  for (auto first = places.begin(); first != places.end();) {
-    auto last = first;
+  std::vector<NetPlace> rest = merged(places);
+  while (!rest.empty()) {
+    const std::vector<Stretch> way = way_over(net, rest);
     double left_m = 0;
-    do {
-      left_m += 0.5 * (last->to_m - last->from_m);
-      ++last;
-    } while (last != places.end() && (meets(net, *(last - 1), true, *last) || meets(net, *(last - 1), false, *last)));
-    auto at = first;
-    for (; at + 1 != last && left_m > at->to_m - at->from_m; ++at) left_m -= at->to_m - at->from_m;
-    const bool forward =
-        at + 1 != last ? meets(net, *at, true, *(at + 1)) : at == first || meets(net, *at, false, *(at - 1));
-    out.emplace_back(at->track, forward ? at->from_m + left_m : at->to_m - left_m);
-    first = last;
+    for (const Stretch& stretch : way) left_m += 0.5 * stretch.length_m();
+    auto at = way.begin();
+    for (; at + 1 != way.end() && left_m > at->length_m(); ++at) left_m -= at->length_m();
+    out.emplace_back(at->place.track, at->forward ? at->place.from_m + left_m : at->place.to_m - left_m);
   }
   return out;
 }

@@ -20,17 +20,43 @@ double heading_rad(const Eigen::Vector2d& way) {
   return std::atan2(way.x(), way.y());
 }
 
+/// To the scale of the plane, so that it ends where the points do.
+std::vector<Element> scaled(std::vector<Element> elements, double scale) {
+  for (Element& element : elements) {
+    element.length_m *= scale;
+    element.curvature_start_per_m /= scale;
+    element.curvature_end_per_m /= scale;
+  }
+  return elements;
+}
+
 Alignment laid_along(const std::vector<Element>& elements, const std::vector<Eigen::Vector2d>& points) {
   const Eigen::Vector2d& begin = points.front();
-  const Alignment north = Alignment::chained({begin.x(), begin.y(), 0}, elements);
-  const double turn_rad = heading_rad(points.back() - begin) - heading_rad(end_of(north) - begin);
-  return Alignment::chained({begin.x(), begin.y(), turn_rad}, elements);
+  const Eigen::Vector2d way = points.back() - begin;
+  const Eigen::Vector2d north = end_of(Alignment::chained({begin.x(), begin.y(), 0}, elements)) - begin;
+  const double scale = north.norm() > 0 ? way.norm() / north.norm() : 1;
+  const double turn_rad = heading_rad(way) - heading_rad(north);
+  const double length_m = Alignment::chained({}, elements).length_m();
+  const bool is_near = std::abs(scale - 1) * length_m < kBorneOutM;
+  return Alignment::chained({begin.x(), begin.y(), turn_rad}, is_near ? scaled(elements, scale) : elements);
+}
+
+/// The coordinates of both ends say nothing of the way between them.
+bool needs_more_points(const NetTrack& track) {
+  return track.shape.size() < 3 && std::ranges::any_of(track.plan, [](const Element& element) {
+           return element.curvature_start_per_m != 0 || element.curvature_end_per_m != 0;
+         });
 }
 
 }  // namespace
 
 std::optional<ClothoidFit> own_plan(const NetTrack& track, std::vector<std::string>& problems) {
   if (track.plan.empty()) return std::nullopt;
+  if (needs_more_points(track)) {
+    problems.push_back("track " + track.track.name +
+                       " has the coordinates of its ends alone, which do not bear out its arcs; it is straight");
+    return std::nullopt;
+  }
   ClothoidFit out;
   out.alignment = laid_along(track.plan, track.shape);
   out.element_max_m.resize(track.plan.size());

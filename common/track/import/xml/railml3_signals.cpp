@@ -22,9 +22,9 @@ class Sides {
 
   /// `positionAtTrack` is seen in the direction that the signal applies to, and counts before `lateralSide`.
   double of(const pugi::xml_node& signal, const NetPlace& place) {
-    const double seen_by_trains = left_of(signal.child("signalConstruction").attribute("positionAtTrack").value());
+    const double seen_by_trains = side_in(signal, "signalConstruction", "positionAtTrack");
     const pugi::xml_node spot = spot_of(signal, place);
-    const double told_beside = left_of(spot.child("linearCoordinate").attribute("lateralSide").value());
+    const double told_beside = side_in(spot, "linearCoordinate", "lateralSide");
     const std::string applies = spot.attribute("applicationDirection").value();
     if (seen_by_trains != 0 && (applies == "normal" || applies == "reverse")) {
       const double left = applies == "normal" ? seen_by_trains : -seen_by_trains;
@@ -44,9 +44,20 @@ class Sides {
   }
 
  private:
+  /// Of the first of the children that says one.
+  static double side_in(const pugi::xml_node& of, const char* child, const char* attribute) {
+    for (const pugi::xml_node& one : of.children(child)) {
+      if (const double side = left_of(one.attribute(attribute).value()); side != 0) return side;
+    }
+    return 0;
+  }
+
+  /// The location that the place was read from, or one that says the same.
   [[nodiscard]] pugi::xml_node spot_of(const pugi::xml_node& signal, const NetPlace& place) const {
     for (const pugi::xml_node& spot : signal.children("spotLocation")) {
-      if (places_.track(spot.attribute("netElementRef").value()) == place.track) return spot;
+      const bool is_normal = std::string_view(spot.attribute("applicationDirection").value()) != "reverse";
+      if (places_.track(spot.attribute("netElementRef").value()) == place.track && is_normal == place.same_direction)
+        return spot;
     }
     return {};
   }

@@ -35,6 +35,11 @@ class Slopes {
     std::stable_sort(pieces.begin(), pieces.end(), [](const Piece& a, const Piece& b) { return a.from_m < b.from_m; });
     for (size_t i = 0; i < pieces.size(); ++i) {
       Piece& piece = pieces[i];
+      if (piece.from_m < reached_m_ - kNetTouchM) {
+        problems_.push_back(railml_called(piece.node) + " begins on another gradient of track " + track_.track.name +
+                            "; left out");
+        continue;
+      }
       const Piece* next = i + 1 < pieces.size() ? &pieces[i + 1] : nullptr;
       // A slope at a spot holds up to the next one.
       if (piece.grade && piece.to_m == piece.from_m) piece.to_m = next != nullptr ? next->from_m : track_.length_m;
