@@ -228,7 +228,6 @@ class Sources {
     if (!map_.crs.empty() && map_.crs != "local") static_cast<void>(core::value_or_throw(Projection::open(map_.crs)));
   }
 
-  // A drawing lies nowhere on the Earth.
   void add_virtual_groups() {
     core::ok_or_throw(
         add_virtual_balises_at(map_, options_.virtual_balises_at, options_.virtual_numbers, map_.q_locacc_m));
@@ -239,6 +238,7 @@ class Sources {
     out_.virtual_balises.groups += options_.virtual_balises_at.size();
   }
 
+  // A drawing lies nowhere on the Earth.
   void check_crs() {
     const bool drawn = !map_.edges.empty() && std::ranges::all_of(map_.edges, &Edge::is_drawn);
     if (drawn && !map_.crs.empty())
