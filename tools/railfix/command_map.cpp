@@ -115,7 +115,9 @@ void add_build(CLI::App& map, Action& chosen) {
       ->check(number_between(1.0, 1e6));
   command
       ->add_option("--virtual-balises-at", request->options.virtual_balises_at,
-                   "Virtual balise groups at these places, EDGE:OFFSET, as `railfix map coverage` proposes them")
+                   "Virtual balise groups at these places, EDGE:OFFSET as `railfix map coverage` proposes them, with "
+                   ":- behind it "
+                   "where their nominal direction is against growing offsets")
       ->transform([](std::string place) { return CLI::detail::trim(place); })
       ->delimiter(',')
       ->allow_extra_args(false);

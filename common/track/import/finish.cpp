@@ -54,6 +54,7 @@ void add_frogs_of(Map& map, const Node& node, const Connection& straight, const 
 struct VirtualPlace {
   uint32_t edge = 0;
   double offset_m = 0;
+  bool nominal_is_forward = true;
 };
 
 uint32_t groups_along(double length_m, double every_m) {
@@ -132,7 +133,7 @@ core::Status put_groups(Map& map, const std::vector<VirtualPlace>& places, const
                                  .nid_bg = names[i].nid_bg,
                                  .edge = places[i].edge,
                                  .offset_m = places[i].offset_m,
-                                 .nominal_is_forward = true,
+                                 .nominal_is_forward = places[i].nominal_is_forward,
                                  .is_virtual = true,
                                  .q_locacc_m = q_locacc_m,
                                  .balises = {}});
@@ -177,7 +178,8 @@ core::Status add_virtual_balises_at(Map& map, const std::vector<std::string>& pl
   for (const std::string& text : places) {
     const auto position = map.parse_position(text);
     if (!position.ok()) return position.error();
-    put.push_back({position.value().edge, position.value().offset_m});
+    const EdgePosition& at = position.value();
+    put.push_back({at.edge, at.offset_m, at.direction != Direction::reverse});
     if (taken.is_near(put.back()))
       return core::Error{"a balise group is within " + told_m(kNearGroupM, 0) + " of " + text + " already"};
     taken.take(put.back());

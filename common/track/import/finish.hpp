@@ -34,8 +34,8 @@ struct VirtualBalises {
 core::Result<VirtualBalises> add_virtual_balises(Map& map, double every_m, const GroupNumbers& numbers,
                                                  double q_locacc_m);
 
-/// Virtual balise groups at these places ("EDGE:OFFSET"), nominal as growing offsets. Fails where one is none of the
-/// map, has a group within 10 m, or when numbers run out, and adds none then.
+/// Virtual balise groups at these places ("EDGE:OFFSET"; nominal against growing offsets with ":-" behind it). Fails
+/// where one is none of the map, has a group within 10 m, or when numbers run out, and adds none then.
 core::Status add_virtual_balises_at(Map& map, const std::vector<std::string>& places, const GroupNumbers& numbers,
                                     double q_locacc_m);
 

@@ -192,6 +192,8 @@ TEST(VirtualBalises, StandWhereTheyAreWanted) {
   EXPECT_EQ(map.balise_groups[3].edge, 2U);
   EXPECT_NEAR(map.balise_groups[3].offset_m, 100.5, 1e-9);
   EXPECT_TRUE(map.balise_groups[3].is_virtual);
+  EXPECT_TRUE(map.balise_groups[2].nominal_is_forward);
+  EXPECT_FALSE(map.balise_groups[3].nominal_is_forward);
   EXPECT_EQ(at({"1:300", "1:405"}).error().message, "a balise group is within 10 m of 1:405 already");
   EXPECT_THAT(at({"1:300", "99:5"}).error().message, HasSubstr("99"));
   EXPECT_EQ(map.balise_groups.size(), 4U) << "none is added";

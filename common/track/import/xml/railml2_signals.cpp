@@ -7,11 +7,12 @@
 namespace railfix::track {
 namespace {
 
-/// The schema itself has no such attribute of signals: whichever prefix an extension has, none says anything else by
-/// it.
+/// The schema itself has no such attribute of signals: whichever prefix an extension has, or none, it says nothing else
+/// by it.
 double side_of(const pugi::xml_node& signal) {
   for (const pugi::xml_attribute& attribute : signal.attributes()) {
-    if (std::string_view(attribute.name()).ends_with(":side")) return left_of(attribute.value());
+    const std::string_view name = attribute.name();
+    if (name == "side" || name.ends_with(":side")) return left_of(attribute.value());
   }
   return 0;
 }
