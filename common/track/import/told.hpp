@@ -32,6 +32,11 @@ inline std::string told_left_out(size_t points, double most_m) {
          " beside the track that the others make; left out";
 }
 
+/// Behind the first of so many that a sentence is about.
+inline std::string told_as_more(size_t count) {
+  return count > 1 ? ", as " + std::to_string(count - 1) + " more," : "";
+}
+
 inline std::string called(const Edge& edge) {
   return "edge " + std::to_string(edge.id) + " (" + edge.name + ")";
 }

@@ -18,7 +18,7 @@ std::string told_range(double from_deg, double to_deg) {
 
 }  // namespace
 
-std::string contradiction(const OsmBounds& declared, const OsmData& data) {
+void tell_contradiction(const OsmBounds& declared, OsmData& data) {
   size_t count = 0;
   size_t within = 0;
   size_t swapped_within = 0;
@@ -32,14 +32,15 @@ std::string contradiction(const OsmBounds& declared, const OsmData& data) {
     }
   }
   const bool would_fit = swapped_within > within && 2 * swapped_within > count;
-  if (count == 0 || (within > 0 && !would_fit)) return "";
+  if (count == 0 || (within > 0 && !would_fit)) return;
   const GeoPoint& low = declared.south_west;
   const GeoPoint& high = declared.north_east;
-  return "the file declares bounds of latitude " + told_range(low.lat_deg, high.lat_deg) + ", longitude " +
-         told_range(low.lon_deg, high.lon_deg) + ", and " + std::to_string(within) + " of the " +
-         std::to_string(count) + " points of its tracks " + (within == 1 ? "lies" : "lie") + " within" +
-         (would_fit ? std::string("; the other way round they would: ") + kMayBeSwapped
-                    : ": the bounds or the coordinates are wrong");
+  data.problems.push_back("the file declares bounds of latitude " + told_range(low.lat_deg, high.lat_deg) +
+                          ", longitude " + told_range(low.lon_deg, high.lon_deg) + ", and " + std::to_string(within) +
+                          " of the " + std::to_string(count) + " points of its tracks " +
+                          (within == 1 ? "lies" : "lie") + " within" +
+                          (would_fit ? std::string("; the other way round they would: ") + kMayBeSwapped
+                                     : ": the bounds or the coordinates are wrong"));
 }
 
 }  // namespace railfix::track

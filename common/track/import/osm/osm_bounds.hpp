@@ -12,8 +12,8 @@ struct OsmBounds {
   GeoPoint north_east;
 };
 
-/// Whether the tracks lie elsewhere, and what may be wrong then; else empty. Tracks that only reach beyond the bounds
-/// do not contradict them: extracts hold whole ways.
-std::string contradiction(const OsmBounds& declared, const OsmData& data);
+/// Adds to the problems of the data whether their tracks lie elsewhere, and what may be wrong then. Tracks that only
+/// reach beyond the bounds do not contradict them: extracts hold whole ways.
+void tell_contradiction(const OsmBounds& declared, OsmData& data);
 
 }  // namespace railfix::track

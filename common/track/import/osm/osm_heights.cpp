@@ -113,11 +113,13 @@ class OsmHeights {
     for (size_t i = 1; i < chain.points.size(); ++i)
       along_m.push_back(along_m.back() + (chain.points[i] - chain.points[i - 1]).norm());
     const double scale = draft_.edges[number].track.alignment.length_m() / along_m.back();
+    std::optional<double> grade = grade_at(number, 0);
     for (size_t begin = 0, i = 1; i < chain.nodes.size(); ++i) {
-      const bool is_end = i == chain.ways.size();
-      if (!is_end && grade_at(number, i) == grade_at(number, begin) && !says_height(chain.nodes[i])) continue;
-      add_stretch(number, begin, i, along_m[begin] * scale, along_m[i] * scale);
+      const std::optional<double> next = i < chain.ways.size() ? grade_at(number, i) : std::nullopt;
+      if (i < chain.ways.size() && next == grade && !says_height(chain.nodes[i])) continue;
+      add_stretch(number, begin, i, along_m[begin] * scale, along_m[i] * scale, grade);
       begin = i;
+      grade = next;
     }
   }
 
@@ -126,7 +128,7 @@ class OsmHeights {
     return number != numbers_.end() && elevations_.contains(number->second);
   }
 
-  void add_stretch(size_t chain, size_t begin, size_t end, double from_m, double to_m) {
+  void add_stretch(size_t chain, size_t begin, size_t end, double from_m, double to_m, std::optional<double> grade) {
     NetTrack track{.track = {.name = "way/" + std::to_string(way_at(chain, begin).id),
                              .line = "",
                              .alignment = Alignment::chained({}, {{to_m - from_m, 0, 0}})},
@@ -136,7 +138,7 @@ class OsmHeights {
                    .slopes = {},
                    .cant = {}};
     const std::pair ends(number_of(chains_[chain].nodes[begin]), number_of(chains_[chain].nodes[end]));
-    if (const auto grade = grade_at(chain, begin)) {
+    if (grade) {
       track.slopes.push_back({0, *grade});
       nodes_[ends.first].emplace_back(ends.second, *grade * track.length_m);
       nodes_[ends.second].emplace_back(ends.first, -*grade * track.length_m);

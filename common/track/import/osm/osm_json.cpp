@@ -327,9 +327,7 @@ core::Result<OsmData> read_osm_json(const std::filesystem::path& file, bool with
       read_overpass(document.at("elements"), with_trams, out);
     } else if (document.is_object() && document.contains("features")) {
       FeatureReader(with_trams, out).read(document.at("features"));
-      const std::optional<OsmBounds> declared = bounds_in(document);
-      if (std::string told = declared ? contradiction(*declared, out) : ""; !told.empty())
-        out.problems.push_back(std::move(told));
+      if (const std::optional<OsmBounds> declared = bounds_in(document)) tell_contradiction(*declared, out);
     } else {
       return core::Error{file.string() + " is neither Overpass JSON (\"elements\") nor GeoJSON (\"features\")"};
     }

@@ -101,7 +101,7 @@ OsmData read_passes(const std::string& file, bool with_trams) {
   if (bounds.valid()) {
     const OsmBounds declared{{bounds.bottom_left().lat(), bounds.bottom_left().lon()},
                              {bounds.top_right().lat(), bounds.top_right().lon()}};
-    if (std::string told = contradiction(declared, out); !told.empty()) out.problems.push_back(std::move(told));
+    tell_contradiction(declared, out);
   }
   return out;
 }

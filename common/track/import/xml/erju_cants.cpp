@@ -12,8 +12,32 @@ constexpr double kCurvePerM = 1.0 / 3000;  // wider ones have little cant, and a
 constexpr double kCantM = 0.005;           // of what says which rail is higher
 constexpr size_t kFewAgainst = 10;         // one in so many may lie against the curve, as on the branch of a switch
 
-CantPoint cant_of(const XmlSource& infra, const pugi::xml_node& node, const char* pos, const char* value) {
-  return {metres(infra.required(node, pos)), metres(infra.required(node, value))};
+/// How a kind of cant is called in the file, and in sentences.
+struct Names {
+  const char* pos;
+  const char* value;
+  const char* one;
+};
+
+/// Those that are some and lie on the track.
+std::vector<CantPoint> cants_of(const XmlSource& infra, const std::vector<pugi::xml_node>& nodes, const Names& names,
+                                const NetTrack& track, std::vector<std::string>& problems) {
+  ErjuLeftOut left_out;
+  ErjuLeftOut outside;
+  std::vector<CantPoint> out;
+  for (const pugi::xml_node& node : nodes) {
+    const CantPoint cant{metres(infra.required(node, names.pos)), metres(infra.required(node, names.value))};
+    if (!is_on(track, cant.offset_m)) {
+      outside.add(names.one, cant.offset_m);
+    } else if (is_cant(cant.cant_m)) {
+      out.push_back(cant);
+    } else {
+      left_out.add(std::string(names.value) + " " + node.attribute(names.value).value() + " mm", cant.offset_m);
+    }
+  }
+  left_out.tell(std::string(kNoTrackHas) + "; left out", track, problems);
+  outside.tell("outside its " + told_m(track.length_m) + "; left out", track, problems);
+  return out;
 }
 
 }  // namespace
@@ -21,59 +45,30 @@ CantPoint cant_of(const XmlSource& infra, const pugi::xml_node& node, const char
 ErjuCants::ErjuCants(const XmlSource& infra, const ErjuEdges& edges, RailNet& net)
     : infra_(infra), edges_(edges), net_(net) {
   for (const pugi::xml_node& geometry : descendants(infra.root(), "trackEdgeGeometry")) read_points(geometry);
+  for (const pugi::xml_node& sampled : descendants(infra.root(), "sampledTrackEdgeGeometry")) read_samples(sampled);
   for (NetTrack& track : net.tracks) std::ranges::stable_sort(track.cant, {}, &CantPoint::offset_m);
-  size_t with_samples = 0;
-  for (const pugi::xml_node& sampled : descendants(infra.root(), "sampledTrackEdgeGeometry"))
-    with_samples += read_samples(sampled) ? 1 : 0;
-  if (with_samples == 0) return;
-  net.problems.push_back(std::to_string(with_samples) +
+  if (sampled_.empty()) return;
+  net.problems.push_back(std::to_string(sampled_.size()) +
                          " track edges have their cant from samples, taken as millimetres that hold up to the next "
                          "one, as sampled slopes do; the schema does not say it");
 }
 
 void ErjuCants::read_points(const pugi::xml_node& geometry) {
   NetTrack& track = net_.tracks[edges_.track_of(infra_, geometry, "id")];
-  ErjuLeftOut left_out;
-  ErjuLeftOut outside;
-  for (const pugi::xml_node& point : descendants(geometry, "cantPoint")) {
-    const CantPoint cant = cant_of(infra_, point, "trackGeometryPos", "appliedCant");
-    if (!is_on(track, cant.offset_m)) {
-      outside.add("a cantPoint", cant.offset_m);
-    } else if (is_cant(cant.cant_m)) {
-      track.cant.push_back(cant);
-    } else {
-      left_out.add(std::string("appliedCant ") + point.attribute("appliedCant").value() + " mm", cant.offset_m);
-    }
-  }
-  left_out.tell(std::string(kNoTrackHas) + "; left out", track, net_.problems);
-  outside.tell("outside its " + told_m(track.length_m) + "; left out", track, net_.problems);
+  const auto points = cants_of(infra_, descendants(geometry, "cantPoint"),
+                               {"trackGeometryPos", "appliedCant", "a cantPoint"}, track, net_.problems);
+  track.cant.insert(track.cant.end(), points.begin(), points.end());
 }
 
 /// Nothing where the plan has points.
-bool ErjuCants::read_samples(const pugi::xml_node& sampled) {
+void ErjuCants::read_samples(const pugi::xml_node& sampled) {
   const size_t number = edges_.track_of(infra_, sampled, "id");
   NetTrack& track = net_.tracks[number];
-  if (!track.cant.empty()) return false;
-  ErjuLeftOut left_out;
-  ErjuLeftOut outside;
-  std::vector<CantPoint> samples;
-  for (const pugi::xml_node& sample : sampled.child("cants").children("cant")) {
-    const CantPoint cant = cant_of(infra_, sample, "pos", "samplePointCant");
-    if (!is_on(track, cant.offset_m)) {
-      outside.add("a sampled cant", cant.offset_m);
-    } else if (is_cant(cant.cant_m)) {
-      samples.push_back(cant);
-    } else {
-      left_out.add(std::string("samplePointCant ") + sample.attribute("samplePointCant").value() + " mm",
-                   cant.offset_m);
-    }
-  }
-  left_out.tell(std::string(kNoTrackHas) + "; left out", track, net_.problems);
-  outside.tell("outside its " + told_m(track.length_m) + "; left out", track, net_.problems);
-  std::ranges::stable_sort(samples, {}, &CantPoint::offset_m);
-  track.cant = std::move(samples);
+  if (!track.cant.empty()) return;
+  const auto samples = sampled.child("cants").children("cant");
+  track.cant = cants_of(infra_, {samples.begin(), samples.end()}, {"pos", "samplePointCant", "a sampled cant"}, track,
+                        net_.problems);
   if (!track.cant.empty()) sampled_.insert(number);
-  return !track.cant.empty();
 }
 
 /// How the track curves there: 0 where it is nearly straight.

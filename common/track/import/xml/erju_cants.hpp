@@ -27,7 +27,7 @@ class ErjuCants {
   enum class Sign { as_map, turned, amount };
 
   void read_points(const pugi::xml_node& geometry);
-  bool read_samples(const pugi::xml_node& sampled);  // whether there are any
+  void read_samples(const pugi::xml_node& sampled);
   [[nodiscard]] double bend(size_t track, double offset_m) const;
   [[nodiscard]] Votes votes() const;
   [[nodiscard]] Sign sign_of(const Votes& votes) const;

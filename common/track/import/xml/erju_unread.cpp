@@ -1,5 +1,7 @@
 #include "track/import/xml/erju_unread.hpp"
 
+#include "track/import/told.hpp"
+
 namespace railfix::track {
 namespace {
 
@@ -12,8 +14,7 @@ void tell(const XmlSource& infra, const char* geometry, const char* item, const 
     if (count++ == 0) first = of.attribute("id").value();
   }
   if (count == 0) return;
-  const std::string more = count > 1 ? ", as " + std::to_string(count - 1) + " more," : "";
-  problems.push_back("track edge \"" + first + "\"" + more + " has " + what);
+  problems.push_back("track edge \"" + first + "\"" + told_as_more(count) + " has " + what);
 }
 
 }  // namespace

@@ -33,11 +33,11 @@ std::vector<Element> scaled(std::vector<Element> elements, double scale) {
 Alignment laid_along(const std::vector<Element>& elements, const std::vector<Eigen::Vector2d>& points) {
   const Eigen::Vector2d& begin = points.front();
   const Eigen::Vector2d way = points.back() - begin;
-  const Eigen::Vector2d north = end_of(Alignment::chained({begin.x(), begin.y(), 0}, elements)) - begin;
-  const double scale = north.norm() > 0 ? way.norm() / north.norm() : 1;
-  const double turn_rad = heading_rad(way) - heading_rad(north);
-  const double length_m = Alignment::chained({}, elements).length_m();
-  const bool is_near = std::abs(scale - 1) * length_m < kBorneOutM;
+  const Alignment north = Alignment::chained({begin.x(), begin.y(), 0}, elements);
+  const Eigen::Vector2d north_way = end_of(north) - begin;
+  const double scale = north_way.norm() > 0 ? way.norm() / north_way.norm() : 1;
+  const double turn_rad = heading_rad(way) - heading_rad(north_way);
+  const bool is_near = std::abs(scale - 1) * north.length_m() < kBorneOutM;
   return Alignment::chained({begin.x(), begin.y(), turn_rad}, is_near ? scaled(elements, scale) : elements);
 }
 

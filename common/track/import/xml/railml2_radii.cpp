@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "track/import/told.hpp"
 #include "track/import/xml/railml_readers.hpp"
 
 namespace railfix::track {
@@ -47,7 +48,7 @@ class CantReader {
   /// One sentence for all of a kind.
   void tell(const std::vector<pugi::xml_node>& changes, const std::string& what) {
     if (changes.empty()) return;
-    const std::string more = changes.size() > 1 ? ", as " + std::to_string(changes.size() - 1) + " more," : "";
+    const std::string more = told_as_more(changes.size());
     problems_.push_back(railml_has(changes.front(), track_, "superelevation", "mm" + more + " " + what));
   }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "track/import/told.hpp"
 #include "track/import/xml/railml_readers.hpp"
 
 namespace railfix::track {
@@ -45,7 +46,7 @@ void read_signals2(const XmlSource& source, const pugi::xml_node& control, doubl
                                  kRailmlSigmaM, railml_name(of)});
   }
   if (without_side.empty()) return;
-  const std::string more = without_side.size() > 1 ? ", as " + std::to_string(without_side.size() - 1) + " more," : "";
+  const std::string more = told_as_more(without_side.size());
   problems.push_back(railml_has(without_side.front(), track, "trackDist",
                                 "m" + more +
                                     " and no side that the schema would know; on which side it stands is left "

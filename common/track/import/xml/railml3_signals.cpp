@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "track/import/told.hpp"
 #include "track/import/xml/railml_readers.hpp"
 
 namespace railfix::track {
@@ -69,8 +70,7 @@ class Sides {
 
   void tell(const std::vector<pugi::xml_node>& signals, const std::string& what) const {
     if (signals.empty()) return;
-    const std::string more = signals.size() > 1 ? ", as " + std::to_string(signals.size() - 1) + " more," : "";
-    net_.problems.push_back(railml_called(signals.front()) + more + " has " + what +
+    net_.problems.push_back(railml_called(signals.front()) + told_as_more(signals.size()) + " has " + what +
                             "; on which side it stands is left open");
   }
 
