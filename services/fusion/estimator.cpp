@@ -121,8 +121,13 @@ void Estimator::doubt_time(const SensorWatch& watch, Rhythm& rhythm, int64_t sta
   rhythm.pause_s = 0;
   if (rhythm.samples >= kRhythmSamples && off_s > std::max(kRhythmS, 0.1 * rhythm.period_s)) {
     filter_.doubt_time(off_s);
+    // So many have another rhythm than the first ones, of which some had been lost.
+    rhythm.off_s += dt_s;
+    if (++rhythm.off == kRhythmSamples) rhythm = {rhythm.off_s / rhythm.off, kRhythmSamples};
   } else {
     rhythm.period_s += (dt_s - rhythm.period_s) / std::min(++rhythm.samples, 20);
+    rhythm.off = 0;
+    rhythm.off_s = 0;
   }
 }
 

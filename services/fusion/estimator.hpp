@@ -105,6 +105,8 @@ class Estimator {
   [[nodiscard]] bool has_ever_measured(Source source) const { return watch(source).used_ns != 0; }
   /// So many motion sensors measured in the last moments and were believed.
   [[nodiscard]] int sensors_at_work() const;
+  /// The IMU feels other motion than the one odometer that is left says.
+  [[nodiscard]] bool feels_otherwise() const { return felt_.faster_mps() != 0; }
   /// That sensor is found to be wrong: it is isolated, with what `other` knows of it.
   void exclude(Source source, const Estimator& other);
   /// From now on that sensor's samples do not come here; that it is isolated is no contradiction.
@@ -201,6 +203,8 @@ class Estimator {
   struct Rhythm {
     double period_s = 0;
     int samples = 0;
+    int off = 0;         // samples in a row that came out of it ...
+    double off_s = 0;    // ... and the time that they took
     double pause_s = 0;  // the longest without a sample of any sensor since its last one
   };
   /// How far one reckoning is from another, and the furthest that came to on either side.

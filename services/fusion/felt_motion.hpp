@@ -1,14 +1,14 @@
-// While the camera is blind an accelerometer may feel what the wheel does not say: the train starts with a stuck wheel,
-// or brakes on a sliding one. Done gently no sample contradicts, and the accelerometer's bias learns it little by
-// little. But the speed that it adds up over the last seconds is not the wheel's: from there on it is believed beside
-// the wheel.
+// Where one odometer alone measures, an accelerometer may feel what that does not say: the train starts with a stuck
+// wheel or a stuck camera, or brakes on a sliding wheel. Done gently no sample contradicts, and the accelerometer's bias
+// learns it little by little. But the speed that it adds up over the last seconds is not the odometer's: from there on
+// it is believed beside that.
 #pragma once
 
 #include <optional>
 
 namespace railfix::fusion {
 
-/// One acceleration, and what the filter knows by the wheel.
+/// One acceleration, and what the filter knows by the odometer.
 struct FeltInput {
   double dt_s = 0;        // since the one before
   double accel_mps2 = 0;  // with the bias in it
@@ -23,7 +23,7 @@ struct FeltInput {
 class FeltMotion {
  public:
   void add(const FeltInput& input);
-  /// The train is felt to run so much faster than the wheel says; 0 = as fast.
+  /// The train is felt to run so much faster than the odometer says; 0 = as fast.
   [[nodiscard]] double faster_mps() const { return bias_mps2_ ? lean_mps_ : 0.0; }
 
  private:

@@ -27,7 +27,7 @@ void Hypotheses::exclude_faulty() {
     if (!rival.estimator || rival.without == Source::gnss) continue;
     const bool agrees = rival.estimator->is_consistent();
     consistent += agrees ? 1 : 0;
-    const bool proves = agrees && rival.estimator->sensors_at_work() >= 2;
+    const bool proves = agrees && rival.estimator->sensors_at_work() >= 2 && !rival.estimator->feels_otherwise();
     if (!proves || rival.proven_since_ns == 0) rival.proven_since_ns = proves ? now_ns : 0;
     if (proves && core::seconds(now_ns - rival.proven_since_ns) >= kProofS) proven = &rival;
   }

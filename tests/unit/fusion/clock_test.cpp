@@ -104,6 +104,16 @@ TEST(Clock, OfAFirstSampleThatIsWildIsLeft) {
   }
 }
 
+// Pictures may come slower while a train starts up: then none later is out of a rhythm.
+TEST(Clock, IsNotDoubtedForARhythmOfBefore) {
+  auto fusion = fusion_at(0);
+  for (int i = 1; i <= 20; ++i) fusion.add(step_at(0.1 * i, kSpeedMps, 0.1));
+  run(fusion, 2, 10, kSpeedMps);
+  const auto state = fusion.add(step_at(10.02, 0));
+  ASSERT_TRUE(state);
+  EXPECT_NEAR(state->distance_m, kSpeedMps * 10.02, 0.05) << "no train stops within a picture";
+}
+
 TEST(Clock, SetForwardIsBridgedByWhatCountsTheWay) {
   for (const bool has_imu : {false, true}) {
     for (const double set_s : {3.0, 60.0, 3600.0, 1.5e9}) {
