@@ -1,7 +1,7 @@
 // Where one odometer alone measures, an accelerometer may feel what that does not say: the train starts with a stuck
-// wheel or a stuck camera, or brakes on a sliding wheel. Done gently no sample contradicts, and the accelerometer's bias
-// learns it little by little. But the speed that it adds up over the last seconds is not the odometer's: from there on
-// it is believed beside that.
+// wheel or a stuck camera, or brakes on a sliding wheel. Done gently no sample contradicts, and the accelerometer's
+// bias learns it little by little. But the speed that it adds up over the last seconds is not the odometer's: from
+// there on it is believed beside that.
 #pragma once
 
 #include <optional>

@@ -265,8 +265,10 @@ const std::vector<CampaignRun> kRuns{
      .number = 485,
      .sensor = Sensor::fix,
      .kind = FaultKind::stuck},
-    // A camera that is stuck says that the train stands, and where it starts the wheel slips. Camera and IMU were taken to
-    // agree, because the IMU's bias learnt the acceleration, and the wheel was found wrong: the train stood in the states
+    // A camera that is stuck says that the train stands, and where it starts the wheel slips. Camera and IMU were taken
+    // to
+    // agree, because the IMU's bias learnt the acceleration, and the wheel was found wrong: the train stood in the
+    // states
     // and was 451 m further on, 490 of them outside, by up to 70 m. The IMU had felt it all the time.
     {.name = "AStuckCameraBesideAWheelThatSlips",
      .seed = 3727,
