@@ -22,6 +22,7 @@ constexpr double kSlipSigmas = 4.5;
 constexpr double kScatterResolutions = 3.0;
 constexpr double kSilentS = 1.0;
 constexpr double kSilentSlip = 0.1;  // share of the way
+constexpr double kTeachesS = 10.0;
 constexpr double kTaughtS = 30.0;
 constexpr double kSleeperM = 0.7;  // one more or less: the odd error of a step
 constexpr double kHiddenSlipMps = 0.7;
@@ -210,10 +211,13 @@ bool Estimator::wheel_is_alone() const {
   return !used_within(Source::camera, kBlindS) && !used_within(Source::imu, kLatelyS);
 }
 
-// A camera sees every slip; what it has taught an IMU is good for some time. A wheel that was seen to slip since then,
-// and has nobody beside it, is not believed when it seems well again.
+// A camera sees every slip; what it has taught an IMU is good for some time, unless that was taken back just before. A
+// wheel that was seen to slip since then, and has nobody beside it, is not believed when it seems well again.
 bool Estimator::is_watched() const {
-  return used_within(Source::camera, kTaughtS) && !(slipped_unseen() && wheel_is_alone());
+  const auto& camera = watch(Source::camera);
+  const bool sees = used_within(Source::camera, kBlindS);
+  const bool taught = core::seconds(camera.used_ns - watch(Source::imu).changed_ns) > kTeachesS;
+  return used_within(Source::camera, kTaughtS) && (sees || taught) && !(slipped_unseen() && wheel_is_alone());
 }
 
 bool Estimator::slipped_unseen() const {
