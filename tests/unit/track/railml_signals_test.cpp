@@ -86,6 +86,12 @@ TEST_F(RailmlSignals, OfRailml3WhoseSideIsNotSureAreTold) {
               "positionAtTrack would say it");
 }
 
+TEST_F(RailmlSignals, OfRailml3WithoutALocationAreTold) {
+  const Map map = map_of(railml3("<signalIS id=\"s\"><signalConstruction/></signalIS>"));
+  EXPECT_THAT(map.problems, Contains("<signalIS> \"s\" has no location; it is left out"));
+  EXPECT_TRUE(map.landmarks.empty());
+}
+
 TEST_F(RailmlSignals, OfRailml2StandOnTheSideThatAnExtensionSays) {
   // Cut at the switch at 500 m, and seen along the track whoever heeds them.
   const Map map = map_of(signals2(R"(<signal id="a" pos="100" dir="up" nor:side="right"/>

@@ -70,7 +70,10 @@ double Railml3Places::within(const pugi::xml_node& of, double at_m, double lengt
 
 std::vector<NetPlace> Railml3Places::of(const pugi::xml_node& node) {
   std::vector<NetPlace> out;
-  for (const pugi::xml_node& part : descendants(node, "associatedNetElement")) {
+  const auto parts = descendants(node, "associatedNetElement");
+  const auto spots = descendants(node, "spotLocation");
+  if (parts.empty() && spots.empty()) net_.problems.push_back(railml_called(node) + " has no location; it is left out");
+  for (const pugi::xml_node& part : parts) {
     const std::optional<size_t> track = find_track(node, part);
     if (!track) continue;
     const double length = net_.tracks[*track].length_m;
@@ -86,7 +89,7 @@ std::vector<NetPlace> Railml3Places::of(const pugi::xml_node& node) {
     out.push_back({*track, within(node, first, length), within(node, last, length), from <= to && !turned});
   }
   if (!out.empty()) return out;
-  for (const pugi::xml_node& spot : descendants(node, "spotLocation")) {
+  for (const pugi::xml_node& spot : spots) {
     const std::optional<size_t> track = find_track(node, spot);
     if (!track) continue;
     const double length = net_.tracks[*track].length_m;
