@@ -22,7 +22,6 @@ struct CampaignRun {
   bool gnss = true;
   bool start_told = true;
   bool wheel = true;
-  bool camera = true;
   bool slip_always = false;    // beside the fault, a second one
   double mean_length_m = 1e9;  // of the interval, at most
   double wider_share = 1;      // of the states whose interval is wider than allowed, at most
@@ -42,7 +41,6 @@ TEST_P(OnceOutside, HoldsTheTruth) {
   plan.landmark_spacing_m = run.sightings ? 0 : run.landmarks_m;
   plan.gnss = run.gnss;
   plan.wheel = run.wheel;
-  plan.camera = run.camera;
   plan.start_told = run.start_told;
   const uint64_t seed = train::seed_of_run(run.seed, run.number);
   core::Random random = train::draws_of_run(seed);
@@ -302,15 +300,6 @@ const std::vector<CampaignRun> kRuns{
      .kind = FaultKind::stuck,
      .sightings = true,
      .slip_always = true},
-    // A train without a camera starts with a locked wheel, gently enough for the IMU's bias to learn it. What an IMU
-    // feels was held beside a blind camera only. 417 states were outside, by up to 786 m.
-    {.name = "ATrainWithoutACameraStartsWithALockedWheel",
-     .seed = 3792,
-     .number = 64,
-     .sensor = Sensor::wheel,
-     .kind = FaultKind::stuck,
-     .start_told = false,
-     .camera = false},
 };
 
 INSTANTIATE_TEST_SUITE_P(Runs, OnceOutside, ::testing::ValuesIn(kRuns), [](const auto& run) { return run.param.name; });
