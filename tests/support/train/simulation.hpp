@@ -100,6 +100,8 @@ class TrainSimulation {
   /// place lies elsewhere.
   [[nodiscard]] std::optional<double> error_m(const track::EdgePosition& place, const Motion& truth) const;
   [[nodiscard]] bool on_way(const track::EdgePosition& place) const;
+  /// What map_matcher says of the track, which follows the place that fusion has told: error_m from the truth.
+  [[nodiscard]] fusion::FixInput said_of_track(const fusion::FixInput& fix, double error_m, double arrival_s) const;
   /// Of the track as it lies, not as it is mapped.
   [[nodiscard]] double curvature_at(double distance_m, double t_s) const;
   /// The camera shows what is there.
@@ -166,7 +168,8 @@ class TrainSimulation {
   void make_sightings(const std::vector<Thing>& things);
   void make_declarations();
   void make_track_fixes();
-  [[nodiscard]] SaidTrack track_at(double way_m) const;
+  /// The place as who follows fusion says it, which is so far off.
+  [[nodiscard]] SaidTrack track_at(double way_m, double error_m = 0) const;
   void add(Sensor sensor, double t_s, fusion::Event event);
   [[nodiscard]] bool faulty(Sensor sensor, FaultKind kind, double t_s) const;
   [[nodiscard]] double offset_of(Sensor sensor, double t_s) const;

@@ -59,9 +59,9 @@ void TrainSimulation::make_declarations() {
   misled_landmarks_ = random.uniform() < 0.5;
 }
 
-TrainSimulation::SaidTrack TrainSimulation::track_at(double way_m) const {
+TrainSimulation::SaidTrack TrainSimulation::track_at(double way_m, double error_m) const {
   const auto next = std::ranges::upper_bound(points_, way_m, {}, [](const Points& one) { return one.distance_m; });
-  const auto own = path_->position_at(way_m);
+  const auto own = path_->position_at(way_m + error_m);
   if (next == points_.begin()) return {own, kSureProbability, true};
   const auto i = static_cast<size_t>(next - points_.begin()) - 1;
   const auto& one = declarations_[i];
@@ -69,9 +69,19 @@ TrainSimulation::SaidTrack TrainSimulation::track_at(double way_m) const {
   const double behind_m = way_m - points_[i].distance_m;
   const bool known = behind_m >= one.after_m || behind_m > other.length_m() - kPointsEndM;
   const bool wrong = known ? behind_m < one.wrong_until_m : one.leans_wrong;
-  const track::EdgePosition there{other.edge->id, other.forward ? behind_m : other.length_m() - behind_m,
-                                  other.forward ? track::Direction::forward : track::Direction::reverse};
-  return {wrong ? there : own, known ? one.declared : one.leaning, known};
+  const double into_m = behind_m + error_m;
+  const auto there = other.at(std::clamp(into_m, 0.0, other.length_m()));
+  return {wrong && into_m > 0 ? there : own, known ? one.declared : one.leaning, known};
+}
+
+FixInput TrainSimulation::said_of_track(const FixInput& fix, double error_m, double arrival_s) const {
+  if (plan_.fault.is(Sensor::fix, FaultKind::stuck) && plan_.fault.active(arrival_s)) return fix;
+  const auto place = track_at(truth_at(fix.stamp_ns, arrival_s).distance_m, error_m).place;
+  FixInput said = fix;
+  said.edge = place.edge;
+  said.offset_m = place.offset_m;
+  said.direction = place.direction;
+  return said;
 }
 
 // Once a second, when the word changes, and every 2 m while the track is not known: as map_matcher does.

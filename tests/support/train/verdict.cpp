@@ -10,6 +10,7 @@
 namespace railfix::train {
 namespace {
 
+constexpr double kFollowedM = 1e4;  // a state elsewhere is not followed any further
 constexpr double kTickS = 0.1;
 
 // Words by which the state's reason names a sensor.
@@ -51,6 +52,7 @@ class Judge {
     const double error_m = state.track_known ? simulation_.error_m(state.position, truth).value_or(1e6)
                                              : state.distance_m - truth.distance_m;
     const double excess_m = std::max(error_m - state.over_m, -error_m - state.under_m);
+    error_m_ = state.track_known ? std::clamp(error_m, -kFollowedM, kFollowedM) : 0;
     ++verdict_.states;
     const bool ok = state.integrity == fusion::Integrity::ok;
     if (!(excess_m <= 0)) {
@@ -75,6 +77,8 @@ class Judge {
   }
 
   Verdict take() { return std::move(verdict_); }
+  /// Of the last state.
+  [[nodiscard]] double error_m() const { return error_m_; }
 
  private:
   void judge_width(const fusion::TrainEstimate& state, bool ok) {
@@ -97,6 +101,7 @@ class Judge {
     verdict_.other_leg_sure_m = std::max(verdict_.other_leg_sure_m, std::abs(way_m - sure_since_->way_m));
   }
 
+  double error_m_ = 0;
   const TrainSimulation& simulation_;
   double after_m_;
   const Watcher& watcher_;
@@ -147,7 +152,10 @@ Verdict judge(const TrainSimulation& simulation, fusion::Fusion& fusion, double 
     }
     const auto* gnss = std::get_if<fusion::GnssInput>(&arrival.event);
     if (matcher && gnss != nullptr) matcher->hear(*gnss, arrival.arrival_s);
-    const auto state = fusion.add(arrival.event);
+    auto event = arrival.event;
+    if (auto* fix = std::get_if<fusion::FixInput>(&event); fix != nullptr && fix->kind == fusion::FixKind::track)
+      *fix = simulation.said_of_track(*fix, judge.error_m(), arrival.arrival_s);
+    const auto state = fusion.add(event);
     if (!state) continue;
     judge.see(*state, arrival.arrival_s);
     const auto* step = std::get_if<fusion::OdometryInput>(&arrival.event);
