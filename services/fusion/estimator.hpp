@@ -264,6 +264,8 @@ class Estimator {
   };
 
   [[nodiscard]] bool used_within(Source source, double time_s) const;
+  /// The camera is not blind, and believed.
+  [[nodiscard]] bool sees() const { return used_within(Source::camera, kBlindS); }
   void doubt_time(const SensorWatch& watch, Rhythm& rhythm, int64_t stamp_ns);
   void notice_gap(int64_t stamp_ns);
   /// Offered again as a sudden change of acceleration when it is refused.

@@ -91,11 +91,10 @@ void Estimator::use_acceleration(double accel_mps2, int64_t stamp_ns) {
 // train without a camera that is always so: the first slip would leave room that grows without end.
 void Estimator::feel(double accel_mps2, double sigma_mps2, int64_t before_ns) {
   const double dt_s = core::seconds(filter_.stamp_ns() - before_ns);
-  const bool sees = used_within(Source::camera, kBlindS);
-  const bool blind = watch(Source::camera).seen_ns != 0 && !sees;
+  const bool blind = watch(Source::camera).seen_ns != 0 && !sees();
   // What was felt goes on when the wheel begins to turn and is found out.
   const bool told = measures(Source::wheel) || (watch(Source::wheel).isolated && felt_.faster_mps() != 0);
-  const bool alone = sees ? !measures(Source::wheel) : blind && told;
+  const bool alone = sees() ? !measures(Source::wheel) : blind && told;
   if (!alone || dt_s > kLatelyS) {
     felt_ = {};
     return;

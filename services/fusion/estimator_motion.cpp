@@ -134,7 +134,7 @@ void Estimator::isolate_wheel() {
   slip_watch_.no_picture();
   // On trial it was wrong all the time, not since a second ago, and the speed at which the camera came back was its
   // own.
-  const bool failed_trial = wheel_.on_trial && used_within(Source::camera, kBlindS);
+  const bool failed_trial = wheel_.on_trial && sees();
   if (failed_trial) filter_.loosen_speed(kUnknownSpeedMps);
   slip_began_ = !failed_trial;
   wheel_.on_trial = false;
@@ -195,7 +195,7 @@ void Estimator::watch_alone(double way_m, double dt_s) {
     unwatched_.counted.add(filter_.scale(Odometer::wheel) * way_m - run_m);
   // Nobody else measures for a while, or the wheel came back in the dark, where an IMU alone had said that it is well
   // again: a slip may be no larger than what passes for a change of speed.
-  const bool came_back = slipped_unseen() && !used_within(Source::camera, kBlindS);
+  const bool came_back = slipped_unseen() && !sees();
   if (is_watched() && (wheel_is_alone() || came_back)) {
     const double hidden_mps = std::max(kHiddenSlipMps, kHiddenSlipShare * std::abs(filter_.speed_mps()));
     const double more_m = std::min(hidden_mps * dt_s, parameters_->wheel_slip_share * std::abs(way_m));
@@ -208,16 +208,15 @@ void Estimator::watch_alone(double way_m, double dt_s) {
 }
 
 bool Estimator::wheel_is_alone() const {
-  return !used_within(Source::camera, kBlindS) && !used_within(Source::imu, kLatelyS);
+  return !sees() && !used_within(Source::imu, kLatelyS);
 }
 
 // A camera sees every slip; what it has taught an IMU is good for some time, unless that was taken back just before. A
 // wheel that was seen to slip since then, and has nobody beside it, is not believed when it seems well again.
 bool Estimator::is_watched() const {
   const auto& camera = watch(Source::camera);
-  const bool sees = used_within(Source::camera, kBlindS);
   const bool taught = core::seconds(camera.used_ns - watch(Source::imu).changed_ns) > kTeachesS;
-  return used_within(Source::camera, kTaughtS) && (sees || taught) && !(slipped_unseen() && wheel_is_alone());
+  return used_within(Source::camera, kTaughtS) && (sees() || taught) && !(slipped_unseen() && wheel_is_alone());
 }
 
 bool Estimator::slipped_unseen() const {
@@ -254,7 +253,7 @@ void Estimator::take_wheel_back(int64_t stamp_ns, double wheel_m, double sigma_m
 // While the wheel slips its odometer is only compared, window by window; two good windows in which it turned end the
 // slip: a wheel that is stuck agrees with every train that stands. Where there is no camera it must be taken as it is.
 void Estimator::recover_wheel(const WheelInput& sample, double wheel_m, double sigma_m) {
-  if (used_within(Source::camera, kBlindS)) {
+  if (sees()) {
     if (wheel_.camera_agrees) take_wheel_back(sample.stamp_ns, wheel_m, sigma_m);
     return;
   }
@@ -278,7 +277,7 @@ void Estimator::recover_wheel(const WheelInput& sample, double wheel_m, double s
   begin_window();
   if (wheel_.good_windows < kGoodWindows && !(alone && turns)) return;
   watched(Source::wheel).accept(sample.stamp_ns);
-  wheel_.on_trial = !used_within(Source::camera, kBlindS);
+  wheel_.on_trial = !sees();
   // It tells how fast the train is from now on, not how far the IMU was out before.
   if (wheel_.on_trial) filter_.loosen_speed(filter_.sigma(StateIndex::speed));
 }

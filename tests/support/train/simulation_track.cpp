@@ -75,7 +75,7 @@ TrainSimulation::SaidTrack TrainSimulation::track_at(double way_m, double error_
 }
 
 FixInput TrainSimulation::said_of_track(const FixInput& fix, double error_m, double arrival_s) const {
-  if (plan_.fault.is(Sensor::fix, FaultKind::stuck) && plan_.fault.active(arrival_s)) return fix;
+  if (faulty(Sensor::fix, FaultKind::stuck, arrival_s)) return fix;
   const auto place = track_at(truth_at(fix.stamp_ns, arrival_s).distance_m, error_m).place;
   FixInput said = fix;
   said.edge = place.edge;
