@@ -13,8 +13,8 @@ constexpr double kRivalBelow = 14.0;
 constexpr std::array<double, 3> kScales = {0, -2.0 / 3, 2.0 / 3};  // of the range
 constexpr double kRoughM = 20.0;
 constexpr double kLeastRoughScale = 0.001;
-constexpr size_t kRoughWays = 4;
-constexpr WayWalker::Trial kExactly{8.0, 0.001, 8};
+constexpr size_t kRoughWays = 12;
+constexpr WayWalker::Trial kExactly{8.0, 0.001, 24};
 constexpr size_t kMostComparedBins = 8'000'000;  // a quarter of a second
 constexpr size_t kMostTried = 16;
 constexpr WayFitter::Effort kFirst{3, 10, 4.0};
@@ -104,16 +104,18 @@ std::vector<WayFit> WayComparison::first_fits(const std::vector<Candidate>& cand
 }
 
 // Walked again as exactly as the fit knows it, which may find other legs, and fitted in full.
-void WayComparison::fit_exactly(const WayFit& first, std::vector<WayFit>& fits, double& best) {
+bool WayComparison::fit_exactly(const WayFit& first, std::vector<WayFit>& fits, double& best) {
   Candidate anchor = place_on(first.runs, first.anchor_m - 0.5 * model_.parameters().lag_m);
   anchor.bin = first.bin;
   anchor.scale = first.scale;
-  for (const WalkedWay& way : walker_.follow(anchor, kExactly, -INFINITY)) {
+  const auto ways = walker_.follow(anchor, kExactly, -INFINITY);
+  for (const WalkedWay& way : ways) {
     const auto full = fitter_.fit(way, kFull, best - kFarBelow);
     if (!full) continue;
     best = std::max(best, full->best_log);
     add(*full, fits);
   }
+  return !walker_.cut();
 }
 
 ComparedWays WayComparison::compare(const std::vector<Candidate>& candidates) {
@@ -128,7 +130,7 @@ ComparedWays WayComparison::compare(const std::vector<Candidate>& candidates) {
       break;
     }
     tried.push_back(fit);
-    fit_exactly(fit, compared.fits, best);
+    if (!fit_exactly(fit, compared.fits, best)) compared.complete = false;
   }
   add_beside(compared.fits);
   return compared;

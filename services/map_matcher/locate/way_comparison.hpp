@@ -27,7 +27,8 @@ class WayComparison {
  private:
   [[nodiscard]] std::vector<WayFit> first_fits(const std::vector<Candidate>& candidates, bool& complete);
   [[nodiscard]] std::vector<WalkedWay> roughly(const Candidate& candidate, double least_log);
-  void fit_exactly(const WayFit& first, std::vector<WayFit>& fits, double& best);
+  /// False where more ways lead there than were fitted.
+  [[nodiscard]] bool fit_exactly(const WayFit& first, std::vector<WayFit>& fits, double& best);
   void add_beside(std::vector<WayFit>& fits);
 
   const TurnModel& model_;

@@ -10,6 +10,7 @@ namespace {
 constexpr int kMostRunsAStep = 12;
 constexpr double kSamePlaceM = 15.0;
 constexpr double kMostBeyondM = 100.0;
+constexpr double kNearlyAsGood = 10.0;  // a log likelihood
 
 }  // namespace
 
@@ -125,16 +126,21 @@ std::vector<WayWalker::Walk> WayWalker::go(std::vector<Walk> walks, size_t bin, 
   // Ways that have met again are one from here on.
   std::vector<Walk> kept;
   for (const Walk& w : next) {
-    if (kept.size() == trial.most_ways) break;
     const bool met = std::any_of(kept.begin(), kept.end(), [&](const Walk& k) {
       return k.run() == w.run() && std::abs(k.into_m - w.into_m) < kSamePlaceM;
     });
-    if (!met) kept.push_back(w);
+    if (met) continue;
+    if (kept.size() == trial.most_ways) {
+      cut_ = cut_ || w.log > kept.front().log - kNearlyAsGood;
+      break;
+    }
+    kept.push_back(w);
   }
   return kept;
 }
 
 std::vector<WalkedWay> WayWalker::follow(const Candidate& candidate, const Trial& trial, double least_log) {
+  cut_ = false;
   Walk anchor;
   anchor.into_m = candidate.into_m;
   anchor.turns = model_.begin();

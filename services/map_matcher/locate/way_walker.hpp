@@ -29,6 +29,8 @@ class WayWalker {
     size_t most_ways = 4;
   };
   [[nodiscard]] std::vector<WalkedWay> follow(const Candidate& candidate, const Trial& trial, double least_log);
+  /// The last time a way was given up that fitted nearly as well as others, because there were too many.
+  [[nodiscard]] bool cut() const { return cut_; }
   /// So many bins were compared by now: the time that it took.
   [[nodiscard]] size_t compared_bins() const { return compared_bins_; }
 
@@ -46,6 +48,7 @@ class WayWalker {
   const TurnModel& model_;
   const NetworkIndex& index_;
   size_t compared_bins_ = 0;
+  bool cut_ = false;
 };
 
 }  // namespace railfix::map_matcher
