@@ -14,6 +14,7 @@ constexpr double kSettledM = 100.0;  // behind a switch
 constexpr double kLeastSigmaM = 3.0;
 constexpr size_t kAnewBins = 50;
 constexpr double kWorstMisfit = 7.0;     // over 200 m
+constexpr double kHeardMisfit = 2.0;     // of a place that GNSS holds
 constexpr double kMostOfRange = 1.1;     // of the odometer's scale
 constexpr double kLeastEvidence = 20.0;  // that the track is on the map at all, a log
 
@@ -38,6 +39,7 @@ void NetworkLocator::move(double way_m, double turn_rad, double turn_sigma_rad) 
     // What was taken back stays in the filter: another one begins.
     if (filter && filter->taken_bins() > run.end_bin()) filter.reset();
   }
+  heard_.move(way_m);
 }
 
 void NetworkLocator::sight(const Sighting& sighting) {
@@ -50,6 +52,7 @@ void NetworkLocator::forget() {
     run.clear();
     filter.reset();
   }
+  heard_.forget();
 }
 
 size_t NetworkLocator::leading() const {
@@ -85,12 +88,12 @@ Location NetworkLocator::locate() {
   double turn = 0;
   for (const MeasuredBin& bin : way) turn += std::abs(bin.turn_rad);
   if (way_m() < parameters_.least_way_m || turn < parameters_.least_turn_rad) return {};
-  const TurnModel model(parameters_, way);
-  const auto candidates = filter.candidates(run.gone_bins());
-  const auto compared = WayComparison(model, *index_).compare(candidates);
-  Location location = sum_up(compared.fits, run);
-  location.candidates = candidates.size();
-  location.doubt = doubt_of(location, !filter.overflowed() && compared.complete, filter.evidence());
+  Location location = look(filter, run, way);
+  if (!location.certain() && heard_.known()) {
+    Location heard = look_where_heard(filter, run, way);
+    heard.by_gnss = heard.certain();
+    if (!heard.places.empty()) location = std::move(heard);
+  }
   if (run.ahead()) return location;
   // Found in the direction of the run: its front looks the other way.
   for (auto& found : location.places) {
@@ -99,11 +102,45 @@ Location NetworkLocator::locate() {
   return location;
 }
 
-Doubt NetworkLocator::doubt_of(const Location& location, bool complete, double evidence) const {
+Location NetworkLocator::look(const PlaceFilter& filter, const MeasuredRun& run, const MeasuredWay& way) const {
+  const TurnModel model(parameters_, way);
+  const auto candidates = filter.candidates(run.gone_bins());
+  const auto compared = WayComparison(model, *index_).compare(candidates);
+  Location location = sum_up(compared.fits, run);
+  location.candidates = candidates.size();
+  location.doubt =
+      doubt_of(location, !filter.overflowed() && compared.complete, filter.evidence(), parameters_.certain_misfit);
+  return location;
+}
+
+// Few places are left that had the chance to fit. Where the best of them fits worse than the noise the map is drawn
+// roughly, and tells them apart by so much less.
+Location NetworkLocator::look_where_heard(const PlaceFilter& filter, const MeasuredRun& run,
+                                          const MeasuredWay& way) const {
+  const TurnModel model(parameters_, way);
+  auto candidates = filter.candidates(run.gone_bins());
+  std::erase_if(candidates, [&](const Candidate& c) { return !heard_.may_hold(c, way.size() - c.bin); });
+  if (candidates.empty()) return {};
+  const auto compared = WayComparison(model, *index_).compare(candidates);
+  std::vector<WayFit> fits;
+  for (const auto& fit : compared.fits) {
+    if (auto held = heard_.held(fit, run)) fits.push_back(std::move(*held));
+  }
+  double misfit = kHeardMisfit;
+  for (const WayFit& fit : fits) misfit = std::min(misfit, fit.misfit);
+  for (WayFit& fit : fits) fit.log_evidence /= std::max(1.0, misfit);
+  Location location = sum_up(fits, run);
+  location.candidates = candidates.size();
+  const double evidence = filter.evidence_of(candidates.front(), heard_.places(*index_));
+  location.doubt = doubt_of(location, !filter.overflowed() && compared.complete, evidence, kHeardMisfit);
+  return location;
+}
+
+Doubt NetworkLocator::doubt_of(const Location& location, bool complete, double evidence, double most_misfit) const {
   if (!complete || location.places.empty()) return Doubt::not_all_seen;
   const LocatedPlace& best = location.places.front();
   const bool scaled = std::abs(best.scale - 1) < kMostOfRange * parameters_.scale_range;
-  if (best.misfit >= parameters_.certain_misfit || best.worst_misfit >= kWorstMisfit || !scaled) return Doubt::misfit;
+  if (best.misfit >= most_misfit || best.worst_misfit >= kWorstMisfit || !scaled) return Doubt::misfit;
   if (evidence < kLeastEvidence) return Doubt::by_chance;
   if (location.place_probability < parameters_.certain) return Doubt::alike;
   if (best.sigma_m >= parameters_.certain_sigma_m) return Doubt::wide;

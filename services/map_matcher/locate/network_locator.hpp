@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "map_matcher/locate/heard_place.hpp"
 #include "map_matcher/locate/locator_types.hpp"
 #include "map_matcher/locate/measured_run.hpp"
 #include "map_matcher/locate/network_index.hpp"
@@ -46,6 +47,7 @@ struct Location {
   double place_probability = 0;      // of the best place, on whichever of the tracks beside each other
   Doubt doubt = Doubt::too_plain;
   size_t candidates = 0;  // places that may be the one
+  bool by_gnss = false;   // without GNSS it would not be certain
   [[nodiscard]] bool certain() const { return doubt == Doubt::none; }
   /// Certain but for the track: those beside each other are still open.
   [[nodiscard]] bool place_certain() const { return doubt == Doubt::none || doubt >= Doubt::beside; }
@@ -59,6 +61,8 @@ class NetworkLocator {
   /// Moved by way_m (measured, forward positive) and turned meanwhile (left positive).
   void move(double way_m, double turn_rad, double turn_sigma_rad);
   void sight(const Sighting& sighting);
+  /// Where the way alone is not certain, only what GNSS holds is compared. since_m: moved since then.
+  void hear(const GnssReach& reach, double since_m) { heard_.hear(reach, since_m); }
   void forget();
   /// That is searched for.
   [[nodiscard]] double way_m() const;
@@ -75,9 +79,12 @@ class NetworkLocator {
   };
   /// The one that the train is at the front of, with the longer way.
   [[nodiscard]] size_t leading() const;
+  [[nodiscard]] Location look(const PlaceFilter& filter, const MeasuredRun& run, const MeasuredWay& way) const;
+  [[nodiscard]] Location look_where_heard(const PlaceFilter& filter, const MeasuredRun& run,
+                                          const MeasuredWay& way) const;
   [[nodiscard]] PlaceFilter& filtered(Search& search, const MeasuredWay& way) const;
   [[nodiscard]] Location sum_up(const std::vector<WayFit>& fits, const MeasuredRun& run) const;
-  [[nodiscard]] Doubt doubt_of(const Location& location, bool complete, double evidence) const;
+  [[nodiscard]] Doubt doubt_of(const Location& location, bool complete, double evidence, double most_misfit) const;
   [[nodiscard]] double beside_probability(const std::vector<LocatedPlace>& places) const;
   [[nodiscard]] LocatedPlace place_of(const WayFit& fit, const MeasuredRun& run) const;
   [[nodiscard]] bool just_behind_switch(const LocatedPlace& place) const;
@@ -86,6 +93,7 @@ class NetworkLocator {
   std::shared_ptr<const NetworkIndex> index_;
   std::array<Search, 2> searches_{Search{{parameters_, MeasuredRun::Direction::ahead}, {}},
                                   Search{{parameters_, MeasuredRun::Direction::astern}, {}}};
+  HeardPlace heard_;
 };
 
 }  // namespace railfix::map_matcher

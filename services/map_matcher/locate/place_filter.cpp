@@ -74,43 +74,56 @@ void PlaceFilter::weigh_unmapped(const Block& block) {
   last_turn_rad_ = x;
 }
 
-float PlaceFilter::best_log() const {
-  float best = -INFINITY;
-  for (const Place& place : places_) best = std::max(best, place.log);
-  return best;
+double PlaceFilter::evidence() const {
+  return best_log_ - unmapped_log_ - std::log(static_cast<double>(std::max<size_t>(origins_, 1)));
 }
 
-double PlaceFilter::evidence() const {
-  return best_log() - unmapped_log_ - std::log(static_cast<double>(std::max<size_t>(origins_, 1)));
+double PlaceFilter::evidence_of(const Candidate& candidate, double places) const {
+  return candidate.log - unmapped_log_ - std::log(std::max(places, 1.0));
 }
 
 void PlaceFilter::advance(const MeasuredWay& way, size_t gone_bins) {
   const auto blocks = blocks_of(way, gone_bins);
   if (blocks.empty() || overflowed_) return;
   if (!begun_) return begin(blocks);
-  std::vector<Place> next;
   for (const Block& block : blocks) {
-    next.clear();
-    for (const Place& place : places_) go(place, block, -INFINITY, next);
-    std::swap(places_, next);
+    next_.clear();
+    for (Place& place : places_) {
+      if (runs_on(place, block)) continue;
+      go(place, block, -INFINITY, next_);
+      place.log = -INFINITY;
+    }
+    std::erase_if(places_, [](const Place& place) { return place.log == -INFINITY; });
+    places_.insert(places_.end(), next_.begin(), next_.end());
     if (places_.size() > kMostPlaces) overflowed_ = true;
   }
   drop_unlikely();
+  join_same();
 }
 
 void PlaceFilter::begin(const std::vector<Block>& blocks) {
   begun_ = true;
   best_logs_.assign(blocks.size(), -INFINITY);
+  places_.reserve(most_origins());
   for (uint32_t run = 0; run < index_->runs(); ++run) {
-    const float length_m = index_->length_m(run);
-    const float count = std::max(1.0F, std::round(length_m / kOriginsM));
-    for (int i = 0; i < static_cast<int>(count); ++i)
-      follow(origin_at(run, length_m * (static_cast<float>(i) + 0.5F) / count), blocks);
-    origins_ += static_cast<size_t>(count);
+    const size_t count = origins_on(run);
+    const float step_m = index_->length_m(run) / static_cast<float>(count);
+    for (size_t i = 0; i < count; ++i) follow(origin_at(run, step_m * (static_cast<float>(i) + 0.5F)), blocks);
+    origins_ += count;
     if (places_.size() > kMostPlaces) overflowed_ = true;
-    if (overflowed_) return;
+    if (overflowed_) break;
   }
   drop_unlikely();
+}
+
+size_t PlaceFilter::most_origins() const {
+  size_t origins = 0;
+  for (uint32_t run = 0; run < index_->runs(); ++run) origins += origins_on(run);
+  return std::min(origins, kMostPlaces);
+}
+
+size_t PlaceFilter::origins_on(uint32_t run) const {
+  return std::max<size_t>(1, std::lround(index_->length_m(run) / kOriginsM));
 }
 
 PlaceFilter::Place PlaceFilter::origin_at(uint32_t run, float into_m) const {
@@ -137,9 +150,17 @@ PlaceFilter::Place PlaceFilter::origin_at(uint32_t run, float into_m) const {
 
 // All blocks for one origin, as long as it is worth it.
 void PlaceFilter::follow(Place origin, const std::vector<Block>& blocks) {
+  const auto least_log = [&](size_t k) {
+    return std::max(kExpectedLog * static_cast<double>(k + 1), best_logs_[k]) - kFarBelow;
+  };
+  size_t k = 0;
+  for (; k < blocks.size() && runs_on(origin, blocks[k]); ++k) {
+    if (origin.log < least_log(k)) return;
+    best_logs_[k] = std::max(best_logs_[k], static_cast<double>(origin.log));
+  }
   now_.assign(1, origin);
-  for (size_t k = 0; k < blocks.size() && !now_.empty(); ++k) {
-    const double least = std::max(kExpectedLog * static_cast<double>(k + 1), best_logs_[k]) - kFarBelow;
+  for (; k < blocks.size() && !now_.empty(); ++k) {
+    const double least = least_log(k);
     next_.clear();
     for (const Place& place : now_) go(place, blocks[k], least, next_);
     for (const Place& place : next_) best_logs_[k] = std::max(best_logs_[k], static_cast<double>(place.log));
@@ -148,11 +169,11 @@ void PlaceFilter::follow(Place origin, const std::vector<Block>& blocks) {
   places_.insert(places_.end(), now_.begin(), now_.end());
 }
 
-void PlaceFilter::go(const Place& place, const Block& block, double least_log, std::vector<Place>& to) const {
-  Place p = place;
-  auto& c = p.covariance;
+// When the train has gone on by a block, but for its place.
+void PlaceFilter::foretell(Place& place, const Block& block) {
+  auto& c = place.covariance;
   constexpr float l = kBlockM;
-  p.offset_rad += l * p.bias_per_m;
+  place.offset_rad += l * place.bias_per_m;
   c[kGg] += 2 * l * c[kGb] + l * l * c[kBb] + static_cast<float>(block.turn_variance);
   c[kGp] += l * (c[kGc] + c[kBp] + l * c[kBc]);
   c[kGb] += l * c[kBb];
@@ -160,7 +181,27 @@ void PlaceFilter::go(const Place& place, const Block& block, double least_log, s
   c[kBp] += l * c[kBc];
   c[kPp] += 2 * l * c[kPc] + l * l * c[kCc] + kMapSigmaM * kMapSigmaM;
   c[kPc] += l * c[kCc];
-  go_on(p, p.into_m + l * (1 + p.scale_error), {}, block, least_log, to);
+}
+
+float PlaceFilter::block_end_m(const Place& place) {
+  return place.into_m + kBlockM * (1 + place.scale_error);
+}
+
+// Mostly: nothing need be copied.
+bool PlaceFilter::runs_on(Place& place, const Block& block) const {
+  const float to_m = block_end_m(place);
+  if (to_m > index_->length_m(place.run)) return false;
+  foretell(place, block);
+  place.into_m = to_m;
+  weigh(place, block);
+  if (!block.marks.empty()) weigh_marks(place, {}, block);
+  return true;
+}
+
+void PlaceFilter::go(const Place& place, const Block& block, double least_log, std::vector<Place>& to) const {
+  Place foretold = place;
+  foretell(foretold, block);
+  go_on(foretold, block_end_m(place), {}, block, least_log, to);
 }
 
 void PlaceFilter::go_on(const Place& place, float end_m, const Trail& trail, const Block& block, double least_log,
@@ -259,20 +300,35 @@ void PlaceFilter::weigh_marks(Place& place, const Trail& trail, const Block& blo
   }
 }
 
-// Those that have met go on as one.
 void PlaceFilter::drop_unlikely() {
-  const float least = best_log() - static_cast<float>(kFarBelow);
+  best_log_ = -INFINITY;
+  for (const Place& place : places_) best_log_ = std::max(best_log_, place.log);
+  const float least = best_log_ - static_cast<float>(kFarBelow);
   std::erase_if(places_, [&](const Place& place) { return place.log < least; });
-  const auto cell = [](const Place& place) { return static_cast<int64_t>(std::floor(place.into_m / kSameM)); };
-  std::sort(places_.begin(), places_.end(), [&](const Place& a, const Place& b) {
-    return std::tuple(a.run, cell(a), b.log) < std::tuple(b.run, cell(b), a.log);
-  });
-  const auto same = [&](const Place& a, const Place& b) { return a.run == b.run && cell(a) == cell(b); };
-  places_.erase(std::unique(places_.begin(), places_.end(), same), places_.end());
+}
+
+// Those that have met go on as one.
+void PlaceFilter::join_same() {
+  struct Key {
+    uint64_t cell;  // of all runs
+    float log;
+    uint32_t place;
+  };
+  std::vector<Key> keys(places_.size());
+  for (size_t i = 0; i < keys.size(); ++i) {
+    const auto cell = static_cast<uint32_t>(static_cast<int32_t>(std::floor(places_[i].into_m / kSameM)));
+    keys[i] = {uint64_t{places_[i].run} << 32U | cell, places_[i].log, static_cast<uint32_t>(i)};
+  }
+  std::sort(keys.begin(), keys.end(),
+            [](const Key& a, const Key& b) { return std::tie(a.cell, b.log) < std::tie(b.cell, a.log); });
+  for (size_t i = 1; i < keys.size(); ++i) {
+    if (keys[i].cell == keys[i - 1].cell) places_[keys[i].place].log = -INFINITY;
+  }
+  std::erase_if(places_, [](const Place& place) { return place.log == -INFINITY; });
 }
 
 std::vector<Candidate> PlaceFilter::candidates(size_t gone_bins) const {
-  const float least = best_log() - static_cast<float>(kLikelyBelow);
+  const float least = best_log_ - static_cast<float>(kLikelyBelow);
   std::vector<Candidate> candidates;
   for (const Place& place : places_) {
     if (place.log < least) continue;

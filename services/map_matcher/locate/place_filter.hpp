@@ -30,6 +30,8 @@ class PlaceFilter {
   /// How much likelier (log) the best place is than that the train is on a track that is not on the map, which many
   /// places had the chance to fit.
   [[nodiscard]] double evidence() const;
+  /// The same of a candidate, which is one of so many places.
+  [[nodiscard]] double evidence_of(const Candidate& candidate, double places) const;
   /// Nothing on the map fits.
   [[nodiscard]] bool lost() const { return begun_ && places_.empty(); }
   /// More may fit than could be followed.
@@ -68,22 +70,29 @@ class PlaceFilter {
   void begin(const std::vector<Block>& blocks);
   void follow(Place origin, const std::vector<Block>& blocks);
   [[nodiscard]] Place origin_at(uint32_t run, float into_m) const;
+  static void foretell(Place& place, const Block& block);
+  [[nodiscard]] static float block_end_m(const Place& place);
+  /// False, and nothing changed, where it comes to the end of its run.
+  [[nodiscard]] bool runs_on(Place& place, const Block& block) const;
   void go(const Place& place, const Block& block, double least_log, std::vector<Place>& to) const;
   void go_on(const Place& place, float end_m, const Trail& trail, const Block& block, double least_log,
              std::vector<Place>& to) const;
   void weigh(Place& place, const Block& block) const;
   void weigh_marks(Place& place, const Trail& trail, const Block& block) const;
   [[nodiscard]] float heading(const Place& place, float into_m) const;
-  [[nodiscard]] float best_log() const;
+  [[nodiscard]] size_t most_origins() const;
+  [[nodiscard]] size_t origins_on(uint32_t run) const;
   void drop_unlikely();
+  void join_same();
   void weigh_unmapped(const Block& block);
 
   LocatorParameters parameters_;
   const NetworkIndex* index_;
   std::vector<Place> places_;
+  float best_log_ = -INFINITY;
   std::vector<double> best_logs_;  // of each block while the filter begins
   std::vector<Place> now_;         // of one origin
-  std::vector<Place> next_;
+  std::vector<Place> next_;        // on another run
   size_t first_bin_;
   size_t taken_bins_;
   double turned_rad_ = 0;

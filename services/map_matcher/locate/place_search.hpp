@@ -30,11 +30,12 @@ class PlaceSearch {
   /// is certain where the train is.
   [[nodiscard]] std::vector<LocatedPlace> move(const std::optional<Turn>& turn, double odometer_m);
   void sight(const Sighting& sighting);
-  /// odometer_m, speed_mps: as for GnssSearch.
-  [[nodiscard]] std::optional<LocatedPlace> hear(const GnssPosition& position, double odometer_m, double speed_mps);
+  /// odometer_m, speed_mps: as for GnssSearch. since_m: from there to where the last move() has led.
+  [[nodiscard]] std::optional<LocatedPlace> hear(const GnssPosition& position, double odometer_m, double speed_mps,
+                                                 double since_m);
   /// Nobody knows the place.
   [[nodiscard]] bool searches() const { return stage_ == Stage::unknown; }
-  /// GNSS has told the place that is known.
+  /// GNSS has told the place that is known, or the rest of what makes it certain.
   [[nodiscard]] bool of_gnss() const { return of_gnss_; }
   /// So many tracks are where GNSS says the train is, as far as that is known.
   [[nodiscard]] std::optional<size_t> tracks() const { return gnss_ ? gnss_->tracks() : std::nullopt; }

@@ -83,6 +83,34 @@ class MapError {
   std::array<Wave, 24> waves_;
 };
 
+/// Where GNSS is not heard.
+class Tunnels {
+ public:
+  Tunnels(const track::Map& map, const track::Route& route) {
+    std::vector<std::pair<double, bool>> portals;  // out?
+    for (const auto& leg : route.legs()) {
+      for (const auto* landmark : map.landmarks_on(leg.run.edge->id)) {
+        const auto kind = track::seen_along(landmark->kind, leg.run.forward);
+        if (kind != track::LandmarkKind::portal_in && kind != track::LandmarkKind::portal_out) continue;
+        portals.emplace_back(leg.begin_m + leg.run.into_m(landmark->offset_m), kind == track::LandmarkKind::portal_out);
+      }
+    }
+    std::ranges::sort(portals);
+    double begin_m = -INFINITY;
+    for (const auto& [at_m, out] : portals) {
+      if (out) tunnels_m_.emplace_back(begin_m, at_m);
+      begin_m = out ? INFINITY : at_m;
+    }
+    if (begin_m < INFINITY && !portals.empty()) tunnels_m_.emplace_back(begin_m, INFINITY);
+  }
+  [[nodiscard]] bool hold(double at_m) const {
+    return std::ranges::any_of(tunnels_m_, [&](const auto& t) { return t.first < at_m && at_m < t.second; });
+  }
+
+ private:
+  std::vector<std::pair<double, double>> tunnels_m_;
+};
+
 /// How well the place can be known at all: the Cramer-Rao bound of place and scale with the locator's own noise.
 double bound_m(const testing::VehicleHeading& heading, double begin_m, double end_m, double step_noise_rad) {
   const map_matcher::LocatorParameters p;
@@ -156,9 +184,9 @@ class TripRun {
         wander_(options.map_error_m, random),
         mapped_([&](double m) { return courses.on.curvature_at(m); }, first_m_, first_m_ + kTripM + kBeyondM + 10,
                 errors_),
-        on_{&courses.on, heading_of(courses.on)},
-        back_{&courses.back, heading_of(courses.back)},
-        on_again_{&courses.on_again, heading_of(courses.on_again)},
+        on_{course_of(courses.on)},
+        back_{course_of(courses.back)},
+        on_again_{course_of(courses.on_again)},
         sensors_(errors_, random.next()),
         locator_({}, networks.known),
         gnss_({}, networks.known),
@@ -186,6 +214,7 @@ class TripRun {
   struct Course {
     const track::Route* route;
     testing::VehicleHeading heading;
+    Tunnels tunnels;
   };
   static testing::RideErrors random_errors(core::Random& random) {
     testing::RideErrors errors;
@@ -194,6 +223,9 @@ class TripRun {
     errors.turn_noise_rps = 0;
     errors.step_turn_noise_rad = 3e-4;
     return errors;
+  }
+  Course course_of(const track::Route& route) const {
+    return {&route, heading_of(route), {networks_.real->map(), route}};
   }
   testing::VehicleHeading heading_of(const track::Route& route) const {
     const double begin_m = std::max(route.begin_m(), first_m_);
@@ -254,20 +286,22 @@ void TripRun::step(const Course& course, double from_m, double to_m) {
 }
 
 void TripRun::receive(const Course& course, double run_m) {
-  if (trip_.by_gnss_after_m || run_m - gnss_run_m_ < kGnssEveryM) return;
+  const double here_m = place_at(run_m + kStepM);
+  if (run_m - gnss_run_m_ < kGnssEveryM || course.tunnels.hold(here_m)) return;
   const double keep = gnss_run_m_ < 0 ? 0 : std::exp(-kGnssEveryM / kGnssLastsM);
   gnss_run_m_ = run_m;
   const double fresh_m = kGnssSigmaM * std::sqrt(1 - keep * keep);
   gnss_east_m_ = keep * gnss_east_m_ + fresh_m * gnss_random_.normal();
   gnss_north_m_ = keep * gnss_north_m_ + fresh_m * gnss_random_.normal();
-  const auto truth = course.route->position_at(place_at(run_m + kStepM));
+  const auto truth = course.route->position_at(here_m);
   const auto pose = networks_.real->map().edge(truth.edge)->alignment.at(truth.offset_m).pose;
   gnss_.add({pose.easting_m + gnss_east_m_, pose.northing_m + gnss_north_m_}, odometer_m_, kGnssEveryM);
+  if (const auto reach = gnss_.reach()) locator_.hear(*reach, 0);
   const auto found = gnss_.place();
-  if (!found) return;
+  if (!found || trip_.by_gnss_after_m) return;
   trip_.by_gnss_after_m = run_m;
-  const auto on_route = course.route->distance_of(found->place, place_at(run_m + kStepM));
-  trip_.gnss_wrong = !on_route || std::abs(*on_route - place_at(run_m + kStepM)) > 4 * found->sigma_m;
+  const auto on_route = course.route->distance_of(found->place, here_m);
+  trip_.gnss_wrong = !on_route || std::abs(*on_route - here_m) > 4 * found->sigma_m;
   if (options_.each && trip_.gnss_wrong) {
     std::printf("  GNSS wrong at %.0f m: %u:%.0f for %u:%.0f, sigma %.0f m\n", run_m, found->place.edge,
                 found->place.offset_m, truth.edge, truth.offset_m, found->sigma_m);

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "core/units.hpp"
 #include "support/sensed_ride.hpp"
 
 namespace railfix::map_matcher {
@@ -212,6 +213,97 @@ TEST_F(NetworkLocatorTest, TwoPlacesThatLookTheSameAreBothNamedAndNeitherIsCerta
   EXPECT_FALSE(location.place_certain());
   EXPECT_NEAR(location.places[0].probability, 0.5, 0.01);
   EXPECT_NEAR(location.places[1].probability, 0.5, 0.01);
+}
+
+/// As GNSS sees a train on that line, with an error of 9 m; its antenna is 12 m ahead of the foot.
+GnssReach heard_at(const track::Map& map, uint32_t edge, double at_m) {
+  const auto pose = map.edge(edge)->alignment.at(at_m + 12).pose;
+  return {pose.easting_m - 9, pose.northing_m, pose.heading_rad + 0.05, 30, 60, 15, 12};
+}
+
+TEST_F(NetworkLocatorTest, GnssTellsPlacesApartThatBendAlike) {
+  lines_[20] = lines_[16];
+  const auto index = network_of(lines_);
+  for (const bool backs : {false, true}) {
+    const track::Route route({index->map().edge(21), true}, 0, 0);
+    Shuttle train(index, backs ? 4200 : 700);
+    const double to_m = backs ? 700 : 4200;
+    train.run(route, to_m);
+    EXPECT_FALSE(train.locator().locate().by_gnss);
+    train.locator().hear(heard_at(index->map(), 21, to_m), 0);
+    const auto location = train.locator().locate();
+    expect_right(location, route, to_m);
+    EXPECT_TRUE(location.by_gnss);
+    EXPECT_EQ(location.places.front().place.edge, 21U);
+  }
+}
+
+TEST_F(NetworkLocatorTest, WhatGnssSaidBeforeATunnelHoldsForTwoKilometres) {
+  lines_[20] = lines_[16];
+  const auto index = network_of(lines_);
+  const track::Route route({index->map().edge(21), true}, 0, 0);
+  Shuttle train(index, 700);
+  train.run(route, 2700);
+  train.locator().hear(heard_at(index->map(), 21, 2690), 10);
+  train.run(route, 4500);
+  const auto location = train.locator().locate();
+  EXPECT_TRUE(location.by_gnss);
+  expect_right(location, route, 4500);
+  train.run(route, 4800);
+  EXPECT_FALSE(train.locator().locate().certain());
+}
+
+TEST_F(NetworkLocatorTest, GnssThatHoldsNoneOfThePlacesTellsNothing) {
+  lines_[20] = lines_[16];
+  const auto index = network_of(lines_);
+  const track::Route route({index->map().edge(21), true}, 0, 0);
+  Shuttle train(index, 700);
+  train.run(route, 4200);
+  auto aside = heard_at(index->map(), 21, 4200);
+  aside.easting_m += 60;
+  train.locator().hear(aside, 0);
+  EXPECT_EQ(train.locator().locate().places.size(), 2U);
+  auto astern = heard_at(index->map(), 21, 4200);
+  astern.heading_rad += core::kPi;
+  train.locator().hear(astern, 0);
+  EXPECT_FALSE(train.locator().locate().certain());
+}
+
+TEST_F(NetworkLocatorTest, APlaceThatTheWayAloneTellsIsNotByGnss) {
+  const auto index = network_of(lines_);
+  const track::Route route({index->map().edge(17), true}, 0, 0);
+  Shuttle train(index, 700);
+  train.run(route, 4200);
+  train.locator().hear(heard_at(index->map(), 17, 4200), 0);
+  const auto location = train.locator().locate();
+  expect_right(location, route, 4200);
+  EXPECT_FALSE(location.by_gnss);
+}
+
+// Of so many ways that lead to a place one may have been left out that fits better.
+TEST_F(NetworkLocatorTest, MoreWaysAlikeThanAreFollowedAreSaid) {
+  for (const uint32_t tracks : {10U, 40U}) {
+    auto lines = lines_;
+    const auto stem = static_cast<uint32_t>(lines.size() + 1);
+    lines.push_back(lines_[16]);
+    lines.resize(lines.size() + tracks, {{1000, 0, 0}});
+    auto map = std::make_shared<track::Map>(network_of(lines)->map());
+    map->edges[16] = map->edges[0];
+    map->edges[16].id = 17;
+    const uint32_t node = map->edge(stem)->from_node;
+    map->nodes.push_back({node, track::NodeKind::railway_switch, "", 0, 0});
+    for (uint32_t id = stem + 1; id <= stem + tracks; ++id) {
+      map->edges[id - 1].to_node = node;
+      map->connections.push_back({node, id, stem, id != stem + 1});
+    }
+    const auto index = std::make_shared<const NetworkIndex>(map);
+    track::Route route({map->edge(stem + 3), true}, 0, 0);
+    route.push_ahead({map->edge(stem), true});
+    Shuttle train(index, 500);
+    train.run(route, 5000);
+    const auto location = train.locator().locate();
+    EXPECT_EQ(location.doubt, tracks > 24 ? Doubt::not_all_seen : Doubt::none) << tracks;
+  }
 }
 
 TEST_F(NetworkLocatorTest, ATrackThatIsNotOnTheMapIsNeverCertain) {
