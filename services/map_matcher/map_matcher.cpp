@@ -232,9 +232,9 @@ PlaceFixes MapMatcher::add(const GnssInput& position) {
   const double since_s = core::seconds(position.stamp_ns - train.stamp_ns);
   if (!std::isfinite(train.speed_mps) || std::abs(since_s) > FollowedPath::kOldStateS) return {};
   const double odometer_m = train.distance_m + train.speed_mps * since_s;
-  const double since_m = step_ ? train.speed_mps * core::seconds(step_->stamp_ns - position.stamp_ns) : 0;
+  const double moved_m = step_ ? train.speed_mps * core::seconds(step_->stamp_ns - position.stamp_ns) : 0;
   const auto place =
-      search_.hear({position.easting_m, position.northing_m, position.hdop}, odometer_m, train.speed_mps, since_m);
+      search_.hear({position.easting_m, position.northing_m, position.hdop}, odometer_m, train.speed_mps, moved_m);
   if (!place) return {};
   return {fix_of(FixKind::gnss, position.stamp_ns, {*place})};
 }

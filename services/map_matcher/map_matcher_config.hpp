@@ -138,7 +138,7 @@ struct MapMatcherConfig {
     f.number("correlated_bins", p.correlated_bins, {1, 100}, "", "So many neighbouring 20 m err together.");
     f.number("certain", p.certain, {0.5, 0.999999}, "", "From this probability on a place is certain ...");
     f.number("certain_misfit", p.certain_misfit, {0.5, 100}, "",
-             "... where the way fits to so many sigmas squared in the mean,");
+             "... where the way fits to so many sigmas squared in the mean (2 where much speaks for it),");
     f.number("certain_sigma_m", p.certain_sigma_m, {7, 1000}, "m", "... and its sigma along the track is less.");
   }
 };

@@ -30,9 +30,9 @@ double apart_m(const Place& place, const GnssPosition& position) {
 
 }  // namespace
 
-void GnssSearch::add(const GnssPosition& position, double odometer_m, double speed_mps) {
+bool GnssSearch::add(const GnssPosition& position, double odometer_m, double speed_mps) {
   const auto& p = parameters_;
-  if (!(position.hdop <= p.most_hdop)) return;
+  if (!(position.hdop <= p.most_hdop)) return false;
   const double reach_m = std::max(p.bound_m, p.interval_factor * p.sigma_m * position.hdop);
   Seen seen{position, odometer_m, 0, reach_m, p.lag_s * std::abs(speed_mps)};
   if (!seen_.empty()) {
@@ -42,6 +42,7 @@ void GnssSearch::add(const GnssPosition& position, double odometer_m, double spe
   }
   seen_.push_back(seen);
   while (seen_.size() > kLeastSeen && std::abs(odometer_m - seen_[1].odometer_m) >= kWayM) seen_.pop_front();
+  return true;
 }
 
 bool GnssSearch::agrees() const {

@@ -53,7 +53,8 @@ class GnssSearch {
       : parameters_(parameters), index_(std::move(index)) {}
 
   /// odometer_m: of the train then, forward growing; speed_mps: by which a late stamp errs.
-  void add(const GnssPosition& position, double odometer_m, double speed_mps);
+  /// False for one that is too vague: it is left out, and nothing is known of where the train is now.
+  bool add(const GnssPosition& position, double odometer_m, double speed_mps);
   /// Nothing before GNSS and odometer have agreed over some way, nor where no track or more than one is within reach.
   [[nodiscard]] std::optional<GnssPlace> place() const;
   /// Nothing before GNSS and odometer have agreed over some way.

@@ -25,9 +25,12 @@ struct LocatorParameters {
   double detection = 0.8;            // chance that a mapped landmark is sighted
   double false_per_m = 0.0005;
   double certain = 0.9999;        // probability from which on the place is certain ...
-  double certain_misfit = 1.3;    // ... when the bins fit to so many sigmas squared in the mean ...
+  double certain_misfit = 1.3;    // ... when the bins fit to so many sigmas squared in the mean (or to
+                                  // most_misfit(), and much speaks for it) ...
   double certain_sigma_m = 20.0;  // ... and the place along the track to this sigma
 
+  /// Worse than that the track is another one, or the map is wrong.
+  [[nodiscard]] double most_misfit() const { return std::max(2.0, certain_misfit); }
   /// Likelihood of a sighting so far from a mapped landmark.
   [[nodiscard]] double mark_density(double off_m) const {
     constexpr double kSigmaM = 4.0;

@@ -19,6 +19,7 @@ bool MeasuredRun::at_front() const {
 }
 
 void MeasuredRun::clear() {
+  ++beginnings_;
   bins_.clear();
   gone_bins_ = 0;
   open_ = {};

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/units.hpp"
+#include "map_matcher/locate/gnss_origins.hpp"
 #include "map_matcher/locate/way_comparison.hpp"
 
 namespace railfix::map_matcher {
@@ -14,7 +15,7 @@ constexpr double kSettledM = 100.0;  // behind a switch
 constexpr double kLeastSigmaM = 3.0;
 constexpr size_t kAnewBins = 50;
 constexpr double kWorstMisfit = 7.0;     // over 200 m
-constexpr double kHeardMisfit = 2.0;     // of a place that GNSS holds
+constexpr double kMovedM = 200.0;        // since GNSS was heard: the way does not go on
 constexpr double kMostOfRange = 1.1;     // of the odometer's scale
 constexpr double kLeastEvidence = 20.0;  // that the track is on the map at all, a log
 
@@ -34,12 +35,15 @@ std::string to_string(Doubt doubt) {
 }
 
 void NetworkLocator::move(double way_m, double turn_rad, double turn_sigma_rad) {
-  for (auto& [run, filter] : searches_) {
+  for (auto& [run, filter, heard] : searches_) {
+    const size_t beginnings = run.beginnings();
     run.move(way_m, turn_rad, turn_sigma_rad);
+    if (run.beginnings() != beginnings) heard.reset();
     // What was taken back stays in the filter: another one begins.
-    if (filter && filter->taken_bins() > run.end_bin()) filter.reset();
+    for (auto* one : {&filter, &heard}) {
+      if (*one && (*one)->taken_bins() > run.end_bin()) one->reset();
+    }
   }
-  heard_.move(way_m);
 }
 
 void NetworkLocator::sight(const Sighting& sighting) {
@@ -47,12 +51,23 @@ void NetworkLocator::sight(const Sighting& sighting) {
   for (auto& search : searches_) search.run.sight(sighting);
 }
 
+// The longer ago, the more of the way tells.
+void NetworkLocator::hear(const GnssReach& reach, double moved_m) {
+  if (!(std::abs(moved_m) < kMovedM)) return;
+  for (auto& [run, filter, heard] : searches_) {
+    if (!run.at_front() || (heard && !is_over(*heard, run))) continue;
+    heard.reset();
+    auto origins = origins_near(*index_, reach, moved_m, run.ahead());
+    if (!origins.empty()) heard.emplace(parameters_, *index_, run.end_bin(), std::move(origins));
+  }
+}
+
 void NetworkLocator::forget() {
-  for (auto& [run, filter] : searches_) {
+  for (auto& [run, filter, heard] : searches_) {
     run.clear();
     filter.reset();
+    heard.reset();
   }
-  heard_.forget();
 }
 
 size_t NetworkLocator::leading() const {
@@ -65,14 +80,18 @@ double NetworkLocator::way_m() const {
   return run.at_front() ? static_cast<double>(run.bins()) * kBinM : 0.0;
 }
 
-// A filter that began long ago may have been led astray by what is not on the map: another one begins.
+// A filter that began long ago may have been led astray by what is not on the map.
+bool NetworkLocator::is_over(const PlaceFilter& filter, const MeasuredRun& run) const {
+  const auto most_bins = static_cast<size_t>(parameters_.window_m / kBinM);
+  return filter.lost() || filter.overflowed() || filter.first_bin() + most_bins < run.gone_bins();
+}
+
 PlaceFilter& NetworkLocator::filtered(Search& search, const MeasuredWay& way) const {
   auto& filter = search.filter;
   const size_t gone_bins = search.run.gone_bins();
-  const auto most_bins = static_cast<size_t>(parameters_.window_m / kBinM);
   if (!filter) {
     filter.emplace(parameters_, *index_, gone_bins);
-  } else if (filter->lost() || filter->overflowed() || filter->first_bin() + most_bins < gone_bins) {
+  } else if (is_over(*filter, search.run)) {
     filter.emplace(parameters_, *index_, gone_bins + way.size() - std::min(way.size(), kAnewBins));
   }
   filter->advance(way, gone_bins);
@@ -85,14 +104,14 @@ Location NetworkLocator::locate() {
   if (!run.at_front()) return {};
   const MeasuredWay way = run.way();
   const PlaceFilter& filter = filtered(search, way);
+  if (search.heard) search.heard->advance(way, run.gone_bins());
   double turn = 0;
   for (const MeasuredBin& bin : way) turn += std::abs(bin.turn_rad);
   if (way_m() < parameters_.least_way_m || turn < parameters_.least_turn_rad) return {};
   Location location = look(filter, run, way);
-  if (!location.certain() && heard_.known()) {
-    Location heard = look_where_heard(filter, run, way);
-    heard.by_gnss = heard.certain();
-    if (!heard.places.empty()) location = std::move(heard);
+  if (!location.certain() && search.heard && !is_over(*search.heard, run)) {
+    location = look(*search.heard, run, way);
+    location.by_gnss = location.certain();
   }
   if (run.ahead()) return location;
   // Found in the direction of the run: its front looks the other way.
@@ -108,40 +127,18 @@ Location NetworkLocator::look(const PlaceFilter& filter, const MeasuredRun& run,
   const auto compared = WayComparison(model, *index_).compare(candidates);
   Location location = sum_up(compared.fits, run);
   location.candidates = candidates.size();
-  location.doubt =
-      doubt_of(location, !filter.overflowed() && compared.complete, filter.evidence(), parameters_.certain_misfit);
+  location.doubt = doubt_of(location, !filter.overflowed() && compared.complete, filter.evidence());
   return location;
 }
 
-// Few places are left that had the chance to fit. Where the best of them fits worse than the noise the map is drawn
-// roughly, and tells them apart by so much less.
-Location NetworkLocator::look_where_heard(const PlaceFilter& filter, const MeasuredRun& run,
-                                          const MeasuredWay& way) const {
-  const TurnModel model(parameters_, way);
-  auto candidates = filter.candidates(run.gone_bins());
-  std::erase_if(candidates, [&](const Candidate& c) { return !heard_.may_hold(c, way.size() - c.bin); });
-  if (candidates.empty()) return {};
-  const auto compared = WayComparison(model, *index_).compare(candidates);
-  std::vector<WayFit> fits;
-  for (const auto& fit : compared.fits) {
-    if (auto held = heard_.held(fit, run)) fits.push_back(std::move(*held));
-  }
-  double misfit = kHeardMisfit;
-  for (const WayFit& fit : fits) misfit = std::min(misfit, fit.misfit);
-  for (WayFit& fit : fits) fit.log_evidence /= std::max(1.0, misfit);
-  Location location = sum_up(fits, run);
-  location.candidates = candidates.size();
-  const double evidence = filter.evidence_of(candidates.front(), heard_.places(*index_));
-  location.doubt = doubt_of(location, !filter.overflowed() && compared.complete, evidence, kHeardMisfit);
-  return location;
-}
-
-Doubt NetworkLocator::doubt_of(const Location& location, bool complete, double evidence, double most_misfit) const {
+Doubt NetworkLocator::doubt_of(const Location& location, bool complete, double evidence) const {
   if (!complete || location.places.empty()) return Doubt::not_all_seen;
   const LocatedPlace& best = location.places.front();
   const bool scaled = std::abs(best.scale - 1) < kMostOfRange * parameters_.scale_range;
-  if (best.misfit >= most_misfit || best.worst_misfit >= kWorstMisfit || !scaled) return Doubt::misfit;
-  if (evidence < kLeastEvidence) return Doubt::by_chance;
+  if (best.misfit >= parameters_.most_misfit() || best.worst_misfit >= kWorstMisfit || !scaled) return Doubt::misfit;
+  // Where the map is drawn more roughly than the noise says, what is not on it fits as well as that more easily.
+  const double rough = best.misfit < parameters_.certain_misfit ? 1 : best.misfit;
+  if (evidence < kLeastEvidence * rough * rough) return Doubt::by_chance;
   if (location.place_probability < parameters_.certain) return Doubt::alike;
   if (best.sigma_m >= parameters_.certain_sigma_m) return Doubt::wide;
   if (best.probability < parameters_.certain) return Doubt::beside;
@@ -177,19 +174,21 @@ bool NetworkLocator::just_behind_switch(const LocatedPlace& place) const {
 
 Location NetworkLocator::sum_up(const std::vector<WayFit>& fits, const MeasuredRun& run) const {
   Location location;
-  double most = -INFINITY;
+  if (fits.empty()) return location;
+  const auto& best = *std::max_element(
+      fits.begin(), fits.end(), [](const WayFit& a, const WayFit& b) { return a.log_evidence < b.log_evidence; });
+  // As much as the best one is further off than the noise says, the others are, too.
+  const double per_log = 1 / std::max(1.0, best.misfit);
   double sum = 0;
-  for (const WayFit& fit : fits) most = std::max(most, fit.log_evidence);
   for (const WayFit& fit : fits) {
     location.places.push_back(place_of(fit, run));
-    location.places.back().probability = std::exp(fit.log_evidence - most);
+    location.places.back().probability = std::exp(per_log * (fit.log_evidence - best.log_evidence));
     sum += location.places.back().probability;
   }
   for (auto& place : location.places) place.probability /= sum;
   std::erase_if(location.places, [](const LocatedPlace& p) { return p.probability < 1e-9; });
   std::sort(location.places.begin(), location.places.end(),
             [](const LocatedPlace& a, const LocatedPlace& b) { return a.probability > b.probability; });
-  if (location.places.empty()) return location;
   location.place_probability = beside_probability(location.places);
   return location;
 }

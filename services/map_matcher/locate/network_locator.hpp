@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "map_matcher/locate/heard_place.hpp"
+#include "map_matcher/locate/gnss_search.hpp"
 #include "map_matcher/locate/locator_types.hpp"
 #include "map_matcher/locate/measured_run.hpp"
 #include "map_matcher/locate/network_index.hpp"
@@ -61,8 +61,9 @@ class NetworkLocator {
   /// Moved by way_m (measured, forward positive) and turned meanwhile (left positive).
   void move(double way_m, double turn_rad, double turn_sigma_rad);
   void sight(const Sighting& sighting);
-  /// Where the way alone is not certain, only what GNSS holds is compared. since_m: moved since then.
-  void hear(const GnssReach& reach, double since_m) { heard_.hear(reach, since_m); }
+  /// Where the way alone is not certain, the places are compared to which it leads from where GNSS was heard. moved_m:
+  /// since then.
+  void hear(const GnssReach& reach, double moved_m);
   void forget();
   /// That is searched for.
   [[nodiscard]] double way_m() const;
@@ -75,25 +76,24 @@ class NetworkLocator {
   /// The way ahead or astern, and the search on it.
   struct Search {
     MeasuredRun run;
-    std::optional<PlaceFilter> filter;
+    std::optional<PlaceFilter> filter;  // from everywhere
+    std::optional<PlaceFilter> heard;   // from where GNSS was heard
   };
   /// The one that the train is at the front of, with the longer way.
   [[nodiscard]] size_t leading() const;
   [[nodiscard]] Location look(const PlaceFilter& filter, const MeasuredRun& run, const MeasuredWay& way) const;
-  [[nodiscard]] Location look_where_heard(const PlaceFilter& filter, const MeasuredRun& run,
-                                          const MeasuredWay& way) const;
+  [[nodiscard]] bool is_over(const PlaceFilter& filter, const MeasuredRun& run) const;
   [[nodiscard]] PlaceFilter& filtered(Search& search, const MeasuredWay& way) const;
   [[nodiscard]] Location sum_up(const std::vector<WayFit>& fits, const MeasuredRun& run) const;
-  [[nodiscard]] Doubt doubt_of(const Location& location, bool complete, double evidence, double most_misfit) const;
+  [[nodiscard]] Doubt doubt_of(const Location& location, bool complete, double evidence) const;
   [[nodiscard]] double beside_probability(const std::vector<LocatedPlace>& places) const;
   [[nodiscard]] LocatedPlace place_of(const WayFit& fit, const MeasuredRun& run) const;
   [[nodiscard]] bool just_behind_switch(const LocatedPlace& place) const;
 
   LocatorParameters parameters_;
   std::shared_ptr<const NetworkIndex> index_;
-  std::array<Search, 2> searches_{Search{{parameters_, MeasuredRun::Direction::ahead}, {}},
-                                  Search{{parameters_, MeasuredRun::Direction::astern}, {}}};
-  HeardPlace heard_;
+  std::array<Search, 2> searches_{Search{{parameters_, MeasuredRun::Direction::ahead}, {}, {}},
+                                  Search{{parameters_, MeasuredRun::Direction::astern}, {}, {}}};
 };
 
 }  // namespace railfix::map_matcher

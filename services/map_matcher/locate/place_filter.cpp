@@ -8,7 +8,6 @@ namespace railfix::map_matcher {
 namespace {
 
 constexpr float kBlockM = PlaceFilter::kBlockBins * kBinM;
-constexpr float kOriginsM = 40.0F;  // from one to the next
 constexpr float kOriginSigmaM = 16.0F;
 constexpr float kMapSigmaM = 1.0F;    // the map's length of a block
 constexpr float kDetailM = 2.0F;      // where within so much a kink lies is not known
@@ -78,10 +77,6 @@ double PlaceFilter::evidence() const {
   return best_log_ - unmapped_log_ - std::log(static_cast<double>(std::max<size_t>(origins_, 1)));
 }
 
-double PlaceFilter::evidence_of(const Candidate& candidate, double places) const {
-  return candidate.log - unmapped_log_ - std::log(std::max(places, 1.0));
-}
-
 void PlaceFilter::advance(const MeasuredWay& way, size_t gone_bins) {
   const auto blocks = blocks_of(way, gone_bins);
   if (blocks.empty() || overflowed_) return;
@@ -104,26 +99,33 @@ void PlaceFilter::advance(const MeasuredWay& way, size_t gone_bins) {
 void PlaceFilter::begin(const std::vector<Block>& blocks) {
   begun_ = true;
   best_logs_.assign(blocks.size(), -INFINITY);
-  places_.reserve(most_origins());
-  for (uint32_t run = 0; run < index_->runs(); ++run) {
-    const size_t count = origins_on(run);
-    const float step_m = index_->length_m(run) / static_cast<float>(count);
-    for (size_t i = 0; i < count; ++i) follow(origin_at(run, step_m * (static_cast<float>(i) + 0.5F)), blocks);
-    origins_ += count;
-    if (places_.size() > kMostPlaces) overflowed_ = true;
-    if (overflowed_) break;
+  if (begin_at_.empty()) {
+    begin_everywhere(blocks);
+  } else {
+    for (const auto& [run, into_m] : begin_at_) follow(origin_at(run, into_m), blocks);
+    origins_ = begin_at_.size();
   }
-  drop_unlikely();
+  drop_unlikely();  // few have met by now
 }
 
-size_t PlaceFilter::most_origins() const {
-  size_t origins = 0;
-  for (uint32_t run = 0; run < index_->runs(); ++run) origins += origins_on(run);
-  return std::min(origins, kMostPlaces);
+void PlaceFilter::begin_everywhere(const std::vector<Block>& blocks) {
+  double origins_of_all = 0;
+  for (const auto& edge : index_->map().edges) origins_of_all += 2 * (1 + edge.alignment.length_m() / kOriginsM);
+  places_.reserve(std::min(static_cast<size_t>(origins_of_all), kMostPlaces));
+  for (uint32_t run = 0; run < index_->runs() && !overflowed_; ++run) {
+    const auto origins = origins_on(*index_, run);
+    for (const float into_m : origins) follow(origin_at(run, into_m), blocks);
+    origins_ += origins.size();
+    if (places_.size() > kMostPlaces) overflowed_ = true;
+  }
 }
 
-size_t PlaceFilter::origins_on(uint32_t run) const {
-  return std::max<size_t>(1, std::lround(index_->length_m(run) / kOriginsM));
+std::vector<float> PlaceFilter::origins_on(const NetworkIndex& index, uint32_t run) {
+  const float length_m = index.length_m(run);
+  const float count = std::max(1.0F, std::round(length_m / kOriginsM));
+  std::vector<float> origins(static_cast<size_t>(count));
+  for (size_t i = 0; i < origins.size(); ++i) origins[i] = length_m * (static_cast<float>(i) + 0.5F) / count;
+  return origins;
 }
 
 PlaceFilter::Place PlaceFilter::origin_at(uint32_t run, float into_m) const {

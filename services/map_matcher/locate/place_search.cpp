@@ -35,11 +35,11 @@ void PlaceSearch::sight(const Sighting& sighting) {
 }
 
 std::optional<LocatedPlace> PlaceSearch::hear(const GnssPosition& position, double odometer_m, double speed_mps,
-                                              double since_m) {
+                                              double moved_m) {
   if (!searches()) return std::nullopt;
   if (!gnss_) gnss_.emplace(parameters_.gnss, index());
-  gnss_->add(position, odometer_m, speed_mps);
-  if (const auto reach = gnss_->reach(); reach && locator_) locator_->hear(*reach, since_m);
+  if (!gnss_->add(position, odometer_m, speed_mps)) return std::nullopt;
+  if (const auto reach = gnss_->reach(); reach && locator_) locator_->hear(*reach, moved_m);
   const auto found = gnss_->place();
   if (!found) return std::nullopt;
   of_gnss_ = true;

@@ -30,9 +30,9 @@ class PlaceSearch {
   /// is certain where the train is.
   [[nodiscard]] std::vector<LocatedPlace> move(const std::optional<Turn>& turn, double odometer_m);
   void sight(const Sighting& sighting);
-  /// odometer_m, speed_mps: as for GnssSearch. since_m: from there to where the last move() has led.
+  /// odometer_m, speed_mps: as for GnssSearch. moved_m: from there to where the last move() has led.
   [[nodiscard]] std::optional<LocatedPlace> hear(const GnssPosition& position, double odometer_m, double speed_mps,
-                                                 double since_m);
+                                                 double moved_m);
   /// Nobody knows the place.
   [[nodiscard]] bool searches() const { return stage_ == Stage::unknown; }
   /// GNSS has told the place that is known, or the rest of what makes it certain.

@@ -9,7 +9,6 @@ namespace railfix::map_matcher {
 namespace {
 
 constexpr double kFarBelow = 20.0;  // a way whose log likelihood is so far below the best one is given up
-constexpr double kRivalBelow = 14.0;
 constexpr std::array<double, 3> kScales = {0, -2.0 / 3, 2.0 / 3};  // of the range
 constexpr double kRoughM = 20.0;
 constexpr double kLeastRoughScale = 0.001;
@@ -126,23 +125,24 @@ ComparedWays WayComparison::compare(const std::vector<Candidate>& candidates) {
   for (const WayFit& fit : first) {
     if (std::any_of(tried.begin(), tried.end(), [&](const WayFit& t) { return same_way(t, fit); })) continue;
     if (tried.size() == kMostTried) {
-      if (fit.best_log > first.front().best_log - kRivalBelow) compared.complete = false;
+      compared.complete = false;
       break;
     }
     tried.push_back(fit);
     if (!fit_exactly(fit, compared.fits, best)) compared.complete = false;
   }
-  add_beside(compared.fits);
+  if (!add_beside(compared.fits)) compared.complete = false;
   return compared;
 }
 
 // The tracks beside the best place are compared too: no stretch needs to have found them.
-void WayComparison::add_beside(std::vector<WayFit>& fits) {
-  if (fits.empty()) return;
+bool WayComparison::add_beside(std::vector<WayFit>& fits) {
+  if (fits.empty()) return true;
   const WayFit best = *std::max_element(
       fits.begin(), fits.end(), [](const WayFit& a, const WayFit& b) { return a.log_evidence < b.log_evidence; });
-  if (best.misfit > model_.parameters().certain_misfit) return;
+  if (best.misfit > model_.parameters().most_misfit()) return true;
   const auto end = place_on(best.runs, best.end_m);
+  bool all = true;
   for (const auto& beside : index_.beside(end.run, end.into_m, kBesideM)) {
     Candidate candidate{beside.run, std::max(0.0, beside.into_m - 0.5 * model_.parameters().lag_m)};
     candidate.bin = model_.way().size();
@@ -150,7 +150,9 @@ void WayComparison::add_beside(std::vector<WayFit>& fits) {
     for (const WalkedWay& way : walker_.follow(candidate, kExactly, -INFINITY)) {
       if (const auto fit = fitter_.fit(way, kFull, best.best_log - kFarBelow)) add(*fit, fits);
     }
+    all = all && !walker_.cut();
   }
+  return all;
 }
 
 }  // namespace railfix::map_matcher

@@ -29,7 +29,7 @@ class WayComparison {
   [[nodiscard]] std::vector<WalkedWay> roughly(const Candidate& candidate, double least_log);
   /// False where more ways lead there than were fitted.
   [[nodiscard]] bool fit_exactly(const WayFit& first, std::vector<WayFit>& fits, double& best);
-  void add_beside(std::vector<WayFit>& fits);
+  [[nodiscard]] bool add_beside(std::vector<WayFit>& fits);
 
   const TurnModel& model_;
   const NetworkIndex& index_;

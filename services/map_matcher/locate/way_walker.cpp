@@ -10,7 +10,7 @@ namespace {
 constexpr int kMostRunsAStep = 12;
 constexpr double kSamePlaceM = 15.0;
 constexpr double kMostBeyondM = 100.0;
-constexpr double kNearlyAsGood = 10.0;  // a log likelihood
+constexpr double kNearlyAsGood = 20.0;  // a log likelihood
 
 }  // namespace
 
@@ -161,7 +161,10 @@ std::vector<WalkedWay> WayWalker::follow(const Candidate& candidate, const Trial
     }
   }
   std::sort(ways.begin(), ways.end(), [](const WalkedWay& a, const WalkedWay& b) { return a.log > b.log; });
-  if (ways.size() > trial.most_ways) ways.resize(trial.most_ways);
+  if (ways.size() > trial.most_ways) {
+    cut_ = cut_ || ways[trial.most_ways].log > ways.front().log - kNearlyAsGood;
+    ways.resize(trial.most_ways);
+  }
   return ways;
 }
 

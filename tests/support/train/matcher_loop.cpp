@@ -125,9 +125,8 @@ void MatcherLoop::hear(const fusion::GnssInput& gnss, double arrival_s) {
   if (!search_.searches() || gnss.fix == 0 || !std::isfinite(state_->speed_mps)) return;
   const double since_s = core::seconds(gnss.stamp_ns - state_->stamp_ns);
   const double odometer_m = state_->distance_m + state_->speed_mps * since_s;
-  const double since_step_m = state_->speed_mps * core::seconds(moved_ns_ - gnss.stamp_ns);
-  const auto place =
-      search_.hear({gnss.easting_m, gnss.northing_m, gnss.hdop}, odometer_m, state_->speed_mps, since_step_m);
+  const double moved_m = state_->speed_mps * core::seconds(moved_ns_ - gnss.stamp_ns);
+  const auto place = search_.hear({gnss.easting_m, gnss.northing_m, gnss.hdop}, odometer_m, state_->speed_mps, moved_m);
   if (place) found(*place, fusion::FixKind::gnss, gnss.stamp_ns, arrival_s);
 }
 

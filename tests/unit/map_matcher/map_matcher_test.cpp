@@ -139,6 +139,7 @@ TEST_F(MapMatcherRide, ASearchedPlaceIsSaidByGnssOnTheOneTrackThereIs) {
   EXPECT_EQ(found->options.front().place.edge, 1U);
   EXPECT_NEAR(found->options.front().place.offset_m,
               core::seconds(found->stamp_ns - core::kNsPerSecond) * kSpeedMps + 298, 1);
+  EXPECT_TRUE(matcher_.add(GnssInput{2, at_m_, 5, stamp_ns_}).empty()) << "of where it was while GNSS was good";
   known_ = true;
   run_to(460);
   EXPECT_FALSE(matcher_.wants_gnss());

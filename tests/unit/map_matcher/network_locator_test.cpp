@@ -221,16 +221,17 @@ GnssReach heard_at(const track::Map& map, uint32_t edge, double at_m) {
   return {pose.easting_m - 9, pose.northing_m, pose.heading_rad + 0.05, 30, 60, 15, 12};
 }
 
-TEST_F(NetworkLocatorTest, GnssTellsPlacesApartThatBendAlike) {
+TEST_F(NetworkLocatorTest, OfPlacesThatBendAlikeItIsTheOneToWhichTheWayLeadsFromWhereGnssWasHeard) {
   lines_[20] = lines_[16];
   const auto index = network_of(lines_);
+  const track::Route route({index->map().edge(21), true}, 0, 0);
   for (const bool backs : {false, true}) {
-    const track::Route route({index->map().edge(21), true}, 0, 0);
-    Shuttle train(index, backs ? 4200 : 700);
-    const double to_m = backs ? 700 : 4200;
+    const double heard_m = backs ? 4400 : 900;
+    const double to_m = backs ? 700 : 4600;
+    Shuttle train(index, backs ? 4600 : 700);
+    train.run(route, heard_m);
+    train.locator().hear(heard_at(index->map(), 21, heard_m), 0);
     train.run(route, to_m);
-    EXPECT_FALSE(train.locator().locate().by_gnss);
-    train.locator().hear(heard_at(index->map(), 21, to_m), 0);
     const auto location = train.locator().locate();
     expect_right(location, route, to_m);
     EXPECT_TRUE(location.by_gnss);
@@ -238,43 +239,50 @@ TEST_F(NetworkLocatorTest, GnssTellsPlacesApartThatBendAlike) {
   }
 }
 
-TEST_F(NetworkLocatorTest, WhatGnssSaidBeforeATunnelHoldsForTwoKilometres) {
+TEST_F(NetworkLocatorTest, WhatWasHeardBeforeAGapOrBeforeTheTrainSetBackIsForgotten) {
   lines_[20] = lines_[16];
   const auto index = network_of(lines_);
   const track::Route route({index->map().edge(21), true}, 0, 0);
-  Shuttle train(index, 700);
-  train.run(route, 2700);
-  train.locator().hear(heard_at(index->map(), 21, 2690), 10);
-  train.run(route, 4500);
-  const auto location = train.locator().locate();
-  EXPECT_TRUE(location.by_gnss);
-  expect_right(location, route, 4500);
-  train.run(route, 4800);
-  EXPECT_FALSE(train.locator().locate().certain());
+  const auto expect_forgotten = [&](double from_m, double heard_m, double on_m, double step_m, double to_m) {
+    Shuttle train(index, from_m);
+    train.run(route, heard_m);
+    train.locator().hear(heard_at(index->map(), 21, heard_m), 0);
+    train.run(route, on_m, step_m);
+    train.run(route, to_m);
+    const auto location = train.locator().locate();
+    EXPECT_EQ(location.places.size(), 2U);
+    EXPECT_FALSE(location.certain()) << from_m << ' ' << heard_m << ' ' << on_m;
+  };
+  expect_forgotten(700, 900, 960, 60, 4600);
+  expect_forgotten(900, 900, 960, 60, 4600);
+  expect_forgotten(4600, 4600, 5000, 0.5, 700);
+  expect_forgotten(1500, 1600, 900, 0.5, 4900);
 }
 
-TEST_F(NetworkLocatorTest, GnssThatHoldsNoneOfThePlacesTellsNothing) {
+TEST_F(NetworkLocatorTest, GnssWhereNoTrackRunsAsTheTrainTellsNothing) {
   lines_[20] = lines_[16];
   const auto index = network_of(lines_);
   const track::Route route({index->map().edge(21), true}, 0, 0);
-  Shuttle train(index, 700);
-  train.run(route, 4200);
-  auto aside = heard_at(index->map(), 21, 4200);
-  aside.easting_m += 60;
-  train.locator().hear(aside, 0);
-  EXPECT_EQ(train.locator().locate().places.size(), 2U);
-  auto astern = heard_at(index->map(), 21, 4200);
-  astern.heading_rad += core::kPi;
-  train.locator().hear(astern, 0);
-  EXPECT_FALSE(train.locator().locate().certain());
+  for (const double aside_m : {0.0, 400.0}) {
+    Shuttle train(index, 700);
+    train.run(route, 900);
+    auto heard = heard_at(index->map(), 21, 900);
+    heard.easting_m += aside_m;
+    if (aside_m == 0) heard.heading_rad += core::kPi / 2;
+    train.locator().hear(heard, 0);
+    train.run(route, 4600);
+    const auto location = train.locator().locate();
+    EXPECT_EQ(location.places.size(), 2U);
+    EXPECT_FALSE(location.certain());
+  }
 }
 
 TEST_F(NetworkLocatorTest, APlaceThatTheWayAloneTellsIsNotByGnss) {
   const auto index = network_of(lines_);
   const track::Route route({index->map().edge(17), true}, 0, 0);
   Shuttle train(index, 700);
+  train.locator().hear(heard_at(index->map(), 17, 700), 0);
   train.run(route, 4200);
-  train.locator().hear(heard_at(index->map(), 17, 4200), 0);
   const auto location = train.locator().locate();
   expect_right(location, route, 4200);
   EXPECT_FALSE(location.by_gnss);
@@ -304,6 +312,39 @@ TEST_F(NetworkLocatorTest, MoreWaysAlikeThanAreFollowedAreSaid) {
     const auto location = train.locator().locate();
     EXPECT_EQ(location.doubt, tracks > 24 ? Doubt::not_all_seen : Doubt::none) << tracks;
   }
+}
+
+/// With a track that wanders about the mapped one, its heading by so much.
+Location ride_wandering(const std::shared_ptr<const NetworkIndex>& index, uint32_t edge, double wander_rad,
+                        double to_m) {
+  const track::Route route({index->map().edge(edge), true}, 0, 0);
+  const auto errors = errors_of(0.01);
+  constexpr double kPerM = 2 * core::kPi / 90;
+  const testing::VehicleHeading heading(
+      [&](double m) { return route.curvature_at(m) + wander_rad * kPerM * std::cos(kPerM * m); }, 699, to_m + 1,
+      errors);
+  testing::RideSensors sensors(errors, 5);
+  NetworkLocator locator({}, index);
+  for (double m = 700; m < to_m; m += 1) {
+    const auto s = sensors.step(heading, 0, m, m + 1, 0.05);
+    locator.move(s.way_m, s.turn_rad, s.turn_sigma_rad);
+  }
+  return locator.locate();
+}
+
+TEST_F(NetworkLocatorTest, OnAMapThatIsDrawnRoughlyMoreMustSpeakForAPlace) {
+  const auto index = network_of(lines_);
+  const auto early = ride_wandering(index, 17, 0.0102, 2000);
+  const auto late = ride_wandering(index, 17, 0.0102, 5500);
+  for (const auto& location : {early, late}) {
+    ASSERT_FALSE(location.places.empty());
+    EXPECT_EQ(location.places.front().place.edge, 17U);
+    EXPECT_GT(location.places.front().misfit, 1.3);
+    EXPECT_LT(location.places.front().misfit, 2);
+  }
+  EXPECT_EQ(early.doubt, Doubt::by_chance);
+  EXPECT_TRUE(late.certain()) << to_string(late.doubt);
+  EXPECT_EQ(ride_wandering(index, 17, 0.0145, 5500).doubt, Doubt::misfit);
 }
 
 TEST_F(NetworkLocatorTest, ATrackThatIsNotOnTheMapIsNeverCertain) {
