@@ -221,8 +221,7 @@ void MapMatcher::search(const StepInput& step, PlaceFixes& fixes) {
   if (!turn && step_ && core::seconds(step.stamp_ns - step_->stamp_ns) < FollowedPath::kOldStateS)
     turn = turn_of_gyro(step_->stamp_ns, step.stamp_ns);
   const auto places = search_.move(turn, chain_.odometer_m());
-  if (places.empty()) return;
-  fixes.push_back(fix_of(search_.of_gnss() ? FixKind::gnss : FixKind::network, step.stamp_ns, places));
+  if (!places.empty()) fixes.push_back(fix_of(FixKind::network, step.stamp_ns, places));
 }
 
 // The odometer is fusion's, which runs on by whatever sensor there is.
@@ -232,9 +231,8 @@ PlaceFixes MapMatcher::add(const GnssInput& position) {
   const double since_s = core::seconds(position.stamp_ns - train.stamp_ns);
   if (!std::isfinite(train.speed_mps) || std::abs(since_s) > FollowedPath::kOldStateS) return {};
   const double odometer_m = train.distance_m + train.speed_mps * since_s;
-  const double moved_m = step_ ? train.speed_mps * core::seconds(step_->stamp_ns - position.stamp_ns) : 0;
   const auto place =
-      search_.hear({position.easting_m, position.northing_m, position.hdop}, odometer_m, train.speed_mps, moved_m);
+      search_.hear({position.easting_m, position.northing_m, position.hdop}, odometer_m, train.speed_mps);
   if (!place) return {};
   return {fix_of(FixKind::gnss, position.stamp_ns, {*place})};
 }

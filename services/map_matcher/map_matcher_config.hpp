@@ -39,8 +39,7 @@ struct MapMatcherConfig {
                   "Constant error of the camera's turning for the choice of the track, one sigma.");
     fields.flag("locate", p.locate, "Look for the place on the whole map while nobody knows it.");
     fields.number("locate_every_m", p.search.every_m, {20, 10000}, "m", "... once in this way.");
-    fields.flag("use_gnss", use_gnss,
-                "... with GNSS, too: of the tracks within 30 m of it the only one, or the one that fits.");
+    fields.flag("use_gnss", use_gnss, "... where GNSS says it, too: the one track within 30 m of it.");
     fields.number("gnss_antenna_ahead_m", p.search.gnss.antenna_ahead_m, {-500, 500}, "m",
                   "GNSS antenna ahead of the camera's foot: the same as fusion.gnss_antenna_ahead_m.");
     fields.number("view_ahead_m", p.view_ahead_m, {0, 50}, "m",

@@ -15,10 +15,11 @@ constexpr size_t kLeastSeen = 10;
 constexpr double kWayM = 100.0;  // over which GNSS and odometer must agree, ...
 constexpr double kOffM = 10.0;   // ... to this and
 constexpr double kOffShare = 0.05;
-constexpr double kRocksM = 2.0;    // a train that stands or begins to move
-constexpr double kStandsM = 1.0;   // since the last position: it takes that one's place
-constexpr double kAlongRad = 0.5;  // of the track that is the train's: the way may be a bend
-constexpr double kAbeamM = 0.1;    // what is further ahead or behind lies beyond the edge's end
+constexpr double kRocksM = 2.0;      // a train that stands or begins to move
+constexpr double kStandsM = 1.0;     // since the last position: it takes that one's place
+constexpr double kAlongRad = 0.5;    // of the track that is the train's: the way may be a bend
+constexpr double kCrossesRad = 1.2;  // ... and one that turns more off is no track that the train may be on
+constexpr double kAbeamM = 0.1;      // what is further ahead or behind lies beyond the edge's end
 constexpr int kNewtonSteps = 6;
 constexpr double kLookM = 10.0;  // from one place to the next on an edge that may come by again
 
@@ -84,7 +85,7 @@ void GnssSearch::add_track(const track::NearTrack& near, const Seen& seen, doubl
     const track::Run run{edge, forward};
     const double into_m = run.into_m(foot_m);
     const double turned_rad = std::abs(core::wrap_pi(run.pose_at(into_m).heading_rad - heading_rad));
-    if (turned_rad < GnssReach::kCrossesRad) tracks.push_back({run.at(into_m), abeam && turned_rad < kAlongRad});
+    if (turned_rad < kCrossesRad) tracks.push_back({run.at(into_m), abeam && turned_rad < kAlongRad});
   }
 }
 
@@ -140,20 +141,6 @@ std::optional<GnssPlace> GnssSearch::place() const {
   const auto foot = foot_behind(antenna);
   return foot ? std::optional(GnssPlace{*foot, (now.reach_m + now.late_m) / parameters_.interval_factor})
               : std::nullopt;
-}
-
-std::optional<GnssReach> GnssSearch::reach() const {
-  const auto heading = heading_rad();
-  if (!heading) return std::nullopt;
-  const auto& [position, odometer_m, run_m, reach_m, late_m] = seen_.back();
-  const double along_m = reach_m + late_m;
-  return GnssReach{position.easting_m,
-                   position.northing_m,
-                   *heading,
-                   reach_m,
-                   along_m,
-                   along_m / parameters_.interval_factor,
-                   parameters_.antenna_ahead_m};
 }
 
 std::optional<size_t> GnssSearch::tracks() const {

@@ -34,19 +34,6 @@ struct GnssPlace {
   double sigma_m = 0;
 };
 
-/// Where the antenna was at the last position: at most so far from there across the track and along it, with the
-/// train's front looking that way. What a late stamp errs by is in along_m.
-struct GnssReach {
-  static constexpr double kCrossesRad = 1.2;  // a track that turns more off is none that the train may be on
-  double easting_m = 0;
-  double northing_m = 0;
-  double heading_rad = 0;  // clockwise from north
-  double across_m = 0;
-  double along_m = 0;
-  double sigma_m = 0;          // along
-  double antenna_ahead_m = 0;  // of the camera's foot
-};
-
 class GnssSearch {
  public:
   GnssSearch(const GnssSearchParameters& parameters, std::shared_ptr<const NetworkIndex> index)
@@ -57,8 +44,6 @@ class GnssSearch {
   bool add(const GnssPosition& position, double odometer_m, double speed_mps);
   /// Nothing before GNSS and odometer have agreed over some way, nor where no track or more than one is within reach.
   [[nodiscard]] std::optional<GnssPlace> place() const;
-  /// Nothing before GNSS and odometer have agreed over some way.
-  [[nodiscard]] std::optional<GnssReach> reach() const;
   /// So many tracks are within reach, as far as that is known.
   [[nodiscard]] std::optional<size_t> tracks() const;
 

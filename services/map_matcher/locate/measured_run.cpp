@@ -19,7 +19,6 @@ bool MeasuredRun::at_front() const {
 }
 
 void MeasuredRun::clear() {
-  ++beginnings_;
   bins_.clear();
   gone_bins_ = 0;
   open_ = {};

@@ -28,8 +28,6 @@ class MeasuredRun {
   [[nodiscard]] size_t bins() const { return bins_.size(); }
   [[nodiscard]] size_t gone_bins() const { return gone_bins_; }
   [[nodiscard]] size_t end_bin() const { return gone_bins_ + bins_.size(); }
-  /// How often it has begun anew: what was known of its beginning is of another one then.
-  [[nodiscard]] size_t beginnings() const { return beginnings_; }
   [[nodiscard]] bool ahead() const { return sign_ > 0; }
   /// The train is where it has come to, but for some rocking. Behind that a switch may have led it elsewhere.
   [[nodiscard]] bool at_front() const;
@@ -47,7 +45,6 @@ class MeasuredRun {
   double sign_;
   std::deque<MeasuredBin> bins_;  // oldest first
   size_t gone_bins_ = 0;          // in front of them
-  size_t beginnings_ = 0;
   MeasuredBin open_;
   double open_m_ = 0;
   double back_m_ = 0;  // behind the farthest point

@@ -36,7 +36,6 @@ class NetworkIndex {
   /// Landmarks on a run, in its direction.
   [[nodiscard]] const std::vector<Mark>& marks_on(const track::Run& run) const { return marks_[number(run)]; }
   /// The same by the numbers of the runs, which are quicker.
-  [[nodiscard]] static uint32_t number(const track::Run& run) { return 2 * (run.edge->id - 1) + (run.forward ? 0 : 1); }
   [[nodiscard]] uint32_t runs() const { return static_cast<uint32_t>(marks_.size()); }
   [[nodiscard]] track::Run run(uint32_t number) const { return {&map_->edges[number / 2], number % 2 == 0}; }
   [[nodiscard]] const std::vector<uint32_t>& after(uint32_t run) const { return after_[run]; }
@@ -45,6 +44,7 @@ class NetworkIndex {
   [[nodiscard]] float turned(uint32_t run, float into_m) const { return turned_on(run, into_m); }
 
  private:
+  static uint32_t number(const track::Run& run) { return 2 * (run.edge->id - 1) + (run.forward ? 0 : 1); }
   template <typename Number>
   [[nodiscard]] Number turned_on(uint32_t run, Number into_m) const {
     const Number length_m = lengths_m_[run / 2];

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "core/units.hpp"
-#include "map_matcher/locate/gnss_origins.hpp"
 #include "map_matcher/locate/way_comparison.hpp"
 
 namespace railfix::map_matcher {
@@ -15,7 +14,6 @@ constexpr double kSettledM = 100.0;  // behind a switch
 constexpr double kLeastSigmaM = 3.0;
 constexpr size_t kAnewBins = 50;
 constexpr double kWorstMisfit = 7.0;     // over 200 m
-constexpr double kMovedM = 200.0;        // since GNSS was heard: the way does not go on
 constexpr double kMostOfRange = 1.1;     // of the odometer's scale
 constexpr double kLeastEvidence = 20.0;  // that the track is on the map at all, a log
 
@@ -35,14 +33,10 @@ std::string to_string(Doubt doubt) {
 }
 
 void NetworkLocator::move(double way_m, double turn_rad, double turn_sigma_rad) {
-  for (auto& [run, filter, heard] : searches_) {
-    const size_t beginnings = run.beginnings();
+  for (auto& [run, filter] : searches_) {
     run.move(way_m, turn_rad, turn_sigma_rad);
-    if (run.beginnings() != beginnings) heard.reset();
     // What was taken back stays in the filter: another one begins.
-    for (auto* one : {&filter, &heard}) {
-      if (*one && (*one)->taken_bins() > run.end_bin()) one->reset();
-    }
+    if (filter && filter->taken_bins() > run.end_bin()) filter.reset();
   }
 }
 
@@ -51,22 +45,10 @@ void NetworkLocator::sight(const Sighting& sighting) {
   for (auto& search : searches_) search.run.sight(sighting);
 }
 
-// The longer ago, the more of the way tells.
-void NetworkLocator::hear(const GnssReach& reach, double moved_m) {
-  if (!(std::abs(moved_m) < kMovedM)) return;
-  for (auto& [run, filter, heard] : searches_) {
-    if (!run.at_front() || (heard && !is_over(*heard, run))) continue;
-    heard.reset();
-    auto origins = origins_near(*index_, reach, moved_m, run.ahead());
-    if (!origins.empty()) heard.emplace(parameters_, *index_, run.end_bin(), std::move(origins));
-  }
-}
-
 void NetworkLocator::forget() {
-  for (auto& [run, filter, heard] : searches_) {
+  for (auto& [run, filter] : searches_) {
     run.clear();
     filter.reset();
-    heard.reset();
   }
 }
 
@@ -80,18 +62,16 @@ double NetworkLocator::way_m() const {
   return run.at_front() ? static_cast<double>(run.bins()) * kBinM : 0.0;
 }
 
-// A filter that began long ago may have been led astray by what is not on the map.
-bool NetworkLocator::is_over(const PlaceFilter& filter, const MeasuredRun& run) const {
-  const auto most_bins = static_cast<size_t>(parameters_.window_m / kBinM);
-  return filter.lost() || filter.overflowed() || filter.first_bin() + most_bins < run.gone_bins();
-}
-
+// A filter that began long ago may have been led astray by what is not on the map, and one that was not asked for long
+// lacks what the way has forgotten: another one begins.
 PlaceFilter& NetworkLocator::filtered(Search& search, const MeasuredWay& way) const {
   auto& filter = search.filter;
   const size_t gone_bins = search.run.gone_bins();
+  const auto most_bins = static_cast<size_t>(parameters_.window_m / kBinM);
   if (!filter) {
     filter.emplace(parameters_, *index_, gone_bins);
-  } else if (is_over(*filter, search.run)) {
+  } else if (filter->lost() || filter->overflowed() || filter->first_bin() + most_bins < gone_bins ||
+             filter->taken_bins() < gone_bins) {
     filter.emplace(parameters_, *index_, gone_bins + way.size() - std::min(way.size(), kAnewBins));
   }
   filter->advance(way, gone_bins);
@@ -104,30 +84,20 @@ Location NetworkLocator::locate() {
   if (!run.at_front()) return {};
   const MeasuredWay way = run.way();
   const PlaceFilter& filter = filtered(search, way);
-  if (search.heard) search.heard->advance(way, run.gone_bins());
   double turn = 0;
   for (const MeasuredBin& bin : way) turn += std::abs(bin.turn_rad);
   if (way_m() < parameters_.least_way_m || turn < parameters_.least_turn_rad) return {};
-  Location location = look(filter, run, way);
-  if (!location.certain() && search.heard && !is_over(*search.heard, run)) {
-    location = look(*search.heard, run, way);
-    location.by_gnss = location.certain();
-  }
-  if (run.ahead()) return location;
-  // Found in the direction of the run: its front looks the other way.
-  for (auto& found : location.places) {
-    found.place.direction = track::run_of(index_->map(), found.place).reversed().direction();
-  }
-  return location;
-}
-
-Location NetworkLocator::look(const PlaceFilter& filter, const MeasuredRun& run, const MeasuredWay& way) const {
   const TurnModel model(parameters_, way);
   const auto candidates = filter.candidates(run.gone_bins());
   const auto compared = WayComparison(model, *index_).compare(candidates);
   Location location = sum_up(compared.fits, run);
   location.candidates = candidates.size();
   location.doubt = doubt_of(location, !filter.overflowed() && compared.complete, filter.evidence());
+  if (run.ahead()) return location;
+  // Found in the direction of the run: its front looks the other way.
+  for (auto& found : location.places) {
+    found.place.direction = track::run_of(index_->map(), found.place).reversed().direction();
+  }
   return location;
 }
 
@@ -137,7 +107,7 @@ Doubt NetworkLocator::doubt_of(const Location& location, bool complete, double e
   const bool scaled = std::abs(best.scale - 1) < kMostOfRange * parameters_.scale_range;
   if (best.misfit >= parameters_.most_misfit() || best.worst_misfit >= kWorstMisfit || !scaled) return Doubt::misfit;
   // Where the map is drawn more roughly than the noise says, what is not on it fits as well as that more easily.
-  const double rough = best.misfit < parameters_.certain_misfit ? 1 : best.misfit;
+  const double rough = best.misfit < parameters_.certain_misfit ? 1 : std::max(1.0, best.misfit);
   if (evidence < kLeastEvidence * rough * rough) return Doubt::by_chance;
   if (location.place_probability < parameters_.certain) return Doubt::alike;
   if (best.sigma_m >= parameters_.certain_sigma_m) return Doubt::wide;

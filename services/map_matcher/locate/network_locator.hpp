@@ -9,7 +9,6 @@
 #include <string>
 #include <vector>
 
-#include "map_matcher/locate/gnss_search.hpp"
 #include "map_matcher/locate/locator_types.hpp"
 #include "map_matcher/locate/measured_run.hpp"
 #include "map_matcher/locate/network_index.hpp"
@@ -47,7 +46,6 @@ struct Location {
   double place_probability = 0;      // of the best place, on whichever of the tracks beside each other
   Doubt doubt = Doubt::too_plain;
   size_t candidates = 0;  // places that may be the one
-  bool by_gnss = false;   // without GNSS it would not be certain
   [[nodiscard]] bool certain() const { return doubt == Doubt::none; }
   /// Certain but for the track: those beside each other are still open.
   [[nodiscard]] bool place_certain() const { return doubt == Doubt::none || doubt >= Doubt::beside; }
@@ -61,9 +59,6 @@ class NetworkLocator {
   /// Moved by way_m (measured, forward positive) and turned meanwhile (left positive).
   void move(double way_m, double turn_rad, double turn_sigma_rad);
   void sight(const Sighting& sighting);
-  /// Where the way alone is not certain, the places are compared to which it leads from where GNSS was heard. moved_m:
-  /// since then.
-  void hear(const GnssReach& reach, double moved_m);
   void forget();
   /// That is searched for.
   [[nodiscard]] double way_m() const;
@@ -76,13 +71,10 @@ class NetworkLocator {
   /// The way ahead or astern, and the search on it.
   struct Search {
     MeasuredRun run;
-    std::optional<PlaceFilter> filter;  // from everywhere
-    std::optional<PlaceFilter> heard;   // from where GNSS was heard
+    std::optional<PlaceFilter> filter;
   };
   /// The one that the train is at the front of, with the longer way.
   [[nodiscard]] size_t leading() const;
-  [[nodiscard]] Location look(const PlaceFilter& filter, const MeasuredRun& run, const MeasuredWay& way) const;
-  [[nodiscard]] bool is_over(const PlaceFilter& filter, const MeasuredRun& run) const;
   [[nodiscard]] PlaceFilter& filtered(Search& search, const MeasuredWay& way) const;
   [[nodiscard]] Location sum_up(const std::vector<WayFit>& fits, const MeasuredRun& run) const;
   [[nodiscard]] Doubt doubt_of(const Location& location, bool complete, double evidence) const;
@@ -92,8 +84,8 @@ class NetworkLocator {
 
   LocatorParameters parameters_;
   std::shared_ptr<const NetworkIndex> index_;
-  std::array<Search, 2> searches_{Search{{parameters_, MeasuredRun::Direction::ahead}, {}, {}},
-                                  Search{{parameters_, MeasuredRun::Direction::astern}, {}, {}}};
+  std::array<Search, 2> searches_{Search{{parameters_, MeasuredRun::Direction::ahead}, {}},
+                                  Search{{parameters_, MeasuredRun::Direction::astern}, {}}};
 };
 
 }  // namespace railfix::map_matcher

@@ -8,6 +8,7 @@ namespace railfix::map_matcher {
 namespace {
 
 constexpr float kBlockM = PlaceFilter::kBlockBins * kBinM;
+constexpr float kOriginsM = 40.0F;  // from one to the next
 constexpr float kOriginSigmaM = 16.0F;
 constexpr float kMapSigmaM = 1.0F;    // the map's length of a block
 constexpr float kDetailM = 2.0F;      // where within so much a kink lies is not known
@@ -99,33 +100,18 @@ void PlaceFilter::advance(const MeasuredWay& way, size_t gone_bins) {
 void PlaceFilter::begin(const std::vector<Block>& blocks) {
   begun_ = true;
   best_logs_.assign(blocks.size(), -INFINITY);
-  if (begin_at_.empty()) {
-    begin_everywhere(blocks);
-  } else {
-    for (const auto& [run, into_m] : begin_at_) follow(origin_at(run, into_m), blocks);
-    origins_ = begin_at_.size();
+  double most = 0;
+  for (const auto& edge : index_->map().edges) most += 2 * (1 + edge.alignment.length_m() / kOriginsM);
+  places_.reserve(std::min(static_cast<size_t>(most), kMostPlaces));
+  for (uint32_t run = 0; run < index_->runs() && !overflowed_; ++run) {
+    const float length_m = index_->length_m(run);
+    const float count = std::max(1.0F, std::round(length_m / kOriginsM));
+    for (int i = 0; i < static_cast<int>(count); ++i)
+      follow(origin_at(run, length_m * (static_cast<float>(i) + 0.5F) / count), blocks);
+    origins_ += static_cast<size_t>(count);
+    overflowed_ = places_.size() > kMostPlaces;
   }
   drop_unlikely();  // few have met by now
-}
-
-void PlaceFilter::begin_everywhere(const std::vector<Block>& blocks) {
-  double origins_of_all = 0;
-  for (const auto& edge : index_->map().edges) origins_of_all += 2 * (1 + edge.alignment.length_m() / kOriginsM);
-  places_.reserve(std::min(static_cast<size_t>(origins_of_all), kMostPlaces));
-  for (uint32_t run = 0; run < index_->runs() && !overflowed_; ++run) {
-    const auto origins = origins_on(*index_, run);
-    for (const float into_m : origins) follow(origin_at(run, into_m), blocks);
-    origins_ += origins.size();
-    if (places_.size() > kMostPlaces) overflowed_ = true;
-  }
-}
-
-std::vector<float> PlaceFilter::origins_on(const NetworkIndex& index, uint32_t run) {
-  const float length_m = index.length_m(run);
-  const float count = std::max(1.0F, std::round(length_m / kOriginsM));
-  std::vector<float> origins(static_cast<size_t>(count));
-  for (size_t i = 0; i < origins.size(); ++i) origins[i] = length_m * (static_cast<float>(i) + 0.5F) / count;
-  return origins;
 }
 
 PlaceFilter::Place PlaceFilter::origin_at(uint32_t run, float into_m) const {

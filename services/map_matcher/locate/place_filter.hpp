@@ -6,7 +6,6 @@
 
 #include <array>
 #include <cstdint>
-#include <utility>
 #include <vector>
 
 #include "map_matcher/locate/locator_types.hpp"
@@ -17,23 +16,9 @@ namespace railfix::map_matcher {
 class PlaceFilter {
  public:
   static constexpr size_t kBlockBins = 5;
-  static constexpr float kOriginsM = 40.0F;  // from one to the next
-  /// Where a hypothesis begins.
-  struct Origin {
-    uint32_t run = 0;
-    float into_m = 0;
-  };
-  /// The places of all origins on a run.
-  [[nodiscard]] static std::vector<float> origins_on(const NetworkIndex& index, uint32_t run);
-  /// `first_bin` is the number of the bin where it begins, counted since the first ever. No origins: everywhere. The
-  /// index must outlive it.
-  PlaceFilter(const LocatorParameters& parameters, const NetworkIndex& index, size_t first_bin,
-              std::vector<Origin> origins = {})
-      : parameters_(parameters),
-        index_(&index),
-        begin_at_(std::move(origins)),
-        first_bin_(first_bin),
-        taken_bins_(first_bin) {}
+  /// `first_bin` is the number of the bin where it begins, counted since the first ever. The index must outlive it.
+  PlaceFilter(const LocatorParameters& parameters, const NetworkIndex& index, size_t first_bin)
+      : parameters_(parameters), index_(&index), first_bin_(first_bin), taken_bins_(first_bin) {}
 
   /// Takes the whole blocks that are new. `gone_bins` were measured before the way, and forgotten.
   void advance(const MeasuredWay& way, size_t gone_bins);
@@ -93,14 +78,12 @@ class PlaceFilter {
   void weigh(Place& place, const Block& block) const;
   void weigh_marks(Place& place, const Trail& trail, const Block& block) const;
   [[nodiscard]] float heading(const Place& place, float into_m) const;
-  void begin_everywhere(const std::vector<Block>& blocks);
   void drop_unlikely();
   void join_same();
   void weigh_unmapped(const Block& block);
 
   LocatorParameters parameters_;
   const NetworkIndex* index_;
-  std::vector<Origin> begin_at_;
   std::vector<Place> places_;
   float best_log_ = -INFINITY;
   std::vector<double> best_logs_;  // of each block while the filter begins

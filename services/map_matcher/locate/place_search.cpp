@@ -26,7 +26,7 @@ std::vector<LocatedPlace> PlaceSearch::move(const std::optional<Turn>& turn, dou
   located_m_ = odometer_m;
   auto location = locator_->locate();
   if (!location.certain()) return {};
-  of_gnss_ = location.by_gnss;
+  of_gnss_ = false;
   return std::move(location.places);
 }
 
@@ -34,12 +34,10 @@ void PlaceSearch::sight(const Sighting& sighting) {
   if (locator_) locator_->sight(sighting);
 }
 
-std::optional<LocatedPlace> PlaceSearch::hear(const GnssPosition& position, double odometer_m, double speed_mps,
-                                              double moved_m) {
+std::optional<LocatedPlace> PlaceSearch::hear(const GnssPosition& position, double odometer_m, double speed_mps) {
   if (!searches()) return std::nullopt;
   if (!gnss_) gnss_.emplace(parameters_.gnss, index());
   if (!gnss_->add(position, odometer_m, speed_mps)) return std::nullopt;
-  if (const auto reach = gnss_->reach(); reach && locator_) locator_->hear(*reach, moved_m);
   const auto found = gnss_->place();
   if (!found) return std::nullopt;
   of_gnss_ = true;

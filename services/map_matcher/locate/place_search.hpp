@@ -30,12 +30,11 @@ class PlaceSearch {
   /// is certain where the train is.
   [[nodiscard]] std::vector<LocatedPlace> move(const std::optional<Turn>& turn, double odometer_m);
   void sight(const Sighting& sighting);
-  /// odometer_m, speed_mps: as for GnssSearch. moved_m: from there to where the last move() has led.
-  [[nodiscard]] std::optional<LocatedPlace> hear(const GnssPosition& position, double odometer_m, double speed_mps,
-                                                 double moved_m);
+  /// odometer_m, speed_mps: as for GnssSearch.
+  [[nodiscard]] std::optional<LocatedPlace> hear(const GnssPosition& position, double odometer_m, double speed_mps);
   /// Nobody knows the place.
   [[nodiscard]] bool searches() const { return stage_ == Stage::unknown; }
-  /// GNSS has told the place that is known, or the rest of what makes it certain.
+  /// GNSS has told the place that is known.
   [[nodiscard]] bool of_gnss() const { return of_gnss_; }
   /// So many tracks are where GNSS says the train is, as far as that is known.
   [[nodiscard]] std::optional<size_t> tracks() const { return gnss_ ? gnss_->tracks() : std::nullopt; }

@@ -8,7 +8,7 @@
 namespace railfix::map_matcher {
 namespace {
 
-constexpr double kFarBelow = 20.0;  // a way whose log likelihood is so far below the best one is given up
+constexpr double kFarBelow = 30.0;  // a way whose log likelihood is so far below the best one is given up
 constexpr std::array<double, 3> kScales = {0, -2.0 / 3, 2.0 / 3};  // of the range
 constexpr double kRoughM = 20.0;
 constexpr double kLeastRoughScale = 0.001;

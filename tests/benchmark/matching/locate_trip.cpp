@@ -287,7 +287,7 @@ void TripRun::step(const Course& course, double from_m, double to_m) {
 
 void TripRun::receive(const Course& course, double run_m) {
   const double here_m = place_at(run_m + kStepM);
-  if (run_m - gnss_run_m_ < kGnssEveryM || course.tunnels.hold(here_m)) return;
+  if (trip_.by_gnss_after_m || run_m - gnss_run_m_ < kGnssEveryM || course.tunnels.hold(here_m)) return;
   const double keep = gnss_run_m_ < 0 ? 0 : std::exp(-kGnssEveryM / kGnssLastsM);
   gnss_run_m_ = run_m;
   const double fresh_m = kGnssSigmaM * std::sqrt(1 - keep * keep);
@@ -296,9 +296,8 @@ void TripRun::receive(const Course& course, double run_m) {
   const auto truth = course.route->position_at(here_m);
   const auto pose = networks_.real->map().edge(truth.edge)->alignment.at(truth.offset_m).pose;
   gnss_.add({pose.easting_m + gnss_east_m_, pose.northing_m + gnss_north_m_}, odometer_m_, kGnssEveryM);
-  if (const auto reach = gnss_.reach()) locator_.hear(*reach, 0);
   const auto found = gnss_.place();
-  if (!found || trip_.by_gnss_after_m) return;
+  if (!found) return;
   trip_.by_gnss_after_m = run_m;
   const auto on_route = course.route->distance_of(found->place, here_m);
   trip_.gnss_wrong = !on_route || std::abs(*on_route - here_m) > 4 * found->sigma_m;

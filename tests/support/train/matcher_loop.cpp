@@ -116,17 +116,14 @@ void MatcherLoop::look_for_place(const fusion::OdometryInput& step, const fusion
     turn = {moved_m, turn_rad + kTurnSigmaRad * random_.normal(), kTurnSigmaRad};
   }
   const auto places = search_.move(turn, chain_.odometer_m());
-  if (places.empty()) return;
-  const auto kind = search_.of_gnss() ? fusion::FixKind::gnss : fusion::FixKind::network;
-  found(places.front(), kind, step.stamp_ns, arrival_s);
+  if (!places.empty()) found(places.front(), fusion::FixKind::network, step.stamp_ns, arrival_s);
 }
 
 void MatcherLoop::hear(const fusion::GnssInput& gnss, double arrival_s) {
   if (!search_.searches() || gnss.fix == 0 || !std::isfinite(state_->speed_mps)) return;
   const double since_s = core::seconds(gnss.stamp_ns - state_->stamp_ns);
   const double odometer_m = state_->distance_m + state_->speed_mps * since_s;
-  const double moved_m = state_->speed_mps * core::seconds(moved_ns_ - gnss.stamp_ns);
-  const auto place = search_.hear({gnss.easting_m, gnss.northing_m, gnss.hdop}, odometer_m, state_->speed_mps, moved_m);
+  const auto place = search_.hear({gnss.easting_m, gnss.northing_m, gnss.hdop}, odometer_m, state_->speed_mps);
   if (place) found(*place, fusion::FixKind::gnss, gnss.stamp_ns, arrival_s);
 }
 

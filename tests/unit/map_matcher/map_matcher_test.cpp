@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/random.hpp"
 #include "core/time.hpp"
 #include "unit/map_matcher/fork_map.hpp"
 
@@ -144,56 +143,6 @@ TEST_F(MapMatcherRide, ASearchedPlaceIsSaidByGnssOnTheOneTrackThereIs) {
   run_to(460);
   EXPECT_FALSE(matcher_.wants_gnss());
   EXPECT_EQ(matcher_.trouble(), "");
-}
-
-// Two tracks, and ten kilometres away two that bend in the same way: balises tell which of two it is, GNSS where.
-TEST(MapMatcher, WhatTheWayAndGnssTellOnlyTogetherIsSaidByGnss) {
-  auto map = std::make_shared<track::Map>();
-  for (const double east_m : {0.0, 12.0, 10'000.0, 10'012.0}) {
-    const auto id = static_cast<uint32_t>(map->edges.size() + 1);
-    map->edges.push_back({id, "", 2 * id - 1, 2 * id, "",
-                          track::Alignment::chained({east_m, 0, 0}, {{300, 0, 0},
-                                                                     {500, 1 / 600.0, 1 / 600.0},
-                                                                     {250, 0, 0},
-                                                                     {400, -1 / 400.0, -1 / 400.0},
-                                                                     {200, 0, 0},
-                                                                     {500, 1 / 800.0, 1 / 800.0},
-                                                                     {900, 0, 0}})});
-  }
-  for (uint32_t id = 1; id <= 20; ++id)
-    map->landmarks.push_back(
-        {id, track::LandmarkKind::balise, id <= 10 ? 1U : 3U, 270.0 * ((id - 1) % 10), 0, 0.1, ""});
-  for (const bool gnss : {false, true}) {
-    MapMatcher matcher({}, map);
-    core::Random random(4);
-    std::optional<PlaceFix> found;
-    int64_t stamp_ns = core::kNsPerSecond;
-    const double step_m = 2;
-    double before_rad = 0;
-    for (double at_m = 0; at_m < 2800 && !found; at_m += step_m) {
-      stamp_ns += core::to_ns(kPeriodS);
-      StateInput state;
-      state.placed = {stamp_ns, {}, kSpeedMps, at_m, 1e6, 1e6};
-      state.track_known = false;
-      matcher.add(state);
-      const auto pose = map->edge(3)->alignment.at(at_m).pose;
-      const double behind_rad = map->edge(3)->alignment.at(std::max(0.0, at_m - 10)).pose.heading_rad;
-      const double yaw_rad = std::exchange(before_rad, behind_rad) - behind_rad + 1e-4 * random.normal();
-      PlaceFixes said = matcher.add(
-          StepInput{stamp_ns, stamp_ns - core::to_ns(kPeriodS), true, step_m, yaw_rad, 1e-4, at_m, kSpeedMps});
-      if (std::fmod(at_m, 270) == 0) matcher.add(Sighting{stamp_ns, track::LandmarkKind::balise, 0, 0, 0.1, 0.99});
-      if (gnss && std::fmod(at_m, 20) == 0) {
-        EXPECT_TRUE(matcher.add(GnssInput{pose.easting_m + 3, pose.northing_m, 1, stamp_ns}).empty()) << "two tracks";
-      }
-      if (!said.empty()) found = said.front();
-    }
-    ASSERT_EQ(found.has_value(), gnss);
-    if (!gnss) continue;
-    EXPECT_EQ(found->kind, FixKind::gnss);
-    EXPECT_EQ(found->options.front().place.edge, 3U);
-    const double at_m = kSpeedMps * (core::seconds(found->stamp_ns - core::kNsPerSecond) - kPeriodS);
-    EXPECT_NEAR(found->options.front().place.offset_m, at_m, 4 * found->sigma_m);
-  }
 }
 
 TEST_F(MapMatcherRide, AStateOfAnotherMapIsNamedAndNothingIsMatchedThere) {

@@ -215,79 +215,6 @@ TEST_F(NetworkLocatorTest, TwoPlacesThatLookTheSameAreBothNamedAndNeitherIsCerta
   EXPECT_NEAR(location.places[1].probability, 0.5, 0.01);
 }
 
-/// As GNSS sees a train on that line, with an error of 9 m; its antenna is 12 m ahead of the foot.
-GnssReach heard_at(const track::Map& map, uint32_t edge, double at_m) {
-  const auto pose = map.edge(edge)->alignment.at(at_m + 12).pose;
-  return {pose.easting_m - 9, pose.northing_m, pose.heading_rad + 0.05, 30, 60, 15, 12};
-}
-
-TEST_F(NetworkLocatorTest, OfPlacesThatBendAlikeItIsTheOneToWhichTheWayLeadsFromWhereGnssWasHeard) {
-  lines_[20] = lines_[16];
-  const auto index = network_of(lines_);
-  const track::Route route({index->map().edge(21), true}, 0, 0);
-  for (const bool backs : {false, true}) {
-    const double heard_m = backs ? 4400 : 900;
-    const double to_m = backs ? 700 : 4600;
-    Shuttle train(index, backs ? 4600 : 700);
-    train.run(route, heard_m);
-    train.locator().hear(heard_at(index->map(), 21, heard_m), 0);
-    train.run(route, to_m);
-    const auto location = train.locator().locate();
-    expect_right(location, route, to_m);
-    EXPECT_TRUE(location.by_gnss);
-    EXPECT_EQ(location.places.front().place.edge, 21U);
-  }
-}
-
-TEST_F(NetworkLocatorTest, WhatWasHeardBeforeAGapOrBeforeTheTrainSetBackIsForgotten) {
-  lines_[20] = lines_[16];
-  const auto index = network_of(lines_);
-  const track::Route route({index->map().edge(21), true}, 0, 0);
-  const auto expect_forgotten = [&](double from_m, double heard_m, double on_m, double step_m, double to_m) {
-    Shuttle train(index, from_m);
-    train.run(route, heard_m);
-    train.locator().hear(heard_at(index->map(), 21, heard_m), 0);
-    train.run(route, on_m, step_m);
-    train.run(route, to_m);
-    const auto location = train.locator().locate();
-    EXPECT_EQ(location.places.size(), 2U);
-    EXPECT_FALSE(location.certain()) << from_m << ' ' << heard_m << ' ' << on_m;
-  };
-  expect_forgotten(700, 900, 960, 60, 4600);
-  expect_forgotten(900, 900, 960, 60, 4600);
-  expect_forgotten(4600, 4600, 5000, 0.5, 700);
-  expect_forgotten(1500, 1600, 900, 0.5, 4900);
-}
-
-TEST_F(NetworkLocatorTest, GnssWhereNoTrackRunsAsTheTrainTellsNothing) {
-  lines_[20] = lines_[16];
-  const auto index = network_of(lines_);
-  const track::Route route({index->map().edge(21), true}, 0, 0);
-  for (const double aside_m : {0.0, 400.0}) {
-    Shuttle train(index, 700);
-    train.run(route, 900);
-    auto heard = heard_at(index->map(), 21, 900);
-    heard.easting_m += aside_m;
-    if (aside_m == 0) heard.heading_rad += core::kPi / 2;
-    train.locator().hear(heard, 0);
-    train.run(route, 4600);
-    const auto location = train.locator().locate();
-    EXPECT_EQ(location.places.size(), 2U);
-    EXPECT_FALSE(location.certain());
-  }
-}
-
-TEST_F(NetworkLocatorTest, APlaceThatTheWayAloneTellsIsNotByGnss) {
-  const auto index = network_of(lines_);
-  const track::Route route({index->map().edge(17), true}, 0, 0);
-  Shuttle train(index, 700);
-  train.locator().hear(heard_at(index->map(), 17, 700), 0);
-  train.run(route, 4200);
-  const auto location = train.locator().locate();
-  expect_right(location, route, 4200);
-  EXPECT_FALSE(location.by_gnss);
-}
-
 // Of so many ways that lead to a place one may have been left out that fits better.
 TEST_F(NetworkLocatorTest, MoreWaysAlikeThanAreFollowedAreSaid) {
   for (const uint32_t tracks : {10U, 40U}) {
@@ -367,6 +294,21 @@ TEST_F(NetworkLocatorTest, WhatWasLookedForBeforeIsTakenFromMemoryAndGivesTheSam
   EXPECT_TRUE(often.certain());
   EXPECT_EQ(often.places.front().place.edge, once.places.front().place.edge);
   EXPECT_NEAR(often.places.front().place.offset_m, once.places.front().place.offset_m, 0.5);
+}
+
+TEST_F(NetworkLocatorTest, NotAskedForLongerThanTheWayItRemembersItFindsThePlaceNonetheless) {
+  auto& line = lines_[16];
+  for (const size_t other : {3U, 9U}) line.insert(line.end(), lines_[other].begin(), lines_[other].end());
+  lines_[3] = lines_[9] = lines_[0];
+  const auto index = network_of(lines_);
+  const track::Route route({index->map().edge(17), true}, 0, 0);
+  Shuttle train(index, 700);
+  train.run(route, 2300);
+  static_cast<void>(train.locator().locate());
+  train.run(route, 11'000);
+  static_cast<void>(train.locator().locate());
+  train.run(route, 14'000);
+  expect_right(train.locator().locate(), route, 14'000);
 }
 
 // Two lines bend alike, a balise stands on one of them.
