@@ -145,8 +145,7 @@ bool NetworkLocator::just_behind_switch(const LocatedPlace& place) const {
 Location NetworkLocator::sum_up(const std::vector<WayFit>& fits, const MeasuredRun& run) const {
   Location location;
   if (fits.empty()) return location;
-  const auto& best = *std::max_element(
-      fits.begin(), fits.end(), [](const WayFit& a, const WayFit& b) { return a.log_evidence < b.log_evidence; });
+  const WayFit& best = best_of(fits);
   // As much as the best one is further off than the noise says, the others are, too.
   const double per_log = 1 / std::max(1.0, best.misfit);
   double sum = 0;

@@ -20,7 +20,8 @@ class PlaceFilter {
   PlaceFilter(const LocatorParameters& parameters, const NetworkIndex& index, size_t first_bin)
       : parameters_(parameters), index_(&index), first_bin_(first_bin), taken_bins_(first_bin) {}
 
-  /// Takes the whole blocks that are new. `gone_bins` were measured before the way, and forgotten.
+  /// Takes the whole blocks that are new. `gone_bins` were measured before the way, and forgotten. REQUIRES: no more
+  /// than taken_bins().
   void advance(const MeasuredWay& way, size_t gone_bins);
   /// Those that may be the place, the likely ones first; their bins count from the way's first one.
   [[nodiscard]] std::vector<Candidate> candidates(size_t gone_bins) const;

@@ -107,8 +107,7 @@ bool WayComparison::fit_exactly(const WayFit& first, std::vector<WayFit>& fits, 
   Candidate anchor = place_on(first.runs, first.anchor_m - 0.5 * model_.parameters().lag_m);
   anchor.bin = first.bin;
   anchor.scale = first.scale;
-  const auto ways = walker_.follow(anchor, kExactly, -INFINITY);
-  for (const WalkedWay& way : ways) {
+  for (const WalkedWay& way : walker_.follow(anchor, kExactly, -INFINITY)) {
     const auto full = fitter_.fit(way, kFull, best - kFarBelow);
     if (!full) continue;
     best = std::max(best, full->best_log);
@@ -138,8 +137,7 @@ ComparedWays WayComparison::compare(const std::vector<Candidate>& candidates) {
 // The tracks beside the best place are compared too: no stretch needs to have found them.
 bool WayComparison::add_beside(std::vector<WayFit>& fits) {
   if (fits.empty()) return true;
-  const WayFit best = *std::max_element(
-      fits.begin(), fits.end(), [](const WayFit& a, const WayFit& b) { return a.log_evidence < b.log_evidence; });
+  const WayFit best = best_of(fits);
   if (best.misfit > model_.parameters().most_misfit()) return true;
   const auto end = place_on(best.runs, best.end_m);
   bool all = true;

@@ -214,6 +214,10 @@ std::optional<WayFit> WayFitter::fit(const WalkedWay& walked, const Effort& effo
   return result;
 }
 
+const WayFit& best_of(const std::vector<WayFit>& fits) {
+  return *std::ranges::max_element(fits, {}, &WayFit::log_evidence);
+}
+
 Candidate place_on(const std::vector<track::Run>& runs, double along_m) {
   size_t i = 0;
   for (; i + 1 < runs.size() && along_m > runs[i].length_m(); ++i) along_m -= runs[i].length_m();

@@ -25,6 +25,9 @@ struct WayFit {
   double worst_misfit = 0;  // ... over the worst 200 m
 };
 
+/// The one of most evidence. REQUIRES: one at least.
+const WayFit& best_of(const std::vector<WayFit>& fits);
+
 /// A place `along_m` on runs that follow each other.
 Candidate place_on(const std::vector<track::Run>& runs, double along_m);
 

@@ -45,10 +45,14 @@ testing::RideErrors errors_of(double scale) {
   return errors;
 }
 
+/// On a track that wanders about the mapped one, its heading by wander_rad.
 Location ride(const std::shared_ptr<const NetworkIndex>& index, const track::Route& route, double from_m, double to_m,
-              double scale, double every_m = 1e9) {
+              double scale, double every_m = 1e9, double wander_rad = 0) {
+  constexpr double kPerM = 2 * core::kPi / 90;
   const auto errors = errors_of(scale);
-  const testing::VehicleHeading heading([&](double m) { return route.curvature_at(m); }, from_m - 1, to_m + 1, errors);
+  const testing::VehicleHeading heading(
+      [&](double m) { return route.curvature_at(m) + wander_rad * kPerM * std::cos(kPerM * m); }, from_m - 1, to_m + 1,
+      errors);
   testing::RideSensors sensors(errors, 5);
   NetworkLocator locator({}, index);
   for (double m = from_m; m < to_m; m += 1) {
@@ -221,10 +225,9 @@ TEST_F(NetworkLocatorTest, MoreWaysAlikeThanAreFollowedAreSaid) {
     auto lines = lines_;
     const auto stem = static_cast<uint32_t>(lines.size() + 1);
     lines.push_back(lines_[16]);
+    lines[16] = lines_[0];
     lines.resize(lines.size() + tracks, {{1000, 0, 0}});
     auto map = std::make_shared<track::Map>(network_of(lines)->map());
-    map->edges[16] = map->edges[0];
-    map->edges[16].id = 17;
     const uint32_t node = map->edge(stem)->from_node;
     map->nodes.push_back({node, track::NodeKind::railway_switch, "", 0, 0});
     for (uint32_t id = stem + 1; id <= stem + tracks; ++id) {
@@ -241,28 +244,12 @@ TEST_F(NetworkLocatorTest, MoreWaysAlikeThanAreFollowedAreSaid) {
   }
 }
 
-/// With a track that wanders about the mapped one, its heading by so much.
-Location ride_wandering(const std::shared_ptr<const NetworkIndex>& index, uint32_t edge, double wander_rad,
-                        double to_m) {
-  const track::Route route({index->map().edge(edge), true}, 0, 0);
-  const auto errors = errors_of(0.01);
-  constexpr double kPerM = 2 * core::kPi / 90;
-  const testing::VehicleHeading heading(
-      [&](double m) { return route.curvature_at(m) + wander_rad * kPerM * std::cos(kPerM * m); }, 699, to_m + 1,
-      errors);
-  testing::RideSensors sensors(errors, 5);
-  NetworkLocator locator({}, index);
-  for (double m = 700; m < to_m; m += 1) {
-    const auto s = sensors.step(heading, 0, m, m + 1, 0.05);
-    locator.move(s.way_m, s.turn_rad, s.turn_sigma_rad);
-  }
-  return locator.locate();
-}
-
 TEST_F(NetworkLocatorTest, OnAMapThatIsDrawnRoughlyMoreMustSpeakForAPlace) {
   const auto index = network_of(lines_);
-  const auto early = ride_wandering(index, 17, 0.0102, 2000);
-  const auto late = ride_wandering(index, 17, 0.0102, 5500);
+  const track::Route route({index->map().edge(17), true}, 0, 0);
+  const auto wander = [&](double to_m, double by_rad) { return ride(index, route, 700, to_m, 0.01, 1e9, by_rad); };
+  const auto early = wander(2000, 0.0102);
+  const auto late = wander(5500, 0.0102);
   for (const auto& location : {early, late}) {
     ASSERT_FALSE(location.places.empty());
     EXPECT_EQ(location.places.front().place.edge, 17U);
@@ -271,7 +258,7 @@ TEST_F(NetworkLocatorTest, OnAMapThatIsDrawnRoughlyMoreMustSpeakForAPlace) {
   }
   EXPECT_EQ(early.doubt, Doubt::by_chance);
   EXPECT_TRUE(late.certain()) << to_string(late.doubt);
-  EXPECT_EQ(ride_wandering(index, 17, 0.0145, 5500).doubt, Doubt::misfit);
+  EXPECT_EQ(wander(5500, 0.0145).doubt, Doubt::misfit);
 }
 
 TEST_F(NetworkLocatorTest, ATrackThatIsNotOnTheMapIsNeverCertain) {
