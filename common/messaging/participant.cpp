@@ -7,7 +7,6 @@
 #include <mutex>
 
 #include "core/time.hpp"
-#include "messaging/every_nth.hpp"
 #include "messaging/fastdds_types.hpp"
 #include "messaging/layout.hpp"
 #include "messaging/network.hpp"
@@ -103,24 +102,6 @@ dds::Topic* Participant::Impl::topic(const TopicInfo& info, const std::string& i
       throw core::BadInput("topic " + name + " cannot be made on DDS domain " + std::to_string(options.domain));
   }
   return topic;
-}
-
-dds::TopicDescription* Participant::Impl::source(const TopicInfo& info, const std::string& instance) {
-  auto* whole = topic(info, instance);
-  if (info.qos.one_in <= 1) return whole;
-  const std::string every = std::to_string(info.qos.one_in);
-  const std::string name = whole->get_name() + " 1:" + every;
-  const std::lock_guard lock(mutex);
-  auto& part = thinned[name];
-  if (part == nullptr) part = participant->create_contentfilteredtopic(name, whole, "every %0", {every}, kEveryNth);
-  if (part == nullptr) throw core::BadInput("topic " + whole->get_name() + " cannot be thinned out");
-  return part;
-}
-
-std::string topic_of(const dds::DataReader& reader) {
-  const auto* source = reader.get_topicdescription();
-  const auto* part = dynamic_cast<const dds::ContentFilteredTopic*>(source);
-  return part == nullptr ? source->get_name() : part->get_related_topic()->get_name();
 }
 
 namespace {
@@ -226,6 +207,7 @@ Participant::Participant(const ParticipantOptions& options) : impl_(std::make_un
   impl_->train.partition = "train/" + options.train_id;
   impl_->host.partition = impl_->train.partition + "/memory/" + memory_id();
   const auto transport = transport_of(options);
+  impl_->discovery = transport->discovery;
   auto qos = participant_qos(options, transport);
   if (!options.security_folder.empty()) {
     impl_->certificate_ends_ns =
@@ -239,7 +221,6 @@ Participant::Participant(const ParticipantOptions& options) : impl_(std::make_un
                          "; check that the network of this host is up (`ip link set lo up` at least)");
   }
   *transport->open = true;
-  impl_->participant->register_content_filter_factory(kEveryNth, &every_nth_filters());
   for (auto* ends : {&impl_->train, &impl_->host}) impl_->join(*ends);
 }
 
@@ -270,7 +251,7 @@ Connections Participant::connections() const {
     dds::SubscriptionMatchedStatus status;
     reader->get_subscription_matched_status(status);
     connections.matches += static_cast<uint32_t>(status.current_count);
-    ++ends[topic_of(*reader)].second;
+    ++ends[reader->get_topicdescription()->get_name()].second;
   }
   for (const auto& [guid, writer] : impl_->remote_writers) ++ends[writer.topic].first;
   for (const auto& [guid, reader] : impl_->remote_readers) ++ends[reader.topic].second;

@@ -26,7 +26,8 @@ struct SentCount {
 
 struct Participant::Impl : eprosima::fastdds::dds::DomainParticipantListener {
   ParticipantOptions options;
-  size_t running_interfaces = 0;  // when this participant joined
+  size_t running_interfaces = 0;          // when this participant joined
+  std::shared_ptr<std::mutex> discovery;  // held where a reader or writer goes away (see transport.hpp)
   eprosima::fastdds::dds::DomainParticipant* participant = nullptr;
   /// Where writers and readers live: those of the whole train, and those of topics that stay in this host's memory.
   struct Ends {
@@ -41,7 +42,6 @@ struct Participant::Impl : eprosima::fastdds::dds::DomainParticipantListener {
 
   std::mutex mutex;
   std::map<std::string, eprosima::fastdds::dds::Topic*> topics;
-  std::map<std::string, eprosima::fastdds::dds::ContentFilteredTopic*> thinned;
   std::set<eprosima::fastdds::dds::DataWriter*> writers;
   std::set<eprosima::fastdds::dds::DataReader*> readers;
   std::vector<std::shared_ptr<const SentCount>> sent;
@@ -65,8 +65,6 @@ struct Participant::Impl : eprosima::fastdds::dds::DomainParticipantListener {
   bool own_profiles = false;
 
   eprosima::fastdds::dds::Topic* topic(const TopicInfo& info, const std::string& instance);
-  /// What a reader reads: the topic, or every n-th sample of it.
-  eprosima::fastdds::dds::TopicDescription* source(const TopicInfo& info, const std::string& instance);
   void on_participant_discovery(eprosima::fastdds::dds::DomainParticipant*,
                                 eprosima::fastrtps::rtps::ParticipantDiscoveryInfo&& info) override;
   void on_publisher_discovery(eprosima::fastdds::dds::DomainParticipant*,
@@ -74,8 +72,5 @@ struct Participant::Impl : eprosima::fastdds::dds::DomainParticipantListener {
   void on_subscriber_discovery(eprosima::fastdds::dds::DomainParticipant*,
                                eprosima::fastrtps::rtps::ReaderDiscoveryInfo&& info) override;
 };
-
-/// The topic's name also of a reader that takes every n-th sample.
-std::string topic_of(const eprosima::fastdds::dds::DataReader& reader);
 
 }  // namespace railfix::messaging

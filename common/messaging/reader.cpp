@@ -60,7 +60,6 @@ struct AnyReader::Impl : dds::DataReaderListener {
   void on_data_available(dds::DataReader* from) override {
     type->take_all(*from, [this](std::shared_ptr<const void> sample, const SampleInfo& info) {
       if (!hears(info.writer)) return;
-      // A sample that is being written while its writer learns of this reader passes Fast DDS's filter at both ends.
       if (info.sequence % one_in != 0) return;
       if (exclusive && !one_writer.hears(info.writer)) return;
       queue->push(&source, [run = handler, sample = std::move(sample), info] { (*run)(sample, info); });
@@ -87,7 +86,7 @@ AnyReader::AnyReader(Participant& participant, const TopicInfo& topic, const std
   }
   impl_->layout = layout_of(topic);
   qos.user_data().data_vec(user_data_of_layout(impl_->layout));
-  auto* source = inside.source(topic, instance);
+  auto* source = inside.topic(topic, instance);
   impl_->reader = impl_->subscriber->create_datareader(source, qos, impl_.get(), dds::StatusMask::data_available());
   if (impl_->reader == nullptr) {
     throw core::BadInput("topic " + source->get_name() +
@@ -102,8 +101,11 @@ AnyReader::~AnyReader() {
     const std::lock_guard lock(impl_->participant->mutex);
     impl_->participant->readers.erase(impl_->reader);
   }
-  impl_->reader->set_listener(nullptr);
-  impl_->subscriber->delete_datareader(impl_->reader);
+  {
+    const std::lock_guard lock(*impl_->participant->discovery);
+    impl_->reader->set_listener(nullptr);
+    impl_->subscriber->delete_datareader(impl_->reader);
+  }
   impl_->queue->forget(&impl_->source);
 }
 

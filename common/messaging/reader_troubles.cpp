@@ -11,7 +11,7 @@ std::map<std::string, ReaderTroubles> reader_troubles(Participant& participant) 
   const std::lock_guard lock(inside.mutex);
   std::map<std::string, ReaderTroubles> by_topic;
   for (auto* reader : inside.readers) {
-    ReaderTroubles& troubles = by_topic[topic_of(*reader)];
+    ReaderTroubles& troubles = by_topic[reader->get_topicdescription()->get_name()];
     dds::SampleRejectedStatus rejected;
     if (reader->get_sample_rejected_status(rejected) == ReturnCode_t::RETCODE_OK) {
       troubles.rejected += static_cast<uint64_t>(rejected.total_count);

@@ -71,7 +71,7 @@ class Transport final : public rtps::ChainingTransport {
   void receive(rtps::TransportReceiverInterface* next, const eprosima::fastrtps::rtps::octet* bytes, uint32_t size,
                const Locator_t& local, const Locator_t& remote) override {
     if (!*descriptor_.open) return;
-    std::unique_lock one_at_a_time(discovery_mutex_, std::defer_lock);
+    std::unique_lock one_at_a_time(*descriptor_.discovery, std::defer_lock);
     if (is_of_discovery(local)) one_at_a_time.lock();
     next->OnDataReceived(bytes, size, local, remote);
   }
@@ -99,7 +99,6 @@ class Transport final : public rtps::ChainingTransport {
   TrainTransport descriptor_;
   std::mutex mutex_;
   std::map<const SenderResource*, Reach> reach_;  // sockets live as long as this
-  std::mutex discovery_mutex_;
 };
 
 }  // namespace

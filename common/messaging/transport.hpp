@@ -8,7 +8,8 @@
 //   this host. Here the loopback's socket serves loopback addresses, and the others the rest.
 // - Each socket is listened to by a thread of its own, and participants that are discovered by two of them at once
 //   share one record (SecurityManager::match_builtin_endpoints): with certificates, one of them was never let in. Here
-//   what comes for the discovery is handed on by one thread at a time.
+//   what comes for the discovery is handed on by one thread at a time, and none while a reader or writer goes away: one
+//   that is just being matched would be told of it when it is gone (eProsima/Fast-DDS#3303).
 #pragma once
 
 #include <fastdds/rtps/transport/ChainingTransportDescriptor.h>
@@ -16,6 +17,7 @@
 
 #include <atomic>
 #include <memory>
+#include <mutex>
 
 namespace railfix::messaging {
 
@@ -26,6 +28,8 @@ struct TrainTransport : eprosima::fastdds::rtps::ChainingTransportDescriptor {
 
   /// Whether the participant is whole; set once, by who made it.
   std::shared_ptr<std::atomic<bool>> open = std::make_shared<std::atomic<bool>>(false);
+  /// Held while something is handed on to the discovery.
+  std::shared_ptr<std::mutex> discovery = std::make_shared<std::mutex>();
 };
 
 }  // namespace railfix::messaging

@@ -23,7 +23,7 @@ std::vector<std::string> unheard_writers(Participant& participant) {
   const std::lock_guard lock(inside.mutex);
   std::vector<std::string> sentences;
   for (const auto* reader : inside.readers) {
-    const std::string topic = topic_of(*reader);
+    const std::string topic = reader->get_topicdescription()->get_name();
     const Terms wanted = terms_of(reader->get_qos());
     const uint64_t layout = layout_in(reader->get_qos().user_data().data_vec());
     for (const auto& [guid, writer] : inside.remote_writers) {

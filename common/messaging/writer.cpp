@@ -39,6 +39,7 @@ struct AnyWriter::Impl : dds::DataWriterListener {
     }
     // A service's last words (its status, its last log line) would go with their writer.
     writer->wait_for_acknowledgments(kLastWordsPatience);
+    const std::lock_guard lock(*participant->discovery);
     publisher->delete_datawriter(writer);
   }
 };
@@ -54,6 +55,9 @@ AnyWriter::AnyWriter(Participant& participant, const TopicInfo& topic, const std
       impl_->publisher->get_datawriter_qos_from_profile(topic.name, qos) != ReturnCode_t::RETCODE_OK) {
     apply(topic.qos, qos);
   }
+  // No reader has its samples filtered here: 2.9.1 changes the list of filters while a sample goes through it, and
+  // crashes (eProsima/Fast-DDS#4878).
+  qos.writer_resource_limits().reader_filters_allocation.maximum = 0;
   qos.user_data().data_vec(user_data_of_layout(layout_of(topic)));
   auto* dds_topic = inside.topic(topic, instance);
   impl_->writer = impl_->publisher->create_datawriter(dds_topic, qos, impl_.get(), dds::StatusMask::all());

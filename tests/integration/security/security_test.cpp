@@ -107,23 +107,6 @@ void expect_nothing_crosses(Train& train, Rogue& rogue) {
   EXPECT_THAT(train.heard, ::testing::Not(::testing::Contains(666U)));
 }
 
-// As the monitor reads while nobody looks.
-TEST_F(Security, AReaderOfEveryFourthSampleIsLetIn) {
-  const auto keys = keys_of("train");
-  Train train(options("fusion", keys), options("monitor", keys));
-  messaging::TopicInfo thinned = messaging::info_of(topics::train_state);
-  thinned.qos.one_in = 4;
-  std::vector<uint64_t> part;
-  messaging::AnyReader some(train.monitor, thinned, "", train.queue,
-                            [&](const auto&, const messaging::SampleInfo& info) { part.push_back(info.sequence); });
-  uint64_t seq = 0;
-  EXPECT_TRUE(test::run_until(train.queue, [&] {
-    train.write(++seq);
-    return part.size() >= 4;
-  }));
-  for (const uint64_t sequence : part) EXPECT_EQ(sequence % 4, 0U);
-}
-
 // Service by service, as an upgrade goes: each step's keys are understood by those that still have the step before.
 class Exchange : public Security, public ::testing::WithParamInterface<bool> {};
 INSTANTIATE_TEST_SUITE_P(LostKey, Exchange, ::testing::Bool());
