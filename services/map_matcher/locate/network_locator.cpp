@@ -13,6 +13,7 @@ namespace {
 constexpr double kSettledM = 100.0;  // behind a switch
 constexpr double kLeastSigmaM = 3.0;
 constexpr size_t kAnewBins = 50;
+constexpr size_t kSettledBins = 2;       // a train that rolls back, and late sightings, change no more
 constexpr double kWorstMisfit = 7.0;     // over 200 m
 constexpr double kMostOfRange = 1.1;     // of the odometer's scale
 constexpr double kLeastEvidence = 20.0;  // that the track is on the map at all, a log
@@ -45,6 +46,13 @@ void NetworkLocator::sight(const Sighting& sighting) {
   for (auto& search : searches_) search.run.sight(sighting);
 }
 
+void NetworkLocator::prepare() {
+  Search& search = searches_[leading()];
+  const MeasuredRun& run = search.run;
+  const size_t taken_bins = search.filter ? search.filter->taken_bins() : run.gone_bins();
+  if (run.at_front() && run.end_bin() >= taken_bins + PlaceFilter::kBlockBins + kSettledBins) follow(search, run.way());
+}
+
 void NetworkLocator::forget() {
   for (auto& [run, filter] : searches_) {
     run.clear();
@@ -64,7 +72,7 @@ double NetworkLocator::way_m() const {
 
 // A filter that began long ago may have been led astray by what is not on the map, and one that was not asked for long
 // lacks what the way has forgotten: another one begins.
-PlaceFilter& NetworkLocator::filtered(Search& search, const MeasuredWay& way) const {
+void NetworkLocator::follow(Search& search, const MeasuredWay& way) const {
   auto& filter = search.filter;
   const size_t gone_bins = search.run.gone_bins();
   const auto most_bins = static_cast<size_t>(parameters_.window_m / kBinM);
@@ -75,7 +83,6 @@ PlaceFilter& NetworkLocator::filtered(Search& search, const MeasuredWay& way) co
     filter.emplace(parameters_, *index_, gone_bins + way.size() - std::min(way.size(), kAnewBins));
   }
   filter->advance(way, gone_bins);
-  return *filter;
 }
 
 Location NetworkLocator::locate() {
@@ -83,7 +90,8 @@ Location NetworkLocator::locate() {
   const MeasuredRun& run = search.run;
   if (!run.at_front()) return {};
   const MeasuredWay way = run.way();
-  const PlaceFilter& filter = filtered(search, way);
+  follow(search, way);
+  const PlaceFilter& filter = *search.filter;
   double turn = 0;
   for (const MeasuredBin& bin : way) turn += std::abs(bin.turn_rad);
   if (way_m() < parameters_.least_way_m || turn < parameters_.least_turn_rad) return {};

@@ -59,6 +59,8 @@ class NetworkLocator {
   /// Moved by way_m (measured, forward positive) and turned meanwhile (left positive).
   void move(double way_m, double turn_rad, double turn_sigma_rad);
   void sight(const Sighting& sighting);
+  /// Some of the work of the next search, where the way has got longer since the last one; else nothing.
+  void prepare();
   void forget();
   /// That is searched for.
   [[nodiscard]] double way_m() const;
@@ -75,7 +77,7 @@ class NetworkLocator {
   };
   /// The one that the train is at the front of, with the longer way.
   [[nodiscard]] size_t leading() const;
-  [[nodiscard]] PlaceFilter& filtered(Search& search, const MeasuredWay& way) const;
+  void follow(Search& search, const MeasuredWay& way) const;
   [[nodiscard]] Location sum_up(const std::vector<WayFit>& fits, const MeasuredRun& run) const;
   [[nodiscard]] Doubt doubt_of(const Location& location, bool complete, double evidence) const;
   [[nodiscard]] double beside_probability(const std::vector<LocatedPlace>& places) const;

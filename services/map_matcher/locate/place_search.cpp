@@ -22,7 +22,11 @@ std::vector<LocatedPlace> PlaceSearch::move(const std::optional<Turn>& turn, dou
     return {};
   }
   if (std::abs(turn->way_m) > kLeastWayM) locator_->move(turn->way_m, turn->turn_rad, turn->sigma_rad);
-  if (!searches() || std::abs(odometer_m - located_m_) < parameters_.every_m) return {};
+  if (!searches()) return {};
+  if (std::abs(odometer_m - located_m_) < parameters_.every_m) {
+    locator_->prepare();
+    return {};
+  }
   located_m_ = odometer_m;
   auto location = locator_->locate();
   if (!location.certain()) return {};

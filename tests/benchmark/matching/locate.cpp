@@ -57,16 +57,21 @@ void print(const std::vector<Trip>& trips) {
                [](const Trip& t) { return t.bound_m < map_matcher::LocatorParameters{}.certain_sigma_m; });
   print_found("... where the track can tell", informed);
   std::vector<double> seconds;
+  std::vector<double> answers;
   std::vector<double> after_m;
+  double prepared_s = 0;
   double most_sigmas = 0;
   int wrong = 0;
   for (const Trip& t : trips) {
     seconds.insert(seconds.end(), t.searches_s.begin(), t.searches_s.end());
+    answers.insert(answers.end(), t.answers_s.begin(), t.answers_s.end());
+    prepared_s = std::max(prepared_s, t.most_prepared_s);
     if (t.found) after_m.push_back(t.found_after_m);
     most_sigmas = std::max(most_sigmas, t.most_sigmas);
     wrong += t.wrong ? 1 : 0;
   }
   std::sort(seconds.begin(), seconds.end());
+  std::sort(answers.begin(), answers.end());
   std::sort(after_m.begin(), after_m.end());
   std::printf(
       "wrong although certain %d; largest error of a certain place %.1f sigma; track certain after %.0f m in the "
@@ -75,6 +80,9 @@ void print(const std::vector<Trip>& trips) {
   print_gnss(trips);
   std::printf("search (processor time, %zu): p50 %.2f, p99 %.2f, max %.2f s\n", seconds.size(), quantile(seconds, 0.5),
               quantile(seconds, 0.99), quantile(seconds, 1));
+  std::printf(
+      "... of it when the train has come there: p50 %.2f, p99 %.2f, max %.2f s; before at most %.2f s at once\n",
+      quantile(answers, 0.5), quantile(answers, 0.99), quantile(answers, 1), prepared_s);
 }
 
 void tell(int number, const Trip& t) {

@@ -203,7 +203,10 @@ class TripRun {
       step(course_at(run_m), place_at(run_m), place_at(run_m + kStepM));
       if (options_.gnss) receive(course_at(run_m), run_m);
       const bool last = run_m + 1.5 * kStepM > way_m;
-      if (!last && run_m - looked_m < every_m) continue;
+      if (!last && run_m - looked_m < every_m) {
+        prepare();
+        continue;
+      }
       looked_m = run_m;
       look(course_at(run_m), run_m, place_at(run_m + kStepM));
     }
@@ -242,6 +245,7 @@ class TripRun {
     return first_m_ + (run_m < kOnM + options_.back_m ? 2 * kOnM - run_m : run_m - 2 * options_.back_m);
   }
   void step(const Course& course, double from_m, double to_m);
+  void prepare();
   void look(const Course& course, double run_m, double here_m);
   void receive(const Course& course, double run_m);
 
@@ -263,6 +267,7 @@ class TripRun {
   double gnss_north_m_ = 0;
   double gnss_run_m_ = -kGnssEveryM;
   double odometer_m_ = 0;
+  double prepared_s_ = 0;  // of the next search
   Trip trip_;
 };
 
@@ -307,13 +312,23 @@ void TripRun::receive(const Course& course, double run_m) {
   }
 }
 
+void TripRun::prepare() {
+  const double begin_s = processor_s();
+  locator_.prepare();
+  const double took_s = processor_s() - begin_s;
+  trip_.most_prepared_s = std::max(trip_.most_prepared_s, took_s);
+  prepared_s_ += took_s;
+}
+
 void TripRun::look(const Course& course, double run_m, double here_m) {
   const double end_m = options_.astern ? place_at(0) : here_m;
   const double begin_m = options_.astern ? here_m : first_m_;
   trip_.bound_m = std::min(trip_.bound_m, bound_m(mapped_, begin_m, end_m, errors_.step_turn_noise_rad));
   const double begin_s = processor_s();
   const auto location = locator_.locate();
-  trip_.searches_s.push_back(processor_s() - begin_s);
+  trip_.answers_s.push_back(processor_s() - begin_s);
+  trip_.searches_s.push_back(prepared_s_ + trip_.answers_s.back());
+  prepared_s_ = 0;
   if (location.places.empty()) return;
   const auto truth = course.route->position_at(here_m);
   const auto& best = location.places.front().place;

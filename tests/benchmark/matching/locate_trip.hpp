@@ -22,7 +22,9 @@ struct Trip {
   bool best_right = false;  // at the end, certain or not
   std::optional<double> by_gnss_after_m;
   bool gnss_wrong = false;  // GNSS found another track, the other direction, or a place that is more than 4 sigma off
-  std::vector<double> searches_s;
+  std::vector<double> searches_s;  // all the work of each ...
+  std::vector<double> answers_s;   // ... and what of it is left when the train has come there
+  double most_prepared_s = 0;      // of the other work the longest piece
   std::vector<map_matcher::Doubt> doubts;
   double turn_rad = 0;        // of the true track, over stretches of 20 m
   double most_sigmas = 0;     // error of a place that was certain

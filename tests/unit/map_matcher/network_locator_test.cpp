@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <ctime>
+#include <utility>
 
 #include "core/units.hpp"
 #include "support/sensed_ride.hpp"
@@ -77,6 +79,7 @@ class Shuttle {
     for (; std::abs(to_m - at_m_) > 0.5 * step_m; at_m_ += way_m) {
       const auto s = sensors_.step(heading, 0, at_m_, at_m_ + way_m, 0.05);
       locator_.move(s.way_m, s.turn_rad, s.turn_sigma_rad);
+      if (prepares) locator_.prepare();
     }
   }
   /// Stands for so many pictures, of which the odometer errs by centimetres.
@@ -90,6 +93,7 @@ class Shuttle {
     }
   }
   NetworkLocator& locator() { return locator_; }
+  bool prepares = false;
 
  private:
   testing::RideErrors errors_ = errors_of(0.01);
@@ -281,6 +285,25 @@ TEST_F(NetworkLocatorTest, WhatWasLookedForBeforeIsTakenFromMemoryAndGivesTheSam
   EXPECT_TRUE(often.certain());
   EXPECT_EQ(often.places.front().place.edge, once.places.front().place.edge);
   EXPECT_NEAR(often.places.front().place.offset_m, once.places.front().place.offset_m, 0.5);
+}
+
+// With some rolling back where a block of the way is just whole.
+TEST_F(NetworkLocatorTest, WhatIsPreparedOnTheWayGivesTheSameAndLessIsLeftToDo) {
+  const auto index = network_of(lines_);
+  const track::Route route({index->map().edge(17), true}, 0, 0);
+  const auto last_search = [&](bool prepares) {
+    Shuttle train(index, 700);
+    train.prepares = prepares;
+    for (const double to_m : {1430.0, 1425.0, 2105.0, 2100.0, 4200.0}) train.run(route, to_m);
+    const std::clock_t begin = std::clock();
+    auto location = train.locator().locate();
+    return std::pair(std::move(location), std::clock() - begin);
+  };
+  const auto [once, whole] = last_search(false);
+  const auto [prepared, rest] = last_search(true);
+  expect_right(prepared, route, 4200);
+  EXPECT_NEAR(prepared.places.front().place.offset_m, once.places.front().place.offset_m, 0.5);
+  EXPECT_LT(rest, whole);
 }
 
 TEST_F(NetworkLocatorTest, NotAskedForLongerThanTheWayItRemembersItFindsThePlaceNonetheless) {
