@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <limits>
 #include <utility>
 
 #include "core/units.hpp"
@@ -287,17 +289,24 @@ TEST_F(NetworkLocatorTest, WhatWasLookedForBeforeIsTakenFromMemoryAndGivesTheSam
   EXPECT_NEAR(often.places.front().place.offset_m, once.places.front().place.offset_m, 0.5);
 }
 
-// With some rolling back where a block of the way is just whole.
+// With some rolling back where a block of the way is just whole. The least times of several rides are compared: what
+// else the machine does counts for processor time, too.
 TEST_F(NetworkLocatorTest, WhatIsPreparedOnTheWayGivesTheSameAndLessIsLeftToDo) {
+  constexpr int kRides = 5;
   const auto index = network_of(lines_);
   const track::Route route({index->map().edge(17), true}, 0, 0);
   const auto last_search = [&](bool prepares) {
-    Shuttle train(index, 700);
-    train.prepares = prepares;
-    for (const double to_m : {1430.0, 1425.0, 2105.0, 2100.0, 4200.0}) train.run(route, to_m);
-    const std::clock_t begin = std::clock();
-    auto location = train.locator().locate();
-    return std::pair(std::move(location), std::clock() - begin);
+    Location location;
+    std::clock_t least = std::numeric_limits<std::clock_t>::max();
+    for (int i = 0; i < kRides; ++i) {
+      Shuttle train(index, 700);
+      train.prepares = prepares;
+      for (const double to_m : {1430.0, 1425.0, 2105.0, 2100.0, 4200.0}) train.run(route, to_m);
+      const std::clock_t begin = std::clock();
+      location = train.locator().locate();
+      least = std::min(least, std::clock() - begin);
+    }
+    return std::pair(location, least);
   };
   const auto [once, whole] = last_search(false);
   const auto [prepared, rest] = last_search(true);
