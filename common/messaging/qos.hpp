@@ -17,7 +17,6 @@ struct QosProfile {
   bool exclusive = false;        // a reader hears one writer at a time, and stays with it (standby services)
   int64_t deadline_ns = 0;       // 0 = none
   bool data_sharing = false;     // zero copy on one host; for plain, unkeyed types
-  uint32_t one_in = 1;           // a reader may want every n-th sample only; its handler gets no others
   bool asynchronous = false;     // sending never blocks the service thread
 };
 

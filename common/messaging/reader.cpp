@@ -45,7 +45,6 @@ struct AnyReader::Impl : dds::DataReaderListener {
   std::shared_ptr<const Handler> handler;
   Queue::Source source;
   bool exclusive = false;
-  uint32_t one_in = 1;
   uint64_t layout = 0;
   OneWriter one_writer;                     // the middleware's thread only
   std::map<uint64_t, bool> fits_by_writer;  // the same
@@ -60,7 +59,6 @@ struct AnyReader::Impl : dds::DataReaderListener {
   void on_data_available(dds::DataReader* from) override {
     type->take_all(*from, [this](std::shared_ptr<const void> sample, const SampleInfo& info) {
       if (!hears(info.writer)) return;
-      if (info.sequence % one_in != 0) return;
       if (exclusive && !one_writer.hears(info.writer)) return;
       queue->push(&source, [run = handler, sample = std::move(sample), info] { (*run)(sample, info); });
     });
@@ -76,7 +74,6 @@ AnyReader::AnyReader(Participant& participant, const TopicInfo& topic, const std
   impl_->queue = &queue;
   impl_->handler = std::make_shared<const Handler>(std::move(handler));
   impl_->exclusive = topic.qos.exclusive;
-  impl_->one_in = std::max(topic.qos.one_in, 1U);
   impl_->source.limit = topic.reader_queue;
   impl_->subscriber = inside.ends_of(topic).subscriber;
   dds::DataReaderQos qos;

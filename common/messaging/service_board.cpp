@@ -28,14 +28,14 @@ void ServiceBoard::note(const msg::ServiceStatus& status, int64_t now_ns, uint64
   seen.alive = true;
 }
 
-bool ServiceBoard::note_silence(int64_t now_ns, uint32_t one_in) {
+bool ServiceBoard::note_silence(int64_t now_ns) {
   const int64_t passed_ns = now_ns - std::exchange(looked_ns_, now_ns);
   const bool in_time = passed_ns >= 0 && passed_ns < kSilentNs - kLookNs;
   const bool played = player_ns_ != 0 && now_ns - player_ns_ < kPlayerNs;
   if (!in_time || played) return false;
   bool fallen = false;
   for (auto& [key, seen] : services_) {
-    if (!seen.alive || now_ns - seen.received_ns < kSilentNs * one_in) continue;
+    if (!seen.alive || now_ns - seen.received_ns < kSilentNs) continue;
     seen.alive = false;
     fallen = true;
     if (!seen.stopped()) seen.since_ns = seen.received_ns;

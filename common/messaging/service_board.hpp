@@ -35,8 +35,8 @@ class ServiceBoard {
   void note_player(int64_t now_ns) { player_ns_ = now_ns; }
   /// Who has said nothing for kSilentNs is dead, frozen or stopped: services speak four times a second. Nobody is
   /// silent because the caller was held up itself, or because the clock was set. True: somebody is silent since the
-  /// last time. `one_in`: only every n-th status comes here.
-  bool note_silence(int64_t now_ns, uint32_t one_in = 1);
+  /// last time.
+  bool note_silence(int64_t now_ns);
   /// The same for who comes by all the time: looks no more often than kLookNs.
   bool note_silence_now_and_then(int64_t now_ns);
   [[nodiscard]] const std::map<Key, ServiceSeen>& services() const { return services_; }

@@ -1,7 +1,6 @@
 #include "service/loop.hpp"
 
 #include <algorithm>
-#include <ranges>
 
 #include "core/joined.hpp"
 #include "core/kernel_clock.hpp"
@@ -191,7 +190,7 @@ void Loop::answer(const msg::ControlRequest& request) {
   reply.request_id(request.request_id());
   reply.service(service_);
   if (known == commands_.end()) {
-    const auto names = core::joined(commands_ | std::views::keys);
+    const auto names = core::joined(commands_, [](const auto& one) { return one.first; });
     reply.done(false);
     reply.text(service_ + " does not know the command " + command + (names.empty() ? "" : "; it knows: " + names));
   } else {

@@ -36,7 +36,7 @@ const Projection* projection_for(const std::string& crs) {
     cached.projection.reset();
     if (opened.ok()) cached.projection = std::make_unique<Projection>(std::move(opened).value());
   }
-  return cached.projection.get();
+  return cached.projection.get();  // NOLINT(clang-analyzer-cplusplus.NewDelete): clang-tidy 14 takes it for freed
 }
 
 /// A line that was cut at switches is called NAME, NAME#2, ...: counts on over its pieces, which need not follow one

@@ -48,7 +48,9 @@ Junctions::Junctions(const Map& map) : map_(&map) {
 std::vector<Run> Junctions::after(const Run& run) const {
   const uint32_t node = run.forward ? run.edge->to_node : run.edge->from_node;
   std::vector<std::pair<double, Run>> found;
-  for (const Connection* met : std::ranges::equal_range(by_node_, node, {}, &Connection::node)) {
+  for (auto at = std::ranges::lower_bound(by_node_, node, {}, &Connection::node);
+       at != by_node_.end() && (*at)->node == node; ++at) {
+    const Connection* met = *at;
     if (met->edge_a != run.edge->id && met->edge_b != run.edge->id) continue;
     const Edge* other = map_->edge(met->edge_a == run.edge->id ? met->edge_b : met->edge_a);
     if (other == nullptr) continue;
@@ -60,6 +62,7 @@ std::vector<Run> Junctions::after(const Run& run) const {
   }
   std::ranges::stable_sort(found, {}, &std::pair<double, Run>::first);
   std::vector<Run> runs;
+  runs.reserve(found.size());
   for (const auto& [cost, next] : found) runs.push_back(next);
   return runs;
 }

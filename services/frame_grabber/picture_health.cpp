@@ -69,8 +69,9 @@ void PictureHealth::watch_track(const geometry::Intrinsics& camera, const geomet
   const geometry::View view(camera, mount);
   TileMask mask;
   for (int i = 0; i < kTiles; ++i) {
+    const int row = i / kTileColumns;
     const Eigen::Vector2d centre((i % kTileColumns + 0.5) * camera.width_px / kTileColumns,
-                                 (i / kTileColumns + 0.5) * camera.height_px / kTileRows);
+                                 (row + 0.5) * camera.height_px / kTileRows);
     const auto ground = view.on_plane(centre, 0);
     if (ground && ground->x() > kNearM && ground->x() < kFarM && std::abs(ground->y()) < kHalfWidthM) mask.set(i);
   }

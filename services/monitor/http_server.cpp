@@ -266,7 +266,7 @@ struct HttpServer::Impl {
   }
 
   template <class Stream>
-  void open(Stream&& stream) {
+  void open(Stream stream) {
     const auto session = std::make_shared<HttpSession<Stream>>(shared, std::move(stream));
     shared->sessions.emplace_back(session);
     session->begin();

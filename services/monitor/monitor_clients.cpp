@@ -170,7 +170,6 @@ Response MonitorService::metrics_answer() {
 }
 
 Response MonitorService::health_answer() {
-  watched_ns_ = core::monotonic_ns();
   const auto& problems = problems_.problems();
   const bool bad = !problems.empty() && problems.front().level == Level::error;
   return {bad ? 503U : 200U, kText, bad ? problems.front().what + "\n" : "ok\n", "", "no-store"};

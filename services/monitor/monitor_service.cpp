@@ -24,14 +24,6 @@ constexpr int64_t kScrapeNs = 60 * core::kNsPerSecond;
 // Readers go away this long after the last one looked, so that opening a page anew makes none.
 constexpr int64_t kLingerNs = 10 * core::kNsPerSecond;
 constexpr auto kBeat = 50ms;
-// Of these one sample stands for so many when nobody looks: enough to say since when somebody is silent, the position
-// is wide or has stopped coming.
-constexpr uint32_t kIdleStatuses = 4;
-const std::map<std::string, uint32_t>& idle_one_in() {
-  static const std::map<std::string, uint32_t> one_in{
-      {topics::train_state.name, 8}, {topics::gnss_fix.name, 4}, {topics::service_status.name, kIdleStatuses}};
-  return one_in;
-}
 
 std::filesystem::path page_folder(const std::string& configured) {
   if (!configured.empty()) return configured;
@@ -267,15 +259,9 @@ void MonitorService::choose_topics() {
   const int64_t now_ns = core::monotonic_ns();
   for (const auto& name : wanted_topics()) wanted_ns_[name] = now_ns;
   std::erase_if(wanted_ns_, [&](const auto& entry) { return now_ns - entry.second > kLingerNs; });
-  if (!nobody_looks() || scraped()) watched_ns_ = now_ns;
-  const bool idle = watched_ns_ == 0 || now_ns - watched_ns_ > kLingerNs;
-  if (idle) idle_ns_ = now_ns;
-  std::map<std::string, uint32_t> one_in;
-  for (const auto& [name, at_ns] : wanted_ns_) {
-    const auto sparse = idle_one_in().find(name);
-    one_in[name] = idle && sparse != idle_one_in().end() ? sparse->second : 1;
-  }
-  watch_.read(one_in);
+  std::set<std::string> names;
+  for (const auto& [name, at_ns] : wanted_ns_) names.insert(name);
+  watch_.read(names);
 }
 
 void MonitorService::show_channels() {
@@ -330,9 +316,7 @@ TrainSeen MonitorService::train_seen() {
 
 void MonitorService::look_for_silence() {
   if (recent(player_)) services_.note_player(player_.arrived_ns);
-  const int64_t now_ns = core::monotonic_ns();
-  const bool sparse = now_ns - idle_ns_ < kIdleStatuses * core::kNsPerSecond;
-  if (!services_.note_silence(now_ns, sparse ? kIdleStatuses : 1)) return;
+  if (!services_.note_silence(core::monotonic_ns())) return;
   publish_services();
   look_for_problems();
 }

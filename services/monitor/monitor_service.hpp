@@ -122,9 +122,7 @@ class MonitorService {
   bool looked_ = false;
   int64_t begun_ns_ = 0;
   int64_t scraped_ns_ = 0;
-  int64_t watched_ns_ = 0;  // when somebody looked last
   uint64_t slow_viewers_ = 0;
-  int64_t idle_ns_ = 0;  // when nobody had looked for long, last
   uint64_t beats_ = 0;
 
   uint64_t next_request_ = 0;

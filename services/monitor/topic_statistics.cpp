@@ -32,7 +32,7 @@ TopicStatistics::Slice& TopicStatistics::slice(int64_t at_ns) {
 }
 
 void TopicStatistics::add(const SeenSample& sample) {
-  lost_ += sequences_.before(sample.writer, sample.sequence / one_in_, exclusive_);
+  lost_ += sequences_.before(sample.writer, sample.sequence, exclusive_);
   if (samples_ == 0) {
     first_ns_ = sample.arrived_ns;
   } else {
@@ -45,15 +45,6 @@ void TopicStatistics::add(const SeenSample& sample) {
   ++now.samples;
   now.bytes += sample.bytes;
   if (sample.source_ns > 0) note_latency(sample);
-}
-
-// The rate begins anew; how long the topic is silent is known throughout.
-void TopicStatistics::thin(uint32_t one_in) {
-  usual_gap_s_ *= static_cast<double>(one_in) / one_in_;
-  one_in_ = one_in;
-  sequences_ = {};
-  slices_.fill({});
-  first_ns_ = last_ns_;
 }
 
 void TopicStatistics::note_gap(int64_t gap_ns) {

@@ -47,8 +47,6 @@ class TopicStatistics {
   /// exclusive: one of its writers is heard at a time.
   explicit TopicStatistics(bool exclusive = false) : exclusive_(exclusive) {}
   void add(const SeenSample& sample);
-  /// From now on one in n samples is asked for.
-  void thin(uint32_t one_in);
   [[nodiscard]] TopicNumbers numbers(int64_t now_ns) const;  // monotonic
   /// How many latencies lay at or below each bound and above the one before; the last one counts those beyond.
   [[nodiscard]] const std::array<uint64_t, kLatencyBoundsS.size() + 1>& latency_counts() const {
@@ -86,7 +84,6 @@ class TopicStatistics {
   size_t next_latency_ = 0;
   std::array<uint64_t, kLatencyBoundsS.size() + 1> latency_counts_{};
   double latency_sum_s_ = 0;
-  uint32_t one_in_ = 1;
   bool exclusive_;
   core::SequenceGaps sequences_;
 };

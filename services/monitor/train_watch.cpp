@@ -20,27 +20,22 @@ bool of_fixed_size(const cdr::Structure& structure) {
 
 }  // namespace
 
-void TrainWatch::read(const std::map<std::string, uint32_t>& one_in_by_name) {
+void TrainWatch::read(const std::set<std::string>& names) {
   for (auto& [name, topic] : topics_) {
-    if (topic.reader && !one_in_by_name.contains(name)) topic.reader.reset();
+    if (topic.reader && !names.contains(name)) topic.reader.reset();
   }
-  for (const auto& [name, one_in] : one_in_by_name) {
+  for (const std::string& name : names) {
     const auto* info = messaging::find_topic(name);
     if (info == nullptr) continue;
     Topic& topic = topics_[name];
-    if (topic.reader && topic.one_in == one_in) continue;
-    if (!topic.reader) topic.statistics = TopicStatistics(info->qos.exclusive);
-    topic.statistics.thin(one_in);
-    topic.reader.reset();
+    if (topic.reader) continue;
+    topic.statistics = TopicStatistics(info->qos.exclusive);
     topic.info = info;
-    topic.one_in = one_in;
     topic.read_since_ns = core::monotonic_ns();
     messaging::TopicInfo lenient = *info;
     // Statuses come again before anyone has missed one; asking for one again would cost an answer to each.
     if (info->name == messaging::topics::service_status.name) lenient.qos.transient_local = false;
     if (!lenient.qos.transient_local) lenient.qos.reliable = false;
-    lenient.qos.one_in = one_in;
-    if (one_in > 1) lenient.qos.deadline_ns = 0;
     lenient.reader_queue = std::max(info->reader_queue, info->name == "camera_preview" ? size_t{4} : kWaiting);
     const size_t slash = name.find('/');
     topic.reader = std::make_unique<messaging::AnyReader>(

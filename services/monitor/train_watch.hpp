@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 
 #include "messaging/topics.hpp"
@@ -30,9 +31,8 @@ class TrainWatch {
   TrainWatch(messaging::Participant& participant, Handler handler)
       : participant_(participant), handler_(std::move(handler)) {}
 
-  /// From now on exactly these topics ("track_view", "camera_preview/cam0") are read, each with "one in n samples";
-  /// unknown names are left out.
-  void read(const std::map<std::string, uint32_t>& one_in_by_name);
+  /// From now on exactly these topics ("track_view", "camera_preview/cam0") are read; unknown names are left out.
+  void read(const std::set<std::string>& names);
   /// Handles what has come since the last call.
   void drain();
   /// Samples that waited too long for drain(), since the last call.
@@ -43,7 +43,6 @@ class TrainWatch {
     TopicStatistics statistics;
     std::unique_ptr<messaging::AnyReader> reader;
     int64_t read_since_ns = 0;  // monotonic
-    uint32_t one_in = 1;
     size_t fixed_bytes = 0;  // of every sample, 0 = not fixed
   };
   /// All that were ever read.

@@ -38,8 +38,9 @@ NetworkIndex::NetworkIndex(std::shared_ptr<const track::Map> map)
     const auto* edge = map_->edge(l.edge);
     if (edge == nullptr || !is_mark(l.kind)) continue;
     const double length_m = edge->alignment.length_m();
-    marks_[2 * (l.edge - 1)].push_back({l.offset_m, mark_kind(l.kind), l.lateral_m});
-    marks_[2 * (l.edge - 1) + 1].push_back({length_m - l.offset_m, mark_kind(l.kind), -l.lateral_m});
+    const size_t run = 2 * (size_t{l.edge} - 1);
+    marks_[run].push_back({l.offset_m, mark_kind(l.kind), l.lateral_m});
+    marks_[run + 1].push_back({length_m - l.offset_m, mark_kind(l.kind), -l.lateral_m});
   }
   for (auto& marks : marks_) {
     std::sort(marks.begin(), marks.end(), [](const Mark& a, const Mark& b) { return a.along_m < b.along_m; });

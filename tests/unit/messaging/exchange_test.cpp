@@ -194,25 +194,6 @@ TEST_F(Exchange, AWriterOfAnotherLayoutIsNotHeardAndNamed) {
                   "bring both to one release"));
 }
 
-// Which ones is decided by their numbers, so a reader that joins later gets the same.
-TEST_F(Exchange, AReaderMayWantEveryFourthSampleOnly) {
-  TopicInfo thinned = info_of(topics::train_state);
-  thinned.qos.reliable = false;
-  thinned.qos.one_in = 4;
-  std::vector<uint64_t> part;
-  AnyReader some(participant_, thinned, "", queue_,
-                 [&](const auto&, const SampleInfo& info) { part.push_back(info.sequence); });
-  uint64_t last = 0;
-  Reader<msg::TrainState> all(participant_, topics::train_state, "", queue_,
-                              [&](const msg::TrainState&, const SampleInfo& info) { last = info.sequence; });
-  Participant fusion(options("train-" + std::to_string(getpid())));
-  Writer<msg::TrainState> writer(fusion, topics::train_state);
-  ASSERT_TRUE(run_until([&] { return writer.matched_readers() == 2 && some.matched_writers() == 1; }));
-  EXPECT_EQ(participant_.connections().pairs, 2U) << "it counts as a reader of its topic";
-  ASSERT_TRUE(run_until([&] { return writer.write({}) && last >= 40 && part.size() >= 8; }));
-  for (const uint64_t sequence : part) EXPECT_EQ(sequence % 4, 0U);
-}
-
 TEST(Serialize, RoundTripsAndRefusesShortBytes) {
   msg::ServiceStatus status;
   status.service("fusion");

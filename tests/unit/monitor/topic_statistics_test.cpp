@@ -53,23 +53,6 @@ TEST(TopicStatistics, CountsWhatIsMissingAndTheGap) {
   EXPECT_NEAR(topic.usual_gap_s(), 0.01, 1e-3);
 }
 
-// Every fourth sample is asked for, then all again: no loss, no gap, and the silence before counts on.
-TEST(TopicStatistics, ThinnedOutIsNotLost) {
-  TopicStatistics topic;
-  for (int i = 0; i < 20; ++i) topic.add(sample(10 * i, static_cast<uint64_t>(i)));
-  topic.thin(4);
-  for (int i = 20; i < 60; i += 4) topic.add(sample(10 * i, static_cast<uint64_t>(i)));
-  EXPECT_NEAR(topic.usual_gap_s(), 0.04, 0.005);
-  topic.add(sample(680, 68));
-  EXPECT_EQ(topic.numbers(kBegin_ns + 680 * kMs).lost, 2U) << "60 and 64 were asked for";
-  topic.thin(1);
-  EXPECT_NEAR(*topic.numbers(kBegin_ns + 3'680 * kMs).age_s, 3, 1e-9);
-  for (int i = 400; i < 500; ++i) topic.add(sample(10 * i, static_cast<uint64_t>(i)));
-  const auto numbers = topic.numbers(kBegin_ns + 5'000 * kMs);
-  EXPECT_EQ(numbers.lost, 2U);
-  EXPECT_NEAR(topic.usual_gap_s(), 0.01, 1e-3);
-}
-
 // A standby goes on counting while nobody hears it; it is heard when the other one falls silent.
 TEST(TopicStatistics, NothingIsLostWhenAStandbyTakesOver) {
   for (const bool exclusive : {true, false}) {

@@ -1,7 +1,6 @@
 // What a player does when it is told to.
 #include <sched.h>
 #include <spdlog/fmt/fmt.h>
-#include <ranges>
 
 #include "core/joined.hpp"
 #include "core/time.hpp"
@@ -65,7 +64,7 @@ core::Result<std::string> Player::carry_out(const std::string& name, const std::
     return result;
   }
   return core::Error{"player does not know the command " + name +
-                     "; it knows: " + core::joined(commands_ | std::views::keys)};
+                     "; it knows: " + core::joined(commands_, [](const auto& one) { return one.first; })};
 }
 
 void Player::post(const std::string& name, const std::string& argument) {

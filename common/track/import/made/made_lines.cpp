@@ -264,8 +264,8 @@ MadeLines make_lines(size_t n, double spacing_m, uint64_t seed) {
     out.junctions[a].lines[side_a].push_back(index);
     out.junctions[b].lines[side_b].push_back(index);
   };
-  for (size_t i = 0; i < n * n; ++i) {  // ahead of a junction is the east
-    if (i % n + 1 < n) connect(i, 1, i + 1, 0);
+  for (size_t row = 0; row < n; ++row) {
+    for (size_t i = row * n; i + 1 < (row + 1) * n; ++i) connect(i, 1, i + 1, 0);  // ahead of a junction is the east
   }
   for (size_t i = 0; i + n < n * n; ++i) connect(i, random.next() % 2, i + n, random.next() % 2);
   for (size_t i = 0; i < out.lines.size(); ++i) {
