@@ -263,16 +263,17 @@ std::vector<BaliseTracker::Passed> BaliseTracker::groups_on(const std::vector<Wa
   return common;
 }
 
-std::optional<double> BaliseTracker::foot_beyond_m(uint32_t nid_lrbg) const {
-  if (reference_ && reference_->group->nid_lrbg() == nid_lrbg) return reference_->foot_m;
+std::optional<Reference> BaliseTracker::behind(uint32_t nid_lrbg) const {
+  if (reference_ && reference_->group->nid_lrbg() == nid_lrbg) return reference_;
   if (!last_ || leg_is_guess()) return std::nullopt;
   const auto path = track::Path::follow(map_, *last_, 0, search_behind_m_);
   if (!path.ok()) return std::nullopt;
-  std::optional<double> beyond_m;
+  std::optional<Reference> found;
   for (const auto& mark : path.value().balise_groups()) {  // by distance: the last one is the nearest
-    if (mark.distance_m <= 0 && mark.group->nid_lrbg() == nid_lrbg) beyond_m = -mark.distance_m;
+    if (mark.distance_m <= 0 && mark.group->nid_lrbg() == nid_lrbg)
+      found = Reference{mark.group, nullptr, mark.nominal_is_along_path, true, -mark.distance_m};
   }
-  return beyond_m;
+  return found;
 }
 
 std::optional<BaliseTracker::Step> BaliseTracker::step_to(const EdgePosition& foot) const {

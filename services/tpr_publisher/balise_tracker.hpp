@@ -57,9 +57,9 @@ class BaliseTracker {
   [[nodiscard]] uint32_t passed_again() const { return passed_again_; }
   /// How far the train has come since its track was declared last; nothing while it is declared.
   [[nodiscard]] std::optional<double> undeclared_m() const;
-  /// How far the foot is beyond this group, along, when it is the reference or lies behind the train, no farther than
-  /// one is looked for at the start.
-  [[nodiscard]] std::optional<double> foot_beyond_m(uint32_t nid_lrbg) const;
+  /// This group as a reference, when it is the present one or lies behind the train, no farther than one is looked for
+  /// at the start.
+  [[nodiscard]] std::optional<Reference> behind(uint32_t nid_lrbg) const;
 
  private:
   /// A group on the way from the last place to this one.

@@ -88,11 +88,12 @@ void refer(const TrainPosition& position, const Reference& reference, Motion mot
 }  // namespace
 
 Allowance train_allowance(const ReportSettings& settings) {
-  const bool applies =
-      settings.baseline == etcs::Baseline::b4 &&
-      (settings.m_mode == kSupervisedManoeuvre || (settings.m_mode == kStandBy && !settings.train_data));
-  if (!applies) return {};
-  return {amount_m(settings.train_over_m), amount_m(settings.train_under_m)};
+  if (settings.baseline != etcs::Baseline::b4) return {};
+  if (settings.m_mode == kSupervisedManoeuvre)
+    return {amount_m(settings.train_over_m), amount_m(settings.train_under_m)};
+  if (settings.m_mode == kStandBy && !settings.train_data)
+    return {std::max(settings.train_over_m, 0.0), std::max(settings.train_under_m, 0.0)};
+  return {};
 }
 
 uint32_t orientation(const Reference& reference) {

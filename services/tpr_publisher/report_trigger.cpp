@@ -117,8 +117,8 @@ std::optional<Reason> ReportTrigger::onboard_reason(const Moment& moment) const 
   const auto& then = reported_->onboard;
   // Who counts from 0 again wants nothing yet.
   const uint32_t wanted_before = now.reports_wanted < then.reports_wanted ? 0 : then.reports_wanted;
-  if (now.m_mode != then.m_mode) return Reason::mode;
-  if (now.m_level != then.m_level || now.nid_ntc != then.nid_ntc) return Reason::level;
+  if (moment.mode_changes != reported_->mode_changes) return Reason::mode;
+  if (moment.level_changes != reported_->level_changes) return Reason::level;
   if (now.q_integrity == etcs::kIntegrityLost && then.q_integrity != etcs::kIntegrityLost)
     return Reason::integrity_lost;
   const bool confirmed = now.q_integrity != then.q_integrity || now.integrity_ns != then.integrity_ns;

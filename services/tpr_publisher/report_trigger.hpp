@@ -57,6 +57,8 @@ struct Moment {
   std::optional<double> beyond_lrbg_m;    // front end beyond the LRBG, along the train
   std::optional<double> beyond_origin_m;  // ... beyond the group that wanted_origin() names
   Onboard onboard;
+  uint32_t mode_changes = 0;  // of what is reported: count up, so that one there and back is noticed
+  uint32_t level_changes = 0;
 };
 
 class ReportTrigger {

@@ -18,23 +18,38 @@ bool ToldParameters::remember(const std::string& notes) {
   return true;
 }
 
-bool ToldParameters::hear(std::span<const uint8_t> packet, bool just_come) {
-  if (packet.empty()) return false;
+bool ToldParameters::is_known(std::span<const uint8_t> packet, std::optional<uint32_t> lrbg) const {
   const auto& last = newer_ ? newer_ : used_;
-  if (last && std::ranges::equal(packet, last->bytes)) return false;
-  newer_ = {{packet.begin(), packet.end()},
-            just_come ? std::nullopt : std::optional<uint32_t>(etcs::kUnknownBaliseGroup)};
+  return last && std::ranges::equal(packet, last->bytes) && (!lrbg || lrbg == last->origin);
+}
+
+bool ToldParameters::hear(std::span<const uint8_t> packet, bool just_come, uint32_t lrbg) {
+  const bool said = lrbg != 0 && etcs::names_group(lrbg);
+  auto origin = said ? std::optional(lrbg) : std::nullopt;
+  if (packet.empty() || is_known(packet, origin)) return false;
+  if (!said && !just_come) origin = etcs::kUnknownBaliseGroup;
+  newer_ = {{packet.begin(), packet.end()}, origin};
   return try_newer();
+}
+
+bool ToldParameters::hear_deleted() {
+  if (!used_ && !newer_) return false;
+  used_.reset();
+  newer_.reset();
+  waits_ = false;
+  refusal_.clear();
+  publisher_.delete_parameters();
+  return true;
 }
 
 // Once it is known where locations count from they are not moved to where a later process begins.
 bool ToldParameters::follow() {
   const auto origin = publisher_.origin();
   if (used_ && origin) used_->origin = origin;
-  return waits_ && publisher_.direction_known() && try_newer();
+  return waits_ && publisher_.direction_known(newer_->origin) && try_newer();
 }
 
-// It was for this train's direction when it came: Q_DIR is relative to the LRBG of that moment, not to the present one.
+// It was for this train's orientation when it came.
 void ToldParameters::begin_anew() {
   if (!used_) return;
   auto parameters = etcs::decode_report_parameters(used_->bytes).value();
@@ -46,7 +61,7 @@ core::Status ToldParameters::take_newer() {
   waits_ = false;
   const auto parameters = etcs::decode_report_parameters(newer_->bytes);
   if (!parameters.ok()) return parameters.error();
-  waits_ = !publisher_.direction_known();
+  waits_ = !publisher_.direction_known(newer_->origin);
   return publisher_.set_parameters(parameters.value(), newer_->origin);
 }
 

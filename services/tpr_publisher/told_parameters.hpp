@@ -18,9 +18,12 @@ class ToldParameters {
 
   /// notes() of the process before, used as they are; what cannot be read says nothing. True when they are used.
   bool remember(const std::string& notes);
-  /// What stands in an onboard_status; empty = none. `just_come`: it did not stand in one of some seconds ago, and its
-  /// locations count from the present LRBG. True when it is used from now on.
-  bool hear(std::span<const uint8_t> packet, bool just_come);
+  /// What stands in an onboard_status; empty = none. `lrbg`: the group that the message which brought it refers to
+  /// (3.6.2.2.1); where that was not said (0, "unknown"), the present LRBG of a packet that has `just_come`: it did not
+  /// stand in an onboard_status of some seconds ago. True when it is used from now on.
+  bool hear(std::span<const uint8_t> packet, bool just_come, uint32_t lrbg = etcs::kUnknownBaliseGroup);
+  /// None is valid any more (4.9.1.3, table 4.10): those of the settings again. True when that is new.
+  bool hear_deleted();
   /// To be called when the publisher has followed the train: what came before the train's direction was known may fit
   /// now, and the LRBG that locations count from may have been found. True when one is used from now on.
   bool follow();
@@ -34,8 +37,9 @@ class ToldParameters {
  private:
   struct Packet {
     std::vector<uint8_t> bytes;
-    std::optional<uint32_t> origin;  // LRBG when it came, for its locations; nothing = the next one
+    std::optional<uint32_t> origin;  // what it refers to; nothing = the next LRBG
   };
+  [[nodiscard]] bool is_known(std::span<const uint8_t> packet, std::optional<uint32_t> lrbg) const;
   core::Status take_newer();
   bool try_newer();
 

@@ -49,6 +49,8 @@ inline core::Result<Onboard> onboard_of(const msg::OnboardStatus& status) {
     return core::Error{"q_integrity is " + std::to_string(status.q_integrity()) + ", not 0 to 3."};
   if (status.active_cab() > 2)
     return core::Error{"active_cab is " + std::to_string(status.active_cab()) + ", not 0 to 2."};
+  if (status.packet_58_lrbg() > etcs::kUnknownBaliseGroup)
+    return core::Error{"packet_58_lrbg is " + std::to_string(status.packet_58_lrbg()) + ", not 0 to 16777215."};
   if (status.reports_wanted() != 0 &&
       (status.wanted_because() < msg::REPORT_BORDER || status.wanted_because() > msg::REPORT_ERROR))
     return core::Error{"wanted_because is " + std::to_string(status.wanted_because()) +

@@ -19,6 +19,7 @@ constexpr int64_t kMostAheadNs = core::kNsPerSecond;
 constexpr double kLongUndeclaredM = 500;  // a switch every few kilometres, declared soon, is no trouble
 // Of a train that comes to rest the estimated speed may have any sign: its direction is that of its way.
 constexpr double kSurelyMovesMps = 1.0;
+constexpr int64_t kTrainborneStepNs = 10'000'000;  // T_TRAIN
 constexpr double kNoCorrectionM = 2.0;
 constexpr double kMovesM = 0.05;     // what fusion takes for rest
 constexpr double kCorrectionM = 20;  // a distance may be corrected by so much, and by what it was not sure of
@@ -94,6 +95,9 @@ void TprPublisher::follow(const TrainPosition& position) {
   const bool guessed = position.place_known() && !position.track_declared();
   const bool same_group = reference_ && reference_->group == group_before;
   doubt_.follow(position, reference_ ? std::optional(reference_->foot_m) : std::nullopt, same_group, !guessed);
+  // 4.0.0 only: a train that has backed is not taken for complete (3.6.5.2, table 2c [8]).
+  const bool backs = !position.standstill && (is_turned() ? turned(motion_) : motion_) == Motion::backward;
+  if (backs && settings_.report.baseline == etcs::Baseline::b4) integrity_.use_up();
   if (position.usable) {
     integrity_.follow(integrity_place());
   } else {
@@ -139,19 +143,28 @@ double TprPublisher::group_m() const {
 
 TrainIntegrity::Place TprPublisher::integrity_place() const {
   const auto position = doubted_position();
-  return {position.stamp_ns, position.distance_m, position.over_m + group_m()};
+  return {position.stamp_ns, position.distance_m,
+          position.over_m + group_m() + train_allowance(settings_.report).over_m};
 }
 
-bool TprPublisher::direction_known() const {
-  const auto here = reference();
-  return here && orientation(*here) != etcs::kUnknownSide;
+uint32_t TprPublisher::orientation_to(std::optional<uint32_t> group) const {
+  auto there = reference();
+  if (there && group && *group != etcs::kUnknownBaliseGroup && *group != there->group->nid_lrbg()) {
+    there = tracker_->behind(*group);
+    if (there && is_turned()) there = turned(*there);
+  }
+  return there ? orientation(*there) : uint32_t{etcs::kUnknownSide};
+}
+
+bool TprPublisher::direction_known(std::optional<uint32_t> origin) const {
+  return orientation_to(origin) != etcs::kUnknownSide;
 }
 
 core::Status TprPublisher::set_parameters(const etcs::ReportParameters& parameters, std::optional<uint32_t> origin) {
   if (parameters.q_dir != etcs::kUnknownSide) {  // here the value 2 says "both"
-    if (!direction_known())
+    if (!direction_known(origin))
       return core::Error{"Packet 58 is for one direction only (Q_DIR), but the train's is not known yet."};
-    if (orientation(*reference()) != parameters.q_dir)
+    if (orientation_to(origin) != parameters.q_dir)
       return core::Error{"Packet 58 is for trains of the other direction (Q_DIR) than this one's."};
   }
   trigger_.set_parameters(parameters, origin);
@@ -166,6 +179,8 @@ core::Status TprPublisher::set_onboard(const Onboard& onboard, int64_t now_ns) {
   report.train_data = onboard.train_length_m > 0;
   const auto trial = etcs::encode(make_report({}, std::nullopt, Motion::unknown, report, 0), report.baseline);
   if (!trial.ok()) return trial.error();
+  mode_changes_ += report.m_mode != settings_.report.m_mode ? 1 : 0;
+  level_changes_ += report.m_level != settings_.report.m_level || report.nid_ntc != settings_.report.nid_ntc ? 1 : 0;
   settings_.report = report;
   length_said_ = length_said_ || report.train_data;
   if (length_said_) trigger_.set_train_length(onboard.train_length_m);
@@ -256,7 +271,8 @@ etcs::TrainPositionReport TprPublisher::fields(int64_t now_ns) const {
   auto settings = settings_.report;
   settings.foot_to_front_m = ends_.to_front_m(cab_).value_or(0);
   const auto here = reference();
-  auto fields = make_report(position, here, is_turned() ? turned(motion_) : motion_, settings, now_ns);
+  const auto motion = is_turned() ? turned(motion_) : motion_;
+  auto fields = make_report(position, here, motion, settings, trainborne_ns(now_ns));
   if (onboard_silent(now_ns)) return fields;
   double ahead_m = 0;
   if (here && fields.d_lrbg != etcs::kUnknownDistance) {  // trackside counts the length from the front end it was told
@@ -292,8 +308,8 @@ Moment TprPublisher::moment(int64_t now_ns) const {
     if (position_->track_declared() || !origin || *origin == moment.nid_lrbg)
       moment.beyond_lrbg_m = here->foot_m + to_front_m;
     if (origin) {
-      if (const auto foot_m = tracker_->foot_beyond_m(*origin))
-        moment.beyond_origin_m = (is_turned() ? -*foot_m : *foot_m) + to_front_m;
+      if (const auto there = tracker_->behind(*origin))
+        moment.beyond_origin_m = (is_turned() ? -there->foot_m : there->foot_m) + to_front_m;
     }
   }
   if (onboard_) {
@@ -301,11 +317,9 @@ Moment TprPublisher::moment(int64_t now_ns) const {
     // As in fields(): what is said again after a silence is news for the trackside.
     moment.onboard.q_integrity = onboard_silent(now_ns) ? etcs::kNoIntegrityInformation : integrity_.q_integrity();
     moment.onboard.integrity_ns = integrity_.integrity_ns();
-  } else {  // no change when it is heard for the first time and says the same
-    moment.onboard.m_mode = settings_.report.m_mode;
-    moment.onboard.m_level = settings_.report.m_level;
-    moment.onboard.nid_ntc = settings_.report.nid_ntc;
   }
+  moment.mode_changes = mode_changes_;
+  moment.level_changes = level_changes_;
   return moment;
 }
 
@@ -331,8 +345,20 @@ Outcome TprPublisher::update(const TrainPosition& position, int64_t now_ns) {
   auto message = etcs::encode(report.fields, settings_.report.baseline);
   if (!message.ok()) return {std::nullopt, "Position report not sent: " + message.error().message};
   report.message = std::move(message).value();
-  trigger_.sent(now);
+  sent(report, now);
   return {std::move(report), ""};
+}
+
+// A clock that was set back is taken on from where it was.
+int64_t TprPublisher::trainborne_ns(int64_t now_ns) const {
+  return std::max(now_ns + trainborne_ahead_ns_, sent_trainborne_ns_ + kTrainborneStepNs);
+}
+
+void TprPublisher::sent(const Report& report, const Moment& moment) {
+  trigger_.sent(moment);
+  sent_trainborne_ns_ = trainborne_ns(report.sent_ns);
+  trainborne_ahead_ns_ = sent_trainborne_ns_ - report.sent_ns;
+  if (settings_.report.baseline == etcs::Baseline::b4 && is_confirmed(report.fields.q_length)) integrity_.use_up();
 }
 
 Outcome TprPublisher::tick(int64_t now_ns) {

@@ -50,11 +50,13 @@ class TprPublisher {
   void watch(const TrainPosition& position, int64_t now_ns);
   /// Time goes on without a position: says when a report is due that cannot be sent.
   Outcome tick(int64_t now_ns);
-  /// A packet 58 from trackside. One for the other running direction than the train's (Q_DIR) is refused. `origin`: as
-  /// for the trigger.
+  /// A packet 58 from trackside. One for the other orientation than the train's (Q_DIR) is refused, as 3.6.3.1.3 asks.
+  /// `origin`: the group that Q_DIR and locations refer to, as for the trigger.
   core::Status set_parameters(const etcs::ReportParameters& parameters, std::optional<uint32_t> origin = std::nullopt);
   /// Whether such a packet can be judged.
-  [[nodiscard]] bool direction_known() const;
+  [[nodiscard]] bool direction_known(std::optional<uint32_t> origin = std::nullopt) const;
+  /// Those of the settings again.
+  void delete_parameters() { trigger_.set_parameters(settings_.parameters); }
   /// The group that its locations count from, when it has any and it is known.
   [[nodiscard]] std::optional<uint32_t> origin() const { return trigger_.origin(); }
   /// What the on-board unit says replaces mode and level of the settings. Refused when it cannot be encoded. Of one
@@ -81,12 +83,16 @@ class TprPublisher {
   /// With the doubt of an undeclared track; along the train's own axis, as the two below.
   [[nodiscard]] TrainPosition doubted_position() const;
   [[nodiscard]] std::optional<Reference> reference() const;
+  /// Of the train to this group, or to the present LRBG where none is named.
+  [[nodiscard]] uint32_t orientation_to(std::optional<uint32_t> group) const;
   /// What nobody knows of the place of the group that is referred to.
   [[nodiscard]] double group_m() const;
   [[nodiscard]] TrainIntegrity::Place integrity_place() const;
   void hear_integrity(const Onboard& onboard, int64_t now_ns);
   [[nodiscard]] Moment moment(int64_t now_ns) const;
   [[nodiscard]] etcs::TrainPositionReport fields(int64_t now_ns) const;
+  [[nodiscard]] int64_t trainborne_ns(int64_t now_ns) const;
+  void sent(const Report& report, const Moment& moment);
 
   Settings settings_;
   std::optional<BaliseTracker> tracker_;
@@ -98,6 +104,10 @@ class TprPublisher {
   int64_t complete_ns_ = 0;         // its integrity_ns in this host's clock ...
   int64_t complete_ahead_ns_ = 0;   // ... and how far it was ahead when it was heard first
   int64_t onboard_ahead_ns_ = 0;    // too much of it, and no confirmation is taken
+  uint32_t mode_changes_ = 0;
+  uint32_t level_changes_ = 0;
+  int64_t trainborne_ahead_ns_ = 0;  // T_TRAIN's clock is ahead of the caller's, which was set back
+  int64_t sent_trainborne_ns_ = 0;
   TrainEnds ends_;
   ActiveCab cab_ = ActiveCab::not_said;
   // Along the axis that the camera looks.

@@ -71,7 +71,8 @@ std::optional<GroundLinkSettings> GroundLinkConfig::settings(const std::string& 
 
 void TprPublisherConfig::describe(service::Fields& fields) {
   fields.text("map", map, "Compiled map with the balise groups; empty = every report says LRBG unknown.");
-  fields.choice("baseline", baseline, {"3", "4"}, "Layout of the message: SUBSET-026 3.x or 4.0.0.");
+  fields.choice("baseline", baseline, {"3", "4"},
+                "Layout of the message: 3 = SUBSET-026 3.x, 4 = 4.0.0 on trackside of system version 3.0.");
   fields.integer("nid_engine", nid_engine, {0, 16777215}, "", "On-board ETCS identity, NID_ENGINE.");
   fields.integer("m_mode", m_mode, {0, 31}, "", "On-board operating mode to report, M_MODE (0 = full supervision).");
   fields.integer("m_level", m_level, {0, 4}, "", "ETCS level to report, M_LEVEL (1 = NTC, 3 = level 2).");

@@ -57,14 +57,19 @@ void TprPublisherService::remember_packet_58() {
 
 // It stands in every onboard_status: who was away, or is the second one of two, hears it all the same.
 void TprPublisherService::hear_packet_58(const msg::OnboardStatus& status, bool just_come) {
+  if (status.packet_58_deleted() != 0) {
+    if (told_.hear_deleted()) context_.log().info("position report parameters of packet 58 deleted");
+    note_packet_58(false);
+    return;
+  }
   const size_t bytes = std::min<size_t>(status.packet_58_bytes(), status.packet_58().size());
-  note_packet_58(told_.hear({status.packet_58().data(), bytes}, just_come));
+  note_packet_58(told_.hear({status.packet_58().data(), bytes}, just_come, status.packet_58_lrbg()));
 }
 
 void TprPublisherService::note_packet_58(bool taken) {
   if (taken) context_.log().info("position report parameters of packet 58 taken over");
   const auto notes = told_.notes();
-  if (notes.empty() || notes == kept_) return;
+  if (notes == kept_) return;
   kept_ = notes;
   context_.keep(notes);
 }

@@ -35,6 +35,8 @@ void TrainIntegrity::hear(uint32_t q_integrity, int64_t integrity_ns, double tra
     return;
   }
   const bool other_length = train_length_m != train_length_m_;
+  if (other_length && integrity_ns == confirmed_ns_) used_up_ns_ = integrity_ns;
+  confirmed_ns_ = integrity_ns;
   if (is_confirmed(heard_.q_integrity) && !other_length) {
     if (integrity_ns == heard_.integrity_ns) {
       heard_.q_integrity = q_integrity;
@@ -80,7 +82,7 @@ void TrainIntegrity::place_rear() {
 
 TrainIntegrity::Said TrainIntegrity::said(double distance_m, double reported_ahead_m) const {
   if (!is_confirmed(q_integrity())) return {q_integrity(), std::nullopt};
-  if (!rear_m_) return {};
+  if (!rear_m_ || integrity_ns() == used_up_ns_) return {};
   const double length_m = std::ceil(std::max(distance_m, *at_distance_m_) - *rear_m_ + reported_ahead_m);
   if (!(length_m <= kLongestM)) return {};
   // A train shorter than the step of D_LRBG may lie in front of the front end that was reported.

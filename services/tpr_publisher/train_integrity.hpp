@@ -34,8 +34,12 @@ class TrainIntegrity {
   void lose_way();
   /// q_integrity as in the message; the train was complete at integrity_ns. Confirmed without a length, at a time that
   /// is longer ago than ten seconds, or before any place is known, it says nothing. Until the place of that time has
-  /// come, what was heard before stands; newer ones wait until then. What is no confirmation stands at once.
+  /// come, what was heard before stands; newer ones wait until then. What is no confirmation stands at once. One whose
+  /// length is another one later was not of this train (3.6.5.2.7, 4.0.0 table 2c [3]): it says nothing any more.
   void hear(uint32_t q_integrity, int64_t integrity_ns, double train_length_m);
+  /// The confirmation that stands says nothing any more. In 4.0.0 it is reported once, and ends when the train backs
+  /// (3.6.5.2.5, table 2c [5] and [8]).
+  void use_up() { used_up_ns_ = integrity_ns(); }
   /// A train that has backed since then is not taken for shorter. reported_ahead_m: how far in front of distance_m the
   /// report says the front end to be, from which trackside counts the length.
   [[nodiscard]] Said said(double distance_m, double reported_ahead_m = 0) const;
@@ -43,7 +47,9 @@ class TrainIntegrity {
   [[nodiscard]] uint32_t q_integrity() const { return stands().q_integrity; }
   [[nodiscard]] int64_t integrity_ns() const { return stands().integrity_ns; }
   /// A confirmation that could be said before the way was lost.
-  [[nodiscard]] bool forgotten() const { return forgotten_ && is_confirmed(heard_.q_integrity); }
+  [[nodiscard]] bool forgotten() const {
+    return forgotten_ && is_confirmed(heard_.q_integrity) && heard_.integrity_ns != used_up_ns_;
+  }
 
  private:
   struct Confirmation {
@@ -59,6 +65,8 @@ class TrainIntegrity {
   Confirmation before_;               // stands until heard_ is settled
   std::optional<Confirmation> next_;  // waits until heard_ is settled
   double train_length_m_ = 0;
+  std::optional<int64_t> confirmed_ns_;  // with train_length_m_
+  std::optional<int64_t> used_up_ns_;    // integrity_ns of a confirmation that says nothing any more
   bool settled_ = true;                  // rear_m_ belongs to heard_
   bool forgotten_ = false;               // it was known before the way was lost
   std::optional<double> rear_m_;         // min safe rear end, on the travelled distance

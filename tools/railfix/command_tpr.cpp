@@ -63,11 +63,11 @@ std::string meaning(const std::string& name, uint32_t value, const etcs::TrainPo
   if (name == "Q_DLRBG") return "front end on the side: " + one_of({"reverse", "nominal", "unknown"}, value);
   if (name == "Q_DIRTRAIN") return "running direction: " + one_of({"reverse", "nominal", "unknown"}, value);
   if (name == "Q_LENGTH" || name == "Q_INTEGRITY") {
-    return one_of(
-        {"no information", "integrity confirmed by a device", "integrity confirmed by the driver", "integrity lost"},
-        value);
+    if (value == etcs::kConfirmedByDevice)
+      return name == "Q_LENGTH" ? "integrity confirmed by a device" : "integrity confirmed by an external source";
+    return one_of({"no information", "", "integrity confirmed by the driver", "integrity lost"}, value);
   }
-  if (name == "L_TRAININT") return std::to_string(value) + " m safe train length";
+  if (name == "L_TRAININT") return std::to_string(value) + " m confirmed (safe) train length";
   if (name == "V_TRAIN")
     return value == etcs::kStandstillSpeed ? "standstill" : std::to_string(value * etcs::kSpeedStepKmh) + " km/h";
   if (name == "M_MODE") {
@@ -115,8 +115,8 @@ void print_packet_58(const etcs::ReportParameters& packet) {
     std::string meaning;
   };
   std::vector<Row> rows{
-      {"NID_PACKET", etcs::kNidPacketReportParameters, "position report parameters (SUBSET-026 3.6.5.1.4, 7.4.2)"},
-      {"Q_DIR", packet.q_dir, "for trains that run: " + one_of({"reverse", "nominal", "both ways"}, packet.q_dir)},
+      {"NID_PACKET", etcs::kNidPacketReportParameters, "position report parameters (SUBSET-026 3.6.5.1.5, 7.4.2)"},
+      {"Q_DIR", packet.q_dir, "for trains that look: " + one_of({"reverse", "nominal", "either way"}, packet.q_dir)},
       {"Q_SCALE", packet.q_scale, one_of({"10 cm", "1 m", "10 m"}, packet.q_scale)},
       {"T_CYCLOC", packet.t_cycloc,
        cycle_text(packet.t_cycloc, etcs::kNoCycleTime, std::to_string(packet.t_cycloc) + " s")},

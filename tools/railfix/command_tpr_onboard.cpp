@@ -88,6 +88,8 @@ class OnboardUnit {
     if (status_.m_level() == etcs::kLevelNtc) text << " (" << int{status_.nid_ntc()} << ")";
     if (status_.active_cab() > 0) text << ", cab " << kCabs[status_.active_cab()];
     if (status_.packet_58_bytes() > 0) text << ", packet 58 of " << status_.packet_58_bytes() << " bytes";
+    if (status_.packet_58_lrbg() > 0) text << " from LRBG " << status_.packet_58_lrbg();
+    if (status_.packet_58_deleted() > 0) text << ", no packet 58";
     text << ", integrity " << kIntegrities[status_.q_integrity()] << ", length ";
     status_.train_length_m() > 0 ? text << status_.train_length_m() << " m" : text << "not known";
     return text.str();
@@ -118,11 +120,17 @@ class OnboardUnit {
       status_.reports_wanted(std::max(status_.reports_wanted() + 1, seconds));
     } else if (name == "packet_58") {
       take_packet_58(word, value);
+    } else if (name == "lrbg") {
+      status_.packet_58_lrbg(static_cast<uint32_t>(number_of(word, value, etcs::kUnknownBaliseGroup)));
     } else {
-      throw core::BadInput(word + ": must be mode=, level=, ntc=, cab=, integrity=, length=, report= or packet_58=");
+      throw core::BadInput(word +
+                           ": must be mode=, level=, ntc=, cab=, integrity=, length=, report=, packet_58= or lrbg=");
     }
   }
   void take_packet_58(const std::string& word, const std::string& hex) {
+    status_.packet_58_lrbg(0);
+    status_.packet_58_deleted(hex == "none" ? 1 : 0);
+    if (hex == "none") return status_.packet_58_bytes(0);
     const auto packet = core::value_or_throw(etcs::parse_hex(hex));
     if (const auto parameters = etcs::decode_report_parameters(packet); !parameters.ok())
       throw core::BadInput(word + ": " + parameters.error().message);
@@ -239,7 +247,8 @@ void add_tpr_onboard(CLI::App& tpr, Action& chosen) {
       "2, 3\n"
       "  ntc=NID_NTC   integrity=none, device, driver, lost   length=safe length in m, 0 = not known\n"
       "  cab=camera, other: at which end the active cab is, that of the camera or the other   report=border, session, "
-      "error: a\n  report is wanted now   packet_58=HEX: position report parameters\n"
+      "error: a\n  report is wanted now   packet_58=HEX: position report parameters, none: they were deleted\n"
+      "  lrbg=NID_LRBG, behind packet_58: of the message that brought it; without it the LRBG of now\n"
       "onboard_status is sent at every change and once a second until Ctrl-C. Lines of the same words on standard "
       "input\n"
       "change it. Silent for 3 s, tpr_publisher keeps mode and level and says nothing of train integrity.");

@@ -43,7 +43,7 @@ TEST_F(TprCommand, DecodesAPacket58) {
   const auto outcome = tpr({"decode", "3A80908303E82103E9"});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   for (const char* said :
-       {"SUBSET-026 3.6.5.1.4", "for trains that run: both ways", "a report every 6 s", "a report every 1000 m",
+       {"SUBSET-026 3.6.5.1.5", "for trains that look: either way", "a report every 6 s", "a report every 1000 m",
         "a report at every LRBG", "500 m from the LRBG", "when passed by the max safe front end"}) {
     EXPECT_THAT(outcome.out, HasSubstr(said));
   }

@@ -163,6 +163,11 @@ TEST_F(TprService, HearsTheOnboardCommand) {
   EXPECT_EQ(last().nid_ntc, 20U);
   input.say("integrity=driver length=200 packet_58=3A80908303E82103E9");
   ASSERT_TRUE(reported(msg::REPORT_INTEGRITY_CONFIRMED));
+  const auto kept = [&] { return test::slurp(notes_file()); };
+  EXPECT_THAT(kept(), HasSubstr("3A80908303E82103E9"));
+  input.say("packet_58=none");
+  ASSERT_TRUE(run_until([&] { return kept().empty(); }, [&] { write_state(450); }))
+      << "it does not outlive the service";
   input.say("report=session");
   ASSERT_TRUE(reported(msg::REPORT_SESSION));
   ASSERT_TRUE(run_until([&] { return last().q_length == 2; }, [&] { write_state(450); }));

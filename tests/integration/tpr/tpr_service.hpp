@@ -35,8 +35,9 @@ class TprService : public ::testing::Test {
   }
   ~TprService() override {
     std::filesystem::remove(map_file_);
-    std::filesystem::remove("/dev/shm/railfix-notes-" + train_ + "-local-tpr_publisher");
+    std::filesystem::remove(notes_file());
   }
+  [[nodiscard]] std::string notes_file() const { return "/dev/shm/railfix-notes-" + train_ + "-local-tpr_publisher"; }
 
   [[nodiscard]] std::vector<std::string> service(const std::vector<std::string>& more = {}) const {
     std::vector<std::string> settings{"common.train_id=" + train_,       "common.domain=" + std::to_string(kDomain),

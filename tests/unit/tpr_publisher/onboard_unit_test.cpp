@@ -47,6 +47,21 @@ TEST(OnboardUnit, SetsModeLevelAndIntegrity) {
   EXPECT_THAT(publisher.set_onboard(onboard, onboard.stamp_ns).error().message, HasSubstr("M_MODE"));
 }
 
+TEST(OnboardUnit, AModeThereAndBackBetweenTwoPositionsIsReported) {
+  TprPublisher publisher(balise_map(), settings());
+  ASSERT_TRUE(publisher.update(at(forward(1, 450), 0, 20), kStart).report.has_value());
+  Onboard onboard;
+  onboard.stamp_ns = kStart;
+  for (const uint32_t m_mode : {1U, 0U}) {
+    onboard.m_mode = m_mode;
+    ASSERT_TRUE(publisher.set_onboard(onboard, kStart).ok());
+  }
+  const auto report = publisher.update(at(forward(1, 452), 0.1, 20), kStart + core::to_ns(0.1)).report;
+  ASSERT_TRUE(report.has_value());
+  EXPECT_EQ(report->reason, Reason::mode);
+  EXPECT_EQ(report->fields.m_mode, 0U);
+}
+
 /// Beyond group B; 60 positions a second, before each of which the on-board unit says the same again.
 class TrainWithOnboard : public ::testing::Test {
  protected:
@@ -66,6 +81,13 @@ class TrainWithOnboard : public ::testing::Test {
     onboard.q_integrity = etcs::kConfirmedByDriver;
     onboard.integrity_ns = kStart + core::to_ns(at_s) + ahead_ns;
     onboard.train_length_m = 200;
+  }
+  void begin_with_4() {
+    auto four = settings();
+    four.report.baseline = etcs::Baseline::b4;
+    four.report.train_over_m = 30;
+    four.report.train_under_m = 40;
+    publisher = TprPublisher(balise_map(), four);
   }
   TprPublisher publisher{balise_map(), settings()};
   Onboard onboard;
@@ -97,6 +119,50 @@ TEST_F(ConfirmedTrain, SaysItsLength) {
   EXPECT_EQ(report.q_length, etcs::kConfirmedByDriver);
   EXPECT_EQ(report.l_trainint, 208U);
   EXPECT_EQ(publisher.left_out(now_ns), "");
+}
+
+// SUBSET-026 4.0.0 3.6.5.2, table 2c [5].
+TEST_F(TrainWithOnboard, In4AConfirmationIsReportedOnce) {
+  begin_with_4();
+  for (int i = 0; i < 60; ++i) step(i * kPeriodS, 8700);
+  confirm(1);
+  step(1, 8700);
+  EXPECT_EQ(reported->l_trainint, 208U);
+  reported.reset();
+  for (int i = 1; !reported && i < 420; ++i) step(1 + i * kPeriodS, 8700);
+  EXPECT_EQ(reported.value().q_length, 0U);
+}
+
+// Table 2c [8]: a device confirms, then the train backs before the next report.
+TEST_F(TrainWithOnboard, In4ATrainThatHasBackedIsNotComplete) {
+  begin_with_4();
+  for (int i = 0; i < 60; ++i) step(i * kPeriodS, 8700);
+  confirm(1);
+  onboard.q_integrity = etcs::kConfirmedByDevice;
+  for (int i = 0; i < 60; ++i) step(1 + i * kPeriodS, 8700);
+  const auto back = [&](int i) {
+    auto position = at(forward(1, 450), 2 + i * kPeriodS, -1);
+    position.distance_m = 8700 - i * kPeriodS;
+    return publisher.update(position, position.stamp_ns).report;
+  };
+  std::optional<Report> report;
+  for (int i = 0; i < 420; ++i) {
+    onboard.stamp_ns = kStart + core::to_ns(2 + i * kPeriodS);
+    core::ok_or_throw(publisher.set_onboard(onboard, onboard.stamp_ns));
+    if (auto next = back(i)) report = std::move(next);
+  }
+  ASSERT_TRUE(report.has_value());
+  EXPECT_EQ(report->fields.q_length, 0U);
+}
+
+// 3.6.4.1.5, 3.6.5.2.4: vehicles behind the engine belong to the min safe rear end.
+TEST_F(TrainWithOnboard, InASupervisedManoeuvreTheRearEndLiesFartherBehind) {
+  begin_with_4();
+  onboard.m_mode = 17;
+  for (int i = 0; i < 60; ++i) step(i * kPeriodS, 8700);
+  confirm(1);
+  step(1, 8700);
+  EXPECT_EQ(reported->l_trainint, 238U);
 }
 
 TEST_F(ConfirmedTrain, SaysNothingWhenTheDistanceBeganAgain) {

@@ -57,7 +57,7 @@ TEST_F(PositionReport, TellsDistanceSidesAndDoubt) {
   EXPECT_EQ(fields.t_train, 100U);
 }
 
-// SUBSET-026 4.0.0 3.6.4.1: SM, and SB without train data.
+// SUBSET-026 4.0.0 3.6.4.1.5: SM, and SB without train data where the consist length is known.
 TEST_F(PositionReport, ManoeuvresAndStandByWithoutTrainDataWidenTheInterval) {
   constexpr uint32_t kStandBy = 6;
   constexpr uint32_t kSupervisedManoeuvre = 17;
@@ -76,6 +76,10 @@ TEST_F(PositionReport, ManoeuvresAndStandByWithoutTrainDataWidenTheInterval) {
   EXPECT_EQ(doubts(), wider);
   settings.train_under_m = -1;
   EXPECT_EQ(doubts(), std::pair(40U, uint32_t{kUnknownDistance}));
+  settings.train_data = false;
+  settings.train_over_m = -1;
+  settings.m_mode = kStandBy;
+  EXPECT_EQ(doubts(), plain) << "every start of a mission";
   settings.m_mode = 0;
   EXPECT_EQ(doubts(), plain);
 }

@@ -243,9 +243,9 @@ TEST_F(Trigger, TheOnboardUnitCallsForReports) {
     EXPECT_EQ(step(), reason);
     EXPECT_EQ(step(), std::nullopt);
   };
-  moment.onboard.m_mode = 1;
+  ++moment.mode_changes;
   expect_once(Reason::mode);
-  moment.onboard.m_level = etcs::kLevel1;
+  ++moment.level_changes;
   expect_once(Reason::level);
   moment.onboard.q_integrity = 1;  // a device may confirm every second: no report for that
   EXPECT_EQ(step(), std::nullopt);

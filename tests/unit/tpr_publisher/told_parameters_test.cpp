@@ -132,6 +132,41 @@ TEST_F(ToldParametersTest, WhatCannotBeReadIsToldAndNotKept) {
   EXPECT_FALSE(told.hear({}, true)) << "an onboard_status without one takes nothing back";
 }
 
+// SUBSET-026 3.6.2.2.1: the trackside answers to a report that referred to A; the train is beyond B when it comes,
+// which looks the other way.
+TEST_F(ToldParametersTest, APacketRefersToTheGroupThatItsMessageNames) {
+  follow_train();
+  run_s = 1;
+  const auto go_to = [&](double offset_m) {
+    const auto position = at(forward(1, offset_m), run_s += 0.1, 40);
+    const auto report = publisher.update(position, position.stamp_ns).report;
+    told.follow();
+    return report && report->reason == Reason::location;
+  };
+  for (double m = 154; m < 405; m += 4) go_to(m);
+  EXPECT_FALSE(told.hear(packet(etcs::kReverse, {{650, 1}}), true, kA));
+  EXPECT_THAT(told.refusal(), HasSubstr("other direction"));
+  const auto nominal = packet(etcs::kNominal, {{650, 1}});
+  EXPECT_TRUE(told.hear(nominal, true, kA));
+  EXPECT_FALSE(told.hear(nominal, true, kA)) << "it stands in every onboard_status";
+  EXPECT_EQ(told.notes(), etcs::to_hex(nominal) + ' ' + std::to_string(kA));
+  double reported_at_m = 0;
+  for (double m = 406; m < 990 && reported_at_m == 0; m += 4) reported_at_m = go_to(m) ? m : 0;
+  EXPECT_NEAR(reported_at_m, 750 - 2 - 8, 4) << "the max safe front end may be 8 m in front of the front end";
+  EXPECT_TRUE(told.hear(nominal, true, kC)) << "the same bits of another message";
+}
+
+TEST_F(ToldParametersTest, DeletedOnesGiveThoseOfTheKeysBack) {
+  follow_train();
+  EXPECT_FALSE(told.hear_deleted());
+  EXPECT_TRUE(told.hear(packet(etcs::kUnknownSide), true));
+  EXPECT_FALSE(follows_keys());
+  EXPECT_TRUE(told.hear_deleted());
+  EXPECT_EQ(told.notes(), "");
+  EXPECT_TRUE(follows_keys());
+  EXPECT_TRUE(told.hear(packet(etcs::kUnknownSide), true)) << "sent again";
+}
+
 TEST_F(ToldParametersTest, LocationsOfOneThatCameUnheardHaveNoPlace) {
   const auto located = packet(etcs::kUnknownSide, {{50, 1}});
   EXPECT_TRUE(told.hear(located, false));

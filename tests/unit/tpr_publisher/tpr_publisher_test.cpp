@@ -204,6 +204,20 @@ TEST(TprPublisher, Packet58ForTheOtherDirectionIsRefused) {
   EXPECT_THAT(publisher.set_parameters(parameters).error().message, HasSubstr("other direction"));
 }
 
+// 3.16.3.3.2: whoever receives it orders reports by it.
+TEST(TprPublisher, TrainborneTimeGoesOnWhenTheClockIsSetBack) {
+  TprPublisher publisher(balise_map(), settings());
+  std::vector<uint32_t> t_train;
+  for (const double run_s : {0.0, 7.0, -20.0, -13.0, -6.0}) {
+    const auto position = at(forward(1, 150), run_s, 0);
+    const auto report = publisher.update(position, position.stamp_ns).report;
+    ASSERT_TRUE(report.has_value()) << run_s;
+    EXPECT_EQ(report->sent_ns, position.stamp_ns);
+    t_train.push_back(report->fields.t_train - tpr_publisher::t_train(kStart));
+  }
+  EXPECT_EQ(t_train, (std::vector<uint32_t>{0, 700, 701, 1401, 2101}));
+}
+
 TEST(TprPublisher, WithoutAMapTheReferenceIsUnknown) {
   TprPublisher publisher(nullptr, settings());
   EXPECT_EQ(publisher.update(at(forward(1, 450), 0, 20), kStart).report->fields.nid_lrbg, etcs::kUnknownBaliseGroup);

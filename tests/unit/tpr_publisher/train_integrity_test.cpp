@@ -133,6 +133,34 @@ TEST(TrainIntegrity, ATrainShorterThanTheStepOfTheReportHasALength) {
   EXPECT_EQ(said.l_trainint, 0U);
 }
 
+TEST(TrainIntegrity, AnotherLengthNeedsAnotherConfirmation) {
+  for (const auto& [then_m, now_m] : {std::pair(400.0, 100.0), std::pair(0.0, 200.0)}) {
+    auto integrity = running_until(5);
+    integrity.hear(etcs::kConfirmedByDriver, at(3), then_m);
+    integrity.hear(etcs::kConfirmedByDriver, at(3), now_m);
+    expect_nothing(integrity.said(50));
+    integrity.hear(etcs::kConfirmedByDriver, at(3), then_m);
+    expect_nothing(integrity.said(50));
+    integrity.hear(etcs::kConfirmedByDriver, at(5), now_m);
+    EXPECT_EQ(integrity.said(50).l_trainint, now_m + 5);
+  }
+}
+
+TEST(TrainIntegrity, OneThatIsUsedUpIsFollowedByTheNextOne) {
+  auto integrity = running_until(5);
+  integrity.hear(etcs::kConfirmedByDevice, at(4), 200);
+  ASSERT_EQ(integrity.said(50).q_length, etcs::kConfirmedByDevice);
+  integrity.use_up();
+  expect_nothing(integrity.said(50));
+  integrity.hear(etcs::kConfirmedByDevice, at(4), 200);  // said every second
+  expect_nothing(integrity.said(50));
+  integrity.hear(etcs::kConfirmedByDevice, at(5), 200);
+  EXPECT_EQ(integrity.said(50).l_trainint, 205U);
+  integrity.use_up();
+  integrity.hear(etcs::kIntegrityLost, at(5), 200);
+  EXPECT_EQ(integrity.said(50).q_length, etcs::kIntegrityLost);
+}
+
 TEST(TrainIntegrity, BackingMakesNoShorterTrain) {
   auto integrity = running_until(5);
   integrity.hear(etcs::kConfirmedByDevice, at(5), 200);
