@@ -13,17 +13,19 @@ void ClockWatch::look(int64_t wall_ns, int64_t monotonic_ns) {
   const int64_t set_by_ns = ahead_ns - ahead_ns_.value_or(ahead_ns);
   ahead_ns_ = ahead_ns;
   looked_ns_ = wall_ns;
+  std::erase_if(heard_, [&](const auto& entry) { return wall_ns - entry.second.last_ns > kGoneNs; });
   if (std::abs(set_by_ns) <= kToleratedNs) return;
   set_by_ns_ = set_by_ns;
   set_at_ns_ = wall_ns;
-  late_ns_.clear();
+  heard_.clear();
 }
 
 void ClockWatch::hear(const std::string& host, int64_t stamp_ns, int64_t received_ns) {
   if (host == host_) return;
   // What came before the clock was set says nothing of the clock now.
   if (received_ns < set_at_ns_ || received_ns > looked_ns_) return;
-  auto& late_ns = late_ns_[host];
+  auto& [late_ns, last_ns] = heard_[host];
+  last_ns = received_ns;
   late_ns.push_back(received_ns - stamp_ns);
   if (late_ns.size() > kMessages) late_ns.pop_front();
   if (const auto quickest = quickest_ns(late_ns); quickest && std::abs(*quickest) <= kToleratedNs) set_by_ns_ = 0;
@@ -43,8 +45,8 @@ std::optional<int64_t> ClockWatch::quickest_ns(const std::deque<int64_t>& late_n
 std::string ClockWatch::trouble() const {
   std::string text;
   char offset[32];
-  for (const auto& [host, late_ns] : late_ns_) {
-    const auto quickest = quickest_ns(late_ns);
+  for (const auto& [host, heard] : heard_) {
+    const auto quickest = quickest_ns(heard.late_ns);
     if (!quickest || std::abs(*quickest) <= kToleratedNs) continue;
     std::snprintf(offset, sizeof(offset), "%.1f s", std::abs(core::seconds(*quickest)));
     text += (text.empty() ? "" : " ") + ("The clock of " + host + " is " + offset) +

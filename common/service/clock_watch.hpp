@@ -14,6 +14,8 @@ class ClockWatch {
  public:
   /// More than a network of a train delays a message; at 30 m/s it is 3 m.
   static constexpr int64_t kToleratedNs = 100'000'000;
+  /// A host that is silent for so long is gone, as a coach that was uncoupled.
+  static constexpr int64_t kGoneNs = 10'000'000'000;
   /// Messages that are compared: the quickest of them tells the clock from a slow way.
   static constexpr size_t kMessages = 20;
 
@@ -33,8 +35,12 @@ class ClockWatch {
  private:
   std::string host_;
   [[nodiscard]] static std::optional<int64_t> quickest_ns(const std::deque<int64_t>& late_ns);
-  std::map<std::string, std::deque<int64_t>> late_ns_;  // of each other host's last messages
-  std::optional<int64_t> ahead_ns_;                     // of the clock that never jumps
+  struct Heard {
+    std::deque<int64_t> late_ns;  // its last messages
+    int64_t last_ns = 0;          // our wall clock
+  };
+  std::map<std::string, Heard> heard_;  // of each other host
+  std::optional<int64_t> ahead_ns_;     // of the clock that never jumps
   bool was_kept_ = false;
   bool is_kept_ = false;
   int64_t set_by_ns_ = 0;  // 0 = it was not, or has agreed with another one since

@@ -223,11 +223,15 @@ core::Status apply_override(YAML::Node section, const std::string& section_name,
     return core::Error{"command line: " + change.key + "=" + change.value + " is not a YAML value"};
   }
   std::string rest = change.key.substr(section_name.size() + 1);
-  for (size_t dot = rest.find('.'); dot != std::string::npos; dot = rest.find('.')) {
-    section.reset(section[rest.substr(0, dot)]);
-    rest = rest.substr(dot + 1);
+  try {
+    for (size_t dot = rest.find('.'); dot != std::string::npos; dot = rest.find('.')) {
+      section.reset(section[rest.substr(0, dot)]);
+      rest = rest.substr(dot + 1);
+    }
+    section[rest] = value;
+  } catch (const YAML::Exception&) {
+    return core::Error{"command line: " + change.key + ": what stands before the last dot is a value, not a section"};
   }
-  section[rest] = value;
   return {};
 }
 

@@ -2,6 +2,7 @@
 #include <signal.h>
 
 #include <CLI/CLI.hpp>
+#include <atomic>
 #include <cstdio>
 #include <cstdlib>
 #include <iostream>
@@ -61,18 +62,21 @@ class SignalWatch {
   void watch(Loop& loop) {
     thread_ = std::thread([this, &loop] {
       int signal = 0;
-      sigwait(&signals_, &signal);
-      if (signal != SIGUSR2) loop.post([&loop, signal] { loop.finish(signal == SIGTERM ? "SIGTERM" : "SIGINT"); });
+      do sigwait(&signals_, &signal);
+      while (signal == SIGUSR2 && !done_);
+      if (!done_) loop.post([&loop, signal] { loop.finish(signal == SIGTERM ? "SIGTERM" : "SIGINT"); });
     });
   }
   ~SignalWatch() {
     if (!thread_.joinable()) return;
+    done_ = true;
     pthread_kill(thread_.native_handle(), SIGUSR2);
     thread_.join();
   }
 
  private:
   sigset_t signals_{};
+  std::atomic<bool> done_ = false;
   std::thread thread_;
 };
 

@@ -14,7 +14,6 @@ struct TrackBeside : NearTrack {
   double turned_rad = 0;  // of growing offsets there, against those at the place
 };
 
-/// Read from one thread.
 class TracksBeside {
  public:
   /// REQUIRES: the map does not change any more.

@@ -128,6 +128,7 @@ void Estimator::locate(TrainEstimate& e) const {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   e.lat_deg = e.lon_deg = e.easting_m = e.northing_m = e.heading_rad = nan;
   if (!place_.path) return;
+  e.path = place_.path;
   e.path_distance_m = std::clamp(filter_.path_distance_m(), place_.path->begin_m(), place_.path->end_m());
   e.position = place_.path->position_at(e.path_distance_m);
   const auto pose = place_.path->at(e.path_distance_m).pose;

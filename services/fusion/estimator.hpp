@@ -115,7 +115,7 @@ class Estimator {
   [[nodiscard]] bool gnss_proven() const { return gnss_agreed_ >= kGnssProof && place_.told_by != ToldBy::gnss; }
   /// What GNSS that agrees with the motion may still be wrong by.
   [[nodiscard]] double gnss_bound_m() const;
-  /// Takes over place and speed, as independent knowledge.
+  /// Takes over its place, with what is in doubt there, as independent knowledge; speed and scales stay its own.
   void place_like(const Estimator& other);
   /// The train may be so far beyond the interval's ends, until a fix says where it is.
   void doubt_place(const Sides& beyond);
@@ -145,7 +145,7 @@ class Estimator {
   [[nodiscard]] bool fix_unexpected() const;
   /// Nothing has confirmed yet the start that somebody has told.
   [[nodiscard]] bool is_only_told() const { return place_.told_by == ToldBy::start; }
-  /// So many landmarks in a row say that it is here.
+  /// So many landmarks say that it is here, the first kLandmarksBelieved of them in a row.
   [[nodiscard]] int landmarks_agreed() const { return place_.landmarks_agreed; }
 
   /// When the last event showed that the wheel slips: what it said since a little before is best taken back.
@@ -249,7 +249,7 @@ class Estimator {
     double fix_m = 0;                // the distance run at the last fix that settled what was in doubt ...
     double reference_m = 0;          // ... and at the reference
     std::array<uint32_t, 16> met{};  // landmarks that were used last, newest first; 0 = none
-    int landmarks_agreed = 0;        // in a row
+    int landmarks_agreed = 0;        // as landmarks_agreed()
     // Until a landmark tells them apart: over other ways that lead to tracks that were declared, or that map_matcher
     // has named, and as far as it now says another place without naming one.
     Sides joined;
@@ -299,6 +299,7 @@ class Estimator {
   void compare_turns();
   /// What agrees with the place says whether it is the right track, too.
   [[nodiscard]] bool confirms_start(bool tells_track);
+  void landmark_disagrees();
   void confirm_by(const FixInput& landmark);
   void confirm_by_curve(bool tells_track);
   /// GNSS, which has never agreed with it, says otherwise, and hardly anything speaks for it.
@@ -373,7 +374,7 @@ class Estimator {
   std::optional<RefusedFix> refused_fix_;
   std::optional<track::EdgePosition> off_path_;  // a fix was there since the last one that was used
   bool corrected_ = false;                       // the place was moved against the filter's word, not confirmed yet
-  int gnss_agreed_ = 0;                          // fixes, since three in a row were refused
+  int gnss_agreed_ = 0;                          // fixes, since three in a row were refused or one had no place
 
   // What the interval holds beyond the filter's sigma.
   Doubts doubts_;

@@ -37,12 +37,14 @@ double fix_sigma_m(const FixInput& fix, const FusionParameters& p) {
 struct FootOnPath {
   double distance_m;
   double lateral_m;
+  double beyond_m;  // the path's end, either way
 };
 
 // Newton steps along the path; converges in two or three because the start is near.
 FootOnPath foot_on_path(const track::Path& path, double start_m, double easting_m, double northing_m) {
   double s = start_m;
   double lateral_m = 0;
+  double beyond_m = 0;
   for (int k = 0; k < 6; ++k) {
     const auto pose = path.at(s).pose;
     const double east = easting_m - pose.easting_m;
@@ -51,10 +53,12 @@ FootOnPath foot_on_path(const track::Path& path, double start_m, double easting_
     const double cosine = std::cos(pose.heading_rad);
     const double ahead = east * sine + north * cosine;
     lateral_m = north * sine - east * cosine;
-    s = std::clamp(s + ahead, path.begin_m(), path.end_m());
+    const double foot_m = s + ahead;
+    s = std::clamp(foot_m, path.begin_m(), path.end_m());
+    beyond_m = std::abs(foot_m - s);
     if (std::abs(ahead) < 1e-3) break;
   }
-  return {s, lateral_m};
+  return {s, lateral_m, beyond_m};
 }
 
 }  // namespace
@@ -69,6 +73,7 @@ void Estimator::use(const GnssInput& sample) {
   }
   const auto place = foot_on_path(*place_.path, filter_.path_distance_m(), sample.easting_m, sample.northing_m);
   const double once_m = std::hypot(gnss_sigma_m(sample, *parameters_), parameters_->gnss_map_sigma_m);
+  if (place.beyond_m > once_m) return;  // the map ends before: its end is not where the train is
   const double foot_m = place.distance_m - parameters_->gnss_antenna_ahead_m;
   const bool beside = std::abs(place.lateral_m) > kOffTrackM + 3 * once_m;
   const bool agrees = !beside && filter_.test_position(foot_m, once_m, parameters_->gate_gnss).used;
@@ -174,6 +179,7 @@ void Estimator::use(const FixInput& fix) {
   if (!path_distance_m) {
     off_path_ = place;
     place_.track_doubt.seen_elsewhere(fix.probability);
+    if (fix.kind == FixKind::landmark) landmark_disagrees();
     return;
   }
   const double sigma_m = fix_sigma_m(fix, *parameters_);
@@ -190,8 +196,14 @@ void Estimator::use(const FixInput& fix) {
       doubt_surprise(fix.sigma_m);
     }
   } else {
+    if (fix.kind == FixKind::landmark) landmark_disagrees();
     refuse(fix, *path_distance_m, fix_offer_);
   }
+}
+
+// Once so many in a row have agreed they are believed, whatever one says later.
+void Estimator::landmark_disagrees() {
+  if (place_.landmarks_agreed < kLandmarksBelieved) place_.landmarks_agreed = 0;
 }
 
 bool Estimator::has_met(uint32_t landmark) const {
@@ -347,7 +359,7 @@ void Estimator::refuse(const FixInput& fix, double path_distance_m, const Offer&
       const double reach_m = this->reach_m(offer, fix.sigma_m);
       doubts_.refused = {reach_m, reach_m};
       fix_verdict_ = FixVerdict::corrected;
-      place_.landmarks_agreed = 2;
+      place_.landmarks_agreed = fix.kind == FixKind::landmark ? 2 : 0;
       if (fix.kind == FixKind::landmark) confirm_by(fix);
       return;
     }

@@ -95,7 +95,7 @@ void FusionService::hear(const msg::TrainState& state) {
   heard_ns_ = state.stamp_ns();
   if (believes_start_) forget_start();
   seq_ = std::max(seq_, state.seq());
-  if (!latest_ || known_) return;
+  if (!latest_ || known_ || !std::isfinite(state.distance_m())) return;
   // The travelled distance must not jump at a take-over.
   const double speed_mps = std::isfinite(latest_->speed_mps()) ? latest_->speed_mps() : 0;
   const double since_s = core::seconds(state.stamp_ns() - latest_->stamp_ns());
@@ -127,7 +127,7 @@ void FusionService::remember() {
   if (line_end == std::string::npos) return;
   msg::TrainState state;
   const std::vector<uint8_t> cdr(notes.begin() + static_cast<std::ptrdiff_t>(line_end) + 1, notes.end());
-  if (!messaging::deserialize(cdr, state)) return;
+  if (!messaging::deserialize(cdr, state) || !std::isfinite(state.distance_m())) return;
   known_ = state;
   noted_ns_ = std::atoll(notes.c_str() + kept_for_.size());
   known_in_doubt_ = std::string_view(notes).substr(0, line_end).ends_with(kInDoubt);
@@ -204,7 +204,8 @@ TrainEstimate FusionService::said_of(const TrainEstimate& measured) const {
   if (!believes_start_ || start_seen_ || is_played()) return measured;
   TrainEstimate said = measured;
   said.track_known = false;
-  said.track_probability = said.lat_deg = said.lon_deg = said.easting_m = said.northing_m = said.heading_rad = 0;
+  said.track_probability = 0;
+  said.lat_deg = said.lon_deg = said.easting_m = said.northing_m = said.heading_rad = std::nan("");
   said.integrity = Integrity::unusable;
   said.reason = "whether the train stands at fusion.start is not known before its speed is";
   return said;
@@ -225,7 +226,8 @@ void FusionService::restart(int64_t data_ns) {
   latest_.reset();
   known_.reset();
   noted_ns_.reset();
-  begun_anew_ = false;
+  begun_anew_ = learnt_ = in_doubt_ = false;
+  fitness_ = 0;
   heard_ns_ = 0;
   distance_offset_m_ = 0;
   left_out_ = {};
@@ -360,10 +362,8 @@ void FusionService::send(const msg::TrainState& state) {
 }
 
 void FusionService::publish_pose(const TrainEstimate& estimate) {
-  const auto* estimator = fusion_->estimator();
-  const bool imu_healthy = !estimator->watch(Source::imu).isolated;
-  if (!pose_writer_.write(message_of(pose_.at(estimate, *estimator->path(), imu_healthy))))
-    context_.health().dropped(1);
+  const bool imu_healthy = !fusion_->estimator()->watch(Source::imu).isolated;
+  if (!pose_writer_.write(message_of(pose_.at(estimate, *estimate.path, imu_healthy)))) context_.health().dropped(1);
 }
 
 }  // namespace railfix::fusion

@@ -116,7 +116,8 @@ struct TrainEstimate {
   int64_t stamp_ns = 0;
   bool track_known = false;
   track::EdgePosition position;
-  double path_distance_m = 0;  // on fusion's path; 0 without one
+  std::shared_ptr<const track::Path> path;  // of that moment; nullptr = the track is not known
+  double path_distance_m = 0;               // on it
   double distance_m = 0;
   double speed_mps = 0;
   double acceleration_mps2 = 0;

@@ -125,7 +125,6 @@ class MotionFilter {
   [[nodiscard]] double to_unit(Odometer odometer) const;
   [[nodiscard]] double scale_sigma(Odometer odometer) const;
   [[nodiscard]] OdometerScales scales() const;
-  /// Way since the reference.
 
  private:
   [[nodiscard]] int index(StateIndex state) const { return static_cast<int>(clones_.size()) + static_cast<int>(state); }

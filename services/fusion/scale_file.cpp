@@ -58,7 +58,8 @@ bool ScaleFile::fits(const msg::CameraCalibration& camera) {
 }
 
 bool ScaleFile::fits(const WheelInput& sample) {
-  if (sample.pulses_per_metre == pulses_per_metre_) return true;
+  const bool is_number = std::isfinite(sample.pulses_per_metre) && sample.pulses_per_metre > 0;
+  if (!is_number || sample.pulses_per_metre == pulses_per_metre_) return true;
   pulses_per_metre_ = sample.pulses_per_metre;
   if (!saved_ || saved_->pulses_per_metre == 0 || saved_->pulses_per_metre == pulses_per_metre_) return true;
   return forget("the wheel has another number of pulses a metre");
@@ -75,11 +76,13 @@ void ScaleFile::follow(const Fusion& fusion, const TrainEstimate& state) {
   const auto are = fusion.saved_scales();
   if (are != told_ && saved_) {
     if (are == SavedScalesAre::confirmed) log_.info("references confirm the scales of the earlier trip");
-    if (are == SavedScalesAre::contradicted)
+    if (are == SavedScalesAre::contradicted) {
       log_.warn(
           "scales of an earlier trip are contradicted and not used any more ({}): was a wheelset, the lens or "
           "the camera's mount exchanged?",
           in_percent(saved_->scales));
+      saved_.reset();  // also for a fusion that begins anew
+    }
     told_ = are;
   }
   if (path_.empty() || state.integrity != Integrity::ok) return;

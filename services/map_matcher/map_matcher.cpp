@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/time.hpp"
+#include "core/train_limits.hpp"
 #include "track/same_map.hpp"
 
 namespace railfix::map_matcher {
@@ -32,8 +33,11 @@ Sighting sighted_at(int64_t stamp_ns, double speed_mps, Sighting sighting) {
 
 // A fusion that was started anew may count the travelled distance from elsewhere.
 bool counts_on(const PlacedTrain& before, const PlacedTrain& state) {
-  const double expected_m = state.speed_mps * core::seconds(state.stamp_ns - before.stamp_ns);
-  return std::abs(state.distance_m - before.distance_m - expected_m) <= kCountM + 0.5 * std::abs(expected_m);
+  const double since_s = core::seconds(state.stamp_ns - before.stamp_ns);
+  const double moved_m = state.distance_m - before.distance_m;
+  if (!std::isfinite(state.speed_mps)) return std::abs(moved_m) <= kCountM + core::kFastestTrainMps * std::abs(since_s);
+  const double expected_m = state.speed_mps * since_s;
+  return std::abs(moved_m - expected_m) <= kCountM + 0.5 * std::abs(expected_m);
 }
 
 PlaceFix fix_of(FixKind kind, int64_t stamp_ns, const std::vector<LocatedPlace>& places) {

@@ -44,7 +44,8 @@ MapApi::Part MapApi::part_of(const Request& request, const std::optional<track::
     return {static_cast<uint32_t>(*edge), number_of(request, "offset").value_or(0), radius_m};
   }
   if (view_.length_m() <= MapView::kWholeMapM) return {};
-  const auto around = train.value_or(track::EdgePosition{1, 0});
+  const bool is_here = train && map_.edge(train->edge) != nullptr;
+  const auto around = is_here ? *train : track::EdgePosition{1, 0};
   return {around.edge, around.offset_m, radius_m};
 }
 

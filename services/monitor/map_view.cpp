@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <unordered_map>
 
 namespace railfix::monitor {
 namespace {
@@ -82,24 +83,25 @@ json MapView::message(const std::optional<track::EdgePosition>& around, double r
   if (around) {
     if (const auto* edge = map_.edge(around->edge)) centre = edge->alignment.at(around->offset_m).pose;
   }
+  std::unordered_map<uint32_t, const track::Edge*> shown_at;  // node: the first edge there that is shown
   std::vector<bool> shown(map_.edges.size() + 1, false);
   json edges = json::array();
   for (const auto& edge : map_.edges) {
     if (centre) {
       const auto start = edge.alignment.at(0).pose;
       const double away_m = std::hypot(start.easting_m - centre->easting_m, start.northing_m - centre->northing_m);
-      if (away_m - edge.alignment.length_m() > radius_m) continue;
+      if (!(away_m - edge.alignment.length_m() <= radius_m)) continue;
     }
     shown[edge.id] = true;
+    for (const uint32_t node : {edge.from_node, edge.to_node}) shown_at.try_emplace(node, &edge);
     edges.push_back({{"id", edge.id}, {"length_m", number(edge.alignment.length_m(), 100)}, {"line", line_of(edge)}});
   }
   json switches = json::array();
   for (const auto& node : map_.nodes) {
     if (node.kind != track::NodeKind::railway_switch) continue;
-    const auto edge = std::ranges::find_if(map_.edges, [&](const track::Edge& candidate) {
-      return candidate.from_node == node.id || candidate.to_node == node.id;
-    });
-    if (edge == map_.edges.end() || !shown[edge->id]) continue;
+    const auto at = shown_at.find(node.id);
+    if (at == shown_at.end()) continue;
+    const track::Edge* edge = at->second;
     const double offset_m = edge->from_node == node.id ? 0 : edge->alignment.length_m();
     switches.push_back({{"id", node.id},
                         {"edge", edge->id},

@@ -95,6 +95,7 @@ void MonitorService::restart() {
   gnss_ = {};
   trail_ = {};
   reports_.clear();
+  standing_.erase(topics::train_position_report.name);
 }
 
 MonitorService::~MonitorService() = default;

@@ -65,7 +65,10 @@ void MonitorService::publish_pictures() {
 
 void MonitorService::publish_state() {
   if (!live_.watched("state")) return;
+  const bool is_new = state_sent_ns_ != state_.arrived_ns;
   state_sent_ns_ = state_.arrived_ns;
+  if (!is_new && state_.sample)
+    return live_.publish("state", {{"kind", "state"}, {"age_s", state_.age_s(core::monotonic_ns())}});
   for (const auto& message : first("state")) live_.publish("state", message);
 }
 
@@ -117,9 +120,7 @@ std::vector<json> MonitorService::first(const std::string& kind) {
   const int64_t now_ns = core::monotonic_ns();
   if (kind == "state") {
     if (!state_.sample) return {{{"kind", "state"}, {"age_s", nullptr}}};
-    const double age_s = state_.age_s(now_ns);
-    if (age_s > 1) return {{{"kind", "state"}, {"age_s", age_s}}};
-    return {state_message(*state_.sample, age_s, recent(pose_) ? &*pose_.sample : nullptr,
+    return {state_message(*state_.sample, state_.age_s(now_ns), recent(pose_) ? &*pose_.sample : nullptr,
                           recent(choice_) ? &*choice_.sample : nullptr, map_ ? &*map_ : nullptr)};
   }
   if (kind == "curvature") return state_.sample ? std::vector{curvature_message()} : std::vector<json>{};

@@ -59,8 +59,8 @@ void judge_services(const TrainSeen& train, Problems& problems) {
     } else if (name == "recorder" && reason.starts_with(kRecorderLoses) && train.recorder) {
       continue;  // judge_recorder() says it
     } else if (seen.status.state() == msg::STATE_DEGRADED) {
-      problems.push_back(
-          {"degraded " + id, Level::warning, on_host + " works with less: " + reason, "See to what it says."});
+      problems.push_back({"degraded " + id, Level::warning, on_host + " works with less: " + reason,
+                          "See to what it says; its README says what each is and when it ends."});
     } else if (silent_s > kSilentS && !train.data_stands) {
       problems.push_back({"late " + id, Level::warning, on_host + " has said nothing lately",
                           "The computer or the network is overloaded: look at its processor load."});
@@ -86,8 +86,10 @@ void judge_position(const TrainSeen& train, Problems& problems) {
   if (state.track_known() == 0) {
     problems.push_back(
         {"track", Level::warning,
-         fmt::format("It is not known which track the train is on ({:.1f} % for edge {})",
-                     100 * state.track_probability(), state.edge()),
+         "It is not known which track the train is on" +
+             (state.edge() == 0
+                  ? ""
+                  : fmt::format(" ({:.1f} % for edge {})", 100 * state.track_probability(), state.edge())),
          "It becomes known behind the next switch, curve or balise; if not, see what map_matcher says."});
   } else if (state.over_m() + state.under_m() > train.interval_wide_m) {
     problems.push_back({"wide", Level::warning,

@@ -85,8 +85,8 @@ dataset::CameraCalibration starting_calibration(const MountArguments& arguments,
     char text[300];
     std::snprintf(
         text, sizeof text,
-        "The focal length is assumed (%.0f px, 70 degrees across): height and sideways position do not depend on it, "
-        "but angles and every distance along the track do, in proportion. Give --focal or --camera to fix it.",
+        "The focal length is assumed (%.0f px, 70 degrees across): angles and every distance along the track are wrong "
+        "in proportion to it, height and sideways position by some centimetres. Give --focal or --camera to fix it.",
         lens.fu_px);
     remark = text;
   }
@@ -181,6 +181,7 @@ void print_roll(const geometry::CameraPose& mount, const Roll& roll) {
       lateral_m);
 }
 
+// As they are stored.
 void print(const track_detector::MountCalibration& found, const Roll& roll, const std::string& remark) {
   const auto deg = [](double rad) { return core::deg_from_rad(rad); };
   const auto& m = found.mount;
@@ -215,6 +216,14 @@ nlohmann::json to_json(const track_detector::MountCalibration& found, const geom
           {"residual_px", found.residual_px}};
 }
 
+// Roll, sideways position and yaw turn about the same rails.
+void take_in_roll(double roll_sigma_rad, track_detector::MountCalibration& found) {
+  auto& sigma = found.sigma;
+  sigma.roll_rad = roll_sigma_rad;
+  sigma.lateral_m = std::hypot(sigma.lateral_m, roll_sigma_rad * found.mount.height_m);
+  sigma.yaw_rad = std::hypot(sigma.yaw_rad, roll_sigma_rad * std::sin(found.mount.pitch_rad));
+}
+
 int calibrate_mount(const MountArguments& arguments) {
   if (arguments.pictures.empty() == arguments.video.empty()) {
     throw core::BadInput("give either --pictures DIR or --video FILE");
@@ -231,17 +240,14 @@ int calibrate_mount(const MountArguments& arguments) {
   track_detector::MountCalibrator calibrator(calibration.intrinsics, arguments.gauge_m, roll.rad,
                                              calibration.intrinsics_sigma.value_or(geometry::Intrinsics{}));
   for (const auto& picture : pictures) calibrator.add(picture.grey);
-  const auto found = calibrator.solve();
+  auto found = calibrator.solve();
   if (!found.ok()) {
     std::cerr << "railfix: " << found.error().message << '\n';
     return 1;
   }
+  take_in_roll(roll.sigma_rad, found.value());
   calibration.mount = found.value().mount;
   calibration.mount_sigma = found.value().sigma;
-  calibration.mount_sigma->roll_rad = roll.sigma_rad;
-  // Roll and sideways position turn about the same rails.
-  calibration.mount_sigma->lateral_m =
-      std::hypot(found.value().sigma.lateral_m, roll.sigma_rad * calibration.mount->height_m);
   core::ok_or_throw(dataset::write_calibration(arguments.out, calibration));
   say_beside({arguments.out});
   const std::string drawn = arguments.draw.empty()

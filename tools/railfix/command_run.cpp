@@ -1,5 +1,6 @@
 // `railfix run`: recorded data through the real services.
 #include <csignal>
+#include <filesystem>
 #include <iostream>
 
 #include "commands.hpp"
@@ -11,6 +12,7 @@
 #include "run/run_plan.hpp"
 #include "run/supervisor.hpp"
 #include "run_tables.hpp"
+#include "service/notes.hpp"
 
 namespace railfix::tool {
 namespace {
@@ -86,6 +88,16 @@ void stop_services(Processes& processes) {
   }
 }
 
+// Nobody goes on from a run.
+void remove_notes(const std::string& train_id) {
+  service::CommonConfig common;
+  common.train_id = train_id;
+  for (const auto& name : service::service_names()) {
+    std::error_code not_there;
+    std::filesystem::remove(service::notes_path(common, name), not_there);
+  }
+}
+
 int run(const RunOptions& options) {
   const auto plan = core::value_or_throw(plan_run(options));
   const auto programs = programs_for(plan, options);
@@ -107,6 +119,7 @@ int run(const RunOptions& options) {
   if (!started.ok()) throw std::runtime_error(started.error().message);
   watch(supervisor, processes, plan);
   stop_services(processes);
+  remove_notes(plan.train_id);
 
   const auto tables = core::value_or_throw(export_tables(options.out / "recording.mcap", options.out));
   for (const auto& problem : tables.problems) std::cerr << "railfix: " << problem << '\n';

@@ -45,7 +45,7 @@ double TopicStatistics::longest_gap_ms() const {
 }
 
 std::string RateStatistics::line() const {
-  return fmt::format("{:.2f} Hz, gaps {:.1f} to {:.1f} ms, {} samples, {} lost, latency {:.2f} ms", all_.rate_hz(),
+  return fmt::format("{:.2f} Hz, gaps {:.1f} to {:.1f} ms, {} samples, {} lost, last latency {:.2f} ms", all_.rate_hz(),
                      all_.shortest_gap_ms(), all_.longest_gap_ms(), all_.samples(), all_.lost(), all_.latency_ms());
 }
 

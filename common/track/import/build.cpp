@@ -203,9 +203,10 @@ class Sources {
   }
 
   void want_crs(const std::string& crs, const std::filesystem::path& file) {
-    if (!source_crs_.empty() && crs != source_crs_) {
+    if (has_plane_source_ && crs != source_crs_) {
       throw core::BadInput(file.string() + " is in " + (crs.empty() ? "an unnamed coordinate system" : crs) +
-                           " but the sources before it are in " + source_crs_ + "; build one map of each");
+                           " but the sources before it are in " +
+                           (source_crs_.empty() ? "an unnamed one" : source_crs_) + "; build one map of each");
     }
     source_crs_ = crs;
     has_plane_source_ = true;

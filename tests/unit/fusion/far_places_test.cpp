@@ -72,6 +72,20 @@ TEST(FarPlaces, BeyondTheEndOfTheMapTheIntervalHoldsTheTrain) {
   }
 }
 
+// Its end is not where the train is, and GNSS does not contradict the odometer there.
+TEST(FarPlaces, BeyondTheEndOfTheMapGnssHoldsNobodyBack) {
+  auto fusion = fusion_at(19500);
+  TrainEstimate state;
+  for (double to_s = 1; to_s <= 40; ++to_s) {
+    const double train_m = 19500 + 20 * to_s;
+    state = run(fusion, to_s - 1, to_s, 20);
+    fusion.add(GnssInput{at(to_s), 0, train_m, 1, 1});
+    EXPECT_EQ(state.reason.find("GNSS contradicts"), std::string::npos) << state.reason;
+  }
+  EXPECT_NEAR(state.distance_m, 800, 1);
+  EXPECT_GE(state.position.offset_m + state.under_m, 20300);
+}
+
 TEST(FarPlaces, AFixForTheOtherDirectionIsNoPlaceOnTheWay) {
   auto fusion = fusion_at(1000);
   run(fusion, 0, 10, 20);

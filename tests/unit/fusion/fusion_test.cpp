@@ -301,6 +301,27 @@ TEST(Fusion, FollowsTheDeclaredTrackAndSaysWhileItIsOpen) {
   EXPECT_LT(state.over_m, 10);
 }
 
+// A picture that comes late asks for the moment before the track was declared.
+TEST(Fusion, AStateOfTheTimeBeforeATrackWasDeclaredLiesOnThePathOfThatTime) {
+  auto map = std::make_shared<track::Map>();
+  map->edges.push_back({1, "stem", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{1000, 0, 0}})});
+  map->edges.push_back({2, "straight", 2, 3, "", track::Alignment::chained({0, 1000, 0}, {{1000, 0, 0}})});
+  map->edges.push_back({3, "left", 2, 4, "", track::Alignment::chained({0, 1000, 0}, {{1000, 0.001, 0.001}})});
+  map->connections = {{2, 1, 2, false}, {2, 1, 3, true}};
+  auto fusion = core::value_or_throw(Fusion::create({}, map, track::EdgePosition{1, 900, track::Direction::forward}));
+  run(fusion, 0, 12, 10);
+  fusion.add(FixInput{at(12.01), 3, 20, INFINITY, 0.9995, 0, FixKind::track, track::Direction::forward, nullptr});
+  const auto before = fusion.add(step_at(12.005, 10, 0.005));
+  ASSERT_TRUE(before && before->path);
+  EXPECT_EQ(before->position.edge, 2U);
+  EXPECT_EQ(before->path->position_at(before->path_distance_m).edge, 2U);
+  const auto after = fusion.add(step_at(12.025, 10, 0.02));
+  ASSERT_TRUE(after && after->path);
+  EXPECT_EQ(after->path->position_at(after->path_distance_m).edge, 3U);
+  auto lost = fusion_without_start();
+  EXPECT_EQ(run(lost, 0, 1, 10).path, nullptr);
+}
+
 // As a matcher would say that has lost the train.
 TEST(Fusion, ATrackThatIsNotBesideTheTrainIsNotBelieved) {
   auto map = std::make_shared<track::Map>();

@@ -58,6 +58,24 @@ class WrongStart : public testing::Test {
   double t_s_ = 0;
 };
 
+// Where masts stand everywhere, every other one is where the map has one by chance.
+TEST_F(WrongStart, IsNotConfirmedByLandmarksThatAgreeNowAndThen) {
+  const auto gnss = [&] { fusion_.add(GnssInput{at(t_s_), 0, told_m() + 400, 1, 1}); };
+  ASSERT_TRUE(go(200, gnss).place_in_doubt);
+  uint32_t landmark = 0;
+  const auto every_other = [&] {
+    gnss();
+    fusion_.add(fix_at(t_s_, told_m() + (++landmark % 2 == 0 ? 0 : 40 + landmark), landmark));
+  };
+  EXPECT_TRUE(go(600, every_other).place_in_doubt) << "15 of 30 agree";
+  const auto each = [&] {
+    gnss();
+    fusion_.add(fix_at(t_s_, told_m(), ++landmark));
+  };
+  EXPECT_FALSE(go(160, each).place_in_doubt) << "five in a row";
+  EXPECT_FALSE(go(40, every_other).place_in_doubt) << "they are believed, whatever one says later";
+}
+
 TEST_F(WrongStart, IsNoPositionAfter300AndGivenUpAfter1000MetresOfTurningOtherwise) {
   go_straight();
   int second = 0;

@@ -42,6 +42,13 @@ TEST_F(ClockWatchTest, SaysWhichIsOffByHowMuchAndWhatToDo) {
   EXPECT_EQ(watch_.trouble(), "");
 }
 
+TEST_F(ClockWatchTest, AHostThatIsGoneIsForgotten) {
+  hear("coach7", -3000 * kMs, 1 * kMs);
+  EXPECT_NE(watch_.trouble(), "");
+  hear("cab", 0, 1 * kMs, 80);  // 20 s
+  EXPECT_EQ(watch_.trouble(), "");
+}
+
 TEST_F(ClockWatchTest, SlowMessagesAreNoWrongClock) {
   hear("cab", 0, 3000 * kMs, ClockWatch::kMessages - 1);  // what a new reader gets of the past, a cable that was cut
   EXPECT_EQ(watch_.trouble(), "");

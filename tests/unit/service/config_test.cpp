@@ -70,6 +70,13 @@ TEST_F(ConfigTest, CommandLineIsOverTheFile) {
   EXPECT_THAT(error_of(outside), HasSubstr("command line: odometry.speed_mps 700 is outside"));
 }
 
+TEST_F(ConfigTest, CommandLineRefusesAKeyBelowAValue) {
+  const auto file = write("odometry: {name: a}\n");
+  EXPECT_THAT(error_of(read_config<Config>("odometry", file, {{"odometry.name.x", "1"}})),
+              HasSubstr("command line: odometry.name.x: what stands before the last dot is a value, not a section"));
+  EXPECT_FALSE(read_config<Config>("odometry", {}, {{"odometry.name", "a"}, {"odometry.name.x.y", "1"}}).ok());
+}
+
 TEST_F(ConfigTest, CommandLineTakesListsAndEmptyTexts) {
   const auto config = read_config<Config>("odometry", {}, {{"odometry.names", "[p, q]"}, {"odometry.name", ""}});
   ASSERT_TRUE(config.ok()) << error_of(config);

@@ -73,7 +73,26 @@ void fill_grabber(YAML::Node grabber, const RunOptions& options) {
        {"sensor_gateway", "track_detector", "odometry", "map_matcher", "fusion", "tpr_publisher"}) {
     grabber["wait_for"].push_back(service);
   }
-  if (options.record_pictures) grabber["wait_for"].push_back("recorder");
+}
+
+bool records_pictures(const YAML::Node& recorder) {
+  const auto is_of_pictures = [](const YAML::Node& topic) {
+    const auto name = topic.as<std::string>("");
+    return name == "camera_frame" || name.starts_with("camera_frame/");
+  };
+  const YAML::Node left_out = recorder["leave_out"];
+  const bool leaves_out =
+      left_out && left_out.IsSequence() && std::any_of(left_out.begin(), left_out.end(), is_of_pictures);
+  return recorder["pictures"].as<std::string>("jpeg") != "none" && !leaves_out;
+}
+
+// With everything that the user has set. A run takes the next picture when this one is recorded, too.
+core::Status fill_recorder_in(YAML::Node& settings, const RunPlan& plan) {
+  const YAML::Node recorder = settings["recorder"];
+  if (!recorder["autostart"].as<bool>(true))
+    return core::Error{"recorder.autostart: a run records from its beginning; leave it out"};
+  if (plan.lossless && records_pictures(recorder)) settings["frame_grabber"]["wait_for"].push_back("recorder");
+  return {};
 }
 
 // What only the run knows; the rest of each section stays as the user or the default has it.
@@ -99,7 +118,7 @@ void fill_settings(YAML::Node& settings, const RunOptions& options, const RunPla
   for (const char* service : {"recorder", "monitor"}) settings[service]["map"] = plan.map.string();
   settings["recorder"]["train_file"] = plan.config.string();
   settings["recorder"]["file"] = std::filesystem::absolute(options.out / "recording.mcap").string();
-  settings["recorder"]["pictures"] = options.record_pictures ? "jpeg" : "none";
+  if (!options.record_pictures) settings["recorder"]["pictures"] = "none";
   // A folder that somebody has chosen, not the disk of a train.
   if (!settings["recorder"]["keep_free_mb"]) settings["recorder"]["keep_free_mb"] = kKeepFreeMb;
 }
@@ -188,6 +207,7 @@ core::Status plan_in_folder(const RunOptions& options, RunPlan& plan) {
   plan.config = std::filesystem::absolute(options.out / kConfigFile);
   fill_settings(settings.value(), options, plan);
   add_overrides(settings.value(), options.sets);
+  if (const auto filled = fill_recorder_in(settings.value(), plan); !filled.ok()) return filled.error();
   if (const auto room = check_room(settings.value(), options.out); !room.ok()) return room.error();
   std::ostringstream text;
   text << settings.value() << '\n';

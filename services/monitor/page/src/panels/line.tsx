@@ -177,7 +177,7 @@ export function Line() {
   return (
     <Panel id="line" title="Line" topics={["state"]} kind="state" aside={name ? <span class="muted">{name}</span> : undefined}>
       {track.value === null ? (
-        <Nothing>{about.value === null ? "Waiting for the map." : about.value.map === null ? "The monitor has no map (monitor.map). Edge and metres above are right all the same." : map_failed.value ? "The monitor does not give its map; it is asked for again at the next connection." : "Loading the map."}</Nothing>
+        <Nothing>{about.value === null ? "Waiting for the map." : about.value.map === null ? "The monitor has no map (monitor.map). Edge and metres, where they are known, are right all the same." : map_failed.value ? "The monitor does not give its map; it is asked for again at the next connection." : "Loading the map."}</Nothing>
       ) : (
         <Picture />
       )}

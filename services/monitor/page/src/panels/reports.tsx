@@ -22,7 +22,9 @@ function Row({ one }: { one: Report }) {
       <td>{group(one.nid_lrbg)}</td>
       <td class="n">{metres(one.d_lrbg_m)}</td>
       <td class="n">
-        −{metres(one.l_doubtover_m)} / +{metres(one.l_doubtunder_m)}
+        {one.l_doubtover_m === null && one.l_doubtunder_m === null
+          ? "unknown"
+          : `−${metres(one.l_doubtover_m)} / +${metres(one.l_doubtunder_m)}`}
       </td>
       <td class="n">{one.v_train_kmh === null ? "unknown" : `${number(one.v_train_kmh, 0)} km/h`}</td>
     </tr>
