@@ -65,7 +65,8 @@ TEST_F(WrongStart, IsNotConfirmedByLandmarksThatAgreeNowAndThen) {
   uint32_t landmark = 0;
   const auto every_other = [&] {
     gnss();
-    fusion_.add(fix_at(t_s_, told_m() + (++landmark % 2 == 0 ? 0 : 40 + landmark), landmark));
+    ++landmark;
+    fusion_.add(fix_at(t_s_, told_m() + (landmark % 2 == 0 ? 0 : 40 + landmark), landmark));
   };
   EXPECT_TRUE(go(600, every_other).place_in_doubt) << "15 of 30 agree";
   const auto each = [&] {
