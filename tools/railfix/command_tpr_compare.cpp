@@ -2,13 +2,15 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
-#include <map>
 #include <memory>
-#include <set>
+#include <optional>
 #include <string>
 
 #include "command_tpr.hpp"
+#include "compare/columns.hpp"
+#include "compare/doubts.hpp"
 #include "compare/pairing.hpp"
+#include "compare/time_shift.hpp"
 #include "compare/verdict_text.hpp"
 #include "core/time.hpp"
 #include "evaluation/statistics.hpp"
@@ -78,41 +80,6 @@ class Line {
   std::optional<compare::Axes> axes_;
 };
 
-/// Error of a report against the truth; both on the path that begins where the truth does.
-struct Judge {
-  const evaluation::Truth* truth;
-  double foot_to_front_m;
-  [[nodiscard]] bool covers(const compare::Pair& pair) const {
-    return truth->at(pair.stamp_ns) && truth->at(pair.ours_sent.stamp_ns);
-  }
-  [[nodiscard]] double error_m(const compare::PlacedReport& report) const {
-    const auto real = truth->at(report.stamp_ns);
-    const double begin_m = truth->rows().front().distance_m;
-    return real ? report.front_m - (real->distance_m - begin_m) - foot_to_front_m : evaluation::kUnknown;
-  }
-  /// 1 where the true front end lies outside the promised interval, else 0.
-  [[nodiscard]] double outside(const compare::PlacedReport& report) const {
-    const double real_m = report.front_m - error_m(report);
-    return std::isfinite(real_m) && (real_m < report.low_m || real_m > report.high_m) ? 1 : 0;
-  }
-};
-
-compare::Columns columns_of(const compare::Pairing& pairing, const std::optional<Judge>& judge) {
-  compare::Columns columns;
-  for (const auto& at : pairing.availability)
-    columns.available.push_back({at.leg, at.ours ? 1.0 : 0.0, at.certified ? 1.0 : 0.0});
-  for (const auto& pair : pairing.pairs) {
-    const auto& ours = pair.ours_sent;  // as sent: what carrying adds is not its own
-    const auto& other = pair.certified;
-    columns.lengths.push_back({pair.leg, ours.high_m - ours.low_m, other.high_m - other.low_m});
-    if (!judge) continue;
-    columns.errors.push_back({pair.leg, judge->error_m(ours), judge->error_m(other)});
-    if (!std::isfinite(columns.errors.back().ours) || !std::isfinite(columns.errors.back().certified)) continue;
-    columns.outside.push_back({pair.leg, judge->outside(ours), judge->outside(other)});
-  }
-  return columns;
-}
-
 void print_row(const char* what, const std::vector<compare::Sample>& samples) {
   const auto ours = evaluation::summarise(compare::sizes_of(samples, &compare::Sample::ours));
   const auto other = evaluation::summarise(compare::sizes_of(samples, &compare::Sample::certified));
@@ -125,23 +92,26 @@ void print_row(const char* what, const std::vector<compare::Sample>& samples) {
   std::printf("%-24s %s   %s\n", what, columns(ours).c_str(), columns(other).c_str());
 }
 
-compare::Contradicted contradicted(const compare::Pairing& pairing, const std::optional<Judge>& judge) {
-  std::set<size_t> apart;
-  std::map<size_t, int> turned;  // pairs of the leg that are, less those that are not
-  std::map<size_t, int> runs_apart;
-  for (const auto& pair : pairing.pairs) {
-    if (!pair.overlap() && !(judge && judge->covers(pair))) apart.insert(pair.leg);
-    turned[pair.leg] += pair.turned() ? 1 : -1;
-    runs_apart[pair.leg] += pair.runs_apart() ? 1 : -1;
+void print_shift(const compare::Pairing& pairing, const std::optional<compare::Judge>& judge) {
+  const auto pairs = compare::without_repeats(pairing.pairs);
+  const auto shift = compare::time_shift(pairs);
+  if (!std::isfinite(shift.shift_s)) {
+    std::printf(
+        "difference over speed    not known: the speed hardly changes, stamps that are off would not be seen\n");
+    return;
   }
-  // Where the driver changes the cab or the train sets back the two may say so one report apart.
-  const auto most_are = [](const std::map<size_t, int>& legs) {
-    return static_cast<size_t>(std::ranges::count_if(legs, [](const auto& leg) { return leg.second >= 0; }));
-  };
-  return {apart.size(), most_are(turned), most_are(runs_apart)};
+  const bool late = shift.shift_s >= 0;
+  std::printf(
+      "difference over speed    %+.3f s +- %.3f s: stamps of the certified system are %s by that much, or ours %s\n",
+      shift.shift_s, shift.sigma_s, late ? "late" : "early", late ? "early" : "late");
+  if (!judge) return;
+  const auto to_truth = compare::shift_to_truth(pairs, *judge);
+  if (!std::isfinite(to_truth.shift_s)) return;
+  std::printf("... from the truth       %+.3f s +- %.3f s: the certified system's are %s by that much\n",
+              to_truth.shift_s, to_truth.sigma_s, to_truth.shift_s >= 0 ? "late" : "early");
 }
 
-void print_pairs(const compare::Pairing& pairing) {
+void print_pairs(const compare::Pairing& pairing, const std::optional<compare::Judge>& judge) {
   constexpr size_t kMostTold = 5;
   std::vector<double> differences;
   double carried_m = 0;
@@ -173,13 +143,7 @@ void print_pairs(const compare::Pairing& pairing) {
   std::printf(
       "ours - certified         mean %+.2f m, |.| p50 %.2f, p95 %.2f, max %.2f m (carried in time: up to %.2f m)\n",
       mean_m, size.p50, size.p95, size.max, carried_m);
-  const auto shift = compare::time_shift(pairing.pairs);
-  if (std::isfinite(shift.shift_s)) {
-    const bool late = shift.shift_s >= 0;
-    std::printf(
-        "difference over speed    %+.3f s +- %.3f s: stamps of the certified system are %s by that much, or ours %s\n",
-        shift.shift_s, shift.sigma_s, late ? "late" : "early", late ? "early" : "late");
-  }
+  print_shift(pairing, judge);
   std::printf("intervals overlap        %zu of %zu\n", pairing.pairs.size() - disjoint, pairing.pairs.size());
   if (turned > 0) std::printf("train turned round       in %zu of %zu\n", turned, pairing.pairs.size());
   if (runs_apart > 0) std::printf("train runs the other way in %zu of %zu\n", runs_apart, pairing.pairs.size());
@@ -213,19 +177,25 @@ void listen(ReportSource& ours, ReportSource& certified, Line& line, const Optio
   }
 }
 
-int print_comparison(const Options& options, const compare::Pairing& pairing, const std::optional<Judge>& judge) {
-  print_pairs(pairing);
-  const auto columns = columns_of(pairing, judge);
+int print_comparison(const Options& options, const compare::Pairing& pairing,
+                     const std::optional<compare::Judge>& judge) {
+  print_pairs(pairing, judge);
+  const auto columns = compare::columns_of(pairing, judge);
   std::printf("\n%-24s %9s %9s %9s   %9s %9s %9s\n%-24s %9s %9s %9s   %9s %9s %9s\n", "", "ours", "", "", "certified",
               "", "", "m", "mean", "p95", "max", "mean", "p95", "max");
   print_row("interval length", columns.lengths);
   if (judge) print_row("error, size", columns.errors);
+  if (columns.lengths.size() < pairing.pairs.size()) {
+    std::printf("repeats at standstill    %zu of %zu pairs: left out, but for the first and the last of each\n",
+                pairing.pairs.size() - columns.lengths.size(), pairing.pairs.size());
+  }
   const auto unknown = [&](double compare::Sample::*side) {
     return std::ranges::count_if(columns.lengths, [&](const auto& sample) { return !std::isfinite(sample.*side); });
   };
   std::printf("interval not known       ours %td, certified %td of %zu: left out\n", unknown(&compare::Sample::ours),
               unknown(&compare::Sample::certified), columns.lengths.size());
-  const auto verdict = compare::print_verdict(columns, contradicted(pairing, judge), options.demand);
+  const auto verdict =
+      compare::print_verdict(columns, compare::doubts_of(pairing, judge, options.offset_s), options.demand);
   return verdict == compare::Verdict::worse ? kWorse : 0;
 }
 
@@ -258,7 +228,7 @@ std::string span_text(int64_t from_ns, int64_t to_ns) {
   return text;
 }
 
-void check_times(const Judge& judge, const std::vector<compare::Pair>& pairs, const std::string& folder) {
+void check_times(const compare::Judge& judge, const std::vector<compare::Pair>& pairs, const std::string& folder) {
   if (std::ranges::any_of(pairs, [&](const auto& pair) { return judge.covers(pair); })) return;
   const auto& rows = judge.truth->rows();
   throw core::BadInput(folder + ": the truth is " + span_text(rows.front().stamp_ns, rows.back().stamp_ns) +
@@ -284,10 +254,11 @@ int compare_reports(const Options& options) {
   const auto* axes = line.axes(certified.reports());
   if (axes == nullptr) throw core::BadInput(options.map + ": has none of the reported balise groups.");
   const auto pairing = compare::pair_up(ours.reports(), certified.reports(), *axes, core::to_ns(options.longest_gap_s));
-  std::optional<Judge> judge;
-  if (truth) judge = Judge{&*truth, options.foot_to_front_m};
+  std::optional<compare::Judge> judge;
+  if (truth) judge = compare::Judge{&*truth, options.foot_to_front_m};
   std::printf("reports                  ours %zu, %zu with a place; certified %zu, %zu with a place\n",
-              ours.reports().size(), pairing.ours.placed, certified.reports().size(), pairing.certified.placed);
+              ours.reports().size(), pairing.ours.placed.size(), certified.reports().size(),
+              pairing.certified.placed.size());
   if (ours.repeated() + certified.repeated() > 0) {
     std::printf("delivered once more      ours %zu, certified %zu reports: alike with the same stamp, counted once\n",
                 ours.repeated(), certified.repeated());
@@ -296,6 +267,9 @@ int compare_reports(const Options& options) {
     std::printf("group not on the line    ours %zu, certified %zu reports: not paired, but \"known\" as they say\n",
                 pairing.ours.off_line, pairing.certified.off_line);
   }
+  std::printf("reports every            ours %s s, certified %s s\n",
+              compare::figure("%.3g", pairing.ours.every_s).c_str(),
+              compare::figure("%.3g", pairing.certified.every_s).c_str());
   std::printf("paired in time           %zu in %zu legs; %zu certified reports have none of ours beside them\n",
               pairing.pairs.size(), pairing.legs, pairing.alone);
   if (pairing.pairs.empty())
@@ -315,6 +289,9 @@ void add_tpr_compare(CLI::App& tpr, Action& chosen) {
       "  railfix tpr compare --ours topic:demo --certified rbc.csv   what train demo sends now, until the file is "
       "over\n"
       "  railfix tpr compare --ours topic:demo --certified topic:demo-evc --for-s 3600\n"
+      "Both sides must run on the same packet 58 (T_CYCLOC, D_CYCLOC, M_LOC): one that reports more seldom, just "
+      "behind\n"
+      "each group, would look better.\n"
       "Ends with 3 where the verdict is WORSE.");
   command
       ->add_option("--ours", options->ours,

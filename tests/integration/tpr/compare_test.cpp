@@ -143,7 +143,7 @@ TEST_F(TprCompareFiles, OneLineAndItsTruth) {
       compare({"--map", file("line.map"), "--start", "1:150:+", "--truth", file("truth"), "--foot-to-front-m", "2"});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("error, size                   0.50      0.50      0.50        1.50      1.50"));
-  EXPECT_THAT(outcome.out, HasSubstr("outside the interval     ours on 0, certified on 1 of 1 legs"));
+  EXPECT_THAT(outcome.out, HasSubstr("outside the interval     ours on 0 of 1, certified on 1 of 1 legs"));
   outcome = compare({"--truth", file("truth")});
   EXPECT_EQ(outcome.exit_code, 2);
   EXPECT_THAT(outcome.err, HasSubstr("--truth needs --map and --start"));

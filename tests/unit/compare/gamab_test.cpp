@@ -126,7 +126,7 @@ TEST(Gamab, BrokenPromisesCountByLeg) {
   EXPECT_NEAR(none.ours_at_most, 0.0495, 1e-4);  // 1 - 0.05^(1/59)
   const auto many = compare_broken(broken(40, 8, 0), Demand{});
   EXPECT_EQ(many.verdict, Verdict::worse);
-  EXPECT_EQ(many.ours, 8U);
+  EXPECT_EQ(many.ours.broken, 8U);
   EXPECT_EQ(compare_broken(broken(40, 1, 0), Demand{}).verdict, Verdict::open);
   EXPECT_EQ(compare_broken(broken(100, 1, 3), Demand{}).verdict, Verdict::at_least_as_good);
   EXPECT_EQ(compare_broken(broken(40, 1, 3), Demand{}).verdict, Verdict::open)
@@ -136,6 +136,19 @@ TEST(Gamab, BrokenPromisesCountByLeg) {
   const auto few = compare_broken(broken(10, 0, 0), Demand{});
   EXPECT_EQ(few.verdict, Verdict::open);
   EXPECT_NEAR(few.ours_at_most, 0.26, 0.01);
+}
+
+// 60 legs, and each side promises on some of them only.
+TEST(Gamab, ALegWithoutAPromiseKeepsNone) {
+  std::vector<Sample> samples;
+  for (size_t leg = 0; leg < 60; ++leg) samples.push_back({leg, leg % 3 == 0 ? 0 : NAN, leg % 2 == 0 ? 0 : NAN});
+  const auto kept = compare_broken(samples, Demand{});
+  EXPECT_EQ(kept.verdict, Verdict::open);
+  EXPECT_EQ(kept.ours.legs, 20U);
+  EXPECT_EQ(kept.certified.legs, 30U);
+  EXPECT_NEAR(kept.ours_at_most, 0.139, 1e-3);  // 1 - 0.05^(1/20)
+  for (auto& sample : samples) sample.ours = sample.leg % 2 == 0 ? 0 : 1;
+  EXPECT_EQ(compare_broken(samples, Demand{}).verdict, Verdict::open) << "nobody knows what the other would have kept";
 }
 
 /// Ten reports a leg, of which ours has `ours` and the certified system `certified` with a known interval.

@@ -5,43 +5,12 @@
 #include <cmath>
 
 #include "core/time.hpp"
-#include "unit/tpr_publisher/balise_map.hpp"
+#include "unit/compare/made_up_reports.hpp"
 
 namespace railfix::compare {
 namespace {
 
-using namespace tpr_publisher::testing;
-
-/// `front_m` beyond the group, along its nominal direction; the train looks and runs `along` it or against it.
-TimedReport report(double run_s, uint32_t group, double front_m, double speed_kmh = 72, bool along = true) {
-  TimedReport timed;
-  timed.stamp_ns = core::to_ns(run_s);
-  auto& f = timed.fields;
-  f.nid_lrbg = group;
-  f.q_scale = 0;
-  f.d_lrbg = static_cast<uint32_t>(std::lround(std::abs(front_m) * 10));
-  f.q_dlrbg = front_m >= 0 ? etcs::kNominal : etcs::kReverse;
-  f.q_dirlrbg = f.q_dirtrain = along ? etcs::kNominal : etcs::kReverse;
-  f.l_doubtover = 30;
-  f.l_doubtunder = 70;
-  f.v_train = static_cast<uint32_t>(std::lround(speed_kmh / 5));
-  return timed;
-}
-
-/// Packet 1: `nominal` is the way from the group before.
-TimedReport report_from(uint32_t before, TimedReport report) {
-  report.fields.nid_packet = 1;
-  report.fields.nid_prvlrbg = before;
-  return report;
-}
-
-TimedReport lost(double run_s) {
-  auto report = railfix::compare::report(run_s, etcs::kUnknownBaliseGroup, 0);
-  report.fields.d_lrbg = etcs::kUnknownDistance;
-  return report;
-}
-
-constexpr int64_t kGapNs = 15 * core::kNsPerSecond;
+using namespace testing;
 
 TEST(Axes, PlaceAReportOnItsGroup) {
   const auto placed = Axes().place(report(1, kA, 50)).value();
@@ -150,7 +119,7 @@ TEST(Pairing, TellsWhoHadAKnownInterval) {
   for (const auto& at : pairing.availability)
     seen.push_back(static_cast<int>(100 * at.leg) + (at.ours ? 10 : 0) + (at.certified ? 1 : 0));
   EXPECT_EQ(seen, (std::vector<int>{1, 11, 11, 1, 1, 0, 101}));
-  EXPECT_EQ(pairing.certified.placed, 6U);
+  EXPECT_EQ(pairing.certified.placed.size(), 6U);
 }
 
 TEST(Pairing, AReportThatSaysUnknownEndsWhatTheOneBeforeSaid) {
@@ -176,9 +145,9 @@ TEST(Pairing, AHoleInTheMapIsNoFaultOfTheReports) {
     seen.push_back(static_cast<int>(100 * at.leg) + (at.ours ? 10 : 0) + (at.certified ? 1 : 0));
   EXPECT_EQ(seen, (std::vector<int>{11, 101, 111, 211}));
   EXPECT_EQ(pairing.ours.off_line, 1U);
-  EXPECT_EQ(pairing.ours.placed, 1U);
+  EXPECT_EQ(pairing.ours.placed.size(), 1U);
   EXPECT_EQ(pairing.certified.off_line, 2U);
-  EXPECT_EQ(pairing.certified.placed, 2U);
+  EXPECT_EQ(pairing.certified.placed.size(), 2U);
   EXPECT_EQ(pairing.legs, 1U);
 }
 
@@ -226,38 +195,41 @@ TEST(Pairing, ATrainThatStandsStillRanSomeWay) {
               1e-9);
 }
 
-// Half of the reports at standstill, ours always 5 m ahead: the place differs, not the time.
-TEST(Pairing, AHaltIsNoTimeShift) {
-  std::vector<TimedReport> ours;
-  std::vector<TimedReport> certified;
-  for (int i = 0; i < 40; ++i) {
-    const double speed_kmh = i < 20 ? 100 : 0;
-    const double front_m = -std::min(i, 20) * 100 / 3.6;
-    ours.push_back(report(i, kA, front_m - 5, speed_kmh, false));
-    certified.push_back(report(i, kA, front_m, speed_kmh, false));
-  }
-  EXPECT_NEAR(time_shift(pair_up(ours, certified, Axes(), kGapNs).pairs).shift_s, 0, 1e-3);
-}
-
 TEST(Pairing, IntervalsThatDoNotMeetAreSeen) {
   const auto pairing = pair_up({report(0, kA, 100)}, {report(0, kA, 111)}, Axes(), kGapNs);
   EXPECT_FALSE(pairing.pairs.at(0).overlap());  // 97 to 107 and 108 to 118
 }
 
-TEST(Pairing, LateStampsShowInTheSpeed) {
+TEST(Pairing, LegsAreThoseOfTheCertifiedReports) {
+  const auto pairing = pair_up({report(-5, kA, 0), report(9, kA, 180), report(10, kB, 0), report(50, kC, 0)},
+                               {report(0, kA, 0), report(10, kB, 0), report(20, kB, 200)}, Axes(), kGapNs);
+  std::vector<size_t> legs;
+  for (const auto& [leg, report] : pairing.ours.placed) legs.push_back(leg);
+  EXPECT_EQ(legs, (std::vector<size_t>{0, 0, 1, 1})) << "also of those that have no partner";
+}
+
+TEST(Pairing, StaysAreOfOnePlace) {
+  std::vector<TimedReport> certified{report(0, kA, 0),     report(1, kA, 20, 0), report(2, kA, 20.5, 0),
+                                     report(3, kA, 30, 0), report(4, kA, 30, 0), report(5, kB, 30, 0)};
+  std::vector<size_t> stays;
+  for (const auto& pair : pair_up(certified, certified, Axes(), kGapNs).pairs) stays.push_back(pair.stay);
+  EXPECT_EQ(stays, (std::vector<size_t>{0, 1, 1, 3, 3, 5}));
+}
+
+// A burst behind a group does not hide the silence that follows it; a stay over night is no cycle.
+TEST(Pairing, HowOftenASideReportsIsWhatAMomentSees) {
   std::vector<TimedReport> ours;
   std::vector<TimedReport> certified;
-  double way_m = 0;
-  for (int i = 0; i < 60; ++i) {
-    const double speed_kmh = 5 * (10 + i % 20);
-    way_m += speed_kmh / 3.6;
-    ours.push_back(report(i, kA, way_m, speed_kmh));
-    certified.push_back(report(i, kA, way_m - 0.5 * speed_kmh / 3.6, speed_kmh));  // where it was half a second ago
+  for (int t = 0; t <= 120; ++t) {
+    if (t % 12 < 3) ours.push_back(report(t, kA, t));
+    if (t % 2 == 0) certified.push_back(report(t, kA, t));
   }
-  const auto shift = time_shift(pair_up(ours, certified, Axes(), kGapNs).pairs);
-  EXPECT_NEAR(shift.shift_s, 0.5, 0.01);
-  EXPECT_LT(shift.sigma_s, 0.01);
-  EXPECT_TRUE(std::isnan(time_shift({}).shift_s));
+  ours.push_back(report(40000, kA, 200));
+  certified.push_back(report(40000, kA, 200));
+  const auto pairing = pair_up(ours, certified, Axes(), kGapNs);
+  EXPECT_NEAR(pairing.ours.every_s, (1 + 1 + 100) / 12.0, 1e-9);
+  EXPECT_NEAR(pairing.certified.every_s, 2, 1e-9);
+  EXPECT_TRUE(std::isnan(pair_up({ours[0]}, certified, Axes(), kGapNs).ours.every_s));
 }
 
 }  // namespace

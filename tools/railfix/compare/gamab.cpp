@@ -169,28 +169,35 @@ RatioResult compare_share(const std::vector<Sample>& samples, const Demand& dema
 }
 
 BrokenResult compare_broken(const std::vector<Sample>& samples, const Demand& demand) {
-  struct Broken {
-    bool ours = false;
-    bool certified = false;
+  struct Leg {
+    bool promised = false;
+    bool broken = false;
+    void add(double value) {
+      promised |= std::isfinite(value);
+      broken |= value > 0;
+    }
   };
-  std::map<size_t, Broken> legs;
+  std::map<size_t, std::pair<Leg, Leg>> legs;
   for (const auto& sample : samples) {
-    auto& leg = legs[sample.leg];
-    leg.ours |= sample.ours > 0;
-    leg.certified |= sample.certified > 0;
+    auto& [ours, certified] = legs[sample.leg];
+    ours.add(sample.ours);
+    certified.add(sample.certified);
   }
   BrokenResult result;
-  result.legs = legs.size();
   size_t only_ours = 0;
   size_t only_certified = 0;
   for (const auto& [number, leg] : legs) {
-    result.ours += leg.ours;
-    result.certified += leg.certified;
-    only_ours += leg.ours && !leg.certified;
-    only_certified += leg.certified && !leg.ours;
+    const auto& [ours, certified] = leg;
+    result.ours.legs += ours.promised;
+    result.ours.broken += ours.broken;
+    result.certified.legs += certified.promised;
+    result.certified.broken += certified.broken;
+    if (!ours.promised || !certified.promised) continue;
+    only_ours += ours.broken && !certified.broken;
+    only_certified += certified.broken && !ours.broken;
   }
-  result.ours_at_most = upper_share(result.ours, result.legs, demand.confidence);
-  if (result.legs < kFewestLegs) return result;
+  result.ours_at_most = upper_share(result.ours.broken, result.ours.legs, demand.confidence);
+  if (result.ours.legs < kFewestLegs) return result;
   const size_t alone = only_ours + only_certified;
   if (only_ours <= only_certified) {
     if (result.ours_at_most <= demand.broken_at_most) result.verdict = Verdict::at_least_as_good;

@@ -1,6 +1,9 @@
 // "Globally at least as good" (GAMAB, EN 50126-2): is one system's figure shown to be no worse than another's?
 // One-sided, with a stated confidence and a margin, over legs, because the errors of one leg belong together.
 //
+// It compares performance, a non-inferiority test with a margin of 5 % on accuracy and a 95 % bound for the share of
+// legs outside the interval, and is no risk acceptance by EN 50126: it knows no hazards and no rates of them.
+//
 // A bound is the farther one of two:
 // - Ratios of random subsets of the legs are typical values (Hartigan, "Using subsample values as typical values", JASA
 //   64, 1969): the true ratio R is as likely in one gap between the sorted ones as in any other. Exact for
@@ -56,16 +59,19 @@ RatioResult compare_ratio(const std::vector<Sample>& samples, Figure figure, con
 /// is 1 where it was there, else 0.
 RatioResult compare_share(const std::vector<Sample>& samples, const Demand& demand);
 
-/// Legs on which a promise was broken, by one system alone: sign test. At least as good needs a shown bound, too: no
-/// broken leg of few shows nothing.
+/// Legs on which a promise was broken, by one system alone: sign test, over legs on which both promised. At least as
+/// good needs a shown bound, too: no broken leg of few shows nothing.
 struct BrokenResult {
   Verdict verdict = Verdict::open;
-  size_t legs = 0;
-  size_t ours = 0;  // legs with a broken promise
-  size_t certified = 0;
+  struct Side {
+    size_t broken = 0;  // legs with a broken promise
+    size_t legs = 0;    // with any promise
+  };
+  Side ours;
+  Side certified;
   double ours_at_most = 0;  // upper bound of our share of broken legs at the confidence (Clopper, Pearson 1934)
 };
-/// A value above 0 is a broken promise.
+/// A value above 0 is a broken promise, 0 a kept one, NaN none.
 BrokenResult compare_broken(const std::vector<Sample>& samples, const Demand& demand);
 
 }  // namespace railfix::compare

@@ -13,6 +13,7 @@ namespace railfix::compare {
 namespace {
 
 constexpr double kSpeedRoundingMps = 2.5 / 3.6;
+constexpr double kSamePlaceM = 1;
 constexpr double kLargestAccelerationMps2 = 1.5;  // for reports that do not say which way they run
 
 /// Cubic Hermite between two reports; `share` of the way in time.
@@ -46,11 +47,52 @@ struct Said {
   std::optional<PlacedReport> place;
 };
 
-Said said(const TimedReport& report, const Axes& axes, Counted& counted) {
+Said said(const TimedReport& report, const Axes& axes, size_t leg, Counted& counted) {
   Said said{report.stamp_ns, interval_known(report.fields), axes.place(report)};
-  counted.placed += said.place.has_value();
+  if (said.place) counted.placed.push_back({leg, *said.place});
   counted.off_line += !said.place && position_known(report.fields);
   return said;
+}
+
+/// Of every certified report: it begins where the LRBG changes.
+std::vector<size_t> legs_of(const std::vector<TimedReport>& certified) {
+  std::vector<size_t> legs;
+  size_t leg = 0;
+  std::optional<uint32_t> group_before;
+  for (const auto& report : certified) {
+    const uint32_t group = report.fields.nid_lrbg;
+    if (etcs::names_group(group)) {
+      leg += group_before && group != *group_before;
+      group_before = group;
+    }
+    legs.push_back(leg);
+  }
+  return legs;
+}
+
+/// Both stand, and where they say they are is the same.
+bool stand_together(const etcs::TrainPositionReport& a, const etcs::TrainPositionReport& b) {
+  if (!stands(a) || !stands(b) || a.nid_lrbg != b.nid_lrbg || a.q_dlrbg != b.q_dlrbg) return false;
+  const auto a_m = etcs::metres_if_known(a.d_lrbg, a.q_scale);
+  const auto b_m = etcs::metres_if_known(b.d_lrbg, b.q_scale);
+  return a_m && b_m ? std::abs(*a_m - *b_m) <= kSamePlaceM : !a_m && !b_m;
+}
+
+/// Of every certified report. Held against where the stay began: V_TRAIN is 0 for a train that creeps, too.
+std::vector<size_t> stays_of(const std::vector<TimedReport>& certified) {
+  std::vector<size_t> stays;
+  for (size_t i = 0; i < certified.size(); ++i) {
+    const bool on = i > 0 && stand_together(certified[stays.back()].fields, certified[i].fields);
+    stays.push_back(on ? stays.back() : i);
+  }
+  return stays;
+}
+
+/// That of the last certified report, or of the first one for what lies before.
+size_t leg_at(int64_t stamp_ns, const std::vector<TimedReport>& certified, const std::vector<size_t>& legs) {
+  const auto later = std::ranges::upper_bound(certified, stamp_ns, {}, &TimedReport::stamp_ns);
+  if (legs.empty()) return 0;
+  return later == certified.begin() ? legs.front() : legs[static_cast<size_t>(later - certified.begin()) - 1];
 }
 
 /// The last report of any kind, for one that says "unknown" ends what the one before it said, and the next one. Both
@@ -68,6 +110,20 @@ Around around(const std::vector<Said>& reports, int64_t stamp_ns) {
   if (later != reports.begin()) found.last = &*std::prev(later);
   if (found.last != nullptr && found.last->stamp_ns == stamp_ns) found.next = found.last;
   return found;
+}
+
+double every_s(const std::vector<TimedReport>& reports, int64_t from_ns, int64_t to_ns, int64_t longest_gap_ns) {
+  double sum_s = 0;
+  double squares = 0;
+  for (size_t i = 1; i < reports.size(); ++i) {
+    const int64_t begin_ns = reports[i - 1].stamp_ns;
+    const int64_t end_ns = reports[i].stamp_ns;
+    if (begin_ns < from_ns || end_ns > to_ns || end_ns - begin_ns > longest_gap_ns) continue;
+    const double gap_s = core::seconds(end_ns - begin_ns);
+    sum_s += gap_s;
+    squares += gap_s * gap_s;
+  }
+  return squares / sum_s;
 }
 
 /// Ours at the time of a certified report.
@@ -107,21 +163,19 @@ bool Pair::runs_apart() const {
 Pairing pair_up(const std::vector<TimedReport>& ours, const std::vector<TimedReport>& certified, const Axes& axes,
                 int64_t longest_gap_ns) {
   Pairing pairing;
+  const auto legs = legs_of(certified);
+  const auto stays = stays_of(certified);
   std::vector<Said> own;
   own.reserve(ours.size());
-  for (const auto& report : ours) own.push_back(said(report, axes, pairing.ours));
-  size_t leg = 0;
-  std::optional<uint32_t> group_before;
-  for (const auto& timed : certified) {
-    const uint32_t group = timed.fields.nid_lrbg;
-    if (etcs::names_group(group)) {
-      leg += group_before && group != *group_before;
-      group_before = group;
-    }
-    const auto report = said(timed, axes, pairing.certified);
+  for (const auto& report : ours)
+    own.push_back(said(report, axes, leg_at(report.stamp_ns, certified, legs), pairing.ours));
+  for (size_t i = 0; i < certified.size(); ++i) {
+    const auto& timed = certified[i];
+    const size_t leg = legs[i];
+    const auto report = said(timed, axes, leg, pairing.certified);
     const auto beside = around(own, timed.stamp_ns);
     const bool fresh = beside.last != nullptr && timed.stamp_ns - beside.last->stamp_ns <= longest_gap_ns;
-    pairing.availability.push_back({leg, fresh && beside.last->interval_known, report.interval_known});
+    pairing.availability.push_back({leg, stays[i], fresh && beside.last->interval_known, report.interval_known});
     if (!report.place) continue;
     auto pair = paired(beside, *report.place, longest_gap_ns);
     if (!pair) {
@@ -129,37 +183,16 @@ Pairing pair_up(const std::vector<TimedReport>& ours, const std::vector<TimedRep
       continue;
     }
     pair->leg = leg;
+    pair->stay = stays[i];
     pairing.legs += pairing.pairs.empty() || pairing.pairs.back().leg != leg;
     pairing.pairs.push_back(*pair);
   }
+  if (ours.empty() || certified.empty()) return pairing;
+  const int64_t from_ns = std::max(ours.front().stamp_ns, certified.front().stamp_ns);
+  const int64_t to_ns = std::min(ours.back().stamp_ns, certified.back().stamp_ns);
+  pairing.ours.every_s = every_s(ours, from_ns, to_ns, longest_gap_ns);
+  pairing.certified.every_s = every_s(certified, from_ns, to_ns, longest_gap_ns);
   return pairing;
-}
-
-TimeShift time_shift(const std::vector<Pair>& pairs) {
-  const double unknown = std::numeric_limits<double>::quiet_NaN();
-  double n = 0;
-  double mean_v = 0;
-  double mean_d = 0;
-  for (const auto& pair : pairs) {
-    if (!std::isfinite(pair.certified.speed_mps)) continue;
-    ++n;
-    mean_v += (std::abs(pair.certified.speed_mps) - mean_v) / n;
-    mean_d += (pair.difference_m() - mean_d) / n;
-  }
-  double vv = 0;
-  double vd = 0;
-  double dd = 0;
-  for (const auto& pair : pairs) {
-    if (!std::isfinite(pair.certified.speed_mps)) continue;
-    const double v = std::abs(pair.certified.speed_mps) - mean_v;
-    const double d = pair.difference_m() - mean_d;
-    vv += v * v;
-    vd += v * d;
-    dd += d * d;
-  }
-  if (n < 3 || vv < 1) return {unknown, unknown};
-  const double shift_s = vd / vv;
-  return {shift_s, std::sqrt(std::max(0.0, dd - shift_s * vd) / (n - 2) / vv)};
 }
 
 }  // namespace railfix::compare

@@ -11,6 +11,7 @@ namespace railfix::compare {
 struct Pair {
   int64_t stamp_ns = 0;  // of the certified report
   size_t leg = 0;        // certified reports in a row with the same LRBG: errors inside a leg belong together
+  size_t stay = 0;       // the same for certified reports in a row at standstill in one place; else each its own
   PlacedReport certified;
   PlacedReport ours;       // at stamp_ns
   double carried_m = 0;    // bound of what carrying may add: V_TRAIN is rounded to 5 km/h
@@ -29,14 +30,23 @@ struct Pair {
 /// on our map says nothing about them.
 struct Availability {
   size_t leg = 0;
+  size_t stay = 0;
   bool ours = false;  // in the last report, when it is no older than ours are carried
   bool certified = false;
 };
 
+struct OnLeg {
+  size_t leg = 0;
+  PlacedReport report;
+};
+
 /// Reports of one side.
 struct Counted {
-  size_t placed = 0;
-  size_t off_line = 0;  // with a position, but relative to a group that the line does not have
+  std::vector<OnLeg> placed;  // paired or not; the leg is that of the certified report at or before it
+  size_t off_line = 0;        // with a position, but relative to a group that the line does not have
+  /// Length of the gap between reports that a moment lies in, on average over the time that both report. Gaps that
+  /// nothing is carried over are left out; NaN when there are no others.
+  double every_s = 0;
 };
 
 struct Pairing {
@@ -52,12 +62,5 @@ struct Pairing {
 /// REQUIRES: both sorted.
 Pairing pair_up(const std::vector<TimedReport>& ours, const std::vector<TimedReport>& certified, const Axes& axes,
                 int64_t longest_gap_ns);
-
-/// Least squares of the differences over the speed: a system whose stamps are late lies behind by speed times delay.
-struct TimeShift {
-  double shift_s = 0;  // NaN with fewer than 3 pairs or one speed only
-  double sigma_s = 0;
-};
-TimeShift time_shift(const std::vector<Pair>& pairs);
 
 }  // namespace railfix::compare

@@ -12,7 +12,7 @@ namespace {
 
 /// Along the group's nominal direction.
 double speed_mps(const etcs::TrainPositionReport& fields) {
-  if (fields.v_train == etcs::kStandstillSpeed || fields.v_train == 0) return 0;
+  if (stands(fields)) return 0;
   if (fields.q_dirtrain == etcs::kUnknownSide) return std::numeric_limits<double>::quiet_NaN();
   const double speed = core::mps_from_kmh(fields.v_train * etcs::kSpeedStepKmh);
   return fields.q_dirtrain == etcs::kNominal ? speed : -speed;
@@ -45,6 +45,10 @@ bool position_known(const etcs::TrainPositionReport& fields) {
 bool interval_known(const etcs::TrainPositionReport& fields) {
   return position_known(fields) && fields.l_doubtover != etcs::kUnknownDistance &&
          fields.l_doubtunder != etcs::kUnknownDistance;
+}
+
+bool stands(const etcs::TrainPositionReport& fields) {
+  return fields.v_train == etcs::kStandstillSpeed || fields.v_train == 0;
 }
 
 Axes::Axes(const track::Path& path) : line_(std::in_place) {

@@ -26,6 +26,9 @@ bool position_known(const etcs::TrainPositionReport& fields);
 /// ... and both doubts.
 bool interval_known(const etcs::TrainPositionReport& fields);
 
+/// V_TRAIN says standstill or 0 km/h.
+bool stands(const etcs::TrainPositionReport& fields);
+
 class Axes {
  public:
   /// Each balise group alone, along its nominal direction; that of packet 1 is the way from NID_PRVLRBG, an axis of its

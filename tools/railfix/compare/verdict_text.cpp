@@ -24,12 +24,19 @@ std::string text_of_need(const RatioResult& result) {
   return text;
 }
 
-Verdict print_ratio(const char* what, const RatioResult& result) {
+/// `doubt`, where there is one, forbids "at least as good".
+Verdict print_ratio(const char* what, RatioResult result, const char* doubt = nullptr) {
+  const bool doubted = doubt != nullptr && result.verdict == Verdict::at_least_as_good;
+  if (doubted) result.verdict = Verdict::open;
   const std::string bounds = std::isnan(result.low) ? "too few legs for bounds"
                                                     : figure("%.3f", result.low) + " to " + figure("%.3f", result.high);
   std::printf("%-24s ratio %s (%s), %zu pairs in %zu legs: %s", what, figure("%.3f", result.ratio).c_str(),
               bounds.c_str(), result.samples, result.legs, text_of(result.verdict));
-  if (result.verdict == Verdict::open && result.samples > 0) std::printf("; %s", text_of_need(result).c_str());
+  if (doubted) {
+    std::printf("; %s", doubt);
+  } else if (result.verdict == Verdict::open && result.samples > 0) {
+    std::printf("; %s", text_of_need(result).c_str());
+  }
   std::printf("\n");
   return result.verdict;
 }
@@ -42,29 +49,50 @@ Verdict print_share(const std::vector<Sample>& samples, const Demand& demand) {
   return print_ratio("certified over ours:", result);
 }
 
+std::string text_of(const char* format, auto... values) {
+  char text[256];
+  std::snprintf(text, sizeof text, format, values...);
+  return text;
+}
+
+std::string text_of_stamps(const StampsOff& stamps) {
+  return text_of("the stamps of %s are off by %.3f s; say --offset-s %.3f",
+                 stamps.by_truth ? "the certified system" : "one side", std::abs(stamps.shift_s), stamps.offset_s);
+}
+
+/// Empty without any.
+std::string text_of(const Doubts& doubts) {
+  if (doubts.turned > 0) {
+    return text_of("on %zu legs the train looks the other way in ours (Q_DIRLRBG), so one side is wrong",
+                   doubts.turned);
+  }
+  if (doubts.runs_apart > 0) {
+    return text_of("on %zu legs the train runs the other way in ours (Q_DIRTRAIN), so one side is wrong",
+                   doubts.runs_apart);
+  }
+  if (doubts.stamps) return text_of_stamps(*doubts.stamps);
+  if (doubts.apart > 0) {
+    return text_of(
+        "on %zu legs the intervals have nothing in common, so one side is wrong, and only --truth says which",
+        doubts.apart);
+  }
+  if (doubts.ours_seldom()) {
+    return text_of("ours reports every %.3g s, the certified system every %.3g s; let both run on the same packet 58",
+                   doubts.ours_every_s, doubts.certified_every_s);
+  }
+  return {};
+}
+
 /// What the verdicts come to.
-Verdict print_sum(const std::vector<Verdict>& verdicts, const Contradicted& legs, bool errors_known) {
+Verdict print_sum(const std::vector<Verdict>& verdicts, const Doubts& doubts, bool errors_known) {
   const auto any = [&](Verdict one) { return std::ranges::count(verdicts, one) > 0; };
   std::printf("verdict                  ");
   if (any(Verdict::worse)) {
     std::printf("WORSE\n");
     return Verdict::worse;
   }
-  if (legs.turned > 0) {
-    std::printf("not shown: on %zu legs the train looks the other way in ours (Q_DIRLRBG), so one side is wrong\n",
-                legs.turned);
-    return Verdict::open;
-  }
-  if (legs.runs_apart > 0) {
-    std::printf("not shown: on %zu legs the train runs the other way in ours (Q_DIRTRAIN), so one side is wrong\n",
-                legs.runs_apart);
-    return Verdict::open;
-  }
-  if (legs.apart > 0) {
-    std::printf(
-        "not shown: on %zu legs the intervals have nothing in common, so one side is wrong, and only --truth "
-        "says which\n",
-        legs.apart);
+  if (const auto doubt = text_of(doubts); !doubt.empty()) {
+    std::printf("not shown: %s\n", doubt.c_str());
     return Verdict::open;
   }
   if (any(Verdict::open)) {
@@ -91,24 +119,29 @@ std::string figure(const char* format, double value) {
   return text;
 }
 
-Verdict print_verdict(const Columns& columns, const Contradicted& legs, const Demand& demand) {
+Verdict print_verdict(const Columns& columns, const Doubts& doubts, const Demand& demand) {
   std::printf("\nGAMAB, %.0f %% confidence, margin %.0f %%, over legs (ours / certified)\n", 100 * demand.confidence,
               100 * demand.margin);
   std::vector<Verdict> verdicts{print_share(columns.available, demand)};
-  verdicts.push_back(print_ratio("interval length, mean", compare_ratio(columns.lengths, Figure::mean, demand)));
+  const char* seldom = doubts.ours_seldom() ? "ours reports too seldom" : nullptr;
+  verdicts.push_back(
+      print_ratio("interval length, mean", compare_ratio(columns.lengths, Figure::mean, demand), seldom));
   if (columns.errors.empty()) {
     std::printf("error                    not known without --truth\n");
   } else {
-    verdicts.push_back(print_ratio("error, RMS", compare_ratio(columns.errors, Figure::root_mean_square, demand)));
+    const char* doubt = doubts.stamps ? "stamps are off" : seldom;
+    verdicts.push_back(
+        print_ratio("error, RMS", compare_ratio(columns.errors, Figure::root_mean_square, demand), doubt));
     const auto broken = compare_broken(columns.outside, demand);
     std::printf(
-        "outside the interval     ours on %zu, certified on %zu of %zu legs; ours at most %.2g of legs, demanded %.2g: "
-        "%s\n",
-        broken.ours, broken.certified, broken.legs, broken.ours_at_most, demand.broken_at_most,
-        text_of(broken.verdict));
+        "outside the interval     ours on %zu of %zu, certified on %zu of %zu legs; ours at most %.2g of legs, "
+        "demanded "
+        "%.2g: %s\n",
+        broken.ours.broken, broken.ours.legs, broken.certified.broken, broken.certified.legs, broken.ours_at_most,
+        demand.broken_at_most, text_of(broken.verdict));
     verdicts.push_back(broken.verdict);
   }
-  return print_sum(verdicts, legs, !columns.errors.empty());
+  return print_sum(verdicts, doubts, !columns.errors.empty());
 }
 
 }  // namespace railfix::compare

@@ -1,0 +1,245 @@
+// `railfix tpr compare` on rides where one side looks better than it is: stamps that are late, reports between the
+// certified ones, legs that promise nothing, reports held for long, a train that stands.
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <filesystem>
+#include <functional>
+
+#include "core/random.hpp"
+#include "core/time.hpp"
+#include "core/units.hpp"
+#include "etcs/train_position_report.hpp"
+#include "support/program.hpp"
+#include "track/map.hpp"
+
+namespace railfix {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+constexpr double kPatienceS = 60;
+constexpr double kFirstStampS = 1000;
+constexpr double kSpacingM = 1000;
+constexpr int kLegs = 130;
+
+/// One group every kilometre.
+track::Map long_line() {
+  track::Map map;
+  const double length_m = (kLegs + 10) * kSpacingM;
+  map.edges = {{1, "main", 1, 2, "", track::Alignment::chained({0, 0, core::kPi / 2}, {{length_m, 0, 0}})}};
+  map.nodes = {{1, track::NodeKind::end, "", 0, 0}, {2, track::NodeKind::end, "", length_m, 0}};
+  for (uint32_t i = 1; i * kSpacingM < length_m; ++i)
+    map.balise_groups.push_back({85, i, 1, i * kSpacingM, true, true, 1, {}});
+  return map;
+}
+
+uint32_t group_at(double place_m) {
+  return static_cast<uint32_t>(place_m / kSpacingM);
+}
+
+/// A line of a table; `doubt_m` below 0 is not known.
+std::string line(double stamp_s, double front_m, double doubt_m, double speed_mps) {
+  etcs::TrainPositionReport report;
+  const uint32_t group = group_at(front_m);
+  report.nid_lrbg = 85U << 14U | group;
+  report.q_scale = 0;
+  report.d_lrbg = static_cast<uint32_t>(std::lround((front_m - group * kSpacingM) * 10));
+  report.q_dirlrbg = report.q_dlrbg = report.q_dirtrain = etcs::kNominal;
+  report.l_doubtover = report.l_doubtunder =
+      doubt_m < 0 ? uint32_t{etcs::kUnknownDistance} : static_cast<uint32_t>(std::lround(doubt_m * 10));
+  report.v_train = static_cast<uint32_t>(std::lround(speed_mps * 3.6 / etcs::kSpeedStepKmh));
+  return std::to_string(core::to_ns(kFirstStampS + stamp_s)) + ',' +
+         etcs::to_hex(core::value_or_throw(etcs::encode(report, etcs::Baseline::b3))) + '\n';
+}
+
+// From 20 to 40 m/s and back in ten minutes, from 1 km of the line on.
+constexpr double kMiddleMps = 30;
+constexpr double kSwingMps = 10;
+constexpr double kSwingS = 97;
+
+double speed_mps(double run_s) {
+  return kMiddleMps + kSwingMps * std::sin(run_s / kSwingS);
+}
+double way_m(double run_s) {
+  return kMiddleMps * run_s + kSwingMps * kSwingS * (1 - std::cos(run_s / kSwingS));
+}
+double run_s() {
+  return (kLegs - 1) * kSpacingM / kMiddleMps;
+}
+
+class TprCompareFairness : public ::testing::Test {
+ protected:
+  TprCompareFairness() {
+    std::filesystem::create_directories(folder_ / "truth");
+    core::ok_or_throw(long_line().save(folder_ / "line.map"));
+  }
+  ~TprCompareFairness() override { std::filesystem::remove_all(folder_); }
+
+  /// Lines of the table.
+  void write(const std::string& name, const std::string& lines) const {
+    std::ofstream(folder_ / name) << "stamp_ns,hex\n" << lines;
+  }
+  void write_truth(const std::function<double(double)>& way_m, double length_s) const {
+    std::ofstream truth(folder_ / "truth" / "track.csv");
+    truth << "timestamp,distance\n";
+    for (double t = 0; t < length_s; t += 0.5)
+      truth << core::to_ns(kFirstStampS + t) << ',' << std::to_string(way_m(t)) << '\n';
+  }
+  [[nodiscard]] std::string said(const std::vector<std::string>& more = {},
+                                 const std::string& start = "1:1000:+") const {
+    const auto file = [&](const char* name) { return (folder_ / name).string(); };
+    std::vector<std::string> arguments{"railfix",
+                                       "tpr",
+                                       "compare",
+                                       "--ours",
+                                       file("ours.csv"),
+                                       "--certified",
+                                       file("certified.csv"),
+                                       "--map",
+                                       file("line.map"),
+                                       "--start",
+                                       start,
+                                       "--truth",
+                                       file("truth")};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const auto outcome = test::run_program(arguments, kPatienceS);
+    return outcome.out + outcome.err;
+  }
+
+ private:
+  std::filesystem::path folder_ =
+      std::filesystem::temp_directory_path() / ("tpr-compare-fairness-" + std::to_string(getpid()));
+};
+
+/// Errors that stay the same on each leg, and reports every `every_s`.
+std::string wavy_ride(double every_s, double sigma_m, double doubt_m, uint64_t seed, double late_s = 0) {
+  core::Random random(seed);
+  std::string lines;
+  double error_m = 0;
+  uint32_t group = 0;
+  for (double t = 5; t < run_s(); t += every_s) {
+    const double place_m = kSpacingM + way_m(t);
+    if (group_at(place_m) != group) error_m = random.normal(0, sigma_m);
+    group = group_at(place_m);
+    const double front_m = std::max(place_m + error_m, group * kSpacingM);
+    lines += line(t + late_s, std::min(front_m, (group + 1) * kSpacingM - 0.1), doubt_m, speed_mps(t));
+  }
+  return lines;
+}
+
+// Ours is three times worse, and the certified system's stamps are half a second late.
+TEST_F(TprCompareFairness, LateStampsMakeNobodyAsGood) {
+  write_truth(way_m, run_s());
+  write("ours.csv", wavy_ride(5, 3, 14, 1));
+  write("certified.csv", wavy_ride(5, 1, 15, 2, 0.5));
+  auto text = said();
+  EXPECT_THAT(text, HasSubstr("not shown; stamps are off"));
+  EXPECT_THAT(text, HasSubstr("the stamps of the certified system are off by 0.475 s; say --offset-s -0.475"));
+  EXPECT_THAT(said({"--offset-s", "-0.5"}), HasSubstr("verdict                  WORSE"));
+  // Ours as good, and the stamps right: what is left of the shift is chance or small.
+  write("ours.csv", wavy_ride(5, 0.5, 5, 1));
+  EXPECT_THAT(said({"--offset-s", "-0.5"}), HasSubstr("verdict                  at least as good"));
+}
+
+// Every second, with a true place in the interval only when the certified system reports, too.
+TEST_F(TprCompareFairness, APromiseNeedsNoPartner) {
+  write_truth(way_m, run_s());
+  std::string ours;
+  for (int t = 5; t < run_s(); ++t) {
+    const double front_m = kSpacingM + way_m(t) + (t % 10 == 5 ? 0 : 40);
+    ours += line(t, front_m, 5, speed_mps(t));
+  }
+  write("ours.csv", ours);
+  write("certified.csv", wavy_ride(10, 1, 15, 2));
+  const auto text = said();
+  EXPECT_THAT(text, HasSubstr("error, size                   0.0"));
+  EXPECT_THAT(text, HasSubstr("outside the interval     ours on 1"));
+  EXPECT_THAT(text, HasSubstr("verdict                  WORSE"));
+}
+
+// The interval is known on every sixth leg.
+TEST_F(TprCompareFairness, ALegWithoutAnyIntervalKeepsNoPromise) {
+  write_truth(way_m, run_s());
+  std::string lines;
+  for (double t = 5; t < run_s(); t += 5) {
+    const double front_m = kSpacingM + way_m(t);
+    lines += line(t, front_m, group_at(front_m) % 6 == 0 ? 5 : -1, speed_mps(t));
+  }
+  write("ours.csv", lines);
+  write("certified.csv", lines);
+  EXPECT_THAT(said(),
+              HasSubstr("outside the interval     ours on 0 of 21, certified on 0 of 21 legs; ours at most 0.13"));
+}
+
+/// 5 % of the way since the group as doubt and 2 % as error, at 30 m/s; a report behind each group, then every so
+/// often.
+std::string odometer(double every_s, uint64_t seed) {
+  core::Random random(seed);
+  std::string lines;
+  double scale = 0;
+  uint32_t group = 0;
+  double last_s = 0;
+  for (double t = 5; t < run_s(); t += 0.5) {
+    const double place_m = kSpacingM + kMiddleMps * t;
+    const bool new_group = group_at(place_m) != group;
+    group = group_at(place_m);
+    if (new_group) scale = std::clamp(random.normal(0, 0.01), -0.02, 0.02);
+    if (!new_group && t - last_s < every_s) continue;
+    last_s = t;
+    const double since_m = place_m - group * kSpacingM;
+    lines +=
+        line(t, std::min(place_m + scale * since_m, (group + 1) * kSpacingM - 0.1), 1 + 0.05 * since_m, kMiddleMps);
+  }
+  return lines;
+}
+
+TEST_F(TprCompareFairness, WhatIsHeldForLongIsNotShown) {
+  write_truth([](double t) { return kMiddleMps * t; }, run_s());
+  write("ours.csv", odometer(12, 1));
+  write("certified.csv", odometer(1, 1));
+  auto text = said();
+  EXPECT_THAT(text, HasSubstr("not shown; ours reports too seldom"));
+  EXPECT_THAT(
+      text,
+      HasSubstr("ours reports every 11.3 s, the certified system every 0.995 s; let both run on the same packet 58"));
+  EXPECT_THAT(text, HasSubstr("the speed hardly changes, stamps that are off would not be seen"));
+  // The other way round nothing is gained: the same intervals are not shorter.
+  write("ours.csv", odometer(1, 1));
+  write("certified.csv", odometer(12, 1));
+  text = said();
+  EXPECT_THAT(text, Not(HasSubstr("packet 58")));
+  EXPECT_THAT(text, HasSubstr("interval length, mean    ratio 1."));
+  write("certified.csv", odometer(1, 1));
+  EXPECT_THAT(said(), HasSubstr("ratio 1.000 (0.955 to 1.047), 4338 pairs in 129 legs: at least as good"));
+}
+
+// Ours is three times worse on the way and better while the train stands for ten minutes.
+TEST_F(TprCompareFairness, AStandstillCountsOnce) {
+  constexpr int kRunS = 48;
+  constexpr int kStandS = 600;
+  const auto way_m = [](double t) {
+    const int leg = static_cast<int>(t / (kRunS + kStandS));
+    return kSpacingM * leg + 20 * std::min(t - leg * (kRunS + kStandS), double{kRunS});
+  };
+  core::Random random(3);
+  std::string ours;
+  std::string certified;
+  constexpr int kStops = 70;
+  for (int t = 0; t < kStops * (kRunS + kStandS); t += 6) {
+    const bool runs = t % (kRunS + kStandS) < kRunS;
+    const double place_m = kSpacingM + 10 + way_m(t);
+    ours += line(t, place_m + (runs ? random.normal(0, 1.5) : 0.2), runs ? 9 : 2, runs ? 20 : 0);
+    certified += line(t, place_m + (runs ? random.normal(0, 0.5) : 1), 3, runs ? 20 : 0);
+  }
+  write("ours.csv", ours);
+  write("certified.csv", certified);
+  write_truth([&](double t) { return 10 + way_m(t); }, kStops * (kRunS + kStandS));
+  const auto text = said({}, "1:1010:+");
+  EXPECT_THAT(text, HasSubstr("repeats at standstill    6860 of 7560 pairs"));
+  EXPECT_THAT(text, HasSubstr("verdict                  WORSE"));
+}
+
+}  // namespace
+}  // namespace railfix

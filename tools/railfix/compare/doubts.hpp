@@ -1,0 +1,35 @@
+// What forbids "at least as good" whatever the ratios say: sides that contradict each other or were not seen alike.
+#pragma once
+
+#include "compare/columns.hpp"
+#include "compare/time_shift.hpp"
+
+namespace railfix::compare {
+
+struct StampsOff {
+  double shift_s = 0;   // positive: the certified system's are late
+  double offset_s = 0;  // that puts them right
+  bool by_truth = false;
+};
+
+struct Doubts {
+  // Legs on which both cannot be right.
+  size_t apart = 0;       // their intervals have nothing in common, and no truth says who is wrong
+  size_t turned = 0;      // in half of their pairs the train looks the one way in ours and the other way in theirs
+  size_t runs_apart = 0;  // the same of the way that it runs
+  std::optional<StampsOff> stamps;  // by more than chance, and so much that it matters
+  double ours_every_s = 0;          // Counted::every_s
+  double certified_every_s = 0;
+  /// What ours said last is held against a fresh certified report; sent behind each group only, it is always good. The
+  /// other way round nothing is gained: at the time of a certified report, ours of a moment ago is compared.
+  [[nodiscard]] bool ours_seldom() const;
+};
+
+/// `offset_s` is in the certified stamps already. The truth judges the pairs it covers and the certified stamps;
+/// without it the sides must agree.
+Doubts doubts_of(const Pairing& pairing, const std::optional<Judge>& judge, double offset_s);
+
+/// Of the certified system's stamps against the truth.
+TimeShift shift_to_truth(const std::vector<Pair>& pairs, const Judge& judge);
+
+}  // namespace railfix::compare
