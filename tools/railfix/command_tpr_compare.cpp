@@ -289,9 +289,8 @@ void add_tpr_compare(CLI::App& tpr, Action& chosen) {
       "  railfix tpr compare --ours topic:demo --certified rbc.csv   what train demo sends now, until the file is "
       "over\n"
       "  railfix tpr compare --ours topic:demo --certified topic:demo-evc --for-s 3600\n"
-      "Both sides must run on the same packet 58 (T_CYCLOC, D_CYCLOC, M_LOC): one that reports more seldom, just "
-      "behind\n"
-      "each group, would look better.\n"
+      "Both sides must run on the same packet 58 (T_CYCLOC, D_CYCLOC, M_LOC): one that reports more seldom, and just\n"
+      "behind each group, would look better.\n"
       "Ends with 3 where the verdict is WORSE.");
   command
       ->add_option("--ours", options->ours,
