@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "core/units.hpp"
 #include "map_matcher/locate/way_comparison.hpp"
@@ -50,7 +51,12 @@ void NetworkLocator::prepare() {
   Search& search = searches_[leading()];
   const MeasuredRun& run = search.run;
   const size_t taken_bins = search.filter ? search.filter->taken_bins() : run.gone_bins();
-  if (run.at_front() && run.end_bin() >= taken_bins + PlaceFilter::kBlockBins + kSettledBins) follow(search, run.way());
+  if (!run.at_front() || run.end_bin() < taken_bins + PlaceFilter::kBlockBins + kSettledBins) return;
+  // A train that shunts would begin anew each time that it has come back.
+  if (!search.filter && std::exchange(begun_, true)) return;
+  MeasuredWay way = run.way();
+  way.resize(way.size() - kSettledBins);
+  follow(search, way);
 }
 
 void NetworkLocator::forget() {
@@ -90,6 +96,7 @@ Location NetworkLocator::locate() {
   const MeasuredRun& run = search.run;
   if (!run.at_front()) return {};
   const MeasuredWay way = run.way();
+  begun_ = false;
   follow(search, way);
   const PlaceFilter& filter = *search.filter;
   double turn = 0;

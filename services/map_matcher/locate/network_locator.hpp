@@ -59,7 +59,8 @@ class NetworkLocator {
   /// Moved by way_m (measured, forward positive) and turned meanwhile (left positive).
   void move(double way_m, double turn_rad, double turn_sigma_rad);
   void sight(const Sighting& sighting);
-  /// Some of the work of the next search, where the way has got longer since the last one; else nothing.
+  /// Some of the work of the next search, where the way has got longer since the last one. All of it once between two
+  /// searches, where it begins anew, as behind a train that has set back.
   void prepare();
   void forget();
   /// That is searched for.
@@ -88,6 +89,7 @@ class NetworkLocator {
   std::shared_ptr<const NetworkIndex> index_;
   std::array<Search, 2> searches_{Search{{parameters_, MeasuredRun::Direction::ahead}, {}},
                                   Search{{parameters_, MeasuredRun::Direction::astern}, {}}};
+  bool begun_ = false;  // anew by prepare(), since the last search
 };
 
 }  // namespace railfix::map_matcher

@@ -15,7 +15,7 @@ namespace railfix::map_matcher {
 struct PlaceSearchParameters {
   LocatorParameters locator;
   GnssSearchParameters gnss;
-  double every_m = 250.0;  // the whole map is searched once in this way
+  double every_m = 250.0;  // a place is asked for once in this way
 };
 
 class PlaceSearch {

@@ -301,7 +301,7 @@ TEST_F(NetworkLocatorTest, WhatIsPreparedOnTheWayGivesTheSameAndLessIsLeftToDo) 
     for (int i = 0; i < kRides; ++i) {
       Shuttle train(index, 700);
       train.prepares = prepares;
-      for (const double to_m : {1430.0, 1425.0, 2105.0, 2100.0, 4200.0}) train.run(route, to_m);
+      for (const double to_m : {1395.0, 1391.0, 2089.0, 2083.0, 4200.0}) train.run(route, to_m);
       const std::clock_t begin = std::clock();
       location = train.locator().locate();
       least = std::min(least, std::clock() - begin);
