@@ -1,5 +1,3 @@
-#include <algorithm>
-
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 
 #include "core/time.hpp"

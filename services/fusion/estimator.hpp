@@ -299,7 +299,7 @@ class Estimator {
   void compare_turns();
   /// What agrees with the place says whether it is the right track, too.
   [[nodiscard]] bool confirms_start(bool tells_track);
-  void landmark_disagrees();
+  void disagrees(const FixInput& fix);
   void confirm_by(const FixInput& landmark);
   void confirm_by_curve(bool tells_track);
   /// GNSS, which has never agreed with it, says otherwise, and hardly anything speaks for it.

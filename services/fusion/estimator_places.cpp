@@ -179,7 +179,7 @@ void Estimator::use(const FixInput& fix) {
   if (!path_distance_m) {
     off_path_ = place;
     place_.track_doubt.seen_elsewhere(fix.probability);
-    if (fix.kind == FixKind::landmark) landmark_disagrees();
+    disagrees(fix);
     return;
   }
   const double sigma_m = fix_sigma_m(fix, *parameters_);
@@ -196,14 +196,15 @@ void Estimator::use(const FixInput& fix) {
       doubt_surprise(fix.sigma_m);
     }
   } else {
-    if (fix.kind == FixKind::landmark) landmark_disagrees();
+    disagrees(fix);
     refuse(fix, *path_distance_m, fix_offer_);
   }
 }
 
 // Once so many in a row have agreed they are believed, whatever one says later.
-void Estimator::landmark_disagrees() {
-  if (place_.landmarks_agreed < kLandmarksBelieved) place_.landmarks_agreed = 0;
+void Estimator::disagrees(const FixInput& fix) {
+  const bool believed = place_.landmarks_agreed >= kLandmarksBelieved;
+  if (fix.kind == FixKind::landmark && !believed) place_.landmarks_agreed = 0;
 }
 
 bool Estimator::has_met(uint32_t landmark) const {

@@ -204,6 +204,7 @@ TrainEstimate FusionService::said_of(const TrainEstimate& measured) const {
   if (!believes_start_ || start_seen_ || is_played()) return measured;
   TrainEstimate said = measured;
   said.track_known = false;
+  said.path.reset();
   said.track_probability = 0;
   said.lat_deg = said.lon_deg = said.easting_m = said.northing_m = said.heading_rad = std::nan("");
   said.integrity = Integrity::unusable;

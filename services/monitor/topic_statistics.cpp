@@ -1,6 +1,7 @@
 #include "monitor/topic_statistics.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/time.hpp"
 
@@ -17,7 +18,7 @@ constexpr double kShortestGapS = 0.02;
 
 double percentile(std::vector<float>& values, double share) {
   if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  const auto nth = values.begin() + static_cast<int64_t>(share * static_cast<double>(values.size() - 1) + 0.5);
+  const auto nth = values.begin() + std::lround(share * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), nth, values.end());
   return *nth;
 }

@@ -96,7 +96,7 @@ void TprPublisher::follow(const TrainPosition& position) {
   const bool same_group = reference_ && reference_->group == group_before;
   doubt_.follow(position, reference_ ? std::optional(reference_->foot_m) : std::nullopt, same_group, !guessed);
   // 4.0.0 only: a train that has backed is not taken for complete (3.6.5.2, table 2c [8]).
-  const bool backs = !position.standstill && (is_turned() ? turned(motion_) : motion_) == Motion::backward;
+  const bool backs = !position.standstill && motion() == Motion::backward;
   if (backs && settings_.report.baseline == etcs::Baseline::b4) integrity_.use_up();
   if (position.usable) {
     integrity_.follow(integrity_place());
@@ -132,9 +132,11 @@ TrainPosition TprPublisher::doubted_position() const {
   return is_turned() ? turned(position) : position;
 }
 
-std::optional<Reference> TprPublisher::reference() const {
+std::optional<Reference> TprPublisher::reference(std::optional<uint32_t> group) const {
   if (!reference_ || !ends_.to_front_m(cab_)) return std::nullopt;
-  return is_turned() ? turned(*reference_) : reference_;
+  const bool named = group && *group != etcs::kUnknownBaliseGroup;
+  const auto found = named ? tracker_->behind(*group) : reference_;
+  return found && is_turned() ? turned(*found) : found;
 }
 
 double TprPublisher::group_m() const {
@@ -148,11 +150,7 @@ TrainIntegrity::Place TprPublisher::integrity_place() const {
 }
 
 uint32_t TprPublisher::orientation_to(std::optional<uint32_t> group) const {
-  auto there = reference();
-  if (there && group && *group != etcs::kUnknownBaliseGroup && *group != there->group->nid_lrbg()) {
-    there = tracker_->behind(*group);
-    if (there && is_turned()) there = turned(*there);
-  }
+  const auto there = reference(group);
   return there ? orientation(*there) : uint32_t{etcs::kUnknownSide};
 }
 
@@ -162,9 +160,10 @@ bool TprPublisher::direction_known(std::optional<uint32_t> origin) const {
 
 core::Status TprPublisher::set_parameters(const etcs::ReportParameters& parameters, std::optional<uint32_t> origin) {
   if (parameters.q_dir != etcs::kUnknownSide) {  // here the value 2 says "both"
-    if (!direction_known(origin))
+    const uint32_t looks = orientation_to(origin);
+    if (looks == etcs::kUnknownSide)
       return core::Error{"Packet 58 is for one direction only (Q_DIR), but the train's is not known yet."};
-    if (orientation_to(origin) != parameters.q_dir)
+    if (looks != parameters.q_dir)
       return core::Error{"Packet 58 is for trains of the other direction (Q_DIR) than this one's."};
   }
   trigger_.set_parameters(parameters, origin);
@@ -271,8 +270,7 @@ etcs::TrainPositionReport TprPublisher::fields(int64_t now_ns) const {
   auto settings = settings_.report;
   settings.foot_to_front_m = ends_.to_front_m(cab_).value_or(0);
   const auto here = reference();
-  const auto motion = is_turned() ? turned(motion_) : motion_;
-  auto fields = make_report(position, here, motion, settings, trainborne_ns(now_ns));
+  auto fields = make_report(position, here, motion(), settings, trainborne_ns(now_ns));
   if (onboard_silent(now_ns)) return fields;
   double ahead_m = 0;
   if (here && fields.d_lrbg != etcs::kUnknownDistance) {  // trackside counts the length from the front end it was told
@@ -308,8 +306,7 @@ Moment TprPublisher::moment(int64_t now_ns) const {
     if (position_->track_declared() || !origin || *origin == moment.nid_lrbg)
       moment.beyond_lrbg_m = here->foot_m + to_front_m;
     if (origin) {
-      if (const auto there = tracker_->behind(*origin))
-        moment.beyond_origin_m = (is_turned() ? -there->foot_m : there->foot_m) + to_front_m;
+      if (const auto there = reference(origin)) moment.beyond_origin_m = there->foot_m + to_front_m;
     }
   }
   if (onboard_) {

@@ -80,10 +80,12 @@ class TprPublisher {
   void follow_motion(const TrainPosition& position);
   void hear_cab(ActiveCab cab);
   [[nodiscard]] bool is_turned() const { return cab_ == ActiveCab::other; }
-  /// With the doubt of an undeclared track; along the train's own axis, as the two below.
+  /// With the doubt of an undeclared track; along the train's own axis, as the ones below.
   [[nodiscard]] TrainPosition doubted_position() const;
-  [[nodiscard]] std::optional<Reference> reference() const;
-  /// Of the train to this group, or to the present LRBG where none is named.
+  [[nodiscard]] Motion motion() const { return is_turned() ? turned(motion_) : motion_; }
+  /// The present LRBG, or the group that is named, where that lies behind the train.
+  [[nodiscard]] std::optional<Reference> reference(std::optional<uint32_t> group = std::nullopt) const;
+  /// Of the train to that group.
   [[nodiscard]] uint32_t orientation_to(std::optional<uint32_t> group) const;
   /// What nobody knows of the place of the group that is referred to.
   [[nodiscard]] double group_m() const;

@@ -273,13 +273,18 @@ TEST(Fusion, WithoutAnySensorTheIntervalGrowsAndSaysSo) {
   EXPECT_FALSE(fusion.tick(at(20)));  // no second state for one time
 }
 
-TEST(Fusion, FollowsTheDeclaredTrackAndSaysWhileItIsOpen) {
+/// A switch at 1000 m: edge 2 straight on, edge 3 to the left.
+Fusion fusion_on_fork(const track::EdgePosition& start) {
   auto map = std::make_shared<track::Map>();
   map->edges.push_back({1, "stem", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{1000, 0, 0}})});
   map->edges.push_back({2, "straight", 2, 3, "", track::Alignment::chained({0, 1000, 0}, {{1000, 0, 0}})});
   map->edges.push_back({3, "left", 2, 4, "", track::Alignment::chained({0, 1000, 0}, {{1000, 0.001, 0.001}})});
   map->connections = {{2, 1, 2, false}, {2, 1, 3, true}};
-  auto fusion = core::value_or_throw(Fusion::create({}, map, track::EdgePosition{1, 900, track::Direction::forward}));
+  return core::value_or_throw(Fusion::create({}, map, start));
+}
+
+TEST(Fusion, FollowsTheDeclaredTrackAndSaysWhileItIsOpen) {
+  auto fusion = fusion_on_fork({1, 900, track::Direction::forward});
   EXPECT_EQ(run(fusion, 0, 9, 10).track_probability, 1);
   const auto said = [&](double t_s, uint32_t edge, double offset_m, double probability) {
     FixInput fix{at(t_s), edge, offset_m, INFINITY, probability, 0, FixKind::track, track::Direction::forward, nullptr};
@@ -303,12 +308,7 @@ TEST(Fusion, FollowsTheDeclaredTrackAndSaysWhileItIsOpen) {
 
 // A picture that comes late asks for the moment before the track was declared.
 TEST(Fusion, AStateOfTheTimeBeforeATrackWasDeclaredLiesOnThePathOfThatTime) {
-  auto map = std::make_shared<track::Map>();
-  map->edges.push_back({1, "stem", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{1000, 0, 0}})});
-  map->edges.push_back({2, "straight", 2, 3, "", track::Alignment::chained({0, 1000, 0}, {{1000, 0, 0}})});
-  map->edges.push_back({3, "left", 2, 4, "", track::Alignment::chained({0, 1000, 0}, {{1000, 0.001, 0.001}})});
-  map->connections = {{2, 1, 2, false}, {2, 1, 3, true}};
-  auto fusion = core::value_or_throw(Fusion::create({}, map, track::EdgePosition{1, 900, track::Direction::forward}));
+  auto fusion = fusion_on_fork({1, 900, track::Direction::forward});
   run(fusion, 0, 12, 10);
   fusion.add(FixInput{at(12.01), 3, 20, INFINITY, 0.9995, 0, FixKind::track, track::Direction::forward, nullptr});
   const auto before = fusion.add(step_at(12.005, 10, 0.005));
@@ -350,13 +350,7 @@ TEST(Fusion, ATrackThatIsNotBesideTheTrainIsNotBelieved) {
 }
 
 TEST(Fusion, WithoutAMatcherTheTrackBehindASwitchIsAGuessAndOnTheStemItIsNot) {
-  auto map = std::make_shared<track::Map>();
-  map->edges.push_back({1, "stem", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{1000, 0, 0}})});
-  map->edges.push_back({2, "straight", 2, 3, "", track::Alignment::chained({0, 1000, 0}, {{1000, 0, 0}})});
-  map->edges.push_back({3, "left", 2, 4, "", track::Alignment::chained({0, 1000, 0}, {{1000, 0.001, 0.001}})});
-  map->connections = {{2, 1, 2, false}, {2, 1, 3, true}};
-  const auto start = track::EdgePosition{1, 950, track::Direction::forward};
-  auto there = core::value_or_throw(Fusion::create({}, map, start));
+  auto there = fusion_on_fork({1, 950, track::Direction::forward});
   EXPECT_EQ(run(there, 0, 4, 10).track_probability, 1);
   EXPECT_EQ(run(there, 4, 20, 10).track_probability, 0.5);  // 150 m behind it
   for (int t = 20; t < 40; ++t) run(there, t, t + 1, 30 - t);
@@ -364,8 +358,7 @@ TEST(Fusion, WithoutAMatcherTheTrackBehindASwitchIsAGuessAndOnTheStemItIsNot) {
   for (int t = 60; t < 80; ++t) run(there, t, t + 1, t - 70);
   EXPECT_EQ(run(there, 80, 95, 10).track_probability, 0.5);  // it may have been thrown
   // A leg that is run towards the switch is no question.
-  const auto from_leg = track::EdgePosition{3, 100, track::Direction::reverse};
-  auto trailing = core::value_or_throw(Fusion::create({}, map, from_leg));
+  auto trailing = fusion_on_fork({3, 100, track::Direction::reverse});
   const auto state = run(trailing, 0, 20, 10);
   EXPECT_EQ(state.position.edge, 1U);
   EXPECT_EQ(state.track_probability, 1);

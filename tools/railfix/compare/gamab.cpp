@@ -35,6 +35,7 @@ std::vector<Leg> sums_of_legs(const std::vector<Sample>& samples, Figure figure,
     legs[sample.leg].certified += square ? sample.certified * sample.certified : sample.certified;
   }
   std::vector<Leg> sums;
+  sums.reserve(legs.size());
   for (const auto& [number, leg] : legs) sums.push_back(leg);
   return sums;
 }

@@ -49,6 +49,7 @@ TimeShift time_shift(const std::vector<Lag>& lags) {
 
 TimeShift time_shift(const std::vector<Pair>& pairs) {
   std::vector<Lag> lags;
+  lags.reserve(pairs.size());
   for (const auto& pair : pairs) lags.push_back({pair.leg, std::abs(pair.certified.speed_mps), pair.difference_m()});
   return time_shift(lags);
 }

@@ -108,6 +108,7 @@ Verdict print_sum(const std::vector<Verdict>& verdicts, const Doubts& doubts, bo
 
 std::vector<double> sizes_of(const std::vector<Sample>& samples, double Sample::*side) {
   std::vector<double> list;
+  list.reserve(samples.size());
   for (const auto& sample : samples) list.push_back(std::abs(sample.*side));
   return list;
 }
@@ -135,8 +136,7 @@ Verdict print_verdict(const Columns& columns, const Doubts& doubts, const Demand
     const auto broken = compare_broken(columns.outside, demand);
     std::printf(
         "outside the interval     ours on %zu of %zu, certified on %zu of %zu legs; ours at most %.2g of legs, "
-        "demanded "
-        "%.2g: %s\n",
+        "demanded %.2g: %s\n",
         broken.ours.broken, broken.ours.legs, broken.certified.broken, broken.certified.legs, broken.ours_at_most,
         demand.broken_at_most, text_of(broken.verdict));
     verdicts.push_back(broken.verdict);
