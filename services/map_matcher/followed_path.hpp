@@ -31,9 +31,9 @@ class FollowedPath {
       : map_(std::move(map)), ways_(std::move(ways)) {}
 
   enum class Way : uint8_t {
-    same,         // as before
-    other_track,  // another path, whose distances go on from the old one's
-    anew          // another path with distances of its own: nothing measured so far belongs to it
+    same,        // as before
+    other_path,  // a longer one or one over another track, whose distances go on from the old one's
+    anew         // another path with distances of its own: nothing measured so far belongs to it
   };
   /// The train's next state. An error when it is nowhere on the map.
   core::Result<Way> follow(const PlacedTrain& train);
@@ -47,10 +47,13 @@ class FollowedPath {
   [[nodiscard]] std::optional<Prior> prior_at(int64_t stamp_ns, const PlacedTrain& train) const;
 
  private:
+  /// Whether the path is a longer one now.
+  bool follow_on();
   std::shared_ptr<const track::Map> map_;
   std::shared_ptr<const track::Ways> ways_;
   std::shared_ptr<const track::Path> path_;
-  double place_m_ = 0;  // on the path, of the last state
+  double place_m_ = 0;                      // on the path, of the last state
+  std::optional<double> followed_on_at_m_;  // where the path was followed on last, or could not be
 };
 
 }  // namespace railfix::map_matcher

@@ -154,7 +154,7 @@ core::Status MapMatcher::follow(const StateInput& state) {
   if (!way.ok()) return way.error();
   if (way.value() == FollowedPath::Way::same) return {};
   const auto& path = followed_->path();
-  if (way.value() == FollowedPath::Way::other_track) {
+  if (way.value() == FollowedPath::Way::other_path) {
     landmarks_->change_path(path);
     curvature_->change_path(path);
   } else {
@@ -250,7 +250,7 @@ void MapMatcher::follow_turning(const StepInput& step, PlaceFixes& fixes) {
   } else {
     move_without_camera(step.stamp_ns);
   }
-  say_track(chain_.odometer_m(), fixes);
+  say_track(fixes);
 }
 
 // The doubt that was said comes back in the state; counted again it would never end.
@@ -266,7 +266,7 @@ void MapMatcher::follow_without_camera(PlaceFixes& fixes) {
   if (step_ && core::seconds(stamp_ns - step_->stamp_ns) < kNoCameraS) return;
   if (!prior_at(stamp_ns)) return;
   move_without_camera(stamp_ns);
-  say_track(state_->placed.distance_m, fixes);
+  say_track(fixes);
 }
 
 void MapMatcher::move(const Turn& turn, int64_t to_ns) {
@@ -322,7 +322,7 @@ bool MapMatcher::is_followed(const track::EdgePosition& place) const {
 }
 
 // The chooser is where it was moved to: a step that comes late does not take it back.
-void MapMatcher::say_track(double odometer_m, PlaceFixes& fixes) {
+void MapMatcher::say_track(PlaceFixes& fixes) {
   const int64_t stamp_ns = moved_ns_;
   const auto prior = prior_at(stamp_ns);
   if (!prior) return;
@@ -330,14 +330,14 @@ void MapMatcher::say_track(double odometer_m, PlaceFixes& fixes) {
   const auto choice = chooser_->choice();
   if (!choice) return;
   const auto& best = choice->options.front();
-  const double since_m = std::abs(odometer_m - said_track_.odometer_m);
+  const double since_m = std::abs(prior->travelled_m - said_track_.travelled_m);
   const double doubt = place_doubt();
   const double there = (1 - doubt) * (1 - beside_->probability());
   const bool known = choice->known && there == 1;
   const bool changed = best.place.edge != said_track_.edge || known != said_track_.known;
   const bool due = core::seconds(stamp_ns - said_track_.stamp_ns) > kTrackEveryS;
   if (!changed && !due && (choice->known || since_m < kOpenTrackEveryM)) return;
-  said_track_ = {best.place.edge, known, stamp_ns, odometer_m, there};
+  said_track_ = {best.place.edge, known, stamp_ns, prior->travelled_m, there};
   PlaceFix fix{FixKind::track, stamp_ns, choice->options, std::numeric_limits<double>::infinity()};
   fix.options.insert(fix.options.begin() + 1, choice->elsewhere.begin(), choice->elsewhere.end());
   for (auto& option : fix.options) option.probability *= there;

@@ -85,7 +85,7 @@ class MapMatcher {
   [[nodiscard]] double share_of_followed(uint32_t landmark) const;
   /// Of a train on a declared track: is it the one beside?
   void compare_with_beside(const Sighting& sighting, const Prior& prior);
-  void say_track(double odometer_m, PlaceFixes& fixes);
+  void say_track(PlaceFixes& fixes);
   void say(const Fix& fix, FixKind kind, PlaceFixes& fixes) const;
 
   MapMatcherParameters parameters_;
@@ -113,7 +113,7 @@ class MapMatcher {
     uint32_t edge = 0;
     bool known = false;
     int64_t stamp_ns = 0;
-    double odometer_m = 0;
+    double travelled_m = 0;
     double there = 1;  // and not elsewhere on the map or on the track beside
   };
   SaidTrack said_track_;

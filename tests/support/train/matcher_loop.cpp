@@ -42,7 +42,7 @@ bool MatcherLoop::follow(const fusion::TrainEstimate& state) {
   const Way way = core::value_or_throw(followed_.follow(placed(state)));
   if (way == Way::same) return true;
   const auto& path = followed_.path();
-  if (way == Way::other_track) {
+  if (way == Way::other_path) {
     shape_->change_path(path);
     landmarks_->change_path(path);
   } else {

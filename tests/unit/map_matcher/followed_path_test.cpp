@@ -102,7 +102,7 @@ TEST(FollowedPath, DistancesGoOnOverATrackThatFusionTakesInstead) {
   follow(followed, {1, 900, Direction::forward});
   EXPECT_EQ(follow(followed, {2, 50, Direction::forward}), Way::same) << "the straight way is expected";
   const EdgePosition siding{3, 60, Direction::forward};
-  EXPECT_EQ(follow(followed, siding), Way::other_track);
+  EXPECT_EQ(follow(followed, siding), Way::other_path);
   EXPECT_NEAR(place_of(followed, siding), 160, 1e-9);
   EXPECT_NEAR(place_of(followed, {1, 950, Direction::forward}), 50, 1e-9);
   EXPECT_EQ(follow(followed, {3, 70, Direction::forward}), Way::same);
@@ -118,18 +118,26 @@ TEST(FollowedPath, ATurnedTrainBeginsAnotherTrip) {
   EXPECT_NEAR(place_of(followed, turned), 0, 1e-9);
 }
 
-TEST(FollowedPath, IsFollowedAnewBeforeItsEndIsReached) {
+TEST(FollowedPath, IsFollowedOnBeforeItsEndIsReached) {
   FollowedPath followed = followed_on(line(50000));
-  follow(followed, {1, 1000, Direction::forward});
+  follow(followed, {1, 10000, Direction::forward});
   const auto first = followed.path();
-  EXPECT_EQ(follow(followed, {1, 27900, Direction::forward}), Way::same);
+  EXPECT_EQ(follow(followed, {1, 36900, Direction::forward}), Way::same);
   EXPECT_EQ(followed.path(), first);
-  EXPECT_EQ(follow(followed, {1, 28100, Direction::forward}), Way::anew);
-  EXPECT_NEAR(followed.path()->end_m(), 50000 - 28100, 1e-9);
-  EXPECT_NEAR(followed.path()->begin_m(), -5000, 1e-9);
-  // Where the track itself ends nothing is gained by it, once.
-  EXPECT_EQ(follow(followed, {1, 47200, Direction::forward}), Way::anew);
+  EXPECT_EQ(follow(followed, {1, 37100, Direction::forward}), Way::other_path);
+  EXPECT_NEAR(followed.path()->end_m(), 40000, 1e-9);
+  EXPECT_NEAR(place_of(followed, {1, 37100, Direction::forward}), 27100, 1e-9);
+  // Where the track itself ends nothing is gained by it.
   EXPECT_EQ(follow(followed, {1, 49000, Direction::forward}), Way::same);
+}
+
+TEST(FollowedPath, ATrainThatSetsBackFarKeepsItsDistances) {
+  FollowedPath followed = followed_on(line(50000));
+  follow(followed, {1, 20000, Direction::forward});
+  EXPECT_NEAR(followed.path()->begin_m(), -5000, 1e-9);
+  EXPECT_EQ(follow(followed, {1, 17900, Direction::forward}), Way::other_path);
+  EXPECT_NEAR(followed.path()->begin_m(), -20000, 1e-9) << "whole edges are followed";
+  EXPECT_NEAR(place_of(followed, {1, 17900, Direction::forward}), -2100, 1e-9);
 }
 
 TEST(FollowedPath, APlaceThatIsNotOnTheMapIsAnError) {
