@@ -29,7 +29,8 @@ void ServiceBoard::note(const msg::ServiceStatus& status, int64_t now_ns, uint64
 }
 
 bool ServiceBoard::note_silence(int64_t now_ns) {
-  const int64_t passed_ns = now_ns - std::exchange(looked_ns_, now_ns);
+  looked_ns_ = now_ns;
+  const int64_t passed_ns = now_ns - std::exchange(came_by_ns_, now_ns);
   const bool in_time = passed_ns >= 0 && passed_ns < kSilentNs - kLookNs;
   const bool played = player_ns_ != 0 && now_ns - player_ns_ < kPlayerNs;
   if (!in_time || played) return false;
@@ -45,7 +46,9 @@ bool ServiceBoard::note_silence(int64_t now_ns) {
 
 bool ServiceBoard::note_silence_now_and_then(int64_t now_ns) {
   const bool lately = now_ns >= looked_ns_ && now_ns - looked_ns_ < kLookNs;
-  return !lately && note_silence(now_ns);
+  if (!lately) return note_silence(now_ns);
+  came_by_ns_ = now_ns;
+  return false;
 }
 
 const ServiceSeen* ServiceBoard::find(const std::string& service) const {

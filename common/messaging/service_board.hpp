@@ -47,7 +47,8 @@ class ServiceBoard {
   static Key key_of(const msg::ServiceStatus& status) { return {status.host().c_str(), status.service().c_str()}; }
   std::map<Key, ServiceSeen> services_;
   int64_t player_ns_ = 0;
-  int64_t looked_ns_ = 0;
+  int64_t looked_ns_ = 0;   // for silence
+  int64_t came_by_ns_ = 0;  // the caller, to look or not
 };
 
 }  // namespace railfix::messaging

@@ -116,6 +116,15 @@ TEST(ServiceBoard, WhoComesByAllTheTimeLooksNowAndThen) {
       << "what has come meanwhile is handled first";
 }
 
+TEST(ServiceBoard, WhoComesByJustBeforeItIsTimeHearsOfTheSilence) {
+  ServiceBoard board;
+  board.note(status(msg::STATE_ACTIVE), kBegin);
+  constexpr int64_t kEveryNs = ServiceBoard::kLookNs - 20'000'000;
+  int64_t at_ns = kBegin;
+  while (!board.note_silence_now_and_then(at_ns) && at_ns < kBegin + 4 * kSilentNs) at_ns += kEveryNs;
+  EXPECT_LE(at_ns, kBegin + kSilentNs + 2 * kEveryNs);
+}
+
 TEST(ServiceBoard, NobodyIsSilentWhileAPlayerSpeaksForAll) {
   ServiceBoard board;
   board.note(status(msg::STATE_ACTIVE), kBegin);
