@@ -111,7 +111,8 @@ struct FusionConfig {
     f.number("budget_per_m", p.budget_per_m, {0, 1}, "m/m", "... and this share of the way since the reference.");
     f.number("unusable_budgets", p.unusable_budgets, {1, 1000}, "", "An interval of so many budgets is no position.");
     f.number("sensor_timeout_s", p.sensor_timeout_s, {0.02, 60}, "s", "A sensor silent for longer is reported.");
-    f.number("output_period_s", p.output_period_s, {0.01, 1}, "s", "Period of train_state without a camera.");
+    f.number("output_period_s", p.output_period_s, {0.01, 0.1}, "s",
+             "Period of train_state without a camera. Readers turn to a standby 0.15 s after the last one.");
     f.number("history_s", p.history_s, {1.2, 60}, "s",
              "A measurement that comes later than this is left out; slips are taken back over 1.2 s.");
     f.number("max_jump_s", p.max_jump_s, {0.1, 3600}, "s", "A stamp further ahead is not believed at once.");
