@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <fstream>
 
+#include "core/cut_text.hpp"
 #include "core/time.hpp"
 #include "service/release.hpp"
 
@@ -73,7 +74,7 @@ void PublishedHealth::output(int64_t grabbed_ns) {
 
 // Services say how they are with every sample.
 void PublishedHealth::change(uint8_t state, const std::string& reason) {
-  const std::string cut = reason.substr(0, kReasonBytes);
+  const std::string cut = core::cut_text(reason, kReasonBytes);
   if (status_.state() == state && cut == status_.reason().c_str()) return;
   status_.state(state);
   status_.reason(cut);
@@ -126,7 +127,7 @@ msg::ServiceStatus PublishedHealth::said() const {
     if (trouble.empty()) continue;
     if (said.state() == msg::STATE_READY || said.state() == msg::STATE_ACTIVE) said.state(msg::STATE_DEGRADED);
     const std::string reason = said.reason().c_str();
-    said.reason((trouble + (reason.empty() ? "" : " ") + reason).substr(0, kReasonBytes));
+    said.reason(core::cut_text(trouble + (reason.empty() ? "" : " ") + reason, kReasonBytes));
   }
   return said;
 }

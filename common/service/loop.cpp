@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/cut_text.hpp"
 #include "core/joined.hpp"
 #include "core/kernel_clock.hpp"
 #include "core/time.hpp"
@@ -196,7 +197,7 @@ void Loop::answer(const msg::ControlRequest& request) {
   } else {
     const auto result = answered(known->second, request.argument().c_str());
     reply.done(result.ok());
-    reply.text(result.ok() ? result.value() : result.error().message.substr(0, 255));
+    reply.text(result.ok() ? result.value() : core::cut_text(result.error().message, 255));
   }
   reply_->write(reply);
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/cut_text.hpp"
 #include "core/json_text.hpp"
 #include "monitor/live_api.hpp"
 
@@ -135,7 +136,8 @@ void FoxgloveApi::message(const ClientPtr& client, const std::string& text, bool
     gather();
   } else {
     const auto op = message["op"].get<std::string>();
-    client->send(status(kWarning, "this server does not know `" + op.substr(0, 40) + "`: it only shows topics", "op"));
+    client->send(
+        status(kWarning, "this server does not know `" + core::cut_text(op, 40) + "`: it only shows topics", "op"));
   }
   client->resume();
 }

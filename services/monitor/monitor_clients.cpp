@@ -1,6 +1,7 @@
 // How the monitor service answers HTTP, lets WebSockets in, and passes on what they ask for.
 #include <stdexcept>
 
+#include "core/cut_text.hpp"
 #include "core/time.hpp"
 #include "messaging/reader_troubles.hpp"
 #include "monitor/metrics.hpp"
@@ -199,8 +200,8 @@ void MonitorService::control(const ClientPtr& client, const ControlAsk& ask) {
   msg::ControlRequest request;
   request.request_id(++next_request_);
   request.service(ask.service);
-  request.command(ask.command.substr(0, 32));
-  request.argument(ask.argument.substr(0, 256));
+  request.command(core::cut_text(ask.command, 32));
+  request.argument(core::cut_text(ask.argument, 256));
   waiting_[next_request_] = {ask.client, ask.id, ask.service, core::monotonic_ns()};
   context_.log().info("from the page: {} {} {}", ask.service, ask.command, ask.argument);
   control_.write(request);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/cut_text.hpp"
 #include "core/time.hpp"
 
 namespace railfix::monitor {
@@ -168,7 +169,7 @@ void WebSocket<Stream>::say_goodbye(const std::string& why, websocket::close_cod
   if (!open_) return end(why);
   open_ = false;
   why_ = why;
-  const websocket::close_reason reason(code, why.substr(0, kLongestReason));
+  const websocket::close_reason reason(code, core::cut_text(why, kLongestReason));
   stream_.async_close(reason, [self = shared_from_this(), why](beast::error_code) { self->end(why); });
 }
 

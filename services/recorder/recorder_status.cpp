@@ -1,5 +1,6 @@
 #include "recorder/recorder_status.hpp"
 
+#include "core/cut_text.hpp"
 #include "core/time.hpp"
 
 namespace railfix::recorder {
@@ -27,7 +28,7 @@ msg::LostSamples lost_of(const TopicLosses& losses) {
     return found == losses.by_cause.end() ? 0 : found->second;
   };
   msg::LostSamples lost;
-  lost.topic(losses.topic.substr(0, kMostTopic));
+  lost.topic(core::cut_text(losses.topic, kMostTopic));
   lost.transport(count(Loss::transport));
   lost.encoder(count(Loss::encoder));
   lost.queue(count(Loss::queue));
@@ -53,8 +54,8 @@ msg::RecorderStatus status_of(const RecorderState& state, const Survey& folder, 
   status.files(folder.files);
   status.protected_files(folder.protected_files);
   status.state(state_of(state));
-  status.file(state.file.substr(0, kMostText));
-  status.event(state.event ? state.event->text.substr(0, kMostText) : "");
+  status.file(core::cut_text(state.file, kMostText));
+  status.event(state.event ? core::cut_text(state.event->text, kMostText) : "");
   for (const auto& losses : state.losses_by_topic) {
     if (status.lost().size() < kMostTopics) status.lost().push_back(lost_of(losses));
   }

@@ -4,6 +4,7 @@
 #include <thread>
 #include <utility>
 
+#include "core/cut_text.hpp"
 #include "core/time.hpp"
 #include "recording/standing_values.hpp"
 
@@ -229,7 +230,7 @@ void Player::publish_status() {
   status.state(state_);
   status.looped(options_.loop ? 1 : 0);
   status.lock_step(leader_ ? 1 : 0);
-  status.file(options_.file.string().substr(0, 255));
+  status.file(core::cut_text(options_.file.string(), 255));
   status_.write(status);
   if (on_status_) on_status_(status);
 }

@@ -2,6 +2,7 @@
 #include <sched.h>
 #include <spdlog/fmt/fmt.h>
 
+#include "core/cut_text.hpp"
 #include "core/joined.hpp"
 #include "core/time.hpp"
 #include "replay/player.hpp"
@@ -78,7 +79,7 @@ void Player::answer(const msg::ControlRequest& request) {
   reply.request_id(request.request_id());
   reply.service("player");
   reply.done(result.ok());
-  reply.text(result.ok() ? result.value() : result.error().message.substr(0, 255));
+  reply.text(result.ok() ? result.value() : core::cut_text(result.error().message, 255));
   replies_.write(reply);
 }
 

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <fstream>
 
+#include "core/cut_text.hpp"
 #include "core/time.hpp"
 #include "service/health_file.hpp"
 #include "train/stands_still.hpp"
@@ -86,7 +87,7 @@ std::string last_words(const fs::path& log, std::streamoff from) {
   for (std::string line; std::getline(in, line);) {
     if (!line.empty()) last = line;
   }
-  return last.substr(0, kLastWords);
+  return core::cut_text(last, kLastWords);
 }
 
 }  // namespace

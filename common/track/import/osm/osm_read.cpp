@@ -15,6 +15,7 @@
 #include <osmium/visitor.hpp>
 #include <unordered_set>
 
+#include "core/cut_text.hpp"
 #include "track/import/osm/osm_bounds.hpp"
 #include "track/import/osm/osm_data.hpp"
 #include "track/import/swapped.hpp"
@@ -136,7 +137,7 @@ std::string remark_in(const std::filesystem::path& file) {
   const size_t begin = end.find(tag);
   if (begin == std::string::npos) return "";
   const std::string remark = end.substr(begin + tag.size(), end.find('<', begin + 1) - begin - tag.size());
-  return "\"" + (remark.size() > kMost ? remark.substr(0, kMost) + "..." : remark) + "\"";
+  return "\"" + (remark.size() > kMost ? core::cut_text(remark, kMost) + "..." : remark) + "\"";
 }
 
 /// What the library says, and what it means for the file.
