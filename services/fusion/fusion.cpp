@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <tuple>
 #include <utility>
 
@@ -20,6 +21,8 @@ namespace {
 constexpr double kPathAheadM = 300000;
 constexpr double kPathBehindM = 50000;
 constexpr double kPathLeftM = 20000;  // it is followed on when less of it is left, ...
+constexpr double kLagVagueS = 0.1;    // sigma
+constexpr double kLagSure = 3.0;      // sigma
 constexpr double kPathAgainM = 5000;  // ... and tried again so much further on where it could not be
 constexpr double kBesideM = 50.0;     // beyond the interval: what is further off is no track beside the train
 constexpr double kNoCameraS = 0.3;
@@ -137,8 +140,12 @@ std::optional<TrainEstimate> Fusion::use(Event event) {
     }
   }
   look_beside(event);
-  if (const auto* wheel = std::get_if<WheelInput>(&event)) last_wheel_ = *wheel;
+  if (const auto* wheel = std::get_if<WheelInput>(&event)) {
+    last_wheel_ = *wheel;
+    camera_lag_.add(*wheel);
+  }
   if (auto* step = std::get_if<OdometryInput>(&event)) {
+    camera_lag_.add(*step);
     anchor(*step);
     remember_reference(*step);
   }
@@ -368,7 +375,24 @@ std::optional<TrainEstimate> Fusion::give(TrainEstimate estimate) {
   last_output_ns_ = estimate.stamp_ns;
   if (const auto names = stamps_.left_out(now_->stamp_ns()); !names.empty())
     estimate.degrade("left out, its stamps are seconds from those of the odometers: " + names);
+  allow_for_lag(estimate);
   return estimate;
+}
+
+// What the camera shows was a little earlier: the train is further on than its landmarks say, or less far.
+void Fusion::allow_for_lag(TrainEstimate& estimate) const {
+  const auto [lag_s, sigma_s] = camera_lag_.lag();
+  const double off_s = std::abs(lag_s);
+  if (sigma_s > kLagVagueS || off_s < std::max(parameters_->camera_lag_s + 2 * sigma_s, kLagSure * sigma_s)) return;
+  const double way_m = std::copysign(off_s + 2 * sigma_s, lag_s) * estimate.speed_mps;
+  estimate.over_m += way_m < 0 ? -way_m : 0;  // where the speed is not known it is no position
+  estimate.under_m += way_m > 0 ? way_m : 0;
+  char text[160];
+  std::snprintf(
+      text, sizeof text,
+      "camera stamps %.2f s %s against the wheel's: check live.latency_ms, live.line_latency_ms and the clocks", off_s,
+      lag_s > 0 ? "late" : "early");
+  estimate.degrade(text);
 }
 
 }  // namespace railfix::fusion

@@ -10,6 +10,7 @@
 #include <optional>
 #include <vector>
 
+#include "fusion/camera_lag.hpp"
 #include "fusion/fusion_parameters.hpp"
 #include "fusion/fusion_types.hpp"
 #include "fusion/odometer_scales.hpp"
@@ -90,6 +91,7 @@ class Fusion {
   void forget_old();
   [[nodiscard]] bool due(const Event& event) const;
   std::optional<TrainEstimate> give(TrainEstimate estimate);
+  void allow_for_lag(TrainEstimate& estimate) const;
 
   std::shared_ptr<const FusionParameters> parameters_;
   std::shared_ptr<const track::Map> map_;
@@ -110,6 +112,7 @@ class Fusion {
   std::optional<ScaleTrial> before_behind_;  // the state before those that are behind
   std::deque<GnssInput> early_;              // GNSS that waits for what measures motion
   std::optional<WheelInput> last_wheel_;
+  CameraLag camera_lag_;
   std::optional<OdometryInput> anchor_;  // the first step that counts from a picture before all that is known
 };
 

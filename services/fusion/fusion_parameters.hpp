@@ -81,6 +81,7 @@ struct FusionParameters {
   double output_period_s = 0.1;   // of states without a camera
   double history_s = 3.0;         // a measurement older than this is too late
   double max_jump_s = 2.0;        // a stamp further ahead is not believed at once
+  double camera_lag_s = 0.02;     // the camera's stamps may be so far off the wheel's
 };
 
 }  // namespace railfix::fusion

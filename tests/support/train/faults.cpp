@@ -61,7 +61,7 @@ double random_size(core::Random& random, Sensor sensor, FaultKind kind) {
     case FaultKind::delay:
       return std::abs(between(random, {0.05, 2.5}));
     case FaultKind::lag:
-      return std::abs(between(random, {0.1, 1.5}));
+      return std::abs(between(random, sensor == Sensor::gnss ? Range{0.1, 1.5} : Range{0.02, 0.3}));
     case FaultKind::wrong_landmark:
       return between(random, {1, 400});
     case FaultKind::wrong_sighting:
@@ -106,7 +106,8 @@ const std::vector<std::pair<Sensor, FaultKind>>& all_faults() {
     all.emplace_back(Sensor::clock, FaultKind::clock_step);
     all.emplace_back(Sensor::clock, FaultKind::drift);
     all.emplace_back(Sensor::fix, FaultKind::wrong_sighting);
-    all.emplace_back(Sensor::gnss, FaultKind::lag);
+    for (const auto sensor : {Sensor::gnss, Sensor::camera, Sensor::wheel, Sensor::accelerometer})
+      all.emplace_back(sensor, FaultKind::lag);
     return all;
   }();
   return list;

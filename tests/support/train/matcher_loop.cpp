@@ -111,7 +111,7 @@ void MatcherLoop::look_for_place(const fusion::OdometryInput& step, const fusion
   std::optional<map_matcher::Turn> turn;
   if (since_s > 0 && since_s < kLostS && std::isfinite(state.speed_mps)) {
     const double moved_m = chain_.broken() ? state.speed_mps * since_s : way_m;
-    const auto truth = simulation_.truth_at(step.stamp_ns, arrival_s);
+    const auto truth = simulation_.pictured_at(step.stamp_ns, arrival_s);
     const double turn_rad = (simulation_.curvature_at(truth.distance_m, arrival_s) + bias_per_m_) * moved_m;
     turn = {moved_m, turn_rad + kTurnSigmaRad * random_.normal(), kTurnSigmaRad};
   }
@@ -154,7 +154,7 @@ std::vector<fusion::FixInput> MatcherLoop::see(const fusion::OdometryInput& step
   look_for_place(step, state, arrival_s);
   match_sightings(state, arrival_s);
   if (placed && !chain_.broken() && simulation_.plan().shape) {
-    if (std::abs(state.speed_mps) > kLeastSpeedMps) look(arrival_s, simulation_.truth_at(step.stamp_ns, arrival_s));
+    if (std::abs(state.speed_mps) > kLeastSpeedMps) look(arrival_s, simulation_.pictured_at(step.stamp_ns, arrival_s));
     match_shape(step.stamp_ns, state, arrival_s);
   } else if (shape_) {
     shape_->forget();

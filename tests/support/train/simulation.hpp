@@ -96,6 +96,8 @@ class TrainSimulation {
   [[nodiscard]] std::optional<track::EdgePosition> start() const;
   /// Truth at a stamp; arrival_s: when fusion said it (a clock that was set back gives every stamp twice).
   [[nodiscard]] Motion truth_at(int64_t stamp_ns, double arrival_s = 1e9) const;
+  /// The same of what a picture of this stamp shows, whose clock may be late.
+  [[nodiscard]] Motion pictured_at(int64_t stamp_ns, double arrival_s) const;
   /// Place minus truth, along the way, or along the other leg of points that the train has run over; nothing when the
   /// place lies elsewhere.
   [[nodiscard]] std::optional<double> error_m(const track::EdgePosition& place, const Motion& truth) const;
@@ -171,6 +173,8 @@ class TrainSimulation {
   /// The place as who follows fusion says it, which is so far off.
   [[nodiscard]] SaidTrack track_at(double way_m, double error_m = 0) const;
   void add(Sensor sensor, double t_s, fusion::Event event);
+  /// Its stamps are so late, s.
+  [[nodiscard]] double lag_of(Sensor sensor) const;
   [[nodiscard]] bool faulty(Sensor sensor, FaultKind kind, double t_s) const;
   [[nodiscard]] double offset_of(Sensor sensor, double t_s) const;
   std::vector<Spell> spells(core::Random& random, double every_s, double shortest_s, double longest_s,

@@ -1,0 +1,135 @@
+#include "fusion/camera_lag.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/time.hpp"
+
+namespace railfix::fusion {
+namespace {
+
+constexpr double kWindowS = 1.0;
+constexpr double kSpeedS = 0.15;  // a speed is that of so long before and behind
+constexpr double kPauseS = 0.5;   // no sample for so long
+constexpr double kKeptS = 5.0;
+constexpr size_t kReferences = 8;
+constexpr double kRatioSigma = 0.03;
+constexpr double kCreepSigma = 0.005;  // a driven axle runs half a per cent ahead at 1 m/s2
+constexpr double kLagSigmaS = 0.15;
+constexpr double kRatioWalk = 1e-4;  // from window to window
+constexpr double kCreepWalk = 2e-5;
+constexpr double kLagWalkS = 3e-4;
+constexpr double kPlayM = 0.005;    // of the wheel's reading, beside its pulses
+constexpr double kWaySigma = 3e-4;  // share of a window's way
+constexpr double kSameGainMps = 0.15;
+constexpr double kSameGain = 0.15;  // ... and this share of it
+constexpr double kGate = 4.0;
+constexpr int kRefusedInRow = 8;  // then the ratio is another one
+
+Eigen::Vector3d squares(double ratio, double creep, double lag_s) {
+  return {ratio * ratio, creep * creep, lag_s * lag_s};
+}
+
+}  // namespace
+
+CameraLag::CameraLag() : covariance_(squares(kRatioSigma, kCreepSigma, kLagSigmaS).asDiagonal()) {}
+
+CameraLag::Lag CameraLag::lag() const {
+  return {fitted_(2), std::sqrt(covariance_(2, 2))};
+}
+
+void CameraLag::break_off() {
+  reference_.clear();
+  seen_.clear();
+  mark_.reset();
+}
+
+void CameraLag::add(const WheelInput& sample) {
+  if (!(sample.pulses_per_metre > 0)) return;
+  const double since_s = wheel_.empty() ? kSpeedS : core::seconds(sample.stamp_ns - wheel_.back().stamp_ns);
+  if (std::abs(since_s) > kPauseS) {
+    wheel_.clear();
+    mark_.reset();
+  } else if (since_s <= 0) {
+    return;
+  }
+  const double variance_m2 = kPlayM * kPlayM + 1 / (12 * sample.pulses_per_metre * sample.pulses_per_metre);
+  wheel_.push_back({sample.stamp_ns, static_cast<double>(sample.pulses) / sample.pulses_per_metre, variance_m2});
+  while (core::seconds(sample.stamp_ns - wheel_.front().stamp_ns) > kKeptS) wheel_.pop_front();
+  compare();
+}
+
+void CameraLag::add(const OdometryInput& step) {
+  if (!seen_.empty() && step.stamp_ns <= seen_.back().stamp_ns &&
+      core::seconds(seen_.back().stamp_ns - step.stamp_ns) < kPauseS)
+    return;
+  const auto reference = std::ranges::find(reference_, step.reference_stamp_ns, &Reading::stamp_ns);
+  if (!step.valid || reference == reference_.end()) {
+    break_off();
+    if (!step.valid) return;
+    reference_.push_back({step.stamp_ns, 0, 0});
+    seen_.push_back(reference_.back());
+    return;
+  }
+  const Reading picture{step.stamp_ns, reference->way_m + step.step_m,
+                        reference->variance_m2 + step.step_sigma_m * step.step_sigma_m};
+  reference_.erase(reference_.begin(), reference);  // what lies before it is not referred to any more
+  if (reference_.size() >= kReferences) reference_.erase(reference_.begin() + 1);  // a train at rest keeps its first
+  reference_.push_back(picture);
+  seen_.push_back(picture);
+  while (core::seconds(step.stamp_ns - seen_.front().stamp_ns) > kKeptS) seen_.pop_front();
+}
+
+std::optional<CameraLag::Reading> CameraLag::reading_at(const Readings& readings, int64_t stamp_ns) {
+  const auto next = std::ranges::lower_bound(readings, stamp_ns, {}, &Reading::stamp_ns);
+  if (next == readings.begin() || next == readings.end()) return std::nullopt;
+  const Reading& before = *std::prev(next);
+  const double gap_s = core::seconds(next->stamp_ns - before.stamp_ns);
+  if (gap_s > kPauseS) return std::nullopt;
+  const double share = core::seconds(stamp_ns - before.stamp_ns) / gap_s;
+  return Reading{stamp_ns, std::lerp(before.way_m, next->way_m, share), next->variance_m2};
+}
+
+std::optional<CameraLag::Moving> CameraLag::moving_at(const Readings& readings, int64_t stamp_ns) {
+  const auto at = reading_at(readings, stamp_ns);
+  const auto before = reading_at(readings, stamp_ns - core::to_ns(kSpeedS));
+  const auto after = reading_at(readings, stamp_ns + core::to_ns(kSpeedS));
+  if (!at || !before || !after) return std::nullopt;
+  return Moving{*at, (after->way_m - before->way_m) / (2 * kSpeedS)};
+}
+
+void CameraLag::compare() {
+  if (seen_.empty()) return;
+  const int64_t known_ns = std::min(wheel_.back().stamp_ns, seen_.back().stamp_ns) - core::to_ns(kSpeedS);
+  const int64_t due_ns = mark_ ? mark_->wheel.at.stamp_ns + core::to_ns(kWindowS) : known_ns;
+  if (known_ns < due_ns) return;
+  const auto camera = moving_at(seen_, known_ns);
+  const auto wheel = moving_at(wheel_, known_ns);
+  if (!camera || !wheel) return;
+  const Mark mark{*camera, *wheel};
+  if (mark_) fit(*mark_, mark);
+  mark_ = mark;
+}
+
+void CameraLag::fit(const Mark& from, const Mark& to) {
+  covariance_.diagonal() += squares(kRatioWalk, kCreepWalk, kLagWalkS);
+  const double wheel_m = to.wheel.at.way_m - from.wheel.at.way_m;
+  const double gained_mps = to.wheel.speed_mps - from.wheel.speed_mps;
+  const double seen_mps = to.camera.speed_mps - from.camera.speed_mps;
+  if (std::abs(seen_mps - gained_mps) > kSameGainMps + kSameGain * std::abs(gained_mps)) return;
+  const Eigen::Vector3d by(wheel_m, -gained_mps * wheel_m, -gained_mps);
+  const double off_m = to.camera.at.way_m - from.camera.at.way_m - wheel_m - by.dot(fitted_);
+  const double noise_m2 = to.camera.at.variance_m2 - from.camera.at.variance_m2 + from.wheel.at.variance_m2 +
+                          to.wheel.at.variance_m2 + kWaySigma * kWaySigma * wheel_m * wheel_m;
+  const double variance = by.dot(covariance_ * by) + noise_m2;
+  if (off_m * off_m > kGate * kGate * variance) {
+    if (++refused_ == kRefusedInRow) *this = CameraLag();
+    return;
+  }
+  refused_ = 0;
+  const Eigen::Vector3d gain = covariance_ * by / variance;
+  fitted_ += gain * off_m;
+  covariance_ -= gain * gain.transpose() * variance;
+}
+
+}  // namespace railfix::fusion

@@ -1,0 +1,61 @@
+// How late the camera's stamps are against the wheel's: where the speed changes, the way between two pictures is that
+// of a little earlier. Landmarks put the train where it was then, and at constant speed nothing else shows it.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <deque>
+#include <optional>
+
+#include "fusion/fusion_types.hpp"
+
+namespace railfix::fusion {
+
+/// Fitted to the way of both over windows of a second, beside their ratio and the wheel's creep, which grows with
+/// acceleration and speed. Where both say another change of speed, as in a slip, and where samples come late, nothing
+/// is measured.
+class CameraLag {
+ public:
+  CameraLag();
+  void add(const WheelInput& sample);
+  void add(const OdometryInput& step);
+
+  struct Lag {
+    double s = 0;  // positive: the camera's stamps are late, or the wheel's early
+    double sigma_s = 0;
+  };
+  /// By all that was measured so far; vague before the speed has changed.
+  [[nodiscard]] Lag lag() const;
+
+ private:
+  struct Reading {
+    int64_t stamp_ns = 0;
+    double way_m = 0;
+    double variance_m2 = 0;
+  };
+  using Readings = std::deque<Reading>;
+  struct Moving {
+    Reading at;
+    double speed_mps = 0;
+  };
+  struct Mark {
+    Moving camera;
+    Moving wheel;
+  };
+  void break_off();
+  static std::optional<Reading> reading_at(const Readings& readings, int64_t stamp_ns);
+  static std::optional<Moving> moving_at(const Readings& readings, int64_t stamp_ns);
+  void compare();
+  void fit(const Mark& from, const Mark& to);
+
+  Readings wheel_;
+  Readings seen_;       // variances since the first picture
+  Readings reference_;  // pictures that steps may refer to
+  std::optional<Mark> mark_;
+  // Ratio of the ways less one, creep (m of way per m and m/s gained), lag (s).
+  Eigen::Vector3d fitted_ = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d covariance_;
+  int refused_ = 0;  // in a row
+};
+
+}  // namespace railfix::fusion

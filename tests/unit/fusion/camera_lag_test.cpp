@@ -1,0 +1,91 @@
+#include "fusion/camera_lag.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+
+#include "core/random.hpp"
+#include "core/time.hpp"
+#include "support/train/verdict.hpp"
+
+namespace railfix::fusion {
+namespace {
+
+constexpr double kPulsesPerMetre = 90;
+constexpr double kSampleS = 0.05;
+
+/// Way run until then, m.
+using Way = std::function<double(double t_s)>;
+
+/// From rest at 0.7 m/s2 to 21 m/s, which are kept.
+double departure(double t_s) {
+  const double until_s = std::min(t_s, 30.0);
+  return 0.35 * until_s * until_s + 21 * (t_s - until_s);
+}
+
+/// The camera's stamps are `lag_s` late; the wheel counts what `wheel` says.
+CameraLag::Lag measured(double lag_s, double duration_s, const Way& way, const Way& wheel) {
+  CameraLag watch;
+  core::Random random(1);
+  double seen_m = way(-lag_s);
+  for (double t = kSampleS; t < duration_s; t += kSampleS) {
+    const int64_t now_ns = core::to_ns(1000 + t);
+    watch.add(WheelInput{now_ns, static_cast<int64_t>(std::floor(wheel(t) * kPulsesPerMetre)), kPulsesPerMetre});
+    const double way_m = way(t - lag_s);
+    const double step_m = 1.004 * (way_m - std::exchange(seen_m, way_m)) + 0.002 * random.normal();
+    watch.add(OdometryInput{now_ns, now_ns - core::to_ns(kSampleS), step_m, 0.002, true});
+  }
+  return watch.lag();
+}
+
+double from_rest(double t_s) {
+  return t_s < 0 ? 0 : departure(t_s);
+}
+
+TEST(CameraLag, IsKnownSoonAfterTheDeparture) {
+  for (const double lag_s : {-0.1, 0.0, 0.03, 0.3}) {
+    const auto lag = measured(lag_s, 15, from_rest, from_rest);
+    EXPECT_NEAR(lag.s, lag_s, 0.01) << lag_s;
+    EXPECT_LT(lag.sigma_s, 0.02) << lag_s;
+  }
+}
+
+TEST(CameraLag, DoesNotShowAtConstantSpeed) {
+  const Way even = [](double t_s) { return 30 * t_s; };
+  EXPECT_GT(measured(0.1, 120, even, even).sigma_s, 0.1);
+}
+
+TEST(CameraLag, AWheelThatCreepsUnderTractionIsNoLag) {
+  const Way creeping = [](double t_s) {
+    return t_s < 30 ? 1.01 * from_rest(t_s) : 1.01 * from_rest(30) + 21 * (t_s - 30);
+  };
+  EXPECT_LT(std::abs(measured(0, 40, from_rest, creeping).s), 0.02);
+}
+
+TEST(CameraLag, AWheelThatSlipsIsNoLag) {
+  const Way slipping = [](double t_s) { return from_rest(t_s) + 2.0 * std::clamp(t_s - 12, 0.0, 5.0); };
+  EXPECT_LT(std::abs(measured(0, 60, from_rest, slipping).s), 0.02);
+}
+
+TEST(CameraLag, AWheelThatIsStuckTellsNothing) {
+  const auto lag = measured(0.1, 60, from_rest, [](double) { return 5.0; });
+  EXPECT_GT(lag.sigma_s, 0.02);
+}
+
+TEST(CameraLag, IsSaidAndHeldByTheInterval) {
+  train::SimulationPlan plan = train::campaign_plan();
+  plan.duration_s = 100;
+  plan.fault = {train::Sensor::camera, train::FaultKind::lag, 0, 0, 0.2};
+  const train::TrainSimulation simulation(plan, 4);
+  auto fusion = core::value_or_throw(Fusion::create({}, simulation.map, simulation.start()));
+  int said = 0;
+  const auto verdict = train::judge(simulation, fusion, 0, [&](const TrainEstimate& state, double) {
+    said += state.reason.find("camera stamps 0.2") != std::string::npos ? 1 : 0;
+  });
+  EXPECT_EQ(verdict.outside, 0U);
+  EXPECT_GT(said, 1000);
+}
+
+}  // namespace
+}  // namespace railfix::fusion
