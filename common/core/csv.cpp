@@ -1,5 +1,6 @@
 #include "core/csv.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <charconv>
@@ -51,6 +52,7 @@ Result<CsvReader> CsvReader::open(const std::filesystem::path& file) {
   reader.stream_.open(file);
   if (!reader.stream_) return Error{file.string() + " cannot be opened; check that the file exists and may be read"};
   if (!std::getline(reader.stream_, reader.line_)) {
+    if (reader.stream_.bad()) return cannot_read(file.string());
     return Error{file.string() + " is empty; the first line must name the columns"};
   }
   reader.line_number_ = 1;
@@ -80,6 +82,12 @@ bool CsvReader::next() {
     if (cells_.size() < header_.size()) {
       status_ = error("has " + std::to_string(cells_.size()) + " values where the header names " +
                       std::to_string(header_.size()) + " columns");
+      return false;
+    }
+    const auto beyond = cells_.begin() + static_cast<std::ptrdiff_t>(header_.size());
+    if (std::any_of(beyond, cells_.end(), [](std::string_view cell) { return !cell.empty(); })) {
+      status_ = error("has " + std::to_string(cells_.size()) + " values where the header names " +
+                      std::to_string(header_.size()) + " columns; is a comma used as the decimal point?");
       return false;
     }
     return true;

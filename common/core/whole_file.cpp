@@ -22,6 +22,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr size_t kMostBytes = 2'000'000'000;  // a device never ends
+
 /// The links in /proc/PID/fd, where /dev/stdout and /dev/fd lead: what is read there is the name that an open file once
 /// had, which may be another file's by now, or be none.
 bool is_open_file(const fs::path& file) {
@@ -180,8 +182,10 @@ Result<std::string> read_whole(const std::filesystem::path& file) {
 Result<std::string> read_whole(std::istream& stream, const std::string& name) {
   std::string text;
   std::array<char, 65536> part{};
-  while (stream.read(part.data(), part.size()) || stream.gcount() > 0)
+  while (stream.read(part.data(), part.size()) || stream.gcount() > 0) {
     text.append(part.data(), static_cast<size_t>(stream.gcount()));
+    if (text.size() > kMostBytes) return Error{name + " has more than 2 GB; is it the right file?"};
+  }
   if (stream.bad()) return cannot_read(name);
   return text;
 }

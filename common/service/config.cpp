@@ -10,6 +10,7 @@
 
 #include "core/joined.hpp"
 #include "core/similar_names.hpp"
+#include "service/yaml_file.hpp"
 
 namespace railfix::service {
 namespace {
@@ -184,8 +185,10 @@ std::string also(const std::vector<std::string>& sections) {
 core::Result<YAML::Node> load(const std::filesystem::path& file) {
   if (file.empty()) return YAML::Node(YAML::NodeType::Map);
   if (!std::filesystem::exists(file)) return core::Error{file.string() + " does not exist; --config needs a YAML file"};
+  if (std::filesystem::is_directory(file))
+    return core::Error{file.string() + " is a folder; --config needs a YAML file"};
   try {
-    YAML::Node node = YAML::LoadFile(file.string());
+    YAML::Node node = load_yaml(file);
     std::error_code unknown;
     if (node.IsNull() && std::filesystem::file_size(file, unknown) == 0)
       return core::Error{
@@ -195,6 +198,8 @@ core::Result<YAML::Node> load(const std::filesystem::path& file) {
     if (node.IsNull()) return YAML::Node(YAML::NodeType::Map);
     if (!node.IsMap()) return core::Error{file.string() + " must consist of sections, one for each service"};
     return node;
+  } catch (const YAML::BadFile&) {
+    return core::Error{file.string() + " cannot be read; --config needs a YAML file"};
   } catch (const YAML::Exception& error) {
     return core::Error{file.string() + " line " + std::to_string(error.mark.line + 1) +
                        ": not valid YAML: " + error.msg};

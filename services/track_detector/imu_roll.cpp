@@ -12,7 +12,8 @@ namespace {
 constexpr double kDamping = 0.4;      // share of the critical one
 constexpr double kTwistLastsS = 4.0;  // a cant ramp
 constexpr double kStepS = 0.010;
-constexpr double kForgetS = 1.0;  // without samples nothing is known of the swinging any more
+constexpr double kFastestRollRps = 2.0;  // no body on rails rolls faster: the sample is a wrong one
+constexpr double kForgetS = 1.0;         // without samples nothing is known of the swinging any more
 constexpr size_t kMostWaiting = 4000;
 constexpr double kLeastSway = 0.3;  // of the limit, however large the standing part
 
@@ -37,7 +38,7 @@ void ImuRoll::know_nothing() {
 }
 
 void ImuRoll::add(int64_t stamp_ns, double rate_x_rps) {
-  if (!std::isfinite(rate_x_rps)) return;
+  if (!(std::abs(rate_x_rps) < kFastestRollRps)) return;
   const int64_t last_ns = waiting_.empty() ? state_ns_ : waiting_.back().stamp_ns;
   if (core::seconds(last_ns - stamp_ns) > kForgetS) {  // the data begin anew
     waiting_.clear();

@@ -280,10 +280,13 @@ void add_calibrate(CLI::App& app, Action& chosen) {
   mount->add_option("--gauge", arguments->gauge_m, "Track gauge in metres")
       ->check(number_between(0.5, 2.0))
       ->capture_default_str();
-  mount->add_option("--focal", arguments->focal_px, "Focal length in pixels; else it is assumed")
-      ->check(number_between(50.0, 50000.0));
-  mount->add_option("--camera", arguments->camera,
-                    "Calibration with the lens (intrinsics and distortion), instead of --focal");
+  auto* focal = mount->add_option("--focal", arguments->focal_px, "Focal length in pixels; else it is assumed")
+                    ->check(number_between(50.0, 50000.0));
+  mount
+      ->add_option("--camera", arguments->camera,
+                   "Calibration with the lens (intrinsics and distortion), instead of --focal")
+      ->check(CLI::ExistingFile)
+      ->excludes(focal);
   mount->add_option("--out", arguments->out, "Calibration file to write")->required();
   mount->add_option("--draw", arguments->draw, "Picture to check by eye; else beside --out");
   mount->add_flag(

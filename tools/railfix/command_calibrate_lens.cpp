@@ -20,6 +20,7 @@ namespace {
 
 constexpr double kLivePauseS = 0.5;    // between two pictures of a live camera, for the board to move
 constexpr size_t kLiveEnough = 25;     // pictures of the board
+constexpr size_t kLongestSize = 10;    // of a text: more is no number
 constexpr size_t kMostPictures = 150;  // of a recording, spread over it
 
 struct LensArguments {
@@ -57,7 +58,10 @@ struct Boards {
 };
 
 void parse_board(const LensArguments& arguments, BoardDescription& board) {
-  if (std::sscanf(arguments.size_text.c_str(), "%dx%d", &board.columns, &board.rows) == 2) return;
+  char more = 0;
+  if (arguments.size_text.size() < kLongestSize &&
+      std::sscanf(arguments.size_text.c_str(), "%dx%d%c", &board.columns, &board.rows, &more) == 2)
+    return;
   throw core::BadInput("--board must be COLUMNSxROWS of squares, as 9x7, not '" + arguments.size_text + "'");
 }
 

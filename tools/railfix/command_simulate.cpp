@@ -120,6 +120,8 @@ int simulate(Settings& settings) {
                report.length_m, report.duration_s, report.pictures, report.render_ms);
   if (report.length_m < simulation.run.length_m - 1)
     std::fprintf(stderr, "railfix: the line ends there: not the %.0f m of --length-m\n", simulation.run.length_m);
+  if (report.duration_s < simulation.run.duration_s - 1)
+    std::fprintf(stderr, "railfix: the line ends there: not the %.0f s of --duration-s\n", simulation.run.duration_s);
   return 0;
 }
 
@@ -234,11 +236,12 @@ void add_simulate(CLI::App& app, Action& chosen) {
       ->capture_default_str();
   command->add_option("--start", simulation.start, "EDGE:OFFSET[:+|-] where the train stands first")
       ->capture_default_str();
-  command->add_option("--length-m", simulation.run.length_m, "way to run")
-      ->check(number_between(1.0, 1e6))
-      ->capture_default_str();
+  auto* length = command->add_option("--length-m", simulation.run.length_m, "way to run")
+                     ->check(number_between(1.0, 1e6))
+                     ->capture_default_str();
   command->add_option("--duration-s", simulation.run.duration_s, "time to run, instead of --length-m")
-      ->check(number_between(1.0, 1e5));
+      ->check(number_between(1.0, 1e5))
+      ->excludes(length);
   command->add_option("--speed-kmh", settings->speed_kmh, "cruising speed")
       ->check(number_between(1.0, 400.0))
       ->capture_default_str();

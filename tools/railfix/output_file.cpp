@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 /// What datasets and runs are made of; figures, reports and drawings may be written beside it again and again.
 bool is_data(const fs::path& file) {
-  static constexpr std::array kEndings{".csv", ".jsonl", ".yaml", ".mcap", ".png", ".jpg", ".jpeg", ".pgm"};
+  static constexpr std::array kEndings{".csv", ".jsonl", ".yaml", ".mcap", ".log", ".png", ".jpg", ".jpeg", ".pgm"};
   return std::ranges::find(kEndings, file.extension()) != kEndings.end();
 }
 

@@ -56,6 +56,15 @@ TEST_F(CsvTest, ErrorsNameFileLineAndColumn) {
   EXPECT_THAT(table.status().error().message, HasSubstr(" line 3: has 1 values where the header names 2"));
 }
 
+TEST_F(CsvTest, ADecimalCommaShiftsNoColumns) {
+  auto table = reader("a,b\n1,2,\n1,5,2\n");
+  EXPECT_TRUE(table.next()) << "nothing stands behind the last comma";
+  EXPECT_FALSE(table.next());
+  EXPECT_THAT(
+      table.status().error().message,
+      HasSubstr(" line 3: has 3 values where the header names 2 columns; is a comma used as the decimal point"));
+}
+
 TEST_F(CsvTest, ANumberBeyondTheMostThatItCanBeIsAnError) {
   auto table = reader("a,b\n-200,\n200.1,-inf\n");
   ASSERT_TRUE(table.next());

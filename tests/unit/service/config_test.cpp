@@ -93,6 +93,7 @@ TEST_F(ConfigTest, OneFileConfiguresAWholeTrain) {
 
 TEST_F(ConfigTest, MissingAndBrokenFilesAreSentences) {
   EXPECT_THAT(error_of(read_config<Config>("odometry", "/no/such.yaml")), HasSubstr("/no/such.yaml does not exist"));
+  EXPECT_THAT(error_of(read_config<Config>("odometry", "/tmp")), HasSubstr("/tmp is a folder"));
   EXPECT_THAT(error_of(read_config<Config>("odometry", write("odometry: {a: [\n"))), HasSubstr("not valid YAML"));
   EXPECT_THAT(error_of(read_config<Config>("odometry", write("just text\n"))), HasSubstr("sections"));
   EXPECT_THAT(error_of(read_config<Config>("odometry", write(""))),

@@ -68,6 +68,22 @@ TEST(ImuRoll, NarrowsTheRollAndItsSigmaHoldsAlsoWhereTheTrackTwists) {
   EXPECT_LT(std::sqrt(squares / count), std::sqrt(of_limits / count)) << "the mount alone would be as good";
 }
 
+TEST(ImuRoll, ASampleThatNoBodyTurnsIsLeftOut) {
+  ImuRoll sound({}, test::kMount, kLimitRad);
+  ImuRoll hit({}, test::kMount, kLimitRad);
+  Random random(2);
+  Random same(2);
+  feed(sound, {}, 0, 1, random);
+  feed(hit, {}, 0, 1, same);
+  hit.add(ns(1.001), 30);
+  hit.add(ns(1.002), 1e300);
+  feed(sound, {}, 1, 2, random);
+  feed(hit, {}, 1, 2, same);
+  sound.at(ns(1.95));
+  hit.at(ns(1.95));
+  EXPECT_EQ(hit.at(ns(2)).value().roll_rad, sound.at(ns(2)).value().roll_rad);
+}
+
 TEST(ImuRoll, SaysNothingWithoutSamplesOrWithOldOnesOnly) {
   ImuRoll imu({}, test::kMount, kLimitRad);
   EXPECT_FALSE(imu.at(ns(0)));

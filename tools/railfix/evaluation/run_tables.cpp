@@ -52,6 +52,7 @@ Status read(const fs::path& file, std::vector<StateRow>& rows) {
     row.speed_mps = table.number_or_nan(speed, core::kFastestTrainMps);
     row.over_m = table.number_or_nan(over, core::kWidestM);
     row.under_m = table.number_or_nan(under, core::kWidestM);
+    if (row.over_m < 0 || row.under_m < 0) table.refuse("has an interval that ends before it begins");
     row.integrity = table.text(integrity);
     row.easting_m = table.number_or_nan(easting, core::kFarthestM);
     row.northing_m = table.number_or_nan(northing, core::kFarthestM);

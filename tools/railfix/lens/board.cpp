@@ -9,6 +9,7 @@ namespace railfix::tool {
 namespace {
 
 constexpr size_t kFewestCorners = 8;
+constexpr int kMostSquares = 60;
 
 constexpr std::pair<const char*, int> kDictionaries[] = {
     {"4X4_50", cv::aruco::DICT_4X4_50}, {"4X4_100", cv::aruco::DICT_4X4_100}, {"4X4_250", cv::aruco::DICT_4X4_250},
@@ -19,6 +20,9 @@ constexpr std::pair<const char*, int> kDictionaries[] = {
 
 core::Result<BoardFinder> BoardFinder::make(const BoardDescription& board) {
   if (board.columns < 4 || board.rows < 4) return core::Error{"a board has at least 4x4 squares, as --board 9x7"};
+  if (board.columns > kMostSquares || board.rows > kMostSquares)
+    return core::Error{"a board of " + std::to_string(board.columns) + "x" + std::to_string(board.rows) +
+                       " squares is none that a camera sees: at most " + std::to_string(kMostSquares) + " a side"};
   if (!(board.square_m > 0)) return core::Error{"give the side of a square in metres, as --square 0.03"};
   BoardFinder finder(board);
   if (board.marker_m <= 0) return finder;

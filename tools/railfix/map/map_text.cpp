@@ -172,6 +172,7 @@ void print_place(const track::Map& map, const track::EdgePosition& place, bool a
   const auto if_known = [](bool known, double value) { return known ? ordered_json(value + 0.0) : ordered_json(); };
   const double heading = core::wrap_pi(point.pose.heading_rad + (reverse ? core::kPi : 0.0));
   const auto geo = map.to_geo(point.pose.easting_m, point.pose.northing_m);
+  const bool on_earth = geo && !map.edge(place.edge)->is_drawn;
   const auto limit =
       map.edge(place.edge)
           ->speed_limit_mps(place.offset_m, reverse ? track::Direction::reverse : track::Direction::forward);
@@ -189,8 +190,8 @@ void print_place(const track::Map& map, const track::EdgePosition& place, bool a
                 {"grade", if_known(has_heights, sign * point.grade)},
                 {"grade_is_guess", has_heights && !alignment.grade_known_at(place.offset_m)},
                 {"speed_limit_mps", limit ? ordered_json(*limit) : ordered_json()},
-                {"lat_deg", geo ? ordered_json(geo->lat_deg) : ordered_json()},
-                {"lon_deg", geo ? ordered_json(geo->lon_deg) : ordered_json()}});
+                {"lat_deg", on_earth ? ordered_json(geo->lat_deg) : ordered_json()},
+                {"lon_deg", on_earth ? ordered_json(geo->lon_deg) : ordered_json()}});
     return;
   }
   std::printf("edge %u at %.3f m%s\n", place.edge, place.offset_m, reverse ? ", seen against growing offset" : "");
@@ -208,7 +209,7 @@ void print_place(const track::Map& map, const track::EdgePosition& place, bool a
   std::printf("its rate         %.3e per m2\n", point.curvature_rate_per_m2 + 0.0);
   print_height_and_cant(alignment, place.offset_m, point, sign);
   if (limit) std::printf("speed limit      %.0f km/h\n", core::kmh_from_mps(*limit));
-  if (geo) std::printf("latitude         %.8f\nlongitude        %.8f\n", geo->lat_deg, geo->lon_deg);
+  if (on_earth) std::printf("latitude         %.8f\nlongitude        %.8f\n", geo->lat_deg, geo->lon_deg);
 }
 
 }  // namespace railfix::tool

@@ -8,6 +8,7 @@
 
 #include "core/whole_file.hpp"
 #include "dataset/dataset.hpp"
+#include "service/yaml_file.hpp"
 #include "track/import/build.hpp"
 #include "track/map.hpp"
 
@@ -51,7 +52,7 @@ core::Status check_start(const RunOptions& options, const std::filesystem::path&
 core::Result<YAML::Node> load_settings(const std::filesystem::path& file) {
   if (file.empty()) return YAML::Node(YAML::NodeType::Map);
   try {
-    YAML::Node settings = YAML::LoadFile(file.string());
+    YAML::Node settings = service::load_yaml(file);
     if (!settings.IsMap()) return core::Error{file.string() + " must consist of sections, one for each service"};
     return settings;
   } catch (const YAML::BadFile&) {
@@ -174,6 +175,9 @@ core::Status check_drawing(const RunOptions& options) {
       return core::Error{"--draw " + options.draw.string() +
                          " is the folder of the pictures themselves; give another folder"};
   }
+  std::error_code failed;
+  if (!options.draw.empty()) std::filesystem::create_directories(options.draw, failed);
+  if (failed) return core::Error{"--draw " + options.draw.string() + ": " + failed.message() + "; give a folder"};
   return {};
 }
 

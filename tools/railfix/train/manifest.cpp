@@ -9,6 +9,7 @@
 #include "core/similar_names.hpp"
 #include "messaging/network.hpp"
 #include "service/service.hpp"
+#include "service/yaml_file.hpp"
 
 namespace railfix::tool {
 namespace {
@@ -254,7 +255,7 @@ core::Result<Manifest> read_manifest(const std::filesystem::path& train) {
   manifest.folder = std::filesystem::absolute(file).lexically_normal().parent_path();
   ManifestReader reader(file, manifest);
   try {
-    reader.read(YAML::LoadFile(file.string()));
+    reader.read(service::load_yaml(file));
   } catch (const YAML::BadFile&) {
     return core::Error{file.string() + " cannot be opened; give the train's folder, such as deploy/trains/re460-042"};
   } catch (const YAML::Exception& error) {

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "core/whole_file.hpp"
+#include "service/yaml_file.hpp"
 #include "train/stands_still.hpp"
 #include "train/whole_folder.hpp"
 
@@ -27,7 +28,7 @@ core::BadInput damaged(const fs::path& file, const std::string& how) {
 template <class Read>
 auto load(const fs::path& file, Read read) -> std::optional<decltype(read(YAML::Node()))> {
   try {
-    return read(YAML::LoadFile(file.string()));
+    return read(service::load_yaml(file));
   } catch (const YAML::BadFile&) {
     return std::nullopt;
   } catch (const YAML::Exception& error) {

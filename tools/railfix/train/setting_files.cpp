@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "service/yaml_file.hpp"
+
 namespace railfix::tool {
 namespace {
 
@@ -59,7 +61,7 @@ bool is_file_on_host(const std::filesystem::path& file) {
 
 YAML::Node installed_settings(const std::filesystem::path& generation) {
   try {
-    return YAML::LoadFile((generation / "config.yaml").string());
+    return service::load_yaml(generation / "config.yaml");
   } catch (const YAML::Exception&) {
     return {};
   }

@@ -322,6 +322,7 @@ core::Result<OsmData> read_osm_json(const std::filesystem::path& file, bool with
     const json& document = parsed.value();
     OsmData out;
     if (document.is_object() && document.contains("elements")) {
+      if (!document.at("elements").is_array()) return wrong("its \"elements\" are no list");
       if (document.contains("remark"))
         out.problems.push_back(problem_of_remark(text_of(document.at("remark"), kMostOfRemark)));
       read_overpass(document.at("elements"), with_trams, out);
