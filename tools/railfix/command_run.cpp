@@ -13,6 +13,7 @@
 #include "run/supervisor.hpp"
 #include "run_tables.hpp"
 #include "service/notes.hpp"
+#include "train/run.hpp"
 
 namespace railfix::tool {
 namespace {
@@ -21,6 +22,7 @@ constexpr double kConnectS = 90;
 constexpr double kAnswerS = 10;
 constexpr double kStopS = 15;
 constexpr double kTurnS = 0.1;
+constexpr int kRefused = 2;  // exit code of a service that does not accept its settings
 
 volatile std::sig_atomic_t interrupted = 0;
 
@@ -42,13 +44,29 @@ std::vector<ServiceProgram> programs_for(const RunPlan& plan, const RunOptions& 
   return programs;
 }
 
-void start_services(Processes& processes, const std::vector<ServiceProgram>& programs, const RunPlan& plan,
-                    const std::vector<std::string>& sets) {
-  std::vector<std::string> arguments{"--config", plan.config.string()};
+void add_sets(const std::vector<std::string>& sets, std::vector<std::string>& arguments) {
   for (const auto& set : sets) {
     arguments.push_back("--set");
     arguments.push_back(set);
   }
+}
+
+// Each service looks at what the user has set, before there is a run.
+void check_settings(const RunOptions& options) {
+  if (options.config.empty() && options.sets.empty()) return;
+  for (const auto& program : core::value_or_throw(find_service_programs())) {
+    std::vector<std::string> command{program.program.string(), "--check"};
+    if (!options.config.empty()) command.insert(command.end(), {"--config", options.config.string()});
+    add_sets(options.sets, command);
+    const auto [exit_code, text] = run(command);
+    if (exit_code == kRefused) throw core::BadInput(text);
+  }
+}
+
+void start_services(Processes& processes, const std::vector<ServiceProgram>& programs, const RunPlan& plan,
+                    const std::vector<std::string>& sets) {
+  std::vector<std::string> arguments{"--config", plan.config.string()};
+  add_sets(sets, arguments);
   for (const auto& program : programs) core::ok_or_throw(processes.start(program, arguments));
 }
 
@@ -99,6 +117,7 @@ void remove_notes(const std::string& train_id) {
 }
 
 int run(const RunOptions& options) {
+  check_settings(options);
   const auto plan = core::value_or_throw(plan_run(options));
   const auto programs = programs_for(plan, options);
   std::signal(SIGINT, [](int) { interrupted = 1; });

@@ -55,6 +55,14 @@ TEST_F(RunCommand, WithoutRoomForItsRecordingItDoesNotBegin) {
   EXPECT_FALSE(fs::exists(root_ / "out"));
 }
 
+TEST_F(RunCommand, SettingsThatNoServiceAcceptsLeaveTheFolderFree) {
+  write_picture("pictures/1000.png", 100);
+  expect_refusal(test::run_program(run("pictures", {"--set", "fusion.interval_factor=nan"}), kPatienceS),
+                 "fusion.interval_factor 'nan' is not a number");
+  expect_refusal(test::run_program(run("pictures", {"--config", path("pictures")}), kPatienceS), "is a folder");
+  EXPECT_FALSE(fs::exists(root_ / "out"));
+}
+
 TEST_F(RunCommand, ADatasetOfSensorsAloneIsRunWithoutTheCamerasServices) {
   const auto simulated = test::run_program({"railfix", "simulate", "--no-pictures", "--out", path("seq"), "--start",
                                             "1:250", "--duration-s", "8", "--dwell-s", "1", "--quiet"},
