@@ -233,6 +233,9 @@ int calibrate_mount(const MountArguments& arguments) {
   check_output("--out", arguments.out, {arguments.video});
   check_output("--draw", arguments.draw, {path, arguments.camera});
   check_different({{"--out", arguments.out}, {"--draw", arguments.draw}});
+  if (std::filesystem::is_regular_file(arguments.out) && !std::filesystem::is_empty(arguments.out) &&
+      !dataset::read_calibration(arguments.out).ok())
+    throw core::BadInput("--out " + arguments.out + " is there and no calibration; remove it or give another name");
   const auto pictures = load_pictures(path, arguments.json);
   const Roll roll = arguments.roll_from_imu ? roll_from_gravity(path) : Roll{};
   std::string remark;

@@ -87,7 +87,9 @@ class ManifestReader {
       problem(train, "train.id", "must be a name of letters, digits, '-', '_' and '.', such as re460-042");
     manifest_.release = text_of(train["release"], "train.release");
     if (!is_name(manifest_.release))
-      problem(train, "train.release", "is missing: the release that the train runs, such as 0.1.0");
+      problem(train, "train.release",
+              std::string(manifest_.release.empty() ? "is missing" : "is none") +
+                  ": the release that the train runs, such as 0.1.0");
     manifest_.map = text_of(train["map"], "train.map");
     manifest_.calibration = text_of(train["calibration"], "train.calibration");
     manifest_.qos_profiles = text_of(train["qos_profiles"], "train.qos_profiles");
