@@ -21,8 +21,8 @@ namespace {
 constexpr double kPathAheadM = 300000;
 constexpr double kPathBehindM = 50000;
 constexpr double kPathLeftM = 20000;  // it is followed on when less of it is left, ...
-constexpr double kLagVagueS = 0.1;    // sigma
-constexpr double kLagSure = 3.0;      // sigma
+constexpr double kLagVagueS = 0.1;    // sigma of a lag that is not known yet
+constexpr double kLagSure = 3.0;      // sigmas of one that is
 constexpr double kPathAgainM = 5000;  // ... and tried again so much further on where it could not be
 constexpr double kBesideM = 50.0;     // beyond the interval: what is further off is no track beside the train
 constexpr double kNoCameraS = 0.3;
