@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <ranges>
 
 #include "core/whole_file.hpp"
 
@@ -79,18 +80,13 @@ bool CsvReader::next() {
     const std::string_view content = trim(line_);
     if (content.empty() || content.front() == '#') continue;
     split(content, cells_);
-    if (cells_.size() < header_.size()) {
-      status_ = error("has " + std::to_string(cells_.size()) + " values where the header names " +
-                      std::to_string(header_.size()) + " columns");
-      return false;
-    }
-    const auto beyond = cells_.begin() + static_cast<std::ptrdiff_t>(header_.size());
-    if (std::any_of(beyond, cells_.end(), [](std::string_view cell) { return !cell.empty(); })) {
-      status_ = error("has " + std::to_string(cells_.size()) + " values where the header names " +
-                      std::to_string(header_.size()) + " columns; is a comma used as the decimal point?");
-      return false;
-    }
-    return true;
+    const auto filled = [](std::string_view cell) { return !cell.empty(); };
+    const bool too_many = std::ranges::any_of(cells_ | std::views::drop(header_.size()), filled);
+    if (cells_.size() >= header_.size() && !too_many) return true;
+    status_ = error("has " + std::to_string(cells_.size()) + " values where the header names " +
+                    std::to_string(header_.size()) + " columns" +
+                    (too_many ? "; is a comma used as the decimal point?" : ""));
+    return false;
   }
   if (stream_.bad()) status_ = error("cannot be read further");
   return false;

@@ -187,23 +187,16 @@ core::Result<YAML::Node> load(const std::filesystem::path& file) {
   if (!std::filesystem::exists(file)) return core::Error{file.string() + " does not exist; --config needs a YAML file"};
   if (std::filesystem::is_directory(file))
     return core::Error{file.string() + " is a folder; --config needs a YAML file"};
-  try {
-    YAML::Node node = load_yaml(file);
-    std::error_code unknown;
-    if (node.IsNull() && std::filesystem::file_size(file, unknown) == 0)
-      return core::Error{
-          file.string() +
-          " is empty, as a power cut leaves a file; write it anew (on a train: railfix train upgrade), or "
-          "leave --config out for the defaults"};
-    if (node.IsNull()) return YAML::Node(YAML::NodeType::Map);
-    if (!node.IsMap()) return core::Error{file.string() + " must consist of sections, one for each service"};
-    return node;
-  } catch (const YAML::BadFile&) {
-    return core::Error{file.string() + " cannot be read; --config needs a YAML file"};
-  } catch (const YAML::Exception& error) {
-    return core::Error{file.string() + " line " + std::to_string(error.mark.line + 1) +
-                       ": not valid YAML: " + error.msg};
-  }
+  auto node = read_yaml(file, "--config needs a YAML file");
+  if (!node.ok()) return node;
+  std::error_code unknown;
+  if (node.value().IsNull() && std::filesystem::file_size(file, unknown) == 0)
+    return core::Error{file.string() +
+                       " is empty, as a power cut leaves a file; write it anew (on a train: railfix train upgrade), or "
+                       "leave --config out for the defaults"};
+  if (node.value().IsNull()) return YAML::Node(YAML::NodeType::Map);
+  if (!node.value().IsMap()) return core::Error{file.string() + " must consist of sections, one for each service"};
+  return node;
 }
 
 // Without places in a text, so that what is wrong with it is not told with a line of the file.

@@ -12,7 +12,6 @@ constexpr double kWindowS = 1.0;
 constexpr double kSpeedS = 0.15;  // a speed is that of so long before and behind
 constexpr double kPauseS = 0.5;   // no sample for so long
 constexpr double kKeptS = 5.0;
-constexpr size_t kReferences = 8;
 constexpr double kRatioSigma = 0.03;
 constexpr double kCreepSigma = 0.005;  // a driven axle runs half a per cent ahead at 1 m/s2
 constexpr double kLagSigmaS = 0.15;
@@ -39,7 +38,7 @@ CameraLag::Lag CameraLag::lag() const {
 }
 
 void CameraLag::break_off() {
-  reference_.clear();
+  way_.clear();
   seen_.clear();
   mark_.reset();
 }
@@ -63,20 +62,15 @@ void CameraLag::add(const OdometryInput& step) {
   if (!seen_.empty() && step.stamp_ns <= seen_.back().stamp_ns &&
       core::seconds(seen_.back().stamp_ns - step.stamp_ns) < kPauseS)
     return;
-  const auto reference = std::ranges::find(reference_, step.reference_stamp_ns, &Reading::stamp_ns);
-  if (!step.valid || reference == reference_.end()) {
+  const auto picture = step.valid ? way_.add(step) : std::nullopt;
+  if (!picture) {
     break_off();
     if (!step.valid) return;
-    reference_.push_back({step.stamp_ns, 0, 0});
-    seen_.push_back(reference_.back());
+    way_.begin(step.stamp_ns);
+    seen_.push_back({step.stamp_ns, 0, 0});
     return;
   }
-  const Reading picture{step.stamp_ns, reference->way_m + step.step_m,
-                        reference->variance_m2 + step.step_sigma_m * step.step_sigma_m};
-  reference_.erase(reference_.begin(), reference);  // what lies before it is not referred to any more
-  if (reference_.size() >= kReferences) reference_.erase(reference_.begin() + 1);  // a train at rest keeps its first
-  reference_.push_back(picture);
-  seen_.push_back(picture);
+  seen_.push_back(*picture);
   while (core::seconds(step.stamp_ns - seen_.front().stamp_ns) > kKeptS) seen_.pop_front();
 }
 

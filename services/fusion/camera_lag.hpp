@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "fusion/fusion_types.hpp"
+#include "fusion/seen_way.hpp"
 
 namespace railfix::fusion {
 
@@ -28,11 +29,7 @@ class CameraLag {
   [[nodiscard]] Lag lag() const;
 
  private:
-  struct Reading {
-    int64_t stamp_ns = 0;
-    double way_m = 0;
-    double variance_m2 = 0;
-  };
+  using Reading = SeenWay::Picture;
   using Readings = std::deque<Reading>;
   struct Moving {
     Reading at;
@@ -49,8 +46,8 @@ class CameraLag {
   void fit(const Mark& from, const Mark& to);
 
   Readings wheel_;
-  Readings seen_;       // variances since the first picture
-  Readings reference_;  // pictures that steps may refer to
+  Readings seen_;  // variances since the first picture
+  SeenWay way_;
   std::optional<Mark> mark_;
   // Ratio of the ways less one, creep (m of way per m and m/s gained), lag (s).
   Eigen::Vector3d fitted_ = Eigen::Vector3d::Zero();

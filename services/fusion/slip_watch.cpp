@@ -11,7 +11,6 @@ constexpr double kMarkS = 0.1;
 constexpr double kWindowS = 1.0;
 constexpr double kShortestS = 0.3;
 constexpr double kWheelFreshS = 0.15;
-constexpr size_t kPictures = 4;
 
 }  // namespace
 
@@ -21,7 +20,7 @@ void SlipWatch::wheel(int64_t stamp_ns, double wheel_m) {
 }
 
 void SlipWatch::no_picture() {
-  pictures_.clear();
+  seen_.clear();
   marks_.clear();
   steps_ = 0;
 }
@@ -36,24 +35,15 @@ std::optional<double> SlipWatch::wheel_at(int64_t stamp_ns) const {
 }
 
 std::optional<SlipWatch::Ways> SlipWatch::picture(const OdometryInput& step) {
-  const auto reference = std::find_if(pictures_.begin(), pictures_.end(), [&](const Reading& picture) {
-    return picture.stamp_ns == step.reference_stamp_ns;
-  });
+  const auto picture = seen_.add(step);
   const auto wheel_m = wheel_at(step.stamp_ns);
-  if (reference == pictures_.end() || !wheel_m) {
+  if (!picture || !wheel_m) {
     no_picture();
-    pictures_.push_back({step.stamp_ns, 0});
+    seen_.begin(step.stamp_ns);
     return std::nullopt;
   }
-  const Reading base = *reference;
-  const double visual_m = base.metres + step.step_m;
+  const double visual_m = picture->way_m;
   ++steps_;
-  // The reference may be kept for long; of the others the oldest goes.
-  if (pictures_.size() >= kPictures) {
-    const bool reference_first = pictures_.front().stamp_ns == base.stamp_ns;
-    pictures_.erase(pictures_.begin() + (reference_first ? 1 : 0));
-  }
-  pictures_.push_back({step.stamp_ns, visual_m});
 
   std::erase_if(marks_, [&](const Mark& m) { return core::seconds(step.stamp_ns - m.stamp_ns) > kWindowS; });
   if (marks_.empty() || core::seconds(step.stamp_ns - marks_.back().stamp_ns) >= kMarkS) {

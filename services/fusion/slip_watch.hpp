@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "fusion/fusion_types.hpp"
+#include "fusion/seen_way.hpp"
 
 namespace railfix::fusion {
 
@@ -43,8 +44,8 @@ class SlipWatch {
 
   Reading wheel_before_;
   Reading wheel_last_;
-  std::vector<Reading> pictures_;  // visual way at the last pictures
-  std::vector<Mark> marks_;        // one each kMarkS
+  SeenWay seen_;
+  std::vector<Mark> marks_;  // one each kMarkS
   int steps_ = 0;
 };
 

@@ -51,16 +51,10 @@ core::Status check_start(const RunOptions& options, const std::filesystem::path&
 
 core::Result<YAML::Node> load_settings(const std::filesystem::path& file) {
   if (file.empty()) return YAML::Node(YAML::NodeType::Map);
-  try {
-    YAML::Node settings = service::load_yaml(file);
-    if (!settings.IsMap()) return core::Error{file.string() + " must consist of sections, one for each service"};
-    return settings;
-  } catch (const YAML::BadFile&) {
-    return core::Error{file.string() + " cannot be opened; --config needs a YAML file"};
-  } catch (const YAML::Exception& error) {
-    return core::Error{file.string() + " line " + std::to_string(error.mark.line + 1) +
-                       ": not valid YAML: " + error.msg};
-  }
+  auto settings = service::read_yaml(file, "--config needs a YAML file");
+  if (settings.ok() && !settings.value().IsMap())
+    return core::Error{file.string() + " must consist of sections, one for each service"};
+  return settings;
 }
 
 void fill_grabber(YAML::Node grabber, const RunOptions& options) {
@@ -175,9 +169,6 @@ core::Status check_drawing(const RunOptions& options) {
       return core::Error{"--draw " + options.draw.string() +
                          " is the folder of the pictures themselves; give another folder"};
   }
-  std::error_code failed;
-  if (!options.draw.empty()) std::filesystem::create_directories(options.draw, failed);
-  if (failed) return core::Error{"--draw " + options.draw.string() + ": " + failed.message() + "; give a folder"};
   return {};
 }
 
@@ -239,18 +230,20 @@ core::Result<RunPlan> plan_run(const RunOptions& options) {
   }
 
   std::vector<std::filesystem::path> made;
-  for (const auto& folder : {options.out, options.state}) {
+  const auto given_up = [&](const core::Error& why) {
+    for (const auto& folder : made) {
+      std::error_code ignored;  // one that stays does no harm
+      std::filesystem::remove_all(folder, ignored);
+    }
+    return why;
+  };
+  for (const auto& folder : {options.out, options.state, options.draw}) {
     std::error_code failed;
     if (!folder.empty() && std::filesystem::create_directories(folder, failed)) made.push_back(folder);
-    if (failed) return core::Error{folder.string() + " cannot be made: " + failed.message()};
+    if (failed) return given_up({folder.string() + " cannot be made: " + failed.message()});
   }
-  const auto planned = plan_in_folder(options, plan);
-  if (planned.ok()) return plan;
-  for (const auto& folder : made) {
-    std::error_code ignored;  // one that stays does no harm
-    std::filesystem::remove_all(folder, ignored);
-  }
-  return planned.error();
+  if (const auto planned = plan_in_folder(options, plan); !planned.ok()) return given_up(planned.error());
+  return plan;
 }
 
 }  // namespace railfix::tool
