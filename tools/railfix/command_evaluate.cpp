@@ -12,14 +12,14 @@
 namespace railfix::tool {
 namespace {
 
-struct Options {
+struct EvaluateOptions {
   std::string truth;
   std::string run;
   std::string json;
   std::string report;
 };
 
-int evaluate(const Options& options) {
+int evaluate(const EvaluateOptions& options) {
   if (options.json != "-") check_output("--json", options.json, {options.truth, options.run});
   check_output("--report", options.report, {options.truth, options.run});
   check_different({{"--json", options.json == "-" ? "/dev/stdout" : options.json}, {"--report", options.report}});
@@ -47,7 +47,7 @@ int evaluate(const Options& options) {
 void add_evaluate(CLI::App& app, Action& chosen) {
   auto* command = app.add_subcommand("evaluate", "Judge a run against the truth of its dataset");
   command->footer("Example: railfix evaluate --truth SEQ/truth --run OUT --json figures.json --report report.html");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<EvaluateOptions>();
   command->add_option("--truth", options->truth, "Folder with track.csv and landmarks.csv (SEQ/truth)")->required();
   command->add_option("--run", options->run, "Folder that `railfix run --out` wrote")->required();
   command->add_option("--json", options->json, "Write all figures as JSON to this file, - = standard output alone");

@@ -18,7 +18,7 @@ namespace {
 // As in LogRecord.level and common.log_level.
 const std::vector<std::string> kLevels(messaging::kLevelNames.begin(), messaging::kLevelNames.end());
 
-struct Options {
+struct LogOptions {
   std::filesystem::path file;
   TrainNetwork network;
   bool follow = false;
@@ -28,14 +28,14 @@ struct Options {
   bool json = false;
 };
 
-bool wanted(const Options& options, const msg::LogRecord& record) {
+bool wanted(const LogOptions& options, const msg::LogRecord& record) {
   const auto least = std::ranges::find(kLevels, options.level) - kLevels.begin();
   if (record.level() < least) return false;
   return options.services.empty() ||
          std::ranges::find(options.services, record.service().c_str()) != options.services.end();
 }
 
-void print(const Options& options, const msg::LogRecord& record) {
+void print(const LogOptions& options, const msg::LogRecord& record) {
   if (!wanted(options, record)) return;
   const std::string level = messaging::name_of_level(record.level());
   if (options.json) {
@@ -52,7 +52,7 @@ void print(const Options& options, const msg::LogRecord& record) {
             << record.text().c_str() << std::endl;
 }
 
-int print_recorded(const Options& options) {
+int print_recorded(const LogOptions& options) {
   const auto reader = core::value_or_throw(mcap::Reader::open(options.file));
   reader->for_each({{messaging::topics::log_record.name}, {}, {}},
                    [&](const mcap::Channel&, const mcap::Message& message) {
@@ -66,7 +66,7 @@ int print_recorded(const Options& options) {
   return 0;
 }
 
-int follow(const Options& options) {
+int follow(const LogOptions& options) {
   TopicListener listener(options.network, "railfix-log");
   listener.listen(messaging::topics::log_record.name, [&](const auto&, const auto&, const auto& sample, const auto&) {
     print(options, *static_cast<const msg::LogRecord*>(sample.get()));
@@ -75,7 +75,7 @@ int follow(const Options& options) {
   return 0;
 }
 
-int log(const Options& options) {
+int log(const LogOptions& options) {
   if (!options.file.empty()) return print_recorded(options);
   if (options.follow) return follow(options);
   throw core::BadInput("give a recording, or -f to follow " + where(options.network) + " (--train, --domain)");
@@ -84,7 +84,7 @@ int log(const Options& options) {
 }  // namespace
 
 void add_log(CLI::App& app, Action& chosen) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<LogOptions>();
   auto* command = app.add_subcommand(
       "log",
       "What the services say, from now on (-f) or in a recording.  Example: railfix log -f --service fusion,odometry "

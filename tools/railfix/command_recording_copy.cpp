@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct CopyOptions {
   std::vector<fs::path> files;
   fs::path out;
   CutOptions cut{0, std::numeric_limits<double>::infinity(), {}, {}};
@@ -25,7 +25,7 @@ void print(const CopyReport& report, const fs::path& out) {
   std::cout << out.string() << ": " << report.samples << " samples of " << report.topics << " topics";
 }
 
-int cut(const Options& options) {
+int cut(const CopyOptions& options) {
   check_output("--out", options.out, options.files);
   const auto report = core::value_or_throw(cut_recording(options.files.front(), options.out, options.cut));
   print(report, options.out);
@@ -34,7 +34,7 @@ int cut(const Options& options) {
   return 0;
 }
 
-int merge(const Options& options) {
+int merge(const CopyOptions& options) {
   check_output("--out", options.out, options.files);
   const auto report = core::value_or_throw(merge_recordings(options.files, options.out));
   print(report, options.out);
@@ -46,7 +46,7 @@ int merge(const Options& options) {
 }  // namespace
 
 void add_recording_cut(CLI::App& recording, Action& chosen) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CopyOptions>();
   auto* command =
       recording.add_subcommand("cut",
                                "A part of a recording as a recording of its own, with the calibrations and other "
@@ -62,7 +62,7 @@ void add_recording_cut(CLI::App& recording, Action& chosen) {
 }
 
 void add_recording_merge(CLI::App& recording, Action& chosen) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CopyOptions>();
   auto* command = recording.add_subcommand(
       "merge",
       "Several recordings of one train as one, in the order of time; what stands in more than one is kept once, e.g. "

@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct ExportOptions {
   fs::path file;
   fs::path csv;
   fs::path gpx;
@@ -31,7 +31,7 @@ struct Options {
   double to_s = std::numeric_limits<double>::infinity();
 };
 
-mcap::Selection part_of(const mcap::Reader& reader, const Options& options) {
+mcap::Selection part_of(const mcap::Reader& reader, const ExportOptions& options) {
   auto part = core::value_or_throw(part_in_time(reader, options.from_s, options.to_s));
   for (const auto& [id, channel] : reader.channels()) {
     for (const auto& name : options.topics) {
@@ -51,7 +51,7 @@ void write_tables(mcap::Reader& reader, const mcap::Selection& part, const fs::p
   std::cout << folder.string() << ": " << report.tables << " tables, " << report.rows << " rows\n";
 }
 
-void write_tracks(mcap::Reader& reader, const mcap::Selection& part, const Options& options) {
+void write_tracks(mcap::Reader& reader, const mcap::Selection& part, const ExportOptions& options) {
   const auto track = core::value_or_throw(read_track(reader, part));
   const auto points = [](const std::vector<std::vector<TrackPoint>>& lines) {
     size_t count = 0;
@@ -68,7 +68,7 @@ void write_tracks(mcap::Reader& reader, const mcap::Selection& part, const Optio
   }
 }
 
-void write_film(mcap::Reader& reader, const mcap::Selection& part, const Options& options) {
+void write_film(mcap::Reader& reader, const mcap::Selection& part, const ExportOptions& options) {
   const auto report = core::value_or_throw(export_video(reader, part, options.video, options.mp4));
   for (const auto& problem : report.problems) std::cerr << problem << '\n';
   std::cout << options.mp4.string() << ": " << report.codec << ", " << report.frames << " frames at " << report.fps
@@ -87,7 +87,7 @@ void check_tables(const fs::path& folder, const fs::path& recording) {
   }
 }
 
-void check_outputs(const Options& options) {
+void check_outputs(const ExportOptions& options) {
   check_output("--gpx", options.gpx, {options.file});
   check_output("--geojson", options.geojson, {options.file});
   check_output("--mp4", options.mp4, {options.file});
@@ -99,7 +99,7 @@ void check_outputs(const Options& options) {
   if (!options.csv.empty()) check_tables(options.csv, options.file);
 }
 
-int run(const Options& options) {
+int run(const ExportOptions& options) {
   if (options.csv.empty() && options.gpx.empty() && options.geojson.empty() && options.mp4.empty()) {
     throw core::BadInput("say what to make of it: --csv FOLDER, --gpx FILE, --geojson FILE or --mp4 FILE");
   }
@@ -119,7 +119,7 @@ int run(const Options& options) {
 }  // namespace
 
 void add_recording_export(CLI::App& recording, Action& chosen) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ExportOptions>();
   auto* command = recording.add_subcommand(
       "export",
       "A recording as tables, as a track for maps, or as a film with the rails drawn, e.g. railfix recording export "

@@ -21,7 +21,7 @@ using nlohmann::ordered_json;
 
 constexpr double kBytesPerMb = 1e6;
 
-struct Options {
+struct InfoOptions {
   fs::path file;
   bool quick = false;
   bool json = false;
@@ -33,7 +33,7 @@ struct Info {
   std::vector<std::string> problems;
 };
 
-Info read(const Options& options) {
+Info read(const InfoOptions& options) {
   Info info{core::value_or_throw(mcap::Reader::open(options.file)), {}, {}};
   if (!options.quick) {
     info.check = core::value_or_throw(mcap::check(options.file));
@@ -102,7 +102,7 @@ uint64_t samples_of(const Info& info) {
   return samples;
 }
 
-ordered_json to_json(const Options& options, const Info& info) {
+ordered_json to_json(const InfoOptions& options, const Info& info) {
   const auto& statistics = info.reader->statistics();
   const auto when = [&](int64_t ns) { return statistics.messages > 0 ? ordered_json(utc_text(ns)) : ordered_json(); };
   const auto by_index = info.reader->indexed() ? ordered_json(statistics.messages) : ordered_json();
@@ -189,7 +189,7 @@ void print(const ordered_json& json) {
     std::printf("railfix recording repair makes a proper file of everything in whole chunks\n");
 }
 
-int info(const Options& options) {
+int info(const InfoOptions& options) {
   const Info all = read(options);
   const auto json = to_json(options, all);
   if (options.json) {
@@ -203,7 +203,7 @@ int info(const Options& options) {
 }  // namespace
 
 void add_recording_info(CLI::App& recording, Action& chosen) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<InfoOptions>();
   auto* command = recording.add_subcommand(
       "info",
       "What is in a recording, what was lost, and whether every checksum is right (1 when not), e.g. railfix recording "

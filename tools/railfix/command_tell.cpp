@@ -22,9 +22,9 @@ namespace topics = messaging::topics;
 constexpr int64_t kPatienceNs = 10 * core::kNsPerSecond;
 // Tools that listen say nothing of their connections; then this is long enough for a network at rest.
 constexpr int64_t kDiscoveryNs = 3 * core::kNsPerSecond;
-constexpr int64_t kTurnNs = core::kNsPerSecond / 20;
+constexpr int64_t kTellTurnNs = core::kNsPerSecond / 20;
 
-struct Options {
+struct TellOptions {
   std::string service;
   std::string command;
   std::string argument;
@@ -34,7 +34,7 @@ struct Options {
 /// One request to one service, and its answer.
 class Teller {
  public:
-  explicit Teller(const Options& options)
+  explicit Teller(const TellOptions& options)
       : options_(options),
         participant_(participant_options(options.network, "railfix-tell")),
         control_(participant_, topics::service_control),
@@ -77,7 +77,7 @@ class Teller {
     const int64_t deadline_ns = core::monotonic_ns() + kPatienceNs;
     while (!condition()) {
       if (core::monotonic_ns() > deadline_ns) return false;
-      queue_.run_one(core::monotonic_ns() + kTurnNs);
+      queue_.run_one(core::monotonic_ns() + kTellTurnNs);
     }
     return true;
   }
@@ -90,7 +90,7 @@ class Teller {
   }
   [[nodiscard]] bool connected() const { return messaging::all_connected(participant_.connections(), known_); }
 
-  Options options_;
+  TellOptions options_;
   uint64_t id_ = static_cast<uint64_t>(core::wall_ns()) ^ static_cast<uint64_t>(getpid());
   std::optional<msg::ControlReply> reply_;
   std::map<std::string, msg::ServiceStatus> known_;
@@ -104,7 +104,7 @@ class Teller {
 }  // namespace
 
 void add_tell(CLI::App& app, Action& chosen) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<TellOptions>();
   auto* tell = app.add_subcommand(
       "tell",
       "Give a running service a command and print its answer, e.g. railfix tell recorder event \"a jolt at km 12\"; "

@@ -27,7 +27,7 @@ constexpr double kOnceS = 3;
 constexpr int64_t kDrawNs = core::kNsPerSecond;
 constexpr double kOldS = 3600;
 
-struct Options {
+struct TopOptions {
   TrainNetwork network;
   bool once = false;
   bool json = false;
@@ -48,7 +48,7 @@ struct WatchedTopic {
 
 class Watch {
  public:
-  explicit Watch(const Options& options) : options_(options), listener_(options.network, "railfix-top") {
+  explicit Watch(const TopOptions& options) : options_(options), listener_(options.network, "railfix-top") {
     listener_.listen(messaging::topics::service_status.name, [this](const auto& name, const auto& topic,
                                                                     const auto& sample, const auto& info) {
       services_.note(*static_cast<const msg::ServiceStatus*>(sample.get()), core::wall_ns(), info.writer);
@@ -156,7 +156,7 @@ class Watch {
                                topic.whole.lost());
   }
 
-  Options options_;
+  TopOptions options_;
   int64_t begun_ns_ = core::wall_ns();
   TopicListener listener_;
   messaging::ServiceBoard services_;
@@ -186,7 +186,7 @@ class Screen {
   }
 };
 
-int top(const Options& options) {
+int top(const TopOptions& options) {
   const bool terminal = isatty(STDOUT_FILENO) == 1;
   const bool colours = terminal && !options.plain && std::getenv("NO_COLOR") == nullptr;
   Watch watch(options);
@@ -212,7 +212,7 @@ int top(const Options& options) {
 }  // namespace
 
 void add_top(CLI::App& app, Action& chosen) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<TopOptions>();
   auto* command = app.add_subcommand(
       "top",
       "Services and topics of a train, live; q quits.  Example: railfix top --train demo; railfix top --once --json");

@@ -26,7 +26,7 @@ using nlohmann::ordered_json;
 constexpr double kListS = 3;
 constexpr int64_t kHintNs = 2 * core::kNsPerSecond;
 
-struct Options {
+struct TopicsOptions {
   std::string topic;
   TrainNetwork network;
   bool json = false;
@@ -35,7 +35,7 @@ struct Options {
 };
 
 /// The topic, with its camera when there is only one; BadInput with the names that may have been meant.
-std::string resolve(TopicListener& listener, const Options& options) {
+std::string resolve(TopicListener& listener, const TopicsOptions& options) {
   std::vector<std::string> written;
   listener.run(kListS, [&] {
     written = listener.participant().written_topics();
@@ -58,7 +58,7 @@ std::string resolve(TopicListener& listener, const Options& options) {
   throw core::BadInput("there is no topic '" + options.topic + "'; " + core::did_you_mean(options.topic, written));
 }
 
-int list(const Options& options) {
+int list(const TopicsOptions& options) {
   TopicListener listener(options.network, "railfix-topics");
   std::map<std::string, TopicStatistics> all;
   const int64_t since_ns = core::wall_ns();
@@ -104,7 +104,7 @@ int list(const Options& options) {
 /// Says once that nothing has come yet, and why that may be.
 class Hint {
  public:
-  void update(const TopicListener& listener, const std::string& topic, uint64_t samples, const Options& options) {
+  void update(const TopicListener& listener, const std::string& topic, uint64_t samples, const TopicsOptions& options) {
     if (said_ || samples > 0 || core::monotonic_ns() - begun_ns_ < kHintNs) return;
     said_ = true;
     std::cerr << topic << ": "
@@ -119,7 +119,7 @@ class Hint {
 
 /// Watches one topic: `report` is asked for a line every second about that second, and at the end about all of it.
 template <class Statistics>
-int watch(const Options& options) {
+int watch(const TopicsOptions& options) {
   TopicListener listener(options.network, "railfix-topics");
   const std::string topic = resolve(listener, options);
   const int64_t since_ns = core::wall_ns();
@@ -168,7 +168,7 @@ void print_sample(ordered_json sample, double before_s, bool as_json) {
   std::cout << "---" << std::endl;
 }
 
-int echo(const Options& options) {
+int echo(const TopicsOptions& options) {
   TopicListener listener(options.network, "railfix-topics");
   const std::string topic = resolve(listener, options);
   uint64_t shown = 0;
@@ -193,7 +193,7 @@ int echo(const Options& options) {
   return shown > 0 ? 0 : 1;
 }
 
-void add_common(CLI::App& command, Options& options) {
+void add_common(CLI::App& command, TopicsOptions& options) {
   add_network(command, options.network);
   find_running_train(command, options.network);
   command.add_flag("--json", options.json, "JSON on standard output");
@@ -203,10 +203,10 @@ void add_common(CLI::App& command, Options& options) {
 }  // namespace
 
 void add_topics(CLI::App& app, Action& chosen) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<TopicsOptions>();
   auto* topics = app.add_subcommand("topics", "Live topics of a train: which there are, how fast, what they say");
   topics->require_subcommand(1);
-  const auto add = [&](const char* name, const char* what, int (*run)(const Options&), bool one_topic) {
+  const auto add = [&](const char* name, const char* what, int (*run)(const TopicsOptions&), bool one_topic) {
     auto* command = topics->add_subcommand(name, what);
     add_common(*command, *options);
     if (one_topic) {

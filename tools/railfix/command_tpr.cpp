@@ -187,7 +187,7 @@ int encode(const std::string& file, Baseline baseline) {
   return 0;
 }
 
-struct Options {
+struct TprOptions {
   std::string hex;
   std::string file;
   int baseline = 3;
@@ -197,7 +197,7 @@ struct Options {
 }  // namespace
 
 void add_tpr(CLI::App& app, Action& chosen) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<TprOptions>();
   auto* tpr = app.add_subcommand("tpr", "ETCS train position reports (message 136): bits, ground link, comparison");
   tpr->require_subcommand(1);
   const auto add_baseline = [&](CLI::App* command) {

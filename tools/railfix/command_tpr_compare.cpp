@@ -22,7 +22,7 @@ namespace railfix::tool {
 
 namespace {
 
-struct Options {
+struct CompareOptions {
   std::string ours;
   std::string certified;
   std::string map;
@@ -50,7 +50,7 @@ constexpr double kLargestOffsetS = 4e9;  // from a clock that begins at 0 to UTC
 /// system reports. The map is read once.
 class Line {
  public:
-  explicit Line(const Options& options) : options_(options) {
+  explicit Line(const CompareOptions& options) : options_(options) {
     if (options.map.empty()) {
       axes_.emplace();
       return;
@@ -75,7 +75,7 @@ class Line {
   void follow(const track::EdgePosition& start) {
     axes_.emplace(core::value_or_throw(track::Path::follow(map_, start, kPathM, kPathM, options_.via)));
   }
-  const Options& options_;
+  const CompareOptions& options_;
   std::shared_ptr<const track::Map> map_;
   std::optional<compare::Axes> axes_;
 };
@@ -150,7 +150,7 @@ void print_pairs(const compare::Pairing& pairing, const std::optional<compare::J
 }
 
 /// Reports that come now, until the other side's file is over, time is up, or Ctrl-C; each pair is told as it comes.
-void listen(ReportSource& ours, ReportSource& certified, Line& line, const Options& options) {
+void listen(ReportSource& ours, ReportSource& certified, Line& line, const CompareOptions& options) {
   const int64_t end_ns =
       options.for_s > 0 ? core::monotonic_ns() + core::to_ns(options.for_s) : std::numeric_limits<int64_t>::max();
   const auto over = [](const ReportSource& live, const ReportSource& other) {
@@ -177,7 +177,7 @@ void listen(ReportSource& ours, ReportSource& certified, Line& line, const Optio
   }
 }
 
-int print_comparison(const Options& options, const compare::Pairing& pairing,
+int print_comparison(const CompareOptions& options, const compare::Pairing& pairing,
                      const std::optional<compare::Judge>& judge) {
   print_pairs(pairing, judge);
   const auto columns = compare::columns_of(pairing, judge);
@@ -199,7 +199,7 @@ int print_comparison(const Options& options, const compare::Pairing& pairing,
   return verdict == compare::Verdict::worse ? kWorse : 0;
 }
 
-void check(const Options& options) {
+void check(const CompareOptions& options) {
   if (options.map.empty() && !options.start.empty()) throw core::BadInput("--start needs --map: it is a place on it.");
   if (options.map.empty() && !options.via.empty()) throw core::BadInput("--via needs --map: it names edges of it.");
   if (!options.truth.empty() && (options.map.empty() || options.start.empty()))
@@ -236,7 +236,7 @@ void check_times(const compare::Judge& judge, const std::vector<compare::Pair>& 
                        span_text(pairs.front().stamp_ns, pairs.back().stamp_ns) + ".");
 }
 
-int compare_reports(const Options& options) {
+int compare_reports(const CompareOptions& options) {
   check(options);
   std::optional<evaluation::Truth> truth;
   if (!options.truth.empty()) truth = core::value_or_throw(evaluation::Truth::read(options.truth));
@@ -281,7 +281,7 @@ int compare_reports(const Options& options) {
 }  // namespace
 
 void add_tpr_compare(CLI::App& tpr, Action& chosen) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CompareOptions>();
   auto* command = tpr.add_subcommand("compare", "Our reports beside those of the certified system, paired in time");
   command->footer(
       "Examples:\n"

@@ -21,7 +21,7 @@ namespace {
 using ground_link::Arrival;
 using ground_link::GroundReport;
 
-struct Options {
+struct ListenOptions {
   std::string broker = "localhost:1883";
   ground_link::MqttOptions mqtt;
   std::string password_file;
@@ -86,7 +86,7 @@ void print(const GroundReport& report, Arrival arrival, bool as_json) {
   std::fflush(stdout);
 }
 
-int listen(const Options& options) {
+int listen(const ListenOptions& options) {
   sigset_t ends;
   sigemptyset(&ends);
   for (const int signal : {SIGINT, SIGTERM, SIGUSR1}) sigaddset(&ends, signal);
@@ -123,7 +123,7 @@ int listen(const Options& options) {
 }  // namespace
 
 void add_tpr_listen(CLI::App& tpr, Action& chosen) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ListenOptions>();
   options->mqtt.subscribe_to = "railfix/+/position_report";
   auto* command = tpr.add_subcommand("listen", "The ground side: print the reports that come over MQTT, each once");
   command->footer("Example: railfix tpr listen --broker ground.example:8883 --ca ca.pem --client-id rbc1");

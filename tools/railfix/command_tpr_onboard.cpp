@@ -37,7 +37,7 @@ const Names kIntegrities{"none", "device", "driver", "lost"};
 const Names kCabs{"unsaid", "camera", "other"};
 const Names kReports{"border", "session", "error"};
 
-struct Options {
+struct OnboardOptions {
   std::vector<std::string> words;
   TrainNetwork network;
   double for_s = 0;
@@ -169,7 +169,7 @@ class Lines {
 
 class Station {
  public:
-  explicit Station(const Options& options)
+  explicit Station(const OnboardOptions& options)
       : options_(options),
         listener_(options.network, "railfix-tpr-onboard"),
         writer_(listener_.participant(), messaging::topics::onboard_status) {
@@ -225,7 +225,7 @@ class Station {
     next_ns_ = core::monotonic_ns() + kPeriodNs;
   }
 
-  Options options_;
+  OnboardOptions options_;
   TopicListener listener_;
   messaging::Writer<msg::OnboardStatus> writer_;
   Lines lines_;
@@ -238,7 +238,7 @@ class Station {
 }  // namespace
 
 void add_tpr_onboard(CLI::App& tpr, Action& chosen) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<OnboardOptions>();
   auto* command = tpr.add_subcommand(
       "onboard", "Say what the ETCS on-board unit would: mode, level, train integrity, and when it wants a report");
   command->footer(

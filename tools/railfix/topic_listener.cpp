@@ -11,7 +11,7 @@ namespace railfix::tool {
 
 namespace {
 
-constexpr int64_t kTurnNs = 50'000'000;
+constexpr int64_t kListenTurnNs = 50'000'000;
 constexpr size_t kWaiting = 1000;
 
 volatile std::sig_atomic_t interrupted = 0;
@@ -117,7 +117,7 @@ void TopicListener::listen(const std::string& name, OnSample on_sample) {
 void TopicListener::run(double for_s, const std::function<bool()>& done) {
   const int64_t end_ns = for_s > 0 ? core::monotonic_ns() + core::to_ns(for_s) : std::numeric_limits<int64_t>::max();
   while (interrupted == 0 && core::monotonic_ns() < end_ns && !done()) {
-    const int64_t turn_ns = std::min(core::monotonic_ns() + kTurnNs, end_ns);
+    const int64_t turn_ns = std::min(core::monotonic_ns() + kListenTurnNs, end_ns);
     while (queue_.run_one(turn_ns) && core::monotonic_ns() < turn_ns) {
     }
   }

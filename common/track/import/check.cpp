@@ -15,7 +15,7 @@ namespace railfix::track {
 namespace {
 
 constexpr double kGapM = 0.05;
-constexpr double kSharpestPerM = 1.0 / 80.0;
+constexpr double kSharpestBendPerM = 1.0 / 80.0;
 constexpr double kSteepest = 0.075;
 constexpr double kStepM = 0.05;  // in height, from one profile point to the next
 constexpr double kSamePlaceM = 0.5;
@@ -94,7 +94,7 @@ class Check {
       const double kink = std::abs(core::wrap_pi(before.heading_rad - start.heading_rad));
       if (kink > kKinkRad) shapes_.push_back(where + " has a kink of " + told_deg(kink));
     }
-    if (bend.curvature_per_m > kSharpestPerM) bends_.push_back(bend);
+    if (bend.curvature_per_m > kSharpestBendPerM) bends_.push_back(bend);
   }
 
   /// The worst by name, the others counted: one yard has more than all the rest that is wrong.

@@ -8,7 +8,7 @@
 #include "live_sensors.hpp"
 #include "support/ubx_frames.hpp"
 
-namespace railfix {
+namespace railfix::line_test {
 namespace {
 
 using ::testing::AllOf;
@@ -181,4 +181,4 @@ TEST_F(Line, ADeviceThatCannotBeIsFoundBeforeItStarts) {
 }
 
 }  // namespace
-}  // namespace railfix
+}  // namespace railfix::line_test

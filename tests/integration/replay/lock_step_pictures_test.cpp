@@ -4,7 +4,7 @@
 
 #include "integration/replay/lock_step_train.hpp"
 
-namespace railfix {
+namespace railfix::lock_step_pictures_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -59,4 +59,4 @@ TEST_F(LockStepReplayOfPictures, GivesTheSamePositionsByteForByte) {
 }
 
 }  // namespace
-}  // namespace railfix
+}  // namespace railfix::lock_step_pictures_test

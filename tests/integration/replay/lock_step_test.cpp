@@ -5,7 +5,7 @@
 #include "integration/replay/lock_step_train.hpp"
 #include "integration/replay/recorded_ride.hpp"
 
-namespace railfix {
+namespace railfix::lock_step_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -46,4 +46,4 @@ TEST_F(LockStepReplay, GivesTheSamePositionsByteForByte) {
 }
 
 }  // namespace
-}  // namespace railfix
+}  // namespace railfix::lock_step_test

@@ -6,7 +6,7 @@
 #include "support/on_train.hpp"
 #include "support/program.hpp"
 
-namespace railfix {
+namespace railfix::replay_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -202,4 +202,4 @@ TEST_F(Replay, RefusesWhatCannotBeMeant) {
 }
 
 }  // namespace
-}  // namespace railfix
+}  // namespace railfix::replay_test

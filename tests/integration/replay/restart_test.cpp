@@ -5,7 +5,7 @@
 #include "support/on_train.hpp"
 #include "support/program.hpp"
 
-namespace railfix {
+namespace railfix::restart_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -97,4 +97,4 @@ TEST_F(MovedReplay, BeginsAnewWhereTheDataGoesOn) {
 }
 
 }  // namespace
-}  // namespace railfix
+}  // namespace railfix::restart_test

@@ -19,7 +19,7 @@
 #include "support/two_hosts.hpp"
 #include "train/keys.hpp"
 
-namespace railfix {
+namespace railfix::on_the_wire_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -161,4 +161,4 @@ TEST_F(OnTheWire, PicturesOfASecuredTrainAreSharedInMemoryAsTheyAre) {
 }
 
 }  // namespace
-}  // namespace railfix
+}  // namespace railfix::on_the_wire_test

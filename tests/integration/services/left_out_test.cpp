@@ -8,7 +8,7 @@
 #include "messaging/topics.hpp"
 #include "support/lock_step.hpp"
 
-namespace railfix {
+namespace railfix::left_out_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -77,4 +77,4 @@ TEST_F(FusionLeavesOut, WhatComesTooLateAndWhatIsFarAhead) {
 }
 
 }  // namespace
-}  // namespace railfix
+}  // namespace railfix::left_out_test

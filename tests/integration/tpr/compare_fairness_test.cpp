@@ -13,7 +13,7 @@
 #include "support/program.hpp"
 #include "track/map.hpp"
 
-namespace railfix {
+namespace railfix::compare_fairness_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -242,4 +242,4 @@ TEST_F(TprCompareFairness, AStandstillCountsOnce) {
 }
 
 }  // namespace
-}  // namespace railfix
+}  // namespace railfix::compare_fairness_test

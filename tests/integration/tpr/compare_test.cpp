@@ -7,7 +7,7 @@
 #include "integration/tpr/tpr_service.hpp"
 #include "support/program.hpp"
 
-namespace railfix {
+namespace railfix::compare_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -315,4 +315,4 @@ TEST_F(TprService, IsComparedWhileItRuns) {
 }
 
 }  // namespace
-}  // namespace railfix
+}  // namespace railfix::compare_test

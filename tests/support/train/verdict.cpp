@@ -11,7 +11,7 @@ namespace railfix::train {
 namespace {
 
 constexpr double kFollowedM = 1e4;  // a state elsewhere is not followed any further
-constexpr double kTickS = 0.1;
+constexpr double kJudgedEveryS = 0.1;
 
 // Words by which the state's reason names a sensor.
 const char* name_in_reason(Sensor sensor) {
@@ -147,7 +147,7 @@ Verdict judge(const TrainSimulation& simulation, fusion::Fusion& fusion, double 
   double tick_s = 0;
   for (const auto& arrival : simulation.arrivals) {
     if (arrival.arrival_s > simulation.duration_s()) break;
-    for (; tick_s < arrival.arrival_s; tick_s += kTickS) {
+    for (; tick_s < arrival.arrival_s; tick_s += kJudgedEveryS) {
       if (const auto state = fusion.tick(simulation.stamp_ns(tick_s))) judge.see(*state, tick_s);
     }
     const auto* gnss = std::get_if<fusion::GnssInput>(&arrival.event);

@@ -6,7 +6,7 @@
 
 #include "unit/etcs/random_report.hpp"
 
-namespace railfix::etcs {
+namespace railfix::etcs::report_json_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -110,4 +110,4 @@ TEST(Packet58Json, WrongValuesAreNamed) {
 }
 
 }  // namespace
-}  // namespace railfix::etcs
+}  // namespace railfix::etcs::report_json_test

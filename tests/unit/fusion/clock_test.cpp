@@ -3,7 +3,7 @@
 
 #include "straight_run.hpp"
 
-namespace railfix::fusion {
+namespace railfix::fusion::clock_test {
 namespace {
 
 constexpr double kSpeedMps = 20;
@@ -255,4 +255,4 @@ TEST(Clock, NumbersWhoseSquaresRunOverPromiseNothing) {
 }
 
 }  // namespace
-}  // namespace railfix::fusion
+}  // namespace railfix::fusion::clock_test

@@ -9,7 +9,7 @@
 #include "core/units.hpp"
 #include "straight_run.hpp"
 
-namespace railfix::fusion {
+namespace railfix::fusion::grade_test {
 namespace {
 
 using testing::HasSubstr;
@@ -82,4 +82,4 @@ TEST(Grade, OfTheMapIsTakenOff) {
 }
 
 }  // namespace
-}  // namespace railfix::fusion
+}  // namespace railfix::fusion::grade_test

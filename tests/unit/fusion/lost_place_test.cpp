@@ -6,7 +6,7 @@
 #include "map_matcher/landmark_matcher.hpp"
 #include "straight_run.hpp"
 
-namespace railfix::fusion {
+namespace railfix::fusion::lost_place_test {
 namespace {
 
 constexpr double kPeriodS = 0.1;
@@ -29,7 +29,7 @@ class MastRide {
     const track::EdgePosition start{1, 0, track::Direction::forward};
     path_ = std::make_shared<const track::Path>(core::value_or_throw(track::Path::follow(map, start, 20000, 0)));
     matcher_.emplace(map_matcher::LandmarkParameters{}, path_);
-    fusion_.emplace(core::value_or_throw(Fusion::create({}, map, start)));
+    fusion_.emplace(core::value_or_throw(Fusion::create({.camera_lag_s = kAnyLagS}, map, start)));
   }
 
   void run_to(double place_m) {
@@ -162,4 +162,4 @@ TEST(LostPlace, IsNoneWhereGnssHoldsThePlaceAndTheIntervalHoldsWhatGnssMayBeWron
 }
 
 }  // namespace
-}  // namespace railfix::fusion
+}  // namespace railfix::fusion::lost_place_test

@@ -9,7 +9,7 @@
 #include "simulator/builtin_line.hpp"
 #include "simulator/sensors.hpp"
 
-namespace railfix::fusion {
+namespace railfix::fusion::train_pose_test {
 namespace {
 
 using simulator::Trajectory;
@@ -204,4 +204,4 @@ TEST(TrainPose, HeightsThatAreAGuessAreNone) {
 }
 
 }  // namespace
-}  // namespace railfix::fusion
+}  // namespace railfix::fusion::train_pose_test

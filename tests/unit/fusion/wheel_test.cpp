@@ -11,7 +11,7 @@
 #include "fusion/wheel_noise.hpp"
 #include "straight_run.hpp"
 
-namespace railfix::fusion {
+namespace railfix::fusion::wheel_test {
 namespace {
 
 using testing::HasSubstr;
@@ -334,4 +334,4 @@ TEST(Wheel, TheReasonSaysSinceWhenItIsDistrusted) {
 }
 
 }  // namespace
-}  // namespace railfix::fusion
+}  // namespace railfix::fusion::wheel_test

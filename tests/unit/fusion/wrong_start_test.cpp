@@ -7,7 +7,7 @@
 #include "straight_run.hpp"
 #include "support/train/verdict.hpp"
 
-namespace railfix::fusion {
+namespace railfix::fusion::wrong_start_test {
 namespace {
 
 using testing::HasSubstr;
@@ -266,4 +266,4 @@ INSTANTIATE_TEST_SUITE_P(By, WrongStartRide,
                          [](const auto& one) { return one.param.name; });
 
 }  // namespace
-}  // namespace railfix::fusion
+}  // namespace railfix::fusion::wrong_start_test

@@ -16,7 +16,7 @@ namespace {
 constexpr int kWarmUp = 12;
 
 /// A ride over two balises and a frog of the built-in line.
-class SteadyState : public testing::Test {
+class SteadyState : public ::testing::Test {
  protected:
   SteadyState() {
     auto& camera = options_.camera;

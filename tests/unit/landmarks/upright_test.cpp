@@ -10,7 +10,7 @@
 #include "track_detector/upright_objects.hpp"
 #include "unit/landmarks/seen_along_track.hpp"
 
-namespace railfix::track_detector {
+namespace railfix::track_detector::upright_test {
 namespace {
 
 constexpr double kStepM = 0.7;
@@ -424,4 +424,4 @@ TEST(Platforms, WhatLiesOnTheGroundIsNone) {
 }
 
 }  // namespace
-}  // namespace railfix::track_detector
+}  // namespace railfix::track_detector::upright_test

@@ -6,7 +6,7 @@
 #include "core/units.hpp"
 #include "map_matcher/map_matcher.hpp"
 
-namespace railfix::map_matcher {
+namespace railfix::map_matcher::beside_doubt_test {
 namespace {
 
 using testing::HasSubstr;
@@ -191,4 +191,4 @@ INSTANTIATE_TEST_SUITE_P(Drawn, Beside, testing::Bool(),
                          [](const auto& drawn) { return drawn.param ? "Against" : "Along"; });
 
 }  // namespace
-}  // namespace railfix::map_matcher
+}  // namespace railfix::map_matcher::beside_doubt_test

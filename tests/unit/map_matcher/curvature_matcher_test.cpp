@@ -9,7 +9,7 @@
 #include "map_matcher/shape/curve_exit_matcher.hpp"
 #include "support/sensed_ride.hpp"
 
-namespace railfix::map_matcher {
+namespace railfix::map_matcher::curvature_matcher_test {
 namespace {
 
 std::shared_ptr<const track::Path> line_of(const std::vector<track::Element>& elements) {
@@ -300,4 +300,4 @@ TEST(CurvatureMatcher, ForgetsWhatCameBeforeTheCameraWasBlind) {
 }
 
 }  // namespace
-}  // namespace railfix::map_matcher
+}  // namespace railfix::map_matcher::curvature_matcher_test

@@ -11,7 +11,7 @@
 #include "fork_map.hpp"
 #include "fusion/fusion_parameters.hpp"
 
-namespace railfix::map_matcher {
+namespace railfix::map_matcher::gnss_search_test {
 namespace {
 
 constexpr double kSpeedMps = 15;
@@ -246,4 +246,4 @@ TEST(GnssSearch, HoldsTheTrainWithinFourSigma) {
 }
 
 }  // namespace
-}  // namespace railfix::map_matcher
+}  // namespace railfix::map_matcher::gnss_search_test

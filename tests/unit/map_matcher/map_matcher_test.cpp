@@ -10,7 +10,7 @@
 #include "core/time.hpp"
 #include "unit/map_matcher/fork_map.hpp"
 
-namespace railfix::map_matcher {
+namespace railfix::map_matcher::map_matcher_test {
 namespace {
 
 using testing::HasSubstr;
@@ -166,4 +166,4 @@ TEST(MapMatcher, WithoutAMapSaysWhy) {
 }
 
 }  // namespace
-}  // namespace railfix::map_matcher
+}  // namespace railfix::map_matcher::map_matcher_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace railfix::map_matcher {
+namespace railfix::map_matcher::measured_run_test {
 namespace {
 
 constexpr double kCurvaturePerM = 1 / 400.0;
@@ -98,4 +98,4 @@ TEST(MeasuredRun, AsternALandmarkInFrontLiesOnTheWayBehind) {
 }
 
 }  // namespace
-}  // namespace railfix::map_matcher
+}  // namespace railfix::map_matcher::measured_run_test

@@ -7,7 +7,7 @@
 
 #include "core/time.hpp"
 
-namespace railfix::map_matcher {
+namespace railfix::map_matcher::step_chain_test {
 namespace {
 
 constexpr double kPeriodS = 0.1;
@@ -93,4 +93,4 @@ TEST(StepChain, BlindPicturesAndStampsThatGoBackBreakIt) {
 }
 
 }  // namespace
-}  // namespace railfix::map_matcher
+}  // namespace railfix::map_matcher::step_chain_test

@@ -5,7 +5,7 @@
 #include "monitor/cab_watch.hpp"
 #include "monitor/map_api.hpp"
 
-namespace railfix::monitor {
+namespace railfix::monitor::cab_test {
 namespace {
 
 using track::EdgePosition;
@@ -201,4 +201,4 @@ TEST_F(OnALine, DrawsInPixelsOfThePreview) {
 }
 
 }  // namespace
-}  // namespace railfix::monitor
+}  // namespace railfix::monitor::cab_test

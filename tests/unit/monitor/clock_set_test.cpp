@@ -8,7 +8,7 @@
 #include "monitor/newest.hpp"
 #include "monitor/topic_statistics.hpp"
 
-namespace railfix::monitor {
+namespace railfix::monitor::clock_set_test {
 namespace {
 
 constexpr int64_t kWall_ns = 1'700'000'000 * core::kNsPerSecond;
@@ -71,4 +71,4 @@ TEST(ClockSet, AServiceIsInItsStateSinceATimeOfTheClockAsItIsNow) {
 }
 
 }  // namespace
-}  // namespace railfix::monitor
+}  // namespace railfix::monitor::clock_set_test

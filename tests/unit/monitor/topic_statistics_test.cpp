@@ -6,7 +6,7 @@
 
 #include "core/time.hpp"
 
-namespace railfix::monitor {
+namespace railfix::monitor::topic_statistics_test {
 namespace {
 
 constexpr int64_t kBegin_ns = 1'700'000'000 * core::kNsPerSecond;
@@ -82,4 +82,4 @@ TEST(TopicStatistics, TellsLatencyByPercentileAndBucket) {
 }
 
 }  // namespace
-}  // namespace railfix::monitor
+}  // namespace railfix::monitor::topic_statistics_test

@@ -7,7 +7,7 @@
 #include "core/random.hpp"
 #include "core/time.hpp"
 
-namespace railfix::odometry {
+namespace railfix::odometry::standstill_test {
 namespace {
 
 constexpr double kRate = 60;
@@ -81,4 +81,4 @@ TEST(Standstill, ADepartureAtOnceIsSeenAtOnce) {
 }
 
 }  // namespace
-}  // namespace railfix::odometry
+}  // namespace railfix::odometry::standstill_test

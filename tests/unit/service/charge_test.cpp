@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-namespace railfix::service {
+namespace railfix::service::charge_test {
 namespace {
 
 constexpr int64_t kMs = 1'000'000;
@@ -368,4 +368,4 @@ TEST(Charge, AnyRowOfFailuresLeavesOneThatSpeaks) {
 }
 
 }  // namespace
-}  // namespace railfix::service
+}  // namespace railfix::service::charge_test

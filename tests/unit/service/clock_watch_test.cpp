@@ -5,7 +5,7 @@
 
 #include "core/time.hpp"
 
-namespace railfix::service {
+namespace railfix::service::clock_watch_test {
 namespace {
 
 constexpr int64_t kMs = 1'000'000;
@@ -109,4 +109,4 @@ TEST_F(ClockWatchTest, SaysWhenNobodyKeepsTheClockAnyMore) {
 }
 
 }  // namespace
-}  // namespace railfix::service
+}  // namespace railfix::service::clock_watch_test

@@ -4,7 +4,7 @@
 
 #include <optional>
 
-namespace railfix::service {
+namespace railfix::service::data_time_test {
 namespace {
 
 constexpr int64_t kMs = 1'000'000;
@@ -50,4 +50,4 @@ TEST_F(DataTimeTest, StandsInLockStepAndBehindTheEnd) {
 }
 
 }  // namespace
-}  // namespace railfix::service
+}  // namespace railfix::service::data_time_test

@@ -7,7 +7,7 @@
 #include "core/units.hpp"
 #include "scene.hpp"
 
-namespace railfix::simulator {
+namespace railfix::simulator::sensors_test {
 namespace {
 
 const geometry::CameraPose kMount{0.0, 0.2094, 0.0, 0.0, 2.5};
@@ -114,4 +114,4 @@ TEST(Gnss, NearTheTruthAndSilentInTheTunnel) {
 }
 
 }  // namespace
-}  // namespace railfix::simulator
+}  // namespace railfix::simulator::sensors_test

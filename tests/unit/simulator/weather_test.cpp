@@ -6,7 +6,7 @@
 #include "scene.hpp"
 #include "simulator/illumination.hpp"
 
-namespace railfix::simulator {
+namespace railfix::simulator::weather_test {
 namespace {
 
 // A picture without noise.
@@ -190,4 +190,4 @@ TEST(Visibility, IsOneByDayAndLessWhereThePictureIsWashedOut) {
 }
 
 }  // namespace
-}  // namespace railfix::simulator
+}  // namespace railfix::simulator::weather_test

@@ -140,7 +140,7 @@ TEST(RailFit, ReachesTheCramerRaoBoundInThePapersExtremeCase) {
   beta.expect_reached("beta");
 }
 
-const Intrinsics kCab{1200, 1200, 639.5, 511.5, -0.05, 0.01, 1e-4, -2e-4, 1280, 1024};
+const Intrinsics kDistortedCab{1200, 1200, 639.5, 511.5, -0.05, 0.01, 1e-4, -2e-4, 1280, 1024};
 
 struct CabCase {
   TrackShape mount;
@@ -166,9 +166,9 @@ TEST(RailFit, ReachesTheCramerRaoBoundWithNoise) {
     ShapeVector truth = to_vector(cab.mount);
     for (int k = 0; k < 7; ++k) truth(k) += sigma(k) * (k == 5 ? 0.3 : 1.0) * random.normal();
     if (std::abs(truth(5)) > 0.005) truth(5) = 0.005;
-    auto points = exact_points(kCab, to_shape(truth), 1.435, 7, 40, 40, false, 0.5);
+    auto points = exact_points(kDistortedCab, to_shape(truth), 1.435, 7, 40, 40, false, 0.5);
     for (auto& point : points) point.pixel += 0.5 * Eigen::Vector2d(random.normal(), random.normal());
-    const auto fit = fit_rails(kCab, points, cab.mount, cab.options);
+    const auto fit = fit_rails(kDistortedCab, points, cab.mount, cab.options);
     ASSERT_TRUE(fit.converged) << draw;
     const Eigen::Matrix<double, 7, 1> error = (to_vector(fit.shape) - truth).head<7>();
     error_squares += error.cwiseAbs2();
@@ -185,12 +185,12 @@ TEST(RailFit, OneFifthOfWildPointsDoesNotPullTheFit) {
   TrackShape truth = cab.mount;
   truth.camera.pitch_rad += rad_from_deg(0.4);
   truth.curvature_per_m = 1.0 / 400;
-  auto points = exact_points(kCab, truth, 1.435, 7, 40, 40, false, 0.5);
+  auto points = exact_points(kDistortedCab, truth, 1.435, 7, 40, 40, false, 0.5);
   Random random(3);
   for (size_t i = 0; i < points.size(); ++i) {
     points[i].pixel.x() += i % 5 == 0 ? 12.0 : 0.3 * random.normal();
   }
-  const auto fit = fit_rails(kCab, points, cab.mount, cab.options);
+  const auto fit = fit_rails(kDistortedCab, points, cab.mount, cab.options);
   EXPECT_NEAR(fit.shape.curvature_per_m, truth.curvature_per_m, 1e-4);
   EXPECT_NEAR(fit.inliers, 0.8, 0.05);
 }
@@ -198,21 +198,21 @@ TEST(RailFit, OneFifthOfWildPointsDoesNotPullTheFit) {
 TEST(RailFit, StraightRailsFixFourNumbersAndTheConditionSaysSo) {
   const CabCase cab;
   const auto straight =
-      fit_rails(kCab, exact_points(kCab, cab.mount, 1.435, 7, 40, 40, false, 0.5), cab.mount, cab.options);
+      fit_rails(kDistortedCab, exact_points(kDistortedCab, cab.mount, 1.435, 7, 40, 40, false, 0.5), cab.mount, cab.options);
   EXPECT_GT(straight.condition, 1e6);
   // What the rails do not fix keeps its prior: lateral and roll trade off, the height is fixed by the gauge.
   EXPECT_GT(std::sqrt(straight.covariance(0, 0)), 0.7 * cab.options.prior_sigma.roll_rad);
   EXPECT_LT(std::sqrt(straight.covariance(4, 4)), 0.5 * cab.options.prior_sigma.height_m);
   const auto known =
-      fit_rails(kCab, exact_points(kCab, cab.mount, 1.435, 7, 40, 40, true, 0.5), cab.mount, cab.options);
+      fit_rails(kDistortedCab, exact_points(kDistortedCab, cab.mount, 1.435, 7, 40, 40, true, 0.5), cab.mount, cab.options);
   EXPECT_LT(known.condition, straight.condition);
 }
 
 TEST(RailFit, OneRailAloneKeepsTheRestAtThePrior) {
   const CabCase cab;
-  auto points = exact_points(kCab, cab.mount, 1.435, 7, 40, 40, false, 0.5);
+  auto points = exact_points(kDistortedCab, cab.mount, 1.435, 7, 40, 40, false, 0.5);
   points.resize(40);
-  const auto fit = fit_rails(kCab, points, cab.mount, cab.options);
+  const auto fit = fit_rails(kDistortedCab, points, cab.mount, cab.options);
   EXPECT_TRUE(fit.converged);
   EXPECT_NEAR(std::sqrt(fit.covariance(4, 4)), cab.options.prior_sigma.height_m, 0.005);
 }
@@ -226,9 +226,9 @@ TEST(RailFit, TakesTheSigmasFromTheResiduals) {
   double squares = 0;
   constexpr int kDraws = 200;
   for (int draw = 0; draw < kDraws; ++draw) {
-    auto points = exact_points(kCab, cab.mount, 1.435, 7, 40, 40, false, 0.5);
+    auto points = exact_points(kDistortedCab, cab.mount, 1.435, 7, 40, 40, false, 0.5);
     for (auto& point : points) point.pixel += 0.1 * Eigen::Vector2d(random.normal(), random.normal());
-    const auto fit = fit_rails(kCab, points, cab.mount, cab.options);
+    const auto fit = fit_rails(kDistortedCab, points, cab.mount, cab.options);
     EXPECT_NEAR(fit.sigma_factor, 0.2, 0.1);
     squares += std::pow(fit.shape.camera.height_m - 2.5, 2) / fit.covariance(4, 4);
   }
@@ -237,10 +237,10 @@ TEST(RailFit, TakesTheSigmasFromTheResiduals) {
 
 TEST(RailFit, AnOffsetOfAWholeRailWidensTheHeight) {
   CabCase cab;
-  const auto points = exact_points(kCab, cab.mount, 1.435, 7, 40, 40, false, 0.05);
-  const auto exact = fit_rails(kCab, points, cab.mount, cab.options);
+  const auto points = exact_points(kDistortedCab, cab.mount, 1.435, 7, 40, 40, false, 0.05);
+  const auto exact = fit_rails(kDistortedCab, points, cab.mount, cab.options);
   cab.options.rail_offset_sigma_m = 0.002;
-  const auto worn = fit_rails(kCab, points, cab.mount, cab.options);
+  const auto worn = fit_rails(kDistortedCab, points, cab.mount, cab.options);
   const double expected_m = 2.5 * std::sqrt(2.0) * 0.002 / 1.435;
   EXPECT_NEAR(std::sqrt(worn.covariance(4, 4) - exact.covariance(4, 4)), expected_m, 0.2 * expected_m);
 }
@@ -288,7 +288,7 @@ TEST(RailFit, ASwitchIsNotTakenForACantRamp) {
 
 TEST(RailFit, NoPointsGiveThePriorBack) {
   const CabCase cab;
-  const auto fit = fit_rails(kCab, {}, cab.mount, cab.options);
+  const auto fit = fit_rails(kDistortedCab, {}, cab.mount, cab.options);
   EXPECT_NEAR(fit.shape.camera.height_m, 2.5, 1e-9);
   EXPECT_EQ(fit.inliers, 0);
 }

@@ -10,7 +10,7 @@ namespace railfix::track {
 namespace {
 
 constexpr double kClosestPointsM = 2.0;
-constexpr double kSharpestPerM = 1.0 / 15.0;
+constexpr double kSharpestBiarcPerM = 1.0 / 15.0;
 
 struct Arc {
   Element element;
@@ -97,7 +97,7 @@ class Fitter {
       const Arc second = arc_to(middle, direction_of(half.heading_rad), to);
       const double sharpest =
           std::max(std::abs(first.element.curvature_start_per_m), std::abs(second.element.curvature_start_per_m));
-      if (sharpest < kSharpestPerM && first.element.length_m > 1e-3 && second.element.length_m > 1e-3) {
+      if (sharpest < kSharpestBiarcPerM && first.element.length_m > 1e-3 && second.element.length_m > 1e-3) {
         take(first, from, to, out);
         take(second, from, to, out);
         return;

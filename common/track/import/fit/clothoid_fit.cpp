@@ -19,8 +19,8 @@ constexpr double kUsualWeighs = 4;    // points
 constexpr size_t kMostPoints = 1500;  // the cost grows with their third power
 constexpr double kLeastSigmaM = 0.02;
 constexpr double kShortestM = 3.0;
-constexpr double kSharpestPerM = 1.0 / 50.0;
-constexpr int kSteps = 12;
+constexpr double kSharpestFitPerM = 1.0 / 50.0;
+constexpr int kFitSteps = 12;
 constexpr int kClosingSteps = 5;
 constexpr double kCurvatureStep = 1e-9;
 
@@ -43,7 +43,7 @@ class Refiner {
     Eigen::VectorXd residual = residuals(best_);
     double cost = residual.squaredNorm();
     double damping = 1e-3;
-    for (int step = 0; step < kSteps; ++step) {
+    for (int step = 0; step < kFitSteps; ++step) {
       const Eigen::MatrixXd jacobian = derivatives(residual);
       Eigen::MatrixXd normal = jacobian.transpose() * jacobian;
       normal.diagonal() *= 1.0 + damping;
@@ -230,8 +230,8 @@ bool bows_out(const Alignment& track, const std::vector<Eigen::Vector2d>& points
 
 bool is_track(const Alignment& track) {
   return std::all_of(track.elements().begin(), track.elements().end(), [](const Element& element) {
-    return std::isfinite(element.length_m) && std::abs(element.curvature_start_per_m) < kSharpestPerM &&
-           std::abs(element.curvature_end_per_m) < kSharpestPerM;
+    return std::isfinite(element.length_m) && std::abs(element.curvature_start_per_m) < kSharpestFitPerM &&
+           std::abs(element.curvature_end_per_m) < kSharpestFitPerM;
   });
 }
 

@@ -16,7 +16,7 @@ constexpr double kSparseM = 50.0;     // between points farther apart there are 
 constexpr size_t kMostExtra = 3;      // ... so many
 constexpr double kDoneSigmas = 1e-3;  // of the largest change
 constexpr double kSlopeSigma = 1e-4;  // change of the curvature's rate at a knot, per metre squared
-constexpr int kSteps = 6;
+constexpr int kProfileSteps = 6;
 constexpr double kWald = 25.0;  // five sigma: chosen on made-up lines
 
 /// Knots on the chords, curvature from the turn at every point.
@@ -341,7 +341,7 @@ Eigen::VectorXd distances_of(const Alignment& track, const std::vector<Eigen::Ve
 
 CurvatureProfile dense_profile(const CurvatureTarget& target, Eigen::MatrixXd& covariance) {
   CurvatureProfile profile = first_guess(target);
-  for (int step = 0; step < kSteps; ++step) {
+  for (int step = 0; step < kProfileSteps; ++step) {
     const Eigen::VectorXd change = Problem(target, profile).solve(covariance);
     if (!change.allFinite()) break;
     profile.start.heading_rad -= change[0];

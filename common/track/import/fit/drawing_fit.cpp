@@ -15,7 +15,7 @@ using Points = std::vector<Eigen::Vector2d>;
 constexpr size_t kFewestInPart = 8;
 constexpr size_t kMostInPart = 400;     // the cost of a fit grows with their third power
 constexpr ptrdiff_t kBesideSplit = 15;  // points on either side that tell the track's direction there
-constexpr int kMostTries = 4;
+constexpr int kMostFits = 4;
 constexpr ptrdiff_t kOneOutlier = 3;  // neighbours whose error is that of the worst among them
 
 /// Points that lie apart by more than the limit, of each group of neighbours the worst; never the first and last.
@@ -50,7 +50,7 @@ std::optional<ClothoidFit> fit_without_outliers(const Points& points, const Clot
   const size_t most = std::max<size_t>(1, points.size() / 10);
   Points rest = points;
   Points left_out;
-  for (int attempt = 0; attempt < kMostTries; ++attempt) {
+  for (int attempt = 0; attempt < kMostFits; ++attempt) {
     std::vector<double> off_m;
     const double sigma_m = std::max(scatter_of(rest), options.usual_sigma_m);
     std::vector<size_t> outliers = outliers_of(apart_from_neighbours(rest), fit_limit_m(sigma_m));

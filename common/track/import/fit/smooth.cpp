@@ -12,7 +12,7 @@ namespace {
 constexpr double kFixedWeight = 1e8;   // of the end points, against 1 of the others
 constexpr double kLongestWaveM = 150;  // shorter bends are drawn by hand, longer ones are real
 constexpr double kEasing = 1.2;
-constexpr int kMostTries = 40;
+constexpr int kMostSmoothings = 40;
 
 using SparseMatrix = Eigen::SparseMatrix<double>;
 
@@ -54,7 +54,7 @@ std::vector<Eigen::Vector2d> smoothed(const std::vector<Eigen::Vector2d>& points
 
   const double length = (drawn.bottomRows(count - 1) - drawn.topRows(count - 1)).rowwise().norm().sum();
   const double stiffness = std::pow(kLongestWaveM / (2.0 * core::kPi), 6.0) * static_cast<double>(count) / length;
-  for (int attempt = 0; attempt < kMostTries; ++attempt) {
+  for (int attempt = 0; attempt < kMostSmoothings; ++attempt) {
     SparseMatrix system = stiffness * roughness;
     system.diagonal() += weight;
     const Eigen::SimplicialLDLT<SparseMatrix> solver(system);

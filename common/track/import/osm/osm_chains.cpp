@@ -14,7 +14,7 @@
 namespace railfix::track {
 namespace {
 
-constexpr size_t kMostNamed = 5;
+constexpr size_t kMostStraysNamed = 5;
 constexpr const char* kAskForNodes =
     "extract the ways together with their nodes, from Overpass by (._;>;); or by out geom;";
 
@@ -70,7 +70,7 @@ class Tracer {
   /// One sentence for all: of a region that is cut out, every way over its border lacks nodes.
   static std::string told_missing(const std::vector<int64_t>& ways, size_t nodes) {
     std::string names;
-    const size_t named = std::min(kMostNamed, ways.size());
+    const size_t named = std::min(kMostStraysNamed, ways.size());
     for (size_t i = 0; i < named; ++i) names += (i == 0 ? "way " : ", way ") + std::to_string(ways[i]);
     if (ways.size() > named) names += " and " + std::to_string(ways.size() - named) + " more ways";
     return names + (ways.size() == 1 ? " names " : " name ") + std::to_string(nodes) +
@@ -85,16 +85,16 @@ class Tracer {
       for (const size_t segment : segments) neighbours[node].push_back(other_end(segment, node));
     }
     const std::vector<StrayNode> stray = stray_nodes(places_, neighbours);
-    for (size_t i = 0; i < std::min(kMostNamed, stray.size()); ++i) {
+    for (size_t i = 0; i < std::min(kMostStraysNamed, stray.size()); ++i) {
       const auto& [node, off_m] = stray[i];
       const int64_t way = data_.ways[segments_[at_node_.at(node).front()].way].id;
       out_.cuts.push_back(called(node, data_.nodes.at(node).place, way) + " lies " + told_m(off_m) +
                           " off the line between its neighbours, as no track runs: correct its place in the source, or "
                           "take it out of the way");
     }
-    if (stray.size() > kMostNamed)
-      out_.cuts.push_back(std::to_string(stray.size() - kMostNamed) + " more nodes lie up to " +
-                          told_m(stray[kMostNamed].off_m) + " off the line between their neighbours");
+    if (stray.size() > kMostStraysNamed)
+      out_.cuts.push_back(std::to_string(stray.size() - kMostStraysNamed) + " more nodes lie up to " +
+                          told_m(stray[kMostStraysNamed].off_m) + " off the line between their neighbours");
   }
 
   bool place(int64_t node) {

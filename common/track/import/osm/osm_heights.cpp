@@ -20,7 +20,7 @@ constexpr double kHighestM = 5500;
 constexpr double kHeightToldM = 3;  // of whole metres, of the ground or the rails, over sums of rounded grades
 constexpr double kLevelM = 0.05;
 constexpr double kSamePointM = 1e-6;
-constexpr size_t kMostNamed = 5;
+constexpr size_t kMostCutsNamed = 5;
 
 /// A number and what stands behind it; nothing where it begins with none.
 std::optional<std::pair<double, std::string>> number_and_unit(const std::string& text) {
@@ -182,15 +182,15 @@ class OsmHeights {
   void tell_contradictions() {
     std::erase_if(off_m_, [](const auto& off) { return std::abs(off.first) < kHeightToldM; });
     std::ranges::stable_sort(off_m_, std::greater{}, [](const auto& off) { return std::abs(off.first); });
-    for (size_t i = 0; i < std::min(kMostNamed, off_m_.size()); ++i) {
+    for (size_t i = 0; i < std::min(kMostCutsNamed, off_m_.size()); ++i) {
       const auto& [off, told] = off_m_[i];
       problems_.push_back(
           called(told->node, data_.nodes.at(told->node).place, told->way) + " has a height (ele) of " +
           told_m(told->height_m) + ", " + told_m(std::abs(off)) + (off > 0 ? " above" : " below") +
           " where the inclines put it, in the middle of what all nodes with one say; the inclines count");
     }
-    if (off_m_.size() > kMostNamed)
-      problems_.push_back(std::to_string(off_m_.size() - kMostNamed) +
+    if (off_m_.size() > kMostCutsNamed)
+      problems_.push_back(std::to_string(off_m_.size() - kMostCutsNamed) +
                           " more nodes have a height (ele) that the inclines contradict, by less");
   }
 

@@ -17,9 +17,9 @@ constexpr double kSurveyedM = 0.5;
 constexpr double kNearCoordinateM = 0.1;
 constexpr double kOnEdgeM = 0.01;
 
-class Reader {
+class ErjuReader {
  public:
-  Reader(const std::filesystem::path& infra, const std::filesystem::path* map) : infra_(infra), edges_(infra_, net_) {
+  ErjuReader(const std::filesystem::path& infra, const std::filesystem::path* map) : infra_(infra), edges_(infra_, net_) {
     if (map != nullptr) map_.emplace(*map);
   }
 
@@ -265,7 +265,7 @@ class Reader {
 
 core::Result<RailNet> read_erju(const std::filesystem::path& infra, const std::filesystem::path* map) {
   try {
-    return Reader(infra, map).read();
+    return ErjuReader(infra, map).read();
   } catch (const core::BadInput& bad) {
     return core::Error{bad.what()};
   }

@@ -22,9 +22,9 @@ constexpr double kToldOutsideM = 1.0;
 constexpr size_t kMostProblems = 200;
 
 /// Reads one document; errors are thrown as BadInput inside and become values at the door.
-class Reader {
+class LandXmlReader {
  public:
-  explicit Reader(const std::filesystem::path& file) : source_(file) {}
+  explicit LandXmlReader(const std::filesystem::path& file) : source_(file) {}
 
   LandXml read() {
     const pugi::xml_node root = source_.root();
@@ -353,7 +353,7 @@ ClosedElement close_element(const Eigen::Vector2d& from, const Eigen::Vector2d& 
 
 core::Result<LandXml> read_landxml(const std::filesystem::path& file) {
   try {
-    return Reader(file).read();
+    return LandXmlReader(file).read();
   } catch (const core::BadInput& bad) {
     return core::Error{bad.what()};
   }

@@ -31,9 +31,9 @@ struct Connector {
   pugi::xml_node node{};
 };
 
-class Reader {
+class Railml2Reader {
  public:
-  explicit Reader(const XmlSource& source) : source_(source), coordinates_(source) {}
+  explicit Railml2Reader(const XmlSource& source) : source_(source), coordinates_(source) {}
 
   RailNet read() {
     special_profiles_ = special_speed_profiles(source_);
@@ -336,7 +336,7 @@ class Reader {
 }  // namespace
 
 RailNet read_railml2(const XmlSource& source) {
-  return Reader(source).read();
+  return Railml2Reader(source).read();
 }
 
 }  // namespace railfix::track

@@ -8,14 +8,14 @@
 namespace railfix::track {
 namespace {
 
-struct PlacedBalise {
+struct Railml2PlacedBalise {
   TrackMark mark;
   pugi::xml_node node;
 };
 
-class Reader {
+class Railml2BaliseReader {
  public:
-  Reader(const XmlSource& source, NetTrack& track, std::vector<std::string>& problems)
+  Railml2BaliseReader(const XmlSource& source, NetTrack& track, std::vector<std::string>& problems)
       : source_(source), track_(track), problems_(problems) {}
 
   void read(const pugi::xml_node& balises, double origin_m) {
@@ -34,14 +34,14 @@ class Reader {
     const TrackMark mark{LandmarkKind::balise, std::clamp(at_m, 0.0, track_.length_m), 0, kRailmlSigmaM,
                          railml_name(balise)};
     // A second one of that id is told for the whole file; it belongs to no group.
-    if (!by_id_.emplace(balise.attribute("id").value(), PlacedBalise{mark, balise}).second)
+    if (!by_id_.emplace(balise.attribute("id").value(), Railml2PlacedBalise{mark, balise}).second)
       track_.track.marks.push_back(mark);
   }
 
   void read_group(const pugi::xml_node& node) {
     const std::optional<EtcsIdentity> identity = etcs_identity(source_, node);
     bool has_reference = true;
-    const std::vector<PlacedBalise> balises = balises_of(node, has_reference);
+    const std::vector<Railml2PlacedBalise> balises = balises_of(node, has_reference);
     if (balises.empty()) {
       tell(node, "has no balises on its track");
     } else if (!identity) {
@@ -56,13 +56,13 @@ class Reader {
   }
 
   /// In the order of the group. Takes them out of those that belong to none.
-  std::vector<PlacedBalise> balises_of(const pugi::xml_node& group, bool& has_reference) {
+  std::vector<Railml2PlacedBalise> balises_of(const pugi::xml_node& group, bool& has_reference) {
     std::vector<std::pair<double, std::string>> order;
     for (const pugi::xml_node& ref : group.children("baliseRef"))
       order.emplace_back(source_.number(ref, "sequence").value_or(0), ref.attribute("ref").value());
     std::stable_sort(order.begin(), order.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
     has_reference = order.empty() || order.front().first <= kLastReferenceNumber;
-    std::vector<PlacedBalise> balises;
+    std::vector<Railml2PlacedBalise> balises;
     for (const auto& [sequence, id] : order) {
       const auto found = by_id_.find(id);
       if (found == by_id_.end()) {
@@ -76,10 +76,10 @@ class Reader {
     return balises;
   }
 
-  void add_group(const pugi::xml_node& node, const EtcsIdentity& identity, const std::vector<PlacedBalise>& balises) {
+  void add_group(const pugi::xml_node& node, const EtcsIdentity& identity, const std::vector<Railml2PlacedBalise>& balises) {
     const double at_m = balises.front().mark.offset_m;
     TrackGroup group{identity.nid_c, identity.nid_bg, at_m, true, kRailmlSigmaM, {}};
-    for (const PlacedBalise& balise : balises) group.balises.push_back(balise.mark);
+    for (const Railml2PlacedBalise& balise : balises) group.balises.push_back(balise.mark);
     const std::string direction = balises.front().node.attribute("dir").value();
     if (const std::optional<bool> ordered = nominal_by_order(group.balises)) {
       group.nominal_is_forward = *ordered;
@@ -94,8 +94,8 @@ class Reader {
     track_.track.groups.push_back(std::move(group));
   }
 
-  void keep_as_landmarks(const std::vector<PlacedBalise>& balises) {
-    for (const PlacedBalise& balise : balises) track_.track.marks.push_back(balise.mark);
+  void keep_as_landmarks(const std::vector<Railml2PlacedBalise>& balises) {
+    for (const Railml2PlacedBalise& balise : balises) track_.track.marks.push_back(balise.mark);
   }
 
   void tell(const pugi::xml_node& group, const std::string& what) {
@@ -105,14 +105,14 @@ class Reader {
   const XmlSource& source_;
   NetTrack& track_;
   std::vector<std::string>& problems_;
-  std::map<std::string, PlacedBalise> by_id_;  // on the track, in no group yet
+  std::map<std::string, Railml2PlacedBalise> by_id_;  // on the track, in no group yet
 };
 
 }  // namespace
 
 void read_balises2(const XmlSource& source, const pugi::xml_node& balises, double origin_m, NetTrack& track,
                    std::vector<std::string>& problems) {
-  Reader(source, track, problems).read(balises, origin_m);
+  Railml2BaliseReader(source, track, problems).read(balises, origin_m);
 }
 
 }  // namespace railfix::track

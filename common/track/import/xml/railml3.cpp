@@ -13,9 +13,9 @@
 namespace railfix::track {
 namespace {
 
-class Reader {
+class Railml3Reader {
  public:
-  explicit Reader(const XmlSource& source) : source_(source), places_(source, net_), plane_(source) {}
+  explicit Railml3Reader(const XmlSource& source) : source_(source), places_(source, net_), plane_(source) {}
 
   RailNet read() {
     read_systems();
@@ -286,7 +286,7 @@ class Reader {
 }  // namespace
 
 RailNet read_railml3(const XmlSource& source) {
-  return Reader(source).read();
+  return Railml3Reader(source).read();
 }
 
 }  // namespace railfix::track

@@ -7,7 +7,7 @@
 namespace railfix::track {
 namespace {
 
-struct PlacedBalise {
+struct Railml3PlacedBalise {
   NetPlace place;
   pugi::xml_node node;
   std::optional<double> number;  // in its group
@@ -17,9 +17,9 @@ struct PlacedBalise {
   }
 };
 
-class Reader {
+class Railml3BaliseReader {
  public:
-  Reader(const XmlSource& source, Railml3Places& places, RailNet& net) : source_(source), places_(places), net_(net) {}
+  Railml3BaliseReader(const XmlSource& source, Railml3Places& places, RailNet& net) : source_(source), places_(places), net_(net) {}
 
   void read() {
     const std::vector<pugi::xml_node> groups = descendants(source_.root(), "baliseGroup");
@@ -48,7 +48,7 @@ class Reader {
 
   void read_group(const pugi::xml_node& node) {
     const auto identity = etcs_identity(source_, node);
-    std::vector<PlacedBalise>& balises = of_group_[node.attribute("id").value()];
+    std::vector<Railml3PlacedBalise>& balises = of_group_[node.attribute("id").value()];
     const std::vector<NetPlace> own = places_.of(node);
     if (balises.empty() && !own.empty()) balises.push_back({own.front(), node, {}});
     if (balises.empty()) {
@@ -59,7 +59,7 @@ class Reader {
       return keep_as_landmarks(node, balises,
                                "has no ETCS identity (countryID and groupID); its balises are kept as landmarks");
     }
-    std::stable_sort(balises.begin(), balises.end(), [](const PlacedBalise& a, const PlacedBalise& b) {
+    std::stable_sort(balises.begin(), balises.end(), [](const Railml3PlacedBalise& a, const Railml3PlacedBalise& b) {
       return a.number && (!b.number || *a.number < *b.number);
     });
     if (balises.front().number.value_or(0) > kLastReferenceNumber) {
@@ -78,30 +78,30 @@ class Reader {
   }
 
   /// Without numbers the first one of the file is the first in nominal direction, unless that is said to be another.
-  static bool is_order_open(const pugi::xml_node& of, const std::vector<PlacedBalise>& balises) {
-    const PlacedBalise& first = balises.front();
+  static bool is_order_open(const pugi::xml_node& of, const std::vector<Railml3PlacedBalise>& balises) {
+    const Railml3PlacedBalise& first = balises.front();
     return !first.number && std::string(of.attribute("mileageDirection").value()) == "reverse" &&
-           std::ranges::any_of(balises, [&](const PlacedBalise& b) { return b.place.track != first.place.track; });
+           std::ranges::any_of(balises, [&](const Railml3PlacedBalise& b) { return b.place.track != first.place.track; });
   }
 
   /// Balises without numbers lie in the nominal direction, one after the other.
-  static void sort_by_place(std::vector<PlacedBalise>& balises, bool forward) {
+  static void sort_by_place(std::vector<Railml3PlacedBalise>& balises, bool forward) {
     const size_t track = balises.front().place.track;
     if (std::any_of(balises.begin(), balises.end(),
-                    [&](const PlacedBalise& balise) { return balise.number || balise.place.track != track; }))
+                    [&](const Railml3PlacedBalise& balise) { return balise.number || balise.place.track != track; }))
       return;
-    std::stable_sort(balises.begin(), balises.end(), [&](const PlacedBalise& a, const PlacedBalise& b) {
+    std::stable_sort(balises.begin(), balises.end(), [&](const Railml3PlacedBalise& a, const Railml3PlacedBalise& b) {
       return forward ? a.place.from_m < b.place.from_m : a.place.from_m > b.place.from_m;
     });
   }
 
   /// A group lies on one track, that of its reference balise.
-  void add_group(const pugi::xml_node& of, const EtcsIdentity& identity, const std::vector<PlacedBalise>& balises,
+  void add_group(const pugi::xml_node& of, const EtcsIdentity& identity, const std::vector<Railml3PlacedBalise>& balises,
                  const std::optional<bool>& said) {
     const NetPlace& first = balises.front().place;
     ImportedTrack& track = net_.tracks[first.track].track;
     std::vector<TrackMark> here;
-    for (const PlacedBalise& balise : balises) {
+    for (const Railml3PlacedBalise& balise : balises) {
       if (balise.place.track == first.track) here.push_back(balise.mark());
     }
     const std::optional<bool> forward = nominal_is_forward(of, here, balises, said);
@@ -111,7 +111,7 @@ class Reader {
           "says no direction: it has no mileageDirection, nor balises at two places; its balises are kept as "
           "landmarks");
     }
-    for (const PlacedBalise& balise : balises) {
+    for (const Railml3PlacedBalise& balise : balises) {
       if (balise.place.track != first.track) keep_as_landmark(balise);
     }
     if (here.size() < balises.size())
@@ -122,10 +122,10 @@ class Reader {
 
   /// By the file's word, else by the order of the balises, else by the direction that they apply to.
   std::optional<bool> nominal_is_forward(const pugi::xml_node& of, const std::vector<TrackMark>& here,
-                                         const std::vector<PlacedBalise>& balises, const std::optional<bool>& said) {
+                                         const std::vector<Railml3PlacedBalise>& balises, const std::optional<bool>& said) {
     // Numbers say the order for certain, that of the file only where nobody else says the direction.
     const bool numbered =
-        std::ranges::all_of(balises, [](const PlacedBalise& balise) { return balise.number.has_value(); });
+        std::ranges::all_of(balises, [](const Railml3PlacedBalise& balise) { return balise.number.has_value(); });
     const std::optional<bool> ordered = nominal_by_order(here);
     if (said) {
       if (numbered && ordered && *ordered != *said)
@@ -139,7 +139,7 @@ class Reader {
 
   /// By mileageDirection, turned where the mileage falls along the track or, where it says none, the place is told
   /// against it.
-  std::optional<bool> said_direction(const pugi::xml_node& of, const std::vector<PlacedBalise>& balises) {
+  std::optional<bool> said_direction(const pugi::xml_node& of, const std::vector<Railml3PlacedBalise>& balises) {
     const std::string direction = of.attribute("mileageDirection").value();
     if (direction != "nominal" && direction != "reverse") return std::nullopt;
     const size_t track = balises.front().place.track;
@@ -155,7 +155,7 @@ class Reader {
   }
 
   [[nodiscard]] std::optional<bool> applied_direction(const pugi::xml_node& of,
-                                                      const std::vector<PlacedBalise>& balises) const {
+                                                      const std::vector<Railml3PlacedBalise>& balises) const {
     for (const pugi::xml_node& node : {of, balises.front().node}) {
       for (const pugi::xml_node& spot : descendants(node, "spotLocation")) {
         if (places_.track(spot.attribute("netElementRef").value()) != balises.front().place.track) continue;
@@ -166,13 +166,13 @@ class Reader {
     return std::nullopt;
   }
 
-  void keep_as_landmarks(const pugi::xml_node& group, const std::vector<PlacedBalise>& balises,
+  void keep_as_landmarks(const pugi::xml_node& group, const std::vector<Railml3PlacedBalise>& balises,
                          const std::string& because) {
     tell(group, because);
-    for (const PlacedBalise& balise : balises) keep_as_landmark(balise);
+    for (const Railml3PlacedBalise& balise : balises) keep_as_landmark(balise);
   }
 
-  void keep_as_landmark(const PlacedBalise& balise) {
+  void keep_as_landmark(const Railml3PlacedBalise& balise) {
     net_.tracks[balise.place.track].track.marks.push_back(balise.mark());
   }
 
@@ -183,13 +183,13 @@ class Reader {
   const XmlSource& source_;
   Railml3Places& places_;
   RailNet& net_;
-  std::map<std::string, std::vector<PlacedBalise>> of_group_;
+  std::map<std::string, std::vector<Railml3PlacedBalise>> of_group_;
 };
 
 }  // namespace
 
 void read_balises3(const XmlSource& source, Railml3Places& places, RailNet& net) {
-  Reader(source, places, net).read();
+  Railml3BaliseReader(source, places, net).read();
 }
 
 }  // namespace railfix::track
