@@ -15,7 +15,8 @@ constexpr double kKeptS = 5.0;
 constexpr double kRatioSigma = 0.03;
 constexpr double kCreepSigma = 0.005;  // a driven axle runs half a per cent ahead at 1 m/s2
 constexpr double kLagSigmaS = 0.15;
-constexpr double kRatioWalk = 1e-4;  // from window to window
+constexpr double kLagTripSigmaS = 0.02;  // a camera that is started anew
+constexpr double kRatioWalk = 1e-4;      // from window to window
 constexpr double kCreepWalk = 2e-5;
 constexpr double kLagWalkS = 3e-4;
 constexpr double kPlayM = 0.005;    // of the wheel's reading, beside its pulses
@@ -33,8 +34,14 @@ Eigen::Vector3d squares(double ratio, double creep, double lag_s) {
 
 CameraLag::CameraLag() : covariance_(squares(kRatioSigma, kCreepSigma, kLagSigmaS).asDiagonal()) {}
 
-CameraLag::Lag CameraLag::lag() const {
-  return {fitted_(2), std::sqrt(covariance_(2, 2))};
+CameraLag::CameraLag(const Lag& before) : CameraLag() {
+  fitted_(2) = before.s;
+  covariance_(2, 2) = std::min(covariance_(2, 2), std::pow(std::hypot(before.sigma_s, kLagTripSigmaS), 2));
+}
+
+std::optional<CameraLag::Lag> CameraLag::lag() const {
+  if (!compared_) return std::nullopt;
+  return Lag{fitted_(2), std::sqrt(covariance_(2, 2))};
 }
 
 void CameraLag::break_off() {
@@ -103,6 +110,7 @@ void CameraLag::compare() {
   const Mark mark{*camera, *wheel};
   if (mark_) fit(*mark_, mark);
   mark_ = mark;
+  compared_ = true;
 }
 
 void CameraLag::fit(const Mark& from, const Mark& to) {

@@ -17,16 +17,17 @@ namespace railfix::fusion {
 /// is measured.
 class CameraLag {
  public:
-  CameraLag();
-  void add(const WheelInput& sample);
-  void add(const OdometryInput& step);
-
   struct Lag {
     double s = 0;  // positive: the camera's stamps are late, or the wheel's early
     double sigma_s = 0;
   };
-  /// By all that was measured so far; vague before the speed has changed.
-  [[nodiscard]] Lag lag() const;
+  CameraLag();
+  /// As an earlier trip has measured it; it may be another one by some 20 ms now.
+  explicit CameraLag(const Lag& before);
+  void add(const WheelInput& sample);
+  void add(const OdometryInput& step);
+  /// By all that was measured so far, or before; vague until the speed has changed. Nothing until both have measured.
+  [[nodiscard]] std::optional<Lag> lag() const;
 
  private:
   using Reading = SeenWay::Picture;
@@ -49,6 +50,7 @@ class CameraLag {
   Readings seen_;  // variances since the first picture
   SeenWay way_;
   std::optional<Mark> mark_;
+  bool compared_ = false;
   // Ratio of the ways less one, creep (m of way per m and m/s gained), lag (s).
   Eigen::Vector3d fitted_ = Eigen::Vector3d::Zero();
   Eigen::Matrix3d covariance_;

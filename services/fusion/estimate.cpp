@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <string_view>
 
 #include "core/time.hpp"
 #include "fusion/estimator.hpp"
@@ -52,6 +53,13 @@ void TrainEstimate::degrade(const std::string& why) {
   integrity = std::max(integrity, Integrity::degraded);
   if (!reason.empty()) reason += "; ";
   reason += why;
+}
+
+void TrainEstimate::judge_width(double budget_m, double unusable_budgets) {
+  constexpr std::string_view kWide = "interval wider than allowed";
+  const double bound_m = std::max(over_m, under_m);
+  if (bound_m > budget_m && reason.find(kWide) == std::string::npos) degrade(std::string(kWide));
+  if (bound_m > unusable_budgets * budget_m) integrity = Integrity::unusable;
 }
 
 Interval Estimator::interval() const {
@@ -224,8 +232,7 @@ void Estimator::judge_place(TrainEstimate& e) const {
 
 void Estimator::judge_bounds(TrainEstimate& e, double since_sure_m) const {
   const double budget_m = parameters_->budget_m + parameters_->budget_per_m * since_sure_m;
-  const double bound_m = std::max(e.over_m, e.under_m);
-  if (bound_m > budget_m) e.degrade("interval wider than allowed");
+  e.judge_width(budget_m, parameters_->unusable_budgets);
   const bool wheel = unused_for_s(Source::wheel) < kRecentS;
   if (wheel && unused_for_s(Source::camera) > kRecentS && unused_for_s(Source::imu) > kRecentS) {
     e.degrade("the wheel alone measures: nothing would see it slip");
@@ -235,9 +242,7 @@ void Estimator::judge_bounds(TrainEstimate& e, double since_sure_m) const {
   const bool moved = watch(Source::camera).used_ns != 0 || watch(Source::wheel).used_ns != 0;
   if (!e.standstill && (!moved || no_motion_s > kNoMotionUnusableS))
     e.speed_mps = std::numeric_limits<double>::quiet_NaN();
-  if (no_motion_s > kNoMotionUnusableS || bound_m > parameters_->unusable_budgets * budget_m) {
-    e.integrity = Integrity::unusable;
-  }
+  if (no_motion_s > kNoMotionUnusableS) e.integrity = Integrity::unusable;
 }
 
 }  // namespace railfix::fusion

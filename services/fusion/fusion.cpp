@@ -21,7 +21,7 @@ namespace {
 constexpr double kPathAheadM = 300000;
 constexpr double kPathBehindM = 50000;
 constexpr double kPathLeftM = 20000;  // it is followed on when less of it is left, ...
-constexpr double kLagVagueS = 0.1;    // sigma of a lag that is not known yet
+constexpr double kLagKnownS = 0.01;   // sigma of a lag that is known
 constexpr double kLagSure = 3.0;      // sigmas of one that is
 constexpr double kPathAgainM = 5000;  // ... and tried again so much further on where it could not be
 constexpr double kBesideM = 50.0;     // beyond the interval: what is further off is no track beside the train
@@ -74,7 +74,8 @@ Fusion::Fusion(const FusionParameters& parameters, std::shared_ptr<const track::
     : parameters_(std::make_shared<const FusionParameters>(parameters)),
       map_(std::move(map)),
       path_(std::move(path)),
-      saved_(saved) {}
+      saved_(saved),
+      camera_lag_(saved && saved->camera_lag ? CameraLag(*saved->camera_lag) : CameraLag()) {}
 
 void Fusion::begin_before(const Event& event) {
   // The first step counts from a picture before it: begin there.
@@ -100,6 +101,11 @@ void Fusion::drop_saved_scales() {
 
 std::optional<OdometerScales> Fusion::learnt_scales() const {
   return now_ ? now_->learnt() : std::nullopt;
+}
+
+std::optional<CameraLag::Lag> Fusion::camera_lag() const {
+  const auto lag = camera_lag_.lag();
+  return lag && lag->sigma_s < kLagKnownS ? lag : std::nullopt;
 }
 
 std::optional<TrainEstimate> Fusion::add(Event event) {
@@ -379,14 +385,26 @@ std::optional<TrainEstimate> Fusion::give(TrainEstimate estimate) {
   return estimate;
 }
 
-// What the camera shows was a little earlier: the train is further on than its landmarks say, or less far.
+// What the camera shows was a little earlier: the train is further on than its landmarks say, or less far. That it is
+// further on is held as long as nothing has ruled it out, as far as the allowed width has room for that.
 void Fusion::allow_for_lag(TrainEstimate& estimate) const {
-  const auto [lag_s, sigma_s] = camera_lag_.lag();
+  const auto lag = camera_lag_.lag();
+  if (!lag || std::isnan(estimate.speed_mps)) return;  // where the speed is not known it is no position
+  const auto [lag_s, sigma_s] = *lag;
   const double off_s = std::abs(lag_s);
-  if (sigma_s > kLagVagueS || off_s < std::max(parameters_->camera_lag_s + 2 * sigma_s, kLagSure * sigma_s)) return;
-  const double way_m = std::copysign(off_s + 2 * sigma_s, lag_s) * estimate.speed_mps;
-  estimate.over_m += way_m < 0 ? -way_m : 0;  // where the speed is not known it is no position
-  estimate.under_m += way_m > 0 ? way_m : 0;
+  const bool is_sure = off_s > std::max(parameters_->camera_lag_s + 2 * sigma_s, kLagSure * sigma_s);
+  if (!is_sure && lag_s + 2 * sigma_s < parameters_->camera_lag_s) return;
+  const auto& p = *parameters_;
+  const double budget_m = p.budget_m + p.budget_per_m * estimate.since_sure_m;
+  const double way_m = (is_sure ? std::copysign(off_s + 2 * sigma_s, lag_s) : lag_s + 2 * sigma_s) * estimate.speed_mps;
+  double& side_m = way_m < 0 ? estimate.over_m : estimate.under_m;
+  const double held_m = side_m + std::abs(way_m);
+  if (!is_sure) {
+    side_m = std::max(side_m, std::min(held_m, budget_m));
+    return;
+  }
+  side_m = held_m;
+  estimate.judge_width(budget_m, p.unusable_budgets);
   char text[160];
   std::snprintf(
       text, sizeof text,

@@ -56,6 +56,8 @@ class Fusion {
   void drop_saved_scales();
   /// What this trip has taught of the scales, fit to be saved.
   [[nodiscard]] std::optional<OdometerScales> learnt_scales() const;
+  /// ... and of how late the camera is.
+  [[nodiscard]] std::optional<CameraLag::Lag> camera_lag() const;
 
  private:
   /// What it blocks follows from the stamps of the data before it, as does everything else.

@@ -142,6 +142,8 @@ struct TrainEstimate {
   std::string reason;           // why it is not ok, one sentence
 
   void degrade(const std::string& why);
+  /// Degraded with an interval beyond the budget, unusable beyond so many of it.
+  void judge_width(double budget_m, double unusable_budgets);
 };
 
 }  // namespace railfix::fusion

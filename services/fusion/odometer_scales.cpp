@@ -14,6 +14,7 @@ namespace {
 
 constexpr double kSecondsPerDay = 86400;
 constexpr double kLargestError = 0.2;
+constexpr double kLargestLagS = 2.0;
 
 // The numbers of the file; one list for both ways.
 struct Number {
@@ -43,7 +44,8 @@ bool possible(const SavedScales& saved) {
   const auto sigma_possible = [](double sigma) { return sigma > 0 && sigma <= kLargestError; };
   return std::abs(s.camera) < kLargestError && std::abs(s.wheel) < kLargestError && sigma_possible(s.camera_sigma) &&
          sigma_possible(s.wheel_sigma) && std::abs(s.correlation) < 1 && saved.stamp_ns >= 0 &&
-         saved.pulses_per_metre >= 0;
+         saved.pulses_per_metre >= 0 &&
+         (!saved.camera_lag || (std::abs(saved.camera_lag->s) < kLargestLagS && saved.camera_lag->sigma_s > 0));
 }
 
 double aged_sigma(double sigma, double trip_sigma, double days, const FusionParameters& p, double unlearnt_sigma) {
@@ -59,7 +61,8 @@ OdometerScales unlearnt_scales(const FusionParameters& parameters) {
 
 std::string to_text(const SavedScales& saved) {
   std::string text =
-      "# True over measured metres, less 1, as references on the last trip have taught them to railfix-fusion.\n"
+      "# True over measured metres, less 1, as references on the last trip have taught them to railfix-fusion; how late\n"
+      "# the camera's stamps are against the wheel's.\n"
       "# Remove this file when a wheelset, the lens or the camera's mount has been exchanged.\n";
   char line[80];
   for (const auto& [key, member] : kNumbers) {
@@ -68,6 +71,11 @@ std::string to_text(const SavedScales& saved) {
   }
   std::snprintf(line, sizeof line, "pulses_per_metre: %.17g\n", saved.pulses_per_metre);
   text += line;
+  if (saved.camera_lag) {
+    std::snprintf(line, sizeof line, "camera_lag_s: %.6g\ncamera_lag_sigma_s: %.6g\n", saved.camera_lag->s,
+                  saved.camera_lag->sigma_s);
+    text += line;
+  }
   return text + "stamp_ns: " + std::to_string(saved.stamp_ns) + "\ncamera_id: " + saved.camera_id + "\n";
 }
 
@@ -85,6 +93,11 @@ core::Result<SavedScales> saved_scales(const std::string& text) {
   for (const auto& [key, member] : kNumbers) number(key, saved.scales.*member);
   number("pulses_per_metre", saved.pulses_per_metre);
   number("stamp_ns", saved.stamp_ns);
+  if (values["camera_lag_s"].IsDefined()) {
+    saved.camera_lag.emplace();
+    number("camera_lag_s", saved.camera_lag->s);
+    number("camera_lag_sigma_s", saved.camera_lag->sigma_s);
+  }
   const YAML::Node camera_id = values["camera_id"];
   if (camera_id.IsDefined() && camera_id.IsScalar()) {
     saved.camera_id = camera_id.Scalar();

@@ -3,9 +3,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "core/result.hpp"
+#include "fusion/camera_lag.hpp"
 #include "fusion/fusion_parameters.hpp"
 
 namespace railfix::fusion {
@@ -27,6 +29,7 @@ struct SavedScales {
   int64_t stamp_ns = 0;         // of the data that taught it
   std::string camera_id;        // its calibration; empty = not known
   double pulses_per_metre = 0;  // 0 = no wheel
+  std::optional<CameraLag::Lag> camera_lag;
 };
 
 /// A line each, `key: value` (YAML).

@@ -27,7 +27,7 @@ class ScaleFile {
 
  private:
   void read();
-  void write(const OdometerScales& learnt, int64_t stamp_ns);
+  void write(SavedScales saved);
   bool forget(const std::string& sensor);
 
   std::filesystem::path path_;

@@ -4,6 +4,7 @@
 
 #include "command_recording.hpp"
 #include "core/result.hpp"
+#include "mcap/check.hpp"
 #include "mcap/reader.hpp"
 #include "output_file.hpp"
 #include "recording/copier.hpp"
@@ -16,16 +17,16 @@ namespace {
 namespace fs = std::filesystem;
 using core::BadInput;
 
-struct Options {
+struct RepairOptions {
   fs::path file;
   fs::path out;
 };
 
-/// Closed properly, and every chunk can be read.
-bool sound(mcap::Reader& reader) {
+/// Closed properly, every chunk can be read, and `recording info` finds nothing.
+bool sound(const fs::path& file, mcap::Reader& reader) {
   if (!reader.indexed()) return false;
   reader.for_each({}, [&](const mcap::Channel&, const mcap::Message&) { return reader.problems().empty(); });
-  return reader.problems().empty();
+  return reader.problems().empty() && core::value_or_throw(mcap::check(file)).problems.empty();
 }
 
 std::string counted(uint64_t count, const std::string& what) {
@@ -38,12 +39,12 @@ std::string missing(const RepairReport& report) {
          " that cannot be read";
 }
 
-int repair(const Options& options) {
+int repair(const RepairOptions& options) {
   const auto reader = core::value_or_throw(mcap::Reader::open(options.file));
   if (mcap::being_written(options.file)) {
     throw BadInput(options.file.string() + " is being written by a recorder now; stop that first");
   }
-  if (sound(*reader)) {
+  if (sound(options.file, *reader)) {
     std::cout << options.file.string() << " is a whole recording; nothing to repair\n";
     return 0;
   }
@@ -65,7 +66,7 @@ int repair(const Options& options) {
 }  // namespace
 
 void add_recording_repair(CLI::App& recording, Action& chosen) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<RepairOptions>();
   auto* command = recording.add_subcommand(
       "repair",
       "Make a proper file of one that a crash, a power cut or a bad disk damaged: everything in whole chunks is kept, "

@@ -86,7 +86,7 @@ std::optional<fusion::SavedScales> scales_of_trip_before(const SimulationPlan& p
   judge(before, fusion);
   const auto learnt = fusion.learnt_scales();
   if (!learnt) return std::nullopt;
-  return fusion::SavedScales{*learnt, before.stamp_ns(before.duration_s()), "", 0};
+  return fusion::SavedScales{*learnt, before.stamp_ns(before.duration_s()), "", 0, fusion.camera_lag()};
 }
 
 // Absolute errors of states a metre apart.

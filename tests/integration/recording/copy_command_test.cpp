@@ -83,6 +83,15 @@ TEST_F(LongRecording, WhatIsMissingIsToldAndAddsUp) {
                                                        std::to_string(lost) + " skipped_bytes="));
 }
 
+TEST_F(LongRecording, WhatInfoCallsDamagedIsRepaired) {
+  std::fstream(long_, std::ios::binary | std::ios::in | std::ios::out).seekp(8).write("\xFF", 1);  // of the header
+  EXPECT_EQ(recording({"info", long_}).exit_code, 1);
+  const auto repaired = recording({"repair", long_, "--out", out_});
+  EXPECT_EQ(repaired.exit_code, 0) << repaired.err;
+  EXPECT_THAT(repaired.out, HasSubstr("300000 samples of 1 topics")) << repaired.err;
+  EXPECT_EQ(recording({"info", out_}).exit_code, 0);
+}
+
 TEST_F(LongRecording, RepairDoesNotWriteOverWhatItReads) {
   const fs::path active = folder_ / "run.mcap.active";
   fs::copy_file(damaged_, active);

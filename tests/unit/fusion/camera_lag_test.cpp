@@ -36,7 +36,7 @@ CameraLag::Lag measured(double lag_s, double duration_s, const Way& way, const W
     const double step_m = 1.004 * (way_m - std::exchange(seen_m, way_m)) + 0.002 * random.normal();
     watch.add(OdometryInput{now_ns, now_ns - core::to_ns(kSampleS), step_m, 0.002, true});
   }
-  return watch.lag();
+  return watch.lag().value();
 }
 
 double from_rest(double t_s) {
@@ -73,11 +73,15 @@ TEST(CameraLag, AWheelThatIsStuckTellsNothing) {
   EXPECT_GT(lag.sigma_s, 0.02);
 }
 
-TEST(CameraLag, IsSaidAndHeldByTheInterval) {
+train::SimulationPlan late_by(double lag_s) {
   train::SimulationPlan plan = train::campaign_plan();
   plan.duration_s = 100;
-  plan.fault = {train::Sensor::camera, train::FaultKind::lag, 0, 0, 0.2};
-  const train::TrainSimulation simulation(plan, 4);
+  plan.fault = {train::Sensor::camera, train::FaultKind::lag, 0, 0, lag_s};
+  return plan;
+}
+
+TEST(CameraLag, IsSaidAndHeldByTheInterval) {
+  const train::TrainSimulation simulation(late_by(0.2), 4);
   auto fusion = core::value_or_throw(Fusion::create({}, simulation.map, simulation.start()));
   int said = 0;
   const auto verdict = train::judge(simulation, fusion, 0, [&](const TrainEstimate& state, double) {
@@ -85,6 +89,34 @@ TEST(CameraLag, IsSaidAndHeldByTheInterval) {
   });
   EXPECT_EQ(verdict.outside, 0U);
   EXPECT_GT(said, 1000);
+}
+
+/// A ride that begins at speed.
+train::TrainSimulation begun_at_speed(const train::SimulationPlan& plan) {
+  for (uint64_t seed = 1;; ++seed)
+    if (train::TrainSimulation ride(plan, seed); ride.drive().at(0).speed_mps > 15) return ride;
+}
+
+TEST(CameraLag, IsHeldUntilTheSpeedHasShownIt) {
+  const auto ride = begun_at_speed(late_by(0.2));
+  auto fusion = core::value_or_throw(Fusion::create({}, ride.map, ride.start()));
+  EXPECT_EQ(train::judge(ride, fusion).outside, 0U);
+}
+
+TEST(CameraLag, OfAnEarlierTripIsKnownFromTheStart) {
+  const auto ride = begun_at_speed(late_by(0));
+  const auto first_under_m = [&](const std::optional<SavedScales>& saved) {
+    auto fusion = core::value_or_throw(Fusion::create({}, ride.map, ride.start(), saved));
+    std::optional<double> first_m;
+    train::judge(ride, fusion, 0, [&](const TrainEstimate& state, double) {
+      if (!first_m && core::seconds(state.stamp_ns - ride.stamp_ns(0)) > 2) first_m = state.under_m;
+    });
+    return first_m.value();
+  };
+  SavedScales saved{{.camera_sigma = 0.01, .wheel_sigma = 0.01}, ride.stamp_ns(0), "", 0, {}};
+  const double unknown_m = first_under_m(saved);
+  saved.camera_lag = CameraLag::Lag{0.001, 0.003};
+  EXPECT_GT(unknown_m, first_under_m(saved) + 0.5);
 }
 
 }  // namespace

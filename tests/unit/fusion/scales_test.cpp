@@ -8,7 +8,7 @@ namespace railfix::fusion {
 namespace {
 
 SavedScales saved_as(double camera, double wheel) {
-  return {{camera - 1, wheel - 1, 2e-4, 1e-4, 0.5}, kBeginNs, "cam0=640x512,577", 100};
+  return {{camera - 1, wheel - 1, 2e-4, 1e-4, 0.5}, kBeginNs, "cam0=640x512,577", 100, CameraLag::Lag{0.03, 0.004}};
 }
 
 TEST(Scales, AreWrittenAndReadAgain) {
@@ -22,6 +22,9 @@ TEST(Scales, AreWrittenAndReadAgain) {
   EXPECT_EQ(read.value().stamp_ns, saved.stamp_ns);
   EXPECT_EQ(read.value().camera_id, saved.camera_id);
   EXPECT_EQ(read.value().pulses_per_metre, 100);
+  ASSERT_TRUE(read.value().camera_lag);
+  EXPECT_NEAR(read.value().camera_lag->s, 0.03, 1e-9);
+  EXPECT_NEAR(read.value().camera_lag->sigma_s, 0.004, 1e-9);
 }
 
 TEST(Scales, ADamagedFileIsRefused) {
@@ -29,7 +32,7 @@ TEST(Scales, ADamagedFileIsRefused) {
   for (size_t length = 0; length < whole.size(); ++length)
     EXPECT_FALSE(saved_scales(whole.substr(0, length)).ok()) << length;
   for (const auto& [number, other] :
-       {std::pair{"-0.0029", "nan"}, {"-0.0029", "3"}, {"0.0001\n", "0\n"}, {"0.5", "1"}}) {
+       {std::pair{"-0.0029", "nan"}, {"-0.0029", "3"}, {"0.0001\n", "0\n"}, {"0.5", "1"}, {"0.03", "3"}, {"0.03", "x"}, {"0.004", "0"}}) {
     std::string text = whole;
     text.replace(text.find(number), std::string(number).size(), other);
     EXPECT_FALSE(saved_scales(text).ok()) << text;
@@ -69,8 +72,9 @@ TEST(Scales, AFileOfTheReleaseBeforeIsRead) {
   EXPECT_EQ(read.value().scales.camera_sigma, 1.9e-05);
   EXPECT_EQ(read.value().pulses_per_metre, 98.039215686274517);
   EXPECT_EQ(read.value().stamp_ns, 1763700000000000000);
+  EXPECT_FALSE(read.value().camera_lag);
   EXPECT_TRUE(read.value().camera_id.ends_with("cam1=640x512,577,577,320,256,0,0,0,0,2.5,0,0,0,0"));
-  const auto of_no_camera = saved_scales(to_text({read.value().scales, 0, "", 0}));
+  const auto of_no_camera = saved_scales(to_text({read.value().scales, 0, "", 0, {}}));
   ASSERT_TRUE(of_no_camera.ok()) << of_no_camera.error().message;
   EXPECT_EQ(of_no_camera.value().camera_id, "");
 }

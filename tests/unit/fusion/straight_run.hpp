@@ -20,6 +20,9 @@ inline int64_t at(double t_s) {
 /// Nothing else is wrong.
 inline constexpr const char* kOnlyTold = "the place was only told: waits for a landmark, GNSS or curves";
 
+/// At constant speed nothing shows that the camera is not late: in these rides it is believed.
+inline constexpr double kAnyLagS = 1;
+
 inline std::shared_ptr<const track::Map> straight_line() {
   auto map = std::make_shared<track::Map>();
   map->edges.push_back({1, "line", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{20000, 0, 0}})});
@@ -28,8 +31,8 @@ inline std::shared_ptr<const track::Map> straight_line() {
 }
 
 inline Fusion fusion_at(double offset_m, const std::optional<SavedScales>& saved = std::nullopt) {
-  return core::value_or_throw(
-      Fusion::create({}, straight_line(), track::EdgePosition{1, offset_m, track::Direction::forward}, saved));
+  return core::value_or_throw(Fusion::create({.camera_lag_s = kAnyLagS}, straight_line(),
+                                             track::EdgePosition{1, offset_m, track::Direction::forward}, saved));
 }
 inline Fusion fusion_without_start() {
   return core::value_or_throw(Fusion::create({}, straight_line(), std::nullopt));

@@ -15,6 +15,16 @@ using core::CsvTable;
 using core::Error;
 using core::Status;
 
+// One that nobody knows would be judged as another.
+std::string word(CsvTable& table, size_t column, const std::string& what, std::initializer_list<const char*> words) {
+  std::string said = table.text(column);
+  if (std::ranges::find(words, said) != words.end()) return said;
+  std::string known;
+  for (const char* one : words) known += (known.empty() ? "" : ", ") + std::string(one);
+  table.refuse("has the " + what + " '" + said + "', which must be one of " + known);
+  return said;
+}
+
 Status read(const fs::path& file, std::vector<OdometryRow>& rows) {
   CsvTable table(file);
   const size_t stamp = table.required({"stamp_ns"});
@@ -25,7 +35,8 @@ Status read(const fs::path& file, std::vector<OdometryRow>& rows) {
   const std::optional<size_t> yaw_rate = table.optional({"yaw_rate_rps"});
   while (table.next()) {
     rows.push_back({table.integer(stamp), table.integer(valid) != 0, table.number_or_nan(distance, core::kFarthestM),
-                    table.number_or_nan(speed, core::kFastestTrainMps), table.text(mode),
+                    table.number_or_nan(speed, core::kFastestTrainMps),
+                    word(table, mode, "mode", {"search", "track", "keyframe", "blind"}),
                     table.number_or_nan(yaw_rate)});
   }
   return table.status();
@@ -53,7 +64,7 @@ Status read(const fs::path& file, std::vector<StateRow>& rows) {
     row.over_m = table.number_or_nan(over, core::kWidestM);
     row.under_m = table.number_or_nan(under, core::kWidestM);
     if (row.over_m < 0 || row.under_m < 0) table.refuse("has an interval that ends before it begins");
-    row.integrity = table.text(integrity);
+    row.integrity = word(table, integrity, "integrity", {"ok", "degraded", "unusable"});
     row.easting_m = table.number_or_nan(easting, core::kFarthestM);
     row.northing_m = table.number_or_nan(northing, core::kFarthestM);
     rows.push_back(row);
