@@ -33,5 +33,10 @@ TEST_F(EvaluatedRun, AnIntervalMayBeUnknownButNotNegative) {
               HasSubstr("train_state.csv line 3: has an interval that ends before it begins"));
 }
 
+TEST_F(EvaluatedRun, AWordThatStandsForNothingIsNotTakenForAnother) {
+  EXPECT_THAT(with_states("1,1,10,5,3,4,UNUSABLE,0,0\n").error().message,
+              HasSubstr("line 2: has the integrity 'UNUSABLE', which must be one of ok, degraded, unusable"));
+}
+
 }  // namespace
 }  // namespace railfix::evaluation

@@ -31,8 +31,13 @@ TEST(Scales, ADamagedFileIsRefused) {
   const std::string whole = to_text(saved_as(1.0021, 0.9971));
   for (size_t length = 0; length < whole.size(); ++length)
     EXPECT_FALSE(saved_scales(whole.substr(0, length)).ok()) << length;
-  for (const auto& [number, other] :
-       {std::pair{"-0.0029", "nan"}, {"-0.0029", "3"}, {"0.0001\n", "0\n"}, {"0.5", "1"}, {"0.03", "3"}, {"0.03", "x"}, {"0.004", "0"}}) {
+  for (const auto& [number, other] : {std::pair{"-0.0029", "nan"},
+                                      {"-0.0029", "3"},
+                                      {"0.0001\n", "0\n"},
+                                      {"0.5", "1"},
+                                      {"0.03", "3"},
+                                      {"0.03", "x"},
+                                      {"0.004", "0"}}) {
     std::string text = whole;
     text.replace(text.find(number), std::string(number).size(), other);
     EXPECT_FALSE(saved_scales(text).ok()) << text;

@@ -197,14 +197,14 @@ TEST(RailFit, OneFifthOfWildPointsDoesNotPullTheFit) {
 
 TEST(RailFit, StraightRailsFixFourNumbersAndTheConditionSaysSo) {
   const CabCase cab;
-  const auto straight =
-      fit_rails(kDistortedCab, exact_points(kDistortedCab, cab.mount, 1.435, 7, 40, 40, false, 0.5), cab.mount, cab.options);
+  const auto straight = fit_rails(kDistortedCab, exact_points(kDistortedCab, cab.mount, 1.435, 7, 40, 40, false, 0.5),
+                                  cab.mount, cab.options);
   EXPECT_GT(straight.condition, 1e6);
   // What the rails do not fix keeps its prior: lateral and roll trade off, the height is fixed by the gauge.
   EXPECT_GT(std::sqrt(straight.covariance(0, 0)), 0.7 * cab.options.prior_sigma.roll_rad);
   EXPECT_LT(std::sqrt(straight.covariance(4, 4)), 0.5 * cab.options.prior_sigma.height_m);
-  const auto known =
-      fit_rails(kDistortedCab, exact_points(kDistortedCab, cab.mount, 1.435, 7, 40, 40, true, 0.5), cab.mount, cab.options);
+  const auto known = fit_rails(kDistortedCab, exact_points(kDistortedCab, cab.mount, 1.435, 7, 40, 40, true, 0.5),
+                               cab.mount, cab.options);
   EXPECT_LT(known.condition, straight.condition);
 }
 

@@ -19,7 +19,8 @@ constexpr double kOnEdgeM = 0.01;
 
 class ErjuReader {
  public:
-  ErjuReader(const std::filesystem::path& infra, const std::filesystem::path* map) : infra_(infra), edges_(infra_, net_) {
+  ErjuReader(const std::filesystem::path& infra, const std::filesystem::path* map)
+      : infra_(infra), edges_(infra_, net_) {
     if (map != nullptr) map_.emplace(*map);
   }
 

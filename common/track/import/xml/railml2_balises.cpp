@@ -76,7 +76,8 @@ class Railml2BaliseReader {
     return balises;
   }
 
-  void add_group(const pugi::xml_node& node, const EtcsIdentity& identity, const std::vector<Railml2PlacedBalise>& balises) {
+  void add_group(const pugi::xml_node& node, const EtcsIdentity& identity,
+                 const std::vector<Railml2PlacedBalise>& balises) {
     const double at_m = balises.front().mark.offset_m;
     TrackGroup group{identity.nid_c, identity.nid_bg, at_m, true, kRailmlSigmaM, {}};
     for (const Railml2PlacedBalise& balise : balises) group.balises.push_back(balise.mark);

@@ -19,7 +19,8 @@ struct Railml3PlacedBalise {
 
 class Railml3BaliseReader {
  public:
-  Railml3BaliseReader(const XmlSource& source, Railml3Places& places, RailNet& net) : source_(source), places_(places), net_(net) {}
+  Railml3BaliseReader(const XmlSource& source, Railml3Places& places, RailNet& net)
+      : source_(source), places_(places), net_(net) {}
 
   void read() {
     const std::vector<pugi::xml_node> groups = descendants(source_.root(), "baliseGroup");
@@ -81,7 +82,8 @@ class Railml3BaliseReader {
   static bool is_order_open(const pugi::xml_node& of, const std::vector<Railml3PlacedBalise>& balises) {
     const Railml3PlacedBalise& first = balises.front();
     return !first.number && std::string(of.attribute("mileageDirection").value()) == "reverse" &&
-           std::ranges::any_of(balises, [&](const Railml3PlacedBalise& b) { return b.place.track != first.place.track; });
+           std::ranges::any_of(balises,
+                               [&](const Railml3PlacedBalise& b) { return b.place.track != first.place.track; });
   }
 
   /// Balises without numbers lie in the nominal direction, one after the other.
@@ -96,8 +98,8 @@ class Railml3BaliseReader {
   }
 
   /// A group lies on one track, that of its reference balise.
-  void add_group(const pugi::xml_node& of, const EtcsIdentity& identity, const std::vector<Railml3PlacedBalise>& balises,
-                 const std::optional<bool>& said) {
+  void add_group(const pugi::xml_node& of, const EtcsIdentity& identity,
+                 const std::vector<Railml3PlacedBalise>& balises, const std::optional<bool>& said) {
     const NetPlace& first = balises.front().place;
     ImportedTrack& track = net_.tracks[first.track].track;
     std::vector<TrackMark> here;
@@ -122,7 +124,8 @@ class Railml3BaliseReader {
 
   /// By the file's word, else by the order of the balises, else by the direction that they apply to.
   std::optional<bool> nominal_is_forward(const pugi::xml_node& of, const std::vector<TrackMark>& here,
-                                         const std::vector<Railml3PlacedBalise>& balises, const std::optional<bool>& said) {
+                                         const std::vector<Railml3PlacedBalise>& balises,
+                                         const std::optional<bool>& said) {
     // Numbers say the order for certain, that of the file only where nobody else says the direction.
     const bool numbered =
         std::ranges::all_of(balises, [](const Railml3PlacedBalise& balise) { return balise.number.has_value(); });
