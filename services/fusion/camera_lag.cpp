@@ -15,8 +15,8 @@ constexpr double kKeptS = 5.0;
 constexpr double kRatioSigma = 0.03;
 constexpr double kCreepSigma = 0.005;  // a driven axle runs half a per cent ahead at 1 m/s2
 constexpr double kLagSigmaS = 0.15;
-constexpr double kLagTripSigmaS = 0.02;  // a camera that is started anew
-constexpr double kRatioWalk = 1e-4;      // from window to window
+constexpr double kStandsM = 0.02;    // in a window
+constexpr double kRatioWalk = 1e-4;  // from window to window
 constexpr double kCreepWalk = 2e-5;
 constexpr double kLagWalkS = 3e-4;
 constexpr double kPlayM = 0.005;    // of the wheel's reading, beside its pulses
@@ -33,11 +33,6 @@ Eigen::Vector3d squares(double ratio, double creep, double lag_s) {
 }  // namespace
 
 CameraLag::CameraLag() : covariance_(squares(kRatioSigma, kCreepSigma, kLagSigmaS).asDiagonal()) {}
-
-CameraLag::CameraLag(const Lag& before) : CameraLag() {
-  fitted_(2) = before.s;
-  covariance_(2, 2) = std::min(covariance_(2, 2), std::pow(std::hypot(before.sigma_s, kLagTripSigmaS), 2));
-}
 
 std::optional<CameraLag::Lag> CameraLag::lag() const {
   if (!compared_) return std::nullopt;
@@ -114,8 +109,9 @@ void CameraLag::compare() {
 }
 
 void CameraLag::fit(const Mark& from, const Mark& to) {
-  covariance_.diagonal() += squares(kRatioWalk, kCreepWalk, kLagWalkS);
   const double wheel_m = to.wheel.at.way_m - from.wheel.at.way_m;
+  if (std::abs(wheel_m) < kStandsM) return;  // what a train knows it still knows when it goes on
+  covariance_.diagonal() += squares(kRatioWalk, kCreepWalk, kLagWalkS);
   const double gained_mps = to.wheel.speed_mps - from.wheel.speed_mps;
   const double seen_mps = to.camera.speed_mps - from.camera.speed_mps;
   if (std::abs(seen_mps - gained_mps) > kSameGainMps + kSameGain * std::abs(gained_mps)) return;

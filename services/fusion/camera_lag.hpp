@@ -22,11 +22,9 @@ class CameraLag {
     double sigma_s = 0;
   };
   CameraLag();
-  /// As an earlier trip has measured it; it may be another one by some 20 ms now.
-  explicit CameraLag(const Lag& before);
   void add(const WheelInput& sample);
   void add(const OdometryInput& step);
-  /// By all that was measured so far, or before; vague until the speed has changed. Nothing until both have measured.
+  /// By all that was measured so far; vague until the speed has changed. Nothing until both have measured.
   [[nodiscard]] std::optional<Lag> lag() const;
 
  private:

@@ -20,11 +20,12 @@ namespace {
 
 constexpr double kPathAheadM = 300000;
 constexpr double kPathBehindM = 50000;
-constexpr double kPathLeftM = 20000;  // it is followed on when less of it is left, ...
-constexpr double kLagKnownS = 0.01;   // sigma of a lag that is known
-constexpr double kLagSure = 3.0;      // sigmas of one that is
-constexpr double kPathAgainM = 5000;  // ... and tried again so much further on where it could not be
-constexpr double kBesideM = 50.0;     // beyond the interval: what is further off is no track beside the train
+constexpr double kPathLeftM = 20000;     // it is followed on when less of it is left, ...
+constexpr double kLagKnownS = 0.01;      // sigma of a lag that is known
+constexpr double kLagTripSigmaS = 0.02;  // a camera that is started anew may have another one
+constexpr double kLagSure = 3.0;         // sigmas of one that is
+constexpr double kPathAgainM = 5000;     // ... and tried again so much further on where it could not be
+constexpr double kBesideM = 50.0;        // beyond the interval: what is further off is no track beside the train
 constexpr double kNoCameraS = 0.3;
 constexpr int64_t kSnapshotNs = 50'000'000;
 constexpr int64_t kSlipUnseenNs = 1'200'000'000;  // a slip may have grown for so long before it is found
@@ -74,8 +75,10 @@ Fusion::Fusion(const FusionParameters& parameters, std::shared_ptr<const track::
     : parameters_(std::make_shared<const FusionParameters>(parameters)),
       map_(std::move(map)),
       path_(std::move(path)),
-      saved_(saved),
-      camera_lag_(saved && saved->camera_lag ? CameraLag(*saved->camera_lag) : CameraLag()) {}
+      saved_(saved) {
+  if (saved && saved->camera_lag && std::abs(saved->camera_lag->s) < parameters.camera_lag_s)
+    lag_before_ = saved->camera_lag;
+}
 
 void Fusion::begin_before(const Event& event) {
   // The first step counts from a picture before it: begin there.
@@ -94,6 +97,7 @@ SavedScalesAre Fusion::saved_scales() const {
 
 void Fusion::drop_saved_scales() {
   saved_.reset();
+  lag_before_.reset();
   if (now_) now_->drop_saved();
   if (before_behind_) before_behind_->drop_saved();
   for (auto& snapshot : snapshots_) snapshot.drop_saved();
@@ -105,7 +109,12 @@ std::optional<OdometerScales> Fusion::learnt_scales() const {
 
 std::optional<CameraLag::Lag> Fusion::camera_lag() const {
   const auto lag = camera_lag_.lag();
-  return lag && lag->sigma_s < kLagKnownS ? lag : std::nullopt;
+  if (lag && lag->sigma_s < kLagKnownS) return std::abs(lag->s) < parameters_->camera_lag_s ? lag : std::nullopt;
+  return !lag || fits_lag_before(*lag) ? lag_before_ : std::nullopt;
+}
+
+bool Fusion::fits_lag_before(const CameraLag::Lag& measured) const {
+  return lag_before_ && std::abs(measured.s - lag_before_->s) < 2 * measured.sigma_s;
 }
 
 std::optional<TrainEstimate> Fusion::add(Event event) {
@@ -385,11 +394,13 @@ std::optional<TrainEstimate> Fusion::give(TrainEstimate estimate) {
   return estimate;
 }
 
-// What the camera shows was a little earlier: the train is further on than its landmarks say, or less far. That it is
-// further on is held as long as nothing has ruled it out, as far as the allowed width has room for that.
+// What the camera shows was a little earlier: the train is further on than its landmarks say. That is held as long as
+// nothing has ruled it out, as far as the allowed width has room for that; stamps that are early, once they are sure.
 void Fusion::allow_for_lag(TrainEstimate& estimate) const {
-  const auto lag = camera_lag_.lag();
+  auto lag = camera_lag_.lag();
   if (!lag || std::isnan(estimate.speed_mps)) return;  // where the speed is not known it is no position
+  if (lag->sigma_s > kLagTripSigmaS && fits_lag_before(*lag))
+    lag = {lag_before_->s, std::hypot(lag_before_->sigma_s, kLagTripSigmaS)};
   const auto [lag_s, sigma_s] = *lag;
   const double off_s = std::abs(lag_s);
   const bool is_sure = off_s > std::max(parameters_->camera_lag_s + 2 * sigma_s, kLagSure * sigma_s);

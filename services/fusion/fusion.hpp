@@ -1,7 +1,8 @@
 // The fusion of all sensors: takes measurements in any order, uses each at its own time, and gives the train's state.
 //
 // The state after a set of measurements does not depend on the order in which they came: late ones are put where they
-// belong and everything behind them is replayed from a snapshot, when the next state is wanted.
+// belong and everything behind them is replayed from a snapshot, when the next state is wanted. Not so camera_lag, which
+// looks at what has come so far.
 #pragma once
 
 #include <cstdint>
@@ -56,7 +57,7 @@ class Fusion {
   void drop_saved_scales();
   /// What this trip has taught of the scales, fit to be saved.
   [[nodiscard]] std::optional<OdometerScales> learnt_scales() const;
-  /// ... and of how late the camera is.
+  /// ... and of how late the camera is, by this trip or one before it. Nothing where that is vague or more than may be.
   [[nodiscard]] std::optional<CameraLag::Lag> camera_lag() const;
 
  private:
@@ -93,6 +94,7 @@ class Fusion {
   void forget_old();
   [[nodiscard]] bool due(const Event& event) const;
   std::optional<TrainEstimate> give(TrainEstimate estimate);
+  [[nodiscard]] bool fits_lag_before(const CameraLag::Lag& measured) const;
   void allow_for_lag(TrainEstimate& estimate) const;
 
   std::shared_ptr<const FusionParameters> parameters_;
@@ -115,7 +117,8 @@ class Fusion {
   std::deque<GnssInput> early_;              // GNSS that waits for what measures motion
   std::optional<WheelInput> last_wheel_;
   CameraLag camera_lag_;
-  std::optional<OdometryInput> anchor_;  // the first step that counts from a picture before all that is known
+  std::optional<CameraLag::Lag> lag_before_;  // of an earlier trip
+  std::optional<OdometryInput> anchor_;       // the first step that counts from a picture before all that is known
 };
 
 }  // namespace railfix::fusion

@@ -61,9 +61,8 @@ OdometerScales unlearnt_scales(const FusionParameters& parameters) {
 
 std::string to_text(const SavedScales& saved) {
   std::string text =
-      "# True over measured metres, less 1, as references on the last trip have taught them to railfix-fusion; how "
-      "late\n"
-      "# the camera's stamps are against the wheel's.\n"
+      "# True over measured metres, less 1, as references on the last trip have taught them to railfix-fusion;\n"
+      "# camera_lag_s: how late the camera's stamps are against the wheel's.\n"
       "# Remove this file when a wheelset, the lens or the camera's mount has been exchanged.\n";
   char line[80];
   for (const auto& [key, member] : kNumbers) {

@@ -44,7 +44,8 @@ function(railfix_made_quickly target)
 endfunction()
 
 # Most of a compiler's time goes into the headers of Fast DDS, JSON and GoogleTest: targets that ask, carry and test read
-# them once for eight of their files. Libraries of algorithms stay apart, a name there is its file's alone.
+# them once for eight of their files. There a name of an anonymous namespace stands in all eight, and hides what a header
+# calls the same: tests have namespaces of their own where they share names. Filters, matching and vision stay apart.
 option(RAILFIX_TOGETHER "Compile several files of a target at once; off for ./dev lint, which wants each alone" ON)
 function(railfix_compiled_together target)
   set_target_properties(${target} PROPERTIES UNITY_BUILD ${RAILFIX_TOGETHER} UNITY_BUILD_BATCH_SIZE 8)

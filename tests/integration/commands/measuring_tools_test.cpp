@@ -3,7 +3,7 @@
 
 #include "support/program.hpp"
 
-namespace railfix {
+namespace railfix::measuring_tools_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -54,4 +54,4 @@ TEST(MeasuringTools, RefuseNumbersThatMeanNothing) {
 }
 
 }  // namespace
-}  // namespace railfix
+}  // namespace railfix::measuring_tools_test

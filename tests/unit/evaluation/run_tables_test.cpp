@@ -36,6 +36,9 @@ TEST_F(EvaluatedRun, AnIntervalMayBeUnknownButNotNegative) {
 TEST_F(EvaluatedRun, AWordThatStandsForNothingIsNotTakenForAnother) {
   EXPECT_THAT(with_states("1,1,10,5,3,4,UNUSABLE,0,0\n").error().message,
               HasSubstr("line 2: has the integrity 'UNUSABLE', which must be one of ok, degraded, unusable"));
+  std::ofstream(folder_ / "odometry.csv") << "stamp_ns,valid,distance_m,speed_mps,mode\n1,1,0,5,blnd\n";
+  EXPECT_THAT(with_states("1,1,10,5,3,4,ok,0,0\n").error().message,
+              HasSubstr("has the mode 'blnd', which must be one of search, track, keyframe, blind"));
 }
 
 }  // namespace

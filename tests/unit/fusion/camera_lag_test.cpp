@@ -103,6 +103,21 @@ TEST(CameraLag, IsHeldUntilTheSpeedHasShownIt) {
   EXPECT_EQ(train::judge(ride, fusion).outside, 0U);
 }
 
+TEST(CameraLag, OfAnEarlierTripIsForgottenWhereItIsAnotherNow) {
+  const auto ride = begun_at_speed(late_by(0.2));
+  SavedScales saved{{.camera_sigma = 0.01, .wheel_sigma = 0.01}, ride.stamp_ns(0), "", 0, CameraLag::Lag{0.001, 0.004}};
+  auto fusion = core::value_or_throw(Fusion::create({}, ride.map, ride.start(), saved));
+  EXPECT_NEAR(fusion.camera_lag().value().s, 0.001, 1e-9);
+  bool said = false;
+  train::judge(ride, fusion, 0, [&](const TrainEstimate& state, double) {
+    said = said || state.reason.find("camera stamps 0.2") != std::string::npos;
+  });
+  EXPECT_TRUE(said);
+  EXPECT_FALSE(fusion.camera_lag());  // nothing to be kept for the next trip
+  fusion = core::value_or_throw(Fusion::create({.camera_lag_s = 0.0005}, ride.map, ride.start(), saved));
+  EXPECT_FALSE(fusion.camera_lag());
+}
+
 TEST(CameraLag, OfAnEarlierTripIsKnownFromTheStart) {
   const auto ride = begun_at_speed(late_by(0));
   const auto first_under_m = [&](const std::optional<SavedScales>& saved) {

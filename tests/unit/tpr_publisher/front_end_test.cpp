@@ -7,7 +7,7 @@
 #include "tpr_publisher/tpr_publisher.hpp"
 #include "unit/tpr_publisher/balise_map.hpp"
 
-namespace railfix::tpr_publisher {
+namespace railfix::tpr_publisher::front_end_test {
 namespace {
 
 using namespace testing;
@@ -174,4 +174,4 @@ TEST(FrontEnd, WhatWasAskedAndConfirmedForTheOldFrontIsOver) {
 }
 
 }  // namespace
-}  // namespace railfix::tpr_publisher
+}  // namespace railfix::tpr_publisher::front_end_test
