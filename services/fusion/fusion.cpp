@@ -21,10 +21,10 @@ namespace {
 constexpr double kPathAheadM = 300000;
 constexpr double kPathBehindM = 50000;
 constexpr double kPathLeftM = 20000;     // it is followed on when less of it is left, ...
+constexpr double kPathAgainM = 5000;     // ... and tried again so much further on where it could not be
 constexpr double kLagKnownS = 0.01;      // sigma of a lag that is known
 constexpr double kLagTripSigmaS = 0.02;  // a camera that is started anew may have another one
 constexpr double kLagSure = 3.0;         // sigmas of one that is
-constexpr double kPathAgainM = 5000;     // ... and tried again so much further on where it could not be
 constexpr double kBesideM = 50.0;        // beyond the interval: what is further off is no track beside the train
 constexpr double kNoCameraS = 0.3;
 constexpr int64_t kSnapshotNs = 50'000'000;
