@@ -402,12 +402,13 @@ void Fusion::allow_for_lag(TrainEstimate& estimate) const {
   if (lag->sigma_s > kLagTripSigmaS && fits_lag_before(*lag))
     lag = {lag_before_->s, std::hypot(lag_before_->sigma_s, kLagTripSigmaS)};
   const auto [lag_s, sigma_s] = *lag;
-  const double off_s = std::abs(lag_s);
-  const bool is_sure = off_s > std::max(parameters_->camera_lag_s + 2 * sigma_s, kLagSure * sigma_s);
-  if (!is_sure && lag_s + 2 * sigma_s < parameters_->camera_lag_s) return;
   const auto& p = *parameters_;
+  const double off_s = std::abs(lag_s);
+  const bool is_sure = off_s > std::max(p.camera_lag_s + 2 * sigma_s, kLagSure * sigma_s);
+  const double beyond_s = lag_s + 2 * sigma_s - p.camera_lag_s;  // what every interval has room for
+  if (!is_sure && beyond_s < 0) return;
   const double budget_m = p.budget_m + p.budget_per_m * estimate.since_sure_m;
-  const double way_m = (is_sure ? std::copysign(off_s + 2 * sigma_s, lag_s) : lag_s + 2 * sigma_s) * estimate.speed_mps;
+  const double way_m = (is_sure ? std::copysign(off_s + 2 * sigma_s, lag_s) : beyond_s) * estimate.speed_mps;
   double& side_m = way_m < 0 ? estimate.over_m : estimate.under_m;
   const double held_m = side_m + std::abs(way_m);
   if (!is_sure) {
