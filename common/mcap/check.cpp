@@ -8,8 +8,6 @@ namespace railfix::mcap {
 
 namespace {
 
-constexpr size_t kMostCheckProblems = 100;
-
 struct CheckedChunk {
   uint64_t length = 0;
   std::map<uint64_t, std::pair<uint16_t, int64_t>> messages;  // by position: channel and log time
@@ -38,7 +36,7 @@ class Checker {
 
  private:
   void problem(const std::string& what) {
-    if (check_.problems.size() < kMostCheckProblems) check_.problems.push_back(what);
+    if (check_.problems.size() < kMostProblems) check_.problems.push_back(what);
   }
   void problem_here(const std::string& what) { problem("byte " + std::to_string(offset_) + ": " + what); }
 

@@ -11,7 +11,6 @@ namespace railfix::mcap {
 namespace {
 
 constexpr uint64_t kTailBytes = kRecordHeadBytes + kFooterBytes + kMagic.size();
-constexpr size_t kMostProblems = 100;
 constexpr uint64_t kMostMetadataBytes = uint64_t{1} << 24U;
 // Gigabytes forced to the disk at once would hold up who else writes there.
 constexpr double kRecoverySyncS = 1;

@@ -19,6 +19,9 @@
 
 namespace railfix::mcap {
 
+/// So many are told of one recording.
+inline constexpr size_t kMostProblems = 100;
+
 /// Where messages are stored: a Chunk record, or a run of Message records that stand outside chunks.
 struct ChunkPlace {
   int64_t start_ns = 0;

@@ -55,11 +55,12 @@ void TrainEstimate::degrade(const std::string& why) {
   reason += why;
 }
 
-void TrainEstimate::judge_width(double budget_m, double unusable_budgets) {
+void TrainEstimate::judge_width(const FusionParameters& parameters) {
   constexpr std::string_view kWide = "interval wider than allowed";
   const double bound_m = std::max(over_m, under_m);
-  if (bound_m > budget_m && reason.find(kWide) == std::string::npos) degrade(std::string(kWide));
-  if (bound_m > unusable_budgets * budget_m) integrity = Integrity::unusable;
+  const double allowed_m = parameters.allowed_m(since_sure_m);
+  if (bound_m > allowed_m && reason.find(kWide) == std::string::npos) degrade(std::string(kWide));
+  if (bound_m > parameters.unusable_budgets * allowed_m) integrity = Integrity::unusable;
 }
 
 Interval Estimator::interval() const {
@@ -81,7 +82,7 @@ double Estimator::known_to_m() const {
 // the matcher, which has few landmarks to choose from then, finds the train there.
 double Estimator::lost_to_m() const {
   const auto& p = *parameters_;
-  const double budgets_m = p.unusable_budgets * (p.budget_m + p.budget_per_m * since_reference_m());
+  const double budgets_m = p.unusable_budgets * p.allowed_m(since_reference_m());
   return place_.wrong_place.lost() ? std::clamp(budgets_m, kLostAtLeastM, kLostAtMostM) : 0.0;
 }
 
@@ -128,7 +129,7 @@ TrainEstimate Estimator::estimate(const Interval& promised, double since_sure_m)
     e.over_m = e.under_m = std::numeric_limits<double>::infinity();
     e.degrade("the filter's numbers ran over");
   }
-  judge(e, since_sure_m);
+  judge(e);
   return e;
 }
 
@@ -160,10 +161,10 @@ bool Estimator::silent(Source source) const {
   return w.seen_ns != 0 && core::seconds(filter_.stamp_ns() - w.seen_ns) > parameters_->sensor_timeout_s;
 }
 
-void Estimator::judge(TrainEstimate& e, double since_sure_m) const {
+void Estimator::judge(TrainEstimate& e) const {
   judge_sensors(e);
   judge_place(e);
-  judge_bounds(e, since_sure_m);
+  judge_bounds(e);
 }
 
 void Estimator::judge_sensors(TrainEstimate& e) const {
@@ -230,9 +231,8 @@ void Estimator::judge_place(TrainEstimate& e) const {
   }
 }
 
-void Estimator::judge_bounds(TrainEstimate& e, double since_sure_m) const {
-  const double budget_m = parameters_->budget_m + parameters_->budget_per_m * since_sure_m;
-  e.judge_width(budget_m, parameters_->unusable_budgets);
+void Estimator::judge_bounds(TrainEstimate& e) const {
+  e.judge_width(*parameters_);
   const bool wheel = unused_for_s(Source::wheel) < kRecentS;
   if (wheel && unused_for_s(Source::camera) > kRecentS && unused_for_s(Source::imu) > kRecentS) {
     e.degrade("the wheel alone measures: nothing would see it slip");

@@ -332,10 +332,10 @@ class Estimator {
   SensorWatch& watched(Source source) { return watches_[static_cast<size_t>(source)]; }
   [[nodiscard]] bool silent(Source source) const;
   [[nodiscard]] double unused_for_s(Source source) const;
-  void judge(TrainEstimate& estimate, double since_sure_m) const;
+  void judge(TrainEstimate& estimate) const;
   void judge_sensors(TrainEstimate& estimate) const;
   void judge_place(TrainEstimate& estimate) const;
-  void judge_bounds(TrainEstimate& estimate, double since_sure_m) const;
+  void judge_bounds(TrainEstimate& estimate) const;
   void locate(TrainEstimate& estimate) const;
 
   static constexpr int kLandmarksBelieved = 5;  // in a row, whoever says otherwise

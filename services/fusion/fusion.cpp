@@ -407,16 +407,15 @@ void Fusion::allow_for_lag(TrainEstimate& estimate) const {
   const bool is_sure = off_s > std::max(p.camera_lag_s + 2 * sigma_s, kLagSure * sigma_s);
   const double beyond_s = lag_s + 2 * sigma_s - p.camera_lag_s;  // what every interval has room for
   if (!is_sure && beyond_s < 0) return;
-  const double budget_m = p.budget_m + p.budget_per_m * estimate.since_sure_m;
   const double way_m = (is_sure ? std::copysign(off_s + 2 * sigma_s, lag_s) : beyond_s) * estimate.speed_mps;
   double& side_m = way_m < 0 ? estimate.over_m : estimate.under_m;
   const double held_m = side_m + std::abs(way_m);
   if (!is_sure) {
-    side_m = std::max(side_m, std::min(held_m, budget_m));
+    side_m = std::max(side_m, std::min(held_m, p.allowed_m(estimate.since_sure_m)));
     return;
   }
   side_m = held_m;
-  estimate.judge_width(budget_m, p.unusable_budgets);
+  estimate.judge_width(p);
   char text[160];
   std::snprintf(
       text, sizeof text,

@@ -1,8 +1,8 @@
 // The fusion of all sensors: takes measurements in any order, uses each at its own time, and gives the train's state.
 //
 // The state after a set of measurements does not depend on the order in which they came: late ones are put where they
-// belong and everything behind them is replayed from a snapshot, when the next state is wanted. Not so camera_lag, which
-// looks at what has come so far.
+// belong and everything behind them is replayed from a snapshot, when the next state is wanted. Not so camera_lag,
+// which looks at what has come so far.
 #pragma once
 
 #include <cstdint>

@@ -117,7 +117,8 @@ struct FusionConfig {
              "A measurement that comes later than this is left out; slips are taken back over 1.2 s.");
     f.number("max_jump_s", p.max_jump_s, {0.1, 3600}, "s", "A stamp further ahead is not believed at once.");
     f.number("camera_lag_s", p.camera_lag_s, {0, 1}, "s",
-             "Camera stamps that are, or may be, further off those of the wheel widen the interval by the way run meanwhile.");
+             "Camera stamps that are, or may be, further off those of the wheel widen the interval by the way run "
+             "meanwhile.");
   }
 };
 

@@ -76,6 +76,8 @@ struct FusionParameters {
   double budget_m = 5.0;
   double budget_per_m = 0.05;
   double unusable_budgets = 4.0;  // an interval of so many budgets is no position
+  /// Half an interval may be so long so far behind the reference.
+  [[nodiscard]] double allowed_m(double since_m) const { return budget_m + budget_per_m * since_m; }
 
   double sensor_timeout_s = 0.5;  // a sensor that was there and is silent for longer is reported
   double output_period_s = 0.1;   // of states without a camera

@@ -9,6 +9,7 @@
 #include <string>
 #include <variant>
 
+#include "fusion/fusion_parameters.hpp"
 #include "track/path.hpp"
 
 namespace railfix::fusion {
@@ -143,7 +144,7 @@ struct TrainEstimate {
 
   void degrade(const std::string& why);
   /// Degraded with an interval beyond the budget, unusable beyond so many of it.
-  void judge_width(double budget_m, double unusable_budgets);
+  void judge_width(const FusionParameters& parameters);
 };
 
 }  // namespace railfix::fusion

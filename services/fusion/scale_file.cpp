@@ -87,12 +87,12 @@ void ScaleFile::follow(const Fusion& fusion, const TrainEstimate& state) {
   }
   if (path_.empty() || state.integrity != Integrity::ok) return;
   if (std::abs(core::seconds(state.stamp_ns - written_ns_)) < kWriteEveryS) return;
-  if (const auto learnt = fusion.learnt_scales()) write({*learnt, state.stamp_ns, "", 0, fusion.camera_lag()});
+  if (const auto learnt = fusion.learnt_scales()) write(*learnt, fusion.camera_lag(), state.stamp_ns);
 }
 
-void ScaleFile::write(SavedScales saved) {
-  written_ns_ = saved.stamp_ns;
-  saved.pulses_per_metre = pulses_per_metre_;
+void ScaleFile::write(const OdometerScales& learnt, const std::optional<CameraLag::Lag>& camera_lag, int64_t stamp_ns) {
+  written_ns_ = stamp_ns;
+  SavedScales saved{learnt, stamp_ns, "", pulses_per_metre_, camera_lag};
   for (const auto& [name, numbers] : cameras_) saved.camera_id += (saved.camera_id.empty() ? "" : " ") + name + numbers;
   const auto status = core::write_whole(path_, to_text(saved));
   if (status.ok() || failure_told_) return;

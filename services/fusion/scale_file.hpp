@@ -27,7 +27,7 @@ class ScaleFile {
 
  private:
   void read();
-  void write(SavedScales saved);
+  void write(const OdometerScales& learnt, const std::optional<CameraLag::Lag>& camera_lag, int64_t stamp_ns);
   bool forget(const std::string& sensor);
 
   std::filesystem::path path_;

@@ -9,8 +9,10 @@
 
 #include "core/csv.hpp"
 #include "mcap/reader.hpp"
+#include "messaging/operation_words.hpp"
 #include "messaging/samples.hpp"
 #include "messaging/topics.hpp"
+#include "run_words.hpp"
 
 namespace railfix::tool {
 
@@ -30,13 +32,10 @@ template <size_t N>
 const char* word(const std::array<const char*, N>& words, uint8_t value) {
   return value < N ? words[value] : "?";
 }
-constexpr std::array kModes{"search", "track", "keyframe", "blind"};
 constexpr std::array kSightings{"unknown", "frog", "balise", "portal_in", "portal_out", "mast", "bridge", "platform"};
 constexpr std::array kFixes{"unknown", "curvature", "landmark", "network", "track", "gnss"};
 constexpr std::array kDirections{"?", "+", "-"};
-constexpr std::array kIntegrities{"ok", "degraded", "unusable"};
 constexpr std::array kOrientations{"track", "imu"};
-constexpr std::array kStates{"starting", "ready", "active", "degraded", "failed", "stopped"};
 
 /// A name that may stand in a cell.
 std::string cell(std::string text) {
@@ -105,7 +104,7 @@ class Tables {
     for (const double value : {step.speed_mps(), step.lateral_speed_mps(), step.yaw_rate_rps(), step.step_sigma_m()}) {
       odometry_ << (known ? value : kUnknown);
     }
-    odometry_ << word(kModes, step.mode());
+    odometry_ << word(kModeWords, step.mode());
     end(odometry_);
   }
 
@@ -132,7 +131,7 @@ class Tables {
       train_state_.empty().empty().empty() << 0;
     }
     train_state_ << state.distance_m() << state.speed_mps() << state.over_m() << state.under_m() << state.sigma_m()
-                 << word(kIntegrities, state.integrity());
+                 << word(kIntegrityWords, state.integrity());
     const bool placed = state.track_known() != 0;
     for (const double value :
          {state.lat_deg(), state.lon_deg(), state.easting_m(), state.northing_m(), state.heading_rad()}) {
@@ -170,9 +169,9 @@ class Tables {
 
   void add(const msg::ServiceStatus& status) {
     status_ << (data_ns_ ? *data_ns_ : status.stamp_ns()) << cell(status.service().c_str())
-            << cell(status.host().c_str()) << word(kStates, status.state()) << status.frames_in() << status.frames_out()
-            << status.dropped() << status.latency_p50_ms() << status.latency_p99_ms() << status.cpu_percent()
-            << status.rss_mb();
+            << cell(status.host().c_str()) << word(messaging::kStateNames, status.state()) << status.frames_in()
+            << status.frames_out() << status.dropped() << status.latency_p50_ms() << status.latency_p99_ms()
+            << status.cpu_percent() << status.rss_mb();
     end(status_);
   }
 

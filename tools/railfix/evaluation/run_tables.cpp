@@ -5,7 +5,9 @@
 #include <type_traits>
 
 #include "core/csv_table.hpp"
+#include "core/joined.hpp"
 #include "core/train_limits.hpp"
+#include "run_words.hpp"
 
 namespace railfix::evaluation {
 namespace {
@@ -16,12 +18,11 @@ using core::Error;
 using core::Status;
 
 // One that nobody knows would be judged as another.
-std::string word(CsvTable& table, size_t column, const std::string& what, std::initializer_list<const char*> words) {
+template <size_t N>
+std::string word(CsvTable& table, size_t column, const std::string& what, const std::array<const char*, N>& words) {
   std::string said = table.text(column);
-  if (std::ranges::find(words, said) != words.end()) return said;
-  std::string known;
-  for (const char* one : words) known += (known.empty() ? "" : ", ") + std::string(one);
-  table.refuse("has the " + what + " '" + said + "', which must be one of " + known);
+  if (std::ranges::find(words, said) == words.end())
+    table.refuse("has the " + what + " '" + said + "', which must be one of " + core::joined(words));
   return said;
 }
 
@@ -35,8 +36,7 @@ Status read(const fs::path& file, std::vector<OdometryRow>& rows) {
   const std::optional<size_t> yaw_rate = table.optional({"yaw_rate_rps"});
   while (table.next()) {
     rows.push_back({table.integer(stamp), table.integer(valid) != 0, table.number_or_nan(distance, core::kFarthestM),
-                    table.number_or_nan(speed, core::kFastestTrainMps),
-                    word(table, mode, "mode", {"search", "track", "keyframe", "blind"}),
+                    table.number_or_nan(speed, core::kFastestTrainMps), word(table, mode, "mode", tool::kModeWords),
                     table.number_or_nan(yaw_rate)});
   }
   return table.status();
@@ -64,7 +64,7 @@ Status read(const fs::path& file, std::vector<StateRow>& rows) {
     row.over_m = table.number_or_nan(over, core::kWidestM);
     row.under_m = table.number_or_nan(under, core::kWidestM);
     if (row.over_m < 0 || row.under_m < 0) table.refuse("has an interval that ends before it begins");
-    row.integrity = word(table, integrity, "integrity", {"ok", "degraded", "unusable"});
+    row.integrity = word(table, integrity, "integrity", tool::kIntegrityWords);
     row.easting_m = table.number_or_nan(easting, core::kFarthestM);
     row.northing_m = table.number_or_nan(northing, core::kFarthestM);
     rows.push_back(row);

@@ -95,8 +95,7 @@ class NominalRide {
       const auto state = fusion_.add(fusion::OdometryInput{now_ns_, before_ns_, at_m_ - was_m_, kStepSigmaM, true});
       if (!state) continue;
       const double half_m = std::max(state->over_m, state->under_m);
-      const double budget_m = parameters_.budget_m + parameters_.budget_per_m * state->since_sure_m;
-      promised.push_back({at_m_, half_m, half_m > budget_m});
+      promised.push_back({at_m_, half_m, half_m > parameters_.allowed_m(state->since_sure_m)});
       match(*state);
     }
     return promised;
