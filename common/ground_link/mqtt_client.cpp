@@ -2,6 +2,7 @@
 
 #include <mosquitto.h>
 #include <mqtt_protocol.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -14,6 +15,8 @@
 #include <mutex>
 #include <thread>
 
+#include "core/joined.hpp"
+#include "core/whole_file.hpp"
 #include "ground_link/name_lookup.hpp"
 
 namespace railfix::ground_link {
@@ -96,10 +99,18 @@ class MqttClient::Connection {
     const auto or_null = [](const std::string& file) { return file.empty() ? nullptr : file.c_str(); };
     const int code = mosquitto_tls_set(client_.get(), options_.ca_file.c_str(), nullptr,
                                        or_null(options_.certificate_file), or_null(options_.key_file), nullptr);
-    if (code != MOSQ_ERR_SUCCESS) {
-      throw core::BadInput("TLS of the ground link: " + options_.ca_file + ", " + options_.certificate_file + ", " +
-                           options_.key_file + ": " + text_of(code) + "; do the files exist, as PEM?");
+    if (code != MOSQ_ERR_SUCCESS) throw core::BadInput(why_no_tls(code));
+  }
+
+  /// The library's word for a file that is not there is "invalid arguments".
+  [[nodiscard]] std::string why_no_tls(int code) const {
+    std::vector<std::string> named;
+    for (const auto& file : {options_.ca_file, options_.certificate_file, options_.key_file}) {
+      if (file.empty()) continue;
+      if (access(file.c_str(), R_OK) != 0) return "TLS of the ground link: " + core::cannot_read(file).message;
+      named.push_back(file);
     }
+    return "TLS of the ground link: " + core::joined(named) + ": " + text_of(code) + "; are they PEM?";
   }
 
   void set_callbacks() {
@@ -253,7 +264,7 @@ core::Status parse_broker(const std::string& text, MqttOptions& options) {
 core::Result<std::string> read_password(const std::string& file) {
   std::ifstream stream(file);
   std::string password;
-  if (!stream || !std::getline(stream, password))
+  if (!stream || !std::getline(stream, password) || password.empty())
     return core::Error{file + ": no password can be read; put it into the first line."};
   return password;
 }

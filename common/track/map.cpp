@@ -5,7 +5,10 @@
 #include <charconv>
 #include <cmath>
 #include <memory>
+#include <span>
 #include <string_view>
+
+#include "core/joined.hpp"
 
 namespace railfix::track {
 namespace {
@@ -68,10 +71,15 @@ std::optional<LandmarkKind> landmark_kind_from(const std::string& text) {
 }
 
 std::string landmark_kinds() {
-  std::string all;
-  for (size_t i = 1; i < kLandmarkKinds.size(); ++i)  // the first one is no kind
-    all += (i > 1 ? ", " : "") + std::string(kLandmarkKinds[i]);
-  return all;
+  return core::joined(std::span(kLandmarkKinds).subspan(1));  // the first one is no kind
+}
+
+std::string sighted_kinds() {
+  std::vector<std::string> names;
+  for (size_t i = 0; i < kLandmarkKinds.size(); ++i) {
+    if (can_be_sighted(static_cast<LandmarkKind>(i))) names.emplace_back(kLandmarkKinds[i]);
+  }
+  return core::joined(names);
 }
 
 LandmarkKind seen_along(LandmarkKind kind, bool forward) {

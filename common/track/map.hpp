@@ -28,8 +28,9 @@ enum class LandmarkKind : uint8_t {
 /// "frog", "balise", "portal_in", ... as in the run tables; and back.
 std::string to_string(LandmarkKind kind);
 std::optional<LandmarkKind> landmark_kind_from(const std::string& text);
-/// All of them, as in "balise, mast, frog".
+/// All of them, as in "balise, mast, frog"; and those that a camera sights.
 std::string landmark_kinds();
+std::string sighted_kinds();
 /// As a train meets it that runs along growing offsets, or against them: a portal in is a portal out the other way.
 LandmarkKind seen_along(LandmarkKind kind, bool forward);
 /// Does a camera in the cab tell it? The other kinds are on the map for people, and no reference.

@@ -205,12 +205,14 @@ core::Status read_map(const map::Map& in, Map& out) {
   return {};
 }
 
-/// Length of the UTF-8 character (RFC 3629) that begins there; 0 where none does.
+/// Length of the UTF-8 character (RFC 3629) that begins there; 0 where none does, or one that moves a terminal's
+/// cursor.
 size_t character_at(std::string_view text) {
   const auto byte = [&](size_t i) { return i < text.size() ? static_cast<uint8_t>(text[i]) : uint8_t{0}; };
   const auto follows = [&](size_t i) { return (byte(i) & 0xC0U) == 0x80U; };
   const uint8_t first = byte(0);
-  if (first < 0x80) return 1;
+  if (first < 0x80) return first < 0x20 || first == 0x7F ? 0 : 1;
+  if (first == 0xC2 && byte(1) < 0xA0) return 0;
   if (first >= 0xC2 && first <= 0xDF && follows(1)) return 2;
   const bool too_long = (first == 0xE0 && byte(1) < 0xA0) || (first == 0xF0 && byte(1) < 0x90);
   const bool beyond = (first == 0xED && byte(1) > 0x9F) || (first == 0xF4 && byte(1) > 0x8F);
@@ -219,8 +221,9 @@ size_t character_at(std::string_view text) {
   return follows(1) && follows(2) && (length == 3 || follows(3)) ? length : 0;
 }
 
-/// Names come from foreign files in any encoding; what is no UTF-8 would make the whole map unreadable.
-std::string as_utf8(std::string text) {
+/// Names come from foreign files in any encoding; what is no UTF-8 would make the whole map unreadable, and control
+/// characters would command the terminal that shows them.
+std::string as_text(std::string text) {
   for (size_t i = 0; i < text.size();) {
     const size_t length = character_at(std::string_view(text).substr(i));
     if (length == 0) text[i] = '?';
@@ -231,10 +234,10 @@ std::string as_utf8(std::string text) {
 
 void write_edge(const Edge& edge, map::Edge& out) {
   out.set_id(edge.id);
-  out.set_name(as_utf8(edge.name));
+  out.set_name(as_text(edge.name));
   out.set_from_node(edge.from_node);
   out.set_to_node(edge.to_node);
-  out.set_line(as_utf8(edge.line));
+  out.set_line(as_text(edge.line));
   out.set_length_m(edge.alignment.length_m());
   out.set_is_drawn(edge.is_drawn);
   for (size_t i = 0; i < edge.alignment.elements().size(); ++i) {
@@ -275,7 +278,7 @@ void write_network(const Map& map, map::Map& out) {
     map::Node& n = *out.add_nodes();
     n.set_id(node.id);
     n.set_kind(static_cast<map::Node::Kind>(node.kind));
-    n.set_name(as_utf8(node.name));
+    n.set_name(as_text(node.name));
     n.set_easting_m(node.easting_m);
     n.set_northing_m(node.northing_m);
   }
@@ -297,7 +300,7 @@ void write_marks(const Map& map, map::Map& out) {
     l.set_offset_m(landmark.offset_m);
     l.set_lateral_m(landmark.lateral_m);
     l.set_sigma_m(landmark.sigma_m);
-    l.set_name(as_utf8(landmark.name));
+    l.set_name(as_text(landmark.name));
   }
   for (const BaliseGroup& group : map.balise_groups) {
     map::BaliseGroup& g = *out.add_balise_groups();
@@ -334,10 +337,10 @@ core::Result<Map> Map::load(const std::filesystem::path& file) {
 
 core::Status Map::save(const std::filesystem::path& file) const {
   map::Map out;
-  out.set_name(as_utf8(name));
-  out.set_source(as_utf8(source));
-  out.set_crs(as_utf8(crs));
-  for (const std::string& problem : problems) out.add_problems(as_utf8(problem));
+  out.set_name(as_text(name));
+  out.set_source(as_text(source));
+  out.set_crs(as_text(crs));
+  for (const std::string& problem : problems) out.add_problems(as_text(problem));
   out.set_q_locacc_m(q_locacc_m);
   write_network(*this, out);
   write_marks(*this, out);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <tuple>
 #include <utility>
 
@@ -20,12 +19,9 @@ namespace {
 
 constexpr double kPathAheadM = 300000;
 constexpr double kPathBehindM = 50000;
-constexpr double kPathLeftM = 20000;     // it is followed on when less of it is left, ...
-constexpr double kPathAgainM = 5000;     // ... and tried again so much further on where it could not be
-constexpr double kLagKnownS = 0.01;      // sigma of a lag that is known
-constexpr double kLagTripSigmaS = 0.02;  // a camera that is started anew may have another one
-constexpr double kLagSure = 3.0;         // sigmas of one that is
-constexpr double kBesideM = 50.0;        // beyond the interval: what is further off is no track beside the train
+constexpr double kPathLeftM = 20000;  // it is followed on when less of it is left, ...
+constexpr double kPathAgainM = 5000;  // ... and tried again so much further on where it could not be
+constexpr double kBesideM = 50.0;     // beyond the interval: what is further off is no track beside the train
 constexpr double kNoCameraS = 0.3;
 constexpr int64_t kSnapshotNs = 50'000'000;
 constexpr int64_t kSlipUnseenNs = 1'200'000'000;  // a slip may have grown for so long before it is found
@@ -76,8 +72,7 @@ Fusion::Fusion(const FusionParameters& parameters, std::shared_ptr<const track::
       map_(std::move(map)),
       path_(std::move(path)),
       saved_(saved) {
-  if (saved && saved->camera_lag && std::abs(saved->camera_lag->s) < parameters.camera_lag_s)
-    lag_before_ = saved->camera_lag;
+  if (saved) lag_room_.begin_with(saved->camera_lag, parameters);
 }
 
 void Fusion::begin_before(const Event& event) {
@@ -97,7 +92,7 @@ SavedScalesAre Fusion::saved_scales() const {
 
 void Fusion::drop_saved_scales() {
   saved_.reset();
-  lag_before_.reset();
+  lag_room_.forget_earlier_trips();
   if (now_) now_->drop_saved();
   if (before_behind_) before_behind_->drop_saved();
   for (auto& snapshot : snapshots_) snapshot.drop_saved();
@@ -108,13 +103,7 @@ std::optional<OdometerScales> Fusion::learnt_scales() const {
 }
 
 std::optional<CameraLag::Lag> Fusion::camera_lag() const {
-  const auto lag = camera_lag_.lag();
-  if (lag && lag->sigma_s < kLagKnownS) return std::abs(lag->s) < parameters_->camera_lag_s ? lag : std::nullopt;
-  return !lag || fits_lag_before(*lag) ? lag_before_ : std::nullopt;
-}
-
-bool Fusion::fits_lag_before(const CameraLag::Lag& measured) const {
-  return lag_before_ && std::abs(measured.s - lag_before_->s) < 2 * measured.sigma_s;
+  return lag_room_.to_keep(*parameters_);
 }
 
 std::optional<TrainEstimate> Fusion::add(Event event) {
@@ -157,10 +146,10 @@ std::optional<TrainEstimate> Fusion::use(Event event) {
   look_beside(event);
   if (const auto* wheel = std::get_if<WheelInput>(&event)) {
     last_wheel_ = *wheel;
-    camera_lag_.add(*wheel);
+    lag_room_.add(*wheel);
   }
   if (auto* step = std::get_if<OdometryInput>(&event)) {
-    camera_lag_.add(*step);
+    lag_room_.add(*step);
     anchor(*step);
     remember_reference(*step);
   }
@@ -390,38 +379,8 @@ std::optional<TrainEstimate> Fusion::give(TrainEstimate estimate) {
   last_output_ns_ = estimate.stamp_ns;
   if (const auto names = stamps_.left_out(now_->stamp_ns()); !names.empty())
     estimate.degrade("left out, its stamps are seconds from those of the odometers: " + names);
-  allow_for_lag(estimate);
+  lag_room_.widen(estimate, *parameters_);
   return estimate;
-}
-
-// What the camera shows was a little earlier: the train is further on than its landmarks say. That is held as long as
-// nothing has ruled it out, as far as the allowed width has room for that; stamps that are early, once they are sure.
-void Fusion::allow_for_lag(TrainEstimate& estimate) const {
-  auto lag = camera_lag_.lag();
-  if (!lag || std::isnan(estimate.speed_mps)) return;  // where the speed is not known it is no position
-  if (lag->sigma_s > kLagTripSigmaS && fits_lag_before(*lag))
-    lag = {lag_before_->s, std::hypot(lag_before_->sigma_s, kLagTripSigmaS)};
-  const auto [lag_s, sigma_s] = *lag;
-  const auto& p = *parameters_;
-  const double off_s = std::abs(lag_s);
-  const bool is_sure = off_s > std::max(p.camera_lag_s + 2 * sigma_s, kLagSure * sigma_s);
-  const double beyond_s = lag_s + 2 * sigma_s - p.camera_lag_s;  // what every interval has room for
-  if (!is_sure && beyond_s < 0) return;
-  const double way_m = (is_sure ? std::copysign(off_s + 2 * sigma_s, lag_s) : beyond_s) * estimate.speed_mps;
-  double& side_m = way_m < 0 ? estimate.over_m : estimate.under_m;
-  const double held_m = side_m + std::abs(way_m);
-  if (!is_sure) {
-    side_m = std::max(side_m, std::min(held_m, p.allowed_m(estimate.since_sure_m)));
-    return;
-  }
-  side_m = held_m;
-  estimate.judge_width(p);
-  char text[160];
-  std::snprintf(
-      text, sizeof text,
-      "camera stamps %.2f s %s against the wheel's: check live.latency_ms, live.line_latency_ms and the clocks", off_s,
-      lag_s > 0 ? "late" : "early");
-  estimate.degrade(text);
 }
 
 }  // namespace railfix::fusion

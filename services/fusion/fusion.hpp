@@ -1,8 +1,8 @@
 // The fusion of all sensors: takes measurements in any order, uses each at its own time, and gives the train's state.
 //
 // The state after a set of measurements does not depend on the order in which they came: late ones are put where they
-// belong and everything behind them is replayed from a snapshot, when the next state is wanted. Not so camera_lag,
-// which looks at what has come so far.
+// belong and everything behind them is replayed from a snapshot, when the next state is wanted. Not so LagRoom, which
+// looks at what has come so far.
 #pragma once
 
 #include <cstdint>
@@ -11,9 +11,9 @@
 #include <optional>
 #include <vector>
 
-#include "fusion/camera_lag.hpp"
 #include "fusion/fusion_parameters.hpp"
 #include "fusion/fusion_types.hpp"
+#include "fusion/lag_room.hpp"
 #include "fusion/odometer_scales.hpp"
 #include "fusion/scale_trial.hpp"
 #include "fusion/stamp_watch.hpp"
@@ -94,8 +94,6 @@ class Fusion {
   void forget_old();
   [[nodiscard]] bool due(const Event& event) const;
   std::optional<TrainEstimate> give(TrainEstimate estimate);
-  [[nodiscard]] bool fits_lag_before(const CameraLag::Lag& measured) const;
-  void allow_for_lag(TrainEstimate& estimate) const;
 
   std::shared_ptr<const FusionParameters> parameters_;
   std::shared_ptr<const track::Map> map_;
@@ -116,9 +114,8 @@ class Fusion {
   std::optional<ScaleTrial> before_behind_;  // the state before those that are behind
   std::deque<GnssInput> early_;              // GNSS that waits for what measures motion
   std::optional<WheelInput> last_wheel_;
-  CameraLag camera_lag_;
-  std::optional<CameraLag::Lag> lag_before_;  // of an earlier trip
-  std::optional<OdometryInput> anchor_;       // the first step that counts from a picture before all that is known
+  LagRoom lag_room_;
+  std::optional<OdometryInput> anchor_;  // the first step that counts from a picture before all that is known
 };
 
 }  // namespace railfix::fusion

@@ -41,6 +41,8 @@ std::string picture_name(int64_t stamp_ns, const std::string& format) {
 
 core::Result<DatasetWriter> DatasetWriter::create(const fs::path& root) {
   std::error_code code;
+  if (fs::exists(root, code) && !fs::is_directory(root, code))
+    return core::Error{root.string() + " is a file; name a new folder with --out"};
   if (fs::exists(root, code) && !fs::is_empty(root, code)) {
     return core::Error{root.string() + " is not empty; remove it or give another --out"};
   }

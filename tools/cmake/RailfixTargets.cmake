@@ -87,8 +87,8 @@ function(railfix_service name)
 endfunction()
 
 # railfix_test(core SOURCES a_test.cpp DEPENDS railfix_core)  -> program railfix-test-core, run by CTest test by test.
-# Tests of a folder that sets RAILFIX_TESTS_RUN_ALONE start processes that have the machine for themselves, but for
-# those that wait most of their time: WAITS, they run beside others.
+# A test steps back (nice) for those that wait most of their time: WAITS, which begin first, the longest before all. Tests
+# of a folder that sets RAILFIX_TESTS_RUN_ALONE start processes that have the machine for themselves, but for such.
 function(railfix_test name)
   cmake_parse_arguments(ARG "WAITS" "TIMEOUT" "SOURCES;DEPENDS" ${ARGN})
   if(NOT ARG_TIMEOUT)
@@ -110,12 +110,17 @@ function(railfix_test name)
   target_compile_options(railfix-test-${name} PRIVATE -pthread $<$<CXX_COMPILER_ID:GNU>:-Wno-error=invalid-pch -fpch-preprocess>)
   # SIGABRT leaves a core of a program that hangs, which .ci/run prints: CTest's own end of it would leave nothing.
   math(EXPR last_second "${ARG_TIMEOUT} + 30")
-  add_test(NAME ${name} COMMAND timeout --verbose --signal=ABRT ${ARG_TIMEOUT} $<TARGET_FILE:railfix-test-${name}>)
-  set(alone OFF)
-  if(RAILFIX_TESTS_RUN_ALONE AND NOT ARG_WAITS)
-    set(alone ON)
+  set(ended_in_time timeout --verbose --signal=ABRT ${ARG_TIMEOUT} $<TARGET_FILE:railfix-test-${name}>)
+  if(ARG_WAITS)
+    add_test(NAME ${name} COMMAND ${ended_in_time})
+    set_tests_properties(${name} PROPERTIES COST ${ARG_TIMEOUT})
+  elseif(RAILFIX_TESTS_RUN_ALONE)
+    add_test(NAME ${name} COMMAND ${ended_in_time})
+    set_tests_properties(${name} PROPERTIES RUN_SERIAL ON)
+  else()
+    add_test(NAME ${name} COMMAND nice -n 5 ${ended_in_time})
   endif()
-  set_tests_properties(${name} PROPERTIES TIMEOUT ${last_second} RUN_SERIAL ${alone})
+  set_tests_properties(${name} PROPERTIES TIMEOUT ${last_second})
 endfunction()
 
 # railfix_measuring_program(railfix-measure-survey SOURCES survey.cpp DEPENDS railfix_track)  -> that program: no timing

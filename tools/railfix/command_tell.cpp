@@ -49,6 +49,8 @@ class Teller {
         }) {}
 
   int tell() {
+    if (options_.service.empty() || options_.command.empty())
+      throw core::BadInput("a service and a command have names, e.g. railfix tell recorder stop");
     const std::string here = where(options_.network);
     if (!wait_until([this] { return heard_of_it(); })) {
       throw core::BadInput(

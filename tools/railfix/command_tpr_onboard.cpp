@@ -131,7 +131,9 @@ class OnboardUnit {
     status_.packet_58_lrbg(0);
     status_.packet_58_deleted(hex == "none" ? 1 : 0);
     if (hex == "none") return status_.packet_58_bytes(0);
-    const auto packet = core::value_or_throw(etcs::parse_hex(hex));
+    const auto bytes = etcs::parse_hex(hex);
+    if (!bytes.ok()) throw core::BadInput(word + ": " + bytes.error().message);
+    const auto& packet = bytes.value();
     if (const auto parameters = etcs::decode_report_parameters(packet); !parameters.ok())
       throw core::BadInput(word + ": " + parameters.error().message);
     if (packet.size() > status_.packet_58().size()) throw core::BadInput(word + ": is longer than a packet 58 can be");

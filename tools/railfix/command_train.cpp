@@ -133,8 +133,19 @@ int check(const TrainOptions& options) {
   return good ? 0 : 1;
 }
 
+/// The folders of the hosts would lie among what they are made of, and be removed with the keys of others.
+void refuse_own_folder(const Manifest& manifest, const fs::path& out) {
+  if (out.empty()) throw core::BadInput("--out is missing: name the folder to write into");
+  std::error_code none;
+  for (const auto& own : {manifest.folder, manifest.folder / "security"}) {
+    if (fs::equivalent(out, own, none))
+      throw core::BadInput("--out " + out.string() + " is the train's own folder; name another one");
+  }
+}
+
 int render(const TrainOptions& options) {
   const auto manifest = core::value_or_throw(read_manifest(options.train));
+  refuse_own_folder(manifest, options.out);
   if (!say(checked(manifest, options).findings)) return 1;
   for (const auto& other : remove_secrets_of_others(manifest, options.out))
     std::cout << other.string() << ": is of no host of train " << manifest.train_id << "; its keys are removed\n";
@@ -239,6 +250,11 @@ void add_train(CLI::App& app, Action& chosen) {
   auto* train = app.add_subcommand(
       "train", "A train as a whole, from its manifest.  Example: railfix train check deploy/trains/re460-042");
   train->require_subcommand(1);
+  const CLI::Validator no_file(
+      [](const std::string& name) {
+        return fs::exists(name) && !fs::is_directory(name) ? name + " is a file; give a folder" : std::string();
+      },
+      "");
   enum { kManifest = 1, kHost = 2, kRoot = 4, kGate = 8 };
   const auto add = [&](const char* name, const char* what, int (*work)(const TrainOptions&), int takes) {
     auto* command = train->add_subcommand(name, what);
@@ -247,7 +263,9 @@ void add_train(CLI::App& app, Action& chosen) {
       command->add_option("--host", options->host,
                           "Which host of the train this computer is; found by its address otherwise");
     if ((takes & kRoot) != 0)
-      command->add_option("--root", options->root, "Where var/lib/railfix and opt/railfix are")->capture_default_str();
+      command->add_option("--root", options->root, "Where var/lib/railfix and opt/railfix are")
+          ->check(no_file)
+          ->capture_default_str();
     if ((takes & kGate) != 0) {
       command->add_option("--healthy-for", options->gate.healthy_s, "Seconds that a service must be healthy")
           ->check(number_between(0.5, 600.0))
@@ -290,7 +308,7 @@ void add_train(CLI::App& app, Action& chosen) {
   auto* computer = app.add_subcommand("doctor", "Say what is wrong with this computer as a host of a train");
   computer->add_option("--train", options->train, "Folder of train.yaml");
   computer->add_option("--host", options->host, "Which host of the train this computer is");
-  computer->add_option("--root", options->root, "Where var/lib/railfix is")->capture_default_str();
+  computer->add_option("--root", options->root, "Where var/lib/railfix is")->check(no_file)->capture_default_str();
   computer->callback([&chosen, options] { chosen = [options] { return doctor(*options); }; });
 }
 

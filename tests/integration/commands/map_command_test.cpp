@@ -56,6 +56,8 @@ TEST_F(MapCommand, RefusesValuesThatMeanNothing) {
     EXPECT_EQ(refused.exit_code, 2) << command << refused.out;
   }
   refuses({"info", map_, "--at", ""}, "is not a place on the map");
+  refuses({"coverage", map_, "--sighted", "frog,pole"},
+          "--sighted: 'pole' is no kind of landmark that the camera sights; give of frog, balise, portal_in, ");
   const auto seed = map({"make", "--seed", "-1", "--out", root_ / "made.map"});
   EXPECT_EQ(seed.exit_code, 2);
   EXPECT_THAT(seed.err, HasSubstr("--seed: -1 is not a whole number from 0 on"));

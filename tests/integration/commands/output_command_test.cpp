@@ -46,6 +46,27 @@ TEST_F(OutputCommand, RunDrawsIntoNoFolderOfPictures) {
   EXPECT_FALSE(std::filesystem::exists(path("out")));
 }
 
+TEST_F(OutputCommand, FoldersAreNoFilesAndNotOnesOwn) {
+  refuses({"simulate", "--out", path("film.mp4")}, "film.mp4 is a file; name a new folder with --out");
+  const auto train = path("train");
+  std::filesystem::copy(std::string(RAILFIX_SOURCE_DIR) + "/deploy/trains/am843-017", train,
+                        std::filesystem::copy_options::recursive);
+  refuses({"train", "render", train, "--out", train + "/"}, "is the train's own folder; name another one");
+  refuses({"train", "render", train, "--out", ""}, "--out is missing");
+  const auto root = test::run_program({"railfix", "train", "status", "--root", path("film.mp4")}, kPatienceS);
+  EXPECT_EQ(root.exit_code, 2);
+  EXPECT_THAT(root.err, ::testing::HasSubstr("film.mp4 is a file; give a folder"));
+}
+
+TEST(Words, ThatMeanNothingAreNamed) {
+  expect_refusal(test::run_program({"railfix", "tpr", "onboard", "packet_58=zz"}, kPatienceS),
+                 "packet_58=zz: Character 1 ('z') is not a hexadecimal digit");
+  expect_refusal(test::run_program({"railfix", "tell", "", "stop"}, kPatienceS), "a service and a command have names");
+  expect_refusal(
+      test::run_program({"railfix", "tpr", "listen", "--broker", "localhost", "--ca", "/none.pem"}, kPatienceS),
+      "TLS of the ground link: cannot read /none.pem (No such file or directory)");
+}
+
 TEST(StandardOutput, IsMissedWhereItIsFullAndNotWhereNobodyReadsOn) {
   const auto shell = [](const std::string& command) {
     return test::run_program({"/bin/bash", "-c", std::string(RAILFIX_BIN_DIR) + "/railfix " + command}, kPatienceS);

@@ -186,6 +186,10 @@ TEST(Board, WhatCannotBe) {
   EXPECT_FALSE(BoardFinder::make({9, 7, 0, 0, ""}).ok());
   EXPECT_FALSE(BoardFinder::make({9, 7, 0.03, 0.03, "5X5_100"}).ok());
   EXPECT_FALSE(BoardFinder::make({9, 7, 0.03, 0.02, "9X9"}).ok());
+  EXPECT_TRUE(BoardFinder::make({10, 10, 0.03, 0.02, "5X5_50"}).ok());
+  const auto too_large = BoardFinder::make({11, 10, 0.03, 0.02, "5X5_50"});
+  ASSERT_FALSE(too_large.ok());
+  EXPECT_THAT(too_large.error().message, ::testing::HasSubstr("has 50 markers, and the board has 55"));
 }
 
 }  // namespace

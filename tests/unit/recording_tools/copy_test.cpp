@@ -186,6 +186,15 @@ TEST_F(Copy, WhatAKilledOneLeftIsNamedAndStays) {
   EXPECT_THAT(content(folder_ / "saved.mcap"), ElementsAre("odometry_step@1"));
 }
 
+TEST_F(Copy, OfNothingThatCanBeReadNothingIsMade) {
+  Recorded(a_, "t").step(1);
+  fs::resize_file(a_, 8);  // the file's first mark
+  const auto refused = repair_recording(a_, out_);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_THAT(refused.error().message, HasSubstr("holds no sample that can be read; nothing is written"));
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 1);
+}
+
 TEST_F(Copy, WhatIsBeingWrittenIsLeftToItsWriter) {
   Recorded(a_, "t").step(1);
   const auto writer = mcap::Writer::create(out_, {}).value();

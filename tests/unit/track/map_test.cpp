@@ -41,6 +41,13 @@ TEST_F(MapFile, NamesInOtherEncodingsDoNotMakeItUnreadable) {
   EXPECT_EQ(core::value_or_throw(Map::load(file())).edges[0].name, "M?hle \xE4\xB8\xAD ???");
 }
 
+TEST_F(MapFile, NamesGiveATerminalNoOrders) {
+  Map map = small_map();
+  map.edges[0].name = "\x1B[2J\xC2\x9B\n\x7F\xC2\xA0";  // escapes of 7 and 8 bits, and a space that stays
+  ASSERT_TRUE(map.save(file()).ok());
+  EXPECT_EQ(core::value_or_throw(Map::load(file())).edges[0].name, "?[2J????\xC2\xA0");
+}
+
 TEST_F(MapFile, ReadsBackWhatWasSaved) {
   const Map saved = small_map();
   ASSERT_TRUE(saved.save(file()).ok());

@@ -290,6 +290,16 @@ TEST_F(TrainFolder, ReportsThatLeaveASecuredTrainInTheOpenAreTold) {
               ElementsAre(HasSubstr("a password in plain text")));
 }
 
+TEST_F(TrainFolder, APasswordThatIsEmptyIsTold) {
+  write_map();
+  std::ofstream(folder_ / "password") << "\nsecret";
+  EXPECT_THAT(findings("settings:\n  tpr_publisher:\n",
+                       "settings:\n  tpr_publisher:\n    ground_link: { broker: g:1883, store: s, user: a, "
+                       "password_file: password }\n"),
+              testing::Contains(HasSubstr("password_file: " + (folder_ / "password").string() +
+                                          ": no password can be read; put it into the first line")));
+}
+
 TEST_F(TrainFolder, APageThatNobodyCanControlIsTold) {
   write_map();
   std::ofstream(folder_ / "word") << "secret";

@@ -29,9 +29,13 @@ core::Result<BoardFinder> BoardFinder::make(const BoardDescription& board) {
   if (board.marker_m >= board.square_m) return core::Error{"a marker is smaller than its square: check --marker"};
   for (const auto& [name, number] : kDictionaries) {
     if (board.dictionary != name) continue;
-    finder.charuco_ =
-        cv::aruco::CharucoBoard::create(board.columns, board.rows, static_cast<float>(board.square_m),
-                                        static_cast<float>(board.marker_m), cv::aruco::getPredefinedDictionary(number));
+    const auto dictionary = cv::aruco::getPredefinedDictionary(number);
+    const int markers = board.columns * board.rows / 2;  // one in every second square
+    if (markers > dictionary->bytesList.rows)
+      return core::Error{"--dictionary " + board.dictionary + " has " + std::to_string(dictionary->bytesList.rows) +
+                         " markers, and the board has " + std::to_string(markers) + "; 5X5_250 and the like have more"};
+    finder.charuco_ = cv::aruco::CharucoBoard::create(board.columns, board.rows, static_cast<float>(board.square_m),
+                                                      static_cast<float>(board.marker_m), dictionary);
     return finder;
   }
   return core::Error{"--dictionary " + board.dictionary + " is not known; 5X5_100 and the like are"};

@@ -54,7 +54,8 @@ CoverageOptions options_of(const CoverageRequest& request) {
   for (const std::string& name : request.sighted) {
     const auto kind = track::landmark_kind_from(name);
     if (!kind || !track::can_be_sighted(*kind))
-      throw core::BadInput("--sighted: " + name + " is no kind of landmark that the camera sights");
+      throw core::BadInput("--sighted: '" + name + "' is no kind of landmark that the camera sights; give of " +
+                           track::sighted_kinds());
     options.sighted.push_back(*kind);
   }
   return options;

@@ -32,6 +32,8 @@ core::Result<RepairReport> repair_recording(const std::filesystem::path& damaged
   RepairReport report;
   auto status = copy(reader, copier, report);
   report.lost = mcap::losses_of(reader, report.samples);
+  if (status.ok() && report.samples == 0)
+    status = core::Error{damaged.string() + " holds no sample that can be read; nothing is written"};
   if (status.ok()) status = copier.write(mcap::repair_trace(report.lost, damaged));
   if (status.ok()) status = copier.close();
   if (!status.ok()) return status.error();

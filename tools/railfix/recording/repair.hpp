@@ -17,7 +17,8 @@ struct RepairReport {
   std::vector<std::string> problems;  // a sentence each
 };
 
-/// The damaged one is left as it is. The new file says in its metadata (railfix_repair) what of it is missing.
+/// The damaged one is left as it is; one without a readable sample is an error. The new file says in its metadata
+/// (railfix_repair) what of it is missing.
 core::Result<RepairReport> repair_recording(const std::filesystem::path& damaged, const std::filesystem::path& out);
 
 }  // namespace railfix::tool

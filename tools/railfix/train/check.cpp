@@ -7,6 +7,7 @@
 #include <future>
 
 #include "dataset/calibration.hpp"
+#include "ground_link/mqtt_client.hpp"
 #include "messaging/qos_match.hpp"
 #include "track/map.hpp"
 #include "train/findings.hpp"
@@ -82,9 +83,14 @@ void check_files(const Manifest& manifest, Findings& findings) {
             key + ": " + (manifest.folder / name).string() + " is missing or cannot be read; put it beside train.yaml");
   }
   for (const auto& file : setting_files(manifest)) {
-    if (access((manifest.folder / file.file).c_str(), R_OK) != 0)
-      error(findings, "settings." + file.service + "." + file.key + ": " + (manifest.folder / file.file).string() +
-                          " is missing or cannot be read; put it beside train.yaml");
+    const auto at = manifest.folder / file.file;
+    const std::string setting = "settings." + file.service + "." + file.key + ": ";
+    if (access(at.c_str(), R_OK) != 0) {
+      error(findings, setting + at.string() + " is missing or cannot be read; put it beside train.yaml");
+    } else if (file.key == "ground_link.password_file") {
+      if (const auto password = ground_link::read_password(at); !password.ok())
+        error(findings, setting + password.error().message);
+    }
   }
   if (manifest.map.empty()) warning(findings, "train.map is empty: there will be distance and speed, but no position");
 }

@@ -1,0 +1,46 @@
+// Room in the interval for a camera whose stamps may be late against the wheel's: what it shows was a little earlier,
+// so that the train is further on than its landmarks say.
+#pragma once
+
+#include <algorithm>
+#include <optional>
+
+#include "fusion/camera_lag.hpp"
+#include "fusion/fusion_parameters.hpp"
+#include "fusion/fusion_types.hpp"
+
+namespace railfix::fusion {
+
+class LagRoom {
+ public:
+  /// before: of an earlier trip; it bounds what is held as long as this one measures nothing else.
+  void begin_with(const std::optional<CameraLag::Lag>& before, const FusionParameters& parameters);
+  void forget_earlier_trips() { before_.reset(); }
+  void add(const WheelInput& sample) { measured_.add(sample); }
+  void add(const OdometryInput& step) { measured_.add(step); }
+  /// Holds what nothing has ruled out, as far as the allowed width has room for that, and beyond where it is no
+  /// position anyway; all of a lag that is sure, and says it. States come in the order of their stamps.
+  void widen(TrainEstimate& estimate, const FusionParameters& parameters);
+  /// Fit to be kept for the next trip: nothing where it is vague or more than may be.
+  [[nodiscard]] std::optional<CameraLag::Lag> to_keep(const FusionParameters& parameters) const;
+
+ private:
+  /// A landmark leaves the way run at its speed; on from there the camera's way is short by that of the speed of now,
+  /// the wheel's as before.
+  struct Speeds {
+    double slowest_mps = 0;
+    double fastest_mps = 0;
+  };
+  [[nodiscard]] bool fits_before(const CameraLag::Lag& measured) const;
+  [[nodiscard]] std::optional<CameraLag::Lag> lag() const;
+  [[nodiscard]] Speeds speeds_since_sure(const TrainEstimate& estimate);
+
+  CameraLag measured_;
+  std::optional<CameraLag::Lag> before_;
+  Speeds speeds_;         // since the last sure place
+  Speeds speeds_before_;  // since the one before it: which was sure is known later
+  double since_sure_m_ = 0;
+  double last_speed_mps_ = 0;
+};
+
+}  // namespace railfix::fusion
