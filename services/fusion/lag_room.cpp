@@ -2,13 +2,15 @@
 
 #include <cmath>
 #include <cstdio>
+#include <limits>
 
 namespace railfix::fusion {
 namespace {
 
 constexpr double kKnownS = 0.01;      // sigma of a lag that is known
 constexpr double kTripSigmaS = 0.02;  // a camera that is started anew may have another one
-constexpr double kSure = 3.0;         // sigmas of one that is
+constexpr double kLikely = 1.0;       // sigmas of one that the measurements speak for
+constexpr double kSure = 3.0;         // ... and of one that is
 
 void degrade(TrainEstimate& estimate, double lag_s) {
   char text[160];
@@ -64,17 +66,16 @@ void LagRoom::widen(TrainEstimate& estimate, const FusionParameters& p) {
   const double beyond_s = held->s + 2 * held->sigma_s - p.camera_lag_s;  // what every interval has room for
   if (!is_sure && beyond_s < 0) return;
   const double late_s = is_sure ? std::copysign(off_s + 2 * held->sigma_s, held->s) : beyond_s;
-  const bool is_position = estimate.integrity != Integrity::unusable;
+  const bool is_likely = is_sure || held->s > kLikely * held->sigma_s;
+  const bool is_bounded = !is_likely && estimate.integrity != Integrity::unusable;
+  const double most_m = is_bounded ? p.allowed_m(estimate.since_sure_m) : std::numeric_limits<double>::infinity();
   const auto make_room = [&](double& side_m, double way_m) {
-    const double wide_m = side_m + std::max(0.0, way_m);
-    const double most_m = is_sure || !is_position ? wide_m : p.allowed_m(estimate.since_sure_m);
-    side_m = std::max(side_m, std::min(wide_m, most_m));
+    side_m = std::max(side_m, std::min(side_m + std::max(0.0, way_m), most_m));
   };
-  make_room(estimate.under_m, std::max(late_s * speeds.fastest_mps, late_s * speeds.slowest_mps));
-  make_room(estimate.over_m, -std::min(late_s * speeds.fastest_mps, late_s * speeds.slowest_mps));
-  if (!is_sure) return;
+  make_room(estimate.under_m, late_s * (late_s > 0 ? speeds.fastest_mps : speeds.slowest_mps));
+  make_room(estimate.over_m, -late_s * (late_s > 0 ? speeds.slowest_mps : speeds.fastest_mps));
   estimate.judge_width(p);
-  degrade(estimate, held->s);
+  if (is_sure) degrade(estimate, held->s);
 }
 
 }  // namespace railfix::fusion

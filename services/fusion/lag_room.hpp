@@ -18,15 +18,15 @@ class LagRoom {
   void forget_earlier_trips() { before_.reset(); }
   void add(const WheelInput& sample) { measured_.add(sample); }
   void add(const OdometryInput& step) { measured_.add(step); }
-  /// Holds what nothing has ruled out, as far as the allowed width has room for that, and beyond where it is no
-  /// position anyway; all of a lag that is sure, and says it. States come in the order of their stamps.
+  /// Holds what nothing has ruled out: as far as the allowed width has room for that, and all of it where a lag is
+  /// likely or the state is no position anyway. One that is sure is said. States come in the order of their stamps.
   void widen(TrainEstimate& estimate, const FusionParameters& parameters);
   /// Fit to be kept for the next trip: nothing where it is vague or more than may be.
   [[nodiscard]] std::optional<CameraLag::Lag> to_keep(const FusionParameters& parameters) const;
 
  private:
-  /// A landmark leaves the way run at its speed; on from there the camera's way is short by that of the speed of now,
-  /// the wheel's as before.
+  /// By a landmark the train is put back by the way of its lag at that speed. From there on this becomes the way at the
+  /// speed of now where the camera counts, and stays where the wheel does: the train is between the two.
   struct Speeds {
     double slowest_mps = 0;
     double fastest_mps = 0;
