@@ -7,7 +7,7 @@
 
 #include "core/time.hpp"
 #include "etcs/train_position_report.hpp"
-#include "messaging/operation_words.hpp"
+#include "messaging/message_words.hpp"
 #include "messaging/samples.hpp"
 
 namespace railfix::monitor {
@@ -21,10 +21,6 @@ json known(double value) {
 
 const char* direction_name(uint8_t direction) {
   return direction == msg::DIRECTION_FORWARD ? "forward" : direction == msg::DIRECTION_REVERSE ? "reverse" : "unknown";
-}
-
-const char* integrity_name(uint8_t integrity) {
-  return integrity == msg::INTEGRITY_OK ? "ok" : integrity == msg::INTEGRITY_DEGRADED ? "degraded" : "unusable";
 }
 
 const char* reason_name(uint8_t reason) {
@@ -154,7 +150,7 @@ json state_message(const msg::TrainState& state, double age_s, const msg::TrainP
                {"over_m", known(state.over_m())},
                {"under_m", known(state.under_m())},
                {"sigma_m", known(state.sigma_m())},
-               {"integrity", integrity_name(state.integrity())},
+               {"integrity", messaging::name_of_integrity(state.integrity())},
                {"track_known", state.track_known() != 0},
                {"track_probability", known(state.track_probability())},
                {"direction", direction_name(state.direction())},

@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "core/time.hpp"
-#include "messaging/operation_words.hpp"
+#include "messaging/message_words.hpp"
 
 namespace railfix::monitor {
 namespace {

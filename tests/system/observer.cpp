@@ -12,7 +12,7 @@
 
 #include "core/time.hpp"
 #include "ground_link/ground_report.hpp"
-#include "messaging/operation_words.hpp"
+#include "messaging/message_words.hpp"
 
 namespace railfix::system_test {
 namespace {

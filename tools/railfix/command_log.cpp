@@ -7,7 +7,7 @@
 #include "commands.hpp"
 #include "core/result.hpp"
 #include "mcap/reader.hpp"
-#include "messaging/operation_words.hpp"
+#include "messaging/message_words.hpp"
 #include "not_negative.hpp"
 #include "recording/utc_text.hpp"
 #include "topic_listener.hpp"

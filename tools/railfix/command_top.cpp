@@ -11,7 +11,7 @@
 #include "commands.hpp"
 #include "core/time.hpp"
 #include "key_reader.hpp"
-#include "messaging/operation_words.hpp"
+#include "messaging/message_words.hpp"
 #include "not_negative.hpp"
 #include "recording/utc_text.hpp"
 #include "service_table.hpp"

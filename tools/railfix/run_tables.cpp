@@ -9,10 +9,9 @@
 
 #include "core/csv.hpp"
 #include "mcap/reader.hpp"
-#include "messaging/operation_words.hpp"
+#include "messaging/message_words.hpp"
 #include "messaging/samples.hpp"
 #include "messaging/topics.hpp"
-#include "run_words.hpp"
 
 namespace railfix::tool {
 
@@ -104,7 +103,7 @@ class Tables {
     for (const double value : {step.speed_mps(), step.lateral_speed_mps(), step.yaw_rate_rps(), step.step_sigma_m()}) {
       odometry_ << (known ? value : kUnknown);
     }
-    odometry_ << word(kModeWords, step.mode());
+    odometry_ << word(messaging::kOdometryModeNames, step.mode());
     end(odometry_);
   }
 
@@ -131,7 +130,7 @@ class Tables {
       train_state_.empty().empty().empty() << 0;
     }
     train_state_ << state.distance_m() << state.speed_mps() << state.over_m() << state.under_m() << state.sigma_m()
-                 << word(kIntegrityWords, state.integrity());
+                 << word(messaging::kIntegrityNames, state.integrity());
     const bool placed = state.track_known() != 0;
     for (const double value :
          {state.lat_deg(), state.lon_deg(), state.easting_m(), state.northing_m(), state.heading_rad()}) {

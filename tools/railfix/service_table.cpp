@@ -6,7 +6,7 @@
 #include <functional>
 #include <set>
 
-#include "messaging/operation_words.hpp"
+#include "messaging/message_words.hpp"
 
 namespace railfix::tool {
 

@@ -47,10 +47,17 @@ class Judge {
     verdict_.way_m = simulation.way_m();
   }
 
+  /// Fusion counts its way from the first measurement on, the ride from its own beginning.
+  void begin_with(const fusion::Event& first) {
+    const auto* step = std::get_if<fusion::OdometryInput>(&first);
+    const int64_t begin_ns = fusion::stamp_of(first);
+    counted_from_m_ = simulation_.truth_at(step ? std::min(step->reference_stamp_ns, begin_ns) : begin_ns).distance_m;
+  }
+
   void see(const fusion::TrainEstimate& state, double arrival_s) {
     const auto truth = simulation_.truth_at(state.stamp_ns, arrival_s);
     const double error_m = state.track_known ? simulation_.error_m(state.position, truth).value_or(1e6)
-                                             : state.distance_m - truth.distance_m;
+                                             : state.distance_m - (truth.distance_m - counted_from_m_);
     const double excess_m = std::max(error_m - state.over_m, -error_m - state.under_m);
     error_m_ = state.track_known ? std::clamp(error_m, -kFollowedM, kFollowedM) : 0;
     ++verdict_.states;
@@ -102,6 +109,7 @@ class Judge {
   }
 
   double error_m_ = 0;
+  double counted_from_m_ = 0;
   const TrainSimulation& simulation_;
   double after_m_;
   const Watcher& watcher_;
@@ -145,6 +153,7 @@ Verdict judge(const TrainSimulation& simulation, fusion::Fusion& fusion, double 
   std::optional<MatcherLoop> matcher;
   if (simulation.plan().shape || simulation.plan().sightings) matcher.emplace(simulation);
   double tick_s = 0;
+  bool began = false;
   for (const auto& arrival : simulation.arrivals) {
     if (arrival.arrival_s > simulation.duration_s()) break;
     for (; tick_s < arrival.arrival_s; tick_s += kJudgedEveryS) {
@@ -156,6 +165,10 @@ Verdict judge(const TrainSimulation& simulation, fusion::Fusion& fusion, double 
     if (auto* fix = std::get_if<fusion::FixInput>(&event); fix != nullptr && fix->kind == fusion::FixKind::track)
       *fix = simulation.said_of_track(*fix, judge.error_m(), arrival.arrival_s);
     const auto state = fusion.add(event);
+    if (!began && fusion.estimator() != nullptr) {
+      judge.begin_with(event);
+      began = true;
+    }
     if (!state) continue;
     judge.see(*state, arrival.arrival_s);
     const auto* step = std::get_if<fusion::OdometryInput>(&arrival.event);

@@ -7,7 +7,7 @@
 #include "core/csv_table.hpp"
 #include "core/joined.hpp"
 #include "core/train_limits.hpp"
-#include "run_words.hpp"
+#include "messaging/message_words.hpp"
 
 namespace railfix::evaluation {
 namespace {
@@ -36,8 +36,8 @@ Status read(const fs::path& file, std::vector<OdometryRow>& rows) {
   const std::optional<size_t> yaw_rate = table.optional({"yaw_rate_rps"});
   while (table.next()) {
     rows.push_back({table.integer(stamp), table.integer(valid) != 0, table.number_or_nan(distance, core::kFarthestM),
-                    table.number_or_nan(speed, core::kFastestTrainMps), word(table, mode, "mode", tool::kModeWords),
-                    table.number_or_nan(yaw_rate)});
+                    table.number_or_nan(speed, core::kFastestTrainMps),
+                    word(table, mode, "mode", messaging::kOdometryModeNames), table.number_or_nan(yaw_rate)});
   }
   return table.status();
 }
@@ -64,7 +64,7 @@ Status read(const fs::path& file, std::vector<StateRow>& rows) {
     row.over_m = table.number_or_nan(over, core::kWidestM);
     row.under_m = table.number_or_nan(under, core::kWidestM);
     if (row.over_m < 0 || row.under_m < 0) table.refuse("has an interval that ends before it begins");
-    row.integrity = word(table, integrity, "integrity", tool::kIntegrityWords);
+    row.integrity = word(table, integrity, "integrity", messaging::kIntegrityNames);
     row.easting_m = table.number_or_nan(easting, core::kFarthestM);
     row.northing_m = table.number_or_nan(northing, core::kFarthestM);
     rows.push_back(row);

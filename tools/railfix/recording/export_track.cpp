@@ -10,6 +10,7 @@
 #include "core/time.hpp"
 #include "core/units.hpp"
 #include "core/whole_file.hpp"
+#include "messaging/message_words.hpp"
 #include "messaging/topics.hpp"
 #include "recording/sample_types.hpp"
 #include "recording/utc_text.hpp"
@@ -98,10 +99,6 @@ ordered_json place(const TrackPoint& point, double ahead_m = 0) {
   return {rounded(point.lon_deg + east_deg), rounded(point.lat_deg + north_deg)};
 }
 
-const char* integrity_word(uint8_t integrity) {
-  return integrity == msg::INTEGRITY_OK ? "ok" : integrity == msg::INTEGRITY_DEGRADED ? "degraded" : "unusable";
-}
-
 TrackPoint with_integrity(TrackPoint point, uint8_t integrity) {
   point.integrity = integrity;
   return point;
@@ -149,7 +146,7 @@ ordered_json lines_feature(const char* name, const Lines& lines) {
 
 ordered_json train_feature(uint8_t integrity, const Lines& lines) {
   auto feature = lines_feature("train", lines);
-  feature["properties"]["integrity"] = integrity_word(integrity);
+  feature["properties"]["integrity"] = messaging::name_of_integrity(integrity);
   feature["properties"]["stroke"] = integrity_colour(integrity);
   return feature;
 }
@@ -170,7 +167,7 @@ ordered_json interval_feature(const TrackPoint& point) {
             {"over_m", point.over_m},
             {"under_m", point.under_m},
             {"speed_kmh", number(core::kmh_from_mps(point.speed_mps))},
-            {"integrity", integrity_word(point.integrity)},
+            {"integrity", messaging::name_of_integrity(point.integrity)},
             {"degraded", point.integrity != msg::INTEGRITY_OK}}}};
 }
 

@@ -9,6 +9,7 @@
 #include "core/time.hpp"
 #include "core/units.hpp"
 #include "etcs/train_position_report.hpp"
+#include "messaging/message_words.hpp"
 #include "service_table.hpp"
 
 namespace railfix::tool {
@@ -23,14 +24,11 @@ std::string position_line(const TrainPicture& picture) {
   const double elapsed_s = core::seconds(picture.data_ns - picture.data_begin_ns);
   const std::string where =
       s.track_known() != 0 ? fmt::format("edge {} at {:.2f} m", s.edge(), s.offset_m()) : "track not yet known";
-  const char* integrity = s.integrity() == msg::INTEGRITY_OK         ? "ok"
-                          : s.integrity() == msg::INTEGRITY_DEGRADED ? "degraded"
-                                                                     : "unusable";
   const std::string speed =
       std::isnan(s.speed_mps()) ? "speed not known" : fmt::format("{:.1f} km/h", core::kmh_from_mps(s.speed_mps()));
   return fmt::format("{:6.1f} s  {}  -{:.2f}/+{:.2f} m  {}{}  travelled {:.1f} m  integrity {}", elapsed_s, where,
                      s.over_m(), s.under_m(), speed, s.standstill() != 0 ? " (standstill)" : "", s.distance_m(),
-                     integrity);
+                     messaging::name_of_integrity(s.integrity()));
 }
 
 std::string counts_line(const TrainPicture& picture) {

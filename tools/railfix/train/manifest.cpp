@@ -255,14 +255,13 @@ core::Result<Manifest> read_manifest(const std::filesystem::path& train) {
   const auto file = std::filesystem::is_directory(train) ? train / "train.yaml" : train;
   Manifest manifest;
   manifest.folder = std::filesystem::absolute(file).lexically_normal().parent_path();
+  const auto root = service::read_yaml(file, "give the train's folder, such as deploy/trains/re460-042");
+  if (!root.ok()) return root.error();
   ManifestReader reader(file, manifest);
   try {
-    reader.read(service::load_yaml(file));
-  } catch (const YAML::BadFile&) {
-    return core::Error{file.string() + " cannot be opened; give the train's folder, such as deploy/trains/re460-042"};
-  } catch (const YAML::Exception& error) {
-    return core::Error{file.string() + " line " + std::to_string(error.mark.line + 1) +
-                       ": not valid YAML: " + error.msg};
+    reader.read(root.value());
+  } catch (const YAML::Exception& error) {  // a node that is of another kind than asked for
+    return core::Error{file.string() + " line " + std::to_string(error.mark.line + 1) + ": " + error.msg};
   }
   if (!reader.problems().empty()) return core::Error{reader.problems()};
   return manifest;

@@ -1,4 +1,4 @@
-// Words for the numbers of operation.idl, the same on every page, table and metric.
+// Words for the numbers of messages, the same on every page, table and metric.
 #pragma once
 
 #include <algorithm>
@@ -13,9 +13,18 @@ inline constexpr std::array kStateNames{"starting", "ready", "active", "degraded
 /// By LogRecord.level.
 inline constexpr std::array kLevelNames{"trace", "debug", "info", "warning", "error", "critical"};
 
+/// By TrainState.integrity.
+inline constexpr std::array kIntegrityNames{"ok", "degraded", "unusable"};
+/// By OdometryStep.mode.
+inline constexpr std::array kOdometryModeNames{"search", "track", "keyframe", "blind"};
+
 /// A state that a later release may have is "stopped".
 constexpr const char* name_of_state(uint8_t state) {
   return kStateNames[std::min<size_t>(state, kStateNames.size() - 1)];
+}
+/// ... and an integrity "unusable".
+constexpr const char* name_of_integrity(uint8_t integrity) {
+  return kIntegrityNames[std::min<size_t>(integrity, kIntegrityNames.size() - 1)];
 }
 constexpr const char* name_of_level(uint8_t level) {
   return kLevelNames[std::min<size_t>(level, kLevelNames.size() - 1)];
