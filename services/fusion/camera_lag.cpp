@@ -23,6 +23,7 @@ constexpr double kPlayM = 0.005;    // of the wheel's reading, beside its pulses
 constexpr double kWaySigma = 3e-4;  // share of a window's way
 constexpr double kSameGainMps = 0.15;
 constexpr double kSameGain = 0.15;  // ... and this share of it
+constexpr double kFarthestS = 0.5;  // beyond that it is a wheel that slips
 constexpr double kGate = 4.0;
 constexpr int kRefusedInRow = 8;  // then the ratio is another one
 
@@ -128,6 +129,7 @@ void CameraLag::fit(const Mark& from, const Mark& to) {
   const Eigen::Vector3d gain = covariance_ * by / variance;
   fitted_ += gain * off_m;
   covariance_ -= gain * gain.transpose() * variance;
+  if (std::abs(fitted_(2)) > kFarthestS) *this = CameraLag();
 }
 
 }  // namespace railfix::fusion

@@ -77,7 +77,10 @@ void Hypotheses::confirm_rivals(bool unexpected) {
 
 void Hypotheses::begin_rival(Source source) {
   for (auto& rival : rivals_) {
-    if (rival.without == source && !rival.estimator) rival.estimator = main_;
+    if (rival.without != source || rival.estimator) continue;
+    rival.estimator = main_;
+    // A first sample that is used at once finds it there, not away.
+    if (main_.knows_motion()) rival.asked_ns = main_.filter().stamp_ns();
   }
 }
 

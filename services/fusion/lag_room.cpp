@@ -9,8 +9,9 @@ namespace {
 
 constexpr double kKnownS = 0.01;      // sigma of a lag that is known
 constexpr double kTripSigmaS = 0.02;  // a camera that is started anew may have another one
-constexpr double kLikely = 1.0;       // sigmas of one that the measurements speak for
-constexpr double kSure = 3.0;         // ... and of one that is
+constexpr double kLikelyLate = 1.0;   // sigmas of one that the measurements speak for ...
+constexpr double kLikelyEarly = 2.0;  // ... which a camera seldom is
+constexpr double kSure = 3.0;         // of one that is sure
 
 void degrade(TrainEstimate& estimate, double lag_s) {
   char text[160];
@@ -61,19 +62,25 @@ void LagRoom::widen(TrainEstimate& estimate, const FusionParameters& p) {
   const Speeds speeds = speeds_since_sure(estimate);
   const auto held = lag();
   if (!held) return;
-  const double off_s = std::abs(held->s);
-  const bool is_sure = off_s > std::max(p.camera_lag_s + 2 * held->sigma_s, kSure * held->sigma_s);
-  const double beyond_s = held->s + 2 * held->sigma_s - p.camera_lag_s;  // what every interval has room for
-  if (!is_sure && beyond_s < 0) return;
-  const double late_s = is_sure ? std::copysign(off_s + 2 * held->sigma_s, held->s) : beyond_s;
-  const bool is_likely = is_sure || held->s > kLikely * held->sigma_s;
-  const bool is_bounded = !is_likely && estimate.integrity != Integrity::unusable;
-  const double most_m = is_bounded ? p.allowed_m(estimate.since_sure_m) : std::numeric_limits<double>::infinity();
-  const auto make_room = [&](double& side_m, double way_m) {
-    side_m = std::max(side_m, std::min(side_m + std::max(0.0, way_m), most_m));
+  const double spread_s = 2 * held->sigma_s;
+  const bool is_sure = std::abs(held->s) > std::max(p.camera_lag_s + spread_s, kSure * held->sigma_s);
+  const double bare_over_m = estimate.over_m;
+  const double bare_under_m = estimate.under_m;
+  // Stamps that are late so much, or early where it is below 0: the train is further on, or not so far.
+  const auto hold = [&](double late_s) {
+    const bool is_likely =
+        is_sure || (late_s > 0 ? held->s > kLikelyLate * held->sigma_s : -held->s > kLikelyEarly * held->sigma_s);
+    const bool is_bounded = !is_likely && estimate.integrity != Integrity::unusable;
+    const double most_m = is_bounded ? p.allowed_m(estimate.since_sure_m) : std::numeric_limits<double>::infinity();
+    const auto [behind_m, ahead_m] = std::minmax({late_s * speeds.slowest_mps, late_s * speeds.fastest_mps});
+    const double over_m = bare_over_m + std::max(0.0, -behind_m);
+    const double under_m = bare_under_m + std::max(0.0, ahead_m);
+    estimate.over_m = std::max(estimate.over_m, std::min(over_m, most_m));
+    estimate.under_m = std::max(estimate.under_m, std::min(under_m, most_m));
   };
-  make_room(estimate.under_m, late_s * (late_s > 0 ? speeds.fastest_mps : speeds.slowest_mps));
-  make_room(estimate.over_m, -late_s * (late_s > 0 ? speeds.slowest_mps : speeds.fastest_mps));
+  const double room_s = is_sure ? 0 : p.camera_lag_s;  // what every interval has
+  if (const double late_s = held->s + spread_s - room_s; late_s > 0) hold(late_s);
+  if (const double early_s = spread_s - held->s - room_s; early_s > 0) hold(-early_s);
   estimate.judge_width(p);
   if (is_sure) degrade(estimate, held->s);
 }

@@ -61,7 +61,7 @@ double random_size(core::Random& random, Sensor sensor, FaultKind kind) {
     case FaultKind::delay:
       return std::abs(between(random, {0.05, 2.5}));
     case FaultKind::lag:
-      return std::abs(between(random, sensor == Sensor::gnss ? Range{0.1, 1.5} : Range{0.02, 0.3}));
+      return sensor == Sensor::gnss ? std::abs(between(random, {0.1, 1.5})) : between(random, {0.02, 0.3});
     case FaultKind::wrong_landmark:
       return between(random, {1, 400});
     case FaultKind::wrong_sighting:

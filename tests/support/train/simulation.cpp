@@ -216,8 +216,8 @@ void TrainSimulation::add(Sensor sensor, double t_s, fusion::Event event) {
   if (faulty(sensor, FaultKind::dropout, t_s)) return;
   const bool late = faulty(sensor, FaultKind::delay, t_s);
   const double lag_s = lag_of(sensor);
-  if (lag_s > 0) stamp_later(event, core::to_ns(lag_s));
-  arrivals.push_back({t_s + lag_s + (late ? plan_.fault.size : 0.0), std::move(event)});
+  if (lag_s != 0) stamp_later(event, core::to_ns(lag_s));
+  arrivals.push_back({t_s + std::max(0.0, lag_s) + (late ? plan_.fault.size : 0.0), std::move(event)});
 }
 
 // Landmarks and tracks are seen in the camera's pictures.

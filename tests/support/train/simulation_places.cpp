@@ -133,7 +133,7 @@ void TrainSimulation::make_sightings(const std::vector<Thing>& things) {
     if (!sees(t) || faulty(Sensor::fix, FaultKind::dropout, t)) continue;
     const bool late = faulty(Sensor::fix, FaultKind::delay, t);
     const double seen_s = t + lag_of(Sensor::camera);
-    sightings.push_back({seen_s + (late ? plan_.fault.size : 0),
+    sightings.push_back({std::max(t, seen_s) + (late ? plan_.fault.size : 0),
                          {stamp_ns(seen_s), thing.kind, ahead_m, thing.lateral_m, kSightingSigmaM, 0.95}});
   }
   std::ranges::stable_sort(sightings, {}, &SightingArrival::arrival_s);
