@@ -1,5 +1,6 @@
 #include "fusion/lag_room.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <limits>

@@ -1,8 +1,7 @@
-// Room in the interval for a camera whose stamps may be late against the wheel's: what it shows was a little earlier,
-// so that the train is further on than its landmarks say.
+// Room in the interval for a camera whose stamps may be late against the wheel's, or early: what it shows was a little
+// earlier or later, so that the train is further on than its landmarks say, or not so far.
 #pragma once
 
-#include <algorithm>
 #include <optional>
 
 #include "fusion/camera_lag.hpp"
