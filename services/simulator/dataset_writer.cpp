@@ -41,10 +41,9 @@ std::string picture_name(int64_t stamp_ns, const std::string& format) {
 
 core::Result<DatasetWriter> DatasetWriter::create(const fs::path& root) {
   std::error_code code;
-  if (fs::exists(root, code) && !fs::is_directory(root, code))
-    return core::Error{root.string() + " is a file; name a new folder with --out"};
-  if (fs::exists(root, code) && !fs::is_empty(root, code)) {
-    return core::Error{root.string() + " is not empty; remove it or give another --out"};
+  if (fs::exists(root, code)) {
+    if (!fs::is_directory(root, code)) return core::Error{root.string() + " is a file; name a new folder with --out"};
+    if (!fs::is_empty(root, code)) return core::Error{root.string() + " is not empty; remove it or give another --out"};
   }
   for (const char* folder : {"mav0/cam0/data", "mav0/imu0", "mav0/wheel0", "mav0/gnss0", "truth", "map"}) {
     fs::create_directories(root / folder, code);

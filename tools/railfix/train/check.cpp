@@ -72,6 +72,11 @@ void check_contents(const Manifest& manifest, Findings& findings) {
     if (const auto camera = dataset::read_calibration(manifest.folder / manifest.calibration); !camera.ok())
       error(findings, "train.calibration: " + camera.error().message);
   }
+  for (const auto& file : setting_files(manifest)) {
+    if (file.key != "ground_link.password_file" || !is_there(file.file.string())) continue;
+    if (const auto password = ground_link::read_password(manifest.folder / file.file); !password.ok())
+      error(findings, "settings." + file.service + "." + file.key + ": " + password.error().message);
+  }
 }
 
 void check_files(const Manifest& manifest, Findings& findings) {
@@ -83,14 +88,9 @@ void check_files(const Manifest& manifest, Findings& findings) {
             key + ": " + (manifest.folder / name).string() + " is missing or cannot be read; put it beside train.yaml");
   }
   for (const auto& file : setting_files(manifest)) {
-    const auto at = manifest.folder / file.file;
-    const std::string setting = "settings." + file.service + "." + file.key + ": ";
-    if (access(at.c_str(), R_OK) != 0) {
-      error(findings, setting + at.string() + " is missing or cannot be read; put it beside train.yaml");
-    } else if (file.key == "ground_link.password_file") {
-      if (const auto password = ground_link::read_password(at); !password.ok())
-        error(findings, setting + password.error().message);
-    }
+    if (access((manifest.folder / file.file).c_str(), R_OK) != 0)
+      error(findings, "settings." + file.service + "." + file.key + ": " + (manifest.folder / file.file).string() +
+                          " is missing or cannot be read; put it beside train.yaml");
   }
   if (manifest.map.empty()) warning(findings, "train.map is empty: there will be distance and speed, but no position");
 }
