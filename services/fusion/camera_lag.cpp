@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/time.hpp"
 
@@ -25,10 +26,23 @@ constexpr double kSameGainMps = 0.15;
 constexpr double kSameGain = 0.15;  // ... and this share of it
 constexpr double kFarthestS = 0.5;  // beyond that it is a wheel that slips
 constexpr double kGate = 4.0;
-constexpr int kRefusedInRow = 8;  // then the ratio is another one
+constexpr int kRefusedInRow = 8;        // then the ratio is another one
+constexpr double kUnevenS = 0.01;       // less is the jitter of stamps ...
+constexpr double kUnevenBlindS = 0.03;  // ... where no way says that they have jumped
+constexpr double kStoodSigmaS = 0.02;   // a jump while the train stands shows nowhere
+constexpr double kJumpShare = 0.2;      // that the size of a jump may be wrong by
+constexpr double kSpeedBackS = 0.3;     // the speed before a jump is that of so long
+constexpr double kSlowMps = 1.0;        // the way of a slower train says no jump
 
 Eigen::Vector3d squares(double ratio, double creep, double lag_s) {
   return {ratio * ratio, creep * creep, lag_s * lag_s};
+}
+
+/// Pictures that were left out leave a gap of whole ones.
+bool is_whole(double one_s, double other_s) {
+  const auto [shorter_s, longer_s] = std::minmax(one_s, other_s);
+  if (!(shorter_s > 0)) return false;
+  return std::abs(std::remainder(longer_s, shorter_s)) < 0.15 * shorter_s;
 }
 
 }  // namespace
@@ -40,10 +54,17 @@ std::optional<CameraLag::Lag> CameraLag::lag() const {
   return Lag{fitted_(2), std::sqrt(covariance_(2, 2))};
 }
 
-void CameraLag::break_off() {
+void CameraLag::doubt(double sigma_s) {
+  if (covariance_(2, 2) < kLagSigmaS * kLagSigmaS) covariance_(2, 2) += sigma_s * sigma_s;
+}
+
+void CameraLag::begin_again(const OdometryInput& step) {
   way_.clear();
   seen_.clear();
   mark_.reset();
+  if (!step.valid) return;
+  way_.begin(step.stamp_ns);
+  seen_.push_back({step.stamp_ns, 0, 0});
 }
 
 void CameraLag::add(const WheelInput& sample) {
@@ -62,19 +83,49 @@ void CameraLag::add(const WheelInput& sample) {
 }
 
 void CameraLag::add(const OdometryInput& step) {
-  if (!seen_.empty() && step.stamp_ns <= seen_.back().stamp_ns &&
-      core::seconds(seen_.back().stamp_ns - step.stamp_ns) < kPauseS)
-    return;
   const auto picture = step.valid ? way_.add(step) : std::nullopt;
-  if (!picture) {
-    break_off();
-    if (!step.valid) return;
-    way_.begin(step.stamp_ns);
-    seen_.push_back({step.stamp_ns, 0, 0});
-    return;
+  const auto jumped = jump(step.stamp_ns, picture);
+  const double passed_s = last_step_ns_ ? core::seconds(step.stamp_ns - *last_step_ns_) : 0;
+  if (last_step_ns_ && passed_s <= 0 && !jumped) return;  // late
+  last_step_ns_ = step.stamp_ns;
+  if (jumped) {
+    has_jumped_ = std::abs(passed_s) < kPauseS;
+    fitted_(2) += jumped->s;
+    doubt(jumped->sigma_s);
+  } else if (passed_s < interval_s_ || !is_whole(passed_s, interval_s_)) {
+    interval_s_ = passed_s;
   }
+  if (!picture || jumped) return begin_again(step);
   seen_.push_back(*picture);
   while (core::seconds(step.stamp_ns - seen_.front().stamp_ns) > kKeptS) seen_.pop_front();
+}
+
+/// What the stamps have gone on beyond the way, where they are uneven: at even ones it is the way that is wrong.
+/// Without a way, or where it says something else again, what they may have jumped by.
+std::optional<CameraLag::Lag> CameraLag::jump(int64_t stamp_ns, const std::optional<Reading>& picture) const {
+  if (!last_step_ns_ || !(interval_s_ > 0)) return std::nullopt;
+  const double passed_s = core::seconds(stamp_ns - *last_step_ns_);
+  if (std::abs(passed_s) > kPauseS) return Lag{0, kLagSigmaS};
+  const double uneven_s = passed_s - interval_s_;
+  if (std::abs(uneven_s) < kUnevenS) return std::nullopt;
+  const auto speed_mps = picture ? seen_speed_mps() : std::nullopt;
+  if (!speed_mps || std::abs(*speed_mps) < kSlowMps) {
+    if (std::abs(uneven_s) < kUnevenBlindS || is_whole(passed_s, interval_s_)) return std::nullopt;
+    return Lag{0, std::abs(uneven_s)};
+  }
+  const double jump_s = passed_s - (picture->way_m - seen_.back().way_m) / *speed_mps;
+  if (std::abs(jump_s) < kUnevenS) return std::nullopt;
+  const double sigma_s = std::max(kUnevenS, kJumpShare * std::abs(jump_s));
+  const double left_out = std::max(0.0, std::round((uneven_s - jump_s) / interval_s_));
+  if (std::abs(uneven_s - jump_s - left_out * interval_s_) > sigma_s) return Lag{0, std::abs(uneven_s)};
+  return Lag{jump_s, sigma_s};
+}
+
+std::optional<double> CameraLag::seen_speed_mps() const {
+  if (seen_.empty()) return std::nullopt;
+  const auto before = reading_at(seen_, seen_.back().stamp_ns - core::to_ns(kSpeedBackS));
+  if (!before) return std::nullopt;
+  return (seen_.back().way_m - before->way_m) / kSpeedBackS;
 }
 
 std::optional<CameraLag::Reading> CameraLag::reading_at(const Readings& readings, int64_t stamp_ns) {
@@ -111,7 +162,11 @@ void CameraLag::compare() {
 
 void CameraLag::fit(const Mark& from, const Mark& to) {
   const double wheel_m = to.wheel.at.way_m - from.wheel.at.way_m;
-  if (std::abs(wheel_m) < kStandsM) return;  // what a train knows it still knows when it goes on
+  if (std::abs(wheel_m) < kStandsM) {
+    stood_ = true;
+    return;  // what a train knows it still knows when it goes on
+  }
+  if (std::exchange(stood_, false)) doubt(kStoodSigmaS);
   covariance_.diagonal() += squares(kRatioWalk, kCreepWalk, kLagWalkS);
   const double gained_mps = to.wheel.speed_mps - from.wheel.speed_mps;
   const double seen_mps = to.camera.speed_mps - from.camera.speed_mps;

@@ -14,7 +14,7 @@ namespace railfix::fusion {
 
 /// Fitted to the way of both over windows of a second, beside their ratio and the wheel's creep, which grows with
 /// acceleration and speed. Where both say another change of speed, as in a slip, and where samples come late, nothing
-/// is measured.
+/// is measured. Stamps that jump on the way, as those of a camera that is started anew, show against the way itself.
 class CameraLag {
  public:
   struct Lag {
@@ -26,6 +26,8 @@ class CameraLag {
   void add(const OdometryInput& step);
   /// By all that was measured so far; vague until the speed has changed. Nothing until both have measured.
   [[nodiscard]] std::optional<Lag> lag() const;
+  /// The stamps have, or may have: what an earlier trip knew is void.
+  [[nodiscard]] bool has_jumped() const { return has_jumped_; }
 
  private:
   using Reading = SeenWay::Picture;
@@ -38,7 +40,10 @@ class CameraLag {
     Moving camera;
     Moving wheel;
   };
-  void break_off();
+  [[nodiscard]] std::optional<Lag> jump(int64_t stamp_ns, const std::optional<Reading>& picture) const;
+  [[nodiscard]] std::optional<double> seen_speed_mps() const;
+  void doubt(double sigma_s);
+  void begin_again(const OdometryInput& step);
   static std::optional<Reading> reading_at(const Readings& readings, int64_t stamp_ns);
   static std::optional<Moving> moving_at(const Readings& readings, int64_t stamp_ns);
   void compare();
@@ -48,7 +53,11 @@ class CameraLag {
   Readings seen_;  // variances since the first picture
   SeenWay way_;
   std::optional<Mark> mark_;
+  std::optional<int64_t> last_step_ns_;
+  double interval_s_ = 0;  // between the last two steps
   bool compared_ = false;
+  bool stood_ = false;
+  bool has_jumped_ = false;
   // Ratio of the ways less one, creep (m of way per m and m/s gained), lag (s).
   Eigen::Vector3d fitted_ = Eigen::Vector3d::Zero();
   Eigen::Matrix3d covariance_;

@@ -29,6 +29,11 @@ void LagRoom::begin_with(const std::optional<CameraLag::Lag>& before, const Fusi
   if (before && std::abs(before->s) < parameters.camera_lag_s) before_ = before;
 }
 
+void LagRoom::add(const OdometryInput& step) {
+  measured_.add(step);
+  if (measured_.has_jumped()) before_.reset();
+}
+
 bool LagRoom::fits_before(const CameraLag::Lag& measured) const {
   return before_ && std::abs(measured.s - before_->s) < 2 * measured.sigma_s;
 }

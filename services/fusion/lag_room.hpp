@@ -16,7 +16,7 @@ class LagRoom {
   void begin_with(const std::optional<CameraLag::Lag>& before, const FusionParameters& parameters);
   void forget_earlier_trips() { before_.reset(); }
   void add(const WheelInput& sample) { measured_.add(sample); }
-  void add(const OdometryInput& step) { measured_.add(step); }
+  void add(const OdometryInput& step);
   /// Holds what nothing has ruled out: as far as the allowed width has room for that, and all of it where a lag is
   /// likely or the state is no position anyway. One that is sure is said. States come in the order of their stamps.
   void widen(TrainEstimate& estimate, const FusionParameters& parameters);

@@ -62,6 +62,8 @@ double random_size(core::Random& random, Sensor sensor, FaultKind kind) {
       return std::abs(between(random, {0.05, 2.5}));
     case FaultKind::lag:
       return sensor == Sensor::gnss ? std::abs(between(random, {0.1, 1.5})) : between(random, {0.02, 0.3});
+    case FaultKind::stamp_jump:
+      return between(random, {0.03, 0.3});
     case FaultKind::wrong_landmark:
       return between(random, {1, 400});
     case FaultKind::wrong_sighting:
@@ -81,9 +83,9 @@ std::string to_string(Sensor sensor) {
 }
 
 std::string to_string(FaultKind kind) {
-  static const std::array names{"none",           "bias",           "drift",        "stuck",     "noise",
-                                "outliers",       "dropout",        "blind",        "delay",     "lag",
-                                "wrong landmark", "wrong sighting", "wrong branch", "clock step"};
+  static const std::array names{"none",       "bias",           "drift",          "stuck",        "noise",
+                                "outliers",   "dropout",        "blind",          "delay",        "lag",
+                                "stamp jump", "wrong landmark", "wrong sighting", "wrong branch", "clock step"};
   return names.at(static_cast<size_t>(kind));
 }
 
@@ -108,6 +110,7 @@ const std::vector<std::pair<Sensor, FaultKind>>& all_faults() {
     all.emplace_back(Sensor::fix, FaultKind::wrong_sighting);
     for (const auto sensor : {Sensor::gnss, Sensor::camera, Sensor::wheel, Sensor::accelerometer})
       all.emplace_back(sensor, FaultKind::lag);
+    all.emplace_back(Sensor::camera, FaultKind::stamp_jump);
     return all;
   }();
   return list;

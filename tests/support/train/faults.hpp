@@ -22,6 +22,7 @@ enum class FaultKind : uint8_t {
   blind,
   delay,
   lag,
+  stamp_jump,
   wrong_landmark,
   wrong_sighting,
   wrong_branch,
@@ -33,7 +34,8 @@ std::string to_string(FaultKind kind);
 /// size: of a bias or the end of a drift in the sensor's own unit (share of the way for camera and wheel, m/s^2, rad/s,
 /// m for GNSS, fixes and the place of curves, 1/m for the drift of a seen shape; of a wrong sighting, surely known and
 /// sharp as ever, one and every second one while it lasts); seconds for delay (it comes so late), lag (its stamp is so
-/// late, below 0: early) and clock_step; rate for clock drift; how many times noise; else unused.
+/// late, below 0: early), stamp_jump (the same from its begin on) and clock_step; rate for clock drift; how many times
+/// noise; else unused.
 struct Fault {
   Sensor sensor = Sensor::none;
   FaultKind kind = FaultKind::none;

@@ -27,11 +27,6 @@ Drive drive_on(uint64_t seed, const SimulationPlan& plan, double most_m) {
   return Drive(random, plan.duration_s, plan.max_speed_mps, most_m, plan.style);
 }
 
-void stamp_later(fusion::Event& event, int64_t by_ns) {
-  std::visit([by_ns](auto& one) { one.stamp_ns += by_ns; }, event);
-  if (auto* step = std::get_if<fusion::OdometryInput>(&event)) step->reference_stamp_ns += by_ns;
-}
-
 RandomLine line_of(uint64_t seed, const SimulationPlan& plan) {
   auto random = stream(seed, 1);
   const double way_m = (plan.max_speed_mps + 3) * plan.duration_s + plan.start_wrong_m;
@@ -162,7 +157,9 @@ Motion TrainSimulation::truth_at(int64_t stamp_ns, double arrival_s) const {
 }
 
 Motion TrainSimulation::pictured_at(int64_t stamp_ns, double arrival_s) const {
-  return truth_at(stamp_ns - core::to_ns(lag_of(Sensor::camera)), arrival_s);
+  const bool jumps = plan_.fault.is(Sensor::camera, FaultKind::stamp_jump);
+  const double taken_s = arrival_s - (jumps ? std::max(0.0, plan_.fault.size) : 0);
+  return truth_at(stamp_ns - core::to_ns(lag_of(Sensor::camera, taken_s)), arrival_s);
 }
 
 std::optional<double> TrainSimulation::error_m(const track::EdgePosition& place, const Motion& truth) const {
@@ -215,14 +212,19 @@ double TrainSimulation::offset_of(Sensor sensor, double t_s) const {
 void TrainSimulation::add(Sensor sensor, double t_s, fusion::Event event) {
   if (faulty(sensor, FaultKind::dropout, t_s)) return;
   const bool late = faulty(sensor, FaultKind::delay, t_s);
-  const double lag_s = lag_of(sensor);
-  if (lag_s != 0) stamp_later(event, core::to_ns(lag_s));
+  const double lag_s = lag_of(sensor, t_s);
+  std::visit([lag_s](auto& one) { one.stamp_ns += core::to_ns(lag_s); }, event);
+  if (auto* step = std::get_if<OdometryInput>(&event)) {
+    const double reference_s = core::seconds(step->reference_stamp_ns - kBeginNs);
+    step->reference_stamp_ns += core::to_ns(lag_of(sensor, reference_s));
+  }
   arrivals.push_back({t_s + std::max(0.0, lag_s) + (late ? plan_.fault.size : 0.0), std::move(event)});
 }
 
 // Landmarks and tracks are seen in the camera's pictures.
-double TrainSimulation::lag_of(Sensor sensor) const {
+double TrainSimulation::lag_of(Sensor sensor, double t_s) const {
   const Sensor of = sensor == Sensor::fix ? Sensor::camera : sensor;
+  if (plan_.fault.is(of, FaultKind::stamp_jump)) return t_s >= plan_.fault.begin_s ? plan_.fault.size : 0;
   return plan_.fault.is(of, FaultKind::lag) && of != Sensor::gnss ? plan_.fault.size : 0;
 }
 

@@ -174,7 +174,7 @@ class TrainSimulation {
   [[nodiscard]] SaidTrack track_at(double way_m, double error_m = 0) const;
   void add(Sensor sensor, double t_s, fusion::Event event);
   /// Its stamps are so late, s.
-  [[nodiscard]] double lag_of(Sensor sensor) const;
+  [[nodiscard]] double lag_of(Sensor sensor, double t_s) const;
   [[nodiscard]] bool faulty(Sensor sensor, FaultKind kind, double t_s) const;
   [[nodiscard]] double offset_of(Sensor sensor, double t_s) const;
   std::vector<Spell> spells(core::Random& random, double every_s, double shortest_s, double longest_s,

@@ -132,7 +132,7 @@ void TrainSimulation::make_sightings(const std::vector<Thing>& things) {
     if (faulty(Sensor::fix, FaultKind::stuck, t)) ahead_m = stuck_m = std::isnan(stuck_m) ? ahead_m : stuck_m;
     if (!sees(t) || faulty(Sensor::fix, FaultKind::dropout, t)) continue;
     const bool late = faulty(Sensor::fix, FaultKind::delay, t);
-    const double seen_s = t + lag_of(Sensor::camera);
+    const double seen_s = t + lag_of(Sensor::camera, t);
     sightings.push_back({std::max(t, seen_s) + (late ? plan_.fault.size : 0),
                          {stamp_ns(seen_s), thing.kind, ahead_m, thing.lateral_m, kSightingSigmaM, 0.95}});
   }
