@@ -86,13 +86,18 @@ function(railfix_service name)
   set_property(GLOBAL APPEND PROPERTY RAILFIX_SERVICES railfix-${program})
 endfunction()
 
+set(RAILFIX_BESIDE_OTHERS RESOURCE_GROUPS machine:1)
+set(RAILFIX_ALONE RESOURCE_GROUPS machine:3 PROCESSORS 2)
+set(RAILFIX_STEP_BACK nice -n 10)
+
 # railfix_test(core SOURCES a_test.cpp DEPENDS railfix_core)  -> program railfix-test-core, run by CTest test by test.
-# A test steps back (nice) for those that wait most of their time: WAITS, which begin first, the longest before all. Tests
-# of a folder that sets RAILFIX_TESTS_RUN_ALONE start processes that have the machine for themselves, but for such.
+# Three kinds share the machine (tests/machine.json). Those that wait most of their time, WAITS, run together and begin
+# first, the longest before all. Those of a folder that sets RAILFIX_TESTS_RUN_ALONE watch how fast processes answer: one at
+# a time, beside none that waits. All others compute, and take what these leave of the processors.
 function(railfix_test name)
   cmake_parse_arguments(ARG "WAITS" "TIMEOUT" "SOURCES;DEPENDS" ${ARGN})
   if(NOT ARG_TIMEOUT)
-    set(ARG_TIMEOUT 120)
+    set(ARG_TIMEOUT 300)
   endif()
   if(RAILFIX_SANITIZE)
     math(EXPR ARG_TIMEOUT "10 * ${ARG_TIMEOUT}")  # so much slower is what is watched
@@ -113,11 +118,11 @@ function(railfix_test name)
   set(step_back)
   set(how)
   if(ARG_WAITS)
-    set(how COST ${ARG_TIMEOUT})
+    set(how COST ${ARG_TIMEOUT} ${RAILFIX_BESIDE_OTHERS})
   elseif(RAILFIX_TESTS_RUN_ALONE)
-    set(how RUN_SERIAL ON)
+    set(how COST 1 ${RAILFIX_ALONE})
   else()
-    set(step_back nice -n 5)
+    set(step_back ${RAILFIX_STEP_BACK})
   endif()
   add_test(NAME ${name}
     COMMAND ${step_back} timeout --verbose --signal=ABRT ${ARG_TIMEOUT} $<TARGET_FILE:railfix-test-${name}>)
