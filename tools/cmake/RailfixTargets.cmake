@@ -86,16 +86,17 @@ function(railfix_service name)
   set_property(GLOBAL APPEND PROPERTY RAILFIX_SERVICES railfix-${program})
 endfunction()
 
-set(RAILFIX_BESIDE_OTHERS RESOURCE_GROUPS machine:1)
-set(RAILFIX_ALONE RESOURCE_GROUPS machine:3 PROCESSORS 2)
+set(RAILFIX_BESIDE_OTHERS RESOURCE_GROUPS watched:1)
+set(RAILFIX_ALONE RESOURCE_GROUPS watched:3 COST 1)
+set(RAILFIX_STEPS_BACK RESOURCE_GROUPS computing:1)
 set(RAILFIX_STEP_BACK nice -n 10)
 
 # railfix_test(core SOURCES a_test.cpp DEPENDS railfix_core)  -> program railfix-test-core, run by CTest test by test.
 # Three kinds share the machine (tests/machine.json). Those that wait most of their time, WAITS, run together and begin
-# first, the longest before all. Those of a folder that sets RAILFIX_TESTS_RUN_ALONE watch how fast processes answer: one at
-# a time, beside none that waits. All others compute, and take what these leave of the processors.
+# first, the longest before all. Others of a folder that sets RAILFIX_TESTS_RUN_ALONE watch how fast processes answer: one
+# at a time, beside none that waits. All that is left COMPUTES, two at a time, and takes what these leave of the processors.
 function(railfix_test name)
-  cmake_parse_arguments(ARG "WAITS" "TIMEOUT" "SOURCES;DEPENDS" ${ARGN})
+  cmake_parse_arguments(ARG "WAITS;COMPUTES" "TIMEOUT" "SOURCES;DEPENDS" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()
@@ -119,9 +120,10 @@ function(railfix_test name)
   set(how)
   if(ARG_WAITS)
     set(how COST ${ARG_TIMEOUT} ${RAILFIX_BESIDE_OTHERS})
-  elseif(RAILFIX_TESTS_RUN_ALONE)
-    set(how COST 1 ${RAILFIX_ALONE})
+  elseif(RAILFIX_TESTS_RUN_ALONE AND NOT ARG_COMPUTES)
+    set(how ${RAILFIX_ALONE})
   else()
+    set(how ${RAILFIX_STEPS_BACK})
     set(step_back ${RAILFIX_STEP_BACK})
   endif()
   add_test(NAME ${name}
