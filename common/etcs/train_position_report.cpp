@@ -178,23 +178,23 @@ core::Result<TrainPositionReport> decode_or_advise(std::span<const uint8_t> mess
 }
 
 std::string said_of_no_group(const TrainPositionReport& report) {
-  if (names_group(report.nid_lrbg)) return "";
-  struct Related {
-    const char* field;
-    uint32_t value;
-    uint32_t unknown;
-  };
+  const bool has_group = names_group(report.nid_lrbg);
+  const uint32_t previous = report.nid_prvlrbg.value_or(kUnknownBaliseGroup);
+  const bool has_direction = has_group && (report.nid_packet != 1 || names_group(previous));
   std::vector<std::string> said;
-  for (const auto& [field, value, unknown] :
-       {Related{"D_LRBG", report.d_lrbg, kUnknownDistance}, Related{"Q_DIRLRBG", report.q_dirlrbg, kUnknownSide},
-        Related{"Q_DLRBG", report.q_dlrbg, kUnknownSide}, Related{"L_DOUBTOVER", report.l_doubtover, kUnknownDistance},
-        Related{"L_DOUBTUNDER", report.l_doubtunder, kUnknownDistance},
-        Related{"Q_DIRTRAIN", report.q_dirtrain, kUnknownSide}}) {
-    if (value != unknown) said.push_back(std::string(field) + " = " + number(value));
-  }
+  const auto look = [&said](bool has_relation, const char* field, uint32_t value, uint32_t unknown) {
+    if (!has_relation && value != unknown) said.push_back(std::string(field) + " = " + number(value));
+  };
+  look(has_group, "D_LRBG", report.d_lrbg, kUnknownDistance);
+  look(has_direction, "Q_DIRLRBG", report.q_dirlrbg, kUnknownSide);
+  look(has_direction, "Q_DLRBG", report.q_dlrbg, kUnknownSide);
+  look(has_group, "L_DOUBTOVER", report.l_doubtover, kUnknownDistance);
+  look(has_group, "L_DOUBTUNDER", report.l_doubtunder, kUnknownDistance);
+  look(has_direction, "Q_DIRTRAIN", report.q_dirtrain, kUnknownSide);
   if (said.empty()) return "";
-  return "nothing is said by " + core::joined(said) +
-         ", in relation to an LRBG that is unknown (NID_LRBG = " + number(report.nid_lrbg) + ").";
+  const std::string unknown = has_group ? "a group before the LRBG that is unknown (NID_PRVLRBG = " + number(previous)
+                                        : "an LRBG that is unknown (NID_LRBG = " + number(report.nid_lrbg);
+  return "nothing is said by " + core::joined(said) + ", in relation to " + unknown + ").";
 }
 
 double scale_m(uint32_t q_scale) {

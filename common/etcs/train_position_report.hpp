@@ -84,8 +84,9 @@ constexpr bool names_group(uint32_t nid_lrbg) {
   return nid_bg_of(nid_lrbg) != kUnknownNidBg;
 }
 
-/// What stands in relation to the LRBG (its distance, sides and doubts) says nothing where that is unknown: a sentence
-/// that names such fields, empty without any. encode() and decode() carry them, because any train may say so.
+/// What stands in relation to the LRBG (its distance, sides and doubts) says nothing where that is unknown, and in
+/// packet 1 the sides nothing where NID_PRVLRBG is: a sentence that names such fields, empty without any. encode() and
+/// decode() carry them, because any train may say so.
 std::string said_of_no_group(const TrainPositionReport& report);
 
 /// L_PACKET of packet 0 or 1 of this report in bits. REQUIRES: encode() accepts the report.

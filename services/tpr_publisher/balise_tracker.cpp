@@ -120,7 +120,7 @@ BaliseTracker::LegSinceSwitch BaliseTracker::leg_from(const EdgePosition& stem, 
   auto& reference = leg.reference;
   if (!reference) return leg;
   reference->foot_m -= way_m;
-  if (lies_further(*reference, forwards)) reference = forwards ? nearest_behind(stem) : std::nullopt;
+  if (lies_further(*reference, forwards)) reference = front_first(forwards) ? nearest_behind(stem) : std::nullopt;
   return leg;
 }
 
@@ -133,7 +133,7 @@ void BaliseTracker::leave_leg(const Step& step) {
     return mark.group == reference_->group &&
            std::abs(mark.way_m + reference_->foot_m) <= kSameWayM + reference_->doubt_m;
   });
-  if (!leads_there) reference_ = forwards ? nearest_behind(*last_) : std::nullopt;
+  if (!leads_there) reference_ = front_first(forwards) ? nearest_behind(*last_) : std::nullopt;
 }
 
 void BaliseTracker::go_back_to(LegSinceSwitch leg) {
@@ -263,17 +263,22 @@ std::vector<BaliseTracker::Passed> BaliseTracker::groups_on(const std::vector<Wa
   return common;
 }
 
+std::optional<Reference> BaliseTracker::remembered(uint32_t nid_lrbg) const {
+  return reference_ ? reference_->remembered(nid_lrbg) : std::nullopt;
+}
+
 std::optional<Reference> BaliseTracker::behind(uint32_t nid_lrbg) const {
-  if (reference_ && reference_->group->nid_lrbg() == nid_lrbg) return reference_;
+  if (auto found = remembered(nid_lrbg)) return found;
   if (!last_ || leg_is_guess()) return std::nullopt;
-  const auto path = track::Path::follow(map_, *last_, 0, search_behind_m_);
-  if (!path.ok()) return std::nullopt;
-  std::optional<Reference> found;
-  for (const auto& mark : path.value().balise_groups()) {  // by distance: the last one is the nearest
-    if (mark.distance_m <= 0 && mark.group->nid_lrbg() == nid_lrbg)
-      found = Reference{mark.group, nullptr, mark.nominal_is_along_path, true, -mark.distance_m};
-  }
-  return found;
+  const auto all = groups_behind(*last_);
+  const auto one =
+      std::ranges::find_if(all, [&](const Reference& other) { return other.group->nid_lrbg() == nid_lrbg; });
+  return one == all.end() ? std::nullopt : std::optional(*one);
+}
+
+void BaliseTracker::turn_front(bool is_at_other_end) {
+  front_at_other_end_ = is_at_other_end;
+  if (reference_ && !reference_->passed && last_ && !leg_is_guess()) acquire(*last_);
 }
 
 std::optional<BaliseTracker::Step> BaliseTracker::step_to(const EdgePosition& foot) const {
@@ -339,12 +344,15 @@ void BaliseTracker::pass(std::vector<Passed> passed, double step_m) {
     }
     // Over and back it stays as it is. Round a loop it is passed anew, and no group lies before it.
     if (again && reference_->nominal_along == mark.nominal_along &&
-        std::abs(reference_->foot_m - foot_m) <= kSameWayM + reference_->doubt_m)
+        std::abs(reference_->foot_m - foot_m) <= kSameWayM + reference_->doubt_m) {
+      reference_->passed = true;
       continue;
+    }
     const double from_previous_m = reference_ ? reference_->foot_m - foot_m : 0;
     const bool tells = reference_ && !again && std::abs(from_previous_m) > reference_->doubt_m + mark.doubt_m;
     const auto* previous = tells ? reference_->group : nullptr;
-    reference_ = Reference{mark.group, previous, mark.nominal_along, from_previous_m > 0, foot_m, mark.doubt_m};
+    Reference present{mark.group, previous, mark.nominal_along, from_previous_m > 0, foot_m, mark.doubt_m, 0, true};
+    reference_ = reference_ ? passed_behind(std::move(present), *reference_, search_behind_m_) : std::move(present);
   }
   if (reference_) reference_->furthest_m = std::max(reference_->furthest_m, std::abs(reference_->foot_m));
 }
@@ -354,22 +362,13 @@ void BaliseTracker::acquire(const EdgePosition& foot) {
   reference_ = nearest_behind(foot);
 }
 
+std::vector<Reference> BaliseTracker::groups_behind(const EdgePosition& foot) const {
+  return tpr_publisher::groups_behind(map_, foot, front_at_other_end_, search_behind_m_);
+}
+
 std::optional<Reference> BaliseTracker::nearest_behind(const EdgePosition& foot) const {
-  std::optional<Reference> nearest;
-  const auto path = track::Path::follow(map_, foot, 0, search_behind_m_);
-  if (!path.ok()) return nearest;
-  // Where tracks have met behind the train nobody knows from which one it came.
-  double from_m = -search_behind_m_;
-  for (const auto& one : path.value().switches()) {
-    if (!one.ahead && one.distance_m <= 0) from_m = std::max(from_m, one.distance_m);
-  }
-  for (const auto& mark : path.value().balise_groups()) {  // by distance: the last one is the nearest
-    if (mark.distance_m > 0 || mark.distance_m <= from_m) continue;
-    // Round a ring it may be the group itself.
-    const auto* previous = nearest && nearest->group != mark.group ? nearest->group : nullptr;
-    nearest = Reference{mark.group, previous, mark.nominal_is_along_path, true, -mark.distance_m};
-  }
-  return nearest;
+  const auto groups = groups_behind(foot);
+  return groups.empty() ? std::nullopt : std::optional(groups.front());
 }
 
 }  // namespace railfix::tpr_publisher

@@ -8,21 +8,11 @@
 #include <unordered_map>
 #include <vector>
 
+#include "tpr_publisher/reference.hpp"
 #include "tpr_publisher/undeclared_way.hpp"
 #include "track/map.hpp"
 
 namespace railfix::tpr_publisher {
-
-/// "Along" means along the axis that the camera looks.
-struct Reference {
-  const track::BaliseGroup* group = nullptr;
-  const track::BaliseGroup* previous = nullptr;  // LRBG before this one, nullptr = not known
-  bool nominal_along = true;                     // the group's nominal direction runs along
-  bool from_previous_along = true;               // the way from `previous` to `group` runs along
-  double foot_m = 0;                             // camera's foot beyond the group, along; negative = in front of it
-  double doubt_m = 0;                            // the way from the group may be longer or shorter by so much
-  double furthest_m = 0;                         // the foot was so far from it since it was passed
-};
 
 /// Follows the camera's foot over the map. A group counts as passed when the foot's estimate passes it, in either
 /// direction. The distance to the LRBG is summed along the way really run, so that it stays right beyond switches.
@@ -43,13 +33,16 @@ struct Reference {
 class BaliseTracker {
  public:
   /// At the start, and after a jump to another track, the nearest group up to `search_behind_m` behind the train is
-  /// taken, when only one way leads from there.
+  /// taken, when only one way leads from there. Eight that were passed within this way are remembered.
   BaliseTracker(std::shared_ptr<const track::Map> map, double search_behind_m);
 
   /// REQUIRES: the direction is known. A place that is not on the map loses the reference. `heard`: the train was
   /// followed from the place before to this one.
   void update(const track::EdgePosition& foot, bool declared, bool heard = true);
   void lose();
+  /// The train's front is at the other end than the camera's, so that behind it is what the camera sees ahead. A
+  /// reference that was not passed but taken from the map is taken anew.
+  void turn_front(bool is_at_other_end);
   [[nodiscard]] const std::optional<Reference>& reference() const { return reference_; }
   /// So many times a group that had been taken for passed counted no more.
   [[nodiscard]] uint32_t taken_back() const { return taken_back_; }
@@ -57,8 +50,9 @@ class BaliseTracker {
   [[nodiscard]] uint32_t passed_again() const { return passed_again_; }
   /// How far the train has come since its track was declared last; nothing while it is declared.
   [[nodiscard]] std::optional<double> undeclared_m() const;
-  /// This group as a reference, when it is the present one or lies behind the train, no farther than one is looked for
-  /// at the start.
+  /// This group as a reference, when it is the present one or one that was passed before it.
+  [[nodiscard]] std::optional<Reference> remembered(uint32_t nid_lrbg) const;
+  /// ... or, as after a start, when the map has it behind the train, as near and as surely as one that is taken then.
   [[nodiscard]] std::optional<Reference> behind(uint32_t nid_lrbg) const;
 
  private:
@@ -97,8 +91,10 @@ class BaliseTracker {
   [[nodiscard]] std::vector<Passed> groups_on(const std::vector<WayBetween>& ways) const;
   void pass(std::vector<Passed> passed, double step_m);
   void acquire(const track::EdgePosition& foot);
-  /// As at the start.
+  [[nodiscard]] std::vector<Reference> groups_behind(const track::EdgePosition& foot) const;
   [[nodiscard]] std::optional<Reference> nearest_behind(const track::EdgePosition& foot) const;
+  /// A train that runs so, along or not, runs with its front first.
+  [[nodiscard]] bool front_first(bool along) const { return along != front_at_other_end_; }
 
   std::shared_ptr<const track::Map> map_;
   track::Ways ways_;
@@ -110,7 +106,8 @@ class BaliseTracker {
   std::optional<Reference> reference_;
   uint32_t taken_back_ = 0;
   uint32_t passed_again_ = 0;
-  bool forwards_ = true;  // the way that the train runs, seen from the cab
+  bool front_at_other_end_ = false;
+  bool forwards_ = true;  // the way that the train runs, seen from the camera's cab
   double moved_back_m_ = 0;
 };
 

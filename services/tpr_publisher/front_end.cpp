@@ -22,6 +22,11 @@ Reference turned(Reference reference) {
   reference.foot_m = -reference.foot_m;
   reference.nominal_along = !reference.nominal_along;
   reference.from_previous_along = !reference.from_previous_along;
+  for (auto& one : reference.earlier) {
+    one.ahead_m = -one.ahead_m;
+    one.nominal_along = !one.nominal_along;
+    one.from_previous_along = !one.from_previous_along;
+  }
   return reference;
 }
 

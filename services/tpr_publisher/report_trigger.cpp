@@ -16,6 +16,7 @@ namespace {
 constexpr int64_t kShortestCycleNs = core::kNsPerSecond;
 constexpr double kShortestCycleM = 1.0;
 constexpr int64_t kClockJitterNs = 100'000'000;  // no clock that was set back
+constexpr double kOriginWaitM = 500;
 
 }  // namespace
 
@@ -28,6 +29,7 @@ void ReportTrigger::set_parameters(const etcs::ReportParameters& parameters, std
   parameters_ = parameters;
   origin_ = origin;
   origin_m_.reset();
+  waits_since_m_.reset();
   passed_before_ = true;
   locations_.clear();
   double at_m = 0;
@@ -41,18 +43,23 @@ void ReportTrigger::set_parameters(const etcs::ReportParameters& parameters, std
 }
 
 void ReportTrigger::place_locations(const Moment& moment) {
-  if (locations_.empty() || origin_m_ || !moment.beyond_lrbg_m) return;
+  if (locations_.empty() || !moment.beyond_lrbg_m) return;
   if (!origin_) origin_ = moment.nid_lrbg;
   const auto beyond_m = *origin_ == moment.nid_lrbg ? moment.beyond_lrbg_m : moment.beyond_origin_m;
-  if (!beyond_m) {  // nor will it come to lie behind a train that has left it
-    locations_.clear();
-    return;
-  }
-  origin_m_ = moment.front_m - *beyond_m;
+  if (!beyond_m) return wait_for_origin(moment);
+  waits_since_m_.reset();
+  origin_m_ = moment.front_m - *beyond_m;  // anew: the place may have been corrected against the travelled distance
   for (auto& location : locations_) {
     if (passed_before_) location.passed = reached_m(moment, location.rear_end) - *origin_m_ >= location.at_m;
   }
   passed_before_ = false;
+}
+
+void ReportTrigger::wait_for_origin(const Moment& moment) {
+  if (origin_m_) return;
+  passed_before_ = false;
+  if (!waits_since_m_) waits_since_m_ = moment.front_m;
+  if (std::abs(moment.front_m - *waits_since_m_) > kOriginWaitM) locations_.clear();
 }
 
 bool ReportTrigger::rear_end_left_out() const {
@@ -63,6 +70,7 @@ bool ReportTrigger::rear_end_left_out() const {
 
 void ReportTrigger::lose_way() {
   origin_m_.reset();
+  waits_since_m_.reset();
   way_lost_ = true;
 }
 
@@ -138,7 +146,8 @@ std::optional<Reason> ReportTrigger::due(const Moment& moment) {
   if (group_passed_ && parameters_.m_loc == etcs::kReportAtGroups) return Reason::balise_group;
   // What was said is not known any more: trackside must not go on with it until the cycle is over.
   const bool taken_back = moment.nid_lrbg == etcs::kUnknownBaliseGroup || moment.taken_back != reported_->taken_back;
-  if (taken_back && reported_->nid_lrbg != moment.nid_lrbg) return Reason::balise_group;
+  const bool found_again = reported_->nid_lrbg == etcs::kUnknownBaliseGroup;
+  if ((taken_back || found_again) && reported_->nid_lrbg != moment.nid_lrbg) return Reason::balise_group;
   if (location_passed_) return Reason::location;
   if (cycle_distance_over(moment)) return Reason::cycle_distance;
   if (cycle_time_over(moment)) return Reason::cycle_time;

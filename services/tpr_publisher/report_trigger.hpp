@@ -55,7 +55,7 @@ struct Moment {
   uint32_t taken_back = 0;                // counts up whenever an LRBG that was told turns out to be none
   uint32_t passed_again = 0;              // counts up whenever the train goes over its LRBG once more
   std::optional<double> beyond_lrbg_m;    // front end beyond the LRBG, along the train
-  std::optional<double> beyond_origin_m;  // ... beyond the group that wanted_origin() names
+  std::optional<double> beyond_origin_m;  // ... beyond the group that origin() names
   Onboard onboard;
   uint32_t mode_changes = 0;  // of what is reported: count up, so that one there and back is noticed
   uint32_t level_changes = 0;
@@ -69,14 +69,19 @@ class ReportTrigger {
   /// A packet 58. T_CYCLOC 0 and D_CYCLOC 0 ask for reports as often as possible: once a second at most, for D_CYCLOC
   /// once a metre at most, too. Its locations count along the train from `origin`, the LRBG when it came; nothing = the
   /// next one that is known, because it has only just come, kUnknownBaliseGroup = nobody knows any more, and locations
-  /// are left out.
+  /// are left out. A group that is not known to have been passed is waited for, 500 m long: trackside's antenna may be
+  /// ahead of our estimate.
   void set_parameters(const etcs::ReportParameters& parameters, std::optional<uint32_t> origin = std::nullopt);
   /// The group that locations count from; nothing before it is known and when there are no locations.
   [[nodiscard]] std::optional<uint32_t> origin() const { return locations_.empty() ? std::nullopt : origin_; }
-  /// The same, while moments must say where it is.
-  [[nodiscard]] std::optional<uint32_t> wanted_origin() const { return origin_m_ ? std::nullopt : origin(); }
-  /// Locations are asked for, but where they are is not known.
-  [[nodiscard]] bool locations_left_out() const { return locations_.empty() && !parameters_.locations.empty(); }
+  /// It has not been looked for yet; not to be done at every moment.
+  [[nodiscard]] bool looks_for_origin() const { return !origin_m_ && !waits_since_m_; }
+  /// Locations are asked for, but where they are is not known, or not yet.
+  [[nodiscard]] bool locations_left_out() const {
+    return (locations_.empty() || waits_since_m_) && !parameters_.locations.empty();
+  }
+  /// ... nor will it be known.
+  [[nodiscard]] bool locations_given_up() const { return locations_.empty() && !parameters_.locations.empty(); }
   /// A location waits for the rear end of a train whose length is not known.
   [[nodiscard]] bool rear_end_left_out() const;
   void set_train_length(double train_length_m) { train_length_m_ = train_length_m; }
@@ -98,6 +103,7 @@ class ReportTrigger {
     bool passed = false;
   };
   void place_locations(const Moment& moment);
+  void wait_for_origin(const Moment& moment);
   void note_events(const Moment& moment);
   [[nodiscard]] double reached_m(const Moment& moment, bool rear_end) const;
   [[nodiscard]] std::optional<Reason> onboard_reason(const Moment& moment) const;
@@ -108,10 +114,11 @@ class ReportTrigger {
   etcs::ReportParameters parameters_;
   double train_length_m_;
   std::vector<Location> locations_;
-  std::optional<uint32_t> origin_;  // balise group
-  std::optional<double> origin_m_;  // its travelled distance; nothing = must be found
-  bool passed_before_ = true;       // locations that lie behind when the origin is found were passed long ago
-  std::optional<Moment> reported_;  // last moment that was sent
+  std::optional<uint32_t> origin_;       // balise group
+  std::optional<double> origin_m_;       // its travelled distance; nothing = must be found
+  std::optional<double> waits_since_m_;  // for the origin; the front end's travelled distance
+  bool passed_before_ = true;            // locations that lie behind when the origin is found were passed long ago
+  std::optional<Moment> reported_;       // last moment that was sent
   uint32_t last_group_ = etcs::kUnknownBaliseGroup;
   uint32_t passed_again_ = 0;  // when it was looked at last
   bool asked_ = false;         // "now"

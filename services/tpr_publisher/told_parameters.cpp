@@ -23,10 +23,13 @@ bool ToldParameters::is_known(std::span<const uint8_t> packet, std::optional<uin
   return last && std::ranges::equal(packet, last->bytes) && (!lrbg || lrbg == last->origin);
 }
 
-bool ToldParameters::hear(std::span<const uint8_t> packet, bool just_come, uint32_t lrbg) {
+// Who begins anew counts from 0 again: that is no packet yet.
+bool ToldParameters::hear(std::span<const uint8_t> packet, bool just_come, uint32_t lrbg, uint32_t count) {
   const bool said = lrbg != 0 && etcs::names_group(lrbg);
   auto origin = said ? std::optional(lrbg) : std::nullopt;
-  if (packet.empty() || is_known(packet, origin)) return false;
+  const bool once_more = count_ > 0 && count > count_;
+  count_ = count;
+  if (packet.empty() || (is_known(packet, origin) && !once_more)) return false;
   if (!said && !just_come) origin = etcs::kUnknownBaliseGroup;
   newer_ = {{packet.begin(), packet.end()}, origin};
   return try_newer();
@@ -46,6 +49,7 @@ bool ToldParameters::hear_deleted() {
 bool ToldParameters::follow() {
   const auto origin = publisher_.origin();
   if (used_ && origin) used_->origin = origin;
+  given_up_ = used_ && publisher_.locations_given_up();
   return waits_ && publisher_.direction_known(newer_->origin) && try_newer();
 }
 
@@ -69,7 +73,7 @@ bool ToldParameters::try_newer() {
   const auto taken = take_newer();
   refusal_ = taken.ok() ? "" : "packet 58 of onboard_status is not used: " + taken.error().message;
   if (!taken.ok()) return false;
-  waits_ = false;
+  waits_ = given_up_ = false;
   used_ = std::exchange(newer_, std::nullopt);
   return true;
 }
@@ -77,7 +81,7 @@ bool ToldParameters::try_newer() {
 std::string ToldParameters::notes() const {
   if (!used_) return "";
   const bool known = used_->origin && *used_->origin != etcs::kUnknownBaliseGroup;
-  return etcs::to_hex(used_->bytes) + (known ? ' ' + std::to_string(*used_->origin) : "");
+  return etcs::to_hex(used_->bytes) + (known && !given_up_ ? ' ' + std::to_string(*used_->origin) : "");
 }
 
 }  // namespace railfix::tpr_publisher

@@ -20,8 +20,10 @@ class ToldParameters {
   bool remember(const std::string& notes);
   /// What stands in an onboard_status; empty = none. `lrbg`: the group that the message which brought it refers to
   /// (3.6.2.2.1); where that was not said (0, "unknown"), the present LRBG of a packet that has `just_come`: it did not
-  /// stand in an onboard_status of some seconds ago. True when it is used from now on.
-  bool hear(std::span<const uint8_t> packet, bool just_come, uint32_t lrbg = etcs::kUnknownBaliseGroup);
+  /// stand in an onboard_status of some seconds ago. `count`: of those that have come; the same one once more is a new
+  /// one where it is higher than before. True when it is used from now on.
+  bool hear(std::span<const uint8_t> packet, bool just_come, uint32_t lrbg = etcs::kUnknownBaliseGroup,
+            uint32_t count = 0);
   /// None is valid any more (4.9.1.3, table 4.10): those of the settings again. True when that is new.
   bool hear_deleted();
   /// To be called when the publisher has followed the train: what came before the train's direction was known may fit
@@ -46,6 +48,8 @@ class ToldParameters {
   TprPublisher& publisher_;
   std::optional<Packet> used_;
   std::optional<Packet> newer_;  // heard since, and refused ...
+  uint32_t count_ = 0;           // heard last
+  bool given_up_ = false;        // the locations of what is used
   bool waits_ = false;           // ... but for the train's direction, which is not known
   std::string refusal_;
 };

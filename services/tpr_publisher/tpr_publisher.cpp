@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <utility>
 
 #include "core/time.hpp"
 #include "core/train_limits.hpp"
@@ -81,9 +82,9 @@ void TprPublisher::follow(const TrainPosition& position) {
     trigger_.lose_way();
     furthest_m_.reset();
   }
-  position_ = position;
+  const auto position_before = std::exchange(position_, position);
+  const auto reference_before = reference_;
   follow_motion(position);
-  const auto* group_before = reference_ ? reference_->group : nullptr;
   if (tracker_) {
     if (position.place_known()) {
       tracker_->update(position.foot, position.track_declared(), heard);
@@ -93,13 +94,15 @@ void TprPublisher::follow(const TrainPosition& position) {
     reference_ = tracker_->reference();
   }
   const bool guessed = position.place_known() && !position.track_declared();
-  const bool same_group = reference_ && reference_->group == group_before;
+  const bool same_group = reference_ && reference_before && reference_->group == reference_before->group;
   doubt_.follow(position, reference_ ? std::optional(reference_->foot_m) : std::nullopt, same_group, !guessed);
   // 4.0.0 only: a train that has backed is not taken for complete (3.6.5.2, table 2c [8]).
   const bool backs = !position.standstill && motion() == Motion::backward;
   if (backs && settings_.report.baseline == etcs::Baseline::b4) integrity_.use_up();
   if (position.usable) {
-    integrity_.follow(integrity_place());
+    auto place = place_of_now();
+    if (heard && position_before) place.moved_m = moved_m(*position_before, reference_before);
+    integrity_.follow(place);
   } else {
     integrity_.lose_way();
   }
@@ -132,21 +135,34 @@ TrainPosition TprPublisher::doubted_position() const {
   return is_turned() ? turned(position) : position;
 }
 
+std::optional<Reference> TprPublisher::along_train(std::optional<Reference> found) const {
+  if (!found || !ends_.to_front_m(cab_)) return std::nullopt;
+  return is_turned() ? turned(std::move(*found)) : found;
+}
+
 std::optional<Reference> TprPublisher::reference(std::optional<uint32_t> group) const {
-  if (!reference_ || !ends_.to_front_m(cab_)) return std::nullopt;
+  if (!reference_) return std::nullopt;
   const bool named = group && *group != etcs::kUnknownBaliseGroup;
-  const auto found = named ? tracker_->behind(*group) : reference_;
-  return found && is_turned() ? turned(*found) : found;
+  return along_train(named ? tracker_->behind(*group) : reference_);
 }
 
 double TprPublisher::group_m() const {
   return reference_ ? place_doubt_m(*reference_) : 0.0;
 }
 
-TrainIntegrity::Place TprPublisher::integrity_place() const {
+TrainIntegrity::Place TprPublisher::place_of_now() const {
   const auto position = doubted_position();
   return {position.stamp_ns, position.distance_m,
-          position.over_m + group_m() + train_allowance(settings_.report).over_m};
+          position.over_m + group_m() + train_allowance(settings_.report).over_m, position.place_known()};
+}
+
+double TprPublisher::moved_m(const TrainPosition& before, const std::optional<Reference>& reference_before) const {
+  if (!before.place_known() && !position_->place_known()) return 0;
+  const auto same = reference_before ? tracker_->remembered(reference_before->group->nid_lrbg()) : std::nullopt;
+  if (!same) return HUGE_VAL;
+  const double way_m = position_->distance_m - before.distance_m;
+  const double moved_m = same->foot_m - reference_before->foot_m - way_m;
+  return is_turned() ? -moved_m : moved_m;
 }
 
 uint32_t TprPublisher::orientation_to(std::optional<uint32_t> group) const {
@@ -179,7 +195,8 @@ core::Status TprPublisher::set_onboard(const Onboard& onboard, int64_t now_ns) {
   const auto trial = etcs::encode(make_report({}, std::nullopt, Motion::unknown, report, 0), report.baseline);
   if (!trial.ok()) return trial.error();
   mode_changes_ += report.m_mode != settings_.report.m_mode ? 1 : 0;
-  level_changes_ += report.m_level != settings_.report.m_level || report.nid_ntc != settings_.report.nid_ntc ? 1 : 0;
+  const bool other_ntc = report.m_level == etcs::kLevelNtc && report.nid_ntc != settings_.report.nid_ntc;
+  level_changes_ += report.m_level != settings_.report.m_level || other_ntc ? 1 : 0;
   settings_.report = report;
   length_said_ = length_said_ || report.train_data;
   if (length_said_) trigger_.set_train_length(onboard.train_length_m);
@@ -191,11 +208,19 @@ core::Status TprPublisher::set_onboard(const Onboard& onboard, int64_t now_ns) {
 // While the driver walks to the other end nobody says anything: then the front stays where it was.
 void TprPublisher::hear_cab(ActiveCab cab) {
   if (cab == ActiveCab::not_said) return;
-  const bool was_turned = is_turned();
-  cab_ = cab;
-  if (is_turned() == was_turned) return;
+  const auto was = std::exchange(cab_, cab);
+  if (cab == was) return;
+  if (tracker_) {
+    tracker_->turn_front(is_turned());
+    reference_ = tracker_->reference();
+  }
+  if (was == ActiveCab::not_said && !is_turned()) return;  // as it was taken for
   integrity_.lose_way();
-  trigger_.turn();
+  if (was == ActiveCab::not_said) {
+    trigger_.lose_way();
+  } else {
+    trigger_.turn();
+  }
 }
 
 std::string TprPublisher::front_unknown() const {
@@ -250,7 +275,7 @@ std::string TprPublisher::left_out(int64_t now_ns) const {
            "on-board unit must say it, or set tpr_publisher.train_length_m.";
   if (trigger_.locations_left_out())
     return "No reports at the locations of packet 58: it came while nobody listened, or the group that they count from "
-           "is not on the way behind the train, or the cab was changed since.";
+           "is not on the way behind the train, or not yet, or the cab was changed since.";
   return "";
 }
 
@@ -277,12 +302,16 @@ etcs::TrainPositionReport TprPublisher::fields(int64_t now_ns) const {
     const double front_m = here->foot_m + settings.foot_to_front_m;
     ahead_m = reported_ahead_m(fields.d_lrbg, etcs::scale_m(fields.q_scale), front_m);
   }
-  const auto said = integrity_.said(position.distance_m, ahead_m);
+  const auto said = integrity_.said(position.distance_m, ahead_m, place_of_now().over_m);
   // Nobody can place a length from a front end that is not referred to a group (3.6.5.2.7).
   if (said.l_trainint && fields.nid_lrbg == etcs::kUnknownBaliseGroup) return fields;
   fields.q_length = said.q_length;
   fields.l_trainint = said.l_trainint;
   return fields;
+}
+
+std::optional<Reference> TprPublisher::trigger_origin(uint32_t group) const {
+  return trigger_.looks_for_origin() ? reference(group) : along_train(tracker_->remembered(group));
 }
 
 Moment TprPublisher::moment(int64_t now_ns) const {
@@ -301,13 +330,11 @@ Moment TprPublisher::moment(int64_t now_ns) const {
   moment.passed_again = tracker_ ? tracker_->passed_again() : 0;
   if (const auto here = reference()) {
     moment.nid_lrbg = here->group->nid_lrbg();
-    const auto origin = trigger_.wanted_origin();
+    const auto origin = trigger_.origin();
+    const auto there = origin ? trigger_origin(*origin) : std::nullopt;
+    if (there) moment.beyond_origin_m = there->foot_m + to_front_m;
     // A group behind a train on a leg that is guessed is not found, and not known to be nowhere either.
-    if (position_->track_declared() || !origin || *origin == moment.nid_lrbg)
-      moment.beyond_lrbg_m = here->foot_m + to_front_m;
-    if (origin) {
-      if (const auto there = reference(origin)) moment.beyond_origin_m = there->foot_m + to_front_m;
-    }
+    if (position_->track_declared() || !origin || there) moment.beyond_lrbg_m = here->foot_m + to_front_m;
   }
   if (onboard_) {
     moment.onboard = *onboard_;

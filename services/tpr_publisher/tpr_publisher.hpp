@@ -59,6 +59,8 @@ class TprPublisher {
   void delete_parameters() { trigger_.set_parameters(settings_.parameters); }
   /// The group that its locations count from, when it has any and it is known.
   [[nodiscard]] std::optional<uint32_t> origin() const { return trigger_.origin(); }
+  /// It has locations, and they are over: the cab was changed since, or their group is not on the train's way.
+  [[nodiscard]] bool locations_given_up() const { return trigger_.locations_given_up(); }
   /// What the on-board unit says replaces mode and level of the settings. Refused when it cannot be encoded. Of one
   /// whose clock is more than a second ahead no confirmation of the train's integrity is taken, also not afterwards:
   /// its time would be taken for the place of a later one.
@@ -83,13 +85,18 @@ class TprPublisher {
   /// With the doubt of an undeclared track; along the train's own axis, as the ones below.
   [[nodiscard]] TrainPosition doubted_position() const;
   [[nodiscard]] Motion motion() const { return is_turned() ? turned(motion_) : motion_; }
+  [[nodiscard]] std::optional<Reference> along_train(std::optional<Reference> found) const;
   /// The present LRBG, or the group that is named, where that lies behind the train.
   [[nodiscard]] std::optional<Reference> reference(std::optional<uint32_t> group = std::nullopt) const;
+  /// Of the locations; on the map it is looked for once.
+  [[nodiscard]] std::optional<Reference> trigger_origin(uint32_t group) const;
   /// Of the train to that group.
   [[nodiscard]] uint32_t orientation_to(std::optional<uint32_t> group) const;
   /// What nobody knows of the place of the group that is referred to.
   [[nodiscard]] double group_m() const;
-  [[nodiscard]] TrainIntegrity::Place integrity_place() const;
+  [[nodiscard]] TrainIntegrity::Place place_of_now() const;
+  /// By how much the place was corrected against the travelled distance; infinite = nobody knows.
+  [[nodiscard]] double moved_m(const TrainPosition& before, const std::optional<Reference>& reference_before) const;
   void hear_integrity(const Onboard& onboard, int64_t now_ns);
   [[nodiscard]] Moment moment(int64_t now_ns) const;
   [[nodiscard]] etcs::TrainPositionReport fields(int64_t now_ns) const;

@@ -63,7 +63,8 @@ void TprPublisherService::hear_packet_58(const msg::OnboardStatus& status, bool 
     return;
   }
   const size_t bytes = std::min<size_t>(status.packet_58_bytes(), status.packet_58().size());
-  note_packet_58(told_.hear({status.packet_58().data(), bytes}, just_come, status.packet_58_lrbg()));
+  note_packet_58(
+      told_.hear({status.packet_58().data(), bytes}, just_come, status.packet_58_lrbg(), status.packets_58()));
 }
 
 void TprPublisherService::note_packet_58(bool taken) {

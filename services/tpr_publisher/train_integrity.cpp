@@ -17,6 +17,7 @@ constexpr uint32_t kLongestM = 32767;  // L_TRAININT
 void TrainIntegrity::follow(const Place& place) {
   places_.push_back(place);
   while (place.stamp_ns - places_.front().stamp_ns > kHistoryNs) places_.pop_front();
+  then_.moved_m += place.moved_m;
   settle();
 }
 
@@ -75,15 +76,17 @@ void TrainIntegrity::place_rear() {
   const auto after = std::upper_bound(places_.begin(), places_.end(), heard_.integrity_ns,
                                       [](int64_t stamp_ns, const Place& place) { return stamp_ns < place.stamp_ns; });
   if (after == places_.begin() || !(train_length_m_ > 0)) return;
-  const Place& then = *std::prev(after);
-  rear_m_ = then.distance_m - then.over_m - train_length_m_;
-  at_distance_m_ = then.distance_m;
+  then_ = *std::prev(after);
+  then_.moved_m = 0;
+  for (auto place = after; place != places_.end(); ++place) then_.moved_m += place->moved_m;
+  if (then_.known) rear_m_ = then_.distance_m - then_.over_m - train_length_m_;
 }
 
-TrainIntegrity::Said TrainIntegrity::said(double distance_m, double reported_ahead_m) const {
+TrainIntegrity::Said TrainIntegrity::said(double distance_m, double reported_ahead_m, double over_m) const {
   if (!is_confirmed(q_integrity())) return {q_integrity(), std::nullopt};
   if (!rear_m_ || integrity_ns() == used_up_ns_) return {};
-  const double length_m = std::ceil(std::max(distance_m, *at_distance_m_) - *rear_m_ + reported_ahead_m);
+  const double moved_m = std::max(0.0, std::min(then_.moved_m, over_m - then_.over_m));
+  const double length_m = std::ceil(std::max(distance_m, then_.distance_m) - *rear_m_ + reported_ahead_m + moved_m);
   if (!(length_m <= kLongestM)) return {};
   // A train shorter than the step of D_LRBG may lie in front of the front end that was reported.
   return {q_integrity(), static_cast<uint32_t>(std::max(length_m, 0.0))};

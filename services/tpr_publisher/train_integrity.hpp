@@ -21,6 +21,8 @@ class TrainIntegrity {
     int64_t stamp_ns = 0;
     double distance_m = 0;  // travelled, signed
     double over_m = 0;      // L_DOUBTOVER's amount at that time
+    bool known = true;      // on the map; no rear end can be told from one that is not
+    double moved_m = 0;     // so much further on than the way from the last place says; infinite = nobody knows
   };
   struct Said {
     uint32_t q_length = 0;               // 0 = no information
@@ -41,8 +43,9 @@ class TrainIntegrity {
   /// (3.6.5.2.5, table 2c [5] and [8]).
   void use_up() { used_up_ns_ = integrity_ns(); }
   /// A train that has backed since then is not taken for shorter. reported_ahead_m: how far in front of distance_m the
-  /// report says the front end to be, from which trackside counts the length.
-  [[nodiscard]] Said said(double distance_m, double reported_ahead_m = 0) const;
+  /// report says the front end to be, from which trackside counts the length. over_m: L_DOUBTOVER's amount now; a front
+  /// end that was moved forward since then does not take the rear end along farther than that.
+  [[nodiscard]] Said said(double distance_m, double reported_ahead_m = 0, double over_m = 0) const;
   /// What said() speaks of.
   [[nodiscard]] uint32_t q_integrity() const { return stands().q_integrity; }
   [[nodiscard]] int64_t integrity_ns() const { return stands().integrity_ns; }
@@ -70,7 +73,7 @@ class TrainIntegrity {
   bool settled_ = true;                  // rear_m_ belongs to heard_
   bool forgotten_ = false;               // it was known before the way was lost
   std::optional<double> rear_m_;         // min safe rear end, on the travelled distance
-  std::optional<double> at_distance_m_;  // travelled then
+  Place then_;                           // the place then; moved_m: since then
 };
 
 }  // namespace railfix::tpr_publisher

@@ -115,9 +115,7 @@ class OnboardUnit {
       status_.train_length_m(number_of(word, value, 2000));
     } else if (name == "report") {
       status_.wanted_because(static_cast<uint8_t>(msg::REPORT_BORDER + index_of(word, kReports, value)));
-      // Another number than whoever spoke before: seconds do not come twice.
-      const auto seconds = static_cast<uint32_t>(core::wall_ns() / core::kNsPerSecond);
-      status_.reports_wanted(std::max(status_.reports_wanted() + 1, seconds));
+      status_.reports_wanted(next(status_.reports_wanted()));
     } else if (name == "packet_58") {
       take_packet_58(word, value);
     } else if (name == "lrbg") {
@@ -126,6 +124,10 @@ class OnboardUnit {
       throw core::BadInput(word +
                            ": must be mode=, level=, ntc=, cab=, integrity=, length=, report=, packet_58= or lrbg=");
     }
+  }
+  /// Higher than any of whoever spoke before: seconds do not come twice.
+  static uint32_t next(uint32_t count) {
+    return std::max(count + 1, static_cast<uint32_t>(core::wall_ns() / core::kNsPerSecond));
   }
   void take_packet_58(const std::string& word, const std::string& hex) {
     status_.packet_58_lrbg(0);
@@ -139,6 +141,7 @@ class OnboardUnit {
     if (packet.size() > status_.packet_58().size()) throw core::BadInput(word + ": is longer than a packet 58 can be");
     std::ranges::copy(packet, status_.packet_58().begin());
     status_.packet_58_bytes(static_cast<uint32_t>(packet.size()));
+    status_.packets_58(next(status_.packets_58()));
   }
   msg::OnboardStatus status_;
 };

@@ -258,6 +258,23 @@ TEST(TrainPositionReport, WhatIsSaidOfAnUnknownGroupIsTold) {
   EXPECT_EQ(said(&TrainPositionReport::q_dirtrain), "Q_DIRTRAIN");
 }
 
+// Of a single balise the sides are relative to the group before it.
+TEST(TrainPositionReport, SidesOfPacket1SayNothingWithoutAGroupBefore) {
+  TrainPositionReport report;
+  report.nid_lrbg = 7;
+  report.d_lrbg = 20;
+  report.l_doubtover = report.l_doubtunder = 3;
+  report.nid_packet = 1;
+  report.nid_prvlrbg = kUnknownBaliseGroup;
+  EXPECT_EQ(said_of_no_group(report), "");
+  report.q_dirtrain = kNominal;
+  EXPECT_EQ(said_of_no_group(report),
+            "nothing is said by Q_DIRTRAIN = 1, in relation to a group before the LRBG that is unknown (NID_PRVLRBG = "
+            "16777215).");
+  report.nid_prvlrbg = 6;
+  EXPECT_EQ(said_of_no_group(report), "");
+}
+
 TEST(TrainPositionReport, MetresAreThoseThatTheFieldSays) {
   EXPECT_EQ(metres(3, 0), 0.3);
   EXPECT_EQ(metres(12, 0), 1.2);

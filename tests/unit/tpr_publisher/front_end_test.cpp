@@ -3,6 +3,8 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+
 #include "core/time.hpp"
 #include "tpr_publisher/tpr_publisher.hpp"
 #include "unit/tpr_publisher/balise_map.hpp"
@@ -81,8 +83,12 @@ TEST(FrontEnd, ReportsDoNotDependOnTheEndOutOfWhichTheCameraLooks) {
       b.hear(said_to_b);
       const auto by_a = a.run(at_m, 20);
       const auto by_b = b.run(at_m - kApartM, 20);
-      // Either camera passes the groups where it is itself.
-      if (!by_a.report || !by_b.report || by_a.report->fields.nid_lrbg != by_b.report->fields.nid_lrbg) continue;
+      const auto map = balise_map();
+      const bool on_a_group = std::ranges::any_of(map->balise_groups, [&](const track::BaliseGroup& group) {
+        return group.edge == 1 && group.offset_m >= at_m - kApartM && group.offset_m <= at_m;
+      });
+      if (on_a_group) continue;  // either camera passes the groups where it is itself
+      ASSERT_TRUE(by_a.report && by_b.report) << at_m;
       EXPECT_EQ(by_a.report->fields, by_b.report->fields) << at_m;
       ++compared;
     }
@@ -171,6 +177,41 @@ TEST(FrontEnd, WhatWasAskedAndConfirmedForTheOldFrontIsOver) {
   ride.hear(other);  // confirmed again: the rear end is the camera's now
   const auto again = ride.run(390, 0).report->fields;
   EXPECT_EQ(again.l_trainint, 119U);  // 110 m, 4 m that the train may be further back along its new axis, Q_LOCACC 5 m
+}
+
+TEST(FrontEnd, ATrainThatBeginsInTheOtherCabRefersToTheGroupBehindThat) {
+  for (const bool said_first : {true, false}) {
+    Ride ride(true, settings());
+    if (said_first) ride.hear(with(ActiveCab::other));
+    ride.run(300, 0);
+    if (!said_first) ride.hear(with(ActiveCab::other));
+    auto wanted = with(ActiveCab::other);
+    wanted.reports_wanted = 1;
+    ride.hear(wanted);
+    const auto fields = ride.run(300, 0).report->fields;
+    EXPECT_EQ(fields.nid_lrbg, kB) << "A lies ahead of it";
+    EXPECT_EQ(fields.d_lrbg, 1980U);
+    EXPECT_EQ(fields.q_dlrbg, etcs::kNominal);
+    EXPECT_EQ(fields.q_dirlrbg, etcs::kNominal);
+  }
+}
+
+TEST(FrontEnd, LocationsStandWhenAProcessBeganAgainAndHearsWhichCabIsActive) {
+  Ride ride(true, settings());
+  etcs::ReportParameters parameters;
+  parameters.t_cycloc = etcs::kNoCycleTime;
+  parameters.m_loc = etcs::kReportNotAtGroups;
+  parameters.locations = {{300, 1}};
+  ASSERT_TRUE(ride.publisher().set_parameters(parameters, kC).ok());
+  ride.run(600, -20);
+  ride.hear(with(ActiveCab::other));
+  ride.run(600, -20);  // the front 198 m beyond C
+  double reported_at_m = 0;
+  for (double at_m = 590; at_m > 420 && reported_at_m == 0; at_m -= 10) {
+    const auto report = ride.run(at_m, -20).report;
+    if (report && report->reason == Reason::location) reported_at_m = at_m;
+  }
+  EXPECT_NEAR(reported_at_m, 510, 15) << "the max safe front end may be 10 m ahead";
 }
 
 }  // namespace

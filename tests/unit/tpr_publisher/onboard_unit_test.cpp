@@ -62,13 +62,31 @@ TEST(OnboardUnit, AModeThereAndBackBetweenTwoPositionsIsReported) {
   EXPECT_EQ(report->fields.m_mode, 0U);
 }
 
+TEST(OnboardUnit, AnNtcIsOfLevelNtcOnly) {
+  TprPublisher publisher(balise_map(), settings());
+  ASSERT_TRUE(publisher.update(at(forward(1, 450), 0, 20), kStart).report.has_value());
+  Onboard onboard;
+  onboard.stamp_ns = kStart;
+  const auto reports = [&](double run_s) {
+    core::ok_or_throw(publisher.set_onboard(onboard, kStart));
+    return publisher.update(at(forward(1, 450 + 20 * run_s), run_s, 20), kStart + core::to_ns(run_s)).report;
+  };
+  onboard.nid_ntc = 9;
+  EXPECT_FALSE(reports(0.1).has_value());
+  onboard.m_level = etcs::kLevelNtc;
+  EXPECT_EQ(reports(0.2).value().reason, Reason::level);
+  onboard.nid_ntc = 10;
+  EXPECT_EQ(reports(0.3).value().reason, Reason::level);
+}
+
 /// Beyond group B; 60 positions a second, before each of which the on-board unit says the same again.
 class TrainWithOnboard : public ::testing::Test {
  protected:
   static constexpr double kPeriodS = 1 / 60.0;
 
   void step(double run_s, double distance_m, bool track_known = true) {
-    auto position = at(forward(1, 450), run_s, 0);
+    auto position = at(forward(1, foot_m), run_s, 0);
+    position.over_m = over_m;
     position.distance_m = distance_m;
     position.track_known = track_known;
     now_ns = position.stamp_ns;
@@ -92,6 +110,8 @@ class TrainWithOnboard : public ::testing::Test {
   TprPublisher publisher{balise_map(), settings()};
   Onboard onboard;
   int64_t ahead_ns = 0;  // the on-board unit's clock
+  double foot_m = 450;
+  double over_m = 3;
   std::optional<etcs::TrainPositionReport> reported;
   int64_t now_ns = kStart;
 };
@@ -163,6 +183,23 @@ TEST_F(TrainWithOnboard, InASupervisedManoeuvreTheRearEndLiesFartherBehind) {
   confirm(1);
   step(1, 8700);
   EXPECT_EQ(reported->l_trainint, 238U);
+}
+
+TEST_F(ConfirmedTrain, IsLongerWhenItsFrontEndIsCorrectedForward) {
+  foot_m += 60;
+  over_m = 20;
+  EXPECT_EQ(next_report(kNextS, 8700).l_trainint, 225U) << "no farther behind than 20 m of doubt, 5 m of Q_LOCACC";
+}
+
+// 3.6.5.2.7: nor later, when the place is known, from where it was not.
+TEST_F(TrainWithOnboard, ATrainThatWasConfirmedAtAnUnknownPlaceHasNoLength) {
+  for (int i = 0; i < 60; ++i) step(i * kPeriodS, 8700, false);
+  confirm(1);
+  step(1, 8700, false);
+  for (int i = 1; i < 420; ++i) step(1 + i * kPeriodS, 8700);
+  ASSERT_EQ(reported->nid_lrbg, kB);
+  EXPECT_EQ(reported->q_length, 0U);
+  EXPECT_FALSE(reported->l_trainint.has_value());
 }
 
 TEST_F(ConfirmedTrain, SaysNothingWhenTheDistanceBeganAgain) {

@@ -23,6 +23,7 @@ class Trigger : public ::testing::Test {
     moment.max_safe_front_m = moment.front_m + 10;
     moment.min_safe_front_m = moment.front_m - 20;
     if (moment.beyond_lrbg_m) *moment.beyond_lrbg_m += distance_m;
+    if (moment.beyond_origin_m) *moment.beyond_origin_m += distance_m;
   }
   static etcs::ReportParameters parameters() {
     etcs::ReportParameters parameters;
@@ -107,7 +108,8 @@ TEST_F(Trigger, EveryNewBaliseGroupUnlessNotWanted) {
   moment.nid_lrbg = etcs::kUnknownBaliseGroup;
   EXPECT_EQ(step(), Reason::balise_group) << "what was said must not stand";
   EXPECT_EQ(step(), std::nullopt);
-  moment.nid_lrbg = 7;  // found again, not new
+  moment.nid_lrbg = 7;
+  EXPECT_EQ(step(), Reason::balise_group) << "found again: trackside need not wait for the cycle";
   EXPECT_EQ(step(), std::nullopt);
   auto wanted = parameters();
   wanted.m_loc = etcs::kReportNotAtGroups;
@@ -161,13 +163,14 @@ class TriggerWithLocation : public Trigger {
 TEST_F(TriggerWithLocation, CountsFromTheGroupOfThePacketNotFromThePresentOne) {
   trigger.set_parameters(wanted, 7);
   step();  // no LRBG yet
-  EXPECT_EQ(trigger.wanted_origin(), 7U);
+  EXPECT_EQ(trigger.origin(), 7U);
+  EXPECT_TRUE(trigger.looks_for_origin());
   moment.nid_lrbg = 8;
   moment.beyond_lrbg_m = 20;
   moment.beyond_origin_m = 420;
   run(1, 0);
-  EXPECT_EQ(step(), std::nullopt);
-  EXPECT_EQ(trigger.wanted_origin(), std::nullopt);
+  EXPECT_EQ(step(), Reason::balise_group);
+  EXPECT_FALSE(trigger.looks_for_origin());
   run(1, 69);  // 489 m, max safe front end 499 m
   EXPECT_EQ(step(), std::nullopt);
   run(1, 2);
@@ -177,15 +180,53 @@ TEST_F(TriggerWithLocation, CountsFromTheGroupOfThePacketNotFromThePresentOne) {
 TEST_F(TriggerWithLocation, IsLeftOutWhereNobodyKnowsIt) {
   trigger.set_parameters(wanted, etcs::kUnknownBaliseGroup);
   EXPECT_TRUE(trigger.locations_left_out());
-  trigger.set_parameters(wanted, 7);
-  EXPECT_FALSE(trigger.locations_left_out());
-  step();
-  moment.nid_lrbg = 8;  // group 7 is not behind the train
+  EXPECT_TRUE(trigger.locations_given_up());
+}
+
+TEST_F(TriggerWithLocation, WaitsForAGroupThatIsNotBehindTheTrainYet) {
+  moment.nid_lrbg = 8;
   moment.beyond_lrbg_m = 20;
-  run(1, 10000);
+  step();
+  trigger.set_parameters(wanted, 7);  // trackside's antenna has passed it, our estimate has not
+  EXPECT_FALSE(trigger.locations_left_out());
+  run(1, 490);
   EXPECT_EQ(step(), std::nullopt);
   EXPECT_TRUE(trigger.locations_left_out());
+  EXPECT_FALSE(trigger.locations_given_up());
+  moment.nid_lrbg = 7;
+  moment.beyond_lrbg_m = 3;
+  EXPECT_EQ(step(), std::nullopt);
+  EXPECT_FALSE(trigger.locations_left_out());
+  run(1, 488);  // max safe front end 501 m
+  EXPECT_EQ(step(), Reason::location);
+}
+
+TEST_F(TriggerWithLocation, IsGivenUpWhenItsGroupDoesNotCome) {
+  trigger.set_parameters(wanted, 7);
+  moment.nid_lrbg = 8;
+  moment.beyond_lrbg_m = 20;
+  step();
+  run(1, 500);
+  EXPECT_EQ(step(), std::nullopt);
+  EXPECT_FALSE(trigger.locations_given_up());
+  run(1, 1);
+  EXPECT_EQ(step(), std::nullopt);
+  EXPECT_TRUE(trigger.locations_given_up());
   EXPECT_EQ(trigger.origin(), std::nullopt);
+}
+
+TEST_F(TriggerWithLocation, FollowsACorrectionOfThePlace) {
+  ask(wanted);
+  moment.nid_lrbg = 7;
+  moment.beyond_lrbg_m = 100;
+  step();
+  run(1, 300);
+  *moment.beyond_lrbg_m += 30;  // the train was 30 m further on than the way said
+  EXPECT_EQ(step(), std::nullopt);
+  run(1, 59);  // 489 m, max safe front end 499 m
+  EXPECT_EQ(step(), std::nullopt);
+  run(1, 2);
+  EXPECT_EQ(step(), Reason::location);
 }
 
 TEST_F(TriggerWithLocation, IsFoundAgainWhenTheDistanceBeganAgain) {

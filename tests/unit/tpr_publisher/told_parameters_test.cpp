@@ -156,6 +156,58 @@ TEST_F(ToldParametersTest, APacketRefersToTheGroupThatItsMessageNames) {
   EXPECT_TRUE(told.hear(nominal, true, kC)) << "the same bits of another message";
 }
 
+// Trackside's antenna has read B when the estimate is still 8 m in front of it.
+TEST_F(ToldParametersTest, LocationsWaitForAGroupThatTheEstimateHasNotPassed) {
+  const auto go_to = [&](double offset_m) {
+    const auto position = at(forward(1, offset_m), run_s += 0.1, 40);
+    const auto report = publisher.update(position, position.stamp_ns).report;
+    told.follow();
+    return report && report->reason == Reason::location;
+  };
+  for (double m = 152; m <= 392; m += 4) go_to(m);
+  const auto located = packet(etcs::kUnknownSide, {{100, 1}});
+  EXPECT_TRUE(told.hear(located, true, kB));
+  double reported_at_m = 0;
+  for (double m = 396; m < 600 && reported_at_m == 0; m += 4) reported_at_m = go_to(m) ? m : 0;
+  EXPECT_NEAR(reported_at_m, 500 - 2 - 8, 4);
+}
+
+TEST_F(ToldParametersTest, LocationsThatAreOverAreNotRemembered) {
+  const auto go_to = [&](double offset_m) {
+    const auto position = at(forward(1, offset_m), run_s += 0.1, 40);
+    publisher.update(position, position.stamp_ns);
+    told.follow();
+  };
+  go_to(404);
+  const auto located = packet(etcs::kUnknownSide, {{100, 1}});
+  EXPECT_TRUE(told.hear(located, true, kE));  // a group that the train does not come to
+  for (double m = 408; m <= 900; m += 4) go_to(m);
+  EXPECT_EQ(told.notes(), etcs::to_hex(located) + ' ' + std::to_string(kE));
+  for (double m = 904; m <= 916; m += 4) go_to(m);
+  EXPECT_EQ(told.notes(), etcs::to_hex(located));
+}
+
+TEST_F(ToldParametersTest, TheSameBitsOnceMoreAreAPacketWhereThatIsCounted) {
+  follow_train();
+  etcs::ReportParameters now;
+  now.m_loc = etcs::kReportNow;
+  const auto bits = etcs::encode(now).value();
+  const auto hear = [&](uint32_t count) {
+    const bool taken = told.hear(bits, true, kA, count);
+    run_s += 0.1;
+    follow_train();
+    EXPECT_EQ(reported, taken) << count;
+    return taken;
+  };
+  EXPECT_TRUE(hear(7));
+  EXPECT_FALSE(hear(7)) << "it stands in every onboard_status";
+  EXPECT_TRUE(hear(8));
+  EXPECT_FALSE(hear(1)) << "who counts began anew";
+  EXPECT_TRUE(hear(2));
+  EXPECT_FALSE(hear(0)) << "not counted";
+  EXPECT_FALSE(hear(9)) << "by somebody else who counts";
+}
+
 TEST_F(ToldParametersTest, DeletedOnesGiveThoseOfTheKeysBack) {
   follow_train();
   EXPECT_FALSE(told.hear_deleted());

@@ -167,5 +167,28 @@ TEST(TrainIntegrity, BackingMakesNoShorterTrain) {
   EXPECT_EQ(integrity.said(30).l_trainint, 205U);
 }
 
+TEST(TrainIntegrity, APlaceThatIsNotOnTheMapHasNoRearEnd) {
+  auto integrity = running_until(5);
+  integrity.follow({at(5.1), 51, 5, false});
+  integrity.hear(etcs::kConfirmedByDriver, at(5.1), 200);
+  expect_nothing(integrity.said(51));
+  integrity.follow({at(5.2), 52, 5, true});
+  expect_nothing(integrity.said(52));
+  integrity.hear(etcs::kConfirmedByDriver, at(5.2), 200);
+  EXPECT_EQ(integrity.said(52).l_trainint, 205U);
+}
+
+// The rear end stays where it was, and lies no farther behind than the interval of now allows.
+TEST(TrainIntegrity, AFrontEndThatIsCorrectedForwardHasALongerTrain) {
+  for (const auto& [moved_m, over_m, length_m] :
+       {std::tuple(8.0, 20.0, 213U), std::tuple(60.0, 20.0, 220U), std::tuple(HUGE_VAL, 20.0, 220U),
+        std::tuple(-60.0, 20.0, 205U), std::tuple(60.0, 3.0, 205U)}) {
+    auto integrity = running_until(5);
+    integrity.hear(etcs::kConfirmedByDevice, at(5), 200);
+    integrity.follow({at(5.1), 50, over_m, true, moved_m});
+    EXPECT_EQ(integrity.said(50, 0, over_m).l_trainint, length_m) << moved_m << ' ' << over_m;
+  }
+}
+
 }  // namespace
 }  // namespace railfix::tpr_publisher
