@@ -62,6 +62,10 @@ void CsvTable::refuse(const std::string& what) {
   if (status_.ok()) status_ = reader_->error(what);
 }
 
+void CsvTable::refuse_cell(size_t column, const std::string& what) {
+  refuse("'" + text(column) + "' in column " + reader_->header().at(column) + " " + what);
+}
+
 Status CsvTable::status() const {
   if (!status_.ok() || !reader_) return status_;
   return reader_->status();

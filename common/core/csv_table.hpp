@@ -37,6 +37,8 @@ class CsvTable {
   [[nodiscard]] std::string text(size_t column) const { return std::string(reader_->text(column)); }
   /// This row is wrong for a reason of the caller's.
   void refuse(const std::string& what);
+  /// ... or this cell of it: "'TEXT' in column NAME " and what.
+  void refuse_cell(size_t column, const std::string& what);
 
   [[nodiscard]] Status status() const;
 

@@ -18,7 +18,6 @@ class DeviceClock {
   /// host's clock is not set back. A device clock that was set begins anew, which takes 3 s where it was set back by
   /// less than the device was silent. REQUIRES: in the order of arrival.
   int64_t host_ns(int64_t device_ns, const HostTime& arrival);
-  [[nodiscard]] double drift_ppm() const { return drift_ * 1e6; }
 
  private:
   struct Lowest {  // of one window

@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "core/cut_text.hpp"
+#include "core/quantile.hpp"
 #include "core/time.hpp"
 #include "service/release.hpp"
 
@@ -30,13 +31,6 @@ double resident_mb() {
   double resident_pages = 0;
   statm >> total_pages >> resident_pages;
   return resident_pages * static_cast<double>(sysconf(_SC_PAGESIZE)) / 1e6;
-}
-
-double percentile(std::vector<double>& values, double share) {
-  if (values.empty()) return 0;
-  const auto nth = values.begin() + static_cast<int64_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), nth, values.end());
-  return *nth;
 }
 
 }  // namespace
@@ -138,8 +132,10 @@ void PublishedHealth::measure() {
   const int64_t cpu_ns = used_cpu_ns();
   status_.cpu_percent(100.0 * static_cast<double>(cpu_ns - cpu_ns_) / static_cast<double>(now_ns - measured_ns_));
   status_.rss_mb(resident_mb());
-  status_.latency_p50_ms(percentile(latencies_ms_, 0.50));
-  status_.latency_p99_ms(percentile(latencies_ms_, 0.99));
+  if (latencies_ms_.empty()) latencies_ms_.push_back(0);  // nothing went out
+  std::ranges::sort(latencies_ms_);
+  status_.latency_p50_ms(core::quantile(latencies_ms_, 0.50));
+  status_.latency_p99_ms(core::quantile(latencies_ms_, 0.99));
   latencies_ms_.clear();
   measured_ns_ = now_ns;
   cpu_ns_ = cpu_ns;

@@ -258,11 +258,6 @@ TrackPoint Path::at(double distance_m) const {
   return point;
 }
 
-std::optional<double> Path::speed_limit_at(double distance_m) const {
-  const Leg& leg = leg_at(distance_m);
-  return leg.run.edge->speed_limit_mps(leg.offset_at(distance_m), leg.run.direction());
-}
-
 double Path::curvature_at(double distance_m) const {
   const Leg& leg = leg_at(distance_m);
   const double curvature = leg.run.edge->alignment.curvature_at(leg.offset_at(distance_m));

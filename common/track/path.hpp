@@ -61,8 +61,6 @@ class Path {
   [[nodiscard]] double curvature_at(double distance_m) const;
   /// False where the map has no heights or guesses them, and beyond its end.
   [[nodiscard]] bool grade_known_at(double distance_m) const;
-  /// For a train that runs along the path; nothing where the map says none.
-  [[nodiscard]] std::optional<double> speed_limit_at(double distance_m) const;
   [[nodiscard]] const std::vector<PathLandmark>& landmarks() const { return landmarks_; }  // by distance
   /// With those that lie at either end.
   [[nodiscard]] std::span<const PathLandmark> landmarks_between(double from_m, double to_m) const;

@@ -6,7 +6,9 @@
 #include <cstring>
 #include <opencv2/imgproc.hpp>
 
+#include "core/joined.hpp"
 #include "core/time.hpp"
+#include "messaging/message_words.hpp"
 #include "pictures/encode.hpp"
 #include "service/data_time.hpp"
 
@@ -32,7 +34,8 @@ std::string complaint(uint32_t health) {
       {kDark, "lengthen the exposure, or see what covers the lens"},
       {kOutOfOrder, "their time stamps do not grow; check the camera's clock"}};
   for (const auto& [bit, what] : advice) {
-    if ((health & bit) != 0) return "pictures are " + health_words(health) + ": " + what;
+    if ((health & bit) != 0)
+      return "pictures are " + core::joined(messaging::names_of_picture_health(health)) + ": " + what;
   }
   return "";
 }
@@ -136,7 +139,9 @@ void FrameGrabberService::prepare_recorded() {
 
 void FrameGrabberService::start_when_connected() {
   if (!made_ns_) return;
-  const bool complete = config_.wait_for.empty() || gathering_.complete(context_.participant().connections());
+  const auto here = context_.participant().connections();
+  const bool complete =
+      config_.wait_for.empty() || gathering_.complete({here.matches, here.remote_endpoints, here.pairs});
   const bool gave_up = core::seconds(core::monotonic_ns() - *made_ns_) > config_.wait_s;
   if (!complete && !gave_up) return;
   made_ns_.reset();

@@ -45,17 +45,6 @@ TileMask usual_track() {
 
 }  // namespace
 
-std::string health_words(uint32_t health) {
-  std::string text;
-  const std::pair<uint32_t, const char*> names[] = {{kDark, "dark"},       {kSaturated, "saturated"},
-                                                    {kFrozen, "frozen"},   {kOutOfOrder, "out of order"},
-                                                    {kCovered, "covered"}, {kBlurred, "blurred"}};
-  for (const auto& [bit, name] : names) {
-    if ((health & bit) != 0) text += (text.empty() ? "" : ", ") + std::string(name);
-  }
-  return text;
-}
-
 bool PictureHealth::Lasting::update(bool now, int64_t stamp_ns, int64_t long_enough_ns) {
   if (!now) {
     since_ns_.reset();

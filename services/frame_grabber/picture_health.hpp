@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <opencv2/core.hpp>
 #include <optional>
-#include <string>
 
 #include "frame_grabber/picture_tiles.hpp"
 #include "geometry/camera.hpp"
@@ -15,9 +14,6 @@ namespace railfix::frame_grabber {
 
 /// The bits have the values of PICTURE_* in idl/camera.idl.
 enum HealthBit : uint32_t { kDark = 1, kSaturated = 2, kFrozen = 4, kOutOfOrder = 8, kCovered = 16, kBlurred = 32 };
-
-/// "dark, frozen"; empty for 0.
-std::string health_words(uint32_t health);
 
 struct PictureHealthConfig {
   double dark_below_grey = 16;        // 95 % of the pixels are darker

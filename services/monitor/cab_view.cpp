@@ -1,7 +1,8 @@
 #include "monitor/cab_view.hpp"
 
-#include <array>
 #include <cmath>
+
+#include "messaging/message_words.hpp"
 
 namespace railfix::monitor {
 namespace {
@@ -66,20 +67,6 @@ json landmarks_of(const CabView& view, double scale) {
 
 }  // namespace
 
-std::vector<std::string> health_words(uint32_t health) {
-  constexpr std::array<std::pair<uint32_t, const char*>, 6> kWords{{{msg::PICTURE_DARK, "dark"},
-                                                                    {msg::PICTURE_SATURATED, "too bright"},
-                                                                    {msg::PICTURE_FROZEN, "frozen"},
-                                                                    {msg::PICTURE_OUT_OF_ORDER, "out of order"},
-                                                                    {msg::PICTURE_COVERED, "covered"},
-                                                                    {msg::PICTURE_BLURRED, "blurred"}}};
-  std::vector<std::string> words;
-  for (const auto& [bit, word] : kWords) {
-    if ((health & bit) != 0) words.emplace_back(word);
-  }
-  return words;
-}
-
 json view_message(const CabView& view) {
   const double scale = view.intrinsics != nullptr && view.intrinsics->width_px > 0
                            ? static_cast<double>(view.width_px) / view.intrinsics->width_px
@@ -94,7 +81,7 @@ json view_message(const CabView& view) {
                {"seen", why.empty()},
                {"why", why.empty() ? json(nullptr) : json(why)},
                {"landmarks", landmarks_of(view, scale)},
-               {"health", health_words(view.health)}};
+               {"health", messaging::names_of_picture_health(view.health)}};
   if (view.track != nullptr && (view.track->seen_left() != 0 || view.track->seen_right() != 0)) {
     const auto& t = *view.track;
     message["rails"] = {{"left", points_of(t.left_u_px(), t.left_v_px(), t.left_points(), scale)},

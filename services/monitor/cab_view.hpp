@@ -4,7 +4,6 @@
 
 #include <nlohmann/json.hpp>
 #include <string>
-#include <vector>
 
 #include "geometry/camera.hpp"
 #include "idl/camera.h"
@@ -27,7 +26,5 @@ struct CabView {
 
 /// The message `view` of /api/live.
 nlohmann::json view_message(const CabView& view);
-/// Words for PICTURE_* bits.
-std::vector<std::string> health_words(uint32_t health);
 
 }  // namespace railfix::monitor

@@ -51,7 +51,6 @@ class FoxgloveApi {
   void set_channels(const std::vector<FoxgloveChannel>& channels);
   [[nodiscard]] bool watched(const std::string& topic) const { return watched_.contains(topic); }
   [[nodiscard]] const std::set<std::string>& watched() const { return watched_; }
-  [[nodiscard]] size_t clients() const { return clients_.size(); }
   void publish(const std::string& topic, const FoxgloveMessage& message);
 
  private:

@@ -26,7 +26,7 @@ std::string text_of(const json& json) {
 
 void LiveApi::opened(const ClientPtr& client) {
   clients_[client->id()] = {client, {}};
-  client->send(frame_of(actions_.hello(*client)));
+  client->send(frame_of(actions_.hello()));
 }
 
 void LiveApi::closed(const ClientPtr& client) {

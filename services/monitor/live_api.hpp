@@ -22,7 +22,7 @@ struct ControlAsk {
 class LiveApi {
  public:
   struct Actions {
-    std::function<nlohmann::json(const Client&)> hello;
+    std::function<nlohmann::json()> hello;
     /// What a client gets at once when it begins to watch this.
     std::function<std::vector<nlohmann::json>(const std::string& kind)> first;
     std::function<void()> watch_changed;
@@ -36,7 +36,6 @@ class LiveApi {
 
   [[nodiscard]] bool watched(const std::string& kind) const { return watched_.contains(kind); }
   [[nodiscard]] const std::set<std::string>& watched() const { return watched_; }
-  [[nodiscard]] size_t clients() const { return clients_.size(); }
 
   /// To everyone who watches `kind`. A client that is behind gets the newest only, unless it must have `every` one.
   void publish(const std::string& kind, const nlohmann::json& message, bool every = false);

@@ -84,7 +84,7 @@ Handlers::Upgrade MonitorService::upgrade(const Request& request) const {
 
 LiveApi::Actions MonitorService::live_actions() {
   LiveApi::Actions actions;
-  actions.hello = [this](const Client&) {
+  actions.hello = [this] {
     return json{{"kind", "hello"},
                 {"train", context_.common().train_id},
                 {"version", service::release()},

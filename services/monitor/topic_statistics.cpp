@@ -1,8 +1,8 @@
 #include "monitor/topic_statistics.hpp"
 
 #include <algorithm>
-#include <cmath>
 
+#include "core/quantile.hpp"
 #include "core/time.hpp"
 
 namespace railfix::monitor {
@@ -15,13 +15,6 @@ constexpr size_t kLatencies = 512;
 constexpr double kUsualShare = 0.1;  // of a new gap in the usual one
 constexpr double kGapFactor = 3;
 constexpr double kShortestGapS = 0.02;
-
-double percentile(std::vector<float>& values, double share) {
-  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  const auto nth = values.begin() + std::lround(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), nth, values.end());
-  return *nth;
-}
 
 }  // namespace
 
@@ -100,9 +93,10 @@ TopicNumbers TopicStatistics::numbers(int64_t now_ns) const {
   for (const Latency& latency : latencies_) {
     if (now_ns - latency.arrived_ns <= kLatencyNs) latencies_ms.push_back(latency.ms);
   }
-  numbers.latency_p50_ms = percentile(latencies_ms, 0.50);
-  numbers.latency_p95_ms = percentile(latencies_ms, 0.95);
-  numbers.latency_p99_ms = percentile(latencies_ms, 0.99);
+  std::ranges::sort(latencies_ms);
+  numbers.latency_p50_ms = core::quantile(latencies_ms, 0.50);
+  numbers.latency_p95_ms = core::quantile(latencies_ms, 0.95);
+  numbers.latency_p99_ms = core::quantile(latencies_ms, 0.99);
   return numbers;
 }
 

@@ -227,7 +227,6 @@ void MotionFilter::solve(const PoseErrors& reference, const PosePrior& prior, co
       std::max(0.0, all(kDistanceN, kDistanceN) + all(kDistanceR, kDistanceR) - 2.0 * all(kDistanceN, kDistanceR)));
   motion.lateral_sigma_m = sigma(kLateral);
   motion.turn_sigma_rad = sigma(kTurn);
-  motion.disagreement = std::sqrt(scale);
   motion.agreement = 0;
   for (const Vote& vote : votes_) motion.agreement += vote.weight / static_cast<double>(votes_.size());
   motion.reference = solution.head<PoseErrors::kCount>();

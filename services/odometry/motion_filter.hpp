@@ -40,8 +40,7 @@ struct Motion {
   double along_sigma_m = 0;
   double lateral_sigma_m = 0;
   double turn_sigma_rad = 0;
-  double agreement = 0;     // sum of the patches' weights over their number, 0..1
-  double disagreement = 1;  // root of the normalised squared errors: 1 = patches differ as their gradients promise
+  double agreement = 0;                                   // sum of the patches' weights over their number, 0..1
   PoseErrors::Mean reference = PoseErrors::Mean::Zero();  // the reference picture's errors, seen from here
   PoseErrors now;                                         // distance relative to the reference picture's
 };

@@ -7,6 +7,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "core/joined.hpp"
 #include "core/json_text.hpp"
 #include "core/time.hpp"
 
@@ -66,12 +67,6 @@ int fix_of(int mode, int status) {
 bool is_receiver(const std::string& path) {
   return !path.empty() && !path.starts_with("/dev/pps") && !path.starts_with("ntrip://") &&
          !path.starts_with("dgpsip://");
-}
-
-std::string joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
 }
 
 }  // namespace
@@ -141,9 +136,10 @@ void GpsdReports::read_devices(const Message& message) {
   }
   trouble_.clear();
   if (device_.empty() && devices_.size() > 1)
-    trouble_ = "has several receivers (" + joined(devices_) + "); name one behind the address";
+    trouble_ = "has several receivers (" + core::joined(devices_) + "); name one behind the address";
   if (!device_.empty() && !devices_.empty() && std::find(devices_.begin(), devices_.end(), device_) == devices_.end())
-    trouble_ = "has no receiver " + device_ + ", only " + joined(devices_) + "; correct the name behind the address";
+    trouble_ =
+        "has no receiver " + device_ + ", only " + core::joined(devices_) + "; correct the name behind the address";
 }
 
 bool GpsdReports::is_ours(const Message& message) {
@@ -190,7 +186,8 @@ std::string GpsdReports::why_silent() const {
            "UBX-NAV-DOP and UBX-NAV-SAT) messages";
   if (devices_.empty())
     return "has no receiver; check that it is plugged in, and tell gpsd of it with `gpsdctl add DEVICE`";
-  return "tells no position; check the receiver " + (device_.empty() ? joined(devices_) : device_) + " and its cable";
+  return "tells no position; check the receiver " + (device_.empty() ? core::joined(devices_) : device_) +
+         " and its cable";
 }
 
 }  // namespace railfix::sensor_gateway

@@ -106,21 +106,6 @@ void draw_track(cv::Mat& picture, const geometry::Intrinsics& camera, const Trac
   write(picture, lines);
 }
 
-void draw_sighting(cv::Mat& picture, const geometry::View& view, const Sighting& sighting) {
-  static constexpr const char* kNames[] = {"",           "frog", "balise", "portal in",
-                                           "portal out", "mast", "bridge", "platform"};
-  const auto foot = view.project({sighting.distance_ahead_m, sighting.lateral_m, 0});
-  const auto top = view.project({sighting.distance_ahead_m, sighting.lateral_m, 1.5});
-  if (!foot || !top) return;
-  const cv::Point2d a(foot->x(), foot->y());
-  const cv::Point2d b(top->x(), top->y());
-  cv::line(picture, a, b, cv::Scalar(0, 200, 255), 2, cv::LINE_AA);
-  char text[80];
-  std::snprintf(text, sizeof(text), "%s %.2f m +- %.2f", kNames[static_cast<size_t>(sighting.type)],
-                sighting.distance_ahead_m, sighting.sigma_m);
-  cv::putText(picture, text, b, cv::FONT_HERSHEY_SIMPLEX, 0.6, cv::Scalar(0, 200, 255), 2, cv::LINE_AA);
-}
-
 void draw_words(cv::Mat& picture, const std::vector<std::string>& warnings) {
   std::vector<Words> lines;
   for (const auto& warning : warnings) lines.push_back({warning, kWarn});

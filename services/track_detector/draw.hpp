@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "track_detector/landmark_types.hpp"
 #include "track_detector/track_detector.hpp"
 
 namespace railfix::track_detector {
@@ -14,9 +13,6 @@ namespace railfix::track_detector {
 /// `picture` is CV_8UC3 of the camera's size.
 void draw_track(cv::Mat& picture, const geometry::Intrinsics& camera, const TrackObservation& observation,
                 double gauge_m);
-
-/// A sighting of this picture: a post where the object stands, with its kind, distance and sigma.
-void draw_sighting(cv::Mat& picture, const geometry::View& view, const Sighting& sighting);
 
 /// What there is to say about a picture without an answer.
 void draw_words(cv::Mat& picture, const std::vector<std::string>& warnings);

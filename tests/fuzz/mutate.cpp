@@ -85,9 +85,9 @@ int main(int argc, char** argv) {
     std::cerr << "usage: " << argv[0] << " SEEDS_FOLDER [RUNS]\n";
     return 2;
   }
-  const auto seeds = read_seeds(argv[1]);
+  const auto seeds = std::filesystem::is_directory(argv[1]) ? read_seeds(argv[1]) : std::vector<Bytes>{};
   if (seeds.empty()) {
-    std::cerr << argv[1] << ": no seeds\n";
+    std::cerr << argv[1] << ": no folder with seeds\n";
     return 2;
   }
   for (const int signal : {SIGABRT, SIGSEGV, SIGBUS, SIGFPE, SIGILL}) std::signal(signal, keep_input);

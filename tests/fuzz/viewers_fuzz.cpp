@@ -45,7 +45,7 @@ void foxglove(const std::string& text, bool binary) {
 }
 
 void live(const std::string& text) {
-  LiveApi api({[](const Client&) {
+  LiveApi api({[] {
                  return nlohmann::json{{"type", "hello"}};
                },
                [](const std::string& kind) {

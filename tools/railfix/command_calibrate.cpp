@@ -196,7 +196,7 @@ void print(const track_detector::MountCalibration& found, const Roll& roll, cons
   if (!remark.empty()) std::printf("%s\n", remark.c_str());
 }
 
-nlohmann::json to_json(const track_detector::MountCalibration& found, const geometry::Intrinsics& lens, bool assumed) {
+nlohmann::json json_of(const track_detector::MountCalibration& found, const geometry::Intrinsics& lens, bool assumed) {
   const auto& m = found.mount;
   const auto& s = found.sigma;
   return {{"height_m", m.height_m},
@@ -259,7 +259,7 @@ int calibrate_mount(const MountArguments& arguments) {
   const auto& picture = pictures[pictures.size() / 2];
   draw(drawn, in_colour(path, picture), picture, calibration.intrinsics, *calibration.mount, arguments.gauge_m);
   if (arguments.json) {
-    std::cout << to_json(found.value(), calibration.intrinsics, !remark.empty()).dump(2) << '\n';
+    std::cout << json_of(found.value(), calibration.intrinsics, !remark.empty()).dump(2) << '\n';
   } else {
     print(found.value(), roll, remark);
     std::printf("written to %s; look at %s: straight rails must lie in the yellow lines\n", arguments.out.c_str(),

@@ -129,7 +129,7 @@ void print(const LensCalibration& found, const Boards& boards) {
               found.rms_px, 100 * found.coverage, found.tilt_rad * 57.29578);
 }
 
-nlohmann::json to_json(const LensCalibration& found, const Boards& boards) {
+nlohmann::json json_of(const LensCalibration& found, const Boards& boards) {
   const auto numbers = [](const geometry::Intrinsics& c) {
     return nlohmann::json{{"fu_px", c.fu_px}, {"fv_px", c.fv_px}, {"cu_px", c.cu_px}, {"cv_px", c.cv_px},
                           {"k1", c.k1},       {"k2", c.k2},       {"p1", c.p1},       {"p2", c.p2}};
@@ -162,7 +162,7 @@ int calibrate(LensArguments arguments) {
                                 : arguments.draw;
   core::ok_or_throw(write_picture(drawn, draw_lens(found.value(), boards.picture, boards.views[boards.pictured])));
   if (arguments.json) {
-    std::cout << to_json(found.value(), boards).dump(2) << '\n';
+    std::cout << json_of(found.value(), boards).dump(2) << '\n';
     return 0;
   }
   print(found.value(), boards);

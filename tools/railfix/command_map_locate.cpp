@@ -7,13 +7,13 @@
 #include "core/csv_table.hpp"
 #include "core/result.hpp"
 #include "map_matcher/locate/network_locator.hpp"
+#include "map_matcher/step_chain.hpp"
 #include "number_between.hpp"
 #include "recording/utc_text.hpp"
 
 namespace railfix::tool {
 namespace {
 
-constexpr double kTurnNoiseRad = 3e-4;  // of one step, as map_matcher takes it
 constexpr double kLongestGapS = 1.0;
 
 struct LocateRequest {
@@ -55,7 +55,7 @@ core::Result<Breaks> feed(const std::filesystem::path& file, double until_m, map
       started = false;
     }
     if (!measured) continue;
-    if (started && at_m != last_m) locator.move(at_m - last_m, rate_rps * dt_s, kTurnNoiseRad);
+    if (started && at_m != last_m) locator.move(at_m - last_m, rate_rps * dt_s, map_matcher::kYawNoiseRad);
     started = true;
     last_m = at_m;
     last_ns = table.stamp_ns();

@@ -102,7 +102,7 @@ uint64_t samples_of(const Info& info) {
   return samples;
 }
 
-ordered_json to_json(const InfoOptions& options, const Info& info) {
+ordered_json json_of(const InfoOptions& options, const Info& info) {
   const auto& statistics = info.reader->statistics();
   const auto when = [&](int64_t ns) { return statistics.messages > 0 ? ordered_json(utc_text(ns)) : ordered_json(); };
   const auto by_index = info.reader->indexed() ? ordered_json(statistics.messages) : ordered_json();
@@ -191,7 +191,7 @@ void print(const ordered_json& json) {
 
 int info(const InfoOptions& options) {
   const Info all = read(options);
-  const auto json = to_json(options, all);
+  const auto json = json_of(options, all);
   if (options.json) {
     std::cout << json.dump(2) << '\n';
   } else {

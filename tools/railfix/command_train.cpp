@@ -1,4 +1,4 @@
-// `railfix train` and `railfix doctor`: a train from its manifest (docs/fleet.md).
+// `railfix train`: a train from its manifest (docs/fleet.md).
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -25,6 +25,13 @@ bool say(const std::vector<Finding>& findings) {
     good = good && !finding.error;
   }
   return good;
+}
+
+CLI::Validator no_file() {
+  return {[](const std::string& name) {
+            return fs::exists(name) && !fs::is_directory(name) ? name + " is a file; give a folder" : std::string();
+          },
+          ""};
 }
 
 TrainCheck checked(const Manifest& manifest, const TrainOptions& options) {
@@ -206,43 +213,6 @@ int supervise_here(const TrainOptions& options) {
   return 0;
 }
 
-/// What the services that run on this computer complain of.
-std::vector<Finding> check_services(const TrainOptions& options) {
-  const HostFolder folder(options.root);
-  std::vector<Finding> findings;
-  const auto plan = folder.plan();
-  if (!plan || plan->down) return findings;
-  if (!supervisor_of(folder)) {
-    if (any_runs(folder))
-      findings.push_back({true, "services run without a supervisor: railfix train up " + plan->train() +
-                                    at_root(options.root) + " starts it"});
-    return findings;
-  }
-  for (const auto& service : plan->services) {
-    const auto health = health_of(*plan, folder.state(), service.name);
-    if (!health.healthy || health.degraded) findings.push_back({!health.healthy, service.name + " " + health.text});
-  }
-  return findings;
-}
-
-int doctor(const TrainOptions& options) {
-  const TrainHost* host = nullptr;
-  Manifest manifest;
-  if (!options.train.empty()) {
-    manifest = core::value_or_throw(read_manifest(options.train));
-    host = &chosen_host(manifest, options);
-  }
-  auto findings = check_computer(host == nullptr ? nullptr : &manifest, host, options.root);
-  if (host != nullptr) {
-    for (auto& finding : check_certificates(manifest, *host)) findings.push_back(std::move(finding));
-  }
-  for (auto& finding : check_installed_certificates(HostFolder(options.root))) findings.push_back(std::move(finding));
-  for (auto& finding : check_services(options)) findings.push_back(std::move(finding));
-  const bool good = say(findings);
-  std::cout << (good ? "this computer can run Railfix\n" : "this computer must not run Railfix like this\n");
-  return good ? 0 : 1;
-}
-
 }  // namespace
 
 void add_train(CLI::App& app, Action& chosen) {
@@ -250,11 +220,6 @@ void add_train(CLI::App& app, Action& chosen) {
   auto* train = app.add_subcommand(
       "train", "A train as a whole, from its manifest.  Example: railfix train check deploy/trains/re460-042");
   train->require_subcommand(1);
-  const CLI::Validator no_file(
-      [](const std::string& name) {
-        return fs::exists(name) && !fs::is_directory(name) ? name + " is a file; give a folder" : std::string();
-      },
-      "");
   enum { kManifest = 1, kHost = 2, kRoot = 4, kGate = 8 };
   const auto add = [&](const char* name, const char* what, int (*work)(const TrainOptions&), int takes) {
     auto* command = train->add_subcommand(name, what);
@@ -264,7 +229,7 @@ void add_train(CLI::App& app, Action& chosen) {
                           "Which host of the train this computer is; found by its address otherwise");
     if ((takes & kRoot) != 0)
       command->add_option("--root", options->root, "Where var/lib/railfix and opt/railfix are")
-          ->check(no_file)
+          ->check(no_file())
           ->capture_default_str();
     if ((takes & kGate) != 0) {
       command->add_option("--healthy-for", options->gate.healthy_s, "Seconds that a service must be healthy")
@@ -304,12 +269,6 @@ void add_train(CLI::App& app, Action& chosen) {
       train_upgrade, kManifest | kHost | kRoot | kGate);
   add("rollback", "Back to the generation before; once more: further back", train_rollback, kRoot | kGate);
   add("supervise", "Keep this computer's services running; what systemd starts", supervise_here, kRoot);
-
-  auto* computer = app.add_subcommand("doctor", "Say what is wrong with this computer as a host of a train");
-  computer->add_option("--train", options->train, "Folder of train.yaml");
-  computer->add_option("--host", options->host, "Which host of the train this computer is");
-  computer->add_option("--root", options->root, "Where var/lib/railfix is")->check(no_file)->capture_default_str();
-  computer->callback([&chosen, options] { chosen = [options] { return doctor(*options); }; });
 }
 
 }  // namespace railfix::tool

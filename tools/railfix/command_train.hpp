@@ -1,6 +1,8 @@
-// What the commands of `railfix train` have in common, and those that change what runs on a computer.
+// What `railfix doctor` and the commands of `railfix train` have in common, and those that change what runs on a
+// computer.
 #pragma once
 
+#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -23,6 +25,8 @@ struct TrainOptions {
 
 /// Prints what was found; false when one of it is an error.
 bool say(const std::vector<Finding>& findings);
+/// For an option that names a folder, which need not be there.
+CLI::Validator no_file();
 TrainCheck checked(const Manifest& manifest, const TrainOptions& options);
 /// These throw BadInput: no host of the train, nothing here, another train.
 const TrainHost& chosen_host(const Manifest& manifest, const TrainOptions& options);

@@ -1,4 +1,4 @@
-// The commands of `railfix`, one file each (command_<name>.cpp). Each adds itself to the command line and, when it was
+// The commands of `railfix`: add_<name> is in command_<name>.cpp. Each adds itself to the command line and, when it was
 // typed, puts what to do into `chosen`. Exit codes: 0 done, 1 the work failed, 2 bad input (core::BadInput).
 #pragma once
 
@@ -24,5 +24,6 @@ void add_recording(CLI::App& app, Action& chosen);
 void add_tell(CLI::App& app, Action& chosen);
 void add_tpr(CLI::App& app, Action& chosen);
 void add_train(CLI::App& app, Action& chosen);
+void add_doctor(CLI::App& app, Action& chosen);
 
 }  // namespace railfix::tool

@@ -65,7 +65,7 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   Action chosen;
   for (const auto add : {add_run, add_simulate, add_evaluate, add_calibrate, add_map, add_top, add_topics, add_log,
-                         add_replay, add_recording, add_tell, add_tpr, add_train}) {
+                         add_replay, add_recording, add_tell, add_tpr, add_train, add_doctor}) {
     add(app, chosen);
   }
   try {

@@ -12,6 +12,7 @@
 #include "messaging/message_words.hpp"
 #include "messaging/samples.hpp"
 #include "messaging/topics.hpp"
+#include "track/map.hpp"
 
 namespace railfix::tool {
 
@@ -31,10 +32,15 @@ template <size_t N>
 const char* word(const std::array<const char*, N>& words, uint8_t value) {
   return value < N ? words[value] : "?";
 }
-constexpr std::array kSightings{"unknown", "frog", "balise", "portal_in", "portal_out", "mast", "bridge", "platform"};
 constexpr std::array kFixes{"unknown", "curvature", "landmark", "network", "track", "gnss"};
 constexpr std::array kDirections{"?", "+", "-"};
 constexpr std::array kOrientations{"track", "imu"};
+
+std::string sighted(uint8_t kind) {
+  const auto landmark = static_cast<track::LandmarkKind>(kind);
+  const bool possible = landmark == track::LandmarkKind::unknown || track::can_be_sighted(landmark);
+  return possible ? to_string(landmark) : "?";
+}
 
 /// A name that may stand in a cell.
 std::string cell(std::string text) {
@@ -109,8 +115,8 @@ class Tables {
 
   void add(const msg::LandmarkSighting& sighting) {
     seen_data(sighting.stamp_ns());
-    sightings_ << sighting.stamp_ns() << word(kSightings, sighting.kind()) << sighting.distance_ahead_m()
-               << sighting.lateral_m() << sighting.sigma_m() << sighting.confidence();
+    sightings_ << sighting.stamp_ns() << sighted(sighting.kind()) << sighting.distance_ahead_m() << sighting.lateral_m()
+               << sighting.sigma_m() << sighting.confidence();
     end(sightings_);
   }
 

@@ -1,5 +1,4 @@
-// A recording as the tables of a run (docs: "Running a dataset"): one CSV file per kind of result, empty cells = not
-// known.
+// A recording as the tables of a run (docs/dataset.md): one CSV file per kind of result, empty cells = not known.
 #pragma once
 
 #include <cstdint>

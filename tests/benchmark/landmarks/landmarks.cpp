@@ -13,7 +13,6 @@
 #include "core/random.hpp"
 #include "core/time.hpp"
 #include "dataset/dataset.hpp"
-#include "track_detector/draw.hpp"
 #include "track_detector/landmark_finder.hpp"
 #include "track_detector/mount_calibration.hpp"
 #include "track_detector/track_detector.hpp"
@@ -65,12 +64,28 @@ track_detector::LandmarkPicture picture_of(const dataset::Picture& source,
   return picture;
 }
 
+/// A post where the object stands, with its kind, distance and sigma.
+void draw_sighting(cv::Mat& picture, const geometry::View& view, const track_detector::Sighting& sighting) {
+  static constexpr const char* kNames[] = {"",           "frog", "balise", "portal in",
+                                           "portal out", "mast", "bridge", "platform"};
+  const auto foot = view.project({sighting.distance_ahead_m, sighting.lateral_m, 0});
+  const auto top = view.project({sighting.distance_ahead_m, sighting.lateral_m, 1.5});
+  if (!foot || !top) return;
+  const cv::Point2d a(foot->x(), foot->y());
+  const cv::Point2d b(top->x(), top->y());
+  cv::line(picture, a, b, cv::Scalar(0, 200, 255), 2, cv::LINE_AA);
+  char text[80];
+  std::snprintf(text, sizeof(text), "%s %.2f m +- %.2f", kNames[static_cast<size_t>(sighting.type)],
+                sighting.distance_ahead_m, sighting.sigma_m);
+  cv::putText(picture, text, b, cv::FONT_HERSHEY_SIMPLEX, 0.6, cv::Scalar(0, 200, 255), 2, cv::LINE_AA);
+}
+
 void draw(const Settings& settings, const cv::Mat& grey, const geometry::View& view,
           const track_detector::Sighting& sighting, size_t number) {
   if (settings.draw.empty()) return;
   cv::Mat colour;
   cv::cvtColor(grey, colour, cv::COLOR_GRAY2BGR);
-  track_detector::draw_sighting(colour, view, sighting);
+  draw_sighting(colour, view, sighting);
   cv::imwrite(
       settings.draw + "/" + std::to_string(number) + "_" + std::to_string(static_cast<int>(sighting.type)) + ".png",
       colour);

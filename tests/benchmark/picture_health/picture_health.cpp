@@ -9,9 +9,11 @@
 #include <string>
 #include <vector>
 
+#include "core/joined.hpp"
 #include "dataset/dataset.hpp"
 #include "frame_grabber/picture_health.hpp"
 #include "measuring_tool.hpp"
+#include "messaging/message_words.hpp"
 #include "number_between.hpp"
 #include "whole_number.hpp"
 
@@ -60,6 +62,10 @@ double cpu_ms() {
   return static_cast<double>(now.tv_sec) * 1e3 + static_cast<double>(now.tv_nsec) * 1e-6;
 }
 
+std::string words_of(uint32_t health) {
+  return core::joined(messaging::names_of_picture_health(health));
+}
+
 void judge(const std::string& path, const Spoiling& spoiling, double fps, int most) {
   auto source = core::value_or_throw(dataset::open_pictures(path, {fps}));
   const auto calibration = core::value_or_throw(dataset::find_calibration(path));
@@ -81,14 +87,14 @@ void judge(const std::string& path, const Spoiling& spoiling, double fps, int mo
     expected += (bits & spoiling.expected) != 0;
     all |= bits;
     if (bits != 0 && spoiling.expected == 0)
-      std::printf("  %s %s\n", next.value()->name.c_str(), health_words(bits).c_str());
+      std::printf("  %s %s\n", next.value()->name.c_str(), words_of(bits).c_str());
     if (health.sharpness()) sharpness.push_back(*health.sharpness());
     covered.push_back(health.covered_share());
   }
   std::printf(
       "%-22s %5d pictures, %5d flagged, %5d as expected (%s); sharpness p5 %.2f p50 %.2f p95 %.2f (%zu); covered p50 "
       "%.2f max %.2f; %.3f ms\n",
-      spoiling.name, pictures, flagged, expected, health_words(all).c_str(), quantile(sharpness, 0.05),
+      spoiling.name, pictures, flagged, expected, words_of(all).c_str(), quantile(sharpness, 0.05),
       quantile(sharpness, 0.5), quantile(sharpness, 0.95), sharpness.size(), quantile(covered, 0.5),
       quantile(covered, 1), quantile(times, 0.5));
 }

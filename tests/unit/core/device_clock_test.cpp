@@ -26,7 +26,6 @@ TEST(DeviceClock, FollowsOffsetAndDriftWhileMessagesArriveLate) {
       EXPECT_LT(std::abs(error_s), true_s < 12 ? 600e-6 : 100e-6) << true_s;
     }
   }
-  EXPECT_NEAR(clock.drift_ppm(), -40, 5);
 }
 
 // Wall time is ahead of monotonic time by so much, and a message takes 5 ms.

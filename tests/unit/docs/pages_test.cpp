@@ -1,5 +1,5 @@
 // The tables in docs/configuration say what the programs say: every key with its default, unit, range and meaning, and
-// no other key.
+// no other key. Links lead to files that are there, and tables of files name those of the service.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -34,6 +34,11 @@ std::vector<fs::path> files_below(const fs::path& folder, const std::string& ext
     if (entry->path().extension() == extension) files.push_back(entry->path());
   }
   return files;
+}
+
+std::string text_of(const fs::path& file) {
+  std::ifstream stream(file);
+  return {std::istreambuf_iterator<char>(stream), {}};
 }
 
 // "section.group.key" of everything in a file that `railfix-<service> --document` wrote.
@@ -120,24 +125,42 @@ TEST(ConfigurationPages, SayNoKeyThatIsGone) {
 
 // A relative link that leads nowhere is a page that has gone.
 TEST(Documentation, LinksLeadSomewhere) {
-  static const std::regex kLink(R"(\]\(([^)#:]+)\))");
+  static const std::regex kLink(R"(\]\(([^)#:]+)(?:#[^)]*)?\))");
   auto pages = files_below(kRoot / "docs", ".md");
+  pages.push_back(kRoot / "README.md");
   for (const char* folder : {"services", "common"}) {
     for (const auto& page : files_below(kRoot / folder, ".md")) pages.push_back(page);
   }
   for (const auto& page : pages) {
-    std::ifstream stream(page);
-    const std::string text{std::istreambuf_iterator<char>(stream), {}};
+    const std::string text = text_of(page);
     for (std::sregex_iterator link(text.begin(), text.end(), kLink), end; link != end; ++link) {
       EXPECT_TRUE(fs::exists(page.parent_path() / link->str(1))) << page << " links to " << link->str(1);
     }
   }
 }
 
+// A service's page with a table of its files names all of them, or the folder they are in; what only carries data or
+// configuration needs no row.
+TEST(Documentation, TablesOfFilesAreComplete) {
+  static const std::regex kNeedsNoRow(".*_(config|parameters|service|types)");
+  for (const auto& page : files_below(kRoot / "docs" / "methods", ".md")) {
+    const std::string text = text_of(page);
+    if (text.find("\n## Files\n") == std::string::npos) continue;
+    const fs::path service = kRoot / "services" / page.stem();
+    for (const auto& header : files_below(service, ".hpp")) {
+      const std::string name = header.stem().string();
+      const bool folder_named = header.parent_path() != service &&
+                                text.find("`" + header.parent_path().filename().string() + "/`") != std::string::npos;
+      EXPECT_TRUE(folder_named || std::regex_match(name, kNeedsNoRow) ||
+                  text.find("`" + name + "`") != std::string::npos)
+          << page << " has no row for " << name;
+    }
+  }
+}
+
 // The table of what each source is worth has a row for every set that the program compares.
 TEST(SourcesPage, HasARowForEverySetOfSensors) {
-  std::ifstream stream(kRoot / "docs" / "sources.md");
-  const std::string page{std::istreambuf_iterator<char>(stream), {}};
+  const std::string page = text_of(kRoot / "docs" / "sources.md");
   for (const auto& set : train::kSensorSets) {
     EXPECT_NE(page.find("| " + std::string(set.name) + " |"), std::string::npos) << set.name;
   }

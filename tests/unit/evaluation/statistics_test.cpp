@@ -19,7 +19,6 @@ TEST(Statistics, OfKnownValuesInAnyOrder) {
   EXPECT_DOUBLE_EQ(summary.p50, 50);
   EXPECT_DOUBLE_EQ(summary.p95, 95);
   EXPECT_DOUBLE_EQ(summary.max, 100);
-  EXPECT_DOUBLE_EQ(quantile({1, 2}, 0.5), 1.5);
   EXPECT_DOUBLE_EQ(root_mean_square({3, -4, kUnknown}), std::sqrt(12.5));
 }
 

@@ -22,6 +22,12 @@ constexpr int kReaders = 250;
 constexpr int kReadersAmongWriters = 600;
 constexpr std::chrono::seconds kPatience{10};
 
+/// Ends the other thread also where this one fails.
+struct Ending {
+  std::atomic<bool>& ended;
+  ~Ending() { ended = true; }
+};
+
 class LeavingReaders : public ::testing::Test {
  protected:
   void write() {
@@ -58,6 +64,7 @@ class LeavingReaders : public ::testing::Test {
 
 TEST_F(LeavingReaders, DoNotStopAWriter) {
   const auto writer = std::async(std::launch::async, [&] { write(); });
+  const Ending ending{ended_};
   read();
   ended_ = true;
   if (writer.wait_for(kPatience) != std::future_status::ready) {
@@ -70,6 +77,7 @@ TEST_F(LeavingReaders, DoNotStopAWriter) {
 // A writer that appears is told to a reader by the middleware's thread, while ours takes the reader away.
 TEST_F(LeavingReaders, AreNotToldOfWritersThatAppear) {
   const auto writers = std::async(std::launch::async, [&] { come_and_go(); });
+  const Ending ending{ended_};
   uint64_t met = 0;
   for (int n = 0; n < kReadersAmongWriters; ++n) {
     std::vector<std::unique_ptr<Reader<msg::TrackView>>> readers(16);
@@ -80,7 +88,6 @@ TEST_F(LeavingReaders, AreNotToldOfWritersThatAppear) {
     std::this_thread::sleep_for(std::chrono::milliseconds(n % 4));
     for (const auto& reader : readers) met += static_cast<uint64_t>(reader->matched_writers());
   }
-  ended_ = true;
   EXPECT_GT(met, 0U) << "they never met";
 }
 

@@ -185,11 +185,11 @@ TEST_F(OnALine, DrawsInPixelsOfThePreview) {
   const MapView map(map_);
   const geometry::Intrinsics camera{800, 800, 320, 256, 0, 0, 0, 0, 640, 512};
   const auto seen = view(5);
-  const auto message = view_message(
-      {"cam0", 5, 320, 256, msg::PICTURE_DARK, &seen, &camera, &map, EdgePosition{1, 450, track::Direction::forward}});
+  const auto message = view_message({"cam0", 5, 320, 256, msg::PICTURE_DARK | msg::PICTURE_BLURRED, &seen, &camera,
+                                     &map, EdgePosition{1, 450, track::Direction::forward}});
   EXPECT_EQ(message["rails"]["left"][0], nlohmann::json({100, 200}));
   EXPECT_TRUE(message["seen"]);
-  EXPECT_EQ(message["health"][0], "dark");
+  EXPECT_EQ(message["health"], nlohmann::json({"dark", "blurred"}));
   ASSERT_EQ(message["landmarks"].size(), 2U);
   EXPECT_LT(message["landmarks"][0]["x"], 160) << "the mast stands left";
   EXPECT_EQ(message["landmarks"][0]["side"], "left");

@@ -112,6 +112,13 @@ class HttpConnectionsTest : public ::testing::Test {
     const std::lock_guard lock(mutex_);
     return failures_;
   }
+  /// Waits until there are so many, at most 10 s.
+  std::vector<std::string> failures(size_t number) {
+    for (int i = 0; i < 2000 && failures().size() < number; ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    return failures();
+  }
   void expect_health() const { EXPECT_THAT(Connection(port_).asked(kHealth, "ok\n"), EndsWith("ok\n")); }
 
   HttpOptions options_;
@@ -161,8 +168,7 @@ TEST_F(HttpConnectionsTest, AViewerWhoseHandlerThrowsIsClosedWith1011) {
     viewer.say(std::string("\x88\x80\0\0\0\0", 6));
     EXPECT_EQ(viewer.hear(""), "");
   }
-  while (failures().size() < 2) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  EXPECT_THAT(failures(), ElementsAre("no such word", "closed: the monitor failed"));
+  EXPECT_THAT(failures(2), ElementsAre("no such word", "closed: the monitor failed"));
   expect_health();
 }
 
@@ -189,8 +195,7 @@ TEST_F(HttpConnectionsTest, WhatNoHandlerAnswersForIsToldAndDoesNotEndTheProcess
   start();
   const Connection client(port_);
   client.say(kHealth);
-  while (failures().empty()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  EXPECT_THAT(failures(), ElementsAre("server: twice after once"));
+  EXPECT_THAT(failures(1), ElementsAre("server: twice after once"));
   server_.reset();
   EXPECT_EQ(client.hear(""), "") << "the server could be taken down in order";
 }

@@ -18,7 +18,7 @@ class LiveApiTest : public ::testing::Test {
     live_.opened(two_);
   }
   LiveApi::Actions actions() {
-    return {[](const Client&) {
+    return {[] {
               return json{{"kind", "hello"}};
             },
             [](const std::string& kind) {

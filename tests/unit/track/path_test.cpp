@@ -86,9 +86,6 @@ TEST(Path, ListsMarksByDistanceAsSeenAlongThePath) {
   const Path siding = path_from({3, 300, Direction::reverse}, 300, 0);
   ASSERT_EQ(siding.landmarks().size(), 1U);
   EXPECT_EQ(siding.landmarks()[0].kind, LandmarkKind::portal_out);
-
-  EXPECT_FALSE(path_from({1, 700, Direction::forward}, 10, 0).speed_limit_at(0));
-  EXPECT_EQ(path_from({1, 700, Direction::reverse}, 10, 0).speed_limit_at(0), 30);
 }
 
 TEST(Path, EndsOnARing) {

@@ -4,14 +4,9 @@
 #include <cmath>
 #include <numeric>
 
-namespace railfix::evaluation {
+#include "core/quantile.hpp"
 
-double quantile(const std::vector<double>& sorted, double share) {
-  const double rank = share * static_cast<double>(sorted.size() - 1);
-  const auto below = static_cast<size_t>(rank);
-  const size_t above = std::min(below + 1, sorted.size() - 1);
-  return sorted[below] + (rank - static_cast<double>(below)) * (sorted[above] - sorted[below]);
-}
+namespace railfix::evaluation {
 
 Summary summarise(std::vector<double> values) {
   std::erase_if(values, [](double value) { return !std::isfinite(value); });
@@ -20,8 +15,8 @@ Summary summarise(std::vector<double> values) {
   if (values.empty()) return summary;
   std::sort(values.begin(), values.end());
   summary.mean = std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
-  summary.p50 = quantile(values, 0.5);
-  summary.p95 = quantile(values, 0.95);
+  summary.p50 = core::quantile(values, 0.5);
+  summary.p95 = core::quantile(values, 0.95);
   summary.max = values.back();
   return summary;
 }

@@ -22,8 +22,6 @@ struct Summary {
 Summary summarise(std::vector<double> values);
 /// Root mean square of the finite values; NaN when there are none.
 double root_mean_square(const std::vector<double>& values);
-/// Linear between the two nearest ranks. REQUIRES: sorted, not empty, share in [0, 1].
-double quantile(const std::vector<double>& sorted, double share);
 /// 100 * part / whole; NaN when whole is 0.
 double percent(size_t part, size_t whole);
 

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "core/csv.hpp"
+#include "core/csv_table.hpp"
 #include "core/time.hpp"
 #include "core/train_limits.hpp"
 #include "map/survey.hpp"
@@ -36,51 +36,29 @@ std::optional<double> way_between(const std::shared_ptr<const track::Map>& map, 
   return path.ok() ? path.value().distance_of(b.place.edge, b.place.offset_m) : std::nullopt;
 }
 
-template <class T>
-T read_or_throw(core::Result<T> cell) {
-  return core::value_or_throw(std::move(cell));
-}
-
-size_t column_of(const core::CsvReader& table, const std::filesystem::path& file, std::string_view name) {
-  const auto column = table.column({name});
-  if (!column) throw core::BadInput(file.string() + " has no column " + std::string(name));
-  return *column;
-}
-
-core::BadInput bad_cell(const core::CsvReader& table, size_t column, const std::string& what) {
-  return core::BadInput(
-      table.error("'" + std::string(table.text(column)) + "' in column " + table.header().at(column) + what));
-}
-
 /// An infinite sigma counts for nothing, one of 0 for everything.
-double sigma_in(const core::CsvReader& table, size_t column) {
-  const double sigma_m = read_or_throw(table.number(column, core::kWidestM));
-  if (!std::isfinite(sigma_m) || sigma_m <= 0) throw bad_cell(table, column, " is not a length of more than 0 m");
+double sigma_in(core::CsvTable& table, size_t column) {
+  const double sigma_m = table.number_or_nan(column, core::kWidestM);
+  if (!std::isfinite(sigma_m) || sigma_m <= 0) table.refuse_cell(column, "is not a length of more than 0 m");
   return sigma_m;
 }
 
-double ahead_in(const core::CsvReader& table, size_t column) {
-  const double value = read_or_throw(table.number(column, core::kFarthestSeenM));
-  if (!std::isfinite(value)) throw bad_cell(table, column, " is not a finite number");
-  return value;
-}
-
-void check_confidence(const core::CsvReader& table, std::optional<size_t> column) {
+void check_confidence(core::CsvTable& table, std::optional<size_t> column) {
   if (!column) return;
-  const double confidence = read_or_throw(table.number(*column));
-  if (confidence < 0 || confidence > 1) throw bad_cell(table, *column, " is not a probability from 0 to 1");
+  const double confidence = table.number_or_nan(column);
+  if (confidence < 0 || confidence > 1) table.refuse_cell(*column, "is not a probability from 0 to 1");
 }
 
 /// The stamps of a table, in the order of its rows.
 class Stamps {
  public:
-  /// Of this row. Throws where it lies far before that of a row above.
-  int64_t next(const core::CsvReader& table, size_t column) {
-    const int64_t stamp_ns = read_or_throw(table.integer(column));
+  /// Of this row, which is refused where that lies far before the one of a row above.
+  int64_t next(core::CsvTable& table, size_t column) {
+    const int64_t stamp_ns = table.integer(column);
     is_late_ = newest_ns_ && stamp_ns < *newest_ns_;
     if (is_late_ && static_cast<uint64_t>(*newest_ns_) - static_cast<uint64_t>(stamp_ns) > kInterleavedNs)
-      throw core::BadInput(table.error("the stamp " + std::to_string(stamp_ns) +
-                                       " goes back by more than 1 s; was the clock set, or are these two runs?"));
+      table.refuse("the stamp " + std::to_string(stamp_ns) +
+                   " goes back by more than 1 s; was the clock set, or are these two runs?");
     if (!is_late_) newest_ns_ = stamp_ns;
     return stamp_ns;
   }
@@ -114,30 +92,30 @@ class WayBySpeed {
 /// The place in a row, which must be one of this map, and where this map has it.
 class PlaceColumns {
  public:
-  PlaceColumns(const core::CsvReader& table, const std::filesystem::path& file)
-      : edge_(column_of(table, file, "edge")),
-        offset_(column_of(table, file, "offset_m")),
-        direction_(column_of(table, file, "direction")),
-        easting_(table.column({"easting_m"})),
-        northing_(table.column({"northing_m"})) {}
+  explicit PlaceColumns(core::CsvTable& table)
+      : edge_(table.required({"edge"})),
+        offset_(table.required({"offset_m"})),
+        direction_(table.required({"direction"})),
+        easting_(table.optional({"easting_m"})),
+        northing_(table.optional({"northing_m"})) {}
 
-  [[nodiscard]] bool empty(const core::CsvReader& table) const { return table.text(edge_).empty(); }
-  [[nodiscard]] track::EdgePosition read(const core::CsvReader& table, const track::Map& map) const {
-    const int64_t edge = read_or_throw(table.integer(edge_));
+  [[nodiscard]] bool empty(const core::CsvTable& table) const { return table.text(edge_).empty(); }
+  /// Nothing where the row was refused.
+  [[nodiscard]] std::optional<track::EdgePosition> read(core::CsvTable& table, const track::Map& map) const {
+    const int64_t edge = table.integer(edge_);
     const bool possible = edge >= 0 && edge <= std::numeric_limits<uint32_t>::max();
     const track::EdgePosition place{
-        possible ? static_cast<uint32_t>(edge) : 0, read_or_throw(table.number(offset_, core::kFarthestM)),
+        possible ? static_cast<uint32_t>(edge) : 0, table.number_or_nan(offset_, core::kFarthestM),
         table.text(direction_) == "-" ? track::Direction::reverse : track::Direction::forward};
     if (!possible || map.edge(place.edge) == nullptr) {
-      throw core::BadInput(table.error("edge " + std::to_string(edge) + " is not on the map; was the run made on it?"));
+      table.refuse("edge " + std::to_string(edge) + " is not on the map; was the run made on it?");
+    } else if (easting_ && northing_ &&
+               !track::lies_there(map, place, table.number_or_nan(easting_, core::kFarthestM),
+                                  table.number_or_nan(northing_, core::kFarthestM))) {
+      table.refuse("this map has edge " + std::to_string(edge) +
+                   " elsewhere than at the row's easting_m and northing_m; give the map that the run was made on");
     }
-    if (!easting_ || !northing_) return place;
-    if (!track::lies_there(map, place, read_or_throw(table.number(*easting_, core::kFarthestM)),
-                           read_or_throw(table.number(*northing_, core::kFarthestM))))
-      throw core::BadInput(table.error("this map has edge " + std::to_string(edge) +
-                                       " elsewhere than at the row's easting_m and northing_m; give the map that the "
-                                       "run was made on"));
-    return place;
+    return table.status().ok() ? std::optional(place) : std::nullopt;
   }
 
  private:
@@ -145,11 +123,14 @@ class PlaceColumns {
   std::optional<size_t> easting_, northing_;
 };
 
-std::vector<State> read_states(const std::shared_ptr<const track::Map>& map, const std::filesystem::path& file) {
-  core::CsvReader table = core::value_or_throw(core::CsvReader::open(file));
-  const auto at = [&](std::string_view name) { return column_of(table, file, name); };
-  const size_t stamp = at("stamp_ns"), speed = at("speed_mps"), sigma = at("sigma_m"), known = at("track_known");
-  const PlaceColumns place(table, file);
+core::Result<std::vector<State>> read_states(const std::shared_ptr<const track::Map>& map,
+                                             const std::filesystem::path& file) {
+  core::CsvTable table(file);
+  const size_t stamp = table.required({"stamp_ns"});
+  const size_t speed = table.required({"speed_mps"});
+  const size_t sigma = table.required({"sigma_m"});
+  const size_t known = table.required({"track_known"});
+  const PlaceColumns places(table);
   Stamps stamps;
   WayBySpeed way;
   std::vector<State> out;
@@ -157,20 +138,21 @@ std::vector<State> read_states(const std::shared_ptr<const track::Map>& map, con
     State state;
     state.stamp_ns = stamps.next(table, stamp);
     if (stamps.late()) continue;
-    state.way_m = way.at(state.stamp_ns, read_or_throw(table.number(speed, core::kFastestTrainMps)));
-    const std::string_view is_known = table.text(known);
-    if (place.empty(table) || is_known == "0" || is_known == "false") continue;
-    state.place = place.read(table, *map);
-    state.sigma_m = read_or_throw(table.number(sigma, core::kWidestM));
-    if (!std::isfinite(state.place.offset_m) || !std::isfinite(state.sigma_m)) continue;
-    if (state.sigma_m < 0) throw bad_cell(table, sigma, " is less than 0 m");
+    state.way_m = way.at(state.stamp_ns, table.number_or_nan(speed, core::kFastestTrainMps));
+    const std::string is_known = table.text(known);
+    if (places.empty(table) || is_known == "0" || is_known == "false") continue;
+    const auto place = places.read(table, *map);
+    state.sigma_m = table.number_or_nan(sigma, core::kWidestM);
+    if (!place || !std::isfinite(place->offset_m) || !std::isfinite(state.sigma_m)) continue;
+    state.place = *place;
+    if (state.sigma_m < 0) table.refuse_cell(sigma, "is less than 0 m");
     if (!out.empty()) {
       const double run_m = state.way_m - out.back().way_m;
       state.place_ahead_m = out.back().place_ahead_m + way_between(map, out.back(), state).value_or(run_m) - run_m;
     }
     out.push_back(state);
   }
-  core::ok_or_throw(table.status());
+  if (!table.status().ok()) return table.status().error();
   return out;
 }
 
@@ -191,43 +173,43 @@ std::optional<track::EdgePosition> place_at(const std::shared_ptr<const track::M
 
 core::Result<ReadSightings> read_sightings(const std::shared_ptr<const track::Map>& map,
                                            const std::filesystem::path& run_folder, size_t run) {
-  try {
-    const std::vector<State> states = read_states(map, run_folder / "train_state.csv");
-    const std::filesystem::path file = run_folder / "sightings.csv";
-    core::CsvReader table = core::value_or_throw(core::CsvReader::open(file));
-    const auto at = [&](std::string_view name) { return column_of(table, file, name); };
-    const size_t stamp = at("stamp_ns"), kind = at("kind"), ahead = at("distance_ahead_m"), lateral = at("lateral_m");
-    const size_t sigma = at("sigma_m");
-    const std::optional<size_t> confidence = table.column({"confidence"});
-    ReadSightings out;
-    Stamps stamps;
-    while (table.next()) {
-      const int64_t when = stamps.next(table, stamp);
-      const auto what = track::landmark_kind_from(std::string(table.text(kind)));
-      if (!what) return table.error("\"" + std::string(table.text(kind)) + "\" is no kind of landmark");
-      const double ahead_m = ahead_in(table, ahead);
-      const double sigma_m = sigma_in(table, sigma);
-      const double side = read_or_throw(table.number(lateral, core::kFarthestSeenM));
-      check_confidence(table, confidence);
-      const auto after = std::lower_bound(states.begin(), states.end(), when,
-                                          [](const State& state, int64_t ns) { return state.stamp_ns < ns; });
-      const bool between_states = after != states.begin() && after != states.end();
-      const auto place = between_states ? place_at(map, *(after - 1), *after, when, ahead_m) : std::nullopt;
-      if (!place) {
-        ++out.placeless;
-        continue;
-      }
-      const State& before = *(after - 1);
-      const bool is_reverse = place->direction == track::Direction::reverse;
-      out.placed.push_back({run, before.way_m, track::seen_along(*what, !is_reverse), place->edge, place->offset_m,
-                            std::isfinite(side) ? (is_reverse ? -side : side) : 0.0, sigma_m, before.sigma_m,
-                            before.place_ahead_m, is_reverse});
+  const auto read = read_states(map, run_folder / "train_state.csv");
+  if (!read.ok()) return read.error();
+  const std::vector<State>& states = read.value();
+  core::CsvTable table(run_folder / "sightings.csv");
+  const size_t stamp = table.required({"stamp_ns"});
+  const size_t kind = table.required({"kind"});
+  const size_t ahead = table.required({"distance_ahead_m"});
+  const size_t lateral = table.required({"lateral_m"});
+  const size_t sigma = table.required({"sigma_m"});
+  const std::optional<size_t> confidence = table.optional({"confidence"});
+  ReadSightings out;
+  Stamps stamps;
+  while (table.next()) {
+    const int64_t when = stamps.next(table, stamp);
+    const auto what = track::landmark_kind_from(table.text(kind));
+    if (!what) table.refuse("\"" + table.text(kind) + "\" is no kind of landmark");
+    const double ahead_m = table.finite(ahead, core::kFarthestSeenM);
+    const double sigma_m = sigma_in(table, sigma);
+    const double side = table.number_or_nan(lateral, core::kFarthestSeenM);
+    check_confidence(table, confidence);
+    if (!table.status().ok()) break;
+    const auto after = std::lower_bound(states.begin(), states.end(), when,
+                                        [](const State& state, int64_t ns) { return state.stamp_ns < ns; });
+    const bool between_states = after != states.begin() && after != states.end();
+    const auto place = between_states ? place_at(map, *(after - 1), *after, when, ahead_m) : std::nullopt;
+    if (!place) {
+      ++out.placeless;
+      continue;
     }
-    core::ok_or_throw(table.status());
-    return out;
-  } catch (const core::BadInput& bad) {
-    return core::Error{bad.what()};
+    const State& before = *(after - 1);
+    const bool is_reverse = place->direction == track::Direction::reverse;
+    out.placed.push_back({run, before.way_m, track::seen_along(*what, !is_reverse), place->edge, place->offset_m,
+                          std::isfinite(side) ? (is_reverse ? -side : side) : 0.0, sigma_m, before.sigma_m,
+                          before.place_ahead_m, is_reverse});
   }
+  if (!table.status().ok()) return table.status().error();
+  return out;
 }
 
 core::Result<ReadSightings> read_runs(const std::shared_ptr<const track::Map>& map,

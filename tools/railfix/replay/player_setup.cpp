@@ -133,7 +133,8 @@ void Player::connect() {
     look_ns += kLookNs;
     const auto here = participant_.connections();
     steady_looks = here.matches == std::exchange(matches, here.matches) ? steady_looks + 1 : 0;
-    if (leader_ ? gathering_.complete(here) : steady_looks >= kSteadyLooks) return;
+    const frame_grabber::Gathering::Found found{here.matches, here.remote_endpoints, here.pairs};
+    if (leader_ ? gathering_.complete(found) : steady_looks >= kSteadyLooks) return;
   }
 }
 
