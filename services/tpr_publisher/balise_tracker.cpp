@@ -58,11 +58,13 @@ BaliseTracker::BaliseTracker(std::shared_ptr<const track::Map> map, double searc
 
 void BaliseTracker::lose() {
   last_.reset();
+  step_m_.reset();
   leg_.reset();
   reference_.reset();
 }
 
 void BaliseTracker::update(const EdgePosition& place, bool declared, bool heard) {
+  step_m_.reset();
   const track::Edge* edge = map_->edge(place.edge);
   if (edge == nullptr || !std::isfinite(place.offset_m)) return lose();
   EdgePosition foot = place;
@@ -75,6 +77,8 @@ void BaliseTracker::update(const EdgePosition& place, bool declared, bool heard)
     go_undeclared(foot);
   } else if (!go_declared(foot)) {
     acquire(foot);
+  } else if (front_turned_) {
+    acquire_behind_turned_front(foot);
   }
   last_ = foot;
 }
@@ -148,7 +152,10 @@ void BaliseTracker::go_back_to(LegSinceSwitch leg) {
 void BaliseTracker::go_undeclared(const EdgePosition& foot) {
   const bool anew = !leg_is_guess();
   if (anew) go_back_to(leg_since(foot));
-  if (!leg_->from) return;
+  if (!leg_->from) {
+    if (const auto step = last_ ? step_to(foot) : std::nullopt) step_m_ = step->way_m;
+    return;
+  }
   const double before_m = leg_->turns.way_m();
   if (const auto step = step_to(foot)) {
     note_direction(step->way_m);
@@ -160,6 +167,7 @@ void BaliseTracker::go_undeclared(const EdgePosition& foot) {
     leg_->from.reset();
     reference_.reset();
   }
+  if (leg_->from) step_m_ = leg_->turns.way_m() - before_m;
   if (!reference_) return;
   reference_->foot_m += leg_->turns.way_m() - before_m;
   if (anew || foot.edge != last_->edge) doubt_legs(ways_between(*map_, ways_, *leg_->from, foot, leg_->turns.way_m()));
@@ -185,6 +193,7 @@ bool BaliseTracker::go_declared(const EdgePosition& foot) {
   if (!last_) return false;
   if (!leg_is_guess()) {
     if (auto step = step_to(foot)) {
+      step_m_ = step->way_m;
       run_on(step->way_m);
       leave_leg(*step);
       pass(std::move(step->groups), step->way_m);
@@ -203,7 +212,8 @@ bool BaliseTracker::go_declared(const EdgePosition& foot) {
   const double length_m = ways.front().length_m;
   reference_ = leg.reference;
   if (reference_) reference_->doubt_m = std::max(reference_->doubt_m, most_apart_m(ways, length_m));
-  leg.turns.run(length_m - counted_m);
+  step_m_ = length_m - counted_m;
+  leg.turns.run(*step_m_);
   const auto groups = groups_on(ways);
   const auto& points = leg.turns.points();
   for (size_t i = 1; i < points.size(); ++i) {
@@ -263,22 +273,31 @@ std::vector<BaliseTracker::Passed> BaliseTracker::groups_on(const std::vector<Wa
   return common;
 }
 
-std::optional<Reference> BaliseTracker::remembered(uint32_t nid_lrbg) const {
-  return reference_ ? reference_->remembered(nid_lrbg) : std::nullopt;
-}
-
-std::optional<Reference> BaliseTracker::behind(uint32_t nid_lrbg) const {
-  if (auto found = remembered(nid_lrbg)) return found;
+std::optional<Reference> BaliseTracker::find(uint32_t nid_lrbg, double ahead_m,
+                                             std::optional<double> expected_foot_m) const {
+  if (reference_) {
+    if (auto found = reference_->remembered(nid_lrbg, expected_foot_m)) return found;
+  }
   if (!last_ || leg_is_guess()) return std::nullopt;
-  const auto all = groups_behind(*last_);
+  const auto groups = groups_on_only_way(map_, *last_, !front_at_other_end_, ahead_m);
   const auto one =
-      std::ranges::find_if(all, [&](const Reference& other) { return other.group->nid_lrbg() == nid_lrbg; });
-  return one == all.end() ? std::nullopt : std::optional(*one);
+      std::ranges::find_if(groups, [&](const Reference& other) { return other.group->nid_lrbg() == nid_lrbg; });
+  if (one == groups.end()) return std::nullopt;
+  Reference found = *one;
+  found.previous = nullptr;  // the one that the train will come from has not been passed either
+  return found;
 }
 
 void BaliseTracker::turn_front(bool is_at_other_end) {
+  if (is_at_other_end == front_at_other_end_) return;
   front_at_other_end_ = is_at_other_end;
-  if (reference_ && !reference_->passed && last_ && !leg_is_guess()) acquire(*last_);
+  front_turned_ = true;
+  if (last_ && !leg_is_guess()) acquire_behind_turned_front(*last_);
+}
+
+void BaliseTracker::acquire_behind_turned_front(const EdgePosition& foot) {
+  front_turned_ = false;
+  if (!reference_ || !reference_->passed) acquire(foot);
 }
 
 std::optional<BaliseTracker::Step> BaliseTracker::step_to(const EdgePosition& foot) const {
@@ -359,16 +378,13 @@ void BaliseTracker::pass(std::vector<Passed> passed, double step_m) {
 
 void BaliseTracker::acquire(const EdgePosition& foot) {
   leg_.reset();
+  front_turned_ = false;
   reference_ = nearest_behind(foot);
 }
 
-std::vector<Reference> BaliseTracker::groups_behind(const EdgePosition& foot) const {
-  return tpr_publisher::groups_behind(map_, foot, front_at_other_end_, search_behind_m_);
-}
-
+// Where tracks have met behind the train nobody knows from which one it came.
 std::optional<Reference> BaliseTracker::nearest_behind(const EdgePosition& foot) const {
-  const auto groups = groups_behind(foot);
-  return groups.empty() ? std::nullopt : std::optional(groups.front());
+  return nearest_of(groups_on_only_way(map_, foot, front_at_other_end_, search_behind_m_));
 }
 
 }  // namespace railfix::tpr_publisher

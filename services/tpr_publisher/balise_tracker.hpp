@@ -33,7 +33,7 @@ namespace railfix::tpr_publisher {
 class BaliseTracker {
  public:
   /// At the start, and after a jump to another track, the nearest group up to `search_behind_m` behind the train is
-  /// taken, when only one way leads from there. Eight that were passed within this way are remembered.
+  /// taken, when only one way leads from there. Eight more within this way are remembered, passed or on the map.
   BaliseTracker(std::shared_ptr<const track::Map> map, double search_behind_m);
 
   /// REQUIRES: the direction is known. A place that is not on the map loses the reference. `heard`: the train was
@@ -50,10 +50,12 @@ class BaliseTracker {
   [[nodiscard]] uint32_t passed_again() const { return passed_again_; }
   /// How far the train has come since its track was declared last; nothing while it is declared.
   [[nodiscard]] std::optional<double> undeclared_m() const;
-  /// This group as a reference, when it is the present one or one that was passed before it.
-  [[nodiscard]] std::optional<Reference> remembered(uint32_t nid_lrbg) const;
-  /// ... or, as after a start, when the map has it behind the train, as near and as surely as one that is taken then.
-  [[nodiscard]] std::optional<Reference> behind(uint32_t nid_lrbg) const;
+  /// The way on the map from the place before to the present one, along; nothing where nobody knows it.
+  [[nodiscard]] std::optional<double> step_m() const { return step_m_; }
+  /// This group as a reference: the present one, one of those before it (Reference::remembered), or one up to `ahead_m`
+  /// in front of the train, where only one way leads there.
+  [[nodiscard]] std::optional<Reference> find(uint32_t nid_lrbg, double ahead_m,
+                                              std::optional<double> expected_foot_m = std::nullopt) const;
 
  private:
   /// A group on the way from the last place to this one.
@@ -91,7 +93,7 @@ class BaliseTracker {
   [[nodiscard]] std::vector<Passed> groups_on(const std::vector<WayBetween>& ways) const;
   void pass(std::vector<Passed> passed, double step_m);
   void acquire(const track::EdgePosition& foot);
-  [[nodiscard]] std::vector<Reference> groups_behind(const track::EdgePosition& foot) const;
+  void acquire_behind_turned_front(const track::EdgePosition& foot);
   [[nodiscard]] std::optional<Reference> nearest_behind(const track::EdgePosition& foot) const;
   /// A train that runs so, along or not, runs with its front first.
   [[nodiscard]] bool front_first(bool along) const { return along != front_at_other_end_; }
@@ -106,8 +108,10 @@ class BaliseTracker {
   std::optional<Reference> reference_;
   uint32_t taken_back_ = 0;
   uint32_t passed_again_ = 0;
+  std::optional<double> step_m_;
   bool front_at_other_end_ = false;
-  bool forwards_ = true;  // the way that the train runs, seen from the camera's cab
+  bool front_turned_ = false;  // since a reference was looked for
+  bool forwards_ = true;       // the way that the train runs, seen from the camera's cab
   double moved_back_m_ = 0;
 };
 

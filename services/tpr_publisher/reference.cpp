@@ -13,21 +13,26 @@ constexpr size_t kRemembered = 8;
 
 }  // namespace
 
-std::optional<Reference> Reference::remembered(uint32_t nid_lrbg) const {
-  if (group->nid_lrbg() == nid_lrbg) return *this;
-  const auto one =
-      std::ranges::find_if(earlier, [&](const EarlierGroup& other) { return other.group->nid_lrbg() == nid_lrbg; });
-  if (one == earlier.end()) return std::nullopt;
-  Reference found{one->group, one->previous, one->nominal_along, one->from_previous_along};
-  found.foot_m = foot_m + one->ahead_m;
-  found.doubt_m = doubt_m + one->doubt_m;
-  found.passed = true;
+std::optional<Reference> Reference::remembered(uint32_t nid_lrbg, std::optional<double> expected_foot_m) const {
+  std::optional<Reference> found;
+  const auto consider = [&](Reference one) {
+    if (one.group->nid_lrbg() != nid_lrbg) return;
+    const bool better = !found || (expected_foot_m && std::abs(one.foot_m - *expected_foot_m) <
+                                                          std::abs(found->foot_m - *expected_foot_m));
+    if (better) found = std::move(one);
+  };
+  consider(*this);
+  for (const auto& one : earlier) {
+    consider({one.group, one.previous, one.nominal_along, one.from_previous_along, foot_m + one.ahead_m,
+              doubt_m + one.doubt_m, 0, one.passed});
+  }
   return found;
 }
 
 Reference passed_behind(Reference present, const Reference& last, double within_m) {
   const double ahead_m = last.foot_m - present.foot_m;
-  present.earlier = {{last.group, last.previous, last.nominal_along, last.from_previous_along, ahead_m, last.doubt_m}};
+  present.earlier = {
+      {last.group, last.previous, last.nominal_along, last.from_previous_along, ahead_m, last.doubt_m, last.passed}};
   for (auto other : last.earlier) {
     other.ahead_m += ahead_m;
     other.doubt_m += last.doubt_m;
@@ -38,12 +43,12 @@ Reference passed_behind(Reference present, const Reference& last, double within_
   return present;
 }
 
-std::vector<Reference> groups_behind(const std::shared_ptr<const track::Map>& map, const track::EdgePosition& foot,
-                                     bool ahead, double within_m) {
+std::vector<Reference> groups_on_only_way(const std::shared_ptr<const track::Map>& map, const track::EdgePosition& foot,
+                                          bool ahead, double within_m) {
   std::vector<Reference> groups;
   const auto path = track::Path::follow(map, foot, ahead ? within_m : 0, ahead ? 0 : within_m);
   if (!path.ok()) return groups;
-  // Where tracks have met behind the train nobody knows from which one it came.
+  // Beyond points that divide the way it is not the only one any more.
   const double sign = ahead ? 1 : -1;
   double most_m = within_m;
   for (const auto& one : path.value().switches()) {
@@ -59,6 +64,17 @@ std::vector<Reference> groups_behind(const std::shared_ptr<const track::Map>& ma
   for (size_t i = 0; i + 1 < groups.size(); ++i)  // round a ring it may be the group itself
     if (groups[i + 1].group != groups[i].group) groups[i].previous = groups[i + 1].group;
   return groups;
+}
+
+std::optional<Reference> nearest_of(const std::vector<Reference>& groups) {
+  if (groups.empty()) return std::nullopt;
+  Reference nearest = groups.front();
+  for (size_t i = 1; i < std::min(groups.size(), kRemembered + 1); ++i) {
+    const Reference& one = groups[i];
+    nearest.earlier.push_back(
+        {one.group, one.previous, one.nominal_along, one.from_previous_along, one.foot_m - nearest.foot_m});
+  }
+  return nearest;
 }
 
 }  // namespace railfix::tpr_publisher

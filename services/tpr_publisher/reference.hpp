@@ -11,7 +11,8 @@
 
 namespace railfix::tpr_publisher {
 
-/// An LRBG of before. Trackside may still refer to it (SUBSET-026 3.6.2.2.1).
+/// A group that was passed before the LRBG, or that lies behind it on the map. Trackside may still refer to it
+/// (SUBSET-026 3.6.2.2.1).
 struct EarlierGroup {
   const track::BaliseGroup* group = nullptr;
   const track::BaliseGroup* previous = nullptr;
@@ -19,6 +20,7 @@ struct EarlierGroup {
   bool from_previous_along = true;
   double ahead_m = 0;  // the present one lies so far beyond it, along
   double doubt_m = 0;  // that way may be longer or shorter by so much
+  bool passed = false;
 };
 
 struct Reference {
@@ -32,16 +34,21 @@ struct Reference {
   bool passed = false;                           // false: taken from the map, because it lies behind
   std::vector<EarlierGroup> earlier{};           // the last one first
 
-  /// This group, or that earlier one, as a reference.
-  [[nodiscard]] std::optional<Reference> remembered(uint32_t nid_lrbg) const;
+  /// This group, or that earlier one, as a reference. Round a loop it was passed more than once: the passage from which
+  /// the foot is as far as expected, or, expected nowhere, the last one.
+  [[nodiscard]] std::optional<Reference> remembered(uint32_t nid_lrbg,
+                                                    std::optional<double> expected_foot_m = std::nullopt) const;
 };
 
 /// `present` has been passed behind `last`, whose groups it remembers: eight, no farther away than `within_m`.
 Reference passed_behind(Reference present, const Reference& last, double within_m);
 
-/// On the only way on which a train at this place can have come, no farther than `within_m`, the nearest first.
-/// `ahead`: its front is at the other end than the camera's, and behind it is what the camera sees ahead.
-std::vector<Reference> groups_behind(const std::shared_ptr<const track::Map>& map, const track::EdgePosition& foot,
-                                     bool ahead, double within_m);
+/// Up to `within_m` from this place on the only way that leads there, the nearest first. `ahead`: as the camera looks,
+/// otherwise behind it.
+std::vector<Reference> groups_on_only_way(const std::shared_ptr<const track::Map>& map, const track::EdgePosition& foot,
+                                          bool ahead, double within_m);
+
+/// The nearest of these, which remembers the others.
+std::optional<Reference> nearest_of(const std::vector<Reference>& groups);
 
 }  // namespace railfix::tpr_publisher

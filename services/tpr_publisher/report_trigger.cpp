@@ -16,7 +16,7 @@ namespace {
 constexpr int64_t kShortestCycleNs = core::kNsPerSecond;
 constexpr double kShortestCycleM = 1.0;
 constexpr int64_t kClockJitterNs = 100'000'000;  // no clock that was set back
-constexpr double kOriginWaitM = 500;
+constexpr double kMostCorrectedM = 200;  // a place; what is farther off is another passage of the group, round a loop
 
 }  // namespace
 
@@ -25,12 +25,13 @@ ReportTrigger::ReportTrigger(const etcs::ReportParameters& parameters, double tr
   set_parameters(parameters);
 }
 
-void ReportTrigger::set_parameters(const etcs::ReportParameters& parameters, std::optional<uint32_t> origin) {
+void ReportTrigger::set_parameters(const etcs::ReportParameters& parameters, std::optional<uint32_t> origin,
+                                   bool waited) {
   parameters_ = parameters;
   origin_ = origin;
   origin_m_.reset();
   waits_since_m_.reset();
-  passed_before_ = true;
+  passed_before_ = !waited;
   locations_.clear();
   double at_m = 0;
   for (const auto& location : parameters.locations) {
@@ -45,12 +46,17 @@ void ReportTrigger::set_parameters(const etcs::ReportParameters& parameters, std
 void ReportTrigger::place_locations(const Moment& moment) {
   if (locations_.empty() || !moment.beyond_lrbg_m) return;
   if (!origin_) origin_ = moment.nid_lrbg;
-  const auto beyond_m = *origin_ == moment.nid_lrbg ? moment.beyond_lrbg_m : moment.beyond_origin_m;
+  const bool is_lrbg = *origin_ == moment.nid_lrbg && !moment.beyond_origin_m;
+  const auto beyond_m = is_lrbg ? moment.beyond_lrbg_m : moment.beyond_origin_m;
   if (!beyond_m) return wait_for_origin(moment);
   waits_since_m_.reset();
-  origin_m_ = moment.front_m - *beyond_m;  // anew: the place may have been corrected against the travelled distance
+  const double at_m = moment.front_m - *beyond_m;
+  if (origin_m_ && std::abs(at_m - *origin_m_) > kMostCorrectedM) return;
+  origin_m_ = at_m;  // anew: the place may have been corrected against the travelled distance
+  origin_doubt_m_ = moment.origin_doubt_m;
   for (auto& location : locations_) {
-    if (passed_before_) location.passed = reached_m(moment, location.rear_end) - *origin_m_ >= location.at_m;
+    const double reached_m = beyond_origin_m(moment, location.rear_end);
+    if (passed_before_) location.passed = std::isfinite(reached_m) && reached_m >= location.at_m;
   }
   passed_before_ = false;
 }
@@ -59,7 +65,8 @@ void ReportTrigger::wait_for_origin(const Moment& moment) {
   if (origin_m_) return;
   passed_before_ = false;
   if (!waits_since_m_) waits_since_m_ = moment.front_m;
-  if (std::abs(moment.front_m - *waits_since_m_) > kOriginWaitM) locations_.clear();
+  const double most_m = kOriginWaitM + std::max(moment.foot_to_front_m, 0.0);
+  if (std::abs(moment.front_m - *waits_since_m_) > most_m) locations_.clear();
 }
 
 bool ReportTrigger::rear_end_left_out() const {
@@ -81,9 +88,9 @@ void ReportTrigger::turn() {
   asked_ = group_passed_ = location_passed_ = false;
 }
 
-double ReportTrigger::reached_m(const Moment& moment, bool rear_end) const {
-  if (!rear_end) return moment.max_safe_front_m;
-  return train_length_m_ > 0 ? moment.min_safe_front_m - train_length_m_ : -HUGE_VAL;
+double ReportTrigger::beyond_origin_m(const Moment& moment, bool rear_end) const {
+  if (!rear_end) return moment.max_safe_front_m + origin_doubt_m_ - *origin_m_;
+  return train_length_m_ > 0 ? moment.min_safe_front_m - train_length_m_ - origin_doubt_m_ - *origin_m_ : -HUGE_VAL;
 }
 
 void ReportTrigger::note_events(const Moment& moment) {
@@ -94,7 +101,7 @@ void ReportTrigger::note_events(const Moment& moment) {
   if (moment.passed_again > passed_again_) group_passed_ = true;
   passed_again_ = moment.passed_again;
   for (auto& location : locations_) {
-    if (!origin_m_ || location.passed || reached_m(moment, location.rear_end) - *origin_m_ < location.at_m) continue;
+    if (!origin_m_ || location.passed || beyond_origin_m(moment, location.rear_end) < location.at_m) continue;
     location.passed = true;
     location_passed_ = true;
   }
@@ -146,7 +153,8 @@ std::optional<Reason> ReportTrigger::due(const Moment& moment) {
   if (group_passed_ && parameters_.m_loc == etcs::kReportAtGroups) return Reason::balise_group;
   // What was said is not known any more: trackside must not go on with it until the cycle is over.
   const bool taken_back = moment.nid_lrbg == etcs::kUnknownBaliseGroup || moment.taken_back != reported_->taken_back;
-  const bool found_again = reported_->nid_lrbg == etcs::kUnknownBaliseGroup;
+  const bool found_again =
+      reported_->nid_lrbg == etcs::kUnknownBaliseGroup && since_report_ns(moment) >= kShortestCycleNs;
   if ((taken_back || found_again) && reported_->nid_lrbg != moment.nid_lrbg) return Reason::balise_group;
   if (location_passed_) return Reason::location;
   if (cycle_distance_over(moment)) return Reason::cycle_distance;

@@ -56,6 +56,8 @@ struct Moment {
   uint32_t passed_again = 0;              // counts up whenever the train goes over its LRBG once more
   std::optional<double> beyond_lrbg_m;    // front end beyond the LRBG, along the train
   std::optional<double> beyond_origin_m;  // ... beyond the group that origin() names
+  double origin_doubt_m = 0;              // that way may be longer or shorter by so much more than the one to the LRBG
+  double foot_to_front_m = 0;             // the foot passes groups so much later
   Onboard onboard;
   uint32_t mode_changes = 0;  // of what is reported: count up, so that one there and back is noticed
   uint32_t level_changes = 0;
@@ -63,19 +65,22 @@ struct Moment {
 
 class ReportTrigger {
  public:
+  static constexpr double kOriginWaitM = 500;
+
   /// train_length_m: 0 = not known; then nothing is reported where the rear end passes.
   ReportTrigger(const etcs::ReportParameters& parameters, double train_length_m);
 
   /// A packet 58. T_CYCLOC 0 and D_CYCLOC 0 ask for reports as often as possible: once a second at most, for D_CYCLOC
   /// once a metre at most, too. Its locations count along the train from `origin`, the LRBG when it came; nothing = the
   /// next one that is known, because it has only just come, kUnknownBaliseGroup = nobody knows any more, and locations
-  /// are left out. A group that is not known to have been passed is waited for, 500 m long: trackside's antenna may be
-  /// ahead of our estimate.
-  void set_parameters(const etcs::ReportParameters& parameters, std::optional<uint32_t> origin = std::nullopt);
+  /// are left out. A group that nobody knows is waited for, kOriginWaitM long: trackside's antenna may be ahead of our
+  /// estimate. Locations behind the train have been passed long ago, unless the packet has `waited` to be used.
+  void set_parameters(const etcs::ReportParameters& parameters, std::optional<uint32_t> origin = std::nullopt,
+                      bool waited = false);
   /// The group that locations count from; nothing before it is known and when there are no locations.
   [[nodiscard]] std::optional<uint32_t> origin() const { return locations_.empty() ? std::nullopt : origin_; }
-  /// It has not been looked for yet; not to be done at every moment.
-  [[nodiscard]] bool looks_for_origin() const { return !origin_m_ && !waits_since_m_; }
+  /// Its travelled distance, as far as that is known.
+  [[nodiscard]] std::optional<double> origin_m() const { return origin_m_; }
   /// Locations are asked for, but where they are is not known, or not yet.
   [[nodiscard]] bool locations_left_out() const {
     return (locations_.empty() || waits_since_m_) && !parameters_.locations.empty();
@@ -105,7 +110,8 @@ class ReportTrigger {
   void place_locations(const Moment& moment);
   void wait_for_origin(const Moment& moment);
   void note_events(const Moment& moment);
-  [[nodiscard]] double reached_m(const Moment& moment, bool rear_end) const;
+  /// By the max safe front end, or by the min safe rear end. REQUIRES: the origin's place is known.
+  [[nodiscard]] double beyond_origin_m(const Moment& moment, bool rear_end) const;
   [[nodiscard]] std::optional<Reason> onboard_reason(const Moment& moment) const;
   [[nodiscard]] int64_t since_report_ns(const Moment& moment) const;
   [[nodiscard]] bool cycle_distance_over(const Moment& moment) const;
@@ -114,8 +120,9 @@ class ReportTrigger {
   etcs::ReportParameters parameters_;
   double train_length_m_;
   std::vector<Location> locations_;
-  std::optional<uint32_t> origin_;       // balise group
-  std::optional<double> origin_m_;       // its travelled distance; nothing = must be found
+  std::optional<uint32_t> origin_;  // balise group
+  std::optional<double> origin_m_;  // its travelled distance; nothing = must be found
+  double origin_doubt_m_ = 0;
   std::optional<double> waits_since_m_;  // for the origin; the front end's travelled distance
   bool passed_before_ = true;            // locations that lie behind when the origin is found were passed long ago
   std::optional<Moment> reported_;       // last moment that was sent

@@ -2,18 +2,27 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <string_view>
 #include <utility>
 
 namespace railfix::tpr_publisher {
+
+namespace {
+
+constexpr std::string_view kOver = " over";
+
+}  // namespace
 
 bool ToldParameters::remember(const std::string& notes) {
   const size_t blank = std::min(notes.find(' '), notes.size());
   const auto kept = etcs::parse_hex(notes.substr(0, blank));
   if (!kept.ok()) return false;
-  const uint64_t lrbg = std::strtoull(notes.c_str() + blank, nullptr, 10);
+  char* end = nullptr;
+  const uint64_t lrbg = std::strtoull(notes.c_str() + blank, &end, 10);
   const bool known = lrbg > 0 && lrbg < etcs::kUnknownBaliseGroup;
   if (!etcs::decode_report_parameters(kept.value()).ok()) return false;
-  used_ = {kept.value(), known ? static_cast<uint32_t>(lrbg) : etcs::kUnknownBaliseGroup};
+  used_ = {kept.value(), known ? static_cast<uint32_t>(lrbg) : etcs::kUnknownBaliseGroup,
+           std::string_view(end) == kOver};
   begin_anew();
   return true;
 }
@@ -27,12 +36,13 @@ bool ToldParameters::is_known(std::span<const uint8_t> packet, std::optional<uin
 bool ToldParameters::hear(std::span<const uint8_t> packet, bool just_come, uint32_t lrbg, uint32_t count) {
   const bool said = lrbg != 0 && etcs::names_group(lrbg);
   auto origin = said ? std::optional(lrbg) : std::nullopt;
+  if (packet.empty()) return false;
   const bool once_more = count_ > 0 && count > count_;
   count_ = count;
-  if (packet.empty() || (is_known(packet, origin) && !once_more)) return false;
+  if (is_known(packet, origin) && !once_more) return false;
   if (!said && !just_come) origin = etcs::kUnknownBaliseGroup;
   newer_ = {{packet.begin(), packet.end()}, origin};
-  return try_newer();
+  return try_newer(false);
 }
 
 bool ToldParameters::hear_deleted() {
@@ -49,8 +59,8 @@ bool ToldParameters::hear_deleted() {
 bool ToldParameters::follow() {
   const auto origin = publisher_.origin();
   if (used_ && origin) used_->origin = origin;
-  given_up_ = used_ && publisher_.locations_given_up();
-  return waits_ && publisher_.direction_known(newer_->origin) && try_newer();
+  if (used_ && publisher_.locations_given_up()) used_->over = true;
+  return waits_ && publisher_.direction_known(newer_->origin) && try_newer(true);
 }
 
 // It was for this train's orientation when it came.
@@ -58,22 +68,22 @@ void ToldParameters::begin_anew() {
   if (!used_) return;
   auto parameters = etcs::decode_report_parameters(used_->bytes).value();
   parameters.q_dir = etcs::kUnknownSide;
-  core::ok_or_throw(publisher_.set_parameters(parameters, used_->origin));
+  core::ok_or_throw(publisher_.set_parameters(parameters, used_->over ? etcs::kUnknownBaliseGroup : used_->origin));
 }
 
-core::Status ToldParameters::take_newer() {
+core::Status ToldParameters::take_newer(bool waited) {
   waits_ = false;
   const auto parameters = etcs::decode_report_parameters(newer_->bytes);
   if (!parameters.ok()) return parameters.error();
   waits_ = !publisher_.direction_known(newer_->origin);
-  return publisher_.set_parameters(parameters.value(), newer_->origin);
+  return publisher_.set_parameters(parameters.value(), newer_->origin, waited);
 }
 
-bool ToldParameters::try_newer() {
-  const auto taken = take_newer();
+bool ToldParameters::try_newer(bool waited) {
+  const auto taken = take_newer(waited);
   refusal_ = taken.ok() ? "" : "packet 58 of onboard_status is not used: " + taken.error().message;
   if (!taken.ok()) return false;
-  waits_ = given_up_ = false;
+  waits_ = false;
   used_ = std::exchange(newer_, std::nullopt);
   return true;
 }
@@ -81,7 +91,8 @@ bool ToldParameters::try_newer() {
 std::string ToldParameters::notes() const {
   if (!used_) return "";
   const bool known = used_->origin && *used_->origin != etcs::kUnknownBaliseGroup;
-  return etcs::to_hex(used_->bytes) + (known && !given_up_ ? ' ' + std::to_string(*used_->origin) : "");
+  if (!known) return etcs::to_hex(used_->bytes);
+  return etcs::to_hex(used_->bytes) + ' ' + std::to_string(*used_->origin) + std::string(used_->over ? kOver : "");
 }
 
 }  // namespace railfix::tpr_publisher

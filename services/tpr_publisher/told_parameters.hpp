@@ -33,23 +33,24 @@ class ToldParameters {
   void begin_anew();
   /// Why what was heard last is not used; empty = it is.
   [[nodiscard]] const std::string& refusal() const { return refusal_; }
-  /// "HEX LRBG" of what is used, or "HEX" when its locations have no LRBG yet; empty = nothing.
+  /// "HEX LRBG" of what is used, or "HEX" when its locations have no LRBG yet, and " over" behind that when they are
+  /// over; empty = nothing.
   [[nodiscard]] std::string notes() const;
 
  private:
   struct Packet {
     std::vector<uint8_t> bytes;
     std::optional<uint32_t> origin;  // what it refers to; nothing = the next LRBG
+    bool over = false;               // its locations are: a later process does not begin with them again
   };
   [[nodiscard]] bool is_known(std::span<const uint8_t> packet, std::optional<uint32_t> lrbg) const;
-  core::Status take_newer();
-  bool try_newer();
+  core::Status take_newer(bool waited);
+  bool try_newer(bool waited);
 
   TprPublisher& publisher_;
   std::optional<Packet> used_;
   std::optional<Packet> newer_;  // heard since, and refused ...
   uint32_t count_ = 0;           // heard last
-  bool given_up_ = false;        // the locations of what is used
   bool waits_ = false;           // ... but for the train's direction, which is not known
   std::string refusal_;
 };

@@ -101,7 +101,7 @@ void TprPublisher::follow(const TrainPosition& position) {
   if (backs && settings_.report.baseline == etcs::Baseline::b4) integrity_.use_up();
   if (position.usable) {
     auto place = place_of_now();
-    if (heard && position_before) place.moved_m = moved_m(*position_before, reference_before);
+    if (heard && position_before) place.moved_m = moved_m(*position_before);
     integrity_.follow(place);
   } else {
     integrity_.lose_way();
@@ -141,9 +141,15 @@ std::optional<Reference> TprPublisher::along_train(std::optional<Reference> foun
 }
 
 std::optional<Reference> TprPublisher::reference(std::optional<uint32_t> group) const {
-  if (!reference_) return std::nullopt;
   const bool named = group && *group != etcs::kUnknownBaliseGroup;
-  return along_train(named ? tracker_->behind(*group) : reference_);
+  return named ? find(*group, std::nullopt) : along_train(reference_);
+}
+
+std::optional<Reference> TprPublisher::find(uint32_t group, std::optional<double> expected_foot_m) const {
+  if (!tracker_) return std::nullopt;
+  if (expected_foot_m && is_turned()) expected_foot_m = -*expected_foot_m;
+  const double ahead_m = ReportTrigger::kOriginWaitM + std::max(ends_.to_front_m(cab_).value_or(0), 0.0);
+  return along_train(tracker_->find(group, ahead_m, expected_foot_m));
 }
 
 double TprPublisher::group_m() const {
@@ -152,16 +158,15 @@ double TprPublisher::group_m() const {
 
 TrainIntegrity::Place TprPublisher::place_of_now() const {
   const auto position = doubted_position();
-  return {position.stamp_ns, position.distance_m,
-          position.over_m + group_m() + train_allowance(settings_.report).over_m, position.place_known()};
+  const double over_m = position.over_m >= 0 ? position.over_m : HUGE_VAL;
+  return {position.stamp_ns, position.distance_m, over_m + group_m() + train_allowance(settings_.report).over_m,
+          position.place_known()};
 }
 
-double TprPublisher::moved_m(const TrainPosition& before, const std::optional<Reference>& reference_before) const {
-  if (!before.place_known() && !position_->place_known()) return 0;
-  const auto same = reference_before ? tracker_->remembered(reference_before->group->nid_lrbg()) : std::nullopt;
-  if (!same) return HUGE_VAL;
-  const double way_m = position_->distance_m - before.distance_m;
-  const double moved_m = same->foot_m - reference_before->foot_m - way_m;
+double TprPublisher::moved_m(const TrainPosition& before) const {
+  if (!tracker_ || (!before.place_known() && !position_->place_known())) return 0;
+  if (!tracker_->step_m()) return HUGE_VAL;
+  const double moved_m = *tracker_->step_m() - (position_->distance_m - before.distance_m);
   return is_turned() ? -moved_m : moved_m;
 }
 
@@ -174,7 +179,8 @@ bool TprPublisher::direction_known(std::optional<uint32_t> origin) const {
   return orientation_to(origin) != etcs::kUnknownSide;
 }
 
-core::Status TprPublisher::set_parameters(const etcs::ReportParameters& parameters, std::optional<uint32_t> origin) {
+core::Status TprPublisher::set_parameters(const etcs::ReportParameters& parameters, std::optional<uint32_t> origin,
+                                          bool waited) {
   if (parameters.q_dir != etcs::kUnknownSide) {  // here the value 2 says "both"
     const uint32_t looks = orientation_to(origin);
     if (looks == etcs::kUnknownSide)
@@ -182,7 +188,7 @@ core::Status TprPublisher::set_parameters(const etcs::ReportParameters& paramete
     if (looks != parameters.q_dir)
       return core::Error{"Packet 58 is for trains of the other direction (Q_DIR) than this one's."};
   }
-  trigger_.set_parameters(parameters, origin);
+  trigger_.set_parameters(parameters, origin, waited);
   return {};
 }
 
@@ -216,10 +222,11 @@ void TprPublisher::hear_cab(ActiveCab cab) {
   }
   if (was == ActiveCab::not_said && !is_turned()) return;  // as it was taken for
   integrity_.lose_way();
-  if (was == ActiveCab::not_said) {
-    trigger_.lose_way();
-  } else {
+  const bool front_was_known = was != ActiveCab::not_said || ends_.to_front_m(was);
+  if (front_was_known) {
     trigger_.turn();
+  } else {  // what was asked for stands: a process that began anew hears which cab it is
+    trigger_.lose_way();
   }
 }
 
@@ -269,7 +276,7 @@ std::string TprPublisher::left_out(int64_t now_ns) const {
   }
   if (integrity_.forgotten())
     return "Train integrity is not reported: how far the train has gone since it was confirmed is not known, because "
-           "train_state was away, unusable or began again; confirm it again.";
+           "train_state was away, unusable or began again, or the place was lost; confirm it again.";
   if (trigger_.rear_end_left_out())
     return "No reports where the rear end passes the locations of packet 58: the train's length is not known; the "
            "on-board unit must say it, or set tpr_publisher.train_length_m.";
@@ -302,7 +309,7 @@ etcs::TrainPositionReport TprPublisher::fields(int64_t now_ns) const {
     const double front_m = here->foot_m + settings.foot_to_front_m;
     ahead_m = reported_ahead_m(fields.d_lrbg, etcs::scale_m(fields.q_scale), front_m);
   }
-  const auto said = integrity_.said(position.distance_m, ahead_m, place_of_now().over_m);
+  const auto said = integrity_.said(position.distance_m, ahead_m);
   // Nobody can place a length from a front end that is not referred to a group (3.6.5.2.7).
   if (said.l_trainint && fields.nid_lrbg == etcs::kUnknownBaliseGroup) return fields;
   fields.q_length = said.q_length;
@@ -310,8 +317,11 @@ etcs::TrainPositionReport TprPublisher::fields(int64_t now_ns) const {
   return fields;
 }
 
-std::optional<Reference> TprPublisher::trigger_origin(uint32_t group) const {
-  return trigger_.looks_for_origin() ? reference(group) : along_train(tracker_->remembered(group));
+std::optional<Reference> TprPublisher::trigger_origin(double foot_m) const {
+  const auto origin = trigger_.origin();
+  if (!origin) return std::nullopt;
+  const auto origin_m = trigger_.origin_m();
+  return find(*origin, origin_m ? std::optional(foot_m - *origin_m) : std::nullopt);
 }
 
 Moment TprPublisher::moment(int64_t now_ns) const {
@@ -320,6 +330,7 @@ Moment TprPublisher::moment(int64_t now_ns) const {
   const auto position = doubted_position();
   const double to_front_m = ends_.to_front_m(cab_).value_or(0);
   moment.standstill = position.standstill;
+  moment.foot_to_front_m = to_front_m;
   moment.front_m = position.distance_m + to_front_m;
   const auto allowance = train_allowance(settings_.report);
   moment.max_safe_front_m =
@@ -330,11 +341,13 @@ Moment TprPublisher::moment(int64_t now_ns) const {
   moment.passed_again = tracker_ ? tracker_->passed_again() : 0;
   if (const auto here = reference()) {
     moment.nid_lrbg = here->group->nid_lrbg();
-    const auto origin = trigger_.origin();
-    const auto there = origin ? trigger_origin(*origin) : std::nullopt;
-    if (there) moment.beyond_origin_m = there->foot_m + to_front_m;
+    const auto there = trigger_origin(position.distance_m);
+    if (there) {
+      moment.beyond_origin_m = there->foot_m + to_front_m;
+      moment.origin_doubt_m = std::max(there->doubt_m - here->doubt_m, 0.0);
+    }
     // A group behind a train on a leg that is guessed is not found, and not known to be nowhere either.
-    if (position_->track_declared() || !origin || there) moment.beyond_lrbg_m = here->foot_m + to_front_m;
+    if (position_->track_declared() || !trigger_.origin() || there) moment.beyond_lrbg_m = here->foot_m + to_front_m;
   }
   if (onboard_) {
     moment.onboard = *onboard_;

@@ -51,8 +51,9 @@ class TprPublisher {
   /// Time goes on without a position: says when a report is due that cannot be sent.
   Outcome tick(int64_t now_ns);
   /// A packet 58 from trackside. One for the other orientation than the train's (Q_DIR) is refused, as 3.6.3.1.3 asks.
-  /// `origin`: the group that Q_DIR and locations refer to, as for the trigger.
-  core::Status set_parameters(const etcs::ReportParameters& parameters, std::optional<uint32_t> origin = std::nullopt);
+  /// `origin`, `waited`: the group that Q_DIR and locations refer to, as for the trigger.
+  core::Status set_parameters(const etcs::ReportParameters& parameters, std::optional<uint32_t> origin = std::nullopt,
+                              bool waited = false);
   /// Whether such a packet can be judged.
   [[nodiscard]] bool direction_known(std::optional<uint32_t> origin = std::nullopt) const;
   /// Those of the settings again.
@@ -86,17 +87,19 @@ class TprPublisher {
   [[nodiscard]] TrainPosition doubted_position() const;
   [[nodiscard]] Motion motion() const { return is_turned() ? turned(motion_) : motion_; }
   [[nodiscard]] std::optional<Reference> along_train(std::optional<Reference> found) const;
-  /// The present LRBG, or the group that is named, where that lies behind the train.
+  /// The present LRBG, or the group that is named, as find() has it.
   [[nodiscard]] std::optional<Reference> reference(std::optional<uint32_t> group = std::nullopt) const;
-  /// Of the locations; on the map it is looked for once.
-  [[nodiscard]] std::optional<Reference> trigger_origin(uint32_t group) const;
+  /// On the way that was run, on the map behind the train that began, or a little in front of it.
+  [[nodiscard]] std::optional<Reference> find(uint32_t group, std::optional<double> expected_foot_m) const;
+  /// The group that locations count from; foot_m: travelled distance.
+  [[nodiscard]] std::optional<Reference> trigger_origin(double foot_m) const;
   /// Of the train to that group.
   [[nodiscard]] uint32_t orientation_to(std::optional<uint32_t> group) const;
   /// What nobody knows of the place of the group that is referred to.
   [[nodiscard]] double group_m() const;
   [[nodiscard]] TrainIntegrity::Place place_of_now() const;
   /// By how much the place was corrected against the travelled distance; infinite = nobody knows.
-  [[nodiscard]] double moved_m(const TrainPosition& before, const std::optional<Reference>& reference_before) const;
+  [[nodiscard]] double moved_m(const TrainPosition& before) const;
   void hear_integrity(const Onboard& onboard, int64_t now_ns);
   [[nodiscard]] Moment moment(int64_t now_ns) const;
   [[nodiscard]] etcs::TrainPositionReport fields(int64_t now_ns) const;

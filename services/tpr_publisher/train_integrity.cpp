@@ -18,11 +18,16 @@ void TrainIntegrity::follow(const Place& place) {
   places_.push_back(place);
   while (place.stamp_ns - places_.front().stamp_ns > kHistoryNs) places_.pop_front();
   then_.moved_m += place.moved_m;
+  if (!std::isfinite(then_.moved_m)) forget_rear();
   settle();
 }
 
 void TrainIntegrity::lose_way() {
   places_.clear();
+  forget_rear();
+}
+
+void TrainIntegrity::forget_rear() {
   forgotten_ = forgotten_ || rear_m_;
   rear_m_.reset();
 }
@@ -79,13 +84,13 @@ void TrainIntegrity::place_rear() {
   then_ = *std::prev(after);
   then_.moved_m = 0;
   for (auto place = after; place != places_.end(); ++place) then_.moved_m += place->moved_m;
-  if (then_.known) rear_m_ = then_.distance_m - then_.over_m - train_length_m_;
+  if (then_.known && std::isfinite(then_.moved_m)) rear_m_ = then_.distance_m - then_.over_m - train_length_m_;
 }
 
-TrainIntegrity::Said TrainIntegrity::said(double distance_m, double reported_ahead_m, double over_m) const {
+TrainIntegrity::Said TrainIntegrity::said(double distance_m, double reported_ahead_m) const {
   if (!is_confirmed(q_integrity())) return {q_integrity(), std::nullopt};
   if (!rear_m_ || integrity_ns() == used_up_ns_) return {};
-  const double moved_m = std::max(0.0, std::min(then_.moved_m, over_m - then_.over_m));
+  const double moved_m = std::max(0.0, then_.moved_m);
   const double length_m = std::ceil(std::max(distance_m, then_.distance_m) - *rear_m_ + reported_ahead_m + moved_m);
   if (!(length_m <= kLongestM)) return {};
   // A train shorter than the step of D_LRBG may lie in front of the front end that was reported.

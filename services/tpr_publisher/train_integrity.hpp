@@ -43,9 +43,9 @@ class TrainIntegrity {
   /// (3.6.5.2.5, table 2c [5] and [8]).
   void use_up() { used_up_ns_ = integrity_ns(); }
   /// A train that has backed since then is not taken for shorter. reported_ahead_m: how far in front of distance_m the
-  /// report says the front end to be, from which trackside counts the length. over_m: L_DOUBTOVER's amount now; a front
-  /// end that was moved forward since then does not take the rear end along farther than that.
-  [[nodiscard]] Said said(double distance_m, double reported_ahead_m = 0, double over_m = 0) const;
+  /// report says the front end to be, from which trackside counts the length. A front end that was moved forward since
+  /// then leaves the rear end where it was.
+  [[nodiscard]] Said said(double distance_m, double reported_ahead_m = 0) const;
   /// What said() speaks of.
   [[nodiscard]] uint32_t q_integrity() const { return stands().q_integrity; }
   [[nodiscard]] int64_t integrity_ns() const { return stands().integrity_ns; }
@@ -61,6 +61,7 @@ class TrainIntegrity {
   };
   void settle();
   void place_rear();
+  void forget_rear();
   [[nodiscard]] const Confirmation& stands() const { return settled_ ? heard_ : before_; }
 
   std::deque<Place> places_;  // of the last ten seconds

@@ -147,7 +147,10 @@ TEST(FrontEnd, AnEndThatNobodyMeasuredIsNoFront) {
   ride.run(390, 20);
   EXPECT_EQ(ride.run(450, 0).report->fields.nid_lrbg, kB) << "one cab: it is the camera's";
   ride.hear(with(ActiveCab::other));
-  EXPECT_EQ(ride.run(450, 0).report->fields.nid_lrbg, etcs::kUnknownBaliseGroup);
+  const auto other = ride.run(450, 0).report;
+  ASSERT_TRUE(other.has_value());
+  EXPECT_EQ(other->reason, Reason::start);
+  EXPECT_EQ(other->fields.nid_lrbg, etcs::kUnknownBaliseGroup);
   EXPECT_THAT(ride.publisher().front_unknown(), HasSubstr("foot_to_rear_m is not set"));
 }
 
@@ -212,6 +215,24 @@ TEST(FrontEnd, LocationsStandWhenAProcessBeganAgainAndHearsWhichCabIsActive) {
     if (report && report->reason == Reason::location) reported_at_m = at_m;
   }
   EXPECT_NEAR(reported_at_m, 510, 15) << "the max safe front end may be 10 m ahead";
+}
+
+// The front's antenna reads B when the foot is still 98 m in front of it.
+TEST(FrontEnd, LocationsCountFromAGroupThatTheFootHasNotPassed) {
+  Ride ride(true, settings());
+  ride.hear(with(ActiveCab::other));
+  ride.run(600, -20);
+  ride.run(498, -20);
+  etcs::ReportParameters parameters;
+  parameters.t_cycloc = etcs::kNoCycleTime;
+  parameters.locations = {{60, 1}};
+  ASSERT_TRUE(ride.publisher().set_parameters(parameters, kB).ok());
+  double reported_at_m = 0;
+  for (double at_m = 497; at_m > 420 && reported_at_m == 0; at_m -= 1) {
+    const auto report = ride.run(at_m, -20).report;
+    if (report && report->reason == Reason::location) reported_at_m = at_m;
+  }
+  EXPECT_NEAR(reported_at_m, 438 + 5 + 3, 2) << "Q_LOCACC and the doubt ahead of it";
 }
 
 }  // namespace

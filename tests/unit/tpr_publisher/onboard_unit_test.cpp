@@ -86,7 +86,6 @@ class TrainWithOnboard : public ::testing::Test {
 
   void step(double run_s, double distance_m, bool track_known = true) {
     auto position = at(forward(1, foot_m), run_s, 0);
-    position.over_m = over_m;
     position.distance_m = distance_m;
     position.track_known = track_known;
     now_ns = position.stamp_ns;
@@ -111,7 +110,6 @@ class TrainWithOnboard : public ::testing::Test {
   Onboard onboard;
   int64_t ahead_ns = 0;  // the on-board unit's clock
   double foot_m = 450;
-  double over_m = 3;
   std::optional<etcs::TrainPositionReport> reported;
   int64_t now_ns = kStart;
 };
@@ -187,8 +185,7 @@ TEST_F(TrainWithOnboard, InASupervisedManoeuvreTheRearEndLiesFartherBehind) {
 
 TEST_F(ConfirmedTrain, IsLongerWhenItsFrontEndIsCorrectedForward) {
   foot_m += 60;
-  over_m = 20;
-  EXPECT_EQ(next_report(kNextS, 8700).l_trainint, 225U) << "no farther behind than 20 m of doubt, 5 m of Q_LOCACC";
+  EXPECT_EQ(next_report(kNextS, 8700).l_trainint, 268U);
 }
 
 // 3.6.5.2.7: nor later, when the place is known, from where it was not.

@@ -109,6 +109,8 @@ TEST_F(Trigger, EveryNewBaliseGroupUnlessNotWanted) {
   EXPECT_EQ(step(), Reason::balise_group) << "what was said must not stand";
   EXPECT_EQ(step(), std::nullopt);
   moment.nid_lrbg = 7;
+  EXPECT_EQ(step(), std::nullopt) << "one that comes and goes fills no store";
+  run(1, 0);
   EXPECT_EQ(step(), Reason::balise_group) << "found again: trackside need not wait for the cycle";
   EXPECT_EQ(step(), std::nullopt);
   auto wanted = parameters();
@@ -164,13 +166,13 @@ TEST_F(TriggerWithLocation, CountsFromTheGroupOfThePacketNotFromThePresentOne) {
   trigger.set_parameters(wanted, 7);
   step();  // no LRBG yet
   EXPECT_EQ(trigger.origin(), 7U);
-  EXPECT_TRUE(trigger.looks_for_origin());
+  EXPECT_EQ(trigger.origin_m(), std::nullopt);
   moment.nid_lrbg = 8;
   moment.beyond_lrbg_m = 20;
   moment.beyond_origin_m = 420;
   run(1, 0);
   EXPECT_EQ(step(), Reason::balise_group);
-  EXPECT_FALSE(trigger.looks_for_origin());
+  EXPECT_EQ(trigger.origin_m(), -420);
   run(1, 69);  // 489 m, max safe front end 499 m
   EXPECT_EQ(step(), std::nullopt);
   run(1, 2);
@@ -227,6 +229,60 @@ TEST_F(TriggerWithLocation, FollowsACorrectionOfThePlace) {
   EXPECT_EQ(step(), std::nullopt);
   run(1, 2);
   EXPECT_EQ(step(), Reason::location);
+}
+
+TEST_F(TriggerWithLocation, CountsFromThePassageOfThePacketWhenALoopLeadsBackToItsGroup) {
+  ask(wanted);
+  moment.nid_lrbg = 7;
+  moment.beyond_lrbg_m = 10;
+  step();
+  EXPECT_EQ(trigger.origin_m(), -10);
+  run(10, 390);
+  moment.beyond_lrbg_m = 0;  // once round
+  EXPECT_EQ(step(), std::nullopt);
+  run(1, 89);  // 489 m from the first passage, max safe front end 499 m
+  EXPECT_EQ(step(), std::nullopt);
+  run(1, 2);
+  EXPECT_EQ(step(), Reason::location);
+}
+
+TEST_F(TriggerWithLocation, TheWayToItsGroupMayBeMoreInDoubtThanThatToTheLrbg) {
+  trigger.set_parameters(wanted, 7);
+  moment.nid_lrbg = 8;
+  moment.beyond_lrbg_m = 20;
+  moment.beyond_origin_m = 300;
+  moment.origin_doubt_m = 40;
+  run(1, 0);
+  step();
+  run(1, 149);  // 449 m, max safe front end 459 m, or 499 m over the longer way
+  EXPECT_EQ(step(), std::nullopt);
+  run(1, 2);
+  EXPECT_EQ(step(), Reason::location);
+}
+
+TEST_F(TriggerWithLocation, WhereNobodyKnowsTheMaxSafeFrontEndItIsReported) {
+  step();
+  ask(wanted);
+  moment.nid_lrbg = 7;
+  moment.beyond_lrbg_m = 10;
+  moment.max_safe_front_m = HUGE_VAL;
+  run(1, 0);
+  moment.max_safe_front_m = HUGE_VAL;
+  EXPECT_EQ(step(), Reason::balise_group);
+  run(1, 0);
+  EXPECT_EQ(step(), std::nullopt) << "with that report";
+}
+
+TEST_F(TriggerWithLocation, OfAPacketThatHasWaitedItIsNotPassedLongAgo) {
+  step();
+  moment.nid_lrbg = 7;
+  moment.beyond_lrbg_m = 495;
+  run(1, 0);
+  trigger.set_parameters(wanted, 7, true);
+  EXPECT_EQ(trigger.due(moment), Reason::balise_group);
+  moment.nid_lrbg = etcs::kUnknownBaliseGroup;
+  moment.beyond_lrbg_m.reset();
+  EXPECT_EQ(trigger.due(moment), Reason::location);
 }
 
 TEST_F(TriggerWithLocation, IsFoundAgainWhenTheDistanceBeganAgain) {

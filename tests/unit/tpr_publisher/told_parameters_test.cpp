@@ -184,7 +184,55 @@ TEST_F(ToldParametersTest, LocationsThatAreOverAreNotRemembered) {
   for (double m = 408; m <= 900; m += 4) go_to(m);
   EXPECT_EQ(told.notes(), etcs::to_hex(located) + ' ' + std::to_string(kE));
   for (double m = 904; m <= 916; m += 4) go_to(m);
-  EXPECT_EQ(told.notes(), etcs::to_hex(located));
+  const auto notes = told.notes();
+  EXPECT_EQ(notes, etcs::to_hex(located) + ' ' + std::to_string(kE) + " over");
+
+  TprPublisher later_publisher(balise_map(), settings());
+  ToldParameters later(later_publisher);
+  EXPECT_TRUE(later.remember(notes));
+  EXPECT_FALSE(later.hear(located, false, kE)) << "it stands in every onboard_status";
+  EXPECT_EQ(later_publisher.origin(), std::nullopt);
+  EXPECT_EQ(later.notes(), notes);
+}
+
+// Of a single balise nobody knows the train's direction before it has passed it.
+TEST_F(ToldParametersTest, LocationsOfAPacketThatWaitedForTheDirectionAreNotPassedLongAgo) {
+  const auto go_to = [&](double offset_m) {
+    const auto position = at(forward(1, offset_m), run_s += 0.1, 40);
+    const auto report = publisher.update(position, position.stamp_ns).report;
+    told.follow();
+    return report && report->reason == Reason::location;
+  };
+  for (double m = 500; m <= 692; m += 4) go_to(m);
+  EXPECT_FALSE(told.hear(packet(etcs::kNominal, {{10, 1}}), true, kC));
+  double reported_at_m = 0;
+  for (double m = 696; m < 800 && reported_at_m == 0; m += 4) reported_at_m = go_to(m) ? m : 0;
+  EXPECT_NEAR(reported_at_m, 704, 4.1);
+}
+
+// The group of the packet lies behind where this process began; the place is corrected, or lost for a while.
+TEST_F(ToldParametersTest, LocationsFollowAPlaceThatIsCorrected) {
+  for (const bool lost : {false, true}) {
+    publisher = TprPublisher(balise_map(), settings());
+    double correction_m = 0;
+    const auto go_to = [&](double offset_m, bool track_known = true) {
+      auto position = at(forward(1, offset_m), run_s += 0.1, 40);
+      position.distance_m = offset_m - correction_m;
+      position.track_known = track_known;
+      const auto report = publisher.update(position, position.stamp_ns).report;
+      return report && report->reason == Reason::location;
+    };
+    for (double m = 450; m <= 480; m += 4) go_to(m);
+    etcs::ReportParameters parameters;
+    parameters.t_cycloc = etcs::kNoCycleTime;
+    parameters.locations = {{500, 1}};
+    ASSERT_TRUE(publisher.set_parameters(parameters, kA).ok());
+    for (double m = 484; m <= 500; m += 4) go_to(m, !lost || m < 492);
+    correction_m = 40;
+    double reported_at_m = 0;
+    for (double m = 544; m < 700 && reported_at_m == 0; m += 4) reported_at_m = go_to(m) ? m : 0;
+    EXPECT_NEAR(reported_at_m, 600 - 2 - 8, 4) << lost;
+  }
 }
 
 TEST_F(ToldParametersTest, TheSameBitsOnceMoreAreAPacketWhereThatIsCounted) {
@@ -201,6 +249,7 @@ TEST_F(ToldParametersTest, TheSameBitsOnceMoreAreAPacketWhereThatIsCounted) {
   };
   EXPECT_TRUE(hear(7));
   EXPECT_FALSE(hear(7)) << "it stands in every onboard_status";
+  EXPECT_FALSE(told.hear({}, true, kA, 8)) << "counted before the bits are there";
   EXPECT_TRUE(hear(8));
   EXPECT_FALSE(hear(1)) << "who counts began anew";
   EXPECT_TRUE(hear(2));

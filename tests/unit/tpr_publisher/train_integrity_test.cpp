@@ -178,16 +178,27 @@ TEST(TrainIntegrity, APlaceThatIsNotOnTheMapHasNoRearEnd) {
   EXPECT_EQ(integrity.said(52).l_trainint, 205U);
 }
 
-// The rear end stays where it was, and lies no farther behind than the interval of now allows.
+// Whether the place was wrong before or the way since: the rear end stays where it was.
 TEST(TrainIntegrity, AFrontEndThatIsCorrectedForwardHasALongerTrain) {
-  for (const auto& [moved_m, over_m, length_m] :
-       {std::tuple(8.0, 20.0, 213U), std::tuple(60.0, 20.0, 220U), std::tuple(HUGE_VAL, 20.0, 220U),
-        std::tuple(-60.0, 20.0, 205U), std::tuple(60.0, 3.0, 205U)}) {
+  for (const auto& [moved_m, length_m] : {std::pair(8.0, 213U), std::pair(60.0, 265U), std::pair(-60.0, 205U)}) {
     auto integrity = running_until(5);
     integrity.hear(etcs::kConfirmedByDevice, at(5), 200);
-    integrity.follow({at(5.1), 50, over_m, true, moved_m});
-    EXPECT_EQ(integrity.said(50, 0, over_m).l_trainint, length_m) << moved_m << ' ' << over_m;
+    integrity.follow({at(5.1), 50, 20, true, moved_m});
+    integrity.follow({at(5.2), 50, 5});
+    EXPECT_EQ(integrity.said(50).l_trainint, length_m) << moved_m;
   }
+}
+
+TEST(TrainIntegrity, APlaceThatWasLostNeedsAnotherConfirmation) {
+  auto integrity = running_until(5);
+  integrity.hear(etcs::kConfirmedByDevice, at(5), 200);
+  integrity.follow({at(5.1), 51, 5, true, HUGE_VAL});
+  integrity.follow({at(5.2), 52, 5});
+  expect_nothing(integrity.said(52));
+  EXPECT_TRUE(integrity.forgotten());
+  integrity.hear(etcs::kConfirmedByDevice, at(5.15), 200);
+  EXPECT_EQ(integrity.said(52).l_trainint, 206U);
+  EXPECT_FALSE(integrity.forgotten());
 }
 
 }  // namespace
