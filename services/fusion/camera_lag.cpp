@@ -49,6 +49,10 @@ bool is_whole(double one_s, double other_s) {
 
 CameraLag::CameraLag() : covariance_(squares(kRatioSigma, kCreepSigma, kLagSigmaS).asDiagonal()) {}
 
+std::optional<CameraLag::Lag> CameraLag::unknown() {
+  return Lag{0, kLagSigmaS};
+}
+
 std::optional<CameraLag::Lag> CameraLag::lag() const {
   if (!compared_) return std::nullopt;
   return Lag{fitted_(2), std::sqrt(covariance_(2, 2))};
@@ -105,7 +109,7 @@ void CameraLag::add(const OdometryInput& step) {
 std::optional<CameraLag::Lag> CameraLag::jump(int64_t stamp_ns, const std::optional<Reading>& picture) const {
   if (!last_step_ns_ || !(interval_s_ > 0)) return std::nullopt;
   const double passed_s = core::seconds(stamp_ns - *last_step_ns_);
-  if (std::abs(passed_s) > kPauseS) return Lag{0, kLagSigmaS};
+  if (std::abs(passed_s) > kPauseS) return unknown();
   const double uneven_s = passed_s - interval_s_;
   if (std::abs(uneven_s) < kUnevenS) return std::nullopt;
   const auto speed_mps = picture ? seen_speed_mps() : std::nullopt;

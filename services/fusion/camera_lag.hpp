@@ -21,11 +21,14 @@ class CameraLag {
     double s = 0;  // positive: the camera's stamps are late, or the wheel's early
     double sigma_s = 0;
   };
+  /// Before anything has shown it.
+  static std::optional<Lag> unknown();
   CameraLag();
   void add(const WheelInput& sample);
   void add(const OdometryInput& step);
   /// By all that was measured so far; vague until the speed has changed. Nothing until both have measured.
   [[nodiscard]] std::optional<Lag> lag() const;
+  [[nodiscard]] bool has_wheel_only() const { return !compared_ && !wheel_.empty(); }
   /// The stamps have, or may have: what an earlier trip knew is void.
   [[nodiscard]] bool has_jumped() const { return has_jumped_; }
 

@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <limits>
 
+#include "core/time.hpp"
+
 namespace railfix::fusion {
 namespace {
 
@@ -13,6 +15,7 @@ constexpr double kTripSigmaS = 0.02;  // a camera that is started anew may have 
 constexpr double kLikelyLate = 1.0;   // sigmas of one that the measurements speak for ...
 constexpr double kLikelyEarly = 2.0;  // ... which a camera seldom is
 constexpr double kSure = 3.0;         // of one that is sure
+constexpr double kBeginsS = 1.0;
 
 void degrade(TrainEstimate& estimate, double lag_s) {
   char text[160];
@@ -64,20 +67,28 @@ LagRoom::Speeds LagRoom::speeds_since_sure(const TrainEstimate& estimate) {
           std::max(speeds_.fastest_mps, speeds_before_.fastest_mps)};
 }
 
+bool LagRoom::begins_with_the_wheel(const TrainEstimate& estimate) {
+  if (!begun_ns_) begun_ns_ = estimate.stamp_ns;
+  const double since_s = core::seconds(estimate.stamp_ns - *begun_ns_);
+  return since_s >= 0 && since_s < kBeginsS && measured_.has_wheel_only();
+}
+
 void LagRoom::widen(TrainEstimate& estimate, const FusionParameters& p) {
   const Speeds speeds = speeds_since_sure(estimate);
-  const auto held = lag();
+  const auto held = begins_with_the_wheel(estimate) ? CameraLag::unknown() : lag();
   if (!held) return;
   const double spread_s = 2 * held->sigma_s;
   const bool is_sure = std::abs(held->s) > std::max(p.camera_lag_s + spread_s, kSure * held->sigma_s);
   const double bare_over_m = estimate.over_m;
   const double bare_under_m = estimate.under_m;
+  const double allowed_m = p.allowed_m(estimate.since_sure_m);
+  const bool has_width_to_lose = std::max(bare_over_m, bare_under_m) <= allowed_m;
   // Stamps that are late so much, or early where it is below 0: the train is further on, or not so far.
   const auto hold = [&](double late_s) {
     const bool is_likely =
         is_sure || (late_s > 0 ? held->s > kLikelyLate * held->sigma_s : -held->s > kLikelyEarly * held->sigma_s);
-    const bool is_bounded = !is_likely && estimate.integrity != Integrity::unusable;
-    const double most_m = is_bounded ? p.allowed_m(estimate.since_sure_m) : std::numeric_limits<double>::infinity();
+    const bool is_bounded = !is_likely && has_width_to_lose && estimate.integrity != Integrity::unusable;
+    const double most_m = is_bounded ? allowed_m : std::numeric_limits<double>::infinity();
     const auto [behind_m, ahead_m] = std::minmax({late_s * speeds.slowest_mps, late_s * speeds.fastest_mps});
     const double over_m = bare_over_m + std::max(0.0, -behind_m);
     const double under_m = bare_under_m + std::max(0.0, ahead_m);

@@ -17,8 +17,9 @@ class LagRoom {
   void forget_earlier_trips() { before_.reset(); }
   void add(const WheelInput& sample) { measured_.add(sample); }
   void add(const OdometryInput& step);
-  /// Holds what nothing has ruled out: as far as the allowed width has room for that, and all of it where a lag is
-  /// likely or the state is no position anyway. One that is sure is said. States come in the order of their stamps.
+  /// Holds what nothing has ruled out, also before the camera is heard, for a second: the first stamp of all is the
+  /// wheel's then. As far as the allowed width has room for that, and all of it where a lag is likely, the interval is
+  /// wider anyway or the state is no position. One that is sure is said. States come in the order of their stamps.
   void widen(TrainEstimate& estimate, const FusionParameters& parameters);
   /// Fit to be kept for the next trip: nothing where it is vague or more than may be.
   [[nodiscard]] std::optional<CameraLag::Lag> to_keep(const FusionParameters& parameters) const;
@@ -31,6 +32,7 @@ class LagRoom {
     double fastest_mps = 0;
   };
   [[nodiscard]] bool fits_before(const CameraLag::Lag& measured) const;
+  [[nodiscard]] bool begins_with_the_wheel(const TrainEstimate& estimate);
   [[nodiscard]] std::optional<CameraLag::Lag> lag() const;
   [[nodiscard]] Speeds speeds_since_sure(const TrainEstimate& estimate);
 
@@ -40,6 +42,7 @@ class LagRoom {
   Speeds speeds_before_;  // since the one before it: which was sure is known later
   double since_sure_m_ = 0;
   double last_speed_mps_ = 0;
+  std::optional<int64_t> begun_ns_;
 };
 
 }  // namespace railfix::fusion
