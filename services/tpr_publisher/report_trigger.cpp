@@ -54,6 +54,8 @@ void ReportTrigger::place_locations(const Moment& moment) {
   if (origin_m_ && std::abs(at_m - *origin_m_) > kMostCorrectedM) return;
   origin_m_ = at_m;  // anew: the place may have been corrected against the travelled distance
   origin_doubt_m_ = moment.origin_doubt_m;
+  const bool is_ahead = *beyond_m < moment.foot_to_front_m;  // of the foot: it was read just now
+  passed_before_ = passed_before_ && !is_ahead;
   for (auto& location : locations_) {
     const double reached_m = beyond_origin_m(moment, location.rear_end);
     if (passed_before_) location.passed = std::isfinite(reached_m) && reached_m >= location.at_m;
@@ -142,6 +144,18 @@ std::optional<Reason> ReportTrigger::onboard_reason(const Moment& moment) const 
   return std::nullopt;
 }
 
+// What was said is not known any more: trackside must not go on with it until the cycle is over.
+bool ReportTrigger::group_lost(const Moment& moment) const {
+  if (reported_->nid_lrbg == etcs::kUnknownBaliseGroup || reported_->nid_lrbg == moment.nid_lrbg) return false;
+  return moment.nid_lrbg == etcs::kUnknownBaliseGroup || moment.taken_back != reported_->taken_back;
+}
+
+// One that comes and goes must not fill the store.
+bool ReportTrigger::group_found_again(const Moment& moment) const {
+  return reported_->nid_lrbg == etcs::kUnknownBaliseGroup && moment.nid_lrbg != etcs::kUnknownBaliseGroup &&
+         since_report_ns(moment) >= kShortestCycleNs;
+}
+
 std::optional<Reason> ReportTrigger::due(const Moment& moment) {
   place_locations(moment);
   note_events(moment);
@@ -151,11 +165,7 @@ std::optional<Reason> ReportTrigger::due(const Moment& moment) {
   }
   if (const auto reason = onboard_reason(moment)) return reason;
   if (group_passed_ && parameters_.m_loc == etcs::kReportAtGroups) return Reason::balise_group;
-  // What was said is not known any more: trackside must not go on with it until the cycle is over.
-  const bool taken_back = moment.nid_lrbg == etcs::kUnknownBaliseGroup || moment.taken_back != reported_->taken_back;
-  const bool found_again =
-      reported_->nid_lrbg == etcs::kUnknownBaliseGroup && since_report_ns(moment) >= kShortestCycleNs;
-  if ((taken_back || found_again) && reported_->nid_lrbg != moment.nid_lrbg) return Reason::balise_group;
+  if (group_lost(moment) || group_found_again(moment)) return Reason::balise_group;
   if (location_passed_) return Reason::location;
   if (cycle_distance_over(moment)) return Reason::cycle_distance;
   if (cycle_time_over(moment)) return Reason::cycle_time;

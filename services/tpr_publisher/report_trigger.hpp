@@ -109,6 +109,8 @@ class ReportTrigger {
   };
   void place_locations(const Moment& moment);
   void wait_for_origin(const Moment& moment);
+  [[nodiscard]] bool group_lost(const Moment& moment) const;
+  [[nodiscard]] bool group_found_again(const Moment& moment) const;
   void note_events(const Moment& moment);
   /// By the max safe front end, or by the min safe rear end. REQUIRES: the origin's place is known.
   [[nodiscard]] double beyond_origin_m(const Moment& moment, bool rear_end) const;

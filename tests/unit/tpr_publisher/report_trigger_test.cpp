@@ -120,6 +120,21 @@ TEST_F(Trigger, EveryNewBaliseGroupUnlessNotWanted) {
   EXPECT_EQ(step(), std::nullopt);
 }
 
+TEST_F(Trigger, AnLrbgThatComesAndGoesFillsNoStore) {
+  moment.nid_lrbg = 7;
+  step();
+  int reports = 0;
+  for (int i = 0; i < 180; ++i) {  // 3 s
+    const bool is_lost = i % 2 == 0;
+    moment.nid_lrbg = is_lost ? etcs::kUnknownBaliseGroup : 7;
+    if (is_lost) ++moment.taken_back;
+    run(1.0 / 60, 0);
+    reports += step() ? 1 : 0;
+  }
+  EXPECT_GE(reports, 3);
+  EXPECT_LE(reports, 7);
+}
+
 TEST_F(Trigger, NowReportsAtOnce) {
   step();
   auto wanted = parameters();
@@ -271,6 +286,17 @@ TEST_F(TriggerWithLocation, WhereNobodyKnowsTheMaxSafeFrontEndItIsReported) {
   EXPECT_EQ(step(), Reason::balise_group);
   run(1, 0);
   EXPECT_EQ(step(), std::nullopt) << "with that report";
+}
+
+TEST_F(TriggerWithLocation, BehindAGroupThatTheFootHasNotPassedItIsNotPassedLongAgo) {
+  wanted.locations = {{5, 1}};
+  moment.nid_lrbg = 8;
+  moment.beyond_lrbg_m = 300;
+  step();
+  trigger.set_parameters(wanted, 7);
+  moment.beyond_origin_m = -1;  // max safe front end 9 m beyond it
+  run(1, 0);
+  EXPECT_EQ(step(), Reason::location);
 }
 
 TEST_F(TriggerWithLocation, OfAPacketThatHasWaitedItIsNotPassedLongAgo) {
