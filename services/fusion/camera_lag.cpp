@@ -49,8 +49,8 @@ bool is_whole(double one_s, double other_s) {
 
 CameraLag::CameraLag() : covariance_(squares(kRatioSigma, kCreepSigma, kLagSigmaS).asDiagonal()) {}
 
-std::optional<CameraLag::Lag> CameraLag::unknown() {
-  return Lag{0, kLagSigmaS};
+CameraLag::Lag CameraLag::unknown() {
+  return {0, kLagSigmaS};
 }
 
 std::optional<CameraLag::Lag> CameraLag::lag() const {

@@ -22,7 +22,7 @@ class CameraLag {
     double sigma_s = 0;
   };
   /// Before anything has shown it.
-  static std::optional<Lag> unknown();
+  static Lag unknown();
   CameraLag();
   void add(const WheelInput& sample);
   void add(const OdometryInput& step);

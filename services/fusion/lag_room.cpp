@@ -75,7 +75,7 @@ bool LagRoom::begins_with_the_wheel(const TrainEstimate& estimate) {
 
 void LagRoom::widen(TrainEstimate& estimate, const FusionParameters& p) {
   const Speeds speeds = speeds_since_sure(estimate);
-  const auto held = begins_with_the_wheel(estimate) ? CameraLag::unknown() : lag();
+  const auto held = begins_with_the_wheel(estimate) ? std::optional(CameraLag::unknown()) : lag();
   if (!held) return;
   const double spread_s = 2 * held->sigma_s;
   const bool is_sure = std::abs(held->s) > std::max(p.camera_lag_s + spread_s, kSure * held->sigma_s);

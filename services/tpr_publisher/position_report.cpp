@@ -45,11 +45,6 @@ uint32_t side(bool nominal) {
   return nominal ? etcs::kNominal : etcs::kReverse;
 }
 
-/// No amount may be taken for certain that is not a distance.
-double amount_m(double value_m) {
-  return value_m >= 0 ? value_m : HUGE_VAL;
-}
-
 /// Not when the map does not say of how many balises the group is: then no direction of its own is claimed.
 bool has_co_ordinate_system(const track::BaliseGroup& group) {
   return group.is_virtual || group.balises.size() > 1;
@@ -86,6 +81,10 @@ void refer(const TrainPosition& position, const Reference& reference, Motion mot
 }
 
 }  // namespace
+
+double amount_m(double value_m) {
+  return value_m >= 0 ? value_m : HUGE_VAL;
+}
 
 Allowance train_allowance(const ReportSettings& settings) {
   if (settings.baseline != etcs::Baseline::b4) return {};

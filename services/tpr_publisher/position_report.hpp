@@ -46,6 +46,9 @@ struct ReportSettings {
   double train_under_m = -1;
 };
 
+/// An over- or under-reading amount; infinite where it is no distance, because none may be taken for certain then.
+double amount_m(double value_m);
+
 /// What 4.0.0 adds to the over- and under-reading amounts in supervised manoeuvre, and in stand-by without train data
 /// where the consist length is known, because vehicles may stand in front of and behind the engine (L_TRAINOVER and
 /// L_TRAINUNDER, SUBSET-026 4.0.0 3.6.4.1.5). Zero otherwise, infinite where a manoeuvre's is not known.

@@ -46,8 +46,8 @@ void ReportTrigger::set_parameters(const etcs::ReportParameters& parameters, std
 void ReportTrigger::place_locations(const Moment& moment) {
   if (locations_.empty() || !moment.beyond_lrbg_m) return;
   if (!origin_) origin_ = moment.nid_lrbg;
-  const bool is_lrbg = *origin_ == moment.nid_lrbg && !moment.beyond_origin_m;
-  const auto beyond_m = is_lrbg ? moment.beyond_lrbg_m : moment.beyond_origin_m;
+  auto beyond_m = moment.beyond_origin_m;
+  if (!beyond_m && *origin_ == moment.nid_lrbg) beyond_m = moment.beyond_lrbg_m;
   if (!beyond_m) return wait_for_origin(moment);
   waits_since_m_.reset();
   const double at_m = moment.front_m - *beyond_m;
@@ -55,10 +55,11 @@ void ReportTrigger::place_locations(const Moment& moment) {
   origin_m_ = at_m;  // anew: the place may have been corrected against the travelled distance
   origin_doubt_m_ = moment.origin_doubt_m;
   const bool is_ahead = *beyond_m < moment.foot_to_front_m;  // of the foot: it was read just now
-  passed_before_ = passed_before_ && !is_ahead;
-  for (auto& location : locations_) {
-    const double reached_m = beyond_origin_m(moment, location.rear_end);
-    if (passed_before_) location.passed = std::isfinite(reached_m) && reached_m >= location.at_m;
+  if (passed_before_ && !is_ahead) {
+    for (auto& location : locations_) {
+      const double reached_m = beyond_origin_m(moment, location.rear_end);
+      location.passed = std::isfinite(reached_m) && reached_m >= location.at_m;
+    }
   }
   passed_before_ = false;
 }

@@ -83,7 +83,7 @@ void TprPublisher::follow(const TrainPosition& position) {
     furthest_m_.reset();
   }
   const auto position_before = std::exchange(position_, position);
-  const auto reference_before = reference_;
+  const auto* group_before = reference_ ? reference_->group : nullptr;
   follow_motion(position);
   if (tracker_) {
     if (position.place_known()) {
@@ -94,7 +94,7 @@ void TprPublisher::follow(const TrainPosition& position) {
     reference_ = tracker_->reference();
   }
   const bool guessed = position.place_known() && !position.track_declared();
-  const bool same_group = reference_ && reference_before && reference_->group == reference_before->group;
+  const bool same_group = reference_ && reference_->group == group_before;
   doubt_.follow(position, reference_ ? std::optional(reference_->foot_m) : std::nullopt, same_group, !guessed);
   // 4.0.0 only: a train that has backed is not taken for complete (3.6.5.2, table 2c [8]).
   const bool backs = !position.standstill && motion() == Motion::backward;
@@ -158,9 +158,8 @@ double TprPublisher::group_m() const {
 
 TrainIntegrity::Place TprPublisher::place_of_now() const {
   const auto position = doubted_position();
-  const double over_m = position.over_m >= 0 ? position.over_m : HUGE_VAL;
-  return {position.stamp_ns, position.distance_m, over_m + group_m() + train_allowance(settings_.report).over_m,
-          position.place_known()};
+  return {position.stamp_ns, position.distance_m,
+          amount_m(position.over_m) + group_m() + train_allowance(settings_.report).over_m, position.place_known()};
 }
 
 double TprPublisher::moved_m(const TrainPosition& before) const {
@@ -332,11 +331,9 @@ Moment TprPublisher::moment(int64_t now_ns) const {
   moment.standstill = position.standstill;
   moment.foot_to_front_m = to_front_m;
   moment.front_m = position.distance_m + to_front_m;
-  const auto allowance = train_allowance(settings_.report);
   moment.max_safe_front_m =
-      position.under_m >= 0 ? moment.front_m + position.under_m + group_m() + allowance.under_m : HUGE_VAL;
-  moment.min_safe_front_m =
-      position.over_m >= 0 ? moment.front_m - position.over_m - group_m() - allowance.over_m : -HUGE_VAL;
+      moment.front_m + amount_m(position.under_m) + group_m() + train_allowance(settings_.report).under_m;
+  moment.min_safe_front_m = moment.front_m - place_of_now().over_m;
   moment.taken_back = tracker_ ? tracker_->taken_back() : 0;
   moment.passed_again = tracker_ ? tracker_->passed_again() : 0;
   if (const auto here = reference()) {

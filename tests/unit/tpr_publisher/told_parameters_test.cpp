@@ -27,6 +27,19 @@ class ToldParametersTest : public ::testing::Test {
     reported = publisher.update(position, position.stamp_ns).report.has_value();
     return told.follow();
   }
+  /// At 40 m/s; whether that is reported as a location.
+  bool go_to(double offset_m) {
+    const auto position = at(forward(1, offset_m), run_s += 0.1, 40);
+    const auto report = publisher.update(position, position.stamp_ns).report;
+    told.follow();
+    return report && report->reason == Reason::location;
+  }
+  /// Where between the two it is, 0 = nowhere.
+  double location_reported_m(double from_m, double to_m) {
+    for (double m = from_m; m < to_m; m += 4)
+      if (go_to(m)) return m;
+    return 0;
+  }
   /// Played data begins anew, or a process does.
   void begin_anew() {
     publisher = TprPublisher(balise_map(), settings());
@@ -137,12 +150,6 @@ TEST_F(ToldParametersTest, WhatCannotBeReadIsToldAndNotKept) {
 TEST_F(ToldParametersTest, APacketRefersToTheGroupThatItsMessageNames) {
   follow_train();
   run_s = 1;
-  const auto go_to = [&](double offset_m) {
-    const auto position = at(forward(1, offset_m), run_s += 0.1, 40);
-    const auto report = publisher.update(position, position.stamp_ns).report;
-    told.follow();
-    return report && report->reason == Reason::location;
-  };
   for (double m = 154; m < 405; m += 4) go_to(m);
   EXPECT_FALSE(told.hear(packet(etcs::kReverse, {{650, 1}}), true, kA));
   EXPECT_THAT(told.refusal(), HasSubstr("other direction"));
@@ -150,34 +157,20 @@ TEST_F(ToldParametersTest, APacketRefersToTheGroupThatItsMessageNames) {
   EXPECT_TRUE(told.hear(nominal, true, kA));
   EXPECT_FALSE(told.hear(nominal, true, kA)) << "it stands in every onboard_status";
   EXPECT_EQ(told.notes(), etcs::to_hex(nominal) + ' ' + std::to_string(kA));
-  double reported_at_m = 0;
-  for (double m = 406; m < 990 && reported_at_m == 0; m += 4) reported_at_m = go_to(m) ? m : 0;
-  EXPECT_NEAR(reported_at_m, 750 - 2 - 8, 4) << "the max safe front end may be 8 m in front of the front end";
+  EXPECT_NEAR(location_reported_m(406, 990), 750 - 2 - 8, 4)
+      << "the max safe front end may be 8 m in front of the front end";
   EXPECT_TRUE(told.hear(nominal, true, kC)) << "the same bits of another message";
 }
 
 // Trackside's antenna has read B when the estimate is still 8 m in front of it.
 TEST_F(ToldParametersTest, LocationsWaitForAGroupThatTheEstimateHasNotPassed) {
-  const auto go_to = [&](double offset_m) {
-    const auto position = at(forward(1, offset_m), run_s += 0.1, 40);
-    const auto report = publisher.update(position, position.stamp_ns).report;
-    told.follow();
-    return report && report->reason == Reason::location;
-  };
   for (double m = 152; m <= 392; m += 4) go_to(m);
   const auto located = packet(etcs::kUnknownSide, {{100, 1}});
   EXPECT_TRUE(told.hear(located, true, kB));
-  double reported_at_m = 0;
-  for (double m = 396; m < 600 && reported_at_m == 0; m += 4) reported_at_m = go_to(m) ? m : 0;
-  EXPECT_NEAR(reported_at_m, 500 - 2 - 8, 4);
+  EXPECT_NEAR(location_reported_m(396, 600), 500 - 2 - 8, 4);
 }
 
 TEST_F(ToldParametersTest, LocationsThatAreOverAreNotRemembered) {
-  const auto go_to = [&](double offset_m) {
-    const auto position = at(forward(1, offset_m), run_s += 0.1, 40);
-    publisher.update(position, position.stamp_ns);
-    told.follow();
-  };
   go_to(404);
   const auto located = packet(etcs::kUnknownSide, {{100, 1}});
   EXPECT_TRUE(told.hear(located, true, kE));  // a group that the train does not come to
@@ -197,17 +190,9 @@ TEST_F(ToldParametersTest, LocationsThatAreOverAreNotRemembered) {
 
 // Of a single balise nobody knows the train's direction before it has passed it.
 TEST_F(ToldParametersTest, LocationsOfAPacketThatWaitedForTheDirectionAreNotPassedLongAgo) {
-  const auto go_to = [&](double offset_m) {
-    const auto position = at(forward(1, offset_m), run_s += 0.1, 40);
-    const auto report = publisher.update(position, position.stamp_ns).report;
-    told.follow();
-    return report && report->reason == Reason::location;
-  };
   for (double m = 500; m <= 692; m += 4) go_to(m);
   EXPECT_FALSE(told.hear(packet(etcs::kNominal, {{10, 1}}), true, kC));
-  double reported_at_m = 0;
-  for (double m = 696; m < 800 && reported_at_m == 0; m += 4) reported_at_m = go_to(m) ? m : 0;
-  EXPECT_NEAR(reported_at_m, 704, 4.1);
+  EXPECT_NEAR(location_reported_m(696, 800), 704, 4.1);
 }
 
 // The group of the packet lies behind where this process began; the place is corrected, or lost for a while.
