@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "core/result.hpp"
+#include "messaging/connected.hpp"
 #include "messaging/qos.hpp"
 
 namespace railfix::messaging {
@@ -71,15 +72,6 @@ struct ParticipantOptions {
   std::vector<std::string> interfaces = {};  // names or addresses of those that DDS uses, empty = all
   std::vector<std::string> peers = {};  // addresses of the train's other hosts, asked where multicast does not pass
   std::string security_folder = {};     // this service's keys (see security.hpp), empty = DDS without security
-};
-
-/// Who has found whom. A train is connected when every service's matches add up to what the readers and writers there
-/// are should have.
-struct Connections {
-  uint32_t endpoints = 0;         // readers and writers of this participant
-  uint32_t matches = 0;           // their partners, summed up
-  uint32_t remote_endpoints = 0;  // of all others on this train, as discovered
-  uint32_t pairs = 0;             // reader-writer pairs of equal topics on this train, own and remote
 };
 
 /// Samples that this participant has sent to a topic. SampleInfo::sequence of the last one is the same number.

@@ -139,9 +139,7 @@ void FrameGrabberService::prepare_recorded() {
 
 void FrameGrabberService::start_when_connected() {
   if (!made_ns_) return;
-  const auto here = context_.participant().connections();
-  const bool complete =
-      config_.wait_for.empty() || gathering_.complete({here.matches, here.remote_endpoints, here.pairs});
+  const bool complete = config_.wait_for.empty() || gathering_.complete(context_.participant().connections());
   const bool gave_up = core::seconds(core::monotonic_ns() - *made_ns_) > config_.wait_s;
   if (!complete && !gave_up) return;
   made_ns_.reset();

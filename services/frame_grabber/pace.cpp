@@ -1,6 +1,6 @@
 #include "frame_grabber/pace.hpp"
 
-#include "messaging/connected.hpp"
+#include <tuple>
 
 namespace railfix::frame_grabber {
 
@@ -34,8 +34,9 @@ bool LockStep::answered(const std::string& service, uint64_t step) {
   return true;
 }
 
-bool Gathering::complete(const Found& here) {
-  const bool steady = here == before_ && heard_ == heard_before_;
+bool Gathering::complete(const messaging::Connections& here) {
+  const auto seen = [](const messaging::Connections& c) { return std::tie(c.matches, c.remote_endpoints, c.pairs); };
+  const bool steady = seen(here) == seen(before_) && heard_ == heard_before_;
   steady_looks_ = steady ? steady_looks_ + 1 : 0;
   before_ = here;
   heard_before_ = heard_;

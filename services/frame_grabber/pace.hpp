@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "messaging/connected.hpp"
+
 namespace railfix::frame_grabber {
 
 /// Recorded rate on the wall clock: the first picture is due when it comes (unless it is said when), each other as much
@@ -62,26 +64,19 @@ class Gathering {
     uint32_t matches = 0;
     bool operator==(const Told&) const = default;
   };
-  /// What has been found from here.
-  struct Found {
-    uint32_t matches = 0;           // partners of the own readers and writers
-    uint32_t remote_endpoints = 0;  // readers and writers of all others
-    uint32_t pairs = 0;             // of reader and writer, own and of others
-    bool operator==(const Found&) const = default;
-  };
   explicit Gathering(std::vector<std::string> services) : services_(std::move(services)) {}
   /// Status of another service that is set up.
   void heard(const std::string& service, const Told& told) { heard_[service] = told; }
   /// REQUIRES: asked ten times a second. Programs without a status (tools) cannot be counted: then it is enough that
   /// nothing has changed for two seconds.
-  bool complete(const Found& here);
+  bool complete(const messaging::Connections& here);
 
  private:
   static constexpr int kSteadyLooks = 20;
   std::vector<std::string> services_;
   std::map<std::string, Told> heard_;
   std::map<std::string, Told> heard_before_;
-  Found before_;
+  messaging::Connections before_;
   int steady_looks_ = 0;
 };
 

@@ -61,7 +61,7 @@ TEST(LockStep, GivesEveryoneATurnInOrderAndNamesWhoHasIt) {
 TEST(Gathering, IsCompleteWhenEveryoneHasFoundEveryone) {
   Gathering gathering({"odometry", "fusion"});
   // 4 endpoints there; 3 pairs are 6 matches, of which 2 are here.
-  const Gathering::Found found{2, 4, 3};
+  const messaging::Connections found{0, 2, 4, 3};
   EXPECT_FALSE(gathering.complete(found));
   gathering.heard("odometry", {2, 2});
   EXPECT_FALSE(gathering.complete(found)) << "fusion is not there";
@@ -69,12 +69,12 @@ TEST(Gathering, IsCompleteWhenEveryoneHasFoundEveryone) {
   EXPECT_FALSE(gathering.complete(found)) << "fusion has not found all";
   gathering.heard("fusion", {2, 2});
   EXPECT_TRUE(gathering.complete(found));
-  EXPECT_FALSE(gathering.complete({2, 5, 3})) << "one more has come";
+  EXPECT_FALSE(gathering.complete({0, 2, 5, 3})) << "one more has come";
 }
 
 TEST(Gathering, IsNotHeldUpByProgramsWithoutAStatus) {
   Gathering gathering({"odometry"});
-  const Gathering::Found found{2, 9, 7};
+  const messaging::Connections found{0, 2, 9, 7};
   int looks = 0;
   for (; looks < 100; ++looks) EXPECT_FALSE(gathering.complete(found)) << "nobody is there";
   gathering.heard("odometry", {2, 2});

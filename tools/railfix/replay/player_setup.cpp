@@ -133,8 +133,7 @@ void Player::connect() {
     look_ns += kLookNs;
     const auto here = participant_.connections();
     steady_looks = here.matches == std::exchange(matches, here.matches) ? steady_looks + 1 : 0;
-    const frame_grabber::Gathering::Found found{here.matches, here.remote_endpoints, here.pairs};
-    if (leader_ ? gathering_.complete(found) : steady_looks >= kSteadyLooks) return;
+    if (leader_ ? gathering_.complete(here) : steady_looks >= kSteadyLooks) return;
   }
 }
 
