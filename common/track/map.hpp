@@ -127,6 +127,7 @@ class Map {
   std::vector<BaliseGroup> balise_groups;
   std::vector<std::string> problems;
   double q_locacc_m = 0;  // of virtual groups: how far off its places may be, 0 = not known
+  std::vector<std::string> learnt_runs;  // whose sightings are in its landmarks (`railfix map learn`), by their content
 
   /// Nullptr when there is no such edge or landmark.
   [[nodiscard]] const Edge* edge(uint32_t id) const;

@@ -196,6 +196,7 @@ core::Status read_map(const map::Map& in, Map& out) {
   out.source = in.source();
   out.crs = in.crs();
   out.problems.assign(in.problems().begin(), in.problems().end());
+  out.learnt_runs.assign(in.learnt_runs().begin(), in.learnt_runs().end());
   out.q_locacc_m = in.q_locacc_m();
   if (!std::isfinite(out.q_locacc_m) || out.q_locacc_m < 0)
     return core::Error{"its location accuracy is not a length of 0 m or more"};
@@ -342,6 +343,7 @@ core::Status Map::save(const std::filesystem::path& file) const {
   out.set_crs(as_text(crs));
   for (const std::string& problem : problems) out.add_problems(as_text(problem));
   out.set_q_locacc_m(q_locacc_m);
+  for (const std::string& run : learnt_runs) out.add_learnt_runs(as_text(run));
   write_network(*this, out);
   write_marks(*this, out);
   Map read_back;

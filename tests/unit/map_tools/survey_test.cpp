@@ -65,6 +65,34 @@ TEST(Survey, FindsWhatSeveralRunsSawWithHonestSigmas) {
   EXPECT_NEAR(std::sqrt(squares / count), 1.0, 0.25);
 }
 
+// Week after week on the map of the week before: what the camera sees wrongly in the same way would count again.
+TEST(Survey, AMapThatHasLearntGetsNewLandmarksAlone) {
+  const Passes passes(4, 0.5, 3);
+  track::Map map = passes.map;
+  const auto learn = [&](size_t first_run, size_t masts) {
+    std::vector<SurveySighting> week;
+    for (const SurveySighting& seen : passes.sightings) {
+      const bool sees = seen.kind != LandmarkKind::mast || seen.offset_m < passes.masts[masts - 1] + 10;
+      if (sees && seen.run / 2 == first_run / 2) week.push_back(seen);
+    }
+    apply_survey(survey_landmarks(map, week, {.stretch_m = 2000, .drift = 1e-5}), map);
+    map.learnt_runs.push_back(std::to_string(first_run));
+  };
+  learn(0, 2);
+  const auto before = map.landmarks;
+  ASSERT_EQ(before.size(), passes.map.landmarks.size() + 2);
+  learn(2, 4);
+  ASSERT_EQ(map.landmarks.size(), before.size() + 2);
+  for (size_t i = 0; i < before.size(); ++i) {
+    EXPECT_EQ(map.landmarks[i].offset_m, before[i].offset_m);
+    EXPECT_EQ(map.landmarks[i].sigma_m, before[i].sigma_m);
+  }
+  for (size_t i = 0; i < 2; ++i) {
+    const track::Landmark& added = map.landmarks[before.size() + i];
+    EXPECT_NEAR(added.offset_m, passes.masts[2 + i], 4 * added.sigma_m);
+  }
+}
+
 TEST(Survey, TwoBalisesOfAGroupAreTwo) {
   Passes passes(3, 0.3, 7);
   for (size_t run = 0; run < 3; ++run) {
@@ -181,7 +209,7 @@ TEST_F(RunTables, SightingsArePutOnTheMap) {
   write("sightings.csv",
         "stamp_ns,kind,distance_ahead_m,lateral_m,sigma_m,confidence\n"
         "1500000000,mast,5,-3,0.1,0.9\n1500000000,mast,30,3,0.2,0.9\n9000000000,mast,5,3,0.2,0.9\n");
-  const auto [read, placeless] = core::value_or_throw(read_sightings(map_, folder_, 7));
+  const auto [read, placeless, runs] = core::value_or_throw(read_sightings(map_, folder_, 7));
   ASSERT_EQ(read.size(), 2U);
   EXPECT_EQ(placeless, 1U) << "the third is after the last state";
   EXPECT_EQ(read[0].edge, 1U);
@@ -274,6 +302,30 @@ TEST_F(RunTables, OneRunGivenTwiceIsRefused) {
     EXPECT_THAT(read.error().message, HasSubstr("the same run as"));
   }
   EXPECT_THAT(read_runs(map_, {folder_, folder_ / "none"}).error().message, HasSubstr("none"));
+}
+
+TEST_F(RunTables, ACopyOfARunAndARunThatTheMapHasLearntFromAreRefused) {
+  const auto copy = folder_.parent_path() / (folder_.filename().string() + "_copy");
+  write("train_state.csv",
+        "stamp_ns,edge,offset_m,direction,track_known,speed_mps,sigma_m\n"
+        "1000000000,1,480,+,1,20,0.4\n2000000000,1,500,+,1,20,0.4\n");
+  write("sightings.csv", "stamp_ns,kind,distance_ahead_m,lateral_m,sigma_m,confidence\n1500000000,mast,5,-3,0.1,1\n");
+  std::filesystem::copy(folder_, copy);
+  const auto copied = read_runs(map_, {folder_, copy});
+  ASSERT_FALSE(copied.ok());
+  EXPECT_THAT(copied.error().message, HasSubstr("_copy is the same run as"));
+
+  const auto first = core::value_or_throw(read_runs(map_, {folder_}));
+  track::Map learnt = *map_;
+  learnt.learnt_runs = first.runs;
+  ASSERT_TRUE(learnt.save(copy / "learnt.map").ok());
+  const auto loaded = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(copy / "learnt.map")));
+  const auto again = read_runs(loaded, {copy});
+  ASSERT_FALSE(again.ok());
+  EXPECT_THAT(again.error().message, HasSubstr("has learnt from"));
+  std::ofstream(copy / "sightings.csv", std::ios::app) << "1600000000,mast,9,3,0.1,1\n";
+  EXPECT_TRUE(read_runs(loaded, {copy}).ok()) << "another ride";
+  std::filesystem::remove_all(copy);
 }
 
 TEST_F(RunTables, BadTablesAreOneSentence) {

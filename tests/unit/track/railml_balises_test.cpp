@@ -127,6 +127,22 @@ std::string group2(const std::string& first, const std::string& second) {
          "\" sequence=\"1\"/><baliseRef ref=\"" + second + "\" sequence=\"2\"/></baliseGroup>";
 }
 
+TEST_F(RailmlBalises, OneIdentityOfTwoGroupsIsToldThoughOneIsNotOnTheMap) {
+  const std::string two = balise("b1", "100") + group3("mileageDirection=\"nominal\"") +
+                          "<baliseGroup id=\"h\"><spotLocation netElementRef=\"n1\" pos=\"300\"/>"
+                          "<isEurobaliseGroup countryID=\"2\" groupID=\"55\"/></baliseGroup>";
+  const Map map = core::value_or_throw(build_map({write("a.railml", railml3(two))}, {})).map;
+  ASSERT_EQ(map.balise_groups.size(), 1U) << "the other one says no direction";
+  EXPECT_THAT(map.problems, Contains(HasSubstr("\"g\" and <baliseGroup> \"h\" have one identity, 2/55")));
+}
+
+// A group that its balises locate has a place.
+TEST_F(RailmlBalises, AGroupWithoutALocationOfItsOwnLiesWhereItsBalisesDo) {
+  const std::string text = balise("b1", "100") + group3("mileageDirection=\"nominal\"");
+  const Map map = core::value_or_throw(build_map({write("a.railml", railml3(text))}, {})).map;
+  EXPECT_THAT(map.problems, Not(Contains(HasSubstr("has no location"))));
+}
+
 TEST_F(RailmlBalises, BalisesOfRailml2BesideTheirTrackAreLeftOut) {
   const std::string text = with_balises("<balise id=\"a\" pos=\"-500\"/><balise id=\"b\" pos=\"103\"/>" +
                                         group2("a", "b") + "<balise id=\"c\" pos=\"9000\"/>");

@@ -105,7 +105,10 @@ ordered_json groups_json(const track::Path& path, const std::vector<GroupGap>& g
 
 void print_groups(const track::Path& path, const std::vector<GroupGap>& gaps, const CoverageRequest& request) {
   std::printf("balise groups    at most %.0f m apart: %s\n", request.options.group_limit_m,
-              gaps.empty() ? "yes, real and virtual ones" : "no");
+              !gaps.empty() ? "no"
+              : path.balise_groups().empty()
+                  ? "the way is shorter than that; it has none, and reports say \"LRBG unknown\""
+                  : "yes, real and virtual ones");
   std::string missing;
   for (const GroupGap& gap : gaps) {
     std::printf("  none           %s to %s (%.0f m)\n", place_text(path, gap.from_m).c_str(),

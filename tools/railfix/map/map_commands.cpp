@@ -42,10 +42,12 @@ int learn(const LearnRequest& request) {
   inputs.emplace_back(request.map);
   check_output("--out", request.out, inputs);
   const auto map = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(request.map)));
-  const auto [sightings, placeless] = core::value_or_throw(read_runs(map, {request.runs.begin(), request.runs.end()}));
+  const auto [sightings, placeless, runs] =
+      core::value_or_throw(read_runs(map, {request.runs.begin(), request.runs.end()}));
   const Survey survey = survey_landmarks(*map, sightings, request.options);
   track::Map updated = *map;
   apply_survey(survey, updated);
+  updated.learnt_runs.insert(updated.learnt_runs.end(), runs.begin(), runs.end());
   core::ok_or_throw(updated.save(request.out));
   say_beside({request.out});
   std::printf(
@@ -58,7 +60,13 @@ int learn(const LearnRequest& request) {
     if (std::ranges::none_of(sightings, [run](const SurveySighting& sighting) { return sighting.run == run; }))
       std::printf("nothing seen     %s has no sighting with a place on the map\n", request.runs[run].c_str());
   }
-  std::printf("errors           %.2f of their sigmas (rms)\n\n", survey.spread);
+  std::printf("errors           %.2f of their sigmas (rms)\n", survey.spread);
+  if (!map->learnt_runs.empty())
+    std::printf(
+        "known ones       stay: the map has learnt from %zu runs before, and all sightings of a thing err alike; to "
+        "better them, learn from all runs at once on the map of before\n",
+        map->learnt_runs.size());
+  std::puts("");
   std::printf("%-10s %6s %12s %9s %9s %5s %9s  %s\n", "kind", "edge", "offset [m]", "sigma [m]", "moved [m]", "runs",
               "sightings", "on the map as");
   for (const SurveyedLandmark& found : survey.landmarks) {

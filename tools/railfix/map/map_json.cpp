@@ -125,6 +125,7 @@ ordered_json map_json(const track::Map& map) {
           {"switches", switches_json(map)},
           {"landmarks", marks_json(map)},
           {"balise_groups", groups_json(map)},
+          {"learnt_runs", map.learnt_runs},
           {"problems", map.problems}};
 }
 

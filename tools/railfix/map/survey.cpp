@@ -112,11 +112,13 @@ SurveyedLandmark landmark_of(const track::Map& map, const Thing& thing, const st
     for (const size_t i : thing.sightings) lateral_m += all[i].lateral_m / static_cast<double>(thing.sightings.size());
     found.landmark = {0, first.kind, first.edge, 0, lateral_m, 0, ""};
   }
+  found.sightings = thing.sightings.size();
+  found.runs = runs_of(thing, all);
+  // What all sightings of a thing have in common would come in once more.
+  if (thing.known != nullptr && !map.learnt_runs.empty()) return found;
   found.landmark.offset_m = std::clamp(place_m, 0.0, map.edge(first.edge)->alignment.length_m());
   found.landmark.sigma_m = sigma_m;
   found.moved_m = thing.known != nullptr ? found.landmark.offset_m - thing.known->offset_m : 0.0;
-  found.sightings = thing.sightings.size();
-  found.runs = runs_of(thing, all);
   return found;
 }
 

@@ -53,7 +53,8 @@ struct Survey {
 };
 
 /// Robust least squares (Huber) over landmarks and the error of every run's way; landmarks of the map enter with their
-/// sigma. What the camera sees wrongly in the same way every time does not average out: see common_share.
+/// sigma. What the camera sees wrongly in the same way every time does not average out: see common_share. So those of a
+/// map that has learnt before stay as they are, and only new ones are found.
 Survey survey_landmarks(const track::Map& map, const std::vector<SurveySighting>& sightings,
                         const SurveyOptions& options);
 
@@ -63,13 +64,15 @@ void apply_survey(const Survey& survey, track::Map& map);
 struct ReadSightings {
   std::vector<SurveySighting> placed;
   size_t placeless = 0;  // left out: the track was not known there, or nothing of the map lies there
+  std::vector<std::string> runs{};  // that have sightings, by their content, for Map::learnt_runs
 };
 
 /// Sightings of a run's tables (sightings.csv, train_state.csv).
 core::Result<ReadSightings> read_sightings(const std::shared_ptr<const track::Map>& map,
                                            const std::filesystem::path& run_folder, size_t run);
 
-/// Those of several runs; a folder given twice, however its path is spelled, is no second run and an error.
+/// Those of several runs. An error where sightings would count twice: a folder or a copy of it given again, or a run
+/// that the map has learnt from.
 core::Result<ReadSightings> read_runs(const std::shared_ptr<const track::Map>& map,
                                       const std::vector<std::filesystem::path>& run_folders);
 

@@ -1,11 +1,16 @@
 // The tables of a run as sightings on the map.
 #include <algorithm>
+#include <cinttypes>
 #include <cmath>
+#include <cstdio>
 #include <limits>
+#include <map>
 
 #include "core/csv_table.hpp"
+#include "core/fnv.hpp"
 #include "core/time.hpp"
 #include "core/train_limits.hpp"
+#include "core/whole_file.hpp"
 #include "map/survey.hpp"
 #include "track/path.hpp"
 #include "track/same_map.hpp"
@@ -169,6 +174,21 @@ std::optional<track::EdgePosition> place_at(const std::shared_ptr<const track::M
   return path.value().position_at(ahead);
 }
 
+core::Error same_run(const std::filesystem::path& run, const std::filesystem::path& as) {
+  return {run.string() + " is the same run as " + as.string() + "; give every run once"};
+}
+
+/// The same for a copy, another for every other ride.
+core::Result<std::string> content_of(const std::filesystem::path& file) {
+  const auto text = core::read_whole(file);
+  if (!text.ok()) return text.error();
+  core::Fnv fnv;
+  fnv.add(text.value());
+  char name[17];
+  std::snprintf(name, sizeof name, "%016" PRIx64, fnv.value());
+  return std::string(name);
+}
+
 }  // namespace
 
 core::Result<ReadSightings> read_sightings(const std::shared_ptr<const track::Map>& map,
@@ -209,22 +229,36 @@ core::Result<ReadSightings> read_sightings(const std::shared_ptr<const track::Ma
                           before.place_ahead_m, is_reverse});
   }
   if (!table.status().ok()) return table.status().error();
+  if (out.placed.size() + out.placeless > 0) {
+    const auto content = content_of(run_folder / "sightings.csv");
+    if (!content.ok()) return content.error();
+    out.runs.push_back(content.value());
+  }
   return out;
 }
 
 core::Result<ReadSightings> read_runs(const std::shared_ptr<const track::Map>& map,
                                       const std::vector<std::filesystem::path>& run_folders) {
   ReadSightings out;
+  std::map<std::string, std::filesystem::path> folder_of;
   for (size_t i = 0; i < run_folders.size(); ++i) {
     for (size_t before = 0; before < i; ++before) {
       std::error_code unreadable;  // told below
       if (std::filesystem::equivalent(run_folders[i], run_folders[before], unreadable))
-        return core::Error{run_folders[i].string() + " is the same run as " + run_folders[before].string() +
-                           "; give every run once"};
+        return same_run(run_folders[i], run_folders[before]);
     }
-    auto read = read_sightings(map, run_folders[i], i);
+    const auto read = read_sightings(map, run_folders[i], i);
     if (!read.ok()) return read.error();
-    const auto& [placed, placeless] = read.value();
+    const auto& [placed, placeless, runs] = read.value();
+    for (const std::string& run : runs) {
+      const auto [first, is_new] = folder_of.emplace(run, run_folders[i]);
+      if (!is_new) return same_run(run_folders[i], first->second);
+      if (std::ranges::count(map->learnt_runs, run) > 0)
+        return core::Error{"the map has learnt from " + run_folders[i].string() +
+                           " before, and its sightings would count twice; leave it out, or learn from all runs at once "
+                           "on the map of before"};
+      out.runs.push_back(run);
+    }
     out.placed.insert(out.placed.end(), placed.begin(), placed.end());
     out.placeless += placeless;
   }

@@ -8,6 +8,7 @@
 #include "core/whole_file.hpp"
 #include "track/import/osm/osm_bounds.hpp"
 #include "track/import/osm/osm_data.hpp"
+#include "track/import/osm/osm_feature_tags.hpp"
 #include "track/import/swapped.hpp"
 
 namespace railfix::track {
@@ -16,27 +17,6 @@ namespace {
 using nlohmann::json;
 
 constexpr size_t kMostOfRemark = 200;
-
-/// As OpenStreetMap says it: converters make numbers and booleans of what are strings there, and 1.0 of 1.
-std::optional<std::string> tag_of(const json& value) {
-  constexpr double kMostWhole = 1e15;
-  if (value.is_string()) return value.get<std::string>();
-  if (value.is_boolean()) return value.get<bool>() ? "yes" : "no";
-  if (!value.is_number()) return std::nullopt;
-  const double number = value.get<double>();
-  const bool is_whole = value.is_number_float() && std::abs(number) < kMostWhole && number == std::floor(number);
-  return is_whole ? std::to_string(static_cast<int64_t>(number)) : value.dump();
-}
-
-OsmTags tags_in(const json& object, const char* key) {
-  OsmTags tags;
-  const auto found = object.find(key);
-  if (found == object.end() || !found->is_object()) return tags;
-  for (const auto& [name, value] : found->items()) {
-    if (auto tag = tag_of(value)) tags.emplace(name, std::move(*tag));
-  }
-  return tags;
-}
 
 /// Beginning of a value, for a message; in ASCII, so that no letter is cut in two.
 std::string text_of(const json& value, size_t most = 60) {
@@ -168,13 +148,9 @@ GeoPoint place_in(const json& coordinates) {
 
 /// "way/123" -> 123; a number made up (negative) where there is none.
 int64_t number_in(const OsmTags& tags, size_t position) {
-  const auto id = tags.find("@id");
-  const size_t slash = id == tags.end() ? std::string::npos : id->second.find('/');
-  if (slash != std::string::npos) {
-    const int64_t number = std::strtoll(id->second.c_str() + slash + 1, nullptr, 10);
-    if (number > 0) return number;
-  }
-  return -static_cast<int64_t>(position) - 1;
+  const std::string id = value_of(tags, "@id");
+  const int64_t number = id.starts_with("way/") ? std::strtoll(id.c_str() + 4, nullptr, 10) : 0;
+  return number > 0 ? number : -static_cast<int64_t>(position) - 1;
 }
 
 /// Keys that say what a line is; with one of them it is no track, unless it is a train's route.
@@ -210,7 +186,7 @@ class FeatureReader {
       ++number_;
       const auto geometry = feature.find("geometry");
       if (geometry == feature.end() || !geometry->is_object() || !geometry->contains("coordinates")) return;
-      add(tags_in(feature, "properties"), geometry->value("type", ""), geometry->at("coordinates"));
+      add(feature_tags(feature), geometry->value("type", ""), geometry->at("coordinates"));
     });
     if (on_earth_ == 0 && !elsewhere_.empty()) {
       throw core::BadInput(elsewhere_ + "; GeoJSON coordinates are longitude, latitude in degrees (WGS 84)" +
@@ -218,6 +194,8 @@ class FeatureReader {
     }
     for (const auto& [key, count] : others_)
       out_.problems.push_back(features_named(count) + " with \"" + key + "\" and no railway: no track, left out");
+    if (with_height_ > 0)
+      out_.problems.push_back(features_named(with_height_) + " with heights, as third coordinates: these are not read");
     if (silent_lines_ > 0)
       out_.problems.push_back(features_named(silent_lines_) + " without a word of what it is: taken as track");
   }
@@ -258,6 +236,7 @@ class FeatureReader {
 
   void add_line(const json& coordinates, const OsmTags& tags, std::vector<OsmWay>& ways) {
     OsmWay way{number_in(tags, ways.size()), {}, tags};
+    if (std::ranges::any_of(coordinates, [](const json& place) { return place.size() > 2; })) ++with_height_;
     size_t elsewhere = 0;
     const json* first_elsewhere = nullptr;
     for (const json& pair : coordinates) {
@@ -297,6 +276,7 @@ class FeatureReader {
   size_t number_ = 0;  // of the feature that is read, from 1
   std::map<std::string, size_t> others_;
   size_t silent_lines_ = 0;
+  size_t with_height_ = 0;
   size_t on_earth_ = 0;
   std::string elsewhere_;  // the first time that a point was not
   bool swapped_ = false;   // it would be, the other way round

@@ -19,7 +19,7 @@ class OsmPoints {
   /// What stands at this node of a way (an id, for problems), if anything. `along_way`: the track runs as the way is
   /// drawn; nothing where ways meet there that are drawn against each other.
   std::optional<TrackMark> mark(int64_t node, int64_t way, double offset_m, std::optional<bool> along_way);
-  /// Signals that give no mast, or no side, one sentence each.
+  /// Points on no track, signals that give no mast, or no side, one sentence each.
   void tell(std::vector<std::string>& problems) const;
 
  private:
@@ -31,6 +31,7 @@ class OsmPoints {
       if (count++ == 0) first = one;
     }
   };
+  void tell_strays(std::vector<std::string>& problems) const;
   std::optional<TrackMark> signal(int64_t node, int64_t way, double offset_m, std::optional<bool> along_way);
 
   const OsmData& data_;

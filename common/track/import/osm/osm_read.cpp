@@ -92,7 +92,7 @@ OsmData read_passes(const std::string& file, bool with_trams) {
         continue;
       }
       OsmTags tags = tags_of(node);
-      if (!wanted.contains(node.id()) && !is_mast(tags)) continue;
+      if (!wanted.contains(node.id()) && !is_mast(tags) && !is_of_track(tags)) continue;
       out.nodes[node.id()] = {{node.location().lat(), node.location().lon()}, std::move(tags)};
     }
   }
@@ -209,6 +209,11 @@ bool is_platform(const OsmTags& tags, bool with_trams) {
 
 bool is_platform_relation(const OsmTags& tags, bool with_trams) {
   return value_of(tags, "type") == "multipolygon" && is_platform(tags, with_trams);
+}
+
+bool is_of_track(const OsmTags& tags) {
+  constexpr std::array kKinds{"balise", "signal", "switch", "level_crossing", "crossing", "railway_crossing"};
+  return std::ranges::find(kKinds, value_of(tags, "railway")) != kKinds.end() || is_set(tags, "railway:balise");
 }
 
 bool is_mast(const OsmTags& tags) {

@@ -50,7 +50,8 @@ class Railml3BaliseReader {
   void read_group(const pugi::xml_node& node) {
     const auto identity = etcs_identity(source_, node);
     std::vector<Railml3PlacedBalise>& balises = of_group_[node.attribute("id").value()];
-    const std::vector<NetPlace> own = places_.of(node);
+    std::vector<NetPlace> own;
+    if (balises.empty() || places_.has_location(node)) own = places_.of(node);
     if (balises.empty() && !own.empty()) balises.push_back({own.front(), node, {}});
     if (balises.empty()) {
       tell(node, "has no place on a track, nor has a balise of it; it is left out");

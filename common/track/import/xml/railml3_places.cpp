@@ -68,11 +68,15 @@ double Railml3Places::within(const pugi::xml_node& of, double at_m, double lengt
   return std::clamp(at_m, 0.0, length_m);
 }
 
+bool Railml3Places::has_location(const pugi::xml_node& node) {
+  return !descendants(node, "associatedNetElement").empty() || !descendants(node, "spotLocation").empty();
+}
+
 std::vector<NetPlace> Railml3Places::of(const pugi::xml_node& node) {
   std::vector<NetPlace> out;
   const auto parts = descendants(node, "associatedNetElement");
   const auto spots = descendants(node, "spotLocation");
-  if (parts.empty() && spots.empty()) net_.problems.push_back(railml_called(node) + " has no location; it is left out");
+  if (!has_location(node)) net_.problems.push_back(railml_called(node) + " has no location; it is left out");
   for (const pugi::xml_node& part : parts) {
     const std::optional<size_t> track = find_track(node, part);
     if (!track) continue;

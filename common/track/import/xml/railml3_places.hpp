@@ -27,6 +27,8 @@ class Railml3Places {
     const auto found = mileage_falls_.find(track);
     return found == mileage_falls_.end() ? std::nullopt : std::optional(found->second);
   }
+  /// Does the file say where the element lies?
+  [[nodiscard]] static bool has_location(const pugi::xml_node& node);
   /// Where an element lies; what lies on coarser net elements only is left out.
   [[nodiscard]] std::vector<NetPlace> of(const pugi::xml_node& node);
   void tell_missing(const pugi::xml_node& of, const std::string& kind, const std::string& id,
