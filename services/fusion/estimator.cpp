@@ -18,6 +18,9 @@ constexpr double kGapS = 0.05;
 constexpr int kRhythmSamples = 10;
 constexpr double kPointsOffM = 5.0;  // from where the map has them, or the wheels behind the foot
 
+template <class Input>
+constexpr bool tells_place = std::is_same_v<Input, GnssInput> || std::is_same_v<Input, FixInput>;
+
 }  // namespace
 
 Estimator::Estimator(const FusionParameters* parameters, const OdometerScales& scales,
@@ -83,7 +86,10 @@ void Estimator::apply(const Event& event) {
         // Inertial samples are many and only their mean is used: they move the filter when it is complete.
         if constexpr (!std::is_same_v<std::decay_t<decltype(input)>, ImuInput>) predict_to(input.stamp_ns);
         stamp_ns_ = std::max(stamp_ns_, input.stamp_ns);
+        const double here_m = distance_m();
         use(input);
+        // What a place corrects is no way: a train that stands goes on standing.
+        if constexpr (tells_place<std::decay_t<decltype(input)>>) rest_distance_m_ += distance_m() - here_m;
       },
       event);
   if (place_.path) {

@@ -23,6 +23,7 @@ constexpr double kSurelyMovesMps = 1.0;
 constexpr int64_t kTrainborneStepNs = 10'000'000;  // T_TRAIN
 constexpr double kNoCorrectionM = 2.0;
 constexpr double kMovesM = 0.05;     // what fusion takes for rest
+constexpr double kNoCreepM = 0.02;   // from one state of a train at rest to the next: its place was corrected
 constexpr double kCorrectionM = 20;  // a distance may be corrected by so much, and by what it was not sure of
 
 /// Empty when the position is young enough.
@@ -84,7 +85,8 @@ void TprPublisher::follow(const TrainPosition& position) {
   }
   const auto position_before = std::exchange(position_, position);
   const auto* group_before = reference_ ? reference_->group : nullptr;
-  follow_motion(position);
+  const bool rests = position_before && position_before->standstill && position.standstill;
+  follow_motion(position, rests ? position.distance_m - position_before->distance_m : 0);
   if (tracker_) {
     if (position.place_known()) {
       tracker_->update(position.foot, position.track_declared(), heard);
@@ -108,13 +110,16 @@ void TprPublisher::follow(const TrainPosition& position) {
   }
 }
 
-void TprPublisher::follow_motion(const TrainPosition& position) {
+void TprPublisher::follow_motion(const TrainPosition& position, double moved_at_rest_m) {
   if (!furthest_m_ || std::isnan(position.speed_mps)) {
     motion_ = Motion::unknown;
     furthest_m_ = position.distance_m;
   }
   rested_ = rested_ || position.standstill;
-  if (position.standstill && motion_ != Motion::unknown) return;  // what the distance is corrected by is no way
+  if (position.standstill && motion_ != Motion::unknown) {
+    if (std::abs(moved_at_rest_m) > kNoCreepM) *furthest_m_ += moved_at_rest_m;
+    return;
+  }
   const double moved_m = position.distance_m - *furthest_m_;
   const bool fast = !position.standstill && std::abs(position.speed_mps) >= kSurelyMovesMps;
   const Motion moves = (fast ? position.speed_mps : moved_m) > 0 ? Motion::forward : Motion::backward;

@@ -377,6 +377,38 @@ TEST(Fusion, GnssHoldsTheIntervalAndWildFixesAreRefused) {
   EXPECT_GT(state->over_m, std::abs(state->position.offset_m - 6000));
 }
 
+// A minute at a station: GNSS wanders, so does the place, and the train stands.
+TEST(Fusion, GnssMovesThePlaceOfAStandingTrainAndNotTheTrain) {
+  for (const bool with_camera : {false, true}) {
+    auto fusion = fusion_at(0);
+    std::optional<TrainEstimate> state;
+    double least_m = INFINITY;
+    double most_m = -INFINITY;
+    for (int i = 1; i <= 6000; ++i) {
+      const double t = i * 0.02;
+      const double brakes_s = std::clamp(t - 40, 0.0, 10.0);
+      const double place_m = 8 * std::min(t, 50.0) - 0.4 * brakes_s * brakes_s;
+      if (auto s = fusion.add(wheel_at(t, 1.01 * place_m))) state = s;
+      if (with_camera) state = fusion.add(step_at(t, 8 - 0.8 * brakes_s));
+      if (i % 50 == 0) fusion.add(GnssInput{at(t + 0.001), 0, place_m + 3 * std::sin(0.1 * t), 1.0, 1});
+      if (t < 53) continue;
+      ASSERT_TRUE(state && state->standstill) << t << " s";
+      least_m = std::min(least_m, state->distance_m);
+      most_m = std::max(most_m, state->distance_m);
+    }
+    if (!with_camera) {
+      EXPECT_GT(most_m - least_m, 0.3) << "it was moved";
+    }
+    double t = 120;
+    while (state->standstill && t < 125) {  // and says so when it starts again
+      t += 0.02;
+      if (auto s = fusion.add(wheel_at(t, 1.01 * (360 + 0.25 * (t - 120) * (t - 120))))) state = s;
+      if (with_camera) state = fusion.add(step_at(t, 0.5 * (t - 120)));
+    }
+    EXPECT_LT(t, 122);
+  }
+}
+
 TEST(Fusion, WildStampsAreNotFollowedButANewClockIs) {
   auto fusion = fusion_at(0);
   run(fusion, 0, 5, 10);

@@ -114,6 +114,22 @@ TEST(TprPublisher, ACorrectionWhileItBrakesIsNoMovementBack) {
   EXPECT_EQ(direction(149.95, 0, true), etcs::kReverse) << "it rested before";
 }
 
+// As by GNSS at a station: what the estimate went back there is no way that the train backs when it starts.
+TEST(TprPublisher, ACorrectionAtRestIsNoMovement) {
+  for (const double corrected_m : {-3.0, 3.0}) {
+    SaidDirection direction;
+    direction(150, 2, false);
+    direction(150.2, 0.5, false);
+    for (int i = 0; i < 20; ++i) direction(150.2 + (i < 10 ? 0 : corrected_m), i % 2 == 0 ? -0.001 : 0.001, true);
+    uint32_t said = 99;
+    for (int i = 1; i <= 20 && said == 99; ++i)
+      said = direction(150.2 + corrected_m + 0.012 * i, i == 1 ? -0.01 : 0.12, false);
+    EXPECT_EQ(said, etcs::kNominal) << corrected_m;
+    direction(150.5 + corrected_m, 0, true);
+    EXPECT_EQ(direction(150.0 + corrected_m, -0.2, false), etcs::kReverse) << corrected_m;
+  }
+}
+
 TEST(TprPublisher, ADirectionOfBeforeAGapIsNotKnownAtStandstill) {
   TprPublisher publisher(balise_map(), settings());
   publisher.update(at(forward(1, 150), 0, 20), kStart);
