@@ -97,6 +97,8 @@ struct MapMatcherConfig {
     f.number("noise_rad", p.noise_rad, {1e-6, 0.1}, "rad", "Random walk of the heading in a second, one sigma.");
     f.number("bias_rps", p.bias_rps, {0, 0.1}, "rad/s", "Constant error before the train has stood, one sigma.");
     f.number("bias_walk_rps", p.bias_walk_rps, {0, 0.01}, "rad/s", "It wanders by so much in a second.");
+    f.number("jump_rps", p.jump_rps, {0, 1}, "rad/s",
+             "Constant error of a gyro that has failed, one sigma; 0: none fails.");
     f.number("longest_gap_s", p.longest_gap_s, {0.01, 2}, "s", "Samples further apart do not belong together.");
   }
   void describe_track(service::Fields& f) {

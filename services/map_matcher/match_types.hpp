@@ -39,6 +39,7 @@ struct Turn {
   TurnSensor sensor = TurnSensor::camera;
   double bias_walk = 0;   // by so much may that error have changed meanwhile (variance, in its sigmas)
   double duration_s = 0;  // 0: not known
+  double jump_rad = 0;    // what one sigma of another constant error, that of a failed sensor, has turned; 0: none
 };
 
 /// Where fusion thinks the train is: only a window to search in.

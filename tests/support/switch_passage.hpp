@@ -18,6 +18,9 @@ namespace railfix::testing {
 
 enum class Manoeuvre : uint8_t { through, stop_on_switch, back_and_forth, just_clear, backwards };
 
+/// What becomes of the gyro from a place on: stays at its value, another constant error, more noise.
+enum class GyroFault : uint8_t { none, stuck, bias, noise };
+
 struct PassagePlan {
   bool facing = true;
   bool diverging = false;
@@ -33,6 +36,9 @@ struct PassagePlan {
   bool frog_seen = true;
   bool views = true;         // the rails' curvature in the pictures, with a camera
   double sway_rad = 0.0015;  // of the body, 1 sigma at 72 km/h
+  GyroFault gyro_fault = GyroFault::none;
+  double gyro_fault_rps = 0;  // the error, or the noise of a sample
+  double gyro_fault_m = 40;   // so far from the points it begins
   std::string text() const {
     return std::string(facing ? "facing" : "trailing") + (diverging ? " diverging" : " straight") + " layout " +
            std::to_string(layout) + " manoeuvre " + std::to_string(static_cast<int>(manoeuvre)) + " R " +
@@ -220,7 +226,8 @@ class SwitchPassage {
   }
 
   void move_to(double next_m) {
-    const auto sensed = sensors_->step(*heading_, time_s_, at_m_, next_m, 1 / kTicksPerS);
+    auto sensed = sensors_->step(*heading_, time_s_, at_m_, next_m, 1 / kTicksPerS);
+    sensed.turn_rad = told_by_gyro(sensed.turn_rad * kTicksPerS) / kTicksPerS;
     weigh_legs(next_m, sensed);
     at_m_ = next_m;
     time_s_ += 1 / kTicksPerS;
@@ -228,9 +235,19 @@ class SwitchPassage {
     const auto turn = turn_of(sensed);
     if (turn && sensed.way_m == 0) chooser_->stand(*turn);
     if (turn && std::abs(sensed.way_m) > 1e-4) chooser_->move(*turn);
+    if (!turn) chooser_->move_blind(sensed.way_m);
     look_for_frog();
     look_at_rails();
     judge();
+  }
+
+  double told_by_gyro(double rate_rps) {
+    gyro_failed_ = gyro_failed_ || std::abs(at_m_) < plan_.gyro_fault_m;
+    if (plan_.camera || !gyro_failed_) return stuck_rps_ = rate_rps;
+    if (plan_.gyro_fault == GyroFault::stuck) return stuck_rps_;
+    if (plan_.gyro_fault == GyroFault::bias) return rate_rps + plan_.gyro_fault_rps;
+    if (plan_.gyro_fault == GyroFault::noise) return rate_rps + plan_.gyro_fault_rps * random_.normal();
+    return rate_rps;
   }
 
   std::optional<map_matcher::Turn> turn_of(const SensedStep& sensed) {
@@ -370,6 +387,8 @@ class SwitchPassage {
   bool diverging_now_ = false;
   bool known_ = true;
   bool frog_told_ = false;
+  bool gyro_failed_ = false;
+  double stuck_rps_ = 0;
   PassageResult result_;
 };
 

@@ -22,7 +22,12 @@ constexpr double kViewNoisePerM = 3e-4;  // least sigma of a picture's curvature
 constexpr double kApartM = 2.5;          // tracks further apart than that share no rails
 constexpr double kAlikeM = 3;            // along the track
 constexpr double kOthersBalise = 0.01;   // chance that it is another track's all the same
-constexpr double kWatched = 0.9;         // a begin less probable lies behind a switch that nobody watched
+constexpr double kJumpsPerS =
+    1e-4;  // chance that a gyro fails: far more than it does, for 20 minutes of one in the dark
+constexpr double kJumpedBefore = 1e-3;  // ... that it had failed before
+constexpr double kJumpEveryS = 2.0;     // or ...
+constexpr double kJumpEveryM = 10.0;    // ... between the times at which it may have
+constexpr double kWatched = 0.9;        // a begin less probable lies behind a switch that nobody watched
 
 double apart_m(const track::Map& map, const track::EdgePosition& a, const track::EdgePosition& b) {
   const auto at = [&](const track::EdgePosition& p) { return map.edge(p.edge)->alignment.at(p.offset_m).pose; };
@@ -36,6 +41,7 @@ void TrackChooser::start(const TrackWindow& window) {
   pending_ = {};
   lost_m_ = moved_back_m_ = 0;
   place_m_ = 0;
+  watched_s_ = INFINITY;
   sure_m_.reset();
   window_ = window;
   hypotheses_.push_back({track::Route(track::run_of(*map_, window.place), window.place.offset_m, 0),
@@ -100,8 +106,9 @@ void TrackChooser::move(const Turn& turn) {
   if (turn.sensor != sensor_) {
     sensor_ = turn.sensor;
     for (auto& hypothesis : hypotheses_) {
-      for (auto& cell : hypothesis.cells) cell.errors.forget(TurnErrors::bias);
+      for (auto& cell : hypothesis.cells) cell.begin_sensor();
     }
+    watched_s_ = INFINITY;
   }
   run(turn.way_m);
   pending_.way_m += turn.way_m;
@@ -110,6 +117,7 @@ void TrackChooser::move(const Turn& turn) {
   pending_.bias_rad += turn.bias_rad;
   pending_.bias_walk += turn.bias_walk;
   pending_.duration_s += turn.duration_s;
+  pending_.jump_rad += turn.jump_rad;
   if (std::abs(pending_.way_m) >= parameters_.bin_m) use_pending();
 }
 
@@ -138,7 +146,7 @@ void TrackChooser::move_blind(double way_m) {
   run(way_m);
   for (auto& hypothesis : hypotheses_) {
     spread(hypothesis.cells, way_m);
-    for (auto& cell : hypothesis.cells) cell.errors.forget(TurnErrors::sway);
+    for (auto& cell : hypothesis.cells) cell.forget(TurnErrors::sway);
   }
   trim();
   merge();
@@ -153,12 +161,25 @@ void TrackChooser::use_pending() {
   trim();
   extend();
   fit_cells();
+  watch_for_jump(bin);
   for (auto& hypothesis : hypotheses_) {
     spread(hypothesis.cells, bin.way_m);
     weigh_turn(hypothesis.cells, cells_m_, hypothesis.route, bin, parameters_);
   }
   merge();
   prune();
+}
+
+// Before it was looked to for the first time nobody has watched the sensor.
+void TrackChooser::watch_for_jump(const BinTurn& bin) {
+  watched_s_ += bin.duration_s;
+  watched_m_ += std::abs(bin.way_m);
+  if (!(bin.jump_rad > 0) || (watched_s_ < kJumpEveryS && watched_m_ < kJumpEveryM)) return;
+  const double chance = std::isinf(watched_s_) ? kJumpedBefore : kJumpsPerS * watched_s_;
+  for (auto& hypothesis : hypotheses_) {
+    for (auto& cell : hypothesis.cells) begin_jump(cell, bin, chance);
+  }
+  watched_s_ = watched_m_ = 0;
 }
 
 // The cells cover where the train can be; new ones at the ends know no more than their neighbours.
@@ -198,7 +219,7 @@ double TrackChooser::of_turning(const Hypothesis& hypothesis) const {
   double prior = 0;
   for (size_t i = 0; i < hypothesis.cells.size(); ++i) {
     const double of_place = log_of_place(cells_m_ + kCellM * static_cast<double>(i));
-    logs.push_back(hypothesis.cells[i].log_weight + of_place);
+    logs.push_back(hypothesis.cells[i].log_weight() + of_place);
     prior += std::exp(of_place);
   }
   const double most = *std::max_element(logs.begin(), logs.end());

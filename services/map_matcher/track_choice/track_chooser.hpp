@@ -80,6 +80,7 @@ class TrackChooser {
   void open_ways_behind();
   void run(double way_m);
   void use_pending();
+  void watch_for_jump(const BinTurn& bin);
   void fit_cells();
   void turn_round();
   void extend();
@@ -120,6 +121,8 @@ class TrackChooser {
   double told_ = 1;               // probability of what was told at the start and cannot be looked into
   std::optional<double> sure_m_;  // on the routes, what was sighted below the train last
   TurnSensor sensor_ = TurnSensor::camera;
+  double watched_s_ = INFINITY;  // since the sensor's bias may have jumped last
+  double watched_m_ = 0;
   BinTurn pending_;
 };
 

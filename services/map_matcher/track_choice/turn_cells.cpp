@@ -48,12 +48,20 @@ class TurnErrorModel {
   }
   /// `turned_rad`: more than the track. How well it fits weighs the cell.
   void weigh(TurnCell& cell, double turned_rad, double noise) const {
-    auto& [mean, covariance] = cell.errors;
+    weigh(cell.steady, turned_rad, noise);
+    for (TurnFit& fit : cell.jumped) {
+      if (std::isfinite(fit.log_weight)) weigh(fit, turned_rad, noise);
+    }
+  }
+
+ private:
+  void weigh(TurnFit& fit, double turned_rad, double noise) const {
+    auto& [mean, covariance] = fit.errors;
     const double error = turned_rad - seen_.dot(mean);
     const Eigen::Vector2d together = covariance * seen_;
     const double variance = noise + fresh_ + seen_.dot(together);
     const double squared = error * error / variance;
-    cell.log_weight -= 0.5 * (std::min(squared, kMostSquared) + std::log(variance));
+    fit.log_weight -= 0.5 * (std::min(squared, kMostSquared) + std::log(variance));
     Eigen::Vector2d of_errors = keeps_.cwiseProduct(together);
     of_errors[TurnErrors::sway] += fresh_;
     mean = keeps_.cwiseProduct(mean);
@@ -68,7 +76,6 @@ class TurnErrorModel {
     if (bias < 1) bias = std::min(1.0, bias + forgotten_);
   }
 
- private:
   Eigen::Vector2d keeps_;  // of the errors, over the bin
   Eigen::Vector2d seen_;   // what is measured of the errors that the bin begins with
   double fresh_;           // variance of the sway that is new
@@ -97,7 +104,7 @@ void weigh_turn(std::vector<TurnCell>& cells, double first_m, const track::Route
     // The map errs over several bins alike: as much less is to be learnt from one.
     const double noise = sensor + body + parameters.correlated_bins * rough * rough;
     model.weigh(cells[i], bin.turn_rad - bin.way_m * mapped, noise);
-    cells[i].log_weight += usual_log;
+    cells[i].add_log(usual_log);
   }
 }
 
@@ -111,8 +118,40 @@ void weigh_stand(TurnCell& cell, const BinTurn& stood, const TrackParameters& pa
   TurnErrorModel(stood, parameters).weigh(cell, stood.turn_rad, stood.variance);
 }
 
+double TurnCell::log_weight() const {
+  double log = steady.log_weight;
+  for (const TurnFit& fit : jumped) log = log_sum(log, fit.log_weight);
+  return log;
+}
+
+void TurnCell::add_log(double log) {
+  steady.log_weight += log;
+  for (TurnFit& fit : jumped) fit.log_weight += log;
+}
+
+void TurnCell::forget(TurnErrors::Index error) {
+  steady.errors.forget(error);
+  for (TurnFit& fit : jumped) fit.errors.forget(error);
+}
+
+void TurnCell::begin_sensor() {
+  steady.log_weight = log_weight();
+  steady.errors.forget(TurnErrors::bias);
+  jumped = {};
+}
+
+void begin_jump(TurnCell& cell, const BinTurn& bin, double chance) {
+  if (!(bin.bias_rad > 0)) return;
+  TurnFit& fit = *std::ranges::min_element(cell.jumped, {}, &TurnFit::log_weight);
+  fit = cell.steady;
+  fit.log_weight += std::log(chance);
+  fit.errors.covariance(TurnErrors::bias, TurnErrors::bias) += std::pow(bin.jump_rad / bin.bias_rad, 2);
+}
+
+namespace {
+
 // The mean and covariance of a mixture.
-void join_cells(TurnCell& into, double log_into, const TurnCell& other, double log_other) {
+void join_fits(TurnFit& into, double log_into, const TurnFit& other, double log_other) {
   const double mine = log_into + into.log_weight;
   const double its = log_other + other.log_weight;
   const double both = log_sum(mine, its);
@@ -125,6 +164,13 @@ void join_cells(TurnCell& into, double log_into, const TurnCell& other, double l
   into = {both - log_sum(log_into, log_other), {mean, covariance}};
 }
 
+}  // namespace
+
+void join_cells(TurnCell& into, double log_into, const TurnCell& other, double log_other) {
+  join_fits(into.steady, log_into, other.steady, log_other);
+  for (size_t i = 0; i < into.jumped.size(); ++i) join_fits(into.jumped[i], log_into, other.jumped[i], log_other);
+}
+
 void TurnErrors::forget(Index error) {
   mean[error] = 0;
   covariance.row(error).setZero();
@@ -135,17 +181,14 @@ void TurnErrors::forget(Index error) {
 void spread(std::vector<TurnCell>& cells, double way_m) {
   const double share = std::min(0.25, 0.5 * std::pow(kDriftPerM * way_m / kCellM, 2));
   if (cells.size() < 3 || share <= 0) return;
-  const double most = std::max_element(cells.begin(), cells.end(), [](const TurnCell& a, const TurnCell& b) {
-                        return a.log_weight < b.log_weight;
-                      })->log_weight;
-  std::vector<double> weights;
-  weights.reserve(cells.size());
-  for (const TurnCell& cell : cells) weights.push_back(std::exp(cell.log_weight - most));
-  for (size_t i = 0; i < weights.size(); ++i) {
-    const double before = weights[i == 0 ? 0 : i - 1];
-    const double after = weights[std::min(i + 1, weights.size() - 1)];
-    const double mixed = (1 - 2 * share) * weights[i] + share * (before + after);
-    cells[i].log_weight = most + std::log(std::max(mixed, 1e-300));
+  std::vector<double> logs;
+  logs.reserve(cells.size());
+  for (const TurnCell& cell : cells) logs.push_back(cell.log_weight());
+  const double most = *std::ranges::max_element(logs);
+  const auto weight = [&](size_t i) { return std::exp(logs[std::min(i, logs.size() - 1)] - most); };
+  for (size_t i = 0; i < logs.size(); ++i) {
+    const double mixed = (1 - 2 * share) * weight(i) + share * (weight(i == 0 ? 0 : i - 1) + weight(i + 1));
+    cells[i].add_log(most + std::log(std::max(mixed, 1e-300)) - logs[i]);
   }
 }
 

@@ -1,8 +1,11 @@
 // The places on a route where the train can be, one every metre: how well the turning fits there, with the sensor's
-// bias and the sway of the body that fit best.
+// bias and the sway of the body that fit best. The bias of a gyro may also have become another one at any time: as well
+// as that fits is kept beside, so that a gyro that has failed makes the track unknown and not a wrong one certain.
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -23,9 +26,23 @@ struct TurnErrors {
   void forget(Index error);
 };
 
+/// Logarithm of the sum of what two logarithms stand for.
+double log_sum(double a, double b);
+
+/// One way in which the errors may have come about.
+struct TurnFit {
+  double log_weight = -INFINITY;
+  TurnErrors errors{};
+};
+
 struct TurnCell {
-  double log_weight = 0;
-  TurnErrors errors;
+  TurnFit steady{0, {}};            // the bias is what it was
+  std::array<TurnFit, 3> jumped{};  // it has jumped since, each begun at another time
+  [[nodiscard]] double log_weight() const;
+  void add_log(double log);
+  void forget(TurnErrors::Index error);
+  /// Another sensor turns from now on.
+  void begin_sensor();
 };
 
 /// Turned over some way.
@@ -36,10 +53,11 @@ struct BinTurn {
   double bias_rad = 0;    // one sigma of the sensor's bias
   double bias_walk = 0;   // as in Turn
   double duration_s = 0;  // 0: not known
+  double jump_rad = 0;    // what one sigma of another bias has turned; 0: the sensor's does not jump
 };
 
-/// Logarithm of the sum of what two logarithms stand for.
-double log_sum(double a, double b);
+/// The bias may have jumped just now, with this chance: the least likely of the jumps that are followed makes room.
+void begin_jump(TurnCell& cell, const BinTurn& bin, double chance);
 
 /// Weighs the cells, of which the first is first_m along the route.
 void weigh_turn(std::vector<TurnCell>& cells, double first_m, const track::Route& route, const BinTurn& bin,

@@ -52,6 +52,12 @@ void add_options(CLI::App& app, measure::MatchingOptions& options) {
       ->needs(back);
   app.add_flag("--just-clear", options.just_clear,
                "switches: all trains set back to a metre before the points, which are thrown then, and go on");
+  auto* fault = app.add_option("--gyro-fault", options.gyro_fault,
+                               "switches: all trains have a gyro alone, which fails 40 m before the points")
+                    ->check(CLI::IsMember({"stuck", "bias", "noise"}));
+  app.add_option("--fault-rps", options.fault_rps, "... by this error, either way, or this noise of a sample")
+      ->check(tool::number_between(0, 1))
+      ->needs(fault);
   app.add_flag("--each", options.each, "A line for each ride that went wrong; locate: for every trip as it ends");
 }
 

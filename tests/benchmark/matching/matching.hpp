@@ -20,6 +20,8 @@ struct MatchingOptions {
   bool gnss = false;         // where GNSS alone finds the train, too (locate)
   double masts_mapped = 1;   // share of the masts that the map has (landmarks)
   bool just_clear = false;   // all trains set back to a metre before the points, which are thrown (switches)
+  std::string gyro_fault;    // all trains have a gyro alone that fails so 40 m before the points (switches)
+  double fault_rps = 0;      // ... by so much
   bool each = false;         // a line for each ride that went wrong
 };
 

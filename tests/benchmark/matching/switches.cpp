@@ -3,6 +3,8 @@
 #include <chrono>
 #include <cstdio>
 #include <iostream>
+#include <map>
+#include <string>
 
 #include "matching.hpp"
 #include "support/switch_passage.hpp"
@@ -70,6 +72,15 @@ void tell(int number, const testing::PassagePlan& plan, const testing::PassageRe
 
 testing::PassagePlan passage_of(core::Random& random, const MatchingOptions& options) {
   testing::PassagePlan plan = testing::random_passage(random);
+  static const std::map<std::string, testing::GyroFault> faults{{"", testing::GyroFault::none},
+                                                                {"stuck", testing::GyroFault::stuck},
+                                                                {"bias", testing::GyroFault::bias},
+                                                                {"noise", testing::GyroFault::noise}};
+  plan.gyro_fault = faults.at(options.gyro_fault);
+  if (plan.gyro_fault != testing::GyroFault::none) {
+    plan.camera = plan.frog_seen = false;
+    plan.gyro_fault_rps = (random.uniform() < 0.5 ? -1 : 1) * options.fault_rps;
+  }
   if (!options.just_clear) return plan;
   plan.facing = true;
   plan.manoeuvre = testing::Manoeuvre::just_clear;

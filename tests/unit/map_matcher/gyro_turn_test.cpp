@@ -4,13 +4,16 @@
 
 #include <cmath>
 
+#include "core/random.hpp"
+
 namespace railfix::map_matcher {
 namespace {
 
 constexpr int64_t kPeriodNs = 10'000'000;
 
+/// With some noise: a gyro that says the same again and again is stuck.
 void feed(GyroTurn& gyro, int64_t from_ns, int64_t to_ns, double rate_rps) {
-  for (int64_t t = from_ns; t <= to_ns; t += kPeriodNs) gyro.add(t, rate_rps);
+  for (int64_t t = from_ns; t <= to_ns; t += kPeriodNs) gyro.add(t, rate_rps + (t / kPeriodNs % 2 == 0 ? 1e-9 : -1e-9));
 }
 
 TEST(GyroTurn, SumsTheRatesBetweenAnyTwoMoments) {
@@ -35,6 +38,30 @@ TEST(GyroTurn, SaysNothingWhereSamplesAreMissing) {
   EXPECT_FALSE(gyro.between(500'000'000, 2'500'000'000)) << "over a gap";
   gyro.add(2'100'000'000, 0.02);  // the clock was set back
   EXPECT_FALSE(gyro.between(2'500'000'000, 2'900'000'000));
+}
+
+TEST(GyroTurn, AStuckGyroSaysNothingUntilItIsWellAgain) {
+  GyroTurn gyro({});
+  feed(gyro, kPeriodNs, 1'000'000'000, 0.02);
+  for (int64_t t = 1'000'000'000 + kPeriodNs; t <= 2'000'000'000; t += kPeriodNs) gyro.add(t, 0.03);
+  feed(gyro, 2'000'000'000 + kPeriodNs, 3'000'000'000, 0.02);
+  EXPECT_TRUE(gyro.between(500'000'000, 1'000'000'000));
+  EXPECT_FALSE(gyro.between(900'000'000, 1'100'000'000));
+  EXPECT_FALSE(gyro.between(1'501'000'000, 1'502'000'000)) << "between two samples";
+  EXPECT_FALSE(gyro.between(1'900'000'000, 2'100'000'000));
+  EXPECT_TRUE(gyro.between(2'100'000'000, 2'900'000'000));
+}
+
+TEST(GyroTurn, OneThatScattersMoreThanItShouldSaysLess) {
+  GyroTurn gyro({});
+  core::Random random(5);
+  const auto scatter = [&](int64_t from_ns, double sigma_rps) {
+    for (int64_t t = from_ns; t < from_ns + 3'000'000'000; t += kPeriodNs) gyro.add(t, sigma_rps * random.normal());
+    return gyro.between(from_ns + 2'000'000'000, from_ns + 2'900'000'000)->sigma_rad / std::sqrt(0.9);
+  };
+  EXPECT_NEAR(scatter(kPeriodNs, 0.01), 1e-3, 1e-9) << "as promised";
+  EXPECT_NEAR(scatter(3'000'000'000 + kPeriodNs, 0.1), 1e-2, 3e-3);
+  EXPECT_NEAR(scatter(6'000'000'000 + kPeriodNs, 0.01), 1e-3, 1e-9);
 }
 
 TEST(GyroTurn, LearnsItsErrorWhileTheTrainStandsAndForgetsItSlowly) {

@@ -196,7 +196,7 @@ TEST(Inputs, FixesGoOnWhateverOneCurvatureOrSightingWas) {
 TEST(Inputs, TheGyroGoesOnWhateverOneSampleWas) {
   for (const double none : kNone) {
     GyroTurn gyro({});
-    for (int i = 0; i < 200; ++i) gyro.add(i * 20'000'000LL, i == 100 ? none : 0.01);
+    for (int i = 0; i < 200; ++i) gyro.add(i * 20'000'000LL, i == 100 ? none : 0.01 + 1e-9 * i);
     const auto turn = gyro.between(120 * 20'000'000LL, 170 * 20'000'000LL);
     ASSERT_TRUE(turn);
     EXPECT_NEAR(turn->turn_rad, 0.01, 1e-6) << none;

@@ -163,9 +163,9 @@ TEST(TurnCells, JoinedOnesKnowSomethingThatCanBe) {
   for (int i = 0; i < 30; ++i) {
     weigh_turn(cells, 2.0 * i, route, bin, {});
     for (const TurnCell& of : cells) {
-      EXPECT_TRUE(std::isfinite(of.log_weight));
-      ASSERT_GT(of.errors.covariance.determinant(), 0) << i;
-      ASSERT_GT(of.errors.covariance(0, 0), 0) << i;
+      EXPECT_TRUE(std::isfinite(of.log_weight()));
+      ASSERT_GT(of.steady.errors.covariance.determinant(), 0) << i;
+      ASSERT_GT(of.steady.errors.covariance(0, 0), 0) << i;
     }
   }
 }
