@@ -20,12 +20,27 @@ constexpr double kLostAtLeastM = 100.0;
 constexpr double kLostAtMostM = 500.0;
 
 // Operators ask since when a sensor is distrusted.
-std::string since(const SensorWatch& watch) {
-  const int64_t second = watch.changed_ns / 1'000'000'000 % 86'400;
+std::string since(int64_t changed_ns) {
+  const int64_t second = changed_ns / 1'000'000'000 % 86'400;
   char text[32];
   std::snprintf(text, sizeof text, " since %02d:%02d:%02d UTC", static_cast<int>(second / 3600),
                 static_cast<int>(second / 60 % 60), static_cast<int>(second % 60));
   return text;
+}
+
+const char* what_of(GyroWatch::Fault fault) {
+  switch (fault) {
+    case GyroWatch::Fault::none:
+    case GyroWatch::Fault::absent:
+      break;
+    case GyroWatch::Fault::stuck:
+      return "the IMU's gyro is stuck";
+    case GyroWatch::Fault::scatters:
+      return "the IMU's gyro scatters";
+    case GyroWatch::Fault::contradicted:
+      return "the IMU's gyro turns otherwise than the camera";
+  }
+  return nullptr;
 }
 
 std::string why_given_up(Against because) {
@@ -179,27 +194,28 @@ void Estimator::judge_sensors(TrainEstimate& e) const {
   if (silent(Source::camera)) {
     e.degrade("no camera");
   } else if (camera.isolated) {
-    e.degrade("camera motion contradicts the other sensors" + since(camera));
+    e.degrade("camera motion contradicts the other sensors" + since(camera.changed_ns));
   } else if (camera.seen_ns != 0 && unused_for_s(Source::camera) > parameters_->sensor_timeout_s) {
     e.degrade("camera blind");
   }
   if (silent(Source::wheel)) {
     e.degrade("no wheel pulses");
   } else if (watch(Source::wheel).isolated) {
-    e.degrade("wheel slips or slides" + since(watch(Source::wheel)));
+    e.degrade("wheel slips or slides" + since(watch(Source::wheel).changed_ns));
   } else if (wheel_.scatters) {
     e.degrade("wheel readings scatter");
   }
   if (silent(Source::imu)) {
     e.degrade("no IMU");
   } else if (watch(Source::imu).isolated) {
-    e.degrade("IMU contradicts the other sensors" + since(watch(Source::imu)));
+    e.degrade("IMU contradicts the other sensors" + since(watch(Source::imu).changed_ns));
   }
+  if (const char* gyro = what_of(gyro_watch_.fault())) e.degrade(gyro + since(gyro_watch_.since_ns()));
 }
 
 void Estimator::judge_place(TrainEstimate& e) const {
   const auto& gnss = watch(Source::gnss);
-  if (gnss.isolated) e.degrade("GNSS contradicts the position" + since(gnss));
+  if (gnss.isolated) e.degrade("GNSS contradicts the position" + since(gnss.changed_ns));
   const bool turned_away = place_.track_doubt.turns_otherwise() && place_.wrong_place.is_no_position();
   e.place_in_doubt = gnss_denies_place() || turned_away || place_.wrong_place.lost();
   if (gnss_denies_place() || turned_away) e.integrity = Integrity::unusable;

@@ -13,6 +13,7 @@
 #include "fusion/felt_motion.hpp"
 #include "fusion/fusion_parameters.hpp"
 #include "fusion/fusion_types.hpp"
+#include "fusion/gyro_watch.hpp"
 #include "fusion/motion_filter.hpp"
 #include "fusion/odometer_scales.hpp"
 #include "fusion/slip_watch.hpp"
@@ -295,6 +296,8 @@ class Estimator {
   void take_wheel_back(int64_t stamp_ns, double wheel_m, double sigma_m);
   void recover_wheel(const WheelInput& sample, double wheel_m, double sigma_m);
   void use_yaw_rate(double rate_rps);
+  /// Whether it is believed.
+  bool judge_gyro(double rate_rps);
   void remember_turn(double rate_rps, double speed_mps);
   void compare_turns();
   /// What agrees with the place says whether it is the right track, too.
@@ -356,6 +359,8 @@ class Estimator {
   bool grade_known_ = true;
   double graded_m_ = 0;  // the distance up to which the bias allows for a grade that is not known
   Mean yaw_;
+  GyroWatch gyro_watch_;
+  double judged_m_ = 0;  // the distance up to which the gyro was judged
   Wheel wheel_;
   WheelNoise wheel_noise_;
   FeltMotion felt_;

@@ -36,6 +36,7 @@ void Estimator::use(const ImuInput& sample) {
   imu.seen_ns = sample.stamp_ns;
   accel_repeated_.add(sample.accel_x_mps2, sample.stamp_ns);
   const auto accel_mps2 = accel_.add(sample.stamp_ns, sample.accel_x_mps2, parameters_->imu_period_s);
+  gyro_watch_.add(sample.stamp_ns, sample.rate_z_rps);
   const auto rate_rps = yaw_.add(sample.stamp_ns, sample.rate_z_rps, parameters_->gyro_period_s);
   if (accel_mps2 || rate_rps) predict_to(sample.stamp_ns);
   if (accel_mps2) use_acceleration(*accel_mps2, sample.stamp_ns);
@@ -108,6 +109,10 @@ void Estimator::feel(double accel_mps2, double sigma_mps2, int64_t before_ns) {
 void Estimator::use_yaw_rate(double rate_rps) {
   const double speed_mps = filter_.speed_mps();
   const double speed_sigma_mps = filter_.sigma(StateIndex::speed);
+  if (!judge_gyro(rate_rps)) {
+    place_.turned_way.clear();
+    return;
+  }
   if (standstill_) {
     filter_.offer_yaw_rate(rate_rps, 0, 0, parameters_->gyro_sigma_rps, parameters_->gate_gyro);
     return;
@@ -126,6 +131,26 @@ void Estimator::use_yaw_rate(double rate_rps) {
   const bool bends = std::abs(speed_mps * point.curvature_per_m) > parameters_->gate_gyro * sigma_rps;
   place_.track_doubt.turned(offer.used, bends);
   compare_turns();
+}
+
+// At rest one with coarse steps says the same for long.
+bool Estimator::judge_gyro(double rate_rps) {
+  const double period_s = parameters_->gyro_period_s;
+  const double way_m = distance_m() - std::exchange(judged_m_, distance_m());
+  GyroWatch::Turned turned{period_s, way_m, rate_rps * period_s, parameters_->gyro_sigma_rps * period_s};
+  if (standstill_) {
+    gyro_watch_.rest(turned);
+    return gyro_watch_.fault() == GyroWatch::Fault::none || gyro_watch_.fault() == GyroWatch::Fault::contradicted;
+  }
+  if (place_.path && filter_.path_sigma_m() < kGyroPositionSigmaM) {
+    const auto point = place_.path->at(filter_.path_distance_m() - 0.5 * way_m);
+    turned.track_rad = point.curvature_per_m * way_m;
+  }
+  const bool was_believed = gyro_watch_.fault() == GyroWatch::Fault::none;
+  gyro_watch_.judge(turned, stamp_ns_);
+  const bool believed = gyro_watch_.fault() == GyroWatch::Fault::none;
+  if (was_believed && !believed) place_.track_doubt.changed();  // it has spoken against the track
+  return believed;
 }
 
 void Estimator::remember_turn(double rate_rps, double speed_mps) {

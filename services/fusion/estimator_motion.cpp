@@ -52,6 +52,7 @@ void Estimator::use(const PictureInput& picture) {
 
 void Estimator::use(const OdometryInput& step) {
   auto& camera = watched(Source::camera);
+  gyro_watch_.add(step);
   if (step.valid) doubt_time(camera, pictures_, step.stamp_ns);
   camera.seen_ns = step.stamp_ns;
   if (step.valid) {

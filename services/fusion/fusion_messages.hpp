@@ -20,7 +20,8 @@ static_assert(static_cast<uint8_t>(FixKind::track) == msg::FIX_TRACK);
 static_assert(static_cast<uint8_t>(FixKind::gnss) == msg::FIX_GNSS);
 
 inline OdometryInput input_of(const msg::OdometryStep& m) {
-  return {m.stamp_ns(), m.reference_stamp_ns(), m.step_m(), m.step_sigma_m(), messaging::has_measured(m)};
+  return {m.stamp_ns(), m.reference_stamp_ns(), m.step_m(), m.step_sigma_m(), messaging::has_measured(m),
+          m.yaw_rad(),  m.yaw_sigma_rad()};
 }
 /// Other places on the track that a fix says: ways of another length have led there.
 inline void hold_other_places(const msg::PositionFix& m, FixInput& fix) {

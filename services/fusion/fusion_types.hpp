@@ -20,7 +20,9 @@ struct OdometryInput {
   int64_t reference_stamp_ns = 0;
   double step_m = 0;
   double step_sigma_m = 0;
-  bool valid = false;  // false: blind, the step means nothing
+  bool valid = false;        // false: blind, the step means nothing
+  double yaw_rad = 0;        // turned meanwhile, left positive
+  double yaw_sigma_rad = 0;  // 0: not told
 };
 
 struct WheelInput {

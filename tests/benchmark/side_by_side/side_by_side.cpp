@@ -60,6 +60,22 @@ Ride in_the_dark(core::Random& random) {
   return ride;
 }
 
+/// The same with a gyro, which fails on the way there, in one of three ways, for a minute.
+Ride failing_gyro(core::Random& random) {
+  const StationPlan plan{.length_m = 4000, .crossovers = {{0, 1, 1000}}, .balise_every_m = 700};
+  const auto made = station(plan, random);
+  Ride ride = ride_over(plan, made, random.next());
+  ride.way = way_through(made, 0, 0.5, random);
+  ride.told = told_on(made, 0);
+  ride.dark = {{900, 1300}};
+  ride.gyro_fault = static_cast<GyroFault>(static_cast<int>(random.uniform(0, 3)));
+  const double bias_rps = (random.uniform() < 0.5 ? -1 : 1) * random.uniform(0.005, 0.1);
+  ride.gyro_fault_rps = ride.gyro_fault == GyroFault::noise ? random.uniform(0.01, 0.1) : bias_rps;
+  ride.gyro_fails.from_m = 1000 - random.uniform(-50, 200);
+  ride.gyro_fails.to_m = ride.gyro_fails.from_m + 60 * ride.speed_mps;
+  return ride;
+}
+
 /// Two to four tracks, a crossover every 300 to 1200 m, half of them taken, half of them dark; map_matcher begun anew.
 Ride anywhere(core::Random& random) {
   StationPlan plan{.tracks = 2 + static_cast<int>(random.uniform(0, 3)), .length_m = 8000, .balise_every_m = 700};
@@ -97,6 +113,7 @@ int measure(const Options& options) {
       {"told", [](core::Random& random) { return told(random, 0); }, true, 1.0},
       {"neighbour", [](core::Random& random) { return told(random, 1); }, false, 0, 0.2},
       {"dark", in_the_dark, true, 0.6},
+      {"gyro", failing_gyro, true, 0.2},
       {"anywhere", anywhere, true, 0.6},
   };
   bool failed = false;
@@ -129,7 +146,7 @@ int main(int argc, char** argv) {
   app.add_option("--seed", options.seed, "Other seeds, other stations and rides")->capture_default_str();
   app.add_option("--runs", options.runs, "Of every scenario")->check(CLI::Range(1, 1000000))->capture_default_str();
   app.add_option("--only", options.only, "One scenario")
-      ->check(CLI::IsMember({"told", "neighbour", "dark", "anywhere"}));
+      ->check(CLI::IsMember({"told", "neighbour", "dark", "gyro", "anywhere"}));
   app.add_flag("--each", options.each, "Print every run");
   return measure::run_tool(app, argc, argv, [&] { return measure::measure(options); });
 }

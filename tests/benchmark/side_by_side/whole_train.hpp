@@ -17,6 +17,9 @@ struct Stretch {
   double to_m = 0;
 };
 
+/// What a gyro does that has failed.
+enum class GyroFault : uint8_t { stuck, bias, noise };
+
 /// Distances are those of the way, from the begin of its first run.
 struct Ride {
   std::shared_ptr<const track::Map> map;
@@ -29,6 +32,9 @@ struct Ride {
   std::vector<Stretch> dark;         // nothing is seen there
   std::vector<double> matcher_anew;  // map_matcher is started anew there
   bool gyro = true;
+  GyroFault gyro_fault = GyroFault::stuck;
+  double gyro_fault_rps = 0;  // the bias, or the noise of a sample
+  Stretch gyro_fails;
   bool gnss = false;
   double detection = 0.95;
   uint64_t seed = 1;

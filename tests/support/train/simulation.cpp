@@ -17,7 +17,8 @@ constexpr double kPulseS = 0.05;
 constexpr double kInertialS = 0.02;
 constexpr double kPulsesPerMetre = 90;
 constexpr double kKeyFrameM = 0.15;
-constexpr double kShapeM = 500;  // a curve and the next err by themselves
+constexpr double kYawNoiseRad = 3e-4;  // of a step, as the camera measures it
+constexpr double kShapeM = 500;        // a curve and the next err by themselves
 // Of a scale, between trips of one train: the light and the track for a camera, load and temperature for a wheel.
 constexpr double kCameraTripChange = 2e-4;
 constexpr double kWheelTripChange = 5e-5;
@@ -256,19 +257,25 @@ void TrainSimulation::make_steps() {
   camera_scale_error = scale_error_of(plan_.visual_scale_error, kCameraTripChange, random, 10);
   const double scale = 1 + camera_scale_error;
   const double phase = random.uniform(0, 6);
+  auto yaw_random = stream(seed_, 19);
   double reference_s = 0;
   double seen_m = 0;  // way as the camera measures it
   double reference_m = 0;
+  double heading_rad = 0;
+  double reference_rad = 0;
   for (int i = 1; i * kPictureS <= duration_s(); ++i) {
     const double t = i * kPictureS;
     const double true_m = drive_.at(t).distance_m;
     const double wander = 1 + plan_.visual_wander * std::sin(phase + true_m / 3000);
     seen_m += (true_m - drive_.at(t - kPictureS).distance_m) / (scale * wander) * (1 + offset_of(Sensor::camera, t));
+    heading_rad += (true_m - drive_.at(t - kPictureS).distance_m) * curvature_at(true_m, t);
     const bool lost = random.uniform() < 0.01;
     const double times = faulty(Sensor::camera, FaultKind::noise, t) ? plan_.fault.size : 1;
     const double share = faulty(Sensor::camera, FaultKind::outliers, t) ? 0.3 : plan_.outlier_share;
     OdometryInput step{stamp_ns(t), stamp_ns(reference_s), seen_m - reference_m, plan_.step_noise_m, true};
     step.step_m += times * plan_.step_noise_m * random.normal();
+    step.yaw_rad = heading_rad - reference_rad + kYawNoiseRad * yaw_random.normal();
+    step.yaw_sigma_rad = kYawNoiseRad;
     const double sleeper = random.uniform() < 0.5 ? 0.6 : -0.6;
     if (random.uniform() < share) step.step_m += sleeper;
     if (faulty(Sensor::camera, FaultKind::stuck, t)) step.step_m = 0;
@@ -279,6 +286,7 @@ void TrainSimulation::make_steps() {
     if (dark || std::abs(seen_m - reference_m) > kKeyFrameM) {
       reference_s = t;
       reference_m = seen_m;
+      reference_rad = heading_rad;
     }
   }
 }

@@ -212,6 +212,41 @@ TEST(Coverage, TheSensorThatIsWrongIsFoundOut) {
   }
 }
 
+// It is named, while the camera sees or for how it fails, and no track is blamed for it; a gyro that is well never is.
+TEST(Coverage, AGyroThatIsWrongIsFoundOut) {
+  SimulationPlan plan = train::campaign_plan();
+  plan.blind_spells = false;
+  for (const train::Fault& fault : {train::Fault{}, train::Fault{Sensor::gyro, FaultKind::stuck, 60, 160, 1},
+                                    train::Fault{Sensor::gyro, FaultKind::bias, 60, 160, 0.05},
+                                    train::Fault{Sensor::gyro, FaultKind::bias, 60, 160, -0.2},
+                                    train::Fault{Sensor::gyro, FaultKind::noise, 60, 160, 10},
+                                    train::Fault{Sensor::gyro, FaultKind::outliers, 60, 160, 1}}) {
+    plan.fault = fault;
+    for (const uint64_t seed : {13'000'001, 13'000'002, 13'000'003}) {
+      const train::TrainSimulation simulation(plan, seed);
+      auto fusion = core::value_or_throw(Fusion::create({}, simulation.map, simulation.start()));
+      const int64_t begin_ns = stamp_of(simulation.arrivals.front().event);
+      size_t named = 0;
+      size_t states = 0;
+      const auto verdict = train::judge(simulation, fusion, 0, [&](const TrainEstimate& state, double) {
+        const double t_s = core::seconds(state.stamp_ns - begin_ns);
+        const bool names = state.reason.find("IMU's gyro") != std::string::npos;
+        EXPECT_TRUE(!names || fault.sensor == Sensor::gyro) << t_s << " s: " << state.reason;
+        if (t_s < 80 || t_s > 160 || state.speed_mps < 5) return;
+        ++states;
+        named += names ? 1 : 0;
+        if (fault.sensor != Sensor::gyro) return;
+        EXPECT_EQ(state.reason.find("turns otherwise than this track"), std::string::npos) << train::to_string(fault.kind) << " " << fault.size << ", " << seed << ", " << t_s << " s: " << state.reason;
+      });
+      EXPECT_EQ(verdict.outside, 0U);
+      if (fault.sensor == Sensor::gyro) {
+        EXPECT_GT(static_cast<double>(named), 0.8 * static_cast<double>(states))
+            << train::to_string(fault.kind) << " " << fault.size << ", " << seed;
+      }
+    }
+  }
+}
+
 // Nothing is known before it, so that no gate refuses it.
 TEST(Coverage, TheFirstStepMayCountASleeperTooMany) {
   auto fusion = core::value_or_throw(Fusion::create({}, nullptr, std::nullopt));

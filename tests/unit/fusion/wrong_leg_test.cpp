@@ -37,7 +37,8 @@ class WrongLeg : public testing::Test {
     std::optional<TrainEstimate> last;
     for (int i = 1; from_s + i * 0.02 <= to_s + 1e-9; ++i) {
       const double t_s = from_s + i * 0.02;
-      fusion_.add(ImuInput{at(t_s), 0, 20 * curvature_per_m});
+      const double noise_rps = i % 2 == 0 ? 1e-4 : -1e-4;
+      fusion_.add(ImuInput{at(t_s), 0, 20 * curvature_per_m + noise_rps});
       if (auto state = fusion_.add(step_at(t_s, 20))) last = state;
     }
     return last.value_or(TrainEstimate{});

@@ -50,7 +50,8 @@ class WrongStart : public testing::Test {
     fusion_.add(*place);
   }
   void feel(double rate_rps) {
-    for (int i = 0; i < 50; ++i) fusion_.add(ImuInput{at(t_s_ + 0.02 * i + 0.01), 0.01 * (i % 3), rate_rps});
+    for (int i = 0; i < 50; ++i)
+      fusion_.add(ImuInput{at(t_s_ + 0.02 * i + 0.01), 0.01 * (i % 3), rate_rps + (i % 2 == 0 ? 1e-4 : -1e-4)});
   }
 
   Fusion fusion_ = fusion_at(900);
