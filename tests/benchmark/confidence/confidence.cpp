@@ -30,6 +30,7 @@ struct Arguments {
   std::string start;
   double max_kmh = 150;
   double sudden_mps2 = 0;
+  double back_kmh = 0;
   int64_t run = -1;
   int position = 0;
   std::string row;
@@ -200,6 +201,8 @@ void add_options(CLI::App& app, Arguments& a) {
   app.add_option("--sudden", a.sudden_mps2,
                  "Accelerate and brake so hard (m/s2), from one moment to the next; 0: gently")
       ->check(tool::number_between(0, 10));
+  app.add_option("--back-kmh", a.back_kmh, "The trains set back now and then, so fast at most; 0: they never do")
+      ->check(tool::number_between(0, 160));
   app.add_option("--landmarks-m", s.landmark_spacing_m, "Mean distance of landmarks, 0 = none")
       ->check(tool::number_between(0, 1e6))
       ->capture_default_str();
@@ -247,6 +250,7 @@ void fill_plan(Arguments& a) {
   a.plan.faults = faults_named(a.fault);
   s.max_speed_mps = a.max_kmh / 3.6;
   if (a.sudden_mps2 > 0) s.style = DriveStyle::sudden(a.sudden_mps2);
+  s.style.back_mps = core::mps_from_kmh(a.back_kmh);
   leave_out(s, a.without);
   if (s.sightings) s.landmark_spacing_m = 0;
   if (a.saved_wrong >= 0) a.plan.saved_wrong = a.saved_wrong;

@@ -121,6 +121,42 @@ class Factors {
   UdFilter filter_{variances()};
 };
 
+/// As fusion has it: clones for pictures to come in front of the states, older ones forgotten, scales and biases
+/// doubted, a place that is lost and begun anew.
+class ClonedFactors {
+ public:
+  void cycle(uint64_t k) {
+    StateMatrix phi = StateMatrix::Identity(size(), size());
+    phi.bottomRightCorner(kStates, kStates) = phi_;
+    StateMatrix g = StateMatrix::Zero(size(), kStates);
+    g.bottomRows(kStates).setIdentity();
+    filter_.propagate(phi, g, q_);
+    const auto [own, r] = measurement(k);
+    StateVector h = StateVector::Zero(size());
+    h.tail(kStates) = own;
+    if (clones() > 0 && k % 3 == 1) {  // the way since the reference picture
+      h.setZero();
+      h[static_cast<int>(k / 3) % clones()] = -1;
+      h[clones() + at(StateIndex::camera_odometer)] = 1;
+    }
+    filter_.update(h, 0, r);
+    if (k % 5 == 0) filter_.clone_to_front(clones() + at(StateIndex::camera_odometer));
+    if (clones() > kMostClones) filter_.marginalise(static_cast<int>(k / 5) % clones());
+    if (k % 1000 == 500) filter_.inflate(clones() + at(StateIndex::accel_bias), 1e-2);
+    if (k % 20000 == 10000) filter_.reset(clones() + at(StateIndex::origin), 3600);
+  }
+  [[nodiscard]] double variance(int state) const { return filter_.variance(clones() + state); }
+  [[nodiscard]] bool healthy() const { return filter_.u().allFinite() && (filter_.d().array() >= 0).all(); }
+
+ private:
+  static constexpr int kMostClones = 4;
+  [[nodiscard]] int size() const { return filter_.size(); }
+  [[nodiscard]] int clones() const { return size() - kStates; }
+  StateMatrix phi_ = transition();
+  StateVector q_ = noise();
+  UdFilter filter_{variances()};
+};
+
 template <class Filter>
 void run(const char* name, uint64_t updates) {
   Filter filter;
@@ -151,6 +187,7 @@ int main(int argc, char** argv) {
   return railfix::measure::run_tool(app, argc, argv, [&] {
     std::printf("%llu updates, %d states\n", static_cast<unsigned long long>(updates), kStates);
     run<Factors>("U-D factors, double", updates);
+    run<ClonedFactors>("... with clones", updates);
     run<Full<double, true>>("Joseph, double", updates);
     run<Full<double, false>>("naive, double", updates);
     run<Full<float, true>>("Joseph, float", updates);

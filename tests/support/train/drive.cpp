@@ -7,6 +7,14 @@ namespace railfix::train {
 namespace {
 
 constexpr double kTickS = 0.05;
+constexpr double kRoomM = 60;  // kept in front of where a train began that sets back
+
+double new_target(core::Random& random, double max_speed_mps, const DriveStyle& style) {
+  const double luck = random.uniform();
+  if (luck < 0.25) return 0;
+  if (style.back_mps > 0 && luck < 0.6) return -random.uniform(0.5, style.back_mps);
+  return random.uniform(3, max_speed_mps);
+}
 
 }  // namespace
 
@@ -19,15 +27,19 @@ Drive::Drive(core::Random& random, double duration_s, double max_speed_mps, doub
   for (int i = 0; i * kTickS <= duration_s + 1; ++i) {
     samples_.push_back({distance, speed, accel});
     if (i * kTickS > change_s) {
-      target = random.uniform() < 0.25 ? 0 : random.uniform(3, max_speed_mps);
+      target = new_target(random, max_speed_mps, style);
       change_s += random.uniform(10, 40);
     }
-    const double left_m = max_way_m - distance - 5;
-    if (speed * speed / (2 * 0.6 * style.brake_mps2) + 3 * speed > left_m) target = 0;
-    const double wanted = std::clamp(style.gain_per_s * (target - speed), -style.brake_mps2, style.traction_mps2);
+    const bool backs = speed < 0 || (speed == 0 && target < 0);
+    const double left_m = backs ? distance - kRoomM : max_way_m - distance - 5;
+    if (speed * speed / (2 * 0.6 * style.brake_mps2) + 3 * std::abs(speed) > left_m) target = 0;
+    const double wanted =
+        std::clamp(style.gain_per_s * (target - speed), backs ? -style.traction_mps2 : -style.brake_mps2,
+                   backs ? style.brake_mps2 : style.traction_mps2);
     accel += std::clamp(wanted - accel, -style.jerk_mps3 * kTickS, style.jerk_mps3 * kTickS);
     const double before = speed;
-    speed = std::max(0.0, speed + accel * kTickS);
+    speed += accel * kTickS;
+    if (before * speed < 0 || (before == 0 && target == 0) || (speed < 0 && style.back_mps == 0)) speed = 0;
     if (speed == 0) accel = 0;
     distance += 0.5 * (before + speed) * kTickS;
   }

@@ -257,7 +257,7 @@ void TrainSimulation::make_steps() {
   camera_scale_error = scale_error_of(plan_.visual_scale_error, kCameraTripChange, random, 10);
   const double scale = 1 + camera_scale_error;
   const double phase = random.uniform(0, 6);
-  auto yaw_random = stream(seed_, 19);
+  auto yaw_random = stream(seed_, 21);
   double reference_s = 0;
   double seen_m = 0;  // way as the camera measures it
   double reference_m = 0;
