@@ -48,10 +48,11 @@ class Judge {
   }
 
   /// Fusion counts its way from the first measurement on, the ride from its own beginning.
-  void begin_with(const fusion::Event& first) {
-    const auto* step = std::get_if<fusion::OdometryInput>(&first);
-    const int64_t begin_ns = fusion::stamp_of(first);
-    counted_from_m_ = simulation_.truth_at(step ? std::min(step->reference_stamp_ns, begin_ns) : begin_ns).distance_m;
+  void begin_with(const Arrival& first) {
+    const auto* step = std::get_if<fusion::OdometryInput>(&first.event);
+    const int64_t stamp_ns = fusion::stamp_of(first.event);
+    const int64_t begin_ns = step ? std::min(step->reference_stamp_ns, stamp_ns) : stamp_ns;
+    counted_from_m_ = simulation_.truth_at(begin_ns, first.arrival_s).distance_m;
   }
 
   void see(const fusion::TrainEstimate& state, double arrival_s) {
@@ -166,7 +167,7 @@ Verdict judge(const TrainSimulation& simulation, fusion::Fusion& fusion, double 
       *fix = simulation.said_of_track(*fix, judge.error_m(), arrival.arrival_s);
     const auto state = fusion.add(event);
     if (!began && fusion.estimator() != nullptr) {
-      judge.begin_with(event);
+      judge.begin_with(arrival);
       began = true;
     }
     if (!state) continue;
