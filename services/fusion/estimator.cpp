@@ -57,6 +57,7 @@ void Estimator::rebase_clock(int64_t stamp_ns) {
   }
   accel_ = {};
   yaw_ = {};
+  gyro_watch_.set_clock(stamp_ns);
   wheel_.blocks.clear();
   wheel_.window_begin_ns = 0;
   wheel_.counts_since_ns = std::min(wheel_.counts_since_ns, stamp_ns);
@@ -164,7 +165,10 @@ void Estimator::exclude(Source source, const Estimator& other) {
   watched(source).convicted = true;
   slip_began_ = false;
   if (source == Source::camera) pictures_ = other.pictures_;
-  if (source == Source::imu) accel_repeated_ = other.accel_repeated_;
+  if (source == Source::imu) {
+    accel_repeated_ = other.accel_repeated_;
+    gyro_watch_ = other.gyro_watch_;
+  }
   if (source != Source::wheel) return;
   pulses_ = other.pulses_;
   wheel_ = other.wheel_;

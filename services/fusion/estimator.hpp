@@ -10,6 +10,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/time.hpp"
 #include "fusion/felt_motion.hpp"
 #include "fusion/fusion_parameters.hpp"
 #include "fusion/fusion_types.hpp"
@@ -173,6 +174,7 @@ class Estimator {
     int64_t last_ns = 0;
     double sum = 0;
     int count = 0;
+    [[nodiscard]] bool begins(int64_t stamp_ns) const { return count == 0 || core::seconds(stamp_ns - last_ns) > 0.5; }
     std::optional<double> add(int64_t stamp_ns, double value, double period_s);
   };
   /// The wheel's odometer and its recovery from slip.
@@ -360,7 +362,7 @@ class Estimator {
   double graded_m_ = 0;  // the distance up to which the bias allows for a grade that is not known
   Mean yaw_;
   GyroWatch gyro_watch_;
-  double judged_m_ = 0;  // the distance up to which the gyro was judged
+  double judged_m_ = 0;  // the distance at which its mean began
   Wheel wheel_;
   WheelNoise wheel_noise_;
   FeltMotion felt_;

@@ -21,7 +21,7 @@ constexpr double kTurnSigmasOfTwo = 2.0;  // without the worst second
 }  // namespace
 
 std::optional<double> Estimator::Mean::add(int64_t stamp_ns, double value, double period_s) {
-  if (count == 0 || core::seconds(stamp_ns - last_ns) > 0.5) *this = {stamp_ns, stamp_ns, 0, 0};
+  if (begins(stamp_ns)) *this = {stamp_ns, stamp_ns, 0, 0};
   last_ns = stamp_ns;
   sum += value;
   ++count;
@@ -36,6 +36,10 @@ void Estimator::use(const ImuInput& sample) {
   imu.seen_ns = sample.stamp_ns;
   accel_repeated_.add(sample.accel_x_mps2, sample.stamp_ns);
   const auto accel_mps2 = accel_.add(sample.stamp_ns, sample.accel_x_mps2, parameters_->imu_period_s);
+  if (yaw_.begins(sample.stamp_ns)) {
+    gyro_watch_.begin_period();
+    judged_m_ = distance_m();
+  }
   gyro_watch_.add(sample.stamp_ns, sample.rate_z_rps);
   const auto rate_rps = yaw_.add(sample.stamp_ns, sample.rate_z_rps, parameters_->gyro_period_s);
   if (accel_mps2 || rate_rps) predict_to(sample.stamp_ns);
@@ -136,7 +140,7 @@ void Estimator::use_yaw_rate(double rate_rps) {
 // At rest one with coarse steps says the same for long.
 bool Estimator::judge_gyro(double rate_rps) {
   const double period_s = parameters_->gyro_period_s;
-  const double way_m = distance_m() - std::exchange(judged_m_, distance_m());
+  const double way_m = distance_m() - judged_m_;
   GyroWatch::Turned turned{period_s, way_m, rate_rps * period_s, parameters_->gyro_sigma_rps * period_s};
   if (standstill_) {
     gyro_watch_.rest(turned);

@@ -8,12 +8,15 @@
 namespace railfix::fusion {
 namespace {
 
-constexpr int kRepeats = 10;          // and for ...
-constexpr double kRepeatsS = 0.15;    // ... so long a train that runs never turns alike
+constexpr int kRepeats = 10;
+constexpr double kRepeatsS = 1.0;     // a train that runs never turns alike for so long, in steps however coarse
+constexpr double kRunsM = 1.0;        // less in a period may be a train that has just stopped
 constexpr double kSeenShare = 0.8;    // of a period by the camera
 constexpr double kTurnShare = 0.1;    // of a turn: the ends of the period are not those of the pictures
 constexpr double kCameraPerM = 1e-4;  // the camera turns too far or too little by so much a metre, lastingly
 constexpr double kBiasWalk = 5e-5;    // rad/s per square root of a second
+constexpr double kNoBiasRps = 1e-2;   // what nobody knows of it
+constexpr double kForgetS = 60.0;     // while it is contradicted: a new bias that lasts is one as well
 constexpr double kSigmas = 4.0;
 constexpr size_t kLeastPieces = 3;
 constexpr int kWell = 12;
@@ -47,22 +50,25 @@ void GyroWatch::add(const OdometryInput& step) {
 }
 
 void GyroWatch::judge(const Turned& turned, int64_t stamp_ns) {
-  const Fault now = fault_now(turned);
+  const auto now = fault_now(turned);
   begin_period();
+  if (!now) return;
   well_ = now == Fault::none ? well_ + 1 : 0;
   if (now != Fault::none && fault_ == Fault::none) since_ns_ = stamp_ns;
-  if (now != Fault::none || well_ >= kWell) fault_ = now;
+  if (now != Fault::none || well_ >= kWell) fault_ = *now;
 }
 
-GyroWatch::Fault GyroWatch::fault_now(const Turned& turned) {
+// Nothing where a fault that was found could not be seen.
+std::optional<GyroWatch::Fault> GyroWatch::fault_now(const Turned& turned) {
   if (!has_turned_) return Fault::absent;
-  if (repeats_ >= kRepeats && core::seconds(last_ns_ - repeats_since_ns_) >= kRepeatsS) return Fault::stuck;
+  if (repeats_ >= kRepeats && core::seconds(last_ns_ - repeats_since_ns_) >= kRepeatsS)
+    return std::abs(turned.way_m) > kRunsM ? std::optional(Fault::stuck) : std::nullopt;
   // Of the mean of the samples, from how they differ from each other.
   const double scatter_rad = samples_ > 0 ? std::sqrt(0.5 * squares_) / samples_ * turned.time_s : 0;
   if (scatter_rad > turned.sigma_rad) return Fault::scatters;
   if (camera_s_ < kSeenShare * turned.time_s) {
     count_ = 0;
-    return Fault::none;
+    return fault_ == Fault::contradicted ? std::nullopt : std::optional(Fault::none);
   }
   const double camera_rad = camera_rad_ * turned.time_s / camera_s_;
   std::shift_right(pieces_.begin(), pieces_.end(), 1);
@@ -72,14 +78,20 @@ GyroWatch::Fault GyroWatch::fault_now(const Turned& turned) {
                 turned.sigma_rad * turned.sigma_rad + camera_variance_ + ends_rad * ends_rad, turned.way_m,
                 turned.time_s};
   if (turned.track_rad) pieces_[0].gyro_from_track_rad = turned.gyro_rad - *turned.track_rad;
-  if (contradicted()) return Fault::contradicted;
+  if (contradicted()) {
+    bias_variance_ =
+        std::min(bias_variance_ + kNoBiasRps * kNoBiasRps * turned.time_s / kForgetS, kNoBiasRps * kNoBiasRps);
+    return Fault::contradicted;
+  }
   learn_bias(pieces_[0].gyro_from_camera_rad, pieces_[0].variance, turned.time_s);
   return Fault::none;
 }
 
+// Who is stuck at rest says nothing of its bias, and what was judged before has another one.
 void GyroWatch::rest(const Turned& turned) {
   begin_period();
-  learn_bias(turned.gyro_rad, turned.sigma_rad * turned.sigma_rad, turned.time_s);
+  count_ = 0;
+  if (repeats_ < kRepeats) learn_bias(turned.gyro_rad, turned.sigma_rad * turned.sigma_rad, turned.time_s);
 }
 
 void GyroWatch::learn_bias(double turned_rad, double variance, double time_s) {
@@ -112,6 +124,14 @@ bool GyroWatch::contradicted() const {
     if (apart && (!track_known || 2 * std::abs(from_track_rad) > std::abs(from_camera_rad))) return true;
   }
   return false;
+}
+
+void GyroWatch::set_clock(int64_t stamp_ns) {
+  begin_period();
+  count_ = 0;
+  repeats_ = 0;
+  step_.reset();
+  since_ns_ = std::min(since_ns_, stamp_ns);
 }
 
 void GyroWatch::begin_period() {

@@ -1,5 +1,5 @@
-// Is the gyro to be believed? One that is stuck, that scatters, or that turns otherwise than the camera where the
-// camera turns as the track does, has failed: what it says speaks for no track and against none.
+// Is the gyro to be believed? One that is stuck, that scatters, or that turns otherwise than the camera and no nearer
+// to the track has failed: what it says speaks for no track and against none.
 #pragma once
 
 #include <array>
@@ -30,6 +30,9 @@ class GyroWatch {
   void judge(const Turned& turned, int64_t stamp_ns);
   /// The train stood: what has turned is the bias.
   void rest(const Turned& turned);
+  /// What came so far belongs to no period: samples were missing.
+  void begin_period();
+  void set_clock(int64_t stamp_ns);
   [[nodiscard]] Fault fault() const { return fault_; }
   [[nodiscard]] int64_t since_ns() const { return since_ns_; }
 
@@ -42,9 +45,8 @@ class GyroWatch {
     double way_m = 0;
     double time_s = 0;
   };
-  [[nodiscard]] Fault fault_now(const Turned& turned);
+  [[nodiscard]] std::optional<Fault> fault_now(const Turned& turned);
   [[nodiscard]] bool contradicted() const;
-  void begin_period();
   void learn_bias(double turned_rad, double variance, double time_s);
 
   static constexpr size_t kMost = 12;

@@ -144,7 +144,7 @@ std::string MapMatcher::placeless() const {
 void MapMatcher::stand(int64_t from_ns, int64_t to_ns) {
   if (!chooser_ || chooser_->sensor() != TurnSensor::gyro) {
     gyro_.stood(from_ns, to_ns);
-  } else if (const auto turn = gyro_.between(from_ns, to_ns)) {
+  } else if (const auto turn = gyro_.at_rest(from_ns, to_ns)) {
     chooser_->stand(*turn);
   }
 }

@@ -23,7 +23,7 @@ constexpr double kSurelyMovesMps = 1.0;
 constexpr int64_t kTrainborneStepNs = 10'000'000;  // T_TRAIN
 constexpr double kNoCorrectionM = 2.0;
 constexpr double kMovesM = 0.05;     // what fusion takes for rest
-constexpr double kNoCreepM = 0.02;   // from one state of a train at rest to the next: its place was corrected
+constexpr double kCreepsM = 0.045;   // at most while it rests
 constexpr double kCorrectionM = 20;  // a distance may be corrected by so much, and by what it was not sure of
 
 /// Empty when the position is young enough.
@@ -85,8 +85,7 @@ void TprPublisher::follow(const TrainPosition& position) {
   }
   const auto position_before = std::exchange(position_, position);
   const auto* group_before = reference_ ? reference_->group : nullptr;
-  const bool rests = position_before && position_before->standstill && position.standstill;
-  follow_motion(position, rests ? position.distance_m - position_before->distance_m : 0);
+  follow_motion(position, position_before);
   if (tracker_) {
     if (position.place_known()) {
       tracker_->update(position.foot, position.track_declared(), heard);
@@ -110,14 +109,19 @@ void TprPublisher::follow(const TrainPosition& position) {
   }
 }
 
-void TprPublisher::follow_motion(const TrainPosition& position, double moved_at_rest_m) {
+void TprPublisher::follow_motion(const TrainPosition& position, const std::optional<TrainPosition>& before) {
   if (!furthest_m_ || std::isnan(position.speed_mps)) {
     motion_ = Motion::unknown;
     furthest_m_ = position.distance_m;
   }
   rested_ = rested_ || position.standstill;
   if (position.standstill && motion_ != Motion::unknown) {
-    if (std::abs(moved_at_rest_m) > kNoCreepM) *furthest_m_ += moved_at_rest_m;
+    // What the distance is corrected by at rest is no way: what the speed does not explain, and more than it may creep.
+    if (before && before->standstill) {
+      const double crept_m = position.speed_mps * core::seconds(position.stamp_ns - before->stamp_ns);
+      *furthest_m_ += position.distance_m - before->distance_m - crept_m;
+      furthest_m_ = std::clamp(*furthest_m_, position.distance_m - kCreepsM, position.distance_m + kCreepsM);
+    }
     return;
   }
   const double moved_m = position.distance_m - *furthest_m_;

@@ -80,7 +80,7 @@ class TprPublisher {
 
  private:
   void follow(const TrainPosition& position);
-  void follow_motion(const TrainPosition& position, double moved_at_rest_m);
+  void follow_motion(const TrainPosition& position, const std::optional<TrainPosition>& before);
   void hear_cab(ActiveCab cab);
   [[nodiscard]] bool is_turned() const { return cab_ == ActiveCab::other; }
   /// With the doubt of an undeclared track; along the train's own axis, as the ones below.

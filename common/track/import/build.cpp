@@ -181,9 +181,11 @@ class Sources {
   }
 
   void take(OsmData read) {
+    osm_.nodes.merge(read.nodes);
+    // GeoJSON has lines in one file and points in another.
     for (auto& [id, node] : read.nodes) {
-      const auto [known, is_new] = osm_.nodes.try_emplace(id, node);
-      if (!is_new) known->second.tags.merge(node.tags);  // GeoJSON has lines in one file and points in another
+      OsmNode& known = osm_.nodes.at(id);
+      if (known.tags.empty()) known.tags = std::move(node.tags);
     }
     std::move(read.ways.begin(), read.ways.end(), std::back_inserter(osm_.ways));
     std::move(read.bridges.begin(), read.bridges.end(), std::back_inserter(osm_.bridges));

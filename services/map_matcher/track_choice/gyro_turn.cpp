@@ -10,7 +10,9 @@ namespace railfix::map_matcher {
 namespace {
 
 constexpr double kHistoryS = 10.0;
-constexpr int kStuckRepeats = 4;     // noise never does that on a train that runs
+constexpr int kStuckRepeats = 9;  // and for ...
+constexpr double kStuckS = 0.15;  // ... so long the same, which a train that runs never feels
+constexpr double kLeastBiasRps = 1e-6;
 constexpr double kScatterS = 0.5;    // over which the scatter is taken
 constexpr double kScattersMore = 2;  // of the variance that is promised: a body's vibration is no noise
 
@@ -35,16 +37,21 @@ void GyroTurn::add(int64_t stamp_ns, double rate_rps) {
 void GyroTurn::watch(int64_t stamp_ns, double rate_rps) {
   if (samples_.size() < 2) {
     repeats_ = 0;
+    repeats_since_ns_ = stamp_ns;
     scatter_ = 0;
   } else {
     const double dt_s = core::seconds(stamp_ns - samples_[samples_.size() - 2].stamp_ns);
     const double step_rps = rate_rps - rate_rps_;
     scatter_ += (0.5 * step_rps * step_rps * dt_s - scatter_) * std::min(1.0, dt_s / kScatterS);
     repeats_ = step_rps == 0 ? repeats_ + 1 : 0;
+    if (repeats_ == 0) repeats_since_ns_ = stamp_ns;
   }
   rate_rps_ = rate_rps;
-  const size_t stuck = repeats_ < kStuckRepeats ? 0 : std::min<size_t>(samples_.size(), kStuckRepeats + 1);
-  for (size_t i = samples_.size() - stuck; i < samples_.size(); ++i) samples_[i].is_stuck = true;
+  if (repeats_ < kStuckRepeats || core::seconds(stamp_ns - repeats_since_ns_) < kStuckS) return;
+  for (auto sample = samples_.rbegin(); sample != samples_.rend() && !sample->is_stuck; ++sample) {
+    if (sample->stamp_ns < repeats_since_ns_) break;
+    sample->is_stuck = true;
+  }
 }
 
 bool GyroTurn::is_stuck(int64_t from_ns, int64_t to_ns) const {
@@ -77,25 +84,32 @@ double GyroTurn::bias_variance_at(int64_t stamp_ns) const {
 }
 
 std::optional<Turn> GyroTurn::between(int64_t from_ns, int64_t to_ns) const {
+  auto turn = at_rest(from_ns, to_ns);
+  if (turn && is_stuck(from_ns, to_ns)) turn.reset();
+  return turn;
+}
+
+// One with coarse steps says the same for long.
+std::optional<Turn> GyroTurn::at_rest(int64_t from_ns, int64_t to_ns) const {
   const auto from = heading_at(from_ns);
   const auto to = heading_at(to_ns);
-  if (!from || !to || to_ns <= from_ns || is_stuck(from_ns, to_ns)) return std::nullopt;
+  if (!from || !to || to_ns <= from_ns) return std::nullopt;
   const double dt_s = core::seconds(to_ns - from_ns);
   const double promised = parameters_.noise_rad * parameters_.noise_rad;
   Turn turn;
   turn.turn_rad = *to - *from - bias_rps_ * dt_s;
   turn.sigma_rad = std::sqrt((scatter_ > kScattersMore * promised ? scatter_ : promised) * dt_s);
   turn.jump_rad = parameters_.jump_rps * dt_s;
-  const double bias_variance = bias_variance_at(to_ns);
+  const double bias_variance = std::max(bias_variance_at(to_ns), kLeastBiasRps * kLeastBiasRps);
   turn.bias_rad = std::sqrt(bias_variance) * dt_s;
-  if (bias_variance > 0) turn.bias_walk = parameters_.bias_walk_rps * parameters_.bias_walk_rps * dt_s / bias_variance;
+  turn.bias_walk = parameters_.bias_walk_rps * parameters_.bias_walk_rps * dt_s / bias_variance;
   turn.sensor = TurnSensor::gyro;
   turn.duration_s = dt_s;
   return turn;
 }
 
 void GyroTurn::stood(int64_t from_ns, int64_t to_ns) {
-  const auto turn = between(from_ns, to_ns);
+  const auto turn = at_rest(from_ns, to_ns);
   if (!turn) return;
   const double dt_s = core::seconds(to_ns - from_ns);
   const double prior = bias_variance_at(to_ns);

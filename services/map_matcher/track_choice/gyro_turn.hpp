@@ -26,6 +26,8 @@ class GyroTurn {
   void add(int64_t stamp_ns, double rate_rps);
   /// The turn between two moments, without its way; nothing where samples are missing or the gyro is stuck.
   [[nodiscard]] std::optional<Turn> between(int64_t from_ns, int64_t to_ns) const;
+  /// The same for a train that stands, whose gyro may be taken for stuck.
+  [[nodiscard]] std::optional<Turn> at_rest(int64_t from_ns, int64_t to_ns) const;
   /// The train stood between two moments: whatever turned is the gyro's own error.
   void stood(int64_t from_ns, int64_t to_ns);
 
@@ -44,7 +46,8 @@ class GyroTurn {
   std::deque<Sample> samples_;
   double rate_rps_ = 0;  // of the last sample
   int repeats_ = 0;      // of that rate, one behind the other
-  double scatter_ = 0;   // variance of the heading after a second, as the samples differ from each other
+  int64_t repeats_since_ns_ = 0;
+  double scatter_ = 0;  // variance of the heading after a second, as the samples differ from each other
   double bias_rps_ = 0;
   std::optional<double> bias_variance_;  // at learnt_ns_; nothing before the first learning
   int64_t learnt_ns_ = 0;

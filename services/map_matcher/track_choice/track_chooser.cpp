@@ -1,6 +1,7 @@
 #include "map_matcher/track_choice/track_chooser.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 
@@ -104,6 +105,7 @@ bool TrackChooser::stands_near(const track::EdgePosition& place) const {
 void TrackChooser::move(const Turn& turn) {
   if (hypotheses_.empty() || !has_sense(turn)) return;
   if (turn.sensor != sensor_) {
+    if (pending_.way_m != 0) use_pending();
     sensor_ = turn.sensor;
     for (auto& hypothesis : hypotheses_) {
       for (auto& cell : hypothesis.cells) cell.begin_sensor();
@@ -133,7 +135,8 @@ void TrackChooser::run(double way_m) {
 void TrackChooser::stand(const Turn& turn) {
   if (turn.sensor != sensor_ || !has_sense(turn) || !(turn.sigma_rad > 0)) return;
   const BinTurn stood{
-      0, turn.turn_rad, turn.sigma_rad * turn.sigma_rad, turn.bias_rad, turn.bias_walk, turn.duration_s};
+      0, turn.turn_rad, turn.sigma_rad * turn.sigma_rad, turn.bias_rad, turn.bias_walk, turn.duration_s, turn.jump_rad};
+  watch_for_jump(stood);
   for (auto& hypothesis : hypotheses_) {
     for (auto& cell : hypothesis.cells) weigh_stand(cell, stood, parameters_);
   }
@@ -143,6 +146,7 @@ void TrackChooser::move_blind(double way_m) {
   if (hypotheses_.empty() || !has_sense(Turn{way_m})) return;
   cells_m_ += pending_.way_m + way_m;
   pending_ = {};
+  watched_s_ = INFINITY;
   run(way_m);
   for (auto& hypothesis : hypotheses_) {
     spread(hypothesis.cells, way_m);
@@ -170,14 +174,23 @@ void TrackChooser::use_pending() {
   prune();
 }
 
-// Before it was looked to for the first time nobody has watched the sensor.
+// Before it was looked to for the first time, or while it said nothing, nobody has watched the sensor. The least likely
+// of the jumps that are followed makes room.
 void TrackChooser::watch_for_jump(const BinTurn& bin) {
   watched_s_ += bin.duration_s;
   watched_m_ += std::abs(bin.way_m);
   if (!(bin.jump_rad > 0) || (watched_s_ < kJumpEveryS && watched_m_ < kJumpEveryM)) return;
   const double chance = std::isinf(watched_s_) ? kJumpedBefore : kJumpsPerS * watched_s_;
+  std::array<double, std::tuple_size_v<decltype(TurnCell::fits)>> logs;
+  logs.fill(-INFINITY);
+  for (const auto& hypothesis : hypotheses_) {
+    for (const auto& cell : hypothesis.cells) {
+      for (size_t i = 0; i < logs.size(); ++i) logs[i] = log_sum(logs[i], cell.fits[i].log_weight);
+    }
+  }
+  const auto fit = static_cast<size_t>(std::min_element(logs.begin() + 1, logs.end()) - logs.begin());
   for (auto& hypothesis : hypotheses_) {
-    for (auto& cell : hypothesis.cells) begin_jump(cell, bin, chance);
+    for (auto& cell : hypothesis.cells) begin_jump(cell, fit, bin, chance);
   }
   watched_s_ = watched_m_ = 0;
 }

@@ -48,8 +48,7 @@ class TurnErrorModel {
   }
   /// `turned_rad`: more than the track. How well it fits weighs the cell.
   void weigh(TurnCell& cell, double turned_rad, double noise) const {
-    weigh(cell.steady, turned_rad, noise);
-    for (TurnFit& fit : cell.jumped) {
+    for (TurnFit& fit : cell.fits) {
       if (std::isfinite(fit.log_weight)) weigh(fit, turned_rad, noise);
     }
   }
@@ -119,33 +118,31 @@ void weigh_stand(TurnCell& cell, const BinTurn& stood, const TrackParameters& pa
 }
 
 double TurnCell::log_weight() const {
-  double log = steady.log_weight;
-  for (const TurnFit& fit : jumped) log = log_sum(log, fit.log_weight);
+  double log = -INFINITY;
+  for (const TurnFit& fit : fits) log = log_sum(log, fit.log_weight);
   return log;
 }
 
 void TurnCell::add_log(double log) {
-  steady.log_weight += log;
-  for (TurnFit& fit : jumped) fit.log_weight += log;
+  for (TurnFit& fit : fits) fit.log_weight += log;
 }
 
 void TurnCell::forget(TurnErrors::Index error) {
-  steady.errors.forget(error);
-  for (TurnFit& fit : jumped) fit.errors.forget(error);
+  for (TurnFit& fit : fits) fit.errors.forget(error);
 }
 
 void TurnCell::begin_sensor() {
-  steady.log_weight = log_weight();
-  steady.errors.forget(TurnErrors::bias);
-  jumped = {};
+  TurnFit now{log_weight(), fits.front().errors};
+  now.errors.forget(TurnErrors::bias);
+  fits = {now};
 }
 
-void begin_jump(TurnCell& cell, const BinTurn& bin, double chance) {
+void begin_jump(TurnCell& cell, size_t fit, const BinTurn& bin, double chance) {
   if (!(bin.bias_rad > 0)) return;
-  TurnFit& fit = *std::ranges::min_element(cell.jumped, {}, &TurnFit::log_weight);
-  fit = cell.steady;
-  fit.log_weight += std::log(chance);
-  fit.errors.covariance(TurnErrors::bias, TurnErrors::bias) += std::pow(bin.jump_rad / bin.bias_rad, 2);
+  TurnFit& jumped = cell.fits[fit];
+  jumped = cell.fits.front();
+  jumped.log_weight += std::log(chance);
+  jumped.errors.covariance(TurnErrors::bias, TurnErrors::bias) += std::pow(bin.jump_rad / bin.bias_rad, 2);
 }
 
 namespace {
@@ -167,8 +164,7 @@ void join_fits(TurnFit& into, double log_into, const TurnFit& other, double log_
 }  // namespace
 
 void join_cells(TurnCell& into, double log_into, const TurnCell& other, double log_other) {
-  join_fits(into.steady, log_into, other.steady, log_other);
-  for (size_t i = 0; i < into.jumped.size(); ++i) join_fits(into.jumped[i], log_into, other.jumped[i], log_other);
+  for (size_t i = 0; i < into.fits.size(); ++i) join_fits(into.fits[i], log_into, other.fits[i], log_other);
 }
 
 void TurnErrors::forget(Index error) {
@@ -181,14 +177,16 @@ void TurnErrors::forget(Index error) {
 void spread(std::vector<TurnCell>& cells, double way_m) {
   const double share = std::min(0.25, 0.5 * std::pow(kDriftPerM * way_m / kCellM, 2));
   if (cells.size() < 3 || share <= 0) return;
-  std::vector<double> logs;
-  logs.reserve(cells.size());
-  for (const TurnCell& cell : cells) logs.push_back(cell.log_weight());
-  const double most = *std::ranges::max_element(logs);
-  const auto weight = [&](size_t i) { return std::exp(logs[std::min(i, logs.size() - 1)] - most); };
-  for (size_t i = 0; i < logs.size(); ++i) {
-    const double mixed = (1 - 2 * share) * weight(i) + share * (weight(i == 0 ? 0 : i - 1) + weight(i + 1));
-    cells[i].add_log(most + std::log(std::max(mixed, 1e-300)) - logs[i]);
+  std::vector<double> before(cells.size());
+  for (size_t fit = 0; fit < cells.front().fits.size(); ++fit) {
+    std::ranges::transform(cells, before.begin(), [fit](const TurnCell& cell) { return cell.fits[fit].log_weight; });
+    const double most = *std::ranges::max_element(before);
+    if (!std::isfinite(most)) continue;
+    const auto weight = [&](size_t i) { return std::exp(before[std::min(i, before.size() - 1)] - most); };
+    for (size_t i = 0; i < cells.size(); ++i) {
+      const double mixed = (1 - 2 * share) * weight(i) + share * (weight(i == 0 ? 0 : i - 1) + weight(i + 1));
+      cells[i].fits[fit].log_weight = most + std::log(std::max(mixed, 1e-300));
+    }
   }
 }
 

@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -29,15 +30,16 @@ struct TurnErrors {
 /// Logarithm of the sum of what two logarithms stand for.
 double log_sum(double a, double b);
 
-/// One way in which the errors may have come about.
+/// How well the turning fits, with one way in which the errors may have come about.
 struct TurnFit {
   double log_weight = -INFINITY;
   TurnErrors errors{};
 };
 
 struct TurnCell {
-  TurnFit steady{0, {}};            // the bias is what it was
-  std::array<TurnFit, 3> jumped{};  // it has jumped since, each begun at another time
+  /// The first: the sensor's bias is what it was. The others: it has jumped since, each begun at another time, the same
+  /// one in all cells.
+  std::array<TurnFit, 4> fits{TurnFit{0, {}}};
   [[nodiscard]] double log_weight() const;
   void add_log(double log);
   void forget(TurnErrors::Index error);
@@ -56,8 +58,8 @@ struct BinTurn {
   double jump_rad = 0;    // what one sigma of another bias has turned; 0: the sensor's does not jump
 };
 
-/// The bias may have jumped just now, with this chance: the least likely of the jumps that are followed makes room.
-void begin_jump(TurnCell& cell, const BinTurn& bin, double chance);
+/// The bias may have jumped just now, with this chance: in the place of this fit.
+void begin_jump(TurnCell& cell, size_t fit, const BinTurn& bin, double chance);
 
 /// Weighs the cells, of which the first is first_m along the route.
 void weigh_turn(std::vector<TurnCell>& cells, double first_m, const track::Route& route, const BinTurn& bin,

@@ -50,6 +50,20 @@ TEST(GyroTurn, AStuckGyroSaysNothingUntilItIsWellAgain) {
   EXPECT_FALSE(gyro.between(1'501'000'000, 1'502'000'000)) << "between two samples";
   EXPECT_FALSE(gyro.between(1'900'000'000, 2'100'000'000));
   EXPECT_TRUE(gyro.between(2'100'000'000, 2'900'000'000));
+  EXPECT_TRUE(gyro.at_rest(1'900'000'000, 2'100'000'000));
+}
+
+// Two or three equal samples are steps of its scale.
+TEST(GyroTurn, CoarseStepsAreNotStuck) {
+  GyroTurn gyro({});
+  core::Random random(6);
+  int missing = 0;
+  for (int i = 1; i <= 3000; ++i) {
+    constexpr double kStepRps = 1.07e-3;
+    gyro.add(i * kPeriodNs, kStepRps * std::round((0.01 + 0.75 * kStepRps * random.normal()) / kStepRps));
+    if (i > 100 && i % 10 == 0 && !gyro.between((i - 10) * kPeriodNs, i * kPeriodNs)) ++missing;
+  }
+  EXPECT_LE(missing, 3);
 }
 
 TEST(GyroTurn, OneThatScattersMoreThanItShouldSaysLess) {

@@ -152,8 +152,8 @@ TEST(TrackChooser, ATrainThatIsMovedBackOverPointsByFusionIsOnNoLegThatWasGuesse
 
 // Two ways that meet know the bias otherwise: together they may know less than at first.
 TEST(TurnCells, JoinedOnesKnowSomethingThatCanBe) {
-  TurnCell cell{0, {{3, 0.002}, Eigen::Vector2d(0.01, 1e-7).asDiagonal()}};
-  const TurnCell other{0, {{-3, -0.002}, Eigen::Vector2d(0.01, 1e-7).asDiagonal()}};
+  TurnCell cell{{TurnFit{0, {{3, 0.002}, Eigen::Vector2d(0.01, 1e-7).asDiagonal()}}}};
+  const TurnCell other{{TurnFit{0, {{-3, -0.002}, Eigen::Vector2d(0.01, 1e-7).asDiagonal()}}}};
   join_cells(cell, 0, other, 0);
   std::vector<TurnCell> cells(10, cell);
   const auto map = fork();
@@ -164,10 +164,45 @@ TEST(TurnCells, JoinedOnesKnowSomethingThatCanBe) {
     weigh_turn(cells, 2.0 * i, route, bin, {});
     for (const TurnCell& of : cells) {
       EXPECT_TRUE(std::isfinite(of.log_weight()));
-      ASSERT_GT(of.steady.errors.covariance.determinant(), 0) << i;
-      ASSERT_GT(of.steady.errors.covariance(0, 0), 0) << i;
+      ASSERT_GT(of.fits[0].errors.covariance.determinant(), 0) << i;
+      ASSERT_GT(of.fits[0].errors.covariance(0, 0), 0) << i;
     }
   }
+}
+
+// On a straight track the gyro has another error all at once: that it failed soon fits better, and ends the sums of
+// weights no less than one. A place without it stays without it where the two are joined.
+TEST(TurnCells, AJumpOfTheBiasIsFollowedBesideWhatWasBelieved) {
+  const auto map = fork();
+  const track::Route route({map->edge(1), true}, 100, 0);
+  BinTurn bin{.way_m = 2,
+              .turn_rad = 0,
+              .variance = 1e-7,
+              .bias_rad = 1e-4,
+              .bias_walk = 1e-6,
+              .duration_s = 0.1,
+              .jump_rad = 0.05 * 0.1};
+  std::vector<TurnCell> cells(10);
+  for (int i = 0; i < 20; ++i) weigh_turn(cells, i, route, bin, {});
+  const auto jumped = [&](size_t i) { return cells[i].fits[1].log_weight - cells[i].fits[0].log_weight; };
+  for (TurnCell& cell : cells) begin_jump(cell, 1, bin, 1e-4);
+  EXPECT_NEAR(jumped(5), std::log(1e-4), 1e-9);
+  for (int i = 0; i < 20; ++i) weigh_turn(cells, 20 + i, route, bin, {});
+  EXPECT_LT(jumped(5), std::log(1e-4)) << "it did not jump";
+  for (TurnCell& cell : cells) begin_jump(cell, 1, bin, 1e-4);
+  bin.turn_rad = 0.03 * bin.duration_s;
+  for (int i = 0; i < 40; ++i) {
+    weigh_turn(cells, 40 + i, route, bin, {});
+    spread(cells, bin.way_m);
+  }
+  EXPECT_GT(jumped(5), 5);
+  EXPECT_NEAR(cells[5].fits[1].errors.mean[TurnErrors::bias] * bin.bias_rad, bin.turn_rad, 5e-4);
+  TurnCell joined = cells[5];
+  join_cells(joined, 0, TurnCell{}, -1000);
+  EXPECT_NEAR(joined.log_weight(), cells[5].log_weight(), 1e-6);
+  joined.begin_sensor();
+  EXPECT_NEAR(joined.fits[0].log_weight, cells[5].log_weight(), 1e-6);
+  EXPECT_FALSE(std::isfinite(joined.fits[1].log_weight));
 }
 
 // As a map_matcher that was away while the train ran over the switch.

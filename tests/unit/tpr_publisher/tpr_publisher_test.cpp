@@ -116,11 +116,12 @@ TEST(TprPublisher, ACorrectionWhileItBrakesIsNoMovementBack) {
 
 // As by GNSS at a station: what the estimate went back there is no way that the train backs when it starts.
 TEST(TprPublisher, ACorrectionAtRestIsNoMovement) {
-  for (const double corrected_m : {-3.0, 3.0}) {
+  for (const double corrected_m : {-3.0, -0.9, 0.9, 3.0}) {
     SaidDirection direction;
     direction(150, 2, false);
     direction(150.2, 0.5, false);
-    for (int i = 0; i < 20; ++i) direction(150.2 + (i < 10 ? 0 : corrected_m), i % 2 == 0 ? -0.001 : 0.001, true);
+    const int steps = std::abs(corrected_m) > 1 ? 1 : 60;  // at once, or fix by fix
+    for (int i = 0; i <= steps; ++i) direction(150.2 + corrected_m * i / steps, i % 2 == 0 ? -0.001 : 0.001, true);
     uint32_t said = 99;
     for (int i = 1; i <= 20 && said == 99; ++i)
       said = direction(150.2 + corrected_m + 0.012 * i, i == 1 ? -0.01 : 0.12, false);

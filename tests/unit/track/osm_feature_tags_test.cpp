@@ -41,7 +41,9 @@ TEST_F(OsmFeatureTags, WhatOgr2ogrHasNoColumnForIsRead) {
     ASSERT_EQ(map.landmarks.size(), 1U) << text;
     EXPECT_EQ(map.landmarks[0].name, "B \"1\"");
   }
-  // Cut short or no hstore at all: what is whole is read.
+  // NULL is a value, too; cut short, what is whole is read.
+  const Map with_null = map_of(line(R"("railway":"rail","other_tags":"\"service\"=>NULL, \"maxspeed\"=>\"80\"")"));
+  EXPECT_TRUE(with_null.edges.at(0).speed_limit_mps(50, Direction::forward).has_value());
   const Map map = map_of(line(R"("railway":"rail","other_tags":"\"maxspeed\"=>\"80\",\"bridge\"=>\"ye")"));
   EXPECT_TRUE(map.landmarks.empty());
   EXPECT_TRUE(map.edges.at(0).speed_limit_mps(50, Direction::forward).has_value());
@@ -82,14 +84,6 @@ TEST_F(OsmFeatureTags, PointsBesideTheTrackAndHeightsAreTold) {
   const std::string high =
       R"({"properties":{"railway":"rail"},"geometry":{"type":"LineString","coordinates":[[15,48,200],[15.002,48,201]]}})";
   EXPECT_THAT(map_of(high).problems, Contains(HasSubstr("1 line with heights")));
-}
-
-TEST_F(OsmFeatureTags, NodesOfNoTrackAreToldInXmlToo) {
-  const std::string text = R"(<osm version="0.6"><node id="1" lat="48" lon="15"/><node id="2" lat="48" lon="15.01"/>)"
-                           R"(<node id="9" lat="48" lon="15.005"><tag k="railway" v="switch"/></node>)"
-                           R"(<way id="5"><nd ref="1"/><nd ref="2"/><tag k="railway" v="rail"/></way></osm>)";
-  const Map map = core::value_or_throw(build_map({write("a.osm", text)}, {})).map;
-  EXPECT_THAT(map.problems, Contains(HasSubstr("the first one (node 9) at latitude 48.000000")));
 }
 
 }  // namespace

@@ -156,6 +156,7 @@ Survey survey_landmarks(const track::Map& map, const std::vector<SurveySighting>
 void apply_survey(const Survey& survey, track::Map& map) {
   for (const SurveyedLandmark& found : survey.landmarks) {
     if (found.known_id != 0) {
+      if (!map.learnt_runs.empty()) continue;
       map.landmarks[found.known_id - 1] = found.landmark;
       if (found.landmark.kind == track::LandmarkKind::balise) move_group(found, map);
       continue;

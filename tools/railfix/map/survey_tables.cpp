@@ -229,7 +229,7 @@ core::Result<ReadSightings> read_sightings(const std::shared_ptr<const track::Ma
                           before.place_ahead_m, is_reverse});
   }
   if (!table.status().ok()) return table.status().error();
-  if (out.placed.size() + out.placeless > 0) {
+  if (!out.placed.empty()) {
     const auto content = content_of(run_folder / "sightings.csv");
     if (!content.ok()) return content.error();
     out.runs.push_back(content.value());

@@ -37,11 +37,13 @@ std::optional<std::string> quoted(const std::string& text, size_t& at) {
   return out;
 }
 
-/// PostgreSQL's hstore: "bridge"=>"yes","layer"=>"1".
+/// PostgreSQL's hstore: "bridge"=>"yes","layer"=>"1". A value may be NULL.
 void unpack_hstore(const std::string& text, OsmTags& tags) {
   for (size_t at = 0;;) {
     const auto key = quoted(text, at);
-    if (!key || !text.substr(at).starts_with("=>")) return;
+    if (!key || text.compare(at, 2, "=>") != 0) return;
+    at += 2;
+    if (text.compare(at, 4, "NULL") == 0) continue;
     auto value = quoted(text, at);
     if (!value) return;
     tags.emplace(*key, std::move(*value));

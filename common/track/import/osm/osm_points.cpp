@@ -68,21 +68,24 @@ std::optional<TrackMark> OsmPoints::signal(int64_t node, int64_t way, double off
   return mast;
 }
 
-/// Of those on tracks that no train runs on any more there may be many: one sentence for all.
+/// Of GeoJSON, where a point belongs to a line by its place alone. OpenStreetMap's own nodes are those of a way, and
+/// may be those of a tram or of a track that is gone.
 void OsmPoints::tell_strays(std::vector<std::string>& problems) const {
   std::unordered_set<int64_t> on_track;
   for (const OsmWay& way : data_.ways) on_track.insert(way.nodes.begin(), way.nodes.end());
-  std::map<int64_t, const OsmNode*> strays;  // the same file always tells the same first one
+  std::map<int64_t, GeoPoint> strays;  // the same file always tells the same first one
   for (const auto& [id, node] : data_.nodes) {
-    if (is_of_track(node.tags) && !on_track.contains(id)) strays.emplace(id, &node);
+    if (is_of_track(node.tags) && !on_track.contains(id) && id == id_of_place(node.place))
+      strays.emplace(id, node.place);
   }
   if (strays.empty()) return;
-  const auto& [id, first] = *strays.begin();
-  problems.push_back(std::to_string(strays.size()) +
-                     " signals, switches, balises and crossings are no points of a track that is read, the first one " +
-                     (id == id_of_place(first->place) ? "" : "(node " + std::to_string(id) + ") ") + "at latitude " +
-                     told_number(first->place.lat_deg, 6) + ", longitude " + told_number(first->place.lon_deg, 6) +
-                     "; left out: they count where the line has a point at the very same place");
+  const GeoPoint& first = strays.begin()->second;
+  problems.push_back(
+      std::to_string(strays.size()) +
+      " signals, switches, balises and crossings are no points of a track that is read, the first one at "
+      "latitude " +
+      told_number(first.lat_deg, 6) + ", longitude " + told_number(first.lon_deg, 6) +
+      "; left out: they count where the line has a point at the very same place");
 }
 
 void OsmPoints::tell(std::vector<std::string>& problems) const {

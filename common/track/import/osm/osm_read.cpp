@@ -92,7 +92,7 @@ OsmData read_passes(const std::string& file, bool with_trams) {
         continue;
       }
       OsmTags tags = tags_of(node);
-      if (!wanted.contains(node.id()) && !is_mast(tags) && !is_of_track(tags)) continue;
+      if (!wanted.contains(node.id()) && !is_mast(tags)) continue;
       out.nodes[node.id()] = {{node.location().lat(), node.location().lon()}, std::move(tags)};
     }
   }
