@@ -38,8 +38,7 @@ bool has_sense(const PictureInput&) {
   return true;
 }
 bool has_sense(const OdometryInput& e) {
-  return up_to(e.step_m, 1e6) && up_to(e.step_sigma_m, 1e6) && up_to(e.yaw_rad, 1e3) && up_to(e.yaw_sigma_rad, 1e3) &&
-         (!e.valid || e.reference_stamp_ns != e.stamp_ns);
+  return up_to(e.step_m, 1e6) && up_to(e.step_sigma_m, 1e6) && (!e.valid || e.reference_stamp_ns != e.stamp_ns);
 }
 bool has_sense(const GnssInput& e) {
   return up_to(e.easting_m, 1e9) && up_to(e.northing_m, 1e9) && up_to(e.hdop, 1e6);

@@ -22,7 +22,7 @@ struct OdometryInput {
   double step_sigma_m = 0;
   bool valid = false;        // false: blind, the step means nothing
   double yaw_rad = 0;        // turned meanwhile, left positive
-  double yaw_sigma_rad = 0;  // 0: not told
+  double yaw_sigma_rad = 0;  // 0, or no number: not told
 };
 
 struct WheelInput {

@@ -37,7 +37,7 @@ void GyroWatch::add(int64_t stamp_ns, double rate_rps) {
 }
 
 void GyroWatch::add(const OdometryInput& step) {
-  const bool told = step.valid && step.yaw_sigma_rad > 0;
+  const bool told = step.valid && step.yaw_sigma_rad > 0 && std::isfinite(step.yaw_rad + step.yaw_sigma_rad);
   if (told && step_) {
     const bool same = step.reference_stamp_ns == step_->reference_stamp_ns;
     if (same || step.reference_stamp_ns == step_->stamp_ns) {

@@ -108,6 +108,15 @@ TEST(GyroWatch, ASmallBiasThatLastsIsLearntAnew) {
   EXPECT_EQ(ride.run(120, {.bias_rps = 0.02}), Fault::none);
 }
 
+TEST(GyroWatch, ATurnThatIsNoNumberIsNotTold) {
+  Ride ride;
+  ride.run(60, {});
+  ride.watch().add({1, 0, 0.66, 0.001, true, NAN, 3e-4});
+  ride.watch().add({2, 1, 0.66, 0.001, true, 0, INFINITY});
+  EXPECT_EQ(ride.denied(20, {}), 0);
+  EXPECT_EQ(ride.run(5, {.bias_rps = 0.05}), Fault::contradicted);
+}
+
 TEST(GyroWatch, AnImuWithoutAGyroIsNamedNowhere) {
   Ride ride;
   EXPECT_EQ(ride.run(5, {.bias_rps = 0, .noise_rps = 0}), Fault::absent);
