@@ -10,6 +10,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/repeated.hpp"
 #include "core/time.hpp"
 #include "fusion/felt_motion.hpp"
 #include "fusion/fusion_parameters.hpp"
@@ -191,17 +192,6 @@ class Estimator {
     int good_windows = 0;
     bool camera_agrees = false;  // over the last second, and it turned
   };
-  /// A sensor that is stuck repeats itself to the last digit.
-  struct Repeated {
-    double value = 0;
-    int64_t since_ns = 0;
-    int count = 0;
-    void add(double next, int64_t stamp_ns) {
-      count = next == value ? count + 1 : 0;
-      if (count == 0) since_ns = stamp_ns;
-      value = next;
-    }
-  };
   /// Usual time between the samples of one odometer.
   struct Rhythm {
     double period_s = 0;
@@ -357,7 +347,7 @@ class Estimator {
   Rhythm pulses_;
   int64_t gap_begin_ns_ = 0;
   Mean accel_;
-  Repeated accel_repeated_;
+  core::Repeated accel_repeated_;
   bool grade_known_ = true;
   double graded_m_ = 0;  // the distance up to which the bias allows for a grade that is not known
   Mean yaw_;

@@ -61,9 +61,7 @@ void Estimator::doubt_grade() {
 
 void Estimator::use_acceleration(double accel_mps2, int64_t stamp_ns) {
   auto& imu = watched(Source::imu);
-  const bool stuck =
-      accel_repeated_.count >= kRepeatedSamples && core::seconds(stamp_ns - accel_repeated_.since_ns) >= kRepeatedS;
-  if (stuck) {
+  if (accel_repeated_.lasts(kRepeatedSamples, kRepeatedS)) {
     imu.isolate(stamp_ns);
     imu.convicted = true;
     imu.agreed = 0;

@@ -15,7 +15,6 @@ constexpr double kSeenShare = 0.8;    // of a period by the camera
 constexpr double kTurnShare = 0.1;    // of a turn: the ends of the period are not those of the pictures
 constexpr double kCameraPerM = 1e-4;  // the camera turns too far or too little by so much a metre, lastingly
 constexpr double kBiasWalk = 5e-5;    // rad/s per square root of a second
-constexpr double kNoBiasRps = 1e-2;   // what nobody knows of it
 constexpr double kForgetS = 60.0;     // while it is contradicted: a new bias that lasts is one as well
 constexpr double kSigmas = 4.0;
 constexpr size_t kLeastPieces = 3;
@@ -24,16 +23,12 @@ constexpr int kWell = 12;
 }  // namespace
 
 void GyroWatch::add(int64_t stamp_ns, double rate_rps) {
-  const double step_rps = rate_rps - rate_rps_;
-  if (last_ns_ != 0) {
+  if (const double step_rps = rate_rps - rate_.value(); std::isfinite(step_rps)) {
     squares_ += step_rps * step_rps;
     ++samples_;
   }
   has_turned_ = has_turned_ || rate_rps != 0;
-  repeats_ = step_rps == 0 ? repeats_ + 1 : 0;
-  if (repeats_ == 0) repeats_since_ns_ = stamp_ns;
-  rate_rps_ = rate_rps;
-  last_ns_ = stamp_ns;
+  rate_.add(rate_rps, stamp_ns);
 }
 
 void GyroWatch::add(const OdometryInput& step) {
@@ -61,7 +56,7 @@ void GyroWatch::judge(const Turned& turned, int64_t stamp_ns) {
 // Nothing where a fault that was found could not be seen.
 std::optional<GyroWatch::Fault> GyroWatch::fault_now(const Turned& turned) {
   if (!has_turned_) return Fault::absent;
-  if (repeats_ >= kRepeats && core::seconds(last_ns_ - repeats_since_ns_) >= kRepeatsS)
+  if (rate_.lasts(kRepeats, kRepeatsS))
     return std::abs(turned.way_m) > kRunsM ? std::optional(Fault::stuck) : std::nullopt;
   // Of the mean of the samples, from how they differ from each other.
   const double scatter_rad = samples_ > 0 ? std::sqrt(0.5 * squares_) / samples_ * turned.time_s : 0;
@@ -91,7 +86,7 @@ std::optional<GyroWatch::Fault> GyroWatch::fault_now(const Turned& turned) {
 void GyroWatch::rest(const Turned& turned) {
   begin_period();
   count_ = 0;
-  if (repeats_ < kRepeats) learn_bias(turned.gyro_rad, turned.sigma_rad * turned.sigma_rad, turned.time_s);
+  if (rate_.count() < kRepeats) learn_bias(turned.gyro_rad, turned.sigma_rad * turned.sigma_rad, turned.time_s);
 }
 
 void GyroWatch::learn_bias(double turned_rad, double variance, double time_s) {
@@ -129,7 +124,7 @@ bool GyroWatch::contradicted() const {
 void GyroWatch::set_clock(int64_t stamp_ns) {
   begin_period();
   count_ = 0;
-  repeats_ = 0;
+  rate_ = {};
   step_.reset();
   since_ns_ = std::min(since_ns_, stamp_ns);
 }

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "core/repeated.hpp"
 #include "fusion/fusion_types.hpp"
 
 namespace railfix::fusion {
@@ -61,13 +62,11 @@ class GyroWatch {
 
   // Against the camera and at rest: that of the filter follows a place that may be wrong.
   double bias_rps_ = 0;
-  double bias_variance_ = 1e-4;
+  static constexpr double kNoBiasRps = 1e-2;  // what nobody knows of it
+  double bias_variance_ = kNoBiasRps * kNoBiasRps;
 
-  double rate_rps_ = 0;
-  bool has_turned_ = false;  // an IMU without a gyro says 0 all the time
-  int repeats_ = 0;
-  int64_t repeats_since_ns_ = 0;
-  int64_t last_ns_ = 0;
+  core::Repeated rate_;
+  bool has_turned_ = false;            // an IMU without a gyro says 0 all the time
   std::optional<OdometryInput> step_;  // the last one that was measured
   Fault fault_ = Fault::none;
   int64_t since_ns_ = 0;

@@ -12,14 +12,12 @@
 #include "core/units.hpp"
 #include "map_matcher/track_choice/gyro_turn.hpp"
 #include "map_matcher/track_choice/track_chooser.hpp"
+#include "support/failing_gyro.hpp"
 #include "support/sensed_ride.hpp"
 
 namespace railfix::testing {
 
 enum class Manoeuvre : uint8_t { through, stop_on_switch, back_and_forth, just_clear, backwards };
-
-/// What becomes of the gyro from a place on: stays at its value, another constant error, more noise.
-enum class GyroFault : uint8_t { none, stuck, bias, noise };
 
 struct PassagePlan {
   bool facing = true;
@@ -227,7 +225,9 @@ class SwitchPassage {
 
   void move_to(double next_m) {
     auto sensed = sensors_->step(*heading_, time_s_, at_m_, next_m, 1 / kTicksPerS);
-    sensed.turn_rad = told_by_gyro(sensed.turn_rad * kTicksPerS) / kTicksPerS;
+    gyro_failed_ = gyro_failed_ || std::abs(at_m_) < plan_.gyro_fault_m;
+    if (!plan_.camera)
+      sensed.turn_rad = failing_gyro_.told_rps(sensed.turn_rad * kTicksPerS, gyro_failed_, random_) / kTicksPerS;
     weigh_legs(next_m, sensed);
     at_m_ = next_m;
     time_s_ += 1 / kTicksPerS;
@@ -239,15 +239,6 @@ class SwitchPassage {
     look_for_frog();
     look_at_rails();
     judge();
-  }
-
-  double told_by_gyro(double rate_rps) {
-    gyro_failed_ = gyro_failed_ || std::abs(at_m_) < plan_.gyro_fault_m;
-    if (plan_.camera || !gyro_failed_) return stuck_rps_ = rate_rps;
-    if (plan_.gyro_fault == GyroFault::stuck) return stuck_rps_;
-    if (plan_.gyro_fault == GyroFault::bias) return rate_rps + plan_.gyro_fault_rps;
-    if (plan_.gyro_fault == GyroFault::noise) return rate_rps + plan_.gyro_fault_rps * random_.normal();
-    return rate_rps;
   }
 
   std::optional<map_matcher::Turn> turn_of(const SensedStep& sensed) {
@@ -371,6 +362,7 @@ class SwitchPassage {
   std::optional<track::Route> route_;
   std::optional<track::Route> fusion_route_;
   std::optional<VehicleHeading> legs_[2];
+  FailingGyro failing_gyro_{plan_.gyro_fault, plan_.gyro_fault_rps};
   std::optional<map_matcher::GyroTurn> gyro_;
   Apart apart_;
   double viewed_m_ = -1e9;
@@ -388,7 +380,6 @@ class SwitchPassage {
   bool known_ = true;
   bool frog_told_ = false;
   bool gyro_failed_ = false;
-  double stuck_rps_ = 0;
   PassageResult result_;
 };
 

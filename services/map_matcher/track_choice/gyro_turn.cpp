@@ -36,20 +36,17 @@ void GyroTurn::add(int64_t stamp_ns, double rate_rps) {
 
 void GyroTurn::watch(int64_t stamp_ns, double rate_rps) {
   if (samples_.size() < 2) {
-    repeats_ = 0;
-    repeats_since_ns_ = stamp_ns;
+    rate_ = {};
     scatter_ = 0;
   } else {
     const double dt_s = core::seconds(stamp_ns - samples_[samples_.size() - 2].stamp_ns);
-    const double step_rps = rate_rps - rate_rps_;
+    const double step_rps = rate_rps - rate_.value();
     scatter_ += (0.5 * step_rps * step_rps * dt_s - scatter_) * std::min(1.0, dt_s / kScatterS);
-    repeats_ = step_rps == 0 ? repeats_ + 1 : 0;
-    if (repeats_ == 0) repeats_since_ns_ = stamp_ns;
   }
-  rate_rps_ = rate_rps;
-  if (repeats_ < kStuckRepeats || core::seconds(stamp_ns - repeats_since_ns_) < kStuckS) return;
+  rate_.add(rate_rps, stamp_ns);
+  if (!rate_.lasts(kStuckRepeats, kStuckS)) return;
   for (auto sample = samples_.rbegin(); sample != samples_.rend() && !sample->is_stuck; ++sample) {
-    if (sample->stamp_ns < repeats_since_ns_) break;
+    if (sample->stamp_ns < rate_.since_ns()) break;
     sample->is_stuck = true;
   }
 }

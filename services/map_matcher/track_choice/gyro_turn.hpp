@@ -6,6 +6,7 @@
 #include <deque>
 #include <optional>
 
+#include "core/repeated.hpp"
 #include "map_matcher/match_types.hpp"
 
 namespace railfix::map_matcher {
@@ -44,9 +45,7 @@ class GyroTurn {
 
   GyroParameters parameters_;
   std::deque<Sample> samples_;
-  double rate_rps_ = 0;  // of the last sample
-  int repeats_ = 0;      // of that rate, one behind the other
-  int64_t repeats_since_ns_ = 0;
+  core::Repeated rate_;
   double scatter_ = 0;  // variance of the heading after a second, as the samples differ from each other
   double bias_rps_ = 0;
   std::optional<double> bias_variance_;  // at learnt_ns_; nothing before the first learning

@@ -2,6 +2,7 @@
 // the dark, with services that are started anew.
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <functional>
@@ -48,29 +49,29 @@ Ride told(core::Random& random, size_t track) {
   return ride;
 }
 
-/// One crossover, taken by half of the trains, while camera and gyro tell nothing.
-Ride in_the_dark(core::Random& random) {
-  const StationPlan plan{.length_m = 14000, .crossovers = {{0, 1, 1000}}, .balise_every_m = 1500};
+/// One crossover, taken by half of the trains, while the camera tells nothing.
+Ride in_the_dark(const StationPlan& plan, core::Random& random) {
   const auto made = station(plan, random);
   Ride ride = ride_over(plan, made, random.next());
   ride.way = way_through(made, 0, 0.5, random);
   ride.told = told_on(made, 0);
   ride.dark = {{900, 1300}};
+  return ride;
+}
+
+Ride without_gyro(core::Random& random) {
+  Ride ride = in_the_dark({.length_m = 14000, .crossovers = {{0, 1, 1000}}, .balise_every_m = 1500}, random);
   ride.gyro = false;
   return ride;
 }
 
-/// The same with a gyro, which fails on the way there, in one of three ways, for a minute.
+/// It fails on the way there, in one of three ways, for a minute.
 Ride failing_gyro(core::Random& random) {
-  const StationPlan plan{.length_m = 4000, .crossovers = {{0, 1, 1000}}, .balise_every_m = 700};
-  const auto made = station(plan, random);
-  Ride ride = ride_over(plan, made, random.next());
-  ride.way = way_through(made, 0, 0.5, random);
-  ride.told = told_on(made, 0);
-  ride.dark = {{900, 1300}};
-  ride.gyro_fault = static_cast<GyroFault>(static_cast<int>(random.uniform(0, 3)));
+  using enum testing::GyroFault;
+  Ride ride = in_the_dark({.length_m = 4000, .crossovers = {{0, 1, 1000}}, .balise_every_m = 700}, random);
+  ride.gyro_fault = std::array{stuck, bias, noise}[static_cast<size_t>(random.uniform(0, 3))];
   const double bias_rps = (random.uniform() < 0.5 ? -1 : 1) * random.uniform(0.005, 0.1);
-  ride.gyro_fault_rps = ride.gyro_fault == GyroFault::noise ? random.uniform(0.01, 0.1) : bias_rps;
+  ride.gyro_fault_rps = ride.gyro_fault == noise ? random.uniform(0.01, 0.1) : bias_rps;
   ride.gyro_fails.from_m = 1000 - random.uniform(-50, 200);
   ride.gyro_fails.to_m = ride.gyro_fails.from_m + 60 * ride.speed_mps;
   return ride;
@@ -112,7 +113,7 @@ int measure(const Options& options) {
   const std::vector<Scenario> scenarios{
       {"told", [](core::Random& random) { return told(random, 0); }, true, 1.0},
       {"neighbour", [](core::Random& random) { return told(random, 1); }, false, 0, 0.2},
-      {"dark", in_the_dark, true, 0.6},
+      {"dark", without_gyro, true, 0.6},
       {"gyro", failing_gyro, true, 0.2},
       {"anywhere", anywhere, true, 0.6},
   };

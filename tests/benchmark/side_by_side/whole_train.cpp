@@ -87,9 +87,10 @@ class WholeTrain {
   }
   void measure() {
     const double turn_rps = truth_.curvature_at(0.5 * (before_m_ + way_m_)) * ride_.speed_mps;
+    const bool gyro_fails = way_m_ > ride_.gyro_fails.from_m && way_m_ < ride_.gyro_fails.to_m;
     for (int i = 1; ride_.gyro && i <= kImuSamples; ++i) {
       const int64_t stamp_ns = stamp_ns_ - core::to_ns(kPeriodS * (kImuSamples - i) / kImuSamples) - 1;
-      const double rate_rps = told_by_gyro(random_.normal(turn_rps, kGyroNoiseRps));
+      const double rate_rps = gyro_.told_rps(random_.normal(turn_rps, kGyroNoiseRps), gyro_fails, random_);
       give(fusion::ImuInput{stamp_ns, random_.normal(0, 0.01), rate_rps});
       matcher_->add(map_matcher::GyroInput{rate_rps, stamp_ns});
     }
@@ -98,13 +99,6 @@ class WholeTrain {
     yaw_rad_ = random_.normal(turn_rps * kPeriodS, kYawNoiseRad);
     give(fusion::input_of(step_message()));
     if (ride_.gnss && ++since_gnss_ % 10 == 0) hear_gnss();
-  }
-  double told_by_gyro(double rate_rps) {
-    const bool fails = way_m_ > ride_.gyro_fails.from_m && way_m_ < ride_.gyro_fails.to_m;
-    if (!fails) return stuck_rps_ = rate_rps;
-    if (ride_.gyro_fault == GyroFault::stuck) return stuck_rps_;
-    if (ride_.gyro_fault == GyroFault::bias) return rate_rps + ride_.gyro_fault_rps;
-    return random_.normal(rate_rps, ride_.gyro_fault_rps);
   }
   [[nodiscard]] msg::OdometryStep step_message() const {
     msg::OdometryStep step;
@@ -201,7 +195,7 @@ class WholeTrain {
   double step_m_ = 0;
   double yaw_rad_ = 0;
   int since_gnss_ = 0;
-  double stuck_rps_ = 0;
+  testing::FailingGyro gyro_{ride_.gyro_fault, ride_.gyro_fault_rps};
   double gnss_east_m_ = 0, gnss_north_m_ = 0;  // its error
   std::vector<track::PathLandmark>::const_iterator next_mark_;
   std::vector<msg::PositionFix> fixes_;

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "support/failing_gyro.hpp"
 #include "track/map.hpp"
 #include "track/ways.hpp"
 
@@ -16,9 +17,6 @@ struct Stretch {
   double from_m = 0;
   double to_m = 0;
 };
-
-/// What a gyro does that has failed.
-enum class GyroFault : uint8_t { stuck, bias, noise };
 
 /// Distances are those of the way, from the begin of its first run.
 struct Ride {
@@ -32,9 +30,9 @@ struct Ride {
   std::vector<Stretch> dark;         // nothing is seen there
   std::vector<double> matcher_anew;  // map_matcher is started anew there
   bool gyro = true;
-  GyroFault gyro_fault = GyroFault::stuck;
-  double gyro_fault_rps = 0;  // the bias, or the noise of a sample
-  Stretch gyro_fails;
+  testing::GyroFault gyro_fault = testing::GyroFault::none;
+  double gyro_fault_rps = 0;  // the error, or the noise of a sample
+  Stretch gyro_fails;         // there
   bool gnss = false;
   double detection = 0.95;
   uint64_t seed = 1;
