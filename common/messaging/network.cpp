@@ -74,9 +74,7 @@ std::string memory_id() {
   if (stat("/proc/thread-self/ns/net", &network) == 0) text += std::to_string(network.st_ino);
   core::Fnv hash;
   hash.add(text);
-  char hex[17];
-  std::snprintf(hex, sizeof(hex), "%016llx", static_cast<unsigned long long>(hash.value()));
-  return hex;
+  return hash.hex();
 }
 
 }  // namespace railfix::messaging

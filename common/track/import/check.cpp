@@ -176,7 +176,7 @@ class Check {
     if (std::ranges::all_of(ends_.at(node.id), &Edge::is_drawn)) return "";
     const std::optional<GeoPoint> geo = map_.to_geo(node.easting_m, node.northing_m);
     if (!geo) return " at easting " + told_m(node.easting_m) + ", northing " + told_m(node.northing_m);
-    return " at latitude " + told_number(geo->lat_deg, 6) + ", longitude " + told_number(geo->lon_deg, 6);
+    return " at " + told_place(*geo);
   }
 
   /// Grades that no adhesion railway has. Points beyond the ends are of the edges next to it.

@@ -22,6 +22,10 @@ inline std::string told_m(double value, int places = 2) {
   return told_number(value, places) + " m";
 }
 
+inline std::string told_place(const GeoPoint& at) {
+  return "latitude " + told_number(at.lat_deg, 6) + ", longitude " + told_number(at.lon_deg, 6);
+}
+
 inline std::string told_deg(double rad) {
   return told_number(core::deg_from_rad(rad), 1) + " degrees";
 }

@@ -52,6 +52,7 @@ struct TrackGroup {
 struct EtcsIdentity {
   uint32_t nid_c = 0;
   uint32_t nid_bg = 0;
+  auto operator<=>(const EtcsIdentity&) const = default;
 };
 std::optional<EtcsIdentity> etcs_identity(double nid_c, double nid_bg);
 /// For the sentence that refuses another one.

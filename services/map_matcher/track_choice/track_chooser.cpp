@@ -23,12 +23,11 @@ constexpr double kViewNoisePerM = 3e-4;  // least sigma of a picture's curvature
 constexpr double kApartM = 2.5;          // tracks further apart than that share no rails
 constexpr double kAlikeM = 3;            // along the track
 constexpr double kOthersBalise = 0.01;   // chance that it is another track's all the same
-constexpr double kJumpsPerS =
-    1e-4;  // chance that a gyro fails: far more than it does, for 20 minutes of one in the dark
-constexpr double kJumpedBefore = 1e-3;  // ... that it had failed before
-constexpr double kJumpEveryS = 2.0;     // or ...
-constexpr double kJumpEveryM = 10.0;    // ... between the times at which it may have
-constexpr double kWatched = 0.9;        // a begin less probable lies behind a switch that nobody watched
+constexpr double kJumpsPerS = 1e-4;      // chance that a gyro fails, far more than it does
+constexpr double kJumpedBefore = 1e-3;   // ... that it had failed before
+constexpr double kJumpEveryS = 2.0;      // or ...
+constexpr double kJumpEveryM = 10.0;     // ... between the times at which it may have
+constexpr double kWatched = 0.9;         // a begin less probable lies behind a switch that nobody watched
 
 double apart_m(const track::Map& map, const track::EdgePosition& a, const track::EdgePosition& b) {
   const auto at = [&](const track::EdgePosition& p) { return map.edge(p.edge)->alignment.at(p.offset_m).pose; };
@@ -181,7 +180,7 @@ void TrackChooser::watch_for_jump(const BinTurn& bin) {
   watched_m_ += std::abs(bin.way_m);
   if (!(bin.jump_rad > 0) || (watched_s_ < kJumpEveryS && watched_m_ < kJumpEveryM)) return;
   const double chance = std::isinf(watched_s_) ? kJumpedBefore : kJumpsPerS * watched_s_;
-  std::array<double, std::tuple_size_v<decltype(TurnCell::fits)>> logs;
+  std::array<double, TurnCell::kFits> logs;
   logs.fill(-INFINITY);
   for (const auto& hypothesis : hypotheses_) {
     for (const auto& cell : hypothesis.cells) {

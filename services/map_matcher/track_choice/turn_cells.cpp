@@ -164,7 +164,7 @@ void join_fits(TurnFit& into, double log_into, const TurnFit& other, double log_
 }  // namespace
 
 void join_cells(TurnCell& into, double log_into, const TurnCell& other, double log_other) {
-  for (size_t i = 0; i < into.fits.size(); ++i) join_fits(into.fits[i], log_into, other.fits[i], log_other);
+  for (size_t i = 0; i < TurnCell::kFits; ++i) join_fits(into.fits[i], log_into, other.fits[i], log_other);
 }
 
 void TurnErrors::forget(Index error) {
@@ -178,7 +178,7 @@ void spread(std::vector<TurnCell>& cells, double way_m) {
   const double share = std::min(0.25, 0.5 * std::pow(kDriftPerM * way_m / kCellM, 2));
   if (cells.size() < 3 || share <= 0) return;
   std::vector<double> before(cells.size());
-  for (size_t fit = 0; fit < cells.front().fits.size(); ++fit) {
+  for (size_t fit = 0; fit < TurnCell::kFits; ++fit) {
     std::ranges::transform(cells, before.begin(), [fit](const TurnCell& cell) { return cell.fits[fit].log_weight; });
     const double most = *std::ranges::max_element(before);
     if (!std::isfinite(most)) continue;

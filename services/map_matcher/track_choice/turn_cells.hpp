@@ -37,9 +37,10 @@ struct TurnFit {
 };
 
 struct TurnCell {
+  static constexpr size_t kFits = 4;
   /// The first: the sensor's bias is what it was. The others: it has jumped since, each begun at another time, the same
   /// one in all cells.
-  std::array<TurnFit, 4> fits{TurnFit{0, {}}};
+  std::array<TurnFit, kFits> fits{TurnFit{0, {}}};
   [[nodiscard]] double log_weight() const;
   void add_log(double log);
   void forget(TurnErrors::Index error);

@@ -61,7 +61,7 @@ int learn(const LearnRequest& request) {
       std::printf("nothing seen     %s has no sighting with a place on the map\n", request.runs[run].c_str());
   }
   std::printf("errors           %.2f of their sigmas (rms)\n", survey.spread);
-  if (!map->learnt_runs.empty())
+  if (known_ones_stay(*map))
     std::printf(
         "known ones       stay: the map has learnt from %zu runs before, and all sightings of a thing err alike; to "
         "better them, learn from all runs at once on the map of before\n",

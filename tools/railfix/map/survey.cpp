@@ -114,8 +114,7 @@ SurveyedLandmark landmark_of(const track::Map& map, const Thing& thing, const st
   }
   found.sightings = thing.sightings.size();
   found.runs = runs_of(thing, all);
-  // What all sightings of a thing have in common would come in once more.
-  if (thing.known != nullptr && !map.learnt_runs.empty()) return found;
+  if (thing.known != nullptr && known_ones_stay(map)) return found;
   found.landmark.offset_m = std::clamp(place_m, 0.0, map.edge(first.edge)->alignment.length_m());
   found.landmark.sigma_m = sigma_m;
   found.moved_m = thing.known != nullptr ? found.landmark.offset_m - thing.known->offset_m : 0.0;
@@ -156,7 +155,7 @@ Survey survey_landmarks(const track::Map& map, const std::vector<SurveySighting>
 void apply_survey(const Survey& survey, track::Map& map) {
   for (const SurveyedLandmark& found : survey.landmarks) {
     if (found.known_id != 0) {
-      if (!map.learnt_runs.empty()) continue;
+      if (known_ones_stay(map)) continue;
       map.landmarks[found.known_id - 1] = found.landmark;
       if (found.landmark.kind == track::LandmarkKind::balise) move_group(found, map);
       continue;

@@ -52,9 +52,14 @@ struct Survey {
   double spread = 0;      // rms of errors over their sigmas; sigmas are widened where it is above 1
 };
 
+/// All sightings of a thing err alike to some part, which would come in once more: on a map that has learnt before the
+/// known landmarks stay as they are, and only new ones are found.
+inline bool known_ones_stay(const track::Map& map) {
+  return !map.learnt_runs.empty();
+}
+
 /// Robust least squares (Huber) over landmarks and the error of every run's way; landmarks of the map enter with their
-/// sigma. What the camera sees wrongly in the same way every time does not average out: see common_share. So those of a
-/// map that has learnt before stay as they are, and only new ones are found.
+/// sigma. What the camera sees wrongly in the same way every time does not average out: see common_share.
 Survey survey_landmarks(const track::Map& map, const std::vector<SurveySighting>& sightings,
                         const SurveyOptions& options);
 
@@ -63,7 +68,7 @@ void apply_survey(const Survey& survey, track::Map& map);
 
 struct ReadSightings {
   std::vector<SurveySighting> placed;
-  size_t placeless = 0;  // left out: the track was not known there, or nothing of the map lies there
+  size_t placeless = 0;             // left out: the track was not known there, or nothing of the map lies there
   std::vector<std::string> runs{};  // that have sightings, by their content, for Map::learnt_runs
 };
 

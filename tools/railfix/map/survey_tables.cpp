@@ -1,8 +1,6 @@
 // The tables of a run as sightings on the map.
 #include <algorithm>
-#include <cinttypes>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <map>
 
@@ -184,9 +182,7 @@ core::Result<std::string> content_of(const std::filesystem::path& file) {
   if (!text.ok()) return text.error();
   core::Fnv fnv;
   fnv.add(text.value());
-  char name[17];
-  std::snprintf(name, sizeof name, "%016" PRIx64, fnv.value());
-  return std::string(name);
+  return fnv.hex();
 }
 
 }  // namespace

@@ -169,7 +169,7 @@ class Tracer {
 
 std::string called(int64_t node, const GeoPoint& at, int64_t way) {
   return (node == id_of_place(at) ? "the point" : "node " + std::to_string(node)) + " of way/" + std::to_string(way) +
-         " at latitude " + told_number(at.lat_deg, 6) + ", longitude " + told_number(at.lon_deg, 6);
+         " at " + told_place(at);
 }
 
 OsmChains chains_of(const OsmData& data, const Projection& projection, double smooth_m) {

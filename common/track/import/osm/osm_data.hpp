@@ -61,8 +61,6 @@ bool is_platform(const OsmTags& tags, bool with_trams);
 /// A platform with holes in it; the ways around it, by their role, are then its outline.
 bool is_platform_relation(const OsmTags& tags, bool with_trams);
 bool is_outline(const std::string& role);
-/// A node of a track by its nature: a balise, signal, switch, or where something crosses.
-bool is_of_track(const OsmTags& tags);
 /// A node that is one of the masts that carry the wire. They stand beside the tracks, and no way leads there.
 bool is_mast(const OsmTags& tags);
 /// There, and not "no", nor what converters write for that.

@@ -33,6 +33,12 @@ bool is_no_mast(const std::string& position) {
   return std::ranges::find(kNoMasts, position) != kNoMasts.end();
 }
 
+/// By its nature: a balise, signal, switch, or where something crosses.
+bool is_of_track(const OsmTags& tags) {
+  constexpr std::array kKinds{"balise", "signal", "switch", "level_crossing", "crossing", "railway_crossing"};
+  return std::ranges::find(kKinds, value_of(tags, "railway")) != kKinds.end() || is_set(tags, "railway:balise");
+}
+
 }  // namespace
 
 std::optional<TrackMark> OsmPoints::mark(int64_t node, int64_t way, double offset_m, std::optional<bool> along_way) {
@@ -79,13 +85,10 @@ void OsmPoints::tell_strays(std::vector<std::string>& problems) const {
       strays.emplace(id, node.place);
   }
   if (strays.empty()) return;
-  const GeoPoint& first = strays.begin()->second;
   problems.push_back(
       std::to_string(strays.size()) +
-      " signals, switches, balises and crossings are no points of a track that is read, the first one at "
-      "latitude " +
-      told_number(first.lat_deg, 6) + ", longitude " + told_number(first.lon_deg, 6) +
-      "; left out: they count where the line has a point at the very same place");
+      " signals, switches, balises and crossings are no points of a track that is read, the first one at " +
+      told_place(strays.begin()->second) + "; left out: they count where the line has a point at the very same place");
 }
 
 void OsmPoints::tell(std::vector<std::string>& problems) const {

@@ -211,11 +211,6 @@ bool is_platform_relation(const OsmTags& tags, bool with_trams) {
   return value_of(tags, "type") == "multipolygon" && is_platform(tags, with_trams);
 }
 
-bool is_of_track(const OsmTags& tags) {
-  constexpr std::array kKinds{"balise", "signal", "switch", "level_crossing", "crossing", "railway_crossing"};
-  return std::ranges::find(kKinds, value_of(tags, "railway")) != kKinds.end() || is_set(tags, "railway:balise");
-}
-
 bool is_mast(const OsmTags& tags) {
   return value_of(tags, "power") == "catenary_mast";
 }

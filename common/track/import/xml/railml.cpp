@@ -111,19 +111,18 @@ void tell_repeated_ids(const XmlSource& source, std::vector<std::string>& proble
 
 /// Groups of one identity of which not all are on the map, where the check of maps finds those.
 void tell_repeated_identities(const XmlSource& source, RailNet& net) {
-  std::map<uint32_t, std::vector<pugi::xml_node>> groups_of;
-  std::map<uint32_t, size_t> on_map;
-  const auto key = [](const auto& group) { return group.nid_c << 14U | group.nid_bg; };
+  std::map<EtcsIdentity, std::vector<pugi::xml_node>> groups_of;
+  std::map<EtcsIdentity, size_t> on_map;
   for (const NetTrack& track : net.tracks) {
-    for (const TrackGroup& group : track.track.groups) ++on_map[key(group)];
+    for (const TrackGroup& group : track.track.groups) ++on_map[{group.nid_c, group.nid_bg}];
   }
   for (const pugi::xml_node& group : descendants(source.root(), "baliseGroup")) {
-    if (const auto identity = etcs_identity(source, group)) groups_of[key(*identity)].push_back(group);
+    if (const auto identity = etcs_identity(source, group)) groups_of[*identity].push_back(group);
   }
   for (const auto& [identity, groups] : groups_of) {
     if (groups.size() < 2 || on_map[identity] == groups.size()) continue;
     net.problems.push_back(railml_called(groups[0]) + " and " + railml_called(groups[1]) + " have one identity, " +
-                           std::to_string(identity >> 14U) + "/" + std::to_string(identity & 0x3FFFU) +
+                           std::to_string(identity.nid_c) + "/" + std::to_string(identity.nid_bg) +
                            ": one of them has a wrong one");
   }
 }
