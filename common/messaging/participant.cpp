@@ -4,7 +4,9 @@
 #include <fastrtps/xmlparser/XMLProfileManager.h>
 #include <algorithm>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <filesystem>
 #include <mutex>
+#include <sstream>
 
 #include "core/time.hpp"
 #include "messaging/fastdds_types.hpp"
@@ -136,6 +138,24 @@ void note(Known& known, const Endpoint& endpoint, bool removed, const std::vecto
   known[endpoint.guid()] = {endpoint.topicName().to_string(), terms_of(endpoint.m_qos)};
 }
 
+// A reader in shared memory that is gone before a writer hears of it, or has a /dev/shm of its own, has left no place
+// to be called at. 2.9.1 takes it for one on the network without an address then, and sends the next sample to it for
+// ever, with all locks held (ReaderLocator::start, StatefulWriter::deliver_sample_to_network).
+bool has_no_memory(const eprosima::fastrtps::rtps::ReaderProxyData& reader) {
+  const auto& shared = reader.m_qos.data_sharing;
+  if (shared.kind() == dds::DataSharingKind::OFF || shared.domain_ids().empty()) return false;
+  std::ostringstream place;
+  place << "/dev/shm/fast_datasharing_" << reader.guid().guidPrefix << "_" << reader.guid().entityId;
+  return !std::filesystem::exists(place.str());
+}
+
+// No writer matches it: what is matched next is this very object, which Fast DDS only shows.
+void keep_apart(const eprosima::fastrtps::rtps::ReaderProxyData& reader) {
+  auto& partition = const_cast<eprosima::fastrtps::rtps::ReaderProxyData&>(reader).m_qos.m_partition;
+  partition.clear();
+  partition.push_back("gone");
+}
+
 }  // namespace
 
 void Participant::Impl::on_participant_discovery(dds::DomainParticipant*,
@@ -174,9 +194,11 @@ void Participant::Impl::on_publisher_discovery(dds::DomainParticipant* own,
 
 void Participant::Impl::on_subscriber_discovery(dds::DomainParticipant* own,
                                                 eprosima::fastrtps::rtps::ReaderDiscoveryInfo&& info) {
+  const bool removed = info.status == eprosima::fastrtps::rtps::ReaderDiscoveryInfo::REMOVED_READER;
+  const bool others = info.info.guid().guidPrefix != own->guid().guidPrefix;
+  if (others && !removed && has_no_memory(info.info)) keep_apart(info.info);
   const std::lock_guard lock(mutex);
-  note(remote_readers, info.info, info.status == eprosima::fastrtps::rtps::ReaderDiscoveryInfo::REMOVED_READER,
-       {train.partition, host.partition}, *own);
+  note(remote_readers, info.info, removed, {train.partition, host.partition}, *own);
 }
 
 void Participant::Impl::join(Ends& ends) {

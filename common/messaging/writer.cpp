@@ -12,7 +12,6 @@ namespace dds = eprosima::fastdds::dds;
 namespace {
 
 const eprosima::fastrtps::Duration_t kLastWordsPatience{0, 300'000'000};
-constexpr int kFailuresBeforeClearing = 4;
 
 }  // namespace
 
@@ -25,10 +24,10 @@ struct AnyWriter::Impl : dds::DataWriterListener {
   dds::DataWriter* writer = nullptr;
   std::shared_ptr<void> scratch;  // for topics whose samples cannot be loaned
   std::shared_ptr<SentCount> sent;
-  int failed_in_a_row = 0;
 
   bool send(void* sample);
-  void free_memory_when_stuck();
+  void* loan(dds::DataWriter::LoanInitializationKind initialization);
+  void* memory_for_a_sample();
   void touch_shared_memory();
 
   ~Impl() override {
@@ -73,34 +72,40 @@ AnyWriter::AnyWriter(Participant& participant, const TopicInfo& topic, const std
   inside.writers.insert(impl_->writer);
 }
 
+// Nullptr when there is none.
+void* AnyWriter::Impl::loan(dds::DataWriter::LoanInitializationKind initialization) {
+  void* memory = nullptr;
+  return writer->loan_sample(memory, initialization) == ReturnCode_t::RETCODE_OK ? memory : nullptr;
+}
+
 // Shared memory is fresh when a writer is made: else each of its first pictures would wait for hundreds of page faults.
 // One sample more than may be loaned at a time lies in it; what is given back goes to the end of the row.
 void AnyWriter::Impl::touch_shared_memory() {
   std::vector<void*> loans;
-  void* loan = nullptr;
-  const auto touched = [&] {
-    return writer->loan_sample(loan, dds::DataWriter::LoanInitializationKind::ZERO_LOAN_INITIALIZATION) ==
-           ReturnCode_t::RETCODE_OK;
-  };
-  if (touched()) writer->discard_loan(loan);
-  while (loans.size() < static_cast<size_t>(topic.qos.depth) && touched()) {
-    loans.push_back(loan);
+  const auto touched = [&] { return loan(dds::DataWriter::LoanInitializationKind::ZERO_LOAN_INITIALIZATION); };
+  if (void* first = touched()) writer->discard_loan(first);
+  while (loans.size() < static_cast<size_t>(topic.qos.depth)) {
+    void* one = touched();
+    if (one == nullptr) break;
+    loans.push_back(one);
   }
   for (void* one : loans) writer->discard_loan(one);
 }
 
-// Shared memory holds one sample more than the history. Should one be lost inside the middleware, a full history leaves
-// none for the next sample, whose coming would have made the oldest go: from then on every write would fail.
-void AnyWriter::Impl::free_memory_when_stuck() {
-  if (!topic.qos.data_sharing || ++failed_in_a_row < kFailuresBeforeClearing) return;
-  failed_in_a_row = 0;
+// Shared memory holds one sample more than the history, so there is always some, but for this: where a reader is
+// matched while a sample waits to be sent, 2.9.1 (StatefulWriter::check_acked_status) never takes that sample out of
+// the history again, and no memory of what came after it becomes free.
+void* AnyWriter::Impl::memory_for_a_sample() {
+  constexpr auto kAsItIs = dds::DataWriter::LoanInitializationKind::NO_LOAN_INITIALIZATION;
+  void* memory = loan(kAsItIs);
+  if (memory != nullptr || !topic.qos.data_sharing) return memory;
   size_t removed = 0;
   writer->clear_history(&removed);
+  return loan(kAsItIs);
 }
 
 bool AnyWriter::Impl::send(void* sample) {
   if (!writer->write(sample)) return false;
-  failed_in_a_row = 0;
   ++sent->samples;
   return true;
 }
@@ -110,17 +115,11 @@ bool AnyWriter::write(const void* sample) {
 }
 
 bool AnyWriter::write_in_place(const std::function<void(void*)>& fill) {
-  void* loan = nullptr;
-  const auto loaned = impl_->writer->loan_sample(loan, dds::DataWriter::LoanInitializationKind::NO_LOAN_INITIALIZATION);
-  if (loaned != ReturnCode_t::RETCODE_OK) {
-    fill(impl_->scratch.get());
-    if (impl_->send(impl_->scratch.get())) return true;
-  } else {
-    fill(loan);
-    if (impl_->send(loan)) return true;
-    impl_->writer->discard_loan(loan);
-  }
-  impl_->free_memory_when_stuck();
+  void* loaned = impl_->memory_for_a_sample();
+  void* sample = loaned != nullptr ? loaned : impl_->scratch.get();
+  fill(sample);
+  if (impl_->send(sample)) return true;
+  if (loaned != nullptr) impl_->writer->discard_loan(loaned);
   return false;
 }
 

@@ -3,7 +3,13 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <chrono>
+#include <filesystem>
+#include <fstream>
 #include <set>
+#include <string>
+#include <thread>
 
 #include "core/time.hpp"
 #include "messaging/topics.hpp"
@@ -91,6 +97,70 @@ TEST_F(Exchange, PicturesAreFilledInPlace) {
     ASSERT_TRUE(run_until([&] { return seen == i; })) << "picture " << int{i};
     EXPECT_EQ(last_pixel, i);
   }
+}
+
+// A second reader that is matched just while a picture waits to be sent had Fast DDS keep that picture for ever, and
+// the seventeenth after it found no memory. Here pictures wait, because previews keep the thread busy that sends both.
+TEST_F(Exchange, NoPictureIsRefusedWhileReadersComeAndGo) {
+  constexpr int kComeAndGo = 10;
+  constexpr auto kPeriod = std::chrono::milliseconds(10);
+  const auto ignore = [](const auto&) {};
+  Participant other(options("train-" + std::to_string(getpid())));
+  Queue other_queue;
+  Reader<msg::CameraPreview> previews(other, topics::camera_preview, "cam0", other_queue, ignore);
+  Reader<msg::CameraFrame> stays(other, topics::camera_frame, "cam0", other_queue, ignore);
+  Writer<msg::CameraPreview> preview_writer(participant_, topics::camera_preview, "cam0");
+  Writer<msg::CameraFrame> writer(participant_, topics::camera_frame, "cam0");
+  ASSERT_TRUE(run_until([&] { return preview_writer.matched_readers() == 1 && writer.matched_readers() == 1; }));
+  std::atomic<bool> over = false;
+  std::thread busy([&] {
+    msg::CameraPreview preview;
+    preview.jpeg().resize(2'000'000);
+    while (!over) preview_writer.write(preview);
+  });
+  int refused = 0;
+  const auto write_until_read_by = [&](int readers) {
+    EXPECT_TRUE(run_until([&] {
+      if (!writer.write_in_place([](msg::CameraFrame& frame) { frame.seq(1); })) ++refused;
+      std::this_thread::sleep_for(kPeriod);
+      return writer.matched_readers() == readers;
+    }));
+  };
+  for (int i = 0; i < kComeAndGo; ++i) {
+    {
+      Reader<msg::CameraFrame> comes(other, topics::camera_frame, "cam0", other_queue, ignore);
+      write_until_read_by(2);
+    }
+    for (int k = 0; k < 17; ++k) write_until_read_by(1);
+  }
+  over = true;
+  busy.join();
+  EXPECT_EQ(refused, 0);
+}
+
+/// The files of shared memory that this process has open.
+std::set<std::string> shared_memory() {
+  std::set<std::string> files;
+  std::ifstream maps("/proc/self/maps");
+  for (std::string line; std::getline(maps, line);) {
+    if (const size_t at = line.find("/dev/shm/"); at != std::string::npos) files.insert(line.substr(at));
+  }
+  return files;
+}
+
+// As one that left before the writer's process came to hear of it, or whose container has a /dev/shm of its own: Fast
+// DDS would send it the next picture for ever.
+TEST_F(Exchange, AReaderWithoutItsMemoryDoesNotHoldTheCameraBack) {
+  const std::set<std::string> before = shared_memory();
+  Reader<msg::CameraFrame> reader(participant_, topics::camera_frame, "cam0", queue_, [](const msg::CameraFrame&) {});
+  int removed = 0;
+  for (const auto& file : shared_memory()) removed += !before.contains(file) && std::filesystem::remove(file) ? 1 : 0;
+  ASSERT_EQ(removed, 1);
+  Participant other(options("train-" + std::to_string(getpid())));
+  Writer<msg::CameraFrame> writer(other, topics::camera_frame, "cam0");
+  ASSERT_TRUE(run_until([&] { return reader.matched_writers() == 1; }));
+  EXPECT_EQ(writer.matched_readers(), 0);
+  for (int i = 0; i < 40; ++i) EXPECT_TRUE(writer.write_in_place([](msg::CameraFrame& frame) { frame.seq(1); })) << i;
 }
 
 TEST_F(Exchange, LateJoinersGetTheCalibration) {
