@@ -4,11 +4,9 @@
 #include <functional>
 
 #include "core/random.hpp"
-#include "core/units.hpp"
 #include "import_fixture.hpp"
+#include "plans.hpp"
 #include "track/import/build.hpp"
-#include "track/import/xml/erju.hpp"
-#include "track/import/xml/railml.hpp"
 #include "track/path.hpp"
 
 namespace railfix::track {
@@ -16,12 +14,6 @@ namespace {
 
 using testing::Contains;
 using testing::HasSubstr;
-
-double length_of(const Map& map) {
-  double sum = 0;
-  for (const Edge& edge : map.edges) sum += edge.alignment.length_m();
-  return sum;
-}
 
 const Node* node_named(const Map& map, const std::string& name) {
   const auto found = std::find_if(map.nodes.begin(), map.nodes.end(), [&](const Node& n) { return n.name == name; });
@@ -33,103 +25,10 @@ size_t count_of(const Map& map, LandmarkKind kind) {
       std::count_if(map.landmarks.begin(), map.landmarks.end(), [&](const Landmark& m) { return m.kind == kind; }));
 }
 
-/// Name and offset of the only level crossing.
-std::pair<std::string, double> level_crossing_of(const Map& map) {
-  std::vector<const Landmark*> found;
-  for (const Landmark& mark : map.landmarks) {
-    if (mark.kind == LandmarkKind::level_crossing) found.push_back(&mark);
-  }
-  return found.size() == 1 ? std::pair(found[0]->name, found[0]->offset_m)
-                           : std::pair(std::string("none or many"), 0.0);
-}
-
-/// km/h, 0 = none said.
-double limit_kmh(const Map& map, uint32_t edge, double offset_m, Direction running) {
-  return core::kmh_from_mps(map.edge(edge)->speed_limit_mps(offset_m, running).value_or(0));
-}
-
 size_t ways_at(const Map& map, uint32_t node) {
   return static_cast<size_t>(std::count_if(map.connections.begin(), map.connections.end(),
                                            [&](const Connection& way) { return way.node == node; }));
 }
-
-// A line of 1000 m with a right curve; a siding leaves it to the left at 300 m and comes back at 700 m.
-constexpr const char* kRailml2 = R"(<?xml version="1.0"?>
-<railml xmlns="https://www.railml.org/schemas/2018" version="2.4"><infrastructure id="i"><tracks>
-<track id="t1" name="main"><trackTopology><trackBegin id="b1" pos="0"><openEnd id="o1"/></trackBegin>
-<trackEnd id="e1" pos="1000"><bufferStop id="o2"/></trackEnd><connections>
-<switch id="w1" name="W1" pos="300" trackContinueCourse="straight"><connection id="c1" ref="c3" orientation="outgoing" course="left"/></switch>
-<switch id="w2" name="W2" pos="700" trackContinueCourse="straight"><connection id="c2" ref="c4" orientation="incoming" course="right"/></switch>
-</connections></trackTopology><trackElements><radiusChanges><radiusChange id="r1" pos="800" radius="500" superelevation="60"/>
-<radiusChange id="r2" pos="950" radius="0"/></radiusChanges><gradientChanges><gradientChange id="g1" pos="0" slope="5"/>
-<gradientChange id="g2" pos="400" slope="-10"/></gradientChanges>
-<bridges><brigde id="br1" name="B" pos="40" length="20" kind="under"/><bridge id="br2" name="C" pos="80" length="20"/>
-<brigde id="br3" name="D" pos="120" length="10" kind="crossing"/></bridges>
-<tunnels><tunnel id="tu1" name="T" pos="820" length="100"/></tunnels>
-<platformEdges><platformEdge id="pe1" name="P" pos="400" length="150" side="left"/></platformEdges>
-<levelCrossings><levelCrossing id="lc1" name="Mill Lane" pos="100"/></levelCrossings>
-<speedChanges><speedChange id="v1" pos="0" dir="up" vMax="80"/><speedChange id="v2" pos="500" dir="up" vMax="120"/>
-<speedChange id="v3" pos="900" dir="down" vMax="60"/><speedChange id="v4" pos="200" dir="down" vMax="end"/>
-<speedChange id="v5" pos="0" dir="up" vMax="20" profileRef="slow"/></speedChanges></trackElements>
-<ocsElements><signals><signal id="s1" name="S" pos="280"/></signals><balises><balise id="x1" pos="200"/><balise id="x2" pos="203"/>
-<baliseGroup id="bg1" name="BG" countryID="97" groupID="1234"><baliseRef ref="x1" sequence="1"/><baliseRef ref="x2" sequence="2"/></baliseGroup>
-</balises></ocsElements></track>
-<track id="t2" name="siding"><trackTopology><trackBegin id="b2" pos="0"><connection id="c3" ref="c1"/></trackBegin>
-<trackEnd id="e2" pos="400"><connection id="c4" ref="c2"/></trackEnd></trackTopology></track>
-</tracks><infraAttrGroups/><speedProfiles><speedProfile id="slow" influence="decreasing"/></speedProfiles></infrastructure></railml>)";
-
-constexpr const char* kRailml3 = R"(<?xml version="1.0"?>
-<railML xmlns="https://www.railml.org/schemas/3.2" version="3.2"><common><positioning><geometricPositioningSystems>
-<geometricPositioningSystem id="gps" crsDefinition="EPSG:25832"/></geometricPositioningSystems></positioning></common>
-<infrastructure><topology><netElements>
-<netElement id="n1" length="300"><associatedPositioningSystem><intrinsicCoordinate intrinsicCoord="0"><geometricCoordinate positioningSystemRef="gps" x="500000" y="5500000"/></intrinsicCoordinate>
-<intrinsicCoordinate intrinsicCoord="1"><geometricCoordinate positioningSystemRef="gps" x="500300" y="5500000"/></intrinsicCoordinate></associatedPositioningSystem></netElement>
-<netElement id="n2" length="200"/><netElement id="n3" length="200"/></netElements><netRelations>
-<netRelation id="r12" navigability="Both" positionOnA="1" positionOnB="0"><elementA ref="n1"/><elementB ref="n2"/></netRelation>
-<netRelation id="r13" navigability="Both" positionOnA="1" positionOnB="0"><elementA ref="n1"/><elementB ref="n3"/></netRelation>
-<netRelation id="r23" navigability="None" positionOnA="0" positionOnB="0"><elementA ref="n2"/><elementB ref="n3"/></netRelation>
-</netRelations></topology><geometry><gradientCurves><gradientCurve id="g1" curveType="straight" gradient="5"><linearLocation>
-<associatedNetElement netElementRef="n2" posBegin="0" posEnd="200"/></linearLocation></gradientCurve></gradientCurves></geometry><functionalInfrastructure>
-<switchesIS><switchIS id="s1" branchCourse="right" continueCourse="left" type="ordinarySwitch"><name name="W7"/>
-<leftBranch netRelationRef="r12"/><rightBranch netRelationRef="r13"/></switchIS></switchesIS>
-<overCrossings><overCrossing id="o1" constructionType="tunnel"><linearLocation><associatedNetElement netElementRef="n2" posBegin="50" posEnd="150"/></linearLocation></overCrossing>
-<overCrossing id="o2" constructionType="bridge"><linearLocation><associatedNetElement netElementRef="n3" posBegin="20" posEnd="30"/></linearLocation></overCrossing></overCrossings>
-<underCrossings><underCrossing id="u1" constructionType="bridge"><linearLocation><associatedNetElement netElementRef="n3" posBegin="40" posEnd="60"/></linearLocation></underCrossing></underCrossings>
-<signalsIS><signalIS id="s2"><spotLocation netElementRef="n1" pos="250"/></signalIS></signalsIS>
-<balises><balise id="b1" baliseGroupRef="bg"><spotLocation netElementRef="n1" pos="200"/></balise>
-<balise id="b2" baliseGroupRef="bg"><spotLocation netElementRef="n1" pos="203"/></balise><balise id="b3"><spotLocation netElementRef="n2" pos="20"/></balise></balises>
-<baliseGroups><baliseGroup id="bg"><etcs countryID="97" groupID="77"/></baliseGroup></baliseGroups>
-<platformEdges><platformEdge id="p1"><linearLocation><associatedNetElement netElementRef="n3" posBegin="100" posEnd="180"/></linearLocation></platformEdge></platformEdges>
-<levelCrossingsIS><levelCrossingIS id="x1"><name name="Mill Lane"/><spotLocation netElementRef="n1" pos="120"/></levelCrossingIS></levelCrossingsIS>
-<speeds><speedProfile id="basic" isBasicSpeedProfile="true"/><speedProfile id="tilting" isBasicSpeedProfile="false"/>
-<speedSection id="v1" maxSpeed="100"><linearLocation><associatedNetElement netElementRef="n1" posBegin="50" posEnd="300"/></linearLocation><validForSpeedProfile ref="basic"/></speedSection>
-<speedSection id="v2" maxSpeed="130"><linearLocation><associatedNetElement netElementRef="n2" posBegin="0" posEnd="200"/></linearLocation><validForSpeedProfile ref="tilting"/></speedSection>
-<speedSection id="v3" maxSpeed="40"><linearLocation applicationDirection="reverse"><associatedNetElement netElementRef="n3" posBegin="0" posEnd="200"/></linearLocation></speedSection></speeds>
-</functionalInfrastructure></infrastructure></railML>)";
-
-constexpr const char* kInfra = R"(<?xml version="1.0"?>
-<infrastructure xmlns="https://erju.org/infra"><trackEdges><trackEdge id="T1" trackEdgeLength="500000"/><trackEdge id="T2" trackEdgeLength="300000"/></trackEdges>
-<trackEdgeLinks><trackEdgeLink id="l" trackEdgeA="T1" trackEdgeB="T2" startOfA="false" startOfB="true"/></trackEdgeLinks>
-<trackEdgeGeometries><trackEdgeGeometry id="T1"><cantPoints><cantPoint trackGeometryPos="0" appliedCant="0"/><cantPoint trackGeometryPos="100000" appliedCant="50"/></cantPoints></trackEdgeGeometry></trackEdgeGeometries>
-<sampledTrackEdgeGeometry id="T1"><slopes><slope pos="0" samplePointSlope="100"/></slopes></sampledTrackEdgeGeometry>
-<teSpeedProfiles><teSpeedProfile id="T1"><sameDirProfile><staticSpeedProfile><staticSpeedProfileItem pos="0" speed="60"/>
-<staticSpeedProfileItem pos="200000" speed="40"/></staticSpeedProfile></sameDirProfile><oppositeDirProfile><staticSpeedProfile>
-<staticSpeedProfileItem pos="300000" speed="50"/><staticSpeedProfileItem pos="500000" speed="70"/></staticSpeedProfile></oppositeDirProfile></teSpeedProfile></teSpeedProfiles>
-<platforms><platform id="P"><platformEdges><platformEdge platformId="P1" height="380"><linearLocation skipFromPathStart="420000" skipFromPathEnd="260000">
-<dirTrackEdges><dirTrackEdge trackEdge="T1" sameDir="true"/><dirTrackEdge trackEdge="T2" sameDir="true"/></dirTrackEdges></linearLocation></platformEdge>
-<platformEdge platformId="P2" height="380"><linearLocation skipFromPathStart="200000" skipFromPathEnd="50000"><dirTrackEdges>
-<dirTrackEdge trackEdge="T2" sameDir="false"/></dirTrackEdges></linearLocation></platformEdge>
-<platformEdge platformId="P3" height="380"><linearLocation skipFromPathStart="900000" skipFromPathEnd="0"><dirTrackEdges>
-<dirTrackEdge trackEdge="T2" sameDir="true"/></dirTrackEdges></linearLocation></platformEdge></platformEdges></platform></platforms>
-<tunnels><tunnel id="TU"><trackArea><trackEdgeSections><trackEdgeSection trackEdge="T2" skipFromStart="120000" skipFromEnd="80000"/></trackEdgeSections></trackArea></tunnel></tunnels>
-<bridges><bridge id="BR"><trackArea><trackEdgeSections><trackEdgeSection trackEdge="T2" skipFromStart="240000" skipFromEnd="40000"/></trackEdgeSections></trackArea></bridge></bridges>
-<levelCrossings><levelCrossing id="LX"><trackArea><trackEdgeSection trackEdge="T2" skipFromStart="100000" skipFromEnd="190000"/></trackArea></levelCrossing></levelCrossings>
-<baliseGroups><baliseGroup id="G" nid_c="97" nid_bg="5050" linkOrientationDirection="dirReverse"><balises>
-<balise id="G0"><spotLocation trackEdge="T2" pos="13000"/></balise><balise id="G1"><spotLocation trackEdge="T2" pos="10000"/></balise></balises></baliseGroup></baliseGroups>
-<etcsMarkers><etcsMarker id="12" markerFunctionStop="false"><dirSpotLocation trackEdge="T1" pos="92073" sameDir="false"/></etcsMarker>
-<etcsMarker id="13" markerFunctionStop="true"><dirSpotLocation trackEdge="T2" pos="300001" sameDir="true"/></etcsMarker></etcsMarkers>
-<timingPoints><timingPoint id="TP"><activeObject><etcsMarker ref="12"/></activeObject></timingPoint></timingPoints>
-</infrastructure>)";
 
 class PlanImport : public ImportTest {
  protected:
@@ -411,91 +310,6 @@ TEST_F(PlanImport, PlatformsStandWhereTheFileSaysOrOnNeitherSide) {
   EXPECT_EQ(lateral_m(kRailml3, of_3, with_side("left")), kPlatformEdgeM);
   EXPECT_EQ(lateral_m(kRailml3, of_3, with_side("right")), -kPlatformEdgeM);
   EXPECT_EQ(lateral_m(kRailml3, of_3, with_side("both")), 0);
-}
-
-TEST_F(PlanImport, ErjuValuesThatAreNoneAreLeftOutAndTold) {
-  std::string text = kInfra;
-  const auto instead = [&](const std::string& old, const std::string& now) {
-    text.replace(text.find(old), old.size(), now);
-  };
-  instead(
-      "</cantPoints>",
-      R"(<cantPoint trackGeometryPos="150000" appliedCant="301"/><cantPoint trackGeometryPos="200000" appliedCant="-50000"/></cantPoints>)");
-  instead(R"(pos="200000" speed="40")", R"(pos="200000" speed="601")");
-  instead(R"(pos="300000" speed="50")", R"(pos="300000" speed="-1")");
-  const Map map = core::value_or_throw(build_map({write("infra.xml", text)}, {})).map;
-  EXPECT_THAT(
-      map.problems,
-      testing::IsSupersetOf(
-          {"track edge \"T1\" has appliedCant 301 mm at 150.00 m and 1 more like it, which no track has; left "
-           "out",
-           "track edge \"T1\" has sameDirProfile speed 601 km/h at 200.00 m, which no train runs; no limit begins "
-           "there",
-           "track edge \"T1\" has oppositeDirProfile speed -1 km/h at 300.00 m, which no train runs; no limit "
-           "begins there"}));
-  EXPECT_NEAR(map.edges[0].alignment.at(300).cant_m, 0.05, 1e-12) << "as the last point that is one says";
-  ASSERT_EQ(map.edges[0].speed_limits.size(), 2U);
-  EXPECT_NEAR(map.edges[0].speed_limits[0].to_m, 200, 1e-9);
-  EXPECT_NEAR(map.edges[0].speed_limits[1].speed_mps, 70 / 3.6, 1e-9);
-}
-
-TEST_F(PlanImport, ErjuWithoutCoordinatesIsADrawing) {
-  const Map map = core::value_or_throw(build_map({write("infra.xml", kInfra)}, {})).map;
-  ASSERT_EQ(map.edges.size(), 2U);
-  EXPECT_NEAR(length_of(map), 800, 1e-6);
-  EXPECT_EQ(map.connections.size(), 1U);
-  ASSERT_EQ(map.balise_groups.size(), 1U);
-  EXPECT_FALSE(map.balise_groups[0].nominal_is_forward);
-  EXPECT_NEAR(map.balise_groups[0].offset_m, 13, 1e-9);
-  EXPECT_NEAR(map.edges[0].alignment.at(100).cant_m, 0.05, 1e-12);
-  EXPECT_NEAR(map.edges[1].alignment.at(0).elevation_m, 5, 1e-9);
-  EXPECT_EQ(level_crossing_of(map).first, "LX");
-  EXPECT_NEAR(level_crossing_of(map).second, 105, 1e-9);
-  using Kind = LandmarkKind;
-  EXPECT_THAT(marks_of(map, {Kind::portal_in, Kind::portal_out, Kind::bridge, Kind::underbridge}),
-              testing::ElementsAre("portal_in TU at 120.0 on 2", "portal_out TU at 220.0 on 2",
-                                   "underbridge BR at 250.0 on 2"));
-  EXPECT_THAT(marks_of(map, {Kind::platform}),
-              testing::ElementsAre("platform P1 at 420.0 on 1", "platform P1 at 40.0 on 2", "platform P2 at 50.0 on 2",
-                                   "platform P2 at 100.0 on 2"));
-  EXPECT_THAT(map.problems, Contains("platform edge \"P3\" is not on its track edges; it is left out"));
-  EXPECT_THAT(marks_of(map, {Kind::mast}), testing::ElementsAre("mast 12 at 92.1 on 1"));
-  EXPECT_THAT(map.problems, Contains("ETCS marker board \"13\" is not on its track edge; it is left out"));
-  EXPECT_NEAR(limit_kmh(map, 1, 100, Direction::forward), 60, 1e-9);
-  EXPECT_NEAR(limit_kmh(map, 1, 250, Direction::forward), 40, 1e-9);
-  EXPECT_NEAR(limit_kmh(map, 1, 100, Direction::reverse), 50, 1e-9);
-  EXPECT_NEAR(limit_kmh(map, 1, 400, Direction::reverse), 70, 1e-9);
-  EXPECT_EQ(limit_kmh(map, 2, 100, Direction::forward), 0);
-}
-
-TEST_F(PlanImport, ScheibenbergIsReadWhole) {
-  const std::filesystem::path infra = shared_data("network/scheibenberg/infra_v1.0.xml");
-  const std::filesystem::path places = shared_data("network/scheibenberg/map_v1.0.xml");
-  if (!std::filesystem::exists(infra)) GTEST_SKIP() << "skipped: no " << infra;
-  const BuiltMap built = core::value_or_throw(build_map({infra, places}, {}));
-  const Map& map = built.map;
-  EXPECT_EQ(map.crs, "EPSG:31468");  // the file names the zone by a number that PROJ has not
-  EXPECT_EQ(map.edges.size(), 11U);
-  EXPECT_EQ(map.balise_groups.size(), 115U);
-  EXPECT_EQ(std::ranges::count(map.landmarks, LandmarkKind::balise, &Landmark::kind), 163);
-  EXPECT_EQ(std::ranges::count(map.landmarks, LandmarkKind::mast, &Landmark::kind), 56) << "marker boards";
-  EXPECT_EQ(std::count_if(map.nodes.begin(), map.nodes.end(),
-                          [](const Node& node) { return node.kind == NodeKind::railway_switch; }),
-            6);
-  // As the files count, but for one edge whose coordinates are 20.5 m shorter than its length.
-  EXPECT_NEAR(length_of(map), 26258.83 - 20.5, 1);
-  EXPECT_THAT(map.problems, Contains(HasSubstr("T11")));
-  // The file says this one as a straight, an arc and a straight, and its points lie on them.
-  const auto t6 = std::ranges::find_if(map.edges, [](const Edge& edge) { return edge.name.starts_with("T6 "); });
-  ASSERT_EQ(t6->alignment.elements().size(), 3U);
-  EXPECT_NEAR(1 / t6->alignment.elements()[1].curvature_start_per_m, -190.1, 0.01);
-  EXPECT_TRUE(
-      std::none_of(map.edges.begin(), map.edges.end(), [](const Edge& edge) { return edge.speed_limits.empty(); }));
-  EXPECT_LT(built.fit.max_m, 0.5);
-  const auto geo = map.to_geo(map.nodes[0].easting_m, map.nodes[0].northing_m);
-  ASSERT_TRUE(geo);
-  EXPECT_NEAR(geo->lat_deg, 50.54, 0.1);  // Scheibenberg in Saxony
-  EXPECT_NEAR(geo->lon_deg, 12.91, 0.15);
 }
 
 TEST_F(PlanImport, SaysWhatIsWrongInOneSentence) {
