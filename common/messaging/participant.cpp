@@ -13,6 +13,7 @@
 #include "messaging/layout.hpp"
 #include "messaging/network.hpp"
 #include "messaging/security.hpp"
+#include "messaging/topics.hpp"
 #include "messaging/transport.hpp"
 
 namespace railfix::messaging {
@@ -27,6 +28,7 @@ constexpr int32_t kParticipantLeaseS = 5;
 constexpr int32_t kAnnouncementS = 1;
 // The first announcement that is heard comes so long after the participant is made.
 constexpr uint32_t kFirstAnnouncementNs = 20'000'000;
+constexpr int64_t kLongestMessageNs = 5 * core::kNsPerSecond;
 // Participants of one host that a peer is asked for: every service twice (standby, swap) and a few tools.
 constexpr uint32_t kParticipantsOfHost = 32;
 
@@ -92,6 +94,13 @@ dds::DomainParticipantQos participant_qos(const ParticipantOptions& options,
 
 }  // namespace
 
+bool has_shared_memory(const eprosima::fastrtps::rtps::GUID_t& endpoint) {
+  std::ostringstream file;
+  file << "/dev/shm/fast_datasharing_" << endpoint.guidPrefix << "_" << endpoint.entityId;
+  std::error_code none;
+  return std::filesystem::exists(file.str(), none);
+}
+
 dds::Topic* Participant::Impl::topic(const TopicInfo& info, const std::string& instance) {
   const std::string name = instance.empty() ? info.name : info.name + "/" + instance;
   const std::lock_guard lock(mutex);
@@ -138,15 +147,14 @@ void note(Known& known, const Endpoint& endpoint, bool removed, const std::vecto
   known[endpoint.guid()] = {endpoint.topicName().to_string(), terms_of(endpoint.m_qos)};
 }
 
-// A reader in shared memory that is gone before a writer hears of it, or has a /dev/shm of its own, has left no place
-// to be called at. 2.9.1 takes it for one on the network without an address then, and sends the next sample to it for
-// ever, with all locks held (ReaderLocator::start, StatefulWriter::deliver_sample_to_network).
-bool has_no_memory(const eprosima::fastrtps::rtps::ReaderProxyData& reader) {
-  const auto& shared = reader.m_qos.data_sharing;
-  if (shared.kind() == dds::DataSharingKind::OFF || shared.domain_ids().empty()) return false;
-  std::ostringstream place;
-  place << "/dev/shm/fast_datasharing_" << reader.guid().guidPrefix << "_" << reader.guid().entityId;
-  return !std::filesystem::exists(place.str());
+// 2.9.1 sends the next sample for ever, with all locks held, to a reader on the network without an address
+// (StatefulWriter::deliver_sample_to_network). For one it takes a reader in shared memory, too, that has left no place
+// to be called at (ReaderLocator::start): it went before the writer heard of it, or has a /dev/shm of its own.
+bool cannot_be_reached(const eprosima::fastrtps::rtps::ReaderProxyData& reader, bool own) {
+  const auto* topic = find_topic(reader.topicName().to_string());
+  const bool shares = topic != nullptr && topic->qos.data_sharing && !reader.m_qos.data_sharing.domain_ids().empty();
+  if (shares) return !has_shared_memory(reader.guid());
+  return !own && reader.remote_locators().unicast.empty() && reader.remote_locators().multicast.empty();
 }
 
 // No writer matches it: what is matched next is this very object, which Fast DDS only shows.
@@ -195,8 +203,8 @@ void Participant::Impl::on_publisher_discovery(dds::DomainParticipant* own,
 void Participant::Impl::on_subscriber_discovery(dds::DomainParticipant* own,
                                                 eprosima::fastrtps::rtps::ReaderDiscoveryInfo&& info) {
   const bool removed = info.status == eprosima::fastrtps::rtps::ReaderDiscoveryInfo::REMOVED_READER;
-  const bool others = info.info.guid().guidPrefix != own->guid().guidPrefix;
-  if (others && !removed && has_no_memory(info.info)) keep_apart(info.info);
+  const bool is_own = info.info.guid().guidPrefix == own->guid().guidPrefix;
+  if (!removed && cannot_be_reached(info.info, is_own)) keep_apart(info.info);
   const std::lock_guard lock(mutex);
   note(remote_readers, info.info, removed, {train.partition, host.partition}, *own);
 }
@@ -230,6 +238,7 @@ Participant::Participant(const ParticipantOptions& options) : impl_(std::make_un
   impl_->host.partition = impl_->train.partition + "/memory/" + memory_id();
   const auto transport = transport_of(options);
   impl_->discovery = transport->discovery;
+  impl_->handed_on = transport->handed_on;
   auto qos = participant_qos(options, transport);
   if (!options.security_folder.empty()) {
     impl_->certificate_ends_ns =
@@ -251,6 +260,19 @@ Participant::~Participant() {
   impl_->participant->set_listener(nullptr);
   impl_->participant->delete_contained_entities();
   dds::DomainParticipantFactory::get_instance()->delete_participant(impl_->participant);
+}
+
+bool Participant::hears(int64_t now_ns) {
+  const std::unique_lock at_rest(*impl_->discovery, std::try_to_lock);
+  auto& since_ns = impl_->at_message_since_ns;
+  if (at_rest) {
+    since_ns.reset();
+    return true;
+  }
+  const uint64_t message = *impl_->handed_on;
+  if (!since_ns || message != impl_->at_message) since_ns = now_ns;
+  impl_->at_message = message;
+  return now_ns - *since_ns < kLongestMessageNs;
 }
 
 bool Participant::interface_appeared() const {

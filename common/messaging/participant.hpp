@@ -10,6 +10,7 @@
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
 #include <map>
+#include <optional>
 #include <set>
 
 #include "messaging/messaging.hpp"
@@ -28,6 +29,9 @@ struct Participant::Impl : eprosima::fastdds::dds::DomainParticipantListener {
   ParticipantOptions options;
   size_t running_interfaces = 0;          // when this participant joined
   std::shared_ptr<std::mutex> discovery;  // held where a reader or writer goes away (see transport.hpp)
+  std::shared_ptr<const std::atomic<uint64_t>> handed_on;
+  uint64_t at_message = 0;                     // of them, when it was looked at last ...
+  std::optional<int64_t> at_message_since_ns;  // ... and since when
   eprosima::fastdds::dds::DomainParticipant* participant = nullptr;
   /// Where writers and readers live: those of the whole train, and those of topics that stay in this host's memory.
   struct Ends {
@@ -72,5 +76,8 @@ struct Participant::Impl : eprosima::fastdds::dds::DomainParticipantListener {
   void on_subscriber_discovery(eprosima::fastdds::dds::DomainParticipant*,
                                eprosima::fastrtps::rtps::ReaderDiscoveryInfo&& info) override;
 };
+
+/// Whether this reader or writer of this host has its file in shared memory.
+[[nodiscard]] bool has_shared_memory(const eprosima::fastrtps::rtps::GUID_t& endpoint);
 
 }  // namespace railfix::messaging

@@ -72,7 +72,10 @@ class Transport final : public rtps::ChainingTransport {
                const Locator_t& local, const Locator_t& remote) override {
     if (!*descriptor_.open) return;
     std::unique_lock one_at_a_time(*descriptor_.discovery, std::defer_lock);
-    if (is_of_discovery(local)) one_at_a_time.lock();
+    if (is_of_discovery(local)) {
+      one_at_a_time.lock();
+      ++*descriptor_.handed_on;
+    }
     next->OnDataReceived(bytes, size, local, remote);
   }
 

@@ -30,6 +30,8 @@ struct TrainTransport : eprosima::fastdds::rtps::ChainingTransportDescriptor {
   std::shared_ptr<std::atomic<bool>> open = std::make_shared<std::atomic<bool>>(false);
   /// Held while something is handed on to the discovery.
   std::shared_ptr<std::mutex> discovery = std::make_shared<std::mutex>();
+  /// Messages that were handed on to it.
+  std::shared_ptr<std::atomic<uint64_t>> handed_on = std::make_shared<std::atomic<uint64_t>>(0);
 };
 
 }  // namespace railfix::messaging

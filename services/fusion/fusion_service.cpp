@@ -27,7 +27,8 @@ constexpr std::chrono::milliseconds kTickPeriod{50};
 constexpr int64_t kKeepPeriodNs = 250'000'000;
 constexpr uint64_t kNumbersUnheard = 100;  // at least as many as the one before may have used since it was heard last
 constexpr double kSameRideS = 0.5;         // data and the host's clock go on alike
-constexpr double kSameBeginS = 0.5;        // a replay that is looped begins where it began before
+constexpr int64_t kCatchUpNs = 2 * core::kNsPerSecond;
+constexpr double kSameBeginS = 0.5;  // a replay that is looped begins where it began before
 constexpr double kOutOfOrderS = 2.0;
 constexpr double kStandsMps = 1.0;
 constexpr const char* kInDoubt = " in doubt";  // in the notes
@@ -142,12 +143,14 @@ void FusionService::keep(const msg::TrainState& state) {
 }
 
 // A known place is wanted at the time of the first state of the fusion that is to go on from it. False: that fusion has
-// only just been made, or has been told its place, and this state is of the one that did not know.
+// only just been made, or has been told its place, and this state is of the one that did not know; or it is not certain
+// yet whether the place is of this ride.
 bool FusionService::take_over_known(const TrainEstimate& first) {
   const double age_s = core::seconds(first.stamp_ns - known_->stamp_ns());
   if (noted_ns_) {
     // Of the same ride: neither the clock nor a replay has jumped since, nor has another one begun.
     const double noted_s = core::seconds(core::monotonic_ns() - *noted_ns_);
+    if (catches_up(noted_s - age_s)) return false;
     noted_ns_.reset();
     const bool same_time = age_s >= 0 && std::abs(age_s - noted_s) <= kSameRideS;
     if (!same_time || age_s > kOldestPlaceS) {
@@ -179,6 +182,14 @@ bool FusionService::take_over_known(const TrainEstimate& first) {
   begun_anew_ = false;
   known_.reset();
   return !placed;
+}
+
+// Measurements that waited while this process began say too small an age of the notes, until the last of them is used.
+bool FusionService::catches_up(double behind_s) {
+  if (is_played() || behind_s <= kSameRideS) return false;
+  const int64_t now_ns = core::monotonic_ns();
+  if (!behind_since_ns_) behind_since_ns_ = now_ns;
+  return now_ns - *behind_since_ns_ < kCatchUpNs;
 }
 
 // What is known of the place comes from another fusion: what this one believes of it is forgotten.

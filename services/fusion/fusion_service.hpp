@@ -46,6 +46,7 @@ class FusionService {
   [[nodiscard]] TrainEstimate said_of(const TrainEstimate& measured) const;
   [[nodiscard]] bool is_played() const;
   bool take_over_known(const TrainEstimate& first);
+  bool catches_up(double behind_s);
 
   FusionConfig config_;
   service::Context& context_;
@@ -69,6 +70,7 @@ class FusionService {
   bool known_in_doubt_ = false;
   bool in_doubt_ = false;            // the place that is sent now
   std::optional<int64_t> noted_ns_;  // known_ is of the process before, and when it was noted, monotonic
+  std::optional<int64_t> behind_since_ns_;
   bool begun_anew_ = false;          // known_ is to be used in the new one
   bool learnt_ = false;              // nothing more to take over
   bool believes_start_ = false;      // no other fusion of this ride was heard of yet

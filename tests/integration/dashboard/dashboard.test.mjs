@@ -78,7 +78,7 @@ describe("the page", { timeout: 600000 }, () => {
     assert.match(await text("#figure-track .note"), /certain, (> )?\d/);
     assert.match(await text("#figure-integrity .value"), /^(Good|Degraded)$/);
     await until("the camera holds the position", async () => (await page.locator("#figure-integrity .sources .on", { hasText: "camera" }).count()) === 1);
-    assert.equal(await page.locator("#numbers.stale").count(), 0);
+    await until("it is live", async () => (await page.locator("#numbers.stale").count()) === 0);
     assert.match(await text(".connection"), /Connected/);
     assert.match(await page.title(), /run-\d+ Railfix/);
   });
@@ -132,7 +132,7 @@ describe("the page", { timeout: 600000 }, () => {
     assert.deepEqual(names.map((name) => name.split(/\s/)[0]).sort(), SERVICES);
     assert.match(await text("#services tbody tr"), /MB/);
     assert.match(await text("#services .aside"), /^\d of 9 well · \d+\s% of a core/);
-    for (const state of await page.locator("#services .state").allInnerTexts()) assert.match(state, /^(active|ready|degraded)$/);
+    await until("all of them are alive", async () => (await page.locator("#services .state").allInnerTexts()).every((state) => /^(active|ready|degraded)$/.test(state)));
   });
 
   it("shows every topic with its rate", async () => {
@@ -315,7 +315,7 @@ describe("the page", { timeout: 600000 }, () => {
     await until("it is connected again", async () => /Connected/.test(await text(".connection")));
     await page.locator("#numbers:not(.stale) dl").waitFor();
     await page.locator("#camera:not(.stale)").waitFor();
-    assert.equal(await page.locator(".problem", { hasText: "No connection" }).count(), 0);
+    await until("it is no problem any more", async () => (await page.locator(".problem", { hasText: "No connection" }).count()) === 0);
   });
 
   it("leads a replay with its time bar", async () => {

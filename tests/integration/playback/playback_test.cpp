@@ -146,7 +146,9 @@ TEST_F(Playback, LosslessGivesEveryPictureAndSampleOnceAndEnds) {
   ASSERT_TRUE(run_until([&] { return pictures->exit_code() && sensors->exit_code(); }));
   EXPECT_EQ(pictures->exit_code(), 0);
   EXPECT_EQ(sensors->exit_code(), 0);
-  ASSERT_TRUE(run_until([&] { return imu_.size() >= kImuSamples; })) << imu_.size();
+  ASSERT_TRUE(run_until([&] {
+    return imu_.size() >= kImuSamples && frames_.size() >= kPictures && clocks_.size() > 2 * kPictures && preview_;
+  })) << imu_.size();
   ASSERT_EQ(frames_.size(), size_t{kPictures});
   for (size_t i = 0; i < frames_.size(); ++i) {
     EXPECT_EQ(frames_[i].seq, i + 1);
@@ -183,6 +185,7 @@ TEST_F(Playback, LosslessNamesWhoDoesNotAnswer) {
   start();
   ASSERT_TRUE(run_until([&] { return pictures->exit_code().has_value(); }));
   EXPECT_EQ(pictures->exit_code(), 1);
+  ASSERT_TRUE(run_until([this] { return !failure_.empty(); }));
   EXPECT_THAT(failure_, HasSubstr("no answer on data_progress from tester for 3 s at picture 1"));
   EXPECT_EQ(frames_.size(), 1U);
 }

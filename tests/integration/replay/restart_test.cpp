@@ -72,7 +72,7 @@ TEST_F(MovedReplay, BeginsAnewWhereTheDataGoesOn) {
       test::with_settings("railfix-fusion", {"common.train_id=" + train_, "common.domain=" + domain,
                                              "fusion.map=" + (folder_ / "line.map").string(), "fusion.start=1:100:+"}));
   const auto replay = program({"railfix", "replay", (folder_ / "ride.mcap").string(), "--without", "train_state",
-                               "--train", train_, "--domain", domain, "--rate", "5", "--controlled"});
+                               "--train", train_, "--domain", domain, "--rate", "2", "--controlled"});
   ASSERT_TRUE(run_until([this] { return ended() && !states_.empty() && into_s(states_.back()) > 19; }));
   EXPECT_EQ(states_.back().track_known(), 1);
   EXPECT_NEAR(states_.back().offset_m(), 100 + test::kFrames * test::kStepM, 10);

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <nlohmann/json.hpp>
+#include <regex>
 #include <thread>
 
 #include "core/time.hpp"
@@ -91,6 +92,15 @@ class Terminal : public ::testing::Test {
     EXPECT_EQ(top.exit_code, 0) << top.err;
     return nlohmann::json::parse(top.out, nullptr, false);
   }
+  /// Asked again, up to five times, until it says so: on a busy computer everybody looks silent now and then.
+  [[nodiscard]] test::Outcome top_that_says(const std::string& pattern) const {
+    test::Outcome once;
+    for (int i = 0; i < 5; ++i) {
+      once = railfix({"top", "--once"});
+      if (std::regex_search(once.out, std::regex(pattern))) break;
+    }
+    return once;
+  }
   static nlohmann::json find(const nlohmann::json& all, const char* key, const std::string& name) {
     for (const auto& one : all) {
       if (one[key] == name) return one;
@@ -103,7 +113,7 @@ class Terminal : public ::testing::Test {
 
 TEST_F(Terminal, TopShowsServicesAndTopics) {
   const Talker talker(train_);
-  const auto once = railfix({"top", "--once"});
+  const auto once = top_that_says("fusion +degraded .*no wheel");
   EXPECT_EQ(once.exit_code, 0) << once.err;
   EXPECT_THAT(once.out, HasSubstr("train " + train_ + ", domain 89"));
   EXPECT_THAT(once.out, ::testing::ContainsRegex("fusion +degraded .*no wheel"));
@@ -118,7 +128,7 @@ TEST_F(Terminal, TopShowsServicesAndTopics) {
 
 TEST_F(Terminal, TopTellsTwoHostsServicesOfOneNameApart) {
   const Talker talker(train_, true);
-  const auto once = railfix({"top", "--once"});
+  const auto once = top_that_says("fusion +cab +degraded .*no wheel");
   EXPECT_EQ(once.exit_code, 0) << once.err;
   EXPECT_THAT(once.out, ::testing::ContainsRegex("service +host +state"));
   EXPECT_THAT(once.out, ::testing::ContainsRegex("fusion +cab +degraded .*no wheel"));

@@ -20,7 +20,7 @@ constexpr auto kMosquitto = "/usr/sbin/mosquitto";
 // service's own default, gives the figures of docs/figures.md on a quiet one.
 std::string take_over_s() {
   const char* set = std::getenv("RAILFIX_TAKE_OVER_S");
-  return set != nullptr ? set : "1.5";
+  return set != nullptr ? set : "2";
 }
 
 class StandbyTest : public TwoHostsTest {

@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "core/time.hpp"
+#include "messaging/participant.hpp"
 #include "messaging/topics.hpp"
 #include "messaging/unheard.hpp"
 
@@ -161,6 +162,21 @@ TEST_F(Exchange, AReaderWithoutItsMemoryDoesNotHoldTheCameraBack) {
   ASSERT_TRUE(run_until([&] { return reader.matched_writers() == 1; }));
   EXPECT_EQ(writer.matched_readers(), 0);
   for (int i = 0; i < 40; ++i) EXPECT_TRUE(writer.write_in_place([](msg::CameraFrame& frame) { frame.seq(1); })) << i;
+}
+
+// What comes for the discovery is handed on under this lock, which the middleware did not give back for hours.
+TEST_F(Exchange, WhoWaitsForItselfInTheDiscoverySaysSo) {
+  constexpr int64_t kS = core::kNsPerSecond;
+  EXPECT_TRUE(participant_.hears(1 * kS));
+  {
+    const std::lock_guard one_message(*participant_.impl().discovery);
+    EXPECT_TRUE(participant_.hears(100 * kS)) << "it may have begun just now";
+    EXPECT_TRUE(participant_.hears(104 * kS));
+    EXPECT_FALSE(participant_.hears(106 * kS));
+  }
+  EXPECT_TRUE(participant_.hears(107 * kS));
+  const std::lock_guard another_message(*participant_.impl().discovery);
+  EXPECT_TRUE(participant_.hears(111 * kS));
 }
 
 TEST_F(Exchange, LateJoinersGetTheCalibration) {

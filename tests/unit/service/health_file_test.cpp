@@ -52,8 +52,18 @@ TEST(HealthFile, OneThatWasRenamedLeavesItsSuccessorsAlone) {
 
 class HealthFileFlow : public ::testing::Test {
  protected:
+  /// Asked again where this computer was held up: the answer says tenths of a second.
   HealthAnswer ask(Flow flow, double input_since_s, double last_input_s, double last_output_s, bool stands_by = false) {
-    const int64_t now_ns = core::monotonic_ns();
+    HealthAnswer answer;
+    int64_t began_ns = 0;
+    do {
+      began_ns = core::monotonic_ns();
+      answer = ask_at(began_ns, flow, input_since_s, last_input_s, last_output_s, stands_by);
+    } while (core::monotonic_ns() - began_ns > 40'000'000);
+    return answer;
+  }
+  HealthAnswer ask_at(int64_t now_ns, Flow flow, double input_since_s, double last_input_s, double last_output_s,
+                      bool stands_by) {
     const auto at = [&](double ago_s) { return ago_s < 0 ? 0 : now_ns - core::to_ns(ago_s); };
     msg::ServiceStatus status;
     status.state(msg::STATE_DEGRADED);

@@ -11,9 +11,9 @@ namespace {
 using testing::Contains;
 using testing::HasSubstr;
 
-class ErjuPlan : public ImportTest {};
+class WholeErjuPlan : public ImportTest {};
 
-TEST_F(ErjuPlan, ValuesThatAreNoneAreLeftOutAndTold) {
+TEST_F(WholeErjuPlan, ValuesThatAreNoneAreLeftOutAndTold) {
   std::string text = kInfra;
   const auto instead = [&](const std::string& old, const std::string& now) {
     text.replace(text.find(old), old.size(), now);
@@ -39,7 +39,7 @@ TEST_F(ErjuPlan, ValuesThatAreNoneAreLeftOutAndTold) {
   EXPECT_NEAR(map.edges[0].speed_limits[1].speed_mps, 70 / 3.6, 1e-9);
 }
 
-TEST_F(ErjuPlan, WithoutCoordinatesIsADrawing) {
+TEST_F(WholeErjuPlan, WithoutCoordinatesIsADrawing) {
   const Map map = core::value_or_throw(build_map({write("infra.xml", kInfra)}, {})).map;
   ASSERT_EQ(map.edges.size(), 2U);
   EXPECT_NEAR(length_of(map), 800, 1e-6);
@@ -68,7 +68,7 @@ TEST_F(ErjuPlan, WithoutCoordinatesIsADrawing) {
   EXPECT_EQ(limit_kmh(map, 2, 100, Direction::forward), 0);
 }
 
-TEST_F(ErjuPlan, ScheibenbergIsReadWhole) {
+TEST_F(WholeErjuPlan, ScheibenbergIsReadWhole) {
   const std::filesystem::path infra = shared_data("network/scheibenberg/infra_v1.0.xml");
   const std::filesystem::path places = shared_data("network/scheibenberg/map_v1.0.xml");
   if (!std::filesystem::exists(infra)) GTEST_SKIP() << "skipped: no " << infra;
