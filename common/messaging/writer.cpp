@@ -66,7 +66,8 @@ AnyWriter::AnyWriter(Participant& participant, const TopicInfo& topic, const std
     throw core::BadInput("topic " + dds_topic->get_name() +
                          " cannot be written: quality of service or permissions refuse it");
   }
-  if (topic.qos.data_sharing) {
+  if (topic.qos.data_sharing && qos.data_sharing().kind() != dds::DataSharingKind::OFF) {
+    // Without room there 2.9.1 sends over the network without a word, where a volatile writer can wait for itself.
     if (!has_shared_memory(impl_->writer->guid()))
       throw core::BadInput("topic " + dds_topic->get_name() + " needs shared memory; make room in /dev/shm");
     impl_->touch_shared_memory();
