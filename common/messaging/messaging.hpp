@@ -96,8 +96,8 @@ class Participant {
   Participant& operator=(const Participant&) = delete;
 
   [[nodiscard]] Connections connections() const;
-  /// To be asked again and again. False where Fast DDS has been at one message of the discovery for more than five
-  /// seconds: 2.9.1 can wait for itself there (eProsima/Fast-DDS#6502), and only a new process gets out of it.
+  /// To be asked several times a second. False where Fast DDS has been at one message of the discovery for more than
+  /// five seconds: 2.9.1 can wait for itself there (eProsima/Fast-DDS#6502), and only a new process gets out of it.
   [[nodiscard]] bool hears(int64_t now_ns);
   /// An interface of ParticipantOptions::interfaces has got a carrier since this participant joined without it; only a
   /// new participant will use it.

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <mutex>
 #include <sstream>
+#include <utility>
 
 #include "core/time.hpp"
 #include "messaging/fastdds_types.hpp"
@@ -28,7 +29,9 @@ constexpr int32_t kParticipantLeaseS = 5;
 constexpr int32_t kAnnouncementS = 1;
 // The first announcement that is heard comes so long after the participant is made.
 constexpr uint32_t kFirstAnnouncementNs = 20'000'000;
+// A message of the discovery takes milliseconds, with certificates some tens of them.
 constexpr int64_t kLongestMessageNs = 5 * core::kNsPerSecond;
+constexpr int64_t kLookedAwayNs = core::kNsPerSecond;  // a process that was stopped has not waited for itself
 // Participants of one host that a peer is asked for: every service twice (standby, swap) and a few tools.
 constexpr uint32_t kParticipantsOfHost = 32;
 
@@ -270,7 +273,8 @@ bool Participant::hears(int64_t now_ns) {
     return true;
   }
   const uint64_t message = *impl_->handed_on;
-  if (!since_ns || message != impl_->at_message) since_ns = now_ns;
+  const bool looked_away = now_ns - std::exchange(impl_->looked_ns, now_ns) > kLookedAwayNs;
+  if (!since_ns || message != impl_->at_message || looked_away) since_ns = now_ns;
   impl_->at_message = message;
   return now_ns - *since_ns < kLongestMessageNs;
 }
@@ -280,10 +284,9 @@ bool Participant::interface_appeared() const {
 }
 
 Connections Participant::connections() const {
-  const std::lock_guard lock(impl_->mutex);
+  const std::lock_guard own_lock(impl_->own_mutex);
   Connections connections;
   connections.endpoints = static_cast<uint32_t>(impl_->writers.size() + impl_->readers.size());
-  connections.remote_endpoints = static_cast<uint32_t>(impl_->remote_writers.size() + impl_->remote_readers.size());
   std::map<std::string, std::pair<uint32_t, uint32_t>> ends;  // topic -> writers, readers
   for (auto* writer : impl_->writers) {
     dds::PublicationMatchedStatus status;
@@ -297,6 +300,8 @@ Connections Participant::connections() const {
     connections.matches += static_cast<uint32_t>(status.current_count);
     ++ends[reader->get_topicdescription()->get_name()].second;
   }
+  const std::lock_guard lock(impl_->mutex);
+  connections.remote_endpoints = static_cast<uint32_t>(impl_->remote_writers.size() + impl_->remote_readers.size());
   for (const auto& [guid, writer] : impl_->remote_writers) ++ends[writer.topic].first;
   for (const auto& [guid, reader] : impl_->remote_readers) ++ends[reader.topic].second;
   for (const auto& [topic, counts] : ends) connections.pairs += counts.first * counts.second;
@@ -304,7 +309,7 @@ Connections Participant::connections() const {
 }
 
 std::vector<Sent> Participant::sent() const {
-  const std::lock_guard lock(impl_->mutex);
+  const std::lock_guard lock(impl_->own_mutex);
   std::vector<Sent> sent;
   for (const auto& count : impl_->sent) sent.push_back({count->topic, count->samples});
   return sent;

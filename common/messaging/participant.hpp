@@ -27,9 +27,10 @@ struct SentCount {
 
 struct Participant::Impl : eprosima::fastdds::dds::DomainParticipantListener {
   ParticipantOptions options;
-  size_t running_interfaces = 0;          // when this participant joined
-  std::shared_ptr<std::mutex> discovery;  // held where a reader or writer goes away (see transport.hpp)
-  std::shared_ptr<const std::atomic<uint64_t>> handed_on;
+  size_t running_interfaces = 0;                     // when this participant joined
+  std::shared_ptr<std::mutex> discovery;             // held where a reader or writer goes away (see transport.hpp)
+  std::shared_ptr<std::atomic<uint64_t>> handed_on;  // messages to the discovery
+  int64_t looked_ns = 0;
   uint64_t at_message = 0;                     // of them, when it was looked at last ...
   std::optional<int64_t> at_message_since_ns;  // ... and since when
   eprosima::fastdds::dds::DomainParticipant* participant = nullptr;
@@ -46,6 +47,9 @@ struct Participant::Impl : eprosima::fastdds::dds::DomainParticipantListener {
 
   std::mutex mutex;
   std::map<std::string, eprosima::fastdds::dds::Topic*> topics;
+  // Who holds this one may wait for an endpoint inside the middleware, so that no callback of the middleware may want
+  // it.
+  std::mutex own_mutex;
   std::set<eprosima::fastdds::dds::DataWriter*> writers;
   std::set<eprosima::fastdds::dds::DataReader*> readers;
   std::vector<std::shared_ptr<const SentCount>> sent;

@@ -87,13 +87,13 @@ AnyReader::AnyReader(Participant& participant, const TopicInfo& topic, const std
     throw core::BadInput("topic " + source->get_name() +
                          " cannot be read: quality of service or permissions refuse it");
   }
-  const std::lock_guard lock(inside.mutex);
+  const std::lock_guard lock(inside.own_mutex);
   inside.readers.insert(impl_->reader);
 }
 
 AnyReader::~AnyReader() {
   {
-    const std::lock_guard lock(impl_->participant->mutex);
+    const std::lock_guard lock(impl_->participant->own_mutex);
     impl_->participant->readers.erase(impl_->reader);
   }
   {

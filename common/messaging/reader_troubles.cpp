@@ -8,7 +8,7 @@ namespace dds = eprosima::fastdds::dds;
 
 std::map<std::string, ReaderTroubles> reader_troubles(Participant& participant) {
   auto& inside = participant.impl();
-  const std::lock_guard lock(inside.mutex);
+  const std::lock_guard lock(inside.own_mutex);
   std::map<std::string, ReaderTroubles> by_topic;
   for (auto* reader : inside.readers) {
     ReaderTroubles& troubles = by_topic[reader->get_topicdescription()->get_name()];

@@ -20,6 +20,7 @@ std::string why_unheard(const Terms& offered, const Terms& wanted, bool layouts_
 
 std::vector<std::string> unheard_writers(Participant& participant) {
   auto& inside = participant.impl();
+  const std::lock_guard own_lock(inside.own_mutex);
   const std::lock_guard lock(inside.mutex);
   std::vector<std::string> sentences;
   for (const auto* reader : inside.readers) {

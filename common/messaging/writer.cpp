@@ -24,6 +24,7 @@ struct AnyWriter::Impl : dds::DataWriterListener {
   dds::DataWriter* writer = nullptr;
   std::shared_ptr<void> scratch;  // for topics whose samples cannot be loaned
   std::shared_ptr<SentCount> sent;
+  bool in_shared_memory = false;
 
   bool send(void* sample);
   void* loan(dds::DataWriter::LoanInitializationKind initialization);
@@ -33,7 +34,7 @@ struct AnyWriter::Impl : dds::DataWriterListener {
   ~Impl() override {
     if (writer == nullptr) return;
     {
-      const std::lock_guard lock(participant->mutex);
+      const std::lock_guard lock(participant->own_mutex);
       participant->writers.erase(writer);
     }
     // A service's last words (its status, its last log line) would go with their writer.
@@ -66,7 +67,8 @@ AnyWriter::AnyWriter(Participant& participant, const TopicInfo& topic, const std
     throw core::BadInput("topic " + dds_topic->get_name() +
                          " cannot be written: quality of service or permissions refuse it");
   }
-  if (topic.qos.data_sharing && qos.data_sharing().kind() != dds::DataSharingKind::OFF) {
+  impl_->in_shared_memory = topic.qos.data_sharing && qos.data_sharing().kind() != dds::DataSharingKind::OFF;
+  if (impl_->in_shared_memory) {
     // Without room there 2.9.1 sends over the network without a word, where a volatile writer can wait for itself.
     if (!has_shared_memory(impl_->writer->guid()))
       throw core::BadInput("topic " + dds_topic->get_name() + " needs shared memory; make room in /dev/shm");
@@ -74,7 +76,7 @@ AnyWriter::AnyWriter(Participant& participant, const TopicInfo& topic, const std
   }
   impl_->scratch = topic.type->make();
   impl_->sent = std::make_shared<SentCount>(dds_topic->get_name());
-  const std::lock_guard lock(inside.mutex);
+  const std::lock_guard lock(inside.own_mutex);
   inside.sent.push_back(impl_->sent);
   inside.writers.insert(impl_->writer);
 }
@@ -105,7 +107,7 @@ void AnyWriter::Impl::touch_shared_memory() {
 void* AnyWriter::Impl::memory_for_a_sample() {
   constexpr auto kAsItIs = dds::DataWriter::LoanInitializationKind::NO_LOAN_INITIALIZATION;
   void* memory = loan(kAsItIs);
-  if (memory != nullptr || !topic.qos.data_sharing) return memory;
+  if (memory != nullptr || !in_shared_memory) return memory;
   writer->clear_history(nullptr);
   return loan(kAsItIs);
 }
@@ -119,7 +121,7 @@ bool AnyWriter::Impl::send(void* sample) {
 bool AnyWriter::write(const void* sample) {
   void* whole = const_cast<void*>(sample);  // Fast DDS takes void* and only reads
   if (impl_->send(whole)) return true;
-  if (!impl_->topic.qos.data_sharing) return false;
+  if (!impl_->in_shared_memory) return false;
   impl_->writer->clear_history(nullptr);  // see memory_for_a_sample
   return impl_->send(whole);
 }

@@ -93,6 +93,17 @@ void PublishedHealth::publish_news() {
   if (now.state() != published_.state() || now.reason() != published_.reason()) publish();
 }
 
+bool PublishedHealth::hears() {
+  const bool hears = participant_.hears(core::monotonic_ns());
+  if (!hears && !deaf_) log_.critical("hears of nobody any more: the middleware waits for itself");
+  deaf_ = !hears;
+  return hears;
+}
+
+void PublishedHealth::beat() {
+  if (hears()) file_.beat();
+}
+
 void PublishedHealth::publish() {
   measure();
   const auto connections = participant_.connections();
@@ -102,7 +113,7 @@ void PublishedHealth::publish() {
   published_ = said();
   writer_.write(published_);
   traffic_.stands_by = !stands_by_.empty();
-  file_.write(published_, traffic_, serves_);
+  if (hears()) file_.write(published_, traffic_, serves_);
   log_news();
 }
 

@@ -1,7 +1,6 @@
 #include "service/loop.hpp"
 
 #include <algorithm>
-#include <utility>
 
 #include "core/cut_text.hpp"
 #include "core/joined.hpp"
@@ -66,7 +65,7 @@ Loop::Loop(std::string service, const CommonConfig& common, bool beside)
   }
   on<msg::ControlRequest>(messaging::topics::service_control,
                           [this](const msg::ControlRequest& request) { answer(request); });
-  every(kBeatPeriod, [this] { beat(); });
+  every(kBeatPeriod, [this] { health_->beat(); });
   every(kStatusPeriod, [this] {
     health_->dropped(queue_.take_dropped());
     health_->publish();
@@ -75,12 +74,6 @@ Loop::Loop(std::string service, const CommonConfig& common, bool beside)
   if (!common_.interfaces.empty()) watch_cable();
   if (!common_.security.empty()) watch_own_certificate();
   if (!common_.peers.empty() && !common_.lock_step) watch_clocks();
-}
-
-// Who watches this process starts it anew when it is silent.
-void Loop::beat() {
-  if (participant_.hears(core::monotonic_ns())) return health_->beat();
-  if (!std::exchange(deaf_told_, true)) log_->critical("hears of nobody any more: the middleware waits for itself");
 }
 
 void Loop::read_clock() {

@@ -65,7 +65,6 @@ class Loop final : public Context {
   void watch_writers();
   void answer(const msg::ControlRequest& request);
   void keep_in_turn(const messaging::TopicInfo& topic, const std::string& instance, Handler handler, StampOf stamp_of);
-  void beat();
   void read_clock();
   void clock(const msg::DataClock& clock, uint64_t writer);
   void take_turn();
@@ -98,7 +97,6 @@ class Loop final : public Context {
   std::vector<Handler> on_clock_;
   bool clock_is_read_ = false;
   std::vector<std::unique_ptr<messaging::AnyReader>> readers_;
-  bool deaf_told_ = false;
   bool finished_ = false;
 };
 

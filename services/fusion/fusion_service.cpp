@@ -155,8 +155,10 @@ bool FusionService::take_over_known(const TrainEstimate& first) {
     const bool same_time = age_s >= 0 && std::abs(age_s - noted_s) <= kSameRideS;
     if (!same_time || age_s > kOldestPlaceS) {
       known_.reset();
-      // Only what is played begins where it began before: a train has gone on, and its clock was set.
-      const bool under_way = believes_start_ && (same_time || !is_played());
+      // Only what is played begins where it began before: a train has gone on, and its clock was set. What is played
+      // goes on, too, where it is slow or was paused.
+      const bool goes_on = !is_played() || (age_s >= 0 && age_s <= noted_s);
+      const bool under_way = believes_start_ && (same_time || goes_on);
       if (under_way) forget_start();
       return !under_way;
     }
@@ -184,9 +186,10 @@ bool FusionService::take_over_known(const TrainEstimate& first) {
   return !placed;
 }
 
-// Measurements that waited while this process began say too small an age of the notes, until the last of them is used.
+// Measurements that waited while this process began say too small an age of the notes. How old they are is seen when
+// the last one must have been used, and not before: a clock that was set forward looks right for a moment on the way.
 bool FusionService::catches_up(double behind_s) {
-  if (is_played() || behind_s <= kSameRideS) return false;
+  if (is_played() || (!behind_since_ns_ && behind_s <= kSameRideS)) return false;
   const int64_t now_ns = core::monotonic_ns();
   if (!behind_since_ns_) behind_since_ns_ = now_ns;
   return now_ns - *behind_since_ns_ < kCatchUpNs;

@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 
 #include <opencv2/videoio.hpp>
+#include <span>
 
 #include "core/time.hpp"
 #include "live_camera.hpp"
@@ -49,9 +50,12 @@ TEST_F(LiveCamera, AGigeCameraThatComesGoesAndComesBack) {
   EXPECT_EQ(frames_[0].height_px, 240U);
   EXPECT_NEAR(frames_[0].exposure_s, 0.004, 1e-6);
   EXPECT_FALSE(calibration_->mount_known());
-  const auto& first = frames_[9];  // the very first ones are late where this computer is busy
   const auto& last = frames_.back();
-  const double period_s = core::seconds(last.stamp_ns - first.stamp_ns) / static_cast<double>(last.seq - first.seq);
+  double period_s = 0;
+  for (const auto& first : std::span(frames_).first(10)) {  // some of them may be late where this computer is busy
+    const auto pictures = static_cast<double>(last.seq - first.seq);
+    period_s = std::max(period_s, core::seconds(last.stamp_ns - first.stamp_ns) / pictures);
+  }
   EXPECT_GT(period_s, 0.045) << "a slow computer may lose pictures, but cannot make more";
   EXPECT_LT(std::abs(core::seconds(last.grabbed_ns - last.stamp_ns)), 5.0);
 

@@ -1,6 +1,7 @@
 // frame_grabber as a program with network cameras on the loopback: H.264, H.265 and JPEG over RTSP, JPEG over HTTP.
 #include <gst/rtsp-server/rtsp-server.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cmath>
@@ -146,15 +147,15 @@ TEST_F(NetworkCamera, StampsAreThoseOfTheArrival) {
   auto stream = video::open_url(camera.url());
   ASSERT_TRUE(stream.ok()) << stream.error().message;
   // A busy computer makes some look older or younger, a decoder that gathers all of them.
-  double nearest_s = 1e9;
+  std::vector<double> since_s;
   for (int i = 0; i < 20; ++i) {
     const auto frame = stream.value()->next(std::chrono::seconds(20));
     ASSERT_TRUE(frame.ok() && frame.value());
     const int64_t stamp_ns = core::wall_ns() - frame.value()->age_ns;
-    const double since_s = core::seconds(stamp_ns - camera.sent_ns(cv::mean(frame.value()->pixels)[0]));
-    if (std::abs(since_s) < std::abs(nearest_s)) nearest_s = since_s;
+    since_s.push_back(core::seconds(stamp_ns - camera.sent_ns(cv::mean(frame.value()->pixels)[0])));
   }
-  EXPECT_NEAR(nearest_s, 0, 0.5);
+  std::ranges::sort(since_s);
+  EXPECT_NEAR(since_s[since_s.size() / 2], 0, 0.5);
 }
 
 TEST_F(NetworkCamera, ThatGoesAndComesBackIsSaid) {

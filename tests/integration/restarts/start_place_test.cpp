@@ -31,7 +31,7 @@ class StartPlace : public ::testing::Test, public test::OnTrain {
   void TearDown() override {
     fusion_.reset();
     fs::remove(map_);
-    fs::remove("/dev/shm/railfix-notes-" + train_ + "-local-fusion");
+    forget_notes();
   }
 
   void start() {
@@ -42,8 +42,10 @@ class StartPlace : public ::testing::Test, public test::OnTrain {
     ASSERT_TRUE(run_until([&] { return wheel_.matched_readers() > 0 && states_.matched_writers() > 0; }));
     state_.reset();
   }
-  void kill_and_start() {
+  void forget_notes() const { fs::remove("/dev/shm/railfix-notes-" + train_ + "-local-fusion"); }
+  void kill_and_start(bool has_notes = true) {
     fusion_->end(SIGKILL);
+    if (!has_notes) forget_notes();
     ASSERT_TRUE(run_until([&] { return wheel_.matched_readers() == 0; }));
     start();
   }
@@ -112,9 +114,15 @@ TEST_F(StartPlace, SamplesThatWaitedWhileItBeganDoNotCostATrainItsPlace) {
   run_until([&] { return core::monotonic_ns() > until_ns; });
   speed_mps_ = 10;
   ride(0.3, 10, -1);
-  ride(2, 10);
+  ride(3, 10);
   ASSERT_TRUE(knows_its_place());
   EXPECT_GT(state_->offset_m(), kStartM + 25);
+
+  // A clock that was set back says so for good.
+  kill_and_start();
+  ride(4, 10, -5);
+  ASSERT_TRUE(state_);
+  EXPECT_FALSE(knows_its_place()) << "at " << state_->offset_m();
 }
 
 // The sensors' computer may have another clock than this one: that makes no played data of them.
@@ -125,8 +133,7 @@ TEST_F(StartPlace, IsNotBelievedByATrainThatRuns) {
     ride(3, 10, ahead_s);
     ASSERT_TRUE(state_);
     EXPECT_FALSE(ever_known_) << "not even before the speed is known";
-    kill_and_start();
-    fs::remove("/dev/shm/railfix-notes-" + train_ + "-local-fusion");
+    kill_and_start(false);
   }
 }
 

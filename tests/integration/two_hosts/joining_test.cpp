@@ -42,6 +42,7 @@ TEST_F(JoiningTest, WhoJoinsKnowsHisNeighboursBeforeTheySpeakUpAgain) {
   ASSERT_TRUE(run_until([&] { return cab_->written_topics().size() == kNeighbours; }));
   // A computer that holds everybody up now and then spoils a round, not every one of five.
   double sixth_s = 1e9;
+  std::vector<double> all_s;
   for (int round = 0; round < 5 && sixth_s >= 0.5; ++round) {
     std::vector<double> took_s;
     for (int time = 0; time < 7; ++time) {
@@ -50,11 +51,14 @@ TEST_F(JoiningTest, WhoJoinsKnowsHisNeighboursBeforeTheySpeakUpAgain) {
       ASSERT_TRUE(run_until([&] { return newcomer->written_topics().size() == kNeighbours; }));
       took_s.push_back(core::seconds(core::monotonic_ns() - began_ns));
     }
+    all_s.insert(all_s.end(), took_s.begin(), took_s.end());
     std::ranges::sort(took_s);
     std::cout << "joined after " << ::testing::PrintToString(took_s) << " s\n";
     sixth_s = took_s[5];
   }
   EXPECT_LT(sixth_s, 0.5) << "all but one of seven";
+  std::ranges::sort(all_s);
+  EXPECT_LT(all_s[all_s.size() / 2], 0.5);
 }
 
 TEST_F(JoiningTest, ANeighbourGetsASampleOnceNotFromEveryInterface) {

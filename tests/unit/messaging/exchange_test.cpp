@@ -7,6 +7,7 @@
 #include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <future>
 #include <set>
 #include <string>
 #include <thread>
@@ -159,24 +160,43 @@ TEST_F(Exchange, AReaderWithoutItsMemoryDoesNotHoldTheCameraBack) {
   ASSERT_EQ(removed, 1);
   Participant other(options("train-" + std::to_string(getpid())));
   Writer<msg::CameraFrame> writer(other, topics::camera_frame, "cam0");
-  ASSERT_TRUE(run_until([&] { return reader.matched_writers() == 1; }));
-  EXPECT_EQ(writer.matched_readers(), 0);
+  // One that is announced later is matched: the other one has been heard of by then.
+  Reader<msg::CameraFrame> sound(participant_, topics::camera_frame, "cam0", queue_, [](const msg::CameraFrame&) {});
+  ASSERT_TRUE(run_until([&] { return reader.matched_writers() == 1 && writer.matched_readers() > 0; }));
+  EXPECT_EQ(writer.matched_readers(), 1);
   for (int i = 0; i < 40; ++i) EXPECT_TRUE(writer.write_in_place([](msg::CameraFrame& frame) { frame.seq(1); })) << i;
 }
 
-// What comes for the discovery is handed on under this lock, which the middleware did not give back for hours.
+// What comes for the discovery is handed on one message after the other, each under this lock.
 TEST_F(Exchange, WhoWaitsForItselfInTheDiscoverySaysSo) {
-  constexpr int64_t kS = core::kNsPerSecond;
-  EXPECT_TRUE(participant_.hears(1 * kS));
-  {
-    const std::lock_guard one_message(*participant_.impl().discovery);
-    EXPECT_TRUE(participant_.hears(100 * kS)) << "it may have begun just now";
-    EXPECT_TRUE(participant_.hears(104 * kS));
-    EXPECT_FALSE(participant_.hears(106 * kS));
-  }
-  EXPECT_TRUE(participant_.hears(107 * kS));
-  const std::lock_guard another_message(*participant_.impl().discovery);
-  EXPECT_TRUE(participant_.hears(111 * kS));
+  auto& inside = participant_.impl();
+  std::promise<void> holds;
+  std::promise<void> enough;
+  std::thread handing([&] {
+    const std::lock_guard one_at_a_time(*inside.discovery);
+    holds.set_value();
+    enough.get_future().wait();
+  });
+  holds.get_future().wait();
+  int64_t now_ns = 100 * core::kNsPerSecond;
+  const auto hears_after_s = [&](double seconds) {
+    bool hears = true;
+    for (const int64_t until_ns = now_ns + core::to_ns(seconds); now_ns < until_ns;) {
+      now_ns += core::kNsPerSecond / 10;
+      hears = participant_.hears(now_ns);
+    }
+    return hears;
+  };
+  EXPECT_TRUE(hears_after_s(4));
+  ++*inside.handed_on;
+  EXPECT_TRUE(hears_after_s(4)) << "busy, but with one message after the other";
+  EXPECT_FALSE(hears_after_s(2));
+  now_ns += 20 * core::kNsPerSecond;
+  EXPECT_TRUE(hears_after_s(0.1)) << "stopped itself meanwhile";
+  EXPECT_FALSE(hears_after_s(6));
+  enough.set_value();
+  handing.join();
+  EXPECT_TRUE(participant_.hears(now_ns));
 }
 
 TEST_F(Exchange, LateJoinersGetTheCalibration) {

@@ -83,7 +83,7 @@ class Supervise : public TrainFolder {
     const auto before = of("sensor_gateway");
     ASSERT_GT(before.pid, 1) << when;
     ASSERT_EQ(kill(static_cast<pid_t>(before.pid), SIGKILL), 0) << when;
-    EXPECT_TRUE(within_s(60, [&] {
+    EXPECT_TRUE(within_s(8, [&] {  // one that is asked to end has 10 s
       const auto now = of("sensor_gateway");
       return now.runs() && now.pid != before.pid;
     })) << when;
@@ -115,7 +115,7 @@ TEST_F(Supervise, WhoDoesNotEndEvenWhenKilledKeepsOnlyItsOwnSuccessorWaiting) {
   EXPECT_TRUE(within_s(60, [&] { return runs("tpr_publisher", 2); })) << "it cannot do anything any more";
   expect_watched_while([&] { return kill(held, 0) == 0; }, "one that was killed does not go");
   ASSERT_EQ(kill(supervisor_, SIGTERM), 0);
-  EXPECT_TRUE(within_s(60, [&] { return waitpid(supervisor_, nullptr, WNOHANG) == supervisor_; }));
+  EXPECT_TRUE(within_s(30, [&] { return waitpid(supervisor_, nullptr, WNOHANG) == supervisor_; }));
   EXPECT_THAT(test::slurp(log_), HasSubstr("tpr_publisher, process " + std::to_string(held) +
                                            ", was killed and does not end: the kernel waits for a disk or a device"));
   waitpid(held, nullptr, __WALL);  // lets it go

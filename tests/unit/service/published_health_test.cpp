@@ -1,0 +1,56 @@
+// What a service says of itself, to its train and to who watches it on its computer.
+#include <gmock/gmock.h>
+#include <spdlog/sinks/null_sink.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <future>
+#include <thread>
+
+#include "core/time.hpp"
+#include "messaging/participant.hpp"
+#include "service/health.hpp"
+
+namespace railfix::service {
+namespace {
+
+// The loop turns and says that all is well, but nobody will ever be discovered again.
+TEST(PublishedHealthTest, WhoHearsOfNobodyAnyMoreFallsSilent) {
+  CommonConfig common;
+  common.train_id = "deaf-" + std::to_string(getpid());
+  common.host = "cab";
+  messaging::ParticipantOptions options;
+  options.train_id = common.train_id;
+  options.domain = 77;
+  messaging::Participant participant(options);
+  spdlog::logger log("none", std::make_shared<spdlog::sinks::null_sink_mt>());
+  PublishedHealth health(participant, "fusion", common, false, log);
+  const auto file = health_path(common, "fusion");
+  const auto longest_silence_s = [&](double seconds) {
+    int64_t longest_ns = 0;
+    for (const int64_t until_ns = core::monotonic_ns() + core::to_ns(seconds); core::monotonic_ns() < until_ns;) {
+      health.beat();
+      health.publish();
+      longest_ns = std::max(longest_ns, silent_ns(file).value_or(0));
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+    return core::seconds(longest_ns);
+  };
+  EXPECT_LT(longest_silence_s(0.2), 1);
+  std::promise<void> holds;
+  std::promise<void> enough;
+  std::thread handing([&] {
+    const std::lock_guard one_at_a_time(*participant.impl().discovery);
+    holds.set_value();
+    enough.get_future().wait();
+  });
+  holds.get_future().wait();
+  EXPECT_GT(longest_silence_s(8), 2);
+  enough.set_value();
+  handing.join();
+  health.beat();
+  EXPECT_LT(core::seconds(silent_ns(file).value()), 1);
+}
+
+}  // namespace
+}  // namespace railfix::service
