@@ -4,9 +4,7 @@
 #include <fastrtps/xmlparser/XMLProfileManager.h>
 #include <algorithm>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
-#include <filesystem>
 #include <mutex>
-#include <sstream>
 #include <utility>
 
 #include "core/time.hpp"
@@ -14,6 +12,7 @@
 #include "messaging/layout.hpp"
 #include "messaging/network.hpp"
 #include "messaging/security.hpp"
+#include "messaging/shared_memory.hpp"
 #include "messaging/topics.hpp"
 #include "messaging/transport.hpp"
 
@@ -96,13 +95,6 @@ dds::DomainParticipantQos participant_qos(const ParticipantOptions& options,
 }
 
 }  // namespace
-
-bool has_shared_memory(const eprosima::fastrtps::rtps::GUID_t& endpoint) {
-  std::ostringstream file;
-  file << "/dev/shm/fast_datasharing_" << endpoint.guidPrefix << "_" << endpoint.entityId;
-  std::error_code none;
-  return std::filesystem::exists(file.str(), none);
-}
 
 dds::Topic* Participant::Impl::topic(const TopicInfo& info, const std::string& instance) {
   const std::string name = instance.empty() ? info.name : info.name + "/" + instance;

@@ -81,7 +81,4 @@ struct Participant::Impl : eprosima::fastdds::dds::DomainParticipantListener {
                                eprosima::fastrtps::rtps::ReaderDiscoveryInfo&& info) override;
 };
 
-/// Whether this reader or writer of this host has its file in shared memory.
-[[nodiscard]] bool has_shared_memory(const eprosima::fastrtps::rtps::GUID_t& endpoint);
-
 }  // namespace railfix::messaging

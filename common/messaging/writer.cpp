@@ -4,6 +4,7 @@
 #include "messaging/fastdds_types.hpp"
 #include "messaging/layout.hpp"
 #include "messaging/participant.hpp"
+#include "messaging/shared_memory.hpp"
 
 namespace railfix::messaging {
 
@@ -62,16 +63,18 @@ AnyWriter::AnyWriter(Participant& participant, const TopicInfo& topic, const std
   qos.writer_resource_limits().reader_filters_allocation.maximum = 0;
   qos.user_data().data_vec(user_data_of_layout(layout_of(topic)));
   auto* dds_topic = inside.topic(topic, instance);
+  impl_->in_shared_memory = topic.qos.data_sharing && qos.data_sharing().kind() != dds::DataSharingKind::OFF;
+  if (impl_->in_shared_memory) {
+    const auto samples = static_cast<uint64_t>(topic.qos.depth) + 1;
+    expect_shared_memory(samples * fastdds(*topic.type).support()->m_typeSize, dds_topic->get_name());
+  }
   impl_->writer = impl_->publisher->create_datawriter(dds_topic, qos, impl_.get(), dds::StatusMask::all());
   if (impl_->writer == nullptr) {
     throw core::BadInput("topic " + dds_topic->get_name() +
                          " cannot be written: quality of service or permissions refuse it");
   }
-  impl_->in_shared_memory = topic.qos.data_sharing && qos.data_sharing().kind() != dds::DataSharingKind::OFF;
   if (impl_->in_shared_memory) {
-    // Without room there 2.9.1 sends over the network without a word, where a volatile writer can wait for itself.
-    if (!has_shared_memory(impl_->writer->guid()))
-      throw core::BadInput("topic " + dds_topic->get_name() + " needs shared memory; make room in /dev/shm");
+    take_shared_memory(impl_->writer->guid(), dds_topic->get_name());
     impl_->touch_shared_memory();
   }
   impl_->scratch = topic.type->make();

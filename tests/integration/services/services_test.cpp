@@ -94,6 +94,27 @@ void expect_ready_and_clean_end(const std::string& name, const std::string& prog
   EXPECT_EQ(service.exit_code(), 0) << "did not end on SIGTERM, or not cleanly";
 }
 
+// Fast DDS would be ended by a signal where it writes the first picture.
+TEST(SharedMemory, AFrameGrabberWithoutRoomForPicturesSaysSo) {
+  const auto folder = fs::temp_directory_path() / ("services-test-full-" + std::to_string(getpid()));
+  write_dataset(folder);
+  for (const char* size : {"20m", "1"}) {  // for its files, but not for pictures; for nothing
+    const std::string command =
+        std::string("mount -t tmpfs -o size=") + size + " none /dev/shm || exit 77; exec " + RAILFIX_BIN_DIR +
+        "/railfix-frame-grabber --set frame_grabber.source=" + folder.string() +
+        " --set common.domain=" + std::to_string(kDomain) + " --set common.train_id=" + folder.filename().string();
+    const auto refused = test::run_program({"/usr/bin/unshare", "--mount", "/bin/sh", "-c", command}, 60);
+    if (refused.exit_code == 77 || refused.err.find("unshare:") != std::string::npos) {
+      fs::remove_all(folder);
+      GTEST_SKIP() << "skipped: this user may not mount";
+    }
+    EXPECT_EQ(refused.exit_code, 2) << size << refused.out << refused.err;
+    EXPECT_THAT(refused.out + refused.err,
+                HasSubstr("topic camera_frame/cam0 needs 40 MB of shared memory: make room in /dev/shm"));
+  }
+  fs::remove_all(folder);
+}
+
 TEST_P(EveryService, GetsReadyAndEndsCleanlyOnSigterm) {
   const auto folder = fs::temp_directory_path() / ("services-test-" + GetParam() + "-" + std::to_string(getpid()));
   expect_ready_and_clean_end(GetParam(), program(), folder, "");
