@@ -71,11 +71,11 @@ class FusionService {
   bool in_doubt_ = false;            // the place that is sent now
   std::optional<int64_t> noted_ns_;  // known_ is of the process before, and when it was noted, monotonic
   std::optional<int64_t> behind_since_ns_;
-  bool begun_anew_ = false;          // known_ is to be used in the new one
-  bool learnt_ = false;              // nothing more to take over
-  bool believes_start_ = false;      // no other fusion of this ride was heard of yet
-  bool start_seen_ = false;          // the train's first speed
-  int64_t heard_ns_ = 0;             // stamp of the newest state of the one in charge
+  bool begun_anew_ = false;      // known_ is to be used in the new one
+  bool learnt_ = false;          // nothing more to take over
+  bool believes_start_ = false;  // no other fusion of this ride was heard of yet
+  bool start_seen_ = false;      // the train's first speed
+  int64_t heard_ns_ = 0;         // stamp of the newest state of the one in charge
   int64_t kept_ns_ = 0;
   double distance_offset_m_ = 0;  // of what is sent to what has been measured here
   int fitness_ = 0;
