@@ -23,13 +23,12 @@ struct AnyWriter::Impl : dds::DataWriterListener {
   TopicInfo topic;
   dds::Publisher* publisher = nullptr;
   dds::DataWriter* writer = nullptr;
-  std::shared_ptr<void> scratch;  // for topics whose samples cannot be loaned
+  std::shared_ptr<void> scratch;  // for samples that cannot be loaned
   std::shared_ptr<SentCount> sent;
   bool in_shared_memory = false;
 
   bool send(void* sample);
   void* loan(dds::DataWriter::LoanInitializationKind initialization);
-  void* memory_for_a_sample();
   void touch_shared_memory();
 
   ~Impl() override {
@@ -107,30 +106,22 @@ void AnyWriter::Impl::touch_shared_memory() {
 // Shared memory holds one sample more than the history, so there is always some, but for this: where a reader is
 // matched while a sample waits to be sent, 2.9.1 (StatefulWriter::check_acked_status) never takes that sample out of
 // the history again, and no memory of what came after it becomes free.
-void* AnyWriter::Impl::memory_for_a_sample() {
-  constexpr auto kAsItIs = dds::DataWriter::LoanInitializationKind::NO_LOAN_INITIALIZATION;
-  void* memory = loan(kAsItIs);
-  if (memory != nullptr || !in_shared_memory) return memory;
-  writer->clear_history(nullptr);
-  return loan(kAsItIs);
-}
-
 bool AnyWriter::Impl::send(void* sample) {
-  if (!writer->write(sample)) return false;
-  ++sent->samples;
-  return true;
+  bool written = writer->write(sample);
+  if (!written && in_shared_memory) {
+    writer->clear_history(nullptr);
+    written = writer->write(sample);
+  }
+  if (written) ++sent->samples;
+  return written;
 }
 
 bool AnyWriter::write(const void* sample) {
-  void* whole = const_cast<void*>(sample);  // Fast DDS takes void* and only reads
-  if (impl_->send(whole)) return true;
-  if (!impl_->in_shared_memory) return false;
-  impl_->writer->clear_history(nullptr);  // see memory_for_a_sample
-  return impl_->send(whole);
+  return impl_->send(const_cast<void*>(sample));  // Fast DDS takes void* and only reads
 }
 
 bool AnyWriter::write_in_place(const std::function<void(void*)>& fill) {
-  void* loaned = impl_->memory_for_a_sample();
+  void* loaned = impl_->loan(dds::DataWriter::LoanInitializationKind::NO_LOAN_INITIALIZATION);
   void* sample = loaned != nullptr ? loaned : impl_->scratch.get();
   fill(sample);
   if (impl_->send(sample)) return true;

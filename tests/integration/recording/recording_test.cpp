@@ -90,13 +90,19 @@ class RecordingTest : public ::testing::Test {
     EXPECT_EQ(nlohmann::json::parse(status.out)["service"], "recorder");
   }
 
-  /// It records meanwhile.
-  void wait_for_recovery() const {
+  template <class Condition>
+  void wait_until(Condition condition) const {
     const int64_t deadline_ns = core::monotonic_ns() + 60 * core::kNsPerSecond;
-    while (test::slurp(folder_ / "recorder.log").find("what it held is now in") == std::string::npos) {
+    while (!condition()) {
       ASSERT_LT(core::monotonic_ns(), deadline_ns) << test::slurp(folder_ / "recorder.log");
       usleep(10'000);
     }
+  }
+
+  /// It records meanwhile.
+  void wait_for_recovery() const {
+    wait_until(
+        [&] { return test::slurp(folder_ / "recorder.log").find("what it held is now in") != std::string::npos; });
   }
 
   /// Whole ones, two more than there are now: what had come before is in them.
@@ -106,11 +112,7 @@ class RecordingTest : public ::testing::Test {
                                 static_cast<uint8_t>(mcap::Opcode::chunk), &test::RecordEnd::opcode);
     };
     const auto before = chunks();
-    const int64_t deadline_ns = core::monotonic_ns() + 60 * core::kNsPerSecond;
-    while (chunks() < before + 2) {
-      ASSERT_LT(core::monotonic_ns(), deadline_ns) << test::slurp(folder_ / "recorder.log");
-      usleep(10'000);
-    }
+    wait_until([&] { return chunks() >= before + 2; });
   }
 
   static constexpr int64_t kBegin = 1'700'000'000 * core::kNsPerSecond;
@@ -206,14 +208,13 @@ TEST_F(RecordingTest, KilledWhileItWritesItKeepsEveryWholeChunk) {
       {folder_ / "replay.log", {}, {}});
   const fs::path active = fs::directory_iterator(folder_ / "killed")->path();
   ASSERT_EQ(active.extension(), ".active");
-  const int64_t deadline_ns = core::monotonic_ns() + 60 * core::kNsPerSecond;
   size_t written = 0;
-  while (written < kSteps / 4) {
-    ASSERT_LT(core::monotonic_ns(), deadline_ns) << test::slurp(folder_ / "recorder.log");
-    usleep(10'000);
+  wait_until([&] {
     const auto ends = test::record_ends(test::bytes_of_file(active));
     written = ends.empty() ? 0 : ends.back().messages;
-  }
+    return written >= kSteps / 4;
+  });
+  ASSERT_FALSE(HasFatalFailure());
   const auto refused = test::run_program({"railfix", "recording", "repair", active.string()}, 60);
   EXPECT_EQ(refused.exit_code, 2);
   EXPECT_THAT(refused.err, HasSubstr("is being written by a recorder now"));

@@ -7,15 +7,15 @@
 #include <chrono>
 #include <filesystem>
 #include <fstream>
-#include <future>
+#include <optional>
 #include <set>
 #include <string>
 #include <thread>
 
 #include "core/time.hpp"
-#include "messaging/participant.hpp"
 #include "messaging/topics.hpp"
 #include "messaging/unheard.hpp"
+#include "support/held_discovery.hpp"
 
 namespace railfix::messaging {
 namespace {
@@ -169,15 +169,7 @@ TEST_F(Exchange, AReaderWithoutItsMemoryDoesNotHoldTheCameraBack) {
 
 // What comes for the discovery is handed on one message after the other, each under this lock.
 TEST_F(Exchange, WhoWaitsForItselfInTheDiscoverySaysSo) {
-  auto& inside = participant_.impl();
-  std::promise<void> holds;
-  std::promise<void> enough;
-  std::thread handing([&] {
-    const std::lock_guard one_at_a_time(*inside.discovery);
-    holds.set_value();
-    enough.get_future().wait();
-  });
-  holds.get_future().wait();
+  std::optional<test::HeldDiscovery> held(participant_);
   int64_t now_ns = 100 * core::kNsPerSecond;
   const auto hears_after_s = [&](double seconds) {
     bool hears = true;
@@ -188,14 +180,13 @@ TEST_F(Exchange, WhoWaitsForItselfInTheDiscoverySaysSo) {
     return hears;
   };
   EXPECT_TRUE(hears_after_s(4));
-  ++*inside.handed_on;
+  ++*participant_.impl().handed_on;
   EXPECT_TRUE(hears_after_s(4)) << "busy, but with one message after the other";
   EXPECT_FALSE(hears_after_s(2));
   now_ns += 20 * core::kNsPerSecond;
   EXPECT_TRUE(hears_after_s(0.1)) << "stopped itself meanwhile";
   EXPECT_FALSE(hears_after_s(6));
-  enough.set_value();
-  handing.join();
+  held.reset();
   EXPECT_TRUE(participant_.hears(now_ns));
 }
 

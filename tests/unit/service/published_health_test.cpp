@@ -4,12 +4,12 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
-#include <future>
+#include <algorithm>
 #include <thread>
 
 #include "core/time.hpp"
-#include "messaging/participant.hpp"
 #include "service/health.hpp"
+#include "support/held_discovery.hpp"
 
 namespace railfix::service {
 namespace {
@@ -37,17 +37,10 @@ TEST(PublishedHealthTest, WhoHearsOfNobodyAnyMoreFallsSilent) {
     return core::seconds(longest_ns);
   };
   EXPECT_LT(longest_silence_s(0.2), 1);
-  std::promise<void> holds;
-  std::promise<void> enough;
-  std::thread handing([&] {
-    const std::lock_guard one_at_a_time(*participant.impl().discovery);
-    holds.set_value();
-    enough.get_future().wait();
-  });
-  holds.get_future().wait();
-  EXPECT_GT(longest_silence_s(8), 2);
-  enough.set_value();
-  handing.join();
+  {
+    const test::HeldDiscovery held(participant);
+    EXPECT_GT(longest_silence_s(8), 2);
+  }
   health.beat();
   EXPECT_LT(core::seconds(silent_ns(file).value()), 1);
 }
