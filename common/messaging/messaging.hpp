@@ -21,6 +21,13 @@
 
 namespace railfix::messaging {
 
+/// Thrown by what makes a reader or writer whose samples lie in shared memory: nothing is wrong with its settings, and
+/// once there is room it can be made. A program that ends for it has exit code 1.
+class NoRoom : public core::BadInput {
+ public:
+  using core::BadInput::BadInput;
+};
+
 /// When a sample was sent and when it came, in the hosts' clocks; these may be set.
 struct SampleInfo {
   int64_t source_ns = 0;
@@ -96,9 +103,10 @@ class Participant {
   Participant& operator=(const Participant&) = delete;
 
   [[nodiscard]] Connections connections() const;
-  /// To be asked several times a second. False where Fast DDS has been at one message of the discovery for more than
-  /// five seconds: 2.9.1 can wait for itself there (eProsima/Fast-DDS#6502), and only a new process gets out of it.
-  [[nodiscard]] bool hears(int64_t now_ns);
+  /// To be asked several times a second, by one thread. False where Fast DDS has been at one message of the discovery
+  /// for more than five seconds: 2.9.1 can wait for itself there (eProsima/Fast-DDS#6502), and only a new process gets
+  /// out of it.
+  [[nodiscard]] bool discovery_goes_on(int64_t now_ns);
   /// An interface of ParticipantOptions::interfaces has got a carrier since this participant joined without it; only a
   /// new participant will use it.
   [[nodiscard]] bool interface_appeared() const;

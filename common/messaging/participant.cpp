@@ -143,13 +143,15 @@ void note(Known& known, const Endpoint& endpoint, bool removed, const std::vecto
 }
 
 // 2.9.1 sends the next sample for ever, with all locks held, to a reader on the network without an address
-// (StatefulWriter::deliver_sample_to_network). For one it takes a reader in shared memory, too, that has left no place
-// to be called at (ReaderLocator::start): it went before the writer heard of it, or has a /dev/shm of its own.
-bool cannot_be_reached(const eprosima::fastrtps::rtps::ReaderProxyData& reader, bool own) {
+// (StatefulWriter::deliver_sample_to_network). For one it takes a reader in shared memory, too, that has no place where
+// this process may call it (ReaderLocator::start): it went before the writer heard of it, is another user's, or has a
+// /dev/shm of its own. What is left: a reader that goes between this look and the match, and a writer that is made
+// after such a reader was heard of.
+bool is_out_of_reach(const eprosima::fastrtps::rtps::ReaderProxyData& reader) {
   const auto* topic = find_topic(reader.topicName().to_string());
   const bool shares = topic != nullptr && topic->qos.data_sharing && !reader.m_qos.data_sharing.domain_ids().empty();
   if (shares) return !has_shared_memory(reader.guid());
-  return !own && reader.remote_locators().unicast.empty() && reader.remote_locators().multicast.empty();
+  return reader.remote_locators().unicast.empty() && reader.remote_locators().multicast.empty();
 }
 
 // No writer matches it: what is matched next is this very object, which Fast DDS only shows.
@@ -199,9 +201,13 @@ void Participant::Impl::on_subscriber_discovery(dds::DomainParticipant* own,
                                                 eprosima::fastrtps::rtps::ReaderDiscoveryInfo&& info) {
   const bool removed = info.status == eprosima::fastrtps::rtps::ReaderDiscoveryInfo::REMOVED_READER;
   const bool is_own = info.info.guid().guidPrefix == own->guid().guidPrefix;
-  if (!removed && cannot_be_reached(info.info, is_own)) keep_apart(info.info);
+  const bool apart = !removed && !is_own && is_out_of_reach(info.info);
   const std::lock_guard lock(mutex);
   note(remote_readers, info.info, removed, {train.partition, host.partition}, *own);
+  if (!apart) return;
+  if (const auto known = remote_readers.find(info.info.guid()); known != remote_readers.end())
+    known->second.out_of_reach_since_ns = core::monotonic_ns();
+  keep_apart(info.info);
 }
 
 void Participant::Impl::join(Ends& ends) {
@@ -257,7 +263,7 @@ Participant::~Participant() {
   dds::DomainParticipantFactory::get_instance()->delete_participant(impl_->participant);
 }
 
-bool Participant::hears(int64_t now_ns) {
+bool Participant::discovery_goes_on(int64_t now_ns) {
   const std::unique_lock at_rest(*impl_->discovery, std::try_to_lock);
   auto& since_ns = impl_->at_message_since_ns;
   if (at_rest) {
@@ -293,9 +299,13 @@ Connections Participant::connections() const {
     ++ends[reader->get_topicdescription()->get_name()].second;
   }
   const std::lock_guard lock(impl_->mutex);
-  connections.remote_endpoints = static_cast<uint32_t>(impl_->remote_writers.size() + impl_->remote_readers.size());
+  connections.remote_endpoints = static_cast<uint32_t>(impl_->remote_writers.size());
   for (const auto& [guid, writer] : impl_->remote_writers) ++ends[writer.topic].first;
-  for (const auto& [guid, reader] : impl_->remote_readers) ++ends[reader.topic].second;
+  for (const auto& [guid, reader] : impl_->remote_readers) {
+    if (reader.out_of_reach_since_ns) continue;
+    ++connections.remote_endpoints;
+    ++ends[reader.topic].second;
+  }
   for (const auto& [topic, counts] : ends) connections.pairs += counts.first * counts.second;
   return connections;
 }

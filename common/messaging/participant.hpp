@@ -56,6 +56,7 @@ struct Participant::Impl : eprosima::fastdds::dds::DomainParticipantListener {
   struct Remote {
     std::string topic;
     Terms terms;
+    std::optional<int64_t> out_of_reach_since_ns = {};  // a reader that no writer here may match (monotonic clock)
   };
   std::map<eprosima::fastrtps::rtps::GUID_t, Remote> remote_writers;
   std::map<eprosima::fastrtps::rtps::GUID_t, Remote> remote_readers;

@@ -17,7 +17,8 @@ namespace {
 // more than a period of train_state without a camera, less than a standby needs to take over. DDS's own exclusive
 // ownership would hear the strongest, which is the one that comes back and knows nothing yet.
 constexpr int64_t kHoldNs = 150'000'000;
-constexpr uint64_t kCallBytes = 32'768;  // for the place where a writer in shared memory calls its reader
+// For the file where a writer in shared memory calls its reader: 21,656 bytes in 2.9.1.
+constexpr uint64_t kCallBytes = 32'768;
 
 class OneWriter {
  public:
@@ -84,7 +85,7 @@ AnyReader::AnyReader(Participant& participant, const TopicInfo& topic, const std
   impl_->layout = layout_of(topic);
   qos.user_data().data_vec(user_data_of_layout(impl_->layout));
   auto* source = inside.topic(topic, instance);
-  if (topic.qos.data_sharing) expect_shared_memory(kCallBytes, source->get_name());
+  if (wants_shared_memory(topic, qos.data_sharing())) expect_shared_memory(kCallBytes, source->get_name());
   impl_->reader = impl_->subscriber->create_datareader(source, qos, impl_.get(), dds::StatusMask::data_available());
   if (impl_->reader == nullptr) {
     throw core::BadInput("topic " + source->get_name() +

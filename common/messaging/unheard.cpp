@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/time.hpp"
 #include "messaging/fastdds_types.hpp"
 #include "messaging/layout.hpp"
 #include "messaging/participant.hpp"
@@ -9,6 +10,14 @@
 namespace railfix::messaging {
 
 namespace {
+
+// One that went without a word is forgotten by then (kParticipantLeaseS).
+constexpr int64_t kGoneNs = 6 * core::kNsPerSecond;
+
+void sort_out(std::vector<std::string>& sentences) {
+  std::sort(sentences.begin(), sentences.end());
+  sentences.erase(std::unique(sentences.begin(), sentences.end()), sentences.end());
+}
 
 std::string why_unheard(const Terms& offered, const Terms& wanted, bool layouts_fit) {
   if (!layouts_fit) return ": its release has another layout of this topic (IDL); bring both to one release";
@@ -36,8 +45,28 @@ std::vector<std::string> unheard_writers(Participant& participant) {
                           " is not heard" + why);
     }
   }
-  std::sort(sentences.begin(), sentences.end());
-  sentences.erase(std::unique(sentences.begin(), sentences.end()), sentences.end());
+  sort_out(sentences);
+  return sentences;
+}
+
+std::vector<std::string> unreached_readers(Participant& participant) {
+  auto& inside = participant.impl();
+  const std::lock_guard own_lock(inside.own_mutex);
+  const std::lock_guard lock(inside.mutex);
+  const int64_t now_ns = core::monotonic_ns();
+  std::vector<std::string> sentences;
+  for (const auto* writer : inside.writers) {
+    const std::string topic = writer->get_topic()->get_name();
+    for (const auto& [guid, reader] : inside.remote_readers) {
+      const auto& since_ns = reader.out_of_reach_since_ns;
+      if (reader.topic != topic || !since_ns || now_ns - *since_ns < kGoneNs) continue;
+      const auto name = inside.remote_processes.find(guid.guidPrefix);
+      sentences.push_back(topic + " does not reach " +
+                          (name == inside.remote_processes.end() ? "a reader" : name->second.name) +
+                          ": run it as the same user and with this one's /dev/shm");
+    }
+  }
+  sort_out(sentences);
   return sentences;
 }
 

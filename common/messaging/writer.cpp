@@ -62,8 +62,8 @@ AnyWriter::AnyWriter(Participant& participant, const TopicInfo& topic, const std
   qos.writer_resource_limits().reader_filters_allocation.maximum = 0;
   qos.user_data().data_vec(user_data_of_layout(layout_of(topic)));
   auto* dds_topic = inside.topic(topic, instance);
-  impl_->in_shared_memory = topic.qos.data_sharing && qos.data_sharing().kind() != dds::DataSharingKind::OFF;
-  if (impl_->in_shared_memory) {
+  const bool wants_memory = wants_shared_memory(topic, qos.data_sharing());
+  if (wants_memory) {
     const auto samples = static_cast<uint64_t>(topic.qos.depth) + 1;
     expect_shared_memory(samples * fastdds(*topic.type).support()->m_typeSize, dds_topic->get_name());
   }
@@ -72,6 +72,8 @@ AnyWriter::AnyWriter(Participant& participant, const TopicInfo& topic, const std
     throw core::BadInput("topic " + dds_topic->get_name() +
                          " cannot be written: quality of service or permissions refuse it");
   }
+  // Where a profile's other settings do not go with shared memory, Fast DDS makes none and sends over the network.
+  impl_->in_shared_memory = wants_memory && has_shared_memory(impl_->writer->guid());
   if (impl_->in_shared_memory) {
     take_shared_memory(impl_->writer->guid(), dds_topic->get_name());
     impl_->touch_shared_memory();

@@ -93,15 +93,16 @@ void PublishedHealth::publish_news() {
   if (now.state() != published_.state() || now.reason() != published_.reason()) publish();
 }
 
-bool PublishedHealth::hears() {
-  const bool hears = participant_.hears(core::monotonic_ns());
-  if (!hears && !deaf_) log_.critical("hears of nobody any more: the middleware waits for itself");
-  deaf_ = !hears;
-  return hears;
+bool PublishedHealth::discovers() {
+  const bool goes_on = participant_.discovery_goes_on(core::monotonic_ns());
+  if (!goes_on && !stuck_)
+    log_.critical("the discovery has been at one message for 5 s: the middleware waits for itself");
+  stuck_ = !goes_on;
+  return goes_on;
 }
 
 void PublishedHealth::beat() {
-  if (hears()) file_.beat();
+  if (discovers()) file_.beat();
 }
 
 void PublishedHealth::publish() {
@@ -113,7 +114,7 @@ void PublishedHealth::publish() {
   published_ = said();
   writer_.write(published_);
   traffic_.stands_by = !stands_by_.empty();
-  if (hears()) file_.write(published_, traffic_, serves_);
+  if (discovers()) file_.write(published_, traffic_, serves_);
   log_news();
 }
 

@@ -33,15 +33,15 @@ class PublishedHealth final : public Health {
   /// Empty = none; a service that is ready or active is degraded by it.
   void trouble(Trouble kind, const std::string& sentence);
   void stopped() { change(msg::STATE_STOPPED, ""); }
-  /// The loop turns: told to this host, many times between two publish(); not while nobody is heard any more, so that
-  /// who watches this process starts it anew.
+  /// The loop turns: told to this host, many times between two publish(); not while the discovery is stuck, so that who
+  /// watches this process starts it anew.
   void beat();
   /// Publishes; measures processor and latency anew when the measuring period has passed.
   void publish();
 
  private:
   void change(uint8_t state, const std::string& reason);
-  [[nodiscard]] bool hears();
+  [[nodiscard]] bool discovers();
   void measure();
   /// When what it says is not what was published last.
   void publish_news();
@@ -57,7 +57,7 @@ class PublishedHealth final : public Health {
   std::string stands_by_;
   Traffic traffic_;
   std::string serves_;
-  bool deaf_ = false;
+  bool stuck_ = false;
   std::array<std::string, 3> troubles_;
   std::vector<double> latencies_ms_;  // since the last measurement
   int64_t measured_ns_ = 0;

@@ -1,6 +1,7 @@
 #include "service/loop.hpp"
 
 #include <algorithm>
+#include <iterator>
 
 #include "core/cut_text.hpp"
 #include "core/joined.hpp"
@@ -99,10 +100,11 @@ void Loop::watch_cable() {
   });
 }
 
-// A writer that is there and not heard looks like one that has nothing to say.
+// A writer that is there and not heard looks like one that has nothing to say. Who is not reached does not know it.
 void Loop::watch_writers() {
   every(kWritersPeriod, [this] {
     auto unheard = messaging::unheard_writers(participant_);
+    std::ranges::copy(messaging::unreached_readers(participant_), std::back_inserter(unheard));
     if (unheard == unheard_) return;
     for (const auto& sentence : unheard) log_->warn("{}", sentence);
     health_->trouble(Trouble::writers, unheard.empty() ? "" : unheard.front());

@@ -117,7 +117,7 @@ int serve(const Program& program, const CommonConfig& common, bool beside) {
   } catch (const core::BadInput& error) {
     loop.log().error("{}", error.what());
     loop.health().failed(error.what());
-    return kBadInput;
+    return dynamic_cast<const messaging::NoRoom*>(&error) != nullptr ? kFailed : kBadInput;
   } catch (const std::exception& error) {
     loop.log().critical("failed: {}", error.what());
     loop.health().failed(error.what());

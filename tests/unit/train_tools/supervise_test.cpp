@@ -9,10 +9,12 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <fstream>
 
 #include "core/time.hpp"
 #include "service/health_file.hpp"
 #include "support/program.hpp"
+#include "train/left_behind.hpp"
 #include "train/stands_still.hpp"
 #include "unit/train_tools/train_folder.hpp"
 
@@ -119,6 +121,22 @@ TEST_F(Supervise, WhoDoesNotEndEvenWhenKilledKeepsOnlyItsOwnSuccessorWaiting) {
   EXPECT_THAT(test::slurp(log_), HasSubstr("tpr_publisher, process " + std::to_string(held) +
                                            ", was killed and does not end: the kernel waits for a disk or a device"));
   waitpid(held, nullptr, __WALL);  // lets it go
+}
+
+// It may end for want of that very room.
+TEST_F(Supervise, WhatWasLeftInSharedMemoryGoesThoughAServiceEndsAgainAndAgain) {
+  const fs::path left = "/dev/shm/fast_datasharing_" + folder_.filename().string();
+  std::ofstream(left) << "a picture";
+  const auto all_left = left_behind();
+  if (std::ranges::find(all_left, left) == all_left.end()) {
+    fs::remove(left);
+    GTEST_SKIP() << "skipped: this user may not look into every process";
+  }
+  plan({service("frame_grabber", 1, "exit 2")});
+  start();
+  EXPECT_TRUE(within_s(60, [&] { return !fs::exists(left); }));
+  EXPECT_GT(of("frame_grabber").restarts, 0);
+  fs::remove(left);
 }
 
 TEST_F(Supervise, AnEngineThatHangsKeepsOnlyItsOwnServiceWaiting) {

@@ -9,6 +9,7 @@
 #include <csignal>
 #include <iostream>
 #include <ranges>
+#include <utility>
 
 #include "core/time.hpp"
 #include "core/whole_file.hpp"
@@ -43,7 +44,7 @@ class Supervision {
     changed = hand_over() || changed;
     if (changed) {
       say();
-      clean_ns_ = core::monotonic_ns() + kForgottenNs;
+      changed_ns_ = core::monotonic_ns();
     }
     clean();
   }
@@ -68,9 +69,11 @@ class Supervision {
   }
 
  private:
-  // What killed services have left, in two looks.
+  // What killed services have left, in two looks. Not only when all is quiet: a service that ends again and again may
+  // do so for the room that is taken.
   void clean() {
     const int64_t now_ns = core::monotonic_ns();
+    if (clean_ns_ == 0 && changed_ns_ != 0) clean_ns_ = std::exchange(changed_ns_, 0) + kForgottenNs;
     if (clean_ns_ == 0 || now_ns < clean_ns_) return;
     if (!left_) {
       left_ = left_behind();
@@ -244,7 +247,8 @@ class Supervision {
   }
   const HostFolder& folder_;
   fs::file_time_type plan_written_{};
-  int64_t clean_ns_ = 0;  // 0 = there is nothing to be cleaned
+  int64_t changed_ns_ = 0;  // 0 = nothing has changed since clean_ns_ was set
+  int64_t clean_ns_ = 0;    // 0 = there is nothing to be cleaned
   std::optional<std::vector<fs::path>> left_;
   std::vector<PlannedService> planned_;
   std::vector<SupervisedService> children_;
