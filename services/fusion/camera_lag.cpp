@@ -15,18 +15,18 @@ constexpr double kPauseS = 0.5;   // no sample for so long
 constexpr double kKeptS = 5.0;
 constexpr double kRatioSigma = 0.03;
 constexpr double kCreepSigma = 0.005;  // a driven axle runs half a per cent ahead at 1 m/s2
-constexpr double kLagSigmaS = 0.15;
-constexpr double kStandsM = 0.02;    // in a window
-constexpr double kRatioWalk = 1e-4;  // from window to window
+constexpr double kLagSigma = 0.3;      // of the farthest
+constexpr double kStandsM = 0.02;      // in a window
+constexpr double kRatioWalk = 1e-4;    // from window to window
 constexpr double kCreepWalk = 2e-5;
 constexpr double kLagWalkS = 3e-4;
 constexpr double kPlayM = 0.005;    // of the wheel's reading, beside its pulses
 constexpr double kWaySigma = 3e-4;  // share of a window's way
 constexpr double kSameGainMps = 0.15;
 constexpr double kSameGain = 0.15;  // ... and this share of it
-constexpr double kFarthestS = 0.5;  // beyond that it is a wheel that slips
+constexpr double kFarthestS = 2.0;
 constexpr double kGate = 4.0;
-constexpr int kRefusedInRow = 8;        // then the ratio is another one
+constexpr int kRefusedInRow = 8;        // then the ratio is another one, or the lag
 constexpr double kUnevenS = 0.01;       // less is the jitter of stamps ...
 constexpr double kUnevenBlindS = 0.03;  // ... where no way says that they have jumped
 constexpr double kStoodSigmaS = 0.02;   // a jump while the train stands shows nowhere
@@ -47,10 +47,20 @@ bool is_whole(double one_s, double other_s) {
 
 }  // namespace
 
-CameraLag::CameraLag() : covariance_(squares(kRatioSigma, kCreepSigma, kLagSigmaS).asDiagonal()) {}
+CameraLag::CameraLag(double farthest_s) : farthest_s_(farthest_s) {
+  covariance_ = squares(kRatioSigma, kCreepSigma, lag_sigma_s()).asDiagonal();
+}
 
 CameraLag::Lag CameraLag::unknown() {
-  return {0, kLagSigmaS};
+  return {0, kLagSigma * kUsualS};
+}
+
+double CameraLag::lag_sigma_s() const {
+  return kLagSigma * farthest_s_;
+}
+
+void CameraLag::look_elsewhere() {
+  *this = CameraLag(farthest_s_ < kFarthestS ? kFarthestS : kUsualS);
 }
 
 std::optional<CameraLag::Lag> CameraLag::lag() const {
@@ -59,7 +69,7 @@ std::optional<CameraLag::Lag> CameraLag::lag() const {
 }
 
 void CameraLag::doubt(double sigma_s) {
-  if (covariance_(2, 2) < kLagSigmaS * kLagSigmaS) covariance_(2, 2) += sigma_s * sigma_s;
+  if (covariance_(2, 2) < lag_sigma_s() * lag_sigma_s()) covariance_(2, 2) += sigma_s * sigma_s;
 }
 
 void CameraLag::begin_again(const OdometryInput& step) {
@@ -181,14 +191,14 @@ void CameraLag::fit(const Mark& from, const Mark& to) {
                           to.wheel.at.variance_m2 + kWaySigma * kWaySigma * wheel_m * wheel_m;
   const double variance = by.dot(covariance_ * by) + noise_m2;
   if (off_m * off_m > kGate * kGate * variance) {
-    if (++refused_ == kRefusedInRow) *this = CameraLag();
+    if (++refused_ == kRefusedInRow) look_elsewhere();
     return;
   }
   refused_ = 0;
   const Eigen::Vector3d gain = covariance_ * by / variance;
   fitted_ += gain * off_m;
   covariance_ -= gain * gain.transpose() * variance;
-  if (std::abs(fitted_(2)) > kFarthestS) *this = CameraLag();
+  if (std::abs(fitted_(2)) > farthest_s_) look_elsewhere();
 }
 
 }  // namespace railfix::fusion

@@ -15,6 +15,8 @@ namespace railfix::fusion {
 /// Fitted to the way of both over windows of a second, beside their ratio and the wheel's creep, which grows with
 /// acceleration and speed. Where both say another change of speed, as in a slip, and where samples come late, nothing
 /// is measured. Stamps that jump on the way, as those of a camera that is started anew, show against the way itself.
+/// Where no lag of half a second fits one of up to two is looked for, and then again one of half a second: the wheel may
+/// have slipped for long.
 class CameraLag {
  public:
   struct Lag {
@@ -23,7 +25,7 @@ class CameraLag {
   };
   /// Before anything has shown it.
   static Lag unknown();
-  CameraLag();
+  CameraLag() : CameraLag(kUsualS) {}
   void add(const WheelInput& sample);
   void add(const OdometryInput& step);
   /// By all that was measured so far; vague until the speed has changed. Nothing until both have measured.
@@ -33,6 +35,10 @@ class CameraLag {
   [[nodiscard]] bool has_jumped() const { return has_jumped_; }
 
  private:
+  static constexpr double kUsualS = 0.5;  // the farthest that is looked for at first
+  explicit CameraLag(double farthest_s);
+  [[nodiscard]] double lag_sigma_s() const;
+  void look_elsewhere();
   using Reading = SeenWay::Picture;
   using Readings = std::deque<Reading>;
   struct Moving {
@@ -65,6 +71,7 @@ class CameraLag {
   Eigen::Vector3d fitted_ = Eigen::Vector3d::Zero();
   Eigen::Matrix3d covariance_;
   int refused_ = 0;  // in a row
+  double farthest_s_ = kUsualS;
 };
 
 }  // namespace railfix::fusion

@@ -18,6 +18,15 @@ static_assert(static_cast<uint8_t>(FixKind::landmark) == msg::FIX_LANDMARK);
 static_assert(static_cast<uint8_t>(FixKind::network) == msg::FIX_NETWORK);
 static_assert(static_cast<uint8_t>(FixKind::track) == msg::FIX_TRACK);
 static_assert(static_cast<uint8_t>(FixKind::gnss) == msg::FIX_GNSS);
+static_assert(static_cast<uint8_t>(Integrity::ok) == msg::INTEGRITY_OK);
+static_assert(static_cast<uint8_t>(Integrity::degraded) == msg::INTEGRITY_DEGRADED);
+static_assert(static_cast<uint8_t>(Integrity::unusable) == msg::INTEGRITY_UNUSABLE);
+static_assert(1U << static_cast<unsigned>(Source::camera) == msg::SOURCE_CAMERA);
+static_assert(1U << static_cast<unsigned>(Source::wheel) == msg::SOURCE_WHEEL);
+static_assert(1U << static_cast<unsigned>(Source::imu) == msg::SOURCE_IMU);
+static_assert(1U << static_cast<unsigned>(Source::gnss) == msg::SOURCE_GNSS);
+static_assert(1U << static_cast<unsigned>(Source::landmark) == msg::SOURCE_LANDMARK);
+static_assert(1U << static_cast<unsigned>(Source::curvature) == msg::SOURCE_CURVATURE);
 
 inline OdometryInput input_of(const msg::OdometryStep& m) {
   return {m.stamp_ns(), m.reference_stamp_ns(), m.step_m(), m.step_sigma_m(), messaging::has_measured(m),

@@ -100,7 +100,9 @@ void FusionService::hear(const msg::TrainState& state) {
   // The travelled distance must not jump at a take-over.
   const double speed_mps = std::isfinite(latest_->speed_mps()) ? latest_->speed_mps() : 0;
   const double since_s = core::seconds(state.stamp_ns() - latest_->stamp_ns());
-  distance_offset_m_ += state.distance_m() - (latest_->distance_m() + speed_mps * since_s);
+  const double ahead_m = state.distance_m() - (latest_->distance_m() + speed_mps * since_s);
+  distance_offset_m_ += ahead_m;
+  latest_->distance_m(latest_->distance_m() + ahead_m);  // several may be heard before the next one of this fusion
   if (learnt_ || !map_ || state.track_known() == 0 || state.integrity() == msg::INTEGRITY_UNUSABLE) return;
   if (tell_other_map(state)) return;
   if (!place_at(map_, known_place_of(state, false), state.stamp_ns(), config_.parameters.interval_factor))
@@ -291,6 +293,11 @@ void FusionService::use_gnss(const msg::GnssFix& sample) {
     input.easting_m = place ? place->x() : nan;
     input.northing_m = place ? place->y() : nan;
     input.hdop = sample.hdop();
+    if (!extent_) extent_.emplace(*map_);
+    if (extent_->is_far_off(input.easting_m, input.northing_m)) {
+      leave_out(gnss_fix.name, "they lie more than 50 km off the map: latitude and longitude may be exchanged");
+      return;
+    }
   }
   use(input, sample.grabbed_ns());
 }
@@ -306,12 +313,16 @@ void FusionService::use(const Event& event, int64_t grabbed_ns) {
 
 void FusionService::note_left_out(const Event& event, const FusionCounts& before) {
   const FusionCounts& now = fusion_->counts();
-  const char* why = now.nonsense > before.nonsense   ? service::LeftOut::kNoSense
-                    : now.too_late > before.too_late ? "they came later than fusion.history_s behind the newest"
-                    : now.jumped > before.jumped     ? "their clock is ahead of the other sensors'"
-                                                     : nullptr;
-  if (why == nullptr) return;
-  left_out_.add(topic_of(event), why, fusion_->latest_stamp_ns().value_or(0));
+  const char* why = now.nonsense > before.nonsense     ? service::LeftOut::kNoSense
+                    : now.too_late > before.too_late   ? "they came later than fusion.history_s behind the newest"
+                    : now.jumped > before.jumped       ? "their clock is ahead of the other sensors'"
+                    : now.elsewhere > before.elsewhere ? "they say a track where the train is not"
+                                                       : nullptr;
+  if (why != nullptr) leave_out(topic_of(event), why);
+}
+
+void FusionService::leave_out(const std::string& topic, const char* why) {
+  left_out_.add(topic, why, fusion_->latest_stamp_ns().value_or(0));
   if (!latest_) context_.health().degraded(left_out());
 }
 

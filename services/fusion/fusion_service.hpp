@@ -7,6 +7,7 @@
 #include "fusion/fusion.hpp"
 #include "fusion/fusion_config.hpp"
 #include "fusion/handover.hpp"
+#include "fusion/map_extent.hpp"
 #include "fusion/scale_file.hpp"
 #include "fusion/train_pose.hpp"
 #include "service/data_time.hpp"
@@ -25,6 +26,7 @@ class FusionService {
   void restart(int64_t data_ns);
   void use(const Event& event, int64_t grabbed_ns);
   void note_left_out(const Event& event, const FusionCounts& before);
+  void leave_out(const std::string& topic, const char* why);
   [[nodiscard]] std::string left_out() const;
   void use_gnss(const msg::GnssFix& sample);
   void keep_time(const msg::DataClock& clock);
@@ -53,6 +55,7 @@ class FusionService {
   messaging::Writer<msg::TrainState> writer_;
   messaging::Writer<msg::TrainPose> pose_writer_;
   std::shared_ptr<const track::Map> map_;
+  std::optional<MapExtent> extent_;  // from the first GNSS on
   ScaleFile scale_file_;
   std::optional<Fusion> fusion_;
   TrainPose pose_;

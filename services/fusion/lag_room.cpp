@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <utility>
 
 #include "core/time.hpp"
 
@@ -16,6 +17,7 @@ constexpr double kLikelyLate = 1.0;   // sigmas of one that the measurements spe
 constexpr double kLikelyEarly = 2.0;  // ... which a camera seldom is
 constexpr double kSure = 3.0;         // of one that is sure
 constexpr double kBeginsS = 1.0;
+constexpr double kSameM = 0.1;
 
 void degrade(TrainEstimate& estimate, double lag_s) {
   char text[160];
@@ -56,7 +58,9 @@ std::optional<CameraLag::Lag> LagRoom::to_keep(const FusionParameters& parameter
 
 LagRoom::Speeds LagRoom::speeds_since_sure(const TrainEstimate& estimate) {
   if (!std::isnan(estimate.speed_mps)) last_speed_mps_ = estimate.speed_mps;
-  if (estimate.since_sure_m < since_sure_m_) {
+  // A train that only comes back towards it, or rocks at a halt, has none that is new.
+  const double run_m = std::abs(estimate.distance_m - std::exchange(distance_m_, estimate.distance_m));
+  if (estimate.since_sure_m < since_sure_m_ - run_m - kSameM) {
     speeds_before_ = speeds_;
     speeds_ = {last_speed_mps_, last_speed_mps_};
   }

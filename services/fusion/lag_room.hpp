@@ -41,6 +41,7 @@ class LagRoom {
   Speeds speeds_;         // since the last sure place
   Speeds speeds_before_;  // since the one before it: which was sure is known later
   double since_sure_m_ = 0;
+  double distance_m_ = 0;  // of the last state
   double last_speed_mps_ = 0;
   std::optional<int64_t> begun_ns_;
 };

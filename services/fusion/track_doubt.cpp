@@ -6,6 +6,7 @@
 namespace railfix::fusion {
 namespace {
 
+constexpr size_t kMostOpen = 100;     // the one before has been divided by all of these anyway
 constexpr double kSameSwitchM = 1.0;  // a path that was joined anew may have it elsewhere by so much
 // Seconds in which the train turns otherwise, or as the track does: one may be a bump.
 constexpr int kTurnsToDoubt = 3;
@@ -66,6 +67,10 @@ void TrackDoubt::move(const track::Path& path, double place_m) {
       return s.ahead != ahead && std::abs(s.distance_m - one->distance_m) < kSameSwitchM;
     });
     if (one->ahead != ahead) continue;
+    if (open_.size() == kMostOpen) {
+      said_ /= open_.front().ways;
+      open_.erase(open_.begin());
+    }
     open_.push_back(*one);
     divided_ = true;
     divided_at_m_ = one->distance_m;

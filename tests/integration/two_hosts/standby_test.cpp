@@ -104,12 +104,19 @@ class Heard {
   uint64_t backwards = 0;  // numbers that do not grow
   double longest_s = 0;
   double widest_m = 0;
+  double distance_jump_m = 0;  // the largest, from one fusion to the other
 
  private:
   void hear(const msg::TrainState& state, const messaging::SampleInfo& info) {
     const int64_t now_ns = core::monotonic_ns();
     if (states > 0) longest_s = std::max(longest_s, core::seconds(now_ns - last_ns_));
-    if (states > 0 && writer != info.writer) ++changes;
+    if (states > 0 && writer != info.writer) {
+      ++changes;
+      const double expected_m = distance_m_ + state.speed_mps() * core::seconds(state.stamp_ns() - stamp_ns_);
+      distance_jump_m = std::max(distance_jump_m, std::abs(state.distance_m() - expected_m));
+    }
+    distance_m_ = state.distance_m();
+    stamp_ns_ = state.stamp_ns();
     if (states > 0 && state.seq() <= seq_) ++backwards;
     last_ns_ = now_ns;
     seq_ = state.seq();
@@ -125,6 +132,8 @@ class Heard {
   const Camera& camera_;
   int64_t last_ns_ = 0;
   uint64_t seq_ = 0;
+  double distance_m_ = 0;
+  int64_t stamp_ns_ = 0;
   messaging::Reader<msg::TrainState> reader_;
 };
 
@@ -187,6 +196,37 @@ TEST_F(StandbyTest, AFusionThatFailsIsFollowedByTheOtherAndComesBackSilently) {
   EXPECT_EQ(heard.wrong, 0U) << "of " << heard.known;
   EXPECT_EQ(heard.backwards, 0U);
   EXPECT_LT(heard.widest_m, 40);
+}
+
+TEST_F(StandbyTest, TheDistanceGoesOnBehindAStandbyThatMeasuresLessOften) {
+  constexpr int64_t kWheelPeriodNs = core::kNsPerSecond / 5;
+  const std::string at_begin = "1:" + std::to_string(kBeginM) + ":+";
+  auto coach = fusion(TwoHosts::coach, at_begin);
+  auto cab = begin(TwoHosts::cab, "railfix-fusion",
+                   {"fusion.map=" + (folder_ / "line.map").string(), "fusion.start=" + at_begin,
+                    "fusion.start_sigma_m=1", "fusion.use_camera=false"});
+  Heard heard(*cab_, queue_, *camera_);
+  messaging::Writer<msg::WheelSample> wheel(*cab_, topics::wheel_sample);
+  int64_t next_wheel_ns = 0;
+  const auto with_wheel = [&](auto condition) {
+    return drive([&, condition] {
+      if (core::monotonic_ns() >= next_wheel_ns) {
+        msg::WheelSample sample;
+        sample.stamp_ns(core::wall_ns());
+        sample.pulses_per_metre(100);
+        sample.pulses(static_cast<int64_t>(100 * camera_->way_m()));
+        wheel.write(sample);
+        next_wheel_ns = core::monotonic_ns() + kWheelPeriodNs;
+      }
+      return condition();
+    });
+  };
+  ASSERT_TRUE(run_until([&] { return camera_->listeners() == 1 && wheel.matched_readers() == 2; }));
+  ASSERT_TRUE(with_wheel([&] { return stands_by("fusion@cab") && heard.states > 300; })) << all_say();
+  const int before = heard.changes;
+  coach->end(SIGKILL);
+  ASSERT_TRUE(with_wheel([&] { return heard.changes > before; })) << all_say();
+  EXPECT_LT(heard.distance_jump_m, 2);
 }
 
 /// The ground: a broker in the cab, and who listens there.

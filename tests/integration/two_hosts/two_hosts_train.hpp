@@ -82,6 +82,8 @@ class Camera {
     const auto found = ways_m_.find(stamp_ns);
     return found == ways_m_.end() ? std::nullopt : std::optional(found->second);
   }
+  /// At the last picture.
+  [[nodiscard]] double way_m() const { return way_m_; }
   [[nodiscard]] bool heard() const { return frames_.matched_readers() > 0 && steps_.matched_readers() > 0; }
   [[nodiscard]] int listeners() const { return steps_.matched_readers(); }
   void shoot() {

@@ -7,6 +7,7 @@
 
 #include "core/random.hpp"
 #include "core/time.hpp"
+#include "fusion/lag_room.hpp"
 #include "support/train/verdict.hpp"
 
 namespace railfix::fusion {
@@ -48,6 +49,14 @@ TEST(CameraLag, IsKnownSoonAfterTheDeparture) {
     const auto lag = measured(lag_s, 15, from_rest, from_rest);
     EXPECT_NEAR(lag.s, lag_s, 0.01) << lag_s;
     EXPECT_LT(lag.sigma_s, 0.02) << lag_s;
+  }
+}
+
+TEST(CameraLag, ThatIsLongerThanUsualIsKnownLater) {
+  for (const double lag_s : {-0.8, 0.6, 0.8, 1.2}) {
+    const auto lag = measured(lag_s, 29, from_rest, from_rest);
+    EXPECT_NEAR(lag.s, lag_s, 0.03) << lag_s;
+    EXPECT_LT(lag.sigma_s, 0.05) << lag_s;
   }
 }
 
@@ -245,6 +254,38 @@ TEST(CameraLag, OfAnEarlierTripIsKnownFromTheStart) {
   const double unknown_m = first_under_m(saved);
   saved.camera_lag = CameraLag::Lag{0.001, 0.003};
   EXPECT_GT(unknown_m, first_under_m(saved) + 0.5);
+}
+
+/// Departs, passes a sure place at 21 m/s, 33 s behind the start, and brakes to a halt from 35 to 56 s.
+double to_a_halt(double t_s) {
+  const double braked_s = std::clamp(t_s - 35, 0.0, 21.0);
+  return from_rest(std::min(t_s, 35.0)) + 21 * braked_s - 0.5 * braked_s * braked_s;
+}
+
+// The landmark put the train back by the lag's way at 21 m/s, and the wheel may have carried that on.
+TEST(LagRoom, KeepsTheSpeedOfTheSurePlaceAtAHalt) {
+  constexpr double kLagS = 0.2;
+  constexpr double kBareM = 1;
+  const FusionParameters parameters;
+  LagRoom room;
+  core::Random random(2);
+  TrainEstimate state;
+  double last_m = 0;
+  for (double t = kSampleS; t < 70; t += kSampleS) {
+    const int64_t now_ns = core::to_ns(1000 + t);
+    room.add(WheelInput{now_ns, static_cast<int64_t>(std::floor(to_a_halt(t) * kPulsesPerMetre)), kPulsesPerMetre});
+    const double step_m = to_a_halt(t - kLagS) - to_a_halt(t - kLagS - kSampleS);
+    room.add(OdometryInput{now_ns, now_ns - core::to_ns(kSampleS), step_m, 0.002, true});
+    state = TrainEstimate();
+    state.integrity = Integrity::ok;
+    state.stamp_ns = now_ns;
+    state.distance_m = to_a_halt(t) + 1e-4 * random.normal();
+    state.speed_mps = (state.distance_m - std::exchange(last_m, state.distance_m)) / kSampleS;
+    state.since_sure_m = t < 33 ? 1000 + state.distance_m : state.distance_m - to_a_halt(33);
+    state.over_m = state.under_m = kBareM;
+    room.widen(state, parameters);
+  }
+  EXPECT_GT(state.under_m, kBareM + kLagS * 20);
 }
 
 }  // namespace
