@@ -14,6 +14,13 @@ namespace {
 constexpr size_t kMostLegs = 100000;  // ends a path round a ring of tiny edges
 constexpr size_t kMostJoinSteps = 1000;
 constexpr double kLongestJoinM = 30000;  // a wrong leg may have been followed for so long
+constexpr double kKeptM = 200000;
+
+// A train that runs for weeks would take its whole way along.
+void drop_far(Route& route, double near_m) {
+  while (route.legs().front().end_m() < near_m - kKeptM) route.drop_behind();
+  while (route.legs().back().begin_m > near_m + kKeptM) route.drop_ahead();
+}
 
 /// Runs after the first until `distance_m` beyond the end of the first is covered or the track ends: over an edge of
 /// `via` where one follows, else the straight way.
@@ -150,6 +157,7 @@ std::optional<Path> followed_on(const Path& old, const Ways& ways, double near_m
   const bool cut = route.end_m() > old.end_m() + 1e-6 || route.begin_m() < old.begin_m() - 1e-6;
   follow_on(route, ways, near_m, ahead_m, behind_m);
   if (route.legs().size() == legs && !cut) return std::nullopt;
+  drop_far(route, near_m);
   return Path::along(old.shared_map(), route, ways);
 }
 
@@ -165,6 +173,7 @@ std::optional<Rerouted> rerouted(const Path& old, const Ways& ways, const EdgePo
   if (best == joins.end() || off_m(*best) > kLongestJoinM) return std::nullopt;
   Route route = joined(old_route, *best);
   follow_on(route, ways, near_m, ahead_m, behind_m);
+  drop_far(route, near_m);
   Rerouted found{Path::along(old.shared_map(), route, ways), {}};
   for (const Join& join : joins) {
     if (join.behind == best->behind && &join != &*best) found.otherwise_m.push_back(join.place_m);

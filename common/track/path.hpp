@@ -33,7 +33,7 @@ struct PathSwitch {
   int ways = 2;
 };
 
-/// Distance 0 is where the path was started; it may be negative behind it. Read-only after it is made; keeps the map
+/// Distance 0 is where the path was started, which a long one may have left; it is negative behind it. Read-only after it is made; keeps the map
 /// alive.
 class Path {
  public:
@@ -48,7 +48,7 @@ class Path {
   /// This way as whole edges, with the same distances.
   [[nodiscard]] Route route() const;
 
-  [[nodiscard]] double begin_m() const;  // smallest distance, <= 0
+  [[nodiscard]] double begin_m() const;  // smallest distance
   [[nodiscard]] double end_m() const;
   [[nodiscard]] EdgePosition position_at(double distance_m) const;  // clamped to the ends
   /// Distance of a place on the map, the one nearest to 0 on a ring; nothing when the path does not run over it.
@@ -96,7 +96,8 @@ class Path {
 };
 
 /// The same way with the same distances, followed on over the straight way of every switch up to `ahead_m` and
-/// `behind_m` from `near_m`. Nothing when the track ends before, or it reaches so far.
+/// `behind_m` from `near_m`; what lies 200 km from there is left out. Nothing when the track ends before, or it reaches
+/// so far.
 std::optional<Path> followed_on(const Path& old, const Ways& ways, double near_m, double ahead_m, double behind_m);
 
 /// A way that was joined to an old one, and where on its distances the place lies over other ways that lead there.

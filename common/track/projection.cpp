@@ -90,9 +90,10 @@ std::optional<Eigen::Vector2d> Projection::from_geo(const GeoPoint& point) const
   return Eigen::Vector2d(out.xy.x, out.xy.y);
 }
 
-bool Projection::is_made_for(const GeoPoint& point) const {
+bool Projection::is_made_for(const GeoPoint& point, double beyond_deg) const {
   const auto is_within = [&](double GeoPoint::*degrees) {
-    return point.*degrees >= handle_->south_west.*degrees && point.*degrees <= handle_->north_east.*degrees;
+    return point.*degrees >= handle_->south_west.*degrees - beyond_deg &&
+           point.*degrees <= handle_->north_east.*degrees + beyond_deg;
   };
   return !handle_->has_area || (is_within(&GeoPoint::lat_deg) && is_within(&GeoPoint::lon_deg));
 }

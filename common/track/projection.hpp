@@ -24,8 +24,9 @@ class Projection {
   /// Nothing where the projection is not defined.
   [[nodiscard]] std::optional<GeoPoint> to_geo(double easting_m, double northing_m) const;
   [[nodiscard]] std::optional<Eigen::Vector2d> from_geo(const GeoPoint& point) const;
-  /// False where the system is made for other places; true where nobody says for which.
-  [[nodiscard]] bool is_made_for(const GeoPoint& point) const;
+  /// False where the system is made for other places, so many degrees beyond its area; true where nobody says for
+  /// which.
+  [[nodiscard]] bool is_made_for(const GeoPoint& point, double beyond_deg = 0) const;
 
  private:
   struct Handle;

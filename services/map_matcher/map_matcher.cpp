@@ -18,6 +18,7 @@ constexpr double kTrackEveryS = 1.0;      // the track is said again after this 
 constexpr double kOpenTrackEveryM = 2.0;  // ... or, while it is not known, this way
 constexpr double kNoCameraS = 0.5;        // without an odometry step
 constexpr double kCountM = 20.0;
+constexpr double kCreepMps = 0.3;     // slower than that the sign of a speed may be its noise
 constexpr double kLostS = 30.0;       // after so long unseen the track is chosen anew
 constexpr double kWorthSaying = 0.5;  // probability of the track beside
 constexpr double kRateShare = 0.75;   // of the curvature's sigma comes from its unknown rate
@@ -224,7 +225,7 @@ void MapMatcher::search(const StepInput& step, PlaceFixes& fixes) {
   auto turn = turn_of_camera();
   if (!turn && step_ && core::seconds(step.stamp_ns - step_->stamp_ns) < FollowedPath::kOldStateS)
     turn = turn_of_gyro(step_->stamp_ns, step.stamp_ns);
-  const auto places = search_.move(turn, chain_.odometer_m());
+  const auto places = search_.move(turn);
   if (!places.empty()) fixes.push_back(fix_of(FixKind::network, step.stamp_ns, places));
 }
 
@@ -257,13 +258,20 @@ void MapMatcher::follow_turning(const StepInput& step, PlaceFixes& fixes) {
 TrackWindow MapMatcher::window_at(const Prior& prior) const {
   const auto place = followed_->path()->position_at(prior.path_distance_m);
   const double probability = std::min(1.0, state_->track_probability / said_track_.there);
-  return {place, prior.over_m, prior.under_m, state_->sigma_m, probability, !(state_->placed.speed_mps < 0)};
+  const double speed_mps = state_->placed.speed_mps;
+  return {.place = place,
+          .over_m = prior.over_m,
+          .under_m = prior.under_m,
+          .sigma_m = state_->sigma_m,
+          .probability = probability,
+          .forwards = !(speed_mps < -kCreepMps),
+          .stands = !(std::abs(speed_mps) > kCreepMps)};
 }
 
 // Without a camera fusion's states lead: they come ten times a second.
 void MapMatcher::follow_without_camera(PlaceFixes& fixes) {
   const int64_t stamp_ns = state_->placed.stamp_ns;
-  if (step_ && core::seconds(stamp_ns - step_->stamp_ns) < kNoCameraS) return;
+  if (step_ && std::abs(core::seconds(stamp_ns - step_->stamp_ns)) < kNoCameraS) return;
   if (!prior_at(stamp_ns)) return;
   move_without_camera(stamp_ns);
   say_track(fixes);
@@ -335,7 +343,7 @@ void MapMatcher::say_track(PlaceFixes& fixes) {
   const double there = (1 - doubt) * (1 - beside_->probability());
   const bool known = choice->known && there == 1;
   const bool changed = best.place.edge != said_track_.edge || known != said_track_.known;
-  const bool due = core::seconds(stamp_ns - said_track_.stamp_ns) > kTrackEveryS;
+  const bool due = std::abs(core::seconds(stamp_ns - said_track_.stamp_ns)) > kTrackEveryS;  // clocks are set back
   if (!changed && !due && (choice->known || since_m < kOpenTrackEveryM)) return;
   said_track_ = {best.place.edge, known, stamp_ns, prior->travelled_m, there};
   PlaceFix fix{FixKind::track, stamp_ns, choice->options, std::numeric_limits<double>::infinity()};

@@ -161,8 +161,8 @@ void BaliseTracker::go_undeclared(const EdgePosition& foot) {
     note_direction(step->way_m);
     leg_->turns.run(step->way_m);
     leave_doubted(*step);
-  } else if (const auto ways = ways_between(*map_, ways_, *leg_->from, foot, before_m); !ways.empty()) {
-    leg_->turns.run(ways.front().length_m - before_m);  // onto another leg, behind one more switch
+  } else if (const auto ways = ways_between(*map_, ways_, *leg_->from, foot, before_m); ways && !ways->empty()) {
+    leg_->turns.run(ways->front().length_m - before_m);  // onto another leg, behind one more switch
   } else {
     leg_->from.reset();
     reference_.reset();
@@ -170,7 +170,7 @@ void BaliseTracker::go_undeclared(const EdgePosition& foot) {
   if (leg_->from) step_m_ = leg_->turns.way_m() - before_m;
   if (!reference_) return;
   reference_->foot_m += leg_->turns.way_m() - before_m;
-  if (anew || foot.edge != last_->edge) doubt_legs(ways_between(*map_, ways_, *leg_->from, foot, leg_->turns.way_m()));
+  if (anew || foot.edge != last_->edge) doubt_legs(foot);
 }
 
 // The group that it runs back to may lie beyond this switch on one of its legs.
@@ -185,8 +185,11 @@ void BaliseTracker::leave_doubted(const Step& step) {
 }
 
 // Where legs have joined again nobody knows over which one the train came.
-void BaliseTracker::doubt_legs(const std::vector<WayBetween>& ways) {
-  reference_->doubt_m = std::max(leg_->reference->doubt_m, most_apart_m(ways, leg_->turns.way_m()));
+void BaliseTracker::doubt_legs(const EdgePosition& foot) {
+  const double way_m = leg_->turns.way_m();
+  const auto ways = ways_between(*map_, ways_, *leg_->from, foot, way_m);
+  const double apart_m = ways && !ways->empty() ? most_apart_m(*ways, way_m) : legs_differ_m(way_m);
+  reference_->doubt_m = std::max(leg_->reference->doubt_m, apart_m);
 }
 
 bool BaliseTracker::go_declared(const EdgePosition& foot) {
@@ -207,8 +210,9 @@ bool BaliseTracker::go_declared(const EdgePosition& foot) {
   const auto step = step_to(foot);
   const double counted_m = leg.turns.way_m();
   const double about_m = counted_m + (step ? step->way_m : 0.0);
-  const auto ways = ways_between(*map_, ways_, *leg.from, foot, about_m);
-  if (ways.empty()) return false;
+  const auto found = ways_between(*map_, ways_, *leg.from, foot, about_m);
+  if (!found || found->empty()) return false;
+  const auto& ways = *found;
   const double length_m = ways.front().length_m;
   reference_ = leg.reference;
   if (reference_) reference_->doubt_m = std::max(reference_->doubt_m, most_apart_m(ways, length_m));

@@ -87,7 +87,7 @@ class BaliseTracker {
   void go_back_to(LegSinceSwitch leg);
   void leave_doubted(const Step& step);
   void go_undeclared(const track::EdgePosition& foot);
-  void doubt_legs(const std::vector<WayBetween>& ways);
+  void doubt_legs(const track::EdgePosition& foot);
   [[nodiscard]] bool go_declared(const track::EdgePosition& foot);
   void run_on(double way_m);
   [[nodiscard]] std::vector<Passed> groups_on(const std::vector<WayBetween>& ways) const;

@@ -22,6 +22,11 @@ static_assert(static_cast<uint8_t>(Reason::balise_group) == msg::REPORT_BALISE_G
 static_assert(static_cast<uint8_t>(Reason::location) == msg::REPORT_LOCATION);
 static_assert(static_cast<uint8_t>(Reason::start) == msg::REPORT_START);
 static_assert(static_cast<uint8_t>(Reason::mode) == msg::REPORT_MODE);
+static_assert(static_cast<uint8_t>(Reason::level) == msg::REPORT_LEVEL);
+static_assert(static_cast<uint8_t>(Reason::integrity_confirmed) == msg::REPORT_INTEGRITY_CONFIRMED);
+static_assert(static_cast<uint8_t>(Reason::integrity_lost) == msg::REPORT_INTEGRITY_LOST);
+static_assert(static_cast<uint8_t>(Reason::border) == msg::REPORT_BORDER);
+static_assert(static_cast<uint8_t>(Reason::session) == msg::REPORT_SESSION);
 static_assert(static_cast<uint8_t>(Reason::error) == msg::REPORT_ERROR);
 
 inline bool of_another_map(const track::Map* map, const msg::TrainState& state) {

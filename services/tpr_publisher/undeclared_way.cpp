@@ -8,8 +8,8 @@ namespace railfix::tpr_publisher {
 namespace {
 
 constexpr size_t kMostRoutes = 5000;      // looked at in a large station before giving up
-constexpr double kLegsDifferM = 200.0;    // ways of one train differ by so much at most, ...
-constexpr double kLegsDifferPerM = 0.05;  // ... and by this share of their length
+constexpr double kLegsDifferM = 200.0;    // beside ...
+constexpr double kLegsDifferPerM = 0.05;  // ... this share of the way
 
 }  // namespace
 
@@ -29,15 +29,20 @@ void Turns::run(double step_m) {
   }
 }
 
-std::vector<WayBetween> ways_between(const track::Map& map, const track::Ways& ways, const track::EdgePosition& from,
-                                     const track::EdgePosition& to, double way_m) {
+double legs_differ_m(double way_m) {
+  return kLegsDifferM + kLegsDifferPerM * std::abs(way_m);
+}
+
+std::optional<std::vector<WayBetween>> ways_between(const track::Map& map, const track::Ways& ways,
+                                                    const track::EdgePosition& from, const track::EdgePosition& to,
+                                                    double way_m) {
   const bool along = way_m >= 0;
   const auto begin = track::run_of(map, from);
-  const double differ_m = kLegsDifferM + kLegsDifferPerM * std::abs(way_m);
+  const double differ_m = legs_differ_m(way_m);
   std::vector<WayBetween> found;
   std::vector<track::Route> open{track::Route(track::run_of(map, to), to.offset_m, 0)};
   for (size_t i = 0; i < open.size(); ++i) {
-    if (open.size() > kMostRoutes) return {};
+    if (open.size() > kMostRoutes) return std::nullopt;
     const auto& end = along ? open[i].legs().front() : open[i].legs().back();
     if (end.run == begin) {
       const double length_m = -(end.begin_m + begin.into_m(from.offset_m));

@@ -2,6 +2,7 @@
 // declared again, by which edges it came.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "track/ways.hpp"
@@ -27,10 +28,13 @@ struct WayBetween {
   double length_m = 0;  // signed: negative when it runs against the direction of the places
 };
 
-/// All ways that lead there and are about `way_m` long, the one nearest to it first. Empty when there are none, or too
-/// many to look at. REQUIRES: both edges are on the map.
-std::vector<WayBetween> ways_between(const track::Map& map, const track::Ways& ways, const track::EdgePosition& from,
-                                     const track::EdgePosition& to, double way_m);
+/// Ways of one train over different legs, about `way_m` long, differ by so much at most.
+double legs_differ_m(double way_m);
+/// All ways that lead there and are about `way_m` long, the one nearest to it first. Nothing when there are too many to
+/// look at. REQUIRES: both edges are on the map.
+std::optional<std::vector<WayBetween>> ways_between(const track::Map& map, const track::Ways& ways,
+                                                    const track::EdgePosition& from, const track::EdgePosition& to,
+                                                    double way_m);
 
 /// Whether a train that runs on from a place, along its direction or against it, comes to that edge within `most_m`
 /// whichever way it takes. False when there are too many to look at. REQUIRES: the edge is on the map.

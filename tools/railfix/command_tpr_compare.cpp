@@ -9,6 +9,7 @@
 #include "command_tpr.hpp"
 #include "compare/columns.hpp"
 #include "compare/doubts.hpp"
+#include "compare/one_train.hpp"
 #include "compare/pairing.hpp"
 #include "compare/time_shift.hpp"
 #include "compare/verdict_text.hpp"
@@ -162,10 +163,11 @@ void listen(ReportSource& ours, ReportSource& certified, Line& line, const Compa
     for (auto* source : {&ours, &certified}) {
       if (source->live()) goes_on &= source->listen(kTurnS);
     }
-    const auto* axes = line.axes(certified.reports());
+    const auto one_train = compare::of_one_train(ours.reports(), certified.reports());
+    const auto* axes = one_train.ok() ? line.axes(one_train.value().certified) : nullptr;
     if (axes == nullptr) continue;
     const auto pairs =
-        compare::pair_up(ours.reports(), certified.reports(), *axes, core::to_ns(options.longest_gap_s)).pairs;
+        compare::pair_up(ours.reports(), one_train.value().certified, *axes, core::to_ns(options.longest_gap_s)).pairs;
     for (; told < pairs.size(); ++told) {
       std::printf("at %.3f s ours - certified %+.2f m, intervals %s%s%s\n", core::seconds(pairs[told].stamp_ns),
                   pairs[told].difference_m(), pairs[told].overlap() ? "overlap" : "have nothing in common",
@@ -213,8 +215,7 @@ void check_reports(const char* side, const std::string& where, const ReportSourc
                                       : ": it holds no position report; is it the right file?"));
 }
 
-void check_places(const char* side, const std::string& where, const ReportSource& source) {
-  const auto& reports = source.reports();
+void check_places(const char* side, const std::string& where, const std::vector<compare::TimedReport>& reports) {
   if (std::ranges::any_of(reports, [](const auto& report) { return compare::position_known(report.fields); })) return;
   throw core::BadInput(
       std::string(side) + " " + where + ": none of its " + std::to_string(reports.size()) +
@@ -249,16 +250,18 @@ int compare_reports(const CompareOptions& options) {
   if (ours.live() || certified.live()) listen(ours, certified, line, options);
   check_reports("--ours", options.ours, ours);
   check_reports("--certified", options.certified, certified);
-  check_places("--ours", options.ours, ours);
-  check_places("--certified", options.certified, certified);
-  const auto* axes = line.axes(certified.reports());
+  check_places("--ours", options.ours, ours.reports());
+  const auto one_train = core::value_or_throw(compare::of_one_train(ours.reports(), certified.reports()));
+  const auto& theirs = one_train.certified;
+  check_places("--certified", options.certified, theirs);
+  const auto* axes = line.axes(theirs);
   if (axes == nullptr) throw core::BadInput(options.map + ": has none of the reported balise groups.");
-  const auto pairing = compare::pair_up(ours.reports(), certified.reports(), *axes, core::to_ns(options.longest_gap_s));
+  const auto pairing = compare::pair_up(ours.reports(), theirs, *axes, core::to_ns(options.longest_gap_s));
   std::optional<compare::Judge> judge;
   if (truth) judge = compare::Judge{&*truth, options.foot_to_front_m};
   std::printf("reports                  ours %zu, %zu with a place; certified %zu, %zu with a place\n",
-              ours.reports().size(), pairing.ours.placed.size(), certified.reports().size(),
-              pairing.certified.placed.size());
+              ours.reports().size(), pairing.ours.placed.size(), theirs.size(), pairing.certified.placed.size());
+  if (!one_train.remark.empty()) std::printf("trains                   %s\n", one_train.remark.c_str());
   if (ours.repeated() + certified.repeated() > 0) {
     std::printf("delivered once more      ours %zu, certified %zu reports: alike with the same stamp, counted once\n",
                 ours.repeated(), certified.repeated());

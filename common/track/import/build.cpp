@@ -13,6 +13,7 @@
 #include "track/import/scale.hpp"
 #include "track/import/swapped.hpp"
 #include "track/import/told.hpp"
+#include "track/import/whereabouts.hpp"
 #include "track/import/xml/erju.hpp"
 #include "track/import/xml/landxml.hpp"
 #include "track/import/xml/railml.hpp"
@@ -71,7 +72,9 @@ core::Result<Kind> kind_of(const std::filesystem::path& file) {
 
 std::vector<std::string> problems_of(const Map& map) {
   std::vector<std::string> found = check_topology(map);
-  if (std::string of_scale = scale_problem(map); !of_scale.empty()) found.push_back(std::move(of_scale));
+  for (std::string problem : {whereabouts_problem(map), scale_problem(map)}) {
+    if (!problem.empty()) found.push_back(std::move(problem));
+  }
   return found;
 }
 

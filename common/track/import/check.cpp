@@ -54,6 +54,7 @@ class Check {
       check_end(edge, edge.from_node, edge.alignment.at(0).pose);
       check_end(edge, edge.to_node, edge.alignment.at(edge.alignment.length_m()).pose);
     }
+    check_cant_sides();
     for (const Node& node : map_.nodes) check_node(node);
     take(near_misses(map_), cuts_);
     take(facing_ends(map_), cuts_);
@@ -202,6 +203,33 @@ class Check {
       shapes_.push_back(called(edge) + " at " + told_m(offset_m) + " has a cant of " + told_m(cant_m) +
                         ", more than any track has");
       return;
+    }
+  }
+
+  /// Of the whole map: the cant of curves that are canted to speak of lies on the outer rail, but for errors.
+  void check_cant_sides() {
+    constexpr double kEveryM = 10;
+    constexpr double kCurvePerM = 1e-4;
+    constexpr double kMillimetresM = 0.002;  // the largest of cants that were told in metres
+    double outer_m = 0;
+    double inner_m = 0;
+    double largest_m = 0;
+    for (const Edge& edge : map_.edges) {
+      if (edge.alignment.cant().empty()) continue;
+      for (double s_m = 0; s_m < edge.alignment.length_m(); s_m += kEveryM) {
+        const TrackPoint at = edge.alignment.at(s_m);
+        largest_m = std::max(largest_m, std::abs(at.cant_m));
+        if (std::abs(at.cant_m) < kMillimetresM || std::abs(at.curvature_per_m) < kCurvePerM) continue;
+        (at.cant_m * at.curvature_per_m > 0 ? outer_m : inner_m) += kEveryM;
+      }
+    }
+    if (inner_m > outer_m) {
+      shapes_.push_back("the inner rail is the higher one on " + told_m(inner_m, 0) + " of curves, the outer one on " +
+                        told_m(outer_m, 0) + ": the signs of the cant, or the sides of the curves, are exchanged");
+    }
+    if (largest_m > 0 && largest_m < kMillimetresM) {
+      shapes_.push_back("the largest cant is " + told_number(1e3 * largest_m, 2) +
+                        " mm: the source has it in metres where it must be millimetres");
     }
   }
 

@@ -12,6 +12,7 @@ namespace railfix::map_matcher {
 namespace {
 
 constexpr size_t kLeastSeen = 10;
+constexpr size_t kMostSeen = 1000;  // of a train that is moved to and fro
 constexpr double kWayM = 100.0;  // over which GNSS and odometer must agree, ...
 constexpr double kOffM = 10.0;   // ... to this and
 constexpr double kOffShare = 0.05;
@@ -42,7 +43,8 @@ bool GnssSearch::add(const GnssPosition& position, double odometer_m, double spe
     if (seen_.size() > 1 && moved_m < kStandsM) seen_.pop_back();
   }
   seen_.push_back(seen);
-  while (seen_.size() > kLeastSeen && std::abs(odometer_m - seen_[1].odometer_m) >= kWayM) seen_.pop_front();
+  const auto is_left = [&] { return std::abs(odometer_m - seen_[1].odometer_m) >= kWayM; };
+  while (seen_.size() > kMostSeen || (seen_.size() > kLeastSeen && is_left())) seen_.pop_front();
   return true;
 }
 

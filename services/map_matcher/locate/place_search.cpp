@@ -11,23 +11,26 @@ void PlaceSearch::follow(bool track_known, bool usable) {
   if (track_known) gnss_.reset();
 }
 
-std::vector<LocatedPlace> PlaceSearch::move(const std::optional<Turn>& turn, double odometer_m) {
+std::vector<LocatedPlace> PlaceSearch::move(const std::optional<Turn>& turn) {
   if (stage_ == Stage::known) return {};
   if (!locator_) {
     locator_.emplace(parameters_.locator, index());
-    located_m_ = odometer_m;
+    since_search_m_ = 0;
   }
   if (!turn) {
     locator_->forget();
     return {};
   }
-  if (std::abs(turn->way_m) > kLeastWayM) locator_->move(turn->way_m, turn->turn_rad, turn->sigma_rad);
+  if (std::abs(turn->way_m) > kLeastWayM) {
+    locator_->move(turn->way_m, turn->turn_rad, turn->sigma_rad);
+    since_search_m_ += std::abs(turn->way_m);
+  }
   if (!searches()) return {};
-  if (std::abs(odometer_m - located_m_) < parameters_.every_m) {
+  if (since_search_m_ < parameters_.every_m) {
     locator_->prepare();
     return {};
   }
-  located_m_ = odometer_m;
+  since_search_m_ = 0;
   auto location = locator_->locate();
   if (!location.certain()) return {};
   of_gnss_ = false;
@@ -53,7 +56,7 @@ void PlaceSearch::forget() {
   locator_.reset();
   gnss_.reset();
   of_gnss_ = false;
-  located_m_ = 0;
+  since_search_m_ = 0;
 }
 
 const std::shared_ptr<const NetworkIndex>& PlaceSearch::index() {

@@ -26,9 +26,9 @@ class PlaceSearch {
   /// Fusion's last word; before the first one nothing is searched for. A place that is no position may soon be given
   /// up: the way is measured already, and searched for then.
   void follow(bool track_known, bool usable);
-  /// The train has moved on; without a turn nobody knows how. odometer_m: of its way. The places, best first, when it
-  /// is certain where the train is.
-  [[nodiscard]] std::vector<LocatedPlace> move(const std::optional<Turn>& turn, double odometer_m);
+  /// The train has moved on; without a turn nobody knows how. The places, best first, when it is certain where the
+  /// train is.
+  [[nodiscard]] std::vector<LocatedPlace> move(const std::optional<Turn>& turn);
   void sight(const Sighting& sighting);
   /// odometer_m, speed_mps: as for GnssSearch.
   [[nodiscard]] std::optional<LocatedPlace> hear(const GnssPosition& position, double odometer_m, double speed_mps);
@@ -51,7 +51,7 @@ class PlaceSearch {
   std::optional<NetworkLocator> locator_;
   std::optional<GnssSearch> gnss_;
   bool of_gnss_ = false;
-  double located_m_ = 0;  // odometer at the last search
+  double since_search_m_ = 0;  // way
 };
 
 }  // namespace railfix::map_matcher

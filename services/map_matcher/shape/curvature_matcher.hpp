@@ -42,7 +42,10 @@ class CurvatureMatcher {
   /// Another way with distances that go on from the old one's; the measurements so far stay.
   void change_path(std::shared_ptr<const track::Path> path) { path_ = std::move(path); }
   /// The odometer lost the way (camera blind): what came before cannot be used any more.
-  void forget() { bins_.clear(); }
+  void forget() {
+    bins_.clear();
+    waiting_sigma_m_ = 0;
+  }
   [[nodiscard]] size_t bins() const { return bins_.size(); }
   /// Best place now. A fix uses up its measurements, so that none is counted twice. Call it every few metres.
   std::optional<Fix> match(int64_t stamp_ns, double odometer_m, const Prior& prior);
@@ -51,7 +54,7 @@ class CurvatureMatcher {
   struct Bin {
     double odometer_m = 0;  // weighted mean of its samples
     double curvature_per_m = 0;
-    double weight = 0;
+    double weight = 0;  // of its samples, in m^2: 1 / sigma^2
     CurvatureOf of = CurvatureOf::rails;
   };
   /// How a bin's error is weighed, given those of the bins before: what the body swayed to the one side within a bin it

@@ -76,7 +76,7 @@ std::optional<double> GyroTurn::heading_at(int64_t stamp_ns) const {
 double GyroTurn::bias_variance_at(int64_t stamp_ns) const {
   const double most = parameters_.bias_rps * parameters_.bias_rps;
   if (!bias_variance_) return most;
-  const double walked_s = std::max(0.0, core::seconds(stamp_ns - learnt_ns_));
+  const double walked_s = std::abs(core::seconds(stamp_ns - learnt_ns_));  // a clock may have been set back
   return std::min(most, *bias_variance_ + parameters_.bias_walk_rps * parameters_.bias_walk_rps * walked_s);
 }
 

@@ -23,6 +23,7 @@ struct TrackWindow {
   double sigma_m = 0;
   double probability = 1;  // of this edge, as long as nothing is known here
   bool forwards = true;    // the train moves the way that the cab looks
+  bool stands = false;     // or creeps: which way it came is not known
 };
 
 struct TrackOption {
@@ -78,6 +79,13 @@ class TrackChooser {
   };
   void start(const TrackWindow& window);
   void open_ways_behind();
+  /// Of the switches that a train came over which runs on that way: where it may be instead.
+  struct OtherLegs {
+    std::vector<track::Route> routes;
+    double probability = 1;    // that it is on none of them
+    bool of_one_near = false;  // a switch that it may stand in front of
+  };
+  [[nodiscard]] OtherLegs other_legs(bool forwards) const;
   void run(double way_m);
   void use_pending();
   void watch_for_jump(const BinTurn& bin);

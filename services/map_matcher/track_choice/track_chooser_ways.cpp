@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <numeric>
 
 #include "map_matcher/track_choice/picture_fits.hpp"
@@ -22,38 +23,51 @@ constexpr double kUnwatchedM = 3000;     // behind a switch that nobody watched,
 }  // namespace
 
 // Who begins does not know more than fusion. Where that has not declared the track the train may be on any leg of the
-// switches behind it, as far beyond them; else of those that it may stand in front of.
+// switches that it came over, as far beyond them; else of those that it may stand in front of. Nobody knows which way
+// a train came that stands: as the cab looks, if there is a switch that near.
 void TrackChooser::open_ways_behind() {
+  auto legs = other_legs(forwards_);
   const bool declared = window_.probability >= track::kDeclaredProbability;
-  const double behind_m = forwards_ ? window_.over_m : window_.under_m;
+  if (window_.stands && !declared && !legs.of_one_near) {
+    auto other_way = other_legs(!forwards_);
+    legs.probability = std::min(legs.probability, other_way.probability);
+    std::ranges::move(other_way.routes, std::back_inserter(legs.routes));
+  }
+  told_ = legs.routes.empty() && !declared ? window_.probability : 1;
+  if (legs.routes.empty()) return;
+  hypotheses_.front().log_prior = std::log(legs.probability);
+  const double share = (1 - legs.probability) / static_cast<double>(legs.routes.size());
+  for (auto& route : legs.routes)
+    hypotheses_.push_back({std::move(route), std::log(share), {0, std::log(parameters_.astray)}, {}});
+}
+
+TrackChooser::OtherLegs TrackChooser::other_legs(bool forwards) const {
+  const bool declared = window_.probability >= track::kDeclaredProbability;
+  const double behind_m = forwards ? window_.over_m : window_.under_m;
   const double in_front_m = behind_m + kMapSigmas * parameters_.map_sigma_m + kWheelsBehindM;
   track::Route back = hypotheses_.front().route;
-  std::vector<track::Route> others;
-  double probability = window_.probability;
+  OtherLegs legs{{}, window_.probability};
   while (back.legs().size() < kMostHypotheses) {
-    const double node_m = forwards_ ? -back.begin_m() : back.end_m();
-    if (node_m > (declared ? in_front_m : kUnwatchedM) || others.size() > kMostHypotheses) break;
-    const track::Run here = forwards_ ? back.legs().front().run : back.legs().back().run;
-    const auto before = forwards_ ? ways_->before(here) : ways_->after(here);
+    const double node_m = forwards ? -back.begin_m() : back.end_m();
+    if (node_m > (declared ? in_front_m : kUnwatchedM) || legs.routes.size() > kMostHypotheses) break;
+    const track::Run here = forwards ? back.legs().front().run : back.legs().back().run;
+    const auto before = forwards ? ways_->before(here) : ways_->after(here);
     if (before.empty()) break;
     const track::Run& from = before.front();
-    const auto ways = forwards_ ? ways_->after(from) : ways_->before(from);
+    const auto ways = forwards ? ways_->after(from) : ways_->before(from);
     for (const auto& way : ways) {
       if (way == here) continue;
-      const double switch_m = from.forward == forwards_ ? from.length_m() : 0.0;  // on the edge before it
-      auto& other = others.emplace_back(from, switch_m, forwards_ ? back.begin_m() : back.end_m());
-      forwards_ ? other.push_ahead(way) : other.push_behind(way);
+      const double switch_m = from.forward == forwards ? from.length_m() : 0.0;  // on the edge before it
+      auto& other = legs.routes.emplace_back(from, switch_m, forwards ? back.begin_m() : back.end_m());
+      forwards ? other.push_ahead(way) : other.push_behind(way);
     }
-    if (node_m <= in_front_m) probability = std::min(probability, 1.0 / static_cast<double>(ways.size()));
-    forwards_ ? back.push_behind(from) : back.push_ahead(from);
+    if (node_m <= in_front_m && ways.size() > 1) {
+      legs.probability = std::min(legs.probability, 1.0 / static_cast<double>(ways.size()));
+      legs.of_one_near = true;
+    }
+    forwards ? back.push_behind(from) : back.push_ahead(from);
   }
-  told_ = others.empty() && !declared ? window_.probability : 1;
-  if (others.empty()) return;
-  hypotheses_.front().log_prior = std::log(probability);
-  for (auto& other : others) {
-    const double share = (1 - probability) / static_cast<double>(others.size());
-    hypotheses_.push_back({std::move(other), std::log(share), {0, std::log(parameters_.astray)}, {}});
-  }
+  return legs;
 }
 
 // What lies ahead may be set otherwise once the train has left it: only what its wheels certainly stand on is kept.

@@ -189,7 +189,9 @@ void GroundLink::store_new(bool all) {
   }
   const auto dropped = outbox_.limit(settings_.store_limit);
   dropped_ += dropped.size();
-  if (const auto removed = store_.remove(dropped); !removed.ok()) store_trouble_ = removed.error().message;
+  if (dropped.empty()) return;
+  std::ranges::copy(dropped, std::back_inserter(delivered_));  // to be removed as those are
+  remove_delivered();
 }
 
 void GroundLink::publish() {

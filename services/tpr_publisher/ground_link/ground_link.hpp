@@ -96,7 +96,7 @@ class GroundLink {
   Outbox outbox_;
   std::deque<Unstored> unstored_;
   std::map<int, Unstored> unstored_under_way_;
-  std::vector<uint64_t> delivered_;  // to be removed from the store
+  std::vector<uint64_t> delivered_;  // or beyond the limit: to be removed from the store
   uint64_t memory_stream_;           // of what was never stored
   uint64_t memory_sequence_ = 0;
   std::string link_trouble_;     // why there is no connection

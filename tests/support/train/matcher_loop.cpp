@@ -115,7 +115,7 @@ void MatcherLoop::look_for_place(const fusion::OdometryInput& step, const fusion
     const double turn_rad = (simulation_.curvature_at(truth.distance_m, arrival_s) + bias_per_m_) * moved_m;
     turn = {moved_m, turn_rad + kTurnSigmaRad * random_.normal(), kTurnSigmaRad};
   }
-  const auto places = search_.move(turn, chain_.odometer_m());
+  const auto places = search_.move(turn);
   if (!places.empty()) found(places.front(), fusion::FixKind::network, step.stamp_ns, arrival_s);
 }
 

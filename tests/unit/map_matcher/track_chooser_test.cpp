@@ -1,8 +1,10 @@
 #include "map_matcher/track_choice/track_chooser.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <set>
 
 #include "support/switch_passage.hpp"
 #include "unit/map_matcher/fork_map.hpp"
@@ -259,6 +261,32 @@ TEST(TrackChooser, WhoBeginsInDoubtLooksAtEverySwitchBehind) {
   const auto choice = chooser.choice();
   EXPECT_FALSE(choice->known) << "the left leg of the first one is as straight there";
   EXPECT_LT(choice->options.front().probability, 0.7);
+}
+
+// The speed of a train that stands has the sign of its noise.
+TEST(TrackChooser, WhoBeginsInDoubtAtAHaltLooksAtTheSwitchBehindAndIfThereIsNoneAtTheOneInFront) {
+  auto made = std::make_shared<track::Map>(*fork());
+  made->edges.push_back({4, "beyond", 3, 5, "", track::Alignment::chained({0, 1000, 0}, {{800, 0, 0}})});
+  made->edges.push_back({5, "joins it", 6, 3, "", track::Alignment::chained({0, 1000, 0}, {{800, 0, 0}})});
+  made->connections.push_back({3, 2, 4, false});
+  made->connections.push_back({3, 5, 4, true});
+  const std::shared_ptr<const track::Map> map = made;
+  const auto options_at = [&](uint32_t edge, double place_m) {
+    TrackChooser chooser({}, map, std::make_shared<const track::Ways>(*map));
+    chooser.follow({.place = {edge, place_m, track::Direction::forward},
+                    .over_m = 3,
+                    .under_m = 3,
+                    .sigma_m = 0.5,
+                    .probability = 0.5,
+                    .stands = true});
+    std::set<uint32_t> edges;
+    const auto choice = chooser.choice();
+    EXPECT_FALSE(choice->known);
+    for (const auto& option : choice->options) edges.insert(option.place.edge);
+    return edges;
+  };
+  EXPECT_THAT(options_at(2, 5), ::testing::UnorderedElementsAre(2, 3)) << "near the points behind";
+  EXPECT_THAT(options_at(2, 400), ::testing::UnorderedElementsAre(2, 3, 5)) << "either may be why";
 }
 
 /// Fusion has declared the track, and is 3 m sure of the place.

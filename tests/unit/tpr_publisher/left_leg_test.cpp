@@ -84,6 +84,38 @@ TEST_F(LeftLeg, ADoubtInFrontOfATrailingSwitchIsOfTheOneBehind) {
   expect(kOfLoop[2], 20);
 }
 
+// More loops, each 8 m longer on its siding, than there are ways to look at.
+TEST_F(LeftLeg, WhereTooManyWaysHaveJoinedTheDoubtIsNoLess) {
+  constexpr uint32_t kLoops = 14;
+  auto map = std::make_shared<track::Map>();
+  const auto straight = [](double length_m) {
+    return track::Alignment::chained({0, 0, core::kPi / 2}, {{length_m, 0, 0}});
+  };
+  map->edges = {{1, "stem", 1, 2, "", straight(1000)}};
+  map->balise_groups = {{85, 1, 1, 100, true, true, 0, {}}};
+  uint32_t before = 1;
+  for (uint32_t i = 0; i < kLoops; ++i) {
+    const uint32_t node = 2 + 2 * i;
+    const uint32_t edge = 2 + 3 * i;
+    map->edges.push_back({edge, "straight", node, node + 1, "", straight(100)});
+    map->edges.push_back({edge + 1, "siding", node, node + 1, "", straight(108)});
+    map->edges.push_back({edge + 2, "on", node + 1, node + 2, "", straight(50)});
+    map->connections.push_back({node, before, edge, false});
+    map->connections.push_back({node, before, edge + 1, true});
+    map->connections.push_back({node + 1, edge, edge + 2, false});
+    map->connections.push_back({node + 1, edge + 1, edge + 2, true});
+    before = edge + 2;
+  }
+  tracker = BaliseTracker(map, 5000);
+  run(1, 900, 996, 4, true);
+  for (uint32_t i = 0; i < kLoops; ++i) {
+    run(2 + 3 * i, 2, 98, 4, false);
+    run(4 + 3 * i, 2, 48, 4, false);
+    ASSERT_TRUE(tracker.reference());
+    EXPECT_GE(tracker.reference()->doubt_m, 8 * (i + 1) - 1e-6) << i;
+  }
+}
+
 TEST_F(LeftLeg, TheWayFromTheGroupBeforeTellsTheDirectionAndNotTheLastStep) {
   tracker = BaliseTracker(loop(405), 5000);
   run(4, 150, 2, -4, true);  // back over the group beyond the loop, over a leg that nobody knows, and forward again

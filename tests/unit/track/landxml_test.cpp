@@ -6,6 +6,7 @@
 #include "core/random.hpp"
 #include "core/units.hpp"
 #include "import_fixture.hpp"
+#include "track/import/build.hpp"
 
 namespace railfix::track {
 namespace {
@@ -123,6 +124,46 @@ TEST_F(LandXmlTest, SwissMainLineIsReproducedWithinATenthOfAMillimetre) {
   EXPECT_EQ(track.elements().size(), 103U);
   EXPECT_LT(worst_m, 1e-4);
   EXPECT_LT(read.figures.max_heading_step_rad, 1e-3);
+}
+
+TEST_F(LandXmlTest, TellsCantOnTheInnerRailCantInMetresAndALengthWithoutUnit) {
+  const auto problems = [&](const std::vector<std::pair<std::string, std::string>>& changes) {
+    std::string text = kSample;
+    for (const auto& [from, to] : changes) {
+      const size_t at = text.find(from);
+      EXPECT_NE(at, std::string::npos) << from;
+      text.replace(at, from.size(), to);
+    }
+    return core::value_or_throw(build_map({write("c.xml", text)}, {})).map.problems;
+  };
+  const auto inner = HasSubstr("the inner rail is the higher one on ");
+  const auto metres = HasSubstr("the largest cant is 0.12 mm: the source has it in metres");
+  const auto unit = HasSubstr("the file names no unit of length");
+  EXPECT_THAT(problems({}), testing::Each(testing::Not(testing::AnyOf(inner, metres, unit))));
+  EXPECT_THAT(problems({{"appliedCant=\"120\"", "appliedCant=\"-120\""}}), testing::Contains(inner));
+  EXPECT_THAT(problems({{"curvature=\"cw\"", "curvature=\"ccw\""},
+                        {"appliedCant=\"120\" curvature=\"cw\"", "appliedCant=\"120\" curvature=\"ccw\""}}),
+              testing::Contains(inner));
+  EXPECT_THAT(problems({{"appliedCant=\"120\"", "appliedCant=\"0.12\""}}), testing::Contains(metres));
+  EXPECT_THAT(problems({{" linearUnit=\"meter\"", ""}}), testing::Contains(unit));
+}
+
+// Of a plan whose axes are exchanged nothing else is wrong.
+TEST_F(LandXmlTest, APlanThatLiesWhereItsSystemIsNotMadeForIsTold) {
+  const auto problems = [&](const std::string& begin, const std::string& end, const std::string& epsg) {
+    const std::string text =
+        "<LandXML version=\"1.2\"><Units><Metric linearUnit=\"meter\"/></Units><CoordinateSystem epsgCode=\"" + epsg +
+        "\"/><Alignments><Alignment name=\"L\" length=\"1000\" staStart=\"0\"><CoordGeom><Line "
+        "length=\"1000\"><Start>" +
+        begin + "</Start><End>" + end + "</End></Line></CoordGeom></Alignment></Alignments></LandXML>";
+    return core::value_or_throw(build_map({write("w.xml", text)}, {})).map.problems;
+  };
+  const auto elsewhere = HasSubstr("the tracks lie around ");
+  EXPECT_THAT(problems("1200000 2600000", "1201000 2600000", "2056"), testing::Each(testing::Not(elsewhere)));
+  EXPECT_THAT(problems("2600000 1200000", "2601000 1200000", "2056"),
+              testing::Contains(HasSubstr("eastings and northings are exchanged, and the map is a mirror image")));
+  EXPECT_THAT(problems("1200000 2600000", "1201000 2600000", "21781"),
+              testing::Contains(testing::AllOf(elsewhere, HasSubstr("the coordinates are of another system"))));
 }
 
 TEST_F(LandXmlTest, NamesTheLineThatIsWrong) {

@@ -75,6 +75,26 @@ class OsmTest : public ImportTest {
   }
 };
 
+// JOSM keeps what was deleted in its file until it is uploaded.
+TEST_F(OsmTest, WhatWasDeletedInJosmIsNoTrack) {
+  const auto track_m = [&](const std::string& of_way, const std::string& generator) {
+    const std::string text =
+        "<osm version='0.6' generator='" + generator +
+        "'><node id='1' version='1' lat='48.2' lon='15.6'/><node id='2' version='1' lat='48.21' lon='15.6'/>"
+        "<node id='3' version='1' lat='48.22' lon='15.6'/><way id='10' version='1'><nd ref='1'/><nd ref='2'/>"
+        "<tag k='railway' v='rail'/></way><way id='11' version='1' " +
+        of_way + "><nd ref='2'/><nd ref='3'/><tag k='railway' v='rail'/></way></osm>";
+    double length_m = 0;
+    for (const Edge& edge : core::value_or_throw(build_map({write("d.osm", text)}, {})).map.edges)
+      length_m += edge.alignment.length_m();
+    return length_m;
+  };
+  EXPECT_NEAR(track_m("", "JOSM"), 2224, 10);
+  EXPECT_NEAR(track_m("action='modify' visible='true'", "JOSM"), 2224, 10);
+  EXPECT_NEAR(track_m("action='delete' visible='true'", "JOSM"), 1112, 5);
+  EXPECT_NEAR(track_m("visible='false'", "Overpass API"), 1112, 5);
+}
+
 TEST_F(OsmTest, XmlAndPbfGiveTheSameNetwork) {
   for (const char* name : {"a.osm", "a.osm.pbf", "a.osm.bz2", "a.osm.gz"}) {
     SCOPED_TRACE(name);

@@ -88,14 +88,18 @@ TEST(Path, ListsMarksByDistanceAsSeenAlongThePath) {
   EXPECT_EQ(siding.landmarks()[0].kind, LandmarkKind::portal_out);
 }
 
+/// Of one edge, closed.
+std::shared_ptr<const Map> ring(double length_m) {
+  auto map = std::make_shared<Map>();
+  map->edges = {{1, "ring", 1, 1, "", Alignment::chained({}, {{length_m, 0.01, 0.01}})}};
+  map->nodes = {{1, NodeKind::joint, "", 0, 0}};
+  map->connections = {{1, 1, 1, false}};
+  return map;
+}
+
 TEST(Path, EndsOnARing) {
-  Map map;
   const double length = 2 * core::kPi * 100;
-  map.edges = {{1, "ring", 1, 1, "", Alignment::chained({}, {{length, 0.01, 0.01}})}};
-  map.nodes = {{1, NodeKind::joint, "", 0, 0}};
-  map.connections = {{1, 1, 1, false}};
-  const Path path =
-      core::value_or_throw(Path::follow(std::make_shared<const Map>(map), {1, 10, Direction::forward}, 2000, 2000));
+  const Path path = core::value_or_throw(Path::follow(ring(length), {1, 10, Direction::forward}, 2000, 2000));
   EXPECT_NEAR(path.end_m(), 2000, 1e-9);
   EXPECT_NEAR(path.begin_m(), -2000, 1e-9);
   EXPECT_NEAR(path.position_at(length).offset_m, 10, 1e-9);
@@ -103,6 +107,20 @@ TEST(Path, EndsOnARing) {
   EXPECT_NEAR(*path.distance_of(1, 5), -5, 1e-9);
   EXPECT_NEAR(*path.distance_of({1, 5, Direction::forward}, 1.9 * length), 2 * length - 5, 1e-9);
   EXPECT_FALSE(path.distance_of({1, 5, Direction::reverse}, 0));
+}
+
+TEST(Path, OfATrainThatRunsForWeeksStaysShort) {
+  const double length_m = 2 * core::kPi / 0.01;
+  const auto map = ring(length_m);
+  const Ways ways(*map);
+  Path path = core::value_or_throw(Path::follow(map, {1, 10, Direction::forward}, 2000, 2000));
+  constexpr double kRunM = 600'000;
+  for (double here_m = 0; here_m < kRunM; here_m += 30'000)
+    path = followed_on(path, ways, here_m, 60'000, 2000).value();
+  EXPECT_LT(path.end_m() - path.begin_m(), 300'000);
+  const double place_m = std::round(kRunM / length_m) * length_m;
+  EXPECT_NEAR(*path.distance_of({1, 10, Direction::forward}, kRunM), place_m, 1e-3);
+  EXPECT_NEAR(path.position_at(place_m + 100).offset_m, 110, 1e-3);
 }
 
 TEST(Path, IsFollowedOnWithItsDistances) {

@@ -46,6 +46,23 @@ TEST_F(RailmlTest, ADrawingIsPutNowhereOnTheEarth) {
   EXPECT_THAT(drawn.map.problems, testing::Not(testing::Contains(HasSubstr("give --crs"))));
 }
 
+// What is said for both directions holds until something is said for one.
+TEST_F(RailmlTest, ASpeedForOneDirectionEndsOneForBoth) {
+  std::string text = railml2("500");
+  const size_t begin = text.find("<trackElements>") + std::string("<trackElements>").size();
+  text.insert(begin,
+              "<speedChanges><speedChange id=\"a\" pos=\"0\" dir=\"both\" vMax=\"60\"/>"
+              "<speedChange id=\"b\" pos=\"50\" dir=\"up\" vMax=\"100\"/>"
+              "<speedChange id=\"c\" pos=\"450\" dir=\"both\" vMax=\"60\"/></speedChanges>");
+  const auto map = core::value_or_throw(build_map({write("s.railml", text)}, {})).map;
+  std::map<Direction, double> kmh_at_60_m;
+  for (const auto& limit : map.edges[0].speed_limits) {
+    if (limit.from_m < 60 && limit.to_m > 60) kmh_at_60_m[limit.direction] = std::round(3.6 * limit.speed_mps);
+  }
+  EXPECT_THAT(kmh_at_60_m,
+              testing::ElementsAre(testing::Pair(Direction::forward, 100), testing::Pair(Direction::reverse, 60)));
+}
+
 TEST_F(RailmlTest, ChangesBeyondTheirTrackAreLeftOutAndTold) {
   std::string text = railml2("500");
   const size_t end = text.find("<trackElements>");
@@ -54,6 +71,11 @@ TEST_F(RailmlTest, ChangesBeyondTheirTrackAreLeftOutAndTold) {
               "<speedChanges><speedChange id=\"far\" pos=\"14500\" dir=\"up\" vMax=\"20\"/></speedChanges>"
               "<gradientChanges><gradientChange id=\"steep\" pos=\"282100\" slope=\"5\"/></gradientChanges>");
   const auto map = core::value_or_throw(build_map({write("a.railml", text)}, {})).map;
+  const size_t radii = text.find("<radiusChanges>") + std::string("<radiusChanges>").size();
+  text.insert(radii, "<radiusChange id=\"before\" pos=\"-900\" radius=\"500\"/>");
+  const auto bent = core::value_or_throw(build_map({write("b.railml", text)}, {})).map;
+  EXPECT_THAT(bent.problems, testing::Contains("<radiusChange> \"before\" is not on its track; it is left out"));
+  EXPECT_EQ(bent.edges[0].alignment.at(1).curvature_per_m, map.edges[0].alignment.at(1).curvature_per_m);
   EXPECT_THAT(map.problems, testing::IsSupersetOf({"<speedChange> \"far\" is not on its track; it is left out",
                                                    "<gradientChange> \"steep\" is not on its track; it is left out"}));
 }

@@ -98,6 +98,7 @@ Evaluation evaluate(const Truth& truth, const RunTables& run) {
   result.travelled_m = truth.travelled_m(stretch);
   result.ride_s = core::seconds(truth.whole().to_ns - truth.whole().from_ns);
   result.ride_m = truth.travelled_m(truth.whole());
+  result.truth_gaps = truth.gaps();
   result.missing = run.missing;
   result.empty = run.empty;
   result.out_of_order = run.out_of_order;

@@ -39,6 +39,7 @@ struct Evaluation {
   double travelled_m = 0;
   double ride_s = 0;  // ... and of the truth: a run that was broken off is shorter
   double ride_m = 0;
+  Truth::Gaps truth_gaps;
   std::optional<OdometryResult> odometry;
   std::optional<PositionResult> position;
   std::optional<ViewResult> views;

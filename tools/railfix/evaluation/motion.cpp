@@ -203,7 +203,12 @@ PositionResult judge_position(const Truth& truth, const std::vector<StateRow>& r
   result.speed_rms_mps = speed_rms(result.motion);
   result.samples = on_map(truth, rows);
   result.from_map = !result.samples.empty();
-  if (!result.from_map) result.samples = by_distance(truth, rows);
+  if (!result.from_map) {
+    result.samples = by_distance(truth, rows);
+    result.truth_lacks_heading = std::ranges::any_of(truth.rows(), [](const dataset::TruthRow& row) {
+      return std::isfinite(row.easting_m + row.northing_m) && !std::isfinite(row.heading_rad);
+    });
+  }
   sum_up_errors(result);
   sum_up_interval(result);
   sum_up_track_choice(rows, result);

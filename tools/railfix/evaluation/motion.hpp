@@ -54,9 +54,10 @@ struct PositionSample {
 };
 
 struct PositionResult {
-  /// True: map coordinates against the truth's. False: distance run since the start, because one of them has no
-  /// coordinates.
+  /// True: map coordinates against the truth's. False: distance run since the first state, because one of them has no
+  /// coordinates, or the truth no heading.
   bool from_map = false;
+  bool truth_lacks_heading = false;
   std::vector<PositionSample> samples;  // only those with a position
   std::vector<MotionSample> motion;
   Drift drift;      // of the state's distance_m

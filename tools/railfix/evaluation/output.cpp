@@ -60,7 +60,11 @@ void print_odometry(std::ostream& out, const OdometryResult& odometry) {
 }
 
 void print_position(std::ostream& out, const PositionResult& position) {
-  out << "position (" << (position.from_map ? "on the map" : "distance only: no map coordinates to compare") << ")\n";
+  out << "position ("
+      << (position.from_map              ? "on the map"
+          : position.truth_lacks_heading ? "distance since the first state only: the truth has no heading"
+                                         : "distance since the first state only: no map coordinates to compare")
+      << ")\n";
   line(out, "error along the track", spread(position.error_m, metres) + ", bias " + metres(position.bias_m));
   if (position.cross_m.count > 0) line(out, "error across", spread(position.cross_m, metres));
   line(out, "interval coverage",
@@ -240,6 +244,10 @@ void print(const Evaluation& evaluation, std::ostream& out) {
   if (is_part(evaluation))
     out << ", a part of the ride of " << metres(evaluation.ride_m) << " in " << figure(evaluation.ride_s, "%.1f", " s");
   out << '\n';
+  if (const auto& gaps = evaluation.truth_gaps; gaps.count > 0) {
+    line(out, "gaps in the truth",
+         std::to_string(gaps.count) + " of up to " + figure(gaps.longest_s, "%.1f", " s") + ", not judged there");
+  }
   if (evaluation.odometry) print_odometry(out, *evaluation.odometry);
   if (evaluation.position) print_position(out, *evaluation.position);
   if (evaluation.views) print_views(out, *evaluation.views);
@@ -272,6 +280,7 @@ ordered_json to_json(const Evaluation& evaluation) {
                        {"ride_s", evaluation.ride_s},
                        {"ride_m", evaluation.ride_m},
                        {"missing", evaluation.missing}};
+  json["truth_gaps"] = {{"count", evaluation.truth_gaps.count}, {"longest_s", evaluation.truth_gaps.longest_s}};
   json["empty"] = evaluation.empty;
   json["out_of_order"] = evaluation.out_of_order;
   json["odometry"] = or_null(evaluation.odometry, odometry_json);

@@ -1,8 +1,12 @@
 #include "evaluation/truth.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 
+#include "core/quantile.hpp"
+#include "core/time.hpp"
 #include "core/units.hpp"
 
 namespace railfix::evaluation {
@@ -10,10 +14,55 @@ namespace railfix::evaluation {
 using core::Error;
 using dataset::TruthRow;
 
+namespace {
+
+double median(std::vector<double> values) {
+  std::ranges::sort(values);
+  return core::quantile(values, 0.5);
+}
+
+int64_t longest_step_ns(const std::vector<TruthRow>& rows) {
+  std::vector<double> steps;
+  for (size_t i = 1; i < rows.size(); ++i)
+    steps.push_back(static_cast<double>(rows[i].stamp_ns - rows[i - 1].stamp_ns));
+  return std::max(core::kNsPerSecond, static_cast<int64_t>(3 * median(steps)));
+}
+
+/// Degrees, or an angle that counts from the east, would put every error along the track across it. A train runs either
+/// way along its track.
+core::Status check_headings(const std::vector<TruthRow>& rows, const std::filesystem::path& file) {
+  constexpr double kWayM = 5;
+  constexpr double kMostRad = 0.3;
+  constexpr size_t kEnough = 10;
+  std::vector<double> off_rad;
+  for (size_t from = 0, to = 1; to < rows.size(); ++to) {
+    const double east_m = rows[to].easting_m - rows[from].easting_m;
+    const double north_m = rows[to].northing_m - rows[from].northing_m;
+    const double way_m = std::hypot(east_m, north_m);
+    if (way_m < kWayM) continue;
+    const double heading_rad = rows[from].heading_rad;
+    from = to;
+    if (!std::isfinite(way_m + heading_rad)) continue;
+    const double along = (east_m * std::sin(heading_rad) + north_m * std::cos(heading_rad)) / way_m;
+    off_rad.push_back(std::acos(std::min(1.0, std::abs(along))));
+  }
+  if (off_rad.size() < kEnough) return {};
+  const double usual_rad = median(off_rad);
+  if (usual_rad < kMostRad) return {};
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.2f", usual_rad);
+  return Error{file.string() + ": its headings are " + text.data() +
+               " rad off the way that easting and northing run, in the median; write them in radians, clockwise from "
+               "north"};
+}
+
+}  // namespace
+
 core::Result<Truth> Truth::read(const std::filesystem::path& folder) {
   auto rows = dataset::read_truth(folder / "track.csv");
   if (!rows.ok()) return rows.error();
   if (rows.value().size() < 2) return Error{(folder / "track.csv").string() + " needs at least two rows"};
+  if (const auto headings = check_headings(rows.value(), folder / "track.csv"); !headings.ok()) return headings.error();
   std::optional<std::vector<dataset::TruthLandmark>> landmarks;
   if (std::filesystem::exists(folder / "landmarks.csv")) {
     auto read = dataset::read_truth_landmarks(folder / "landmarks.csv");
@@ -44,6 +93,7 @@ void Truth::set_visibility(const std::vector<dataset::TruthVisibility>& rows) {
 Truth::Truth(std::vector<TruthRow> rows, std::optional<std::vector<dataset::TruthLandmark>> landmarks,
              std::optional<dataset::CameraCalibration> calibration)
     : rows_(std::move(rows)), landmarks_(std::move(landmarks)), calibration_(std::move(calibration)) {
+  longest_step_ns_ = longest_step_ns(rows_);
   for (const TruthRow& row : rows_) {
     if (!std::isfinite(row.curvature_per_m)) continue;
     const double vertical = std::isfinite(row.vertical_curvature_per_m) ? row.vertical_curvature_per_m : 0.0;
@@ -60,6 +110,7 @@ std::optional<TruthRow> Truth::at(int64_t stamp_ns) const {
   if (next->stamp_ns == stamp_ns) return *next;
   const TruthRow& a = *(next - 1);
   const TruthRow& b = *next;
+  if (is_gap(a.stamp_ns, b.stamp_ns)) return std::nullopt;
   const double share = static_cast<double>(stamp_ns - a.stamp_ns) / static_cast<double>(b.stamp_ns - a.stamp_ns);
   const auto between = [share](double from, double to) { return from + share * (to - from); };
   TruthRow row;
@@ -78,6 +129,16 @@ std::optional<TruthRow> Truth::at(int64_t stamp_ns) const {
   row.northing_m = between(a.northing_m, b.northing_m);
   row.heading_rad = core::wrap_pi(a.heading_rad + share * core::wrap_pi(b.heading_rad - a.heading_rad));
   return row;
+}
+
+Truth::Gaps Truth::gaps() const {
+  Gaps gaps;
+  for (size_t i = 1; i < rows_.size(); ++i) {
+    if (!is_gap(rows_[i - 1].stamp_ns, rows_[i].stamp_ns)) continue;
+    ++gaps.count;
+    gaps.longest_s = std::max(gaps.longest_s, core::seconds(rows_[i].stamp_ns - rows_[i - 1].stamp_ns));
+  }
+  return gaps;
 }
 
 Truth::Bend Truth::bend_at(double distance_m) const {

@@ -27,7 +27,7 @@ class Truth {
   Truth(std::vector<dataset::TruthRow> rows, std::optional<std::vector<dataset::TruthLandmark>> landmarks,
         std::optional<dataset::CameraCalibration> calibration);
 
-  /// Linear between the two rows around the stamp; nothing outside the table.
+  /// Linear between the two rows around the stamp; nothing outside the table and in its gaps.
   [[nodiscard]] std::optional<dataset::TruthRow> at(int64_t stamp_ns) const;
 
   struct Offset {
@@ -44,6 +44,13 @@ class Truth {
   void set_visibility(const std::vector<dataset::TruthVisibility>& rows);
 
   [[nodiscard]] const std::vector<dataset::TruthRow>& rows() const { return rows_; }
+  /// Rows in a row that lie further apart than a second and three times as far as usual: what was between them is not
+  /// known.
+  struct Gaps {
+    size_t count = 0;
+    double longest_s = 0;
+  };
+  [[nodiscard]] Gaps gaps() const;
   [[nodiscard]] const std::optional<std::vector<dataset::TruthLandmark>>& landmarks() const { return landmarks_; }
   [[nodiscard]] const std::optional<dataset::CameraCalibration>& calibration() const { return calibration_; }
   [[nodiscard]] Stretch whole() const { return {rows_.front().stamp_ns, rows_.back().stamp_ns}; }
@@ -57,7 +64,9 @@ class Truth {
     double vertical_per_m;
   };
   [[nodiscard]] Bend bend_at(double distance_m) const;
+  [[nodiscard]] bool is_gap(int64_t from_ns, int64_t to_ns) const { return to_ns - from_ns > longest_step_ns_; }
   std::vector<dataset::TruthRow> rows_;
+  int64_t longest_step_ns_ = 0;  // from row to row
   std::optional<std::vector<dataset::TruthLandmark>> landmarks_;
   std::optional<dataset::CameraCalibration> calibration_;
   std::unordered_map<int64_t, double> visible_;

@@ -176,12 +176,16 @@ core::Error same_run(const std::filesystem::path& run, const std::filesystem::pa
   return {run.string() + " is the same run as " + as.string() + "; give every run once"};
 }
 
-/// The same for a copy, another for every other ride.
+/// The same for a copy, also one that was saved with other line ends; another for every other ride.
 core::Result<std::string> content_of(const std::filesystem::path& file) {
-  const auto text = core::read_whole(file);
-  if (!text.ok()) return text.error();
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+  auto read = core::read_whole(file);
+  if (!read.ok()) return read.error();
+  std::string text = std::move(read).value();
+  if (text.starts_with(kByteOrderMark)) text.erase(0, kByteOrderMark.size());
+  std::erase(text, '\r');
   core::Fnv fnv;
-  fnv.add(text.value());
+  fnv.add(text);
   return fnv.hex();
 }
 

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <osmium/io/any_input.hpp>
 #include <osmium/io/compression.hpp>
 #include <osmium/io/file.hpp>
@@ -13,6 +14,8 @@
 #include <osmium/osm/relation.hpp>
 #include <osmium/osm/way.hpp>
 #include <osmium/visitor.hpp>
+#include <pugixml.hpp>
+#include <string_view>
 #include <unordered_set>
 
 #include "core/cut_text.hpp"
@@ -61,52 +64,6 @@ std::unordered_map<int64_t, OsmTags> platform_outlines(const std::string& file, 
   return out;
 }
 
-/// What the ways are comes before the nodes, and of these only what they use: a country fits into memory.
-OsmData read_passes(const std::string& file, bool with_trams) {
-  OsmData out;
-  const std::unordered_map<int64_t, OsmTags> outlines = platform_outlines(file, with_trams);
-  std::unordered_set<int64_t> wanted;
-  osmium::io::Reader ways(file, osmium::osm_entity_bits::way);
-  while (const osmium::memory::Buffer buffer = ways.read()) {
-    for (const osmium::Way& way : buffer.select<osmium::Way>()) {
-      OsmTags tags = tags_of(way);
-      std::vector<OsmWay>* ways_like_it = ways_for(out, tags, with_trams);
-      if (const auto outline = outlines.find(way.id()); ways_like_it == nullptr && outline != outlines.end()) {
-        ways_like_it = &out.platforms;
-        tags = outline->second;
-      }
-      if (ways_like_it == nullptr) continue;
-      OsmWay& taken = ways_like_it->emplace_back(OsmWay{way.id(), {}, std::move(tags)});
-      for (const osmium::NodeRef& node : way.nodes()) taken.nodes.push_back(node.ref());
-      wanted.insert(taken.nodes.begin(), taken.nodes.end());
-    }
-  }
-  ways.close();
-  NodesNowhere nowhere;
-  osmium::io::Reader nodes(file, osmium::osm_entity_bits::node);
-  while (const osmium::memory::Buffer buffer = nodes.read()) {
-    for (const osmium::Node& node : buffer.select<osmium::Node>()) {
-      if (!node.location().valid()) {
-        if (wanted.contains(node.id()))
-          nowhere.add({node.location().lat_without_check(), node.location().lon_without_check()});
-        continue;
-      }
-      OsmTags tags = tags_of(node);
-      if (!wanted.contains(node.id()) && !is_mast(tags)) continue;
-      out.nodes[node.id()] = {{node.location().lat(), node.location().lon()}, std::move(tags)};
-    }
-  }
-  const osmium::Box bounds = nodes.header().joined_boxes();
-  nodes.close();
-  nowhere.tell(out.problems);
-  if (bounds.valid()) {
-    const OsmBounds declared{{bounds.bottom_left().lat(), bounds.bottom_left().lon()},
-                             {bounds.top_right().lat(), bounds.top_right().lon()}};
-    tell_contradiction(declared, out);
-  }
-  return out;
-}
-
 /// The last bytes of a file, of what is in it where that is compressed: the whole file has to be unpacked for that.
 std::string end_of(const std::filesystem::path& file, size_t bytes) {
   const osmium::io::file_compression compression = osmium::io::File(file.string()).compression();
@@ -126,6 +83,76 @@ std::string end_of(const std::filesystem::path& file, size_t bytes) {
   }
   unpacked->close();
   return end;
+}
+
+/// JOSM keeps what was deleted until it is uploaded, marked in a way that osmium does not read.
+using Deleted = std::unordered_set<int64_t>;
+struct DeletedInJosm {
+  Deleted nodes;
+  Deleted ways;
+};
+DeletedInJosm deleted_in_josm(const std::string& file, const osmium::io::Header& header) {
+  DeletedInJosm deleted;
+  if (header.get("generator") != "JOSM") return deleted;
+  pugi::xml_document document;
+  const std::string text = end_of(file, std::numeric_limits<std::streamoff>::max());
+  if (!document.load_buffer(text.data(), text.size())) return deleted;  // told by osmium
+  for (const pugi::xml_node& object : document.child("osm").children()) {
+    if (std::string_view(object.attribute("action").value()) != "delete") continue;
+    const std::string_view kind = object.name();
+    if (kind == "node") deleted.nodes.insert(object.attribute("id").as_llong());
+    if (kind == "way") deleted.ways.insert(object.attribute("id").as_llong());
+  }
+  return deleted;
+}
+
+/// What the ways are comes before the nodes, and of these only what they use: a country fits into memory.
+OsmData read_passes(const std::string& file, bool with_trams) {
+  OsmData out;
+  const std::unordered_map<int64_t, OsmTags> outlines = platform_outlines(file, with_trams);
+  std::unordered_set<int64_t> wanted;
+  osmium::io::Reader ways(file, osmium::osm_entity_bits::way);
+  const DeletedInJosm deleted = deleted_in_josm(file, ways.header());
+  while (const osmium::memory::Buffer buffer = ways.read()) {
+    for (const osmium::Way& way : buffer.select<osmium::Way>()) {
+      if (!way.visible() || deleted.ways.contains(way.id())) continue;
+      OsmTags tags = tags_of(way);
+      std::vector<OsmWay>* ways_like_it = ways_for(out, tags, with_trams);
+      if (const auto outline = outlines.find(way.id()); ways_like_it == nullptr && outline != outlines.end()) {
+        ways_like_it = &out.platforms;
+        tags = outline->second;
+      }
+      if (ways_like_it == nullptr) continue;
+      OsmWay& taken = ways_like_it->emplace_back(OsmWay{way.id(), {}, std::move(tags)});
+      for (const osmium::NodeRef& node : way.nodes()) taken.nodes.push_back(node.ref());
+      wanted.insert(taken.nodes.begin(), taken.nodes.end());
+    }
+  }
+  ways.close();
+  NodesNowhere nowhere;
+  osmium::io::Reader nodes(file, osmium::osm_entity_bits::node);
+  while (const osmium::memory::Buffer buffer = nodes.read()) {
+    for (const osmium::Node& node : buffer.select<osmium::Node>()) {
+      if (!node.visible() || deleted.nodes.contains(node.id())) continue;
+      if (!node.location().valid()) {
+        if (wanted.contains(node.id()))
+          nowhere.add({node.location().lat_without_check(), node.location().lon_without_check()});
+        continue;
+      }
+      OsmTags tags = tags_of(node);
+      if (!wanted.contains(node.id()) && !is_mast(tags)) continue;
+      out.nodes[node.id()] = {{node.location().lat(), node.location().lon()}, std::move(tags)};
+    }
+  }
+  const osmium::Box bounds = nodes.header().joined_boxes();
+  nodes.close();
+  nowhere.tell(out.problems);
+  if (bounds.valid()) {
+    const OsmBounds declared{{bounds.bottom_left().lat(), bounds.bottom_left().lon()},
+                             {bounds.top_right().lat(), bounds.top_right().lon()}};
+    tell_contradiction(declared, out);
+  }
+  return out;
 }
 
 /// What Overpass writes at the end of XML; osmium reads over it. Empty where there is none.

@@ -58,12 +58,13 @@ class LandXmlReader {
     return {numbers[1], numbers[0]};
   }
 
-  void check_units(const pugi::xml_node& root) const {
+  void check_units(const pugi::xml_node& root) {
     const pugi::xml_node units = root.child("Units");
     const std::string_view unit = units.child("Metric").attribute("linearUnit").value();
     if (units.child("Imperial") || (!unit.empty() && unit != "meter" && unit != "metre")) {
       throw source_.wrong(units, "only LandXML in metres is read; export it with <Metric linearUnit=\"meter\">");
     }
+    if (unit.empty()) problem("the file names no unit of length (<Metric linearUnit=...>): metres are taken");
   }
 
   /// Left positive; nothing for a radius of INF.

@@ -123,8 +123,11 @@ class Railml2Reader {
 
   /// Every profile for itself: the lowest holds. "end" as speed ends a limit. On its own track only.
   void read_speeds(const pugi::xml_node& elements, NetTrack& track) {
-    std::map<std::pair<std::string, std::string>, std::vector<std::pair<double, double>>>
-        changes;  // profile, direction
+    struct Changes {
+      std::vector<std::pair<double, double>> up;  // offset, m/s
+      std::vector<std::pair<double, double>> down;
+    };
+    std::map<std::string, Changes> profiles;
     for (const pugi::xml_node& change : elements.child("speedChanges").children("speedChange")) {
       const std::string profile = change.attribute("profileRef").value();
       if (special_profiles_.contains(profile) || !lies_on(change, track)) continue;
@@ -132,12 +135,14 @@ class Railml2Reader {
       const double kmh = is_end ? 0 : source_.number(change, "vMax").value_or(0);
       if (!is_speed(kmh))
         tell_impossible(change, "vMax", std::string("km/h, ") + kNoTrainRuns + "; no limit begins there", track);
-      changes[{profile, change.attribute("dir").value()}].emplace_back(pos(change) - origin_m_,
-                                                                       core::mps_from_kmh(is_speed(kmh) ? kmh : 0));
+      const std::string direction = change.attribute("dir").value();
+      const std::pair limit(pos(change) - origin_m_, core::mps_from_kmh(is_speed(kmh) ? kmh : 0));
+      if (direction != "down") profiles[profile].up.push_back(limit);
+      if (direction != "up") profiles[profile].down.push_back(limit);
     }
-    for (const auto& [of, list] : changes) {
-      if (of.second != "down") add_speeds(list, Direction::forward, track.length_m, track.track);
-      if (of.second != "up") add_speeds(list, Direction::reverse, track.length_m, track.track);
+    for (const auto& [name, changes] : profiles) {
+      add_speeds(changes.up, Direction::forward, track.length_m, track.track);
+      add_speeds(changes.down, Direction::reverse, track.length_m, track.track);
     }
   }
 

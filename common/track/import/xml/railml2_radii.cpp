@@ -76,11 +76,15 @@ void read_radii2(const XmlSource& source, const pugi::xml_node& radius_changes, 
   std::vector<RadiusChange> changes;
   CantReader cant(source, track, problems);
   for (const pugi::xml_node& change : radius_changes.children("radiusChange")) {
+    const double offset_m = source.required(change, "pos") - origin_m;
+    if (!is_on_track(offset_m, track.length_m)) {
+      problems.push_back(not_on_its_track(change));
+      continue;
+    }
     const double radius = source.required(change, "radius");
     if (radius != 0 && std::abs(radius) < 10) throw source.wrong(change, "a radius of less than 10 m is no railway's");
     const double curvature_per_m = radius == 0 ? 0.0 : -1.0 / radius;
-    changes.push_back(
-        {source.required(change, "pos") - origin_m, curvature_per_m, cant.cant_of(change, curvature_per_m)});
+    changes.push_back({offset_m, curvature_per_m, cant.cant_of(change, curvature_per_m)});
   }
   cant.tell();
   std::ranges::stable_sort(changes, {}, &RadiusChange::offset_m);

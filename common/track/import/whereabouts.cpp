@@ -1,0 +1,48 @@
+#include "track/import/whereabouts.hpp"
+
+#include <optional>
+
+#include "track/import/told.hpp"
+
+namespace railfix::track {
+namespace {
+
+constexpr double kBeyondDeg = 1.0;  // lines run on across the border of a zone
+
+/// Of the tracks that have coordinates.
+std::optional<Eigen::Vector2d> middle_of(const Map& map) {
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  double length_m = 0;
+  for (const Edge& edge : map.edges) {
+    if (edge.is_drawn) continue;
+    const double of_edge_m = edge.alignment.length_m();
+    const PlanPose pose = edge.alignment.at(0.5 * of_edge_m).pose;
+    sum += of_edge_m * Eigen::Vector2d(pose.easting_m, pose.northing_m);
+    length_m += of_edge_m;
+  }
+  return length_m > 0 ? std::optional<Eigen::Vector2d>(sum / length_m) : std::nullopt;
+}
+
+}  // namespace
+
+std::string whereabouts_problem(const Map& map) {
+  const auto middle = map.crs.empty() ? std::nullopt : middle_of(map);
+  if (!middle) return "";
+  const auto opened = Projection::open(map.crs);
+  if (!opened.ok()) return "";
+  const Projection& projection = opened.value();
+  const auto fits = [&](const std::optional<GeoPoint>& place) {
+    return place && projection.is_made_for(*place, kBeyondDeg);
+  };
+  const auto place = projection.to_geo(middle->x(), middle->y());
+  if (fits(place)) return "";
+  const bool fits_exchanged = fits(projection.to_geo(middle->y(), middle->x()));
+  const std::string around =
+      place ? "latitude " + told_number(place->lat_deg, 3) + ", longitude " + told_number(place->lon_deg, 3)
+            : "easting " + told_m(middle->x(), 0) + ", northing " + told_m(middle->y(), 0);
+  return "the tracks lie around " + around + ", for which " + map.crs + " is not made: " +
+         (fits_exchanged ? "eastings and northings are exchanged, and the map is a mirror image"
+                         : "the coordinates are of another system, or eastings and northings are exchanged");
+}
+
+}  // namespace railfix::track
