@@ -80,7 +80,7 @@ describe("the page", { timeout: 600000 }, () => {
     await until("the camera holds the position", async () => (await page.locator("#figure-integrity .sources .on", { hasText: "camera" }).count()) === 1);
     await until("it is live", async () => (await page.locator("#numbers.stale").count()) === 0);
     assert.match(await text(".connection"), /Connected/);
-    assert.match(await page.title(), /run-\d+ Railfix/);
+    await until("the title names the train", async () => /run-\d+ Railfix/.test(await page.title()));
   });
 
   it("draws the train on its line, with its interval along the track", async () => {
